@@ -1,0 +1,20 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPODE_H
+#define HAPODE_HAPODE_H
+
+/* Everything but the parts with ODE types (hapode/ode.h) and the part for people who write a
+ * device (hapode/device_impl.h). */
+
+#include <hapode/attributes.h>
+#include <hapode/device.h>
+#include <hapode/hooks.h>
+#include <hapode/pointer.h>
+#include <hapode/record.h>
+#include <hapode/session.h>
+#include <hapode/spatial.h>
+#include <hapode/stats.h>
+#include <hapode/status.h>
+#include <hapode/version.h>
+
+#endif

@@ -1,0 +1,34 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HOOKS_H
+#define HAPODE_HOOKS_H
+
+#include <stddef.h>
+
+#include <hapode/attributes.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+typedef enum hap_log_level {
+  HAP_LOG_ERROR = 0,
+  HAP_LOG_WARNING = 1,
+  HAP_LOG_INFO = 2
+} hap_log_level;
+
+/* The process-wide hooks. A member left NULL keeps its default: malloc, free, and a log that is
+ * thrown away. */
+typedef struct hap_hooks {
+  void *(*allocate)(size_t size, void *user); /* as malloc; NULL is a legal answer */
+  void (*release)(void *memory, void *user);  /* as free */
+  void (*log)(hap_log_level level, const char *text, void *user); /* any thread but the haptic */
+  void *user;
+} hap_hooks;
+
+/* [control] Sets the hooks, or the defaults when hooks is NULL. Call it before any other function
+ * of the library and not again while an object of the library lives. */
+HAP_API hap_status hap_hooks_set(const hap_hooks *hooks);
+
+HAP_END_DECLS
+
+#endif

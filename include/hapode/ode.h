@@ -1,0 +1,89 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_ODE_H
+#define HAPODE_ODE_H
+
+/* The only public header with ODE types. */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+#include <hapode/attributes.h>
+#include <hapode/session.h>
+#include <hapode/spatial.h>
+#include <hapode/status.h>
+
+#ifndef dDOUBLE
+#error "hapode needs ODE in double precision (define dIDEDOUBLE, or use ode.pc of such a build)"
+#endif
+
+HAP_BEGIN_DECLS
+
+/* [physics] Whether a and b collide. io arrives with mode dContactApprox1 and mu = infinity; fill
+ * in what the pair's surface is. Called once per pair and step, never in testing simulations. */
+typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io);
+
+/* [physics] Forces in (before) and results out (after) of a global step of step_s seconds; never
+ * called for testing simulations. */
+typedef void (*hap_step_fn)(void *user, double step_s);
+
+/* The application's world. From start to stop it is touched only under hap_session_lock, in a
+ * posted edit, or in one of these callbacks.
+ *
+ * Bodies known to the session: those of the geoms in space (and in spaces inside it), whatever is
+ * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
+ * must be adopted, or a testing simulation would move it. */
+typedef struct hap_ode_def {
+  uint32_t size;                 /* set by hap_ode_def_init */
+  uint32_t cookie;               /* set by hap_ode_def_init */
+  dWorldID world;                /* borrowed; one session per world */
+  dSpaceID space;                /* borrowed */
+  hap_surface_fn surface;        /* NULL: every pair collides with mu = infinity */
+  hap_step_fn before_step;       /* may be NULL */
+  hap_step_fn after_step;        /* may be NULL */
+  void *user;                    /* handed to the three */
+  int32_t max_contacts_per_pair; /* 1..64, default 8 */
+} hap_ode_def;
+
+/* [any] */
+HAP_API void hap_ode_def_init(hap_ode_def *def, size_t size_of_def);
+
+/* [control] Creates a session over the world. ODE must be initialised (dInitODE2). Nothing moves
+ * before start. On failure *out is NULL and detail (may be NULL) says what to do.
+ * HAP_ERROR_UNINITIALISED, HAP_ERROR_ARGUMENT (field named in detail), HAP_ERROR_UNSUPPORTED (model
+ * CONTACT), HAP_ERROR_WORLD (a body that cannot be simulated), HAP_ERROR_MEMORY. */
+HAP_API HAP_NODISCARD hap_status hap_session_create(const hap_session_def *def,
+                                                    const hap_ode_def *ode, hap_session **out,
+                                                    hap_detail *detail);
+
+/* [locked, or control before start] Makes known a body without geom and without joint. Forget it
+ * before dBodyDestroy. */
+HAP_API HAP_NODISCARD hap_status hap_session_adopt_body(hap_session *session, dBodyID body);
+
+/* [locked] Before dBodyDestroy: the session drops what it knows of the body. */
+HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
+
+/* [locked] Before dGeomDestroy of a geom that a pointer may be near to. */
+HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
+
+/* [locked, or control before start] ODE has no getter for a body's moved callback, so the session
+ * can keep one silent in testing simulations only when it was set here (NULL: none). */
+HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
+                                                                void (*callback)(dBodyID));
+
+/* [any] Poses for drawing at time_ns (see hap_session_now): interpolated between physics steps one
+ * H behind. Unknown bodies give HAP_ERROR_NOT_FOUND and leave out untouched. */
+HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
+                                     size_t count, hap_pose *out);
+
+/* [locked, or control before start] Bodies whose positions go into the trace, at most
+ * HAP_TRACE_BODIES_MAX; replaces an earlier list. */
+HAP_API HAP_NODISCARD hap_status hap_session_trace_bodies(hap_session *session,
+                                                          const dBodyID *bodies, size_t count);
+
+HAP_END_DECLS
+
+#endif

@@ -1,0 +1,86 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_POINTER_H
+#define HAPODE_POINTER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hapode/attributes.h>
+#include <hapode/device.h>
+#include <hapode/session.h>
+#include <hapode/spatial.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+/* Index and generation in one number: an id of a removed pointer is never valid again. 0 is
+ * none. */
+typedef struct hap_pointer_id {
+  uint64_t v;
+} hap_pointer_id;
+
+typedef enum hap_coupling {
+  HAP_COUPLING_DIRECT = 0 /* the pointer is at the pose of the device (the paper) */
+} hap_coupling;
+
+/* What the hand holds in the world. */
+typedef struct hap_pointer_def {
+  uint32_t size;      /* set by hap_pointer_def_init */
+  uint32_t cookie;    /* set by hap_pointer_def_init */
+  hap_device *device; /* borrowed, one pointer per device; NULL: hap_pointer_set_target moves it */
+  double radius;      /* m, > 0, default 0.01: the pointer is a sphere */
+  double mass;        /* kg, >= 0, default 0; reserved for the coupling proxy */
+  double stiffness;   /* N/m, >= 0, default 1000: k of eq. 7 */
+  double damping;     /* N s/m, >= 0, default 0: d of eq. 7, acts while in contact */
+  double friction;    /* reserved; must be 0 in this version */
+  const double *hull_xyz;     /* reserved for 6-DoF tools; must be NULL in this version */
+  size_t hull_points;         /* must be 0 in this version */
+  hap_pose pose_world_device; /* pose of the device's frame in the world, default identity */
+  double motion_scale;        /* world metres per device metre, > 0, default 1 */
+  double force_scale;         /* device newtons per world newton, >= 0, default 1. The stiffness
+                                 felt at the device is stiffness x motion_scale x force_scale. */
+  double max_force;           /* N at the device, > 0; the device's own limit holds as well.
+                                 Default 20. */
+  double max_torque;          /* N m at the device, > 0, default 1 */
+  hap_coupling coupling;      /* default HAP_COUPLING_DIRECT */
+  uint32_t collide_bits;      /* the pointer touches geoms whose category bits meet these; default
+                                 all */
+} hap_pointer_def;
+
+/* [any] Fills *def with defaults. */
+HAP_API void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def);
+
+/* [control] Adds a pointer, also while running; it feels forces from the next sync on.
+ * HAP_ERROR_CAPACITY beyond max_pointers; HAP_ERROR_STATE when the device is in use. */
+HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def,
+                                                 hap_pointer_id *out);
+
+/* [control] Zero force, device stopped, id invalid. */
+HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
+
+/* [app] Moves a pointer without device: pose and twist (may be NULL: at rest) in the device's
+ * frame, from the next tick on. Non-finite values are HAP_ERROR_ARGUMENT and change nothing. */
+HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
+                                          const hap_pose *pose, const hap_twist *twist);
+
+typedef struct hap_pointer_state {
+  uint32_t size;
+  uint32_t contacts; /* bodies that push back now */
+  int64_t stamp_ns;  /* of the tick */
+  hap_pose device;   /* device's frame */
+  hap_pose proxy;    /* pointer in the world */
+  hap_twist twist;   /* pointer in the world */
+  hap_wrench wrench; /* on the hand, world frame, after the guard: what was written to the
+                           device, divided by force_scale */
+  uint32_t buttons;  /* bit 0 is the first one */
+  uint32_t reserved;
+} hap_pointer_state;
+
+/* [any] State after the newest tick. */
+HAP_API hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
+                                   hap_pointer_state *out, size_t size_of_out);
+
+HAP_END_DECLS
+
+#endif

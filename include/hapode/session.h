@@ -1,0 +1,137 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SESSION_H
+#define HAPODE_SESSION_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hapode/attributes.h>
+#include <hapode/stats.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+/* A session couples one ODE world to the pointers that a hand holds in it. It is created with
+ * hap_session_create of ode.h.
+ *
+ * Threads. [control]: one application thread at a time, the one that also creates and destroys.
+ * [app]: any application thread, but not from a callback. [any]: any thread at all. */
+typedef struct hap_session hap_session;
+
+/* Who moves time. Values are fixed. */
+typedef enum hap_drive {
+  HAP_DRIVE_THREADS = 0, /* the library's own physics and haptic threads, real time */
+  HAP_DRIVE_FRAME = 1,   /* the application's frame loop calls hap_session_update for physics;
+                            the haptic thread is the library's, real time */
+  HAP_DRIVE_LOCKSTEP = 2 /* hap_session_advance; virtual clock from 0, one thread, reproducible */
+} hap_drive;
+
+/* How near things are simulated (the paper: Susa, Sato, Hasegawa, World Haptics 2011). */
+typedef enum hap_model {
+  HAP_MODEL_SINGLE = 0,      /* paper's Method 1: the world itself at the haptic rate */
+  HAP_MODEL_IMPULSE = 1,     /* paper's Method 3: force on the last known pose */
+  HAP_MODEL_ACCELERANCE = 2, /* paper's Method 2: testing simulations, A and b in the loop */
+  HAP_MODEL_CONTACT = 3      /* contacts in the loop; not supported by this version */
+} hap_model;
+
+/* Where model IMPULSE shows a body between two physics steps. */
+typedef enum hap_impulse_pose {
+  HAP_IMPULSE_INTERPOLATED = 0, /* moves from the last but one to the last pose in one step H */
+  HAP_IMPULSE_HELD = 1          /* stays at the last pose */
+} hap_impulse_pose;
+
+/* How model ACCELERANCE tests (design.md 3.1). */
+typedef enum hap_probe {
+  HAP_PROBE_SHARED = 0, /* one zero probe for all neighbours: 1 + 3N steps */
+  HAP_PROBE_PAPER = 1   /* four steps for each neighbour: 4N steps */
+} hap_probe;
+
+#define HAP_LATENCY_NEXT_SYNC (-1)
+
+typedef struct hap_session_def {
+  uint32_t size;        /* set by hap_session_def_init */
+  uint32_t cookie;      /* set by hap_session_def_init; an unset def is refused */
+  hap_drive drive;      /* default HAP_DRIVE_THREADS */
+  hap_model model;      /* default HAP_MODEL_ACCELERANCE */
+  double physics_hz;    /* Hz, 1..1000 and at most haptic_hz, default 60; unused by model SINGLE */
+  double contact_hz;    /* Hz, 20..1000, default 200; reserved for model CONTACT */
+  double haptic_hz;     /* Hz, 100..20000, default 1000 */
+  int32_t max_bodies;   /* bodies the loop can carry, 1..1024, default 64 */
+  int32_t max_contacts; /* pointer-body contacts, 1..4096, default 256 */
+  int32_t max_pointers; /* 1..16, default 4 */
+  int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
+                           time. Default 80. Physics runs at half of it. */
+  int32_t physics_latency_ticks; /* LOCKSTEP: ticks from the start of a physics step to the tick
+                                    that uses its result. HAP_LATENCY_NEXT_SYNC (default): the
+                                    end of the step, as in the paper. */
+  int32_t trace_rows; /* rows kept for hap_session_trace_read, 0..1048576, default 0: none */
+  hap_impulse_pose impulse_pose; /* default HAP_IMPULSE_INTERPOLATED */
+  hap_probe probe;               /* default HAP_PROBE_SHARED */
+  uint32_t flags;                /* no bit is defined; an unknown bit is an error */
+} hap_session_def;
+
+/* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
+HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
+
+/* [control] Stops, writes zero force to every device, frees. NULL is allowed. The world goes back
+ * to the application as it is, with ODE's auto-disable as it was found. */
+HAP_API void hap_session_destroy(hap_session *session);
+
+/* [control] THREADS: starts both threads; FRAME: the haptic one; LOCKSTEP: builds the first local
+ * model. HAP_NO_REALTIME when real-time rights were asked for and not given (it runs all the
+ * same). HAP_ERROR_STATE when already started; HAP_ERROR_WORLD with a detail text. */
+HAP_API HAP_NODISCARD hap_status hap_session_start(hap_session *session);
+
+/* [control] Zero force, then threads end. Idempotent. A stopped session can be started again. */
+HAP_API hap_status hap_session_stop(hap_session *session);
+
+/* [control] FRAME: runs the whole physics steps that fit into frame_s seconds [s, finite, >= 0]
+ * plus the remainder of earlier calls, at most 3; the rest is dropped and counted
+ * (HAP_DROPPED). */
+HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
+
+/* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due. */
+HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
+
+/* [app] Between lock and unlock this thread alone may touch the ODE world. Waits at most one
+ * physics step. Not recursive. Legal before start and after stop. HAP_ERROR_THREAD from a callback
+ * or when this thread holds the lock. */
+HAP_API HAP_NODISCARD hap_status hap_session_lock(hap_session *session);
+
+/* [app] As lock, but gives up after timeout_ns (0: at once) with HAP_ERROR_TIMEOUT. */
+HAP_API HAP_NODISCARD hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns);
+
+/* [app] The thread that locked. */
+HAP_API hap_status hap_session_unlock(hap_session *session);
+
+/* [any] Runs edit(arg) in the physics thread before its next step. In order of posting; at most
+ * 256 wait at a time (HAP_ERROR_CAPACITY). Edits not yet run when the session stops are run by
+ * stop. */
+typedef void (*hap_edit_fn)(void *arg);
+HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit_fn edit,
+                                                  void *arg);
+
+/* [any] From the next sync on. HAP_ERROR_UNSUPPORTED for HAP_MODEL_CONTACT in this version. */
+HAP_API HAP_NODISCARD hap_status hap_session_set_model(hap_session *session, hap_model model);
+
+/* [any] Clears a latched fault; force may be felt again from the next tick on. */
+HAP_API hap_status hap_session_reset_fault(hap_session *session);
+
+/* [any] Text of the last error or fault of this session; "" when there was none. */
+HAP_API hap_status hap_session_detail(const hap_session *session, hap_detail *out);
+
+/* [any] A consistent-enough copy for display: each counter is exact, the set may straddle a tick.
+ * size_of_out: sizeof *out of the caller's build. */
+HAP_API hap_status hap_session_stats(const hap_session *session, hap_stats *out,
+                                     size_t size_of_out);
+
+/* [any] Time of the session [ns]: CLOCK_MONOTONIC, in lockstep the virtual clock. */
+HAP_API int64_t hap_session_now(const hap_session *session);
+
+/* [any] Name of a model as programs spell it ("accelerance"); NULL for an unknown value. */
+HAP_API const char *hap_model_name(hap_model model);
+
+HAP_END_DECLS
+
+#endif

@@ -1,0 +1,84 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_STATS_H
+#define HAPODE_STATS_H
+
+#include <stdint.h>
+
+/* Why the guard took the force away. Values are never renumbered. */
+typedef enum hap_fault {
+  HAP_FAULT_NONE = 0,
+  HAP_FAULT_DEVICE_READ = 1,  /* the device's read failed */
+  HAP_FAULT_DEVICE_POSE = 2,  /* the device gave a pose that is not finite */
+  HAP_FAULT_FORCE = 3,        /* a wrench was not finite */
+  HAP_FAULT_LOCAL_STATE = 4,  /* a local body's state was not finite */
+  HAP_FAULT_DEVICE_WRITE = 5, /* the device's write failed */
+  HAP_FAULT_WORLD = 6         /* the ODE world holds a body that cannot be stepped */
+} hap_fault;
+
+/* Everything since start. Times of ticks and steps are wall-clock, in lockstep as well; in
+ * lockstep they are the only figures that differ from run to run. Grows at its end. */
+typedef struct hap_stats {
+  uint32_t size;  /* bytes filled in */
+  uint32_t model; /* hap_model in force in the loop */
+
+  /* Haptic loop. */
+  uint64_t ticks;         /* executed */
+  uint64_t missed_ticks;  /* deadlines t0 + jT with no tick begun before t0 + (j+1)T */
+  uint64_t contact_ticks; /* ticks in which a pointer was pushed back */
+  double tick_us_mean;    /* us, the whole cycle with device input and output */
+  double tick_us_p50;
+  double tick_us_p99;
+  double tick_us_max;
+  double haptic_duty; /* mean tick time / T */
+  double model_age_s; /* now - time for which the newest adopted model was built */
+  double model_age_max_s;
+  uint64_t models_adopted;
+
+  /* Physics. */
+  uint64_t physics_steps;
+  uint64_t physics_missed; /* deadlines of steps passed over because physics was late */
+  uint64_t frames_dropped; /* FRAME: steps dropped by hap_session_update */
+  double physics_ms_mean;  /* ms a cycle: all of the parts below */
+  double physics_ms_p99;
+  double physics_ms_max;
+  double physics_duty;      /* mean cycle time / H */
+  double collide_ms_mean;   /* broad and narrow phase, contact joints */
+  double neighbour_ms_mean; /* neighbours and nearest points */
+  double testing_ms_mean;   /* testing simulations and what they save and restore */
+  double step_ms_mean;      /* the global step */
+  double publish_ms_mean;   /* reconcile, messages, poses */
+  double last_collide_ms;   /* the newest cycle alone */
+  double last_neighbour_ms;
+  double last_testing_ms;
+  double last_step_ms;
+  double last_publish_ms;
+  uint64_t quickstep_calls; /* dWorldQuickStep, global and testing */
+  uint64_t probe_steps;     /* testing simulations among them */
+  uint32_t bodies_known;
+  uint32_t neighbours; /* dynamic bodies in the newest model */
+  uint32_t neighbours_max;
+  uint32_t pointer_contacts; /* pointer-geom pairs in the newest model */
+  uint64_t capacity_dropped; /* bodies or contacts that found no room */
+  uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept */
+  uint64_t states_rejected;  /* non-finite states kept away from ODE */
+  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body */
+
+  /* Momentum audit: what the hands gave to dynamic bodies against what the world got. */
+  double impulse_ns;        /* N s, norm of the net impulse on the bodies */
+  double impulse_abs_ns;    /* N s, sum over ticks of the norms */
+  double momentum_ratio;    /* world / hand along the net impulse; NaN while the net is below 5 %
+                               of the sum of norms */
+  double momentum_error_ns; /* N s, norm of the difference */
+  double peak_force_n;      /* N, largest on a hand, before force_scale */
+
+  /* Guard. */
+  uint64_t saturated_ticks;
+  uint64_t faults;        /* latched so far */
+  uint32_t fault;         /* hap_fault latched now */
+  uint32_t realtime;      /* 1: haptic thread runs under SCHED_FIFO */
+  uint64_t trace_dropped; /* rows that found no room */
+  uint64_t trace_hash;    /* lockstep: states and forces of all ticks; 0 otherwise */
+} hap_stats;
+
+#endif

@@ -1,0 +1,19 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_VERSION_H
+#define HAPODE_VERSION_H
+
+#include <hapode/attributes.h>
+
+HAP_BEGIN_DECLS
+
+#define HAP_VERSION_MAJOR 0
+#define HAP_VERSION_MINOR 1
+#define HAP_VERSION_PATCH 0
+
+/* [any] Version of the library that runs, such as "0.1.0". */
+HAP_API const char *hap_version(void);
+
+HAP_END_DECLS
+
+#endif

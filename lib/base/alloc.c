@@ -1,0 +1,83 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/alloc.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/hooks.h"
+
+static void *default_allocate(size_t size, void *user)
+{
+  (void)user;
+  return malloc(size);
+}
+
+static void default_release(void *memory, void *user)
+{
+  (void)user;
+  free(memory);
+}
+
+static void default_log(hap_log_level level, const char *text, void *user)
+{
+  (void)level;
+  (void)text;
+  (void)user;
+}
+
+/* Not atomic: hap_hooks_set is promised to come before any object of the library. */
+static hap_hooks current = {default_allocate, default_release, default_log, NULL};
+
+const hap_hooks *hapi_hooks(void)
+{
+  return &current;
+}
+
+hap_status hap_hooks_set(const hap_hooks *hooks)
+{
+  hap_hooks wanted = {NULL, NULL, NULL, NULL};
+  if (hooks != NULL) {
+    wanted = *hooks;
+  }
+  /* Half a pair would free the memory of one heap in another. */
+  if ((wanted.allocate == NULL) != (wanted.release == NULL)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (wanted.allocate == NULL) {
+    wanted.allocate = default_allocate;
+    wanted.release = default_release;
+  }
+  if (wanted.log == NULL) {
+    wanted.log = default_log;
+  }
+  current = wanted;
+  return HAP_OK;
+}
+
+void *hapi_alloc(size_t size)
+{
+  /* One byte at least: malloc(0) may answer NULL, which here means out of memory. */
+  size_t wanted = size != 0 ? size : 1;
+  void *memory = current.allocate(wanted, current.user);
+  if (memory != NULL) {
+    memset(memory, 0, wanted);
+  }
+  return memory;
+}
+
+void *hapi_alloc_array(size_t count, size_t size)
+{
+  if (size != 0 && count > SIZE_MAX / size) {
+    return NULL;
+  }
+  return hapi_alloc(count * size);
+}
+
+void hapi_free(void *memory)
+{
+  if (memory != NULL) {
+    current.release(memory, current.user);
+  }
+}

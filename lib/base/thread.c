@@ -1,0 +1,87 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/thread.h"
+
+#include <sched.h>
+#include <string.h>
+#include <sys/mman.h>
+#if defined(__linux__)
+#include <sys/prctl.h>
+#endif
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+#define STACK_TOUCHED 65536
+
+static int create(hapi_thread *thread, void *(*entry)(void *), void *arg, int priority)
+{
+  pthread_attr_t attributes;
+  int failed = pthread_attr_init(&attributes);
+  if (failed != 0) {
+    return failed;
+  }
+  if (priority > 0) {
+    struct sched_param parameters;
+    memset(&parameters, 0, sizeof parameters);
+    parameters.sched_priority = priority;
+    pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+    pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+    pthread_attr_setschedparam(&attributes, &parameters);
+  }
+  failed = pthread_create(&thread->handle, &attributes, entry, arg);
+  pthread_attr_destroy(&attributes);
+  return failed;
+}
+
+hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
+                             const char *name, int priority)
+{
+  thread->realtime = priority > 0 && create(thread, main, arg, priority) == 0;
+  if (!thread->realtime && create(thread, main, arg, 0) != 0) {
+    return HAP_ERROR_SYSTEM;
+  }
+  thread->running = true;
+  char shown[16];
+  strncpy(shown, name, sizeof shown - 1);
+  shown[sizeof shown - 1] = '\0';
+  pthread_setname_np(thread->handle, shown);
+  return HAP_OK;
+}
+
+void hapi_thread_join(hapi_thread *thread)
+{
+  if (thread->running) {
+    pthread_join(thread->handle, NULL);
+    thread->running = false;
+  }
+}
+
+static void touch_stack(void)
+{
+  volatile char deep[STACK_TOUCHED];
+  for (size_t i = 0; i < sizeof deep; i += 1024) {
+    deep[i] = 0;
+  }
+}
+
+void hapi_thread_prepare_for_ticks(void)
+{
+#if defined(__linux__)
+  prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+#endif
+#if defined(__SSE2__)
+  _mm_setcsr(_mm_getcsr() | 0x8040u); /* flush to zero, denormals are zero */
+#endif
+  touch_stack();
+}
+
+bool hapi_memory_lock(void *memory, size_t size)
+{
+  return mlock(memory, size) == 0;
+}
+
+void hapi_memory_unlock(void *memory, size_t size)
+{
+  munlock(memory, size);
+}

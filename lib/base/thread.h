@@ -1,0 +1,32 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_THREAD_H
+#define HAPODE_BASE_THREAD_H
+
+#include <pthread.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <hapode/status.h>
+
+typedef struct hapi_thread {
+  pthread_t handle;
+  bool running;
+  bool realtime; /* has the priority it asked for */
+} hapi_thread;
+
+/* Starts main(arg). priority 1..99 asks for SCHED_FIFO and goes on without it when that is not
+ * allowed. name: at most 15 characters are shown. */
+hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
+                             const char *name, int priority);
+void hapi_thread_join(hapi_thread *thread); /* idempotent */
+
+/* The calling thread: wakes up without the timer slack of ordinary threads, has its stack touched
+ * down to 64 KiB, and reads denormal results as zero. */
+void hapi_thread_prepare_for_ticks(void);
+
+/* Keeps the block in memory; false when not allowed. */
+bool hapi_memory_lock(void *memory, size_t size);
+void hapi_memory_unlock(void *memory, size_t size);
+
+#endif

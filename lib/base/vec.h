@@ -1,0 +1,162 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_VEC_H
+#define HAPODE_BASE_VEC_H
+
+/* Small fixed-size algebra on plain arrays: vectors of 3, quaternions w, x, y, z. Outputs may be
+ * the inputs unless a comment says otherwise. */
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+static inline void hapi_v3_copy(const double a[3], double out[3])
+{
+  out[0] = a[0];
+  out[1] = a[1];
+  out[2] = a[2];
+}
+
+static inline void hapi_v3_set(double out[3], double x, double y, double z)
+{
+  out[0] = x;
+  out[1] = y;
+  out[2] = z;
+}
+
+static inline void hapi_v3_add(const double a[3], const double b[3], double out[3])
+{
+  out[0] = a[0] + b[0];
+  out[1] = a[1] + b[1];
+  out[2] = a[2] + b[2];
+}
+
+static inline void hapi_v3_sub(const double a[3], const double b[3], double out[3])
+{
+  out[0] = a[0] - b[0];
+  out[1] = a[1] - b[1];
+  out[2] = a[2] - b[2];
+}
+
+static inline void hapi_v3_scale(double s, const double a[3], double out[3])
+{
+  out[0] = s * a[0];
+  out[1] = s * a[1];
+  out[2] = s * a[2];
+}
+
+/* out = a + s b */
+static inline void hapi_v3_madd(const double a[3], double s, const double b[3], double out[3])
+{
+  out[0] = a[0] + s * b[0];
+  out[1] = a[1] + s * b[1];
+  out[2] = a[2] + s * b[2];
+}
+
+static inline double hapi_v3_dot(const double a[3], const double b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline double hapi_v3_norm(const double a[3])
+{
+  return sqrt(hapi_v3_dot(a, a));
+}
+
+static inline void hapi_v3_cross(const double a[3], const double b[3], double out[3])
+{
+  double x = a[1] * b[2] - a[2] * b[1];
+  double y = a[2] * b[0] - a[0] * b[2];
+  double z = a[0] * b[1] - a[1] * b[0];
+  hapi_v3_set(out, x, y, z);
+}
+
+/* Finite is tested without isfinite so that it holds under any math flags: x - x is 0 only then. */
+static inline bool hapi_finite(const double *values, int count)
+{
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i) {
+    sum += values[i] - values[i];
+  }
+  return sum == 0.0;
+}
+
+/* out = q v q*, for a unit quaternion */
+static inline void hapi_quat_rotate(const double q[4], const double v[3], double out[3])
+{
+  double t[3];
+  double u[3];
+  hapi_v3_cross(q + 1, v, t);
+  hapi_v3_scale(2.0, t, t);
+  hapi_v3_cross(q + 1, t, u);
+  hapi_v3_set(out, v[0] + q[0] * t[0] + u[0], v[1] + q[0] * t[1] + u[1], v[2] + q[0] * t[2] + u[2]);
+}
+
+/* out = q* v q */
+static inline void hapi_quat_unrotate(const double q[4], const double v[3], double out[3])
+{
+  double c[4] = {q[0], -q[1], -q[2], -q[3]};
+  hapi_quat_rotate(c, v, out);
+}
+
+static inline void hapi_quat_multiply(const double a[4], const double b[4], double out[4])
+{
+  double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  double x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  double z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+  out[0] = w;
+  out[1] = x;
+  out[2] = y;
+  out[3] = z;
+}
+
+/* Unit length; a quaternion too short to have a direction becomes the identity. */
+static inline void hapi_quat_normalize(double q[4])
+{
+  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (!(n2 > 1e-24)) {
+    q[0] = 1.0;
+    q[1] = q[2] = q[3] = 0.0;
+    return;
+  }
+  double s = 1.0 / sqrt(n2);
+  for (int i = 0; i < 4; ++i) {
+    q[i] *= s;
+  }
+}
+
+/* Row-major 3x3 of a unit quaternion. */
+static inline void hapi_quat_to_matrix(const double q[4], double r[9])
+{
+  double w = q[0];
+  double x = q[1];
+  double y = q[2];
+  double z = q[3];
+  r[0] = 1.0 - 2.0 * (y * y + z * z);
+  r[1] = 2.0 * (x * y - w * z);
+  r[2] = 2.0 * (x * z + w * y);
+  r[3] = 2.0 * (x * y + w * z);
+  r[4] = 1.0 - 2.0 * (x * x + z * z);
+  r[5] = 2.0 * (y * z - w * x);
+  r[6] = 2.0 * (x * z - w * y);
+  r[7] = 2.0 * (y * z + w * x);
+  r[8] = 1.0 - 2.0 * (x * x + y * y);
+}
+
+/* Point of a frame to the world, and back. */
+static inline void hapi_pose_point(const double position[3], const double quat[4],
+                                   const double point[3], double out[3])
+{
+  hapi_quat_rotate(quat, point, out);
+  hapi_v3_add(out, position, out);
+}
+
+static inline void hapi_pose_unpoint(const double position[3], const double quat[4],
+                                     const double point[3], double out[3])
+{
+  hapi_v3_sub(point, position, out);
+  hapi_quat_unrotate(quat, out, out);
+}
+
+#endif

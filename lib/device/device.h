@@ -1,0 +1,49 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_DEVICE_DEVICE_H
+#define HAPODE_DEVICE_DEVICE_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <hapode/device.h>
+#include <hapode/device_impl.h>
+
+/* Who holds the device, as bits: a pointer (claimed), and the application until it has closed it.
+ * The last one to let go frees it, so closing before the session stopped is late, not fatal. */
+typedef struct hapi_device_holders {
+  atomic_uint bits;
+} hapi_device_holders;
+
+struct hap_device {
+  const hap_device_ops *ops;
+  void *self;
+  hap_device_info info; /* asked once, at open: the session may read it while the loop runs */
+  hapi_device_holders holders;
+};
+
+/* [control] Opens a device of these ops; the ways to find ops are the registry and the loader.
+ * The ops must outlive the device. HAP_ERROR_UNSUPPORTED for another ABI; detail is not NULL. */
+HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args,
+                                              hap_device **out, hap_detail *detail);
+
+/* [any] For the calls of a session; self goes into each op. */
+const hap_device_ops *hapi_device_ops(const hap_device *device);
+void *hapi_device_self(const hap_device *device);
+
+/* [any] Lives as long as the device. */
+const hap_device_info *hapi_device_info(const hap_device *device);
+
+/* [control] A pointer takes the device; false when another one has it or it was closed. */
+HAP_NODISCARD bool hapi_device_claim(hap_device *device);
+
+/* [control] After ops->stop. Frees the device when it was closed in the meantime. */
+void hapi_device_release(hap_device *device);
+
+/* [any] The built-in devices: by index, NULL past the end; by a name of that length, NULL when
+ * there is none. */
+const hap_device_ops *hapi_registry_at(size_t index);
+const hap_device_ops *hapi_registry_find(const char *name, size_t length);
+
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_HAPTIC_H
+#define HAPODE_HAPTIC_HAPTIC_H
+
+/* The haptic side of a session: pointers and their devices, the tick, the thread that paces it. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/pointer.h>
+#include <hapode/record.h>
+#include <hapode/stats.h>
+
+#include "sync/exchange.h"
+
+typedef struct hapi_haptic hapi_haptic;
+
+typedef struct hapi_haptic_config {
+  hapi_capacity capacity;
+  double haptic_hz;
+  bool lockstep;
+  int rt_priority;
+  uint32_t trace_rows;
+  hapi_exchange *exchange;
+} hapi_haptic_config;
+
+hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out);
+void hapi_haptic_destroy(hapi_haptic *haptic); /* NULL allowed; ended before */
+
+/* [control] Forgets all state, starts the devices, tells physics where the pointers are. */
+hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *detail);
+void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns); /* time of tick 0 */
+void hapi_haptic_end(hapi_haptic *haptic); /* zero force, devices stopped; idempotent */
+
+/* [control] Between begin and end; not in lockstep. */
+hap_status hapi_haptic_start_thread(hapi_haptic *haptic);
+void hapi_haptic_stop_thread(hapi_haptic *haptic); /* idempotent */
+bool hapi_haptic_is_realtime(const hapi_haptic *haptic);
+
+/* [haptic] Uses a local model that has come in and whose time has come. */
+void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns);
+/* [haptic] One whole tick: devices in, tick, devices out, messages. */
+void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns);
+
+/* pointer.h */
+hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
+                                   hap_pointer_id *out, hap_detail *detail);
+hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
+hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
+                                  const hap_twist *twist);
+hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
+
+void hapi_haptic_reset_fault(hapi_haptic *haptic);                 /* [any] from the next tick on */
+void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault);      /* [any] from the next tick on */
+void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out); /* [any] its part of *out */
+size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity);
+
+#endif

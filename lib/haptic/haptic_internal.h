@@ -1,0 +1,105 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_HAPTIC_INTERNAL_H
+#define HAPODE_HAPTIC_HAPTIC_INTERNAL_H
+
+/* Shared by the files of lib/haptic. */
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include <hapode/device_impl.h>
+
+#include "base/histogram.h"
+#include "base/thread.h"
+#include "haptic/haptic.h"
+#include "haptic/rt/tick.h"
+#include "sync/triple_buffer.h"
+
+typedef enum hapi_pointer_phase {
+  HAPI_POINTER_EMPTY = 0,
+  HAPI_POINTER_ADDED = 1,   /* by the application, not yet seen by the loop */
+  HAPI_POINTER_ACTIVE = 2,  /* the loop uses it */
+  HAPI_POINTER_LEAVING = 3, /* to be let go by the loop */
+  HAPI_POINTER_LEFT = 4     /* let go; the application cleans up */
+} hapi_pointer_phase;
+
+typedef struct hapi_pointer_target {
+  hap_pose pose;
+  hap_twist twist;
+} hapi_pointer_target;
+
+typedef struct hapi_pointer_slot {
+  _Atomic int phase;
+  uint32_t generation; /* written while EMPTY */
+  hap_pointer_def def;
+  const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
+  void *self;
+  bool started;
+  hap_device_info info;
+  pthread_mutex_t target_lock; /* between applications that set */
+  hapi_triple_buffer target_buffer;
+  hapi_pointer_target targets[3];
+  pthread_mutex_t state_lock; /* between applications that get */
+  hapi_triple_buffer state_buffer;
+  hap_pointer_state states[3];
+} hapi_pointer_slot;
+
+/* Published for the statistics; each written by the haptic thread alone. */
+typedef struct hapi_haptic_figures {
+  hapi_histogram tick_ns;
+  _Atomic uint64_t ticks;
+  _Atomic uint64_t missed_ticks;
+  _Atomic uint64_t contact_ticks;
+  _Atomic uint64_t saturated_ticks;
+  _Atomic uint64_t models_adopted;
+  _Atomic uint64_t faults;
+  _Atomic uint64_t trace_dropped;
+  _Atomic uint64_t hash;
+  _Atomic int fault;
+  _Atomic int model;
+  _Atomic int64_t age_ns;
+  _Atomic int64_t age_max_ns;
+  _Atomic double peak_force;
+  _Atomic double hand_impulse[3];
+  _Atomic double hand_impulse_abs;
+} hapi_haptic_figures;
+
+/* One writer (haptic), one reader (application). */
+typedef struct hapi_trace_ring {
+  hap_trace_row *rows;
+  uint32_t capacity;
+  _Atomic uint64_t written;
+  _Atomic uint64_t read;
+} hapi_trace_ring;
+
+struct hapi_haptic {
+  hapi_haptic_config config;
+  hapi_tick tick;
+  hapi_model *pending; /* taken, its time has not come */
+  hapi_pointer_slot *slots;
+  hapi_trace_ring ring;
+  hapi_haptic_figures figures;
+  hapi_thread thread;
+  _Atomic int stop;
+  _Atomic int reset_fault;
+  _Atomic int outside_fault; /* hap_fault that another thread wants latched */
+  bool begun;
+  int64_t start_ns;
+  double last_tick_us;
+};
+
+/* pointers.c: what the loop does with the slots */
+void hapi_pointers_follow(hapi_haptic *haptic); /* phases */
+void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns);
+void hapi_pointers_write(hapi_haptic *haptic);
+void hapi_pointers_publish(hapi_haptic *haptic);
+hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail);
+void hapi_pointers_stop_devices(hapi_haptic *haptic);
+
+/* trace_ring.c */
+hap_status hapi_trace_ring_create(hapi_trace_ring *ring, uint32_t capacity);
+void hapi_trace_ring_finish(hapi_trace_ring *ring);
+void hapi_trace_ring_write(hapi_haptic *haptic);
+
+#endif

@@ -1,0 +1,251 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/vec.h"
+#include "haptic/haptic_internal.h"
+
+#define STORE(field, value) \
+  atomic_store_explicit(&haptic->figures.field, (value), memory_order_relaxed)
+#define LOAD(field) atomic_load_explicit(&haptic->figures.field, memory_order_relaxed)
+
+static bool allocate_tick(hapi_tick *tick, const hapi_capacity *c)
+{
+  tick->capacity = *c;
+  tick->bodies = hapi_alloc_array(c->bodies, sizeof *tick->bodies);
+  tick->live = hapi_alloc_array(c->bodies, sizeof *tick->live);
+  tick->contacts = hapi_alloc_array(c->contacts, sizeof *tick->contacts);
+  tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
+  tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
+  tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
+  return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
+         tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL;
+}
+
+static void free_tick(hapi_tick *tick)
+{
+  hapi_free(tick->bodies);
+  hapi_free(tick->live);
+  hapi_free(tick->contacts);
+  hapi_free(tick->ramps);
+  hapi_free(tick->ramp_generations);
+  hapi_free(tick->pointers);
+}
+
+static bool prepare_slots(hapi_haptic *haptic)
+{
+  haptic->slots = hapi_alloc_array(haptic->config.capacity.pointers, sizeof *haptic->slots);
+  if (haptic->slots == NULL) {
+    return false;
+  }
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    atomic_init(&haptic->slots[i].phase, HAPI_POINTER_EMPTY);
+    pthread_mutex_init(&haptic->slots[i].target_lock, NULL);
+    pthread_mutex_init(&haptic->slots[i].state_lock, NULL);
+  }
+  return true;
+}
+
+hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out)
+{
+  *out = NULL;
+  hapi_haptic *haptic = hapi_alloc(sizeof *haptic);
+  if (haptic == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  haptic->config = *config;
+  if (!allocate_tick(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
+      hapi_trace_ring_create(&haptic->ring, config->trace_rows) != HAP_OK) {
+    hapi_haptic_destroy(haptic);
+    return HAP_ERROR_MEMORY;
+  }
+  haptic->tick.period = 1.0 / config->haptic_hz;
+  haptic->tick.hashing = config->lockstep;
+  hapi_tick_reset(&haptic->tick);
+  *out = haptic;
+  return HAP_OK;
+}
+
+void hapi_haptic_destroy(hapi_haptic *haptic)
+{
+  if (haptic == NULL) {
+    return;
+  }
+  hapi_haptic_end(haptic);
+  for (uint32_t i = 0; haptic->slots != NULL && i < haptic->config.capacity.pointers; ++i) {
+    hap_pointer_id id = {((uint64_t)haptic->slots[i].generation << 32) | (i + 1)};
+    hapi_haptic_remove_pointer(haptic, id);
+    pthread_mutex_destroy(&haptic->slots[i].target_lock);
+    pthread_mutex_destroy(&haptic->slots[i].state_lock);
+  }
+  hapi_free(haptic->slots);
+  hapi_trace_ring_finish(&haptic->ring);
+  free_tick(&haptic->tick);
+  hapi_free(haptic);
+}
+
+static void reset_figures(hapi_haptic *haptic)
+{
+  hapi_histogram_reset(&haptic->figures.tick_ns);
+  STORE(ticks, 0);
+  STORE(missed_ticks, 0);
+  STORE(models_adopted, 0);
+  STORE(trace_dropped, 0);
+  STORE(age_ns, 0);
+  STORE(age_max_ns, 0);
+  atomic_store(&haptic->ring.read, 0);
+  atomic_store(&haptic->ring.written, 0);
+  atomic_store(&haptic->reset_fault, 0);
+  atomic_store(&haptic->outside_fault, HAP_FAULT_NONE);
+}
+
+hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *detail)
+{
+  hapi_tick_reset(&haptic->tick);
+  memset(haptic->tick.pointers, 0,
+         haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
+  reset_figures(haptic);
+  haptic->pending = NULL;
+  haptic->start_ns = start_ns;
+  haptic->last_tick_us = 0.0;
+  hap_status status = hapi_pointers_start_devices(haptic, detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  haptic->begun = true;
+  /* Physics builds the first local model around where the pointers are. */
+  hapi_pointers_follow(haptic);
+  hapi_pointers_read(haptic, start_ns);
+  haptic->tick.now_ns = start_ns;
+  hapi_coupling_read(&haptic->tick);
+  hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
+  hapi_exchange_state_publish(haptic->config.exchange);
+  return HAP_OK;
+}
+
+void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns)
+{
+  haptic->start_ns = start_ns;
+}
+
+void hapi_haptic_end(hapi_haptic *haptic)
+{
+  if (haptic->begun) {
+    hapi_haptic_stop_thread(haptic);
+    hapi_pointers_stop_devices(haptic);
+    haptic->begun = false;
+  }
+}
+
+void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
+{
+  if (haptic->pending == NULL) {
+    haptic->pending = hapi_exchange_model_take(haptic->config.exchange);
+  }
+  if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
+    hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
+    haptic->pending = NULL;
+    STORE(models_adopted, LOAD(models_adopted) + 1);
+  }
+}
+
+static void follow_faults(hapi_haptic *haptic)
+{
+  if (atomic_load_explicit(&haptic->reset_fault, memory_order_acquire) != 0) {
+    atomic_store_explicit(&haptic->reset_fault, 0, memory_order_relaxed);
+    hapi_tick_reset_fault(&haptic->tick);
+  }
+  int outside = atomic_load_explicit(&haptic->outside_fault, memory_order_acquire);
+  if (outside != HAP_FAULT_NONE) {
+    atomic_store_explicit(&haptic->outside_fault, HAP_FAULT_NONE, memory_order_relaxed);
+    hapi_tick_fault(&haptic->tick, (hap_fault)outside);
+  }
+}
+
+static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
+{
+  const hapi_tick *tick = &haptic->tick;
+  int64_t age = tick->model_number != 0 ? tick->now_ns - tick->state_ns : 0;
+  STORE(ticks, tick->tick);
+  STORE(contact_ticks, tick->contact_ticks);
+  STORE(saturated_ticks, tick->saturated_ticks);
+  STORE(faults, tick->faults);
+  STORE(fault, (int)tick->fault);
+  STORE(model, (int)tick->model);
+  STORE(hash, tick->hashing ? tick->hash : 0);
+  STORE(age_ns, age);
+  if (age > LOAD(age_max_ns)) {
+    STORE(age_max_ns, age);
+  }
+  STORE(peak_force, tick->peak_force);
+  STORE(hand_impulse_abs, tick->hand_impulse_abs);
+  for (int i = 0; i < 3; ++i) {
+    STORE(hand_impulse[i], tick->hand_impulse[i]);
+  }
+  int64_t spent = hapi_clock_now() - begin_ns;
+  hapi_histogram_add(&haptic->figures.tick_ns, spent);
+  haptic->last_tick_us = 1e-3 * (double)spent;
+}
+
+void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
+{
+  int64_t begin_ns = hapi_clock_now();
+  hapi_pointers_follow(haptic);
+  follow_faults(haptic);
+  hapi_haptic_receive(haptic, now_ns);
+  hapi_pointers_read(haptic, now_ns);
+  hapi_tick_run(&haptic->tick, now_ns);
+  hapi_pointers_write(haptic);
+  hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
+  hapi_exchange_state_publish(haptic->config.exchange);
+  hapi_pointers_publish(haptic);
+  hapi_trace_ring_write(haptic);
+  publish_figures(haptic, begin_ns);
+}
+
+void hapi_haptic_reset_fault(hapi_haptic *haptic)
+{
+  atomic_store_explicit(&haptic->reset_fault, 1, memory_order_release);
+}
+
+void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault)
+{
+  atomic_store_explicit(&haptic->outside_fault, (int)fault, memory_order_release);
+}
+
+static void fill_times(const hapi_haptic *haptic, hap_stats *out)
+{
+  const hapi_histogram *h = &haptic->figures.tick_ns;
+  out->tick_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
+  out->tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
+  out->tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
+  out->tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
+  out->haptic_duty = 1e-6 * out->tick_us_mean * haptic->config.haptic_hz;
+}
+
+void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
+{
+  double impulse[3];
+  fill_times(haptic, out);
+  for (int i = 0; i < 3; ++i) {
+    impulse[i] = LOAD(hand_impulse[i]);
+  }
+  out->model = (uint32_t)LOAD(model);
+  out->ticks = LOAD(ticks);
+  out->missed_ticks = LOAD(missed_ticks);
+  out->contact_ticks = LOAD(contact_ticks);
+  out->model_age_s = 1e-9 * (double)LOAD(age_ns);
+  out->model_age_max_s = 1e-9 * (double)LOAD(age_max_ns);
+  out->models_adopted = LOAD(models_adopted);
+  out->impulse_ns = hapi_v3_norm(impulse);
+  out->impulse_abs_ns = LOAD(hand_impulse_abs);
+  out->peak_force_n = LOAD(peak_force);
+  out->saturated_ticks = LOAD(saturated_ticks);
+  out->faults = LOAD(faults);
+  out->fault = (uint32_t)LOAD(fault);
+  out->realtime = haptic->thread.realtime ? 1 : 0;
+  out->trace_dropped = LOAD(trace_dropped);
+  out->trace_hash = LOAD(hash);
+}

@@ -1,0 +1,302 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "device/device.h"
+#include "haptic/haptic_internal.h"
+
+/* ---- the loop's side ---- */
+
+static void activate(hapi_haptic *haptic, uint32_t index)
+{
+  const hapi_pointer_slot *slot = &haptic->slots[index];
+  const hap_pointer_def *def = &slot->def;
+  const hap_device_info *info = &slot->info;
+  hapi_tick_pointer *p = &haptic->tick.pointers[index];
+  memset(p, 0, sizeof *p);
+  p->generation = slot->generation;
+  p->collide_bits = def->collide_bits;
+  p->radius = def->radius;
+  p->stiffness = def->stiffness;
+  p->damping = def->damping;
+  p->motion_scale = def->motion_scale;
+  p->force_scale = def->force_scale;
+  p->pose_world_device = def->pose_world_device;
+  p->max_force =
+      info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
+  p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque
+                                                                               : def->max_torque;
+  p->device_pose.quat_wxyz[0] = 1.0;
+  p->pose.quat_wxyz[0] = 1.0;
+}
+
+void hapi_pointers_follow(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
+    if (phase == HAPI_POINTER_ADDED) {
+      activate(haptic, i);
+      atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
+    } else if (phase == HAPI_POINTER_LEAVING) {
+      haptic->tick.pointers[i].generation = 0;
+      if (slot->ops != NULL) {
+        slot->ops->zero(slot->self);
+      }
+      atomic_store_explicit(&slot->phase, HAPI_POINTER_LEFT, memory_order_release);
+    }
+  }
+}
+
+void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    if (slot->ops == NULL) {
+      hapi_triple_take(&slot->target_buffer);
+      const hapi_pointer_target *target = &slot->targets[hapi_triple_front(&slot->target_buffer)];
+      p->device_pose = target->pose;
+      p->device_twist = target->twist;
+      continue;
+    }
+    hap_pose pose = p->device_pose;
+    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    uint32_t buttons = 0;
+    if (slot->ops->read(slot->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
+      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_READ);
+      continue;
+    }
+    p->device_pose = pose;
+    p->device_twist = twist;
+    p->buttons = buttons;
+  }
+}
+
+void hapi_pointers_write(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    if (p->generation == 0 || slot->ops == NULL) {
+      continue;
+    }
+    hap_wrench reached;
+    if (slot->ops->write(slot->self, &p->device_wrench, &reached) < HAP_OK) {
+      slot->ops->zero(slot->self);
+      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_WRITE);
+    }
+  }
+}
+
+void hapi_pointers_publish(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    const hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    hap_pointer_state *out = &slot->states[hapi_triple_back(&slot->state_buffer)];
+    out->size = sizeof *out;
+    out->contacts = p->contacts;
+    out->stamp_ns = haptic->tick.now_ns;
+    out->device = p->device_pose;
+    out->proxy = p->pose;
+    out->twist = p->twist;
+    out->wrench = p->wrench;
+    out->buttons = p->buttons;
+    out->reserved = 0;
+    hapi_triple_publish(&slot->state_buffer);
+  }
+}
+
+/* ---- the application's side ---- */
+
+static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap_detail *detail)
+{
+  if (slot->ops == NULL || slot->started) {
+    return HAP_OK;
+  }
+  if (haptic->config.lockstep && slot->ops->pacing != HAP_PACING_VIRTUAL) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "device %s has a clock of its own and cannot run in lockstep; use drive "
+                     "threads or a virtual device",
+                     slot->ops->name);
+  }
+  if (slot->ops->start(slot->self) < HAP_OK) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE, "device %s did not start", slot->ops->name);
+  }
+  slot->started = true;
+  return HAP_OK;
+}
+
+static void stop_device(hapi_pointer_slot *slot)
+{
+  if (slot->ops != NULL && slot->started) {
+    slot->ops->zero(slot->self);
+    slot->ops->stop(slot->self);
+    slot->started = false;
+  }
+}
+
+hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    if (atomic_load(&slot->phase) == HAPI_POINTER_EMPTY) {
+      continue;
+    }
+    hap_status status = start_device(haptic, slot, detail);
+    if (status < HAP_OK) {
+      hapi_pointers_stop_devices(haptic);
+      return status;
+    }
+    atomic_store(&slot->phase, HAPI_POINTER_ADDED);
+  }
+  return HAP_OK;
+}
+
+void hapi_pointers_stop_devices(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    stop_device(&haptic->slots[i]);
+  }
+}
+
+static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
+{
+  uint32_t index = (uint32_t)(id.v & 0xffffffffu);
+  if (index == 0 || index > haptic->config.capacity.pointers) {
+    return NULL;
+  }
+  hapi_pointer_slot *slot = &haptic->slots[index - 1];
+  int phase = atomic_load(&slot->phase);
+  bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE;
+  return there && slot->generation == (uint32_t)(id.v >> 32) ? slot : NULL;
+}
+
+static uint32_t free_slot(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    if (atomic_load(&haptic->slots[i].phase) == HAPI_POINTER_EMPTY) {
+      return i;
+    }
+  }
+  return HAPI_SLOT_NONE;
+}
+
+static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
+{
+  slot->def = *def;
+  slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
+  slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
+  memset(&slot->info, 0, sizeof slot->info);
+  if (def->device != NULL) {
+    hap_device_get_info(def->device, &slot->info, sizeof slot->info);
+  }
+  ++slot->generation;
+  hapi_triple_init(&slot->target_buffer);
+  hapi_triple_init(&slot->state_buffer);
+  memset(slot->targets, 0, sizeof slot->targets);
+  memset(slot->states, 0, sizeof slot->states);
+  for (int i = 0; i < 3; ++i) {
+    slot->targets[i].pose.quat_wxyz[0] = 1.0;
+    slot->states[i].device.quat_wxyz[0] = 1.0;
+    slot->states[i].proxy.quat_wxyz[0] = 1.0;
+    slot->states[i].size = sizeof slot->states[i];
+  }
+}
+
+hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
+                                   hap_pointer_id *out, hap_detail *detail)
+{
+  uint32_t index = free_slot(haptic);
+  if (index == HAPI_SLOT_NONE) {
+    return hapi_fail(detail, HAP_ERROR_CAPACITY,
+                     "all %u pointers of the session are in use; raise max_pointers",
+                     haptic->config.capacity.pointers);
+  }
+  if (def->device != NULL && !hapi_device_claim(def->device)) {
+    return hapi_fail(detail, HAP_ERROR_STATE, "the device serves another pointer already");
+  }
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  fill_slot(slot, def);
+  if (haptic->begun) {
+    hap_status status = start_device(haptic, slot, detail);
+    if (status < HAP_OK) {
+      hapi_device_release(def->device);
+      return status;
+    }
+  }
+  out->v = ((uint64_t)slot->generation << 32) | (index + 1);
+  atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
+  return HAP_OK;
+}
+
+/* The loop lets go of the pointer; when no loop runs, it is done here. */
+static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot)
+{
+  atomic_store(&slot->phase, HAPI_POINTER_LEAVING);
+  while (haptic->thread.running && atomic_load(&slot->phase) != HAPI_POINTER_LEFT) {
+    hapi_clock_sleep_until(hapi_clock_now() + 1000000);
+  }
+  if (!haptic->thread.running) {
+    hapi_pointers_follow(haptic);
+  }
+}
+
+hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  leave_loop(haptic, slot);
+  stop_device(slot);
+  if (slot->def.device != NULL) {
+    hapi_device_release(slot->def.device);
+  }
+  atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
+  return HAP_OK;
+}
+
+hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
+                                  const hap_twist *twist)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  if (slot->ops != NULL) {
+    return HAP_ERROR_STATE;
+  }
+  pthread_mutex_lock(&slot->target_lock);
+  hapi_pointer_target *target = &slot->targets[hapi_triple_back(&slot->target_buffer)];
+  memset(target, 0, sizeof *target);
+  target->pose = *pose;
+  if (twist != NULL) {
+    target->twist = *twist;
+  }
+  hapi_triple_publish(&slot->target_buffer);
+  pthread_mutex_unlock(&slot->target_lock);
+  return HAP_OK;
+}
+
+hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  pthread_mutex_lock(&slot->state_lock);
+  hapi_triple_take(&slot->state_buffer);
+  *out = slot->states[hapi_triple_front(&slot->state_buffer)];
+  pthread_mutex_unlock(&slot->state_lock);
+  return HAP_OK;
+}

@@ -1,0 +1,115 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "haptic/rt/tick.h"
+
+/* Local dynamics simulation (paper section 5.2). */
+
+/* Eq. 10 and 11; the quaternion is normalised because eq. 11 leaves the unit sphere. */
+static void move(hap_pose *pose, const hap_twist *twist, double period)
+{
+  double turn[4] = {0.0, twist->angular[0], twist->angular[1], twist->angular[2]};
+  double rate[4];
+  hapi_v3_madd(pose->position, period, twist->linear, pose->position);
+  hapi_quat_multiply(turn, pose->quat_wxyz, rate);
+  for (int i = 0; i < 4; ++i) {
+    pose->quat_wxyz[i] += 0.5 * period * rate[i];
+  }
+  hapi_quat_normalize(pose->quat_wxyz);
+}
+
+/* Eq. 9, and 14 in the first tick of a model. */
+static void accelerate(hapi_local_body *body, double period)
+{
+  for (int i = 0; i < 3; ++i) {
+    body->twist.linear[i] += (body->acceleration[i] + body->b[i]) * period + body->residual[i];
+    body->twist.angular[i] +=
+        (body->acceleration[3 + i] + body->b[3 + i]) * period + body->residual[3 + i];
+  }
+  for (int i = 0; i < 6; ++i) {
+    body->residual[i] = 0.0;
+  }
+}
+
+static bool sound(const hapi_local_body *body)
+{
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    sum +=
+        fabs(body->twist.linear[i]) + fabs(body->twist.angular[i]) + fabs(body->pose.position[i]);
+  }
+  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
+}
+
+/* A state that is not finite stays here: the body stops where it last was and the guard latches. */
+static void step_body(hapi_tick *tick, hapi_local_body *body)
+{
+  hap_pose before = body->pose;
+  accelerate(body, tick->period);
+  move(&body->pose, &body->twist, tick->period);
+  if (!sound(body)) {
+    body->pose = before;
+    body->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE);
+  }
+}
+
+void hapi_local_step(hapi_tick *tick)
+{
+  if (tick->model != HAP_MODEL_ACCELERANCE) {
+    return;
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if ((body->flags & HAPI_BODY_DRIVEN) != 0) {
+      move(&body->pose, &body->twist, tick->period);
+    } else if ((body->flags & HAPI_BODY_RESTING) == 0) {
+      step_body(tick, body);
+    }
+  }
+}
+
+static void blend(hapi_local_body *body, double share)
+{
+  double sign = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    sign += body->from.quat_wxyz[i] * body->to.quat_wxyz[i];
+  }
+  sign = sign < 0.0 ? -1.0 : 1.0; /* q and -q are the same turn: take the shorter way */
+  for (int i = 0; i < 3; ++i) {
+    body->pose.position[i] =
+        body->from.position[i] + share * (body->to.position[i] - body->from.position[i]);
+  }
+  for (int i = 0; i < 4; ++i) {
+    body->pose.quat_wxyz[i] =
+        (1.0 - share) * body->from.quat_wxyz[i] + share * sign * body->to.quat_wxyz[i];
+  }
+  hapi_quat_normalize(body->pose.quat_wxyz);
+}
+
+/* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the
+ * way from the last but one to the last. */
+void hapi_local_place(hapi_tick *tick)
+{
+  if (tick->model == HAP_MODEL_ACCELERANCE) {
+    return;
+  }
+  bool moving = tick->model == HAP_MODEL_IMPULSE && tick->blend_s > 0.0 &&
+                tick->impulse_pose == HAP_IMPULSE_INTERPOLATED;
+  double share = 1.0;
+  if (moving) {
+    share = 1e-9 * (double)(tick->now_ns - tick->adopted_ns) / tick->blend_s;
+    share = share > 1.0 ? 1.0 : share;
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if (!moving) {
+      body->pose = body->to;
+      continue;
+    }
+    blend(body, share);
+    for (int k = 0; k < 3; ++k) {
+      body->twist.linear[k] = (body->to.position[k] - body->from.position[k]) / tick->blend_s;
+    }
+  }
+}

@@ -1,0 +1,131 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "haptic/rt/tick.h"
+
+/* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
+
+typedef struct plane {
+  double point[3];  /* contact point x_o, world */
+  double normal[3]; /* out of the body, world */
+  double arm[3];    /* x_o - centre of mass */
+} plane;
+
+static void place_plane(const hapi_local_contact *c, const hapi_local_body *body, plane *out)
+{
+  if (body == NULL) {
+    hapi_v3_copy(c->point_body, out->point);
+    hapi_v3_copy(c->normal_body, out->normal);
+    hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
+    return;
+  }
+  hapi_quat_rotate(body->pose.quat_wxyz, c->point_body, out->arm);
+  hapi_quat_rotate(body->pose.quat_wxyz, c->normal_body, out->normal);
+  hapi_v3_add(body->pose.position, out->arm, out->point);
+}
+
+/* Rate at which the pointer goes into the plane [m/s]. */
+static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *body, const plane *at)
+{
+  double relative[3];
+  hapi_v3_copy(p->twist.linear, relative);
+  if (body != NULL) {
+    double surface[3];
+    hapi_v3_cross(body->twist.angular, at->arm, surface);
+    hapi_v3_add(surface, body->twist.linear, surface);
+    hapi_v3_sub(relative, surface, relative);
+  }
+  return -hapi_v3_dot(at->normal, relative);
+}
+
+/* Contact that arrives with depth starts at zero force; one that closes later has all of it. */
+static double ramp(hapi_local_contact *c, double depth, double period)
+{
+  if (!c->seen) {
+    c->seen = true;
+    c->ramp = depth > 0.0 ? 0.0 : 1.0;
+  } else if (c->ramp < 1.0) {
+    double next = depth > 0.0 ? c->ramp + period / HAPI_RAMP_S : 1.0;
+    c->ramp = next > 1.0 ? 1.0 : next;
+  }
+  return c->ramp;
+}
+
+/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. */
+static double normal_force(hapi_local_contact *c, const hapi_tick_pointer *p,
+                           const hapi_local_body *body, const plane *at, double period)
+{
+  double apart[3];
+  hapi_v3_sub(p->pose.position, at->point, apart);
+  double depth = p->radius - hapi_v3_dot(at->normal, apart);
+  double share = ramp(c, depth, period);
+  if (!(depth > 0.0)) {
+    return 0.0;
+  }
+  double force = p->stiffness * depth + p->damping * closing_rate(p, body, at);
+  return force > 0.0 ? share * force : 0.0;
+}
+
+/* f_o = -f_d goes to the body: as impulse to physics, and through A into its acceleration. */
+static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane *at, double period)
+{
+  double moment[3];
+  hapi_v3_cross(at->arm, c->force, moment);
+  hapi_v3_madd(body->impulse, period, c->force, body->impulse);
+  hapi_v3_madd(body->angular_impulse, period, moment, body->angular_impulse);
+  for (int i = 0; i < 6; ++i) {
+    body->acceleration[i] += hapi_v3_dot(c->a[i], c->force);
+  }
+}
+
+static void audit(hapi_tick *tick, const double force[3])
+{
+  hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
+  tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
+}
+
+static void render_contact(hapi_tick *tick, hapi_local_contact *c)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[c->body];
+  plane at;
+  hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+  if (p->generation == 0) {
+    return;
+  }
+  place_plane(c, body, &at);
+  double force = normal_force(c, p, body, &at, tick->period);
+  if (force == 0.0 || tick->fault != HAP_FAULT_NONE) {
+    return;
+  }
+  hapi_v3_madd(p->wrench.force, force, at.normal, p->wrench.force);
+  ++p->contacts;
+  ++tick->pushing;
+  hapi_v3_scale(-force, at.normal, c->force);
+  hapi_v3_madd(c->impulse, tick->period, c->force, c->impulse);
+  if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
+    body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+    body->pushed = true;
+    push_body(body, c, &at, tick->period);
+    audit(tick, c->force);
+  }
+}
+
+void hapi_render(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    tick->pointers[i].contacts = 0;
+    tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    double *acceleration = tick->bodies[tick->live[i]].acceleration;
+    for (int k = 0; k < 6; ++k) {
+      acceleration[k] = 0.0;
+    }
+  }
+  tick->pushing = 0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    render_contact(tick, &tick->contacts[i]);
+  }
+  tick->contact_ticks += tick->pushing != 0;
+}

@@ -1,0 +1,150 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_RT_TICK_H
+#define HAPODE_HAPTIC_RT_TICK_H
+
+/* The pure tick: what the haptic thread computes at 1 kHz and more, from the pointers' device poses
+ * to the wrenches for the devices. No allocation, lock, system call, log or function pointer in
+ * this folder. All memory is handed over by hapi_tick_init's caller.
+ *
+ *   adopt     a new local model, when its time has come            (paper section 6)
+ *   coupling  device pose -> pointer                               (paper step a)
+ *   render    pointer and planes -> forces, eq. 7                  (step b)
+ *   local_dynamics  forces -> motion of the neighbours, eq. 8-11   (step c)
+ *   guard     sum per pointer, checks, limits -> device wrench
+ *   report    state for physics; trace row; hash
+ */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/record.h>
+#include <hapode/spatial.h>
+#include <hapode/stats.h>
+
+#include "sync/messages.h"
+
+/* A contact that is already deep when it arrives gets its full force after this time. */
+#define HAPI_RAMP_S 0.02
+
+/* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
+#define HAPI_STATE_LIMIT 1e6
+
+typedef struct hapi_tick_pointer {
+  uint32_t generation; /* 0: no pointer here */
+  uint32_t collide_bits;
+  double radius;
+  double stiffness;
+  double damping;
+  double motion_scale;
+  double force_scale;
+  double max_force;  /* N at the device */
+  double max_torque; /* N m at the device */
+  hap_pose pose_world_device;
+
+  hap_pose device_pose;   /* in, device frame */
+  hap_twist device_twist; /* in, device frame */
+  uint32_t buttons;       /* in */
+
+  hap_pose pose;            /* world */
+  hap_twist twist;          /* world */
+  hap_wrench wrench;        /* world, on the hand */
+  hap_wrench device_wrench; /* out, device frame, scaled and limited */
+  uint32_t contacts;        /* that push */
+  bool saturated;
+} hapi_tick_pointer;
+
+typedef struct hapi_local_body {
+  uint32_t generation;
+  uint32_t flags;
+  bool live;   /* in the model in use */
+  bool pushed; /* since it was adopted */
+  hap_pose pose;
+  hap_twist twist;
+  double b[6];
+  double residual[6];     /* of eq. 14, still to be added */
+  double acceleration[6]; /* sum of A f in this tick */
+  hap_pose from;          /* model IMPULSE: pose at adoption, and pose to reach */
+  hap_pose to;
+  double impulse[3];
+  double angular_impulse[3];
+} hapi_local_body;
+
+typedef struct hapi_local_contact {
+  uint32_t slot;
+  uint32_t body;
+  uint32_t pointer;
+  uint32_t generation;
+  bool seen; /* rendered at least once */
+  double point_body[3];
+  double normal_body[3];
+  double a[6][3];
+  double ramp;     /* 0..1, share of the force */
+  double force[3]; /* on the body */
+  double impulse[3];
+} hapi_local_contact;
+
+typedef struct hapi_tick {
+  hapi_capacity capacity;
+  double period; /* s, T */
+  bool hashing;  /* lockstep */
+
+  hapi_local_body *bodies;      /* by slot, capacity.bodies */
+  uint32_t *live;               /* slots in the model, live_count */
+  hapi_local_contact *contacts; /* of the model, contact_count */
+  double *ramps;                /* by contact slot, of the model before: to go on with */
+  uint32_t *ramp_generations;   /* by contact slot */
+  hapi_tick_pointer *pointers;  /* capacity.pointers */
+  uint32_t live_count;
+  uint32_t contact_count;
+  uint32_t body_high;
+
+  uint64_t tick;
+  int64_t now_ns;
+  uint64_t model_number;
+  uint64_t ticks_in_model;
+  hap_model model;
+  hap_impulse_pose impulse_pose;
+  double blend_s;
+  int64_t adopted_ns;
+  int64_t state_ns;
+  uint32_t watch_count;
+  uint32_t watch_slot[HAP_TRACE_BODIES_MAX];
+  double watch_position[HAP_TRACE_BODIES_MAX][3];
+
+  hap_fault fault; /* latched */
+  uint64_t faults;
+  uint32_t pushing; /* contacts that push in this tick */
+  double peak_force;
+  uint64_t contact_ticks;
+  uint64_t saturated_ticks;
+  double hand_impulse[3]; /* N s on dynamic bodies, all pointers, since start */
+  double hand_impulse_abs;
+  uint64_t hash;
+} hapi_tick;
+
+/* Zeroes the state; arrays, capacity, period and hashing are set by the caller before. */
+void hapi_tick_reset(hapi_tick *tick);
+
+void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns);
+
+/* One tick at now_ns from the pointers' device_pose and device_twist to their device_wrench. */
+void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
+
+void hapi_tick_fault(hapi_tick *tick, hap_fault fault); /* latches the first one */
+void hapi_tick_reset_fault(hapi_tick *tick);
+
+void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
+void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
+
+/* ---- the steps of hapi_tick_run, one file each ---- */
+
+void hapi_coupling_read(hapi_tick *tick);             /* device -> world */
+void hapi_local_place(hapi_tick *tick);               /* models SINGLE and IMPULSE: poses now */
+void hapi_render(hapi_tick *tick);                    /* eq. 7 */
+void hapi_local_step(hapi_tick *tick);                /* eq. 8-11, 14 */
+void hapi_guard(hapi_tick *tick);                     /* finite, limits, world -> device */
+void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
+void hapi_trace_hash(hapi_tick *tick);
+
+#endif

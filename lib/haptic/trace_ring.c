@@ -1,0 +1,61 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "haptic/haptic_internal.h"
+
+hap_status hapi_trace_ring_create(hapi_trace_ring *ring, uint32_t capacity)
+{
+  ring->capacity = capacity;
+  ring->rows = NULL;
+  if (capacity == 0) {
+    return HAP_OK;
+  }
+  ring->rows = hapi_alloc_array(capacity, sizeof *ring->rows);
+  if (ring->rows == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  memset(ring->rows, 0, capacity * sizeof *ring->rows); /* so that no tick touches new memory */
+  return HAP_OK;
+}
+
+void hapi_trace_ring_finish(hapi_trace_ring *ring)
+{
+  hapi_free(ring->rows);
+  ring->rows = NULL;
+  ring->capacity = 0;
+}
+
+void hapi_trace_ring_write(hapi_haptic *haptic)
+{
+  hapi_trace_ring *ring = &haptic->ring;
+  if (ring->capacity == 0) {
+    return;
+  }
+  uint64_t written = atomic_load_explicit(&ring->written, memory_order_relaxed);
+  uint64_t read = atomic_load_explicit(&ring->read, memory_order_acquire);
+  if (written - read >= ring->capacity) {
+    uint64_t dropped = atomic_load_explicit(&haptic->figures.trace_dropped, memory_order_relaxed);
+    atomic_store_explicit(&haptic->figures.trace_dropped, dropped + 1, memory_order_relaxed);
+    return;
+  }
+  hap_trace_row *row = &ring->rows[written % ring->capacity];
+  hapi_tick_trace(&haptic->tick, row);
+  row->t = 1e-9 * (double)(haptic->tick.now_ns - haptic->start_ns);
+  row->tick_us = haptic->last_tick_us;
+  atomic_store_explicit(&ring->written, written + 1, memory_order_release);
+}
+
+size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity)
+{
+  hapi_trace_ring *ring = &haptic->ring;
+  uint64_t read = atomic_load_explicit(&ring->read, memory_order_relaxed);
+  uint64_t written = atomic_load_explicit(&ring->written, memory_order_acquire);
+  size_t count = 0;
+  while (read < written && count < capacity) {
+    rows[count++] = ring->rows[read++ % ring->capacity];
+  }
+  atomic_store_explicit(&ring->read, read, memory_order_release);
+  return count;
+}

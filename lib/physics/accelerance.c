@@ -1,0 +1,168 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Accelerance of the neighbours (paper sections 4.2 and 4.3, eq. 3-6). Each pointer contact has its
+ * own A: acceleration of the body by a force at the contact point. The zero probe is shared, and
+ * the contacts of different islands are probed in the same step, as islands do not feel each
+ * other: a round perturbs one contact of each island. */
+
+static hapi_body_slot *body_of(hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  return &physics->bodies[contact->body];
+}
+
+static bool probed(hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  return contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+         (body_of(physics, contact)->flags & HAPI_BODY_DRIVEN) == 0;
+}
+
+static void acceleration_since_snapshot(const hapi_physics *physics, uint32_t known, double out[6])
+{
+  const hapi_body_state *before = hapi_test_state(physics, known);
+  const dReal *linear = dBodyGetLinearVel(before->body);
+  const dReal *angular = dBodyGetAngularVel(before->body);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = (linear[i] - before->linear[i]) / physics->probe_step_s;
+    out[3 + i] = (angular[i] - before->angular[i]) / physics->probe_step_s;
+  }
+}
+
+/* Eq. 3 with no force: b. */
+static void measure_b(hapi_physics *physics)
+{
+  hapi_test_rewind(physics);
+  hapi_test_step(physics);
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0) {
+      continue;
+    }
+    double b[6];
+    acceleration_since_snapshot(physics, slot->known, b);
+    if (hapi_finite(b, 6)) {
+      memcpy(slot->b, b, sizeof b);
+    } else {
+      ++physics->figures.stats.probes_singular;
+    }
+  }
+}
+
+/* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. */
+static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  double last = hapi_v3_norm(contact->last_force);
+  double floor = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body_of(physics, contact)->mass;
+  return last > floor ? last : floor;
+}
+
+/* One column of eq. 5 and 6 for each contact of the round. */
+static void measure_column(hapi_physics *physics, const hapi_contact_slot *contact, double out[6])
+{
+  const hapi_body_slot *body = body_of(physics, contact);
+  double force = perturbation(physics, contact);
+  acceleration_since_snapshot(physics, body->known, out);
+  for (int i = 0; i < 6; ++i) {
+    out[i] = (out[i] - body->b[i]) / force;
+  }
+}
+
+static void push(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
+{
+  dBodyID body = physics->table.entries[body_of(physics, contact)->known].body;
+  double force[3] = {0.0, 0.0, 0.0};
+  double at[3];
+  force[axis] = perturbation(physics, contact);
+  hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), contact->point_body, at);
+  dBodyAddForceAtPos(body, force[0], force[1], force[2], at[0], at[1], at[2]);
+}
+
+static void keep_column(hapi_physics *physics, hapi_contact_slot *contact, int axis,
+                        const double column[6])
+{
+  if (!hapi_finite(column, 6)) {
+    ++physics->figures.stats.probes_singular; /* the last good one stays */
+    return;
+  }
+  for (int i = 0; i < 6; ++i) {
+    contact->a[i][axis] = column[i];
+  }
+  contact->probed = true;
+}
+
+/* Three probes for the contacts of one round. */
+static void measure_round(hapi_physics *physics, uint32_t round)
+{
+  for (int axis = 0; axis < 3; ++axis) {
+    hapi_test_rewind(physics);
+    for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+      const hapi_contact_slot *contact = &physics->contacts[i];
+      if (probed(physics, contact) && contact->round == round) {
+        push(physics, contact, axis);
+      }
+    }
+    hapi_test_step(physics);
+    for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+      hapi_contact_slot *contact = &physics->contacts[i];
+      if (probed(physics, contact) && contact->round == round) {
+        double column[6];
+        measure_column(physics, contact, column);
+        keep_column(physics, contact, axis, column);
+      }
+    }
+  }
+}
+
+/* Numbers the contacts of each island from 0; how many rounds that makes. With probe=paper each
+ * contact has a round of its own. */
+static uint32_t plan_rounds(hapi_physics *physics)
+{
+  uint32_t most = 0;
+  uint32_t total = 0;
+  memset(physics->test.rounds, 0, physics->config.capacity.contacts * sizeof(uint32_t));
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    hapi_contact_slot *contact = &physics->contacts[i];
+    if (!probed(physics, contact)) {
+      continue;
+    }
+    uint32_t known = body_of(physics, contact)->known;
+    uint32_t *count = &physics->test.rounds[physics->table.entries[known].island];
+    contact->round = physics->config.probe == HAP_PROBE_PAPER ? total : *count;
+    ++total;
+    ++*count;
+    most = *count > most ? *count : most;
+  }
+  return physics->config.probe == HAP_PROBE_PAPER ? total : most;
+}
+
+void hapi_accelerance_measure(hapi_physics *physics)
+{
+  if (physics->model != HAP_MODEL_ACCELERANCE) {
+    return;
+  }
+  hap_status status = hapi_test_gather(physics);
+  if (status >= HAP_OK && physics->test.member_count > 0) {
+    status = hapi_test_enter(physics);
+  }
+  if (status < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
+    return;
+  }
+  if (physics->test.member_count == 0) {
+    return;
+  }
+  uint32_t rounds = plan_rounds(physics);
+  for (uint32_t round = 0; round < rounds; ++round) {
+    if (round == 0 || physics->config.probe == HAP_PROBE_PAPER) {
+      measure_b(physics);
+    }
+    measure_round(physics, round);
+  }
+  hapi_test_leave(physics);
+}

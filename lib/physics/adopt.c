@@ -1,0 +1,120 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* What the application says of its bodies, and what it asks of them. */
+
+bool hapi_physics_may_edit(hapi_physics *physics)
+{
+  return !physics->begun || physics->config.lockstep || hapi_physics_in_callback(physics) ||
+         hapi_fair_lock_is_mine(&physics->lock);
+}
+
+hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
+{
+  uint32_t index;
+  return hapi_bodies_adopt(physics, body, &index);
+}
+
+hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
+{
+  uint32_t index = hapi_bodies_find(&physics->table, body);
+  if (index == HAPI_NONE) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  hapi_bodies_forget(physics, index);
+  return HAP_OK;
+}
+
+void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    if (physics->contacts[i].phase == HAPI_SLOT_LIVE && physics->contacts[i].geom == geom) {
+      physics->contacts[i].phase = HAPI_SLOT_FREE;
+    }
+  }
+}
+
+hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
+                                           void (*callback)(struct dxBody *))
+{
+  uint32_t index = hapi_bodies_find(&physics->table, body);
+  if (index == HAPI_NONE) {
+    hap_status status = hapi_bodies_scan(physics);
+    index = hapi_bodies_find(&physics->table, body);
+    if (status < HAP_OK || index == HAPI_NONE) {
+      return status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
+    }
+  }
+  physics->table.entries[index].moved_callback = callback;
+  dBodySetMovedCallback(body, callback);
+  return HAP_OK;
+}
+
+hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
+                                     size_t count)
+{
+  uint32_t watch[HAP_TRACE_BODIES_MAX];
+  if (count > HAP_TRACE_BODIES_MAX) {
+    return HAP_ERROR_CAPACITY;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    watch[i] = hapi_bodies_find(&physics->table, bodies[i]);
+    if (watch[i] == HAPI_NONE) {
+      return HAP_ERROR_NOT_FOUND;
+    }
+  }
+  memcpy(physics->watch, watch, count * sizeof watch[0]);
+  physics->watch_count = (uint32_t)count;
+  return HAP_OK;
+}
+
+static void blend(const hap_pose poses[2], double share, hap_pose *out)
+{
+  double side = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    side += poses[0].quat_wxyz[i] * poses[1].quat_wxyz[i];
+  }
+  side = side < 0.0 ? -1.0 : 1.0;
+  for (int i = 0; i < 3; ++i) {
+    out->position[i] = poses[0].position[i] + share * (poses[1].position[i] - poses[0].position[i]);
+  }
+  for (int i = 0; i < 4; ++i) {
+    out->quat_wxyz[i] =
+        (1.0 - share) * poses[0].quat_wxyz[i] + share * side * poses[1].quat_wxyz[i];
+  }
+  hapi_quat_normalize(out->quat_wxyz);
+}
+
+/* Drawn one interval behind: between the last but one and the last known poses. */
+static double share_at(const hapi_physics *physics, int64_t time_ns)
+{
+  double interval = (double)(physics->pose_times[1] - physics->pose_times[0]);
+  double since = (double)(time_ns - physics->pose_times[1]);
+  if (!(interval > 0.0)) {
+    return 1.0;
+  }
+  double share = since / interval;
+  return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
+}
+
+hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
+                              size_t count, hap_pose *out)
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->poses_lock);
+  double share = share_at(physics, time_ns);
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
+    if (index == HAPI_NONE || physics->table.entries[index].pose_count == 0) {
+      status = HAP_ERROR_NOT_FOUND;
+      continue;
+    }
+    blend(physics->table.entries[index].poses, share, &out[i]);
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+  return status;
+}

@@ -1,0 +1,64 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Physics' part of the statistics. */
+
+void hapi_counts_show(hapi_physics *physics)
+{
+  physics->figures.stats.bodies_known = physics->table.used;
+  physics->figures.stats.bodies_lost = physics->table.lost;
+  pthread_mutex_lock(&physics->shown_lock);
+  physics->shown = physics->figures;
+  pthread_mutex_unlock(&physics->shown_lock);
+}
+
+void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
+{
+  physics->figures.stats.frames_dropped += steps; /* in drive FRAME physics is the caller */
+  hapi_counts_show(physics);
+}
+
+static void fill_times(const hapi_physics *physics, hap_stats *out)
+{
+  const hapi_physics_counts *f = &physics->shown;
+  double per_cycle = f->cycles > 0 ? 1e3 / (double)f->cycles : 0.0;
+  out->collide_ms_mean = per_cycle * f->collide_s;
+  out->neighbour_ms_mean = per_cycle * f->neighbour_s;
+  out->testing_ms_mean = per_cycle * f->testing_s;
+  out->step_ms_mean = per_cycle * f->step_s;
+  out->publish_ms_mean = per_cycle * f->publish_s;
+  out->physics_ms_mean = 1e-6 * hapi_histogram_mean_ns(&physics->cycle_ns);
+  out->physics_ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&physics->cycle_ns, 0.99);
+  out->physics_ms_max = 1e-6 * hapi_histogram_max_ns(&physics->cycle_ns);
+  out->physics_duty = 1e-3 * out->physics_ms_mean / hapi_physics_next_period(physics);
+}
+
+/* Impulse on the world over impulse of the hands, along the latter. */
+static void fill_momentum(const hapi_physics *physics, hap_stats *out)
+{
+  const hapi_physics_counts *f = &physics->shown;
+  double net2 = hapi_v3_dot(f->hand_impulse, f->hand_impulse);
+  double difference[3];
+  hapi_v3_sub(f->world_impulse, f->hand_impulse, difference);
+  out->momentum_error_ns = hapi_v3_norm(difference);
+  bool meaningful = net2 > 0.0 && sqrt(net2) >= 0.05 * out->impulse_abs_ns;
+  out->momentum_ratio =
+      meaningful ? hapi_v3_dot(f->world_impulse, f->hand_impulse) / net2 : (double)NAN;
+}
+
+void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
+{
+  pthread_mutex_lock(&physics->shown_lock);
+  hap_stats loop = *out;
+  *out = physics->shown.stats;
+  out->size = loop.size;
+  out->impulse_abs_ns = loop.impulse_abs_ns;
+  fill_times(physics, out);
+  fill_momentum(physics, out);
+  pthread_mutex_unlock(&physics->shown_lock);
+}

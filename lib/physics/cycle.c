@@ -1,0 +1,173 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* One cycle of the physics thread, in the paper's order: step, neighbours, testing simulations,
+ * sync. The world's time runs ahead of the loop's by the cycle's own period, because the result is
+ * for the end of it; only model SINGLE steps up to now. */
+
+typedef struct stopwatch {
+  int64_t last_ns;
+} stopwatch;
+
+/* Seconds since the last call. */
+static double lap(stopwatch *watch)
+{
+  int64_t now = hapi_clock_now();
+  double seconds = 1e-9 * (double)(now - watch->last_ns);
+  watch->last_ns = now;
+  return seconds;
+}
+
+static double lead_of(const hapi_physics *physics, hap_model model)
+{
+  return model == HAP_MODEL_SINGLE ? 0.0 : 1.0 / physics->config.physics_hz;
+}
+
+/* A change of model changes how far ahead the world is: the step between makes up for it. */
+static void follow_model(hapi_physics *physics)
+{
+  hap_model wanted = (hap_model)atomic_load(&physics->wanted_model);
+  double since_last = physics->probe_step_s;
+  physics->step_s = since_last + lead_of(physics, wanted) - lead_of(physics, physics->model);
+  if (physics->step_s < 1e-9) {
+    physics->step_s = 0.0;
+  }
+  physics->model = wanted;
+  physics->probe_step_s =
+      1.0 / (wanted == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
+}
+
+static void latch_world_fault(hapi_physics *physics, dBodyID body, const char *what)
+{
+  char text[256];
+  const dReal *p = dBodyGetPosition(body);
+  snprintf(text, sizeof text,
+           "the body at (%g, %g, %g) %s: ODE is not stepped until it is set right", p[0], p[1],
+           p[2], what);
+  if (!physics->world_faulty) {
+    hapi_log(HAP_LOG_ERROR, "%s", text);
+    physics->config.report_fault(physics->config.user, HAP_FAULT_WORLD, text);
+  }
+  physics->world_faulty = true;
+}
+
+/* ODE aborts the process on a pose that is not finite: none may reach it. */
+static bool world_is_sound(hapi_physics *physics)
+{
+  const char *what = NULL;
+  dBodyID body = hapi_bodies_find_unsound(physics, &what);
+  if (body != NULL) {
+    latch_world_fault(physics, body, what);
+    return false;
+  }
+  physics->world_faulty = false;
+  return true;
+}
+
+static void global_step(hapi_physics *physics)
+{
+  if (physics->step_s <= 0.0) {
+    return;
+  }
+  hapi_sleep_step(physics, physics->step_s);
+  hapi_world_quickstep(physics, physics->step_s);
+  if (physics->ode.after_step != NULL) {
+    physics->ode.after_step(physics->ode.user, physics->step_s);
+  }
+}
+
+static void sync_in(hapi_physics *physics, int64_t now_ns)
+{
+  hapi_edits_run(physics);
+  follow_model(physics);
+  if (hapi_bodies_scan(physics) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
+  }
+  hapi_reconcile_take(physics);
+  if (physics->model != HAP_MODEL_SINGLE) {
+    hapi_publish_poses(physics, now_ns);
+  }
+  if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
+    physics->ode.before_step(physics->ode.user, physics->step_s);
+  }
+  hapi_world_read_user_wrenches(physics);
+}
+
+static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+{
+  int64_t half_tick = (int64_t)(0.5e9 / physics->config.haptic_hz);
+  int64_t state_ns = physics->model == HAP_MODEL_SINGLE ? now_ns : next_ns;
+  int64_t valid_ns = state_ns;
+  if (physics->latency_s >= 0.0 && physics->model != HAP_MODEL_SINGLE) {
+    valid_ns = now_ns + (int64_t)llround(1e9 * physics->latency_s);
+  }
+  hapi_publish_model(physics, state_ns, valid_ns - half_tick);
+  if (physics->model == HAP_MODEL_SINGLE) {
+    hapi_publish_poses(physics, now_ns);
+  }
+  hapi_reconcile_left(physics);
+}
+
+static void note_times(hapi_physics *physics, const double seconds[5])
+{
+  hapi_physics_counts *f = &physics->figures;
+  hap_stats *s = &f->stats;
+  double total = seconds[0] + seconds[1] + seconds[2] + seconds[3] + seconds[4];
+  f->collide_s += seconds[0];
+  f->neighbour_s += seconds[1];
+  f->testing_s += seconds[2];
+  f->step_s += seconds[3];
+  f->publish_s += seconds[4];
+  ++f->cycles;
+  s->physics_steps += physics->step_s > 0.0;
+  s->last_collide_ms = 1e3 * seconds[0];
+  s->last_neighbour_ms = 1e3 * seconds[1];
+  s->last_testing_ms = 1e3 * seconds[2];
+  s->last_step_ms = 1e3 * seconds[3];
+  s->last_publish_ms = 1e3 * seconds[4];
+  hapi_histogram_add(&physics->cycle_ns, (int64_t)(1e9 * total));
+  hapi_counts_show(physics);
+}
+
+static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+{
+  stopwatch watch = {hapi_clock_now()};
+  double seconds[5] = {0.0};
+  sync_in(physics, now_ns);
+  if (!world_is_sound(physics)) {
+    return;
+  }
+  hapi_reconcile_predict(physics);
+  seconds[4] = lap(&watch);
+  hapi_world_collide(physics);
+  seconds[0] = lap(&watch);
+  hapi_neighbors_collect(physics);
+  seconds[1] = lap(&watch);
+  global_step(physics);
+  seconds[3] = lap(&watch);
+  hapi_reconcile_after(physics);
+  hapi_neighbors_find(physics);
+  seconds[1] += lap(&watch);
+  hapi_accelerance_measure(physics);
+  seconds[2] = lap(&watch);
+  sync_out(physics, now_ns, next_ns);
+  seconds[4] += lap(&watch);
+  note_times(physics, seconds);
+}
+
+void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+{
+  hapi_fair_lock_take(&physics->lock, INT64_MAX);
+  physics->cycle_thread = pthread_self();
+  atomic_store(&physics->in_cycle, 1);
+  run(physics, now_ns, next_ns);
+  atomic_store(&physics->in_cycle, 0);
+  hapi_fair_lock_give(&physics->lock);
+}

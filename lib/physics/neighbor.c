@@ -1,0 +1,198 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Neighbours: the bodies that a pointer may touch before the next sync (paper section 4.1). In two
+ * passes. Before the global step the space is asked for what is near; its geoms are clean then, and
+ * asking moves nothing in its lists. After the step the nearest points are taken. */
+
+#define REACH_FLOOR 0.005       /* m */
+#define REACH_ACCELERATION 15.0 /* m/s^2: a hand, or a body that is hit */
+
+static double reach_of(double relative_speed, double horizon_s)
+{
+  return REACH_FLOOR + relative_speed * horizon_s + REACH_ACCELERATION * horizon_s * horizon_s;
+}
+
+static double fastest_body(const hapi_physics *physics)
+{
+  double fastest = 0.0;
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    const hapi_known_body *known = &physics->table.entries[i];
+    if (known->body != NULL && dBodyIsEnabled(known->body)) {
+      double speed = hapi_v3_norm(dBodyGetLinearVel(known->body)) +
+                     known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
+      fastest = speed > fastest ? speed : fastest;
+    }
+  }
+  return fastest;
+}
+
+static void collect_geom(void *data, dGeomID a, dGeomID b)
+{
+  hapi_physics *physics = data;
+  hapi_neighborhood *hood = &physics->neighborhood;
+  dGeomID geom = a == hood->probe_geom ? b : a;
+  if (dGeomIsSpace(geom)) {
+    dSpaceCollide2(hood->probe_geom, geom, data, collect_geom);
+    return;
+  }
+  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hood->current_pointer];
+  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass ||
+      (dGeomGetCategoryBits(geom) & pointer->collide_bits) == 0) {
+    return;
+  }
+  if (hood->candidate_count == hood->candidate_capacity) {
+    ++physics->figures.stats.capacity_dropped;
+    return;
+  }
+  hapi_candidate *candidate = &hood->candidates[hood->candidate_count++];
+  candidate->geom = geom;
+  candidate->pointer = hood->current_pointer;
+  candidate->reach = hood->current_reach;
+}
+
+void hapi_neighbors_collect(hapi_physics *physics)
+{
+  hapi_neighborhood *hood = &physics->neighborhood;
+  hood->candidate_count = 0;
+  if (physics->state == NULL) {
+    return;
+  }
+  const hapi_state_pointer *pointers = hapi_state_pointers(physics->state);
+  double fastest = fastest_body(physics);
+  for (uint32_t i = 0; i < physics->state->pointer_count; ++i) {
+    if (pointers[i].generation == 0) {
+      continue;
+    }
+    const double *at = pointers[i].pose.position;
+    double speed = fastest + hapi_v3_norm(pointers[i].twist.linear);
+    double reach = reach_of(speed, 2.0 * physics->probe_step_s);
+    hood->current_pointer = i;
+    hood->current_reach = reach;
+    dGeomSphereSetRadius(hood->probe_geom, pointers[i].radius + reach);
+    dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
+    dGeomSetCollideBits(hood->probe_geom, ~0ul);
+    dGeomSetCategoryBits(hood->probe_geom, ~0ul);
+    dSpaceCollide2(hood->probe_geom, (dGeomID)physics->ode.space, physics, collect_geom);
+  }
+}
+
+static double relative_speed(dGeomID geom, const hapi_state_pointer *pointer, const double point[3])
+{
+  dVector3 velocity = {0.0, 0.0, 0.0, 0.0};
+  dBodyID body = dGeomGetBody(geom);
+  if (body != NULL) {
+    dBodyGetPointVel(body, point[0], point[1], point[2], velocity);
+  }
+  double difference[3];
+  hapi_v3_sub(pointer->twist.linear, velocity, difference);
+  return hapi_v3_norm(difference);
+}
+
+/* Nearest points for where the pointer will be at the time of the model; where that would put its
+ * centre inside the body, for where it is now: the far face must not be taken for the near one. */
+static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate, hapi_nearest *out)
+{
+  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[candidate->pointer];
+  double horizon = physics->probe_step_s;
+  double ahead = physics->model == HAP_MODEL_SINGLE ? 0.0 : horizon;
+  double there[3];
+  hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
+  bool found =
+      hapi_geom_nearest(physics, candidate->geom, there, pointer->radius, candidate->reach, out);
+  if (!found || out->distance < -pointer->radius) {
+    found = hapi_geom_nearest(physics, candidate->geom, pointer->pose.position, pointer->radius,
+                              candidate->reach, out);
+  }
+  return found &&
+         out->distance <= reach_of(relative_speed(candidate->geom, pointer, out->point_b), horizon);
+}
+
+static int by_distance(const void *a, const void *b)
+{
+  double x = ((const hapi_hit *)a)->nearest.distance;
+  double y = ((const hapi_hit *)b)->nearest.distance;
+  return (x > y) - (x < y);
+}
+
+static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit)
+{
+  dBodyID body = dGeomGetBody(hit->geom);
+  hapi_v3_copy(hit->nearest.point_b, slot->point_world);
+  hapi_v3_copy(hit->nearest.point_b, slot->point_body);
+  hapi_v3_copy(hit->nearest.normal, slot->normal_body);
+  slot->distance = hit->nearest.distance;
+  slot->wanted = true;
+  if (body != NULL) {
+    const dReal *q = dBodyGetQuaternion(body);
+    hapi_pose_unpoint(dBodyGetPosition(body), q, hit->nearest.point_b, slot->point_body);
+    hapi_quat_unrotate(q, hit->nearest.normal, slot->normal_body);
+  }
+}
+
+static void take_hit(hapi_physics *physics, const hapi_hit *hit)
+{
+  dBodyID body = dGeomGetBody(hit->geom);
+  uint32_t slot = HAPI_SLOT_NONE;
+  if (body != NULL) {
+    uint32_t known = hapi_bodies_find(&physics->table, body);
+    slot = known != HAPI_NONE ? hapi_slots_body(physics, known) : HAPI_NONE;
+    if (slot == HAPI_NONE) {
+      ++physics->figures.stats.capacity_dropped;
+      return;
+    }
+  }
+  uint32_t generation = hapi_state_pointers(physics->state)[hit->pointer].generation;
+  hapi_contact_slot *contact =
+      hapi_slots_contact(physics, slot, hit->geom, hit->pointer, generation);
+  if (contact == NULL) {
+    ++physics->figures.stats.capacity_dropped;
+    return;
+  }
+  place_contact(contact, hit);
+  if (slot != HAPI_SLOT_NONE) {
+    hapi_body_slot *local = &physics->bodies[slot];
+    local->wanted = true;
+    local->mass = hapi_body_mass(body);
+    local->flags = dBodyIsKinematic(body)  ? HAPI_BODY_DRIVEN
+                   : !dBodyIsEnabled(body) ? HAPI_BODY_RESTING
+                                           : 0;
+  }
+}
+
+void hapi_neighbors_find(hapi_physics *physics)
+{
+  hapi_neighborhood *hood = &physics->neighborhood;
+  uint32_t count = 0;
+  hapi_slots_begin_model(physics);
+  for (uint32_t i = 0; i < hood->candidate_count; ++i) {
+    hapi_hit *hit = &hood->hits[count];
+    if (find_nearest(physics, &hood->candidates[i], &hit->nearest)) {
+      hit->geom = hood->candidates[i].geom;
+      hit->pointer = hood->candidates[i].pointer;
+      ++count;
+    }
+  }
+  qsort(hood->hits, count, sizeof *hood->hits, by_distance); /* nearest first, for capacity */
+  for (uint32_t i = 0; i < count; ++i) {
+    take_hit(physics, &hood->hits[i]);
+  }
+  hapi_slots_end_model(physics);
+}
+
+uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
+{
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    const hapi_body_slot *slot = &physics->bodies[i];
+    count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
+  }
+  return count;
+}

@@ -1,0 +1,82 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* The global step's parts that are plain ODE. */
+
+double hapi_body_mass(dBodyID body)
+{
+  dMass mass;
+  if (dBodyIsKinematic(body)) {
+    return 0.0;
+  }
+  dBodyGetMass(body, &mass);
+  return mass.mass;
+}
+
+static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b,
+                          const dSurfaceParameters *surface)
+{
+  dContact *contacts = physics->contact_scratch;
+  int count =
+      dCollide(a, b, physics->ode.max_contacts_per_pair, &contacts[0].geom, sizeof(dContact));
+  for (int i = 0; i < count; ++i) {
+    contacts[i].surface = *surface;
+    dJointID joint = dJointCreateContact(physics->ode.world, physics->contact_group, &contacts[i]);
+    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
+  }
+}
+
+static bool can_move(dBodyID body)
+{
+  return body != NULL && !dBodyIsKinematic(body);
+}
+
+static void near_callback(void *data, dGeomID a, dGeomID b)
+{
+  hapi_physics *physics = data;
+  if (dGeomIsSpace(a) || dGeomIsSpace(b)) {
+    dSpaceCollide2(a, b, data, near_callback);
+    /* What is inside a space collides as well (ODE's own convention). */
+    if (dGeomIsSpace(a)) {
+      dSpaceCollide((dSpaceID)a, data, near_callback);
+    }
+    if (dGeomIsSpace(b)) {
+      dSpaceCollide((dSpaceID)b, data, near_callback);
+    }
+    return;
+  }
+  dBodyID body_a = dGeomGetBody(a);
+  dBodyID body_b = dGeomGetBody(b);
+  if (body_a == body_b || (!can_move(body_a) && !can_move(body_b))) {
+    return;
+  }
+  dSurfaceParameters surface = {.mode = dContactApprox1, .mu = dInfinity};
+  if (physics->ode.surface == NULL || physics->ode.surface(physics->ode.user, a, b, &surface)) {
+    make_contacts(physics, a, b, &surface);
+  }
+}
+
+void hapi_world_collide(hapi_physics *physics)
+{
+  dJointGroupEmpty(physics->contact_group);
+  dSpaceCollide(physics->ode.space, physics, near_callback);
+}
+
+void hapi_world_quickstep(hapi_physics *physics, double step_s)
+{
+  ++physics->figures.stats.quickstep_calls;
+  dWorldQuickStep(physics->ode.world, step_s);
+}
+
+void hapi_world_read_user_wrenches(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    hapi_known_body *known = &physics->table.entries[i];
+    if (known->body != NULL) {
+      hapi_v3_copy(dBodyGetForce(known->body), known->user_force);
+      hapi_v3_copy(dBodyGetTorque(known->body), known->user_torque);
+    }
+  }
+}

@@ -1,0 +1,242 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "physics/physics.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Life of the physics side: create, begin, end, destroy; what the session asks it for. */
+
+#define CANDIDATES_PER_CONTACT 8u
+
+static bool allocate(hapi_physics *physics)
+{
+  const hapi_capacity *c = &physics->config.capacity;
+  hapi_neighborhood *hood = &physics->neighborhood;
+  hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts;
+  physics->bodies = hapi_alloc_array(c->bodies, sizeof *physics->bodies);
+  physics->contacts = hapi_alloc_array(c->contacts, sizeof *physics->contacts);
+  hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
+  hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
+  physics->test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->test.rounds);
+  physics->contact_scratch =
+      hapi_alloc_array((size_t)physics->ode.max_contacts_per_pair, sizeof(dContact));
+  return physics->bodies != NULL && physics->contacts != NULL && hood->candidates != NULL &&
+         hood->hits != NULL && physics->test.rounds != NULL && physics->contact_scratch != NULL &&
+         hapi_bodies_init(&physics->table) == HAP_OK;
+}
+
+static bool init_locks(hapi_physics *physics)
+{
+  return pthread_mutex_init(&physics->edits_lock, NULL) == 0 &&
+         pthread_mutex_init(&physics->poses_lock, NULL) == 0 &&
+         pthread_mutex_init(&physics->shown_lock, NULL) == 0 && hapi_fair_lock_init(&physics->lock);
+}
+
+/* The world as it is must be one that can be stepped. */
+static hap_status check_world(hapi_physics *physics, hap_detail *detail)
+{
+  if (hapi_bodies_scan(physics) < HAP_OK) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the table of bodies");
+  }
+  const char *what = NULL;
+  dBodyID body = hapi_bodies_find_unsound(physics, &what);
+  if (body != NULL) {
+    const dReal *p = dBodyGetPosition(body);
+    return hapi_fail(detail, HAP_ERROR_WORLD,
+                     "a body at (%g, %g, %g) %s: set it right, or make the body kinematic", p[0],
+                     p[1], p[2], what);
+  }
+  return HAP_OK;
+}
+
+static void release_bodies(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    if (physics->table.entries[i].body != NULL) {
+      hapi_sleep_give_back(&physics->table.entries[i]);
+    }
+  }
+}
+
+hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
+                               hapi_physics **out, hap_detail *detail)
+{
+  *out = NULL;
+  hapi_physics *physics = hapi_alloc(sizeof *physics);
+  if (physics == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
+  }
+  physics->config = *config;
+  physics->ode = *ode;
+  physics->model = config->model;
+  physics->latency_s = -1.0;
+  atomic_init(&physics->wanted_model, (int)config->model);
+  if (!init_locks(physics) || !allocate(physics)) {
+    hapi_physics_destroy(physics);
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
+  }
+  physics->neighborhood.probe_geom = dCreateSphere(NULL, 1.0);
+  physics->contact_group = dJointGroupCreate(0);
+  hapi_slots_reset(physics);
+  hap_status status = check_world(physics, detail);
+  if (status < HAP_OK) {
+    hapi_physics_destroy(physics);
+    return status;
+  }
+  *out = physics;
+  return HAP_OK;
+}
+
+void hapi_physics_destroy(hapi_physics *physics)
+{
+  if (physics == NULL) {
+    return;
+  }
+  hapi_physics_end(physics);
+  if (physics->neighborhood.probe_geom != NULL) {
+    dGeomDestroy(physics->neighborhood.probe_geom);
+  }
+  if (physics->contact_group != NULL) {
+    dJointGroupDestroy(physics->contact_group);
+  }
+  hapi_bodies_finish(&physics->table);
+  hapi_snapshot_finish(&physics->snapshot);
+  hapi_test_finish(&physics->test);
+  hapi_free(physics->bodies);
+  hapi_free(physics->contacts);
+  hapi_free(physics->neighborhood.candidates);
+  hapi_free(physics->neighborhood.hits);
+  hapi_free(physics->contact_scratch);
+  hapi_fair_lock_finish(&physics->lock);
+  pthread_mutex_destroy(&physics->edits_lock);
+  pthread_mutex_destroy(&physics->poses_lock);
+  pthread_mutex_destroy(&physics->shown_lock);
+  hapi_free(physics);
+}
+
+static void reset_figures(hapi_physics *physics)
+{
+  memset(&physics->figures, 0, sizeof physics->figures);
+  hapi_histogram_reset(&physics->cycle_ns);
+  hapi_counts_show(physics);
+}
+
+static double period_of(const hapi_physics *physics, hap_model model)
+{
+  return 1.0 / (model == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
+}
+
+static void build_first_model(hapi_physics *physics)
+{
+  hapi_reconcile_take(physics);
+  hapi_world_read_user_wrenches(physics);
+  hapi_world_collide(physics);
+  hapi_neighbors_collect(physics);
+  hapi_neighbors_find(physics);
+  hapi_accelerance_measure(physics);
+}
+
+hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
+{
+  physics->begun = true;
+  hap_status status = check_world(physics, detail);
+  if (status < HAP_OK) {
+    hapi_physics_end(physics);
+    return status;
+  }
+  reset_figures(physics);
+  hapi_slots_reset(physics);
+  physics->model = (hap_model)atomic_load(&physics->wanted_model);
+  physics->probe_step_s = period_of(physics, physics->model);
+  physics->state = NULL;
+  physics->step_s = 0.0;
+  physics->model_number = 0;
+  physics->world_faulty = false;
+  physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
+  if (physics->config.lockstep) {
+    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+    dRandSetSeed(0);
+  }
+  build_first_model(physics);
+  *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
+  physics->start_ns = *start_ns;
+  hapi_publish_poses(physics, *start_ns);
+  hapi_publish_poses(physics, *start_ns);
+  hapi_publish_model(physics, *start_ns, *start_ns);
+  hapi_reconcile_left(physics);
+  return HAP_OK;
+}
+
+void hapi_physics_end(hapi_physics *physics)
+{
+  if (!physics->begun) {
+    return;
+  }
+  hapi_physics_stop_thread(physics);
+  hapi_edits_run(physics);
+  dJointGroupEmpty(physics->contact_group);
+  /* What was destroyed since the last cycle must not be given anything back. */
+  if (hapi_bodies_scan(physics) >= HAP_OK) {
+    release_bodies(physics);
+  }
+  if (physics->islands_threads != 0) {
+    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
+  }
+  physics->begun = false;
+}
+
+double hapi_physics_period(const hapi_physics *physics)
+{
+  return period_of(physics, physics->model);
+}
+
+double hapi_physics_next_period(const hapi_physics *physics)
+{
+  return period_of(physics, (hap_model)atomic_load(&physics->wanted_model));
+}
+
+void hapi_physics_set_latency(hapi_physics *physics, double seconds)
+{
+  physics->latency_s = seconds;
+}
+
+void hapi_physics_set_model(hapi_physics *physics, hap_model model)
+{
+  atomic_store(&physics->wanted_model, (int)model);
+}
+
+bool hapi_physics_in_callback(const hapi_physics *physics)
+{
+  return atomic_load(&physics->in_cycle) != 0 &&
+         pthread_equal(physics->cycle_thread, pthread_self()) != 0;
+}
+
+bool hapi_physics_steps_to_now(const hapi_physics *physics)
+{
+  return physics->model == HAP_MODEL_SINGLE;
+}
+
+hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
+{
+  if (hapi_physics_in_callback(physics) || hapi_fair_lock_is_mine(&physics->lock)) {
+    return HAP_ERROR_THREAD;
+  }
+  int64_t deadline = timeout_ns < 0 ? INT64_MAX : hapi_clock_now() + timeout_ns;
+  return hapi_fair_lock_take(&physics->lock, deadline) ? HAP_OK : HAP_ERROR_TIMEOUT;
+}
+
+hap_status hapi_physics_unlock(hapi_physics *physics)
+{
+  if (hapi_physics_in_callback(physics) || !hapi_fair_lock_is_mine(&physics->lock)) {
+    return HAP_ERROR_THREAD;
+  }
+  hapi_fair_lock_give(&physics->lock);
+  return HAP_OK;
+}

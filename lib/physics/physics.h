@@ -1,0 +1,85 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PHYSICS_PHYSICS_H
+#define HAPODE_PHYSICS_PHYSICS_H
+
+/* The physics side of a session: the application's ODE world, its neighbours of the pointers, and
+ * the testing simulations. No ODE types here. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/session.h>
+#include <hapode/stats.h>
+
+#include "sync/exchange.h"
+
+struct hap_ode_def;
+struct dxBody; /* dBodyID is a pointer to it */
+
+typedef struct hapi_physics hapi_physics;
+
+typedef struct hapi_physics_config {
+  hapi_capacity capacity;
+  hap_model model;
+  hap_impulse_pose impulse_pose;
+  hap_probe probe;
+  double physics_hz;
+  double haptic_hz;
+  bool lockstep;
+  int rt_priority;
+  hapi_exchange *exchange;
+  void (*report_fault)(void *user, hap_fault fault, const char *text); /* [physics] */
+  void *user;
+} hapi_physics_config;
+
+hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
+                               hapi_physics **out, hap_detail *detail);
+void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before */
+
+/* [control] Takes the world over and builds the first local model; *start_ns is the time for which
+ * it holds: 0 in lockstep, else now. */
+hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);
+void hapi_physics_end(hapi_physics *physics); /* gives the world back; idempotent */
+
+/* [control] Between begin and end: the thread of drive THREADS. */
+hap_status hapi_physics_start_thread(hapi_physics *physics);
+void hapi_physics_stop_thread(hapi_physics *physics); /* idempotent */
+
+/* [physics] One cycle at now_ns, the next one being planned for next_ns: the world goes one period
+ * on. Takes and gives the lock. */
+void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);
+
+/* [physics] Seconds from the last cycle to the next one in the model in force: H, or T in model
+ * SINGLE; and as it will be after the next cycle. */
+double hapi_physics_period(const hapi_physics *physics);
+double hapi_physics_next_period(const hapi_physics *physics);
+
+/* [control] LOCKSTEP: time from a cycle to the use of its model; negative: next sync. */
+void hapi_physics_set_latency(hapi_physics *physics, double seconds);
+
+/* [physics] Whether the model in force steps the world up to now, not ahead (SINGLE). */
+bool hapi_physics_steps_to_now(const hapi_physics *physics);
+
+/* ode.h; the caller holds the lock or runs in a cycle, or nothing runs */
+bool hapi_physics_may_edit(hapi_physics *physics);
+hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body);
+hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body);
+hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
+                                           void (*callback)(struct dxBody *));
+hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
+                                     size_t count);
+void hapi_physics_forget_geom(hapi_physics *physics, const void *geom);
+hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
+                              size_t count, hap_pose *out); /* [any] */
+
+/* session.h */
+void hapi_physics_set_model(hapi_physics *physics, hap_model model);     /* [any] */
+hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns); /* negative: for ever */
+hap_status hapi_physics_unlock(hapi_physics *physics);
+hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg); /* [any] */
+bool hapi_physics_in_callback(const hapi_physics *physics); /* calling thread runs a cycle */
+void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps);
+void hapi_physics_stats(hapi_physics *physics, hap_stats *out); /* [any] its part of *out */
+
+#endif

@@ -1,0 +1,350 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PHYSICS_PHYSICS_INTERNAL_H
+#define HAPODE_PHYSICS_PHYSICS_INTERNAL_H
+
+/* Shared by the files of lib/physics. Everything here belongs to the physics thread, or to whoever
+ * holds the lock, unless it says otherwise. */
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include <hapode/ode.h>
+
+#include "base/fair_lock.h"
+#include "base/histogram.h"
+#include "base/thread.h"
+#include "physics/physics.h"
+#include "proximity/proximity.h"
+
+#define HAPI_NONE 0xffffffffu
+#define HAPI_EDITS_MAX 256
+
+/* Standard gravity, for the smallest perturbation of a testing simulation. */
+#define HAPI_STANDARD_GRAVITY 9.81
+/* Share of the weight that a probe uses where the pointer gave no force yet (eq. 4 would divide
+ * by zero). */
+#define HAPI_PROBE_FLOOR 0.01
+
+/* ---- bodies.c: what is known of the world's bodies ---- */
+
+typedef struct hapi_sleep {
+  bool taken;
+  bool automatic; /* ODE's flag as the application set it; kept by us while the session runs */
+  double linear_threshold;  /* m/s, squared as ODE keeps it */
+  double angular_threshold; /* rad/s, squared */
+  int idle_steps;
+  double idle_time; /* s */
+  int samples;
+  int steps_left;
+  double time_left;
+  double *velocities; /* samples x 6, ring; NULL for up to one */
+  int next_sample;
+  bool ring_full;
+} hapi_sleep;
+
+typedef struct hapi_known_body {
+  dBodyID body;  /* NULL: free entry */
+  uint64_t seen; /* scan that found it */
+  bool adopted;
+  bool enabled_before;  /* scratch of the probe's flag pass */
+  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
+  uint32_t member;      /* scratch: place in the test set and its snapshot */
+  uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  double extent;        /* m, from the body's origin to the far corner of its geoms */
+  double user_force[3]; /* accumulators before the last global step */
+  double user_torque[3];
+  void (*moved_callback)(dBodyID);
+  hapi_sleep sleep;
+  hap_pose poses[2]; /* at the last but one and the last cycle, for drawing */
+  int pose_count;
+} hapi_known_body;
+
+typedef struct hapi_body_table {
+  hapi_known_body *entries;
+  uint32_t capacity;
+  uint32_t high;     /* entries in use are below */
+  uint32_t *buckets; /* open addressing, entry index + 1 */
+  uint32_t bucket_count;
+  uint32_t used;
+  uint64_t scan;
+  uint64_t lost;
+} hapi_body_table;
+
+/* ---- what the loop knows, and what we told it ---- */
+
+typedef enum hapi_slot_phase {
+  HAPI_SLOT_FREE = 0,
+  HAPI_SLOT_LIVE = 1,
+  HAPI_SLOT_RETIRING = 2 /* no longer in the model; the loop may still be using an older one */
+} hapi_slot_phase;
+
+typedef struct hapi_body_slot {
+  hapi_slot_phase phase;
+  uint32_t generation;
+  uint32_t known;      /* entry of the body table; HAPI_NONE: the body is gone */
+  uint32_t flags;      /* of the message */
+  uint64_t retired_at; /* first model without it */
+  bool wanted;         /* scratch: in the model being built */
+  bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
+  bool predicted;      /* the last global step had a predicted force on it */
+  bool has_prediction; /* b and the contacts' A were in force in this interval */
+  bool placed;         /* left_* hold what we left in ODE */
+  double mass;
+  double impulse_taken[3];
+  double angular_impulse_taken[3];
+  double left_position[3];
+  double left_quat[4];
+  double left_velocity[6];
+  double b[6];
+  double new_impulse[3]; /* of the last interval, to be given to the world */
+  double new_angular_impulse[3];
+  double velocity_before[6]; /* before the global step */
+  double applied[6];         /* A f of the global step's prediction, per second */
+  double residual[6];
+} hapi_body_slot;
+
+typedef struct hapi_contact_slot {
+  hapi_slot_phase phase;
+  uint32_t generation;
+  uint32_t body; /* slot, HAPI_SLOT_NONE: static world */
+  uint32_t pointer;
+  uint32_t pointer_generation;
+  dGeomID geom; /* compared only, never used */
+  bool wanted;
+  bool probed;    /* a holds a measured accelerance */
+  uint32_t round; /* scratch: order among the contacts of its island */
+  double point_body[3];
+  double normal_body[3];
+  double point_world[3]; /* when it was found */
+  double distance;
+  double last_force[3]; /* on the body, newest message */
+  double mean_force[3]; /* on the body, over the last interval */
+  double a[6][3];
+} hapi_contact_slot;
+
+/* ---- neighbor.c ---- */
+
+typedef struct hapi_candidate {
+  dGeomID geom;
+  uint32_t pointer;
+  double reach; /* m, that it was found with */
+} hapi_candidate;
+
+typedef struct hapi_hit {
+  dGeomID geom;
+  uint32_t pointer;
+  hapi_nearest nearest; /* a: pointer, b: geom */
+} hapi_hit;
+
+typedef struct hapi_neighborhood {
+  dGeomID probe_geom; /* private sphere, in no space */
+  hapi_candidate *candidates;
+  uint32_t candidate_capacity;
+  uint32_t candidate_count;
+  struct hapi_hit *hits;    /* candidate_capacity */
+  uint32_t current_pointer; /* while ODE calls back */
+  double current_reach;
+} hapi_neighborhood;
+
+/* ---- snapshot.c ---- */
+
+typedef struct hapi_body_state {
+  dBodyID body;
+  dReal position[4];
+  dReal quat[4];
+  dReal rotation[12];
+  dReal linear[4];
+  dReal angular[4];
+  dReal force[4];
+  dReal torque[4];
+  bool enabled;
+  void (*moved_callback)(dBodyID);
+} hapi_body_state;
+
+typedef struct hapi_feedback_state {
+  dJointFeedback *feedback;
+  dJointFeedback saved;
+} hapi_feedback_state;
+
+typedef struct hapi_snapshot {
+  hapi_body_state *bodies;
+  uint32_t body_count;
+  uint32_t body_capacity;
+  hapi_feedback_state *feedbacks;
+  uint32_t feedback_count;
+  uint32_t feedback_capacity;
+  unsigned long seed;
+} hapi_snapshot;
+
+/* ---- probe.c: the islands under test ---- */
+
+typedef struct hapi_test_set {
+  uint32_t *rounds;  /* by island: contacts so far; capacity.contacts */
+  uint32_t *members; /* entries of the body table, all islands under test */
+  uint32_t member_count;
+  uint32_t member_capacity;
+  uint32_t island_count;
+  dJointID *cut; /* joints of kinematic bodies to the outside, disabled for the probe */
+  uint32_t cut_count;
+  uint32_t cut_capacity;
+  uint32_t *disabled; /* entries switched off for the probe */
+  uint32_t disabled_count;
+  uint32_t disabled_capacity;
+  unsigned islands_threads; /* ODE's setting, restored after the probes */
+} hapi_test_set;
+
+typedef struct hapi_physics_counts {
+  hap_stats stats; /* physics' part */
+  double collide_s;
+  double neighbour_s;
+  double testing_s;
+  double step_s;
+  double publish_s;
+  uint64_t cycles;
+  double world_impulse[3]; /* given to the world: predictions and overwrites */
+  double hand_impulse[3];  /* given to the bodies, as the loop reported */
+} hapi_physics_counts;
+
+typedef struct hapi_edit {
+  hap_edit_fn run;
+  void *arg;
+} hapi_edit;
+
+struct hapi_physics {
+  hapi_physics_config config;
+  hap_ode_def ode;
+  dJointGroupID contact_group;
+  dContact *contact_scratch;
+
+  hapi_fair_lock lock;
+  pthread_mutex_t edits_lock;
+  hapi_edit edits[HAPI_EDITS_MAX];
+  uint32_t edit_first;
+  uint32_t edit_count;
+
+  hapi_body_table table;
+  hapi_body_slot *bodies;      /* capacity.bodies */
+  hapi_contact_slot *contacts; /* capacity.contacts */
+  hapi_neighborhood neighborhood;
+  hapi_snapshot snapshot;
+  hapi_test_set test;
+
+  _Atomic int wanted_model;
+  hap_model model;  /* in force in this cycle */
+  double step_s;    /* of this cycle's global step */
+  double latency_s; /* negative: next sync */
+  uint64_t model_number;
+  hapi_state *state;   /* newest message of the loop; NULL: none yet */
+  uint64_t last_tick;  /* of the newest message that was reconciled */
+  bool has_new_state;  /* state came in this cycle */
+  double probe_step_s; /* H */
+  int64_t pose_times[2];
+  pthread_mutex_t poses_lock; /* physics and those who draw */
+
+  uint32_t watch[HAP_TRACE_BODIES_MAX]; /* body table entries */
+  uint32_t watch_count;
+
+  bool begun;
+  unsigned islands_threads; /* ODE's setting as it was found */
+  bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
+  hapi_thread thread;
+  _Atomic int stop;
+  _Atomic int in_cycle;
+  pthread_t cycle_thread;
+  int64_t start_ns;
+  hapi_histogram cycle_ns;
+  hapi_physics_counts figures; /* physics' own */
+  pthread_mutex_t shown_lock;
+  hapi_physics_counts shown; /* copied once a cycle for readers */
+};
+
+/* bodies.c */
+hap_status hapi_bodies_init(hapi_body_table *table);
+void hapi_bodies_finish(hapi_body_table *table);
+uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
+/* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
+hap_status hapi_bodies_scan(hapi_physics *physics);
+hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
+void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
+/* A body with a mass or a state that must not reach a step; NULL when all are sound. */
+dBodyID hapi_bodies_find_unsound(hapi_physics *physics, const char **out_what);
+
+/* sleep.c: ODE's auto-disable, kept by us because a probe would reset ODE's own */
+void hapi_sleep_take(hapi_known_body *known);               /* idempotent */
+void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
+void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
+
+/* ode_world.c */
+void hapi_world_collide(hapi_physics *physics);
+void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
+void hapi_world_read_user_wrenches(hapi_physics *physics);
+double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
+
+/* shape.c */
+/* Shape and pose of a geom for proximity; false: of a class that only ODE's collider knows. */
+bool hapi_shape_of_geom(dGeomID geom, hapi_shape *out_shape, hap_pose *out_pose);
+/* Distance from a sphere's surface to the geom, within reach of it; false: farther. normal out of
+ * the geom. */
+bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[3], double radius,
+                       double reach, hapi_nearest *out);
+
+/* neighbor.c */
+void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
+void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
+uint32_t hapi_neighbors_bodies(const hapi_physics *physics); /* dynamic ones in the model */
+
+/* slots.c */
+uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known); /* live slot; HAPI_NONE: full */
+hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                      uint32_t pointer, uint32_t pointer_generation);
+void hapi_slots_begin_model(hapi_physics *physics); /* nothing wanted yet */
+void hapi_slots_end_model(hapi_physics *physics);   /* what is not wanted retires */
+void hapi_slots_release(hapi_physics *physics);     /* retired ones the loop is done with */
+void hapi_slots_drop_body(hapi_physics *physics, uint32_t known); /* the body is gone */
+void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE's state */
+void hapi_slots_reset(hapi_physics *physics);
+
+/* snapshot.c */
+hap_status hapi_snapshot_reserve(hapi_snapshot *snapshot, uint32_t bodies, uint32_t feedbacks);
+void hapi_snapshot_finish(hapi_snapshot *snapshot);
+void hapi_snapshot_clear(hapi_snapshot *snapshot);
+void hapi_snapshot_add_body(hapi_snapshot *snapshot, dBodyID body, void (*moved_callback)(dBodyID));
+void hapi_snapshot_add_feedback(hapi_snapshot *snapshot, dJointFeedback *feedback);
+/* Poses, velocities, accumulators and seed, to begin the next probe from. */
+void hapi_snapshot_rewind(const hapi_snapshot *snapshot);
+/* Rewinds, and restores flags and feedback as well. */
+void hapi_snapshot_restore(const hapi_snapshot *snapshot);
+
+/* probe.c */
+/* Which bodies the wanted contacts can move: their islands. HAP_ERROR_MEMORY. */
+hap_status hapi_test_gather(hapi_physics *physics);
+/* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
+hap_status hapi_test_enter(hapi_physics *physics);
+void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
+/* One testing simulation from the saved state; forces were added by prepare. */
+void hapi_test_rewind(hapi_physics *physics);
+void hapi_test_step(hapi_physics *physics);
+const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known); /* saved */
+void hapi_test_finish(hapi_test_set *test);
+
+/* accelerance.c: eq. 3-6 */
+void hapi_accelerance_measure(hapi_physics *physics);
+
+/* reconcile.c: eq. 12-14, momentum */
+void hapi_reconcile_take(hapi_physics *physics);    /* newest message, eq. 12-13 */
+void hapi_reconcile_predict(hapi_physics *physics); /* pointers' forces of the global step */
+void hapi_reconcile_after(hapi_physics *physics);   /* after it: residuals */
+void hapi_reconcile_left(hapi_physics *physics);    /* last: remember what we leave in ODE */
+
+/* publish.c */
+void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
+void hapi_publish_poses(hapi_physics *physics, int64_t now_ns);
+
+/* counts.c */
+void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */
+
+/* edits.c */
+void hapi_edits_run(hapi_physics *physics);
+
+#endif

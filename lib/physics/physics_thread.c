@@ -1,0 +1,67 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include <hapode/ode.h>
+
+#include "base/clock.h"
+#include "physics/physics_internal.h"
+
+/* Paces the cycles in drive THREADS. */
+
+static int64_t nanoseconds(double seconds)
+{
+  return (int64_t)llround(1e9 * seconds);
+}
+
+static void count_missed(hapi_physics *physics, int64_t deadlines)
+{
+  physics->figures.stats.physics_missed += (uint64_t)deadlines; /* shown with the next cycle */
+}
+
+/* Where the next cycle belongs: at its deadline, or, when that has passed by whole periods, at the
+ * last one before now. */
+static int64_t skip_missed(hapi_physics *physics, int64_t deadline, int64_t period)
+{
+  int64_t late = hapi_clock_now() - deadline;
+  if (late < period) {
+    return deadline;
+  }
+  count_missed(physics, late / period);
+  return deadline + late / period * period;
+}
+
+static void *physics_main(void *arg)
+{
+  hapi_physics *physics = arg;
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  int64_t period = nanoseconds(hapi_physics_period(physics));
+  int64_t deadline = physics->start_ns;
+  if (physics->model == HAP_MODEL_SINGLE) {
+    deadline += period; /* the first model is for the first tick already */
+  }
+  while (atomic_load_explicit(&physics->stop, memory_order_acquire) == 0) {
+    bool single = physics->model == HAP_MODEL_SINGLE;
+    /* SINGLE works between two ticks: after the one before its time and before the one at it. */
+    hapi_clock_sleep_until(single ? deadline - period / 2 : deadline);
+    hapi_physics_cycle(physics, deadline,
+                       deadline + nanoseconds(hapi_physics_next_period(physics)));
+    period = nanoseconds(hapi_physics_period(physics));
+    deadline = skip_missed(physics, deadline + period, period);
+  }
+  dCleanupODEAllDataForThread();
+  return NULL;
+}
+
+hap_status hapi_physics_start_thread(hapi_physics *physics)
+{
+  atomic_store(&physics->stop, 0);
+  return hapi_thread_start(&physics->thread, physics_main, physics, "hapode-physics",
+                           physics->config.rt_priority / 2);
+}
+
+void hapi_physics_stop_thread(hapi_physics *physics)
+{
+  atomic_store(&physics->stop, 1);
+  hapi_thread_join(&physics->thread);
+}

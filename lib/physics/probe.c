@@ -1,0 +1,262 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* The testing simulation: a step of the global world that is undone afterwards. Only the islands
+ * under test are stepped. All probes whose difference is taken step the same islands from the same
+ * seed: QuickStep shuffles its rows, and another order gives another error. */
+
+static bool dynamic(dBodyID body)
+{
+  return body != NULL && !dBodyIsKinematic(body);
+}
+
+/* Grows an array of elements of one size to hold count more than in use. */
+static bool reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
+{
+  if (used + count <= *capacity) {
+    return true;
+  }
+  uint32_t wanted = 2 * (used + count) + 64;
+  void *more = hapi_alloc_array(wanted, size);
+  if (more == NULL) {
+    return false;
+  }
+  if (used > 0) {
+    memcpy(more, *array, used * size);
+  }
+  hapi_free(*array);
+  *array = more;
+  *capacity = wanted;
+  return true;
+}
+
+static bool add_member(hapi_physics *physics, uint32_t index, uint32_t island)
+{
+  hapi_test_set *test = &physics->test;
+  if (!reserve((void **)&test->members, &test->member_capacity, test->member_count, 1,
+               sizeof *test->members)) {
+    return false;
+  }
+  physics->table.entries[index].island = island;
+  physics->table.entries[index].member = test->member_count;
+  test->members[test->member_count++] = index;
+  return true;
+}
+
+/* Partner of a body in a joint that is switched on; NULL: the static world. */
+static dBodyID partner(dBodyID body, dJointID joint)
+{
+  if (!dJointIsEnabled(joint)) {
+    return NULL;
+  }
+  dBodyID first = dJointGetBody(joint, 0);
+  return first == body ? dJointGetBody(joint, 1) : first;
+}
+
+/* A kinematic body moves with the island, but nothing passes through it. */
+static bool add_partners(hapi_physics *physics, dBodyID body, uint32_t island)
+{
+  int joints = dBodyGetNumJoints(body);
+  for (int i = 0; i < joints; ++i) {
+    uint32_t other = hapi_bodies_find(&physics->table, partner(body, dBodyGetJoint(body, i)));
+    if (other != HAPI_NONE && physics->table.entries[other].island == HAPI_NONE &&
+        !add_member(physics, other, island)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static bool gather_island(hapi_physics *physics, uint32_t start)
+{
+  hapi_test_set *test = &physics->test;
+  uint32_t island = test->island_count++;
+  uint32_t next = test->member_count;
+  bool good = add_member(physics, start, island);
+  for (; good && next < test->member_count; ++next) {
+    dBodyID body = physics->table.entries[test->members[next]].body;
+    good = !dynamic(body) || add_partners(physics, body, island);
+  }
+  return good;
+}
+
+static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  return contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+         (physics->bodies[contact->body].flags & HAPI_BODY_DRIVEN) == 0;
+}
+
+hap_status hapi_test_gather(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    physics->table.entries[test->members[i]].island = HAPI_NONE;
+  }
+  test->member_count = 0;
+  test->island_count = 0;
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    if (!contact_moves_a_body(physics, &physics->contacts[i])) {
+      continue;
+    }
+    uint32_t known = physics->bodies[physics->contacts[i].body].known;
+    if (physics->table.entries[known].island == HAPI_NONE && !gather_island(physics, known)) {
+      return HAP_ERROR_MEMORY;
+    }
+  }
+  return HAP_OK;
+}
+
+/* ODE's island search goes through kinematic bodies: their joints to the outside are cut. */
+static hap_status cut_joints(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  test->cut_count = 0;
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    dBodyID body = physics->table.entries[test->members[i]].body;
+    int joints = dynamic(body) ? 0 : dBodyGetNumJoints(body);
+    if (!reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
+                 sizeof *test->cut)) {
+      return HAP_ERROR_MEMORY;
+    }
+    for (int k = 0; k < joints; ++k) {
+      dJointID joint = dBodyGetJoint(body, k);
+      uint32_t other = hapi_bodies_find(&physics->table, partner(body, joint));
+      if (other != HAPI_NONE && physics->table.entries[other].island == HAPI_NONE) {
+        dJointDisable(joint);
+        test->cut[test->cut_count++] = joint;
+      }
+    }
+  }
+  return HAP_OK;
+}
+
+static hap_status save_members(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  uint32_t joints = 0;
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    joints += (uint32_t)dBodyGetNumJoints(physics->table.entries[test->members[i]].body);
+  }
+  hap_status status = hapi_snapshot_reserve(&physics->snapshot, test->member_count, joints);
+  if (status < HAP_OK) {
+    return status;
+  }
+  hapi_snapshot_clear(&physics->snapshot);
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    const hapi_known_body *known = &physics->table.entries[test->members[i]];
+    hapi_snapshot_add_body(&physics->snapshot, known->body, known->moved_callback);
+    int count = dBodyGetNumJoints(known->body);
+    for (int k = 0; k < count; ++k) {
+      dJointFeedback *feedback = dJointGetFeedback(dBodyGetJoint(known->body, k));
+      if (feedback != NULL) {
+        hapi_snapshot_add_feedback(&physics->snapshot, feedback); /* twice does no harm */
+      }
+    }
+  }
+  return HAP_OK;
+}
+
+static hap_status switch_others_off(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  test->disabled_count = 0;
+  if (!reserve((void **)&test->disabled, &test->disabled_capacity, 0, physics->table.high,
+               sizeof *test->disabled)) {
+    return HAP_ERROR_MEMORY;
+  }
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    const hapi_known_body *known = &physics->table.entries[i];
+    if (known->body != NULL && known->island == HAPI_NONE && dBodyIsEnabled(known->body)) {
+      dBodyDisable(known->body);
+      test->disabled[test->disabled_count++] = i;
+    }
+  }
+  return HAP_OK;
+}
+
+hap_status hapi_test_enter(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hap_status status = save_members(physics);
+  if (status < HAP_OK) {
+    return status;
+  }
+  test->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
+  dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    const hapi_known_body *known = &physics->table.entries[test->members[i]];
+    dBodyEnable(known->body); /* a sleeping body would answer A = 0 */
+    if (known->moved_callback != NULL) {
+      dBodySetMovedCallback(known->body, NULL);
+    }
+  }
+  status = cut_joints(physics);
+  if (status >= HAP_OK) {
+    status = switch_others_off(physics);
+  }
+  if (status < HAP_OK) {
+    hapi_test_leave(physics);
+  }
+  return status;
+}
+
+void hapi_test_leave(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hapi_snapshot_restore(&physics->snapshot);
+  for (uint32_t i = 0; i < test->cut_count; ++i) {
+    dJointEnable(test->cut[i]);
+  }
+  for (uint32_t i = 0; i < test->disabled_count; ++i) {
+    dBodyEnable(physics->table.entries[test->disabled[i]].body);
+  }
+  test->cut_count = 0;
+  test->disabled_count = 0;
+  dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, test->islands_threads);
+}
+
+/* The application's forces of the last step act in a probe as well: it may add them at each step,
+ * in a callback that probes must not call. What waits in the accumulators already goes first. */
+static void add_user_wrench(const hapi_known_body *known)
+{
+  const dReal *f = dBodyGetForce(known->body);
+  const dReal *t = dBodyGetTorque(known->body);
+  if (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0 || t[0] != 0.0 || t[1] != 0.0 || t[2] != 0.0) {
+    return;
+  }
+  dBodySetForce(known->body, known->user_force[0], known->user_force[1], known->user_force[2]);
+  dBodySetTorque(known->body, known->user_torque[0], known->user_torque[1], known->user_torque[2]);
+}
+
+void hapi_test_rewind(hapi_physics *physics)
+{
+  hapi_snapshot_rewind(&physics->snapshot);
+  for (uint32_t i = 0; i < physics->test.member_count; ++i) {
+    add_user_wrench(&physics->table.entries[physics->test.members[i]]);
+  }
+}
+
+void hapi_test_step(hapi_physics *physics)
+{
+  ++physics->figures.stats.probe_steps;
+  hapi_world_quickstep(physics, physics->probe_step_s);
+}
+
+const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known)
+{
+  return &physics->snapshot.bodies[physics->table.entries[known].member];
+}
+
+void hapi_test_finish(hapi_test_set *test)
+{
+  hapi_free(test->rounds);
+  hapi_free(test->members);
+  hapi_free(test->cut);
+  hapi_free(test->disabled);
+  memset(test, 0, sizeof *test);
+}

@@ -1,0 +1,115 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+static void read_pose(dBodyID body, hap_pose *out)
+{
+  hapi_v3_copy(dBodyGetPosition(body), out->position);
+  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+}
+
+static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *out)
+{
+  hapi_body_slot *slot = &physics->bodies[index];
+  dBodyID body = physics->table.entries[slot->known].body;
+  memset(out, 0, sizeof *out);
+  out->slot = index;
+  out->generation = slot->generation;
+  out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
+  read_pose(body, &out->pose);
+  hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
+  hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
+  memcpy(out->b, slot->b, sizeof out->b);
+  memcpy(out->residual, slot->residual, sizeof out->residual);
+  slot->has_prediction = physics->model == HAP_MODEL_ACCELERANCE;
+  bool sound = hapi_finite(out->pose.position, 3) && hapi_finite(out->pose.quat_wxyz, 4) &&
+               hapi_finite(out->twist.linear, 3) && hapi_finite(out->twist.angular, 3);
+  physics->figures.stats.states_rejected += !sound;
+  return sound;
+}
+
+static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_model_contact *out)
+{
+  memset(out, 0, sizeof *out);
+  out->slot = index;
+  out->generation = slot->generation;
+  out->body = slot->body;
+  out->pointer = slot->pointer;
+  out->pointer_generation = slot->pointer_generation;
+  hapi_v3_copy(slot->point_body, out->point_body);
+  hapi_v3_copy(slot->normal_body, out->normal_body);
+  memcpy(out->a, slot->a, sizeof out->a);
+}
+
+static void fill_watch(hapi_physics *physics, hapi_model *out)
+{
+  out->watch_count = physics->watch_count;
+  for (uint32_t i = 0; i < physics->watch_count; ++i) {
+    const hapi_known_body *known =
+        physics->watch[i] != HAPI_NONE ? &physics->table.entries[physics->watch[i]] : NULL;
+    bool local = known != NULL && known->slot != HAPI_NONE;
+    out->watch_slot[i] = local ? known->slot : HAPI_SLOT_NONE;
+    if (known != NULL) {
+      hapi_v3_copy(dBodyGetPosition(known->body), out->watch_position[i]);
+    }
+  }
+}
+
+static void count_model(hapi_physics *physics, const hapi_model *model)
+{
+  hap_stats *stats = &physics->figures.stats;
+  stats->neighbours = hapi_neighbors_bodies(physics);
+  stats->pointer_contacts = model->contact_count;
+  if (stats->neighbours > stats->neighbours_max) {
+    stats->neighbours_max = stats->neighbours;
+  }
+}
+
+void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
+{
+  hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
+  hapi_model_body *bodies = hapi_model_bodies(out);
+  hapi_model_contact *contacts = hapi_model_contacts(out);
+  out->number = ++physics->model_number;
+  out->state_ns = state_ns;
+  out->valid_from_ns = valid_from_ns;
+  out->blend_s = physics->model == HAP_MODEL_IMPULSE ? physics->probe_step_s : 0.0;
+  out->model = physics->model;
+  out->impulse_pose = physics->config.impulse_pose;
+  out->body_count = 0;
+  out->contact_count = 0;
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    if (physics->bodies[i].phase == HAPI_SLOT_LIVE &&
+        fill_body(physics, i, &bodies[out->body_count])) {
+      ++out->body_count;
+    }
+  }
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    if (physics->contacts[i].phase == HAPI_SLOT_LIVE) {
+      fill_contact(&physics->contacts[i], i, &contacts[out->contact_count++]);
+    }
+  }
+  fill_watch(physics, out);
+  count_model(physics, out);
+  hapi_exchange_model_publish(physics->config.exchange);
+}
+
+void hapi_publish_poses(hapi_physics *physics, int64_t now_ns)
+{
+  pthread_mutex_lock(&physics->poses_lock);
+  physics->pose_times[0] = physics->pose_times[1];
+  physics->pose_times[1] = now_ns;
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    hapi_known_body *known = &physics->table.entries[i];
+    if (known->body != NULL) {
+      known->poses[0] = known->poses[1];
+      read_pose(known->body, &known->poses[1]);
+      known->poses[0] = known->pose_count == 0 ? known->poses[1] : known->poses[0];
+      known->pose_count = 1;
+    }
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+}

@@ -1,0 +1,136 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+#include "physics/physics_internal.h"
+
+/* Auto-disable. ODE keeps its countdown inside the body, without getter or setter: enabling a body
+ * restarts it and a testing simulation advances it, so with probes no body would ever fall asleep,
+ * or too soon. So ODE's own is switched off while a session runs, and the same rule is applied
+ * here: a body whose mean speed over the last samples stays below its thresholds for so many steps
+ * and so long is disabled with its velocity set to zero. */
+
+static void start_countdown(hapi_sleep *sleep)
+{
+  sleep->steps_left = sleep->idle_steps;
+  sleep->time_left = sleep->idle_time;
+}
+
+void hapi_sleep_take(hapi_known_body *known)
+{
+  dBodyID body = known->body;
+  hapi_sleep *sleep = &known->sleep;
+  if (sleep->taken) {
+    return;
+  }
+  memset(sleep, 0, sizeof *sleep);
+  sleep->taken = true;
+  sleep->automatic = dBodyGetAutoDisableFlag(body) != 0;
+  if (!sleep->automatic) {
+    return;
+  }
+  sleep->linear_threshold = dBodyGetAutoDisableLinearThreshold(body);
+  sleep->linear_threshold *= sleep->linear_threshold;
+  sleep->angular_threshold = dBodyGetAutoDisableAngularThreshold(body);
+  sleep->angular_threshold *= sleep->angular_threshold;
+  sleep->idle_steps = dBodyGetAutoDisableSteps(body);
+  sleep->idle_time = dBodyGetAutoDisableTime(body);
+  sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
+  start_countdown(sleep);
+  if (sleep->samples > 1) {
+    sleep->velocities = hapi_alloc_array((size_t)sleep->samples, 6 * sizeof(double));
+    if (sleep->velocities == NULL) {
+      hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
+      sleep->samples = 0;
+    }
+  }
+  bool enabled = dBodyIsEnabled(body) != 0;
+  dBodySetAutoDisableFlag(body, 0); /* also enables the body and resets its settings */
+  if (!enabled) {
+    dBodyDisable(body);
+  }
+}
+
+void hapi_sleep_give_back(hapi_known_body *known)
+{
+  hapi_sleep *sleep = &known->sleep;
+  if (!sleep->taken || !sleep->automatic) {
+    sleep->taken = false;
+    return;
+  }
+  dBodyID body = known->body;
+  dBodySetAutoDisableLinearThreshold(body, sqrt(sleep->linear_threshold));
+  dBodySetAutoDisableAngularThreshold(body, sqrt(sleep->angular_threshold));
+  dBodySetAutoDisableSteps(body, sleep->idle_steps);
+  dBodySetAutoDisableTime(body, sleep->idle_time);
+  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
+  dBodySetAutoDisableFlag(body, 1);
+  hapi_free(sleep->velocities);
+  memset(sleep, 0, sizeof *sleep);
+}
+
+/* Takes a sample; true when the mean over all samples is known. */
+static bool mean_velocity(hapi_sleep *sleep, dBodyID body, double mean[6])
+{
+  double now[6];
+  memcpy(now, dBodyGetLinearVel(body), 3 * sizeof(double));
+  memcpy(now + 3, dBodyGetAngularVel(body), 3 * sizeof(double));
+  if (sleep->velocities == NULL) {
+    memcpy(mean, now, sizeof now);
+    return true;
+  }
+  memcpy(sleep->velocities + (size_t)sleep->next_sample * 6, now, sizeof now);
+  sleep->next_sample = (sleep->next_sample + 1) % sleep->samples;
+  sleep->ring_full = sleep->ring_full || sleep->next_sample == 0;
+  memset(mean, 0, sizeof now);
+  for (int i = 0; i < 6 * sleep->samples; ++i) {
+    mean[i % 6] += sleep->velocities[i];
+  }
+  for (int i = 0; i < 6; ++i) {
+    mean[i] *= 1.0 / (double)sleep->samples;
+  }
+  return sleep->ring_full;
+}
+
+static bool is_idle(hapi_sleep *sleep, dBodyID body)
+{
+  double v[6];
+  if (!mean_velocity(sleep, body, v)) {
+    return false;
+  }
+  double linear = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  double angular = v[3] * v[3] + v[4] * v[4] + v[5] * v[5];
+  return !(linear > sleep->linear_threshold) && !(angular > sleep->angular_threshold);
+}
+
+static void step_body(hapi_known_body *known, double step_s)
+{
+  hapi_sleep *sleep = &known->sleep;
+  if (is_idle(sleep, known->body)) {
+    --sleep->steps_left;
+    sleep->time_left -= step_s;
+  } else {
+    start_countdown(sleep);
+  }
+  if (sleep->steps_left <= 0 && sleep->time_left <= 0.0) {
+    dBodyDisable(known->body);
+    dBodySetLinearVel(known->body, 0.0, 0.0, 0.0);
+    dBodySetAngularVel(known->body, 0.0, 0.0, 0.0);
+  }
+}
+
+void hapi_sleep_step(hapi_physics *physics, double step_s)
+{
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    hapi_known_body *known = &physics->table.entries[i];
+    if (known->body == NULL || !known->sleep.automatic || known->sleep.samples == 0) {
+      continue;
+    }
+    /* ODE leaves bodies alone that have no joint, and those asleep already. */
+    if (dBodyIsEnabled(known->body) && dBodyGetNumJoints(known->body) > 0) {
+      step_body(known, step_s);
+    }
+  }
+}

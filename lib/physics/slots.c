@@ -1,0 +1,158 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "physics/physics_internal.h"
+
+/* Small numbers for what the loop carries. A body's slot is used again only after the loop has
+ * said that it uses a model without the body: until then its running totals are still read. */
+
+void hapi_slots_restart(hapi_body_slot *slot)
+{
+  uint32_t known = slot->known;
+  uint32_t generation = slot->generation;
+  hapi_slot_phase phase = slot->phase;
+  bool wanted = slot->wanted;
+  memset(slot, 0, sizeof *slot);
+  slot->known = known;
+  slot->generation = generation + 1;
+  slot->phase = phase;
+  slot->wanted = wanted;
+}
+
+uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known_index)
+{
+  hapi_known_body *known = &physics->table.entries[known_index];
+  if (known->slot != HAPI_NONE) {
+    return known->slot;
+  }
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase == HAPI_SLOT_FREE) {
+      slot->phase = HAPI_SLOT_LIVE;
+      slot->known = known_index;
+      hapi_slots_restart(slot);
+      known->slot = i;
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
+static bool same_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID geom,
+                         uint32_t pointer, uint32_t pointer_generation)
+{
+  return slot->phase == HAPI_SLOT_LIVE && slot->body == body && slot->geom == geom &&
+         slot->pointer == pointer && slot->pointer_generation == pointer_generation;
+}
+
+hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                      uint32_t pointer, uint32_t pointer_generation)
+{
+  hapi_contact_slot *empty = NULL;
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    hapi_contact_slot *slot = &physics->contacts[i];
+    if (same_contact(slot, body, geom, pointer, pointer_generation)) {
+      return slot;
+    }
+    if (empty == NULL && slot->phase == HAPI_SLOT_FREE) {
+      empty = slot;
+    }
+  }
+  if (empty == NULL) {
+    return NULL;
+  }
+  uint32_t generation = empty->generation;
+  memset(empty, 0, sizeof *empty);
+  empty->generation = generation + 1;
+  empty->phase = HAPI_SLOT_LIVE;
+  empty->body = body;
+  empty->geom = geom;
+  empty->pointer = pointer;
+  empty->pointer_generation = pointer_generation;
+  return empty;
+}
+
+void hapi_slots_begin_model(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    physics->bodies[i].wanted = false;
+  }
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    physics->contacts[i].wanted = false;
+  }
+}
+
+static void retire(hapi_physics *physics, hapi_body_slot *slot)
+{
+  slot->phase = HAPI_SLOT_RETIRING;
+  slot->retired_at = physics->model_number + 1;
+  if (slot->known != HAPI_NONE) {
+    physics->table.entries[slot->known].slot = HAPI_NONE;
+  }
+}
+
+void hapi_slots_end_model(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
+      retire(physics, slot);
+    }
+  }
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    hapi_contact_slot *slot = &physics->contacts[i];
+    if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
+      slot->phase = HAPI_SLOT_FREE;
+    }
+  }
+}
+
+void hapi_slots_release(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase == HAPI_SLOT_RETIRING && physics->state != NULL &&
+        physics->state->model_number >= slot->retired_at) {
+      slot->phase = HAPI_SLOT_FREE;
+      slot->known = HAPI_NONE;
+    }
+  }
+}
+
+void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase == HAPI_SLOT_FREE || slot->known != known) {
+      continue;
+    }
+    if (slot->phase == HAPI_SLOT_LIVE) {
+      retire(physics, slot);
+    }
+    slot->known = HAPI_NONE;
+    for (uint32_t k = 0; k < physics->config.capacity.contacts; ++k) {
+      if (physics->contacts[k].phase == HAPI_SLOT_LIVE && physics->contacts[k].body == i) {
+        physics->contacts[k].phase = HAPI_SLOT_FREE;
+      }
+    }
+  }
+}
+
+void hapi_slots_reset(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    uint32_t generation = physics->bodies[i].generation;
+    memset(&physics->bodies[i], 0, sizeof physics->bodies[i]);
+    physics->bodies[i].generation = generation;
+    physics->bodies[i].known = HAPI_NONE;
+  }
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    uint32_t generation = physics->contacts[i].generation;
+    memset(&physics->contacts[i], 0, sizeof physics->contacts[i]);
+    physics->contacts[i].generation = generation;
+  }
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    physics->table.entries[i].slot = HAPI_NONE;
+  }
+}

@@ -1,0 +1,111 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "physics/physics_internal.h"
+
+/* Everything a step touches. Poses go back bit by bit through the getters' pointers:
+ * dBodySetQuaternion would normalise again. The geoms need no word of it: the step that is undone
+ * has marked them as moved, and where they are is worked out from the body when it is next asked
+ * for. Finite-rotation data is the application's alone, a step only reads it. */
+
+hap_status hapi_snapshot_reserve(hapi_snapshot *snapshot, uint32_t bodies, uint32_t feedbacks)
+{
+  if (bodies > snapshot->body_capacity) {
+    hapi_body_state *more = hapi_alloc_array((size_t)bodies * 2, sizeof *more);
+    if (more == NULL) {
+      return HAP_ERROR_MEMORY;
+    }
+    hapi_free(snapshot->bodies);
+    snapshot->bodies = more;
+    snapshot->body_capacity = bodies * 2;
+  }
+  if (feedbacks > snapshot->feedback_capacity) {
+    hapi_feedback_state *more = hapi_alloc_array((size_t)feedbacks * 2, sizeof *more);
+    if (more == NULL) {
+      return HAP_ERROR_MEMORY;
+    }
+    hapi_free(snapshot->feedbacks);
+    snapshot->feedbacks = more;
+    snapshot->feedback_capacity = feedbacks * 2;
+  }
+  return HAP_OK;
+}
+
+void hapi_snapshot_finish(hapi_snapshot *snapshot)
+{
+  hapi_free(snapshot->bodies);
+  hapi_free(snapshot->feedbacks);
+  memset(snapshot, 0, sizeof *snapshot);
+}
+
+void hapi_snapshot_clear(hapi_snapshot *snapshot)
+{
+  snapshot->body_count = 0;
+  snapshot->feedback_count = 0;
+  snapshot->seed = dRandGetSeed();
+}
+
+void hapi_snapshot_add_body(hapi_snapshot *snapshot, dBodyID body, void (*moved_callback)(dBodyID))
+{
+  hapi_body_state *state = &snapshot->bodies[snapshot->body_count++];
+  state->body = body;
+  memcpy(state->position, dBodyGetPosition(body), sizeof state->position);
+  memcpy(state->quat, dBodyGetQuaternion(body), sizeof state->quat);
+  memcpy(state->rotation, dBodyGetRotation(body), sizeof state->rotation);
+  memcpy(state->linear, dBodyGetLinearVel(body), sizeof state->linear);
+  memcpy(state->angular, dBodyGetAngularVel(body), sizeof state->angular);
+  memcpy(state->force, dBodyGetForce(body), sizeof state->force);
+  memcpy(state->torque, dBodyGetTorque(body), sizeof state->torque);
+  state->enabled = dBodyIsEnabled(body) != 0;
+  state->moved_callback = moved_callback;
+}
+
+void hapi_snapshot_add_feedback(hapi_snapshot *snapshot, dJointFeedback *feedback)
+{
+  hapi_feedback_state *state = &snapshot->feedbacks[snapshot->feedback_count++];
+  state->feedback = feedback;
+  state->saved = *feedback;
+}
+
+/* The getters give const pointers to the body's own storage. */
+static void write_back(const dReal *storage, const dReal *values, size_t size)
+{
+  memcpy((dReal *)(uintptr_t)storage, values, size);
+}
+
+void hapi_snapshot_rewind(const hapi_snapshot *snapshot)
+{
+  for (uint32_t i = 0; i < snapshot->body_count; ++i) {
+    const hapi_body_state *state = &snapshot->bodies[i];
+    dBodyID body = state->body;
+    write_back(dBodyGetPosition(body), state->position, sizeof state->position);
+    write_back(dBodyGetQuaternion(body), state->quat, sizeof state->quat);
+    write_back(dBodyGetRotation(body), state->rotation, sizeof state->rotation);
+    write_back(dBodyGetLinearVel(body), state->linear, sizeof state->linear);
+    write_back(dBodyGetAngularVel(body), state->angular, sizeof state->angular);
+    write_back(dBodyGetForce(body), state->force, sizeof state->force);
+    write_back(dBodyGetTorque(body), state->torque, sizeof state->torque);
+  }
+  dRandSetSeed(snapshot->seed);
+}
+
+void hapi_snapshot_restore(const hapi_snapshot *snapshot)
+{
+  hapi_snapshot_rewind(snapshot);
+  for (uint32_t i = 0; i < snapshot->body_count; ++i) {
+    const hapi_body_state *state = &snapshot->bodies[i];
+    if (state->enabled) {
+      dBodyEnable(state->body);
+    } else {
+      dBodyDisable(state->body);
+    }
+    if (state->moved_callback != NULL) {
+      dBodySetMovedCallback(state->body, state->moved_callback);
+    }
+  }
+  for (uint32_t i = 0; i < snapshot->feedback_count; ++i) {
+    *snapshot->feedbacks[i].feedback = snapshot->feedbacks[i].saved;
+  }
+}

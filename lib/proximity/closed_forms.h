@@ -1,0 +1,19 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PROXIMITY_CLOSED_FORMS_H
+#define HAPODE_PROXIMITY_CLOSED_FORMS_H
+
+#include "proximity/support.h"
+
+/* Answers without iteration and without libccd, fit for the haptic loop. Exact inside and outside
+ * and stable where the direction is undefined (centre on a surface, an axis, the other centre):
+ * there one of the equally good directions is taken, the same one every time. */
+
+/* Pairs with a sphere and anything but a hull; pairs with a plane and anything but a plane. Points
+ * are relative to the origin of the solids. False: no closed form for this pair. */
+bool hapi_closed_form(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out);
+
+/* Change of the roles of a and b. */
+void hapi_nearest_swap(hapi_nearest *nearest);
+
+#endif

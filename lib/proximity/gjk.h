@@ -1,0 +1,26 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PROXIMITY_GJK_H
+#define HAPODE_PROXIMITY_GJK_H
+
+#include "proximity/support.h"
+
+/* Nearest points of two cores that are apart. Gilbert, Johnson, Keerthi, "A fast procedure for
+ * computing the distance between complex objects in three-dimensional space", 1988. Bounded
+ * iterations, no allocation. */
+
+typedef struct hapi_gjk {
+  double point_a[3];
+  double point_b[3];
+  double normal[3]; /* unit, b to a */
+  double distance;  /* m, > 0 */
+  int iterations;
+} hapi_gjk;
+
+/* False: the cores meet, or are so near (1e-13 of their size) that the answer would be noise; then
+ * normal is the last direction looked at, out of the cores when they hardly meet. Not for planes.
+ * start: a direction (b to a) to begin with, or NULL; one that separates them is proof that they
+ * are apart. */
+bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *start, hapi_gjk *out);
+
+#endif

@@ -1,0 +1,142 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "proximity/support.h"
+
+#include "base/vec.h"
+
+void hapi_solid_axis(const hapi_solid *solid, int axis, double out[3])
+{
+  const double *r = solid->rotation;
+  hapi_v3_set(out, r[axis], r[3 + axis], r[6 + axis]);
+}
+
+void hapi_solid_to_local(const hapi_solid *solid, const double vector[3], double out[3])
+{
+  const double *r = solid->rotation;
+  const double *v = vector;
+  hapi_v3_set(out, r[0] * v[0] + r[3] * v[1] + r[6] * v[2], r[1] * v[0] + r[4] * v[1] + r[7] * v[2],
+              r[2] * v[0] + r[5] * v[1] + r[8] * v[2]);
+}
+
+void hapi_solid_to_world(const hapi_solid *solid, const double vector[3], double out[3])
+{
+  const double *r = solid->rotation;
+  hapi_v3_set(out, hapi_v3_dot(r, vector), hapi_v3_dot(r + 3, vector), hapi_v3_dot(r + 6, vector));
+}
+
+static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
+{
+  double round[2] = {0.0, 0.0}; /* disc, ball */
+  switch (shape->kind) {
+    case HAPI_SHAPE_SPHERE:
+      round[1] = shape->radius;
+      break;
+    case HAPI_SHAPE_BOX:
+      hapi_v3_copy(shape->half, solid->half);
+      break;
+    case HAPI_SHAPE_CAPSULE:
+      round[1] = shape->radius;
+      solid->half[2] = shape->half[2];
+      break;
+    case HAPI_SHAPE_CYLINDER:
+      round[0] = shape->radius;
+      solid->half[2] = shape->half[2];
+      break;
+    case HAPI_SHAPE_PLANE:
+    case HAPI_SHAPE_HULL:
+      break;
+  }
+  solid->disc = round[0];
+  solid->ball = round[1];
+  const double *h = solid->half;
+  solid->reach = sqrt(hapi_v3_dot(h, h) + solid->disc * solid->disc);
+  return hapi_finite(h, 3) && hapi_finite(round, 2) && h[0] >= 0.0 && h[1] >= 0.0 && h[2] >= 0.0 &&
+         round[0] >= 0.0 && round[1] >= 0.0;
+}
+
+static bool hull_set(hapi_solid *solid, const hapi_shape *shape)
+{
+  if (shape->hull == NULL || shape->hull_count == 0) {
+    return false;
+  }
+  solid->hull = shape->hull;
+  solid->hull_count = shape->hull_count;
+  double mean[3] = {0.0, 0.0, 0.0};
+  double farthest2 = 0.0;
+  for (size_t i = 0; i < shape->hull_count; ++i) {
+    const double *point = shape->hull + 3 * i;
+    hapi_v3_madd(mean, 1.0 / (double)shape->hull_count, point, mean);
+    farthest2 = fmax(farthest2, hapi_v3_dot(point, point));
+  }
+  solid->reach = sqrt(farthest2);
+  hapi_solid_to_world(solid, mean, mean);
+  hapi_v3_add(solid->center, mean, solid->inside);
+  return hapi_finite(mean, 3);
+}
+
+bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose *pose,
+                      const double origin[3])
+{
+  *solid = (hapi_solid){.kind = shape->kind};
+  double quat[4];
+  memcpy(quat, pose->quat_wxyz, sizeof quat);
+  hapi_v3_sub(pose->position, origin, solid->center);
+  hapi_v3_copy(solid->center, solid->inside);
+  if (!hapi_finite(quat, 4) || !hapi_finite(solid->center, 3) || !sizes_set(solid, shape)) {
+    return false;
+  }
+  hapi_quat_normalize(quat);
+  hapi_quat_to_matrix(quat, solid->rotation);
+  return shape->kind != HAPI_SHAPE_HULL || hull_set(solid, shape);
+}
+
+bool hapi_pair_place(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
+                     const hap_pose *pose_b, hapi_solid out[2])
+{
+  bool planes = a->kind == HAPI_SHAPE_PLANE && b->kind == HAPI_SHAPE_PLANE;
+  return !planes && hapi_solid_place(&out[0], a, pose_a, pose_a->position) &&
+         hapi_solid_place(&out[1], b, pose_b, pose_a->position);
+}
+
+static void hull_support(const hapi_solid *solid, const double direction[3], double out[3])
+{
+  const double *best = solid->hull;
+  double best_dot = hapi_v3_dot(best, direction);
+  for (size_t i = 1; i < solid->hull_count; ++i) {
+    const double *point = solid->hull + 3 * i;
+    double dot = hapi_v3_dot(point, direction);
+    if (dot > best_dot) {
+      best_dot = dot;
+      best = point;
+    }
+  }
+  hapi_v3_copy(best, out);
+}
+
+/* Point of the disc: its middle when the direction stands on it, where every point is as good. */
+static void rim_support(double radius, const double direction[3], double out[3])
+{
+  double across = sqrt(direction[0] * direction[0] + direction[1] * direction[1]);
+  double scale = across > 0.0 ? radius / across : 0.0;
+  out[0] = scale * direction[0];
+  out[1] = scale * direction[1];
+}
+
+void hapi_solid_support(const hapi_solid *solid, const double direction[3], double out[3])
+{
+  double d[3];
+  double point[3];
+  hapi_solid_to_local(solid, direction, d);
+  if (solid->kind == HAPI_SHAPE_HULL) {
+    hull_support(solid, d, point);
+  } else {
+    for (int i = 0; i < 3; ++i) {
+      point[i] = d[i] < 0.0 ? -solid->half[i] : solid->half[i];
+    }
+    if (solid->kind == HAPI_SHAPE_CYLINDER) {
+      rim_support(solid->disc, d, point);
+    }
+  }
+  hapi_solid_to_world(solid, point, out);
+  hapi_v3_add(solid->center, out, out);
+}

@@ -1,0 +1,145 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include <hapode/pointer.h>
+
+#include "base/log.h"
+#include "session/session_internal.h"
+
+/* The def structs: defaults and checks. */
+
+typedef struct def_head {
+  uint32_t size;
+  uint32_t cookie;
+} def_head;
+
+/* A caller of an older build has room for less than this build knows. */
+static void give_defaults(void *def, size_t size_of_def, const void *defaults, size_t size)
+{
+  def_head head;
+  if (def == NULL || size_of_def < sizeof head) {
+    return;
+  }
+  memset(def, 0, size_of_def);
+  memcpy(def, defaults, size < size_of_def ? size : size_of_def);
+  memcpy(&head, def, sizeof head);
+  head.size = (uint32_t)size_of_def;
+  memcpy(def, &head, sizeof head);
+}
+
+void hap_session_def_init(hap_session_def *def, size_t size_of_def)
+{
+  hap_session_def d;
+  memset(&d, 0, sizeof d);
+  d.cookie = HAPI_SESSION_COOKIE;
+  d.drive = HAP_DRIVE_THREADS;
+  d.model = HAP_MODEL_ACCELERANCE;
+  d.physics_hz = 60.0;
+  d.contact_hz = 200.0;
+  d.haptic_hz = 1000.0;
+  d.max_bodies = 64;
+  d.max_contacts = 256;
+  d.max_pointers = 4;
+  d.rt_priority = 80;
+  d.physics_latency_ticks = HAP_LATENCY_NEXT_SYNC;
+  give_defaults(def, size_of_def, &d, sizeof d);
+}
+
+void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
+{
+  hap_pointer_def d;
+  memset(&d, 0, sizeof d);
+  d.cookie = HAPI_POINTER_COOKIE;
+  d.radius = 0.01;
+  d.stiffness = 1000.0;
+  d.pose_world_device.quat_wxyz[0] = 1.0;
+  d.motion_scale = 1.0;
+  d.force_scale = 1.0;
+  d.max_force = 20.0;
+  d.max_torque = 1.0;
+  d.collide_bits = 0xffffffffu;
+  give_defaults(def, size_of_def, &d, sizeof d);
+}
+
+hap_status hapi_def_read(void *out, size_t size_of_out, const void *def, uint32_t cookie,
+                         const char *init_name, hap_detail *detail)
+{
+  def_head head;
+  if (def == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the def is NULL");
+  }
+  memcpy(&head, def, sizeof head);
+  if (head.cookie != cookie || head.size < sizeof head || head.size > 65536) {
+    return hapi_fail(detail, HAP_ERROR_UNINITIALISED, "the def was not initialised: call %s first",
+                     init_name);
+  }
+  memcpy(out, def, head.size < size_of_out ? head.size : size_of_out);
+  return HAP_OK;
+}
+
+static hap_status check_number(double value, double low, double high, const char *name,
+                               hap_detail *detail)
+{
+  if (value >= low && value <= high) { /* false for NaN */
+    return HAP_OK;
+  }
+  return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not in %g .. %g", name, value, low, high);
+}
+
+typedef struct number_rule {
+  double value;
+  double low;
+  double high;
+  const char *name;
+} number_rule;
+
+static hap_status check_numbers(const number_rule *rules, size_t count, hap_detail *detail)
+{
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+    status = check_number(rules[i].value, rules[i].low, rules[i].high, rules[i].name, detail);
+  }
+  return status;
+}
+
+static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
+{
+  if (def->model == HAP_MODEL_CONTACT) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "model contact is not supported by this version; use accelerance, impulse or "
+                     "single");
+  }
+  if (def->flags != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "flags has unknown bits 0x%x", def->flags);
+  }
+  return HAP_OK;
+}
+
+hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail)
+{
+  const number_rule rules[] = {
+      {def->drive, 0, 2, "drive"},
+      {def->model, 0, 3, "model"},
+      {def->haptic_hz, 100.0, 20000.0, "haptic_hz"},
+      {def->physics_hz, 1.0, 1000.0, "physics_hz"},
+      {def->contact_hz, 20.0, 1000.0, "contact_hz"},
+      {def->max_bodies, 1, 1024, "max_bodies"},
+      {def->max_contacts, 1, 4096, "max_contacts"},
+      {def->max_pointers, 1, HAP_TRACE_POINTERS_MAX, "max_pointers"},
+      {def->rt_priority, 0, 99, "rt_priority"},
+      {def->physics_latency_ticks, -1, 20000, "physics_latency_ticks"},
+      {def->trace_rows, 0, 1048576, "trace_rows"},
+      {def->impulse_pose, 0, 1, "impulse_pose"},
+      {def->probe, 0, 1, "probe"},
+  };
+  hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
+  if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "physics_hz is %g, above haptic_hz %g: there must be at least one tick to a "
+                     "step",
+                     def->physics_hz, def->haptic_hz);
+  }
+  return status >= HAP_OK ? check_choices(def, detail) : status;
+}

@@ -1,0 +1,352 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "session/session_internal.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/thread.h"
+
+const char *hap_model_name(hap_model model)
+{
+  switch (model) {
+    case HAP_MODEL_SINGLE:
+      return "single";
+    case HAP_MODEL_IMPULSE:
+      return "impulse";
+    case HAP_MODEL_ACCELERANCE:
+      return "accelerance";
+    case HAP_MODEL_CONTACT:
+      return "contact";
+  }
+  return NULL;
+}
+
+hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
+{
+  hap_session *s = (hap_session *)(uintptr_t)session; /* the text is no part of its value */
+  va_list arguments;
+  va_start(arguments, format);
+  pthread_mutex_lock(&s->detail_lock);
+  vsnprintf(s->detail.text, sizeof s->detail.text, format, arguments);
+  pthread_mutex_unlock(&s->detail_lock);
+  va_end(arguments);
+  return status;
+}
+
+static hap_status note_detail(hap_session *session, hap_status status, const hap_detail *detail)
+{
+  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail->text) : status;
+}
+
+void hap_session_destroy(hap_session *session)
+{
+  if (session == NULL) {
+    return;
+  }
+  hap_session_stop(session);
+  hapi_haptic_destroy(session->haptic);
+  hapi_physics_destroy(session->physics);
+  hapi_exchange_destroy(session->exchange);
+  pthread_mutex_destroy(&session->detail_lock);
+  hapi_free(session);
+}
+
+/* ---- start and stop ---- */
+
+static void lock_memory(hap_session *session)
+{
+  size_t size = 0;
+  void *block = hapi_exchange_memory(session->exchange, &size);
+  session->memory_locked = session->def.rt_priority > 0 && hapi_memory_lock(block, size);
+}
+
+static hap_status start_threads(hap_session *session)
+{
+  hap_status status = hapi_haptic_start_thread(session->haptic);
+  if (status >= HAP_OK && session->def.drive == HAP_DRIVE_THREADS) {
+    status = hapi_physics_start_thread(session->physics);
+  }
+  if (status < HAP_OK) {
+    return hapi_session_fail(session, status, "a thread could not be started");
+  }
+  bool wanted = session->def.rt_priority > 0;
+  bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
+  return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
+}
+
+static hap_status begin(hap_session *session)
+{
+  hap_detail detail = {""};
+  int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
+  hapi_exchange_reset(session->exchange);
+  hap_status status = hapi_haptic_begin(session->haptic, start_ns, &detail);
+  if (status >= HAP_OK) {
+    status = hapi_physics_begin(session->physics, &start_ns, &detail);
+  }
+  if (status < HAP_OK) {
+    return note_detail(session, status, &detail);
+  }
+  hapi_haptic_set_start(session->haptic, start_ns);
+  hapi_haptic_receive(session->haptic, start_ns);
+  session->tick = session->base = session->step = 0;
+  session->frame_remainder_s = 0.0;
+  return HAP_OK;
+}
+
+hap_status hap_session_start(hap_session *session)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (session->started) {
+    return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
+  }
+  if (hapi_physics_lock(session->physics, -1) < HAP_OK) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD, "start while this thread holds the lock");
+  }
+  hap_status status = begin(session);
+  (void)hapi_physics_unlock(session->physics);
+  session->started = true;
+  if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {
+    lock_memory(session);
+    status = start_threads(session);
+  }
+  if (status < HAP_OK) {
+    hap_session_stop(session);
+  }
+  return status;
+}
+
+hap_status hap_session_stop(hap_session *session)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (hapi_physics_in_callback(session->physics)) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD, "stop must not be called in a callback");
+  }
+  if (!session->started) {
+    return HAP_OK;
+  }
+  hapi_haptic_end(session->haptic); /* first: the hand is let go */
+  hapi_physics_end(session->physics);
+  if (session->memory_locked) {
+    size_t size = 0;
+    void *block = hapi_exchange_memory(session->exchange, &size);
+    hapi_memory_unlock(block, size);
+    session->memory_locked = false;
+  }
+  session->started = false;
+  return HAP_OK;
+}
+
+/* ---- the drives ---- */
+
+hap_status hap_session_update(hap_session *session, double frame_s)
+{
+  if (session == NULL || !(frame_s >= 0.0) || isinf(frame_s)) {
+    return session == NULL ? HAP_ERROR_ARGUMENT
+                           : hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                                               "frame_s is %g: not a length of time", frame_s);
+  }
+  if (!session->started || session->def.drive != HAP_DRIVE_FRAME) {
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "update belongs to drive FRAME between start and stop");
+  }
+  if (hapi_physics_in_callback(session->physics)) {
+    return HAP_ERROR_THREAD;
+  }
+  double period = hapi_physics_next_period(session->physics);
+  double steps = floor((session->frame_remainder_s + frame_s) / period + 1e-9);
+  session->frame_remainder_s = fmax(0.0, session->frame_remainder_s + frame_s - steps * period);
+  int count = steps > 3.0 ? 3 : (int)steps;
+  int64_t period_ns = (int64_t)llround(1e9 * period);
+  for (int i = 0; i < count; ++i) {
+    int64_t now = hapi_clock_now() - (count - 1 - i) * period_ns;
+    hapi_physics_cycle(session->physics, now, now + period_ns);
+  }
+  if (steps > 3.0) {
+    hapi_physics_count_dropped_frames(session->physics, (uint64_t)(steps - 3.0));
+    return HAP_DROPPED;
+  }
+  return HAP_OK;
+}
+
+static uint64_t ticks_of(const hap_session *session, double period, uint64_t steps)
+{
+  return (uint64_t)floor((double)steps * period * session->def.haptic_hz + 1e-6);
+}
+
+static int64_t time_of(const hap_session *session, uint64_t tick)
+{
+  return hapi_clock_deadline(tick, session->def.haptic_hz);
+}
+
+/* Runs the physics cycle of this tick when one is due. A change of model starts a new count. */
+static void step_when_due(hap_session *session)
+{
+  double period = hapi_physics_period(session->physics);
+  if (session->tick != session->base + ticks_of(session, period, session->step)) {
+    return;
+  }
+  double next_period = hapi_physics_next_period(session->physics);
+  bool changes = next_period != period;
+  uint64_t next = changes ? session->tick + ticks_of(session, next_period, 1)
+                          : session->base + ticks_of(session, period, session->step + 1);
+  /* SINGLE steps up to now, and at the start there is nothing to step. */
+  if (session->tick > 0 || !hapi_physics_steps_to_now(session->physics)) {
+    hapi_physics_cycle(session->physics, time_of(session, session->tick), time_of(session, next));
+  }
+  session->base = changes ? session->tick : session->base;
+  session->step = changes ? 1 : session->step + 1;
+}
+
+hap_status hap_session_advance(hap_session *session, uint64_t ticks)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (!session->started || session->def.drive != HAP_DRIVE_LOCKSTEP) {
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "advance belongs to drive LOCKSTEP between start and stop");
+  }
+  if (hapi_physics_in_callback(session->physics)) {
+    return HAP_ERROR_THREAD;
+  }
+  for (uint64_t i = 0; i < ticks; ++i) {
+    int64_t now = time_of(session, session->tick);
+    hapi_haptic_receive(session->haptic, now);
+    step_when_due(session);
+    hapi_haptic_cycle(session->haptic, now);
+    ++session->tick;
+  }
+  return HAP_OK;
+}
+
+int64_t hap_session_now(const hap_session *session)
+{
+  bool virtual_clock = session != NULL && session->def.drive == HAP_DRIVE_LOCKSTEP;
+  return virtual_clock ? time_of(session, session->tick) : hapi_clock_now();
+}
+
+/* ---- the world, between threads ---- */
+
+hap_status hap_session_lock(hap_session *session)
+{
+  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, -1);
+}
+
+hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns)
+{
+  bool bad = session == NULL || timeout_ns < 0;
+  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, timeout_ns);
+}
+
+hap_status hap_session_unlock(hap_session *session)
+{
+  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_unlock(session->physics);
+}
+
+hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
+{
+  bool bad = session == NULL || edit == NULL;
+  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_post(session->physics, edit, arg);
+}
+
+hap_status hap_session_set_model(hap_session *session, hap_model model)
+{
+  if (session == NULL || (int)model < 0 || hap_model_name(model) == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (model == HAP_MODEL_CONTACT) {
+    return hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                             "model contact is not supported by this version");
+  }
+  hapi_physics_set_model(session->physics, model);
+  return HAP_OK;
+}
+
+/* ---- faults and figures ---- */
+
+static const char *fault_text(hap_fault fault)
+{
+  switch (fault) {
+    case HAP_FAULT_NONE:
+      return "";
+    case HAP_FAULT_DEVICE_READ:
+      return "the device could not be read; force is zero until the fault is reset";
+    case HAP_FAULT_DEVICE_POSE:
+      return "the device gave a pose that is not finite or beyond 1000 km; force is zero until the "
+             "fault is reset";
+    case HAP_FAULT_FORCE:
+      return "a contact force was not finite; force is zero until the fault is reset";
+    case HAP_FAULT_LOCAL_STATE:
+      return "the state of a body in the loop was not finite; force is zero until the fault is "
+             "reset";
+    case HAP_FAULT_DEVICE_WRITE:
+      return "the device did not take a force; force is zero until the fault is reset";
+    case HAP_FAULT_WORLD:
+      return "the ODE world holds a body that cannot be stepped";
+  }
+  return "";
+}
+
+hap_status hap_session_reset_fault(hap_session *session)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hapi_haptic_reset_fault(session->haptic);
+  return HAP_OK;
+}
+
+hap_status hap_session_stats(const hap_session *session, hap_stats *out, size_t size_of_out)
+{
+  hap_stats stats;
+  hap_stats loop;
+  if (session == NULL || out == NULL || size_of_out < sizeof stats.size) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  memset(&loop, 0, sizeof loop);
+  hapi_haptic_stats(session->haptic, &loop);
+  stats = loop;
+  hapi_physics_stats(session->physics, &stats);
+  hapi_haptic_stats(session->haptic, &stats);
+  size_t size = size_of_out < sizeof stats ? size_of_out : sizeof stats;
+  stats.size = (uint32_t)size;
+  memcpy(out, &stats, size);
+  return HAP_OK;
+}
+
+hap_status hap_session_detail(const hap_session *session, hap_detail *out)
+{
+  if (session == NULL || out == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_stats stats;
+  hap_session *s = (hap_session *)(uintptr_t)session;
+  pthread_mutex_lock(&s->detail_lock);
+  *out = s->detail;
+  pthread_mutex_unlock(&s->detail_lock);
+  hapi_haptic_stats(session->haptic, &stats);
+  if (stats.fault != HAP_FAULT_NONE && stats.fault != HAP_FAULT_WORLD) {
+    snprintf(out->text, sizeof out->text, "%s", fault_text((hap_fault)stats.fault));
+  }
+  return HAP_OK;
+}
+
+hap_status hap_session_trace_read(hap_session *session, hap_trace_row *rows, size_t capacity,
+                                  size_t *out_count)
+{
+  if (session == NULL || rows == NULL || out_count == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  *out_count = hapi_haptic_read_trace(session->haptic, rows, capacity);
+  return *out_count == 0 ? HAP_END : HAP_OK;
+}

@@ -1,0 +1,50 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SESSION_SESSION_INTERNAL_H
+#define HAPODE_SESSION_SESSION_INTERNAL_H
+
+#include <pthread.h>
+#include <stdbool.h>
+
+#include <hapode/session.h>
+
+#include "haptic/haptic.h"
+#include "physics/physics.h"
+#include "sync/exchange.h"
+
+#define HAPI_SESSION_COOKIE 0x48534531u
+#define HAPI_POINTER_COOKIE 0x48505431u
+#define HAPI_ODE_COOKIE 0x484f4431u
+
+struct hap_session {
+  hap_session_def def;
+  hapi_exchange *exchange;
+  hapi_haptic *haptic;
+  hapi_physics *physics;
+  bool started;
+  bool memory_locked;
+
+  /* LOCKSTEP: physics step number step, counted from tick base, is due at
+   * base + floor(step x ticks a step). */
+  uint64_t tick;
+  uint64_t base;
+  uint64_t step;
+
+  double frame_remainder_s; /* FRAME */
+
+  pthread_mutex_t detail_lock;
+  hap_detail detail;
+};
+
+/* Notes the text of an error on the session and gives back status. */
+hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
+    HAP_PRINTF(3, 4);
+
+/* What both ends of a def struct need: the caller's size, which may be that of an older or newer
+ * build, and a cookie. Copies what both know over defaults that stand in *out. */
+hap_status hapi_def_read(void *out, size_t size_of_out, const void *def, uint32_t cookie,
+                         const char *init_name, hap_detail *detail);
+
+hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
+
+#endif

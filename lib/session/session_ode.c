@@ -1,0 +1,204 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include <hapode/ode.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+#include "session/session_internal.h"
+
+/* What of the session has ODE types: create. The other calls of hapode/ode.h end in
+ * lib/physics/adopt.c, through the session's physics. */
+
+void hap_ode_def_init(hap_ode_def *def, size_t size_of_def)
+{
+  hap_ode_def d;
+  if (def == NULL || size_of_def < 2 * sizeof(uint32_t)) {
+    return;
+  }
+  memset(&d, 0, sizeof d);
+  d.cookie = HAPI_ODE_COOKIE;
+  d.max_contacts_per_pair = 8;
+  memset(def, 0, size_of_def);
+  d.size = (uint32_t)size_of_def;
+  memcpy(def, &d, size_of_def < sizeof d ? size_of_def : sizeof d);
+}
+
+static hap_status check_ode(const hap_ode_def *def, hap_detail *detail)
+{
+  if (def->world == NULL || def->space == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is NULL",
+                     def->world == NULL ? "world" : "space");
+  }
+  if (def->max_contacts_per_pair < 1 || def->max_contacts_per_pair > 64) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_contacts_per_pair is %d, not in 1 .. 64",
+                     def->max_contacts_per_pair);
+  }
+  if (dCheckConfiguration("ODE_double_precision") == 0) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "the ODE library loaded is single precision");
+  }
+  return HAP_OK;
+}
+
+static void note_fault(void *user, hap_fault fault, const char *text)
+{
+  hap_session *session = user;
+  hapi_haptic_fault(session->haptic, fault);
+  (void)hapi_session_fail(session, HAP_ERROR_WORLD, "%s", text);
+}
+
+static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
+                                 const hapi_capacity *capacity, hap_detail *detail)
+{
+  const hap_session_def *def = &session->def;
+  hapi_physics_config config = {
+      .capacity = *capacity,
+      .model = def->model,
+      .impulse_pose = def->impulse_pose,
+      .probe = def->probe,
+      .physics_hz = def->physics_hz,
+      .haptic_hz = def->haptic_hz,
+      .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
+      .rt_priority = def->rt_priority,
+      .exchange = session->exchange,
+      .report_fault = note_fault,
+      .user = session,
+  };
+  hap_status status = hapi_physics_create(&config, ode, &session->physics, detail);
+  if (status >= HAP_OK && def->drive == HAP_DRIVE_LOCKSTEP && def->physics_latency_ticks >= 0) {
+    hapi_physics_set_latency(session->physics, (double)def->physics_latency_ticks / def->haptic_hz);
+  }
+  return status;
+}
+
+static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap_detail *detail)
+{
+  const hap_session_def *def = &session->def;
+  hapi_capacity capacity = {(uint32_t)def->max_bodies, (uint32_t)def->max_contacts,
+                            (uint32_t)def->max_pointers};
+  hap_status status = hapi_exchange_create(&capacity, &session->exchange);
+  if (status >= HAP_OK) {
+    hapi_haptic_config config = {
+        .capacity = capacity,
+        .haptic_hz = def->haptic_hz,
+        .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
+        .rt_priority = def->rt_priority,
+        .trace_rows = (uint32_t)def->trace_rows,
+        .exchange = session->exchange,
+    };
+    status = hapi_haptic_create(&config, &session->haptic);
+  }
+  if (status < HAP_OK) {
+    return hapi_fail(detail, status, "no memory for a session of %d bodies and %d contacts",
+                     def->max_bodies, def->max_contacts);
+  }
+  return create_physics(session, ode, &capacity, detail);
+}
+
+static hap_status read_defs(const hap_session_def *def, const hap_ode_def *ode,
+                            hap_session_def *out_def, hap_ode_def *out_ode, hap_detail *detail)
+{
+  hap_session_def_init(out_def, sizeof *out_def);
+  hap_ode_def_init(out_ode, sizeof *out_ode);
+  hap_status status = hapi_def_read(out_def, sizeof *out_def, def, HAPI_SESSION_COOKIE,
+                                    "hap_session_def_init", detail);
+  if (status >= HAP_OK) {
+    status = hapi_session_check_def(out_def, detail);
+  }
+  if (status >= HAP_OK) {
+    status =
+        hapi_def_read(out_ode, sizeof *out_ode, ode, HAPI_ODE_COOKIE, "hap_ode_def_init", detail);
+  }
+  return status >= HAP_OK ? check_ode(out_ode, detail) : status;
+}
+
+hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode, hap_session **out,
+                              hap_detail *detail)
+{
+  hap_session_def checked_def;
+  hap_ode_def checked_ode;
+  if (out == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "out is NULL");
+  }
+  *out = NULL;
+  hap_status status = read_defs(def, ode, &checked_def, &checked_ode, detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  hap_session *session = hapi_alloc(sizeof *session);
+  if (session == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a session");
+  }
+  session->def = checked_def;
+  pthread_mutex_init(&session->detail_lock, NULL);
+  status = create_parts(session, &checked_ode, detail);
+  if (status < HAP_OK) {
+    hapi_haptic_destroy(session->haptic);
+    hapi_physics_destroy(session->physics);
+    hapi_exchange_destroy(session->exchange);
+    pthread_mutex_destroy(&session->detail_lock);
+    hapi_free(session);
+    return status;
+  }
+  *out = session;
+  return HAP_OK;
+}
+
+/* ---- the application's bodies ---- */
+
+static hap_status may_edit(hap_session *session, const void *object)
+{
+  if (session == NULL || object == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (!hapi_physics_may_edit(session->physics)) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "take hap_session_lock first, or do it in a posted edit");
+  }
+  return HAP_OK;
+}
+
+hap_status hap_session_adopt_body(hap_session *session, dBodyID body)
+{
+  hap_status status = may_edit(session, body);
+  return status < HAP_OK ? status : hapi_physics_adopt(session->physics, body);
+}
+
+hap_status hap_session_forget_body(hap_session *session, dBodyID body)
+{
+  hap_status status = may_edit(session, body);
+  return status < HAP_OK ? status : hapi_physics_forget(session->physics, body);
+}
+
+hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)
+{
+  hap_status status = may_edit(session, geom);
+  if (status >= HAP_OK) {
+    hapi_physics_forget_geom(session->physics, geom);
+  }
+  return status;
+}
+
+hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
+                                          void (*callback)(dBodyID))
+{
+  hap_status status = may_edit(session, body);
+  return status < HAP_OK ? status
+                         : hapi_physics_set_moved_callback(session->physics, body, callback);
+}
+
+hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
+                             size_t count, hap_pose *out)
+{
+  if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return hapi_physics_poses(session->physics, time_ns, bodies, count, out);
+}
+
+hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)
+{
+  hap_status status = may_edit(session, bodies);
+  return status < HAP_OK ? status : hapi_physics_trace_bodies(session->physics, bodies, count);
+}

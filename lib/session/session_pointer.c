@@ -1,0 +1,117 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/vec.h"
+#include "session/session_internal.h"
+
+static bool unit_quaternion(const double q[4])
+{
+  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return fabs(n2 - 1.0) < 1e-3; /* false for NaN */
+}
+
+static bool good_pose(const hap_pose *pose)
+{
+  return hapi_finite(pose->position, 3) && unit_quaternion(pose->quat_wxyz);
+}
+
+static hap_status need(bool good, const char *what, hap_detail *detail)
+{
+  return good ? HAP_OK : hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s", what);
+}
+
+static bool between(double value, double low, double high)
+{
+  return value >= low && value <= high;
+}
+
+static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
+{
+  const struct {
+    bool good;
+    const char *what;
+  } rules[] = {
+      {between(d->radius, 1e-6, 100.0), "radius is not in 1e-6 .. 100 m"},
+      {between(d->mass, 0.0, 1e6), "mass is not in 0 .. 1e6 kg"},
+      {between(d->stiffness, 0.0, 1e9), "stiffness is not in 0 .. 1e9 N/m"},
+      {between(d->damping, 0.0, 1e6), "damping is not in 0 .. 1e6 N s/m"},
+      {between(d->motion_scale, 1e-6, 1e6), "motion_scale is not in 1e-6 .. 1e6"},
+      {between(d->force_scale, 0.0, 1e6), "force_scale is not in 0 .. 1e6"},
+      {between(d->max_force, 1e-6, 1e6), "max_force is not in 1e-6 .. 1e6 N"},
+      {between(d->max_torque, 1e-6, 1e6), "max_torque is not in 1e-6 .. 1e6 N m"},
+      {good_pose(&d->pose_world_device), "pose_world_device is not finite with a unit quaternion"},
+  };
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < sizeof rules / sizeof rules[0] && status >= HAP_OK; ++i) {
+    status = need(rules[i].good, rules[i].what, detail);
+  }
+  return status;
+}
+
+static hap_status check_def(const hap_pointer_def *d, hap_detail *detail)
+{
+  if (d->friction != 0.0 || d->hull_xyz != NULL || d->hull_points != 0 ||
+      d->coupling != HAP_COUPLING_DIRECT) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "this version has sphere pointers without friction and direct coupling");
+  }
+  return check_numbers(d, detail);
+}
+
+hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
+{
+  if (session == NULL || out == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_detail detail = {""};
+  hap_pointer_def d;
+  hap_pointer_def_init(&d, sizeof d);
+  out->v = 0;
+  hap_status status =
+      hapi_def_read(&d, sizeof d, def, HAPI_POINTER_COOKIE, "hap_pointer_def_init", &detail);
+  if (status >= HAP_OK) {
+    status = check_def(&d, &detail);
+  }
+  if (status >= HAP_OK) {
+    hapi_quat_normalize(d.pose_world_device.quat_wxyz);
+    status = hapi_haptic_add_pointer(session->haptic, &d, out, &detail);
+  }
+  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail.text) : status;
+}
+
+hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
+{
+  return session == NULL ? HAP_ERROR_ARGUMENT
+                         : hapi_haptic_remove_pointer(session->haptic, pointer);
+}
+
+hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
+                                  const hap_pose *pose, const hap_twist *twist)
+{
+  if (session == NULL || pose == NULL || !good_pose(pose)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (twist != NULL && (!hapi_finite(twist->linear, 3) || !hapi_finite(twist->angular, 3))) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return hapi_haptic_set_target(session->haptic, pointer, pose, twist);
+}
+
+hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
+                           hap_pointer_state *out, size_t size_of_out)
+{
+  hap_pointer_state state;
+  if (session == NULL || out == NULL || size_of_out < sizeof state.size) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_haptic_get_pointer(session->haptic, pointer, &state);
+  if (status >= HAP_OK) {
+    size_t size = size_of_out < sizeof state ? size_of_out : sizeof state;
+    state.size = (uint32_t)size;
+    memcpy(out, &state, size);
+  }
+  return status;
+}

@@ -1,0 +1,59 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "plugins/common/output.h"
+
+#include <stdbool.h>
+
+#include "base/vec.h"
+
+_Static_assert(ATOMIC_BOOL_LOCK_FREE == 2, "zero is called from signal handlers");
+
+void hapi_output_init(hapi_output *output, double max_force, double max_torque)
+{
+  *output = (hapi_output){.max_force = max_force, .max_torque = max_torque};
+  atomic_init(&output->zeroed.raised, true);
+}
+
+/* True when it had to. The largest component comes out first, so that no square overflows. */
+static bool shorten(const double wanted[3], double limit, double out[3])
+{
+  double largest = fmax(fabs(wanted[0]), fmax(fabs(wanted[1]), fabs(wanted[2])));
+  hapi_v3_copy(wanted, out);
+  if (largest == 0.0) {
+    return false;
+  }
+  double unit[3] = {wanted[0] / largest, wanted[1] / largest, wanted[2] / largest};
+  double norm = hapi_v3_norm(unit);
+  if (largest * norm <= limit) {
+    return false;
+  }
+  hapi_v3_scale(limit / norm, unit, out);
+  return true;
+}
+
+hap_status hapi_output_write(hapi_output *output, const hap_wrench *wanted, hap_wrench *reached)
+{
+  if (!hapi_finite(wanted->force, 3) || !hapi_finite(wanted->torque, 3)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  bool shortened = shorten(wanted->force, output->max_force, output->held.force);
+  bool twisted = shorten(wanted->torque, output->max_torque, output->held.torque);
+  *reached = output->held;
+  /* Last, so that a zero that comes in between is taken as one from before this write. */
+  atomic_store_explicit(&output->zeroed.raised, false, memory_order_release);
+  return shortened || (twisted && output->max_torque > 0.0) ? HAP_SATURATED : HAP_OK;
+}
+
+void hapi_output_zero(hapi_output *output)
+{
+  atomic_store_explicit(&output->zeroed.raised, true, memory_order_release);
+}
+
+void hapi_output_get(const hapi_output *output, hap_wrench *out)
+{
+  if (atomic_load_explicit(&output->zeroed.raised, memory_order_acquire)) {
+    *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    return;
+  }
+  *out = output->held;
+}

@@ -1,0 +1,301 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* A device of numbers: a scripted motion, held by a rigid or by a yielding hand. */
+
+#include <hapode/device_impl.h>
+
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "plugins/common/arguments.h"
+#include "plugins/common/output.h"
+#include "plugins/common/timeline.h"
+#include "plugins/virtual/hand.h"
+#include "plugins/virtual/motion.h"
+
+#define SUBSTEP_NS 1000000u /* the target is taken as straight within */
+#define SUBSTEPS_MAX 1000u  /* a read stays bounded however long the pause was */
+
+typedef struct virtual_device {
+  hap_device_info info;
+  hapi_motion motion;
+  double start; /* s of the script at the first read */
+  double orientation[4];
+  bool yields; /* else rigid: the hand is not used */
+  hapi_hand hand;
+  hapi_output output;
+  hapi_timeline timeline;
+} virtual_device;
+
+enum argument {
+  PATH,
+  BLEND,
+  LOOP,
+  SINE,
+  HZ,
+  START,
+  ORIENTATION,
+  HAND,
+  MASS,
+  DAMPING,
+  STIFFNESS,
+  MAX_FORCE,
+  MAX_TORQUE,
+  RATED_STIFFNESS,
+  DEVICE_DAMPING,
+  DOF,
+  ARGUMENT_COUNT
+};
+
+/* Order of the words of hand=. */
+enum hand_word {
+  RIGID,
+  RELAXED,
+  TENSE
+};
+
+/* Round numbers, chosen and not fitted: a hand on a handle, held loosely and co-contracted. For the
+ * order: one trial of a person holding a haptic device gave 0.55 kg, 6.5 N s/m, 135 N/m (figure 3
+ * of "Haptic perception of force magnitude and its relation to postural arm dynamics in 3D",
+ * Scientific Reports 5, 18004, 2015). */
+static const hapi_hand_def presets[] = {
+    [RIGID] = {1.0, 0.0, 0.0}, /* not used */
+    [RELAXED] = {0.2, 3.0, 150.0},
+    [TENSE] = {0.3, 10.0, 800.0},
+};
+
+static const char *const blend_words[] = {"smooth", "linear", NULL};
+static const char *const switch_words[] = {"0", "1", NULL};
+static const char *const hand_words[] = {"rigid", "relaxed", "tense", NULL};
+static const char *const dof_words[] = {"3", "6", NULL};
+
+static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
+    [PATH] = {"path", HAPI_ARGUMENT_TEXT, .expected = "T:x/y/z;T:x/y/z in s and m"},
+    [BLEND] = {"blend", HAPI_ARGUMENT_WORD, .expected = "smooth or linear", .words = blend_words},
+    [LOOP] = {"loop", HAPI_ARGUMENT_WORD, .expected = "0 or 1", .words = switch_words},
+    [SINE] = {"sine", HAPI_ARGUMENT_VECTOR, false, -1e3, 1e3, "ax/ay/az in m, each within 1000"},
+    [HZ] = {"hz", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4, "a number from 0 to 10000",
+            .number = {1.0}},
+    [START] = {"start", HAPI_ARGUMENT_NUMBER, false, -1e6, 1e6, "seconds within 1e6"},
+    [ORIENTATION] = {"orientation", HAPI_ARGUMENT_QUATERNION, .expected = "w/x/y/z, not all zero",
+                     .number = {1.0}},
+    [HAND] = {"hand", HAPI_ARGUMENT_WORD, .expected = "rigid, relaxed or tense",
+              .words = hand_words},
+    [MASS] = {"mass", HAPI_ARGUMENT_NUMBER, false, 1e-3, 1e3, "kg from 0.001 to 1000"},
+    [DAMPING] = {"damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e5, "N s/m from 0 to 1e5"},
+    [STIFFNESS] = {"stiffness", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e7, "N/m from 0 to 1e7"},
+    [MAX_FORCE] = {"max_force", HAPI_ARGUMENT_NUMBER, false, 1e-3, 1e6, "N from 0.001 to 1e6",
+                   .number = {20.0}},
+    [MAX_TORQUE] = {"max_torque", HAPI_ARGUMENT_NUMBER, false, 1e-6, 1e6, "N m from 1e-6 to 1e6",
+                    .number = {1.0}},
+    [RATED_STIFFNESS] = {"rated_stiffness", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e9,
+                         "N/m from 0 to 1e9"},
+    [DEVICE_DAMPING] = {"device_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e6,
+                        "N s/m from 0 to 1e6"},
+    [DOF] = {"dof", HAPI_ARGUMENT_WORD, .expected = "3 or 6", .words = dof_words},
+};
+
+static hap_status set_motion(virtual_device *device, const hapi_argument *entries,
+                             hap_detail *detail)
+{
+  hapi_motion *motion = &device->motion;
+  motion->blend = entries[BLEND].word == 0 ? HAPI_BLEND_SMOOTH : HAPI_BLEND_LINEAR;
+  motion->loop = entries[LOOP].word == 1;
+  motion->hz = entries[HZ].number[0];
+  hapi_v3_copy(entries[SINE].number, motion->sine);
+  device->start = entries[START].number[0];
+  memcpy(device->orientation, entries[ORIENTATION].number, sizeof device->orientation);
+  if (!entries[PATH].given) {
+    return HAP_OK;
+  }
+  hap_status status =
+      hapi_motion_set_path(motion, entries[PATH].text, entries[PATH].length, detail);
+  if (status < 0 || !motion->loop) {
+    return status;
+  }
+  const hapi_waypoint *last = &motion->waypoints[motion->count - 1];
+  double jump[3];
+  hapi_v3_sub(last->position, motion->waypoints[0].position, jump);
+  if (hapi_v3_norm(jump) > 1e-9) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "virtual: loop=1 would jump: the path must end where it begins");
+  }
+  return HAP_OK;
+}
+
+static hap_status set_hand(virtual_device *device, const hapi_argument *entries, hap_detail *detail)
+{
+  bool tuned = entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given;
+  size_t word = entries[HAND].given || !tuned ? entries[HAND].word : RELAXED;
+  if (word == RIGID && tuned) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "virtual: hand=rigid has no mass, damping or stiffness");
+  }
+  hapi_hand_def def = presets[word];
+  def.mass = entries[MASS].given ? entries[MASS].number[0] : def.mass;
+  def.damping = entries[DAMPING].given ? entries[DAMPING].number[0] : def.damping;
+  def.stiffness = entries[STIFFNESS].given ? entries[STIFFNESS].number[0] : def.stiffness;
+  device->yields = word != RIGID;
+  hapi_hand_init(&device->hand, &def);
+  return HAP_OK;
+}
+
+static void set_info(virtual_device *device, const hapi_argument *entries)
+{
+  hap_device_info *info = &device->info;
+  info->dof = entries[DOF].word == 0 ? 3 : 6;
+  info->max_force = entries[MAX_FORCE].number[0];
+  info->max_torque = entries[MAX_TORQUE].number[0];
+  info->rated_stiffness = entries[RATED_STIFFNESS].number[0];
+  info->damping = entries[DEVICE_DAMPING].number[0];
+  hapi_output_init(&device->output, info->max_force, info->dof == 6 ? info->max_torque : 0.0);
+}
+
+static hap_status configure(virtual_device *device, const char *args, hap_detail *detail)
+{
+  hapi_argument entries[ARGUMENT_COUNT];
+  memcpy(entries, known_arguments, sizeof entries);
+  hapi_argument_table table = {"virtual", entries, ARGUMENT_COUNT};
+  hap_status status = hapi_arguments_read(&table, args, detail);
+  if (status < 0) {
+    return status;
+  }
+  set_info(device, entries);
+  if (entries[HZ].given && !entries[SINE].given) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: hz has no effect without sine");
+  }
+  status = set_hand(device, entries, detail);
+  return status < 0 ? status : set_motion(device, entries, detail);
+}
+
+static void virtual_close(void *self)
+{
+  virtual_device *device = self;
+  hapi_motion_finish(&device->motion);
+  hapi_free(device);
+}
+
+static hap_status virtual_open(const char *args, void **self, hap_detail *detail)
+{
+  virtual_device *device = hapi_alloc(sizeof *device);
+  if (device == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: out of memory");
+  }
+  hap_status status = configure(device, args, detail);
+  if (status < 0) {
+    virtual_close(device);
+    return status;
+  }
+  *self = device;
+  return HAP_OK;
+}
+
+static void virtual_describe(void *self, hap_device_info *out)
+{
+  const virtual_device *device = self;
+  *out = device->info;
+}
+
+static hap_status virtual_start(void *self)
+{
+  virtual_device *device = self;
+  hapi_output_zero(&device->output);
+  hapi_timeline_start(&device->timeline);
+  return HAP_OK;
+}
+
+/* From the read at before_ns to the newest one, in steps short enough for the script. */
+static void move_hand(virtual_device *device, uint64_t before_ns)
+{
+  uint64_t way_ns = device->timeline.elapsed_ns - before_ns;
+  uint64_t count = way_ns / SUBSTEP_NS + (way_ns % SUBSTEP_NS != 0);
+  if (count == 0) {
+    return;
+  }
+  count = count < SUBSTEPS_MAX ? count : SUBSTEPS_MAX;
+  double from = device->start + hapi_timeline_seconds(before_ns);
+  double length = hapi_timeline_seconds(way_ns) / (double)count;
+  hap_wrench push;
+  hapi_output_get(&device->output, &push);
+  hapi_hand_target target;
+  hapi_motion_at(&device->motion, from, target.position[1], target.velocity[1]);
+  for (uint64_t i = 0; i < count; ++i) {
+    hapi_v3_copy(target.position[1], target.position[0]);
+    hapi_v3_copy(target.velocity[1], target.velocity[0]);
+    hapi_motion_at(&device->motion, from + length * (double)(i + 1), target.position[1],
+                   target.velocity[1]);
+    hapi_hand_step(&device->hand, length, &target, push.force);
+  }
+}
+
+static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
+                               uint32_t *buttons)
+{
+  virtual_device *device = self;
+  bool first = !device->timeline.begun;
+  uint64_t before_ns = device->timeline.elapsed_ns;
+  hap_status status = hapi_timeline_advance(&device->timeline, time_ns);
+  if (status < 0) {
+    return status;
+  }
+  double now = device->start + hapi_timeline_seconds(device->timeline.elapsed_ns);
+  *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hapi_motion_at(&device->motion, now, pose->position, twist->linear);
+  memcpy(pose->quat_wxyz, device->orientation, sizeof pose->quat_wxyz);
+  *buttons = 0;
+  if (!device->yields) {
+    return HAP_OK;
+  }
+  if (first) {
+    hapi_hand_place(&device->hand, pose->position, twist->linear);
+  } else {
+    move_hand(device, before_ns);
+  }
+  hapi_v3_copy(device->hand.position, pose->position);
+  hapi_v3_copy(device->hand.velocity, twist->linear);
+  return HAP_OK;
+}
+
+static hap_status virtual_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+{
+  virtual_device *device = self;
+  if (!device->timeline.running) {
+    return HAP_ERROR_STATE;
+  }
+  return hapi_output_write(&device->output, wanted, reached);
+}
+
+static void virtual_zero(void *self)
+{
+  virtual_device *device = self;
+  hapi_output_zero(&device->output);
+}
+
+static void virtual_stop(void *self)
+{
+  virtual_device *device = self;
+  hapi_timeline_stop(&device->timeline);
+}
+
+const hap_device_ops hapi_virtual_ops = {
+    .abi = HAP_DEVICE_ABI,
+    .size = sizeof(hap_device_ops),
+    .name = "virtual",
+    .help =
+        "scripted motion and a simulated hand: path=T:x/y/z;..., blend=smooth|linear, loop=0|1, "
+        "sine=ax/ay/az, hz=F, start=S, orientation=w/x/y/z, hand=rigid|relaxed|tense, mass=, "
+        "damping=, stiffness=, max_force=, max_torque=, rated_stiffness=, device_damping=, "
+        "dof=3|6",
+    .pacing = HAP_PACING_VIRTUAL,
+    .open = virtual_open,
+    .describe = virtual_describe,
+    .start = virtual_start,
+    .read = virtual_read,
+    .write = virtual_write,
+    .zero = virtual_zero,
+    .stop = virtual_stop,
+    .close = virtual_close,
+};

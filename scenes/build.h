@@ -1,0 +1,57 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SCENES_BUILD_H
+#define HAPODE_SCENES_BUILD_H
+
+/* Between the files of this folder: the rows with their builders, and what builders are made of. */
+
+#include <scenes/scenes.h>
+
+#define SCENE_COUNT_MAX 10000 /* of "name:N" */
+
+/* Thickness of the layer in which a contact rests. Bodies that touch at the start are placed this
+ * deep, so that their contacts exist from the first step on and nothing settles. */
+#define SCENE_LAYER 1e-5
+
+/* Adds bodies, geoms and joints to a scene whose world and space exist. Cannot fail: room for the
+ * bodies is there. */
+typedef void (*scene_build_fn)(scene *s);
+
+typedef struct scene_row {
+  scene_parameters parameters;
+  int bodies; /* of a scene without N; with N it has N bodies */
+  scene_build_fn build;
+} scene_row;
+
+/* NULL past the end. */
+const scene_row *scene_row_at(size_t index);
+
+/* Each add makes one body with one geom of uniform density and appends it to the scene's bodies.
+ * centre in world axes, m; cylinders and capsules stand along z. */
+dBodyID scene_add_box(scene *s, const double edges[3], double mass, const double centre[3]);
+dBodyID scene_add_sphere(scene *s, double radius, double mass, const double centre[3]);
+dBodyID scene_add_cylinder(scene *s, double radius, double length, double mass,
+                           const double centre[3]);
+/* length without the two caps */
+dBodyID scene_add_capsule(scene *s, double radius, double length, double mass,
+                          const double centre[3]);
+
+/* The plane z = 0. */
+void scene_add_floor(scene *s);
+
+/* A hinge between two bodies (b NULL: the world) with the table's friction torque. */
+dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
+                         const double axis[3]);
+
+/* cubes.c */
+void scene_build_flying_cube(scene *s);
+void scene_build_row(scene *s);
+void scene_build_stack(scene *s);
+void scene_build_wedge(scene *s);
+void scene_build_pile(scene *s);
+
+/* mechanisms.c */
+void scene_build_door(scene *s);
+void scene_build_lightstand(scene *s);
+
+#endif

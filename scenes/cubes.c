@@ -1,0 +1,97 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Scenes made of cubes. The face that the hand meets is the plane x = 0: a pointer of radius r
+ * touches when its centre is at x = -r. */
+
+#include <scenes/build.h>
+
+#define PILE_LAYERS_MAX 4
+
+static const double fig5_speed = 0.017; /* m/s, the paper's section 7.2 */
+
+static dBodyID add_cube(scene *s, double x, double y, double z)
+{
+  const double edge = s->parameters.size;
+  return scene_add_box(s, (const double[3]){edge, edge, edge}, s->parameters.mass,
+                       (const double[3]){x, y, z});
+}
+
+/* Height of a cube's centre in a layer; the lowest one lies on the floor. */
+static double layer_height(const scene *s, int layer)
+{
+  const double edge = s->parameters.size;
+  return edge / 2 - SCENE_LAYER + layer * (edge - SCENE_LAYER);
+}
+
+/* The pointer stands at the origin and the cube comes centrally: nothing excites a rotation. Here
+ * the gap is the one to the pointer. */
+void scene_build_flying_cube(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  const dBodyID cube = add_cube(s, p->radius + p->gap + p->size / 2, 0, 0);
+  dBodySetLinearVel(cube, -fig5_speed, 0, 0);
+}
+
+void scene_build_row(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  const int cubes = s->count > 0 ? s->count : 1;
+  scene_add_floor(s);
+  for (int i = 0; i < cubes; ++i) {
+    add_cube(s, p->size / 2 + i * (p->size + p->gap), 0, layer_height(s, 0));
+  }
+}
+
+void scene_build_stack(scene *s)
+{
+  const double x = s->parameters.size / 2;
+  scene_add_floor(s);
+  add_cube(s, x, 0, layer_height(s, 1));
+  add_cube(s, x, 0, layer_height(s, 0));
+}
+
+void scene_build_wedge(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  scene_add_floor(s);
+  dCreatePlane(s->space, -1, 0, 0, -(p->size + p->gap));
+  add_cube(s, p->size / 2, 0, layer_height(s, 0));
+}
+
+/* Side of the lowest layer of the smallest pile that takes all cubes. */
+static int pile_side(int cubes)
+{
+  for (int side = 1;; ++side) {
+    int room = 0;
+    for (int layer = 0; layer < PILE_LAYERS_MAX && layer < side; ++layer) {
+      room += (side - layer) * (side - layer);
+    }
+    if (room >= cubes) {
+      return side;
+    }
+  }
+}
+
+/* Square layers, each one cube narrower than the one below, so that a cube lies on four others. The
+ * first cube is the middle of the border that the hand meets, at y = 0. */
+void scene_build_pile(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  const double pitch = p->size + p->gap;
+  const int side = pile_side(s->count);
+  const int middle = side / 2;
+  scene_add_floor(s);
+  add_cube(s, p->size / 2, 0, layer_height(s, 0));
+  for (int layer = 0; layer < PILE_LAYERS_MAX && layer < side; ++layer) {
+    const int width = side - layer;
+    for (int i = 0; i < width * width && s->body_count < (size_t)s->count; ++i) {
+      const int along = i / width;
+      const int across = i % width;
+      if (layer != 0 || i != middle) {
+        add_cube(s, p->size / 2 + pitch * (along + 0.5 * layer),
+                 pitch * (across + 0.5 * layer - middle), layer_height(s, layer));
+      }
+    }
+  }
+}

@@ -1,0 +1,236 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+#include <assert.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <scenes/build.h>
+
+static const double push_out_speed = 0.5; /* m/s, of bodies that penetrate */
+
+static hap_status fail(hap_detail *detail, hap_status status, const char *format, ...)
+    HAP_PRINTF(3, 4);
+
+static hap_status fail(hap_detail *detail, hap_status status, const char *format, ...)
+{
+  if (detail != NULL) {
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(detail->text, sizeof detail->text, format, arguments);
+    va_end(arguments);
+  }
+  return status;
+}
+
+/* "fig5, fig6, fig7:N, ..." */
+static const char *list_scenes(char *out, size_t size)
+{
+  size_t used = 0;
+  out[0] = '\0';
+  for (size_t i = 0; scene_row_at(i) != NULL && used < size; ++i) {
+    const scene_parameters *p = &scene_row_at(i)->parameters;
+    const int n = snprintf(out + used, size - used, "%s%s%s", i != 0 ? ", " : "", p->name,
+                           p->count_default > 0 ? ":N" : "");
+    used += (size_t)n;
+  }
+  return out;
+}
+
+static const scene_row *find_row(const char *name, size_t length)
+{
+  for (size_t i = 0; scene_row_at(i) != NULL; ++i) {
+    const char *have = scene_row_at(i)->parameters.name;
+    if (strlen(have) == length && memcmp(have, name, length) == 0) {
+      return scene_row_at(i);
+    }
+  }
+  return NULL;
+}
+
+/* Digits only, 1 .. SCENE_COUNT_MAX; otherwise 0. */
+static int parse_count(const char *text)
+{
+  int count = 0;
+  for (const char *c = text; *c != '\0'; ++c) {
+    if (*c < '0' || *c > '9') {
+      return 0;
+    }
+    count = 10 * count + (*c - '0');
+    if (count > SCENE_COUNT_MAX) {
+      return 0;
+    }
+  }
+  return count;
+}
+
+static bool at_least(double value, double least, bool strictly)
+{
+  return strictly ? value > least : value >= least; /* both false for NaN */
+}
+
+/* Name of the first field that cannot be built, or NULL. */
+static const char *bad_parameter(const scene_parameters *p)
+{
+  const struct {
+    const char *name;
+    double value;
+    double least;
+    bool strictly;
+  } checks[] = {
+      {"mass", p->mass, 0, true},
+      {"size", p->size, 0, true},
+      {"gravity", p->gravity, -1e6, false},
+      {"gap", p->gap, -p->size / 2, true},
+      {"radius", p->radius, 0, true},
+      {"stiffness", p->stiffness, 0, false},
+      {"damping", p->damping, 0, false},
+      {"duration", p->duration, 0, true},
+      {"iterations", p->iterations, 1, false},
+      {"hinge_torque", p->hinge_torque, 0, false},
+  };
+  for (size_t i = 0; i < sizeof checks / sizeof checks[0]; ++i) {
+    if (!isfinite(checks[i].value) ||
+        !at_least(checks[i].value, checks[i].least, checks[i].strictly)) {
+      return checks[i].name;
+    }
+  }
+  if (!(p->mu >= 0)) {
+    return "mu";
+  }
+  if (p->pointers < 1 || p->pointers > SCENE_POINTERS_MAX) {
+    return "pointers";
+  }
+  for (int i = 0; i < p->pointers; ++i) {
+    if (p->hands[i] == NULL) {
+      return "hands";
+    }
+  }
+  return NULL;
+}
+
+static void create_world(scene *s)
+{
+  s->world = dWorldCreate();
+  s->space = dHashSpaceCreate(NULL);
+  dWorldSetGravity(s->world, 0, 0, -s->parameters.gravity);
+  dWorldSetERP(s->world, 0.2);
+  dWorldSetCFM(s->world, 1e-10); /* more shows in measured accelerances */
+  dWorldSetQuickStepNumIterations(s->world, s->parameters.iterations);
+  dWorldSetContactMaxCorrectingVel(s->world, push_out_speed);
+  dWorldSetContactSurfaceLayer(s->world, SCENE_LAYER);
+  dWorldSetAutoDisableFlag(s->world, 0);
+}
+
+/* parameters were checked, count is in range */
+static hap_status build(const scene_row *row, const scene_parameters *parameters, int count,
+                        scene **out, hap_detail *detail)
+{
+  const size_t bodies = (size_t)(count > 0 ? count : row->bodies);
+  scene *s = calloc(1, sizeof *s);
+  dBodyID *list = calloc(bodies, sizeof(dBodyID));
+  if (s == NULL || list == NULL) {
+    free(s);
+    free(list);
+    return fail(detail, HAP_ERROR_MEMORY, "no memory for scene '%s' of %zu bodies",
+                row->parameters.name, bodies);
+  }
+  s->parameters = *parameters;
+  s->parameters.name = row->parameters.name;
+  s->count = count;
+  s->bodies = list;
+  create_world(s);
+  row->build(s);
+  assert(s->body_count == bodies);
+  *out = s;
+  return HAP_OK;
+}
+
+hap_status scene_create_from(const scene_parameters *parameters, int count, scene **out,
+                             hap_detail *detail)
+{
+  char all[256];
+  if (out == NULL) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
+  }
+  *out = NULL;
+  if (parameters == NULL || parameters->name == NULL) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene: no name; there are: %s",
+                list_scenes(all, sizeof all));
+  }
+  const scene_row *row = find_row(parameters->name, strlen(parameters->name));
+  if (row == NULL) {
+    return fail(detail, HAP_ERROR_NOT_FOUND, "no scene '%.40s'; there are: %s", parameters->name,
+                list_scenes(all, sizeof all));
+  }
+  const char *bad = bad_parameter(parameters);
+  if (bad != NULL) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' cannot be built with this %s",
+                parameters->name, bad);
+  }
+  const int count_max = row->parameters.count_default > 0 ? SCENE_COUNT_MAX : 0;
+  if (count < 0 || count > count_max) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s': N is 0 .. %d, not %d; there are: %s",
+                parameters->name, count_max, count, list_scenes(all, sizeof all));
+  }
+  return build(row, parameters, count > 0 ? count : row->parameters.count_default, out, detail);
+}
+
+hap_status scene_create(const char *spec, scene **out, hap_detail *detail)
+{
+  char all[256];
+  if (out == NULL) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
+  }
+  *out = NULL;
+  const char *name = spec != NULL ? spec : "";
+  const size_t length = strcspn(name, ":");
+  const scene_row *row = find_row(name, length);
+  if (row == NULL) {
+    return fail(detail, spec != NULL ? HAP_ERROR_NOT_FOUND : HAP_ERROR_ARGUMENT,
+                "no scene '%.40s'; there are: %s", name, list_scenes(all, sizeof all));
+  }
+  int count = 0;
+  if (name[length] == ':') {
+    if (row->parameters.count_default == 0) {
+      return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' takes no N; there are: %s",
+                  row->parameters.name, list_scenes(all, sizeof all));
+    }
+    count = parse_count(name + length + 1);
+    if (count == 0) {
+      return fail(detail, HAP_ERROR_ARGUMENT,
+                  "scene '%s': N is a number from 1 to %d, not '%.40s'; there are: %s",
+                  row->parameters.name, SCENE_COUNT_MAX, name + length + 1,
+                  list_scenes(all, sizeof all));
+    }
+  }
+  return scene_create_from(&row->parameters, count, out, detail);
+}
+
+void scene_destroy(scene *s)
+{
+  if (s == NULL) {
+    return;
+  }
+  dSpaceDestroy(s->space);
+  dWorldDestroy(s->world);
+  free(s->bodies);
+  free(s);
+}
+
+bool scene_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  const scene *s = user;
+  const dBodyID body_a = dGeomGetBody(a);
+  const dBodyID body_b = dGeomGetBody(b);
+  if (body_a == body_b || (body_a != NULL && body_b != NULL &&
+                           dAreConnectedExcluding(body_a, body_b, dJointTypeContact))) {
+    return false;
+  }
+  io->mode = dContactApprox1;
+  io->mu = s->parameters.mu;
+  return true;
+}

@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: hapode contributors
+# SPDX-License-Identifier: MIT
+"""layering.py ROOT: what may include what (design.md section 2), one door to the heap, no exit."""
+import fnmatch
+import os
+import posixpath
+import re
+import sys
+
+import lint
+
+# Folder: folders whose headers it may include besides its own and include/hapode. "*": any.
+LAYERS = {
+    "include/hapode": [],
+    "lib/base": [],
+    "lib/sync": ["lib/base"],
+    "lib/proximity": ["lib/base"],
+    "lib/device": ["lib/base"],
+    "lib/haptic/rt": ["lib/base", "lib/sync", "lib/proximity"],
+    "lib/contact": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt"],
+    "lib/haptic": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/device"],
+    "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt"],
+    "lib/session": ["lib/*"],
+    "plugins/*": ["lib/base"],
+    "scenes": [],
+    "examples": [],
+    "tools": ["*"],
+    "bench": ["*"],
+    "tests": ["*"],
+    "tests/*": ["*"],
+}
+ODE_USERS = ["lib/physics/*", "include/hapode/ode.h", "scenes/*", "examples/*", "tests/*",
+             "bench/*", "tools/*"]
+HAPODE_ODE_USERS = ODE_USERS + ["lib/session/*ode*.c"]
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.M)
+# a call of the heap, but not of a member or of a hook with such a name
+HEAP = re.compile(r"(?<![\w.>*])(malloc|calloc|realloc|reallocarray|free|strdup|strndup|"
+                  r"aligned_alloc|posix_memalign|v?asprintf|getline)\s*\(")
+QUIT = re.compile(r"(?<![\w.>*])(exit|_exit|_Exit|quick_exit|abort)\s*\(")
+
+SPDX = ("SPDX-FileCopyrightText: hapode contributors", "SPDX-License-Identifier: MIT")
+
+
+def fits(name, patterns):
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def layer_of(name):
+    """The deepest folder of the table that holds the file; None: the table does not know it."""
+    folder = posixpath.dirname(name)
+    while folder:
+        for layer in LAYERS:
+            if fnmatch.fnmatchcase(folder, layer) and folder.count("/") == layer.count("/"):
+                return layer
+        folder = posixpath.dirname(folder)
+    return None
+
+
+def resolve(root, name, target):
+    """The project's file that an #include means, None for any other."""
+    for start in (posixpath.dirname(name), "lib", "", "include"):
+        path = posixpath.normpath(posixpath.join(start, target))
+        if not path.startswith("..") and os.path.isfile(os.path.join(root, path)):
+            return path
+    return None
+
+
+def includes(root, name):
+    """(line, target as written, project's file or None)"""
+    text = re.sub(r"/\*.*?\*/", lambda m: re.sub(r"[^\n]", " ", m.group()),
+                  lint.read(root, name), flags=re.S)
+    for match in INCLUDE.finditer(text):
+        target = match.group(2)
+        yield text.count("\n", 0, match.start()) + 1, target, resolve(root, name, target)
+
+
+def check_layers(root, files):
+    for name in files:
+        layer = layer_of(name)
+        if layer is None:
+            yield f"{name}: its folder is not in the table of layering.py"
+            continue
+        for line, target, path in includes(root, name):
+            if path is None or path.startswith("include/hapode/"):
+                continue
+            other = posixpath.dirname(path)
+            # a folder of its own layer; for plugins/* that is the same plugin
+            same = other == posixpath.dirname(name) or (
+                layer_of(path) == layer and "*" not in layer)
+            if not same and not fits(other, LAYERS[layer]):
+                yield f"{name}:{line}: {layer} must not include {target}"
+
+
+def check_ode(root, files):
+    for name in files:
+        for line, target, path in includes(root, name):
+            if target.startswith("ode/") and path is None and not fits(name, ODE_USERS):
+                yield f"{name}:{line}: must not include {target}"
+            if path == "include/hapode/ode.h" and not fits(name, HAPODE_ODE_USERS):
+                yield f"{name}:{line}: must not include {target}"
+
+
+def check_calls(root, files, pattern):
+    for name in files:
+        for number, line in enumerate(lint.without_comments(lint.read(root, name)).split("\n"), 1):
+            for match in pattern.finditer(line):
+                yield f"{name}:{number}: {match.group(1)}"
+
+
+def needs_licence(root, name):
+    if name.endswith((".c", ".h", ".py", ".sh")) or name.endswith(("meson.build", "options.txt")):
+        return True
+    with open(os.path.join(root, name), "rb") as f:
+        return f.read(2) == b"#!"
+
+
+def check_licence(root, names):
+    for name in names:
+        lines = lint.read(root, name).split("\n")
+        if name.endswith((".c", ".h")):
+            good = lines[:2] == [f"/* {SPDX[0]}", f" * {SPDX[1]} */"]
+        else:
+            start = 1 if lines[0].startswith("#!") else 0
+            good = lines[start:start + 2] == [f"# {SPDX[0]}", f"# {SPDX[1]}"]
+        if not good:
+            yield f"{name}:1: the two SPDX lines are not there"
+
+
+def main(root):
+    tap = lint.Tap()
+    files = lint.code_files(root)
+    inside = [n for n in files if n.startswith(("lib/", "plugins/"))]
+    tap.point("there are files to check", [] if inside else ["no .c or .h file in lib/"])
+    tap.point("includes go one way", check_layers(root, files))
+    tap.point("ODE is included only where it may", check_ode(root, files))
+    tap.point("lib/base/alloc.c is the one door to the heap",
+              check_calls(root, [n for n in inside if n != "lib/base/alloc.c"], HEAP))
+    tap.point("nothing ends the process", check_calls(root, inside, QUIT))
+    tap.point("every file has its licence",
+              check_licence(root, [n for n in lint.project_files(root) if needs_licence(root, n)]))
+    tap.done()
+
+
+main(sys.argv[1])

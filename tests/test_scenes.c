@@ -1,0 +1,640 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+#include <scenes/scenes.h>
+#include <tests/tap.h>
+
+#define CONTACTS_MAX 8
+#define WAYPOINTS_MAX 16
+
+static const double slow_step = 0.05; /* s, the paper's physics step */
+static const double tick = 0.001;     /* s */
+
+/* One scene under test: what the near callback needs and fills. */
+typedef struct run {
+  scene *s;
+  dJointGroupID contacts;
+  double deepest; /* m, of all contacts seen */
+} run;
+
+/* A hand as the text of the virtual device describes it. */
+typedef struct hand {
+  double waypoints[WAYPOINTS_MAX][4]; /* s, m */
+  int count;
+  double sine[3];
+  double hz;
+  double mass; /* 0: rigid */
+  double damping;
+  double stiffness;
+} hand;
+
+static bool near_zero_or_more(double x)
+{
+  return isfinite(x) && x >= 0;
+}
+
+static void near(void *user, dGeomID a, dGeomID b)
+{
+  run *r = user;
+  dContact contacts[CONTACTS_MAX];
+  dSurfaceParameters surface = {.mode = dContactApprox1, .mu = dInfinity};
+  if ((dGeomGetBody(a) == NULL && dGeomGetBody(b) == NULL) ||
+      !scene_surface(r->s, a, b, &surface)) {
+    return;
+  }
+  const int count = dCollide(a, b, CONTACTS_MAX, &contacts[0].geom, sizeof contacts[0]);
+  for (int i = 0; i < count; ++i) {
+    contacts[i].surface = surface;
+    r->deepest = fmax(r->deepest, contacts[i].geom.depth);
+    const dJointID joint = dJointCreateContact(r->s->world, r->contacts, &contacts[i]);
+    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
+  }
+}
+
+static void step(run *r, double seconds)
+{
+  dSpaceCollide(r->s->space, r, near);
+  dWorldQuickStep(r->s->world, seconds);
+  dJointGroupEmpty(r->contacts);
+}
+
+static bool open_run(run *r, const char *spec)
+{
+  hap_detail detail = {""};
+  *r = (run){0};
+  if (scene_create(spec, &r->s, &detail) != HAP_OK) {
+    printf("# %s: %s\n", spec, detail.text);
+    return false;
+  }
+  dRandSetSeed(1);
+  r->contacts = dJointGroupCreate(0);
+  return true;
+}
+
+static void close_run(run *r)
+{
+  dJointGroupDestroy(r->contacts);
+  scene_destroy(r->s);
+}
+
+static double field(const char *text, const char *key, double otherwise)
+{
+  const char *at = strstr(text, key);
+  return at != NULL ? atof(at + strlen(key)) : otherwise;
+}
+
+static void parse_hand(const char *text, hand *out)
+{
+  *out = (hand){0};
+  const char *at = strstr(text, "path=");
+  int used = 0;
+  at += at != NULL ? 5 : 0;
+  while (at != NULL && out->count < WAYPOINTS_MAX) {
+    double *w = out->waypoints[out->count];
+    if (sscanf(at, "%lf:%lf/%lf/%lf%n", &w[0], &w[1], &w[2], &w[3], &used) != 4) {
+      break;
+    }
+    ++out->count;
+    at += used + (at[used] == ';');
+  }
+  at = strstr(text, "sine=");
+  if (at != NULL) {
+    CHECK(sscanf(at, "sine=%lf/%lf/%lf", &out->sine[0], &out->sine[1], &out->sine[2]) == 3);
+  }
+  const bool tense = strstr(text, "hand=tense") != NULL;
+  const bool relaxed = strstr(text, "hand=relaxed") != NULL;
+  out->hz = field(text, ",hz=", 0);
+  out->mass = field(text, ",mass=", tense ? 0.3 : relaxed ? 0.2 : 0);
+  out->damping = field(text, ",damping=", tense ? 10 : 3);
+  out->stiffness = field(text, ",stiffness=", tense ? 800 : 150);
+}
+
+/* Where the hand wants to be. Smooth: at rest at each waypoint. */
+static void path_at(const hand *h, double t, double out[3])
+{
+  int i = 0;
+  while (i + 2 < h->count && h->waypoints[i + 1][0] <= t) {
+    ++i;
+  }
+  const double *from = h->waypoints[i];
+  const double *to = h->count > 1 ? h->waypoints[i + 1] : from;
+  const double span = to[0] - from[0];
+  const double u = span > 0 ? fmin(1, fmax(0, (t - from[0]) / span)) : 0;
+  const double blend = u * u * u * (10 - 15 * u + 6 * u * u);
+  for (int k = 0; k < 3; ++k) {
+    out[k] =
+        from[k + 1] + blend * (to[k + 1] - from[k + 1]) + h->sine[k] * sin(2 * M_PI * h->hz * t);
+  }
+}
+
+/* The pointer's pose and speed one tick later, pushed by force. */
+static void hand_step(const hand *h, double t, const double force[3], double x[3], double v[3])
+{
+  double now[3];
+  double next[3];
+  path_at(h, t, now);
+  path_at(h, t + tick, next);
+  for (int k = 0; k < 3; ++k) {
+    const double wanted = (next[k] - now[k]) / tick;
+    const double pull = h->stiffness * (now[k] - x[k]) + h->damping * (wanted - v[k]);
+    v[k] = h->mass > 0 ? v[k] + tick * (pull + force[k]) / h->mass : wanted;
+    x[k] = h->mass > 0 ? x[k] + tick * v[k] : next[k];
+  }
+}
+
+/* Contact of the pointer with one body; adds to the force on the hand and pushes the body. */
+static void touch(run *r, dGeomID ball, dBodyID body, const double v[3], double force[3])
+{
+  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    dContactGeom c;
+    dVector3 u;
+    if (dCollide(ball, geom, 1, &c, sizeof c) == 0) {
+      continue;
+    }
+    dBodyGetPointVel(body, c.pos[0], c.pos[1], c.pos[2], u);
+    double rate = 0;
+    for (int k = 0; k < 3; ++k) {
+      rate -= c.normal[k] * (v[k] - u[k]);
+    }
+    const scene_parameters *p = &r->s->parameters;
+    const double f = fmax(0, p->stiffness * c.depth + p->damping * rate);
+    for (int k = 0; k < 3; ++k) {
+      force[k] += f * c.normal[k];
+    }
+    dBodyAddForceAtPos(body, -f * c.normal[0], -f * c.normal[1], -f * c.normal[2], c.pos[0],
+                       c.pos[1], c.pos[2]);
+  }
+}
+
+typedef struct felt {
+  double peak_n;
+  double share;   /* of the duration in which a force is felt */
+  double held;    /* of the duration in which the hand does not move */
+  double impulse; /* N s */
+  bool first;     /* the first body was touched */
+} felt;
+
+static felt play(run *r)
+{
+  const scene_parameters *p = &r->s->parameters;
+  const long ticks = lround(p->duration / tick);
+  const dGeomID ball = dCreateSphere(NULL, p->radius);
+  felt all = {0};
+  hand h;
+  double x[3];
+  double v[3] = {0, 0, 0};
+  double force[3] = {0, 0, 0};
+  parse_hand(p->hands[0], &h);
+  path_at(&h, 0, x);
+  for (long i = 0; i < ticks; ++i) {
+    hand_step(&h, (double)i * tick, force, x, v);
+    dGeomSetPosition(ball, x[0], x[1], x[2]);
+    memset(force, 0, sizeof force);
+    for (size_t b = 0; b < r->s->body_count; ++b) {
+      touch(r, ball, r->s->bodies[b], v, force);
+      all.first = all.first || (b == 0 && force[0] * force[0] + force[1] * force[1] > 0);
+    }
+    const double f = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+    all.peak_n = fmax(all.peak_n, f);
+    all.share += f > 0 ? 1.0 / (double)ticks : 0;
+    all.held += fabs(v[0]) + fabs(v[1]) + fabs(v[2]) < 1e-3 ? 1.0 / (double)ticks : 0;
+    all.impulse += f * tick;
+    step(r, tick);
+  }
+  dGeomDestroy(ball);
+  return all;
+}
+
+static void check_parameters(const scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  CHECK(p->mass > 0 && p->size > 0 && p->radius > 0 && p->duration > 0 && p->iterations > 0);
+  CHECK(near_zero_or_more(p->stiffness) && near_zero_or_more(p->damping) && p->mu >= 0);
+  CHECK(p->pointers >= 1 && p->pointers <= SCENE_POINTERS_MAX);
+  for (int i = 0; i < p->pointers; ++i) {
+    CHECK(p->hands[i] != NULL && strncmp(p->hands[i], "virtual:", 8) == 0);
+  }
+  CHECK(dWorldGetCFM(s->world) <= 1e-10);
+  CHECK(dWorldGetAutoDisableFlag(s->world) == 0);
+  CHECK(dWorldGetQuickStepNumIterations(s->world) == p->iterations);
+}
+
+static void check_bodies(const scene *s)
+{
+  CHECK(s->body_count > 0);
+  for (size_t i = 0; i < s->body_count; ++i) {
+    const dReal *x = dBodyGetPosition(s->bodies[i]);
+    dMass mass;
+    dBodyGetMass(s->bodies[i], &mass);
+    CHECK(isfinite(x[0]) && isfinite(x[1]) && isfinite(x[2]));
+    CHECK(isfinite(mass.mass) && mass.mass > 0 && dMassCheck(&mass) == 1);
+    CHECK(dBodyGetFirstGeom(s->bodies[i]) != NULL);
+  }
+}
+
+static void check_start(const char *spec)
+{
+  run r;
+  REQUIRE(open_run(&r, spec));
+  check_parameters(r.s);
+  check_bodies(r.s);
+  dSpaceCollide(r.s->space, &r, near);
+  CHECK(r.deepest <= 1e-4);
+  close_run(&r);
+}
+
+TEST(every_scene_builds)
+{
+  const char *names[] = {"fig5",  "fig6",  "fig7", "slide",      "row10",
+                         "stack", "wedge", "door", "lightstand", "pile"};
+  size_t count = 0;
+  for (const scene_parameters *p; (p = scene_table_at(count)) != NULL; ++count) {
+    check_start(p->name);
+  }
+  CHECK(count == sizeof names / sizeof names[0]);
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    check_start(names[i]);
+  }
+}
+
+static void check_count(const char *spec, size_t bodies)
+{
+  run r;
+  REQUIRE(open_run(&r, spec));
+  CHECK(r.s->body_count == bodies);
+  CHECK(r.s->count == (int)bodies);
+  close_run(&r);
+}
+
+TEST(n_is_the_number_of_bodies)
+{
+  const int counts[] = {1, 2, 3, 5, 6, 13, 100, 2000};
+  const char *names[] = {"fig7", "row10", "pile"};
+  for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      char spec[32];
+      snprintf(spec, sizeof spec, "%s:%d", names[k], counts[i]);
+      check_count(spec, (size_t)counts[i]);
+      check_start(spec);
+    }
+  }
+  check_count("fig7", 10);
+  check_count("row10", 10);
+  check_count("pile", 100);
+}
+
+/* Largest distance that a body moved from start, m; infinite when one is not finite. */
+static double largest_move(const scene *s, const double (*start)[3])
+{
+  double largest = 0;
+  for (size_t i = 0; i < s->body_count; ++i) {
+    const dReal *x = dBodyGetPosition(s->bodies[i]);
+    const double move = hypot(hypot(x[0] - start[i][0], x[1] - start[i][1]), x[2] - start[i][2]);
+    largest = isfinite(move) ? fmax(largest, move) : HUGE_VAL;
+  }
+  return largest;
+}
+
+/* The two bodies see the anchor at the same place, and the axis still points where it did. */
+static void check_hinge(dJointID hinge)
+{
+  dVector3 a;
+  dVector3 b;
+  dJointGetHingeAnchor(hinge, a);
+  dJointGetHingeAnchor2(hinge, b);
+  CHECK(hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]) < 2e-4);
+  dJointGetHingeAxis(hinge, a);
+  const dBodyID body = dJointGetBody(hinge, 0);
+  const dReal *w = dBodyGetRotation(body);
+  /* along z (door) or y (light stand), in the world and in the body */
+  const int k = fabs(a[2]) > fabs(a[1]) ? 2 : 1;
+  CHECK_NEAR(fabs(w[5 * k]), 1, 1e-3);
+}
+
+static int check_joints(const scene *s)
+{
+  int hinges = 0;
+  for (size_t i = 0; i < s->body_count; ++i) {
+    for (int k = 0; k < dBodyGetNumJoints(s->bodies[i]); ++k) {
+      const dJointID joint = dBodyGetJoint(s->bodies[i], k);
+      if (dJointGetType(joint) == dJointTypeHinge) {
+        ++hinges;
+        check_hinge(joint);
+      }
+    }
+  }
+  return hinges;
+}
+
+static void check_rest(const char *spec)
+{
+  run r;
+  REQUIRE(open_run(&r, spec));
+  double(*start)[3] = calloc(r.s->body_count, sizeof *start);
+  for (size_t i = 0; start != NULL && i < r.s->body_count; ++i) {
+    memcpy(start[i], dBodyGetPosition(r.s->bodies[i]), sizeof start[i]);
+  }
+  for (int i = 0; i < 200; ++i) {
+    step(&r, slow_step);
+  }
+  const double move = start != NULL ? largest_move(r.s, (const double(*)[3])start) : HUGE_VAL;
+  printf("# %s: moved %.4f mm\n", spec, 1e3 * move);
+  CHECK(move < 1e-3);
+  check_joints(r.s);
+  free(start);
+  close_run(&r);
+}
+
+TEST(resting_scenes_stay_at_rest)
+{
+  const char *specs[] = {"fig6",  "fig7", "slide",      "row10",  "stack",
+                         "wedge", "door", "lightstand", "pile:1", "pile"};
+  for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
+    check_rest(specs[i]);
+  }
+}
+
+TEST(fig5_flies_at_its_speed)
+{
+  run r;
+  REQUIRE(open_run(&r, "fig5"));
+  const dBodyID cube = r.s->bodies[0];
+  const double start = dBodyGetPosition(cube)[0];
+  for (int i = 0; i < 40; ++i) {
+    step(&r, slow_step);
+    const dReal *v = dBodyGetLinearVel(cube);
+    const dReal *w = dBodyGetAngularVel(cube);
+    CHECK(v[0] == -0.017 && v[1] == 0 && v[2] == 0);
+    CHECK(w[0] == 0 && w[1] == 0 && w[2] == 0);
+  }
+  CHECK_NEAR(dBodyGetPosition(cube)[0], start - 2 * 0.017, 1e-12);
+  dMass mass;
+  dBodyGetMass(cube, &mass);
+  CHECK(mass.mass == 60);
+  const double contact_s = r.s->parameters.gap / 0.017;
+  CHECK(contact_s > 0.09 && contact_s < 0.13);
+  CHECK(fabs(remainder(contact_s, slow_step)) > 0.005);
+  close_run(&r);
+}
+
+/* Closed forms: half period, peak v sqrt(k m), impulse 2 m v. */
+TEST(fig5_rebounds_as_a_spring_does)
+{
+  run r;
+  REQUIRE(open_run(&r, "fig5"));
+  const scene_parameters p = r.s->parameters;
+  const felt f = play(&r);
+  CHECK_NEAR(f.peak_n, 0.017 * sqrt(p.stiffness * p.mass), 1e-3);
+  CHECK_NEAR(f.share * p.duration, M_PI * sqrt(p.mass / p.stiffness), 2 * tick);
+  CHECK_NEAR(f.impulse, 2 * p.mass * 0.017, 1e-3);
+  close_run(&r);
+}
+
+static void check_played(const char *spec)
+{
+  run r;
+  REQUIRE(open_run(&r, spec));
+  const felt f = play(&r);
+  printf("# %s: peak %.2f N, contact %.0f %%, held %.0f %%, %.2f N s\n", spec, f.peak_n,
+         100 * f.share, 100 * f.held, f.impulse);
+  CHECK(f.first);
+  CHECK(f.peak_n >= 1 && f.peak_n <= 10);
+  CHECK(f.share >= 0.4);
+  CHECK(f.held <= 0.3);
+  CHECK(r.s->parameters.hinge_torque == 0 || check_joints(r.s) > 0);
+  close_run(&r);
+}
+
+TEST(hands_are_felt)
+{
+  const char *specs[] = {"fig6",  "fig7", "slide",      "row10", "stack",
+                         "wedge", "door", "lightstand", "pile"};
+  for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
+    check_played(specs[i]);
+  }
+}
+
+/* The path alone, no force and no hand: the pointer must reach into the first body. */
+TEST(paths_reach_the_first_body)
+{
+  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
+    const scene_parameters *p = scene_table_at(i);
+    run r;
+    hand h;
+    bool reached = false;
+    REQUIRE(open_run(&r, p->name));
+    parse_hand(p->hands[0], &h);
+    CHECK(h.count > 0);
+    CHECK_NEAR(h.waypoints[0][0], 0, 0);
+    CHECK(h.waypoints[h.count - 1][0] <= p->duration);
+    const dGeomID ball = dCreateSphere(NULL, p->radius);
+    for (int k = 0; k * slow_step < p->duration; ++k) {
+      const double t = k * slow_step;
+      double x[3];
+      dContactGeom c;
+      path_at(&h, t, x);
+      dGeomSetPosition(ball, x[0], x[1], x[2]);
+      const int touches = dCollide(ball, dBodyGetFirstGeom(r.s->bodies[0]), 1, &c, sizeof c);
+      CHECK(t > 0 || touches == 0);
+      reached = reached || touches > 0;
+      step(&r, slow_step);
+    }
+    CHECK(reached);
+    dGeomDestroy(ball);
+    close_run(&r);
+  }
+}
+
+/* Every scene's name is in the text. */
+static void check_lists_all(const char *text)
+{
+  CHECK(strlen(text) + 1 < sizeof((hap_detail *)0)->text);
+  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
+    CHECK(strstr(text, scene_table_at(i)->name) != NULL);
+  }
+}
+
+TEST(bad_specs_are_refused_with_a_list)
+{
+  const char *specs[] = {"",         "nosuch",         "fig",
+                         "fig55",    "row10:0",        "row10:x",
+                         "row10:",   "row10:-1",       "row10:3x",
+                         "row10: 3", "slide:3",        "fig5:",
+                         ":3",       "pile:999999999", "pile:10001",
+                         "door:1",   "FIG5",           "fig7:99999999999999999999999999",
+                         NULL};
+  for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
+    hap_detail detail = {""};
+    scene *s = (scene *)&detail;
+    CHECK(scene_create(specs[i], &s, &detail) < 0);
+    CHECK(s == NULL);
+    check_lists_all(detail.text);
+    CHECK(scene_create(specs[i], &s, NULL) < 0);
+  }
+  scene *s = NULL;
+  CHECK(scene_create("nosuch", &s, NULL) == HAP_ERROR_NOT_FOUND);
+  CHECK(scene_create("slide:3", &s, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(scene_create("slide", NULL, NULL) == HAP_ERROR_ARGUMENT);
+}
+
+TEST(long_names_do_not_cut_the_list)
+{
+  char name[2000];
+  memset(name, 'a', sizeof name);
+  name[sizeof name - 1] = '\0';
+  hap_detail detail = {""};
+  scene *s = NULL;
+  CHECK(scene_create(name, &s, &detail) == HAP_ERROR_NOT_FOUND);
+  check_lists_all(detail.text);
+  memcpy(name, "pile:", 5);
+  CHECK(scene_create(name, &s, &detail) == HAP_ERROR_ARGUMENT);
+  check_lists_all(detail.text);
+  scene_parameters p = *scene_table_at(0);
+  p.name = name;
+  CHECK(scene_create_from(&p, 0, &s, &detail) == HAP_ERROR_NOT_FOUND);
+  check_lists_all(detail.text);
+}
+
+static const scene_parameters *row_of(const char *name)
+{
+  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
+    if (strcmp(scene_table_at(i)->name, name) == 0) {
+      return scene_table_at(i);
+    }
+  }
+  return NULL;
+}
+
+TEST(edited_parameters_are_used)
+{
+  REQUIRE(row_of("slide") != NULL);
+  scene_parameters p = *row_of("slide");
+  scene *s = NULL;
+  dMass mass;
+  p.mass = 3;
+  p.gravity = 1.6;
+  p.iterations = 77;
+  p.hands[0] = "virtual:path=0:0/0/1";
+  REQUIRE(scene_create_from(&p, 0, &s, NULL) == HAP_OK);
+  dBodyGetMass(s->bodies[0], &mass);
+  dVector3 g;
+  dWorldGetGravity(s->world, g);
+  CHECK(mass.mass == 3 && g[2] == -1.6 && s->count == 0);
+  CHECK(dWorldGetQuickStepNumIterations(s->world) == 77);
+  CHECK(s->parameters.hands[0] == p.hands[0]);
+  scene_destroy(s);
+}
+
+static void check_refused(scene_parameters p, int count)
+{
+  hap_detail detail = {""};
+  scene *s = NULL;
+  CHECK(scene_create_from(&p, count, &s, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(s == NULL);
+  CHECK(detail.text[0] != '\0');
+}
+
+TEST(bad_parameters_are_refused)
+{
+  REQUIRE(row_of("slide") != NULL && row_of("fig7") != NULL);
+  const scene_parameters good = *row_of("slide");
+  const double bad[] = {-1, NAN, INFINITY};
+  for (size_t i = 0; i < 3; ++i) {
+    scene_parameters p = good;
+    p.mass = bad[i];
+    check_refused(p, 0);
+    p = good;
+    p.size = bad[i];
+    check_refused(p, 0);
+    p = good;
+    p.duration = bad[i];
+    check_refused(p, 0);
+    p = good;
+    p.gap = bad[i];
+    check_refused(p, 0);
+    if (!isinf(bad[i])) { /* infinite friction is allowed */
+      p = good;
+      p.mu = bad[i];
+      check_refused(p, 0);
+    }
+  }
+  scene_parameters p = good;
+  p.pointers = SCENE_POINTERS_MAX + 1;
+  check_refused(p, 0);
+  p = good;
+  p.pointers = 2; /* and only one hand */
+  check_refused(p, 0);
+  p = good;
+  p.iterations = 0;
+  check_refused(p, 0);
+  check_refused(good, 1);
+  check_refused(*row_of("fig7"), -1);
+  check_refused(*row_of("fig7"), 999999999);
+  p = good;
+  p.name = NULL;
+  check_refused(p, 0);
+}
+
+TEST(infinite_friction_stays_finite)
+{
+  REQUIRE(row_of("slide") != NULL);
+  scene_parameters p = *row_of("slide");
+  p.mu = dInfinity;
+  run r = {0};
+  REQUIRE(scene_create_from(&p, 0, &r.s, NULL) == HAP_OK);
+  r.contacts = dJointGroupCreate(0);
+  const double start = dBodyGetPosition(r.s->bodies[0])[0];
+  for (int i = 0; i < 50; ++i) {
+    dBodyAddForce(r.s->bodies[0], 4, 0, 0);
+    step(&r, slow_step);
+  }
+  CHECK_NEAR(dBodyGetPosition(r.s->bodies[0])[0], start, 1e-4);
+  close_run(&r);
+}
+
+TEST(surface_leaves_out_jointed_pairs)
+{
+  run r;
+  REQUIRE(open_run(&r, "lightstand"));
+  CHECK(check_joints(r.s) == 6); /* three hinges, each seen from both of its bodies */
+  const size_t base = r.s->body_count - 1;
+  const dGeomID lower = dBodyGetFirstGeom(r.s->bodies[base - 1]);
+  const dGeomID head = dBodyGetFirstGeom(r.s->bodies[0]);
+  dSurfaceParameters io = {.mode = dContactApprox1, .mu = dInfinity};
+  CHECK(!scene_surface(r.s, lower, dBodyGetFirstGeom(r.s->bodies[base]), &io));
+  CHECK(scene_surface(r.s, lower, head, &io));
+  CHECK(io.mu == 0.5 && io.mode == dContactApprox1);
+  close_run(&r);
+}
+
+TEST(destroy_accepts_null)
+{
+  scene_destroy(NULL);
+  CHECK(scene_table_at(1000) == NULL);
+}
+
+static void run_all(void)
+{
+  RUN(every_scene_builds);
+  RUN(n_is_the_number_of_bodies);
+  RUN(resting_scenes_stay_at_rest);
+  RUN(fig5_flies_at_its_speed);
+  RUN(fig5_rebounds_as_a_spring_does);
+  RUN(hands_are_felt);
+  RUN(paths_reach_the_first_body);
+  RUN(bad_specs_are_refused_with_a_list);
+  RUN(long_names_do_not_cut_the_list);
+  RUN(edited_parameters_are_used);
+  RUN(bad_parameters_are_refused);
+  RUN(infinite_friction_stays_finite);
+  RUN(surface_leaves_out_jointed_pairs);
+  RUN(destroy_accepts_null);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  run_all();
+  dCloseODE();
+  return tap_done();
+}

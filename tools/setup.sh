@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: hapode contributors
+# SPDX-License-Identifier: MIT
+# Sourced by run-demo and run-tests: packages and build folder on Debian. Everything it says goes to
+# stderr. HAPODE_MESON_OPTIONS: options for meson, such as "-Dwerror=true".
+
+# shellcheck shell=bash
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
+build=$root/build
+
+say() {
+  printf '%s\n' "$*" >&2
+}
+
+# gcc alone only recommends the C library's headers, so libc6-dev is named.
+packages_needed=(gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev)
+
+# Whether a package, or the same thing from elsewhere, is there.
+have_package() {
+  case $(dpkg-query -W -f='${Status}' "$1" 2>/dev/null) in
+    *' ok installed') return 0 ;;
+  esac
+  case $1 in
+    meson) command -v meson >/dev/null ;;
+    ninja-build) command -v ninja >/dev/null ;;
+    pkg-config) command -v pkg-config >/dev/null ;;
+    clang-format) command -v clang-format-14 >/dev/null ;;
+    gnuplot-nox) command -v gnuplot >/dev/null ;;
+    python3) command -v python3 >/dev/null ;;
+    *) return 1 ;;
+  esac
+}
+
+# missing_packages NAME...: those that are not there, one a line.
+missing_packages() {
+  local name
+  for name in "$@"; do
+    have_package "$name" || printf '%s\n' "$name"
+  done
+}
+
+# install_packages NAME...: as root or by a sudo that asks nothing; fails otherwise.
+install_packages() {
+  local as_root=()
+  if [ "$(id -u)" -ne 0 ]; then
+    sudo -n true 2>/dev/null || return 1
+    as_root=(sudo -n)
+  fi
+  say "installing: $*"
+  # an update that fails may still leave lists that are good enough
+  "${as_root[@]}" apt-get update -qq >&2 </dev/null || say "apt-get update failed"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -qq --no-install-recommends "$@" >&2 </dev/null
+}
+
+# need_packages OPTIONAL...: installs what is missing; ends the script when a needed one stays away.
+need_packages() {
+  local needed optional
+  if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+    say "not a Debian: needs ${packages_needed[*]}, is better with $*"
+    return 0
+  fi
+  mapfile -t needed < <(missing_packages "${packages_needed[@]}")
+  mapfile -t optional < <(missing_packages "$@")
+  if [ $((${#needed[@]} + ${#optional[@]})) -eq 0 ]; then
+    return 0
+  fi
+  # an optional package that cannot be had must not take the needed ones with it
+  if ! install_packages "${needed[@]}" "${optional[@]}" && [ ${#needed[@]} -gt 0 ]; then
+    install_packages "${needed[@]}" || true
+  fi
+  mapfile -t needed < <(missing_packages "${packages_needed[@]}")
+  mapfile -t optional < <(missing_packages "$@")
+  if [ ${#needed[@]} -gt 0 ]; then
+    say "packages are missing; type:"
+    say "  sudo apt-get update && sudo apt-get install -y --no-install-recommends" \
+      "${needed[*]} ${optional[*]}"
+    exit 1
+  fi
+  if [ ${#optional[@]} -gt 0 ]; then
+    say "going on without ${optional[*]}; to have them, type:"
+    say "  sudo apt-get update && sudo apt-get install -y --no-install-recommends ${optional[*]}"
+  fi
+}
+
+# quietly LOG COMMAND...: the output goes to LOG, and to stderr when the command fails.
+quietly() {
+  local log=$1
+  shift
+  if ! "$@" >"$log" 2>&1 </dev/null; then
+    cat "$log" >&2
+    say "failed: $* (log: $log)"
+    return 1
+  fi
+}
+
+# A build folder that meson can still use and that belongs to this source folder.
+build_is_good() {
+  [ -f "$build/build.ninja" ] &&
+    grep -qsF "\"source\": \"$root\"" "$build/meson-info/meson-info.json" &&
+    meson configure "$build" >/dev/null 2>&1 </dev/null
+}
+
+build_all() {
+  local options
+  read -ra options <<<"${HAPODE_MESON_OPTIONS:-}"
+  mkdir -p "$build"
+  if ! build_is_good; then
+    say "setting up $build"
+    rm -rf "$build/meson-private" "$build/meson-info" "$build/build.ninja"
+    quietly "$build/setup.log" meson setup --buildtype=release "${options[@]}" "$build" "$root"
+  elif [ ${#options[@]} -gt 0 ]; then
+    quietly "$build/setup.log" meson configure "$build" "${options[@]}"
+  fi
+  say "building"
+  quietly "$build/compile.log" meson compile -C "$build"
+}
