@@ -29,7 +29,7 @@ typedef struct thing {
 static const char *const kind_names[KINDS] = {"sphere",   "box",   "capsule",
                                               "cylinder", "plane", "hull"};
 
-/* --- random things ----------------------------------------------------------------------------- */
+/* --- random things -------------------------------------------------------------------------- */
 
 static double random_unit(uint64_t *state)
 {
@@ -127,7 +127,7 @@ static double thing_size(const thing *t)
   return size;
 }
 
-/* --- oracle ------------------------------------------------------------------------------------ */
+/* --- oracle --------------------------------------------------------------------------------- */
 
 /* Largest value of x.n over the shape, in its own frame. */
 static double local_extent(const thing *t, const double n[3])
@@ -323,7 +323,7 @@ static double alternate(const thing *a, const thing *b, int rounds)
   return hapi_v3_norm(gap);
 }
 
-/* --- checks of one answer ---------------------------------------------------------------------- */
+/* --- checks of one answer ------------------------------------------------------------------- */
 
 typedef struct errors {
   double gap;         /* point_a - point_b against distance x normal */
@@ -482,7 +482,7 @@ TEST(ten_kilometres_away)
   pairs_run(&r);
 }
 
-/* --- relations between answers ----------------------------------------------------------------- */
+/* --- relations between answers -------------------------------------------------------------- */
 
 typedef void pair_test(hapi_shape_kind a, hapi_shape_kind b, uint64_t *state);
 
@@ -582,8 +582,8 @@ static void move_to_gap(thing *a, const hapi_nearest *answer, double gap)
   hapi_v3_madd(a->pose.position, gap - answer->distance, answer->normal, a->pose.position);
 }
 
-/* Moving along the normal changes the distance by as much, until contact. Beyond, another normal may
- * be better, and a needle may even come out again. */
+/* Moving along the normal changes the distance by as much, until contact. Beyond, another normal
+ * may be better, and a needle may even come out again. */
 static void approach(thing *a, const thing *b, double reach, double grain)
 {
   static const double gaps[] = {1.0, 1e-3, 1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-3};
@@ -739,7 +739,7 @@ TEST(coincident_frames)
   each_pair(coincident_pair, 20);
 }
 
-/* --- single cases ------------------------------------------------------------------------------ */
+/* --- single cases --------------------------------------------------------------------------- */
 
 static thing simple(hapi_shape_kind kind, double radius, double x, double y, double z)
 {
@@ -843,6 +843,11 @@ TEST(no_answer)
   bad = box;
   bad.pose.quat_wxyz[2] = INFINITY;
   CHECK(refused(&bad, &plane) && refused(&plane, &bad));
+  bad = box;
+  bad.pose.position[0] = 1e31;
+  CHECK(refused(&bad, &box) && refused(&plane, &bad));
+  bad.pose.position[0] = 1e29;
+  CHECK(!refused(&bad, &plane));
   bad = box;
   bad.shape.half[0] = -0.1;
   CHECK(refused(&bad, &box));

@@ -25,7 +25,7 @@ typedef struct hap_device_info {
 } hap_device_info;
 
 /* [control] Opens a device by its spec: a name, then ':' and arguments separated by commas, such
- * as "virtual", "virtual:motion=sine,to=0.1/0/0", "replay:hand.csv,scale=0.5". On failure *out is
+ * as "virtual", "virtual:sine=0.1/0/0,hz=1", "replay:hand.csv,scale=0.5". On failure *out is
  * NULL and detail (may be NULL) says what was wrong and, for an unknown name, which exist.
  * May block. The caller owns the device and closes it after the session that uses it stopped. */
 HAP_API HAP_NODISCARD hap_status hap_device_open(const char *spec, hap_device **out,

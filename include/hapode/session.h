@@ -47,7 +47,7 @@ typedef enum hap_probe {
   HAP_PROBE_PAPER = 1   /* four steps for each neighbour: 4N steps */
 } hap_probe;
 
-#define HAP_LATENCY_NEXT_SYNC (-1)
+#define HAP_LATENCY_DEFAULT (-1)
 
 typedef struct hap_session_def {
   uint32_t size;        /* set by hap_session_def_init */
@@ -63,8 +63,9 @@ typedef struct hap_session_def {
   int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
                            time. Default 80. Physics runs at half of it. */
   int32_t physics_latency_ticks; /* LOCKSTEP: ticks from the start of a physics step to the tick
-                                    that uses its result. HAP_LATENCY_NEXT_SYNC (default): the
-                                    end of the step, as in the paper. */
+                                    that uses its result, 0..20000. HAP_LATENCY_DEFAULT (default):
+                                    1 in model ACCELERANCE, one step in model IMPULSE. Model SINGLE
+                                    always has 0. */
   int32_t trace_rows; /* rows kept for hap_session_trace_read, 0..1048576, default 0: none */
   hap_impulse_pose impulse_pose; /* default HAP_IMPULSE_INTERPOLATED */
   hap_probe probe;               /* default HAP_PROBE_SHARED */

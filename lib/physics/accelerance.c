@@ -54,12 +54,16 @@ static void measure_b(hapi_physics *physics)
   }
 }
 
-/* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. */
+/* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. Before the
+ * first touch that is zero and cannot be used: then the peak of the force that the touch will give,
+ * v sqrt(k m), or a small share of the weight where that is more. */
 static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact)
 {
   double last = hapi_v3_norm(contact->last_force);
-  double floor = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body_of(physics, contact)->mass;
-  return last > floor ? last : floor;
+  double mass = body_of(physics, contact)->mass;
+  double touch = contact->speed * sqrt(contact->stiffness * mass);
+  double least = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * mass;
+  return last > 0.0 ? last : touch > least ? touch : least;
 }
 
 /* One column of eq. 5 and 6 for each contact of the round. */

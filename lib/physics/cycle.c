@@ -9,8 +9,9 @@
 #include "physics/physics_internal.h"
 
 /* One cycle of the physics thread, in the paper's order: step, neighbours, testing simulations,
- * sync. The world's time runs ahead of the loop's by the cycle's own period, because the result is
- * for the end of it; only model SINGLE steps up to now. */
+ * sync. The step goes from the last cycle's time up to now, with the impulse that the pointers gave
+ * in that time: so what the world makes of it can be held against what the loop made of it. Model
+ * IMPULSE steps from now to the next cycle, as its poses are shown on the way there. */
 
 typedef struct stopwatch {
   int64_t last_ns;
@@ -27,7 +28,7 @@ static double lap(stopwatch *watch)
 
 static double lead_of(const hapi_physics *physics, hap_model model)
 {
-  return model == HAP_MODEL_SINGLE ? 0.0 : 1.0 / physics->config.physics_hz;
+  return model == HAP_MODEL_IMPULSE ? 1.0 / physics->config.physics_hz : 0.0;
 }
 
 /* A change of model changes how far ahead the world is: the step between makes up for it. */
@@ -91,7 +92,7 @@ static void sync_in(hapi_physics *physics, int64_t now_ns)
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   hapi_reconcile_take(physics);
-  if (physics->model != HAP_MODEL_SINGLE) {
+  if (physics->model == HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
   }
   if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
@@ -102,17 +103,19 @@ static void sync_in(hapi_physics *physics, int64_t now_ns)
 
 static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
-  int64_t half_tick = (int64_t)(0.5e9 / physics->config.haptic_hz);
-  int64_t state_ns = physics->model == HAP_MODEL_SINGLE ? now_ns : next_ns;
+  int64_t half_tick = (int64_t)(0.5e9 / physics->config.haptic_hz); /* clocks are rounded */
+  int64_t state_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns : now_ns;
   int64_t valid_ns = state_ns;
-  if (physics->latency_s >= 0.0 && physics->model != HAP_MODEL_SINGLE) {
+  if (physics->model != HAP_MODEL_SINGLE && physics->latency_s >= 0.0) {
     valid_ns = now_ns + (int64_t)llround(1e9 * physics->latency_s);
+  } else if (physics->model == HAP_MODEL_ACCELERANCE && physics->config.lockstep) {
+    valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
-  if (physics->model == HAP_MODEL_SINGLE) {
+  hapi_reconcile_overwrite(physics);
+  if (physics->model != HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
   }
-  hapi_reconcile_left(physics);
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5])
@@ -144,7 +147,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   if (!world_is_sound(physics)) {
     return;
   }
-  hapi_reconcile_predict(physics);
+  hapi_reconcile_push(physics);
   seconds[4] = lap(&watch);
   hapi_world_collide(physics);
   seconds[0] = lap(&watch);
@@ -152,7 +155,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[1] = lap(&watch);
   global_step(physics);
   seconds[3] = lap(&watch);
-  hapi_reconcile_after(physics);
+  hapi_reconcile_residual(physics);
   hapi_neighbors_find(physics);
   seconds[1] += lap(&watch);
   hapi_accelerance_measure(physics);

@@ -84,7 +84,7 @@ void hapi_neighbors_collect(hapi_physics *physics)
   }
 }
 
-static double relative_speed(dGeomID geom, const hapi_state_pointer *pointer, const double point[3])
+double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer, const double point[3])
 {
   dVector3 velocity = {0.0, 0.0, 0.0, 0.0};
   dBodyID body = dGeomGetBody(geom);
@@ -96,13 +96,14 @@ static double relative_speed(dGeomID geom, const hapi_state_pointer *pointer, co
   return hapi_v3_norm(difference);
 }
 
-/* Nearest points for where the pointer will be at the time of the model; where that would put its
- * centre inside the body, for where it is now: the far face must not be taken for the near one. */
+/* Nearest points for where the pointer will be at the time of the model, which is later than now in
+ * model IMPULSE; where that would put its centre inside the body, for where it is now: the far face
+ * must not be taken for the near one. */
 static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate, hapi_nearest *out)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[candidate->pointer];
   double horizon = physics->probe_step_s;
-  double ahead = physics->model == HAP_MODEL_SINGLE ? 0.0 : horizon;
+  double ahead = hapi_physics_steps_to_now(physics) ? 0.0 : horizon;
   double there[3];
   hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
   bool found =
@@ -112,7 +113,8 @@ static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate,
                               candidate->reach, out);
   }
   return found &&
-         out->distance <= reach_of(relative_speed(candidate->geom, pointer, out->point_b), horizon);
+         out->distance <=
+             reach_of(hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
 }
 
 static int by_distance(const void *a, const void *b)
@@ -122,13 +124,16 @@ static int by_distance(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit)
+static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
+                          const hapi_state_pointer *pointer)
 {
   dBodyID body = dGeomGetBody(hit->geom);
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   hapi_v3_copy(hit->nearest.point_b, slot->point_body);
   hapi_v3_copy(hit->nearest.normal, slot->normal_body);
   slot->distance = hit->nearest.distance;
+  slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
+  slot->stiffness = pointer->stiffness;
   slot->wanted = true;
   if (body != NULL) {
     const dReal *q = dBodyGetQuaternion(body);
@@ -149,14 +154,14 @@ static void take_hit(hapi_physics *physics, const hapi_hit *hit)
       return;
     }
   }
-  uint32_t generation = hapi_state_pointers(physics->state)[hit->pointer].generation;
+  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
   hapi_contact_slot *contact =
-      hapi_slots_contact(physics, slot, hit->geom, hit->pointer, generation);
+      hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
   if (contact == NULL) {
     ++physics->figures.stats.capacity_dropped;
     return;
   }
-  place_contact(contact, hit);
+  place_contact(contact, hit, pointer);
   if (slot != HAPI_SLOT_NONE) {
     hapi_body_slot *local = &physics->bodies[slot];
     local->wanted = true;

@@ -170,7 +170,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
-  hapi_reconcile_left(physics);
+  hapi_reconcile_overwrite(physics);
   return HAP_OK;
 }
 
@@ -220,7 +220,7 @@ bool hapi_physics_in_callback(const hapi_physics *physics)
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
-  return physics->model == HAP_MODEL_SINGLE;
+  return physics->model != HAP_MODEL_IMPULSE;
 }
 
 hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)

@@ -55,10 +55,10 @@ void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);
 double hapi_physics_period(const hapi_physics *physics);
 double hapi_physics_next_period(const hapi_physics *physics);
 
-/* [control] LOCKSTEP: time from a cycle to the use of its model; negative: next sync. */
+/* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 
-/* [physics] Whether the model in force steps the world up to now, not ahead (SINGLE). */
+/* [physics] Whether the model in force steps the world up to now, not ahead (IMPULSE). */
 bool hapi_physics_steps_to_now(const hapi_physics *physics);
 
 /* ode.h; the caller holds the lock or runs in a cycle, or nothing runs */

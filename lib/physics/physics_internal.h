@@ -22,8 +22,8 @@
 
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
 #define HAPI_STANDARD_GRAVITY 9.81
-/* Share of the weight that a probe uses where the pointer gave no force yet (eq. 4 would divide
- * by zero). */
+/* Share of the weight that a probe uses at least where the pointer gave no force yet (eq. 4 would
+ * divide by zero). */
 #define HAPI_PROBE_FLOOR 0.01
 
 /* ---- bodies.c: what is known of the world's bodies ---- */
@@ -87,8 +87,6 @@ typedef struct hapi_body_slot {
   uint64_t retired_at; /* first model without it */
   bool wanted;         /* scratch: in the model being built */
   bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
-  bool predicted;      /* the last global step had a predicted force on it */
-  bool has_prediction; /* b and the contacts' A were in force in this interval */
   bool placed;         /* left_* hold what we left in ODE */
   double mass;
   double impulse_taken[3];
@@ -99,9 +97,7 @@ typedef struct hapi_body_slot {
   double b[6];
   double new_impulse[3]; /* of the last interval, to be given to the world */
   double new_angular_impulse[3];
-  double velocity_before[6]; /* before the global step */
-  double applied[6];         /* A f of the global step's prediction, per second */
-  double residual[6];
+  double residual[6]; /* eq. 14, running total */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
@@ -118,8 +114,9 @@ typedef struct hapi_contact_slot {
   double normal_body[3];
   double point_world[3]; /* when it was found */
   double distance;
+  double speed;         /* m/s, pointer against body */
+  double stiffness;     /* N/m, the pointer's */
   double last_force[3]; /* on the body, newest message */
-  double mean_force[3]; /* on the body, over the last interval */
   double a[6][3];
 } hapi_contact_slot;
 
@@ -233,7 +230,7 @@ struct hapi_physics {
   _Atomic int wanted_model;
   hap_model model;  /* in force in this cycle */
   double step_s;    /* of this cycle's global step */
-  double latency_s; /* negative: next sync */
+  double latency_s; /* negative: the model's own */
   uint64_t model_number;
   hapi_state *state;   /* newest message of the loop; NULL: none yet */
   uint64_t last_tick;  /* of the newest message that was reconciled */
@@ -292,6 +289,8 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
 /* neighbor.c */
 void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
 void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
+double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
+                            const double point[3]);          /* m/s, relative */
 uint32_t hapi_neighbors_bodies(const hapi_physics *physics); /* dynamic ones in the model */
 
 /* slots.c */
@@ -332,10 +331,10 @@ void hapi_test_finish(hapi_test_set *test);
 void hapi_accelerance_measure(hapi_physics *physics);
 
 /* reconcile.c: eq. 12-14, momentum */
-void hapi_reconcile_take(hapi_physics *physics);    /* newest message, eq. 12-13 */
-void hapi_reconcile_predict(hapi_physics *physics); /* pointers' forces of the global step */
-void hapi_reconcile_after(hapi_physics *physics);   /* after it: residuals */
-void hapi_reconcile_left(hapi_physics *physics);    /* last: remember what we leave in ODE */
+void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */
+void hapi_reconcile_push(hapi_physics *physics);      /* pointers' impulse into the global step */
+void hapi_reconcile_residual(hapi_physics *physics);  /* after it: eq. 14 */
+void hapi_reconcile_overwrite(hapi_physics *physics); /* after the probes: eq. 12 and 13 */
 
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);

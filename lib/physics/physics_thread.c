@@ -37,8 +37,8 @@ static void *physics_main(void *arg)
   dAllocateODEDataForThread(dAllocateMaskAll);
   int64_t period = nanoseconds(hapi_physics_period(physics));
   int64_t deadline = physics->start_ns;
-  if (physics->model == HAP_MODEL_SINGLE) {
-    deadline += period; /* the first model is for the first tick already */
+  if (hapi_physics_steps_to_now(physics)) {
+    deadline += period; /* the first model is for the start already */
   }
   while (atomic_load_explicit(&physics->stop, memory_order_acquire) == 0) {
     bool single = physics->model == HAP_MODEL_SINGLE;

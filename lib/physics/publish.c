@@ -24,7 +24,6 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
   memcpy(out->b, slot->b, sizeof out->b);
   memcpy(out->residual, slot->residual, sizeof out->residual);
-  slot->has_prediction = physics->model == HAP_MODEL_ACCELERANCE;
   bool sound = hapi_finite(out->pose.position, 3) && hapi_finite(out->pose.quat_wxyz, 4) &&
                hapi_finite(out->twist.linear, 3) && hapi_finite(out->twist.angular, 3);
   physics->figures.stats.states_rejected += !sound;

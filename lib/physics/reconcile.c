@@ -55,36 +55,11 @@ static bool moved_by_application(const hapi_body_slot *slot, dBodyID body)
 static bool sound(const hapi_state_body *in)
 {
   return hapi_finite(in->pose.position, 3) && hapi_finite(in->pose.quat_wxyz, 4) &&
-         hapi_finite(in->twist.linear, 3) && hapi_finite(in->twist.angular, 3);
+         hapi_finite(in->twist.linear, 3) && hapi_finite(in->twist.angular, 3) &&
+         hapi_finite(in->impulse, 3) && hapi_finite(in->angular_impulse, 3) &&
+         hapi_finite(in->residual, 6);
 }
 
-/* Eq. 12 and 13. */
-static void overwrite(hapi_physics *physics, hapi_body_slot *slot, dBodyID body,
-                      const hapi_state_body *in)
-{
-  if (!sound(in)) {
-    ++physics->figures.stats.states_rejected;
-    hapi_slots_restart(slot);
-    return;
-  }
-  double change[3];
-  hapi_v3_sub(in->twist.linear, dBodyGetLinearVel(body), change);
-  hapi_v3_madd(physics->figures.world_impulse, slot->mass, change, physics->figures.world_impulse);
-  if (!dBodyIsEnabled(body)) {
-    dBodyEnable(body);
-  }
-  const double *p = in->pose.position;
-  const double *v = in->twist.linear;
-  const double *w = in->twist.angular;
-  dBodySetPosition(body, p[0], p[1], p[2]);
-  dBodySetQuaternion(body, in->pose.quat_wxyz);
-  dBodySetLinearVel(body, v[0], v[1], v[2]);
-  dBodySetAngularVel(body, w[0], w[1], w[2]);
-}
-
-/* A body that no pointer pushed in the last interval, and for which the world assumed no push,
- * keeps the world's state: for a body alone the
- * two are the same, and a neighbour that another body pushes is moved by the world only. */
 static void take_body(hapi_physics *physics, uint32_t index)
 {
   hapi_body_slot *slot = &physics->bodies[index];
@@ -94,38 +69,28 @@ static void take_body(hapi_physics *physics, uint32_t index)
   if (in == NULL || body == NULL || slot->phase == HAPI_SLOT_FREE || driven) {
     return;
   }
-  take_impulse(physics, slot, in);
-  bool owned = slot->pushed || slot->predicted;
-  slot->predicted = false;
-  if (physics->state->model != HAP_MODEL_ACCELERANCE || !owned) {
+  if (!sound(in)) {
+    ++physics->figures.stats.states_rejected;
+    hapi_slots_restart(slot);
     return;
   }
+  take_impulse(physics, slot, in);
   if (moved_by_application(slot, body)) {
     hapi_slots_restart(slot);
-  } else {
-    overwrite(physics, slot, body, in);
   }
-  memset(slot->new_impulse, 0, sizeof slot->new_impulse); /* is in the velocity already */
-  memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
 }
 
-static void take_contacts(hapi_physics *physics)
+static void take_forces(hapi_physics *physics)
 {
-  const hapi_state *state = physics->state;
   const hapi_state_contact *in = hapi_state_contacts(physics->state);
-  double seconds = (double)state->ticks_in_model / physics->config.haptic_hz;
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
     memset(physics->contacts[i].last_force, 0, sizeof physics->contacts[i].last_force);
-    memset(physics->contacts[i].mean_force, 0, sizeof physics->contacts[i].mean_force);
   }
-  for (uint32_t i = 0; i < state->contact_count; ++i) {
+  for (uint32_t i = 0; i < physics->state->contact_count; ++i) {
     hapi_contact_slot *contact = &physics->contacts[in[i].slot];
-    if (contact->phase != HAPI_SLOT_LIVE || contact->generation != in[i].generation) {
-      continue;
-    }
-    if (hapi_finite(in[i].last_force, 3) && hapi_finite(in[i].impulse, 3) && seconds > 0.0) {
-      hapi_v3_copy(in[i].last_force, contact->last_force);
-      hapi_v3_scale(1.0 / seconds, in[i].impulse, contact->mean_force);
+    if (contact->phase == HAPI_SLOT_LIVE && contact->generation == in[i].generation &&
+        hapi_finite(in[i].force, 3)) {
+      hapi_v3_copy(in[i].force, contact->last_force);
     }
   }
 }
@@ -135,18 +100,17 @@ void hapi_reconcile_take(hapi_physics *physics)
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
   physics->has_new_state = newest != NULL;
   if (newest == NULL) {
-    return; /* the loop has stopped or is late: nothing is applied twice */
+    return; /* the loop has stopped or is late: nothing is taken twice */
   }
   physics->state = newest;
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     take_body(physics, i);
   }
-  take_contacts(physics);
-  hapi_slots_release(physics);
+  take_forces(physics);
 }
 
-/* Models SINGLE and IMPULSE: what the pointers gave since the last step. */
-static void apply_impulse(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
+/* What the pointers gave in the last interval acts over the global step. */
+static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
 {
   const double *p = slot->new_impulse;
   const double *l = slot->new_angular_impulse;
@@ -161,73 +125,74 @@ static void apply_impulse(hapi_physics *physics, hapi_body_slot *slot, dBodyID b
   memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
 }
 
-/* Model ACCELERANCE: the mean force of the last interval, so that the bodies that the pushed one
- * pushes get theirs. Its own motion is overwritten at the next sync. */
-static void predict(hapi_physics *physics, const hapi_contact_slot *contact)
+static bool any(const double v[3])
 {
-  hapi_body_slot *slot = &physics->bodies[contact->body];
-  dBodyID body = ode_body(physics, slot);
-  const double *f = contact->mean_force;
-  if (body == NULL || hapi_v3_dot(f, f) == 0.0) {
-    return;
-  }
-  double at[3];
-  hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), contact->point_body, at);
-  dBodyAddForceAtPos(body, f[0], f[1], f[2], at[0], at[1], at[2]);
-  slot->predicted = true;
-  for (int i = 0; i < 6; ++i) {
-    slot->applied[i] += hapi_v3_dot(contact->a[i], f);
-  }
-  hapi_v3_madd(physics->figures.world_impulse, physics->step_s, f, physics->figures.world_impulse);
+  return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
 }
 
-void hapi_reconcile_predict(hapi_physics *physics)
+void hapi_reconcile_push(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->config.capacity.bodies && physics->step_s > 0.0; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
-    if (body == NULL) {
-      continue;
-    }
-    memset(slot->applied, 0, sizeof slot->applied);
-    read_velocity(body, slot->velocity_before);
-    if (physics->step_s > 0.0 && hapi_v3_dot(slot->new_impulse, slot->new_impulse) > 0.0) {
-      apply_impulse(physics, slot, body);
-    }
-  }
-  bool loop_moves = physics->state != NULL && physics->state->model == HAP_MODEL_ACCELERANCE;
-  for (uint32_t i = 0; loop_moves && i < physics->config.capacity.contacts; ++i) {
-    const hapi_contact_slot *contact = &physics->contacts[i];
-    if (contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-        (physics->bodies[contact->body].flags & HAPI_BODY_DRIVEN) == 0) {
-      predict(physics, contact);
+    if (body != NULL && (any(slot->new_impulse) || any(slot->new_angular_impulse))) {
+      push_body(physics, slot, body);
     }
   }
 }
 
-/* Eq. 14: what the world did beyond the linear model that the loop has in this interval. */
-void hapi_reconcile_after(hapi_physics *physics)
+/* Whether the loop moved the body in the interval that the message closes. */
+static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t index)
+{
+  bool moves = physics->has_new_state && physics->state->model == HAP_MODEL_ACCELERANCE &&
+               physics->bodies[index].phase != HAPI_SLOT_FREE &&
+               (physics->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
+  return moves ? message_of(physics, index) : NULL;
+}
+
+/* Eq. 14. The global step had the same impulse from the pointers as the loop; where it came to
+ * another velocity, the linear model missed something: an impact, a change of friction. What was
+ * found before and is still on its way to the loop does not count twice. */
+void hapi_reconcile_residual(hapi_physics *physics)
 {
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
+    const hapi_state_body *in = moved_by_loop(physics, i);
     dBodyID body = slot->phase == HAPI_SLOT_LIVE ? ode_body(physics, slot) : NULL;
-    double now[6];
-    if (body == NULL) {
+    if (in == NULL || body == NULL || physics->step_s <= 0.0) {
       continue;
     }
-    memset(slot->residual, 0, sizeof slot->residual);
-    read_velocity(body, now);
-    for (int k = 0; slot->has_prediction && k < 6; ++k) {
-      slot->residual[k] =
-          now[k] - slot->velocity_before[k] - (slot->b[k] + slot->applied[k]) * physics->step_s;
+    double world[6];
+    double loop[6];
+    read_velocity(body, world);
+    hapi_v3_copy(in->twist.linear, loop);
+    hapi_v3_copy(in->twist.angular, loop + 3);
+    for (int k = 0; k < 6; ++k) {
+      slot->residual[k] = world[k] - loop[k] + in->residual[k];
     }
   }
 }
 
-void hapi_reconcile_left(hapi_physics *physics)
+/* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference, and it is
+ * on its way to the loop. What is left is the pose. A body that no pointer pushed keeps the world's:
+ * for a body alone the two are equal, and what another body pushes is moved by the world only. */
+static void overwrite(hapi_physics *physics, uint32_t index)
+{
+  hapi_body_slot *slot = &physics->bodies[index];
+  const hapi_state_body *in = moved_by_loop(physics, index);
+  dBodyID body = ode_body(physics, slot);
+  if (in != NULL && body != NULL && slot->pushed) {
+    const double *p = in->pose.position;
+    dBodySetPosition(body, p[0], p[1], p[2]);
+    dBodySetQuaternion(body, in->pose.quat_wxyz);
+  }
+}
+
+void hapi_reconcile_overwrite(hapi_physics *physics)
 {
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
+    overwrite(physics, i);
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     slot->placed = body != NULL;
     if (body != NULL) {
@@ -236,4 +201,5 @@ void hapi_reconcile_left(hapi_physics *physics)
       read_velocity(body, slot->left_velocity);
     }
   }
+  hapi_slots_release(physics);
 }

@@ -8,13 +8,15 @@
 #include "proximity/direction.h"
 
 /* Depth along a unit normal n (b to a) is what a must move along n to be free of b. Every n gives a
- * true separation, the least one is wanted. It is found in three steps: directions in which polytope
- * pairs have their minimum, libccd for what has no such list, and a descent from the best one.
+ * true separation, the least one is wanted. It is found in three steps: directions in which
+ * polytope pairs have their minimum, libccd for what has no such list, and a descent from the best
+ * one.
  *
  * The expanding polytope of libccd 2.0 lies inside the difference of the cores, so the depth it
  * reports is a bound from below and the depth along its direction one from above. In 5 to 20 % of
  * the cylinder and hull pairs the two do not meet (rounding, an edge as the nearest feature); then
- * many descents search instead. */
+ * many descents search instead. Where cores of 1 mm and 100 m just touch, both bounds have been
+ * wrong alike by metres: the hint, the last direction of GJK, covers that. */
 
 enum {
   CCD_CALLS_MAX = 1500,
@@ -139,8 +141,8 @@ static bool try_ccd(search *s)
   return depth > 0.0 && s->depth * scale <= depth * (1.0 + 1e-5) + 10.0 * tolerance;
 }
 
-/* a moved clear of b along the normal: the nearest points then show the way downhill. With C = b - a
- * it is the projection of a point outside C back onto C; the depth never rises, and falls to the
+/* a moved clear of b along the normal: the nearest points then show the way downhill. With C = b -
+ * a it is the projection of a point outside C back onto C; the depth never rises, and falls to the
  * minimum at once where C is flat. The clearance is a compromise: small is fast on curved parts,
  * large makes the direction exact. */
 static bool descent_step(search *s, hapi_gjk *out)
@@ -159,7 +161,8 @@ static bool descent_step(search *s, hapi_gjk *out)
   return true;
 }
 
-/* The turns shrink by a constant ratio on curved parts; their sum to the end is known beforehand. */
+/* The turns shrink by a constant ratio on curved parts; their sum to the end is known beforehand.
+ * */
 static void leap(search *s, const double turn[3], const double last_turn[3])
 {
   double last2 = hapi_v3_dot(last_turn, last_turn);
@@ -219,8 +222,8 @@ static void search_globally(search *s)
   }
 }
 
-/* The descent is slow from corner to corner when the cores are apart by a hair; but now a separating
- * normal is known and GJK cannot be mistaken about it. */
+/* The descent is slow from corner to corner when the cores are apart by a hair; but now a
+ * separating normal is known and GJK cannot be mistaken about it. */
 static bool settle_apart(search *s, hapi_gjk *out)
 {
   hapi_gjk cores;

@@ -24,6 +24,9 @@ void hapi_solid_to_world(const hapi_solid *solid, const double vector[3], double
   hapi_v3_set(out, hapi_v3_dot(r, vector), hapi_v3_dot(r + 3, vector), hapi_v3_dot(r + 6, vector));
 }
 
+/* m; products of six lengths must not overflow. */
+static const double length_max = 1e30;
+
 static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
 {
   double round[2] = {0.0, 0.0}; /* disc, ball */
@@ -87,7 +90,10 @@ bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose
   }
   hapi_quat_normalize(quat);
   hapi_quat_to_matrix(quat, solid->rotation);
-  return shape->kind != HAPI_SHAPE_HULL || hull_set(solid, shape);
+  if (shape->kind == HAPI_SHAPE_HULL && !hull_set(solid, shape)) {
+    return false;
+  }
+  return hapi_v3_norm(solid->center) < length_max && solid->reach + solid->ball < length_max;
 }
 
 bool hapi_pair_place(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,

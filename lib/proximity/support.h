@@ -24,7 +24,7 @@ typedef struct hapi_solid {
   size_t hull_count;
 } hapi_solid;
 
-/* False: sizes negative or not finite, hull empty, pose not finite. */
+/* False: sizes negative or not finite, hull empty, pose not finite, anything beyond 1e30 m. */
 bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose *pose,
                       const double origin[3]);
 

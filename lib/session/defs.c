@@ -43,7 +43,7 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.max_contacts = 256;
   d.max_pointers = 4;
   d.rt_priority = 80;
-  d.physics_latency_ticks = HAP_LATENCY_NEXT_SYNC;
+  d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
   give_defaults(def, size_of_def, &d, sizeof d);
 }
 

@@ -37,7 +37,8 @@ typedef struct hapi_model_body {
   hap_pose pose;      /* at hapi_model.state_ns */
   hap_twist twist;    /* at hapi_model.state_ns */
   double b[6];        /* acceleration term of eq. 2: m/s^2, rad/s^2 */
-  double residual[6]; /* velocity that the linear model missed (eq. 14): m/s, rad/s */
+  double residual[6]; /* velocity that the linear model missed (eq. 14), running total since the
+                         slot's generation began: m/s, rad/s */
 } hapi_model_body;
 
 typedef struct hapi_model_contact {
@@ -85,6 +86,7 @@ typedef struct hapi_state_pointer {
   uint32_t generation; /* 0: no pointer here */
   uint32_t collide_bits;
   double radius;
+  double stiffness;
   hap_pose pose;
   hap_twist twist;
 } hapi_state_pointer;
@@ -97,20 +99,19 @@ typedef struct hapi_state_body {
   double impulse[3];         /* N s, running total of the pointers' force since the slot's
                                 generation began */
   double angular_impulse[3]; /* N m s, the same about the centre of mass */
+  double residual[6];        /* how much of hapi_model_body.residual is in the twist */
 } hapi_state_body;
 
 typedef struct hapi_state_contact {
   uint32_t slot;
   uint32_t generation;
-  double impulse[3];    /* N s on the body since the model was adopted */
-  double last_force[3]; /* N on the body at this tick */
+  double force[3]; /* N on the body at this tick */
 } hapi_state_contact;
 
 typedef struct hapi_state {
   uint64_t tick;
   int64_t time_ns;
-  uint64_t model_number;   /* the local model in use; 0: none yet */
-  uint64_t ticks_in_model; /* ticks run with it */
+  uint64_t model_number; /* the local model in use; 0: none yet */
   hap_model model;
   uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */
   uint32_t contact_count;

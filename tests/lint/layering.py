@@ -22,7 +22,7 @@ LAYERS = {
     "lib/haptic": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/device"],
     "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt"],
     "lib/session": ["lib/*"],
-    "plugins/*": ["lib/base"],
+    "plugins/*": ["lib/base", "plugins/common"],
     "scenes": [],
     "examples": [],
     "tools": ["*"],

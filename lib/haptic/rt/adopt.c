@@ -25,6 +25,7 @@ static void enter(hapi_local_body *body, const hapi_model_body *in, double age_s
   body->twist = in->twist;
   advance(&body->pose, &body->twist, age_s);
   memset(body->residual, 0, sizeof body->residual);
+  memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
 }
 
 static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_model_body *in,
@@ -53,8 +54,9 @@ static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_mode
   body->flags = awake ? in->flags & ~(uint32_t)HAPI_BODY_RESTING : in->flags;
   body->pushed = false;
   memcpy(body->b, in->b, sizeof body->b);
-  for (int i = 0; i < 6; ++i) {
-    body->residual[i] += keeps ? in->residual[i] : 0.0;
+  for (int i = 0; i < 6; ++i) { /* eq. 14, in the first tick of the model */
+    body->residual[i] += in->residual[i] - body->residual_taken[i];
+    body->residual_taken[i] = in->residual[i];
   }
 }
 
@@ -120,7 +122,6 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   tick->blend_s = model->blend_s;
   tick->adopted_ns = now_ns;
   tick->state_ns = model->state_ns;
-  tick->ticks_in_model = 0;
   tick->watch_count = model->watch_count;
   memcpy(tick->watch_slot, model->watch_slot, sizeof tick->watch_slot);
   memcpy(tick->watch_position, model->watch_position, sizeof tick->watch_position);

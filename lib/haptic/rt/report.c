@@ -16,6 +16,7 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
     bodies[i].twist = in->twist;
     hapi_v3_copy(in->impulse, bodies[i].impulse);
     hapi_v3_copy(in->angular_impulse, bodies[i].angular_impulse);
+    memcpy(bodies[i].residual, in->residual_taken, sizeof bodies[i].residual);
   }
   out->body_high = tick->body_high;
 }
@@ -27,8 +28,7 @@ static void report_contacts(const hapi_tick *tick, hapi_state *out)
     const hapi_local_contact *in = &tick->contacts[i];
     contacts[i].slot = in->slot;
     contacts[i].generation = in->generation;
-    hapi_v3_copy(in->impulse, contacts[i].impulse);
-    hapi_v3_copy(in->force, contacts[i].last_force);
+    hapi_v3_copy(in->force, contacts[i].force);
   }
   out->contact_count = tick->contact_count;
 }
@@ -38,7 +38,6 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   out->tick = tick->tick;
   out->time_ns = tick->now_ns;
   out->model_number = tick->model_number;
-  out->ticks_in_model = tick->ticks_in_model;
   out->model = tick->model;
   report_bodies(tick, out);
   report_contacts(tick, out);
@@ -48,6 +47,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
     pointers[i].generation = in->generation;
     pointers[i].collide_bits = in->collide_bits;
     pointers[i].radius = in->radius;
+    pointers[i].stiffness = in->stiffness;
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
   }

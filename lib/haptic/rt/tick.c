@@ -41,5 +41,4 @@ void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
     hapi_trace_hash(tick);
   }
   ++tick->tick;
-  ++tick->ticks_in_model;
 }

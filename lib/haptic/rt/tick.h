@@ -62,9 +62,10 @@ typedef struct hapi_local_body {
   hap_pose pose;
   hap_twist twist;
   double b[6];
-  double residual[6];     /* of eq. 14, still to be added */
-  double acceleration[6]; /* sum of A f in this tick */
-  hap_pose from;          /* model IMPULSE: pose at adoption, and pose to reach */
+  double residual[6];       /* of eq. 14, to be added in this tick */
+  double residual_taken[6]; /* what has been added so far */
+  double acceleration[6];   /* sum of A f in this tick */
+  hap_pose from;            /* model IMPULSE: pose at adoption, and pose to reach */
   hap_pose to;
   double impulse[3];
   double angular_impulse[3];
@@ -81,7 +82,6 @@ typedef struct hapi_local_contact {
   double a[6][3];
   double ramp;     /* 0..1, share of the force */
   double force[3]; /* on the body */
-  double impulse[3];
 } hapi_local_contact;
 
 typedef struct hapi_tick {
@@ -102,7 +102,6 @@ typedef struct hapi_tick {
   uint64_t tick;
   int64_t now_ns;
   uint64_t model_number;
-  uint64_t ticks_in_model;
   hap_model model;
   hap_impulse_pose impulse_pose;
   double blend_s;

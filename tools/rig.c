@@ -1,0 +1,115 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/rig.h"
+
+#include <stdio.h>
+#include <string.h>
+
+void rig_options_init(rig_options *options)
+{
+  memset(options, 0, sizeof *options);
+  options->scene = "row10";
+  hap_session_def_init(&options->def, sizeof options->def);
+}
+
+hap_status rig_find_model(const char *name, hap_model *out, hap_detail *detail)
+{
+  size_t length = 0;
+  for (int i = 0; hap_model_name((hap_model)i) != NULL; ++i) {
+    if (strcmp(name, hap_model_name((hap_model)i)) == 0) {
+      *out = (hap_model)i;
+      return HAP_OK;
+    }
+  }
+  length += (size_t)snprintf(detail->text, sizeof detail->text,
+                             "there is no model \"%s\"; models:", name);
+  for (int i = 0; hap_model_name((hap_model)i) != NULL && length < sizeof detail->text; ++i) {
+    length += (size_t)snprintf(detail->text + length, sizeof detail->text - length, " %s",
+                               hap_model_name((hap_model)i));
+  }
+  return HAP_ERROR_NOT_FOUND;
+}
+
+/* "virtual" without arguments is the hand that belongs to the scene. */
+static const char *device_spec(const rig_options *options, const scene *s, size_t index)
+{
+  const char *own = index < (size_t)s->parameters.pointers ? s->parameters.hands[index] : NULL;
+  const char *asked = index < options->device_count ? options->devices[index] : NULL;
+  bool scenes_own = asked == NULL || strcmp(asked, "virtual") == 0;
+  return scenes_own && own != NULL ? own : asked != NULL ? asked : "virtual";
+}
+
+static hap_status add_pointer(const rig_options *options, rig *r, size_t index, hap_detail *detail)
+{
+  const scene_parameters *p = &r->scene->parameters;
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  hap_status status =
+      hap_device_open(device_spec(options, r->scene, index), &r->devices[index], detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  def.device = r->devices[index];
+  def.radius = p->radius;
+  def.stiffness = p->stiffness;
+  def.damping = p->damping;
+  def.max_force = options->max_force > 0.0 ? options->max_force : def.max_force;
+  status = hap_pointer_add(r->session, &def, &r->pointers[index]);
+  if (status < HAP_OK) {
+    (void)hap_session_detail(r->session, detail);
+  }
+  return status;
+}
+
+static hap_status create_session(const rig_options *options, rig *r, hap_detail *detail)
+{
+  hap_ode_def ode;
+  hap_ode_def_init(&ode, sizeof ode);
+  ode.world = r->scene->world;
+  ode.space = r->scene->space;
+  ode.surface = scene_surface;
+  ode.user = r->scene;
+  hap_session_def def = options->def;
+  if (def.max_pointers < (int32_t)r->pointer_count) {
+    def.max_pointers = (int32_t)r->pointer_count;
+  }
+  hap_status status = hap_session_create(&def, &ode, &r->session, detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  size_t traced =
+      r->scene->body_count < HAP_TRACE_BODIES_MAX ? r->scene->body_count : HAP_TRACE_BODIES_MAX;
+  return hap_session_trace_bodies(r->session, r->scene->bodies, traced);
+}
+
+hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
+{
+  memset(out, 0, sizeof *out);
+  hap_status status =
+      options->parameters != NULL
+          ? scene_create_from(options->parameters, options->count, &out->scene, detail)
+          : scene_create(options->scene, &out->scene, detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  size_t own = (size_t)out->scene->parameters.pointers;
+  out->pointer_count = options->device_count > 0 ? options->device_count : own;
+  status = create_session(options, out, detail);
+  for (size_t i = 0; i < out->pointer_count && status >= HAP_OK; ++i) {
+    status = add_pointer(options, out, i, detail);
+  }
+  if (status < HAP_OK) {
+    rig_destroy(out);
+  }
+  return status;
+}
+
+void rig_destroy(rig *r)
+{
+  hap_session_destroy(r->session);
+  for (size_t i = 0; i < RIG_POINTERS_MAX; ++i) {
+    hap_device_close(r->devices[i]);
+  }
+  scene_destroy(r->scene);
+  memset(r, 0, sizeof *r);
+}

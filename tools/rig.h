@@ -1,0 +1,45 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TOOLS_RIG_H
+#define HAPODE_TOOLS_RIG_H
+
+/* A scene with a session over it and its pointers: what hapode-run, hapode-bench and the tests set
+ * up alike. Public API only. */
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#include "scenes/scenes.h"
+
+#define RIG_POINTERS_MAX 16
+
+typedef struct rig_options {
+  const char *scene;                  /* "name" or "name:N" */
+  const scene_parameters *parameters; /* not NULL: build from these with count, not from scene */
+  int count;
+  const char *devices[RIG_POINTERS_MAX]; /* specs in pointer order; "virtual" alone: the scene's
+                                            own simulated hand; none given: the same */
+  size_t device_count;
+  double max_force; /* N; 0: 20 */
+  hap_session_def def;
+} rig_options;
+
+typedef struct rig {
+  scene *scene;
+  hap_session *session;
+  hap_device *devices[RIG_POINTERS_MAX];
+  hap_pointer_id pointers[RIG_POINTERS_MAX];
+  size_t pointer_count;
+} rig;
+
+/* Defaults: row10, accelerance, threads, 60 Hz and 1 kHz. */
+void rig_options_init(rig_options *options);
+
+/* dInitODE2 was called. On failure nothing is left behind and detail says why. */
+hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail);
+void rig_destroy(rig *r); /* zeroed allowed */
+
+/* A model by name; on failure a text that lists what exists. */
+hap_status rig_find_model(const char *name, hap_model *out, hap_detail *detail);
+
+#endif
