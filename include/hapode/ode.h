@@ -75,7 +75,7 @@ HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *ses
                                                                 void (*callback)(dBodyID));
 
 /* [any] Poses for drawing at time_ns (see hap_session_now): interpolated between physics steps one
- * H behind. Unknown bodies give HAP_ERROR_NOT_FOUND and leave out untouched. */
+ * H behind. HAP_STALE when physics is late by more than a step. Unknown bodies give HAP_ERROR_NOT_FOUND and leave out untouched. */
 HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                                      size_t count, hap_pose *out);
 

@@ -89,10 +89,11 @@ HAP_API hap_status hap_session_stop(hap_session *session);
 
 /* [control] FRAME: runs the whole physics steps that fit into frame_s seconds [s, finite, >= 0]
  * plus the remainder of earlier calls, at most 3; the rest is dropped and counted
- * (HAP_DROPPED). */
+ * (HAP_DROPPED). HAP_BODY_LOST: see its text. */
 HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
 
-/* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due. */
+/* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due.
+ * HAP_BODY_LOST: see its text. */
 HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
 
 /* [app] Between lock and unlock this thread alone may touch the ODE world. Waits at most one

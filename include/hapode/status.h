@@ -17,6 +17,7 @@ typedef enum hap_status {
   HAP_SATURATED = 3,   /* the wanted wrench was beyond a limit and was shortened */
   HAP_DROPPED = 4,     /* more frame time came in than three physics steps; the rest was dropped */
   HAP_END = 5,         /* nothing further to read */
+  HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */

@@ -15,6 +15,7 @@ const char *hap_status_name(hap_status status)
     NAME(HAP_SATURATED);
     NAME(HAP_DROPPED);
     NAME(HAP_END);
+    NAME(HAP_BODY_LOST);
     NAME(HAP_ERROR_ARGUMENT);
     NAME(HAP_ERROR_UNINITIALISED);
     NAME(HAP_ERROR_MEMORY);
@@ -48,6 +49,8 @@ const char *hap_status_text(hap_status status)
       return "the wanted wrench was beyond a limit and was shortened";
     case HAP_DROPPED:
       return "more frame time came in than three physics steps, the rest was dropped";
+    case HAP_BODY_LOST:
+      return "a body was destroyed without hap_session_forget_body, it was dropped";
     case HAP_END:
       return "nothing further to read";
     case HAP_ERROR_ARGUMENT:

@@ -107,6 +107,8 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->poses_lock);
   double share = share_at(physics, time_ns);
+  int64_t interval = physics->pose_times[1] - physics->pose_times[0];
+  bool stale = interval > 0 && time_ns > physics->pose_times[1] + 2 * interval;
   for (size_t i = 0; i < count; ++i) {
     uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
     if (index == HAPI_NONE || physics->table.entries[index].pose_count == 0) {
@@ -116,5 +118,5 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
     blend(physics->table.entries[index].poses, share, &out[i]);
   }
   pthread_mutex_unlock(&physics->poses_lock);
-  return status;
+  return status == HAP_OK && stale ? HAP_STALE : status;
 }

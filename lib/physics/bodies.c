@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/alloc.h"
@@ -255,8 +256,11 @@ static void drop_unseen(hapi_physics *physics)
   }
   rebuild_buckets(table);
   table->lost += dropped;
-  hapi_log(HAP_LOG_WARNING,
-           "%u bodies left the world without hap_session_forget_body; they were dropped", dropped);
+  char text[128];
+  snprintf(text, sizeof text,
+           "%u bodies were destroyed without hap_session_forget_body; they were dropped", dropped);
+  hapi_log(HAP_LOG_WARNING, "%s", text);
+  physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
 }
 
 static hap_status scan(hapi_physics *physics)

@@ -51,6 +51,14 @@ static void fill_momentum(const hapi_physics *physics, hap_stats *out)
       meaningful ? hapi_v3_dot(f->world_impulse, f->hand_impulse) / net2 : (double)NAN;
 }
 
+uint64_t hapi_physics_bodies_lost(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->shown_lock);
+  uint64_t lost = physics->shown.stats.bodies_lost;
+  pthread_mutex_unlock(&physics->shown_lock);
+  return lost;
+}
+
 void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
 {
   pthread_mutex_lock(&physics->shown_lock);

@@ -54,7 +54,7 @@ static void latch_world_fault(hapi_physics *physics, dBodyID body, const char *w
            p[2], what);
   if (!physics->world_faulty) {
     hapi_log(HAP_LOG_ERROR, "%s", text);
-    physics->config.report_fault(physics->config.user, HAP_FAULT_WORLD, text);
+    physics->config.report(physics->config.user, HAP_FAULT_WORLD, text);
   }
   physics->world_faulty = true;
 }
@@ -167,10 +167,9 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
-  hapi_fair_lock_take(&physics->lock, INT64_MAX);
-  physics->cycle_thread = pthread_self();
-  atomic_store(&physics->in_cycle, 1);
+  hapi_physics_enter(physics);
+  atomic_store(&physics->cycle_thread, (unsigned long)pthread_self());
   run(physics, now_ns, next_ns);
-  atomic_store(&physics->in_cycle, 0);
+  atomic_store(&physics->cycle_thread, 0);
   hapi_fair_lock_give(&physics->lock);
 }

@@ -121,6 +121,20 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_free(physics);
 }
 
+static void give_world_back(hapi_physics *physics)
+{
+  dJointGroupEmpty(physics->contact_group);
+  /* What was destroyed since the last cycle must not be given anything back. */
+  if (hapi_bodies_scan(physics) >= HAP_OK) {
+    release_bodies(physics);
+  }
+  if (physics->islands_threads != 0) {
+    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
+    physics->islands_threads = 0;
+  }
+  physics->begun = false;
+}
+
 static void reset_figures(hapi_physics *physics)
 {
   memset(&physics->figures, 0, sizeof physics->figures);
@@ -148,7 +162,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   physics->begun = true;
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
-    hapi_physics_end(physics);
+    give_world_back(physics);
     return status;
   }
   reset_figures(physics);
@@ -180,16 +194,10 @@ void hapi_physics_end(hapi_physics *physics)
     return;
   }
   hapi_physics_stop_thread(physics);
+  hapi_physics_enter(physics);
   hapi_edits_run(physics);
-  dJointGroupEmpty(physics->contact_group);
-  /* What was destroyed since the last cycle must not be given anything back. */
-  if (hapi_bodies_scan(physics) >= HAP_OK) {
-    release_bodies(physics);
-  }
-  if (physics->islands_threads != 0) {
-    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
-  }
-  physics->begun = false;
+  give_world_back(physics);
+  hapi_fair_lock_give(&physics->lock);
 }
 
 double hapi_physics_period(const hapi_physics *physics)
@@ -214,13 +222,24 @@ void hapi_physics_set_model(hapi_physics *physics, hap_model model)
 
 bool hapi_physics_in_callback(const hapi_physics *physics)
 {
-  return atomic_load(&physics->in_cycle) != 0 &&
-         pthread_equal(physics->cycle_thread, pthread_self()) != 0;
+  return atomic_load(&physics->cycle_thread) == (unsigned long)pthread_self();
 }
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
   return physics->model != HAP_MODEL_IMPULSE;
+}
+
+void hapi_physics_enter(hapi_physics *physics)
+{
+  while (!hapi_fair_lock_take(&physics->lock, INT64_MAX)) {
+    hapi_clock_sleep_until(hapi_clock_now() + 1000000); /* more threads wait than it has places */
+  }
+}
+
+bool hapi_physics_lock_is_mine(hapi_physics *physics)
+{
+  return hapi_fair_lock_is_mine(&physics->lock);
 }
 
 hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)

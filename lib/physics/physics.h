@@ -29,7 +29,8 @@ typedef struct hapi_physics_config {
   bool lockstep;
   int rt_priority;
   hapi_exchange *exchange;
-  void (*report_fault)(void *user, hap_fault fault, const char *text); /* [physics] */
+  /* [physics] HAP_FAULT_NONE: something that the application should know, but no fault */
+  void (*report)(void *user, hap_fault fault, const char *text);
   void *user;
 } hapi_physics_config;
 
@@ -76,10 +77,12 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
 /* session.h */
 void hapi_physics_set_model(hapi_physics *physics, hap_model model);     /* [any] */
 hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns); /* negative: for ever */
+bool hapi_physics_lock_is_mine(hapi_physics *physics);
 hap_status hapi_physics_unlock(hapi_physics *physics);
 hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg); /* [any] */
 bool hapi_physics_in_callback(const hapi_physics *physics); /* calling thread runs a cycle */
 void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps);
+uint64_t hapi_physics_bodies_lost(hapi_physics *physics);       /* [any] */
 void hapi_physics_stats(hapi_physics *physics, hap_stats *out); /* [any] its part of *out */
 
 #endif

@@ -247,8 +247,7 @@ struct hapi_physics {
   bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
   hapi_thread thread;
   _Atomic int stop;
-  _Atomic int in_cycle;
-  pthread_t cycle_thread;
+  _Atomic unsigned long cycle_thread; /* pthread_t of the thread in a cycle, 0: none */
   int64_t start_ns;
   hapi_histogram cycle_ns;
   hapi_physics_counts figures; /* physics' own */
@@ -339,6 +338,9 @@ void hapi_reconcile_overwrite(hapi_physics *physics); /* after the probes: eq. 1
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
 void hapi_publish_poses(hapi_physics *physics, int64_t now_ns);
+
+/* physics.c */
+void hapi_physics_enter(hapi_physics *physics); /* takes the lock, whoever waits */
 
 /* counts.c */
 void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */

@@ -59,6 +59,13 @@ void hap_session_destroy(hap_session *session)
 
 /* ---- start and stop ---- */
 
+/* What takes the lock itself must not be called by a thread that has it. */
+static bool may_run(hap_session *session)
+{
+  return !hapi_physics_in_callback(session->physics) &&
+         !hapi_physics_lock_is_mine(session->physics);
+}
+
 static void lock_memory(hap_session *session)
 {
   size_t size = 0;
@@ -107,8 +114,9 @@ hap_status hap_session_start(hap_session *session)
   if (session->started) {
     return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
   }
-  if (hapi_physics_lock(session->physics, -1) < HAP_OK) {
-    return hapi_session_fail(session, HAP_ERROR_THREAD, "start while this thread holds the lock");
+  if (!may_run(session) || hapi_physics_lock(session->physics, -1) < HAP_OK) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "start in a callback or while this thread holds the lock");
   }
   hap_status status = begin(session);
   (void)hapi_physics_unlock(session->physics);
@@ -128,8 +136,9 @@ hap_status hap_session_stop(hap_session *session)
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  if (hapi_physics_in_callback(session->physics)) {
-    return hapi_session_fail(session, HAP_ERROR_THREAD, "stop must not be called in a callback");
+  if (!may_run(session)) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "stop in a callback or while this thread holds the lock");
   }
   if (!session->started) {
     return HAP_OK;
@@ -159,9 +168,11 @@ hap_status hap_session_update(hap_session *session, double frame_s)
     return hapi_session_fail(session, HAP_ERROR_STATE,
                              "update belongs to drive FRAME between start and stop");
   }
-  if (hapi_physics_in_callback(session->physics)) {
-    return HAP_ERROR_THREAD;
+  if (!may_run(session)) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "update in a callback or while this thread holds the lock");
   }
+  uint64_t lost = hapi_physics_bodies_lost(session->physics);
   double period = hapi_physics_next_period(session->physics);
   double steps = floor((session->frame_remainder_s + frame_s) / period + 1e-9);
   session->frame_remainder_s = fmax(0.0, session->frame_remainder_s + frame_s - steps * period);
@@ -175,7 +186,7 @@ hap_status hap_session_update(hap_session *session, double frame_s)
     hapi_physics_count_dropped_frames(session->physics, (uint64_t)(steps - 3.0));
     return HAP_DROPPED;
   }
-  return HAP_OK;
+  return hapi_physics_bodies_lost(session->physics) > lost ? HAP_BODY_LOST : HAP_OK;
 }
 
 static uint64_t ticks_of(const hap_session *session, double period, uint64_t steps)
@@ -216,9 +227,11 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
     return hapi_session_fail(session, HAP_ERROR_STATE,
                              "advance belongs to drive LOCKSTEP between start and stop");
   }
-  if (hapi_physics_in_callback(session->physics)) {
-    return HAP_ERROR_THREAD;
+  if (!may_run(session)) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "advance in a callback or while this thread holds the lock");
   }
+  uint64_t lost = hapi_physics_bodies_lost(session->physics);
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
     hapi_haptic_receive(session->haptic, now);
@@ -226,7 +239,7 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
     hapi_haptic_cycle(session->haptic, now);
     ++session->tick;
   }
-  return HAP_OK;
+  return hapi_physics_bodies_lost(session->physics) > lost ? HAP_BODY_LOST : HAP_OK;
 }
 
 int64_t hap_session_now(const hap_session *session)

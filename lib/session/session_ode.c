@@ -41,10 +41,12 @@ static hap_status check_ode(const hap_ode_def *def, hap_detail *detail)
   return HAP_OK;
 }
 
-static void note_fault(void *user, hap_fault fault, const char *text)
+static void note(void *user, hap_fault fault, const char *text)
 {
   hap_session *session = user;
-  hapi_haptic_fault(session->haptic, fault);
+  if (fault != HAP_FAULT_NONE) {
+    hapi_haptic_fault(session->haptic, fault);
+  }
   (void)hapi_session_fail(session, HAP_ERROR_WORLD, "%s", text);
 }
 
@@ -62,7 +64,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
       .rt_priority = def->rt_priority,
       .exchange = session->exchange,
-      .report_fault = note_fault,
+      .report = note,
       .user = session,
   };
   hap_status status = hapi_physics_create(&config, ode, &session->physics, detail);

@@ -1,0 +1,61 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BENCH_BENCH_H
+#define HAPODE_BENCH_BENCH_H
+
+/* What the programs of hapode-bench share: the run's options, tables, checks, pictures. */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include <hapode/attributes.h>
+#include <hapode/status.h>
+
+typedef struct bench {
+  const char *out;   /* folder of tables and pictures */
+  bool quick;        /* shorter sweeps, fewer repeats */
+  bool verify;       /* say "ok" or "off" */
+  int off;           /* checks that were off */
+  hap_detail detail; /* why a program failed */
+} bench;
+
+/* Status, and on failure a text in bench.detail. */
+typedef hap_status (*bench_fn)(bench *b);
+
+hap_status bench_fig5(bench *b);
+hap_status bench_fig6(bench *b);
+hap_status bench_fig7(bench *b);
+hap_status bench_scaling(bench *b);
+hap_status bench_tick(bench *b);
+
+/* ---- csv.c ---- */
+
+/* Opens OUT/NAME.csv and writes its header line; NULL on failure. */
+FILE *bench_csv_open(bench *b, const char *name, const char *header);
+hap_status bench_csv_close(bench *b, FILE *csv); /* NULL: what open said */
+
+hap_status bench_fail(bench *b, hap_status status, const char *format, ...) HAP_PRINTF(3, 4);
+
+/* A measured number as a line of stdout. */
+void bench_say(const char *format, ...) HAP_PRINTF(1, 2);
+
+/* The same for a number that has a bound: with --verify the line begins with "ok" or "off". */
+void bench_check(bench *b, bool good, const char *format, ...) HAP_PRINTF(3, 4);
+
+/* What --verify cannot check, and why. */
+void bench_skip(const bench *b, const char *format, ...) HAP_PRINTF(2, 3);
+
+double bench_median(double *values, size_t count);                     /* sorts; 0 of none */
+double bench_quantile(const double *sorted, size_t count, double share); /* 0 of none */
+bool bench_within(double value, double wanted, double relative);       /* false for NaN */
+
+/* ---- picture.c ---- */
+
+/* The script of OUT/NAME.svg, see tools/plot.h; NULL when there is no gnuplot. */
+FILE *bench_picture_begin(bench *b, const char *name, int width, int height);
+
+/* Draws. Without gnuplot one line says that there is no picture, and the status is good. */
+hap_status bench_picture_end(bench *b, const char *name, FILE *script);
+
+#endif

@@ -1,0 +1,117 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "bench/bench.h"
+
+hap_status bench_fail(bench *b, hap_status status, const char *format, ...)
+{
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(b->detail.text, sizeof b->detail.text, format, arguments);
+  va_end(arguments);
+  return status;
+}
+
+FILE *bench_csv_open(bench *b, const char *name, const char *header)
+{
+  char path[PATH_MAX];
+  if (mkdir(b->out, 0777) != 0 && errno != EEXIST) {
+    (void)bench_fail(b, HAP_ERROR_IO, "%s: %s", b->out, strerror(errno));
+    return NULL;
+  }
+  if (snprintf(path, sizeof path, "%s/%s.csv", b->out, name) >= (int)sizeof path) {
+    (void)bench_fail(b, HAP_ERROR_IO, "the name of the folder is too long");
+    return NULL;
+  }
+  FILE *csv = fopen(path, "w");
+  if (csv == NULL) {
+    (void)bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
+    return NULL;
+  }
+  fprintf(csv, "%s\n", header);
+  return csv;
+}
+
+hap_status bench_csv_close(bench *b, FILE *csv)
+{
+  if (csv == NULL) {
+    return HAP_ERROR_IO;
+  }
+  bool broken = ferror(csv) != 0;
+  if (fclose(csv) != 0 || broken) {
+    return bench_fail(b, HAP_ERROR_IO, "a table in %s could not be written: %s", b->out,
+                      strerror(errno));
+  }
+  return HAP_OK;
+}
+
+void bench_say(const char *format, ...)
+{
+  va_list arguments;
+  va_start(arguments, format);
+  vprintf(format, arguments);
+  va_end(arguments);
+  putchar('\n');
+}
+
+void bench_check(bench *b, bool good, const char *format, ...)
+{
+  va_list arguments;
+  b->off += b->verify && !good;
+  if (b->verify) {
+    fputs(good ? "ok   " : "off  ", stdout);
+  }
+  va_start(arguments, format);
+  vprintf(format, arguments);
+  va_end(arguments);
+  putchar('\n');
+}
+
+void bench_skip(const bench *b, const char *format, ...)
+{
+  va_list arguments;
+  if (!b->verify) {
+    return;
+  }
+  fputs("skip ", stdout);
+  va_start(arguments, format);
+  vprintf(format, arguments);
+  va_end(arguments);
+  putchar('\n');
+}
+
+static int by_value(const void *a, const void *b)
+{
+  double x = *(const double *)a;
+  double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+double bench_median(double *values, size_t count)
+{
+  qsort(values, count, sizeof *values, by_value);
+  return bench_quantile(values, count, 0.5);
+}
+
+double bench_quantile(const double *sorted, size_t count, double share)
+{
+  if (count == 0) {
+    return 0.0;
+  }
+  double at = share * (double)(count - 1);
+  size_t below = (size_t)at;
+  size_t above = below + 1 < count ? below + 1 : below;
+  return sorted[below] + (at - (double)below) * (sorted[above] - sorted[below]);
+}
+
+bool bench_within(double value, double wanted, double relative)
+{
+  return fabs(value - wanted) <= relative * fabs(wanted);
+}

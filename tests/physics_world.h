@@ -1,0 +1,260 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TESTS_PHYSICS_WORLD_H
+#define HAPODE_TESTS_PHYSICS_WORLD_H
+
+/* A small ODE world with a lockstep session over it, for the tests of lib/physics. Pointers have no
+ * device: a test puts them where it wants them. Include after tap.h. */
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#include "physics/physics_internal.h"
+#include "session/session_internal.h"
+
+#define WORLD_BODIES_MAX 64
+#define WORLD_POINTERS_MAX 4
+
+typedef struct test_world {
+  dWorldID world;
+  dSpaceID space;
+  dBodyID bodies[WORLD_BODIES_MAX];
+  int body_count;
+  double mu; /* of every pair */
+  hap_session *session;
+  hap_pointer_id pointers[WORLD_POINTERS_MAX];
+  int pointer_count;
+  hap_session_def def;
+  hap_step_fn before_step;
+  hap_step_fn after_step;
+  int surface_calls;
+} test_world;
+
+/* A step H of 20 Hz, contacts without compliance, a layer in which they rest without push. */
+static inline void world_open(test_world *w, double gravity, int iterations)
+{
+  memset(w, 0, sizeof *w);
+  w->world = dWorldCreate();
+  w->space = dHashSpaceCreate(NULL);
+  w->mu = 0.5;
+  dWorldSetGravity(w->world, 0.0, 0.0, -gravity);
+  dWorldSetCFM(w->world, 1e-12);
+  dWorldSetERP(w->world, 0.2);
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  dWorldSetQuickStepNumIterations(w->world, iterations);
+  hap_session_def_init(&w->def, sizeof w->def);
+  w->def.drive = HAP_DRIVE_LOCKSTEP;
+  w->def.model = HAP_MODEL_ACCELERANCE;
+  w->def.physics_hz = 20.0;
+  w->def.haptic_hz = 1000.0;
+}
+
+static inline void world_close(test_world *w)
+{
+  hap_session_destroy(w->session);
+  dSpaceDestroy(w->space);
+  dWorldDestroy(w->world);
+  memset(w, 0, sizeof *w);
+}
+
+static inline dBodyID world_add(test_world *w, dGeomID geom, const dMass *mass, double x, double y,
+                                double z)
+{
+  dBodyID body = dBodyCreate(w->world);
+  dBodySetMass(body, mass);
+  dBodySetPosition(body, x, y, z);
+  if (geom != NULL) {
+    dGeomSetBody(geom, body);
+  }
+  w->bodies[w->body_count++] = body;
+  return body;
+}
+
+static inline dBodyID world_add_box(test_world *w, const double edges[3], double mass, double x,
+                                    double y, double z)
+{
+  dMass m;
+  dMassSetBoxTotal(&m, mass, edges[0], edges[1], edges[2]);
+  return world_add(w, dCreateBox(w->space, edges[0], edges[1], edges[2]), &m, x, y, z);
+}
+
+static inline dBodyID world_add_cube(test_world *w, double edge, double mass, double x, double y,
+                                     double z)
+{
+  return world_add_box(w, (const double[3]){edge, edge, edge}, mass, x, y, z);
+}
+
+static inline dBodyID world_add_sphere(test_world *w, double radius, double mass, double x,
+                                       double y, double z)
+{
+  dMass m;
+  dMassSetSphereTotal(&m, mass, radius);
+  return world_add(w, dCreateSphere(w->space, radius), &m, x, y, z);
+}
+
+static inline bool world_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  test_world *w = user;
+  (void)a;
+  (void)b;
+  ++w->surface_calls;
+  io->mu = w->mu;
+  return true;
+}
+
+static inline hap_status world_create_session(test_world *w, hap_surface_fn surface)
+{
+  hap_detail detail = {""};
+  hap_ode_def ode;
+  hap_ode_def_init(&ode, sizeof ode);
+  ode.world = w->world;
+  ode.space = w->space;
+  ode.surface = surface != NULL ? surface : world_surface;
+  ode.before_step = w->before_step;
+  ode.after_step = w->after_step;
+  ode.user = w;
+  hap_status status = hap_session_create(&w->def, &ode, &w->session, &detail);
+  if (status < HAP_OK) {
+    printf("# %s\n", detail.text);
+  }
+  return status;
+}
+
+static inline void world_move_pointer(test_world *w, int index, const double at[3],
+                                      const double velocity[3])
+{
+  hap_pose pose = {{at[0], at[1], at[2]}, {1.0, 0.0, 0.0, 0.0}};
+  hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  if (velocity != NULL) {
+    memcpy(twist.linear, velocity, sizeof twist.linear);
+  }
+  CHECK(hap_pointer_set_target(w->session, w->pointers[index], &pose, &twist) == HAP_OK);
+}
+
+static inline void world_add_pointer(test_world *w, double radius, double x, double y, double z)
+{
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  def.radius = radius;
+  int index = w->pointer_count++;
+  CHECK(hap_pointer_add(w->session, &def, &w->pointers[index]) == HAP_OK);
+  world_move_pointer(w, index, (const double[3]){x, y, z}, NULL);
+}
+
+/* A session with one pointer, started: the first local model is built. */
+static inline bool world_start(test_world *w, double radius, double x, double y, double z)
+{
+  if (world_create_session(w, NULL) < HAP_OK) {
+    return false;
+  }
+  world_add_pointer(w, radius, x, y, z);
+  return hap_session_start(w->session) == HAP_OK;
+}
+
+static inline hapi_physics *world_physics(const test_world *w)
+{
+  return w->session->physics;
+}
+
+/* One physics step: 50 ticks. */
+static inline void world_step(test_world *w, int steps)
+{
+  uint64_t ticks = (uint64_t)(w->def.haptic_hz / w->def.physics_hz + 0.5) * (uint64_t)steps;
+  CHECK(hap_session_advance(w->session, ticks) == HAP_OK);
+}
+
+static inline hap_stats world_stats(const test_world *w)
+{
+  hap_stats stats;
+  memset(&stats, 0, sizeof stats);
+  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
+  return stats;
+}
+
+/* The live contact of a body (NULL: the static world) and a pointer; NULL: there is none. */
+static inline hapi_contact_slot *world_contact(const test_world *w, dBodyID body, uint32_t pointer)
+{
+  hapi_physics *physics = world_physics(w);
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    hapi_contact_slot *slot = &physics->contacts[i];
+    if (slot->phase != HAPI_SLOT_LIVE || slot->pointer != pointer) {
+      continue;
+    }
+    dBodyID of = NULL;
+    if (slot->body != HAPI_SLOT_NONE) {
+      of = physics->table.entries[physics->bodies[slot->body].known].body;
+    }
+    if (of == body) {
+      return slot;
+    }
+  }
+  return NULL;
+}
+
+static inline int world_count_contacts(const test_world *w)
+{
+  hapi_physics *physics = world_physics(w);
+  int count = 0;
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    count += physics->contacts[i].phase == HAPI_SLOT_LIVE;
+  }
+  return count;
+}
+
+static inline hapi_body_slot *world_slot(const test_world *w, dBodyID body)
+{
+  hapi_physics *physics = world_physics(w);
+  uint32_t known = hapi_bodies_find(&physics->table, body);
+  uint32_t slot = known != HAPI_NONE ? physics->table.entries[known].slot : HAPI_NONE;
+  return slot != HAPI_NONE ? &physics->bodies[slot] : NULL;
+}
+
+/* Everything about a body that a getter of ODE gives and a step can change. */
+typedef struct body_bits {
+  dReal position[3];
+  dReal quat[4];
+  dReal rotation[12];
+  dReal linear[3];
+  dReal angular[3];
+  dReal force[3];
+  dReal torque[3];
+  dReal finite_axis[3];
+  dReal thresholds[2];
+  dReal idle_time;
+  int idle_steps;
+  int samples;
+  int automatic;
+  int finite_mode;
+  int enabled;
+  int kinematic;
+  int gyroscopic;
+  int joints;
+} body_bits;
+
+static inline void body_read(dBodyID body, body_bits *out)
+{
+  dVector3 axis;
+  memset(out, 0, sizeof *out);
+  memcpy(out->position, dBodyGetPosition(body), sizeof out->position);
+  memcpy(out->quat, dBodyGetQuaternion(body), sizeof out->quat);
+  memcpy(out->rotation, dBodyGetRotation(body), sizeof out->rotation);
+  memcpy(out->linear, dBodyGetLinearVel(body), sizeof out->linear);
+  memcpy(out->angular, dBodyGetAngularVel(body), sizeof out->angular);
+  memcpy(out->force, dBodyGetForce(body), sizeof out->force);
+  memcpy(out->torque, dBodyGetTorque(body), sizeof out->torque);
+  dBodyGetFiniteRotationAxis(body, axis);
+  memcpy(out->finite_axis, axis, sizeof out->finite_axis);
+  out->thresholds[0] = dBodyGetAutoDisableLinearThreshold(body);
+  out->thresholds[1] = dBodyGetAutoDisableAngularThreshold(body);
+  out->idle_time = dBodyGetAutoDisableTime(body);
+  out->idle_steps = dBodyGetAutoDisableSteps(body);
+  out->samples = dBodyGetAutoDisableAverageSamplesCount(body);
+  out->automatic = dBodyGetAutoDisableFlag(body);
+  out->finite_mode = dBodyGetFiniteRotationMode(body);
+  out->enabled = dBodyIsEnabled(body);
+  out->kinematic = dBodyIsKinematic(body);
+  out->gyroscopic = dBodyGetGyroscopicMode(body);
+  out->joints = dBodyGetNumJoints(body);
+}
+
+#endif
