@@ -93,13 +93,16 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
     return status;
   }
   size_t own = (size_t)out->scene->parameters.pointers;
+  rig_part part = RIG_SESSION;
   out->pointer_count = options->device_count > 0 ? options->device_count : own;
   status = create_session(options, out, detail);
   for (size_t i = 0; i < out->pointer_count && status >= HAP_OK; ++i) {
+    part = RIG_POINTER;
     status = add_pointer(options, out, i, detail);
   }
   if (status < HAP_OK) {
     rig_destroy(out);
+    out->failed = part;
   }
   return status;
 }

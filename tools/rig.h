@@ -24,18 +24,25 @@ typedef struct rig_options {
   hap_session_def def;
 } rig_options;
 
+typedef enum rig_part {
+  RIG_SCENE = 0,
+  RIG_SESSION,
+  RIG_POINTER
+} rig_part;
+
 typedef struct rig {
   scene *scene;
   hap_session *session;
   hap_device *devices[RIG_POINTERS_MAX];
   hap_pointer_id pointers[RIG_POINTERS_MAX];
   size_t pointer_count;
+  rig_part failed; /* what it was after a rig_create that failed */
 } rig;
 
 /* Defaults: row10, accelerance, threads, 60 Hz and 1 kHz. */
 void rig_options_init(rig_options *options);
 
-/* dInitODE2 was called. On failure nothing is left behind and detail says why. */
+/* dInitODE2 was called. On failure nothing is left behind, detail says why and out->failed where. */
 hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail);
 void rig_destroy(rig *r); /* zeroed allowed */
 

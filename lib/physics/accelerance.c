@@ -17,12 +17,6 @@ static hapi_body_slot *body_of(hapi_physics *physics, const hapi_contact_slot *c
   return &physics->bodies[contact->body];
 }
 
-static bool probed(hapi_physics *physics, const hapi_contact_slot *contact)
-{
-  return contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-         (body_of(physics, contact)->flags & HAPI_BODY_DRIVEN) == 0;
-}
-
 static void acceleration_since_snapshot(const hapi_physics *physics, uint32_t known, double out[6])
 {
   const hapi_body_state *before = hapi_test_state(physics, known);
@@ -103,18 +97,19 @@ static void keep_column(hapi_physics *physics, hapi_contact_slot *contact, int a
 /* Three probes for the contacts of one round. */
 static void measure_round(hapi_physics *physics, uint32_t round)
 {
+  const hapi_test_set *test = &physics->test;
   for (int axis = 0; axis < 3; ++axis) {
     hapi_test_rewind(physics);
-    for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-      const hapi_contact_slot *contact = &physics->contacts[i];
-      if (probed(physics, contact) && contact->round == round) {
+    for (uint32_t i = 0; i < test->contact_count; ++i) {
+      const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+      if (contact->round == round) {
         push(physics, contact, axis);
       }
     }
     hapi_test_step(physics);
-    for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-      hapi_contact_slot *contact = &physics->contacts[i];
-      if (probed(physics, contact) && contact->round == round) {
+    for (uint32_t i = 0; i < test->contact_count; ++i) {
+      hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+      if (contact->round == round) {
         double column[6];
         measure_column(physics, contact, column);
         keep_column(physics, contact, axis, column);
@@ -127,22 +122,18 @@ static void measure_round(hapi_physics *physics, uint32_t round)
  * contact has a round of its own. */
 static uint32_t plan_rounds(hapi_physics *physics)
 {
+  const hapi_test_set *test = &physics->test;
   uint32_t most = 0;
-  uint32_t total = 0;
-  memset(physics->test.rounds, 0, physics->config.capacity.contacts * sizeof(uint32_t));
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    hapi_contact_slot *contact = &physics->contacts[i];
-    if (!probed(physics, contact)) {
-      continue;
-    }
+  memset(test->rounds, 0, test->island_count * sizeof *test->rounds);
+  for (uint32_t i = 0; i < test->contact_count; ++i) {
+    hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
     uint32_t known = body_of(physics, contact)->known;
-    uint32_t *count = &physics->test.rounds[physics->table.entries[known].island];
-    contact->round = physics->config.probe == HAP_PROBE_PAPER ? total : *count;
-    ++total;
+    uint32_t *count = &test->rounds[physics->table.entries[known].island];
+    contact->round = physics->config.probe == HAP_PROBE_PAPER ? i : *count;
     ++*count;
     most = *count > most ? *count : most;
   }
-  return physics->config.probe == HAP_PROBE_PAPER ? total : most;
+  return physics->config.probe == HAP_PROBE_PAPER ? test->contact_count : most;
 }
 
 void hapi_accelerance_measure(hapi_physics *physics)
@@ -151,14 +142,14 @@ void hapi_accelerance_measure(hapi_physics *physics)
     return;
   }
   hap_status status = hapi_test_gather(physics);
-  if (status >= HAP_OK && physics->test.member_count > 0) {
+  if (status >= HAP_OK && physics->test.contact_count > 0) {
     status = hapi_test_enter(physics);
   }
   if (status < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
     return;
   }
-  if (physics->test.member_count == 0) {
+  if (physics->test.contact_count == 0) {
     return;
   }
   uint32_t rounds = plan_rounds(physics);

@@ -24,12 +24,13 @@ static bool allocate(hapi_physics *physics)
   physics->contacts = hapi_alloc_array(c->contacts, sizeof *physics->contacts);
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
+  physics->test.contacts = hapi_alloc_array(c->contacts, sizeof *physics->test.contacts);
   physics->test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->test.rounds);
   physics->contact_scratch =
       hapi_alloc_array((size_t)physics->ode.max_contacts_per_pair, sizeof(dContact));
   return physics->bodies != NULL && physics->contacts != NULL && hood->candidates != NULL &&
-         hood->hits != NULL && physics->test.rounds != NULL && physics->contact_scratch != NULL &&
-         hapi_bodies_init(&physics->table) == HAP_OK;
+         hood->hits != NULL && physics->test.contacts != NULL && physics->test.rounds != NULL &&
+         physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
 static bool init_locks(hapi_physics *physics)

@@ -177,6 +177,8 @@ typedef struct hapi_snapshot {
 /* ---- probe.c: the islands under test ---- */
 
 typedef struct hapi_test_set {
+  uint32_t *contacts; /* slots of the contacts to probe; capacity.contacts */
+  uint32_t contact_count;
   uint32_t *rounds;  /* by island: contacts so far; capacity.contacts */
   uint32_t *members; /* entries of the body table, all islands under test */
   uint32_t member_count;

@@ -99,10 +99,12 @@ hap_status hapi_test_gather(hapi_physics *physics)
   }
   test->member_count = 0;
   test->island_count = 0;
+  test->contact_count = 0;
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
     if (!contact_moves_a_body(physics, &physics->contacts[i])) {
       continue;
     }
+    test->contacts[test->contact_count++] = i;
     uint32_t known = physics->bodies[physics->contacts[i].body].known;
     if (physics->table.entries[known].island == HAPI_NONE && !gather_island(physics, known)) {
       return HAP_ERROR_MEMORY;
@@ -254,6 +256,7 @@ const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t kno
 
 void hapi_test_finish(hapi_test_set *test)
 {
+  hapi_free(test->contacts);
   hapi_free(test->rounds);
   hapi_free(test->members);
   hapi_free(test->cut);

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: hapode contributors
+# SPDX-License-Identifier: MIT
+"""The program of the README is the example, and the example runs. Arguments: source root, binary."""
+import pathlib
+import re
+import subprocess
+import sys
+
+root = pathlib.Path(sys.argv[1])
+readme = (root / "README.md").read_text(encoding="utf-8")
+example = (root / "examples/touch_a_cube.c").read_text(encoding="utf-8").split("\n", 2)[2].strip()
+block = re.search(r"```c\n(.*?)```", readme, re.S)
+points = []
+
+
+def point(good, name, note=""):
+    points.append(good)
+    if note and not good:
+        print("# " + note.replace("\n", "\n# "))
+    print(f"{'ok' if good else 'not ok'} {len(points)} - {name}")
+
+
+point(block is not None and block.group(1).strip() == example, "the README shows the example")
+point(len(example.splitlines()) <= 45, "the example is short")
+run = subprocess.run([sys.argv[2]], capture_output=True, text=True, timeout=30)
+point(run.returncode == 0, "the example runs", run.stderr)
+rows = re.findall(r"^cube at (-?[0-9.]+) m, hand feels (-?[0-9.]+) N$", run.stdout, re.M)
+point(len(rows) == 90, "it prints a line a frame", f"{len(rows)} lines")
+point(any(float(f) < -0.2 for _, f in rows), "the hand feels the cube")
+point(bool(rows) and float(rows[-1][0]) > 0.01, "the cube moves")
+for target in re.findall(r"\]\((?!http)([^)]+)\)", readme):
+    point((root / target).exists(), f"{target} exists")
+print(f"1..{len(points)}")
+sys.exit(0 if all(points) else 1)

@@ -1,0 +1,118 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/run_effects.h"
+
+#include <string.h>
+
+typedef struct effect {
+  const char *name;
+  const char *text;
+  unsigned models; /* that have it: bits by hap_model */
+} effect;
+
+#define BIT(model) (1u << (model))
+
+static const effect effects[RUN_EFFECTS] = {
+    {"testing", "testing simulations", BIT(HAP_MODEL_ACCELERANCE)},
+    {"cross", "cross accelerance between local bodies", 0},
+    {"contacts", "contacts between bodies in the loop", 0},
+    {"passes", "contact passes between syncs", 0},
+    {"joints", "joints in the loop", 0},
+    {"range", "local range beyond the neighbours", 0},
+    {"restitution", "restitution in the loop", 0},
+    {"friction", "friction on the pointer", 0},
+    {"torque", "torque on the pointer", 0},
+    {"gyro", "gyroscopic term in the loop", 0},
+    {"shape", "shape at every tick instead of a plane", 0},
+    {"proxy", "coupling by a proxy", 0},
+    {"observer", "energy observer", 0},
+    {"recording", "recording for a replay bit for bit", 0},
+};
+
+static const char *const wishes[] = {"auto", "off", "on"};
+
+static hap_status refuse(const char *item, size_t length, hap_detail *detail)
+{
+  int shown = length < 60 ? (int)length : 60;
+  int used = snprintf(detail->text, sizeof detail->text,
+                      "\"%.*s\" is not NAME=on, NAME=off or NAME=auto; names:", shown, item);
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    used +=
+        snprintf(detail->text + used, sizeof detail->text - (size_t)used, " %s", effects[i].name);
+  }
+  return HAP_ERROR_ARGUMENT;
+}
+
+static bool is_word(const char *text, size_t length, const char *word)
+{
+  return strlen(word) == length && memcmp(text, word, length) == 0;
+}
+
+static bool take_item(const char *item, size_t length, run_effects *io)
+{
+  const char *equals = memchr(item, '=', length);
+  size_t name_length = equals != NULL ? (size_t)(equals - item) : length;
+  if (equals == NULL) {
+    return false;
+  }
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    for (size_t k = 0; k < sizeof wishes / sizeof wishes[0]; ++k) {
+      if (is_word(item, name_length, effects[i].name) &&
+          is_word(equals + 1, length - name_length - 1, wishes[k])) {
+        io->wish[i] = (run_effect_wish)k;
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail)
+{
+  for (;;) {
+    size_t length = strcspn(list, ",");
+    if (!take_item(list, length, io)) {
+      return refuse(list, length, detail);
+    }
+    if (list[length] == '\0') {
+      return HAP_OK;
+    }
+    list += length + 1;
+  }
+}
+
+static bool has(hap_model model, const effect *e)
+{
+  return (e->models & BIT(model)) != 0;
+}
+
+hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_detail *detail)
+{
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    bool on = has(model, &effects[i]);
+    if (wanted->wish[i] == (on ? RUN_EFFECT_OFF : RUN_EFFECT_ON)) {
+      snprintf(detail->text, sizeof detail->text,
+               "%s=%s is not supported in this version: with model %s the %s (%s) cannot be "
+               "switched %s",
+               effects[i].name, wishes[wanted->wish[i]], hap_model_name(model), "effect",
+               effects[i].text, wishes[wanted->wish[i]]);
+      return HAP_ERROR_UNSUPPORTED;
+    }
+  }
+  return HAP_OK;
+}
+
+void run_effects_print(hap_model model, FILE *out)
+{
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    fprintf(out, "%s%s=%s", i > 0 ? "," : "", effects[i].name,
+            has(model, &effects[i]) ? "on" : "off");
+  }
+}
+
+void run_effects_list(FILE *out)
+{
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    fprintf(out, "  %-12s %s\n", effects[i].name, effects[i].text);
+  }
+}

@@ -1,0 +1,39 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TOOLS_RUN_EFFECTS_H
+#define HAPODE_TOOLS_RUN_EFFECTS_H
+
+/* The effects of design.md section 7. In this version they are not switches: the model decides, and
+ * asking for another state is refused. */
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include <hapode/hapode.h>
+
+#define RUN_EFFECTS 14
+
+typedef enum run_effect_wish {
+  RUN_EFFECT_AUTO = 0, /* also: not named */
+  RUN_EFFECT_OFF,
+  RUN_EFFECT_ON
+} run_effect_wish;
+
+typedef struct run_effects {
+  run_effect_wish wish[RUN_EFFECTS];
+} run_effects;
+
+/* Takes a list such as "friction=off,torque=auto" over what was there. On failure detail says what
+ * the list may hold. */
+hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail);
+
+/* HAP_ERROR_UNSUPPORTED for a wish that the model does not meet in this version. */
+hap_status run_effects_check(const run_effects *effects, hap_model model, hap_detail *detail);
+
+/* "testing=on,cross=off,...": what the model has. */
+void run_effects_print(hap_model model, FILE *out);
+
+/* One line each: name and what it is. */
+void run_effects_list(FILE *out);
+
+#endif

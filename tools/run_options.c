@@ -1,0 +1,305 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/run_options.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LATENCY_TICKS_MAX 20000.0
+
+typedef struct option option;
+
+/* Takes the value; a text that says what is allowed stays in detail on failure. */
+typedef hap_status (*take_fn)(run_options *options, const option *self, const char *value,
+                              hap_detail *detail);
+
+struct option {
+  const char *name;
+  const char *value; /* as the help calls it; NULL: takes none */
+  const char *help;
+  take_fn take;
+  size_t offset; /* of the member, for takers of plain numbers and texts */
+  double low;
+  double high;
+};
+
+static hap_status fail(hap_detail *detail, const char *format, ...)
+{
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(detail->text, sizeof detail->text, format, arguments);
+  va_end(arguments);
+  return HAP_ERROR_ARGUMENT;
+}
+
+static hap_status take_number(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  char *end = NULL;
+  double number = strtod(value, &end);
+  if (end == value || *end != '\0' || !(number >= self->low && number <= self->high)) {
+    return fail(detail, "\"%.60s\" is not a number from %g to %g", value, self->low, self->high);
+  }
+  *(double *)((char *)options + self->offset) = number;
+  return HAP_OK;
+}
+
+static hap_status take_text(run_options *options, const option *self, const char *value,
+                            hap_detail *detail)
+{
+  if (*value == '\0') {
+    return fail(detail, "an empty %s", self->value);
+  }
+  *(const char **)((char *)options + self->offset) = value;
+  return HAP_OK;
+}
+
+static hap_status take_model(run_options *options, const option *self, const char *value,
+                             hap_detail *detail)
+{
+  (void)self;
+  hap_status status = rig_find_model(value, &options->rig.def.model, detail);
+  if (status >= HAP_OK && options->rig.def.model == HAP_MODEL_CONTACT) {
+    return fail(detail,
+                "contact is not supported in this version; take single, impulse or "
+                "accelerance");
+  }
+  return status;
+}
+
+static hap_status take_device(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  (void)self;
+  if (options->rig.device_count == RIG_POINTERS_MAX) {
+    return fail(detail, "more than %d devices", RIG_POINTERS_MAX);
+  }
+  options->rig.devices[options->rig.device_count++] = value;
+  return HAP_OK;
+}
+
+static hap_status take_effects(run_options *options, const option *self, const char *value,
+                               hap_detail *detail)
+{
+  (void)self;
+  return run_effects_parse(value, &options->effects, detail);
+}
+
+static hap_status take_pose(run_options *options, const option *self, const char *value,
+                            hap_detail *detail)
+{
+  (void)self;
+  bool held = strcmp(value, "held") == 0;
+  if (!held && strcmp(value, "interpolated") != 0) {
+    return fail(detail, "\"%.60s\" is neither held nor interpolated", value);
+  }
+  options->rig.def.impulse_pose = held ? HAP_IMPULSE_HELD : HAP_IMPULSE_INTERPOLATED;
+  return HAP_OK;
+}
+
+static hap_status take_probe(run_options *options, const option *self, const char *value,
+                             hap_detail *detail)
+{
+  (void)self;
+  bool paper = strcmp(value, "paper") == 0;
+  if (!paper && strcmp(value, "shared") != 0) {
+    return fail(detail, "\"%.60s\" is neither shared nor paper", value);
+  }
+  options->rig.def.probe = paper ? HAP_PROBE_PAPER : HAP_PROBE_SHARED;
+  return HAP_OK;
+}
+
+static hap_status take_priority(run_options *options, const option *self, const char *value,
+                                hap_detail *detail)
+{
+  char *end = NULL;
+  long number = strtol(value, &end, 10);
+  if (end == value || *end != '\0' || number < (long)self->low || number > (long)self->high) {
+    return fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
+                self->high);
+  }
+  options->rig.def.rt_priority = (int32_t)number;
+  return HAP_OK;
+}
+
+static hap_status take_no_realtime(run_options *options, const option *self, const char *value,
+                                   hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->rig.def.rt_priority = 0;
+  return HAP_OK;
+}
+
+static hap_status take_lockstep(run_options *options, const option *self, const char *value,
+                                hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->rig.def.drive = HAP_DRIVE_LOCKSTEP;
+  return HAP_OK;
+}
+
+/* The action is the option's low. */
+static hap_status take_action(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  (void)value;
+  (void)detail;
+  options->action = (run_action)self->low;
+  return HAP_OK;
+}
+
+static const option table[] = {
+    {"--scene", "NAME[:N]", "scene, N: how many bodies where it takes that (default row10)",
+     take_text, offsetof(run_options, rig.scene), 0, 0},
+    {"--model", "NAME", "single, impulse, accelerance (default); contact comes later", take_model,
+     0, 0, 0},
+    {"--device", "SPEC",
+     "device of the next pointer, such as virtual or replay:hand.csv\n"
+     "(default, and virtual alone: the scene's own simulated hand)",
+     take_device, 0, 0, 0},
+    {"--physics-hz", "F", "steps of the world a second, 1 to 1000 (default 60)", take_number,
+     offsetof(run_options, rig.def.physics_hz), 1, 1000},
+    {"--haptic-hz", "F", "ticks of the haptic loop a second, 100 to 20000 (default 1000)",
+     take_number, offsetof(run_options, rig.def.haptic_hz), 100, 20000},
+    {"--contact-hz", "F", "contact passes a second, 20 to 1000; for model contact", take_number,
+     offsetof(run_options, rig.def.contact_hz), 20, 1000},
+    {"--seconds", "S", "length of the run (default: the scene's)", take_number,
+     offsetof(run_options, seconds), 0.001, 86400},
+    {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_lockstep, 0, 0, 0},
+    {"--model-age", "S", "lockstep: seconds from a physics step's start to the use of its result",
+     take_number, offsetof(run_options, model_age_s), 0, 200},
+    {"--impulse-pose", "NAME", "model impulse shows bodies held or interpolated (default)",
+     take_pose, 0, 0, 0},
+    {"--probe", "NAME", "model accelerance: shared zero probe (default) or as in the paper",
+     take_probe, 0, 0, 0},
+    {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
+     offsetof(run_options, rig.max_force), 1e-6, 1e6},
+    {"--effects", "LIST", "such as friction=off,torque=auto; see --list", take_effects, 0, 0, 0},
+    {"--trace", "FILE", "every tick as a row of a CSV file", take_text,
+     offsetof(run_options, trace_path), 0, 0},
+    {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
+     offsetof(run_options, plot_path), 0, 0},
+    {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
+     take_priority, 0, 0, 99},
+    {"--no-realtime", NULL, "do not ask for real-time rights", take_no_realtime, 0, 0, 0},
+    {"--list", NULL, "scenes with their parameters, models, devices, effects", take_action, 0,
+     RUN_LIST, 0},
+    {"--help", NULL, "this text", take_action, 0, RUN_HELP, 0},
+    {"--version", NULL, "version of the library", take_action, 0, RUN_VERSION, 0},
+};
+
+#define OPTIONS (sizeof table / sizeof table[0])
+
+static const option *find(const char *argument, size_t length)
+{
+  for (size_t i = 0; i < OPTIONS; ++i) {
+    if (strlen(table[i].name) == length && memcmp(argument, table[i].name, length) == 0) {
+      return &table[i];
+    }
+  }
+  return NULL;
+}
+
+static hap_status fail_unknown(const char *argument, hap_detail *detail)
+{
+  int used = snprintf(detail->text, sizeof detail->text,
+                      "there is no option \"%.60s\"; options:", argument);
+  for (size_t i = 0; i < OPTIONS; ++i) {
+    used += snprintf(detail->text + used, sizeof detail->text - (size_t)used, " %s", table[i].name);
+  }
+  return HAP_ERROR_ARGUMENT;
+}
+
+/* Takes the option at argv[*at], as "--name value" or "--name=value", and moves *at to its end. */
+static hap_status take_option(char **argv, int *at, run_options *out, hap_detail *detail)
+{
+  const char *argument = argv[*at];
+  size_t length = strcspn(argument, "=");
+  const option *found = find(argument, length);
+  if (found == NULL) {
+    return fail_unknown(argument, detail);
+  }
+  const char *value = argument[length] == '=' ? argument + length + 1 : NULL;
+  if (found->value == NULL && value != NULL) {
+    return fail(detail, "%s takes no value", found->name);
+  }
+  if (found->value != NULL && value == NULL) {
+    value = argv[++*at];
+  }
+  if (found->value != NULL && value == NULL) {
+    return fail(detail, "%s needs a value: %s %s", found->name, found->name, found->value);
+  }
+  hap_detail why = {""};
+  hap_status status = found->take(out, found, value, &why);
+  return status < HAP_OK ? fail(detail, "%s: %.480s", found->name, why.text) : HAP_OK;
+}
+
+/* What only several options together can get wrong. */
+static hap_status check(run_options *o, hap_detail *detail)
+{
+  hap_detail why = {""};
+  hap_session_def *def = &o->rig.def;
+  if (def->physics_hz > def->haptic_hz) {
+    return fail(detail, "--physics-hz: %g is more than --haptic-hz, which is %g", def->physics_hz,
+                def->haptic_hz);
+  }
+  if (o->model_age_s >= 0.0) {
+    double ticks = round(o->model_age_s * def->haptic_hz);
+    if (def->drive != HAP_DRIVE_LOCKSTEP) {
+      return fail(detail, "--model-age: only with --lockstep; in real time the age is what it is");
+    }
+    if (ticks > LATENCY_TICKS_MAX) {
+      return fail(detail, "--model-age: %g s are over %g ticks of the haptic loop; at most %g s",
+                  o->model_age_s, LATENCY_TICKS_MAX, LATENCY_TICKS_MAX / def->haptic_hz);
+    }
+    def->physics_latency_ticks = (int32_t)ticks;
+  }
+  if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
+    return fail(detail, "--plot: the same file as --trace");
+  }
+  if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
+    return fail(detail, "--effects: %.480s", why.text);
+  }
+  return HAP_OK;
+}
+
+hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail *detail)
+{
+  hap_status status = HAP_OK;
+  memset(out, 0, sizeof *out);
+  rig_options_init(&out->rig);
+  out->model_age_s = -1.0;
+  for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {
+    status = take_option(argv, &at, out, detail);
+  }
+  return status < HAP_OK || out->action != RUN_SESSION ? status : check(out, detail);
+}
+
+void run_options_help(FILE *out)
+{
+  fputs(
+      "hapode-run: lets a hand, real or simulated, feel a scene.\n\n"
+      "usage: hapode-run [OPTION VALUE | OPTION=VALUE | SWITCH]...\n\n",
+      out);
+  for (size_t i = 0; i < OPTIONS; ++i) {
+    const option *o = &table[i];
+    size_t line = strcspn(o->help, "\n");
+    fprintf(out, "  %-15s %-9s %.*s\n", o->name, o->value != NULL ? o->value : "", (int)line,
+            o->help);
+    if (o->help[line] != '\0') {
+      fprintf(out, "%28s%s\n", "", o->help + line + 1);
+    }
+  }
+  fputs(
+      "\nA summary comes on stdout, one \"key: value\" a line. Ctrl-C takes the force away and "
+      "ends\nthe run with its summary.\n"
+      "exit: 0 run complete (also without real-time rights) or stopped by Ctrl-C, 1 it failed or "
+      "a\ndevice did, 2 wrong usage\n",
+      out);
+}

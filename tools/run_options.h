@@ -1,0 +1,35 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TOOLS_RUN_OPTIONS_H
+#define HAPODE_TOOLS_RUN_OPTIONS_H
+
+/* The command line of hapode-run. */
+
+#include <stdio.h>
+
+#include "tools/rig.h"
+#include "tools/run_effects.h"
+
+typedef enum run_action {
+  RUN_SESSION = 0,
+  RUN_LIST,
+  RUN_HELP,
+  RUN_VERSION
+} run_action;
+
+typedef struct run_options {
+  run_action action;
+  rig_options rig;
+  double seconds;     /* 0: as long as the scene says */
+  double model_age_s; /* negative: not given */
+  const char *trace_path;
+  const char *plot_path;
+  run_effects effects;
+} run_options;
+
+/* Fills *out. On failure the detail text names the option and what it may be. */
+hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail *detail);
+
+void run_options_help(FILE *out);
+
+#endif
