@@ -91,18 +91,13 @@ double bare_cycle(bare *b, double step_s)
 
 /* ---- the island of the first body ---- */
 
-static bool joined(dBodyID a, dBodyID b)
-{
-  return dAreConnected(a, b) != 0;
-}
-
 /* Enables what hangs together with the first body and switches all others off. The scenes of the
  * bench are rows: a body of the island is jointed to the one before it or after it. */
 static void enable_island(const scene *s)
 {
   bool linked = true;
   for (size_t i = 0; i < s->body_count; ++i) {
-    linked = linked && (i == 0 || joined(s->bodies[i - 1], s->bodies[i]));
+    linked = linked && (i == 0 || dAreConnected(s->bodies[i - 1], s->bodies[i]) != 0);
     if (linked) {
       dBodyEnable(s->bodies[i]);
     } else {
@@ -122,15 +117,9 @@ double bare_island_step(bare *b, double step_s, int repeats)
 {
   double times[REPEATS_MAX];
   unsigned long seed = dRandGetSeed();
-  bare before = {0};
-  hap_detail detail;
-  if (repeats > REPEATS_MAX) {
-    repeats = REPEATS_MAX;
-  }
-  (void)before;
-  (void)detail;
+  int count = repeats < REPEATS_MAX ? repeats : REPEATS_MAX;
   enable_island(b->scene);
-  for (int i = 0; i < repeats; ++i) {
+  for (int i = 0; i < count; ++i) {
     dRandSetSeed(seed);
     int64_t begin_ns = hapi_clock_now();
     dWorldQuickStep(b->scene->world, step_s);
@@ -138,5 +127,5 @@ double bare_island_step(bare *b, double step_s, int repeats)
   }
   enable_all(b->scene);
   dRandSetSeed(seed);
-  return bench_median(times, (size_t)repeats);
+  return bench_median(times, (size_t)count);
 }

@@ -27,8 +27,9 @@ void bare_follow(bare *b, const scene *from);
 /* Collision and global step over step_s, timed [s]. */
 double bare_cycle(bare *b, double step_s);
 
-/* One QuickStep of the island of the first body, all other bodies switched off, undone afterwards:
- * median of repeats [s]. The contacts are those of the last bare_cycle. */
+/* One QuickStep of the island of the first body, all other bodies switched off: median of repeats
+ * [s]. The contacts are those of the last bare_cycle. Nothing is undone: bare_follow puts the bodies
+ * right again. */
 double bare_island_step(bare *b, double step_s, int repeats);
 
 #endif

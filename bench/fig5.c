@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "bench/bench.h"
+#include "bench/cycles.h"
 #include "tools/rig.h"
 
 #define TICKS 1200 /* 1.2 s at 1 kHz: the longest contact and some more */
@@ -56,16 +57,6 @@ typedef struct figure {
 } figure;
 
 /* ---- the runs ---- */
-
-static const scene_parameters *fig5_row(void)
-{
-  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
-    if (strcmp(scene_table_at(i)->name, "fig5") == 0) {
-      return scene_table_at(i);
-    }
-  }
-  return NULL;
-}
 
 static hap_status follow_force(rig *r, double force[TICKS])
 {
@@ -368,7 +359,7 @@ static void report(bench *b, const figure *f)
 
 static hap_status measure(bench *b, figure *f)
 {
-  scene_parameters parameters = *fig5_row();
+  scene_parameters parameters = *cycles_scene("fig5");
   f->mass = parameters.mass;
   for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
     parameters.stiffness = stiffnesses[k];

@@ -92,10 +92,9 @@ hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_det
     bool on = has(model, &effects[i]);
     if (wanted->wish[i] == (on ? RUN_EFFECT_OFF : RUN_EFFECT_ON)) {
       snprintf(detail->text, sizeof detail->text,
-               "%s=%s is not supported in this version: with model %s the %s (%s) cannot be "
-               "switched %s",
-               effects[i].name, wishes[wanted->wish[i]], hap_model_name(model), "effect",
-               effects[i].text, wishes[wanted->wish[i]]);
+               "%s=%s is not supported in this version: model %s always runs %s: %s",
+               effects[i].name, wishes[wanted->wish[i]], hap_model_name(model),
+               on ? "with it" : "without it", effects[i].text);
       return HAP_ERROR_UNSUPPORTED;
     }
   }

@@ -199,6 +199,11 @@ static int64_t time_of(const hap_session *session, uint64_t tick)
   return hapi_clock_deadline(tick, session->def.haptic_hz);
 }
 
+static int64_t nanoseconds(double seconds)
+{
+  return (int64_t)llround(1e9 * seconds);
+}
+
 /* Runs the physics cycle of this tick when one is due. A change of model starts a new count. */
 static void step_when_due(hap_session *session)
 {
@@ -208,11 +213,11 @@ static void step_when_due(hap_session *session)
   }
   double next_period = hapi_physics_next_period(session->physics);
   bool changes = next_period != period;
-  uint64_t next = changes ? session->tick + ticks_of(session, next_period, 1)
-                          : session->base + ticks_of(session, period, session->step + 1);
+  /* Where H is no whole number of ticks, the step's own time lies between two ticks. */
+  int64_t now = time_of(session, session->base) + nanoseconds((double)session->step * period);
   /* SINGLE steps up to now, and at the start there is nothing to step. */
   if (session->tick > 0 || !hapi_physics_steps_to_now(session->physics)) {
-    hapi_physics_cycle(session->physics, time_of(session, session->tick), time_of(session, next));
+    hapi_physics_cycle(session->physics, now, now + nanoseconds(next_period));
   }
   session->base = changes ? session->tick : session->base;
   session->step = changes ? 1 : session->step + 1;

@@ -1,0 +1,981 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The pure tick on local models made by hand. Equation numbers are those of the paper. */
+
+#include "tests/tap.h"
+
+#include <sys/resource.h>
+
+#include <hapode/hapode.h>
+
+#include "base/vec.h"
+#include "haptic/haptic.h"
+#include "haptic/rt/tick.h"
+#include "sync/exchange.h"
+
+#define T 1e-3
+#define TICK_NS 1000000LL
+#define BODIES 8u
+#define CONTACTS 16u
+#define POINTERS 4u
+
+static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS};
+
+/* A tick with its memory, and a message to fill in. */
+static struct {
+  hapi_tick tick;
+  hapi_local_body bodies[BODIES];
+  uint32_t live[BODIES];
+  hapi_local_contact contacts[CONTACTS];
+  double ramps[CONTACTS];
+  uint32_t ramp_generations[CONTACTS];
+  hapi_tick_pointer pointers[POINTERS];
+  hapi_exchange *exchange;
+  hapi_model *model;
+  int64_t now_ns;
+} f;
+
+static void set_up(void)
+{
+  hapi_exchange_destroy(f.exchange);
+  memset(&f, 0, sizeof f);
+  f.tick.capacity = capacity;
+  f.tick.period = T;
+  f.tick.hashing = true;
+  f.tick.bodies = f.bodies;
+  f.tick.live = f.live;
+  f.tick.contacts = f.contacts;
+  f.tick.ramps = f.ramps;
+  f.tick.ramp_generations = f.ramp_generations;
+  f.tick.pointers = f.pointers;
+  hapi_tick_reset(&f.tick);
+  if (hapi_exchange_create(&capacity, &f.exchange) != HAP_OK) {
+    abort();
+  }
+  f.model = hapi_exchange_model_back(f.exchange);
+  f.model->model = HAP_MODEL_ACCELERANCE;
+}
+
+/* Radius 10 mm, 1000 N/m, no limit to speak of, at (x, y, z). */
+static hapi_tick_pointer *add_pointer(uint32_t index, double x, double y, double z)
+{
+  hapi_tick_pointer *p = &f.pointers[index];
+  memset(p, 0, sizeof *p);
+  p->generation = 1;
+  p->radius = 0.01;
+  p->stiffness = 1000.0;
+  p->motion_scale = 1.0;
+  p->force_scale = 1.0;
+  p->max_force = 1e6;
+  p->max_torque = 1.0;
+  p->pose_world_device.quat_wxyz[0] = 1.0;
+  p->device_pose.quat_wxyz[0] = 1.0;
+  hapi_v3_set(p->device_pose.position, x, y, z);
+  return p;
+}
+
+static void begin_model(void)
+{
+  f.model->body_count = 0;
+  f.model->contact_count = 0;
+  ++f.model->number;
+  f.model->state_ns = f.now_ns;
+}
+
+static hapi_model_body *add_body(uint32_t slot)
+{
+  hapi_model_body *body = &hapi_model_bodies(f.model)[f.model->body_count++];
+  memset(body, 0, sizeof *body);
+  body->slot = slot;
+  body->generation = 1;
+  body->pose.quat_wxyz[0] = 1.0;
+  return body;
+}
+
+/* At point, normal -x: a pointer coming along +x meets it. A of a body that cannot move. */
+static hapi_model_contact *add_contact(uint32_t slot, uint32_t body, uint32_t pointer)
+{
+  hapi_model_contact *contact = &hapi_model_contacts(f.model)[f.model->contact_count++];
+  memset(contact, 0, sizeof *contact);
+  contact->slot = slot;
+  contact->generation = 1;
+  contact->body = body;
+  contact->pointer = pointer;
+  contact->pointer_generation = 1;
+  contact->normal_body[0] = -1.0;
+  return contact;
+}
+
+/* A of a free body (numerics.md section 6) with inertia of a ball. */
+static void set_free(hapi_model_contact *c, double mass, double inertia)
+{
+  const double *r = c->point_body;
+  const double cross[3][3] = {{0.0, -r[2], r[1]}, {r[2], 0.0, -r[0]}, {-r[1], r[0], 0.0}};
+  for (int i = 0; i < 3; ++i) {
+    c->a[i][i] = 1.0 / mass;
+    for (int k = 0; k < 3; ++k) {
+      c->a[3 + i][k] = cross[i][k] / inertia;
+    }
+  }
+}
+
+static void adopt(void)
+{
+  hapi_tick_adopt(&f.tick, f.model, f.now_ns);
+}
+
+static void run(int ticks)
+{
+  for (int i = 0; i < ticks; ++i) {
+    hapi_tick_run(&f.tick, f.now_ns);
+    f.now_ns += TICK_NS;
+  }
+}
+
+static hapi_state *report(void)
+{
+  hapi_state *state = hapi_exchange_state_back(f.exchange);
+  hapi_tick_report(&f.tick, state);
+  return state;
+}
+
+static void check_v3(const double v[3], double x, double y, double z, double tolerance)
+{
+  CHECK_NEAR(v[0], x, tolerance);
+  CHECK_NEAR(v[1], y, tolerance);
+  CHECK_NEAR(v[2], z, tolerance);
+}
+
+/* One pointer at a contact that has been seen apart, so that there is no ramp. */
+static hapi_tick_pointer *pointer_before_wall(void)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  run(1);
+  return p;
+}
+
+/* ---- eq. 7 ---- */
+
+TEST(force_is_spring_on_depth)
+{
+  hapi_tick_pointer *p = pointer_before_wall();
+  for (int mm10 = -200; mm10 <= 200; ++mm10) {
+    double depth = 1e-4 * mm10;
+    p->device_pose.position[0] = -0.01 + depth;
+    run(1);
+    check_v3(p->device_wrench.force, depth > 0.0 ? -1000.0 * depth : 0.0, 0.0, 0.0, 1e-11);
+    CHECK(p->contacts == (depth > 0.0 ? 1u : 0u));
+  }
+}
+
+TEST(damper_acts_only_in_contact_and_never_pulls)
+{
+  hapi_tick_pointer *p = pointer_before_wall();
+  p->damping = 20.0;
+  p->device_twist.linear[0] = 0.1; /* closing, 2 N */
+  p->device_pose.position[0] = -0.0101;
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0); /* apart, however fast it comes */
+  p->device_pose.position[0] = -0.009;
+  run(1);
+  check_v3(p->device_wrench.force, -3.0, 0.0, 0.0, 1e-12);
+  p->device_twist.linear[0] = -0.02;
+  run(1);
+  check_v3(p->device_wrench.force, -0.6, 0.0, 0.0, 1e-12);
+  p->device_twist.linear[0] = -0.5; /* opening: 1 N - 10 N would pull */
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  CHECK(p->contacts == 0);
+  p->device_twist.linear[0] = 0.0;
+  p->device_twist.linear[1] = 5.0; /* along the plane: no force */
+  run(1);
+  check_v3(p->device_wrench.force, -1.0, 0.0, 0.0, 1e-12);
+}
+
+TEST(damper_takes_the_speed_of_the_surface)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -0.02, 0.0, 0.0);
+  p->damping = 10.0;
+  begin_model();
+  hapi_model_body *body = add_body(2);
+  body->flags = HAPI_BODY_DRIVEN;
+  hapi_v3_set(body->twist.linear, 0.3, 0.0, 0.0);
+  hapi_v3_set(body->twist.angular, 0.0, 0.0, 2.0);
+  hapi_v3_set(add_contact(0, 2, 0)->point_body, 0.0, 0.05, 0.0);
+  adopt();
+  run(1);
+  /* The point moves at 0.3 - 2 x 0.05 = 0.2 m/s; put the pointer there, 1 mm deep. */
+  f.bodies[2].pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hapi_v3_set(p->device_pose.position, -0.009, 0.05, 0.0);
+  p->device_twist.linear[0] = 0.25;
+  run(1);
+  check_v3(p->device_wrench.force, -(1.0 + 10.0 * 0.05), 0.0, 0.0, 1e-11);
+}
+
+TEST(a_static_contact_takes_no_impulse)
+{
+  hapi_tick_pointer *p = pointer_before_wall();
+  p->device_pose.position[0] = 0.0;
+  run(100);
+  check_v3(p->device_wrench.force, -10.0, 0.0, 0.0, 1e-11);
+  CHECK(f.tick.contact_ticks == 100);
+  CHECK_NEAR(f.tick.hand_impulse_abs, 0.0, 0.0); /* the audit is about dynamic bodies */
+  CHECK_NEAR(f.tick.peak_force, 10.0, 1e-11);
+  hapi_state *state = report();
+  check_v3(hapi_state_contacts(state)[0].force, 10.0, 0.0, 0.0, 1e-11);
+  CHECK(state->body_high == 0);
+}
+
+/* ---- eq. 8 to 11 ---- */
+
+/* A body of 2 kg at rest, 3 mm deep at a point off its centre. */
+static hapi_model_body *body_under_pointer(double depth)
+{
+  set_up();
+  (void)add_pointer(0, -1.0, 0.01, 0.0);
+  begin_model();
+  hapi_model_body *body = add_body(3);
+  hapi_model_contact *c = add_contact(1, 3, 0);
+  hapi_v3_set(c->point_body, -0.025, 0.01, 0.0);
+  set_free(c, 2.0, 0.02);
+  adopt();
+  run(1); /* seen apart */
+  f.pointers[0].device_pose.position[0] = -0.025 - 0.01 + depth;
+  return body;
+}
+
+TEST(one_step_of_eq_8_and_9_to_the_last_digit)
+{
+  body_under_pointer(0.003);
+  static const double b[6] = {0.5, -9.81, 0.25, 1.0, -2.0, 3.0};
+  memcpy(f.bodies[3].b, b, sizeof b);
+  run(1);
+  const hapi_local_body *body = &f.bodies[3];
+  const double w[3] = {1.0 * T, -2.0 * T, (3.0 - 0.03 / 0.02) * T}; /* r x F = (0, 0, -0.03) */
+  check_v3(f.pointers[0].device_wrench.force, -3.0, 0.0, 0.0, 1e-12);
+  check_v3(body->twist.linear, (3.0 / 2.0 + 0.5) * T, -9.81 * T, 0.25 * T, 1e-16);
+  check_v3(body->twist.angular, w[0], w[1], w[2], 1e-16);
+  /* eq. 10 and 11 with the new velocity, from the identity */
+  check_v3(body->pose.position, 2.0 * T * T, -9.81 * T * T, 0.25 * T * T, 1e-18);
+  double q[4] = {1.0, 0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2]};
+  hapi_quat_normalize(q);
+  for (int i = 0; i < 4; ++i) {
+    CHECK_NEAR(body->pose.quat_wxyz[i], q[i], 1e-16);
+  }
+}
+
+/* Planes are carried by the body: a quarter turn about z takes the normal from -x to -y. */
+TEST(contact_turns_with_the_body)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, 5.0, 1.0, 0.0);
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  hapi_v3_set(body->pose.position, 5.0, 2.0, 0.0);
+  const double half = sqrt(0.5);
+  const double quarter[4] = {half, 0.0, 0.0, half};
+  memcpy(body->pose.quat_wxyz, quarter, sizeof quarter);
+  hapi_v3_set(add_contact(0, 0, 0)->point_body, -0.5, 0.0, 0.0);
+  adopt();
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  p->device_pose.position[1] = 1.5 - 0.01 + 0.002;
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, -2.0, 0.0, 1e-11);
+  check_v3(f.bodies[0].impulse, 0.0, 2.0 * T, 0.0, 1e-14);
+  /* moment of (0, 2, 0) at the arm (0, -0.5, 0) */
+  check_v3(f.bodies[0].angular_impulse, 0.0, 0.0, 0.0, 1e-14);
+  p->device_pose.position[0] += 0.1;
+  run(1);
+  check_v3(f.bodies[0].angular_impulse, 0.0, 0.0, 0.0, 1e-14); /* at the contact point still */
+}
+
+TEST(quaternion_stays_unit_over_a_million_ticks)
+{
+  enum {
+    TICKS = 1000000
+  };
+  set_up();
+  begin_model();
+  hap_twist *twist = &add_body(0)->twist;
+  hapi_v3_set(twist->angular, 6.0, 0.0, 8.0); /* 10 rad/s */
+  adopt();
+  double worst = 0.0;
+  for (int i = 0; i < TICKS; ++i) {
+    run(1);
+    const double *q = f.bodies[0].pose.quat_wxyz;
+    double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    worst = fmax(worst, fabs(norm - 1.0));
+  }
+  CHECK(worst < 1e-12);
+  /* Eq. 11 and a division by the norm turn by 2 atan(w T / 2) a tick. */
+  double half = fmod(TICKS * atan(0.5 * 10.0 * T), 2.0 * acos(-1.0));
+  const double *q = f.bodies[0].pose.quat_wxyz;
+  CHECK_NEAR(q[0], cos(half), 1e-8);
+  check_v3(q + 1, 0.6 * sin(half), 0.0, 0.8 * sin(half), 1e-8);
+}
+
+TEST(free_fall_is_symplectic_euler)
+{
+  set_up();
+  begin_model();
+  add_body(0)->b[2] = -9.81;
+  adopt();
+  run(1000);
+  CHECK_NEAR(f.bodies[0].twist.linear[2], -9.81, 1e-12);
+  CHECK_NEAR(f.bodies[0].pose.position[2], -9.81 * T * T * 1000.0 * 1001.0 / 2.0, 1e-11);
+  CHECK(f.tick.tick == 1000);
+}
+
+/* ---- several ---- */
+
+TEST(several_pointers_on_one_body_add_up)
+{
+  set_up();
+  begin_model();
+  (void)add_body(1);
+  for (uint32_t i = 0; i < 3; ++i) {
+    (void)add_pointer(i, -1.0, 0.02 * i, 0.0);
+    hapi_model_contact *c = add_contact(i, 1, i);
+    hapi_v3_set(c->point_body, 0.0, 0.02 * i, 0.0);
+    set_free(c, 1.5, 0.01);
+  }
+  adopt();
+  run(1);
+  for (uint32_t i = 0; i < 3; ++i) {
+    f.pointers[i].device_pose.position[0] = -0.01 + 0.001 * (i + 1); /* 1, 2, 3 N */
+  }
+  run(1);
+  for (uint32_t i = 0; i < 3; ++i) {
+    check_v3(f.pointers[i].device_wrench.force, -1.0 * (i + 1), 0.0, 0.0, 1e-12);
+    CHECK(f.pointers[i].contacts == 1);
+  }
+  check_v3(f.bodies[1].twist.linear, 6.0 / 1.5 * T, 0.0, 0.0, 1e-15);
+  /* -(0.02 x 2 + 0.04 x 3) N m about z */
+  check_v3(f.bodies[1].twist.angular, 0.0, 0.0, -0.16 / 0.01 * T, 1e-14);
+  check_v3(f.bodies[1].impulse, 6.0 * T, 0.0, 0.0, 1e-15);
+  check_v3(f.bodies[1].angular_impulse, 0.0, 0.0, -0.16 * T, 1e-15);
+  check_v3(f.tick.hand_impulse, 6.0 * T, 0.0, 0.0, 1e-15);
+  CHECK_NEAR(f.tick.hand_impulse_abs, 6.0 * T, 1e-15);
+  CHECK(f.tick.contact_ticks == 1 && f.tick.pushing == 3);
+}
+
+TEST(one_pointer_between_several_bodies)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, 0.0, 0.0, 1.0);
+  begin_model();
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    (void)add_body(i);
+    hapi_model_contact *c = add_contact(i, i, 0);
+    double angle = acos(-1.0) / 4.0 * i;
+    hapi_v3_set(c->normal_body, cos(angle), sin(angle), 0.0);
+    hapi_v3_scale(-0.008, c->normal_body, c->point_body); /* each 2 mm deep at z = 0 */
+    set_free(c, 1.0 + i, 1.0);
+  }
+  adopt();
+  f.tick.contacts[0].point_body[2] = 0.0;
+  p->device_pose.position[0] = 1.0; /* far from half of them only: come back through the ramp */
+  run(1);
+  hapi_v3_set(p->device_pose.position, 0.0, 0.0, 0.0);
+  run(30);
+  /* Let go, then all around at once: forces cancel on the hand, each body gets its own. */
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    f.bodies[i].pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+    memset(&f.bodies[i].twist, 0, sizeof f.bodies[i].twist);
+  }
+  run(1);
+  CHECK(p->contacts == BODIES);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 1e-12);
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    CHECK_NEAR(hapi_v3_norm(f.bodies[i].twist.linear), 2.0 * T / (1.0 + i), 1e-14);
+  }
+}
+
+TEST(a_driven_body_pushes_and_is_not_pushed)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_DRIVEN;
+  body->twist.linear[0] = -0.5;
+  body->b[0] = 100.0; /* must not matter */
+  set_free(add_contact(0, 0, 0), 1e-3, 1e-6);
+  adopt();
+  run(180);
+  check_v3(f.bodies[0].pose.position, -0.09, 0.0, 0.0, 1e-12);
+  run(10);
+  check_v3(p->device_wrench.force, -1000.0 * 0.0045, 0.0, 0.0,
+           1e-9); /* places of the tick before */
+  check_v3(f.bodies[0].twist.linear, -0.5, 0.0, 0.0, 0.0);
+  check_v3(f.bodies[0].impulse, 0.0, 0.0, 0.0, 0.0);
+  CHECK_NEAR(f.tick.hand_impulse_abs, 0.0, 0.0);
+}
+
+/* ---- sleep, FOLLOWS, residual ---- */
+
+TEST(a_resting_body_moves_only_after_a_push)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_RESTING;
+  body->b[2] = -1.0; /* what a testing simulation of a waking body may see */
+  set_free(add_contact(0, 0, 0), 1.0, 1.0);
+  adopt();
+  run(50);
+  check_v3(f.bodies[0].pose.position, 0.0, 0.0, 0.0, 0.0);
+  check_v3(f.bodies[0].twist.linear, 0.0, 0.0, 0.0, 0.0);
+  CHECK((hapi_state_bodies(report())[0].flags & HAPI_BODY_RESTING) != 0);
+  p->device_pose.position[0] = -0.009;
+  run(1);
+  check_v3(f.bodies[0].twist.linear, T, 0.0, -T, 1e-15);
+  CHECK((hapi_state_bodies(report())[0].flags & HAPI_BODY_RESTING) == 0);
+  p->device_pose.position[0] = -0.1;
+  begin_model(); /* physics still thinks that it rests: the loop knows better */
+  body = add_body(0);
+  body->flags = HAPI_BODY_RESTING;
+  adopt();
+  run(10);
+  CHECK(f.bodies[0].pose.position[0] > 10.0 * T * T);
+}
+
+TEST(follows_hands_a_body_that_was_not_pushed_to_the_world)
+{
+  for (int follows = 0; follows < 2; ++follows) {
+    for (int push = 0; push < 2; ++push) {
+      set_up();
+      hapi_tick_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+      begin_model();
+      (void)add_body(0);
+      set_free(add_contact(0, 0, 0), 1.0, 1.0);
+      adopt();
+      run(1);
+      p->device_pose.position[0] = push != 0 ? -0.009 : -0.1;
+      run(1);
+      p->device_pose.position[0] = -0.1;
+      begin_model();
+      hapi_model_body *body = add_body(0);
+      body->flags = follows != 0 ? HAPI_BODY_FOLLOWS : 0;
+      hapi_v3_set(body->pose.position, 7.0, 8.0, 9.0);
+      hapi_v3_set(body->twist.linear, 1.0, 2.0, 3.0);
+      adopt();
+      bool worlds = follows != 0 && push == 0;
+      CHECK((f.bodies[0].pose.position[0] == 7.0) == worlds);
+      CHECK((f.bodies[0].twist.linear[0] == 1.0) == worlds);
+      CHECK((fabs(f.bodies[0].twist.linear[0] - T) < 1e-15) == (!worlds && push != 0));
+    }
+  }
+}
+
+TEST(a_body_that_comes_in_is_advanced_by_the_age_of_the_model)
+{
+  set_up();
+  begin_model();
+  hapi_model_body *body = add_body(5);
+  hapi_v3_set(body->twist.linear, 1.0, -2.0, 0.0);
+  f.now_ns += 20 * TICK_NS;
+  adopt();
+  check_v3(f.bodies[5].pose.position, 0.02, -0.04, 0.0, 1e-15);
+  begin_model();
+  body = add_body(5);
+  body->generation = 2; /* the slot has another body now */
+  hapi_v3_set(body->pose.position, 1.0, 1.0, 1.0);
+  adopt();
+  check_v3(f.bodies[5].pose.position, 1.0, 1.0, 1.0, 0.0);
+  check_v3(f.bodies[5].twist.linear, 0.0, 0.0, 0.0, 0.0);
+}
+
+static void adopt_residual(double total)
+{
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  for (int i = 0; i < 6; ++i) {
+    body->residual[i] = total * (i + 1);
+  }
+  adopt();
+}
+
+TEST(residual_is_added_once_also_when_a_model_is_skipped)
+{
+  set_up();
+  adopt_residual(3.0); /* it was there before the body came in: is in its twist already */
+  run(5);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 0.0, 0.0);
+  adopt_residual(3.5);
+  run(1);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
+  CHECK_NEAR(f.bodies[0].twist.angular[2], 0.5 * 6, 1e-14);
+  run(20);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
+  adopt_residual(3.5); /* nothing new */
+  run(3);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
+  /* 3.75 is lost on the way; the next one has it in its total */
+  adopt_residual(4.0);
+  run(2);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 1.0, 1e-15);
+  adopt_residual(4.25); /* two adoptions between two ticks */
+  adopt_residual(4.5);
+  run(2);
+  CHECK_NEAR(f.bodies[0].twist.linear[0], 1.5, 1e-15);
+  const hapi_state_body *told = &hapi_state_bodies(report())[0];
+  for (int i = 0; i < 6; ++i) {
+    CHECK_NEAR(told->residual[i], 4.5 * (i + 1), 1e-14);
+  }
+}
+
+/* ---- ramp ---- */
+
+TEST(a_contact_that_arrives_deep_ramps_from_zero)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, 0.0, 0.0, 0.0); /* 10 mm deep, 10 N */
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  int ticks = (int)lround(HAPI_RAMP_S / T);
+  for (int i = 0; i <= ticks + 5; ++i) {
+    if (i == ticks / 2) { /* a new model of the same contact goes on where it was */
+      begin_model();
+      (void)add_contact(0, HAPI_SLOT_NONE, 0);
+      adopt();
+    }
+    run(1);
+    double share = i < ticks ? (double)i / ticks : 1.0;
+    check_v3(p->device_wrench.force, -10.0 * share, 0.0, 0.0, 1e-9);
+  }
+  begin_model(); /* another contact in the same slot begins anew */
+  add_contact(0, HAPI_SLOT_NONE, 0)->generation = 2;
+  adopt();
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  p->device_pose.position[0] = -0.1; /* letting go ends the ramp */
+  run(1);
+  p->device_pose.position[0] = 0.0;
+  run(1);
+  check_v3(p->device_wrench.force, -10.0, 0.0, 0.0, 1e-9);
+}
+
+TEST(contacts_of_a_pointer_that_has_gone_are_not_used)
+{
+  set_up();
+  (void)add_pointer(0, 0.0, 0.0, 0.0);
+  begin_model();
+  add_contact(0, HAPI_SLOT_NONE, 0)->pointer_generation = 7;
+  adopt();
+  run(40);
+  CHECK(f.tick.contact_count == 0 && f.tick.contact_ticks == 0);
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  f.pointers[0].generation = 0;
+  run(40);
+  CHECK(f.tick.contact_ticks == 0);
+}
+
+/* ---- guard ---- */
+
+TEST(saturation_keeps_the_direction)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -1.0, -1.0, -1.0);
+  p->max_force = 20.0;
+  p->force_scale = 4.0;
+  begin_model();
+  for (uint32_t i = 0; i < 3; ++i) {
+    hapi_model_contact *c = add_contact(i, HAPI_SLOT_NONE, 0);
+    hapi_v3_set(c->normal_body, 0.0, 0.0, 0.0);
+    c->normal_body[i] = -1.0;
+  }
+  adopt();
+  run(1);
+  CHECK(!p->saturated && f.tick.saturated_ticks == 0);
+  hapi_v3_set(p->device_pose.position, 0.01, 0.02, 0.05); /* 20, 30, 60 N, 4 times that */
+  run(1);
+  const double norm = sqrt(4.0 + 9.0 + 36.0);
+  check_v3(p->device_wrench.force, -20.0 * 2 / norm, -20.0 * 3 / norm, -20.0 * 6 / norm, 1e-12);
+  check_v3(p->wrench.force, -5.0 * 2 / norm, -5.0 * 3 / norm, -5.0 * 6 / norm, 1e-12);
+  CHECK(p->saturated && f.tick.saturated_ticks == 1);
+  CHECK_NEAR(f.tick.peak_force, 5.0, 1e-12);
+  hapi_v3_set(p->device_pose.position, -1.0, -1.0, -0.009);
+  run(1);
+  check_v3(p->device_wrench.force, 0.0, 0.0, -4.0, 1e-11);
+  CHECK(!p->saturated && f.tick.saturated_ticks == 1);
+}
+
+static bool state_is_finite(hapi_state *state)
+{
+  bool good = true;
+  for (uint32_t i = 0; i < state->body_high; ++i) {
+    const hapi_state_body *b = &hapi_state_bodies(state)[i];
+    good = good && hapi_finite(b->pose.position, 3) && hapi_finite(b->pose.quat_wxyz, 4) &&
+           hapi_finite(b->twist.linear, 3) && hapi_finite(b->twist.angular, 3) &&
+           hapi_finite(b->impulse, 3) && hapi_finite(b->angular_impulse, 3) &&
+           hapi_finite(b->residual, 6);
+  }
+  for (uint32_t i = 0; i < state->contact_count; ++i) {
+    good = good && hapi_finite(hapi_state_contacts(state)[i].force, 3);
+  }
+  for (uint32_t i = 0; i < state->pointer_count; ++i) {
+    const hapi_state_pointer *p = &hapi_state_pointers(state)[i];
+    good = good && hapi_finite(p->pose.position, 3) && hapi_finite(p->pose.quat_wxyz, 4) &&
+           hapi_finite(p->twist.linear, 3) && hapi_finite(p->twist.angular, 3);
+  }
+  return good;
+}
+
+static bool force_is_zero(const hapi_tick_pointer *p)
+{
+  return hapi_v3_norm(p->device_wrench.force) == 0.0 &&
+         hapi_v3_norm(p->device_wrench.torque) == 0.0 && hapi_v3_norm(p->wrench.force) == 0.0;
+}
+
+/* One bad number among the 13 of a device's sample. */
+static void bad_sample(int place, double bad)
+{
+  body_under_pointer(0.003);
+  hapi_tick_pointer *other = add_pointer(1, 3.0, 0.0, 0.0);
+  hapi_tick_pointer *p = &f.pointers[0];
+  run(1);
+  CHECK(f.tick.fault == HAP_FAULT_NONE && p->device_wrench.force[0] < -1.0);
+  hap_pose good_pose = p->device_pose;
+  double *sample[13];
+  for (int i = 0; i < 13; ++i) {
+    sample[i] = i < 3    ? &p->device_pose.position[i]
+                : i < 7  ? &p->device_pose.quat_wxyz[i - 3]
+                : i < 10 ? &p->device_twist.linear[i - 7]
+                         : &p->device_twist.angular[i - 10];
+  }
+  *sample[place] = bad;
+  run(1);
+  CHECK(f.tick.fault == HAP_FAULT_DEVICE_POSE && f.tick.faults == 1);
+  CHECK(force_is_zero(p) && force_is_zero(other));
+  CHECK(state_is_finite(report()));
+  p->device_pose = good_pose;
+  memset(&p->device_twist, 0, sizeof p->device_twist);
+  run(10); /* latched */
+  CHECK(force_is_zero(p) && f.tick.fault == HAP_FAULT_DEVICE_POSE && f.tick.faults == 1);
+  double before = f.bodies[3].impulse[0];
+  run(5);
+  CHECK_NEAR(f.bodies[3].impulse[0], before, 0.0); /* and the world is not pushed either */
+  p->device_pose.position[0] += 0.01;
+  hapi_tick_reset_fault(&f.tick);
+  run(1);
+  CHECK(f.tick.fault == HAP_FAULT_NONE && p->device_wrench.force[0] < -1.0);
+}
+
+TEST(bad_device_samples_latch_a_fault_and_go_no_further)
+{
+  const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, 1e30, -1e30};
+  for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
+    for (int place = 0; place < 13; ++place) {
+      bad_sample(place, bad[k]);
+    }
+  }
+}
+
+TEST(a_fault_that_goes_on_latches_again_after_a_reset)
+{
+  body_under_pointer(0.003);
+  f.pointers[0].device_pose.position[1] = (double)NAN;
+  run(5);
+  CHECK(f.tick.faults == 1);
+  hapi_tick_reset_fault(&f.tick);
+  run(5);
+  CHECK(f.tick.faults == 2 && f.tick.fault == HAP_FAULT_DEVICE_POSE);
+  hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_WRITE); /* the first one stays */
+  CHECK(f.tick.faults == 2 && f.tick.fault == HAP_FAULT_DEVICE_POSE);
+}
+
+TEST(a_local_state_that_is_not_finite_is_stopped)
+{
+  const double bad[] = {(double)NAN, (double)INFINITY, 1e30};
+  for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
+    for (int place = 0; place < 6; ++place) {
+      body_under_pointer(0.003);
+      run(1);
+      f.bodies[3].b[place] = bad[k];
+      hap_pose before = f.bodies[3].pose;
+      run(1);
+      CHECK(f.tick.fault == HAP_FAULT_LOCAL_STATE);
+      CHECK(force_is_zero(&f.pointers[0]));
+      CHECK(state_is_finite(report()));
+      CHECK(memcmp(&before, &f.bodies[3].pose, sizeof before) == 0);
+      body_under_pointer(0.003);
+      f.contacts[0].a[place][0] = bad[k];
+      run(1);
+      CHECK(f.tick.fault == HAP_FAULT_LOCAL_STATE && state_is_finite(report()));
+      CHECK(force_is_zero(&f.pointers[0]));
+    }
+  }
+}
+
+/* ---- device and world ---- */
+
+/* What the hand does on the device and what the pointer does in the world are the same work up to
+ * force_scale / motion_scale, and position, velocity and force go through the same frame. */
+TEST(scales_and_frame_keep_virtual_work)
+{
+  const double frame[4] = {0.5, -0.1, 0.7, 0.3};
+  static const double motion[] = {1.0, 0.25, 3.0};
+  static const double force[] = {1.0, 2.0, 0.1};
+  for (size_t i = 0; i < 9; ++i) {
+    hapi_tick_pointer *p = pointer_before_wall();
+    p->motion_scale = motion[i % 3];
+    p->force_scale = force[i / 3];
+    hapi_v3_set(p->pose_world_device.position, 0.3, -0.2, 0.1);
+    memcpy(p->pose_world_device.quat_wxyz, frame, sizeof frame);
+    hapi_quat_normalize(p->pose_world_device.quat_wxyz);
+    /* the device's position for 2 mm depth, and one 1e-6 s later at its velocity */
+    const double target[3] = {-0.008, 0.4, -0.7};
+    hapi_pose_unpoint(p->pose_world_device.position, p->pose_world_device.quat_wxyz, target,
+                      p->device_pose.position);
+    hapi_v3_scale(1.0 / p->motion_scale, p->device_pose.position, p->device_pose.position);
+    hapi_v3_set(p->device_twist.linear, 0.02, -0.05, 0.03);
+    hapi_v3_set(p->device_twist.angular, 0.5, 0.2, -0.1);
+    run(1);
+    check_v3(p->pose.position, target[0], target[1], target[2], 1e-14);
+    check_v3(p->wrench.force, -2.0, 0.0, 0.0, 1e-10);
+    double at_device = hapi_v3_dot(p->device_wrench.force, p->device_twist.linear);
+    double in_world = hapi_v3_dot(p->wrench.force, p->twist.linear);
+    CHECK_NEAR(at_device, in_world * p->force_scale / p->motion_scale, 1e-12);
+    CHECK(fabs(at_device) > 1e-4);
+    CHECK_NEAR(hapi_v3_norm(p->twist.angular), hapi_v3_norm(p->device_twist.angular), 1e-15);
+    double moved[3];
+    double force_before[3];
+    hapi_v3_copy(p->pose.position, moved);
+    hapi_v3_copy(p->device_wrench.force, force_before);
+    hapi_v3_madd(p->device_pose.position, 1e-3, p->device_twist.linear, p->device_pose.position);
+    run(1);
+    hapi_v3_madd(moved, 1e-3, p->twist.linear, moved);
+    check_v3(p->pose.position, moved[0], moved[1], moved[2], 1e-14);
+    /* stiffness at the device = k x motion_scale x force_scale, along the wall's normal there */
+    double normal[3];
+    const double x[3] = {1.0, 0.0, 0.0};
+    hapi_quat_unrotate(p->pose_world_device.quat_wxyz, x, normal);
+    double step = 1e-3 * hapi_v3_dot(normal, p->device_twist.linear);
+    double change = hapi_v3_dot(normal, p->device_wrench.force) - hapi_v3_dot(normal, force_before);
+    CHECK_NEAR(change, -1000.0 * p->motion_scale * p->force_scale * step, 1e-9);
+  }
+}
+
+/* ---- model IMPULSE and SINGLE ---- */
+
+static void impulse_model(hap_impulse_pose shown, double x, double sign)
+{
+  begin_model();
+  f.model->model = HAP_MODEL_IMPULSE;
+  f.model->impulse_pose = shown;
+  f.model->blend_s = 0.05;
+  hapi_model_body *body = add_body(0);
+  body->pose.position[0] = x;
+  body->pose.quat_wxyz[0] = sign;
+  body->b[2] = -9.81; /* not of this model */
+  set_free(add_contact(0, 0, 0), 1.0, 1.0);
+  adopt();
+}
+
+TEST(impulse_interpolates_from_the_last_but_one_to_the_last_pose)
+{
+  set_up();
+  (void)add_pointer(0, -1.0, 0.0, 0.0);
+  impulse_model(HAP_IMPULSE_INTERPOLATED, 0.0, 1.0);
+  run(50);
+  impulse_model(HAP_IMPULSE_INTERPOLATED, 0.1, -1.0); /* -q is the same attitude */
+  for (int i = 0; i < 80; ++i) {
+    run(1);
+    double share = i < 50 ? i / 50.0 : 1.0;
+    check_v3(f.bodies[0].pose.position, 0.1 * share, 0.0, 0.0, 1e-14);
+    CHECK_NEAR(fabs(f.bodies[0].pose.quat_wxyz[0]), 1.0, 1e-15);
+    CHECK_NEAR(f.bodies[0].twist.linear[0], 2.0, 1e-13);
+  }
+  impulse_model(HAP_IMPULSE_INTERPOLATED, 0.0, 1.0);
+  run(1);
+  CHECK_NEAR(f.bodies[0].pose.position[0], 0.1, 1e-14); /* without a jump */
+}
+
+TEST(impulse_holds_the_last_pose_and_sums_the_impulse)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -1.0, 0.0, 0.0);
+  impulse_model(HAP_IMPULSE_HELD, 0.0, 1.0);
+  run(1);
+  p->device_pose.position[0] = -0.008;
+  run(49);
+  check_v3(f.bodies[0].pose.position, 0.0, 0.0, 0.0, 0.0);
+  check_v3(f.bodies[0].impulse, 49 * 2.0 * T, 0.0, 0.0, 1e-13);
+  impulse_model(HAP_IMPULSE_HELD, 0.002, 1.0);
+  run(50);
+  check_v3(f.bodies[0].pose.position, 0.002, 0.0, 0.0, 0.0);
+  CHECK_NEAR(f.bodies[0].impulse[0], 49 * 2.0 * T, 1e-13); /* total goes on; apart now */
+  f.model->model = HAP_MODEL_SINGLE;
+  f.model->blend_s = 0.0;
+  begin_model();
+  add_body(0)->pose.position[0] = -0.001;
+  (void)add_contact(0, 0, 0);
+  adopt();
+  run(1);
+  check_v3(f.bodies[0].pose.position, -0.001, 0.0, 0.0, 0.0);
+  CHECK_NEAR(f.bodies[0].impulse[0], 49 * 2.0 * T + 3.0 * T, 1e-13);
+}
+
+/* ---- bounce, totals, cost ---- */
+
+/* The paper's Fig. 5: 60 kg at 0.017 m/s into a fixed pointer. Symplectic Euler conserves a
+ * neighbour of the energy, so the speed comes back within (w T)^2. */
+TEST(a_bounce_conserves_energy)
+{
+  static const double stiffness[] = {1000.0, 3000.0, 10000.0};
+  for (int k = 0; k < 3; ++k) {
+    const double m = 60.0;
+    const double v = 0.017;
+    const double omega = sqrt(stiffness[k] / m);
+    set_up();
+    add_pointer(0, 0.0, 0.0, 0.0)->stiffness = stiffness[k];
+    begin_model();
+    hapi_model_body *body = add_body(0);
+    hapi_v3_set(body->pose.position, 0.1119, 0.0, 0.0); /* 1.9 mm before contact */
+    body->twist.linear[0] = -v;
+    hapi_model_contact *c = add_contact(0, 0, 0);
+    c->point_body[0] = -0.1;
+    set_free(c, m, 0.4);
+    adopt();
+    double contact_ns = 0.0;
+    for (int i = 0; i < 1200; ++i) {
+      run(1);
+      contact_ns += f.pointers[0].contacts != 0 ? TICK_NS : 0.0;
+    }
+    double bound = omega * omega * T * T;
+    CHECK_NEAR(f.bodies[0].twist.linear[0], v, bound * v);
+    CHECK_NEAR(f.bodies[0].impulse[0], 2.0 * m * v, bound * 2.0 * m * v);
+    CHECK_NEAR(f.tick.peak_force, v * sqrt(stiffness[k] * m), 5e-4 * v * sqrt(stiffness[k] * m));
+    CHECK_NEAR(1e-9 * contact_ns, acos(-1.0) / omega, 2.0 * T);
+    CHECK_NEAR(f.pointers[0].wrench.force[0], 0.0, 0.0);
+  }
+}
+
+TEST(totals_run_on_over_models_and_begin_anew_with_a_generation)
+{
+  set_up();
+  hapi_tick_pointer *p = add_pointer(0, -1.0, 0.0, 0.0);
+  double expected = 0.0;
+  for (int n = 0; n < 20; ++n) {
+    begin_model();
+    (void)add_body(0);
+    (void)add_contact(0, 0, 0); /* A = 0: does not give way */
+    adopt();
+    for (int i = 0; i < 20; ++i) {
+      run(1);
+      expected += T * fabs(p->wrench.force[0]);
+    }
+    p->device_pose.position[0] = n % 2 == 0 ? -0.005 : -1.0;
+  }
+  CHECK_NEAR(expected, 10 * 20 * 5.0 * T, 1e-12); /* every second of 20 intervals */
+  CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], expected, 1e-12);
+  CHECK_NEAR(f.tick.hand_impulse[0], expected, 1e-12);
+  CHECK_NEAR(f.tick.hand_impulse_abs, expected, 1e-12);
+  begin_model();
+  add_body(0)->generation = 2;
+  adopt();
+  run(1);
+  CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], 0.0, 0.0);
+  CHECK(hapi_state_bodies(report())[0].generation == 2);
+  CHECK_NEAR(f.tick.hand_impulse[0], expected, 1e-12);
+}
+
+TEST(the_hash_tells_any_change)
+{
+  uint64_t first = 0;
+  for (int run_number = 0; run_number < 3; ++run_number) {
+    body_under_pointer(0.003);
+    f.pointers[0].device_pose.position[1] += run_number == 2 ? 1e-16 : 0.0;
+    run(100);
+    first = run_number == 0 ? f.tick.hash : first;
+    CHECK((f.tick.hash == first) == (run_number < 2));
+  }
+}
+
+/* Page faults of the whole cycle, with a device, bodies and a trace. */
+TEST(ten_thousand_cycles_touch_no_new_memory)
+{
+  hapi_haptic *haptic = NULL;
+  hap_device *device = NULL;
+  hap_pointer_id id;
+  hap_pointer_def def;
+  hap_detail detail;
+  struct rusage before;
+  struct rusage after;
+  set_up();
+  hapi_haptic_config config = {capacity, 1000.0, true, 0, 12000, f.exchange};
+  REQUIRE(hapi_haptic_create(&config, &haptic) == HAP_OK);
+  REQUIRE(hap_device_open("virtual:sine=0.02/0/0,hz=2,hand=tense", &device, &detail) == HAP_OK);
+  hap_pointer_def_init(&def, sizeof def);
+  def.device = device;
+  REQUIRE(hapi_haptic_add_pointer(haptic, &def, &id, &detail) == HAP_OK);
+  REQUIRE(hapi_haptic_begin(haptic, 0, &detail) == HAP_OK);
+  begin_model();
+  (void)add_body(0);
+  hapi_v3_set(add_contact(0, 0, 0)->point_body, 0.015, 0.0, 0.0);
+  set_free(&hapi_model_contacts(f.model)[0], 1.0, 1.0);
+  hapi_exchange_model_publish(f.exchange);
+  for (int i = 0; i < 11000; ++i) {
+    if (i == 1000) {
+      getrusage(RUSAGE_THREAD, &before);
+    }
+    hapi_haptic_cycle(haptic, i * TICK_NS);
+  }
+  getrusage(RUSAGE_THREAD, &after);
+  hap_stats stats;
+  hapi_haptic_stats(haptic, &stats);
+  CHECK(stats.ticks == 11000 && stats.contact_ticks > 0 && stats.models_adopted == 1);
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__) /* they touch memory of theirs */
+  CHECK(after.ru_minflt == before.ru_minflt);
+  CHECK(after.ru_majflt == before.ru_majflt);
+#endif
+  hapi_haptic_destroy(haptic);
+  hap_device_close(device);
+}
+
+int main(void)
+{
+  RUN(force_is_spring_on_depth);
+  RUN(damper_acts_only_in_contact_and_never_pulls);
+  RUN(damper_takes_the_speed_of_the_surface);
+  RUN(a_static_contact_takes_no_impulse);
+  RUN(one_step_of_eq_8_and_9_to_the_last_digit);
+  RUN(contact_turns_with_the_body);
+  RUN(quaternion_stays_unit_over_a_million_ticks);
+  RUN(free_fall_is_symplectic_euler);
+  RUN(several_pointers_on_one_body_add_up);
+  RUN(one_pointer_between_several_bodies);
+  RUN(a_driven_body_pushes_and_is_not_pushed);
+  RUN(a_resting_body_moves_only_after_a_push);
+  RUN(follows_hands_a_body_that_was_not_pushed_to_the_world);
+  RUN(a_body_that_comes_in_is_advanced_by_the_age_of_the_model);
+  RUN(residual_is_added_once_also_when_a_model_is_skipped);
+  RUN(a_contact_that_arrives_deep_ramps_from_zero);
+  RUN(contacts_of_a_pointer_that_has_gone_are_not_used);
+  RUN(saturation_keeps_the_direction);
+  RUN(bad_device_samples_latch_a_fault_and_go_no_further);
+  RUN(a_fault_that_goes_on_latches_again_after_a_reset);
+  RUN(a_local_state_that_is_not_finite_is_stopped);
+  RUN(scales_and_frame_keep_virtual_work);
+  RUN(impulse_interpolates_from_the_last_but_one_to_the_last_pose);
+  RUN(impulse_holds_the_last_pose_and_sums_the_impulse);
+  RUN(a_bounce_conserves_energy);
+  RUN(totals_run_on_over_models_and_begin_anew_with_a_generation);
+  RUN(the_hash_tells_any_change);
+  RUN(ten_thousand_cycles_touch_no_new_memory);
+  hapi_exchange_destroy(f.exchange);
+  return tap_done();
+}

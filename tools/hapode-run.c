@@ -1,0 +1,213 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The program: one scene, one session, one summary. */
+
+#include <errno.h>
+#include <inttypes.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "tools/plot.h"
+#include "tools/rig.h"
+#include "tools/run_list.h"
+#include "tools/run_loop.h"
+#include "tools/run_options.h"
+#include "tools/run_summary.h"
+
+enum exit_code {
+  EXIT_GOOD = 0,
+  EXIT_FAILED = 1,
+  EXIT_USAGE = 2
+};
+
+static int complain(int code, const char *text)
+{
+  fprintf(stderr, "hapode-run: %s\n", text);
+  if (code == EXIT_USAGE) {
+    fputs("hapode-run --help says what there is, --list which scenes, models and devices\n",
+          stderr);
+  }
+  return code;
+}
+
+/* What cannot be written must be known before the hand has moved. */
+static bool check_writable(const char *option, const char *path, FILE *opened, hap_detail *detail)
+{
+  if (opened == NULL) {
+    snprintf(detail->text, sizeof detail->text, "%s %.300s: cannot be written: %s", option, path,
+             strerror(errno));
+  }
+  return opened != NULL;
+}
+
+static bool open_trace(const run_options *options, run_loop *loop, hap_detail *detail)
+{
+  if (options->trace_path == NULL) {
+    return true;
+  }
+  loop->trace.file = fopen(options->trace_path, "w");
+  loop->trace.pointers = loop->rig->pointer_count;
+  size_t bodies = loop->rig->scene->body_count;
+  loop->trace.bodies = bodies < HAP_TRACE_BODIES_MAX ? bodies : HAP_TRACE_BODIES_MAX;
+  return check_writable("--trace", options->trace_path, loop->trace.file, detail);
+}
+
+static bool open_picture(const run_options *options, run_loop *loop, hap_detail *detail)
+{
+  if (options->plot_path == NULL) {
+    return true;
+  }
+  struct stat before;
+  bool made = lstat(options->plot_path, &before) != 0;
+  FILE *file = fopen(options->plot_path, "a");
+  if (!check_writable("--plot", options->plot_path, file, detail)) {
+    return false;
+  }
+  fclose(file);
+  if (made) {
+    (void)unlink(options->plot_path); /* gnuplot makes it again, if it comes to that */
+  }
+  if (!plot_available()) {
+    fputs("hapode-run: " PLOT_ABSENT_TEXT "\n", stderr);
+    return true;
+  }
+  loop->picture =
+      run_picture_create(loop->seconds, loop->rig->pointer_count, options->rig.def.haptic_hz);
+  snprintf(detail->text, sizeof detail->text, "no memory for the picture");
+  return loop->picture != NULL;
+}
+
+static bool close_trace(run_loop *loop, hap_detail *detail)
+{
+  FILE *file = loop->trace.file;
+  loop->trace.file = NULL;
+  if (file == NULL || fclose(file) == 0) {
+    return true;
+  }
+  snprintf(detail->text, sizeof detail->text, "--trace %.300s: cannot be written: %s",
+           loop->options->trace_path, strerror(errno));
+  return false;
+}
+
+static hap_status draw(const run_loop *loop, hap_detail *detail)
+{
+  const run_options *o = loop->options;
+  char devices[80];
+  char title[256];
+  if (loop->picture == NULL) {
+    return HAP_OK;
+  }
+  run_summary_devices(&o->rig, devices, sizeof devices);
+  snprintf(title, sizeof title, "%.60s, model %s, physics %g Hz, haptic %g Hz, device %s",
+           o->rig.scene, hap_model_name(o->rig.def.model), run_summary_physics_hz(o),
+           o->rig.def.haptic_hz, devices);
+  return run_picture_draw(loop->picture, o->plot_path, title, detail);
+}
+
+static void tell(const run_options *options, hap_status status, const hap_stats *stats)
+{
+  if (status == HAP_END) {
+    fprintf(stderr, "hapode-run: stopped early, after %.3f s\n",
+            (double)stats->ticks / options->rig.def.haptic_hz);
+  }
+  if (stats->trace_dropped > 0) {
+    fprintf(stderr, "hapode-run: %" PRIu64 " rows of the trace were dropped\n",
+            stats->trace_dropped);
+  }
+}
+
+/* Runs and reports; the files are open. */
+static int run_and_report(run_loop *loop)
+{
+  hap_stats stats;
+  hap_detail detail = {""};
+  hap_status status = run_loop_run(loop, &stats, &detail);
+  int code = EXIT_GOOD;
+  if (status < HAP_OK) {
+    code = complain(EXIT_FAILED, detail.text[0] != '\0' ? detail.text : hap_status_text(status));
+  }
+  if (!close_trace(loop, &detail) && code == EXIT_GOOD) {
+    code = complain(EXIT_FAILED, detail.text);
+  }
+  if (draw(loop, &detail) < HAP_OK) {
+    code = complain(EXIT_FAILED, detail.text);
+  }
+  if (stats.ticks > 0) {
+    tell(loop->options, status, &stats);
+    run_summary_print(loop->options, &stats, stdout);
+  }
+  if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+    code = complain(EXIT_FAILED, "the summary cannot be written to stdout");
+  }
+  return code;
+}
+
+static int run_in(const run_options *options, rig *r)
+{
+  hap_detail detail = {""};
+  double seconds = options->seconds > 0.0 ? options->seconds : r->scene->parameters.duration;
+  run_loop loop = {.options = options, .rig = r, .seconds = seconds};
+  run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
+  int code = EXIT_FAILED;
+  if (open_trace(options, &loop, &detail) && open_picture(options, &loop, &detail)) {
+    code = run_and_report(&loop);
+  } else {
+    complain(EXIT_FAILED, detail.text);
+    (void)close_trace(&loop, &detail);
+  }
+  run_picture_destroy(loop.picture);
+  return code;
+}
+
+/* A name or argument that cannot be is wrong usage, all else a failure. */
+static int refuse(const rig *r, hap_status status, const hap_detail *detail)
+{
+  static const char *const parts[] = {
+      [RIG_SCENE] = "--scene: ", [RIG_SESSION] = "", [RIG_POINTER] = "--device: "};
+  hap_detail whole;
+  snprintf(whole.text, sizeof whole.text, "%s%.490s", parts[r->failed],
+           detail->text[0] != '\0' ? detail->text : hap_status_text(status));
+  bool usage = status == HAP_ERROR_NOT_FOUND || status == HAP_ERROR_ARGUMENT;
+  return complain(usage ? EXIT_USAGE : EXIT_FAILED, whole.text);
+}
+
+static int run_session(run_options *options)
+{
+  rig r;
+  hap_detail detail = {""};
+  options->rig.def.trace_rows = run_loop_trace_rows(options);
+  run_loop_catch_signals();
+  dInitODE2(0);
+  hap_status status = rig_create(&options->rig, &r, &detail);
+  int code = status < HAP_OK ? refuse(&r, status, &detail) : run_in(options, &r);
+  if (status >= HAP_OK) {
+    rig_destroy(&r);
+  }
+  dCloseODE();
+  return code;
+}
+
+int main(int argc, char **argv)
+{
+  run_options options;
+  hap_detail detail = {""};
+  if (run_options_parse(argc, argv, &options, &detail) < HAP_OK) {
+    return complain(EXIT_USAGE, detail.text);
+  }
+  switch (options.action) {
+    case RUN_LIST:
+      run_list_print(stdout);
+      break;
+    case RUN_HELP:
+      run_options_help(stdout);
+      break;
+    case RUN_VERSION:
+      printf("hapode-run %s\n", hap_version());
+      break;
+    case RUN_SESSION:
+      return run_session(&options);
+  }
+  return EXIT_GOOD;
+}

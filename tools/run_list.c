@@ -1,0 +1,65 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/run_list.h"
+
+#include "scenes/scenes.h"
+#include "tools/run_effects.h"
+
+static const char *model_text(hap_model model)
+{
+  switch (model) {
+    case HAP_MODEL_SINGLE:
+      return "the world itself is stepped at the haptic rate (paper's Method 1)";
+    case HAP_MODEL_IMPULSE:
+      return "force on the last known pose, its impulse goes to the world (Method 3)";
+    case HAP_MODEL_ACCELERANCE:
+      return "testing simulations give A and b to the loop (Method 2, the default)";
+    case HAP_MODEL_CONTACT:
+      return "contacts in the loop; not supported in this version";
+  }
+  return "";
+}
+
+static void print_scene(const scene_parameters *p, FILE *out)
+{
+  char name[32];
+  snprintf(name, sizeof name, "%s%s", p->name, p->count_default > 0 ? "[:N]" : "");
+  fprintf(out, "  %-12s %s\n", name, p->text);
+  fprintf(out, "%15s", "");
+  if (p->count_default > 0) {
+    fprintf(out, "N %d, ", p->count_default);
+  }
+  fprintf(out, "mass %g kg, size %g m, mu %g, gravity %g m/s^2, gap %g m\n", p->mass, p->size,
+          p->mu, p->gravity, p->gap);
+  fprintf(out, "%15spointer: radius %g m, k %g N/m, d %g N s/m\n", "", p->radius, p->stiffness,
+          p->damping);
+  fprintf(out, "%15sduration %g s, %d iterations", "", p->duration, p->iterations);
+  if (p->hinge_torque > 0.0) {
+    fprintf(out, ", hinge friction %g N m", p->hinge_torque);
+  }
+  fputc('\n', out);
+  for (int i = 0; i < p->pointers; ++i) {
+    fprintf(out, "%15shand: %s\n", "", p->hands[i]);
+  }
+}
+
+void run_list_print(FILE *out)
+{
+  const scene_parameters *p;
+  const char *name;
+  const char *text = "";
+  fputs("scenes:\n", out);
+  for (size_t i = 0; (p = scene_table_at(i)) != NULL; ++i) {
+    print_scene(p, out);
+  }
+  fputs("\nmodels:\n", out);
+  for (int i = 0; hap_model_name((hap_model)i) != NULL; ++i) {
+    fprintf(out, "  %-12s %s\n", hap_model_name((hap_model)i), model_text((hap_model)i));
+  }
+  fputs("\ndevices:\n", out);
+  for (size_t i = 0; (name = hap_device_name_at(i, &text)) != NULL; ++i) {
+    fprintf(out, "  %-12s %s\n", name, text != NULL ? text : "");
+  }
+  fputs("\neffects (in this version the model decides; auto is always right):\n", out);
+  run_effects_list(out);
+}

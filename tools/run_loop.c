@@ -1,0 +1,197 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/run_loop.h"
+
+#include <errno.h>
+#include <math.h>
+#include <signal.h>
+#include <string.h>
+#include <time.h>
+
+#include "tools/run_summary.h"
+
+#define PAUSE_S 0.01 /* between two looks at the session */
+#define PROGRESS_S 0.1
+#define ROWS_AT_ONCE 64
+#define ROWS_MIN 2000 /* the reader may be away for 2 s at 1 kHz */
+#define ROWS_MAX 20000
+
+static volatile sig_atomic_t stop_wanted;
+
+/* Where a run stands. */
+typedef struct watch {
+  const run_loop *loop;
+  double next_sample;   /* s */
+  double next_progress; /* s, wall clock */
+  hap_detail *detail;
+} watch;
+
+static void want_stop(int number)
+{
+  (void)number;
+  stop_wanted = 1;
+}
+
+void run_loop_catch_signals(void)
+{
+  const int ending[] = {SIGINT, SIGTERM, SIGHUP};
+  struct sigaction action;
+  memset(&action, 0, sizeof action);
+  action.sa_handler = want_stop;
+  sigemptyset(&action.sa_mask);
+  for (size_t i = 0; i < sizeof ending / sizeof ending[0]; ++i) {
+    sigaction(ending[i], &action, NULL);
+  }
+  /* A reader of the trace that goes away must not end us with the force on. */
+  action.sa_handler = SIG_IGN;
+  sigaction(SIGPIPE, &action, NULL);
+}
+
+int32_t run_loop_trace_rows(const run_options *options)
+{
+  if (options->trace_path == NULL && options->plot_path == NULL) {
+    return 0;
+  }
+  return (int32_t)fmin(fmax(options->rig.def.haptic_hz, ROWS_MIN), ROWS_MAX);
+}
+
+static double wall_clock(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Takes all rows that are there. */
+static hap_status drain(const run_loop *loop, hap_detail *detail)
+{
+  hap_trace_row rows[ROWS_AT_ONCE];
+  size_t count = 0;
+  if (loop->trace.file == NULL && loop->picture == NULL) {
+    return HAP_OK;
+  }
+  while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, &count) == HAP_OK) {
+    for (size_t i = 0; i < count && loop->picture != NULL; ++i) {
+      run_picture_add_row(loop->picture, &rows[i]);
+    }
+    for (size_t i = 0; i < count && loop->trace.file != NULL; ++i) {
+      trace_csv_row(&loop->trace, &rows[i]);
+    }
+    if (loop->trace.file != NULL && ferror(loop->trace.file) != 0) {
+      snprintf(detail->text, sizeof detail->text, "--trace %.300s: cannot be written: %s",
+               loop->options->trace_path, strerror(errno));
+      return HAP_ERROR_IO;
+    }
+  }
+  return HAP_OK;
+}
+
+static double strongest_force(const rig *r)
+{
+  double strongest = 0.0;
+  for (size_t i = 0; i < r->pointer_count; ++i) {
+    hap_pointer_state state;
+    if (hap_pointer_get(r->session, r->pointers[i], &state, sizeof state) >= HAP_OK) {
+      const double *f = state.wrench.force;
+      strongest = fmax(strongest, sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));
+    }
+  }
+  return strongest;
+}
+
+static void show_progress(watch *w, double t, const hap_stats *stats)
+{
+  double now = wall_clock();
+  if (now < w->next_progress) {
+    return;
+  }
+  run_progress_show(&w->loop->progress, w->loop->seconds - t, strongest_force(w->loop->rig),
+                    stats->missed_ticks);
+  w->next_progress = now + PROGRESS_S;
+}
+
+/* What is to be done between two stretches of the run, at time t of it. */
+static hap_status look(watch *w, double t)
+{
+  const run_loop *loop = w->loop;
+  hap_stats stats;
+  hap_status status = drain(loop, w->detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
+  if (loop->picture != NULL && t >= w->next_sample) {
+    run_picture_add_stats(loop->picture, t, &stats, 1.0 / run_summary_physics_hz(loop->options));
+    w->next_sample = t + run_picture_interval(loop->picture);
+  }
+  show_progress(w, t, &stats);
+  if (stats.fault != HAP_FAULT_NONE) {
+    (void)hap_session_detail(loop->rig->session, w->detail);
+    return HAP_ERROR_FAULT;
+  }
+  return HAP_OK;
+}
+
+static hap_status run_threads(watch *w)
+{
+  const struct timespec pause = {0, (long)(1e9 * PAUSE_S)};
+  double start = wall_clock();
+  double t = 0.0;
+  hap_status status = HAP_OK;
+  while (status >= HAP_OK && t < w->loop->seconds) {
+    if (stop_wanted != 0) {
+      return HAP_END;
+    }
+    double left = w->loop->seconds - t;
+    struct timespec last = {0, (long)(1e9 * fmin(left, PAUSE_S))};
+    (void)nanosleep(left < PAUSE_S ? &last : &pause, NULL);
+    t = wall_clock() - start;
+    status = look(w, t);
+  }
+  return status;
+}
+
+static hap_status run_lockstep(watch *w)
+{
+  hap_session *session = w->loop->rig->session;
+  double hz = w->loop->options->rig.def.haptic_hz;
+  uint64_t all = (uint64_t)llround(w->loop->seconds * hz);
+  uint64_t stretch = (uint64_t)ceil(PAUSE_S * hz);
+  hap_status status = HAP_OK;
+  for (uint64_t done = 0; status >= HAP_OK && done < all;) {
+    if (stop_wanted != 0) {
+      return HAP_END;
+    }
+    uint64_t next = all - done < stretch ? all - done : stretch;
+    status = hap_session_advance(session, next);
+    done += next;
+    if (status < HAP_OK) {
+      (void)hap_session_detail(session, w->detail);
+      return status;
+    }
+    status = look(w, (double)done / hz);
+  }
+  return status;
+}
+
+hap_status run_loop_run(const run_loop *loop, hap_stats *stats, hap_detail *detail)
+{
+  hap_session *session = loop->rig->session;
+  watch w = {.loop = loop, .detail = detail};
+  memset(stats, 0, sizeof *stats);
+  if (loop->trace.file != NULL) {
+    trace_csv_header(&loop->trace);
+  }
+  hap_status started = hap_session_start(session);
+  if (started < HAP_OK) {
+    (void)hap_session_detail(session, detail);
+    return started;
+  }
+  bool lockstep = loop->options->rig.def.drive == HAP_DRIVE_LOCKSTEP;
+  hap_status status = lockstep ? run_lockstep(&w) : run_threads(&w);
+  hap_session_stop(session);
+  run_progress_clear(&loop->progress);
+  (void)hap_session_stats(session, stats, sizeof *stats);
+  hap_status drained = status < HAP_OK ? status : drain(loop, detail);
+  return drained < HAP_OK ? drained : status != HAP_OK ? status : started;
+}

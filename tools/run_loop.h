@@ -1,0 +1,33 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TOOLS_RUN_LOOP_H
+#define HAPODE_TOOLS_RUN_LOOP_H
+
+/* Lets a session run for its time and takes the trace out of it on the way. */
+
+#include "tools/run_options.h"
+#include "tools/run_picture.h"
+#include "tools/run_progress.h"
+#include "tools/trace_csv.h"
+
+typedef struct run_loop {
+  const run_options *options;
+  const rig *rig;
+  double seconds;
+  trace_csv trace;      /* file NULL: none wanted */
+  run_picture *picture; /* NULL: none wanted */
+  run_progress progress;
+} run_loop;
+
+/* Rows that the session has to keep for run_loop_run. 0: nobody wants them. */
+int32_t run_loop_trace_rows(const run_options *options);
+
+/* From now on SIGINT, SIGTERM and SIGHUP end the run instead of the process. */
+void run_loop_catch_signals(void);
+
+/* Starts the session, runs it, stops it. HAP_NO_REALTIME as of hap_session_start; HAP_END when a
+ * signal ended it early; errors with detail. Whatever comes back, the session is stopped and *stats
+ * is what it came to. */
+hap_status run_loop_run(const run_loop *loop, hap_stats *stats, hap_detail *detail);
+
+#endif

@@ -1,0 +1,85 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/run_summary.h"
+
+#include <inttypes.h>
+
+void run_summary_devices(const rig_options *options, char *out, size_t size)
+{
+  size_t used = 0;
+  snprintf(out, size, "virtual");
+  for (size_t i = 0; i < options->device_count && used < size; ++i) {
+    used +=
+        (size_t)snprintf(out + used, size - used, "%s%s", i > 0 ? " + " : "", options->devices[i]);
+  }
+}
+
+double run_summary_physics_hz(const run_options *options)
+{
+  const hap_session_def *def = &options->rig.def;
+  return def->model == HAP_MODEL_SINGLE ? def->haptic_hz : def->physics_hz;
+}
+
+static void count(FILE *out, const char *key, uint64_t value)
+{
+  fprintf(out, "%s: %" PRIu64 "\n", key, value);
+}
+
+static void number(FILE *out, const char *key, double value)
+{
+  fprintf(out, "%s: %.6g\n", key, value);
+}
+
+static const char *fault_name(uint32_t fault)
+{
+  static const char *const names[] = {"none",        "device_read",  "device_pose", "force",
+                                      "local_state", "device_write", "world"};
+  return fault < sizeof names / sizeof names[0] ? names[fault] : "unknown";
+}
+
+static void print_setup(const run_options *options, FILE *out)
+{
+  char devices[4096];
+  run_summary_devices(&options->rig, devices, sizeof devices);
+  fprintf(out, "scene: %s\n", options->rig.scene);
+  fprintf(out, "model: %s\n", hap_model_name(options->rig.def.model));
+  fprintf(out, "device: %s\n", devices);
+  number(out, "physics_hz", run_summary_physics_hz(options));
+  number(out, "haptic_hz", options->rig.def.haptic_hz);
+}
+
+static void print_more(const hap_stats *stats, FILE *out)
+{
+  fprintf(out, "fault: %s\n", fault_name(stats->fault));
+  fprintf(out, "realtime: %s\n", stats->realtime != 0 ? "yes" : "no");
+  count(out, "physics_steps", stats->physics_steps);
+  count(out, "physics_missed", stats->physics_missed);
+  count(out, "probe_steps", stats->probe_steps);
+  number(out, "tick_us_max", stats->tick_us_max);
+  number(out, "model_age_s_max", stats->model_age_max_s);
+  count(out, "saturated_ticks", stats->saturated_ticks);
+  count(out, "capacity_dropped", stats->capacity_dropped);
+  count(out, "trace_dropped", stats->trace_dropped);
+}
+
+void run_summary_print(const run_options *options, const hap_stats *stats, FILE *out)
+{
+  print_setup(options, out);
+  count(out, "ticks", stats->ticks);
+  count(out, "missed_ticks", stats->missed_ticks);
+  number(out, "tick_us_p50", stats->tick_us_p50);
+  number(out, "tick_us_p99", stats->tick_us_p99);
+  number(out, "physics_ms_mean", stats->physics_ms_mean);
+  number(out, "physics_duty", stats->physics_duty);
+  number(out, "haptic_duty", stats->haptic_duty);
+  number(out, "peak_force_n", stats->peak_force_n);
+  number(out, "impulse_ns", stats->impulse_ns);
+  count(out, "contact_ticks", stats->contact_ticks);
+  count(out, "neighbours_max", stats->neighbours_max);
+  number(out, "momentum_ratio", stats->momentum_ratio);
+  fputs("effects: ", out);
+  run_effects_print(options->rig.def.model, out);
+  fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->trace_hash);
+  count(out, "faults", stats->faults);
+  print_more(stats, out);
+}
