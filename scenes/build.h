@@ -9,10 +9,6 @@
 
 #define SCENE_COUNT_MAX 10000 /* of "name:N" */
 
-/* Thickness of the layer in which a contact rests. Bodies that touch at the start are placed this
- * deep, so that their contacts exist from the first step on and nothing settles. */
-#define SCENE_LAYER 1e-5
-
 /* Adds bodies, geoms and joints to a scene whose world and space exist. Cannot fail: room for the
  * bodies is there. */
 typedef void (*scene_build_fn)(scene *s);

@@ -21,7 +21,8 @@ static dBodyID add_cube(scene *s, double x, double y, double z)
 static double layer_height(const scene *s, int layer)
 {
   const double edge = s->parameters.size;
-  return edge / 2 - SCENE_LAYER + layer * (edge - SCENE_LAYER);
+  const double deep = s->parameters.layer;
+  return edge / 2 - deep + layer * (edge - deep);
 }
 
 /* The pointer stands at the origin and the cube comes centrally: nothing excites a rotation. Here

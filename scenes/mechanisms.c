@@ -43,7 +43,7 @@ static void add_dice(scene *s)
   const double edge = p->size;
   const double pitch = edge + p->gap;
   const double x = 0.18;
-  const double z = edge / 2 - SCENE_LAYER;
+  const double z = edge / 2 - s->parameters.layer;
   scene_add_box(s, (const double[3]){edge, edge, edge}, p->mass, (const double[3]){x, 0, z});
   scene_add_sphere(s, edge / 2, p->mass, (const double[3]){x, pitch, z});
   scene_add_cylinder(s, edge / 2, edge, p->mass, (const double[3]){x, 2 * pitch, z});
@@ -68,8 +68,8 @@ void scene_build_lightstand(scene *s)
   add_dice(s);
   const dBodyID upper = add_rod(s, 0.2, joints[1], joints[2]);
   const dBodyID lower = add_rod(s, 0.4, joints[0], joints[1]);
-  const dBodyID base =
-      scene_add_box(s, base_edges, 2.0, (const double[3]){0, 0, base_edges[2] / 2 - SCENE_LAYER});
+  const dBodyID base = scene_add_box(
+      s, base_edges, 2.0, (const double[3]){0, 0, base_edges[2] / 2 - s->parameters.layer});
   const dBodyID chain[] = {base, lower, upper, head};
   for (size_t i = 0; i + 1 < COUNT_OF(chain); ++i) {
     scene_add_hinge(s, chain[i + 1], chain[i], joints[i], axis);

@@ -91,6 +91,7 @@ static const char *bad_parameter(const scene_parameters *p)
       {"duration", p->duration, 0, true},
       {"iterations", p->iterations, 1, false},
       {"hinge_torque", p->hinge_torque, 0, false},
+      {"layer", p->layer, 0, false},
   };
   for (size_t i = 0; i < sizeof checks / sizeof checks[0]; ++i) {
     if (!isfinite(checks[i].value) ||
@@ -121,7 +122,7 @@ static void create_world(scene *s)
   dWorldSetCFM(s->world, 1e-10); /* more shows in measured accelerances */
   dWorldSetQuickStepNumIterations(s->world, s->parameters.iterations);
   dWorldSetContactMaxCorrectingVel(s->world, push_out_speed);
-  dWorldSetContactSurfaceLayer(s->world, SCENE_LAYER);
+  dWorldSetContactSurfaceLayer(s->world, s->parameters.layer);
   dWorldSetAutoDisableFlag(s->world, 0);
 }
 

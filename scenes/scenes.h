@@ -34,6 +34,8 @@ typedef struct scene_parameters {
   const char *hands[SCENE_POINTERS_MAX]; /* specs of the virtual device for a simulated hand, in
                                             world coordinates; borrowed */
   double hinge_torque;                   /* N m, friction of each hinge; 0: none */
+  double layer; /* m, ODE's contact surface layer: what rests lies this deep, so that a contact is
+                   not lost to a gap of micrometres */
 } scene_parameters;
 
 typedef struct scene {

@@ -18,6 +18,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 0,
                     .duration = 1.2,
+                    .layer = 1e-4,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:0/0/0,hand=rigid"}},
@@ -34,6 +35,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 2.5,
+                    .layer = 1e-3,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.03/0/0.025;2.5:0.11/0/0.025,blend=smooth,"
@@ -52,6 +54,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 3,
+                    .layer = 1e-3,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.03/0/0.025;3:0.13/0/0.025,blend=smooth,"
@@ -68,6 +71,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 2,
+                    .layer = 1e-4,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.02/0/0.025;2:0.08/0/0.025,blend=smooth,"
@@ -81,11 +85,12 @@ static const scene_row rows[] = {
                     .size = 0.05,
                     .mu = 0.5,
                     .gravity = 9.81,
-                    .gap = -SCENE_LAYER,
+                    .gap = -1e-3,
                     .radius = 0.01,
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 2,
+                    .layer = 1e-3,
                     .iterations = 20,
                     .pointers = 1,
                     /* soft: a row too long to be moved stops it at 14 N */
@@ -104,6 +109,7 @@ static const scene_row rows[] = {
                     .damping = 15,
                     .duration = 0.8,
                     /* with 50 the upper cube falls off at rest at 20 Hz */
+                    .layer = 1e-4,
                     .iterations = 100,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.0115/0/0.102;0.6:0.008/0/0.102;0.8:0.004/0/0.102,"
@@ -121,6 +127,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 3,
+                    .layer = 1e-4,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.03/0/0.025;0.5:-0.002/0/0.025;3:0/0/0.025,"
@@ -138,6 +145,7 @@ static const scene_row rows[] = {
                     .stiffness = 2000,
                     .damping = 5,
                     .duration = 2,
+                    .layer = 1e-4,
                     .iterations = 20,
                     .pointers = 1,
                     .hands = {"virtual:path=0:0.24/-0.04/0;2:0.24/0.08/0,blend=smooth,"
@@ -157,6 +165,7 @@ static const scene_row rows[] = {
                     .damping = 5,
                     .duration = 5.6,
                     /* with 100 the arm sinks at rest at 20 Hz */
+                    .layer = 1e-4,
                     .iterations = 200,
                     .pointers = 1,
                     .hands = {"virtual:path=0:0.16/0/0.233;1.3:0.09/0/0.233;2:0.16/-0.02/0.2;"
@@ -177,6 +186,7 @@ static const scene_row rows[] = {
                     .damping = 5,
                     .duration = 2,
                     /* with 50 the pile falls apart at rest at 20 Hz */
+                    .layer = 1e-3,
                     .iterations = 100,
                     .pointers = 1,
                     .hands = {"virtual:path=0:-0.02/0/0.025;1.5:0.008/0/0.025;2:-0.01/0/0.025,"

@@ -75,7 +75,9 @@ static bool open_picture(const run_options *options, run_loop *loop, hap_detail 
   }
   loop->picture =
       run_picture_create(loop->seconds, loop->rig->pointer_count, options->rig.def.haptic_hz);
-  snprintf(detail->text, sizeof detail->text, "no memory for the picture");
+  if (loop->picture == NULL) {
+    snprintf(detail->text, sizeof detail->text, "no memory for the picture");
+  }
   return loop->picture != NULL;
 }
 
@@ -134,7 +136,7 @@ static int run_and_report(run_loop *loop)
   if (draw(loop, &detail) < HAP_OK) {
     code = complain(EXIT_FAILED, detail.text);
   }
-  if (stats.ticks > 0) {
+  if (stats.size > 0) { /* it was started */
     tell(loop->options, status, &stats);
     run_summary_print(loop->options, &stats, stdout);
   }

@@ -75,7 +75,9 @@ FILE *plot_begin(const char *svg_path, int width, int height, hap_detail *detail
 /* Starts gnuplot with the script as its input and its words into errors. */
 static int start(FILE *script, FILE *errors, pid_t *out)
 {
-  char *arguments[] = {"gnuplot", "-", NULL};
+  char program[] = "gnuplot";
+  char from_input[] = "-";
+  char *arguments[] = {program, from_input, NULL};
   posix_spawn_file_actions_t actions;
   int error = posix_spawn_file_actions_init(&actions);
   if (error != 0) {
@@ -89,7 +91,7 @@ static int start(FILE *script, FILE *errors, pid_t *out)
     error = posix_spawn_file_actions_adddup2(&actions, fileno(errors), STDERR_FILENO);
   }
   if (error == 0) {
-    error = posix_spawnp(out, arguments[0], &actions, NULL, arguments, environ);
+    error = posix_spawnp(out, program, &actions, NULL, arguments, environ);
   }
   posix_spawn_file_actions_destroy(&actions);
   return error;

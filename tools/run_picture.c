@@ -44,6 +44,7 @@ struct run_picture {
   sample *samples;
   size_t rows;
   size_t sample_count;
+  bool tested; /* there were testing simulations */
 };
 
 run_picture *run_picture_create(double seconds, size_t pointers, double haptic_hz)
@@ -127,6 +128,7 @@ void run_picture_add_stats(run_picture *picture, double t, const hap_stats *stat
   if (picture->sample_count == SAMPLES_MAX || stats->physics_steps == 0) {
     return;
   }
+  picture->tested |= stats->probe_steps > 0;
   double total_ms = stats->last_collide_ms + stats->last_neighbour_ms + stats->last_testing_ms +
                     stats->last_step_ms + stats->last_publish_ms;
   picture->samples[picture->sample_count++] =
@@ -173,13 +175,11 @@ static void write_run(const run_picture *picture, FILE *script)
   fputs("EOD\n", script);
 }
 
-static bool write_duties(const run_picture *picture, FILE *script)
+static void write_duties(const run_picture *picture, FILE *script)
 {
-  bool testing = false;
   fputs("$physics << EOD\n", script);
   for (size_t i = 0; i < picture->sample_count; ++i) {
     const sample *s = &picture->samples[i];
-    testing |= s->testing > 0.0;
     fprintf(script, "%.6f %.5g %.5g\n", s->t, s->physics, s->testing);
   }
   fputs("EOD\n$haptic << EOD\n", script);
@@ -196,17 +196,17 @@ static bool write_duties(const run_picture *picture, FILE *script)
     }
   }
   fputs("EOD\n", script);
-  return testing;
 }
 
 /* A panel from bottom to top (shares of the height), its legend to the right of it. */
 static void begin_panel(FILE *script, double bottom, double top, const char *label)
 {
+  /* A label and not ylabel: that one stands where the numbers end, elsewhere in each panel. */
   fprintf(script,
           "set bmargin at screen %g\nset tmargin at screen %g\n"
           "set key at screen 0.815, screen %g left top Left reverse samplen 2 spacing 1.2\n"
-          "set ylabel \"%s\" offset screen 0,0\n",
-          bottom, top, top, label);
+          "set label 1 \"%s\" at screen 0.02, screen %g center rotate\n",
+          bottom, top, top, label, 0.5 * (bottom + top));
 }
 
 static void draw_force(const run_picture *picture, FILE *script)
@@ -214,8 +214,9 @@ static void draw_force(const run_picture *picture, FILE *script)
   begin_panel(script, 0.69, 0.93, "force on the hand [N]");
   if (picture->pointers == 1) {
     fputs(
-        "plot $run using 1:2 with lines lt 1 title 'x', "
-        "'' using 1:3 with lines lt 2 title 'y', '' using 1:4 with lines lt 3 title 'z'\n",
+        "plot $run using 1:2 with lines lt 1 title 'force x', "
+        "'' using 1:3 with lines lt 2 title 'force y', '' using 1:4 with lines lt 3 title 'force "
+        "z'\n",
         script);
     return;
   }
@@ -250,7 +251,7 @@ static void draw_position(const run_picture *picture, FILE *script)
   fputc('\n', script);
 }
 
-static void draw_duties(bool testing, FILE *script)
+static void draw_duties(const run_picture *picture, FILE *script)
 {
   begin_panel(script, 0.08, 0.32, "duty factor");
   fputs(
@@ -259,7 +260,7 @@ static void draw_duties(bool testing, FILE *script)
       "plot 1 with lines lc rgb '#606060' dashtype 3 title 'all of its time', "
       "$physics using 1:($2>0?$2:1/0) with linespoints lt 4 pt 7 ps 0.3 title 'physics'",
       script);
-  if (testing) {
+  if (picture->tested) {
     fputs(", '' using 1:($3>0?$3:1/0) with linespoints lt 5 pt 7 ps 0.3 title ' of it testing'",
           script);
   }
@@ -277,16 +278,16 @@ hap_status run_picture_draw(const run_picture *picture, const char *path, const 
     return HAP_ERROR_IO;
   }
   write_run(picture, script);
-  bool testing = write_duties(picture, script);
+  write_duties(picture, script);
   fprintf(script,
           "set lmargin at screen 0.09\nset rmargin at screen 0.80\nset format x ''\n"
           "set xrange [0:%.6g]\nset multiplot title ",
-          fmax(picture->end, 1e-3));
+          picture->end > 0.98 * picture->seconds ? picture->seconds : fmax(picture->end, 1e-3));
   plot_string(script, title);
-  fputs(" noenhanced\n", script);
+  fputs(" noenhanced font ',14'\n", script);
   draw_force(picture, script);
   draw_position(picture, script);
-  draw_duties(testing, script);
+  draw_duties(picture, script);
   fputs("unset multiplot\n", script);
   return plot_end(script, detail);
 }

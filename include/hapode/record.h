@@ -29,7 +29,7 @@ typedef struct hap_trace_row {
   double model_age_s; /* s */
   uint32_t bodies;    /* local bodies */
   uint32_t contacts;  /* contacts that push */
-  uint32_t pointer_count;
+  uint32_t pointer_count; /* places in use: up to the last pointer there is */
   uint32_t body_count; /* traced bodies, see hap_session_trace_bodies in ode.h */
   hap_trace_pointer pointers[HAP_TRACE_POINTERS_MAX];
   double body_position[HAP_TRACE_BODIES_MAX][3]; /* m: the loop's where the body is local,

@@ -22,10 +22,10 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
   out->model_age_s = 1e-9 * (double)(tick->now_ns - tick->state_ns);
   out->bodies = tick->live_count;
   out->contacts = tick->pushing;
-  out->pointer_count = tick->capacity.pointers < HAP_TRACE_POINTERS_MAX ? tick->capacity.pointers
-                                                                        : HAP_TRACE_POINTERS_MAX;
-  for (uint32_t i = 0; i < out->pointer_count; ++i) {
+  out->pointer_count = 0;
+  for (uint32_t i = 0; i < tick->capacity.pointers && i < HAP_TRACE_POINTERS_MAX; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
+    out->pointer_count = p->generation != 0 ? i + 1 : out->pointer_count;
     hapi_v3_copy(p->pose.position, out->pointers[i].position);
     hapi_v3_copy(p->wrench.force, out->pointers[i].force);
     hapi_v3_copy(p->wrench.torque, out->pointers[i].torque);
