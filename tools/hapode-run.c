@@ -102,9 +102,9 @@ static hap_status draw(const run_loop *loop, hap_detail *detail)
     return HAP_OK;
   }
   run_summary_devices(&o->rig, devices, sizeof devices);
-  snprintf(title, sizeof title, "%.60s, model %s, physics %g Hz, haptic %g Hz, device %s",
+  snprintf(title, sizeof title, "%.60s, model %s, physics %g Hz, haptic %g Hz, device %.*s",
            o->rig.scene, hap_model_name(o->rig.def.model), run_summary_physics_hz(o),
-           o->rig.def.haptic_hz, devices);
+           o->rig.def.haptic_hz, (int)strcspn(devices, ":"), devices);
   return run_picture_draw(loop->picture, o->plot_path, title, detail);
 }
 
