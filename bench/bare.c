@@ -6,10 +6,8 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "bench/bench.h"
 
 #define CONTACTS_PER_PAIR 8 /* hap_ode_def's default */
-#define REPEATS_MAX 16
 
 hap_status bare_create(const scene_parameters *parameters, int count, bare *out, hap_detail *detail)
 {
@@ -20,10 +18,11 @@ hap_status bare_create(const scene_parameters *parameters, int count, bare *out,
   }
   out->contacts = dJointGroupCreate(0);
   out->scratch = calloc(CONTACTS_PER_PAIR, sizeof *out->scratch);
+  out->states = calloc(out->scene->body_count, sizeof *out->states);
   dWorldSetStepIslandsProcessingMaxThreadCount(out->scene->world, 1);
-  if (out->scratch == NULL) {
+  if (out->scratch == NULL || out->states == NULL) {
     bare_destroy(out);
-    snprintf(detail->text, sizeof detail->text, "no memory for contacts");
+    snprintf(detail->text, sizeof detail->text, "no memory for a second scene");
     return HAP_ERROR_MEMORY;
   }
   return HAP_OK;
@@ -36,20 +35,37 @@ void bare_destroy(bare *b)
   }
   scene_destroy(b->scene);
   free(b->scratch);
+  free(b->states);
   memset(b, 0, sizeof *b);
+}
+
+static void read_states(const scene *from, bare_state *states)
+{
+  for (size_t i = 0; i < from->body_count; ++i) {
+    dBodyID body = from->bodies[i];
+    memcpy(states[i].position, dBodyGetPosition(body), sizeof states[i].position);
+    memcpy(states[i].quat, dBodyGetQuaternion(body), sizeof states[i].quat);
+    memcpy(states[i].linear, dBodyGetLinearVel(body), sizeof states[i].linear);
+    memcpy(states[i].angular, dBodyGetAngularVel(body), sizeof states[i].angular);
+  }
+}
+
+static void write_states(bare *b)
+{
+  for (size_t i = 0; i < b->scene->body_count; ++i) {
+    const bare_state *s = &b->states[i];
+    dBodyID body = b->scene->bodies[i];
+    dBodySetPosition(body, s->position[0], s->position[1], s->position[2]);
+    dBodySetQuaternion(body, s->quat);
+    dBodySetLinearVel(body, s->linear[0], s->linear[1], s->linear[2]);
+    dBodySetAngularVel(body, s->angular[0], s->angular[1], s->angular[2]);
+  }
 }
 
 void bare_follow(bare *b, const scene *from)
 {
-  for (size_t i = 0; i < from->body_count; ++i) {
-    const dReal *p = dBodyGetPosition(from->bodies[i]);
-    const dReal *v = dBodyGetLinearVel(from->bodies[i]);
-    const dReal *w = dBodyGetAngularVel(from->bodies[i]);
-    dBodySetPosition(b->scene->bodies[i], p[0], p[1], p[2]);
-    dBodySetQuaternion(b->scene->bodies[i], dBodyGetQuaternion(from->bodies[i]));
-    dBodySetLinearVel(b->scene->bodies[i], v[0], v[1], v[2]);
-    dBodySetAngularVel(b->scene->bodies[i], w[0], w[1], w[2]);
-  }
+  read_states(from, b->states);
+  write_states(b);
 }
 
 static void near_callback(void *data, dGeomID x, dGeomID y)
@@ -89,15 +105,15 @@ double bare_cycle(bare *b, double step_s)
   return spent;
 }
 
-/* ---- the island of the first body ---- */
+/* ---- islands ---- */
 
-/* Enables what hangs together with the first body and switches all others off. The scenes of the
- * bench are rows: a body of the island is jointed to the one before it or after it. */
-static void enable_island(const scene *s)
+/* Switches off what does not hang together with one of the first bodies. The scenes of the bench are
+ * rows: a body of the island is jointed to the one before it. */
+static void enable_islands(const scene *s, size_t first)
 {
   bool linked = true;
   for (size_t i = 0; i < s->body_count; ++i) {
-    linked = linked && (i == 0 || dAreConnected(s->bodies[i - 1], s->bodies[i]) != 0);
+    linked = i < first || (linked && dAreConnected(s->bodies[i - 1], s->bodies[i]) != 0);
     if (linked) {
       dBodyEnable(s->bodies[i]);
     } else {
@@ -113,19 +129,33 @@ static void enable_all(const scene *s)
   }
 }
 
-double bare_island_step(bare *b, double step_s, int repeats)
+/* On the first body, where the hand meets it. */
+static void push(const scene *s, int axis, double force)
 {
-  double times[REPEATS_MAX];
+  const dReal *at = dBodyGetPosition(s->bodies[0]);
+  double f[3] = {0.0, 0.0, 0.0};
+  f[axis] = force;
+  dBodyAddForceAtPos(s->bodies[0], f[0], f[1], f[2], at[0] - 0.5 * s->parameters.size, at[1],
+                     at[2]);
+}
+
+double bare_island_step(bare *b, size_t first, double force, double step_s)
+{
   unsigned long seed = dRandGetSeed();
-  int count = repeats < REPEATS_MAX ? repeats : REPEATS_MAX;
-  enable_island(b->scene);
-  for (int i = 0; i < count; ++i) {
+  double spent = 0.0;
+  read_states(b->scene, b->states);
+  enable_islands(b->scene, first);
+  for (int i = 0; i < 4; ++i) {
+    write_states(b);
+    if (i > 0) {
+      push(b->scene, i - 1, force);
+    }
     dRandSetSeed(seed);
     int64_t begin_ns = hapi_clock_now();
     dWorldQuickStep(b->scene->world, step_s);
-    times[i] = since(begin_ns);
+    spent += since(begin_ns);
   }
   enable_all(b->scene);
   dRandSetSeed(seed);
-  return bench_median(times, (size_t)count);
+  return spent / 4.0;
 }

@@ -46,9 +46,9 @@ void bench_check(bench *b, bool good, const char *format, ...) HAP_PRINTF(3, 4);
 /* What --verify cannot check, and why. */
 void bench_skip(const bench *b, const char *format, ...) HAP_PRINTF(2, 3);
 
-double bench_median(double *values, size_t count);                     /* sorts; 0 of none */
+double bench_median(double *values, size_t count);                       /* sorts; 0 of none */
 double bench_quantile(const double *sorted, size_t count, double share); /* 0 of none */
-bool bench_within(double value, double wanted, double relative);       /* false for NaN */
+bool bench_within(double value, double wanted, double relative);         /* false for NaN */
 
 /* ---- picture.c ---- */
 

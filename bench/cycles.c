@@ -8,7 +8,11 @@
 
 #include "bench/bare.h"
 
-#define ISLAND_REPEATS 5
+#define PROBE_FLOOR 0.0981 /* N a kg: the library's smallest perturbation */
+
+/* The number of testing simulations of the first cycle includes those of the first model, which was
+ * made before. */
+#define FIRST_COUNTED 1
 
 typedef struct watcher {
   const cycles_def *def;
@@ -17,8 +21,10 @@ typedef struct watcher {
   size_t ticks;        /* of the run */
   size_t period_ticks; /* H/T */
   size_t run;
-  uint64_t steps;  /* physics steps seen */
-  uint64_t probes; /* testing simulations seen */
+  uint64_t steps;    /* physics steps seen */
+  uint64_t probes;   /* testing simulations seen */
+  size_t neighbours; /* in the newest model, at least 1 */
+  double force;      /* N, as the next testing simulations will push */
 } watcher;
 
 const scene_parameters *cycles_scene(const char *name)
@@ -64,7 +70,7 @@ static void measure_bare(watcher *w, double period_s, cycle *out)
 {
   out->v[CYCLE_BARE] = 1e3 * bare_cycle(&w->bare, period_s);
   if (w->def->model != HAP_MODEL_SINGLE) {
-    out->v[CYCLE_ISLAND] = 1e3 * bare_island_step(&w->bare, period_s, ISLAND_REPEATS);
+    out->v[CYCLE_ISLAND] = 1e3 * bare_island_step(&w->bare, w->neighbours, w->force, period_s);
   }
 }
 
@@ -76,12 +82,35 @@ static void note_cycle(watcher *w, const hap_stats *stats, cycle *out)
   v[CYCLE_TESTING] = stats->last_testing_ms;
   v[CYCLE_STEP] = stats->last_step_ms;
   v[CYCLE_PUBLISH] = stats->last_publish_ms;
-  v[CYCLE_UNTESTED] =
-      v[CYCLE_COLLIDE] + v[CYCLE_NEIGHBOUR] + v[CYCLE_STEP] + v[CYCLE_PUBLISH];
+  v[CYCLE_UNTESTED] = v[CYCLE_COLLIDE] + v[CYCLE_NEIGHBOUR] + v[CYCLE_STEP] + v[CYCLE_PUBLISH];
   v[CYCLE_PROBES] = (double)(stats->probe_steps - w->probes);
   v[CYCLE_NEIGHBOURS] = (double)stats->neighbours;
   w->steps = stats->physics_steps;
   w->probes = stats->probe_steps;
+  w->neighbours = stats->neighbours > 0 ? stats->neighbours : 1;
+}
+
+static double norm(const double v[3])
+{
+  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* The last force on the body; before the first touch that of the touch to come. */
+static double next_push(const watcher *w)
+{
+  const scene_parameters *p = w->def->parameters;
+  hap_pointer_state state;
+  double relative[3];
+  if (hap_pointer_get(w->rig.session, w->rig.pointers[0], &state, sizeof state) < HAP_OK) {
+    return 0.0;
+  }
+  const dReal *v = dBodyGetLinearVel(w->rig.scene->bodies[0]);
+  for (int i = 0; i < 3; ++i) {
+    relative[i] = state.twist.linear[i] - v[i];
+  }
+  double last = norm(state.wrench.force);
+  double touch = norm(relative) * sqrt(p->stiffness * p->mass);
+  return last > 0.0 ? last : fmax(touch, PROBE_FLOOR * p->mass);
 }
 
 /* The tick in which a cycle may be due. Who goes first, the library or plain ODE, finds colder
@@ -93,19 +122,20 @@ static hap_status watch_tick(watcher *w, size_t tick, double period_s, cycle *ou
   memset(out, 0, sizeof *out);
   out->v[CYCLE_T] = (double)tick / CYCLES_HAPTIC_HZ;
   bare_follow(&w->bare, w->rig.scene);
+  w->force = next_push(w);
   if (bare_first) {
     measure_bare(w, period_s, out);
   }
   hap_status status = hap_session_advance(w->rig.session, 1);
-  if (!bare_first) {
-    measure_bare(w, period_s, out);
-  }
   if (status >= HAP_OK) {
     status = hap_session_stats(w->rig.session, &stats, sizeof stats);
   }
   *out_ran = status >= HAP_OK && stats.physics_steps != w->steps;
   if (*out_ran) {
     note_cycle(w, &stats, out);
+  }
+  if (!bare_first) {
+    measure_bare(w, period_s, out);
   }
   return status;
 }
@@ -131,7 +161,7 @@ static hap_status watch_run(watcher *w, double period_s, cycle *rows, size_t *ou
 
 static hap_status one_run(bench *b, const cycles_def *def, size_t run, cycle *rows, cycles *out)
 {
-  watcher w = {.def = def, .run = run};
+  watcher w = {.def = def, .run = run, .neighbours = 1};
   hap_stats stats;
   w.period_ticks = (size_t)lround(out->period_s * CYCLES_HAPTIC_HZ);
   w.ticks = (size_t)lround(def->seconds * CYCLES_HAPTIC_HZ);
@@ -193,44 +223,36 @@ void cycles_free(cycles *c)
   memset(c, 0, sizeof *c);
 }
 
-static double figure_of(const cycle *c, int figure)
+double cycles_median(const cycles *c, int figure)
 {
-  return c->v[figure];
-}
-
-static double probe_ratio_of(const cycle *c, int figure)
-{
-  (void)figure;
-  double steps = c->v[CYCLE_PROBES] * c->v[CYCLE_ISLAND];
-  return steps > 0.0 ? c->v[CYCLE_TESTING] / steps : (double)NAN;
-}
-
-/* Median of what pick gives, without what is not a number. */
-static double median_of(const cycles *c, double from_s, double (*pick)(const cycle *c, int figure),
-                        int figure)
-{
-  size_t used = 0;
   double *values = calloc(c->count + 1, sizeof *values);
   if (values == NULL) {
     return (double)NAN;
   }
   for (size_t i = 0; i < c->count; ++i) {
-    double value = pick(&c->rows[i], figure);
-    if (c->rows[i].v[CYCLE_T] >= from_s && !isnan(value)) {
-      values[used++] = value;
-    }
+    values[i] = c->rows[i].v[figure];
   }
-  double median = bench_median(values, used);
+  double median = bench_median(values, c->count);
   free(values);
   return median;
 }
 
-double cycles_median(const cycles *c, double from_s, int figure)
+double cycles_mean(const cycles *c, int figure)
 {
-  return median_of(c, from_s, figure_of, figure);
+  double sum = 0.0;
+  for (size_t i = FIRST_COUNTED; i < c->count; ++i) {
+    sum += c->rows[i].v[figure];
+  }
+  return c->count > FIRST_COUNTED ? sum / (double)(c->count - FIRST_COUNTED) : 0.0;
 }
 
-double cycles_probe_ratio(const cycles *c, double from_s)
+double cycles_probe_ratio(const cycles *c)
 {
-  return median_of(c, from_s, probe_ratio_of, 0);
+  double steps = 0.0;
+  double spent = 0.0;
+  for (size_t i = FIRST_COUNTED; i < c->count; ++i) {
+    steps += c->rows[i].v[CYCLE_PROBES] * c->rows[i].v[CYCLE_ISLAND];
+    spent += c->rows[i].v[CYCLE_TESTING];
+  }
+  return steps > 0.0 ? spent / steps : (double)NAN;
 }

@@ -20,7 +20,7 @@ enum {
   CYCLE_PUBLISH,
   CYCLE_UNTESTED,   /* sum of the parts without the testing simulations */
   CYCLE_BARE,       /* collision and step by plain ODE calls on the same state */
-  CYCLE_ISLAND,     /* one step of the pushed body's island alone, by plain ODE calls */
+  CYCLE_ISLAND,     /* one step of the neighbours' islands alone, by plain ODE calls */
   CYCLE_PROBES,     /* testing simulations; a number */
   CYCLE_NEIGHBOURS, /* a number */
   CYCLE_FIGURES
@@ -53,11 +53,12 @@ typedef struct cycles {
 hap_status cycles_measure(bench *b, const cycles_def *def, cycles *out);
 void cycles_free(cycles *c); /* zeroed allowed */
 
-/* Median of a figure over the cycles that begin at from_s or later. */
-double cycles_median(const cycles *c, double from_s, int figure);
+double cycles_median(const cycles *c, int figure); /* over the cycles; NaN without memory */
+double cycles_mean(const cycles *c, int figure);   /* without the first cycle; 0 of none */
 
-/* Median over these cycles of time in testing simulations / (their number x one island step). */
-double cycles_probe_ratio(const cycles *c, double from_s);
+/* Time in testing simulations / (their number x one island step), both summed over the cycles but
+ * the first; NaN when there was none. */
+double cycles_probe_ratio(const cycles *c);
 
 /* A row of the scenes' table; NULL when there is none of that name. */
 const scene_parameters *cycles_scene(const char *name);

@@ -3,8 +3,8 @@
 
 /* The paper's Fig. 5: a cube of 60 kg runs into a fixed pointer and rebounds; the force over time.
  * Contact begins and ends between ticks: both ends are extrapolated from the two samples next to
- * them, which is as good as exact, as the cube moves nearly straight there. The peak is that of the
- * parabola through the largest sample and its neighbours. */
+ * them, which is as good as exact, as the cube moves nearly straight there. The peak is the
+ * largest sample, at 1 kHz at most 2e-5 below that between the samples. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -108,16 +108,6 @@ static double overhang(double outer, double inner)
   return inner > outer ? TICK_S * outer / (inner - outer) : 0.0;
 }
 
-static double peak_near(const double *force, int top)
-{
-  if (top == 0 || top == TICKS - 1) {
-    return force[top];
-  }
-  double slope = 0.5 * (force[top + 1] - force[top - 1]);
-  double bend = force[top + 1] - 2.0 * force[top] + force[top - 1];
-  return bend < 0.0 ? force[top] - 0.5 * slope * slope / bend : force[top];
-}
-
 static summary summarise(const double *force)
 {
   summary s = {0.0, 0.0, 0.0};
@@ -136,7 +126,7 @@ static summary summarise(const double *force)
     s.contact_s = TICK_S * (last - first) + overhang(force[first], force[first + 1]) +
                   overhang(force[last], force[last - 1]);
   }
-  s.peak_n = peak_near(force, top);
+  s.peak_n = force[top];
   return s;
 }
 
@@ -148,8 +138,8 @@ static hap_status write_curves(bench *b, const figure *f)
   for (size_t k = 0; k < STIFFNESS_COUNT && csv != NULL; ++k) {
     for (size_t v = 0; v < VARIANT_COUNT; ++v) {
       for (int i = 0; i < TICKS; ++i) {
-        fprintf(csv, "%s,%.3f,%.9g,%g,%g\n", variants[v].name, TICK_S * i,
-                f->curves[k][v].force[i], stiffnesses[k], variants[v].physics_hz);
+        fprintf(csv, "%s,%.3f,%.9g,%g,%g\n", variants[v].name, TICK_S * i, f->curves[k][v].force[i],
+                stiffnesses[k], variants[v].physics_hz);
       }
     }
   }
@@ -158,8 +148,8 @@ static hap_status write_curves(bench *b, const figure *f)
 
 static hap_status write_summary(bench *b, const figure *f)
 {
-  FILE *csv = bench_csv_open(b, "fig5_summary",
-                             "model,physics_hz,stiffness,contact_s,peak_n,impulse_ns");
+  FILE *csv =
+      bench_csv_open(b, "fig5_summary", "model,physics_hz,stiffness,contact_s,peak_n,impulse_ns");
   for (size_t k = 0; k < STIFFNESS_COUNT && csv != NULL; ++k) {
     for (size_t v = 0; v < VARIANT_COUNT; ++v) {
       const summary *s = &f->curves[k][v].sum;
@@ -182,8 +172,11 @@ static const char *line_of(size_t v)
 static const char *title_of(size_t v)
 {
   static const char *const titles[VARIANT_COUNT] = {
-      "1: single, 1 ms",       "2: accelerance, 50 ms",        "3: impulse, held, 50 ms",
-      "3: impulse, held, 20 ms", "3: impulse, interpolated, 50 ms",
+      "1: single, 1 ms",
+      "2: accelerance, 50 ms",
+      "3: impulse, held, 50 ms",
+      "3: impulse, held, 20 ms",
+      "3: impulse, interpolated, 50 ms",
       "3: impulse, interpolated, 20 ms",
   };
   return titles[v];
@@ -199,7 +192,7 @@ static void draw_panel(FILE *script, const figure *f, size_t k)
     fprintf(script, "EOD\n");
   }
   fprintf(script, "set title 'k = %g kN/m'\n%s\nplot ", 1e-3 * stiffnesses[k],
-          k == 0 ? "set key outside bottom center horizontal maxcols 3" : "unset key");
+          k + 1 == STIFFNESS_COUNT ? "set key top right" : "unset key");
   for (size_t v = 0; v < VARIANT_COUNT; ++v) {
     fprintf(script, "%s$c%zu using 1:2 with lines %s title '%s'", v > 0 ? ", " : "", v, line_of(v),
             title_of(v));
@@ -211,8 +204,9 @@ static hap_status draw(bench *b, const figure *f)
 {
   FILE *script = bench_picture_begin(b, "fig5", 900, 1000);
   if (script != NULL) {
-    fprintf(script, "set multiplot layout 3,1\nset xlabel 'time [s]'\n"
-                    "set ylabel 'force on the cube [N]'\nset xrange [0:1.2]\nset yrange [0:*]\n");
+    fprintf(script,
+            "set multiplot layout 3,1\nset xlabel 'time [s]'\n"
+            "set ylabel 'force on the cube [N]'\nset xrange [0:1.2]\nset yrange [0:*]\n");
     for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
       draw_panel(script, f, k);
     }
@@ -264,8 +258,9 @@ static void check_impulse(bench *b, const figure *f, size_t k, size_t v)
   double longer = percent(s->contact_s, one->contact_s);
   double larger = percent(s->impulse_ns, one->impulse_ns);
   double higher = percent(s->peak_n, one->peak_n);
-  const char *text = "k = %5g N/m, %s at %g Hz against single: contact %+.2f %%, impulse %+.2f %%, "
-                     "peak %+.2f %%%s";
+  const char *text =
+      "k = %5g N/m, %s at %g Hz against single: contact %+.2f %%, impulse %+.2f %%, "
+      "peak %+.2f %%%s";
   if (variants[v].pose == HAP_IMPULSE_INTERPOLATED) {
     bench_check(b, longer > 0.0 && larger > 0.0 && higher > 0.0, text, stiffnesses[k],
                 variants[v].name, variants[v].physics_hz, longer, larger, higher,
@@ -314,8 +309,7 @@ static void check_line(bench *b, const figure *f, const char *line)
     for (size_t v = 0; v < VARIANT_COUNT && column(line, 0) == stiffnesses[k]; ++v) {
       double value = 0.0;
       double wanted = column(line, variants[v].physics_hz == 50.0 ? 5 : 6);
-      if (variants[v].model == HAP_MODEL_IMPULSE &&
-          variants[v].pose == HAP_IMPULSE_INTERPOLATED &&
+      if (variants[v].model == HAP_MODEL_IMPULSE && variants[v].pose == HAP_IMPULSE_INTERPOLATED &&
           quantity_of(line, &f->curves[k][v].sum, &value)) {
         int length = (int)strcspn(strchr(line, ',') + 1, ",");
         bench_check(b, bench_within(value, wanted, 0.05),

@@ -28,8 +28,9 @@ static const program programs[] = {
 
 static void print_usage(FILE *to)
 {
-  fprintf(to, "usage: hapode-bench NAME [--out DIR] [--quick] [--verify]\n"
-              "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
+  fprintf(to,
+          "usage: hapode-bench NAME [--out DIR] [--quick] [--verify]\n"
+          "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-8s  %s\n", programs[i].name, programs[i].text);
   }

@@ -9,6 +9,7 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
+#include "base/vec.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 

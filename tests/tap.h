@@ -36,8 +36,8 @@ static void tap_check(bool good, const char *file, int line, const char *what)
   }
 }
 
-static void tap_check_near(double a, double b, double tolerance, const char *file, int line,
-                           const char *what)
+static inline void tap_check_near(double a, double b, double tolerance, const char *file, int line,
+                                  const char *what)
 {
   if (!(fabs(a - b) <= tolerance)) { /* also when one is NaN */
     char text[512];

@@ -24,13 +24,13 @@ typedef struct hap_trace_pointer {
 /* One tick. */
 typedef struct hap_trace_row {
   uint64_t tick;
-  double t;           /* s since start */
-  double tick_us;     /* us, computing time of the previous tick (this one is not over) */
-  double model_age_s; /* s */
-  uint32_t bodies;    /* local bodies */
-  uint32_t contacts;  /* contacts that push */
+  double t;               /* s since start */
+  double tick_us;         /* us, computing time of the previous tick (this one is not over) */
+  double model_age_s;     /* s */
+  uint32_t bodies;        /* local bodies */
+  uint32_t contacts;      /* contacts that push */
   uint32_t pointer_count; /* places in use: up to the last pointer there is */
-  uint32_t body_count; /* traced bodies, see hap_session_trace_bodies in ode.h */
+  uint32_t body_count;    /* traced bodies, see hap_session_trace_bodies in ode.h */
   hap_trace_pointer pointers[HAP_TRACE_POINTERS_MAX];
   double body_position[HAP_TRACE_BODIES_MAX][3]; /* m: the loop's where the body is local,
                                                     otherwise of the newest physics step */

@@ -36,6 +36,10 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
       physics->contacts[i].phase = HAPI_SLOT_FREE;
     }
   }
+  for (uint32_t i = 0; i < physics->neighborhood.candidate_count; ++i) {
+    hapi_candidate *candidate = &physics->neighborhood.candidates[i];
+    candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
+  }
 }
 
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
@@ -93,7 +97,8 @@ static void blend(const hap_pose poses[2], double share, hap_pose *out)
 static double share_at(const hapi_physics *physics, int64_t time_ns)
 {
   double interval = (double)(physics->pose_times[1] - physics->pose_times[0]);
-  double since = (double)(time_ns - physics->pose_times[1]);
+  int64_t last = physics->pose_times[1];
+  double since = time_ns > last ? (double)(time_ns - last) : 0.0; /* no overflow for any time */
   if (!(interval > 0.0)) {
     return 1.0;
   }

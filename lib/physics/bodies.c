@@ -60,18 +60,23 @@ static void rebuild_buckets(hapi_body_table *table)
 static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
+  dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || buckets == NULL) {
     hapi_free(entries);
+    hapi_free(handles);
     hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
+    memcpy(handles, table->handles, table->high * sizeof(dBodyID));
   }
   hapi_free(table->entries);
+  hapi_free(table->handles);
   hapi_free(table->buckets);
   table->entries = entries;
+  table->handles = handles;
   table->buckets = buckets;
   table->capacity = capacity;
   table->bucket_count = capacity * 4;
@@ -91,6 +96,7 @@ void hapi_bodies_finish(hapi_body_table *table)
     hapi_free(table->entries[i].sleep.velocities);
   }
   hapi_free(table->entries);
+  hapi_free(table->handles);
   hapi_free(table->buckets);
   memset(table, 0, sizeof *table);
 }
@@ -139,6 +145,7 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   hapi_known_body *known = &table->entries[index];
   memset(known, 0, sizeof *known);
   known->body = body;
+  table->handles[index] = body;
   known->slot = HAPI_NONE;
   known->island = HAPI_NONE;
   known->extent = extent_of(body);
@@ -159,9 +166,19 @@ static hap_status see_body(hapi_physics *physics, dBodyID body)
       return status;
     }
   }
-  table->entries[index].seen = table->scan;
+  hapi_known_body *known = &table->entries[index];
+  known->seen = table->scan;
+  /* ODE's auto-disable was switched off on the body that is known: where it is on, another body
+   * has come to be at the address of a destroyed one, or the application has set it anew. */
+  if (known->sleep.taken && dBodyGetAutoDisableFlag(body) != 0) {
+    hapi_slots_drop_body(physics, index);
+    hapi_free(known->sleep.velocities);
+    memset(&known->sleep, 0, sizeof known->sleep);
+    known->slot = HAPI_NONE;
+    known->extent = extent_of(body);
+  }
   if (physics->begun) {
-    hapi_sleep_take(&table->entries[index]);
+    hapi_sleep_take(known);
   }
   return HAP_OK;
 }
@@ -232,6 +249,7 @@ static void remove_entry(hapi_physics *physics, uint32_t index)
   hapi_free(known->sleep.velocities);
   memset(known, 0, sizeof *known);
   known->slot = HAPI_NONE;
+  table->handles[index] = NULL;
   --table->used;
 }
 
@@ -310,7 +328,13 @@ void hapi_bodies_forget(hapi_physics *physics, uint32_t index)
   pthread_mutex_unlock(&physics->poses_lock);
 }
 
-static const char *unsoundness(dBodyID body)
+/* Beyond these sizes ODE's own arithmetic overflows within a step or two. */
+static bool within(const dReal *v, double limit)
+{
+  return fabs(v[0]) <= limit && fabs(v[1]) <= limit && fabs(v[2]) <= limit; /* false for NaN */
+}
+
+const char *hapi_bodies_unsoundness(dBodyID body)
 {
   if (!dBodyIsKinematic(body)) {
     dMass mass;
@@ -319,12 +343,14 @@ static const char *unsoundness(dBodyID body)
       return "has no mass";
     }
   }
-  const dReal *parts[] = {dBodyGetPosition(body), dBodyGetLinearVel(body), dBodyGetAngularVel(body),
-                          dBodyGetForce(body), dBodyGetTorque(body)};
-  for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-    if (!hapi_finite(parts[i], 3)) {
-      return "has a position, velocity or force that is not finite";
-    }
+  if (!within(dBodyGetPosition(body), 1e9)) {
+    return "has a position that is not finite or beyond 1e9 m";
+  }
+  if (!within(dBodyGetLinearVel(body), 1e8) || !within(dBodyGetAngularVel(body), 1e7)) {
+    return "has a velocity that is not finite or beyond 1e8 m/s or 1e7 rad/s";
+  }
+  if (!within(dBodyGetForce(body), 1e12) || !within(dBodyGetTorque(body), 1e12)) {
+    return "has a force or torque on it that is not finite or beyond 1e12";
   }
   return hapi_finite(dBodyGetQuaternion(body), 4) ? NULL : "has an orientation that is not finite";
 }
@@ -333,8 +359,8 @@ dBodyID hapi_bodies_find_unsound(hapi_physics *physics, const char **out_what)
 {
   const hapi_body_table *table = &physics->table;
   for (uint32_t i = 0; i < table->high; ++i) {
-    dBodyID body = table->entries[i].body;
-    *out_what = body != NULL ? unsoundness(body) : NULL;
+    dBodyID body = table->handles[i];
+    *out_what = body != NULL ? hapi_bodies_unsoundness(body) : NULL;
     if (*out_what != NULL) {
       return body;
     }

@@ -54,8 +54,8 @@ static void latch_world_fault(hapi_physics *physics, dBodyID body, const char *w
            p[2], what);
   if (!physics->world_faulty) {
     hapi_log(HAP_LOG_ERROR, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_WORLD, text);
   }
+  physics->config.report(physics->config.user, HAP_FAULT_WORLD, text); /* as long as it lasts */
   physics->world_faulty = true;
 }
 
@@ -79,24 +79,23 @@ static void global_step(hapi_physics *physics)
   }
   hapi_sleep_step(physics, physics->step_s);
   hapi_world_quickstep(physics, physics->step_s);
-  if (physics->ode.after_step != NULL) {
-    physics->ode.after_step(physics->ode.user, physics->step_s);
-  }
+  hapi_sleep_note(physics);
 }
 
 static void sync_in(hapi_physics *physics, int64_t now_ns)
 {
   hapi_edits_run(physics);
   follow_model(physics);
+  /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
+  if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
+    physics->ode.before_step(physics->ode.user, physics->step_s);
+  }
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   hapi_reconcile_take(physics);
   if (physics->model == HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
-  }
-  if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
-    physics->ode.before_step(physics->ode.user, physics->step_s);
   }
   hapi_world_read_user_wrenches(physics);
 }
@@ -112,7 +111,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
-  hapi_reconcile_overwrite(physics);
+  hapi_reconcile_leave(physics);
   if (physics->model != HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
   }
@@ -156,6 +155,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   global_step(physics);
   seconds[3] = lap(&watch);
   hapi_reconcile_residual(physics);
+  hapi_reconcile_overwrite(physics);
   hapi_neighbors_find(physics);
   seconds[1] += lap(&watch);
   hapi_accelerance_measure(physics);
@@ -163,6 +163,9 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   sync_out(physics, now_ns, next_ns);
   seconds[4] += lap(&watch);
   note_times(physics, seconds);
+  if (physics->ode.after_step != NULL && physics->step_s > 0.0) {
+    physics->ode.after_step(physics->ode.user, physics->step_s);
+  }
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)

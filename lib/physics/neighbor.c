@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/alloc.h"
 #include "base/log.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
@@ -34,6 +35,26 @@ static double fastest_body(const hapi_physics *physics)
   return fastest;
 }
 
+/* How many geoms are near is the world's affair: the lists grow as they must. */
+static bool grow(hapi_neighborhood *hood)
+{
+  uint32_t capacity = 2 * hood->candidate_capacity;
+  hapi_candidate *candidates = hapi_alloc_array(capacity, sizeof *candidates);
+  hapi_hit *hits = hapi_alloc_array(capacity, sizeof *hits);
+  if (candidates == NULL || hits == NULL) {
+    hapi_free(candidates);
+    hapi_free(hits);
+    return false;
+  }
+  memcpy(candidates, hood->candidates, hood->candidate_count * sizeof *candidates);
+  hapi_free(hood->candidates);
+  hapi_free(hood->hits);
+  hood->candidates = candidates;
+  hood->hits = hits;
+  hood->candidate_capacity = capacity;
+  return true;
+}
+
 static void collect_geom(void *data, dGeomID a, dGeomID b)
 {
   hapi_physics *physics = data;
@@ -48,7 +69,7 @@ static void collect_geom(void *data, dGeomID a, dGeomID b)
       (dGeomGetCategoryBits(geom) & pointer->collide_bits) == 0) {
     return;
   }
-  if (hood->candidate_count == hood->candidate_capacity) {
+  if (hood->candidate_count == hood->candidate_capacity && !grow(hood)) {
     ++physics->figures.stats.capacity_dropped;
     return;
   }
@@ -124,51 +145,104 @@ static int by_distance(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
+/* A plane that turned far is another contact: it does not go on with the force of the old one. */
+#define SAME_PLANE_COSINE 0.7
+
 static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
   dBodyID body = dGeomGetBody(hit->geom);
-  hapi_v3_copy(hit->nearest.point_b, slot->point_world);
+  double normal[3];
   hapi_v3_copy(hit->nearest.point_b, slot->point_body);
-  hapi_v3_copy(hit->nearest.normal, slot->normal_body);
-  slot->distance = hit->nearest.distance;
-  slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
-  slot->stiffness = pointer->stiffness;
-  slot->wanted = true;
+  hapi_v3_copy(hit->nearest.normal, normal);
   if (body != NULL) {
     const dReal *q = dBodyGetQuaternion(body);
     hapi_pose_unpoint(dBodyGetPosition(body), q, hit->nearest.point_b, slot->point_body);
-    hapi_quat_unrotate(q, hit->nearest.normal, slot->normal_body);
+    hapi_quat_unrotate(q, hit->nearest.normal, normal);
   }
+  if (slot->placed && hapi_v3_dot(normal, slot->normal_body) < SAME_PLANE_COSINE) {
+    ++slot->generation;
+    memset(slot->last_force, 0, sizeof slot->last_force);
+  }
+  hapi_v3_copy(normal, slot->normal_body);
+  hapi_v3_copy(hit->nearest.point_b, slot->point_world);
+  slot->distance = hit->nearest.distance;
+  slot->placed = true;
+  slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
+  slot->stiffness = pointer->stiffness;
+}
+
+static uint32_t known_of(const hapi_physics *physics, const hapi_hit *hit)
+{
+  return hapi_bodies_find(&physics->table, dGeomGetBody(hit->geom));
+}
+
+/* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
+ * those lose them then. */
+static uint32_t choose(hapi_physics *physics, uint32_t count)
+{
+  hapi_hit *hits = physics->neighborhood.hits;
+  uint32_t bodies = 0;
+  uint32_t chosen = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    bool has_body = dGeomGetBody(hits[i].geom) != NULL;
+    uint32_t index = known_of(physics, &hits[i]);
+    hapi_known_body *known = index != HAPI_NONE ? &physics->table.entries[index] : NULL;
+    bool counted = known != NULL && known->chosen_in == physics->model_number + 1;
+    bool room = chosen < physics->config.capacity.contacts && (!has_body || known != NULL) &&
+                (known == NULL || counted || bodies < physics->config.capacity.bodies);
+    if (!room) {
+      ++physics->figures.stats.capacity_dropped;
+      continue;
+    }
+    if (known != NULL && !counted) {
+      known->chosen_in = physics->model_number + 1;
+      ++bodies;
+    }
+    hits[chosen++] = hits[i];
+  }
+  return chosen;
+}
+
+/* What the chosen hits have already is kept from those that need a new place. */
+static void keep_places(hapi_physics *physics, const hapi_hit *hit)
+{
+  uint32_t index = known_of(physics, hit);
+  uint32_t slot = index != HAPI_NONE ? physics->table.entries[index].slot : HAPI_SLOT_NONE;
+  uint32_t generation = hapi_state_pointers(physics->state)[hit->pointer].generation;
+  hapi_contact_slot *contact =
+      hapi_slots_find_contact(physics, slot, hit->geom, hit->pointer, generation);
+  if (contact != NULL) {
+    contact->wanted = true;
+  }
+}
+
+static void take_body(hapi_body_slot *local, dBodyID body)
+{
+  local->wanted = true;
+  local->mass = hapi_body_mass(body);
+  local->flags = dBodyIsKinematic(body)  ? HAPI_BODY_DRIVEN
+                 : !dBodyIsEnabled(body) ? HAPI_BODY_RESTING
+                                         : 0;
 }
 
 static void take_hit(hapi_physics *physics, const hapi_hit *hit)
 {
   dBodyID body = dGeomGetBody(hit->geom);
-  uint32_t slot = HAPI_SLOT_NONE;
-  if (body != NULL) {
-    uint32_t known = hapi_bodies_find(&physics->table, body);
-    slot = known != HAPI_NONE ? hapi_slots_body(physics, known) : HAPI_NONE;
-    if (slot == HAPI_NONE) {
-      ++physics->figures.stats.capacity_dropped;
-      return;
-    }
-  }
   const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
-  hapi_contact_slot *contact =
-      hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
+  uint32_t slot = body != NULL ? hapi_slots_body(physics, known_of(physics, hit)) : HAPI_SLOT_NONE;
+  hapi_contact_slot *contact = NULL;
+  if (body == NULL || slot != HAPI_NONE) {
+    contact = hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
+  }
   if (contact == NULL) {
-    ++physics->figures.stats.capacity_dropped;
+    ++physics->figures.stats.capacity_dropped; /* until the loop has let go of an old slot */
     return;
   }
+  contact->wanted = true;
   place_contact(contact, hit, pointer);
-  if (slot != HAPI_SLOT_NONE) {
-    hapi_body_slot *local = &physics->bodies[slot];
-    local->wanted = true;
-    local->mass = hapi_body_mass(body);
-    local->flags = dBodyIsKinematic(body)  ? HAPI_BODY_DRIVEN
-                   : !dBodyIsEnabled(body) ? HAPI_BODY_RESTING
-                                           : 0;
+  if (body != NULL) {
+    take_body(&physics->bodies[slot], body);
   }
 }
 
@@ -179,13 +253,18 @@ void hapi_neighbors_find(hapi_physics *physics)
   hapi_slots_begin_model(physics);
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
-    if (find_nearest(physics, &hood->candidates[i], &hit->nearest)) {
+    if (hood->candidates[i].geom != NULL &&
+        find_nearest(physics, &hood->candidates[i], &hit->nearest)) {
       hit->geom = hood->candidates[i].geom;
       hit->pointer = hood->candidates[i].pointer;
       ++count;
     }
   }
   qsort(hood->hits, count, sizeof *hood->hits, by_distance); /* nearest first, for capacity */
+  count = choose(physics, count);
+  for (uint32_t i = 0; i < count; ++i) {
+    keep_places(physics, &hood->hits[i]);
+  }
   for (uint32_t i = 0; i < count; ++i) {
     take_hit(physics, &hood->hits[i]);
   }

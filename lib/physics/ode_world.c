@@ -37,14 +37,7 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
 {
   hapi_physics *physics = data;
   if (dGeomIsSpace(a) || dGeomIsSpace(b)) {
-    dSpaceCollide2(a, b, data, near_callback);
-    /* What is inside a space collides as well (ODE's own convention). */
-    if (dGeomIsSpace(a)) {
-      dSpaceCollide((dSpaceID)a, data, near_callback);
-    }
-    if (dGeomIsSpace(b)) {
-      dSpaceCollide((dSpaceID)b, data, near_callback);
-    }
+    dSpaceCollide2(a, b, data, near_callback); /* what is inside of one is met by itself */
     return;
   }
   dBodyID body_a = dGeomGetBody(a);
@@ -58,10 +51,23 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   }
 }
 
+/* The pairs inside a space, and those inside each space in it: every pair once. */
+static void collide_inside(hapi_physics *physics, dSpaceID space)
+{
+  dSpaceCollide(space, physics, near_callback);
+  int count = dSpaceGetNumGeoms(space);
+  for (int i = 0; i < count; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    if (dGeomIsSpace(geom)) {
+      collide_inside(physics, (dSpaceID)geom);
+    }
+  }
+}
+
 void hapi_world_collide(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->contact_group);
-  dSpaceCollide(physics->ode.space, physics, near_callback);
+  collide_inside(physics, physics->ode.space);
 }
 
 void hapi_world_quickstep(hapi_physics *physics, double step_s)

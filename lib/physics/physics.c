@@ -19,17 +19,20 @@ static bool allocate(hapi_physics *physics)
 {
   const hapi_capacity *c = &physics->config.capacity;
   hapi_neighborhood *hood = &physics->neighborhood;
-  hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts;
+  hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts; /* grows when needed */
   physics->bodies = hapi_alloc_array(c->bodies, sizeof *physics->bodies);
   physics->contacts = hapi_alloc_array(c->contacts, sizeof *physics->contacts);
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
   physics->test.contacts = hapi_alloc_array(c->contacts, sizeof *physics->test.contacts);
   physics->test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->test.rounds);
+  hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
+  hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
   physics->contact_scratch =
       hapi_alloc_array((size_t)physics->ode.max_contacts_per_pair, sizeof(dContact));
   return physics->bodies != NULL && physics->contacts != NULL && hood->candidates != NULL &&
-         hood->hits != NULL && physics->test.contacts != NULL && physics->test.rounds != NULL &&
+         hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
+         physics->test.contacts != NULL && physics->test.rounds != NULL &&
          physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
@@ -84,6 +87,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
   physics->neighborhood.probe_geom = dCreateSphere(NULL, 1.0);
+  physics->neighborhood.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
   physics->contact_group = dJointGroupCreate(0);
   hapi_slots_reset(physics);
   hap_status status = check_world(physics, detail);
@@ -103,6 +107,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_physics_end(physics);
   if (physics->neighborhood.probe_geom != NULL) {
     dGeomDestroy(physics->neighborhood.probe_geom);
+    dGeomDestroy(physics->neighborhood.plane_geom);
   }
   if (physics->contact_group != NULL) {
     dJointGroupDestroy(physics->contact_group);
@@ -114,6 +119,8 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_free(physics->contacts);
   hapi_free(physics->neighborhood.candidates);
   hapi_free(physics->neighborhood.hits);
+  hapi_free(physics->neighborhood.vertices);
+  hapi_free(physics->neighborhood.hull);
   hapi_free(physics->contact_scratch);
   hapi_fair_lock_finish(&physics->lock);
   pthread_mutex_destroy(&physics->edits_lock);
@@ -185,7 +192,8 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
-  hapi_reconcile_overwrite(physics);
+  hapi_reconcile_leave(physics);
+  hapi_counts_show(physics);
   return HAP_OK;
 }
 

@@ -19,6 +19,7 @@
 
 #define HAPI_NONE 0xffffffffu
 #define HAPI_EDITS_MAX 256
+#define HAPI_HULL_POINTS 4096u /* of a convex geom that are looked at */
 
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
 #define HAPI_STANDARD_GRAVITY 9.81
@@ -30,6 +31,7 @@
 
 typedef struct hapi_sleep {
   bool taken;
+  bool awake;     /* after the last global step */
   bool automatic; /* ODE's flag as the application set it; kept by us while the session runs */
   double linear_threshold;  /* m/s, squared as ODE keeps it */
   double angular_threshold; /* rad/s, squared */
@@ -50,6 +52,7 @@ typedef struct hapi_known_body {
   bool enabled_before;  /* scratch of the probe's flag pass */
   uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in;   /* scratch: model that it was chosen for */
   uint32_t slot;        /* local slot, HAPI_NONE: not local */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
   double user_force[3]; /* accumulators before the last global step */
@@ -62,6 +65,7 @@ typedef struct hapi_known_body {
 
 typedef struct hapi_body_table {
   hapi_known_body *entries;
+  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
   uint32_t *buckets; /* open addressing, entry index + 1 */
@@ -112,11 +116,12 @@ typedef struct hapi_contact_slot {
   uint32_t round; /* scratch: order among the contacts of its island */
   double point_body[3];
   double normal_body[3];
+  bool placed;           /* what follows holds, of the last model */
   double point_world[3]; /* when it was found */
-  double distance;
-  double speed;         /* m/s, pointer against body */
-  double stiffness;     /* N/m, the pointer's */
-  double last_force[3]; /* on the body, newest message */
+  double distance;       /* m, then */
+  double speed;          /* m/s, pointer against body */
+  double stiffness;      /* N/m, the pointer's */
+  double last_force[3];  /* on the body, newest message */
   double a[6][3];
 } hapi_contact_slot;
 
@@ -135,7 +140,10 @@ typedef struct hapi_hit {
 } hapi_hit;
 
 typedef struct hapi_neighborhood {
-  dGeomID probe_geom; /* private sphere, in no space */
+  dGeomID probe_geom;     /* private sphere, in no space */
+  dGeomID plane_geom;     /* private plane, in no space */
+  dContactGeom *vertices; /* HAPI_HULL_POINTS, of a convex geom */
+  double *hull;           /* the same, x, y, z */
   hapi_candidate *candidates;
   uint32_t candidate_capacity;
   uint32_t candidate_count;
@@ -184,10 +192,13 @@ typedef struct hapi_test_set {
   uint32_t member_count;
   uint32_t member_capacity;
   uint32_t island_count;
+  dGeomID *order; /* geoms of the spaces that sleeping members are in, space by space */
+  uint32_t order_count;
+  uint32_t order_capacity;
   dJointID *cut; /* joints of kinematic bodies to the outside, disabled for the probe */
   uint32_t cut_count;
   uint32_t cut_capacity;
-  uint32_t *disabled; /* entries switched off for the probe */
+  dBodyID *disabled; /* switched off for the probe */
   uint32_t disabled_count;
   uint32_t disabled_capacity;
   unsigned islands_threads; /* ODE's setting, restored after the probes */
@@ -265,13 +276,16 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
 hap_status hapi_bodies_scan(hapi_physics *physics);
 hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
 void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
-/* A body with a mass or a state that must not reach a step; NULL when all are sound. */
+/* Why a body's mass or state must not reach a step; NULL: it may. */
+const char *hapi_bodies_unsoundness(dBodyID body);
+/* The first such body; NULL when all are sound. */
 dBodyID hapi_bodies_find_unsound(hapi_physics *physics, const char **out_what);
 
 /* sleep.c: ODE's auto-disable, kept by us because a probe would reset ODE's own */
 void hapi_sleep_take(hapi_known_body *known);               /* idempotent */
 void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
 void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
+void hapi_sleep_note(hapi_physics *physics);                /* just after it */
 
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
@@ -296,6 +310,10 @@ uint32_t hapi_neighbors_bodies(const hapi_physics *physics); /* dynamic ones in 
 
 /* slots.c */
 uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known); /* live slot; HAPI_NONE: full */
+/* NULL: there is none. */
+hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                           uint32_t pointer, uint32_t pointer_generation);
+/* The one there is, or a new one in a place that is free or not wanted; NULL: full. */
 hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
                                       uint32_t pointer, uint32_t pointer_generation);
 void hapi_slots_begin_model(hapi_physics *physics); /* nothing wanted yet */
@@ -316,6 +334,12 @@ void hapi_snapshot_rewind(const hapi_snapshot *snapshot);
 /* Rewinds, and restores flags and feedback as well. */
 void hapi_snapshot_restore(const hapi_snapshot *snapshot);
 
+/* space_order.c */
+hap_status hapi_space_order_save(hapi_physics *physics); /* when a member sleeps */
+void hapi_space_order_restore(hapi_physics *physics);
+/* Grows an array of elements of one size to hold count more than those in use. */
+bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size);
+
 /* probe.c */
 /* Which bodies the wanted contacts can move: their islands. HAP_ERROR_MEMORY. */
 hap_status hapi_test_gather(hapi_physics *physics);
@@ -335,7 +359,8 @@ void hapi_accelerance_measure(hapi_physics *physics);
 void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */
 void hapi_reconcile_push(hapi_physics *physics);      /* pointers' impulse into the global step */
 void hapi_reconcile_residual(hapi_physics *physics);  /* after it: eq. 14 */
-void hapi_reconcile_overwrite(hapi_physics *physics); /* after the probes: eq. 12 and 13 */
+void hapi_reconcile_overwrite(hapi_physics *physics); /* eq. 12 and 13 */
+void hapi_reconcile_leave(hapi_physics *physics);     /* last: what is left in ODE */
 
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);

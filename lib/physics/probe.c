@@ -15,31 +15,11 @@ static bool dynamic(dBodyID body)
   return body != NULL && !dBodyIsKinematic(body);
 }
 
-/* Grows an array of elements of one size to hold count more than in use. */
-static bool reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
-{
-  if (used + count <= *capacity) {
-    return true;
-  }
-  uint32_t wanted = 2 * (used + count) + 64;
-  void *more = hapi_alloc_array(wanted, size);
-  if (more == NULL) {
-    return false;
-  }
-  if (used > 0) {
-    memcpy(more, *array, used * size);
-  }
-  hapi_free(*array);
-  *array = more;
-  *capacity = wanted;
-  return true;
-}
-
 static bool add_member(hapi_physics *physics, uint32_t index, uint32_t island)
 {
   hapi_test_set *test = &physics->test;
-  if (!reserve((void **)&test->members, &test->member_capacity, test->member_count, 1,
-               sizeof *test->members)) {
+  if (!hapi_reserve((void **)&test->members, &test->member_capacity, test->member_count, 1,
+                    sizeof *test->members)) {
     return false;
   }
   physics->table.entries[index].island = island;
@@ -121,8 +101,8 @@ static hap_status cut_joints(hapi_physics *physics)
   for (uint32_t i = 0; i < test->member_count; ++i) {
     dBodyID body = physics->table.entries[test->members[i]].body;
     int joints = dynamic(body) ? 0 : dBodyGetNumJoints(body);
-    if (!reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
-                 sizeof *test->cut)) {
+    if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
+                      sizeof *test->cut)) {
       return HAP_ERROR_MEMORY;
     }
     for (int k = 0; k < joints; ++k) {
@@ -163,19 +143,20 @@ static hap_status save_members(hapi_physics *physics)
   return HAP_OK;
 }
 
-static hap_status switch_others_off(hapi_physics *physics)
+/* All that are awake; the members are switched on again after it. */
+static hap_status switch_off(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
   test->disabled_count = 0;
-  if (!reserve((void **)&test->disabled, &test->disabled_capacity, 0, physics->table.high,
-               sizeof *test->disabled)) {
+  if (!hapi_reserve((void **)&test->disabled, &test->disabled_capacity, 0, physics->table.high,
+                    sizeof *test->disabled)) {
     return HAP_ERROR_MEMORY;
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
-    const hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL && known->island == HAPI_NONE && dBodyIsEnabled(known->body)) {
-      dBodyDisable(known->body);
-      test->disabled[test->disabled_count++] = i;
+    dBodyID body = physics->table.handles[i];
+    if (body != NULL && dBodyIsEnabled(body)) {
+      dBodyDisable(body);
+      test->disabled[test->disabled_count++] = body;
     }
   }
   return HAP_OK;
@@ -185,21 +166,24 @@ hap_status hapi_test_enter(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
   hap_status status = save_members(physics);
+  if (status >= HAP_OK) {
+    status = hapi_space_order_save(physics);
+  }
   if (status < HAP_OK) {
     return status;
   }
   test->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+  status = cut_joints(physics);
+  if (status >= HAP_OK) {
+    status = switch_off(physics);
+  }
   for (uint32_t i = 0; i < test->member_count; ++i) {
     const hapi_known_body *known = &physics->table.entries[test->members[i]];
     dBodyEnable(known->body); /* a sleeping body would answer A = 0 */
     if (known->moved_callback != NULL) {
       dBodySetMovedCallback(known->body, NULL);
     }
-  }
-  status = cut_joints(physics);
-  if (status >= HAP_OK) {
-    status = switch_others_off(physics);
   }
   if (status < HAP_OK) {
     hapi_test_leave(physics);
@@ -210,13 +194,14 @@ hap_status hapi_test_enter(hapi_physics *physics)
 void hapi_test_leave(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
-  hapi_snapshot_restore(&physics->snapshot);
   for (uint32_t i = 0; i < test->cut_count; ++i) {
     dJointEnable(test->cut[i]);
   }
   for (uint32_t i = 0; i < test->disabled_count; ++i) {
-    dBodyEnable(physics->table.entries[test->disabled[i]].body);
+    dBodyEnable(test->disabled[i]);
   }
+  hapi_space_order_restore(physics);
+  hapi_snapshot_restore(&physics->snapshot); /* also switches sleeping members off again */
   test->cut_count = 0;
   test->disabled_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, test->islands_threads);
@@ -259,6 +244,7 @@ void hapi_test_finish(hapi_test_set *test)
   hapi_free(test->contacts);
   hapi_free(test->rounds);
   hapi_free(test->members);
+  hapi_free(test->order);
   hapi_free(test->cut);
   hapi_free(test->disabled);
   memset(test, 0, sizeof *test);

@@ -27,16 +27,25 @@ static void read_velocity(dBodyID body, double out[6])
   hapi_v3_copy(dBodyGetAngularVel(body), out + 3);
 }
 
+static bool any(const double v[3])
+{
+  return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
+}
+
 /* The totals' growth since the last message. */
 static void take_impulse(hapi_physics *physics, hapi_body_slot *slot, const hapi_state_body *in)
 {
-  hapi_v3_sub(in->impulse, slot->impulse_taken, slot->new_impulse);
-  hapi_v3_sub(in->angular_impulse, slot->angular_impulse_taken, slot->new_angular_impulse);
+  double linear[3];
+  double angular[3];
+  hapi_v3_sub(in->impulse, slot->impulse_taken, linear);
+  hapi_v3_sub(in->angular_impulse, slot->angular_impulse_taken, angular);
   hapi_v3_copy(in->impulse, slot->impulse_taken);
   hapi_v3_copy(in->angular_impulse, slot->angular_impulse_taken);
-  hapi_v3_add(physics->figures.hand_impulse, slot->new_impulse, physics->figures.hand_impulse);
-  slot->pushed = hapi_v3_dot(slot->new_impulse, slot->new_impulse) > 0.0 ||
-                 hapi_v3_dot(slot->new_angular_impulse, slot->new_angular_impulse) > 0.0;
+  hapi_v3_add(physics->figures.hand_impulse, linear, physics->figures.hand_impulse);
+  /* What an earlier cycle could not give, because it had no step, is still there. */
+  hapi_v3_add(slot->new_impulse, linear, slot->new_impulse);
+  hapi_v3_add(slot->new_angular_impulse, angular, slot->new_angular_impulse);
+  slot->pushed = any(linear) || any(angular);
 }
 
 /* Whether somebody else moved the body since the last cycle: then what they did holds. */
@@ -60,6 +69,18 @@ static bool sound(const hapi_state_body *in)
          hapi_finite(in->residual, 6);
 }
 
+/* The loop begins again from ODE's state; what the pointers gave before still counts. */
+static void restart_where_it_is(hapi_body_slot *slot)
+{
+  double linear[3];
+  double angular[3];
+  hapi_v3_copy(slot->new_impulse, linear);
+  hapi_v3_copy(slot->new_angular_impulse, angular);
+  hapi_slots_restart(slot);
+  hapi_v3_copy(linear, slot->new_impulse);
+  hapi_v3_copy(angular, slot->new_angular_impulse);
+}
+
 static void take_body(hapi_physics *physics, uint32_t index)
 {
   hapi_body_slot *slot = &physics->bodies[index];
@@ -76,7 +97,7 @@ static void take_body(hapi_physics *physics, uint32_t index)
   }
   take_impulse(physics, slot, in);
   if (moved_by_application(slot, body)) {
-    hapi_slots_restart(slot);
+    restart_where_it_is(slot);
   }
 }
 
@@ -125,11 +146,6 @@ static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
   memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
 }
 
-static bool any(const double v[3])
-{
-  return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
-}
-
 void hapi_reconcile_push(hapi_physics *physics)
 {
   for (uint32_t i = 0; i < physics->config.capacity.bodies && physics->step_s > 0.0; ++i) {
@@ -174,7 +190,8 @@ void hapi_reconcile_residual(hapi_physics *physics)
 }
 
 /* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference, and it is
- * on its way to the loop. What is left is the pose. A body that no pointer pushed keeps the world's:
+ * on its way to the loop. What is left is the pose; the contact planes are sought on it, as it is the
+ * pose that the loop goes on with. A body that no pointer pushed keeps the world's:
  * for a body alone the two are equal, and what another body pushes is moved by the world only. */
 static void overwrite(hapi_physics *physics, uint32_t index)
 {
@@ -191,8 +208,14 @@ static void overwrite(hapi_physics *physics, uint32_t index)
 void hapi_reconcile_overwrite(hapi_physics *physics)
 {
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
     overwrite(physics, i);
+  }
+}
+
+void hapi_reconcile_leave(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     slot->placed = body != NULL;
     if (body != NULL) {

@@ -27,6 +27,7 @@ void hapi_sleep_take(hapi_known_body *known)
   }
   memset(sleep, 0, sizeof *sleep);
   sleep->taken = true;
+  sleep->awake = true;
   sleep->automatic = dBodyGetAutoDisableFlag(body) != 0;
   if (!sleep->automatic) {
     return;
@@ -128,9 +129,23 @@ void hapi_sleep_step(hapi_physics *physics, double step_s)
     if (known->body == NULL || !known->sleep.automatic || known->sleep.samples == 0) {
       continue;
     }
+    bool awake = dBodyIsEnabled(known->body) != 0;
+    if (awake && !known->sleep.awake) {
+      start_countdown(&known->sleep); /* dBodyEnable does so; being woken by an island does not */
+    }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
-    if (dBodyIsEnabled(known->body) && dBodyGetNumJoints(known->body) > 0) {
+    if (awake && dBodyGetNumJoints(known->body) > 0) {
       step_body(known, step_s);
+    }
+  }
+}
+
+void hapi_sleep_note(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    hapi_known_body *known = &physics->table.entries[i];
+    if (known->body != NULL && known->sleep.automatic) {
+      known->sleep.awake = dBodyIsEnabled(known->body) != 0;
     }
   }
 }

@@ -46,31 +46,54 @@ static bool same_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID g
          slot->pointer == pointer && slot->pointer_generation == pointer_generation;
 }
 
-hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
-                                      uint32_t pointer, uint32_t pointer_generation)
+hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                           uint32_t pointer, uint32_t pointer_generation)
 {
-  hapi_contact_slot *empty = NULL;
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
     hapi_contact_slot *slot = &physics->contacts[i];
     if (same_contact(slot, body, geom, pointer, pointer_generation)) {
       return slot;
     }
-    if (empty == NULL && slot->phase == HAPI_SLOT_FREE) {
-      empty = slot;
+  }
+  return NULL;
+}
+
+static hapi_contact_slot *contact_place(hapi_physics *physics)
+{
+  hapi_contact_slot *unwanted = NULL;
+  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+    hapi_contact_slot *slot = &physics->contacts[i];
+    if (slot->phase == HAPI_SLOT_FREE) {
+      return slot;
+    }
+    if (!slot->wanted) {
+      unwanted = slot;
     }
   }
-  if (empty == NULL) {
+  return unwanted;
+}
+
+hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                      uint32_t pointer, uint32_t pointer_generation)
+{
+  hapi_contact_slot *slot =
+      hapi_slots_find_contact(physics, body, geom, pointer, pointer_generation);
+  if (slot != NULL) {
+    return slot;
+  }
+  slot = contact_place(physics);
+  if (slot == NULL) {
     return NULL;
   }
-  uint32_t generation = empty->generation;
-  memset(empty, 0, sizeof *empty);
-  empty->generation = generation + 1;
-  empty->phase = HAPI_SLOT_LIVE;
-  empty->body = body;
-  empty->geom = geom;
-  empty->pointer = pointer;
-  empty->pointer_generation = pointer_generation;
-  return empty;
+  uint32_t generation = slot->generation;
+  memset(slot, 0, sizeof *slot);
+  slot->generation = generation + 1;
+  slot->phase = HAPI_SLOT_LIVE;
+  slot->body = body;
+  slot->geom = geom;
+  slot->pointer = pointer;
+  slot->pointer_generation = pointer_generation;
+  return slot;
 }
 
 void hapi_slots_begin_model(hapi_physics *physics)

@@ -109,7 +109,8 @@ void hapi_local_place(hapi_tick *tick)
     }
     blend(body, share);
     for (int k = 0; k < 3; ++k) {
-      body->twist.linear[k] = (body->to.position[k] - body->from.position[k]) / tick->blend_s;
+      double way = share < 1.0 ? body->to.position[k] - body->from.position[k] : 0.0;
+      body->twist.linear[k] = way / tick->blend_s;
     }
   }
 }

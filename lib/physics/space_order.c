@@ -1,0 +1,93 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "physics/physics_internal.h"
+
+/* A geom that moves goes to the front of its space's list, and the order of the list is the order in
+ * which contacts are found. Geoms of awake bodies have moved in the global step already and do not
+ * go again; those of a sleeping body move only in the probes. For these the order is put back. */
+
+bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
+{
+  if (used + count <= *capacity) {
+    return true;
+  }
+  uint32_t wanted = 2 * (used + count) + 64;
+  void *more = hapi_alloc_array(wanted, size);
+  if (more == NULL) {
+    return false;
+  }
+  if (used > 0) {
+    memcpy(more, *array, used * size);
+  }
+  hapi_free(*array);
+  *array = more;
+  *capacity = wanted;
+  return true;
+}
+
+static bool saved_already(const hapi_test_set *test, dSpaceID space)
+{
+  for (uint32_t i = 0; i < test->order_count; ++i) {
+    if (dGeomGetSpace(test->order[i]) == space) {
+      return true;
+    }
+  }
+  return false;
+}
+
+static hap_status save_space(hapi_test_set *test, dSpaceID space)
+{
+  int count = dSpaceGetNumGeoms(space);
+  if (!hapi_reserve((void **)&test->order, &test->order_capacity, test->order_count,
+                    (uint32_t)count, sizeof(dGeomID))) {
+    return HAP_ERROR_MEMORY;
+  }
+  for (int i = 0; i < count; ++i) {
+    test->order[test->order_count++] = dSpaceGetGeom(space, i);
+  }
+  return HAP_OK;
+}
+
+/* The body's geoms' spaces, and the spaces that those are in: they move to the front as well. */
+static hap_status save_spaces_of(hapi_test_set *test, dBodyID body)
+{
+  hap_status status = HAP_OK;
+  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    dSpaceID space = dGeomGetSpace(geom);
+    for (; space != NULL && status >= HAP_OK; space = dGeomGetSpace((dGeomID)space)) {
+      if (!saved_already(test, space)) {
+        status = save_space(test, space);
+      }
+    }
+  }
+  return status;
+}
+
+hap_status hapi_space_order_save(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hap_status status = HAP_OK;
+  test->order_count = 0;
+  for (uint32_t i = 0; i < test->member_count && status >= HAP_OK; ++i) {
+    dBodyID body = physics->table.handles[test->members[i]];
+    if (!dBodyIsEnabled(body)) {
+      status = save_spaces_of(test, body);
+    }
+  }
+  return status;
+}
+
+/* Adding puts a geom in front: from the last to the first. */
+void hapi_space_order_restore(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  for (uint32_t i = test->order_count; i > 0; --i) {
+    dSpaceID space = dGeomGetSpace(test->order[i - 1]);
+    dSpaceRemove(space, test->order[i - 1]);
+    dSpaceAdd(space, test->order[i - 1]);
+  }
+  test->order_count = 0;
+}

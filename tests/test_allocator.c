@@ -1,0 +1,289 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Every create and start with the first, the second, the third ... allocation failing: a status, no
+ * crash, nothing left behind. */
+
+#include "tests/tap.h"
+
+#include <stdatomic.h>
+#include <unistd.h>
+
+#include "tests/stage.h"
+
+#define ROUNDS_MAX 2000
+
+/* Physics may allocate on its own thread. */
+static struct {
+  atomic_long calls;
+  atomic_long lives;
+  atomic_long fail_at; /* number of the call that fails, counted from 1; 0: none */
+  atomic_int fail_on;  /* and all behind it */
+} heap;
+
+static void *failing_allocate(size_t size, void *user)
+{
+  (void)user;
+  long call = atomic_fetch_add(&heap.calls, 1) + 1;
+  long fail_at = atomic_load(&heap.fail_at);
+  if (fail_at != 0 && (call == fail_at || (atomic_load(&heap.fail_on) != 0 && call > fail_at))) {
+    return NULL;
+  }
+  void *memory = malloc(size);
+  if (memory != NULL) {
+    memset(memory, 0xa5, size); /* whoever does not clear it shall notice */
+    atomic_fetch_add(&heap.lives, 1);
+  }
+  return memory;
+}
+
+static void counted_release(void *memory, void *user)
+{
+  (void)user;
+  atomic_fetch_sub(&heap.lives, 1);
+  free(memory);
+}
+
+static void fail_from_now(long call, int on)
+{
+  atomic_store(&heap.calls, 0);
+  atomic_store(&heap.fail_at, call);
+  atomic_store(&heap.fail_on, on);
+}
+
+static bool was_reached(void)
+{
+  return atomic_load(&heap.calls) >= atomic_load(&heap.fail_at);
+}
+
+/* Runs work with each of its allocations failing, alone and with all that follow; work gives back
+ * whether it had all it needs. At the end it must have, and in between the failure must be seen. */
+static void fail_each(bool (*work)(void), bool may_degrade)
+{
+  for (int on = 0; on < 2; ++on) {
+    long round = 1;
+    bool complete = false;
+    for (; round < ROUNDS_MAX; ++round) {
+      fail_from_now(round, on);
+      complete = work();
+      bool reached = was_reached();
+      CHECK(atomic_load(&heap.lives) == 0);
+      CHECK(reached || complete);
+      CHECK(!reached || !complete || may_degrade);
+      if (!reached) {
+        break;
+      }
+    }
+    CHECK(complete && round > 1 && round < ROUNDS_MAX);
+    printf("# %ld allocations\n", round - 1);
+  }
+  fail_from_now(0, 0);
+}
+
+/* ---- session ---- */
+
+static bool create(stage *s)
+{
+  hap_status status = stage_create(s);
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  CHECK((s->session != NULL) == (status == HAP_OK));
+  CHECK(status == HAP_OK || has(s->detail.text, "no memory"));
+  return status == HAP_OK;
+}
+
+static bool work_create(void)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.def.trace_rows = 10;
+  for (int i = 1; i < 100; ++i) { /* the table of bodies has to grow */
+    (void)add_cube(&s, 0.2 * i, NULL);
+  }
+  bool good = create(&s);
+  stage_end(&s);
+  return good;
+}
+
+TEST(create_with_failing_allocations)
+{
+  fail_each(work_create, false);
+}
+
+/* Everything from an open device to 100 ticks; what is allocated while it runs may be missing, then
+ * it goes on without. */
+static bool run_all(hap_drive drive)
+{
+  stage s;
+  hap_device *device = NULL;
+  hap_pointer_id id;
+  hap_pointer_def def;
+  stage_init(&s, drive);
+  dBodySetAutoDisableFlag(s.cube, 1);
+  dBodySetAutoDisableAverageSamplesCount(s.cube, 5);
+  hap_status status = hap_device_open("virtual:path=0:-0.1/0/0;0.1:-0.05/0/0", &device, &s.detail);
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  bool good = status == HAP_OK && create(&s);
+  if (good) {
+    hap_pointer_def_init(&def, sizeof def);
+    def.device = device;
+    status = hap_pointer_add(s.session, &def, &id);
+    CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+    good = status == HAP_OK;
+  }
+  if (good) {
+    status = hap_session_start(s.session);
+    CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
+    good = status >= HAP_OK;
+  }
+  if (good && drive == HAP_DRIVE_LOCKSTEP) {
+    CHECK(hap_session_advance(s.session, 150) == HAP_OK);
+    CHECK(stats_of(&s).fault == HAP_FAULT_NONE && stats_of(&s).ticks == 150);
+  } else if (good) {
+    sleep_ms(30);
+  }
+  stage_end(&s);
+  hap_device_close(device);
+  return good;
+}
+
+static bool work_lockstep(void)
+{
+  return run_all(HAP_DRIVE_LOCKSTEP);
+}
+
+static bool work_threads(void)
+{
+  return run_all(HAP_DRIVE_THREADS);
+}
+
+TEST(a_lockstep_run_with_failing_allocations)
+{
+  fail_each(work_lockstep, true);
+}
+
+TEST(a_threaded_run_with_failing_allocations)
+{
+  fail_each(work_threads, true);
+}
+
+/* Bodies that are added while it runs, when there is no memory for them. */
+static bool work_grow(void)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  long fail_at = atomic_load(&heap.fail_at);
+  int on = atomic_load(&heap.fail_on);
+  fail_from_now(0, 0);
+  bool good = create(&s) && hap_session_start(s.session) == HAP_OK;
+  fail_from_now(fail_at, on);
+  for (int i = 1; good && i < 200; ++i) {
+    (void)add_cube(&s, 0.2 * i, NULL);
+  }
+  CHECK(good && hap_session_advance(s.session, 50) == HAP_OK);
+  dBodyID loose = dBodyCreate(s.world);
+  hap_status status = hap_session_adopt_body(s.session, loose);
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  hap_session_destroy(s.session);
+  s.session = NULL;
+  dBodyDestroy(loose);
+  stage_end(&s);
+  return good;
+}
+
+TEST(growing_worlds_with_failing_allocations)
+{
+  fail_each(work_grow, true);
+}
+
+/* The last good A and b stay in use when a testing simulation finds no memory: the pointer is felt
+ * all the same. */
+TEST(without_memory_for_probes_the_force_is_still_felt)
+{
+  stage s;
+  hap_pointer_id id;
+  hap_pointer_def def;
+  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  hap_pointer_def_init(&def, sizeof def);
+  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
+  fail_from_now(1, 1);
+  for (int i = 0; i < 300; ++i) {
+    const hap_pose pose = {{-0.07 + 1e-4 * i, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_set_target(s.session, id, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+  }
+  CHECK(stats_of(&s).contact_ticks > 0 && stats_of(&s).peak_force_n > 0.1);
+  CHECK(stats_of(&s).faults == 0);
+  fail_from_now(0, 0);
+  stage_end(&s);
+  CHECK(atomic_load(&heap.lives) == 0);
+}
+
+/* ---- devices ---- */
+
+static char replay_spec[300];
+
+static bool open_device(const char *spec)
+{
+  hap_device *device = (hap_device *)&heap; /* must be overwritten */
+  hap_detail detail;
+  hap_status status = hap_device_open(spec, &device, &detail);
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  CHECK((device != NULL) == (status == HAP_OK));
+  CHECK(status == HAP_OK || has(detail.text, "memory"));
+  hap_device_close(device);
+  return status == HAP_OK;
+}
+
+static bool work_virtual(void)
+{
+  return open_device("virtual:path=0:0/0/0;1:1/0/0;2:0/0/1;3:0/0/0,loop=1,hand=tense");
+}
+
+static bool work_replay(void)
+{
+  return open_device(replay_spec);
+}
+
+TEST(virtual_device_with_failing_allocations)
+{
+  fail_each(work_virtual, false);
+}
+
+/* 3 and 7 channels, more rows than a first block may hold. */
+TEST(replay_device_with_failing_allocations)
+{
+  for (int channels = 3; channels <= 7; channels += 4) {
+    char path[] = "/tmp/hapode-allocator-XXXXXX";
+    int descriptor = mkstemp(path);
+    REQUIRE(descriptor >= 0);
+    FILE *file = fdopen(descriptor, "w");
+    REQUIRE(file != NULL);
+    fprintf(file, channels == 3 ? "t,x,y,z\n" : "t,x,y,z,qw,qx,qy,qz\n");
+    for (int i = 0; i < 5000; ++i) {
+      fprintf(file, "%g,%g,0,0%s\n", 0.01 * i, 1e-5 * i, channels == 3 ? "" : ",1,0,0,0");
+    }
+    fclose(file);
+    snprintf(replay_spec, sizeof replay_spec, "replay:%s,scale=2", path);
+    fail_each(work_replay, false);
+    unlink(path);
+  }
+}
+
+int main(void)
+{
+  const hap_hooks hooks = {failing_allocate, counted_release, NULL, NULL};
+  if (hap_hooks_set(&hooks) != HAP_OK) {
+    return 1;
+  }
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(create_with_failing_allocations);
+  RUN(a_lockstep_run_with_failing_allocations);
+  RUN(a_threaded_run_with_failing_allocations);
+  RUN(growing_worlds_with_failing_allocations);
+  RUN(without_memory_for_probes_the_force_is_still_felt);
+  RUN(virtual_device_with_failing_allocations);
+  RUN(replay_device_with_failing_allocations);
+  dCloseODE();
+  return tap_done();
+}

@@ -1,0 +1,212 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The program hapode-bench: each of its names runs and leaves its table, errors have their exit
+ * codes. Of the numbers only those are checked that are no times. HAPODE_BENCH: path of the
+ * program. */
+
+#include "tests/tap.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tools/plot.h"
+
+#define ARGUMENTS_MAX 8
+#define LINE_MAX_LENGTH 4096
+
+static char folder[256]; /* of this test alone */
+
+static const char *file_in_folder(const char *name, const char *extension)
+{
+  static char paths[4][320];
+  static int next;
+  char *path = paths[next++ % 4];
+  snprintf(path, sizeof paths[0], "%s/%s%s", folder, name, extension);
+  return path;
+}
+
+/* Exit code; what the program says goes to the file "said". -1: it did not end by itself. */
+static int run(const char *const arguments[], char **environment)
+{
+  static char words[ARGUMENTS_MAX][320]; /* posix_spawn's are not const */
+  char *argv[ARGUMENTS_MAX + 2] = {getenv("HAPODE_BENCH")};
+  posix_spawn_file_actions_t actions;
+  pid_t child = -1;
+  int result = 0;
+  for (int i = 0; i < ARGUMENTS_MAX && arguments[i] != NULL; ++i) {
+    snprintf(words[i], sizeof words[i], "%s", arguments[i]);
+    argv[i + 1] = words[i];
+  }
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, file_in_folder("said", ""),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  if (argv[0] == NULL || posix_spawn(&child, argv[0], &actions, NULL, argv, environment) != 0) {
+    child = -1;
+  }
+  posix_spawn_file_actions_destroy(&actions);
+  bool ended = child > 0 && waitpid(child, &result, 0) == child && WIFEXITED(result);
+  return ended ? WEXITSTATUS(result) : -1;
+}
+
+static bool exists(const char *path)
+{
+  struct stat info;
+  return stat(path, &info) == 0;
+}
+
+/* Lines that contain the text. */
+static int count_lines(const char *path, const char *text)
+{
+  char line[LINE_MAX_LENGTH];
+  int count = 0;
+  FILE *file = fopen(path, "r");
+  while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    count += strstr(line, text) != NULL;
+  }
+  if (file != NULL) {
+    fclose(file);
+  }
+  return count;
+}
+
+/* Rows that are whole: as many columns as the header, and no number that is none. */
+static int count_rows(const char *path, const char *header)
+{
+  char line[LINE_MAX_LENGTH];
+  int rows = -1;
+  FILE *file = fopen(path, "r");
+  size_t columns = 0;
+  for (const char *c = header; *c != '\0'; ++c) {
+    columns += *c == ',';
+  }
+  while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    size_t commas = 0;
+    line[strcspn(line, "\n")] = '\0';
+    for (const char *c = line; *c != '\0'; ++c) {
+      commas += *c == ',';
+    }
+    CHECK(commas == columns);
+    CHECK(strstr(line, "nan") == NULL && strstr(line, "inf") == NULL);
+    if (rows < 0) {
+      CHECK(strcmp(line, header) == 0);
+    }
+    ++rows;
+  }
+  if (file != NULL) {
+    fclose(file);
+  }
+  return rows;
+}
+
+static void check_program(const char *name, const char *header, int rows_least)
+{
+  const char *const arguments[] = {name, "--quick", "--out", folder, NULL};
+  REQUIRE(run(arguments, environ) == 0);
+  CHECK(count_rows(file_in_folder(name, ".csv"), header) >= rows_least);
+  CHECK(!plot_available() || exists(file_in_folder(name, ".svg")));
+  unlink(file_in_folder(name, ".csv"));
+  unlink(file_in_folder(name, ".svg"));
+}
+
+TEST(fig5_leaves_its_tables)
+{
+  check_program("fig5", "model,t,force_n,stiffness,physics_hz", 1000);
+  CHECK(count_rows(file_in_folder("fig5_summary", ".csv"),
+                   "model,physics_hz,stiffness,contact_s,peak_n,impulse_ns") == 18);
+  unlink(file_in_folder("fig5_summary", ".csv"));
+}
+
+TEST(fig5_is_as_the_paper_and_the_closed_form_say)
+{
+  const char *const arguments[] = {"fig5", "--verify", "--quick", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "ok ") >= 24);
+  CHECK(count_lines(file_in_folder("said", ""), "fig5: 0 off") == 1);
+}
+
+TEST(fig6_leaves_its_table)
+{
+  check_program("fig6", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
+}
+
+TEST(fig7_leaves_its_table)
+{
+  check_program("fig7", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
+}
+
+TEST(scaling_leaves_its_table)
+{
+  check_program("scaling",
+                "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,island_step_ms,"
+                "library_ms",
+                8);
+}
+
+TEST(tick_leaves_its_table)
+{
+  check_program("tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour", 12);
+}
+
+TEST(without_gnuplot_a_line_says_that_there_is_no_picture)
+{
+  const char *const arguments[] = {"fig5", "--out", folder, NULL};
+  char path[] = "PATH=/nowhere";
+  char *environment[] = {path, NULL};
+  unlink(file_in_folder("fig5", ".svg"));
+  CHECK(run(arguments, environment) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "no picture") == 1);
+  CHECK(exists(file_in_folder("fig5", ".csv")));
+  CHECK(!exists(file_in_folder("fig5", ".svg")));
+}
+
+TEST(wrong_usage_is_2_and_says_what_there_is)
+{
+  const char *const cases[][ARGUMENTS_MAX] = {
+      {NULL},
+      {"fig55", NULL},
+      {"fig5", "fig6", NULL},
+      {"fig5", "--fast", NULL},
+      {"fig5", "--out", NULL},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    CHECK(run(cases[i], environ) == 2);
+    CHECK(count_lines(file_in_folder("said", ""), "scaling") == 1);
+  }
+}
+
+TEST(a_folder_that_cannot_be_is_1)
+{
+  const char *const arguments[] = {"fig5", "--out", "/dev/null/x", NULL};
+  CHECK(run(arguments, environ) == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "/dev/null/x") == 1);
+}
+
+int main(void)
+{
+  const char *temporary = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%s/hapode-bench-XXXXXX", temporary != NULL ? temporary : "/tmp");
+  if (getenv("HAPODE_BENCH") == NULL || mkdtemp(folder) == NULL) {
+    printf("1..0 # SKIP needs HAPODE_BENCH and a folder for files\n");
+    return 0;
+  }
+  RUN(fig5_leaves_its_tables);
+  RUN(fig5_is_as_the_paper_and_the_closed_form_say);
+  RUN(fig6_leaves_its_table);
+  RUN(fig7_leaves_its_table);
+  RUN(scaling_leaves_its_table);
+  RUN(tick_leaves_its_table);
+  RUN(without_gnuplot_a_line_says_that_there_is_no_picture);
+  RUN(wrong_usage_is_2_and_says_what_there_is);
+  RUN(a_folder_that_cannot_be_is_1);
+  const char *const left[] = {"fig5.csv", "fig5.svg", "fig5_summary.csv", "said"};
+  for (size_t i = 0; i < sizeof left / sizeof left[0]; ++i) {
+    unlink(file_in_folder(left[i], ""));
+  }
+  rmdir(folder);
+  return tap_done();
+}

@@ -1,0 +1,491 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Which bodies a pointer may touch before the next sync, where, and what happens when there are
+ * more of them than there is room. */
+
+#include <tests/tap.h>
+
+#include <tests/physics_world.h>
+
+#define RADIUS 0.01 /* m, of the pointer */
+
+typedef struct expectation {
+  double distance; /* m, surface to surface */
+  double normal[3];
+  double tolerance;
+} expectation;
+
+static void check_contact(const test_world *w, dBodyID body, const expectation *e)
+{
+  const hapi_contact_slot *contact = world_contact(w, body, 0);
+  REQUIRE(contact != NULL);
+  double normal[3];
+  hapi_v3_copy(contact->normal_body, normal);
+  if (body != NULL) {
+    double point[3];
+    hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, normal);
+    hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), contact->point_body, point);
+    for (int i = 0; i < 3; ++i) {
+      CHECK_NEAR(point[i], contact->point_world[i], 1e-12);
+    }
+  }
+  CHECK_NEAR(contact->distance, e->distance, e->tolerance);
+  for (int i = 0; i < 3; ++i) {
+    CHECK_NEAR(normal[i], e->normal[i], 10.0 * e->tolerance);
+  }
+}
+
+/* ---- geom classes ---- */
+
+/* Corners and faces of a box with half edges 0.05, 0.04, 0.03, for convex and trimesh. */
+static const dReal box_points[] = {-0.05, -0.04, -0.03, 0.05,  -0.04, -0.03, 0.05, 0.04,
+                                   -0.03, -0.05, 0.04,  -0.03, -0.05, -0.04, 0.03, 0.05,
+                                   -0.04, 0.03,  0.05,  0.04,  0.03,  -0.05, 0.04, 0.03};
+static const dReal box_planes[] = {1, 0,  0, 0.05, -1, 0, 0, 0.05, 0, 1, 0,  0.04,
+                                   0, -1, 0, 0.04, 0,  0, 1, 0.03, 0, 0, -1, 0.03};
+static const unsigned box_polygons[] = {4, 1, 2, 6, 5, 4, 0, 4, 7, 3, 4, 3, 7, 6, 2,
+                                        4, 0, 1, 5, 4, 4, 4, 5, 6, 7, 4, 0, 3, 2, 1};
+static const dTriIndex box_triangles[] = {1, 2, 6, 1, 6, 5, 0, 4, 7, 0, 7, 3, 3, 7, 6, 3, 6, 2,
+                                          0, 1, 5, 0, 5, 4, 4, 5, 6, 4, 6, 7, 0, 3, 2, 0, 2, 1};
+
+typedef enum shape {
+  BOX,
+  CONVEX,
+  TRIMESH,
+  SPHERE,
+  CAPSULE,
+  CYLINDER,
+  SHAPE_COUNT
+} shape;
+
+static const char *const shape_names[] = {"box",    "convex",  "trimesh",
+                                          "sphere", "capsule", "cylinder"};
+
+/* Each is 0.03 m high above its centre. */
+static dGeomID make_geom(dSpaceID space, shape kind, dTriMeshDataID mesh)
+{
+  switch (kind) {
+    case BOX:
+      return dCreateBox(space, 0.1, 0.08, 0.06);
+    case CONVEX:
+      return dCreateConvex(space, box_planes, 6, box_points, 8, box_polygons);
+    case TRIMESH:
+      return dCreateTriMesh(space, mesh, NULL, NULL, NULL);
+    case SPHERE:
+      return dCreateSphere(space, 0.03);
+    case CAPSULE:
+      return dCreateCapsule(space, 0.01, 0.04);
+    case CYLINDER:
+      return dCreateCylinder(space, 0.05, 0.06);
+    case SHAPE_COUNT:
+      break;
+  }
+  return NULL;
+}
+
+static dTriMeshDataID make_mesh(void)
+{
+  static double vertices[24];
+  memcpy(vertices, box_points, sizeof vertices);
+  dTriMeshDataID mesh = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(mesh, vertices, 3 * sizeof(double), 8, box_triangles, 36,
+                              3 * sizeof(dTriIndex));
+  return mesh;
+}
+
+static void tilt(dBodyID body, const double away[3])
+{
+  const dQuaternion q = {0.8, 0.36, 0.0, 0.48};
+  dBodySetQuaternion(body, q);
+  dBodySetPosition(body, away[0], away[1], away[2]);
+}
+
+/* The pointer is above the top face, in the body's frame, whatever way the body is turned. */
+static void check_shape(shape kind, bool turned)
+{
+  test_world w;
+  dMass mass;
+  dTriMeshDataID mesh = make_mesh();
+  const double apart = 0.004;
+  double at[3] = {0.003, -0.002, 0.03 + RADIUS + apart};
+  expectation e = {apart, {0, 0, 1}, 1e-9};
+  if (kind == SPHERE || kind == CAPSULE) {
+    at[0] = at[1] = 0.0;
+  }
+  world_open(&w, 0.0, 20);
+  dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
+  dBodyID body = world_add(&w, make_geom(w.space, kind, mesh), &mass, 0, 0, 0);
+  if (turned) {
+    tilt(body, (const double[3]){1.0, -2.0, 0.5});
+    hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), at, at);
+    hapi_quat_rotate(dBodyGetQuaternion(body), e.normal, e.normal);
+  }
+  printf("# %s%s\n", shape_names[kind], turned ? ", turned" : "");
+  CHECK(world_start(&w, RADIUS, at[0], at[1], at[2]));
+  check_contact(&w, body, &e);
+  CHECK(world_count_contacts(&w) == 1);
+  const hapi_contact_slot *contact = world_contact(&w, body, 0);
+  CHECK(contact != NULL && contact->probed);
+  world_close(&w);
+  dGeomTriMeshDataDestroy(mesh);
+}
+
+TEST(all_geom_classes_are_found)
+{
+  for (int kind = 0; kind < SHAPE_COUNT; ++kind) {
+    check_shape((shape)kind, false);
+    check_shape((shape)kind, true);
+  }
+}
+
+/* Beside an edge: the nearest point is on it, and the way to it is slanted. */
+TEST(edges_of_convex_and_trimesh)
+{
+  const double s = sqrt(0.5);
+  for (int kind = BOX; kind <= TRIMESH; ++kind) {
+    test_world w;
+    dMass mass;
+    dTriMeshDataID mesh = make_mesh();
+    const double apart = RADIUS + 0.005;
+    expectation e = {0.005, {s, 0, s}, 1e-7};
+    printf("# %s\n", shape_names[kind]);
+    world_open(&w, 0.0, 20);
+    dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
+    dBodyID body = world_add(&w, make_geom(w.space, (shape)kind, mesh), &mass, 0, 0, 0);
+    CHECK(world_start(&w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart));
+    check_contact(&w, body, &e);
+    world_close(&w);
+    dGeomTriMeshDataDestroy(mesh);
+  }
+}
+
+TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
+{
+  for (int kind = CONVEX; kind <= TRIMESH; ++kind) {
+    test_world w;
+    dMass mass;
+    dTriMeshDataID mesh = make_mesh();
+    world_open(&w, 0.0, 20);
+    dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
+    dBodyID body = world_add(&w, make_geom(w.space, (shape)kind, mesh), &mass, 0, 0, 0);
+    CHECK(world_start(&w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002));
+    const hapi_contact_slot *contact = world_contact(&w, body, 0);
+    REQUIRE(contact != NULL);
+    for (int i = 0; i < 3; ++i) {
+      CHECK_NEAR(contact->a[i][i], 1 / 0.3, 1e-9);
+    }
+    CHECK_NEAR(contact->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
+    world_close(&w);
+    dGeomTriMeshDataDestroy(mesh);
+  }
+}
+
+TEST(planes_are_found)
+{
+  test_world w;
+  const double n[3] = {0.6, 0.0, 0.8};
+  expectation e = {0.003, {0.6, 0.0, 0.8}, 1e-12};
+  world_open(&w, 0.0, 20);
+  dCreatePlane(w.space, n[0], n[1], n[2], 0.25);
+  double out = 0.25 + RADIUS + 0.003;
+  REQUIRE(world_start(&w, RADIUS, n[0] * out, 7.0, n[2] * out));
+  check_contact(&w, NULL, &e);
+  CHECK(world_stats(&w).neighbours == 0); /* static ones are contacts, not neighbours */
+  world_close(&w);
+}
+
+TEST(geom_offsets_and_several_geoms_of_a_body)
+{
+  test_world w;
+  dMass mass;
+  expectation e = {0.002, {0, 0, 1}, 1e-9};
+  world_open(&w, 0.0, 20);
+  dMassSetSphereTotal(&mass, 0.3, 0.05);
+  dGeomID low = dCreateBox(w.space, 0.1, 0.1, 0.02);
+  dBodyID body = world_add(&w, low, &mass, 1, 2, 3);
+  dGeomID ball = dCreateSphere(w.space, 0.02);
+  dGeomSetBody(ball, body);
+  dGeomSetOffsetPosition(ball, 0.3, 0.0, 0.1);
+  dBodySetQuaternion(body, (const dQuaternion){sqrt(0.5), 0, 0, sqrt(0.5)}); /* x to y */
+  REQUIRE(world_start(&w, RADIUS, 1.0, 2.3, 3.1 + 0.02 + RADIUS + 0.002));
+  CHECK(world_count_contacts(&w) == 1);
+  check_contact(&w, body, &e);
+  world_close(&w);
+}
+
+/* Between two geoms of one body: two contacts, one neighbour. */
+TEST(a_body_is_touched_at_two_geoms)
+{
+  test_world w;
+  dMass mass;
+  world_open(&w, 0.0, 20);
+  dMassSetSphereTotal(&mass, 0.3, 0.05);
+  dBodyID body = world_add(&w, dCreateBox(w.space, 0.1, 0.1, 0.02), &mass, 0, 0, 0);
+  dGeomID ball = dCreateSphere(w.space, 0.02);
+  dGeomSetBody(ball, body);
+  dGeomSetOffsetPosition(ball, 0.04, 0, 0.01 + RADIUS + 0.002);
+  REQUIRE(world_start(&w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002));
+  CHECK(world_count_contacts(&w) == 2);
+  CHECK(hapi_neighbors_bodies(world_physics(&w)) == 1);
+  hapi_physics *physics = world_physics(&w);
+  double sum = 0.0;
+  for (uint32_t i = 0; i < 2; ++i) {
+    CHECK(physics->contacts[i].phase == HAPI_SLOT_LIVE && physics->contacts[i].probed);
+    sum += physics->contacts[i].distance;
+  }
+  CHECK_NEAR(sum, 0.002 + 0.01, 1e-9);
+  world_close(&w);
+}
+
+/* ---- spaces ---- */
+
+static int pair_calls;
+
+static bool count_pairs(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)user;
+  (void)io;
+  pair_calls += dGeomGetClass(a) == dBoxClass && dGeomGetClass(b) == dBoxClass;
+  return true;
+}
+
+TEST(nested_spaces_are_searched)
+{
+  test_world w;
+  expectation e = {0.002, {0, 0, 1}, 1e-9};
+  world_open(&w, 0.0, 20);
+  dSpaceID inner = dSimpleSpaceCreate(w.space);
+  dSpaceID inmost = dHashSpaceCreate(inner);
+  dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0, 0, 0);
+  dGeomID geom = dBodyGetFirstGeom(cube);
+  dSpaceRemove(w.space, geom);
+  dSpaceAdd(inmost, geom);
+  REQUIRE(world_start(&w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002));
+  check_contact(&w, cube, &e);
+  world_step(&w, 2);
+  check_contact(&w, cube, &e);
+  CHECK(world_physics(&w)->table.used == 1);
+  world_close(&w);
+}
+
+/* Two cubes that touch in a space of their own, with so many things of the outer space around. */
+static int pair_calls_a_step(int things)
+{
+  test_world w;
+  world_open(&w, 0.0, 20);
+  dSpaceID inner = dHashSpaceCreate(w.space);
+  for (int i = 0; i < 2; ++i) {
+    dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0.04999 * i, 0, 0);
+    dGeomID geom = dBodyGetFirstGeom(cube);
+    dSpaceRemove(w.space, geom);
+    dSpaceAdd(inner, geom);
+  }
+  for (int i = 0; i < things; ++i) {
+    dGeomID ball = dCreateSphere(w.space, 0.01); /* within the box around both, touching nothing */
+    dGeomSetPosition(ball, 0.025, 0.03, 0.02 + 0.001 * i);
+  }
+  CHECK(world_create_session(&w, count_pairs) == HAP_OK);
+  world_add_pointer(&w, RADIUS, 5, 0, 0);
+  CHECK(hap_session_start(w.session) == HAP_OK);
+  pair_calls = 0;
+  CHECK(hap_session_advance(w.session, 51) == HAP_OK);
+  int calls = pair_calls;
+  world_close(&w);
+  return calls;
+}
+
+TEST(pairs_in_nested_spaces_collide_once)
+{
+  CHECK(pair_calls_a_step(0) == 1);
+  CHECK(pair_calls_a_step(1) == 1);
+  CHECK(pair_calls_a_step(3) == 1);
+}
+
+/* ---- reach ---- */
+
+static bool found_at(double distance, double pointer_speed, double body_speed)
+{
+  test_world w;
+  world_open(&w, 0.0, 20);
+  dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0, 0, 0);
+  dBodySetLinearVel(cube, body_speed, 0, 0);
+  double at = 0.025 + RADIUS + distance;
+  CHECK(world_create_session(&w, NULL) == HAP_OK);
+  world_add_pointer(&w, RADIUS, at, 0, 0);
+  world_move_pointer(&w, 0, (const double[3]){at, 0, 0}, (const double[3]){-pointer_speed, 0, 0});
+  CHECK(hap_session_start(w.session) == HAP_OK);
+  bool found = world_contact(&w, cube, 0) != NULL;
+  world_close(&w);
+  return found;
+}
+
+/* 5 mm + v H + 15 m/s^2 H^2 at least, and not the whole world. */
+TEST(reach_grows_with_speed)
+{
+  const double still = 0.005 + 15.0 * 0.05 * 0.05;
+  CHECK(found_at(still - 1e-3, 0.0, 0.0));
+  CHECK(!found_at(3.0 * still, 0.0, 0.0));
+  CHECK(found_at(still + 0.05 * 5.0 - 1e-3, 5.0, 0.0));
+  CHECK(found_at(still + 0.05 * 5.0 - 1e-3, 0.0, 5.0));
+  CHECK(found_at(still + 0.05 * 7.0 - 1e-3, 5.0, 2.0));
+  CHECK(!found_at(still + 0.5, 1.0, 2.0));
+}
+
+/* A fast pointer must not pass through between two syncs: contact before it arrives. */
+TEST(a_fast_body_is_known_before_it_arrives)
+{
+  for (int offset = 0; offset < 5; ++offset) {
+    test_world w;
+    world_open(&w, 0.0, 20);
+    dBodyID cube = world_add_cube(&w, 0.05, 0.3, -1.0 - 0.03 * offset, 0, 0);
+    dBodySetLinearVel(cube, 3.0, 0, 0);
+    REQUIRE(world_start(&w, RADIUS, 0, 0, 0));
+    double impulse = 0.0;
+    for (int i = 0; i < 600 && impulse == 0.0; ++i) {
+      CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+      impulse = world_stats(&w).peak_force_n;
+    }
+    CHECK(impulse > 0.0);
+    CHECK(impulse < 10.0); /* the first touch, not one from deep inside: 3 mm a tick, 1 kN/m */
+    world_close(&w);
+  }
+}
+
+TEST(disabled_geoms_and_collide_bits)
+{
+  test_world w;
+  world_open(&w, 0.0, 20);
+  dBodyID cubes[3];
+  for (int i = 0; i < 3; ++i) {
+    cubes[i] = world_add_cube(&w, 0.05, 0.3, 0.06 * (i - 1), 0, 0);
+    dGeomSetCategoryBits(dBodyGetFirstGeom(cubes[i]), 1ul << i);
+  }
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  def.radius = 1.0;
+  def.collide_bits = 1u | 2u;
+  REQUIRE(world_create_session(&w, NULL) == HAP_OK);
+  REQUIRE(hap_pointer_add(w.session, &def, &w.pointers[0]) == HAP_OK);
+  w.pointer_count = 1;
+  world_move_pointer(&w, 0, (const double[3]){0, 0, 1.0 + 0.025 + 0.01}, NULL);
+  REQUIRE(hap_session_start(w.session) == HAP_OK);
+  CHECK(world_contact(&w, cubes[0], 0) != NULL);
+  CHECK(world_contact(&w, cubes[1], 0) != NULL);
+  CHECK(world_contact(&w, cubes[2], 0) == NULL);
+  dGeomDisable(dBodyGetFirstGeom(cubes[0]));
+  world_step(&w, 2);
+  CHECK(world_contact(&w, cubes[0], 0) == NULL);
+  CHECK(world_contact(&w, cubes[1], 0) != NULL);
+  dGeomEnable(dBodyGetFirstGeom(cubes[0]));
+  world_step(&w, 1);
+  CHECK(world_contact(&w, cubes[0], 0) != NULL);
+  world_close(&w);
+}
+
+/* ---- capacity ---- */
+
+#define CROWD 30
+
+/* Free balls along x; the pointer is a plane to them, number i is i mm farther away than the
+ * nearest one. */
+static bool start_crowd(test_world *w, int bodies, int contacts, bool nearest_first)
+{
+  world_open(w, 0.0, 20);
+  w->def.max_bodies = bodies;
+  w->def.max_contacts = contacts;
+  for (int i = 0; i < CROWD; ++i) {
+    int rank = nearest_first ? i : CROWD - 1 - i;
+    world_add_sphere(w, 0.01, 0.1, 0.021 * (i - CROWD / 2), 0, -0.0105 - 0.001 * rank);
+  }
+  return world_start(w, 100.0, 0, 0, 100.0 + 0.0005);
+}
+
+static int count_nearest(const test_world *w, bool nearest_first, int count)
+{
+  int held = 0;
+  for (int rank = 0; rank < count; ++rank) {
+    int i = nearest_first ? rank : CROWD - 1 - rank;
+    held += world_contact(w, w->bodies[i], 0) != NULL;
+  }
+  return held;
+}
+
+static void check_crowd(int bodies, int contacts, int expected)
+{
+  for (int order = 0; order < 2; ++order) {
+    test_world w;
+    printf("# %d bodies, %d contacts, %s\n", bodies, contacts, order ? "nearest first" : "last");
+    REQUIRE(start_crowd(&w, bodies, contacts, order != 0));
+    CHECK(world_count_contacts(&w) == expected);
+    CHECK(count_nearest(&w, order != 0, expected) == expected);
+    world_step(&w, 3);
+    CHECK(count_nearest(&w, order != 0, expected) == expected);
+    CHECK(world_stats(&w).capacity_dropped > 0);
+    world_close(&w);
+  }
+}
+
+TEST(the_nearest_have_room_first)
+{
+  check_crowd(4, 256, 4);
+  check_crowd(64, 4, 4);
+}
+
+/* More geoms in reach than the first pass has places for (8 a contact). */
+TEST(the_nearest_is_found_in_a_crowd)
+{
+  check_crowd(1, 1, 1);
+}
+
+/* Full of bodies that stay near, and a nearer one comes. */
+static void check_newcomer(int bodies, int contacts)
+{
+  test_world w;
+  world_open(&w, 0.0, 20);
+  w.def.max_bodies = bodies;
+  w.def.max_contacts = contacts;
+  for (int i = 0; i < 4; ++i) {
+    world_add_sphere(&w, 0.01, 0.1, 0.03 * i, 0, -0.010 - 0.010);
+  }
+  dBodyID late = world_add_sphere(&w, 0.01, 0.1, -0.03, 0, -1.0);
+  REQUIRE(world_start(&w, 100.0, 0, 0, 100.0));
+  world_step(&w, 3);
+  CHECK(world_count_contacts(&w) == 4);
+  CHECK(world_contact(&w, late, 0) == NULL);
+  dBodySetPosition(late, -0.03, 0, -0.010 - 0.002);
+  world_step(&w, 5);
+  CHECK(world_contact(&w, late, 0) != NULL);
+  CHECK(world_count_contacts(&w) == 4);
+  world_close(&w);
+}
+
+TEST(a_nearer_newcomer_gets_a_place)
+{
+  printf("# places for bodies\n");
+  check_newcomer(4, 256);
+  printf("# places for contacts\n");
+  check_newcomer(64, 4);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(all_geom_classes_are_found);
+  RUN(edges_of_convex_and_trimesh);
+  RUN(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass);
+  RUN(planes_are_found);
+  RUN(geom_offsets_and_several_geoms_of_a_body);
+  RUN(a_body_is_touched_at_two_geoms);
+  RUN(nested_spaces_are_searched);
+  RUN(pairs_in_nested_spaces_collide_once);
+  RUN(reach_grows_with_speed);
+  RUN(a_fast_body_is_known_before_it_arrives);
+  RUN(disabled_geoms_and_collide_bits);
+  RUN(the_nearest_have_room_first);
+  RUN(the_nearest_is_found_in_a_crowd);
+  RUN(a_nearer_newcomer_gets_a_place);
+  dCloseODE();
+  return tap_done();
+}

@@ -1,0 +1,215 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* No allocation and no lock on the haptic thread, seen by LLVM's real-time sanitizer, whose runtime
+ * catches the calls of a region between enter and exit. Linked with HAPODE_RTSAN where
+ * libclang_rt.rtsan is (Debian: libclang-rt-19-dev). */
+
+#include "tests/tap.h"
+
+#include <hapode/hapode.h>
+
+#ifndef HAPODE_RTSAN
+
+TEST(haptic_cycle_neither_allocates_nor_locks)
+{
+  SKIP("needs libclang_rt.rtsan of libclang-rt-19-dev (and no other sanitizer)");
+}
+
+int main(void)
+{
+  RUN(haptic_cycle_neither_allocates_nor_locks);
+  return tap_done();
+}
+
+#else
+
+#include <pthread.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "haptic/haptic.h"
+#include "haptic/haptic_internal.h"
+#include "sync/exchange.h"
+
+#define TICKS 10000
+#define TICK_NS 1000000LL
+
+void __rtsan_init(void);           /* NOLINT: LLVM's names */
+void __rtsan_realtime_enter(void); /* NOLINT */
+void __rtsan_realtime_exit(void);  /* NOLINT */
+
+/* Runs work in a process of its own, within a real-time region; true when it came to its end. The
+ * sanitizer's report, if any, goes to the TAP stream as a comment. */
+static bool runs_clean(void (*work)(void), bool show)
+{
+  int ends[2];
+  char line[200];
+  fflush(stdout);
+  if (pipe(ends) != 0) {
+    return false;
+  }
+  pid_t child = fork();
+  if (child == 0) {
+    dup2(ends[1], 2);
+    close(ends[0]);
+    close(ends[1]);
+    work();
+    _exit(0);
+  }
+  close(ends[1]);
+  FILE *report = fdopen(ends[0], "r");
+  while (report != NULL && fgets(line, sizeof line, report) != NULL) {
+    if (show) {
+      printf("# %s", line);
+    }
+  }
+  fclose(report);
+  int status = -1;
+  return waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+static void *volatile sink;
+
+static void allocate(void)
+{
+  __rtsan_realtime_enter();
+  sink = malloc(16);
+  __rtsan_realtime_exit();
+}
+
+static void release(void)
+{
+  sink = malloc(16);
+  __rtsan_realtime_enter();
+  free(sink);
+  __rtsan_realtime_exit();
+}
+
+static void take_mutex(void)
+{
+  static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+  __rtsan_realtime_enter();
+  pthread_mutex_lock(&mutex);
+  __rtsan_realtime_exit();
+}
+
+static void nothing(void)
+{
+  __rtsan_realtime_enter();
+  sink = NULL;
+  __rtsan_realtime_exit();
+}
+
+TEST(the_sanitizer_catches_what_it_should)
+{
+  CHECK(runs_clean(nothing, true));
+  CHECK(!runs_clean(allocate, false));
+  CHECK(!runs_clean(release, false));
+  CHECK(!runs_clean(take_mutex, false));
+}
+
+static hapi_exchange *exchange;
+static hapi_haptic *haptic;
+static hap_device *devices[2];
+
+/* A body and a wall, met by two pointers with virtual devices. */
+static void publish_model(uint64_t number)
+{
+  hapi_model *model = hapi_exchange_model_back(exchange);
+  model->number = number;
+  model->state_ns = model->valid_from_ns = (int64_t)number * 10 * TICK_NS;
+  model->model = number / 100 % 2 != 0 ? HAP_MODEL_IMPULSE : HAP_MODEL_ACCELERANCE;
+  model->blend_s = 0.01;
+  model->body_count = 1;
+  model->contact_count = 2;
+  hapi_model_body *body = hapi_model_bodies(model);
+  memset(body, 0, sizeof *body);
+  body->generation = 1;
+  body->pose.quat_wxyz[0] = 1.0;
+  hapi_model_contact *contacts = hapi_model_contacts(model);
+  memset(contacts, 0, 2 * sizeof *contacts);
+  for (uint32_t i = 0; i < 2; ++i) {
+    contacts[i].slot = i;
+    contacts[i].generation = contacts[i].pointer_generation = 1;
+    contacts[i].pointer = i;
+    contacts[i].body = i == 0 ? 0 : HAPI_SLOT_NONE;
+    contacts[i].normal_body[0] = -1.0;
+    contacts[i].point_body[0] = 0.01;
+    contacts[i].a[0][0] = 1.0;
+  }
+  hapi_exchange_model_publish(exchange);
+}
+
+static bool set_up(void)
+{
+  const hapi_capacity capacity = {16, 16, 4};
+  hap_detail detail;
+  if (hapi_exchange_create(&capacity, &exchange) != HAP_OK) {
+    return false;
+  }
+  hapi_haptic_config config = {capacity, 1000.0, true, 0, 1000, exchange};
+  bool good = hapi_haptic_create(&config, &haptic) == HAP_OK;
+  for (int i = 0; i < 2 && good; ++i) {
+    hap_pointer_def def;
+    hap_pointer_id id;
+    hap_pointer_def_init(&def, sizeof def);
+    good = hap_device_open(i == 0 ? "virtual:sine=0.02/0/0,hz=2,hand=tense"
+                                  : "virtual:path=0:-0.1/0/0;5:0.02/0/0",
+                           &devices[i], &detail) == HAP_OK;
+    def.device = devices[i];
+    good = good && hapi_haptic_add_pointer(haptic, &def, &id, &detail) == HAP_OK;
+  }
+  return good && hapi_haptic_begin(haptic, 0, &detail) == HAP_OK;
+}
+
+static void cycles(void)
+{
+  for (int i = 0; i < TICKS; ++i) {
+    if (i % 10 == 0) {
+      publish_model((uint64_t)i / 10 + 1);
+    }
+    __rtsan_realtime_enter();
+    hapi_haptic_cycle(haptic, i * TICK_NS);
+    __rtsan_realtime_exit();
+  }
+  hap_stats stats;
+  memset(&stats, 0, sizeof stats);
+  hapi_haptic_stats(haptic, &stats);
+  if (stats.ticks != TICKS || stats.contact_ticks < 100 || stats.models_adopted < 900) {
+    fprintf(stderr, "the loop did not do its work\n");
+    _exit(1);
+  }
+}
+
+static void ticks(void)
+{
+  __rtsan_realtime_enter();
+  for (int i = 0; i < TICKS; ++i) {
+    hapi_tick_run(&haptic->tick, i * TICK_NS);
+    hapi_tick_report(&haptic->tick, hapi_exchange_state_back(exchange));
+  }
+  __rtsan_realtime_exit();
+}
+
+TEST(haptic_cycle_neither_allocates_nor_locks)
+{
+  REQUIRE(set_up());
+  CHECK(runs_clean(cycles, true));
+  CHECK(runs_clean(ticks, true));
+}
+
+int main(void)
+{
+  setenv("RTSAN_OPTIONS", "halt_on_error=1", 0);
+  __rtsan_init();
+  RUN(the_sanitizer_catches_what_it_should);
+  RUN(haptic_cycle_neither_allocates_nor_locks);
+  hapi_haptic_destroy(haptic);
+  hapi_exchange_destroy(exchange);
+  hap_device_close(devices[0]);
+  hap_device_close(devices[1]);
+  return tap_done();
+}
+
+#endif

@@ -1,0 +1,571 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The program hapode-run as its users meet it: exit codes, messages, summary, trace, picture.
+ * HAPODE_RUN: path of the program. */
+
+#include "tests/tap.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdarg.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "tools/plot.h"
+
+#define ARGUMENTS_MAX 24
+#define OUTPUT_MAX 60000
+
+extern char **environ;
+
+static char folder[256]; /* of this test alone */
+
+/* What a run came to. */
+static struct {
+  int code; /* -1: it did not end by itself */
+  char out[OUTPUT_MAX];
+  char err[OUTPUT_MAX];
+} ran;
+
+/* ---- files and the program ---- */
+
+static const char *file_in_folder(const char *name)
+{
+  static char paths[4][320];
+  static int next;
+  char *path = paths[next++ % 4];
+  snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+  return path;
+}
+
+static void read_file(const char *path, char *out, size_t size)
+{
+  FILE *file = fopen(path, "r");
+  size_t got = 0;
+  if (file != NULL) {
+    got = fread(out, 1, size - 1, file);
+    fclose(file);
+  }
+  out[got] = '\0';
+}
+
+static bool exists(const char *path)
+{
+  struct stat info;
+  return stat(path, &info) == 0;
+}
+
+static void write_text(const char *path, const char *text)
+{
+  FILE *file = fopen(path, "w");
+  if (file != NULL) {
+    fputs(text, file);
+    fclose(file);
+  }
+}
+
+/* Starts hapode-run with arguments that blanks part. */
+static pid_t start(const char *arguments, char **environment)
+{
+  static char words[2000];
+  char *argv[ARGUMENTS_MAX + 2] = {getenv("HAPODE_RUN")};
+  size_t count = 1;
+  posix_spawn_file_actions_t actions;
+  pid_t child = -1;
+  snprintf(words, sizeof words, "%s", arguments);
+  for (char *rest = NULL, *word = strtok_r(words, " ", &rest);
+       word != NULL && count <= ARGUMENTS_MAX; word = strtok_r(NULL, " ", &rest)) {
+    argv[count++] = word;
+  }
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, file_in_folder("out"),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, file_in_folder("err"),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  if (argv[0] == NULL || posix_spawn(&child, argv[0], &actions, NULL, argv, environment) != 0) {
+    child = -1;
+  }
+  posix_spawn_file_actions_destroy(&actions);
+  return child;
+}
+
+static int finish(pid_t child)
+{
+  int result = 0;
+  bool ended = child > 0 && waitpid(child, &result, 0) == child && WIFEXITED(result);
+  ran.code = ended ? WEXITSTATUS(result) : -1;
+  read_file(file_in_folder("out"), ran.out, sizeof ran.out);
+  read_file(file_in_folder("err"), ran.err, sizeof ran.err);
+  return ran.code;
+}
+
+static int run(const char *format, ...)
+{
+  char arguments[2000];
+  va_list list;
+  va_start(list, format);
+  vsnprintf(arguments, sizeof arguments, format, list);
+  va_end(list);
+  return finish(start(arguments, environ));
+}
+
+static bool says(const char *text)
+{
+  bool found = strstr(ran.err, text) != NULL;
+  if (!found) {
+    printf("# \"%s\" is not in: %.400s\n", text, ran.err);
+  }
+  return found;
+}
+
+/* The value of a key of the summary; NULL: it is not there. */
+static const char *value_of(const char *key)
+{
+  static char values[4][1000];
+  static int next;
+  size_t length = strlen(key);
+  for (const char *line = ran.out; *line != '\0'; line += strcspn(line, "\n") + 1) {
+    if (strncmp(line, key, length) == 0 && strncmp(line + length, ": ", 2) == 0) {
+      char *value = values[next++ % 4];
+      snprintf(value, sizeof values[0], "%.*s", (int)strcspn(line + length + 2, "\n"),
+               line + length + 2);
+      return value;
+    }
+    if (line[strcspn(line, "\n")] == '\0') {
+      break;
+    }
+  }
+  return NULL;
+}
+
+static double number_of(const char *key)
+{
+  const char *value = value_of(key);
+  char *end = NULL;
+  double number = value != NULL ? strtod(value, &end) : (double)NAN;
+  return value != NULL && end != value && *end == '\0' ? number : (double)NAN;
+}
+
+/* ---- usage ---- */
+
+TEST(help_list_and_version_are_answered)
+{
+  CHECK(run("--help") == 0);
+  CHECK(strstr(ran.out, "--physics-hz") != NULL && strstr(ran.out, "exit:") != NULL);
+  CHECK(ran.err[0] == '\0');
+  CHECK(run("--version") == 0);
+  CHECK(strncmp(ran.out, "hapode-run 0.", 13) == 0);
+  CHECK(run("--list") == 0);
+  const char *const there[] = {"fig5",    "row10[:N]",  "pile[:N]",    "lightstand",  "mass 60 kg",
+                               "virtual", "replay",     "impulse",     "accelerance", "contact",
+                               "testing", "k 2000 N/m", "duration 2 s"};
+  for (size_t i = 0; i < sizeof there / sizeof there[0]; ++i) {
+    if (strstr(ran.out, there[i]) == NULL) {
+      printf("# --list does not tell of %s\n", there[i]);
+      CHECK(false);
+    }
+  }
+}
+
+TEST(an_unknown_name_is_answered_with_those_that_exist)
+{
+  CHECK(run("--scene nowhere") == 2);
+  CHECK(says("--scene") && says("nowhere") && says("row10") && says("lightstand"));
+  CHECK(run("--model guess") == 2);
+  CHECK(says("--model") && says("guess") && says("single") && says("impulse"));
+  CHECK(run("--device nothing") == 2);
+  CHECK(says("--device") && says("nothing") && says("virtual") && says("replay"));
+  CHECK(run("--effects glow=on") == 2);
+  CHECK(says("--effects") && says("glow") && says("friction") && says("testing"));
+  CHECK(run("--colour red") == 2);
+  CHECK(says("--colour") && says("--physics-hz"));
+  CHECK(run("row10") == 2);
+  CHECK(says("row10"));
+}
+
+TEST(a_wrong_value_is_answered_with_what_is_allowed)
+{
+  const struct {
+    const char *arguments;
+    const char *option;
+    const char *allowed;
+  } cases[] = {
+      {"--physics-hz 0", "--physics-hz", "1 to 1000"},
+      {"--physics-hz nan", "--physics-hz", "1 to 1000"},
+      {"--physics-hz=fast", "--physics-hz", "1 to 1000"},
+      {"--haptic-hz 99", "--haptic-hz", "100 to 20000"},
+      {"--physics-hz 800 --haptic-hz 500", "--physics-hz", "500"},
+      {"--contact-hz 5", "--contact-hz", "20 to 1000"},
+      {"--seconds -1", "--seconds", "86400"},
+      {"--seconds 1x", "--seconds", "86400"},
+      {"--seconds", "--seconds", "needs a value"},
+      {"--lockstep=1", "--lockstep", "no value"},
+      {"--rt-priority 100", "--rt-priority", "0 to 99"},
+      {"--impulse-pose bent", "--impulse-pose", "held nor interpolated"},
+      {"--probe twice", "--probe", "shared nor paper"},
+      {"--model-age 0.01", "--model-age", "--lockstep"},
+      {"--lockstep --model-age 150", "--model-age", "at most 20 s"},
+      {"--effects friction", "--effects", "NAME=on"},
+      {"--scene fig5:3", "--scene", "takes no N"},
+      {"--scene row10:x", "--scene", "number from 1"},
+      {"--device virtual:colour=1", "--device", "path"},
+      {"--trace=", "--trace", "empty FILE"},
+      {"--trace a --plot a", "--plot", "--trace"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    bool good = run("%s", cases[i].arguments) == 2 && says(cases[i].option);
+    if (!good || !says(cases[i].allowed)) {
+      printf("# hapode-run %s: exit %d\n", cases[i].arguments, ran.code);
+      CHECK(false);
+    }
+    CHECK(ran.out[0] == '\0');
+  }
+}
+
+TEST(what_this_version_cannot_do_is_said)
+{
+  CHECK(run("--model contact") == 2);
+  CHECK(says("not supported"));
+  CHECK(run("--effects friction=on") == 2);
+  CHECK(says("friction=on") && says("not supported in this version"));
+  CHECK(run("--effects testing=off") == 2);
+  CHECK(says("testing=off") && says("not supported in this version"));
+  CHECK(run("--model impulse --effects testing=on") == 2);
+  CHECK(run("--lockstep --seconds 0.05 --effects friction=off,torque=auto --effects testing=on") ==
+        0);
+}
+
+/* ---- files ---- */
+
+TEST(a_malformed_recording_names_its_line)
+{
+  write_text(file_in_folder("bad.csv"), "t,x,y,z\n0,0,0,0\n0.1,0,zero,0\n0.2,0,0,0\n");
+  CHECK(run("--lockstep --device replay:%s", file_in_folder("bad.csv")) == 1);
+  CHECK(says("bad.csv") && says("line 3"));
+  CHECK(run("--lockstep --device replay:%s", file_in_folder("absent.csv")) == 1);
+  CHECK(says("absent.csv"));
+}
+
+TEST(files_that_cannot_be_written_are_found_before_the_run)
+{
+  CHECK(run("--lockstep --seconds 1 --trace %s", file_in_folder("no/such/trace.csv")) == 1);
+  CHECK(says("--trace") && says("no/such/trace.csv"));
+  CHECK(ran.out[0] == '\0');
+  CHECK(run("--lockstep --seconds 1 --plot %s", file_in_folder("no/such/plot.svg")) == 1);
+  CHECK(says("--plot") && says("no/such/plot.svg"));
+  CHECK(ran.out[0] == '\0');
+  CHECK(run("--lockstep --seconds 1 --trace %s", folder) == 1);
+  CHECK(says("--trace"));
+}
+
+TEST(a_full_disk_is_a_failure)
+{
+  if (access("/dev/full", W_OK) != 0) {
+    SKIP("no /dev/full");
+  }
+  CHECK(run("--lockstep --seconds 0.5 --trace /dev/full") == 1);
+  CHECK(says("/dev/full"));
+}
+
+/* ---- summary and trace ---- */
+
+static const char *const keys[] = {
+    "scene",          "model",          "device",       "physics_hz",  "haptic_hz",
+    "ticks",          "missed_ticks",   "tick_us_p50",  "tick_us_p99", "physics_ms_mean",
+    "physics_duty",   "haptic_duty",    "peak_force_n", "impulse_ns",  "contact_ticks",
+    "neighbours_max", "momentum_ratio", "effects",      "trace_hash",  "faults"};
+
+TEST(the_summary_has_its_keys_in_order)
+{
+  CHECK(run("--scene slide --lockstep --seconds 1 --physics-hz 20") == 0);
+  CHECK(ran.err[0] == '\0');
+  const char *line = ran.out;
+  for (size_t i = 0; i < sizeof keys / sizeof keys[0]; ++i) {
+    size_t length = strlen(keys[i]);
+    bool good = strncmp(line, keys[i], length) == 0 && strncmp(line + length, ": ", 2) == 0;
+    if (!good) {
+      printf("# line %zu is not %s: %.60s\n", i + 1, keys[i], line);
+    }
+    REQUIRE(good);
+    line += strcspn(line, "\n") + 1;
+  }
+}
+
+TEST(the_summary_has_its_values)
+{
+  CHECK(run("--scene slide --model accelerance --lockstep --seconds 1 --physics-hz 20 "
+            "--device virtual") == 0);
+  REQUIRE(value_of("scene") != NULL && value_of("effects") != NULL);
+  CHECK(strcmp(value_of("scene"), "slide") == 0);
+  CHECK(strcmp(value_of("model"), "accelerance") == 0);
+  CHECK(strcmp(value_of("device"), "virtual") == 0);
+  CHECK(strncmp(value_of("effects"), "testing=on,cross=off", 20) == 0);
+  CHECK(strlen(value_of("trace_hash")) == 16 && strspn(value_of("trace_hash"), "0") < 16);
+  CHECK(number_of("physics_hz") == 20.0);
+  CHECK(number_of("haptic_hz") == 1000.0);
+  CHECK(number_of("ticks") == 1000.0);
+  CHECK(number_of("missed_ticks") == 0.0);
+  CHECK(number_of("faults") == 0.0);
+  CHECK(number_of("neighbours_max") == 1.0);
+  CHECK(number_of("peak_force_n") > 1.0 && number_of("peak_force_n") <= 20.0);
+  CHECK(number_of("contact_ticks") > 50.0 && number_of("contact_ticks") < 1000.0);
+  CHECK(number_of("impulse_ns") > 0.1);
+  CHECK(number_of("tick_us_p50") > 0.0 && number_of("tick_us_p99") >= number_of("tick_us_p50"));
+  CHECK(number_of("physics_duty") > 0.0 && number_of("haptic_duty") > 0.0);
+  CHECK_NEAR(number_of("momentum_ratio"), 1.0, 0.01);
+}
+
+TEST(single_steps_the_world_at_the_haptic_rate)
+{
+  CHECK(run("--scene slide --model single --lockstep --seconds 0.1 --haptic-hz 500") == 0);
+  CHECK(number_of("physics_hz") == 500.0);
+  CHECK(number_of("ticks") == 50.0);
+}
+
+TEST(a_run_of_no_tick_has_a_summary)
+{
+  CHECK(run("--lockstep --seconds 0.001 --haptic-hz 100 --trace %s --plot %s",
+            file_in_folder("trace.csv"), file_in_folder("same.svg")) == 0);
+  CHECK(number_of("ticks") == 0.0);
+}
+
+static size_t columns_of(const char *line)
+{
+  size_t columns = 1;
+  for (; *line != '\n' && *line != '\0'; ++line) {
+    columns += *line == ',';
+  }
+  return columns;
+}
+
+/* Walks over the rows of a trace; the checks are about its numbers. */
+static void check_rows(FILE *file, size_t columns, size_t rows, double period)
+{
+  char line[8000];
+  double peak = 0.0;
+  size_t count = 0;
+  while (fgets(line, sizeof line, file) != NULL) {
+    ++count;
+    REQUIRE(columns_of(line) == columns);
+    REQUIRE(fabs(strtod(line, NULL) - period * (double)(count - 1)) < 1e-6 + period);
+    char *at = line;
+    double force = 0.0;
+    for (size_t i = 0; i < columns; ++i) {
+      double value = strtod(at, &at);
+      REQUIRE(isfinite(value) && (*at == ',' || *at == '\n'));
+      force = i >= 4 && i <= 6 ? hypot(force, value) : force;
+      ++at;
+    }
+    peak = fmax(peak, force);
+  }
+  CHECK(count == rows);
+  CHECK_NEAR(peak, number_of("peak_force_n"), 1e-4 * peak);
+}
+
+TEST(the_trace_has_its_columns_and_every_tick)
+{
+  char head[8000] = "";
+  CHECK(run("--scene row10:2 --lockstep --seconds 3 --trace %s", file_in_folder("trace.csv")) == 0);
+  FILE *file = fopen(file_in_folder("trace.csv"), "r");
+  REQUIRE(file != NULL);
+  CHECK(fgets(head, sizeof head, file) != NULL);
+  CHECK(strcmp(head,
+               "t,px,py,pz,fx,fy,fz,tx,ty,tz,bodies,contacts,tick_us,model_age_s,"
+               "b0_x,b0_y,b0_z,b1_x,b1_y,b1_z\n") == 0);
+  check_rows(file, 20, 3000, 1e-3);
+  fclose(file);
+  CHECK(number_of("trace_dropped") == 0.0);
+}
+
+TEST(the_trace_of_threads_is_drained_while_they_run)
+{
+  char text[OUTPUT_MAX];
+  CHECK(run("--scene fig6 --haptic-hz 4000 --seconds 1.5 --no-realtime --trace %s",
+            file_in_folder("threads.csv")) == 0);
+  double rows = -1.0;
+  FILE *file = fopen(file_in_folder("threads.csv"), "r");
+  REQUIRE(file != NULL);
+  while (fgets(text, sizeof text, file) != NULL) {
+    rows += 1.0;
+  }
+  fclose(file);
+  CHECK(number_of("ticks") > 100.0);
+  CHECK(rows == number_of("ticks") - number_of("trace_dropped"));
+  CHECK(strcmp(value_of("realtime"), "no") == 0);
+}
+
+TEST(two_devices_are_two_pointers)
+{
+  char head[8000] = "";
+  CHECK(run("--scene slide --lockstep --seconds 0.5 --device virtual "
+            "--device virtual:path=0:0.1/0/0.025;0.5:0.05/0/0.025,hand=rigid --trace %s",
+            file_in_folder("two.csv")) == 0);
+  CHECK(strncmp(value_of("device"), "virtual + virtual:path", 22) == 0);
+  FILE *file = fopen(file_in_folder("two.csv"), "r");
+  REQUIRE(file != NULL);
+  CHECK(fgets(head, sizeof head, file) != NULL);
+  CHECK(strstr(head, ",model_age_s,p1_x,p1_y,p1_z,p1_fx,p1_fy,p1_fz,p1_tx,p1_ty,p1_tz,b0_x,") !=
+        NULL);
+  double second_x = 0.0;
+  CHECK(fscanf(file,
+               "%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],%*[^,],"
+               "%*[^,],%*[^,],%*[^,],%*[^,],%lf",
+               &second_x) == 1);
+  fclose(file);
+  CHECK_NEAR(second_x, 0.1, 1e-3);
+}
+
+TEST(lockstep_is_the_same_every_time)
+{
+  char first[64];
+  CHECK(run("--scene row10 --lockstep --seconds 1.5") == 0);
+  REQUIRE(value_of("trace_hash") != NULL);
+  snprintf(first, sizeof first, "%s", value_of("trace_hash"));
+  CHECK(run("--scene row10 --lockstep --seconds 1.5 --trace %s --plot %s",
+            file_in_folder("same.csv"), file_in_folder("same.svg")) == 0);
+  CHECK(strcmp(first, value_of("trace_hash")) == 0);
+  CHECK(run("--scene row10 --lockstep --seconds 1.5 --model-age 0.01") == 0);
+  CHECK(strcmp(first, value_of("trace_hash")) != 0);
+}
+
+TEST(a_recording_runs_in_lockstep)
+{
+  write_text(file_in_folder("push.csv"),
+             "t,x,y,z\n0,-0.03,0,0.025\n0.2,-0.02,0,0.025\n"
+             "0.4,-0.01,0,0.025\n0.6,0,0,0.025\n0.8,0.01,0,0.025\n");
+  CHECK(run("--scene slide --lockstep --seconds 0.8 --device replay:%s",
+            file_in_folder("push.csv")) == 0);
+  CHECK(number_of("contact_ticks") > 50.0);
+}
+
+TEST(every_scene_runs_in_every_model)
+{
+  const char *const scenes[] = {"fig5",  "fig6",  "fig7", "slide",      "row10",
+                                "stack", "wedge", "door", "lightstand", "pile:20"};
+  const char *const models[] = {"single", "impulse", "accelerance"};
+  const char *const finite[] = {"peak_force_n", "impulse_ns", "physics_ms_mean", "tick_us_p99"};
+  for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
+    for (size_t k = 0; k < sizeof models / sizeof models[0]; ++k) {
+      int code = run("--scene %s --model %s --lockstep --seconds 0.4", scenes[i], models[k]);
+      bool good = code == 0 && number_of("ticks") == 400.0 && number_of("faults") == 0.0;
+      for (size_t n = 0; n < sizeof finite / sizeof finite[0]; ++n) {
+        good = good && isfinite(number_of(finite[n]));
+      }
+      if (!good) {
+        printf("# %s, %s: exit %d, %.300s\n", scenes[i], models[k], code, ran.err);
+      }
+      CHECK(good);
+    }
+  }
+}
+
+/* ---- the end of a run ---- */
+
+TEST(a_device_fault_ends_the_run_with_1)
+{
+  write_text(file_in_folder("far.csv"),
+             "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,9e5,0,0.5\n0.3,9e5,0,0.5\n");
+  CHECK(run("--lockstep --seconds 1 --device replay:%s,scale=10", file_in_folder("far.csv")) == 1);
+  CHECK(says("fault") && says("pose"));
+  CHECK(number_of("faults") == 1.0);
+  CHECK(number_of("ticks") < 1000.0);
+  CHECK(run("--no-realtime --seconds 1 --device replay:%s,scale=10", file_in_folder("far.csv")) ==
+        1);
+  CHECK(number_of("faults") == 1.0);
+}
+
+static void interrupt(int number, const char *arguments)
+{
+  const struct timespec pause = {0, 300000000};
+  pid_t child = start(arguments, environ);
+  REQUIRE(child > 0);
+  nanosleep(&pause, NULL);
+  kill(child, number);
+  CHECK(finish(child) == 0);
+  CHECK(says("stopped early"));
+  CHECK(number_of("ticks") > 0.0 && number_of("ticks") < 1e7);
+  CHECK(number_of("faults") == 0.0);
+}
+
+TEST(a_signal_ends_the_run_with_its_summary)
+{
+  interrupt(SIGINT, "--seconds 10000 --no-realtime");
+  interrupt(SIGTERM, "--seconds 80000 --lockstep");
+}
+
+TEST(the_picture_is_an_svg)
+{
+  char text[200];
+  if (!plot_available()) {
+    SKIP("needs gnuplot");
+  }
+  const char *const cases[] = {"--seconds 1", "--seconds 0.05 --model single",
+                               "--seconds 0.5 --device virtual --device virtual:path=0:0/1/0"};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    unlink(file_in_folder("it's.svg"));
+    CHECK(run("--lockstep %s --plot %s", cases[i], file_in_folder("it's.svg")) == 0);
+    CHECK(ran.err[0] == '\0');
+    read_file(file_in_folder("it's.svg"), text, sizeof text);
+    CHECK(strstr(text, "<svg") != NULL);
+  }
+}
+
+TEST(without_gnuplot_one_line_says_so)
+{
+  char *bare[] = {(char[]){"PATH=/nonexistent"}, NULL};
+  char arguments[600];
+  snprintf(arguments, sizeof arguments, "--lockstep --seconds 0.1 --plot %s",
+           file_in_folder("none.svg"));
+  CHECK(finish(start(arguments, bare)) == 0);
+  CHECK(says("gnuplot") && strchr(ran.err, '\n') == ran.err + strlen(ran.err) - 1);
+  CHECK(number_of("ticks") == 100.0);
+  CHECK(!exists(file_in_folder("none.svg")));
+}
+
+static void remove_folder(void)
+{
+  const char *const names[] = {"out",         "err",     "bad.csv",  "trace.csv",
+                               "threads.csv", "two.csv", "same.csv", "same.svg",
+                               "push.csv",    "far.csv", "it's.svg"};
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    unlink(file_in_folder(names[i]));
+  }
+  rmdir(folder);
+}
+
+int main(void)
+{
+  const char *base = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%.200s/hapode-run-XXXXXX", base != NULL ? base : "/tmp");
+  if (getenv("HAPODE_RUN") == NULL || mkdtemp(folder) == NULL) {
+    printf("1..0 # SKIP needs HAPODE_RUN, the path of the program, and a folder to write in\n");
+    return 0;
+  }
+  RUN(help_list_and_version_are_answered);
+  RUN(an_unknown_name_is_answered_with_those_that_exist);
+  RUN(a_wrong_value_is_answered_with_what_is_allowed);
+  RUN(what_this_version_cannot_do_is_said);
+  RUN(a_malformed_recording_names_its_line);
+  RUN(files_that_cannot_be_written_are_found_before_the_run);
+  RUN(a_full_disk_is_a_failure);
+  RUN(the_summary_has_its_keys_in_order);
+  RUN(the_summary_has_its_values);
+  RUN(single_steps_the_world_at_the_haptic_rate);
+  RUN(a_run_of_no_tick_has_a_summary);
+  RUN(the_trace_has_its_columns_and_every_tick);
+  RUN(the_trace_of_threads_is_drained_while_they_run);
+  RUN(two_devices_are_two_pointers);
+  RUN(lockstep_is_the_same_every_time);
+  RUN(a_recording_runs_in_lockstep);
+  RUN(every_scene_runs_in_every_model);
+  RUN(a_device_fault_ends_the_run_with_1);
+  RUN(a_signal_ends_the_run_with_its_summary);
+  RUN(the_picture_is_an_svg);
+  RUN(without_gnuplot_one_line_says_so);
+  remove_folder();
+  return tap_done();
+}

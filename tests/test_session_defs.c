@@ -1,0 +1,326 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* What a session is made of: defs and worlds, good and bad, and structs of other sizes. */
+
+#include "tests/tap.h"
+
+#include <stddef.h>
+
+#include "tests/stage.h"
+
+/* ---- defs ---- */
+
+/* Creates with the defs of s as they are; must fail and say part. */
+static bool refused(stage *s, hap_status status, const char *part)
+{
+  s->session = (hap_session *)s; /* must be overwritten */
+  s->detail.text[0] = '\0';
+  hap_status answer = stage_create(s);
+  bool good = answer == status && s->session == NULL && has(s->detail.text, part);
+  if (answer != status) {
+    printf("# %s for \"%s\"\n", hap_status_name(answer), part);
+  }
+  if (answer >= HAP_OK) {
+    hap_session_destroy(s->session);
+  }
+  s->session = NULL;
+  return good;
+}
+
+TEST(unset_defs_are_refused)
+{
+  static const unsigned char garbage[] = {0x00, 0xff, 0xa5, 0x01};
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  for (size_t i = 0; i < sizeof garbage; ++i) {
+    hap_session_def good = s.def;
+    memset(&s.def, garbage[i], sizeof s.def);
+    CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+    s.def = good;
+    hap_ode_def good_ode = s.ode;
+    memset(&s.ode, garbage[i], sizeof s.ode);
+    CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_ode_def_init"));
+    s.ode = good_ode;
+  }
+  uint32_t cookie = s.def.cookie;
+  s.def.cookie = s.ode.cookie; /* one def for another */
+  CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+  s.def.cookie = cookie;
+  s.def.size = 3;
+  CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+  hap_session_def_init(NULL, sizeof s.def); /* do nothing */
+  hap_session_def_init(&s.def, 3);
+  hap_ode_def_init(NULL, sizeof s.ode);
+  stage_end(&s);
+}
+
+TEST(missing_arguments_are_refused)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  hap_session *out = (hap_session *)&s;
+  CHECK(hap_session_create(NULL, &s.ode, &out, NULL) == HAP_ERROR_ARGUMENT && out == NULL);
+  CHECK(hap_session_create(&s.def, NULL, &out, NULL) == HAP_ERROR_ARGUMENT && out == NULL);
+  CHECK(hap_session_create(&s.def, &s.ode, NULL, &s.detail) == HAP_ERROR_ARGUMENT);
+  CHECK(has(s.detail.text, "out"));
+  s.ode.world = NULL;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "world"));
+  s.ode.world = s.world;
+  s.ode.space = NULL;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "space"));
+  s.ode.space = s.space;
+  s.ode.max_contacts_per_pair = 0;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
+  s.ode.max_contacts_per_pair = 65;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
+  stage_end(&s);
+}
+
+#define REAL_FIELD(name, value)                         \
+  {                                                     \
+#name, offsetof(hap_session_def, name), true, value \
+  }
+#define WHOLE_FIELD(name, value)                         \
+  {                                                      \
+#name, offsetof(hap_session_def, name), false, value \
+  }
+
+static const struct {
+  const char *name;
+  size_t offset;
+  bool real;
+  double value;
+} bad_fields[] = {
+    REAL_FIELD(physics_hz, 0.0),
+    REAL_FIELD(physics_hz, -1.0),
+    REAL_FIELD(physics_hz, 0.99),
+    REAL_FIELD(physics_hz, 1001.0),
+    REAL_FIELD(physics_hz, (double)NAN),
+    REAL_FIELD(physics_hz, (double)INFINITY),
+    REAL_FIELD(haptic_hz, 99.0),
+    REAL_FIELD(haptic_hz, 20001.0),
+    REAL_FIELD(haptic_hz, (double)NAN),
+    REAL_FIELD(haptic_hz, 0.0),
+    REAL_FIELD(haptic_hz, -1000.0),
+    REAL_FIELD(haptic_hz, (double)INFINITY),
+    REAL_FIELD(contact_hz, 19.0),
+    REAL_FIELD(contact_hz, 1001.0),
+    REAL_FIELD(contact_hz, (double)NAN),
+    WHOLE_FIELD(max_bodies, 0),
+    WHOLE_FIELD(max_bodies, -1),
+    WHOLE_FIELD(max_bodies, 1025),
+    WHOLE_FIELD(max_contacts, 0),
+    WHOLE_FIELD(max_contacts, 4097),
+    WHOLE_FIELD(max_contacts, -2147483648.0),
+    WHOLE_FIELD(max_pointers, 0),
+    WHOLE_FIELD(max_pointers, 17),
+    WHOLE_FIELD(rt_priority, -1),
+    WHOLE_FIELD(rt_priority, 100),
+    WHOLE_FIELD(trace_rows, -1),
+    WHOLE_FIELD(trace_rows, 1048577),
+    WHOLE_FIELD(drive, 3),
+    WHOLE_FIELD(drive, -1),
+    WHOLE_FIELD(model, 4),
+    WHOLE_FIELD(model, -1),
+    WHOLE_FIELD(impulse_pose, 2),
+    WHOLE_FIELD(probe, 2),
+    WHOLE_FIELD(flags, 1),
+    WHOLE_FIELD(flags, -2147483648.0),
+    WHOLE_FIELD(physics_latency_ticks, -2),
+    WHOLE_FIELD(physics_latency_ticks, 20001),
+};
+
+TEST(every_bad_field_is_named)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  for (size_t i = 0; i < sizeof bad_fields / sizeof bad_fields[0]; ++i) {
+    hap_session_def good = s.def;
+    char *at = (char *)&s.def + bad_fields[i].offset;
+    int32_t whole = bad_fields[i].real ? 0 : (int32_t)bad_fields[i].value;
+    if (bad_fields[i].real) {
+      memcpy(at, &bad_fields[i].value, sizeof(double));
+    } else {
+      memcpy(at, &whole, sizeof whole);
+    }
+    CHECK(refused(&s, HAP_ERROR_ARGUMENT, bad_fields[i].name));
+    s.def = good;
+  }
+  s.def.physics_hz = 500.0;
+  s.def.haptic_hz = 499.0; /* H / T below 1 */
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "at least one tick"));
+  s.def.haptic_hz = 500.0;
+  CHECK(stage_create(&s) == HAP_OK); /* H = T */
+  stage_end(&s);
+}
+
+TEST(model_contact_says_that_it_is_not_supported)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.def.model = HAP_MODEL_CONTACT;
+  CHECK(refused(&s, HAP_ERROR_UNSUPPORTED, "model contact is not supported"));
+  CHECK(has(s.detail.text, "accelerance")); /* and what is */
+  s.def.model = HAP_MODEL_SINGLE;
+  REQUIRE(stage_create(&s) == HAP_OK);
+  CHECK(hap_session_set_model(s.session, HAP_MODEL_CONTACT) == HAP_ERROR_UNSUPPORTED);
+  CHECK(has(detail_of(&s), "model contact is not supported"));
+  CHECK(hap_session_set_model(s.session, (hap_model)4) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_set_model(s.session, (hap_model)-1) == HAP_ERROR_ARGUMENT);
+  stage_end(&s);
+}
+
+/* A program built against an older header has a smaller def, one built against a newer header a
+ * larger one. */
+TEST(smaller_and_larger_defs_are_accepted)
+{
+  union {
+    hap_session_def def;
+    unsigned char bytes[sizeof(hap_session_def) + 64];
+  } block;
+  static const size_t sizes[] = {8, offsetof(hap_session_def, haptic_hz),
+                                 offsetof(hap_session_def, trace_rows), sizeof(hap_session_def),
+                                 sizeof(hap_session_def) + 64};
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
+    memset(&block, 0xee, sizeof block);
+    hap_session_def_init(&block.def, sizes[i]);
+    for (size_t k = sizes[i]; k < sizeof block; ++k) {
+      CHECK(block.bytes[k] == 0xee); /* init keeps to what it was told */
+    }
+    CHECK(block.def.size == sizes[i]);
+    if (sizes[i] > offsetof(hap_session_def, physics_hz)) {
+      block.def.drive = HAP_DRIVE_LOCKSTEP;
+    }
+    CHECK(hap_session_create(&block.def, &s.ode, &s.session, &s.detail) == HAP_OK);
+    hap_session_destroy(s.session);
+    s.session = NULL;
+  }
+  stage_end(&s);
+}
+
+TEST(statistics_of_a_smaller_struct)
+{
+  stage s;
+  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  CHECK(hap_session_advance(s.session, 5) == HAP_OK);
+  union {
+    hap_stats stats;
+    unsigned char bytes[sizeof(hap_stats) + 32];
+  } block;
+  static const size_t sizes[] = {4, 16, sizeof(hap_stats) - 8, sizeof(hap_stats),
+                                 sizeof(hap_stats) + 32};
+  for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
+    memset(&block, 0xee, sizeof block);
+    CHECK(hap_session_stats(s.session, &block.stats, sizes[i]) == HAP_OK);
+    size_t filled = sizes[i] < sizeof(hap_stats) ? sizes[i] : sizeof(hap_stats);
+    CHECK(block.stats.size == filled);
+    CHECK(filled < 16 || block.stats.ticks == 5);
+    for (size_t k = filled; k < sizeof block; ++k) {
+      CHECK(block.bytes[k] == 0xee);
+    }
+  }
+  CHECK(hap_session_stats(s.session, &block.stats, 3) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_stats(s.session, NULL, 8) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_stats(NULL, &block.stats, 8) == HAP_ERROR_ARGUMENT);
+  stage_end(&s);
+}
+
+/* ---- worlds that cannot be stepped ---- */
+
+static void spoil(dBodyID body, int way)
+{
+  const double nan = (double)NAN;
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  switch (way) {
+    case 0:
+      dBodySetPosition(body, nan, 0.0, 0.0);
+      break;
+    case 1:
+      dBodySetLinearVel(body, 0.0, (double)INFINITY, 0.0);
+      break;
+    case 2:
+      dBodySetAngularVel(body, 0.0, 0.0, nan);
+      break;
+    case 3:
+      dBodyAddForce(body, nan, 0.0, 0.0);
+      break;
+    case 4:
+      dBodyAddTorque(body, nan, 0.0, 0.0);
+      break;
+    case 5:
+      ((dReal *)(uintptr_t)dBodyGetQuaternion(body))[2] = nan; /* the setter would abort */
+      break;
+    default: /* ODE itself aborts on zero, and takes an infinite mass for a kinematic body */
+      mass.mass = nan;
+      dBodySetMass(body, &mass);
+  }
+}
+
+TEST(a_body_that_cannot_be_simulated_is_refused_at_create_and_start)
+{
+  for (int way = 0; way < 7; ++way) {
+    stage s;
+    stage_init(&s, HAP_DRIVE_LOCKSTEP);
+    REQUIRE(stage_create(&s) == HAP_OK);
+    spoil(add_cube(&s, 5.0, NULL), way);
+    CHECK(hap_session_start(s.session) == HAP_ERROR_WORLD);
+    CHECK(has(detail_of(&s), "a body at ("));
+    CHECK(hap_session_advance(s.session, 1) == HAP_ERROR_STATE); /* has not started */
+    hap_session_destroy(s.session);
+    CHECK(refused(&s, HAP_ERROR_WORLD, way < 6 ? "not finite" : "has no mass"));
+    stage_end(&s);
+  }
+}
+
+TEST(a_body_that_goes_bad_is_kept_from_ode)
+{
+  for (int way = 0; way < 7; ++way) {
+    stage s;
+    REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    dMass mass;
+    dBodyGetMass(s.cube, &mass);
+    REQUIRE(hap_session_lock(s.session) == HAP_OK);
+    spoil(s.cube, way);
+    CHECK(hap_session_unlock(s.session) == HAP_OK);
+    uint64_t steps = stats_of(&s).physics_steps;
+    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    CHECK(stats_of(&s).fault == HAP_FAULT_WORLD && stats_of(&s).faults == 1);
+    CHECK(stats_of(&s).physics_steps == steps && stats_of(&s).ticks == 200);
+    CHECK(has(detail_of(&s), "body at"));
+    dBodySetMass(s.cube, &mass);
+    dBodySetPosition(s.cube, 0.0, 0.0, 0.0);
+    ((dReal *)(uintptr_t)dBodyGetQuaternion(s.cube))[2] = 0.0;
+    dBodySetLinearVel(s.cube, 0.0, 0.0, 0.0);
+    dBodySetAngularVel(s.cube, 0.0, 0.0, 0.0);
+    dBodySetForce(s.cube, 0.0, 0.0, 0.0);
+    dBodySetTorque(s.cube, 0.0, 0.0, 0.0);
+    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    CHECK(stats_of(&s).physics_steps > steps);
+    CHECK(stats_of(&s).fault == HAP_FAULT_WORLD); /* latched */
+    CHECK(hap_session_reset_fault(s.session) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    CHECK(stats_of(&s).fault == HAP_FAULT_NONE);
+    stage_end(&s);
+  }
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(unset_defs_are_refused);
+  RUN(missing_arguments_are_refused);
+  RUN(every_bad_field_is_named);
+  RUN(model_contact_says_that_it_is_not_supported);
+  RUN(smaller_and_larger_defs_are_accepted);
+  RUN(statistics_of_a_smaller_struct);
+  RUN(a_body_that_cannot_be_simulated_is_refused_at_create_and_start);
+  RUN(a_body_that_goes_bad_is_kept_from_ode);
+  dCloseODE();
+  return tap_done();
+}
