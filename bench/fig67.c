@@ -276,6 +276,32 @@ static double against_bare(const cycles *c)
   return cycles_mean(c, CYCLE_UNTESTED) / cycles_mean(c, CYCLE_BARE);
 }
 
+/* The same over the cycles with exactly one neighbour, where nothing is shared. */
+static void check_one_neighbour(bench *b, const group *g)
+{
+  const cycles *c = &g->accelerance;
+  double testing = 0.0;
+  double island = 0.0;
+  size_t count = 0;
+  for (size_t i = 1; i < c->count; ++i) {
+    const double *v = c->rows[i].v;
+    if (v[CYCLE_NEIGHBOURS] == 1.0 && v[CYCLE_PROBES] > 0.0) {
+      testing += v[CYCLE_TESTING];
+      island += v[CYCLE_ISLAND];
+      ++count;
+    }
+  }
+  if (count == 0) {
+    bench_say("%d bodies, %s: no cycle with exactly one neighbour", g->bodies, g->layout);
+    return;
+  }
+  bench_check(
+      b, testing <= 4.2 * island,
+      "%d bodies, %s, the %zu cycles with one neighbour: testing = %.3f island steps (bound "
+      "4.2)",
+      g->bodies, g->layout, count, testing / island);
+}
+
 /* The bounds are for ten cubes: beside a world of one the fixed part of a cycle is not small. */
 static void check_parts(bench *b, const group *g, bool bounded)
 {
@@ -294,6 +320,7 @@ static void check_parts(bench *b, const group *g, bool bounded)
   if (bounded) {
     bench_check(b, island <= 4.2 && ratio <= 1.1, testing, g->bodies, g->layout, island, ratio,
                 " (bounds 4.2 and 1.1)");
+    check_one_neighbour(b, g);
     bench_check(b, impulse <= 1.1, plain, g->bodies, g->layout, cycle_ms, bare_ms, impulse,
                 " (bound 1.1)");
   } else {

@@ -91,7 +91,7 @@ static void read_rows(rig *r, reader *reading)
 }
 
 /* Runs the scene as options say at 1 kHz for that long. */
-static outcome run(rig_options *options, double seconds)
+static outcome run_seeded(rig_options *options, double seconds, unsigned long seed)
 {
   outcome out = {.finite = true};
   reader reading = {.out = &out, .half_time = 0.5 * seconds};
@@ -103,6 +103,7 @@ static outcome run(rig_options *options, double seconds)
     printf("# %s\n", detail.text);
     return out;
   }
+  dRandSetSeed(seed); /* start has set it to 0 */
   const scene_parameters *p = &r.scene->parameters;
   reading.contact_x = p->radius + 0.5 * p->size;
   out.good = true;
@@ -115,6 +116,11 @@ static outcome run(rig_options *options, double seconds)
   out.good = out.good && hap_session_stats(r.session, &out.stats, sizeof out.stats) == HAP_OK;
   rig_destroy(&r);
   return out;
+}
+
+static outcome run(rig_options *options, double seconds)
+{
+  return run_seeded(options, seconds, 0);
 }
 
 static rig_options options_of(const char *scene_name, hap_model model, double physics_hz)
@@ -254,6 +260,23 @@ TEST(a_pushed_cube_and_a_pushed_row_give_sane_forces)
   }
 }
 
+/* At 20 Hz the linear model errs, but nothing is thrown about. QuickStep shuffles its rows, so one
+ * seed could be a lucky one. */
+TEST(a_slow_world_stays_together_whatever_the_seed)
+{
+  for (int m = 1; m < 3; ++m) {
+    for (unsigned long seed = 0; seed < 6; ++seed) {
+      rig_options options = options_of("row10", models[m], 20.0);
+      outcome out = run_seeded(&options, 2.0, 77 * seed);
+      CHECK(out.good && out.finite && out.stats.faults == 0);
+      CHECK(out.stats.contact_ticks > 300);
+      CHECK(out.largest_force < 15.0); /* model single: 5.8 */
+      CHECK(out.stats.saturated_ticks == 0);
+      CHECK(fabs(out.first_body_x) < 0.3);
+    }
+  }
+}
+
 /* ---- recorded hands ---- */
 
 /* Placed so that the hand goes along +x into the first cube's face at x = 0, near y = 0 and
@@ -335,6 +358,7 @@ int main(void)
   RUN(fig5_single_and_accelerance_are_within_half_a_thousandth);
   RUN(fig5_impulse_is_longer_and_larger);
   RUN(a_pushed_cube_and_a_pushed_row_give_sane_forces);
+  RUN(a_slow_world_stays_together_whatever_the_seed);
   RUN(an_index_finger_pushes_a_row);
   RUN(a_tapping_hand_pushes_a_row);
   RUN(a_lifting_hand_pushes_a_row);
