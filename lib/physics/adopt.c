@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "base/vec.h"
+#include "base/pose.h"
 #include "physics/physics_internal.h"
 
 /* What the application says of its bodies, and what it asks of them. */
@@ -76,23 +76,6 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
   return HAP_OK;
 }
 
-static void blend(const hap_pose poses[2], double share, hap_pose *out)
-{
-  double side = 0.0;
-  for (int i = 0; i < 4; ++i) {
-    side += poses[0].quat_wxyz[i] * poses[1].quat_wxyz[i];
-  }
-  side = side < 0.0 ? -1.0 : 1.0;
-  for (int i = 0; i < 3; ++i) {
-    out->position[i] = poses[0].position[i] + share * (poses[1].position[i] - poses[0].position[i]);
-  }
-  for (int i = 0; i < 4; ++i) {
-    out->quat_wxyz[i] =
-        (1.0 - share) * poses[0].quat_wxyz[i] + share * side * poses[1].quat_wxyz[i];
-  }
-  hapi_quat_normalize(out->quat_wxyz);
-}
-
 /* Drawn one interval behind: between the last but one and the last known poses. */
 static double share_at(const hapi_physics *physics, int64_t time_ns)
 {
@@ -120,7 +103,8 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
       status = HAP_ERROR_NOT_FOUND;
       continue;
     }
-    blend(physics->table.entries[index].poses, share, &out[i]);
+    const hap_pose *poses = physics->table.entries[index].poses;
+    hapi_pose_blend(&poses[0], &poses[1], share, &out[i]);
   }
   pthread_mutex_unlock(&physics->poses_lock);
   return status == HAP_OK && stale ? HAP_STALE : status;

@@ -155,5 +155,9 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
   if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
     return nearest_by_collider(physics, geom, center, radius, reach, out);
   }
+  /* A hull is worth asking first whether it is near at all (libccd): its box says little. */
+  if (convex && !hapi_overlap(&pointer, &at, &shape, &pose, reach)) {
+    return false;
+  }
   return hapi_nearest_points(&pointer, &at, &shape, &pose, out) && out->distance <= reach;
 }

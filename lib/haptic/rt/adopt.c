@@ -2,28 +2,15 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "base/vec.h"
+#include "base/pose.h"
 #include "haptic/rt/tick.h"
-
-/* Pose after seconds of constant twist; the angle is small (a model's age). */
-static void advance(hap_pose *pose, const hap_twist *twist, double seconds)
-{
-  double turn[4] = {0.0, twist->angular[0], twist->angular[1], twist->angular[2]};
-  double rate[4];
-  hapi_v3_madd(pose->position, seconds, twist->linear, pose->position);
-  hapi_quat_multiply(turn, pose->quat_wxyz, rate);
-  for (int i = 0; i < 4; ++i) {
-    pose->quat_wxyz[i] += 0.5 * seconds * rate[i];
-  }
-  hapi_quat_normalize(pose->quat_wxyz);
-}
 
 /* A body that comes in has the world's state, advanced by the age of the model. */
 static void enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
 {
   body->pose = in->pose;
   body->twist = in->twist;
-  advance(&body->pose, &body->twist, age_s);
+  hapi_pose_move(&body->pose, &body->twist, age_s);
   memset(body->residual, 0, sizeof body->residual);
   memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
 }

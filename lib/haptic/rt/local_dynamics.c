@@ -1,22 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "base/vec.h"
+#include "base/pose.h"
 #include "haptic/rt/tick.h"
 
 /* Local dynamics simulation (paper section 5.2). */
-
-/* Eq. 10 and 11; the quaternion is normalised because eq. 11 leaves the unit sphere. */
-static void move(hap_pose *pose, const hap_twist *twist, double period)
-{
-  double turn[4] = {0.0, twist->angular[0], twist->angular[1], twist->angular[2]};
-  double rate[4];
-  hapi_v3_madd(pose->position, period, twist->linear, pose->position);
-  hapi_quat_multiply(turn, pose->quat_wxyz, rate);
-  for (int i = 0; i < 4; ++i) {
-    pose->quat_wxyz[i] += 0.5 * period * rate[i];
-  }
-  hapi_quat_normalize(pose->quat_wxyz);
-}
 
 /* Eq. 9, and 14 in the first tick of a model. */
 static void accelerate(hapi_local_body *body, double period)
@@ -46,7 +33,7 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
 {
   hap_pose before = body->pose;
   accelerate(body, tick->period);
-  move(&body->pose, &body->twist, tick->period);
+  hapi_pose_move(&body->pose, &body->twist, tick->period);
   if (!sound(body)) {
     body->pose = before;
     body->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -62,29 +49,11 @@ void hapi_local_step(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
     if ((body->flags & HAPI_BODY_DRIVEN) != 0) {
-      move(&body->pose, &body->twist, tick->period);
+      hapi_pose_move(&body->pose, &body->twist, tick->period);
     } else if ((body->flags & HAPI_BODY_RESTING) == 0) {
       step_body(tick, body);
     }
   }
-}
-
-static void blend(hapi_local_body *body, double share)
-{
-  double sign = 0.0;
-  for (int i = 0; i < 4; ++i) {
-    sign += body->from.quat_wxyz[i] * body->to.quat_wxyz[i];
-  }
-  sign = sign < 0.0 ? -1.0 : 1.0; /* q and -q are the same turn: take the shorter way */
-  for (int i = 0; i < 3; ++i) {
-    body->pose.position[i] =
-        body->from.position[i] + share * (body->to.position[i] - body->from.position[i]);
-  }
-  for (int i = 0; i < 4; ++i) {
-    body->pose.quat_wxyz[i] =
-        (1.0 - share) * body->from.quat_wxyz[i] + share * sign * body->to.quat_wxyz[i];
-  }
-  hapi_quat_normalize(body->pose.quat_wxyz);
 }
 
 /* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the
@@ -107,7 +76,7 @@ void hapi_local_place(hapi_tick *tick)
       body->pose = body->to;
       continue;
     }
-    blend(body, share);
+    hapi_pose_blend(&body->from, &body->to, share, &body->pose);
     for (int k = 0; k < 3; ++k) {
       double way = share < 1.0 ? body->to.position[k] - body->from.position[k] : 0.0;
       body->twist.linear[k] = way / tick->blend_s;

@@ -1,0 +1,42 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_POSE_H
+#define HAPODE_BASE_POSE_H
+
+#include <hapode/spatial.h>
+
+#include "base/vec.h"
+
+/* Eq. 10 and 11 of the paper: pose after seconds of a twist; the turn in it is small. The quaternion
+ * is normalised because eq. 11 leaves the unit sphere. */
+static inline void hapi_pose_move(hap_pose *pose, const hap_twist *twist, double seconds)
+{
+  double turn[4] = {0.0, twist->angular[0], twist->angular[1], twist->angular[2]};
+  double rate[4];
+  hapi_v3_madd(pose->position, seconds, twist->linear, pose->position);
+  hapi_quat_multiply(turn, pose->quat_wxyz, rate);
+  for (int i = 0; i < 4; ++i) {
+    pose->quat_wxyz[i] += 0.5 * seconds * rate[i];
+  }
+  hapi_quat_normalize(pose->quat_wxyz);
+}
+
+/* Between two poses, share 0..1; the shorter of the two turns, as q and -q are the same. */
+static inline void hapi_pose_blend(const hap_pose *from, const hap_pose *to, double share,
+                                   hap_pose *out)
+{
+  double side = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    side += from->quat_wxyz[i] * to->quat_wxyz[i];
+  }
+  side = side < 0.0 ? -1.0 : 1.0;
+  for (int i = 0; i < 3; ++i) {
+    out->position[i] = from->position[i] + share * (to->position[i] - from->position[i]);
+  }
+  for (int i = 0; i < 4; ++i) {
+    out->quat_wxyz[i] = (1.0 - share) * from->quat_wxyz[i] + share * side * to->quat_wxyz[i];
+  }
+  hapi_quat_normalize(out->quat_wxyz);
+}
+
+#endif
