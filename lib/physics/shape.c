@@ -84,7 +84,7 @@ static bool nearest_by_collider(hapi_physics *physics, dGeomID geom, const doubl
 {
   dContactGeom contacts[FALLBACK_CONTACTS];
   dGeomID sphere = physics->neighborhood.probe_geom;
-  double best = INFINITY;
+  double best = HUGE_VAL;
   const dContactGeom *nearest = NULL;
   dGeomSphereSetRadius(sphere, radius + reach);
   dGeomSetPosition(sphere, center[0], center[1], center[2]);
