@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#define _POSIX_C_SOURCE 200809L /* nanosleep */
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 #include <stdio.h>
@@ -28,7 +29,7 @@ int main(void)
   hap_session *session;
   hap_pointer_id hand;
   if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
-      hap_device_open("virtual:path=0:-0.06/0/0;1:0/0/0", &hand_def.device, &why) < HAP_OK ||
+      hap_device_open("virtual:path=0:-0.05/0/0;1:0.1/0/0", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK || hap_session_start(session) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;
   }

@@ -279,8 +279,8 @@ static bool model_is(hapi_model *m, const hapi_capacity *c, uint64_t seed)
 
 static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)
 {
-  s->tick = seed;
-  s->time_ns = (int64_t)mix(seed);
+  s->model_number = seed;
+  s->hand_impulse[0] = (double)(mix(seed) >> 12);
   s->body_high = c->bodies;
   s->contact_count = c->contacts;
   memset(hapi_state_bodies(s), (int)(mix(seed) & 0xff), c->bodies * sizeof(hapi_state_body));
@@ -292,8 +292,8 @@ static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)
 
 static bool state_is(hapi_state *s, const hapi_capacity *c, uint64_t seed)
 {
-  return s->tick == seed && s->time_ns == (int64_t)mix(seed) && s->body_high == c->bodies &&
-         s->pointer_count == c->pointers &&
+  return s->model_number == seed && s->hand_impulse[0] == (double)(mix(seed) >> 12) &&
+         s->body_high == c->bodies && s->pointer_count == c->pointers &&
          all_bytes(hapi_state_bodies(s), c->bodies * sizeof(hapi_state_body), mix(seed)) &&
          all_bytes(hapi_state_contacts(s), c->contacts * sizeof(hapi_state_contact),
                    mix(seed + 1)) &&
@@ -366,7 +366,7 @@ TEST(exchange_reset_forgets_everything)
   }
   hapi_exchange_reset(e);
   CHECK(hapi_exchange_model_take(e) == NULL && hapi_exchange_state_take(e) == NULL);
-  CHECK(hapi_exchange_model_back(e)->number == 0 && hapi_exchange_state_back(e)->tick == 0);
+  CHECK(hapi_exchange_model_back(e)->number == 0 && hapi_exchange_state_back(e)->model_number == 0);
   CHECK(hapi_exchange_state_back(e)->pointer_count == c->pointers);
   CHECK(all_bytes(hapi_model_bodies(hapi_exchange_model_back(e)),
                   c->bodies * sizeof(hapi_model_body), 0));
@@ -397,7 +397,7 @@ static void *physics_side(void *arg)
     hapi_state *state = hapi_exchange_state_take(t->exchange);
     if (state != NULL) {
       ++t->states;
-      t->bad += !state_is(state, t->capacity, state->tick);
+      t->bad += !state_is(state, t->capacity, state->model_number);
     }
   }
   atomic_store(&t->ended, 1);

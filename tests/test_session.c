@@ -444,11 +444,10 @@ TEST(poses_for_drawing_are_interpolated_one_step_behind)
   dBodyID asked[3] = {s.cube, unknown, s.cube};
   hap_pose out[3];
   memset(out, 0x5a, sizeof out);
-  hap_pose untouched = out[1];
+  hap_pose untouched[3];
+  memcpy(untouched, out, sizeof out);
   CHECK(hap_session_poses(s.session, 210 * MS, asked, 3, out) == HAP_ERROR_NOT_FOUND);
-  CHECK(memcmp(&out[1], &untouched, sizeof untouched) == 0);
-  CHECK_NEAR(out[0].position[0], 0.19, 1e-12);
-  CHECK_NEAR(out[2].position[0], 0.19, 1e-12);
+  CHECK(memcmp(out, untouched, sizeof out) == 0);
   CHECK(hap_session_poses(s.session, INT64_MAX, &s.cube, 1, out) == HAP_STALE);
   CHECK(hap_session_poses(s.session, 240 * MS, &s.cube, 1, out) == HAP_OK);
   CHECK(hap_session_poses(s.session, 241 * MS, &s.cube, 1, out) == HAP_STALE);

@@ -202,15 +202,15 @@ static void fault_and_reset(atomic_int *cause, hap_fault fault, const char *text
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
   CHECK(pushes(&fakes[0]) && stats_of(&s).fault == HAP_FAULT_NONE);
   atomic_store(cause, 1);
-  CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
   CHECK(stats_of(&s).faults == 1 || fault == HAP_FAULT_DEVICE_WRITE);
-  CHECK(hap_session_advance(s.session, 20) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
   CHECK(stats_of(&s).fault == fault && stats_of(&s).faults == 1);
   CHECK(!pushes(&fakes[0]) && atomic_load(&fakes[0].zeroed) == 1);
   CHECK(has(detail_of(&s), text));
   int writes = atomic_load(&fakes[0].writes);
   atomic_store(cause, 0);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 50) == HAP_FAULTED);
   CHECK(stats_of(&s).fault == fault && !pushes(&fakes[0])); /* latched */
   CHECK(atomic_load(&fakes[0].writes) == writes + 50);      /* zeros go on being written */
   CHECK(hap_session_reset_fault(s.session) == HAP_OK);
@@ -248,7 +248,7 @@ TEST(one_bad_device_takes_the_force_of_all)
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
   CHECK(pushes(&fakes[0]) && atomic_load(&fakes[1].writes) == 50);
   atomic_store(&fakes[1].bad_pose, 1);
-  CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
   CHECK(!pushes(&fakes[0]) && stats_of(&s).fault == HAP_FAULT_DEVICE_POSE);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   hap_device_close(devices[1]); /* late: the session still has it */

@@ -44,8 +44,15 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   const scene_parameters *p = &r->scene->parameters;
   hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
-  hap_status status =
-      hap_device_open(device_spec(options, r->scene, index), &r->devices[index], detail);
+  const char *spec = device_spec(options, r->scene, index);
+  if (strcmp(spec, "virtual") == 0) {
+    snprintf(detail->text, sizeof detail->text,
+             "scene %s has %d simulated hands: give device %zu a motion, as in "
+             "virtual:path=0:0/0/0;1:0.1/0/0",
+             p->name, p->pointers, index + 1);
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hap_device_open(spec, &r->devices[index], detail);
   if (status < HAP_OK) {
     return status;
   }

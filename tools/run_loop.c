@@ -127,7 +127,7 @@ static hap_status look(watch *w, double t)
   show_progress(w, t, &stats);
   if (stats.fault != HAP_FAULT_NONE) {
     (void)hap_session_detail(loop->rig->session, w->detail);
-    return HAP_ERROR_FAULT;
+    return HAP_ERROR_DEVICE;
   }
   return HAP_OK;
 }

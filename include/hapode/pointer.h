@@ -28,11 +28,12 @@ typedef enum hap_coupling {
 typedef struct hap_pointer_def {
   uint32_t size;      /* set by hap_pointer_def_init */
   uint32_t cookie;    /* set by hap_pointer_def_init */
-  hap_device *device; /* borrowed, one pointer per device; NULL: hap_pointer_set_target moves it */
-  double radius;      /* m, > 0, default 0.01: the pointer is a sphere */
-  double mass;        /* kg, >= 0, default 0; reserved for the coupling proxy */
-  double stiffness;   /* N/m, >= 0, default 1000: k of eq. 7 */
-  double damping;     /* N s/m, >= 0, default 0: d of eq. 7, acts while in contact */
+  hap_device *device; /* borrowed, one pointer per device; NULL: hap_pointer_set_target moves it,
+                         and it is not in the world before the first target */
+  double radius;      /* m, 1e-6..100, default 0.01: the pointer is a sphere */
+  double mass;        /* kg, 0..1e6, default 0; reserved for the coupling proxy, without effect */
+  double stiffness;   /* N/m, 0..1e9, default 1000: k of eq. 7 */
+  double damping;     /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact */
   double friction;    /* reserved; must be 0 in this version */
   const double *hull_xyz;     /* reserved for 6-DoF tools; must be NULL in this version */
   size_t hull_points;         /* must be 0 in this version */
@@ -60,7 +61,8 @@ HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap
 HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
 
 /* [app] Moves a pointer without device: pose and twist (may be NULL: at rest) in the device's
- * frame, from the next tick on. Non-finite values are HAP_ERROR_ARGUMENT and change nothing. */
+ * frame, from the next tick on. Values that are not finite, and a quaternion that is not unit, are
+ * HAP_ERROR_ARGUMENT and change nothing. */
 HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                           const hap_pose *pose, const hap_twist *twist);
 

@@ -41,7 +41,7 @@ typedef enum hap_impulse_pose {
   HAP_IMPULSE_HELD = 1          /* stays at the last pose */
 } hap_impulse_pose;
 
-/* How model ACCELERANCE tests (design.md 3.1). */
+/* How model ACCELERANCE tests. */
 typedef enum hap_probe {
   HAP_PROBE_SHARED = 0, /* one zero probe for all neighbours: 1 + 3N steps */
   HAP_PROBE_PAPER = 1   /* four steps for each neighbour: 4N steps */
@@ -63,7 +63,7 @@ typedef struct hap_session_def {
   int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
                            time. Default 80. Physics runs at half of it. */
   int32_t physics_latency_ticks; /* LOCKSTEP: ticks from the start of a physics step to the tick
-                                    that uses its result, 0..20000. HAP_LATENCY_DEFAULT (default):
+                                    that uses its result, at most haptic_hz / physics_hz. HAP_LATENCY_DEFAULT (default):
                                     1 in model ACCELERANCE, one step in model IMPULSE. Model SINGLE
                                     always has 0. */
   int32_t trace_rows; /* rows kept for hap_session_trace_read, 0..1048576, default 0: none */
@@ -75,7 +75,8 @@ typedef struct hap_session_def {
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
 HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
 
-/* [control] Stops, writes zero force to every device, frees. NULL is allowed. The world goes back
+/* [control] Stops, writes zero force to every device, frees. NULL is allowed. A lock that this
+ * thread holds is given up; in a callback nothing happens. The world goes back
  * to the application as it is, with ODE's auto-disable as it was found. */
 HAP_API void hap_session_destroy(hap_session *session);
 
@@ -89,11 +90,11 @@ HAP_API hap_status hap_session_stop(hap_session *session);
 
 /* [control] FRAME: runs the whole physics steps that fit into frame_s seconds [s, finite, >= 0]
  * plus the remainder of earlier calls, at most 3; the rest is dropped and counted
- * (HAP_DROPPED). HAP_BODY_LOST: see its text. */
+ * (HAP_DROPPED). HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
 
 /* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due.
- * HAP_BODY_LOST: see its text. */
+ * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
 
 /* [app] Between lock and unlock this thread alone may touch the ODE world. Waits at most one

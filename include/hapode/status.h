@@ -18,6 +18,7 @@ typedef enum hap_status {
   HAP_DROPPED = 4,     /* more frame time came in than three physics steps; the rest was dropped */
   HAP_END = 5,         /* nothing further to read */
   HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
+  HAP_FAULTED = 7,     /* done, but a fault is latched and the force is zero */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */
@@ -32,8 +33,7 @@ typedef enum hap_status {
   HAP_ERROR_IO = -11,           /* a file cannot be opened, read or written */
   HAP_ERROR_FORMAT = -12,       /* a file or text does not have the form it should have */
   HAP_ERROR_TIMEOUT = -13,      /* it did not happen within the time given */
-  HAP_ERROR_FAULT = -14,        /* the guard has latched a fault; see hap_session_reset_fault */
-  HAP_ERROR_SYSTEM = -15        /* the operating system refused (threads, clocks) */
+  HAP_ERROR_SYSTEM = -14        /* the operating system refused (threads, clocks) */
 } hap_status;
 
 /* Room for one sentence that says what was wrong, where, and what to do. Always terminated. */

@@ -2,7 +2,6 @@
  * SPDX-License-Identifier: MIT */
 #include "base/fair_lock.h"
 
-#include <errno.h>
 #include <string.h>
 #include <time.h>
 
@@ -60,7 +59,7 @@ static bool wait_for_change(hapi_fair_lock *lock, int64_t deadline_ns)
   }
   struct timespec at = {.tv_sec = deadline_ns / HAPI_NS_PER_S,
                         .tv_nsec = deadline_ns % HAPI_NS_PER_S};
-  return pthread_cond_timedwait(&lock->changed, &lock->mutex, &at) != ETIMEDOUT;
+  return pthread_cond_timedwait(&lock->changed, &lock->mutex, &at) == 0;
 }
 
 static bool my_turn(const hapi_fair_lock *lock, uint64_t ticket)

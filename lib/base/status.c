@@ -16,6 +16,7 @@ const char *hap_status_name(hap_status status)
     NAME(HAP_DROPPED);
     NAME(HAP_END);
     NAME(HAP_BODY_LOST);
+    NAME(HAP_FAULTED);
     NAME(HAP_ERROR_ARGUMENT);
     NAME(HAP_ERROR_UNINITIALISED);
     NAME(HAP_ERROR_MEMORY);
@@ -29,7 +30,6 @@ const char *hap_status_name(hap_status status)
     NAME(HAP_ERROR_IO);
     NAME(HAP_ERROR_FORMAT);
     NAME(HAP_ERROR_TIMEOUT);
-    NAME(HAP_ERROR_FAULT);
     NAME(HAP_ERROR_SYSTEM);
   }
 #undef NAME
@@ -51,6 +51,8 @@ const char *hap_status_text(hap_status status)
       return "more frame time came in than three physics steps, the rest was dropped";
     case HAP_BODY_LOST:
       return "a body was destroyed without hap_session_forget_body, it was dropped";
+    case HAP_FAULTED:
+      return "done, but a fault is latched and the force is zero";
     case HAP_END:
       return "nothing further to read";
     case HAP_ERROR_ARGUMENT:
@@ -79,8 +81,6 @@ const char *hap_status_text(hap_status status)
       return "a file or text does not have the form it should have";
     case HAP_ERROR_TIMEOUT:
       return "it did not happen within the time given";
-    case HAP_ERROR_FAULT:
-      return "the guard has latched a fault";
     case HAP_ERROR_SYSTEM:
       return "the operating system refused";
   }

@@ -37,8 +37,9 @@ static int create(hapi_thread *thread, void *(*entry)(void *), void *arg, int pr
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority)
 {
-  thread->realtime = priority > 0 && create(thread, main, arg, priority) == 0;
-  if (!thread->realtime && create(thread, main, arg, 0) != 0) {
+  bool realtime = priority > 0 && create(thread, main, arg, priority) == 0;
+  atomic_store(&thread->realtime, realtime);
+  if (!realtime && create(thread, main, arg, 0) != 0) {
     return HAP_ERROR_SYSTEM;
   }
   thread->running = true;

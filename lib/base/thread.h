@@ -4,6 +4,7 @@
 #define HAPODE_BASE_THREAD_H
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -12,7 +13,7 @@
 typedef struct hapi_thread {
   pthread_t handle;
   bool running;
-  bool realtime; /* has the priority it asked for */
+  _Atomic bool realtime; /* has the priority it asked for */
 } hapi_thread;
 
 /* Starts main(arg). priority 1..99 asks for SCHED_FIFO and goes on without it when that is not

@@ -51,8 +51,9 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
                                   const hap_twist *twist);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
 
-void hapi_haptic_reset_fault(hapi_haptic *haptic);                 /* [any] from the next tick on */
-void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault);      /* [any] from the next tick on */
+void hapi_haptic_reset_fault(hapi_haptic *haptic);            /* [any] from the next tick on */
+void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the next tick on */
+bool hapi_haptic_has_fault(const hapi_haptic *haptic);        /* [any] latched at the last tick */
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out); /* [any] its part of *out */
 size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity);
 

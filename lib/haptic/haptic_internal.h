@@ -31,7 +31,7 @@ typedef struct hapi_pointer_target {
 
 typedef struct hapi_pointer_slot {
   _Atomic int phase;
-  uint32_t generation; /* written while EMPTY */
+  _Atomic uint32_t generation; /* written while EMPTY */
   hap_pointer_def def;
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;

@@ -93,6 +93,16 @@ static void reset_figures(hapi_haptic *haptic)
   STORE(missed_ticks, 0);
   STORE(models_adopted, 0);
   STORE(trace_dropped, 0);
+  STORE(contact_ticks, 0);
+  STORE(saturated_ticks, 0);
+  STORE(faults, 0);
+  STORE(fault, HAP_FAULT_NONE);
+  STORE(hash, 0);
+  STORE(peak_force, 0.0);
+  STORE(hand_impulse_abs, 0.0);
+  for (int i = 0; i < 3; ++i) {
+    STORE(hand_impulse[i], 0.0);
+  }
   STORE(age_ns, 0);
   STORE(age_max_ns, 0);
   atomic_store(&haptic->ring.read, 0);
@@ -215,6 +225,11 @@ void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault)
   atomic_store_explicit(&haptic->outside_fault, (int)fault, memory_order_release);
 }
 
+bool hapi_haptic_has_fault(const hapi_haptic *haptic)
+{
+  return LOAD(fault) != HAP_FAULT_NONE;
+}
+
 static void fill_times(const hapi_haptic *haptic, hap_stats *out)
 {
   const hapi_histogram *h = &haptic->figures.tick_ns;
@@ -245,7 +260,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->saturated_ticks = LOAD(saturated_ticks);
   out->faults = LOAD(faults);
   out->fault = (uint32_t)LOAD(fault);
-  out->realtime = haptic->thread.realtime ? 1 : 0;
+  out->realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->trace_dropped = LOAD(trace_dropped);
   out->trace_hash = LOAD(hash);
 }

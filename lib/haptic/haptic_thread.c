@@ -72,5 +72,5 @@ void hapi_haptic_stop_thread(hapi_haptic *haptic)
 
 bool hapi_haptic_is_realtime(const hapi_haptic *haptic)
 {
-  return haptic->thread.realtime;
+  return atomic_load(&haptic->thread.realtime);
 }

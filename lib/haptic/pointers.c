@@ -37,7 +37,9 @@ void hapi_pointers_follow(hapi_haptic *haptic)
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
-    if (phase == HAPI_POINTER_ADDED) {
+    /* A pointer that the application moves comes in with its first target. */
+    bool ready = slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
+    if (phase == HAPI_POINTER_ADDED && ready) {
       activate(haptic, i);
       atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
     } else if (phase == HAPI_POINTER_LEAVING) {
@@ -200,7 +202,9 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
   if (def->device != NULL) {
     hap_device_get_info(def->device, &slot->info, sizeof slot->info);
   }
-  ++slot->generation;
+  pthread_mutex_lock(&slot->target_lock);
+  pthread_mutex_lock(&slot->state_lock);
+  atomic_fetch_add(&slot->generation, 1);
   hapi_triple_init(&slot->target_buffer);
   hapi_triple_init(&slot->state_buffer);
   memset(slot->targets, 0, sizeof slot->targets);
@@ -211,6 +215,8 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
     slot->states[i].proxy.quat_wxyz[0] = 1.0;
     slot->states[i].size = sizeof slot->states[i];
   }
+  pthread_mutex_unlock(&slot->state_lock);
+  pthread_mutex_unlock(&slot->target_lock);
 }
 
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
@@ -277,6 +283,10 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
     return HAP_ERROR_STATE;
   }
   pthread_mutex_lock(&slot->target_lock);
+  if (find_slot(haptic, id) != slot) { /* removed in between */
+    pthread_mutex_unlock(&slot->target_lock);
+    return HAP_ERROR_NOT_FOUND;
+  }
   hapi_pointer_target *target = &slot->targets[hapi_triple_back(&slot->target_buffer)];
   memset(target, 0, sizeof *target);
   target->pose = *pose;
@@ -295,6 +305,10 @@ hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_p
     return HAP_ERROR_NOT_FOUND;
   }
   pthread_mutex_lock(&slot->state_lock);
+  if (find_slot(haptic, id) != slot) { /* removed in between */
+    pthread_mutex_unlock(&slot->state_lock);
+    return HAP_ERROR_NOT_FOUND;
+  }
   hapi_triple_take(&slot->state_buffer);
   *out = slot->states[hapi_triple_front(&slot->state_buffer)];
   pthread_mutex_unlock(&slot->state_lock);

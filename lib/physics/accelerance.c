@@ -50,14 +50,15 @@ static void measure_b(hapi_physics *physics)
 
 /* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. Before the
  * first touch that is zero and cannot be used: then the peak of the force that the touch will give,
- * v sqrt(k m), or a small share of the weight where that is more. */
+ * v sqrt(k m). At least a small share of the weight. */
 static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact)
 {
   double last = hapi_v3_norm(contact->last_force);
   double mass = body_of(physics, contact)->mass;
   double touch = contact->speed * sqrt(contact->stiffness * mass);
   double least = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * mass;
-  return last > 0.0 ? last : touch > least ? touch : least;
+  double wanted = last > 0.0 ? last : touch;
+  return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
 }
 
 /* One column of eq. 5 and 6 for each contact of the round. */

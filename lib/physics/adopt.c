@@ -65,6 +65,10 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
   if (count > HAP_TRACE_BODIES_MAX) {
     return HAP_ERROR_CAPACITY;
   }
+  hap_status status = hapi_bodies_scan(physics); /* some may have been made since the last one */
+  if (status < HAP_OK) {
+    return status;
+  }
   for (size_t i = 0; i < count; ++i) {
     watch[i] = hapi_bodies_find(&physics->table, bodies[i]);
     if (watch[i] == HAPI_NONE) {
@@ -92,20 +96,22 @@ static double share_at(const hapi_physics *physics, int64_t time_ns)
 hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
                               size_t count, hap_pose *out)
 {
-  hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->poses_lock);
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
+    if (index == HAPI_NONE || physics->table.entries[index].pose_count == 0) {
+      pthread_mutex_unlock(&physics->poses_lock);
+      return HAP_ERROR_NOT_FOUND;
+    }
+  }
   double share = share_at(physics, time_ns);
   int64_t interval = physics->pose_times[1] - physics->pose_times[0];
   bool stale = interval > 0 && time_ns > physics->pose_times[1] + 2 * interval;
   for (size_t i = 0; i < count; ++i) {
     uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
-    if (index == HAPI_NONE || physics->table.entries[index].pose_count == 0) {
-      status = HAP_ERROR_NOT_FOUND;
-      continue;
-    }
     const hap_pose *poses = physics->table.entries[index].poses;
     hapi_pose_blend(&poses[0], &poses[1], share, &out[i]);
   }
   pthread_mutex_unlock(&physics->poses_lock);
-  return status == HAP_OK && stale ? HAP_STALE : status;
+  return stale ? HAP_STALE : HAP_OK;
 }

@@ -168,6 +168,7 @@ static hap_status see_body(hapi_physics *physics, dBodyID body)
   }
   hapi_known_body *known = &table->entries[index];
   known->seen = table->scan;
+  known->found = true;
   /* ODE's auto-disable was switched off on the body that is known: where it is on, another body
    * has come to be at the address of a destroyed one, or the application has set it anew. */
   if (known->sleep.taken && dBodyGetAutoDisableFlag(body) != 0) {
@@ -262,8 +263,11 @@ static void drop_unseen(hapi_physics *physics)
     if (known->body == NULL || known->seen == table->scan) {
       continue;
     }
-    if (known->adopted) {
-      (void)see_body(physics, known->body); /* is in the table: cannot fail */
+    if (known->adopted && !known->found) { /* only the application knows whether it lives */
+      known->seen = table->scan;
+      if (physics->begun) {
+        hapi_sleep_take(known);
+      }
       continue;
     }
     remove_entry(physics, i);
@@ -274,9 +278,11 @@ static void drop_unseen(hapi_physics *physics)
   }
   rebuild_buckets(table);
   table->lost += dropped;
-  char text[128];
+  char text[192];
   snprintf(text, sizeof text,
-           "%u bodies were destroyed without hap_session_forget_body; they were dropped", dropped);
+           "%u bodies were destroyed without hap_session_forget_body, or lost their last geom and "
+           "joint without hap_session_adopt_body; they were dropped",
+           dropped);
   hapi_log(HAP_LOG_WARNING, "%s", text);
   physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
 }
@@ -341,6 +347,10 @@ const char *hapi_bodies_unsoundness(dBodyID body)
     dBodyGetMass(body, &mass);
     if (!(mass.mass > 0.0) || !isfinite(mass.mass)) {
       return "has no mass";
+    }
+    if (!hapi_finite(mass.I, 12) || !(mass.I[0] > 0.0) || !(mass.I[5] > 0.0) ||
+        !(mass.I[10] > 0.0)) {
+      return "has an inertia that is not finite and positive";
     }
   }
   if (!within(dBodyGetPosition(body), 1e9)) {

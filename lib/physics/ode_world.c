@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
+
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -28,6 +30,29 @@ static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b,
   }
 }
 
+/* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process. */
+static bool sound_surface(const dSurfaceParameters *s)
+{
+  const struct {
+    int bit;
+    double value;
+  } parts[] = {
+      {dContactMu2, s->mu2},          {dContactRolling, s->rho},
+      {dContactBounce, s->bounce},    {dContactBounce, s->bounce_vel},
+      {dContactSoftERP, s->soft_erp}, {dContactSoftCFM, s->soft_cfm},
+      {dContactMotion1, s->motion1},  {dContactMotion2, s->motion2},
+      {dContactMotionN, s->motionN},  {dContactSlip1, s->slip1},
+      {dContactSlip2, s->slip2},
+  };
+  bool sound = s->mu >= 0.0; /* also infinity; false for NaN */
+  for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+    bool friction = parts[i].bit == dContactMu2 || parts[i].bit == dContactRolling;
+    bool good = friction ? parts[i].value >= 0.0 : fabs(parts[i].value) <= 1e12;
+    sound = sound && ((s->mode & parts[i].bit) == 0 || good);
+  }
+  return sound;
+}
+
 static bool can_move(dBodyID body)
 {
   return body != NULL && !dBodyIsKinematic(body);
@@ -46,9 +71,16 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
     return;
   }
   dSurfaceParameters surface = {.mode = dContactApprox1, .mu = dInfinity};
-  if (physics->ode.surface == NULL || physics->ode.surface(physics->ode.user, a, b, &surface)) {
-    make_contacts(physics, a, b, &surface);
+  if (physics->ode.surface != NULL && !physics->ode.surface(physics->ode.user, a, b, &surface)) {
+    return;
   }
+  if (!sound_surface(&surface)) {
+    physics->config.report(physics->config.user, HAP_FAULT_WORLD,
+                           "the surface callback gave a number that is not finite or a friction "
+                           "below 0: the pair has no contact");
+    return;
+  }
+  make_contacts(physics, a, b, &surface);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */

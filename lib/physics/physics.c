@@ -105,6 +105,7 @@ void hapi_physics_destroy(hapi_physics *physics)
     return;
   }
   hapi_physics_end(physics);
+  hapi_edits_run(physics); /* of a session that never started */
   if (physics->neighborhood.probe_geom != NULL) {
     dGeomDestroy(physics->neighborhood.probe_geom);
     dGeomDestroy(physics->neighborhood.plane_geom);
@@ -204,7 +205,9 @@ void hapi_physics_end(hapi_physics *physics)
   }
   hapi_physics_stop_thread(physics);
   hapi_physics_enter(physics);
-  hapi_edits_run(physics);
+  for (int round = 0; round < 16; ++round) {
+    hapi_edits_run(physics); /* also what the edits post */
+  }
   give_world_back(physics);
   hapi_fair_lock_give(&physics->lock);
 }
@@ -256,7 +259,9 @@ hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
   if (hapi_physics_in_callback(physics) || hapi_fair_lock_is_mine(&physics->lock)) {
     return HAP_ERROR_THREAD;
   }
-  int64_t deadline = timeout_ns < 0 ? INT64_MAX : hapi_clock_now() + timeout_ns;
+  int64_t now = hapi_clock_now();
+  bool for_ever = timeout_ns < 0 || timeout_ns > INT64_MAX - now;
+  int64_t deadline = for_ever ? INT64_MAX : now + timeout_ns;
   return hapi_fair_lock_take(&physics->lock, deadline) ? HAP_OK : HAP_ERROR_TIMEOUT;
 }
 

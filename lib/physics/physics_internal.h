@@ -49,6 +49,7 @@ typedef struct hapi_known_body {
   dBodyID body;  /* NULL: free entry */
   uint64_t seen; /* scan that found it */
   bool adopted;
+  bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
   bool enabled_before;  /* scratch of the probe's flag pass */
   uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
@@ -86,6 +87,7 @@ typedef enum hapi_slot_phase {
 typedef struct hapi_body_slot {
   hapi_slot_phase phase;
   uint32_t generation;
+  uint32_t epoch;      /* grows when the loop shall start again from ODE\'s state */
   uint32_t known;      /* entry of the body table; HAPI_NONE: the body is gone */
   uint32_t flags;      /* of the message */
   uint64_t retired_at; /* first model without it */
@@ -246,7 +248,6 @@ struct hapi_physics {
   double latency_s; /* negative: the model's own */
   uint64_t model_number;
   hapi_state *state;   /* newest message of the loop; NULL: none yet */
-  uint64_t last_tick;  /* of the newest message that was reconciled */
   bool has_new_state;  /* state came in this cycle */
   double probe_step_s; /* H */
   int64_t pose_times[2];
@@ -321,6 +322,7 @@ void hapi_slots_end_model(hapi_physics *physics);   /* what is not wanted retire
 void hapi_slots_release(hapi_physics *physics);     /* retired ones the loop is done with */
 void hapi_slots_drop_body(hapi_physics *physics, uint32_t known); /* the body is gone */
 void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE's state */
+void hapi_slots_renew(hapi_body_slot *slot);   /* and forgets what it summed up, too */
 void hapi_slots_reset(hapi_physics *physics);
 
 /* snapshot.c */

@@ -18,6 +18,7 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   memset(out, 0, sizeof *out);
   out->slot = index;
   out->generation = slot->generation;
+  out->epoch = slot->epoch;
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   read_pose(body, &out->pose);
   hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);

@@ -33,7 +33,7 @@ static bool any(const double v[3])
 }
 
 /* The totals' growth since the last message. */
-static void take_impulse(hapi_physics *physics, hapi_body_slot *slot, const hapi_state_body *in)
+static void take_impulse(hapi_body_slot *slot, const hapi_state_body *in)
 {
   double linear[3];
   double angular[3];
@@ -41,7 +41,6 @@ static void take_impulse(hapi_physics *physics, hapi_body_slot *slot, const hapi
   hapi_v3_sub(in->angular_impulse, slot->angular_impulse_taken, angular);
   hapi_v3_copy(in->impulse, slot->impulse_taken);
   hapi_v3_copy(in->angular_impulse, slot->angular_impulse_taken);
-  hapi_v3_add(physics->figures.hand_impulse, linear, physics->figures.hand_impulse);
   /* What an earlier cycle could not give, because it had no step, is still there. */
   hapi_v3_add(slot->new_impulse, linear, slot->new_impulse);
   hapi_v3_add(slot->new_angular_impulse, angular, slot->new_angular_impulse);
@@ -69,18 +68,6 @@ static bool sound(const hapi_state_body *in)
          hapi_finite(in->residual, 6);
 }
 
-/* The loop begins again from ODE's state; what the pointers gave before still counts. */
-static void restart_where_it_is(hapi_body_slot *slot)
-{
-  double linear[3];
-  double angular[3];
-  hapi_v3_copy(slot->new_impulse, linear);
-  hapi_v3_copy(slot->new_angular_impulse, angular);
-  hapi_slots_restart(slot);
-  hapi_v3_copy(linear, slot->new_impulse);
-  hapi_v3_copy(angular, slot->new_angular_impulse);
-}
-
 static void take_body(hapi_physics *physics, uint32_t index)
 {
   hapi_body_slot *slot = &physics->bodies[index];
@@ -92,12 +79,12 @@ static void take_body(hapi_physics *physics, uint32_t index)
   }
   if (!sound(in)) {
     ++physics->figures.stats.states_rejected;
-    hapi_slots_restart(slot);
+    hapi_slots_renew(slot);
     return;
   }
-  take_impulse(physics, slot, in);
+  take_impulse(slot, in);
   if (moved_by_application(slot, body)) {
-    restart_where_it_is(slot);
+    hapi_slots_restart(slot);
   }
 }
 
@@ -124,6 +111,7 @@ void hapi_reconcile_take(hapi_physics *physics)
     return; /* the loop has stopped or is late: nothing is taken twice */
   }
   physics->state = newest;
+  hapi_v3_copy(newest->hand_impulse, physics->figures.hand_impulse);
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     take_body(physics, i);
   }
@@ -163,7 +151,8 @@ static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t inde
   bool moves = physics->has_new_state && physics->state->model == HAP_MODEL_ACCELERANCE &&
                physics->bodies[index].phase != HAPI_SLOT_FREE &&
                (physics->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
-  return moves ? message_of(physics, index) : NULL;
+  const hapi_state_body *in = moves ? message_of(physics, index) : NULL;
+  return in != NULL && in->epoch == physics->bodies[index].epoch ? in : NULL;
 }
 
 /* Eq. 14. The global step had the same impulse from the pointers as the loop; where it came to

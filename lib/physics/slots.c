@@ -7,17 +7,27 @@
 /* Small numbers for what the loop carries. A body's slot is used again only after the loop has
  * said that it uses a model without the body: until then its running totals are still read. */
 
-void hapi_slots_restart(hapi_body_slot *slot)
+/* A new user of the slot: the loop forgets all it had there. */
+static void renew(hapi_body_slot *slot, uint32_t known)
 {
-  uint32_t known = slot->known;
   uint32_t generation = slot->generation;
-  hapi_slot_phase phase = slot->phase;
   bool wanted = slot->wanted;
   memset(slot, 0, sizeof *slot);
   slot->known = known;
   slot->generation = generation + 1;
-  slot->phase = phase;
+  slot->phase = HAPI_SLOT_LIVE;
   slot->wanted = wanted;
+}
+
+void hapi_slots_restart(hapi_body_slot *slot)
+{
+  ++slot->epoch; /* the totals of impulse go on */
+  slot->placed = false;
+}
+
+void hapi_slots_renew(hapi_body_slot *slot)
+{
+  renew(slot, slot->known);
 }
 
 uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known_index)
@@ -29,9 +39,7 @@ uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known_index)
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase == HAPI_SLOT_FREE) {
-      slot->phase = HAPI_SLOT_LIVE;
-      slot->known = known_index;
-      hapi_slots_restart(slot);
+      renew(slot, known_index);
       known->slot = i;
       return i;
     }

@@ -141,5 +141,11 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
                      "step",
                      def->physics_hz, def->haptic_hz);
   }
+  double most = floor(def->haptic_hz / def->physics_hz + 1e-9);
+  if (status >= HAP_OK && def->physics_latency_ticks > most) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "physics_latency_ticks is %d, above the %g ticks of a physics step",
+                     def->physics_latency_ticks, most);
+  }
   return status >= HAP_OK ? check_choices(def, detail) : status;
 }

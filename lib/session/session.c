@@ -49,6 +49,11 @@ void hap_session_destroy(hap_session *session)
   if (session == NULL) {
     return;
   }
+  if (hapi_physics_in_callback(session->physics)) {
+    hapi_log(HAP_LOG_ERROR, "hap_session_destroy was called in a callback: nothing is destroyed");
+    return;
+  }
+  (void)hapi_physics_unlock(session->physics); /* where this thread has it, stop would wait */
   hap_session_stop(session);
   hapi_haptic_destroy(session->haptic);
   hapi_physics_destroy(session->physics);
@@ -101,7 +106,8 @@ static hap_status begin(hap_session *session)
   }
   hapi_haptic_set_start(session->haptic, start_ns);
   hapi_haptic_receive(session->haptic, start_ns);
-  session->tick = session->base = session->step = 0;
+  atomic_store(&session->tick, 0);
+  session->base = session->step = 0;
   session->frame_remainder_s = 0.0;
   return HAP_OK;
 }
@@ -157,6 +163,16 @@ hap_status hap_session_stop(hap_session *session)
 
 /* ---- the drives ---- */
 
+/* What update and advance have to say when they have done their work. */
+static hap_status outcome(const hap_session *session, uint64_t lost_before)
+{
+  if (hapi_haptic_has_fault(session->haptic)) {
+    return HAP_FAULTED;
+  }
+  bool lost = hapi_physics_bodies_lost(session->physics) > lost_before;
+  return lost ? HAP_BODY_LOST : HAP_OK;
+}
+
 hap_status hap_session_update(hap_session *session, double frame_s)
 {
   if (session == NULL || !(frame_s >= 0.0) || isinf(frame_s)) {
@@ -183,10 +199,10 @@ hap_status hap_session_update(hap_session *session, double frame_s)
     hapi_physics_cycle(session->physics, now, now + period_ns);
   }
   if (steps > 3.0) {
-    hapi_physics_count_dropped_frames(session->physics, (uint64_t)(steps - 3.0));
+    hapi_physics_count_dropped_frames(session->physics, (uint64_t)fmin(steps - 3.0, 1e15));
     return HAP_DROPPED;
   }
-  return hapi_physics_bodies_lost(session->physics) > lost ? HAP_BODY_LOST : HAP_OK;
+  return outcome(session, lost);
 }
 
 static uint64_t ticks_of(const hap_session *session, double period, uint64_t steps)
@@ -242,9 +258,9 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
     hapi_haptic_receive(session->haptic, now);
     step_when_due(session);
     hapi_haptic_cycle(session->haptic, now);
-    ++session->tick;
+    atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);
   }
-  return hapi_physics_bodies_lost(session->physics) > lost ? HAP_BODY_LOST : HAP_OK;
+  return outcome(session, lost);
 }
 
 int64_t hap_session_now(const hap_session *session)

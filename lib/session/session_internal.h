@@ -4,6 +4,7 @@
 #define HAPODE_SESSION_SESSION_INTERNAL_H
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 
 #include <hapode/session.h>
@@ -26,7 +27,7 @@ struct hap_session {
 
   /* LOCKSTEP: physics step number step, counted from tick base, is due at
    * base + floor(step x ticks a step). */
-  uint64_t tick;
+  _Atomic uint64_t tick;
   uint64_t base;
   uint64_t step;
 

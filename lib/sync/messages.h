@@ -33,7 +33,7 @@ typedef struct hapi_model_body {
   uint32_t slot;
   uint32_t generation;
   uint32_t flags;
-  uint32_t reserved;
+  uint32_t epoch;     /* another one than before: the loop goes on from this pose and twist */
   hap_pose pose;      /* at hapi_model.state_ns */
   hap_twist twist;    /* at hapi_model.state_ns */
   double b[6];        /* acceleration term of eq. 2: m/s^2, rad/s^2 */
@@ -94,6 +94,8 @@ typedef struct hapi_state_pointer {
 typedef struct hapi_state_body {
   uint32_t generation; /* 0: slot never used */
   uint32_t flags;      /* HAPI_BODY_RESTING while nothing has pushed it */
+  uint32_t epoch;      /* of the newest model in use */
+  uint32_t reserved;
   hap_pose pose;
   hap_twist twist;
   double impulse[3];         /* N s, running total of the pointers' force since the slot's
@@ -109,9 +111,8 @@ typedef struct hapi_state_contact {
 } hapi_state_contact;
 
 typedef struct hapi_state {
-  uint64_t tick;
-  int64_t time_ns;
-  uint64_t model_number; /* the local model in use; 0: none yet */
+  uint64_t model_number;  /* the local model in use; 0: none yet */
+  double hand_impulse[3]; /* N s, given to bodies that can move by all pointers since start */
   hap_model model;
   uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */
   uint32_t contact_count;

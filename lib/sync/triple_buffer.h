@@ -55,6 +55,12 @@ static inline bool hapi_triple_take(hapi_triple_buffer *b)
   return true;
 }
 
+/* [reader] Whether take would find something newer. */
+static inline bool hapi_triple_is_fresh(const hapi_triple_buffer *b)
+{
+  return (atomic_load_explicit(&b->middle, memory_order_acquire) & HAPI_TRIPLE_FRESH) != 0;
+}
+
 /* [reader] The place held. */
 static inline unsigned hapi_triple_front(const hapi_triple_buffer *b)
 {

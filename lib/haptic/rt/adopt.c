@@ -8,8 +8,13 @@
 /* A body that comes in has the world's state, advanced by the age of the model. */
 static void enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
 {
+  bool falls = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
   body->pose = in->pose;
   body->twist = in->twist;
+  for (int i = 0; falls && i < 3; ++i) {
+    body->twist.linear[i] += age_s * in->b[i];
+    body->twist.angular[i] += age_s * in->b[3 + i];
+  }
   hapi_pose_move(&body->pose, &body->twist, age_s);
   memset(body->residual, 0, sizeof body->residual);
   memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
@@ -31,9 +36,10 @@ static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_mode
   body->live = true;
   /* What a pointer pushed keeps the loop's state: a new model replaces what is known of the body,
    * never where the body is. */
-  bool keeps = !is_new && model->model == HAP_MODEL_ACCELERANCE &&
+  bool keeps = !is_new && body->epoch == in->epoch && model->model == HAP_MODEL_ACCELERANCE &&
                tick->model == HAP_MODEL_ACCELERANCE && (in->flags & HAPI_BODY_DRIVEN) == 0 &&
                ((in->flags & HAPI_BODY_FOLLOWS) == 0 || body->pushed);
+  body->epoch = in->epoch;
   if (!keeps) {
     enter(body, in, age_s);
   }
@@ -63,6 +69,7 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   out->generation = in->generation;
   out->body = in->body;
   out->pointer = in->pointer;
+  out->pointer_generation = in->pointer_generation;
   memcpy(out->point_body, in->point_body, sizeof out->point_body);
   memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
   memcpy(out->a, in->a, sizeof out->a);

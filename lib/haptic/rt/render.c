@@ -90,8 +90,8 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[c->body];
   plane at;
   hapi_v3_set(c->force, 0.0, 0.0, 0.0);
-  if (p->generation == 0) {
-    return;
+  if (p->generation != c->pointer_generation) {
+    return; /* another pointer has come to its place: its contacts come with the next model */
   }
   place_plane(c, body, &at);
   double force = normal_force(c, p, body, &at, tick->period);

@@ -12,6 +12,7 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
     const hapi_local_body *in = &tick->bodies[i];
     bodies[i].generation = in->generation;
     bodies[i].flags = in->flags;
+    bodies[i].epoch = in->epoch;
     bodies[i].pose = in->pose;
     bodies[i].twist = in->twist;
     hapi_v3_copy(in->impulse, bodies[i].impulse);
@@ -35,8 +36,7 @@ static void report_contacts(const hapi_tick *tick, hapi_state *out)
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
 {
-  out->tick = tick->tick;
-  out->time_ns = tick->now_ns;
+  hapi_v3_copy(tick->hand_impulse, out->hand_impulse);
   out->model_number = tick->model_number;
   out->model = tick->model;
   report_bodies(tick, out);

@@ -57,6 +57,7 @@ typedef struct hapi_tick_pointer {
 typedef struct hapi_local_body {
   uint32_t generation;
   uint32_t flags;
+  uint32_t epoch;
   bool live;   /* in the model in use */
   bool pushed; /* since it was adopted */
   hap_pose pose;
@@ -75,6 +76,7 @@ typedef struct hapi_local_contact {
   uint32_t slot;
   uint32_t body;
   uint32_t pointer;
+  uint32_t pointer_generation;
   uint32_t generation;
   bool seen; /* rendered at least once */
   double point_body[3];

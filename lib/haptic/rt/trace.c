@@ -18,7 +18,7 @@ static void trace_bodies(const hapi_tick *tick, hap_trace_row *out)
 
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
 {
-  out->tick = tick->tick;
+  out->tick = tick->tick - 1; /* the one that has just been run */
   out->model_age_s = 1e-9 * (double)(tick->now_ns - tick->state_ns);
   out->bodies = tick->live_count;
   out->contacts = tick->pushing;
