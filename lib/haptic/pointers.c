@@ -32,14 +32,18 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->pose.quat_wxyz[0] = 1.0;
 }
 
+/* A pointer that the application moves comes in with its first target. */
+static bool is_ready(const hapi_pointer_slot *slot)
+{
+  return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
+}
+
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
-    /* A pointer that the application moves comes in with its first target. */
-    bool ready = slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
-    if (phase == HAPI_POINTER_ADDED && ready) {
+    if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
       activate(haptic, i);
       atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
     } else if (phase == HAPI_POINTER_LEAVING) {
