@@ -198,6 +198,28 @@ TEST(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed)
   stage_end(&s);
 }
 
+TEST(a_transmission_is_not_probed_and_that_is_said)
+{
+  for (int with = 0; with < 2; ++with) {
+    stage s;
+    stage_init(&s, HAP_DRIVE_LOCKSTEP);
+    dBodyID other = add_cube(&s, 1.0, NULL);
+    if (with != 0) {
+      dJointAttach(dJointCreateTransmission(s.world, NULL), s.cube, other);
+    }
+    REQUIRE(stage_create(&s) == HAP_OK);
+    hap_pointer_id hand = add_hand(&s, ~0u);
+    move_hand(&s, hand, -0.055, 0.0);
+    REQUIRE(hap_session_start(s.session) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    CHECK((figures(&s).probe_steps == 0) == (with != 0));
+    CHECK((strstr(detail_of(&s), "transmission") != NULL) == (with != 0));
+    CHECK(felt(&s, hand) < 0.0 || with == 0);
+    CHECK(figures(&s).impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
+    stage_end(&s);
+  }
+}
+
 static void count(void *arg)
 {
   ++*(int *)arg;
@@ -248,6 +270,7 @@ int main(void)
   RUN(a_surface_that_is_no_number_does_not_reach_ode);
   RUN(an_inertia_that_is_no_number_is_refused);
   RUN(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed);
+  RUN(a_transmission_is_not_probed_and_that_is_said);
   RUN(edits_of_a_session_that_never_ran_are_run);
   RUN(a_falling_neighbour_falls_at_the_worlds_speed);
   dCloseODE();

@@ -114,6 +114,12 @@ static void tell(const run_options *options, hap_status status, const hap_stats 
     fprintf(stderr, "hapode-run: stopped early, after %.3f s\n",
             (double)stats->ticks / options->rig.def.haptic_hz);
   }
+  if (stats->physics_duty > 1.0 && options->rig.def.drive != HAP_DRIVE_LOCKSTEP) {
+    fprintf(stderr,
+            "hapode-run: physics took %.2g times the time it had: the world ran slowly; lower "
+            "--physics-hz or take a smaller scene\n",
+            stats->physics_duty);
+  }
   if (stats->trace_dropped > 0) {
     fprintf(stderr, "hapode-run: %" PRIu64 " rows of the trace were dropped\n",
             stats->trace_dropped);

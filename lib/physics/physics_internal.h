@@ -258,6 +258,7 @@ struct hapi_physics {
 
   bool begun;
   unsigned islands_threads; /* ODE's setting as it was found */
+  bool said_not_probed;     /* of a transmission, once a session */
   bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
   hapi_thread thread;
   _Atomic int stop;

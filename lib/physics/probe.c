@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/log.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -52,6 +53,51 @@ static bool add_partners(hapi_physics *physics, dBodyID body, uint32_t island)
   return true;
 }
 
+static bool has_transmission(dBodyID body)
+{
+  int joints = dBodyGetNumJoints(body);
+  for (int i = 0; i < joints; ++i) {
+    if (dJointGetType(dBodyGetJoint(body, i)) == dJointTypeTransmission) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* A transmission keeps its phase where nobody can put it back: its island is not probed. */
+static bool can_be_undone(const hapi_physics *physics, uint32_t first)
+{
+  const hapi_test_set *test = &physics->test;
+  for (uint32_t i = first; i < test->member_count; ++i) {
+    if (has_transmission(physics->table.handles[test->members[i]])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static void drop_island(hapi_physics *physics, uint32_t first)
+{
+  hapi_test_set *test = &physics->test;
+  for (uint32_t i = first; i < test->member_count; ++i) {
+    physics->table.entries[test->members[i]].island = HAPI_NONE;
+  }
+  test->member_count = first;
+  --test->island_count;
+}
+
+static void say_not_probed(hapi_physics *physics)
+{
+  if (!physics->said_not_probed) {
+    const char *text =
+        "bodies with a transmission joint are not probed: a pointer feels them as "
+        "moved by the application";
+    hapi_log(HAP_LOG_WARNING, "%s", text);
+    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
+  }
+  physics->said_not_probed = true;
+}
+
 static bool gather_island(hapi_physics *physics, uint32_t start)
 {
   hapi_test_set *test = &physics->test;
@@ -84,11 +130,19 @@ hap_status hapi_test_gather(hapi_physics *physics)
     if (!contact_moves_a_body(physics, &physics->contacts[i])) {
       continue;
     }
-    test->contacts[test->contact_count++] = i;
-    uint32_t known = physics->bodies[physics->contacts[i].body].known;
-    if (physics->table.entries[known].island == HAPI_NONE && !gather_island(physics, known)) {
+    hapi_body_slot *body = &physics->bodies[physics->contacts[i].body];
+    uint32_t first = test->member_count;
+    if (physics->table.entries[body->known].island == HAPI_NONE &&
+        !gather_island(physics, body->known)) {
       return HAP_ERROR_MEMORY;
     }
+    if (!can_be_undone(physics, first)) {
+      drop_island(physics, first);
+      say_not_probed(physics);
+      body->flags = HAPI_BODY_DRIVEN;
+      continue;
+    }
+    test->contacts[test->contact_count++] = i;
   }
   return HAP_OK;
 }
