@@ -33,7 +33,7 @@ static void measure_b(hapi_physics *physics)
 {
   hapi_test_rewind(physics);
   hapi_test_step(physics);
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0) {
       continue;

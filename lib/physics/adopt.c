@@ -31,7 +31,7 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     if (physics->contacts[i].phase == HAPI_SLOT_LIVE && physics->contacts[i].geom == geom) {
       physics->contacts[i].phase = HAPI_SLOT_FREE;
     }

@@ -274,7 +274,7 @@ void hapi_neighbors_find(hapi_physics *physics)
 uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
 {
   uint32_t count = 0;
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     const hapi_body_slot *slot = &physics->bodies[i];
     count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
   }

@@ -194,7 +194,8 @@ typedef struct hapi_test_set {
   uint32_t member_count;
   uint32_t member_capacity;
   uint32_t island_count;
-  dGeomID *order; /* geoms of the spaces that sleeping members are in, space by space */
+  bool mechanisms; /* there are joints other than contacts */
+  dGeomID *order;  /* geoms of the spaces that sleeping members are in, space by space */
   uint32_t order_count;
   uint32_t order_capacity;
   dJointID *cut; /* joints of kinematic bodies to the outside, disabled for the probe */
@@ -238,6 +239,8 @@ struct hapi_physics {
   hapi_body_table table;
   hapi_body_slot *bodies;      /* capacity.bodies */
   hapi_contact_slot *contacts; /* capacity.contacts */
+  uint32_t body_high;          /* slots that were ever used are below */
+  uint32_t contact_high;
   hapi_neighborhood neighborhood;
   hapi_snapshot snapshot;
   hapi_test_set test;

@@ -44,7 +44,11 @@ static bool add_partners(hapi_physics *physics, dBodyID body, uint32_t island)
 {
   int joints = dBodyGetNumJoints(body);
   for (int i = 0; i < joints; ++i) {
-    uint32_t other = hapi_bodies_find(&physics->table, partner(body, dBodyGetJoint(body, i)));
+    dJointID joint = dBodyGetJoint(body, i);
+    if (dJointGetType(joint) != dJointTypeContact) {
+      physics->test.mechanisms = true;
+    }
+    uint32_t other = hapi_bodies_find(&physics->table, partner(body, joint));
     if (other != HAPI_NONE && physics->table.entries[other].island == HAPI_NONE &&
         !add_member(physics, other, island)) {
       return false;
@@ -68,7 +72,7 @@ static bool has_transmission(dBodyID body)
 static bool can_be_undone(const hapi_physics *physics, uint32_t first)
 {
   const hapi_test_set *test = &physics->test;
-  for (uint32_t i = first; i < test->member_count; ++i) {
+  for (uint32_t i = first; test->mechanisms && i < test->member_count; ++i) {
     if (has_transmission(physics->table.handles[test->members[i]])) {
       return false;
     }
@@ -106,7 +110,9 @@ static bool gather_island(hapi_physics *physics, uint32_t start)
   bool good = add_member(physics, start, island);
   for (; good && next < test->member_count; ++next) {
     dBodyID body = physics->table.entries[test->members[next]].body;
-    good = !dynamic(body) || add_partners(physics, body, island);
+    bool passes = dynamic(body);
+    test->mechanisms = test->mechanisms || !passes; /* its own joints are not walked */
+    good = !passes || add_partners(physics, body, island);
   }
   return good;
 }
@@ -126,7 +132,8 @@ hap_status hapi_test_gather(hapi_physics *physics)
   test->member_count = 0;
   test->island_count = 0;
   test->contact_count = 0;
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  test->mechanisms = false;
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     if (!contact_moves_a_body(physics, &physics->contacts[i])) {
       continue;
     }
@@ -175,7 +182,7 @@ static hap_status save_members(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
   uint32_t joints = 0;
-  for (uint32_t i = 0; i < test->member_count; ++i) {
+  for (uint32_t i = 0; test->mechanisms && i < test->member_count; ++i) {
     joints += (uint32_t)dBodyGetNumJoints(physics->table.entries[test->members[i]].body);
   }
   hap_status status = hapi_snapshot_reserve(&physics->snapshot, test->member_count, joints);
@@ -186,7 +193,7 @@ static hap_status save_members(hapi_physics *physics)
   for (uint32_t i = 0; i < test->member_count; ++i) {
     const hapi_known_body *known = &physics->table.entries[test->members[i]];
     hapi_snapshot_add_body(&physics->snapshot, known->body, known->moved_callback);
-    int count = dBodyGetNumJoints(known->body);
+    int count = test->mechanisms ? dBodyGetNumJoints(known->body) : 0; /* ours have no feedback */
     for (int k = 0; k < count; ++k) {
       dJointFeedback *feedback = dJointGetFeedback(dBodyGetJoint(known->body, k));
       if (feedback != NULL) {

@@ -91,7 +91,7 @@ static void take_body(hapi_physics *physics, uint32_t index)
 static void take_forces(hapi_physics *physics)
 {
   const hapi_state_contact *in = hapi_state_contacts(physics->state);
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     memset(physics->contacts[i].last_force, 0, sizeof physics->contacts[i].last_force);
   }
   for (uint32_t i = 0; i < physics->state->contact_count; ++i) {
@@ -112,7 +112,7 @@ void hapi_reconcile_take(hapi_physics *physics)
   }
   physics->state = newest;
   hapi_v3_copy(newest->hand_impulse, physics->figures.hand_impulse);
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     take_body(physics, i);
   }
   take_forces(physics);
@@ -136,7 +136,7 @@ static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
 
 void hapi_reconcile_push(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies && physics->step_s > 0.0; ++i) {
+  for (uint32_t i = 0; i < physics->body_high && physics->step_s > 0.0; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     if (body != NULL && (any(slot->new_impulse) || any(slot->new_angular_impulse))) {
@@ -160,7 +160,7 @@ static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t inde
  * found before and is still on its way to the loop does not count twice. */
 void hapi_reconcile_residual(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     const hapi_state_body *in = moved_by_loop(physics, i);
     dBodyID body = slot->phase == HAPI_SLOT_LIVE ? ode_body(physics, slot) : NULL;
@@ -196,14 +196,14 @@ static void overwrite(hapi_physics *physics, uint32_t index)
 
 void hapi_reconcile_overwrite(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     overwrite(physics, i);
   }
 }
 
 void hapi_reconcile_leave(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     slot->placed = body != NULL;

@@ -41,6 +41,7 @@ uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known_index)
     if (slot->phase == HAPI_SLOT_FREE) {
       renew(slot, known_index);
       known->slot = i;
+      physics->body_high = i >= physics->body_high ? i + 1 : physics->body_high;
       return i;
     }
   }
@@ -57,7 +58,7 @@ static bool same_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID g
 hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
                                            uint32_t pointer, uint32_t pointer_generation)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     hapi_contact_slot *slot = &physics->contacts[i];
     if (same_contact(slot, body, geom, pointer, pointer_generation)) {
       return slot;
@@ -72,6 +73,7 @@ static hapi_contact_slot *contact_place(hapi_physics *physics)
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
     hapi_contact_slot *slot = &physics->contacts[i];
     if (slot->phase == HAPI_SLOT_FREE) {
+      physics->contact_high = i >= physics->contact_high ? i + 1 : physics->contact_high;
       return slot;
     }
     if (!slot->wanted) {
@@ -106,10 +108,10 @@ hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeo
 
 void hapi_slots_begin_model(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     physics->bodies[i].wanted = false;
   }
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     physics->contacts[i].wanted = false;
   }
 }
@@ -125,13 +127,13 @@ static void retire(hapi_physics *physics, hapi_body_slot *slot)
 
 void hapi_slots_end_model(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
       retire(physics, slot);
     }
   }
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
     hapi_contact_slot *slot = &physics->contacts[i];
     if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
       slot->phase = HAPI_SLOT_FREE;
@@ -141,7 +143,7 @@ void hapi_slots_end_model(hapi_physics *physics)
 
 void hapi_slots_release(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase == HAPI_SLOT_RETIRING && physics->state != NULL &&
         physics->state->model_number >= slot->retired_at) {
@@ -153,7 +155,7 @@ void hapi_slots_release(hapi_physics *physics)
 
 void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
 {
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase == HAPI_SLOT_FREE || slot->known != known) {
       continue;
@@ -162,7 +164,7 @@ void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
       retire(physics, slot);
     }
     slot->known = HAPI_NONE;
-    for (uint32_t k = 0; k < physics->config.capacity.contacts; ++k) {
+    for (uint32_t k = 0; k < physics->contact_high; ++k) {
       if (physics->contacts[k].phase == HAPI_SLOT_LIVE && physics->contacts[k].body == i) {
         physics->contacts[k].phase = HAPI_SLOT_FREE;
       }
@@ -172,6 +174,8 @@ void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
 
 void hapi_slots_reset(hapi_physics *physics)
 {
+  physics->body_high = 0;
+  physics->contact_high = 0;
   for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
     uint32_t generation = physics->bodies[i].generation;
     memset(&physics->bodies[i], 0, sizeof physics->bodies[i]);
