@@ -107,19 +107,54 @@ double bare_cycle(bare *b, double step_s)
 
 /* ---- islands ---- */
 
-/* Switches off what does not hang together with one of the first bodies. The scenes of the bench are
- * rows: a body of the island is jointed to the one before it. */
-static void enable_islands(const scene *s, size_t first)
+static double distance2(dBodyID body, const double at[3])
 {
-  bool linked = true;
+  const dReal *p = dBodyGetPosition(body);
+  return (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) +
+         (p[2] - at[2]) * (p[2] - at[2]);
+}
+
+/* The body nearest to a point among those that are switched off; NULL when there is none. */
+static dBodyID nearest_off(const scene *s, const double at[3])
+{
+  dBodyID nearest = NULL;
   for (size_t i = 0; i < s->body_count; ++i) {
-    linked = i < first || (linked && dAreConnected(s->bodies[i - 1], s->bodies[i]) != 0);
-    if (linked) {
-      dBodyEnable(s->bodies[i]);
-    } else {
-      dBodyDisable(s->bodies[i]);
+    bool off = dBodyIsEnabled(s->bodies[i]) == 0;
+    if (off && (nearest == NULL || distance2(s->bodies[i], at) < distance2(nearest, at))) {
+      nearest = s->bodies[i];
     }
   }
+  return nearest;
+}
+
+/* Switches on what hangs together with this body. */
+static void enable_island(dBodyID body)
+{
+  dBodyEnable(body);
+  int joints = dBodyGetNumJoints(body);
+  for (int i = 0; i < 2 * joints; ++i) {
+    dBodyID other = dJointGetBody(dBodyGetJoint(body, i / 2), i % 2);
+    if (other != NULL && dBodyIsEnabled(other) == 0) {
+      enable_island(other);
+    }
+  }
+}
+
+/* Leaves on the bodies nearest to the hand and what hangs together with them. */
+static dBodyID enable_islands(const scene *s, size_t neighbours, const double hand[3])
+{
+  dBodyID first = NULL;
+  for (size_t i = 0; i < s->body_count; ++i) {
+    dBodyDisable(s->bodies[i]);
+  }
+  for (size_t i = 0; i < neighbours; ++i) {
+    dBodyID body = nearest_off(s, hand);
+    first = first == NULL ? body : first;
+    if (body != NULL) {
+      enable_island(body);
+    }
+  }
+  return first;
 }
 
 static void enable_all(const scene *s)
@@ -129,26 +164,26 @@ static void enable_all(const scene *s)
   }
 }
 
-/* On the first body, where the hand meets it. */
-static void push(const scene *s, int axis, double force)
+/* On the touched body, where the hand meets it. */
+static void push(const scene *s, dBodyID body, int axis, double force)
 {
-  const dReal *at = dBodyGetPosition(s->bodies[0]);
+  const dReal *at = dBodyGetPosition(body);
   double f[3] = {0.0, 0.0, 0.0};
   f[axis] = force;
-  dBodyAddForceAtPos(s->bodies[0], f[0], f[1], f[2], at[0] - 0.5 * s->parameters.size, at[1],
-                     at[2]);
+  dBodyAddForceAtPos(body, f[0], f[1], f[2], at[0] - 0.5 * s->parameters.size, at[1], at[2]);
 }
 
-double bare_island_step(bare *b, size_t first, double force, double step_s)
+double bare_island_step(bare *b, size_t neighbours, const double hand[3], double force,
+                        double step_s)
 {
   unsigned long seed = dRandGetSeed();
   double spent = 0.0;
   read_states(b->scene, b->states);
-  enable_islands(b->scene, first);
+  dBodyID touched = enable_islands(b->scene, neighbours, hand);
   for (int i = 0; i < 4; ++i) {
     write_states(b);
-    if (i > 0) {
-      push(b->scene, i - 1, force);
+    if (i > 0 && touched != NULL) {
+      push(b->scene, touched, i - 1, force);
     }
     dRandSetSeed(seed);
     int64_t begin_ns = hapi_clock_now();

@@ -35,11 +35,12 @@ void bare_follow(bare *b, const scene *from);
 /* Collision and global step over step_s, timed [s]. */
 double bare_cycle(bare *b, double step_s);
 
-/* One QuickStep of the islands of the first bodies (at least 1), all others switched off [s]: the
- * mean of four in a row from the same state, without and with a force on the first body along x, y
+/* One QuickStep of the islands of the bodies nearest to the hand, all others switched off [s]: the
+ * mean of four in a row from the same state, without and with a force on the nearest body along x, y
  * and z, as testing simulations are. So it has what makes these dearer than a step alone: colder
  * caches at first, and friction that slips under the force. The contacts are those of the last
  * bare_cycle. The last step is not undone. */
-double bare_island_step(bare *b, size_t first, double force, double step_s);
+double bare_island_step(bare *b, size_t neighbours, const double hand[3], double force,
+                        double step_s);
 
 #endif

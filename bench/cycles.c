@@ -70,7 +70,11 @@ static void measure_bare(watcher *w, double period_s, cycle *out)
 {
   out->v[CYCLE_BARE] = 1e3 * bare_cycle(&w->bare, period_s);
   if (w->def->model != HAP_MODEL_SINGLE) {
-    out->v[CYCLE_ISLAND] = 1e3 * bare_island_step(&w->bare, w->neighbours, w->force, period_s);
+    hap_pointer_state hand;
+    if (hap_pointer_get(w->rig.session, w->rig.pointers[0], &hand, sizeof hand) >= HAP_OK) {
+      out->v[CYCLE_ISLAND] =
+          1e3 * bare_island_step(&w->bare, w->neighbours, hand.proxy.position, w->force, period_s);
+    }
   }
 }
 
