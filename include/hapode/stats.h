@@ -64,7 +64,8 @@ typedef struct hap_stats {
   uint64_t states_rejected;  /* non-finite states kept away from ODE */
   uint64_t bodies_lost;      /* destroyed without hap_session_forget_body */
 
-  /* Momentum audit: what the hands gave to dynamic bodies against what the world got. */
+  /* Momentum audit: what the hands gave to dynamic bodies, before the limits of the devices, against
+   * what the world got. */
   double impulse_ns;        /* N s, norm of the net impulse on the bodies */
   double impulse_abs_ns;    /* N s, sum over ticks of the norms */
   double momentum_ratio;    /* world / hand along the net impulse; NaN while the net is below 5 %
