@@ -48,6 +48,12 @@ void scene_add_floor(scene *s)
   dCreatePlane(s->space, 0, 0, 1, 0);
 }
 
+void scene_add_block(scene *s, const double edges[3], const double centre[3])
+{
+  const dGeomID block = dCreateBox(s->space, edges[0], edges[1], edges[2]);
+  dGeomSetPosition(block, centre[0], centre[1], centre[2]);
+}
+
 dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
                          const double axis[3])
 {

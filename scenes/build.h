@@ -35,6 +35,9 @@ dBodyID scene_add_capsule(scene *s, double radius, double length, double mass,
 /* The plane z = 0. */
 void scene_add_floor(scene *s);
 
+/* A box that never moves: a geom without a body. */
+void scene_add_block(scene *s, const double edges[3], const double centre[3]);
+
 /* A hinge between two bodies (b NULL: the world) with the table's friction torque. */
 dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
                          const double axis[3]);
@@ -45,6 +48,20 @@ void scene_build_row(scene *s);
 void scene_build_stack(scene *s);
 void scene_build_wedge(scene *s);
 void scene_build_pile(scene *s);
+void scene_build_tower(scene *s);
+void scene_build_hold(scene *s);
+void scene_build_pair(scene *s);
+void scene_build_clump(scene *s);
+
+/* tipping.c */
+void scene_build_tall_box(scene *s);
+void scene_build_table(scene *s);
+
+/* round.c */
+void scene_build_ball(scene *s);
+void scene_build_lying_capsule(scene *s);
+void scene_build_lying_cylinder(scene *s);
+void scene_build_spheres(scene *s);
 
 /* mechanisms.c */
 void scene_build_door(scene *s);

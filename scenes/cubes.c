@@ -4,9 +4,13 @@
 /* Scenes made of cubes. The face that the hand meets is the plane x = 0: a pointer of radius r
  * touches when its centre is at x = -r. */
 
+#include <math.h>
+
 #include <scenes/build.h>
 
 #define PILE_LAYERS_MAX 4
+#define HOLD_CUBES 4
+#define CLUMP_CUBES 8
 
 static const double fig5_speed = 0.017; /* m/s, the paper's section 7.2 */
 
@@ -94,5 +98,55 @@ void scene_build_pile(scene *s)
                  pitch * (across + 0.5 * layer - middle), layer_height(s, layer));
       }
     }
+  }
+}
+
+/* The second cube from the top comes first, then the others from the top down. */
+static void add_tower(scene *s, int cubes, int first)
+{
+  const double x = s->parameters.size / 2;
+  scene_add_floor(s);
+  add_cube(s, x, 0, layer_height(s, first));
+  for (int layer = cubes - 1; layer >= 0; --layer) {
+    if (layer != first) {
+      add_cube(s, x, 0, layer_height(s, layer));
+    }
+  }
+}
+
+void scene_build_tower(scene *s)
+{
+  add_tower(s, s->count, s->count > 1 ? s->count - 2 : 0);
+}
+
+void scene_build_hold(scene *s)
+{
+  add_tower(s, HOLD_CUBES, HOLD_CUBES - 1);
+}
+
+/* One that is pushed into another, a third as heavy, which stands free. */
+void scene_build_pair(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  scene_add_floor(s);
+  add_cube(s, p->size / 2, 0, layer_height(s, 0));
+  scene_add_box(s, (const double[3]){p->size, p->size, p->size}, p->mass / 3,
+                (const double[3]){1.5 * p->size + p->gap, 0, layer_height(s, 0)});
+}
+
+/* A ring around the z axis, one face of each cube towards it, at the distance at which neighbours'
+ * edges are the gap apart. The first cube is at +x. */
+void scene_build_clump(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  const double inner = (p->size + p->gap) / 2 / tan(M_PI / CLUMP_CUBES);
+  scene_add_floor(s);
+  for (int i = 0; i < CLUMP_CUBES; ++i) {
+    const double angle = 2 * M_PI * i / CLUMP_CUBES;
+    const double r = inner + p->size / 2;
+    const dBodyID cube = add_cube(s, r * cos(angle), r * sin(angle), layer_height(s, 0));
+    dMatrix3 rotation;
+    dRFromAxisAndAngle(rotation, 0, 0, 1, angle);
+    dBodySetRotation(cube, rotation);
   }
 }

@@ -10,6 +10,8 @@
 
 #include <scenes/build.h>
 
+#define SHIFT_MAX 1e3 /* m */
+
 static const double push_out_speed = 0.5; /* m/s, of bodies that penetrate */
 
 static hap_status fail(hap_detail *detail, hap_status status, const char *format, ...)
@@ -92,6 +94,9 @@ static const char *bad_parameter(const scene_parameters *p)
       {"iterations", p->iterations, 1, false},
       {"hinge_torque", p->hinge_torque, 0, false},
       {"layer", p->layer, 0, false},
+      {"shift", p->shift[0], -SHIFT_MAX, false},
+      {"shift", p->shift[1], -SHIFT_MAX, false},
+      {"shift", p->shift[2], -SHIFT_MAX, false},
   };
   for (size_t i = 0; i < sizeof checks / sizeof checks[0]; ++i) {
     if (!isfinite(checks[i].value) ||
@@ -126,6 +131,25 @@ static void create_world(scene *s)
   dWorldSetAutoDisableFlag(s->world, 0);
 }
 
+/* False, and nothing is moved, where joints hold the bodies: their anchors would stay. */
+static bool shift_bodies(scene *s)
+{
+  const double *shift = s->parameters.shift;
+  if (shift[0] == 0 && shift[1] == 0 && shift[2] == 0) {
+    return true; /* bit for bit the scene itself */
+  }
+  for (size_t i = 0; i < s->body_count; ++i) {
+    if (dBodyGetNumJoints(s->bodies[i]) > 0) {
+      return false;
+    }
+  }
+  for (size_t i = 0; i < s->body_count; ++i) {
+    const dReal *x = dBodyGetPosition(s->bodies[i]);
+    dBodySetPosition(s->bodies[i], x[0] + shift[0], x[1] + shift[1], x[2] + shift[2]);
+  }
+  return true;
+}
+
 /* parameters were checked, count is in range */
 static hap_status build(const scene_row *row, const scene_parameters *parameters, int count,
                         scene **out, hap_detail *detail)
@@ -146,6 +170,11 @@ static hap_status build(const scene_row *row, const scene_parameters *parameters
   create_world(s);
   row->build(s);
   assert(s->body_count == bodies);
+  if (!shift_bodies(s)) {
+    scene_destroy(s);
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' has joints and takes no shift",
+                row->parameters.name);
+  }
   *out = s;
   return HAP_OK;
 }
