@@ -13,6 +13,7 @@
 #include "base/vec.h"
 #include "bench/bench.h"
 #include "haptic/rt/tick.h"
+#include "haptic/tick_memory.h"
 #include "sync/exchange.h"
 
 #define NEIGHBOURS_MAX 256
@@ -41,27 +42,15 @@ typedef struct bed {
 
 static void close_bed(bed *t)
 {
-  hapi_free(t->tick.bodies);
-  hapi_free(t->tick.live);
-  hapi_free(t->tick.contacts);
-  hapi_free(t->tick.ramps);
-  hapi_free(t->tick.ramp_generations);
-  hapi_free(t->tick.pointers);
+  hapi_tick_memory_destroy(&t->tick);
   hapi_exchange_destroy(t->exchange);
 }
 
 static bool allocate(hapi_tick *tick, uint32_t count)
 {
-  tick->capacity = (hapi_capacity){count, count, 1};
+  const hapi_capacity capacity = {count, count, 1, 1, 1};
   tick->period = 1e-9 * PERIOD_NS;
-  tick->bodies = hapi_alloc_array(count, sizeof *tick->bodies);
-  tick->live = hapi_alloc_array(count, sizeof *tick->live);
-  tick->contacts = hapi_alloc_array(count, sizeof *tick->contacts);
-  tick->ramps = hapi_alloc_array(count, sizeof *tick->ramps);
-  tick->ramp_generations = hapi_alloc_array(count, sizeof *tick->ramp_generations);
-  tick->pointers = hapi_alloc_array(1, sizeof *tick->pointers);
-  return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
-         tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL;
+  return hapi_tick_memory_create(tick, &capacity);
 }
 
 /* Directions spread over the sphere. */

@@ -152,6 +152,69 @@ TEST(tick_leaves_its_table)
   check_program("tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour", 12);
 }
 
+/* ---- accuracy ---- */
+
+#define ACCURACY_COLUMNS                                                                         \
+  "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms," \
+  "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,"               \
+  "pose_median_mm,force_rms_n,rest_share,start_um"
+
+/* Force error of a row of accuracy.csv that begins so; *out_count: how many rows do. */
+static double force_error(const char *begin, int *out_count)
+{
+  char line[LINE_MAX_LENGTH];
+  double error = -1.0;
+  FILE *file = fopen(file_in_folder("accuracy", ".csv"), "r");
+  *out_count = 0;
+  while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    if (strncmp(line, begin, strlen(begin)) == 0) {
+      error = strtod(line + strlen(begin), NULL);
+      ++*out_count;
+    }
+  }
+  if (file != NULL) {
+    fclose(file);
+  }
+  return error;
+}
+
+/* One scene; the numbers of all of them have their bounds in the program itself. */
+TEST(accuracy_sets_models_side_by_side)
+{
+  const char *const arguments[] = {"accuracy", "--quick", "--scene", "slide",
+                                   "--out",    folder,    NULL};
+  const char *const rows[] = {
+      "slide,contact,20,default,0,",     "slide,contact,60,default,0,",
+      "slide,accelerance,20,default,0,", "slide,accelerance,60,default,0,",
+      "slide,impulse,20,default,0,",     "slide,impulse,60,default,0,",
+      "slide,single,1000,default,0,",
+  };
+  enum {
+    ROWS = sizeof rows / sizeof rows[0]
+  };
+  double errors[ROWS];
+  REQUIRE(run(arguments, environ) == 0);
+  CHECK(count_rows(file_in_folder("accuracy", ".csv"), ACCURACY_COLUMNS) >= ROWS);
+  CHECK(count_lines(file_in_folder("accuracy", ".csv"), ",default,") == ROWS);
+  for (int i = 0; i < ROWS; ++i) {
+    int count = 0;
+    errors[i] = force_error(rows[i], &count);
+    CHECK(count == 1 && errors[i] >= 0.0);
+  }
+  CHECK(errors[0] < 0.01 && errors[0] < 0.1 * errors[2]);
+  CHECK(errors[1] < 0.01 && errors[1] < 0.5 * errors[3]);
+  CHECK(errors[4] > 0.5); /* friction: a force on the last known pose is not near */
+  CHECK(errors[6] < 1e-3);
+  CHECK(!plot_available() || exists(file_in_folder("accuracy", ".svg")));
+}
+
+TEST(accuracy_knows_its_scenes)
+{
+  const char *const arguments[] = {"accuracy", "--scene", "slides", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "slides") == 1);
+}
+
 TEST(without_gnuplot_a_line_says_that_there_is_no_picture)
 {
   const char *const arguments[] = {"fig5", "--out", folder, NULL};
@@ -172,6 +235,7 @@ TEST(wrong_usage_is_2_and_says_what_there_is)
       {"fig5", "fig6", NULL},
       {"fig5", "--fast", NULL},
       {"fig5", "--out", NULL},
+      {"fig5", "--scene", "slide", NULL},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     CHECK(run(cases[i], environ) == 2);
@@ -200,10 +264,13 @@ int main(void)
   RUN(fig7_leaves_its_table);
   RUN(scaling_leaves_its_table);
   RUN(tick_leaves_its_table);
+  RUN(accuracy_sets_models_side_by_side);
+  RUN(accuracy_knows_its_scenes);
   RUN(without_gnuplot_a_line_says_that_there_is_no_picture);
   RUN(wrong_usage_is_2_and_says_what_there_is);
   RUN(a_folder_that_cannot_be_is_1);
-  const char *const left[] = {"fig5.csv", "fig5.svg", "fig5_summary.csv", "said"};
+  const char *const left[] = {"fig5.csv",     "fig5.svg",     "fig5_summary.csv",
+                              "accuracy.csv", "accuracy.svg", "said"};
   for (size_t i = 0; i < sizeof left / sizeof left[0]; ++i) {
     unlink(file_in_folder(left[i], ""));
   }

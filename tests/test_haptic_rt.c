@@ -768,7 +768,11 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   struct rusage before;
   struct rusage after;
   set_up();
-  hapi_haptic_config config = {capacity, 1000.0, true, 0, 12000, f.exchange};
+  hapi_haptic_config config = {.capacity = capacity,
+                               .haptic_hz = 1000.0,
+                               .lockstep = true,
+                               .trace_rows = 12000,
+                               .exchange = f.exchange};
   REQUIRE(hapi_haptic_create(&config, &haptic) == HAP_OK);
   REQUIRE(hap_device_open("virtual:sine=0.02/0/0,hz=2,hand=tense", &device, &detail) == HAP_OK);
   hap_pointer_def_init(&def, sizeof def);

@@ -143,12 +143,16 @@ static void publish_model(uint64_t number)
 
 static bool set_up(void)
 {
-  const hapi_capacity capacity = {16, 16, 4};
+  const hapi_capacity capacity = {16, 16, 4, 16, 64};
   hap_detail detail;
   if (hapi_exchange_create(&capacity, &exchange) != HAP_OK) {
     return false;
   }
-  hapi_haptic_config config = {capacity, 1000.0, true, 0, 1000, exchange};
+  hapi_haptic_config config = {.capacity = capacity,
+                               .haptic_hz = 1000.0,
+                               .lockstep = true,
+                               .trace_rows = 1000,
+                               .exchange = exchange};
   bool good = hapi_haptic_create(&config, &haptic) == HAP_OK;
   for (int i = 0; i < 2 && good; ++i) {
     hap_pointer_def def;

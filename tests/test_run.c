@@ -228,15 +228,18 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
 
 TEST(what_this_version_cannot_do_is_said)
 {
-  CHECK(run("--model contact") == 2);
-  CHECK(says("not supported"));
   CHECK(run("--effects friction=on") == 2);
   CHECK(says("friction=on") && says("not supported in this version"));
   CHECK(run("--effects testing=off") == 2);
   CHECK(says("testing=off") && says("not supported in this version"));
+  CHECK(run("--model accelerance --effects contacts=on") == 2);
+  CHECK(says("contacts=on") && says("not supported in this version"));
   CHECK(run("--model impulse --effects testing=on") == 2);
-  CHECK(run("--lockstep --seconds 0.05 --effects friction=off,torque=auto --effects testing=on") ==
-        0);
+  CHECK(run("--model accelerance --lockstep --seconds 0.05 "
+            "--effects friction=off,torque=auto --effects testing=on") == 0);
+  CHECK(run("--lockstep --seconds 0.05 --effects shape=off,contacts=on") == 0);
+  CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL);
+  CHECK(strstr(ran.out, "testing=auto") != NULL);
 }
 
 /* ---- files ---- */

@@ -143,7 +143,7 @@ TEST(lockstep_steps_are_due_at_whole_ticks)
     hap_stats stats = stats_of(&s);
     CHECK(stats.ticks == 1000 && stats.missed_ticks == 0);
     CHECK(stats.physics_steps == (uint64_t)atomic_load(&s.steps));
-    CHECK(stats.bodies_known == 1 && stats.model == HAP_MODEL_ACCELERANCE);
+    CHECK(stats.bodies_known == 1 && stats.model == HAP_MODEL_CONTACT);
     CHECK(stats.model_age_s <= 2.0 * per_step * 1e-3 && stats.models_adopted > 0);
     CHECK(stats.tick_us_p50 <= stats.tick_us_p99 * 1.01 && stats.tick_us_p99 > 0.0);
     CHECK(stats.physics_ms_mean > 0.0 && stats.physics_ms_max >= stats.physics_ms_mean);

@@ -155,17 +155,13 @@ TEST(every_bad_field_is_named)
   stage_end(&s);
 }
 
-TEST(model_contact_says_that_it_is_not_supported)
+TEST(models_are_checked)
 {
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.model = HAP_MODEL_CONTACT;
-  CHECK(refused(&s, HAP_ERROR_UNSUPPORTED, "model contact is not supported"));
-  CHECK(has(s.detail.text, "accelerance")); /* and what is */
-  s.def.model = HAP_MODEL_SINGLE;
+  CHECK(s.def.model == HAP_MODEL_CONTACT); /* the default */
   REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_set_model(s.session, HAP_MODEL_CONTACT) == HAP_ERROR_UNSUPPORTED);
-  CHECK(has(detail_of(&s), "model contact is not supported"));
+  CHECK(hap_session_set_model(s.session, HAP_MODEL_SINGLE) == HAP_OK);
   CHECK(hap_session_set_model(s.session, (hap_model)4) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_set_model(s.session, (hap_model)-1) == HAP_ERROR_ARGUMENT);
   stage_end(&s);
@@ -316,7 +312,7 @@ int main(void)
   RUN(unset_defs_are_refused);
   RUN(missing_arguments_are_refused);
   RUN(every_bad_field_is_named);
-  RUN(model_contact_says_that_it_is_not_supported);
+  RUN(models_are_checked);
   RUN(smaller_and_larger_defs_are_accepted);
   RUN(statistics_of_a_smaller_struct);
   RUN(a_body_that_cannot_be_simulated_is_refused_at_create_and_start);

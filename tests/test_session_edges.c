@@ -212,7 +212,8 @@ TEST(a_transmission_is_not_probed_and_that_is_said)
     move_hand(&s, hand, -0.055, 0.0);
     REQUIRE(hap_session_start(s.session) == HAP_OK);
     CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-    CHECK((figures(&s).probe_steps == 0) == (with != 0));
+    CHECK(figures(&s).probe_steps == 0 || with == 0);
+    CHECK(figures(&s).probe_steps > 0 || with != 0 || s.def.model == HAP_MODEL_CONTACT);
     CHECK((strstr(detail_of(&s), "transmission") != NULL) == (with != 0));
     CHECK(felt(&s, hand) < 0.0 || with == 0);
     CHECK(figures(&s).impulse_abs_ns == 0.0 || with == 0); /* it feels no force */

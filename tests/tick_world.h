@@ -16,7 +16,10 @@
 #define CONTACTS 16u
 #define POINTERS 4u
 
-static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS};
+#define ROWS (4u * CONTACTS)
+#define BUCKETS 32u
+
+static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64};
 
 /* A tick with its memory, and a message to fill in. */
 static struct {
@@ -27,10 +30,34 @@ static struct {
   double ramps[CONTACTS];
   uint32_t ramp_generations[CONTACTS];
   hapi_tick_pointer pointers[POINTERS];
+  hapi_contact_memory memory[2][CONTACTS];
+  uint32_t buckets[BUCKETS];
+  hapi_row_source sources[ROWS];
+  hapi_row rows[ROWS];
+  double v[BODIES + 1][6];
+  double work[HAPI_SOLVER_WORK(ROWS, BODIES + 1)];
   hapi_exchange *exchange;
   hapi_model *model;
   int64_t now_ns;
 } f;
+
+static inline void set_up_world(void)
+{
+  hapi_local_world *world = &f.tick.world;
+  world->memory = f.memory[0];
+  world->old_memory = f.memory[1];
+  world->buckets = f.buckets;
+  world->bucket_count = BUCKETS;
+  world->sources = f.sources;
+  world->row_capacity = ROWS;
+  world->solver.rows = f.rows;
+  world->solver.v = f.v;
+  world->solver.work = f.work;
+  world->solver.work_count = sizeof f.work / sizeof f.work[0];
+  world->solver.tolerance = 1e-9;
+  world->solver.update_budget = 100000;
+  world->solver.direct_rows = 64;
+}
 
 static inline void set_up(void)
 {
@@ -45,6 +72,7 @@ static inline void set_up(void)
   f.tick.ramps = f.ramps;
   f.tick.ramp_generations = f.ramp_generations;
   f.tick.pointers = f.pointers;
+  set_up_world();
   hapi_tick_reset(&f.tick);
   if (hapi_exchange_create(&capacity, &f.exchange) != HAP_OK) {
     abort();

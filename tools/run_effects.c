@@ -7,26 +7,29 @@
 typedef struct effect {
   const char *name;
   const char *text;
-  unsigned models; /* that have it: bits by hap_model */
+  unsigned models;   /* that have it: bits by hap_model */
+  unsigned autos;    /* that have it where a scene calls for it */
+  unsigned switched; /* that do without it when told */
 } effect;
 
 #define BIT(model) (1u << (model))
+#define CONTACT BIT(HAP_MODEL_CONTACT)
 
 static const effect effects[RUN_EFFECTS] = {
-    {"testing", "testing simulations", BIT(HAP_MODEL_ACCELERANCE)},
-    {"cross", "cross accelerance between local bodies", 0},
-    {"contacts", "contacts between bodies in the loop", 0},
-    {"passes", "contact passes between syncs", 0},
-    {"joints", "joints in the loop", 0},
-    {"range", "local range beyond the neighbours", 0},
-    {"restitution", "restitution in the loop", 0},
-    {"friction", "friction on the pointer", 0},
-    {"torque", "torque on the pointer", 0},
-    {"gyro", "gyroscopic term in the loop", 0},
-    {"shape", "shape at every tick instead of a plane", 0},
-    {"proxy", "coupling by a proxy", 0},
-    {"observer", "energy observer", 0},
-    {"recording", "recording for a replay bit for bit", 0},
+    {"testing", "testing simulations", BIT(HAP_MODEL_ACCELERANCE), CONTACT, 0},
+    {"cross", "cross accelerance between local bodies", 0, 0, 0},
+    {"contacts", "contacts between bodies in the loop", CONTACT, 0, 0},
+    {"passes", "contact passes between syncs", CONTACT, 0, 0},
+    {"joints", "joints in the loop", 0, 0, 0},
+    {"range", "local range beyond the neighbours", CONTACT, 0, 0},
+    {"restitution", "restitution in the loop", CONTACT, 0, 0},
+    {"friction", "friction on the pointer", 0, 0, 0},
+    {"torque", "torque on the pointer", 0, 0, 0},
+    {"gyro", "gyroscopic term in the loop", CONTACT, 0, 0},
+    {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
+    {"proxy", "coupling by a proxy", 0, 0, 0},
+    {"observer", "energy observer", 0, 0, 0},
+    {"recording", "recording for a replay bit for bit", 0, 0, 0},
 };
 
 static const char *const wishes[] = {"auto", "off", "on"};
@@ -90,22 +93,46 @@ hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_det
 {
   for (size_t i = 0; i < RUN_EFFECTS; ++i) {
     bool on = has(model, &effects[i]);
-    if (wanted->wish[i] == (on ? RUN_EFFECT_OFF : RUN_EFFECT_ON)) {
+    bool switched = (effects[i].switched & BIT(model)) != 0;
+    bool maybe = (effects[i].autos & BIT(model)) != 0;
+    bool other = wanted->wish[i] == (on ? RUN_EFFECT_OFF : RUN_EFFECT_ON) ||
+                 (maybe && wanted->wish[i] != RUN_EFFECT_AUTO);
+    if (other && !switched) {
       snprintf(detail->text, sizeof detail->text,
                "%s=%s is not supported in this version: model %s always runs %s: %s",
                effects[i].name, wishes[wanted->wish[i]], hap_model_name(model),
-               on ? "with it" : "without it", effects[i].text);
+               maybe ? "with it where a scene calls for it"
+               : on  ? "with it"
+                     : "without it",
+               effects[i].text);
       return HAP_ERROR_UNSUPPORTED;
     }
   }
   return HAP_OK;
 }
 
-void run_effects_print(hap_model model, FILE *out)
+static const char *state_of(const run_effects *wanted, hap_model model, size_t index)
+{
+  const effect *e = &effects[index];
+  if ((e->switched & BIT(model)) != 0 && wanted->wish[index] == RUN_EFFECT_OFF) {
+    return "off";
+  }
+  return (e->autos & BIT(model)) != 0 ? "auto" : has(model, e) ? "on" : "off";
+}
+
+void run_effects_apply(const run_effects *wanted, hap_session_def *io)
 {
   for (size_t i = 0; i < RUN_EFFECTS; ++i) {
-    fprintf(out, "%s%s=%s", i > 0 ? "," : "", effects[i].name,
-            has(model, &effects[i]) ? "on" : "off");
+    if (strcmp(effects[i].name, "shape") == 0 && wanted->wish[i] == RUN_EFFECT_OFF) {
+      io->plane = HAP_PLANE_ALWAYS;
+    }
+  }
+}
+
+void run_effects_print(const run_effects *wanted, hap_model model, FILE *out)
+{
+  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+    fprintf(out, "%s%s=%s", i > 0 ? "," : "", effects[i].name, state_of(wanted, model, i));
   }
 }
 

@@ -30,8 +30,11 @@ hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *deta
 /* HAP_ERROR_UNSUPPORTED for a wish that the model does not meet in this version. */
 hap_status run_effects_check(const run_effects *effects, hap_model model, hap_detail *detail);
 
+/* What the session can be told of it. */
+void run_effects_apply(const run_effects *effects, hap_session_def *io);
+
 /* "testing=on,cross=off,...": what the model has. */
-void run_effects_print(hap_model model, FILE *out);
+void run_effects_print(const run_effects *effects, hap_model model, FILE *out);
 
 /* One line each: name and what it is. */
 void run_effects_list(FILE *out);

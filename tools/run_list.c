@@ -13,9 +13,9 @@ static const char *model_text(hap_model model)
     case HAP_MODEL_IMPULSE:
       return "force on the last known pose, its impulse goes to the world (Method 3)";
     case HAP_MODEL_ACCELERANCE:
-      return "testing simulations give A and b to the loop (Method 2, the default)";
+      return "testing simulations give A and b to the loop (Method 2)";
     case HAP_MODEL_CONTACT:
-      return "contacts in the loop; not supported in this version";
+      return "the loop simulates what is near with its own contacts (the default)";
   }
   return "";
 }

@@ -60,13 +60,7 @@ static hap_status take_model(run_options *options, const option *self, const cha
                              hap_detail *detail)
 {
   (void)self;
-  hap_status status = rig_find_model(value, &options->rig.def.model, detail);
-  if (status >= HAP_OK && options->rig.def.model == HAP_MODEL_CONTACT) {
-    return fail(detail,
-                "contact is not supported in this version; take single, impulse or "
-                "accelerance");
-  }
-  return status;
+  return rig_find_model(value, &options->rig.def.model, detail);
 }
 
 static hap_status take_device(run_options *options, const option *self, const char *value,
@@ -266,6 +260,7 @@ static hap_status check(run_options *o, hap_detail *detail)
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
     return fail(detail, "--effects: %.480s", why.text);
   }
+  run_effects_apply(&o->effects, def);
   return HAP_OK;
 }
 

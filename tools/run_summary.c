@@ -78,7 +78,7 @@ void run_summary_print(const run_options *options, const hap_stats *stats, FILE 
   count(out, "neighbours_max", stats->neighbours_max);
   number(out, "momentum_ratio", stats->momentum_ratio);
   fputs("effects: ", out);
-  run_effects_print(options->rig.def.model, out);
+  run_effects_print(&options->effects, options->rig.def.model, out);
   fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->trace_hash);
   count(out, "faults", stats->faults);
   print_more(stats, out);

@@ -26,6 +26,10 @@ HAP_BEGIN_DECLS
  * in what the pair's surface is. Called once per pair and step, never in testing simulations. */
 typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io);
 
+/* [physics] First friction direction (world axes, any length) of a pair whose surface has
+ * dContactFDir1. The part across each contact's normal is used. False: ODE's own direction. */
+typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_direction[3]);
+
 /* [physics] Forces in (before) and results out (after) of a global step of step_s seconds; never
  * called for testing simulations. */
 typedef void (*hap_step_fn)(void *user, double step_s);
@@ -37,15 +41,16 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
  * must be adopted, or a testing simulation would move it. */
 typedef struct hap_ode_def {
-  uint32_t size;                 /* set by hap_ode_def_init */
-  uint32_t cookie;               /* set by hap_ode_def_init */
-  dWorldID world;                /* borrowed; one session per world */
-  dSpaceID space;                /* borrowed */
-  hap_surface_fn surface;        /* NULL: every pair collides with mu = infinity */
-  hap_step_fn before_step;       /* may be NULL */
-  hap_step_fn after_step;        /* may be NULL */
-  void *user;                    /* handed to the three */
-  int32_t max_contacts_per_pair; /* 1..64, default 8 */
+  uint32_t size;                       /* set by hap_ode_def_init */
+  uint32_t cookie;                     /* set by hap_ode_def_init */
+  dWorldID world;                      /* borrowed; one session per world */
+  dSpaceID space;                      /* borrowed */
+  hap_surface_fn surface;              /* NULL: every pair collides with mu = infinity */
+  hap_step_fn before_step;             /* may be NULL */
+  hap_step_fn after_step;              /* may be NULL */
+  void *user;                          /* handed to all of them */
+  int32_t max_contacts_per_pair;       /* 1..64, default 8; the loop keeps at most 4 */
+  hap_direction_fn friction_direction; /* may be NULL */
 } hap_ode_def;
 
 /* [any] */

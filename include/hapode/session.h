@@ -32,7 +32,7 @@ typedef enum hap_model {
   HAP_MODEL_SINGLE = 0,      /* paper's Method 1: the world itself at the haptic rate */
   HAP_MODEL_IMPULSE = 1,     /* paper's Method 3: force on the last known pose */
   HAP_MODEL_ACCELERANCE = 2, /* paper's Method 2: testing simulations, A and b in the loop */
-  HAP_MODEL_CONTACT = 3      /* contacts in the loop; not supported by this version */
+  HAP_MODEL_CONTACT = 3      /* the loop simulates what is near with its own contacts */
 } hap_model;
 
 /* Where model IMPULSE shows a body between two physics steps. */
@@ -47,29 +47,45 @@ typedef enum hap_probe {
   HAP_PROBE_PAPER = 1   /* four steps for each neighbour: 4N steps */
 } hap_probe;
 
+/* What model CONTACT takes a body's surface for, where a pointer touches it. */
+typedef enum hap_plane {
+  HAP_PLANE_WHERE_NEEDED = 0, /* the shape itself at every tick; a plane for convex geoms and
+                                 meshes */
+  HAP_PLANE_ALWAYS = 1        /* the plane at the nearest point of the last physics step: cheaper */
+} hap_plane;
+
 #define HAP_LATENCY_DEFAULT (-1)
 
 typedef struct hap_session_def {
   uint32_t size;        /* set by hap_session_def_init */
   uint32_t cookie;      /* set by hap_session_def_init; an unset def is refused */
   hap_drive drive;      /* default HAP_DRIVE_THREADS */
-  hap_model model;      /* default HAP_MODEL_ACCELERANCE */
+  hap_model model;      /* default HAP_MODEL_CONTACT */
   double physics_hz;    /* Hz, 1..1000 and at most haptic_hz, default 60; unused by model SINGLE */
-  double contact_hz;    /* Hz, 20..1000, default 200; reserved for model CONTACT */
+  double contact_hz;    /* Hz, 20..1000, default 200: how often model CONTACT finds the contacts
+                           between bodies anew */
   double haptic_hz;     /* Hz, 100..20000, default 1000 */
-  int32_t max_bodies;   /* bodies the loop can carry, 1..1024, default 64 */
-  int32_t max_contacts; /* pointer-body contacts, 1..4096, default 256 */
+  int32_t max_bodies;   /* bodies that the loop moves itself, 1..1024, default 64; it knows as many
+                           again of those around them */
+  int32_t max_contacts; /* contact points between bodies, pairs of geoms that are near, and pointer
+                           contacts, of each 1..4096, default 1024 */
   int32_t max_pointers; /* 1..16, default 4 */
   int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
                            time. Default 80. Physics runs at half of it. */
   int32_t physics_latency_ticks; /* LOCKSTEP: ticks from the start of a physics step to the tick
                                     that uses its result, at most haptic_hz / physics_hz. HAP_LATENCY_DEFAULT (default):
-                                    1 in model ACCELERANCE, one step in model IMPULSE. Model SINGLE
+                                    1 in models CONTACT and ACCELERANCE, one step in model IMPULSE. Model SINGLE
                                     always has 0. */
   int32_t trace_rows; /* rows kept for hap_session_trace_read, 0..1048576, default 0: none */
   hap_impulse_pose impulse_pose; /* default HAP_IMPULSE_INTERPOLATED */
-  hap_probe probe;               /* default HAP_PROBE_SHARED */
+  hap_probe probe;               /* model ACCELERANCE, default HAP_PROBE_SHARED */
   uint32_t flags;                /* no bit is defined; an unknown bit is an error */
+  int32_t max_edge_probes; /* model CONTACT: bodies at the border of the range that are probed at a
+                              physics step (7 steps of their island), 0..1024, default 4; the others
+                              are moving walls until the next one */
+  hap_plane plane;         /* model CONTACT, default HAP_PLANE_WHERE_NEEDED */
+  int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
+                              mesh there, 0..1048576, default 4096 */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -115,7 +131,7 @@ typedef void (*hap_edit_fn)(void *arg);
 HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit_fn edit,
                                                   void *arg);
 
-/* [any] From the next sync on. HAP_ERROR_UNSUPPORTED for HAP_MODEL_CONTACT in this version. */
+/* [any] From the next sync on. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_model(hap_session *session, hap_model model);
 
 /* [any] Clears a latched fault; force may be felt again from the next tick on. */

@@ -80,6 +80,19 @@ typedef struct hap_stats {
   uint32_t realtime;      /* 1: haptic thread runs under SCHED_FIFO */
   uint64_t trace_dropped; /* rows that found no room */
   uint64_t trace_hash;    /* lockstep: states and forces of all ticks; 0 otherwise */
+
+  /* Model CONTACT. */
+  uint64_t contact_passes;    /* sets of contacts between bodies that the loop has taken */
+  double contact_us_mean;     /* us a pass */
+  double contact_us_max;      /* us */
+  double solver_residual_max; /* m/s, largest correction of a velocity that was left undone */
+  uint64_t solver_sweeps;     /* sum over ticks */
+  uint32_t local_contacts;    /* contact points between bodies that push in the newest tick */
+  uint32_t range_bodies;      /* bodies that the loop moves itself, in the newest model */
+  uint32_t edge_bodies;       /* outside of the range, but touched by it: moving boundaries */
+  uint32_t measured_bodies;   /* moved by what testing simulations say */
+  double range_ms_mean;       /* ms a cycle, part of neighbour_ms: building the local model */
+  double last_range_ms;
 } hap_stats;
 
 #endif

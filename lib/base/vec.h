@@ -144,6 +144,36 @@ static inline void hapi_quat_to_matrix(const double q[4], double r[9])
   r[8] = 1.0 - 2.0 * (x * x + y * y);
 }
 
+/* out = m v, m row-major 3x3; out is not v */
+static inline void hapi_m3_apply(const double m[9], const double v[3], double out[3])
+{
+  out[0] = m[0] * v[0] + m[1] * v[1] + m[2] * v[2];
+  out[1] = m[3] * v[0] + m[4] * v[1] + m[5] * v[2];
+  out[2] = m[6] * v[0] + m[7] * v[1] + m[8] * v[2];
+}
+
+/* out = m^T v; out is not v */
+static inline void hapi_m3_apply_transposed(const double m[9], const double v[3], double out[3])
+{
+  out[0] = m[0] * v[0] + m[3] * v[1] + m[6] * v[2];
+  out[1] = m[1] * v[0] + m[4] * v[1] + m[7] * v[2];
+  out[2] = m[2] * v[0] + m[5] * v[1] + m[8] * v[2];
+}
+
+/* out = r m r^T: a tensor of the body in world axes; out is none of the two */
+static inline void hapi_m3_turn(const double r[9], const double m[9], double out[9])
+{
+  double rm[9];
+  for (int i = 0; i < 3; ++i) {
+    hapi_m3_apply_transposed(m, r + 3 * i, rm + 3 * i); /* row i of r m */
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out[3 * i + k] = hapi_v3_dot(rm + 3 * i, r + 3 * k);
+    }
+  }
+}
+
 /* Point of a frame to the world, and back. */
 static inline void hapi_pose_point(const double position[3], const double quat[4],
                                    const double point[3], double out[3])

@@ -10,6 +10,7 @@
 
 #include <hapode/pointer.h>
 #include <hapode/record.h>
+#include <hapode/session.h>
 #include <hapode/stats.h>
 
 #include "sync/exchange.h"
@@ -22,6 +23,7 @@ typedef struct hapi_haptic_config {
   bool lockstep;
   int rt_priority;
   uint32_t trace_rows;
+  hap_plane plane; /* model CONTACT */
   hapi_exchange *exchange;
 } hapi_haptic_config;
 

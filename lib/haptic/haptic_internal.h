@@ -53,6 +53,10 @@ typedef struct hapi_haptic_figures {
   _Atomic uint64_t contact_ticks;
   _Atomic uint64_t saturated_ticks;
   _Atomic uint64_t models_adopted;
+  _Atomic uint64_t contact_passes;
+  _Atomic uint64_t solver_sweeps;
+  _Atomic double solver_residual;
+  _Atomic uint32_t local_contacts;
   _Atomic uint64_t faults;
   _Atomic uint64_t trace_dropped;
   _Atomic uint64_t hash;
@@ -77,6 +81,7 @@ struct hapi_haptic {
   hapi_haptic_config config;
   hapi_tick tick;
   hapi_model *pending; /* taken, its time has not come */
+  hapi_patches *pending_patches;
   hapi_pointer_slot *slots;
   hapi_trace_ring ring;
   hapi_haptic_figures figures;

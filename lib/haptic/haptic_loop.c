@@ -6,33 +6,11 @@
 #include "base/clock.h"
 #include "base/vec.h"
 #include "haptic/haptic_internal.h"
+#include "haptic/tick_memory.h"
 
 #define STORE(field, value) \
   atomic_store_explicit(&haptic->figures.field, (value), memory_order_relaxed)
 #define LOAD(field) atomic_load_explicit(&haptic->figures.field, memory_order_relaxed)
-
-static bool allocate_tick(hapi_tick *tick, const hapi_capacity *c)
-{
-  tick->capacity = *c;
-  tick->bodies = hapi_alloc_array(c->bodies, sizeof *tick->bodies);
-  tick->live = hapi_alloc_array(c->bodies, sizeof *tick->live);
-  tick->contacts = hapi_alloc_array(c->contacts, sizeof *tick->contacts);
-  tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
-  tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
-  tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
-  return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
-         tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL;
-}
-
-static void free_tick(hapi_tick *tick)
-{
-  hapi_free(tick->bodies);
-  hapi_free(tick->live);
-  hapi_free(tick->contacts);
-  hapi_free(tick->ramps);
-  hapi_free(tick->ramp_generations);
-  hapi_free(tick->pointers);
-}
 
 static bool prepare_slots(hapi_haptic *haptic)
 {
@@ -56,13 +34,14 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
     return HAP_ERROR_MEMORY;
   }
   haptic->config = *config;
-  if (!allocate_tick(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
+  if (!hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
       hapi_trace_ring_create(&haptic->ring, config->trace_rows) != HAP_OK) {
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;
   }
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
+  haptic->tick.world.plane_mode = config->plane;
   hapi_tick_reset(&haptic->tick);
   *out = haptic;
   return HAP_OK;
@@ -82,7 +61,7 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   }
   hapi_free(haptic->slots);
   hapi_trace_ring_finish(&haptic->ring);
-  free_tick(&haptic->tick);
+  hapi_tick_memory_destroy(&haptic->tick);
   hapi_free(haptic);
 }
 
@@ -92,6 +71,10 @@ static void reset_figures(hapi_haptic *haptic)
   STORE(ticks, 0);
   STORE(missed_ticks, 0);
   STORE(models_adopted, 0);
+  STORE(contact_passes, 0);
+  STORE(solver_sweeps, 0);
+  STORE(solver_residual, 0.0);
+  STORE(local_contacts, 0);
   STORE(trace_dropped, 0);
   STORE(contact_ticks, 0);
   STORE(saturated_ticks, 0);
@@ -118,6 +101,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
   reset_figures(haptic);
   haptic->pending = NULL;
+  haptic->pending_patches = NULL;
   haptic->start_ns = start_ns;
   haptic->last_tick_us = 0.0;
   hap_status status = hapi_pointers_start_devices(haptic, detail);
@@ -149,16 +133,40 @@ void hapi_haptic_end(hapi_haptic *haptic)
   }
 }
 
+static void publish_poses(hapi_haptic *haptic)
+{
+  if (haptic->tick.model == HAP_MODEL_CONTACT) {
+    hapi_tick_report_poses(&haptic->tick, hapi_exchange_poses_back(haptic->config.exchange));
+    hapi_exchange_poses_publish(haptic->config.exchange);
+  }
+}
+
+/* A set that was taken and whose time has not come is safe: its writer fills in two others first. */
+static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
+{
+  if (haptic->pending_patches == NULL) {
+    haptic->pending_patches = hapi_exchange_patches_take(haptic->config.exchange);
+  }
+  if (haptic->pending_patches != NULL && now_ns >= haptic->pending_patches->valid_from_ns) {
+    hapi_tick_adopt_patches(&haptic->tick, haptic->pending_patches);
+    haptic->pending_patches = NULL;
+    STORE(contact_passes, LOAD(contact_passes) + 1);
+  }
+}
+
 void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
 {
   if (haptic->pending == NULL) {
     haptic->pending = hapi_exchange_model_take(haptic->config.exchange);
   }
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
+    haptic->tick.now_ns = now_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
     STORE(models_adopted, LOAD(models_adopted) + 1);
+    publish_poses(haptic); /* the contact thread looks for new bodies */
   }
+  receive_patches(haptic, now_ns);
 }
 
 static void follow_faults(hapi_haptic *haptic)
@@ -190,6 +198,9 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
     STORE(age_max_ns, age);
   }
   STORE(peak_force, tick->peak_force);
+  STORE(solver_sweeps, tick->sweeps);
+  STORE(solver_residual, tick->residual_max);
+  STORE(local_contacts, tick->model == HAP_MODEL_CONTACT ? tick->world.active : 0);
   STORE(hand_impulse_abs, tick->hand_impulse_abs);
   for (int i = 0; i < 3; ++i) {
     STORE(hand_impulse[i], tick->hand_impulse[i]);
@@ -210,6 +221,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_write(haptic);
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);
+  publish_poses(haptic);
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);
@@ -254,6 +266,10 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->model_age_s = 1e-9 * (double)LOAD(age_ns);
   out->model_age_max_s = 1e-9 * (double)LOAD(age_max_ns);
   out->models_adopted = LOAD(models_adopted);
+  out->contact_passes = LOAD(contact_passes);
+  out->local_contacts = LOAD(local_contacts);
+  out->solver_sweeps = LOAD(solver_sweeps);
+  out->solver_residual_max = LOAD(solver_residual);
   out->impulse_ns = hapi_v3_norm(impulse);
   out->impulse_abs_ns = LOAD(hand_impulse_abs);
   out->peak_force_n = LOAD(peak_force);

@@ -35,7 +35,8 @@ static void measure_b(hapi_physics *physics)
   hapi_test_step(physics);
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
-    if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0) {
+    if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0 ||
+        physics->table.entries[slot->known].island == HAPI_NONE) {
       continue;
     }
     double b[6];
@@ -139,7 +140,7 @@ static uint32_t plan_rounds(hapi_physics *physics)
 
 void hapi_accelerance_measure(hapi_physics *physics)
 {
-  if (physics->model != HAP_MODEL_ACCELERANCE) {
+  if (physics->model != HAP_MODEL_ACCELERANCE && physics->model != HAP_MODEL_CONTACT) {
     return;
   }
   hap_status status = hapi_test_gather(physics);

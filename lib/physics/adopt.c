@@ -40,6 +40,7 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
     hapi_candidate *candidate = &physics->neighborhood.candidates[i];
     candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
   }
+  hapi_meshes_forget(&physics->meshes, (dGeomID)(uintptr_t)geom);
 }
 
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,

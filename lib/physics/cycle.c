@@ -78,7 +78,11 @@ static void global_step(hapi_physics *physics)
     return;
   }
   hapi_sleep_step(physics, physics->step_s);
+  hapi_reconcile_hold(physics);
+  hapi_world_convert(physics);
   hapi_world_quickstep(physics, physics->step_s);
+  hapi_world_restore(physics);
+  hapi_reconcile_let_go(physics);
   hapi_sleep_note(physics);
 }
 
@@ -98,6 +102,7 @@ static void sync_in(hapi_physics *physics, int64_t now_ns)
     hapi_publish_poses(physics, now_ns);
   }
   hapi_world_read_user_wrenches(physics);
+  hapi_reconcile_own(physics);
 }
 
 static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
@@ -107,11 +112,12 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   int64_t valid_ns = state_ns;
   if (physics->model != HAP_MODEL_SINGLE && physics->latency_s >= 0.0) {
     valid_ns = now_ns + (int64_t)llround(1e9 * physics->latency_s);
-  } else if (physics->model == HAP_MODEL_ACCELERANCE && physics->config.lockstep) {
+  } else if (physics->model >= HAP_MODEL_ACCELERANCE && physics->config.lockstep) {
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
+  physics->last_cycle_ns = now_ns;
   if (physics->model != HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
   }
@@ -159,6 +165,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_neighbors_find(physics);
   seconds[1] += lap(&watch);
   hapi_accelerance_measure(physics);
+  hapi_operating_point_measure(physics);
   seconds[2] = lap(&watch);
   sync_out(physics, now_ns, next_ns);
   seconds[4] += lap(&watch);

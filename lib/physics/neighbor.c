@@ -148,6 +148,21 @@ static int by_distance(const void *a, const void *b)
 /* A plane that turned far is another contact: it does not go on with the force of the old one. */
 #define SAME_PLANE_COSINE 0.7
 
+/* The shape itself, in the body's frame, for the loop to ask. */
+static void place_shape(dGeomID geom, hapi_contact_slot *slot)
+{
+  dBodyID body = dGeomGetBody(geom);
+  hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  slot->has_shape = hapi_shape_of_geom(geom, &slot->shape, &world);
+  slot->shape_pose = world;
+  if (slot->has_shape && body != NULL) {
+    const dReal *q = dBodyGetQuaternion(body);
+    double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
+    hapi_pose_unpoint(dBodyGetPosition(body), q, world.position, slot->shape_pose.position);
+    hapi_quat_multiply(inverse, world.quat_wxyz, slot->shape_pose.quat_wxyz);
+  }
+}
+
 static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
@@ -164,6 +179,7 @@ static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
     ++slot->generation;
     memset(slot->last_force, 0, sizeof slot->last_force);
   }
+  place_shape(hit->geom, slot);
   hapi_v3_copy(normal, slot->normal_body);
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
@@ -190,7 +206,7 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
     hapi_known_body *known = index != HAPI_NONE ? &physics->table.entries[index] : NULL;
     bool counted = known != NULL && known->chosen_in == physics->model_number + 1;
     bool room = chosen < physics->config.capacity.contacts && (!has_body || known != NULL) &&
-                (known == NULL || counted || bodies < physics->config.capacity.bodies);
+                (known == NULL || counted || bodies < physics->config.max_bodies);
     if (!room) {
       ++physics->figures.stats.capacity_dropped;
       continue;
@@ -268,6 +284,7 @@ void hapi_neighbors_find(hapi_physics *physics)
   for (uint32_t i = 0; i < count; ++i) {
     take_hit(physics, &hood->hits[i]);
   }
+  hapi_range_walk(physics, count);
   hapi_slots_end_model(physics);
 }
 
@@ -276,7 +293,8 @@ uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
   uint32_t count = 0;
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     const hapi_body_slot *slot = &physics->bodies[i];
-    count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
+    count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
+             physics->table.entries[slot->known].chosen_in == physics->model_number;
   }
   return count;
 }

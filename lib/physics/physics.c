@@ -25,6 +25,8 @@ static bool allocate(hapi_physics *physics)
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
   physics->test.contacts = hapi_alloc_array(c->contacts, sizeof *physics->test.contacts);
+  physics->test.bodies = hapi_alloc_array(c->bodies, sizeof *physics->test.bodies);
+  physics->test.base = hapi_alloc_array(c->bodies, sizeof *physics->test.base);
   physics->test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->test.rounds);
   hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
   hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
@@ -33,6 +35,7 @@ static bool allocate(hapi_physics *physics)
   return physics->bodies != NULL && physics->contacts != NULL && hood->candidates != NULL &&
          hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
          physics->test.contacts != NULL && physics->test.rounds != NULL &&
+         physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
          physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
@@ -114,6 +117,8 @@ void hapi_physics_destroy(hapi_physics *physics)
     dJointGroupDestroy(physics->contact_group);
   }
   hapi_bodies_finish(&physics->table);
+  hapi_range_finish(physics);
+  hapi_meshes_finish(&physics->meshes);
   hapi_snapshot_finish(&physics->snapshot);
   hapi_test_finish(&physics->test);
   hapi_free(physics->bodies);
@@ -164,6 +169,7 @@ static void build_first_model(hapi_physics *physics)
   hapi_neighbors_collect(physics);
   hapi_neighbors_find(physics);
   hapi_accelerance_measure(physics);
+  hapi_operating_point_measure(physics);
 }
 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
@@ -190,6 +196,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   build_first_model(physics);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
   physics->start_ns = *start_ns;
+  physics->last_cycle_ns = *start_ns;
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);

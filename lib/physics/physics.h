@@ -21,6 +21,8 @@ typedef struct hapi_physics hapi_physics;
 
 typedef struct hapi_physics_config {
   hapi_capacity capacity;
+  uint32_t max_bodies;      /* that the loop may move itself; capacity.bodies is more */
+  uint32_t max_edge_probes; /* model CONTACT: bodies at the border of the range, a cycle */
   hap_model model;
   hap_impulse_pose impulse_pose;
   hap_probe probe;

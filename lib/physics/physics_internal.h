@@ -54,7 +54,10 @@ typedef struct hapi_known_body {
   uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in;   /* scratch: model that it was chosen for */
+  uint64_t ranged_in;   /* scratch: walk that met it */
+  uint64_t expanded_in; /* scratch: walk that went on from it */
   uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
@@ -94,6 +97,8 @@ typedef struct hapi_body_slot {
   bool wanted;         /* scratch: in the model being built */
   bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
   bool placed;         /* left_* hold what we left in ODE */
+  bool pose_changed;   /* since then, by the application */
+  bool velocity_changed;
   double mass;
   double impulse_taken[3];
   double angular_impulse_taken[3];
@@ -104,6 +109,16 @@ typedef struct hapi_body_slot {
   double new_impulse[3]; /* of the last interval, to be given to the world */
   double new_angular_impulse[3];
   double residual[6]; /* eq. 14, running total */
+
+  /* Model CONTACT. */
+  bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
+  bool linked;            /* scratch: a body of the range may touch it */
+  bool held;              /* scratch: switched off for the global step */
+  int64_t owned_until_ns; /* that the loop's last state was taken for */
+  double gain_taken[6];
+  double exchanged[6];   /* N, N m: mean wrench from the loop in the last interval */
+  double response[6][6]; /* measured */
+  bool measured;         /* response and b hold a measurement */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
@@ -118,6 +133,9 @@ typedef struct hapi_contact_slot {
   uint32_t round; /* scratch: order among the contacts of its island */
   double point_body[3];
   double normal_body[3];
+  bool has_shape; /* one with a closed form */
+  hapi_shape shape;
+  hap_pose shape_pose;   /* body frame */
   bool placed;           /* what follows holds, of the last model */
   double point_world[3]; /* when it was found */
   double distance;       /* m, then */
@@ -154,6 +172,53 @@ typedef struct hapi_neighborhood {
   double current_reach;
 } hapi_neighborhood;
 
+/* ---- local_range.c, mesh.c ---- */
+
+typedef struct hapi_link {
+  dGeomID own;
+  dGeomID other;
+  dReal box[6]; /* own's, with the reach */
+  hapi_surface surface;
+} hapi_link;
+
+typedef struct hapi_range {
+  hapi_near *near; /* message being written */
+  dGeomID *geoms;  /* of its geoms; capacity.geoms */
+  uint64_t number; /* of the walk: that of its model */
+  uint32_t *queue; /* entries of the body table; capacity.bodies */
+  uint32_t count;
+  uint32_t owned;
+  double fastest;   /* m/s, of the pointers */
+  dGeomID box_geom; /* private, in no space */
+  dGeomID own_geom; /* while ODE calls back */
+  dBodyID own_body;
+  dReal own_box[6];
+  hapi_link *links; /* of one body */
+  uint32_t link_count;
+  uint32_t link_capacity;
+} hapi_range;
+
+typedef struct hapi_mesh {
+  dGeomID geom;
+  dTriMeshDataID data;
+  uint32_t count;
+  double *corners; /* count x 9, geom's frame */
+  double *boxes;   /* of every few triangles, x 6 */
+} hapi_mesh;
+
+typedef struct hapi_near_triangle {
+  double corners[9]; /* world */
+  uint32_t index;
+  uint32_t open_edges; /* as in hapi_near_geom */
+} hapi_near_triangle;
+
+typedef struct hapi_meshes {
+  hapi_mesh *meshes;
+  uint32_t count;
+  uint32_t capacity;
+  hapi_near_triangle found[64];
+} hapi_meshes;
+
 /* ---- snapshot.c ---- */
 
 typedef struct hapi_body_state {
@@ -189,6 +254,9 @@ typedef struct hapi_snapshot {
 typedef struct hapi_test_set {
   uint32_t *contacts; /* slots of the contacts to probe; capacity.contacts */
   uint32_t contact_count;
+  uint32_t *bodies;  /* slots of bodies to probe, model CONTACT; capacity.bodies */
+  double (*base)[6]; /* their acceleration at the operating point */
+  uint32_t body_count;
   uint32_t *rounds;  /* by island: contacts so far; capacity.contacts */
   uint32_t *members; /* entries of the body table, all islands under test */
   uint32_t member_count;
@@ -214,9 +282,11 @@ typedef struct hapi_physics_counts {
   double testing_s;
   double step_s;
   double publish_s;
+  double range_s; /* part of neighbour_s */
   uint64_t cycles;
   double world_impulse[3]; /* given to the world: predictions and overwrites */
   double hand_impulse[3];  /* given to the bodies, as the loop reported */
+  double owned_taken[3];   /* of hapi_state.owned_impulse, in world_impulse */
 } hapi_physics_counts;
 
 typedef struct hapi_edit {
@@ -242,6 +312,8 @@ struct hapi_physics {
   uint32_t body_high;          /* slots that were ever used are below */
   uint32_t contact_high;
   hapi_neighborhood neighborhood;
+  hapi_range range;
+  hapi_meshes meshes;
   hapi_snapshot snapshot;
   hapi_test_set test;
 
@@ -250,15 +322,19 @@ struct hapi_physics {
   double step_s;    /* of this cycle's global step */
   double latency_s; /* negative: the model's own */
   uint64_t model_number;
-  hapi_state *state;   /* newest message of the loop; NULL: none yet */
-  bool has_new_state;  /* state came in this cycle */
-  double probe_step_s; /* H */
+  hapi_state *state;     /* newest message of the loop; NULL: none yet */
+  bool has_new_state;    /* state came in this cycle */
+  double probe_step_s;   /* H */
+  int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
   int64_t pose_times[2];
   pthread_mutex_t poses_lock; /* physics and those who draw */
 
   uint32_t watch[HAP_TRACE_BODIES_MAX]; /* body table entries */
   uint32_t watch_count;
 
+  bool converted; /* ODE holds parameters of another step, see soft.c */
+  double meant_erp;
+  double meant_cfm;
   bool begun;
   unsigned islands_threads; /* ODE's setting as it was found */
   bool said_not_probed;     /* of a transmission, once a session */
@@ -298,7 +374,39 @@ void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 void hapi_world_read_user_wrenches(hapi_physics *physics);
 double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
+/* What the pair's surface is, from the application's callback; false: no contact. */
+bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out);
+/* The same for the loop: soft constraints converted from H to T. */
+bool hapi_world_surface(hapi_physics *physics, dGeomID a, dGeomID b, hapi_surface *out);
+/* First friction direction of a pair whose surface has dContactFDir1; false: none was given. */
+bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double out[3]);
+
+/* soft.c */
+/* Constraint parameters of step H as those of step T: the same spring and damper. */
+void hapi_soften(double step_ratio, double *erp, double *cfm);
+/* Model SINGLE steps at T: ERP, CFM and damping of the world and its bodies as meant for H. Undone
+ * by restore. */
+void hapi_world_convert(hapi_physics *physics);
+void hapi_world_restore(hapi_physics *physics);
+
+/* local_range.c: model CONTACT */
+bool hapi_range_create(hapi_physics *physics);
+void hapi_range_finish(hapi_physics *physics);
+void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
+void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
+
+/* mesh.c */
+/* Triangles of a static mesh that meet a box of the world, into physics->meshes.found; at most 64. */
+uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]);
+void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
+void hapi_meshes_finish(hapi_meshes *meshes);
+
+/* operating_point.c: A and b of whole bodies, model CONTACT */
+void hapi_operating_point_measure(hapi_physics *physics);
+
 /* shape.c */
+/* The hull of a convex geom in world axes, its points in physics->neighborhood.hull. */
+bool hapi_hull_of_convex(hapi_physics *physics, dGeomID geom, hapi_shape *shape, hap_pose *pose);
 /* Shape and pose of a geom for proximity; false: of a class that only ODE's collider knows. */
 bool hapi_shape_of_geom(dGeomID geom, hapi_shape *out_shape, hap_pose *out_pose);
 /* Distance from a sphere's surface to the geom, within reach of it; false: farther. normal out of
@@ -310,8 +418,9 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
 void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
 void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
 double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
-                            const double point[3]);          /* m/s, relative */
-uint32_t hapi_neighbors_bodies(const hapi_physics *physics); /* dynamic ones in the model */
+                            const double point[3]); /* m/s, relative */
+/* Dynamic bodies that a pointer may touch, of the newest model. */
+uint32_t hapi_neighbors_bodies(const hapi_physics *physics);
 
 /* slots.c */
 uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known); /* live slot; HAPI_NONE: full */
@@ -349,6 +458,8 @@ bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t coun
 /* probe.c */
 /* Which bodies the wanted contacts can move: their islands. HAP_ERROR_MEMORY. */
 hap_status hapi_test_gather(hapi_physics *physics);
+/* The islands of the measured bodies of model CONTACT. */
+hap_status hapi_test_gather_bodies(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
 hap_status hapi_test_enter(hapi_physics *physics);
 void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
@@ -363,6 +474,9 @@ void hapi_accelerance_measure(hapi_physics *physics);
 
 /* reconcile.c: eq. 12-14, momentum */
 void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */
+void hapi_reconcile_own(hapi_physics *physics);       /* model CONTACT: the loop's states */
+void hapi_reconcile_hold(hapi_physics *physics);      /* ... are not stepped */
+void hapi_reconcile_let_go(hapi_physics *physics);    /* after the step */
 void hapi_reconcile_push(hapi_physics *physics);      /* pointers' impulse into the global step */
 void hapi_reconcile_residual(hapi_physics *physics);  /* after it: eq. 14 */
 void hapi_reconcile_overwrite(hapi_physics *physics); /* eq. 12 and 13 */

@@ -119,11 +119,15 @@ static bool gather_island(hapi_physics *physics, uint32_t start)
 
 static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact_slot *contact)
 {
-  return contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-         (physics->bodies[contact->body].flags & HAPI_BODY_DRIVEN) == 0;
+  if (contact->phase != HAPI_SLOT_LIVE || contact->body == HAPI_SLOT_NONE) {
+    return false;
+  }
+  uint32_t flags = physics->bodies[contact->body].flags;
+  bool needs = physics->model == HAP_MODEL_ACCELERANCE || (flags & HAPI_BODY_MEASURED) != 0;
+  return needs && (flags & HAPI_BODY_DRIVEN) == 0;
 }
 
-hap_status hapi_test_gather(hapi_physics *physics)
+static void begin_gathering(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
   for (uint32_t i = 0; i < test->member_count; ++i) {
@@ -132,26 +136,61 @@ hap_status hapi_test_gather(hapi_physics *physics)
   test->member_count = 0;
   test->island_count = 0;
   test->contact_count = 0;
+  test->body_count = 0;
   test->mechanisms = false;
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    if (!contact_moves_a_body(physics, &physics->contacts[i])) {
-      continue;
-    }
-    hapi_body_slot *body = &physics->bodies[physics->contacts[i].body];
-    uint32_t first = test->member_count;
-    if (physics->table.entries[body->known].island == HAPI_NONE &&
-        !gather_island(physics, body->known)) {
-      return HAP_ERROR_MEMORY;
-    }
-    if (!can_be_undone(physics, first)) {
-      drop_island(physics, first);
-      say_not_probed(physics);
-      body->flags = HAPI_BODY_DRIVEN;
-      continue;
-    }
-    test->contacts[test->contact_count++] = i;
+}
+
+/* The island of a body joins the test set. *testable: it can be undone; else the body is driven. */
+static hap_status gather_body(hapi_physics *physics, hapi_body_slot *body, bool *testable)
+{
+  uint32_t first = physics->test.member_count;
+  *testable = true;
+  if (physics->table.entries[body->known].island == HAPI_NONE &&
+      !gather_island(physics, body->known)) {
+    return HAP_ERROR_MEMORY;
+  }
+  if (!can_be_undone(physics, first)) {
+    drop_island(physics, first);
+    say_not_probed(physics);
+    body->flags = HAPI_BODY_DRIVEN;
+    *testable = false;
   }
   return HAP_OK;
+}
+
+hap_status hapi_test_gather(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hap_status status = HAP_OK;
+  begin_gathering(physics);
+  for (uint32_t i = 0; i < physics->contact_high && status >= HAP_OK; ++i) {
+    if (contact_moves_a_body(physics, &physics->contacts[i])) {
+      bool testable = false;
+      status = gather_body(physics, &physics->bodies[physics->contacts[i].body], &testable);
+      if (status >= HAP_OK && testable) {
+        test->contacts[test->contact_count++] = i;
+      }
+    }
+  }
+  return status;
+}
+
+hap_status hapi_test_gather_bodies(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hap_status status = HAP_OK;
+  begin_gathering(physics);
+  for (uint32_t i = 0; i < physics->body_high && status >= HAP_OK; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    if (slot->phase == HAPI_SLOT_LIVE && slot->linked && (slot->flags & HAPI_BODY_MEASURED) != 0) {
+      bool testable = false;
+      status = gather_body(physics, slot, &testable);
+      if (status >= HAP_OK && testable) {
+        test->bodies[test->body_count++] = i;
+      }
+    }
+  }
+  return status;
 }
 
 /* ODE's island search goes through kinematic bodies: their joints to the outside are cut. */
@@ -303,6 +342,8 @@ const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t kno
 void hapi_test_finish(hapi_test_set *test)
 {
   hapi_free(test->contacts);
+  hapi_free(test->bodies);
+  hapi_free(test->base);
   hapi_free(test->rounds);
   hapi_free(test->members);
   hapi_free(test->order);

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <string.h>
 
 #include "base/vec.h"
@@ -9,6 +10,79 @@ static void read_pose(dBodyID body, hap_pose *out)
 {
   hapi_v3_copy(dBodyGetPosition(body), out->position);
   memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+}
+
+/* Row-major 3x3 of ODE's rows of four. */
+static void read_matrix(const dReal in[12], double out[9])
+{
+  for (int i = 0; i < 9; ++i) {
+    out[i] = in[4 * (i / 3) + i % 3];
+  }
+}
+
+/* By the adjugate; the inertia was checked to be positive. */
+static void invert(const double m[9], double out[9])
+{
+  double adjugate[9] = {
+      m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
+      m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
+      m[3] * m[7] - m[4] * m[6], m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
+  double det = m[0] * adjugate[0] + m[1] * adjugate[3] + m[2] * adjugate[6];
+  for (int i = 0; i < 9; ++i) {
+    out[i] = det != 0.0 ? adjugate[i] / det : 0.0;
+  }
+}
+
+/* A ball or a cube turns the same about every axis: nothing gyroscopic about it. */
+static bool turns_alike(const double inertia[9])
+{
+  double off = fabs(inertia[1]) + fabs(inertia[2]) + fabs(inertia[5]);
+  double spread = fabs(inertia[0] - inertia[4]) + fabs(inertia[0] - inertia[8]);
+  return off + spread <= 1e-9 * inertia[0];
+}
+
+static double keep_per_tick(const hapi_physics *physics, double damping)
+{
+  double share = damping < 0.0 ? 0.0 : damping > 1.0 ? 1.0 : damping; /* lost in a step of H */
+  return pow(1.0 - share, physics->config.physics_hz / physics->config.haptic_hz);
+}
+
+static void fill_mass(dBodyID body, hapi_model_body *out)
+{
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  out->mass = mass.mass;
+  read_matrix(mass.I, out->inertia);
+  invert(out->inertia, out->inverse_inertia);
+  if (dBodyGetGyroscopicMode(body) != 0 && !turns_alike(out->inertia)) {
+    out->flags |= HAPI_BODY_GYROSCOPIC;
+  }
+}
+
+/* What the loop needs to move the body itself. */
+static void fill_dynamics(hapi_physics *physics, const hapi_body_slot *slot, hapi_model_body *out)
+{
+  const hapi_known_body *known = &physics->table.entries[slot->known];
+  dBodyID body = known->body;
+  fill_mass(body, out);
+  if (dBodyGetGravityMode(body) != 0) {
+    dVector3 gravity;
+    dWorldGetGravity(physics->ode.world, gravity);
+    hapi_v3_copy(gravity, out->gravity);
+  }
+  hapi_v3_copy(known->user_force, out->user_wrench);
+  hapi_v3_copy(known->user_torque, out->user_wrench + 3);
+  double linear = dBodyGetLinearDampingThreshold(body);
+  double angular = dBodyGetAngularDampingThreshold(body);
+  out->linear_keep = keep_per_tick(physics, dBodyGetLinearDamping(body));
+  out->angular_keep = keep_per_tick(physics, dBodyGetAngularDamping(body));
+  out->linear_threshold2 = linear * linear;
+  out->angular_threshold2 = angular * angular;
+  out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
+  hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
+  hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
+  memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
+  memcpy(out->response, slot->response, sizeof out->response);
 }
 
 static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *out)
@@ -25,6 +99,12 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
   memcpy(out->b, slot->b, sizeof out->b);
   memcpy(out->residual, slot->residual, sizeof out->residual);
+  if (physics->model == HAP_MODEL_CONTACT) {
+    fill_dynamics(physics, slot, out);
+    if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
+      memset(out->b, 0, sizeof out->b); /* the loop knows it better, or nobody measured it */
+    }
+  }
   bool sound = hapi_finite(out->pose.position, 3) && hapi_finite(out->pose.quat_wxyz, 4) &&
                hapi_finite(out->twist.linear, 3) && hapi_finite(out->twist.angular, 3);
   physics->figures.stats.states_rejected += !sound;
@@ -42,6 +122,9 @@ static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_mod
   hapi_v3_copy(slot->point_body, out->point_body);
   hapi_v3_copy(slot->normal_body, out->normal_body);
   memcpy(out->a, slot->a, sizeof out->a);
+  out->has_shape = slot->has_shape;
+  out->shape = slot->shape;
+  out->shape_pose = slot->shape_pose;
 }
 
 static void fill_watch(hapi_physics *physics, hapi_model *out)
@@ -94,6 +177,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   }
   fill_watch(physics, out);
   count_model(physics, out);
+  hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);
 }
 

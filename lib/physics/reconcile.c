@@ -47,17 +47,21 @@ static void take_impulse(hapi_body_slot *slot, const hapi_state_body *in)
   slot->pushed = any(linear) || any(angular);
 }
 
-/* Whether somebody else moved the body since the last cycle: then what they did holds. */
-static bool moved_by_application(const hapi_body_slot *slot, dBodyID body)
+/* Whether somebody else moved the body since the last cycle, or changed its velocity: then what
+ * they did holds. */
+static bool moved_by_application(hapi_body_slot *slot, dBodyID body)
 {
   double velocity[6];
   if (!slot->placed) {
+    slot->pose_changed = slot->velocity_changed = false;
     return false;
   }
   read_velocity(body, velocity);
-  return memcmp(slot->left_position, dBodyGetPosition(body), sizeof slot->left_position) != 0 ||
-         memcmp(slot->left_quat, dBodyGetQuaternion(body), sizeof slot->left_quat) != 0 ||
-         memcmp(slot->left_velocity, velocity, sizeof velocity) != 0;
+  slot->pose_changed =
+      memcmp(slot->left_position, dBodyGetPosition(body), sizeof slot->left_position) != 0 ||
+      memcmp(slot->left_quat, dBodyGetQuaternion(body), sizeof slot->left_quat) != 0;
+  slot->velocity_changed = memcmp(slot->left_velocity, velocity, sizeof velocity) != 0;
+  return slot->pose_changed || slot->velocity_changed;
 }
 
 static bool sound(const hapi_state_body *in)
@@ -65,7 +69,9 @@ static bool sound(const hapi_state_body *in)
   return hapi_finite(in->pose.position, 3) && hapi_finite(in->pose.quat_wxyz, 4) &&
          hapi_finite(in->twist.linear, 3) && hapi_finite(in->twist.angular, 3) &&
          hapi_finite(in->impulse, 3) && hapi_finite(in->angular_impulse, 3) &&
-         hapi_finite(in->residual, 6);
+         hapi_finite(in->residual, 6) && hapi_finite(in->gain, 6) &&
+         hapi_finite(in->owned_pose.position, 3) && hapi_finite(in->owned_pose.quat_wxyz, 4) &&
+         hapi_finite(in->owned_twist.linear, 3) && hapi_finite(in->owned_twist.angular, 3);
 }
 
 static void take_body(hapi_physics *physics, uint32_t index)
@@ -74,6 +80,7 @@ static void take_body(hapi_physics *physics, uint32_t index)
   const hapi_state_body *in = message_of(physics, index);
   dBodyID body = ode_body(physics, slot);
   bool driven = (slot->flags & HAPI_BODY_DRIVEN) != 0;
+  slot->loop_owned = false;
   if (in == NULL || body == NULL || slot->phase == HAPI_SLOT_FREE || driven) {
     return;
   }
@@ -83,6 +90,8 @@ static void take_body(hapi_physics *physics, uint32_t index)
     return;
   }
   take_impulse(slot, in);
+  slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
+  memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(slot, body)) {
     hapi_slots_restart(slot);
   }
@@ -103,6 +112,16 @@ static void take_forces(hapi_physics *physics)
   }
 }
 
+/* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an impulse. */
+static void take_owned_impulse(hapi_physics *physics, const hapi_state *state)
+{
+  hapi_physics_counts *f = &physics->figures;
+  for (int i = 0; i < 3; ++i) {
+    f->world_impulse[i] += state->owned_impulse[i] - f->owned_taken[i];
+    f->owned_taken[i] = state->owned_impulse[i];
+  }
+}
+
 void hapi_reconcile_take(hapi_physics *physics)
 {
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
@@ -112,10 +131,94 @@ void hapi_reconcile_take(hapi_physics *physics)
   }
   physics->state = newest;
   hapi_v3_copy(newest->hand_impulse, physics->figures.hand_impulse);
+  take_owned_impulse(physics, newest);
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     take_body(physics, i);
   }
   take_forces(physics);
+}
+
+/* What the application has not changed itself. */
+static void set_state(const hapi_body_slot *slot, dBodyID body, const hap_pose *pose,
+                      const hap_twist *twist)
+{
+  const double *p = pose->position;
+  const double *v = twist->linear;
+  const double *w = twist->angular;
+  if (!slot->pose_changed) {
+    dBodySetPosition(body, p[0], p[1], p[2]);
+    dBodySetQuaternion(body, pose->quat_wxyz);
+  }
+  if (!slot->velocity_changed) {
+    dBodySetLinearVel(body, v[0], v[1], v[2]);
+    dBodySetAngularVel(body, w[0], w[1], w[2]);
+  }
+}
+
+/* A body that the loop has let go since the last message. It did so some ticks after the time that
+ * ODE's state is for: back by that, as the step to come goes over the whole interval. */
+static void take_last_state(hapi_physics *physics, const hapi_body_slot *slot, dBodyID body,
+                            const hapi_state_body *in)
+{
+  hap_pose pose = in->owned_pose;
+  double since = 1e-9 * (double)(in->owned_until_ns - physics->last_cycle_ns);
+  since = since > physics->step_s ? physics->step_s : since < 0.0 ? 0.0 : since;
+  hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
+  set_state(slot, body, &pose, &in->owned_twist);
+}
+
+/* Model CONTACT: where the loop owns a body, its state is the body's. */
+void hapi_reconcile_own(hapi_physics *physics)
+{
+  if (!physics->has_new_state) {
+    return;
+  }
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    const hapi_state_body *in = slot->phase == HAPI_SLOT_FREE ? NULL : message_of(physics, i);
+    dBodyID body = in != NULL ? ode_body(physics, slot) : NULL;
+    if (body == NULL) {
+      continue;
+    }
+    if (slot->loop_owned) {
+      set_state(slot, body, &in->pose, &in->twist);
+      if ((in->flags & HAPI_BODY_RESTING) == 0 && !dBodyIsEnabled(body)) {
+        dBodyEnable(body);
+      }
+    } else if (in->owned_until_ns > slot->owned_until_ns) {
+      slot->owned_until_ns = in->owned_until_ns;
+      take_last_state(physics, slot, body, in);
+    }
+  }
+}
+
+/* ... and ODE does not step it. */
+void hapi_reconcile_hold(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    dBodyID body = slot->loop_owned ? ode_body(physics, slot) : NULL;
+    slot->held = body != NULL && dBodyIsEnabled(body);
+    if (slot->held) {
+      dBodyDisable(body);
+    }
+  }
+}
+
+void hapi_reconcile_let_go(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    dBodyID body = slot->loop_owned ? ode_body(physics, slot) : NULL;
+    if (body != NULL) {
+      dBodySetForce(body, 0.0, 0.0, 0.0); /* as a step does; the loop has them from the message */
+      dBodySetTorque(body, 0.0, 0.0, 0.0);
+    }
+    if (body != NULL && slot->held) {
+      dBodyEnable(body);
+    }
+    slot->held = false;
+  }
 }
 
 /* What the pointers gave in the last interval acts over the global step. */
@@ -130,6 +233,8 @@ static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
   dBodyAddForce(body, p[0] * rate, p[1] * rate, p[2] * rate);
   dBodyAddTorque(body, l[0] * rate, l[1] * rate, l[2] * rate);
   hapi_v3_add(physics->figures.world_impulse, p, physics->figures.world_impulse);
+  hapi_v3_scale(rate, p, slot->exchanged);
+  hapi_v3_scale(rate, l, slot->exchanged + 3);
   memset(slot->new_impulse, 0, sizeof slot->new_impulse);
   memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
 }
@@ -139,20 +244,25 @@ void hapi_reconcile_push(hapi_physics *physics)
   for (uint32_t i = 0; i < physics->body_high && physics->step_s > 0.0; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
+    memset(slot->exchanged, 0, sizeof slot->exchanged);
     if (body != NULL && (any(slot->new_impulse) || any(slot->new_angular_impulse))) {
       push_body(physics, slot, body);
     }
   }
 }
 
-/* Whether the loop moved the body in the interval that the message closes. */
+/* Whether the loop moved the body by A and b in the interval that the message closes. */
 static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t index)
 {
-  bool moves = physics->has_new_state && physics->state->model == HAP_MODEL_ACCELERANCE &&
-               physics->bodies[index].phase != HAPI_SLOT_FREE &&
+  bool moves = physics->has_new_state && physics->bodies[index].phase != HAPI_SLOT_FREE &&
                (physics->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
   const hapi_state_body *in = moves ? message_of(physics, index) : NULL;
-  return in != NULL && in->epoch == physics->bodies[index].epoch ? in : NULL;
+  if (in == NULL || in->epoch != physics->bodies[index].epoch) {
+    return NULL;
+  }
+  bool linear = physics->state->model == HAP_MODEL_ACCELERANCE ||
+                (physics->state->model == HAP_MODEL_CONTACT && (in->flags & HAPI_BODY_OWNED) == 0);
+  return linear ? in : NULL;
 }
 
 /* Eq. 14. The global step had the same impulse from the pointers as the loop; where it came to

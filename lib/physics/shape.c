@@ -125,8 +125,7 @@ static uint32_t vertices_below(hapi_physics *physics, dGeomID geom, const double
   return count;
 }
 
-/* The hull of a convex geom, in world axes. */
-static bool hull_of_convex(hapi_physics *physics, dGeomID geom, hapi_shape *shape, hap_pose *pose)
+bool hapi_hull_of_convex(hapi_physics *physics, dGeomID geom, hapi_shape *shape, hap_pose *pose)
 {
   const double up[3] = {0.0, 0.0, 1.0};
   const double down[3] = {0.0, 0.0, -1.0};
@@ -151,7 +150,8 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
   hapi_shape pointer = {.kind = HAPI_SHAPE_SPHERE, .radius = radius};
   hap_pose at = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
   hapi_v3_copy(center, at.position);
-  bool convex = dGeomGetClass(geom) == dConvexClass && hull_of_convex(physics, geom, &shape, &pose);
+  bool convex =
+      dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(physics, geom, &shape, &pose);
   if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
     return nearest_by_collider(physics, geom, center, radius, reach, out);
   }

@@ -35,15 +35,17 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   memset(&d, 0, sizeof d);
   d.cookie = HAPI_SESSION_COOKIE;
   d.drive = HAP_DRIVE_THREADS;
-  d.model = HAP_MODEL_ACCELERANCE;
+  d.model = HAP_MODEL_CONTACT;
   d.physics_hz = 60.0;
   d.contact_hz = 200.0;
   d.haptic_hz = 1000.0;
   d.max_bodies = 64;
-  d.max_contacts = 256;
+  d.max_contacts = 1024;
   d.max_pointers = 4;
   d.rt_priority = 80;
   d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
+  d.max_edge_probes = 4;
+  d.max_hull_points = 4096;
   give_defaults(def, size_of_def, &d, sizeof d);
 }
 
@@ -106,11 +108,6 @@ static hap_status check_numbers(const number_rule *rules, size_t count, hap_deta
 
 static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
 {
-  if (def->model == HAP_MODEL_CONTACT) {
-    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "model contact is not supported by this version; use accelerance, impulse or "
-                     "single");
-  }
   if (def->flags != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "flags has unknown bits 0x%x", def->flags);
   }
@@ -133,6 +130,9 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->trace_rows, 0, 1048576, "trace_rows"},
       {def->impulse_pose, 0, 1, "impulse_pose"},
       {def->probe, 0, 1, "probe"},
+      {def->max_edge_probes, 0, 1024, "max_edge_probes"},
+      {def->plane, 0, 1, "plane"},
+      {def->max_hull_points, 0, 1048576, "max_hull_points"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

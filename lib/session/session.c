@@ -57,6 +57,7 @@ void hap_session_destroy(hap_session *session)
   hap_session_stop(session);
   hapi_haptic_destroy(session->haptic);
   hapi_physics_destroy(session->physics);
+  hapi_contact_destroy(session->contact);
   hapi_exchange_destroy(session->exchange);
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);
@@ -84,6 +85,9 @@ static hap_status start_threads(hap_session *session)
   if (status >= HAP_OK && session->def.drive == HAP_DRIVE_THREADS) {
     status = hapi_physics_start_thread(session->physics);
   }
+  if (status >= HAP_OK) {
+    status = hapi_contact_start_thread(session->contact);
+  }
   if (status < HAP_OK) {
     return hapi_session_fail(session, status, "a thread could not be started");
   }
@@ -105,9 +109,12 @@ static hap_status begin(hap_session *session)
     return note_detail(session, status, &detail);
   }
   hapi_haptic_set_start(session->haptic, start_ns);
+  hapi_contact_begin(session->contact, start_ns);
+  hapi_haptic_receive(session->haptic, start_ns);
+  hapi_contact_pass(session->contact, start_ns); /* the first tick has contacts */
   hapi_haptic_receive(session->haptic, start_ns);
   atomic_store(&session->tick, 0);
-  session->base = session->step = 0;
+  session->base = session->step = session->pass = 0;
   session->frame_remainder_s = 0.0;
   return HAP_OK;
 }
@@ -150,6 +157,7 @@ hap_status hap_session_stop(hap_session *session)
     return HAP_OK;
   }
   hapi_haptic_end(session->haptic); /* first: the hand is let go */
+  hapi_contact_stop_thread(session->contact);
   hapi_physics_end(session->physics);
   if (session->memory_locked) {
     size_t size = 0;
@@ -239,6 +247,22 @@ static void step_when_due(hap_session *session)
   session->step = changes ? 1 : session->step + 1;
 }
 
+/* The contact thread's part: at its rate, and when bodies have come into the range. Its contacts
+ * are used from the next tick on. */
+static void find_contacts_when_due(hap_session *session)
+{
+  double period = 1.0 / session->def.contact_hz;
+  bool due = session->tick >= ticks_of(session, period, session->pass);
+  if (due) {
+    session->pass =
+        (uint64_t)floor((double)session->tick / (period * session->def.haptic_hz) + 1e-6) + 1;
+  }
+  if (due || hapi_contact_has_news(session->contact)) {
+    int64_t half_tick = (int64_t)(0.5e9 / session->def.haptic_hz);
+    hapi_contact_pass(session->contact, time_of(session, session->tick + 1) - half_tick);
+  }
+}
+
 hap_status hap_session_advance(hap_session *session, uint64_t ticks)
 {
   if (session == NULL) {
@@ -257,6 +281,7 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
     int64_t now = time_of(session, session->tick);
     hapi_haptic_receive(session->haptic, now);
     step_when_due(session);
+    find_contacts_when_due(session);
     hapi_haptic_cycle(session->haptic, now);
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);
   }
@@ -297,10 +322,6 @@ hap_status hap_session_set_model(hap_session *session, hap_model model)
 {
   if (session == NULL || (int)model < 0 || hap_model_name(model) == NULL) {
     return HAP_ERROR_ARGUMENT;
-  }
-  if (model == HAP_MODEL_CONTACT) {
-    return hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
-                             "model contact is not supported by this version");
   }
   hapi_physics_set_model(session->physics, model);
   return HAP_OK;
@@ -352,6 +373,7 @@ hap_status hap_session_stats(const hap_session *session, hap_stats *out, size_t 
   stats = loop;
   hapi_physics_stats(session->physics, &stats);
   hapi_haptic_stats(session->haptic, &stats);
+  hapi_contact_stats(session->contact, &stats);
   size_t size = size_of_out < sizeof stats ? size_of_out : sizeof stats;
   stats.size = (uint32_t)size;
   memcpy(out, &stats, size);

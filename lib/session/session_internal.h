@@ -9,6 +9,7 @@
 
 #include <hapode/session.h>
 
+#include "contact/contact.h"
 #include "haptic/haptic.h"
 #include "physics/physics.h"
 #include "sync/exchange.h"
@@ -22,6 +23,7 @@ struct hap_session {
   hapi_exchange *exchange;
   hapi_haptic *haptic;
   hapi_physics *physics;
+  hapi_contact *contact;
   bool started;
   bool memory_locked;
 
@@ -30,6 +32,7 @@ struct hap_session {
   _Atomic uint64_t tick;
   uint64_t base;
   uint64_t step;
+  uint64_t pass; /* of the contact thread's part, the next one */
 
   double frame_remainder_s; /* FRAME */
 

@@ -56,6 +56,8 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   const hap_session_def *def = &session->def;
   hapi_physics_config config = {
       .capacity = *capacity,
+      .max_bodies = (uint32_t)def->max_bodies,
+      .max_edge_probes = (uint32_t)def->max_edge_probes,
       .model = def->model,
       .impulse_pose = def->impulse_pose,
       .probe = def->probe,
@@ -74,11 +76,35 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   return status;
 }
 
+static hap_status create_contact(hap_session *session, const hapi_capacity *capacity)
+{
+  hapi_contact_config config = {
+      .capacity = *capacity,
+      .contact_hz = session->def.contact_hz,
+      .haptic_hz = session->def.haptic_hz,
+      .rt_priority = session->def.rt_priority,
+      .exchange = session->exchange,
+  };
+  return hapi_contact_create(&config, &session->contact);
+}
+
+/* Slots for the range, as many again for what stands around it, and some for those that have left and
+ * that the loop has not let go of. Geoms: a few a body. */
+static hapi_capacity capacity_of(const hap_session_def *def)
+{
+  return (hapi_capacity){
+      .bodies = 2 * (uint32_t)def->max_bodies + 16,
+      .contacts = (uint32_t)def->max_contacts,
+      .pointers = (uint32_t)def->max_pointers,
+      .geoms = 8 * (uint32_t)def->max_bodies + 64,
+      .hull_points = (uint32_t)def->max_hull_points,
+  };
+}
+
 static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap_detail *detail)
 {
   const hap_session_def *def = &session->def;
-  hapi_capacity capacity = {(uint32_t)def->max_bodies, (uint32_t)def->max_contacts,
-                            (uint32_t)def->max_pointers};
+  hapi_capacity capacity = capacity_of(def);
   hap_status status = hapi_exchange_create(&capacity, &session->exchange);
   if (status >= HAP_OK) {
     hapi_haptic_config config = {
@@ -87,9 +113,13 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
         .rt_priority = def->rt_priority,
         .trace_rows = (uint32_t)def->trace_rows,
+        .plane = def->plane,
         .exchange = session->exchange,
     };
     status = hapi_haptic_create(&config, &session->haptic);
+  }
+  if (status >= HAP_OK) {
+    status = create_contact(session, &capacity);
   }
   if (status < HAP_OK) {
     return hapi_fail(detail, status, "no memory for a session of %d bodies and %d contacts",
@@ -138,6 +168,7 @@ hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode
   if (status < HAP_OK) {
     hapi_haptic_destroy(session->haptic);
     hapi_physics_destroy(session->physics);
+    hapi_contact_destroy(session->contact);
     hapi_exchange_destroy(session->exchange);
     pthread_mutex_destroy(&session->detail_lock);
     hapi_free(session);

@@ -7,13 +7,25 @@
 #include "base/alloc.h"
 #include "sync/triple_buffer.h"
 
+typedef enum channel_name {
+  MODEL,
+  STATE,
+  NEAR,
+  POSES,
+  PATCHES,
+  CHANNELS
+} channel_name;
+
+typedef struct channel {
+  hapi_triple_buffer buffer;
+  size_t size; /* of one message */
+  void *places[3];
+} channel;
+
 struct hapi_exchange {
-  hapi_triple_buffer model_buffer;
-  hapi_triple_buffer state_buffer;
+  channel channels[CHANNELS];
   hapi_capacity capacity;
   size_t size;
-  hapi_model *models[3];
-  hapi_state *states[3];
 };
 
 /* Blocks start on cache lines of their own. */
@@ -22,38 +34,99 @@ static size_t round_up(size_t size)
   return (size + 63u) & ~(size_t)63u;
 }
 
-static size_t model_size(const hapi_capacity *c)
+/* Offset of an array of a message; moves *at behind it. */
+static uint32_t place_array(size_t *at, size_t count, size_t size)
 {
-  return round_up(round_up(sizeof(hapi_model)) + c->bodies * sizeof(hapi_model_body) +
-                  c->contacts * sizeof(hapi_model_contact));
+  size_t offset = round_up(*at);
+  *at = offset + count * size;
+  return (uint32_t)offset;
 }
 
-static size_t state_size(const hapi_capacity *c)
+static size_t lay_out_model(hapi_model *m, const hapi_capacity *c)
 {
-  return round_up(round_up(sizeof(hapi_state)) + c->bodies * sizeof(hapi_state_body) +
-                  c->contacts * sizeof(hapi_state_contact) +
-                  c->pointers * sizeof(hapi_state_pointer));
+  size_t at = sizeof *m;
+  m->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_model_body));
+  m->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_model_contact));
+  return at;
 }
 
-static void lay_out_model(hapi_model *m, const hapi_capacity *c)
+static size_t lay_out_state(hapi_state *s, const hapi_capacity *c)
 {
-  m->bodies_offset = (uint32_t)round_up(sizeof(hapi_model));
-  m->contacts_offset = m->bodies_offset + c->bodies * (uint32_t)sizeof(hapi_model_body);
-}
-
-static void lay_out_state(hapi_state *s, const hapi_capacity *c)
-{
-  s->bodies_offset = (uint32_t)round_up(sizeof(hapi_state));
-  s->contacts_offset = s->bodies_offset + c->bodies * (uint32_t)sizeof(hapi_state_body);
-  s->pointers_offset = s->contacts_offset + c->contacts * (uint32_t)sizeof(hapi_state_contact);
+  size_t at = sizeof *s;
+  s->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_state_body));
+  s->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_state_contact));
+  s->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_state_pointer));
   s->pointer_count = c->pointers;
+  return at;
+}
+
+static size_t lay_out_near(hapi_near *n, const hapi_capacity *c)
+{
+  size_t at = sizeof *n;
+  n->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_near_body));
+  n->geoms_offset = place_array(&at, c->geoms, sizeof(hapi_near_geom));
+  n->pairs_offset = place_array(&at, c->contacts, sizeof(hapi_near_pair));
+  n->points_offset = place_array(&at, c->hull_points, 3 * sizeof(double));
+  return at;
+}
+
+static size_t lay_out_poses(hapi_poses *p, const hapi_capacity *c)
+{
+  size_t at = sizeof *p;
+  p->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_poses_body));
+  return at;
+}
+
+static size_t lay_out_patches(hapi_patches *p, const hapi_capacity *c)
+{
+  size_t at = sizeof *p;
+  p->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_patch_contact));
+  p->surfaces_offset = place_array(&at, c->contacts, sizeof(hapi_surface));
+  return at;
+}
+
+/* Writes the offsets of a message, and gives back its size. */
+static size_t lay_out(channel_name name, void *message, const hapi_capacity *c)
+{
+  switch (name) {
+    case MODEL:
+      return lay_out_model(message, c);
+    case STATE:
+      return lay_out_state(message, c);
+    case NEAR:
+      return lay_out_near(message, c);
+    case POSES:
+      return lay_out_poses(message, c);
+    case PATCHES:
+      return lay_out_patches(message, c);
+    case CHANNELS:
+      break;
+  }
+  return 0;
+}
+
+static void measure(const hapi_capacity *capacity, size_t sizes[CHANNELS])
+{
+  union {
+    hapi_model model;
+    hapi_state state;
+    hapi_near near;
+    hapi_poses poses;
+    hapi_patches patches;
+  } scratch;
+  for (int i = 0; i < CHANNELS; ++i) {
+    sizes[i] = round_up(lay_out((channel_name)i, &scratch, capacity));
+  }
 }
 
 hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out)
 {
-  size_t model_bytes = model_size(capacity);
-  size_t state_bytes = state_size(capacity);
-  size_t size = round_up(sizeof(hapi_exchange)) + 3 * (model_bytes + state_bytes);
+  size_t sizes[CHANNELS];
+  size_t size = round_up(sizeof(hapi_exchange));
+  measure(capacity, sizes);
+  for (int i = 0; i < CHANNELS; ++i) {
+    size += 3 * sizes[i];
+  }
   *out = NULL;
   char *memory = hapi_alloc(size);
   if (memory == NULL) {
@@ -63,11 +136,12 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   e->capacity = *capacity;
   e->size = size;
   char *at = memory + round_up(sizeof(hapi_exchange));
-  for (int i = 0; i < 3; ++i) {
-    e->models[i] = (hapi_model *)(void *)at;
-    at += model_bytes;
-    e->states[i] = (hapi_state *)(void *)at;
-    at += state_bytes;
+  for (int i = 0; i < CHANNELS; ++i) {
+    e->channels[i].size = sizes[i];
+    for (int k = 0; k < 3; ++k) {
+      e->channels[i].places[k] = at;
+      at += sizes[i];
+    }
   }
   hapi_exchange_reset(e);
   *out = e;
@@ -81,50 +155,106 @@ void hapi_exchange_destroy(hapi_exchange *exchange)
 
 void hapi_exchange_reset(hapi_exchange *exchange)
 {
-  hapi_triple_init(&exchange->model_buffer);
-  hapi_triple_init(&exchange->state_buffer);
-  for (int i = 0; i < 3; ++i) {
-    memset(exchange->models[i], 0, model_size(&exchange->capacity));
-    memset(exchange->states[i], 0, state_size(&exchange->capacity));
-    lay_out_model(exchange->models[i], &exchange->capacity);
-    lay_out_state(exchange->states[i], &exchange->capacity);
+  for (int i = 0; i < CHANNELS; ++i) {
+    channel *c = &exchange->channels[i];
+    hapi_triple_init(&c->buffer);
+    for (int k = 0; k < 3; ++k) {
+      memset(c->places[k], 0, c->size);
+      lay_out((channel_name)i, c->places[k], &exchange->capacity);
+    }
   }
+}
+
+static void *back(hapi_exchange *exchange, channel_name name)
+{
+  channel *c = &exchange->channels[name];
+  return c->places[hapi_triple_back(&c->buffer)];
+}
+
+static void publish(hapi_exchange *exchange, channel_name name)
+{
+  hapi_triple_publish(&exchange->channels[name].buffer);
+}
+
+static void *take(hapi_exchange *exchange, channel_name name)
+{
+  channel *c = &exchange->channels[name];
+  return hapi_triple_take(&c->buffer) ? c->places[hapi_triple_front(&c->buffer)] : NULL;
 }
 
 hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
 {
-  return exchange->models[hapi_triple_back(&exchange->model_buffer)];
+  return back(exchange, MODEL);
 }
 
 void hapi_exchange_model_publish(hapi_exchange *exchange)
 {
-  hapi_triple_publish(&exchange->model_buffer);
-}
-
-hapi_state *hapi_exchange_state_take(hapi_exchange *exchange)
-{
-  if (!hapi_triple_take(&exchange->state_buffer)) {
-    return NULL;
-  }
-  return exchange->states[hapi_triple_front(&exchange->state_buffer)];
+  publish(exchange, MODEL);
 }
 
 hapi_model *hapi_exchange_model_take(hapi_exchange *exchange)
 {
-  if (!hapi_triple_take(&exchange->model_buffer)) {
-    return NULL;
-  }
-  return exchange->models[hapi_triple_front(&exchange->model_buffer)];
+  return take(exchange, MODEL);
 }
 
 hapi_state *hapi_exchange_state_back(hapi_exchange *exchange)
 {
-  return exchange->states[hapi_triple_back(&exchange->state_buffer)];
+  return back(exchange, STATE);
 }
 
 void hapi_exchange_state_publish(hapi_exchange *exchange)
 {
-  hapi_triple_publish(&exchange->state_buffer);
+  publish(exchange, STATE);
+}
+
+hapi_state *hapi_exchange_state_take(hapi_exchange *exchange)
+{
+  return take(exchange, STATE);
+}
+
+hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
+{
+  return back(exchange, NEAR);
+}
+
+void hapi_exchange_near_publish(hapi_exchange *exchange)
+{
+  publish(exchange, NEAR);
+}
+
+hapi_near *hapi_exchange_near_take(hapi_exchange *exchange)
+{
+  return take(exchange, NEAR);
+}
+
+hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange)
+{
+  return back(exchange, POSES);
+}
+
+void hapi_exchange_poses_publish(hapi_exchange *exchange)
+{
+  publish(exchange, POSES);
+}
+
+hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange)
+{
+  return take(exchange, POSES);
+}
+
+hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange)
+{
+  return back(exchange, PATCHES);
+}
+
+void hapi_exchange_patches_publish(hapi_exchange *exchange)
+{
+  publish(exchange, PATCHES);
+}
+
+hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
+{
+  return take(exchange, PATCHES);
 }
 
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size)

@@ -5,7 +5,13 @@
 
 /* What the threads tell each other. A message is one block: a header and arrays behind it at
  * offsets, no pointers. Bodies and contacts have slots, small numbers that physics gives out; a
- * slot's generation tells one user of the slot from the next. World frame, SI. */
+ * slot's generation tells one user of the slot from the next. World frame, SI.
+ *
+ *   physics -> haptic    hapi_model    bodies, pointer contacts
+ *   haptic  -> physics   hapi_state    where they have come to, what was exchanged
+ *   physics -> contact   hapi_near     geoms and pairs near the pointers   (model CONTACT)
+ *   haptic  -> contact   hapi_poses    newest poses of the bodies          (model CONTACT)
+ *   contact -> haptic    hapi_patches  contacts between bodies             (model CONTACT) */
 
 #include <stdint.h>
 
@@ -13,18 +19,27 @@
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 
+#include "proximity/patch.h"
+
 #define HAPI_SLOT_NONE 0xffffffffu
 
 typedef struct hapi_capacity {
-  uint32_t bodies;
+  uint32_t bodies; /* slots: those of the range, and as many again for what lies around it */
   uint32_t contacts;
   uint32_t pointers;
+  uint32_t geoms;       /* near the pointers */
+  uint32_t hull_points; /* of all of them together */
 } hapi_capacity;
 
 enum {
-  HAPI_BODY_DRIVEN = 1,  /* moved by the application: keeps its twist, feels no force */
-  HAPI_BODY_RESTING = 2, /* asleep in the world: does not move until it is pushed */
-  HAPI_BODY_FOLLOWS = 4 /* not pushed in the interval before: the world's state is the better one */
+  HAPI_BODY_DRIVEN = 1,    /* moved by the application: keeps its twist, feels no force */
+  HAPI_BODY_RESTING = 2,   /* asleep in the world: does not move until it is pushed */
+  HAPI_BODY_FOLLOWS = 4,   /* not pushed in the interval before: the world's state is better */
+  HAPI_BODY_OWNED = 8,     /* model CONTACT: the loop moves it, ODE takes its state from the loop.
+                            A body with neither this nor DRIVEN nor MEASURED is outside of the range:
+                            it goes on with its twist, and ODE gets what the loop gave to it */
+  HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
+  HAPI_BODY_GYROSCOPIC = 32
 };
 
 /* ---- physics -> haptic: the local model ---- */
@@ -39,6 +54,21 @@ typedef struct hapi_model_body {
   double b[6];        /* acceleration term of eq. 2: m/s^2, rad/s^2 */
   double residual[6]; /* velocity that the linear model missed (eq. 14), running total since the
                          slot's generation began: m/s, rad/s */
+
+  /* Model CONTACT only. */
+  double mass;
+  double inertia[9];         /* kg m^2, body frame, row-major */
+  double inverse_inertia[9]; /* body frame, row-major */
+  double gravity[3];         /* m/s^2; zero where the body has none */
+  double user_wrench[6];     /* N, N m about the centre of mass: the application's, held */
+  double linear_keep;        /* share of the velocity that damping leaves after a tick */
+  double angular_keep;
+  double linear_threshold2; /* m^2/s^2: damping acts above it */
+  double angular_threshold2;
+  double max_angular_speed; /* rad/s */
+  double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
+  double gain_taken[6];    /* of hapi_state_body.gain, the same */
+  double response[6][6];   /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;
 
 typedef struct hapi_model_contact {
@@ -47,10 +77,12 @@ typedef struct hapi_model_contact {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
   uint32_t pointer;
   uint32_t pointer_generation;
-  uint32_t reserved;
+  uint32_t has_shape;    /* shape and shape_pose can be asked for the nearest point at every tick */
   double point_body[3];  /* contact point, body frame (world frame for the static world) */
   double normal_body[3]; /* unit, out of the body */
   double a[6][3];        /* accelerance of eq. 6: force at the contact point, world axes */
+  hapi_shape shape;      /* one with a closed form against a sphere */
+  hap_pose shape_pose;   /* in the body's frame */
 } hapi_model_contact;
 
 typedef struct hapi_model {
@@ -80,6 +112,159 @@ static inline hapi_model_contact *hapi_model_contacts(hapi_model *m)
   return (hapi_model_contact *)(void *)((char *)m + m->contacts_offset);
 }
 
+/* ---- physics -> contact: what may touch what (model CONTACT) ---- */
+
+/* ODE's dSurfaceParameters with fdir1; soft constraints converted from the world's step to the tick
+ * (numerics.md: same spring and damper). */
+typedef struct hapi_surface {
+  uint32_t flags; /* HAPI_SURFACE_* */
+  double mu;      /* with APPROX1: friction coefficient, else N */
+  double mu2;
+  double direction[3]; /* unit, world: first friction direction, with FDIR1 */
+  double bounce;
+  double bounce_speed; /* m/s */
+  double erp;          /* at the tick */
+  double cfm;          /* (m/s)/N at the tick: J v = target - cfm x force */
+  double layer;        /* m, depth that is not pushed out */
+  double max_push;     /* m/s, largest correcting velocity */
+  double motion[3];    /* m/s along friction 1, friction 2, normal */
+  double slip[2];      /* m/(N s) */
+} hapi_surface;
+
+enum {
+  HAPI_SURFACE_APPROX1_1 = 1,
+  HAPI_SURFACE_APPROX1_2 = 2,
+  HAPI_SURFACE_FDIR1 = 4,
+  HAPI_SURFACE_BOUNCE = 8,
+  HAPI_SURFACE_SOFT = 16, /* push-out is a spring's, and stays in the velocity */
+  HAPI_SURFACE_SLIP1 = 32,
+  HAPI_SURFACE_SLIP2 = 64
+};
+
+typedef struct hapi_near_geom {
+  uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
+  uint32_t generation;
+  hapi_shape shape;    /* hull: not set here, see hull_first */
+  uint32_t hull_first; /* into the message's points */
+  uint32_t open_edges; /* a triangle of a mesh: bits 0, 1, 2 for edges that may be touched, as no
+                          neighbour goes on there in the same plane or rises; bit 3: a triangle */
+  hap_pose pose;       /* in the body's frame; world for the static world */
+} hapi_near_geom;
+
+typedef struct hapi_near_pair {
+  uint64_t key; /* the same as long as the pair is */
+  uint32_t geom_a;
+  uint32_t geom_b;
+  hapi_surface surface;
+} hapi_near_pair;
+
+/* A body of the message, for poses that the loop has not yet told. */
+typedef struct hapi_near_body {
+  uint32_t slot;
+  uint32_t generation;
+  hap_pose pose;
+  hap_twist twist;
+} hapi_near_body;
+
+typedef struct hapi_near {
+  uint64_t model_number; /* of the model that it belongs to */
+  uint32_t body_count;
+  uint32_t geom_count;
+  uint32_t pair_count;
+  uint32_t point_count;
+  uint32_t bodies_offset;
+  uint32_t geoms_offset;
+  uint32_t pairs_offset;
+  uint32_t points_offset;
+} hapi_near;
+
+static inline hapi_near_body *hapi_near_bodies(hapi_near *n)
+{
+  return (hapi_near_body *)(void *)((char *)n + n->bodies_offset);
+}
+
+static inline hapi_near_geom *hapi_near_geoms(hapi_near *n)
+{
+  return (hapi_near_geom *)(void *)((char *)n + n->geoms_offset);
+}
+
+static inline hapi_near_pair *hapi_near_pairs(hapi_near *n)
+{
+  return (hapi_near_pair *)(void *)((char *)n + n->pairs_offset);
+}
+
+static inline double *hapi_near_points(hapi_near *n)
+{
+  return (double *)(void *)((char *)n + n->points_offset);
+}
+
+/* ---- haptic -> contact: where the bodies are (model CONTACT) ---- */
+
+typedef struct hapi_poses_body {
+  uint32_t slot;
+  uint32_t generation;
+  hap_pose pose;
+  hap_twist twist;
+} hapi_poses_body;
+
+typedef struct hapi_poses {
+  uint64_t model_number; /* the local model in use */
+  uint32_t body_count;
+  uint32_t bodies_offset;
+} hapi_poses;
+
+static inline hapi_poses_body *hapi_poses_bodies(hapi_poses *p)
+{
+  return (hapi_poses_body *)(void *)((char *)p + p->bodies_offset);
+}
+
+/* ---- contact -> haptic: contacts between bodies (model CONTACT) ---- */
+
+/* A point of hapi_patch with everything in the frames of the bodies, to be placed anew at every
+ * tick. Static world: world frame. */
+typedef struct hapi_patch_contact {
+  uint64_t key; /* of the pair; contacts of a pair follow each other */
+  uint32_t body_a;
+  uint32_t generation_a;
+  uint32_t body_b; /* HAPI_SLOT_NONE: static world */
+  uint32_t generation_b;
+  uint32_t surface; /* index into the message's surfaces */
+  hapi_touch touch;
+  double core_a[3];
+  double core_b[3];
+  double ball_a;
+  double ball_b;
+  double rim_a;
+  double rim_b;
+  double axis_a[3]; /* of the rims */
+  double axis_b[3];
+  double edge_a[3]; /* EDGES */
+  double edge_b[3];
+  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
+  hapi_shape shape; /* BALL: what the ball touches */
+  hap_pose shape_pose;
+} hapi_patch_contact;
+
+typedef struct hapi_patches {
+  uint64_t number;       /* 1, 2, 3 ... */
+  uint64_t model_number; /* of the hapi_near that it was made from */
+  int64_t valid_from_ns; /* the loop uses the message from this time on */
+  uint32_t contact_count;
+  uint32_t surface_count;
+  uint32_t contacts_offset;
+  uint32_t surfaces_offset;
+} hapi_patches;
+
+static inline hapi_patch_contact *hapi_patches_contacts(hapi_patches *p)
+{
+  return (hapi_patch_contact *)(void *)((char *)p + p->contacts_offset);
+}
+
+static inline hapi_surface *hapi_patches_surfaces(hapi_patches *p)
+{
+  return (hapi_surface *)(void *)((char *)p + p->surfaces_offset);
+}
+
 /* ---- haptic -> physics: the state of the loop after a tick ---- */
 
 typedef struct hapi_state_pointer {
@@ -98,10 +283,15 @@ typedef struct hapi_state_body {
   uint32_t reserved;
   hap_pose pose;
   hap_twist twist;
-  double impulse[3];         /* N s, running total of the pointers' force since the slot's
-                                generation began */
+  double impulse[3];         /* N s, running total since the slot's generation began of what the
+                                pointers, and in model CONTACT the bodies of the range, gave to the
+                                body while the loop did not own it */
   double angular_impulse[3]; /* N m s, the same about the centre of mass */
   double residual[6];        /* how much of hapi_model_body.residual is in the twist */
+  double gain[6];      /* N s, N m s, running total of what pointers gave while the loop owned it */
+  hap_pose owned_pose; /* where the loop left it when it owned it for the last time ... */
+  hap_twist owned_twist;
+  int64_t owned_until_ns; /* ... then; 0: it never did. The tick's own time while it owns it */
 } hapi_state_body;
 
 typedef struct hapi_state_contact {
@@ -111,8 +301,11 @@ typedef struct hapi_state_contact {
 } hapi_state_contact;
 
 typedef struct hapi_state {
-  uint64_t model_number;  /* the local model in use; 0: none yet */
-  double hand_impulse[3]; /* N s, given to bodies that can move by all pointers since start */
+  uint64_t model_number;   /* the local model in use; 0: none yet */
+  int64_t now_ns;          /* time for which the poses hold */
+  double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
+  double owned_impulse[3]; /* N s, what bodies that the loop owns got of it, and from bodies that it
+                              does not own */
   hap_model model;
   uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */
   uint32_t contact_count;

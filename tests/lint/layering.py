@@ -14,7 +14,7 @@ import lint
 LAYERS = {
     "include/hapode": [],
     "lib/base": [],
-    "lib/sync": ["lib/base"],
+    "lib/sync": ["lib/base", "lib/proximity"],
     "lib/proximity": ["lib/base"],
     "lib/device": ["lib/base"],
     "lib/haptic/rt": ["lib/base", "lib/sync", "lib/proximity"],

@@ -20,6 +20,83 @@ static void enter(hapi_local_body *body, const hapi_model_body *in, double age_s
   memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
 }
 
+/* What the loop gave to the body since the state of the message: the totals have gone on. */
+static void add_new_impulse(hapi_local_body *body, const hapi_model_body *in)
+{
+  double totals[6];
+  double turned[3];
+  double angular[3];
+  for (int i = 0; i < 3; ++i) {
+    totals[i] = body->impulse[i] - in->impulse_taken[i] + body->gain[i] - in->gain_taken[i];
+    totals[3 + i] = body->angular_impulse[i] - in->impulse_taken[3 + i] + body->gain[3 + i] -
+                    in->gain_taken[3 + i];
+  }
+  if ((in->flags & HAPI_BODY_MEASURED) != 0) {
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 6; ++k) {
+        body->twist.linear[i] += in->response[i][k] * totals[k];
+        body->twist.angular[i] += in->response[3 + i][k] * totals[k];
+      }
+    }
+  } else if ((in->flags & HAPI_BODY_DRIVEN) == 0 && in->mass > 0.0) {
+    hapi_v3_madd(body->twist.linear, 1.0 / in->mass, totals, body->twist.linear);
+    hapi_quat_unrotate(body->pose.quat_wxyz, totals + 3, turned);
+    hapi_m3_apply(in->inverse_inertia, turned, angular);
+    hapi_quat_rotate(body->pose.quat_wxyz, angular, angular);
+    hapi_v3_add(body->twist.angular, angular, body->twist.angular);
+  }
+}
+
+/* The loop lets go of the body: physics goes on from here. */
+static void disown(hapi_tick *tick, hapi_local_body *body)
+{
+  if ((body->flags & HAPI_BODY_OWNED) != 0) {
+    body->owned_pose = body->pose;
+    body->owned_twist = body->twist;
+    body->owned_until_ns = tick->now_ns;
+    body->flags &= ~(uint32_t)HAPI_BODY_OWNED;
+  }
+}
+
+/* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is
+ * known of it. One that has been let go keeps its pose until physics has had it. */
+static void adopt_contact_body(hapi_tick *tick, hapi_local_body *body, const hapi_model_body *in,
+                               double age_s)
+{
+  bool same = body->generation == in->generation && body->epoch == in->epoch;
+  bool owned = same && (body->flags & HAPI_BODY_OWNED) != 0;
+  bool owns = (in->flags & HAPI_BODY_OWNED) != 0;
+  uint32_t flags = in->flags;
+  if (owned && !owns) {
+    disown(tick, body);
+  } else if (!owned) {
+    enter(body, in, age_s);
+    add_new_impulse(body, in);
+    body->entered_model = tick->adopting;
+  }
+  if (owned && owns && (body->pushed || (body->flags & HAPI_BODY_RESTING) == 0)) {
+    /* Physics puts a body to sleep that moved too little, unless it was pushed meanwhile. */
+    if (body->pushed || (flags & HAPI_BODY_RESTING) == 0) {
+      flags &= ~(uint32_t)HAPI_BODY_RESTING;
+    } else {
+      memset(&body->twist, 0, sizeof body->twist);
+    }
+  }
+  body->flags = flags;
+  body->epoch = in->epoch;
+  body->given = *in;
+  memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
+  memset(body->residual, 0, sizeof body->residual);
+}
+
+/* Whether the loop moves the body by an accelerance: physics then says what that missed (eq. 14). In
+ * model CONTACT all that it meets and does not own; what was not measured has its mass alone. */
+static bool is_linear(hap_model model, uint32_t flags)
+{
+  return model == HAP_MODEL_ACCELERANCE ||
+         (model == HAP_MODEL_CONTACT && (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0);
+}
+
 static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_model_body *in,
                        double age_s)
 {
@@ -34,14 +111,24 @@ static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_mode
   }
   body->to = in->pose;
   body->live = true;
+  bool was_linear = is_linear(tick->model, body->flags);
+  bool stays_linear = is_linear(model->model, in->flags);
+  if (model->model == HAP_MODEL_CONTACT && !stays_linear) {
+    adopt_contact_body(tick, body, in, age_s);
+    body->pushed = false;
+    return;
+  }
+  disown(tick, body);
+  body->given = *in;
   /* What a pointer pushed keeps the loop's state: a new model replaces what is known of the body,
    * never where the body is. */
-  bool keeps = !is_new && body->epoch == in->epoch && model->model == HAP_MODEL_ACCELERANCE &&
-               tick->model == HAP_MODEL_ACCELERANCE && (in->flags & HAPI_BODY_DRIVEN) == 0 &&
+  bool keeps = !is_new && body->epoch == in->epoch && stays_linear && was_linear &&
+               (in->flags & HAPI_BODY_DRIVEN) == 0 &&
                ((in->flags & HAPI_BODY_FOLLOWS) == 0 || body->pushed);
   body->epoch = in->epoch;
   if (!keeps) {
     enter(body, in, age_s);
+    add_new_impulse(body, in);
   }
   bool awake = keeps && (body->flags & HAPI_BODY_RESTING) == 0;
   body->flags = awake ? in->flags & ~(uint32_t)HAPI_BODY_RESTING : in->flags;
@@ -73,6 +160,9 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->point_body, in->point_body, sizeof out->point_body);
   memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
   memcpy(out->a, in->a, sizeof out->a);
+  out->has_shape = in->has_shape != 0;
+  out->shape = in->shape;
+  out->shape_pose = in->shape_pose;
   if (tick->ramp_generations[in->slot] == in->generation) {
     out->seen = true;
     out->ramp = tick->ramps[in->slot];
@@ -93,13 +183,30 @@ static void adopt_contacts(hapi_tick *tick, hapi_model *model)
   }
 }
 
+/* Bodies that are not in the new model. */
+static void leave(hapi_tick *tick, hapi_model *model)
+{
+  const hapi_model_body *in = hapi_model_bodies(model);
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    tick->bodies[tick->live[i]].live = false;
+  }
+  for (uint32_t i = 0; i < model->body_count; ++i) {
+    tick->bodies[in[i].slot].live = true;
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if (!body->live) {
+      disown(tick, body);
+    }
+  }
+}
+
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
 {
   double age_s = 1e-9 * (double)(now_ns - model->state_ns);
   age_s = age_s > 0.1 ? 0.1 : age_s < -0.1 ? -0.1 : age_s;
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    tick->bodies[tick->live[i]].live = false;
-  }
+  tick->adopting = model->number;
+  leave(tick, model);
   const hapi_model_body *in = hapi_model_bodies(model);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     adopt_body(tick, model, &in[i], age_s);

@@ -18,6 +18,10 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
     hapi_v3_copy(in->impulse, bodies[i].impulse);
     hapi_v3_copy(in->angular_impulse, bodies[i].angular_impulse);
     memcpy(bodies[i].residual, in->residual_taken, sizeof bodies[i].residual);
+    memcpy(bodies[i].gain, in->gain, sizeof bodies[i].gain);
+    bodies[i].owned_pose = in->owned_pose;
+    bodies[i].owned_twist = in->owned_twist;
+    bodies[i].owned_until_ns = in->owned_until_ns;
   }
   out->body_high = tick->body_high;
 }
@@ -37,6 +41,8 @@ static void report_contacts(const hapi_tick *tick, hapi_state *out)
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
 {
   hapi_v3_copy(tick->hand_impulse, out->hand_impulse);
+  hapi_v3_copy(tick->owned_impulse, out->owned_impulse);
+  out->now_ns = tick->now_ns;
   out->model_number = tick->model_number;
   out->model = tick->model;
   report_bodies(tick, out);
@@ -51,4 +57,18 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
   }
+}
+
+void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
+{
+  hapi_poses_body *bodies = hapi_poses_bodies(out);
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    const hapi_local_body *in = &tick->bodies[tick->live[i]];
+    bodies[i].slot = tick->live[i];
+    bodies[i].generation = in->generation;
+    bodies[i].pose = in->pose;
+    bodies[i].twist = in->twist;
+  }
+  out->body_count = tick->live_count;
+  out->model_number = tick->model_number;
 }

@@ -6,6 +6,38 @@
 
 #include "base/vec.h"
 
+static void keep_arrays(const hapi_local_world *from, hapi_local_world *to)
+{
+  to->memory = from->memory;
+  to->old_memory = from->old_memory;
+  to->buckets = from->buckets;
+  to->bucket_count = from->bucket_count;
+  to->sources = from->sources;
+  to->row_capacity = from->row_capacity;
+  to->plane_mode = from->plane_mode;
+  to->solver = from->solver;
+  to->solver.row_count = to->solver.body_count = 0;
+}
+
+/* Touches every page once, so that no tick is the first to do so. */
+static void clear_arrays(hapi_tick *tick)
+{
+  const hapi_capacity *c = &tick->capacity;
+  const hapi_local_world *w = &tick->world;
+  memset(tick->bodies, 0, c->bodies * sizeof *tick->bodies);
+  memset(tick->live, 0, c->bodies * sizeof *tick->live);
+  memset(tick->contacts, 0, c->contacts * sizeof *tick->contacts);
+  memset(tick->ramps, 0, c->contacts * sizeof *tick->ramps);
+  memset(tick->ramp_generations, 0, c->contacts * sizeof *tick->ramp_generations);
+  memset(w->memory, 0, c->contacts * sizeof *w->memory);
+  memset(w->old_memory, 0, c->contacts * sizeof *w->old_memory);
+  memset(w->buckets, 0, w->bucket_count * sizeof *w->buckets);
+  memset(w->sources, 0, w->row_capacity * sizeof *w->sources);
+  memset(w->solver.rows, 0, w->row_capacity * sizeof *w->solver.rows);
+  memset(w->solver.v, 0, (c->bodies + 1) * sizeof *w->solver.v);
+  memset(w->solver.work, 0, w->solver.work_count * sizeof *w->solver.work);
+}
+
 void hapi_tick_reset(hapi_tick *tick)
 {
   hapi_tick fresh;
@@ -19,23 +51,23 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.ramps = tick->ramps;
   fresh.ramp_generations = tick->ramp_generations;
   fresh.pointers = tick->pointers;
+  keep_arrays(&tick->world, &fresh.world);
   fresh.hash = 0xcbf29ce484222325u;
   *tick = fresh;
-  /* Also touches every page once, so that no tick is the first to do so. */
-  memset(tick->bodies, 0, tick->capacity.bodies * sizeof *tick->bodies);
-  memset(tick->live, 0, tick->capacity.bodies * sizeof *tick->live);
-  memset(tick->contacts, 0, tick->capacity.contacts * sizeof *tick->contacts);
-  memset(tick->ramps, 0, tick->capacity.contacts * sizeof *tick->ramps);
-  memset(tick->ramp_generations, 0, tick->capacity.contacts * sizeof *tick->ramp_generations);
+  clear_arrays(tick);
 }
 
 void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
 {
   tick->now_ns = now_ns;
   hapi_coupling_read(tick);
-  hapi_local_place(tick);
-  hapi_render(tick);
-  hapi_local_step(tick);
+  if (tick->model == HAP_MODEL_CONTACT) {
+    hapi_local_world_step(tick);
+  } else {
+    hapi_local_place(tick);
+    hapi_render(tick);
+    hapi_local_step(tick);
+  }
   hapi_guard(tick);
   if (tick->hashing) {
     hapi_trace_hash(tick);

@@ -12,6 +12,15 @@
  *   render    pointer and planes -> forces, eq. 7                  (step b)
  *   local_dynamics  forces -> motion of the neighbours, eq. 8-11   (step c)
  *   guard     sum per pointer, checks, limits -> device wrench
+ *
+ * Model CONTACT has one solve in the place of steps b and c:
+ *
+ *   adopt_patches  new contacts between bodies, with the impulses of the old ones
+ *   local_world    free velocities, poses; calls the next three
+ *   pointer_rows   pointer contacts as rows
+ *   contact_rows   contacts between bodies as rows
+ *   contact_solver, direct_solver  impulses of all rows
+ *
  *   report    state for physics; trace row; hash
  */
 
@@ -22,6 +31,7 @@
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
 
+#include "haptic/rt/contact_solver.h"
 #include "sync/messages.h"
 
 /* A contact that is already deep when it arrives gets its full force after this time. */
@@ -70,6 +80,19 @@ typedef struct hapi_local_body {
   hap_pose to;
   double impulse[3];
   double angular_impulse[3];
+
+  /* Model CONTACT. */
+  hapi_model_body given;  /* of the newest model */
+  uint64_t entered_model; /* with which the loop came to own the body */
+  bool waiting;           /* for its first contacts: goes on with its twist until they are known */
+  uint32_t row;           /* place in the solver's velocities */
+  double rotation[9];     /* of pose */
+  double inverse_inertia[9]; /* world */
+  double start_twist[6];     /* before this tick */
+  double gain[6];
+  hap_pose owned_pose;
+  hap_twist owned_twist;
+  int64_t owned_until_ns;
 } hapi_local_body;
 
 typedef struct hapi_local_contact {
@@ -84,7 +107,50 @@ typedef struct hapi_local_contact {
   double a[6][3];
   double ramp;     /* 0..1, share of the force */
   double force[3]; /* on the body */
+
+  /* Model CONTACT. */
+  bool has_shape; /* asked at every tick */
+  hapi_shape shape;
+  hap_pose shape_pose;
+  uint32_t row;         /* in this tick, HAPI_NO_ROW */
+  double normal_now[3]; /* world, out of the body */
+  double point_now[3];
 } hapi_local_contact;
+
+#define HAPI_NO_ROW 0xffffffffu
+
+/* Where a row of the solver comes from. */
+typedef struct hapi_row_source {
+  uint32_t contact; /* of the patches, or of the pointers */
+  uint32_t body_a;  /* slot; HAPI_SLOT_NONE: none */
+  uint32_t body_b;
+  uint8_t part; /* 0 normal, 1 and 2 friction */
+  bool pointer;
+  bool pushes_out; /* its target lifts a body out of another one: not to stay in the velocity */
+} hapi_row_source;
+
+/* What is kept of a contact from tick to tick, and from one set of patches to the next. */
+typedef struct hapi_contact_memory {
+  uint64_t key;
+  double core_a[3];
+  double impulse[3]; /* N s: normal, friction 1 and 2 */
+} hapi_contact_memory;
+
+/* The bodies' contacts and the solver's arrays, model CONTACT. */
+typedef struct hapi_local_world {
+  hapi_patches *patches;       /* of the contact thread, NULL: none yet */
+  hapi_contact_memory *memory; /* of its contacts; capacity.contacts */
+  hapi_contact_memory *old_memory;
+  uint32_t memory_count;
+  uint32_t *buckets;        /* of the matching; HAPI_MEMORY_BUCKETS */
+  uint32_t bucket_count;    /* power of 2 */
+  hapi_row_source *sources; /* of the rows; 4 x capacity.contacts */
+  hapi_solver solver;
+  uint32_t row_capacity;
+  uint32_t active; /* contacts between bodies that push in this tick */
+  uint64_t late_passes;
+  hap_plane plane_mode;
+} hapi_local_world;
 
 typedef struct hapi_tick {
   hapi_capacity capacity;
@@ -100,10 +166,12 @@ typedef struct hapi_tick {
   uint32_t live_count;
   uint32_t contact_count;
   uint32_t body_high;
+  hapi_local_world world;
 
   uint64_t tick;
   int64_t now_ns;
   uint64_t model_number;
+  uint64_t adopting; /* scratch of adopt */
   hap_model model;
   hap_impulse_pose impulse_pose;
   double blend_s;
@@ -121,6 +189,9 @@ typedef struct hapi_tick {
   uint64_t saturated_ticks;
   double hand_impulse[3]; /* N s on dynamic bodies, all pointers, since start */
   double hand_impulse_abs;
+  double owned_impulse[3]; /* see hapi_state */
+  double residual_max;     /* m/s, of the solver since start */
+  uint64_t sweeps;
   uint64_t hash;
 } hapi_tick;
 
@@ -129,6 +200,9 @@ void hapi_tick_reset(hapi_tick *tick);
 
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns);
 
+/* The set stays in use, and must stay as it is, until the next call. */
+void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches);
+
 /* One tick at now_ns from the pointers' device_pose and device_twist to their device_wrench. */
 void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
 
@@ -136,6 +210,7 @@ void hapi_tick_fault(hapi_tick *tick, hap_fault fault); /* latches the first one
 void hapi_tick_reset_fault(hapi_tick *tick);
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
+void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
 /* ---- the steps of hapi_tick_run, one file each ---- */
@@ -144,6 +219,11 @@ void hapi_coupling_read(hapi_tick *tick);             /* device -> world */
 void hapi_local_place(hapi_tick *tick);               /* models SINGLE and IMPULSE: poses now */
 void hapi_render(hapi_tick *tick);                    /* eq. 7 */
 void hapi_local_step(hapi_tick *tick);                /* eq. 8-11, 14 */
+void hapi_local_world_step(hapi_tick *tick);          /* model CONTACT: b and c in one */
+void hapi_pointer_rows(hapi_tick *tick);              /* pointer contacts -> rows */
+void hapi_pointer_forces(hapi_tick *tick);            /* rows -> wrenches */
+void hapi_contact_rows(hapi_tick *tick);              /* contacts between bodies -> rows */
+void hapi_contact_keep(hapi_tick *tick);              /* impulses for the next tick */
 void hapi_guard(hapi_tick *tick);                     /* finite, limits, world -> device */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
 void hapi_trace_hash(hapi_tick *tick);

@@ -1,0 +1,225 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/vec.h"
+#include "contact/contact_internal.h"
+
+/* One pass: pairs and poses in, contacts out, each with what the tick needs to place it anew. */
+
+#define MARGIN_FLOOR 0.002 /* m */
+#define MARGIN_SPEED 1.5   /* of the way that the bodies' speed makes until the next pass */
+#define MARGIN_GRAVITY 9.81
+#define AGE_TICKS 2.0 /* from the poses of a pass to the use of its contacts */
+
+/* A geom of a pair where it is now. */
+typedef struct placed_geom {
+  const hapi_near_geom *in;
+  const hapi_pass_body *body; /* NULL: static world */
+  hapi_shape shape;
+  hap_pose pose;
+} placed_geom;
+
+static void take_poses(hapi_contact *contact)
+{
+  hapi_poses *poses = hapi_exchange_poses_take(contact->config.exchange);
+  contact->poses = poses != NULL ? poses : contact->poses;
+}
+
+bool hapi_contact_has_news(hapi_contact *contact)
+{
+  take_poses(contact);
+  return contact->poses != NULL && contact->poses->model_number != 0 &&
+         (contact->near == NULL || contact->poses->model_number > contact->near->model_number);
+}
+
+/* Pairs that the loop is not ready for stay in the mailbox: those it goes on with would lose their
+ * contacts. */
+static void take_near(hapi_contact *contact)
+{
+  if (hapi_contact_has_news(contact)) {
+    hapi_near *near = hapi_exchange_near_take(contact->config.exchange);
+    contact->near = near != NULL ? near : contact->near;
+  }
+}
+
+/* The loop's poses; for a body that it does not have yet, physics'. */
+static void place_bodies(hapi_contact *contact)
+{
+  const hapi_near_body *near = hapi_near_bodies(contact->near);
+  for (uint32_t i = 0; i < contact->config.capacity.bodies; ++i) {
+    contact->bodies[i].known = false;
+  }
+  for (uint32_t i = 0; i < contact->near->body_count; ++i) {
+    contact->bodies[near[i].slot] =
+        (hapi_pass_body){near[i].generation, true, near[i].pose, near[i].twist};
+  }
+  const hapi_poses_body *loop = hapi_poses_bodies(contact->poses);
+  for (uint32_t i = 0; i < contact->poses->body_count; ++i) {
+    hapi_pass_body *body = &contact->bodies[loop[i].slot];
+    if (body->known && body->generation == loop[i].generation) {
+      body->pose = loop[i].pose;
+      body->twist = loop[i].twist;
+    }
+  }
+}
+
+static bool place_geom(const hapi_contact *contact, uint32_t index, placed_geom *out)
+{
+  const hapi_near_geom *in = &hapi_near_geoms(contact->near)[index];
+  out->in = in;
+  out->shape = in->shape;
+  out->pose = in->pose;
+  out->body = NULL;
+  if (in->shape.kind == HAPI_SHAPE_HULL) {
+    out->shape.hull = hapi_near_points(contact->near) + (size_t)3 * in->hull_first;
+  }
+  if (in->body == HAPI_SLOT_NONE) {
+    return true;
+  }
+  const hapi_pass_body *body = &contact->bodies[in->body];
+  out->body = body;
+  hapi_pose_point(body->pose.position, body->pose.quat_wxyz, in->pose.position, out->pose.position);
+  hapi_quat_multiply(body->pose.quat_wxyz, in->pose.quat_wxyz, out->pose.quat_wxyz);
+  return body->known && body->generation == in->generation;
+}
+
+static double radius_of(const placed_geom *geom)
+{
+  const hapi_shape *s = &geom->shape;
+  double offset = geom->body != NULL ? hapi_v3_norm(geom->in->pose.position) : 0.0;
+  return offset + hapi_v3_norm(s->half) + s->radius;
+}
+
+/* Along the normal: how far the surfaces may come nearer until the contacts are found anew. */
+static double margin_of(const hapi_contact *contact, const placed_geom *a, const placed_geom *b)
+{
+  const placed_geom *geoms[2] = {a, b};
+  double seconds = 1.0 / contact->config.contact_hz + AGE_TICKS / contact->config.haptic_hz;
+  double apart[3] = {0.0, 0.0, 0.0};
+  double speed = 0.0;
+  for (int i = 0; i < 2; ++i) {
+    const hapi_pass_body *body = geoms[i]->body;
+    if (body != NULL) {
+      hapi_v3_madd(apart, i == 0 ? 1.0 : -1.0, body->twist.linear, apart);
+      speed += hapi_v3_norm(body->twist.angular) * radius_of(geoms[i]);
+    }
+  }
+  speed += hapi_v3_norm(apart);
+  return MARGIN_FLOOR + MARGIN_SPEED * speed * seconds + 0.5 * MARGIN_GRAVITY * seconds * seconds;
+}
+
+static void point_to_body(const placed_geom *geom, const double world[3], double out[3])
+{
+  if (geom->body == NULL) {
+    hapi_v3_copy(world, out);
+    return;
+  }
+  hapi_pose_unpoint(geom->body->pose.position, geom->body->pose.quat_wxyz, world, out);
+}
+
+static void vector_to_body(const placed_geom *geom, const double world[3], double out[3])
+{
+  if (geom->body == NULL) {
+    hapi_v3_copy(world, out);
+    return;
+  }
+  hapi_quat_unrotate(geom->body->pose.quat_wxyz, world, out);
+}
+
+static void fill_axis(const placed_geom *geom, double rim, double out[3])
+{
+  const double z[3] = {0.0, 0.0, 1.0};
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
+  if (rim > 0.0) {
+    double world[3];
+    hapi_quat_rotate(geom->pose.quat_wxyz, z, world);
+    vector_to_body(geom, world, out);
+  }
+}
+
+static void fill_contact(const placed_geom *a, const placed_geom *b, const hapi_patch_point *in,
+                         hapi_patch_contact *out)
+{
+  const placed_geom *face = in->touch == HAPI_TOUCH_FACE_A ? a : b;
+  const placed_geom *target = in->touch == HAPI_TOUCH_BALL_A ? b : a;
+  out->body_a = a->in->body;
+  out->generation_a = a->in->generation;
+  out->body_b = b->in->body;
+  out->generation_b = b->in->generation;
+  out->touch = in->touch;
+  point_to_body(a, in->core_a, out->core_a);
+  point_to_body(b, in->core_b, out->core_b);
+  out->ball_a = in->ball_a;
+  out->ball_b = in->ball_b;
+  out->rim_a = in->rim_a;
+  out->rim_b = in->rim_b;
+  fill_axis(a, in->rim_a, out->axis_a);
+  fill_axis(b, in->rim_b, out->axis_b);
+  vector_to_body(a, in->edge_a, out->edge_a);
+  vector_to_body(b, in->edge_b, out->edge_b);
+  hapi_v3_copy(in->normal, out->normal);
+  if (in->touch == HAPI_TOUCH_FACE_A || in->touch == HAPI_TOUCH_FACE_B) {
+    vector_to_body(face, in->normal, out->normal);
+  }
+  out->shape = target->shape;
+  out->shape.hull = NULL; /* of another message; a ball against a hull is no BALL */
+  out->shape.hull_count = 0;
+  out->shape_pose = target->in->pose;
+}
+
+/* A triangle's neighbours in the mesh hide its edges. */
+static bool allowed(const placed_geom *a, const placed_geom *b, const hapi_patch_point *point)
+{
+  double into[3];
+  hapi_v3_scale(-1.0, point->normal, into);
+  return (a->in->open_edges == 0 || hapi_mesh_allows(a->in, a->shape.hull, into)) &&
+         (b->in->open_edges == 0 || hapi_mesh_allows(b->in, b->shape.hull, point->normal));
+}
+
+static void pass_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_patches *out)
+{
+  placed_geom a;
+  placed_geom b;
+  hapi_patch patch;
+  if (!place_geom(contact, pair->geom_a, &a) || !place_geom(contact, pair->geom_b, &b) ||
+      !hapi_patch_find(&a.shape, &a.pose, &b.shape, &b.pose, margin_of(contact, &a, &b), &patch)) {
+    return;
+  }
+  uint32_t first = out->contact_count;
+  for (int i = 0; i < patch.count && out->contact_count < contact->config.capacity.contacts; ++i) {
+    if (allowed(&a, &b, &patch.points[i])) {
+      hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
+      fill_contact(&a, &b, &patch.points[i], c);
+      c->key = pair->key;
+      c->surface = out->surface_count;
+    }
+  }
+  if (out->contact_count > first) {
+    hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+  }
+}
+
+void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
+{
+  int64_t begin_ns = hapi_clock_now();
+  take_near(contact);
+  if (contact->near == NULL || contact->poses == NULL) {
+    return;
+  }
+  place_bodies(contact);
+  hapi_patches *out = hapi_exchange_patches_back(contact->config.exchange);
+  const hapi_near_pair *pairs = hapi_near_pairs(contact->near);
+  out->contact_count = 0;
+  out->surface_count = 0;
+  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+    pass_pair(contact, &pairs[i], out);
+  }
+  out->number = ++contact->number;
+  out->model_number = contact->near->model_number;
+  out->valid_from_ns = valid_from_ns;
+  hapi_exchange_patches_publish(contact->config.exchange);
+  hapi_histogram_add(&contact->pass_ns, hapi_clock_now() - begin_ns);
+}

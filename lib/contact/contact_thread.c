@@ -1,0 +1,86 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "contact/contact_internal.h"
+
+/* Life of the contact thread, and its pace. */
+
+hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact **out)
+{
+  *out = NULL;
+  hapi_contact *contact = hapi_alloc(sizeof *contact);
+  if (contact == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  contact->config = *config;
+  contact->bodies = hapi_alloc_array(config->capacity.bodies, sizeof *contact->bodies);
+  if (contact->bodies == NULL) {
+    hapi_contact_destroy(contact);
+    return HAP_ERROR_MEMORY;
+  }
+  *out = contact;
+  return HAP_OK;
+}
+
+void hapi_contact_destroy(hapi_contact *contact)
+{
+  if (contact == NULL) {
+    return;
+  }
+  hapi_contact_stop_thread(contact);
+  hapi_free(contact->bodies);
+  hapi_free(contact);
+}
+
+void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
+{
+  contact->near = NULL;
+  contact->poses = NULL;
+  contact->number = 0;
+  contact->start_ns = start_ns;
+  hapi_histogram_reset(&contact->pass_ns);
+}
+
+/* Between two passes the thread looks once a millisecond whether there is a body that waits for its
+ * first contacts. */
+static void *contact_main(void *arg)
+{
+  const int64_t look_ns = 1000000;
+  hapi_contact *contact = arg;
+  int64_t period = (int64_t)llround(1e9 / contact->config.contact_hz);
+  int64_t pause = period < look_ns ? period : look_ns;
+  int64_t due = contact->start_ns;
+  while (atomic_load_explicit(&contact->stop, memory_order_acquire) == 0) {
+    int64_t now = hapi_clock_now();
+    if (now >= due || hapi_contact_has_news(contact)) {
+      hapi_contact_pass(contact, now);
+      due =
+          now >= due ? due + ((now - due) / period + 1) * period : due; /* late ones are left out */
+    }
+    hapi_clock_sleep_until(now + pause < due ? now + pause : due);
+  }
+  return NULL;
+}
+
+hap_status hapi_contact_start_thread(hapi_contact *contact)
+{
+  atomic_store(&contact->stop, 0);
+  return hapi_thread_start(&contact->thread, contact_main, contact, "hapode-contact",
+                           3 * contact->config.rt_priority / 4);
+}
+
+void hapi_contact_stop_thread(hapi_contact *contact)
+{
+  atomic_store(&contact->stop, 1);
+  hapi_thread_join(&contact->thread);
+}
+
+void hapi_contact_stats(const hapi_contact *contact, hap_stats *out)
+{
+  out->contact_us_mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
+  out->contact_us_max = 1e-3 * (double)hapi_histogram_max_ns(&contact->pass_ns);
+}

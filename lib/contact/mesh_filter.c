@@ -1,0 +1,38 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "contact/contact_internal.h"
+
+/* A body that slides over a mesh must not feel the seams between its triangles. A contact whose
+ * normal is the triangle's own counts always; one that leans over an edge only when no neighbour
+ * goes on behind that edge in the same plane or higher. */
+
+#define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
+#define TRIANGLE 8u
+
+bool hapi_mesh_allows(const hapi_near_geom *triangle, const double *corners, const double normal[3])
+{
+  double sides[3][3];
+  double own[3];
+  if ((triangle->open_edges & TRIANGLE) == 0) {
+    return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    hapi_v3_sub(corners + (size_t)3 * ((i + 1) % 3), corners + (size_t)3 * i, sides[i]);
+  }
+  hapi_v3_cross(sides[0], sides[1], own);
+  double area = hapi_v3_norm(own);
+  double lean = area > 0.0 ? hapi_v3_dot(own, normal) / area : 1.0;
+  if (fabs(lean) >= OWN_NORMAL_COSINE) {
+    return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    double outward[3];
+    hapi_v3_cross(sides[i], own, outward);
+    bool over = hapi_v3_dot(outward, normal) > 1e-9 * hapi_v3_norm(outward);
+    if (over && (triangle->open_edges & (1u << i)) == 0) {
+      return false;
+    }
+  }
+  return true;
+}

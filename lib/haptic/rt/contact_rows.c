@@ -1,0 +1,316 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "haptic/rt/ball_nearest.h"
+#include "haptic/rt/rows.h"
+
+/* Contacts between bodies as rows of the solver. Every contact is placed anew from the poses of its
+ * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
+ * constraint), at the step of the tick. */
+
+#define PUSH_OUT_MAX 0.2   /* m/s */
+#define PUSH_OUT_SLOP 1e-6 /* m, depth that is left alone */
+#define OPEN_FLOOR \
+  1e-3 /* m: a contact that is more open than this and than what the bodies'
+                               motion closes in a few ticks has no rows */
+#define OPEN_TICKS 3.0
+
+typedef struct placed_contact {
+  const hapi_patch_contact *in;
+  const hapi_surface *surface;
+  hapi_local_body *a;
+  hapi_local_body *b;
+  double normal[3]; /* from b to a */
+  double point[3];  /* between the surfaces */
+  double gap;
+} placed_contact;
+
+/* What of a contact belongs to one of its bodies. */
+typedef struct side {
+  const hapi_local_body *body;
+  const double *core;
+  const double *axis;
+  double ball;
+  double rim;
+} side;
+
+/* Surface point: ball and rim lie towards direction. */
+static void surface_point(const side *s, const double direction[3], double out[3])
+{
+  hapi_body_point(s->body, s->core, out);
+  hapi_v3_madd(out, s->ball, direction, out);
+  if (s->rim > 0.0) {
+    double axis[3];
+    double across[3];
+    hapi_body_vector(s->body, s->axis, axis);
+    hapi_v3_madd(direction, -hapi_v3_dot(direction, axis), axis, across);
+    double length = hapi_v3_norm(across);
+    if (length > 1e-9) {
+      hapi_v3_madd(out, s->rim / length, across, out);
+    }
+  }
+}
+
+static void place_surfaces(placed_contact *c)
+{
+  double a[3];
+  double b[3];
+  double apart[3];
+  double back[3];
+  const hapi_patch_contact *in = c->in;
+  const side side_a = {c->a, in->core_a, in->axis_a, in->ball_a, in->rim_a};
+  const side side_b = {c->b, in->core_b, in->axis_b, in->ball_b, in->rim_b};
+  hapi_v3_scale(-1.0, c->normal, back);
+  surface_point(&side_a, back, a);
+  surface_point(&side_b, c->normal, b);
+  hapi_v3_sub(a, b, apart);
+  c->gap = hapi_v3_dot(c->normal, apart);
+  hapi_v3_madd(a, -0.5 * c->gap, c->normal, c->point);
+}
+
+/* Crossing edges: the normal turns with both. Edges that have become parallel keep the last one. */
+static void edge_normal(placed_contact *c)
+{
+  double a[3];
+  double b[3];
+  double across[3];
+  hapi_body_vector(c->a, c->in->edge_a, a);
+  hapi_body_vector(c->b, c->in->edge_b, b);
+  hapi_v3_cross(a, b, across);
+  double length = hapi_v3_norm(across);
+  hapi_v3_copy(c->in->normal, c->normal);
+  if (length > 1e-3) {
+    double sign = hapi_v3_dot(across, c->in->normal) < 0.0 ? -1.0 : 1.0;
+    hapi_v3_scale(sign / length, across, c->normal);
+  }
+}
+
+/* A ball is asked anew where it touches the other shape. */
+static bool place_ball(placed_contact *c)
+{
+  bool ball_is_a = c->in->touch == HAPI_TOUCH_BALL_A;
+  const hapi_local_body *ball = ball_is_a ? c->a : c->b;
+  const hapi_local_body *other = ball_is_a ? c->b : c->a;
+  double center[3];
+  hapi_nearest nearest;
+  hapi_body_point(ball, ball_is_a ? c->in->core_a : c->in->core_b, center);
+  if (!hapi_ball_nearest(center, ball_is_a ? c->in->ball_a : c->in->ball_b, &c->in->shape,
+                         &c->in->shape_pose, other != NULL ? &other->pose : NULL, &nearest)) {
+    return false;
+  }
+  hapi_v3_scale(ball_is_a ? 1.0 : -1.0, nearest.normal, c->normal);
+  c->gap = nearest.distance;
+  hapi_v3_madd(nearest.point_a, -0.5 * nearest.distance, nearest.normal, c->point);
+  return true;
+}
+
+static bool place(placed_contact *c)
+{
+  switch (c->in->touch) {
+    case HAPI_TOUCH_FACE_A:
+      hapi_body_vector(c->a, c->in->normal, c->normal);
+      break;
+    case HAPI_TOUCH_FACE_B:
+      hapi_body_vector(c->b, c->in->normal, c->normal);
+      break;
+    case HAPI_TOUCH_EDGES:
+      edge_normal(c);
+      break;
+    case HAPI_TOUCH_BALL_A:
+    case HAPI_TOUCH_BALL_B:
+      return place_ball(c);
+  }
+  place_surfaces(c);
+  return true;
+}
+
+/* Two directions across the normal, as ODE takes them: its friction pyramid stands on them. */
+static void friction_directions(const hapi_surface *surface, const double n[3], double t1[3],
+                                double t2[3])
+{
+  if ((surface->flags & HAPI_SURFACE_FDIR1) != 0) {
+    hapi_v3_madd(surface->direction, -hapi_v3_dot(surface->direction, n), n, t1);
+    double length = hapi_v3_norm(t1);
+    if (length > 1e-6) {
+      hapi_v3_scale(1.0 / length, t1, t1);
+      hapi_v3_cross(n, t1, t2);
+      return;
+    }
+  }
+  if (fabs(n[2]) > 0.70710678118654752440) { /* dPlaneSpace: t1 in the y-z plane ... */
+    double k = 1.0 / sqrt(n[1] * n[1] + n[2] * n[2]);
+    hapi_v3_set(t1, 0.0, -n[2] * k, n[1] * k);
+  } else { /* ... or in the x-y plane */
+    double k = 1.0 / sqrt(n[0] * n[0] + n[1] * n[1]);
+    hapi_v3_set(t1, -n[1] * k, n[0] * k, 0.0);
+  }
+  hapi_v3_cross(n, t1, t2);
+}
+
+static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t index, int part,
+                          const double direction[3])
+{
+  hapi_local_world *world = &tick->world;
+  uint32_t at = world->solver.row_count++;
+  hapi_row *row = &world->solver.rows[at];
+  hapi_row_source *source = &world->sources[at];
+  hapi_row_column(c->a, c->point, direction, 1.0, row->ja, row->ba);
+  hapi_row_column(c->b, c->point, direction, -1.0, row->jb, row->bb);
+  row->a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
+  row->b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
+  row->mu = 0.0;
+  row->normal = -1;
+  row->impulse = world->memory[index].impulse[part];
+  source->contact = index;
+  source->body_a = c->in->body_a;
+  source->body_b = c->in->body_b;
+  source->part = (uint8_t)part;
+  source->pointer = false;
+  source->pushes_out = false;
+  return row;
+}
+
+/* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
+ * deeper than the surface layer. Coming in faster than the threshold: back with its share. */
+static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
+{
+  const hapi_surface *s = c->surface;
+  double speed = hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
+  double deep = -c->gap - s->layer - PUSH_OUT_SLOP;
+  bool soft = (s->flags & HAPI_SURFACE_SOFT) != 0;
+  row->lo = 0.0;
+  row->hi = HUGE_VAL;
+  row->softness = s->cfm / tick->period;
+  row->target = c->gap > 0.0 ? -c->gap / tick->period : s->motion[2];
+  if (deep > 0.0) {
+    double push = fmin(s->erp * deep / tick->period, s->max_push);
+    push = soft ? push : fmin(push, PUSH_OUT_MAX);
+    row->target += push;
+    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = !soft;
+  }
+  bool hits = c->gap + tick->period * speed < 0.0;
+  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
+    row->target = fmax(row->target, -s->bounce * speed + s->motion[2]);
+    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
+  }
+}
+
+static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, int part,
+                         int32_t normal)
+{
+  double mu = part == 1 ? s->mu : s->mu2;
+  bool share = (s->flags & (part == 1 ? HAPI_SURFACE_APPROX1_1 : HAPI_SURFACE_APPROX1_2)) != 0;
+  bool slips = (s->flags & (part == 1 ? HAPI_SURFACE_SLIP1 : HAPI_SURFACE_SLIP2)) != 0;
+  row->target = s->motion[part - 1];
+  row->softness = (slips ? s->slip[part - 1] : s->cfm) / tick->period;
+  row->normal = share ? normal : -1;
+  row->mu = share ? mu : 0.0;
+  row->hi = share ? 0.0 : mu * tick->period; /* without Approx1 mu is a force */
+  row->lo = -row->hi;
+}
+
+static void add_contact(hapi_tick *tick, const placed_contact *c, uint32_t index)
+{
+  hapi_solver *solver = &tick->world.solver;
+  int32_t normal = (int32_t)solver->row_count;
+  double t1[3];
+  double t2[3];
+  friction_directions(c->surface, c->normal, t1, t2);
+  set_normal(tick, c, next_row(tick, c, index, 0, c->normal));
+  if (c->surface->mu > 0.0) {
+    set_friction(tick, c->surface, next_row(tick, c, index, 1, t1), 1, normal);
+  }
+  if (c->surface->mu2 > 0.0) {
+    set_friction(tick, c->surface, next_row(tick, c, index, 2, t2), 2, normal);
+  }
+}
+
+/* A body that the contact was made for, and that is where the contact thread thought it was. */
+static bool find_body(hapi_tick *tick, uint32_t slot, uint32_t generation, hapi_local_body **out)
+{
+  *out = hapi_row_body(tick, slot);
+  return *out == NULL || ((*out)->live && (*out)->generation == generation && !(*out)->waiting);
+}
+
+static bool is_owned(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+static double point_speed(const hapi_local_body *body, const double point[3])
+{
+  if (body == NULL) {
+    return 0.0;
+  }
+  double arm[3];
+  double velocity[3];
+  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_cross(body->start_twist + 3, arm, velocity);
+  hapi_v3_add(velocity, body->start_twist, velocity);
+  return hapi_v3_norm(velocity);
+}
+
+static bool is_near(const hapi_tick *tick, const placed_contact *c)
+{
+  if (c->gap <= OPEN_FLOOR) {
+    return true;
+  }
+  double speed = point_speed(c->a, c->point) + point_speed(c->b, c->point);
+  return c->gap <= OPEN_FLOOR + OPEN_TICKS * tick->period * speed;
+}
+
+/* What touches a body that moves is awake, as in ODE. */
+static void wake(placed_contact *c)
+{
+  hapi_local_body *bodies[2] = {c->a, c->b};
+  for (int i = 0; i < 2; ++i) {
+    hapi_local_body *body = bodies[i];
+    const hapi_local_body *other = bodies[1 - i];
+    if (body != NULL && (body->flags & HAPI_BODY_RESTING) != 0 && hapi_body_responds(other)) {
+      body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+      body->pushed = true;
+    }
+  }
+}
+
+void hapi_contact_rows(hapi_tick *tick)
+{
+  hapi_local_world *world = &tick->world;
+  if (world->patches == NULL) {
+    return;
+  }
+  const hapi_patch_contact *contacts = hapi_patches_contacts(world->patches);
+  const hapi_surface *surfaces = hapi_patches_surfaces(world->patches);
+  for (uint32_t i = 0; i < world->patches->contact_count; ++i) {
+    placed_contact c = {.in = &contacts[i], .surface = &surfaces[contacts[i].surface]};
+    bool known = find_body(tick, c.in->body_a, c.in->generation_a, &c.a) &&
+                 find_body(tick, c.in->body_b, c.in->generation_b, &c.b);
+    bool moves = known && (hapi_body_responds(c.a) || hapi_body_responds(c.b)) &&
+                 (is_owned(c.a) || is_owned(c.b)); /* others are ODE's affair */
+    bool room = world->solver.row_count + 3 <= world->row_capacity;
+    if (moves && room && place(&c) && is_near(tick, &c)) {
+      if (c.gap <= 0.0) {
+        wake(&c);
+      }
+      add_contact(tick, &c, i);
+    } else {
+      memset(world->memory[i].impulse, 0, sizeof world->memory[i].impulse);
+    }
+  }
+}
+
+void hapi_contact_keep(hapi_tick *tick)
+{
+  hapi_local_world *world = &tick->world;
+  world->active = 0;
+  for (uint32_t i = 0; i < world->solver.row_count; ++i) {
+    const hapi_row_source *source = &world->sources[i];
+    if (!source->pointer) {
+      double impulse = world->solver.rows[i].impulse;
+      world->memory[source->contact].impulse[source->part] = impulse;
+      world->active += source->part == 0 && impulse > 0.0;
+    }
+  }
+}

@@ -1,0 +1,160 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "haptic/rt/contact_solver.h"
+
+#include <stdbool.h>
+
+#include "base/vec.h"
+
+/* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
+ * go in circles, sweeps lead out. */
+#define DIRECT_ROUNDS 8
+
+/* ---- preparation ---- */
+
+static bool responds(const double b[6])
+{
+  return b[0] != 0.0 || b[1] != 0.0 || b[2] != 0.0 || b[3] != 0.0 || b[4] != 0.0 || b[5] != 0.0;
+}
+
+static bool same_bodies(const hapi_row *row, const hapi_row *other)
+{
+  return row->a == other->a && row->b == other->b;
+}
+
+static bool valid(const hapi_solver *solver, uint32_t index)
+{
+  const hapi_row *row = &solver->rows[index];
+  bool numbers = hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
+                 row->softness >= 0.0 && (row->normal >= 0 ? row->mu >= 0.0 : row->lo <= row->hi);
+  bool partners = row->a < solver->body_count && row->b < solver->body_count &&
+                  (row->normal < 0 ||
+                   ((uint32_t)row->normal < index && same_bodies(row, &solver->rows[row->normal])));
+  return numbers && partners;
+}
+
+/* A row left out keeps no impulse: its normal's frictions get none either. */
+static void prepare(hapi_solver *solver, uint32_t index)
+{
+  hapi_row *row = &solver->rows[index];
+  row->inverse = 0.0;
+  if (valid(solver, index)) {
+    double d = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb) + row->softness;
+    row->inverse = d > 1e-200 && d < 1e200 ? 1.0 / d : 0.0;
+    row->response = d;
+  }
+  if (row->inverse == 0.0) {
+    row->impulse = 0.0;
+    return;
+  }
+  row->paired = responds(row->bb);
+  row->drive = row->target - (row->paired ? 0.0 : hapi_dot6(row->jb, solver->v[row->b]));
+}
+
+static void warm_start(hapi_solver *solver)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    prepare(solver, i);
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    if (row->inverse == 0.0) {
+      continue;
+    }
+    double lo;
+    double hi;
+    hapi_row_bounds(solver->rows, row, &lo, &hi);
+    row->impulse = hapi_clamp(row->impulse, lo, hi);
+    hapi_madd6(solver->v[row->a], row->impulse, row->ba);
+    if (row->paired) {
+      hapi_madd6(solver->v[row->b], row->impulse, row->bb);
+    }
+  }
+}
+
+/* ---- sweeps ---- */
+
+/* The correction of one row, m/s. The rows of a body wait for each other, so that the way from v to
+ * v counts: the change is cut by itself and not taken as the difference of two impulses. */
+static double update(hapi_solver *solver, hapi_row *row)
+{
+  if (row->inverse == 0.0) {
+    return 0.0;
+  }
+  double lo;
+  double hi;
+  hapi_row_bounds(solver->rows, row, &lo, &hi);
+  double old = row->impulse;
+  double wanted = hapi_row_error(solver, row) * row->inverse;
+  double change = hapi_clamp(wanted, lo - old, hi - old);
+  hapi_row_push(solver, row, change);
+  row->impulse = hapi_clamp(old + wanted, lo, hi); /* exactly at its bound */
+  return fabs(change) * row->response;
+}
+
+static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, double largest)
+{
+  for (uint32_t i = first; i < end; ++i) {
+    double correction = update(solver, &solver->rows[i]);
+    largest = correction > largest ? correction : largest;
+  }
+  return largest;
+}
+
+/* Backwards contact by contact, but with each normal before its frictions: they then end inside the
+ * bounds that it sets. */
+static double sweep_back(hapi_solver *solver)
+{
+  double largest = 0.0;
+  uint32_t end = solver->row_count;
+  while (end > 0) {
+    uint32_t first = end - 1;
+    while (first > 0 && solver->rows[first].normal >= 0) {
+      --first;
+    }
+    largest = update_group(solver, first, end, largest);
+    end = first;
+  }
+  return largest;
+}
+
+static double sweep(hapi_solver *solver)
+{
+  ++solver->sweeps;
+  return solver->sweeps % 2 == 1 ? update_group(solver, 0, solver->row_count, 0.0)
+                                 : sweep_back(solver);
+}
+
+/* Non-finite velocities must not pass for a solution. */
+static void check_finite(hapi_solver *solver)
+{
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    if (!hapi_finite(solver->v[i], 6)) {
+      solver->residual = HUGE_VAL;
+    }
+  }
+}
+
+void hapi_solver_run(hapi_solver *solver)
+{
+  uint32_t rows = solver->row_count;
+  uint64_t left = solver->update_budget;
+  solver->sweeps = 0;
+  solver->direct_solves = 0;
+  solver->residual = 0.0;
+  warm_start(solver);
+  for (uint32_t rounds = 0; rows > 0; ++rounds) {
+    do {
+      solver->residual = sweep(solver);
+      left -= left < rows ? left : rows;
+    } while (solver->sweeps < 2);
+    if (solver->residual < solver->tolerance || left < rows) {
+      break;
+    }
+    /* One sweep is kept to measure and repair what the direct solve leaves. */
+    if (solver->direct_rows > 0 && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+      left -= hapi_direct_run(solver, (uint32_t)left - rows);
+    }
+  }
+  check_finite(solver);
+}

@@ -1,0 +1,132 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
+#define HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
+
+/* Impulses of contacts, by ODE's friction pyramid: the box LCP on the level of velocities.
+ *
+ *   w = ja.v[a] + jb.v[b],   v = free velocity + sum over rows of (ba, bb) impulse
+ *   lo < impulse < hi:  w + softness impulse = target
+ *   impulse == lo:      w + softness impulse >= target
+ *   impulse == hi:      w + softness impulse <= target
+ *
+ * Sweeps of projected Gauss-Seidel, forward and backward by turns, find which rows push, stick and
+ * slide; a direct solve over the bodies of an island (direct_solver.c) then gives their impulses,
+ * and sweeps again check it. The same input gives the same bits. */
+
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* One scalar row. Three rows of a contact stand together: normal, then its two frictions. Chains of
+ * bodies converge best in their order, beginning at the hand. A body that does not respond in one
+ * row must not respond in any. */
+typedef struct hapi_row {
+  double ja[6]; /* row of the Jacobian, linear and angular */
+  double jb[6]; /* 0 for a static partner */
+  double ba[6]; /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
+  double bb[6];
+  double softness; /* (m/s)/(N s), >= 0 */
+  double target;   /* m/s */
+  double lo;       /* N s; may be -HUGE_VAL */
+  double hi;       /* N s; may be HUGE_VAL */
+  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
+  double impulse;  /* N s; in: warm start, out: result */
+  double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
+  double response; /* inner: 1 / inverse */
+  double drive;    /* inner: target without the part of a partner that does not respond */
+  int32_t normal;  /* index of the normal row, before this one and of the same a and b; -1: none,
+                      the bounds are lo .. hi */
+  uint32_t a;      /* index into v */
+  uint32_t b;      /* several static partners may share one index, whose v stays as it is */
+  uint32_t next;   /* inner: of the same island */
+  uint8_t paired;  /* inner: b responds */
+  uint8_t state;   /* inner, of direct_solver.c */
+} hapi_row;
+
+typedef struct hapi_solver {
+  hapi_row *rows;
+  double (*v)[6]; /* in: free velocities, without any row's impulse; out: with all */
+  uint32_t row_count;
+  uint32_t body_count;
+  double tolerance;       /* m/s: done when the largest correction of a sweep is below */
+  uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
+                             cost; two sweeps are made in any case */
+  uint32_t direct_rows;   /* islands of at most this many free rows are solved directly; 0: none */
+  double *work;           /* for direct solves; an island that does not fit is left to sweeps */
+  size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
+
+  uint32_t sweeps;        /* out */
+  uint32_t direct_solves; /* out: that were accepted */
+  double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
+} hapi_solver;
+
+/* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
+ * of n bodies takes n. */
+#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*3 + (size_t)(bodies)*600)
+
+/* [haptic] Works in rows, v and work only, with 16 kB of stack; bounded by update_budget whatever
+ * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
+void hapi_solver_run(hapi_solver *solver);
+
+/* ---- inner: between contact_solver.c and direct_solver.c ---- */
+
+/* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
+ * updates, 0 when no island was changed. Rows are prepared, v has the impulses. */
+uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
+
+/* Two sums side by side: half the latency, and two lanes for the compiler. */
+static inline double hapi_dot6(const double a[6], const double b[6])
+{
+  double even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];
+  double odd = a[1] * b[1] + a[3] * b[3] + a[5] * b[5];
+  return even + odd;
+}
+
+/* v += s b */
+static inline void hapi_madd6(double v[6], double s, const double b[6])
+{
+  for (int i = 0; i < 6; ++i) {
+    v[i] += s * b[i];
+  }
+}
+
+static inline double hapi_clamp(double x, double lo, double hi)
+{
+  double y = x > lo ? x : lo;
+  return y < hi ? y : hi;
+}
+
+static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, double *out_lo,
+                                   double *out_hi)
+{
+  *out_lo = row->lo;
+  *out_hi = row->hi;
+  if (row->normal >= 0) {
+    double p = rows[row->normal].impulse;
+    *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+    *out_lo = -*out_hi;
+  }
+}
+
+/* m/s, what is missing to w + softness impulse = target */
+static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *row)
+{
+  double rest = row->drive - row->softness * row->impulse;
+  double w = hapi_dot6(row->ja, solver->v[row->a]);
+  if (row->paired) {
+    w += hapi_dot6(row->jb, solver->v[row->b]);
+  }
+  return rest - w;
+}
+
+static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double change)
+{
+  row->impulse += change;
+  hapi_madd6(solver->v[row->a], change, row->ba);
+  if (row->paired) {
+    hapi_madd6(solver->v[row->b], change, row->bb);
+  }
+}
+
+#endif

@@ -1,0 +1,589 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* One round of an active-set method for each island of bodies that rows tie together. The impulses
+ * at hand say which rows are free (inside their bounds) and which frictions slide (tied to their
+ * normal); all others stay as they are. With e the errors of the free rows and R small,
+ *
+ *   dv = sum of b_i dp_i,   dp_i = (e_i - j_i dv) / (softness_i + R_i)
+ *   (I + sum of b_i j_i / (softness_i + R_i)) dv = sum of b_i e_i / (softness_i + R_i)
+ *
+ * has six unknowns per body whatever the number of rows, and one 6x6 block per touching pair. R
+ * makes redundant contacts (four of a box on a floor) well behaved: only the change is regularised,
+ * so that what the null space holds from the warm start stays, and the next round takes what R has
+ * left of the errors (method of multipliers). */
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "haptic/rt/contact_solver.h"
+
+#define BODIES_MAX 512  /* with more in the solver, sweeps only */
+#define ISLAND_MAX 64   /* bodies; one bit each */
+#define NONE UINT16_MAX /* local index of a body that does not respond */
+#define SOFTENING 1e-8  /* R, relative to the row's own response */
+#define INNER_ROUNDS 2  /* active sets tried from one state */
+#define WORSE \
+  30.0                   /* how much the largest correction may grow: of one row at a bound it is a
+                            poor measure of the whole, and a sweep repairs it */
+#define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
+#define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
+#define NO_ROW UINT32_MAX
+
+enum {
+  FIXED,
+  FREE,
+  TIED
+};
+
+typedef struct island {
+  hapi_solver *solver;
+  uint32_t first; /* row; the others by hapi_row.next, in their order */
+  uint32_t free_rows;
+  uint32_t used_rows; /* free or tied */
+  uint32_t count;     /* bodies */
+  uint32_t block_count;
+  uint16_t local[BODIES_MAX]; /* body -> index in the island */
+  uint16_t body[ISLAND_MAX];
+  uint16_t pivot[ISLAND_MAX]; /* order of elimination */
+  uint64_t link[ISLAND_MAX];  /* the blocks of a body's row, fill included */
+  uint64_t rest[ISLAND_MAX];  /* link when the body is eliminated, of bodies still to come */
+  uint16_t block[ISLAND_MAX][ISLAND_MAX];
+  double *gain;          /* by row: impulse per error */
+  double *saved_impulse; /* by row */
+  double (*saved_v)[6];  /* by local index, as the next */
+  double (*dv)[6];
+  double (*blocks)[36];
+} island;
+
+/* ---- islands ---- */
+
+static bool responds(const double b[6])
+{
+  return b[0] != 0.0 || b[1] != 0.0 || b[2] != 0.0 || b[3] != 0.0 || b[4] != 0.0 || b[5] != 0.0;
+}
+
+static uint16_t root(uint16_t *parent, uint16_t i)
+{
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
+  }
+  return i;
+}
+
+/* Lists of the rows of each island, by the island's lowest body. */
+static void split(hapi_solver *solver, uint32_t head[BODIES_MAX])
+{
+  uint16_t parent[BODIES_MAX];
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    parent[i] = (uint16_t)i;
+    head[i] = NO_ROW;
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0 && row->paired && responds(row->ba)) {
+      uint16_t a = root(parent, (uint16_t)row->a);
+      uint16_t b = root(parent, (uint16_t)row->b);
+      parent[a > b ? a : b] = a > b ? b : a;
+    }
+  }
+  for (uint32_t i = solver->row_count; i-- > 0;) {
+    hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0) {
+      uint16_t r = root(parent, (uint16_t)(responds(row->ba) ? row->a : row->b));
+      row->next = head[r];
+      head[r] = i;
+    }
+  }
+}
+
+/* The largest correction due, m/s. */
+static double measure(const island *is)
+{
+  const hapi_solver *solver = is->solver;
+  double largest = 0.0;
+  for (uint32_t i = is->first; i != NO_ROW; i = solver->rows[i].next) {
+    const hapi_row *row = &solver->rows[i];
+    double lo;
+    double hi;
+    hapi_row_bounds(solver->rows, row, &lo, &hi);
+    double p = hapi_clamp(row->impulse + hapi_row_error(solver, row) * row->inverse, lo, hi);
+    double due = fabs(p - row->impulse) * row->response;
+    largest = due <= largest ? largest : due; /* NaN stays, unless the next row hides it */
+  }
+  return largest;
+}
+
+/* `sticking` takes the friction of all contacts that push for free. */
+static void classify(island *is, bool sticking)
+{
+  hapi_row *rows = is->solver->rows;
+  is->free_rows = 0;
+  is->used_rows = 0;
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    hapi_row *row = &rows[i];
+    double lo;
+    double hi;
+    hapi_row_bounds(rows, row, &lo, &hi);
+    double p = row->impulse;
+    if (!(p > lo && p < hi)) { /* at a bound: does it want to leave? */
+      p += hapi_row_error(is->solver, row) * row->inverse;
+    }
+    row->state = FIXED;
+    if ((p > lo && p < hi) || (sticking && row->normal >= 0 && hi > 0.0)) {
+      row->state = FREE;
+      is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
+    } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == FREE) {
+      row->state = TIED;
+      is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
+    }
+    is->free_rows += row->state == FREE;
+    is->used_rows += row->state != FIXED;
+  }
+}
+
+/* The row whose error drives this row's impulse. */
+static const hapi_row *source(const island *is, const hapi_row *row)
+{
+  return row->state == TIED ? &is->solver->rows[row->normal] : row;
+}
+
+/* ---- structure of the matrix ---- */
+
+static bool add_body(island *is, uint32_t body, const double b[6])
+{
+  if (is->local[body] != NONE || !responds(b)) {
+    return true;
+  }
+  if (is->count == ISLAND_MAX) {
+    return false;
+  }
+  is->link[is->count] = 0;
+  is->body[is->count] = (uint16_t)body;
+  is->local[body] = (uint16_t)is->count++;
+  return true;
+}
+
+static void add_link(island *is, uint16_t a, uint16_t b)
+{
+  if (a != NONE && b != NONE) {
+    is->link[a] |= (uint64_t)1 << b;
+    is->link[b] |= (uint64_t)1 << a;
+  }
+}
+
+/* Also of rows that do not push now: a later round may take them up. */
+static void link_row(island *is, const hapi_row *row)
+{
+  if (row->inverse != 0.0) {
+    uint16_t a = is->local[row->a];
+    uint16_t b = is->local[row->b];
+    add_link(is, a, a);
+    add_link(is, b, b);
+    add_link(is, a, b);
+  }
+}
+
+static bool gather(island *is)
+{
+  const hapi_row *rows = is->solver->rows;
+  is->count = 0;
+  memset(is->local, 0xff, sizeof is->local);
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    const hapi_row *row = &rows[i];
+    if (row->inverse != 0.0 && (!add_body(is, row->a, row->ba) || !add_body(is, row->b, row->bb))) {
+      return false;
+    }
+  }
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    link_row(is, &rows[i]);
+  }
+  return true;
+}
+
+static uint32_t bit_count(uint64_t bits)
+{
+  uint32_t count = 0;
+  for (; bits != 0; bits &= bits - 1) {
+    ++count;
+  }
+  return count;
+}
+
+static bool has(uint64_t set, uint32_t i)
+{
+  return (set >> i & 1) != 0;
+}
+
+/* Body of least degree among those left: chains and trees get no fill at all. */
+static uint32_t least_linked(const island *is, uint64_t left)
+{
+  uint32_t best = 0;
+  uint32_t best_degree = UINT32_MAX;
+  for (uint32_t i = 0; i < is->count; ++i) {
+    uint32_t degree = has(left, i) ? bit_count(is->link[i] & left) : UINT32_MAX;
+    if (degree < best_degree) {
+      best_degree = degree;
+      best = i;
+    }
+  }
+  return best;
+}
+
+/* Order, fill and places of the blocks; the cost in row updates. */
+static uint32_t plan(island *is)
+{
+  uint64_t left = is->count < 64 ? ((uint64_t)1 << is->count) - 1 : UINT64_MAX;
+  uint32_t madds = is->used_rows * ROW_MADDS;
+  is->block_count = 0;
+  for (uint32_t k = 0; k < is->count; ++k) {
+    uint32_t p = least_linked(is, left);
+    left &= ~((uint64_t)1 << p);
+    is->pivot[k] = (uint16_t)p;
+    is->rest[p] = is->link[p] & left;
+    uint32_t degree = bit_count(is->rest[p]);
+    madds += 216 * (1 + degree + degree * degree);
+    for (uint32_t i = 0; i < is->count; ++i) {
+      is->link[i] |= has(is->rest[p], i) ? is->rest[p] : 0;
+    }
+  }
+  for (uint32_t i = 0; i < is->count; ++i) {
+    for (uint32_t j = 0; j < is->count; ++j) {
+      is->block[i][j] = (uint16_t)is->block_count;
+      is->block_count += has(is->link[i], j);
+    }
+  }
+  return INNER_ROUNDS * (madds / MADDS_PER_ROW);
+}
+
+/* ---- numbers ---- */
+
+/* block += s b j^T */
+static void add_outer(double *restrict block, double s, const double *restrict b,
+                      const double *restrict j)
+{
+  for (int i = 0; i < 6; ++i) {
+    double sb = s * b[i];
+    for (int k = 0; k < 6; ++k) {
+      block[6 * i + k] += sb * j[k];
+    }
+  }
+}
+
+static void add_row(island *is, uint16_t to, double s, const double b[6], const hapi_row *from)
+{
+  uint16_t a = is->local[from->a];
+  uint16_t other = from->paired ? is->local[from->b] : NONE;
+  if (to != NONE && a != NONE) {
+    add_outer(is->blocks[is->block[to][a]], s, b, from->ja);
+  }
+  if (to != NONE && other != NONE) {
+    add_outer(is->blocks[is->block[to][other]], s, b, from->jb);
+  }
+}
+
+static void assemble(island *is)
+{
+  const hapi_row *rows = is->solver->rows;
+  memset(is->blocks, 0, is->block_count * sizeof *is->blocks);
+  for (uint32_t i = 0; i < is->count; ++i) {
+    for (int k = 0; k < 36; k += 7) {
+      is->blocks[is->block[i][i]][k] = 1.0;
+    }
+  }
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    const hapi_row *row = &rows[i];
+    if (row->state != FIXED) {
+      const hapi_row *from = source(is, row);
+      add_row(is, is->local[row->a], is->gain[i], row->ba, from);
+      if (row->paired) {
+        add_row(is, is->local[row->b], is->gain[i], row->bb, from);
+      }
+    }
+  }
+}
+
+/* One step of Gauss and Jordan: row k by the pivot, the others freed of column k, in which the
+ * inverse grows. */
+static void eliminate(double m[36], int k)
+{
+  double pivot = 1.0 / m[7 * k];
+  m[7 * k] = 1.0;
+  for (int c = 0; c < 6; ++c) {
+    m[6 * k + c] *= pivot;
+  }
+  for (int i = 0; i < 6; ++i) {
+    if (i != k) {
+      double f = m[6 * i + k];
+      m[6 * i + k] = 0.0;
+      for (int c = 0; c < 6; ++c) {
+        m[6 * i + c] -= f * m[6 * k + c];
+      }
+    }
+  }
+}
+
+/* m = m^-1. No pivoting: such a block is 1 plus a product of positive definite matrices as long as
+ * nothing slides, and what sliding spoils is not accepted. */
+static void invert(double m[36])
+{
+  for (int k = 0; k < 6; ++k) {
+    eliminate(m, k);
+  }
+}
+
+/* out = out - a b */
+static void multiply_sub(const double a[36], const double b[36], double out[36])
+{
+  for (int i = 0; i < 6; ++i) {
+    double row[6];
+    memcpy(row, out + 6 * i, sizeof row);
+    for (int k = 0; k < 6; ++k) {
+      for (int c = 0; c < 6; ++c) {
+        row[c] -= a[6 * i + k] * b[6 * k + c];
+      }
+    }
+    memcpy(out + 6 * i, row, sizeof row);
+  }
+}
+
+/* y -= m x */
+static void apply_sub(const double m[36], const double x[6], double y[6])
+{
+  for (int i = 0; i < 6; ++i) {
+    y[i] -= hapi_dot6(m + 6 * i, x);
+  }
+}
+
+/* Block LU: diagonal blocks become their inverses, blocks below factors. */
+static void factor(island *is)
+{
+  for (uint32_t k = 0; k < is->count; ++k) {
+    uint16_t p = is->pivot[k];
+    double *diagonal = is->blocks[is->block[p][p]];
+    invert(diagonal);
+    for (uint32_t i = 0; i < is->count; ++i) {
+      if (!has(is->rest[p], i)) {
+        continue;
+      }
+      double *below = is->blocks[is->block[i][p]];
+      double l[36] = {0.0};
+      multiply_sub(below, diagonal, l);
+      for (int c = 0; c < 36; ++c) {
+        below[c] = l[c] = -l[c];
+      }
+      for (uint32_t j = 0; j < is->count; ++j) {
+        if (has(is->rest[p], j)) {
+          multiply_sub(l, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
+        }
+      }
+    }
+  }
+}
+
+/* dv: in right side, out solution */
+static void substitute(island *is)
+{
+  for (uint32_t k = 0; k < is->count; ++k) {
+    uint16_t p = is->pivot[k];
+    for (uint32_t i = 0; i < is->count; ++i) {
+      if (has(is->rest[p], i)) {
+        apply_sub(is->blocks[is->block[i][p]], is->dv[p], is->dv[i]);
+      }
+    }
+  }
+  for (uint32_t k = is->count; k-- > 0;) {
+    uint16_t p = is->pivot[k];
+    double y[6];
+    memcpy(y, is->dv[p], sizeof y);
+    for (uint32_t j = 0; j < is->count; ++j) {
+      if (has(is->rest[p], j)) {
+        apply_sub(is->blocks[is->block[p][j]], is->dv[j], y);
+      }
+    }
+    const double *inverse = is->blocks[is->block[p][p]];
+    for (int i = 0; i < 6; ++i) {
+      is->dv[p][i] = hapi_dot6(inverse + 6 * i, y);
+    }
+  }
+}
+
+/* ---- one round ---- */
+
+static void add_to(island *is, uint16_t local, double s, const double b[6])
+{
+  if (local != NONE) {
+    hapi_madd6(is->dv[local], s, b);
+  }
+}
+
+/* dv = sum of gain b e. The driving errors are kept in `error`. */
+static void right_side(island *is, double *error)
+{
+  const hapi_row *rows = is->solver->rows;
+  memset(is->dv, 0, is->count * sizeof *is->dv);
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    const hapi_row *row = &rows[i];
+    if (row->state == FIXED) {
+      continue;
+    }
+    error[i] = row->state == TIED ? error[row->normal] : hapi_row_error(is->solver, row);
+    add_to(is, is->local[row->a], is->gain[i] * error[i], row->ba);
+    if (row->paired) {
+      add_to(is, is->local[row->b], is->gain[i] * error[i], row->bb);
+    }
+  }
+}
+
+static double moved(const island *is, uint16_t local, const double j[6])
+{
+  return local == NONE ? 0.0 : hapi_dot6(j, is->dv[local]);
+}
+
+static void push_rows(island *is, const double *error)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    hapi_row *row = &rows[i];
+    if (row->state == FIXED) {
+      continue;
+    }
+    const hapi_row *from = source(is, row);
+    double w = moved(is, is->local[from->a], from->ja);
+    if (from->paired) {
+      w += moved(is, is->local[from->b], from->jb);
+    }
+    row->impulse += is->gain[i] * (error[i] - w);
+  }
+}
+
+/* Back inside the bounds. */
+static void project(island *is)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    double lo;
+    double hi;
+    hapi_row_bounds(rows, &rows[i], &lo, &hi);
+    rows[i].impulse = hapi_clamp(rows[i].impulse, lo, hi);
+  }
+}
+
+/* Velocities of the impulses as they are now, from the saved ones. Not kept along: a set of active
+ * rows that cannot be gives impulses so large that nothing of the velocities would be left. */
+static void follow(island *is)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = 0; i < is->count; ++i) {
+    memcpy(is->solver->v[is->body[i]], is->saved_v[i], sizeof is->saved_v[i]);
+  }
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    double now = rows[i].impulse;
+    hapi_row_push(is->solver, &rows[i], now - is->saved_impulse[i]);
+    rows[i].impulse = now;
+  }
+}
+
+static void save(island *is)
+{
+  for (uint32_t i = is->first; i != NO_ROW; i = is->solver->rows[i].next) {
+    is->saved_impulse[i] = is->solver->rows[i].impulse;
+  }
+  for (uint32_t i = 0; i < is->count; ++i) {
+    memcpy(is->saved_v[i], is->solver->v[is->body[i]], sizeof is->saved_v[i]);
+  }
+}
+
+static void restore(island *is)
+{
+  for (uint32_t i = is->first; i != NO_ROW; i = is->solver->rows[i].next) {
+    is->solver->rows[i].impulse = is->saved_impulse[i];
+  }
+  for (uint32_t i = 0; i < is->count; ++i) {
+    memcpy(is->solver->v[is->body[i]], is->saved_v[i], sizeof is->saved_v[i]);
+  }
+}
+
+/* Places the arrays in the work; false if they do not fit. */
+static bool place(island *is)
+{
+  size_t rows = is->solver->row_count;
+  size_t need = 3 * rows + 12 * (size_t)is->count + 36 * (size_t)is->block_count;
+  double *at = is->solver->work + 3 * rows;
+  is->saved_v = (double(*)[6])at;
+  is->dv = is->saved_v + is->count;
+  is->blocks = (double(*)[36])(at + 12 * is->count);
+  return need <= is->solver->work_count;
+}
+
+/* Impulses of the rows that are free or tied now, cut at their bounds. */
+static void solve(island *is)
+{
+  double *error = is->solver->work + 2 * (size_t)is->solver->row_count;
+  assemble(is);
+  factor(is);
+  right_side(is, error);
+  substitute(is);
+  push_rows(is, error);
+  project(is);
+  follow(is);
+}
+
+/* The best of some rounds is kept, each with the active set that the one before leads to. */
+static bool improve(island *is, double before)
+{
+  double best = WORSE * before;
+  bool better = false;
+  save(is);
+  for (int round = 0; round < INNER_ROUNDS; ++round) {
+    solve(is);
+    double due = measure(is);
+    if (due < best) {
+      save(is);
+      best = due;
+      better = true;
+    }
+    if (due < is->solver->tolerance) {
+      break;
+    }
+    classify(is, false);
+  }
+  restore(is);
+  return better;
+}
+
+uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
+{
+  island is;
+  uint32_t head[BODIES_MAX];
+  uint32_t spent = 0;
+  /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
+   * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
+   * right, and again where neither leads to the end. */
+  bool sticking = solver->sweeps % 3 == 0;
+  if (solver->body_count > BODIES_MAX || solver->work_count < 3 * (size_t)solver->row_count) {
+    return 0;
+  }
+  split(solver, head);
+  is.solver = solver;
+  is.gain = solver->work;
+  is.saved_impulse = solver->work + solver->row_count;
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    is.first = head[i];
+    double before = is.first == NO_ROW ? 0.0 : measure(&is);
+    if (!(before >= solver->tolerance)) {
+      continue;
+    }
+    classify(&is, sticking);
+    if (is.free_rows == 0 || is.free_rows > solver->direct_rows || !gather(&is)) {
+      continue;
+    }
+    uint32_t cost = plan(&is);
+    if (cost <= budget - spent && place(&is)) {
+      spent += cost;
+      solver->direct_solves += improve(&is, before);
+    }
+  }
+  return spent;
+}

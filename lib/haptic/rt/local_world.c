@@ -1,0 +1,341 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/pose.h"
+#include "haptic/rt/rows.h"
+
+/* The local world of model CONTACT: bodies near the pointers with their own contacts, stepped by the
+ * tick as the global world would be stepped at the same rate (semi-implicit Euler, contacts on the
+ * level of velocities). What the loop does not own stands around it and moves as it was last seen. */
+
+#define TURN_MAX 0.1      /* rad a substep of the gyroscopic motion */
+#define TURN_SUBSTEPS 100 /* at most, a tick */
+
+void hapi_row_column(const hapi_local_body *body, const double point[3], const double direction[3],
+                     double sign, double j[6], double b[6])
+{
+  double arm[3];
+  if (body == NULL) {
+    memset(j, 0, 6 * sizeof *j);
+    memset(b, 0, 6 * sizeof *b);
+    return;
+  }
+  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_scale(sign, direction, j);
+  hapi_v3_cross(arm, j, j + 3);
+  if (!hapi_body_responds(body)) {
+    memset(b, 0, 6 * sizeof *b);
+  } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
+    hapi_v3_scale(1.0 / body->given.mass, j, b);
+    hapi_m3_apply(body->inverse_inertia, j + 3, b + 3);
+  } else {
+    for (int i = 0; i < 6; ++i) {
+      b[i] = 0.0;
+      for (int k = 0; k < 6; ++k) {
+        b[i] += body->given.response[i][k] * j[k];
+      }
+    }
+  }
+}
+
+/* Velocity after the tick if nothing touched the body. */
+static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, double v[6])
+{
+  const hapi_model_body *given = &body->given;
+  double turn[3];
+  memcpy(v, body->start_twist, 6 * sizeof *v);
+  if (!hapi_body_responds(body) || body->waiting) {
+    return;
+  }
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    for (int i = 0; i < 6; ++i) {
+      v[i] += tick->period * given->b[i] + body->residual[i]; /* eq. 14, in the first tick */
+    }
+    return;
+  }
+  hapi_v3_madd(v, tick->period, given->gravity, v);
+  hapi_v3_madd(v, tick->period / given->mass, given->user_wrench, v);
+  hapi_m3_apply(body->inverse_inertia, given->user_wrench + 3, turn);
+  hapi_v3_madd(v + 3, tick->period, turn, v + 3);
+}
+
+/* A body that came into the range moves on with its twist until the contact thread has seen it:
+ * without its contacts it would fall through the floor. */
+static bool waits(const hapi_tick *tick, const hapi_local_body *body)
+{
+  const hapi_patches *patches = tick->world.patches;
+  return (body->flags & HAPI_BODY_OWNED) != 0 &&
+         (patches == NULL || patches->model_number < body->entered_model);
+}
+
+static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
+{
+  hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
+  hapi_v3_copy(body->twist.linear, body->start_twist);
+  hapi_v3_copy(body->twist.angular, body->start_twist + 3);
+  body->waiting = waits(tick, body);
+  body->row = row;
+  if ((body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
+    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+  }
+}
+
+static void begin(hapi_tick *tick)
+{
+  hapi_solver *solver = &tick->world.solver;
+  memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
+  solver->body_count = 1;
+  solver->row_count = 0;
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    begin_body(tick, &tick->bodies[tick->live[i]], solver->body_count++);
+  }
+}
+
+static void set_free_velocities(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies[tick->live[i]];
+    free_velocity(tick, body, tick->world.solver.v[body->row]);
+  }
+}
+
+/* The turn that a constant angular velocity makes, by the exponential map. Small angles: the sine
+ * and cosine by their series, good to 1e-12 for the half of TURN_MAX. */
+static void turn(double quat[4], const double w[3], double seconds)
+{
+  double half2 = 0.25 * seconds * seconds * hapi_v3_dot(w, w);
+  double sinc = 1.0 - half2 / 6.0 * (1.0 - half2 / 20.0 * (1.0 - half2 / 42.0));
+  double cosine = 1.0 - half2 / 2.0 * (1.0 - half2 / 12.0 * (1.0 - half2 / 30.0));
+  double q[4] = {cosine, 0.5 * seconds * sinc * w[0], 0.5 * seconds * sinc * w[1],
+                 0.5 * seconds * sinc * w[2]};
+  hapi_quat_multiply(q, quat, quat);
+  hapi_quat_normalize(quat);
+}
+
+/* Angular velocity of an angular momentum at an orientation. */
+static void spin_of(const hapi_model_body *given, const double quat[4], const double momentum[3],
+                    double out[3])
+{
+  double local[3];
+  double spin[3];
+  hapi_quat_unrotate(quat, momentum, local);
+  hapi_m3_apply(given->inverse_inertia, local, spin);
+  hapi_quat_rotate(quat, spin, out);
+}
+
+/* The angular momentum stays, the angular velocity follows the inertia that turns: a midpoint step
+ * each, which loses no energy to the second order. */
+static void turn_gyroscopic(hapi_local_body *body, double seconds, uint32_t substeps)
+{
+  double local[3];
+  double momentum[3];
+  double *w = body->twist.angular;
+  double step = seconds / (double)substeps;
+  hapi_quat_unrotate(body->pose.quat_wxyz, w, local);
+  hapi_m3_apply(body->given.inertia, local, momentum);
+  hapi_quat_rotate(body->pose.quat_wxyz, momentum, momentum);
+  for (uint32_t i = 0; i < substeps; ++i) {
+    double middle[4];
+    double spin[3];
+    memcpy(middle, body->pose.quat_wxyz, sizeof middle);
+    turn(middle, w, 0.5 * step);
+    spin_of(&body->given, middle, momentum, spin);
+    turn(body->pose.quat_wxyz, spin, step);
+    spin_of(&body->given, body->pose.quat_wxyz, momentum, w);
+  }
+}
+
+static void move_body(hapi_local_body *body, double seconds)
+{
+  double angle = seconds * hapi_v3_norm(body->twist.angular);
+  double wanted = angle / TURN_MAX;
+  uint32_t substeps = wanted < TURN_SUBSTEPS ? (uint32_t)wanted + 1 : TURN_SUBSTEPS;
+  hapi_v3_madd(body->pose.position, seconds, body->twist.linear, body->pose.position);
+  if ((body->flags & HAPI_BODY_GYROSCOPIC) != 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+    turn_gyroscopic(body, seconds, substeps);
+    return;
+  }
+  for (uint32_t i = 0; i < substeps; ++i) {
+    turn(body->pose.quat_wxyz, body->twist.angular, seconds / (double)substeps);
+  }
+}
+
+/* A new angular velocity for the orientation before the tick, at the one after it. */
+static void follow_inertia(hapi_local_body *body)
+{
+  double local[3];
+  double momentum[3];
+  if ((body->flags & HAPI_BODY_GYROSCOPIC) != 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+    hapi_m3_apply_transposed(body->rotation, body->twist.angular, local);
+    hapi_m3_apply(body->given.inertia, local, momentum);
+    hapi_m3_apply(body->rotation, momentum, local);
+    spin_of(&body->given, body->pose.quat_wxyz, local, body->twist.angular);
+  }
+}
+
+/* ODE's damping and limit, after the pose as there. */
+static void damp(hapi_local_body *body)
+{
+  const hapi_model_body *given = &body->given;
+  double *v = body->twist.linear;
+  double *w = body->twist.angular;
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    return;
+  }
+  if (hapi_v3_dot(v, v) > given->linear_threshold2) {
+    hapi_v3_scale(given->linear_keep, v, v);
+  }
+  if (hapi_v3_dot(w, w) > given->angular_threshold2) {
+    hapi_v3_scale(given->angular_keep, w, w);
+  }
+}
+
+static void limit_spin(hapi_local_body *body)
+{
+  double speed = hapi_v3_norm(body->twist.angular);
+  if (speed > body->given.max_angular_speed) {
+    hapi_v3_scale(body->given.max_angular_speed / speed, body->twist.angular, body->twist.angular);
+  }
+}
+
+static bool sound(const hapi_local_body *body)
+{
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    sum +=
+        fabs(body->twist.linear[i]) + fabs(body->twist.angular[i]) + fabs(body->pose.position[i]);
+  }
+  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
+}
+
+static void take_velocity(hapi_local_body *body, const double v[6])
+{
+  hapi_v3_copy(v, body->twist.linear);
+  hapi_v3_copy(v + 3, body->twist.angular);
+}
+
+static void step_body(hapi_tick *tick, hapi_local_body *body)
+{
+  hap_pose before = body->pose;
+  if (hapi_body_responds(body)) {
+    take_velocity(body, tick->world.solver.v[body->row]);
+    limit_spin(body);
+  } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
+    return;
+  }
+  memset(body->residual, 0, sizeof body->residual);
+  move_body(body, tick->period);
+  damp(body);
+  if (!sound(body)) {
+    body->pose = before;
+    memset(&body->twist, 0, sizeof body->twist);
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE);
+  }
+}
+
+/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
+static void give_outside(hapi_tick *tick, uint32_t slot, const double j[6], double impulse)
+{
+  hapi_local_body *body = hapi_row_body(tick, slot);
+  if (body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
+    body->pushed = true;
+    hapi_v3_madd(body->impulse, impulse, j, body->impulse);
+    hapi_v3_madd(body->angular_impulse, impulse, j + 3, body->angular_impulse);
+  }
+}
+
+static bool is_outside(hapi_tick *tick, uint32_t slot)
+{
+  const hapi_local_body *body = hapi_row_body(tick, slot);
+  return body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+}
+
+static bool is_owned(hapi_tick *tick, uint32_t slot)
+{
+  const hapi_local_body *body = hapi_row_body(tick, slot);
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+static void account(hapi_tick *tick)
+{
+  const hapi_solver *solver = &tick->world.solver;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    const hapi_row_source *source = &tick->world.sources[i];
+    if (row->impulse == 0.0) {
+      continue;
+    }
+    give_outside(tick, source->body_a, row->ja, row->impulse);
+    give_outside(tick, source->body_b, row->jb, row->impulse);
+    if (source->pointer && is_owned(tick, source->body_a)) {
+      hapi_local_body *body = &tick->bodies[source->body_a];
+      for (int k = 0; k < 6; ++k) {
+        body->gain[k] += row->impulse * row->ja[k];
+      }
+    }
+    if (is_owned(tick, source->body_a) && (source->pointer || is_outside(tick, source->body_b))) {
+      hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
+    }
+    if (is_owned(tick, source->body_b) && is_outside(tick, source->body_a)) {
+      hapi_v3_madd(tick->owned_impulse, row->impulse, row->jb, tick->owned_impulse);
+    }
+  }
+}
+
+/* Push-out moves the bodies, and is not to stay in their velocities: poses first, then a second
+ * solve without it. */
+static bool stop_push_out(hapi_tick *tick)
+{
+  hapi_solver *solver = &tick->world.solver;
+  bool any = false;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    if (tick->world.sources[i].pushes_out && solver->rows[i].impulse > 0.0) {
+      any = true;
+    }
+  }
+  for (uint32_t i = 0; any && i < solver->row_count; ++i) {
+    if (tick->world.sources[i].pushes_out) {
+      solver->rows[i].target = 0.0;
+    }
+  }
+  return any;
+}
+
+static void solve(hapi_tick *tick)
+{
+  hapi_solver_run(&tick->world.solver);
+  double residual = tick->world.solver.residual;
+  tick->residual_max = residual > tick->residual_max ? residual : tick->residual_max;
+  tick->sweeps += tick->world.solver.sweeps;
+}
+
+void hapi_local_world_step(hapi_tick *tick)
+{
+  begin(tick);
+  hapi_pointer_rows(tick);
+  hapi_contact_rows(tick);
+  set_free_velocities(tick);
+  solve(tick);
+  bool again = stop_push_out(tick);
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    step_body(tick, &tick->bodies[tick->live[i]]);
+  }
+  if (again) {
+    set_free_velocities(tick); /* eq. 14 went with the first */
+    solve(tick);
+    for (uint32_t i = 0; i < tick->live_count; ++i) {
+      hapi_local_body *body = &tick->bodies[tick->live[i]];
+      if (hapi_body_responds(body)) {
+        take_velocity(body, tick->world.solver.v[body->row]);
+        limit_spin(body);
+        follow_inertia(body);
+        damp(body);
+      }
+    }
+  }
+  hapi_contact_keep(tick);
+  hapi_pointer_forces(tick);
+  account(tick);
+}

@@ -1,0 +1,233 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include "haptic/rt/ball_nearest.h"
+#include "haptic/rt/rows.h"
+
+/* Pointer contacts as rows of the solver: the spring and damper of eq. 7, integrated so that no
+ * stiffness is too large for the body (numerics.md section 3). With n out of the body, w the speed
+ * at which the body gives way along -n, s that of the pointer into it, g the depth:
+ *
+ *   up to T^2 a k = 4  f = k (g' + 2 g + g")/4 + d (s - (w + w')/2)   g", g': one tick before, after
+ *   above it           f = k g' + d (s - w')
+ *
+ * The first is the midpoint rule written for poses that move with the new velocity: it keeps the
+ * energy, and f belongs to the tick's own time. The second is implicit Euler. Both are
+ * w' + f / c = F / c, a soft row. */
+
+#define MIDPOINT_LIMIT 4.0
+
+typedef struct placed_pointer {
+  hapi_tick_pointer *pointer;
+  hapi_local_body *body; /* NULL: static world */
+  double normal[3];      /* out of the body */
+  double point[3];
+  double depth;
+} placed_pointer;
+
+static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
+{
+  hapi_nearest nearest;
+  if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->radius, &c->shape, &c->shape_pose,
+                         at->body != NULL ? &at->body->pose : NULL, &nearest)) {
+    return false;
+  }
+  hapi_v3_copy(nearest.normal, at->normal);
+  hapi_v3_copy(nearest.point_b, at->point);
+  at->depth = -nearest.distance;
+  return true;
+}
+
+static void place_by_plane(const hapi_local_contact *c, placed_pointer *at)
+{
+  double apart[3];
+  hapi_body_point(at->body, c->point_body, at->point);
+  hapi_body_vector(at->body, c->normal_body, at->normal);
+  hapi_v3_sub(at->pointer->pose.position, at->point, apart);
+  at->depth = at->pointer->radius - hapi_v3_dot(at->normal, apart);
+}
+
+static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
+{
+  at->pointer = &tick->pointers[c->pointer];
+  at->body = hapi_row_body(tick, c->body);
+  if (at->pointer->generation != c->pointer_generation) {
+    return false; /* another pointer has come to its place: its contacts come with the next model */
+  }
+  bool ask = c->has_shape && tick->world.plane_mode == HAP_PLANE_WHERE_NEEDED;
+  if (!ask || !place_by_shape(c, at)) {
+    place_by_plane(c, at);
+  }
+  return true;
+}
+
+/* Contact that arrives with depth starts at zero force; one that closes later has all of it. */
+static double ramp(hapi_local_contact *c, double depth, double period)
+{
+  if (!c->seen) {
+    c->seen = true;
+    c->ramp = depth > 0.0 ? 0.0 : 1.0;
+  } else if (c->ramp < 1.0) {
+    double next = depth > 0.0 ? c->ramp + period / HAPI_RAMP_S : 1.0;
+    c->ramp = next > 1.0 ? 1.0 : next;
+  }
+  return c->ramp;
+}
+
+/* Spring and damper against what does not answer: eq. 7 as it stands. */
+static void push_static(hapi_local_contact *c, const placed_pointer *at, double share, double speed)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  double force = at->depth > 0.0 ? share * (p->stiffness * at->depth + p->damping * speed) : 0.0;
+  hapi_v3_scale(force > 0.0 ? -force : 0.0, at->normal, c->force);
+}
+
+static void soften(hapi_row *row, const placed_pointer *at, const double speeds[2], double share,
+                   double period)
+{
+  double k = share * at->pointer->stiffness;
+  double d = at->depth > 0.0 ? share * at->pointer->damping : 0.0;
+  double a = hapi_v3_dot(row->ja, row->ba) + hapi_v3_dot(row->ja + 3, row->ba + 3);
+  double w = speeds[0];
+  double s = speeds[1];
+  bool midpoint = period * period * a * k <= MIDPOINT_LIMIT;
+  double c = midpoint ? 0.25 * period * k + 0.5 * d : period * k + d;
+  double force = midpoint ? k * at->depth + 0.25 * period * k * w + d * (s - 0.5 * w)
+                          : k * (at->depth + period * s) + d * s;
+  row->softness = c > 0.0 ? 1.0 / (period * c) : HUGE_VAL;
+  row->target = c > 0.0 ? force / c : 0.0;
+}
+
+static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, double share)
+{
+  hapi_local_world *world = &tick->world;
+  hapi_local_contact *contact = &tick->contacts[index];
+  uint32_t number = world->solver.row_count;
+  hapi_row *row = &world->solver.rows[number];
+  double into[3];
+  hapi_v3_scale(-1.0, at->normal, into);
+  hapi_row_column(at->body, at->point, into, 1.0, row->ja, row->ba);
+  hapi_row_column(NULL, at->point, into, 1.0, row->jb, row->bb);
+  if ((at->body->flags & HAPI_BODY_MEASURED) != 0) { /* eq. 6: probed for this contact */
+    for (int i = 0; i < 6; ++i) {
+      row->ba[i] = hapi_v3_dot(contact->a[i], into);
+    }
+  }
+  double speeds[2] = {hapi_row_start_speed(at->body, row->ja),
+                      hapi_v3_dot(into, at->pointer->twist.linear)};
+  soften(row, at, speeds, share, tick->period);
+  if (row->softness == HUGE_VAL) {
+    return;
+  }
+  row->a = at->body->row;
+  row->b = HAPI_STATIC_ROW;
+  row->lo = 0.0;
+  row->hi = HUGE_VAL;
+  row->mu = 0.0;
+  row->normal = -1;
+  row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
+  world->sources[number] = (hapi_row_source){
+      .contact = index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  contact->row = number;
+  ++world->solver.row_count;
+}
+
+static double closing_speed(const placed_pointer *at)
+{
+  double speed = -hapi_v3_dot(at->normal, at->pointer->twist.linear);
+  if (at->body != NULL) {
+    double j[6];
+    double b[6];
+    hapi_row_column(at->body, at->point, at->normal, 1.0, j, b);
+    speed += hapi_row_start_speed(at->body, j);
+  }
+  return speed;
+}
+
+static void take_contact(hapi_tick *tick, uint32_t index)
+{
+  hapi_local_contact *c = &tick->contacts[index];
+  placed_pointer at;
+  bool placed = tick->fault == HAP_FAULT_NONE && place(tick, c, &at);
+  c->row = HAPI_NO_ROW;
+  if (!placed) {
+    hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+    return;
+  }
+  hapi_v3_copy(at.normal, c->normal_now);
+  hapi_v3_copy(at.point, c->point_now);
+  double share = ramp(c, at.depth, tick->period);
+  double speed = closing_speed(&at);
+  bool comes = at.depth > 0.0 || at.depth + tick->period * speed > 0.0;
+  if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 && at.depth > 0.0) {
+    at.body->flags &= ~(uint32_t)HAPI_BODY_RESTING; /* woken by the touch */
+  }
+  if (!comes || share <= 0.0) {
+    hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+  } else if (hapi_body_responds(at.body)) {
+    add_row(tick, index, &at, share);
+  } else {
+    push_static(c, &at, share, speed);
+  }
+}
+
+void hapi_pointer_rows(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    take_contact(tick, i);
+  }
+}
+
+static void audit(hapi_tick *tick, const double force[3])
+{
+  hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
+  tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
+}
+
+/* A body outside of the range has no row, but gets what it took at the next sync. */
+static void push_outside(hapi_tick *tick, hapi_local_body *body, const hapi_local_contact *c)
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(c->point_now, body->pose.position, arm);
+  hapi_v3_cross(arm, c->force, moment);
+  hapi_v3_madd(body->impulse, tick->period, c->force, body->impulse);
+  hapi_v3_madd(body->angular_impulse, tick->period, moment, body->angular_impulse);
+}
+
+static void feel(hapi_tick *tick, hapi_local_contact *c)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  hapi_local_body *body = hapi_row_body(tick, c->body);
+  if (c->row != HAPI_NO_ROW) {
+    double force = tick->world.solver.rows[c->row].impulse / tick->period;
+    hapi_v3_scale(-force, c->normal_now, c->force);
+  }
+  if (c->force[0] == 0.0 && c->force[1] == 0.0 && c->force[2] == 0.0) {
+    return;
+  }
+  hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
+  ++p->contacts;
+  ++tick->pushing;
+  if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
+    body->pushed = true;
+    audit(tick, c->force);
+    if (c->row == HAPI_NO_ROW) {
+      push_outside(tick, body, c);
+    }
+  }
+}
+
+void hapi_pointer_forces(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    tick->pointers[i].contacts = 0;
+    tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  }
+  tick->pushing = 0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    feel(tick, &tick->contacts[i]);
+  }
+  tick->contact_ticks += tick->pushing != 0;
+}

@@ -1,0 +1,61 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_RT_ROWS_H
+#define HAPODE_HAPTIC_RT_ROWS_H
+
+/* What contact rows and pointer rows share: placing things of a body, and one row's columns. */
+
+#include "base/vec.h"
+#include "haptic/rt/tick.h"
+
+/* Place 0 of the solver's velocities never moves: the static world. */
+#define HAPI_STATIC_ROW 0u
+
+static inline hapi_local_body *hapi_row_body(hapi_tick *tick, uint32_t slot)
+{
+  return slot == HAPI_SLOT_NONE ? NULL : &tick->bodies[slot];
+}
+
+static inline void hapi_body_point(const hapi_local_body *body, const double local[3],
+                                   double out[3])
+{
+  if (body == NULL) {
+    hapi_v3_copy(local, out);
+    return;
+  }
+  hapi_m3_apply(body->rotation, local, out);
+  hapi_v3_add(out, body->pose.position, out);
+}
+
+static inline void hapi_body_vector(const hapi_local_body *body, const double local[3],
+                                    double out[3])
+{
+  if (body == NULL) {
+    hapi_v3_copy(local, out);
+    return;
+  }
+  hapi_m3_apply(body->rotation, local, out);
+}
+
+/* Whether impulses of the loop move it: not what is driven or asleep. A body outside of the range
+ * answers with its own mass until physics says what became of it: as a wall it would take the whole
+ * push of an interval and hand it on too late, which is unstable (numerics.md section 3). */
+static inline bool hapi_body_responds(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
+}
+
+/* Jacobian and response of a unit impulse along direction at point. sign: -1 for the second body
+ * of a contact. */
+void hapi_row_column(const hapi_local_body *body, const double point[3], const double direction[3],
+                     double sign, double j[6], double b[6]);
+
+/* Velocity along j before this tick. */
+static inline double hapi_row_start_speed(const hapi_local_body *body, const double j[6])
+{
+  return body == NULL
+             ? 0.0
+             : hapi_v3_dot(j, body->start_twist) + hapi_v3_dot(j + 3, body->start_twist + 3);
+}
+
+#endif

@@ -1,0 +1,70 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "haptic/tick_memory.h"
+
+#include "base/alloc.h"
+
+#define ROWS_PER_CONTACT 3u   /* and one for a pointer's */
+#define DIRECT_ROWS 1024u     /* of an island: what it costs is bounded by the updates */
+#define SOLVER_TOLERANCE 1e-7 /* m/s */
+#define SOLVER_UPDATES 10000u /* row updates a solve: about 120 us */
+
+static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
+{
+  world->bucket_count = 4;
+  while (world->bucket_count < 2 * c->contacts) {
+    world->bucket_count *= 2;
+  }
+  world->row_capacity = (ROWS_PER_CONTACT + 1) * c->contacts;
+  world->memory = hapi_alloc_array(c->contacts, sizeof *world->memory);
+  world->old_memory = hapi_alloc_array(c->contacts, sizeof *world->old_memory);
+  world->buckets = hapi_alloc_array(world->bucket_count, sizeof *world->buckets);
+  world->sources = hapi_alloc_array(world->row_capacity, sizeof *world->sources);
+  hapi_solver *solver = &world->solver;
+  solver->tolerance = SOLVER_TOLERANCE;
+  solver->update_budget = SOLVER_UPDATES;
+  solver->direct_rows = DIRECT_ROWS;
+  solver->work_count = HAPI_SOLVER_WORK(world->row_capacity, c->bodies + 1);
+  solver->rows = hapi_alloc_array(world->row_capacity, sizeof *solver->rows);
+  solver->v = hapi_alloc_array(c->bodies + 1, sizeof *solver->v);
+  solver->work = hapi_alloc_array(solver->work_count, sizeof *solver->work);
+  return world->memory != NULL && world->old_memory != NULL && world->buckets != NULL &&
+         world->sources != NULL && solver->rows != NULL && solver->v != NULL &&
+         solver->work != NULL;
+}
+
+static void free_world(hapi_local_world *world)
+{
+  hapi_free(world->memory);
+  hapi_free(world->old_memory);
+  hapi_free(world->buckets);
+  hapi_free(world->sources);
+  hapi_free(world->solver.rows);
+  hapi_free(world->solver.v);
+  hapi_free(world->solver.work);
+}
+
+bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
+{
+  tick->capacity = *c;
+  tick->bodies = hapi_alloc_array(c->bodies, sizeof *tick->bodies);
+  tick->live = hapi_alloc_array(c->bodies, sizeof *tick->live);
+  tick->contacts = hapi_alloc_array(c->contacts, sizeof *tick->contacts);
+  tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
+  tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
+  tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
+  return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
+         tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL &&
+         allocate_world(&tick->world, c);
+}
+
+void hapi_tick_memory_destroy(hapi_tick *tick)
+{
+  hapi_free(tick->bodies);
+  hapi_free(tick->live);
+  hapi_free(tick->contacts);
+  hapi_free(tick->ramps);
+  hapi_free(tick->ramp_generations);
+  hapi_free(tick->pointers);
+  free_world(&tick->world);
+}

@@ -1,0 +1,487 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* The range of model CONTACT: a walk from the neighbours over what they may touch before the next
+ * sync, nearest first, until the loop's capacity is used. Each body gets one of four roles:
+ *
+ *   owned      free bodies of shapes that the contact thread knows: the loop moves them
+ *   measured   jointed ones, or on ground that only ODE's collider knows: testing simulations
+ *   outside    beyond the capacity: a moving boundary
+ *   driven     kinematic
+ *
+ * What is written here is what the contact thread needs: geoms, and pairs with their surfaces. */
+
+#define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
+#define LINK_GRAVITY 9.81
+
+static uint32_t range_capacity(const hapi_physics *physics)
+{
+  return physics->config.max_bodies;
+}
+
+static hapi_known_body *entry(hapi_physics *physics, uint32_t known)
+{
+  return &physics->table.entries[known];
+}
+
+static bool dynamic(dBodyID body)
+{
+  return body != NULL && !dBodyIsKinematic(body);
+}
+
+/* ---- the queue of the walk ---- */
+
+static bool enqueue(hapi_physics *physics, uint32_t known)
+{
+  hapi_range *range = &physics->range;
+  hapi_known_body *body = entry(physics, known);
+  if (body->ranged_in == range->number) {
+    return true;
+  }
+  uint32_t slot = hapi_slots_body(physics, known);
+  if (slot == HAPI_NONE || range->count == physics->config.capacity.bodies) {
+    ++physics->figures.stats.capacity_dropped;
+    return false;
+  }
+  hapi_body_slot *local = &physics->bodies[slot];
+  body->ranged_in = range->number;
+  body->expanded_in = 0;
+  local->wanted = true;
+  local->linked = false;
+  local->mass = hapi_body_mass(body->body);
+  local->flags = dBodyIsKinematic(body->body)  ? HAPI_BODY_DRIVEN
+                 : !dBodyIsEnabled(body->body) ? HAPI_BODY_RESTING
+                                               : 0;
+  range->queue[range->count++] = known;
+  return true;
+}
+
+/* ---- geoms ---- */
+
+static void fill_static(hapi_near_geom *out)
+{
+  out->body = HAPI_SLOT_NONE;
+  out->generation = 0;
+}
+
+static bool fill_hull(hapi_physics *physics, dGeomID geom, hapi_near *near, hapi_near_geom *out)
+{
+  const double *points = physics->neighborhood.hull;
+  hapi_shape hull;
+  hap_pose pose;
+  if (!hapi_hull_of_convex(physics, geom, &hull, &pose) ||
+      near->point_count + hull.hull_count > physics->config.capacity.hull_points) {
+    return false;
+  }
+  dBodyID body = dGeomGetBody(geom);
+  out->hull_first = near->point_count;
+  for (size_t i = 0; i < hull.hull_count; ++i) {
+    double *to = hapi_near_points(near) + (size_t)3 * near->point_count++;
+    hapi_v3_copy(points + 3 * i, to);
+    if (body != NULL) {
+      hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), to, to);
+    }
+  }
+  out->shape = hull;
+  out->shape.hull = NULL;
+  out->pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  return true;
+}
+
+static bool fill_geom(hapi_physics *physics, dGeomID geom, hapi_near_geom *out)
+{
+  hapi_near *near = physics->range.near;
+  dBodyID body = dGeomGetBody(geom);
+  memset(out, 0, sizeof *out);
+  fill_static(out);
+  if (dGeomGetClass(geom) == dConvexClass) {
+    if (!fill_hull(physics, geom, near, out)) {
+      return false;
+    }
+  } else {
+    hap_pose world;
+    if (!hapi_shape_of_geom(geom, &out->shape, &world)) {
+      return false;
+    }
+    out->pose = world;
+    if (body != NULL) {
+      const dReal *q = dBodyGetQuaternion(body);
+      double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
+      hapi_pose_unpoint(dBodyGetPosition(body), q, world.position, out->pose.position);
+      hapi_quat_multiply(inverse, world.quat_wxyz, out->pose.quat_wxyz);
+    }
+  }
+  if (body != NULL) {
+    uint32_t slot = entry(physics, hapi_bodies_find(&physics->table, body))->slot;
+    out->body = slot;
+    out->generation = physics->bodies[slot].generation;
+  }
+  return true;
+}
+
+/* Index of a geom in the message; HAPI_NONE: no room, or no shape. */
+static uint32_t take_geom(hapi_physics *physics, dGeomID geom)
+{
+  hapi_range *range = &physics->range;
+  for (uint32_t i = 0; i < range->near->geom_count; ++i) {
+    if (range->geoms[i] == geom) {
+      return i;
+    }
+  }
+  if (range->near->geom_count == physics->config.capacity.geoms) {
+    ++physics->figures.stats.capacity_dropped;
+    return HAPI_NONE;
+  }
+  uint32_t index = range->near->geom_count;
+  if (!fill_geom(physics, geom, &hapi_near_geoms(range->near)[index])) {
+    ++physics->figures.stats.capacity_dropped;
+    return HAPI_NONE;
+  }
+  range->geoms[index] = geom;
+  ++range->near->geom_count;
+  return index;
+}
+
+/* ---- pairs ---- */
+
+static uint64_t mix(uint64_t x)
+{
+  x = (x ^ (x >> 33)) * 0xff51afd7ed558ccdu;
+  x = (x ^ (x >> 33)) * 0xc4ceb9fe1a85ec53u;
+  return x ^ (x >> 33);
+}
+
+static uint64_t key_of(dGeomID a, dGeomID b, uint32_t part)
+{
+  uint64_t x = mix((uint64_t)(uintptr_t)a);
+  uint64_t y = mix((uint64_t)(uintptr_t)b);
+  return mix(x + y) ^ mix(part + 1u); /* whichever of the two was met first */
+}
+
+static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom_b, uint32_t part)
+{
+  hapi_near *near = physics->range.near;
+  uint32_t geom_a = take_geom(physics, link->own);
+  if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
+      near->pair_count == physics->config.capacity.contacts) {
+    ++physics->figures.stats.capacity_dropped;
+    return;
+  }
+  hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
+  pair->key = key_of(link->own, link->other, part);
+  pair->geom_a = geom_a;
+  pair->geom_b = geom_b;
+  pair->surface = link->surface;
+}
+
+/* The triangles of static ground near a geom, each as a geom of its own. */
+static void add_mesh(hapi_physics *physics, const hapi_link *link)
+{
+  hapi_range *range = &physics->range;
+  hapi_near *near = range->near;
+  uint32_t count = hapi_mesh_near(physics, link->other, link->box);
+  for (uint32_t i = 0; i < count; ++i) {
+    if (near->geom_count == physics->config.capacity.geoms ||
+        near->point_count + 3 > physics->config.capacity.hull_points) {
+      ++physics->figures.stats.capacity_dropped;
+      return;
+    }
+    const hapi_near_triangle *triangle = &physics->meshes.found[i];
+    hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
+    memset(out, 0, sizeof *out);
+    fill_static(out);
+    out->shape.kind = HAPI_SHAPE_HULL;
+    out->shape.hull_count = 3;
+    out->hull_first = near->point_count;
+    out->open_edges = triangle->open_edges;
+    out->pose.quat_wxyz[0] = 1.0;
+    memcpy(hapi_near_points(near) + (size_t)3 * near->point_count, triangle->corners,
+           sizeof triangle->corners);
+    near->point_count += 3;
+    range->geoms[near->geom_count] = NULL; /* not to be found by its geom */
+    add_pair(physics, link, near->geom_count++, triangle->index + 1);
+  }
+}
+
+/* ---- links: what is near a body ---- */
+
+static bool geom_is_known(dGeomID geom)
+{
+  switch (dGeomGetClass(geom)) {
+    case dSphereClass:
+    case dBoxClass:
+    case dCapsuleClass:
+    case dCylinderClass:
+    case dPlaneClass:
+    case dConvexClass:
+      return true;
+    case dTriMeshClass:
+      return dGeomGetBody(geom) == NULL;
+    default:
+      return false;
+  }
+}
+
+static bool bits_meet(dGeomID a, dGeomID b)
+{
+  return (dGeomGetCategoryBits(a) & dGeomGetCollideBits(b)) != 0 ||
+         (dGeomGetCategoryBits(b) & dGeomGetCollideBits(a)) != 0;
+}
+
+/* A pair is met from both of its bodies: the second time it is known. */
+static bool met_before(const hapi_physics *physics, dBodyID other)
+{
+  uint32_t known = hapi_bodies_find(&physics->table, other);
+  return known != HAPI_NONE && physics->table.entries[known].expanded_in == physics->range.number;
+}
+
+static void link_geom(void *data, dGeomID a, dGeomID b)
+{
+  hapi_physics *physics = data;
+  hapi_range *range = &physics->range;
+  dGeomID geom = a == range->box_geom ? b : a;
+  if (dGeomIsSpace(geom)) {
+    dSpaceCollide2(range->box_geom, geom, data, link_geom);
+    return;
+  }
+  dBodyID body = dGeomGetBody(geom);
+  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->own_body ||
+      !bits_meet(range->own_geom, geom) || met_before(physics, body)) {
+    return;
+  }
+  if (!hapi_reserve((void **)&range->links, &range->link_capacity, range->link_count, 1,
+                    sizeof *range->links)) {
+    ++physics->figures.stats.capacity_dropped;
+    return;
+  }
+  hapi_link *link = &range->links[range->link_count];
+  link->own = range->own_geom;
+  link->other = geom;
+  memcpy(link->box, range->own_box, sizeof link->box);
+  if (hapi_world_surface(physics, link->own, link->other, &link->surface)) {
+    ++range->link_count;
+  }
+}
+
+/* How far the surfaces of a body and of others may come nearer until the model after the next. */
+static double reach_of(const hapi_physics *physics, const hapi_known_body *known)
+{
+  double seconds = 2.0 * physics->probe_step_s;
+  double speed = hapi_v3_norm(dBodyGetLinearVel(known->body)) +
+                 known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
+  speed = speed > physics->range.fastest ? speed : physics->range.fastest;
+  return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
+}
+
+static void find_links(hapi_physics *physics, const hapi_known_body *known)
+{
+  hapi_range *range = &physics->range;
+  double reach = reach_of(physics, known);
+  range->link_count = 0;
+  range->own_body = known->body;
+  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    dReal *box = range->own_box;
+    if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass) {
+      continue;
+    }
+    dGeomGetAABB(geom, box);
+    for (int k = 0; k < 3; ++k) {
+      box[2 * k] -= reach;
+      box[2 * k + 1] += reach;
+    }
+    range->own_geom = geom;
+    dGeomBoxSetLengths(range->box_geom, box[1] - box[0], box[3] - box[2], box[5] - box[4]);
+    dGeomSetPosition(range->box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
+                     0.5 * (box[4] + box[5]));
+    dSpaceCollide2(range->box_geom, (dGeomID)physics->ode.space, physics, link_geom);
+  }
+}
+
+/* ---- roles ---- */
+
+static bool has_joint(dBodyID body)
+{
+  int count = dBodyGetNumJoints(body);
+  for (int i = 0; i < count; ++i) {
+    if (dJointGetType(dBodyGetJoint(body, i)) != dJointTypeContact) {
+      return true;
+    }
+  }
+  return false;
+}
+
+static bool can_be_owned(const hapi_physics *physics, const hapi_known_body *known)
+{
+  const hapi_range *range = &physics->range;
+  if (has_joint(known->body)) {
+    return false;
+  }
+  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    if (dGeomGetClass(geom) != dRayClass && !geom_is_known(geom)) {
+      return false;
+    }
+  }
+  for (uint32_t i = 0; i < range->link_count; ++i) {
+    if (!geom_is_known(range->links[i].other)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static void take_links(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  for (uint32_t i = 0; i < range->link_count; ++i) {
+    const hapi_link *link = &range->links[i];
+    dBodyID body = dGeomGetBody(link->other);
+    uint32_t known = hapi_bodies_find(&physics->table, body);
+    if (body != NULL && (known == HAPI_NONE || !enqueue(physics, known))) {
+      continue;
+    }
+    if (body != NULL) {
+      physics->bodies[entry(physics, known)->slot].linked = true;
+    }
+    if (dGeomGetClass(link->other) == dTriMeshClass) {
+      add_mesh(physics, link);
+    } else {
+      add_pair(physics, link, take_geom(physics, link->other), 0);
+    }
+  }
+}
+
+/* True: the loop moves the body, and the walk goes on from it. */
+static void expand(hapi_physics *physics, uint32_t index, bool seed)
+{
+  hapi_range *range = &physics->range;
+  hapi_known_body *known = entry(physics, index);
+  hapi_body_slot *slot = &physics->bodies[known->slot];
+  if (!dynamic(known->body)) {
+    return;
+  }
+  if (range->owned == range_capacity(physics)) {
+    slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
+    return;
+  }
+  find_links(physics, known);
+  if (!can_be_owned(physics, known)) {
+    slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
+    return;
+  }
+  slot->flags |= HAPI_BODY_OWNED;
+  ++range->owned;
+  take_links(physics);
+  known->expanded_in = range->number;
+}
+
+static double fastest_pointer(const hapi_physics *physics)
+{
+  double fastest = 0.0;
+  const hapi_state_pointer *pointers = hapi_state_pointers(physics->state);
+  for (uint32_t i = 0; i < physics->state->pointer_count; ++i) {
+    double speed = pointers[i].generation != 0 ? hapi_v3_norm(pointers[i].twist.linear) : 0.0;
+    fastest = speed > fastest ? speed : fastest;
+  }
+  return fastest;
+}
+
+static void begin_walk(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  range->near = hapi_exchange_near_back(physics->config.exchange);
+  range->near->body_count = 0;
+  range->near->geom_count = 0;
+  range->near->pair_count = 0;
+  range->near->point_count = 0;
+  range->number = physics->model_number + 1;
+  range->count = range->owned = 0;
+  range->fastest = fastest_pointer(physics);
+}
+
+void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
+{
+  if (physics->model != HAP_MODEL_CONTACT || physics->state == NULL) {
+    return;
+  }
+  hapi_range *range = &physics->range;
+  begin_walk(physics);
+  for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */
+    uint32_t known =
+        hapi_bodies_find(&physics->table, dGeomGetBody(physics->neighborhood.hits[i].geom));
+    if (known != HAPI_NONE && entry(physics, known)->slot != HAPI_NONE) {
+      enqueue(physics, known);
+    }
+  }
+  uint32_t seeds = range->count;
+  for (uint32_t next = 0; next < range->count; ++next) {
+    expand(physics, range->queue[next], next < seeds);
+  }
+}
+
+/* ---- the message to the contact thread ---- */
+
+static void fill_body(hapi_physics *physics, uint32_t known, hapi_near_body *out)
+{
+  dBodyID body = entry(physics, known)->body;
+  out->slot = entry(physics, known)->slot;
+  out->generation = physics->bodies[out->slot].generation;
+  hapi_v3_copy(dBodyGetPosition(body), out->pose.position);
+  memcpy(out->pose.quat_wxyz, dBodyGetQuaternion(body), sizeof out->pose.quat_wxyz);
+  hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
+  hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
+}
+
+static void count_roles(hapi_physics *physics)
+{
+  hap_stats *stats = &physics->figures.stats;
+  stats->range_bodies = stats->edge_bodies = stats->measured_bodies = 0;
+  for (uint32_t i = 0; i < physics->range.count; ++i) {
+    uint32_t flags = physics->bodies[entry(physics, physics->range.queue[i])->slot].flags;
+    stats->range_bodies += (flags & HAPI_BODY_OWNED) != 0;
+    stats->measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
+    stats->edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+  }
+}
+
+void hapi_range_publish(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  if (physics->model != HAP_MODEL_CONTACT || range->number != physics->model_number) {
+    return;
+  }
+  hapi_near_body *bodies = hapi_near_bodies(range->near);
+  for (uint32_t i = 0; i < range->count; ++i) {
+    fill_body(physics, range->queue[i], &bodies[range->near->body_count++]);
+  }
+  range->near->model_number = physics->model_number;
+  count_roles(physics);
+  hapi_exchange_near_publish(physics->config.exchange);
+}
+
+bool hapi_range_create(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  const hapi_capacity *c = &physics->config.capacity;
+  range->queue = hapi_alloc_array(c->bodies, sizeof *range->queue);
+  range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
+  range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
+  return range->queue != NULL && range->geoms != NULL && range->box_geom != NULL;
+}
+
+void hapi_range_finish(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  if (range->box_geom != NULL) {
+    dGeomDestroy(range->box_geom);
+  }
+  hapi_free(range->queue);
+  hapi_free(range->geoms);
+  hapi_free(range->links);
+  memset(range, 0, sizeof *range);
+}

@@ -1,0 +1,216 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Triangles of static meshes near a box. ODE's own search keeps a cache that the whole process
+ * shares, and gives contacts, not triangles; so the triangles are read once, in the order of the
+ * mesh, with a box around every few of them. */
+
+#define CHUNK 32u
+#define FOUND_MAX 64u
+#define SAME_POINT2 1e-16 /* m^2 */
+
+static void destroy_mesh(hapi_mesh *mesh)
+{
+  hapi_free(mesh->corners);
+  hapi_free(mesh->boxes);
+  memset(mesh, 0, sizeof *mesh);
+}
+
+void hapi_meshes_finish(hapi_meshes *meshes)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    destroy_mesh(&meshes->meshes[i]);
+  }
+  hapi_free(meshes->meshes);
+  memset(meshes, 0, sizeof *meshes);
+}
+
+void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    if (meshes->meshes[i].geom == geom) {
+      destroy_mesh(&meshes->meshes[i]);
+      meshes->meshes[i] = meshes->meshes[--meshes->count];
+      return;
+    }
+  }
+}
+
+static void grow_box(double box[6], const double *point, bool first)
+{
+  for (int k = 0; k < 3; ++k) {
+    box[2 * k] = first || point[k] < box[2 * k] ? point[k] : box[2 * k];
+    box[2 * k + 1] = first || point[k] > box[2 * k + 1] ? point[k] : box[2 * k + 1];
+  }
+}
+
+/* ODE gives the corners in the world: kept in the geom's frame, as the geom may be moved. */
+static void read_triangle(dGeomID geom, uint32_t index, double out[9])
+{
+  dVector3 corners[3];
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  dGeomTriMeshGetTriangle(geom, (int)index, &corners[0], &corners[1], &corners[2]);
+  for (int i = 0; i < 3; ++i) {
+    hapi_pose_unpoint(dGeomGetPosition(geom), quat, corners[i], out + 3 * i);
+  }
+}
+
+static bool read_mesh(dGeomID geom, hapi_mesh *mesh)
+{
+  uint32_t count = (uint32_t)dGeomTriMeshGetTriangleCount(geom);
+  uint32_t chunks = (count + CHUNK - 1) / CHUNK;
+  memset(mesh, 0, sizeof *mesh);
+  mesh->corners = hapi_alloc_array(count, 9 * sizeof(double));
+  mesh->boxes = hapi_alloc_array(chunks, 6 * sizeof(double));
+  if (count == 0 || mesh->corners == NULL || mesh->boxes == NULL) {
+    destroy_mesh(mesh);
+    return false;
+  }
+  mesh->geom = geom;
+  mesh->data = dGeomTriMeshGetTriMeshDataID(geom);
+  mesh->count = count;
+  for (uint32_t i = 0; i < count; ++i) {
+    double *corners = mesh->corners + (size_t)9 * i;
+    double *box = mesh->boxes + (size_t)6 * (i / CHUNK);
+    read_triangle(geom, i, corners);
+    for (int k = 0; k < 3; ++k) {
+      grow_box(box, corners + 3 * k, i % CHUNK == 0 && k == 0);
+    }
+  }
+  return true;
+}
+
+static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    const hapi_mesh *mesh = &meshes->meshes[i];
+    if (mesh->geom == geom && mesh->data == dGeomTriMeshGetTriMeshDataID(geom) &&
+        mesh->count == (uint32_t)dGeomTriMeshGetTriangleCount(geom)) {
+      return mesh;
+    }
+  }
+  hapi_meshes_forget(meshes, geom);
+  if (!hapi_reserve((void **)&meshes->meshes, &meshes->capacity, meshes->count, 1,
+                    sizeof *meshes->meshes) ||
+      !read_mesh(geom, &meshes->meshes[meshes->count])) {
+    return NULL;
+  }
+  return &meshes->meshes[meshes->count++];
+}
+
+static bool boxes_meet(const double a[6], const double b[6])
+{
+  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
+         b[4] <= a[5];
+}
+
+/* A box of the world in the geom's frame: one that holds it. */
+static void box_to_geom(dGeomID geom, const double box[6], double out[6])
+{
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  for (int i = 0; i < 8; ++i) {
+    double corner[3] = {box[i & 1], box[2 + ((i >> 1) & 1)], box[4 + ((i >> 2) & 1)]};
+    hapi_pose_unpoint(dGeomGetPosition(geom), quat, corner, corner);
+    grow_box(out, corner, i == 0);
+  }
+}
+
+static bool same_point(const double *a, const double *b)
+{
+  double apart[3];
+  hapi_v3_sub(a, b, apart);
+  return hapi_v3_dot(apart, apart) <= SAME_POINT2;
+}
+
+/* Whether other has the edge from corner edge of triangle, and lies level with it or above. */
+static bool closes(const double *triangle, int edge, const double *other)
+{
+  const double *from = triangle + (size_t)3 * (size_t)edge;
+  const double *to = triangle + (size_t)3 * (size_t)((edge + 1) % 3);
+  for (int i = 0; i < 3; ++i) {
+    const double *p = other + (size_t)3 * (size_t)i;
+    const double *q = other + (size_t)3 * (size_t)((i + 1) % 3);
+    const double *apex = other + (size_t)3 * (size_t)((i + 2) % 3);
+    if ((same_point(p, to) && same_point(q, from)) || (same_point(p, from) && same_point(q, to))) {
+      double sides[2][3];
+      double normal[3];
+      double rise[3];
+      hapi_v3_sub(triangle + 3, triangle, sides[0]);
+      hapi_v3_sub(triangle + 6, triangle, sides[1]);
+      hapi_v3_cross(sides[0], sides[1], normal);
+      hapi_v3_sub(apex, from, rise);
+      return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
+    }
+  }
+  return false;
+}
+
+static void find_open_edges(hapi_meshes *meshes, uint32_t count)
+{
+  for (uint32_t i = 0; i < count; ++i) {
+    hapi_near_triangle *triangle = &meshes->found[i];
+    triangle->open_edges = 15;
+    for (int edge = 0; edge < 3; ++edge) {
+      for (uint32_t k = 0; k < count; ++k) {
+        if (k != i && closes(triangle->corners, edge, meshes->found[k].corners)) {
+          triangle->open_edges &= ~(1u << edge);
+        }
+      }
+    }
+  }
+}
+
+static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
+                             hapi_meshes *meshes, uint32_t found)
+{
+  uint32_t end = (chunk + 1) * CHUNK < mesh->count ? (chunk + 1) * CHUNK : mesh->count;
+  for (uint32_t i = chunk * CHUNK; i < end && found < FOUND_MAX; ++i) {
+    const double *corners = mesh->corners + (size_t)9 * i;
+    double own[6];
+    for (int k = 0; k < 3; ++k) {
+      grow_box(own, corners + 3 * k, k == 0);
+    }
+    if (boxes_meet(own, box)) {
+      memcpy(meshes->found[found].corners, corners, sizeof meshes->found[found].corners);
+      meshes->found[found++].index = i;
+    }
+  }
+  return found;
+}
+
+uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6])
+{
+  hapi_meshes *meshes = &physics->meshes;
+  const hapi_mesh *mesh = find_mesh(meshes, geom);
+  double local[6];
+  uint32_t found = 0;
+  if (mesh == NULL) {
+    ++physics->figures.stats.capacity_dropped;
+    return 0;
+  }
+  box_to_geom(geom, box, local);
+  for (uint32_t chunk = 0; chunk < (mesh->count + CHUNK - 1) / CHUNK; ++chunk) {
+    if (boxes_meet(mesh->boxes + (size_t)6 * chunk, local)) {
+      found = search_chunk(mesh, chunk, local, meshes, found);
+    }
+  }
+  physics->figures.stats.capacity_dropped += found == FOUND_MAX;
+  find_open_edges(meshes, found);
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  for (uint32_t i = 0; i < found; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      double *corner = meshes->found[i].corners + 3 * k;
+      hapi_pose_point(dGeomGetPosition(geom), quat, corner, corner);
+    }
+  }
+  return found;
+}

@@ -1,0 +1,176 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Testing simulations for bodies that the loop of model CONTACT meets but does not own: jointed
+ * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of each
+ * the response to a wrench at its centre of mass, 6x6, about the operating point: every probe has
+ * the mean wrench of the last interval, so that contacts are loaded as they really are. The bodies
+ * that the loop owns are not there in a probe: their contacts are the loop's. */
+
+/* Of the weight: within the plateau between rounding and another set of active contacts. */
+#define PROBE_SHARE 0.01
+
+static double force_of(const hapi_body_slot *slot)
+{
+  double least = PROBE_SHARE * HAPI_STANDARD_GRAVITY * slot->mass;
+  return fmax(least, hapi_v3_norm(slot->exchanged));
+}
+
+static double torque_of(const hapi_physics *physics, const hapi_body_slot *slot)
+{
+  double arm = physics->table.entries[slot->known].extent;
+  return force_of(slot) * (arm > 0.0 ? arm : 1.0);
+}
+
+static double exchanged_norm(const hapi_body_slot *slot)
+{
+  return hapi_v3_norm(slot->exchanged);
+}
+
+/* Those that took most of the loop's impulse first. */
+static void choose(hapi_physics *physics)
+{
+  for (uint32_t n = 0; n < physics->config.max_edge_probes; ++n) {
+    hapi_body_slot *best = NULL;
+    for (uint32_t i = 0; i < physics->body_high; ++i) {
+      hapi_body_slot *slot = &physics->bodies[i];
+      uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
+      bool outside = slot->phase == HAPI_SLOT_LIVE && slot->wanted && (slot->flags & role) == 0;
+      if (outside && exchanged_norm(slot) > (best != NULL ? exchanged_norm(best) : 0.0)) {
+        best = slot;
+      }
+    }
+    if (best == NULL) {
+      return;
+    }
+    best->flags = (best->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
+  }
+}
+
+static void add_wrench(dBodyID body, const double wrench[6])
+{
+  dBodyAddForce(body, wrench[0], wrench[1], wrench[2]);
+  dBodyAddTorque(body, wrench[3], wrench[4], wrench[5]);
+}
+
+static dBodyID body_of(const hapi_physics *physics, const hapi_body_slot *slot)
+{
+  return physics->table.entries[slot->known].body;
+}
+
+static void begin_probe(hapi_physics *physics)
+{
+  hapi_test_rewind(physics);
+  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
+    const hapi_body_slot *slot = &physics->bodies[physics->test.bodies[i]];
+    add_wrench(body_of(physics, slot), slot->exchanged);
+  }
+}
+
+static void acceleration(const hapi_physics *physics, const hapi_body_slot *slot, double out[6])
+{
+  const hapi_body_state *before = hapi_test_state(physics, slot->known);
+  const dReal *linear = dBodyGetLinearVel(before->body);
+  const dReal *angular = dBodyGetAngularVel(before->body);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = (linear[i] - before->linear[i]) / physics->probe_step_s;
+    out[3 + i] = (angular[i] - before->angular[i]) / physics->probe_step_s;
+  }
+}
+
+/* What a response must be: symmetric, and no body gives way the wrong way. Clipped to no more than
+ * the free body's, whose mass nothing makes smaller. False: not usable. */
+static bool tidy(const hapi_physics *physics, const hapi_body_slot *slot, double a[6][6])
+{
+  dMass mass;
+  dBodyGetMass(body_of(physics, slot), &mass);
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < i; ++k) {
+      a[i][k] = a[k][i] = 0.5 * (a[i][k] + a[k][i]);
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    double most = i < 3 ? 1.0 / mass.mass : HUGE_VAL;
+    if (!hapi_finite(a[i], 6) || a[i][i] > 1.5 * most) {
+      return false;
+    }
+    a[i][i] = fmax(fmin(a[i][i], most), 0.0);
+  }
+  for (int i = 0; i < 6; ++i) { /* no off-diagonal larger than its diagonals allow */
+    for (int k = 0; k < i; ++k) {
+      double limit = sqrt(a[i][i] * a[k][k]);
+      a[i][k] = a[k][i] = fmax(-limit, fmin(limit, a[i][k]));
+    }
+  }
+  return true;
+}
+
+/* b without the wrench of the operating point, which the loop's rows give anew. */
+static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], const double base[6])
+{
+  if (!tidy(physics, slot, a) || !hapi_finite(base, 6)) {
+    ++physics->figures.stats.probes_singular; /* the last good one stays, or the body is outside */
+    slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
+    return;
+  }
+  memcpy(slot->response, a, sizeof slot->response);
+  for (int i = 0; i < 6; ++i) {
+    slot->b[i] = base[i];
+    for (int k = 0; k < 6; ++k) {
+      slot->b[i] -= a[i][k] * slot->exchanged[k];
+    }
+  }
+  slot->measured = true;
+}
+
+static void measure_body(hapi_physics *physics, hapi_body_slot *slot, const double base[6])
+{
+  double a[6][6];
+  for (int axis = 0; axis < 6; ++axis) {
+    double wrench[6] = {0.0};
+    double column[6];
+    wrench[axis] = axis < 3 ? force_of(slot) : torque_of(physics, slot);
+    begin_probe(physics);
+    add_wrench(body_of(physics, slot), wrench);
+    hapi_test_step(physics);
+    acceleration(physics, slot, column);
+    for (int i = 0; i < 6; ++i) {
+      a[i][axis] = (column[i] - base[i]) / wrench[axis];
+    }
+  }
+  keep(physics, slot, a, base);
+}
+
+void hapi_operating_point_measure(hapi_physics *physics)
+{
+  if (physics->model != HAP_MODEL_CONTACT) {
+    return;
+  }
+  choose(physics);
+  hap_status status = hapi_test_gather_bodies(physics);
+  if (status >= HAP_OK && physics->test.body_count > 0) {
+    status = hapi_test_enter(physics);
+  }
+  if (status < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last response stays");
+    return;
+  }
+  if (physics->test.body_count == 0) {
+    return;
+  }
+  begin_probe(physics);
+  hapi_test_step(physics);
+  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
+    acceleration(physics, &physics->bodies[physics->test.bodies[i]], physics->test.base[i]);
+  }
+  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
+    measure_body(physics, &physics->bodies[physics->test.bodies[i]], physics->test.base[i]);
+  }
+  hapi_test_leave(physics);
+}

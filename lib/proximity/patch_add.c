@@ -1,0 +1,121 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "proximity/direction.h"
+#include "proximity/patch_parts.h"
+
+void hapi_surface_lift(const hapi_solid *solid, double ball, double rim, const double dir[3],
+                       double out[3])
+{
+  hapi_v3_scale(ball, dir, out);
+  if (rim > 0.0) {
+    double axis[3];
+    double across[3];
+    hapi_solid_axis(solid, 2, axis);
+    hapi_v3_madd(dir, -hapi_v3_dot(dir, axis), axis, across);
+    if (hapi_v3_unit(across, across) > 0.0) {
+      hapi_v3_madd(out, rim, across, out);
+    }
+  }
+}
+
+static double gap_of(const hapi_pair *pair, const hapi_patch_point *p)
+{
+  double back[3];
+  double lift_a[3];
+  double lift_b[3];
+  double between[3];
+  hapi_v3_scale(-1.0, p->normal, back);
+  hapi_surface_lift(pair->a, p->ball_a, p->rim_a, back, lift_a);
+  hapi_surface_lift(pair->b, p->ball_b, p->rim_b, p->normal, lift_b);
+  hapi_v3_sub(p->core_a, p->core_b, between);
+  hapi_v3_add(between, lift_a, between);
+  hapi_v3_sub(between, lift_b, between);
+  return hapi_v3_dot(between, p->normal);
+}
+
+void hapi_patch_add(const hapi_pair *pair, const hapi_patch_point *point)
+{
+  hapi_patch *patch = pair->out;
+  double gap = gap_of(pair, point);
+  if (!(gap <= pair->margin)) {
+    return;
+  }
+  int place = patch->count;
+  while (place > 0 && gap < patch->points[place - 1].gap) {
+    --place;
+  }
+  if (place == HAPI_PATCH_POINTS) {
+    return;
+  }
+  patch->count += patch->count < HAPI_PATCH_POINTS;
+  for (int i = patch->count - 1; i > place; --i) {
+    patch->points[i] = patch->points[i - 1];
+  }
+  patch->points[place] = *point;
+  patch->points[place].gap = gap;
+}
+
+static void spot_point(const hapi_frame *frame, const hapi_spot *spot, double out[3])
+{
+  for (int i = 0; i < 3; ++i) {
+    out[i] = frame->origin[i] + spot->x * frame->x[i] + spot->y * frame->y[i];
+  }
+}
+
+/* Field by field: clearing the point first takes as long as all the rest. */
+static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
+                       const hapi_feature *incident, const hapi_spot *spot)
+{
+  double *fixed = reference_is_a ? p->core_a : p->core_b;
+  double *pushed = reference_is_a ? p->core_b : p->core_a;
+  p->touch = reference_is_a ? HAPI_TOUCH_FACE_A : HAPI_TOUCH_FACE_B;
+  spot_point(frame, spot, fixed);
+  hapi_v3_madd(fixed, spot->gap, frame->normal, pushed);
+  hapi_v3_sub(pushed, incident->lift, pushed);
+  p->ball_a = reference_is_a ? 0.0 : incident->ball;
+  p->ball_b = reference_is_a ? incident->ball : 0.0;
+  p->rim_a = reference_is_a ? 0.0 : incident->rim;
+  p->rim_b = reference_is_a ? incident->rim : 0.0;
+  hapi_v3_set(p->edge_a, 0.0, 0.0, 0.0);
+  hapi_v3_set(p->edge_b, 0.0, 0.0, 0.0);
+  hapi_v3_scale(reference_is_a ? -1.0 : 1.0, frame->normal, p->normal);
+  p->gap = spot->gap;
+}
+
+void hapi_patch_add_spots(const hapi_pair *pair, bool reference_is_a, const hapi_frame *frame,
+                          const hapi_feature *incident, hapi_spot *spots, int count)
+{
+  hapi_patch *patch = pair->out;
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    if (spots[i].gap <= pair->margin) {
+      spots[kept++] = spots[i];
+    }
+  }
+  kept = hapi_patch_reduce(spots, kept, pair->size);
+  for (int i = 0; i < kept && patch->count < HAPI_PATCH_POINTS; ++i) {
+    face_point(&patch->points[patch->count++], reference_is_a, frame, incident, &spots[i]);
+  }
+}
+
+bool hapi_patch_add_faces(const hapi_pair *pair, bool reference_is_a, const hapi_feature *reference,
+                          const hapi_feature *incident)
+{
+  hapi_spot spots[HAPI_SPOTS_MAX];
+  hapi_frame frame;
+  int before = pair->out->count;
+  hapi_v3_copy(reference->center, frame.origin);
+  hapi_v3_copy(reference->normal, frame.normal);
+  hapi_v3_sub(reference->corner[1], reference->corner[0], frame.x);
+  hapi_v3_unit(frame.x, frame.x);
+  hapi_v3_cross(frame.normal, frame.x, frame.y);
+  for (int i = 0; i < incident->count; ++i) {
+    double arm[3];
+    hapi_v3_sub(incident->corner[i], frame.origin, arm);
+    spots[i] = (hapi_spot){hapi_v3_dot(arm, frame.x), hapi_v3_dot(arm, frame.y),
+                           hapi_v3_dot(arm, frame.normal)};
+  }
+  int count = hapi_patch_clip(reference, &frame, spots, incident->count);
+  hapi_patch_add_spots(pair, reference_is_a, &frame, incident, spots, count);
+  return pair->out->count > before;
+}
