@@ -105,6 +105,13 @@ double bare_cycle(bare *b, double step_s)
   return spent;
 }
 
+void bare_exact_step(bare *b, double step_s)
+{
+  dJointGroupEmpty(b->contacts);
+  dSpaceCollide(b->scene->space, b, near_callback);
+  dWorldStep(b->scene->world, step_s);
+}
+
 /* ---- islands ---- */
 
 static double distance2(dBodyID body, const double at[3])

@@ -35,6 +35,9 @@ void bare_follow(bare *b, const scene *from);
 /* Collision and global step over step_s, timed [s]. */
 double bare_cycle(bare *b, double step_s);
 
+/* The same with ODE's direct solver. Forces that were added before act in it. */
+void bare_exact_step(bare *b, double step_s);
+
 /* One QuickStep of the islands of the bodies nearest to the hand, all others switched off [s]: the
  * mean of four in a row from the same state, without and with a force on the nearest body along x, y
  * and z, as testing simulations are. So it has what makes these dearer than a step alone: colder

@@ -16,6 +16,7 @@ typedef struct bench {
   const char *out;   /* folder of tables and pictures */
   bool quick;        /* shorter sweeps, fewer repeats */
   bool verify;       /* say "ok" or "off" */
+  const char *scene; /* accuracy: this scene alone; NULL: all */
   int off;           /* checks that were off */
   hap_detail detail; /* why a program failed */
 } bench;
@@ -23,6 +24,7 @@ typedef struct bench {
 /* Status, and on failure a text in bench.detail. */
 typedef hap_status (*bench_fn)(bench *b);
 
+hap_status bench_accuracy(bench *b);
 hap_status bench_fig5(bench *b);
 hap_status bench_fig6(bench *b);
 hap_status bench_fig7(bench *b);

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench NAME [--out DIR] [--quick] [--verify]: measures, writes NAME.csv and NAME.svg. Exit
- * 0: done, 1: failed or --verify found something off, 2: usage. */
+/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE]: measures, writes NAME.csv and
+ * NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
 
@@ -17,6 +17,7 @@ typedef struct program {
 } program;
 
 static const program programs[] = {
+    {"accuracy", bench_accuracy, "what accuracy costs in time; --scene NAME: of one scene alone"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
@@ -29,7 +30,7 @@ static const program programs[] = {
 static void print_usage(FILE *to)
 {
   fprintf(to,
-          "usage: hapode-bench NAME [--out DIR] [--quick] [--verify]\n"
+          "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE]\n"
           "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-8s  %s\n", programs[i].name, programs[i].text);
@@ -60,6 +61,8 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
       b->out = argument + 6;
     } else if (strcmp(argument, "--out") == 0 && i + 1 < count) {
       b->out = arguments[++i];
+    } else if (strcmp(argument, "--scene") == 0 && i + 1 < count) {
+      b->scene = arguments[++i];
     } else if (argument[0] == '-' || *out != NULL) {
       fprintf(stderr, "hapode-bench: \"%s\" is not understood\n", argument);
       return false;
@@ -70,6 +73,9 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
   }
   if (*out == NULL) {
     fprintf(stderr, "hapode-bench: which bench?\n");
+  } else if (b->scene != NULL && (*out)->run != bench_accuracy) {
+    fprintf(stderr, "hapode-bench: %s has no scenes to choose from\n", (*out)->name);
+    return false;
   }
   return *out != NULL && b->out[0] != '\0';
 }

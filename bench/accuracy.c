@@ -1,0 +1,165 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench accuracy: what accuracy costs in time. Every scene with a prescribed motion of the
+ * hand, in every model, against model SINGLE at 1 kHz with 1000 iterations. Columns:
+ *
+ *   knob, value    what differs from the library's defaults; default: nothing, the worst of ten
+ *                  starts that are 1 um to 1 mm apart
+ *   force_rel_rms  RMS of the difference / RMS of the reference, while either is in contact
+ *   duty           computing time of all threads / simulated time
+ *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
+ *                  worst one of model contact, or 1 um apart
+ *   estimate       0, reserved
+ *   pose_*_mm      distance of the bodies that the loop moves from their reference
+ *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
+ *                  is half way to the next ones
+ *   rest_share     of the ticks with contact, those in which no hand moves
+ *   start_um       the worst start */
+
+#include <math.h>
+#include <string.h>
+
+#include "bench/accuracy.h"
+
+#define REST_BOUND 0.3
+#define PEAK_BOUND 1.05
+#define POSE_MEDIAN_BOUND 1e-3
+#define POSE_MAX_BOUND 5e-3
+#define LINE_BOUND_N 5e-3
+#define LINE_BOUND 0.002 /* of the force */
+
+static const char header[] =
+    "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms,"
+    "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,pose_median_mm,"
+    "force_rms_n,rest_share,start_um";
+
+static bool is_default(const accuracy_row *row)
+{
+  return strcmp(row->knob, "default") == 0;
+}
+
+static void write_row(FILE *csv, const accuracy_row *r)
+{
+  const accuracy_errors *e = &r->errors;
+  fprintf(csv, "%s,%s,%g,%s,%g,%.6g,%.6g,%.6g,", r->scene, hap_model_name(r->model), r->physics_hz,
+          r->knob, r->value, e->force, e->impulse_ratio, e->peak_ratio);
+  fprintf(csv, "%.4g,%.4g,%.4g,%g,%.6g,0,%s,", r->tick_us, r->physics_ms, r->duty, r->haptic_hz,
+          r->noise_floor, r->hand);
+  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g\n", 1e3 * e->pose_max, e->line_n, r->hand_speed,
+          1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um);
+}
+
+static hap_status write_table(bench *b, const accuracy_table *table)
+{
+  FILE *csv = bench_csv_open(b, "accuracy", header);
+  for (size_t i = 0; i < table->count && csv != NULL; ++i) {
+    write_row(csv, &table->rows[i]);
+  }
+  return bench_csv_close(b, csv);
+}
+
+/* ---- numbers ---- */
+
+/* A scene cannot be followed more closely than it follows itself. */
+static void check_force(bench *b, const accuracy_row *r)
+{
+  double bound = fmax(r->bound, 2.0 * r->noise_floor);
+  bench_check(b, r->errors.force <= bound,
+              "%s at %g Hz: force error %.3f %% (bound %.3f %%%s; noise floor %.3f %%)", r->scene,
+              r->physics_hz, 100.0 * r->errors.force, 100.0 * bound,
+              bound > r->bound ? ", twice the noise floor" : "", 100.0 * r->noise_floor);
+}
+
+static void check_row(bench *b, const accuracy_row *r)
+{
+  const accuracy_errors *e = &r->errors;
+  double line = fmax(LINE_BOUND_N, LINE_BOUND * e->force_rms);
+  if (r->bound > 0.0) {
+    check_force(b, r);
+  }
+  bench_check(b, e->peak_ratio <= PEAK_BOUND, "%s at %g Hz: peak ratio %.4f (bound %g)", r->scene,
+              r->physics_hz, e->peak_ratio, PEAK_BOUND);
+  bench_check(b, e->pose_median <= POSE_MEDIAN_BOUND && e->pose_max <= POSE_MAX_BOUND,
+              "%s at %g Hz: local pose %.3f mm, at most %.3f mm (bounds %g and %g mm)", r->scene,
+              r->physics_hz, 1e3 * e->pose_median, 1e3 * e->pose_max, 1e3 * POSE_MEDIAN_BOUND,
+              1e3 * POSE_MAX_BOUND);
+  bench_check(b, e->line_n <= line, "%s at %g Hz: line %.2f mN (bound %.2f mN)", r->scene,
+              r->physics_hz, 1e3 * e->line_n, 1e3 * line);
+}
+
+static void check_rest(bench *b, const accuracy_row *r)
+{
+  bench_check(b, r->rest_share <= REST_BOUND,
+              "%s: the hand rests in %.1f %% of the contact (%g %%)", r->scene,
+              100.0 * r->rest_share, 100.0 * REST_BOUND);
+}
+
+static void report(bench *b, const accuracy_table *table)
+{
+  const char *before = "";
+  for (size_t i = 0; i < table->count; ++i) {
+    const accuracy_row *r = &table->rows[i];
+    bool bounded = r->physics_hz == 20.0 || r->physics_hz == 60.0;
+    if (is_default(r) && strcmp(before, r->scene) != 0) {
+      before = r->scene;
+      check_rest(b, r);
+    }
+    if (is_default(r) && r->model == HAP_MODEL_CONTACT && bounded) {
+      check_row(b, r);
+    } else if (is_default(r) && bounded) {
+      bench_say("%s at %g Hz: %s: force error %.3g %%, peak ratio %.3f", r->scene, r->physics_hz,
+                hap_model_name(r->model), 100.0 * r->errors.force, r->errors.peak_ratio);
+    }
+  }
+}
+
+/* ---- the program ---- */
+
+/* The recording may be absent: then its scene is left out, and a line says so. */
+static bool can_run(bench *b, const accuracy_scene *which)
+{
+  char spec[ACCURACY_SPEC_MAX];
+  if (which->recording == NULL || accuracy_recorded_hand(b, which, spec, sizeof spec) >= HAP_OK) {
+    return true;
+  }
+  bench_skip(b, "%s: %s", which->name, b->detail.text);
+  return false;
+}
+
+static size_t choose_scenes(bench *b, const accuracy_scene **out)
+{
+  size_t count = 0;
+  for (size_t i = 0; accuracy_scene_at(i) != NULL && count < ACCURACY_SCENES_MAX; ++i) {
+    const accuracy_scene *which = accuracy_scene_at(i);
+    bool asked = b->scene == NULL || strcmp(b->scene, which->name) == 0;
+    if (asked && can_run(b, which)) {
+      out[count] = which;
+      ++count;
+    }
+  }
+  return count;
+}
+
+hap_status bench_accuracy(bench *b)
+{
+  const accuracy_scene *scenes[ACCURACY_SCENES_MAX];
+  accuracy_table table = {0};
+  size_t count = choose_scenes(b, scenes);
+  if (count == 0) {
+    return bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene \"%s\"", b->scene != NULL ? b->scene : "");
+  }
+  hap_status status = accuracy_jobs(b, scenes, count, &table);
+  if (status >= HAP_OK) {
+    status = write_table(b, &table);
+  }
+  if (status >= HAP_OK) {
+    report(b, &table);
+    status = b->scene == NULL || strcmp(b->scene, "hold") == 0 ? accuracy_check_hold(b) : HAP_OK;
+  }
+  if (status >= HAP_OK) {
+    status = accuracy_draw(b, &table);
+  }
+  accuracy_table_free(&table);
+  return status;
+}

@@ -1,0 +1,116 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/accuracy.h"
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
+
+#define UNLIMITED_N 1000.0 /* the guard's limit is far */
+
+void accuracy_run_def_init(accuracy_run_def *def)
+{
+  hap_session_def library;
+  hap_session_def_init(&library, sizeof library);
+  memset(def, 0, sizeof *def);
+  def->model = library.model;
+  def->physics_hz = library.physics_hz;
+  def->haptic_hz = library.haptic_hz;
+  def->contact_hz = library.contact_hz;
+  def->latency_ticks = library.physics_latency_ticks;
+}
+
+static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
+{
+  rig_options options;
+  rig_options_init(&options);
+  options.parameters = def->parameters;
+  options.max_force = UNLIMITED_N;
+  options.device_count = (size_t)def->parameters->pointers;
+  memcpy(options.devices, def->hands, sizeof def->hands);
+  options.def.drive = HAP_DRIVE_LOCKSTEP;
+  options.def.model = def->model;
+  options.def.physics_hz = def->physics_hz;
+  options.def.haptic_hz = def->haptic_hz;
+  options.def.contact_hz = def->contact_hz;
+  options.def.physics_latency_ticks = def->latency_ticks;
+  options.def.trace_rows = 8; /* read after each tick */
+  hap_status status = rig_create(&options, r, &b->detail);
+  return status >= HAP_OK ? hap_session_start(r->session) : status;
+}
+
+/* The trace does not say which bodies are local; the loop's own list does. */
+static uint32_t local_bodies(const rig *r, size_t bodies)
+{
+  const hapi_tick *tick = &r->session->haptic->tick;
+  uint32_t local = 0;
+  for (size_t i = 0; i < bodies; ++i) {
+    local |= (uint32_t)(tick->watch_slot[i] != HAPI_SLOT_NONE) << i;
+  }
+  return local;
+}
+
+static void note_frame(const rig *r, const hap_trace_row *row, accuracy_frame *out)
+{
+  for (size_t i = 0; i < row->pointer_count && i < SCENE_POINTERS_MAX; ++i) {
+    memcpy(out->force[i], row->pointers[i].force, sizeof out->force[i]);
+    memcpy(out->hand[i], row->pointers[i].position, sizeof out->hand[i]);
+  }
+  memcpy(out->body, row->body_position, sizeof out->body);
+  out->local = local_bodies(r, row->body_count);
+}
+
+/* With a faster loop every frame is the first of its ticks: the one at that time. */
+static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *out)
+{
+  hap_trace_row row;
+  size_t got = 0;
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
+    for (uint64_t tick = 0; tick < ticks_a_frame && status >= HAP_OK; ++tick) {
+      status = hap_session_advance(r->session, 1);
+      hap_status read = hap_session_trace_read(r->session, &row, 1, &got);
+      status = status >= HAP_OK ? read : status;
+      if (tick == 0 && got == 1) {
+        note_frame(r, &row, &out->frames[i]);
+        out->bodies = row.body_count;
+      }
+    }
+  }
+  return status;
+}
+
+hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *out)
+{
+  rig r;
+  memset(out, 0, sizeof *out);
+  memset(&r, 0, sizeof r);
+  out->count = (size_t)lround(def->seconds * ACCURACY_HAPTIC_HZ);
+  out->frames = calloc(out->count, sizeof *out->frames);
+  if (out->frames == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for a run");
+  }
+  hap_status status = open_rig(b, def, &r);
+  if (status >= HAP_OK) {
+    status = record(&r, (uint64_t)lround(def->haptic_hz / ACCURACY_HAPTIC_HZ), out);
+    (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
+  }
+  if (r.session != NULL) {
+    if (status < HAP_OK) {
+      (void)hap_session_detail(r.session, &b->detail);
+    }
+    rig_destroy(&r);
+  }
+  if (status < HAP_OK) {
+    accuracy_motion_free(out);
+  }
+  return status;
+}
+
+void accuracy_motion_free(accuracy_motion *m)
+{
+  free(m->frames);
+  memset(m, 0, sizeof *m);
+}
