@@ -98,7 +98,7 @@ static const scene_row rows[] = {
                               "hand=relaxed"}},
      .build = scene_build_row},
     {.parameters = {.name = "stack",
-                    .text = "the upper of two cubes is pushed and pressed at its edge",
+                    .text = "the upper of two cubes is pushed along the lower one",
                     .mass = 1,
                     .size = 0.05,
                     .mu = 0.3,
@@ -112,7 +112,7 @@ static const scene_row rows[] = {
                     .layer = 1e-4,
                     .iterations = 100,
                     .pointers = 1,
-                    .hands = {"virtual:path=0:-0.0115/0/0.102;0.6:0.008/0/0.102;0.8:0.004/0/0.102,"
+                    .hands = {"virtual:path=0:-0.0115/0/0.085;0.6:0.008/0/0.085;0.8:-0.02/0/0.085,"
                               "blend=smooth,hand=rigid"}},
      .bodies = 2,
      .build = scene_build_stack},
@@ -130,8 +130,9 @@ static const scene_row rows[] = {
                     .layer = 1e-4,
                     .iterations = 20,
                     .pointers = 1,
-                    .hands = {"virtual:path=0:-0.03/0/0.025;0.5:-0.002/0/0.025;3:0/0/0.025,"
-                              "blend=smooth,sine=0.004/0/0,hz=1,hand=tense"}},
+                    .hands = {"virtual:path=0:-0.03/0/0.025;0.4:-0.0085/0/0.025;1.5:-0.006/0/0.025;"
+                              "2:-0.001/0/0.025;2.5:-0.004/0/0.025;3:-0.02/0/0.025,blend=smooth,"
+                              "hand=tense"}},
      .bodies = 1,
      .build = scene_build_wedge},
     {.parameters = {.name = "door",

@@ -158,6 +158,7 @@ static void fill_contact(const placed_geom *a, const placed_geom *b, const hapi_
   out->rim_b = in->rim_b;
   fill_axis(a, in->rim_a, out->axis_a);
   fill_axis(b, in->rim_b, out->axis_b);
+  out->slide = in->slide;
   vector_to_body(a, in->edge_a, out->edge_a);
   vector_to_body(b, in->edge_b, out->edge_b);
   hapi_v3_copy(in->normal, out->normal);

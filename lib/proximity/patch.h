@@ -23,6 +23,16 @@ typedef enum hapi_touch {
   HAPI_TOUCH_BALL_B  /* the same with a and b exchanged */
 } hapi_touch;
 
+/* Where the border of the reference face cut the other face or edge, the point stays on that border
+ * while the bodies slide: a box that hangs over an edge tips about that edge. */
+typedef enum hapi_slide {
+  HAPI_SLIDE_NONE = 0, /* fixed on the pushed shape */
+  HAPI_SLIDE_EDGE,     /* where an edge of the pushed shape (its edge_x, a direction) meets a side
+                          plane of the face (the face's edge_x, normal of that plane) */
+  HAPI_SLIDE_CORNER    /* a corner of the face under a face of the pushed shape (its edge_x, the
+                          normal of that face) */
+} hapi_slide;
+
 /* The surface point of a shape is core + ball x dir + rim x unit(part of dir across the shape's
  * local z axis), where dir is -normal for a and +normal for b. */
 typedef struct hapi_patch_point {
@@ -33,7 +43,8 @@ typedef struct hapi_patch_point {
   double ball_b;
   double rim_a; /* m, radius of a disc around the core (round side or rim of a cylinder), else 0 */
   double rim_b;
-  double edge_a[3]; /* unit, world; EDGES only, else 0 */
+  hapi_slide slide; /* of FACE points */
+  double edge_a[3]; /* unit, world; of EDGES and slides, else 0 */
   double edge_b[3];
   double normal[3]; /* unit, world, from b to a, now */
   double gap;       /* m, normal . (surface point of a - surface point of b), now; negative:

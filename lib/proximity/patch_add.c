@@ -62,6 +62,25 @@ static void spot_point(const hapi_frame *frame, const hapi_spot *spot, double ou
   }
 }
 
+static void set_slide(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
+                      const hapi_feature *incident, const hapi_spot *spot)
+{
+  double *side = reference_is_a ? p->edge_a : p->edge_b;
+  double *edge = reference_is_a ? p->edge_b : p->edge_a;
+  p->slide = spot->slide;
+  hapi_v3_set(side, 0.0, 0.0, 0.0);
+  hapi_v3_set(edge, 0.0, 0.0, 0.0);
+  if (spot->slide == HAPI_SLIDE_EDGE) {
+    for (int i = 0; i < 3; ++i) {
+      side[i] = spot->side[0] * frame->x[i] + spot->side[1] * frame->y[i];
+      edge[i] = spot->edge[0] * frame->x[i] + spot->edge[1] * frame->y[i] +
+                spot->edge[2] * frame->normal[i];
+    }
+  } else if (spot->slide == HAPI_SLIDE_CORNER) {
+    hapi_v3_copy(incident->normal, edge);
+  }
+}
+
 /* Field by field: clearing the point first takes as long as all the rest. */
 static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
                        const hapi_feature *incident, const hapi_spot *spot)
@@ -76,8 +95,7 @@ static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_fram
   p->ball_b = reference_is_a ? incident->ball : 0.0;
   p->rim_a = reference_is_a ? 0.0 : incident->rim;
   p->rim_b = reference_is_a ? incident->rim : 0.0;
-  hapi_v3_set(p->edge_a, 0.0, 0.0, 0.0);
-  hapi_v3_set(p->edge_b, 0.0, 0.0, 0.0);
+  set_slide(p, reference_is_a, frame, incident, spot);
   hapi_v3_scale(reference_is_a ? -1.0 : 1.0, frame->normal, p->normal);
   p->gap = spot->gap;
 }
@@ -112,8 +130,9 @@ bool hapi_patch_add_faces(const hapi_pair *pair, bool reference_is_a, const hapi
   for (int i = 0; i < incident->count; ++i) {
     double arm[3];
     hapi_v3_sub(incident->corner[i], frame.origin, arm);
-    spots[i] = (hapi_spot){hapi_v3_dot(arm, frame.x), hapi_v3_dot(arm, frame.y),
-                           hapi_v3_dot(arm, frame.normal)};
+    spots[i] = (hapi_spot){.x = hapi_v3_dot(arm, frame.x),
+                           .y = hapi_v3_dot(arm, frame.y),
+                           .gap = hapi_v3_dot(arm, frame.normal)};
   }
   int count = hapi_patch_clip(reference, &frame, spots, incident->count);
   hapi_patch_add_spots(pair, reference_is_a, &frame, incident, spots, count);

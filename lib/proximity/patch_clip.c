@@ -10,8 +10,34 @@ static const double border = 1e-9;
 
 static hapi_spot between(const hapi_spot *a, const hapi_spot *b, double t)
 {
-  return (hapi_spot){a->x + t * (b->x - a->x), a->y + t * (b->y - a->y),
-                     a->gap + t * (b->gap - a->gap)};
+  return (hapi_spot){.x = a->x + t * (b->x - a->x),
+                     .y = a->y + t * (b->y - a->y),
+                     .gap = a->gap + t * (b->gap - a->gap)};
+}
+
+/* Whether a spot lies on the border of the reference, along the way to another one. */
+static bool borders(const hapi_spot *spot, double dx, double dy)
+{
+  double off = fabs(spot->side[0] * dx + spot->side[1] * dy);
+  return spot->slide == HAPI_SLIDE_CORNER ||
+         (spot->slide == HAPI_SLIDE_EDGE && off <= 1e-9 * (fabs(dx) + fabs(dy)));
+}
+
+/* The spot where the way from a to b crosses a side of the reference. On a way along its border that
+ * is a corner of the reference, else a point of an edge of the incident feature. */
+static hapi_spot cut(const hapi_spot *a, const hapi_spot *b, double t, const double side[2])
+{
+  hapi_spot spot = between(a, b, t);
+  double way[3] = {b->x - a->x, b->y - a->y, b->gap - a->gap};
+  if (borders(a, way[0], way[1]) && borders(b, way[0], way[1])) {
+    spot.slide = HAPI_SLIDE_CORNER;
+    return spot;
+  }
+  spot.slide = HAPI_SLIDE_EDGE;
+  hapi_v3_scale(1.0 / hapi_v3_norm(way), way, spot.edge);
+  spot.side[0] = side[0];
+  spot.side[1] = side[1];
+  return spot;
 }
 
 /* Sutherland-Hodgman: one half plane, left of the line from..to. A line of two spots is treated as
@@ -22,13 +48,15 @@ static int clip_side(const hapi_spot *from, const hapi_spot *to, const hapi_spot
   double dx = to->x - from->x;
   double dy = to->y - from->y;
   double slack = border * (dx * dx + dy * dy);
+  double length = sqrt(dx * dx + dy * dy);
+  const double side[2] = {dy / length, -dx / length};
   int kept = 0;
   const hapi_spot *last = &in[count - 1];
   double last_out = dy * (last->x - from->x) - dx * (last->y - from->y) - slack;
   for (int i = 0; i < count; ++i) {
     double next_out = dy * (in[i].x - from->x) - dx * (in[i].y - from->y) - slack;
     if ((last_out > 0.0) != (next_out > 0.0) && kept < HAPI_SPOTS_MAX) {
-      out[kept++] = between(last, &in[i], last_out / (last_out - next_out));
+      out[kept++] = cut(last, &in[i], last_out / (last_out - next_out), side);
     }
     if (!(next_out > 0.0) && kept < HAPI_SPOTS_MAX) {
       out[kept++] = in[i];
@@ -60,7 +88,7 @@ static int clip_polygon(const hapi_feature *reference, const hapi_frame *frame, 
   for (int i = 0; i < reference->count; ++i) {
     double arm[3];
     hapi_v3_sub(reference->corner[i], frame->origin, arm);
-    side[i] = (hapi_spot){hapi_v3_dot(arm, frame->x), hapi_v3_dot(arm, frame->y), 0.0};
+    side[i] = (hapi_spot){.x = hapi_v3_dot(arm, frame->x), .y = hapi_v3_dot(arm, frame->y)};
   }
   for (int i = 0; i < reference->count && count > 0; ++i) {
     const hapi_spot *to = &side[i + 1 < reference->count ? i + 1 : 0];
@@ -102,7 +130,7 @@ static void push_arc(overlap *o, const hapi_spot *from, double span)
     double angle = start + o->turn * span * i / (steps + 1.0);
     double x = o->radius * cos(angle);
     double y = o->radius * sin(angle);
-    push(o, (hapi_spot){x, y, o->gap + o->slope[0] * x + o->slope[1] * y});
+    push(o, (hapi_spot){.x = x, .y = y, .gap = o->gap + o->slope[0] * x + o->slope[1] * y});
   }
 }
 
@@ -195,7 +223,8 @@ static void walk_edges(overlap *o)
 
 static int clip_disc(double radius, hapi_spot *spots, int count)
 {
-  hapi_spot clipped[HAPI_SPOTS_MAX] = {{0.0, 0.0, 0.0}};
+  hapi_spot clipped[HAPI_SPOTS_MAX];
+  memset(clipped, 0, sizeof clipped);
   overlap o = {.polygon = spots, .corners = count, .radius = radius, .out = clipped};
   if (count == 1) {
     return spots[0].x * spots[0].x + spots[0].y * spots[0].y <= radius * radius ? 1 : 0;
@@ -204,7 +233,7 @@ static int clip_disc(double radius, hapi_spot *spots, int count)
   plane_of(&o);
   walk_edges(&o);
   if (o.count == 0 && polygon_holds_middle(&o)) {
-    hapi_spot start = {radius, 0.0, o.gap + o.slope[0] * radius};
+    hapi_spot start = {.x = radius, .gap = o.gap + o.slope[0] * radius};
     push(&o, start);
     push_arc(&o, &start, 2.0 * pi * (1.0 - 1e-9));
   }

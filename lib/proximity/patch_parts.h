@@ -67,6 +67,9 @@ typedef struct hapi_spot {
   double x; /* m */
   double y;
   double gap; /* m, height over the reference */
+  hapi_slide slide;
+  double edge[3]; /* unit, in the frame: of the incident feature, HAPI_SLIDE_EDGE */
+  double side[2]; /* unit, in the frame: out of the reference face, HAPI_SLIDE_EDGE */
 } hapi_spot;
 
 typedef struct hapi_frame {

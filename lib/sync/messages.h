@@ -238,7 +238,8 @@ typedef struct hapi_patch_contact {
   double rim_b;
   double axis_a[3]; /* of the rims */
   double axis_b[3];
-  double edge_a[3]; /* EDGES */
+  hapi_slide slide;
+  double edge_a[3]; /* EDGES and slides */
   double edge_b[3];
   double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
   hapi_shape shape; /* BALL: what the ball touches */

@@ -53,6 +53,34 @@ static void surface_point(const side *s, const double direction[3], double out[3
   }
 }
 
+#define SLIDE_MAX 0.1 /* m between two passes */
+
+/* The point of the pushed body goes on to where the border of the face is now. */
+static void slide(const placed_contact *c, double a[3], double b[3])
+{
+  bool face_is_a = c->in->touch == HAPI_TOUCH_FACE_A;
+  double *fixed = face_is_a ? a : b;
+  double *pushed = face_is_a ? b : a;
+  double edge[3];
+  double border[3];
+  double apart[3];
+  hapi_v3_sub(fixed, pushed, apart);
+  if (c->in->slide == HAPI_SLIDE_EDGE) {
+    hapi_body_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
+    hapi_body_vector(face_is_a ? c->a : c->b, face_is_a ? c->in->edge_a : c->in->edge_b, border);
+    double way = hapi_v3_dot(apart, border) / hapi_v3_dot(edge, border);
+    if (fabs(way) < SLIDE_MAX) { /* false for edges that have become parallel */
+      hapi_v3_madd(pushed, way, edge, pushed);
+    }
+  } else if (c->in->slide == HAPI_SLIDE_CORNER) {
+    hapi_body_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
+    double up = -hapi_v3_dot(apart, edge) / hapi_v3_dot(c->normal, edge);
+    if (fabs(up) < SLIDE_MAX) {
+      hapi_v3_madd(fixed, up, c->normal, pushed);
+    }
+  }
+}
+
 static void place_surfaces(placed_contact *c)
 {
   double a[3];
@@ -65,6 +93,7 @@ static void place_surfaces(placed_contact *c)
   hapi_v3_scale(-1.0, c->normal, back);
   surface_point(&side_a, back, a);
   surface_point(&side_b, c->normal, b);
+  slide(c, a, b);
   hapi_v3_sub(a, b, apart);
   c->gap = hapi_v3_dot(c->normal, apart);
   hapi_v3_madd(a, -0.5 * c->gap, c->normal, c->point);

@@ -14,9 +14,11 @@
  *
  * The first is the midpoint rule written for poses that move with the new velocity: it keeps the
  * energy, and f belongs to the tick's own time. The second is implicit Euler. Both are
- * w' + f / c = F / c, a soft row. */
+ * w' + f / c = F / c, a soft row. A damper that changes the velocity by little in a tick takes it as
+ * it is, d (s - w), as eq. 7 says and as the world does when it is stepped at this rate itself. */
 
 #define MIDPOINT_LIMIT 4.0
+#define DAMPER_LIMIT 0.25 /* of T a d: explicit damping is stable up to 2 */
 
 typedef struct placed_pointer {
   hapi_tick_pointer *pointer;
@@ -92,8 +94,9 @@ static void soften(hapi_row *row, const placed_pointer *at, const double speeds[
   double w = speeds[0];
   double s = speeds[1];
   bool midpoint = period * period * a * k <= MIDPOINT_LIMIT;
-  double c = midpoint ? 0.25 * period * k + 0.5 * d : period * k + d;
-  double force = midpoint ? k * at->depth + 0.25 * period * k * w + d * (s - 0.5 * w)
+  double late = period * a * d <= DAMPER_LIMIT ? 0.0 : 0.5; /* share of the new velocity */
+  double c = midpoint ? 0.25 * period * k + late * d : period * k + d;
+  double force = midpoint ? k * at->depth + 0.25 * period * k * w + d * (s - (1.0 - late) * w)
                           : k * (at->depth + period * s) + d * s;
   row->softness = c > 0.0 ? 1.0 / (period * c) : HUGE_VAL;
   row->target = c > 0.0 ? force / c : 0.0;
