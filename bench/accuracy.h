@@ -81,6 +81,7 @@ typedef struct accuracy_errors {
   double pose_median; /* m */
   double line_n;      /* N, largest line of the difference at the physics rate or 5 harmonics,
                            above what is half way to the next ones */
+  bool lines;         /* contact is long enough to tell one */
   double force_rms;   /* N, of the reference while either touches */
 } accuracy_errors;
 

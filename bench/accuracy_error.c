@@ -6,7 +6,8 @@
 
 #include "bench/accuracy.h"
 
-#define LINES 6 /* the physics rate and 5 harmonics */
+#define LINES 6        /* the physics rate and 5 harmonics */
+#define LINE_STEPS 4.0 /* a line is 2 / window wide to either side */
 #define CHANNELS (SCENE_POINTERS_MAX * 3)
 #define REST_SPEED 0.01 /* of the hand's largest speed */
 
@@ -99,26 +100,30 @@ static double line_at(const accuracy_motion *reference, const accuracy_motion *t
 }
 
 /* A line is what stands out of its surroundings, here those half way to its neighbours: an impact
- * that is a tick late is in all frequencies alike. Contact shorter than 8 steps hides a line. */
-static double largest_line(const accuracy_motion *reference, const accuracy_motion *test,
-                           double physics_hz)
+ * that is a tick late is in all frequencies alike. False: the window is too short to tell the two
+ * apart. */
+static bool largest_line(const accuracy_motion *reference, const accuracy_motion *test,
+                         double physics_hz, double *out)
 {
   size_t window[2] = {reference->count, 0};
-  double largest = 0.0;
   for (size_t t = 0; t < reference->count; ++t) {
     if (touches(&reference->frames[t]) || touches(&test->frames[t])) {
       window[0] = t < window[0] ? t : window[0];
       window[1] = t + 1;
     }
   }
+  *out = 0.0;
+  if ((double)(window[1] - window[0]) < LINE_STEPS * ACCURACY_HAPTIC_HZ / physics_hz) {
+    return false;
+  }
   double before = line_at(reference, test, window, 0.5 * physics_hz);
   for (int i = 1; i <= LINES && (i + 0.5) * physics_hz < 0.5 * ACCURACY_HAPTIC_HZ; ++i) {
     double line = line_at(reference, test, window, i * physics_hz);
     double after = line_at(reference, test, window, (i + 0.5) * physics_hz);
-    largest = fmax(largest, sqrt(fmax(0.0, line * line - before * after)));
+    *out = fmax(*out, sqrt(fmax(0.0, line * line - before * after)));
     before = after;
   }
-  return largest;
+  return true;
 }
 
 /* ---- poses ---- */
@@ -160,7 +165,7 @@ bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *t
   out->force_rms = sqrt(s.reference / (double)s.ticks);
   out->impulse_ratio = s.impulse[1] / s.impulse[0];
   out->peak_ratio = s.peak[1] / s.peak[0];
-  out->line_n = largest_line(reference, test, physics_hz);
+  out->lines = largest_line(reference, test, physics_hz, &out->line_n);
   return compare_poses(reference, test, out);
 }
 

@@ -169,6 +169,7 @@ static void take_worst(accuracy_errors *worst, const accuracy_errors *e)
   worst->peak_ratio = further_from_1(worst->peak_ratio, e->peak_ratio);
   worst->pose_max = fmax(worst->pose_max, e->pose_max);
   worst->pose_median = fmax(worst->pose_median, e->pose_median);
+  worst->lines = worst->lines || e->lines;
   worst->line_n = fmax(worst->line_n, e->line_n);
   worst->force_rms = fmax(worst->force_rms, e->force_rms);
 }

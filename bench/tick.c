@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/vec.h"
 #include "bench/bench.h"
+#include "bench/tick_contact.h"
 #include "haptic/rt/tick.h"
 #include "haptic/tick_memory.h"
 #include "sync/exchange.h"
@@ -196,18 +197,20 @@ static void report(bench *b, hap_model model, uint32_t count, double ns)
 hap_status bench_tick(bench *b)
 {
   double ns[MODEL_COUNT][SIZE_COUNT];
-  FILE *csv = bench_csv_open(b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour");
+  FILE *csv = bench_csv_open(
+      b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
   for (size_t m = 0; m < MODEL_COUNT; ++m) {
     for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
       status = measure(b, models[m], sizes[i], &ns[m][i]);
       if (status >= HAP_OK) {
-        fprintf(csv, "%s,%u,%u,%.1f,%.2f\n", hap_model_name(models[m]), sizes[i], sizes[i],
-                ns[m][i], ns[m][i] / sizes[i]);
+        fprintf(csv, "%s,%u,%u,%.1f,%.2f," TICK_CONTACT_EMPTY "\n", hap_model_name(models[m]),
+                sizes[i], sizes[i], ns[m][i], ns[m][i] / sizes[i]);
         report(b, models[m], sizes[i], ns[m][i]);
       }
     }
   }
+  status = status >= HAP_OK ? bench_tick_contact(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;
   return status >= HAP_OK ? draw(b, ns) : status;
