@@ -117,7 +117,7 @@ TEST(fig5_leaves_its_tables)
 {
   check_program("fig5", "model,t,force_n,stiffness,physics_hz", 1000);
   CHECK(count_rows(file_in_folder("fig5_summary", ".csv"),
-                   "model,physics_hz,stiffness,contact_s,peak_n,impulse_ns") == 18);
+                   "model,physics_hz,stiffness,contact_s,peak_n,impulse_ns") == 21);
   unlink(file_in_folder("fig5_summary", ".csv"));
 }
 
