@@ -17,6 +17,12 @@ void hapi_counts_show(hapi_physics *physics)
   pthread_mutex_unlock(&physics->shown_lock);
 }
 
+void hapi_counts_range(hapi_physics *physics, double seconds)
+{
+  physics->figures.range_s += seconds;
+  physics->figures.stats.last_range_ms = 1e3 * seconds;
+}
+
 void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
 {
   physics->figures.stats.frames_dropped += steps; /* in drive FRAME physics is the caller */
@@ -31,6 +37,7 @@ static void fill_times(const hapi_physics *physics, hap_stats *out)
   out->neighbour_ms_mean = per_cycle * f->neighbour_s;
   out->testing_ms_mean = per_cycle * f->testing_s;
   out->step_ms_mean = per_cycle * f->step_s;
+  out->range_ms_mean = per_cycle * f->range_s;
   out->publish_ms_mean = per_cycle * f->publish_s;
   out->physics_ms_mean = 1e-6 * hapi_histogram_mean_ns(&physics->cycle_ns);
   out->physics_ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&physics->cycle_ns, 0.99);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/log.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
@@ -284,7 +285,9 @@ void hapi_neighbors_find(hapi_physics *physics)
   for (uint32_t i = 0; i < count; ++i) {
     take_hit(physics, &hood->hits[i]);
   }
+  int64_t begin_ns = hapi_clock_now();
   hapi_range_walk(physics, count);
+  hapi_counts_range(physics, 1e-9 * (double)(hapi_clock_now() - begin_ns));
   hapi_slots_end_model(physics);
 }
 

@@ -491,6 +491,7 @@ void hapi_physics_enter(hapi_physics *physics); /* takes the lock, whoever waits
 
 /* counts.c */
 void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */
+void hapi_counts_range(hapi_physics *physics, double seconds);
 
 /* edits.c */
 void hapi_edits_run(hapi_physics *physics);

@@ -15,6 +15,9 @@ static hapi_spot between(const hapi_spot *a, const hapi_spot *b, double t)
                      .gap = a->gap + t * (b->gap - a->gap)};
 }
 
+/* Edges that run along each other more than this cross nowhere for sure: flush boxes. */
+#define LEAST_SINE 0.2
+
 /* Whether a spot lies on the border of the reference, along the way to another one. */
 static bool borders(const hapi_spot *spot, double dx, double dy)
 {
@@ -33,8 +36,11 @@ static hapi_spot cut(const hapi_spot *a, const hapi_spot *b, double t, const dou
     spot.slide = HAPI_SLIDE_CORNER;
     return spot;
   }
-  spot.slide = HAPI_SLIDE_EDGE;
   hapi_v3_scale(1.0 / hapi_v3_norm(way), way, spot.edge);
+  if (fabs(spot.edge[0] * side[0] + spot.edge[1] * side[1]) < LEAST_SINE) {
+    return spot;
+  }
+  spot.slide = HAPI_SLIDE_EDGE;
   spot.side[0] = side[0];
   spot.side[1] = side[1];
   return spot;

@@ -10,8 +10,9 @@
  * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
  * constraint), at the step of the tick. */
 
-#define PUSH_OUT_MAX 0.2   /* m/s */
-#define PUSH_OUT_SLOP 1e-6 /* m, depth that is left alone */
+#define PUSH_OUT_MAX 0.2    /* m/s */
+#define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
+#define PUSH_OUT_LEAST 1e-5 /* m/s: less may stay in the velocity, it is not worth a second solve */
 #define OPEN_FLOOR \
   1e-3 /* m: a contact that is more open than this and than what the bodies'
                                motion closes in a few ticks has no rows */
@@ -217,7 +218,8 @@ static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
     double push = fmin(s->erp * deep / tick->period, s->max_push);
     push = soft ? push : fmin(push, PUSH_OUT_MAX);
     row->target += push;
-    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = !soft;
+    tick->world.sources[tick->world.solver.row_count - 1].pushes_out =
+        !soft && push > PUSH_OUT_LEAST;
   }
   bool hits = c->gap + tick->period * speed < 0.0;
   if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {

@@ -85,6 +85,9 @@ static double update(hapi_solver *solver, hapi_row *row)
   double hi;
   hapi_row_bounds(solver->rows, row, &lo, &hi);
   double old = row->impulse;
+  if (hi == 0.0 && lo == 0.0 && old == 0.0) {
+    return 0.0; /* friction of a contact that does not push */
+  }
   double wanted = hapi_row_error(solver, row) * row->inverse;
   double change = hapi_clamp(wanted, lo - old, hi - old);
   hapi_row_push(solver, row, change);
@@ -142,6 +145,7 @@ void hapi_solver_run(hapi_solver *solver)
   solver->sweeps = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
+  bool direct = solver->direct_rows > 0;
   warm_start(solver);
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
@@ -152,8 +156,10 @@ void hapi_solver_run(hapi_solver *solver)
       break;
     }
     /* One sweep is kept to measure and repair what the direct solve leaves. */
-    if (solver->direct_rows > 0 && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
-      left -= hapi_direct_run(solver, (uint32_t)left - rows);
+    if (direct && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+      uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
+      direct = spent != HAPI_TOO_DEAR; /* now, and so in the next round */
+      left -= direct ? spent : 0;
     }
   }
   check_finite(solver);

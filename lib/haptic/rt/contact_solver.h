@@ -71,8 +71,10 @@ void hapi_solver_run(hapi_solver *solver);
 
 /* ---- inner: between contact_solver.c and direct_solver.c ---- */
 
+#define HAPI_TOO_DEAR UINT32_MAX
+
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
- * updates, 0 when no island was changed. Rows are prepared, v has the impulses. */
+ * updates, 0 when no island was changed, HAPI_TOO_DEAR when that was for the budget alone. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
 
 /* Two sums side by side: half the latency, and two lanes for the compiler. */

@@ -558,6 +558,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   island is;
   uint32_t head[BODIES_MAX];
   uint32_t spent = 0;
+  bool too_dear = false;
   /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
    * right, and again where neither leads to the end. */
@@ -583,7 +584,9 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
     if (cost <= budget - spent && place(&is)) {
       spent += cost;
       solver->direct_solves += improve(&is, before);
+    } else {
+      too_dear = true;
     }
   }
-  return spent;
+  return spent == 0 && too_dear ? HAPI_TOO_DEAR : spent;
 }
