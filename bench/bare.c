@@ -105,6 +105,18 @@ double bare_cycle(bare *b, double step_s)
   return spent;
 }
 
+double bare_global_step(bare *b, double step_s)
+{
+  unsigned long seed = dRandGetSeed();
+  dJointGroupEmpty(b->contacts);
+  dSpaceCollide(b->scene->space, b, near_callback);
+  int64_t begin_ns = hapi_clock_now();
+  dWorldQuickStep(b->scene->world, step_s);
+  double spent = since(begin_ns);
+  dRandSetSeed(seed);
+  return spent;
+}
+
 void bare_exact_step(bare *b, double step_s)
 {
   dJointGroupEmpty(b->contacts);

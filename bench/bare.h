@@ -35,6 +35,9 @@ void bare_follow(bare *b, const scene *from);
 /* Collision and global step over step_s, timed [s]. */
 double bare_cycle(bare *b, double step_s);
 
+/* The same, but of the two the global step alone is timed [s]. */
+double bare_global_step(bare *b, double step_s);
+
 /* The same with ODE's direct solver. Forces that were added before act in it. */
 void bare_exact_step(bare *b, double step_s);
 

@@ -9,9 +9,12 @@
  *   tick_us         a haptic tick
  *   probes          testing simulations a cycle, probe_ms all of them together
  *   island_step_ms  one step of the neighbour's island alone, by plain ODE calls
- *   library_ms      what is neither collision nor a step of ODE */
+ *   library_ms      what is neither collision nor a step of ODE
+ *
+ * Model CONTACT has its own rows, see scaling_contact.c. */
 
 #include "bench/cycles.h"
+#include "bench/scaling_contact.h"
 
 #define PHYSICS_HZ 20.0
 #define LARGE_WORLD 1000
@@ -107,22 +110,23 @@ hap_status bench_scaling(bench *b)
   world worlds[MODEL_COUNT][SIZE_COUNT];
   FILE *csv = bench_csv_open(b, "scaling",
                              "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,"
-                             "island_step_ms,library_ms");
+                             "island_step_ms,library_ms," SCALING_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
   for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
     for (size_t m = 0; m < MODEL_COUNT && status >= HAP_OK; ++m) {
       world *w = &worlds[m][i];
       status = measure(b, sizes[i], models[m], w);
       if (status >= HAP_OK) {
-        fprintf(csv, "%d,%g,%s,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g\n", sizes[i], w->neighbours,
-                hap_model_name(models[m]), w->build_ms, w->step_ms, w->tick_us, w->probes,
-                w->probe_ms, w->island_step_ms, w->library_ms);
+        fprintf(csv, "%d,%g,%s,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,fig7,0,0,,\n", sizes[i],
+                w->neighbours, hap_model_name(models[m]), w->build_ms, w->step_ms, w->tick_us,
+                w->probes, w->probe_ms, w->island_step_ms, w->library_ms);
       }
     }
     if (status >= HAP_OK) {
       report(b, sizes[i], &worlds[MODEL_COUNT - 1][i]);
     }
   }
+  status = status >= HAP_OK ? bench_scaling_contact(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;
   return status >= HAP_OK ? draw(b, worlds[MODEL_COUNT - 1]) : status;

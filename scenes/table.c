@@ -112,7 +112,7 @@ static const scene_row rows[] = {
                     .layer = 1e-4,
                     .iterations = 100,
                     .pointers = 1,
-                    .hands = {"virtual:path=0:-0.0115/0/0.085;0.6:0.008/0/0.085;0.8:-0.02/0/0.085,"
+                    .hands = {"virtual:path=0:-0.0115/0/0.075;0.6:0.008/0/0.075;0.8:-0.02/0/0.075,"
                               "blend=smooth,hand=rigid"}},
      .bodies = 2,
      .build = scene_build_stack},
