@@ -86,6 +86,14 @@ static void near_callback(void *data, dGeomID x, dGeomID y)
     dJointID joint = dJointCreateContact(b->scene->world, b->contacts, &contacts[i]);
     dJointAttach(joint, dGeomGetBody(x), dGeomGetBody(y));
   }
+  b->contact_count += (size_t)count;
+}
+
+static void find_contacts(bare *b)
+{
+  dJointGroupEmpty(b->contacts);
+  b->contact_count = 0;
+  dSpaceCollide(b->scene->space, b, near_callback);
 }
 
 static double since(int64_t begin_ns)
@@ -97,8 +105,7 @@ double bare_cycle(bare *b, double step_s)
 {
   unsigned long seed = dRandGetSeed();
   int64_t begin_ns = hapi_clock_now();
-  dJointGroupEmpty(b->contacts);
-  dSpaceCollide(b->scene->space, b, near_callback);
+  find_contacts(b);
   dWorldQuickStep(b->scene->world, step_s);
   double spent = since(begin_ns);
   dRandSetSeed(seed);
@@ -108,8 +115,7 @@ double bare_cycle(bare *b, double step_s)
 double bare_global_step(bare *b, double step_s)
 {
   unsigned long seed = dRandGetSeed();
-  dJointGroupEmpty(b->contacts);
-  dSpaceCollide(b->scene->space, b, near_callback);
+  find_contacts(b);
   int64_t begin_ns = hapi_clock_now();
   dWorldQuickStep(b->scene->world, step_s);
   double spent = since(begin_ns);
@@ -119,8 +125,7 @@ double bare_global_step(bare *b, double step_s)
 
 void bare_exact_step(bare *b, double step_s)
 {
-  dJointGroupEmpty(b->contacts);
-  dSpaceCollide(b->scene->space, b, near_callback);
+  find_contacts(b);
   dWorldStep(b->scene->world, step_s);
 }
 

@@ -22,7 +22,8 @@ typedef struct bare {
   scene *scene;
   dJointGroupID contacts;
   dContact *scratch;
-  bare_state *states; /* of the bodies, to begin from */
+  size_t contact_count; /* of the last collision */
+  bare_state *states;   /* of the bodies, to begin from */
 } bare;
 
 hap_status bare_create(const scene_parameters *parameters, int count, bare *out,

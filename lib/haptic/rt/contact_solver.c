@@ -160,6 +160,7 @@ void hapi_solver_run(hapi_solver *solver)
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       direct = spent != HAPI_TOO_DEAR; /* now, and so in the next round */
       left -= direct ? spent : 0;
+      left = direct || left < 2 * (uint64_t)rows ? left : 2 * (uint64_t)rows;
     }
   }
   check_finite(solver);

@@ -577,7 +577,11 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
       continue;
     }
     classify(&is, sticking);
-    if (is.free_rows == 0 || is.free_rows > solver->direct_rows || !gather(&is)) {
+    if (is.free_rows == 0) {
+      continue;
+    }
+    if (is.free_rows > solver->direct_rows || !gather(&is)) {
+      too_dear = true;
       continue;
     }
     uint32_t cost = plan(&is);

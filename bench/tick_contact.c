@@ -1,0 +1,278 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The tick of model CONTACT, which carries the contacts between the bodies itself: cubes that touch
+ * each other, at rest and pushed. A session runs in lockstep; after each of its ticks the next one
+ * is run alone on a copy, by turns with plain ODE, which finds the contacts of the same scene in the
+ * same state and steps it with 10 iterations. Times are medians over the ticks. */
+
+#include "bench/tick_contact.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "bench/bare.h"
+#include "bench/cycles.h"
+#include "bench/tick_copy.h"
+#include "contact/contact.h"
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
+#include "tools/rig.h"
+
+#define WARM_TICKS 300
+#define PASSES 401
+#define BARE_ITERATIONS 10
+#define BARE_SHARE 0.75   /* of ten bodies, of plain ODE's time */
+#define LARGE_NS 200000.0 /* the pile: 64 bodies and 600 to 700 contacts */
+#define PASS_NS 25000.0   /* ten bodies */
+
+/* 2 mm in front of the first cube, and through it from there. */
+static const char *const at_rest = "virtual:path=0:-0.012/0/0.025,hand=rigid";
+static const char *const pushed =
+    "virtual:path=0:-0.012/0/0.025;2:0.188/0/0.025,blend=linear,hand=rigid";
+
+typedef struct tick_case {
+  const char *name;
+  const char *scene;
+  int count;
+  int block[3]; /* cubes along x, y, z that touch; 0: as the scene builds them */
+  bool push;
+} tick_case;
+
+static const tick_case cases[] = {
+    {"cube", "slide", 0, {0, 0, 0}, false},        {"cube", "slide", 0, {0, 0, 0}, true},
+    {"stack", "stack", 0, {0, 0, 0}, false},       {"stack", "stack", 0, {0, 0, 0}, true},
+    {"row10", "row10", 10, {0, 0, 0}, false},      {"row10", "row10", 10, {0, 0, 0}, true},
+    {"pile64", "pile", 64, {0, 0, 0}, false},      {"pile64", "pile", 64, {0, 0, 0}, true},
+    {"wall8x8", "row10", 64, {8, 1, 8}, false},    {"wall8x8", "row10", 64, {8, 1, 8}, true},
+    {"block4x4x4", "row10", 64, {4, 4, 4}, false}, {"block4x4x4", "row10", 64, {4, 4, 4}, true},
+};
+
+/* What a tick is measured by. */
+enum {
+  TICK_NS,
+  ODE_NS,
+  ODE_CONTACTS,
+  CONTACTS, /* that have rows */
+  ROWS,
+  SWEEPS,
+  DIRECT_SOLVES, /* of the last solve */
+  PART_ROWS,
+  PART_SOLVE,
+  PART_AGAIN,
+  PART_UPDATE,
+  FIGURES
+};
+
+typedef struct tick_bed {
+  const tick_case *what;
+  rig rig;
+  bare bare;
+  hapi_tick copy;
+  size_t ticks;            /* to measure */
+  double *values[FIGURES]; /* of the ticks */
+  double p99_ns;
+  double pass_ns;
+} tick_bed;
+
+static void close_bed(tick_bed *t)
+{
+  tick_copy_destroy(&t->copy);
+  bare_destroy(&t->bare);
+  rig_destroy(&t->rig);
+  free(t->values[0]);
+}
+
+/* In columns of z; the first cube stays in front of the hand. */
+static void arrange(const scene *s, const int block[3])
+{
+  const scene_parameters *p = &s->parameters;
+  double pitch = p->size + p->gap;
+  for (int i = 0; block[0] > 0 && i < s->count; ++i) {
+    int x = i / (block[1] * block[2]);
+    int y = i / block[2] % block[1];
+    int z = i % block[2];
+    y -= y >= (block[1] + 1) / 2 ? block[1] : 0;
+    dBodySetPosition(s->bodies[i], p->size / 2 + pitch * x, pitch * y,
+                     p->size / 2 - p->layer + z * (p->size - p->layer));
+  }
+}
+
+static hap_status open_bed(bench *b, const tick_case *what, tick_bed *t)
+{
+  rig_options options;
+  memset(t, 0, sizeof *t);
+  t->what = what;
+  t->ticks = b->quick ? 200 : 1000;
+  rig_options_init(&options);
+  options.parameters = cycles_scene(what->scene);
+  options.count = what->count;
+  options.devices[0] = what->push ? pushed : at_rest;
+  options.device_count = 1;
+  options.def.drive = HAP_DRIVE_LOCKSTEP;
+  options.def.model = HAP_MODEL_CONTACT;
+  hap_status status = rig_create(&options, &t->rig, &b->detail);
+  if (status >= HAP_OK) {
+    status = bare_create(options.parameters, what->count, &t->bare, &b->detail);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  dWorldSetQuickStepNumIterations(t->bare.scene->world, BARE_ITERATIONS);
+  arrange(t->rig.scene, what->block);
+  double *values = calloc(FIGURES * t->ticks, sizeof *values);
+  for (int i = 0; i < FIGURES; ++i) {
+    t->values[i] = values + (size_t)i * t->ticks;
+  }
+  if (!tick_copy_create(&t->copy, &t->rig.session->haptic->tick) || values == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for a copy of the tick");
+  }
+  return hap_session_start(t->rig.session);
+}
+
+/* ---- measuring ---- */
+
+static void measure_copy(tick_bed *t, size_t i)
+{
+  const hapi_solver *solver = &t->copy.world.solver;
+  tick_parts parts;
+  uint64_t sweeps = t->copy.sweeps;
+  t->values[TICK_NS][i] = tick_copy_run(&t->copy);
+  t->values[SWEEPS][i] = (double)(t->copy.sweeps - sweeps);
+  t->values[ROWS][i] = solver->row_count;
+  t->values[DIRECT_SOLVES][i] = solver->direct_solves;
+  for (uint32_t row = 0; row < solver->row_count; ++row) {
+    t->values[CONTACTS][i] += t->copy.world.sources[row].part == 0;
+  }
+  tick_copy_parts(&t->copy, &parts);
+  t->values[PART_ROWS][i] = parts.rows;
+  t->values[PART_SOLVE][i] = parts.solve;
+  t->values[PART_AGAIN][i] = parts.again;
+  t->values[PART_UPDATE][i] = parts.update;
+}
+
+static double bare_tick(tick_bed *t)
+{
+  bare_follow(&t->bare, t->rig.scene); /* as it was at the last sync */
+  return 1e9 * bare_cycle(&t->bare, t->rig.session->haptic->tick.period);
+}
+
+static void measure_tick(tick_bed *t, size_t i)
+{
+  if (i % 2 == 0) {
+    t->values[ODE_NS][i] = bare_tick(t);
+  }
+  t->values[ODE_CONTACTS][i] = (double)t->bare.contact_count;
+  tick_copy_take(&t->copy, &t->rig.session->haptic->tick);
+  measure_copy(t, i);
+  if (i % 2 != 0) {
+    t->values[ODE_NS][i] = bare_tick(t);
+  }
+}
+
+/* Contact passes one after another, from the newest poses. */
+static double measure_passes(tick_bed *t)
+{
+  double passes[PASSES];
+  int64_t now_ns = hap_session_now(t->rig.session);
+  for (int i = 0; i < PASSES; ++i) {
+    int64_t begin_ns = hapi_clock_now();
+    hapi_contact_pass(t->rig.session->contact, now_ns);
+    passes[i] = (double)(hapi_clock_now() - begin_ns);
+  }
+  return bench_median(passes, PASSES);
+}
+
+static hap_status measure(bench *b, const tick_case *what, tick_bed *t)
+{
+  hap_status status = open_bed(b, what, t);
+  if (status >= HAP_OK) {
+    status = hap_session_advance(t->rig.session, WARM_TICKS);
+  }
+  for (size_t i = 0; i < t->ticks && status == HAP_OK; ++i) {
+    status = hap_session_advance(t->rig.session, 1);
+    measure_tick(t, i);
+  }
+  if (status != HAP_OK) {
+    return status < HAP_OK ? status
+                           : bench_fail(b, HAP_ERROR_STATE, "%s: a fault in the loop", what->name);
+  }
+  t->pass_ns = measure_passes(t);
+  for (int figure = 0; figure < FIGURES; ++figure) {
+    (void)bench_median(t->values[figure], t->ticks); /* sorts */
+  }
+  t->p99_ns = bench_quantile(t->values[TICK_NS], t->ticks, 0.99);
+  return HAP_OK;
+}
+
+/* ---- saying ---- */
+
+static double middle(const tick_bed *t, int figure)
+{
+  return bench_quantile(t->values[figure], t->ticks, 0.5);
+}
+
+static void check(bench *b, const tick_bed *t)
+{
+  size_t bodies = t->rig.scene->body_count;
+  const char *name = t->what->name;
+  const char *phase = t->what->push ? "pushed" : "at rest";
+  double ns = middle(t, TICK_NS);
+  double ode_ns = middle(t, ODE_NS);
+  if (bodies == 10) {
+    bench_check(b, ns <= BARE_SHARE * ode_ns,
+                "contact, %s %s: tick / (dSpaceCollide + dWorldQuickStep of 10 iterations) = %.1f "
+                "us / %.1f us = %.3f (bound %.2f)",
+                name, phase, 1e-3 * ns, 1e-3 * ode_ns, ns / ode_ns, BARE_SHARE);
+    bench_check(b, t->pass_ns <= PASS_NS, "contact, %s %s: a contact pass %.1f us (bound %.0f)",
+                name, phase, 1e-3 * t->pass_ns, 1e-3 * PASS_NS);
+  } else if (strcmp(t->what->scene, "pile") == 0) {
+    bench_check(b, ns <= LARGE_NS, "contact, %s %s: %g contacts, tick %.1f us (bound %.0f)", name,
+                phase, middle(t, CONTACTS), 1e-3 * ns, 1e-3 * LARGE_NS);
+  }
+}
+
+static void report(bench *b, const tick_bed *t)
+{
+  double ns = middle(t, TICK_NS);
+  double solve = middle(t, PART_SOLVE) + middle(t, PART_AGAIN);
+  const char *phase = t->what->push ? "pushed" : "at rest";
+  bench_say(
+      "contact, %s %s: %zu bodies, %g contacts, %g rows: tick %.1f us, p99 %.1f, plain ODE "
+      "%.1f (%g contacts), contact pass %.1f",
+      t->what->name, phase, t->rig.scene->body_count, middle(t, CONTACTS), middle(t, ROWS),
+      1e-3 * ns, 1e-3 * t->p99_ns, 1e-3 * middle(t, ODE_NS), middle(t, ODE_CONTACTS),
+      1e-3 * t->pass_ns);
+  bench_say(
+      "  rows %.1f %%, solve %.1f %% (the second one %.1f), rest %.1f %%; %g sweeps, "
+      "%g direct solves in the last solve; a row update %.1f ns",
+      100.0 * middle(t, PART_ROWS) / ns, 100.0 * solve / ns, 100.0 * middle(t, PART_AGAIN) / ns,
+      100.0 * (1.0 - (middle(t, PART_ROWS) + solve) / ns), middle(t, SWEEPS),
+      middle(t, DIRECT_SOLVES), middle(t, PART_UPDATE));
+  check(b, t);
+}
+
+static void write_row(FILE *csv, const tick_bed *t)
+{
+  size_t bodies = t->rig.scene->body_count;
+  double ns = middle(t, TICK_NS);
+  fprintf(csv, "contact,%zu,%g,%.1f,%.2f,%.1f,%s,%s,%g,%g,%.1f,%.1f\n", bodies, middle(t, CONTACTS),
+          ns, ns / (double)bodies, t->p99_ns, t->what->name, t->what->push ? "pushed" : "rest",
+          middle(t, ROWS), middle(t, SWEEPS), middle(t, ODE_NS), t->pass_ns);
+}
+
+hap_status bench_tick_contact(bench *b, FILE *csv)
+{
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0] && status >= HAP_OK; ++i) {
+    tick_bed t;
+    status = measure(b, &cases[i], &t);
+    if (status >= HAP_OK) {
+      write_row(csv, &t);
+      report(b, &t);
+    }
+    close_bed(&t);
+  }
+  return status;
+}
