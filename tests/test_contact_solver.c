@@ -715,7 +715,7 @@ TEST(an_unchanged_load_is_solved_at_once)
     fall();
     run();
   }
-  CHECK(s.solver.sweeps == 2);
+  CHECK(s.solver.sweeps == 1);
   CHECK(s.solver.direct_solves == 0);
   check_complementarity(1e-9);
 }
@@ -774,7 +774,7 @@ TEST(budget_and_limits_hold)
     CHECK(limit != 0 || (s.solver.sweeps == 2 && s.solver.direct_solves == 0));
     CHECK(limit != 1 || (s.solver.sweeps == 30 && s.solver.direct_solves == 0));
     CHECK(limit != 2 || (s.solver.sweeps < 30 && s.solver.direct_solves > 0));
-    CHECK(limit != 3 || s.solver.sweeps == 2);
+    CHECK(limit != 3 || s.solver.sweeps == 1);
   }
   memcpy(s.v, s.free_v, sizeof s.v);
   s.solver.work_count = 0; /* sweeps only */

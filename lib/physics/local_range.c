@@ -51,7 +51,6 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
   }
   hapi_body_slot *local = &physics->bodies[slot];
   body->ranged_in = range->number;
-  body->expanded_in = 0;
   local->wanted = true;
   local->linked = false;
   local->mass = hapi_body_mass(body->body);
@@ -234,11 +233,63 @@ static bool bits_meet(dGeomID a, dGeomID b)
          (dGeomGetCategoryBits(b) & dGeomGetCollideBits(a)) != 0;
 }
 
-/* A pair is met from both of its bodies: the second time it is known. */
-static bool met_before(const hapi_physics *physics, dBodyID other)
+/* A pair is met from both of its bodies. */
+static hapi_pair_place *pair_place(hapi_range *range, uint64_t key)
 {
-  uint32_t known = hapi_bodies_find(&physics->table, other);
-  return known != HAPI_NONE && physics->table.entries[known].expanded_in == physics->range.number;
+  uint32_t mask = range->pair_place_count - 1;
+  uint32_t at = (uint32_t)(key >> 32) & mask;
+  while (range->pair_places[at].walk == range->number && range->pair_places[at].key != key) {
+    at = (at + 1) & mask;
+  }
+  range->pair_found = range->pair_places[at].walk == range->number;
+  return &range->pair_places[at];
+}
+
+static bool met_before(hapi_range *range, dGeomID own, dGeomID other)
+{
+  (void)pair_place(range, key_of(own, other, 0));
+  return range->pair_found;
+}
+
+static void note_pair(hapi_physics *physics, const hapi_link *link)
+{
+  hapi_range *range = &physics->range;
+  uint64_t key = key_of(link->own, link->other, 0);
+  hapi_pair_place *place = pair_place(range, key);
+  if (!range->pair_found && 2 * range->pairs_noted < range->pair_place_count) {
+    place->key = key;
+    place->walk = range->number;
+    ++range->pairs_noted;
+  }
+}
+
+static double speed_of(const hapi_physics *physics, dBodyID body)
+{
+  uint32_t known = hapi_bodies_find(&physics->table, body);
+  if (known == HAPI_NONE) {
+    return 0.0;
+  }
+  return hapi_v3_norm(dBodyGetLinearVel(body)) +
+         physics->table.entries[known].extent * hapi_v3_norm(dBodyGetAngularVel(body));
+}
+
+/* How far two surfaces may come nearer until the model after the next. */
+static double reach_of(const hapi_physics *physics, double speed)
+{
+  double seconds = 2.0 * physics->probe_step_s;
+  return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
+}
+
+static bool boxes_come_near(const dReal a[6], dGeomID other, double reach)
+{
+  dReal b[6];
+  dGeomGetAABB(other, b);
+  for (int k = 0; k < 6; k += 2) {
+    if (a[k] - reach > b[k + 1] || b[k] - reach > a[k + 1]) {
+      return false;
+    }
+  }
+  return true;
 }
 
 static void link_geom(void *data, dGeomID a, dGeomID b)
@@ -251,8 +302,10 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
     return;
   }
   dBodyID body = dGeomGetBody(geom);
+  double reach = reach_of(physics, range->own_speed + speed_of(physics, body));
   if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->own_body ||
-      !bits_meet(range->own_geom, geom) || met_before(physics, body)) {
+      !bits_meet(range->own_geom, geom) || !boxes_come_near(range->own_box, geom, reach) ||
+      met_before(range, range->own_geom, geom)) {
     return;
   }
   if (!hapi_reserve((void **)&range->links, &range->link_capacity, range->link_count, 1,
@@ -263,40 +316,32 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   hapi_link *link = &range->links[range->link_count];
   link->own = range->own_geom;
   link->other = geom;
-  memcpy(link->box, range->own_box, sizeof link->box);
+  for (int k = 0; k < 6; ++k) {
+    link->box[k] = range->own_box[k] + (k % 2 == 0 ? -reach : reach);
+  }
   if (hapi_world_surface(physics, link->own, link->other, &link->surface)) {
     ++range->link_count;
   }
 }
 
-/* How far the surfaces of a body and of others may come nearer until the model after the next. */
-static double reach_of(const hapi_physics *physics, const hapi_known_body *known)
-{
-  double seconds = 2.0 * physics->probe_step_s;
-  double speed = hapi_v3_norm(dBodyGetLinearVel(known->body)) +
-                 known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
-  speed = speed > physics->range.fastest ? speed : physics->range.fastest;
-  return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
-}
-
+/* The space is asked with room for the fastest body of all; each pair then has its own reach. */
 static void find_links(hapi_physics *physics, const hapi_known_body *known)
 {
   hapi_range *range = &physics->range;
-  double reach = reach_of(physics, known);
+  double own = speed_of(physics, known->body);
+  range->own_speed = own > range->fastest ? own : range->fastest;
+  double reach = reach_of(physics, range->own_speed + physics->neighborhood.fastest);
   range->link_count = 0;
   range->own_body = known->body;
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    dReal *box = range->own_box;
+    const dReal *box = range->own_box;
     if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass) {
       continue;
     }
-    dGeomGetAABB(geom, box);
-    for (int k = 0; k < 3; ++k) {
-      box[2 * k] -= reach;
-      box[2 * k + 1] += reach;
-    }
+    dGeomGetAABB(geom, range->own_box);
     range->own_geom = geom;
-    dGeomBoxSetLengths(range->box_geom, box[1] - box[0], box[3] - box[2], box[5] - box[4]);
+    dGeomBoxSetLengths(range->box_geom, box[1] - box[0] + 2.0 * reach,
+                       box[3] - box[2] + 2.0 * reach, box[5] - box[4] + 2.0 * reach);
     dGeomSetPosition(range->box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
                      0.5 * (box[4] + box[5]));
     dSpaceCollide2(range->box_geom, (dGeomID)physics->ode.space, physics, link_geom);
@@ -316,7 +361,16 @@ static bool has_joint(dBodyID body)
   return false;
 }
 
-static bool can_be_owned(const hapi_physics *physics, const hapi_known_body *known)
+/* Whether all triangles near a body have room. */
+static bool mesh_fits(hapi_physics *physics, const hapi_link *link)
+{
+  const hapi_near *near = physics->range.near;
+  uint32_t count = hapi_mesh_near(physics, link->other, link->box);
+  return count < HAPI_NEAR_TRIANGLES && near->geom_count + count < physics->config.capacity.geoms &&
+         near->point_count + 3 * count < physics->config.capacity.hull_points;
+}
+
+static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
 {
   const hapi_range *range = &physics->range;
   if (has_joint(known->body)) {
@@ -328,7 +382,9 @@ static bool can_be_owned(const hapi_physics *physics, const hapi_known_body *kno
     }
   }
   for (uint32_t i = 0; i < range->link_count; ++i) {
-    if (!geom_is_known(range->links[i].other)) {
+    const hapi_link *link = &range->links[i];
+    if (!geom_is_known(link->other) ||
+        (dGeomGetClass(link->other) == dTriMeshClass && !mesh_fits(physics, link))) {
       return false;
     }
   }
@@ -341,6 +397,7 @@ static void take_links(hapi_physics *physics)
   for (uint32_t i = 0; i < range->link_count; ++i) {
     const hapi_link *link = &range->links[i];
     dBodyID body = dGeomGetBody(link->other);
+    note_pair(physics, link);
     uint32_t known = hapi_bodies_find(&physics->table, body);
     if (body != NULL && (known == HAPI_NONE || !enqueue(physics, known))) {
       continue;
@@ -377,7 +434,6 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
   slot->flags |= HAPI_BODY_OWNED;
   ++range->owned;
   take_links(physics);
-  known->expanded_in = range->number;
 }
 
 static double fastest_pointer(const hapi_physics *physics)
@@ -401,6 +457,7 @@ static void begin_walk(hapi_physics *physics)
   range->near->point_count = 0;
   range->number = physics->model_number + 1;
   range->count = range->owned = 0;
+  range->pairs_noted = 0;
   range->fastest = fastest_pointer(physics);
 }
 
@@ -470,8 +527,14 @@ bool hapi_range_create(hapi_physics *physics)
   const hapi_capacity *c = &physics->config.capacity;
   range->queue = hapi_alloc_array(c->bodies, sizeof *range->queue);
   range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
+  range->pair_place_count = 4;
+  while (range->pair_place_count < 4 * c->contacts) {
+    range->pair_place_count *= 2;
+  }
+  range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
   range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
-  return range->queue != NULL && range->geoms != NULL && range->box_geom != NULL;
+  return range->queue != NULL && range->geoms != NULL && range->pair_places != NULL &&
+         range->box_geom != NULL;
 }
 
 void hapi_range_finish(hapi_physics *physics)
@@ -483,5 +546,6 @@ void hapi_range_finish(hapi_physics *physics)
   hapi_free(range->queue);
   hapi_free(range->geoms);
   hapi_free(range->links);
+  hapi_free(range->pair_places);
   memset(range, 0, sizeof *range);
 }

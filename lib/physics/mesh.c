@@ -12,8 +12,7 @@
  * mesh, with a box around every few of them. */
 
 #define CHUNK 32u
-#define FOUND_MAX 64u
-#define SAME_POINT2 1e-16 /* m^2 */
+#define FOUND_MAX HAPI_NEAR_TRIANGLES
 
 static void destroy_mesh(hapi_mesh *mesh)
 {
@@ -123,48 +122,84 @@ static void box_to_geom(dGeomID geom, const double box[6], double out[6])
   }
 }
 
-static bool same_point(const double *a, const double *b)
+/* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
+
+static const double *corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
 {
-  double apart[3];
-  hapi_v3_sub(a, b, apart);
-  return hapi_v3_dot(apart, apart) <= SAME_POINT2;
+  return meshes->found[edge / 3].corners + (size_t)3 * ((edge % 3 + which) % 3);
 }
 
-/* Whether other has the edge from corner edge of triangle, and lies level with it or above. */
-static bool closes(const double *triangle, int edge, const double *other)
+static bool same_point(const double *a, const double *b)
 {
-  const double *from = triangle + (size_t)3 * (size_t)edge;
-  const double *to = triangle + (size_t)3 * (size_t)((edge + 1) % 3);
-  for (int i = 0; i < 3; ++i) {
-    const double *p = other + (size_t)3 * (size_t)i;
-    const double *q = other + (size_t)3 * (size_t)((i + 1) % 3);
-    const double *apex = other + (size_t)3 * (size_t)((i + 2) % 3);
-    if ((same_point(p, to) && same_point(q, from)) || (same_point(p, from) && same_point(q, to))) {
-      double sides[2][3];
-      double normal[3];
-      double rise[3];
-      hapi_v3_sub(triangle + 3, triangle, sides[0]);
-      hapi_v3_sub(triangle + 6, triangle, sides[1]);
-      hapi_v3_cross(sides[0], sides[1], normal);
-      hapi_v3_sub(apex, from, rise);
-      return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool same_edge(const hapi_meshes *meshes, uint32_t a, uint32_t b)
+{
+  const double *p = corner(meshes, a, 0);
+  const double *q = corner(meshes, a, 1);
+  const double *r = corner(meshes, b, 0);
+  const double *s = corner(meshes, b, 1);
+  return (same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s));
+}
+
+/* Of both directions the same. */
+static uint32_t edge_hash(const hapi_meshes *meshes, uint32_t edge)
+{
+  uint64_t sum = 0;
+  for (uint32_t end = 0; end < 2; ++end) {
+    uint64_t mixed = 0;
+    for (int k = 0; k < 3; ++k) {
+      uint64_t bits;
+      memcpy(&bits, &corner(meshes, edge, end)[k], sizeof bits);
+      mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
+      mixed ^= mixed >> 32;
+    }
+    sum += mixed;
+  }
+  return (uint32_t)(sum ^ (sum >> 29));
+}
+
+/* Whether the triangle of edge `other` lies level with that of `edge` or above it. */
+static bool closes(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
+{
+  const double *triangle = meshes->found[edge / 3].corners;
+  double sides[2][3];
+  double normal[3];
+  double rise[3];
+  hapi_v3_sub(triangle + 3, triangle, sides[0]);
+  hapi_v3_sub(triangle + 6, triangle, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], normal);
+  hapi_v3_sub(corner(meshes, other, 2), corner(meshes, edge, 0), rise);
+  return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
+}
+
+static void meet_edge(hapi_meshes *meshes, uint32_t edge)
+{
+  uint32_t mask = HAPI_EDGE_PLACES - 1;
+  uint32_t at = edge_hash(meshes, edge) & mask;
+  for (; meshes->places[at] != 0; at = (at + 1) & mask) {
+    uint32_t other = meshes->places[at] - 1;
+    if (same_edge(meshes, edge, other)) {
+      if (closes(meshes, edge, other)) {
+        meshes->found[edge / 3].open_edges &= ~(1u << (edge % 3));
+      }
+      if (closes(meshes, other, edge)) {
+        meshes->found[other / 3].open_edges &= ~(1u << (other % 3));
+      }
     }
   }
-  return false;
+  meshes->places[at] = edge + 1;
 }
 
 static void find_open_edges(hapi_meshes *meshes, uint32_t count)
 {
+  memset(meshes->places, 0, sizeof meshes->places);
   for (uint32_t i = 0; i < count; ++i) {
-    hapi_near_triangle *triangle = &meshes->found[i];
-    triangle->open_edges = 15;
-    for (int edge = 0; edge < 3; ++edge) {
-      for (uint32_t k = 0; k < count; ++k) {
-        if (k != i && closes(triangle->corners, edge, meshes->found[k].corners)) {
-          triangle->open_edges &= ~(1u << edge);
-        }
-      }
-    }
+    meshes->found[i].open_edges = 15;
+  }
+  for (uint32_t edge = 0; edge < 3 * count; ++edge) {
+    meet_edge(meshes, edge);
   }
 }
 
@@ -202,7 +237,9 @@ uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]
       found = search_chunk(mesh, chunk, local, meshes, found);
     }
   }
-  physics->figures.stats.capacity_dropped += found == FOUND_MAX;
+  if (found == FOUND_MAX) {
+    return found; /* too many: the caller leaves them to ODE */
+  }
   find_open_edges(meshes, found);
   dQuaternion quat;
   dGeomGetQuaternion(geom, quat);

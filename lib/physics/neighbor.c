@@ -89,6 +89,7 @@ void hapi_neighbors_collect(hapi_physics *physics)
   }
   const hapi_state_pointer *pointers = hapi_state_pointers(physics->state);
   double fastest = fastest_body(physics);
+  hood->fastest = fastest;
   for (uint32_t i = 0; i < physics->state->pointer_count; ++i) {
     if (pointers[i].generation == 0) {
       continue;

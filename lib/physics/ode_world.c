@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
+#include "base/alloc.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -107,7 +108,7 @@ static bool can_move(dBodyID body)
   return body != NULL && !dBodyIsKinematic(body);
 }
 
-bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out)
+static bool ask_application(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out)
 {
   *out = (dSurfaceParameters){.mode = dContactApprox1, .mu = dInfinity};
   if (physics->ode.surface != NULL && !physics->ode.surface(physics->ode.user, a, b, out)) {
@@ -120,6 +121,63 @@ bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfac
     return false;
   }
   return true;
+}
+
+/* The application is asked once a step for each pair; model CONTACT asks for some of them twice, in
+ * the collision phase and when it looks for what is near. */
+static hapi_surface_entry *cached(hapi_surface_cache *cache, dGeomID a, dGeomID b)
+{
+  uint64_t x = (uint64_t)(uintptr_t)a;
+  uint64_t y = (uint64_t)(uintptr_t)b;
+  uint64_t key = (x < y ? x : y) * 0x9e3779b97f4a7c15u ^ (x < y ? y : x);
+  uint32_t at = (uint32_t)((key * 0xff51afd7ed558ccdu) >> 40) & (cache->capacity - 1);
+  for (;; at = (at + 1) & (cache->capacity - 1)) {
+    hapi_surface_entry *entry = &cache->entries[at];
+    bool same = (entry->a == a && entry->b == b) || (entry->a == b && entry->b == a);
+    if (entry->step != cache->step || same) {
+      return entry;
+    }
+  }
+}
+
+/* Room for one more, at most half full; false without memory: the application is asked again. */
+static bool reserve(hapi_surface_cache *cache)
+{
+  if (cache->entries != NULL && 2 * cache->used < cache->capacity) {
+    return true;
+  }
+  hapi_surface_cache larger = {.capacity = cache->capacity > 0 ? 2 * cache->capacity : 256,
+                               .step = cache->step};
+  larger.entries = hapi_alloc_array(larger.capacity, sizeof *larger.entries);
+  if (larger.entries == NULL) {
+    return false;
+  }
+  for (uint32_t i = 0; i < cache->capacity; ++i) {
+    const hapi_surface_entry *entry = &cache->entries[i];
+    if (entry->step == cache->step) {
+      *cached(&larger, entry->a, entry->b) = *entry;
+      ++larger.used;
+    }
+  }
+  hapi_free(cache->entries);
+  *cache = larger;
+  return true;
+}
+
+bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out)
+{
+  hapi_surface_cache *cache = &physics->surfaces;
+  if (physics->model != HAP_MODEL_CONTACT || !reserve(cache)) {
+    return ask_application(physics, a, b, out);
+  }
+  hapi_surface_entry *entry = cached(cache, a, b);
+  if (entry->step != cache->step) {
+    *entry = (hapi_surface_entry){.a = a, .b = b, .step = cache->step};
+    entry->collides = ask_application(physics, a, b, &entry->surface);
+    ++cache->used;
+  }
+  *out = entry->surface;
+  return entry->collides;
 }
 
 /* The loop carries the contacts of what it moves: ODE must not have them as well. */
@@ -166,6 +224,8 @@ static void collide_inside(hapi_physics *physics, dSpaceID space)
 void hapi_world_collide(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->contact_group);
+  ++physics->surfaces.step; /* forgets what the surfaces were */
+  physics->surfaces.used = 0;
   collide_inside(physics, physics->ode.space);
 }
 

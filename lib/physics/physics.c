@@ -117,6 +117,7 @@ void hapi_physics_destroy(hapi_physics *physics)
     dJointGroupDestroy(physics->contact_group);
   }
   hapi_bodies_finish(&physics->table);
+  hapi_free(physics->surfaces.entries);
   hapi_range_finish(physics);
   hapi_meshes_finish(&physics->meshes);
   hapi_snapshot_finish(&physics->snapshot);

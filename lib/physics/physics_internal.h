@@ -19,7 +19,9 @@
 
 #define HAPI_NONE 0xffffffffu
 #define HAPI_EDITS_MAX 256
-#define HAPI_HULL_POINTS 4096u /* of a convex geom that are looked at */
+#define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
+#define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
+#define HAPI_HULL_POINTS 4096u    /* of a convex geom that are looked at */
 
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
 #define HAPI_STANDARD_GRAVITY 9.81
@@ -55,7 +57,6 @@ typedef struct hapi_known_body {
   uint32_t member;      /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in;   /* scratch: model that it was chosen for */
   uint64_t ranged_in;   /* scratch: walk that met it */
-  uint64_t expanded_in; /* scratch: walk that went on from it */
   uint32_t slot;        /* local slot, HAPI_NONE: not local */
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
@@ -113,6 +114,7 @@ typedef struct hapi_body_slot {
   /* Model CONTACT. */
   bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
   bool linked;            /* scratch: a body of the range may touch it */
+  bool touched;           /* in the newest message: something in the loop carries it */
   bool held;              /* scratch: switched off for the global step */
   int64_t owned_until_ns; /* that the loop's last state was taken for */
   double gain_taken[6];
@@ -168,6 +170,7 @@ typedef struct hapi_neighborhood {
   uint32_t candidate_capacity;
   uint32_t candidate_count;
   struct hapi_hit *hits;    /* candidate_capacity */
+  double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
   double current_reach;
 } hapi_neighborhood;
@@ -181,6 +184,11 @@ typedef struct hapi_link {
   hapi_surface surface;
 } hapi_link;
 
+typedef struct hapi_pair_place {
+  uint64_t key;
+  uint64_t walk; /* that noted it */
+} hapi_pair_place;
+
 typedef struct hapi_range {
   hapi_near *near; /* message being written */
   dGeomID *geoms;  /* of its geoms; capacity.geoms */
@@ -188,6 +196,11 @@ typedef struct hapi_range {
   uint32_t *queue; /* entries of the body table; capacity.bodies */
   uint32_t count;
   uint32_t owned;
+  hapi_pair_place *pair_places; /* open addressing, a power of 2 */
+  uint32_t pair_place_count;
+  uint32_t pairs_noted;
+  bool pair_found;  /* scratch */
+  double own_speed; /* m/s, while ODE calls back */
   double fastest;   /* m/s, of the pointers */
   dGeomID box_geom; /* private, in no space */
   dGeomID own_geom; /* while ODE calls back */
@@ -216,8 +229,26 @@ typedef struct hapi_meshes {
   hapi_mesh *meshes;
   uint32_t count;
   uint32_t capacity;
-  hapi_near_triangle found[64];
+  hapi_near_triangle found[HAPI_NEAR_TRIANGLES];
+  uint32_t places[HAPI_EDGE_PLACES]; /* of their edges, + 1; open addressing */
 } hapi_meshes;
+
+/* ---- ode_world.c ---- */
+
+typedef struct hapi_surface_entry {
+  dGeomID a; /* compared only */
+  dGeomID b;
+  uint64_t step; /* in which it was asked for */
+  bool collides;
+  dSurfaceParameters surface;
+} hapi_surface_entry;
+
+typedef struct hapi_surface_cache {
+  hapi_surface_entry *entries; /* open addressing, a power of 2 */
+  uint32_t capacity;
+  uint32_t used;
+  uint64_t step;
+} hapi_surface_cache;
 
 /* ---- snapshot.c ---- */
 
@@ -312,6 +343,7 @@ struct hapi_physics {
   uint32_t body_high;          /* slots that were ever used are below */
   uint32_t contact_high;
   hapi_neighborhood neighborhood;
+  hapi_surface_cache surfaces;
   hapi_range range;
   hapi_meshes meshes;
   hapi_snapshot snapshot;
@@ -396,7 +428,8 @@ void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 
 /* mesh.c */
-/* Triangles of a static mesh that meet a box of the world, into physics->meshes.found; at most 64. */
+/* Triangles of a static mesh that meet a box of the world, into physics->meshes.found;
+ * HAPI_NEAR_TRIANGLES: there may be more, and they are not to be used. */
 uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]);
 void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
 void hapi_meshes_finish(hapi_meshes *meshes);

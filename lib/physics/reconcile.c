@@ -91,6 +91,7 @@ static void take_body(hapi_physics *physics, uint32_t index)
   }
   take_impulse(slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
+  slot->touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
   memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(slot, body)) {
     hapi_slots_restart(slot);
@@ -187,7 +188,9 @@ void hapi_reconcile_own(hapi_physics *physics)
       }
     } else if (in->owned_until_ns > slot->owned_until_ns) {
       slot->owned_until_ns = in->owned_until_ns;
-      take_last_state(physics, slot, body, in);
+      if (in->epoch == slot->epoch) { /* else the application has moved it since */
+        take_last_state(physics, slot, body, in);
+      }
     }
   }
 }

@@ -96,7 +96,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .bodies = 2 * (uint32_t)def->max_bodies + 16,
       .contacts = (uint32_t)def->max_contacts,
       .pointers = (uint32_t)def->max_pointers,
-      .geoms = 8 * (uint32_t)def->max_bodies + 64,
+      .geoms = 8 * (uint32_t)def->max_bodies + 1024,
       .hull_points = (uint32_t)def->max_hull_points,
   };
 }

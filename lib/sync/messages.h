@@ -39,7 +39,8 @@ enum {
                             A body with neither this nor DRIVEN nor MEASURED is outside of the range:
                             it goes on with its twist, and ODE gets what the loop gave to it */
   HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
-  HAPI_BODY_GYROSCOPIC = 32
+  HAPI_BODY_GYROSCOPIC = 32,
+  HAPI_BODY_TOUCHED = 64 /* of the loop's message: a contact carried it in this tick */
 };
 
 /* ---- physics -> haptic: the local model ---- */

@@ -292,6 +292,27 @@ static bool is_near(const hapi_tick *tick, const placed_contact *c)
   return c->gap <= OPEN_FLOOR + OPEN_TICKS * tick->period * speed;
 }
 
+static bool rests(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_RESTING) != 0;
+}
+
+/* m/s along the normal, before the tick; negative: they come nearer. */
+static double approach(const placed_contact *c)
+{
+  double speed = 0.0;
+  const hapi_local_body *bodies[2] = {c->a, c->b};
+  for (int i = 0; i < 2; ++i) {
+    if (bodies[i] != NULL) {
+      double j[6];
+      double b[6];
+      hapi_row_column(bodies[i], c->point, c->normal, i == 0 ? 1.0 : -1.0, j, b);
+      speed += hapi_row_start_speed(bodies[i], j);
+    }
+  }
+  return speed;
+}
+
 /* What touches a body that moves is awake, as in ODE. */
 static void wake(placed_contact *c)
 {
@@ -322,7 +343,7 @@ void hapi_contact_rows(hapi_tick *tick)
                  (is_owned(c.a) || is_owned(c.b)); /* others are ODE's affair */
     bool room = world->solver.row_count + 3 <= world->row_capacity;
     if (moves && room && place(&c) && is_near(tick, &c)) {
-      if (c.gap <= 0.0) {
+      if ((rests(c.a) || rests(c.b)) && c.gap + tick->period * approach(&c) <= 0.0) {
         wake(&c);
       }
       add_contact(tick, &c, i);

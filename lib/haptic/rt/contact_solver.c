@@ -9,6 +9,7 @@
 /* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
  * go in circles, sweeps lead out. */
 #define DIRECT_ROUNDS 8
+#define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
 
 /* ---- preparation ---- */
 
@@ -51,10 +52,33 @@ static void prepare(hapi_solver *solver, uint32_t index)
   row->drive = row->target - (row->paired ? 0.0 : hapi_dot6(row->jb, solver->v[row->b]));
 }
 
+static double couple(const hapi_row *row, const hapi_row *other)
+{
+  double k = hapi_dot6(row->ja, other->ba);
+  return row->paired ? k + hapi_dot6(row->jb, other->bb) : k;
+}
+
+/* A normal and its two frictions: one update takes all three. */
+static void find_triple(hapi_solver *solver, uint32_t i)
+{
+  hapi_row *r = &solver->rows[i];
+  r->triple = r->inverse != 0.0 && r->normal < 0 && i + 2 < solver->row_count &&
+              r[1].normal == (int32_t)i && r[2].normal == (int32_t)i && r[1].inverse != 0.0 &&
+              r[2].inverse != 0.0;
+  if (r->triple) {
+    r[1].coupling[0] = couple(&r[1], &r[0]);
+    r[2].coupling[0] = couple(&r[2], &r[0]);
+    r[2].coupling[1] = couple(&r[2], &r[1]);
+  }
+}
+
 static void warm_start(hapi_solver *solver)
 {
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     prepare(solver, i);
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    find_triple(solver, i);
   }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     hapi_row *row = &solver->rows[i];
@@ -95,10 +119,64 @@ static double update(hapi_solver *solver, hapi_row *row)
   return fabs(change) * row->response;
 }
 
+/* The change of a row's impulse, cut at its bounds. */
+static double change(hapi_row *row, double error, double lo, double hi)
+{
+  double old = row->impulse;
+  double wanted = error * row->inverse;
+  row->impulse = hapi_clamp(old + wanted, lo, hi);
+  return hapi_clamp(wanted, lo - old, hi - old);
+}
+
+static double change_friction(hapi_row *row, double error, double p)
+{
+  double hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+  return change(row, error, -hi, hi);
+}
+
+/* v += b0 d0 + b1 d1 + b2 d2 */
+static void push_triple(double *restrict v, const double d[3], const double *restrict b0,
+                        const double *restrict b1, const double *restrict b2)
+{
+  for (int k = 0; k < 6; ++k) {
+    v[k] += d[0] * b0[k] + d[1] * b1[k] + d[2] * b2[k];
+  }
+}
+
+/* As three updates, but the velocities are read and written once: what the first changes do to the
+ * later rows comes from the couplings. So the three do not wait for each other's way through v. */
+static double update_triple(hapi_solver *solver, hapi_row *r)
+{
+  double e[3];
+  double d[3];
+  for (int i = 0; i < 3; ++i) {
+    e[i] = hapi_row_error(solver, &r[i]);
+  }
+  d[0] = change(&r[0], e[0], r[0].lo, r[0].hi);
+  if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
+    return 0.0; /* a contact that does not push */
+  }
+  d[1] = change_friction(&r[1], e[1] - r[1].coupling[0] * d[0], r[0].impulse);
+  d[2] = change_friction(&r[2], e[2] - r[2].coupling[0] * d[0] - r[2].coupling[1] * d[1],
+                         r[0].impulse);
+  push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
+  if (r->paired) {
+    push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
+  }
+  double largest = fabs(d[0]) * r[0].response;
+  for (int i = 1; i < 3; ++i) {
+    double correction = fabs(d[i]) * r[i].response;
+    largest = correction > largest ? correction : largest;
+  }
+  return largest;
+}
+
 static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, double largest)
 {
   for (uint32_t i = first; i < end; ++i) {
-    double correction = update(solver, &solver->rows[i]);
+    hapi_row *row = &solver->rows[i];
+    double correction = row->triple ? update_triple(solver, row) : update(solver, row);
+    i += row->triple ? 2 : 0;
     largest = correction > largest ? correction : largest;
   }
   return largest;
@@ -151,7 +229,7 @@ void hapi_solver_run(hapi_solver *solver)
     do {
       solver->residual = sweep(solver);
       left -= left < rows ? left : rows;
-    } while (solver->sweeps < 2);
+    } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
     if (solver->residual < solver->tolerance || left < rows) {
       break;
     }
@@ -160,7 +238,14 @@ void hapi_solver_run(hapi_solver *solver)
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       direct = spent != HAPI_TOO_DEAR; /* now, and so in the next round */
       left -= direct ? spent : 0;
-      left = direct || left < 2 * (uint64_t)rows ? left : 2 * (uint64_t)rows;
+      if (direct && solver->direct_residual < solver->tolerance) {
+        solver->residual = solver->direct_residual;
+        break;
+      }
+      if (!direct) {
+        uint64_t enough = 2 * (uint64_t)rows > SWEEPS_ALONE ? 2 * (uint64_t)rows : SWEEPS_ALONE;
+        left = left < enough ? left : enough;
+      }
     }
   }
   check_finite(solver);

@@ -34,14 +34,16 @@ typedef struct hapi_row {
   double impulse;  /* N s; in: warm start, out: result */
   double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
   double response; /* inner: 1 / inverse */
-  double drive;    /* inner: target without the part of a partner that does not respond */
-  int32_t normal;  /* index of the normal row, before this one and of the same a and b; -1: none,
+  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact */
+  double drive;       /* inner: target without the part of a partner that does not respond */
+  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
                       the bounds are lo .. hi */
-  uint32_t a;      /* index into v */
-  uint32_t b;      /* several static partners may share one index, whose v stays as it is */
-  uint32_t next;   /* inner: of the same island */
-  uint8_t paired;  /* inner: b responds */
-  uint8_t state;   /* inner, of direct_solver.c */
+  uint32_t a;         /* index into v */
+  uint32_t b;         /* several static partners may share one index, whose v stays as it is */
+  uint32_t next;      /* inner: of the same island */
+  uint8_t triple;     /* inner: a normal whose two frictions come next, all of use */
+  uint8_t paired;     /* inner: b responds */
+  uint8_t state;      /* inner, of direct_solver.c */
 } hapi_row;
 
 typedef struct hapi_solver {
@@ -56,6 +58,7 @@ typedef struct hapi_solver {
   double *work;           /* for direct solves; an island that does not fit is left to sweeps */
   size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
 
+  double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
   uint32_t direct_solves; /* out: that were accepted */
   double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */

@@ -531,21 +531,24 @@ static void solve(island *is)
 }
 
 /* The best of some rounds is kept, each with the active set that the one before leads to. */
-static bool improve(island *is, double before)
+static bool improve(island *is, double before, double *out_due)
 {
   double best = WORSE * before;
   bool better = false;
+  *out_due = before;
   save(is);
   for (int round = 0; round < INNER_ROUNDS; ++round) {
     solve(is);
     double due = measure(is);
+    if (due < is->solver->tolerance) {
+      *out_due = due;
+      return true; /* nothing to save, nothing to restore */
+    }
     if (due < best) {
+      *out_due = due;
       save(is);
       best = due;
       better = true;
-    }
-    if (due < is->solver->tolerance) {
-      break;
     }
     classify(is, false);
   }
@@ -563,34 +566,37 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
    * right, and again where neither leads to the end. */
   bool sticking = solver->sweeps % 3 == 0;
+  solver->direct_residual = HUGE_VAL;
   if (solver->body_count > BODIES_MAX || solver->work_count < 3 * (size_t)solver->row_count) {
     return 0;
   }
   split(solver, head);
+  solver->direct_residual = 0.0;
   is.solver = solver;
   is.gain = solver->work;
   is.saved_impulse = solver->work + solver->row_count;
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     is.first = head[i];
     double before = is.first == NO_ROW ? 0.0 : measure(&is);
+    double due = before;
     if (!(before >= solver->tolerance)) {
+      solver->direct_residual = fmax(solver->direct_residual, before);
       continue;
     }
     classify(&is, sticking);
-    if (is.free_rows == 0) {
-      continue;
-    }
-    if (is.free_rows > solver->direct_rows || !gather(&is)) {
-      too_dear = true;
+    if (is.free_rows == 0 || is.free_rows > solver->direct_rows || !gather(&is)) {
+      too_dear = too_dear || is.free_rows > 0;
+      solver->direct_residual = HUGE_VAL;
       continue;
     }
     uint32_t cost = plan(&is);
     if (cost <= budget - spent && place(&is)) {
       spent += cost;
-      solver->direct_solves += improve(&is, before);
+      solver->direct_solves += improve(&is, before, &due);
     } else {
       too_dear = true;
     }
+    solver->direct_residual = fmax(solver->direct_residual, due);
   }
   return spent == 0 && too_dear ? HAPI_TOO_DEAR : spent;
 }

@@ -10,7 +10,7 @@
  * tick as the global world would be stepped at the same rate (semi-implicit Euler, contacts on the
  * level of velocities). What the loop does not own stands around it and moves as it was last seen. */
 
-#define TURN_MAX 0.1      /* rad a substep of the gyroscopic motion */
+#define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
 void hapi_row_column(const hapi_local_body *body, const double point[3], const double direction[3],
@@ -75,6 +75,7 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
   hapi_v3_copy(body->twist.linear, body->start_twist);
   hapi_v3_copy(body->twist.angular, body->start_twist + 3);
+  body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
   body->waiting = waits(tick, body);
   body->row = row;
   if ((body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
@@ -258,6 +259,13 @@ static bool is_owned(hapi_tick *tick, uint32_t slot)
   return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
 }
 
+static void touch(hapi_tick *tick, uint32_t slot)
+{
+  if (slot != HAPI_SLOT_NONE) {
+    tick->bodies[slot].flags |= HAPI_BODY_TOUCHED;
+  }
+}
+
 static void account(hapi_tick *tick)
 {
   const hapi_solver *solver = &tick->world.solver;
@@ -267,6 +275,8 @@ static void account(hapi_tick *tick)
     if (row->impulse == 0.0) {
       continue;
     }
+    touch(tick, source->body_a);
+    touch(tick, source->body_b);
     give_outside(tick, source->body_a, row->ja, row->impulse);
     give_outside(tick, source->body_b, row->jb, row->impulse);
     if (source->pointer && is_owned(tick, source->body_a)) {

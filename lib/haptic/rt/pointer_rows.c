@@ -13,7 +13,7 @@
  *   above it           f = k g' + d (s - w')
  *
  * The first is the midpoint rule written for poses that move with the new velocity: it keeps the
- * energy, and f belongs to the tick's own time. The second is implicit Euler. Both are
+ * energy, also when a contact begins or ends within a tick (secant), and f belongs to the tick's own time. The second is implicit Euler. Both are
  * w' + f / c = F / c, a soft row. A damper that changes the velocity by little in a tick takes it as
  * it is, d (s - w), as eq. 7 says and as the world does when it is stepped at this rate itself. */
 
@@ -85,19 +85,73 @@ static void push_static(hapi_local_contact *c, const placed_pointer *at, double 
   hapi_v3_scale(force > 0.0 ? -force : 0.0, at->normal, c->force);
 }
 
+/* Spring force between the middles h and g of two ticks (depth, m): the change of its energy over the
+ * change of depth. So a contact that begins or ends within the tick gains nothing by it. With both
+ * in touch it is the mean, k (h + g) / 2. */
+static double secant(double k, double h, double g, double *out_slope)
+{
+  *out_slope = 0.0;
+  if (h > 0.0 && g >= 0.0) {
+    *out_slope = 0.5 * k;
+    return 0.5 * k * (h + g);
+  }
+  if (h <= 0.0 && g <= 0.0) {
+    return 0.0;
+  }
+  double way = g - h;
+  if (h > 0.0) { /* ends */
+    *out_slope = 0.5 * k * h * h / (way * way);
+    return -0.5 * k * h * h / way;
+  }
+  *out_slope = 0.5 * k * g * (g - 2.0 * h) / (way * way);
+  return 0.5 * k * g * g / way;
+}
+
+typedef struct spring {
+  double k;
+  double a;     /* 1/kg, how the body answers */
+  double depth; /* m, at the tick */
+  double w;     /* m/s, as above, before the tick */
+  double s;
+} spring;
+
+#define NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
+
+/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that the
+ * body would have with nothing else in touch. */
+static void linearise(const spring *p, double period, double *out_c, double *out_force)
+{
+  double before = p->depth - 0.5 * period * (p->s - p->w);
+  double w = p->w;
+  double slope = 0.0;
+  double force = 0.0;
+  for (int i = 0; i < NEWTON_STEPS; ++i) {
+    force = secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
+    w -= (w - p->w - period * p->a * force) / (1.0 + 0.5 * period * period * p->a * slope);
+  }
+  force = secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
+  *out_c = 0.5 * period * slope;
+  *out_force = force + *out_c * w;
+}
+
 static void soften(hapi_row *row, const placed_pointer *at, const double speeds[2], double share,
                    double period)
 {
-  double k = share * at->pointer->stiffness;
   double d = at->depth > 0.0 ? share * at->pointer->damping : 0.0;
-  double a = hapi_v3_dot(row->ja, row->ba) + hapi_v3_dot(row->ja + 3, row->ba + 3);
-  double w = speeds[0];
-  double s = speeds[1];
-  bool midpoint = period * period * a * k <= MIDPOINT_LIMIT;
-  double late = period * a * d <= DAMPER_LIMIT ? 0.0 : 0.5; /* share of the new velocity */
-  double c = midpoint ? 0.25 * period * k + late * d : period * k + d;
-  double force = midpoint ? k * at->depth + 0.25 * period * k * w + d * (s - (1.0 - late) * w)
-                          : k * (at->depth + period * s) + d * s;
+  spring p = {.k = share * at->pointer->stiffness,
+              .a = hapi_v3_dot(row->ja, row->ba) + hapi_v3_dot(row->ja + 3, row->ba + 3),
+              .depth = at->depth,
+              .w = speeds[0],
+              .s = speeds[1]};
+  double c = period * p.k;
+  double force = p.k * (p.depth + period * p.s);
+  double late = 1.0; /* share of the new velocity in the damper's */
+  if (period * period * p.a * p.k <= MIDPOINT_LIMIT) {
+    linearise(&p, period, &c, &force);
+    late = period * p.a * d <= DAMPER_LIMIT ? 0.0 : 0.5;
+  }
+  c += late * d;
+  force += d * (p.s - (1.0 - late) * p.w);
   row->softness = c > 0.0 ? 1.0 / (period * c) : HUGE_VAL;
   row->target = c > 0.0 ? force / c : 0.0;
 }
@@ -121,6 +175,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
                       hapi_v3_dot(into, at->pointer->twist.linear)};
   soften(row, at, speeds, share, tick->period);
   if (row->softness == HUGE_VAL) {
+    hapi_v3_set(contact->force, 0.0, 0.0, 0.0);
     return;
   }
   row->a = at->body->row;
@@ -162,7 +217,9 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   hapi_v3_copy(at.point, c->point_now);
   double share = ramp(c, at.depth, tick->period);
   double speed = closing_speed(&at);
-  bool comes = at.depth > 0.0 || at.depth + tick->period * speed > 0.0;
+  double way = tick->period * speed;
+  /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
+  bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && way < 0.25 * at.pointer->radius);
   if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 && at.depth > 0.0) {
     at.body->flags &= ~(uint32_t)HAPI_BODY_RESTING; /* woken by the touch */
   }

@@ -1,0 +1,304 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TESTS_CONTACT_WORLD_H
+#define HAPODE_TESTS_CONTACT_WORLD_H
+
+/* A world with a lockstep session of model CONTACT over it and one hand that a test moves. Every
+ * tick is read from the trace: where the traced bodies are, how fast they move, what the hand gave.
+ * Public API only. Include after tap.h. */
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#define CW_BODIES_MAX 128
+#define CW_TRACED_MAX HAP_TRACE_BODIES_MAX
+#define CW_GRAVITY 9.81
+
+typedef struct contact_world {
+  dWorldID world;
+  dSpaceID space;
+  dBodyID bodies[CW_BODIES_MAX];
+  int body_count;
+  dSurfaceParameters surface; /* of every pair */
+  double direction[3];        /* first friction direction, with dContactFDir1 */
+
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_pointer_def hand_def;
+  hap_session *session;
+  hap_pointer_id hand;
+
+  double hand_at[3];
+  double hand_velocity[3];
+  bool follows; /* the hand goes with the first body, hand_offset from it */
+  double hand_offset[3];
+  double user_force[3]; /* N on the first body, in every step */
+  double user_torque[3];
+
+  uint64_t ticks;
+  hap_trace_row row;                 /* of the newest tick */
+  double position[CW_TRACED_MAX][3]; /* after it */
+  double velocity[CW_TRACED_MAX][3]; /* of the way made in it */
+  double force[3];                   /* on the hand */
+  double impulse[3];                 /* N s, the hand's on the bodies, up to now */
+  double synced_impulse[3];          /* up to the newest sync */
+  double momentum[3];                /* of all bodies, in ODE at the newest sync */
+  uint32_t range_min;                /* bodies in the range, at the syncs so far */
+  uint32_t range_max;
+  uint32_t steps;
+  int surface_calls;
+} contact_world;
+
+static inline bool cw_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  contact_world *w = user;
+  (void)a;
+  (void)b;
+  ++w->surface_calls;
+  *io = w->surface;
+  return true;
+}
+
+static inline bool cw_direction(void *user, dGeomID a, dGeomID b, double out[3])
+{
+  contact_world *w = user;
+  (void)a;
+  (void)b;
+  memcpy(out, w->direction, sizeof w->direction);
+  return true;
+}
+
+static inline void cw_before_step(void *user, double step_s)
+{
+  contact_world *w = user;
+  const double *f = w->user_force;
+  const double *t = w->user_torque;
+  (void)step_s;
+  if (w->body_count > 0 && (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0)) {
+    dBodyAddForce(w->bodies[0], f[0], f[1], f[2]);
+  }
+  if (w->body_count > 0 && (t[0] != 0.0 || t[1] != 0.0 || t[2] != 0.0)) {
+    dBodyAddTorque(w->bodies[0], t[0], t[1], t[2]);
+  }
+}
+
+/* At a sync ODE holds what the loop had made of its bodies up to then. */
+static inline void cw_after_step(void *user, double step_s)
+{
+  contact_world *w = user;
+  (void)step_s;
+  memset(w->momentum, 0, sizeof w->momentum);
+  for (int i = 0; i < w->body_count; ++i) {
+    dMass mass;
+    if (w->bodies[i] == NULL || dBodyIsKinematic(w->bodies[i])) {
+      continue;
+    }
+    dBodyGetMass(w->bodies[i], &mass);
+    for (int k = 0; k < 3; ++k) {
+      w->momentum[k] += mass.mass * dBodyGetLinearVel(w->bodies[i])[k];
+    }
+  }
+  memcpy(w->synced_impulse, w->impulse, sizeof w->impulse);
+  ++w->steps;
+}
+
+static inline void cw_open(contact_world *w, double gravity)
+{
+  memset(w, 0, sizeof *w);
+  w->world = dWorldCreate();
+  w->space = dHashSpaceCreate(NULL);
+  dWorldSetGravity(w->world, 0.0, 0.0, -gravity);
+  dWorldSetCFM(w->world, 1e-12);
+  dWorldSetERP(w->world, 0.2);
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  dWorldSetQuickStepNumIterations(w->world, 100);
+  w->surface = (dSurfaceParameters){.mode = dContactApprox1, .mu = 0.5};
+  hap_session_def_init(&w->def, sizeof w->def);
+  w->def.drive = HAP_DRIVE_LOCKSTEP;
+  w->def.model = HAP_MODEL_CONTACT;
+  w->def.physics_hz = 20.0;
+  w->def.trace_rows = 16;
+  hap_ode_def_init(&w->ode, sizeof w->ode);
+  w->ode.surface = cw_surface;
+  w->ode.friction_direction = cw_direction;
+  w->ode.before_step = cw_before_step;
+  w->ode.after_step = cw_after_step;
+  hap_pointer_def_init(&w->hand_def, sizeof w->hand_def);
+  w->hand_def.stiffness = 2000.0;
+  w->hand_def.damping = 20.0;
+  w->hand_def.max_force = 1e6;
+}
+
+static inline void cw_close(contact_world *w)
+{
+  hap_session_destroy(w->session);
+  dSpaceDestroy(w->space);
+  dWorldDestroy(w->world);
+  memset(w, 0, sizeof *w);
+}
+
+static inline dBodyID cw_add(contact_world *w, dGeomID geom, const dMass *mass, double x, double y,
+                             double z)
+{
+  dBodyID body = dBodyCreate(w->world);
+  dBodySetMass(body, mass);
+  dBodySetPosition(body, x, y, z);
+  if (geom != NULL) {
+    dGeomSetBody(geom, body);
+  }
+  w->bodies[w->body_count++] = body;
+  return body;
+}
+
+static inline dBodyID cw_add_box(contact_world *w, double mass, const double edges[3], double x,
+                                 double y, double z)
+{
+  dMass m;
+  dGeomID geom = dCreateBox(w->space, edges[0], edges[1], edges[2]);
+  dMassSetBoxTotal(&m, mass, edges[0], edges[1], edges[2]);
+  dBodyID body = dBodyCreate(w->world);
+  dBodySetMass(body, &m);
+  dBodySetPosition(body, x, y, z);
+  dGeomSetBody(geom, body);
+  w->bodies[w->body_count++] = body;
+  return body;
+}
+
+static inline dBodyID cw_add_cube(contact_world *w, double mass, double edge, double x, double y,
+                                  double z)
+{
+  return cw_add_box(w, mass, (const double[3]){edge, edge, edge}, x, y, z);
+}
+
+static inline dBodyID cw_add_ball(contact_world *w, double mass, double radius, double x, double y,
+                                  double z)
+{
+  dMass m;
+  dMassSetSphereTotal(&m, mass, radius);
+  return cw_add(w, dCreateSphere(w->space, radius), &m, x, y, z);
+}
+
+static inline dGeomID cw_add_floor(contact_world *w)
+{
+  return dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
+}
+
+static inline void cw_put_hand(contact_world *w, double vx, double vy, double vz)
+{
+  const double *at = w->hand_at;
+  hap_pose pose = {{at[0], at[1], at[2]}, {1.0, 0.0, 0.0, 0.0}};
+  hap_twist twist = {{vx, vy, vz}, {0.0, 0.0, 0.0}};
+  CHECK(hap_pointer_set_target(w->session, w->hand, &pose, &twist) == HAP_OK);
+}
+
+static inline hap_stats cw_stats(const contact_world *w)
+{
+  hap_stats stats;
+  memset(&stats, 0, sizeof stats);
+  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
+  return stats;
+}
+
+/* Session and hand, started. The first 16 bodies are traced. */
+static inline bool cw_start(contact_world *w, double x, double y, double z)
+{
+  hap_detail detail = {""};
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  w->ode.user = w;
+  w->range_min = UINT32_MAX;
+  if (hap_session_create(&w->def, &w->ode, &w->session, &detail) < HAP_OK) {
+    printf("# %s\n", detail.text);
+    return false;
+  }
+  size_t traced = w->body_count < CW_TRACED_MAX ? (size_t)w->body_count : CW_TRACED_MAX;
+  w->hand_at[0] = x;
+  w->hand_at[1] = y;
+  w->hand_at[2] = z;
+  for (size_t i = 0; i < traced; ++i) {
+    memcpy(w->position[i], dBodyGetPosition(w->bodies[i]), 3 * sizeof(double));
+  }
+  bool good = hap_session_trace_bodies(w->session, w->bodies, traced) == HAP_OK &&
+              hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK;
+  if (good) {
+    cw_put_hand(w, 0.0, 0.0, 0.0);
+    good = hap_session_start(w->session) == HAP_OK;
+  }
+  if (!good && hap_session_detail(w->session, &detail) == HAP_OK) {
+    printf("# %s\n", detail.text);
+  }
+  return good;
+}
+
+/* As cw_start, with a hand that goes with the first body at this distance from its centre. */
+static inline bool cw_start_following(contact_world *w, double dx, double dy, double dz)
+{
+  const dReal *p = dBodyGetPosition(w->bodies[0]);
+  w->follows = true;
+  w->hand_offset[0] = dx;
+  w->hand_offset[1] = dy;
+  w->hand_offset[2] = dz;
+  return cw_start(w, p[0] + dx, p[1] + dy, p[2] + dz);
+}
+
+static inline void cw_read(contact_world *w)
+{
+  size_t count = 0;
+  double period = 1.0 / w->def.haptic_hz;
+  CHECK(hap_session_trace_read(w->session, &w->row, 1, &count) == HAP_OK && count == 1);
+  for (uint32_t i = 0; i < w->row.body_count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      w->velocity[i][k] = (w->row.body_position[i][k] - w->position[i][k]) / period;
+      w->position[i][k] = w->row.body_position[i][k];
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    w->force[k] = w->row.pointers[0].force[k];
+    w->impulse[k] -= period * w->force[k];
+  }
+  hap_stats stats = cw_stats(w);
+  w->range_min = stats.range_bodies < w->range_min ? stats.range_bodies : w->range_min;
+  w->range_max = stats.range_bodies > w->range_max ? stats.range_bodies : w->range_max;
+}
+
+/* One tick. */
+static inline void cw_tick(contact_world *w)
+{
+  const double *v = w->hand_velocity;
+  double period = 1.0 / w->def.haptic_hz;
+  if (w->follows) {
+    for (int k = 0; k < 3; ++k) {
+      w->hand_at[k] = w->position[0][k] + w->hand_offset[k];
+    }
+    cw_put_hand(w, w->velocity[0][0], w->velocity[0][1], w->velocity[0][2]);
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      w->hand_at[k] += period * v[k];
+    }
+    cw_put_hand(w, v[0], v[1], v[2]);
+  }
+  CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+  ++w->ticks;
+  cw_read(w);
+}
+
+static inline void cw_run(contact_world *w, int ticks)
+{
+  for (int i = 0; i < ticks; ++i) {
+    cw_tick(w);
+  }
+}
+
+static inline void cw_move_hand(contact_world *w, double vx, double vy, double vz)
+{
+  w->hand_velocity[0] = vx;
+  w->hand_velocity[1] = vy;
+  w->hand_velocity[2] = vz;
+}
+
+static inline double cw_norm(const double v[3])
+{
+  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+#endif
