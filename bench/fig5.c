@@ -249,11 +249,13 @@ static void check_exact(bench *b, const figure *f, size_t k, size_t v)
       {"peak [N]", s->peak_n, want.peak_n},
       {"impulse [N s]", s->impulse_ns, want.impulse_ns},
   };
+  /* The spring of model contact shows the ends of a contact over two ticks. */
+  double bound = variants[v].model == HAP_MODEL_CONTACT ? 1e-3 : 5e-4;
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
-    bench_check(b, bench_within(rows[i].value, rows[i].wanted, 5e-4),
-                "k = %5g N/m, %s, %s: %.6f, closed form %.6f (%+.4f %%, bound 0.05 %%)",
+    bench_check(b, bench_within(rows[i].value, rows[i].wanted, bound),
+                "k = %5g N/m, %s, %s: %.6f, closed form %.6f (%+.4f %%, bound %g %%)",
                 stiffnesses[k], variants[v].name, rows[i].name, rows[i].value, rows[i].wanted,
-                percent(rows[i].value, rows[i].wanted));
+                percent(rows[i].value, rows[i].wanted), 100.0 * bound);
   }
 }
 
