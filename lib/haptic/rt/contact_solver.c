@@ -233,8 +233,10 @@ void hapi_solver_run(hapi_solver *solver)
     if (solver->residual < solver->tolerance || left < rows) {
       break;
     }
-    /* One sweep is kept to measure and repair what the direct solve leaves. */
-    if (direct && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+    /* Direct solves may have one half of the budget: where they lead in circles between two sets of
+     * active rows, sweeps from the second half still come near, and the next tick starts from there. */
+    if (direct && 2 * left > solver->update_budget &&
+        (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       direct = spent != HAPI_TOO_DEAR; /* now, and so in the next round */
       left -= direct ? spent : 0;
