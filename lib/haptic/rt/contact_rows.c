@@ -26,6 +26,8 @@ typedef struct placed_contact {
   double normal[3]; /* from b to a */
   double point[3];  /* between the surfaces */
   double gap;
+  double arm_a[3]; /* to point */
+  double arm_b[3];
 } placed_contact;
 
 /* What of a contact belongs to one of its bodies. */
@@ -186,8 +188,8 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   uint32_t at = world->solver.row_count++;
   hapi_row *row = &world->solver.rows[at];
   hapi_row_source *source = &world->sources[at];
-  hapi_row_column(c->a, c->point, direction, 1.0, row->ja, row->ba);
-  hapi_row_column(c->b, c->point, direction, -1.0, row->jb, row->bb);
+  hapi_row_column(c->a, c->arm_a, direction, 1.0, row->ja, row->ba);
+  hapi_row_column(c->b, c->arm_b, direction, -1.0, row->jb, row->bb);
   row->a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
   row->b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
   row->mu = 0.0;
@@ -242,12 +244,14 @@ static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, 
   row->lo = -row->hi;
 }
 
-static void add_contact(hapi_tick *tick, const placed_contact *c, uint32_t index)
+static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
 {
   hapi_solver *solver = &tick->world.solver;
   int32_t normal = (int32_t)solver->row_count;
   double t1[3];
   double t2[3];
+  hapi_body_arm(c->a, c->point, c->arm_a);
+  hapi_body_arm(c->b, c->point, c->arm_b);
   friction_directions(c->surface, c->normal, t1, t2);
   set_normal(tick, c, next_row(tick, c, index, 0, c->normal));
   if (c->surface->mu > 0.0) {
@@ -306,7 +310,9 @@ static double approach(const placed_contact *c)
     if (bodies[i] != NULL) {
       double j[6];
       double b[6];
-      hapi_row_column(bodies[i], c->point, c->normal, i == 0 ? 1.0 : -1.0, j, b);
+      double arm[3];
+      hapi_body_arm(bodies[i], c->point, arm);
+      hapi_row_column(bodies[i], arm, c->normal, i == 0 ? 1.0 : -1.0, j, b);
       speed += hapi_row_start_speed(bodies[i], j);
     }
   }

@@ -9,6 +9,7 @@
 /* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
  * go in circles, sweeps lead out. */
 #define DIRECT_ROUNDS 8
+#define DEAR_RUNS 32u
 #define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
 
 /* ---- preparation ---- */
@@ -39,6 +40,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
 {
   hapi_row *row = &solver->rows[index];
   row->inverse = 0.0;
+  row->triple = 0;
   if (valid(solver, index)) {
     double d = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb) + row->softness;
     row->inverse = d > 1e-200 && d < 1e200 ? 1.0 / d : 0.0;
@@ -58,13 +60,16 @@ static double couple(const hapi_row *row, const hapi_row *other)
   return row->paired ? k + hapi_dot6(row->jb, other->bb) : k;
 }
 
-/* A normal and its two frictions: one update takes all three. */
-static void find_triple(hapi_solver *solver, uint32_t i)
+/* A normal and its two frictions: one update takes all three. `last` is the second friction. */
+static void join_triple(hapi_solver *solver, uint32_t last)
 {
-  hapi_row *r = &solver->rows[i];
-  r->triple = r->inverse != 0.0 && r->normal < 0 && i + 2 < solver->row_count &&
-              r[1].normal == (int32_t)i && r[2].normal == (int32_t)i && r[1].inverse != 0.0 &&
-              r[2].inverse != 0.0;
+  int32_t normal = solver->rows[last].normal;
+  if (normal < 0 || (uint32_t)normal + 2 != last) {
+    return;
+  }
+  hapi_row *r = &solver->rows[normal];
+  r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal &&
+              r[1].inverse != 0.0 && r[2].inverse != 0.0;
   if (r->triple) {
     r[1].coupling[0] = couple(&r[1], &r[0]);
     r[2].coupling[0] = couple(&r[2], &r[0]);
@@ -72,23 +77,25 @@ static void find_triple(hapi_solver *solver, uint32_t i)
   }
 }
 
+/* One walk over the rows: there are more of them than fit into a near cache. */
 static void warm_start(hapi_solver *solver)
 {
   for (uint32_t i = 0; i < solver->row_count; ++i) {
-    prepare(solver, i);
-  }
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    find_triple(solver, i);
-  }
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
     hapi_row *row = &solver->rows[i];
+    double lo;
+    double hi;
+    if (!solver->prepared) {
+      prepare(solver, i);
+      join_triple(solver, i);
+    }
     if (row->inverse == 0.0) {
       continue;
     }
-    double lo;
-    double hi;
     hapi_row_bounds(solver->rows, row, &lo, &hi);
     row->impulse = hapi_clamp(row->impulse, lo, hi);
+    if (row->impulse == 0.0) {
+      continue;
+    }
     hapi_madd6(solver->v[row->a], row->impulse, row->ba);
     if (row->paired) {
       hapi_madd6(solver->v[row->b], row->impulse, row->bb);
@@ -216,6 +223,35 @@ static void check_finite(hapi_solver *solver)
   }
 }
 
+/* What is left for sweeps where a direct solve is too dear: more of them gain little. */
+static uint64_t sweeps_alone(uint32_t rows, uint64_t left)
+{
+  uint64_t enough = 2 * (uint64_t)rows > SWEEPS_ALONE ? 2 * (uint64_t)rows : SWEEPS_ALONE;
+  return left < enough ? left : enough;
+}
+
+/* Too dear for the whole budget, not for what was left of it. */
+static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
+{
+  if (left + 3 * (uint64_t)rows >= solver->update_budget) {
+    solver->dear_rows = rows;
+    solver->dear_runs = 0;
+  }
+}
+
+/* An island that was too dear in the last runs will be so in this one: finding out costs as much as
+ * two sweeps. */
+static bool stays_dear(hapi_solver *solver)
+{
+  bool alike =
+      solver->dear_rows > 0 && 10 * (uint64_t)solver->row_count >= 9 * (uint64_t)solver->dear_rows;
+  if (!alike || ++solver->dear_runs >= DEAR_RUNS) {
+    solver->dear_rows = 0;
+    return false;
+  }
+  return true;
+}
+
 void hapi_solver_run(hapi_solver *solver)
 {
   uint32_t rows = solver->row_count;
@@ -223,7 +259,9 @@ void hapi_solver_run(hapi_solver *solver)
   solver->sweeps = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
-  bool direct = solver->direct_rows > 0;
+  bool dear = solver->direct_rows > 0 && stays_dear(solver);
+  bool direct = solver->direct_rows > 0 && !dear;
+  left = dear ? sweeps_alone(rows, left) : left;
   warm_start(solver);
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
@@ -238,15 +276,15 @@ void hapi_solver_run(hapi_solver *solver)
     if (direct && 2 * left > solver->update_budget &&
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
-      direct = spent != HAPI_TOO_DEAR; /* now, and so in the next round */
-      left -= direct ? spent : 0;
+      left -= spent;
+      direct = !solver->too_dear; /* now, and so in the next round */
       if (direct && solver->direct_residual < solver->tolerance) {
         solver->residual = solver->direct_residual;
         break;
       }
       if (!direct) {
-        uint64_t enough = 2 * (uint64_t)rows > SWEEPS_ALONE ? 2 * (uint64_t)rows : SWEEPS_ALONE;
-        left = left < enough ? left : enough;
+        note_dear(solver, left, rows);
+        left = sweeps_alone(rows, left);
       }
     }
   }

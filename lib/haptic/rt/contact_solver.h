@@ -15,6 +15,7 @@
  * and sweeps again check it. The same input gives the same bits. */
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -58,6 +59,10 @@ typedef struct hapi_solver {
   double *work;           /* for direct solves; an island that does not fit is left to sweeps */
   size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
 
+  bool prepared;      /* in: rows are those of the last run but for hapi_row_retarget */
+  uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
+  uint32_t dear_runs; /* inner: since then */
+  bool too_dear;      /* inner: an island was too large or too dear for the budget */
   double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
   uint32_t direct_solves; /* out: that were accepted */
@@ -74,10 +79,8 @@ void hapi_solver_run(hapi_solver *solver);
 
 /* ---- inner: between contact_solver.c and direct_solver.c ---- */
 
-#define HAPI_TOO_DEAR UINT32_MAX
-
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
- * updates, 0 when no island was changed, HAPI_TOO_DEAR when that was for the budget alone. Rows are prepared, v has the impulses. */
+ * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
 
 /* Two sums side by side: half the latency, and two lanes for the compiler. */
@@ -123,6 +126,13 @@ static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *r
     w += hapi_dot6(row->jb, solver->v[row->b]);
   }
   return rest - w;
+}
+
+/* Another target between two runs. */
+static inline void hapi_row_retarget(hapi_row *row, double target)
+{
+  row->drive += target - row->target;
+  row->target = target;
 }
 
 static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double change)

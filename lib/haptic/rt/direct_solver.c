@@ -561,11 +561,11 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   island is;
   uint32_t head[BODIES_MAX];
   uint32_t spent = 0;
-  bool too_dear = false;
   /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
    * right, and again where neither leads to the end. */
   bool sticking = solver->sweeps % 3 == 0;
+  solver->too_dear = false;
   solver->direct_residual = HUGE_VAL;
   if (solver->body_count > BODIES_MAX || solver->work_count < 3 * (size_t)solver->row_count) {
     return 0;
@@ -585,7 +585,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
     }
     classify(&is, sticking);
     if (is.free_rows == 0 || is.free_rows > solver->direct_rows || !gather(&is)) {
-      too_dear = too_dear || is.free_rows > 0;
+      solver->too_dear = solver->too_dear || is.free_rows > 0;
       solver->direct_residual = HUGE_VAL;
       continue;
     }
@@ -594,9 +594,9 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
       spent += cost;
       solver->direct_solves += improve(&is, before, &due);
     } else {
-      too_dear = true;
+      solver->too_dear = true;
     }
     solver->direct_residual = fmax(solver->direct_residual, due);
   }
-  return spent == 0 && too_dear ? HAPI_TOO_DEAR : spent;
+  return spent;
 }

@@ -13,33 +13,6 @@
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
-void hapi_row_column(const hapi_local_body *body, const double point[3], const double direction[3],
-                     double sign, double j[6], double b[6])
-{
-  double arm[3];
-  if (body == NULL) {
-    memset(j, 0, 6 * sizeof *j);
-    memset(b, 0, 6 * sizeof *b);
-    return;
-  }
-  hapi_v3_sub(point, body->pose.position, arm);
-  hapi_v3_scale(sign, direction, j);
-  hapi_v3_cross(arm, j, j + 3);
-  if (!hapi_body_responds(body)) {
-    memset(b, 0, 6 * sizeof *b);
-  } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
-    hapi_v3_scale(1.0 / body->given.mass, j, b);
-    hapi_m3_apply(body->inverse_inertia, j + 3, b + 3);
-  } else {
-    for (int i = 0; i < 6; ++i) {
-      b[i] = 0.0;
-      for (int k = 0; k < 6; ++k) {
-        b[i] += body->given.response[i][k] * j[k];
-      }
-    }
-  }
-}
-
 /* Velocity after the tick if nothing touched the body. */
 static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, double v[6])
 {
@@ -79,6 +52,7 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   body->waiting = waits(tick, body);
   body->row = row;
   if ((body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
+    body->inverse_mass = 1.0 / body->given.mass;
     hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
   }
 }
@@ -307,7 +281,7 @@ static bool stop_push_out(hapi_tick *tick)
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (tick->world.sources[i].pushes_out) {
-      solver->rows[i].target = 0.0;
+      hapi_row_retarget(&solver->rows[i], 0.0);
     }
   }
   return any;
@@ -334,7 +308,9 @@ void hapi_local_world_step(hapi_tick *tick)
   }
   if (again) {
     set_free_velocities(tick); /* eq. 14 went with the first */
+    tick->world.solver.prepared = true;
     solve(tick);
+    tick->world.solver.prepared = false;
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];
       if (hapi_body_responds(body)) {

@@ -164,8 +164,10 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
   hapi_row *row = &world->solver.rows[number];
   double into[3];
   hapi_v3_scale(-1.0, at->normal, into);
-  hapi_row_column(at->body, at->point, into, 1.0, row->ja, row->ba);
-  hapi_row_column(NULL, at->point, into, 1.0, row->jb, row->bb);
+  double arm[3];
+  hapi_body_arm(at->body, at->point, arm);
+  hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
+  hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
   if ((at->body->flags & HAPI_BODY_MEASURED) != 0) { /* eq. 6: probed for this contact */
     for (int i = 0; i < 6; ++i) {
       row->ba[i] = hapi_v3_dot(contact->a[i], into);
@@ -197,7 +199,9 @@ static double closing_speed(const placed_pointer *at)
   if (at->body != NULL) {
     double j[6];
     double b[6];
-    hapi_row_column(at->body, at->point, at->normal, 1.0, j, b);
+    double arm[3];
+    hapi_body_arm(at->body, at->point, arm);
+    hapi_row_column(at->body, arm, at->normal, 1.0, j, b);
     speed += hapi_row_start_speed(at->body, j);
   }
   return speed;

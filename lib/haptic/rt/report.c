@@ -19,9 +19,11 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
     hapi_v3_copy(in->angular_impulse, bodies[i].angular_impulse);
     memcpy(bodies[i].residual, in->residual_taken, sizeof bodies[i].residual);
     memcpy(bodies[i].gain, in->gain, sizeof bodies[i].gain);
-    bodies[i].owned_pose = in->owned_pose;
-    bodies[i].owned_twist = in->owned_twist;
     bodies[i].owned_until_ns = in->owned_until_ns;
+    if (in->owned_until_ns != 0) {
+      bodies[i].owned_pose = in->owned_pose;
+      bodies[i].owned_twist = in->owned_twist;
+    }
   }
   out->body_high = tick->body_high;
 }

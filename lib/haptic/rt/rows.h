@@ -45,10 +45,40 @@ static inline bool hapi_body_responds(const hapi_local_body *body)
   return body != NULL && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
 }
 
-/* Jacobian and response of a unit impulse along direction at point. sign: -1 for the second body
- * of a contact. */
-void hapi_row_column(const hapi_local_body *body, const double point[3], const double direction[3],
-                     double sign, double j[6], double b[6]);
+/* From the centre of mass to a point of the world. */
+static inline void hapi_body_arm(const hapi_local_body *body, const double point[3], double out[3])
+{
+  if (body != NULL) {
+    hapi_v3_sub(point, body->pose.position, out);
+  }
+}
+
+/* Jacobian and response of a unit impulse along direction, sign: -1 for the second body of a
+ * contact. */
+static inline void hapi_row_column(const hapi_local_body *body, const double arm[3],
+                                   const double direction[3], double sign, double j[6], double b[6])
+{
+  memset(b, 0, 6 * sizeof *b);
+  if (body == NULL) {
+    memset(j, 0, 6 * sizeof *j);
+    return;
+  }
+  hapi_v3_scale(sign, direction, j);
+  hapi_v3_cross(arm, j, j + 3);
+  if (!hapi_body_responds(body)) {
+    return;
+  }
+  if ((body->flags & HAPI_BODY_MEASURED) == 0) {
+    hapi_v3_scale(body->inverse_mass, j, b);
+    hapi_m3_apply(body->inverse_inertia, j + 3, b + 3);
+    return;
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      b[i] += body->given.response[i][k] * j[k];
+    }
+  }
+}
 
 /* Velocity along j before this tick. */
 static inline double hapi_row_start_speed(const hapi_local_body *body, const double j[6])

@@ -87,6 +87,7 @@ typedef struct hapi_local_body {
   bool waiting;           /* for its first contacts: goes on with its twist until they are known */
   uint32_t row;           /* place in the solver's velocities */
   double rotation[9];     /* of pose */
+  double inverse_mass;
   double inverse_inertia[9]; /* world */
   double start_twist[6];     /* before this tick */
   double gain[6];
