@@ -81,8 +81,9 @@ typedef struct hap_session_def {
   hap_probe probe;               /* model ACCELERANCE, default HAP_PROBE_SHARED */
   uint32_t flags;                /* no bit is defined; an unknown bit is an error */
   int32_t max_edge_probes; /* model CONTACT: bodies at the border of the range that are probed at a
-                              physics step (7 steps of their island), 0..1024, default 4; the others
-                              are moving walls until the next one */
+                              physics step (7 steps of their island, of at most 64 bodies), 0..1024,
+                              default 4; the others answer with their own mass alone until the next
+                              step */
   hap_plane plane;         /* model CONTACT, default HAP_PLANE_WHERE_NEEDED */
   int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
                               mesh there, 0..1048576, default 4096 */

@@ -53,6 +53,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
   body->ranged_in = range->number;
   local->wanted = true;
   local->linked = false;
+  local->edge = false;
   local->mass = hapi_body_mass(body->body);
   local->flags = dBodyIsKinematic(body->body)  ? HAPI_BODY_DRIVEN
                  : !dBodyIsEnabled(body->body) ? HAPI_BODY_RESTING

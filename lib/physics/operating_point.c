@@ -49,6 +49,7 @@ static void choose(hapi_physics *physics)
     if (best == NULL) {
       return;
     }
+    best->edge = true;
     best->flags = (best->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
   }
 }

@@ -113,6 +113,7 @@ typedef struct hapi_body_slot {
 
   /* Model CONTACT. */
   bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
+  bool edge;              /* scratch: measured only because it borders the range */
   bool linked;            /* scratch: a body of the range may touch it */
   bool touched;           /* in the newest message: something in the loop carries it */
   bool held;              /* scratch: switched off for the global step */
