@@ -71,7 +71,8 @@ HAP_API HAP_NODISCARD hap_status hap_session_adopt_body(hap_session *session, dB
 /* [locked] Before dBodyDestroy: the session drops what it knows of the body. */
 HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 
-/* [locked] Before dGeomDestroy of a geom that a pointer may be near to. */
+/* [locked] Before dGeomDestroy of a geom that a pointer may be near to, and after a change of the
+ * triangles of a mesh. */
 HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
 
 /* [locked, or control before start] ODE has no getter for a body's moved callback, so the session

@@ -25,6 +25,7 @@ struct hapi_contact {
   hapi_poses *poses;
   hapi_pass_body *bodies; /* capacity.bodies */
   uint64_t number;
+  _Atomic uint64_t full_passes; /* pairs after which there was no room */
   hapi_histogram pass_ns;
   hapi_thread thread;
   _Atomic int stop;

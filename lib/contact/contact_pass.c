@@ -90,7 +90,7 @@ static double radius_of(const placed_geom *geom)
 {
   const hapi_shape *s = &geom->shape;
   double offset = geom->body != NULL ? hapi_v3_norm(geom->in->pose.position) : 0.0;
-  return offset + hapi_v3_norm(s->half) + s->radius;
+  return offset + hapi_v3_norm(s->half) + s->radius + geom->in->extent;
 }
 
 /* Along the normal: how far the surfaces may come nearer until the contacts are found anew. */
@@ -197,6 +197,9 @@ static void pass_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_pa
       c->key = pair->key;
       c->surface = out->surface_count;
     }
+  }
+  if (out->contact_count == contact->config.capacity.contacts) {
+    atomic_fetch_add_explicit(&contact->full_passes, 1, memory_order_relaxed);
   }
   if (out->contact_count > first) {
     hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;

@@ -41,6 +41,7 @@ void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
   contact->near = NULL;
   contact->poses = NULL;
   contact->number = 0;
+  atomic_store(&contact->full_passes, 0);
   contact->start_ns = start_ns;
   hapi_histogram_reset(&contact->pass_ns);
 }
@@ -57,7 +58,7 @@ static void *contact_main(void *arg)
   while (atomic_load_explicit(&contact->stop, memory_order_acquire) == 0) {
     int64_t now = hapi_clock_now();
     if (now >= due || hapi_contact_has_news(contact)) {
-      hapi_contact_pass(contact, now);
+      hapi_contact_pass(contact, 0); /* due at once */
       due =
           now >= due ? due + ((now - due) / period + 1) * period : due; /* late ones are left out */
     }
@@ -81,6 +82,7 @@ void hapi_contact_stop_thread(hapi_contact *contact)
 
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out)
 {
+  out->capacity_dropped += atomic_load_explicit(&contact->full_passes, memory_order_relaxed);
   out->contact_us_mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
   out->contact_us_max = 1e-3 * (double)hapi_histogram_max_ns(&contact->pass_ns);
 }

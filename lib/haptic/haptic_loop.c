@@ -141,7 +141,8 @@ static void publish_poses(hapi_haptic *haptic)
   }
 }
 
-/* A set that was taken and whose time has not come is safe: its writer fills in two others first. */
+/* A set that was taken and is not due leaves the one in use to its writer, who fills in another one
+ * first: that happens in lockstep alone, where a tick comes between any two passes. */
 static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
 {
   if (haptic->pending_patches == NULL) {

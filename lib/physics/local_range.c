@@ -87,6 +87,8 @@ static bool fill_hull(hapi_physics *physics, dGeomID geom, hapi_near *near, hapi
     if (body != NULL) {
       hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), to, to);
     }
+    double far = hapi_v3_norm(to);
+    out->extent = far > out->extent ? far : out->extent;
   }
   out->shape = hull;
   out->shape.hull = NULL;
@@ -168,6 +170,7 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
 {
   hapi_near *near = physics->range.near;
   uint32_t geom_a = take_geom(physics, link->own);
+  bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
       near->pair_count == physics->config.capacity.contacts) {
     ++physics->figures.stats.capacity_dropped;
@@ -175,8 +178,8 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
   pair->key = key_of(link->own, link->other, part);
-  pair->geom_a = geom_a;
-  pair->geom_b = geom_b;
+  pair->geom_a = turned ? geom_b : geom_a;
+  pair->geom_b = turned ? geom_a : geom_b;
   pair->surface = link->surface;
 }
 
@@ -320,7 +323,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   for (int k = 0; k < 6; ++k) {
     link->box[k] = range->own_box[k] + (k % 2 == 0 ? -reach : reach);
   }
-  if (hapi_world_surface(physics, link->own, link->other, &link->surface)) {
+  if (hapi_world_surface(physics, link)) {
     ++range->link_count;
   }
 }
@@ -362,13 +365,53 @@ static bool has_joint(dBodyID body)
   return false;
 }
 
-/* Whether all triangles near a body have room. */
-static bool mesh_fits(hapi_physics *physics, const hapi_link *link)
+/* What the pairs of a body would add to the message. */
+typedef struct need {
+  uint32_t geoms;
+  uint32_t points;
+  uint32_t pairs;
+} need;
+
+static void need_geom(hapi_physics *physics, dGeomID geom, need *io)
 {
-  const hapi_near *near = physics->range.near;
+  hapi_shape hull;
+  hap_pose pose;
+  ++io->geoms;
+  if (dGeomGetClass(geom) == dConvexClass) {
+    bool good = hapi_hull_of_convex(physics, geom, &hull, &pose);
+    io->points += good ? (uint32_t)hull.hull_count : physics->config.capacity.hull_points + 1;
+  }
+}
+
+static void need_link(hapi_physics *physics, const hapi_link *link, need *io)
+{
+  if (dGeomGetClass(link->other) != dTriMeshClass) {
+    need_geom(physics, link->other, io);
+    ++io->pairs;
+    return;
+  }
   uint32_t count = hapi_mesh_near(physics, link->other, link->box);
-  return count < HAPI_NEAR_TRIANGLES && near->geom_count + count < physics->config.capacity.geoms &&
-         near->point_count + 3 * count < physics->config.capacity.hull_points;
+  bool all = count < HAPI_NEAR_TRIANGLES;
+  io->geoms += count;
+  io->points += 3 * count;
+  io->pairs += all ? count : physics->config.capacity.contacts + 1;
+}
+
+/* The loop must have all contacts of what it owns: ODE has none of them. */
+static bool has_room(hapi_physics *physics, const hapi_known_body *known)
+{
+  const hapi_range *range = &physics->range;
+  const hapi_capacity *c = &physics->config.capacity;
+  need n = {0, 0, 0};
+  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    need_geom(physics, geom, &n);
+  }
+  for (uint32_t i = 0; i < range->link_count; ++i) {
+    need_link(physics, &range->links[i], &n);
+  }
+  return range->near->geom_count + n.geoms <= c->geoms &&
+         range->near->point_count + n.points <= c->hull_points &&
+         range->near->pair_count + n.pairs <= c->contacts;
 }
 
 static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
@@ -383,13 +426,11 @@ static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
     }
   }
   for (uint32_t i = 0; i < range->link_count; ++i) {
-    const hapi_link *link = &range->links[i];
-    if (!geom_is_known(link->other) ||
-        (dGeomGetClass(link->other) == dTriMeshClass && !mesh_fits(physics, link))) {
+    if (!geom_is_known(range->links[i].other)) {
       return false;
     }
   }
-  return true;
+  return has_room(physics, known);
 }
 
 static void take_links(hapi_physics *physics)
@@ -520,6 +561,19 @@ void hapi_range_publish(hapi_physics *physics)
   range->near->model_number = physics->model_number;
   count_roles(physics);
   hapi_exchange_near_publish(physics->config.exchange);
+}
+
+/* A session that is started again counts its models, and so its walks, from 1 again. */
+void hapi_range_reset(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  memset(range->pair_places, 0, range->pair_place_count * sizeof *range->pair_places);
+  range->number = 0;
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    physics->table.entries[i].ranged_in = 0;
+    physics->table.entries[i].chosen_in = 0;
+    physics->table.entries[i].loop_owned = false;
+  }
 }
 
 bool hapi_range_create(hapi_physics *physics)

@@ -164,8 +164,10 @@ static bool reserve(hapi_surface_cache *cache)
   return true;
 }
 
-bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out)
+bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
+                            bool *out_turned)
 {
+  *out_turned = false;
   hapi_surface_cache *cache = &physics->surfaces;
   if (physics->model != HAP_MODEL_CONTACT || !reserve(cache)) {
     return ask_application(physics, a, b, out);
@@ -177,6 +179,7 @@ bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfac
     ++cache->used;
   }
   *out = entry->surface;
+  *out_turned = entry->a != a; /* directions of motion belong to the order that was asked for */
   return entry->collides;
 }
 
@@ -184,8 +187,7 @@ bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfac
 static bool carried_by_loop(const hapi_physics *physics, dBodyID body)
 {
   uint32_t known = hapi_bodies_find(&physics->table, body);
-  uint32_t slot = known != HAPI_NONE ? physics->table.entries[known].slot : HAPI_NONE;
-  return slot != HAPI_NONE && physics->bodies[slot].loop_owned;
+  return known != HAPI_NONE && physics->table.entries[known].loop_owned;
 }
 
 static void near_callback(void *data, dGeomID a, dGeomID b)
@@ -201,11 +203,12 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
     return;
   }
   dSurfaceParameters surface;
+  bool turned;
   if (carried_by_loop(physics, body_a) || carried_by_loop(physics, body_b) ||
-      !hapi_world_ask_surface(physics, a, b, &surface)) {
+      !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
     return;
   }
-  make_contacts(physics, a, b, &surface);
+  make_contacts(physics, turned ? b : a, turned ? a : b, &surface);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */

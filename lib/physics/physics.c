@@ -183,6 +183,8 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   }
   reset_figures(physics);
   hapi_slots_reset(physics);
+  hapi_range_reset(physics);
+  hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
   physics->probe_step_s = period_of(physics, physics->model);
   physics->state = NULL;

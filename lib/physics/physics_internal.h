@@ -52,12 +52,14 @@ typedef struct hapi_known_body {
   uint64_t seen; /* scan that found it */
   bool adopted;
   bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool enabled_before;  /* scratch of the probe's flag pass */
-  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
-  uint32_t member;      /* scratch: place in the test set and its snapshot */
-  uint64_t chosen_in;   /* scratch: model that it was chosen for */
-  uint64_t ranged_in;   /* scratch: walk that met it */
-  uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  bool enabled_before; /* scratch of the probe's flag pass */
+  uint32_t island;     /* scratch: number of the island under test, HAPI_NONE outside */
+  uint32_t member;     /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in;  /* scratch: model that it was chosen for */
+  uint64_t ranged_in;  /* scratch: walk that met it */
+  uint32_t slot;       /* local slot, HAPI_NONE: not local */
+  bool loop_owned;     /* in the newest message, also while its slot retires */
+  bool loop_touched;
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
   double user_force[3]; /* accumulators before the last global step */
@@ -98,7 +100,8 @@ typedef struct hapi_body_slot {
   bool wanted;         /* scratch: in the model being built */
   bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
   bool placed;         /* left_* hold what we left in ODE */
-  bool pose_changed;   /* since then, by the application */
+  bool left_enabled;
+  bool pose_changed; /* since then, by the application */
   bool velocity_changed;
   double mass;
   double impulse_taken[3];
@@ -115,10 +118,10 @@ typedef struct hapi_body_slot {
   bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
   bool edge;              /* scratch: measured only because it borders the range */
   bool linked;            /* scratch: a body of the range may touch it */
-  bool touched;           /* in the newest message: something in the loop carries it */
   bool held;              /* scratch: switched off for the global step */
   int64_t owned_until_ns; /* that the loop's last state was taken for */
   double gain_taken[6];
+  double falls[3];       /* m/s^2, by gravity and the application's force */
   double exchanged[6];   /* N, N m: mean wrench from the loop in the last interval */
   double response[6][6]; /* measured */
   bool measured;         /* response and b hold a measurement */
@@ -183,6 +186,7 @@ typedef struct hapi_link {
   dGeomID other;
   dReal box[6]; /* own's, with the reach */
   hapi_surface surface;
+  bool turned; /* the surface is of (other, own) */
 } hapi_link;
 
 typedef struct hapi_pair_place {
@@ -408,9 +412,10 @@ void hapi_world_read_user_wrenches(hapi_physics *physics);
 double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
-bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out);
+bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
+                            bool *out_turned); /* it was asked for (b, a) */
 /* The same for the loop: soft constraints converted from H to T. */
-bool hapi_world_surface(hapi_physics *physics, dGeomID a, dGeomID b, hapi_surface *out);
+bool hapi_world_surface(hapi_physics *physics, hapi_link *link);
 /* First friction direction of a pair whose surface has dContactFDir1; false: none was given. */
 bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double out[3]);
 
@@ -425,6 +430,7 @@ void hapi_world_restore(hapi_physics *physics);
 /* local_range.c: model CONTACT */
 bool hapi_range_create(hapi_physics *physics);
 void hapi_range_finish(hapi_physics *physics);
+void hapi_range_reset(hapi_physics *physics);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 

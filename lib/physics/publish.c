@@ -60,7 +60,7 @@ static void fill_mass(dBodyID body, hapi_model_body *out)
 }
 
 /* What the loop needs to move the body itself. */
-static void fill_dynamics(hapi_physics *physics, const hapi_body_slot *slot, hapi_model_body *out)
+static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_model_body *out)
 {
   const hapi_known_body *known = &physics->table.entries[slot->known];
   dBodyID body = known->body;
@@ -72,6 +72,10 @@ static void fill_dynamics(hapi_physics *physics, const hapi_body_slot *slot, hap
   }
   hapi_v3_copy(known->user_force, out->user_wrench);
   hapi_v3_copy(known->user_torque, out->user_wrench + 3);
+  hapi_v3_copy(out->gravity, slot->falls);
+  if (out->mass > 0.0) {
+    hapi_v3_madd(slot->falls, 1.0 / out->mass, known->user_force, slot->falls);
+  }
   double linear = dBodyGetLinearDampingThreshold(body);
   double angular = dBodyGetAngularDampingThreshold(body);
   out->linear_keep = keep_per_tick(physics, dBodyGetLinearDamping(body));
@@ -103,6 +107,9 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
     fill_dynamics(physics, slot, out);
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
       memset(out->b, 0, sizeof out->b); /* the loop knows it better, or nobody measured it */
+    }
+    if ((slot->flags & HAPI_BODY_OWNED) != 0 && dBodyGetNumJoints(body) == 0) {
+      hapi_v3_copy(slot->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
   bool sound = hapi_finite(out->pose.position, 3) && hapi_finite(out->pose.quat_wxyz, 4) &&

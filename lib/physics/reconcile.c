@@ -81,6 +81,9 @@ static void take_body(hapi_physics *physics, uint32_t index)
   dBodyID body = ode_body(physics, slot);
   bool driven = (slot->flags & HAPI_BODY_DRIVEN) != 0;
   slot->loop_owned = false;
+  if (in != NULL && driven) {
+    slot->owned_until_ns = in->owned_until_ns; /* it is the application's now */
+  }
   if (in == NULL || body == NULL || slot->phase == HAPI_SLOT_FREE || driven) {
     return;
   }
@@ -91,7 +94,10 @@ static void take_body(hapi_physics *physics, uint32_t index)
   }
   take_impulse(slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
-  slot->touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
+  if (slot->loop_owned) {
+    physics->table.entries[slot->known].loop_owned = true;
+    physics->table.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
+  }
   memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(slot, body)) {
     hapi_slots_restart(slot);
@@ -134,6 +140,11 @@ void hapi_reconcile_take(hapi_physics *physics)
   hapi_v3_copy(newest->hand_impulse, physics->figures.hand_impulse);
   take_owned_impulse(physics, newest);
   for (uint32_t i = 0; i < physics->body_high; ++i) {
+    if (ode_body(physics, &physics->bodies[i]) != NULL) {
+      physics->table.entries[physics->bodies[i].known].loop_owned = false;
+    }
+  }
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
     take_body(physics, i);
   }
   take_forces(physics);
@@ -165,7 +176,11 @@ static void take_last_state(hapi_physics *physics, const hapi_body_slot *slot, d
   double since = 1e-9 * (double)(in->owned_until_ns - physics->last_cycle_ns);
   since = since > physics->step_s ? physics->step_s : since < 0.0 ? 0.0 : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
-  set_state(slot, body, &pose, &in->owned_twist);
+  hap_twist twist = in->owned_twist;
+  if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */
+    hapi_v3_madd(twist.linear, -since, slot->falls, twist.linear);
+  }
+  set_state(slot, body, &pose, &twist);
 }
 
 /* Model CONTACT: where the loop owns a body, its state is the body's. */
@@ -183,7 +198,8 @@ void hapi_reconcile_own(hapi_physics *physics)
     }
     if (slot->loop_owned) {
       set_state(slot, body, &in->pose, &in->twist);
-      if ((in->flags & HAPI_BODY_RESTING) == 0 && !dBodyIsEnabled(body)) {
+      bool told = slot->placed && slot->left_enabled; /* by the application to sleep */
+      if ((in->flags & HAPI_BODY_RESTING) == 0 && !dBodyIsEnabled(body) && !told) {
         dBodyEnable(body);
       }
     } else if (in->owned_until_ns > slot->owned_until_ns) {
@@ -322,6 +338,7 @@ void hapi_reconcile_leave(hapi_physics *physics)
     slot->placed = body != NULL;
     if (body != NULL) {
       hapi_v3_copy(dBodyGetPosition(body), slot->left_position);
+      slot->left_enabled = dBodyIsEnabled(body) != 0;
       memcpy(slot->left_quat, dBodyGetQuaternion(body), sizeof slot->left_quat);
       read_velocity(body, slot->left_velocity);
     }

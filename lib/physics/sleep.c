@@ -123,10 +123,9 @@ static void step_body(hapi_known_body *known, double step_s)
 }
 
 /* A body that the loop owns has its contacts there. */
-static bool touches_in_loop(const hapi_physics *physics, const hapi_known_body *known)
+static bool touches_in_loop(const hapi_known_body *known)
 {
-  return known->slot != HAPI_NONE && physics->bodies[known->slot].loop_owned &&
-         physics->bodies[known->slot].touched;
+  return known->loop_owned && known->loop_touched;
 }
 
 void hapi_sleep_step(hapi_physics *physics, double step_s)
@@ -141,7 +140,7 @@ void hapi_sleep_step(hapi_physics *physics, double step_s)
       start_countdown(&known->sleep); /* dBodyEnable does so; being woken by an island does not */
     }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
-    if (awake && (dBodyGetNumJoints(known->body) > 0 || touches_in_loop(physics, known))) {
+    if (awake && (dBodyGetNumJoints(known->body) > 0 || touches_in_loop(known))) {
       step_body(known, step_s);
     }
   }

@@ -68,12 +68,15 @@ static void fill_surface(const hapi_physics *physics, const dSurfaceParameters *
   out->slip[1] = s->slip2;
 }
 
-bool hapi_world_surface(hapi_physics *physics, dGeomID a, dGeomID b, hapi_surface *out)
+bool hapi_world_surface(hapi_physics *physics, hapi_link *link)
 {
+  hapi_surface *out = &link->surface;
   dSurfaceParameters surface;
-  if (!hapi_world_ask_surface(physics, a, b, &surface)) {
+  if (!hapi_world_ask_surface(physics, link->own, link->other, &surface, &link->turned)) {
     return false;
   }
+  dGeomID a = link->turned ? link->other : link->own;
+  dGeomID b = link->turned ? link->own : link->other;
   fill_surface(physics, &surface, out);
   double direction[3];
   if ((surface.mode & dContactFDir1) != 0 && hapi_world_direction(physics, a, b, direction)) {

@@ -146,6 +146,7 @@ typedef struct hapi_near_geom {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
   uint32_t generation;
   hapi_shape shape;    /* hull: not set here, see hull_first */
+  double extent;       /* m, of a hull: farthest point from the frame's origin */
   uint32_t hull_first; /* into the message's points */
   uint32_t open_edges; /* a triangle of a mesh: bits 0, 1, 2 for edges that may be touched, as no
                           neighbour goes on there in the same plane or rises; bit 3: a triangle */

@@ -246,18 +246,21 @@ static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, 
 
 static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
 {
-  hapi_solver *solver = &tick->world.solver;
-  int32_t normal = (int32_t)solver->row_count;
+  const hapi_local_world *world = &tick->world;
+  int32_t normal = (int32_t)world->solver.row_count;
   double t1[3];
   double t2[3];
   hapi_body_arm(c->a, c->point, c->arm_a);
   hapi_body_arm(c->b, c->point, c->arm_b);
   friction_directions(c->surface, c->normal, t1, t2);
   set_normal(tick, c, next_row(tick, c, index, 0, c->normal));
-  if (c->surface->mu > 0.0) {
+  /* With Approx1 friction is bounded by the normal impulse; a force mu is there from the touch on. */
+  bool touches = world->memory[index].impulse[0] > 0.0 || c->gap <= 0.0;
+  const uint32_t flags = c->surface->flags;
+  if (c->surface->mu > 0.0 && (touches || (flags & HAPI_SURFACE_APPROX1_1) != 0)) {
     set_friction(tick, c->surface, next_row(tick, c, index, 1, t1), 1, normal);
   }
-  if (c->surface->mu2 > 0.0) {
+  if (c->surface->mu2 > 0.0 && (touches || (flags & HAPI_SURFACE_APPROX1_2) != 0)) {
     set_friction(tick, c->surface, next_row(tick, c, index, 2, t2), 2, normal);
   }
 }

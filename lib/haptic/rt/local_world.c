@@ -200,7 +200,6 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
     return;
   }
-  memset(body->residual, 0, sizeof body->residual);
   move_body(body, tick->period);
   damp(body);
   if (!sound(body)) {
@@ -307,7 +306,7 @@ void hapi_local_world_step(hapi_tick *tick)
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
-    set_free_velocities(tick); /* eq. 14 went with the first */
+    set_free_velocities(tick);
     tick->world.solver.prepared = true;
     solve(tick);
     tick->world.solver.prepared = false;
@@ -320,6 +319,9 @@ void hapi_local_world_step(hapi_tick *tick)
         damp(body);
       }
     }
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_contact_keep(tick);
   hapi_pointer_forces(tick);

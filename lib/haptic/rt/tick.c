@@ -17,6 +17,8 @@ static void keep_arrays(const hapi_local_world *from, hapi_local_world *to)
   to->plane_mode = from->plane_mode;
   to->solver = from->solver;
   to->solver.row_count = to->solver.body_count = 0;
+  to->solver.dear_rows = to->solver.dear_runs = 0;
+  to->solver.prepared = false;
 }
 
 /* Touches every page once, so that no tick is the first to do so. */
