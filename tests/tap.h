@@ -29,7 +29,7 @@ static void tap_note(const char *file, int line, const char *what)
   }
 }
 
-static void tap_check(bool good, const char *file, int line, const char *what)
+static inline void tap_check(bool good, const char *file, int line, const char *what)
 {
   if (!good) {
     tap_note(file, line, what);
