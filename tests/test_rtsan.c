@@ -28,6 +28,7 @@ int main(void)
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/vec.h"
 #include "haptic/haptic.h"
 #include "haptic/haptic_internal.h"
 #include "sync/exchange.h"
@@ -119,7 +120,8 @@ static void publish_model(uint64_t number)
   hapi_model *model = hapi_exchange_model_back(exchange);
   model->number = number;
   model->state_ns = model->valid_from_ns = (int64_t)number * 10 * TICK_NS;
-  model->model = number / 100 % 2 != 0 ? HAP_MODEL_IMPULSE : HAP_MODEL_ACCELERANCE;
+  static const hap_model models[] = {HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE, HAP_MODEL_CONTACT};
+  model->model = models[number / 100 % 3];
   model->blend_s = 0.01;
   model->body_count = 1;
   model->contact_count = 2;
@@ -127,6 +129,14 @@ static void publish_model(uint64_t number)
   memset(body, 0, sizeof *body);
   body->generation = 1;
   body->pose.quat_wxyz[0] = 1.0;
+  body->flags = HAPI_BODY_OWNED | HAPI_BODY_GYROSCOPIC; /* which model CONTACT alone looks at */
+  body->mass = body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = 1e9;
+  body->gravity[2] = -9.81;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = 1e-3 * (1 + i);
+    body->inverse_inertia[4 * i] = 1.0 / body->inertia[4 * i];
+  }
   hapi_model_contact *contacts = hapi_model_contacts(model);
   memset(contacts, 0, 2 * sizeof *contacts);
   for (uint32_t i = 0; i < 2; ++i) {
@@ -139,6 +149,37 @@ static void publish_model(uint64_t number)
     contacts[i].a[0][0] = 1.0;
   }
   hapi_exchange_model_publish(exchange);
+}
+
+/* Four corners of the body on a floor with friction, and a ball of it. */
+static void publish_patches(uint64_t number)
+{
+  hapi_patches *patches = hapi_exchange_patches_back(exchange);
+  hapi_patch_contact *contacts = hapi_patches_contacts(patches);
+  patches->number = patches->model_number = number;
+  patches->valid_from_ns = 0;
+  patches->contact_count = 5;
+  patches->surface_count = 1;
+  memset(contacts, 0, 5 * sizeof *contacts);
+  for (uint32_t i = 0; i < 5; ++i) {
+    contacts[i].key = 1;
+    contacts[i].generation_a = 1;
+    contacts[i].body_b = HAPI_SLOT_NONE;
+    contacts[i].touch = i < 4 ? HAPI_TOUCH_FACE_B : HAPI_TOUCH_BALL_A;
+    hapi_v3_set(contacts[i].core_a, i % 2 != 0 ? 0.02 : -0.02, i / 2 != 0 ? 0.02 : -0.02, -0.02);
+    hapi_v3_set(contacts[i].core_b, 0.0, 0.0, -0.02);
+    contacts[i].normal[2] = 1.0;
+    contacts[i].ball_a = i < 4 ? 0.0 : 0.01;
+    contacts[i].shape.kind = HAPI_SHAPE_PLANE;
+    contacts[i].shape_pose = (hap_pose){{0.0, 0.0, -0.03}, {1.0, 0.0, 0.0, 0.0}};
+  }
+  *hapi_patches_surfaces(patches) =
+      (hapi_surface){.flags = HAPI_SURFACE_APPROX1_1 | HAPI_SURFACE_APPROX1_2,
+                     .mu = 0.5,
+                     .mu2 = 0.5,
+                     .erp = 0.01,
+                     .max_push = 1.0};
+  hapi_exchange_patches_publish(exchange);
 }
 
 static bool set_up(void)
@@ -172,6 +213,7 @@ static void cycles(void)
   for (int i = 0; i < TICKS; ++i) {
     if (i % 10 == 0) {
       publish_model((uint64_t)i / 10 + 1);
+      publish_patches((uint64_t)i / 10 + 1);
     }
     __rtsan_realtime_enter();
     hapi_haptic_cycle(haptic, i * TICK_NS);
@@ -180,7 +222,8 @@ static void cycles(void)
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   hapi_haptic_stats(haptic, &stats);
-  if (stats.ticks != TICKS || stats.contact_ticks < 100 || stats.models_adopted < 900) {
+  if (stats.ticks != TICKS || stats.contact_ticks < 100 || stats.models_adopted < 900 ||
+      stats.contact_passes < 900 || stats.solver_sweeps < 1000) {
     fprintf(stderr, "the loop did not do its work\n");
     _exit(1);
   }
