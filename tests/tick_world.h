@@ -131,7 +131,7 @@ static inline hapi_model_contact *add_contact(uint32_t slot, uint32_t body, uint
   return contact;
 }
 
-/* A of a free body (numerics.md section 6) with inertia of a ball. */
+/* A of a free body with inertia of a ball. */
 static inline void set_free(hapi_model_contact *c, double mass, double inertia)
 {
   const double *r = c->point_body;

@@ -116,7 +116,7 @@ static inline hapi_model_contact *hapi_model_contacts(hapi_model *m)
 /* ---- physics -> contact: what may touch what (model CONTACT) ---- */
 
 /* ODE's dSurfaceParameters with fdir1; soft constraints converted from the world's step to the tick
- * (numerics.md: same spring and damper). */
+ * (the same spring and damper). */
 typedef struct hapi_surface {
   uint32_t flags; /* HAPI_SURFACE_* */
   double mu;      /* with APPROX1: friction coefficient, else N */

@@ -6,7 +6,7 @@
 #include "haptic/rt/rows.h"
 
 /* Pointer contacts as rows of the solver: the spring and damper of eq. 7, integrated so that no
- * stiffness is too large for the body (numerics.md section 3). With n out of the body, w the speed
+ * stiffness is too large for the body. With n out of the body, w the speed
  * at which the body gives way along -n, s that of the pointer into it, g the depth:
  *
  *   up to T^2 a k = 4  f = k (g' + 2 g + g")/4 + d (s - (w + w')/2)   g", g': one tick before, after

@@ -39,7 +39,7 @@ static inline void hapi_body_vector(const hapi_local_body *body, const double lo
 
 /* Whether impulses of the loop move it: not what is driven or asleep. A body outside of the range
  * answers with its own mass until physics says what became of it: as a wall it would take the whole
- * push of an interval and hand it on too late, which is unstable (numerics.md section 3). */
+ * push of an interval and hand it on too late, which is unstable. */
 static inline bool hapi_body_responds(const hapi_local_body *body)
 {
   return body != NULL && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
