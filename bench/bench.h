@@ -16,7 +16,7 @@ typedef struct bench {
   const char *out;   /* folder of tables and pictures */
   bool quick;        /* shorter sweeps, fewer repeats */
   bool verify;       /* say "ok" or "off" */
-  const char *scene; /* accuracy: this scene alone; NULL: all */
+  const char *scene; /* accuracy, tick: this one alone; NULL: all */
   int off;           /* checks that were off */
   hap_detail detail; /* why a program failed */
 } bench;

@@ -200,7 +200,7 @@ hap_status bench_tick(bench *b)
   FILE *csv = bench_csv_open(
       b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
-  for (size_t m = 0; m < MODEL_COUNT; ++m) {
+  for (size_t m = 0; m < MODEL_COUNT && b->scene == NULL; ++m) {
     for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
       status = measure(b, models[m], sizes[i], &ns[m][i]);
       if (status >= HAP_OK) {
@@ -213,5 +213,5 @@ hap_status bench_tick(bench *b)
   status = status >= HAP_OK ? bench_tick_contact(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;
-  return status >= HAP_OK ? draw(b, ns) : status;
+  return status >= HAP_OK && b->scene == NULL ? draw(b, ns) : status;
 }

@@ -265,14 +265,22 @@ static void write_row(FILE *csv, const tick_bed *t)
 hap_status bench_tick_contact(bench *b, FILE *csv)
 {
   hap_status status = HAP_OK;
+  bool found = false;
   for (size_t i = 0; i < sizeof cases / sizeof cases[0] && status >= HAP_OK; ++i) {
+    if (b->scene != NULL && strcmp(b->scene, cases[i].name) != 0) {
+      continue;
+    }
     tick_bed t;
+    found = true;
     status = measure(b, &cases[i], &t);
     if (status >= HAP_OK) {
       write_row(csv, &t);
       report(b, &t);
     }
     close_bed(&t);
+  }
+  if (status >= HAP_OK && !found) {
+    return bench_fail(b, HAP_ERROR_ARGUMENT, "tick has no case \"%s\"", b->scene);
   }
   return status;
 }

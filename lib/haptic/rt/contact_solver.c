@@ -50,6 +50,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
     row->impulse = 0.0;
     return;
   }
+  row->moves_a = responds(row->ba);
   row->paired = responds(row->bb);
   row->drive = row->target - (row->paired ? 0.0 : hapi_dot6(row->jb, solver->v[row->b]));
 }

@@ -43,6 +43,7 @@ typedef struct hapi_row {
   uint32_t b;         /* several static partners may share one index, whose v stays as it is */
   uint32_t next;      /* inner: of the same island */
   uint8_t triple;     /* inner: a normal whose two frictions come next, all of use */
+  uint8_t moves_a;    /* inner: a responds */
   uint8_t paired;     /* inner: b responds */
   uint8_t state;      /* inner, of direct_solver.c */
 } hapi_row;

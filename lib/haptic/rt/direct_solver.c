@@ -58,11 +58,6 @@ typedef struct island {
 
 /* ---- islands ---- */
 
-static bool responds(const double b[6])
-{
-  return b[0] != 0.0 || b[1] != 0.0 || b[2] != 0.0 || b[3] != 0.0 || b[4] != 0.0 || b[5] != 0.0;
-}
-
 static uint16_t root(uint16_t *parent, uint16_t i)
 {
   while (parent[i] != i) {
@@ -82,7 +77,7 @@ static void split(hapi_solver *solver, uint32_t head[BODIES_MAX])
   }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->paired && responds(row->ba)) {
+    if (row->inverse != 0.0 && row->paired && row->moves_a) {
       uint16_t a = root(parent, (uint16_t)row->a);
       uint16_t b = root(parent, (uint16_t)row->b);
       parent[a > b ? a : b] = a > b ? b : a;
@@ -91,56 +86,50 @@ static void split(hapi_solver *solver, uint32_t head[BODIES_MAX])
   for (uint32_t i = solver->row_count; i-- > 0;) {
     hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0) {
-      uint16_t r = root(parent, (uint16_t)(responds(row->ba) ? row->a : row->b));
+      uint16_t r = root(parent, (uint16_t)(row->moves_a ? row->a : row->b));
       row->next = head[r];
       head[r] = i;
     }
   }
 }
 
-/* The largest correction due, m/s. */
-static double measure(const island *is)
+/* `sticking` takes the friction of all contacts that push for free. `at_bound`: it wants to stay. */
+static void classify(island *is, uint32_t i, bool at_bound, double hi, bool sticking)
+{
+  hapi_row *rows = is->solver->rows;
+  hapi_row *row = &rows[i];
+  row->state = FIXED;
+  if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
+    row->state = FREE;
+    is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
+  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == FREE) {
+    row->state = TIED;
+    is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
+  }
+  is->free_rows += row->state == FREE;
+  is->used_rows += row->state != FIXED;
+}
+
+/* The states of the rows, for the next round; returns the largest correction due, m/s. */
+static double inspect(island *is, bool sticking)
 {
   const hapi_solver *solver = is->solver;
   double largest = 0.0;
+  is->free_rows = 0;
+  is->used_rows = 0;
   for (uint32_t i = is->first; i != NO_ROW; i = solver->rows[i].next) {
     const hapi_row *row = &solver->rows[i];
     double lo;
     double hi;
     hapi_row_bounds(solver->rows, row, &lo, &hi);
-    double p = hapi_clamp(row->impulse + hapi_row_error(solver, row) * row->inverse, lo, hi);
-    double due = fabs(p - row->impulse) * row->response;
+    double p = row->impulse;
+    double wanted = p + hapi_row_error(solver, row) * row->inverse;
+    bool inside = (p > lo && p < hi) || (wanted > lo && wanted < hi);
+    double due = fabs(hapi_clamp(wanted, lo, hi) - p) * row->response;
     largest = due <= largest ? largest : due; /* NaN stays, unless the next row hides it */
+    classify(is, i, !inside, hi, sticking);
   }
   return largest;
-}
-
-/* `sticking` takes the friction of all contacts that push for free. */
-static void classify(island *is, bool sticking)
-{
-  hapi_row *rows = is->solver->rows;
-  is->free_rows = 0;
-  is->used_rows = 0;
-  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    hapi_row *row = &rows[i];
-    double lo;
-    double hi;
-    hapi_row_bounds(rows, row, &lo, &hi);
-    double p = row->impulse;
-    if (!(p > lo && p < hi)) { /* at a bound: does it want to leave? */
-      p += hapi_row_error(is->solver, row) * row->inverse;
-    }
-    row->state = FIXED;
-    if ((p > lo && p < hi) || (sticking && row->normal >= 0 && hi > 0.0)) {
-      row->state = FREE;
-      is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
-    } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == FREE) {
-      row->state = TIED;
-      is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
-    }
-    is->free_rows += row->state == FREE;
-    is->used_rows += row->state != FIXED;
-  }
 }
 
 /* The row whose error drives this row's impulse. */
@@ -151,53 +140,35 @@ static const hapi_row *source(const island *is, const hapi_row *row)
 
 /* ---- structure of the matrix ---- */
 
-static bool add_body(island *is, uint32_t body, const double b[6])
+static bool add_body(island *is, uint32_t body)
 {
-  if (is->local[body] != NONE || !responds(b)) {
+  if (is->local[body] != NONE) {
     return true;
   }
   if (is->count == ISLAND_MAX) {
     return false;
   }
-  is->link[is->count] = 0;
+  is->link[is->count] = (uint64_t)1 << is->count;
   is->body[is->count] = (uint16_t)body;
   is->local[body] = (uint16_t)is->count++;
   return true;
 }
 
-static void add_link(island *is, uint16_t a, uint16_t b)
-{
-  if (a != NONE && b != NONE) {
-    is->link[a] |= (uint64_t)1 << b;
-    is->link[b] |= (uint64_t)1 << a;
-  }
-}
-
 /* Also of rows that do not push now: a later round may take them up. */
-static void link_row(island *is, const hapi_row *row)
-{
-  if (row->inverse != 0.0) {
-    uint16_t a = is->local[row->a];
-    uint16_t b = is->local[row->b];
-    add_link(is, a, a);
-    add_link(is, b, b);
-    add_link(is, a, b);
-  }
-}
-
 static bool gather(island *is)
 {
   const hapi_row *rows = is->solver->rows;
   is->count = 0;
-  memset(is->local, 0xff, sizeof is->local);
+  memset(is->local, 0xff, is->solver->body_count * sizeof is->local[0]);
   for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (row->inverse != 0.0 && (!add_body(is, row->a, row->ba) || !add_body(is, row->b, row->bb))) {
+    if ((row->moves_a && !add_body(is, row->a)) || (row->paired && !add_body(is, row->b))) {
       return false;
     }
-  }
-  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    link_row(is, &rows[i]);
+    if (row->moves_a && row->paired) {
+      is->link[is->local[row->a]] |= (uint64_t)1 << is->local[row->b];
+      is->link[is->local[row->b]] |= (uint64_t)1 << is->local[row->a];
+    }
   }
   return true;
 }
@@ -283,10 +254,20 @@ static void add_row(island *is, uint16_t to, double s, const double b[6], const 
   }
 }
 
-static void assemble(island *is)
+static void add_to(island *is, uint16_t local, double s, const double b[6])
+{
+  if (local != NONE) {
+    hapi_madd6(is->dv[local], s, b);
+  }
+}
+
+/* Matrix and right side, dv = sum of gain b e. The driving errors are kept in `error`. One walk for
+ * both: the rows are more than fits into a near cache. */
+static void assemble(island *is, double *error)
 {
   const hapi_row *rows = is->solver->rows;
   memset(is->blocks, 0, is->block_count * sizeof *is->blocks);
+  memset(is->dv, 0, is->count * sizeof *is->dv);
   for (uint32_t i = 0; i < is->count; ++i) {
     for (int k = 0; k < 36; k += 7) {
       is->blocks[is->block[i][i]][k] = 1.0;
@@ -294,12 +275,16 @@ static void assemble(island *is)
   }
   for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (row->state != FIXED) {
-      const hapi_row *from = source(is, row);
-      add_row(is, is->local[row->a], is->gain[i], row->ba, from);
-      if (row->paired) {
-        add_row(is, is->local[row->b], is->gain[i], row->bb, from);
-      }
+    if (row->state == FIXED) {
+      continue;
+    }
+    const hapi_row *from = source(is, row);
+    error[i] = row->state == TIED ? error[row->normal] : hapi_row_error(is->solver, row);
+    add_row(is, is->local[row->a], is->gain[i], row->ba, from);
+    add_to(is, is->local[row->a], is->gain[i] * error[i], row->ba);
+    if (row->paired) {
+      add_row(is, is->local[row->b], is->gain[i], row->bb, from);
+      add_to(is, is->local[row->b], is->gain[i] * error[i], row->bb);
     }
   }
 }
@@ -411,77 +396,42 @@ static void substitute(island *is)
 
 /* ---- one round ---- */
 
-static void add_to(island *is, uint16_t local, double s, const double b[6])
-{
-  if (local != NONE) {
-    hapi_madd6(is->dv[local], s, b);
-  }
-}
-
-/* dv = sum of gain b e. The driving errors are kept in `error`. */
-static void right_side(island *is, double *error)
-{
-  const hapi_row *rows = is->solver->rows;
-  memset(is->dv, 0, is->count * sizeof *is->dv);
-  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    const hapi_row *row = &rows[i];
-    if (row->state == FIXED) {
-      continue;
-    }
-    error[i] = row->state == TIED ? error[row->normal] : hapi_row_error(is->solver, row);
-    add_to(is, is->local[row->a], is->gain[i] * error[i], row->ba);
-    if (row->paired) {
-      add_to(is, is->local[row->b], is->gain[i] * error[i], row->bb);
-    }
-  }
-}
-
 static double moved(const island *is, uint16_t local, const double j[6])
 {
   return local == NONE ? 0.0 : hapi_dot6(j, is->dv[local]);
 }
 
-static void push_rows(island *is, const double *error)
+static void restore_velocities(island *is)
 {
-  hapi_row *rows = is->solver->rows;
-  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    hapi_row *row = &rows[i];
-    if (row->state == FIXED) {
-      continue;
-    }
-    const hapi_row *from = source(is, row);
-    double w = moved(is, is->local[from->a], from->ja);
-    if (from->paired) {
-      w += moved(is, is->local[from->b], from->jb);
-    }
-    row->impulse += is->gain[i] * (error[i] - w);
-  }
-}
-
-/* Back inside the bounds. */
-static void project(island *is)
-{
-  hapi_row *rows = is->solver->rows;
-  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    double lo;
-    double hi;
-    hapi_row_bounds(rows, &rows[i], &lo, &hi);
-    rows[i].impulse = hapi_clamp(rows[i].impulse, lo, hi);
-  }
-}
-
-/* Velocities of the impulses as they are now, from the saved ones. Not kept along: a set of active
- * rows that cannot be gives impulses so large that nothing of the velocities would be left. */
-static void follow(island *is)
-{
-  hapi_row *rows = is->solver->rows;
   for (uint32_t i = 0; i < is->count; ++i) {
     memcpy(is->solver->v[is->body[i]], is->saved_v[i], sizeof is->saved_v[i]);
   }
+}
+
+/* What the rows of dv ask for, cut at the bounds: a normal comes before its frictions. The
+ * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a set
+ * of active rows that cannot be gives impulses so large that nothing of the velocities would be left. */
+static void push_rows(island *is, const double *error)
+{
+  hapi_row *rows = is->solver->rows;
+  restore_velocities(is);
   for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    double now = rows[i].impulse;
-    hapi_row_push(is->solver, &rows[i], now - is->saved_impulse[i]);
-    rows[i].impulse = now;
+    hapi_row *row = &rows[i];
+    double p = row->impulse;
+    double lo;
+    double hi;
+    if (row->state != FIXED) {
+      const hapi_row *from = source(is, row);
+      double w = moved(is, is->local[from->a], from->ja);
+      if (from->paired) {
+        w += moved(is, is->local[from->b], from->jb);
+      }
+      p += is->gain[i] * (error[i] - w);
+    }
+    hapi_row_bounds(rows, row, &lo, &hi);
+    p = hapi_clamp(p, lo, hi);
+    hapi_row_push(is->solver, row, p - is->saved_impulse[i]);
+    row->impulse = p;
   }
 }
 
@@ -500,9 +450,7 @@ static void restore(island *is)
   for (uint32_t i = is->first; i != NO_ROW; i = is->solver->rows[i].next) {
     is->solver->rows[i].impulse = is->saved_impulse[i];
   }
-  for (uint32_t i = 0; i < is->count; ++i) {
-    memcpy(is->solver->v[is->body[i]], is->saved_v[i], sizeof is->saved_v[i]);
-  }
+  restore_velocities(is);
 }
 
 /* Places the arrays in the work; false if they do not fit. */
@@ -521,13 +469,10 @@ static bool place(island *is)
 static void solve(island *is)
 {
   double *error = is->solver->work + 2 * (size_t)is->solver->row_count;
-  assemble(is);
+  assemble(is, error);
   factor(is);
-  right_side(is, error);
   substitute(is);
   push_rows(is, error);
-  project(is);
-  follow(is);
 }
 
 /* The best of some rounds is kept, each with the active set that the one before leads to. */
@@ -539,7 +484,7 @@ static bool improve(island *is, double before, double *out_due)
   save(is);
   for (int round = 0; round < INNER_ROUNDS; ++round) {
     solve(is);
-    double due = measure(is);
+    double due = inspect(is, false);
     if (due < is->solver->tolerance) {
       *out_due = due;
       return true; /* nothing to save, nothing to restore */
@@ -550,7 +495,6 @@ static bool improve(island *is, double before, double *out_due)
       best = due;
       better = true;
     }
-    classify(is, false);
   }
   restore(is);
   return better;
@@ -577,13 +521,15 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   is.saved_impulse = solver->work + solver->row_count;
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     is.first = head[i];
-    double before = is.first == NO_ROW ? 0.0 : measure(&is);
+    if (is.first == NO_ROW) {
+      continue;
+    }
+    double before = inspect(&is, sticking);
     double due = before;
     if (!(before >= solver->tolerance)) {
       solver->direct_residual = fmax(solver->direct_residual, before);
       continue;
     }
-    classify(&is, sticking);
     if (is.free_rows == 0 || is.free_rows > solver->direct_rows || !gather(&is)) {
       solver->too_dear = solver->too_dear || is.free_rows > 0;
       solver->direct_residual = HUGE_VAL;
