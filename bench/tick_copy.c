@@ -102,7 +102,6 @@ static void set_free_velocities(hapi_tick *tick)
 
 static double solve(hapi_tick *tick)
 {
-  set_free_velocities(tick);
   int64_t begin_ns = hapi_clock_now();
   hapi_solver_run(&tick->world.solver);
   return since(begin_ns);
@@ -117,7 +116,9 @@ static bool stop_push_out(hapi_tick *tick)
     any = any || (tick->world.sources[i].pushes_out && solver->rows[i].impulse > 0.0);
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
-    solver->rows[i].target = tick->world.sources[i].pushes_out ? 0.0 : solver->rows[i].target;
+    if (tick->world.sources[i].pushes_out) {
+      hapi_row_retarget(&solver->rows[i], 0.0);
+    }
   }
   return any;
 }
@@ -132,8 +133,10 @@ static double time_update(hapi_tick *tick)
   }
   solver->direct_rows = 0;
   solver->tolerance = 0.0;
+  solver->ready = false;
   for (uint32_t lot = 0; lot < 2; ++lot) {
     solver->update_budget = (2 + lot * UPDATE_SWEEPS) * solver->row_count;
+    set_free_velocities(tick);
     spent[lot] = solve(tick);
   }
   return (spent[1] - spent[0]) / (UPDATE_SWEEPS * solver->row_count);
@@ -142,6 +145,7 @@ static double time_update(hapi_tick *tick)
 void tick_copy_parts(hapi_tick *copy, tick_parts *out)
 {
   begin(copy);
+  set_free_velocities(copy);
   int64_t begin_ns = hapi_clock_now();
   hapi_pointer_rows(copy);
   hapi_contact_rows(copy);

@@ -322,16 +322,27 @@ static double approach(const placed_contact *c)
   return speed;
 }
 
-/* What touches a body that moves is awake, as in ODE. */
-static void wake(placed_contact *c)
+/* The contact of that index; false: not one of this tick. */
+static bool find_contact(hapi_tick *tick, uint32_t index, placed_contact *out)
 {
-  hapi_local_body *bodies[2] = {c->a, c->b};
-  for (int i = 0; i < 2; ++i) {
-    hapi_local_body *body = bodies[i];
-    const hapi_local_body *other = bodies[1 - i];
-    if (body != NULL && (body->flags & HAPI_BODY_RESTING) != 0 && hapi_body_responds(other)) {
-      body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
-      body->pushed = true;
+  hapi_patches *patches = tick->world.patches;
+  out->in = &hapi_patches_contacts(patches)[index];
+  out->surface = &hapi_patches_surfaces(patches)[out->in->surface];
+  return find_body(tick, out->in->body_a, out->in->generation_a, &out->a) &&
+         find_body(tick, out->in->body_b, out->in->generation_b, &out->b) &&
+         (hapi_body_responds(out->a) || hapi_body_responds(out->b)) &&
+         (is_owned(out->a) || is_owned(out->b)); /* others are ODE's affair */
+}
+
+/* What touches a body that moves is awake, as in ODE. Before any row: a body has all of its contacts,
+ * the floor's as well, from the tick on in which it wakes. */
+static void wake_touched(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->world.patches->contact_count; ++i) {
+    placed_contact c;
+    if (find_contact(tick, i, &c) && (rests(c.a) || rests(c.b)) && place(&c) &&
+        c.gap + tick->period * approach(&c) <= 0.0) {
+      hapi_local_wake(tick, rests(c.a) ? c.a : c.b);
     }
   }
 }
@@ -342,20 +353,18 @@ void hapi_contact_rows(hapi_tick *tick)
   if (world->patches == NULL) {
     return;
   }
-  const hapi_patch_contact *contacts = hapi_patches_contacts(world->patches);
-  const hapi_surface *surfaces = hapi_patches_surfaces(world->patches);
+  if (world->resting > 0) {
+    wake_touched(tick);
+  }
   for (uint32_t i = 0; i < world->patches->contact_count; ++i) {
-    placed_contact c = {.in = &contacts[i], .surface = &surfaces[contacts[i].surface]};
-    bool known = find_body(tick, c.in->body_a, c.in->generation_a, &c.a) &&
-                 find_body(tick, c.in->body_b, c.in->generation_b, &c.b);
-    bool moves = known && (hapi_body_responds(c.a) || hapi_body_responds(c.b)) &&
-                 (is_owned(c.a) || is_owned(c.b)); /* others are ODE's affair */
+    placed_contact c;
     bool room = world->solver.row_count + 3 <= world->row_capacity;
-    if (moves && room && place(&c) && is_near(tick, &c)) {
-      if ((rests(c.a) || rests(c.b)) && c.gap + tick->period * approach(&c) <= 0.0) {
-        wake(&c);
-      }
+    if (find_contact(tick, i, &c) && room && place(&c) && is_near(tick, &c)) {
+      uint32_t first = world->solver.row_count;
       add_contact(tick, &c, i);
+      for (uint32_t row = first; row < world->solver.row_count; ++row) {
+        hapi_row_ready(&world->solver, row);
+      }
     } else {
       memset(world->memory[i].impulse, 0, sizeof world->memory[i].impulse);
     }

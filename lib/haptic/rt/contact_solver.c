@@ -14,11 +14,6 @@
 
 /* ---- preparation ---- */
 
-static bool responds(const double b[6])
-{
-  return b[0] != 0.0 || b[1] != 0.0 || b[2] != 0.0 || b[3] != 0.0 || b[4] != 0.0 || b[5] != 0.0;
-}
-
 static bool same_bodies(const hapi_row *row, const hapi_row *other)
 {
   return row->a == other->a && row->b == other->b;
@@ -39,19 +34,19 @@ static bool valid(const hapi_solver *solver, uint32_t index)
 static void prepare(hapi_solver *solver, uint32_t index)
 {
   hapi_row *row = &solver->rows[index];
+  double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
+  double of_b = hapi_dot6(row->jb, row->bb);
+  double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
-  if (valid(solver, index)) {
-    double d = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb) + row->softness;
-    row->inverse = d > 1e-200 && d < 1e200 ? 1.0 / d : 0.0;
-    row->response = d;
-  }
-  if (row->inverse == 0.0) {
+  if (!(d > 1e-200 && d < 1e200) || !valid(solver, index)) {
     row->impulse = 0.0;
     return;
   }
-  row->moves_a = responds(row->ba);
-  row->paired = responds(row->bb);
+  row->inverse = 1.0 / d;
+  row->response = d;
+  row->moves_a = of_a != 0.0;
+  row->paired = of_b != 0.0;
   row->drive = row->target - (row->paired ? 0.0 : hapi_dot6(row->jb, solver->v[row->b]));
 }
 
@@ -78,29 +73,27 @@ static void join_triple(hapi_solver *solver, uint32_t last)
   }
 }
 
-/* One walk over the rows: there are more of them than fit into a near cache. */
-static void warm_start(hapi_solver *solver)
+static void warm_start(hapi_solver *solver, hapi_row *row)
 {
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    hapi_row *row = &solver->rows[i];
-    double lo;
-    double hi;
-    if (!solver->prepared) {
-      prepare(solver, i);
-      join_triple(solver, i);
-    }
-    if (row->inverse == 0.0) {
-      continue;
-    }
-    hapi_row_bounds(solver->rows, row, &lo, &hi);
-    row->impulse = hapi_clamp(row->impulse, lo, hi);
-    if (row->impulse == 0.0) {
-      continue;
-    }
-    hapi_madd6(solver->v[row->a], row->impulse, row->ba);
-    if (row->paired) {
-      hapi_madd6(solver->v[row->b], row->impulse, row->bb);
-    }
+  double lo;
+  double hi;
+  hapi_row_bounds(solver->rows, row, &lo, &hi);
+  row->impulse = hapi_clamp(row->impulse, lo, hi);
+  if (row->impulse == 0.0) {
+    return;
+  }
+  hapi_madd6(solver->v[row->a], row->impulse, row->ba);
+  if (row->paired) {
+    hapi_madd6(solver->v[row->b], row->impulse, row->bb);
+  }
+}
+
+void hapi_row_ready(hapi_solver *solver, uint32_t index)
+{
+  prepare(solver, index);
+  join_triple(solver, index);
+  if (solver->rows[index].inverse != 0.0) {
+    warm_start(solver, &solver->rows[index]);
   }
 }
 
@@ -263,7 +256,9 @@ void hapi_solver_run(hapi_solver *solver)
   bool dear = solver->direct_rows > 0 && stays_dear(solver);
   bool direct = solver->direct_rows > 0 && !dear;
   left = dear ? sweeps_alone(rows, left) : left;
-  warm_start(solver);
+  for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
+    hapi_row_ready(solver, i);
+  }
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
       solver->residual = sweep(solver);

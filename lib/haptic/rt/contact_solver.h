@@ -60,7 +60,8 @@ typedef struct hapi_solver {
   double *work;           /* for direct solves; an island that does not fit is left to sweeps */
   size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
 
-  bool prepared;      /* in: rows are those of the last run but for hapi_row_retarget */
+  bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
+                         its impulses in v, but for hapi_row_retarget */
   uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
   uint32_t dear_runs; /* inner: since then */
   bool too_dear;      /* inner: an island was too large or too dear for the budget */
@@ -77,6 +78,11 @@ typedef struct hapi_solver {
 /* [haptic] Works in rows, v and work only, with 16 kB of stack; bounded by update_budget whatever
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
+
+/* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
+ * soon as one is filled in, while it is at hand: there are more of them than fit into a near cache.
+ * In their order; v, row_count and body_count are set before. */
+void hapi_row_ready(hapi_solver *solver, uint32_t index);
 
 /* ---- inner: between contact_solver.c and direct_solver.c ---- */
 

@@ -161,13 +161,17 @@ static bool gather(island *is)
   is->count = 0;
   memset(is->local, 0xff, is->solver->body_count * sizeof is->local[0]);
   for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
-    const hapi_row *row = &rows[i];
-    if ((row->moves_a && !add_body(is, row->a)) || (row->paired && !add_body(is, row->b))) {
+    if ((rows[i].moves_a && !add_body(is, rows[i].a)) ||
+        (rows[i].paired && !add_body(is, rows[i].b))) {
       return false;
     }
-    if (row->moves_a && row->paired) {
-      is->link[is->local[row->a]] |= (uint64_t)1 << is->local[row->b];
-      is->link[is->local[row->b]] |= (uint64_t)1 << is->local[row->a];
+  }
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    uint16_t a = is->local[rows[i].a];
+    uint16_t b = is->local[rows[i].b];
+    if (a != NONE && b != NONE) { /* a body on rails may answer to some of its rows only */
+      is->link[a] |= (uint64_t)1 << b;
+      is->link[b] |= (uint64_t)1 << a;
     }
   }
   return true;

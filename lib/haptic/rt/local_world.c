@@ -63,9 +63,19 @@ static void begin(hapi_tick *tick)
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
   solver->body_count = 1;
   solver->row_count = 0;
+  tick->world.resting = 0;
   for (uint32_t i = 0; i < tick->live_count; ++i) {
-    begin_body(tick, &tick->bodies[tick->live[i]], solver->body_count++);
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    begin_body(tick, body, solver->body_count++);
+    tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
+}
+
+void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
+{
+  body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+  body->pushed = true;
+  free_velocity(tick, body, tick->world.solver.v[body->row]);
 }
 
 static void set_free_velocities(hapi_tick *tick)
@@ -297,19 +307,16 @@ static void solve(hapi_tick *tick)
 void hapi_local_world_step(hapi_tick *tick)
 {
   begin(tick);
+  set_free_velocities(tick);
   hapi_pointer_rows(tick);
   hapi_contact_rows(tick);
-  set_free_velocities(tick);
   solve(tick);
   bool again = stop_push_out(tick);
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
-    set_free_velocities(tick);
-    tick->world.solver.prepared = true;
     solve(tick);
-    tick->world.solver.prepared = false;
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];
       if (hapi_body_responds(body)) {

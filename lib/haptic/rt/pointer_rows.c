@@ -191,6 +191,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
       .contact = index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   contact->row = number;
   ++world->solver.row_count;
+  hapi_row_ready(&world->solver, number);
 }
 
 static double closing_speed(const placed_pointer *at)
@@ -225,7 +226,7 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
   bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && way < 0.25 * at.pointer->radius);
   if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 && at.depth > 0.0) {
-    at.body->flags &= ~(uint32_t)HAPI_BODY_RESTING; /* woken by the touch */
+    hapi_local_wake(tick, at.body);
   }
   if (!comes || share <= 0.0) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);

@@ -58,24 +58,22 @@ static inline void hapi_body_arm(const hapi_local_body *body, const double point
 static inline void hapi_row_column(const hapi_local_body *body, const double arm[3],
                                    const double direction[3], double sign, double j[6], double b[6])
 {
-  memset(b, 0, 6 * sizeof *b);
   if (body == NULL) {
     memset(j, 0, 6 * sizeof *j);
+    memset(b, 0, 6 * sizeof *b);
     return;
   }
   hapi_v3_scale(sign, direction, j);
   hapi_v3_cross(arm, j, j + 3);
   if (!hapi_body_responds(body)) {
-    return;
-  }
-  if ((body->flags & HAPI_BODY_MEASURED) == 0) {
+    memset(b, 0, 6 * sizeof *b);
+  } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
     hapi_v3_scale(body->inverse_mass, j, b);
     hapi_m3_apply(body->inverse_inertia, j + 3, b + 3);
-    return;
-  }
-  for (int i = 0; i < 6; ++i) {
-    for (int k = 0; k < 6; ++k) {
-      b[i] += body->given.response[i][k] * j[k];
+  } else {
+    for (int i = 0; i < 6; ++i) {
+      b[i] =
+          hapi_v3_dot(body->given.response[i], j) + hapi_v3_dot(body->given.response[i] + 3, j + 3);
     }
   }
 }

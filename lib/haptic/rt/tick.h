@@ -148,7 +148,8 @@ typedef struct hapi_local_world {
   hapi_row_source *sources; /* of the rows; 4 x capacity.contacts */
   hapi_solver solver;
   uint32_t row_capacity;
-  uint32_t active; /* contacts between bodies that push in this tick */
+  uint32_t resting; /* bodies at the tick's begin */
+  uint32_t active;  /* contacts between bodies that push in this tick */
   uint64_t late_passes;
   hap_plane plane_mode;
 } hapi_local_world;
@@ -216,17 +217,18 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
 /* ---- the steps of hapi_tick_run, one file each ---- */
 
-void hapi_coupling_read(hapi_tick *tick);             /* device -> world */
-void hapi_local_place(hapi_tick *tick);               /* models SINGLE and IMPULSE: poses now */
-void hapi_render(hapi_tick *tick);                    /* eq. 7 */
-void hapi_local_step(hapi_tick *tick);                /* eq. 8-11, 14 */
-void hapi_local_world_step(hapi_tick *tick);          /* model CONTACT: b and c in one */
-void hapi_pointer_rows(hapi_tick *tick);              /* pointer contacts -> rows */
-void hapi_pointer_forces(hapi_tick *tick);            /* rows -> wrenches */
-void hapi_contact_rows(hapi_tick *tick);              /* contacts between bodies -> rows */
-void hapi_contact_keep(hapi_tick *tick);              /* impulses for the next tick */
-void hapi_guard(hapi_tick *tick);                     /* finite, limits, world -> device */
-void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
+void hapi_coupling_read(hapi_tick *tick);    /* device -> world */
+void hapi_local_place(hapi_tick *tick);      /* models SINGLE and IMPULSE: poses now */
+void hapi_render(hapi_tick *tick);           /* eq. 7 */
+void hapi_local_step(hapi_tick *tick);       /* eq. 8-11, 14 */
+void hapi_local_world_step(hapi_tick *tick); /* model CONTACT: b and c in one */
+void hapi_local_wake(hapi_tick *tick, hapi_local_body *body); /* a resting one, before its rows */
+void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
+void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
+void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
+void hapi_contact_keep(hapi_tick *tick);                      /* impulses for the next tick */
+void hapi_guard(hapi_tick *tick);                             /* finite, limits, world -> device */
+void hapi_coupling_write(hapi_tick_pointer *pointer);         /* world wrench -> device wrench */
 void hapi_trace_hash(hapi_tick *tick);
 
 #endif
