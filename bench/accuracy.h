@@ -80,14 +80,15 @@ typedef struct accuracy_errors {
   double pose_max;    /* m, over the bodies while the loop moves them */
   double pose_median; /* m */
   double line_n;      /* N, largest line of the difference at the physics rate or 5 harmonics,
-                           above what is half way to the next ones */
+                           above what is half way to the next ones and what the control has */
   bool lines;         /* contact is long enough to tell one */
   double force_rms;   /* N, of the reference while either touches */
 } accuracy_errors;
 
-/* False: nothing is touched in the reference, or no memory. */
+/* control: as test, at another physics rate; may be NULL. False: nothing is touched in the reference,
+ * or no memory. */
 bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *test,
-                      double physics_hz, accuracy_errors *out);
+                      const accuracy_motion *control, double physics_hz, accuracy_errors *out);
 
 double accuracy_hand_speed(const accuracy_motion *m); /* m/s, the largest */
 
