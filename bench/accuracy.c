@@ -13,7 +13,8 @@
  *   estimate       0, reserved
  *   pose_*_mm      distance of the bodies that the loop moves from their reference
  *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
- *                  is half way to the next ones; 0 when contact is shorter than 4 steps
+ *                  is half way to the next ones and, in rows "default" of model contact, above what a
+ *                  run at 1.3 times that rate has there; 0 when contact is shorter than 4 steps
  *   rest_share     of the ticks with contact, those in which no hand moves
  *   start_um       the worst start */
 
