@@ -14,7 +14,7 @@
 #include "base/log.h"
 #include "device/device.h"
 #include "plugins/common/arguments.h"
-#include "plugins/common/number.h"
+#include "base/number.h"
 #include "plugins/common/output.h"
 #include "plugins/common/timeline.h"
 

@@ -520,7 +520,7 @@ TEST(bad_specs_say_why)
       {"virtual:loop=yes", "0 or 1"},
       {"virtual:hz=3", "without sine"},
       {"virtual:sine=1/1/1,hz=-1", "hz"},
-      {"virtual:hand=limp", "rigid, relaxed or tense"},
+      {"virtual:hand=limp", "rigid, relaxed, tense or none"},
       {"virtual:hand=rigid,mass=1", "rigid"},
       {"virtual:mass=0", "mass"},
       {"virtual:damping=-1", "damping"},

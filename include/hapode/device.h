@@ -4,6 +4,7 @@
 #define HAPODE_DEVICE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include <hapode/attributes.h>
 #include <hapode/spatial.h>
@@ -16,12 +17,16 @@ typedef struct hap_device hap_device;
 /* What a device is and can hold. Zero in a limit means that the device does not know. */
 typedef struct hap_device_info {
   char name[64];
-  unsigned dof;           /* 3: force only; 6: force and torque */
-  double max_force;       /* N, norm of the force vector the device may be asked for */
-  double max_torque;      /* N m */
-  double rated_stiffness; /* N/m, largest the maker promises to hold */
-  double damping;         /* N s/m, the mechanism's own */
-  double quantum;         /* m, smallest step of the measured position */
+  unsigned dof;               /* 3: force only; 6: force and torque */
+  double max_force;           /* N, norm of the force vector the device may be asked for */
+  double max_torque;          /* N m */
+  double rated_stiffness;     /* N/m, largest the maker promises to hold */
+  double damping;             /* N s/m, the mechanism's own */
+  double quantum;             /* m, smallest step of the measured position */
+  double mass;                /* kg, the mechanism's own, felt at the grip */
+  double friction;            /* N, Coulomb friction of the mechanism */
+  double delay;               /* s, from a force command until its effect is in a measured pose */
+  uint32_t measures_velocity; /* 1: the twist is measured, not a difference of rounded positions */
 } hap_device_info;
 
 /* [control] Opens a device by its spec: a name, then ':' and arguments separated by commas, such

@@ -57,9 +57,9 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
     return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s' says it has dof %u, known are 3 and 6",
                      ops->name, info->dof);
   }
-  double limits[5] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
-                      info->quantum};
-  for (int i = 0; i < 5; ++i) {
+  double limits[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
+                     info->quantum,   info->mass,       info->friction,        info->delay};
+  for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
     if (!hapi_finite(&limits[i], 1) || limits[i] < 0.0) {
       return hapi_fail(detail, HAP_ERROR_DEVICE,
                        "device '%s' describes itself with a limit that is negative or not finite",

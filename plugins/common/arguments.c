@@ -7,7 +7,7 @@
 
 #include "base/log.h"
 #include "base/vec.h"
-#include "plugins/common/number.h"
+#include "base/number.h"
 
 #define SHOWN 60 /* characters of the input in an error: the known keys need their place, too */
 

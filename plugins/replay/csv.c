@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/log.h"
-#include "plugins/common/number.h"
+#include "base/number.h"
 
 static const char *const names[HAPI_CSV_COLUMNS_MAX] = {"t", "x", "y", "z", "qw", "qx", "qy", "qz"};
 

@@ -122,6 +122,7 @@ static void replay_describe(void *self, hap_device_info *out)
 {
   const replay_device *device = self;
   out->dof = device->recording.channels == 7 ? 6 : 3;
+  out->measures_velocity = 1; /* the slope of the spline */
   out->max_force = device->output.max_force;
   out->max_torque = device->output.max_torque;
 }

@@ -69,30 +69,46 @@ static void exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
 /* The oscillator and a right side u that grows by du over the step are one linear system of the
  * state (x, v / w, u, du); its exponential holds the whole step. w, near the natural frequency,
  * makes rows of like size, which keeps the number of squarings and the rounding small. */
-static void prepare(hapi_hand *hand, double length)
+static void prepare(const hapi_hand_def *def, double length, hapi_hand_solution *out)
 {
-  double per_mass = 1.0 / hand->def.mass;
-  double w = fmax(sqrt(hand->def.stiffness * per_mass), 1.0);
+  double per_mass = 1.0 / def->mass;
+  double w = fmax(sqrt(def->stiffness * per_mass), 1.0);
+  double damping = def->damping + def->drag;
   double system[SIZE][SIZE] = {{0.0, w * length, 0.0, 0.0},
-                               {-hand->def.stiffness * per_mass / w * length,
-                                -hand->def.damping * per_mass * length, per_mass / w * length, 0.0},
+                               {-def->stiffness * per_mass / w * length,
+                                -damping * per_mass * length, per_mass / w * length, 0.0},
                                {0.0, 0.0, 0.0, 1.0},
                                {0.0, 0.0, 0.0, 0.0}};
   double step[SIZE][SIZE];
   exponential(system, step);
   for (int i = 0; i < SIZE; ++i) {
-    hand->p[i] = step[0][i];
-    hand->q[i] = w * step[1][i];
+    out->p[i] = step[0][i];
+    out->q[i] = w * step[1][i];
   }
-  hand->p[1] /= w;
-  hand->q[1] /= w;
-  hand->length = length;
+  out->p[1] /= w;
+  out->q[1] /= w;
+  out->length = length;
+}
+
+static const hapi_hand_solution *solution_of(hapi_hand *hand, double length)
+{
+  for (int i = 0; i < HAPI_HAND_SOLUTIONS; ++i) {
+    if (hand->solutions[i].length == length) {
+      return &hand->solutions[i];
+    }
+  }
+  hapi_hand_solution *oldest = &hand->solutions[hand->next];
+  hand->next = (hand->next + 1) % HAPI_HAND_SOLUTIONS;
+  prepare(&hand->def, length, oldest);
+  return oldest;
 }
 
 void hapi_hand_init(hapi_hand *hand, const hapi_hand_def *def)
 {
   *hand = (hapi_hand){.def = *def};
-  prepare(hand, 1e-3);
+  for (int i = 0; i < HAPI_HAND_SOLUTIONS; ++i) {
+    prepare(&hand->def, 1e-3, &hand->solutions[i]);
+  }
 }
 
 void hapi_hand_place(hapi_hand *hand, const double position[3], const double velocity[3])
@@ -101,24 +117,21 @@ void hapi_hand_place(hapi_hand *hand, const double position[3], const double vel
   hapi_v3_copy(velocity, hand->velocity);
 }
 
-void hapi_hand_step(hapi_hand *hand, double length, const hapi_hand_target *target,
-                    const double force[3])
+void hapi_hand_push(const hapi_hand *hand, int axis, const hapi_hand_target *target, double force,
+                    double out_push[2])
 {
-  if (length != hand->length) {
-    prepare(hand, length);
+  for (int end = 0; end < 2; ++end) {
+    out_push[end] = hand->def.stiffness * target->position[end][axis] +
+                    hand->def.damping * target->velocity[end][axis] + force;
   }
-  const double *p = hand->p;
-  const double *q = hand->q;
-  for (int i = 0; i < 3; ++i) {
-    double push[2];
-    for (int end = 0; end < 2; ++end) {
-      push[end] = hand->def.stiffness * target->position[end][i] +
-                  hand->def.damping * target->velocity[end][i] + force[i];
-    }
-    double x = hand->position[i];
-    double v = hand->velocity[i];
-    double rise = push[1] - push[0];
-    hand->position[i] = p[0] * x + p[1] * v + p[2] * push[0] + p[3] * rise;
-    hand->velocity[i] = q[0] * x + q[1] * v + q[2] * push[0] + q[3] * rise;
-  }
+}
+
+void hapi_hand_step_axis(hapi_hand *hand, int axis, double length, const double push[2])
+{
+  const hapi_hand_solution *s = solution_of(hand, length);
+  double x = hand->position[axis];
+  double v = hand->velocity[axis];
+  double rise = push[1] - push[0];
+  hand->position[axis] = s->p[0] * x + s->p[1] * v + s->p[2] * push[0] + s->p[3] * rise;
+  hand->velocity[axis] = s->q[0] * x + s->q[1] * v + s->q[2] * push[0] + s->q[3] * rise;
 }

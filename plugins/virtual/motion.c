@@ -7,9 +7,9 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/number.h"
 #include "base/vec.h"
 #include "plugins/common/arguments.h"
-#include "plugins/common/number.h"
 
 #define TIME_MAX 1e6     /* s */
 #define TIME_STEP 1e-6   /* s; with DISTANCE_MAX it keeps every velocity finite */

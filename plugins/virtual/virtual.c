@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A device of numbers: a scripted motion, held by a rigid or by a yielding hand. */
+/* A device of numbers: a mechanism, held by a hand with a scripted motion. */
 
 #include <hapode/device_impl.h>
 
@@ -9,23 +9,46 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/number.h"
 #include "base/vec.h"
 #include "plugins/common/arguments.h"
 #include "plugins/common/output.h"
 #include "plugins/common/timeline.h"
-#include "plugins/virtual/hand.h"
+#include "plugins/virtual/delay.h"
+#include "plugins/virtual/friction.h"
 #include "plugins/virtual/motion.h"
+#include "plugins/virtual/virtual.h"
 
 #define SUBSTEP_NS 1000000u /* the target is taken as straight within */
 #define SUBSTEPS_MAX 1000u  /* a read stays bounded however long the pause was */
+
+#define NEVER UINT64_MAX
+
+/* A jump of the velocity: the hand's blow. */
+typedef struct kick {
+  uint64_t at_ns; /* of the timeline; NEVER: none */
+  bool done;
+  double velocity[3];
+} kick;
+
+/* What the encoders say: rounded to the quantum, the velocity a difference of that. */
+typedef struct measured {
+  double position[3];
+  double velocity[3];
+} measured;
 
 typedef struct virtual_device {
   hap_device_info info;
   hapi_motion motion;
   double start; /* s of the script at the first read */
   double orientation[4];
-  bool yields; /* else rigid: the hand is not used */
-  hapi_hand hand;
+  bool yields;    /* else rigid: exactly on the script */
+  bool held;      /* else nobody has the device in his hand */
+  hapi_hand hand; /* with the mechanism; rigid: its place alone */
+  kick kick;
+  hapi_delay delay;
+  double work; /* J, see virtual.h */
+  measured measured;
   hapi_output output;
   hapi_timeline timeline;
 } virtual_device;
@@ -46,6 +69,11 @@ enum argument {
   MAX_TORQUE,
   RATED_STIFFNESS,
   DEVICE_DAMPING,
+  DEVICE_MASS,
+  FRICTION,
+  DELAY,
+  QUANTUM,
+  KICK,
   DOF,
   ARGUMENT_COUNT
 };
@@ -54,7 +82,8 @@ enum argument {
 enum hand_word {
   RIGID,
   RELAXED,
-  TENSE
+  TENSE,
+  NOBODY
 };
 
 /* Round numbers, chosen and not fitted: a hand on a handle, held loosely and co-contracted. For the
@@ -62,14 +91,15 @@ enum hand_word {
  * of "Haptic perception of force magnitude and its relation to postural arm dynamics in 3D",
  * Scientific Reports 5, 18004, 2015). */
 static const hapi_hand_def presets[] = {
-    [RIGID] = {1.0, 0.0, 0.0}, /* not used */
-    [RELAXED] = {0.2, 3.0, 150.0},
-    [TENSE] = {0.3, 10.0, 800.0},
+    [RIGID] = {1.0, 0.0, 0.0, 0.0}, /* not used */
+    [RELAXED] = {0.2, 3.0, 150.0, 0.0},
+    [TENSE] = {0.3, 10.0, 800.0, 0.0},
+    [NOBODY] = {0.0, 0.0, 0.0, 0.0},
 };
 
 static const char *const blend_words[] = {"smooth", "linear", NULL};
 static const char *const switch_words[] = {"0", "1", NULL};
-static const char *const hand_words[] = {"rigid", "relaxed", "tense", NULL};
+static const char *const hand_words[] = {"rigid", "relaxed", "tense", "none", NULL};
 static const char *const dof_words[] = {"3", "6", NULL};
 
 static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
@@ -82,7 +112,7 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
     [START] = {"start", HAPI_ARGUMENT_NUMBER, false, -1e6, 1e6, "seconds within 1e6"},
     [ORIENTATION] = {"orientation", HAPI_ARGUMENT_QUATERNION, .expected = "w/x/y/z, not all zero",
                      .number = {1.0}},
-    [HAND] = {"hand", HAPI_ARGUMENT_WORD, .expected = "rigid, relaxed or tense",
+    [HAND] = {"hand", HAPI_ARGUMENT_WORD, .expected = "rigid, relaxed, tense or none",
               .words = hand_words},
     [MASS] = {"mass", HAPI_ARGUMENT_NUMBER, false, 1e-3, 1e3, "kg from 0.001 to 1000"},
     [DAMPING] = {"damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e5, "N s/m from 0 to 1e5"},
@@ -95,6 +125,11 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
                          "N/m from 0 to 1e9"},
     [DEVICE_DAMPING] = {"device_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e6,
                         "N s/m from 0 to 1e6"},
+    [DEVICE_MASS] = {"device_mass", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e3, "kg from 0 to 1000"},
+    [FRICTION] = {"friction", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e3, "N from 0 to 1000"},
+    [DELAY] = {"delay", HAPI_ARGUMENT_NUMBER, false, 0.0, 0.1, "seconds from 0 to 0.1"},
+    [QUANTUM] = {"quantum", HAPI_ARGUMENT_NUMBER, false, 0.0, 0.1, "m from 0 to 0.1"},
+    [KICK] = {"kick", HAPI_ARGUMENT_TEXT, .expected = "T:vx/vy/vz in s and m/s (at most 100 m/s)"},
     [DOF] = {"dof", HAPI_ARGUMENT_WORD, .expected = "3 or 6", .words = dof_words},
 };
 
@@ -126,20 +161,64 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
   return HAP_OK;
 }
 
+static hap_status check_hand(const hapi_argument *entries, size_t word, hap_detail *detail)
+{
+  bool tuned = entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given;
+  if (tuned && (word == RIGID || word == NOBODY)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "virtual: hand=%s has no mass, damping or stiffness", hand_words[word]);
+  }
+  if (word == NOBODY && !(entries[DEVICE_MASS].number[0] >= 1e-3)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "virtual: hand=none: the device alone needs device_mass=, 0.001 kg or more");
+  }
+  if (word == RIGID && entries[KICK].given) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: kick: hand=rigid cannot be kicked");
+  }
+  return HAP_OK;
+}
+
 static hap_status set_hand(virtual_device *device, const hapi_argument *entries, hap_detail *detail)
 {
   bool tuned = entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given;
   size_t word = entries[HAND].given || !tuned ? entries[HAND].word : RELAXED;
-  if (word == RIGID && tuned) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "virtual: hand=rigid has no mass, damping or stiffness");
+  hap_status status = check_hand(entries, word, detail);
+  if (status < 0) {
+    return status;
   }
   hapi_hand_def def = presets[word];
   def.mass = entries[MASS].given ? entries[MASS].number[0] : def.mass;
   def.damping = entries[DAMPING].given ? entries[DAMPING].number[0] : def.damping;
   def.stiffness = entries[STIFFNESS].given ? entries[STIFFNESS].number[0] : def.stiffness;
+  def.mass += entries[DEVICE_MASS].number[0];
+  def.drag = entries[DEVICE_DAMPING].number[0];
   device->yields = word != RIGID;
+  device->held = word != NOBODY;
   hapi_hand_init(&device->hand, &def);
+  return HAP_OK;
+}
+
+static hap_status set_kick(virtual_device *device, const hapi_argument_table *table,
+                           hap_detail *detail)
+{
+  const hapi_argument *text = &table->entries[KICK];
+  double time = 0.0;
+  device->kick.at_ns = NEVER;
+  if (!text->given) {
+    return HAP_OK;
+  }
+  const char *colon = hapi_number_read(text->text, &time);
+  double *velocity = device->kick.velocity;
+  if (colon == NULL || *colon != ':' || fabs(time) > 1e6 ||
+      !hapi_arguments_numbers(colon + 1, text->text + text->length, 3, velocity) ||
+      !(hapi_v3_norm(velocity) <= 100.0)) {
+    return hapi_arguments_fail(table, text, detail);
+  }
+  if (time < device->start) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: kick: at %g s, before start=%g", time,
+                     device->start);
+  }
+  device->kick.at_ns = (uint64_t)llround((time - device->start) * 1e9);
   return HAP_OK;
 }
 
@@ -151,6 +230,11 @@ static void set_info(virtual_device *device, const hapi_argument *entries)
   info->max_torque = entries[MAX_TORQUE].number[0];
   info->rated_stiffness = entries[RATED_STIFFNESS].number[0];
   info->damping = entries[DEVICE_DAMPING].number[0];
+  info->quantum = entries[QUANTUM].number[0];
+  info->mass = entries[DEVICE_MASS].number[0];
+  info->friction = entries[FRICTION].number[0];
+  info->delay = entries[DELAY].number[0];
+  info->measures_velocity = info->quantum == 0.0;
   hapi_output_init(&device->output, info->max_force, info->dof == 6 ? info->max_torque : 0.0);
 }
 
@@ -168,13 +252,24 @@ static hap_status configure(virtual_device *device, const char *args, hap_detail
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: hz has no effect without sine");
   }
   status = set_hand(device, entries, detail);
-  return status < 0 ? status : set_motion(device, entries, detail);
+  if (status >= 0) {
+    status = set_motion(device, entries, detail);
+  }
+  if (status >= 0) {
+    status = set_kick(device, &table, detail);
+  }
+  if (status >= 0 &&
+      !hapi_delay_init(&device->delay, (uint64_t)llround(device->info.delay * 1e9))) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: no memory for the delay");
+  }
+  return status;
 }
 
 static void virtual_close(void *self)
 {
   virtual_device *device = self;
   hapi_motion_finish(&device->motion);
+  hapi_delay_finish(&device->delay);
   hapi_free(device);
 }
 
@@ -203,23 +298,22 @@ static hap_status virtual_start(void *self)
 {
   virtual_device *device = self;
   hapi_output_zero(&device->output);
+  hapi_delay_clear(&device->delay);
+  device->kick.done = false;
+  device->work = 0.0;
   hapi_timeline_start(&device->timeline);
   return HAP_OK;
 }
 
-/* From the read at before_ns to the newest one, in steps short enough for the script. */
-static void move_hand(virtual_device *device, uint64_t before_ns)
+/* Hand and mechanism from one time to another under the force that acts, in steps short enough for
+ * the script. */
+static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
 {
-  uint64_t way_ns = device->timeline.elapsed_ns - before_ns;
+  uint64_t way_ns = to_ns - from_ns;
   uint64_t count = way_ns / SUBSTEP_NS + (way_ns % SUBSTEP_NS != 0);
-  if (count == 0) {
-    return;
-  }
   count = count < SUBSTEPS_MAX ? count : SUBSTEPS_MAX;
-  double from = device->start + hapi_timeline_seconds(before_ns);
+  double from = device->start + hapi_timeline_seconds(from_ns);
   double length = hapi_timeline_seconds(way_ns) / (double)count;
-  hap_wrench push;
-  hapi_output_get(&device->output, &push);
   hapi_hand_target target;
   hapi_motion_at(&device->motion, from, target.position[1], target.velocity[1]);
   for (uint64_t i = 0; i < count; ++i) {
@@ -227,7 +321,78 @@ static void move_hand(virtual_device *device, uint64_t before_ns)
     hapi_v3_copy(target.velocity[1], target.velocity[0]);
     hapi_motion_at(&device->motion, from + length * (double)(i + 1), target.position[1],
                    target.velocity[1]);
-    hapi_hand_step(&device->hand, length, &target, push.force);
+    for (int axis = 0; axis < 3; ++axis) {
+      double push[2];
+      hapi_hand_push(&device->hand, axis, &target, device->delay.acting[axis], push);
+      hapi_friction_step(&device->hand, axis, device->info.friction, length, push);
+    }
+  }
+}
+
+/* To where the script is at that time. */
+static void place_hand(virtual_device *device, uint64_t at_ns)
+{
+  double position[3];
+  double velocity[3];
+  hapi_motion_at(&device->motion, device->start + hapi_timeline_seconds(at_ns), position, velocity);
+  if (!device->held) {
+    hapi_v3_set(velocity, 0.0, 0.0, 0.0);
+  }
+  hapi_hand_place(&device->hand, position, velocity);
+}
+
+static void kick_hand(virtual_device *device, uint64_t now_ns)
+{
+  if (!device->kick.done && device->kick.at_ns <= now_ns) {
+    hapi_v3_add(device->hand.velocity, device->kick.velocity, device->hand.velocity);
+    device->kick.done = true;
+  }
+}
+
+/* From the read at before_ns to the newest one, cut where a command begins to act and at the kick. */
+static void move(virtual_device *device, uint64_t before_ns)
+{
+  uint64_t now_ns = device->timeline.elapsed_ns;
+  hap_wrench given;
+  hapi_output_get(&device->output, &given);
+  hapi_delay_give(&device->delay, before_ns, given.force);
+  for (uint64_t at_ns = before_ns; at_ns < now_ns;) {
+    uint64_t to_ns = hapi_delay_take(&device->delay, at_ns);
+    kick_hand(device, at_ns);
+    if (!device->kick.done && device->kick.at_ns < to_ns) {
+      to_ns = device->kick.at_ns;
+    }
+    to_ns = to_ns < now_ns ? to_ns : now_ns;
+    double way[3];
+    hapi_v3_copy(device->hand.position, way);
+    if (device->yields) {
+      move_hand(device, at_ns, to_ns);
+    } else {
+      place_hand(device, to_ns);
+    }
+    hapi_v3_sub(device->hand.position, way, way);
+    device->work += hapi_v3_dot(device->delay.acting, way);
+    at_ns = to_ns;
+  }
+}
+
+static void measure(virtual_device *device, bool first, uint64_t way_ns)
+{
+  measured *m = &device->measured;
+  double quantum = device->info.quantum;
+  if (quantum == 0.0) {
+    hapi_v3_copy(device->hand.position, m->position);
+    hapi_v3_copy(device->hand.velocity, m->velocity);
+    return;
+  }
+  for (int i = 0; i < 3; ++i) {
+    double before = m->position[i];
+    m->position[i] = quantum * round(device->hand.position[i] / quantum);
+    if (first) {
+      m->velocity[i] = 0.0;
+    } else if (way_ns > 0) {
+      m->velocity[i] = (m->position[i] - before) / hapi_timeline_seconds(way_ns);
+    }
   }
 }
 
@@ -241,21 +406,17 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_
   if (status < 0) {
     return status;
   }
-  double now = device->start + hapi_timeline_seconds(device->timeline.elapsed_ns);
+  if (first) {
+    place_hand(device, 0);
+  } else {
+    move(device, before_ns);
+  }
+  measure(device, first, device->timeline.elapsed_ns - before_ns);
   *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hapi_motion_at(&device->motion, now, pose->position, twist->linear);
+  hapi_v3_copy(device->measured.position, pose->position);
+  hapi_v3_copy(device->measured.velocity, twist->linear);
   memcpy(pose->quat_wxyz, device->orientation, sizeof pose->quat_wxyz);
   *buttons = 0;
-  if (!device->yields) {
-    return HAP_OK;
-  }
-  if (first) {
-    hapi_hand_place(&device->hand, pose->position, twist->linear);
-  } else {
-    move_hand(device, before_ns);
-  }
-  hapi_v3_copy(device->hand.position, pose->position);
-  hapi_v3_copy(device->hand.velocity, twist->linear);
   return HAP_OK;
 }
 
@@ -280,15 +441,26 @@ static void virtual_stop(void *self)
   hapi_timeline_stop(&device->timeline);
 }
 
+void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
+{
+  const virtual_device *device = self;
+  out->work = device->work;
+  hapi_v3_copy(device->delay.acting, out->force);
+  hapi_v3_copy(device->hand.position, out->position);
+  hapi_v3_copy(device->hand.velocity, out->velocity);
+  out->mass = device->yields ? device->hand.def.mass : 0.0;
+}
+
 const hap_device_ops hapi_virtual_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),
     .name = "virtual",
     .help =
         "scripted motion and a simulated hand: path=T:x/y/z;..., blend=smooth|linear, loop=0|1, "
-        "sine=ax/ay/az, hz=F, start=S, orientation=w/x/y/z, hand=rigid|relaxed|tense, mass=, "
-        "damping=, stiffness=, max_force=, max_torque=, rated_stiffness=, device_damping=, "
-        "dof=3|6",
+        "sine=ax/ay/az, hz=F, start=S, orientation=w/x/y/z, "
+        "hand=rigid|relaxed|tense|none, mass=, damping=, stiffness=, kick=T:vx/vy/vz, "
+        "max_force=, max_torque=, rated_stiffness=, device_mass=, device_damping=, friction=, "
+        "delay=, quantum=, dof=3|6",
     .pacing = HAP_PACING_VIRTUAL,
     .open = virtual_open,
     .describe = virtual_describe,

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "plugins/common/number.h"
+#include "base/number.h"
 
 #include <locale.h>
 #include <stdbool.h>

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#ifndef HAPODE_PLUGINS_COMMON_NUMBER_H
-#define HAPODE_PLUGINS_COMMON_NUMBER_H
+#ifndef HAPODE_BASE_NUMBER_H
+#define HAPODE_BASE_NUMBER_H
 
 /* Reads a decimal number such as -1, .5, 2.5e-3 at the start of text, with a point whatever the
  * locale says. No blanks, hex, nan or inf. text ends with a zero byte. Returns the first character

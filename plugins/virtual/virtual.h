@@ -1,0 +1,20 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PLUGINS_VIRTUAL_VIRTUAL_H
+#define HAPODE_PLUGINS_VIRTUAL_VIRTUAL_H
+
+/* What only a simulated device can tell: the truth behind its measurements. For tests and bench. */
+
+typedef struct hapi_virtual_port {
+  double work;        /* J that the force which really acted gave to hand and device since start */
+  double force[3];    /* N that acts now */
+  double position[3]; /* m, not rounded */
+  double velocity[3]; /* m/s */
+  double mass;        /* kg of hand and device; 0: a rigid hand */
+} hapi_virtual_port;
+
+/* self: hapi_device_self of a device "virtual". At the time of its newest read; by the thread that
+ * reads it. */
+void hapi_virtual_get_port(const void *self, hapi_virtual_port *out);
+
+#endif
