@@ -12,9 +12,9 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/number.h"
 #include "device/device.h"
 #include "plugins/common/arguments.h"
-#include "base/number.h"
 #include "plugins/common/output.h"
 #include "plugins/common/timeline.h"
 

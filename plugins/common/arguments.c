@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "base/log.h"
-#include "base/vec.h"
 #include "base/number.h"
+#include "base/vec.h"
 
 #define SHOWN 60 /* characters of the input in an error: the known keys need their place, too */
 

@@ -21,8 +21,8 @@ static void cut_front(unspent *rest, double share)
 
 /* How much of the rest an axis that stands still goes on to stand; 1: all. *direction: of the push
  * that moves it then. */
-static double standing_share(const hapi_hand *hand, int axis, double friction,
-                             const unspent *rest, double *direction)
+static double standing_share(const hapi_hand *hand, int axis, double friction, const unspent *rest,
+                             double *direction)
 {
   double pull = hand->def.stiffness * hand->position[axis];
   double net[2] = {rest->push[0] - pull, rest->push[1] - pull};
