@@ -24,6 +24,14 @@ typedef enum hap_coupling {
   HAP_COUPLING_DIRECT = 0 /* the pointer is at the pose of the device (the paper) */
 } hap_coupling;
 
+/* Where the velocity of a pointer's device comes from. Values are fixed. */
+typedef enum hap_velocity {
+  HAP_VELOCITY_AUTO = 0,     /* estimated when the device rounds its positions (quantum > 0) and
+                                measures no velocity */
+  HAP_VELOCITY_DEVICE = 1,   /* as the device says */
+  HAP_VELOCITY_ESTIMATED = 2 /* from the poses, over a window that adapts to quantum and speed */
+} hap_velocity;
+
 /* What the hand holds in the world. */
 typedef struct hap_pointer_def {
   uint32_t size;      /* set by hap_pointer_def_init */
@@ -47,6 +55,8 @@ typedef struct hap_pointer_def {
   hap_coupling coupling;      /* default HAP_COUPLING_DIRECT */
   uint32_t collide_bits;      /* the pointer touches geoms whose category bits meet these; default
                                  all */
+  hap_velocity velocity;      /* default HAP_VELOCITY_AUTO; of a pointer without device it is that
+                                 of hap_pointer_set_target */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */

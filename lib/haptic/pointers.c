@@ -28,6 +28,10 @@ static void activate(hapi_haptic *haptic, uint32_t index)
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
   p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque
                                                                                : def->max_torque;
+  p->estimates =
+      def->velocity == HAP_VELOCITY_ESTIMATED ||
+      (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
+  hapi_velocity_reset(&p->velocity, info->quantum);
   p->device_pose.quat_wxyz[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
@@ -81,6 +85,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     p->device_pose = pose;
     p->device_twist = twist;
     p->buttons = buttons;
+    if (p->estimates) {
+      hapi_velocity_update(&p->velocity, now_ns, &p->device_pose, &p->device_twist);
+    }
   }
 }
 

@@ -7,6 +7,7 @@
  * to the wrenches for the devices. No allocation, lock, system call, log or function pointer in
  * this folder. All memory is handed over by hapi_tick_init's caller.
  *
+ *   velocity  device poses -> their twist, where the device measures none
  *   adopt     a new local model, when its time has come            (paper section 6)
  *   coupling  device pose -> pointer                               (paper step a)
  *   render    pointer and planes -> forces, eq. 7                  (step b)
@@ -32,6 +33,7 @@
 #include <hapode/stats.h>
 
 #include "haptic/rt/contact_solver.h"
+#include "haptic/rt/velocity.h"
 #include "sync/messages.h"
 
 /* A contact that is already deep when it arrives gets its full force after this time. */
@@ -55,6 +57,8 @@ typedef struct hapi_tick_pointer {
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
   uint32_t buttons;       /* in */
+  bool estimates;         /* device_twist is made of poses by velocity, not read */
+  hapi_velocity velocity;
 
   hap_pose pose;            /* world */
   hap_twist twist;          /* world */
