@@ -10,6 +10,7 @@
 #include <hapode/hapode.h>
 
 #include "haptic/haptic.h"
+#include "haptic/rt/contact_ramp.h"
 #include "tests/tick_world.h"
 
 /* ---- eq. 7 ---- */

@@ -467,6 +467,12 @@ static const struct {
     FIELD(pose_world_device.quat_wxyz, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(friction, 0.5, HAP_ERROR_UNSUPPORTED),
     FIELD(friction, (double)NAN, HAP_ERROR_UNSUPPORTED),
+    FIELD(coupling_stiffness, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(coupling_stiffness, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(coupling_damping, 1.0, HAP_ERROR_ARGUMENT),
+    FIELD(coupling_damping, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(hand_damping, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(hand_damping, (double)INFINITY, HAP_ERROR_ARGUMENT),
 };
 
 TEST(bad_pointer_defs_are_named)
@@ -497,8 +503,8 @@ TEST(bad_pointer_defs_are_named)
   def.hull_points = 4;
   CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
   def = pointer_def(NULL);
-  def.coupling = (hap_coupling)1;
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
+  def.coupling = HAP_COUPLING_PROXY; /* without a device that says what it can hold */
+  CHECK(hap_pointer_add(s.session, &def, &id) < HAP_OK && id.v == 0);
   CHECK(hap_pointer_add(s.session, NULL, &id) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_add(s.session, &def, NULL) == HAP_ERROR_ARGUMENT);
   hap_pointer_def_init(&def, offsetof(hap_pointer_def, friction)); /* of an older build */

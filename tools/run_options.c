@@ -151,8 +151,7 @@ static hap_status take_action(run_options *options, const option *self, const ch
 static const option table[] = {
     {"--scene", "NAME[:N]", "scene, N: how many bodies where it takes that (default row10)",
      take_text, offsetof(run_options, rig.scene), 0, 0},
-    {"--model", "NAME", "single, impulse, accelerance (default); contact comes later", take_model,
-     0, 0, 0},
+    {"--model", "NAME", "single, impulse, accelerance, contact (default)", take_model, 0, 0, 0},
     {"--device", "SPEC",
      "device of the next pointer, such as virtual or replay:hand.csv\n"
      "(default, and virtual alone: the scene's own simulated hand)",
@@ -161,8 +160,8 @@ static const option table[] = {
      offsetof(run_options, rig.def.physics_hz), 1, 1000},
     {"--haptic-hz", "F", "ticks of the haptic loop a second, 100 to 20000 (default 1000)",
      take_number, offsetof(run_options, rig.def.haptic_hz), 100, 20000},
-    {"--contact-hz", "F", "contact passes a second, 20 to 1000; for model contact", take_number,
-     offsetof(run_options, rig.def.contact_hz), 20, 1000},
+    {"--contact-hz", "F", "model contact: contact passes a second, 20 to 1000 (default 200)",
+     take_number, offsetof(run_options, rig.def.contact_hz), 20, 1000},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
     {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_lockstep, 0, 0, 0},

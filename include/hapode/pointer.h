@@ -20,9 +20,34 @@ typedef struct hap_pointer_id {
   uint64_t v;
 } hap_pointer_id;
 
+/* Between the device and what touches the world. Values are fixed. */
 typedef enum hap_coupling {
-  HAP_COUPLING_DIRECT = 0 /* the pointer is at the pose of the device (the paper) */
+  HAP_COUPLING_DIRECT = 0, /* the pointer is at the pose of the device (the paper) */
+  HAP_COUPLING_PROXY = 1, /* the pointer is a light body that a spring pulls to the device: what the
+                              hand feels is never stiffer than the spring, however many contacts
+                              push. Model contact only. */
+  HAP_COUPLING_AUTO = 2   /* direct, and a proxy as soon as the stiffnesses of the contacts near the
+                              pointer add up to more than the device can hold; where it does not say
+                              what that is, and in other models than contact, direct */
 } hap_coupling;
+
+/* Why a pointer has the coupling that it has. Values are fixed. */
+typedef enum hap_coupling_reason {
+  HAP_COUPLING_ASKED = 0,   /* by its definition */
+  HAP_COUPLING_UNKNOWN = 1, /* direct: the device gives neither damping nor rated stiffness */
+  HAP_COUPLING_MODEL = 2,   /* direct: the session's model is not contact */
+  HAP_COUPLING_WITHIN = 3,  /* direct: the device can hold what is near */
+  HAP_COUPLING_ABOVE = 4    /* proxy: it cannot */
+} hap_coupling_reason;
+
+/* How the spring of a contact between pointer and body is integrated, model contact. For comparisons;
+ * the default is right. Values are fixed. */
+typedef enum hap_integration {
+  HAP_INTEGRATION_AUTO = 0,     /* midpoint while T^2 a k <= 4, else implicit */
+  HAP_INTEGRATION_EXPLICIT = 1, /* eq. 7 with the poses as they are: has a stability limit */
+  HAP_INTEGRATION_IMPLICIT = 2,
+  HAP_INTEGRATION_MIDPOINT = 3 /* keeps energy; rings where T^2 a k > 4 */
+} hap_integration;
 
 /* Where the velocity of a pointer's device comes from. Values are fixed. */
 typedef enum hap_velocity {
@@ -39,7 +64,7 @@ typedef struct hap_pointer_def {
   hap_device *device; /* borrowed, one pointer per device; NULL: hap_pointer_set_target moves it,
                          and it is not in the world before the first target */
   double radius;      /* m, 1e-6..100, default 0.01: the pointer is a sphere */
-  double mass;        /* kg, 0..1e6, default 0; reserved for the coupling proxy, without effect */
+  double mass;        /* kg, 0..1e6, default 0: of the coupling's proxy */
   double stiffness;   /* N/m, 0..1e9, default 1000: k of eq. 7 */
   double damping;     /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact */
   double friction;    /* reserved; must be 0 in this version */
@@ -52,11 +77,18 @@ typedef struct hap_pointer_def {
   double max_force;           /* N at the device, > 0; the device's own limit holds as well.
                                  Default 20. */
   double max_torque;          /* N m at the device, > 0, default 1 */
-  hap_coupling coupling;      /* default HAP_COUPLING_DIRECT */
+  hap_coupling coupling;      /* default HAP_COUPLING_AUTO */
   uint32_t collide_bits;      /* the pointer touches geoms whose category bits meet these; default
                                  all */
   hap_velocity velocity;      /* default HAP_VELOCITY_AUTO; of a pointer without device it is that
                                  of hap_pointer_set_target */
+  hap_integration integration;
+  double
+      coupling_stiffness;  /* N/m at the device, 0..1e9: of the proxy's spring, and what the device
+                                is taken to hold; default 0: from the device's figures */
+  double coupling_damping; /* N s/m at the device, 0..1e6; with coupling_stiffness only */
+  double hand_damping;     /* N s/m, 0..1e3, default 0: the least that the hand always adds to the
+                                device's own damping (a finger held loosely: about 1) */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */
@@ -78,15 +110,20 @@ HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id p
 
 typedef struct hap_pointer_state {
   uint32_t size;
-  uint32_t contacts; /* bodies that push back now */
-  int64_t stamp_ns;  /* of the tick */
-  hap_pose device;   /* device's frame */
-  hap_pose proxy;    /* pointer in the world */
-  hap_twist twist;   /* pointer in the world */
-  hap_wrench wrench; /* on the hand, world frame, after the guard: what was written to the
+  uint32_t contacts;        /* bodies that push back now */
+  int64_t stamp_ns;         /* of the tick */
+  hap_pose device;          /* device's frame */
+  hap_pose proxy;           /* pointer in the world: of the proxy where there is one */
+  hap_twist twist;          /* pointer in the world */
+  hap_wrench wrench;        /* on the hand, world frame, after the guard: what was written to the
                            device, divided by force_scale */
-  uint32_t buttons;  /* bit 0 is the first one */
+  uint32_t buttons;         /* bit 0 is the first one */
+  uint32_t coupling;        /* hap_coupling in force: direct or proxy */
+  uint32_t coupling_reason; /* hap_coupling_reason */
   uint32_t reserved;
+  double coupling_stiffness; /* N/m at the device, of the proxy's spring; 0: there is none */
+  double coupling_damping;   /* N s/m at the device */
+  double contact_stiffness;  /* N/m at the device, sum over the contacts near the pointer */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. */

@@ -1,13 +1,32 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/log.h"
 #include "device/device.h"
+#include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 
 /* ---- the loop's side ---- */
+
+/* In the world, where a metre of the device is motion_scale metres and a newton its share. */
+static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
+                         hapi_tick_pointer *p)
+{
+  const hap_pointer_def *def = &slot->def;
+  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.period);
+  double scale = def->motion_scale * def->force_scale;
+  p->coupling = def->coupling;
+  p->integration = def->integration;
+  p->hold_known = gains.known && scale > 0.0;
+  p->hold = p->hold_known ? gains.stiffness / scale : HUGE_VAL;
+  p->coupling_stiffness = p->hold_known ? p->hold : 0.0;
+  p->coupling_damping = p->hold_known ? gains.damping / scale : 0.0;
+  p->proxy_mass = def->mass;
+  p->coupling_reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
+}
 
 static void activate(hapi_haptic *haptic, uint32_t index)
 {
@@ -32,6 +51,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
   hapi_velocity_reset(&p->velocity, info->quantum);
+  set_coupling(haptic, slot, p);
   p->device_pose.quat_wxyz[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
@@ -107,6 +127,17 @@ void hapi_pointers_write(hapi_haptic *haptic)
   }
 }
 
+static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
+{
+  double scale = p->motion_scale * p->force_scale;
+  out->coupling = p->proxied ? HAP_COUPLING_PROXY : HAP_COUPLING_DIRECT;
+  out->coupling_reason = (uint32_t)p->coupling_reason;
+  out->reserved = 0;
+  out->coupling_stiffness = p->proxied ? scale * p->coupling_stiffness : 0.0;
+  out->coupling_damping = p->proxied ? scale * p->coupling_damping : 0.0;
+  out->contact_stiffness = scale * p->contact_stiffness;
+}
+
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
@@ -124,7 +155,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     out->twist = p->twist;
     out->wrench = p->wrench;
     out->buttons = p->buttons;
-    out->reserved = 0;
+    publish_coupling(p, out);
     hapi_triple_publish(&slot->state_buffer);
   }
 }
@@ -230,6 +261,18 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
   pthread_mutex_unlock(&slot->target_lock);
 }
 
+static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
+                                 hap_detail *detail)
+{
+  if (slot->def.coupling == HAP_COUPLING_PROXY &&
+      !hapi_coupling_gains_of(&slot->info, &slot->def, haptic->tick.period).known) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "coupling proxy: the device gives neither damping nor rated stiffness; set "
+                     "coupling_stiffness, or have the device identified");
+  }
+  return HAP_OK;
+}
+
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
                                    hap_pointer_id *out, hap_detail *detail)
 {
@@ -244,12 +287,15 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *d
   }
   hapi_pointer_slot *slot = &haptic->slots[index];
   fill_slot(slot, def);
-  if (haptic->begun) {
-    hap_status status = start_device(haptic, slot, detail);
-    if (status < HAP_OK) {
+  hap_status status = check_coupling(haptic, slot, detail);
+  if (status >= HAP_OK && haptic->begun) {
+    status = start_device(haptic, slot, detail);
+  }
+  if (status < HAP_OK) {
+    if (def->device != NULL) {
       hapi_device_release(def->device);
-      return status;
     }
+    return status;
   }
   out->v = ((uint64_t)slot->generation << 32) | (index + 1);
   atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);

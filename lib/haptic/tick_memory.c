@@ -24,9 +24,10 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   solver->tolerance = SOLVER_TOLERANCE;
   solver->update_budget = SOLVER_UPDATES;
   solver->direct_rows = DIRECT_ROWS;
-  solver->work_count = HAPI_SOLVER_WORK(world->row_capacity, c->bodies + 1);
+  uint32_t places = c->bodies + c->pointers + 1; /* and the static world */
+  solver->work_count = HAPI_SOLVER_WORK(world->row_capacity, places);
   solver->rows = hapi_alloc_array(world->row_capacity, sizeof *solver->rows);
-  solver->v = hapi_alloc_array(c->bodies + 1, sizeof *solver->v);
+  solver->v = hapi_alloc_array(places, sizeof *solver->v);
   solver->work = hapi_alloc_array(solver->work_count, sizeof *solver->work);
   return world->memory != NULL && world->old_memory != NULL && world->buckets != NULL &&
          world->sources != NULL && solver->rows != NULL && solver->v != NULL &&

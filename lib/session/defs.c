@@ -61,6 +61,7 @@ void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
   d.force_scale = 1.0;
   d.max_force = 20.0;
   d.max_torque = 1.0;
+  d.coupling = HAP_COUPLING_AUTO;
   d.collide_bits = 0xffffffffu;
   give_defaults(def, size_of_def, &d, sizeof d);
 }

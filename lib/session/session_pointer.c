@@ -46,6 +46,15 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
        "velocity is not one of hap_velocity"},
       {d->device != NULL || d->velocity != HAP_VELOCITY_ESTIMATED,
        "velocity is HAP_VELOCITY_ESTIMATED, which needs a device"},
+      {between(d->coupling_stiffness, 0.0, 1e9), "coupling_stiffness is not in 0 .. 1e9 N/m"},
+      {between(d->coupling_damping, 0.0, 1e6), "coupling_damping is not in 0 .. 1e6 N s/m"},
+      {d->coupling_damping == 0.0 || d->coupling_stiffness > 0.0,
+       "coupling_damping is given without coupling_stiffness"},
+      {between(d->coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_AUTO),
+       "coupling is not one of hap_coupling"},
+      {between(d->integration, HAP_INTEGRATION_AUTO, HAP_INTEGRATION_MIDPOINT),
+       "integration is not one of hap_integration"},
+      {between(d->hand_damping, 0.0, 1e3), "hand_damping is not in 0 .. 1e3 N s/m"},
       {good_pose(&d->pose_world_device), "pose_world_device is not finite with a unit quaternion"},
   };
   hap_status status = HAP_OK;
@@ -57,10 +66,9 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
 
 static hap_status check_def(const hap_pointer_def *d, hap_detail *detail)
 {
-  if (d->friction != 0.0 || d->hull_xyz != NULL || d->hull_points != 0 ||
-      d->coupling != HAP_COUPLING_DIRECT) {
+  if (d->friction != 0.0 || d->hull_xyz != NULL || d->hull_points != 0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "this version has sphere pointers without friction and direct coupling");
+                     "this version has sphere pointers without friction");
   }
   return check_numbers(d, detail);
 }
@@ -78,6 +86,12 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
       hapi_def_read(&d, sizeof d, def, HAPI_POINTER_COOKIE, "hap_pointer_def_init", &detail);
   if (status >= HAP_OK) {
     status = check_def(&d, &detail);
+  }
+  if (status >= HAP_OK && d.coupling == HAP_COUPLING_PROXY &&
+      session->def.model != HAP_MODEL_CONTACT) {
+    status = hapi_fail(&detail, HAP_ERROR_UNSUPPORTED,
+                       "coupling proxy needs model contact; the session has model %s",
+                       hap_model_name(session->def.model));
   }
   if (status >= HAP_OK) {
     hapi_quat_normalize(d.pose_world_device.quat_wxyz);

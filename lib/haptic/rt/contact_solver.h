@@ -75,7 +75,7 @@ typedef struct hapi_solver {
  * of n bodies takes n. */
 #define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*3 + (size_t)(bodies)*600)
 
-/* [haptic] Works in rows, v and work only, with 16 kB of stack; bounded by update_budget whatever
+/* [haptic] Works in rows, v and work only, with 48 kB of stack; bounded by update_budget whatever
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 

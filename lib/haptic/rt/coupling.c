@@ -3,7 +3,8 @@
 #include "base/vec.h"
 #include "haptic/rt/tick.h"
 
-/* Coupling "direct": the pointer is where the device is (paper section 3). */
+/* Between device and world. The pointer is where the device is (paper section 3), unless it is a
+ * proxy (proxy.c), which then takes its place. */
 
 static bool plausible(const double *values, int count)
 {
@@ -26,6 +27,8 @@ static void place_pointer(hapi_tick_pointer *p)
   hapi_v3_scale(p->motion_scale, p->device_twist.linear, scaled);
   hapi_quat_rotate(frame->quat_wxyz, scaled, p->twist.linear);
   hapi_quat_rotate(frame->quat_wxyz, p->device_twist.angular, p->twist.angular);
+  hapi_v3_copy(p->pose.position, p->handle_position);
+  hapi_v3_copy(p->twist.linear, p->handle_velocity);
 }
 
 void hapi_coupling_read(hapi_tick *tick)

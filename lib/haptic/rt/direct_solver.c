@@ -19,7 +19,7 @@
 #include "haptic/rt/contact_solver.h"
 
 #define BODIES_MAX 512  /* with more in the solver, sweeps only */
-#define ISLAND_MAX 64   /* bodies; one bit each */
+#define ISLAND_MAX 128  /* bodies; one bit each */
 #define NONE UINT16_MAX /* local index of a body that does not respond */
 #define SOFTENING 1e-8  /* R, relative to the row's own response */
 #define INNER_ROUNDS 2  /* active sets tried from one state */
@@ -36,6 +36,10 @@ enum {
   TIED
 };
 
+typedef struct body_set {
+  uint64_t bits[2];
+} body_set;
+
 typedef struct island {
   hapi_solver *solver;
   uint32_t first; /* row; the others by hapi_row.next, in their order */
@@ -46,8 +50,8 @@ typedef struct island {
   uint16_t local[BODIES_MAX]; /* body -> index in the island */
   uint16_t body[ISLAND_MAX];
   uint16_t pivot[ISLAND_MAX]; /* order of elimination */
-  uint64_t link[ISLAND_MAX];  /* the blocks of a body's row, fill included */
-  uint64_t rest[ISLAND_MAX];  /* link when the body is eliminated, of bodies still to come */
+  body_set link[ISLAND_MAX];  /* the blocks of a body's row, fill included */
+  body_set rest[ISLAND_MAX];  /* link when the body is eliminated, of bodies still to come */
   uint16_t block[ISLAND_MAX][ISLAND_MAX];
   double *gain;          /* by row: impulse per error */
   double *saved_impulse; /* by row */
@@ -55,6 +59,45 @@ typedef struct island {
   double (*dv)[6];
   double (*blocks)[36];
 } island;
+
+/* ---- sets of bodies ---- */
+
+static bool has(const body_set *set, uint32_t i)
+{
+  return (set->bits[i / 64] >> i % 64 & 1) != 0;
+}
+
+static void add(body_set *set, uint32_t i)
+{
+  set->bits[i / 64] |= (uint64_t)1 << i % 64;
+}
+
+static void drop(body_set *set, uint32_t i)
+{
+  set->bits[i / 64] &= ~((uint64_t)1 << i % 64);
+}
+
+static body_set both(const body_set *a, const body_set *b)
+{
+  return (body_set){{a->bits[0] & b->bits[0], a->bits[1] & b->bits[1]}};
+}
+
+static void add_all(body_set *set, const body_set *more)
+{
+  set->bits[0] |= more->bits[0];
+  set->bits[1] |= more->bits[1];
+}
+
+static uint32_t count_of(const body_set *set)
+{
+  uint32_t count = 0;
+  for (int i = 0; i < 2; ++i) {
+    for (uint64_t bits = set->bits[i]; bits != 0; bits &= bits - 1) {
+      ++count;
+    }
+  }
+  return count;
+}
 
 /* ---- islands ---- */
 
@@ -148,7 +191,8 @@ static bool add_body(island *is, uint32_t body)
   if (is->count == ISLAND_MAX) {
     return false;
   }
-  is->link[is->count] = (uint64_t)1 << is->count;
+  is->link[is->count] = (body_set){{0, 0}};
+  add(&is->link[is->count], is->count);
   is->body[is->count] = (uint16_t)body;
   is->local[body] = (uint16_t)is->count++;
   return true;
@@ -170,34 +214,21 @@ static bool gather(island *is)
     uint16_t a = is->local[rows[i].a];
     uint16_t b = is->local[rows[i].b];
     if (a != NONE && b != NONE) { /* a body on rails may answer to some of its rows only */
-      is->link[a] |= (uint64_t)1 << b;
-      is->link[b] |= (uint64_t)1 << a;
+      add(&is->link[a], b);
+      add(&is->link[b], a);
     }
   }
   return true;
 }
 
-static uint32_t bit_count(uint64_t bits)
-{
-  uint32_t count = 0;
-  for (; bits != 0; bits &= bits - 1) {
-    ++count;
-  }
-  return count;
-}
-
-static bool has(uint64_t set, uint32_t i)
-{
-  return (set >> i & 1) != 0;
-}
-
 /* Body of least degree among those left: chains and trees get no fill at all. */
-static uint32_t least_linked(const island *is, uint64_t left)
+static uint32_t least_linked(const island *is, const body_set *left)
 {
   uint32_t best = 0;
   uint32_t best_degree = UINT32_MAX;
   for (uint32_t i = 0; i < is->count; ++i) {
-    uint32_t degree = has(left, i) ? bit_count(is->link[i] & left) : UINT32_MAX;
+    body_set links = both(&is->link[i], left);
+    uint32_t degree = has(left, i) ? count_of(&links) : UINT32_MAX;
     if (degree < best_degree) {
       best_degree = degree;
       best = i;
@@ -209,24 +240,29 @@ static uint32_t least_linked(const island *is, uint64_t left)
 /* Order, fill and places of the blocks; the cost in row updates. */
 static uint32_t plan(island *is)
 {
-  uint64_t left = is->count < 64 ? ((uint64_t)1 << is->count) - 1 : UINT64_MAX;
+  body_set left = {{0, 0}};
   uint32_t madds = is->used_rows * ROW_MADDS;
-  is->block_count = 0;
+  for (uint32_t i = 0; i < is->count; ++i) {
+    add(&left, i);
+  }
   for (uint32_t k = 0; k < is->count; ++k) {
-    uint32_t p = least_linked(is, left);
-    left &= ~((uint64_t)1 << p);
+    uint32_t p = least_linked(is, &left);
+    drop(&left, p);
     is->pivot[k] = (uint16_t)p;
-    is->rest[p] = is->link[p] & left;
-    uint32_t degree = bit_count(is->rest[p]);
+    is->rest[p] = both(&is->link[p], &left);
+    uint32_t degree = count_of(&is->rest[p]);
     madds += 216 * (1 + degree + degree * degree);
     for (uint32_t i = 0; i < is->count; ++i) {
-      is->link[i] |= has(is->rest[p], i) ? is->rest[p] : 0;
+      if (has(&is->rest[p], i)) {
+        add_all(&is->link[i], &is->rest[p]);
+      }
     }
   }
+  is->block_count = 0;
   for (uint32_t i = 0; i < is->count; ++i) {
     for (uint32_t j = 0; j < is->count; ++j) {
       is->block[i][j] = (uint16_t)is->block_count;
-      is->block_count += has(is->link[i], j);
+      is->block_count += has(&is->link[i], j);
     }
   }
   return INNER_ROUNDS * (madds / MADDS_PER_ROW);
@@ -353,7 +389,7 @@ static void factor(island *is)
     double *diagonal = is->blocks[is->block[p][p]];
     invert(diagonal);
     for (uint32_t i = 0; i < is->count; ++i) {
-      if (!has(is->rest[p], i)) {
+      if (!has(&is->rest[p], i)) {
         continue;
       }
       double *below = is->blocks[is->block[i][p]];
@@ -363,7 +399,7 @@ static void factor(island *is)
         below[c] = l[c] = -l[c];
       }
       for (uint32_t j = 0; j < is->count; ++j) {
-        if (has(is->rest[p], j)) {
+        if (has(&is->rest[p], j)) {
           multiply_sub(l, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
         }
       }
@@ -377,7 +413,7 @@ static void substitute(island *is)
   for (uint32_t k = 0; k < is->count; ++k) {
     uint16_t p = is->pivot[k];
     for (uint32_t i = 0; i < is->count; ++i) {
-      if (has(is->rest[p], i)) {
+      if (has(&is->rest[p], i)) {
         apply_sub(is->blocks[is->block[i][p]], is->dv[p], is->dv[i]);
       }
     }
@@ -387,7 +423,7 @@ static void substitute(island *is)
     double y[6];
     memcpy(y, is->dv[p], sizeof y);
     for (uint32_t j = 0; j < is->count; ++j) {
-      if (has(is->rest[p], j)) {
+      if (has(&is->rest[p], j)) {
         apply_sub(is->blocks[is->block[p][j]], is->dv[j], y);
       }
     }

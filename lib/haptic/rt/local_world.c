@@ -69,6 +69,7 @@ static void begin(hapi_tick *tick)
     begin_body(tick, body, solver->body_count++);
     tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
+  hapi_proxy_begin(tick);
 }
 
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
@@ -84,6 +85,7 @@ static void set_free_velocities(hapi_tick *tick)
     const hapi_local_body *body = &tick->bodies[tick->live[i]];
     free_velocity(tick, body, tick->world.solver.v[body->row]);
   }
+  hapi_proxy_free(tick);
 }
 
 /* The turn that a constant angular velocity makes, by the exponential map. Small angles: the sine
@@ -332,5 +334,6 @@ void hapi_local_world_step(hapi_tick *tick)
   }
   hapi_contact_keep(tick);
   hapi_pointer_forces(tick);
+  hapi_proxy_move(tick);
   account(tick);
 }

@@ -3,22 +3,29 @@
 #include <math.h>
 
 #include "haptic/rt/ball_nearest.h"
+#include "haptic/rt/contact_ramp.h"
 #include "haptic/rt/rows.h"
 
 /* Pointer contacts as rows of the solver: the spring and damper of eq. 7, integrated so that no
- * stiffness is too large for the body. With n out of the body, w the speed
- * at which the body gives way along -n, s that of the pointer into it, g the depth:
+ * stiffness is too large for the body. With n out of the body, w the speed at which the body gives
+ * way along -n, s that of the pointer into it, g the depth, a what an N s makes of w - s:
  *
  *   up to T^2 a k = 4  f = k (g' + 2 g + g")/4 + d (s - (w + w')/2)   g", g': one tick before, after
  *   above it           f = k g' + d (s - w')
  *
  * The first is the midpoint rule written for poses that move with the new velocity: it keeps the
- * energy, also when a contact begins or ends within a tick (secant), and f belongs to the tick's own time. The second is implicit Euler. Both are
- * w' + f / c = F / c, a soft row. A damper that changes the velocity by little in a tick takes it as
- * it is, d (s - w), as eq. 7 says and as the world does when it is stepped at this rate itself. */
+ * energy, also when a contact begins or ends within a tick (secant), and f belongs to the tick's own
+ * time. The second is implicit Euler. Both are w' + f / c = F / c, a soft row. A damper that changes
+ * the velocity by little in a tick takes it as it is, d (s - w), as eq. 7 says and as the world does
+ * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
+ * row has two bodies, w stands for w - s, and s is 0. */
 
 #define MIDPOINT_LIMIT 4.0
-#define DAMPER_LIMIT 0.25 /* of T a d: explicit damping is stable up to 2 */
+#define DAMPER_LIMIT 0.25   /* of T a d: explicit damping is stable up to 2 */
+#define DAMPER_IMPLICIT 1.0 /* of T a d: above it the mean of old and new velocity rings */
+#define NEAR_FLOOR \
+  1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
+#define NEAR_S 5e-3
 
 typedef struct placed_pointer {
   hapi_tick_pointer *pointer;
@@ -64,20 +71,7 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
   return true;
 }
 
-/* Contact that arrives with depth starts at zero force; one that closes later has all of it. */
-static double ramp(hapi_local_contact *c, double depth, double period)
-{
-  if (!c->seen) {
-    c->seen = true;
-    c->ramp = depth > 0.0 ? 0.0 : 1.0;
-  } else if (c->ramp < 1.0) {
-    double next = depth > 0.0 ? c->ramp + period / HAPI_RAMP_S : 1.0;
-    c->ramp = next > 1.0 ? 1.0 : next;
-  }
-  return c->ramp;
-}
-
-/* Spring and damper against what does not answer: eq. 7 as it stands. */
+/* Spring and damper where neither side answers: eq. 7 as it stands. */
 static void push_static(hapi_local_contact *c, const placed_pointer *at, double share, double speed)
 {
   const hapi_tick_pointer *p = at->pointer;
@@ -109,7 +103,8 @@ static double secant(double k, double h, double g, double *out_slope)
 
 typedef struct spring {
   double k;
-  double a;     /* 1/kg, how the body answers */
+  double d;     /* N s/m */
+  double a;     /* 1/kg, how body and proxy answer */
   double depth; /* m, at the tick */
   double w;     /* m/s, as above, before the tick */
   double s;
@@ -134,26 +129,76 @@ static void linearise(const spring *p, double period, double *out_c, double *out
   *out_force = force + *out_c * w;
 }
 
-static void soften(hapi_row *row, const placed_pointer *at, const double speeds[2], double share,
-                   double period)
+static bool by_midpoint(const hapi_tick_pointer *p, double stiffness)
 {
-  double d = at->depth > 0.0 ? share * at->pointer->damping : 0.0;
-  spring p = {.k = share * at->pointer->stiffness,
-              .a = hapi_v3_dot(row->ja, row->ba) + hapi_v3_dot(row->ja + 3, row->ba + 3),
-              .depth = at->depth,
-              .w = speeds[0],
-              .s = speeds[1]};
-  double c = period * p.k;
-  double force = p.k * (p.depth + period * p.s);
-  double late = 1.0; /* share of the new velocity in the damper's */
-  if (period * period * p.a * p.k <= MIDPOINT_LIMIT) {
-    linearise(&p, period, &c, &force);
-    late = period * p.a * d <= DAMPER_LIMIT ? 0.0 : 0.5;
+  return p->integration == HAP_INTEGRATION_MIDPOINT ||
+         (p->integration == HAP_INTEGRATION_AUTO && stiffness <= MIDPOINT_LIMIT);
+}
+
+/* Share of the new velocity in the damper's; t: T a d. */
+static double lateness(double t)
+{
+  return t <= DAMPER_LIMIT ? 0.0 : t <= DAMPER_IMPLICIT ? 0.5 : 1.0;
+}
+
+/* Spring and damper as a soft row; false: there is none. */
+static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring *p, double period)
+{
+  double c = period * p->k;
+  double force = p->k * (p->depth + period * p->s);
+  double late = 1.0;
+  if (by_midpoint(pointer, period * period * p->a * p->k)) {
+    linearise(p, period, &c, &force);
+    late = lateness(period * p->a * p->d);
   }
-  c += late * d;
-  force += d * (p.s - (1.0 - late) * p.w);
-  row->softness = c > 0.0 ? 1.0 / (period * c) : HUGE_VAL;
+  c += late * p->d;
+  force += p->d * (p->s - (1.0 - late) * p->w);
+  row->lo = 0.0;
+  row->hi = HUGE_VAL;
+  row->softness = c > 0.0 ? 1.0 / (period * c) : 0.0;
   row->target = c > 0.0 ? force / c : 0.0;
+  return c > 0.0;
+}
+
+/* Eq. 7 as it stands: the row's impulse is given. */
+static bool fix(hapi_row *row, const spring *p, double period)
+{
+  double force = p->depth > 0.0 ? p->k * p->depth + p->d * (p->s - p->w) : 0.0;
+  row->lo = row->hi = force > 0.0 ? period * force : 0.0;
+  row->softness = 0.0;
+  row->target = 0.0;
+  return force > 0.0;
+}
+
+/* The columns of the body and, of a proxy, of the pointer: w then is the body's speed less the
+ * proxy's, and s is 0. */
+static void set_columns(const hapi_local_contact *contact, const placed_pointer *at, hapi_row *row,
+                        spring *out)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  double into[3];
+  double arm[3];
+  hapi_v3_scale(-1.0, at->normal, into);
+  hapi_body_arm(at->body, at->point, arm);
+  hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
+  hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
+  if (at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) { /* eq. 6: its own probes */
+    for (int i = 0; i < 6; ++i) {
+      row->ba[i] = hapi_v3_dot(contact->a[i], into);
+    }
+  }
+  row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
+  row->b = HAPI_STATIC_ROW;
+  out->w = hapi_row_start_speed(at->body, row->ja);
+  out->s = hapi_v3_dot(into, p->twist.linear);
+  if (p->proxied) {
+    hapi_v3_copy(at->normal, row->jb);
+    hapi_v3_scale(p->response, row->jb, row->bb);
+    row->b = p->row;
+    out->w += hapi_v3_dot(row->jb, p->free_velocity);
+    out->s = 0.0;
+  }
+  out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
 }
 
 static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, double share)
@@ -162,28 +207,17 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
   hapi_local_contact *contact = &tick->contacts[index];
   uint32_t number = world->solver.row_count;
   hapi_row *row = &world->solver.rows[number];
-  double into[3];
-  hapi_v3_scale(-1.0, at->normal, into);
-  double arm[3];
-  hapi_body_arm(at->body, at->point, arm);
-  hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
-  hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
-  if ((at->body->flags & HAPI_BODY_MEASURED) != 0) { /* eq. 6: probed for this contact */
-    for (int i = 0; i < 6; ++i) {
-      row->ba[i] = hapi_v3_dot(contact->a[i], into);
-    }
-  }
-  double speeds[2] = {hapi_row_start_speed(at->body, row->ja),
-                      hapi_v3_dot(into, at->pointer->twist.linear)};
-  soften(row, at, speeds, share, tick->period);
-  if (row->softness == HUGE_VAL) {
+  spring p = {.k = share * at->pointer->stiffness,
+              .d = at->depth > 0.0 ? share * at->pointer->damping : 0.0,
+              .depth = at->depth};
+  set_columns(contact, at, row, &p);
+  bool pushes = at->pointer->integration == HAP_INTEGRATION_EXPLICIT
+                    ? fix(row, &p, tick->period)
+                    : soften(row, at->pointer, &p, tick->period);
+  if (!pushes) {
     hapi_v3_set(contact->force, 0.0, 0.0, 0.0);
     return;
   }
-  row->a = at->body->row;
-  row->b = HAPI_STATIC_ROW;
-  row->lo = 0.0;
-  row->hi = HUGE_VAL;
   row->mu = 0.0;
   row->normal = -1;
   row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
@@ -196,7 +230,9 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
 
 static double closing_speed(const placed_pointer *at)
 {
-  double speed = -hapi_v3_dot(at->normal, at->pointer->twist.linear);
+  const hapi_tick_pointer *p = at->pointer;
+  const double *velocity = p->proxied ? p->free_velocity : p->twist.linear;
+  double speed = -hapi_v3_dot(at->normal, velocity);
   if (at->body != NULL) {
     double j[6];
     double b[6];
@@ -220,17 +256,21 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   }
   hapi_v3_copy(at.normal, c->normal_now);
   hapi_v3_copy(at.point, c->point_now);
-  double share = ramp(c, at.depth, tick->period);
+  double share = hapi_contact_ramp(c, at.depth, tick->period);
   double speed = closing_speed(&at);
   double way = tick->period * speed;
+  if (at.depth + NEAR_FLOOR + NEAR_S * speed > 0.0) {
+    at.pointer->near_stiffness += at.pointer->stiffness;
+  }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
   bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && way < 0.25 * at.pointer->radius);
-  if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 && at.depth > 0.0) {
+  if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 &&
+      (at.depth > 0.0 || at.pointer->proxied)) {
     hapi_local_wake(tick, at.body);
   }
   if (!comes || share <= 0.0) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
-  } else if (hapi_body_responds(at.body)) {
+  } else if (hapi_body_responds(at.body) || at.pointer->proxied) {
     add_row(tick, index, &at, share);
   } else {
     push_static(c, &at, share, speed);

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include "base/vec.h"
-#include "haptic/rt/tick.h"
+#include "haptic/rt/contact_ramp.h"
 
 /* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
 
@@ -38,19 +38,6 @@ static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *bo
   return -hapi_v3_dot(at->normal, relative);
 }
 
-/* Contact that arrives with depth starts at zero force; one that closes later has all of it. */
-static double ramp(hapi_local_contact *c, double depth, double period)
-{
-  if (!c->seen) {
-    c->seen = true;
-    c->ramp = depth > 0.0 ? 0.0 : 1.0;
-  } else if (c->ramp < 1.0) {
-    double next = depth > 0.0 ? c->ramp + period / HAPI_RAMP_S : 1.0;
-    c->ramp = next > 1.0 ? 1.0 : next;
-  }
-  return c->ramp;
-}
-
 /* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. */
 static double normal_force(hapi_local_contact *c, const hapi_tick_pointer *p,
                            const hapi_local_body *body, const plane *at, double period)
@@ -58,7 +45,7 @@ static double normal_force(hapi_local_contact *c, const hapi_tick_pointer *p,
   double apart[3];
   hapi_v3_sub(p->pose.position, at->point, apart);
   double depth = p->radius - hapi_v3_dot(at->normal, apart);
-  double share = ramp(c, depth, period);
+  double share = hapi_contact_ramp(c, depth, period);
   if (!(depth > 0.0)) {
     return 0.0;
   }

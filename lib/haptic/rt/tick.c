@@ -36,7 +36,7 @@ static void clear_arrays(hapi_tick *tick)
   memset(w->buckets, 0, w->bucket_count * sizeof *w->buckets);
   memset(w->sources, 0, w->row_capacity * sizeof *w->sources);
   memset(w->solver.rows, 0, w->row_capacity * sizeof *w->solver.rows);
-  memset(w->solver.v, 0, (c->bodies + 1) * sizeof *w->solver.v);
+  memset(w->solver.v, 0, (c->bodies + c->pointers + 1) * sizeof *w->solver.v);
   memset(w->solver.work, 0, w->solver.work_count * sizeof *w->solver.work);
 }
 

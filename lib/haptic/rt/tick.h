@@ -17,7 +17,8 @@
  * Model CONTACT has one solve in the place of steps b and c:
  *
  *   adopt_patches  new contacts between bodies, with the impulses of the old ones
- *   local_world    free velocities, poses; calls the next three
+ *   local_world    free velocities, poses; calls the next four
+ *   proxy          pointers that are bodies behind a spring
  *   pointer_rows   pointer contacts as rows
  *   contact_rows   contacts between bodies as rows
  *   contact_solver, direct_solver  impulses of all rows
@@ -28,6 +29,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/pointer.h>
 #include <hapode/record.h>
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
@@ -35,9 +37,6 @@
 #include "haptic/rt/contact_solver.h"
 #include "haptic/rt/velocity.h"
 #include "sync/messages.h"
-
-/* A contact that is already deep when it arrives gets its full force after this time. */
-#define HAPI_RAMP_S 0.02
 
 /* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
 #define HAPI_STATE_LIMIT 1e6
@@ -66,6 +65,27 @@ typedef struct hapi_tick_pointer {
   hap_wrench device_wrench; /* out, device frame, scaled and limited */
   uint32_t contacts;        /* that push */
   bool saturated;
+
+  /* Coupling; world. Stiffnesses as felt in the world: device's / (motion_scale force_scale). */
+  hap_coupling coupling;       /* asked for */
+  hap_integration integration; /* model CONTACT */
+  bool hold_known;
+  double hold; /* N/m, what the device can hold; HUGE_VAL: not known */
+  double coupling_stiffness;
+  double coupling_damping;
+  double proxy_mass;
+  double handle_position[3]; /* of the device */
+  double handle_velocity[3];
+  double near_stiffness;    /* N/m, sum over the contacts near the pointer, as they are found */
+  double contact_stiffness; /* N/m, the same of the last tick, whole */
+  bool proxied;             /* the pointer is a proxy */
+  hap_coupling_reason coupling_reason;
+  double proxy_position[3];
+  double proxy_velocity[3];
+  double offset[3];        /* m, from the device to the end of the spring, shrinking */
+  double free_velocity[3]; /* m/s, of the proxy with nothing in touch */
+  uint32_t row;            /* place in the solver's velocities; 0: direct */
+  double response;         /* 1/kg, change of the proxy's velocity by one N s */
 } hapi_tick_pointer;
 
 typedef struct hapi_local_body {
@@ -227,6 +247,9 @@ void hapi_render(hapi_tick *tick);           /* eq. 7 */
 void hapi_local_step(hapi_tick *tick);       /* eq. 8-11, 14 */
 void hapi_local_world_step(hapi_tick *tick); /* model CONTACT: b and c in one */
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body); /* a resting one, before its rows */
+void hapi_proxy_begin(hapi_tick *tick);                       /* direct or proxy, and why */
+void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
+void hapi_proxy_move(hapi_tick *tick);                        /* poses and forces on the hands */
 void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */

@@ -1,0 +1,29 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "haptic/coupling_gains.h"
+
+#include <math.h>
+
+#define MARGIN 0.8        /* of the stiffness at which damping is used up */
+#define DAMPING_SHARE 0.5 /* of what the stiffness leaves */
+
+hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
+                                           const hap_pointer_def *pointer, double period)
+{
+  if (pointer->coupling_stiffness > 0.0) {
+    return (hapi_coupling_gains){true, pointer->coupling_stiffness, pointer->coupling_damping};
+  }
+  double k = device->rated_stiffness > 0.0 ? device->rated_stiffness : HUGE_VAL;
+  double b = device->damping + pointer->hand_damping;
+  double late = 0.5 * period + device->delay; /* s, the mean age of a force that acts */
+  if (device->damping > 0.0) {
+    k = fmin(k, MARGIN * b / late);
+  }
+  if (device->quantum > 0.0 && device->friction > 0.0) {
+    k = fmin(k, 2.0 * device->friction / device->quantum);
+  }
+  if (k == HUGE_VAL) {
+    return (hapi_coupling_gains){false, HUGE_VAL, 0.0};
+  }
+  return (hapi_coupling_gains){true, k, DAMPING_SHARE * fmax(0.0, b - k * late)};
+}

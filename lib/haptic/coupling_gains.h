@@ -1,0 +1,23 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_COUPLING_GAINS_H
+#define HAPODE_HAPTIC_COUPLING_GAINS_H
+
+/* What a device can hold, from its figures (docs/numerics.md, "Coupling"). */
+
+#include <stdbool.h>
+
+#include <hapode/device.h>
+#include <hapode/pointer.h>
+
+typedef struct hapi_coupling_gains {
+  bool known;
+  double stiffness; /* N/m at the device; HUGE_VAL: not known */
+  double damping;   /* N s/m at the device */
+} hapi_coupling_gains;
+
+/* period in s, of the haptic loop. */
+hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
+                                           const hap_pointer_def *pointer, double period);
+
+#endif
