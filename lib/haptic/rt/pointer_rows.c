@@ -107,22 +107,23 @@ typedef struct spring {
   double a;     /* 1/kg, how body and proxy answer */
   double depth; /* m, at the tick */
   double w;     /* m/s, as above, before the tick */
+  double free;  /* m/s, w after the tick with nothing in touch */
   double s;
 } spring;
 
 #define NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
 
-/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that the
- * body would have with nothing else in touch. */
+/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
+ * would be with nothing else in touch. */
 static void linearise(const spring *p, double period, double *out_c, double *out_force)
 {
   double before = p->depth - 0.5 * period * (p->s - p->w);
-  double w = p->w;
+  double w = p->free;
   double slope = 0.0;
   double force = 0.0;
   for (int i = 0; i < NEWTON_STEPS; ++i) {
     force = secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
-    w -= (w - p->w - period * p->a * force) / (1.0 + 0.5 * period * period * p->a * slope);
+    w -= (w - p->free - period * p->a * force) / (1.0 + 0.5 * period * period * p->a * slope);
   }
   force = secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
   *out_c = 0.5 * period * slope;
@@ -189,13 +190,14 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   }
   row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
   row->b = HAPI_STATIC_ROW;
-  out->w = hapi_row_start_speed(at->body, row->ja);
+  out->w = out->free = hapi_row_start_speed(at->body, row->ja);
   out->s = hapi_v3_dot(into, p->twist.linear);
   if (p->proxied) {
     hapi_v3_copy(at->normal, row->jb);
     hapi_v3_scale(p->response, row->jb, row->bb);
     row->b = p->row;
-    out->w += hapi_v3_dot(row->jb, p->free_velocity);
+    out->w += hapi_v3_dot(row->jb, p->proxy_velocity);
+    out->free += hapi_v3_dot(row->jb, p->free_velocity);
     out->s = 0.0;
   }
   out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);

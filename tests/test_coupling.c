@@ -1,0 +1,361 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The coupling between device and world: what a device can hold, the proxy, the choice between it and
+ * the direct coupling. */
+
+#include "tests/tap.h"
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#include "haptic/coupling_gains.h"
+#include "tests/contact_world.h"
+
+#define T 1e-3
+#define HAND_RADIUS 0.01
+
+/* ---- what a device can hold ---- */
+
+static hapi_coupling_gains gains_of(const hap_device_info *device)
+{
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  return hapi_coupling_gains_of(device, &def, T);
+}
+
+TEST(gains_follow_the_device)
+{
+  hap_device_info device = {.damping = 0.2};
+  hapi_coupling_gains g = gains_of(&device);
+  CHECK(g.known);
+  CHECK_NEAR(g.stiffness, 0.8 * 0.2 / (0.5 * T), 1e-9); /* 320 N/m */
+  CHECK_NEAR(g.damping, 0.5 * (0.2 - 0.5 * T * g.stiffness), 1e-12);
+  device.delay = 1.5 * T;
+  g = gains_of(&device);
+  CHECK_NEAR(g.stiffness, 0.8 * 0.2 / (2.0 * T), 1e-9);
+  CHECK(g.damping > 0.0 && g.damping + g.stiffness * 2.0 * T <= 0.2);
+  device.rated_stiffness = 50.0;
+  CHECK_NEAR(gains_of(&device).stiffness, 50.0, 1e-12);
+  device.quantum = 3e-5;
+  CHECK_NEAR(gains_of(&device).stiffness, 50.0, 1e-12); /* without friction no limit */
+  device.friction = 3e-4;
+  CHECK_NEAR(gains_of(&device).stiffness, 20.0, 1e-9);
+}
+
+TEST(gains_are_not_invented)
+{
+  hap_device_info device = {.quantum = 3e-5, .delay = 1e-3, .max_force = 10.0};
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  CHECK(!hapi_coupling_gains_of(&device, &def, T).known);
+  def.hand_damping = 1.0; /* the hand may let go of a device that says nothing */
+  CHECK(!hapi_coupling_gains_of(&device, &def, T).known);
+  device.damping = 0.2;
+  CHECK_NEAR(hapi_coupling_gains_of(&device, &def, T).stiffness, 0.8 * 1.2 / (1.5 * T), 1e-9);
+  def.coupling_stiffness = 700.0;
+  def.coupling_damping = 0.3;
+  hapi_coupling_gains g = hapi_coupling_gains_of(&device, &def, T);
+  CHECK(g.known && g.stiffness == 700.0 && g.damping == 0.3);
+}
+
+/* ---- the proxy ---- */
+
+static hap_pointer_state state_of(const contact_world *w)
+{
+  hap_pointer_state state;
+  memset(&state, 0, sizeof state);
+  CHECK(hap_pointer_get(w->session, w->hand, &state, sizeof state) == HAP_OK);
+  return state;
+}
+
+static void use_proxy(contact_world *w, double stiffness)
+{
+  w->hand_def.coupling = HAP_COUPLING_PROXY;
+  w->hand_def.coupling_stiffness = stiffness;
+}
+
+/* On the static floor, pressed 2 mm in. */
+TEST(a_wall_and_the_proxy_are_springs_in_series)
+{
+  static const double stiffness[] = {100.0, 1000.0, 1e4, 1e6};
+  for (size_t i = 0; i < sizeof stiffness / sizeof stiffness[0]; ++i) {
+    double k = stiffness[i];
+    double k_v = 500.0;
+    contact_world w;
+    cw_open(&w, 0.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+    w.hand_def.stiffness = k;
+    w.hand_def.damping = 0.0;
+    use_proxy(&w, k_v);
+    REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
+    cw_move_hand(&w, 0.0, 0.0, -0.03);
+    cw_run(&w, 100);
+    cw_move_hand(&w, 0.0, 0.0, 0.0);
+    cw_run(&w, 100);
+    double series = k * k_v / (k + k_v);
+    hap_pointer_state state = state_of(&w);
+    CHECK_NEAR(w.force[2], 0.002 * series, 1e-6);
+    CHECK(state.coupling == HAP_COUPLING_PROXY && state.coupling_reason == HAP_COUPLING_ASKED);
+    CHECK_NEAR(state.coupling_stiffness, k_v, 1e-9);
+    CHECK_NEAR(state.device.position[2], HAND_RADIUS - 0.002, 1e-12);
+    CHECK_NEAR(state.proxy.position[2], HAND_RADIUS - 0.002 * k_v / (k + k_v), 1e-8);
+    cw_close(&w);
+  }
+}
+
+TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  use_proxy(&w, 500.0);
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
+  cw_move_hand(&w, 0.3, -0.2, 0.1);
+  for (int i = 0; i < 100; ++i) {
+    cw_tick(&w);
+    hap_pointer_state state = state_of(&w);
+    for (int k = 0; k < 3; ++k) {
+      CHECK_NEAR(state.proxy.position[k], state.device.position[k], 1e-12);
+      CHECK_NEAR(w.force[k], 0.0, 1e-9);
+    }
+  }
+  cw_close(&w);
+}
+
+/* Without mass the proxy keeps nothing: what the hand gives the cube gets. */
+TEST(a_proxy_passes_the_whole_impulse_on)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
+  w.hand_def.stiffness = 1e5;
+  use_proxy(&w, 400.0);
+  REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.0, 0.0));
+  cw_move_hand(&w, 0.2, 0.0, 0.0);
+  cw_run(&w, 400);
+  CHECK(w.impulse[0] > 0.05);
+  CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 1e-6 * w.impulse[0]);
+  CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 1e-9);
+  cw_close(&w);
+}
+
+/* A cube of 60 g hit through the coupling: half a period of mass and spring, as if the hand were a
+ * wall. The contact is stiff, so that the coupling's spring is what there is; integrated implicitly
+ * it damps as k_v T would: twice what a held force takes from the damping of a device. */
+TEST(an_impact_through_the_proxy_has_the_time_of_its_spring)
+{
+  const double k_v = 300.0;
+  const double k = 1e5;
+  const double mass = 0.06;
+  const double speed = 0.1;
+  contact_world w;
+  cw_open(&w, 0.0);
+  dBodyID cube = cw_add_cube(&w, mass, 0.05, 0.025 + 0.005, 0.0, 0.0);
+  dBodySetLinearVel(cube, -speed, 0.0, 0.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, -HAND_RADIUS, 0.0, 0.0));
+  int touching = 0;
+  double peak = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    cw_tick(&w);
+    touching += state_of(&w).contacts > 0;
+    peak = fmax(peak, cw_norm(w.force));
+  }
+  double series = k * k_v / (k + k_v);
+  CHECK_NEAR(touching * T, M_PI * sqrt(mass / series), 2.5 * T);
+  double undamped = speed * sqrt(mass * series);
+  double damped = T * series / (2.0 * sqrt(mass * series)); /* ratio */
+  CHECK_NEAR(peak, undamped * exp(-damped * 0.5 * M_PI), 0.01 * undamped);
+  CHECK_NEAR(w.velocity[0][0], speed * exp(-damped * M_PI), 0.01 * speed);
+  cw_close(&w);
+}
+
+/* ---- the choice ---- */
+
+/* Small balls that stand around the way of the hand along z, to be touched all at once. */
+static void add_ring(contact_world *w, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    double angle = 2.0 * M_PI * i / count;
+    dGeomID ball = dCreateSphere(w->space, 0.002);
+    dGeomSetPosition(ball, 0.006 * cos(angle), 0.006 * sin(angle), 0.0);
+  }
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 0.0);
+}
+
+static bool open_many(contact_world *w, int count, double hold)
+{
+  cw_open(w, 0.0);
+  add_ring(w, count);
+  w->hand_def.coupling = HAP_COUPLING_AUTO;
+  w->hand_def.coupling_stiffness = hold;
+  w->hand_def.stiffness = 300.0;
+  return cw_start(w, 0.0, 0.0, 0.03);
+}
+
+TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
+{
+  static const struct {
+    int count;
+    double hold;
+    hap_coupling_reason reason;
+  } cases[] = {{1, 500.0, HAP_COUPLING_WITHIN},
+               {1, 200.0, HAP_COUPLING_ABOVE},
+               {4, 1250.0, HAP_COUPLING_WITHIN},
+               {4, 1150.0, HAP_COUPLING_ABOVE},
+               {4, 0.0, HAP_COUPLING_UNKNOWN}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    contact_world w;
+    bool above = cases[i].reason == HAP_COUPLING_ABOVE;
+    REQUIRE(open_many(&w, cases[i].count, cases[i].hold));
+    cw_run(&w, 10);
+    CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT); /* nothing is near */
+    cw_move_hand(&w, 0.0, 0.0, -0.05);
+    while (state_of(&w).contacts < (uint32_t)cases[i].count && w.ticks < 500) {
+      cw_tick(&w);
+    }
+    hap_pointer_state state = state_of(&w);
+    CHECK(state.contacts == (uint32_t)cases[i].count);
+    CHECK(state.coupling == (above ? HAP_COUPLING_PROXY : HAP_COUPLING_DIRECT));
+    CHECK(state.coupling_reason == cases[i].reason);
+    CHECK_NEAR(state.coupling_stiffness, above ? cases[i].hold : 0.0, 1e-9);
+    CHECK_NEAR(state.contact_stiffness, 300.0 * cases[i].count, 1e-9);
+    cw_move_hand(&w, 0.0, 0.0, 0.05);
+    cw_run(&w, 300);
+    CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT); /* and is let go of again */
+    CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
+    cw_close(&w);
+  }
+}
+
+/* A hand that presses a heavy cube down goes sideways over the border of a second one: the coupling
+ * changes while there is force. */
+TEST(the_change_while_pressing_has_no_jump)
+{
+  contact_world w;
+  const double press = 0.002;
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
+  cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
+  w.hand_def.coupling = HAP_COUPLING_AUTO;
+  w.hand_def.coupling_stiffness = 1500.0; /* one contact of 1 kN/m, not two */
+  w.hand_def.stiffness = 1000.0;
+  w.hand_def.damping = 0.0;
+  REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
+  cw_move_hand(&w, 0.0, 0.0, -0.03);
+  cw_run(&w, (int)lround((press + 0.001) / 0.03 / T));
+  cw_move_hand(&w, 0.05, 0.0, 0.0);
+  double before = w.force[2];
+  CHECK_NEAR(before, 1000.0 * press, 0.05);
+  double jump = 0.0;
+  bool changed = false;
+  for (int i = 0; i < 600 && !changed; ++i) {
+    before = w.force[2];
+    cw_tick(&w);
+    changed = state_of(&w).coupling == HAP_COUPLING_PROXY;
+    jump = fmax(jump, fabs(w.force[2] - before));
+  }
+  CHECK(changed);
+  CHECK(state_of(&w).contacts == 1);   /* before the second contact closes */
+  CHECK(jump < 0.06 * 1000.0 * press); /* 20 ms long 1 / 20 of the difference at most */
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 300);
+  double series = 1000.0 * 1500.0 / 2500.0;
+  CHECK_NEAR(w.force[2], series * press, 0.02 * series * press);
+  cw_close(&w);
+}
+
+TEST(a_proxy_is_refused_where_it_cannot_be)
+{
+  hap_pointer_id id;
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
+  hap_pointer_def def = w.hand_def;
+  def.coupling = HAP_COUPLING_PROXY;
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  def.coupling_stiffness = 100.0;
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_OK);
+  cw_close(&w);
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  w.def.model = HAP_MODEL_ACCELERANCE;
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
+  cw_tick(&w);
+  CHECK(state_of(&w).coupling_reason == HAP_COUPLING_MODEL);
+  cw_close(&w);
+}
+
+/* ---- eight contacts at once ---- */
+
+/* A device of 0.1 kg and 0.2 N s/m in a relaxed hand that presses it into a ring of balls; the
+ * fastest it moves when it should have come to rest. */
+static double shaking(hap_coupling coupling, int count, double stiffness)
+{
+  contact_world w;
+  hap_detail detail = {""};
+  double fastest = 0.0;
+  cw_open(&w, 0.0);
+  add_ring(&w, count);
+  w.hand_def.stiffness = stiffness;
+  w.hand_def.damping = 0.0;
+  w.hand_def.coupling = coupling;
+  w.ode.world = w.world;
+  w.ode.space = w.space;
+  w.ode.user = &w;
+  CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
+  CHECK(hap_device_open("virtual:hand=relaxed,device_mass=0.1,device_damping=0.2,max_force=1000,"
+                        "path=0:0/0/0.014;1:0/0/0",
+                        &w.hand_def.device, &detail) == HAP_OK);
+  CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
+  CHECK(hap_session_start(w.session) == HAP_OK);
+  CHECK(hap_session_advance(w.session, 3000) == HAP_OK);
+  hap_pointer_state state = state_of(&w);
+  double at = state.device.position[2];
+  for (int i = 0; i < 500; ++i) {
+    CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+    state = state_of(&w);
+    fastest = fmax(fastest, fabs(state.device.position[2] - at) / T);
+    at = state.device.position[2];
+  }
+  CHECK(state.contacts == (uint32_t)count || coupling == HAP_COUPLING_DIRECT);
+  hap_session_stop(w.session);
+  hap_device *device = w.hand_def.device;
+  cw_close(&w);
+  hap_device_close(device);
+  return fastest;
+}
+
+TEST(eight_contacts_at_once_do_not_shake_the_device)
+{
+  double direct = shaking(HAP_COUPLING_DIRECT, 8, 2000.0);
+  double chosen = shaking(HAP_COUPLING_AUTO, 8, 2000.0);
+  printf("# device at rest moves: direct %.3g m/s, auto %.3g m/s\n", direct, chosen);
+  CHECK(direct > 1e-3);
+  CHECK(chosen < 1e-6);
+  CHECK(shaking(HAP_COUPLING_AUTO, 64, 1e6) < 1e-6);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  RUN(gains_follow_the_device);
+  RUN(gains_are_not_invented);
+  RUN(a_wall_and_the_proxy_are_springs_in_series);
+  RUN(in_the_air_the_proxy_is_at_the_device_and_gives_no_force);
+  RUN(a_proxy_passes_the_whole_impulse_on);
+  RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
+  RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
+  RUN(the_change_while_pressing_has_no_jump);
+  RUN(a_proxy_is_refused_where_it_cannot_be);
+  RUN(eight_contacts_at_once_do_not_shake_the_device);
+  dCloseODE();
+  return tap_done();
+}
