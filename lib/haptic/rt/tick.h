@@ -54,6 +54,7 @@ typedef struct hapi_tick_pointer {
 
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
+  hap_pose device_good;   /* the last device_pose that could be used */
   uint32_t buttons;       /* in */
 
   hap_pose pose;            /* world */
