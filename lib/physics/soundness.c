@@ -229,7 +229,7 @@ static const char *world_unsoundness(dWorldID world)
 static void say(hap_detail *out, dBodyID body, const char *what)
 {
   const dReal *p = dBodyGetPosition(body);
-  snprintf(out->text, sizeof out->text, "the body at (%g, %g, %g) %s: set it right%s", p[0], p[1],
+  snprintf(out->text, sizeof out->text, "a body at (%g, %g, %g) %s: set it right%s", p[0], p[1],
            p[2], what, dBodyIsKinematic(body) ? "" : ", or make the body kinematic");
 }
 
