@@ -144,7 +144,7 @@ TEST(what_constraints_leave_of_a_body_is_left_alone)
     at_arm(response, arm, a);
     memcpy(a_before, a, sizeof a);
     CHECK(hapi_admittance_tidy_point(&body, arm, normal, a) == HAPI_ADMITTANCE_GOOD);
-    CHECK(largest_difference(&a[0][0], &a_before[0][0], 18) <= 1e-12 * largest(&a[0][0], 18));
+    CHECK(memcmp(a, a_before, sizeof a) == 0);
     CHECK(hapi_admittance_tidy_body(&body, response) == HAPI_ADMITTANCE_GOOD);
     CHECK(largest_difference(&response[0][0], &before[0][0], 36) <=
           1e-12 * largest(&before[0][0], 36));
@@ -267,7 +267,7 @@ TEST(the_bounds_hold_for_every_direction)
 }
 
 /* A cube that slides along x, mu 0.5: pressed upon it slows down, pushed along it does not press. */
-TEST(what_friction_does_is_kept_and_what_a_solver_leaves_is_averaged)
+TEST(what_friction_does_is_kept)
 {
   hapi_free_body body = {.inverse_mass = 2.0, .inverse_inertia = {3, 0, 0, 0, 3, 0, 0, 0, 3}};
   const double arm[3] = {0.0, 0.0, 0.0};
@@ -277,11 +277,7 @@ TEST(what_friction_does_is_kept_and_what_a_solver_leaves_is_averaged)
     double before[6][3];
     memcpy(before, a, sizeof a);
     CHECK(hapi_admittance_tidy_point(&body, arm, normals[n], a) == HAPI_ADMITTANCE_GOOD);
-    CHECK(largest_difference(&a[0][0], &before[0][0], 18) < 1e-14);
-    a[0][2] = 0.06;
-    CHECK(hapi_admittance_tidy_point(&body, arm, normals[n], a) == HAPI_ADMITTANCE_GOOD);
-    CHECK_NEAR(a[0][2], 0.03, 1e-14);
-    CHECK_NEAR(a[2][0], 0.03, 1e-14);
+    CHECK(memcmp(a, before, sizeof a) == 0);
   }
 }
 
@@ -399,7 +395,7 @@ int main(void)
   RUN(what_is_outside_is_brought_back_or_refused);
   RUN(numbers_that_are_none_are_refused_and_nothing_is_changed);
   RUN(the_bounds_hold_for_every_direction);
-  RUN(what_friction_does_is_kept_and_what_a_solver_leaves_is_averaged);
+  RUN(what_friction_does_is_kept);
   RUN(a_singular_probe_keeps_the_last_good_one);
   RUN(an_overdetermined_body_stays_in_bounds);
   dCloseODE();

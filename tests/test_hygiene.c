@@ -238,6 +238,22 @@ TEST(a_geom_at_no_place_of_its_body_is_said)
   world_close(&t.w);
 }
 
+/* One without geom and joint, which only adoption makes known. */
+TEST(an_adopted_body_is_looked_at_too)
+{
+  things t;
+  REQUIRE(open_things(&t, HAP_MODEL_ACCELERANCE));
+  dBodyID alone = dBodyCreate(t.w.world);
+  CHECK(hap_session_adopt_body(t.w.session, alone) == HAP_OK);
+  REQUIRE(hap_session_start(t.w.session) == HAP_OK);
+  CHECK(hap_session_advance(t.w.session, 60) == HAP_OK);
+  dBodySetAngularVel(alone, 0.0, no_number, 0.0);
+  CHECK(hap_session_advance(t.w.session, 60) == HAP_FAULTED);
+  CHECK(world_stats(&t.w).fault == HAP_FAULT_WORLD && all_finite(&t.w));
+  dBodySetAngularVel(alone, 0.0, 0.0, 0.0);
+  world_close(&t.w);
+}
+
 /* What is set right goes on; nothing of what was wrong is left anywhere. */
 TEST(a_world_that_was_set_right_goes_on)
 {
@@ -448,6 +464,7 @@ int main(void)
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(nothing_that_is_no_number_reaches_the_world);
   RUN(a_geom_at_no_place_of_its_body_is_said);
+  RUN(an_adopted_body_is_looked_at_too);
   RUN(a_world_that_was_set_right_goes_on);
   RUN(no_surface_that_is_no_number_reaches_a_contact);
   RUN(a_contact_that_is_no_number_is_dropped_and_counted);

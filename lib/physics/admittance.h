@@ -26,8 +26,8 @@ typedef enum hapi_admittance {
  * The bounds hold for the acceleration of the point, a 3x3 part; what is done to that is done by
  * forces at the point, so that the rest follows as in the free body. Along the normal, where a
  * pointer pushes, the bounds are kept to 1e-3. Across it friction goes beyond them for good, and
- * symmetric it is not: what a solver leaves of a difference is averaged, a larger one stays, and only
- * what friction cannot be is cut off. */
+ * symmetric it is not: there only what friction cannot be is cut off. Where nothing is outside, a
+ * stays as it is, bit for bit. */
 hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const double arm[3],
                                            const double normal[3], double a[6][3]);
 
