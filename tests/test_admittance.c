@@ -327,7 +327,7 @@ static void check_contacts(test_world *w)
     double normal[3];
     double a[6][3];
     memcpy(a, c->a, sizeof a);
-    hapi_accelerance_free_body(body, &free);
+    hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);
     hapi_quat_rotate(dBodyGetQuaternion(body), c->point_body, arm);
     hapi_quat_rotate(dBodyGetQuaternion(body), c->normal_body, normal);
     CHECK(hapi_admittance_tidy_point(&free, arm, normal, a) == HAPI_ADMITTANCE_GOOD);

@@ -86,20 +86,19 @@ static void push(hapi_physics *physics, const hapi_contact_slot *contact, int ax
   dBodyAddTorque(body, moment[0], moment[1], moment[2]);
 }
 
-void hapi_accelerance_free_body(dBodyID body, hapi_free_body *out)
+void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out)
 {
   dMass mass;
   double inertia[9];
   double inverse[9];
-  double rotation[9];
+  double r[9];
   dBodyGetMass(body, &mass);
-  const dReal *r = dBodyGetRotation(body);
   for (int i = 0; i < 9; ++i) {
     inertia[i] = mass.I[4 * (i / 3) + i % 3];
-    rotation[i] = r[4 * (i / 3) + i % 3];
+    r[i] = rotation[4 * (i / 3) + i % 3];
   }
   hapi_m3_invert(inertia, inverse);
-  hapi_m3_turn(rotation, inverse, out->inverse_inertia);
+  hapi_m3_turn(r, inverse, out->inverse_inertia);
   out->inverse_mass = 1.0 / mass.mass;
 }
 
@@ -109,16 +108,17 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
 {
   hap_stats *stats = &physics->figures.stats;
   const hapi_body_slot *slot = body_of(physics, contact);
-  dBodyID body = physics->table.entries[slot->known].body;
-  hapi_free_body free;
-  double arm[3];
-  double normal[3];
-  hapi_accelerance_free_body(body, &free);
-  hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
-  hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, normal);
-  hapi_admittance kind = slot->b_is_good
-                             ? hapi_admittance_tidy_point(&free, arm, normal, contact->measured)
-                             : HAPI_ADMITTANCE_SINGULAR;
+  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
+  hapi_admittance kind = HAPI_ADMITTANCE_SINGULAR;
+  if (slot->b_is_good) {
+    hapi_free_body free;
+    double arm[3];
+    double normal[3];
+    hapi_accelerance_free_body(tested->body, tested->rotation, &free);
+    hapi_quat_rotate(tested->quat, contact->point_body, arm);
+    hapi_quat_rotate(tested->quat, contact->normal_body, normal);
+    kind = hapi_admittance_tidy_point(&free, arm, normal, contact->measured);
+  }
   stats->probes_singular += kind == HAPI_ADMITTANCE_SINGULAR;
   stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
   if (kind != HAPI_ADMITTANCE_SINGULAR) {
@@ -147,7 +147,6 @@ static void measure_round(hapi_physics *physics, uint32_t round)
       }
     }
   }
-  hapi_test_rewind(physics); /* to the pose that was tested */
   for (uint32_t i = 0; i < test->contact_count; ++i) {
     hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
     if (contact->round == round) {

@@ -81,6 +81,8 @@ static void global_step(hapi_physics *physics)
 
 static void sync_in(hapi_physics *physics, int64_t now_ns)
 {
+  /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
+  dJointGroupEmpty(physics->contact_group);
   hapi_edits_run(physics);
   follow_model(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */

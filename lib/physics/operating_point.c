@@ -90,7 +90,8 @@ static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], co
 {
   hap_stats *stats = &physics->figures.stats;
   hapi_free_body free;
-  hapi_accelerance_free_body(body_of(physics, slot), &free);
+  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
+  hapi_accelerance_free_body(tested->body, tested->rotation, &free);
   hapi_admittance kind =
       hapi_finite(base, 6) ? hapi_admittance_tidy_body(&free, a) : HAPI_ADMITTANCE_SINGULAR;
   stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;

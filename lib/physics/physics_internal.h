@@ -399,7 +399,8 @@ hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_
 void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
 
 /* accelerance.c */
-void hapi_accelerance_free_body(dBodyID body, hapi_free_body *out);
+/* Of a dynamic body at a rotation of ODE's. */
+void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out);
 
 /* soundness.c: what ODE would abort the process on, or make no number of. *out_text says what it is and
  * what to do. */
