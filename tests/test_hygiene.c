@@ -238,6 +238,23 @@ TEST(a_geom_at_no_place_of_its_body_is_said)
   world_close(&t.w);
 }
 
+/* A running total would keep it for good, also when the world has been set right. */
+TEST(a_velocity_that_a_step_made_is_in_no_residual)
+{
+  things t;
+  REQUIRE(open_things(&t, HAP_MODEL_ACCELERANCE) && hap_session_start(t.w.session) == HAP_OK);
+  CHECK(hap_session_advance(t.w.session, 120) == HAP_OK);
+  hapi_physics *physics = world_physics(&t.w);
+  const hapi_body_slot *slot = world_slot(&t.w, t.w.bodies[0]);
+  REQUIRE(slot != NULL);
+  dBodySetLinearVel(t.w.bodies[0], no_number, 0.0, 0.0);
+  physics->has_new_state = true;
+  hapi_reconcile_residual(physics);
+  CHECK(hapi_finite(slot->residual, 6));
+  dBodySetLinearVel(t.w.bodies[0], 0.0, 0.0, 0.0);
+  world_close(&t.w);
+}
+
 /* One without geom and joint, which only adoption makes known. */
 TEST(an_adopted_body_is_looked_at_too)
 {
@@ -464,6 +481,7 @@ int main(void)
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(nothing_that_is_no_number_reaches_the_world);
   RUN(a_geom_at_no_place_of_its_body_is_said);
+  RUN(a_velocity_that_a_step_made_is_in_no_residual);
   RUN(an_adopted_body_is_looked_at_too);
   RUN(a_world_that_was_set_right_goes_on);
   RUN(no_surface_that_is_no_number_reaches_a_contact);
