@@ -573,6 +573,25 @@ TEST(a_local_state_that_is_not_finite_is_stopped)
   }
 }
 
+/* Too large for a double: in the world, and only at the device. */
+TEST(a_force_that_overflows_is_not_written)
+{
+  for (int k = 0; k < 2; ++k) {
+    body_under_pointer(0.003);
+    memset(f.contacts[0].a, 0, sizeof f.contacts[0].a); /* stays where it is */
+    run(50);                                            /* the ramp is over */
+    CHECK(f.tick.fault == HAP_FAULT_NONE && f.pointers[0].contacts == 1);
+    f.pointers[0].stiffness = k == 0 ? 1e308 : 1e306;
+    f.pointers[0].damping = k == 0 ? 1e308 : 0.0;
+    f.pointers[0].device_twist.linear[0] = k == 0 ? 1e3 : 0.0;
+    f.pointers[0].force_scale = 1e6;
+    run(1);
+    CHECK(f.tick.fault == (k == 0 ? HAP_FAULT_LOCAL_STATE : HAP_FAULT_FORCE)); /* the first one */
+    CHECK(force_is_zero(&f.pointers[0]));
+    CHECK(isfinite(f.tick.peak_force) && hapi_finite(f.tick.hand_impulse, 3));
+  }
+}
+
 /* ---- device and world ---- */
 
 /* What the hand does on the device and what the pointer does in the world are the same work up to
@@ -827,6 +846,7 @@ int main(void)
   RUN(bad_device_samples_latch_a_fault_and_go_no_further);
   RUN(a_fault_that_goes_on_latches_again_after_a_reset);
   RUN(a_local_state_that_is_not_finite_is_stopped);
+  RUN(a_force_that_overflows_is_not_written);
   RUN(scales_and_frame_keep_virtual_work);
   RUN(impulse_interpolates_from_the_last_but_one_to_the_last_pose);
   RUN(impulse_holds_the_last_pose_and_sums_the_impulse);

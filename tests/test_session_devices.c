@@ -250,6 +250,9 @@ TEST(one_bad_device_takes_the_force_of_all)
   atomic_store(&fakes[1].bad_pose, 1);
   CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
   CHECK(!pushes(&fakes[0]) && stats_of(&s).fault == HAP_FAULT_DEVICE_POSE);
+  hap_pointer_state shown;
+  CHECK(hap_pointer_get(s.session, id, &shown, sizeof shown) == HAP_OK);
+  CHECK(hapi_finite(shown.device.position, 3) && hapi_finite(shown.proxy.position, 3));
   CHECK(hap_session_stop(s.session) == HAP_OK);
   hap_device_close(devices[1]); /* late: the session still has it */
   CHECK(atomic_load(&fakes[1].closes) == 0);
@@ -463,6 +466,7 @@ static const struct {
     FIELD(max_force, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(max_torque, -1.0, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.position, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(pose_world_device.position, 1e300, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.quat_wxyz, 0.0, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.quat_wxyz, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(friction, 0.5, HAP_ERROR_UNSUPPORTED),

@@ -39,7 +39,15 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  *
  * Bodies known to the session: those of the geoms in space (and in spaces inside it), whatever is
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
- * must be adopted, or a testing simulation would move it. */
+ * must be adopted, or a testing simulation would move it.
+ *
+ * ODE ends the process on numbers that are none, and so the world is looked at before each step: start
+ * gives HAP_ERROR_WORLD and a running session latches HAP_FAULT_WORLD, steps nothing and says what to
+ * set right. Masses are 1e-12 .. 1e12 kg, inertias positive definite, 1e-30 .. 1e30 kg m^2; positions up
+ * to 1e9 m (in the loop 1e6), speeds 1e8 m/s and 1e7 rad/s, forces and torques 1e12, gravity 1e6 m/s^2,
+ * ERP 0 .. 10, CFM 0 .. 1e12, dampings at most 1, joint parameters 1e12 (ODE does not show the motors
+ * of a Plane2D joint: those are not looked at); no NaN in geoms. A surface with such a number, or with
+ * a friction, softness or slip below 0, is a fault as well, and no contact. */
 typedef struct hap_ode_def {
   uint32_t size;                       /* set by hap_ode_def_init */
   uint32_t cookie;                     /* set by hap_ode_def_init */

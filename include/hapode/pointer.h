@@ -103,8 +103,8 @@ HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap
 HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
 
 /* [app] Moves a pointer without device: pose and twist (may be NULL: at rest) in the device's
- * frame, from the next tick on. Values that are not finite, and a quaternion that is not unit, are
- * HAP_ERROR_ARGUMENT and change nothing. */
+ * frame, from the next tick on. Values that are not finite or beyond 1e6 (m, m/s, rad/s), and a
+ * quaternion that is not unit within 1e-3, are HAP_ERROR_ARGUMENT and change nothing. */
 HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                           const hap_pose *pose, const hap_twist *twist);
 

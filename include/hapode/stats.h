@@ -93,6 +93,9 @@ typedef struct hap_stats {
   uint32_t measured_bodies;   /* moved by what testing simulations say */
   double range_ms_mean;       /* ms a cycle, part of neighbour_ms: building the local model */
   double last_range_ms;
+
+  uint64_t probes_clipped;    /* accelerances that lay outside of 0 .. M^-1 and were brought back */
+  uint64_t contacts_rejected; /* contacts of ODE's colliders with numbers that are none */
 } hap_stats;
 
 #endif

@@ -71,11 +71,40 @@ void hapi_thread_prepare_for_ticks(void)
 #if defined(__linux__)
   prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
 #endif
-#if defined(__SSE2__)
-  _mm_setcsr(_mm_getcsr() | 0x8040u); /* flush to zero, denormals are zero */
-#endif
   touch_stack();
 }
+
+#if defined(__SSE2__)
+
+#define FLUSH_TO_ZERO 0x8000u
+#define DENORMALS_ARE_ZERO 0x0040u
+
+unsigned hapi_denormals_flush(void)
+{
+  unsigned before = _mm_getcsr();
+  _mm_setcsr(before | FLUSH_TO_ZERO | DENORMALS_ARE_ZERO);
+  return before;
+}
+
+/* The rounding flags that were raised meanwhile are not the caller's either. */
+void hapi_denormals_restore(unsigned before)
+{
+  _mm_setcsr(before);
+}
+
+#else
+
+unsigned hapi_denormals_flush(void)
+{
+  return 0;
+}
+
+void hapi_denormals_restore(unsigned before)
+{
+  (void)before;
+}
+
+#endif
 
 bool hapi_memory_lock(void *memory, size_t size)
 {

@@ -174,6 +174,19 @@ static inline void hapi_m3_turn(const double r[9], const double m[9], double out
   }
 }
 
+/* By the adjugate; a singular one becomes 0. out is not m */
+static inline void hapi_m3_invert(const double m[9], double out[9])
+{
+  double adjugate[9] = {
+      m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
+      m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
+      m[3] * m[7] - m[4] * m[6], m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
+  double det = m[0] * adjugate[0] + m[1] * adjugate[3] + m[2] * adjugate[6];
+  for (int i = 0; i < 9; ++i) {
+    out[i] = det != 0.0 ? adjugate[i] / det : 0.0;
+  }
+}
+
 /* Point of a frame to the world, and back. */
 static inline void hapi_pose_point(const double position[3], const double quat[4],
                                    const double point[3], double out[3])

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/thread.h"
 #include "base/vec.h"
 #include "contact/contact_internal.h"
 
@@ -206,13 +207,8 @@ static void pass_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_pa
   }
 }
 
-void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
+static void pass(hapi_contact *contact, int64_t valid_from_ns)
 {
-  int64_t begin_ns = hapi_clock_now();
-  take_near(contact);
-  if (contact->near == NULL || contact->poses == NULL) {
-    return;
-  }
   place_bodies(contact);
   hapi_patches *out = hapi_exchange_patches_back(contact->config.exchange);
   const hapi_near_pair *pairs = hapi_near_pairs(contact->near);
@@ -225,5 +221,17 @@ void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
   out->model_number = contact->near->model_number;
   out->valid_from_ns = valid_from_ns;
   hapi_exchange_patches_publish(contact->config.exchange);
+}
+
+void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
+{
+  int64_t begin_ns = hapi_clock_now();
+  take_near(contact);
+  if (contact->near == NULL || contact->poses == NULL) {
+    return;
+  }
+  unsigned before = hapi_denormals_flush();
+  pass(contact, valid_from_ns);
+  hapi_denormals_restore(before);
   hapi_histogram_add(&contact->pass_ns, hapi_clock_now() - begin_ns);
 }

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/clock.h"
+#include "base/thread.h"
 #include "base/vec.h"
 #include "haptic/haptic_internal.h"
 #include "haptic/tick_memory.h"
@@ -155,7 +156,7 @@ static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
   }
 }
 
-void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
+static void receive(hapi_haptic *haptic, int64_t now_ns)
 {
   if (haptic->pending == NULL) {
     haptic->pending = hapi_exchange_model_take(haptic->config.exchange);
@@ -168,6 +169,13 @@ void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
     publish_poses(haptic); /* the contact thread looks for new bodies */
   }
   receive_patches(haptic, now_ns);
+}
+
+void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
+{
+  unsigned before = hapi_denormals_flush();
+  receive(haptic, now_ns);
+  hapi_denormals_restore(before);
 }
 
 static void follow_faults(hapi_haptic *haptic)
@@ -214,9 +222,10 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
 {
   int64_t begin_ns = hapi_clock_now();
+  unsigned before = hapi_denormals_flush();
   hapi_pointers_follow(haptic);
   follow_faults(haptic);
-  hapi_haptic_receive(haptic, now_ns);
+  receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
@@ -226,6 +235,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);
+  hapi_denormals_restore(before);
 }
 
 void hapi_haptic_reset_fault(hapi_haptic *haptic)

@@ -53,6 +53,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   p->device_pose.quat_wxyz[0] = 1.0;
+  p->device_good.quat_wxyz[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
 
@@ -150,7 +151,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     out->size = sizeof *out;
     out->contacts = p->contacts;
     out->stamp_ns = haptic->tick.now_ns;
-    out->device = p->device_pose;
+    out->device = p->device_good;
     out->proxy = p->pose;
     out->twist = p->twist;
     out->wrench = p->wrench;

@@ -41,10 +41,9 @@ static void measure_b(hapi_physics *physics)
     }
     double b[6];
     acceleration_since_snapshot(physics, slot->known, b);
-    if (hapi_finite(b, 6)) {
+    slot->b_is_good = hapi_finite(b, 6);
+    if (slot->b_is_good) {
       memcpy(slot->b, b, sizeof b);
-    } else {
-      ++physics->figures.stats.probes_singular;
     }
   }
 }
@@ -63,13 +62,14 @@ static double perturbation(hapi_physics *physics, const hapi_contact_slot *conta
 }
 
 /* One column of eq. 5 and 6 for each contact of the round. */
-static void measure_column(hapi_physics *physics, const hapi_contact_slot *contact, double out[6])
+static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, int axis)
 {
   const hapi_body_slot *body = body_of(physics, contact);
   double force = perturbation(physics, contact);
-  acceleration_since_snapshot(physics, body->known, out);
+  double acceleration[6];
+  acceleration_since_snapshot(physics, body->known, acceleration);
   for (int i = 0; i < 6; ++i) {
-    out[i] = (out[i] - body->b[i]) / force;
+    contact->measured[i][axis] = (acceleration[i] - body->b[i]) / force;
   }
 }
 
@@ -77,23 +77,54 @@ static void push(hapi_physics *physics, const hapi_contact_slot *contact, int ax
 {
   dBodyID body = physics->table.entries[body_of(physics, contact)->known].body;
   double force[3] = {0.0, 0.0, 0.0};
-  double at[3];
+  double arm[3];
+  double moment[3];
   force[axis] = perturbation(physics, contact);
-  hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), contact->point_body, at);
-  dBodyAddForceAtPos(body, force[0], force[1], force[2], at[0], at[1], at[2]);
+  hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
+  hapi_v3_cross(arm, force, moment); /* not at a place: far from the origin that has lost digits */
+  dBodyAddForce(body, force[0], force[1], force[2]);
+  dBodyAddTorque(body, moment[0], moment[1], moment[2]);
 }
 
-static void keep_column(hapi_physics *physics, hapi_contact_slot *contact, int axis,
-                        const double column[6])
+void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out)
 {
-  if (!hapi_finite(column, 6)) {
-    ++physics->figures.stats.probes_singular; /* the last good one stays */
-    return;
+  dMass mass;
+  double inertia[9];
+  double inverse[9];
+  double r[9];
+  dBodyGetMass(body, &mass);
+  for (int i = 0; i < 9; ++i) {
+    inertia[i] = mass.I[4 * (i / 3) + i % 3];
+    r[i] = rotation[4 * (i / 3) + i % 3];
   }
-  for (int i = 0; i < 6; ++i) {
-    contact->a[i][axis] = column[i];
+  hapi_m3_invert(inertia, inverse);
+  hapi_m3_turn(r, inverse, out->inverse_inertia);
+  out->inverse_mass = 1.0 / mass.mass;
+}
+
+/* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that does
+ * not give way. */
+static void keep(hapi_physics *physics, hapi_contact_slot *contact)
+{
+  hap_stats *stats = &physics->figures.stats;
+  const hapi_body_slot *slot = body_of(physics, contact);
+  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
+  hapi_admittance kind = HAPI_ADMITTANCE_SINGULAR;
+  if (slot->b_is_good) {
+    hapi_free_body free;
+    double arm[3];
+    double normal[3];
+    hapi_accelerance_free_body(tested->body, tested->rotation, &free);
+    hapi_quat_rotate(tested->quat, contact->point_body, arm);
+    hapi_quat_rotate(tested->quat, contact->normal_body, normal);
+    kind = hapi_admittance_tidy_point(&free, arm, normal, contact->measured);
   }
-  contact->probed = true;
+  stats->probes_singular += kind == HAPI_ADMITTANCE_SINGULAR;
+  stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  if (kind != HAPI_ADMITTANCE_SINGULAR) {
+    memcpy(contact->a, contact->measured, sizeof contact->a);
+    contact->probed = true;
+  }
 }
 
 /* Three probes for the contacts of one round. */
@@ -112,10 +143,14 @@ static void measure_round(hapi_physics *physics, uint32_t round)
     for (uint32_t i = 0; i < test->contact_count; ++i) {
       hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
       if (contact->round == round) {
-        double column[6];
-        measure_column(physics, contact, column);
-        keep_column(physics, contact, axis, column);
+        measure_column(physics, contact, axis);
       }
+    }
+  }
+  for (uint32_t i = 0; i < test->contact_count; ++i) {
+    hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+    if (contact->round == round) {
+      keep(physics, contact);
     }
   }
 }

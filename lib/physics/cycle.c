@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"
@@ -45,31 +46,23 @@ static void follow_model(hapi_physics *physics)
       1.0 / (wanted == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
 }
 
-static void latch_world_fault(hapi_physics *physics, dBodyID body, const char *what)
-{
-  char text[256];
-  const dReal *p = dBodyGetPosition(body);
-  snprintf(text, sizeof text,
-           "the body at (%g, %g, %g) %s: ODE is not stepped until it is set right", p[0], p[1],
-           p[2], what);
-  if (!physics->world_faulty) {
-    hapi_log(HAP_LOG_ERROR, "%s", text);
-  }
-  physics->config.report(physics->config.user, HAP_FAULT_WORLD, text); /* as long as it lasts */
-  physics->world_faulty = true;
-}
-
-/* ODE aborts the process on a pose that is not finite: none may reach it. */
+/* ODE aborts the process on a pose that is not finite: nothing that makes one may reach it. */
 static bool world_is_sound(hapi_physics *physics)
 {
-  const char *what = NULL;
-  dBodyID body = hapi_bodies_find_unsound(physics, &what);
-  if (body != NULL) {
-    latch_world_fault(physics, body, what);
-    return false;
+  hap_detail what;
+  if (!hapi_world_is_unsound(physics, &what)) {
+    physics->world_faulty = false;
+    return true;
   }
-  physics->world_faulty = false;
-  return true;
+  hap_detail text;
+  snprintf(text.text, sizeof text.text, "%.400s; ODE is not stepped until then", what.text);
+  if (!physics->world_faulty) {
+    hapi_log(HAP_LOG_ERROR, "%s", text.text);
+  }
+  physics->config.report(physics->config.user, HAP_FAULT_WORLD,
+                         text.text); /* as long as it lasts */
+  physics->world_faulty = true;
+  return false;
 }
 
 static void global_step(hapi_physics *physics)
@@ -88,6 +81,8 @@ static void global_step(hapi_physics *physics)
 
 static void sync_in(hapi_physics *physics, int64_t now_ns)
 {
+  /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
+  dJointGroupEmpty(physics->contact_group);
   hapi_edits_run(physics);
   follow_model(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */

@@ -71,6 +71,10 @@ static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceP
     surface->mode &= ~dContactFDir1;
   }
   for (int i = 0; i < count; ++i) {
+    if (!hapi_contact_is_sound(&contacts[i].geom)) {
+      ++physics->figures.stats.contacts_rejected;
+      continue;
+    }
     contacts[i].surface = *surface;
     if (directed) {
       set_direction(&contacts[i], direction);
@@ -80,27 +84,40 @@ static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceP
   }
 }
 
-/* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process. */
+/* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process, and
+ * so can a softness below 0, which divides by what is left of a row. */
 static bool sound_surface(const dSurfaceParameters *s)
 {
+  const double most = 1e12;
   const struct {
     int bit;
     double value;
+    double low;
+    double high;
   } parts[] = {
-      {dContactMu2, s->mu2},          {dContactRolling, s->rho},
-      {dContactBounce, s->bounce},    {dContactBounce, s->bounce_vel},
-      {dContactSoftERP, s->soft_erp}, {dContactSoftCFM, s->soft_cfm},
-      {dContactMotion1, s->motion1},  {dContactMotion2, s->motion2},
-      {dContactMotionN, s->motionN},  {dContactSlip1, s->slip1},
-      {dContactSlip2, s->slip2},
+      {0, s->mu, 0.0, HUGE_VAL}, /* ODE reads it whatever the mode is */
+      {dContactMu2, s->mu2, 0.0, HUGE_VAL},
+      {dContactRolling, s->rho, 0.0, HUGE_VAL},
+      {dContactRolling, s->rho2, 0.0, HUGE_VAL},
+      {dContactRolling, s->rhoN, 0.0, HUGE_VAL},
+      {dContactBounce, s->bounce, -most, most},
+      {dContactBounce, s->bounce_vel, -most, most},
+      {dContactSoftERP, s->soft_erp, -most, most},
+      {dContactSoftCFM, s->soft_cfm, 0.0, most},
+      {dContactMotion1, s->motion1, -most, most},
+      {dContactMotion2, s->motion2, -most, most},
+      {dContactMotionN, s->motionN, -most, most},
+      {dContactSlip1, s->slip1, 0.0, most},
+      {dContactSlip2, s->slip2, 0.0, most},
   };
-  bool sound = s->mu >= 0.0; /* also infinity; false for NaN */
   for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-    bool friction = parts[i].bit == dContactMu2 || parts[i].bit == dContactRolling;
-    bool good = friction ? parts[i].value >= 0.0 : fabs(parts[i].value) <= 1e12;
-    sound = sound && ((s->mode & parts[i].bit) == 0 || good);
+    bool read = parts[i].bit == 0 || (s->mode & parts[i].bit) != 0;
+    bool good = parts[i].value >= parts[i].low && parts[i].value <= parts[i].high; /* not NaN */
+    if (read && !good) {
+      return false;
+    }
   }
-  return sound;
+  return true;
 }
 
 static bool can_move(dBodyID body)
@@ -116,8 +133,8 @@ static bool ask_application(hapi_physics *physics, dGeomID a, dGeomID b, dSurfac
   }
   if (!sound_surface(out)) {
     physics->config.report(physics->config.user, HAP_FAULT_WORLD,
-                           "the surface callback gave a number that is not finite or a friction "
-                           "below 0: the pair has no contact");
+                           "the surface callback gave a number that is not finite, or a friction, "
+                           "softness or slip below 0: the pair has no contact");
     return false;
   }
   return true;

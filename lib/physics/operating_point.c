@@ -85,38 +85,18 @@ static void acceleration(const hapi_physics *physics, const hapi_body_slot *slot
   }
 }
 
-/* What a response must be: symmetric, and no body gives way the wrong way. Clipped to no more than
- * the free body's, whose mass nothing makes smaller. False: not usable. */
-static bool tidy(const hapi_physics *physics, const hapi_body_slot *slot, double a[6][6])
-{
-  dMass mass;
-  dBodyGetMass(body_of(physics, slot), &mass);
-  for (int i = 0; i < 6; ++i) {
-    for (int k = 0; k < i; ++k) {
-      a[i][k] = a[k][i] = 0.5 * (a[i][k] + a[k][i]);
-    }
-  }
-  for (int i = 0; i < 6; ++i) {
-    double most = i < 3 ? 1.0 / mass.mass : HUGE_VAL;
-    if (!hapi_finite(a[i], 6) || a[i][i] > 1.5 * most) {
-      return false;
-    }
-    a[i][i] = fmax(fmin(a[i][i], most), 0.0);
-  }
-  for (int i = 0; i < 6; ++i) { /* no off-diagonal larger than its diagonals allow */
-    for (int k = 0; k < i; ++k) {
-      double limit = sqrt(a[i][i] * a[k][k]);
-      a[i][k] = a[k][i] = fmax(-limit, fmin(limit, a[i][k]));
-    }
-  }
-  return true;
-}
-
 /* b without the wrench of the operating point, which the loop's rows give anew. */
 static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], const double base[6])
 {
-  if (!tidy(physics, slot, a) || !hapi_finite(base, 6)) {
-    ++physics->figures.stats.probes_singular; /* the last good one stays, or the body is outside */
+  hap_stats *stats = &physics->figures.stats;
+  hapi_free_body free;
+  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
+  hapi_accelerance_free_body(tested->body, tested->rotation, &free);
+  hapi_admittance kind =
+      hapi_finite(base, 6) ? hapi_admittance_tidy_body(&free, a) : HAPI_ADMITTANCE_SINGULAR;
+  stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  if (kind == HAPI_ADMITTANCE_SINGULAR) {
+    ++stats->probes_singular; /* the last good one stays, or the body is outside */
     slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
     return;
   }

@@ -52,13 +52,9 @@ static hap_status check_world(hapi_physics *physics, hap_detail *detail)
   if (hapi_bodies_scan(physics) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the table of bodies");
   }
-  const char *what = NULL;
-  dBodyID body = hapi_bodies_find_unsound(physics, &what);
-  if (body != NULL) {
-    const dReal *p = dBodyGetPosition(body);
-    return hapi_fail(detail, HAP_ERROR_WORLD,
-                     "a body at (%g, %g, %g) %s: set it right, or make the body kinematic", p[0],
-                     p[1], p[2], what);
+  hap_detail text;
+  if (hapi_world_is_unsound(physics, &text)) {
+    return hapi_fail(detail, HAP_ERROR_WORLD, "%s", text.text);
   }
   return HAP_OK;
 }

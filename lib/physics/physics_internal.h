@@ -14,6 +14,7 @@
 #include "base/fair_lock.h"
 #include "base/histogram.h"
 #include "base/thread.h"
+#include "physics/admittance.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 
@@ -110,6 +111,7 @@ typedef struct hapi_body_slot {
   double left_quat[4];
   double left_velocity[6];
   double b[6];
+  bool b_is_good;        /* scratch: of this cycle's probes */
   double new_impulse[3]; /* of the last interval, to be given to the world */
   double new_angular_impulse[3];
   double residual[6]; /* eq. 14, running total */
@@ -149,6 +151,7 @@ typedef struct hapi_contact_slot {
   double stiffness;      /* N/m, the pointer's */
   double last_force[3];  /* on the body, newest message */
   double a[6][3];
+  double measured[6][3]; /* scratch: a of this cycle's probes, before it is known to be good */
 } hapi_contact_slot;
 
 /* ---- neighbor.c ---- */
@@ -394,10 +397,16 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
 hap_status hapi_bodies_scan(hapi_physics *physics);
 hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
 void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
-/* Why a body's mass or state must not reach a step; NULL: it may. */
-const char *hapi_bodies_unsoundness(dBodyID body);
-/* The first such body; NULL when all are sound. */
-dBodyID hapi_bodies_find_unsound(hapi_physics *physics, const char **out_what);
+
+/* accelerance.c */
+/* Of a dynamic body at a rotation of ODE's. */
+void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out);
+
+/* soundness.c: what ODE would abort the process on, or make no number of. *out_text says what it is and
+ * what to do. */
+bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text);
+/* What a collider found is made of numbers. */
+bool hapi_contact_is_sound(const dContactGeom *contact);
 
 /* sleep.c: ODE's auto-disable, kept by us because a probe would reset ODE's own */
 void hapi_sleep_take(hapi_known_body *known);               /* idempotent */

@@ -12,24 +12,17 @@ static void read_pose(dBodyID body, hap_pose *out)
   memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
 }
 
+/* A step can leave a pose that is none, which is found out at the next cycle only. */
+static bool pose_is_sound(dBodyID body)
+{
+  return hapi_finite(dBodyGetPosition(body), 3) && hapi_finite(dBodyGetQuaternion(body), 4);
+}
+
 /* Row-major 3x3 of ODE's rows of four. */
 static void read_matrix(const dReal in[12], double out[9])
 {
   for (int i = 0; i < 9; ++i) {
     out[i] = in[4 * (i / 3) + i % 3];
-  }
-}
-
-/* By the adjugate; the inertia was checked to be positive. */
-static void invert(const double m[9], double out[9])
-{
-  double adjugate[9] = {
-      m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
-      m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
-      m[3] * m[7] - m[4] * m[6], m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
-  double det = m[0] * adjugate[0] + m[1] * adjugate[3] + m[2] * adjugate[6];
-  for (int i = 0; i < 9; ++i) {
-    out[i] = det != 0.0 ? adjugate[i] / det : 0.0;
   }
 }
 
@@ -53,7 +46,7 @@ static void fill_mass(dBodyID body, hapi_model_body *out)
   dBodyGetMass(body, &mass);
   out->mass = mass.mass;
   read_matrix(mass.I, out->inertia);
-  invert(out->inertia, out->inverse_inertia);
+  hapi_m3_invert(out->inertia, out->inverse_inertia);
   if (dBodyGetGyroscopicMode(body) != 0 && !turns_alike(out->inertia)) {
     out->flags |= HAPI_BODY_GYROSCOPIC;
   }
@@ -112,8 +105,8 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
       hapi_v3_copy(slot->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
-  bool sound = hapi_finite(out->pose.position, 3) && hapi_finite(out->pose.quat_wxyz, 4) &&
-               hapi_finite(out->twist.linear, 3) && hapi_finite(out->twist.angular, 3);
+  bool sound = pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
+               hapi_finite(out->twist.angular, 3);
   physics->figures.stats.states_rejected += !sound;
   return sound;
 }
@@ -142,7 +135,7 @@ static void fill_watch(hapi_physics *physics, hapi_model *out)
         physics->watch[i] != HAPI_NONE ? &physics->table.entries[physics->watch[i]] : NULL;
     bool local = known != NULL && known->slot != HAPI_NONE;
     out->watch_slot[i] = local ? known->slot : HAPI_SLOT_NONE;
-    if (known != NULL) {
+    if (known != NULL && pose_is_sound(known->body)) {
       hapi_v3_copy(dBodyGetPosition(known->body), out->watch_position[i]);
     }
   }
@@ -195,7 +188,7 @@ void hapi_publish_poses(hapi_physics *physics, int64_t now_ns)
   physics->pose_times[1] = now_ns;
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL) {
+    if (known->body != NULL && pose_is_sound(known->body)) {
       known->poses[0] = known->poses[1];
       read_pose(known->body, &known->poses[1]);
       known->poses[0] = known->pose_count == 0 ? known->poses[1] : known->poses[0];

@@ -299,6 +299,9 @@ void hapi_reconcile_residual(hapi_physics *physics)
     double world[6];
     double loop[6];
     read_velocity(body, world);
+    if (!hapi_finite(world, 6)) {
+      continue; /* the world's fault comes with the next cycle; a running total would keep it */
+    }
     hapi_v3_copy(in->twist.linear, loop);
     hapi_v3_copy(in->twist.angular, loop + 3);
     for (int k = 0; k < 6; ++k) {

@@ -199,7 +199,9 @@ hap_status hap_session_update(hap_session *session, double frame_s)
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
   double period = hapi_physics_next_period(session->physics);
   double steps = floor((session->frame_remainder_s + frame_s) / period + 1e-9);
-  session->frame_remainder_s = fmax(0.0, session->frame_remainder_s + frame_s - steps * period);
+  /* Of a time so long that its last digits are longer than a step, no remainder is known. */
+  double rest = session->frame_remainder_s + frame_s - steps * period;
+  session->frame_remainder_s = rest > 0.0 && rest < period ? rest : 0.0;
   int count = steps > 3.0 ? 3 : (int)steps;
   int64_t period_ns = (int64_t)llround(1e9 * period);
   for (int i = 0; i < count; ++i) {

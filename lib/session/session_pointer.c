@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "haptic/rt/tick.h"
 #include "session/session_internal.h"
 
 static bool unit_quaternion(const double q[4])
@@ -13,9 +14,16 @@ static bool unit_quaternion(const double q[4])
   return fabs(n2 - 1.0) < 1e-3; /* false for NaN */
 }
 
+/* False for NaN. What the loop would take for an error is not let in. */
+static bool within_reach(const double v[3])
+{
+  return fabs(v[0]) <= HAPI_STATE_LIMIT && fabs(v[1]) <= HAPI_STATE_LIMIT &&
+         fabs(v[2]) <= HAPI_STATE_LIMIT;
+}
+
 static bool good_pose(const hap_pose *pose)
 {
-  return hapi_finite(pose->position, 3) && unit_quaternion(pose->quat_wxyz);
+  return within_reach(pose->position) && unit_quaternion(pose->quat_wxyz);
 }
 
 static hap_status need(bool good, const char *what, hap_detail *detail)
@@ -55,7 +63,8 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
       {between(d->integration, HAP_INTEGRATION_AUTO, HAP_INTEGRATION_MIDPOINT),
        "integration is not one of hap_integration"},
       {between(d->hand_damping, 0.0, 1e3), "hand_damping is not in 0 .. 1e3 N s/m"},
-      {good_pose(&d->pose_world_device), "pose_world_device is not finite with a unit quaternion"},
+      {good_pose(&d->pose_world_device),
+       "pose_world_device is not within 1000 km with a unit quaternion"},
   };
   hap_status status = HAP_OK;
   for (size_t i = 0; i < sizeof rules / sizeof rules[0] && status >= HAP_OK; ++i) {
@@ -109,11 +118,18 @@ hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                   const hap_pose *pose, const hap_twist *twist)
 {
-  if (session == NULL || pose == NULL || !good_pose(pose)) {
+  if (session == NULL || pose == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  if (twist != NULL && (!hapi_finite(twist->linear, 3) || !hapi_finite(twist->angular, 3))) {
-    return HAP_ERROR_ARGUMENT;
+  if (!good_pose(pose)) {
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "the target's position is not finite or beyond 1000 km, or its "
+                             "quaternion is not unit; the pointer stays where it was");
+  }
+  if (twist != NULL && (!within_reach(twist->linear) || !within_reach(twist->angular))) {
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "the target's twist is not finite or beyond 1e6 m/s or rad/s; the "
+                             "pointer stays where it was");
   }
   return hapi_haptic_set_target(session->haptic, pointer, pose, twist);
 }

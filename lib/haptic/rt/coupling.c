@@ -16,12 +16,18 @@ static bool plausible(const double *values, int count)
   return true;
 }
 
-static void place_pointer(hapi_tick_pointer *p)
+/* False: the frame and the scale take it out of the world. */
+static bool place_pointer(hapi_tick_pointer *p)
 {
   const hap_pose *frame = &p->pose_world_device;
   double scaled[3];
+  double at[3];
   hapi_v3_scale(p->motion_scale, p->device_pose.position, scaled);
-  hapi_pose_point(frame->position, frame->quat_wxyz, scaled, p->pose.position);
+  hapi_pose_point(frame->position, frame->quat_wxyz, scaled, at);
+  if (!plausible(at, 3)) {
+    return false;
+  }
+  hapi_v3_copy(at, p->pose.position);
   hapi_quat_multiply(frame->quat_wxyz, p->device_pose.quat_wxyz, p->pose.quat_wxyz);
   hapi_quat_normalize(p->pose.quat_wxyz);
   hapi_v3_scale(p->motion_scale, p->device_twist.linear, scaled);
@@ -29,6 +35,8 @@ static void place_pointer(hapi_tick_pointer *p)
   hapi_quat_rotate(frame->quat_wxyz, p->device_twist.angular, p->twist.angular);
   hapi_v3_copy(p->pose.position, p->handle_position);
   hapi_v3_copy(p->twist.linear, p->handle_velocity);
+  p->device_good = p->device_pose;
+  return true;
 }
 
 void hapi_coupling_read(hapi_tick *tick)
@@ -38,10 +46,9 @@ void hapi_coupling_read(hapi_tick *tick)
     if (p->generation == 0) {
       continue;
     }
-    if (plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
-        plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3)) {
-      place_pointer(p);
-    } else {
+    bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
+                plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
+    if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE); /* and the pointer stays where it was */
     }
   }

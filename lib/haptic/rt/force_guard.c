@@ -42,12 +42,28 @@ static void limit_wrench(hapi_tick_pointer *p)
   }
 }
 
+static bool is_finite(const hap_wrench *wrench)
+{
+  return hapi_finite(wrench->force, 3) && hapi_finite(wrench->torque, 3);
+}
+
+static const hap_wrench no_wrench = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+
+/* The limit of a force that is finite can be none, where its square is not. */
+static void check_written(hapi_tick *tick, hapi_tick_pointer *p)
+{
+  if (!is_finite(&p->device_wrench)) {
+    hapi_tick_fault(tick, HAP_FAULT_FORCE);
+    p->wrench = p->device_wrench = no_wrench;
+  }
+}
+
 void hapi_guard(hapi_tick *tick)
 {
   bool saturated = false;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
-    if (p->generation != 0 && !hapi_finite(p->wrench.force, 3)) {
+    if (p->generation != 0 && !is_finite(&p->wrench)) {
       hapi_tick_fault(tick, HAP_FAULT_FORCE);
     }
   }
@@ -57,9 +73,10 @@ void hapi_guard(hapi_tick *tick)
       continue;
     }
     if (tick->fault != HAP_FAULT_NONE) {
-      p->wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+      p->wrench = no_wrench;
     }
     limit_wrench(p);
+    check_written(tick, p);
     saturated = saturated || p->saturated;
     double force = hapi_v3_norm(p->wrench.force);
     tick->peak_force = force > tick->peak_force ? force : tick->peak_force;

@@ -288,8 +288,12 @@ void hapi_pointer_rows(hapi_tick *tick)
   }
 }
 
+/* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
 static void audit(hapi_tick *tick, const double force[3])
 {
+  if (!hapi_finite(force, 3)) {
+    return;
+  }
   hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
   tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
 }

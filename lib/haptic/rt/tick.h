@@ -55,6 +55,7 @@ typedef struct hapi_tick_pointer {
 
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
+  hap_pose device_good;   /* the last device_pose that could be used */
   uint32_t buttons;       /* in */
   bool estimates;         /* device_twist is made of poses by velocity, not read */
   hapi_velocity velocity;
