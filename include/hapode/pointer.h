@@ -47,6 +47,9 @@ typedef struct hap_pointer_def {
   hap_coupling coupling;      /* default HAP_COUPLING_DIRECT */
   uint32_t collide_bits;      /* the pointer touches geoms whose category bits meet these; default
                                  all */
+  double max_slew; /* N/s at the device, >= 0: fastest change of the force, also on the way to zero
+                      after a fault; the torque's is in the same proportion to its limit. 0
+                      (default): the whole force in 2 ms */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */
@@ -66,6 +69,16 @@ HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id point
 HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                           const hap_pose *pose, const hap_twist *twist);
 
+/* What the guard did to a pointer's force. Bits; values are fixed. */
+typedef enum hap_guard_flag {
+  HAP_GUARD_STALE = 1,      /* less force: the local model is older than two physics steps */
+  HAP_GUARD_RAMP_IN = 2,    /* less force: the first 20 ms after a start or a reset */
+  HAP_GUARD_ENERGY = 4,     /* the energy observer held force back */
+  HAP_GUARD_SLEW = 8,       /* the slew limit held it back */
+  HAP_GUARD_SATURATED = 16, /* beyond a limit and shortened, direction kept */
+  HAP_GUARD_FAULT = 32      /* a fault is latched: on the way to zero, or there */
+} hap_guard_flag;
+
 typedef struct hap_pointer_state {
   uint32_t size;
   uint32_t contacts; /* bodies that push back now */
@@ -76,7 +89,7 @@ typedef struct hap_pointer_state {
   hap_wrench wrench; /* on the hand, world frame, after the guard: what was written to the
                            device, divided by force_scale */
   uint32_t buttons;  /* bit 0 is the first one */
-  uint32_t reserved;
+  uint32_t guard;    /* hap_guard_flag bits */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. */

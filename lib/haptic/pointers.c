@@ -5,7 +5,10 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "device/device.h"
+#include "device/emergency.h"
 #include "haptic/haptic_internal.h"
+
+#define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
 
 /* ---- the loop's side ---- */
 
@@ -28,6 +31,8 @@ static void activate(hapi_haptic *haptic, uint32_t index)
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
   p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque
                                                                                : def->max_torque;
+  p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;
+  p->slew_torque = p->max_torque * (p->slew_force / p->max_force);
   p->device_pose.quat_wxyz[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
@@ -56,6 +61,15 @@ void hapi_pointers_follow(hapi_haptic *haptic)
   }
 }
 
+/* What the device would do with another force nobody knows: zero, and no ramp. */
+static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
+{
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  slot->ops->zero(slot->self);
+  hapi_guard_cut(&haptic->tick.pointers[index]);
+  hapi_tick_fault(&haptic->tick, fault, index + 1);
+}
+
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
@@ -75,7 +89,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     uint32_t buttons = 0;
     if (slot->ops->read(slot->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
-      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_READ);
+      fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
     }
     p->device_pose = pose;
@@ -94,8 +108,10 @@ void hapi_pointers_write(hapi_haptic *haptic)
     }
     hap_wrench reached;
     if (slot->ops->write(slot->self, &p->device_wrench, &reached) < HAP_OK) {
-      slot->ops->zero(slot->self);
-      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_WRITE);
+      fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
+    }
+    if (hapi_emergencies() != haptic->emergencies) {
+      slot->ops->zero(slot->self); /* it came while this force was being written */
     }
   }
 }
@@ -117,7 +133,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     out->twist = p->twist;
     out->wrench = p->wrench;
     out->buttons = p->buttons;
-    out->reserved = 0;
+    out->guard = p->guard.flags;
     hapi_triple_publish(&slot->state_buffer);
   }
 }
@@ -138,6 +154,12 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
   if (slot->ops->start(slot->self) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "device %s did not start", slot->ops->name);
   }
+  if (!hapi_emergency_add(slot->ops, slot->self)) {
+    slot->ops->zero(slot->self);
+    slot->ops->stop(slot->self);
+    return hapi_fail(detail, HAP_ERROR_CAPACITY, "all %d places for running devices are in use",
+                     HAPI_EMERGENCY_DEVICES);
+  }
   slot->started = true;
   return HAP_OK;
 }
@@ -146,6 +168,7 @@ static void stop_device(hapi_pointer_slot *slot)
 {
   if (slot->ops != NULL && slot->started) {
     slot->ops->zero(slot->self);
+    hapi_emergency_remove(slot->ops, slot->self);
     slot->ops->stop(slot->self);
     slot->started = false;
   }

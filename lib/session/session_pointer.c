@@ -42,6 +42,7 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
       {between(d->force_scale, 0.0, 1e6), "force_scale is not in 0 .. 1e6"},
       {between(d->max_force, 1e-6, 1e6), "max_force is not in 1e-6 .. 1e6 N"},
       {between(d->max_torque, 1e-6, 1e6), "max_torque is not in 1e-6 .. 1e6 N m"},
+      {between(d->max_slew, 0.0, 1e12), "max_slew is not in 0 .. 1e12 N/s"},
       {good_pose(&d->pose_world_device), "pose_world_device is not finite with a unit quaternion"},
   };
   hap_status status = HAP_OK;

@@ -39,7 +39,7 @@ void hapi_coupling_read(hapi_tick *tick)
         plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3)) {
       place_pointer(p);
     } else {
-      hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE); /* and the pointer stays where it was */
+      hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
     }
   }
 }
