@@ -51,13 +51,13 @@ typedef struct hap_black_box_row {
   uint64_t tick;
   int64_t time_ns; /* of the session */
   hap_pointer_id pointer;
-  uint32_t fault;       /* hap_fault latched at the end of the tick */
-  uint32_t guard;       /* hap_guard_flag bits */
-  hap_pose pose;        /* as the device gave it: not finite, where that was the fault */
-  hap_twist twist;      /* the same */
-  hap_wrench wanted;    /* what the simulation asked for; may be not finite */
-  hap_wrench written;   /* what the device was given */
-  double model_age_s;   /* s, now - time for which the local model was built */
+  uint32_t fault;     /* hap_fault latched at the end of the tick */
+  uint32_t guard;     /* hap_guard_flag bits */
+  hap_pose pose;      /* as the device gave it: not finite, where that was the fault */
+  hap_twist twist;    /* the same */
+  hap_wrench wanted;  /* what the simulation asked for; may be not finite */
+  hap_wrench written; /* what the device was given */
+  double model_age_s; /* s, now - time for which the local model was built */
 } hap_black_box_row;
 
 /* [app] The last ticks before the latched fault and the first one with it: up to

@@ -44,7 +44,8 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   }
   haptic->config = *config;
   pthread_mutex_init(&haptic->black_box_lock, NULL);
-  if (!create_black_box(&haptic->black_box, config->capacity.pointers) || !hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
+  if (!create_black_box(&haptic->black_box, config->capacity.pointers) ||
+      !hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
       hapi_trace_ring_create(&haptic->ring, config->trace_rows) != HAP_OK) {
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;

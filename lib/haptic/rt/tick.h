@@ -46,20 +46,20 @@
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
-  double share;        /* 0..1, of the ramp-in */
-  bool cut;            /* its device failed, or an emergency: zero at once, until a reset */
-  bool placed;         /* position and moved are of the device as it is now */
-  double position[3];  /* at the last tick */
-  double moved[3];     /* since the tick before */
-  hap_wrench wanted;   /* before the guard */
-  hap_wrench written;  /* at the last tick; in force until the next write */
-  uint32_t flags;      /* hap_guard_flag, of the last tick */
+  double share;       /* 0..1, of the ramp-in */
+  bool cut;           /* its device failed, or an emergency: zero at once, until a reset */
+  bool placed;        /* position and moved are of the device as it is now */
+  double position[3]; /* at the last tick */
+  double moved[3];    /* since the tick before */
+  hap_wrench wanted;  /* before the guard */
+  hap_wrench written; /* at the last tick; in force until the next write */
+  uint32_t flags;     /* hap_guard_flag, of the last tick */
 } hapi_guard_pointer;
 
 /* What the guard keeps of the whole loop. */
 typedef struct hapi_guard_state {
   hap_guard mode;
-  double age_loss;   /* 0..1, share of the force that the age of the local model has taken */
+  double age_loss; /* 0..1, share of the force that the age of the local model has taken */
   bool stale;
   uint64_t stale_times;
   uint64_t stale_ticks;
@@ -67,7 +67,7 @@ typedef struct hapi_guard_state {
   uint64_t energy_ticks;
   double balance;    /* J, world units: what the hands and the world have put in and not got back */
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
-  double given;      /* J, of this tick: what contacts with things of given motion did on bodies that
+  double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
 
@@ -79,9 +79,9 @@ typedef struct hapi_tick_pointer {
   double damping;
   double motion_scale;
   double force_scale;
-  double max_force;  /* N at the device */
-  double max_torque; /* N m at the device */
-  double slew_force; /* N/s at the device */
+  double max_force;   /* N at the device */
+  double max_torque;  /* N m at the device */
+  double slew_force;  /* N/s at the device */
   double slew_torque; /* N m/s at the device */
   hap_pose pose_world_device;
 
