@@ -108,43 +108,45 @@ static double bodies_lose(const hapi_tick *tick, double *io_stored)
   return sum;
 }
 
-/* Speed of a body's point [m/s], the mean over the tick where it is known. */
-static void surface_velocity(const hapi_tick *tick, const hapi_local_body *body,
-                             const double point[3], double out[3])
+/* J that a force at a point does on a body in this tick: with the mean of its velocities where both
+ * are known. */
+static double work_on(const hapi_tick *tick, const hapi_local_body *body, const double point[3],
+                      const double force[3])
 {
   double arm[3];
-  double linear[3];
-  double angular[3];
-  hapi_v3_copy(body->twist.linear, linear);
-  hapi_v3_copy(body->twist.angular, angular);
-  if (tick->model == HAP_MODEL_CONTACT) {
-    for (int i = 0; i < 3; ++i) {
-      linear[i] = 0.5 * (linear[i] + body->start_twist[i]);
-      angular[i] = 0.5 * (angular[i] + body->start_twist[3 + i]);
-    }
-  }
+  double moment[3];
   hapi_v3_sub(point, body->pose.position, arm);
-  hapi_v3_cross(angular, arm, out);
-  hapi_v3_add(out, linear, out);
+  hapi_v3_cross(arm, force, moment);
+  double power = hapi_v3_dot(force, body->twist.linear) + hapi_v3_dot(moment, body->twist.angular);
+  if (tick->model == HAP_MODEL_CONTACT) {
+    double before =
+        hapi_v3_dot(force, body->start_twist) + hapi_v3_dot(moment, body->start_twist + 3);
+    power = 0.5 * (power + before);
+  }
+  return tick->period * power;
 }
 
 /* J that bodies of given motion do on the pointers' springs in this tick. */
 static double surfaces_give(hapi_tick *tick, double *io_stored)
 {
   double sum = 0.0;
+  double half_compliance = 0.0;
+  uint32_t pointer = HAPI_SLOT_NONE; /* that it belongs to: a division for each contact costs */
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *c = &tick->contacts[i];
     const hapi_local_body *body = hapi_row_body(tick, c->body);
     double force2 = hapi_v3_dot(c->force, c->force);
-    double stiffness = tick->pointers[c->pointer].stiffness;
     if (!(force2 > 0.0)) {
       continue;
     }
-    *io_stored += stiffness > 0.0 ? 0.5 * force2 / stiffness : 0.0;
+    if (pointer != c->pointer) {
+      pointer = c->pointer;
+      double stiffness = tick->pointers[pointer].stiffness;
+      half_compliance = stiffness > 0.0 ? 0.5 / stiffness : 0.0;
+    }
+    *io_stored += half_compliance * force2;
     if (body != NULL && !is_owned(tick, body)) {
-      double velocity[3];
-      surface_velocity(tick, body, c->point_now, velocity);
-      sum -= tick->period * hapi_v3_dot(c->force, velocity);
+      sum -= work_on(tick, body, c->point_now, c->force);
     }
   }
   return sum;
