@@ -33,13 +33,11 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   tick->fault_pointer = 0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.share = 0.0;
-    tick->pointers[i].guard.cut = false;
   }
 }
 
 void hapi_guard_cut(hapi_tick_pointer *pointer)
 {
-  pointer->guard.cut = true;
   memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
 }
 
@@ -160,9 +158,7 @@ static void report_written(hapi_tick_pointer *p)
 
 static void write_pointer(const hapi_tick *tick, hapi_tick_pointer *p)
 {
-  if (p->guard.cut) {
-    memset(&p->device_wrench, 0, sizeof p->device_wrench);
-  } else if (tick->guard.mode == HAP_GUARD_ON) {
+  if (tick->guard.mode == HAP_GUARD_ON) {
     limit_slew(tick, p);
   }
   limit_norm(p);

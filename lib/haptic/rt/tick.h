@@ -47,7 +47,6 @@
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
   double share;       /* 0..1, of the ramp-in */
-  bool cut;           /* its device failed, or an emergency: zero at once, until a reset */
   bool placed;        /* position and moved are of the device as it is now */
   double position[3]; /* at the last tick */
   double moved[3];    /* since the tick before */
@@ -250,7 +249,7 @@ void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
 void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer);
 void hapi_tick_reset_fault(hapi_tick *tick);
 
-/* From now on this pointer's device gets zero, whatever the slew limit says. */
+/* The device has zero force at once, whatever the slew limit says. With a fault it stays so. */
 void hapi_guard_cut(hapi_tick_pointer *pointer);
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
