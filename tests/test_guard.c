@@ -358,27 +358,31 @@ typedef struct energy {
   double peak;   /* N */
 } energy;
 
-/* The hand goes to and fro about the wall's surface, depth metres deep, at hz. The work is taken from
+/* The hand goes 10 mm to and fro about the wall's surface, at hz; a device that is scale times smaller
+ * and weaker. The work is taken from
  * what was written and where the device was, nothing else. */
-static energy tap_wall(hap_guard mode, double depth, double hz, double damping, int ticks)
+static energy tap_wall(hap_guard mode, double scale, double hz, double damping, int ticks)
 {
+  const double depth = 0.01;
   energy e = {0.0, 0.0, 0.0, 0.0};
   hapi_tick_pointer *p = guarded_wall();
   f.tick.guard.mode = mode;
+  p->motion_scale = scale;
+  p->force_scale = 1.0 / scale;
   p->damping = damping;
   f.tick.physics_period = 0.0; /* the wall does not grow old */
   for (int i = 0; i < ticks; ++i) {
     double angle = 2.0 * 3.14159265358979 * hz * T * i;
     double x = -0.01 - depth * cos(angle);
-    double moved = x - p->device_pose.position[0];
-    e.gained += i > 0 ? p->device_wrench.force[0] * moved : 0.0;
+    double moved = x / scale - p->device_pose.position[0];
+    e.gained += i > 0 ? scale * scale * p->device_wrench.force[0] * moved : 0.0;
     e.most = fmax(e.most, e.gained);
-    p->device_pose.position[0] = x;
-    p->device_twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle);
+    p->device_pose.position[0] = x / scale;
+    p->device_twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle) / scale;
     run(1);
     double deep = fmax(x + 0.01, 0.0);
     e.stored = fmax(e.stored, 0.5 * p->stiffness * deep * deep);
-    e.peak = fmax(e.peak, hapi_v3_norm(p->device_wrench.force));
+    e.peak = fmax(e.peak, hapi_v3_norm(p->wrench.force));
   }
   return e;
 }
@@ -386,8 +390,8 @@ static energy tap_wall(hap_guard mode, double depth, double hz, double damping, 
 TEST(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in)
 {
   /* k v^2 T^2 / 2 a tick is what holding the force makes of nothing (Colgate, Schenkel). */
-  energy bare = tap_wall(HAP_GUARD_MEASURE, 0.01, 5.0, 0.0, 10000);
-  energy kept = tap_wall(HAP_GUARD_ON, 0.01, 5.0, 0.0, 10000);
+  energy bare = tap_wall(HAP_GUARD_MEASURE, 1.0, 5.0, 0.0, 10000);
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 5.0, 0.0, 10000);
   printf("# of %.3g J stored: %.3g bare, %.3g guarded, peak %.4g and %.4g N, %llu ticks\n",
          bare.stored, bare.most, kept.most, bare.peak, kept.peak,
          (unsigned long long)f.tick.guard.energy_ticks);
@@ -396,10 +400,16 @@ TEST(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in)
   CHECK(kept.peak >= 0.98 * bare.peak);
 }
 
+TEST(energy_counts_in_the_world_whatever_the_scales)
+{
+  energy kept = tap_wall(HAP_GUARD_ON, 5.0, 5.0, 0.0, 10000);
+  CHECK(kept.most > 0.005 * kept.stored && kept.most <= 0.01 * kept.stored);
+}
+
 TEST(a_damper_that_drives_is_held_back)
 {
-  energy bare = tap_wall(HAP_GUARD_MEASURE, 0.01, 3.0, -20.0, 3000);
-  energy kept = tap_wall(HAP_GUARD_ON, 0.01, 3.0, -20.0, 3000);
+  energy bare = tap_wall(HAP_GUARD_MEASURE, 1.0, 3.0, -20.0, 3000);
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 3.0, -20.0, 3000);
   printf("# of %.3g J stored: %.3g bare, %.3g guarded\n", bare.stored, bare.most, kept.most);
   CHECK(bare.most > bare.stored);
   CHECK(kept.most <= 0.01 * kept.stored + 1e-5);
@@ -407,7 +417,7 @@ TEST(a_damper_that_drives_is_held_back)
 
 TEST(a_wall_with_a_damper_is_left_alone)
 {
-  energy kept = tap_wall(HAP_GUARD_ON, 0.01, 5.0, 5.0, 10000);
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 5.0, 5.0, 10000);
   CHECK(f.tick.guard.energy_ticks == 0 && kept.peak > 9.0);
 }
 
@@ -469,6 +479,70 @@ TEST(an_honest_impact_is_felt_whole)
     CHECK(hands[i] > 0.0 || f.tick.guard.energy_ticks == 0);
     CHECK(total[1] <= 1.01 * 0.125); /* J that the body brought */
   }
+}
+
+/* A body presses against a hand that gives way at 0.05 m/s: with its weight, or because it is driven. The
+ * hand gains energy all the time, and the world loses it. */
+static void yield_to(uint32_t flags, hap_model model)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_tick_pointer *p = guarded_pointer(0);
+  f.model->model = model;
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = flags;
+  body->mass = 0.2;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = 1e-3;
+    body->inverse_inertia[4 * i] = 1e3;
+  }
+  body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = HUGE_VAL;
+  body->gravity[0] = -10.0;
+  body->pose.position[0] = 0.028; /* 2 mm deep: 2 N */
+  body->twist.linear[0] = -0.05;
+  hapi_model_contact *c = add_contact(0, 0, 0);
+  c->point_body[0] = -0.02;
+  adopt();
+  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
+  patches->model_number = f.model->number;
+  patches->contact_count = 0;
+  hapi_tick_adopt_patches(&f.tick, patches);
+  f.contacts[0].seen = true; /* no ramp of its own */
+  f.contacts[0].ramp = 1.0;
+  p->guard.share = 1.0;
+  for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
+    p->device_pose.position[0] = -0.05 * T * i;
+    p->device_twist.linear[0] = -0.05;
+    run(1);
+    CHECK_NEAR(p->device_wrench.force[0], -2.0, 0.05);
+  }
+  CHECK(f.tick.guard.energy_ticks == 0 && f.tick.guard.stored_max < 0.01);
+}
+
+TEST(what_a_weight_or_a_drive_gives_is_felt)
+{
+  yield_to(HAPI_BODY_OWNED, HAP_MODEL_CONTACT);
+  yield_to(HAPI_BODY_DRIVEN, HAP_MODEL_CONTACT);
+  yield_to(HAPI_BODY_DRIVEN, HAP_MODEL_ACCELERANCE);
+}
+
+TEST(a_device_has_not_moved_when_it_is_first_seen)
+{
+  hapi_tick_pointer *p =
+      guarded_alone(); /* 0.1 m from its origin, on the side that it is pushed to */
+  for (int again = 0; again < 2; ++again) {
+    p->guard.share = 1.0;
+    guard_wrench(p, -4.0, 0.0, 0.0);
+    check_v3(p->device_wrench.force, -4.0, 0.0, 0.0, 0.0);
+    hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 1);
+    p->device_pose.position[0] = (double)NAN;
+    guard_wrench(p, 0.0, 0.0, 0.0);
+    p->device_pose.position[0] = -0.3; /* where it is put meanwhile */
+    hapi_tick_reset_fault(&f.tick);
+  }
+  CHECK(f.tick.guard.energy_ticks == 0);
 }
 
 /* ---- the black box ---- */
@@ -582,9 +656,12 @@ int main(void)
   RUN(a_model_of_two_steps_is_not_too_old);
   RUN(without_a_model_and_in_model_single_nothing_grows_old);
   RUN(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in);
+  RUN(energy_counts_in_the_world_whatever_the_scales);
   RUN(a_damper_that_drives_is_held_back);
   RUN(a_wall_with_a_damper_is_left_alone);
   RUN(an_honest_impact_is_felt_whole);
+  RUN(what_a_weight_or_a_drive_gives_is_felt);
+  RUN(a_device_has_not_moved_when_it_is_first_seen);
   RUN(the_black_box_keeps_the_last_256_ticks_until_the_reset);
   RUN(each_pointer_has_its_rows);
   RUN(a_loop_never_waits_for_a_reader);
