@@ -31,6 +31,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);
   options.def.drive = HAP_DRIVE_LOCKSTEP;
+  options.def.guard = HAP_GUARD_MEASURE;
   options.def.model = def->model;
   options.def.physics_hz = def->physics_hz;
   options.def.haptic_hz = def->haptic_hz;

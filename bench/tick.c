@@ -13,6 +13,7 @@
 #include "base/vec.h"
 #include "bench/bench.h"
 #include "bench/tick_contact.h"
+#include "bench/tick_guard.h"
 #include "haptic/rt/tick.h"
 #include "haptic/tick_memory.h"
 #include "sync/exchange.h"
@@ -100,6 +101,7 @@ static void put_pointer(hapi_tick_pointer *p)
   p->damping = damping;
   p->motion_scale = p->force_scale = 1.0;
   p->max_force = p->max_torque = 1e6;
+  p->slew_force = p->slew_torque = 5e8;
   p->pose_world_device.quat_wxyz[0] = 1.0;
   p->device_pose.quat_wxyz[0] = 1.0;
 }
@@ -210,6 +212,7 @@ hap_status bench_tick(bench *b)
       }
     }
   }
+  status = status >= HAP_OK ? bench_tick_guard(b, csv) : status;
   status = status >= HAP_OK ? bench_tick_contact(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;

@@ -115,6 +115,7 @@ static inline void cw_open(contact_world *w, double gravity)
   w->surface = (dSurfaceParameters){.mode = dContactApprox1, .mu = 0.5};
   hap_session_def_init(&w->def, sizeof w->def);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
+  w->def.guard = HAP_GUARD_MEASURE; /* what the hand feels is what the bodies get */
   w->def.model = HAP_MODEL_CONTACT;
   w->def.physics_hz = 20.0;
   w->def.trace_rows = 16;

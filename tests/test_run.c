@@ -481,6 +481,58 @@ TEST(a_device_fault_ends_the_run_with_1)
   CHECK(number_of("faults") == 1.0);
 }
 
+static size_t lines_of(const char *path, char *out_last, size_t size)
+{
+  size_t count = 0;
+  FILE *file = fopen(path, "r");
+  while (file != NULL && fgets(out_last, (int)size, file) != NULL) {
+    ++count;
+  }
+  if (file != NULL) {
+    fclose(file);
+  }
+  return count;
+}
+
+TEST(a_fault_leaves_its_last_ticks)
+{
+  char last[2000] = "";
+  /* A spline goes through them: it feels the leap a few samples before. */
+  write_text(file_in_folder("late.csv"),
+             "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,0,0,0.5\n0.3,0,0,0.5\n0.4,0,0,0.5\n"
+             "0.5,0,0,0.5\n0.6,0,0,0.5\n0.7,0,0,0.5\n0.8,9e5,0,0.5\n0.9,9e5,0,0.5\n");
+  char box[320];
+  snprintf(box, sizeof box, "%s", file_in_folder("box.csv"));
+  CHECK(run("--lockstep --seconds 1 --device replay:%s,scale=10 --black-box %s",
+            file_in_folder("late.csv"), box) == 1);
+  CHECK(says("last 256 ticks before the fault") && says("pointer 1"));
+  CHECK(lines_of(box, last, sizeof last) == 257);
+  unsigned tick = 0;
+  unsigned pointer = 0;
+  unsigned fault = 0;
+  CHECK(sscanf(last, "%u,%*[^,],%u,%u,", &tick, &pointer, &fault) == 3);
+  CHECK(tick > 255 && pointer == 1 && fault == 2);
+  CHECK(run("--lockstep --seconds 0.1 --black-box %s", box) == 0);
+  CHECK(lines_of(box, last, sizeof last) == 1); /* no fault, no rows */
+  CHECK(run("--lockstep --seconds 0.1 --black-box /no/such/place") == 1 && says("--black-box"));
+  CHECK(run("--lockstep --seconds 0.1 --trace %s --black-box %s", box, box) == 2);
+}
+
+TEST(a_deadly_signal_still_kills)
+{
+  const struct timespec pause = {0, 300000000};
+  static const int signals[] = {SIGABRT, SIGSEGV};
+  for (int i = 0; i < 2; ++i) {
+    int result = 0;
+    pid_t child = start("--seconds 10000 --no-realtime", environ);
+    REQUIRE(child > 0);
+    nanosleep(&pause, NULL);
+    kill(child, signals[i]);
+    CHECK(waitpid(child, &result, 0) == child);
+    CHECK(WIFSIGNALED(result) && WTERMSIG(result) == signals[i]);
+  }
+}
+
 static void interrupt(int number, const char *arguments)
 {
   const struct timespec pause = {0, 300000000};
@@ -566,6 +618,8 @@ int main(void)
   RUN(a_recording_runs_in_lockstep);
   RUN(every_scene_runs_in_every_model);
   RUN(a_device_fault_ends_the_run_with_1);
+  RUN(a_fault_leaves_its_last_ticks);
+  RUN(a_deadly_signal_still_kills);
   RUN(a_signal_ends_the_run_with_its_summary);
   RUN(the_picture_is_an_svg);
   RUN(without_gnuplot_one_line_says_so);

@@ -125,6 +125,8 @@ static const struct {
     WHOLE_FIELD(model, -1),
     WHOLE_FIELD(impulse_pose, 2),
     WHOLE_FIELD(probe, 2),
+    WHOLE_FIELD(guard, 2),
+    WHOLE_FIELD(guard, -1),
     WHOLE_FIELD(flags, 1),
     WHOLE_FIELD(flags, -2147483648.0),
     WHOLE_FIELD(physics_latency_ticks, -2),

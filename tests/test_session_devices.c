@@ -465,6 +465,8 @@ static const struct {
     FIELD(max_force, 0.0, HAP_ERROR_ARGUMENT),
     FIELD(max_force, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(max_torque, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(max_slew, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(max_slew, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.position, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.position, 1e300, HAP_ERROR_ARGUMENT),
     FIELD(pose_world_device.quat_wxyz, 0.0, HAP_ERROR_ARGUMENT),

@@ -66,6 +66,7 @@ static inline void set_up(void)
   f.tick.capacity = capacity;
   f.tick.period = T;
   f.tick.hashing = true;
+  f.tick.guard.mode = HAP_GUARD_MEASURE; /* the tests of the guard switch it on */
   f.tick.bodies = f.bodies;
   f.tick.live = f.live;
   f.tick.contacts = f.contacts;

@@ -11,6 +11,7 @@
 
 #include "tools/plot.h"
 #include "tools/rig.h"
+#include "tools/run_black_box.h"
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
 #include "tools/run_options.h"
@@ -52,6 +53,37 @@ static bool open_trace(const run_options *options, run_loop *loop, hap_detail *d
   size_t bodies = loop->rig->scene->body_count;
   loop->trace.bodies = bodies < HAP_TRACE_BODIES_MAX ? bodies : HAP_TRACE_BODIES_MAX;
   return check_writable("--trace", options->trace_path, loop->trace.file, detail);
+}
+
+static bool open_black_box(const run_options *options, run_loop *loop, hap_detail *detail)
+{
+  if (options->black_box_path == NULL) {
+    return true;
+  }
+  loop->black_box = fopen(options->black_box_path, "w");
+  return check_writable("--black-box", options->black_box_path, loop->black_box, detail);
+}
+
+/* The file has its rows when there was a fault; of a run without one only the header. */
+static bool close_black_box(run_loop *loop, hap_detail *detail)
+{
+  FILE *file = loop->black_box;
+  const char *path = loop->options->black_box_path;
+  loop->black_box = NULL;
+  if (file == NULL) {
+    return true;
+  }
+  size_t ticks = run_black_box_write(loop->rig->session, file);
+  bool good = ferror(file) == 0;
+  if (fclose(file) != 0 || !good) {
+    snprintf(detail->text, sizeof detail->text, "--black-box %.300s: cannot be written: %s", path,
+             strerror(errno));
+    return false;
+  }
+  if (ticks > 0) {
+    fprintf(stderr, "hapode-run: last %zu ticks before the fault: %s\n", ticks, path);
+  }
+  return true;
 }
 
 static bool open_picture(const run_options *options, run_loop *loop, hap_detail *detail)
@@ -139,6 +171,9 @@ static int run_and_report(run_loop *loop)
   if (!close_trace(loop, &detail) && code == EXIT_GOOD) {
     code = complain(EXIT_FAILED, detail.text);
   }
+  if (!close_black_box(loop, &detail) && code == EXIT_GOOD) {
+    code = complain(EXIT_FAILED, detail.text);
+  }
   if (draw(loop, &detail) < HAP_OK) {
     code = complain(EXIT_FAILED, detail.text);
   }
@@ -159,11 +194,13 @@ static int run_in(const run_options *options, rig *r)
   run_loop loop = {.options = options, .rig = r, .seconds = seconds};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = EXIT_FAILED;
-  if (open_trace(options, &loop, &detail) && open_picture(options, &loop, &detail)) {
+  if (open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&
+      open_picture(options, &loop, &detail)) {
     code = run_and_report(&loop);
   } else {
     complain(EXIT_FAILED, detail.text);
     (void)close_trace(&loop, &detail);
+    (void)close_black_box(&loop, &detail);
   }
   run_picture_destroy(loop.picture);
   return code;

@@ -14,6 +14,8 @@ typedef struct effect {
 
 #define BIT(model) (1u << (model))
 #define CONTACT BIT(HAP_MODEL_CONTACT)
+#define EVERY \
+  (BIT(HAP_MODEL_SINGLE) | BIT(HAP_MODEL_IMPULSE) | BIT(HAP_MODEL_ACCELERANCE) | CONTACT)
 
 static const effect effects[RUN_EFFECTS] = {
     {"testing", "testing simulations", BIT(HAP_MODEL_ACCELERANCE), CONTACT, 0},
@@ -28,7 +30,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"gyro", "gyroscopic term in the loop", CONTACT, 0, 0},
     {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
     {"proxy", "coupling by a proxy", 0, 0, 0},
-    {"observer", "energy observer", 0, 0, 0},
+    {"observer", "energy observer", EVERY, 0, 0},
     {"recording", "recording for a replay bit for bit", 0, 0, 0},
 };
 

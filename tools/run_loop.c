@@ -26,25 +26,45 @@ typedef struct watch {
   hap_detail *detail;
 } watch;
 
+/* Ends the process by the signal, with the force gone. A tick that is under way may write once more:
+ * hence twice, with 2 ms between. */
+static void let_go_and_die(int number)
+{
+  const struct timespec tick = {0, 2000000};
+  hap_emergency_zero();
+  (void)nanosleep(&tick, NULL);
+  hap_emergency_zero();
+  signal(number, SIG_DFL);
+  raise(number);
+}
+
 static void want_stop(int number)
 {
-  (void)number;
+  if (stop_wanted != 0) {
+    let_go_and_die(number); /* whoever asks twice does not wait for what hangs */
+  }
   stop_wanted = 1;
+}
+
+static void set_handler(const int *numbers, size_t count, void (*handler)(int))
+{
+  struct sigaction action;
+  memset(&action, 0, sizeof action);
+  action.sa_handler = handler;
+  sigemptyset(&action.sa_mask);
+  for (size_t i = 0; i < count; ++i) {
+    sigaction(numbers[i], &action, NULL);
+  }
 }
 
 void run_loop_catch_signals(void)
 {
   const int ending[] = {SIGINT, SIGTERM, SIGHUP};
-  struct sigaction action;
-  memset(&action, 0, sizeof action);
-  action.sa_handler = want_stop;
-  sigemptyset(&action.sa_mask);
-  for (size_t i = 0; i < sizeof ending / sizeof ending[0]; ++i) {
-    sigaction(ending[i], &action, NULL);
-  }
-  /* A reader of the trace that goes away must not end us with the force on. */
-  action.sa_handler = SIG_IGN;
-  sigaction(SIGPIPE, &action, NULL);
+  const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+  const int harmless[] = {SIGPIPE}; /* a reader that goes away must not end us with the force on */
+  set_handler(ending, sizeof ending / sizeof ending[0], want_stop);
+  set_handler(deadly, sizeof deadly / sizeof deadly[0], let_go_and_die);
+  set_handler(harmless, 1, SIG_IGN);
 }
 
 int32_t run_loop_trace_rows(const run_options *options)

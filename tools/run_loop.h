@@ -15,6 +15,7 @@ typedef struct run_loop {
   const rig *rig;
   double seconds;
   trace_csv trace;      /* file NULL: none wanted */
+  FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
   run_progress progress;
 } run_loop;
@@ -22,7 +23,8 @@ typedef struct run_loop {
 /* Rows that the session has to keep for run_loop_run. 0: nobody wants them. */
 int32_t run_loop_trace_rows(const run_options *options);
 
-/* From now on SIGINT, SIGTERM and SIGHUP end the run instead of the process. */
+/* From now on SIGINT, SIGTERM and SIGHUP end the run instead of the process, a second one of them ends
+ * it too. Whatever signal ends the process, the force is zero before. */
 void run_loop_catch_signals(void);
 
 /* Starts the session, runs it, stops it. HAP_NO_REALTIME as of hap_session_start; HAP_END when a

@@ -178,6 +178,8 @@ static const option table[] = {
      offsetof(run_options, trace_path), 0, 0},
     {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
      offsetof(run_options, plot_path), 0, 0},
+    {"--black-box", "FILE", "after a fault, the last 256 ticks before it as a CSV file", take_text,
+     offsetof(run_options, black_box_path), 0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
      take_priority, 0, 0, 99},
     {"--no-realtime", NULL, "do not ask for real-time rights", take_no_realtime, 0, 0, 0},
@@ -256,6 +258,11 @@ static hap_status check(run_options *o, hap_detail *detail)
   if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
     return fail(detail, "--plot: the same file as --trace");
   }
+  if (o->black_box_path != NULL &&
+      ((o->trace_path != NULL && strcmp(o->black_box_path, o->trace_path) == 0) ||
+       (o->plot_path != NULL && strcmp(o->black_box_path, o->plot_path) == 0))) {
+    return fail(detail, "--black-box: the same file as --trace or --plot");
+  }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
     return fail(detail, "--effects: %.480s", why.text);
   }
@@ -292,7 +299,7 @@ void run_options_help(FILE *out)
   }
   fputs(
       "\nA summary comes on stdout, one \"key: value\" a line. Ctrl-C takes the force away and "
-      "ends\nthe run with its summary.\n"
+      "ends\nthe run with its summary; a second one ends it at once.\n"
       "exit: 0 run complete (also without real-time rights) or stopped by Ctrl-C, 1 it failed or "
       "a\ndevice did, 2 wrong usage\n",
       out);

@@ -24,6 +24,7 @@ typedef struct run_options {
   double model_age_s; /* negative: not given */
   const char *trace_path;
   const char *plot_path;
+  const char *black_box_path;
   run_effects effects;
 } run_options;
 

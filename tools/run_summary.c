@@ -60,6 +60,9 @@ static void print_more(const hap_stats *stats, FILE *out)
   count(out, "saturated_ticks", stats->saturated_ticks);
   count(out, "capacity_dropped", stats->capacity_dropped);
   count(out, "trace_dropped", stats->trace_dropped);
+  count(out, "stale_times", stats->stale_times);
+  count(out, "slewed_ticks", stats->slewed_ticks);
+  count(out, "energy_ticks", stats->energy_ticks);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats, FILE *out)

@@ -43,6 +43,12 @@ HAP_API void hap_device_close(hap_device *device);
 HAP_API hap_status hap_device_get_info(const hap_device *device, hap_device_info *out,
                                        size_t size_of_out);
 
+/* [any, also a signal handler] Zero force on every device of every running session, at once. The
+ * sessions latch HAP_FAULT_EMERGENCY: no force until hap_session_reset_fault. A write that is under way
+ * in the haptic thread may still come after it, and is followed by another zero within the same tick;
+ * a handler that ends the process calls this twice, 2 ms apart. */
+HAP_API void hap_emergency_zero(void);
+
 /* [any] The names that hap_device_open knows, index from 0; NULL past the end. One line about
  * each in *out_description when it is not NULL. */
 HAP_API const char *hap_device_name_at(size_t index, const char **out_description);

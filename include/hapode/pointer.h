@@ -89,6 +89,9 @@ typedef struct hap_pointer_def {
   double coupling_damping; /* N s/m at the device, 0..1e6; with coupling_stiffness only */
   double hand_damping;     /* N s/m, 0..1e3, default 0: the least that the hand always adds to the
                                 device's own damping (a finger held loosely: about 1) */
+  double max_slew; /* N/s at the device, >= 0: fastest change of the force, also on the way to zero
+                      after a fault; the torque's is in the same proportion to its limit. 0
+                      (default): the whole force in 2 ms */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */
@@ -108,19 +111,29 @@ HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id point
 HAP_API hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                           const hap_pose *pose, const hap_twist *twist);
 
+/* What the guard did to a pointer's force. Bits; values are fixed. */
+typedef enum hap_guard_flag {
+  HAP_GUARD_STALE = 1,      /* less force: the local model is older than two physics steps */
+  HAP_GUARD_RAMP_IN = 2,    /* less force: the first 20 ms after a start or a reset */
+  HAP_GUARD_ENERGY = 4,     /* the energy observer held force back */
+  HAP_GUARD_SLEW = 8,       /* the slew limit held it back */
+  HAP_GUARD_SATURATED = 16, /* beyond a limit and shortened, direction kept */
+  HAP_GUARD_FAULT = 32      /* a fault is latched: on the way to zero, or there */
+} hap_guard_flag;
+
 typedef struct hap_pointer_state {
   uint32_t size;
-  uint32_t contacts;        /* bodies that push back now */
-  int64_t stamp_ns;         /* of the tick */
-  hap_pose device;          /* device's frame */
-  hap_pose proxy;           /* pointer in the world: of the proxy where there is one */
-  hap_twist twist;          /* pointer in the world */
-  hap_wrench wrench;        /* on the hand, world frame, after the guard: what was written to the
+  uint32_t contacts;         /* bodies that push back now */
+  int64_t stamp_ns;          /* of the tick */
+  hap_pose device;           /* device's frame */
+  hap_pose proxy;            /* pointer in the world: of the proxy where there is one */
+  hap_twist twist;           /* pointer in the world */
+  hap_wrench wrench;         /* on the hand, world frame, after the guard: what was written to the
                            device, divided by force_scale */
-  uint32_t buttons;         /* bit 0 is the first one */
-  uint32_t coupling;        /* hap_coupling in force: direct or proxy */
-  uint32_t coupling_reason; /* hap_coupling_reason */
-  uint32_t reserved;
+  uint32_t buttons;          /* bit 0 is the first one */
+  uint32_t coupling;         /* hap_coupling in force: direct or proxy */
+  uint32_t coupling_reason;  /* hap_coupling_reason */
+  uint32_t guard;            /* hap_guard_flag bits */
   double coupling_stiffness; /* N/m at the device, of the proxy's spring; 0: there is none */
   double coupling_damping;   /* N s/m at the device */
   double contact_stiffness;  /* N/m at the device, sum over the contacts near the pointer */

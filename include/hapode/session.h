@@ -54,6 +54,14 @@ typedef enum hap_plane {
   HAP_PLANE_ALWAYS = 1        /* the plane at the nearest point of the last physics step: cheaper */
 } hap_plane;
 
+/* Whether the guard shapes the force. Its checks, faults and limits always hold. */
+typedef enum hap_guard {
+  HAP_GUARD_ON = 0,
+  HAP_GUARD_MEASURE = 1 /* for measurements with simulated hands: no ramp-in, no fading with an old
+                           model, no energy observer, no slew limit. A fault takes the force away
+                           in one tick. Not for a device that a person holds. */
+} hap_guard;
+
 #define HAP_LATENCY_DEFAULT (-1)
 
 typedef struct hap_session_def {
@@ -87,6 +95,7 @@ typedef struct hap_session_def {
   hap_plane plane;         /* model CONTACT, default HAP_PLANE_WHERE_NEEDED */
   int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
                               mesh there, 0..1048576, default 4096 */
+  hap_guard guard;         /* default HAP_GUARD_ON */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -135,7 +144,7 @@ HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit
 /* [any] From the next sync on. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_model(hap_session *session, hap_model model);
 
-/* [any] Clears a latched fault; force may be felt again from the next tick on. */
+/* [any] Clears a latched fault; from the next tick on force is felt again, over 20 ms. */
 HAP_API hap_status hap_session_reset_fault(hap_session *session);
 
 /* [any] Text of the last error or fault of this session; "" when there was none. */

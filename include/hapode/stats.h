@@ -5,6 +5,10 @@
 
 #include <stdint.h>
 
+#include <hapode/attributes.h>
+
+HAP_BEGIN_DECLS
+
 /* Why the guard took the force away. Values are never renumbered. */
 typedef enum hap_fault {
   HAP_FAULT_NONE = 0,
@@ -13,8 +17,12 @@ typedef enum hap_fault {
   HAP_FAULT_FORCE = 3,        /* a wrench was not finite */
   HAP_FAULT_LOCAL_STATE = 4,  /* a local body's state was not finite */
   HAP_FAULT_DEVICE_WRITE = 5, /* the device's write failed */
-  HAP_FAULT_WORLD = 6         /* the ODE world holds a body that cannot be stepped */
+  HAP_FAULT_WORLD = 6,        /* the ODE world holds a body that cannot be stepped */
+  HAP_FAULT_EMERGENCY = 7     /* hap_emergency_zero was called */
 } hap_fault;
+
+/* [any] What happened and what to do, one sentence; "" for HAP_FAULT_NONE; never NULL. */
+HAP_API const char *hap_fault_text(hap_fault fault);
 
 /* Everything since start. Times of ticks and steps are wall-clock, in lockstep as well; in
  * lockstep they are the only figures that differ from run to run. Grows at its end. */
@@ -96,6 +104,15 @@ typedef struct hap_stats {
 
   uint64_t probes_clipped;    /* accelerances that lay outside of 0 .. M^-1 and were brought back */
   uint64_t contacts_rejected; /* contacts of ODE's colliders with numbers that are none */
+  /* Guard. A tick counts once, however many pointers it was for. */
+  uint64_t fault_pointer; /* hap_pointer_id.v of the pointer that the latched fault came from; 0: of
+                             none in particular */
+  uint64_t stale_times;   /* that the local model became older than two physics steps */
+  uint64_t stale_ticks;   /* ticks in which it was */
+  uint64_t slewed_ticks;  /* ticks in which a force was held back by the slew limit */
+  uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
 } hap_stats;
+
+HAP_END_DECLS
 
 #endif

@@ -24,6 +24,7 @@ typedef struct hapi_haptic_config {
   int rt_priority;
   uint32_t trace_rows;
   hap_plane plane; /* model CONTACT */
+  hap_guard guard;
   hapi_exchange *exchange;
 } hapi_haptic_config;
 
@@ -58,5 +59,7 @@ void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the 
 bool hapi_haptic_has_fault(const hapi_haptic *haptic);        /* [any] latched at the last tick */
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out); /* [any] its part of *out */
 size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity);
+/* [app] */
+size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity);
 
 #endif

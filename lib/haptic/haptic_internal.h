@@ -13,6 +13,7 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "haptic/haptic.h"
+#include "haptic/rt/black_box.h"
 #include "haptic/rt/tick.h"
 #include "sync/triple_buffer.h"
 
@@ -61,6 +62,11 @@ typedef struct hapi_haptic_figures {
   _Atomic uint64_t trace_dropped;
   _Atomic uint64_t hash;
   _Atomic int fault;
+  _Atomic uint64_t fault_pointer;
+  _Atomic uint64_t stale_times;
+  _Atomic uint64_t stale_ticks;
+  _Atomic uint64_t slewed_ticks;
+  _Atomic uint64_t energy_ticks;
   _Atomic int model;
   _Atomic int64_t age_ns;
   _Atomic int64_t age_max_ns;
@@ -84,11 +90,14 @@ struct hapi_haptic {
   hapi_patches *pending_patches;
   hapi_pointer_slot *slots;
   hapi_trace_ring ring;
+  hapi_black_box black_box;
+  pthread_mutex_t black_box_lock; /* between its readers */
   hapi_haptic_figures figures;
   hapi_thread thread;
   _Atomic int stop;
   _Atomic int reset_fault;
   _Atomic int outside_fault; /* hap_fault that another thread wants latched */
+  uint64_t emergencies;      /* calls of hap_emergency_zero that the loop has seen */
   bool begun;
   int64_t start_ns;
   double last_tick_us;

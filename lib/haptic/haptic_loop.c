@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/thread.h"
 #include "base/vec.h"
+#include "device/emergency.h"
 #include "haptic/haptic_internal.h"
 #include "haptic/tick_memory.h"
 
@@ -27,6 +28,14 @@ static bool prepare_slots(hapi_haptic *haptic)
   return true;
 }
 
+static bool create_black_box(hapi_black_box *box, uint32_t pointers)
+{
+  box->pointers = pointers;
+  box->rows = hapi_alloc_array((size_t)HAP_BLACK_BOX_TICKS * pointers, sizeof *box->rows);
+  box->counts = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *box->counts);
+  return box->rows != NULL && box->counts != NULL;
+}
+
 hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out)
 {
   *out = NULL;
@@ -35,7 +44,9 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
     return HAP_ERROR_MEMORY;
   }
   haptic->config = *config;
-  if (!hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
+  pthread_mutex_init(&haptic->black_box_lock, NULL);
+  if (!create_black_box(&haptic->black_box, config->capacity.pointers) ||
+      !hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
       hapi_trace_ring_create(&haptic->ring, config->trace_rows) != HAP_OK) {
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;
@@ -43,6 +54,7 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
   haptic->tick.world.plane_mode = config->plane;
+  haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
   *out = haptic;
   return HAP_OK;
@@ -62,6 +74,9 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   }
   hapi_free(haptic->slots);
   hapi_trace_ring_finish(&haptic->ring);
+  hapi_free(haptic->black_box.rows);
+  hapi_free(haptic->black_box.counts);
+  pthread_mutex_destroy(&haptic->black_box_lock);
   hapi_tick_memory_destroy(&haptic->tick);
   hapi_free(haptic);
 }
@@ -81,6 +96,11 @@ static void reset_figures(hapi_haptic *haptic)
   STORE(saturated_ticks, 0);
   STORE(faults, 0);
   STORE(fault, HAP_FAULT_NONE);
+  STORE(fault_pointer, 0);
+  STORE(stale_times, 0);
+  STORE(stale_ticks, 0);
+  STORE(slewed_ticks, 0);
+  STORE(energy_ticks, 0);
   STORE(hash, 0);
   STORE(peak_force, 0.0);
   STORE(hand_impulse_abs, 0.0);
@@ -101,6 +121,10 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   memset(haptic->tick.pointers, 0,
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
   reset_figures(haptic);
+  pthread_mutex_lock(&haptic->black_box_lock);
+  hapi_black_box_reset(&haptic->black_box);
+  pthread_mutex_unlock(&haptic->black_box_lock);
+  haptic->emergencies = hapi_emergencies();
   haptic->pending = NULL;
   haptic->pending_patches = NULL;
   haptic->start_ns = start_ns;
@@ -187,8 +211,22 @@ static void follow_faults(hapi_haptic *haptic)
   int outside = atomic_load_explicit(&haptic->outside_fault, memory_order_acquire);
   if (outside != HAP_FAULT_NONE) {
     atomic_store_explicit(&haptic->outside_fault, HAP_FAULT_NONE, memory_order_relaxed);
-    hapi_tick_fault(&haptic->tick, (hap_fault)outside);
+    hapi_tick_fault(&haptic->tick, (hap_fault)outside, 0);
   }
+  uint64_t emergencies = hapi_emergencies();
+  if (emergencies != haptic->emergencies) {
+    haptic->emergencies = emergencies;
+    hapi_tick_fault(&haptic->tick, HAP_FAULT_EMERGENCY, 0);
+    for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+      hapi_guard_cut(&haptic->tick.pointers[i]);
+    }
+  }
+}
+
+/* hap_pointer_id.v of an index + 1; 0 stays 0. */
+static uint64_t public_id(const hapi_tick *tick, uint32_t number)
+{
+  return number == 0 ? 0 : ((uint64_t)tick->pointers[number - 1].generation << 32) | number;
 }
 
 static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
@@ -200,6 +238,11 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   STORE(saturated_ticks, tick->saturated_ticks);
   STORE(faults, tick->faults);
   STORE(fault, (int)tick->fault);
+  STORE(fault_pointer, public_id(tick, tick->fault_pointer));
+  STORE(stale_times, tick->guard.stale_times);
+  STORE(stale_ticks, tick->guard.stale_ticks);
+  STORE(slewed_ticks, tick->guard.slewed_ticks);
+  STORE(energy_ticks, tick->guard.energy_ticks);
   STORE(model, (int)tick->model);
   STORE(hash, tick->hashing ? tick->hash : 0);
   STORE(age_ns, age);
@@ -229,6 +272,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
+  hapi_black_box_record(&haptic->black_box, &haptic->tick);
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);
   publish_poses(haptic);
@@ -287,7 +331,20 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->saturated_ticks = LOAD(saturated_ticks);
   out->faults = LOAD(faults);
   out->fault = (uint32_t)LOAD(fault);
+  out->fault_pointer = LOAD(fault_pointer);
+  out->stale_times = LOAD(stale_times);
+  out->stale_ticks = LOAD(stale_ticks);
+  out->slewed_ticks = LOAD(slewed_ticks);
+  out->energy_ticks = LOAD(energy_ticks);
   out->realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->trace_dropped = LOAD(trace_dropped);
   out->trace_hash = LOAD(hash);
+}
+
+size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity)
+{
+  pthread_mutex_lock(&haptic->black_box_lock);
+  size_t count = hapi_black_box_read(&haptic->black_box, rows, capacity);
+  pthread_mutex_unlock(&haptic->black_box_lock);
+  return count;
 }

@@ -6,8 +6,11 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "device/device.h"
+#include "device/emergency.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
+
+#define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
 
 /* ---- the loop's side ---- */
 
@@ -52,6 +55,8 @@ static void activate(hapi_haptic *haptic, uint32_t index)
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
+  p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;
+  p->slew_torque = p->max_torque * (p->slew_force / p->max_force);
   p->device_pose.quat_wxyz[0] = 1.0;
   p->device_good.quat_wxyz[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
@@ -81,6 +86,15 @@ void hapi_pointers_follow(hapi_haptic *haptic)
   }
 }
 
+/* What the device would do with another force nobody knows: zero, and no ramp. */
+static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
+{
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  slot->ops->zero(slot->self);
+  hapi_guard_cut(&haptic->tick.pointers[index]);
+  hapi_tick_fault(&haptic->tick, fault, index + 1);
+}
+
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
@@ -100,7 +114,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     uint32_t buttons = 0;
     if (slot->ops->read(slot->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
-      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_READ);
+      fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
     }
     p->device_pose = pose;
@@ -122,8 +136,10 @@ void hapi_pointers_write(hapi_haptic *haptic)
     }
     hap_wrench reached;
     if (slot->ops->write(slot->self, &p->device_wrench, &reached) < HAP_OK) {
-      slot->ops->zero(slot->self);
-      hapi_tick_fault(&haptic->tick, HAP_FAULT_DEVICE_WRITE);
+      fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
+    }
+    if (hapi_emergencies() != haptic->emergencies) {
+      slot->ops->zero(slot->self); /* it came while this force was being written */
     }
   }
 }
@@ -133,7 +149,6 @@ static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
   double scale = p->motion_scale * p->force_scale;
   out->coupling = p->proxied ? HAP_COUPLING_PROXY : HAP_COUPLING_DIRECT;
   out->coupling_reason = (uint32_t)p->coupling_reason;
-  out->reserved = 0;
   out->coupling_stiffness = p->proxied ? scale * p->coupling_stiffness : 0.0;
   out->coupling_damping = p->proxied ? scale * p->coupling_damping : 0.0;
   out->contact_stiffness = scale * p->contact_stiffness;
@@ -157,6 +172,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     out->wrench = p->wrench;
     out->buttons = p->buttons;
     publish_coupling(p, out);
+    out->guard = p->guard.flags;
     hapi_triple_publish(&slot->state_buffer);
   }
 }
@@ -177,6 +193,12 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
   if (slot->ops->start(slot->self) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "device %s did not start", slot->ops->name);
   }
+  if (!hapi_emergency_add(slot->ops, slot->self)) {
+    slot->ops->zero(slot->self);
+    slot->ops->stop(slot->self);
+    return hapi_fail(detail, HAP_ERROR_CAPACITY, "all %d places for running devices are in use",
+                     HAPI_EMERGENCY_DEVICES);
+  }
   slot->started = true;
   return HAP_OK;
 }
@@ -185,6 +207,7 @@ static void stop_device(hapi_pointer_slot *slot)
 {
   if (slot->ops != NULL && slot->started) {
     slot->ops->zero(slot->self);
+    hapi_emergency_remove(slot->ops, slot->self);
     slot->ops->stop(slot->self);
     slot->started = false;
   }

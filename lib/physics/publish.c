@@ -160,6 +160,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->state_ns = state_ns;
   out->valid_from_ns = valid_from_ns;
   out->blend_s = physics->model == HAP_MODEL_IMPULSE ? physics->probe_step_s : 0.0;
+  out->period_s = hapi_physics_next_period(physics);
   out->model = physics->model;
   out->impulse_pose = physics->config.impulse_pose;
   out->body_count = 0;

@@ -134,6 +134,7 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->max_edge_probes, 0, 1024, "max_edge_probes"},
       {def->plane, 0, 1, "plane"},
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
+      {def->guard, 0, 1, "guard"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

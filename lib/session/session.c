@@ -331,7 +331,7 @@ hap_status hap_session_set_model(hap_session *session, hap_model model)
 
 /* ---- faults and figures ---- */
 
-static const char *fault_text(hap_fault fault)
+const char *hap_fault_text(hap_fault fault)
 {
   switch (fault) {
     case HAP_FAULT_NONE:
@@ -349,9 +349,24 @@ static const char *fault_text(hap_fault fault)
     case HAP_FAULT_DEVICE_WRITE:
       return "the device did not take a force; force is zero until the fault is reset";
     case HAP_FAULT_WORLD:
-      return "the ODE world holds a body that cannot be stepped";
+      return "the ODE world holds a body that cannot be stepped; force is zero until the fault is "
+             "reset";
+    case HAP_FAULT_EMERGENCY:
+      return "hap_emergency_zero was called; force is zero until the fault is reset";
   }
   return "";
+}
+
+/* Says which pointer a fault came from, by the number of its place. */
+static void write_fault(const hap_stats *stats, hap_detail *out)
+{
+  const char *text = hap_fault_text((hap_fault)stats->fault);
+  unsigned place = (unsigned)(stats->fault_pointer & 0xffffffffu);
+  if (place == 0) {
+    snprintf(out->text, sizeof out->text, "%s", text);
+  } else {
+    snprintf(out->text, sizeof out->text, "pointer %u: %s", place, text);
+  }
 }
 
 hap_status hap_session_reset_fault(hap_session *session)
@@ -394,7 +409,7 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
   pthread_mutex_unlock(&s->detail_lock);
   hapi_haptic_stats(session->haptic, &stats);
   if (stats.fault != HAP_FAULT_NONE && stats.fault != HAP_FAULT_WORLD) {
-    snprintf(out->text, sizeof out->text, "%s", fault_text((hap_fault)stats.fault));
+    write_fault(&stats, out);
   }
   return HAP_OK;
 }
@@ -406,5 +421,15 @@ hap_status hap_session_trace_read(hap_session *session, hap_trace_row *rows, siz
     return HAP_ERROR_ARGUMENT;
   }
   *out_count = hapi_haptic_read_trace(session->haptic, rows, capacity);
+  return *out_count == 0 ? HAP_END : HAP_OK;
+}
+
+hap_status hap_session_black_box(hap_session *session, hap_black_box_row *rows, size_t capacity,
+                                 size_t *out_count)
+{
+  if (session == NULL || rows == NULL || out_count == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  *out_count = hapi_haptic_read_black_box(session->haptic, rows, capacity);
   return *out_count == 0 ? HAP_END : HAP_OK;
 }

@@ -114,6 +114,7 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .rt_priority = def->rt_priority,
         .trace_rows = (uint32_t)def->trace_rows,
         .plane = def->plane,
+        .guard = def->guard,
         .exchange = session->exchange,
     };
     status = hapi_haptic_create(&config, &session->haptic);

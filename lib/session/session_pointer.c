@@ -63,6 +63,7 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
       {between(d->integration, HAP_INTEGRATION_AUTO, HAP_INTEGRATION_MIDPOINT),
        "integration is not one of hap_integration"},
       {between(d->hand_damping, 0.0, 1e3), "hand_damping is not in 0 .. 1e3 N s/m"},
+      {between(d->max_slew, 0.0, 1e12), "max_slew is not in 0 .. 1e12 N/s"},
       {good_pose(&d->pose_world_device),
        "pose_world_device is not within 1000 km with a unit quaternion"},
   };

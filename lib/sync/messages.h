@@ -91,6 +91,7 @@ typedef struct hapi_model {
   int64_t state_ns;      /* time for which poses, A and b hold */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
   double blend_s;        /* model IMPULSE, interpolated: how long a body takes to its new pose */
+  double period_s;       /* H, of the next step */
   hap_model model;
   hap_impulse_pose impulse_pose;
   uint32_t body_count;

@@ -181,6 +181,19 @@ static void friction_directions(const hapi_surface *surface, const double n[3], 
   hapi_v3_cross(n, t1, t2);
 }
 
+static bool is_given(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) == 0;
+}
+
+/* See hapi_row_source: what the energy observer has to count as the world's work. */
+static bool gives(const placed_contact *c)
+{
+  const hapi_surface *s = c->surface;
+  bool moves = s->motion[0] != 0.0 || s->motion[1] != 0.0 || s->motion[2] != 0.0;
+  return moves || (s->flags & HAPI_SURFACE_SOFT) != 0 || is_given(c->a) || is_given(c->b);
+}
+
 static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t index, int part,
                           const double direction[3])
 {
@@ -201,6 +214,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   source->part = (uint8_t)part;
   source->pointer = false;
   source->pushes_out = false;
+  source->gives = gives(c);
   return row;
 }
 

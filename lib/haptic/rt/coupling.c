@@ -49,7 +49,7 @@ void hapi_coupling_read(hapi_tick *tick)
     bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
                 plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
     if (!good || !place_pointer(p)) {
-      hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE); /* and the pointer stays where it was */
+      hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
     }
   }
 }

@@ -3,19 +3,113 @@
 #include "base/vec.h"
 #include "haptic/rt/tick.h"
 
-/* The last thing between the simulation and the motors. */
+/* The last thing between the simulation and the motors, in this order: finite, age of the local model,
+ * ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the bodies have
+ * had their share of the impulse before.
+ *
+ * Slew before saturation holds both bounds: the force before lies within its limit, and shortening is
+ * the projection onto a ball, which brings no two points farther apart. */
 
-void hapi_tick_fault(hapi_tick *tick, hap_fault fault)
+#define RAMP_IN_S 0.02
+#define FADE_S 0.1        /* from full force to none with an old local model */
+#define AGE_LEAST 0.01    /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
+#define WRENCH_LIMIT 1e12 /* N, N m: beyond it is an error, and its square could overflow */
+
+void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
 {
   if (tick->fault == HAP_FAULT_NONE) {
     tick->fault = fault;
+    tick->fault_pointer = pointer;
     ++tick->faults;
   }
 }
 
 void hapi_tick_reset_fault(hapi_tick *tick)
 {
+  if (tick->fault == HAP_FAULT_NONE) {
+    return;
+  }
   tick->fault = HAP_FAULT_NONE;
+  tick->fault_pointer = 0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    tick->pointers[i].guard.share = 0.0;
+  }
+}
+
+void hapi_guard_cut(hapi_tick_pointer *pointer)
+{
+  memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
+}
+
+static bool usable(const double v[3])
+{
+  bool good = true;
+  for (int i = 0; i < 3; ++i) {
+    good = good && fabs(v[i]) <= WRENCH_LIMIT; /* false for NaN */
+  }
+  return good;
+}
+
+static void check_finite(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation != 0 && !(usable(p->wrench.force) && usable(p->wrench.torque))) {
+      hapi_tick_fault(tick, HAP_FAULT_FORCE, i + 1);
+    }
+  }
+}
+
+/* A world that does not answer is felt less and less: a state, which ends with the next model. One
+ * tick more than two steps is what an age comes to in good order. */
+static void follow_age(hapi_tick *tick)
+{
+  hapi_guard_state *guard = &tick->guard;
+  double step = tick->physics_period;
+  double age = 1e-9 * (double)(tick->now_ns - tick->state_ns);
+  double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + tick->period;
+  bool stale = tick->model_number != 0 && step > 0.0 && age > limit;
+  guard->stale_times += stale && !guard->stale;
+  guard->stale_ticks += stale;
+  guard->stale = stale;
+  double change = stale ? tick->period / FADE_S : step > 0.0 ? -tick->period / step : 0.0;
+  guard->age_loss = fmin(fmax(guard->age_loss + change, 0.0), 1.0);
+}
+
+/* What the device shall get before the limits. */
+static void want(hapi_tick *tick, hapi_tick_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  hapi_coupling_write(p);
+  g->wanted = p->device_wrench;
+  g->flags = 0;
+  if (tick->fault != HAP_FAULT_NONE) {
+    g->flags = HAP_GUARD_FAULT;
+    memset(&p->device_wrench, 0, sizeof p->device_wrench);
+    return;
+  }
+  if (tick->guard.mode == HAP_GUARD_MEASURE) {
+    return;
+  }
+  g->share = fmin(g->share + tick->period / RAMP_IN_S, 1.0);
+  double share = g->share * (1.0 - tick->guard.age_loss);
+  g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
+  g->flags |= tick->guard.age_loss > 0.0 ? HAP_GUARD_STALE : 0;
+  hapi_v3_scale(share, p->device_wrench.force, p->device_wrench.force);
+  hapi_v3_scale(share, p->device_wrench.torque, p->device_wrench.torque);
+}
+
+/* No farther from the vector before than step. */
+static bool slew(const double before[3], double step, double v[3])
+{
+  double change[3];
+  hapi_v3_sub(v, before, change);
+  double norm = hapi_v3_norm(change);
+  if (norm <= step) {
+    return false;
+  }
+  hapi_v3_madd(before, step / norm, change, v);
+  return true;
 }
 
 /* Shortens a vector to a norm; its direction stays. */
@@ -29,57 +123,77 @@ static bool saturate(double v[3], double limit)
   return true;
 }
 
-static void limit_wrench(hapi_tick_pointer *p)
+static void limit_slew(const hapi_tick *tick, hapi_tick_pointer *p)
 {
-  hapi_coupling_write(p);
-  bool cut_force = saturate(p->device_wrench.force, p->max_force);
-  bool cut_torque = saturate(p->device_wrench.torque, p->max_torque);
-  p->saturated = cut_force || cut_torque;
-  if (p->saturated && p->force_scale > 0.0) {
-    /* What is reported is what the hand feels. */
-    saturate(p->wrench.force, p->max_force / p->force_scale);
-    saturate(p->wrench.torque, p->max_torque / p->force_scale);
+  const hapi_guard_pointer *g = &p->guard;
+  bool force = slew(g->written.force, tick->period * p->slew_force, p->device_wrench.force);
+  bool torque = slew(g->written.torque, tick->period * p->slew_torque, p->device_wrench.torque);
+  p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
+}
+
+static void limit_norm(hapi_tick_pointer *p)
+{
+  bool force = saturate(p->device_wrench.force, p->max_force);
+  bool torque = saturate(p->device_wrench.torque, p->max_torque);
+  p->guard.flags |= force || torque ? HAP_GUARD_SATURATED : 0;
+}
+
+/* What is reported is what the hand feels. */
+static void report_written(hapi_tick_pointer *p)
+{
+  const double *q = p->pose_world_device.quat_wxyz;
+  p->guard.written = p->device_wrench;
+  if (p->guard.flags == 0) {
+    return;
+  }
+  if (p->force_scale > 0.0) {
+    hapi_quat_rotate(q, p->device_wrench.force, p->wrench.force);
+    hapi_quat_rotate(q, p->device_wrench.torque, p->wrench.torque);
+    hapi_v3_scale(1.0 / p->force_scale, p->wrench.force, p->wrench.force);
+    hapi_v3_scale(1.0 / p->force_scale, p->wrench.torque, p->wrench.torque);
+  } else if ((p->guard.flags & HAP_GUARD_FAULT) != 0) {
+    memset(&p->wrench, 0, sizeof p->wrench); /* it may be not finite */
   }
 }
 
-static bool is_finite(const hap_wrench *wrench)
+static void write_pointer(const hapi_tick *tick, hapi_tick_pointer *p)
 {
-  return hapi_finite(wrench->force, 3) && hapi_finite(wrench->torque, 3);
+  if (tick->guard.mode == HAP_GUARD_ON) {
+    limit_slew(tick, p);
+  }
+  limit_norm(p);
+  report_written(p);
 }
 
-static const hap_wrench no_wrench = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-
-/* The limit of a force that is finite can be none, where its square is not. */
-static void check_written(hapi_tick *tick, hapi_tick_pointer *p)
+static void count(hapi_tick *tick, uint32_t flags)
 {
-  if (!is_finite(&p->device_wrench)) {
-    hapi_tick_fault(tick, HAP_FAULT_FORCE);
-    p->wrench = p->device_wrench = no_wrench;
-  }
+  tick->saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
+  tick->guard.slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
+  tick->guard.energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
 }
 
 void hapi_guard(hapi_tick *tick)
 {
-  bool saturated = false;
+  uint32_t flags = 0;
+  check_finite(tick);
+  follow_age(tick);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
-    hapi_tick_pointer *p = &tick->pointers[i];
-    if (p->generation != 0 && !is_finite(&p->wrench)) {
-      hapi_tick_fault(tick, HAP_FAULT_FORCE);
+    if (tick->pointers[i].generation != 0) {
+      want(tick, &tick->pointers[i]);
     }
+  }
+  if (tick->guard.mode == HAP_GUARD_ON) {
+    hapi_energy_observe(tick);
   }
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;
     }
-    if (tick->fault != HAP_FAULT_NONE) {
-      p->wrench = no_wrench;
-    }
-    limit_wrench(p);
-    check_written(tick, p);
-    saturated = saturated || p->saturated;
+    write_pointer(tick, p);
+    flags |= p->guard.flags;
     double force = hapi_v3_norm(p->wrench.force);
     tick->peak_force = force > tick->peak_force ? force : tick->peak_force;
   }
-  tick->saturated_ticks += saturated;
+  count(tick, flags);
 }

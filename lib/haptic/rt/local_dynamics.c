@@ -37,7 +37,7 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   if (!sound(body)) {
     body->pose = before;
     body->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE);
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
   }
 }
 

@@ -217,7 +217,7 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   if (!sound(body)) {
     body->pose = before;
     memset(&body->twist, 0, sizeof body->twist);
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE);
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
   }
 }
 
@@ -251,6 +251,20 @@ static void touch(hapi_tick *tick, uint32_t slot)
   }
 }
 
+/* J that an impulse along j did on a body that the loop owns: with the mean of its velocities, as the
+ * change of a kinetic energy is. */
+static double work_on(hapi_tick *tick, uint32_t slot, const double j[6], double impulse)
+{
+  double mean[6];
+  if (!is_owned(tick, slot)) {
+    return 0.0;
+  }
+  const hapi_local_body *body = &tick->bodies[slot];
+  memcpy(mean, body->start_twist, sizeof mean);
+  hapi_madd6(mean, 1.0, tick->world.solver.v[body->row]);
+  return 0.5 * impulse * hapi_dot6(j, mean);
+}
+
 static void account(hapi_tick *tick)
 {
   const hapi_solver *solver = &tick->world.solver;
@@ -262,6 +276,10 @@ static void account(hapi_tick *tick)
     }
     touch(tick, source->body_a);
     touch(tick, source->body_b);
+    if (!source->pointer && source->gives) {
+      tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
+                           work_on(tick, source->body_b, row->jb, row->impulse);
+    }
     give_outside(tick, source->body_a, row->ja, row->impulse);
     give_outside(tick, source->body_b, row->jb, row->impulse);
     if (source->pointer && is_owned(tick, source->body_a)) {

@@ -118,12 +118,13 @@ void hapi_proxy_free(hapi_tick *tick)
   }
 }
 
-static void move(hapi_tick *tick, hapi_tick_pointer *p)
+static void move(hapi_tick *tick, uint32_t index)
 {
+  hapi_tick_pointer *p = &tick->pointers[index];
   const double *v = tick->world.solver.v[p->row];
   double end[3];
   if (!hapi_finite(v, 3)) {
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE);
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, index + 1);
     hapi_v3_copy(p->handle_position, p->proxy_position);
     hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
     hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
@@ -143,7 +144,7 @@ void hapi_proxy_move(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->proxied) {
-      move(tick, p);
+      move(tick, i);
       hapi_v3_copy(p->proxy_position, p->pose.position);
       hapi_v3_copy(p->proxy_velocity, p->twist.linear);
     }

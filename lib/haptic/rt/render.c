@@ -93,6 +93,7 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   ++p->contacts;
   ++tick->pushing;
   hapi_v3_scale(-force, at.normal, c->force);
+  hapi_v3_copy(at.point, c->point_now);
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
     body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
     body->pushed = true;

@@ -47,6 +47,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.capacity = tick->capacity;
   fresh.period = tick->period;
   fresh.hashing = tick->hashing;
+  fresh.guard.mode = tick->guard.mode;
   fresh.bodies = tick->bodies;
   fresh.live = tick->live;
   fresh.contacts = tick->contacts;

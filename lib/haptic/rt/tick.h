@@ -12,7 +12,7 @@
  *   coupling  device pose -> pointer                               (paper step a)
  *   render    pointer and planes -> forces, eq. 7                  (step b)
  *   local_dynamics  forces -> motion of the neighbours, eq. 8-11   (step c)
- *   guard     sum per pointer, checks, limits -> device wrench
+ *   guard     checks, shares, limits -> device wrench      (force_guard, energy_observer)
  *
  * Model CONTACT has one solve in the place of steps b and c:
  *
@@ -24,6 +24,7 @@
  *   contact_solver, direct_solver  impulses of all rows
  *
  *   report    state for physics; trace row; hash
+ *   black_box what came out, kept for the case of a fault
  */
 
 #include <stdbool.h>
@@ -31,6 +32,7 @@
 
 #include <hapode/pointer.h>
 #include <hapode/record.h>
+#include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
 
@@ -41,6 +43,33 @@
 /* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
 #define HAPI_STATE_LIMIT 1e6
 
+/* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
+ * pointer that has just come. */
+typedef struct hapi_guard_pointer {
+  double share;       /* 0..1, of the ramp-in */
+  bool placed;        /* position and moved are of the device as it is now */
+  double position[3]; /* at the last tick */
+  double moved[3];    /* since the tick before */
+  hap_wrench wanted;  /* before the guard */
+  hap_wrench written; /* at the last tick; in force until the next write */
+  uint32_t flags;     /* hap_guard_flag, of the last tick */
+} hapi_guard_pointer;
+
+/* What the guard keeps of the whole loop. */
+typedef struct hapi_guard_state {
+  hap_guard mode;
+  double age_loss; /* 0..1, share of the force that the age of the local model has taken */
+  bool stale;
+  uint64_t stale_times;
+  uint64_t stale_ticks;
+  uint64_t slewed_ticks;
+  uint64_t energy_ticks;
+  double balance;    /* J, world units: what the hands and the world have put in and not got back */
+  double stored_max; /* J, largest energy of the pointer springs and owned bodies */
+  double given; /* J, of this tick: what contacts with things of given motion did on bodies that
+                        the loop owns */
+} hapi_guard_state;
+
 typedef struct hapi_tick_pointer {
   uint32_t generation; /* 0: no pointer here */
   uint32_t collide_bits;
@@ -49,8 +78,10 @@ typedef struct hapi_tick_pointer {
   double damping;
   double motion_scale;
   double force_scale;
-  double max_force;  /* N at the device */
-  double max_torque; /* N m at the device */
+  double max_force;   /* N at the device */
+  double max_torque;  /* N m at the device */
+  double slew_force;  /* N/s at the device */
+  double slew_torque; /* N m/s at the device */
   hap_pose pose_world_device;
 
   hap_pose device_pose;   /* in, device frame */
@@ -65,7 +96,7 @@ typedef struct hapi_tick_pointer {
   hap_wrench wrench;        /* world, on the hand */
   hap_wrench device_wrench; /* out, device frame, scaled and limited */
   uint32_t contacts;        /* that push */
-  bool saturated;
+  hapi_guard_pointer guard;
 
   /* Coupling; world. Stiffnesses as felt in the world: device's / (motion_scale force_scale). */
   hap_coupling coupling;       /* asked for */
@@ -153,6 +184,8 @@ typedef struct hapi_row_source {
   uint8_t part; /* 0 normal, 1 and 2 friction */
   bool pointer;
   bool pushes_out; /* its target lifts a body out of another one: not to stay in the velocity */
+  bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
+                      surface that moves, a spring */
 } hapi_row_source;
 
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
@@ -208,7 +241,10 @@ typedef struct hapi_tick {
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];
   double watch_position[HAP_TRACE_BODIES_MAX][3];
 
-  hap_fault fault; /* latched */
+  double physics_period; /* s, H of the model in use; 0: not known */
+  hapi_guard_state guard;
+  hap_fault fault;        /* latched */
+  uint32_t fault_pointer; /* index + 1 of the pointer that it came from; 0: none of them */
   uint64_t faults;
   uint32_t pushing; /* contacts that push in this tick */
   double peak_force;
@@ -222,7 +258,8 @@ typedef struct hapi_tick {
   uint64_t hash;
 } hapi_tick;
 
-/* Zeroes the state; arrays, capacity, period and hashing are set by the caller before. */
+/* Zeroes the state; arrays, capacity, period, hashing and the guard's mode are set by the caller
+ * before. */
 void hapi_tick_reset(hapi_tick *tick);
 
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns);
@@ -233,8 +270,12 @@ void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches);
 /* One tick at now_ns from the pointers' device_pose and device_twist to their device_wrench. */
 void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
 
-void hapi_tick_fault(hapi_tick *tick, hap_fault fault); /* latches the first one */
+/* Latches the first one. pointer: index + 1 of the one that it came from; 0: none of them. */
+void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer);
 void hapi_tick_reset_fault(hapi_tick *tick);
+
+/* The device has zero force at once, whatever the slew limit says. With a fault it stays so. */
+void hapi_guard_cut(hapi_tick_pointer *pointer);
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
@@ -255,8 +296,9 @@ void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contact
 void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
 void hapi_contact_keep(hapi_tick *tick);                      /* impulses for the next tick */
-void hapi_guard(hapi_tick *tick);                             /* finite, limits, world -> device */
-void hapi_coupling_write(hapi_tick_pointer *pointer);         /* world wrench -> device wrench */
+void hapi_guard(hapi_tick *tick);                             /* world wrench -> device wrench */
+void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
+void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
 void hapi_trace_hash(hapi_tick *tick);
 
 #endif

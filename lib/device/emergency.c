@@ -1,0 +1,71 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "device/emergency.h"
+
+#include <sched.h>
+#include <stdatomic.h>
+
+#include <hapode/device.h>
+
+/* A fixed table without a lock: a signal handler may come between any two steps of the others.
+ *
+ * A place is taken, then gets its self, then its ops, by which it is seen. Whoever calls counts itself
+ * in before it looks at ops, and out after zero came back: remove hides ops and then waits for the count
+ * to fall to 0, so that no device is freed under a call. All in the one order of seq_cst. */
+
+typedef struct place {
+  _Atomic int taken;
+  _Atomic int callers;
+  _Atomic(const hap_device_ops *) ops;
+  _Atomic(void *) self;
+} place;
+
+static place places[HAPI_EMERGENCY_DEVICES];
+static _Atomic uint64_t emergencies;
+
+bool hapi_emergency_add(const hap_device_ops *ops, void *self)
+{
+  for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
+    if (atomic_exchange(&places[i].taken, 1) == 0) {
+      atomic_store(&places[i].self, self);
+      atomic_store(&places[i].ops, ops);
+      return true;
+    }
+  }
+  return false;
+}
+
+void hapi_emergency_remove(const hap_device_ops *ops, const void *self)
+{
+  for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
+    place *p = &places[i];
+    if (atomic_load(&p->ops) == ops && atomic_load(&p->self) == self) {
+      atomic_store(&p->ops, NULL);
+      while (atomic_load(&p->callers) != 0) {
+        sched_yield();
+      }
+      atomic_store(&p->taken, 0);
+      return;
+    }
+  }
+}
+
+uint64_t hapi_emergencies(void)
+{
+  return atomic_load(&emergencies);
+}
+
+void hap_emergency_zero(void)
+{
+  /* First: a loop that writes a force after its device was zeroed here sees that and zeroes again. */
+  atomic_fetch_add(&emergencies, 1);
+  for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
+    place *p = &places[i];
+    atomic_fetch_add(&p->callers, 1);
+    const hap_device_ops *ops = atomic_load(&p->ops);
+    if (ops != NULL) {
+      ops->zero(atomic_load(&p->self));
+    }
+    atomic_fetch_sub(&p->callers, 1);
+  }
+}

@@ -1,0 +1,25 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_DEVICE_EMERGENCY_H
+#define HAPODE_DEVICE_EMERGENCY_H
+
+/* The devices that run in this process, for hap_emergency_zero. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/device_impl.h>
+
+#define HAPI_EMERGENCY_DEVICES 64
+
+/* [control] A device that was started; false: no room. */
+bool hapi_emergency_add(const hap_device_ops *ops, void *self);
+
+/* [control] When it comes back, nobody calls zero of this device any more: a call that is under way in
+ * another thread is waited for. */
+void hapi_emergency_remove(const hap_device_ops *ops, const void *self);
+
+/* [any] Calls of hap_emergency_zero so far. */
+uint64_t hapi_emergencies(void);
+
+#endif

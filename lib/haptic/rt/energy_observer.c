@@ -1,0 +1,267 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "haptic/rt/rows.h"
+
+/* The ledger of what the hands may get back. It gains what a hand puts in, and what the world loses;
+ * it pays what a hand is given:
+ *
+ *   port     minus the force that was written, held over a tick, times the way that the device went:
+ *            exact, whatever the simulation thought. World units: a device's joule counts motion_scale
+ *            / force_scale.
+ *   bodies   that the loop owns: the fall of their kinetic energy within a tick, from mass and
+ *            inertia, plus the work of gravity and of the application's wrench, plus the work of
+ *            contacts with things that the loop does not own, moving surfaces and springs. What a sync
+ *            changed lies between two ticks and is thereby the world's.
+ *   others   (all bodies of the other models, and static, driven and measured ones): their motion is
+ *            given, and what they do on a pointer's spring is the world's work.
+ *
+ * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
+ * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
+ * motion of an owned body. Of the other models only the port and the springs are watched.
+ *
+ * Nothing is done before the ledger is overdrawn by nearly 1 % of the largest energy that was stored. Then
+ * the part of the force that goes with the hand is cut to what remains; what resists it stays. While
+ * nothing is touched the ledger stands still, and a surplus is forgotten: it must not pay for what a
+ * later touch makes of nothing.
+ *
+ * Torques are left out: they are zero for a ball without friction. */
+
+#define OVERDRAFT 0.008 /* what is held back comes a tick late and no faster than the slew limit */
+#define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
+
+static double world_per_device(const hapi_tick_pointer *p)
+{
+  return p->force_scale > 0.0 ? p->motion_scale / p->force_scale : 0.0;
+}
+
+static double spin_energy(const double inertia[9], const double w[3])
+{
+  double momentum[3];
+  hapi_m3_apply(inertia, w, momentum);
+  return 0.5 * hapi_v3_dot(w, momentum);
+}
+
+static bool spins(const double w[3])
+{
+  return hapi_v3_dot(w, w) > 0.0;
+}
+
+static double spin_before(const hapi_local_body *body)
+{
+  double local[3];
+  if (!spins(body->start_twist + 3)) {
+    return 0.0;
+  }
+  hapi_m3_apply_transposed(body->rotation, body->start_twist + 3, local);
+  return spin_energy(body->given.inertia, local);
+}
+
+static double spin_after(const hapi_local_body *body)
+{
+  double local[3];
+  if (!spins(body->twist.angular)) {
+    return 0.0;
+  }
+  hapi_quat_unrotate(body->pose.quat_wxyz, body->twist.angular, local);
+  return spin_energy(body->given.inertia, local);
+}
+
+/* J that the body lost to contacts in this tick; its energy after it is added to *io_stored. With the
+ * mean velocity the work of a constant force is exactly what it adds to the kinetic energy. */
+static double body_loses(const hapi_local_body *body, double period, double *io_stored)
+{
+  const hapi_model_body *given = &body->given;
+  const double *before = body->start_twist;
+  const double *after = body->twist.linear;
+  double mean[3];
+  double turn[3];
+  double pull[3];
+  hapi_v3_add(before, after, mean);
+  hapi_v3_add(before + 3, body->twist.angular, turn);
+  hapi_v3_scale(given->mass, given->gravity, pull);
+  hapi_v3_add(pull, given->user_wrench, pull);
+  double work = hapi_v3_dot(pull, mean) + hapi_v3_dot(given->user_wrench + 3, turn);
+  work *= body->waiting ? 0.0 : 0.5 * period; /* one that waits feels its contacts alone */
+  double kinetic = 0.5 * given->mass * hapi_v3_dot(after, after) + spin_after(body);
+  *io_stored += kinetic;
+  return 0.5 * given->mass * hapi_v3_dot(before, before) + spin_before(body) - kinetic + work;
+}
+
+static bool is_owned(const hapi_tick *tick, const hapi_local_body *body)
+{
+  return tick->model == HAP_MODEL_CONTACT && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+static double bodies_lose(const hapi_tick *tick, double *io_stored)
+{
+  double sum = 0.0;
+  if (tick->model != HAP_MODEL_CONTACT) {
+    return 0.0;
+  }
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if ((body->flags & HAPI_BODY_RESTING) == 0 && is_owned(tick, body)) {
+      sum += body_loses(body, tick->period, io_stored);
+    }
+  }
+  return sum;
+}
+
+/* J that a force at a point does on a body in this tick: with the mean of its velocities where both
+ * are known. */
+static double work_on(const hapi_tick *tick, const hapi_local_body *body, const double point[3],
+                      const double force[3])
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_cross(arm, force, moment);
+  double power = hapi_v3_dot(force, body->twist.linear) + hapi_v3_dot(moment, body->twist.angular);
+  if (tick->model == HAP_MODEL_CONTACT) {
+    double before =
+        hapi_v3_dot(force, body->start_twist) + hapi_v3_dot(moment, body->start_twist + 3);
+    power = 0.5 * (power + before);
+  }
+  return tick->period * power;
+}
+
+/* J that bodies of given motion do on the pointers' springs in this tick. */
+static double surfaces_give(hapi_tick *tick, double *io_stored)
+{
+  double sum = 0.0;
+  double half_compliance = 0.0;
+  uint32_t pointer = HAPI_SLOT_NONE; /* that it belongs to: a division for each contact costs */
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    const hapi_local_contact *c = &tick->contacts[i];
+    const hapi_local_body *body = hapi_row_body(tick, c->body);
+    double force2 = hapi_v3_dot(c->force, c->force);
+    if (!(force2 > 0.0)) {
+      continue;
+    }
+    if (pointer != c->pointer) {
+      pointer = c->pointer;
+      double stiffness = tick->pointers[pointer].stiffness;
+      half_compliance = stiffness > 0.0 ? 0.5 / stiffness : 0.0;
+    }
+    *io_stored += half_compliance * force2;
+    if (body != NULL && !is_owned(tick, body)) {
+      sum -= work_on(tick, body, c->point_now, c->force);
+    }
+  }
+  return sum;
+}
+
+/* J in the springs between devices and proxies. */
+static double couplings_store(const hapi_tick *tick)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation != 0 && p->proxied) {
+      sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling_stiffness;
+    }
+  }
+  return sum;
+}
+
+/* J that the written force gave to the hand since the last tick. */
+static double port_gave(hapi_tick_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  hapi_v3_sub(p->device_pose.position, g->position, g->moved);
+  hapi_v3_copy(p->device_pose.position, g->position);
+  if (!g->placed) {
+    hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
+    g->placed = true;
+  }
+  return world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+}
+
+static bool any(const double v[3])
+{
+  return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
+}
+
+/* Pays and takes at the ports; whether anything is felt. */
+static bool settle_ports(hapi_tick *tick)
+{
+  bool felt = false;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation != 0) {
+      felt = felt || any(p->device_wrench.force) || any(p->guard.written.force);
+      tick->guard.balance -= port_gave(p);
+    }
+  }
+  return felt;
+}
+
+/* J that the force to be written would give over a tick, if the device goes on as it went. */
+static double port_would_give(const hapi_tick_pointer *p)
+{
+  return p->generation == 0
+             ? 0.0
+             : world_per_device(p) * hapi_v3_dot(p->device_wrench.force, p->guard.moved);
+}
+
+/* Leaves a share of the force's part along the motion. */
+static void hold_back(hapi_tick_pointer *p, double share)
+{
+  double *force = p->device_wrench.force;
+  const double *moved = p->guard.moved;
+  double along = hapi_v3_dot(force, moved) / hapi_v3_dot(moved, moved);
+  hapi_v3_madd(force, -(1.0 - share) * along, moved, force);
+  p->guard.flags |= HAP_GUARD_ENERGY;
+}
+
+static void pay_no_more_than(hapi_tick *tick, double budget)
+{
+  double out = 0.0;
+  double in = 0.0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    double gives = port_would_give(&tick->pointers[i]);
+    out += fmax(gives, 0.0);
+    in += fmax(-gives, 0.0);
+  }
+  if (out - in <= fmax(budget, 0.0)) {
+    return;
+  }
+  double share = fmin(fmax((budget + in) / out, 0.0), 1.0);
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    if (port_would_give(&tick->pointers[i]) > 0.0) {
+      hold_back(&tick->pointers[i], share);
+    }
+  }
+}
+
+/* After a fault nothing is known of where the devices were. */
+static void forget(hapi_tick *tick)
+{
+  tick->guard.balance = 0.0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    tick->pointers[i].guard.placed = false;
+  }
+}
+
+void hapi_energy_observe(hapi_tick *tick)
+{
+  hapi_guard_state *guard = &tick->guard;
+  double given = guard->given;
+  guard->given = 0.0;
+  if (tick->fault != HAP_FAULT_NONE) {
+    forget(tick);
+    return;
+  }
+  if (!settle_ports(tick)) {
+    guard->balance = fmin(guard->balance, 0.0);
+    return;
+  }
+  double stored = 0.0;
+  stored += couplings_store(tick);
+  guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
+  guard->stored_max = fmax(guard->stored_max, stored);
+  /* A larger debt comes from a device that jumped; nobody could pay it back. */
+  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
+  pay_no_more_than(tick, guard->balance + fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST));
+}

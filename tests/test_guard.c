@@ -1,0 +1,670 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The guard of the pure tick: what it lets through, what it holds back, and how it comes back. */
+
+#include "tests/tap.h"
+
+#include "haptic/rt/black_box.h"
+#include "tests/tick_world.h"
+
+#define LIMIT 20.0     /* N */
+#define STEP 10.0      /* N a tick: LIMIT in 2 ms */
+#define ROUNDING 1e-12 /* of the bounds */
+
+static hapi_tick_pointer *guarded_pointer(uint32_t index)
+{
+  hapi_tick_pointer *p = add_pointer(index, -0.1, 0.0, 0.0);
+  p->max_force = LIMIT;
+  p->max_torque = 1.0;
+  p->slew_force = STEP / T;
+  p->slew_torque = 0.5 / T;
+  return p;
+}
+
+/* One pointer before a wall at x = 0, guard on. */
+static hapi_tick_pointer *guarded_wall(void)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_tick_pointer *p = guarded_pointer(0);
+  begin_model();
+  f.model->period_s = 0.02;
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  run(1);
+  return p;
+}
+
+/* The guard alone, with a wrench that the simulation is said to want. */
+static void guard_wrench(hapi_tick_pointer *p, double fx, double fy, double fz)
+{
+  hapi_v3_set(p->wrench.force, fx, fy, fz);
+  hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
+  hapi_guard(&f.tick);
+}
+
+static hapi_tick_pointer *guarded_alone(void)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  return guarded_pointer(0);
+}
+
+/* As a run of 20 ms without force leaves it. */
+static hapi_tick_pointer *guarded_and_warm(void)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  for (int i = 0; i < 25; ++i) {
+    guard_wrench(p, 0.0, 0.0, 0.0);
+  }
+  return p;
+}
+
+/* ---- bounds ---- */
+
+static uint64_t random_state = 1;
+
+static double random_number(void) /* -1 .. 1 */
+{
+  random_state = random_state * 6364136223846793005u + 1442695040888963407u;
+  return (double)(int64_t)(random_state & ~(uint64_t)0x7ff) / 9223372036854775808.0;
+}
+
+static void random_vector(double v[3], int decades)
+{
+  double size = 1.0;
+  int power = (int)((random_number() + 1.0) * 0.5 * decades);
+  for (int i = 0; i < power; ++i) {
+    size *= 10.0;
+  }
+  hapi_v3_set(v, size * random_number(), size * random_number(), size * random_number());
+}
+
+static double distance(const double a[3], const double b[3])
+{
+  double apart[3];
+  hapi_v3_sub(a, b, apart);
+  return hapi_v3_norm(apart);
+}
+
+TEST(a_million_random_wrenches_keep_limit_and_slew)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  p->pose_world_device = (hap_pose){{1.0, 2.0, 3.0}, {0.5, 0.5, -0.5, 0.5}};
+  p->force_scale = 0.7;
+  uint64_t wrong = 0;
+  double largest = 0.0;
+  double fastest = 0.0;
+  for (int i = 0; i < 1000000; ++i) {
+    hap_wrench before = p->device_wrench;
+    random_vector(p->wrench.force, 12);
+    random_vector(p->wrench.torque, 12);
+    if (i % 5000 == 4999) {
+      p->wrench.force[i % 3] = i % 2 == 0 ? (double)NAN : (double)INFINITY;
+    } else if (i % 5000 == 50) {
+      hapi_tick_reset_fault(&f.tick);
+    }
+    for (int k = 0; k < 3; ++k) {
+      p->device_pose.position[k] += 1e-3 * random_number();
+    }
+    hapi_guard(&f.tick);
+    double force = hapi_v3_norm(p->device_wrench.force);
+    double change = distance(p->device_wrench.force, before.force);
+    double torque = hapi_v3_norm(p->device_wrench.torque);
+    double turn = distance(p->device_wrench.torque, before.torque);
+    wrong += !(force <= LIMIT * (1.0 + ROUNDING) && change <= STEP * (1.0 + ROUNDING) &&
+               torque <= 1.0 + ROUNDING && turn <= 0.5 * (1.0 + ROUNDING));
+    largest = fmax(largest, force);
+    fastest = fmax(fastest, change);
+  }
+  CHECK(wrong == 0);
+  CHECK_NEAR(largest, LIMIT, 1e-9); /* both bounds were reached */
+  CHECK_NEAR(fastest, STEP, 1e-9);
+  CHECK(f.tick.faults == 200);
+}
+
+TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  for (int i = 0; i < 20; ++i) {
+    guard_wrench(p, 0.0, 20.0, 0.0);
+  }
+  check_v3(p->device_wrench.force, 0.0, 20.0, 0.0, 1e-12);
+  for (int i = 0; i < 80; ++i) { /* along the sphere: what is left falls to 2/3 a tick */
+    guard_wrench(p, 3e11, 0.0, -4e11);
+  }
+  check_v3(p->device_wrench.force, 12.0, 0.0, -16.0, 1e-9);
+  CHECK(p->guard.flags == HAP_GUARD_SATURATED ||
+        p->guard.flags == (HAP_GUARD_SATURATED | HAP_GUARD_SLEW));
+}
+
+/* ---- order ---- */
+
+TEST(the_ramp_comes_before_slew_and_slew_before_saturation)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  guard_wrench(p, 120.0, 0.0, 0.0); /* 1/20 of it; saturated first it would be 1 N */
+  check_v3(p->device_wrench.force, 6.0, 0.0, 0.0, 1e-12);
+  CHECK(p->guard.flags == HAP_GUARD_RAMP_IN);
+  guard_wrench(p, 3000.0, 0.0, 0.0); /* 300 N, of which one step is made */
+  check_v3(p->device_wrench.force, 16.0, 0.0, 0.0, 1e-12);
+  CHECK(p->guard.flags == (HAP_GUARD_RAMP_IN | HAP_GUARD_SLEW));
+  guard_wrench(p, 3000.0, 0.0, 0.0);
+  check_v3(p->device_wrench.force, 20.0, 0.0, 0.0, 1e-12);
+  CHECK(p->guard.flags == (HAP_GUARD_RAMP_IN | HAP_GUARD_SLEW | HAP_GUARD_SATURATED));
+  check_v3(p->guard.wanted.force, 3000.0, 0.0, 0.0, 0.0);
+}
+
+TEST(what_the_observer_takes_goes_at_the_slew_bound)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  guard_wrench(p, 10.0, 0.0, 0.0);
+  guard_wrench(p, 19.0, 0.0, 0.0);
+  CHECK(p->guard.flags == 0); /* it stands still: nothing flows */
+  for (int i = 0; i < 2; ++i) {
+    p->device_pose.position[0] += 1e-3; /* 19 N along 1 mm: 19 mJ of nothing */
+    guard_wrench(p, 19.0, 0.0, 0.0);
+    CHECK((p->guard.flags & HAP_GUARD_ENERGY) != 0);
+    check_v3(p->device_wrench.force, i == 0 ? 9.0 : 0.0, 0.0, 0.0, 1e-9);
+  }
+  p->device_pose.position[0] += 1e-3;
+  guard_wrench(p, 5.0, 7.0, 0.0); /* across the motion it may push */
+  check_v3(p->device_wrench.force, 0.0, 7.0, 0.0, 1e-9);
+  p->device_pose.position[0] -= 2e-3;
+  guard_wrench(p, 5.0, 7.0, 0.0); /* and against it */
+  check_v3(p->device_wrench.force, 5.0, 7.0, 0.0, 1e-9);
+  CHECK(p->guard.flags == 0 && f.tick.guard.energy_ticks == 3);
+}
+
+/* ---- ramp-in, faults, reset ---- */
+
+static void check_ramp_in(hapi_tick_pointer *p)
+{
+  for (int i = 1; i <= 25; ++i) {
+    guard_wrench(p, 0.0, 4.0, 0.0);
+    CHECK_NEAR(p->device_wrench.force[1], fmin(4.0 * i / 20.0, 4.0), 1e-12);
+    CHECK(((p->guard.flags & HAP_GUARD_RAMP_IN) != 0) == (i < 20));
+    CHECK_NEAR(p->wrench.force[1], p->device_wrench.force[1], 1e-12); /* what is felt is reported */
+  }
+}
+
+TEST(a_pointer_comes_in_over_20_ms_and_so_after_a_reset)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  check_ramp_in(p);
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  for (int i = 0; i < 50; ++i) {
+    guard_wrench(p, 0.0, 4.0, 0.0);
+  }
+  hapi_tick_reset_fault(&f.tick);
+  check_ramp_in(p);
+  CHECK(f.tick.faults == 1 && f.tick.guard.slewed_ticks == 0);
+}
+
+TEST(a_reset_of_no_fault_changes_nothing)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_tick_reset_fault(&f.tick);
+  guard_wrench(p, 0.0, 4.0, 0.0);
+  check_v3(p->device_wrench.force, 0.0, 4.0, 0.0, 0.0);
+}
+
+TEST(a_force_that_is_not_finite_ramps_from_the_last_good_one_to_zero)
+{
+  static const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, 1e200};
+  for (int i = 0; i < 4; ++i) {
+    hapi_tick_pointer *p = guarded_and_warm();
+    hapi_tick_pointer *other = guarded_pointer(2);
+    other->guard.share = 1.0;
+    hapi_v3_set(other->wrench.force, 0.0, 3.0, 0.0);
+    guard_wrench(p, 10.0, 0.0, 0.0);
+    guard_wrench(p, 16.0, 0.0, 0.0);
+    guard_wrench(p, 16.0, bad[i], 0.0);
+    CHECK(f.tick.fault == HAP_FAULT_FORCE && f.tick.fault_pointer == 1 && f.tick.faults == 1);
+    check_v3(p->device_wrench.force, 6.0, 0.0, 0.0, 1e-12);
+    check_v3(p->wrench.force, 6.0, 0.0, 0.0, 1e-12);
+    check_v3(other->device_wrench.force, 0.0, 0.0, 0.0, 0.0); /* 3 N are within one step */
+    guard_wrench(p, 16.0, 0.0, 0.0);                          /* the cause has gone */
+    check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+    guard_wrench(p, 16.0, 0.0, 0.0);
+    check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+    CHECK(f.tick.fault == HAP_FAULT_FORCE && (p->guard.flags & HAP_GUARD_FAULT) != 0);
+  }
+}
+
+TEST(a_torque_that_is_not_finite_is_a_fault_too)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  p->wrench.torque[2] = (double)NAN;
+  hapi_guard(&f.tick);
+  CHECK(f.tick.fault == HAP_FAULT_FORCE);
+  check_v3(p->device_wrench.torque, 0.0, 0.0, 0.0, 0.0);
+}
+
+TEST(the_first_fault_is_the_one_that_stays)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  (void)guarded_pointer(1);
+  hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 2);
+  guard_wrench(p, (double)NAN, 0.0, 0.0);
+  CHECK(f.tick.fault == HAP_FAULT_DEVICE_POSE && f.tick.fault_pointer == 2 && f.tick.faults == 1);
+}
+
+TEST(a_device_that_failed_is_zeroed_at_once)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  guard_wrench(p, 10.0, 0.0, 0.0);
+  guard_wrench(p, 20.0, 0.0, 0.0);
+  hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_READ, 1);
+  hapi_guard_cut(p);
+  guard_wrench(p, 20.0, 0.0, 0.0);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  hapi_tick_reset_fault(&f.tick);
+  check_ramp_in(p);
+}
+
+TEST(a_measuring_guard_keeps_checks_and_limits_alone)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  f.tick.guard.mode = HAP_GUARD_MEASURE;
+  guard_wrench(p, 19.0, 0.0, 0.0);
+  check_v3(p->device_wrench.force, 19.0, 0.0, 0.0, 0.0);
+  p->device_pose.position[0] += 0.01;
+  guard_wrench(p, 0.0, -40.0, 0.0);
+  check_v3(p->device_wrench.force, 0.0, -20.0, 0.0, 1e-12);
+  CHECK(p->guard.flags == HAP_GUARD_SATURATED);
+  guard_wrench(p, (double)NAN, 0.0, 0.0);
+  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  CHECK(f.tick.fault == HAP_FAULT_FORCE);
+}
+
+/* ---- age ---- */
+
+/* A tick, with a new model when it is due: every 20 ms, and none from 200 ms on for 200 ms. */
+static void stalled_tick(int tick)
+{
+  if (tick % 20 == 0 && (tick < 200 || tick >= 400)) {
+    begin_model();
+    f.model->period_s = 0.02;
+    (void)add_contact(0, HAPI_SLOT_NONE, 0);
+    adopt();
+  }
+  run(1);
+}
+
+TEST(a_stall_takes_the_force_down_and_the_next_model_brings_it_back)
+{
+  hapi_tick_pointer *p = guarded_wall();
+  double before = 0.0;
+  double fastest = 0.0;
+  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0); /* 5 mm deep, at rest: 5 N */
+  for (int tick = 0; tick < 500; ++tick) {
+    stalled_tick(tick);
+    double force = -p->device_wrench.force[0];
+    fastest = tick >= 50 ? fmax(fastest, fabs(force - before)) : 0.0;
+    before = force;
+    bool stale = (p->guard.flags & HAP_GUARD_STALE) != 0;
+    if ((tick >= 50 && tick <= 220) || tick >= 420) { /* a step after the recovery: all of it */
+      CHECK_NEAR(force, 5.0, 1e-9);
+      CHECK(!stale && p->guard.flags == 0);
+    } else if (tick >= 330 && tick < 400) {
+      CHECK_NEAR(force, 0.0, 1e-9);
+      CHECK(stale);
+    }
+  }
+  CHECK(fastest <= 5.0 / 20.0 + 1e-9); /* down in 100 ms, up in one step of physics */
+  CHECK(f.tick.guard.stale_times == 1 && f.tick.fault == HAP_FAULT_NONE);
+  CHECK(f.tick.guard.stale_ticks >= 170 && f.tick.guard.stale_ticks <= 180);
+}
+
+TEST(a_model_of_two_steps_is_not_too_old)
+{
+  hapi_tick_pointer *p = guarded_wall();
+  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0);
+  int64_t state_ns = f.tick.state_ns;
+  while (f.now_ns <= state_ns + 41 * TICK_NS) { /* two steps and a tick */
+    run(1);
+    CHECK(!f.tick.guard.stale);
+  }
+  run(1);
+  CHECK(f.tick.guard.stale);
+}
+
+TEST(without_a_model_and_in_model_single_nothing_grows_old)
+{
+  hapi_tick_pointer *p = guarded_alone();
+  f.now_ns = 1000 * TICK_NS;
+  run(50);
+  CHECK(f.tick.guard.stale_times == 0);
+  begin_model();
+  f.model->model = HAP_MODEL_SINGLE;
+  f.model->period_s = T;
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0);
+  run(10); /* models late by a few ms are no reason */
+  CHECK(f.tick.guard.stale_times == 0);
+  run(10);
+  CHECK(f.tick.guard.stale_times == 1);
+}
+
+/* ---- energy ---- */
+
+typedef struct energy {
+  double gained; /* J, by the hand, from the wrench held over each tick */
+  double most;   /* J, largest gain at any time */
+  double stored; /* J, largest in the spring */
+  double peak;   /* N */
+} energy;
+
+/* The hand goes 10 mm to and fro about the wall's surface, at hz; a device that is scale times smaller
+ * and weaker. The work is taken from
+ * what was written and where the device was, nothing else. */
+static energy tap_wall(hap_guard mode, double scale, double hz, double damping, int ticks)
+{
+  const double depth = 0.01;
+  energy e = {0.0, 0.0, 0.0, 0.0};
+  hapi_tick_pointer *p = guarded_wall();
+  f.tick.guard.mode = mode;
+  p->motion_scale = scale;
+  p->force_scale = 1.0 / scale;
+  p->damping = damping;
+  f.tick.physics_period = 0.0; /* the wall does not grow old */
+  for (int i = 0; i < ticks; ++i) {
+    double angle = 2.0 * 3.14159265358979 * hz * T * i;
+    double x = -0.01 - depth * cos(angle);
+    double moved = x / scale - p->device_pose.position[0];
+    e.gained += i > 0 ? scale * scale * p->device_wrench.force[0] * moved : 0.0;
+    e.most = fmax(e.most, e.gained);
+    p->device_pose.position[0] = x / scale;
+    p->device_twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle) / scale;
+    run(1);
+    double deep = fmax(x + 0.01, 0.0);
+    e.stored = fmax(e.stored, 0.5 * p->stiffness * deep * deep);
+    e.peak = fmax(e.peak, hapi_v3_norm(p->wrench.force));
+  }
+  return e;
+}
+
+TEST(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in)
+{
+  /* k v^2 T^2 / 2 a tick is what holding the force makes of nothing (Colgate, Schenkel). */
+  energy bare = tap_wall(HAP_GUARD_MEASURE, 1.0, 5.0, 0.0, 10000);
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 5.0, 0.0, 10000);
+  printf("# of %.3g J stored: %.3g bare, %.3g guarded, peak %.4g and %.4g N, %llu ticks\n",
+         bare.stored, bare.most, kept.most, bare.peak, kept.peak,
+         (unsigned long long)f.tick.guard.energy_ticks);
+  CHECK(bare.most > 0.5 * bare.stored); /* of 50 taps */
+  CHECK(kept.most <= 0.01 * kept.stored + 1e-6);
+  CHECK(kept.peak >= 0.98 * bare.peak);
+}
+
+TEST(energy_counts_in_the_world_whatever_the_scales)
+{
+  energy kept = tap_wall(HAP_GUARD_ON, 5.0, 5.0, 0.0, 10000);
+  CHECK(kept.most > 0.005 * kept.stored && kept.most <= 0.01 * kept.stored);
+}
+
+TEST(a_damper_that_drives_is_held_back)
+{
+  energy bare = tap_wall(HAP_GUARD_MEASURE, 1.0, 3.0, -20.0, 3000);
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 3.0, -20.0, 3000);
+  printf("# of %.3g J stored: %.3g bare, %.3g guarded\n", bare.stored, bare.most, kept.most);
+  CHECK(bare.most > bare.stored);
+  CHECK(kept.most <= 0.01 * kept.stored + 1e-5);
+}
+
+TEST(a_wall_with_a_damper_is_left_alone)
+{
+  energy kept = tap_wall(HAP_GUARD_ON, 1.0, 5.0, 5.0, 10000);
+  CHECK(f.tick.guard.energy_ticks == 0 && kept.peak > 9.0);
+}
+
+/* A body of 1 kg comes at 0.5 m/s, at a hand of 0.3 kg on a spring of hand_k [N/m]; 0: at rest. The
+ * largest sum of what the hand has gained and the body still has goes to *out_total. */
+static double impact(hap_guard mode, double hand_k, double *out_total)
+{
+  set_up();
+  f.tick.guard.mode = mode;
+  hapi_tick_pointer *p = guarded_pointer(0);
+  p->stiffness = 500.0;
+  hapi_v3_set(p->device_pose.position, 0.0, 0.0, 0.0);
+  f.model->model = HAP_MODEL_CONTACT;
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_OWNED;
+  body->mass = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = 1e-3;
+    body->inverse_inertia[4 * i] = 1e3;
+  }
+  body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = HUGE_VAL;
+  body->pose.position[0] = 0.06;
+  body->twist.linear[0] = -0.5;
+  hapi_model_contact *c = add_contact(0, 0, 0);
+  c->point_body[0] = -0.02;
+  adopt();
+  double peak = 0.0;
+  double speed = 0.0;
+  double gained = 0.0;
+  *out_total = 0.0;
+  for (int i = 0; i < 160; ++i) {
+    run(1);
+    double force = p->device_wrench.force[0];
+    peak = fmax(peak, fabs(force));
+    if (hand_k > 0.0) {
+      speed += T * (force - hand_k * p->device_pose.position[0]) / 0.3;
+      p->device_pose.position[0] += T * speed;
+      p->device_twist.linear[0] = speed;
+      gained += force * T * speed;
+    }
+    double v = f.bodies[0].twist.linear[0];
+    *out_total = fmax(*out_total, gained + 0.5 * v * v);
+  }
+  return peak;
+}
+
+TEST(an_honest_impact_is_felt_whole)
+{
+  static const double hands[] = {0.0, 100.0, 1000.0};
+  for (int i = 0; i < 3; ++i) {
+    double total[2];
+    double bare = impact(HAP_GUARD_MEASURE, hands[i], &total[0]);
+    double kept = impact(HAP_GUARD_ON, hands[i], &total[1]);
+    printf("# hand of %g N/m: peak %.4g N, guarded %.4g; of 0.125 J at most %.5g, guarded %.5g\n",
+           hands[i], bare, kept, total[0], total[1]);
+    CHECK(bare > 2.0 && fabs(kept - bare) <= 0.02 * bare);
+    CHECK(hands[i] > 0.0 || f.tick.guard.energy_ticks == 0);
+    CHECK(total[1] <= 1.01 * 0.125); /* J that the body brought */
+  }
+}
+
+/* A body presses against a hand that gives way at 0.05 m/s: with its weight, or because it is driven. The
+ * hand gains energy all the time, and the world loses it. */
+static void yield_to(uint32_t flags, hap_model model)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_tick_pointer *p = guarded_pointer(0);
+  f.model->model = model;
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = flags;
+  body->mass = 0.2;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = 1e-3;
+    body->inverse_inertia[4 * i] = 1e3;
+  }
+  body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = HUGE_VAL;
+  body->gravity[0] = -10.0;
+  body->pose.position[0] = 0.028; /* 2 mm deep: 2 N */
+  body->twist.linear[0] = -0.05;
+  hapi_model_contact *c = add_contact(0, 0, 0);
+  c->point_body[0] = -0.02;
+  adopt();
+  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
+  patches->model_number = f.model->number;
+  patches->contact_count = 0;
+  hapi_tick_adopt_patches(&f.tick, patches);
+  f.contacts[0].seen = true; /* no ramp of its own */
+  f.contacts[0].ramp = 1.0;
+  p->guard.share = 1.0;
+  for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
+    p->device_pose.position[0] = -0.05 * T * i;
+    p->device_twist.linear[0] = -0.05;
+    run(1);
+    CHECK_NEAR(p->device_wrench.force[0], -2.0, 0.05);
+  }
+  CHECK(f.tick.guard.energy_ticks == 0 && f.tick.guard.stored_max < 0.01);
+}
+
+TEST(what_a_weight_or_a_drive_gives_is_felt)
+{
+  yield_to(HAPI_BODY_OWNED, HAP_MODEL_CONTACT);
+  yield_to(HAPI_BODY_DRIVEN, HAP_MODEL_CONTACT);
+  yield_to(HAPI_BODY_DRIVEN, HAP_MODEL_ACCELERANCE);
+}
+
+TEST(a_device_has_not_moved_when_it_is_first_seen)
+{
+  hapi_tick_pointer *p =
+      guarded_alone(); /* 0.1 m from its origin, on the side that it is pushed to */
+  for (int again = 0; again < 2; ++again) {
+    p->guard.share = 1.0;
+    guard_wrench(p, -4.0, 0.0, 0.0);
+    check_v3(p->device_wrench.force, -4.0, 0.0, 0.0, 0.0);
+    hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 1);
+    p->device_pose.position[0] = (double)NAN;
+    guard_wrench(p, 0.0, 0.0, 0.0);
+    p->device_pose.position[0] = -0.3; /* where it is put meanwhile */
+    hapi_tick_reset_fault(&f.tick);
+  }
+  CHECK(f.tick.guard.energy_ticks == 0);
+}
+
+/* ---- the black box ---- */
+
+static hap_black_box_row box_rows[HAP_BLACK_BOX_TICKS * POINTERS];
+static uint32_t box_counts[HAP_BLACK_BOX_TICKS];
+static hap_black_box_row read_rows[HAP_BLACK_BOX_TICKS * POINTERS];
+static hapi_black_box box;
+
+static void record(int ticks)
+{
+  for (int i = 0; i < ticks; ++i) {
+    run(1);
+    hapi_black_box_record(&box, &f.tick);
+  }
+}
+
+static hapi_tick_pointer *open_box(void)
+{
+  hapi_tick_pointer *p = guarded_wall();
+  box = (hapi_black_box){.rows = box_rows, .counts = box_counts, .pointers = POINTERS};
+  hapi_black_box_reset(&box);
+  f.tick.physics_period = 0.0; /* the wall does not grow old */
+  return p;
+}
+
+static size_t read_box(size_t room)
+{
+  memset(read_rows, 0xee, sizeof read_rows);
+  return hapi_black_box_read(&box, read_rows, room);
+}
+
+TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
+{
+  hapi_tick_pointer *p = open_box();
+  record(1000);
+  CHECK(read_box(1000) == 0); /* nothing has happened */
+  p->stiffness = (double)INFINITY;
+  p->device_pose.position[0] = -0.005;
+  record(1);
+  p->stiffness = 1000.0;
+  uint64_t last = f.tick.tick - 1;
+  record(100);
+  for (int again = 0; again < 2; ++again) {
+    REQUIRE(read_box(1000) == 256);
+    for (uint64_t i = 0; i < 256; ++i) {
+      const hap_black_box_row *row = &read_rows[i];
+      CHECK(row->tick == last - 255 + i && row->pointer.v == (((uint64_t)1 << 32) | 1));
+      CHECK(row->fault == (i == 255 ? HAP_FAULT_FORCE : HAP_FAULT_NONE));
+      CHECK(row->time_ns == (int64_t)row->tick * TICK_NS);
+    }
+  }
+  CHECK(!isfinite(read_rows[255].wanted.force[0]) && read_rows[255].written.force[0] == 0.0);
+  CHECK(read_rows[255].pose.position[0] == -0.005 && read_rows[254].pose.position[0] == -0.1);
+  CHECK(read_rows[255].guard == HAP_GUARD_FAULT);
+  CHECK(read_box(3) == 3 && read_rows[0].tick == last - 2 && read_rows[2].tick == last);
+  hapi_tick_reset_fault(&f.tick);
+  record(1);
+  CHECK(read_box(1000) == 0);
+  record(9);
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  record(1);
+  CHECK(read_box(1000) == 11 && read_rows[10].fault == HAP_FAULT_WORLD);
+  CHECK(read_rows[0].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
+}
+
+TEST(each_pointer_has_its_rows)
+{
+  (void)open_box();
+  record(3);
+  (void)guarded_pointer(2);
+  record(2);
+  hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 3);
+  record(1);
+  CHECK(read_box(1000) == 9);
+  CHECK(read_rows[2].tick + 1 == read_rows[3].tick && read_rows[3].tick == read_rows[4].tick);
+  CHECK((uint32_t)read_rows[3].pointer.v == 1 && (uint32_t)read_rows[4].pointer.v == 3);
+}
+
+TEST(a_loop_never_waits_for_a_reader)
+{
+  (void)open_box();
+  record(5);
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  record(1);
+  box.state = HAPI_BOX_READING; /* a reader that takes its time */
+  hapi_tick_reset_fault(&f.tick);
+  record(4); /* not kept */
+  hapi_tick_fault(&f.tick, HAP_FAULT_LOCAL_STATE, 0);
+  record(1);
+  box.state = HAPI_BOX_FROZEN; /* done */
+  record(3);
+  CHECK(read_box(1000) == 1); /* of the new fault, not of the old one */
+  CHECK(read_rows[0].fault == HAP_FAULT_LOCAL_STATE);
+}
+
+int main(void)
+{
+  RUN(a_million_random_wrenches_keep_limit_and_slew);
+  RUN(a_force_beyond_the_limit_comes_to_it_in_its_own_direction);
+  RUN(the_ramp_comes_before_slew_and_slew_before_saturation);
+  RUN(what_the_observer_takes_goes_at_the_slew_bound);
+  RUN(a_pointer_comes_in_over_20_ms_and_so_after_a_reset);
+  RUN(a_reset_of_no_fault_changes_nothing);
+  RUN(a_force_that_is_not_finite_ramps_from_the_last_good_one_to_zero);
+  RUN(a_torque_that_is_not_finite_is_a_fault_too);
+  RUN(the_first_fault_is_the_one_that_stays);
+  RUN(a_device_that_failed_is_zeroed_at_once);
+  RUN(a_measuring_guard_keeps_checks_and_limits_alone);
+  RUN(a_stall_takes_the_force_down_and_the_next_model_brings_it_back);
+  RUN(a_model_of_two_steps_is_not_too_old);
+  RUN(without_a_model_and_in_model_single_nothing_grows_old);
+  RUN(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in);
+  RUN(energy_counts_in_the_world_whatever_the_scales);
+  RUN(a_damper_that_drives_is_held_back);
+  RUN(a_wall_with_a_damper_is_left_alone);
+  RUN(an_honest_impact_is_felt_whole);
+  RUN(what_a_weight_or_a_drive_gives_is_felt);
+  RUN(a_device_has_not_moved_when_it_is_first_seen);
+  RUN(the_black_box_keeps_the_last_256_ticks_until_the_reset);
+  RUN(each_pointer_has_its_rows);
+  RUN(a_loop_never_waits_for_a_reader);
+  hapi_exchange_destroy(f.exchange);
+  return tap_done();
+}
