@@ -57,6 +57,7 @@ static hap_session *start_scene(scene *s, hap_model model, hap_device **device, 
   hap_session_def_init(&def, sizeof def);
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.model = model;
+  def.guard = HAP_GUARD_MEASURE; /* what it decides hangs on the last bit */
   def.physics_hz = 60.0;
   def.trace_rows = 8;
   hap_ode_def_init(&ode, sizeof ode);
