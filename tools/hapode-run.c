@@ -12,6 +12,7 @@
 #include "tools/plot.h"
 #include "tools/rig.h"
 #include "tools/run_black_box.h"
+#include "tools/run_identify.h"
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
 #include "tools/run_options.h"
@@ -218,6 +219,20 @@ static int refuse(const rig *r, hap_status status, const hap_detail *detail)
   return complain(usage ? EXIT_USAGE : EXIT_FAILED, whole.text);
 }
 
+/* A device that cannot be opened as asked for is wrong usage. */
+static int identify(const run_options *options)
+{
+  hap_detail detail = {""};
+  run_loop_catch_signals();
+  hap_status status = run_identify(options, stdout, &detail);
+  if (status == HAP_OK) {
+    return EXIT_GOOD;
+  }
+  bool usage = status == HAP_ERROR_NOT_FOUND || status == HAP_ERROR_ARGUMENT;
+  return complain(usage ? EXIT_USAGE : EXIT_FAILED,
+                  detail.text[0] != '\0' ? detail.text : hap_status_text(status));
+}
+
 static int run_session(run_options *options)
 {
   rig r;
@@ -252,7 +267,7 @@ int main(int argc, char **argv)
       printf("hapode-run %s\n", hap_version());
       break;
     case RUN_SESSION:
-      return run_session(&options);
+      return options.identify_path != NULL ? identify(&options) : run_session(&options);
   }
   return EXIT_GOOD;
 }

@@ -39,6 +39,17 @@ static const char *device_spec(const rig_options *options, const scene *s, size_
   return scenes_own && own != NULL ? own : asked != NULL ? asked : "virtual";
 }
 
+static hap_status take_identity(const char *path, hap_device *device, hap_detail *detail)
+{
+  hap_device_identity identity;
+  hap_device_identity_init(&identity, sizeof identity);
+  if (path == NULL) {
+    return HAP_OK;
+  }
+  hap_status status = hap_device_identity_read(path, &identity, detail);
+  return status < HAP_OK ? status : hap_device_set_identity(device, &identity, detail);
+}
+
 static hap_status add_pointer(const rig_options *options, rig *r, size_t index, hap_detail *detail)
 {
   const scene_parameters *p = &r->scene->parameters;
@@ -53,6 +64,9 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
     return HAP_ERROR_ARGUMENT;
   }
   hap_status status = hap_device_open(spec, &r->devices[index], detail);
+  if (status >= HAP_OK) {
+    status = take_identity(options->identities[index], r->devices[index], detail);
+  }
   if (status < HAP_OK) {
     return status;
   }

@@ -20,7 +20,9 @@ typedef struct rig_options {
   const char *devices[RIG_POINTERS_MAX]; /* specs in pointer order; "virtual" alone: the scene's
                                             own simulated hand; none given: the same */
   size_t device_count;
-  double max_force; /* N; 0: 20 */
+  const char
+      *identities[RIG_POINTERS_MAX]; /* files for the devices; NULL: as they say themselves */
+  double max_force;                  /* N; 0: 20 */
   hap_session_def def;
 } rig_options;
 

@@ -67,6 +67,11 @@ void run_loop_catch_signals(void)
   set_handler(harmless, 1, SIG_IGN);
 }
 
+bool run_loop_stop_wanted(void)
+{
+  return stop_wanted != 0;
+}
+
 int32_t run_loop_trace_rows(const run_options *options)
 {
   if (options->trace_path == NULL && options->plot_path == NULL) {

@@ -27,6 +27,9 @@ int32_t run_loop_trace_rows(const run_options *options);
  * it too. Whatever signal ends the process, the force is zero before. */
 void run_loop_catch_signals(void);
 
+/* Such a signal has come. */
+bool run_loop_stop_wanted(void);
+
 /* Starts the session, runs it, stops it. HAP_NO_REALTIME as of hap_session_start; HAP_END when a
  * signal ended it early; errors with detail. Whatever comes back, the session is stopped and *stats
  * is what it came to. */

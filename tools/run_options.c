@@ -74,6 +74,21 @@ static hap_status take_device(run_options *options, const option *self, const ch
   return HAP_OK;
 }
 
+static hap_status take_identity(run_options *options, const option *self, const char *value,
+                                hap_detail *detail)
+{
+  size_t devices = options->rig.device_count;
+  if (devices == 0) {
+    return fail(detail, "it belongs to a --device before it");
+  }
+  if (options->rig.identities[devices - 1] != NULL) {
+    return fail(detail, "the device \"%.60s\" has one already", options->rig.devices[devices - 1]);
+  }
+  (void)self;
+  options->rig.identities[devices - 1] = value;
+  return HAP_OK;
+}
+
 static hap_status take_effects(run_options *options, const option *self, const char *value,
                                hap_detail *detail)
 {
@@ -156,6 +171,12 @@ static const option table[] = {
      "device of the next pointer, such as virtual or replay:hand.csv\n"
      "(default, and virtual alone: the scene's own simulated hand)",
      take_device, 0, 0, 0},
+    {"--identity", "FILE", "what --identify wrote, for the --device before it", take_identity, 0, 0,
+     0},
+    {"--identify", "FILE",
+     "no session: moves the one --device, which nobody must hold, finds its\n"
+     "mass, damping, friction, delay and quantum and writes them to FILE",
+     take_text, offsetof(run_options, identify_path), 0, 0},
     {"--physics-hz", "F", "steps of the world a second, 1 to 1000 (default 60)", take_number,
      offsetof(run_options, rig.def.physics_hz), 1, 1000},
     {"--haptic-hz", "F", "ticks of the haptic loop a second, 100 to 20000 (default 1000)",
@@ -262,6 +283,10 @@ static hap_status check(run_options *o, hap_detail *detail)
       ((o->trace_path != NULL && strcmp(o->black_box_path, o->trace_path) == 0) ||
        (o->plot_path != NULL && strcmp(o->black_box_path, o->plot_path) == 0))) {
     return fail(detail, "--black-box: the same file as --trace or --plot");
+  }
+  if (o->identify_path != NULL && o->rig.device_count != 1) {
+    return fail(detail, "--identify: takes exactly one --device, there are %zu",
+                o->rig.device_count);
   }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
     return fail(detail, "--effects: %.480s", why.text);

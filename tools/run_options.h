@@ -25,6 +25,7 @@ typedef struct run_options {
   const char *trace_path;
   const char *plot_path;
   const char *black_box_path;
+  const char *identify_path; /* not NULL: identify the device, no session */
   run_effects effects;
 } run_options;
 

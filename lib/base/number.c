@@ -4,6 +4,7 @@
 
 #include <locale.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "base/vec.h"
@@ -73,4 +74,15 @@ const char *hapi_number_read(const char *text, double *out)
   }
   *out = value;
   return end;
+}
+
+void hapi_number_write(char *out, size_t size, double value)
+{
+  locale_t point = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+  locale_t before = uselocale(point);
+  snprintf(out, size, "%.9g", value);
+  uselocale(before);
+  if (point != (locale_t)0) {
+    freelocale(point);
+  }
 }

@@ -10,25 +10,6 @@
 
 /* The def structs: defaults and checks. */
 
-typedef struct def_head {
-  uint32_t size;
-  uint32_t cookie;
-} def_head;
-
-/* A caller of an older build has room for less than this build knows. */
-static void give_defaults(void *def, size_t size_of_def, const void *defaults, size_t size)
-{
-  def_head head;
-  if (def == NULL || size_of_def < sizeof head) {
-    return;
-  }
-  memset(def, 0, size_of_def);
-  memcpy(def, defaults, size < size_of_def ? size : size_of_def);
-  memcpy(&head, def, sizeof head);
-  head.size = (uint32_t)size_of_def;
-  memcpy(def, &head, sizeof head);
-}
-
 void hap_session_def_init(hap_session_def *def, size_t size_of_def)
 {
   hap_session_def d;
@@ -46,7 +27,7 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
   d.max_edge_probes = 4;
   d.max_hull_points = 4096;
-  give_defaults(def, size_of_def, &d, sizeof d);
+  hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
 void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
@@ -63,23 +44,7 @@ void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
   d.max_torque = 1.0;
   d.coupling = HAP_COUPLING_AUTO;
   d.collide_bits = 0xffffffffu;
-  give_defaults(def, size_of_def, &d, sizeof d);
-}
-
-hap_status hapi_def_read(void *out, size_t size_of_out, const void *def, uint32_t cookie,
-                         const char *init_name, hap_detail *detail)
-{
-  def_head head;
-  if (def == NULL) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the def is NULL");
-  }
-  memcpy(&head, def, sizeof head);
-  if (head.cookie != cookie || head.size < sizeof head || head.size > 65536) {
-    return hapi_fail(detail, HAP_ERROR_UNINITIALISED, "the def was not initialised: call %s first",
-                     init_name);
-  }
-  memcpy(out, def, head.size < size_of_out ? head.size : size_of_out);
-  return HAP_OK;
+  hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
 static hap_status check_number(double value, double low, double high, const char *name,

@@ -9,6 +9,7 @@
 
 #include <hapode/session.h>
 
+#include "base/def.h"
 #include "contact/contact.h"
 #include "haptic/haptic.h"
 #include "physics/physics.h"
@@ -43,11 +44,6 @@ struct hap_session {
 /* Notes the text of an error on the session and gives back status. */
 hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
-
-/* What both ends of a def struct need: the caller's size, which may be that of an older or newer
- * build, and a cookie. Copies what both know over defaults that stand in *out. */
-hap_status hapi_def_read(void *out, size_t size_of_out, const void *def, uint32_t cookie,
-                         const char *init_name, hap_detail *detail);
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
 

@@ -1,0 +1,426 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "device/identify.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/def.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "device/device.h"
+
+#define COOKIE 0x48494431u
+#define FORCE_SHARE 0.3    /* of the device's own limit */
+#define FORCE_UNKNOWN 1.0  /* N, for a device that does not know its limit */
+#define REST_S 0.1         /* before an axis */
+#define RISE_S 2.0         /* of the force, from zero to its limit, until the device moves */
+#define MOVED 1e-3         /* m: it does */
+#define SWING_S 8.0        /* to and fro */
+#define BRAKE_S 0.4        /* behind an axis */
+#define AXIS_S 12.0        /* more than all these */
+#define TRAVEL_SHARE 0.2   /* of the bound, for a swing */
+#define SPEED_SHARE 0.5    /* of the bound */
+#define ACCELERATION 4.0   /* m/s^2 that the force is adjusted to */
+#define BRAKE_SPEED 0.2    /* m/s that the brake meets with the whole force */
+#define WAVES_OF_A_SPEED 2 /* turns before the other speed is taken */
+#define WAVE_S_MAX 0.5     /* without a turn for so long: more force */
+#define SPEED_SAMPLES 8u
+#define RESIDUAL_MOST 0.1
+#define WATCH_S 0.1
+#define AXES 3
+
+typedef struct run {
+  const hap_device *device;
+  const hap_identify_def *def;
+  hap_detail *detail;
+  double limit; /* N */
+  int64_t start_ns;
+  uint64_t tick;
+  double time; /* s since start */
+  double watched;
+  double position[3];
+  double origin[3]; /* where it began */
+  int axis;
+  hapi_identify_record records[AXES];
+} run;
+
+void hap_identify_def_init(hap_identify_def *def, size_t size_of_def)
+{
+  hap_identify_def d;
+  memset(&d, 0, sizeof d);
+  d.cookie = COOKIE;
+  d.rate_hz = 1000.0;
+  d.max_travel = 0.05;
+  d.max_speed = 0.5;
+  hapi_def_init(def, size_of_def, &d, sizeof d);
+}
+
+static hap_status check_def(const hap_identify_def *def, double limit, hap_detail *detail)
+{
+  const struct {
+    double value;
+    double low;
+    double high;
+    const char *name;
+  } rules[] = {{def->rate_hz, 100.0, 20000.0, "rate_hz"},
+               {def->max_force, 0.0, limit, "max_force"},
+               {def->max_travel, 0.005, 0.5, "max_travel"},
+               {def->max_speed, 0.05, 2.0, "max_speed"}};
+  for (size_t i = 0; i < sizeof rules / sizeof rules[0]; ++i) {
+    if (!(rules[i].value >= rules[i].low && rules[i].value <= rules[i].high)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "identification: %s is %g, not in %g .. %g",
+                       rules[i].name, rules[i].value, rules[i].low, rules[i].high);
+    }
+  }
+  return HAP_OK;
+}
+
+/* ---- one tick ---- */
+
+static hap_status fail(const run *r, const char *what)
+{
+  return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s', axis %c: %s", r->device->info.name,
+                   "xyz"[r->axis], what);
+}
+
+/* The time of the next tick, when it has come. */
+static int64_t await_tick(run *r)
+{
+  uint32_t pacing = r->device->ops->pacing;
+  int64_t due_ns = r->start_ns + hapi_clock_deadline(++r->tick, r->def->rate_hz);
+  if (pacing == HAP_PACING_VIRTUAL) {
+    return due_ns;
+  }
+  if (pacing == HAP_PACING_HOST) {
+    hapi_clock_sleep_until(due_ns);
+  }
+  return hapi_clock_now();
+}
+
+static hap_status read_device(run *r)
+{
+  const hap_device_ops *ops = r->device->ops;
+  hap_pose pose;
+  hap_twist twist;
+  uint32_t buttons = 0;
+  int64_t now_ns = await_tick(r);
+  memset(&pose, 0, sizeof pose);
+  if (ops->read(r->device->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
+    return fail(r, "it cannot be read");
+  }
+  if (!hapi_finite(pose.position, 3)) {
+    return fail(r, "its position is not finite");
+  }
+  if (ops->pacing == HAP_PACING_DEVICE) {
+    now_ns = hapi_clock_now(); /* the read has waited */
+  }
+  r->time = (double)(now_ns - r->start_ns) / (double)HAPI_NS_PER_S;
+  hapi_v3_copy(pose.position, r->position);
+  return HAP_OK;
+}
+
+static hap_status record(run *r)
+{
+  hapi_identify_record *record = &r->records[r->axis];
+  if (record->count == record->capacity) {
+    return fail(r, "it gives more than rate_hz positions a second; raise rate_hz");
+  }
+  record->samples[record->count++] = (hapi_identify_sample){r->time, r->position[r->axis], 0.0};
+  return HAP_OK;
+}
+
+/* Over the last samples of the axis. */
+static double speed_now(const run *r)
+{
+  const hapi_identify_record *record = &r->records[r->axis];
+  uint32_t back = record->count - 1 < SPEED_SAMPLES ? record->count - 1 : SPEED_SAMPLES;
+  const hapi_identify_sample *now = &record->samples[record->count - 1];
+  double length = now->time - now[-(int)back].time;
+  return length > 0.0 ? (now->position - now[-(int)back].position) / length : 0.0;
+}
+
+static hap_status check_limits(const run *r)
+{
+  double way[3];
+  char text[160];
+  hapi_v3_sub(r->position, r->origin, way);
+  if (hapi_v3_norm(way) > r->def->max_travel) {
+    snprintf(text, sizeof text,
+             "it has moved %.0f mm from where it began, more than %.0f mm: its force was taken off",
+             1e3 * hapi_v3_norm(way), 1e3 * r->def->max_travel);
+    return fail(r, text);
+  }
+  if (fabs(speed_now(r)) > r->def->max_speed) {
+    snprintf(text, sizeof text, "it moves at %.2f m/s, more than %.2f m/s: its force was taken off",
+             fabs(speed_now(r)), r->def->max_speed);
+    return fail(r, text);
+  }
+  return HAP_OK;
+}
+
+static hap_status tell(run *r)
+{
+  if (r->def->watch == NULL || r->time < r->watched + WATCH_S) {
+    return HAP_OK;
+  }
+  r->watched = r->time;
+  double whole = AXES * (REST_S + 0.2 * RISE_S + SWING_S + BRAKE_S);
+  return r->def->watch(r->def->user, fmin(r->time / whole, 1.0)) == 0 ? HAP_OK : HAP_END;
+}
+
+/* Gives the force, waits for the next tick and reads. Anything but HAP_OK ends the identification. */
+static hap_status step(run *r, double force)
+{
+  hapi_identify_record *axis = &r->records[r->axis];
+  hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hap_wrench reached;
+  wanted.force[r->axis] = force;
+  axis->samples[axis->count - 1].force = force;
+  if (r->device->ops->write(r->device->self, &wanted, &reached) < HAP_OK) {
+    return fail(r, "it takes no force");
+  }
+  hap_status status = read_device(r);
+  if (status == HAP_OK) {
+    status = record(r);
+  }
+  if (status == HAP_OK) {
+    status = check_limits(r);
+  }
+  return status == HAP_OK ? tell(r) : status;
+}
+
+/* ---- the phases of an axis ---- */
+
+static hap_status rest(run *r)
+{
+  hap_status status = HAP_OK;
+  for (double end = r->time + REST_S; r->time < end && status == HAP_OK;) {
+    status = step(r, 0.0);
+  }
+  return status;
+}
+
+/* More and more force until it moves; *level is then that force. */
+static hap_status search(run *r, double home, double *level)
+{
+  double begin = r->time;
+  char text[160];
+  *level = 0.0;
+  while (fabs(r->position[r->axis] - home) < MOVED) {
+    if (*level >= r->limit) {
+      snprintf(text, sizeof text,
+               "it does not move under %.2g N: is it held, at a stop, or switched off?", r->limit);
+      return fail(r, text);
+    }
+    *level = fmin((r->time - begin) / RISE_S, 1.0) * r->limit;
+    hap_status status = step(r, *level);
+    if (status != HAP_OK) {
+      return status;
+    }
+  }
+  return HAP_OK;
+}
+
+/* To and fro between two speeds. */
+typedef struct swing {
+  double home;
+  double level; /* N */
+  double direction;
+  double speed; /* m/s, at which the force turns round */
+  double turned;
+  double top; /* speed that may be reached */
+  int waves;
+} swing;
+
+static bool should_turn(const swing *s, double position, double velocity, double travel)
+{
+  double drift = fmin(fmax((position - s->home) / travel, -0.8), 0.8);
+  return s->direction * velocity > s->speed * (1.0 - s->direction * drift) ||
+         (s->direction * (position - s->home) > travel && s->direction * velocity > 0.0);
+}
+
+/* Force for the wanted acceleration and the speeds of the next wave: such that a wave does not go
+ * further than travel. Two speeds tell damping from friction. */
+static void next_wave(swing *s, double now, double limit, double travel)
+{
+  double acceleration = 2.0 * s->speed / fmax(now - s->turned, 1e-3);
+  if (acceleration < 0.8 * ACCELERATION) {
+    s->level = fmin(1.25 * s->level, limit);
+  } else if (acceleration > 1.25 * ACCELERATION) {
+    s->level *= 0.8;
+  }
+  s->top = fmin(1.25 * s->top, sqrt(acceleration * travel));
+  bool slow = s->waves / WAVES_OF_A_SPEED % 2 == 1;
+  s->speed = slow ? 0.5 * s->top : s->top;
+  s->direction = -s->direction;
+  s->turned = now;
+  ++s->waves;
+}
+
+static hap_status swing_about(run *r, double home, double *level)
+{
+  double travel = TRAVEL_SHARE * r->def->max_travel;
+  double top = SPEED_SHARE * r->def->max_speed;
+  double speed = 0.2 * top;
+  swing s = {home, *level, -copysign(1.0, r->position[r->axis] - home), speed, r->time, speed, 0};
+  for (double end = r->time + SWING_S; r->time < end;) {
+    if (should_turn(&s, r->position[r->axis], speed_now(r), travel)) {
+      next_wave(&s, r->time, r->limit, travel);
+      s.top = fmin(s.top, top);
+      s.speed = fmin(s.speed, top);
+    } else if (r->time - s.turned > WAVE_S_MAX) {
+      s.level = fmin(1.25 * s.level, r->limit);
+      s.turned = r->time;
+    }
+    hap_status status = step(r, s.direction * s.level);
+    if (status != HAP_OK) {
+      return status;
+    }
+  }
+  *level = s.level;
+  return HAP_OK;
+}
+
+static hap_status brake(run *r, double level)
+{
+  hap_status status = HAP_OK;
+  for (double end = r->time + BRAKE_S; r->time < end && status == HAP_OK;) {
+    status = step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0));
+  }
+  return status;
+}
+
+static hap_status move_axis(run *r)
+{
+  hap_status status = record(r); /* of where the last axis ended */
+  double level = 0.0;
+  if (status == HAP_OK) {
+    status = rest(r);
+  }
+  double home = r->position[r->axis];
+  if (status == HAP_OK) {
+    status = search(r, home, &level);
+  }
+  if (status == HAP_OK) {
+    status = swing_about(r, home, &level);
+  }
+  return status == HAP_OK ? brake(r, level) : status;
+}
+
+static hap_status move_all(run *r)
+{
+  r->start_ns = r->device->ops->pacing == HAP_PACING_VIRTUAL ? 0 : hapi_clock_now();
+  hap_status status = read_device(r);
+  hapi_v3_copy(r->position, r->origin);
+  for (r->axis = 0; r->axis < AXES && status == HAP_OK; ++r->axis) {
+    status = move_axis(r);
+  }
+  return status;
+}
+
+/* ---- what it comes to ---- */
+
+static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
+{
+  hapi_identify_fit fit;
+  char text[200];
+  hap_detail why = {""};
+  run at = *r;
+  at.axis = axis;
+  hap_status status = hapi_identify_fit_record(&r->records[axis], &fit, &why);
+  if (status < HAP_OK) {
+    return fail(&at, why.text);
+  }
+  if (fit.residual > RESIDUAL_MOST || fit.delay > HAPI_IDENTIFY_DELAY_MAX) {
+    snprintf(text, sizeof text,
+             "mass, damping, friction and a delay of at most %.0f ms do not explain %.0f %% of the "
+             "force: does a hand hold it?",
+             1e3 * HAPI_IDENTIFY_DELAY_MAX, 100.0 * fit.residual);
+    return fail(&at, text);
+  }
+  io->mass = axis == 0 ? fit.mass : fmin(io->mass, fit.mass);
+  io->damping = axis == 0 ? fit.damping : fmin(io->damping, fit.damping);
+  io->friction = axis == 0 ? fit.friction : fmin(io->friction, fit.friction);
+  io->delay = fmax(io->delay, fit.delay);
+  io->quantum = fmax(io->quantum, hapi_identify_quantum(&r->records[axis]));
+  io->residual = fmax(io->residual, fit.residual);
+  return HAP_OK;
+}
+
+static hap_status conclude(const run *r, hap_device_identity *out)
+{
+  hap_status status = HAP_OK;
+  hap_device_identity_init(out, sizeof *out);
+  memcpy(out->device, r->device->info.name, sizeof out->device);
+  for (int axis = 0; axis < AXES && status == HAP_OK; ++axis) {
+    status = add_axis(r, axis, out);
+  }
+  return status;
+}
+
+static hap_status run_device(run *r, hap_device_identity *out)
+{
+  const hap_device_ops *ops = r->device->ops;
+  if (ops->start(r->device->self) < HAP_OK) {
+    return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s' did not start",
+                     r->device->info.name);
+  }
+  hap_status status = move_all(r);
+  ops->zero(r->device->self);
+  ops->stop(r->device->self);
+  return status == HAP_OK ? conclude(r, out) : status;
+}
+
+static hap_status run_with_records(run *r, hap_device_identity *out)
+{
+  hap_status status = HAP_OK;
+  uint32_t capacity = (uint32_t)(AXIS_S * r->def->rate_hz);
+  for (int axis = 0; axis < AXES; ++axis) {
+    r->records[axis].samples = hapi_alloc_array(capacity, sizeof *r->records[axis].samples);
+    r->records[axis].capacity = capacity;
+    if (r->records[axis].samples == NULL) {
+      status = hapi_fail(r->detail, HAP_ERROR_MEMORY, "no memory for the identification");
+    }
+  }
+  if (status == HAP_OK) {
+    status = run_device(r, out);
+  }
+  for (int axis = 0; axis < AXES; ++axis) {
+    hapi_free(r->records[axis].samples);
+  }
+  return status;
+}
+
+hap_status hap_device_identify(hap_device *device, const hap_identify_def *def,
+                               hap_device_identity *out, hap_detail *detail)
+{
+  hap_detail unread;
+  hap_identify_def known;
+  hap_device_identity found;
+  if (device == NULL || out == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_identify: device or out is NULL");
+  }
+  hap_identify_def_init(&known, sizeof known);
+  hap_status status =
+      hapi_def_read(&known, sizeof known, def, COOKIE, "hap_identify_def_init", detail);
+  double limit =
+      device->info.max_force > 0.0 ? FORCE_SHARE * device->info.max_force : FORCE_UNKNOWN;
+  if (status >= HAP_OK) {
+    status = check_def(&known, limit, detail);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  if (!hapi_device_claim(device)) {
+    return hapi_fail(detail, HAP_ERROR_STATE, "a pointer has the device");
+  }
+  run r = {.device = device, .def = &known, .detail = detail != NULL ? detail : &unread};
+  r.limit = known.max_force > 0.0 ? known.max_force : limit;
+  status = run_with_records(&r, &found);
+  hapi_device_release(device);
+  return status == HAP_OK ? hapi_device_identity_give(&found, out, detail) : status;
+}

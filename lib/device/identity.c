@@ -1,0 +1,332 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The file of an identity, and a device that takes one over. */
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/def.h"
+#include "base/log.h"
+#include "base/number.h"
+#include "device/device.h"
+#include "device/identify.h"
+
+#define COOKIE 0x48444931u
+#define VERSION 1.0
+
+typedef struct figure {
+  const char *key;
+  size_t offset;
+  double most;
+  const char *about;
+} figure;
+
+static const figure figures[] = {
+    {"mass", offsetof(hap_device_identity, mass), 1e4, "kg"},
+    {"damping", offsetof(hap_device_identity, damping), 1e6, "N s/m"},
+    {"friction", offsetof(hap_device_identity, friction), 1e6, "N"},
+    {"delay", offsetof(hap_device_identity, delay), 1.0, "s"},
+    {"quantum", offsetof(hap_device_identity, quantum), 1.0, "m"},
+    {"residual", offsetof(hap_device_identity, residual), 1.0,
+     "share of the force that the others do not explain"},
+};
+
+#define FIGURES (sizeof figures / sizeof figures[0])
+
+static double *value_of(hap_device_identity *identity, size_t index)
+{
+  return (double *)((char *)identity + figures[index].offset);
+}
+
+void hap_device_identity_init(hap_device_identity *identity, size_t size_of_identity)
+{
+  hap_device_identity defaults;
+  memset(&defaults, 0, sizeof defaults);
+  defaults.cookie = COOKIE;
+  hapi_def_init(identity, size_of_identity, &defaults, sizeof defaults);
+}
+
+/* The caller's identity as this build's, its values checked. */
+static hap_status take(const hap_device_identity *given, hap_device_identity *out,
+                       hap_detail *detail)
+{
+  hap_device_identity_init(out, sizeof *out);
+  hap_status status =
+      hapi_def_read(out, sizeof *out, given, COOKIE, "hap_device_identity_init", detail);
+  if (status < 0) {
+    return status;
+  }
+  out->device[sizeof out->device - 1] = '\0';
+  for (size_t i = 0; i < FIGURES; ++i) {
+    double value = *value_of(out, i);
+    if (!(value >= 0.0 && value <= figures[i].most)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "identity: %s is %g, not in 0 .. %g",
+                       figures[i].key, value, figures[i].most);
+    }
+  }
+  return HAP_OK;
+}
+
+hap_status hapi_device_identity_give(const hap_device_identity *identity, hap_device_identity *out,
+                                     hap_detail *detail)
+{
+  hap_device_identity known;
+  hap_status status = hapi_def_read(&known, sizeof known.size + sizeof known.cookie, out, COOKIE,
+                                    "hap_device_identity_init", detail);
+  if (status >= 0) {
+    uint32_t size = known.size;
+    memcpy(out, identity, size < sizeof *identity ? size : sizeof *identity);
+    out->size = size;
+  }
+  return status;
+}
+
+/* ---- reading ---- */
+
+typedef struct reader {
+  const char *path;
+  FILE *file;
+  unsigned long line;
+  char text[512];
+  bool known[FIGURES];
+  bool named;
+  bool versioned;
+  hap_device_identity identity;
+  hap_detail *detail;
+} reader;
+
+static hap_status fail_line(const reader *r, const char *what, const char *item)
+{
+  return hapi_fail(r->detail, HAP_ERROR_FORMAT, "%.200s, line %lu: %s%.60s", r->path, r->line, what,
+                   item);
+}
+
+/* Cuts the line into key and value, both trimmed; an empty key: nothing but a comment. */
+static bool cut_line(char *text, char **key, char **value)
+{
+  static const char blanks[] = " \t\r\n";
+  *key = text + strspn(text, blanks);
+  *value = *key + strlen(*key);
+  if (**key == '#' || **key == '\0') {
+    **key = '\0';
+    return true;
+  }
+  char *equals = strchr(*key, '=');
+  if (equals == NULL) {
+    return false;
+  }
+  *value = equals + 1 + strspn(equals + 1, blanks);
+  do {
+    *equals = '\0';
+  } while (equals-- > *key && strchr(blanks, *equals) != NULL);
+  for (char *end = *value + strlen(*value); end > *value && strchr(blanks, end[-1]) != NULL;) {
+    *--end = '\0';
+  }
+  return **key != '\0';
+}
+
+/* A number, and behind it nothing but a comment. */
+static bool number_of(const char *value, double *out)
+{
+  const char *end = hapi_number_read(value, out);
+  if (end == NULL) {
+    return false;
+  }
+  end += strspn(end, " \t");
+  return *end == '\0' || *end == '#';
+}
+
+static hap_status take_version(reader *r, const char *value)
+{
+  double version = 0.0;
+  if (!number_of(value, &version)) {
+    return fail_line(r, "version: expected a number, not ", value);
+  }
+  if (version != VERSION) {
+    return fail_line(r, "this library reads version 1, not ", value);
+  }
+  r->versioned = true;
+  return HAP_OK;
+}
+
+static hap_status take_name(reader *r, const char *value)
+{
+  if (r->named) {
+    return fail_line(r, "given twice: ", "device");
+  }
+  if (*value == '\0' || strlen(value) >= sizeof r->identity.device) {
+    return fail_line(r, "device: expected a name of 1 to 63 characters, not ", value);
+  }
+  snprintf(r->identity.device, sizeof r->identity.device, "%s", value);
+  r->named = true;
+  return HAP_OK;
+}
+
+static hap_status take_figure(reader *r, const char *key, const char *value)
+{
+  size_t i = 0;
+  while (i < FIGURES && strcmp(key, figures[i].key) != 0) {
+    ++i;
+  }
+  if (i == FIGURES) {
+    return fail_line(r,
+                     "known are version, device, mass, damping, friction, delay, quantum and "
+                     "residual, not ",
+                     key);
+  }
+  if (r->known[i]) {
+    return fail_line(r, "given twice: ", key);
+  }
+  double number = 0.0;
+  if (!number_of(value, &number) || number < 0.0 || number > figures[i].most) {
+    return hapi_fail(r->detail, HAP_ERROR_FORMAT,
+                     "%.200s, line %lu: %s: expected a number from 0 to %g, not %.60s", r->path,
+                     r->line, key, figures[i].most, value);
+  }
+  r->known[i] = true;
+  *value_of(&r->identity, i) = number;
+  return HAP_OK;
+}
+
+static hap_status take_line(reader *r)
+{
+  char *key = NULL;
+  char *value = NULL;
+  if (!cut_line(r->text, &key, &value)) {
+    return fail_line(r, "expected key = value, not ", r->text);
+  }
+  if (*key == '\0') {
+    return HAP_OK;
+  }
+  if (strcmp(key, "version") == 0 && !r->versioned) {
+    return take_version(r, value);
+  }
+  if (!r->versioned) {
+    return fail_line(r, "expected version = 1 before all else, not ", key);
+  }
+  return strcmp(key, "device") == 0 ? take_name(r, value) : take_figure(r, key, value);
+}
+
+/* A line of more than the buffer and one with a zero byte have no line end where it should be. */
+static hap_status read_lines(reader *r)
+{
+  hap_status status = HAP_OK;
+  while (status >= 0 && fgets(r->text, sizeof r->text, r->file) != NULL) {
+    ++r->line;
+    bool whole = strchr(r->text, '\n') != NULL || feof(r->file) != 0;
+    status = whole ? take_line(r) : fail_line(r, "longer than 510 characters, or not text", "");
+  }
+  if (status >= 0 && ferror(r->file) != 0) {
+    return hapi_fail(r->detail, HAP_ERROR_IO, "%.200s, line %lu: cannot be read: %s", r->path,
+                     r->line + 1, strerror(errno));
+  }
+  return status;
+}
+
+static hap_status check_complete(const reader *r)
+{
+  const char *missing = r->named ? NULL : "device";
+  for (size_t i = 0; i < FIGURES && missing == NULL; ++i) {
+    missing = r->known[i] ? NULL : figures[i].key;
+  }
+  return missing == NULL ? HAP_OK
+                         : hapi_fail(r->detail, HAP_ERROR_FORMAT,
+                                     "%.200s, line %lu: the file ends without a line %s = ...",
+                                     r->path, r->line + 1, missing);
+}
+
+hap_status hap_device_identity_read(const char *path, hap_device_identity *out, hap_detail *detail)
+{
+  if (path == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the path of the identity is NULL");
+  }
+  reader r = {.path = path, .detail = detail};
+  hap_device_identity_init(&r.identity, sizeof r.identity);
+  r.file = fopen(path, "r");
+  if (r.file == NULL) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
+  }
+  hap_status status = read_lines(&r);
+  fclose(r.file);
+  if (status >= 0) {
+    status = check_complete(&r);
+  }
+  return status >= 0 ? hapi_device_identity_give(&r.identity, out, detail) : status;
+}
+
+/* ---- writing ---- */
+
+static bool name_fits_a_line(const char *name)
+{
+  bool good = *name != '\0' && *name != ' ' && name[strlen(name) - 1] != ' ';
+  for (; *name != '\0'; ++name) {
+    good = good && (unsigned char)*name >= ' ';
+  }
+  return good;
+}
+
+static void write_lines(FILE *file, hap_device_identity *identity)
+{
+  fprintf(file, "# hapode: what an identification found out about a device\nversion = 1\n");
+  fprintf(file, "device = %s\n", identity->device);
+  for (size_t i = 0; i < FIGURES; ++i) {
+    char number[32];
+    hapi_number_write(number, sizeof number, *value_of(identity, i));
+    fprintf(file, "%s = %s # %s\n", figures[i].key, number, figures[i].about);
+  }
+}
+
+hap_status hap_device_identity_write(const char *path, const hap_device_identity *identity,
+                                     hap_detail *detail)
+{
+  hap_device_identity known;
+  hap_status status = take(identity, &known, detail);
+  if (status < 0) {
+    return status;
+  }
+  if (path == NULL || !name_fits_a_line(known.device)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "the path is NULL, or the device's name is not one line of text");
+  }
+  FILE *file = fopen(path, "w");
+  if (file == NULL) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
+  }
+  write_lines(file, &known);
+  bool good = ferror(file) == 0;
+  good = fclose(file) == 0 && good;
+  return good ? HAP_OK
+              : hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be written: %s", path,
+                          strerror(errno));
+}
+
+/* ---- use ---- */
+
+hap_status hap_device_set_identity(hap_device *device, const hap_device_identity *identity,
+                                   hap_detail *detail)
+{
+  hap_device_identity known;
+  if (device == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_set_identity: device is NULL");
+  }
+  hap_status status = take(identity, &known, detail);
+  if (status < 0) {
+    return status;
+  }
+  if (strcmp(known.device, device->info.name) != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the identity is that of '%s', the device is '%s'",
+                     known.device, device->info.name);
+  }
+  if (!hapi_device_claim(device)) {
+    return hapi_fail(detail, HAP_ERROR_STATE, "a pointer has the device: set its identity before");
+  }
+  device->info.mass = known.mass;
+  device->info.damping = known.damping;
+  device->info.friction = known.friction;
+  device->info.delay = known.delay;
+  device->info.quantum = known.quantum;
+  hapi_device_release(device);
+  return HAP_OK;
+}
