@@ -552,6 +552,53 @@ TEST(a_signal_ends_the_run_with_its_summary)
   interrupt(SIGTERM, "--seconds 80000 --lockstep");
 }
 
+TEST(a_device_is_identified_and_its_identity_used)
+{
+  static const char device[] =
+      "virtual:hand=none,device_mass=0.3,device_damping=1,friction=0.1,delay=0.0015,quantum=3e-5";
+  char file[320];
+  char text[800];
+  snprintf(file, sizeof file, "%s", file_in_folder("device.txt"));
+  CHECK(run("--identify %s --device %s", file, device) == 0);
+  CHECK(says("LET GO"));
+  CHECK_NEAR(number_of("mass_kg"), 0.3, 0.009);
+  CHECK_NEAR(number_of("delay_ms"), 1.5, 0.2);
+  CHECK_NEAR(number_of("quantum_um"), 30.0, 1e-6);
+  read_file(file, text, sizeof text);
+  CHECK(strstr(text, "\ndevice = virtual\n") != NULL && strstr(text, "\nquantum = 3e-05 ") != NULL);
+  CHECK(run("--lockstep --seconds 0.1 --device %s --identity %s", device, file) == 0);
+  CHECK(run("--lockstep --seconds 0.1 --identity %s --device %s", file, device) == 2);
+  CHECK(says("--identity: it belongs to a --device before it"));
+  CHECK(run("--device %s --identity %s --identity %s", device, file, file) == 2);
+  CHECK(says("has one already"));
+  write_text(file_in_folder("push.csv"), "t,x,y,z\n0,0,0,0.1\n1,0,0,0\n");
+  CHECK(run("--lockstep --seconds 0.1 --device replay:%s --identity %s", file_in_folder("push.csv"),
+            file) == 2);
+  CHECK(says("identity is that of 'virtual'"));
+  write_text(file, "version = 1\nmas = 2\n");
+  CHECK(run("--lockstep --seconds 0.1 --device %s --identity %s", device, file) == 1);
+  CHECK(says("line 2: known are"));
+}
+
+TEST(an_identification_that_fails_writes_nothing)
+{
+  char file[320];
+  char text[20];
+  snprintf(file, sizeof file, "%s", file_in_folder("device.txt"));
+  unlink(file);
+  CHECK(run("--identify %s --device virtual", file) == 1);
+  CHECK(says("does not move") && !exists(file));
+  CHECK(run("--identify %s", file) == 2);
+  CHECK(says("exactly one --device"));
+  CHECK(run("--identify %s --device virtuel", file) == 2);
+  CHECK(run("--identify /nowhere/at/all --device virtual:hand=none,device_mass=1") == 1);
+  CHECK(says("cannot be written"));
+  write_text(file, "kept");
+  CHECK(run("--identify %s --device virtual", file) == 1);
+  read_file(file, text, sizeof text);
+  CHECK(strcmp(text, "kept") == 0);
+}
+
 TEST(the_picture_is_an_svg)
 {
   char text[200];
@@ -585,7 +632,7 @@ static void remove_folder(void)
 {
   const char *const names[] = {"out",         "err",     "bad.csv",  "trace.csv",
                                "threads.csv", "two.csv", "same.csv", "same.svg",
-                               "push.csv",    "far.csv", "it's.svg"};
+                               "push.csv",    "far.csv", "it's.svg", "device.txt"};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     unlink(file_in_folder(names[i]));
   }
@@ -621,6 +668,8 @@ int main(void)
   RUN(a_fault_leaves_its_last_ticks);
   RUN(a_deadly_signal_still_kills);
   RUN(a_signal_ends_the_run_with_its_summary);
+  RUN(a_device_is_identified_and_its_identity_used);
+  RUN(an_identification_that_fails_writes_nothing);
   RUN(the_picture_is_an_svg);
   RUN(without_gnuplot_one_line_says_so);
   remove_folder();

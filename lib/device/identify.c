@@ -29,7 +29,7 @@
 #define WAVES_OF_A_SPEED 2 /* turns before the other speed is taken */
 #define WAVE_S_MAX 0.5     /* without a turn for so long: more force */
 #define SPEED_SAMPLES 8u
-#define RESIDUAL_MOST 0.1
+#define RESIDUAL_MOST 0.08
 #define WATCH_S 0.1
 #define AXES 3
 
@@ -229,9 +229,12 @@ static hap_status search(run *r, double home, double *level)
 typedef struct swing {
   double home;
   double level; /* N */
+  double share; /* of the level in this wave */
   double direction;
   double speed; /* m/s, at which the force turns round */
   double turned;
+  double peak; /* m/s, reached after the last turn in the direction before it, at that time */
+  double peak_time;
   double top; /* speed that may be reached */
   int waves;
 } swing;
@@ -243,40 +246,55 @@ static bool should_turn(const swing *s, double position, double velocity, double
          (s->direction * (position - s->home) > travel && s->direction * velocity > 0.0);
 }
 
+/* Behind a turn the speed still rises until the force has come through the device's delay. */
+static void note_peak(swing *s, double now, double velocity)
+{
+  if (-s->direction * velocity > s->peak) {
+    s->peak = -s->direction * velocity;
+    s->peak_time = now;
+  }
+}
+
 /* Force for the wanted acceleration and the speeds of the next wave: such that a wave does not go
  * further than travel. Two speeds tell damping from friction. */
-static void next_wave(swing *s, double now, double limit, double travel)
+static void next_wave(swing *s, double now, double velocity, const run *r)
 {
-  double acceleration = 2.0 * s->speed / fmax(now - s->turned, 1e-3);
+  double travel = TRAVEL_SHARE * r->def->max_travel;
+  double change = s->direction * velocity + fmax(s->peak, 0.0);
+  double acceleration = fmax(change, 0.0) / fmax(now - s->peak_time, 1e-3);
   if (acceleration < 0.8 * ACCELERATION) {
-    s->level = fmin(1.25 * s->level, limit);
+    s->level = fmin(1.25 * s->level, r->limit);
   } else if (acceleration > 1.25 * ACCELERATION) {
     s->level *= 0.8;
   }
-  s->top = fmin(1.25 * s->top, sqrt(acceleration * travel));
+  s->top = fmin(fmin(1.25 * s->top, sqrt(acceleration * travel)), SPEED_SHARE * r->def->max_speed);
   bool slow = s->waves / WAVES_OF_A_SPEED % 2 == 1;
   s->speed = slow ? 0.5 * s->top : s->top;
   s->direction = -s->direction;
   s->turned = now;
+  s->peak = 0.0;
+  s->peak_time = now;
   ++s->waves;
+  /* Under the same force every time a free mass moves by multiples of F/m T^2, like a quantum. */
+  s->share = 1.0 - 0.1 * fmod(0.61803398874989485 * s->waves, 1.0);
 }
 
 static hap_status swing_about(run *r, double home, double *level)
 {
   double travel = TRAVEL_SHARE * r->def->max_travel;
-  double top = SPEED_SHARE * r->def->max_speed;
-  double speed = 0.2 * top;
-  swing s = {home, *level, -copysign(1.0, r->position[r->axis] - home), speed, r->time, speed, 0};
+  double speed = 0.2 * SPEED_SHARE * r->def->max_speed;
+  double direction = -copysign(1.0, r->position[r->axis] - home);
+  swing s = {home, *level, 1.0, direction, speed, r->time, 0.0, r->time, speed, 0};
   for (double end = r->time + SWING_S; r->time < end;) {
-    if (should_turn(&s, r->position[r->axis], speed_now(r), travel)) {
-      next_wave(&s, r->time, r->limit, travel);
-      s.top = fmin(s.top, top);
-      s.speed = fmin(s.speed, top);
+    double velocity = speed_now(r);
+    note_peak(&s, r->time, velocity);
+    if (should_turn(&s, r->position[r->axis], velocity, travel)) {
+      next_wave(&s, r->time, velocity, r);
     } else if (r->time - s.turned > WAVE_S_MAX) {
       s.level = fmin(1.25 * s.level, r->limit);
       s.turned = r->time;
     }
-    hap_status status = step(r, s.direction * s.level);
+    hap_status status = step(r, s.direction * s.share * s.level);
     if (status != HAP_OK) {
       return status;
     }

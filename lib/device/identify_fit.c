@@ -25,8 +25,8 @@
 #define SHAPES 5
 #define TERMS 12
 #define UNKNOWNS 4
-#define GRID 5e-4 /* s, of the first search for the delay */
-#define SHRINKS 40
+#define GRID 1e-3 /* s, of the first search for the delay */
+#define SHRINKS 24
 
 /* Coefficients of a function of 0..1, of its derivatives and of its integral from 0. */
 typedef struct shape {
@@ -300,14 +300,15 @@ static double find_delay(fitting *f)
   const double share = 0.61803398874989485;
   double low = fmax(best - GRID, 0.0);
   double high = best + GRID;
+  double at[2] = {high - share * (high - low), low + share * (high - low)};
+  double rest[2] = {fit_at(f, at[0], unknowns), fit_at(f, at[1], unknowns)};
   for (int i = 0; i < SHRINKS; ++i) {
-    double left = high - share * (high - low);
-    double right = low + share * (high - low);
-    if (fit_at(f, left, unknowns) < fit_at(f, right, unknowns)) {
-      high = right;
-    } else {
-      low = left;
-    }
+    int worse = rest[0] < rest[1];
+    *(worse == 1 ? &high : &low) = at[worse];
+    at[worse] = at[1 - worse];
+    rest[worse] = rest[1 - worse];
+    at[1 - worse] = worse == 1 ? high - share * (high - low) : low + share * (high - low);
+    rest[1 - worse] = fit_at(f, at[1 - worse], unknowns);
   }
   return low < 1e-7 ? 0.0 : 0.5 * (low + high);
 }
