@@ -105,9 +105,10 @@ TEST(held_devices_are_not_identified)
   static const char *const specs[][2] = {
       {"virtual", "does not move"},
       {"virtual:hand=none,device_mass=0.3,friction=7", "does not move under 6 N"},
-      {"virtual:hand=relaxed,device_mass=0.2,device_damping=1", "axis x"},
-      {"virtual:hand=tense,device_mass=0.2", "axis x"}};
-  for (size_t i = 0; i < 4; ++i) {
+      {"virtual:hand=relaxed,device_mass=0.2,device_damping=1", "a spring of 150 N/m"},
+      {"virtual:hand=relaxed,device_mass=2,device_damping=5,friction=0.3", "a spring of 1"},
+      {"virtual:hand=tense,device_mass=0.2,quantum=3e-5", "does a hand hold it"}};
+  for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
     hap_device_identity found;
     hap_detail detail = {""};
     CHECK(identify_spec(specs[i][0], &found, &detail) == HAP_ERROR_DEVICE);

@@ -58,8 +58,8 @@ typedef struct hap_device_identity {
   double friction; /* N, 0..1e6, Coulomb; the least of all axes */
   double delay;   /* s, 0..1, from a command until its effect is in a measured pose; the greatest */
   double quantum; /* m, 0..1, smallest step of the measured position; 0: none was seen */
-  double residual; /* 0..1, share of the force (root mean square) that mass, damping, friction and a
-                      constant force do not explain */
+  double residual; /* 0..1, share of the force (root mean square) that mass, damping, friction, a
+                      constant force and a spring do not explain */
 } hap_device_identity;
 
 /* [any] Zeroes *identity. size_of_identity: sizeof *identity of the caller's build. */
@@ -105,11 +105,11 @@ typedef struct hap_identify_def {
 HAP_API void hap_identify_def_init(hap_identify_def *def, size_t size_of_def);
 
 /* [control] Moves the device, which nobody must hold, along each of its axes to and fro and fills in
- * the initialised *out: least squares on f(t - delay) = m a + b v + c sign(v) + g. Blocks for some
- * 15 s; with HAP_PACING_VIRTUAL it takes the time of the computation alone. On return, whatever it
+ * the initialised *out: least squares on f(t - delay) = m a + b v + c sign(v) + k x + g. Blocks for some
+ * 30 s; with HAP_PACING_VIRTUAL it takes the time of the computation alone. On return, whatever it
  * is, the force is zero and the device is stopped. HAP_ERROR_STATE when a pointer has the device;
- * HAP_ERROR_DEVICE with a detail text when it failed, went beyond a limit, did not move, or moved in
- * a way that the model does not explain (a hand that holds it). */
+ * HAP_ERROR_DEVICE with a detail text when it failed, went beyond a limit, did not move, is held by
+ * a hand (a spring of more than 30 N/m), or moved in a way that the model does not explain. */
 HAP_API HAP_NODISCARD hap_status hap_device_identify(hap_device *device,
                                                      const hap_identify_def *def,
                                                      hap_device_identity *out, hap_detail *detail);

@@ -29,7 +29,8 @@
 #define WAVES_OF_A_SPEED 2 /* turns before the other speed is taken */
 #define WAVE_S_MAX 0.5     /* without a turn for so long: more force */
 #define SPEED_SAMPLES 8u
-#define RESIDUAL_MOST 0.08
+#define RESIDUAL_MOST 0.1
+#define STIFFNESS_MOST 30.0 /* N/m; a hand that holds it loosely has 100 and more */
 #define WATCH_S 0.1
 #define AXES 3
 
@@ -356,8 +357,13 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   if (fit.residual > RESIDUAL_MOST || fit.delay > HAPI_IDENTIFY_DELAY_MAX) {
     snprintf(text, sizeof text,
              "mass, damping, friction and a delay of at most %.0f ms do not explain %.0f %% of the "
-             "force: does a hand hold it?",
+             "force",
              1e3 * HAPI_IDENTIFY_DELAY_MAX, 100.0 * fit.residual);
+    return fail(&at, text);
+  }
+  if (fit.stiffness > STIFFNESS_MOST) {
+    snprintf(text, sizeof text, "a spring of %.0f N/m pulls it back: does a hand hold it?",
+             fit.stiffness);
     return fail(&at, text);
   }
   io->mass = axis == 0 ? fit.mass : fmin(io->mass, fit.mass);
@@ -366,6 +372,7 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   io->delay = fmax(io->delay, fit.delay);
   io->quantum = fmax(io->quantum, hapi_identify_quantum(&r->records[axis]));
   io->residual = fmax(io->residual, fit.residual);
+
   return HAP_OK;
 }
 

@@ -35,7 +35,8 @@ typedef struct hapi_identify_fit {
   double mass;
   double damping;
   double friction;
-  double bias; /* N, constant: gravity that is not compensated */
+  double bias;      /* N, constant: gravity that is not compensated */
+  double stiffness; /* N/m, of what pulls it back to where it began: a hand */
   double delay;
   double residual; /* share of the force, root mean square */
 } hapi_identify_fit;

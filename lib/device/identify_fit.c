@@ -1,12 +1,12 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* m a + b v + c sign(v) + g = f(t - delay), multiplied with functions that vanish with their slopes
+/* m a + b v + c sign(v) + g + k x = f(t - delay), multiplied with functions that vanish with their slopes
  * at both ends of a window and integrated by parts (modulating functions: Shinbrot 1957; Preisig,
  * Rippin 1993): no position is differentiated, so rounded ones do. The second derivatives of the
  * functions are Legendre polynomials of order 2 and up: these are orthogonal, so white noise of the
  * positions is white noise of the rows, and least squares is what it should be. Within a window the
- * velocity keeps its sign. For a delay the equation is linear in the other four; the delay is where
+ * velocity keeps its sign. For a delay the equation is linear in the other five; the delay is where
  * the rest is least. */
 
 #include <math.h>
@@ -24,7 +24,7 @@
 #define SLOW 4e-3 /* m/s: the sign of less is not trusted */
 #define SHAPES 5
 #define TERMS 12
-#define UNKNOWNS 4
+#define UNKNOWNS 5
 #define GRID 1e-3 /* s, of the first search for the delay */
 #define SHRINKS 24
 
@@ -160,11 +160,14 @@ static void make_row(const fitting *f, const window *w, const shape *factor, dou
   row[1] = 0.0;
   row[2] = w->sign * area;
   row[3] = area;
+  row[4] = 0.0;
   for (uint32_t i = w->first; i <= w->last; ++i) {
     double s = (samples[i].time - samples[w->first].time) / length;
     double x = weight * (samples[i].position - middle) * share_of(samples, w, i);
     row[0] += x * evaluate(factor->curve, s) / (length * length);
     row[1] -= x * evaluate(factor->slope, s) / length;
+    row[4] += weight * (samples[i].position - samples[0].position) * share_of(samples, w, i) *
+              evaluate(factor->value, s);
   }
 }
 
@@ -331,6 +334,7 @@ static hap_status fit(fitting *f, hapi_identify_fit *out, hap_detail *detail)
   out->damping = fmax(unknowns[1], 0.0);
   out->friction = fmax(unknowns[2], 0.0);
   out->bias = unknowns[3];
+  out->stiffness = unknowns[4];
   return HAP_OK;
 }
 
