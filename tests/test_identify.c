@@ -196,7 +196,7 @@ static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twi
     double a = f->quantum * round((c * f->x[0] + s * f->x[1]) / f->quantum);
     double b = f->quantum * round((c * f->x[1] - s * f->x[0]) / f->quantum);
     hapi_v3_set(pose->position, c * a - s * b, s * a + c * b,
-                f->quantum * round(f->x[2] / f->quantum));
+                0.5 * f->quantum * round(2.0 * f->x[2] / f->quantum));
   }
   if (++f->reads == f->bad_read) {
     pose->position[1] = (double)NAN;
