@@ -13,8 +13,8 @@
 #include "tests/fuzz/fuzz.h"
 
 #define EDITS_MAX 8
-#define MOVES_MAX 24
-#define TICKS_MAX 40
+#define MOVES_MAX 12
+#define TICKS_MAX 20
 
 /* What is left of the bytes; zeros behind their end. */
 typedef struct source {
@@ -93,11 +93,16 @@ static void edit_session(source *s, hap_session_def *def)
 /* What is allowed and only costs time and memory is made smaller. */
 static void keep_small(hap_session_def *def)
 {
-  int32_t *const sizes[] = {&def->max_bodies, &def->max_contacts, &def->trace_rows,
-                            &def->max_hull_points};
+  const struct {
+    int32_t *value;
+    int32_t limit;
+  } sizes[] = {{&def->max_bodies, 1024},
+               {&def->max_contacts, 4096},
+               {&def->trace_rows, 1048576},
+               {&def->max_hull_points, 1048576}};
   for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
-    if (*sizes[i] > 64 && *sizes[i] <= 1048576) {
-      *sizes[i] = 64;
+    if (*sizes[i].value > 40 && *sizes[i].value <= sizes[i].limit) {
+      *sizes[i].value = 40;
     }
   }
 }
@@ -146,6 +151,9 @@ static bool create(source *s, place *p)
   hap_session_def_init(&def, sizeof def);
   hap_ode_def_init(&ode, sizeof ode);
   def.drive = HAP_DRIVE_LOCKSTEP;
+  def.max_bodies = 8; /* less memory to clear: more inputs a second */
+  def.max_contacts = 32;
+  def.max_hull_points = 32;
   ode.world = p->world;
   ode.space = p->space;
   for (int edits = take_byte(s) % EDITS_MAX; edits > 0; --edits) {
