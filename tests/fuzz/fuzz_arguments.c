@@ -42,6 +42,8 @@ static void check_values(const hapi_argument *entries, const char *text)
   check_range(&entries[VECTOR], 3);
   const double *q = entries[QUATERNION].number;
   FUZZ_CHECK(fabs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) < 1e-12);
+  const hapi_argument *turn = &entries[QUATERNION];
+  FUZZ_CHECK(!turn->given || strcspn(turn->text, "123456789") < turn->length); /* not zero */
   FUZZ_CHECK(entries[WORD].word < 3);
   const hapi_argument *given = &entries[TEXT];
   if (given->given) {

@@ -143,6 +143,32 @@ static void build(place *p)
   dWorldSetGravity(p->world, 0.0, 0.0, -9.81);
 }
 
+/* What the header promises of a def that was taken. */
+static void check_def(const hap_session_def *def)
+{
+  const double ranges[][3] = {
+      {def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz)},
+      {def->contact_hz, 20.0, 1000.0},
+      {def->haptic_hz, 100.0, 20000.0},
+      {def->max_bodies, 1, 1024},
+      {def->max_contacts, 1, 4096},
+      {def->max_pointers, 1, 16},
+      {def->rt_priority, 0, 99},
+      {def->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
+      {def->trace_rows, 0, 1048576},
+      {def->max_edge_probes, 0, 1024},
+      {def->max_hull_points, 0, 1048576},
+      {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
+      {def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
+      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_PAPER},
+      {def->plane, HAP_PLANE_WHERE_NEEDED, HAP_PLANE_ALWAYS},
+      {def->flags, 0, 0},
+  };
+  for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; ++i) {
+    FUZZ_CHECK(ranges[i][0] >= ranges[i][1] && ranges[i][0] <= ranges[i][2]);
+  }
+}
+
 static bool create(source *s, place *p)
 {
   hap_session_def def;
@@ -163,6 +189,9 @@ static bool create(source *s, place *p)
   fuzz_detail_spoil(&detail);
   hap_status status = hap_session_create(&def, &ode, &p->session, &detail);
   fuzz_check_answer(status, p->session, &detail);
+  if (status >= HAP_OK) {
+    check_def(&def);
+  }
   return status >= HAP_OK;
 }
 
@@ -191,7 +220,9 @@ static void move(source *s, const place *p, hap_pointer_id id)
     pose.quat_wxyz[take_byte(s) % 4] = take_double(s);
   }
   hap_status status = hap_pointer_set_target(p->session, id, &pose, &twist);
-  FUZZ_CHECK(status == HAP_OK || status == HAP_ERROR_ARGUMENT);
+  bool finite = hapi_finite(pose.position, 3) && hapi_finite(pose.quat_wxyz, 4) &&
+                hapi_finite(twist.linear, 3) && hapi_finite(twist.angular, 3);
+  FUZZ_CHECK(status == HAP_ERROR_ARGUMENT || (status == HAP_OK && finite));
   if ((kind & 8) != 0) {
     FUZZ_CHECK(hap_session_reset_fault(p->session) == HAP_OK);
   }
