@@ -14,7 +14,7 @@
 
 #define EDITS_MAX 8
 #define MOVES_MAX 12
-#define TICKS_MAX 20
+#define TICKS_MAX 10
 
 /* What is left of the bytes; zeros behind their end. */
 typedef struct source {
