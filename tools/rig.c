@@ -22,7 +22,7 @@ hap_status rig_find_model(const char *name, hap_model *out, hap_detail *detail)
     }
   }
   length += (size_t)snprintf(detail->text, sizeof detail->text,
-                             "there is no model \"%s\"; models:", name);
+                             "there is no model \"%.60s\"; models:", name);
   for (int i = 0; hap_model_name((hap_model)i) != NULL && length < sizeof detail->text; ++i) {
     length += (size_t)snprintf(detail->text + length, sizeof detail->text - length, " %s",
                                hap_model_name((hap_model)i));

@@ -41,7 +41,7 @@ static hap_status refuse(const char *item, size_t length, hap_detail *detail)
   int shown = length < 60 ? (int)length : 60;
   int used = snprintf(detail->text, sizeof detail->text,
                       "\"%.*s\" is not NAME=on, NAME=off or NAME=auto; names:", shown, item);
-  for (size_t i = 0; i < RUN_EFFECTS; ++i) {
+  for (size_t i = 0; i < RUN_EFFECTS && used < (int)sizeof detail->text; ++i) {
     used +=
         snprintf(detail->text + used, sizeof detail->text - (size_t)used, " %s", effects[i].name);
   }

@@ -226,7 +226,7 @@ static hap_status fail_unknown(const char *argument, hap_detail *detail)
 {
   int used = snprintf(detail->text, sizeof detail->text,
                       "there is no option \"%.60s\"; options:", argument);
-  for (size_t i = 0; i < OPTIONS; ++i) {
+  for (size_t i = 0; i < OPTIONS && used < (int)sizeof detail->text; ++i) {
     used += snprintf(detail->text + used, sizeof detail->text - (size_t)used, " %s", table[i].name);
   }
   return HAP_ERROR_ARGUMENT;

@@ -23,6 +23,7 @@ have_package() {
     meson) command -v meson >/dev/null ;;
     ninja-build) command -v ninja >/dev/null ;;
     pkg-config) command -v pkg-config >/dev/null ;;
+    clang) command -v clang >/dev/null ;;
     clang-format) command -v clang-format-14 >/dev/null ;;
     gnuplot-nox) command -v gnuplot >/dev/null ;;
     python3) command -v python3 >/dev/null ;;

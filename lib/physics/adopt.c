@@ -50,7 +50,7 @@ hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody 
   if (index == HAPI_NONE) {
     hap_status status = hapi_bodies_scan(physics);
     index = hapi_bodies_find(&physics->table, body);
-    if (status < HAP_OK || index == HAPI_NONE) {
+    if (index == HAPI_NONE) {
       return status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
     }
   }

@@ -136,11 +136,8 @@ static double extent_of(dBodyID body)
 static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
 {
   uint32_t index = free_entry(table);
-  if (index == table->capacity) {
-    hap_status status = grow(table, 2 * table->capacity);
-    if (status < HAP_OK) {
-      return status;
-    }
+  if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
+    return HAP_ERROR_MEMORY;
   }
   hapi_known_body *known = &table->entries[index];
   memset(known, 0, sizeof *known);
@@ -156,14 +153,16 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   return HAP_OK;
 }
 
-static hap_status see_body(hapi_physics *physics, dBodyID body)
+/* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
+ * ones are gone; after the first one it asks for no more memory. */
+static bool see_body(hapi_physics *physics, dBodyID body)
 {
   hapi_body_table *table = &physics->table;
   uint32_t index = hapi_bodies_find(table, body);
   if (index == HAPI_NONE) {
-    hap_status status = add(table, body, &index);
-    if (status < HAP_OK) {
-      return status;
+    table->starved = table->starved || add(table, body, &index) < HAP_OK;
+    if (table->starved) {
+      return false;
     }
   }
   hapi_known_body *known = &table->entries[index];
@@ -181,60 +180,52 @@ static hap_status see_body(hapi_physics *physics, dBodyID body)
   if (physics->begun) {
     hapi_sleep_take(known);
   }
-  return HAP_OK;
+  return true;
 }
 
-static hap_status see_space(hapi_physics *physics, dSpaceID space)
+static void see_space(hapi_physics *physics, dSpaceID space)
 {
   int count = dSpaceGetNumGeoms(space);
   for (int i = 0; i < count; ++i) {
     dGeomID geom = dSpaceGetGeom(space, i);
-    hap_status status = HAP_OK;
     if (dGeomIsSpace(geom)) {
-      status = see_space(physics, (dSpaceID)geom);
+      see_space(physics, (dSpaceID)geom);
     } else if (dGeomGetBody(geom) != NULL) {
-      status = see_body(physics, dGeomGetBody(geom));
-    }
-    if (status < HAP_OK) {
-      return status;
+      (void)see_body(physics, dGeomGetBody(geom));
     }
   }
-  return HAP_OK;
 }
 
 /* The bodies that joints connect to this one; true when one of them was not seen in this scan. */
-static bool see_partners(hapi_physics *physics, dBodyID body, hap_status *status)
+static bool see_partners(hapi_physics *physics, dBodyID body)
 {
   hapi_body_table *table = &physics->table;
   bool found = false;
   int joints = dBodyGetNumJoints(body);
-  for (int k = 0; k < 2 * joints && *status >= HAP_OK; ++k) {
+  for (int k = 0; k < 2 * joints; ++k) {
     dBodyID other = dJointGetBody(dBodyGetJoint(body, k / 2), k % 2);
     uint32_t index = hapi_bodies_find(table, other);
     bool seen = index != HAPI_NONE && table->entries[index].seen == table->scan;
     if (other != NULL && !seen) {
-      *status = see_body(physics, other);
-      found = true;
+      found = see_body(physics, other) || found;
     }
   }
   return found;
 }
 
 /* Bodies without a geom are known by their joints to known ones: walks until nothing is new. */
-static hap_status see_jointed(hapi_physics *physics)
+static void see_jointed(hapi_physics *physics)
 {
   hapi_body_table *table = &physics->table;
-  hap_status status = HAP_OK;
   bool found = true;
-  while (found && status >= HAP_OK) {
+  while (found) {
     found = false;
-    for (uint32_t i = 0; i < table->high && status >= HAP_OK; ++i) {
+    for (uint32_t i = 0; i < table->high; ++i) {
       if (table->entries[i].body != NULL && table->entries[i].seen == table->scan) {
-        found = see_partners(physics, table->entries[i].body, &status) || found;
+        found = see_partners(physics, table->entries[i].body) || found;
       }
     }
   }
-  return status;
 }
 
 static void remove_entry(hapi_physics *physics, uint32_t index)
@@ -290,14 +281,11 @@ static void drop_unseen(hapi_physics *physics)
 static hap_status scan(hapi_physics *physics)
 {
   ++physics->table.scan;
-  hap_status status = see_space(physics, physics->ode.space);
-  if (status >= HAP_OK) {
-    status = see_jointed(physics);
-  }
-  if (status >= HAP_OK) {
-    drop_unseen(physics);
-  }
-  return status;
+  physics->table.starved = false;
+  see_space(physics, physics->ode.space);
+  see_jointed(physics);
+  drop_unseen(physics);
+  return physics->table.starved ? HAP_ERROR_MEMORY : HAP_OK;
 }
 
 /* Those who draw look bodies up in the table. */

@@ -189,7 +189,7 @@ static void add_mesh(hapi_physics *physics, const hapi_link *link)
   hapi_range *range = &physics->range;
   hapi_near *near = range->near;
   uint32_t count = hapi_mesh_near(physics, link->other, link->box);
-  for (uint32_t i = 0; i < count; ++i) {
+  for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     if (near->geom_count == physics->config.capacity.geoms ||
         near->point_count + 3 > physics->config.capacity.hull_points) {
       ++physics->figures.stats.capacity_dropped;
@@ -315,6 +315,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   if (!hapi_reserve((void **)&range->links, &range->link_capacity, range->link_count, 1,
                     sizeof *range->links)) {
     ++physics->figures.stats.capacity_dropped;
+    range->links_missing = true;
     return;
   }
   hapi_link *link = &range->links[range->link_count];
@@ -336,6 +337,7 @@ static void find_links(hapi_physics *physics, const hapi_known_body *known)
   range->own_speed = own > range->fastest ? own : range->fastest;
   double reach = reach_of(physics, range->own_speed + physics->neighborhood.fastest);
   range->link_count = 0;
+  range->links_missing = false;
   range->own_body = known->body;
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     const dReal *box = range->own_box;
@@ -414,10 +416,16 @@ static bool has_room(hapi_physics *physics, const hapi_known_body *known)
          range->near->pair_count + n.pairs <= c->contacts;
 }
 
+/* One that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
+static bool body_is_known(const hapi_physics *physics, dBodyID body)
+{
+  return body == NULL || hapi_bodies_find(&physics->table, body) != HAPI_NONE;
+}
+
 static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
 {
   const hapi_range *range = &physics->range;
-  if (has_joint(known->body)) {
+  if (has_joint(known->body) || range->links_missing) {
     return false;
   }
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
@@ -426,7 +434,8 @@ static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
     }
   }
   for (uint32_t i = 0; i < range->link_count; ++i) {
-    if (!geom_is_known(range->links[i].other)) {
+    dGeomID other = range->links[i].other;
+    if (!geom_is_known(other) || !body_is_known(physics, dGeomGetBody(other))) {
       return false;
     }
   }

@@ -68,7 +68,7 @@ static bool read_mesh(dGeomID geom, hapi_mesh *mesh)
   memset(mesh, 0, sizeof *mesh);
   mesh->corners = hapi_alloc_array(count, 9 * sizeof(double));
   mesh->boxes = hapi_alloc_array(chunks, 6 * sizeof(double));
-  if (count == 0 || mesh->corners == NULL || mesh->boxes == NULL) {
+  if (mesh->corners == NULL || mesh->boxes == NULL) {
     destroy_mesh(mesh);
     return false;
   }
@@ -229,7 +229,7 @@ uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]
   uint32_t found = 0;
   if (mesh == NULL) {
     ++physics->figures.stats.capacity_dropped;
-    return 0;
+    return FOUND_MAX; /* ODE collides it: a body that the loop moved would fall through */
   }
   box_to_geom(geom, box, local);
   for (uint32_t chunk = 0; chunk < (mesh->count + CHUNK - 1) / CHUNK; ++chunk) {

@@ -136,9 +136,8 @@ static void give_world_back(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->contact_group);
   /* What was destroyed since the last cycle must not be given anything back. */
-  if (hapi_bodies_scan(physics) >= HAP_OK) {
-    release_bodies(physics);
-  }
+  (void)hapi_bodies_scan(physics); /* a body without memory for it was given nothing */
+  release_bodies(physics);
   if (physics->islands_threads != 0) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
     physics->islands_threads = 0;

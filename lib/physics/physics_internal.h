@@ -81,6 +81,7 @@ typedef struct hapi_body_table {
   uint32_t used;
   uint64_t scan;
   uint64_t lost;
+  bool starved; /* the newest scan found no memory for a body: not all are known */
 } hapi_body_table;
 
 /* ---- what the loop knows, and what we told it ---- */
@@ -217,6 +218,7 @@ typedef struct hapi_range {
   hapi_link *links; /* of one body */
   uint32_t link_count;
   uint32_t link_capacity;
+  bool links_missing; /* no memory for one */
 } hapi_range;
 
 typedef struct hapi_mesh {
@@ -445,7 +447,8 @@ void hapi_range_publish(hapi_physics *physics); /* with the model of the same nu
 
 /* mesh.c */
 /* Triangles of a static mesh that meet a box of the world, into physics->meshes.found;
- * HAPI_NEAR_TRIANGLES: there may be more, and they are not to be used. */
+ * HAPI_NEAR_TRIANGLES: there may be more, or there is no memory for them, and they are not to be
+ * used. */
 uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]);
 void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
 void hapi_meshes_finish(hapi_meshes *meshes);

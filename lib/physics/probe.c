@@ -275,6 +275,9 @@ static hap_status switch_off(hapi_physics *physics)
 hap_status hapi_test_enter(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;
+  if (physics->table.starved) {
+    return HAP_ERROR_MEMORY; /* a body that is not known would move, and stay so */
+  }
   hap_status status = save_members(physics);
   if (status >= HAP_OK) {
     status = hapi_space_order_save(physics);

@@ -44,7 +44,6 @@ void hapi_sleep_take(hapi_known_body *known)
     sleep->velocities = hapi_alloc_array((size_t)sleep->samples, 6 * sizeof(double));
     if (sleep->velocities == NULL) {
       hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
-      sleep->samples = 0;
     }
   }
   bool enabled = dBodyIsEnabled(body) != 0;
@@ -128,11 +127,17 @@ static bool touches_in_loop(const hapi_known_body *known)
   return known->loop_owned && known->loop_touched;
 }
 
+/* With no samples ODE never puts a body to sleep; nor do we where they found no memory. */
+static bool can_sleep(const hapi_sleep *sleep)
+{
+  return sleep->automatic && (sleep->samples == 1 || sleep->velocities != NULL);
+}
+
 void hapi_sleep_step(hapi_physics *physics, double step_s)
 {
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
-    if (known->body == NULL || !known->sleep.automatic || known->sleep.samples == 0) {
+    if (known->body == NULL || !can_sleep(&known->sleep)) {
       continue;
     }
     bool awake = dBodyIsEnabled(known->body) != 0;

@@ -1,0 +1,83 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The command line of hapode-run: each line of the bytes is an argument. */
+
+#include <math.h>
+
+#include "tests/fuzz/fuzz.h"
+#include "tools/run_options.h"
+
+#define ARGUMENTS_MAX 40
+
+/* Cuts text at its line ends; argv ends with NULL. */
+static int split(char *text, char **argv)
+{
+  static char name[] = "hapode-run";
+  int count = 0;
+  argv[count++] = name;
+  for (char *at = text; at != NULL && count < ARGUMENTS_MAX; ++count) {
+    argv[count] = at;
+    at = strchr(at, '\n');
+    if (at != NULL) {
+      *at++ = '\0';
+    }
+  }
+  argv[count] = NULL;
+  return count;
+}
+
+static void check_between(double value, double low, double high)
+{
+  FUZZ_CHECK(value >= low && value <= high);
+}
+
+static void check_def(const hap_session_def *def)
+{
+  FUZZ_CHECK(hap_model_name(def->model) != NULL);
+  check_between(def->haptic_hz, 100.0, 20000.0);
+  check_between(def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz));
+  check_between(def->contact_hz, 20.0, 1000.0);
+  check_between(def->rt_priority, 0, 99);
+  check_between(def->physics_latency_ticks, -1, 20000);
+  check_between(def->drive, HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP);
+  check_between(def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);
+  check_between(def->probe, HAP_PROBE_SHARED, HAP_PROBE_PAPER);
+  check_between(def->plane, HAP_PLANE_WHERE_NEEDED, HAP_PLANE_ALWAYS);
+}
+
+static void check_options(const run_options *options)
+{
+  check_def(&options->rig.def);
+  FUZZ_CHECK(options->seconds == 0.0 || options->seconds >= 0.001);
+  check_between(options->seconds, 0.0, 86400.0);
+  FUZZ_CHECK(options->rig.max_force == 0.0 || options->rig.max_force >= 1e-6);
+  check_between(options->rig.max_force, 0.0, 1e6);
+  FUZZ_CHECK(options->rig.scene != NULL && options->rig.scene[0] != '\0');
+  FUZZ_CHECK(options->rig.device_count <= RIG_POINTERS_MAX);
+  for (size_t i = 0; i < options->rig.device_count; ++i) {
+    FUZZ_CHECK(options->rig.devices[i] != NULL);
+  }
+  FUZZ_CHECK(options->trace_path == NULL || options->trace_path[0] != '\0');
+  FUZZ_CHECK(options->plot_path == NULL || options->plot_path[0] != '\0');
+}
+
+void fuzz_one(const uint8_t *data, size_t size)
+{
+  char *argv[ARGUMENTS_MAX + 1];
+  char *text = fuzz_text(data, size);
+  int argc = split(text, argv);
+  run_options options;
+  hap_detail detail;
+  fuzz_detail_spoil(&detail);
+  hap_status status = run_options_parse(argc, argv, &options, &detail);
+  fuzz_check_answer(status, status >= HAP_OK ? &options : NULL, &detail);
+  if (status < HAP_OK) {
+    FUZZ_CHECK(strstr(detail.text, "--") != NULL); /* it names the option */
+    bool model = strncmp(detail.text, "--model: ", strlen("--model: ")) == 0;
+    FUZZ_CHECK(!model || strstr(detail.text, hap_model_name(HAP_MODEL_CONTACT)) != NULL);
+  } else if (options.action == RUN_SESSION) {
+    check_options(&options);
+  }
+  free(text);
+}
