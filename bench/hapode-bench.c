@@ -22,6 +22,8 @@ static const program programs[] = {
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
+    {"stability", bench_stability,
+     "where each integrator holds: stiffness, mass, contacts at once"},
     {"tick", bench_tick,
      "the haptic loop alone: time of a tick; --scene NAME: of one case with contacts"},
 };

@@ -1,0 +1,300 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench stability: where each integrator holds, over stiffness and mass and over stiffness and
+ * the number of contacts at once, and what becomes of implicit+proxy with delay, encoder, missed
+ * ticks and other hands. What a point is, and when it is stable: stability.h. */
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/stability_table.h"
+
+#define SECONDS 5.0
+#define MIDDLE_MASS 0.1 /* kg, of the map over contacts */
+#define MIDDLE_CONTACTS 8
+#define QUANTUM 3e-5     /* m, an encoder */
+#define FELT_SHARE 0.9   /* of coupling and contacts in series */
+#define LIMIT_MARGIN 2.0 /* how far from a limit the theory is asked */
+#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
+
+static const double stiffnesses[] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+static const double masses[] = {1e-3, 1e-2, 0.1, 1, 10, 100, 1e3};
+static const int contacts[] = {1, 2, 4, 8, 16, 32, 64};
+static const double delays[] = {0, 0.5, 1, 2}; /* ticks */
+
+typedef struct integrator {
+  const char *name;
+  hap_integration integration;
+  hap_coupling coupling;
+} integrator;
+
+static const integrator integrators[] = {
+    {"explicit", HAP_INTEGRATION_EXPLICIT, HAP_COUPLING_DIRECT},
+    {"implicit", HAP_INTEGRATION_IMPLICIT, HAP_COUPLING_DIRECT},
+    {"midpoint", HAP_INTEGRATION_MIDPOINT, HAP_COUPLING_DIRECT},
+    {"implicit+proxy", HAP_INTEGRATION_IMPLICIT, HAP_COUPLING_PROXY},
+    {"implicit+proxy", HAP_INTEGRATION_IMPLICIT, HAP_COUPLING_AUTO},
+};
+
+/* ---- measuring ---- */
+
+static double in_series(double a, double b)
+{
+  return a * b / (a + b);
+}
+
+static bool same_bed(const stability_point *a, const stability_point *b)
+{
+  return a->coupling == b->coupling && a->stiffness == b->stiffness && a->mass == b->mass &&
+         a->contacts == b->contacts && a->delay_ticks == b->delay_ticks && a->quantum == b->quantum;
+}
+
+/* The stiffness at the hand is one of the same balls, backed: neighbours in the table share it. */
+static hap_status feel(bench *b, const stability_table *table, stability_row *row)
+{
+  const stability_row *before = table->count > 0 ? &table->rows[table->count - 1] : NULL;
+  row->expected = in_series(row->result.held, row->point.stiffness * row->point.contacts);
+  if (before != NULL && before->felt > 0.0 && same_bed(&before->point, &row->point)) {
+    row->felt = before->felt;
+    return HAP_OK;
+  }
+  return stability_feel(b, &row->point, &row->felt);
+}
+
+static hap_status add_point(bench *b, stability_table *table, const char *name,
+                            const stability_point *point)
+{
+  stability_row row = {.integrator = name, .point = *point};
+  if (table->count == STABILITY_ROWS_MAX) {
+    return bench_fail(b, HAP_ERROR_CAPACITY, "more points than the table has room for");
+  }
+  hap_status status = stability_run(b, point, SECONDS, &row.result);
+  if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
+    status = feel(b, table, &row);
+  }
+  table->rows[table->count++] = row;
+  return status;
+}
+
+/* Touched and left, held against something, and between two sides; the device alone and in a hand. */
+static hap_status add_plain(bench *b, stability_table *table, const integrator *i,
+                            stability_point *point)
+{
+  hap_status status = HAP_OK;
+  for (int layout = STABILITY_FREE; layout <= STABILITY_CAGE; ++layout) {
+    for (int hand = STABILITY_NONE; hand <= STABILITY_RELAXED && status >= HAP_OK; ++hand) {
+      point->layout = (stability_layout)layout;
+      point->hand = (stability_hand)hand;
+      bool two_sides = layout == STABILITY_CAGE;
+      bool left_out = b->quick && two_sides != (hand == STABILITY_NONE);
+      if (!left_out && !(two_sides && point->contacts < 2)) {
+        status = add_point(b, table, i->name, point);
+      }
+    }
+  }
+  return status;
+}
+
+/* The two planes of the picture. */
+static hap_status add_map(bench *b, stability_table *table, const integrator *i)
+{
+  const size_t step = b->quick ? 3 : 1;
+  hap_status status = HAP_OK;
+  for (size_t k = 0; k < LENGTH(stiffnesses); k += step) {
+    stability_point point = {.integration = i->integration,
+                             .coupling = i->coupling,
+                             .stiffness = stiffnesses[k],
+                             .contacts = MIDDLE_CONTACTS};
+    for (size_t m = 0; m < LENGTH(masses) && status >= HAP_OK; m += step) {
+      point.mass = masses[m];
+      status = add_plain(b, table, i, &point);
+    }
+    point.mass = MIDDLE_MASS;
+    for (size_t n = 0; n < LENGTH(contacts) && status >= HAP_OK; n += step) {
+      point.contacts = contacts[n];
+      if (point.contacts != MIDDLE_CONTACTS || b->quick) {
+        status = add_plain(b, table, i, &point);
+      }
+    }
+  }
+  return status;
+}
+
+static hap_status add_device(bench *b, stability_table *table, const integrator *i,
+                             stability_point *point)
+{
+  hap_status status = HAP_OK;
+  for (int bits = b->quick ? 3 : 0; bits < 4; ++bits) {
+    point->quantum = (bits & 1) != 0 ? QUANTUM : 0.0;
+    point->missed = (bits & 2) != 0;
+    for (int hand = STABILITY_NONE; hand <= STABILITY_TENSE && status >= HAP_OK; ++hand) {
+      point->hand = (stability_hand)hand;
+      bool kept = hand == STABILITY_NONE && point->contacts > 1; /* the others come back */
+      point->layout = kept ? STABILITY_CAGE : STABILITY_BACKED;
+      status = add_point(b, table, i->name, point);
+      point->layout = STABILITY_FREE;
+      if (status >= HAP_OK && !b->quick) {
+        status = add_point(b, table, i->name, point);
+      }
+    }
+  }
+  return status;
+}
+
+/* Corners of the map and its middle, with what a real device adds. */
+static hap_status add_corners(bench *b, stability_table *table, const integrator *i)
+{
+  hap_status status = HAP_OK;
+  for (int corner = 0; corner <= 8; ++corner) {
+    stability_point point = {.integration = i->integration, .coupling = i->coupling};
+    point.stiffness = corner == 8 ? 1e3 : (corner & 1) != 0 ? 1e6 : 1.0;
+    point.mass = corner == 8 ? 1.0 : (corner & 2) != 0 ? 1e3 : 1e-3;
+    point.contacts = corner == 8 ? MIDDLE_CONTACTS : (corner & 4) != 0 ? 64 : 1;
+    for (size_t d = 0; d < LENGTH(delays) && status >= HAP_OK; ++d) {
+      point.delay_ticks = delays[d];
+      status = add_device(b, table, i, &point);
+    }
+  }
+  return status;
+}
+
+/* ---- what is checked ---- */
+
+static bool is_proxy(const stability_row *row)
+{
+  return row->point.coupling != HAP_COUPLING_DIRECT;
+}
+
+static void check_proxy(bench *b, const stability_table *table)
+{
+  size_t points = 0;
+  size_t stable = 0;
+  double worst = 0.0;
+  double softest = HUGE_VAL;
+  for (size_t i = 0; i < table->count; ++i) {
+    const stability_row *row = &table->rows[i];
+    if (is_proxy(row)) {
+      ++points;
+      stable += row->result.stable;
+      worst = fmax(worst, row->result.energy_ratio);
+      softest = fmin(softest, row->felt / row->expected);
+    }
+  }
+  bench_check(b, stable == points,
+              "implicit+proxy: %zu of %zu points stable, energy_ratio at most %.4f (bound %.2f)",
+              stable, points, worst, STABILITY_RATIO);
+  bench_check(b, softest >= FELT_SHARE,
+              "implicit+proxy: stiffness at the hand / coupling and contacts in series at least "
+              "%.3f (bound %.1f)",
+              softest, FELT_SHARE);
+}
+
+/* A sampled spring k gives k T/2 v^2 that only the device's damping takes: it holds k < 2 b / T
+ * (Colgate and Schenkel 1997), k the sum over the contacts that push. */
+static void check_explicit(bench *b, const stability_table *table)
+{
+  const double limit = 2.0 * STABILITY_DEVICE_DAMPING * STABILITY_HAPTIC_HZ;
+  size_t count[2] = {0, 0};
+  size_t right[2] = {0, 0};
+  for (size_t i = 0; i < table->count; ++i) {
+    const stability_row *row = &table->rows[i];
+    const stability_point *p = &row->point;
+    double k = 0.5 * p->stiffness * p->contacts;
+    bool near_limit = k > limit / LIMIT_MARGIN && k < limit * LIMIT_MARGIN;
+    if (strcmp(row->integrator, "explicit") == 0 && p->layout == STABILITY_CAGE &&
+        p->hand == STABILITY_NONE && !near_limit) {
+      bool above = k > limit;
+      ++count[above];
+      right[above] += row->result.stable != above;
+    }
+  }
+  bench_check(b, count[1] > 0 && right[1] == count[1],
+              "explicit, device alone, above %g x 2 b/T = %g N/m: %zu of %zu points unstable",
+              LIMIT_MARGIN, LIMIT_MARGIN * limit, right[1], count[1]);
+  bench_check(b, count[0] > 0 && right[0] == count[0],
+              "explicit, device alone, below 2 b/T / %g = %g N/m: %zu of %zu points stable",
+              LIMIT_MARGIN, limit / LIMIT_MARGIN, right[0], count[0]);
+}
+
+static void say_counts(const stability_table *table)
+{
+  for (size_t i = 0; i < 3; ++i) {
+    size_t points = 0;
+    size_t stable = 0;
+    for (size_t r = 0; r < table->count; ++r) {
+      if (strcmp(table->rows[r].integrator, integrators[i].name) == 0) {
+        ++points;
+        stable += table->rows[r].result.stable;
+      }
+    }
+    bench_say("%s, pointer at the device: %zu of %zu points stable", integrators[i].name, stable,
+              points);
+  }
+}
+
+/* ---- the program ---- */
+
+static const char *layout_word(stability_layout layout)
+{
+  return layout == STABILITY_FREE ? "free" : layout == STABILITY_BACKED ? "backed" : "cage";
+}
+
+static hap_status write_table(bench *b, const stability_table *table)
+{
+  FILE *csv = bench_csv_open(b, "stability",
+                             "integrator,stiffness,mass,contacts,stable,energy_ratio,coupling,"
+                             "layout,hand,delay_ticks,quantum,missed,held_stiffness,"
+                             "felt_stiffness,expected_stiffness,solver_residual");
+  for (size_t i = 0; i < table->count && csv != NULL; ++i) {
+    const stability_row *row = &table->rows[i];
+    const stability_point *p = &row->point;
+    fprintf(csv, "%s,%g,%g,%d,%d,%.6g,%s,%s,%s,%g,%g,%d,%g,", row->integrator, p->stiffness,
+            p->mass, p->contacts, row->result.stable, row->result.energy_ratio,
+            p->coupling == HAP_COUPLING_DIRECT  ? "direct"
+            : p->coupling == HAP_COUPLING_PROXY ? "proxy"
+                                                : "auto",
+            layout_word(p->layout), stability_hand_word(p->hand), p->delay_ticks, p->quantum,
+            p->missed, row->result.held);
+    if (is_proxy(row)) {
+      fprintf(csv, "%.6g,%.6g", row->felt, row->expected);
+    } else {
+      fprintf(csv, ",");
+    }
+    fprintf(csv, ",%.3g\n", row->result.residual);
+  }
+  return bench_csv_close(b, csv);
+}
+
+static hap_status measure(bench *b, stability_table *table)
+{
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < LENGTH(integrators) && status >= HAP_OK; ++i) {
+    status = add_map(b, table, &integrators[i]);
+    if (status >= HAP_OK && integrators[i].coupling != HAP_COUPLING_DIRECT) {
+      status = add_corners(b, table, &integrators[i]);
+    }
+  }
+  return status;
+}
+
+hap_status bench_stability(bench *b)
+{
+  stability_table *table = calloc(1, sizeof *table);
+  if (table == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
+  }
+  hap_status status = measure(b, table);
+  if (status >= HAP_OK) {
+    status = write_table(b, table);
+  }
+  if (status >= HAP_OK) {
+    say_counts(table);
+    check_proxy(b, table);
+    check_explicit(b, table);
+    status = stability_draw(b, table);
+  }
+  free(table);
+  return status;
+}

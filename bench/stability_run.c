@@ -1,0 +1,340 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "bench/stability.h"
+
+#include <math.h>
+#include <string.h>
+
+#include <ode/ode.h>
+
+#include <hapode/ode.h>
+
+#include "base/vec.h"
+#include "device/device.h"
+#include "haptic/haptic_internal.h"
+#include "physics/physics_internal.h"
+#include "plugins/virtual/virtual.h"
+#include "session/session_internal.h"
+
+#define POINTER_RADIUS 10.0 /* m: so large that all normals are nearly those of the push */
+#define BALL_RADIUS 0.005
+#define PITCH 0.012
+#define GAP 1e-6    /* m, before the push */
+#define PUSH 1e-3   /* m */
+#define PUSH_S 0.01 /* from rest to rest */
+#define MISSED_OF 100
+#define MISSED_AT 57 /* not a tick at which physics is due */
+#define NO_LIMIT 1e6 /* N */
+
+typedef struct stability_bed {
+  const stability_point *point;
+  dWorldID world;
+  dSpaceID space;
+  dBodyID balls[STABILITY_CONTACTS_MAX];
+  hap_device *device;
+  hap_session *session;
+  hap_pointer_id pointer;
+  double before[STABILITY_CONTACTS_MAX][3]; /* of the balls, at the time of the device's read */
+  double kinetic;                           /* J of the balls, then */
+  double proxy[3];
+  bool proxied;
+  double lost; /* J, to the device's damping */
+  double made; /* J, largest */
+  double stored;
+  bool finite;
+} stability_bed;
+
+/* ---- the bed ---- */
+
+static void add_ball(stability_bed *s, int index, double x, double y, double side)
+{
+  const double reach = POINTER_RADIUS + BALL_RADIUS + GAP;
+  const double z = side * sqrt(reach * reach - x * x - y * y);
+  dMass mass;
+  dBodyID ball = dBodyCreate(s->world);
+  dMassSetSphereTotal(&mass, s->point->mass, BALL_RADIUS);
+  dBodySetMass(ball, &mass);
+  dBodySetPosition(ball, x, y, z);
+  dGeomSetBody(dCreateSphere(s->space, BALL_RADIUS), ball);
+  s->balls[index] = ball;
+  if (s->point->layout != STABILITY_FREE) {
+    const double out = (reach + 1.5 * BALL_RADIUS) / reach;
+    dMatrix3 rotation;
+    dGeomID back = dCreateBox(s->space, 0.8 * PITCH, 0.8 * PITCH, BALL_RADIUS);
+    dRFromZAxis(rotation, x, y, z);
+    dGeomSetRotation(back, rotation);
+    dGeomSetPosition(back, out * x, out * y, out * z);
+  }
+}
+
+static void add_balls(stability_bed *s)
+{
+  const int sides = s->point->layout == STABILITY_CAGE ? 2 : 1;
+  const int each = s->point->contacts / sides;
+  const int across = (int)ceil(sqrt(each));
+  for (int i = 0; i < s->point->contacts; ++i) {
+    int place = i % each;
+    double x = PITCH * (place % across - 0.5 * (across - 1));
+    double y = PITCH * (place / across - 0.5 * ((each - 1) / across));
+    add_ball(s, i, x, y, i < each ? -1.0 : 1.0);
+  }
+}
+
+static void write_spec(const stability_point *p, const char *hand, char out[256])
+{
+  int length = snprintf(
+      out, 256, "virtual:max_force=1e6,device_mass=%g,device_damping=%g,delay=%.9g,%s",
+      STABILITY_DEVICE_MASS, STABILITY_DEVICE_DAMPING, p->delay_ticks / STABILITY_HAPTIC_HZ, hand);
+  if (p->quantum > 0.0) {
+    snprintf(out + length, 256 - (size_t)length, ",quantum=%g", p->quantum);
+  }
+}
+
+static hap_status open_session(bench *b, stability_bed *s, const char *spec)
+{
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_pointer_def pointer;
+  hap_session_def_init(&def, sizeof def);
+  hap_ode_def_init(&ode, sizeof ode);
+  hap_pointer_def_init(&pointer, sizeof pointer);
+  def.drive = HAP_DRIVE_LOCKSTEP;
+  def.haptic_hz = STABILITY_HAPTIC_HZ;
+  ode.world = s->world;
+  ode.space = s->space;
+  pointer.radius = POINTER_RADIUS;
+  pointer.stiffness = s->point->stiffness;
+  pointer.max_force = NO_LIMIT;
+  pointer.coupling = s->point->coupling;
+  pointer.integration = s->point->integration;
+  hap_status status = hap_device_open(spec, &s->device, &b->detail);
+  pointer.device = s->device;
+  if (status >= HAP_OK) {
+    status = hap_session_create(&def, &ode, &s->session, &b->detail);
+  }
+  if (status >= HAP_OK) {
+    status = hap_pointer_add(s->session, &pointer, &s->pointer);
+  }
+  if (status >= HAP_OK) {
+    status = hap_session_start(s->session);
+  }
+  if (status < HAP_OK && s->session != NULL) {
+    (void)hap_session_detail(s->session, &b->detail);
+  }
+  return status;
+}
+
+static hap_status open_bed(bench *b, const stability_point *point, const char *hand,
+                           stability_bed *s)
+{
+  char spec[256];
+  memset(s, 0, sizeof *s);
+  s->point = point;
+  s->finite = true;
+  s->world = dWorldCreate();
+  s->space = dHashSpaceCreate(NULL);
+  dWorldSetCFM(s->world, 1e-12);
+  dWorldSetContactSurfaceLayer(s->world, 1e-5);
+  add_balls(s);
+  write_spec(point, hand, spec);
+  return open_session(b, s, spec);
+}
+
+static void close_bed(stability_bed *s)
+{
+  hap_session_destroy(s->session);
+  if (s->device != NULL) {
+    hap_device_close(s->device);
+  }
+  dSpaceDestroy(s->space);
+  dWorldDestroy(s->world);
+}
+
+/* ---- energy ---- */
+
+static int ball_of(const stability_bed *s, dBodyID body)
+{
+  for (int i = 0; i < s->point->contacts; ++i) {
+    if (s->balls[i] == body) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+static double kinetic_of(const stability_bed *s, const double linear[3], const double angular[3])
+{
+  double inertia = 0.4 * s->point->mass * BALL_RADIUS * BALL_RADIUS;
+  return 0.5 * s->point->mass * hapi_v3_dot(linear, linear) +
+         0.5 * inertia * hapi_v3_dot(angular, angular);
+}
+
+/* Where balls and proxy are after a tick: at the time of the device's next read. */
+static void look(stability_bed *s)
+{
+  const hapi_tick *tick = &s->session->haptic->tick;
+  const hapi_physics *physics = s->session->physics;
+  bool local[STABILITY_CONTACTS_MAX] = {false};
+  s->kinetic = 0.0;
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies[tick->live[i]];
+    uint32_t known = physics->bodies[tick->live[i]].known;
+    int ball = known == HAPI_NONE ? -1 : ball_of(s, physics->table.entries[known].body);
+    if (ball >= 0) {
+      local[ball] = true;
+      hapi_v3_copy(body->pose.position, s->before[ball]);
+      s->kinetic += kinetic_of(s, body->twist.linear, body->twist.angular);
+    }
+  }
+  for (int i = 0; i < s->point->contacts; ++i) {
+    if (!local[i]) { /* has drifted away */
+      hapi_v3_copy(dBodyGetPosition(s->balls[i]), s->before[i]);
+      s->kinetic += kinetic_of(s, dBodyGetLinearVel(s->balls[i]), dBodyGetAngularVel(s->balls[i]));
+    }
+  }
+  hapi_v3_copy(tick->pointers[0].proxy_position, s->proxy);
+  s->proxied = tick->pointers[0].proxied;
+}
+
+/* J, of the contacts' and the coupling's springs, with the device where it was measured last. */
+static double springs(const stability_bed *s)
+{
+  const hapi_tick_pointer *p = &s->session->haptic->tick.pointers[0];
+  const double *handle = p->handle_position;
+  const double *at = s->proxied ? s->proxy : handle;
+  double sum = 0.0;
+  double apart[3];
+  for (int i = 0; i < s->point->contacts; ++i) {
+    hapi_v3_sub(at, s->before[i], apart);
+    double depth = fmax(0.0, POINTER_RADIUS + BALL_RADIUS - hapi_v3_norm(apart));
+    sum += 0.5 * s->point->stiffness * depth * depth;
+  }
+  if (s->proxied) {
+    hapi_v3_sub(s->proxy, handle, apart);
+    hapi_v3_sub(apart, p->offset, apart);
+    sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
+  }
+  return sum;
+}
+
+static void account(stability_bed *s, const hapi_virtual_port *was, const hapi_virtual_port *now,
+                    double period)
+{
+  double way[3];
+  hapi_v3_sub(now->position, was->position, way);
+  /* velocity is nearly linear within: mean of its square from ends and mean */
+  double mean = hapi_v3_dot(way, way) / (period * period);
+  double ends =
+      0.5 * (hapi_v3_dot(was->velocity, was->velocity) + hapi_v3_dot(now->velocity, now->velocity));
+  s->lost += STABILITY_DEVICE_DAMPING * period * (2.0 * mean + ends) / 3.0;
+  double made = now->work - s->lost + s->kinetic;
+  double stored =
+      s->kinetic + springs(s) + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
+  s->finite = s->finite && isfinite(made) && isfinite(stored);
+  s->made = fmax(s->made, made);
+  s->stored = fmax(s->stored, stored);
+}
+
+/* ---- runs ---- */
+
+const char *stability_hand_word(stability_hand hand)
+{
+  return hand == STABILITY_NONE ? "none" : hand == STABILITY_RELAXED ? "relaxed" : "tense";
+}
+
+static double in_series(const stability_point *p, double held)
+{
+  double k = p->stiffness * p->contacts / (p->layout == STABILITY_CAGE ? 2 : 1);
+  return p->coupling == HAP_COUPLING_DIRECT ? k : k * held / (k + held);
+}
+
+static void write_hand(const stability_point *p, char out[128])
+{
+  if (p->hand != STABILITY_NONE) {
+    snprintf(out, 128, "hand=%s,path=0:0/0/0;%g:0/0/0;%g:0/0/%g", stability_hand_word(p->hand),
+             PUSH_S, 2.0 * PUSH_S, -PUSH);
+    return;
+  }
+  double held = 0.8 * STABILITY_DEVICE_DAMPING * STABILITY_HAPTIC_HZ / (0.5 + p->delay_ticks);
+  double speed = PUSH * sqrt(in_series(p, held) / STABILITY_DEVICE_MASS);
+  snprintf(out, 128, "hand=none,kick=%g:0/0/%.9g", PUSH_S, -fmin(speed, 50.0));
+}
+
+static void tick_once(stability_bed *s, uint64_t index, hapi_virtual_port *port, double *way)
+{
+  hapi_virtual_port was = *port;
+  bool missed = s->point->missed && index % MISSED_OF == MISSED_AT;
+  double period = (missed ? 2.0 : 1.0) / STABILITY_HAPTIC_HZ;
+  if (missed) {
+    atomic_fetch_add(&s->session->tick, 1);
+  }
+  (void)hap_session_advance(s->session, 1);
+  look(s);
+  hapi_virtual_get_port(hapi_device_self(s->device), port);
+  account(s, &was, port, period);
+  *way = fmax(*way, -port->position[2]);
+}
+
+static void finish(stability_bed *s, double way, int touched, stability_result *out)
+{
+  const hapi_tick *tick = &s->session->haptic->tick;
+  out->energy_ratio = s->finite && s->stored > 0.0 ? 1.0 + s->made / s->stored : HUGE_VAL;
+  out->stable = s->finite && tick->fault == HAP_FAULT_NONE && out->energy_ratio <= STABILITY_RATIO;
+  out->held = tick->pointers[0].hold;
+  out->residual = tick->residual_max;
+  out->way = way;
+  out->stored = s->stored;
+  out->touched = touched;
+  out->proxied = tick->pointers[0].proxied;
+}
+
+hap_status stability_run(bench *b, const stability_point *point, double seconds,
+                         stability_result *out)
+{
+  char hand[128];
+  stability_bed s;
+  hapi_virtual_port port;
+  memset(out, 0, sizeof *out);
+  write_hand(point, hand);
+  hap_status status = open_bed(b, point, hand, &s);
+  if (status >= HAP_OK) {
+    double way = 0.0;
+    int touched = 0;
+    uint64_t ticks = (uint64_t)llround(seconds * STABILITY_HAPTIC_HZ);
+    hapi_virtual_get_port(hapi_device_self(s.device), &port);
+    for (uint64_t i = 0; i < ticks && s.finite; ++i) {
+      tick_once(&s, i, &port, &way);
+      int pushing = (int)s.session->haptic->tick.pushing;
+      touched = pushing > touched ? pushing : touched;
+    }
+    finish(&s, way, touched, out);
+  }
+  close_bed(&s);
+  return status;
+}
+
+hap_status stability_feel(bench *b, const stability_point *point, double *out)
+{
+  static const uint64_t stops[2] = {700, 1400};
+  const char *hand = "hand=rigid,blend=linear,path=0:0/0/0.0001;2:0/0/-0.0019";
+  stability_point backed = *point;
+  backed.layout = STABILITY_BACKED;
+  stability_bed s;
+  double z[2];
+  double force[2];
+  hap_status status = open_bed(b, &backed, hand, &s);
+  for (int i = 0; i < 2 && status >= HAP_OK; ++i) {
+    hap_pointer_state state;
+    hapi_virtual_port port;
+    status = hap_session_advance(s.session, stops[i] - s.session->tick);
+    if (hap_pointer_get(s.session, s.pointer, &state, sizeof state) < HAP_OK) {
+      status = HAP_ERROR_STATE;
+    }
+    hapi_virtual_get_port(hapi_device_self(s.device), &port);
+    z[i] = port.position[2];
+    force[i] = state.wrench.force[2];
+  }
+  *out = status >= HAP_OK ? (force[1] - force[0]) / (z[0] - z[1]) : 0.0;
+  close_bed(&s);
+  return status;
+}
