@@ -18,7 +18,9 @@
  * time. The second is implicit Euler. Both are w' + f / c = F / c, a soft row. A damper that changes
  * the velocity by little in a tick takes it as it is, d (s - w), as eq. 7 says and as the world does
  * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
- * row has two bodies, w stands for w - s, and s is 0. */
+ * row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it follows the contact's
+ * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
+ * negative damper of T k. So a proxy's contacts take the second form. */
 
 #define MIDPOINT_LIMIT 4.0
 #define DAMPER_LIMIT 0.25   /* of T a d: explicit damping is stable up to 2 */
@@ -132,7 +134,7 @@ static void linearise(const spring *p, double period, double *out_c, double *out
 static bool by_midpoint(const hapi_tick_pointer *p, double stiffness)
 {
   return p->integration == HAP_INTEGRATION_MIDPOINT ||
-         (p->integration == HAP_INTEGRATION_AUTO && stiffness <= MIDPOINT_LIMIT);
+         (p->integration == HAP_INTEGRATION_AUTO && !p->proxied && stiffness <= MIDPOINT_LIMIT);
 }
 
 /* Share of the new velocity in the damper's; t: T a d. */
@@ -195,7 +197,7 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
     hapi_v3_copy(at->normal, row->jb);
     hapi_v3_scale(p->response, row->jb, row->bb);
     row->b = p->row;
-    out->w += hapi_v3_dot(row->jb, p->free_velocity);
+    out->w += hapi_v3_dot(row->jb, p->proxy_velocity);
     out->s = 0.0;
   }
   out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
