@@ -36,9 +36,10 @@ typedef struct impedance_truth {
 
 typedef struct impedance_point {
   double hz;
-  double amplitude;     /* m */
-  double complex felt;  /* N/m */
-  double complex truth; /* N/m */
+  double amplitude;       /* m */
+  double complex felt;    /* N/m */
+  double complex truth;   /* N/m */
+  double complex sampled; /* N/m: what the truth is at ticks */
   double residual; /* rms of the force that is not of this frequency, over the rms of what is */
   double contact_share; /* of the ticks */
 } impedance_point;
@@ -72,6 +73,9 @@ extern const impedance_case impedance_cases[PORT_BODIES];
 /* Without a coupling. */
 impedance_truth impedance_truth_of(port_body body);
 double complex impedance_of(const impedance_truth *truth, double hz);
+
+/* The same as model contact should render it, tick by tick. */
+double complex impedance_sampled(const impedance_truth *truth, double hz);
 
 /* Mass, stiffness and damping of the contact that fit the felt values best, up to hz_max; all else is
  * taken from the truth. */

@@ -67,6 +67,30 @@ double complex impedance_of(const impedance_truth *truth, double hz)
   return 1.0 / compliance;
 }
 
+/* What poses and forces at ticks make of the closed form. Bodies move as x' = x + T v', v' = v + T F / m: the mass is that of the central difference. A damper takes a velocity from before the tick,
+ * which is half a tick old. Direct: the midpoint rule weighs the body's places 1, 2, 1. Through a proxy
+ * p: contact and coupling are implicit, F = k (p' - x') = k_v (u - p'), u of the device; so the body is
+ * felt a tick ahead. */
+double complex impedance_sampled(const impedance_truth *truth, double hz)
+{
+  double angle = 2.0 * M_PI * hz * PORT_TICK_S;
+  double complex w = I * 2.0 * M_PI * hz;
+  double complex ahead = cexp(I * angle);
+  double complex rate = (1.0 - 1.0 / ahead) / PORT_TICK_S;
+  double move = 2.0 * sin(0.5 * angle) / PORT_TICK_S;
+  double body = truth->body_stiffness - move * move * truth->mass;
+  double complex give = truth->grounded ? 0.0 : 1.0 / body;
+  if (truth->coupling_stiffness > 0.0) {
+    double complex contact = truth->stiffness + truth->damping * rate;
+    double complex coupling = truth->coupling_stiffness + truth->coupling_damping * rate;
+    return (truth->coupling_stiffness + truth->coupling_damping * w) /
+           (1.0 + coupling * (1.0 / contact + ahead * give));
+  }
+  double mean = cos(0.5 * angle) * cos(0.5 * angle);
+  return (truth->stiffness + truth->damping * w) /
+         (1.0 + (truth->stiffness * mean + truth->damping * rate) * give);
+}
+
 /* ---- fit: Gauss and Newton, relative errors ---- */
 
 static double *parameter(impedance_truth *truth, int index)

@@ -146,6 +146,8 @@ static hap_status add_pointer(bench *b, port *p, const port_def *def)
   pointer.stiffness = def->stiffness;
   pointer.damping = def->damping;
   pointer.coupling = def->coupling;
+  pointer.coupling_stiffness = def->coupling_stiffness;
+  pointer.coupling_damping = def->coupling_damping;
   pointer.max_force = 1e6;
   status = hap_pointer_add(p->session, &pointer, &p->pointer);
   if (status >= HAP_OK) {

@@ -41,8 +41,10 @@ typedef struct port_def {
   const char *device; /* spec */
   hap_model model;
   hap_coupling coupling;
-  double stiffness; /* N/m, of the contact */
-  double damping;   /* N s/m, of the contact */
+  double coupling_stiffness; /* N/m; 0: from the device's figures */
+  double coupling_damping;   /* N s/m */
+  double stiffness;          /* N/m, of the contact */
+  double damping;            /* N s/m, of the contact */
 } port_def;
 
 typedef struct port {
