@@ -15,7 +15,7 @@
 #define HZ_LEAST 0.5
 #define HZ_MOST 200.0
 #define POINTS_QUICK 10
-#define SETTLE_TICKS 3000   /* 15 time constants of the free body on its contact */
+#define SETTLE_TICKS 5000   /* 15 time constants of the free body behind contact and coupling */
 #define WINDOW_S 1.0        /* measured, at least */
 #define PERIODS_LEAST 2.0   /* measured, at least */
 #define AMPLITUDE_MOST 1e-3 /* m */
@@ -25,7 +25,8 @@
 #define FIT_HZ 50.0
 #define FIT_BOUND 0.01
 #define SAMPLED_BOUND 1e-3
-#define STEADY 0.05 /* of the residual: above it the force is no sine, and Z says little */
+#define TURNING_BOUND 0.02 /* of a flap: its A and b are those of the last physics step */
+#define STEADY 0.05        /* of the residual: above it the force is no sine, and Z says little */
 
 const impedance_variant impedance_variants[IMPEDANCE_VARIANTS] = {
     {"contact", HAP_MODEL_CONTACT, HAP_COUPLING_DIRECT},
@@ -256,21 +257,19 @@ static double percent(double value, double wanted)
   return 100.0 * (value / wanted - 1.0);
 }
 
-/* What a hand takes the body for. Through a proxy a body that moves is felt a tick ahead, which is
- * more damping by T k at the contact's resonance: there the mass alone is held to the bound. */
+/* What a hand takes the body for. */
 static void report_fit(bench *b, const char *name, const impedance_curve *c, bool bound)
 {
   const impedance_truth *t = &c->truth;
   const impedance_truth *f = &c->fit;
   bool moves = !t->grounded;
-  bool proxy = t->coupling_stiffness > 0.0;
   if (!c->fitted) {
     bench_say("%s: no steady sine to fit mass, spring and damper to", name);
     return;
   }
   bool good = (!moves || bench_within(f->mass, t->mass, FIT_BOUND)) &&
-              ((moves && proxy) || (bench_within(f->stiffness, t->stiffness, FIT_BOUND) &&
-                                    bench_within(f->damping, t->damping, FIT_BOUND)));
+              bench_within(f->stiffness, t->stiffness, FIT_BOUND) &&
+              bench_within(f->damping, t->damping, FIT_BOUND);
   char mass[64] = "";
   char text[160];
   if (moves) {
@@ -289,6 +288,7 @@ static void report_curve(bench *b, int body, size_t variant, const impedance_tab
 {
   const impedance_curve *c = &table->curves[body][variant];
   bool bound = impedance_variants[variant].model == HAP_MODEL_CONTACT;
+  double sampled_bound = body == PORT_HINGE ? TURNING_BOUND : SAMPLED_BOUND;
   worst low = find_worst(c, table->points, FIT_HZ);
   worst all = find_worst(c, table->points, HUGE_VAL);
   char name[64];
@@ -300,9 +300,9 @@ static void report_curve(bench *b, int body, size_t variant, const impedance_tab
       name, 100.0 * low.error, low.hz, low.phase, 100.0 * all.error, all.hz, all.phase,
       100.0 * all.contact_share, all.residual);
   if (bound) {
-    bench_check(b, all.sampled <= SAMPLED_BOUND && all.contact_share == 1.0,
+    bench_check(b, all.sampled <= sampled_bound && all.contact_share == 1.0,
                 "%s: off the closed form at ticks by %.2g %% at most up to 200 Hz (bound %g %%)",
-                name, 100.0 * all.sampled, 100.0 * SAMPLED_BOUND);
+                name, 100.0 * all.sampled, 100.0 * sampled_bound);
   }
   report_fit(b, name, c, bound);
 }

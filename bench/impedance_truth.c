@@ -67,10 +67,11 @@ double complex impedance_of(const impedance_truth *truth, double hz)
   return 1.0 / compliance;
 }
 
-/* What poses and forces at ticks make of the closed form. Bodies move as x' = x + T v', v' = v + T F / m: the mass is that of the central difference. A damper takes a velocity from before the tick,
- * which is half a tick old. Direct: the midpoint rule weighs the body's places 1, 2, 1. Through a proxy
- * p: contact and coupling are implicit, F = k (p' - x') = k_v (u - p'), u of the device; so the body is
- * felt a tick ahead. */
+/* What poses and forces at ticks make of the closed form. A body moves as x' = x + T v', v' = v + T F / m:
+ * its mass is that of the central difference. Direct: the midpoint rule weighs the body's places 1, 2,
+ * 1, and the damper takes the body's velocity from before the tick, which is half a tick old. Through a
+ * proxy p, u the device: F = k (p' - (x' - T v)) + d (p' - p - x' + x) / T, and the same of the coupling
+ * k_v (u - p') ... */
 double complex impedance_sampled(const impedance_truth *truth, double hz)
 {
   double angle = 2.0 * M_PI * hz * PORT_TICK_S;
@@ -83,8 +84,10 @@ double complex impedance_sampled(const impedance_truth *truth, double hz)
   if (truth->coupling_stiffness > 0.0) {
     double complex contact = truth->stiffness + truth->damping * rate;
     double complex coupling = truth->coupling_stiffness + truth->coupling_damping * rate;
+    double complex back =
+        truth->stiffness * (ahead - 1.0 + 1.0 / ahead) + truth->damping * rate * ahead;
     return (truth->coupling_stiffness + truth->coupling_damping * w) /
-           (1.0 + coupling * (1.0 / contact + ahead * give));
+           (1.0 + coupling / contact * (1.0 + back * give));
   }
   double mean = cos(0.5 * angle) * cos(0.5 * angle);
   return (truth->stiffness + truth->damping * w) /
