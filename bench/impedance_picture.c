@@ -60,10 +60,8 @@ static void draw_case(FILE *script, const impedance_table *table, int body)
 {
   bool grounded = table->curves[body][0].truth.grounded;
   put_data(script, table, body);
-  fprintf(script,
-          "set title '%s'\nset logscale y\nset yrange [*:*]\n"
-          "set ylabel '|F/X| [N/m]'\n",
-          impedance_cases[body].title);
+  fprintf(script, "set title '%s'\nset logscale y\nset yrange [%s]\nset ylabel '|F/X| [N/m]'\n",
+          impedance_cases[body].title, grounded ? "1:1e4" : "*:*");
   plot_column(script, MAGNITUDE);
   fprintf(script, "unset key\nset title ' '\nunset logscale y\nset yrange [%s]\nset ylabel '%s'\n",
           grounded ? "0:2000" : "-0.2:0.6",
@@ -82,7 +80,7 @@ hap_status impedance_draw(bench *b, const impedance_table *table)
     fprintf(script,
             "set multiplot layout %d,3 title 'Dynamic stiffness at the port: felt and true'\n"
             "set logscale x\nset xrange [0.4:250]\nset xlabel 'frequency [Hz]'\n"
-            "set key bottom right font ',9'\n",
+            "set key bottom right font ',8'\n",
             (int)PORT_BODIES);
     for (int body = 0; body < PORT_BODIES; ++body) {
       draw_case(script, table, body);
