@@ -21,6 +21,8 @@ static const program programs[] = {
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
+    {"impedance", bench_impedance,
+     "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
     {"stability", bench_stability,
      "where each integrator holds: stiffness, mass, contacts at once"},
@@ -36,7 +38,7 @@ static void print_usage(FILE *to)
           "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE]\n"
           "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
-    fprintf(to, "  %-8s  %s\n", programs[i].name, programs[i].text);
+    fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
   }
 }
 

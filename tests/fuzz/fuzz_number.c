@@ -1,12 +1,12 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* plugins/common/number.h */
+/* base/number.h */
 
 #include <ctype.h>
 #include <math.h>
 
-#include "plugins/common/number.h"
+#include "base/number.h"
 #include "tests/fuzz/fuzz.h"
 
 void fuzz_one(const uint8_t *data, size_t size)

@@ -20,7 +20,8 @@
  * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
  * row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it follows the contact's
  * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
- * negative damper of T k. So a proxy's contacts take the second form. */
+ * negative damper of T k. So a proxy's contacts take the second form, for the proxy: of a body that it
+ * would damp by T k, the old speed is taken off, k (g' + T w - ...), while the body is heavy enough. */
 
 #define MIDPOINT_LIMIT 4.0
 #define DAMPER_LIMIT 0.25   /* of T a d: explicit damping is stable up to 2 */
@@ -111,6 +112,8 @@ typedef struct spring {
   double w;     /* m/s, as above, before the tick */
   double free;  /* m/s, w after the tick with nothing in touch */
   double s;
+  double body_a; /* 1/kg, of the body alone */
+  double body_w; /* m/s, likewise */
 } spring;
 
 #define NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
@@ -153,6 +156,9 @@ static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring
   if (by_midpoint(pointer, period * period * p->a * p->k)) {
     linearise(p, period, &c, &force);
     late = lateness(period * p->a * p->d);
+  } else if (pointer->proxied && pointer->integration == HAP_INTEGRATION_AUTO &&
+             period * period * p->body_a * p->k <= MIDPOINT_LIMIT) {
+    force += period * p->k * p->body_w;
   }
   c += late * p->d;
   force += p->d * (p->s - (1.0 - late) * p->w);
@@ -192,7 +198,8 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   }
   row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
   row->b = HAPI_STATIC_ROW;
-  out->w = out->free = hapi_row_start_speed(at->body, row->ja);
+  out->w = out->free = out->body_w = hapi_row_start_speed(at->body, row->ja);
+  out->body_a = hapi_dot6(row->ja, row->ba);
   out->s = hapi_v3_dot(into, p->twist.linear);
   if (p->proxied) {
     hapi_v3_copy(at->normal, row->jb);
