@@ -124,6 +124,7 @@ static hap_status create_session(bench *b, port *p, const port_def *def)
   ode.space = p->space;
   ode.surface = surface;
   session.drive = HAP_DRIVE_LOCKSTEP;
+  session.guard = HAP_GUARD_MEASURE;
   session.model = def->model;
   session.physics_hz = PORT_PHYSICS_HZ;
   session.haptic_hz = PORT_HAPTIC_HZ;

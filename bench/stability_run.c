@@ -99,6 +99,7 @@ static hap_status open_session(bench *b, stability_bed *s, const char *spec)
   hap_ode_def_init(&ode, sizeof ode);
   hap_pointer_def_init(&pointer, sizeof pointer);
   def.drive = HAP_DRIVE_LOCKSTEP;
+  def.guard = HAP_GUARD_MEASURE;
   def.haptic_hz = STABILITY_HAPTIC_HZ;
   ode.world = s->world;
   ode.space = s->space;
