@@ -24,7 +24,8 @@
  * would damp by T k, the old speed is taken off, k (g' + T w - ...), while the body is heavy enough. */
 
 #define MIDPOINT_LIMIT 4.0
-#define DAMPER_LIMIT 0.25   /* of T a d: explicit damping is stable up to 2 */
+#define PROXY_LIMIT 0.25  /* of T^2 k over the body's mass: it swings at 80 Hz and less, at 1 kHz */
+#define DAMPER_LIMIT 0.25 /* of T a d: explicit damping is stable up to 2 */
 #define DAMPER_IMPLICIT 1.0 /* of T a d: above it the mean of old and new velocity rings */
 #define NEAR_FLOOR \
   1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
@@ -155,7 +156,7 @@ static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring
   if (by_midpoint(pointer, period * period * p->a * p->k)) {
     linearise(p, period, &c, &force);
     late = lateness(period * p->a * p->d);
-  } else if (pointer->proxied && period * period * p->body_a * p->k <= MIDPOINT_LIMIT) {
+  } else if (pointer->proxied && period * period * p->body_a * p->k <= PROXY_LIMIT) {
     force += period * p->k * p->body_w;
   }
   c += late * p->d;
