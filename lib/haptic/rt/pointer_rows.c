@@ -20,8 +20,9 @@
  * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
  * row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it follows the contact's
  * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
- * negative damper of T k. So a proxy's contacts take the second form, for the proxy: of a body that it
- * would damp by T k, the old speed is taken off, k (g' + T w - ...), while the body is heavy enough. */
+ * negative damper of T k. So a proxy's contacts take the second form, for the proxy: a body that is
+ * not light stays where it is at the tick in it, as it would be damped by T k: with v the proxy's speed
+ * into it and u the body's along -n, f = k (g + T (v' - u' + u)) + d (v' - u'). */
 
 #define MIDPOINT_LIMIT 4.0
 #define PROXY_LIMIT 0.25  /* of T^2 k over the body's mass: it swings at 80 Hz and less, at 1 kHz */
