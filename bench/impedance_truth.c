@@ -67,11 +67,13 @@ double complex impedance_of(const impedance_truth *truth, double hz)
   return 1.0 / compliance;
 }
 
-/* What poses and forces at ticks make of the closed form. A body moves as x' = x + T v', v' = v + T F / m:
- * its mass is that of the central difference. Direct: the midpoint rule weighs the body's places 1, 2,
- * 1, and the damper takes the body's velocity from before the tick, which is half a tick old. Through a
- * proxy p, u the device: F = k (p' - (x' - T v)) + d (p' - p - x' + x) / T, and the same of the coupling
- * k_v (u - p') ... */
+/* What ticks make of the closed form, T a tick, z = exp(i w T) one tick ahead. A body moves by
+ * x' = x + T v', v' = v + T F / m: its w^2 is that of the central difference. Direct, u the device's place
+ * and x the body's: the midpoint rule takes the mean of x z, x, x, x / z, and the damper the velocity from
+ * before the tick, x (1 - 1/z) / T, half a tick old. Through a proxy whose place after the tick is p:
+ *
+ *   F = k (p - (x z - x + x / z)) + d (1 - 1/z) / T (p - x z)
+ *   F = k_v (u - p) + d_v (i w u - (1 - 1/z) / T p) */
 double complex impedance_sampled(const impedance_truth *truth, double hz)
 {
   double angle = 2.0 * M_PI * hz * PORT_TICK_S;

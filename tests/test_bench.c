@@ -147,6 +147,28 @@ TEST(scaling_leaves_its_table)
                 21);
 }
 
+TEST(impedance_is_that_of_the_closed_forms)
+{
+  const char *const arguments[] = {"impedance", "--verify", "--quick", "--out", folder, NULL};
+  const char *const names[] = {"impedance", "zwidth"};
+  CHECK(run(arguments, environ) == 0);
+  /* Two of each of six bodies direct and through a proxy, two of each of four walls of four devices. */
+  CHECK(count_lines(file_in_folder("said", ""), "ok ") == 2 * 2 * 6 + 2 * 4 * 4);
+  CHECK(count_lines(file_in_folder("said", ""), "impedance: 0 off") == 1);
+  CHECK(count_rows(file_in_folder("impedance", ".csv"),
+                   "case,model,coupling,hz,amplitude_m,stiffness_felt,damping_felt,mass_felt,"
+                   "stiffness_true,damping_true,mass_true,magnitude_felt,magnitude_true,error,"
+                   "phase_error_deg,residual,contact_share,error_sampled") == 6 * 5 * 10);
+  CHECK(count_rows(file_in_folder("zwidth", ".csv"),
+                   "device,mass,damping,delay,wall_damping,direct_stiffness,linear_stiffness,"
+                   "passive_stiffness,coupling_stiffness,proxy_stiffness,proxy_felt") == 4 * 4);
+  for (int i = 0; i < 2; ++i) {
+    CHECK(!plot_available() || exists(file_in_folder(names[i], ".svg")));
+    unlink(file_in_folder(names[i], ".csv"));
+    unlink(file_in_folder(names[i], ".svg"));
+  }
+}
+
 TEST(tick_leaves_its_table)
 {
   check_program("tick",
@@ -266,6 +288,7 @@ int main(void)
   RUN(fig6_leaves_its_table);
   RUN(fig7_leaves_its_table);
   RUN(scaling_leaves_its_table);
+  RUN(impedance_is_that_of_the_closed_forms);
   RUN(tick_leaves_its_table);
   RUN(accuracy_sets_models_side_by_side);
   RUN(accuracy_knows_its_scenes);

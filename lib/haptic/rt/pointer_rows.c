@@ -20,11 +20,13 @@
  * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
  * row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it follows the contact's
  * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
- * negative damper of T k. So a proxy's contacts take the second form, for the proxy: of a body that it
- * would damp by T k, the old speed is taken off, k (g' + T w - ...), while the body is heavy enough. */
+ * negative damper of T k. So a proxy's contacts take the second form, for the proxy: a body that is
+ * not light stays where it is at the tick in it, as it would be damped by T k: with v the proxy's speed
+ * into it and u the body's along -n, f = k (g + T (v' - u' + u)) + d (v' - u'). */
 
 #define MIDPOINT_LIMIT 4.0
-#define DAMPER_LIMIT 0.25   /* of T a d: explicit damping is stable up to 2 */
+#define PROXY_LIMIT 0.25  /* of T^2 k over the body's mass: it swings at 80 Hz and less, at 1 kHz */
+#define DAMPER_LIMIT 0.25 /* of T a d: explicit damping is stable up to 2 */
 #define DAMPER_IMPLICIT 1.0 /* of T a d: above it the mean of old and new velocity rings */
 #define NEAR_FLOOR \
   1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
@@ -157,7 +159,7 @@ static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring
     linearise(p, period, &c, &force);
     late = lateness(period * p->a * p->d);
   } else if (pointer->proxied && pointer->integration == HAP_INTEGRATION_AUTO &&
-             period * period * p->body_a * p->k <= MIDPOINT_LIMIT) {
+             period * period * p->body_a * p->k <= PROXY_LIMIT) {
     force += period * p->k * p->body_w;
   }
   c += late * p->d;
