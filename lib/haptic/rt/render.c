@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
+
 #include "base/vec.h"
 #include "haptic/rt/contact_ramp.h"
 
@@ -38,9 +40,10 @@ static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *bo
   return -hapi_v3_dot(at->normal, relative);
 }
 
-/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. */
-static double normal_force(hapi_local_contact *c, const hapi_tick_pointer *p,
-                           const hapi_local_body *body, const plane *at, double period)
+/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for the
+ * energy observer how fast the body's motion, which is given, loads the spring, and its energy. */
+static double normal_force(hapi_local_contact *c, hapi_tick_pointer *p, const hapi_local_body *body,
+                           const plane *at, double period)
 {
   double apart[3];
   hapi_v3_sub(p->pose.position, at->point, apart);
@@ -49,8 +52,12 @@ static double normal_force(hapi_local_contact *c, const hapi_tick_pointer *p,
   if (!(depth > 0.0)) {
     return 0.0;
   }
-  double force = p->stiffness * depth + p->damping * closing_rate(p, body, at);
-  return force > 0.0 ? share * force : 0.0;
+  double closing = closing_rate(p, body, at);
+  double force = p->stiffness * depth + p->damping * closing;
+  force = force > 0.0 ? share * force : 0.0;
+  p->guard.force2 += force * force;
+  p->guard.power += force * (closing + hapi_v3_dot(at->normal, p->twist.linear));
+  return force;
 }
 
 /* f_o = -f_d goes to the body: as impulse to physics, and through A into its acceleration. */
@@ -66,13 +73,13 @@ static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane 
 }
 
 /* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
-static void audit(hapi_tick *tick, const double force[3])
+static void audit(hapi_tick *tick, const double vector[3], double norm)
 {
-  if (!hapi_finite(force, 3)) {
+  if (!isfinite(norm)) {
     return;
   }
-  hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
-  tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
+  hapi_v3_madd(tick->hand_impulse, tick->period, vector, tick->hand_impulse);
+  tick->hand_impulse_abs += tick->period * norm;
 }
 
 static void render_contact(hapi_tick *tick, hapi_local_contact *c)
@@ -93,12 +100,11 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   ++p->contacts;
   ++tick->pushing;
   hapi_v3_scale(-force, at.normal, c->force);
-  hapi_v3_copy(at.point, c->point_now);
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
     body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
     body->pushed = true;
     push_body(body, c, &at, tick->period);
-    audit(tick, c->force);
+    audit(tick, c->force, force);
   }
 }
 
@@ -106,6 +112,7 @@ void hapi_render(hapi_tick *tick)
 {
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].contacts = 0;
+    tick->pointers[i].guard.force2 = tick->pointers[i].guard.power = 0.0;
     tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
