@@ -246,6 +246,53 @@ static bool stays_dear(hapi_solver *solver)
   return true;
 }
 
+static void push_all(hapi_solver *solver, double sign)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->impulse != 0.0) {
+      hapi_madd6(solver->v[row->a], sign * row->impulse, row->ba);
+      if (row->paired) {
+        hapi_madd6(solver->v[row->b], sign * row->impulse, row->bb);
+      }
+    }
+  }
+}
+
+/* Sum of impulse x (error + softness x impulse x share). */
+static double work_of_errors(const hapi_solver *solver, double share)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->impulse != 0.0) {
+      double soft = share * row->softness * row->impulse;
+      sum += row->impulse * (hapi_row_error(solver, row) + soft);
+    }
+  }
+  return sum;
+}
+
+/* Impulses that are not the solution may leave more energy than none at all, and more of it from tick
+ * to tick. Energy is a square function of the impulses, with the errors for its slope: those with and
+ * without the impulses say how it has changed. Sweeps from zero do no such harm. */
+static void begin_anew(hapi_solver *solver)
+{
+  double with = work_of_errors(solver, 0.0);
+  push_all(solver, -1.0);
+  double without = work_of_errors(solver, 1.0);
+  if (with + without >= 0.0) {
+    push_all(solver, 1.0);
+    return;
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    solver->rows[i].impulse = 0.0;
+  }
+  for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
+    solver->residual = sweep(solver);
+  }
+}
+
 void hapi_solver_run(hapi_solver *solver)
 {
   uint32_t rows = solver->row_count;
@@ -283,6 +330,9 @@ void hapi_solver_run(hapi_solver *solver)
         left = sweeps_alone(rows, left);
       }
     }
+  }
+  if (rows > 0 && !(solver->residual < solver->tolerance)) {
+    begin_anew(solver);
   }
   check_finite(solver);
 }

@@ -73,7 +73,7 @@ typedef struct hapi_solver {
 
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */
-#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*3 + (size_t)(bodies)*600)
+#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*4 + (size_t)(bodies)*600)
 
 /* [haptic] Works in rows, v and work only, with 48 kB of stack; bounded by update_budget whatever
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
