@@ -48,10 +48,11 @@ static double in_series(double a, double b)
 static bool same_bed(const stability_point *a, const stability_point *b)
 {
   return a->coupling == b->coupling && a->stiffness == b->stiffness && a->mass == b->mass &&
-         a->contacts == b->contacts && a->delay_ticks == b->delay_ticks && a->quantum == b->quantum;
+         a->contacts == b->contacts && a->cubes == b->cubes && a->delay_ticks == b->delay_ticks &&
+         a->quantum == b->quantum;
 }
 
-/* The stiffness at the hand is one of the same balls, backed: neighbours in the table share it. */
+/* The stiffness at the hand is one of the same bodies, backed: neighbours in the table share it. */
 static hap_status feel(bench *b, const stability_table *table, stability_row *row)
 {
   const stability_row *before = table->count > 0 ? &table->rows[table->count - 1] : NULL;
@@ -147,12 +148,14 @@ static hap_status add_device(bench *b, stability_table *table, const integrator 
 static hap_status add_corners(bench *b, stability_table *table, const integrator *i)
 {
   hap_status status = HAP_OK;
-  for (int corner = 0; corner <= 8; ++corner) {
-    stability_point point = {.integration = i->integration, .coupling = i->coupling};
+  for (int c = b->quick ? 9 : 0; c < 18; ++c) {
+    const int corner = c % 9;
+    stability_point point = {
+        .integration = i->integration, .coupling = i->coupling, .cubes = c >= 9};
     point.stiffness = corner == 8 ? 1e3 : (corner & 1) != 0 ? 1e6 : 1.0;
     point.mass = corner == 8 ? 1.0 : (corner & 2) != 0 ? 1e3 : 1e-3;
     point.contacts = corner == 8 ? MIDDLE_CONTACTS : (corner & 4) != 0 ? 64 : 1;
-    for (size_t d = 0; d < LENGTH(delays) && status >= HAP_OK; ++d) {
+    for (size_t d = 0; d < LENGTH(delays) && status >= HAP_OK; d += b->quick ? 3 : 1) {
       point.delay_ticks = delays[d];
       status = add_device(b, table, i, &point);
     }
@@ -246,7 +249,7 @@ static hap_status write_table(bench *b, const stability_table *table)
   FILE *csv = bench_csv_open(b, "stability",
                              "integrator,stiffness,mass,contacts,stable,energy_ratio,coupling,"
                              "layout,hand,delay_ticks,quantum,missed,held_stiffness,"
-                             "felt_stiffness,expected_stiffness,solver_residual");
+                             "felt_stiffness,expected_stiffness,solver_residual,body");
   for (size_t i = 0; i < table->count && csv != NULL; ++i) {
     const stability_row *row = &table->rows[i];
     const stability_point *p = &row->point;
@@ -262,7 +265,7 @@ static hap_status write_table(bench *b, const stability_table *table)
     } else {
       fprintf(csv, ",");
     }
-    fprintf(csv, ",%.3g\n", row->result.residual);
+    fprintf(csv, ",%.3g,%s\n", row->result.residual, p->cubes ? "cube" : "ball");
   }
   return bench_csv_close(b, csv);
 }

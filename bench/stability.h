@@ -3,16 +3,17 @@
 #ifndef HAPODE_BENCH_STABILITY_H
 #define HAPODE_BENCH_STABILITY_H
 
-/* One point of the stability map: a device, a hand, a pointer and balls that it touches all at once,
+/* One point of the stability map: a device, a hand, a pointer and bodies that it touches all at once,
  * pushed by 1 mm in model CONTACT.
  *
  * Energy. The port is the grip: hand and moving part of the device are one mass there, and the
  * device's damping belongs to the device. With P the work of the force that really acted on that
  * mass (the virtual device keeps it), b the damping of the device and K the kinetic energy of the
- * balls,
+ * bodies,
  *
  *   made(t)      = P(t) - integral of b v^2 + K(t) - K(0)
- *   energy_ratio = 1 + max made / max (K + energy of the springs + kinetic energy at the grip)
+ *   energy_ratio = 1 + max made / max (K + energy of the springs, but no more than was taken
+ *                                         + kinetic energy at the grip)
  *
  * The springs (of the contacts and of the coupling) are empty at the start: what they give was taken
  * before, so that made stays below 0 unless sampling, delay or integration make energy. What the
@@ -45,8 +46,9 @@ typedef struct stability_point {
   hap_integration integration;
   hap_coupling coupling;
   double stiffness; /* N/m of each contact */
-  double mass;      /* kg of each ball */
+  double mass;      /* kg of each body */
   int contacts;
+  bool cubes; /* that stand on four points each; else balls */
   stability_layout layout;
   stability_hand hand;
   double delay_ticks;
@@ -70,7 +72,7 @@ const char *stability_hand_word(stability_hand hand); /* as the virtual device s
 hap_status stability_run(bench *b, const stability_point *point, double seconds,
                          stability_result *out);
 
-/* N/m, slope of the force that a rigid hand feels when it goes slowly into these balls, backed. */
+/* N/m, slope of the force that a rigid hand feels when it goes slowly into these bodies, backed. */
 hap_status stability_feel(bench *b, const stability_point *point, double *out);
 
 #endif

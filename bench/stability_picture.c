@@ -10,11 +10,11 @@
 
 static const char *const names[COLUMNS] = {"explicit", "implicit", "midpoint", "implicit+proxy"};
 
-/* A plain device: no delay, encoder or missed tick. */
+/* Balls and a plain device: no delay, encoder or missed tick. */
 static bool is_plain(const stability_row *row)
 {
   const stability_point *p = &row->point;
-  return p->delay_ticks == 0.0 && p->quantum == 0.0 && !p->missed;
+  return p->delay_ticks == 0.0 && p->quantum == 0.0 && !p->missed && !p->cubes;
 }
 
 static bool same_place(const stability_row *a, const stability_row *b)
@@ -59,8 +59,8 @@ static void plot_panel(FILE *script, int column)
 {
   const char *pick = column == 2 ? "($3 == 8 ? $2 : NaN)" : "($2 == 0.1 ? $3 : NaN)";
   fprintf(script,
-          "plot $s using 1:%s with points pt 7 ps 0.9 lt 2 title 'stable', "
-          "$u using 1:%s with points pt 2 ps 0.9 lw 1.5 lt 1 title 'unstable'\n",
+          "plot $s using 1:%s with points pt 7 ps 0.9 lt 1 title 'stable', "
+          "$u using 1:%s with points pt 2 ps 0.9 lw 1.5 lt 2 title 'unstable'\n",
           pick, pick);
 }
 
@@ -89,7 +89,7 @@ hap_status stability_draw(bench *b, const stability_table *table)
           "set multiplot layout 2,%d title 'Where each integrator holds: device of %g kg and %g N "
           "s/m at %g Hz, pushed by 1 mm'\n"
           "set logscale xy\nset format x '10^{%%L}'\nset xrange [0.3:3e6]\n"
-          "set xlabel 'stiffness of each contact [N/m]'\nset key bottom left opaque\n",
+          "set xlabel 'stiffness of each contact [N/m]'\nset key below\n",
           COLUMNS, STABILITY_DEVICE_MASS, STABILITY_DEVICE_DAMPING, STABILITY_HAPTIC_HZ);
   draw_row(script, table, 2);
   draw_row(script, table, 3);

@@ -17,8 +17,9 @@
 #include "session/session_internal.h"
 
 #define POINTER_RADIUS 10.0 /* m: so large that all normals are nearly those of the push */
-#define BALL_RADIUS 0.005
+#define HALF 0.005          /* m, of a ball or cube */
 #define PITCH 0.012
+#define BACK 0.0115
 #define GAP 1e-6    /* m, before the push */
 #define PUSH 1e-3   /* m */
 #define PUSH_S 0.01 /* from rest to rest */
@@ -30,44 +31,64 @@ typedef struct stability_bed {
   const stability_point *point;
   dWorldID world;
   dSpaceID space;
-  dBodyID balls[STABILITY_CONTACTS_MAX];
+  dBodyID bodies[STABILITY_CONTACTS_MAX];
   hap_device *device;
   hap_session *session;
   hap_pointer_id pointer;
-  double before[STABILITY_CONTACTS_MAX][3]; /* of the balls, at the time of the device's read */
-  double kinetic;                           /* J of the balls, then */
-  double proxy[3];
-  bool proxied;
-  double lost; /* J, to the device's damping */
-  double made; /* J, largest */
+  double kinetic; /* J, of the bodies after the newest tick */
+  double lost;    /* J, to the device's damping */
+  double made;    /* J, largest */
   double stored;
   bool finite;
 } stability_bed;
 
 /* ---- the bed ---- */
 
+static void add_body(stability_bed *s, int index, dGeomID geom, const dMass *mass,
+                     const double at[3])
+{
+  dBodyID body = dBodyCreate(s->world);
+  dBodySetMass(body, mass);
+  dBodySetPosition(body, at[0], at[1], at[2]);
+  dGeomSetBody(geom, body);
+  s->bodies[index] = body;
+}
+
+/* A ball under the pointer at x and y, its back against the normal. */
 static void add_ball(stability_bed *s, int index, double x, double y, double side)
 {
-  const double reach = POINTER_RADIUS + BALL_RADIUS + GAP;
-  const double z = side * sqrt(reach * reach - x * x - y * y);
+  const double reach = POINTER_RADIUS + HALF + GAP;
+  const double at[3] = {x, y, side * sqrt(reach * reach - x * x - y * y)};
+  const double out = 1.0 + 1.5 * HALF / reach;
   dMass mass;
-  dBodyID ball = dBodyCreate(s->world);
-  dMassSetSphereTotal(&mass, s->point->mass, BALL_RADIUS);
-  dBodySetMass(ball, &mass);
-  dBodySetPosition(ball, x, y, z);
-  dGeomSetBody(dCreateSphere(s->space, BALL_RADIUS), ball);
-  s->balls[index] = ball;
+  dMassSetSphereTotal(&mass, s->point->mass, HALF);
+  add_body(s, index, dCreateSphere(s->space, HALF), &mass, at);
   if (s->point->layout != STABILITY_FREE) {
-    const double out = (reach + 1.5 * BALL_RADIUS) / reach;
     dMatrix3 rotation;
-    dGeomID back = dCreateBox(s->space, 0.8 * PITCH, 0.8 * PITCH, BALL_RADIUS);
-    dRFromZAxis(rotation, x, y, z);
+    dGeomID back = dCreateBox(s->space, BACK, BACK, HALF);
+    dRFromZAxis(rotation, at[0], at[1], at[2]);
     dGeomSetRotation(back, rotation);
-    dGeomSetPosition(back, out * x, out * y, out * z);
+    dGeomSetPosition(back, out * at[0], out * at[1], out * at[2]);
   }
 }
 
-static void add_balls(stability_bed *s)
+/* A cube that the pointer touches at its nearest edge or corner, with four contacts on its back. */
+static void add_cube(stability_bed *s, int index, double x, double y, double side)
+{
+  const double across[2] = {fmax(0.0, fabs(x) - HALF), fmax(0.0, fabs(y) - HALF)};
+  const double reach = POINTER_RADIUS + GAP;
+  const double top = sqrt(reach * reach - across[0] * across[0] - across[1] * across[1]);
+  const double at[3] = {x, y, side * (top + HALF)};
+  dMass mass;
+  dMassSetBoxTotal(&mass, s->point->mass, 2.0 * HALF, 2.0 * HALF, 2.0 * HALF);
+  add_body(s, index, dCreateBox(s->space, 2.0 * HALF, 2.0 * HALF, 2.0 * HALF), &mass, at);
+  if (s->point->layout != STABILITY_FREE) {
+    dGeomID back = dCreateBox(s->space, BACK, BACK, HALF);
+    dGeomSetPosition(back, x, y, at[2] + side * 1.5 * HALF);
+  }
+}
+
+static void add_bodies(stability_bed *s)
 {
   const int sides = s->point->layout == STABILITY_CAGE ? 2 : 1;
   const int each = s->point->contacts / sides;
@@ -76,7 +97,7 @@ static void add_balls(stability_bed *s)
     int place = i % each;
     double x = PITCH * (place % across - 0.5 * (across - 1));
     double y = PITCH * (place / across - 0.5 * ((each - 1) / across));
-    add_ball(s, i, x, y, i < each ? -1.0 : 1.0);
+    (s->point->cubes ? add_cube : add_ball)(s, i, x, y, i < each ? -1.0 : 1.0);
   }
 }
 
@@ -136,7 +157,7 @@ static hap_status open_bed(bench *b, const stability_point *point, const char *h
   s->space = dHashSpaceCreate(NULL);
   dWorldSetCFM(s->world, 1e-12);
   dWorldSetContactSurfaceLayer(s->world, 1e-5);
-  add_balls(s);
+  add_bodies(s);
   write_spec(point, hand, spec);
   return open_session(b, s, spec);
 }
@@ -153,10 +174,10 @@ static void close_bed(stability_bed *s)
 
 /* ---- energy ---- */
 
-static int ball_of(const stability_bed *s, dBodyID body)
+static int index_of(const stability_bed *s, dBodyID body)
 {
   for (int i = 0; i < s->point->contacts; ++i) {
-    if (s->balls[i] == body) {
+    if (s->bodies[i] == body) {
       return i;
     }
   }
@@ -165,12 +186,11 @@ static int ball_of(const stability_bed *s, dBodyID body)
 
 static double kinetic_of(const stability_bed *s, const double linear[3], const double angular[3])
 {
-  double inertia = 0.4 * s->point->mass * BALL_RADIUS * BALL_RADIUS;
+  double inertia = (s->point->cubes ? 2.0 / 3.0 : 0.4) * s->point->mass * HALF * HALF;
   return 0.5 * s->point->mass * hapi_v3_dot(linear, linear) +
          0.5 * inertia * hapi_v3_dot(angular, angular);
 }
 
-/* Where balls and proxy are after a tick: at the time of the device's next read. */
 static void look(stability_bed *s)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
@@ -180,38 +200,34 @@ static void look(stability_bed *s)
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     const hapi_local_body *body = &tick->bodies[tick->live[i]];
     uint32_t known = physics->bodies[tick->live[i]].known;
-    int ball = known == HAPI_NONE ? -1 : ball_of(s, physics->table.entries[known].body);
-    if (ball >= 0) {
-      local[ball] = true;
-      hapi_v3_copy(body->pose.position, s->before[ball]);
+    int index = known == HAPI_NONE ? -1 : index_of(s, physics->table.entries[known].body);
+    if (index >= 0) {
+      local[index] = true;
       s->kinetic += kinetic_of(s, body->twist.linear, body->twist.angular);
     }
   }
   for (int i = 0; i < s->point->contacts; ++i) {
     if (!local[i]) { /* has drifted away */
-      hapi_v3_copy(dBodyGetPosition(s->balls[i]), s->before[i]);
-      s->kinetic += kinetic_of(s, dBodyGetLinearVel(s->balls[i]), dBodyGetAngularVel(s->balls[i]));
+      s->kinetic +=
+          kinetic_of(s, dBodyGetLinearVel(s->bodies[i]), dBodyGetAngularVel(s->bodies[i]));
     }
   }
-  hapi_v3_copy(tick->pointers[0].proxy_position, s->proxy);
-  s->proxied = tick->pointers[0].proxied;
 }
 
-/* J, of the contacts' and the coupling's springs, with the device where it was measured last. */
+/* J, of the contacts' springs, from their forces, and of the coupling's, with the device where it
+ * was measured last. */
 static double springs(const stability_bed *s)
 {
-  const hapi_tick_pointer *p = &s->session->haptic->tick.pointers[0];
-  const double *handle = p->handle_position;
-  const double *at = s->proxied ? s->proxy : handle;
+  const hapi_tick *tick = &s->session->haptic->tick;
+  const hapi_tick_pointer *p = &tick->pointers[0];
   double sum = 0.0;
-  double apart[3];
-  for (int i = 0; i < s->point->contacts; ++i) {
-    hapi_v3_sub(at, s->before[i], apart);
-    double depth = fmax(0.0, POINTER_RADIUS + BALL_RADIUS - hapi_v3_norm(apart));
-    sum += 0.5 * s->point->stiffness * depth * depth;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    const double *force = tick->contacts[i].force;
+    sum += 0.5 * hapi_v3_dot(force, force) / s->point->stiffness;
   }
-  if (s->proxied) {
-    hapi_v3_sub(s->proxy, handle, apart);
+  if (p->proxied) {
+    double apart[3];
+    hapi_v3_sub(p->proxy_position, p->handle_position, apart);
     hapi_v3_sub(apart, p->offset, apart);
     sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
   }
@@ -229,8 +245,8 @@ static void account(stability_bed *s, const hapi_virtual_port *was, const hapi_v
       0.5 * (hapi_v3_dot(was->velocity, was->velocity) + hapi_v3_dot(now->velocity, now->velocity));
   s->lost += STABILITY_DEVICE_DAMPING * period * (2.0 * mean + ends) / 3.0;
   double made = now->work - s->lost + s->kinetic;
-  double stored =
-      s->kinetic + springs(s) + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
+  double held = fmin(springs(s), fmax(0.0, -made)); /* no more than was taken */
+  double stored = s->kinetic + held + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
   s->finite = s->finite && isfinite(made) && isfinite(stored);
   s->made = fmax(s->made, made);
   s->stored = fmax(s->stored, stored);

@@ -10,6 +10,9 @@
  * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
  * constraint), at the step of the tick. */
 
+/* 84 degrees of slope. More than that may push without bound along a contact that hardly touches: where
+ * a large island is not solved to the end within a tick, what lets go then gives energy. */
+#define MU_MOST 10.0
 #define PUSH_OUT_MAX 0.2    /* m/s */
 #define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
 #define PUSH_OUT_LEAST 1e-4 /* m/s: less may stay in the velocity, it is not worth a second solve */
@@ -253,7 +256,7 @@ static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, 
   row->target = s->motion[part - 1];
   row->softness = (slips ? s->slip[part - 1] : s->cfm) / tick->period;
   row->normal = share ? normal : -1;
-  row->mu = share ? mu : 0.0;
+  row->mu = share ? fmin(mu, MU_MOST) : 0.0;
   row->hi = share ? 0.0 : mu * tick->period; /* without Approx1 mu is a force */
   row->lo = -row->hi;
 }

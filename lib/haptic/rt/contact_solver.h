@@ -79,6 +79,11 @@ typedef struct hapi_solver {
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 
+/* [haptic] After the last run of a tick. Impulses of an island that is too large to be solved within the
+ * budget may leave more energy than none at all, and as warm start more again from tick to tick: such
+ * are dropped, and found anew by sweeps. */
+void hapi_solver_calm(hapi_solver *solver);
+
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
  * soon as one is filled in, while it is at hand: there are more of them than fit into a near cache.
  * In their order; v, row_count and body_count are set before. */

@@ -332,11 +332,15 @@ void hapi_local_world_step(hapi_tick *tick)
   hapi_contact_rows(tick);
   solve(tick);
   bool again = stop_push_out(tick);
+  if (!again) {
+    hapi_solver_calm(&tick->world.solver);
+  }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
     solve(tick);
+    hapi_solver_calm(&tick->world.solver);
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];
       if (hapi_body_responds(body)) {

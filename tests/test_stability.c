@@ -1,0 +1,96 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Hard points of the stability map, each a row: many contacts at once on a light device. The energy
+ * that a point may not make is defined in bench/stability.h; the whole map is hapode-bench's. */
+
+#include "tests/tap.h"
+
+#include <ode/ode.h>
+
+#include "bench/stability.h"
+
+#define SECONDS 1.5
+
+typedef struct hard_point {
+  const char *what;
+  stability_point point;
+} hard_point;
+
+#define PROXY .integration = HAP_INTEGRATION_IMPLICIT, .coupling = HAP_COUPLING_PROXY
+#define AUTO .integration = HAP_INTEGRATION_AUTO, .coupling = HAP_COUPLING_AUTO
+
+/* stiffness, mass, contacts, cubes, layout, hand, delay in ticks, quantum, missed ticks */
+static const hard_point points[] = {
+    {"as light and stiff as it gets, between two sides",
+     {PROXY, 1e6, 1e-3, 64, false, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+    {"heavy bodies, real device",
+     {AUTO, 1e6, 1e3, 64, false, STABILITY_BACKED, STABILITY_TENSE, 2, 3e-5, true}},
+    {"soft: the device holds them without a proxy",
+     {AUTO, 1, 1e-3, 8, false, STABILITY_BACKED, STABILITY_RELAXED, 1, 3e-5, true}},
+    {"pushed away", {AUTO, 1e6, 1e-3, 8, false, STABILITY_FREE, STABILITY_TENSE, 0.5, 3e-5, true}},
+    {"16 light cubes on a floor",
+     {PROXY, 1e3, 1e-3, 16, true, STABILITY_BACKED, STABILITY_RELAXED, 0, 0, false}},
+    {"32 light cubes on a floor",
+     {PROXY, 1e3, 1e-3, 32, true, STABILITY_BACKED, STABILITY_RELAXED, 0, 0, false}},
+    {"64 cubes on a floor: more than is solved in a tick",
+     {PROXY, 1e3, 0.1, 64, true, STABILITY_BACKED, STABILITY_TENSE, 0, 0, false}},
+    {"64 light, stiff cubes between two sides",
+     {AUTO, 1e6, 1e-3, 64, true, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+};
+
+static bench unused; /* takes the text of an error */
+
+TEST(hard_points_make_no_energy)
+{
+  for (size_t i = 0; i < sizeof points / sizeof points[0]; ++i) {
+    const stability_point *p = &points[i].point;
+    stability_result result;
+    REQUIRE(stability_run(&unused, p, SECONDS, &result) >= HAP_OK);
+    int pushing = p->layout == STABILITY_CAGE ? p->contacts / 2 : p->contacts;
+    printf("# %s: energy ratio %.4f\n", points[i].what, result.energy_ratio);
+    CHECK(result.stable);
+    CHECK(result.way > 3e-4 && result.way < 3e-3); /* it was pushed, and held */
+    CHECK(result.touched >= pushing);
+  }
+}
+
+/* So that the points above are not stable whatever is done. */
+TEST(without_proxy_they_are_unstable)
+{
+  stability_point point = {HAP_INTEGRATION_EXPLICIT, HAP_COUPLING_DIRECT, 1e3, 0.1, 8,    false,
+                           STABILITY_CAGE,           STABILITY_NONE,      0,   0,   false};
+  stability_result result;
+  REQUIRE(stability_run(&unused, &point, SECONDS, &result) >= HAP_OK);
+  CHECK(!result.stable && result.energy_ratio > 1.5);
+  point.stiffness = 10.0; /* within what the device holds */
+  REQUIRE(stability_run(&unused, &point, SECONDS, &result) >= HAP_OK);
+  CHECK(result.stable);
+}
+
+TEST(coupling_is_not_softer_than_the_device_allows)
+{
+  for (int n = 1; n <= 64; n *= 8) {
+    stability_point point = {.integration = HAP_INTEGRATION_IMPLICIT,
+                             .coupling = HAP_COUPLING_PROXY,
+                             .stiffness = 1e3,
+                             .mass = 0.1,
+                             .contacts = n};
+    double felt = 0.0;
+    REQUIRE(stability_feel(&unused, &point, &felt) >= HAP_OK);
+    double held = 0.8 * STABILITY_DEVICE_DAMPING * STABILITY_HAPTIC_HZ / 0.5;
+    double expected = held * 1e3 * n / (held + 1e3 * n);
+    CHECK_NEAR(felt, expected, 0.01 * expected);
+  }
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(hard_points_make_no_energy);
+  RUN(without_proxy_they_are_unstable);
+  RUN(coupling_is_not_softer_than_the_device_allows);
+  dCloseODE();
+  return tap_done();
+}
