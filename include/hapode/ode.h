@@ -23,7 +23,8 @@
 HAP_BEGIN_DECLS
 
 /* [physics] Whether a and b collide. io arrives with mode dContactApprox1 and mu = infinity; fill
- * in what the pair's surface is. Called once per pair and step, never in testing simulations. */
+ * in what the pair's surface is. Called once per pair and step, never in testing simulations. With
+ * Approx1 the loop of model contact takes a mu above 10 for 10 (84 degrees). */
 typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io);
 
 /* [physics] First friction direction (world axes, any length) of a pair whose surface has
