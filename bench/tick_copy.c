@@ -37,6 +37,7 @@ static void copy_world(hapi_local_world *copy, const hapi_local_world *own,
   copy->sources = own->sources;
   copy->solver.rows = own->solver.rows;
   copy->solver.v = own->solver.v;
+  copy->solver.free = own->solver.free;
   copy->solver.work = own->solver.work;
   memcpy(copy->memory, from->memory, from->memory_count * sizeof *copy->memory);
 }

@@ -28,10 +28,11 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   solver->work_count = HAPI_SOLVER_WORK(world->row_capacity, places);
   solver->rows = hapi_alloc_array(world->row_capacity, sizeof *solver->rows);
   solver->v = hapi_alloc_array(places, sizeof *solver->v);
+  solver->free = hapi_alloc_array(places, sizeof *solver->free);
   solver->work = hapi_alloc_array(solver->work_count, sizeof *solver->work);
   return world->memory != NULL && world->old_memory != NULL && world->buckets != NULL &&
          world->sources != NULL && solver->rows != NULL && solver->v != NULL &&
-         solver->work != NULL;
+         solver->free != NULL && solver->work != NULL;
 }
 
 static void free_world(hapi_local_world *world)
@@ -42,6 +43,7 @@ static void free_world(hapi_local_world *world)
   hapi_free(world->sources);
   hapi_free(world->solver.rows);
   hapi_free(world->solver.v);
+  hapi_free(world->solver.free);
   hapi_free(world->solver.work);
 }
 

@@ -29,6 +29,7 @@ typedef struct placed_contact {
   double normal[3]; /* from b to a */
   double point[3];  /* between the surfaces */
   double gap;
+  bool gives;      /* see hapi_row_source */
   double arm_a[3]; /* to point */
   double arm_b[3];
 } placed_contact;
@@ -217,7 +218,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   source->part = (uint8_t)part;
   source->pointer = false;
   source->pushes_out = false;
-  source->gives = gives(c);
+  source->gives = c->gives;
   return row;
 }
 
@@ -267,6 +268,7 @@ static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
   int32_t normal = (int32_t)world->solver.row_count;
   double t1[3];
   double t2[3];
+  c->gives = gives(c);
   hapi_body_arm(c->a, c->point, c->arm_a);
   hapi_body_arm(c->b, c->point, c->arm_b);
   friction_directions(c->surface, c->normal, t1, t2);
@@ -384,20 +386,6 @@ void hapi_contact_rows(hapi_tick *tick)
       }
     } else {
       memset(world->memory[i].impulse, 0, sizeof world->memory[i].impulse);
-    }
-  }
-}
-
-void hapi_contact_keep(hapi_tick *tick)
-{
-  hapi_local_world *world = &tick->world;
-  world->active = 0;
-  for (uint32_t i = 0; i < world->solver.row_count; ++i) {
-    const hapi_row_source *source = &world->sources[i];
-    if (!source->pointer) {
-      double impulse = world->solver.rows[i].impulse;
-      world->memory[source->contact].impulse[source->part] = impulse;
-      world->active += source->part == 0 && impulse > 0.0;
     }
   }
 }

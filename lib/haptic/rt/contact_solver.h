@@ -50,7 +50,8 @@ typedef struct hapi_row {
 
 typedef struct hapi_solver {
   hapi_row *rows;
-  double (*v)[6]; /* in: free velocities, without any row's impulse; out: with all */
+  double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
+  double (*free)[6]; /* in: the same again, stays; for hapi_solver_calm */
   uint32_t row_count;
   uint32_t body_count;
   double tolerance;       /* m/s: done when the largest correction of a sweep is below */
@@ -73,15 +74,15 @@ typedef struct hapi_solver {
 
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */
-#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*3 + (size_t)(bodies)*600)
+#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*4 + (size_t)(bodies)*600)
 
 /* [haptic] Works in rows, v and work only, with 48 kB of stack; bounded by update_budget whatever
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 
-/* [haptic] After the last run of a tick. Impulses of an island that is too large to be solved within the
+/* [haptic] After a run. Impulses of an island that is too large to be solved within the
  * budget may leave more energy than none at all, and as warm start more again from tick to tick: such
- * are dropped, and found anew by sweeps. */
+ * are dropped, and found anew by sweeps, which from zero do no such harm. */
 void hapi_solver_calm(hapi_solver *solver);
 
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as

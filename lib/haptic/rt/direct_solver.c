@@ -18,17 +18,16 @@
 
 #include "haptic/rt/contact_solver.h"
 
-#define BODIES_MAX 512  /* with more in the solver, sweeps only */
-#define ISLAND_MAX 128  /* bodies; one bit each */
-#define NONE UINT16_MAX /* local index of a body that does not respond */
-#define SOFTENING 1e-8  /* R, relative to the row's own response */
-#define INNER_ROUNDS 2  /* active sets tried from one state */
-#define WORSE \
-  30.0                   /* how much the largest correction may grow: of one row at a bound it is a
-                            poor measure of the whole, and a sweep repairs it */
+#define BODIES_MAX 512   /* with more in the solver, sweeps only */
+#define ISLAND_MAX 128   /* bodies; one bit each */
+#define NONE UINT16_MAX  /* local index of a body that does not respond */
+#define SOFTENING 1e-8   /* R, relative to the row's own response */
+#define INNER_ROUNDS 2   /* active sets tried from one state */
+#define WORSE 30.0       /* how much the largest correction may grow in a round */
 #define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
 #define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
 #define NO_ROW UINT32_MAX
+#define ROW_ARRAYS 4u /* of doubles, by row */
 
 enum {
   FIXED,
@@ -53,9 +52,11 @@ typedef struct island {
   body_set link[ISLAND_MAX];  /* the blocks of a body's row, fill included */
   body_set rest[ISLAND_MAX];  /* link when the body is eliminated, of bodies still to come */
   uint16_t block[ISLAND_MAX][ISLAND_MAX];
-  double *gain;          /* by row: impulse per error */
-  double *saved_impulse; /* by row */
-  double (*saved_v)[6];  /* by local index, as the next */
+  double *gain;        /* by row: impulse per error */
+  double *error;       /* by row: when last inspected */
+  double *saved_error; /* by row, as the next */
+  double *saved_impulse;
+  double (*saved_v)[6]; /* by local index, as the next */
   double (*dv)[6];
   double (*blocks)[36];
 } island;
@@ -166,7 +167,8 @@ static double inspect(island *is, bool sticking)
     double hi;
     hapi_row_bounds(solver->rows, row, &lo, &hi);
     double p = row->impulse;
-    double wanted = p + hapi_row_error(solver, row) * row->inverse;
+    is->error[i] = hapi_row_error(solver, row);
+    double wanted = p + is->error[i] * row->inverse;
     bool inside = (p > lo && p < hi) || (wanted > lo && wanted < hi);
     double due = fabs(hapi_clamp(wanted, lo, hi) - p) * row->response;
     largest = due <= largest ? largest : due; /* NaN stays, unless the next row hides it */
@@ -301,9 +303,9 @@ static void add_to(island *is, uint16_t local, double s, const double b[6])
   }
 }
 
-/* Matrix and right side, dv = sum of gain b e. The driving errors are kept in `error`. One walk for
+/* Matrix and right side, dv = sum of gain b e, with the errors of the last look. One walk for
  * both: the rows are more than fits into a near cache. */
-static void assemble(island *is, double *error)
+static void assemble(island *is)
 {
   const hapi_row *rows = is->solver->rows;
   memset(is->blocks, 0, is->block_count * sizeof *is->blocks);
@@ -319,12 +321,12 @@ static void assemble(island *is, double *error)
       continue;
     }
     const hapi_row *from = source(is, row);
-    error[i] = row->state == TIED ? error[row->normal] : hapi_row_error(is->solver, row);
+    double push = is->gain[i] * is->error[from - rows];
     add_row(is, is->local[row->a], is->gain[i], row->ba, from);
-    add_to(is, is->local[row->a], is->gain[i] * error[i], row->ba);
+    add_to(is, is->local[row->a], push, row->ba);
     if (row->paired) {
       add_row(is, is->local[row->b], is->gain[i], row->bb, from);
-      add_to(is, is->local[row->b], is->gain[i] * error[i], row->bb);
+      add_to(is, is->local[row->b], push, row->bb);
     }
   }
 }
@@ -451,7 +453,7 @@ static void restore_velocities(island *is)
 /* What the rows of dv ask for, cut at the bounds: a normal comes before its frictions. The
  * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a set
  * of active rows that cannot be gives impulses so large that nothing of the velocities would be left. */
-static void push_rows(island *is, const double *error)
+static void push_rows(island *is)
 {
   hapi_row *rows = is->solver->rows;
   restore_velocities(is);
@@ -466,7 +468,7 @@ static void push_rows(island *is, const double *error)
       if (from->paired) {
         w += moved(is, is->local[from->b], from->jb);
       }
-      p += is->gain[i] * (error[i] - w);
+      p += is->gain[i] * (is->error[from - rows] - w);
     }
     hapi_row_bounds(rows, row, &lo, &hi);
     p = hapi_clamp(p, lo, hi);
@@ -479,6 +481,7 @@ static void save(island *is)
 {
   for (uint32_t i = is->first; i != NO_ROW; i = is->solver->rows[i].next) {
     is->saved_impulse[i] = is->solver->rows[i].impulse;
+    is->saved_error[i] = is->error[i];
   }
   for (uint32_t i = 0; i < is->count; ++i) {
     memcpy(is->saved_v[i], is->solver->v[is->body[i]], sizeof is->saved_v[i]);
@@ -497,8 +500,8 @@ static void restore(island *is)
 static bool place(island *is)
 {
   size_t rows = is->solver->row_count;
-  size_t need = 3 * rows + 12 * (size_t)is->count + 36 * (size_t)is->block_count;
-  double *at = is->solver->work + 3 * rows;
+  size_t need = ROW_ARRAYS * rows + 12 * (size_t)is->count + 36 * (size_t)is->block_count;
+  double *at = is->solver->work + ROW_ARRAYS * rows;
   is->saved_v = (double(*)[6])at;
   is->dv = is->saved_v + is->count;
   is->blocks = (double(*)[36])(at + 12 * is->count);
@@ -508,31 +511,68 @@ static bool place(island *is)
 /* Impulses of the rows that are free or tied now, cut at their bounds. */
 static void solve(island *is)
 {
-  double *error = is->solver->work + 2 * (size_t)is->solver->row_count;
-  assemble(is, error);
+  assemble(is);
   factor(is);
   substitute(is);
-  push_rows(is, error);
+  push_rows(is);
+}
+
+/* One sweep: where a normal lets go, its frictions go as well, and that shows. */
+static void settle(island *is)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != NO_ROW; i = rows[i].next) {
+    hapi_row *row = &rows[i];
+    double lo;
+    double hi;
+    hapi_row_bounds(rows, row, &lo, &hi);
+    double wanted = row->impulse + hapi_row_error(is->solver, row) * row->inverse;
+    hapi_row_push(is->solver, row, hapi_clamp(wanted, lo, hi) - row->impulse);
+  }
+}
+
+/* J, how much more energy the impulses at hand leave than the saved ones did: what the rows minimise
+ * when no friction slides, a square function of the impulses, whose slope is the error. */
+static double rise(const island *is)
+{
+  double sum = 0.0;
+  for (uint32_t i = is->first; i != NO_ROW; i = is->solver->rows[i].next) {
+    double change = is->solver->rows[i].impulse - is->saved_impulse[i];
+    sum -= 0.5 * change * (is->error[i] + is->saved_error[i]);
+  }
+  return sum;
+}
+
+/* Whether the state after a round is to be kept. The largest correction due, of one row at a bound, is a
+ * poor measure of the whole: it may grow for a while where sweeps and further rounds follow. Where
+ * there is no room for them, the last one, the round must leave less energy as well, or its impulses
+ * blow up in the ticks to come. */
+static bool is_better(const island *is, double due, double best, bool last)
+{
+  return last ? due < best && rise(is) < 0.0 : due < WORSE * best;
 }
 
 /* The best of some rounds is kept, each with the active set that the one before leads to. */
-static bool improve(island *is, double before, double *out_due)
+static bool improve(island *is, double before, bool last, double *out_due)
 {
-  double best = WORSE * before;
+  double best = before;
   bool better = false;
   *out_due = before;
   save(is);
   for (int round = 0; round < INNER_ROUNDS; ++round) {
     solve(is);
     double due = inspect(is, false);
+    if (last && !(due < is->solver->tolerance)) {
+      settle(is);
+      due = inspect(is, false);
+    }
     if (due < is->solver->tolerance) {
       *out_due = due;
       return true; /* nothing to save, nothing to restore */
     }
-    if (due < best) {
-      *out_due = due;
+    if (better ? due < best : is_better(is, due, best, last)) {
+      *out_due = best = due;
       save(is);
-      best = due;
       better = true;
     }
   }
@@ -551,14 +591,17 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   bool sticking = solver->sweeps % 3 == 0;
   solver->too_dear = false;
   solver->direct_residual = HUGE_VAL;
-  if (solver->body_count > BODIES_MAX || solver->work_count < 3 * (size_t)solver->row_count) {
+  if (solver->body_count > BODIES_MAX ||
+      solver->work_count < ROW_ARRAYS * (size_t)solver->row_count) {
     return 0;
   }
   split(solver, head);
   solver->direct_residual = 0.0;
   is.solver = solver;
   is.gain = solver->work;
-  is.saved_impulse = solver->work + solver->row_count;
+  is.error = is.gain + solver->row_count;
+  is.saved_error = is.error + solver->row_count;
+  is.saved_impulse = is.saved_error + solver->row_count;
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     is.first = head[i];
     if (is.first == NO_ROW) {
@@ -578,7 +621,8 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
     uint32_t cost = plan(&is);
     if (cost <= budget - spent && place(&is)) {
       spent += cost;
-      solver->direct_solves += improve(&is, before, &due);
+      bool last = 2 * (uint64_t)(budget - spent) <= solver->update_budget;
+      solver->direct_solves += improve(&is, before, last, &due);
     } else {
       solver->too_dear = true;
     }

@@ -77,6 +77,8 @@ void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
   body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
   body->pushed = true;
   free_velocity(tick, body, tick->world.solver.v[body->row]);
+  memcpy(tick->world.solver.free[body->row], tick->world.solver.v[body->row],
+         sizeof tick->world.solver.free[0]);
 }
 
 static void set_free_velocities(hapi_tick *tick)
@@ -86,6 +88,8 @@ static void set_free_velocities(hapi_tick *tick)
     free_velocity(tick, body, tick->world.solver.v[body->row]);
   }
   hapi_proxy_free(tick);
+  memcpy(tick->world.solver.free, tick->world.solver.v,
+         tick->world.solver.body_count * sizeof *tick->world.solver.free);
 }
 
 /* The turn that a constant angular velocity makes, by the exponential map. Small angles: the sine
@@ -265,34 +269,46 @@ static double work_on(hapi_tick *tick, uint32_t slot, const double j[6], double 
   return 0.5 * impulse * hapi_dot6(j, mean);
 }
 
+/* Of a row with a pointer, or with something that the loop does not own. */
+static void account_row(hapi_tick *tick, const hapi_row *row, const hapi_row_source *source)
+{
+  if (!source->pointer) {
+    tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
+                         work_on(tick, source->body_b, row->jb, row->impulse);
+  }
+  give_outside(tick, source->body_a, row->ja, row->impulse);
+  give_outside(tick, source->body_b, row->jb, row->impulse);
+  if (source->pointer && is_owned(tick, source->body_a)) {
+    hapi_local_body *body = &tick->bodies[source->body_a];
+    hapi_madd6(body->gain, row->impulse, row->ja);
+  }
+  if (is_owned(tick, source->body_a) && (source->pointer || is_outside(tick, source->body_b))) {
+    hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
+  }
+  if (is_owned(tick, source->body_b) && is_outside(tick, source->body_a)) {
+    hapi_v3_madd(tick->owned_impulse, row->impulse, row->jb, tick->owned_impulse);
+  }
+}
+
+/* Keeps the impulses for the next tick, and says who got them. */
 static void account(hapi_tick *tick)
 {
-  const hapi_solver *solver = &tick->world.solver;
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row *row = &solver->rows[i];
-    const hapi_row_source *source = &tick->world.sources[i];
+  hapi_local_world *world = &tick->world;
+  world->active = 0;
+  for (uint32_t i = 0; i < world->solver.row_count; ++i) {
+    const hapi_row *row = &world->solver.rows[i];
+    const hapi_row_source *source = &world->sources[i];
+    if (!source->pointer) {
+      world->memory[source->contact].impulse[source->part] = row->impulse;
+      world->active += source->part == 0 && row->impulse > 0.0;
+    }
     if (row->impulse == 0.0) {
       continue;
     }
     touch(tick, source->body_a);
     touch(tick, source->body_b);
-    if (!source->pointer && source->gives) {
-      tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
-                           work_on(tick, source->body_b, row->jb, row->impulse);
-    }
-    give_outside(tick, source->body_a, row->ja, row->impulse);
-    give_outside(tick, source->body_b, row->jb, row->impulse);
-    if (source->pointer && is_owned(tick, source->body_a)) {
-      hapi_local_body *body = &tick->bodies[source->body_a];
-      for (int k = 0; k < 6; ++k) {
-        body->gain[k] += row->impulse * row->ja[k];
-      }
-    }
-    if (is_owned(tick, source->body_a) && (source->pointer || is_outside(tick, source->body_b))) {
-      hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
-    }
-    if (is_owned(tick, source->body_b) && is_outside(tick, source->body_a)) {
-      hapi_v3_madd(tick->owned_impulse, row->impulse, row->jb, tick->owned_impulse);
+    if (source->pointer || source->gives) {
+      account_row(tick, row, source);
     }
   }
 }
@@ -319,6 +335,7 @@ static bool stop_push_out(hapi_tick *tick)
 static void solve(hapi_tick *tick)
 {
   hapi_solver_run(&tick->world.solver);
+  hapi_solver_calm(&tick->world.solver);
   double residual = tick->world.solver.residual;
   tick->residual_max = residual > tick->residual_max ? residual : tick->residual_max;
   tick->sweeps += tick->world.solver.sweeps;
@@ -332,15 +349,11 @@ void hapi_local_world_step(hapi_tick *tick)
   hapi_contact_rows(tick);
   solve(tick);
   bool again = stop_push_out(tick);
-  if (!again) {
-    hapi_solver_calm(&tick->world.solver);
-  }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
     solve(tick);
-    hapi_solver_calm(&tick->world.solver);
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];
       if (hapi_body_responds(body)) {
@@ -354,7 +367,6 @@ void hapi_local_world_step(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
-  hapi_contact_keep(tick);
   hapi_pointer_forces(tick);
   hapi_proxy_move(tick);
   account(tick);

@@ -37,6 +37,7 @@ static void clear_arrays(hapi_tick *tick)
   memset(w->sources, 0, w->row_capacity * sizeof *w->sources);
   memset(w->solver.rows, 0, w->row_capacity * sizeof *w->solver.rows);
   memset(w->solver.v, 0, (c->bodies + c->pointers + 1) * sizeof *w->solver.v);
+  memset(w->solver.free, 0, (c->bodies + c->pointers + 1) * sizeof *w->solver.free);
   memset(w->solver.work, 0, w->solver.work_count * sizeof *w->solver.work);
 }
 

@@ -297,7 +297,6 @@ void hapi_proxy_move(hapi_tick *tick);                        /* poses and force
 void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
-void hapi_contact_keep(hapi_tick *tick);                      /* impulses for the next tick */
 void hapi_guard(hapi_tick *tick);                             /* world wrench -> device wrench */
 void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
