@@ -267,6 +267,29 @@ TEST(the_change_while_pressing_has_no_jump)
   cw_close(&w);
 }
 
+/* Seen, not felt: whatever is near, there is nothing that could shake. */
+TEST(auto_without_a_force_stays_direct)
+{
+  static const double scale[] = {0.0, 1e-300};
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+    w.hand_def.coupling = HAP_COUPLING_AUTO;
+    w.hand_def.coupling_stiffness = 100.0;
+    w.hand_def.force_scale = scale[i];
+    REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
+    cw_move_hand(&w, 0.0, 0.0, -0.03);
+    cw_run(&w, 100);
+    hap_pointer_state state = state_of(&w);
+    CHECK(state.contacts == 1 && state.coupling == HAP_COUPLING_DIRECT);
+    CHECK(state.coupling_reason == (i == 0 ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_WITHIN));
+    CHECK(cw_stats(&w).faults == 0);
+    cw_close(&w);
+  }
+}
+
 TEST(a_proxy_is_refused_where_it_cannot_be)
 {
   hap_pointer_id id;
@@ -278,6 +301,11 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   def.coupling = HAP_COUPLING_PROXY;
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   def.coupling_stiffness = 100.0;
+  def.force_scale = 0.0; /* a spring without a force at its other end */
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  def.force_scale = 1e-300; /* no number for the spring in the world */
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  def.force_scale = 1.0;
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_OK);
   cw_close(&w);
   cw_open(&w, 0.0);
@@ -287,6 +315,58 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
   cw_tick(&w);
   CHECK(state_of(&w).coupling_reason == HAP_COUPLING_MODEL);
+  cw_close(&w);
+}
+
+/* ---- models that have no proxy ---- */
+
+static void change_model(contact_world *w, hap_model model)
+{
+  CHECK(hap_session_set_model(w->session, model) == HAP_OK);
+  for (int i = 0; i < 200 && cw_stats(w).model != (uint32_t)model; ++i) {
+    cw_tick(w);
+  }
+  CHECK(cw_stats(w).model == (uint32_t)model);
+}
+
+/* Pressed 2 mm into the floor, through a proxy while the model has one. */
+TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
+{
+  const double k = 8000.0;
+  const double k_v = 500.0;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_floor(&w);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
+  cw_move_hand(&w, 0.0, 0.0, -0.03);
+  cw_run(&w, 100);
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 100);
+  CHECK_NEAR(w.force[2], 0.002 * series, 1e-6);
+  change_model(&w, HAP_MODEL_ACCELERANCE);
+  hap_pointer_state state = state_of(&w);
+  CHECK(state.coupling == HAP_COUPLING_DIRECT && state.coupling_reason == HAP_COUPLING_MODEL);
+  CHECK(state.coupling_stiffness == 0.0 && state.contact_stiffness == 0.0);
+  CHECK_NEAR(state.proxy.position[2], state.device.position[2], 1e-12);
+  CHECK(w.force[2] <= 0.002 * k / 20.0 + 1e-9); /* what was behind the spring comes in slowly */
+  cw_run(&w, 100);
+  CHECK_NEAR(w.force[2], 0.002 * k, 1e-6);
+  cw_move_hand(&w, 0.3, 0.0, 0.0);
+  cw_run(&w, 100); /* far from where the proxy was */
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 10);
+  change_model(&w, HAP_MODEL_CONTACT);
+  state = state_of(&w);
+  CHECK(state.coupling == HAP_COUPLING_PROXY && state.coupling_reason == HAP_COUPLING_ASKED);
+  CHECK_NEAR(w.force[0], 0.0, 1e-6);
+  CHECK(w.force[2] > 0.0 && w.force[2] < 0.002 * k + 1e-6);
+  cw_run(&w, 300);
+  CHECK_NEAR(w.force[2], 0.002 * series, 1e-5);
   cw_close(&w);
 }
 
@@ -351,7 +431,9 @@ int main(void)
   RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
   RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
   RUN(the_change_while_pressing_has_no_jump);
+  RUN(auto_without_a_force_stays_direct);
   RUN(a_proxy_is_refused_where_it_cannot_be);
+  RUN(another_model_ends_the_proxy_and_contact_begins_it_anew);
   RUN(eight_contacts_at_once_do_not_shake_the_device);
   dCloseODE();
   return tap_done();

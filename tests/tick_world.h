@@ -34,8 +34,8 @@ static struct {
   uint32_t buckets[BUCKETS];
   hapi_row_source sources[ROWS];
   hapi_row rows[ROWS];
-  double v[BODIES + 1][6];
-  double work[HAPI_SOLVER_WORK(ROWS, BODIES + 1)];
+  double v[BODIES + POINTERS + 1][6];
+  double work[HAPI_SOLVER_WORK(ROWS, BODIES + POINTERS + 1)];
   hapi_exchange *exchange;
   hapi_model *model;
   int64_t now_ns;

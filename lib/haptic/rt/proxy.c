@@ -57,6 +57,34 @@ static void choose(hapi_tick_pointer *p)
   p->proxied = wanted;
 }
 
+/* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones do. */
+static void end_proxy(hapi_tick *tick, uint32_t index)
+{
+  tick->pointers[index].proxied = false;
+  tick->pointers[index].row = 0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    if (tick->contacts[i].pointer == index) {
+      tick->contacts[i].ramp = 0.0;
+    }
+  }
+}
+
+void hapi_proxy_none(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    p->coupling_reason =
+        p->coupling == HAP_COUPLING_DIRECT ? HAP_COUPLING_ASKED : HAP_COUPLING_MODEL;
+    p->near_stiffness = p->contact_stiffness = 0.0;
+    if (p->proxied) {
+      end_proxy(tick, i);
+    }
+  }
+}
+
 static double response(const hapi_tick *tick, const hapi_tick_pointer *p)
 {
   double t = tick->period;
