@@ -318,6 +318,87 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   cw_close(&w);
 }
 
+/* ---- proxy and guard ---- */
+
+/* What the hand was given, by the force that was written over the way of the device. */
+static double port_energy(contact_world *w, int ticks)
+{
+  double sum = 0.0;
+  for (int i = 0; i < ticks; ++i) {
+    double before[3];
+    double force[3];
+    memcpy(before, w->hand_at, sizeof before);
+    memcpy(force, w->force, sizeof force);
+    cw_tick(w);
+    for (int k = 0; k < 3; ++k) {
+      sum += force[k] * (w->hand_at[k] - before[k]);
+    }
+  }
+  return sum;
+}
+
+/* The cube brings its energy with it: the observer has nothing to hold back. */
+TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
+{
+  double speed[2];
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025 + 0.05, 0.0, 0.0);
+    dBodySetLinearVel(cube, -1.0, 0.0, 0.0);
+    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.hand_def.stiffness = 1e5;
+    w.hand_def.damping = 0.0;
+    use_proxy(&w, 800.0);
+    REQUIRE(cw_start(&w, -HAND_RADIUS, 0.0, 0.0));
+    cw_run(&w, 45);
+    double given = port_energy(&w, 20);
+    cw_move_hand(&w, -0.3, 0.0, 0.0); /* and gives way */
+    given += port_energy(&w, 200);
+    speed[i] = w.velocity[0][0];
+    CHECK(given > 0.01);
+    CHECK(cw_stats(&w).energy_ticks == 0);
+    cw_close(&w);
+  }
+  CHECK_NEAR(speed[1], speed[0], 1e-9);
+}
+
+/* At the change the spring of the coupling is there at once, with a force in it: the hand must not get
+ * what it never put in. */
+TEST(a_change_of_the_coupling_is_no_source_of_energy)
+{
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
+    cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
+    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.hand_def.coupling = HAP_COUPLING_AUTO;
+    w.hand_def.coupling_stiffness = 4500.0;
+    w.hand_def.stiffness = 4000.0;
+    w.hand_def.damping = 0.0;
+    w.hand_def.max_force = 20.0;
+    REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
+    double given = port_energy(&w, 30);
+    cw_move_hand(&w, 0.0, 0.0, -0.03);
+    given += port_energy(&w, 133);
+    cw_move_hand(&w, 0.1, 0.0, 0.0);
+    while (state_of(&w).coupling == HAP_COUPLING_DIRECT && w.ticks < 1000) {
+      given += port_energy(&w, 1);
+    }
+    CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+    double put_in = -given;
+    cw_move_hand(&w, 0.0, 0.0, 1.0);
+    given += port_energy(&w, 100);
+    printf("# guard %s: put in %.4g J, got back %.4g J\n", i == 0 ? "off" : "on", put_in,
+           given + put_in);
+    CHECK(put_in > 0.01);
+    CHECK(i == 0 || given < 0.02 * put_in); /* 1 % of what the two springs held together */
+    cw_close(&w);
+  }
+}
+
 /* ---- models that have no proxy ---- */
 
 static void change_model(contact_world *w, hap_model model)
@@ -433,6 +514,8 @@ int main(void)
   RUN(the_change_while_pressing_has_no_jump);
   RUN(auto_without_a_force_stays_direct);
   RUN(a_proxy_is_refused_where_it_cannot_be);
+  RUN(the_guard_leaves_an_impact_through_a_proxy_alone);
+  RUN(a_change_of_the_coupling_is_no_source_of_energy);
   RUN(another_model_ends_the_proxy_and_contact_begins_it_anew);
   RUN(eight_contacts_at_once_do_not_shake_the_device);
   dCloseODE();
