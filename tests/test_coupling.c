@@ -105,6 +105,37 @@ TEST(a_wall_and_the_proxy_are_springs_in_series)
   }
 }
 
+/* A device turned by 90 degrees about x, whose motions are 5 times as large in the world and which gives
+ * half of the world's force: 1 N/m of the device is 1 / (5 x 0.5) N/m there. */
+TEST(the_spring_is_the_devices_whatever_its_frame_and_scales)
+{
+  const double k = 1000.0;
+  const double k_device = 1500.0;
+  const double k_v = k_device / 2.5;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_floor(&w);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  w.hand_def.motion_scale = 5.0;
+  w.hand_def.force_scale = 0.5;
+  w.hand_def.pose_world_device = (hap_pose){{0.0, 0.0, 0.002}, {M_SQRT1_2, M_SQRT1_2, 0.0, 0.0}};
+  use_proxy(&w, k_device);
+  REQUIRE(cw_start(&w, 0.0, (HAND_RADIUS - 0.001) / 5.0, 0.0)); /* y: 1 mm above the floor */
+  cw_move_hand(&w, 0.0, -0.006, 0.0);
+  cw_run(&w, 100);
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 100);
+  hap_pointer_state state = state_of(&w);
+  CHECK_NEAR(state.wrench.force[2], 0.002 * series, 1e-6);
+  CHECK_NEAR(state.proxy.position[2], HAND_RADIUS - 0.002 * k_v / (k + k_v), 1e-8);
+  CHECK_NEAR(state.coupling_stiffness, k_device, 1e-9);
+  CHECK_NEAR(state.contact_stiffness, 2.5 * k, 1e-9);
+  cw_close(&w);
+}
+
 TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
 {
   contact_world w;
@@ -288,6 +319,39 @@ TEST(auto_without_a_force_stays_direct)
     CHECK(cw_stats(&w).faults == 0);
     cw_close(&w);
   }
+}
+
+/* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the device
+ * is, not where it would leap. */
+TEST(a_heavy_proxy_is_let_go_of_at_the_device)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  add_ring(&w, 4);
+  w.hand_def.coupling = HAP_COUPLING_AUTO;
+  w.hand_def.coupling_stiffness = 1000.0;
+  w.hand_def.coupling_damping = 2.0;
+  w.hand_def.stiffness = 300.0;
+  w.hand_def.mass = 0.5;
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.03));
+  cw_move_hand(&w, 0.0, 0.0, -0.05);
+  while (state_of(&w).contacts < 4 && w.ticks < 1000) {
+    cw_tick(&w);
+  }
+  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+  hap_pointer_state state = state_of(&w);
+  double leap = 0.0;
+  for (int i = 0; i < 5000 && state.coupling == HAP_COUPLING_PROXY; ++i) {
+    cw_move_hand(&w, 0.0, 0.0, i < 50 ? 1.0 : 0.0);
+    double before = state.proxy.position[2];
+    double way = T * state.twist.linear[2];
+    cw_tick(&w);
+    state = state_of(&w);
+    leap = fabs(state.proxy.position[2] - before - way);
+  }
+  CHECK(state.coupling == HAP_COUPLING_DIRECT);
+  CHECK(leap < 1e-4);
+  cw_close(&w);
 }
 
 TEST(a_proxy_is_refused_where_it_cannot_be)
@@ -507,12 +571,14 @@ int main(void)
   RUN(gains_follow_the_device);
   RUN(gains_are_not_invented);
   RUN(a_wall_and_the_proxy_are_springs_in_series);
+  RUN(the_spring_is_the_devices_whatever_its_frame_and_scales);
   RUN(in_the_air_the_proxy_is_at_the_device_and_gives_no_force);
   RUN(a_proxy_passes_the_whole_impulse_on);
   RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
   RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
   RUN(the_change_while_pressing_has_no_jump);
   RUN(auto_without_a_force_stays_direct);
+  RUN(a_heavy_proxy_is_let_go_of_at_the_device);
   RUN(a_proxy_is_refused_where_it_cannot_be);
   RUN(the_guard_leaves_an_impact_through_a_proxy_alone);
   RUN(a_change_of_the_coupling_is_no_source_of_energy);
