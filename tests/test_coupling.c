@@ -155,6 +155,89 @@ TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
   cw_close(&w);
 }
 
+/* A kinematic cube comes from below: a wall that moves, at the tick and at both ends of its way. */
+TEST(a_driven_body_presses_through_the_proxy)
+{
+  const double k = 1e5;
+  const double k_v = 500.0;
+  const double speed = 0.05;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  dBodyID cube = cw_add_cube(&w, 1.0, 0.1, 0.0, 0.0, -0.05 - 0.001);
+  dBodySetKinematic(cube);
+  dBodySetLinearVel(cube, 0.0, 0.0, speed);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS));
+  for (int i = 0; i < 200; ++i) {
+    cw_tick(&w);
+    double depth = w.position[0][2] + 0.05;
+    CHECK_NEAR(w.force[2], fmax(0.0, series * depth), 1.1 * series * speed * T);
+  }
+  CHECK(w.force[2] > 4.0);
+  cw_close(&w);
+}
+
+/* A cube on rails is moved by what testing simulations say of it. */
+TEST(a_measured_body_is_pushed_through_the_proxy)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
+  dJointAttach(dJointCreateSlider(w.world, NULL), cube, NULL);
+  w.hand_def.stiffness = 1e5;
+  use_proxy(&w, 400.0);
+  REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.001, 0.002));
+  cw_move_hand(&w, 0.2, 0.0, 0.0);
+  cw_run(&w, 400);
+  CHECK(cw_stats(&w).measured_bodies == 1);
+  CHECK(w.impulse[0] > 0.05 && cw_stats(&w).faults == 0);
+  CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 0.01 * w.impulse[0]);
+  CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 0.01);
+  cw_close(&w);
+}
+
+/* Two hands on one cube, one through a proxy and one direct: each has its own coupling. */
+TEST(pointers_of_one_body_have_each_their_own_coupling)
+{
+  const double k = 2000.0;
+  const double k_v = 500.0;
+  contact_world w;
+  hap_pointer_id other;
+  hap_pose pose = {{HAND_RADIUS + 0.05 - 0.002, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 0.5, 0.05, 0.025, 0.0, 0.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 5.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, -HAND_RADIUS + 0.002, 0.0, 0.0));
+  hap_pointer_def def = w.hand_def;
+  def.coupling = HAP_COUPLING_DIRECT;
+  CHECK(hap_pointer_add(w.session, &def, &other) == HAP_OK);
+  CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
+  cw_run(&w, 3000); /* until it has come to rest between them */
+  hap_pointer_state state;
+  double soft = k * k_v / (k + k_v);
+  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK(state.coupling == HAP_COUPLING_DIRECT && state.contacts == 1);
+  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY && state_of(&w).contacts == 1);
+  CHECK_NEAR(state.wrench.force[0], 0.004 * soft * k / (soft + k), 1e-3);
+  CHECK_NEAR(w.force[0], -state.wrench.force[0], 1e-3);
+  CHECK(hap_pointer_remove(w.session, w.hand) == HAP_OK); /* its place in the solver goes with it */
+  CHECK(hap_session_advance(w.session, 200) == HAP_OK);
+  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK(state.wrench.force[0] == 0.0);
+  w.hand_def.coupling_stiffness = 1000.0;
+  CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
+  cw_put_hand(&w, 0.0, 0.0, 0.0);
+  CHECK(hap_session_advance(w.session, 3) == HAP_OK);
+  CHECK_NEAR(state_of(&w).coupling_stiffness, 1000.0, 1e-9);
+  CHECK_NEAR(state_of(&w).proxy.position[0], -HAND_RADIUS + 0.002, 1e-9);
+  cw_close(&w);
+}
+
 /* Without mass the proxy keeps nothing: what the hand gives the cube gets. */
 TEST(a_proxy_passes_the_whole_impulse_on)
 {
@@ -573,6 +656,9 @@ int main(void)
   RUN(a_wall_and_the_proxy_are_springs_in_series);
   RUN(the_spring_is_the_devices_whatever_its_frame_and_scales);
   RUN(in_the_air_the_proxy_is_at_the_device_and_gives_no_force);
+  RUN(a_driven_body_presses_through_the_proxy);
+  RUN(a_measured_body_is_pushed_through_the_proxy);
+  RUN(pointers_of_one_body_have_each_their_own_coupling);
   RUN(a_proxy_passes_the_whole_impulse_on);
   RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
   RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
