@@ -368,7 +368,7 @@ TEST(person_can_stop_it)
 {
   static const uint32_t pacings[] = {HAP_PACING_VIRTUAL, HAP_PACING_HOST, HAP_PACING_DEVICE};
   for (int k = 0; k < 3; ++k) {
-    int left = 3;
+    int left = 2; /* before it moves fast: a machine that is busy holds a force for long */
     fake device = {.gain = 1.0, .pacing = pacings[k]};
     hap_identify_def def;
     hap_device_identity found;
@@ -382,6 +382,9 @@ TEST(person_can_stop_it)
     hap_status status = hap_device_identify(opened, &def, &found, &detail);
     /* the fake does not wait for a tick of its own, so it may give more than 20000 positions a s */
     bool fast = pacings[k] == HAP_PACING_DEVICE && status == HAP_ERROR_DEVICE;
+    if (status != HAP_END) {
+      printf("# pacing %u: %s\n", pacings[k], detail.text);
+    }
     CHECK(status == HAP_END || (fast && strstr(detail.text, "raise rate_hz") != NULL));
     CHECK(the.stops == 1 && hapi_v3_norm(the.force) == 0.0);
     hap_device_close(opened);
