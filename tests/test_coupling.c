@@ -105,6 +105,37 @@ TEST(a_wall_and_the_proxy_are_springs_in_series)
   }
 }
 
+/* A device turned by 90 degrees about x, whose motions are 5 times as large in the world and which gives
+ * half of the world's force: 1 N/m of the device is 1 / (5 x 0.5) N/m there. */
+TEST(the_spring_is_the_devices_whatever_its_frame_and_scales)
+{
+  const double k = 1000.0;
+  const double k_device = 1500.0;
+  const double k_v = k_device / 2.5;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_floor(&w);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  w.hand_def.motion_scale = 5.0;
+  w.hand_def.force_scale = 0.5;
+  w.hand_def.pose_world_device = (hap_pose){{0.0, 0.0, 0.002}, {M_SQRT1_2, M_SQRT1_2, 0.0, 0.0}};
+  use_proxy(&w, k_device);
+  REQUIRE(cw_start(&w, 0.0, (HAND_RADIUS - 0.001) / 5.0, 0.0)); /* y: 1 mm above the floor */
+  cw_move_hand(&w, 0.0, -0.006, 0.0);
+  cw_run(&w, 100);
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 100);
+  hap_pointer_state state = state_of(&w);
+  CHECK_NEAR(state.wrench.force[2], 0.002 * series, 1e-6);
+  CHECK_NEAR(state.proxy.position[2], HAND_RADIUS - 0.002 * k_v / (k + k_v), 1e-8);
+  CHECK_NEAR(state.coupling_stiffness, k_device, 1e-9);
+  CHECK_NEAR(state.contact_stiffness, 2.5 * k, 1e-9);
+  cw_close(&w);
+}
+
 TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
 {
   contact_world w;
@@ -121,6 +152,89 @@ TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
       CHECK_NEAR(w.force[k], 0.0, 1e-9);
     }
   }
+  cw_close(&w);
+}
+
+/* A kinematic cube comes from below: a wall that moves, at the tick and at both ends of its way. */
+TEST(a_driven_body_presses_through_the_proxy)
+{
+  const double k = 1e5;
+  const double k_v = 500.0;
+  const double speed = 0.05;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  dBodyID cube = cw_add_cube(&w, 1.0, 0.1, 0.0, 0.0, -0.05 - 0.001);
+  dBodySetKinematic(cube);
+  dBodySetLinearVel(cube, 0.0, 0.0, speed);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS));
+  for (int i = 0; i < 200; ++i) {
+    cw_tick(&w);
+    double depth = w.position[0][2] + 0.05;
+    CHECK_NEAR(w.force[2], fmax(0.0, series * depth), 1.1 * series * speed * T);
+  }
+  CHECK(w.force[2] > 4.0);
+  cw_close(&w);
+}
+
+/* A cube on rails is moved by what testing simulations say of it. */
+TEST(a_measured_body_is_pushed_through_the_proxy)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
+  dJointAttach(dJointCreateSlider(w.world, NULL), cube, NULL);
+  w.hand_def.stiffness = 1e5;
+  use_proxy(&w, 400.0);
+  REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.001, 0.002));
+  cw_move_hand(&w, 0.2, 0.0, 0.0);
+  cw_run(&w, 400);
+  CHECK(cw_stats(&w).measured_bodies == 1);
+  CHECK(w.impulse[0] > 0.05 && cw_stats(&w).faults == 0);
+  CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 0.01 * w.impulse[0]);
+  CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 0.01);
+  cw_close(&w);
+}
+
+/* Two hands on one cube, one through a proxy and one direct: each has its own coupling. */
+TEST(pointers_of_one_body_have_each_their_own_coupling)
+{
+  const double k = 2000.0;
+  const double k_v = 500.0;
+  contact_world w;
+  hap_pointer_id other;
+  hap_pose pose = {{HAND_RADIUS + 0.05 - 0.002, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  cw_open(&w, 0.0);
+  cw_add_cube(&w, 0.5, 0.05, 0.025, 0.0, 0.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 5.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, -HAND_RADIUS + 0.002, 0.0, 0.0));
+  hap_pointer_def def = w.hand_def;
+  def.coupling = HAP_COUPLING_DIRECT;
+  CHECK(hap_pointer_add(w.session, &def, &other) == HAP_OK);
+  CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
+  cw_run(&w, 3000); /* until it has come to rest between them */
+  hap_pointer_state state;
+  double soft = k * k_v / (k + k_v);
+  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK(state.coupling == HAP_COUPLING_DIRECT && state.contacts == 1);
+  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY && state_of(&w).contacts == 1);
+  CHECK_NEAR(state.wrench.force[0], 0.004 * soft * k / (soft + k), 1e-3);
+  CHECK_NEAR(w.force[0], -state.wrench.force[0], 1e-3);
+  CHECK(hap_pointer_remove(w.session, w.hand) == HAP_OK); /* its place in the solver goes with it */
+  CHECK(hap_session_advance(w.session, 200) == HAP_OK);
+  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK(state.wrench.force[0] == 0.0);
+  w.hand_def.coupling_stiffness = 1000.0;
+  CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
+  cw_put_hand(&w, 0.0, 0.0, 0.0);
+  CHECK(hap_session_advance(w.session, 3) == HAP_OK);
+  CHECK_NEAR(state_of(&w).coupling_stiffness, 1000.0, 1e-9);
+  CHECK_NEAR(state_of(&w).proxy.position[0], -HAND_RADIUS + 0.002, 1e-9);
   cw_close(&w);
 }
 
@@ -267,6 +381,62 @@ TEST(the_change_while_pressing_has_no_jump)
   cw_close(&w);
 }
 
+/* Seen, not felt: whatever is near, there is nothing that could shake. */
+TEST(auto_without_a_force_stays_direct)
+{
+  static const double scale[] = {0.0, 1e-300};
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+    w.hand_def.coupling = HAP_COUPLING_AUTO;
+    w.hand_def.coupling_stiffness = 100.0;
+    w.hand_def.force_scale = scale[i];
+    REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
+    cw_move_hand(&w, 0.0, 0.0, -0.03);
+    cw_run(&w, 100);
+    hap_pointer_state state = state_of(&w);
+    CHECK(state.contacts == 1 && state.coupling == HAP_COUPLING_DIRECT);
+    CHECK(state.coupling_reason == (i == 0 ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_WITHIN));
+    CHECK(cw_stats(&w).faults == 0);
+    cw_close(&w);
+  }
+}
+
+/* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the device
+ * is, not where it would leap. */
+TEST(a_heavy_proxy_is_let_go_of_at_the_device)
+{
+  contact_world w;
+  cw_open(&w, 0.0);
+  add_ring(&w, 4);
+  w.hand_def.coupling = HAP_COUPLING_AUTO;
+  w.hand_def.coupling_stiffness = 1000.0;
+  w.hand_def.coupling_damping = 2.0;
+  w.hand_def.stiffness = 300.0;
+  w.hand_def.mass = 0.5;
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.03));
+  cw_move_hand(&w, 0.0, 0.0, -0.05);
+  while (state_of(&w).contacts < 4 && w.ticks < 1000) {
+    cw_tick(&w);
+  }
+  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+  hap_pointer_state state = state_of(&w);
+  double leap = 0.0;
+  for (int i = 0; i < 5000 && state.coupling == HAP_COUPLING_PROXY; ++i) {
+    cw_move_hand(&w, 0.0, 0.0, i < 50 ? 1.0 : 0.0);
+    double before = state.proxy.position[2];
+    double way = T * state.twist.linear[2];
+    cw_tick(&w);
+    state = state_of(&w);
+    leap = fabs(state.proxy.position[2] - before - way);
+  }
+  CHECK(state.coupling == HAP_COUPLING_DIRECT);
+  CHECK(leap < 1e-4);
+  cw_close(&w);
+}
+
 TEST(a_proxy_is_refused_where_it_cannot_be)
 {
   hap_pointer_id id;
@@ -278,6 +448,11 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   def.coupling = HAP_COUPLING_PROXY;
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   def.coupling_stiffness = 100.0;
+  def.force_scale = 0.0; /* a spring without a force at its other end */
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  def.force_scale = 1e-300; /* no number for the spring in the world */
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  def.force_scale = 1.0;
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_OK);
   cw_close(&w);
   cw_open(&w, 0.0);
@@ -287,6 +462,139 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
   cw_tick(&w);
   CHECK(state_of(&w).coupling_reason == HAP_COUPLING_MODEL);
+  cw_close(&w);
+}
+
+/* ---- proxy and guard ---- */
+
+/* What the hand was given, by the force that was written over the way of the device. */
+static double port_energy(contact_world *w, int ticks)
+{
+  double sum = 0.0;
+  for (int i = 0; i < ticks; ++i) {
+    double before[3];
+    double force[3];
+    memcpy(before, w->hand_at, sizeof before);
+    memcpy(force, w->force, sizeof force);
+    cw_tick(w);
+    for (int k = 0; k < 3; ++k) {
+      sum += force[k] * (w->hand_at[k] - before[k]);
+    }
+  }
+  return sum;
+}
+
+/* The cube brings its energy with it: the observer has nothing to hold back. */
+TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
+{
+  double speed[2];
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025 + 0.05, 0.0, 0.0);
+    dBodySetLinearVel(cube, -1.0, 0.0, 0.0);
+    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.hand_def.stiffness = 1e5;
+    w.hand_def.damping = 0.0;
+    use_proxy(&w, 800.0);
+    REQUIRE(cw_start(&w, -HAND_RADIUS, 0.0, 0.0));
+    cw_run(&w, 45);
+    double given = port_energy(&w, 20);
+    cw_move_hand(&w, -0.3, 0.0, 0.0); /* and gives way */
+    given += port_energy(&w, 200);
+    speed[i] = w.velocity[0][0];
+    CHECK(given > 0.01);
+    CHECK(cw_stats(&w).energy_ticks == 0);
+    cw_close(&w);
+  }
+  CHECK_NEAR(speed[1], speed[0], 1e-9);
+}
+
+/* At the change the spring of the coupling is there at once, with a force in it: the hand must not get
+ * what it never put in. */
+TEST(a_change_of_the_coupling_is_no_source_of_energy)
+{
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
+    cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
+    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.hand_def.coupling = HAP_COUPLING_AUTO;
+    w.hand_def.coupling_stiffness = 4500.0;
+    w.hand_def.stiffness = 4000.0;
+    w.hand_def.damping = 0.0;
+    w.hand_def.max_force = 20.0;
+    REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
+    double given = port_energy(&w, 30);
+    cw_move_hand(&w, 0.0, 0.0, -0.03);
+    given += port_energy(&w, 133);
+    cw_move_hand(&w, 0.1, 0.0, 0.0);
+    while (state_of(&w).coupling == HAP_COUPLING_DIRECT && w.ticks < 1000) {
+      given += port_energy(&w, 1);
+    }
+    CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+    double put_in = -given;
+    cw_move_hand(&w, 0.0, 0.0, 1.0);
+    given += port_energy(&w, 100);
+    printf("# guard %s: put in %.4g J, got back %.4g J\n", i == 0 ? "off" : "on", put_in,
+           given + put_in);
+    CHECK(put_in > 0.01);
+    CHECK(i == 0 || given < 0.02 * put_in); /* 1 % of what the two springs held together */
+    cw_close(&w);
+  }
+}
+
+/* ---- models that have no proxy ---- */
+
+static void change_model(contact_world *w, hap_model model)
+{
+  CHECK(hap_session_set_model(w->session, model) == HAP_OK);
+  for (int i = 0; i < 200 && cw_stats(w).model != (uint32_t)model; ++i) {
+    cw_tick(w);
+  }
+  CHECK(cw_stats(w).model == (uint32_t)model);
+}
+
+/* Pressed 2 mm into the floor, through a proxy while the model has one. */
+TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
+{
+  const double k = 8000.0;
+  const double k_v = 500.0;
+  const double series = k * k_v / (k + k_v);
+  contact_world w;
+  cw_open(&w, 0.0);
+  cw_add_floor(&w);
+  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w.hand_def.stiffness = k;
+  w.hand_def.damping = 0.0;
+  use_proxy(&w, k_v);
+  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
+  cw_move_hand(&w, 0.0, 0.0, -0.03);
+  cw_run(&w, 100);
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 100);
+  CHECK_NEAR(w.force[2], 0.002 * series, 1e-6);
+  change_model(&w, HAP_MODEL_ACCELERANCE);
+  hap_pointer_state state = state_of(&w);
+  CHECK(state.coupling == HAP_COUPLING_DIRECT && state.coupling_reason == HAP_COUPLING_MODEL);
+  CHECK(state.coupling_stiffness == 0.0 && state.contact_stiffness == 0.0);
+  CHECK_NEAR(state.proxy.position[2], state.device.position[2], 1e-12);
+  CHECK(w.force[2] <= 0.002 * k / 20.0 + 1e-9); /* what was behind the spring comes in slowly */
+  cw_run(&w, 100);
+  CHECK_NEAR(w.force[2], 0.002 * k, 1e-6);
+  cw_move_hand(&w, 0.3, 0.0, 0.0);
+  cw_run(&w, 100); /* far from where the proxy was */
+  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_run(&w, 10);
+  change_model(&w, HAP_MODEL_CONTACT);
+  state = state_of(&w);
+  CHECK(state.coupling == HAP_COUPLING_PROXY && state.coupling_reason == HAP_COUPLING_ASKED);
+  CHECK_NEAR(w.force[0], 0.0, 1e-6);
+  CHECK(w.force[2] > 0.0 && w.force[2] < 0.002 * k + 1e-6);
+  cw_run(&w, 300);
+  CHECK_NEAR(w.force[2], 0.002 * series, 1e-5);
   cw_close(&w);
 }
 
@@ -346,12 +654,21 @@ int main(void)
   RUN(gains_follow_the_device);
   RUN(gains_are_not_invented);
   RUN(a_wall_and_the_proxy_are_springs_in_series);
+  RUN(the_spring_is_the_devices_whatever_its_frame_and_scales);
   RUN(in_the_air_the_proxy_is_at_the_device_and_gives_no_force);
+  RUN(a_driven_body_presses_through_the_proxy);
+  RUN(a_measured_body_is_pushed_through_the_proxy);
+  RUN(pointers_of_one_body_have_each_their_own_coupling);
   RUN(a_proxy_passes_the_whole_impulse_on);
   RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
   RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
   RUN(the_change_while_pressing_has_no_jump);
+  RUN(auto_without_a_force_stays_direct);
+  RUN(a_heavy_proxy_is_let_go_of_at_the_device);
   RUN(a_proxy_is_refused_where_it_cannot_be);
+  RUN(the_guard_leaves_an_impact_through_a_proxy_alone);
+  RUN(a_change_of_the_coupling_is_no_source_of_energy);
+  RUN(another_model_ends_the_proxy_and_contact_begins_it_anew);
   RUN(eight_contacts_at_once_do_not_shake_the_device);
   dCloseODE();
   return tap_done();

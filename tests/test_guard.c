@@ -202,6 +202,24 @@ TEST(a_pointer_comes_in_over_20_ms_and_so_after_a_reset)
   CHECK(f.tick.faults == 1 && f.tick.guard.slewed_ticks == 0);
 }
 
+/* A slew limit that is meant for touch must not keep the motors on for minutes. */
+TEST(a_fault_takes_the_force_away_in_100_ms_whatever_the_slew_limit)
+{
+  hapi_tick_pointer *p = guarded_and_warm();
+  p->slew_force = p->slew_torque = 1e-3;
+  p->guard.written.force[1] = LIMIT;
+  p->guard.written.torque[0] = 1.0;
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  double before = LIMIT;
+  for (int i = 0; i < 100; ++i) {
+    guard_wrench(p, 0.0, LIMIT, 0.0);
+    CHECK(before - p->device_wrench.force[1] <= LIMIT / 100.0 + 1e-9);
+    before = p->device_wrench.force[1];
+  }
+  CHECK_NEAR(hapi_v3_norm(p->device_wrench.force), 0.0, 1e-9);
+  CHECK_NEAR(hapi_v3_norm(p->device_wrench.torque), 0.0, 1e-9);
+}
+
 TEST(a_reset_of_no_fault_changes_nothing)
 {
   hapi_tick_pointer *p = guarded_and_warm();
@@ -575,6 +593,20 @@ static size_t read_box(size_t room)
   return hapi_black_box_read(&box, read_rows, room);
 }
 
+/* The age of a model that there is not would be the time since the machine was switched on. */
+TEST(the_black_box_knows_no_age_before_the_first_model)
+{
+  (void)guarded_alone();
+  box = (hapi_black_box){.rows = box_rows, .counts = box_counts, .pointers = POINTERS};
+  hapi_black_box_reset(&box);
+  f.now_ns = 1000000 * TICK_NS;
+  record(2);
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  record(1);
+  REQUIRE(read_box(10) == 3);
+  CHECK(read_rows[0].model_age_s == 0.0 && read_rows[2].model_age_s == 0.0);
+}
+
 TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
 {
   hapi_tick_pointer *p = open_box();
@@ -646,6 +678,7 @@ int main(void)
   RUN(the_ramp_comes_before_slew_and_slew_before_saturation);
   RUN(what_the_observer_takes_goes_at_the_slew_bound);
   RUN(a_pointer_comes_in_over_20_ms_and_so_after_a_reset);
+  RUN(a_fault_takes_the_force_away_in_100_ms_whatever_the_slew_limit);
   RUN(a_reset_of_no_fault_changes_nothing);
   RUN(a_force_that_is_not_finite_ramps_from_the_last_good_one_to_zero);
   RUN(a_torque_that_is_not_finite_is_a_fault_too);
@@ -662,6 +695,7 @@ int main(void)
   RUN(an_honest_impact_is_felt_whole);
   RUN(what_a_weight_or_a_drive_gives_is_felt);
   RUN(a_device_has_not_moved_when_it_is_first_seen);
+  RUN(the_black_box_knows_no_age_before_the_first_model);
   RUN(the_black_box_keeps_the_last_256_ticks_until_the_reset);
   RUN(each_pointer_has_its_rows);
   RUN(a_loop_never_waits_for_a_reader);

@@ -160,9 +160,13 @@ TEST(help_list_and_version_are_answered)
   CHECK(run("--version") == 0);
   CHECK(strncmp(ran.out, "hapode-run 0.", 13) == 0);
   CHECK(run("--list") == 0);
-  const char *const there[] = {"fig5",    "row10[:N]",  "pile[:N]",    "lightstand",  "mass 60 kg",
-                               "virtual", "replay",     "impulse",     "accelerance", "contact",
-                               "testing", "k 2000 N/m", "duration 2 s"};
+  const char *const there[] = {"fig5",         "row10[:N]",
+                               "pile[:N]",     "lightstand",
+                               "mass 60 kg",   "virtual",
+                               "replay",       "impulse",
+                               "accelerance",  "contact",
+                               "testing",      "k 2000 N/m",
+                               "duration 2 s", "contact auto or as told"};
   for (size_t i = 0; i < sizeof there / sizeof there[0]; ++i) {
     if (strstr(ran.out, there[i]) == NULL) {
       printf("# --list does not tell of %s\n", there[i]);
@@ -210,6 +214,13 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--model-age 0.01", "--model-age", "--lockstep"},
       {"--lockstep --model-age 150", "--model-age", "at most 20 s"},
       {"--effects friction", "--effects", "NAME=on"},
+      {"--stiffness 0", "--stiffness", "0.001 to 1e+09"},
+      {"--coupling stiff", "--coupling", "proxy:K"},
+      {"--coupling direct:500", "--coupling", "proxy:K"},
+      {"--coupling proxy:x", "--coupling", "0.001 to 1e+09"},
+      {"--coupling proxy --model accelerance", "--coupling", "--model contact"},
+      {"--coupling proxy --effects proxy=off", "--coupling", "--effects"},
+      {"--effects proxy=on --model impulse", "--effects", "not supported"},
       {"--scene fig5:3", "--scene", "takes no N"},
       {"--scene row10:x", "--scene", "number from 1"},
       {"--device virtual:colour=1", "--device", "path"},
@@ -320,6 +331,48 @@ TEST(the_summary_has_its_values)
   CHECK(number_of("tick_us_p50") > 0.0 && number_of("tick_us_p99") >= number_of("tick_us_p50"));
   CHECK(number_of("physics_duty") > 0.0 && number_of("haptic_duty") > 0.0);
   CHECK_NEAR(number_of("momentum_ratio"), 1.0, 0.01);
+}
+
+TEST(the_coupling_can_be_chosen_and_is_reported)
+{
+  const struct {
+    const char *arguments;
+    const char *coupling;
+    const char *effect;
+  } cases[] = {
+      {"", "direct (UNKNOWN: 2000 N/m near, the device does not say what it holds)", "proxy=auto"},
+      {"--coupling direct", "direct (ASKED)", "proxy=off"},
+      {"--effects proxy=off", "direct (ASKED)", "proxy=off"},
+      {"--coupling proxy:500", "proxy (ASKED: a spring of 500 N/m)", "proxy=on"},
+      {"--coupling=auto:3000", "direct (WITHIN: 2000 N/m near, no more than the device holds)",
+       "proxy=auto"},
+      {"--coupling=auto:3000 --stiffness 8000",
+       "proxy (ABOVE: 8000 N/m near, the device holds 3000 N/m)", "proxy=auto"},
+      {"--model accelerance", "direct (MODEL: only model contact has a proxy)", "proxy=off"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    REQUIRE(run("--scene slide --lockstep --seconds 1 %s", cases[i].arguments) == 0);
+    REQUIRE(value_of("coupling") != NULL && value_of("effects") != NULL);
+    bool good = strcmp(value_of("coupling"), cases[i].coupling) == 0 &&
+                strstr(value_of("effects"), cases[i].effect) != NULL;
+    if (!good) {
+      printf("# %s: %s\n", cases[i].arguments, value_of("coupling"));
+    }
+    CHECK(good);
+  }
+}
+
+/* 0.2 N s/m at 1 kHz: 0.8 x 0.2 / 0.0005 = 320 N/m. */
+TEST(a_device_is_held_to_its_own_figures)
+{
+  CHECK(run("--scene slide --lockstep --seconds 1 --stiffness 8000 --device "
+            "virtual:path=0:-0.1/0/0.05;0.5:0.05/0/0.05,device_mass=0.1,device_damping=0.2,"
+            "hand=relaxed") == 0);
+  REQUIRE(value_of("coupling") != NULL);
+  CHECK(strcmp(value_of("coupling"), "proxy (ABOVE: 8000 N/m near, the device holds 320 N/m)") ==
+        0);
+  CHECK(run("--scene slide --lockstep --seconds 1 --coupling proxy") == 2);
+  CHECK(says("coupling proxy") && says("identified"));
 }
 
 TEST(single_steps_the_world_at_the_haptic_rate)
@@ -656,6 +709,8 @@ int main(void)
   RUN(a_full_disk_is_a_failure);
   RUN(the_summary_has_its_keys_in_order);
   RUN(the_summary_has_its_values);
+  RUN(the_coupling_can_be_chosen_and_is_reported);
+  RUN(a_device_is_held_to_its_own_figures);
   RUN(single_steps_the_world_at_the_haptic_rate);
   RUN(a_run_of_no_tick_has_a_summary);
   RUN(the_trace_has_its_columns_and_every_tick);

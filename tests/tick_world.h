@@ -34,8 +34,9 @@ static struct {
   uint32_t buckets[BUCKETS];
   hapi_row_source sources[ROWS];
   hapi_row rows[ROWS];
-  double v[BODIES + 1][6];
-  double work[HAPI_SOLVER_WORK(ROWS, BODIES + 1)];
+  double v[BODIES + POINTERS + 1][6];
+  double free_v[BODIES + POINTERS + 1][6];
+  double work[HAPI_SOLVER_WORK(ROWS, BODIES + POINTERS + 1)];
   hapi_exchange *exchange;
   hapi_model *model;
   int64_t now_ns;
@@ -52,6 +53,7 @@ static inline void set_up_world(void)
   world->row_capacity = ROWS;
   world->solver.rows = f.rows;
   world->solver.v = f.v;
+  world->solver.free = f.free_v;
   world->solver.work = f.work;
   world->solver.work_count = sizeof f.work / sizeof f.work[0];
   world->solver.tolerance = 1e-9;

@@ -181,6 +181,7 @@ static int run_and_report(run_loop *loop)
   if (stats.size > 0) { /* it was started */
     tell(loop->options, status, &stats);
     run_summary_print(loop->options, &stats, stdout);
+    run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
   }
   if (fflush(stdout) != 0 || ferror(stdout) != 0) {
     code = complain(EXIT_FAILED, "the summary cannot be written to stdout");
@@ -192,7 +193,8 @@ static int run_in(const run_options *options, rig *r)
 {
   hap_detail detail = {""};
   double seconds = options->seconds > 0.0 ? options->seconds : r->scene->parameters.duration;
-  run_loop loop = {.options = options, .rig = r, .seconds = seconds};
+  run_coupling coupling = {0};
+  run_loop loop = {.options = options, .rig = r, .seconds = seconds, .coupling = &coupling};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = EXIT_FAILED;
   if (open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&

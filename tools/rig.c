@@ -9,6 +9,7 @@ void rig_options_init(rig_options *options)
 {
   memset(options, 0, sizeof *options);
   options->scene = "row10";
+  options->coupling = HAP_COUPLING_AUTO;
   hap_session_def_init(&options->def, sizeof options->def);
 }
 
@@ -72,9 +73,11 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   }
   def.device = r->devices[index];
   def.radius = p->radius;
-  def.stiffness = p->stiffness;
+  def.stiffness = options->stiffness > 0.0 ? options->stiffness : p->stiffness;
   def.damping = p->damping;
   def.max_force = options->max_force > 0.0 ? options->max_force : def.max_force;
+  def.coupling = options->coupling;
+  def.coupling_stiffness = options->coupling_stiffness;
   status = hap_pointer_add(r->session, &def, &r->pointers[index]);
   if (status < HAP_OK) {
     (void)hap_session_detail(r->session, detail);

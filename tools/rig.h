@@ -23,6 +23,9 @@ typedef struct rig_options {
   const char
       *identities[RIG_POINTERS_MAX]; /* files for the devices; NULL: as they say themselves */
   double max_force;                  /* N; 0: 20 */
+  double stiffness;                  /* N/m, of the pointers' contacts; 0: the scene's */
+  hap_coupling coupling;
+  double coupling_stiffness; /* N/m, of hap_pointer_def */
   hap_session_def def;
 } rig_options;
 
@@ -41,7 +44,7 @@ typedef struct rig {
   rig_part failed; /* what it was after a rig_create that failed */
 } rig;
 
-/* Defaults: row10, accelerance, threads, 60 Hz and 1 kHz. */
+/* Defaults: row10, coupling auto, and those of hap_session_def_init. */
 void rig_options_init(rig_options *options);
 
 /* dInitODE2 was called. On failure nothing is left behind, detail says why and out->failed where. */

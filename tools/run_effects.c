@@ -9,7 +9,7 @@ typedef struct effect {
   const char *text;
   unsigned models;   /* that have it: bits by hap_model */
   unsigned autos;    /* that have it where a scene calls for it */
-  unsigned switched; /* that do without it when told */
+  unsigned switched; /* that can be told */
 } effect;
 
 #define BIT(model) (1u << (model))
@@ -29,7 +29,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"torque", "torque on the pointer", 0, 0, 0},
     {"gyro", "gyroscopic term in the loop", CONTACT, 0, 0},
     {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
-    {"proxy", "coupling by a proxy", 0, 0, 0},
+    {"proxy", "coupling by a proxy (--coupling)", 0, CONTACT, CONTACT},
     {"observer", "energy observer", EVERY, 0, 0},
     {"recording", "recording for a replay bit for bit", 0, 0, 0},
 };
@@ -116,10 +116,19 @@ hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_det
 static const char *state_of(const run_effects *wanted, hap_model model, size_t index)
 {
   const effect *e = &effects[index];
-  if ((e->switched & BIT(model)) != 0 && wanted->wish[index] == RUN_EFFECT_OFF) {
-    return "off";
+  if ((e->switched & BIT(model)) != 0 && wanted->wish[index] != RUN_EFFECT_AUTO) {
+    return wishes[wanted->wish[index]];
   }
   return (e->autos & BIT(model)) != 0 ? "auto" : has(model, e) ? "on" : "off";
+}
+
+run_effect_wish *run_effects_wish(run_effects *wanted, const char *name)
+{
+  size_t i = 0;
+  while (i + 1 < RUN_EFFECTS && strcmp(effects[i].name, name) != 0) {
+    ++i;
+  }
+  return &wanted->wish[i];
 }
 
 void run_effects_apply(const run_effects *wanted, hap_session_def *io)
@@ -138,9 +147,28 @@ void run_effects_print(const run_effects *wanted, hap_model model, FILE *out)
   }
 }
 
+static void list_models(size_t index, FILE *out)
+{
+  static const run_effects none;
+  const effect *e = &effects[index];
+  const char *between = "";
+  for (int m = 0; hap_model_name((hap_model)m) != NULL; ++m) {
+    const char *state = state_of(&none, (hap_model)m, index);
+    if (strcmp(state, "off") != 0) {
+      bool switched = (e->switched & BIT(m)) != 0;
+      fprintf(out, "%s%s %s%s", between, hap_model_name((hap_model)m), state,
+              switched ? " or as told" : "");
+      between = ", ";
+    }
+  }
+  fputs(*between == '\0' ? "in no model" : "", out);
+}
+
 void run_effects_list(FILE *out)
 {
   for (size_t i = 0; i < RUN_EFFECTS; ++i) {
-    fprintf(out, "  %-12s %s\n", effects[i].name, effects[i].text);
+    fprintf(out, "  %-12s %s\n%15s", effects[i].name, effects[i].text, "");
+    list_models(i, out);
+    fputc('\n', out);
   }
 }

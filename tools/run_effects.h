@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_RUN_EFFECTS_H
 #define HAPODE_TOOLS_RUN_EFFECTS_H
 
-/* The effects of design.md section 7. In this version they are not switches: the model decides, and
- * asking for another state is refused. */
+/* Parts of the simulation that a scene may or may not call for. Few are switches in this version: the
+ * model decides, and asking for another state is refused. */
 
 #include <stdbool.h>
 #include <stdio.h>
@@ -30,13 +30,16 @@ hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *deta
 /* HAP_ERROR_UNSUPPORTED for a wish that the model does not meet in this version. */
 hap_status run_effects_check(const run_effects *effects, hap_model model, hap_detail *detail);
 
+/* The wish for the effect of that name, one of those that run_effects_list prints. */
+run_effect_wish *run_effects_wish(run_effects *effects, const char *name);
+
 /* What the session can be told of it. */
 void run_effects_apply(const run_effects *effects, hap_session_def *io);
 
 /* "testing=on,cross=off,...": what the model has. */
 void run_effects_print(const run_effects *effects, hap_model model, FILE *out);
 
-/* One line each: name and what it is. */
+/* One line each: name, what it is, which models have it. */
 void run_effects_list(FILE *out);
 
 #endif

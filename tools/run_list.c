@@ -60,6 +60,6 @@ void run_list_print(FILE *out)
   for (size_t i = 0; (name = hap_device_name_at(i, &text)) != NULL; ++i) {
     fprintf(out, "  %-12s %s\n", name, text != NULL ? text : "");
   }
-  fputs("\neffects (in this version the model decides; auto is always right):\n", out);
+  fputs("\neffects (in most the model decides; auto is always right):\n", out);
   run_effects_list(out);
 }

@@ -145,6 +145,7 @@ static hap_status look(watch *w, double t)
     return status;
   }
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
+  run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
     run_picture_add_stats(loop->picture, t, &stats, 1.0 / run_summary_physics_hz(loop->options));
     w->next_sample = t + run_picture_interval(loop->picture) - 0.5 * PAUSE_S;

@@ -5,6 +5,7 @@
 
 /* Lets a session run for its time and takes the trace out of it on the way. */
 
+#include "tools/run_coupling.h"
 #include "tools/run_options.h"
 #include "tools/run_picture.h"
 #include "tools/run_progress.h"
@@ -18,6 +19,7 @@ typedef struct run_loop {
   FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
   run_progress progress;
+  run_coupling *coupling; /* filled in on the way */
 } run_loop;
 
 /* Rows that the session has to keep for run_loop_run. 0: nobody wants them. */

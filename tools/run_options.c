@@ -96,6 +96,28 @@ static hap_status take_effects(run_options *options, const option *self, const c
   return run_effects_parse(value, &options->effects, detail);
 }
 
+/* direct, proxy[:K], auto[:K] */
+static hap_status take_coupling(run_options *options, const option *self, const char *value,
+                                hap_detail *detail)
+{
+  static const char *const names[] = {[HAP_COUPLING_DIRECT] = "direct",
+                                      [HAP_COUPLING_PROXY] = "proxy",
+                                      [HAP_COUPLING_AUTO] = "auto"};
+  size_t length = strcspn(value, ":");
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    bool bare = value[length] == '\0';
+    if (strlen(names[i]) != length || memcmp(value, names[i], length) != 0 ||
+        (i == HAP_COUPLING_DIRECT && !bare)) {
+      continue;
+    }
+    options->rig.coupling = (hap_coupling)i;
+    options->rig.coupling_stiffness = 0.0;
+    options->coupling_given = true;
+    return bare ? HAP_OK : take_number(options, self, value + length + 1, detail);
+  }
+  return fail(detail, "\"%.60s\" is not direct, proxy, proxy:K, auto or auto:K, K in N/m", value);
+}
+
 static hap_status take_pose(run_options *options, const option *self, const char *value,
                             hap_detail *detail)
 {
@@ -194,6 +216,12 @@ static const option table[] = {
      take_probe, 0, 0, 0},
     {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
      offsetof(run_options, rig.max_force), 1e-6, 1e6},
+    {"--stiffness", "F", "of the pointers' contacts, N/m (default: the scene's)", take_number,
+     offsetof(run_options, rig.stiffness), 1e-3, 1e9},
+    {"--coupling", "NAME[:K]",
+     "of hand and world: direct, proxy or auto (default), which takes the proxy for\n"
+     "more than the device holds; K: what it holds, N/m (default: its own figures)",
+     take_coupling, offsetof(run_options, rig.coupling_stiffness), 1e-3, 1e9},
     {"--effects", "LIST", "such as friction=off,torque=auto; see --list", take_effects, 0, 0, 0},
     {"--trace", "FILE", "every tick as a row of a CSV file", take_text,
      offsetof(run_options, trace_path), 0, 0},
@@ -256,6 +284,27 @@ static hap_status take_option(char **argv, int *at, run_options *out, hap_detail
   return status < HAP_OK ? fail(detail, "%s: %.480s", found->name, why.text) : HAP_OK;
 }
 
+/* --coupling and the effect "proxy" are two names of one thing. */
+static hap_status join_coupling(run_options *o, hap_detail *detail)
+{
+  static const run_effect_wish wishes[] = {[HAP_COUPLING_DIRECT] = RUN_EFFECT_OFF,
+                                           [HAP_COUPLING_PROXY] = RUN_EFFECT_ON,
+                                           [HAP_COUPLING_AUTO] = RUN_EFFECT_AUTO};
+  static const hap_coupling couplings[] = {[RUN_EFFECT_OFF] = HAP_COUPLING_DIRECT,
+                                           [RUN_EFFECT_ON] = HAP_COUPLING_PROXY,
+                                           [RUN_EFFECT_AUTO] = HAP_COUPLING_AUTO};
+  run_effect_wish *proxy = run_effects_wish(&o->effects, "proxy");
+  if (o->rig.coupling == HAP_COUPLING_PROXY && o->rig.def.model != HAP_MODEL_CONTACT) {
+    return fail(detail, "--coupling: proxy needs --model contact");
+  }
+  if (o->coupling_given && *proxy != RUN_EFFECT_AUTO && *proxy != wishes[o->rig.coupling]) {
+    return fail(detail, "--coupling: --effects asks for something else by proxy=");
+  }
+  *proxy = o->coupling_given ? wishes[o->rig.coupling] : *proxy;
+  o->rig.coupling = couplings[*proxy];
+  return HAP_OK;
+}
+
 /* What only several options together can get wrong. */
 static hap_status check(run_options *o, hap_detail *detail)
 {
@@ -287,6 +336,9 @@ static hap_status check(run_options *o, hap_detail *detail)
   if (o->identify_path != NULL && o->rig.device_count != 1) {
     return fail(detail, "--identify: takes exactly one --device, there are %zu",
                 o->rig.device_count);
+  }
+  if (join_coupling(o, detail) < HAP_OK) {
+    return HAP_ERROR_ARGUMENT;
   }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
     return fail(detail, "--effects: %.480s", why.text);

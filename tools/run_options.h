@@ -20,6 +20,7 @@ typedef enum run_action {
 typedef struct run_options {
   run_action action;
   rig_options rig;
+  bool coupling_given;
   double seconds;     /* 0: as long as the scene says */
   double model_age_s; /* negative: not given */
   const char *trace_path;

@@ -30,11 +30,27 @@ static void number(FILE *out, const char *key, double value)
   fprintf(out, "%s: %.6g\n", key, value);
 }
 
-static const char *fault_name(uint32_t fault)
+static const char *fault_name(hap_fault fault)
 {
-  static const char *const names[] = {"none",        "device_read",  "device_pose", "force",
-                                      "local_state", "device_write", "world"};
-  return fault < sizeof names / sizeof names[0] ? names[fault] : "unknown";
+  switch (fault) {
+    case HAP_FAULT_NONE:
+      return "none";
+    case HAP_FAULT_DEVICE_READ:
+      return "device_read";
+    case HAP_FAULT_DEVICE_POSE:
+      return "device_pose";
+    case HAP_FAULT_FORCE:
+      return "force";
+    case HAP_FAULT_LOCAL_STATE:
+      return "local_state";
+    case HAP_FAULT_DEVICE_WRITE:
+      return "device_write";
+    case HAP_FAULT_WORLD:
+      return "world";
+    case HAP_FAULT_EMERGENCY:
+      return "emergency";
+  }
+  return "unknown";
 }
 
 static void print_setup(const run_options *options, FILE *out)
@@ -50,7 +66,7 @@ static void print_setup(const run_options *options, FILE *out)
 
 static void print_more(const hap_stats *stats, FILE *out)
 {
-  fprintf(out, "fault: %s\n", fault_name(stats->fault));
+  fprintf(out, "fault: %s\n", fault_name((hap_fault)stats->fault));
   fprintf(out, "realtime: %s\n", stats->realtime != 0 ? "yes" : "no");
   count(out, "physics_steps", stats->physics_steps);
   count(out, "physics_missed", stats->physics_missed);

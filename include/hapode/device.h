@@ -44,10 +44,12 @@ HAP_API hap_status hap_device_get_info(const hap_device *device, hap_device_info
                                        size_t size_of_out);
 
 /* [any, also a signal handler] Zero force on every device of every running session, at once. The
- * sessions latch HAP_FAULT_EMERGENCY: no force until hap_session_reset_fault. A write that is under way
+ * sessions latch HAP_FAULT_EMERGENCY: no force until hap_session_reset_fault. A device that is being
+ * identified is let go too, and its identification fails. A write that is under way
  * in the haptic thread may still come after it, and is followed by another zero within the same tick;
  * a handler that ends the process calls this twice, 2 ms apart. */
 HAP_API void hap_emergency_zero(void);
+
 /* What an identification found out about a device's mechanism. */
 typedef struct hap_device_identity {
   uint32_t size;   /* set by hap_device_identity_init */
@@ -108,7 +110,7 @@ HAP_API void hap_identify_def_init(hap_identify_def *def, size_t size_of_def);
  * the initialised *out: least squares on f(t - delay) = m a + b v + c sign(v) + k x + g. Blocks for some
  * 30 s; with HAP_PACING_VIRTUAL it takes the time of the computation alone. On return, whatever it
  * is, the force is zero and the device is stopped. HAP_ERROR_STATE when a pointer has the device;
- * HAP_ERROR_DEVICE with a detail text when it failed, went beyond a limit, did not move, is held by
+ * HAP_ERROR_DEVICE with a detail text when it failed, was let go by hap_emergency_zero, went beyond a limit, did not move, is held by
  * a hand (a spring of more than 30 N/m), or moved in a way that the model does not explain. */
 HAP_API HAP_NODISCARD hap_status hap_device_identify(hap_device *device,
                                                      const hap_identify_def *def,

@@ -25,7 +25,8 @@ typedef enum hap_coupling {
   HAP_COUPLING_DIRECT = 0, /* the pointer is at the pose of the device (the paper) */
   HAP_COUPLING_PROXY = 1, /* the pointer is a light body that a spring pulls to the device: what the
                               hand feels is never stiffer than the spring, however many contacts
-                              push. Model contact only. */
+                              push. Model contact only: in another one, when the session changes its
+                              model, the pointer is direct meanwhile */
   HAP_COUPLING_AUTO = 2   /* direct, and a proxy as soon as the stiffnesses of the contacts near the
                               pointer add up to more than the device can hold; where it does not say
                               what that is, and in other models than contact, direct */
@@ -34,7 +35,8 @@ typedef enum hap_coupling {
 /* Why a pointer has the coupling that it has. Values are fixed. */
 typedef enum hap_coupling_reason {
   HAP_COUPLING_ASKED = 0,   /* by its definition */
-  HAP_COUPLING_UNKNOWN = 1, /* direct: the device gives neither damping nor rated stiffness */
+  HAP_COUPLING_UNKNOWN = 1, /* direct: the device gives neither damping nor rated stiffness, or
+                               force_scale is 0 */
   HAP_COUPLING_MODEL = 2,   /* direct: the session's model is not contact */
   HAP_COUPLING_WITHIN = 3,  /* direct: the device can hold what is near */
   HAP_COUPLING_ABOVE = 4    /* proxy: it cannot */
@@ -90,8 +92,8 @@ typedef struct hap_pointer_def {
   double hand_damping;     /* N s/m, 0..1e3, default 0: the least that the hand always adds to the
                                 device's own damping (a finger held loosely: about 1) */
   double max_slew; /* N/s at the device, >= 0: fastest change of the force, also on the way to zero
-                      after a fault; the torque's is in the same proportion to its limit. 0
-                      (default): the whole force in 2 ms */
+                      after a fault, which takes 100 ms at most; the torque's is in the same
+                      proportion to its limit. 0 (default): the whole force in 2 ms */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */

@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "base/vec.h"
 #include "device/device.h"
+#include "device/emergency.h"
 
 #define COOKIE 0x48494431u
 #define FORCE_SHARE 0.3    /* of the device's own limit */
@@ -38,7 +39,8 @@ typedef struct run {
   const hap_device *device;
   const hap_identify_def *def;
   hap_detail *detail;
-  double limit; /* N */
+  double limit;         /* N */
+  uint64_t emergencies; /* calls of hap_emergency_zero before it began */
   int64_t start_ns;
   uint64_t tick;
   double time; /* s since start */
@@ -178,18 +180,30 @@ static hap_status tell(run *r)
   return r->def->watch(r->def->user, fmin(r->time / whole, 1.0)) == 0 ? HAP_OK : HAP_END;
 }
 
+/* No force after hap_emergency_zero; one that was on its way meanwhile is taken off by the end. */
+static hap_status give(const run *r, double force)
+{
+  hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hap_wrench reached;
+  wanted.force[r->axis] = force;
+  if (hapi_emergencies() == r->emergencies &&
+      r->device->ops->write(r->device->self, &wanted, &reached) < HAP_OK) {
+    return fail(r, "it takes no force");
+  }
+  return hapi_emergencies() == r->emergencies
+             ? HAP_OK
+             : fail(r, "hap_emergency_zero was called: its force was taken off");
+}
+
 /* Gives the force, waits for the next tick and reads. Anything but HAP_OK ends the identification. */
 static hap_status step(run *r, double force)
 {
   hapi_identify_record *axis = &r->records[r->axis];
-  hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hap_wrench reached;
-  wanted.force[r->axis] = force;
   axis->samples[axis->count - 1].force = force;
-  if (r->device->ops->write(r->device->self, &wanted, &reached) < HAP_OK) {
-    return fail(r, "it takes no force");
+  hap_status status = give(r, force);
+  if (status == HAP_OK) {
+    status = read_device(r);
   }
-  hap_status status = read_device(r);
   if (status == HAP_OK) {
     status = record(r);
   }
@@ -395,12 +409,18 @@ static hap_status conclude(const run *r, hap_device_identity *out)
 static hap_status run_device(run *r, hap_device_identity *out)
 {
   const hap_device_ops *ops = r->device->ops;
+  r->emergencies = hapi_emergencies();
   if (ops->start(r->device->self) < HAP_OK) {
     return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s' did not start",
                      r->device->info.name);
   }
-  hap_status status = move_all(r);
+  bool known = hapi_emergency_add(ops, r->device->self);
+  hap_status status =
+      known ? move_all(r)
+            : hapi_fail(r->detail, HAP_ERROR_CAPACITY,
+                        "all %d places for running devices are in use", HAPI_EMERGENCY_DEVICES);
   ops->zero(r->device->self);
+  hapi_emergency_remove(ops, r->device->self);
   ops->stop(r->device->self);
   return status == HAP_OK ? conclude(r, out) : status;
 }

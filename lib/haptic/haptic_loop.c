@@ -223,10 +223,10 @@ static void follow_faults(hapi_haptic *haptic)
   }
 }
 
-/* hap_pointer_id.v of an index + 1; 0 stays 0. */
-static uint64_t public_id(const hapi_tick *tick, uint32_t number)
+/* hap_pointer_id.v; 0: none. */
+static uint64_t fault_pointer(const hapi_tick *tick)
 {
-  return number == 0 ? 0 : ((uint64_t)tick->pointers[number - 1].generation << 32) | number;
+  return ((uint64_t)tick->fault_generation << 32) | tick->fault_pointer;
 }
 
 static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
@@ -238,7 +238,7 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   STORE(saturated_ticks, tick->saturated_ticks);
   STORE(faults, tick->faults);
   STORE(fault, (int)tick->fault);
-  STORE(fault_pointer, public_id(tick, tick->fault_pointer));
+  STORE(fault_pointer, fault_pointer(tick));
   STORE(stale_times, tick->guard.stale_times);
   STORE(stale_ticks, tick->guard.stale_ticks);
   STORE(slewed_ticks, tick->guard.slewed_ticks);

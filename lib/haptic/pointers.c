@@ -11,6 +11,7 @@
 #include "haptic/haptic_internal.h"
 
 #define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
+#define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
 /* ---- the loop's side ---- */
 
@@ -288,8 +289,19 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
 static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
                                  hap_detail *detail)
 {
-  if (slot->def.coupling == HAP_COUPLING_PROXY &&
-      !hapi_coupling_gains_of(&slot->info, &slot->def, haptic->tick.period).known) {
+  const hap_pointer_def *def = &slot->def;
+  if (def->coupling != HAP_COUPLING_PROXY) {
+    return HAP_OK;
+  }
+  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.period);
+  double scale = def->motion_scale * def->force_scale;
+  if (gains.known && !(gains.stiffness <= scale * WORLD_STIFFNESS_MOST)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "coupling proxy: with force_scale %g the spring of %g N/m has no use; take "
+                     "coupling direct or a larger force_scale",
+                     def->force_scale, gains.stiffness);
+  }
+  if (!gains.known) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "coupling proxy: the device gives neither damping nor rated stiffness; set "
                      "coupling_stiffness, or have the device identified");

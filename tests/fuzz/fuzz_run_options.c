@@ -53,6 +53,12 @@ static void check_options(const run_options *options)
   check_between(options->seconds, 0.0, 86400.0);
   FUZZ_CHECK(options->rig.max_force == 0.0 || options->rig.max_force >= 1e-6);
   check_between(options->rig.max_force, 0.0, 1e6);
+  FUZZ_CHECK(options->rig.stiffness == 0.0 || options->rig.stiffness >= 1e-3);
+  check_between(options->rig.stiffness, 0.0, 1e9);
+  check_between(options->rig.coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_AUTO);
+  check_between(options->rig.coupling_stiffness, 0.0, 1e9);
+  FUZZ_CHECK(options->rig.coupling != HAP_COUPLING_PROXY ||
+             options->rig.def.model == HAP_MODEL_CONTACT);
   FUZZ_CHECK(options->rig.scene != NULL && options->rig.scene[0] != '\0');
   FUZZ_CHECK(options->rig.device_count <= RIG_POINTERS_MAX);
   for (size_t i = 0; i < options->rig.device_count; ++i) {

@@ -25,7 +25,7 @@ static void fill(const hapi_tick *tick, uint32_t index, hap_black_box_row *out)
   out->twist = p->device_twist;
   out->wanted = p->guard.wanted;
   out->written = p->guard.written;
-  out->model_age_s = 1e-9 * (double)(tick->now_ns - tick->state_ns);
+  out->model_age_s = tick->model_number != 0 ? 1e-9 * (double)(tick->now_ns - tick->state_ns) : 0.0;
 }
 
 static void fill_tick(hapi_black_box *box, const hapi_tick *tick)

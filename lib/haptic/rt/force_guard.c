@@ -11,8 +11,8 @@
  * the projection onto a ball, which brings no two points farther apart. */
 
 #define RAMP_IN_S 0.02
-#define FADE_S 0.1        /* from full force to none with an old local model */
-#define AGE_LEAST 0.01    /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
+#define FADE_S 0.1     /* from full force to none with an old local model; longest after a fault */
+#define AGE_LEAST 0.01 /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
 #define WRENCH_LIMIT 1e12 /* N, N m: beyond it is an error, and its square could overflow */
 
 void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
@@ -20,6 +20,7 @@ void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
   if (tick->fault == HAP_FAULT_NONE) {
     tick->fault = fault;
     tick->fault_pointer = pointer;
+    tick->fault_generation = pointer > 0 ? tick->pointers[pointer - 1].generation : 0;
     ++tick->faults;
   }
 }
@@ -30,7 +31,7 @@ void hapi_tick_reset_fault(hapi_tick *tick)
     return;
   }
   tick->fault = HAP_FAULT_NONE;
-  tick->fault_pointer = 0;
+  tick->fault_pointer = tick->fault_generation = 0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.share = 0.0;
   }
@@ -123,11 +124,15 @@ static bool saturate(double v[3], double limit)
   return true;
 }
 
+/* A slew limit that is meant for touch does not keep the force on after a fault. */
 static void limit_slew(const hapi_tick *tick, hapi_tick_pointer *p)
 {
   const hapi_guard_pointer *g = &p->guard;
-  bool force = slew(g->written.force, tick->period * p->slew_force, p->device_wrench.force);
-  bool torque = slew(g->written.torque, tick->period * p->slew_torque, p->device_wrench.torque);
+  bool fault = tick->fault != HAP_FAULT_NONE;
+  double force_rate = fault ? fmax(p->slew_force, p->max_force / FADE_S) : p->slew_force;
+  double torque_rate = fault ? fmax(p->slew_torque, p->max_torque / FADE_S) : p->slew_torque;
+  bool force = slew(g->written.force, tick->period * force_rate, p->device_wrench.force);
+  bool torque = slew(g->written.torque, tick->period * torque_rate, p->device_wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
 }
 

@@ -15,6 +15,7 @@
 #define KEEP_SHARE 0.9 /* of what the device holds: below it the coupling may be direct again */
 #define OFFSET_DECAY_S 0.02 /* time constant */
 #define OFFSET_LEAST 1e-9   /* m */
+#define LEAP_MOST 1e-4      /* m, of the pointer when the coupling becomes direct again */
 
 static bool is_above(const hapi_tick_pointer *p)
 {
@@ -32,12 +33,17 @@ static void begin_proxy(hapi_tick_pointer *p)
   hapi_v3_scale(-1.0 / p->coupling_stiffness, p->wrench.force, p->offset);
 }
 
-static bool is_idle(const hapi_tick_pointer *p)
+/* Nothing touches, and the pointer would not leap to the device: a proxy with mass swings about it. */
+static bool is_idle(const hapi_tick_pointer *p, double period)
 {
-  return p->contacts == 0 && hapi_v3_norm(p->offset) < OFFSET_LEAST;
+  double leap[3];
+  hapi_v3_sub(p->handle_position, p->proxy_position, leap);
+  hapi_v3_madd(leap, -period, p->proxy_velocity, leap);
+  return p->contacts == 0 && hapi_v3_norm(p->offset) < OFFSET_LEAST &&
+         hapi_v3_norm(leap) < LEAP_MOST;
 }
 
-static void choose(hapi_tick_pointer *p)
+static void choose(hapi_tick_pointer *p, double period)
 {
   bool wanted = p->coupling == HAP_COUPLING_PROXY;
   p->coupling_reason = HAP_COUPLING_ASKED;
@@ -46,7 +52,7 @@ static void choose(hapi_tick_pointer *p)
     p->coupling_reason = !p->hold_known ? HAP_COUPLING_UNKNOWN
                          : wanted       ? HAP_COUPLING_ABOVE
                                         : HAP_COUPLING_WITHIN;
-    if (p->proxied && !wanted && !is_idle(p)) {
+    if (p->proxied && !wanted && !is_idle(p, period)) {
       wanted = true; /* back at the end of the touch, when there is no force to jump */
       p->coupling_reason = HAP_COUPLING_ABOVE;
     }
@@ -55,6 +61,34 @@ static void choose(hapi_tick_pointer *p)
     begin_proxy(p);
   }
   p->proxied = wanted;
+}
+
+/* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones do. */
+static void end_proxy(hapi_tick *tick, uint32_t index)
+{
+  tick->pointers[index].proxied = false;
+  tick->pointers[index].row = 0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    if (tick->contacts[i].pointer == index) {
+      tick->contacts[i].ramp = 0.0;
+    }
+  }
+}
+
+void hapi_proxy_none(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    p->coupling_reason =
+        p->coupling == HAP_COUPLING_DIRECT ? HAP_COUPLING_ASKED : HAP_COUPLING_MODEL;
+    p->near_stiffness = p->contact_stiffness = 0.0;
+    if (p->proxied) {
+      end_proxy(tick, i);
+    }
+  }
 }
 
 static double response(const hapi_tick *tick, const hapi_tick_pointer *p)
@@ -84,7 +118,7 @@ void hapi_proxy_begin(hapi_tick *tick)
     if (p->generation == 0) {
       continue;
     }
-    choose(p);
+    choose(p, tick->period);
     p->contact_stiffness = p->near_stiffness;
     p->near_stiffness = 0.0;
     if (p->proxied) {

@@ -245,8 +245,9 @@ typedef struct hapi_tick {
 
   double physics_period; /* s, H of the model in use; 0: not known */
   hapi_guard_state guard;
-  hap_fault fault;        /* latched */
-  uint32_t fault_pointer; /* index + 1 of the pointer that it came from; 0: none of them */
+  hap_fault fault;           /* latched */
+  uint32_t fault_pointer;    /* index + 1 of the pointer that it came from; 0: none of them */
+  uint32_t fault_generation; /* of that pointer, which may have gone since */
   uint64_t faults;
   uint32_t pushing; /* contacts that push in this tick */
   double peak_force;
@@ -292,6 +293,7 @@ void hapi_local_step(hapi_tick *tick);       /* eq. 8-11, 14 */
 void hapi_local_world_step(hapi_tick *tick); /* model CONTACT: b and c in one */
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body); /* a resting one, before its rows */
 void hapi_proxy_begin(hapi_tick *tick);                       /* direct or proxy, and why */
+void hapi_proxy_none(hapi_tick *tick);                        /* other models: all are direct */
 void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
 void hapi_proxy_move(hapi_tick *tick);                        /* poses and forces on the hands */
 void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
