@@ -510,7 +510,7 @@ static void yield_to(uint32_t flags, hap_model model)
   patches->contact_count = 0;
   hapi_tick_adopt_patches(&f.tick, patches);
   f.contacts[0].seen = true; /* no ramp of its own */
-  f.contacts[0].ramp = 1.0;
+  f.contacts[0].ramp.share = 1.0;
   p->guard.share = 1.0;
   for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
     p->device_pose.position[0] = -0.05 * T * i;
@@ -606,7 +606,7 @@ TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
   record(1);
   CHECK(read_box(1000) == 11 && read_rows[10].fault == HAP_FAULT_WORLD);
-  CHECK(read_rows[0].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
+  CHECK(read_rows[1].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
 }
 
 TEST(each_pointer_has_its_rows)

@@ -10,6 +10,7 @@
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 
+#define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
 #define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
 
 /* ---- the loop's side ---- */
@@ -53,6 +54,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
+  p->speed_limit = slot->ops != NULL ? SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;

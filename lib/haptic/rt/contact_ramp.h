@@ -3,23 +3,40 @@
 #ifndef HAPODE_HAPTIC_RT_CONTACT_RAMP_H
 #define HAPODE_HAPTIC_RT_CONTACT_RAMP_H
 
+#include <math.h>
+
 #include "haptic/rt/tick.h"
 
 /* A contact that is already deep when it arrives gets its full force after this time. */
 #define HAPI_RAMP_S 0.02
 
-/* Share of its force that a contact has. One that arrives with depth starts at zero; one that closes
- * later has all of it. Once a tick. */
-static inline double hapi_contact_ramp(hapi_local_contact *c, double depth, double period)
+/* What it is deeper than this does not count at once but comes in at this speed: a spring of 1 kN/m
+ * that begins 0.5 m deep would hold 125 J, and throw 1 kg away at 16 m/s. */
+#define HAPI_RAMP_DEPTH 0.01 /* m */
+#define HAPI_RAMP_SPEED 0.2  /* m/s */
+
+static inline void hapi_contact_ramp_begin(hapi_local_contact *c, double depth)
 {
+  c->seen = true;
+  c->ramp.share = depth > 0.0 ? 0.0 : 1.0;
+  c->ramp.excess = fmax(depth - HAPI_RAMP_DEPTH, 0.0);
+}
+
+/* Share of its force that a contact has, and the part of its depth that counts in *io_depth. One that
+ * arrives with depth starts at zero; one that closes later has all of it. A pointer that draws back out
+ * of an excess depth has it off for good. Once a tick. */
+static inline double hapi_contact_ramp(hapi_local_contact *c, double *io_depth, double period)
+{
+  double depth = *io_depth;
+  hapi_ramp *r = &c->ramp;
   if (!c->seen) {
-    c->seen = true;
-    c->ramp = depth > 0.0 ? 0.0 : 1.0;
-  } else if (c->ramp < 1.0) {
-    double next = depth > 0.0 ? c->ramp + period / HAPI_RAMP_S : 1.0;
-    c->ramp = next > 1.0 ? 1.0 : next;
+    hapi_contact_ramp_begin(c, depth);
+  } else if (r->share < 1.0 || r->excess > 0.0) {
+    r->share = depth > 0.0 ? fmin(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
+    r->excess = fmax(fmin(r->excess, depth) - HAPI_RAMP_SPEED * period, 0.0);
   }
-  return c->ramp;
+  *io_depth = depth - r->excess;
+  return r->share;
 }
 
 #endif

@@ -4,7 +4,11 @@
 #include "haptic/rt/tick.h"
 
 /* Between device and world. The pointer is where the device is (paper section 3), unless it is a
- * proxy (proxy.c), which then takes its place. */
+ * proxy (proxy.c), which then takes its place.
+ *
+ * A device that is farther from where it was at the last tick than a hand can move it in a tick has
+ * jumped: an encoder slipped, or the loop did not run for some time. It is then taken as one that has
+ * just come, whose contacts begin anew (contact_ramp.h). */
 
 static bool plausible(const double *values, int count)
 {
@@ -36,7 +40,37 @@ static bool place_pointer(hapi_tick_pointer *p)
   hapi_v3_copy(p->pose.position, p->handle_position);
   hapi_v3_copy(p->twist.linear, p->handle_velocity);
   p->device_good = p->device_pose;
+  p->placed = true;
   return true;
+}
+
+/* Whatever time has passed: what counts is how deep it may be at once. */
+static bool jumps(const hapi_tick_pointer *p, double period)
+{
+  double way[3];
+  hapi_v3_sub(p->device_pose.position, p->device_good.position, way);
+  return p->placed && p->speed_limit > 0.0 && hapi_v3_norm(way) > p->speed_limit * period;
+}
+
+static void begin_anew(hapi_tick *tick, uint32_t index)
+{
+  hapi_tick_pointer *p = &tick->pointers[index];
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    hapi_local_contact *c = &tick->contacts[i];
+    c->seen = c->seen && c->pointer != index;
+  }
+  hapi_v3_copy(p->handle_position, p->proxy_position);
+  hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
+  hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+}
+
+/* A velocity that is a difference of such positions would be felt through every damper. */
+static void check_speed(hapi_tick_pointer *p)
+{
+  double *v = p->device_twist.linear;
+  if (p->jumped || (p->speed_limit > 0.0 && hapi_v3_norm(v) > p->speed_limit)) {
+    hapi_v3_set(v, 0.0, 0.0, 0.0);
+  }
 }
 
 void hapi_coupling_read(hapi_tick *tick)
@@ -48,8 +82,12 @@ void hapi_coupling_read(hapi_tick *tick)
     }
     bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
                 plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
+    p->jumped = good && jumps(p, tick->period);
+    check_speed(p);
     if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
+    } else if (p->jumped) {
+      begin_anew(tick, i);
     }
   }
 }

@@ -175,7 +175,8 @@ static double port_gave(hapi_tick_pointer *p)
     hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
     g->placed = true;
   }
-  return world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+  double gave = world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+  return p->jumped ? fmax(gave, 0.0) : gave; /* nobody put in what a jump would have cost */
 }
 
 static bool any(const double v[3])

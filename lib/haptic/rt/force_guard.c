@@ -34,6 +34,9 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.share = 0.0;
   }
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    tick->contacts[i].seen = false; /* the hand may be anywhere by now */
+  }
 }
 
 void hapi_guard_cut(hapi_tick_pointer *pointer)

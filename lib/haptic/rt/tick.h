@@ -87,6 +87,9 @@ typedef struct hapi_tick_pointer {
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
   hap_pose device_good;   /* the last device_pose that could be used */
+  bool placed;            /* there was one */
+  bool jumped;            /* between the last one and this one; see coupling.c */
+  double speed_limit;     /* m/s at the device, that a hand can make; 0: none */
   uint32_t buttons;       /* in */
   bool estimates;         /* device_twist is made of poses by velocity, not read */
   hapi_velocity velocity;
@@ -152,6 +155,12 @@ typedef struct hapi_local_body {
   int64_t owned_until_ns;
 } hapi_local_body;
 
+/* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
+typedef struct hapi_ramp {
+  double share;  /* 0..1, of the force */
+  double excess; /* m, of the depth that does not count */
+} hapi_ramp;
+
 typedef struct hapi_local_contact {
   uint32_t slot;
   uint32_t body;
@@ -162,7 +171,7 @@ typedef struct hapi_local_contact {
   double point_body[3];
   double normal_body[3];
   double a[6][3];
-  double ramp;     /* 0..1, share of the force */
+  hapi_ramp ramp;
   double force[3]; /* on the body */
 
   /* Model CONTACT. */
@@ -220,7 +229,7 @@ typedef struct hapi_tick {
   hapi_local_body *bodies;      /* by slot, capacity.bodies */
   uint32_t *live;               /* slots in the model, live_count */
   hapi_local_contact *contacts; /* of the model, contact_count */
-  double *ramps;                /* by contact slot, of the model before: to go on with */
+  hapi_ramp *ramps;             /* by contact slot, of the model before: to go on with */
   uint32_t *ramp_generations;   /* by contact slot */
   hapi_tick_pointer *pointers;  /* capacity.pointers */
   uint32_t live_count;
