@@ -15,25 +15,32 @@
 #define HAPI_RAMP_DEPTH 0.01 /* m */
 #define HAPI_RAMP_SPEED 0.2  /* m/s */
 
-static inline void hapi_contact_ramp_begin(hapi_local_contact *c, double depth)
+/* Where a device jumped, none of the depth counts: nobody put in the energy that it stands for. The
+ * surface is where the device is, goes back with it, and does not come after it. */
+static inline void hapi_contact_ramp_begin(hapi_local_contact *c, double depth, bool jumped)
 {
+  bool deep = depth > 0.0;
   c->seen = true;
-  c->ramp.share = depth > 0.0 ? 0.0 : 1.0;
-  c->ramp.excess = fmax(depth - HAPI_RAMP_DEPTH, 0.0);
+  c->ramp.share = deep && !jumped ? 0.0 : 1.0;
+  c->ramp.excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0);
+  c->ramp.held = deep && jumped;
 }
 
-/* Share of its force that a contact has, and the part of its depth that counts in *io_depth. One that
- * arrives with depth starts at zero; one that closes later has all of it. A pointer that draws back out
- * of an excess depth has it off for good. Once a tick. */
-static inline double hapi_contact_ramp(hapi_local_contact *c, double *io_depth, double period)
+/* Share of its force that a contact of the pointer has, and the part of its depth that counts in
+ * *io_depth. One that arrives with depth starts at zero; one that closes later has all of it. A pointer
+ * that draws back out of an excess depth has it off for good. Once a tick. */
+static inline double hapi_contact_ramp(hapi_local_contact *c, const hapi_tick_pointer *p,
+                                       double *io_depth, double period)
 {
   double depth = *io_depth;
   hapi_ramp *r = &c->ramp;
+  c->depth = depth;
   if (!c->seen) {
-    hapi_contact_ramp_begin(c, depth);
+    hapi_contact_ramp_begin(c, depth, p->jump_s > 0.0);
   } else if (r->share < 1.0 || r->excess > 0.0) {
+    double comes_in = r->held ? 0.0 : HAPI_RAMP_SPEED * period;
     r->share = depth > 0.0 ? fmin(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
-    r->excess = fmax(fmin(r->excess, depth) - HAPI_RAMP_SPEED * period, 0.0);
+    r->excess = fmax(fmin(r->excess, depth) - comes_in, 0.0);
   }
   *io_depth = depth - r->excess;
   return r->share;

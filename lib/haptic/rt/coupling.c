@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <string.h>
+
 #include "base/vec.h"
 #include "haptic/rt/tick.h"
 
@@ -7,8 +9,10 @@
  * proxy (proxy.c), which then takes its place.
  *
  * A device that is farther from where it was at the last tick than a hand can move it in a tick has
- * jumped: an encoder slipped, or the loop did not run for some time. It is then taken as one that has
- * just come, whose contacts begin anew (contact_ramp.h). */
+ * jumped: an encoder slipped, or the loop did not run for some time. Its contacts begin anew, and so do
+ * those that come with the next models (contact_ramp.h). */
+
+#define JUMP_S 0.01 /* and two steps of physics: a model for the new place has come */
 
 static bool plausible(const double *values, int count)
 {
@@ -57,7 +61,10 @@ static void begin_anew(hapi_tick *tick, uint32_t index)
   hapi_tick_pointer *p = &tick->pointers[index];
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     hapi_local_contact *c = &tick->contacts[i];
-    c->seen = c->seen && c->pointer != index;
+    if (c->pointer == index) {
+      c->seen = false;
+      memset(&c->ramp, 0, sizeof c->ramp);
+    }
   }
   hapi_v3_copy(p->handle_position, p->proxy_position);
   hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
@@ -83,6 +90,7 @@ void hapi_coupling_read(hapi_tick *tick)
     bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
                 plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
     p->jumped = good && jumps(p, tick->period);
+    p->jump_s = p->jumped ? JUMP_S + 2.0 * tick->physics_period : p->jump_s - tick->period;
     check_speed(p);
     if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */

@@ -16,6 +16,10 @@
  *   others   (all bodies of the other models, and static, driven and measured ones): their motion is
  *            given, and what they do on a pointer's spring is the world's work.
  *
+ *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
+ *            a spring that is under load: the world's work, to either side. What is in the spring of a
+ *            contact that is no more is lost.
+ *
  * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
  * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
  * motion of an owned body. Of the other models only the port and the springs are watched.
@@ -152,6 +156,40 @@ static double surfaces_give(hapi_tick *tick, double *io_stored)
   return sum;
 }
 
+/* J in the spring of a contact that goes no farther than to the limit of the force. */
+static double spring_energy(const hapi_tick_pointer *p, double share, double depth)
+{
+  double k = share * p->stiffness;
+  double limit = p->force_scale > 0.0 ? p->max_force / p->force_scale : 0.0;
+  if (!(depth > 0.0) || !(k > 0.0)) {
+    return 0.0;
+  }
+  double force = k * depth;
+  return force <= limit ? 0.5 * force * depth : limit * (depth - 0.5 * limit / k);
+}
+
+/* J that ramps and fading added to the springs in this tick. */
+static double ramps_give(hapi_tick *tick)
+{
+  hapi_guard_state *guard = &tick->guard;
+  double gone = guard->sprung;
+  double sum = 0.0;
+  guard->sprung = 0.0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    hapi_local_contact *c = &tick->contacts[i];
+    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    hapi_ramp *r = &c->ramp;
+    gone -= r->sprung;
+    double before = spring_energy(p, r->felt_share, c->depth - r->felt_excess);
+    r->felt_share = r->share * p->guard.share * (1.0 - guard->age_loss);
+    r->felt_excess = r->excess;
+    r->sprung = spring_energy(p, r->felt_share, c->depth - r->felt_excess);
+    guard->sprung += r->sprung;
+    sum += r->sprung - before;
+  }
+  return sum - gone;
+}
+
 /* J in the springs between devices and proxies. */
 static double couplings_store(const hapi_tick *tick)
 {
@@ -240,8 +278,12 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
 static void forget(hapi_tick *tick)
 {
   tick->guard.balance = 0.0;
+  tick->guard.sprung = 0.0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.placed = false;
+  }
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    tick->contacts[i].ramp.felt_share = tick->contacts[i].ramp.sprung = 0.0;
   }
 }
 
@@ -254,6 +296,7 @@ void hapi_energy_observe(hapi_tick *tick)
     forget(tick);
     return;
   }
+  given += ramps_give(tick);
   if (!settle_ports(tick)) {
     guard->balance = fmin(guard->balance, 0.0);
     return;

@@ -66,6 +66,7 @@ typedef struct hapi_guard_state {
   uint64_t energy_ticks;
   double balance;    /* J, world units: what the hands and the world have put in and not got back */
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
+  double sprung;     /* J, sum over the contacts of the last tick */
   double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
@@ -89,6 +90,7 @@ typedef struct hapi_tick_pointer {
   hap_pose device_good;   /* the last device_pose that could be used */
   bool placed;            /* there was one */
   bool jumped;            /* between the last one and this one; see coupling.c */
+  double jump_s; /* s, > 0: contacts that arrive deep are so because of a jump */
   double speed_limit;     /* m/s at the device, that a hand can make; 0: none */
   uint32_t buttons;       /* in */
   bool estimates;         /* device_twist is made of poses by velocity, not read */
@@ -159,6 +161,12 @@ typedef struct hapi_local_body {
 typedef struct hapi_ramp {
   double share;  /* 0..1, of the force */
   double excess; /* m, of the depth that does not count */
+  bool held;     /* the excess goes by drawing back alone */
+
+  /* Of the energy observer, at the last tick: */
+  double felt_share; /* with what the guard took */
+  double felt_excess;
+  double sprung; /* J in the spring, as it was felt */
 } hapi_ramp;
 
 typedef struct hapi_local_contact {
@@ -172,6 +180,7 @@ typedef struct hapi_local_contact {
   double normal_body[3];
   double a[6][3];
   hapi_ramp ramp;
+  double depth; /* m, with the excess */
   double force[3]; /* on the body */
 
   /* Model CONTACT. */
