@@ -44,6 +44,7 @@ typedef struct felt_book {
   double work;      /* J, that the force did on the hand */
   double work_most; /* J, largest at any time */
   double work_once; /* J, largest between two reads */
+  double way_most;  /* m, that the hand went, largest between two reads */
 } felt_book;
 
 static felt_book felt;
@@ -75,6 +76,7 @@ static inline void felt_move(const double at[3])
   felt.work += work;
   felt.work_most = fmax(felt.work_most, felt.work);
   felt.work_once = fmax(felt.work_once, work);
+  felt.way_most = fmax(felt.way_most, felt.placed ? hapi_v3_norm(way) : 0.0);
   felt.placed = true;
   hapi_v3_copy(at, felt.at);
 }

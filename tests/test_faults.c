@@ -98,9 +98,24 @@ static void check_normal_after(int ticks)
 {
   run_ticks(ticks);
   CHECK(stats_of(&f.s).fault == HAP_FAULT_NONE);
-  CHECK(felt_guard(&f) == 0);
+  CHECK((felt_guard(&f) & (HAP_GUARD_FAULT | HAP_GUARD_STALE | HAP_GUARD_RAMP_IN)) == 0);
   run_ticks(2000);
   CHECK_NEAR(felt_force(), 5.217, 0.01);
+  CHECK(felt_guard(&f) == 0);
+}
+
+/* What a hand of 0.3 kg and 5 N s/m would be driven to by the whole force of the device for ever is
+ * 2 m/s. */
+static void check_no_burst(void)
+{
+  printf("# the force rose by %.3g N a tick at most, the hand came to %.3g m/s\n", felt.steepest,
+         1e3 * felt.way_most);
+  CHECK(felt.steepest < 2.0 && felt.way_most < 1e-3);
+}
+
+static void look_for_a_burst(void)
+{
+  felt.steepest = felt.way_most = 0.0;
 }
 
 /* No force at all for some time, and the cause known. */
@@ -122,7 +137,7 @@ TEST(physics_that_dies_fades_within_100_ms_and_comes_back_in_a_step)
   REQUIRE(begin_pressing());
   double before = felt_force();
   felt.steepest = 0.0;
-  run_alone(30); /* an age of two steps is in good order */
+  run_alone(20); /* an age of two steps is in good order */
   CHECK_NEAR(felt_force(), before, 1e-3);
   run_alone(120);
   CHECK(felt_force() == 0.0 && felt_guard(&f) == HAP_GUARD_STALE);
@@ -130,9 +145,10 @@ TEST(physics_that_dies_fades_within_100_ms_and_comes_back_in_a_step)
   run_alone(5000);
   CHECK(felt_force() == 0.0 && stats_of(&f.s).faults == 0 && stats_of(&f.s).stale_times == 1);
   CHECK(felt.work_most < 1e-6); /* the hand sinks in, and is never pushed */
-  felt.steepest = 0.0;
+  look_for_a_burst();
   tick = (tick / STEP_TICKS + 1) * STEP_TICKS;
   check_normal_after(2 + STEP_TICKS);
+  printf("# steepest %.3g N a tick, hand %.3g m/s\n", felt.steepest, 1e3 * felt.way_most);
   CHECK(felt.steepest < 40.0 / STEP_TICKS + 0.5); /* N: 1000 N/m 40 mm deep, over a step */
   felt_end(&f);
 }
@@ -188,7 +204,7 @@ TEST(dropped_ticks_give_the_hand_no_more_than_the_force_held_over_one_gap)
              dropped[i], bare.work, kept.work, kept.once, kept.stored);
       /* Of a longer gap a debt larger than all that was stored is forgiven. */
       bool is_long = dropped[i] > 20;
-      CHECK(kept.work <= (is_long ? 0.1 * bare.work : 0.01 * kept.stored + kept.once));
+      CHECK(kept.work <= (is_long ? 0.3 * bare.work : 0.01 * kept.stored + kept.once));
     }
   }
 }
@@ -235,21 +251,24 @@ TEST(a_jittering_clock_gives_the_hand_no_more_than_the_force_held_over_one_tick)
   }
 }
 
-TEST(a_loop_that_stood_still_while_the_hand_went_in_comes_up_from_zero)
+TEST(a_loop_that_stood_still_while_the_hand_went_in_takes_the_surface_to_the_hand)
 {
   for (int i = 0; i < 2; ++i) { /* the hand starts outside and in contact */
     felt_init(&f, HAP_DRIVE_LOCKSTEP, false);
-    REQUIRE(begin(i == 0 ? "path=0:-0.1/0/0;1:-0.1/0/0;1.3:0.2/0/0"
-                         : "path=0:-0.057/0/0;1:-0.057/0/0;1.3:0.2/0/0"));
+    REQUIRE(begin(i == 0 ? "path=0:-0.1/0/0;1:-0.1/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
+                           "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"
+                         : "path=0:-0.057/0/0;1:-0.057/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
+                           "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"));
     run_ticks(1000);
     CHECK_NEAR(felt_force(), i == 0 ? 0.0 : 3.0, 1e-6);
     drop_ticks(300);
-    run_tick();
-    CHECK(felt_force() < 1e-9);
-    felt.steepest = 0.0;
-    run_ticks(300); /* rigid, it stays where it is and feels the limit in the end */
-    CHECK_NEAR(felt_force(), FELT_LIMIT, 1e-9);
-    CHECK(felt.steepest < 1.0 && stats_of(&f.s).faults == 0);
+    run_ticks(700); /* 0.25 m deep */
+    CHECK(felt_force() == 0.0);
+    run_ticks(500); /* 2 mm on */
+    CHECK_NEAR(felt_force(), 2.0, 1e-6);
+    run_ticks(2500); /* out, and in again: the wall is where it was */
+    CHECK_NEAR(felt_force(), 3.0, 1e-6);
+    CHECK(stats_of(&f.s).faults == 0 && felt.peak <= 3.0 + 1e-6);
     felt_end(&f);
   }
 }
@@ -265,13 +284,10 @@ TEST(a_pose_that_is_nan_ramps_to_zero_and_a_reset_ramps_in)
   atomic_store(&felt.bad_pose, 0);              /* one tick is enough */
   check_latched(HAP_FAULT_DEVICE_POSE, 500);
   CHECK(felt.work_most < 1e-3); /* J; while it ramped down */
-  double gone = felt.work;
   CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
-  felt.steepest = 0.0;
-  run_ticks(20);
-  CHECK(felt.steepest < 1.0); /* N */
-  CHECK(felt.work - gone < 0.01 * 0.5 * 5.2 * 5.2 / 1000.0);
-  check_normal_after(300);
+  look_for_a_burst();
+  check_normal_after(20);
+  check_no_burst();
   felt_end(&f);
 }
 
@@ -290,12 +306,11 @@ static void unplug(atomic_int *how, hap_fault fault)
   check_latched(fault, 300); /* plugged again: nothing without a reset */
   CHECK(felt.work_most <= 1e-9);
   CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
-  felt.steepest = 0.0;
+  look_for_a_burst();
   run_ticks(2);
   CHECK(felt_force() < 0.5);
-  run_ticks(18);
-  CHECK(felt.steepest < 1.0); /* N: 40 mm deep by now, of which 10 mm count */
-  check_normal_after(300);
+  check_normal_after(18); /* 40 mm deep by now, of which 10 mm count */
+  check_no_burst();
   felt_end(&f);
 }
 
@@ -309,7 +324,7 @@ TEST(unplugged_before_the_read_is_zero_at_once_and_comes_back_by_a_reset)
   unplug(&felt.fail_read, HAP_FAULT_DEVICE_READ);
 }
 
-TEST(a_device_plugged_in_again_elsewhere_comes_up_from_zero)
+TEST(a_device_plugged_in_again_deep_in_a_body_comes_up_from_zero)
 {
   felt_init(&f, HAP_DRIVE_LOCKSTEP, true); /* a body of 1 kg */
   REQUIRE(begin("path=0:-0.07/0/0"));
@@ -320,12 +335,12 @@ TEST(a_device_plugged_in_again_elsewhere_comes_up_from_zero)
   atomic_store(&felt.fail_read, 0);
   run_ticks(100);
   CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
-  felt.steepest = 0.0;
+  look_for_a_burst();
   run_ticks(500);
   printf("# steepest %.3g N a tick, peak %.3g N, body at %.3g m/s\n", felt.steepest, felt.peak,
          dBodyGetLinearVel(f.s.cube)[0]);
-  CHECK(felt.steepest < 1.0 && felt.peak > 1.0);
-  CHECK(fabs(dBodyGetLinearVel(f.s.cube)[0]) < 0.7);
+  check_no_burst();
+  CHECK(felt.peak > 1.0 && fabs(dBodyGetLinearVel(f.s.cube)[0]) < 1.0);
   felt_end(&f);
 }
 
@@ -357,22 +372,32 @@ static bool begin_to_jump(bool body, hap_coupling coupling, double stiffness)
 
 static const hap_coupling couplings[] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY};
 
-TEST(a_device_that_jumps_half_a_metre_into_a_wall_comes_up_from_zero)
+static void jump(double way)
+{
+  felt.jump += way;
+  felt.fast = true; /* and its velocity is the difference */
+  run_tick();
+  felt.fast = false;
+}
+
+TEST(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it)
 {
   for (int i = 0; i < 4; ++i) {
     double stiffness = i / 2 == 0 ? 1000.0 : 10000.0;
     REQUIRE(begin_to_jump(false, couplings[i % 2], stiffness));
-    felt.jump = 0.5;
-    felt.fast = true; /* and its velocity is the difference */
-    run_ticks(1);
-    felt.fast = false;
-    CHECK(felt_force() <= 0.5);
+    jump(0.5);
     run_ticks(400);
+    CHECK(stats_of(&f.s).faults == 0 && felt.peak == 0.0);
+    felt.jump += 1e-3; /* a hand that goes on feels it */
+    run_ticks(100);
+    CHECK(felt_force() > 0.4);
+    felt.jump -= 2e-3;
+    run_ticks(100);
+    CHECK(felt_force() < 0.5);
+    felt.jump += 1e-3; /* and one that comes back, 1 mm farther out */
+    run_ticks(100);
+    CHECK(felt_force() > 0.4);
     CHECK(stats_of(&f.s).faults == 0);
-    printf("# %s, %g N/m: steepest %.3g N a tick\n", i % 2 == 0 ? "direct" : "proxy", stiffness,
-           felt.steepest);
-    CHECK(felt.steepest <= (stiffness == 1000.0 ? 1.0 : FELT_STEP));
-    CHECK_NEAR(felt_force(), FELT_LIMIT, 1e-9);
     felt_end(&f);
   }
 }
@@ -382,13 +407,27 @@ TEST(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away)
   for (int i = 0; i < 4; ++i) {
     double stiffness = i / 2 == 0 ? 1000.0 : 10000.0;
     REQUIRE(begin_to_jump(true, couplings[i % 2], stiffness));
-    felt.jump = 0.5;
-    felt.fast = true;
-    run_ticks(1);
-    felt.fast = false;
+    jump(0.5);
+    run_ticks(1000);
+    jump(-0.5);
+    run_ticks(1000);
+    CHECK(fastest == 0.0 && felt.peak == 0.0);
+    CHECK(stats_of(&f.s).faults == 0);
+    felt_end(&f);
+  }
+}
+
+/* The body comes to where the hand is: nothing jumped, and it has to come out. */
+TEST(a_body_put_over_the_hand_is_pushed_out_slowly)
+{
+  for (int i = 0; i < 4; ++i) {
+    double stiffness = i / 2 == 0 ? 1000.0 : 10000.0;
+    REQUIRE(begin_to_jump(true, couplings[i % 2], stiffness));
+    dBodySetPosition(f.s.cube, -0.05, 0.0, 0.0); /* half a metre deep */
+    look_for_a_burst();
     run_ticks(3000);
-    printf("# %s, %g N/m: the body comes to %.3g m/s, the force to %.3g N\n",
-           i % 2 == 0 ? "direct" : "proxy", stiffness, fastest, felt.peak);
+    printf("# %s, %g N/m: body to %.3g m/s, force to %.3g N, %.3g N a tick\n",
+           i % 2 == 0 ? "direct" : "proxy", stiffness, fastest, felt.peak, felt.steepest);
     /* 10 mm of spring, and what comes in at 0.2 m/s */
     CHECK(fastest > 0.05 && fastest <= 0.01 * sqrt(stiffness) + 0.4);
     CHECK(stats_of(&f.s).faults == 0);
@@ -398,31 +437,34 @@ TEST(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away)
 
 TEST(a_device_that_jumps_for_a_tick_and_back_is_felt_as_a_dip)
 {
-  REQUIRE(begin_pressing());
-  for (int i = 0; i < 10; ++i) {
-    felt.jump = i % 2 == 0 ? 0.5 : -0.5; /* deep into the wall, and out of it */
-    run_tick();
-    felt.jump = 0.0;
-    run_ticks(100);
-    CHECK(felt.peak < 8.0 && felt_force() > 1.0);
+  for (int i = 0; i < 2; ++i) {
+    REQUIRE(begin_pressing());
+    felt.peak = 0.0;
+    double way = i == 0 ? 0.5 : -0.5; /* deep into the wall, and out of it */
+    jump(way);
+    jump(-way);
+    run_ticks(2000);
+    /* From nothing the hand swings over; after the wall it has it 5 mm deeper. */
+    CHECK(felt.peak < 8.0 && fabs(felt_force() - 5.217) < 0.75);
+    CHECK(felt.work_most < 1e-3 && stats_of(&f.s).faults == 0);
+    felt_end(&f);
   }
-  CHECK(felt.work_most < 0.01 * 0.5 * 5.2 * 5.2 / 1000.0 + felt.work_once);
-  check_normal_after(300);
-  felt_end(&f);
 }
 
 /* ---- the world ---- */
 
 static void replace_box(void *arg)
 {
+  dGeomID old_geom = f.s.geom;
+  dBodyID old = f.s.cube; /* it goes last, so that the new one is at another address */
   (void)arg;
-  dGeomDestroy(f.s.geom);
-  dBodyDestroy(f.s.cube);
   f.s.cube = dBodyCreate(f.s.world);
   f.s.geom = dCreateBox(f.s.space, 1.0, 1.0, 1.0);
   dBodySetKinematic(f.s.cube);
   dGeomSetBody(f.s.geom, f.s.cube);
   dBodySetPosition(f.s.cube, 0.45, 0.0, 0.0);
+  dGeomDestroy(old_geom);
+  dBodyDestroy(old);
 }
 
 static void post_replacement(void)
@@ -440,7 +482,6 @@ TEST(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps)
   felt.work = felt.work_most = felt.work_once = 0.0;
   at_sync = post_replacement;
   run_ticks(4000);
-  printf("# lost %llu\n",(unsigned long long)stats_of(&f.s).bodies_lost);
   CHECK(stats_of(&f.s).bodies_lost == 200 && stats_of(&f.s).faults == 0);
   printf("# gained %.3g J at most, %.3g in a tick, peak %.3g N\n", felt.work_most, felt.work_once,
          felt.peak);
@@ -450,17 +491,18 @@ TEST(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps)
   felt_end(&f);
 }
 
-/* Five walls around the hand and cubes in them, for one body and two contacts. */
+/* A wall of rods, and cubes in front of it at its sides. */
 static void add_crowd(void)
 {
+  for (int y = -8; y <= 8; ++y) {
+    for (int z = -6; z <= 6; ++z) {
+      dGeomID rod = dCreateBox(f.s.space, 1.0, 0.005, 0.005);
+      dGeomSetPosition(rod, 0.45, 0.006 * y, 0.006 * z);
+    }
+  }
   for (int i = 0; i < 4; ++i) {
-    double y = i % 2 == 0 ? -0.02 : 0.02;
-    double z = i / 2 == 0 ? -0.02 : 0.02;
-    dGeomID wall = dCreateBox(f.s.space, 1.0, 0.02, 0.02);
-    dGeomSetPosition(wall, 0.45 + 1e-3 * i, y, z);
-    dGeomID geom = NULL;
-    dBodyID cube = add_cube(&f.s, 0.2, &geom);
-    dBodySetPosition(cube, -0.06, 5.0 * y, 5.0 * z);
+    dBodyID cube = add_cube(&f.s, 0.2, NULL);
+    dBodySetPosition(cube, -0.06, i % 2 == 0 ? -0.11 : 0.11, i / 2 == 0 ? -0.06 : 0.06);
   }
 }
 
@@ -481,7 +523,7 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
   f.s.def.max_bodies = 1;
   f.s.def.max_contacts = 2;
   REQUIRE(begin("hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.02/0/0,"
-                "sine=0/0.03/0.02,hz=0.7"));
+                "sine=0/0.04/0.02,hz=0.7"));
   run_ticks(1000);
   CHECK(felt_force() > 1.0);
   dropped_before = stats_of(&f.s).capacity_dropped;
@@ -508,13 +550,14 @@ int main(void)
   RUN(physics_that_dies_fades_within_100_ms_and_comes_back_in_a_step);
   RUN(dropped_ticks_give_the_hand_no_more_than_the_force_held_over_one_gap);
   RUN(a_jittering_clock_gives_the_hand_no_more_than_the_force_held_over_one_tick);
-  RUN(a_loop_that_stood_still_while_the_hand_went_in_comes_up_from_zero);
+  RUN(a_loop_that_stood_still_while_the_hand_went_in_takes_the_surface_to_the_hand);
   RUN(a_pose_that_is_nan_ramps_to_zero_and_a_reset_ramps_in);
   RUN(unplugged_between_read_and_write_is_zero_at_once_and_comes_back_by_a_reset);
   RUN(unplugged_before_the_read_is_zero_at_once_and_comes_back_by_a_reset);
-  RUN(a_device_plugged_in_again_elsewhere_comes_up_from_zero);
-  RUN(a_device_that_jumps_half_a_metre_into_a_wall_comes_up_from_zero);
+  RUN(a_device_plugged_in_again_deep_in_a_body_comes_up_from_zero);
+  RUN(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it);
   RUN(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away);
+  RUN(a_body_put_over_the_hand_is_pushed_out_slowly);
   RUN(a_device_that_jumps_for_a_tick_and_back_is_felt_as_a_dip);
   RUN(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps);
   RUN(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps);

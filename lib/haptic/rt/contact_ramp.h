@@ -15,15 +15,18 @@
 #define HAPI_RAMP_DEPTH 0.01 /* m */
 #define HAPI_RAMP_SPEED 0.2  /* m/s */
 
+/* A contact that is pressed in faster was not pressed in: one of the two was put where it is. */
+#define HAPI_PRESS_SPEED 10.0 /* m/s */
+
 /* Where a device jumped, none of the depth counts: nobody put in the energy that it stands for. The
  * surface is where the device is, goes back with it, and does not come after it. */
 static inline void hapi_contact_ramp_begin(hapi_local_contact *c, double depth, bool jumped)
 {
   bool deep = depth > 0.0;
   c->seen = true;
-  c->ramp.share = deep && !jumped ? 0.0 : 1.0;
-  c->ramp.excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0);
-  c->ramp.held = deep && jumped;
+  c->ramp = (hapi_ramp){.share = deep && !jumped ? 0.0 : 1.0,
+                        .excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
+                        .held = deep && jumped};
 }
 
 /* Share of its force that a contact of the pointer has, and the part of its depth that counts in
@@ -33,15 +36,16 @@ static inline double hapi_contact_ramp(hapi_local_contact *c, const hapi_tick_po
                                        double *io_depth, double period)
 {
   double depth = *io_depth;
+  double most = fmax(HAPI_RAMP_DEPTH, HAPI_PRESS_SPEED * period);
   hapi_ramp *r = &c->ramp;
-  c->depth = depth;
-  if (!c->seen) {
+  if (!c->seen || depth - fmax(r->depth, 0.0) > most) {
     hapi_contact_ramp_begin(c, depth, p->jump_s > 0.0);
   } else if (r->share < 1.0 || r->excess > 0.0) {
     double comes_in = r->held ? 0.0 : HAPI_RAMP_SPEED * period;
     r->share = depth > 0.0 ? fmin(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
     r->excess = fmax(fmin(r->excess, depth) - comes_in, 0.0);
   }
+  r->depth = depth;
   *io_depth = depth - r->excess;
   return r->share;
 }

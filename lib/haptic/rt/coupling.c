@@ -1,7 +1,5 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <string.h>
-
 #include "base/vec.h"
 #include "haptic/rt/tick.h"
 
@@ -9,8 +7,8 @@
  * proxy (proxy.c), which then takes its place.
  *
  * A device that is farther from where it was at the last tick than a hand can move it in a tick has
- * jumped: an encoder slipped, or the loop did not run for some time. Its contacts begin anew, and so do
- * those that come with the next models (contact_ramp.h). */
+ * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by it
+ * begin anew (contact_ramp.h), also those that come with the next models. */
 
 #define JUMP_S 0.01 /* and two steps of physics: a model for the new place has come */
 
@@ -56,16 +54,8 @@ static bool jumps(const hapi_tick_pointer *p, double period)
   return p->placed && p->speed_limit > 0.0 && hapi_v3_norm(way) > p->speed_limit * period;
 }
 
-static void begin_anew(hapi_tick *tick, uint32_t index)
+static void begin_proxy_anew(hapi_tick_pointer *p)
 {
-  hapi_tick_pointer *p = &tick->pointers[index];
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    hapi_local_contact *c = &tick->contacts[i];
-    if (c->pointer == index) {
-      c->seen = false;
-      memset(&c->ramp, 0, sizeof c->ramp);
-    }
-  }
   hapi_v3_copy(p->handle_position, p->proxy_position);
   hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
   hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
@@ -95,7 +85,7 @@ void hapi_coupling_read(hapi_tick *tick)
     if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
     } else if (p->jumped) {
-      begin_anew(tick, i);
+      begin_proxy_anew(p);
     }
   }
 }

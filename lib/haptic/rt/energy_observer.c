@@ -33,6 +33,8 @@
 
 #define OVERDRAFT 0.008 /* what is held back comes a tick late and no faster than the slew limit */
 #define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
+#define REST_S 0.3           /* a touch that lasts longer is no tapping */
+#define DEBT_S 0.3           /* time constant with which a debt is then forgiven */
 
 static double world_per_device(const hapi_tick_pointer *p)
 {
@@ -180,10 +182,10 @@ static double ramps_give(hapi_tick *tick)
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
     hapi_ramp *r = &c->ramp;
     gone -= r->sprung;
-    double before = spring_energy(p, r->felt_share, c->depth - r->felt_excess);
+    double before = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
     r->felt_share = r->share * p->guard.share * (1.0 - guard->age_loss);
     r->felt_excess = r->excess;
-    r->sprung = spring_energy(p, r->felt_share, c->depth - r->felt_excess);
+    r->sprung = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
     guard->sprung += r->sprung;
     sum += r->sprung - before;
   }
@@ -274,11 +276,23 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
   }
 }
 
+/* A debt that comes all at once, after a time without the loop or when something vanished that had been
+ * pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So in a touch
+ * that lasts, the ledger comes back to what is in the springs. */
+static void settle_debt(hapi_guard_state *guard, double period)
+{
+  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
+  guard->touch_s += period;
+  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
+    guard->balance += (guard->sprung - guard->balance) * fmin(period / DEBT_S, 1.0);
+  }
+}
+
 /* After a fault nothing is known of where the devices were. */
 static void forget(hapi_tick *tick)
 {
   tick->guard.balance = 0.0;
-  tick->guard.sprung = 0.0;
+  tick->guard.sprung = tick->guard.touch_s = 0.0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.placed = false;
   }
@@ -299,13 +313,14 @@ void hapi_energy_observe(hapi_tick *tick)
   given += ramps_give(tick);
   if (!settle_ports(tick)) {
     guard->balance = fmin(guard->balance, 0.0);
+    guard->touch_s = 0.0;
     return;
   }
   double stored = 0.0;
   stored += couplings_store(tick);
   guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
   guard->stored_max = fmax(guard->stored_max, stored);
-  /* A larger debt comes from a device that jumped; nobody could pay it back. */
-  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
-  pay_no_more_than(tick, guard->balance + fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST));
+  double overdraft = fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
+  settle_debt(guard, tick->period);
+  pay_no_more_than(tick, guard->balance + overdraft);
 }

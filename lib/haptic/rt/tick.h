@@ -67,6 +67,7 @@ typedef struct hapi_guard_state {
   double balance;    /* J, world units: what the hands and the world have put in and not got back */
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
   double sprung;     /* J, sum over the contacts of the last tick */
+  double touch_s;    /* s, since something is felt without a break */
   double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
@@ -159,6 +160,7 @@ typedef struct hapi_local_body {
 
 /* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
 typedef struct hapi_ramp {
+  double depth;  /* m, at the last tick */
   double share;  /* 0..1, of the force */
   double excess; /* m, of the depth that does not count */
   bool held;     /* the excess goes by drawing back alone */
@@ -180,7 +182,6 @@ typedef struct hapi_local_contact {
   double normal_body[3];
   double a[6][3];
   hapi_ramp ramp;
-  double depth; /* m, with the excess */
   double force[3]; /* on the body */
 
   /* Model CONTACT. */
