@@ -200,8 +200,8 @@ TEST(dropped_ticks_give_the_hand_no_more_than_the_force_held_over_one_gap)
     for (int i = 0; i < 5; ++i) {
       taps bare = tap_with_drops(HAP_GUARD_MEASURE, hands[h], dropped[i]);
       taps kept = tap_with_drops(HAP_GUARD_ON, hands[h], dropped[i]);
-      printf("# %s, %d dropped: bare %.3g J, guarded %.3g, in one gap %.3g, stored %.3g\n", hands[h],
-             dropped[i], bare.work, kept.work, kept.once, kept.stored);
+      printf("# %s, %d dropped: bare %.3g J, guarded %.3g, in one gap %.3g, stored %.3g\n",
+             hands[h], dropped[i], bare.work, kept.work, kept.once, kept.stored);
       /* Of a longer gap a debt larger than all that was stored is forgiven. */
       bool is_long = dropped[i] > 20;
       CHECK(kept.work <= (is_long ? 0.3 * bare.work : 0.01 * kept.stored + kept.once));
@@ -522,8 +522,9 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
   add_crowd();
   f.s.def.max_bodies = 1;
   f.s.def.max_contacts = 2;
-  REQUIRE(begin("hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.02/0/0,"
-                "sine=0/0.04/0.02,hz=0.7"));
+  REQUIRE(
+      begin("hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.02/0/0,"
+            "sine=0/0.04/0.02,hz=0.7"));
   run_ticks(1000);
   CHECK(felt_force() > 1.0);
   dropped_before = stats_of(&f.s).capacity_dropped;

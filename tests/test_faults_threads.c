@@ -125,8 +125,8 @@ TEST(a_device_that_blocks_and_then_fails_is_zeroed)
 
 static char trace_path[] = "/tmp/hapode-faults-XXXXXX";
 
-#define RUN_ARGUMENTS                                                                 \
-  "hapode-run --scene wedge --no-realtime --seconds 3 --device "                      \
+#define RUN_ARGUMENTS                                                                \
+  "hapode-run --scene wedge --no-realtime --seconds 3 --device "                     \
   "virtual:hand=relaxed,device_mass=0.1,path=0:-0.2/0/0.05;1:0/0/0.05,max_force=10 " \
   "--trace %s"
 

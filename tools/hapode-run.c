@@ -122,8 +122,7 @@ static bool close_trace(run_loop *loop, hap_detail *detail)
     return true;
   }
   snprintf(detail->text, sizeof detail->text, "--trace %.300s: cannot be written: %s",
-           loop->options->trace_path,
-           strerror(loop->trace_errno != 0 ? loop->trace_errno : errno));
+           loop->options->trace_path, strerror(loop->trace_errno != 0 ? loop->trace_errno : errno));
   return false;
 }
 

@@ -11,7 +11,7 @@
 #include "haptic/haptic_internal.h"
 
 #define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
-#define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
+#define SLEW_S 0.002     /* from no force to all of it, where the application says nothing else */
 
 /* ---- the loop's side ---- */
 

@@ -91,7 +91,7 @@ typedef struct hapi_tick_pointer {
   hap_pose device_good;   /* the last device_pose that could be used */
   bool placed;            /* there was one */
   bool jumped;            /* between the last one and this one; see coupling.c */
-  double jump_s; /* s, > 0: contacts that arrive deep are so because of a jump */
+  double jump_s;          /* s, > 0: contacts that arrive deep are so because of a jump */
   double speed_limit;     /* m/s at the device, that a hand can make; 0: none */
   uint32_t buttons;       /* in */
   bool estimates;         /* device_twist is made of poses by velocity, not read */
