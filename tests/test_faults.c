@@ -370,6 +370,32 @@ static bool begin_to_jump(bool body, hap_coupling coupling, double stiffness)
   return good;
 }
 
+TEST(a_hand_that_went_into_a_body_during_a_fault_does_not_shoot_it_away)
+{
+  static const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE};
+  for (int i = 0; i < 3; ++i) {
+    felt_init(&f, HAP_DRIVE_LOCKSTEP, true);
+    f.s.def.model = models[i];
+    fastest = 0.0;
+    REQUIRE(begin("path=0:-0.07/0/0;0.2:-0.07/0/0;1:0.1/0/0")); /* 160 mm deep */
+    at_sync = note_speed;
+    run_ticks(100);
+    atomic_store(&felt.bad_pose, 1);
+    run_tick();
+    atomic_store(&felt.bad_pose, 0);
+    run_ticks(1500);
+    CHECK(fastest == 0.0 && felt.peak == 0.0);
+    CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
+    look_for_a_burst();
+    run_ticks(500);
+    printf("# %s: body to %.3g m/s, %.3g N a tick\n", hap_model_name(models[i]), fastest,
+           felt.steepest);
+    CHECK(felt.peak > 1.0 && fastest > 0.05 && fastest < 1.5);
+    check_no_burst();
+    felt_end(&f);
+  }
+}
+
 static const hap_coupling couplings[] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY};
 
 static void jump(double way)
@@ -556,6 +582,7 @@ int main(void)
   RUN(unplugged_between_read_and_write_is_zero_at_once_and_comes_back_by_a_reset);
   RUN(unplugged_before_the_read_is_zero_at_once_and_comes_back_by_a_reset);
   RUN(a_device_plugged_in_again_deep_in_a_body_comes_up_from_zero);
+  RUN(a_hand_that_went_into_a_body_during_a_fault_does_not_shoot_it_away);
   RUN(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it);
   RUN(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away);
   RUN(a_body_put_over_the_hand_is_pushed_out_slowly);
