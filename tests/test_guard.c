@@ -528,7 +528,7 @@ static void yield_to(uint32_t flags, hap_model model)
   patches->contact_count = 0;
   hapi_tick_adopt_patches(&f.tick, patches);
   f.contacts[0].seen = true; /* no ramp of its own */
-  f.contacts[0].ramp = 1.0;
+  f.contacts[0].ramp.share = 1.0;
   p->guard.share = 1.0;
   for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
     p->device_pose.position[0] = -0.05 * T * i;
@@ -561,6 +561,48 @@ TEST(a_device_has_not_moved_when_it_is_first_seen)
     hapi_tick_reset_fault(&f.tick);
   }
   CHECK(f.tick.guard.energy_ticks == 0);
+}
+
+/* 5 mm deep in two walls, 5 N and 12.5 mJ each; pressed in within the ledger. */
+static hapi_tick_pointer *pressed_in_two(void)
+{
+  hapi_tick_pointer *p = guarded_wall();
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  (void)add_contact(1, HAPI_SLOT_NONE, 0);
+  adopt();
+  f.tick.physics_period = 0.0; /* the walls do not grow old */
+  p->guard.share = 1.0;
+  for (int i = -100; i <= 50; ++i) {
+    p->device_pose.position[0] = -0.01 + 1e-4 * i;
+    run(1);
+  }
+  CHECK_NEAR(p->device_wrench.force[0], -10.0, 1e-9);
+  CHECK_NEAR(f.tick.guard.balance, 0.025, 1e-3);
+  return p;
+}
+
+TEST(the_spring_of_a_contact_that_vanishes_is_lost)
+{
+  hapi_tick_pointer *p = pressed_in_two();
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  adopt();
+  run(1);
+  CHECK_NEAR(p->device_wrench.force[0], -5.0, 1e-9);
+  CHECK_NEAR(f.tick.guard.balance, 0.0125, 1e-3);
+}
+
+TEST(nobody_pays_for_a_jump_but_what_it_gives_is_given)
+{
+  for (int out = 0; out < 2; ++out) {
+    hapi_tick_pointer *p = pressed_in_two();
+    p->speed_limit = 10.0;
+    p->device_pose.position[0] += out != 0 ? -0.1 : 0.1;
+    run(1);
+    /* Of 1 J no more than was ever stored. */
+    CHECK_NEAR(f.tick.guard.balance, out != 0 ? -f.tick.guard.stored_max : 0.0, 1e-3);
+  }
 }
 
 /* ---- the black box ---- */
@@ -638,7 +680,7 @@ TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
   record(1);
   CHECK(read_box(1000) == 11 && read_rows[10].fault == HAP_FAULT_WORLD);
-  CHECK(read_rows[0].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
+  CHECK(read_rows[1].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
 }
 
 TEST(each_pointer_has_its_rows)
@@ -696,6 +738,8 @@ int main(void)
   RUN(what_a_weight_or_a_drive_gives_is_felt);
   RUN(a_device_has_not_moved_when_it_is_first_seen);
   RUN(the_black_box_knows_no_age_before_the_first_model);
+  RUN(the_spring_of_a_contact_that_vanishes_is_lost);
+  RUN(nobody_pays_for_a_jump_but_what_it_gives_is_given);
   RUN(the_black_box_keeps_the_last_256_ticks_until_the_reset);
   RUN(each_pointer_has_its_rows);
   RUN(a_loop_never_waits_for_a_reader);

@@ -453,14 +453,15 @@ TEST(saturation_keeps_the_direction)
   adopt();
   run(1);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) == 0 && f.tick.saturated_ticks == 0);
-  hapi_v3_set(p->device_pose.position, 0.01, 0.02, 0.05); /* 20, 30, 60 N, 4 times that */
+  p->stiffness = 10000.0;
+  hapi_v3_set(p->device_pose.position, -0.008, -0.007, -0.004); /* 20, 30, 60 N, 4 times that */
   run(1);
   const double norm = sqrt(4.0 + 9.0 + 36.0);
   check_v3(p->device_wrench.force, -20.0 * 2 / norm, -20.0 * 3 / norm, -20.0 * 6 / norm, 1e-12);
   check_v3(p->wrench.force, -5.0 * 2 / norm, -5.0 * 3 / norm, -5.0 * 6 / norm, 1e-12);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) != 0 && f.tick.saturated_ticks == 1);
   CHECK_NEAR(f.tick.peak_force, 5.0, 1e-12);
-  hapi_v3_set(p->device_pose.position, -1.0, -1.0, -0.009);
+  hapi_v3_set(p->device_pose.position, -1.0, -1.0, -0.0099);
   run(1);
   check_v3(p->device_wrench.force, 0.0, 0.0, -4.0, 1e-11);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) == 0 && f.tick.saturated_ticks == 1);
@@ -524,6 +525,8 @@ static void bad_sample(int place, double bad)
   p->device_pose.position[0] += 0.01;
   hapi_tick_reset_fault(&f.tick);
   run(1);
+  CHECK(f.tick.fault == HAP_FAULT_NONE && force_is_zero(p)); /* its contacts begin anew */
+  run(21);
   CHECK(f.tick.fault == HAP_FAULT_NONE && p->device_wrench.force[0] < -1.0);
 }
 

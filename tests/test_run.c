@@ -276,13 +276,36 @@ TEST(files_that_cannot_be_written_are_found_before_the_run)
   CHECK(says("--trace"));
 }
 
-TEST(a_full_disk_is_a_failure)
+TEST(a_full_disk_is_a_failure_that_the_hand_does_not_feel)
+{
+  char hash[32];
+  if (access("/dev/full", W_OK) != 0) {
+    SKIP("no /dev/full");
+  }
+  CHECK(run("--lockstep --seconds 0.5") == 0);
+  snprintf(hash, sizeof hash, "%s", value_of("trace_hash"));
+  CHECK(run("--lockstep --seconds 0.5 --trace /dev/full") == 1);
+  CHECK(says("--trace /dev/full: cannot be written: No space left on device"));
+  CHECK(number_of("ticks") == 500.0 && strcmp(value_of("trace_hash"), hash) == 0);
+  CHECK(number_of("trace_dropped") == 0.0);
+  CHECK(run("--lockstep --seconds 0.5 --black-box /dev/full") == 1);
+  CHECK(says("--black-box /dev/full: cannot be written: No space left on device"));
+  CHECK(number_of("ticks") == 500.0 && strcmp(value_of("trace_hash"), hash) == 0);
+}
+
+TEST(a_full_disk_after_a_fault_is_said_beside_the_fault)
 {
   if (access("/dev/full", W_OK) != 0) {
     SKIP("no /dev/full");
   }
-  CHECK(run("--lockstep --seconds 0.5 --trace /dev/full") == 1);
-  CHECK(says("/dev/full"));
+  write_text(file_in_folder("off.csv"),
+             "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,9e5,0,0.5\n0.3,9e5,0,0.5\n");
+  CHECK(run("--lockstep --seconds 1 --black-box /dev/full --trace /dev/full "
+            "--device replay:%s,scale=10",
+            file_in_folder("off.csv")) == 2); /* the same file twice */
+  CHECK(run("--lockstep --seconds 1 --black-box /dev/full --device replay:%s,scale=10",
+            file_in_folder("off.csv")) == 1);
+  CHECK(says("pose that is not finite") && says("--black-box /dev/full: cannot be written"));
 }
 
 /* ---- summary and trace ---- */
@@ -706,7 +729,8 @@ int main(void)
   RUN(what_this_version_cannot_do_is_said);
   RUN(a_malformed_recording_names_its_line);
   RUN(files_that_cannot_be_written_are_found_before_the_run);
-  RUN(a_full_disk_is_a_failure);
+  RUN(a_full_disk_is_a_failure_that_the_hand_does_not_feel);
+  RUN(a_full_disk_after_a_fault_is_said_beside_the_fault);
   RUN(the_summary_has_its_keys_in_order);
   RUN(the_summary_has_its_values);
   RUN(the_coupling_can_be_chosen_and_is_reported);

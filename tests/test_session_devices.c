@@ -357,8 +357,10 @@ TEST(a_device_limits_the_force)
   stage s;
   hap_device *device;
   REQUIRE(run_with_fake(&s, HAP_DRIVE_LOCKSTEP, &device)); /* 12 N, below the pointer's 20 */
-  fakes[0].x = -0.03;                                      /* 30 mm deep: 30 N */
-  CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+  for (int i = 0; i <= 30; ++i) {
+    fakes[0].x = -0.06 + 1e-3 * i; /* 30 mm deep: 30 N */
+    CHECK(hap_session_advance(s.session, 10) == HAP_OK);
+  }
   hap_pointer_state state;
   hap_pointer_id id = {((uint64_t)1 << 32) | 1};
   CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);

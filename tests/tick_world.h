@@ -27,7 +27,7 @@ static struct {
   hapi_local_body bodies[BODIES];
   uint32_t live[BODIES];
   hapi_local_contact contacts[CONTACTS];
-  double ramps[CONTACTS];
+  hapi_ramp ramps[CONTACTS];
   uint32_t ramp_generations[CONTACTS];
   hapi_tick_pointer pointers[POINTERS];
   hapi_contact_memory memory[2][CONTACTS];

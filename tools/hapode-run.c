@@ -118,11 +118,11 @@ static bool close_trace(run_loop *loop, hap_detail *detail)
 {
   FILE *file = loop->trace.file;
   loop->trace.file = NULL;
-  if (file == NULL || fclose(file) == 0) {
+  if (file == NULL || (fclose(file) == 0 && loop->trace_errno == 0)) {
     return true;
   }
   snprintf(detail->text, sizeof detail->text, "--trace %.300s: cannot be written: %s",
-           loop->options->trace_path, strerror(errno));
+           loop->options->trace_path, strerror(loop->trace_errno != 0 ? loop->trace_errno : errno));
   return false;
 }
 
@@ -169,10 +169,10 @@ static int run_and_report(run_loop *loop)
   if (status < HAP_OK) {
     code = complain(EXIT_FAILED, detail.text[0] != '\0' ? detail.text : hap_status_text(status));
   }
-  if (!close_trace(loop, &detail) && code == EXIT_GOOD) {
+  if (!close_trace(loop, &detail)) {
     code = complain(EXIT_FAILED, detail.text);
   }
-  if (!close_black_box(loop, &detail) && code == EXIT_GOOD) {
+  if (!close_black_box(loop, &detail)) {
     code = complain(EXIT_FAILED, detail.text);
   }
   if (draw(loop, &detail) < HAP_OK) {

@@ -20,7 +20,7 @@ static volatile sig_atomic_t stop_wanted;
 
 /* Where a run stands. */
 typedef struct watch {
-  const run_loop *loop;
+  run_loop *loop;
   double next_sample;   /* s */
   double next_progress; /* s, wall clock */
   hap_detail *detail;
@@ -87,28 +87,33 @@ static double wall_clock(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+static void write_rows(run_loop *loop, const hap_trace_row *rows, size_t count)
+{
+  if (loop->trace.file == NULL || loop->trace_errno != 0) {
+    return;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    trace_csv_row(&loop->trace, &rows[i]);
+  }
+  if (ferror(loop->trace.file) != 0) {
+    loop->trace_errno = errno != 0 ? errno : EIO;
+  }
+}
+
 /* Takes all rows that are there. */
-static hap_status drain(const run_loop *loop, hap_detail *detail)
+static void drain(run_loop *loop)
 {
   hap_trace_row rows[ROWS_AT_ONCE];
   size_t count = 0;
   if (loop->trace.file == NULL && loop->picture == NULL) {
-    return HAP_OK;
+    return;
   }
   while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, &count) == HAP_OK) {
     for (size_t i = 0; i < count && loop->picture != NULL; ++i) {
       run_picture_add_row(loop->picture, &rows[i]);
     }
-    for (size_t i = 0; i < count && loop->trace.file != NULL; ++i) {
-      trace_csv_row(&loop->trace, &rows[i]);
-    }
-    if (loop->trace.file != NULL && ferror(loop->trace.file) != 0) {
-      snprintf(detail->text, sizeof detail->text, "--trace %.300s: cannot be written: %s",
-               loop->options->trace_path, strerror(errno));
-      return HAP_ERROR_IO;
-    }
+    write_rows(loop, rows, count);
   }
-  return HAP_OK;
 }
 
 static double strongest_force(const rig *r)
@@ -138,12 +143,9 @@ static void show_progress(watch *w, double t, const hap_stats *stats)
 /* What is to be done between two stretches of the run, at time t of it. */
 static hap_status look(watch *w, double t)
 {
-  const run_loop *loop = w->loop;
+  run_loop *loop = w->loop;
   hap_stats stats;
-  hap_status status = drain(loop, w->detail);
-  if (status < HAP_OK) {
-    return status;
-  }
+  drain(loop);
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
   run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
@@ -200,7 +202,7 @@ static hap_status run_lockstep(watch *w)
   return status;
 }
 
-hap_status run_loop_run(const run_loop *loop, hap_stats *stats, hap_detail *detail)
+hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
 {
   hap_session *session = loop->rig->session;
   watch w = {.loop = loop, .detail = detail};
@@ -218,6 +220,6 @@ hap_status run_loop_run(const run_loop *loop, hap_stats *stats, hap_detail *deta
   hap_session_stop(session);
   run_progress_clear(&loop->progress);
   (void)hap_session_stats(session, stats, sizeof *stats);
-  hap_status drained = status < HAP_OK ? status : drain(loop, detail);
-  return drained < HAP_OK ? drained : status != HAP_OK ? status : started;
+  drain(loop);
+  return status != HAP_OK ? status : started;
 }

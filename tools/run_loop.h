@@ -16,6 +16,7 @@ typedef struct run_loop {
   const rig *rig;
   double seconds;
   trace_csv trace;      /* file NULL: none wanted */
+  int trace_errno;      /* why it could not be written any more; 0: it could */
   FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
   run_progress progress;
@@ -33,8 +34,9 @@ void run_loop_catch_signals(void);
 bool run_loop_stop_wanted(void);
 
 /* Starts the session, runs it, stops it. HAP_NO_REALTIME as of hap_session_start; HAP_END when a
- * signal ended it early; errors with detail. Whatever comes back, the session is stopped and *stats
+ * signal ended it early; errors with detail. A trace that cannot be written does not end the run: a
+ * hand is on the device. Whatever comes back, the session is stopped and *stats
  * is what it came to. */
-hap_status run_loop_run(const run_loop *loop, hap_stats *stats, hap_detail *detail);
+hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail);
 
 #endif

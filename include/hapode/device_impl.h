@@ -47,7 +47,9 @@ typedef struct hap_device_ops {
 
   /* Pose and twist of the end effector in the device's frame at time_ns (for pacing DEVICE: not
    * later than time_ns). Never blocks except for pacing DEVICE, never allocates. On an error the
-   * outputs are not used and the session latches a fault. buttons: bit 0 is the first one. */
+   * outputs are not used and the session latches a fault and calls zero. It goes on reading: a device that
+   * was unplugged may answer again, and is used again after hap_session_reset_fault; start is not called
+   * in between. buttons: bit 0 is the first one. */
   hap_status (*read)(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
                      uint32_t *buttons);
 

@@ -10,7 +10,8 @@
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 
-#define SLEW_S 0.002 /* from no force to all of it, where the application says nothing else */
+#define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
+#define SLEW_S 0.002     /* from no force to all of it, where the application says nothing else */
 #define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
 /* ---- the loop's side ---- */
@@ -54,6 +55,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
+  p->speed_limit = slot->ops != NULL ? SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;

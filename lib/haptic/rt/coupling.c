@@ -4,7 +4,13 @@
 #include "haptic/rt/tick.h"
 
 /* Between device and world. The pointer is where the device is (paper section 3), unless it is a
- * proxy (proxy.c), which then takes its place. */
+ * proxy (proxy.c), which then takes its place.
+ *
+ * A device that is farther from where it was at the last tick than a hand can move it in a tick has
+ * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by it
+ * begin anew (contact_ramp.h), also those that come with the next models. */
+
+#define JUMP_S 0.01 /* and two steps of physics: a model for the new place has come */
 
 static bool plausible(const double *values, int count)
 {
@@ -36,7 +42,32 @@ static bool place_pointer(hapi_tick_pointer *p)
   hapi_v3_copy(p->pose.position, p->handle_position);
   hapi_v3_copy(p->twist.linear, p->handle_velocity);
   p->device_good = p->device_pose;
+  p->placed = true;
   return true;
+}
+
+/* Whatever time has passed: what counts is how deep it may be at once. */
+static bool jumps(const hapi_tick_pointer *p, double period)
+{
+  double way[3];
+  hapi_v3_sub(p->device_pose.position, p->device_good.position, way);
+  return p->placed && p->speed_limit > 0.0 && hapi_v3_norm(way) > p->speed_limit * period;
+}
+
+static void begin_proxy_anew(hapi_tick_pointer *p)
+{
+  hapi_v3_copy(p->handle_position, p->proxy_position);
+  hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
+  hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+}
+
+/* A velocity that is a difference of such positions would be felt through every damper. */
+static void check_speed(hapi_tick_pointer *p)
+{
+  double *v = p->device_twist.linear;
+  if (p->jumped || (p->speed_limit > 0.0 && hapi_v3_norm(v) > p->speed_limit)) {
+    hapi_v3_set(v, 0.0, 0.0, 0.0);
+  }
 }
 
 void hapi_coupling_read(hapi_tick *tick)
@@ -48,8 +79,13 @@ void hapi_coupling_read(hapi_tick *tick)
     }
     bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
                 plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
+    p->jumped = good && jumps(p, tick->period);
+    p->jump_s = p->jumped ? JUMP_S + 2.0 * tick->physics_period : p->jump_s - tick->period;
+    check_speed(p);
     if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
+    } else if (p->jumped) {
+      begin_proxy_anew(p);
     }
   }
 }

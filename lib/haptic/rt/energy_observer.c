@@ -16,6 +16,10 @@
  *   others   (all bodies of the other models, and static, driven and measured ones): their motion is
  *            given, and what they do on a pointer's spring is the world's work.
  *
+ *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
+ *            a spring that is under load: the world's work, to either side. What is in the spring of a
+ *            contact that is no more is lost.
+ *
  * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
  * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
  * motion of an owned body. Of the other models only the port and the springs are watched.
@@ -27,8 +31,10 @@
  *
  * Torques are left out: they are zero for a ball without friction. */
 
-#define OVERDRAFT 0.008 /* what is held back comes a tick late and no faster than the slew limit */
+#define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
 #define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
+#define REST_S 0.3           /* a touch that lasts longer is no tapping */
+#define DEBT_S 0.3           /* time constant with which a debt is then forgiven */
 
 static double world_per_device(const hapi_tick_pointer *p)
 {
@@ -164,6 +170,40 @@ static double surfaces_give(const hapi_tick *tick, double *io_stored)
   return sum;
 }
 
+/* J in the spring of a contact that goes no farther than to the limit of the force. */
+static double spring_energy(const hapi_tick_pointer *p, double share, double depth)
+{
+  double k = share * p->stiffness;
+  double limit = p->force_scale > 0.0 ? p->max_force / p->force_scale : 0.0;
+  if (!(depth > 0.0) || !(k > 0.0)) {
+    return 0.0;
+  }
+  double force = k * depth;
+  return force <= limit ? 0.5 * force * depth : limit * (depth - 0.5 * limit / k);
+}
+
+/* J that ramps and fading added to the springs in this tick. */
+static double ramps_give(hapi_tick *tick)
+{
+  hapi_guard_state *guard = &tick->guard;
+  double gone = guard->sprung;
+  double sum = 0.0;
+  guard->sprung = 0.0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    hapi_local_contact *c = &tick->contacts[i];
+    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    hapi_ramp *r = &c->ramp;
+    gone -= r->sprung;
+    double before = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+    r->felt_share = r->share * p->guard.share * (1.0 - guard->age_loss);
+    r->felt_excess = r->excess;
+    r->sprung = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+    guard->sprung += r->sprung;
+    sum += r->sprung - before;
+  }
+  return sum - gone;
+}
+
 /* J in the springs between devices and proxies. */
 static double couplings_store(const hapi_tick *tick)
 {
@@ -187,7 +227,8 @@ static double port_gave(hapi_tick_pointer *p)
     hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
     g->placed = true;
   }
-  return world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+  double gave = world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+  return p->jumped ? fmax(gave, 0.0) : gave; /* nobody put in what a jump would have cost */
 }
 
 static bool any(const double v[3])
@@ -247,12 +288,28 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
   }
 }
 
+/* A debt that comes all at once, after a time without the loop or when something vanished that had been
+ * pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So in a touch
+ * that lasts, the ledger comes back to what is in the springs. */
+static void settle_debt(hapi_guard_state *guard, double period)
+{
+  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
+  guard->touch_s += period;
+  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
+    guard->balance += (guard->sprung - guard->balance) * fmin(period / DEBT_S, 1.0);
+  }
+}
+
 /* After a fault nothing is known of where the devices were. */
 static void forget(hapi_tick *tick)
 {
   tick->guard.balance = 0.0;
+  tick->guard.sprung = tick->guard.touch_s = 0.0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.placed = false;
+  }
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    tick->contacts[i].ramp.felt_share = tick->contacts[i].ramp.sprung = 0.0;
   }
 }
 
@@ -265,15 +322,17 @@ void hapi_energy_observe(hapi_tick *tick)
     forget(tick);
     return;
   }
+  given += ramps_give(tick);
   if (!settle_ports(tick)) {
     guard->balance = fmin(guard->balance, 0.0);
+    guard->touch_s = 0.0;
     return;
   }
   double stored = 0.0;
   stored += couplings_store(tick);
   guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
   guard->stored_max = fmax(guard->stored_max, stored);
-  /* A larger debt comes from a device that jumped; nobody could pay it back. */
-  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
-  pay_no_more_than(tick, guard->balance + fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST));
+  double overdraft = fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
+  settle_debt(guard, tick->period);
+  pay_no_more_than(tick, guard->balance + overdraft);
 }

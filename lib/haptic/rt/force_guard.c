@@ -34,6 +34,10 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   tick->fault_pointer = tick->fault_generation = 0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     tick->pointers[i].guard.share = 0.0;
+    tick->pointers[i].jump_s = 0.0; /* whoever resets knows where the device is */
+  }
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    tick->contacts[i].seen = false; /* the hand may be anywhere by now */
   }
 }
 

@@ -269,7 +269,7 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   }
   hapi_v3_copy(at.normal, c->normal_now);
   hapi_v3_copy(at.point, c->point_now);
-  double share = hapi_contact_ramp(c, at.depth, tick->period);
+  double share = hapi_contact_ramp(c, at.pointer, &at.depth, tick->period);
   double speed = closing_speed(&at);
   double way = tick->period * speed;
   if (at.depth + NEAR_FLOOR + NEAR_S * speed > 0.0) {

@@ -70,7 +70,7 @@ static void end_proxy(hapi_tick *tick, uint32_t index)
   tick->pointers[index].row = 0;
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     if (tick->contacts[i].pointer == index) {
-      tick->contacts[i].ramp = 0.0;
+      tick->contacts[i].seen = false;
     }
   }
 }

@@ -48,7 +48,7 @@ static double normal_force(hapi_local_contact *c, hapi_tick_pointer *p, const ha
   double apart[3];
   hapi_v3_sub(p->pose.position, at->point, apart);
   double depth = p->radius - hapi_v3_dot(at->normal, apart);
-  double share = hapi_contact_ramp(c, depth, period);
+  double share = hapi_contact_ramp(c, p, &depth, period);
   if (!(depth > 0.0)) {
     return 0.0;
   }

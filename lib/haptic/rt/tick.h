@@ -68,6 +68,8 @@ typedef struct hapi_guard_state {
   uint64_t energy_ticks;
   double balance;    /* J, world units: what the hands and the world have put in and not got back */
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
+  double sprung;     /* J, sum over the contacts of the last tick */
+  double touch_s;    /* s, since something is felt without a break */
   double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
@@ -89,6 +91,10 @@ typedef struct hapi_tick_pointer {
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
   hap_pose device_good;   /* the last device_pose that could be used */
+  bool placed;            /* there was one */
+  bool jumped;            /* between the last one and this one; see coupling.c */
+  double jump_s;          /* s, > 0: contacts that arrive deep are so because of a jump */
+  double speed_limit;     /* m/s at the device, that a hand can make; 0: none */
   uint32_t buttons;       /* in */
   bool estimates;         /* device_twist is made of poses by velocity, not read */
   hapi_velocity velocity;
@@ -154,6 +160,19 @@ typedef struct hapi_local_body {
   int64_t owned_until_ns;
 } hapi_local_body;
 
+/* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
+typedef struct hapi_ramp {
+  double depth;  /* m, at the last tick */
+  double share;  /* 0..1, of the force */
+  double excess; /* m, of the depth that does not count */
+  bool held;     /* the excess goes by drawing back alone */
+
+  /* Of the energy observer, at the last tick: */
+  double felt_share; /* with what the guard took */
+  double felt_excess;
+  double sprung; /* J in the spring, as it was felt */
+} hapi_ramp;
+
 typedef struct hapi_local_contact {
   uint32_t slot;
   uint32_t body;
@@ -164,7 +183,7 @@ typedef struct hapi_local_contact {
   double point_body[3];
   double normal_body[3];
   double a[6][3];
-  double ramp;     /* 0..1, share of the force */
+  hapi_ramp ramp;
   double force[3]; /* on the body */
 
   /* Model CONTACT. */
@@ -222,7 +241,7 @@ typedef struct hapi_tick {
   hapi_local_body *bodies;      /* by slot, capacity.bodies */
   uint32_t *live;               /* slots in the model, live_count */
   hapi_local_contact *contacts; /* of the model, contact_count */
-  double *ramps;                /* by contact slot, of the model before: to go on with */
+  hapi_ramp *ramps;             /* by contact slot, of the model before: to go on with */
   uint32_t *ramp_generations;   /* by contact slot */
   hapi_tick_pointer *pointers;  /* capacity.pointers */
   uint32_t live_count;

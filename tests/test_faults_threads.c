@@ -1,0 +1,228 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* What the hand feels when a thread or the process stands still for real. HAPODE_RUN: path of the
+ * program hapode-run. */
+
+#include "tests/tap.h"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/felt.h"
+
+extern char **environ;
+
+#define PRESSING "hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.08/0/0;0.5:-0.02/0/0"
+
+static felt_stage f;
+static atomic_int hangs; /* physics does not come back */
+
+static void hang(stage *s)
+{
+  (void)s;
+  while (atomic_load(&hangs) != 0) {
+    sleep_ms(1);
+  }
+}
+
+static bool begin_threads(void)
+{
+  atomic_store(&hangs, 0);
+  felt_init(&f, HAP_DRIVE_THREADS, false);
+  f.s.in_step = hang;
+  return felt_begin(&f, PRESSING);
+}
+
+/* False: not for long. */
+static bool wait_until(bool (*condition)(void))
+{
+  for (int i = 0; i < 20000 && !condition(); ++i) {
+    sleep_ms(1);
+  }
+  return condition();
+}
+
+static bool presses(void)
+{
+  return felt_guard(&f) == 0 && fabs(hapi_v3_norm(f.state.wrench.force) - 5.217) < 0.05;
+}
+
+static bool lets_go(void)
+{
+  return atomic_load(&felt.holds) == 0;
+}
+
+/* ---- threads ---- */
+
+static void *stop(void *arg)
+{
+  (void)arg;
+  CHECK(hap_session_stop(f.s.session) == HAP_OK);
+  return NULL;
+}
+
+TEST(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back)
+{
+  pthread_t stopper;
+  REQUIRE(begin_threads());
+  CHECK(wait_until(presses));
+  atomic_store(&hangs, 1);
+  REQUIRE(pthread_create(&stopper, NULL, stop, NULL) == 0);
+  CHECK(wait_until(lets_go));
+  uint64_t ticks = stats_of(&f.s).ticks;
+  sleep_ms(20);
+  CHECK(stats_of(&f.s).ticks == ticks && lets_go()); /* the loop has ended, stop waits */
+  atomic_store(&hangs, 0);
+  pthread_join(stopper, NULL);
+  felt_end(&f);
+}
+
+TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
+{
+  REQUIRE(begin_threads());
+  CHECK(wait_until(presses));
+  uint64_t missed = stats_of(&f.s).missed_ticks;
+  for (int i = 0; i < 3; ++i) {
+    atomic_store(&felt.block_ms, 300);
+    while (atomic_load(&felt.block_ms) != 0) {
+      sleep_ms(1);
+    }
+    sleep_ms(400);
+  }
+  CHECK(stats_of(&f.s).missed_ticks >= missed + 3 * 290); /* they are passed over, not caught up */
+  CHECK(wait_until(presses));
+  CHECK(stats_of(&f.s).faults == 0);
+  CHECK(hap_session_stop(f.s.session) == HAP_OK);
+  CHECK(felt.peak < FELT_LIMIT);
+  felt_end(&f);
+}
+
+TEST(a_device_that_blocks_and_then_fails_is_zeroed)
+{
+  REQUIRE(begin_threads());
+  CHECK(wait_until(presses));
+  atomic_store(&felt.fail_read, 1);
+  atomic_store(&felt.block_ms, 100);
+  CHECK(wait_until(lets_go));
+  sleep_ms(120); /* it may have been before that read */
+  atomic_store(&felt.ever_holds, 0);
+  sleep_ms(50);
+  CHECK(atomic_load(&felt.ever_holds) == 0 && stats_of(&f.s).fault == HAP_FAULT_DEVICE_READ);
+  atomic_store(&felt.fail_read, 0);
+  sleep_ms(20);
+  CHECK(lets_go());
+  CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
+  CHECK(wait_until(presses));
+  felt_end(&f);
+}
+
+/* ---- the process ---- */
+
+static char trace_path[] = "/tmp/hapode-faults-XXXXXX";
+
+#define RUN_ARGUMENTS                                                                \
+  "hapode-run --scene wedge --no-realtime --seconds 3 --device "                     \
+  "virtual:hand=relaxed,device_mass=0.1,path=0:-0.2/0/0.05;1:0/0/0.05,max_force=10 " \
+  "--trace %s"
+
+static pid_t start_run(void)
+{
+  char words[400];
+  char *argv[12] = {NULL};
+  size_t count = 0;
+  snprintf(words, sizeof words, RUN_ARGUMENTS, trace_path);
+  for (char *rest = NULL, *word = strtok_r(words, " ", &rest); word != NULL && count < 11;
+       word = strtok_r(NULL, " ", &rest)) {
+    argv[count++] = word;
+  }
+  const char *program = getenv("HAPODE_RUN");
+  posix_spawn_file_actions_t actions;
+  pid_t child = -1;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  if (program == NULL || posix_spawn(&child, program, &actions, NULL, argv, environ) != 0) {
+    child = -1;
+  }
+  posix_spawn_file_actions_destroy(&actions);
+  return child;
+}
+
+typedef struct traced {
+  int rows;
+  double longest;  /* s, between two ticks */
+  double steepest; /* N, between two ticks */
+  double peak;     /* N */
+  double work;     /* J on the hand, without what was held over the longest gap */
+  double work_most;
+} traced;
+
+static traced read_trace(void)
+{
+  traced out = {0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  char line[4000];
+  double before[7] = {0.0};
+  FILE *file = fopen(trace_path, "r");
+  while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    double v[7];
+    if (sscanf(line, "%lf,%lf,%lf,%lf,%lf,%lf,%lf", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5],
+               &v[6]) != 7) {
+      continue; /* the header */
+    }
+    double way[3];
+    double change[3];
+    hapi_v3_sub(v + 1, before + 1, way);
+    hapi_v3_sub(v + 4, before + 4, change);
+    if (out.rows++ > 0) {
+      out.longest = fmax(out.longest, v[0] - before[0]);
+      out.steepest = fmax(out.steepest, hapi_v3_norm(change));
+      out.work += v[0] - before[0] < 0.1 ? hapi_v3_dot(before + 4, way) : 0.0;
+      out.work_most = fmax(out.work_most, out.work);
+    }
+    out.peak = fmax(out.peak, hapi_v3_norm(v + 4));
+    memcpy(before, v, sizeof v);
+  }
+  if (file != NULL) {
+    fclose(file);
+  }
+  return out;
+}
+
+TEST(a_process_that_is_stopped_and_continued_gives_no_burst)
+{
+  int status = 0;
+  int file = mkstemp(trace_path);
+  REQUIRE(file >= 0);
+  close(file);
+  pid_t child = start_run();
+  REQUIRE(child > 0);
+  sleep_ms(1500);
+  kill(child, SIGSTOP);
+  sleep_ms(400);
+  kill(child, SIGCONT);
+  CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  traced t = read_trace();
+  printf("# %d ticks, a gap of %.3g s, force to %.3g N, %.3g N a tick, %.3g J\n", t.rows, t.longest,
+         t.peak, t.steepest, t.work_most);
+  CHECK(t.rows > 100 && t.longest > 0.3);
+  CHECK(t.peak > 0.1 && t.peak <= 10.0 * (1.0 + 1e-6)); /* digits of the file */
+  CHECK(t.steepest <= 5.0 * (1.0 + 1e-6));
+  CHECK(t.work_most <= 0.01 * 0.5 * t.peak * t.peak / 1000.0 + 1e-3);
+  unlink(trace_path);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back);
+  RUN(a_device_whose_read_takes_300_ms_is_felt_as_a_pause);
+  RUN(a_device_that_blocks_and_then_fails_is_zeroed);
+  RUN(a_process_that_is_stopped_and_continued_gives_no_burst);
+  dCloseODE();
+  return tap_done();
+}
