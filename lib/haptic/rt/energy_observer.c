@@ -174,12 +174,23 @@ static double surfaces_give(const hapi_tick *tick, double *io_stored)
 static double spring_energy(const hapi_tick_pointer *p, double share, double depth)
 {
   double k = share * p->stiffness;
-  double limit = p->force_scale > 0.0 ? p->max_force / p->force_scale : 0.0;
+  double force = k * depth;
   if (!(depth > 0.0) || !(k > 0.0)) {
     return 0.0;
   }
-  double force = k * depth;
-  return force <= limit ? 0.5 * force * depth : limit * (depth - 0.5 * limit / k);
+  return force <= p->guard.limit ? 0.5 * force * depth
+                                 : p->guard.limit * (depth - 0.5 * p->guard.limit / k);
+}
+
+static void note_limits(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation != 0) {
+      p->guard.limit = p->force_scale > 0.0 ? p->max_force / p->force_scale : 0.0;
+      p->guard.felt = p->guard.share * (1.0 - tick->guard.age_loss);
+    }
+  }
 }
 
 /* J that ramps and fading added to the springs in this tick. */
@@ -189,17 +200,21 @@ static double ramps_give(hapi_tick *tick)
   double gone = guard->sprung;
   double sum = 0.0;
   guard->sprung = 0.0;
+  note_limits(tick);
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     hapi_local_contact *c = &tick->contacts[i];
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
     hapi_ramp *r = &c->ramp;
+    double share = r->share * p->guard.felt;
+    double energy = spring_energy(p, share, r->depth - r->excess);
     gone -= r->sprung;
-    double before = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
-    r->felt_share = r->share * p->guard.share * (1.0 - guard->age_loss);
-    r->felt_excess = r->excess;
-    r->sprung = spring_energy(p, r->felt_share, r->depth - r->felt_excess);
-    guard->sprung += r->sprung;
-    sum += r->sprung - before;
+    if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
+      sum += energy - spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+      r->felt_share = share;
+      r->felt_excess = r->excess;
+    }
+    r->sprung = energy;
+    guard->sprung += energy;
   }
   return sum - gone;
 }

@@ -53,6 +53,8 @@ typedef struct hapi_guard_pointer {
   hap_wrench wanted;  /* before the guard */
   hap_wrench written; /* at the last tick; in force until the next write */
   uint32_t flags;     /* hap_guard_flag, of the last tick */
+  double limit;       /* N in the world, of the device */
+  double felt;        /* 0..1, share after ramp-in and age */
   double force2;      /* N^2, of this tick: sum over the contacts, other models than CONTACT */
   double power;       /* W, likewise: of the bodies on the springs */
 } hapi_guard_pointer;
