@@ -385,7 +385,10 @@ TEST(person_can_stop_it)
     if (status != HAP_END) {
       printf("# pacing %u: %s\n", pacings[k], detail.text);
     }
-    CHECK(status == HAP_END || (fast && strstr(detail.text, "raise rate_hz") != NULL));
+    /* in real time, a machine that lets the thread wait lets the device run: then it is let go of */
+    bool ran = pacings[k] != HAP_PACING_VIRTUAL && status == HAP_ERROR_DEVICE &&
+               strstr(detail.text, "its force was taken off") != NULL;
+    CHECK(status == HAP_END || ran || (fast && strstr(detail.text, "raise rate_hz") != NULL));
     CHECK(the.stops == 1 && hapi_v3_norm(the.force) == 0.0);
     hap_device_close(opened);
   }
