@@ -241,10 +241,8 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
   hapi_row_ready(&world->solver, number);
 }
 
-static double closing_speed(const placed_pointer *at)
+static double closing_speed(const placed_pointer *at, const double velocity[3])
 {
-  const hapi_tick_pointer *p = at->pointer;
-  const double *velocity = p->proxied ? p->free_velocity : p->twist.linear;
   double speed = -hapi_v3_dot(at->normal, velocity);
   if (at->body != NULL) {
     double j[6];
@@ -270,13 +268,16 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   hapi_v3_copy(at.normal, c->normal_now);
   hapi_v3_copy(at.point, c->point_now);
   double share = hapi_contact_ramp(c, at.depth, tick->period);
-  double speed = closing_speed(&at);
+  const hapi_tick_pointer *p = at.pointer;
+  double speed = closing_speed(&at, p->proxied ? p->free_velocity : p->twist.linear);
   double way = tick->period * speed;
+  /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
+  double motion = p->proxied ? closing_speed(&at, p->proxy_velocity) : speed;
   if (at.depth + NEAR_FLOOR + NEAR_S * speed > 0.0) {
     at.pointer->near_stiffness += at.pointer->stiffness;
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
-  bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && way < 0.25 * at.pointer->radius);
+  bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && tick->period * motion < 0.25 * p->radius);
   if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 &&
       (at.depth > 0.0 || at.pointer->proxied)) {
     hapi_local_wake(tick, at.body);
