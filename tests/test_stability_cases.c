@@ -51,8 +51,8 @@ static bool measure_case(const char *how)
     return false;
   }
   bool good = bounds_hold(b, broken, sizeof broken);
-  printf("# %s%s, %s: %.3g N, energy %+.4f, depth %.3g mm (%.2f), momentum %.2f, way %.2g m%s%s\n",
-         how, now.row->name, hap_model_name(now.model), b->force, bounds_energy(b), 1e3 * b->depth,
+  printf("# %s%s, %s: %.3g N, energy %+.4f, gain %.4f, depth %.3g mm (%.2f), momentum %.1e, way %.2g m%s%s\n",
+         how, now.row->name, hap_model_name(now.model), b->force, bounds_energy(b), bounds_gain(b), 1e3 * b->depth,
          b->deeper, b->residual, b->way, good ? "" : "; broken:", broken);
   (void)fflush(stdout);
   return good;
@@ -82,13 +82,17 @@ static void run_row(const case_row *row, bool all)
 
 int main(int argc, char **argv)
 {
-  const char *asked = argc > 1 ? argv[1] : "";
-  bool all = strcmp(asked, "all") == 0;
+  const char *asked = "";
+  bool all = false;
+  for (int i = 1; i < argc; ++i) {
+    all = all || strcmp(argv[i], "all") == 0;
+    asked = strcmp(argv[i], "all") == 0 ? asked : argv[i];
+  }
   dInitODE2(0);
   dAllocateODEDataForThread(dAllocateMaskAll);
   for (size_t i = 0; i < stability_case_count; ++i) {
     const case_row *row = &stability_cases[i];
-    if (all || strstr(row->name, asked) != NULL) {
+    if (strstr(row->name, asked) != NULL) {
       run_row(row, all);
     }
   }

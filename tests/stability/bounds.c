@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/vec.h"
@@ -13,7 +14,7 @@
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 
-#define LEAST_ENERGY 1e-9 /* J: below this a ratio says nothing */
+#define LEAST_ENERGY 1e-8 /* J: 5 nm of a cube's height; below this a ratio says nothing */
 #define LEAST_DEPTH 1e-7  /* m, of ODE's collider between rounded things */
 
 /* A body where the loop has it, else where ODE has it. */
@@ -163,6 +164,12 @@ static void look_at_hand(bounds *b, int index, double *work, double *kinetic)
 
 /* ---- the bounds ---- */
 
+/* ODE moves what is touched, and hears of it at the end of an interval. */
+static bool answers_late(const bounds *b)
+{
+  return b->row->late || b->model != HAP_MODEL_CONTACT;
+}
+
 static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
 {
   double work = 0.0;
@@ -187,9 +194,18 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
   }
   double before = b->ticks >= b->interval ? b->work[b->ticks % b->interval] : 0.0;
   b->work[b->ticks % b->interval] = work;
-  b->late_max = fmax(b->late_max, fabs(work - before));
-  b->made_max = fmax(b->made_max, work - b->loss + b->cut + kinetic + height - b->given);
-  b->stored_max = fmax(b->stored_max, kinetic + held + spring_energy(b));
+  double springs = spring_energy(b);
+  double late = answers_late(b) ? fabs(work - before) : 0.0;
+  double made = work - b->loss + b->cut + kinetic + height - b->given - late;
+  b->made_max = fmax(b->made_max, made);
+  if (getenv("DBG")) {
+    printf("%llu made %.4g springs %.4g kin %.4g h %.4g work %.4g loss %.4g F %.3g z %.4g\n",
+           (unsigned long long)b->ticks, made, springs, kinetic, height, work, b->loss,
+           hapi_v3_norm(tick_of(b)->pointers[0].wrench.force), seen[atoi(getenv("DBG"))].pose.position[2]);
+  }
+  b->least = fmin(b->least, made + springs);
+  b->gain = fmax(b->gain, made + springs - b->least);
+  b->stored_max = fmax(b->stored_max, kinetic + held + springs);
   b->finite = b->finite && isfinite(work + kinetic + height);
 }
 
@@ -315,9 +331,12 @@ void bounds_end(bounds *b)
 
 double bounds_energy(const bounds *b)
 {
-  bool late = b->row->late || b->model != HAP_MODEL_CONTACT;
-  double made = b->made_max - (late ? b->late_max : 0.0);
-  return made / fmax(b->stored_max, LEAST_ENERGY);
+  return b->made_max / fmax(b->stored_max, LEAST_ENERGY);
+}
+
+double bounds_gain(const bounds *b)
+{
+  return fmax(0.0, b->gain - b->row->given) / fmax(b->stored_max, LEAST_ENERGY);
 }
 
 static void note(char *out, size_t size, bool broken, const char *what)
@@ -335,6 +354,7 @@ bool bounds_hold(const bounds *b, char *out_broken, size_t size)
   note(out_broken, size, b->fault != HAP_FAULT_NONE, "fault");
   note(out_broken, size, !(b->force <= b->w->max_force * (1.0 + 1e-12)), "force");
   note(out_broken, size, !(bounds_energy(b) <= BOUNDS_ENERGY), "energy");
+  note(out_broken, size, !answers_late(b) && !(bounds_gain(b) <= BOUNDS_ENERGY), "gain");
   note(out_broken, size, !(b->deeper <= 1.0), "depth");
   note(out_broken, size, !(b->residual <= 1.0), "momentum");
   note(out_broken, size, !(b->way <= b->row->room), "room");

@@ -36,7 +36,8 @@ typedef struct bounds {
   double given;    /* J, of the world at its start */
   double cut;      /* J, less than 0: what the hands were spared by the devices' limits */
   double made_max; /* J */
-  double late_max; /* J, largest work of the hands in one interval */
+  double least;    /* J */
+  double gain;
   double stored_max;
   double work[BOUNDS_INTERVAL_MAX];
   double impulse[BOUNDS_INTERVAL_MAX];
@@ -61,6 +62,7 @@ void bounds_look(bounds *b); /* after each tick */
 void bounds_end(bounds *b);
 
 double bounds_energy(const bounds *b); /* what was made, of the largest stored energy */
+double bounds_gain(const bounds *b);   /* what was made from any moment on, likewise */
 bool bounds_hold(const bounds *b, char *out_broken, size_t size);
 
 #endif

@@ -54,6 +54,7 @@ void build_loop(world *w, const case_row *row)
 void build_chain(world *w, const case_row *row)
 {
   const double length = 0.05;
+  dWorldSetQuickStepNumIterations(w->world, 400); /* else its own weight stretches it */
   dBodyID above = NULL;
   for (int i = 0; i < row->n; ++i) {
     double top = -length * i;

@@ -105,11 +105,11 @@ void build_row_ends(world *w, const case_row *row)
            x + APART, HALF);
 }
 
-/* As wide as the cube, which is pressed down between them. */
+/* 0.3 mm narrower than the cube, which is pressed down between them. */
 void build_walls(world *w, const case_row *row)
 {
-  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(-HALF - 0.01, 0.0, 0.0));
-  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(HALF + 0.01, 0.0, 0.0));
+  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(-HALF - 0.01 + 1.5e-4, 0.0, 0.0));
+  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(HALF + 0.01 - 1.5e-4, 0.0, 0.0));
   (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, 0.0));
   set_gravity(w, 0.0);
   press_at(w, 0.01, 0.0, HALF, 0.02);
@@ -141,13 +141,13 @@ void build_funnel(world *w, const case_row *row)
   for (int i = 0; i < 4; ++i) {
     double x = i == 0 ? 1.0 : i == 1 ? -1.0 : 0.0;
     double y = i == 2 ? 1.0 : i == 3 ? -1.0 : 0.0;
-    dGeomID side = add_block(w, AT(0.5, 0.5, 0.02), AT(0.1 * x, 0.1 * y, 0.1));
+    dGeomID side = add_block(w, AT(0.7, 0.7, 0.2), AT(0.15 * x, 0.15 * y, 0.0));
     tilt(side, y, -x, 0.25 * M_PI);
   }
   for (int i = 0; i < row->n; ++i) {
     double x = 0.03 * (i % 2) - 0.015;
     double y = 0.03 * (i / 2 % 2) - 0.015;
-    (void)add_ball(w, row->mass, 0.014, AT(x, y, 0.06 + 0.03 * (i / 4)));
+    (void)add_ball(w, row->mass, 0.014, AT(x, y, 0.05 + 0.029 * (i / 4)));
   }
   add_hand(w, "path=0:0/0/0.25;0.4:0.01/0.005/0.06;0.6:-0.01/0.01/0.05;0.8:0/0/0.25,loop=1");
 }

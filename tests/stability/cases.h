@@ -24,7 +24,7 @@ typedef struct case_row {
   double room;    /* m, from where it started, that no body leaves */
   /* Where a case differs; 0: it does not. */
   double physics_hz;     /* 60 */
-  double device_damping; /* N s/m, 0.5 */
+  double device_damping; /* N s/m, 2 */
   const char *device;    /* more arguments of the virtual device */
   double origin;         /* m, along x, of the whole scene */
   double cfm;            /* 1e-12; negative: 0 */

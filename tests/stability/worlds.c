@@ -104,7 +104,7 @@ void world_open(world *w)
   w->space = dHashSpaceCreate(NULL);
   w->surface = (dSurfaceParameters){.mode = dContactApprox1, .mu = 0.5};
   w->max_force = 100.0;
-  w->device_damping = 0.5;
+  w->device_damping = 2.0;
   set_gravity(w, 9.81);
   dWorldSetERP(w->world, 0.2);
   dWorldSetContactSurfaceLayer(w->world, WORLD_LAYER);
