@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/vec.h"
@@ -113,6 +112,11 @@ static bool body_is_finite(const seen_body *s, dBodyID body)
          all_finite(dBodyGetLinearVel(body), 3) && all_finite(dBodyGetAngularVel(body), 3);
 }
 
+static double length4(const double q[4])
+{
+  return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+}
+
 /* ---- springs and hands ---- */
 
 static double spring_energy(const bounds *b)
@@ -187,6 +191,7 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       hapi_v3_sub(seen[i].pose.position, b->w->start[i], way);
       b->way = fmax(b->way, hapi_v3_norm(way));
       b->finite = b->finite && body_is_finite(&seen[i], b->w->bodies[i]);
+      b->unit = fmax(b->unit, fabs(length4(seen[i].pose.quat_wxyz) - 1.0));
     }
   }
   if (b->ticks == 0) {
@@ -198,11 +203,6 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
   double late = answers_late(b) ? fabs(work - before) : 0.0;
   double made = work - b->loss + b->cut + kinetic + height - b->given - late;
   b->made_max = fmax(b->made_max, made);
-  if (getenv("DBG")) {
-    printf("%llu made %.4g springs %.4g kin %.4g h %.4g work %.4g loss %.4g F %.3g z %.4g\n",
-           (unsigned long long)b->ticks, made, springs, kinetic, height, work, b->loss,
-           hapi_v3_norm(tick_of(b)->pointers[0].wrench.force), seen[atoi(getenv("DBG"))].pose.position[2]);
-  }
   b->least = fmin(b->least, made + springs);
   b->gain = fmax(b->gain, made + springs - b->least);
   b->stored_max = fmax(b->stored_max, kinetic + held + springs);
@@ -354,9 +354,11 @@ bool bounds_hold(const bounds *b, char *out_broken, size_t size)
   note(out_broken, size, b->fault != HAP_FAULT_NONE, "fault");
   note(out_broken, size, !(b->force <= b->w->max_force * (1.0 + 1e-12)), "force");
   note(out_broken, size, !(bounds_energy(b) <= BOUNDS_ENERGY), "energy");
-  note(out_broken, size, !answers_late(b) && !(bounds_gain(b) <= BOUNDS_ENERGY), "gain");
+  double gain = b->row->gain > 0.0 ? b->row->gain : BOUNDS_ENERGY;
+  note(out_broken, size, !answers_late(b) && !(bounds_gain(b) <= gain), "gain");
   note(out_broken, size, !(b->deeper <= 1.0), "depth");
   note(out_broken, size, !(b->residual <= 1.0), "momentum");
+  note(out_broken, size, !(b->unit <= BOUNDS_UNIT), "unit");
   note(out_broken, size, !(b->way <= b->row->room), "room");
   note(out_broken, size, b->contact_ticks == 0, "nothing was touched");
   return out_broken[0] == '\0';
