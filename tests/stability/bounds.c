@@ -16,11 +16,13 @@
 #define LEAST_ENERGY 1e-8 /* J: 5 nm of a cube's height; below this a ratio says nothing */
 #define LEAST_DEPTH 1e-7  /* m, of ODE's collider between rounded things */
 
-/* A body where the loop has it, else where ODE has it. */
+/* A body as whoever moves it has it, loop or ODE, and as the hand meets it. */
 typedef struct seen_body {
   bool there;
   hap_pose pose;
   hap_twist twist;
+  hap_pose met_pose;
+  hap_twist met_twist;
 } seen_body;
 
 static const hapi_tick *tick_of(const bounds *b)
@@ -55,7 +57,6 @@ static int index_of_slot(const bounds *b, uint32_t slot)
 static void see_bodies(const bounds *b, seen_body seen[WORLD_BODIES_MAX])
 {
   const hapi_tick *tick = tick_of(b);
-  bool in_loop = b->model == HAP_MODEL_CONTACT || b->model == HAP_MODEL_ACCELERANCE;
   for (int i = 0; i < b->w->body_count; ++i) {
     dBodyID body = b->w->bodies[i];
     seen[i].there = body != NULL;
@@ -64,12 +65,18 @@ static void see_bodies(const bounds *b, seen_body seen[WORLD_BODIES_MAX])
       memcpy(seen[i].pose.quat_wxyz, dBodyGetQuaternion(body), 4 * sizeof(double));
       memcpy(seen[i].twist.linear, dBodyGetLinearVel(body), 3 * sizeof(double));
       memcpy(seen[i].twist.angular, dBodyGetAngularVel(body), 3 * sizeof(double));
+      seen[i].met_pose = seen[i].pose;
+      seen[i].met_twist = seen[i].twist;
     }
   }
-  for (uint32_t i = 0; i < tick->live_count && in_loop; ++i) {
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
     const hapi_local_body *body = &tick->bodies[tick->live[i]];
     int index = index_of_slot(b, tick->live[i]);
     if (index >= 0) {
+      seen[index].met_pose = body->pose;
+      seen[index].met_twist = body->twist;
+    }
+    if (index >= 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
       seen[index].pose = body->pose;
       seen[index].twist = body->twist;
     }
@@ -108,6 +115,8 @@ static bool body_is_finite(const seen_body *s, dBodyID body)
 {
   return all_finite(s->pose.position, 3) && all_finite(s->pose.quat_wxyz, 4) &&
          all_finite(s->twist.linear, 3) && all_finite(s->twist.angular, 3) &&
+         all_finite(s->met_pose.position, 3) && all_finite(s->met_pose.quat_wxyz, 4) &&
+         all_finite(s->met_twist.linear, 3) && all_finite(s->met_twist.angular, 3) &&
          all_finite(dBodyGetPosition(body), 3) && all_finite(dBodyGetQuaternion(body), 4) &&
          all_finite(dBodyGetLinearVel(body), 3) && all_finite(dBodyGetAngularVel(body), 3);
 }
@@ -223,8 +232,8 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       continue;
     }
     const seen_body *s = &seen[index];
-    memcpy(q, s->pose.quat_wxyz, 4 * sizeof(double));
-    const double *at = s->pose.position;
+    memcpy(q, s->met_pose.quat_wxyz, 4 * sizeof(double));
+    const double *at = s->met_pose.position;
     dGeomSetPosition(b->clones[index], at[0], at[1], at[2]);
     dGeomSetQuaternion(b->clones[index], q);
     dGeomSetPosition(b->balls[c->pointer], p->pose.position[0], p->pose.position[1],
@@ -232,8 +241,8 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
     if (dCollide(b->balls[c->pointer], b->clones[index], 1, &found, sizeof found) == 1) {
       double arm[3];
       hapi_v3_sub(found.pos, at, arm);
-      double speed = hapi_v3_norm(p->twist.linear) + hapi_v3_norm(s->twist.linear) +
-                     hapi_v3_norm(s->twist.angular) * hapi_v3_norm(arm);
+      double speed = hapi_v3_norm(p->twist.linear) + hapi_v3_norm(s->met_twist.linear) +
+                     hapi_v3_norm(s->met_twist.angular) * hapi_v3_norm(arm);
       double allowed = hapi_v3_norm(c->force) / p->stiffness + speed * step + b->row->depth;
       b->depth = fmax(b->depth, found.depth);
       b->deeper = fmax(b->deeper, found.depth / (allowed + LEAST_DEPTH));
