@@ -51,9 +51,10 @@ void build_press_unequal(world *w, const case_row *row)
 
 void build_push(world *w, const case_row *row)
 {
+  double half = row->size > 0.0 ? 0.5 * row->size : HALF;
   add_floor(w);
-  (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, HALF - WORLD_LAYER));
-  push_at(w, -HALF, HALF, 0.05);
+  (void)add_cube(w, row->mass, 2.0 * half, AT(0.0, 0.0, half - WORLD_LAYER));
+  push_at(w, -half, half, 0.05);
 }
 
 void build_push_sliding(world *w, const case_row *row)
