@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "tests/stability/cases.h"
 #include "tests/stability/build.h"
+#include "tests/stability/cases.h"
 
 static const char *const hand_words[] = {"relaxed", "tense", "rigid", "none"};
 
@@ -84,7 +84,8 @@ static bool surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
   }
   *io = w->surface;
   return (body_a != NULL || body_b != NULL) &&
-         !(body_a != NULL && body_b != NULL && dAreConnectedExcluding(body_a, body_b, dJointTypeContact));
+         !(body_a != NULL && body_b != NULL &&
+           dAreConnectedExcluding(body_a, body_b, dJointTypeContact));
 }
 
 static void in_step(void *user, double step_s)
@@ -132,7 +133,7 @@ static bool open_session(world *w)
 static bool open_hand(world *w, const case_row *row, int index)
 {
   char spec[512];
-  bool rigid = row->hand == HAND_RIGID;
+  bool rigid = row->hand == RIGID;
   (void)snprintf(spec, sizeof spec, "virtual:hand=%s,max_force=%g,device_damping=%g,%s%s%s%s",
                  hand_words[row->hand], w->max_force, w->device_damping,
                  rigid ? "" : "device_mass=0.1,", row->device != NULL ? row->device : "",
