@@ -115,7 +115,7 @@ const case_row stability_cases[] = {
   {"H = T: 1 kHz, row of 10",          build_row,            10, 0.1,   0,    2e3, TENSE,   1.0, CONTACT, 0.2,
      .physics_hz = 1000},
   {"device 1 ms late, quantum 30 um",  build_push,            1, 0.2,   0,    1e4, TENSE,   1.0, CONTACT, 0.3,
-     .device = "delay=0.001, quantum=3e-5"},
+     .device = "delay=0.001,quantum=3e-5"},
   /* Hand-over between two threads: the sessions of tests/test_exchange.c under the thread sanitizer. */
 };
 /* clang-format on */
