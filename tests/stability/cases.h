@@ -25,6 +25,7 @@ typedef struct case_row {
   /* Where a case differs; 0: it does not. */
   double physics_hz;         /* 60 */
   double device_damping;     /* N s/m, 2 */
+  double max_force;          /* N, of the device, 100 */
   const char *device;        /* more arguments of the virtual device */
   double origin;             /* m, along x, of the whole scene */
   double cfm;                /* 1e-12; negative: 0 */

@@ -152,6 +152,7 @@ static void take_parameters(world *w, const case_row *row, hap_model model)
   w->def.model = model;
   w->def.physics_hz = row->physics_hz > 0.0 ? row->physics_hz : w->def.physics_hz;
   w->device_damping = row->device_damping > 0.0 ? row->device_damping : w->device_damping;
+  w->max_force = row->max_force > 0.0 ? row->max_force : w->max_force;
   w->pointer.stiffness = row->k;
   w->pointer.max_force = 1e6; /* the device's limit is the one that counts */
   dWorldSetCFM(w->world, row->cfm < 0.0 ? 0.0 : row->cfm > 0.0 ? row->cfm : 1e-12);
