@@ -27,7 +27,7 @@ TEST(ten_million_ticks_on_a_stack)
                         .n = 3,
                         .mass = 0.2,
                         .k = 2e3,
-                        .hand = HAND_RELAXED,
+                        .hand = RELAXED,
                         .seconds = 1e4,
                         .room = 0.01};
   CHECK(case_holds(&row, HAP_MODEL_CONTACT, ""));
@@ -55,12 +55,12 @@ static void sweep_case(world_build_fn build, const char *what, case_hand hand)
 
 TEST(sweep_of_a_cube_pressed)
 {
-  sweep_case(build_press, "pressed", HAND_RELAXED);
+  sweep_case(build_press, "pressed", RELAXED);
 }
 
 TEST(sweep_of_a_cube_pushed)
 {
-  sweep_case(build_push, "pushed", HAND_TENSE);
+  sweep_case(build_push, "pushed", TENSE);
 }
 
 static bench unused; /* takes the text of an error */
@@ -98,11 +98,13 @@ static void sweep_point(const stability_point *p)
   bool known = is_known_to_fail(p);
   REQUIRE(stability_run(&unused, p, SWEEP_SECONDS, &result) >= HAP_OK);
   if (!result.stable) {
-    printf("# %s%g N/m, %g kg, %d %s, layout %d, hand %s, %s, delay %g ticks, quantum %g, missed %d: "
-           "energy ratio %.4f\n",
-           known ? "TODO " : "", p->stiffness, p->mass, p->contacts, p->cubes ? "cubes" : "balls", p->layout,
-           stability_hand_word(p->hand), p->coupling == HAP_COUPLING_PROXY ? "proxy" : "auto",
-           p->delay_ticks, p->quantum, p->missed, result.energy_ratio);
+    printf(
+        "# %s%g N/m, %g kg, %d %s, layout %d, hand %s, %s, delay %g ticks, quantum %g, missed %d: "
+        "energy ratio %.4f\n",
+        known ? "TODO " : "", p->stiffness, p->mass, p->contacts, p->cubes ? "cubes" : "balls",
+        p->layout, stability_hand_word(p->hand),
+        p->coupling == HAP_COUPLING_PROXY ? "proxy" : "auto", p->delay_ticks, p->quantum, p->missed,
+        result.energy_ratio);
   }
   CHECK(known ? isfinite(result.energy_ratio) : result.stable);
 }

@@ -27,8 +27,8 @@
  * Momentum. The interval is a physics step and the tick in which its result is taken; model impulse
  * takes it a step later. */
 
-#include "tests/stability/cases.h"
 #include "plugins/virtual/virtual.h"
+#include "tests/stability/cases.h"
 
 #define BOUNDS_ENERGY 0.01
 #define BOUNDS_UNIT 1e-12
@@ -60,7 +60,7 @@ typedef struct bounds {
   double deeper;   /* of what is allowed, as a ratio */
   double residual; /* of what is allowed, as a ratio */
   double unit;
-  double way;      /* m */
+  double way; /* m */
   uint64_t contact_ticks;
   uint32_t fault;
 } bounds;

@@ -85,8 +85,9 @@ void build_lightstand(world *w, const case_row *row)
   w->space = w->scene->space;
   w->body_count = (int)w->scene->body_count;
   memcpy(w->bodies, w->scene->bodies, w->scene->body_count * sizeof w->bodies[0]);
-  add_hand(w, "path=0:0.16/0/0.233;1.3:0.09/0/0.233;2:0.16/-0.02/0.2;3.4:0.18/-0.05/0.02;"
-              "5.6:0.18/0.11/0.02");
+  add_hand(w,
+           "path=0:0.16/0/0.233;1.3:0.09/0/0.233;2:0.16/-0.02/0.2;3.4:0.18/-0.05/0.02;"
+           "5.6:0.18/0.11/0.02");
 }
 
 void build_fixed(world *w, const case_row *row)
@@ -96,6 +97,6 @@ void build_fixed(world *w, const case_row *row)
   dJointAttach(joint, cube, NULL);
   dJointSetFixed(joint);
   double z = 0.5 * WORLD_EDGE + POINTER;
-  add_hand(w, "path=0:0.01/0/%g;0.2:0.01/0/%g;0.3:0.01/0/%g;0.5:0.01/0/%g,loop=1", z + 0.002, z - 0.02,
-           z - 0.02, z + 0.002);
+  add_hand(w, "path=0:0.01/0/%g;0.2:0.01/0/%g;0.3:0.01/0/%g;0.5:0.01/0/%g,loop=1", z + 0.002,
+           z - 0.02, z - 0.02, z + 0.002);
 }

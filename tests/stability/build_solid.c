@@ -93,8 +93,8 @@ void build_row_reversing(world *w, const case_row *row)
 {
   add_row(w, row);
   double x = -HALF - POINTER;
-  add_hand(w, "path=0:%.9g/0/%g;0.1:%.9g/0/%g;0.2:%.9g/0/%g,loop=1", x - APART, HALF, x + 0.02, HALF,
-           x - APART, HALF);
+  add_hand(w, "path=0:%.9g/0/%g;0.1:%.9g/0/%g;0.2:%.9g/0/%g,loop=1", x - APART, HALF, x + 0.02,
+           HALF, x - APART, HALF);
 }
 
 void build_row_ends(world *w, const case_row *row)
@@ -102,8 +102,8 @@ void build_row_ends(world *w, const case_row *row)
   add_row(w, row);
   double x = (row->n - 1) * (EDGE - 1e-5) + HALF + POINTER;
   push_at(w, -HALF, HALF, 0.02);
-  add_hand(w, "path=0:%.9g/0/%g;0.3:%.9g/0/%g;0.6:%.9g/0/%g,loop=1", x + APART, HALF, x - 0.02, HALF,
-           x + APART, HALF);
+  add_hand(w, "path=0:%.9g/0/%g;0.3:%.9g/0/%g;0.6:%.9g/0/%g,loop=1", x + APART, HALF, x - 0.02,
+           HALF, x + APART, HALF);
 }
 
 /* 0.3 mm narrower than the cube, which is pressed down between them. */
@@ -309,8 +309,8 @@ void build_squeeze(world *w, const case_row *row)
   (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, HALF - WORLD_LAYER));
   push_at(w, -HALF, HALF, 0.02);
   double x = HALF + POINTER;
-  add_hand(w, "path=0:%.9g/0/%g;0.3:%.9g/0/%g;0.6:%.9g/0/%g,loop=1", x + APART, HALF, x - 0.02, HALF,
-           x + APART, HALF);
+  add_hand(w, "path=0:%.9g/0/%g;0.3:%.9g/0/%g;0.6:%.9g/0/%g,loop=1", x + APART, HALF, x - 0.02,
+           HALF, x + APART, HALF);
 }
 
 /* Left alone for a second. */
@@ -321,8 +321,8 @@ void build_asleep(world *w, const case_row *row)
   add_floor(w);
   (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, HALF - WORLD_LAYER));
   double x = -HALF - POINTER;
-  add_hand(w, "path=0:%.9g/0/%g;1:%.9g/0/%g;1.4:%.9g/0/%g", x - APART, HALF, x - APART, HALF, x + 0.03,
-           HALF);
+  add_hand(w, "path=0:%.9g/0/%g;1:%.9g/0/%g;1.4:%.9g/0/%g", x - APART, HALF, x - APART, HALF,
+           x + 0.03, HALF);
 }
 
 /* 0.1 mm apart in the air; the device is kicked against the first one. At 2 m/s the blow is through

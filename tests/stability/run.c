@@ -9,11 +9,11 @@
 
 static void print_figures(const bounds *b, const char *how, const char *broken)
 {
-  printf("# %s%s, %s: %.3g N, energy %+.4f, gain %.4f, depth %.3g mm (%.2f), momentum %.1e, way %.2g "
-         "m%s%s\n",
-         how, b->row->name, hap_model_name(b->model), b->force, bounds_energy(b), bounds_gain(b),
-         1e3 * b->depth, b->deeper, b->residual, b->way, broken[0] != '\0' ? "; broken:" : "",
-         broken);
+  printf(
+      "# %s%s, %s: %.3g N, energy %+.4f, gain %.4f, depth %.3g mm (%.2f), momentum %.1e, way %.2g "
+      "m%s%s\n",
+      how, b->row->name, hap_model_name(b->model), b->force, bounds_energy(b), bounds_gain(b),
+      1e3 * b->depth, b->deeper, b->residual, b->way, broken[0] != '\0' ? "; broken:" : "", broken);
   (void)fflush(stdout);
 }
 

@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "tests/stability/cases.h"
 #include "tests/stability/build.h"
+#include "tests/stability/cases.h"
 
 static const char *const hand_words[] = {"relaxed", "tense", "rigid", "none"};
 
@@ -84,7 +84,8 @@ static bool surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
   }
   *io = w->surface;
   return (body_a != NULL || body_b != NULL) &&
-         !(body_a != NULL && body_b != NULL && dAreConnectedExcluding(body_a, body_b, dJointTypeContact));
+         !(body_a != NULL && body_b != NULL &&
+           dAreConnectedExcluding(body_a, body_b, dJointTypeContact));
 }
 
 static void in_step(void *user, double step_s)
@@ -132,7 +133,7 @@ static bool open_session(world *w)
 static bool open_hand(world *w, const case_row *row, int index)
 {
   char spec[512];
-  bool rigid = row->hand == HAND_RIGID;
+  bool rigid = row->hand == RIGID;
   (void)snprintf(spec, sizeof spec, "virtual:hand=%s,max_force=%g,device_damping=%g,%s%s%s%s",
                  hand_words[row->hand], w->max_force, w->device_damping,
                  rigid ? "" : "device_mass=0.1,", row->device != NULL ? row->device : "",
@@ -151,6 +152,7 @@ static void take_parameters(world *w, const case_row *row, hap_model model)
   w->def.model = model;
   w->def.physics_hz = row->physics_hz > 0.0 ? row->physics_hz : w->def.physics_hz;
   w->device_damping = row->device_damping > 0.0 ? row->device_damping : w->device_damping;
+  w->max_force = row->max_force > 0.0 ? row->max_force : w->max_force;
   w->pointer.stiffness = row->k;
   w->pointer.max_force = 1e6; /* the device's limit is the one that counts */
   dWorldSetCFM(w->world, row->cfm < 0.0 ? 0.0 : row->cfm > 0.0 ? row->cfm : 1e-12);

@@ -18,10 +18,10 @@
 #define WORLD_LAYER 1e-4      /* m, ODE's surface layer: what rests lies so deep */
 
 typedef enum case_hand {
-  HAND_RELAXED,
-  HAND_TENSE,
-  HAND_RIGID,
-  HAND_NONE /* the device alone */
+  RELAXED,
+  TENSE,
+  RIGID,
+  ALONE /* the device alone */
 } case_hand;
 
 struct case_row;
@@ -57,28 +57,28 @@ bool world_start(world *w, const struct case_row *row, hap_model model);
 void world_close(world *w);
 
 /* What moves and what the hand does. Lengths in m, the hand's device is at the world's origin. */
-void build_press(world *w, const struct case_row *row);     /* n cubes on each other, from above */
+void build_press(world *w, const struct case_row *row); /* n cubes on each other, from above */
 void build_press_unequal(world *w, const struct case_row *row); /* two cubes; size: upper / lower */
-void build_push(world *w, const struct case_row *row);      /* a cube along the floor and back */
+void build_push(world *w, const struct case_row *row);         /* a cube along the floor and back */
 void build_push_sliding(world *w, const struct case_row *row); /* mu = 0 */
 void build_push_rough(world *w, const struct case_row *row);   /* mu = infinity */
-void build_row(world *w, const struct case_row *row);       /* n cubes between guides */
+void build_row(world *w, const struct case_row *row);          /* n cubes between guides */
 void build_row_reversing(world *w, const struct case_row *row); /* every 100 ms, hand holds on */
-void build_row_ends(world *w, const struct case_row *row);  /* a hand at each end */
-void build_walls(world *w, const struct case_row *row);     /* a cube that two walls hold */
-void build_groove(world *w, const struct case_row *row);    /* a ball pressed into a V */
-void build_funnel(world *w, const struct case_row *row);    /* n balls */
-void build_stop(world *w, const struct case_row *row);      /* a flap against the stops of its hinge */
-void build_loop(world *w, const struct case_row *row);      /* four bars, four hinges */
-void build_chain(world *w, const struct case_row *row);     /* n links on ball joints */
+void build_row_ends(world *w, const struct case_row *row);      /* a hand at each end */
+void build_walls(world *w, const struct case_row *row);         /* a cube that two walls hold */
+void build_groove(world *w, const struct case_row *row);        /* a ball pressed into a V */
+void build_funnel(world *w, const struct case_row *row);        /* n balls */
+void build_stop(world *w, const struct case_row *row);  /* a flap against the stops of its hinge */
+void build_loop(world *w, const struct case_row *row);  /* four bars, four hinges */
+void build_chain(world *w, const struct case_row *row); /* n links on ball joints */
 void build_lightstand(world *w, const struct case_row *row);
-void build_top(world *w, const struct case_row *row);       /* size: rad/s */
-void build_plate(world *w, const struct case_row *row);     /* at its corner, on a floor */
+void build_top(world *w, const struct case_row *row);   /* size: rad/s */
+void build_plate(world *w, const struct case_row *row); /* at its corner, on a floor */
 void build_plate_free(world *w, const struct case_row *row);
-void build_speck(world *w, const struct case_row *row);     /* a cube as small as size */
-void build_block(world *w, const struct case_row *row);     /* a cube as large as size */
-void build_inside(world *w, const struct case_row *row);    /* the hand starts size deep in a cube */
-void build_chatter(world *w, const struct case_row *row);   /* size: amplitude at 100 Hz */
+void build_speck(world *w, const struct case_row *row);   /* a cube as small as size */
+void build_block(world *w, const struct case_row *row);   /* a cube as large as size */
+void build_inside(world *w, const struct case_row *row);  /* the hand starts size deep in a cube */
+void build_chatter(world *w, const struct case_row *row); /* size: amplitude at 100 Hz */
 void build_stick_slip(world *w, const struct case_row *row);
 void build_brush(world *w, const struct case_row *row);     /* over n balls, fast */
 void build_flicker(world *w, const struct case_row *row);   /* a neighbour at every other step */
@@ -88,6 +88,6 @@ void build_bar(world *w, const struct case_row *row);       /* under n pointers 
 void build_squeeze(world *w, const struct case_row *row);   /* between two hands */
 void build_fixed(world *w, const struct case_row *row);     /* a fixed joint to the world */
 void build_asleep(world *w, const struct case_row *row);
-void build_impacts(world *w, const struct case_row *row);   /* n balls, one after the other */
+void build_impacts(world *w, const struct case_row *row); /* n balls, one after the other */
 
 #endif
