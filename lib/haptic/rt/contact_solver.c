@@ -3,7 +3,6 @@
 #include "haptic/rt/contact_solver.h"
 
 #include <stdbool.h>
-#include <string.h>
 
 #include "base/vec.h"
 
@@ -249,12 +248,12 @@ static bool stays_dear(hapi_solver *solver)
   return true;
 }
 
-/* J, how much energy the impulses have added, beyond what the targets ask for: what the rows minimise
- * when no friction slides. It is a square function of the impulses, with the errors for its slope, so
- * that those with and without the impulses say how it has changed. */
-static double rise(const hapi_solver *solver)
+/* Energy that the impulses add beyond what the targets ask for, which is what the rows minimise when no
+ * friction slides. Along the ray from no impulses to these it is s^2 b / 2 - s a [J]. */
+static void energy_along(const hapi_solver *solver, double *out_a, double *out_b)
 {
-  double sum = 0.0;
+  *out_a = 0.0;
+  *out_b = 0.0;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
     if (row->impulse != 0.0) {
@@ -262,21 +261,38 @@ static double rise(const hapi_solver *solver)
       if (row->paired) {
         without -= hapi_dot6(row->jb, solver->free[row->b]);
       }
-      sum -= 0.5 * row->impulse * (hapi_row_error(solver, row) + without);
+      *out_a += row->impulse * without;
+      *out_b += row->impulse * (without - hapi_row_error(solver, row));
     }
   }
-  return sum;
+}
+
+/* Bounds hold for any share: a friction's goes with its normal's. */
+static void scale(hapi_solver *solver, double share)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    solver->rows[i].impulse = share > 0.0 ? share * solver->rows[i].impulse : 0.0;
+  }
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      double change = share > 0.0 ? share * (solver->v[i][k] - solver->free[i][k]) : 0.0;
+      solver->v[i][k] = solver->free[i][k] + change; /* share 0: whatever v is */
+    }
+  }
 }
 
 void hapi_solver_calm(hapi_solver *solver)
 {
-  if (solver->row_count == 0 || solver->residual < UNSOLVED || rise(solver) <= 0.0) {
+  double a = 0.0;
+  double b = 0.0;
+  if (solver->row_count == 0 || solver->residual < UNSOLVED) {
     return;
   }
-  memcpy(solver->v, solver->free, solver->body_count * sizeof *solver->v);
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    solver->rows[i].impulse = 0.0;
+  energy_along(solver, &a, &b);
+  if (0.5 * b <= a) {
+    return;
   }
+  scale(solver, a > 0.0 ? a / b : 0.0); /* where it is least; none if a or b are no numbers */
   for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
     solver->residual = sweep(solver);
   }

@@ -80,9 +80,9 @@ typedef struct hapi_solver {
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 
-/* [haptic] After a run. Impulses of an island that is too large to be solved within the
- * budget may leave more energy than none at all, and as warm start more again from tick to tick: such
- * are dropped, and found anew by sweeps, which from zero do no such harm. */
+/* [haptic] After a run. Impulses of an island that is too large to be solved within the budget may leave
+ * more energy than none at all, and as warm start more again from tick to tick: such are shortened to
+ * where they leave least, and swept again. */
 void hapi_solver_calm(hapi_solver *solver);
 
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
