@@ -197,7 +197,7 @@ void build_block(world *w, const case_row *row)
   push_at(w, -0.5 * row->size, 1.0, 0.03);
 }
 
-/* The hand waits outside on the other side: what holds it in there is the spring that it starts in. */
+/* The hand rests in the cube: the spring that it starts in throws both apart. */
 void build_inside(world *w, const case_row *row)
 {
   const double edge = 0.2;

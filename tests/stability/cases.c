@@ -38,6 +38,7 @@ const case_row stability_cases[] = {
   {"stack of 10",                      build_press,          10, 0.1,   0,    2e3, RELAXED, 1.0, CONTACT, 0.02},
   {"stack of 20",                      build_press,          20, 0.1,   0,    2e3, RELAXED, 1.0, CONTACT, 0.02},
   {"stack of 30",                      build_press,          30, 0.1,   0,    2e3, RELAXED, 1.0, CONTACT, 0.02},
+  /* 80: more than the 64 bodies that the loop moves itself. */
   {"guided row of 2",                  build_row,             2, 0.1,   0,    2e3, TENSE,   1.0, TWO,     0.2},
   {"guided row of 10",                 build_row,            10, 0.1,   0,    2e3, TENSE,   1.0, TWO,     0.2},
   {"guided row of 40",                 build_row,            40, 0.1,   0,    2e3, TENSE,   0.5, CONTACT, 0.2},
@@ -80,7 +81,7 @@ const case_row stability_cases[] = {
      .origin = 1e4},
   {"10 km away: row of 10",            build_row,            10, 0.1,   0,    2e3, TENSE,   1.0, CONTACT, 0.2,
      .origin = 1e4},
-  /* given: the spring that the hand starts in. */
+  /* given, k depth^2 / 2: the spring that the hand starts in. */
   {"50 mm deep at the start",          build_inside,          1, 1.0,   0.05, 2e3, RELAXED, 1.0, CONTACT, 1.0,
      .given = 2.5, .depth = 0.05},
   /* Pointer teleported by 0.5 m; physics stalled 200 ms; 1 to 50 ticks dropped; clock jitter; NaN, Inf,
@@ -97,6 +98,7 @@ const case_row stability_cases[] = {
   {"stick-slip under a ramp",          build_stick_slip,      1, 1.0,   0,    2e3, RELAXED, 1.5, TWO,     0.3},
   {"others near at each sync",         build_brush,          20, 0.2,   0,    2e3, RELAXED, 1.5, CONTACT, 0.2},
   {"neighbour at every other sync",    build_flicker,         2, 0.2,   0,    2e3, RELAXED, 1.0, CONTACT, 4.0},
+  /* The upper one falls away from the hand, and ODE, at 60 Hz, into the floor. */
   {"cube destroyed under the hand",    build_destroyed,       2, 0.2,   0,    2e3, RELAXED, 1.0, CONTACT, 0.1,
      .late = true},
   /* More of many at once: tests/test_stability.c and "hapode-bench stability". */

@@ -13,9 +13,8 @@
 
 #define WORLD_BODIES_MAX 128
 #define WORLD_HANDS_MAX 8
-#define WORLD_DEVICE_MASS 0.1 /* kg */
-#define WORLD_EDGE 0.05       /* m, of a cube; diameter of a ball */
-#define WORLD_LAYER 1e-4      /* m, ODE's surface layer: what rests lies so deep */
+#define WORLD_EDGE 0.05  /* m, of a cube; diameter of a ball */
+#define WORLD_LAYER 1e-4 /* m, ODE's surface layer: what rests lies so deep */
 
 typedef enum case_hand {
   RELAXED,
@@ -59,10 +58,10 @@ void world_close(world *w);
 /* What moves and what the hand does. Lengths in m, the hand's device is at the world's origin. */
 void build_press(world *w, const struct case_row *row); /* n cubes on each other, from above */
 void build_press_unequal(world *w, const struct case_row *row); /* two cubes; size: upper / lower */
-void build_push(world *w, const struct case_row *row);         /* a cube along the floor and back */
-void build_push_sliding(world *w, const struct case_row *row); /* mu = 0 */
-void build_push_rough(world *w, const struct case_row *row);   /* mu = infinity */
-void build_row(world *w, const struct case_row *row);          /* n cubes between guides */
+void build_push(world *w, const struct case_row *row); /* a cube, of edge size, along the floor */
+void build_push_sliding(world *w, const struct case_row *row);  /* mu = 0 */
+void build_push_rough(world *w, const struct case_row *row);    /* mu = infinity */
+void build_row(world *w, const struct case_row *row);           /* n cubes between guides */
 void build_row_reversing(world *w, const struct case_row *row); /* every 100 ms, hand holds on */
 void build_row_ends(world *w, const struct case_row *row);      /* a hand at each end */
 void build_walls(world *w, const struct case_row *row);         /* a cube that two walls hold */
