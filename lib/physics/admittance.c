@@ -152,6 +152,22 @@ static void eigen(matrix *a, int n, matrix *out_vectors)
   }
 }
 
+/* Gershgorin: no eigenvalue is farther from a diagonal entry than the rest of its row is large. Mostly
+ * enough, and much cheaper than the eigenvalues. */
+static bool surely_within(const matrix *b, int n, double slack)
+{
+  for (int i = 0; i < n; ++i) {
+    double rest = 0.0;
+    for (int k = 0; k < n; ++k) {
+      rest += k != i ? fabs(b->m[i][k]) : 0.0;
+    }
+    if (!(b->m[i][i] - rest >= -slack && b->m[i][i] + rest <= 1.0 + slack)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /* Brings the eigenvalues of a symmetric b back to 0 .. 1 when one is farther out than slack; how far
  * the farthest was, 0 when nothing was done. */
 static double clip(matrix *b, int n, double slack)
@@ -160,6 +176,9 @@ static double clip(matrix *b, int n, double slack)
   matrix vectors;
   double excess[N_MAX];
   double most = 0.0;
+  if (surely_within(b, n, slack)) {
+    return 0.0;
+  }
   eigen(&values, n, &vectors);
   for (int e = 0; e < n; ++e) {
     excess[e] = values.m[e][e] - fmax(0.0, fmin(1.0, values.m[e][e]));
