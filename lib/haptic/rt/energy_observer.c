@@ -32,6 +32,7 @@
  * Torques are left out: they are zero for a ball without friction. */
 
 #define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
+#define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
 #define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
 #define REST_S 0.3           /* a touch that lasts longer is no tapping */
 #define DEBT_S 0.3           /* time constant with which a debt is then forgiven */
@@ -268,7 +269,7 @@ static bool settle_ports(hapi_tick *tick)
 /* J that the force to be written would give over a tick, if the device goes on as it went. */
 static double port_would_give(const hapi_tick_pointer *p)
 {
-  return p->generation == 0
+  return p->generation == 0 || hapi_v3_dot(p->guard.moved, p->guard.moved) < MOVED_LEAST
              ? 0.0
              : world_per_device(p) * hapi_v3_dot(p->device_wrench.force, p->guard.moved);
 }

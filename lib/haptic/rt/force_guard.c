@@ -165,12 +165,25 @@ static void report_written(hapi_tick_pointer *p)
   }
 }
 
-static void write_pointer(const hapi_tick *tick, hapi_tick_pointer *p)
+/* Whatever came in, and whatever went wrong here: what is no number does not get to the motors. */
+static void check_written(hapi_tick *tick, uint32_t index)
 {
+  hapi_tick_pointer *p = &tick->pointers[index];
+  if (!(usable(p->device_wrench.force) && usable(p->device_wrench.torque))) {
+    hapi_tick_fault(tick, HAP_FAULT_FORCE, index + 1);
+    p->guard.flags = HAP_GUARD_FAULT;
+    memset(&p->device_wrench, 0, sizeof p->device_wrench);
+  }
+}
+
+static void write_pointer(hapi_tick *tick, uint32_t index)
+{
+  hapi_tick_pointer *p = &tick->pointers[index];
   if (tick->guard.mode == HAP_GUARD_ON) {
     limit_slew(tick, p);
   }
   limit_norm(p);
+  check_written(tick, index);
   report_written(p);
 }
 
@@ -199,7 +212,7 @@ void hapi_guard(hapi_tick *tick)
     if (p->generation == 0) {
       continue;
     }
-    write_pointer(tick, p);
+    write_pointer(tick, i);
     flags |= p->guard.flags;
     double force = hapi_v3_norm(p->wrench.force);
     tick->peak_force = force > tick->peak_force ? force : tick->peak_force;
