@@ -94,6 +94,9 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   ode.surface = scene_surface;
   ode.user = r->scene;
   hap_session_def def = options->def;
+  if (options->player != NULL) {
+    (void)hap_player_get_def(options->player, &def);
+  }
   if (def.max_pointers < (int32_t)r->pointer_count) {
     def.max_pointers = (int32_t)r->pointer_count;
   }
@@ -104,6 +107,14 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   size_t traced =
       r->scene->body_count < HAP_TRACE_BODIES_MAX ? r->scene->body_count : HAP_TRACE_BODIES_MAX;
   return hap_session_trace_bodies(r->session, r->scene->bodies, traced);
+}
+
+static hap_status attach_recording(const rig_options *options, rig *r, hap_detail *detail)
+{
+  if (options->player != NULL) {
+    return hap_session_play(r->session, options->player, detail);
+  }
+  return options->record != NULL ? hap_session_record(r->session, options->record, detail) : HAP_OK;
 }
 
 hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
@@ -118,11 +129,17 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
   }
   size_t own = (size_t)out->scene->parameters.pointers;
   rig_part part = RIG_SESSION;
-  out->pointer_count = options->device_count > 0 ? options->device_count : own;
+  out->pointer_count = options->player != NULL        ? 0
+                       : options->device_count > 0 ? options->device_count
+                                                   : own;
   status = create_session(options, out, detail);
   for (size_t i = 0; i < out->pointer_count && status >= HAP_OK; ++i) {
     part = RIG_POINTER;
     status = add_pointer(options, out, i, detail);
+  }
+  if (status >= HAP_OK) {
+    part = RIG_RECORDING;
+    status = attach_recording(options, out, detail);
   }
   if (status < HAP_OK) {
     rig_destroy(out);

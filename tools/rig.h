@@ -27,12 +27,15 @@ typedef struct rig_options {
   hap_coupling coupling;
   double coupling_stiffness; /* N/m, of hap_pointer_def */
   hap_session_def def;
+  const hap_record_def *record; /* not NULL: the session is recorded */
+  hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */
 } rig_options;
 
 typedef enum rig_part {
   RIG_SCENE = 0,
   RIG_SESSION,
-  RIG_POINTER
+  RIG_POINTER,
+  RIG_RECORDING
 } rig_part;
 
 typedef struct rig {

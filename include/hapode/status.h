@@ -19,6 +19,8 @@ typedef enum hap_status {
   HAP_END = 5,         /* nothing further to read */
   HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
   HAP_FAULTED = 7,     /* done, but a fault is latched and the force is zero */
+  HAP_RECORD_ENDED = 8, /* the recording ended before its session; the file is whole up to there */
+  HAP_DIVERGED = 9,     /* the replay is another one than the recording, see hap_player_difference */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */

@@ -12,6 +12,7 @@
 
 #include <hapode/stats.h>
 
+#include "record/tape.h"
 #include "sync/exchange.h"
 
 typedef struct hapi_contact hapi_contact;
@@ -29,6 +30,9 @@ void hapi_contact_destroy(hapi_contact *contact); /* NULL allowed; thread stoppe
 
 /* [control] Forgets all state. */
 void hapi_contact_begin(hapi_contact *contact, int64_t start_ns);
+
+/* [control] Before begin, as hapi_haptic_set_tape. */
+void hapi_contact_set_tape(hapi_contact *contact, hapi_tape *tape);
 
 /* [control] After begin; not in lockstep. */
 hap_status hapi_contact_start_thread(hapi_contact *contact);

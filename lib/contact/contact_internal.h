@@ -30,6 +30,7 @@ struct hapi_contact {
   hapi_thread thread;
   _Atomic int stop;
   int64_t start_ns;
+  hapi_tape *tape; /* of a recording or a replay; NULL: none */
 };
 
 /* mesh_filter.c: whether a contact with a triangle of a mesh is one with the mesh. normal out of the

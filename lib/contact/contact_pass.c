@@ -207,6 +207,42 @@ static void pass_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_pa
   }
 }
 
+/* Without the keys, which are made of addresses. */
+static uint64_t hash_patches(hapi_patches *patches)
+{
+  const hapi_patch_contact *c = hapi_patches_contacts(patches);
+  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, patches->model_number);
+  for (uint32_t i = 0; i < patches->contact_count; ++i) {
+    hash = hapi_hash_word(hash, ((uint64_t)c[i].body_a << 32) | c[i].body_b);
+    hash = hapi_hash_doubles(hash, c[i].core_a, 3);
+    hash = hapi_hash_doubles(hash, c[i].core_b, 3);
+    hash = hapi_hash_doubles(hash, c[i].normal, 3);
+  }
+  return hash;
+}
+
+/* The pass's part of a recording: what it was made from, and a hash of what it found. */
+static void follow_tape(hapi_contact *contact, hapi_patches *out)
+{
+  const hapi_exchange *exchange = contact->config.exchange;
+  if (hapi_tape_records(contact->tape)) {
+    hapi_tape_open(contact->tape);
+    hapi_cell *cell = hapi_tape_put(contact->tape, HAPI_CELL_PASS, 0);
+    cell->u[HAPI_PASS_NUMBER] = out->number;
+    cell->u[HAPI_PASS_POSES] = hapi_exchange_taken(exchange, HAPI_CHANNEL_POSES);
+    cell->u[HAPI_PASS_NEAR] = hapi_exchange_taken(exchange, HAPI_CHANNEL_NEAR);
+    cell->i[HAPI_PASS_VALID] = out->valid_from_ns;
+    cell->u[HAPI_PASS_HASH] = hash_patches(out);
+    hapi_tape_commit(contact->tape);
+  } else if (hapi_tape_plays(contact->tape)) {
+    const hapi_cell *cell = hapi_tape_get(contact->tape, HAPI_CELL_PASS, 0);
+    const hapi_difference difference = {.what = HAPI_DIFFERS_PASS, .number = out->number};
+    if (cell->u[HAPI_PASS_HASH] != hash_patches(out)) {
+      hapi_tape_differ(contact->tape, &difference);
+    }
+  }
+}
+
 static void pass(hapi_contact *contact, int64_t valid_from_ns)
 {
   place_bodies(contact);
@@ -220,6 +256,7 @@ static void pass(hapi_contact *contact, int64_t valid_from_ns)
   out->number = ++contact->number;
   out->model_number = contact->near->model_number;
   out->valid_from_ns = valid_from_ns;
+  follow_tape(contact, out);
   hapi_exchange_patches_publish(contact->config.exchange);
 }
 

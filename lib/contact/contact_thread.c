@@ -36,6 +36,11 @@ void hapi_contact_destroy(hapi_contact *contact)
   hapi_free(contact);
 }
 
+void hapi_contact_set_tape(hapi_contact *contact, hapi_tape *tape)
+{
+  contact->tape = tape;
+}
+
 void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
 {
   contact->near = NULL;

@@ -13,6 +13,7 @@
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
+#include "record/tape.h"
 #include "sync/exchange.h"
 
 typedef struct hapi_haptic hapi_haptic;
@@ -36,6 +37,12 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
 void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns); /* time of tick 0 */
 void hapi_haptic_end(hapi_haptic *haptic); /* zero force, devices stopped; idempotent */
 
+/* [control] Before begin: from then on what comes from outside goes to the tape or comes from it, until
+ * the tape is taken away after end. NULL: none. */
+void hapi_haptic_set_tape(hapi_haptic *haptic, hapi_tape *tape);
+/* Replay: deadlines that no tick was begun for. */
+void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks);
+
 /* [control] Between begin and end; not in lockstep. */
 hap_status hapi_haptic_start_thread(hapi_haptic *haptic);
 void hapi_haptic_stop_thread(hapi_haptic *haptic); /* idempotent */
@@ -53,6 +60,8 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
+
+bool hapi_haptic_has_pointers(const hapi_haptic *haptic);
 
 void hapi_haptic_reset_fault(hapi_haptic *haptic);            /* [any] from the next tick on */
 void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the next tick on */

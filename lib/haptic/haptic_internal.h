@@ -15,6 +15,7 @@
 #include "haptic/haptic.h"
 #include "haptic/rt/black_box.h"
 #include "haptic/rt/tick.h"
+#include "record/tape.h"
 #include "sync/triple_buffer.h"
 
 typedef enum hapi_pointer_phase {
@@ -36,6 +37,7 @@ typedef struct hapi_pointer_slot {
   hap_pointer_def def;
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;
+  bool has_device; /* also in a replay, where there are no ops */
   bool started;
   hap_device_info info;
   pthread_mutex_t target_lock; /* between applications that set */
@@ -101,7 +103,46 @@ struct hapi_haptic {
   bool begun;
   int64_t start_ns;
   double last_tick_us;
+
+  hapi_tape *tape;            /* of a recording or a replay; NULL: none */
+  hapi_cell *note;            /* recording: first cell of the packet */
+  const hapi_cell *tick_cell; /* replay: of the tick */
+  uint32_t turn;              /* whose bodies are recorded */
 };
+
+/* What other threads want of a tick. */
+typedef struct hapi_loop_calls {
+  bool reset;
+  bool emergency;
+  hap_fault outside_fault;
+} hapi_loop_calls;
+
+typedef struct hapi_pointer_input {
+  hap_pose pose;
+  hap_twist twist;
+  uint32_t buttons;
+  bool failed;
+} hapi_pointer_input;
+
+typedef struct hapi_pointer_output {
+  hap_wrench reached;
+  bool failed;
+} hapi_pointer_output;
+
+/* tape_tick.c: nothing without a tape. Of an io a recording notes what is in it, a replay fills it in. */
+void hapi_tape_begin(hapi_haptic *haptic, int64_t start_ns);
+void hapi_tape_begun(hapi_haptic *haptic);
+void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns);
+void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io);
+void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
+void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
+void hapi_tape_leave(hapi_haptic *haptic, uint32_t index);
+void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io);
+void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io);
+void hapi_tape_ticked(hapi_haptic *haptic);
+/* Replay only; false: no more of them come now. */
+bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index);
+bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out);
 
 /* pointers.c: what the loop does with the slots */
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */

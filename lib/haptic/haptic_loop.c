@@ -135,8 +135,10 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   }
   haptic->begun = true;
   /* Physics builds the first local model around where the pointers are. */
+  hapi_tape_begin(haptic, start_ns);
   hapi_pointers_follow(haptic);
   hapi_pointers_read(haptic, start_ns);
+  hapi_tape_begun(haptic);
   haptic->tick.now_ns = start_ns;
   hapi_coupling_read(&haptic->tick);
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
@@ -147,6 +149,16 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
 void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns)
 {
   haptic->start_ns = start_ns;
+}
+
+void hapi_haptic_set_tape(hapi_haptic *haptic, hapi_tape *tape)
+{
+  haptic->tape = tape;
+}
+
+void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks)
+{
+  STORE(missed_ticks, LOAD(missed_ticks) + ticks);
 }
 
 void hapi_haptic_end(hapi_haptic *haptic)
@@ -166,13 +178,26 @@ static void publish_poses(hapi_haptic *haptic)
   }
 }
 
-/* A set that was taken and is not due leaves the one in use to its writer, who fills in another one
+/* All is taken before anything is told: what a tick has from the other threads then never comes of
+ * what it has told them itself, and a replay can run them one after the other. A set of patches that was
+ * taken and is not due leaves the one in use to its writer, who fills in another one
  * first: that happens in lockstep alone, where a tick comes between any two passes. */
-static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
+static void take_messages(hapi_haptic *haptic)
 {
-  if (haptic->pending_patches == NULL) {
+  bool model = haptic->pending == NULL;
+  bool patches = haptic->pending_patches == NULL;
+  if (model) {
+    haptic->pending = hapi_exchange_model_take(haptic->config.exchange);
+  }
+  if (patches) {
     haptic->pending_patches = hapi_exchange_patches_take(haptic->config.exchange);
   }
+  hapi_tape_taken(haptic, model && haptic->pending != NULL,
+                  patches && haptic->pending_patches != NULL);
+}
+
+static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
+{
   if (haptic->pending_patches != NULL && now_ns >= haptic->pending_patches->valid_from_ns) {
     hapi_tick_adopt_patches(&haptic->tick, haptic->pending_patches);
     haptic->pending_patches = NULL;
@@ -182,9 +207,7 @@ static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
 
 static void receive(hapi_haptic *haptic, int64_t now_ns)
 {
-  if (haptic->pending == NULL) {
-    haptic->pending = hapi_exchange_model_take(haptic->config.exchange);
-  }
+  take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
     haptic->tick.now_ns = now_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
@@ -202,20 +225,34 @@ void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
   hapi_denormals_restore(before);
 }
 
-static void follow_faults(hapi_haptic *haptic)
+static void take_calls(hapi_haptic *haptic, hapi_loop_calls *out)
 {
-  if (atomic_load_explicit(&haptic->reset_fault, memory_order_acquire) != 0) {
+  out->reset = atomic_load_explicit(&haptic->reset_fault, memory_order_acquire) != 0;
+  if (out->reset) {
     atomic_store_explicit(&haptic->reset_fault, 0, memory_order_relaxed);
-    hapi_tick_reset_fault(&haptic->tick);
   }
   int outside = atomic_load_explicit(&haptic->outside_fault, memory_order_acquire);
+  out->outside_fault = (hap_fault)outside;
   if (outside != HAP_FAULT_NONE) {
     atomic_store_explicit(&haptic->outside_fault, HAP_FAULT_NONE, memory_order_relaxed);
-    hapi_tick_fault(&haptic->tick, (hap_fault)outside, 0);
   }
   uint64_t emergencies = hapi_emergencies();
-  if (emergencies != haptic->emergencies) {
-    haptic->emergencies = emergencies;
+  out->emergency = emergencies != haptic->emergencies;
+  haptic->emergencies = emergencies;
+}
+
+static void follow_faults(hapi_haptic *haptic)
+{
+  hapi_loop_calls calls;
+  take_calls(haptic, &calls);
+  hapi_tape_calls(haptic, &calls);
+  if (calls.reset) {
+    hapi_tick_reset_fault(&haptic->tick);
+  }
+  if (calls.outside_fault != HAP_FAULT_NONE) {
+    hapi_tick_fault(&haptic->tick, calls.outside_fault, 0);
+  }
+  if (calls.emergency) {
     hapi_tick_fault(&haptic->tick, HAP_FAULT_EMERGENCY, 0);
     for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
       hapi_guard_cut(&haptic->tick.pointers[i]);
@@ -266,12 +303,14 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
 {
   int64_t begin_ns = hapi_clock_now();
   unsigned before = hapi_denormals_flush();
+  hapi_tape_tick(haptic, now_ns);
   hapi_pointers_follow(haptic);
   follow_faults(haptic);
   receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
+  hapi_tape_ticked(haptic);
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);

@@ -55,7 +55,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
-  p->speed_limit = slot->ops != NULL ? SPEED_LIMIT : 0.0;
+  p->speed_limit = slot->has_device ? SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;
@@ -71,19 +71,51 @@ static bool is_ready(const hapi_pointer_slot *slot)
   return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
+static void prepare_slot(hapi_pointer_slot *slot);
+
+/* A replay has the pointers of the recording, and no devices. */
+static void follow_tape(hapi_haptic *haptic)
+{
+  uint32_t index = 0;
+  hapi_joined joined;
+  for (bool more = true; more;) {
+    more = hapi_tape_next_leave(haptic, &index);
+    if (more) {
+      haptic->tick.pointers[index].generation = 0;
+      atomic_store(&haptic->slots[index].phase, HAPI_POINTER_EMPTY);
+    } else if (hapi_tape_next_join(haptic, &index, &joined)) {
+      hapi_pointer_slot *slot = &haptic->slots[index];
+      slot->def = joined.def;
+      slot->info = joined.info;
+      slot->has_device = joined.has_device != 0;
+      prepare_slot(slot);
+      atomic_store(&slot->generation, joined.generation);
+      activate(haptic, index);
+      atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
+      more = true;
+    }
+  }
+}
+
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
+  if (hapi_tape_plays(haptic->tape)) {
+    follow_tape(haptic);
+    return;
+  }
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
     if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
       activate(haptic, i);
+      hapi_tape_join(haptic, i);
       atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
     } else if (phase == HAPI_POINTER_LEAVING) {
       haptic->tick.pointers[i].generation = 0;
       if (slot->ops != NULL) {
         slot->ops->zero(slot->self);
       }
+      hapi_tape_leave(haptic, i);
       atomic_store_explicit(&slot->phase, HAPI_POINTER_LEFT, memory_order_release);
     }
   }
@@ -93,9 +125,23 @@ void hapi_pointers_follow(hapi_haptic *haptic)
 static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
 {
   hapi_pointer_slot *slot = &haptic->slots[index];
-  slot->ops->zero(slot->self);
+  if (slot->ops != NULL) {
+    slot->ops->zero(slot->self);
+  }
   hapi_guard_cut(&haptic->tick.pointers[index]);
   hapi_tick_fault(&haptic->tick, fault, index + 1);
+}
+
+static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_input *io)
+{
+  if (slot->ops != NULL) {
+    io->failed = slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons) < HAP_OK;
+    return;
+  }
+  hapi_triple_take(&slot->target_buffer);
+  const hapi_pointer_target *target = &slot->targets[hapi_triple_front(&slot->target_buffer)];
+  io->pose = target->pose;
+  io->twist = target->twist;
 }
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
@@ -106,24 +152,19 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     if (p->generation == 0) {
       continue;
     }
-    if (slot->ops == NULL) {
-      hapi_triple_take(&slot->target_buffer);
-      const hapi_pointer_target *target = &slot->targets[hapi_triple_front(&slot->target_buffer)];
-      p->device_pose = target->pose;
-      p->device_twist = target->twist;
-      continue;
+    hapi_pointer_input in = {.pose = p->device_pose};
+    if (!hapi_tape_plays(haptic->tape)) {
+      ask_device(slot, now_ns, &in);
     }
-    hap_pose pose = p->device_pose;
-    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    uint32_t buttons = 0;
-    if (slot->ops->read(slot->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
+    hapi_tape_input(haptic, i, &in);
+    if (in.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
     }
-    p->device_pose = pose;
-    p->device_twist = twist;
-    p->buttons = buttons;
-    if (p->estimates) {
+    p->device_pose = in.pose;
+    p->device_twist = in.twist;
+    p->buttons = in.buttons;
+    if (slot->has_device && p->estimates) {
       hapi_velocity_update(&p->velocity, now_ns, &p->device_pose, &p->device_twist);
     }
   }
@@ -134,14 +175,18 @@ void hapi_pointers_write(hapi_haptic *haptic)
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_tick_pointer *p = &haptic->tick.pointers[i];
-    if (p->generation == 0 || slot->ops == NULL) {
+    if (p->generation == 0) {
       continue;
     }
-    hap_wrench reached;
-    if (slot->ops->write(slot->self, &p->device_wrench, &reached) < HAP_OK) {
+    hapi_pointer_output out = {.reached = p->device_wrench};
+    if (slot->ops != NULL) {
+      out.failed = slot->ops->write(slot->self, &p->device_wrench, &out.reached) < HAP_OK;
+    }
+    hapi_tape_output(haptic, i, &out);
+    if (out.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
     }
-    if (hapi_emergencies() != haptic->emergencies) {
+    if (slot->ops != NULL && hapi_emergencies() != haptic->emergencies) {
       slot->ops->zero(slot->self); /* it came while this force was being written */
     }
   }
@@ -240,6 +285,15 @@ void hapi_pointers_stop_devices(hapi_haptic *haptic)
   }
 }
 
+bool hapi_haptic_has_pointers(const hapi_haptic *haptic)
+{
+  bool any = false;
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    any = any || atomic_load(&haptic->slots[i].phase) != HAPI_POINTER_EMPTY;
+  }
+  return any;
+}
+
 static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
 {
   uint32_t index = (uint32_t)(id.v & 0xffffffffu);
@@ -262,15 +316,9 @@ static uint32_t free_slot(hapi_haptic *haptic)
   return HAPI_SLOT_NONE;
 }
 
-static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
+/* For a new user of the slot, whose def is in it. */
+static void prepare_slot(hapi_pointer_slot *slot)
 {
-  slot->def = *def;
-  slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
-  slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
-  memset(&slot->info, 0, sizeof slot->info);
-  if (def->device != NULL) {
-    hap_device_get_info(def->device, &slot->info, sizeof slot->info);
-  }
   pthread_mutex_lock(&slot->target_lock);
   pthread_mutex_lock(&slot->state_lock);
   atomic_fetch_add(&slot->generation, 1);
@@ -286,6 +334,19 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
   }
   pthread_mutex_unlock(&slot->state_lock);
   pthread_mutex_unlock(&slot->target_lock);
+}
+
+static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
+{
+  slot->def = *def;
+  slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
+  slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
+  slot->has_device = def->device != NULL;
+  memset(&slot->info, 0, sizeof slot->info);
+  if (def->device != NULL) {
+    hap_device_get_info(def->device, &slot->info, sizeof slot->info);
+  }
+  prepare_slot(slot);
 }
 
 static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,

@@ -35,7 +35,7 @@ static double lead_of(const hapi_physics *physics, hap_model model)
 /* A change of model changes how far ahead the world is: the step between makes up for it. */
 static void follow_model(hapi_physics *physics)
 {
-  hap_model wanted = (hap_model)atomic_load(&physics->wanted_model);
+  hap_model wanted = hapi_tape_wanted_model(physics, false);
   double since_last = physics->probe_step_s;
   physics->step_s = since_last + lead_of(physics, wanted) - lead_of(physics, physics->model);
   if (physics->step_s < 1e-9) {
@@ -107,7 +107,8 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   int64_t valid_ns = state_ns;
   if (physics->model != HAP_MODEL_SINGLE && physics->latency_s >= 0.0) {
     valid_ns = now_ns + (int64_t)llround(1e9 * physics->latency_s);
-  } else if (physics->model >= HAP_MODEL_ACCELERANCE && physics->config.lockstep) {
+  } else if (physics->model >= HAP_MODEL_ACCELERANCE && physics->config.lockstep &&
+             !hapi_tape_plays(physics->tape)) {
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
@@ -174,7 +175,9 @@ void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   hapi_physics_enter(physics);
   atomic_store(&physics->cycle_thread, (unsigned long)pthread_self());
+  hapi_tape_cycle(physics, now_ns, next_ns);
   run(physics, now_ns, next_ns);
+  hapi_tape_cycled(physics);
   atomic_store(&physics->cycle_thread, 0);
   hapi_fair_lock_give(&physics->lock);
 }

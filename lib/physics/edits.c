@@ -36,6 +36,7 @@ void hapi_edits_run(hapi_physics *physics)
   uint32_t count = physics->edit_count; /* what an edit posts waits for the next step */
   pthread_mutex_unlock(&physics->edits_lock);
   hapi_edit edit;
+  hapi_tape_edits(physics, count);
   for (uint32_t i = 0; i < count && take_edit(physics, &edit); ++i) {
     edit.run(edit.arg);
   }

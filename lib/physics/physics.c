@@ -152,7 +152,7 @@ static void reset_figures(hapi_physics *physics)
   hapi_counts_show(physics);
 }
 
-static double period_of(const hapi_physics *physics, hap_model model)
+double hapi_period_of(const hapi_physics *physics, hap_model model)
 {
   return 1.0 / (model == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
 }
@@ -172,6 +172,9 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
 {
   physics->begun = true;
   hap_status status = check_world(physics, detail);
+  if (status >= HAP_OK) {
+    status = hapi_tape_world(physics, detail);
+  }
   if (status < HAP_OK) {
     give_world_back(physics);
     return status;
@@ -181,23 +184,27 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   hapi_range_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
-  physics->probe_step_s = period_of(physics, physics->model);
+  physics->probe_step_s = hapi_period_of(physics, physics->model);
   physics->state = NULL;
   physics->step_s = 0.0;
   physics->model_number = 0;
   physics->world_faulty = false;
   physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
-  if (physics->config.lockstep) {
+  if (physics->config.lockstep || physics->tape != NULL) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+  }
+  if (physics->config.lockstep && physics->tape == NULL) {
     dRandSetSeed(0);
   }
   build_first_model(physics);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
+  hapi_tape_start(physics, start_ns);
   physics->start_ns = *start_ns;
   physics->last_cycle_ns = *start_ns;
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_poses(physics, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
+  hapi_tape_started(physics);
   hapi_reconcile_leave(physics);
   hapi_counts_show(physics);
   return HAP_OK;
@@ -219,12 +226,17 @@ void hapi_physics_end(hapi_physics *physics)
 
 double hapi_physics_period(const hapi_physics *physics)
 {
-  return period_of(physics, physics->model);
+  return hapi_period_of(physics, physics->model);
 }
 
 double hapi_physics_next_period(const hapi_physics *physics)
 {
-  return period_of(physics, (hap_model)atomic_load(&physics->wanted_model));
+  return hapi_period_of(physics, (hap_model)atomic_load(&physics->wanted_model));
+}
+
+void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)
+{
+  physics->tape = tape;
 }
 
 void hapi_physics_set_latency(hapi_physics *physics, double seconds)
@@ -267,7 +279,11 @@ hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
   int64_t now = hapi_clock_now();
   bool for_ever = timeout_ns < 0 || timeout_ns > INT64_MAX - now;
   int64_t deadline = for_ever ? INT64_MAX : now + timeout_ns;
-  return hapi_fair_lock_take(&physics->lock, deadline) ? HAP_OK : HAP_ERROR_TIMEOUT;
+  if (!hapi_fair_lock_take(&physics->lock, deadline)) {
+    return HAP_ERROR_TIMEOUT;
+  }
+  ++physics->locks;
+  return HAP_OK;
 }
 
 hap_status hapi_physics_unlock(hapi_physics *physics)

@@ -12,6 +12,7 @@
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
+#include "record/tape.h"
 #include "sync/exchange.h"
 
 struct hap_ode_def;
@@ -44,6 +45,12 @@ void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before 
  * it holds: 0 in lockstep, else now. */
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);
 void hapi_physics_end(hapi_physics *physics); /* gives the world back; idempotent */
+
+/* [control] Before begin: from then on what comes from outside goes to the tape or comes from it, until
+ * the tape is taken away after end. NULL: none. A replay has the session's clock from the tape, and what the
+ * threads do and lockstep does not. */
+void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape);
+const char *hapi_physics_ode_configuration(void); /* [any] what ODE was built as */
 
 /* [control] Between begin and end: the thread of drive THREADS. */
 hap_status hapi_physics_start_thread(hapi_physics *physics);

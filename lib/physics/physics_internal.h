@@ -17,6 +17,7 @@
 #include "physics/admittance.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
+#include "record/tape.h"
 
 #define HAPI_NONE 0xffffffffu
 #define HAPI_EDITS_MAX 256
@@ -389,7 +390,30 @@ struct hapi_physics {
   hapi_physics_counts figures; /* physics' own */
   pthread_mutex_t shown_lock;
   hapi_physics_counts shown; /* copied once a cycle for readers */
+
+  hapi_tape *tape; /* of a recording or a replay; NULL: none */
+  hapi_cell *note; /* recording: the cell of this cycle */
+  const hapi_cell *read;      /* replay: the same */
+  const hapi_cell *read_end;  /* and the one of its end */
+  uint64_t model_hash;        /* of the model of this cycle, 0: it has none */
+  uint16_t model_next;        /* hap_model wanted at its end */
+  uint32_t locks;             /* hap_session_lock since the last cycle */
+  uint32_t missed_unrecorded; /* steps, since then */
 };
+
+/* tape_cycle.c: nothing without a tape. */
+hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail); /* the one of the recording */
+void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns);
+void hapi_tape_started(hapi_physics *physics);
+void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);
+void hapi_tape_edits(hapi_physics *physics, uint32_t count);
+void hapi_tape_state(hapi_physics *physics, bool taken);
+hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end);
+void hapi_tape_model(hapi_physics *physics); /* it is ready, and not yet published */
+void hapi_tape_cycled(hapi_physics *physics);
+
+/* physics.c: H, or T in model SINGLE */
+double hapi_period_of(const hapi_physics *physics, hap_model model);
 
 /* bodies.c */
 hap_status hapi_bodies_init(hapi_body_table *table);

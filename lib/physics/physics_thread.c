@@ -17,6 +17,7 @@ static int64_t nanoseconds(double seconds)
 static void count_missed(hapi_physics *physics, int64_t deadlines)
 {
   physics->figures.stats.physics_missed += (uint64_t)deadlines; /* shown with the next cycle */
+  physics->missed_unrecorded += (uint32_t)deadlines;
 }
 
 /* Where the next cycle belongs: at its deadline, or, when that has passed by whole periods, at the

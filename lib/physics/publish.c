@@ -160,7 +160,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->state_ns = state_ns;
   out->valid_from_ns = valid_from_ns;
   out->blend_s = physics->model == HAP_MODEL_IMPULSE ? physics->probe_step_s : 0.0;
-  out->period_s = hapi_physics_next_period(physics);
+  out->period_s = hapi_period_of(physics, hapi_tape_wanted_model(physics, true));
   out->model = physics->model;
   out->impulse_pose = physics->config.impulse_pose;
   out->body_count = 0;
@@ -178,6 +178,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   }
   fill_watch(physics, out);
   count_model(physics, out);
+  hapi_tape_model(physics);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);
 }

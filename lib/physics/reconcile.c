@@ -133,6 +133,7 @@ void hapi_reconcile_take(hapi_physics *physics)
 {
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
   physics->has_new_state = newest != NULL;
+  hapi_tape_state(physics, newest != NULL);
   if (newest == NULL) {
     return; /* the loop has stopped or is late: nothing is taken twice */
   }

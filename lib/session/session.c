@@ -59,6 +59,7 @@ void hap_session_destroy(hap_session *session)
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
   hapi_exchange_destroy(session->exchange);
+  hapi_recorder_destroy(session->recorder);
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);
 }
@@ -96,27 +97,37 @@ static hap_status start_threads(hap_session *session)
   return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
 
+/* The first local model, and the first contacts: the first tick has both. */
+static void prepare_loop(hap_session *session, int64_t start_ns)
+{
+  hapi_haptic_set_start(session->haptic, start_ns);
+  hapi_contact_begin(session->contact, start_ns);
+  hapi_haptic_receive(session->haptic, start_ns);
+  hapi_contact_pass(session->contact, start_ns);
+  hapi_haptic_receive(session->haptic, start_ns);
+  atomic_store(&session->tick, 0);
+  session->base = session->step = session->pass = 0;
+  session->frame_remainder_s = 0.0;
+}
+
 static hap_status begin(hap_session *session)
 {
   hap_detail detail = {""};
   int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
   hapi_exchange_reset(session->exchange);
-  hap_status status = hapi_haptic_begin(session->haptic, start_ns, &detail);
+  hap_status status = session->player != NULL ? hapi_play_begin(session, &start_ns, &detail)
+                                              : hapi_record_begin(session, &detail);
+  if (status >= HAP_OK) {
+    status = hapi_haptic_begin(session->haptic, start_ns, &detail);
+  }
   if (status >= HAP_OK) {
     status = hapi_physics_begin(session->physics, &start_ns, &detail);
   }
-  if (status < HAP_OK) {
-    return note_detail(session, status, &detail);
+  if (status >= HAP_OK) {
+    prepare_loop(session, start_ns);
+    status = session->player != NULL ? hapi_play_begun(session, start_ns, &detail) : HAP_OK;
   }
-  hapi_haptic_set_start(session->haptic, start_ns);
-  hapi_contact_begin(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
-  hapi_contact_pass(session->contact, start_ns); /* the first tick has contacts */
-  hapi_haptic_receive(session->haptic, start_ns);
-  atomic_store(&session->tick, 0);
-  session->base = session->step = session->pass = 0;
-  session->frame_remainder_s = 0.0;
-  return HAP_OK;
+  return status < HAP_OK ? note_detail(session, status, &detail) : HAP_OK;
 }
 
 hap_status hap_session_start(hap_session *session)
@@ -131,9 +142,15 @@ hap_status hap_session_start(hap_session *session)
     return hapi_session_fail(session, HAP_ERROR_THREAD,
                              "start in a callback or while this thread holds the lock");
   }
+  if (session->ran && session->player != NULL) {
+    (void)hapi_physics_unlock(session->physics);
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "a replay is started once: open the recording and create the session "
+                             "anew");
+  }
   hap_status status = begin(session);
   (void)hapi_physics_unlock(session->physics);
-  session->started = true;
+  session->started = session->ran = true;
   if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {
     lock_memory(session);
     status = start_threads(session);
@@ -159,6 +176,7 @@ hap_status hap_session_stop(hap_session *session)
   hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);
   hapi_physics_end(session->physics);
+  hapi_record_stop(session);
   if (session->memory_locked) {
     size_t size = 0;
     void *block = hapi_exchange_memory(session->exchange, &size);
@@ -279,6 +297,10 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
                              "advance in a callback or while this thread holds the lock");
   }
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
+  if (session->player != NULL) {
+    hap_status status = hapi_play_advance(session, ticks);
+    return status != HAP_OK ? status : outcome(session, lost);
+  }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
     hapi_haptic_receive(session->haptic, now);
@@ -292,6 +314,9 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
 
 int64_t hap_session_now(const hap_session *session)
 {
+  if (session != NULL && session->player != NULL) {
+    return hapi_play_now(session);
+  }
   bool virtual_clock = session != NULL && session->def.drive == HAP_DRIVE_LOCKSTEP;
   return virtual_clock ? time_of(session, session->tick) : hapi_clock_now();
 }
@@ -320,10 +345,19 @@ hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
   return bad ? HAP_ERROR_ARGUMENT : hapi_physics_post(session->physics, edit, arg);
 }
 
+static hap_status refuse_in_replay(const hap_session *session)
+{
+  return hapi_session_fail(session, HAP_ERROR_STATE,
+                           "the session plays a recording, and what happened is in it");
+}
+
 hap_status hap_session_set_model(hap_session *session, hap_model model)
 {
   if (session == NULL || (int)model < 0 || hap_model_name(model) == NULL) {
     return HAP_ERROR_ARGUMENT;
+  }
+  if (session->player != NULL) {
+    return refuse_in_replay(session);
   }
   hapi_physics_set_model(session->physics, model);
   return HAP_OK;
@@ -373,6 +407,9 @@ hap_status hap_session_reset_fault(hap_session *session)
 {
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
+  }
+  if (session->player != NULL) {
+    return refuse_in_replay(session);
   }
   hapi_haptic_reset_fault(session->haptic);
   return HAP_OK;

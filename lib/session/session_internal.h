@@ -7,17 +7,20 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
+#include <hapode/record.h>
 #include <hapode/session.h>
 
 #include "base/def.h"
 #include "contact/contact.h"
 #include "haptic/haptic.h"
 #include "physics/physics.h"
+#include "record/recorder.h"
 #include "sync/exchange.h"
 
 #define HAPI_SESSION_COOKIE 0x48534531u
 #define HAPI_POINTER_COOKIE 0x48505431u
 #define HAPI_ODE_COOKIE 0x484f4431u
+#define HAPI_RECORD_COOKIE 0x48524331u
 
 struct hap_session {
   hap_session_def def;
@@ -37,6 +40,10 @@ struct hap_session {
 
   double frame_remainder_s; /* FRAME */
 
+  bool ran;                /* was started at least once */
+  hapi_recorder *recorder; /* NULL: not recorded */
+  hap_player *player;      /* borrowed; NULL: no replay */
+
   pthread_mutex_t detail_lock;
   hap_detail detail;
 };
@@ -44,6 +51,20 @@ struct hap_session {
 /* Notes the text of an error on the session and gives back status. */
 hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
+
+/* session_record.c; begin and stop do nothing where there is no recorder */
+hap_status hapi_record_begin(hap_session *session, hap_detail *detail);
+void hapi_record_stop(hap_session *session);
+void hapi_session_set_tapes(hap_session *session, hapi_tape *const tapes[HAPI_STREAMS]);
+
+/* session_play.c, of a session with a player: around what begins a session, and instead of its drive */
+hap_status hapi_play_begin(hap_session *session, int64_t *out_start_ns, hap_detail *detail);
+hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *detail);
+hap_status hapi_play_advance(hap_session *session, uint64_t ticks);
+int64_t hapi_play_now(const hap_session *session);
+
+/* session_pointer.c; detail may be NULL */
+hap_status hapi_session_check_pointer(const hap_pointer_def *def, hap_detail *detail);
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
 

@@ -74,7 +74,7 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
   return status;
 }
 
-static hap_status check_def(const hap_pointer_def *d, hap_detail *detail)
+hap_status hapi_session_check_pointer(const hap_pointer_def *d, hap_detail *detail)
 {
   if (d->friction != 0.0 || d->hull_xyz != NULL || d->hull_points != 0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
@@ -83,10 +83,20 @@ static hap_status check_def(const hap_pointer_def *d, hap_detail *detail)
   return check_numbers(d, detail);
 }
 
+/* A replay has the pointers of the recording, and what moved them. */
+static hap_status refuse_in_replay(const hap_session *session)
+{
+  return hapi_session_fail(session, HAP_ERROR_STATE,
+                           "the session plays a recording, which has the pointers in it");
+}
+
 hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
 {
   if (session == NULL || out == NULL) {
     return HAP_ERROR_ARGUMENT;
+  }
+  if (session->player != NULL) {
+    return refuse_in_replay(session);
   }
   hap_detail detail = {""};
   hap_pointer_def d;
@@ -95,7 +105,7 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   hap_status status =
       hapi_def_read(&d, sizeof d, def, HAPI_POINTER_COOKIE, "hap_pointer_def_init", &detail);
   if (status >= HAP_OK) {
-    status = check_def(&d, &detail);
+    status = hapi_session_check_pointer(&d, &detail);
   }
   if (status >= HAP_OK && d.coupling == HAP_COUPLING_PROXY &&
       session->def.model != HAP_MODEL_CONTACT) {
@@ -112,8 +122,11 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
 
 hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT
-                         : hapi_haptic_remove_pointer(session->haptic, pointer);
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return session->player != NULL ? refuse_in_replay(session)
+                                 : hapi_haptic_remove_pointer(session->haptic, pointer);
 }
 
 hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
@@ -121,6 +134,9 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
 {
   if (session == NULL || pose == NULL) {
     return HAP_ERROR_ARGUMENT;
+  }
+  if (session->player != NULL) {
+    return refuse_in_replay(session);
   }
   if (!good_pose(pose)) {
     return hapi_session_fail(session, HAP_ERROR_ARGUMENT,

@@ -5,25 +5,20 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "sync/message_queue.h"
 #include "sync/triple_buffer.h"
-
-typedef enum channel_name {
-  MODEL,
-  STATE,
-  NEAR,
-  POSES,
-  PATCHES,
-  CHANNELS
-} channel_name;
 
 typedef struct channel {
   hapi_triple_buffer buffer;
   size_t size; /* of one message */
   void *places[3];
+  uint64_t numbers[3]; /* of the messages in the places; with the place they change hands */
+  uint64_t published;  /* of the writer */
+  hapi_message_queue *queue; /* replay; NULL: none */
 } channel;
 
 struct hapi_exchange {
-  channel channels[CHANNELS];
+  channel channels[HAPI_CHANNELS];
   hapi_capacity capacity;
   size_t size;
 };
@@ -86,26 +81,26 @@ static size_t lay_out_patches(hapi_patches *p, const hapi_capacity *c)
 }
 
 /* Writes the offsets of a message, and gives back its size. */
-static size_t lay_out(channel_name name, void *message, const hapi_capacity *c)
+static size_t lay_out(hapi_channel name, void *message, const hapi_capacity *c)
 {
   switch (name) {
-    case MODEL:
+    case HAPI_CHANNEL_MODEL:
       return lay_out_model(message, c);
-    case STATE:
+    case HAPI_CHANNEL_STATE:
       return lay_out_state(message, c);
-    case NEAR:
+    case HAPI_CHANNEL_NEAR:
       return lay_out_near(message, c);
-    case POSES:
+    case HAPI_CHANNEL_POSES:
       return lay_out_poses(message, c);
-    case PATCHES:
+    case HAPI_CHANNEL_PATCHES:
       return lay_out_patches(message, c);
-    case CHANNELS:
+    case HAPI_CHANNELS:
       break;
   }
   return 0;
 }
 
-static void measure(const hapi_capacity *capacity, size_t sizes[CHANNELS])
+static void measure(const hapi_capacity *capacity, size_t sizes[HAPI_CHANNELS])
 {
   union {
     hapi_model model;
@@ -114,17 +109,17 @@ static void measure(const hapi_capacity *capacity, size_t sizes[CHANNELS])
     hapi_poses poses;
     hapi_patches patches;
   } scratch;
-  for (int i = 0; i < CHANNELS; ++i) {
-    sizes[i] = round_up(lay_out((channel_name)i, &scratch, capacity));
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
+    sizes[i] = round_up(lay_out((hapi_channel)i, &scratch, capacity));
   }
 }
 
 hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out)
 {
-  size_t sizes[CHANNELS];
+  size_t sizes[HAPI_CHANNELS];
   size_t size = round_up(sizeof(hapi_exchange));
   measure(capacity, sizes);
-  for (int i = 0; i < CHANNELS; ++i) {
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
     size += 3 * sizes[i];
   }
   *out = NULL;
@@ -136,7 +131,7 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   e->capacity = *capacity;
   e->size = size;
   char *at = memory + round_up(sizeof(hapi_exchange));
-  for (int i = 0; i < CHANNELS; ++i) {
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
     e->channels[i].size = sizes[i];
     for (int k = 0; k < 3; ++k) {
       e->channels[i].places[k] = at;
@@ -150,111 +145,170 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
 
 void hapi_exchange_destroy(hapi_exchange *exchange)
 {
+  for (int i = 0; exchange != NULL && i < HAPI_CHANNELS; ++i) {
+    hapi_message_queue_destroy(exchange->channels[i].queue);
+  }
   hapi_free(exchange);
 }
 
 void hapi_exchange_reset(hapi_exchange *exchange)
 {
-  for (int i = 0; i < CHANNELS; ++i) {
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
     channel *c = &exchange->channels[i];
     hapi_triple_init(&c->buffer);
+    c->published = 0;
     for (int k = 0; k < 3; ++k) {
+      c->numbers[k] = 0;
       memset(c->places[k], 0, c->size);
-      lay_out((channel_name)i, c->places[k], &exchange->capacity);
+      lay_out((hapi_channel)i, c->places[k], &exchange->capacity);
     }
   }
 }
 
-static void *back(hapi_exchange *exchange, channel_name name)
+static void *back(hapi_exchange *exchange, hapi_channel name)
 {
   channel *c = &exchange->channels[name];
   return c->places[hapi_triple_back(&c->buffer)];
 }
 
-static void publish(hapi_exchange *exchange, channel_name name)
-{
-  hapi_triple_publish(&exchange->channels[name].buffer);
-}
-
-static void *take(hapi_exchange *exchange, channel_name name)
+/* Replay: the writer's place is always the same, and what is in it is copied. */
+static void publish(hapi_exchange *exchange, hapi_channel name)
 {
   channel *c = &exchange->channels[name];
+  unsigned place = hapi_triple_back(&c->buffer);
+  c->numbers[place] = ++c->published;
+  if (c->queue != NULL) {
+    hapi_message_queue_put(c->queue, c->published, c->places[place]);
+    return;
+  }
+  hapi_triple_publish(&c->buffer);
+}
+
+static void *take(hapi_exchange *exchange, hapi_channel name)
+{
+  channel *c = &exchange->channels[name];
+  if (c->queue != NULL) {
+    return hapi_message_queue_take(c->queue);
+  }
   return hapi_triple_take(&c->buffer) ? c->places[hapi_triple_front(&c->buffer)] : NULL;
+}
+
+uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name)
+{
+  const channel *c = &exchange->channels[name];
+  return c->queue != NULL ? hapi_message_queue_held(c->queue)
+                          : c->numbers[hapi_triple_front(&c->buffer)];
+}
+
+uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel name)
+{
+  return exchange->channels[name].published;
+}
+
+hap_status hapi_exchange_play(hapi_exchange *exchange)
+{
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
+    channel *c = &exchange->channels[i];
+    if (c->queue == NULL && hapi_message_queue_create(c->size, &c->queue) < HAP_OK) {
+      return HAP_ERROR_MEMORY;
+    }
+  }
+  return HAP_OK;
+}
+
+void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t number)
+{
+  hapi_message_queue_expect(exchange->channels[name].queue, number);
+}
+
+void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t number)
+{
+  hapi_message_queue_forget(exchange->channels[name].queue, number);
+}
+
+bool hapi_exchange_failed(const hapi_exchange *exchange)
+{
+  bool failed = false;
+  for (int i = 0; i < HAPI_CHANNELS; ++i) {
+    const hapi_message_queue *queue = exchange->channels[i].queue;
+    failed = failed || (queue != NULL && hapi_message_queue_failed(queue));
+  }
+  return failed;
 }
 
 hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
 {
-  return back(exchange, MODEL);
+  return back(exchange, HAPI_CHANNEL_MODEL);
 }
 
 void hapi_exchange_model_publish(hapi_exchange *exchange)
 {
-  publish(exchange, MODEL);
+  publish(exchange, HAPI_CHANNEL_MODEL);
 }
 
 hapi_model *hapi_exchange_model_take(hapi_exchange *exchange)
 {
-  return take(exchange, MODEL);
+  return take(exchange, HAPI_CHANNEL_MODEL);
 }
 
 hapi_state *hapi_exchange_state_back(hapi_exchange *exchange)
 {
-  return back(exchange, STATE);
+  return back(exchange, HAPI_CHANNEL_STATE);
 }
 
 void hapi_exchange_state_publish(hapi_exchange *exchange)
 {
-  publish(exchange, STATE);
+  publish(exchange, HAPI_CHANNEL_STATE);
 }
 
 hapi_state *hapi_exchange_state_take(hapi_exchange *exchange)
 {
-  return take(exchange, STATE);
+  return take(exchange, HAPI_CHANNEL_STATE);
 }
 
 hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
 {
-  return back(exchange, NEAR);
+  return back(exchange, HAPI_CHANNEL_NEAR);
 }
 
 void hapi_exchange_near_publish(hapi_exchange *exchange)
 {
-  publish(exchange, NEAR);
+  publish(exchange, HAPI_CHANNEL_NEAR);
 }
 
 hapi_near *hapi_exchange_near_take(hapi_exchange *exchange)
 {
-  return take(exchange, NEAR);
+  return take(exchange, HAPI_CHANNEL_NEAR);
 }
 
 hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange)
 {
-  return back(exchange, POSES);
+  return back(exchange, HAPI_CHANNEL_POSES);
 }
 
 void hapi_exchange_poses_publish(hapi_exchange *exchange)
 {
-  publish(exchange, POSES);
+  publish(exchange, HAPI_CHANNEL_POSES);
 }
 
 hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange)
 {
-  return take(exchange, POSES);
+  return take(exchange, HAPI_CHANNEL_POSES);
 }
 
 hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange)
 {
-  return back(exchange, PATCHES);
+  return back(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 void hapi_exchange_patches_publish(hapi_exchange *exchange)
 {
-  publish(exchange, PATCHES);
+  publish(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
 {
-  return take(exchange, PATCHES);
+  return take(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size)

@@ -6,7 +6,9 @@
 /* The mailboxes between physics, contact thread and haptic loop: one writer and one reader each. All
  * memory is taken at create. */
 
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include <hapode/status.h>
 
@@ -47,6 +49,36 @@ hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange);
 hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange);
 void hapi_exchange_patches_publish(hapi_exchange *exchange);
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange);
+
+/* ---- recordings ---- */
+
+typedef enum hapi_channel {
+  HAPI_CHANNEL_MODEL = 0,
+  HAPI_CHANNEL_STATE = 1,
+  HAPI_CHANNEL_NEAR = 2,
+  HAPI_CHANNEL_POSES = 3,
+  HAPI_CHANNEL_PATCHES = 4,
+  HAPI_CHANNELS = 5
+} hapi_channel;
+
+#define HAPI_EXCHANGE_NEWEST UINT64_MAX
+
+/* Messages of a channel are counted from 1. [reader] number of the message held, 0: none yet. */
+uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel channel);
+/* [writer] how many there were */
+uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel channel);
+
+/* Replay, one thread. From now on the messages are kept, and take gives the one that is expected: the
+ * threads of a recording are run one after the other, and what one of them told comes to the other
+ * at the same place as then, however much the one is ahead by now. Until expect, take
+ * gives the newest. Before the first message; ends with destroy. */
+hap_status hapi_exchange_play(hapi_exchange *exchange);
+/* number of the message that take gives; 0: none; one that is held already: none */
+void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
+/* of those before number none but the expected one is going to be asked for */
+void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
+/* There was no memory for a message, or take did not find the one that was expected. */
+bool hapi_exchange_failed(const hapi_exchange *exchange);
 
 /* The whole block, for locking it into memory. */
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size);

@@ -1,0 +1,281 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/log.h"
+#include "physics/physics_internal.h"
+
+/* Physics' part of a recording: what a cycle has from outside, and a hash of the local model that it
+ * made of it. */
+
+/* Recording: the cell of a cycle until it has taken its message; NULL: none. */
+static hapi_cell *cycle_note(const hapi_physics *physics)
+{
+  bool running = hapi_tape_records(physics->tape) && physics->note != NULL &&
+                 physics->note->kind == HAPI_CELL_CYCLE;
+  return running ? physics->note : NULL;
+}
+
+static void commit(hapi_physics *physics)
+{
+  hapi_tape_commit(physics->tape);
+  physics->note = NULL;
+}
+
+const char *hapi_physics_ode_configuration(void)
+{
+  return dGetConfiguration();
+}
+
+/* ---- the world at the start ---- */
+
+static uint64_t hash_geom(uint64_t hash, dGeomID geom)
+{
+  hapi_shape shape;
+  hap_pose pose;
+  hash = hapi_hash_word(hash, (uint64_t)dGeomGetClass(geom));
+  hash = hapi_hash_word(hash, dGeomGetCategoryBits(geom));
+  hash = hapi_hash_word(hash, dGeomGetCollideBits(geom));
+  if (hapi_shape_of_geom(geom, &shape, &pose)) {
+    hash = hapi_hash_doubles(hash, shape.half, 3);
+    hash = hapi_hash_doubles(hash, &shape.radius, 1);
+    hash = hapi_hash_doubles(hash, pose.position, 3);
+    hash = hapi_hash_doubles(hash, pose.quat_wxyz, 4);
+  }
+  return hash;
+}
+
+static void hash_space(dSpaceID space, hapi_cell *io)
+{
+  int count = dSpaceGetNumGeoms(space);
+  for (int i = 0; i < count; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    if (dGeomIsSpace(geom)) {
+      hash_space((dSpaceID)geom, io);
+    } else {
+      io->u[HAPI_WORLD_HASH] = hash_geom(io->u[HAPI_WORLD_HASH], geom);
+      ++io->u[HAPI_WORLD_GEOMS];
+    }
+  }
+}
+
+static uint64_t hash_body(uint64_t hash, dBodyID body)
+{
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  hash = hapi_hash_doubles(hash, &mass.mass, 1);
+  hash = hapi_hash_doubles(hash, mass.I, 12);
+  hash = hapi_hash_doubles(hash, dBodyGetPosition(body), 3);
+  hash = hapi_hash_doubles(hash, dBodyGetQuaternion(body), 4);
+  hash = hapi_hash_doubles(hash, dBodyGetLinearVel(body), 3);
+  hash = hapi_hash_doubles(hash, dBodyGetAngularVel(body), 3);
+  hash = hapi_hash_word(hash, (uint64_t)dBodyGetGravityMode(body));
+  return hapi_hash_word(hash, (uint64_t)dBodyIsEnabled(body));
+}
+
+static uint64_t hash_settings(dWorldID world)
+{
+  dVector3 gravity;
+  dWorldGetGravity(world, gravity);
+  const double values[] = {dWorldGetERP(world),
+                           dWorldGetCFM(world),
+                           dWorldGetQuickStepNumIterations(world),
+                           dWorldGetQuickStepW(world),
+                           dWorldGetContactSurfaceLayer(world),
+                           dWorldGetContactMaxCorrectingVel(world)};
+  uint64_t hash = hapi_hash_doubles(HAPI_HASH_BEGIN, gravity, 3);
+  return hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+}
+
+static void describe_world(hapi_physics *physics, hapi_cell *out)
+{
+  out->u[HAPI_WORLD_HASH] = hash_settings(physics->ode.world);
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    dBodyID body = physics->table.entries[i].body;
+    if (body != NULL) {
+      out->u[HAPI_WORLD_HASH] = hash_body(out->u[HAPI_WORLD_HASH], body);
+      out->u[HAPI_WORLD_JOINTS] += (uint64_t)dBodyGetNumJoints(body);
+      ++out->u[HAPI_WORLD_BODIES];
+    }
+  }
+  hash_space(physics->ode.space, out);
+}
+
+static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap_detail *detail)
+{
+  return hapi_fail(detail, HAP_ERROR_WORLD,
+                   "this is not the world that was recorded: it had %llu bodies with %llu geoms "
+                   "and %llu joints, this one has %llu, %llu and %llu%s; build the one of the "
+                   "recording",
+                   (unsigned long long)there->u[HAPI_WORLD_BODIES],
+                   (unsigned long long)there->u[HAPI_WORLD_GEOMS],
+                   (unsigned long long)there->u[HAPI_WORLD_JOINTS],
+                   (unsigned long long)here->u[HAPI_WORLD_BODIES],
+                   (unsigned long long)here->u[HAPI_WORLD_GEOMS],
+                   (unsigned long long)here->u[HAPI_WORLD_JOINTS],
+                   there->u[HAPI_WORLD_BODIES] == here->u[HAPI_WORLD_BODIES] &&
+                           there->u[HAPI_WORLD_GEOMS] == here->u[HAPI_WORLD_GEOMS]
+                       ? ", but in other places, of other masses or shapes, or with other settings"
+                       : "");
+}
+
+hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
+{
+  hapi_cell here = {0};
+  if (physics->tape == NULL) {
+    return HAP_OK;
+  }
+  physics->locks = 0;
+  describe_world(physics, &here);
+  if (hapi_tape_records(physics->tape)) {
+    hapi_tape_open(physics->tape);
+    physics->note = hapi_tape_put(physics->tape, HAPI_CELL_WORLD, 0);
+    memcpy(physics->note->u, here.u, sizeof here.u);
+    physics->note->u[HAPI_WORLD_SEED] = dRandGetSeed();
+    physics->note->flags = (uint16_t)atomic_load(&physics->wanted_model);
+    return HAP_OK;
+  }
+  physics->read = hapi_tape_get(physics->tape, HAPI_CELL_WORLD, 0);
+  if (physics->read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
+    return other_world(physics->read, &here, detail);
+  }
+  dRandSetSeed((unsigned long)physics->read->u[HAPI_WORLD_SEED]);
+  if (hap_model_name((hap_model)physics->read->flags) != NULL) {
+    atomic_store(&physics->wanted_model, (int)physics->read->flags);
+  }
+  return HAP_OK;
+}
+
+void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns)
+{
+  if (hapi_tape_records(physics->tape)) {
+    physics->note->i[HAPI_WORLD_TIME] = *io_start_ns;
+  } else if (hapi_tape_plays(physics->tape)) {
+    *io_start_ns = physics->read->i[HAPI_WORLD_TIME];
+  }
+}
+
+/* ---- the local model ---- */
+
+static uint64_t hash_model(const hapi_physics *physics)
+{
+  hapi_model *model = hapi_exchange_model_back(physics->config.exchange);
+  const hapi_model_body *b = hapi_model_bodies(model);
+  const hapi_model_contact *c = hapi_model_contacts(model);
+  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, model->number);
+  for (uint32_t i = 0; i < model->body_count; ++i) {
+    hash = hapi_hash_word(hash, ((uint64_t)b[i].flags << 32) | b[i].slot);
+    hash = hapi_hash_doubles(hash, b[i].pose.position, 3);
+    hash = hapi_hash_doubles(hash, b[i].pose.quat_wxyz, 4);
+    hash = hapi_hash_doubles(hash, b[i].twist.linear, 3);
+    hash = hapi_hash_doubles(hash, b[i].twist.angular, 3);
+    hash = hapi_hash_doubles(hash, b[i].b, 6);
+    hash = hapi_hash_doubles(hash, b[i].residual, 6);
+    hash = hapi_hash_doubles(hash, b[i].user_wrench, 6);
+  }
+  for (uint32_t i = 0; i < model->contact_count; ++i) {
+    hash = hapi_hash_word(hash, ((uint64_t)c[i].slot << 32) | c[i].body);
+    hash = hapi_hash_doubles(hash, c[i].point_body, 3);
+    hash = hapi_hash_doubles(hash, c[i].normal_body, 3);
+    hash = hapi_hash_doubles(hash, c[i].a[0], 18);
+  }
+  return hash;
+}
+
+static void compare_model(hapi_physics *physics, uint64_t recorded)
+{
+  const hapi_difference difference = {.what = HAPI_DIFFERS_STEP, .number = physics->model_number};
+  if (recorded != physics->model_hash) {
+    hapi_tape_differ(physics->tape, &difference);
+  }
+}
+
+void hapi_tape_model(hapi_physics *physics)
+{
+  if (physics->tape != NULL) {
+    physics->model_hash = hash_model(physics);
+  }
+}
+
+void hapi_tape_started(hapi_physics *physics)
+{
+  if (hapi_tape_records(physics->tape)) {
+    physics->note->u[HAPI_WORLD_MODEL_HASH] = physics->model_hash;
+    commit(physics);
+  } else if (hapi_tape_plays(physics->tape)) {
+    compare_model(physics, physics->read->u[HAPI_WORLD_MODEL_HASH]);
+  }
+}
+
+/* ---- a cycle ---- */
+
+void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+{
+  physics->model_hash = 0;
+  if (hapi_tape_records(physics->tape)) {
+    hapi_tape_open(physics->tape);
+    physics->note = hapi_tape_put(physics->tape, HAPI_CELL_CYCLE, 0);
+    physics->note->i[HAPI_CYCLE_TIME] = now_ns;
+    physics->note->i[HAPI_CYCLE_NEXT] = next_ns;
+    physics->note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
+    physics->note->u[HAPI_CYCLE_LOCKS] = physics->locks;
+    physics->note->u[HAPI_CYCLE_MISSED] = physics->missed_unrecorded;
+  } else if (hapi_tape_plays(physics->tape)) {
+    physics->read = hapi_tape_get(physics->tape, HAPI_CELL_CYCLE, 0);
+    physics->read_end = hapi_tape_get(physics->tape, HAPI_CELL_CYCLED, 0);
+    dRandSetSeed((unsigned long)physics->read->u[HAPI_CYCLE_SEED]);
+    physics->figures.stats.physics_missed += physics->read->u[HAPI_CYCLE_MISSED];
+  }
+  physics->locks = 0;
+  physics->missed_unrecorded = 0;
+}
+
+void hapi_tape_edits(hapi_physics *physics, uint32_t count)
+{
+  hapi_cell *note = cycle_note(physics);
+  if (note != NULL) {
+    note->word = count;
+  }
+}
+
+/* The cell goes out with it, and not at the cycle's end: whoever replays a step that took long knows
+ * from here on which of the loop's messages it needs. */
+void hapi_tape_state(hapi_physics *physics, bool taken)
+{
+  hapi_cell *note = cycle_note(physics);
+  if (note != NULL) {
+    note->u[HAPI_CYCLE_STATE] =
+        taken ? hapi_exchange_taken(physics->config.exchange, HAPI_CHANNEL_STATE) : 0;
+    commit(physics);
+  }
+}
+
+/* at_end: asked for after the step, for the next one. */
+hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end)
+{
+  int wanted = atomic_load(&physics->wanted_model);
+  if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
+    uint16_t flags = at_end ? physics->read_end->flags : physics->read->flags;
+    wanted = hap_model_name((hap_model)flags) != NULL ? (int)flags : (int)physics->model;
+    atomic_store(&physics->wanted_model, wanted);
+  } else if (at_end) {
+    physics->model_next = (uint16_t)wanted;
+  } else if (cycle_note(physics) != NULL) {
+    physics->note->flags = (uint16_t)wanted;
+  }
+  return (hap_model)wanted;
+}
+
+void hapi_tape_cycled(hapi_physics *physics)
+{
+  if (hapi_tape_records(physics->tape)) {
+    hapi_tape_open(physics->tape);
+    hapi_cell *cell = hapi_tape_put(physics->tape, HAPI_CELL_CYCLED, 0);
+    cell->flags = physics->model_next;
+    cell->u[HAPI_CYCLED_HASH] = physics->model_hash;
+    cell->u[HAPI_CYCLED_MODEL] = physics->model_hash != 0 ? physics->model_number : 0;
+    commit(physics);
+  } else if (hapi_tape_plays(physics->tape)) {
+    compare_model(physics, physics->read_end->u[HAPI_CYCLED_HASH]);
+  }
+}

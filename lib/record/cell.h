@@ -1,0 +1,143 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_RECORD_CELL_H
+#define HAPODE_RECORD_CELL_H
+
+/* What a recording is made of: cells of one size, in three streams, one for each thread that writes.
+ * A packet is one cell that says how many follow, and those. docs/recording.md has the table. */
+
+#include <assert.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <hapode/pointer.h>
+
+typedef enum hapi_stream {
+  HAPI_STREAM_HAPTIC = 0,
+  HAPI_STREAM_PHYSICS = 1,
+  HAPI_STREAM_CONTACT = 2,
+  HAPI_STREAMS = 3
+} hapi_stream;
+
+/* Values are of the file. */
+typedef enum hapi_cell_kind {
+  /* haptic: BEGIN or TICK, and what follows in this order */
+  HAPI_CELL_BEGIN = 1,   /* before the first tick. i[0]: time of the pointers' first read */
+  HAPI_CELL_TICK = 2,    /* hapi_tick_word */
+  HAPI_CELL_LEAVE = 3,   /* a pointer has gone */
+  HAPI_CELL_JOIN = 4,    /* a pointer comes: HAPI_JOIN_CELLS of them, see hapi_joined */
+  HAPI_CELL_POSE = 5,    /* read: d[0..2] position, d[3..6] quaternion; word: buttons */
+  HAPI_CELL_TWIST = 6,   /* read: d[0..5] */
+  HAPI_CELL_FORCE = 7,   /* to be written: d[0..2] force, d[3..5] torque; u[6]: hash of the pointer */
+  HAPI_CELL_REACHED = 8, /* what the device made of it, where that is something else */
+  HAPI_CELL_BODY = 9,    /* d[0..2] position, d[3..6] quaternion; word: slot */
+  /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
+  HAPI_CELL_WORLD = 16,  /* hapi_world_word; flags: hap_model at the start */
+  HAPI_CELL_CYCLE = 17,  /* hapi_cycle_word; word: edits that were run; flags: hap_model wanted */
+  HAPI_CELL_CYCLED = 18, /* hapi_cycled_word; flags: hap_model wanted then, of the next cycle */
+  /* contact, packets of one cell */
+  HAPI_CELL_PASS = 24 /* hapi_pass_word */
+} hapi_cell_kind;
+
+/* Places in u of a cell of that kind. Numbers of messages: the first one of a mailbox is 1; 0: none
+ * was taken. */
+typedef enum hapi_tick_word {
+  HAPI_TICK_WINDOW = 0, /* number of the tick; those left out were missed */
+  HAPI_TICK_TIME = 1,   /* ns, the tick's own */
+  HAPI_TICK_MODEL = 2,  /* message taken at its begin */
+  HAPI_TICK_PATCHES = 3,
+  HAPI_TICK_HASH = 4, /* of all pointers and local bodies after it */
+  HAPI_TICK_BODIES = 5
+} hapi_tick_word;
+
+typedef enum hapi_world_word {
+  HAPI_WORLD_TIME = 0, /* ns, of tick 0 */
+  HAPI_WORLD_SEED = 1, /* of ODE */
+  HAPI_WORLD_HASH = 2,
+  HAPI_WORLD_BODIES = 3,
+  HAPI_WORLD_JOINTS = 4,
+  HAPI_WORLD_GEOMS = 5,
+  HAPI_WORLD_MODEL_HASH = 6 /* of the first local model */
+} hapi_world_word;
+
+typedef enum hapi_cycle_word {
+  HAPI_CYCLE_TIME = 0, /* ns */
+  HAPI_CYCLE_NEXT = 1, /* ns */
+  HAPI_CYCLE_STATE = 2, /* message taken */
+  HAPI_CYCLE_SEED = 3,  /* of ODE */
+  HAPI_CYCLE_LOCKS = 4, /* hap_session_lock since the cycle before */
+  HAPI_CYCLE_MISSED = 5 /* steps, likewise */
+} hapi_cycle_word;
+
+typedef enum hapi_cycled_word {
+  HAPI_CYCLED_MODEL = 0, /* number of the local model; 0: the world was not sound, and none came */
+  HAPI_CYCLED_HASH = 1   /* of it */
+} hapi_cycled_word;
+
+typedef enum hapi_pass_word {
+  HAPI_PASS_NUMBER = 0,
+  HAPI_PASS_POSES = 1, /* messages in use */
+  HAPI_PASS_NEAR = 2,
+  HAPI_PASS_VALID = 3, /* ns, from which the loop may use it */
+  HAPI_PASS_HASH = 4
+} hapi_pass_word;
+
+enum {
+  /* of TICK */
+  HAPI_CELL_RESET = 1,     /* the fault was reset */
+  HAPI_CELL_EMERGENCY = 2, /* hap_emergency_zero had been called */
+  /* of POSE and FORCE */
+  HAPI_CELL_FAILED = 1 /* the device did not answer, or did not take it */
+};
+
+typedef struct hapi_cell {
+  uint8_t kind;
+  uint8_t index;  /* of a pointer; TICK: hap_fault that another thread wants latched */
+  uint16_t flags; /* HAPI_CELL_* */
+  uint32_t word;  /* BEGIN, TICK: cells that follow in the packet */
+  union {
+    double d[7];
+    uint64_t u[7];
+    int64_t i[7];
+  };
+} hapi_cell;
+
+static_assert(sizeof(hapi_cell) == 64, "the file's");
+
+/* A pointer as the loop takes it in. */
+typedef struct hapi_joined {
+  hap_pointer_def def; /* device and hull_xyz NULL */
+  hap_device_info info;
+  uint32_t generation;
+  uint32_t has_device;
+} hapi_joined;
+
+#define HAPI_CELL_BYTES (sizeof(((hapi_cell *)0)->d))
+#define HAPI_JOIN_CELLS 8u
+#define HAPI_CELL_BODIES 16u /* of a tick; of more bodies one part after the other, tick by tick */
+
+static_assert(sizeof(hapi_joined) <= HAPI_JOIN_CELLS * HAPI_CELL_BYTES, "room in the cells");
+
+/* Of a tick with everything in it. */
+#define HAPI_PACKET_MAX (1u + 16u * (1u + HAPI_JOIN_CELLS + 4u) + HAPI_CELL_BODIES)
+
+#define HAPI_HASH_BEGIN 0xcbf29ce484222325u
+
+/* FNV-1a over 64-bit words: cheap, and any changed bit changes it. */
+static inline uint64_t hapi_hash_word(uint64_t hash, uint64_t word)
+{
+  hash = (hash ^ word) * 0x100000001b3u;
+  return hash ^ (hash >> 29);
+}
+
+static inline uint64_t hapi_hash_doubles(uint64_t hash, const double *values, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    uint64_t word;
+    memcpy(&word, &values[i], sizeof word);
+    hash = hapi_hash_word(hash, word);
+  }
+  return hash;
+}
+
+#endif

@@ -1,0 +1,516 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "record/reader.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <zlib.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+#include "record/grammar.h"
+
+/* Of one stream, read while another one is behind. A recorder writes all of them four times a
+ * second. */
+#define QUEUE_MAX (1u << 20)
+/* Cells of the loop in which those of another thread must be seen if they belong to its first ticks:
+ * more than are written at a time. */
+#define GLANCE (1u << 17)
+
+typedef struct cell_queue {
+  hapi_cell *cells;
+  uint32_t capacity;
+  uint32_t first;
+  uint32_t count;
+} cell_queue;
+
+struct hapi_reader {
+  FILE *file;
+  char path[256]; /* its end, for texts */
+  hapi_file_info info;
+  char note[HAPI_NOTE_MAX + 1];
+  hapi_file_end end;
+  hapi_grammar grammar;
+  hapi_grammar whole; /* after all cells */
+  long cells_at;      /* offset of the first block of cells */
+  uint64_t offset;
+  uint32_t blocks;
+  bool incomplete;
+  bool over; /* the END has been read, or the file breaks off and may */
+  hapi_block_head head;
+  char *stored;     /* HAPI_BLOCK_BYTES */
+  hapi_cell *bytes; /* HAPI_BLOCK_BYTES */
+  z_stream inflater;
+  bool inflates;
+  cell_queue queues[HAPI_STREAMS];
+};
+
+/* ---- what is wrong ---- */
+
+static hap_status bad(const hapi_reader *reader, const char *what, hap_detail *detail)
+{
+  return hapi_fail(detail, HAP_ERROR_FORMAT,
+                   "%s: block %u at byte %llu: %s; the file is damaged and cannot be replayed",
+                   reader->path, reader->blocks, (unsigned long long)reader->offset, what);
+}
+
+static hap_status broken_off(hapi_reader *reader, hap_detail *detail)
+{
+  if (ferror(reader->file)) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path,
+                     strerror(errno));
+  }
+  if (reader->incomplete) {
+    reader->over = true;
+    return HAP_END;
+  }
+  return hapi_fail(detail, HAP_ERROR_FORMAT,
+                   "%s: breaks off in block %u, which begins at byte %llu: the recording was not "
+                   "ended, or the file was cut; HAP_PLAY_INCOMPLETE (hapode-run "
+                   "--play-incomplete) plays what is there",
+                   reader->path, reader->blocks, (unsigned long long)reader->offset);
+}
+
+/* ---- blocks ---- */
+
+static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
+{
+  z_stream *z = &reader->inflater;
+  if (inflateReset(z) != Z_OK) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+  }
+  z->next_in = (Bytef *)reader->stored;
+  z->avail_in = reader->head.stored;
+  z->next_out = (Bytef *)reader->bytes;
+  z->avail_out = reader->head.size;
+  int answer = inflate(z, Z_FINISH);
+  if (answer == Z_MEM_ERROR) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+  }
+  if (answer != Z_STREAM_END || z->total_out != reader->head.size) {
+    return bad(reader, "its bytes cannot be unpacked", detail);
+  }
+  return HAP_OK;
+}
+
+static const char *wrong_head(const hapi_reader *reader)
+{
+  const hapi_block_head *h = &reader->head;
+  if (h->mark != HAPI_BLOCK_MARK) {
+    return "no block begins here";
+  }
+  if (h->number != reader->blocks) {
+    return "it has another number: a block is missing or twice there";
+  }
+  if (h->type < HAPI_BLOCK_INFO || h->type > HAPI_BLOCK_END || h->size > HAPI_BLOCK_BYTES ||
+      h->stored > h->size || h->size == 0) {
+    return "it is of a kind or size that there is not";
+  }
+  return NULL;
+}
+
+/* Its bytes are in reader->bytes then. */
+static hap_status read_block(hapi_reader *reader, hap_detail *detail)
+{
+  hapi_block_head *head = &reader->head;
+  if (fread(head, sizeof *head, 1, reader->file) != 1) {
+    return broken_off(reader, detail);
+  }
+  const char *wrong = wrong_head(reader);
+  if (wrong != NULL) {
+    return bad(reader, wrong, detail);
+  }
+  bool packed = head->stored < head->size;
+  void *at = packed ? (void *)reader->stored : (void *)reader->bytes;
+  if (head->stored > 0 && fread(at, head->stored, 1, reader->file) != 1) {
+    return broken_off(reader, detail);
+  }
+  if (hapi_file_crc_block(head, at) != head->crc) {
+    return bad(reader, "its checksum is wrong", detail);
+  }
+  hap_status status = packed ? inflate_block(reader, detail) : HAP_OK;
+  if (status >= HAP_OK) {
+    reader->offset += sizeof *head + head->stored;
+    ++reader->blocks;
+  }
+  return status;
+}
+
+static hap_status read_end(hapi_reader *reader, hap_detail *detail)
+{
+  const hapi_grammar *g = &reader->grammar;
+  if (reader->head.size != sizeof reader->end) {
+    return bad(reader, "an end of another size", detail);
+  }
+  memcpy(&reader->end, reader->bytes, sizeof reader->end);
+  bool totals = reader->end.ticks == g->ticks &&
+                memcmp(reader->end.cells, g->cells, sizeof reader->end.cells) == 0;
+  bool why = reader->end.end >= HAPI_RECORD_STOPPED && reader->end.end <= HAPI_RECORD_OVERFLOW;
+  if (!totals || !why) {
+    return bad(reader, "its totals are not those of the blocks before", detail);
+  }
+  if (getc(reader->file) != EOF) {
+    return bad(reader, "something follows the end of the recording", detail);
+  }
+  reader->over = true;
+  return HAP_END;
+}
+
+/* Reads a block of cells: *out_stream, *out_count in reader->bytes. HAP_END at the end. */
+static hap_status read_cells(hapi_reader *reader, hapi_stream *out_stream, uint32_t *out_count,
+                             hap_detail *detail)
+{
+  hap_status status = read_block(reader, detail);
+  const hapi_block_head *head = &reader->head;
+  if (status != HAP_OK) {
+    return status;
+  }
+  if (head->type == HAPI_BLOCK_END) {
+    return read_end(reader, detail);
+  }
+  if (head->type < HAPI_BLOCK_CELLS_OF || head->size % sizeof(hapi_cell) != 0) {
+    return bad(reader, "it does not hold whole cells", detail);
+  }
+  *out_stream = (hapi_stream)(head->type - HAPI_BLOCK_CELLS_OF);
+  *out_count = head->size / (uint32_t)sizeof(hapi_cell);
+  for (uint32_t i = 0; i < *out_count; ++i) {
+    const char *wrong = hapi_grammar_take(&reader->grammar, *out_stream, &reader->bytes[i]);
+    if (wrong != NULL) {
+      return bad(reader, wrong, detail);
+    }
+  }
+  return HAP_OK;
+}
+
+/* ---- head and info ---- */
+
+static hap_status read_head(hapi_reader *reader, hap_detail *detail)
+{
+  hapi_file_head head;
+  size_t got = fread(&head, 1, sizeof head, reader->file);
+  if (ferror(reader->file)) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path,
+                     strerror(errno));
+  }
+  if (got < sizeof head || memcmp(head.magic, HAPI_FILE_MAGIC, sizeof head.magic) != 0) {
+    return hapi_fail(detail, HAP_ERROR_FORMAT,
+                     "%s: is no recording of a session: it does not begin as one%s", reader->path,
+                     got == 0 ? ", it is empty" : "");
+  }
+  if (head.byte_order != HAPI_FILE_BYTE_ORDER) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "%s: was recorded on a machine with the other byte order; replay it there",
+                     reader->path);
+  }
+  if (head.crc != hapi_file_crc_head(&head)) {
+    return bad(reader, "the checksum of the file's head is wrong", detail);
+  }
+  if (head.version != HAPI_FILE_VERSION || head.cell_size != sizeof(hapi_cell)) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "%s: is of version %u of the file format, this library reads version %u; "
+                     "replay it with the library that recorded it",
+                     reader->path, head.version, HAPI_FILE_VERSION);
+  }
+  reader->offset = sizeof head;
+  return HAP_OK;
+}
+
+static hap_status other_build(const hapi_reader *reader, const char *what, const char *there,
+                              const char *here, hap_detail *detail)
+{
+  return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                   "%s: was recorded with %s \"%.100s\", this is \"%.100s\": bit for bit it "
+                   "replays only there",
+                   reader->path, what, there, here);
+}
+
+static bool terminated(const char *text, size_t size)
+{
+  return memchr(text, '\0', size) != NULL;
+}
+
+static hap_status check_build(const hapi_reader *reader, const char *ode, hap_detail *detail)
+{
+  const hapi_file_info *info = &reader->info;
+  hapi_file_info here;
+  memset(&here, 0, sizeof here);
+  hapi_file_describe(&here);
+  if (strcmp(info->machine, here.machine) != 0) {
+    return other_build(reader, "a machine of type", info->machine, here.machine, detail);
+  }
+  if (strcmp(info->library, here.library) != 0 || info->joined_size != here.joined_size) {
+    return other_build(reader, "the library's version", info->library, here.library, detail);
+  }
+  if (ode != NULL && strncmp(info->ode, ode, sizeof info->ode - 1) != 0) {
+    return other_build(reader, "an ODE of configuration", info->ode, ode, detail);
+  }
+  return HAP_OK;
+}
+
+static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *detail)
+{
+  hapi_file_info *info = &reader->info;
+  hap_status status = read_block(reader, detail);
+  if (status != HAP_OK) {
+    reader->incomplete = false; /* there is nothing to play */
+    return status == HAP_END ? broken_off(reader, detail) : status;
+  }
+  if (reader->head.type != HAPI_BLOCK_INFO || reader->head.size < sizeof *info) {
+    return bad(reader, "it should tell what was recorded, and does not", detail);
+  }
+  memcpy(info, reader->bytes, sizeof *info);
+  if (info->note_size > HAPI_NOTE_MAX || reader->head.size != sizeof *info + info->note_size ||
+      !terminated(info->library, sizeof info->library) ||
+      !terminated(info->machine, sizeof info->machine) ||
+      !terminated(info->system, sizeof info->system) || !terminated(info->ode, sizeof info->ode)) {
+    return bad(reader, "it tells what was recorded in a form that there is not", detail);
+  }
+  memcpy(reader->note, (const char *)reader->bytes + sizeof *info, info->note_size);
+  return check_build(reader, ode, detail);
+}
+
+/* ---- life ---- */
+
+static voidpf allocate(voidpf user, uInt count, uInt size)
+{
+  (void)user;
+  return hapi_alloc_array(count, size);
+}
+
+static void release(voidpf user, voidpf memory)
+{
+  (void)user;
+  hapi_free(memory);
+}
+
+static bool prepare(hapi_reader *reader)
+{
+  reader->stored = hapi_alloc(HAPI_BLOCK_BYTES);
+  reader->bytes = hapi_alloc(HAPI_BLOCK_BYTES);
+  reader->inflater.zalloc = allocate;
+  reader->inflater.zfree = release;
+  reader->inflates = inflateInit(&reader->inflater) == Z_OK;
+  return reader->stored != NULL && reader->bytes != NULL && reader->inflates;
+}
+
+/* Looks at all of it, and comes back to the first cells. */
+static hap_status look_through(hapi_reader *reader, hap_detail *detail)
+{
+  uint64_t offset = reader->offset;
+  uint32_t blocks = reader->blocks;
+  hap_status status = HAP_OK;
+  reader->cells_at = ftell(reader->file);
+  while (status == HAP_OK) {
+    hapi_stream stream;
+    uint32_t count;
+    status = read_cells(reader, &stream, &count, detail);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  reader->whole = reader->grammar;
+  memset(&reader->grammar, 0, sizeof reader->grammar);
+  reader->over = false;
+  reader->offset = offset;
+  reader->blocks = blocks;
+  clearerr(reader->file);
+  if (reader->cells_at < 0 || fseek(reader->file, reader->cells_at, SEEK_SET) != 0) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read twice: %s", reader->path,
+                     strerror(errno));
+  }
+  return HAP_OK;
+}
+
+/* The end of a long path tells more than its beginning. */
+static void keep_path(hapi_reader *reader, const char *path)
+{
+  size_t length = strlen(path);
+  size_t skip = length >= 200 ? length - 199 : 0;
+  snprintf(reader->path, sizeof reader->path, "%s", path + skip);
+}
+
+static hap_status open_reader(hapi_reader *reader, const char *path, const char *ode,
+                              hap_detail *detail)
+{
+  if (!prepare(reader)) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+  }
+  reader->file = fopen(path, "rb");
+  if (reader->file == NULL) {
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", reader->path,
+                     strerror(errno));
+  }
+  hap_status status = read_head(reader, detail);
+  if (status >= HAP_OK) {
+    status = read_info(reader, ode, detail);
+  }
+  return status >= HAP_OK ? look_through(reader, detail) : status;
+}
+
+hap_status hapi_reader_open(const char *path, bool incomplete, const char *ode, hapi_reader **out,
+                            hap_detail *detail)
+{
+  *out = NULL;
+  hapi_reader *reader = hapi_alloc(sizeof *reader);
+  if (reader == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading a recording");
+  }
+  keep_path(reader, path);
+  reader->incomplete = incomplete;
+  hap_status status = open_reader(reader, path, ode, detail);
+  if (status < HAP_OK) {
+    hapi_reader_close(reader);
+    return status;
+  }
+  *out = reader;
+  return HAP_OK;
+}
+
+void hapi_reader_close(hapi_reader *reader)
+{
+  if (reader == NULL) {
+    return;
+  }
+  if (reader->file != NULL) {
+    fclose(reader->file);
+  }
+  if (reader->inflates) {
+    inflateEnd(&reader->inflater);
+  }
+  for (int i = 0; i < HAPI_STREAMS; ++i) {
+    hapi_free(reader->queues[i].cells);
+  }
+  hapi_free(reader->stored);
+  hapi_free(reader->bytes);
+  hapi_free(reader);
+}
+
+const hapi_file_info *hapi_reader_info(const hapi_reader *reader)
+{
+  return &reader->info;
+}
+
+const char *hapi_reader_note(const hapi_reader *reader)
+{
+  return reader->note;
+}
+
+const hapi_file_end *hapi_reader_end(const hapi_reader *reader)
+{
+  return &reader->end;
+}
+
+const hapi_grammar *hapi_reader_whole(const hapi_reader *reader)
+{
+  return &reader->whole;
+}
+
+/* ---- packets ---- */
+
+/* Behind the last cell: by moving them when as many places are free before them, otherwise by growing,
+ * so that no cell is moved often. */
+static bool make_room(cell_queue *q, uint32_t count)
+{
+  if (q->first + q->count + count <= q->capacity) {
+    return true;
+  }
+  if (q->first >= q->count + count) {
+    memcpy(q->cells, q->cells + q->first, q->count * sizeof *q->cells);
+    q->first = 0;
+    return true;
+  }
+  uint32_t capacity = 3 * (q->count + count);
+  hapi_cell *cells = hapi_alloc_array(capacity, sizeof *cells);
+  if (cells == NULL) {
+    return false;
+  }
+  if (q->count > 0) {
+    memcpy(cells, q->cells + q->first, q->count * sizeof *cells);
+  }
+  hapi_free(q->cells);
+  q->cells = cells;
+  q->capacity = capacity;
+  q->first = 0;
+  return true;
+}
+
+static hap_status enqueue(hapi_reader *reader, hapi_stream stream, uint32_t count,
+                          hap_detail *detail)
+{
+  cell_queue *q = &reader->queues[stream];
+  if (q->count + count > QUEUE_MAX) {
+    return bad(reader, "one thread is far ahead of the others", detail);
+  }
+  if (!make_room(q, count)) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+  }
+  memcpy(q->cells + q->first + q->count, reader->bytes, count * sizeof *q->cells);
+  q->count += count;
+  return HAP_OK;
+}
+
+/* Cells of the packet at the front; 0: nothing is there. */
+static uint32_t packet_size(const hapi_reader *reader, hapi_stream stream)
+{
+  const cell_queue *q = &reader->queues[stream];
+  if (q->count == 0) {
+    return 0;
+  }
+  const hapi_cell *head = &q->cells[q->first];
+  return stream == HAPI_STREAM_HAPTIC ? 1 + head->word : head->kind == HAPI_CELL_CYCLE ? 2 : 1;
+}
+
+static bool whole_packet(const hapi_reader *reader, hapi_stream stream)
+{
+  uint32_t size = packet_size(reader, stream);
+  return size > 0 && size <= reader->queues[stream].count;
+}
+
+static hap_status read_on(hapi_reader *reader, hap_detail *detail)
+{
+  hapi_stream stream = HAPI_STREAM_HAPTIC;
+  uint32_t count = 0;
+  hap_status status = reader->over ? HAP_END : read_cells(reader, &stream, &count, detail);
+  return status == HAP_OK ? enqueue(reader, stream, count, detail) : status;
+}
+
+hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
+                            uint32_t *out_count, hap_detail *detail)
+{
+  hap_status status = HAP_OK;
+  while (status == HAP_OK && !whole_packet(reader, stream)) {
+    status = read_on(reader, detail);
+  }
+  *out = NULL;
+  *out_count = 0;
+  if (status == HAP_OK) {
+    *out = reader->queues[stream].cells + reader->queues[stream].first;
+    *out_count = packet_size(reader, stream);
+  }
+  return status;
+}
+
+hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
+                              uint32_t *out_count, hap_detail *detail)
+{
+  const cell_queue *q = &reader->queues[stream];
+  hap_status status = HAP_OK;
+  while (status == HAP_OK && !whole_packet(reader, stream) &&
+         reader->queues[HAPI_STREAM_HAPTIC].count < GLANCE) {
+    status = read_on(reader, detail);
+  }
+  uint32_t size = packet_size(reader, stream);
+  *out = q->count > 0 ? q->cells + q->first : NULL;
+  *out_count = size < q->count ? size : q->count;
+  return status < HAP_OK ? status : HAP_OK;
+}
+
+void hapi_reader_pop(hapi_reader *reader, hapi_stream stream)
+{
+  if (whole_packet(reader, stream)) {
+    cell_queue *q = &reader->queues[stream];
+    uint32_t size = packet_size(reader, stream);
+    q->first += size;
+    q->count -= size;
+  }
+}

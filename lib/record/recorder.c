@@ -1,0 +1,315 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "record/recorder.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/thread.h"
+
+#define PAUSE_NS 10000000  /* between two looks at the rings */
+#define FLUSH_NS 250000000 /* what a program that dies loses */
+#define END_BYTES (sizeof(hapi_block_head) + sizeof(hapi_file_end))
+#define DEFLATE_LEVEL 1
+
+struct hapi_recorder {
+  hapi_tape tapes[HAPI_STREAMS];
+  _Atomic int ended; /* hapi_record_end */
+  _Atomic int error;
+  _Atomic uint64_t bytes;
+  _Atomic uint64_t ticks;
+  uint64_t max_bytes;
+  int file; /* -1: closed */
+  uint32_t blocks;
+  hapi_file_end totals;
+  hapi_cell *cells[HAPI_STREAMS]; /* of the next blocks, HAPI_BLOCK_CELLS each */
+  uint32_t counts[HAPI_STREAMS];
+  char *stored; /* HAPI_BLOCK_BYTES */
+  z_stream deflater;
+  bool deflates;
+  hapi_thread thread;
+  _Atomic int stop;
+};
+
+/* ---- bytes ---- */
+
+static bool goes_on(const hapi_recorder *recorder)
+{
+  return atomic_load(&recorder->ended) == HAPI_RECORD_GOES_ON;
+}
+
+static void end(hapi_recorder *recorder, hapi_record_end why)
+{
+  int expected = HAPI_RECORD_GOES_ON;
+  (void)atomic_compare_exchange_strong(&recorder->ended, &expected, (int)why);
+}
+
+/* No more goes to the file, whatever the recording had ended by before. */
+static void fail(hapi_recorder *recorder, int error)
+{
+  atomic_store(&recorder->error, error);
+  atomic_store(&recorder->ended, HAPI_RECORD_FAILED);
+}
+
+static void write_bytes(hapi_recorder *recorder, const void *bytes, size_t size)
+{
+  const char *at = bytes;
+  while (size > 0 && atomic_load(&recorder->error) == 0) {
+    ssize_t written = write(recorder->file, at, size);
+    if (written > 0) {
+      at += written;
+      size -= (size_t)written;
+      atomic_fetch_add(&recorder->bytes, (uint64_t)written);
+    } else if (written < 0 && errno != EINTR) {
+      fail(recorder, errno);
+    } else if (written == 0) {
+      fail(recorder, ENOSPC);
+    }
+  }
+}
+
+/* Bytes in recorder->stored; 0: they would not be fewer. */
+static uint32_t deflate_bytes(hapi_recorder *recorder, const void *bytes, uint32_t size)
+{
+  z_stream *z = &recorder->deflater;
+  if (!recorder->deflates || deflateReset(z) != Z_OK) {
+    return 0;
+  }
+  z->next_in = (Bytef *)(uintptr_t)bytes;
+  z->avail_in = size;
+  z->next_out = (Bytef *)recorder->stored;
+  z->avail_out = size > 0 ? size - 1 : 0;
+  return deflate(z, Z_FINISH) == Z_STREAM_END ? (uint32_t)z->total_out : 0;
+}
+
+/* False: it does not fit below the limit, or cannot be written. */
+static bool write_block(hapi_recorder *recorder, uint32_t type, const void *bytes, uint32_t size)
+{
+  hapi_block_head head = {HAPI_BLOCK_MARK, type, recorder->blocks, size, size, 0};
+  bool cells = type != HAPI_BLOCK_INFO && type != HAPI_BLOCK_END;
+  uint32_t fewer = cells ? deflate_bytes(recorder, bytes, size) : 0;
+  const void *stored = fewer > 0 ? recorder->stored : bytes;
+  head.stored = fewer > 0 ? fewer : size;
+  head.crc = hapi_file_crc_block(&head, stored);
+  uint64_t after = atomic_load(&recorder->bytes) + sizeof head + head.stored;
+  if (cells && after + END_BYTES > recorder->max_bytes) {
+    end(recorder, HAPI_RECORD_LIMIT);
+    return false;
+  }
+  write_bytes(recorder, &head, sizeof head);
+  write_bytes(recorder, stored, head.stored);
+  ++recorder->blocks;
+  return atomic_load(&recorder->error) == 0;
+}
+
+/* ---- cells ---- */
+
+static bool flush(hapi_recorder *recorder, hapi_stream stream)
+{
+  uint32_t count = recorder->counts[stream];
+  recorder->counts[stream] = 0;
+  if (count == 0) {
+    return true;
+  }
+  if (!write_block(recorder, HAPI_BLOCK_CELLS_OF + stream, recorder->cells[stream],
+                   count * (uint32_t)sizeof(hapi_cell))) {
+    return false;
+  }
+  for (uint32_t i = 0; i < count && stream == HAPI_STREAM_HAPTIC; ++i) {
+    recorder->totals.ticks += recorder->cells[stream][i].kind == HAPI_CELL_TICK;
+  }
+  atomic_store(&recorder->ticks, recorder->totals.ticks);
+  recorder->totals.cells[stream] += count;
+  return true;
+}
+
+/* Physics and contacts first: a tick's packet comes after those that it is made of, mostly. */
+static bool drain(hapi_recorder *recorder, bool flushes)
+{
+  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT,
+                                      HAPI_STREAM_HAPTIC};
+  bool good = true;
+  for (int i = 0; i < HAPI_STREAMS && good; ++i) {
+    hapi_stream s = order[i];
+    size_t got = 1;
+    while (got > 0 && good) {
+      got = hapi_tape_take(&recorder->tapes[s], recorder->cells[s] + recorder->counts[s],
+                           HAPI_BLOCK_CELLS - recorder->counts[s]);
+      recorder->counts[s] += (uint32_t)got;
+      good = recorder->counts[s] < HAPI_BLOCK_CELLS || flush(recorder, s);
+    }
+    good = good && (!flushes || flush(recorder, s));
+  }
+  return good;
+}
+
+static void end_file(hapi_recorder *recorder)
+{
+  int why = atomic_load(&recorder->ended);
+  if (why != HAPI_RECORD_FAILED) {
+    recorder->totals.end = (uint32_t)why;
+    recorder->totals.lost = atomic_load(&recorder->tapes[HAPI_STREAM_HAPTIC].lost);
+    (void)write_block(recorder, HAPI_BLOCK_END, &recorder->totals, sizeof recorder->totals);
+  }
+  if (close(recorder->file) != 0 && atomic_load(&recorder->error) == 0) {
+    fail(recorder, errno);
+  }
+  recorder->file = -1;
+}
+
+/* A file that may grow no further is an error to be told, and no signal that ends the process. */
+static void block_signals(void)
+{
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, NULL);
+}
+
+static void *recorder_main(void *arg)
+{
+  hapi_recorder *recorder = arg;
+  block_signals();
+  int64_t next_flush = hapi_clock_now() + FLUSH_NS;
+  while (goes_on(recorder) && atomic_load_explicit(&recorder->stop, memory_order_acquire) == 0) {
+    int64_t now = hapi_clock_now();
+    bool flushes = now >= next_flush;
+    next_flush = flushes ? now + FLUSH_NS : next_flush;
+    (void)drain(recorder, flushes);
+    hapi_clock_sleep_until(now + PAUSE_NS);
+  }
+  int why = atomic_load(&recorder->ended);
+  if (why == HAPI_RECORD_GOES_ON || why == HAPI_RECORD_OVERFLOW) {
+    (void)drain(recorder, true); /* what was complete by then */
+  }
+  end(recorder, HAPI_RECORD_STOPPED);
+  end_file(recorder);
+  return NULL;
+}
+
+/* ---- life ---- */
+
+static voidpf allocate(voidpf user, uInt count, uInt size)
+{
+  (void)user;
+  return hapi_alloc_array(count, size);
+}
+
+static void release(voidpf user, voidpf memory)
+{
+  (void)user;
+  hapi_free(memory);
+}
+
+static bool prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
+{
+  bool good = true;
+  for (int i = 0; i < HAPI_STREAMS; ++i) {
+    good = hapi_tape_create(&recorder->tapes[i], config->cells[i], &recorder->ended) >= HAP_OK &&
+           good;
+    recorder->cells[i] = hapi_alloc_array(HAPI_BLOCK_CELLS, sizeof(hapi_cell));
+    good = good && recorder->cells[i] != NULL;
+  }
+  recorder->stored = hapi_alloc(HAPI_BLOCK_BYTES);
+  recorder->deflater.zalloc = allocate;
+  recorder->deflater.zfree = release;
+  recorder->deflates = good && deflateInit(&recorder->deflater, DEFLATE_LEVEL) == Z_OK;
+  return good && recorder->stored != NULL && recorder->deflates;
+}
+
+static void begin_file(hapi_recorder *recorder, const hapi_recorder_config *config)
+{
+  hapi_file_head head = {HAPI_FILE_MAGIC, HAPI_FILE_BYTE_ORDER, HAPI_FILE_VERSION,
+                         sizeof(hapi_cell), 0, 0};
+  head.crc = hapi_file_crc_head(&head);
+  write_bytes(recorder, &head, sizeof head);
+  memcpy(recorder->cells[0], &config->info, sizeof config->info);
+  if (config->info.note_size > 0) {
+    memcpy((char *)recorder->cells[0] + sizeof config->info, config->note, config->info.note_size);
+  }
+  (void)write_block(recorder, HAPI_BLOCK_INFO, recorder->cells[0],
+                    (uint32_t)sizeof config->info + config->info.note_size);
+}
+
+hap_status hapi_recorder_create(const hapi_recorder_config *config, hapi_recorder **out,
+                                hap_detail *detail)
+{
+  *out = NULL;
+  hapi_recorder *recorder = hapi_alloc(sizeof *recorder);
+  if (recorder == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a recording");
+  }
+  recorder->file = -1;
+  recorder->max_bytes = config->max_bytes;
+  if (!prepare(recorder, config)) {
+    hapi_recorder_destroy(recorder);
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a recording");
+  }
+  recorder->file = open(config->path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  int error = recorder->file < 0 ? errno : 0;
+  if (error == 0) {
+    begin_file(recorder, config);
+    error = atomic_load(&recorder->error);
+  }
+  if (error != 0) {
+    hapi_recorder_destroy(recorder);
+    return hapi_fail(detail, HAP_ERROR_IO, "%.300s: cannot be written: %s", config->path,
+                     strerror(error));
+  }
+  *out = recorder;
+  return HAP_OK;
+}
+
+void hapi_recorder_destroy(hapi_recorder *recorder)
+{
+  if (recorder == NULL) {
+    return;
+  }
+  hapi_recorder_stop(recorder);
+  for (int i = 0; i < HAPI_STREAMS; ++i) {
+    hapi_tape_finish(&recorder->tapes[i]);
+    hapi_free(recorder->cells[i]);
+  }
+  if (recorder->deflates) {
+    deflateEnd(&recorder->deflater);
+  }
+  hapi_free(recorder->stored);
+  hapi_free(recorder);
+}
+
+hapi_tape *hapi_recorder_tape(hapi_recorder *recorder, hapi_stream stream)
+{
+  return &recorder->tapes[stream];
+}
+
+hap_status hapi_recorder_start(hapi_recorder *recorder)
+{
+  atomic_store(&recorder->stop, 0);
+  return hapi_thread_start(&recorder->thread, recorder_main, recorder, "hapode-record", 0);
+}
+
+void hapi_recorder_stop(hapi_recorder *recorder)
+{
+  atomic_store(&recorder->stop, 1);
+  hapi_thread_join(&recorder->thread);
+  if (recorder->file >= 0) { /* its session never ran */
+    end(recorder, HAPI_RECORD_STOPPED);
+    end_file(recorder);
+  }
+}
+
+hapi_recorder_state hapi_recorder_look(const hapi_recorder *recorder)
+{
+  return (hapi_recorder_state){
+      .end = (hapi_record_end)atomic_load(&recorder->ended),
+      .ticks = atomic_load(&recorder->ticks),
+      .lost = atomic_load(&recorder->tapes[HAPI_STREAM_HAPTIC].lost),
+      .bytes = atomic_load(&recorder->bytes),
+      .error = atomic_load(&recorder->error),
+  };
+}
