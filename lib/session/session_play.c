@@ -336,8 +336,11 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   hap_session *session = player->session;
   const hapi_cell *cells = NULL;
   uint32_t count = 0;
-  hap_status status =
-      hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count, detail);
+  hap_status status = run_ready_cycles(player, detail);
+  status = status == HAP_OK ? run_ready_passes(player, detail) : status;
+  status = status == HAP_OK ? hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count,
+                                               detail)
+                            : status;
   status = status == HAP_OK ? check_packet(player, cells, count, detail) : status;
   if (status != HAP_OK) {
     return status;
@@ -363,8 +366,6 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   status = check_after(player, HAPI_STREAM_HAPTIC, detail);
   bool diverged = status == HAP_OK && collect_differences(player);
   ++player->alike;
-  status = status == HAP_OK ? run_ready_cycles(player, detail) : status;
-  status = status == HAP_OK ? run_ready_passes(player, detail) : status;
   return status == HAP_OK && diverged ? HAP_DIVERGED : status;
 }
 
@@ -443,8 +444,7 @@ hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *d
     status = check_after(player, (hapi_stream)i, detail);
   }
   (void)collect_differences(player);
-  status = status == HAP_OK ? run_ready_cycles(player, detail) : status;
-  return status == HAP_OK ? run_ready_passes(player, detail) : status;
+  return status;
 }
 
 /* ---- the public side ---- */
