@@ -16,6 +16,7 @@
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
 #include "tools/run_options.h"
+#include "tools/run_recording.h"
 #include "tools/run_summary.h"
 
 enum exit_code {
@@ -50,7 +51,7 @@ static bool open_trace(const run_options *options, run_loop *loop, hap_detail *d
     return true;
   }
   loop->trace.file = fopen(options->trace_path, "w");
-  loop->trace.pointers = loop->rig->pointer_count;
+  loop->trace.pointers = loop->pointers;
   size_t bodies = loop->rig->scene->body_count;
   loop->trace.bodies = bodies < HAP_TRACE_BODIES_MAX ? bodies : HAP_TRACE_BODIES_MAX;
   return check_writable("--trace", options->trace_path, loop->trace.file, detail);
@@ -106,8 +107,7 @@ static bool open_picture(const run_options *options, run_loop *loop, hap_detail 
     fputs("hapode-run: " PLOT_ABSENT_TEXT "\n", stderr);
     return true;
   }
-  loop->picture =
-      run_picture_create(loop->seconds, loop->rig->pointer_count, options->rig.def.haptic_hz);
+  loop->picture = run_picture_create(loop->seconds, loop->pointers, options->rig.def.haptic_hz);
   if (loop->picture == NULL) {
     snprintf(detail->text, sizeof detail->text, "no memory for the picture");
   }
@@ -160,7 +160,7 @@ static void tell(const run_options *options, hap_status status, const hap_stats 
 }
 
 /* Runs and reports; the files are open. */
-static int run_and_report(run_loop *loop)
+static int run_and_report(run_loop *loop, const run_recording *recording)
 {
   hap_stats stats;
   hap_detail detail = {""};
@@ -181,7 +181,12 @@ static int run_and_report(run_loop *loop)
   if (stats.size > 0) { /* it was started */
     tell(loop->options, status, &stats);
     run_summary_print(loop->options, &stats, stdout);
-    run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
+    if (recording->player == NULL) {
+      run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
+    }
+    if (!run_recording_print(recording, loop->options, loop->rig->session, stdout, &detail)) {
+      code = complain(EXIT_FAILED, detail.text);
+    }
   }
   if (fflush(stdout) != 0 || ferror(stdout) != 0) {
     code = complain(EXIT_FAILED, "the summary cannot be written to stdout");
@@ -189,17 +194,32 @@ static int run_and_report(run_loop *loop)
   return code;
 }
 
-static int run_in(const run_options *options, rig *r)
+/* Of a replay: the whole recording. */
+static double seconds_of(const run_options *options, const rig *r, const run_recording *recording)
+{
+  if (options->seconds > 0.0) {
+    return options->seconds;
+  }
+  return recording->player != NULL
+             ? (double)recording->info.ticks / options->rig.def.haptic_hz + 1.0
+             : r->scene->parameters.duration;
+}
+
+static int run_in(const run_options *options, rig *r, const run_recording *recording)
 {
   hap_detail detail = {""};
-  double seconds = options->seconds > 0.0 ? options->seconds : r->scene->parameters.duration;
   run_coupling coupling = {0};
-  run_loop loop = {.options = options, .rig = r, .seconds = seconds, .coupling = &coupling};
+  run_loop loop = {
+      .options = options,
+      .rig = r,
+      .seconds = seconds_of(options, r, recording),
+      .coupling = &coupling,
+      .pointers = recording->player != NULL ? recording->info.pointers : r->pointer_count};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = EXIT_FAILED;
   if (open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&
       open_picture(options, &loop, &detail)) {
-    code = run_and_report(&loop);
+    code = run_and_report(&loop, recording);
   } else {
     complain(EXIT_FAILED, detail.text);
     (void)close_trace(&loop, &detail);
@@ -212,8 +232,10 @@ static int run_in(const run_options *options, rig *r)
 /* A name or argument that cannot be is wrong usage, all else a failure. */
 static int refuse(const rig *r, hap_status status, const hap_detail *detail)
 {
-  static const char *const parts[] = {
-      [RIG_SCENE] = "--scene: ", [RIG_SESSION] = "", [RIG_POINTER] = "--device: "};
+  static const char *const parts[] = {[RIG_SCENE] = "--scene: ",
+                                      [RIG_SESSION] = "",
+                                      [RIG_POINTER] = "--device: ",
+                                      [RIG_RECORDING] = "--record: "};
   hap_detail whole;
   snprintf(whole.text, sizeof whole.text, "%s%.490s", parts[r->failed],
            detail->text[0] != '\0' ? detail->text : hap_status_text(status));
@@ -235,19 +257,33 @@ static int identify(const run_options *options)
                   detail.text[0] != '\0' ? detail.text : hap_status_text(status));
 }
 
-static int run_session(run_options *options)
+static int run_world(run_options *options, const run_recording *recording)
 {
   rig r;
   hap_detail detail = {""};
-  options->rig.def.trace_rows = run_loop_trace_rows(options);
-  run_loop_catch_signals();
   dInitODE2(0);
   hap_status status = rig_create(&options->rig, &r, &detail);
-  int code = status < HAP_OK ? refuse(&r, status, &detail) : run_in(options, &r);
+  int code = status < HAP_OK ? refuse(&r, status, &detail) : run_in(options, &r, recording);
   if (status >= HAP_OK) {
     rig_destroy(&r);
   }
   dCloseODE();
+  return code;
+}
+
+static int run_session(run_options *options)
+{
+  hap_detail detail = {""};
+  run_recording recording;
+  run_loop_catch_signals();
+  int code = run_recording_open(options, &recording, &detail) < HAP_OK
+                 ? complain(EXIT_FAILED, detail.text)
+                 : EXIT_GOOD;
+  if (code == EXIT_GOOD) {
+    options->rig.def.trace_rows = run_loop_trace_rows(options);
+    code = run_world(options, &recording);
+  }
+  run_recording_close(&recording);
   return code;
 }
 

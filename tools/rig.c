@@ -129,7 +129,7 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
   }
   size_t own = (size_t)out->scene->parameters.pointers;
   rig_part part = RIG_SESSION;
-  out->pointer_count = options->player != NULL        ? 0
+  out->pointer_count = options->player != NULL     ? 0
                        : options->device_count > 0 ? options->device_count
                                                    : own;
   status = create_session(options, out, detail);

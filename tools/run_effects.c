@@ -31,7 +31,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
     {"proxy", "coupling by a proxy (--coupling)", 0, CONTACT, CONTACT},
     {"observer", "energy observer", EVERY, 0, 0},
-    {"recording", "recording for a replay bit for bit", 0, 0, 0},
+    {"recording", "recording for a replay bit for bit (--record)", 0, 0, EVERY},
 };
 
 static const char *const wishes[] = {"auto", "off", "on"};
@@ -154,8 +154,8 @@ static void list_models(size_t index, FILE *out)
   const char *between = "";
   for (int m = 0; hap_model_name((hap_model)m) != NULL; ++m) {
     const char *state = state_of(&none, (hap_model)m, index);
-    if (strcmp(state, "off") != 0) {
-      bool switched = (e->switched & BIT(m)) != 0;
+    bool switched = (e->switched & BIT(m)) != 0;
+    if (switched || strcmp(state, "off") != 0) {
       fprintf(out, "%s%s %s%s", between, hap_model_name((hap_model)m), state,
               switched ? " or as told" : "");
       between = ", ";

@@ -153,7 +153,7 @@ static hap_status look(watch *w, double t)
     w->next_sample = t + run_picture_interval(loop->picture) - 0.5 * PAUSE_S;
   }
   show_progress(w, t, &stats);
-  if (stats.fault != HAP_FAULT_NONE) {
+  if (stats.fault != HAP_FAULT_NONE && loop->options->play_path == NULL) {
     (void)hap_session_detail(loop->rig->session, w->detail);
     return HAP_ERROR_DEVICE;
   }
@@ -183,6 +183,7 @@ static hap_status run_lockstep(watch *w)
 {
   hap_session *session = w->loop->rig->session;
   double hz = w->loop->options->rig.def.haptic_hz;
+  bool plays = w->loop->options->play_path != NULL;
   uint64_t all = (uint64_t)llround(w->loop->seconds * hz);
   uint64_t stretch = (uint64_t)ceil(PAUSE_S * hz);
   hap_status status = HAP_OK;
@@ -193,6 +194,10 @@ static hap_status run_lockstep(watch *w)
     uint64_t next = all - done < stretch ? all - done : stretch;
     status = hap_session_advance(session, next);
     done += next;
+    if (plays && status == HAP_END) {
+      (void)look(w, (double)done / hz);
+      return HAP_OK;
+    }
     if (status < HAP_OK) {
       (void)hap_session_detail(session, w->detail);
       return status;

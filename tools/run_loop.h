@@ -21,6 +21,7 @@ typedef struct run_loop {
   run_picture *picture; /* NULL: none wanted */
   run_progress progress;
   run_coupling *coupling; /* filled in on the way */
+  size_t pointers;        /* of trace and picture */
 } run_loop;
 
 /* Rows that the session has to keep for run_loop_run. 0: nobody wants them. */

@@ -175,6 +175,16 @@ static hap_status take_lockstep(run_options *options, const option *self, const 
   return HAP_OK;
 }
 
+static hap_status take_incomplete(run_options *options, const option *self, const char *value,
+                                  hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->play_incomplete = true;
+  return HAP_OK;
+}
+
 /* The action is the option's low. */
 static hap_status take_action(run_options *options, const option *self, const char *value,
                               hap_detail *detail)
@@ -229,6 +239,16 @@ static const option table[] = {
      offsetof(run_options, plot_path), 0, 0},
     {"--black-box", "FILE", "after a fault, the last 256 ticks before it as a CSV file", take_text,
      offsetof(run_options, black_box_path), 0, 0},
+    {"--record", "FILE", "all that enters the run, for --play (docs/recording.md)", take_text,
+     offsetof(run_options, record_path), 0, 0},
+    {"--record-limit", "MIB", "size at which the recording ends, 0.0625 to 1e6 (default 1024)",
+     take_number, offsetof(run_options, record_limit_mib), 0.0625, 1e6},
+    {"--play", "FILE",
+     "what --record wrote, once more, bit for bit; says where it is not. Scene,\n"
+     "model, rates and hands are those of the file",
+     take_text, offsetof(run_options, play_path), 0, 0},
+    {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_incomplete, 0,
+     0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
      take_priority, 0, 0, 99},
     {"--no-realtime", NULL, "do not ask for real-time rights", take_no_realtime, 0, 0, 0},
@@ -260,6 +280,19 @@ static hap_status fail_unknown(const char *argument, hap_detail *detail)
   return HAP_ERROR_ARGUMENT;
 }
 
+/* What a recording does not answer. */
+static bool beside_play(const option *o)
+{
+  static const char *const names[] = {"--play",   "--play-incomplete", "--seconds", "--trace",
+                                      "--plot",   "--black-box",       "--list",    "--help",
+                                      "--version"};
+  bool found = false;
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    found = found || strcmp(names[i], o->name) == 0;
+  }
+  return found;
+}
+
 /* Takes the option at argv[*at], as "--name value" or "--name=value", and moves *at to its end. */
 static hap_status take_option(char **argv, int *at, run_options *out, hap_detail *detail)
 {
@@ -278,6 +311,9 @@ static hap_status take_option(char **argv, int *at, run_options *out, hap_detail
   }
   if (found->value != NULL && value == NULL) {
     return fail(detail, "%s needs a value: %s %s", found->name, found->name, found->value);
+  }
+  if (out->not_beside_play == NULL && !beside_play(found)) {
+    out->not_beside_play = found->name;
   }
   hap_detail why = {""};
   hap_status status = found->take(out, found, value, &why);
@@ -302,6 +338,51 @@ static hap_status join_coupling(run_options *o, hap_detail *detail)
   }
   *proxy = o->coupling_given ? wishes[o->rig.coupling] : *proxy;
   o->rig.coupling = couplings[*proxy];
+  return HAP_OK;
+}
+
+static bool same(const char *a, const char *b)
+{
+  return a != NULL && b != NULL && strcmp(a, b) == 0;
+}
+
+/* --record and the effect "recording" are two names of one thing. */
+static hap_status join_recording(run_options *o, hap_detail *detail)
+{
+  run_effect_wish *wish = run_effects_wish(&o->effects, "recording");
+  if (*wish == RUN_EFFECT_ON && o->record_path == NULL) {
+    return fail(detail, "--effects: recording=on needs a file: --record FILE");
+  }
+  if (*wish == RUN_EFFECT_OFF && o->record_path != NULL) {
+    return fail(detail, "--record: --effects asks for something else by recording=off");
+  }
+  *wish = o->record_path != NULL ? RUN_EFFECT_ON : *wish;
+  return HAP_OK;
+}
+
+static hap_status check_recording(const run_options *o, hap_detail *detail)
+{
+  const char *file = o->play_path != NULL ? o->play_path : o->record_path;
+  const char *name = o->play_path != NULL ? "--play" : "--record";
+  if (o->play_path != NULL && o->not_beside_play != NULL) {
+    return fail(detail, "--play: the file says what to run; leave out %s", o->not_beside_play);
+  }
+  if (o->play_incomplete && o->play_path == NULL) {
+    return fail(detail, "--play-incomplete: only with --play");
+  }
+  if (o->record_limit_mib > 0.0 && o->record_path == NULL) {
+    return fail(detail, "--record-limit: only with --record");
+  }
+  if (o->record_path != NULL && o->rig.def.drive == HAP_DRIVE_LOCKSTEP) {
+    return fail(detail,
+                "--record: not with --lockstep, which does the same on every run by itself");
+  }
+  if (o->record_path != NULL && o->identify_path != NULL) {
+    return fail(detail, "--record: --identify runs no session");
+  }
+  if (same(file, o->trace_path) || same(file, o->plot_path) || same(file, o->black_box_path)) {
+    return fail(detail, "%s: the same file as --trace, --plot or --black-box", name);
+  }
   return HAP_OK;
 }
 
@@ -337,7 +418,8 @@ static hap_status check(run_options *o, hap_detail *detail)
     return fail(detail, "--identify: takes exactly one --device, there are %zu",
                 o->rig.device_count);
   }
-  if (join_coupling(o, detail) < HAP_OK) {
+  if (check_recording(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
+      join_coupling(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {

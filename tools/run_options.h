@@ -28,6 +28,11 @@ typedef struct run_options {
   const char *black_box_path;
   const char *identify_path; /* not NULL: identify the device, no session */
   run_effects effects;
+  const char *record_path;
+  double record_limit_mib; /* 0: the default */
+  const char *play_path;   /* not NULL: no devices, all from the file */
+  bool play_incomplete;
+  const char *not_beside_play; /* first option given that the file answers itself; NULL: none */
 } run_options;
 
 /* Fills *out. On failure the detail text names the option and what it may be. */

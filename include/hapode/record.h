@@ -85,9 +85,10 @@ typedef enum hap_record_end {
   HAP_RECORD_GOES_ON = 0, /* or its session has not been started. Of a file: it breaks off */
   HAP_RECORD_STOPPED = 1, /* with its session */
   HAP_RECORD_LIMIT = 2,   /* max_bytes */
-  HAP_RECORD_OVERFLOW = 3, /* the disk was too slow, and the buffer full: what came then is a gap, and
+  HAP_RECORD_OVERFLOW =
+      3,                /* the disk was too slow, and the buffer full: what came then is a gap, and
                               a replay ends there */
-  HAP_RECORD_FAILED = 4   /* the file could not be written any more */
+  HAP_RECORD_FAILED = 4 /* the file could not be written any more */
 } hap_record_end;
 
 #define HAP_RECORD_NOTE_MAX 4096
@@ -116,10 +117,10 @@ HAP_API HAP_NODISCARD hap_status hap_session_record(hap_session *session, const 
                                                     hap_detail *detail);
 
 typedef struct hap_record_state {
-  uint32_t size;  /* bytes filled in */
-  uint32_t end;   /* hap_record_end */
-  uint64_t ticks; /* in the file */
-  uint64_t bytes; /* in the file */
+  uint32_t size;       /* bytes filled in */
+  uint32_t end;        /* hap_record_end */
+  uint64_t ticks;      /* in the file */
+  uint64_t bytes;      /* in the file */
   uint64_t lost_ticks; /* run since an overflow, and not recorded */
 } hap_record_state;
 
@@ -149,11 +150,13 @@ typedef struct hap_player_info {
   uint32_t size; /* bytes filled in */
   uint32_t end;  /* hap_record_end of the file */
   uint64_t ticks;
-  double seconds;  /* from the first to the last tick */
-  uint64_t edits;  /* posted edits and locks, none of which is in the file */
-  char system[64]; /* C library of the recording: of another one the last digits may differ */
+  double seconds;   /* from the first to the last tick */
+  uint64_t edits;   /* posted edits and locks, none of which is in the file */
+  char system[64];  /* C library of the recording: of another one the last digits may differ */
   const void *note; /* of hap_record_def; the player's */
   size_t note_size;
+  uint32_t pointers; /* places that pointers had */
+  uint32_t reserved;
 } hap_player_info;
 
 /* [control] */
@@ -185,24 +188,26 @@ typedef enum hap_difference {
   HAP_DIFFERENCE_PASS = 2,    /* contacts between bodies; number: of the pass */
   HAP_DIFFERENCE_POINTER = 3, /* number: hap_pointer_id.v */
   HAP_DIFFERENCE_BODY = 4,    /* number: its place in the loop */
-  HAP_DIFFERENCE_TICK = 5     /* in something of the tick that the file has no values of: a velocity */
+  HAP_DIFFERENCE_TICK = 5 /* in something of the tick that the file has no values of: a velocity */
 } hap_difference;
 
 typedef struct hap_play_difference {
-  uint32_t size;    /* bytes filled in */
-  uint32_t what;    /* hap_difference: the first thing that differed */
+  uint32_t size; /* bytes filled in */
+  uint32_t what; /* hap_difference: the first thing that differed */
   uint64_t number;
-  uint64_t tick;    /* count of ticks that were alike */
-  double t;         /* s since start, of the tick that is not */
-  uint32_t shown;   /* hap_difference, POINTER or BODY: where it showed first as a value; 0: nowhere
+  uint64_t tick;   /* count of ticks that were alike */
+  double t;        /* s since start, of the tick that is not */
+  uint32_t shown;  /* hap_difference, POINTER or BODY: where it showed first as a value; 0: nowhere
                        yet, so that what follows is not filled in */
-  uint32_t traced;  /* BODY: place among hap_session_trace_bodies, UINT32_MAX: none of them */
+  uint32_t traced; /* BODY: place among hap_session_trace_bodies, UINT32_MAX: none of them */
   uint64_t shown_number;
   uint64_t shown_tick;
   double recorded[7]; /* POINTER: force and torque at the device; BODY: position, quaternion */
   double replayed[7];
-  double distance;  /* POINTER: N, of the forces; BODY: m, of the positions */
-  char text[256];   /* all of it in words */
+  double distance;       /* POINTER: N, of the forces; BODY: m, of the positions */
+  char text[256];        /* all of it in words */
+  uint32_t other_system; /* 1: the C library is not the one of the recording, see hap_player_info */
+  uint32_t reserved;
 } hap_play_difference;
 
 /* [control] The first difference; what is HAP_DIFFERENCE_NONE while there is none. */

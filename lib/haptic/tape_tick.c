@@ -64,8 +64,8 @@ void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns)
 void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io)
 {
   if (hapi_tape_records(haptic->tape)) {
-    haptic->note->flags = (uint16_t)((io->reset ? HAPI_CELL_RESET : 0) |
-                                     (io->emergency ? HAPI_CELL_EMERGENCY : 0));
+    haptic->note->flags =
+        (uint16_t)((io->reset ? HAPI_CELL_RESET : 0) | (io->emergency ? HAPI_CELL_EMERGENCY : 0));
     haptic->note->index = (uint8_t)io->outside_fault;
   } else if (hapi_tape_plays(haptic->tape)) {
     io->reset = (haptic->tick_cell->flags & HAPI_CELL_RESET) != 0;
@@ -196,9 +196,8 @@ static void compare(hapi_haptic *haptic, hapi_difference *difference, const hapi
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io)
 {
   const hapi_tick_pointer *p = &haptic->tick.pointers[index];
-  uint64_t hash = hapi_tape_records(haptic->tape) || hapi_tape_plays(haptic->tape)
-                      ? hash_pointer(p)
-                      : 0;
+  uint64_t hash =
+      hapi_tape_records(haptic->tape) || hapi_tape_plays(haptic->tape) ? hash_pointer(p) : 0;
   if (hapi_tape_records(haptic->tape)) {
     hapi_cell *force = hapi_tape_put(haptic->tape, HAPI_CELL_FORCE, index);
     force->flags = io->failed ? HAPI_CELL_FAILED : 0;
@@ -284,9 +283,8 @@ static void compare_bodies(hapi_haptic *haptic)
     const hapi_cell *cell = hapi_tape_get(haptic->tape, HAPI_CELL_BODY, 0);
     double pose[7];
     if (cell->word < tick->capacity.bodies) {
-      hapi_difference difference = {.what = HAPI_DIFFERS_BODY,
-                                    .number = cell->word,
-                                    .traced = trace_place(tick, cell->word)};
+      hapi_difference difference = {
+          .what = HAPI_DIFFERS_BODY, .number = cell->word, .traced = trace_place(tick, cell->word)};
       memcpy(pose, &tick->bodies[cell->word].pose, sizeof pose);
       compare(haptic, &difference, cell, pose, 7);
     }

@@ -391,8 +391,8 @@ struct hapi_physics {
   pthread_mutex_t shown_lock;
   hapi_physics_counts shown; /* copied once a cycle for readers */
 
-  hapi_tape *tape; /* of a recording or a replay; NULL: none */
-  hapi_cell *note; /* recording: the cell of this cycle */
+  hapi_tape *tape;            /* of a recording or a replay; NULL: none */
+  hapi_cell *note;            /* recording: the cell of this cycle */
   const hapi_cell *read;      /* replay: the same */
   const hapi_cell *read_end;  /* and the one of its end */
   uint64_t model_hash;        /* of the model of this cycle, 0: it has none */
@@ -402,7 +402,8 @@ struct hapi_physics {
 };
 
 /* tape_cycle.c: nothing without a tape. */
-hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail); /* the one of the recording */
+hap_status hapi_tape_world(hapi_physics *physics,
+                           hap_detail *detail); /* the one of the recording */
 void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns);
 void hapi_tape_started(hapi_physics *physics);
 void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);

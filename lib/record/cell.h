@@ -22,13 +22,13 @@ typedef enum hapi_stream {
 /* Values are of the file. */
 typedef enum hapi_cell_kind {
   /* haptic: BEGIN or TICK, and what follows in this order */
-  HAPI_CELL_BEGIN = 1,   /* before the first tick. i[0]: time of the pointers' first read */
-  HAPI_CELL_TICK = 2,    /* hapi_tick_word */
-  HAPI_CELL_LEAVE = 3,   /* a pointer has gone */
-  HAPI_CELL_JOIN = 4,    /* a pointer comes: HAPI_JOIN_CELLS of them, see hapi_joined */
-  HAPI_CELL_POSE = 5,    /* read: d[0..2] position, d[3..6] quaternion; word: buttons */
-  HAPI_CELL_TWIST = 6,   /* read: d[0..5] */
-  HAPI_CELL_FORCE = 7,   /* to be written: d[0..2] force, d[3..5] torque; u[6]: hash of the pointer */
+  HAPI_CELL_BEGIN = 1, /* before the first tick. i[0]: time of the pointers' first read */
+  HAPI_CELL_TICK = 2,  /* hapi_tick_word */
+  HAPI_CELL_LEAVE = 3, /* a pointer has gone */
+  HAPI_CELL_JOIN = 4,  /* a pointer comes: HAPI_JOIN_CELLS of them, see hapi_joined */
+  HAPI_CELL_POSE = 5,  /* read: d[0..2] position, d[3..6] quaternion; word: buttons */
+  HAPI_CELL_TWIST = 6, /* read: d[0..5] */
+  HAPI_CELL_FORCE = 7, /* to be written: d[0..2] force, d[3..5] torque; u[6]: hash of the pointer */
   HAPI_CELL_REACHED = 8, /* what the device made of it, where that is something else */
   HAPI_CELL_BODY = 9,    /* d[0..2] position, d[3..6] quaternion; word: slot */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
@@ -61,8 +61,8 @@ typedef enum hapi_world_word {
 } hapi_world_word;
 
 typedef enum hapi_cycle_word {
-  HAPI_CYCLE_TIME = 0, /* ns */
-  HAPI_CYCLE_NEXT = 1, /* ns */
+  HAPI_CYCLE_TIME = 0,  /* ns */
+  HAPI_CYCLE_NEXT = 1,  /* ns */
   HAPI_CYCLE_STATE = 2, /* message taken */
   HAPI_CYCLE_SEED = 3,  /* of ODE */
   HAPI_CYCLE_LOCKS = 4, /* hap_session_lock since the cycle before */

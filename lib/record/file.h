@@ -32,9 +32,9 @@ typedef struct hapi_file_head {
 } hapi_file_head;
 
 typedef enum hapi_block_type {
-  HAPI_BLOCK_INFO = 1,  /* hapi_file_info and the note */
+  HAPI_BLOCK_INFO = 1,     /* hapi_file_info and the note */
   HAPI_BLOCK_CELLS_OF = 2, /* + hapi_stream: cells */
-  HAPI_BLOCK_END = 5    /* hapi_file_end */
+  HAPI_BLOCK_END = 5       /* hapi_file_end */
 } hapi_block_type;
 
 typedef struct hapi_block_head {

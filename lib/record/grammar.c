@@ -42,10 +42,13 @@ static const char *take_haptic(hapi_grammar *g, const hapi_cell *cell)
     return take_head(g, cell);
   }
   --g->left;
+  if (cell->kind == HAPI_CELL_JOIN && cell->index >= g->pointers) {
+    g->pointers = cell->index + 1u;
+  }
   bool of_tick = cell->kind >= HAPI_CELL_LEAVE && cell->kind <= HAPI_CELL_BODY;
-  return !of_tick               ? "a cell that belongs in no tick"
-         : cell->index >= 16    ? "a pointer beyond the 16 that there can be"
-                                : NULL;
+  return !of_tick            ? "a cell that belongs in no tick"
+         : cell->index >= 16 ? "a pointer beyond the 16 that there can be"
+                             : NULL;
 }
 
 static const char *take_cycle(hapi_grammar *g, const hapi_cell *cell)

@@ -25,7 +25,8 @@ typedef struct hapi_grammar {
   uint64_t pass;
   uint64_t poses;
   uint64_t near;
-  uint64_t edits;
+  uint64_t edits;    /* posted ones and locks */
+  uint32_t pointers; /* places that they had */
 } hapi_grammar;
 
 /* NULL: it may stand here. Otherwise what is wrong with it. */

@@ -57,8 +57,7 @@ static hap_status bad(const hapi_reader *reader, const char *what, hap_detail *d
 static hap_status broken_off(hapi_reader *reader, hap_detail *detail)
 {
   if (ferror(reader->file)) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path,
-                     strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path, strerror(errno));
   }
   if (reader->incomplete) {
     reader->over = true;
@@ -189,8 +188,7 @@ static hap_status read_head(hapi_reader *reader, hap_detail *detail)
   hapi_file_head head;
   size_t got = fread(&head, 1, sizeof head, reader->file);
   if (ferror(reader->file)) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path,
-                     strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be read: %s", reader->path, strerror(errno));
   }
   if (got < sizeof head || memcmp(head.magic, HAPI_FILE_MAGIC, sizeof head.magic) != 0) {
     return hapi_fail(detail, HAP_ERROR_FORMAT,

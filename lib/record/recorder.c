@@ -132,8 +132,7 @@ static bool flush(hapi_recorder *recorder, hapi_stream stream)
 /* Physics and contacts first: a tick's packet comes after those that it is made of, mostly. */
 static bool drain(hapi_recorder *recorder, bool flushes)
 {
-  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT,
-                                      HAPI_STREAM_HAPTIC};
+  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT, HAPI_STREAM_HAPTIC};
   bool good = true;
   for (int i = 0; i < HAPI_STREAMS && good; ++i) {
     hapi_stream s = order[i];
@@ -210,8 +209,8 @@ static bool prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
   bool good = true;
   for (int i = 0; i < HAPI_STREAMS; ++i) {
-    good = hapi_tape_create(&recorder->tapes[i], config->cells[i], &recorder->ended) >= HAP_OK &&
-           good;
+    good =
+        hapi_tape_create(&recorder->tapes[i], config->cells[i], &recorder->ended) >= HAP_OK && good;
     recorder->cells[i] = hapi_alloc_array(HAPI_BLOCK_CELLS, sizeof(hapi_cell));
     good = good && recorder->cells[i] != NULL;
   }
@@ -224,8 +223,8 @@ static bool prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
 
 static void begin_file(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
-  hapi_file_head head = {HAPI_FILE_MAGIC, HAPI_FILE_BYTE_ORDER, HAPI_FILE_VERSION,
-                         sizeof(hapi_cell), 0, 0};
+  hapi_file_head head = {
+      HAPI_FILE_MAGIC, HAPI_FILE_BYTE_ORDER, HAPI_FILE_VERSION, sizeof(hapi_cell), 0, 0};
   head.crc = hapi_file_crc_head(&head);
   write_bytes(recorder, &head, sizeof head);
   memcpy(recorder->cells[0], &config->info, sizeof config->info);

@@ -57,12 +57,12 @@ typedef struct hapi_tape {
 
   /* RECORD */
   hapi_cell *cells;
-  uint32_t capacity;  /* power of 2 */
-  _Atomic int *ended; /* hapi_record_end; shared by the tapes of a recording */
-  bool open;          /* it had not ended at the packet's begin */
-  bool overflown;     /* a cell of the packet found no room */
-  uint64_t at;        /* next cell, of the writer alone */
-  uint64_t packet;    /* first cell of the packet */
+  uint32_t capacity;     /* power of 2 */
+  _Atomic int *ended;    /* hapi_record_end; shared by the tapes of a recording */
+  bool open;             /* it had not ended at the packet's begin */
+  bool overflown;        /* a cell of the packet found no room */
+  uint64_t at;           /* next cell, of the writer alone */
+  uint64_t packet;       /* first cell of the packet */
   _Atomic uint64_t lost; /* packets that were not recorded since a ring was full */
   char pad_written[64];
   _Atomic uint64_t written;
@@ -73,7 +73,7 @@ typedef struct hapi_tape {
   const hapi_cell *packet_cells;
   uint32_t packet_count;
   uint32_t packet_at;
-  bool broken; /* another cell was there than the session asked for */
+  bool broken;           /* another cell was there than the session asked for */
   hapi_difference first; /* of this packet */
 } hapi_tape;
 
@@ -106,7 +106,7 @@ void hapi_tape_differ(hapi_tape *tape, const hapi_difference *difference);
 /* ---- the other side ---- */
 
 hap_status hapi_tape_create(hapi_tape *tape, uint32_t cells, _Atomic int *ended); /* RECORD */
-void hapi_tape_finish(hapi_tape *tape);                                            /* idempotent */
+void hapi_tape_finish(hapi_tape *tape);                                           /* idempotent */
 /* [reader] RECORD: takes up to capacity cells of whole packets. */
 size_t hapi_tape_take(hapi_tape *tape, hapi_cell *out, size_t capacity);
 void hapi_tape_load(hapi_tape *tape, const hapi_cell *cells, uint32_t count); /* PLAY */

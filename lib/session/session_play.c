@@ -73,8 +73,8 @@ static void word_difference(hap_play_difference *d)
                       (unsigned long long)d->tick, d->t, thing);
   if (d->shown != HAP_DIFFERENCE_NONE && used < (int)sizeof d->text) {
     name_thing(d->shown, d->shown_number, d->traced, shown, sizeof shown);
-    snprintf(d->text + used, sizeof d->text - (size_t)used, "; at tick %llu %s of %s is off by %.3g %s",
-             (unsigned long long)d->shown_tick,
+    snprintf(d->text + used, sizeof d->text - (size_t)used,
+             "; at tick %llu %s of %s is off by %.3g %s", (unsigned long long)d->shown_tick,
              d->shown == HAP_DIFFERENCE_POINTER ? "the wrench" : "the pose", shown, d->distance,
              d->shown == HAP_DIFFERENCE_POINTER ? "N" : "m");
   }
@@ -144,8 +144,7 @@ static hap_status run_cycle(hap_player *player, const hapi_cell *cells, uint32_t
       cells[0].u[HAPI_CYCLE_STATE] > published(player, HAPI_CHANNEL_STATE)) {
     return contradicts(player, "a physics step took a message that comes later", detail);
   }
-  hapi_exchange_expect(player->session->exchange, HAPI_CHANNEL_STATE,
-                       cells[0].u[HAPI_CYCLE_STATE]);
+  hapi_exchange_expect(player->session->exchange, HAPI_CHANNEL_STATE, cells[0].u[HAPI_CYCLE_STATE]);
   hapi_tape_load(tape, cells, count);
   hapi_physics_cycle(player->session->physics, cells[0].i[HAPI_CYCLE_TIME],
                      cells[0].i[HAPI_CYCLE_NEXT]);
@@ -269,9 +268,8 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, h
   }
   memcpy(&joined, bytes, sizeof joined);
   const hap_device_info *info = &joined.info;
-  const double figures[] = {info->max_force, info->max_torque, info->rated_stiffness,
-                            info->damping,   info->quantum,    info->mass,
-                            info->friction,  info->delay};
+  const double figures[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
+                            info->quantum,   info->mass,       info->friction,        info->delay};
   bool good = cells[0].index < player->session->def.max_pointers && joined.generation != 0 &&
               joined.def.cookie == HAPI_POINTER_COOKIE && joined.def.device == NULL &&
               joined.def.hull_xyz == NULL &&
@@ -319,8 +317,7 @@ static void count_missed(hap_player *player, uint64_t window)
 /* What of the packets has differed since the last tick; the worst of the three first. */
 static bool collect_differences(hap_player *player)
 {
-  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT,
-                                      HAPI_STREAM_HAPTIC};
+  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT, HAPI_STREAM_HAPTIC};
   bool first = false;
   for (int i = 0; i < HAPI_STREAMS; ++i) {
     hapi_difference *d = &player->tapes[order[i]].first;
@@ -338,9 +335,9 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   uint32_t count = 0;
   hap_status status = run_ready_cycles(player, detail);
   status = status == HAP_OK ? run_ready_passes(player, detail) : status;
-  status = status == HAP_OK ? hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count,
-                                               detail)
-                            : status;
+  status = status == HAP_OK
+               ? hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count, detail)
+               : status;
   status = status == HAP_OK ? check_packet(player, cells, count, detail) : status;
   if (status != HAP_OK) {
     return status;
@@ -350,9 +347,9 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   status = run_cycles_for(player, HAPI_CHANNEL_MODEL, model, detail);
   status = status == HAP_OK ? run_passes_for(player, patches, detail) : status;
   /* they may have read on, and the cells have moved */
-  status = status == HAP_OK ? hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count,
-                                               detail)
-                            : status;
+  status = status == HAP_OK
+               ? hapi_reader_peek(player->reader, HAPI_STREAM_HAPTIC, &cells, &count, detail)
+               : status;
   if (status != HAP_OK) {
     return status;
   }
@@ -416,9 +413,9 @@ hap_status hapi_play_begin(hap_session *session, int64_t *out_start_ns, hap_deta
   for (int round = 0; round < 2 && status == HAP_OK; ++round) {
     status = load(player, HAPI_STREAM_PHYSICS, HAPI_CELL_WORLD, detail);
     status = status == HAP_OK ? load(player, HAPI_STREAM_HAPTIC, HAPI_CELL_BEGIN, detail) : status;
-    status = status == HAP_OK ? hapi_reader_glance(player->reader, HAPI_STREAM_CONTACT, &cells,
-                                                   &count, detail)
-                              : status; /* a model without contact passes has none */
+    status = status == HAP_OK
+                 ? hapi_reader_glance(player->reader, HAPI_STREAM_CONTACT, &cells, &count, detail)
+                 : status; /* a model without contact passes has none */
   }
   if (status != HAP_OK) {
     return status;
@@ -452,18 +449,17 @@ hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *d
 hap_status hap_player_open(const char *path, uint32_t flags, hap_player **out, hap_detail *detail)
 {
   if (path == NULL || out == NULL || (flags & ~(uint32_t)HAP_PLAY_INCOMPLETE) != 0) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s",
-                     path == NULL || out == NULL ? "path or out is NULL"
-                                                 : "flags has unknown bits");
+    return hapi_fail(
+        detail, HAP_ERROR_ARGUMENT, "%s",
+        path == NULL || out == NULL ? "path or out is NULL" : "flags has unknown bits");
   }
   *out = NULL;
   hap_player *player = hapi_alloc(sizeof *player);
   if (player == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a player");
   }
-  hap_status status =
-      hapi_reader_open(path, (flags & HAP_PLAY_INCOMPLETE) != 0, hapi_physics_ode_configuration(),
-                       &player->reader, detail);
+  hap_status status = hapi_reader_open(path, (flags & HAP_PLAY_INCOMPLETE) != 0,
+                                       hapi_physics_ode_configuration(), &player->reader, detail);
   if (status < HAP_OK) {
     hapi_free(player);
     return status;
@@ -496,6 +492,7 @@ hap_status hap_player_get_info(const hap_player *player, hap_player_info *out, s
       .ticks = whole->ticks,
       .seconds = whole->ticks > 0 ? 1e-9 * (double)(whole->last_ns - whole->first_ns) : 0.0,
       .edits = whole->edits,
+      .pointers = whole->pointers,
       .note = hapi_reader_note(player->reader),
       .note_size = hapi_reader_info(player->reader)->note_size,
   };
@@ -508,8 +505,8 @@ hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
 {
   hap_session_def d;
   hap_session_def_init(&d, sizeof d);
-  if (player == NULL ||
-      hapi_def_read(&d, sizeof d, def, HAPI_SESSION_COOKIE, "hap_session_def_init", NULL) < HAP_OK) {
+  if (player == NULL || hapi_def_read(&d, sizeof d, def, HAPI_SESSION_COOKIE,
+                                      "hap_session_def_init", NULL) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   const hapi_file_info *info = hapi_reader_info(player->reader);
@@ -579,6 +576,10 @@ hap_status hap_player_difference(const hap_player *player, hap_play_difference *
   }
   size_t size = size_of_out < sizeof *out ? size_of_out : sizeof *out;
   hap_play_difference d = player->difference;
+  hapi_file_info here;
+  memset(&here, 0, sizeof here);
+  hapi_file_describe(&here);
+  d.other_system = strcmp(hapi_reader_info(player->reader)->system, here.system) != 0;
   d.size = (uint32_t)size;
   memcpy(out, &d, size);
   return HAP_OK;

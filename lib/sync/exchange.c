@@ -12,8 +12,8 @@ typedef struct channel {
   hapi_triple_buffer buffer;
   size_t size; /* of one message */
   void *places[3];
-  uint64_t numbers[3]; /* of the messages in the places; with the place they change hands */
-  uint64_t published;  /* of the writer */
+  uint64_t numbers[3];       /* of the messages in the places; with the place they change hands */
+  uint64_t published;        /* of the writer */
   hapi_message_queue *queue; /* replay; NULL: none */
 } channel;
 
