@@ -12,7 +12,8 @@ say() {
 }
 
 # gcc alone only recommends the C library's headers, so libc6-dev is named.
-packages_needed=(gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev)
+packages_needed=(gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev
+  zlib1g-dev)
 
 # Whether a package, or the same thing from elsewhere, is there.
 have_package() {

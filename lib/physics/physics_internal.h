@@ -397,6 +397,7 @@ struct hapi_physics {
   const hapi_cell *read_end;  /* and the one of its end */
   uint64_t model_hash;        /* of the model of this cycle, 0: it has none */
   uint16_t model_next;        /* hap_model wanted at its end */
+  bool cycling;               /* not at the start */
   uint32_t locks;             /* hap_session_lock since the last cycle */
   uint32_t missed_unrecorded; /* steps, since then */
 };

@@ -190,10 +190,25 @@ static void compare_model(hapi_physics *physics, uint64_t recorded)
   }
 }
 
+/* Before the loop can take the model: its tick then comes later in the recording. */
+static void put_end(hapi_physics *physics, uint64_t number)
+{
+  hapi_tape_open(physics->tape);
+  hapi_cell *cell = hapi_tape_put(physics->tape, HAPI_CELL_CYCLED, 0);
+  cell->flags = physics->model_next;
+  cell->u[HAPI_CYCLED_MODEL] = number;
+  cell->u[HAPI_CYCLED_HASH] = physics->model_hash;
+  commit(physics);
+}
+
 void hapi_tape_model(hapi_physics *physics)
 {
-  if (physics->tape != NULL) {
-    physics->model_hash = hash_model(physics);
+  if (physics->tape == NULL) {
+    return;
+  }
+  physics->model_hash = hash_model(physics);
+  if (hapi_tape_records(physics->tape) && physics->cycling) {
+    put_end(physics, physics->model_number);
   }
 }
 
@@ -212,6 +227,8 @@ void hapi_tape_started(hapi_physics *physics)
 void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   physics->model_hash = 0;
+  physics->model_next = (uint16_t)atomic_load(&physics->wanted_model);
+  physics->cycling = true;
   if (hapi_tape_records(physics->tape)) {
     hapi_tape_open(physics->tape);
     physics->note = hapi_tape_put(physics->tape, HAPI_CELL_CYCLE, 0);
@@ -268,13 +285,11 @@ hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end)
 
 void hapi_tape_cycled(hapi_physics *physics)
 {
+  physics->cycling = false;
   if (hapi_tape_records(physics->tape)) {
-    hapi_tape_open(physics->tape);
-    hapi_cell *cell = hapi_tape_put(physics->tape, HAPI_CELL_CYCLED, 0);
-    cell->flags = physics->model_next;
-    cell->u[HAPI_CYCLED_HASH] = physics->model_hash;
-    cell->u[HAPI_CYCLED_MODEL] = physics->model_hash != 0 ? physics->model_number : 0;
-    commit(physics);
+    if (physics->model_hash == 0) { /* the world was not sound */
+      put_end(physics, 0);
+    }
   } else if (hapi_tape_plays(physics->tape)) {
     compare_model(physics, physics->read_end->u[HAPI_CYCLED_HASH]);
   }

@@ -10,12 +10,12 @@
 #include "base/log.h"
 #include "record/grammar.h"
 
-/* Of one stream, read while another one is behind. A recorder writes all of them four times a
- * second. */
+/* Of one stream, read while the cells of another one are sought. In what a recorder writes they
+ * stand before. */
 #define QUEUE_MAX (1u << 20)
-/* Cells of the loop in which those of another thread must be seen if they belong to its first ticks:
- * more than are written at a time. */
-#define GLANCE (1u << 17)
+/* Cells of the loop in which those of another thread are seen if they belong to its first ticks: some
+ * times more than are written at a time. */
+#define GLANCE (8u * HAPI_BLOCK_CELLS)
 
 typedef struct cell_queue {
   hapi_cell *cells;

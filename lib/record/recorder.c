@@ -129,21 +129,34 @@ static bool flush(hapi_recorder *recorder, hapi_stream stream)
   return true;
 }
 
-/* Physics and contacts first: a tick's packet comes after those that it is made of, mostly. */
+/* Takes what is there of a stream, and writes it out. */
+static bool drain_whole(hapi_recorder *recorder, hapi_stream stream)
+{
+  bool good = true;
+  for (size_t got = 1; got > 0 && good;) {
+    got =
+        hapi_tape_take(&recorder->tapes[stream], recorder->cells[stream] + recorder->counts[stream],
+                       HAPI_BLOCK_CELLS - recorder->counts[stream]);
+    recorder->counts[stream] += (uint32_t)got;
+    good = recorder->counts[stream] < HAPI_BLOCK_CELLS || flush(recorder, stream);
+  }
+  return good && flush(recorder, stream);
+}
+
+/* The loop's cells are written after all that the others had put when these were taken: so what a tick
+ * took from them stands before it, and the file can be replayed to wherever it breaks off. */
 static bool drain(hapi_recorder *recorder, bool flushes)
 {
-  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT, HAPI_STREAM_HAPTIC};
+  uint32_t *count = &recorder->counts[HAPI_STREAM_HAPTIC];
   bool good = true;
-  for (int i = 0; i < HAPI_STREAMS && good; ++i) {
-    hapi_stream s = order[i];
-    size_t got = 1;
-    while (got > 0 && good) {
-      got = hapi_tape_take(&recorder->tapes[s], recorder->cells[s] + recorder->counts[s],
-                           HAPI_BLOCK_CELLS - recorder->counts[s]);
-      recorder->counts[s] += (uint32_t)got;
-      good = recorder->counts[s] < HAPI_BLOCK_CELLS || flush(recorder, s);
+  for (size_t got = 1; got > 0 && good;) {
+    got = hapi_tape_take(&recorder->tapes[HAPI_STREAM_HAPTIC],
+                         recorder->cells[HAPI_STREAM_HAPTIC] + *count, HAPI_BLOCK_CELLS - *count);
+    *count += (uint32_t)got;
+    if (*count == HAPI_BLOCK_CELLS || (flushes && got == 0)) {
+      good = drain_whole(recorder, HAPI_STREAM_PHYSICS) &&
+             drain_whole(recorder, HAPI_STREAM_CONTACT) && flush(recorder, HAPI_STREAM_HAPTIC);
     }
-    good = good && (!flushes || flush(recorder, s));
   }
   return good;
 }

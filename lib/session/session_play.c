@@ -71,6 +71,10 @@ static void word_difference(hap_play_difference *d)
   name_thing(d->what, d->number, d->traced, thing, sizeof thing);
   int used = snprintf(d->text, sizeof d->text, "differs from tick %llu (%.4f s) on, first in %s",
                       (unsigned long long)d->tick, d->t, thing);
+  if (d->shown == HAP_DIFFERENCE_NONE && d->what == HAP_DIFFERENCE_POINTER) {
+    snprintf(d->text + used, sizeof d->text - (size_t)used,
+             ": what it was given or how it moves; its force is the same to the last bit");
+  }
   if (d->shown != HAP_DIFFERENCE_NONE && used < (int)sizeof d->text) {
     name_thing(d->shown, d->shown_number, d->traced, shown, sizeof shown);
     snprintf(d->text + used, sizeof d->text - (size_t)used,

@@ -1,0 +1,458 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Files of recordings that are not as they should be: damaged, cut, of somebody else, changed. */
+
+#include "tests/tap.h"
+
+#include <zlib.h>
+
+#include "record/reader.h"
+#include "tests/recorded.h"
+
+#define FILE_MAX (8u << 20)
+
+/* ---- a recording in memory ---- */
+
+typedef struct block {
+  hapi_block_head head;
+  char *bytes; /* whole, head.size */
+} block;
+
+typedef struct file {
+  hapi_file_head head;
+  block blocks[512];
+  uint32_t count;
+} file;
+
+static char raw[FILE_MAX];
+static size_t raw_size;
+
+static void write_raw(size_t size)
+{
+  FILE *out = fopen(recorded_path, "wb");
+  CHECK(out != NULL && fwrite(raw, 1, size, out) == size);
+  if (out != NULL) {
+    fclose(out);
+  }
+}
+
+static bool read_raw(void)
+{
+  FILE *in = fopen(recorded_path, "rb");
+  raw_size = in != NULL ? fread(raw, 1, sizeof raw, in) : 0;
+  if (in != NULL) {
+    fclose(in);
+  }
+  return raw_size > sizeof(hapi_file_head) && raw_size < sizeof raw;
+}
+
+static bool unpack(file *f)
+{
+  memset(f, 0, sizeof *f);
+  memcpy(&f->head, raw, sizeof f->head);
+  for (size_t at = sizeof f->head; at < raw_size && f->count < 512; ++f->count) {
+    block *b = &f->blocks[f->count];
+    memcpy(&b->head, raw + at, sizeof b->head);
+    at += sizeof b->head;
+    b->bytes = malloc(b->head.size);
+    uLongf size = b->head.size;
+    if (b->head.stored == b->head.size) {
+      memcpy(b->bytes, raw + at, b->head.size);
+    } else if (uncompress((Bytef *)b->bytes, &size, (Bytef *)raw + at, b->head.stored) != Z_OK) {
+      return false;
+    }
+    at += b->head.stored;
+  }
+  return f->count > 3;
+}
+
+/* With right sums, whatever is in it. */
+static void pack(file *f)
+{
+  size_t at = sizeof f->head;
+  f->head.crc = hapi_file_crc_head(&f->head);
+  memcpy(raw, &f->head, sizeof f->head);
+  for (uint32_t i = 0; i < f->count; ++i) {
+    block *b = &f->blocks[i];
+    b->head.stored = b->head.size;
+    b->head.crc = hapi_file_crc_block(&b->head, b->bytes);
+    memcpy(raw + at, &b->head, sizeof b->head);
+    memcpy(raw + at + sizeof b->head, b->bytes, b->head.size);
+    at += sizeof b->head + b->head.size;
+  }
+  write_raw(at);
+}
+
+static void release(file *f)
+{
+  for (uint32_t i = 0; i < f->count; ++i) {
+    free(f->blocks[i].bytes);
+  }
+}
+
+/* The cell of that kind in the tick of that count; ticks of a replay are counted from 0. */
+static hapi_cell *find_cell(file *f, uint64_t tick, hapi_cell_kind kind)
+{
+  uint64_t seen = 0;
+  for (uint32_t i = 0; i < f->count; ++i) {
+    const block *b = &f->blocks[i];
+    for (uint32_t k = 0; b->head.type == HAPI_BLOCK_CELLS_OF && k < b->head.size / 64; ++k) {
+      hapi_cell *cell = (hapi_cell *)(void *)b->bytes + k;
+      seen += cell->kind == HAPI_CELL_TICK;
+      if (seen == tick + 1 && cell->kind == (uint8_t)kind) {
+        return cell;
+      }
+    }
+  }
+  return NULL;
+}
+
+static file fresh(const char *scene_name, int ms)
+{
+  file f;
+  recorded_setup s = recorded_setup_of(scene_name, HAP_MODEL_CONTACT, ms);
+  (void)recorded_make(&s);
+  CHECK(read_raw() && unpack(&f));
+  return f;
+}
+
+/* ---- a file that was changed ---- */
+
+static void check_ulp(hapi_cell_kind kind, int place)
+{
+  file f = fresh("row10", 600);
+  hapi_cell *cell = find_cell(&f, 321, kind);
+  REQUIRE(cell != NULL);
+  cell->d[place] = nextafter(cell->d[place], 1e9);
+  pack(&f);
+  release(&f);
+  replay again = recorded_play("row10", 0);
+  printf("# %s\n", again.difference.text);
+  CHECK(again.status == HAP_END && again.diverged_after == 322);
+  CHECK(again.difference.tick == 321 && again.difference.what == HAP_DIFFERENCE_POINTER);
+  CHECK(again.difference.number == ((1ull << 32) | 1));
+}
+
+TEST(a_position_off_by_one_bit_is_told_at_its_tick)
+{
+  check_ulp(HAPI_CELL_POSE, 0);
+}
+
+TEST(a_velocity_off_by_one_bit_is_told_at_its_tick)
+{
+  check_ulp(HAPI_CELL_TWIST, 0);
+}
+
+TEST(a_position_off_by_a_millimetre_is_told_with_its_force)
+{
+  file f = fresh("row10", 900);
+  hapi_cell *cell = find_cell(&f, 700, HAPI_CELL_POSE);
+  REQUIRE(cell != NULL);
+  cell->d[0] += 1e-3;
+  pack(&f);
+  release(&f);
+  replay again = recorded_play("row10", 0);
+  printf("# %s\n", again.difference.text);
+  CHECK(again.difference.tick == 700 && again.difference.shown == HAP_DIFFERENCE_POINTER);
+  CHECK(again.difference.shown_tick == 700);
+  CHECK(again.difference.distance > 0.5 && again.difference.distance < 10.0);
+  double force = again.difference.recorded[0] - again.difference.replayed[0];
+  CHECK(fabs(force) <= again.difference.distance && fabs(force) > 0.5);
+  CHECK(strstr(again.difference.text, "from tick 700") != NULL &&
+        strstr(again.difference.text, "pointer 1") != NULL);
+}
+
+TEST(a_body_elsewhere_is_told_with_its_distance)
+{
+  file f = fresh("row10", 900);
+  hapi_cell *cell = find_cell(&f, 444, HAPI_CELL_BODY);
+  REQUIRE(cell != NULL);
+  cell->d[1] += 2e-6;
+  pack(&f);
+  release(&f);
+  replay again = recorded_play("row10", 0);
+  printf("# %s\n", again.difference.text);
+  CHECK(again.difference.what == HAP_DIFFERENCE_BODY && again.difference.tick == 444);
+  CHECK_NEAR(again.difference.distance, 2e-6, 1e-12);
+  CHECK(again.difference.traced < 10 && strstr(again.difference.text, "body b") != NULL);
+}
+
+static hapi_cell *find_physics(file *f, hapi_cell_kind kind, uint32_t number)
+{
+  for (uint32_t i = 0; i < f->count; ++i) {
+    const block *b = &f->blocks[i];
+    bool other = b->head.type != HAPI_BLOCK_CELLS_OF + HAPI_STREAM_PHYSICS &&
+                 b->head.type != HAPI_BLOCK_CELLS_OF + HAPI_STREAM_CONTACT;
+    for (uint32_t k = 0; !other && k < b->head.size / 64; ++k) {
+      hapi_cell *cell = (hapi_cell *)(void *)b->bytes + k;
+      if (cell->kind == (uint8_t)kind && number-- == 0) {
+        return cell;
+      }
+    }
+  }
+  return NULL;
+}
+
+TEST(what_physics_and_passes_make_is_compared)
+{
+  static const hapi_cell_kind kinds[] = {HAPI_CELL_CYCLED, HAPI_CELL_PASS};
+  static const int places[] = {HAPI_CYCLED_HASH, HAPI_PASS_HASH};
+  static const hap_difference what[] = {HAP_DIFFERENCE_STEP, HAP_DIFFERENCE_PASS};
+  for (int i = 0; i < 2; ++i) {
+    file f = fresh("stack", 400);
+    hapi_cell *cell = find_physics(&f, kinds[i], 9);
+    REQUIRE(cell != NULL);
+    cell->u[places[i]] ^= 1;
+    pack(&f);
+    release(&f);
+    replay again = recorded_play("stack", 0);
+    printf("# %s\n", again.difference.text);
+    CHECK(again.status == HAP_END && again.difference.what == (uint32_t)what[i]);
+    CHECK(again.difference.number == (i == 0 ? 11u : 10u)); /* the start made the first model */
+    CHECK(again.difference.shown == HAP_DIFFERENCE_NONE);
+  }
+}
+
+/* A pass that had another set of poses than in truth: taken at another time. */
+TEST(a_message_taken_at_another_time_is_noticed)
+{
+  file f = fresh("row10", 900);
+  hapi_cell *cell = find_physics(&f, HAPI_CELL_CYCLE, 30);
+  REQUIRE(cell != NULL && cell->u[HAPI_CYCLE_STATE] > 1);
+  --cell->u[HAPI_CYCLE_STATE];
+  pack(&f);
+  release(&f);
+  replay again = recorded_play("row10", 0);
+  printf("# %s\n", again.difference.text);
+  CHECK(again.difference.what == HAP_DIFFERENCE_STEP && again.difference.number == 32);
+}
+
+/* ---- a file that contradicts itself ---- */
+
+typedef void (*spoil_fn)(file *f);
+
+static void later_model(file *f)
+{
+  find_cell(f, 20, HAPI_CELL_TICK)->u[HAPI_TICK_MODEL] = 1000000;
+}
+
+static void later_state(file *f)
+{
+  for (uint32_t i = 3; find_physics(f, HAPI_CELL_CYCLE, i) != NULL; ++i) {
+    find_physics(f, HAPI_CELL_CYCLE, i)->u[HAPI_CYCLE_STATE] = 100000 + i;
+  }
+}
+
+static void later_poses(file *f)
+{
+  for (uint32_t i = 10; find_physics(f, HAPI_CELL_PASS, i) != NULL; ++i) {
+    find_physics(f, HAPI_CELL_PASS, i)->u[HAPI_PASS_POSES] = 1000000;
+  }
+}
+
+static void other_pointer(file *f)
+{
+  find_cell(f, 20, HAPI_CELL_POSE)->index = 2;
+}
+
+static void fault_of_the_future(file *f)
+{
+  find_cell(f, 20, HAPI_CELL_TICK)->index = 77;
+}
+
+static void no_pointer(file *f)
+{
+  hapi_cell *begin = (hapi_cell *)(void *)f->blocks[f->blocks[1].head.type == 2 ? 1 : 2].bytes;
+  for (uint32_t i = 1; i < f->count; ++i) {
+    begin = f->blocks[i].head.type == 2 ? (hapi_cell *)(void *)f->blocks[i].bytes : begin;
+    if (f->blocks[i].head.type == 2) {
+      break;
+    }
+  }
+  for (int i = 0; i < 10; ++i) {
+    if (begin[i].kind == HAPI_CELL_JOIN) {
+      begin[i].d[1] = (double)NAN;
+      begin[i].d[2] = (double)NAN;
+    }
+  }
+}
+
+static void check_contradiction(spoil_fn spoil, bool may_end)
+{
+  file f = fresh("stack", 300);
+  REQUIRE(find_cell(&f, 20, HAPI_CELL_TICK) != NULL);
+  spoil(&f);
+  pack(&f);
+  release(&f);
+  replay again = recorded_play("stack", 0);
+  bool ended = may_end && again.status == HAP_END && again.stats.ticks < 100;
+  CHECK(again.status == HAP_ERROR_FORMAT || ended);
+  CHECK(ended || strstr(again.detail.text, "the recording contradicts itself") != NULL);
+  printf("# %s\n", again.detail.text);
+}
+
+TEST(a_recording_that_contradicts_itself_is_an_error)
+{
+  check_contradiction(later_model, true); /* the step may be lost behind the end */
+  check_contradiction(later_state, true);
+  check_contradiction(later_poses, true);
+  check_contradiction(other_pointer, false);
+  check_contradiction(fault_of_the_future, false);
+  check_contradiction(no_pointer, false);
+}
+
+/* ---- damage ---- */
+
+static hap_status try_open(uint32_t flags, hap_detail *detail)
+{
+  hap_player *player = NULL;
+  detail->text[0] = '\0';
+  hap_status status = hap_player_open(recorded_path, flags, &player, detail);
+  CHECK((player != NULL) == (status >= HAP_OK));
+  CHECK(status >= HAP_OK || detail->text[0] != '\0');
+  hap_player_close(player);
+  return status;
+}
+
+TEST(cut_at_every_100th_byte)
+{
+  hap_detail detail;
+  file f = fresh("row10", 300);
+  release(&f);
+  size_t playable = 0;
+  for (size_t size = 0; size < raw_size; size += 100) {
+    write_raw(size);
+    CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT);
+    CHECK(strstr(detail.text, size < 32 ? "no recording" : "breaks off") != NULL);
+    hap_status status = try_open(HAP_PLAY_INCOMPLETE, &detail);
+    CHECK(status == HAP_OK || status == HAP_ERROR_FORMAT);
+    playable += status == HAP_OK;
+  }
+  CHECK(playable > raw_size / 200);
+  write_raw(raw_size - 1);
+  CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT);
+  replay again = recorded_play("row10", HAP_PLAY_INCOMPLETE);
+  CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
+  CHECK(again.stats.ticks > 250);
+  write_raw(raw_size);
+  CHECK(try_open(0, &detail) == HAP_OK);
+}
+
+TEST(every_changed_byte_is_noticed)
+{
+  hap_detail detail;
+  file f = fresh("fig5", 200);
+  release(&f);
+  for (size_t at = 0; at < raw_size; at += at < 500 ? 1 : 97) {
+    raw[at] = (char)(raw[at] ^ 0x10);
+    write_raw(raw_size);
+    hap_status status = try_open(0, &detail);
+    CHECK(status == HAP_ERROR_FORMAT || status == HAP_ERROR_UNSUPPORTED);
+    raw[at] = (char)(raw[at] ^ 0x10);
+  }
+  raw[raw_size] = 'x';
+  write_raw(raw_size + 1);
+  CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT && strstr(detail.text, "follows") != NULL);
+}
+
+TEST(blocks_in_another_order_are_noticed)
+{
+  hap_detail detail;
+  file f = fresh("fig5", 600);
+  block kept = f.blocks[2];
+  f.blocks[2] = f.blocks[3];
+  f.blocks[3] = kept;
+  pack(&f);
+  CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT &&
+        strstr(detail.text, "missing or twice") != NULL);
+  release(&f);
+}
+
+/* ---- of somebody else ---- */
+
+static hap_status open_changed(file *f, const char *says)
+{
+  hap_detail detail;
+  pack(f);
+  hap_status status = try_open(0, &detail);
+  if (strstr(detail.text, says) == NULL) {
+    printf("# \"%s\" does not say \"%s\"\n", detail.text, says);
+    CHECK(!"the text");
+  }
+  return status;
+}
+
+TEST(another_machine_version_or_library_is_told)
+{
+  file f = fresh("fig5", 100);
+  hapi_file_info *info = (hapi_file_info *)(void *)f.blocks[0].bytes;
+  f.head.byte_order = 0x04030201u;
+  CHECK(open_changed(&f, "other byte order") == HAP_ERROR_UNSUPPORTED);
+  f.head.byte_order = HAPI_FILE_BYTE_ORDER;
+  f.head.version = 2;
+  CHECK(open_changed(&f, "of version 2 of the file format") == HAP_ERROR_UNSUPPORTED);
+  f.head.version = 1;
+  char kept = info->machine[0];
+  info->machine[0] = 'Z';
+  CHECK(open_changed(&f, "a machine of type \"Z") == HAP_ERROR_UNSUPPORTED);
+  info->machine[0] = kept;
+  info->library[0] = '7';
+  CHECK(open_changed(&f, "the library's version \"7") == HAP_ERROR_UNSUPPORTED);
+  info->library[0] = '0';
+  info->ode[0] = '?';
+  CHECK(open_changed(&f, "an ODE of configuration") == HAP_ERROR_UNSUPPORTED);
+  memset(info->ode, 'x', sizeof info->ode);
+  CHECK(open_changed(&f, "in a form that there is not") == HAP_ERROR_FORMAT);
+  release(&f);
+}
+
+TEST(another_scene_is_told)
+{
+  file f = fresh("row10", 200);
+  release(&f);
+  replay again = recorded_play("stack", 0);
+  CHECK(again.status == HAP_ERROR_WORLD && again.stats.ticks == 0);
+  CHECK(strstr(again.detail.text, "it had 10 bodies with 11 geoms") != NULL);
+  again = recorded_play("row10:9", 0);
+  CHECK(again.status == HAP_ERROR_WORLD);
+  f = fresh("fig5", 200);
+  release(&f);
+  again = recorded_play("fig6", 0); /* one cube as well */
+  CHECK(again.status == HAP_ERROR_WORLD);
+}
+
+TEST(no_file_and_no_recording)
+{
+  hap_detail detail;
+  snprintf(raw, sizeof raw, "t,x,y,z\n0,0,0,0\n1,1,1,1\nand more than thirty-two bytes\n");
+  write_raw(strlen(raw));
+  CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT && strstr(detail.text, "no recording") != NULL);
+  unlink(recorded_path);
+  CHECK(try_open(0, &detail) == HAP_ERROR_IO && strstr(detail.text, "cannot be opened") != NULL);
+  hap_player *player = NULL;
+  CHECK(hap_player_open(recorded_path, 2, &player, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_player_open("/", 0, &player, &detail) == HAP_ERROR_IO);
+}
+
+int main(void)
+{
+  recorded_init();
+  dInitODE2(0);
+  RUN(a_position_off_by_one_bit_is_told_at_its_tick);
+  RUN(a_velocity_off_by_one_bit_is_told_at_its_tick);
+  RUN(a_position_off_by_a_millimetre_is_told_with_its_force);
+  RUN(a_body_elsewhere_is_told_with_its_distance);
+  RUN(what_physics_and_passes_make_is_compared);
+  RUN(a_message_taken_at_another_time_is_noticed);
+  RUN(a_recording_that_contradicts_itself_is_an_error);
+  RUN(cut_at_every_100th_byte);
+  RUN(every_changed_byte_is_noticed);
+  RUN(blocks_in_another_order_are_noticed);
+  RUN(another_machine_version_or_library_is_told);
+  RUN(another_scene_is_told);
+  RUN(no_file_and_no_recording);
+  dCloseODE();
+  unlink(recorded_path);
+  return tap_done();
+}
