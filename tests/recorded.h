@@ -32,6 +32,7 @@ typedef struct recorded_setup {
   hap_model model;
   const char *devices[3];
   int ms;
+  uint64_t ticks;                      /* at least, however many are missed */
   void (*meanwhile)(rig *r, int look); /* about every 50 ms */
   hap_record_def record;               /* its path is the file's */
 } recorded_setup;
@@ -68,8 +69,9 @@ static inline hap_stats recorded_run(const recorded_setup *s, rig *r)
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   CHECK(hap_session_start(r->session) >= HAP_OK);
-  for (int look = 0; look * 50 < s->ms; ++look) {
+  for (int look = 0; look * 50 < s->ms || (stats.ticks < s->ticks && look < 400); ++look) {
     sleep_ms(50);
+    CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
     if (s->meanwhile != NULL) {
       s->meanwhile(r, look);
     }

@@ -200,6 +200,75 @@ TEST(replay_device_with_failing_allocations)
   }
 }
 
+/* ---- recording and replay ---- */
+
+static char recording[] = "/tmp/hapode-allocator-XXXXXX";
+
+/* A cube, and a hand in it; with a player it plays. */
+static bool run_recording(hap_drive drive, hap_player *player)
+{
+  stage s;
+  hap_pointer_id id;
+  hap_pointer_def hand;
+  hap_record_def def;
+  hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  stage_init(&s, drive);
+  if (player != NULL) {
+    CHECK(hap_player_get_def(player, &s.def) == HAP_OK);
+  }
+  hap_pointer_def_init(&hand, sizeof hand);
+  hap_record_def_init(&def, sizeof def);
+  def.path = recording;
+  bool good = create(&s);
+  hap_status status = HAP_OK;
+  if (good && player != NULL) {
+    status = hap_session_play(s.session, player, &s.detail);
+  } else if (good) {
+    CHECK(hap_pointer_add(s.session, &hand, &id) == HAP_OK);
+    CHECK(hap_pointer_set_target(s.session, id, &pose, NULL) == HAP_OK);
+    status = hap_session_record(s.session, &def, &s.detail);
+  }
+  status = good && status == HAP_OK ? hap_session_start(s.session) : status;
+  good = good && status >= HAP_OK;
+  CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
+  if (good && player != NULL) {
+    status = hap_session_advance(s.session, 1000000);
+    CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
+    good = status == HAP_END;
+  } else if (good) {
+    sleep_ms(30);
+  }
+  stage_end(&s);
+  return good;
+}
+
+static bool work_record(void)
+{
+  return run_recording(HAP_DRIVE_THREADS, NULL);
+}
+
+static bool work_play(void)
+{
+  hap_player *player = NULL;
+  hap_detail detail;
+  hap_status status = hap_player_open(recording, 0, &player, &detail);
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  bool good = status == HAP_OK && run_recording(HAP_DRIVE_LOCKSTEP, player);
+  hap_player_close(player);
+  return good;
+}
+
+TEST(recording_and_replay_with_failing_allocations)
+{
+  int descriptor = mkstemp(recording);
+  REQUIRE(descriptor >= 0);
+  close(descriptor);
+  fail_each(work_record, true);
+  CHECK(work_record());
+  fail_each(work_play, true);
+  unlink(recording);
+}
+
 int main(void)
 {
   if (!heap_install()) {
@@ -214,6 +283,7 @@ int main(void)
   RUN(without_memory_for_probes_the_force_is_still_felt);
   RUN(virtual_device_with_failing_allocations);
   RUN(replay_device_with_failing_allocations);
+  RUN(recording_and_replay_with_failing_allocations);
   dCloseODE();
   return tap_done();
 }

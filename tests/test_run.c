@@ -704,11 +704,104 @@ TEST(without_gnuplot_one_line_says_so)
   CHECK(!exists(file_in_folder("none.svg")));
 }
 
+/* ---- --record and --play ---- */
+
+/* Number of lines that differ in more than the computing time; -1: in number. */
+static int different_rows(const char *one, const char *other)
+{
+  char a[4000];
+  char b[4000];
+  int different = 0;
+  FILE *files[2] = {fopen(file_in_folder(one), "r"), fopen(file_in_folder(other), "r")};
+  bool more = files[0] != NULL && files[1] != NULL;
+  while (more) {
+    bool first = fgets(a, sizeof a, files[0]) != NULL;
+    more = fgets(b, sizeof b, files[1]) != NULL;
+    different = first != more ? -1 : different;
+    more = more && first;
+    char *at[2] = {a, b};
+    for (int column = 0; more && column < 12; ++column) {
+      at[0] = at[0] != NULL ? strchr(at[0] + 1, ',') : NULL;
+      at[1] = at[1] != NULL ? strchr(at[1] + 1, ',') : NULL;
+    }
+    bool same = more && at[0] != NULL && at[1] != NULL && at[0] - a == at[1] - b &&
+                memcmp(a, b, (size_t)(at[0] - a)) == 0 &&
+                strcmp(strchr(at[0] + 1, ','), strchr(at[1] + 1, ',')) == 0;
+    different += more && different >= 0 && !same;
+  }
+  for (int i = 0; i < 2; ++i) {
+    if (files[i] != NULL) {
+      fclose(files[i]);
+    }
+  }
+  return different;
+}
+
+TEST(a_run_that_was_recorded_is_played_bit_for_bit)
+{
+  CHECK(run("--seconds 1.2 --scene row10:6 --physics-hz 30 --record %s --trace %s",
+            file_in_folder("a.rec"), file_in_folder("trace.csv")) == 0);
+  CHECK(strcmp(value_of("record_end"), "stopped") == 0);
+  CHECK(number_of("record_ticks") == number_of("ticks") && number_of("record_lost_ticks") == 0.0);
+  double ticks = number_of("ticks");
+  char impulse[40];
+  snprintf(impulse, sizeof impulse, "%s", value_of("impulse_ns"));
+  CHECK(strstr(value_of("effects"), "recording=on") != NULL);
+  CHECK(run("--play %s --trace %s", file_in_folder("a.rec"), file_in_folder("same.csv")) == 0);
+  CHECK(strcmp(value_of("replay"), "identical") == 0 && number_of("ticks") == ticks);
+  CHECK(strcmp(value_of("scene"), "row10:6") == 0 && number_of("physics_hz") == 30.0);
+  CHECK(strcmp(value_of("impulse_ns"), impulse) == 0);
+  CHECK(different_rows("trace.csv", "same.csv") == 0);
+  CHECK(run("--play %s --seconds 0.1 --trace %s", file_in_folder("a.rec"),
+            file_in_folder("same.csv")) == 0);
+  CHECK(number_of("ticks") == 100.0 && different_rows("trace.csv", "same.csv") == -1);
+}
+
+TEST(a_recording_ends_at_its_limit_and_the_run_goes_on)
+{
+  CHECK(run("--seconds 1 --record %s --record-limit 0.0625", file_in_folder("a.rec")) == 0);
+  CHECK(says("ended before the run") && says("--record-limit is reached"));
+  CHECK(strcmp(value_of("record_end"), "limit") == 0 && number_of("record_bytes") <= 65536.0);
+  CHECK(number_of("ticks") > number_of("record_ticks"));
+  double recorded = number_of("record_ticks");
+  CHECK(run("--play %s", file_in_folder("a.rec")) == 0);
+  CHECK(strcmp(value_of("record_end"), "limit") == 0 && number_of("record_ticks") == recorded);
+  CHECK(truncate(file_in_folder("a.rec"), 40000) == 0);
+  CHECK(run("--play %s", file_in_folder("a.rec")) == 1);
+  CHECK(says("breaks off") && says("--play-incomplete"));
+  CHECK(run("--play %s --play-incomplete", file_in_folder("a.rec")) == 0);
+  CHECK(strcmp(value_of("record_end"), "broken_off") == 0);
+  CHECK(truncate(file_in_folder("a.rec"), 100) == 0);
+  CHECK(run("--play %s --play-incomplete", file_in_folder("a.rec")) == 1);
+}
+
+TEST(a_recording_that_cannot_be_is_said)
+{
+  CHECK(run("--seconds 1 --record %s", file_in_folder("no/such/a.rec")) == 1);
+  CHECK(says("--record: ") && says("cannot be written: No such file"));
+  CHECK(ran.out[0] == '\0');
+  if (access("/dev/full", W_OK) == 0) {
+    CHECK(run("--seconds 1 --record /dev/full") == 1);
+    CHECK(says("/dev/full: cannot be written: No space left on device") && ran.out[0] == '\0');
+  }
+  CHECK(run("--lockstep --record x") == 2 && says("--record: not with --lockstep"));
+  CHECK(run("--record-limit 5") == 2 && says("--record-limit: only with --record"));
+  CHECK(run("--play-incomplete") == 2 && says("--play-incomplete: only with --play"));
+  CHECK(run("--play x --scene row10") == 2 && says("leave out --scene"));
+  CHECK(run("--play x --record y") == 2 && says("leave out --record"));
+  CHECK(run("--record x --trace x") == 2 && says("the same file"));
+  CHECK(run("--effects recording=on") == 2 && says("--record FILE"));
+  CHECK(run("--effects recording=off --record x") == 2 && says("recording=off"));
+  CHECK(run("--play %s", file_in_folder("none.rec")) == 1 && says("cannot be opened"));
+  write_text(file_in_folder("a.rec"), "t,x,y,z\n0,0,0,0\n1,0,0,0\nand some more of it\n");
+  CHECK(run("--play %s", file_in_folder("a.rec")) == 1 && says("is no recording of a session"));
+}
+
 static void remove_folder(void)
 {
-  const char *const names[] = {"out",         "err",     "bad.csv",  "trace.csv",
-                               "threads.csv", "two.csv", "same.csv", "same.svg",
-                               "push.csv",    "far.csv", "it's.svg", "device.txt"};
+  const char *const names[] = {"out",      "err",        "bad.csv",  "trace.csv", "threads.csv",
+                               "two.csv",  "same.csv",   "same.svg", "push.csv",  "far.csv",
+                               "it's.svg", "device.txt", "a.rec"};
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     unlink(file_in_folder(names[i]));
   }
@@ -749,6 +842,9 @@ int main(void)
   RUN(a_signal_ends_the_run_with_its_summary);
   RUN(a_device_is_identified_and_its_identity_used);
   RUN(an_identification_that_fails_writes_nothing);
+  RUN(a_run_that_was_recorded_is_played_bit_for_bit);
+  RUN(a_recording_ends_at_its_limit_and_the_run_goes_on);
+  RUN(a_recording_that_cannot_be_is_said);
   RUN(the_picture_is_an_svg);
   RUN(without_gnuplot_one_line_says_so);
   remove_folder();

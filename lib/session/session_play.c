@@ -127,11 +127,12 @@ static hap_status check_after(hap_player *player, hapi_stream stream, hap_detail
   if (player->tapes[stream].broken) {
     return contradicts(player, "its cells are not those that the session asks for", detail);
   }
-  if (hapi_exchange_failed(player->session->exchange)) {
-    return contradicts(player, "a message is taken that is not there (or there is no memory)",
-                       detail);
+  hap_status status = hapi_exchange_play_status(player->session->exchange);
+  if (status == HAP_ERROR_MEMORY) {
+    return hapi_fail(detail, status, "no memory for the messages of a replay");
   }
-  return HAP_OK;
+  return status < HAP_OK ? contradicts(player, "a message is taken that is not there", detail)
+                         : HAP_OK;
 }
 
 static uint64_t published(const hap_player *player, hapi_channel channel)

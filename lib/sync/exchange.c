@@ -226,14 +226,14 @@ void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t n
   hapi_message_queue_forget(exchange->channels[name].queue, number);
 }
 
-bool hapi_exchange_failed(const hapi_exchange *exchange)
+hap_status hapi_exchange_play_status(const hapi_exchange *exchange)
 {
-  bool failed = false;
-  for (int i = 0; i < HAPI_CHANNELS; ++i) {
+  hap_status status = HAP_OK;
+  for (int i = 0; i < HAPI_CHANNELS && status == HAP_OK; ++i) {
     const hapi_message_queue *queue = exchange->channels[i].queue;
-    failed = failed || (queue != NULL && hapi_message_queue_failed(queue));
+    status = queue != NULL ? hapi_message_queue_status(queue) : HAP_OK;
   }
-  return failed;
+  return status;
 }
 
 hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)

@@ -6,7 +6,6 @@
 /* The mailboxes between physics, contact thread and haptic loop: one writer and one reader each. All
  * memory is taken at create. */
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -77,8 +76,8 @@ hap_status hapi_exchange_play(hapi_exchange *exchange);
 void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
 /* of those before number none but the expected one is going to be asked for */
 void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
-/* There was no memory for a message, or take did not find the one that was expected. */
-bool hapi_exchange_failed(const hapi_exchange *exchange);
+/* HAP_ERROR_MEMORY, HAP_ERROR_NOT_FOUND: what hapi_message_queue_status says of any of them. */
+hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
 
 /* The whole block, for locking it into memory. */
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size);

@@ -3,6 +3,7 @@
 #include "sync/message_queue.h"
 
 #include <stdalign.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/alloc.h"
@@ -154,7 +155,7 @@ uint64_t hapi_message_queue_held(const hapi_message_queue *queue)
   return queue->held != NULL ? queue->held->number : 0;
 }
 
-bool hapi_message_queue_failed(const hapi_message_queue *queue)
+hap_status hapi_message_queue_status(const hapi_message_queue *queue)
 {
-  return queue->starved || queue->missing;
+  return queue->starved ? HAP_ERROR_MEMORY : queue->missing ? HAP_ERROR_NOT_FOUND : HAP_OK;
 }

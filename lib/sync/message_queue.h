@@ -5,7 +5,6 @@
 
 /* All messages of a channel that may still be asked for, by number. For replay, in one thread. */
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -27,7 +26,8 @@ void hapi_message_queue_expect(hapi_message_queue *queue, uint64_t number); /* U
 /* All before that number but the one that is expected. */
 void hapi_message_queue_forget(hapi_message_queue *queue, uint64_t before);
 uint64_t hapi_message_queue_held(const hapi_message_queue *queue); /* number, 0: none */
-/* There was no memory for a message, or take did not find the one that is expected. */
-bool hapi_message_queue_failed(const hapi_message_queue *queue);
+/* HAP_ERROR_MEMORY: there was none for a message; HAP_ERROR_NOT_FOUND: take did not find the one that
+ * was expected. */
+hap_status hapi_message_queue_status(const hapi_message_queue *queue);
 
 #endif
