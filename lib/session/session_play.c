@@ -25,7 +25,8 @@ struct hap_player {
   bool ticked; /* at least once */
   uint64_t window;
   int64_t now_ns;
-  uint64_t alike; /* ticks before the first difference */
+  uint64_t alike; /* ticks so far */
+  bool found;     /* the first difference, since the last tick */
   hap_play_difference difference;
 };
 
@@ -84,17 +85,15 @@ static void word_difference(hap_play_difference *d)
   }
 }
 
-/* True when it is the first of all. */
-static bool note_difference(hap_player *player, const hapi_difference *found, int64_t now_ns)
+static void note_difference(hap_player *player, const hapi_difference *found)
 {
   hap_play_difference *d = &player->difference;
-  bool first = d->what == HAP_DIFFERENCE_NONE && found->what != HAPI_DIFFERS_NOTHING;
-  if (first) {
+  if (d->what == HAP_DIFFERENCE_NONE && found->what != HAPI_DIFFERS_NOTHING) {
     d->what = (uint32_t)found->what;
     d->number = found->number;
     d->tick = player->alike;
-    d->t = 1e-9 * (double)(now_ns - hapi_reader_whole(player->reader)->start_ns);
     d->traced = found->traced;
+    player->found = true;
   }
   if (shows(found) && d->shown == HAP_DIFFERENCE_NONE) {
     double apart[3];
@@ -106,11 +105,21 @@ static bool note_difference(hap_player *player, const hapi_difference *found, in
     memcpy(d->replayed, found->replayed, sizeof d->replayed);
     hapi_v3_sub(found->replayed, found->recorded, apart);
     d->distance = hapi_v3_norm(apart);
-  }
-  if (first || shows(found)) {
     word_difference(d);
   }
-  return first;
+}
+
+/* Of a tick that has been run: whether it, or what was run before it, is the first that differs. */
+static bool found_first(hap_player *player)
+{
+  bool found = player->found;
+  if (found) {
+    player->difference.t =
+        1e-9 * (double)(player->now_ns - hapi_reader_whole(player->reader)->start_ns);
+    word_difference(&player->difference);
+  }
+  player->found = false;
+  return found;
 }
 
 /* ---- the parts of the session, one packet each ---- */
@@ -124,6 +133,7 @@ static hap_status contradicts(const hap_player *player, const char *what, hap_de
 
 static hap_status check_after(hap_player *player, hapi_stream stream, hap_detail *detail)
 {
+  note_difference(player, &player->tapes[stream].first);
   if (player->tapes[stream].broken) {
     return contradicts(player, "its cells are not those that the session asks for", detail);
   }
@@ -319,19 +329,6 @@ static void count_missed(hap_player *player, uint64_t window)
   player->window = window;
 }
 
-/* What of the packets has differed since the last tick; the worst of the three first. */
-static bool collect_differences(hap_player *player)
-{
-  static const hapi_stream order[] = {HAPI_STREAM_PHYSICS, HAPI_STREAM_CONTACT, HAPI_STREAM_HAPTIC};
-  bool first = false;
-  for (int i = 0; i < HAPI_STREAMS; ++i) {
-    hapi_difference *d = &player->tapes[order[i]].first;
-    first = note_difference(player, d, player->now_ns) || first;
-    memset(d, 0, sizeof *d);
-  }
-  return first;
-}
-
 /* HAP_END: there is none any more; HAP_DIVERGED: the first that is different. */
 static hap_status play_tick(hap_player *player, hap_detail *detail)
 {
@@ -366,7 +363,7 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   hapi_haptic_cycle(session->haptic, player->now_ns);
   hapi_reader_pop(player->reader, HAPI_STREAM_HAPTIC);
   status = check_after(player, HAPI_STREAM_HAPTIC, detail);
-  bool diverged = status == HAP_OK && collect_differences(player);
+  bool diverged = status == HAP_OK && found_first(player);
   ++player->alike;
   return status == HAP_OK && diverged ? HAP_DIVERGED : status;
 }
@@ -445,7 +442,6 @@ hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *d
   for (int i = 0; i < HAPI_STREAMS && status == HAP_OK; ++i) {
     status = check_after(player, (hapi_stream)i, detail);
   }
-  (void)collect_differences(player);
   return status;
 }
 
