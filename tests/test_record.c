@@ -190,6 +190,104 @@ TEST(a_stall_of_physics)
   }
 }
 
+/* ---- a step that takes long, in a world of this test ---- */
+
+#define LONG_MS 2600 /* so that a replay sees its begin long before its end */
+
+typedef struct small_world {
+  dWorldID world;
+  dSpaceID space;
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_session *session;
+  int calls;
+  bool sleeps;
+} small_world;
+
+static bool slow_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  small_world *w = user;
+  (void)a;
+  (void)b;
+  io->mode = dContactApprox1;
+  io->mu = 0.5;
+  if (w->sleeps && ++w->calls == 20) {
+    sleep_ms(LONG_MS);
+  }
+  return true;
+}
+
+/* A cube that slides on a floor, and a pointer in its way. */
+static void build_world(small_world *w)
+{
+  dMass mass;
+  memset(w, 0, sizeof *w);
+  w->world = dWorldCreate();
+  w->space = dHashSpaceCreate(NULL);
+  dWorldSetGravity(w->world, 0.0, 0.0, -9.81);
+  dBodyID cube = dBodyCreate(w->world);
+  dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
+  dBodySetMass(cube, &mass);
+  dGeomSetBody(dCreateBox(w->space, 0.1, 0.1, 0.1), cube);
+  dBodySetPosition(cube, 0.0, 0.0, 0.05);
+  dBodySetLinearVel(cube, 0.5, 0.0, 0.0);
+  dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
+  hap_session_def_init(&w->def, sizeof w->def);
+  hap_ode_def_init(&w->ode, sizeof w->ode);
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  w->ode.surface = slow_surface;
+  w->ode.user = w;
+}
+
+static void destroy_world(small_world *w)
+{
+  hap_session_destroy(w->session);
+  dSpaceDestroy(w->space);
+  dWorldDestroy(w->world);
+}
+
+TEST(a_step_that_takes_long)
+{
+  small_world w;
+  hap_detail detail = {""};
+  hap_pointer_def hand_def;
+  hap_pointer_id id;
+  hap_stats before;
+  hap_player *player = NULL;
+  hap_play_difference difference;
+  hap_pose pose = {{0.07, 0.0, 0.05}, {1.0, 0.0, 0.0, 0.0}};
+  recorded_setup s = recorded_setup_of("", HAP_MODEL_CONTACT, 0);
+  build_world(&w);
+  w.sleeps = true;
+  hap_pointer_def_init(&hand_def, sizeof hand_def);
+  REQUIRE(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
+  CHECK(hap_pointer_add(w.session, &hand_def, &id) == HAP_OK);
+  CHECK(hap_pointer_set_target(w.session, id, &pose, NULL) == HAP_OK);
+  REQUIRE(hap_session_record(w.session, &s.record, &detail) == HAP_OK);
+  REQUIRE(hap_session_start(w.session) >= HAP_OK);
+  sleep_ms(LONG_MS + 700);
+  CHECK(hap_session_stop(w.session) == HAP_OK);
+  CHECK(hap_session_stats(w.session, &before, sizeof before) == HAP_OK);
+  CHECK(before.stale_times == 1 && before.physics_missed > 100);
+  destroy_world(&w);
+  build_world(&w);
+  REQUIRE(hap_player_open(recorded_path, 0, &player, &detail) == HAP_OK);
+  CHECK(hap_player_get_def(player, &w.def) == HAP_OK);
+  REQUIRE(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
+  CHECK(hap_session_play(w.session, player, &detail) == HAP_OK);
+  CHECK(hap_session_start(w.session) == HAP_OK);
+  CHECK(hap_session_advance(w.session, 1000000) == HAP_END);
+  CHECK(hap_player_difference(player, &difference, sizeof difference) == HAP_OK);
+  CHECK(difference.what == HAP_DIFFERENCE_NONE);
+  hap_stats stats;
+  CHECK(hap_session_stats(w.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.ticks == before.ticks && stats.stale_ticks == before.stale_ticks);
+  CHECK(stats.contact_ticks == before.contact_ticks && before.contact_ticks > 10);
+  destroy_world(&w);
+  hap_player_close(player);
+}
+
 static void change_model(rig *r, int look)
 {
   static const hap_model models[] = {HAP_MODEL_ACCELERANCE, HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE,
@@ -469,6 +567,7 @@ TEST(a_replay_takes_nothing_else)
   CHECK(hap_session_stop(r.session) == HAP_OK);
   CHECK(hap_session_start(r.session) == HAP_ERROR_STATE);
   rig_destroy(&r);
+  hap_player_close(options.player);
   rig_options_init(&options); /* with a def and pointers of its own */
   options.scene = "fig5";
   options.def.drive = HAP_DRIVE_LOCKSTEP;
@@ -493,6 +592,7 @@ int main(void)
   RUN(scenes_in_the_paper_s_models);
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);
+  RUN(a_step_that_takes_long);
   RUN(changes_of_model);
   RUN(a_device_with_troubles_and_pointers_that_come_and_go);
   RUN(a_frame_loop);

@@ -8,6 +8,7 @@
 #include <zlib.h>
 
 #include "record/reader.h"
+#include "record/recorder.h"
 #include "tests/recorded.h"
 
 #define FILE_MAX (8u << 20)
@@ -384,6 +385,76 @@ TEST(blocks_in_another_order_are_noticed)
   release(&f);
 }
 
+/* ---- the recorder by itself ---- */
+
+/* 3000 ticks of nothing; what the file came to. */
+static hapi_recorder_state record_ticks(uint64_t max_bytes)
+{
+  hapi_recorder *recorder = NULL;
+  hapi_recorder_state state = {0};
+  hap_detail detail;
+  hapi_recorder_config config = {
+      .path = recorded_path, .max_bytes = max_bytes, .cells = {4096, 64, 64}};
+  hapi_file_describe(&config.info);
+  snprintf(config.info.ode, sizeof config.info.ode, "%s", dGetConfiguration());
+  if (hapi_recorder_create(&config, &recorder, &detail) != HAP_OK) {
+    return state;
+  }
+  hapi_tape *tape = hapi_recorder_tape(recorder, HAPI_STREAM_HAPTIC);
+  for (int i = 0; i <= 3000; ++i) {
+    hapi_tape_open(tape);
+    hapi_cell *cell = hapi_tape_put(tape, i == 0 ? HAPI_CELL_BEGIN : HAPI_CELL_TICK, 0);
+    cell->i[HAPI_TICK_WINDOW] = i;
+    cell->i[HAPI_TICK_TIME] = i;
+    hapi_tape_commit(tape);
+  }
+  CHECK(hapi_recorder_start(recorder) == HAP_OK);
+  hapi_recorder_stop(recorder);
+  state = hapi_recorder_look(recorder);
+  hapi_recorder_destroy(recorder);
+  return state;
+}
+
+TEST(no_file_is_larger_than_its_limit)
+{
+  hap_detail detail;
+  hapi_recorder_state whole = record_ticks(1 << 20);
+  CHECK(whole.end == HAPI_RECORD_STOPPED && whole.ticks == 3000);
+  CHECK(try_open(0, &detail) == HAP_OK && read_raw() && raw_size == whole.bytes);
+  hapi_recorder_state exact = record_ticks(whole.bytes);
+  CHECK(exact.end == HAPI_RECORD_STOPPED && exact.bytes == whole.bytes);
+  for (uint64_t less = 1; less < 200; less += 11) {
+    hapi_recorder_state cut = record_ticks(whole.bytes - less);
+    CHECK(cut.end == HAPI_RECORD_LIMIT && cut.bytes <= whole.bytes - less && cut.ticks < 3000);
+    CHECK(try_open(0, &detail) == HAP_OK);
+  }
+}
+
+TEST(a_ring_that_is_full_ends_the_recording)
+{
+  _Atomic int ended = 0;
+  hapi_tape tape;
+  hapi_cell cells[64];
+  REQUIRE(hapi_tape_create(&tape, 64, &ended) == HAP_OK);
+  for (int i = 0; i < 10; ++i) { /* packets of seven: nine have room */
+    hapi_tape_open(&tape);
+    for (int k = 0; k < 7; ++k) {
+      hapi_tape_put(&tape, HAPI_CELL_TICK, 0)->i[0] = 7 * i + k;
+    }
+    hapi_tape_commit(&tape);
+  }
+  CHECK(atomic_load(&ended) == HAPI_RECORD_OVERFLOW && atomic_load(&tape.lost) == 1);
+  CHECK(hapi_tape_take(&tape, cells, 64) == 63); /* and none of the tenth */
+  for (int i = 0; i < 63; ++i) {
+    CHECK(cells[i].i[0] == i);
+  }
+  hapi_tape_open(&tape); /* there is room now, but a gap before it */
+  (void)hapi_tape_put(&tape, HAPI_CELL_TICK, 0);
+  hapi_tape_commit(&tape);
+  CHECK(hapi_tape_take(&tape, cells, 64) == 0 && atomic_load(&tape.lost) == 2);
+  hapi_tape_finish(&tape);
+}
+
 /* ---- of somebody else ---- */
 
 static hap_status open_changed(file *f, const char *says)
@@ -464,6 +535,8 @@ int main(void)
   RUN(cut_at_every_100th_byte);
   RUN(every_changed_byte_is_noticed);
   RUN(blocks_in_another_order_are_noticed);
+  RUN(no_file_is_larger_than_its_limit);
+  RUN(a_ring_that_is_full_ends_the_recording);
   RUN(another_machine_version_or_library_is_told);
   RUN(another_scene_is_told);
   RUN(no_file_and_no_recording);
