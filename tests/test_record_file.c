@@ -111,7 +111,7 @@ static hapi_cell *find_cell(file *f, uint64_t tick, hapi_cell_kind kind)
 
 static file fresh(const char *scene_name, int ms)
 {
-  file f;
+  file f = {.count = 0};
   recorded_setup s = recorded_setup_of(scene_name, HAP_MODEL_CONTACT, ms);
   s.ticks = (uint64_t)ms;
   (void)recorded_make(&s);

@@ -205,16 +205,23 @@ static double seconds_of(const run_options *options, const rig *r, const run_rec
              : r->scene->parameters.duration;
 }
 
+static size_t pointers_of(const rig *r, const run_recording *recording)
+{
+  if (recording->player == NULL) {
+    return r->pointer_count;
+  }
+  return recording->info.pointers > 0 ? recording->info.pointers : 1;
+}
+
 static int run_in(const run_options *options, rig *r, const run_recording *recording)
 {
   hap_detail detail = {""};
   run_coupling coupling = {0};
-  run_loop loop = {
-      .options = options,
-      .rig = r,
-      .seconds = seconds_of(options, r, recording),
-      .coupling = &coupling,
-      .pointers = recording->player != NULL ? recording->info.pointers : r->pointer_count};
+  run_loop loop = {.options = options,
+                   .rig = r,
+                   .seconds = seconds_of(options, r, recording),
+                   .coupling = &coupling,
+                   .pointers = pointers_of(r, recording)};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = EXIT_FAILED;
   if (open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&

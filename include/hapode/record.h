@@ -74,21 +74,18 @@ HAP_API hap_status hap_session_black_box(hap_session *session, hap_black_box_row
  * go, changes of model, faults and resets. A lockstep session that plays it over the same world
  * does the same, bit for bit, and says where it does not.
  *
- * What the application does to the world itself cannot be recorded: what callbacks, posted
- * edits and code between hap_session_lock and unlock do. That edits and locks
- * happened is. A callback that does the same each time (surface, or a force that depends on the
- * world alone) replays. While ODE's random numbers are drawn for another world at the same time, no
+ * What the application does to the world itself cannot be recorded: what callbacks, posted edits and
+ * code between hap_session_lock and unlock do. That edits and locks happened is. A callback that does
+ * the same each time (surface, or a force that depends on the world alone) replays. While ODE's random numbers are drawn for another world at the same time, no
  * replay is promised. */
 
 /* Why a recording has ended. Values are fixed. */
 typedef enum hap_record_end {
-  HAP_RECORD_GOES_ON = 0, /* or its session has not been started. Of a file: it breaks off */
-  HAP_RECORD_STOPPED = 1, /* with its session */
-  HAP_RECORD_LIMIT = 2,   /* max_bytes */
-  HAP_RECORD_OVERFLOW =
-      3,                /* the disk was too slow, and the buffer full: what came then is a gap, and
-                              a replay ends there */
-  HAP_RECORD_FAILED = 4 /* the file could not be written any more */
+  HAP_RECORD_GOES_ON = 0,  /* or its session has not been started. Of a file: it breaks off */
+  HAP_RECORD_STOPPED = 1,  /* with its session */
+  HAP_RECORD_LIMIT = 2,    /* max_bytes */
+  HAP_RECORD_OVERFLOW = 3, /* the disk was too slow for the buffer: a replay ends at the gap */
+  HAP_RECORD_FAILED = 4    /* the file could not be written any more */
 } hap_record_end;
 
 #define HAP_RECORD_NOTE_MAX 4096

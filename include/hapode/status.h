@@ -12,15 +12,16 @@ HAP_BEGIN_DECLS
 typedef enum hap_status {
   HAP_OK = 0,
 
-  HAP_NO_REALTIME = 1,  /* running, but without real-time scheduling or locked memory */
-  HAP_STALE = 2,        /* the answer is older than one physics step */
-  HAP_SATURATED = 3,    /* the wanted wrench was beyond a limit and was shortened */
-  HAP_DROPPED = 4,      /* more frame time came in than three physics steps; the rest was dropped */
-  HAP_END = 5,          /* nothing further to read */
-  HAP_BODY_LOST = 6,    /* a body was destroyed without hap_session_forget_body; it was dropped */
-  HAP_FAULTED = 7,      /* done, but a fault is latched and the force is zero */
+  HAP_NO_REALTIME = 1, /* running, but without real-time scheduling or locked memory */
+  HAP_STALE = 2,       /* the answer is older than one physics step */
+  HAP_SATURATED = 3,   /* the wanted wrench was beyond a limit and was shortened */
+  HAP_DROPPED = 4,     /* more frame time came in than three physics steps; the rest was dropped */
+  HAP_END = 5,         /* nothing further to read */
+  HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
+  HAP_FAULTED = 7,     /* done, but a fault is latched and the force is zero */
+
   HAP_RECORD_ENDED = 8, /* the recording ended before its session; the file is whole up to there */
-  HAP_DIVERGED = 9, /* the replay is another one than the recording, see hap_player_difference */
+  HAP_DIVERGED = 9,     /* the replay is not the recording, see hap_player_difference */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */

@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
+#define ZLIB_CONST
 #include <zlib.h>
 
 #include "base/alloc.h"
@@ -81,7 +82,7 @@ static uint32_t deflate_bytes(hapi_recorder *recorder, const void *bytes, uint32
   if (!recorder->deflates || deflateReset(z) != Z_OK) {
     return 0;
   }
-  z->next_in = (Bytef *)(uintptr_t)bytes;
+  z->next_in = bytes;
   z->avail_in = size;
   z->next_out = (Bytef *)recorder->stored;
   z->avail_out = size > 0 ? size - 1 : 0;

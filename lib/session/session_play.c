@@ -535,13 +535,15 @@ static hap_status check_session(const hap_session *session, const hap_player *pl
                                 hap_detail *detail)
 {
   hap_session_def wanted = session->def;
+  const void *there = &wanted; /* a copy, down to the bytes between members */
+  const void *here = &session->def;
   (void)hap_player_get_def(player, &wanted);
   if (session->ran || session->player != NULL || session->recorder != NULL ||
       player->session != NULL) {
     return hapi_fail(detail, HAP_ERROR_STATE,
                      "session or player are in use or have been: a replay takes a new one of each");
   }
-  if (memcmp(&wanted, &session->def, sizeof wanted) != 0) {
+  if (memcmp(there, here, sizeof wanted) != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "the session has another def than the recorded one: create it with that of "
                      "hap_player_get_def");
