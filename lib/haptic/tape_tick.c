@@ -203,9 +203,8 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
     force->flags = io->failed ? HAPI_CELL_FAILED : 0;
     memcpy(force->d, &p->device_wrench, sizeof p->device_wrench);
     force->u[6] = hash;
-    const hap_wrench *given = &p->device_wrench;
-    if (memcmp(io->reached.force, given->force, sizeof given->force) != 0 ||
-        memcmp(io->reached.torque, given->torque, sizeof given->torque) != 0) {
+    const void *reached = &io->reached; /* bit by bit: no padding in it */
+    if (memcmp(reached, &p->device_wrench, sizeof io->reached) != 0) {
       memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_REACHED, index)->d, &io->reached,
              sizeof io->reached);
     }

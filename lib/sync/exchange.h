@@ -63,9 +63,9 @@ typedef enum hapi_channel {
 #define HAPI_EXCHANGE_NEWEST UINT64_MAX
 
 /* Messages of a channel are counted from 1. [reader] number of the message held, 0: none yet. */
-uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel channel);
+uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name);
 /* [writer] how many there were */
-uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel channel);
+uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel name);
 
 /* Replay, one thread. From now on the messages are kept, and take gives the one that is expected: the
  * threads of a recording are run one after the other, and what one of them told comes to the other
@@ -73,9 +73,9 @@ uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel cha
  * gives the newest. Before the first message; ends with destroy. */
 hap_status hapi_exchange_play(hapi_exchange *exchange);
 /* number of the message that take gives; 0: none; one that is held already: none */
-void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
+void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t number);
 /* of those before number none but the expected one is going to be asked for */
-void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel channel, uint64_t number);
+void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t number);
 /* HAP_ERROR_MEMORY, HAP_ERROR_NOT_FOUND: what hapi_message_queue_status says of any of them. */
 hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
 
