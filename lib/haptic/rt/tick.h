@@ -72,6 +72,7 @@ typedef struct hapi_guard_state {
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
   double sprung;     /* J, sum over the contacts of the last tick */
   double touch_s;    /* s, since something is felt without a break */
+  int64_t observed_ns; /* time of the last tick */
   double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
