@@ -198,7 +198,7 @@ static void report(bench *b, hap_model model, uint32_t count, double ns)
 
 hap_status bench_tick(bench *b)
 {
-  double ns[MODEL_COUNT][SIZE_COUNT];
+  double ns[MODEL_COUNT][SIZE_COUNT] = {{0.0}};
   FILE *csv = bench_csv_open(
       b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;

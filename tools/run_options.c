@@ -42,7 +42,7 @@ static hap_status take_number(run_options *options, const option *self, const ch
   if (end == value || *end != '\0' || !(number >= self->low && number <= self->high)) {
     return fail(detail, "\"%.60s\" is not a number from %g to %g", value, self->low, self->high);
   }
-  *(double *)((char *)options + self->offset) = number;
+  *(double *)((void *)((char *)options + self->offset)) = number;
   return HAP_OK;
 }
 

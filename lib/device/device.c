@@ -130,7 +130,7 @@ static hap_status fail_unknown(const char *name, size_t length, hap_detail *deta
 
 hap_status hap_device_open(const char *spec, hap_device **out, hap_detail *detail)
 {
-  hap_detail unread; /* the ops are promised a detail */
+  hap_detail unread = {0}; /* the ops are promised a detail */
   hap_detail *text = detail != NULL ? detail : &unread;
   text->text[0] = '\0';
   if (out == NULL) {

@@ -37,7 +37,7 @@ static const figure figures[] = {
 
 static double *value_of(hap_device_identity *identity, size_t index)
 {
-  return (double *)((char *)identity + figures[index].offset);
+  return (double *)((void *)((char *)identity + figures[index].offset));
 }
 
 void hap_device_identity_init(hap_device_identity *identity, size_t size_of_identity)

@@ -212,7 +212,7 @@ static hap_status cut_joints(hapi_physics *physics)
     dBodyID body = physics->table.entries[test->members[i]].body;
     int joints = dynamic(body) ? 0 : dBodyGetNumJoints(body);
     if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
-                      sizeof *test->cut)) {
+                      sizeof(dJointID))) {
       return HAP_ERROR_MEMORY;
     }
     for (int k = 0; k < joints; ++k) {
@@ -259,7 +259,7 @@ static hap_status switch_off(hapi_physics *physics)
   hapi_test_set *test = &physics->test;
   test->disabled_count = 0;
   if (!hapi_reserve((void **)&test->disabled, &test->disabled_capacity, 0, physics->table.high,
-                    sizeof *test->disabled)) {
+                    sizeof(dBodyID))) {
     return HAP_ERROR_MEMORY;
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {

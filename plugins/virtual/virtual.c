@@ -314,7 +314,7 @@ static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
   count = count < SUBSTEPS_MAX ? count : SUBSTEPS_MAX;
   double from = device->start + hapi_timeline_seconds(from_ns);
   double length = hapi_timeline_seconds(way_ns) / (double)count;
-  hapi_hand_target target;
+  hapi_hand_target target = {0};
   hapi_motion_at(&device->motion, from, target.position[1], target.velocity[1]);
   for (uint64_t i = 0; i < count; ++i) {
     hapi_v3_copy(target.position[1], target.position[0]);

@@ -365,6 +365,7 @@ void hapi_local_world_step(hapi_tick *tick)
     }
   }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
+    /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): what is live is in the table */
     memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_pointer_forces(tick);
