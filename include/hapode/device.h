@@ -16,7 +16,7 @@ typedef struct hap_device hap_device;
 
 /* What a device is and can hold. Zero in a limit means that the device does not know. */
 typedef struct hap_device_info {
-  char name[64];
+  char name[64];              /* for people: "virtual", a product's name */
   unsigned dof;               /* 3: force only; 6: force and torque */
   double max_force;           /* N, norm of the force vector the device may be asked for */
   double max_torque;          /* N m */
@@ -73,6 +73,9 @@ HAP_API void hap_device_identity_init(hap_device_identity *identity, size_t size
 HAP_API HAP_NODISCARD hap_status hap_device_identity_read(const char *path,
                                                           hap_device_identity *out,
                                                           hap_detail *detail);
+
+/* [control] Writes *identity to a new file at path, or over what was there, in the form that
+ * hap_device_identity_read takes. HAP_ERROR_IO with the reason in detail (may be NULL). */
 HAP_API HAP_NODISCARD hap_status hap_device_identity_write(const char *path,
                                                            const hap_device_identity *identity,
                                                            hap_detail *detail);

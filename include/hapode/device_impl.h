@@ -20,6 +20,7 @@
 
 HAP_BEGIN_DECLS
 
+/* Goes up when a member of hap_device_ops changes its meaning. */
 #define HAP_DEVICE_ABI 1u
 
 typedef enum hap_device_pacing {

@@ -17,7 +17,7 @@ HAP_BEGIN_DECLS
 /* Index and generation in one number: an id of a removed pointer is never valid again. 0 is
  * none. */
 typedef struct hap_pointer_id {
-  uint64_t v;
+  uint64_t v; /* to be compared with another one's, no more */
 } hap_pointer_id;
 
 /* Between the device and what touches the world. Values are fixed. */
@@ -123,8 +123,9 @@ typedef enum hap_guard_flag {
   HAP_GUARD_FAULT = 32      /* a fault is latched: on the way to zero, or there */
 } hap_guard_flag;
 
+/* What a pointer is doing, of its last tick. */
 typedef struct hap_pointer_state {
-  uint32_t size;
+  uint32_t size;             /* bytes that were filled in */
   uint32_t contacts;         /* bodies that push back now */
   int64_t stamp_ns;          /* of the tick */
   hap_pose device;           /* device's frame */

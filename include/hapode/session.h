@@ -56,12 +56,13 @@ typedef enum hap_plane {
 
 /* Whether the guard shapes the force. Its checks, faults and limits always hold. */
 typedef enum hap_guard {
-  HAP_GUARD_ON = 0,
+  HAP_GUARD_ON = 0,     /* all of it */
   HAP_GUARD_MEASURE = 1 /* for measurements with simulated hands: no ramp-in, no fading with an old
                            model, no energy observer, no slew limit. A fault takes the force away
                            in one tick. Not for a device that a person holds. */
 } hap_guard;
 
+/* For hap_session_def.physics_latency_ticks. */
 #define HAP_LATENCY_DEFAULT (-1)
 
 typedef struct hap_session_def {
@@ -134,10 +135,12 @@ HAP_API HAP_NODISCARD hap_status hap_session_try_lock(hap_session *session, int6
 /* [app] The thread that locked. */
 HAP_API hap_status hap_session_unlock(hap_session *session);
 
+/* [physics] An edit of the world that hap_session_post was given. */
+typedef void (*hap_edit_fn)(void *arg);
+
 /* [any] Runs edit(arg) in the physics thread before its next step. In order of posting; at most
  * 256 wait at a time (HAP_ERROR_CAPACITY). Edits not yet run when the session stops are run by
  * stop. */
-typedef void (*hap_edit_fn)(void *arg);
 HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit_fn edit,
                                                   void *arg);
 

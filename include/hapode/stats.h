@@ -11,7 +11,7 @@ HAP_BEGIN_DECLS
 
 /* Why the guard took the force away. Values are never renumbered. */
 typedef enum hap_fault {
-  HAP_FAULT_NONE = 0,
+  HAP_FAULT_NONE = 0,         /* nothing */
   HAP_FAULT_DEVICE_READ = 1,  /* the device's read failed */
   HAP_FAULT_DEVICE_POSE = 2,  /* the device gave a pose that is not finite */
   HAP_FAULT_FORCE = 3,        /* a wrench was not finite */
