@@ -147,6 +147,15 @@ TEST(scaling_leaves_its_table)
                 21);
 }
 
+TEST(jitter_leaves_its_table)
+{
+  check_program("jitter",
+                "hz,turn,source,realtime,ticks,missed,wake_us_p50,wake_us_p99,wake_us_p999,"
+                "wake_us_max,tick_us_p50,tick_us_p99,tick_us_max,minor_faults,major_faults,"
+                "voluntary_switches,involuntary_switches",
+                8);
+}
+
 TEST(impedance_is_that_of_the_closed_forms)
 {
   const char *const arguments[] = {"impedance", "--verify", "--quick", "--out", folder, NULL};
@@ -174,7 +183,7 @@ TEST(tick_leaves_its_table)
   check_program("tick",
                 "model,neighbours,contacts,tick_ns,ns_per_neighbour,p99_ns,scene,phase,rows,sweeps,"
                 "ode_ns,pass_ns",
-                24);
+                25);
 }
 
 /* ---- accuracy ---- */
@@ -287,6 +296,7 @@ int main(void)
   RUN(fig5_is_as_the_paper_and_the_closed_form_say);
   RUN(fig6_leaves_its_table);
   RUN(fig7_leaves_its_table);
+  RUN(jitter_leaves_its_table);
   RUN(scaling_leaves_its_table);
   RUN(impedance_is_that_of_the_closed_forms);
   RUN(tick_leaves_its_table);

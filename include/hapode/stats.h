@@ -111,6 +111,14 @@ typedef struct hap_stats {
   uint64_t stale_ticks;   /* ticks in which it was */
   uint64_t slewed_ticks;  /* ticks in which a force was held back by the slew limit */
   uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
+
+  /* Haptic thread: how late the system woke it up for a tick. 0 in lockstep and where a device sets the
+   * pace. */
+  double wake_us_mean;
+  double wake_us_p50;
+  double wake_us_p99;
+  double wake_us_p999;
+  double wake_us_max;
 } hap_stats;
 
 HAP_END_DECLS

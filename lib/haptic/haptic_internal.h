@@ -49,6 +49,7 @@ typedef struct hapi_pointer_slot {
 /* Published for the statistics; each written by the haptic thread alone. */
 typedef struct hapi_haptic_figures {
   hapi_histogram tick_ns;
+  hapi_histogram wake_ns; /* from a deadline to the loop's waking up for it */
   _Atomic uint64_t ticks;
   _Atomic uint64_t missed_ticks;
   _Atomic uint64_t contact_ticks;
