@@ -84,6 +84,27 @@ TEST(coupling_is_not_softer_than_the_device_allows)
   }
 }
 
+/* The cubes are so near to each other that there is no room for all contacts that may come to be, and
+ * only their supports hold them. */
+TEST(many_light_cubes_are_all_felt)
+{
+  static const double masses[] = {1e-3, 1e-2, 0.1};
+  for (size_t i = 0; i < sizeof masses / sizeof masses[0]; ++i) {
+    stability_point point = {.integration = HAP_INTEGRATION_IMPLICIT,
+                             .coupling = HAP_COUPLING_PROXY,
+                             .stiffness = 1.0,
+                             .mass = masses[i],
+                             .contacts = 64,
+                             .cubes = true};
+    double felt = 0.0;
+    REQUIRE(stability_feel(&unused, &point, &felt) >= HAP_OK);
+    double held = 0.8 * STABILITY_DEVICE_DAMPING * STABILITY_HAPTIC_HZ / 0.5;
+    double expected = held * 64.0 / (held + 64.0);
+    printf("# 64 cubes of %g kg: %.4f of %.4f N/m\n", masses[i], felt, expected);
+    CHECK_NEAR(felt, expected, 0.01 * expected);
+  }
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -91,6 +112,7 @@ int main(void)
   RUN(hard_points_make_no_energy);
   RUN(without_proxy_they_are_unstable);
   RUN(coupling_is_not_softer_than_the_device_allows);
+  RUN(many_light_cubes_are_all_felt);
   dCloseODE();
   return tap_done();
 }

@@ -77,7 +77,8 @@ typedef struct hap_session_def {
   int32_t max_bodies;   /* bodies that the loop moves itself, 1..1024, default 64; it knows as many
                            again of those around them */
   int32_t max_contacts; /* contact points between bodies, pairs of geoms that are near, and pointer
-                           contacts, of each 1..4096, default 1024 */
+                           contacts, of each 1..4096, default 1024. Of contact points those nearest to
+                           a touch are kept: give at least 12 for each of max_bodies */
   int32_t max_pointers; /* 1..16, default 4 */
   int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
                            time. Default 80. Physics runs at half of it. */
