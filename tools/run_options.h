@@ -7,6 +7,7 @@
 
 #include <stdio.h>
 
+#include "tools/conform/conform.h"
 #include "tools/rig.h"
 #include "tools/run_effects.h"
 
@@ -27,6 +28,7 @@ typedef struct run_options {
   const char *plot_path;
   const char *black_box_path;
   const char *identify_path; /* not NULL: identify the device, no session */
+  conform_options check;     /* spec not NULL: check that device, no session */
   run_effects effects;
 } run_options;
 
