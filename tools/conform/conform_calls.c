@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "tools/conform/conform_internal.h"
 
+#include <dlfcn.h>
 #include <string.h>
 
 #include "base/clock.h"
@@ -31,6 +32,17 @@ bool conform_status_is_known(hap_status status)
 
 /* ---- open to close ---- */
 
+/* A module that leaves a thread behind would take the check with it when its code goes. */
+static void keep_code(const conform *c)
+{
+  Dl_info info;
+  void *address = NULL;
+  memcpy(&address, &c->ops->zero, sizeof address);
+  if (dladdr(address, &info) != 0) {
+    (void)dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE);
+  }
+}
+
 bool conform_open(conform *c, hap_detail *detail)
 {
   conform_enter("open", CONFORM_BLOCK_LIMIT_S);
@@ -42,6 +54,7 @@ bool conform_open(conform *c, hap_detail *detail)
   c->ops = hapi_device_ops(c->device);
   c->self = hapi_device_self(c->device);
   c->info = *hapi_device_info(c->device);
+  keep_code(c);
   return true;
 }
 
@@ -195,6 +208,13 @@ bool conform_tick(conform *c, conform_sample *out)
   return good && !c->stopped;
 }
 
+bool conform_reads_worse(const conform *c, const conform_wrong *then)
+{
+  const conform_wrong *now = &c->wrong;
+  return now->statuses > then->statuses || (then->poses == 0 && now->poses > 0) ||
+         (then->twists == 0 && now->twists > 0) || (then->buttons == 0 && now->buttons > 0);
+}
+
 void conform_pause(conform *c, double seconds)
 {
   c->tick += (uint64_t)(seconds * c->options->rate_hz);
@@ -307,5 +327,9 @@ bool conform_needs_limits(conform *c)
     conform_skip(c, "only with --check-limits: if the device is wrong, it gives all its force");
     return false;
   }
-  return conform_needs_force(c);
+  if (c->reached_wrong) {
+    conform_skip(c, "what was reached is not plausible");
+    return false;
+  }
+  return conform_needs_zero(c) && conform_needs_force(c);
 }

@@ -171,7 +171,7 @@ static void ask_beyond(conform *c, const hap_wrench *wanted, double limit, bool 
 
 void conform_limits(conform *c)
 {
-  static const double ways[][3] = {{1.0, 0.0, 0.0}, {0.0, -1.0, 0.0}, {0.6, 0.48, -0.64}};
+  static const double ways[][3] = {{1.0, 0.0, 0.0}, {0.0, -1.0, 0.0}, {0.96, 0.0, -0.28}};
   static const double factors[] = {1.01, 3.0, 1e6};
   if (c->info.max_force == 0.0) {
     conform_skip(c, "the device does not say what its limits are");

@@ -70,6 +70,8 @@ typedef struct conform {
   bool reached_wrong;
   bool zero_wrong;
   bool start_wrong;
+  bool reads_unstarted;
+  bool writes_unstarted;
 
   /* what was seen */
   hapi_histogram reads;
@@ -108,6 +110,8 @@ hap_status conform_read(conform *c, conform_sample *out);
 hap_status conform_write(conform *c, const hap_wrench *wanted, hap_wrench *reached);
 /* Waits for the next tick and reads; false: it failed, or the check shall end. */
 bool conform_tick(conform *c, conform_sample *out);
+/* Since then reads have failed, or have begun to be wrong in a way in which they were not. */
+bool conform_reads_worse(const conform *c, const conform_wrong *then);
 /* The next tick comes so much later. */
 void conform_pause(conform *c, double seconds);
 

@@ -10,6 +10,9 @@
 #define PATH_SHARE 0.15 /* of the path, that twists and poses may disagree by */
 #define PATH_LEAST 1e-4 /* m, to be judged */
 #define TURN_LEAST 1e-2 /* rad */
+#define WINDOW 20u
+#define GRAIN 1e-6      /* m, of a window */
+#define GRAIN_TURN 1e-4 /* rad */
 #define PAUSE_S 0.4
 
 /* ---- a record at rest ---- */
@@ -97,28 +100,27 @@ void conform_steps(conform *c)
 /* ---- twist against pose ---- */
 
 typedef struct mismatch {
-  double path;  /* m or rad */
-  double worst; /* between what the twists add up to and where it is */
+  double path;  /* m or rad, sum over the windows */
+  double off;   /* the same of what poses and twists disagree by */
   double speed; /* greatest */
+  unsigned windows;
 } mismatch;
 
-static void compare_linear(const conform *c, mismatch *out)
+/* From sample to sample by the mean of both twists, as the sum over one window. */
+static void compare_linear(const conform_sample *s, mismatch *io)
 {
   double sum[3] = {0.0, 0.0, 0.0};
-  memset(out, 0, sizeof *out);
-  for (unsigned i = 1; i < c->record_count; ++i) {
-    const conform_sample *s = &c->record[i];
+  double way[3];
+  for (unsigned i = 1; i <= WINDOW; ++i) {
     double mean[3];
-    double way[3];
-    hapi_v3_add(s->twist.linear, s[-1].twist.linear, mean);
-    hapi_v3_madd(sum, 0.5 * (s->time - s[-1].time), mean, sum);
-    hapi_v3_sub(s->pose.position, s[-1].pose.position, way);
-    out->path += hapi_v3_norm(way);
-    hapi_v3_sub(s->pose.position, c->record[0].pose.position, way);
-    hapi_v3_sub(way, sum, way);
-    out->worst = fmax(out->worst, hapi_v3_norm(way));
-    out->speed = fmax(out->speed, hapi_v3_norm(s->twist.linear));
+    hapi_v3_add(s[i].twist.linear, s[i - 1].twist.linear, mean);
+    hapi_v3_madd(sum, 0.5 * (s[i].time - s[i - 1].time), mean, sum);
+    io->speed = fmax(io->speed, hapi_v3_norm(s[i].twist.linear));
   }
+  hapi_v3_sub(s[WINDOW].pose.position, s[0].pose.position, way);
+  io->path += hapi_v3_norm(way);
+  hapi_v3_sub(way, sum, way);
+  io->off += hapi_v3_norm(way);
 }
 
 static double angle_between(const double a[4], const double b[4])
@@ -137,49 +139,52 @@ static void turn_by(double q[4], const double rate[3], double length)
   hapi_quat_normalize(q);
 }
 
-static void compare_angular(const conform *c, mismatch *out)
+static void compare_angular(const conform_sample *s, mismatch *io)
 {
   double sum[4];
-  memcpy(sum, c->record[0].pose.quat_wxyz, sizeof sum);
-  memset(out, 0, sizeof *out);
-  for (unsigned i = 1; i < c->record_count; ++i) {
-    const conform_sample *s = &c->record[i];
+  memcpy(sum, s[0].pose.quat_wxyz, sizeof sum);
+  for (unsigned i = 1; i <= WINDOW; ++i) {
     double mean[3];
-    hapi_v3_add(s->twist.angular, s[-1].twist.angular, mean);
-    turn_by(sum, mean, 0.5 * (s->time - s[-1].time));
-    out->path += angle_between(s[-1].pose.quat_wxyz, s->pose.quat_wxyz);
-    out->worst = fmax(out->worst, angle_between(sum, s->pose.quat_wxyz));
-    out->speed = fmax(out->speed, hapi_v3_norm(s->twist.angular));
+    hapi_v3_add(s[i].twist.angular, s[i - 1].twist.angular, mean);
+    turn_by(sum, mean, 0.5 * (s[i].time - s[i - 1].time));
+    io->speed = fmax(io->speed, hapi_v3_norm(s[i].twist.angular));
   }
+  io->path += angle_between(s[0].pose.quat_wxyz, s[WINDOW].pose.quat_wxyz);
+  io->off += angle_between(sum, s[WINDOW].pose.quat_wxyz);
 }
 
-/* A difference quotient lags by half a tick, and jumps by a quantum. */
 static void judge_fit(conform *c, const mismatch *m, double grain, const char *what)
 {
-  double allowed = PATH_SHARE * m->path + grain + 2.0 * conform_period(c) * m->speed;
-  conform_note(c, "%s: path %.3g, off by %.2g", what, m->path, m->worst);
-  if (m->worst > allowed) {
-    conform_fail(c, "%s: what the twists add up to is off by %.3g, allowed is %.3g", what, m->worst,
-                 allowed);
+  double allowed = PATH_SHARE * m->path + grain * m->windows;
+  conform_note(c, "%s: path %.3g, twists off by %.2g", what, m->path, m->off);
+  if (m->off > allowed) {
+    conform_fail(c,
+                 "%s: over windows of %u ticks the twists add up to something else than the way "
+                 "between the poses, off by %.3g of %.3g, allowed is %.3g",
+                 what, WINDOW, m->off, m->path, allowed);
   }
 }
 
 void conform_twist_fits(conform *c)
 {
-  mismatch way;
-  mismatch turn;
+  mismatch way = {0.0, 0.0, 0.0, 0};
+  mismatch turn = way;
   if (!needs_record(c)) {
     return;
   }
-  compare_linear(c, &way);
-  compare_angular(c, &turn);
+  for (unsigned i = 0; i + WINDOW < c->record_count; i += WINDOW) {
+    compare_linear(&c->record[i], &way);
+    compare_angular(&c->record[i], &turn);
+    ++way.windows;
+    ++turn.windows;
+  }
   bool moved = way.path > PATH_LEAST + 10.0 * c->info.quantum;
   bool turned = turn.path > TURN_LEAST;
   if (way.speed > 0.0 || moved) {
-    judge_fit(c, &way, 1e-6 + 2.0 * c->info.quantum, "metres");
+    judge_fit(c, &way, GRAIN + 2.0 * c->info.quantum, "metres");
   }
   if (turn.speed > 0.0 || turned) {
-    judge_fit(c, &turn, 1e-3, "radians");
+    judge_fit(c, &turn, GRAIN_TURN, "radians");
   }
   if (!c->failed && !moved && !turned) {
     conform_skip(c, "it did not move: nothing to compare");
@@ -234,7 +239,7 @@ void conform_after_pause(conform *c)
   conform_pause(c, PAUSE_S);
   for (int i = 0; i < 20 && conform_tick(c, &sample); ++i) {
   }
-  if (memcmp(&before, &c->wrong, sizeof before) != 0) {
+  if (conform_reads_worse(c, &before)) {
     conform_fail(c, "after %g s without a read, reads failed or were not filled in", PAUSE_S);
   }
 }

@@ -1,0 +1,125 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* A module whose table is wrong as the environment's HAPODE_TEST_TABLE says; right without it. It
+ * counts, for the tests of loading. */
+
+#define _POSIX_C_SOURCE 200809L
+
+#include <hapode/device_impl.h>
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Of this load of the module: begins at 0 when its code is gone and comes again. */
+HAP_API atomic_int tables_opened;
+HAP_API atomic_int tables_zeroed;
+
+static const char *wrong;
+
+static bool is(const char *name)
+{
+  return wrong != NULL && strcmp(wrong, name) == 0;
+}
+
+static hap_status tables_open(const char *args, void **self, hap_detail *detail)
+{
+  if (is("open_fails") || strcmp(args, "fail") == 0) {
+    snprintf(detail->text, sizeof detail->text, "no board on port 7: is it switched on?");
+    return HAP_ERROR_DEVICE;
+  }
+  if (is("open_fails_silently")) {
+    return (hap_status)-77;
+  }
+  if (!is("no_self")) {
+    *self = malloc(16);
+  }
+  atomic_fetch_add(&tables_opened, 1);
+  return HAP_OK;
+}
+
+static void tables_describe(void *self, hap_device_info *out)
+{
+  (void)self;
+  out->dof = is("dof_4") ? 4 : 3;
+  out->max_force = is("limit_is_negative") ? -1.0 : 5.0;
+}
+
+static hap_status tables_start(void *self)
+{
+  (void)self;
+  return HAP_OK;
+}
+
+static hap_status tables_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
+                              uint32_t *buttons)
+{
+  (void)self;
+  (void)time_ns;
+  *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  memset(twist, 0, sizeof *twist);
+  *buttons = 0;
+  return HAP_OK;
+}
+
+static hap_status tables_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+{
+  (void)self;
+  *reached = *wanted;
+  return HAP_OK;
+}
+
+static void tables_zero(void *self)
+{
+  (void)self;
+  atomic_fetch_add(&tables_zeroed, 1);
+}
+
+static void tables_stop(void *self)
+{
+  (void)self;
+}
+
+static void tables_close(void *self)
+{
+  atomic_fetch_sub(&tables_opened, 1);
+  free(self);
+}
+
+static hap_device_ops ops;
+
+const hap_device_ops *hapode_device_module(uint32_t host_abi)
+{
+  wrong = getenv("HAPODE_TEST_TABLE");
+  const hap_device_ops right = {HAP_DEVICE_ABI,
+                                sizeof ops,
+                                is("no_name") ? NULL : "tables",
+                                "for tests",
+                                HAP_PACING_VIRTUAL,
+                                tables_open,
+                                tables_describe,
+                                tables_start,
+                                tables_read,
+                                tables_write,
+                                tables_zero,
+                                tables_stop,
+                                tables_close,
+                                NULL};
+  ops = right;
+  ops.abi += is("abi_is_new") ? 1 : is("abi_is_old") ? UINT32_MAX : 0;
+  ops.size = is("size_is_small") ? 40 : ops.size;
+  ops.pacing = is("pacing_is_unknown") ? 9 : ops.pacing;
+  ops.name = is("name_is_bad") ? "My Device" : ops.name;
+  ops.read = is("no_read") ? NULL : ops.read;
+  ops.zero = is("no_zero") ? NULL : ops.zero;
+  if (is("name_is_long")) {
+    static char name[2000];
+    memset(name, 'n', sizeof name - 1);
+    ops.name = name;
+    ops.zero = NULL;
+  }
+  return is("refuses") || host_abi != HAP_DEVICE_ABI ? NULL : &ops;
+}
