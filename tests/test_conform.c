@@ -213,6 +213,7 @@ TEST(a_check_without_force_asks_for_none)
   static const char *const none[] = {"--check-force", "0", NULL};
   CHECK(check(broken("refuses_all_force"), none) == 0);
   CHECK(lines_with("not ok") == 0 && skips("# SKIP a check without force") >= 4);
+  CHECK(skips("what this check must not ask for") == 0);
   CHECK(check(broken("refuses_all_force"), NULL) == 1); /* the fault is one */
 }
 
@@ -221,6 +222,7 @@ TEST(a_device_in_real_time_gets_small_forces_alone)
   static const char *const limits[] = {"--check-limits", NULL};
   CHECK(check(broken("refuses_much_force,pacing=host"), NULL) == 0);
   CHECK(lines_with("not ok") == 0 && skips("# SKIP only with --check-limits") == 2);
+  CHECK(skips("what this check must not ask for") == 0);
   CHECK(check(broken("refuses_much_force,pacing=host"), limits) == 1);
   CHECK(skips("what this check must not ask for") > 0);
 }

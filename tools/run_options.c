@@ -175,6 +175,16 @@ static hap_status take_lockstep(run_options *options, const option *self, const 
   return HAP_OK;
 }
 
+static hap_status take_reconnect(run_options *options, const option *self, const char *value,
+                                 hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->reconnect = true;
+  return HAP_OK;
+}
+
 static hap_status take_limits(run_options *options, const option *self, const char *value,
                               hap_detail *detail)
 {
@@ -209,6 +219,10 @@ static const option table[] = {
      "no session: moves the one --device, which nobody must hold, finds its\n"
      "mass, damping, friction, delay and quantum and writes them to FILE",
      take_text, offsetof(run_options, identify_path), 0, 0},
+    {"--reconnect", NULL,
+     "a device that was lost is started again until it answers; then the force\n"
+     "comes back over 20 ms (default: a lost device ends the run)",
+     take_reconnect, 0, 0, 0},
     {"--check-device", "SPEC",
      "no session: holds the device against the contract of hapode/device_impl.h, with\n"
      "a small force; prints ok or not ok for each point; let go of the grip",

@@ -71,13 +71,25 @@ static const char *machine_name(unsigned machine)
   return "another one";
 }
 
+/* Linkers put the table of sections at the end. Loading a file without its end is a bus error. */
+static bool is_cut_off(const elf_header *header, uint64_t file_size)
+{
+  uint64_t table = (uint64_t)header->e_shnum * header->e_shentsize;
+  bool own_form = header->e_ident[EI_CLASS] == (sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32);
+  return file_size < sizeof *header ||
+         (own_form && (header->e_shoff > file_size || header->e_shoff + table > file_size));
+}
+
 /* The first bytes of both forms of the header, of 32 and of 64 bits, are the same up to e_machine. The
  * system's loader says of a foreign machine that there is no such file. */
-static hap_status check_header(const module *m, const elf_header *header)
+static hap_status check_header(const module *m, const elf_header *header, uint64_t file_size)
 {
   const elf_header *own = own_header();
   if (memcmp(header->e_ident, ELFMAG, SELFMAG) != 0) {
     return fail(m, HAP_ERROR_FORMAT, "not a shared object: it is no ELF file", "");
+  }
+  if (is_cut_off(header, file_size)) {
+    return fail(m, HAP_ERROR_FORMAT, "cut off: the end of the file is missing; copy it anew", "");
   }
   if (own == NULL) {
     return HAP_OK;
@@ -119,7 +131,7 @@ static hap_status check_file(const module *m)
   if (got < 0) {
     return fail(m, HAP_ERROR_IO, "cannot be read: ", strerror(cause));
   }
-  return check_header(m, &header);
+  return check_header(m, &header, (uint64_t)about.st_size);
 }
 
 /* ---- loading ---- */
