@@ -247,5 +247,9 @@ hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
   run_progress_clear(&loop->progress);
   (void)hap_session_stats(session, stats, sizeof *stats);
   drain(loop);
+  if (status == HAP_OK && stats->fault != HAP_FAULT_NONE) { /* it was waited for to the end */
+    (void)hap_session_detail(session, detail);
+    return HAP_ERROR_DEVICE;
+  }
   return status != HAP_OK ? status : started;
 }

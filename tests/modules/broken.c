@@ -136,7 +136,7 @@ static hap_status broken_start(void *self)
   broken *d = self;
   ++d->starts;
   if (is(d, "start_fails") || (is(d, "starts_once") && d->starts > 1) ||
-      (is(d, "unplugged_for_ever") && d->reads > 1500) ||
+      (is(d, "unplugged_for_ever") && d->reads > 500) ||
       (is(d, "unplugged") && d->reads > 0 && d->starts < 4)) {
     return HAP_ERROR_DEVICE;
   }
