@@ -227,6 +227,18 @@ TEST(a_device_in_real_time_gets_small_forces_alone)
   CHECK(skips("what this check must not ask for") > 0);
 }
 
+TEST(a_device_with_a_clock_of_its_own_is_waited_for)
+{
+  static const char *const limits[] = {"--check-limits", NULL};
+  int code = check(broken("none,pacing=device"), limits);
+  CHECK(code == 0 && lines_with("not ok") == 0);
+  if (code != 0) {
+    show();
+  }
+  CHECK(check(broken("read_is_slow,pacing=device"), NULL) == 1);
+  CHECK(caught_by("read_comes_back_in_time"));
+}
+
 TEST(a_device_is_followed_through_its_plug)
 {
   static const char *const unplug[] = {"--check-unplug", "3", NULL};
@@ -283,6 +295,7 @@ int main(void)
   RUN(a_device_that_hangs_is_given_up_with_its_line);
   RUN(a_check_without_force_asks_for_none);
   RUN(a_device_in_real_time_gets_small_forces_alone);
+  RUN(a_device_with_a_clock_of_its_own_is_waited_for);
   RUN(a_device_is_followed_through_its_plug);
   RUN(a_device_that_does_not_open_is_said);
   RUN(options_that_do_not_go_together_are_refused);

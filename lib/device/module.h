@@ -8,8 +8,9 @@
 #include <hapode/device.h>
 
 #define HAPI_MODULE_NAME "module"
-#define HAPI_MODULE_HELP \
-  "a device from a shared object: /WHOLE/PATH.so[,ARGUMENTS OF THE DEVICE]; docs/writing-a-device.md"
+#define HAPI_MODULE_HELP                                                      \
+  "a device from a shared object: /WHOLE/PATH.so[,ARGUMENTS OF THE DEVICE]; " \
+  "docs/writing-a-device.md"
 
 /* [control] args: "/whole/path.so[,ARGS]". detail is not NULL. Errors name the path. */
 HAP_NODISCARD hap_status hapi_module_open(const char *args, hap_device **out, hap_detail *detail);

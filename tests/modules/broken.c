@@ -57,6 +57,13 @@ static void rest_ms(double ms)
   nanosleep(&time, NULL);
 }
 
+static int64_t clock_now(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
 static void *wait_for_ever(void *unused)
 {
   for (;;) {
@@ -103,6 +110,8 @@ static hap_status broken_open(const char *args, void **self, hap_detail *detail)
   ops.help = is(d, "help_of_two_lines") ? "two\nlines" : "a device for tests: break=NAME";
   if (rest != NULL && strcmp(rest, ",pacing=host") == 0) {
     ops.pacing = HAP_PACING_HOST;
+  } else if (rest != NULL && strcmp(rest, ",pacing=device") == 0) {
+    ops.pacing = HAP_PACING_DEVICE;
   } else if (rest != NULL && !is(d, "takes_any_argument")) {
     snprintf(detail->text, sizeof detail->text, "%s",
              is(d, "silent_refusal") ? "" : "there is no such argument");
@@ -193,7 +202,7 @@ static void spoil_read(const broken *d, hap_pose *pose, hap_twist *twist)
   } else if (is(d, "jumps") && d->reads % 100 == 99) {
     pose->position[0] += 0.2;
   } else if (is(d, "read_is_slow")) {
-    rest_ms(1.5);
+    rest_ms(ops.pacing == HAP_PACING_DEVICE ? 2.5 : 1.5);
   } else if (is(d, "read_hangs")) {
     rest_ms(990.0);
     (void)wait_for_ever(NULL);
@@ -209,6 +218,10 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
     pthread_mutex_lock(&d->lock);
     rest_ms(0.3);
     pthread_mutex_unlock(&d->lock);
+  }
+  if (ops.pacing == HAP_PACING_DEVICE && d->started) {
+    rest_ms(0.9); /* its own clock */
+    time_ns = clock_now();
   }
   hap_status status = status_of_read(d, time_ns);
   if (status < HAP_OK) {

@@ -196,11 +196,11 @@ void conform_twist_fits(conform *c)
 static void judge_time(conform *c, const hapi_histogram *h, double most_s, const char *call)
 {
   double usual = 1e-9 * hapi_histogram_quantile_ns(h, 0.9);
-  conform_note(c, "%s: p50 %.3g us, p90 %.3g us, max %.3g us", call,
+  conform_note(c, "%s: p50 %.1f us, p90 %.1f us, max %.1f us", call,
                1e-3 * hapi_histogram_quantile_ns(h, 0.5), 1e6 * usual,
                1e-3 * hapi_histogram_max_ns(h));
   if (usual > most_s) {
-    conform_fail(c, "more than one %s in ten took over %.3g us, most is %.3g us", call, 1e6 * usual,
+    conform_fail(c, "more than one %s in ten took over %.1f us, most is %.1f us", call, 1e6 * usual,
                  1e6 * most_s);
   }
 }
