@@ -91,7 +91,7 @@ typedef struct hap_device_ops {
 /* The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is the
  * HAP_DEVICE_ABI of the library that asks. NULL: the device cannot serve that one. The table must last
  * as long as the module is loaded, which is until the last of its devices was closed. It is called
- * once for every device that is opened, by the thread that opens. */
+ * once for every device that is opened, by the thread that opens; there may be several. */
 HAP_API const hap_device_ops *hapode_device_module(uint32_t host_abi);
 
 HAP_END_DECLS

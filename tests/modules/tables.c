@@ -8,6 +8,7 @@
 
 #include <hapode/device_impl.h>
 
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -96,35 +97,35 @@ static void tables_close(void *self)
 
 static hap_device_ops ops;
 
-const hap_device_ops *hapode_device_module(uint32_t host_abi)
+static void fill_in(void)
 {
-  wrong = getenv("HAPODE_TEST_TABLE");
-  const hap_device_ops right = {HAP_DEVICE_ABI,
-                                sizeof ops,
-                                is("no_name") ? NULL : "tables",
-                                "for tests",
-                                HAP_PACING_VIRTUAL,
-                                tables_open,
-                                tables_describe,
-                                tables_start,
-                                tables_read,
-                                tables_write,
-                                tables_zero,
-                                tables_stop,
-                                tables_close,
-                                NULL};
+  static char long_name[2000];
+  const hap_device_ops right = {HAP_DEVICE_ABI,     sizeof ops,   "tables",        "for tests",
+                                HAP_PACING_VIRTUAL, tables_open,  tables_describe, tables_start,
+                                tables_read,        tables_write, tables_zero,     tables_stop,
+                                tables_close,       NULL};
+  memset(long_name, 'n', sizeof long_name - 1);
   ops = right;
   ops.abi += is("abi_is_new") ? 1 : is("abi_is_old") ? UINT32_MAX : 0;
   ops.size = is("size_is_small") ? 40 : ops.size;
   ops.pacing = is("pacing_is_unknown") ? 9 : ops.pacing;
-  ops.name = is("name_is_bad") ? "My Device" : ops.name;
+  ops.name = is("no_name")        ? NULL
+             : is("name_is_bad")  ? "My Device"
+             : is("name_is_long") ? long_name
+                                  : ops.name;
   ops.read = is("no_read") ? NULL : ops.read;
-  ops.zero = is("no_zero") ? NULL : ops.zero;
-  if (is("name_is_long")) {
-    static char name[2000];
-    memset(name, 'n', sizeof name - 1);
-    ops.name = name;
-    ops.zero = NULL;
+  ops.zero = is("no_zero") || is("name_is_long") ? NULL : ops.zero;
+}
+
+/* Once: the environment is that of this load. */
+const hap_device_ops *hapode_device_module(uint32_t host_abi)
+{
+  static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+  pthread_mutex_lock(&lock);
+  if (ops.size == 0) {
+    wrong = getenv("HAPODE_TEST_TABLE");
+    fill_in();
   }
+  pthread_mutex_unlock(&lock);
   return is("refuses") || host_abi != HAP_DEVICE_ABI ? NULL : &ops;
 }
