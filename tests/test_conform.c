@@ -48,17 +48,36 @@ static pid_t start(const char *spec, const char *const *options)
   return child;
 }
 
-/* Exit code; -1: it did not end by itself. */
-static int finish(pid_t child)
+static void read_output(void)
 {
-  int result = 0;
-  bool ended = child > 0 && waitpid(child, &result, 0) == child && WIFEXITED(result);
   FILE *file = fopen(out_path, "r");
   size_t got = file != NULL ? fread(output, 1, sizeof output - 1, file) : 0;
   output[got] = '\0';
   if (file != NULL) {
     fclose(file);
   }
+}
+
+/* False: not for long. */
+static bool await_line(const char *line)
+{
+  const struct timespec moment = {0, 10000000};
+  for (int i = 0; i < 3000; ++i) {
+    read_output();
+    if (strstr(output, line) != NULL) {
+      return true;
+    }
+    nanosleep(&moment, NULL);
+  }
+  return false;
+}
+
+/* Exit code; -1: it did not end by itself. */
+static int finish(pid_t child)
+{
+  int result = 0;
+  bool ended = child > 0 && waitpid(child, &result, 0) == child && WIFEXITED(result);
+  read_output();
   return ended ? WEXITSTATUS(result) : -1;
 }
 
@@ -227,6 +246,25 @@ TEST(a_device_in_real_time_gets_small_forces_alone)
   CHECK(skips("what this check must not ask for") > 0);
 }
 
+TEST(a_device_that_runs_away_is_let_go)
+{
+  CHECK(check(broken("runs_away,pacing=host"), NULL) == 1);
+  CHECK(caught_by("reached_is_plausible"));
+  CHECK(strstr(output, "moved more than 50 mm") != NULL);
+  CHECK(strstr(output, "Bail out! the force was taken off") != NULL);
+  CHECK(skips("what this check must not ask for") == 0);
+}
+
+TEST(a_stop_in_the_countdown_energises_nothing)
+{
+  static const char *const wait[] = {"--check-wait", "600", NULL};
+  pid_t child = start(broken("start_fails,pacing=host"), wait);
+  CHECK(child > 0 && await_line("\nok 1 - open") && kill(child, SIGINT) == 0);
+  CHECK(finish(child) == 1);
+  CHECK(lines_with("ok ") == 1 && lines_with("not ok") == 0);
+  CHECK(strstr(output, "ok 1 - open\nBail out! stopped") != NULL);
+}
+
 TEST(a_device_with_a_clock_of_its_own_is_waited_for)
 {
   static const char *const limits[] = {"--check-limits", NULL};
@@ -273,11 +311,8 @@ TEST(options_that_do_not_go_together_are_refused)
 TEST(a_signal_ends_it_with_the_force_off)
 {
   static const char *const unplug[] = {"--check-unplug", "600", NULL};
-  const struct timespec moment = {0, 700000000};
   pid_t child = start(broken("none,pacing=host"), unplug);
-  nanosleep(&moment, NULL);
-  nanosleep(&moment, NULL);
-  CHECK(child > 0 && kill(child, SIGINT) == 0);
+  CHECK(child > 0 && await_line("\nok 15 - ") && kill(child, SIGINT) == 0);
   CHECK(finish(child) == 1);
   CHECK(strstr(output, "Bail out! stopped") != NULL);
 }
@@ -295,6 +330,8 @@ int main(void)
   RUN(a_device_that_hangs_is_given_up_with_its_line);
   RUN(a_check_without_force_asks_for_none);
   RUN(a_device_in_real_time_gets_small_forces_alone);
+  RUN(a_device_that_runs_away_is_let_go);
+  RUN(a_stop_in_the_countdown_energises_nothing);
   RUN(a_device_with_a_clock_of_its_own_is_waited_for);
   RUN(a_device_is_followed_through_its_plug);
   RUN(a_device_that_does_not_open_is_said);

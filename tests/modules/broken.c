@@ -29,6 +29,7 @@ typedef struct broken {
   bool started;
   int starts;
   int reads;
+  int reads_pushed; /* since the first force */
   int64_t first_ns;
   int64_t before_ns;
   hap_wrench held;
@@ -197,6 +198,8 @@ static void spoil_read(const broken *d, hap_pose *pose, hap_twist *twist)
     pose->position[1] = nan;
   } else if (is(d, "pose_is_far")) {
     pose->position[0] = 1e30;
+  } else if (is(d, "runs_away")) {
+    pose->position[2] += 5e-4 * d->reads_pushed;
   } else if (is(d, "twist_is_nan")) {
     twist->angular[2] = nan;
   } else if (is(d, "jumps") && d->reads % 100 == 99) {
@@ -229,6 +232,7 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   }
   d->first_ns = d->first_ns == 0 ? time_ns : d->first_ns;
   ++d->reads;
+  d->reads_pushed += d->pushed;
   move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, twist);
   spoil_read(d, &here, twist);
   if (is(d, "pose_is_not_filled_in")) {
@@ -276,7 +280,8 @@ static hap_status check_write(broken *d, const hap_wrench *wanted)
       !(is(d, "write_after_stop") && d->starts > 0)) {
     return HAP_ERROR_STATE;
   }
-  if ((is(d, "refuses_all_force") && norm(wanted->force) + norm(wanted->torque) > 0.0) ||
+  if ((is(d, "runs_away") && d->reads_pushed > 110 && norm(wanted->force) > 0.0) ||
+      (is(d, "refuses_all_force") && norm(wanted->force) + norm(wanted->torque) > 0.0) ||
       (is(d, "refuses_much_force") && !(finite && norm(wanted->force) <= SMALL_FORCE))) {
     puts("# it was asked for what this check must not ask for");
     return HAP_ERROR_DEVICE;

@@ -117,6 +117,7 @@ static bool open_first(conform *c)
   if (!good) {
     fputs("Bail out! it does not open\n", c->out);
   }
+  fflush(c->out);
   return good;
 }
 
@@ -151,8 +152,10 @@ static void look_at_all(conform *c)
   }
   if (c->stopped) {
     c->failures += 1;
-    fprintf(c->out, "not ok %d - %s\nBail out! %s\n", c->number, c->name,
-            c->failed ? "the force was taken off" : "stopped");
+    if (c->number > 1) { /* else in the countdown */
+      fprintf(c->out, "not ok %d - %s\n", c->number, c->name);
+    }
+    fprintf(c->out, "Bail out! %s\n", c->failed ? "the force was taken off" : "stopped");
   }
 }
 
