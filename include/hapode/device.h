@@ -81,7 +81,8 @@ HAP_API HAP_NODISCARD hap_status hap_device_identity_write(const char *path,
                                                            hap_detail *detail);
 
 /* [control] From now on hap_device_get_info gives these figures in place of what the device says of
- * itself, and a pointer that is added takes them over. HAP_ERROR_STATE when a pointer has the
+ * itself, and a pointer that is added takes them over. A quantum of 0 leaves the device's own: none was
+ * seen, which is not to say that there is none. HAP_ERROR_STATE when a pointer has the
  * device, HAP_ERROR_ARGUMENT when the identity is that of a device of another name. */
 HAP_API HAP_NODISCARD hap_status hap_device_set_identity(hap_device *device,
                                                          const hap_device_identity *identity,

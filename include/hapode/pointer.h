@@ -107,6 +107,15 @@ HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap
 /* [control] Zero force, device stopped, id invalid. */
 HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
 
+/* [control] Stops the pointer's device and starts it again: for one that was lost, unplugged or switched
+ * off, and has to be opened anew. Blocks as long as the device's start does; the loop and the other
+ * pointers go on. The pointer is out of the world meanwhile, its id stays valid. This alone brings no
+ * force back that a fault has taken: that does hap_session_reset_fault afterwards, over 20 ms. Without
+ * a fault the pointer comes in as one that was just added, also over 20 ms. HAP_ERROR_DEVICE: it did not
+ * start; the pointer stays out of the world, and this may be tried again. HAP_ERROR_STATE: the session is
+ * not started, or the pointer has no device. */
+HAP_API HAP_NODISCARD hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer);
+
 /* [app] Moves a pointer without device: pose and twist (may be NULL: at rest) in the device's
  * frame, from the next tick on. Values that are not finite or beyond 1e6 (m, m/s, rad/s), and a
  * quaternion that is not unit within 1e-3, are HAP_ERROR_ARGUMENT and change nothing. */

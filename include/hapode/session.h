@@ -149,7 +149,8 @@ HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit
 HAP_API HAP_NODISCARD hap_status hap_session_set_model(hap_session *session, hap_model model);
 
 /* [any] Clears a latched fault; from the next tick on force is felt again, over 20 ms. Where the pointer
- * is more than 10 mm deep by then, the rest comes in at 0.2 m/s. A fault that lasts latches again. */
+ * is more than 10 mm deep by then, the rest comes in at 0.2 m/s. A fault that lasts latches again; a device
+ * that has to be opened anew first needs hap_pointer_restart. */
 HAP_API hap_status hap_session_reset_fault(hap_session *session);
 
 /* [any] Text of the last error or fault of this session; "" when there was none. */

@@ -326,7 +326,9 @@ hap_status hap_device_set_identity(hap_device *device, const hap_device_identity
   device->info.damping = known.damping;
   device->info.friction = known.friction;
   device->info.delay = known.delay;
-  device->info.quantum = known.quantum;
+  if (known.quantum > 0.0) {
+    device->info.quantum = known.quantum;
+  }
   hapi_device_release(device);
   return HAP_OK;
 }

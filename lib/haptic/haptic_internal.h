@@ -37,6 +37,7 @@ typedef struct hapi_pointer_slot {
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;
   bool started;
+  _Atomic int restarting; /* out of the loop, LEFT, and its id is valid all the same */
   hap_device_info info;
   pthread_mutex_t target_lock; /* between applications that set */
   hapi_triple_buffer target_buffer;

@@ -229,6 +229,7 @@ hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
       return status;
     }
     atomic_store(&slot->phase, HAPI_POINTER_ADDED);
+    atomic_store(&slot->restarting, 0);
   }
   return HAP_OK;
 }
@@ -248,7 +249,8 @@ static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
   }
   hapi_pointer_slot *slot = &haptic->slots[index - 1];
   int phase = atomic_load(&slot->phase);
-  bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE;
+  bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE ||
+               (phase != HAPI_POINTER_EMPTY && atomic_load(&slot->restarting) != 0);
   return there && slot->generation == (uint32_t)(id.v >> 32) ? slot : NULL;
 }
 
@@ -364,7 +366,31 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
     hapi_device_release(slot->def.device);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
+  atomic_store(&slot->restarting, 0);
   return HAP_OK;
+}
+
+/* Not in the loop's thread: start may block. */
+hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return hapi_fail(detail, HAP_ERROR_NOT_FOUND, "there is no such pointer");
+  }
+  if (slot->ops == NULL || !haptic->begun) {
+    return hapi_fail(
+        detail, HAP_ERROR_STATE,
+        slot->ops == NULL ? "the pointer has no device" : "the session is not started");
+  }
+  atomic_store(&slot->restarting, 1);
+  leave_loop(haptic, slot);
+  stop_device(slot);
+  hap_status status = start_device(haptic, slot, detail);
+  if (status >= HAP_OK) {
+    atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
+    atomic_store(&slot->restarting, 0);
+  }
+  return status;
 }
 
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,

@@ -116,6 +116,16 @@ hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
                          : hapi_haptic_remove_pointer(session->haptic, pointer);
 }
 
+hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer)
+{
+  hap_detail detail = {""};
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_haptic_restart_pointer(session->haptic, pointer, &detail);
+  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail.text) : status;
+}
+
 hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                                   const hap_pose *pose, const hap_twist *twist)
 {

@@ -438,7 +438,14 @@ static void virtual_zero(void *self)
 static void virtual_stop(void *self)
 {
   virtual_device *device = self;
+  hapi_output_zero(&device->output);
   hapi_timeline_stop(&device->timeline);
+}
+
+static void virtual_held(void *self, hap_wrench *out)
+{
+  const virtual_device *device = self;
+  hapi_output_get(&device->output, out);
 }
 
 void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
@@ -470,4 +477,5 @@ const hap_device_ops hapi_virtual_ops = {
     .zero = virtual_zero,
     .stop = virtual_stop,
     .close = virtual_close,
+    .held = virtual_held,
 };
