@@ -111,6 +111,8 @@ typedef struct hap_stats {
   uint64_t stale_ticks;   /* ticks in which it was */
   uint64_t slewed_ticks;  /* ticks in which a force was held back by the slew limit */
   uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
+
+  double pose_delay_s; /* by which hap_session_poses draws behind */
 } hap_stats;
 
 HAP_END_DECLS

@@ -29,6 +29,8 @@ typedef struct hapi_capacity {
   uint32_t pointers;
   uint32_t geoms;       /* near the pointers */
   uint32_t hull_points; /* of all of them together */
+  uint32_t trail_rows;  /* 0: none are kept */
+  uint32_t trail_stride; /* ticks from row to row */
 } hapi_capacity;
 
 enum {
@@ -90,6 +92,7 @@ typedef struct hapi_model {
   uint64_t number;       /* 1, 2, 3 ... */
   int64_t state_ns;      /* time for which poses, A and b hold */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
+  int64_t sent_ns; /* drive FRAME: when physics was at work, which may be later than state_ns; else 0 */
   double blend_s;        /* model IMPULSE, interpolated: how long a body takes to its new pose */
   double period_s;       /* H, of the next step */
   hap_model model;
