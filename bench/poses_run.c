@@ -37,6 +37,13 @@ typedef struct run {
   poses_result *out;
 } run;
 
+static double distance(const double a[3], const double b[3])
+{
+  double d[3];
+  hapi_v3_sub(a, b, d);
+  return hapi_v3_norm(d);
+}
+
 static void path_add(path *p, int64_t time_ns, const hap_pose *pose)
 {
   if (p->count < p->capacity) {
@@ -83,13 +90,6 @@ static hap_pose path_at(const path *p, int64_t time_ns)
   return pose;
 }
 
-static double distance(const double a[3], const double b[3])
-{
-  double d[3];
-  hapi_v3_sub(a, b, d);
-  return hapi_v3_norm(d);
-}
-
 /* m that the path is long between two times. */
 static double path_length(const path *p, int64_t from_ns, int64_t to_ns)
 {
@@ -105,15 +105,16 @@ static double path_length(const path *p, int64_t from_ns, int64_t to_ns)
   return length + distance(at.position, end.position);
 }
 
-/* In model SINGLE the loop shows the world as it is; else it moves bodies that it owns or that are
- * pushed. What it makes do with of the others, until the next sync, is nobody's path. */
+/* In model SINGLE the loop shows the world as it is; else it moves bodies that it owns or has pushed
+ * since the last sync. What it makes do with of the others, until the next sync, is nobody's path. */
 static bool loop_has(const hapi_tick *tick, uint32_t slot)
 {
   if (slot == HAPI_SLOT_NONE || tick->model == HAP_MODEL_IMPULSE) {
     return false;
   }
   const hapi_local_body *body = &tick->bodies[slot];
-  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || body->pushed;
+  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
+         distance(body->impulse, body->given.impulse_taken) > 0.0;
 }
 
 static bool has_stepped(run *r)

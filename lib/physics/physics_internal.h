@@ -85,6 +85,7 @@ typedef struct hapi_drawn {
 typedef struct hapi_frames {
   int64_t stamps[HAPI_FRAMES]; /* rising; time for which the poses hold in what is felt */
   uint64_t count;              /* frames so far: the newest one is count - 1 */
+  uint64_t oldest;             /* that is kept; its place may be used by one that was taken back */
   double waits_ns[HAPI_FRAMES]; /* from the stamp of a frame until the next one was known */
   uint32_t wait_count;
   double delay_ns; /* at delay_from_ns, on its way to delay_wanted_ns */

@@ -67,16 +67,20 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
   } else {
     follow_waits(frames, step, known_ns);
   }
-  while (frames->count > 0 && frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
+  while (frames->count > frames->oldest && frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
     --frames->count;
   }
-  if (frames->count >= 2) {
+  if (frames->count >= frames->oldest + 2) {
     int64_t newest = frames->stamps[(frames->count - 1) % HAPI_FRAMES];
     int64_t before = frames->stamps[(frames->count - 2) % HAPI_FRAMES];
     frames->count -= (double)(newest - before) < FRAMES_APART * step;
   }
-  frames->stamps[frames->count % HAPI_FRAMES] = stamp_ns;
-  return frames->count++;
+  uint64_t frame = frames->count++;
+  frames->stamps[frame % HAPI_FRAMES] = stamp_ns;
+  if (frame >= frames->oldest + HAPI_FRAMES) {
+    frames->oldest = frame + 1 - HAPI_FRAMES;
+  }
+  return frame;
 }
 
 void hapi_pose_read(dBodyID body, hap_pose *out)
@@ -209,13 +213,17 @@ static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample
   return false;
 }
 
-/* The newest that is known of the body up to the time: in the trail, where the loop led it after the
- * last frame, or in that frame. */
+/* The newest that is known of the body up to the time: in the trail, or in a frame where that is later. A
+ * frame that only repeats the loop is no better than the trail; it stands in where that does not
+ * reach. */
 static bool find_before(drawing *d, const hapi_drawn *drawn, sample *out)
 {
   uint64_t first = drawn->first > d->frame_first ? drawn->first : d->frame_first;
-  bool framed = d->frame > first;
-  int64_t floor_ns = framed ? stamp_of(d, d->frame - 1) : INT64_MIN;
+  uint64_t frame = d->frame;
+  while (frame > first && is_led(drawn, frame - 1)) {
+    --frame;
+  }
+  int64_t floor_ns = frame > first ? stamp_of(d, frame - 1) : INT64_MIN;
   for (uint64_t row = drawn->generations[0] != 0 ? d->row : d->rows.first;
        row > d->rows.first && hapi_trail_time(&d->rows, row - 1, HAPI_TRAIL_BODIES) > floor_ns;
        --row) {
@@ -223,34 +231,31 @@ static bool find_before(drawing *d, const hapi_drawn *drawn, sample *out)
       return true;
     }
   }
-  if (framed) {
+  if (d->frame > first) {
     sample_frame(d, drawn, d->frame - 1, out);
   }
-  return framed;
+  return d->frame > first;
 }
 
-/* The next that is known of it after the time. A frame that only repeats the loop is no better than
- * the trail; it stands in where the trail does not reach. */
+/* The next that is known of it after the time, in the same way. */
 static bool find_after(drawing *d, const hapi_drawn *drawn, sample *out)
 {
-  uint64_t frame = d->frame > drawn->first ? d->frame : drawn->first;
+  uint64_t next = d->frame > drawn->first ? d->frame : drawn->first;
+  uint64_t frame = next;
   while (frame < d->frames->count && is_led(drawn, frame)) {
     ++frame;
   }
-  bool framed = frame < d->frames->count;
-  int64_t ceiling_ns = framed ? stamp_of(d, frame) : INT64_MAX;
+  int64_t ceiling_ns = frame < d->frames->count ? stamp_of(d, frame) : INT64_MAX;
   for (uint64_t row = drawn->generations[0] != 0 ? d->row : d->rows.end;
        row < d->rows.end && hapi_trail_time(&d->rows, row, HAPI_TRAIL_BODIES) < ceiling_ns; ++row) {
     if (sample_row(d, drawn, row, out)) {
       return true;
     }
   }
-  frame = framed ? frame : d->frame > drawn->first ? d->frame : drawn->first;
-  if (frame < d->frames->count) {
-    sample_frame(d, drawn, frame, out);
-    return true;
+  if (next < d->frames->count) {
+    sample_frame(d, drawn, frame < d->frames->count ? frame : next, out);
   }
-  return false;
+  return next < d->frames->count;
 }
 
 /* From the last but one frame through the last one, for one step at most. */
@@ -289,7 +294,7 @@ static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
 static void seek(drawing *d)
 {
   const hapi_frames *frames = d->frames;
-  d->frame_first = frames->count > HAPI_FRAMES ? frames->count - HAPI_FRAMES : 0;
+  d->frame_first = frames->oldest;
   d->frame = frames->count;
   while (d->frame > d->frame_first && stamp_of(d, d->frame - 1) > d->time_ns) {
     --d->frame;

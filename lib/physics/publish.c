@@ -65,8 +65,6 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
   out->linear_threshold2 = linear * linear;
   out->angular_threshold2 = angular * angular;
   out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
-  hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
-  hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
   memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
   memcpy(out->response, slot->response, sizeof out->response);
 }
@@ -85,6 +83,8 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
   memcpy(out->b, slot->b, sizeof out->b);
   memcpy(out->residual, slot->residual, sizeof out->residual);
+  hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
+  hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
   if (physics->model == HAP_MODEL_CONTACT) {
     fill_dynamics(physics, slot, out);
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {

@@ -58,6 +58,8 @@ typedef struct hapi_model_body {
   double residual[6]; /* velocity that the linear model missed (eq. 14), running total since the
                          slot's generation began: m/s, rad/s */
 
+  double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
+
   /* Model CONTACT only. */
   double mass;
   double inertia[9];         /* kg m^2, body frame, row-major */
@@ -69,7 +71,6 @@ typedef struct hapi_model_body {
   double linear_threshold2; /* m^2/s^2: damping acts above it */
   double angular_threshold2;
   double max_angular_speed; /* rad/s */
-  double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
   double gain_taken[6];    /* of hapi_state_body.gain, the same */
   double response[6][6];   /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;

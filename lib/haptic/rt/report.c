@@ -61,14 +61,22 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   }
 }
 
+/* The loop gave the body something that the world has not had yet. */
+static bool has_news(const hapi_local_body *body)
+{
+  return memcmp(body->impulse, body->given.impulse_taken, sizeof body->impulse) != 0 ||
+         memcmp(body->angular_impulse, body->given.impulse_taken + 3,
+                sizeof body->angular_impulse) != 0;
+}
+
 /* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body that
- * it does not own and nothing pushes takes the world's state then. */
+ * it does not own and gave nothing takes the world's state then. */
 static bool leads(const hapi_tick *tick, const hapi_local_body *body)
 {
   if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 || tick->model == HAP_MODEL_IMPULSE) {
     return false;
   }
-  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || body->pushed;
+  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || has_news(body);
 }
 
 static void store(_Atomic double *to, const double *from, int count)
