@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/thread.h"
+#include "session/frame_clock.h"
 
 const char *hap_model_name(hap_model model)
 {
@@ -172,8 +173,6 @@ hap_status hap_session_stop(hap_session *session)
 
 /* ---- the drives ---- */
 
-#define FRAME_S_MOST 86400.0 /* a machine that slept comes back with hours; more is no frame time */
-
 /* What update and advance have to say when they have done their work. */
 static hap_status outcome(const hap_session *session, uint64_t lost_before)
 {
@@ -186,10 +185,11 @@ static hap_status outcome(const hap_session *session, uint64_t lost_before)
 
 static hap_status check_update(hap_session *session, double frame_s)
 {
-  if (!(frame_s >= 0.0 && frame_s <= FRAME_S_MOST)) { /* false for NaN */
-    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
-                             "frame_s is %g: the seconds since the last call, 0 .. %g, are asked for",
-                             frame_s, FRAME_S_MOST);
+  if (!(frame_s >= 0.0 && frame_s <= HAPI_FRAME_S_MOST)) { /* false for NaN */
+    return hapi_session_fail(
+        session, HAP_ERROR_ARGUMENT,
+        "frame_s is %g: the seconds since the last call, 0 .. %g, are asked for", frame_s,
+        HAPI_FRAME_S_MOST);
   }
   if (!session->started || session->def.drive != HAP_DRIVE_FRAME) {
     return hapi_session_fail(session, HAP_ERROR_STATE,
@@ -206,22 +206,6 @@ static hap_status check_update(hap_session *session, double frame_s)
   return HAP_OK;
 }
 
-/* The steps end where the frame time has come to, which is the remainder before now: so they lie as
- * evenly on the clock as if physics had a thread of its own, whenever frames come. Where frame time
- * goes faster than the clock, they share what there is of it. */
-static void run_frame_steps(hap_session *session, int count, double period)
-{
-  int64_t last = hapi_physics_last_cycle(session->physics);
-  int64_t end = hapi_clock_now() - (int64_t)llround(1e9 * session->frame_remainder_s);
-  int64_t apart = (int64_t)llround(1e9 * period);
-  end = end < last + count ? last + count : end;
-  apart = (end - last) / count < apart ? (end - last) / count : apart;
-  for (int i = 0; i < count; ++i) {
-    int64_t now = end - (count - 1 - i) * apart;
-    hapi_physics_cycle(session->physics, now, now + (int64_t)llround(1e9 * period));
-  }
-}
-
 hap_status hap_session_update(hap_session *session, double frame_s)
 {
   if (session == NULL) {
@@ -233,15 +217,15 @@ hap_status hap_session_update(hap_session *session, double frame_s)
   }
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
   double period = hapi_physics_next_period(session->physics);
-  double steps = floor((session->frame_remainder_s + frame_s) / period + 1e-9);
-  double rest = session->frame_remainder_s + frame_s - steps * period;
-  session->frame_remainder_s = rest > 0.0 && rest < period ? rest : 0.0;
-  int count = steps > 3.0 ? 3 : (int)steps;
-  if (count > 0) {
-    run_frame_steps(session, count, period);
+  hapi_frame_steps steps =
+      hapi_frame_take(&session->frame_remainder_s, frame_s, period, hapi_clock_now(),
+                      hapi_physics_last_cycle(session->physics));
+  for (int i = 0; i < steps.count; ++i) {
+    int64_t now = steps.first_ns + i * steps.apart_ns;
+    hapi_physics_cycle(session->physics, now, now + (int64_t)llround(1e9 * period));
   }
-  if (steps > 3.0) {
-    hapi_physics_count_dropped_frames(session->physics, (uint64_t)(steps - 3.0));
+  if (steps.dropped > 0) {
+    hapi_physics_count_dropped_frames(session->physics, steps.dropped);
     return HAP_DROPPED;
   }
   return outcome(session, lost);
