@@ -57,6 +57,8 @@ static hap_status make_session(app *a, hap_detail *why)
   ode.space = a->space;
   ode.surface = wood;
   hand.radius = BALL;
+  hand.stiffness = 3000; /* N/m: a finger sinks in by 1 mm at 3 N */
+  hand.damping = 10;
   hap_status status = hap_session_create(&def, &ode, &a->session, why);
   if (status >= HAP_OK) {
     status = hap_device_open("virtual:path=0:-0.06/0/0.03;1.2:0.06/0/0.03", &a->device, why);
