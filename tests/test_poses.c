@@ -526,9 +526,10 @@ typedef struct drawer {
   atomic_int *stop;
   int frames;
   int back;  /* frames in which the cube went back */
-  int apart; /* in which it was ahead of the time */
   int wrong; /* status */
   double last;
+  double jump;     /* m, most that it went beyond its speed */
+  int64_t last_ns;
 } drawer;
 
 static void *draw_on(void *arg)
@@ -544,6 +545,9 @@ static void *draw_on(void *arg)
     d->wrong += status < HAP_OK && status != HAP_ERROR_NOT_FOUND;
     d->wrong += hap_session_poses_now(d->s->session, &d->s->cube, 1, &hand) < HAP_OK;
     d->back += pose.position[0] < d->last;
+    double way = 0.5e-9 * (double)(now - d->last_ns);
+    d->jump = d->last_ns > 0 ? fmax(d->jump, pose.position[0] - d->last - way) : 0.0;
+    d->last_ns = now;
     d->last = pose.position[0];
     ++d->frames;
     sleep_ms(1);
@@ -581,8 +585,8 @@ static void check_threads(hap_drive drive)
   atomic_store(&stop, 1);
   for (int i = 0; i < 3; ++i) {
     CHECK(pthread_join(drawers[i].thread, NULL) == 0);
-    printf("# %d frames, %d back, %d wrong, at %.3f m\n", drawers[i].frames, drawers[i].back,
-           drawers[i].wrong, drawers[i].last);
+    printf("# %d frames, %d back, %d wrong, at %.3f m, jump %.2g m\n", drawers[i].frames,
+           drawers[i].back, drawers[i].wrong, drawers[i].last, drawers[i].jump);
     CHECK(drawers[i].frames > 10 && drawers[i].wrong == 0);
     CHECK(drawers[i].last > 0.02);
     CHECK(drawers[i].back == 0);

@@ -72,6 +72,7 @@ typedef struct hapi_known_body {
 /* ---- poses.c: what is drawn ---- */
 
 #define HAPI_FRAMES 8u /* of the world, that are kept */
+#define HAPI_WAITS 16u
 
 /* Of a known body. Frame number n has place n % HAPI_FRAMES. */
 typedef struct hapi_drawn {
@@ -86,7 +87,7 @@ typedef struct hapi_frames {
   int64_t stamps[HAPI_FRAMES]; /* rising; time for which the poses hold in what is felt */
   uint64_t count;              /* frames so far: the newest one is count - 1 */
   uint64_t oldest;             /* that is kept; its place may be used by one that was taken back */
-  double waits_ns[HAPI_FRAMES]; /* from the stamp of a frame until the next one was known */
+  double waits_ns[HAPI_WAITS]; /* from the stamp of a frame until the next one was known */
   uint32_t wait_count;
   double delay_ns; /* at delay_from_ns, on its way to delay_wanted_ns */
   double delay_wanted_ns;
@@ -96,7 +97,7 @@ typedef struct hapi_frames {
 typedef struct hapi_body_table {
   hapi_known_body *entries;
   hapi_drawn *drawn; /* of each entry */
-  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
+  dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
   uint32_t *buckets; /* open addressing, entry index + 1 */

@@ -10,11 +10,12 @@
  *
  * What is drawn lies behind by a delay: one step H, so that there is a frame after it as well as one
  * before, or as much longer as frames really come late: physics needs its time to compute them, a frame
- * loop asks for them when it draws, a world that is too large takes longer than H. What has happened
- * twice in the last steps counts; a single hitch does not. The delay follows slowly, so that the time
- * that is drawn runs neither back nor visibly faster. */
+ * loop asks for them when it draws, a world that is too large takes longer than H. A single hitch does not
+ * count. The delay follows slowly, so that the time that is drawn runs neither back nor visibly
+ * faster. */
 
 #define DELAY_MOST 6.0         /* H */
+#define HITCH 0.5              /* H, that a single wait is longer than all others */
 #define DELAY_RISES 0.25       /* s a second: drawn time goes at three quarters of its pace */
 #define DELAY_SINKS 0.05       /* s a second */
 #define FRAMES_APART 0.25      /* H: frames of model SINGLE are kept no closer */
@@ -33,26 +34,26 @@ static double delay_at(const hapi_frames *frames, int64_t time_ns)
   return fabs(gap) <= way ? frames->delay_wanted_ns : frames->delay_ns + copysign(way, gap);
 }
 
-/* The second largest wait for a frame among the last ones. */
-static double usual_wait(const hapi_frames *frames)
+/* The largest wait for a frame among the last ones; one that stands out is a hitch and does not count. */
+static double usual_wait(const hapi_frames *frames, double step)
 {
   double largest = 0.0;
   double second = 0.0;
-  for (unsigned i = 0; i < HAPI_FRAMES; ++i) {
+  for (unsigned i = 0; i < HAPI_WAITS; ++i) {
     double wait = frames->waits_ns[i];
     second = fmax(second, fmin(wait, largest));
     largest = fmax(largest, wait);
   }
-  return second;
+  return largest - second > HITCH * step ? second : largest;
 }
 
 static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
 {
   double wait = (double)(known_ns - frames->stamps[(frames->count - 1) % HAPI_FRAMES]);
-  frames->waits_ns[frames->wait_count++ % HAPI_FRAMES] = wait;
+  frames->waits_ns[frames->wait_count++ % HAPI_WAITS] = wait;
   frames->delay_ns = delay_at(frames, known_ns);
   frames->delay_from_ns = known_ns;
-  frames->delay_wanted_ns = fmin(fmax(usual_wait(frames), step), DELAY_MOST * step);
+  frames->delay_wanted_ns = fmin(fmax(usual_wait(frames, step), step), DELAY_MOST * step);
 }
 
 /* Number of the frame for stamp_ns. One that is not later than those before takes their place, as a
@@ -67,7 +68,8 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
   } else {
     follow_waits(frames, step, known_ns);
   }
-  while (frames->count > frames->oldest && frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
+  while (frames->count > frames->oldest &&
+         frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
     --frames->count;
   }
   if (frames->count >= frames->oldest + 2) {
