@@ -528,7 +528,7 @@ typedef struct drawer {
   int back;  /* frames in which the cube went back */
   int wrong; /* status */
   double last;
-  double jump;     /* m, most that it went beyond its speed */
+  double jump; /* m, most that it went beyond its speed */
   int64_t last_ns;
 } drawer;
 

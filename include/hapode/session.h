@@ -118,7 +118,8 @@ HAP_API hap_status hap_session_stop(hap_session *session);
  * [s, 0 .. 86400], plus the remainder of earlier calls, at most 3; the rest is dropped and counted
  * (HAP_DROPPED, hap_stats.frames_dropped). Less time than the clock's is slow motion, none or no call a
  * pause: the world stands, the loop goes on with what is near, and after two steps the force fades, to
- * come back by itself. HAP_ERROR_ARGUMENT: frame_s is not such a time. HAP_ERROR_STATE: another drive,
+ * come back by itself. Model SINGLE needs another drive: its steps are those of the haptic loop.
+ * HAP_ERROR_ARGUMENT: frame_s is not such a time. HAP_ERROR_STATE: another drive,
  * or not started. HAP_ERROR_THREAD: another thread than that of start (ODE keeps data for each thread), a
  * callback, or this thread holds the lock. Nothing is done then, and the remainder stays.
  * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
