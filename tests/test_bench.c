@@ -156,6 +156,21 @@ TEST(jitter_leaves_its_table)
                 8);
 }
 
+TEST(poses_are_drawn_within_their_bound)
+{
+  const char *const arguments[] = {"poses", "--verify", "--quick", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "poses: 0 off") == 1);
+  CHECK(count_rows(file_in_folder("poses", ".csv"),
+                   "scene,model,physics_hz,frame_hz,frames,moved_mm,gap_mm,hand_mm,"
+                   "undelayed_hand_mm,path_mm,jump_mm,back_mm") == 8);
+  CHECK(count_rows(file_in_folder("poses_cost", ".csv"), "bodies,call_us") == 5);
+  CHECK(!plot_available() || exists(file_in_folder("poses", ".svg")));
+  unlink(file_in_folder("poses", ".csv"));
+  unlink(file_in_folder("poses", ".svg"));
+  unlink(file_in_folder("poses_cost", ".csv"));
+}
+
 TEST(impedance_is_that_of_the_closed_forms)
 {
   const char *const arguments[] = {"impedance", "--verify", "--quick", "--out", folder, NULL};
@@ -298,6 +313,7 @@ int main(void)
   RUN(fig7_leaves_its_table);
   RUN(jitter_leaves_its_table);
   RUN(scaling_leaves_its_table);
+  RUN(poses_are_drawn_within_their_bound);
   RUN(impedance_is_that_of_the_closed_forms);
   RUN(tick_leaves_its_table);
   RUN(accuracy_sets_models_side_by_side);

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""The program of the README is the example, and the example runs. Arguments: source root, binary."""
+"""The program of the README is the example, and the example runs. Arguments: source root, the
+binaries touch_a_cube and frame_loop."""
 import pathlib
 import re
 import subprocess
@@ -28,6 +29,14 @@ rows = re.findall(r"^cube at (-?[0-9.]+) m, hand feels (-?[0-9.]+) N$", run.stdo
 point(len(rows) == 90, "it prints a line a frame", f"{len(rows)} lines")
 point(any(float(f) < -0.2 for _, f in rows), "the hand feels the cube")
 point(bool(rows) and float(rows[-1][0]) > 0.01, "the cube moves")
+run = subprocess.run([sys.argv[3]], capture_output=True, text=True, timeout=30)
+point(run.returncode == 0, "the frame loop runs", run.stderr)
+rows = re.findall(r"^frame +\d+: box at (-?[0-9.]+) m, hand at (-?[0-9.]+) m, gap (-?[0-9.]+) mm$",
+                  run.stdout, re.M)
+point(len(rows) == 12, "it prints every tenth frame", f"{len(rows)} lines")
+point(bool(rows) and float(rows[-1][0]) > 0.05, "the box slides")
+point(bool(rows) and -2.0 < float(rows[-1][2]) <= 0.5, "the drawn hand touches the drawn box", run.stdout)
+point("examples/frame_loop.c" in readme, "the README speaks of it")
 for target in re.findall(r"\]\((?!http)([^)]+)\)", readme):
     point((root / target).exists(), f"{target} exists")
 print(f"1..{len(points)}")

@@ -89,10 +89,28 @@ HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
 HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                                                 void (*callback)(dBodyID));
 
-/* [any] Poses for drawing at time_ns (see hap_session_now): interpolated between physics steps one
- * H behind. HAP_STALE when physics is late by more than a step. Unknown bodies give HAP_ERROR_NOT_FOUND and leave out untouched. */
+/* [any] Poses for drawing at time_ns (see hap_session_now), of all bodies at one time, which lies behind
+ * time_ns by hap_stats.pose_delay_s: one physics step, and more where steps regularly come late. Bodies
+ * that the loop moves are where it had them at that time; the others are interpolated between two
+ * physics steps (slerp). So what touches is drawn touching, and with growing time_ns nothing goes back
+ * or jumps: bodies that come into the loop or leave it, and a change of model, do not show. The hand
+ * that belongs to it: hap_pointer_poses.
+ *
+ * A time that nobody knows yet gives the newest of each body, and HAP_STALE when that is later by more
+ * than a step (physics late or paused, time_ns in the future: a predicted time of display). At least
+ * 7 steps are kept (model SINGLE: 1.5), before which HAP_CLAMPED gives the oldest. Unknown bodies give
+ * HAP_ERROR_NOT_FOUND and leave out untouched: a body is known from the next step on, or from
+ * hap_session_adopt_body. One call for many bodies is cheaper than many; none of them keeps the
+ * haptic thread waiting. */
 HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                                      size_t count, hap_pose *out);
+
+/* [any] The same without delay: bodies that the loop moves after its newest tick, where hap_pointer_get
+ * has the hand; the others as they were at the last physics step, carried on by their last motion to
+ * that tick, for one step at most. Where that motion has changed they go back with the next step, and may
+ * meanwhile overlap. HAP_STALE when physics is late by more than a step. */
+HAP_API hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
+                                         hap_pose *out);
 
 /* [locked, or control before start] Bodies whose positions go into the trace, at most
  * HAP_TRACE_BODIES_MAX; replaces an earlier list. */

@@ -116,9 +116,15 @@ HAP_API HAP_NODISCARD hap_status hap_session_start(hap_session *session);
 /* [control] Zero force, then threads end. Idempotent. A stopped session can be started again. */
 HAP_API hap_status hap_session_stop(hap_session *session);
 
-/* [control] FRAME: runs the whole physics steps that fit into frame_s seconds [s, finite, >= 0]
- * plus the remainder of earlier calls, at most 3; the rest is dropped and counted
- * (HAP_DROPPED). HAP_FAULTED, HAP_BODY_LOST: see their texts. */
+/* [control] FRAME: runs the whole physics steps that fit into frame_s, the time since the last call
+ * [s, 0 .. 86400], plus the remainder of earlier calls, at most 3; the rest is dropped and counted
+ * (HAP_DROPPED, hap_stats.frames_dropped). Less time than the clock's is slow motion, none or no call a
+ * pause: the world stands, the loop goes on with what is near, and after two steps the force fades, to
+ * come back by itself. Model SINGLE needs another drive: its steps are those of the haptic loop.
+ * HAP_ERROR_ARGUMENT: frame_s is not such a time. HAP_ERROR_STATE: another drive,
+ * or not started. HAP_ERROR_THREAD: another thread than that of start (ODE keeps data for each thread), a
+ * callback, or this thread holds the lock. Nothing is done then, and the remainder stays.
+ * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
 
 /* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due.

@@ -119,6 +119,8 @@ typedef struct hap_stats {
   double wake_us_p99;
   double wake_us_p999;
   double wake_us_max;
+
+  double pose_delay_s; /* by which hap_session_poses draws behind */
 } hap_stats;
 
 HAP_END_DECLS

@@ -19,6 +19,7 @@ typedef enum hap_status {
   HAP_END = 5,         /* nothing further to read */
   HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
   HAP_FAULTED = 7,     /* done, but a fault is latched and the force is zero */
+  HAP_CLAMPED = 8,     /* the time asked for is no longer kept; the oldest that is was given */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */

@@ -278,6 +278,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);
   publish_poses(haptic);
+  hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);

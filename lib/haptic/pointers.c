@@ -254,6 +254,11 @@ static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
   return there && slot->generation == (uint32_t)(id.v >> 32) ? slot : NULL;
 }
 
+bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id)
+{
+  return find_slot(haptic, id) != NULL;
+}
+
 static uint32_t free_slot(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {

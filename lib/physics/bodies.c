@@ -61,22 +61,27 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
+  hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || drawn == NULL || buckets == NULL) {
     hapi_free(entries);
     hapi_free(handles);
+    hapi_free(drawn);
     hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
+    memcpy(drawn, table->drawn, table->high * sizeof *drawn);
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
+  hapi_free(table->drawn);
   hapi_free(table->buckets);
   table->entries = entries;
   table->handles = handles;
+  table->drawn = drawn;
   table->buckets = buckets;
   table->capacity = capacity;
   table->bucket_count = capacity * 4;
@@ -97,6 +102,7 @@ void hapi_bodies_finish(hapi_body_table *table)
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
+  hapi_free(table->drawn);
   hapi_free(table->buckets);
   memset(table, 0, sizeof *table);
 }
@@ -164,6 +170,7 @@ static bool see_body(hapi_physics *physics, dBodyID body)
     if (table->starved) {
       return false;
     }
+    hapi_poses_begin(physics, index);
   }
   hapi_known_body *known = &table->entries[index];
   known->seen = table->scan;
@@ -176,6 +183,7 @@ static bool see_body(hapi_physics *physics, dBodyID body)
     memset(&known->sleep, 0, sizeof known->sleep);
     known->slot = HAPI_NONE;
     known->extent = extent_of(body);
+    hapi_poses_begin(physics, index);
   }
   if (physics->begun) {
     hapi_sleep_take(known);
@@ -304,6 +312,9 @@ hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_
   *out_index = hapi_bodies_find(&physics->table, body);
   if (*out_index == HAPI_NONE) {
     status = add(&physics->table, body, out_index);
+    if (status >= HAP_OK) {
+      hapi_poses_begin(physics, *out_index);
+    }
   }
   pthread_mutex_unlock(&physics->poses_lock);
   if (status >= HAP_OK) {

@@ -76,4 +76,5 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   fill_times(physics, out);
   fill_momentum(physics, out);
   pthread_mutex_unlock(&physics->shown_lock);
+  out->pose_delay_s = hapi_poses_delay(physics);
 }

@@ -79,7 +79,7 @@ static void global_step(hapi_physics *physics)
   hapi_sleep_note(physics);
 }
 
-static void sync_in(hapi_physics *physics, int64_t now_ns)
+static void sync_in(hapi_physics *physics)
 {
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
   dJointGroupEmpty(physics->contact_group);
@@ -93,9 +93,6 @@ static void sync_in(hapi_physics *physics, int64_t now_ns)
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   hapi_reconcile_take(physics);
-  if (physics->model == HAP_MODEL_IMPULSE) {
-    hapi_publish_poses(physics, now_ns);
-  }
   hapi_world_read_user_wrenches(physics);
   hapi_reconcile_own(physics);
 }
@@ -113,9 +110,10 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
   physics->last_cycle_ns = now_ns;
-  if (physics->model != HAP_MODEL_IMPULSE) {
-    hapi_publish_poses(physics, now_ns);
-  }
+  /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
+  int64_t lag_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;
+  hapi_poses_publish(physics, physics->model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
+                     physics->config.lockstep ? now_ns : hapi_clock_now());
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5])
@@ -143,7 +141,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
-  sync_in(physics, now_ns);
+  sync_in(physics);
   if (!world_is_sound(physics)) {
     return;
   }

@@ -195,8 +195,8 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
   physics->start_ns = *start_ns;
   physics->last_cycle_ns = *start_ns;
-  hapi_publish_poses(physics, *start_ns);
-  hapi_publish_poses(physics, *start_ns);
+  hapi_poses_reset(physics);
+  hapi_poses_publish(physics, *start_ns, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
   hapi_reconcile_leave(physics);
   hapi_counts_show(physics);
@@ -215,6 +215,11 @@ void hapi_physics_end(hapi_physics *physics)
   }
   give_world_back(physics);
   hapi_fair_lock_give(&physics->lock);
+}
+
+int64_t hapi_physics_last_cycle(const hapi_physics *physics)
+{
+  return physics->last_cycle_ns;
 }
 
 double hapi_physics_period(const hapi_physics *physics)

@@ -67,13 +67,37 @@ typedef struct hapi_known_body {
   double user_torque[3];
   void (*moved_callback)(dBodyID);
   hapi_sleep sleep;
-  hap_pose poses[2]; /* at the last but one and the last cycle, for drawing */
-  int pose_count;
 } hapi_known_body;
+
+/* ---- poses.c: what is drawn ---- */
+
+#define HAPI_FRAMES 8u /* of the world, that are kept */
+#define HAPI_WAITS 16u
+
+/* Of a known body. Frame number n has place n % HAPI_FRAMES. */
+typedef struct hapi_drawn {
+  hap_pose poses[HAPI_FRAMES];
+  uint64_t first;          /* frame with a pose */
+  uint32_t led;            /* bits: in this frame the pose is only the loop's */
+  uint32_t slots[2];       /* in the trail: now, and before */
+  uint32_t generations[2]; /* 0: none */
+} hapi_drawn;
+
+typedef struct hapi_frames {
+  int64_t stamps[HAPI_FRAMES]; /* rising; time for which the poses hold in what is felt */
+  uint64_t count;              /* frames so far: the newest one is count - 1 */
+  uint64_t oldest;             /* that is kept; its place may be used by one that was taken back */
+  double waits_ns[HAPI_WAITS]; /* from the stamp of a frame until the next one was known */
+  uint32_t wait_count;
+  double delay_ns; /* at delay_from_ns, on its way to delay_wanted_ns */
+  double delay_wanted_ns;
+  int64_t delay_from_ns;
+} hapi_frames;
 
 typedef struct hapi_body_table {
   hapi_known_body *entries;
-  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
+  hapi_drawn *drawn; /* of each entry */
+  dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
   uint32_t *buckets; /* open addressing, entry index + 1 */
@@ -368,8 +392,8 @@ struct hapi_physics {
   bool has_new_state;    /* state came in this cycle */
   double probe_step_s;   /* H */
   int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
-  int64_t pose_times[2];
-  pthread_mutex_t poses_lock; /* physics and those who draw */
+  hapi_frames frames;
+  pthread_mutex_t poses_lock; /* physics and those who draw: frames, and the table's places */
 
   uint32_t watch[HAP_TRACE_BODIES_MAX]; /* body table entries */
   uint32_t watch_count;
@@ -536,7 +560,17 @@ void hapi_reconcile_leave(hapi_physics *physics);     /* last: what is left in O
 
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
-void hapi_publish_poses(hapi_physics *physics, int64_t now_ns);
+
+/* poses.c */
+void hapi_pose_read(dBodyID body, hap_pose *out);
+/* A step can leave a pose that is none, which is found out at the next cycle only. */
+bool hapi_pose_is_sound(dBodyID body);
+/* A frame of all bodies, for stamp_ns, at known_ns. */
+void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns);
+/* A body that is new can be drawn at once, as it is now. The caller holds poses_lock. */
+void hapi_poses_begin(hapi_physics *physics, uint32_t index);
+void hapi_poses_reset(hapi_physics *physics);
+double hapi_poses_delay(hapi_physics *physics); /* s */
 
 /* physics.c */
 void hapi_physics_enter(hapi_physics *physics); /* takes the lock, whoever waits */

@@ -145,6 +145,25 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
   return hapi_haptic_set_target(session->haptic, pointer, pose, twist);
 }
 
+hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,
+                             hap_pose *out_proxy, hap_pose *out_device)
+{
+  hap_pose poses[2];
+  if (session == NULL || (out_proxy == NULL && out_device == NULL)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  int64_t drawn_ns = hapi_physics_drawn_time(session->physics, time_ns);
+  int64_t step_ns = (int64_t)(1e9 / session->def.physics_hz);
+  hap_status status = hapi_haptic_pointer_poses(session->haptic, pointer, drawn_ns, step_ns, poses);
+  if (status >= HAP_OK && out_proxy != NULL) {
+    *out_proxy = poses[0];
+  }
+  if (status >= HAP_OK && out_device != NULL) {
+    *out_device = poses[1];
+  }
+  return status;
+}
+
 hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
                            hap_pointer_state *out, size_t size_of_out)
 {
