@@ -7,12 +7,6 @@
 
 /* What the application says of its bodies, and what it asks of them. */
 
-bool hapi_physics_may_edit(hapi_physics *physics)
-{
-  return !physics->begun || physics->config.lockstep || hapi_physics_in_callback(physics) ||
-         hapi_fair_lock_is_mine(&physics->lock);
-}
-
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 {
   uint32_t index;

@@ -335,6 +335,14 @@ typedef struct hapi_edit {
   void *arg;
 } hapi_edit;
 
+/* Of the application's threads. Written by the one that has the lock. */
+typedef struct hapi_lock_figures {
+  _Atomic uint64_t count;
+  _Atomic int64_t wait_most_ns;
+  _Atomic int64_t held_most_ns;
+  int64_t taken_ns; /* by the one that has it */
+} hapi_lock_figures;
+
 struct hapi_physics {
   hapi_physics_config config;
   hap_ode_def ode;
@@ -342,10 +350,13 @@ struct hapi_physics {
   dContact *contact_scratch;
 
   hapi_fair_lock lock;
+  hapi_lock_figures lock_figures;
+  bool editable; /* in a callback that may create and destroy, or in an edit */
   pthread_mutex_t edits_lock;
   hapi_edit edits[HAPI_EDITS_MAX];
   uint32_t edit_first;
   uint32_t edit_count;
+  bool edits_closed;
 
   hapi_body_table table;
   hapi_body_slot *bodies;      /* capacity.bodies */
@@ -538,8 +549,12 @@ void hapi_reconcile_leave(hapi_physics *physics);     /* last: what is left in O
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
 void hapi_publish_poses(hapi_physics *physics, int64_t now_ns);
 
-/* physics.c */
-void hapi_physics_enter(hapi_physics *physics); /* takes the lock, whoever waits */
+/* world_lock.c */
+void hapi_physics_enter(hapi_physics *physics); /* takes the lock, for calls of the application */
+void hapi_physics_leave(hapi_physics *physics);
+void hapi_physics_claim(hapi_physics *physics); /* this thread calls the application: it has the */
+void hapi_physics_unclaim(hapi_physics *physics); /* lock already, and may not take or give it */
+void hapi_lock_figures_reset(hapi_lock_figures *figures);
 
 /* counts.c */
 void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */
