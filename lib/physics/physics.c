@@ -181,6 +181,7 @@ static void prepare(hapi_physics *physics)
   physics->step_s = 0.0;
   physics->model_number = 0;
   physics->world_faulty = false;
+  physics->table.said_lost = false;
   physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
   if (physics->config.lockstep) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);

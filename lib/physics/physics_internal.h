@@ -48,6 +48,12 @@ typedef struct hapi_sleep {
   bool ring_full;
 } hapi_sleep;
 
+typedef struct hapi_mark {
+  bool placed;
+  bool in_axis;
+  double idle_time; /* s, the application's, which the mark stands in for */
+} hapi_mark;
+
 typedef struct hapi_known_body {
   dBodyID body;  /* NULL: free entry */
   uint64_t seen; /* scan that found it */
@@ -63,10 +69,12 @@ typedef struct hapi_known_body {
   bool loop_touched;
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
+  uint64_t geoms_print; /* of the geoms that it was measured of */
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
   void (*moved_callback)(dBodyID);
   hapi_sleep sleep;
+  hapi_mark mark;
   hap_pose poses[2]; /* at the last but one and the last cycle, for drawing */
   int pose_count;
 } hapi_known_body;
@@ -81,6 +89,8 @@ typedef struct hapi_body_table {
   uint32_t used;
   uint64_t scan;
   uint64_t lost;
+  uint32_t replaced; /* among them, not counted yet: another one is at the address */
+  bool said_lost;
   bool starved; /* the newest scan found no memory for a body: not all are known */
 } hapi_body_table;
 
@@ -225,8 +235,9 @@ typedef struct hapi_mesh {
   dGeomID geom;
   dTriMeshDataID data;
   uint32_t count;
-  double *corners; /* count x 9, geom's frame */
-  double *boxes;   /* of every few triangles, x 6 */
+  uint64_t checked_in; /* walk that looked whether it is the same mesh */
+  double *corners;     /* count x 9, geom's frame */
+  double *boxes;       /* of every few triangles, x 6 */
 } hapi_mesh;
 
 typedef struct hapi_near_triangle {
@@ -409,7 +420,19 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
 hap_status hapi_bodies_scan(hapi_physics *physics);
 hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
-void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
+hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body);
+hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+                                          void (*callback)(dBodyID));
+
+/* extent.c */
+void hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed */
+
+/* mark.c: tells a body from a later one at its address */
+void hapi_mark_place(hapi_known_body *known);
+bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
+/* What the application has set since; true: the idle time of auto-disable is another one. */
+bool hapi_mark_follow(hapi_known_body *known);
+void hapi_mark_remove(hapi_known_body *known); /* idempotent */
 
 /* accelerance.c */
 /* Of a dynamic body at a rotation of ODE's. */
@@ -422,7 +445,7 @@ bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text);
 bool hapi_contact_is_sound(const dContactGeom *contact);
 
 /* sleep.c: ODE's auto-disable, kept by us because a probe would reset ODE's own */
-void hapi_sleep_take(hapi_known_body *known);               /* idempotent */
+void hapi_sleep_follow(hapi_known_body *known);             /* takes over; and what is set later */
 void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
 void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
 void hapi_sleep_note(hapi_physics *physics);                /* just after it */

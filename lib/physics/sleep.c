@@ -18,20 +18,8 @@ static void start_countdown(hapi_sleep *sleep)
   sleep->time_left = sleep->idle_time;
 }
 
-void hapi_sleep_take(hapi_known_body *known)
+static void read_settings(hapi_sleep *sleep, dBodyID body)
 {
-  dBodyID body = known->body;
-  hapi_sleep *sleep = &known->sleep;
-  if (sleep->taken) {
-    return;
-  }
-  memset(sleep, 0, sizeof *sleep);
-  sleep->taken = true;
-  sleep->awake = true;
-  sleep->automatic = dBodyGetAutoDisableFlag(body) != 0;
-  if (!sleep->automatic) {
-    return;
-  }
   sleep->linear_threshold = dBodyGetAutoDisableLinearThreshold(body);
   sleep->linear_threshold *= sleep->linear_threshold;
   sleep->angular_threshold = dBodyGetAutoDisableAngularThreshold(body);
@@ -46,27 +34,90 @@ void hapi_sleep_take(hapi_known_body *known)
       hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
     }
   }
+}
+
+/* Switching it off also enables the body, and gives it the world's steps, time and samples. */
+static void switch_off(const hapi_sleep *sleep, dBodyID body)
+{
   bool enabled = dBodyIsEnabled(body) != 0;
-  dBodySetAutoDisableFlag(body, 0); /* also enables the body and resets its settings */
+  dBodySetAutoDisableFlag(body, 0);
+  dBodySetAutoDisableSteps(body, sleep->idle_steps);
+  dBodySetAutoDisableTime(body, sleep->idle_time);
+  if (dBodyGetAutoDisableAverageSamplesCount(body) != sleep->samples) {
+    dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
+  }
   if (!enabled) {
     dBodyDisable(body);
+  }
+}
+
+static void take(hapi_known_body *known)
+{
+  hapi_sleep *sleep = &known->sleep;
+  memset(sleep, 0, sizeof *sleep);
+  sleep->taken = true;
+  sleep->awake = true;
+  sleep->automatic = dBodyGetAutoDisableFlag(known->body) != 0;
+  if (sleep->automatic) {
+    read_settings(sleep, known->body);
+    switch_off(sleep, known->body);
+  }
+  hapi_mark_place(known);
+}
+
+/* The application has switched it on, with the settings that the body has now. */
+static void take_again(hapi_known_body *known)
+{
+  hapi_mark_remove(known);
+  hapi_free(known->sleep.velocities);
+  take(known);
+}
+
+/* Another idle time: set by the application, or by dBodySetAutoDisableFlag(body, 0), which gives the
+ * world's and leaves no other trace, as the flag is off all the time. */
+static void take_time(hapi_known_body *known)
+{
+  hapi_sleep *sleep = &known->sleep;
+  double time = known->mark.idle_time;
+  if (time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body))) {
+    hapi_free(sleep->velocities);
+    memset(sleep, 0, sizeof *sleep);
+    sleep->taken = sleep->awake = true;
+  } else if (sleep->automatic) {
+    sleep->idle_time = time;
+    start_countdown(sleep);
+  }
+}
+
+void hapi_sleep_follow(hapi_known_body *known)
+{
+  if (!known->sleep.taken) {
+    take(known);
+  } else if (dBodyGetAutoDisableFlag(known->body) != 0) {
+    take_again(known);
+  } else if (hapi_mark_follow(known)) {
+    take_time(known);
+  }
+}
+
+/* What ODE counted before the session does not count any more. */
+static void restart_countdown(dBodyID body)
+{
+  int samples = dBodyGetAutoDisableAverageSamplesCount(body);
+  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)samples);
+  if (dBodyIsEnabled(body)) {
+    dBodyEnable(body);
   }
 }
 
 void hapi_sleep_give_back(hapi_known_body *known)
 {
   hapi_sleep *sleep = &known->sleep;
-  if (!sleep->taken || !sleep->automatic) {
-    sleep->taken = false;
-    return;
+  hapi_mark_remove(known);
+  if (sleep->taken && sleep->automatic) {
+    dBodySetAutoDisableFlag(known->body, 1);
+    restart_countdown(known->body);
   }
-  dBodyID body = known->body;
-  dBodySetAutoDisableLinearThreshold(body, sqrt(sleep->linear_threshold));
-  dBodySetAutoDisableAngularThreshold(body, sqrt(sleep->angular_threshold));
-  dBodySetAutoDisableSteps(body, sleep->idle_steps);
-  dBodySetAutoDisableTime(body, sleep->idle_time);
-  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
-  dBodySetAutoDisableFlag(body, 1);
   hapi_free(sleep->velocities);
   memset(sleep, 0, sizeof *sleep);
 }
