@@ -32,6 +32,22 @@ static hap_pointer_state state_of(stage *s, hap_pointer_id id)
   return state;
 }
 
+static const hapi_known_body *known_of(stage *s)
+{
+  const hapi_body_table *table = &s->session->physics->table;
+  return &table->entries[hapi_bodies_find(table, s->cube)];
+}
+
+static const hapi_sleep *sleep_of(stage *s)
+{
+  return &known_of(s)->sleep;
+}
+
+static double extent_of(stage *s)
+{
+  return known_of(s)->extent;
+}
+
 /* ---- another body at the address of a destroyed one ---- */
 
 /* The cube goes, and a new one comes to be at its address; false: the heap would not. */
@@ -241,9 +257,13 @@ TEST(settings_of_sleep_that_are_changed_while_running_hold)
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
   dBodySetAutoDisableTime(s.cube, 2.5);
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 7);
+  dBodySetAutoDisableSteps(s.cube, 9);
+  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 9);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   body_read(s.cube, &bits);
-  CHECK(bits.automatic == 1 && bits.idle_time == 2.5 && bits.idle_steps == 7 && bits.samples == 4);
+  CHECK(bits.automatic == 1 && bits.idle_time == 2.5 && bits.idle_steps == 9 && bits.samples == 4);
   CHECK(fabs(bits.thresholds[0] - 0.25) < 1e-15);
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
@@ -324,12 +344,6 @@ TEST(an_adopted_body_that_lost_its_geom_lives_when_it_is_adopted_again)
     CHECK(stats_of(&s).bodies_known == (again != 0 ? 1u : 0u));
     stage_end(&s);
   }
-}
-
-static double extent_of(stage *s)
-{
-  const hapi_body_table *table = &s->session->physics->table;
-  return table->entries[hapi_bodies_find(table, s->cube)].extent;
 }
 
 TEST(the_reach_of_a_body_is_that_of_its_geoms_now)

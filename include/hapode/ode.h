@@ -43,7 +43,8 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * What the session sets on bodies from start to stop, and gives back then: the flag and the idle time of
  * auto-disable (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where that is off. By these
  * it tells a body from a later one at its address. What the application sets of auto-disable meanwhile
- * holds, when the time is set after the flag.
+ * holds; an idle time set to the world's default alone reads as dBodySetAutoDisableFlag(body, 0), which
+ * leaves no other trace.
  *
  * Bodies known to the session: those of the geoms in space (and in spaces inside it), whatever is
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these

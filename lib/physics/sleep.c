@@ -18,12 +18,24 @@ static void start_countdown(hapi_sleep *sleep)
   sleep->time_left = sleep->idle_time;
 }
 
+static double squared(double value)
+{
+  return value * value;
+}
+
+/* The idle time has the mark in its place. */
+static bool were_changed(const hapi_sleep *sleep, dBodyID body)
+{
+  return sleep->linear_threshold != squared(dBodyGetAutoDisableLinearThreshold(body)) ||
+         sleep->angular_threshold != squared(dBodyGetAutoDisableAngularThreshold(body)) ||
+         sleep->idle_steps != dBodyGetAutoDisableSteps(body) ||
+         sleep->samples != dBodyGetAutoDisableAverageSamplesCount(body);
+}
+
 static void read_settings(hapi_sleep *sleep, dBodyID body)
 {
-  sleep->linear_threshold = dBodyGetAutoDisableLinearThreshold(body);
-  sleep->linear_threshold *= sleep->linear_threshold;
-  sleep->angular_threshold = dBodyGetAutoDisableAngularThreshold(body);
-  sleep->angular_threshold *= sleep->angular_threshold;
+  sleep->linear_threshold = squared(dBodyGetAutoDisableLinearThreshold(body));
+  sleep->angular_threshold = squared(dBodyGetAutoDisableAngularThreshold(body));
   sleep->idle_steps = dBodyGetAutoDisableSteps(body);
   sleep->idle_time = dBodyGetAutoDisableTime(body);
   sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
@@ -97,6 +109,9 @@ void hapi_sleep_follow(hapi_known_body *known)
     take_again(known);
   } else if (hapi_mark_follow(known)) {
     take_time(known);
+  } else if (known->sleep.automatic && were_changed(&known->sleep, known->body)) {
+    dBodySetAutoDisableFlag(known->body, 1);
+    take_again(known);
   }
 }
 
