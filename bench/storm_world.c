@@ -374,6 +374,8 @@ void storm_world_open(storm_world *w, uint64_t seed)
     dGeomSetPosition(w->walls[i], 0.1 * i - 0.15, 0.3, 0.0);
   }
   dWorldSetCFM(w->world, 1e-6);
+  dWorldSetMaxAngularSpeed(w->world, 50.0); /* else ODE's gyroscopic term runs away at 60 Hz */
+  dWorldSetContactMaxCorrectingVel(w->world, 1.0);
   for (int i = 0; i < STORM_THINGS / 2; ++i) {
     create_body(w, &w->things[i]);
   }
