@@ -297,6 +297,7 @@ static void edit_settings(storm_world *w, storm_thing *t)
 {
   dBodySetAutoDisableFlag(t->body, chance(w, 0.5));
   dBodySetAutoDisableTime(t->body, uniform(w, 0.0, 0.5));
+  dBodySetAutoDisableSteps(t->body, below(w, 20));
   dBodySetLinearDamping(t->body, uniform(w, 0.0, 0.1));
   dBodySetGyroscopicMode(t->body, chance(w, 0.5));
   dBodySetGravityMode(t->body, chance(w, 0.8));

@@ -158,6 +158,7 @@ TEST(a_body_is_taken_for_itself_whatever_is_set_on_it)
   dMassSetBoxTotal(&mass, 3.0, 0.2, 0.1, 0.1);
   for (int i = 0; i < 14; ++i) {
     CHECK(hap_session_advance(s.session, 25) == HAP_OK); /* not HAP_BODY_LOST */
+    dBodySetAutoDisableTime(s.cube, 1.0 + i);            /* in whatever state it is */
     switch (i) {
       case 0:
         dBodySetAutoDisableTime(s.cube, 2.0);
@@ -260,11 +261,14 @@ TEST(settings_of_sleep_that_are_changed_while_running_hold)
   CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 7);
   dBodySetAutoDisableSteps(s.cube, 9);
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  dBodySetAutoDisableAngularThreshold(s.cube, 0.75);
+  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  CHECK(fabs(sleep_of(&s)->angular_threshold - 0.75 * 0.75) < 1e-15);
   CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 9);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   body_read(s.cube, &bits);
   CHECK(bits.automatic == 1 && bits.idle_time == 2.5 && bits.idle_steps == 9 && bits.samples == 4);
-  CHECK(fabs(bits.thresholds[0] - 0.25) < 1e-15);
+  CHECK(fabs(bits.thresholds[0] - 0.25) + fabs(bits.thresholds[1] - 0.75) < 1e-15);
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
   dBodySetAutoDisableFlag(s.cube, 0);

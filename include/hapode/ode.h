@@ -40,8 +40,8 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * moved callbacks) come while lists of the world are in use: they read it, and what they want changed they
  * post. docs/editing.md has more.
  *
- * What the session sets on bodies from start to stop, and gives back then: the flag and the idle time of
- * auto-disable (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where that is off. By these
+ * What the session sets on bodies from start to stop, and gives back then: flag, idle time and angular
+ * threshold of auto-disable (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where that is off. By these
  * it tells a body from a later one at its address. What the application sets of auto-disable meanwhile
  * holds; an idle time set to the world's default alone reads as dBodySetAutoDisableFlag(body, 0), which
  * leaves no other trace.

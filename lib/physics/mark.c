@@ -6,17 +6,25 @@
 
 /* The heap gives a new body the address of a destroyed one, often at once, and nothing that ODE keeps
  * of a body says which one it is. So a body that is known carries a mark in data that ODE does not use
- * while it is there: the idle time of auto-disable, which is off (sleep.c), and the axis of finite
- * rotation where the application has none and the mode is off. Without any of it the body is another
- * one. Two places, because an application may set one of them in a session; the user pointer is the
- * application's alone. */
+ * while it is there: the idle time and the angular threshold of auto-disable, which is off (sleep.c), and
+ * the axis of finite rotation where the application has none and the mode is off. Without any of it the
+ * body is another one. Several places, because an application may set some of them in a session; the
+ * user pointer is the application's alone. */
 
-#define MARK_TIME (-4.2424242424e17) /* s: no application's idle time */
+#define MARK_TIME (-4.2424242424e17)   /* s: no application's idle time */
+#define MARK_THRESHOLD 4.2424242424e17 /* rad/s: nor its threshold */
 static const double mark_axis[3] = {0.48, 0.6, 0.64};
 
 static bool time_is_there(dBodyID body)
 {
   return dBodyGetAutoDisableTime(body) == MARK_TIME;
+}
+
+/* ODE keeps its square. */
+static bool threshold_is_there(dBodyID body)
+{
+  double threshold = dBodyGetAutoDisableAngularThreshold(body);
+  return fabs(threshold - MARK_THRESHOLD) < 1e-12 * MARK_THRESHOLD;
 }
 
 /* ODE normalises the axis: its last bit may be another. */
@@ -51,20 +59,30 @@ static void place_time(hapi_known_body *known)
   dBodySetAutoDisableTime(known->body, MARK_TIME);
 }
 
+static void place_threshold(hapi_known_body *known)
+{
+  known->mark.angular_threshold =
+      threshold_is_there(known->body)
+          ? dWorldGetAutoDisableAngularThreshold(dBodyGetWorld(known->body))
+          : dBodyGetAutoDisableAngularThreshold(known->body);
+  dBodySetAutoDisableAngularThreshold(known->body, MARK_THRESHOLD);
+}
+
 void hapi_mark_place(hapi_known_body *known)
 {
   place_time(known);
+  place_threshold(known);
   place_axis(known);
   known->mark.placed = true;
 }
 
 bool hapi_mark_is_gone(const hapi_known_body *known)
 {
-  return known->mark.placed && !time_is_there(known->body) &&
+  return known->mark.placed && !time_is_there(known->body) && !threshold_is_there(known->body) &&
          !(known->mark.in_axis && axis_is_there(known->body));
 }
 
-bool hapi_mark_follow(hapi_known_body *known)
+unsigned hapi_mark_follow(hapi_known_body *known)
 {
   dBodyID body = known->body;
   bool axis = known->mark.in_axis && axis_is_there(body);
@@ -73,11 +91,16 @@ bool hapi_mark_follow(hapi_known_body *known)
     axis = false;
   }
   known->mark.in_axis = axis;
-  if (time_is_there(body)) {
-    return false;
+  unsigned changed = 0;
+  if (!time_is_there(body)) {
+    place_time(known);
+    changed |= HAPI_MARK_TIME;
   }
-  place_time(known);
-  return true;
+  if (!threshold_is_there(body)) {
+    place_threshold(known);
+    changed |= HAPI_MARK_THRESHOLD;
+  }
+  return changed;
 }
 
 void hapi_mark_remove(hapi_known_body *known)
@@ -87,6 +110,9 @@ void hapi_mark_remove(hapi_known_body *known)
   }
   if (time_is_there(known->body)) {
     dBodySetAutoDisableTime(known->body, known->mark.idle_time);
+  }
+  if (threshold_is_there(known->body)) {
+    dBodySetAutoDisableAngularThreshold(known->body, known->mark.angular_threshold);
   }
   if (known->mark.in_axis && axis_is_there(known->body)) {
     dBodySetFiniteRotationAxis(known->body, 0.0, 0.0, 0.0);

@@ -51,7 +51,8 @@ typedef struct hapi_sleep {
 typedef struct hapi_mark {
   bool placed;
   bool in_axis;
-  double idle_time; /* s, the application's, which the mark stands in for */
+  double idle_time;         /* s, the application's, which the mark stands in for */
+  double angular_threshold; /* rad/s, the same */
 } hapi_mark;
 
 typedef struct hapi_known_body {
@@ -430,8 +431,10 @@ void hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms h
 /* mark.c: tells a body from a later one at its address */
 void hapi_mark_place(hapi_known_body *known);
 bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
-/* What the application has set since; true: the idle time of auto-disable is another one. */
-bool hapi_mark_follow(hapi_known_body *known);
+/* What the application has set since, of auto-disable. */
+#define HAPI_MARK_TIME 1u
+#define HAPI_MARK_THRESHOLD 2u
+unsigned hapi_mark_follow(hapi_known_body *known);
 void hapi_mark_remove(hapi_known_body *known); /* idempotent */
 
 /* accelerance.c */

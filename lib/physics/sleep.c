@@ -23,11 +23,10 @@ static double squared(double value)
   return value * value;
 }
 
-/* The idle time has the mark in its place. */
+/* Those that have no mark in their place. */
 static bool were_changed(const hapi_sleep *sleep, dBodyID body)
 {
   return sleep->linear_threshold != squared(dBodyGetAutoDisableLinearThreshold(body)) ||
-         sleep->angular_threshold != squared(dBodyGetAutoDisableAngularThreshold(body)) ||
          sleep->idle_steps != dBodyGetAutoDisableSteps(body) ||
          sleep->samples != dBodyGetAutoDisableAverageSamplesCount(body);
 }
@@ -77,7 +76,7 @@ static void take(hapi_known_body *known)
   hapi_mark_place(known);
 }
 
-/* The application has switched it on, with the settings that the body has now. */
+/* With the settings that the application has given to the body by now. */
 static void take_again(hapi_known_body *known)
 {
   hapi_mark_remove(known);
@@ -85,31 +84,28 @@ static void take_again(hapi_known_body *known)
   take(known);
 }
 
-/* Another idle time: set by the application, or by dBodySetAutoDisableFlag(body, 0), which gives the
- * world's and leaves no other trace, as the flag is off all the time. */
-static void take_time(hapi_known_body *known)
+/* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other trace: the
+ * flag is off all the time. */
+static bool was_switched_off(const hapi_known_body *known, unsigned changed)
 {
-  hapi_sleep *sleep = &known->sleep;
-  double time = known->mark.idle_time;
-  if (time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body))) {
-    hapi_free(sleep->velocities);
-    memset(sleep, 0, sizeof *sleep);
-    sleep->taken = sleep->awake = true;
-  } else if (sleep->automatic) {
-    sleep->idle_time = time;
-    start_countdown(sleep);
-  }
+  return (changed & HAPI_MARK_TIME) != 0 &&
+         known->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body));
 }
 
 void hapi_sleep_follow(hapi_known_body *known)
 {
   if (!known->sleep.taken) {
     take(known);
-  } else if (dBodyGetAutoDisableFlag(known->body) != 0) {
+    return;
+  }
+  if (dBodyGetAutoDisableFlag(known->body) != 0) {
     take_again(known);
-  } else if (hapi_mark_follow(known)) {
-    take_time(known);
-  } else if (known->sleep.automatic && were_changed(&known->sleep, known->body)) {
+    return;
+  }
+  unsigned changed = hapi_mark_follow(known);
+  if (was_switched_off(known, changed)) {
+    take_again(known);
+  } else if (known->sleep.automatic && (changed != 0 || were_changed(&known->sleep, known->body))) {
     dBodySetAutoDisableFlag(known->body, 1);
     take_again(known);
   }
