@@ -639,6 +639,60 @@ TEST(a_full_queue_is_said)
   CHECK(atomic_load(&run) == 256);
 }
 
+/* ---- order of geoms ---- */
+
+/* Of those that rest; how many there are. */
+static int list_order(const stage *s, dGeomID mover, dGeomID out[16])
+{
+  int count = 0;
+  for (int i = 0; i < dSpaceGetNumGeoms(s->space) && count < 16; ++i) {
+    dGeomID geom = dSpaceGetGeom(s->space, i);
+    if (geom != mover) {
+      out[count++] = geom;
+    }
+  }
+  return count;
+}
+
+/* In ODE's list the geoms that came later are in front, and here they rest. */
+TEST(a_sleeping_neighbour_may_lie_behind_geoms_that_rest)
+{
+  for (int nested = 0; nested < 2; ++nested) {
+    stage s;
+    stage_init(&s, HAP_DRIVE_LOCKSTEP);
+    s.def.model = HAP_MODEL_ACCELERANCE;
+    dBodyDisable(s.cube);
+    if (nested != 0) {
+      dSpaceID inside = dSimpleSpaceCreate(dHashSpaceCreate(s.space));
+      dSpaceRemove(s.space, s.geom);
+      dSpaceAdd(inside, s.geom);
+      dGeomSetPosition(dCreateSphere(inside, 0.1), 0.0, 5.0, 0.0);
+    }
+    for (int i = 1; i < 5; ++i) {
+      dGeomSetPosition(dCreateSphere(s.space, 0.1), 0.0, 0.0, i);
+      dBodyDisable(add_cube(&s, 1.0 * i, NULL));
+    }
+    dGeomID before[16];
+    dGeomID after[16];
+    dGeomID flier;
+    dBodyID flies = add_cube(&s, 20.0, &flier);
+    dBodySetLinearVel(flies, 1.0, 0.0, 0.0);
+    REQUIRE(stage_create(&s) == HAP_OK);
+    hap_pointer_id hand = add_hand(&s, -0.0605); /* not touching */
+    int count = list_order(&s, flier, before);
+    REQUIRE(hap_session_start(s.session) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 500) == HAP_OK); /* ODE would end the process */
+    CHECK(stats_of(&s).probe_steps > 0 && !dBodyIsEnabled(s.cube));
+    CHECK(list_order(&s, flier, after) == count && count == 9);
+    CHECK(memcmp(before, after, (size_t)count * sizeof before[0]) == 0);
+    const hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_set_target(s.session, hand, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 300) == HAP_OK);
+    CHECK(dBodyGetPosition(s.cube)[0] > 0.01); /* it was felt */
+    stage_end(&s);
+  }
+}
+
 /* ---- meshes ---- */
 
 static double corners[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
@@ -707,6 +761,7 @@ int main(void)
   RUN(edits_that_post_themselves_end_with_the_session);
   RUN(what_was_taken_is_run_once_whatever_threads_post);
   RUN(a_full_queue_is_said);
+  RUN(a_sleeping_neighbour_may_lie_behind_geoms_that_rest);
   RUN(a_mesh_that_is_built_anew_is_read_anew);
   dCloseODE();
   return tap_done();
