@@ -25,8 +25,11 @@ void hapi_counts_range(hapi_physics *physics, double seconds)
 
 void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
 {
-  physics->figures.stats.frames_dropped += steps; /* in drive FRAME physics is the caller */
-  hapi_counts_show(physics);
+  /* In drive FRAME physics is the caller; but the table of bodies may be another's now. */
+  physics->figures.stats.frames_dropped += steps;
+  pthread_mutex_lock(&physics->shown_lock);
+  physics->shown.stats.frames_dropped = physics->figures.stats.frames_dropped;
+  pthread_mutex_unlock(&physics->shown_lock);
 }
 
 static void fill_lock(const hapi_physics *physics, hap_stats *out)
