@@ -98,7 +98,8 @@ HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
 
 /* [locked, or control before start] ODE has no getter for a body's moved callback, so the session
- * can keep one silent in testing simulations only when it was set here (NULL: none). */
+ * can keep one silent in testing simulations only when it was set here (NULL: none). It holds until the body
+ * is forgotten or noticed to be gone; between stop and start nothing is noticed: forget it there. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                                                 void (*callback)(dBodyID));
 

@@ -70,7 +70,7 @@ typedef struct hap_stats {
   uint64_t capacity_dropped; /* bodies or contacts that found no room */
   uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept */
   uint64_t states_rejected;  /* non-finite states kept away from ODE */
-  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body; the first is said as well */
+  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body; said once */
 
   /* Momentum audit: what the hands gave to dynamic bodies, before the limits of the devices, against
    * what the world got. A body that is destroyed takes what it was given since the last sync along. */
