@@ -113,9 +113,8 @@ typedef struct hap_stats {
   uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
 
   /* The world between threads. The haptic loop never waits for the lock. */
-  uint64_t locks; /* times that application threads had the lock */
-  double
-      lock_wait_ms_max; /* ms, longest that one of them waited for it; tries in vain do not count */
+  uint64_t locks;          /* times that application threads had the lock */
+  double lock_wait_ms_max; /* ms, longest wait of one of them; tries in vain do not count */
   double lock_held_ms_max; /* ms, longest that one of them had it: physics cannot step meanwhile */
   uint64_t edits_run;      /* of hap_session_post */
 } hap_stats;
