@@ -18,6 +18,8 @@ typedef struct program {
 
 static const program programs[] = {
     {"accuracy", bench_accuracy, "what accuracy costs in time; --scene NAME: of one scene alone"},
+    {"edits", bench_edits,
+     "a world that threads change all the time under sixteen hands: ticks, steps, waits, forces"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},

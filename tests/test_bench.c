@@ -129,6 +129,25 @@ TEST(fig5_is_as_the_paper_and_the_closed_form_say)
   CHECK(count_lines(file_in_folder("said", ""), "fig5: 0 off") == 1);
 }
 
+/* Of the checks those that are no times hold on every machine. */
+TEST(edits_leaves_its_table)
+{
+  const char *const arguments[] = {"edits", "--quick", "--verify", "--out", folder, NULL};
+  int status = run(arguments, environ);
+  CHECK(status == 0 || status == 1);
+  CHECK(count_lines(file_in_folder("said", ""),
+                    " 0 bad, 0 devices not released, 0 faults, 0 wrong") == 3);
+  CHECK(count_lines(file_in_folder("said", ""), "ok     momentum: hands gave") == 3);
+  CHECK(count_rows(file_in_folder("edits", ".csv"),
+                   "drive,model,seconds,hands,editors,edits,posts,ticks,missed_ticks,contact_ticks,"
+                   "physics_steps,physics_missed,physics_ms_max,locks,wait_ms_p50,wait_ms_p99,"
+                   "wait_ms_max,held_ms_max,peak_n,steepest_n,lost,untold,impulse_abs_ns,momentum_"
+                   "error_ns,faults") == 3);
+  CHECK(!plot_available() || exists(file_in_folder("edits", ".svg")));
+  unlink(file_in_folder("edits", ".csv"));
+  unlink(file_in_folder("edits", ".svg"));
+}
+
 TEST(fig6_leaves_its_table)
 {
   check_program("fig6", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
@@ -309,6 +328,7 @@ int main(void)
   }
   RUN(fig5_leaves_its_tables);
   RUN(fig5_is_as_the_paper_and_the_closed_form_say);
+  RUN(edits_leaves_its_table);
   RUN(fig6_leaves_its_table);
   RUN(fig7_leaves_its_table);
   RUN(jitter_leaves_its_table);

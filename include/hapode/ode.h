@@ -36,7 +36,15 @@ typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_di
 typedef void (*hap_step_fn)(void *user, double step_s);
 
 /* The application's world. From start to stop it is touched only under hap_session_lock, in a
- * posted edit, or in one of these callbacks.
+ * posted edit, in before_step, or in after_step. The other callbacks (surface, friction_direction, ODE's
+ * moved callbacks) come while lists of the world are in use: they read it, and what they want changed they
+ * post. docs/editing.md has more.
+ *
+ * What the session sets on bodies from start to stop, and gives back then: flag, idle time and angular
+ * threshold of auto-disable (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where that is off. By these
+ * it tells a body from a later one at its address. What the application sets of auto-disable meanwhile
+ * holds; an idle time set to the world's default alone reads as dBodySetAutoDisableFlag(body, 0), which
+ * leaves no other trace.
  *
  * Bodies known to the session: those of the geoms in space (and in spaces inside it), whatever is
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
@@ -73,19 +81,25 @@ HAP_API HAP_NODISCARD hap_status hap_session_create(const hap_session_def *def,
                                                     const hap_ode_def *ode, hap_session **out,
                                                     hap_detail *detail);
 
-/* [locked, or control before start] Makes known a body without geom and without joint. Forget it
- * before dBodyDestroy. */
+/* [locked, or control before start] Makes known a body without geom and without joint, or one that is about
+ * to lose its last. Forget it before dBodyDestroy: of such a body nobody else knows that it is gone. */
 HAP_API HAP_NODISCARD hap_status hap_session_adopt_body(hap_session *session, dBodyID body);
 
-/* [locked] Before dBodyDestroy: the session drops what it knows of the body. */
+/* [locked] Before dBodyDestroy: the session drops what it knows of the body, and gives back what it had
+ * set on it. HAP_ERROR_NOT_FOUND: it knew nothing, which is no harm. Without it a body that is gone is
+ * noticed at the next step all the same, also when a new one has got its address: it is counted
+ * (hap_stats.bodies_lost, HAP_BODY_LOST) and said once. A body that is forgotten and not destroyed comes in
+ * again as a new one. */
 HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 
 /* [locked] Before dGeomDestroy of a geom that a pointer may be near to, and after a change of the
- * triangles of a mesh. */
+ * triangles of a mesh. Without it the first is noticed at the next step, and of the second only what
+ * shows in 16 triangles spread over the mesh. */
 HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
 
 /* [locked, or control before start] ODE has no getter for a body's moved callback, so the session
- * can keep one silent in testing simulations only when it was set here (NULL: none). */
+ * can keep one silent in testing simulations only when it was set here (NULL: none). It holds until the body
+ * is forgotten or noticed to be gone; between stop and start nothing is noticed: forget it there. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                                                 void (*callback)(dBodyID));
 

@@ -99,12 +99,15 @@ typedef struct hap_pointer_def {
 /* [any] Fills *def with defaults. */
 HAP_API void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def);
 
-/* [control] Adds a pointer, also while running; it feels forces from the next sync on.
- * HAP_ERROR_CAPACITY beyond max_pointers; HAP_ERROR_STATE when the device is in use. */
+/* [control] Adds a pointer, also while running; it feels forces from the next sync on, ramped in as at
+ * the start. HAP_ERROR_CAPACITY beyond max_pointers; HAP_ERROR_STATE when the device serves another
+ * pointer, of this session or another one. */
 HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def,
                                                  hap_pointer_id *out);
 
-/* [control] Zero force, device stopped, id invalid. */
+/* [control] Zero force, device stopped, id invalid; the last thing that the device was given is zero.
+ * Waits for the loop's next tick, not for the lock. HAP_ERROR_NOT_FOUND for an id of a pointer that was
+ * removed, here and below: its place may have another pointer by now, which has another id. */
 HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
 
 /* [control] Stops the pointer's device and starts it again: for one that was lost, unplugged or switched

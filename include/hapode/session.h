@@ -105,7 +105,7 @@ HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
 
 /* [control] Stops, writes zero force to every device, frees. NULL is allowed. A lock that this
  * thread holds is given up; in a callback nothing happens. The world goes back
- * to the application as it is, with ODE's auto-disable as it was found. */
+ * to the application as it is, with ODE's auto-disable as it was found. Posted edits that still wait are run. */
 HAP_API void hap_session_destroy(hap_session *session);
 
 /* [control] THREADS: starts both threads; FRAME: the haptic one; LOCKSTEP: builds the first local
@@ -131,23 +131,30 @@ HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
  * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
 
-/* [app] Between lock and unlock this thread alone may touch the ODE world. Waits at most one
- * physics step. Not recursive. Legal before start and after stop. HAP_ERROR_THREAD from a callback
- * or when this thread holds the lock. */
+/* [app] Between lock and unlock this thread alone may touch the ODE world. Served in order of arrival: it
+ * waits for at most one physics step, and for what application threads before it do under the lock. Not
+ * recursive. Physics waits while it is held (hap_stats.lock_held_ms_max), the haptic loop does not. Legal
+ * before start and after stop. HAP_ERROR_THREAD, with a text, from a callback or a posted edit, where
+ * the world may be touched without it, or when this thread has the lock. */
 HAP_API HAP_NODISCARD hap_status hap_session_lock(hap_session *session);
 
-/* [app] As lock, but gives up after timeout_ns (0: at once) with HAP_ERROR_TIMEOUT. */
+/* [app] As lock, but gives up after timeout_ns (0: at once; INT64_MAX: never) with HAP_ERROR_TIMEOUT.
+ * Below 0: HAP_ERROR_ARGUMENT. */
 HAP_API HAP_NODISCARD hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns);
 
-/* [app] The thread that locked. */
+/* [app] The thread that locked; any other, and one in a callback: HAP_ERROR_THREAD. */
 HAP_API hap_status hap_session_unlock(hap_session *session);
 
 /* [physics] An edit of the world that hap_session_post was given. */
 typedef void (*hap_edit_fn)(void *arg);
 
 /* [any] Runs edit(arg) in the physics thread before its next step. In order of posting; at most
- * 256 wait at a time (HAP_ERROR_CAPACITY). Edits not yet run when the session stops are run by
- * stop. */
+ * 256 wait at a time (HAP_ERROR_CAPACITY: it is not taken). May be called in callbacks and in edits, and
+ * before start; not in a device's read or write, as it may wait for another thread that posts. What an
+ * edit posts runs at the next step. stop runs the edits that wait and what they post, 16 rounds of it; what
+ * is left then waits for the next start, or is run by destroy, which takes no more (HAP_ERROR_STATE). So
+ * what was taken is run, once. An edit is a callback: it may touch the world, adopt and forget, but not
+ * lock, start, stop, destroy, add or remove pointers. */
 HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit_fn edit,
                                                   void *arg);
 

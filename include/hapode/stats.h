@@ -70,10 +70,10 @@ typedef struct hap_stats {
   uint64_t capacity_dropped; /* bodies or contacts that found no room */
   uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept */
   uint64_t states_rejected;  /* non-finite states kept away from ODE */
-  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body */
+  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body; said once */
 
   /* Momentum audit: what the hands gave to dynamic bodies, before the limits of the devices, against
-   * what the world got. */
+   * what the world got. A body that is destroyed takes what it was given since the last sync along. */
   double impulse_ns;        /* N s, norm of the net impulse on the bodies */
   double impulse_abs_ns;    /* N s, sum over ticks of the norms */
   double momentum_ratio;    /* world / hand along the net impulse; NaN while the net is below 5 %
@@ -121,6 +121,12 @@ typedef struct hap_stats {
   double wake_us_max;
 
   double pose_delay_s; /* by which hap_session_poses draws behind */
+
+  /* The world between threads. The haptic loop never waits for the lock. */
+  uint64_t locks;          /* times that application threads had the lock */
+  double lock_wait_ms_max; /* ms, longest wait of one of them; tries in vain do not count */
+  double lock_held_ms_max; /* ms, longest that one of them had it: physics cannot step meanwhile */
+  uint64_t edits_run;      /* of hap_session_post */
 } hap_stats;
 
 HAP_END_DECLS

@@ -6,12 +6,6 @@
 
 /* What the application says of its bodies. */
 
-bool hapi_physics_may_edit(hapi_physics *physics)
-{
-  return !physics->begun || physics->config.lockstep || hapi_physics_in_callback(physics) ||
-         hapi_fair_lock_is_mine(&physics->lock);
-}
-
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 {
   uint32_t index;
@@ -20,12 +14,7 @@ hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 
 hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 {
-  uint32_t index = hapi_bodies_find(&physics->table, body);
-  if (index == HAPI_NONE) {
-    return HAP_ERROR_NOT_FOUND;
-  }
-  hapi_bodies_forget(physics, index);
-  return HAP_OK;
+  return hapi_bodies_forget(physics, body);
 }
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
@@ -45,17 +34,7 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
                                            void (*callback)(struct dxBody *))
 {
-  uint32_t index = hapi_bodies_find(&physics->table, body);
-  if (index == HAPI_NONE) {
-    hap_status status = hapi_bodies_scan(physics);
-    index = hapi_bodies_find(&physics->table, body);
-    if (index == HAPI_NONE) {
-      return status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
-    }
-  }
-  physics->table.entries[index].moved_callback = callback;
-  dBodySetMovedCallback(body, callback);
-  return HAP_OK;
+  return hapi_bodies_set_moved_callback(physics, body, callback);
 }
 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,

@@ -79,6 +79,15 @@ static void global_step(hapi_physics *physics)
   hapi_sleep_note(physics);
 }
 
+static void call_step(hapi_physics *physics, hap_step_fn callback)
+{
+  if (callback != NULL && physics->step_s > 0.0) {
+    physics->editable = true;
+    callback(physics->ode.user, physics->step_s);
+    physics->editable = false;
+  }
+}
+
 static void sync_in(hapi_physics *physics)
 {
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
@@ -86,9 +95,7 @@ static void sync_in(hapi_physics *physics)
   hapi_edits_run(physics);
   follow_model(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
-  if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
-    physics->ode.before_step(physics->ode.user, physics->step_s);
-  }
+  call_step(physics, physics->ode.before_step);
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
@@ -163,16 +170,12 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   sync_out(physics, now_ns, next_ns);
   seconds[4] += lap(&watch);
   note_times(physics, seconds);
-  if (physics->ode.after_step != NULL && physics->step_s > 0.0) {
-    physics->ode.after_step(physics->ode.user, physics->step_s);
-  }
+  call_step(physics, physics->ode.after_step);
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   hapi_physics_enter(physics);
-  atomic_store(&physics->cycle_thread, (unsigned long)pthread_self());
   run(physics, now_ns, next_ns);
-  atomic_store(&physics->cycle_thread, 0);
-  hapi_fair_lock_give(&physics->lock);
+  hapi_physics_leave(physics);
 }

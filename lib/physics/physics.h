@@ -46,6 +46,10 @@ void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);
 void hapi_physics_end(hapi_physics *physics); /* gives the world back; idempotent */
 
+/* [control] After end, before anything of the session is destroyed: runs the edits that are left, which
+ * may call the session. Nothing can be posted any more. */
+void hapi_physics_close(hapi_physics *physics);
+
 /* [control] Between begin and end: the thread of drive THREADS. */
 hap_status hapi_physics_start_thread(hapi_physics *physics);
 void hapi_physics_stop_thread(hapi_physics *physics); /* idempotent */

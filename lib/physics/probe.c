@@ -313,8 +313,8 @@ void hapi_test_leave(hapi_physics *physics)
   for (uint32_t i = 0; i < test->disabled_count; ++i) {
     dBodyEnable(test->disabled[i]);
   }
-  hapi_space_order_restore(physics);
   hapi_snapshot_restore(&physics->snapshot); /* also switches sleeping members off again */
+  hapi_space_order_restore(physics);         /* it asks where the geoms are: after the poses */
   test->cut_count = 0;
   test->disabled_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, test->islands_threads);

@@ -56,6 +56,7 @@ void hap_session_destroy(hap_session *session)
   }
   (void)hapi_physics_unlock(session->physics); /* where this thread has it, stop would wait */
   hap_session_stop(session);
+  hapi_physics_close(session->physics);
   hapi_haptic_destroy(session->haptic);
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
@@ -314,26 +315,65 @@ int64_t hap_session_now(const hap_session *session)
 
 /* ---- the world, between threads ---- */
 
+static hap_status say_why_not_locked(hap_session *session, hap_status status)
+{
+  if (status == HAP_ERROR_THREAD) {
+    return hapi_session_fail(session, status, "%s",
+                             hapi_physics_in_callback(session->physics)
+                                 ? "lock in a callback or a posted edit: there the world may be "
+                                   "touched without it"
+                                 : "lock by a thread that has the lock already: it is not "
+                                   "recursive, unlock first");
+  }
+  return status;
+}
+
 hap_status hap_session_lock(hap_session *session)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, -1);
+  return session == NULL ? HAP_ERROR_ARGUMENT
+                         : say_why_not_locked(session, hapi_physics_lock(session->physics, -1));
 }
 
 hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns)
 {
-  bool bad = session == NULL || timeout_ns < 0;
-  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, timeout_ns);
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (timeout_ns < 0) {
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "timeout_ns is %lld: below 0; hap_session_lock waits without end",
+                             (long long)timeout_ns);
+  }
+  return say_why_not_locked(session, hapi_physics_lock(session->physics, timeout_ns));
 }
 
 hap_status hap_session_unlock(hap_session *session)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_unlock(session->physics);
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_physics_unlock(session->physics);
+  return status < HAP_OK
+             ? hapi_session_fail(session, status, "unlock by a thread that does not have the lock")
+             : status;
 }
 
 hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
 {
-  bool bad = session == NULL || edit == NULL;
-  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_post(session->physics, edit, arg);
+  if (session == NULL || edit == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_physics_post(session->physics, edit, arg);
+  if (status == HAP_ERROR_CAPACITY) {
+    return hapi_session_fail(
+        session, status,
+        "256 posted edits wait for the next physics step already; this one was "
+        "not taken");
+  }
+  return status < HAP_OK
+             ? hapi_session_fail(session, status,
+                                 "the session is being destroyed: the edit was not taken")
+             : status;
 }
 
 hap_status hap_session_set_model(hap_session *session, hap_model model)

@@ -205,8 +205,11 @@ static hap_status may_edit(hap_session *session, const void *object)
     return HAP_ERROR_ARGUMENT;
   }
   if (!hapi_physics_may_edit(session->physics)) {
-    return hapi_session_fail(session, HAP_ERROR_THREAD,
-                             "take hap_session_lock first, or do it in a posted edit");
+    return hapi_session_fail(session, HAP_ERROR_THREAD, "%s",
+                             hapi_physics_in_callback(session->physics)
+                                 ? "not in a surface, direction or moved callback: post an edit, "
+                                   "or do it in before_step or after_step"
+                                 : "take hap_session_lock first, or do it in a posted edit");
   }
   return HAP_OK;
 }
