@@ -30,7 +30,8 @@ typedef struct hap_device_info {
 } hap_device_info;
 
 /* [control] Opens a device by its spec: a name, then ':' and arguments separated by commas, such
- * as "virtual", "virtual:sine=0.1/0/0,hz=1", "replay:hand.csv,scale=0.5". On failure *out is
+ * as "virtual", "virtual:sine=0.1/0/0,hz=1", "replay:hand.csv,scale=0.5"; or from a shared object,
+ * "module:/whole/path.so,ARGUMENTS" (docs/writing-a-device.md). On failure *out is
  * NULL and detail (may be NULL) says what was wrong and, for an unknown name, which exist.
  * May block. The caller owns the device and closes it after the session that uses it stopped. */
 HAP_API HAP_NODISCARD hap_status hap_device_open(const char *spec, hap_device **out,

@@ -22,7 +22,9 @@ typedef enum hapi_pointer_phase {
   HAPI_POINTER_ADDED = 1,   /* by the application, not yet seen by the loop */
   HAPI_POINTER_ACTIVE = 2,  /* the loop uses it */
   HAPI_POINTER_LEAVING = 3, /* to be let go by the loop */
-  HAPI_POINTER_LEFT = 4     /* let go; the application cleans up */
+  HAPI_POINTER_LEFT = 4,    /* let go; the application cleans up */
+  HAPI_POINTER_PAUSING = 5, /* as LEAVING and LEFT, and its id stays valid: */
+  HAPI_POINTER_PAUSED = 6   /* its device is being started again, or did not start */
 } hapi_pointer_phase;
 
 typedef struct hapi_pointer_target {
@@ -37,7 +39,6 @@ typedef struct hapi_pointer_slot {
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;
   bool started;
-  _Atomic int restarting; /* out of the loop, LEFT, and its id is valid all the same */
   hap_device_info info;
   pthread_mutex_t target_lock; /* between applications that set */
   hapi_triple_buffer target_buffer;

@@ -22,7 +22,6 @@ static bool prepare_slots(hapi_haptic *haptic)
   }
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     atomic_init(&haptic->slots[i].phase, HAPI_POINTER_EMPTY);
-    atomic_init(&haptic->slots[i].restarting, 0);
     pthread_mutex_init(&haptic->slots[i].target_lock, NULL);
     pthread_mutex_init(&haptic->slots[i].state_lock, NULL);
   }

@@ -71,6 +71,11 @@ static bool is_ready(const hapi_pointer_slot *slot)
   return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
+static int phase_after(int way)
+{
+  return way == HAPI_POINTER_LEAVING ? HAPI_POINTER_LEFT : HAPI_POINTER_PAUSED;
+}
+
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
@@ -78,13 +83,14 @@ void hapi_pointers_follow(hapi_haptic *haptic)
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
     if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
       activate(haptic, i);
-      atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
-    } else if (phase == HAPI_POINTER_LEAVING) {
+      /* Fails when the application wants it back meanwhile: seen at the next tick. */
+      (void)atomic_compare_exchange_strong(&slot->phase, &phase, HAPI_POINTER_ACTIVE);
+    } else if (phase == HAPI_POINTER_LEAVING || phase == HAPI_POINTER_PAUSING) {
       haptic->tick.pointers[i].generation = 0;
       if (slot->ops != NULL) {
         slot->ops->zero(slot->self);
       }
-      atomic_store_explicit(&slot->phase, HAPI_POINTER_LEFT, memory_order_release);
+      atomic_store_explicit(&slot->phase, phase_after(phase), memory_order_release);
     }
   }
 }
@@ -229,7 +235,6 @@ hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
       return status;
     }
     atomic_store(&slot->phase, HAPI_POINTER_ADDED);
-    atomic_store(&slot->restarting, 0);
   }
   return HAP_OK;
 }
@@ -250,7 +255,7 @@ static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
   hapi_pointer_slot *slot = &haptic->slots[index - 1];
   int phase = atomic_load(&slot->phase);
   bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE ||
-               (phase != HAPI_POINTER_EMPTY && atomic_load(&slot->restarting) != 0);
+               phase == HAPI_POINTER_PAUSING || phase == HAPI_POINTER_PAUSED;
   return there && slot->generation == (uint32_t)(id.v >> 32) ? slot : NULL;
 }
 
@@ -348,10 +353,10 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *d
 }
 
 /* The loop lets go of the pointer; when no loop runs, it is done here. */
-static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot)
+static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot, hapi_pointer_phase way)
 {
-  atomic_store(&slot->phase, HAPI_POINTER_LEAVING);
-  while (haptic->thread.running && atomic_load(&slot->phase) != HAPI_POINTER_LEFT) {
+  atomic_store(&slot->phase, (int)way);
+  while (haptic->thread.running && atomic_load(&slot->phase) != phase_after((int)way)) {
     hapi_clock_sleep_until(hapi_clock_now() + 1000000);
   }
   if (!haptic->thread.running) {
@@ -365,13 +370,12 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
-  leave_loop(haptic, slot);
+  leave_loop(haptic, slot, HAPI_POINTER_LEAVING);
   stop_device(slot);
   if (slot->def.device != NULL) {
     hapi_device_release(slot->def.device);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
-  atomic_store(&slot->restarting, 0);
   return HAP_OK;
 }
 
@@ -387,13 +391,11 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
         detail, HAP_ERROR_STATE,
         slot->ops == NULL ? "the pointer has no device" : "the session is not started");
   }
-  atomic_store(&slot->restarting, 1);
-  leave_loop(haptic, slot);
+  leave_loop(haptic, slot, HAPI_POINTER_PAUSING);
   stop_device(slot);
   hap_status status = start_device(haptic, slot, detail);
   if (status >= HAP_OK) {
     atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
-    atomic_store(&slot->restarting, 0);
   }
   return status;
 }
