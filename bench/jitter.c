@@ -274,7 +274,8 @@ static hap_status draw(bench *b, const rate *rates, size_t count)
     }
     fprintf(script,
             "set title 'Woken up late: the haptic thread and cyclictest'\n"
-            "set xtics ('median' 0, '99 in 100' 1, '999 in 1000' 2, 'largest' 3)\nset xrange [-0.2:3.2]\n"
+            "set xtics ('median' 0, '99 in 100' 1, '999 in 1000' 2, 'largest' 3)\nset xrange "
+            "[-0.2:3.2]\n"
             "set ylabel 'us'\nset logscale y\nset grid y\nset key top left\nplot ");
     for (size_t i = 0; i < count; ++i) {
       fprintf(script, "$own%zu with linespoints lw 2 title 'hapode, %.0f Hz'%s", i, rates[i].hz,

@@ -33,10 +33,14 @@ static const hard_point points[] = {
      {PROXY, 1e3, 1e-3, 16, true, STABILITY_BACKED, STABILITY_RELAXED, 0, 0, false}},
     {"32 light cubes on a floor",
      {PROXY, 1e3, 1e-3, 32, true, STABILITY_BACKED, STABILITY_RELAXED, 0, 0, false}},
-    {"64 cubes on a floor: more than is solved in a tick",
+    {"64 cubes on a floor",
      {PROXY, 1e3, 0.1, 64, true, STABILITY_BACKED, STABILITY_TENSE, 0, 0, false}},
     {"64 light, stiff cubes between two sides",
      {AUTO, 1e6, 1e-3, 64, true, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+    {"64 heavy, soft cubes between two sides, late device",
+     {AUTO, 100, 10, 64, true, STABILITY_CAGE, STABILITY_RELAXED, 2, 3e-5, true}},
+    {"the same, softer and without a hand",
+     {PROXY, 10, 10, 64, true, STABILITY_CAGE, STABILITY_NONE, 1.5, 3e-5, false}},
 };
 
 static bench unused; /* takes the text of an error */

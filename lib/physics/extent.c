@@ -68,7 +68,7 @@ static uint64_t print_of(dBodyID body)
 {
   uint64_t print = 1;
   for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    dVector3 sizes;
+    dVector3 sizes = {0};
     print = mix(print, (uint64_t)(uintptr_t)geom);
     print = mix_numbers(print, sizes, sizes_of(geom, sizes));
     if (dGeomIsOffset(geom)) {

@@ -17,6 +17,7 @@ OTHER = re.compile(r"^typedef (?!struct \w+ \{|enum \w+ \{)[^;]*?\b(\w+)(?:\)\([
 MACRO = re.compile(r"^#define (\w+)", re.M)
 OPAQUE = re.compile(r"^typedef struct (\w+) \1;", re.M)
 DIRECTIVES = re.compile(r"(^#(?:if|ifdef|ifndef|else|define)\b.*(?:\\\n.*)*\n)+\Z", re.M)
+OF_MODULES = {"hapode_device_module"}  # a module has it, the library looks it up there
 SELF_EVIDENT = re.compile(r"^HAPODE_\w+_H$|^HAP_(BEGIN|END)_DECLS$")
 
 
@@ -92,7 +93,7 @@ def main(root, library):
     else:
         have = exported(library)
         tap.point("exports are what the headers declare",
-                  [f"declared, not exported: {n}" for n in sorted(declared - have)] +
+                  [f"declared, not exported: {n}" for n in sorted(declared - have - OF_MODULES)] +
                   [f"exported, not declared: {n}" for n in sorted(have - declared)])
     for name, text in texts.items():
         tap.point(f"everything in {name} has a comment", undocumented(name, text))

@@ -69,7 +69,9 @@ static void begin(hapi_tick *tick)
     begin_body(tick, body, solver->body_count++);
     tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
+  uint32_t first_hub = solver->body_count;
   hapi_proxy_begin(tick);
+  solver->hub_count = solver->body_count - first_hub;
 }
 
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
