@@ -274,7 +274,7 @@ static void report(bench *b, const tick_bed *t)
       1e-3 * ns, 1e-3 * t->p99_ns, 1e-3 * middle(t, ODE_NS), middle(t, ODE_CONTACTS),
       1e-3 * t->pass_ns);
   if (t->what->hands > 0) {
-    return; /* nothing to compare it with; the parts, timed once more, start without the hands' impulses */
+    return; /* nothing to compare it with */
   }
   bench_say(
       "  rows %.1f %%, solve %.1f %% (the second one %.1f), rest %.1f %%; %g sweeps, "
