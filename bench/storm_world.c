@@ -223,7 +223,7 @@ static void edit_enabled(storm_world *w, storm_thing *t)
 static void edit_geoms(storm_world *w, storm_thing *t)
 {
   if (t->geom_count > 1 && chance(w, 0.5)) {
-    drop_geom(w, t, chance(w, 0.5));
+    drop_geom(w, t, chance(w, 0.5) || w->telling == STORM_TELLS);
   } else if (t->geom_count == 1 && dBodyGetNumJoints(t->body) == 0) { /* a point mass */
     expect(w, hap_session_adopt_body(w->session, t->body) == HAP_OK);
     t->adopted = true;
@@ -316,6 +316,9 @@ static void edit_world(storm_world *w, storm_thing *t)
   dWorldSetContactSurfaceLayer(w->world, uniform(w, 0.0, 1e-3));
   choose_place(w, at);
   if (chance(w, 0.5)) {
+    if (w->telling == STORM_TELLS) {
+      expect(w, hap_session_forget_geom(w->session, w->walls[i]) == HAP_OK);
+    }
     dGeomDestroy(w->walls[i]);
     w->walls[i] = dCreateBox(w->space, uniform(w, 0.05, 0.3), 0.05, 0.05);
   }
