@@ -127,6 +127,7 @@ typedef struct view {
   double x;       /* m, drawn */
   int64_t slack;  /* ns, most that a call of update took, with what the host did meanwhile */
   int64_t slack_now;
+  int64_t gap; /* ns, longest from frame to frame */
   double back; /* m, most that it went back from frame to frame */
   double jump; /* m, most that it went on beyond its speed */
   double off;  /* m, most that it was from where it should be */
@@ -172,6 +173,7 @@ static hap_status view_frame(view *v, int64_t until_ns, double scale)
   int64_t before = v->slack_now;
   v->slack_now = drawn - now;
   v->slack = v->slack_now > v->slack ? v->slack_now : v->slack;
+  v->gap = drawn - v->last > v->gap ? drawn - v->last : v->gap;
   double most = SPEED * 1e-9 * (double)(drawn - v->last + v->slack_now + before);
   v->back = fmax(v->back, -way);
   v->jump = fmax(v->jump, way - most);
@@ -187,7 +189,7 @@ static hap_status view_frame(view *v, int64_t until_ns, double scale)
 static void view_forget(view *v)
 {
   v->back = v->jump = v->off = 0.0;
-  v->slack = 0;
+  v->slack = v->gap = 0;
 }
 
 static uint64_t view_frames(view *v, double hz, int count, double uneven)
@@ -232,12 +234,12 @@ static void check_rate(double hz)
       (unsigned long long)stats.stale_times, force_now(&v));
   CHECK(v.back == 0.0);
   CHECK(stats.pose_delay_s >= 0.02 && stats.pose_delay_s <= 0.12);
-  if (dropped == 0 && v.slack < 2 * MS) {
+  if (dropped == 0 && v.slack < 2 * MS && 1e-9 * (double)v.gap < 1.5 / hz) {
     CHECK(v.jump <= 0.3 * SPEED / hz);
     CHECK(v.off <= SPEED * 0.004);
   }
   check_world(&v);
-  CHECK(force_now(&v) > 0.0 && force_now(&v) <= 6.0);
+  CHECK(force_now(&v) <= 6.0 && (force_now(&v) > 0.0 || stats.stale_times > 0));
   CHECK(hap_session_stop(v.f.s.session) == HAP_OK);
   felt_end(&v.f);
 }
@@ -271,16 +273,19 @@ TEST(slow_frames_are_felt_in_full)
   REQUIRE(view_begin(&v, resting));
   (void)view_frames(&v, 90.0, 70, 0.0);
   frames_until_normal(&v);
-  uint64_t stale = stats_of(&v.f.s).stale_times;
+  hap_stats before = stats_of(&v.f.s);
   for (int i = 0; i < 40; ++i) {
     int64_t last = v.last;
     (void)view_frame(&v, v.last + 33 * MS, 1.0);
     int64_t gap = hap_session_now(v.f.s.session) - last;
     longest = gap > longest ? gap : longest;
   }
-  printf("# frames of up to %.1f ms, stale %d times\n", 1e-6 * (double)longest,
-         (int)(stats_of(&v.f.s).stale_times - stale));
-  CHECK(stats_of(&v.f.s).stale_times == stale || longest > 38 * MS);
+  hap_stats after = stats_of(&v.f.s);
+  uint64_t stale = after.stale_times - before.stale_times;
+  uint64_t missed = after.missed_ticks - before.missed_ticks;
+  printf("# frames of up to %.1f ms, %llu ticks missed, stale %llu times\n", 1e-6 * (double)longest,
+         (unsigned long long)missed, (unsigned long long)stale);
+  CHECK(stale == 0 || longest > 38 * MS || missed > 0);
   CHECK(v.back == 0.0);
   check_world(&v);
   CHECK(hap_session_stop(v.f.s.session) == HAP_OK);
@@ -442,7 +447,7 @@ TEST(slow_motion_is_drawn_evenly)
   printf("# %.3f m/s, fastest frame %.3f m/s, delay %.1f ms, back %.2g m\n", mean, fastest,
          1e3 * stats_of(&v.f.s).pose_delay_s, v.back);
   CHECK(v.back == 0.0 && mean > 0.0);
-  if (stats_of(&v.f.s).frames_dropped == 0 && v.slack < 2 * MS) {
+  if (stats_of(&v.f.s).frames_dropped == 0 && v.slack < 2 * MS && v.gap < 16 * MS) {
     CHECK_NEAR(mean, 0.5 * SPEED, 0.05 * SPEED);
     CHECK(fastest <= SPEED); /* and not in jumps of a step */
   }

@@ -68,6 +68,17 @@ static hap_pose drawn_at(stage *s, dBodyID body, int64_t time_ns)
   return pose;
 }
 
+static hap_pointer_id add_hand(stage *s, double y)
+{
+  hap_pointer_def def;
+  hap_pointer_id id = {0};
+  hap_pose pose = {{0.0, y, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hap_pointer_def_init(&def, sizeof def);
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  CHECK(hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
+  return id;
+}
+
 static int flips;
 
 /* q and -q are the same turn, and an application may set either. */
@@ -154,18 +165,34 @@ TEST(a_body_that_falls_is_drawn_near_its_parabola)
   stage_end(&s);
 }
 
-/* ---- into the local world and out of it ---- */
-
-static hap_pointer_id add_hand(stage *s, double y)
+/* Near the hand model SINGLE draws every tick of it, as the others do of what the loop moves. */
+TEST(a_body_that_falls_beside_the_hand_is_drawn_tick_by_tick_in_model_single)
 {
-  hap_pointer_def def;
-  hap_pointer_id id = {0};
-  hap_pose pose = {{0.0, y, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  hap_pointer_def_init(&def, sizeof def);
-  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK);
-  CHECK(hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
-  return id;
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.def.model = HAP_MODEL_SINGLE;
+  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
+  REQUIRE(stage_create(&s) == HAP_OK);
+  hap_pointer_id hand = add_hand(&s, 0.062);
+  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  double worst = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    hap_pose pose = {{0.0, 0.062, dBodyGetPosition(s.cube)[2]}, {1.0, 0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_set_target(s.session, hand, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    int64_t now = hap_session_now(s.session) - 500000;
+    double t = 1e-9 * (double)now - 1e-3 * H_MS;
+    if (t > 1e-3 * H_MS) {
+      double off = drawn_at(&s, s.cube, now).position[2] + 0.5 * 9.81 * t * (t + 1e-3);
+      worst = fmax(worst, fabs(off));
+    }
+  }
+  printf("# off by %.3g m\n", worst);
+  CHECK(worst < 3e-6);
+  stage_end(&s);
 }
+
+/* ---- into the local world and out of it ---- */
 
 static void move_hand(stage *s, hap_pointer_id id, double x, double y)
 {
@@ -283,7 +310,29 @@ TEST(bodies_are_made_and_destroyed)
   stage_end(&s);
 }
 
-/* The scene's own sleep, a body that the application moves, and one that wakes up. */
+/* ... and without a word, between two steps. That it is another one shows by ODE's auto-disable, which the
+ * session had switched off on the first. */
+TEST(a_body_made_where_another_one_was_in_memory_is_not_drawn_on_its_way)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  dWorldSetAutoDisableFlag(s.world, 1);
+  dBodyID first = add_cube(&s, 0.7, NULL);
+  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 101) == HAP_OK);
+  dGeomDestroy(dBodyGetFirstGeom(first));
+  dBodyDestroy(first);
+  dBodyID second = add_cube(&s, -0.6, NULL);
+  printf("# address %s\n", second == first ? "used again" : "new");
+  CHECK(hap_session_advance(s.session, 20) >= HAP_OK);
+  for (int i = 0; i < 60; ++i) {
+    CHECK_NEAR(drawn_at(&s, second, hap_session_now(s.session)).position[0], -0.6, 1e-12);
+    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+  }
+  stage_end(&s);
+}
+
+/* A body that sleeps, one that the application moves, and one that wakes up. */
 TEST(bodies_that_sleep_or_are_driven_are_drawn_like_others)
 {
   stage s;
@@ -583,13 +632,15 @@ static void check_threads(hap_drive drive)
     last = now;
   }
   atomic_store(&stop, 1);
+  hap_stats stats = stats_of(&s);
   for (int i = 0; i < 3; ++i) {
     CHECK(pthread_join(drawers[i].thread, NULL) == 0);
     printf("# %d frames, %d back, %d wrong, at %.3f m, jump %.2g m\n", drawers[i].frames,
            drawers[i].back, drawers[i].wrong, drawers[i].last, drawers[i].jump);
     CHECK(drawers[i].frames > 10 && drawers[i].wrong == 0);
     CHECK(drawers[i].last > 0.02);
-    CHECK(drawers[i].back == 0);
+    /* A loop or a world that the host kept from running has no even path. */
+    CHECK(drawers[i].back == 0 || stats.missed_ticks > 0 || stats.physics_missed > 0);
   }
   CHECK(stats_of(&s).pose_delay_s >= 0.02 && stats_of(&s).pose_delay_s <= 6.0 * 0.02);
   stage_end(&s);
@@ -688,9 +739,11 @@ int main(void)
   RUN(a_body_that_turns_fast_is_drawn_on_the_arc);
   RUN(a_turn_may_be_anything);
   RUN(a_body_that_falls_is_drawn_near_its_parabola);
+  RUN(a_body_that_falls_beside_the_hand_is_drawn_tick_by_tick_in_model_single);
   RUN(bodies_come_into_the_local_world_and_leave_it_without_a_jump);
   RUN(a_change_of_model_does_not_show);
   RUN(bodies_are_made_and_destroyed);
+  RUN(a_body_made_where_another_one_was_in_memory_is_not_drawn_on_its_way);
   RUN(bodies_that_sleep_or_are_driven_are_drawn_like_others);
   RUN(growing_times_give_motion_that_neither_goes_back_nor_jumps);
   RUN(times_that_are_not_known_are_clamped_and_said);

@@ -57,7 +57,9 @@ static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
 }
 
 /* Number of the frame for stamp_ns. One that is not later than those before takes their place, as a
- * change of model leads to; so does one so close that the ring would soon be used up. */
+ * change of model leads to. In model SINGLE, whose steps would soon use up the ring, a frame goes when the
+ * next one comes unless it is some way behind the one before; elsewhere that would show, where a late
+ * frame loop leaves two steps close together. */
 static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
 {
   hapi_frames *frames = &physics->frames;
@@ -72,7 +74,7 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
          frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
     --frames->count;
   }
-  if (frames->count >= frames->oldest + 2) {
+  if (physics->model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
     int64_t newest = frames->stamps[(frames->count - 1) % HAPI_FRAMES];
     int64_t before = frames->stamps[(frames->count - 2) % HAPI_FRAMES];
     frames->count -= (double)(newest - before) < FRAMES_APART * step;
