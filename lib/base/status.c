@@ -17,6 +17,7 @@ const char *hap_status_name(hap_status status)
     NAME(HAP_END);
     NAME(HAP_BODY_LOST);
     NAME(HAP_FAULTED);
+    NAME(HAP_CLAMPED);
     NAME(HAP_RECORD_ENDED);
     NAME(HAP_DIVERGED);
     NAME(HAP_ERROR_ARGUMENT);
@@ -55,6 +56,8 @@ const char *hap_status_text(hap_status status)
       return "a body was destroyed without hap_session_forget_body, it was dropped";
     case HAP_FAULTED:
       return "done, but a fault is latched and the force is zero";
+    case HAP_CLAMPED:
+      return "the time asked for is no longer kept, the oldest that is was given";
     case HAP_RECORD_ENDED:
       return "the recording ended before its session, the file is whole up to there";
     case HAP_DIVERGED:

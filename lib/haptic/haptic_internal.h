@@ -23,7 +23,9 @@ typedef enum hapi_pointer_phase {
   HAPI_POINTER_ADDED = 1,   /* by the application, not yet seen by the loop */
   HAPI_POINTER_ACTIVE = 2,  /* the loop uses it */
   HAPI_POINTER_LEAVING = 3, /* to be let go by the loop */
-  HAPI_POINTER_LEFT = 4     /* let go; the application cleans up */
+  HAPI_POINTER_LEFT = 4,    /* let go; the application cleans up */
+  HAPI_POINTER_PAUSING = 5, /* as LEAVING and LEFT, and its id stays valid: */
+  HAPI_POINTER_PAUSED = 6   /* its device is being started again, or did not start */
 } hapi_pointer_phase;
 
 typedef struct hapi_pointer_target {
@@ -51,6 +53,7 @@ typedef struct hapi_pointer_slot {
 /* Published for the statistics; each written by the haptic thread alone. */
 typedef struct hapi_haptic_figures {
   hapi_histogram tick_ns;
+  hapi_histogram wake_ns; /* from a deadline to the loop's waking up for it */
   _Atomic uint64_t ticks;
   _Atomic uint64_t missed_ticks;
   _Atomic uint64_t contact_ticks;
@@ -136,12 +139,12 @@ void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns);
 void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io);
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
-void hapi_tape_leave(hapi_haptic *haptic, uint32_t index);
+void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses);
 void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io);
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io);
 void hapi_tape_ticked(hapi_haptic *haptic);
 /* Replay only; false: no more of them come now. */
-bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index);
+bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out);
 
 /* pointers.c: what the loop does with the slots */

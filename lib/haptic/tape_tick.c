@@ -113,21 +113,22 @@ void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
   }
 }
 
-void hapi_tape_leave(hapi_haptic *haptic, uint32_t index)
+void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses)
 {
   if (hapi_tape_records(haptic->tape)) {
-    (void)hapi_tape_put(haptic->tape, HAPI_CELL_LEAVE, index);
+    hapi_tape_put(haptic->tape, HAPI_CELL_LEAVE, index)->flags = pauses ? HAPI_CELL_PAUSES : 0;
   }
 }
 
-bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index)
+bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses)
 {
   const hapi_tape *tape = haptic->tape;
   if (!hapi_tape_next_is(tape, HAPI_CELL_LEAVE)) {
     return false;
   }
   *out_index = tape->packet_cells[tape->packet_at].index;
-  (void)hapi_tape_get(haptic->tape, HAPI_CELL_LEAVE, *out_index);
+  *out_pauses =
+      (hapi_tape_get(haptic->tape, HAPI_CELL_LEAVE, *out_index)->flags & HAPI_CELL_PAUSES) != 0;
   return *out_index < haptic->config.capacity.pointers;
 }
 

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "physics/physics_internal.h"
 
@@ -126,6 +127,8 @@ hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
     return HAP_OK;
   }
   physics->locks = 0;
+  physics->missed_unrecorded = 0;
+  physics->dropped_unrecorded = 0;
   describe_world(physics, &here);
   if (hapi_tape_records(physics->tape)) {
     hapi_tape_open(physics->tape);
@@ -198,7 +201,21 @@ static void put_end(hapi_physics *physics, uint64_t number)
   cell->flags = physics->model_next;
   cell->u[HAPI_CYCLED_MODEL] = number;
   cell->u[HAPI_CYCLED_HASH] = physics->model_hash;
+  cell->i[HAPI_CYCLED_SENT] = physics->sent_ns;
   commit(physics);
+}
+
+/* The clock's time that the loop takes for a sign of life. The first model needs none: it is sent at the
+ * time that it is for. */
+int64_t hapi_tape_sent(hapi_physics *physics)
+{
+  physics->sent_ns = 0;
+  if (physics->cycling && hapi_tape_plays(physics->tape)) {
+    physics->sent_ns = physics->read_end->i[HAPI_CYCLED_SENT];
+  } else if (physics->cycling && physics->config.frame) {
+    physics->sent_ns = hapi_clock_now();
+  }
+  return physics->sent_ns;
 }
 
 void hapi_tape_model(hapi_physics *physics)
@@ -237,14 +254,17 @@ void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     physics->note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
     physics->note->u[HAPI_CYCLE_LOCKS] = physics->locks;
     physics->note->u[HAPI_CYCLE_MISSED] = physics->missed_unrecorded;
+    physics->note->u[HAPI_CYCLE_DROPPED] = physics->dropped_unrecorded;
   } else if (hapi_tape_plays(physics->tape)) {
     physics->read = hapi_tape_get(physics->tape, HAPI_CELL_CYCLE, 0);
     physics->read_end = hapi_tape_get(physics->tape, HAPI_CELL_CYCLED, 0);
     dRandSetSeed((unsigned long)physics->read->u[HAPI_CYCLE_SEED]);
     physics->figures.stats.physics_missed += physics->read->u[HAPI_CYCLE_MISSED];
+    physics->figures.stats.frames_dropped += physics->read->u[HAPI_CYCLE_DROPPED];
   }
   physics->locks = 0;
   physics->missed_unrecorded = 0;
+  physics->dropped_unrecorded = 0;
 }
 
 void hapi_tape_edits(hapi_physics *physics, uint32_t count)

@@ -61,17 +61,19 @@ typedef enum hapi_world_word {
 } hapi_world_word;
 
 typedef enum hapi_cycle_word {
-  HAPI_CYCLE_TIME = 0,  /* ns */
-  HAPI_CYCLE_NEXT = 1,  /* ns */
-  HAPI_CYCLE_STATE = 2, /* message taken */
-  HAPI_CYCLE_SEED = 3,  /* of ODE */
-  HAPI_CYCLE_LOCKS = 4, /* hap_session_lock since the cycle before */
-  HAPI_CYCLE_MISSED = 5 /* steps, likewise */
+  HAPI_CYCLE_TIME = 0,   /* ns */
+  HAPI_CYCLE_NEXT = 1,   /* ns */
+  HAPI_CYCLE_STATE = 2,  /* message taken */
+  HAPI_CYCLE_SEED = 3,   /* of ODE */
+  HAPI_CYCLE_LOCKS = 4,  /* hap_session_lock since the cycle before */
+  HAPI_CYCLE_MISSED = 5, /* steps, likewise */
+  HAPI_CYCLE_DROPPED = 6 /* drive FRAME: steps that frames had too much, likewise */
 } hapi_cycle_word;
 
 typedef enum hapi_cycled_word {
   HAPI_CYCLED_MODEL = 0, /* number of the local model; 0: the world was not sound, and none came */
-  HAPI_CYCLED_HASH = 1   /* of it */
+  HAPI_CYCLED_HASH = 1,  /* of it */
+  HAPI_CYCLED_SENT = 2   /* ns, drive FRAME: when it was told to the loop; else 0 */
 } hapi_cycled_word;
 
 typedef enum hapi_pass_word {
@@ -87,7 +89,9 @@ enum {
   HAPI_CELL_RESET = 1,     /* the fault was reset */
   HAPI_CELL_EMERGENCY = 2, /* hap_emergency_zero had been called */
   /* of POSE and FORCE */
-  HAPI_CELL_FAILED = 1 /* the device did not answer, or did not take it */
+  HAPI_CELL_FAILED = 1, /* the device did not answer, or did not take it */
+  /* of LEAVE */
+  HAPI_CELL_PAUSES = 1 /* its device is being started again, and its id stays valid */
 };
 
 typedef struct hapi_cell {

@@ -73,6 +73,9 @@ static const char *take_cycled(hapi_grammar *g, const hapi_cell *cell)
   if (model != 0 && model != g->model + 1) {
     return "a physics step with another model than the next one";
   }
+  if (!good_time(cell->i[HAPI_CYCLED_SENT])) {
+    return "a physics step that told its model at no time";
+  }
   g->model = model != 0 ? model : g->model;
   g->cycling = false;
   return NULL;

@@ -39,6 +39,7 @@ struct hap_session {
   uint64_t pass; /* of the contact thread's part, the next one */
 
   double frame_remainder_s; /* FRAME */
+  pthread_t starter;        /* thread of the last start */
 
   bool ran;                /* was started at least once */
   hapi_recorder *recorder; /* NULL: not recorded */
