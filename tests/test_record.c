@@ -19,6 +19,7 @@
 static struct {
   atomic_int fail_read;
   atomic_int fail_write;
+  atomic_int fail_start;
   atomic_int bad_pose;
   atomic_int block_ms; /* the next read */
   unsigned noise;
@@ -44,7 +45,7 @@ static void hand_describe(void *self, hap_device_info *out)
 static hap_status hand_start(void *self)
 {
   (void)self;
-  return HAP_OK;
+  return atomic_load(&hand.fail_start) != 0 ? HAP_ERROR_DEVICE : HAP_OK;
 }
 
 /* To and fro, into the row of cubes, as the wall clock says, with noise: no two runs are alike. */
@@ -200,6 +201,10 @@ typedef struct small_world {
   hap_session_def def;
   hap_ode_def ode;
   hap_session *session;
+  hap_pointer_id hands[16];
+  dBodyID cube;
+  dBodyID guest; /* NULL: none */
+  int steps;
   int calls;
   bool sleeps;
 } small_world;
@@ -225,7 +230,7 @@ static void build_world(small_world *w)
   w->world = dWorldCreate();
   w->space = dHashSpaceCreate(NULL);
   dWorldSetGravity(w->world, 0.0, 0.0, -9.81);
-  dBodyID cube = dBodyCreate(w->world);
+  dBodyID cube = w->cube = dBodyCreate(w->world);
   dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
   dBodySetMass(cube, &mass);
   dGeomSetBody(dCreateBox(w->space, 0.1, 0.1, 0.1), cube);
@@ -247,45 +252,142 @@ static void destroy_world(small_world *w)
   dWorldDestroy(w->world);
 }
 
+/* Hands in a row across the cube's way. */
+static void start_recording(small_world *w, int hands)
+{
+  hap_detail detail = {""};
+  hap_pointer_def hand_def;
+  recorded_setup s = recorded_setup_of("", HAP_MODEL_CONTACT, 0);
+  hap_pointer_def_init(&hand_def, sizeof hand_def);
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_OK);
+  for (int i = 0; i < hands; ++i) {
+    double y = 0.006 * (i - 0.5 * (hands - 1));
+    hap_pose pose = {{0.07, y, 0.05}, {1.0, 0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_add(w->session, &hand_def, &w->hands[i]) == HAP_OK);
+    CHECK(hap_pointer_set_target(w->session, w->hands[i], &pose, NULL) == HAP_OK);
+  }
+  CHECK(hap_session_record(w->session, &s.record, &detail) == HAP_OK);
+  CHECK(hap_session_start(w->session) >= HAP_OK);
+}
+
+static hap_stats stop_recording(small_world *w)
+{
+  hap_stats stats;
+  CHECK(hap_session_stop(w->session) == HAP_OK);
+  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
+  destroy_world(w);
+  return stats;
+}
+
+/* In a world that was built anew. */
+static replay play_in(small_world *w)
+{
+  replay out;
+  hap_player *player = NULL;
+  memset(&out, 0, sizeof out);
+  CHECK(hap_player_open(recorded_path, 0, &player, &out.detail) == HAP_OK);
+  CHECK(hap_player_get_def(player, &w->def) == HAP_OK);
+  CHECK(hap_player_get_info(player, &out.info, sizeof out.info) == HAP_OK);
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &out.detail) == HAP_OK);
+  CHECK(hap_session_play(w->session, player, &out.detail) == HAP_OK);
+  rig r = {.session = w->session};
+  replay_run(&r, &out);
+  CHECK(hap_player_difference(player, &out.difference, sizeof out.difference) == HAP_OK);
+  int64_t last = hap_session_now(w->session);
+  hap_player_close(player); /* the session was stopped: it needs it no more */
+  CHECK(hap_session_now(w->session) == last && last > 0);
+  destroy_world(w);
+  return out;
+}
+
 TEST(a_step_that_takes_long)
 {
   small_world w;
-  hap_detail detail = {""};
-  hap_pointer_def hand_def;
-  hap_pointer_id id;
-  hap_stats before;
-  hap_player *player = NULL;
-  hap_play_difference difference;
-  hap_pose pose = {{0.07, 0.0, 0.05}, {1.0, 0.0, 0.0, 0.0}};
-  recorded_setup s = recorded_setup_of("", HAP_MODEL_CONTACT, 0);
   build_world(&w);
   w.sleeps = true;
-  hap_pointer_def_init(&hand_def, sizeof hand_def);
-  REQUIRE(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
-  CHECK(hap_pointer_add(w.session, &hand_def, &id) == HAP_OK);
-  CHECK(hap_pointer_set_target(w.session, id, &pose, NULL) == HAP_OK);
-  REQUIRE(hap_session_record(w.session, &s.record, &detail) == HAP_OK);
-  REQUIRE(hap_session_start(w.session) >= HAP_OK);
+  start_recording(&w, 1);
   sleep_ms(LONG_MS + 700);
-  CHECK(hap_session_stop(w.session) == HAP_OK);
-  CHECK(hap_session_stats(w.session, &before, sizeof before) == HAP_OK);
+  hap_stats before = stop_recording(&w);
   CHECK(before.stale_times == 1 && before.physics_missed > 100);
-  destroy_world(&w);
   build_world(&w);
-  REQUIRE(hap_player_open(recorded_path, 0, &player, &detail) == HAP_OK);
-  CHECK(hap_player_get_def(player, &w.def) == HAP_OK);
-  REQUIRE(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
-  CHECK(hap_session_play(w.session, player, &detail) == HAP_OK);
-  CHECK(hap_session_start(w.session) == HAP_OK);
-  CHECK(hap_session_advance(w.session, 1000000) == HAP_END);
-  CHECK(hap_player_difference(player, &difference, sizeof difference) == HAP_OK);
-  CHECK(difference.what == HAP_DIFFERENCE_NONE);
-  hap_stats stats;
-  CHECK(hap_session_stats(w.session, &stats, sizeof stats) == HAP_OK);
-  CHECK(stats.ticks == before.ticks && stats.stale_ticks == before.stale_ticks);
-  CHECK(stats.contact_ticks == before.contact_ticks && before.contact_ticks > 10);
-  destroy_world(&w);
-  hap_player_close(player);
+  replay again = play_in(&w);
+  check_alike(&again, &before);
+  CHECK(again.stats.stale_ticks == before.stale_ticks && before.contact_ticks > 10);
+}
+
+/* ---- a world that changes ---- */
+
+static dBodyID add_ball(small_world *w, double mass, double x)
+{
+  dMass m;
+  dBodyID ball = dBodyCreate(w->world);
+  dMassSetSphereTotal(&m, mass, 0.02);
+  dBodySetMass(ball, &m);
+  dGeomSetBody(dCreateSphere(w->space, 0.02), ball);
+  dBodySetPosition(ball, x, 0.0, 0.05);
+  return ball;
+}
+
+/* A ball between the hands and the cube is exchanged for another one, which often gets its address. */
+static void exchange_balls(void *user, double step_s)
+{
+  small_world *w = user;
+  (void)step_s;
+  if (w->guest != NULL && w->steps % 7 == 0) {
+    dGeomDestroy(dBodyGetFirstGeom(w->guest));
+    dBodyDestroy(w->guest);
+    w->guest = NULL;
+  }
+  if (w->guest == NULL && w->steps % 14 < 10) {
+    w->guest = add_ball(w, 0.1 + 0.01 * w->steps, 0.09);
+  }
+  ++w->steps;
+}
+
+TEST(sixteen_hands_and_bodies_that_callbacks_exchange)
+{
+  small_world w;
+  build_world(&w);
+  w.def.max_pointers = 16;
+  w.ode.before_step = exchange_balls;
+  start_recording(&w, 16);
+  sleep_ms(900);
+  hap_stats before = stop_recording(&w);
+  CHECK(before.bodies_lost >= 2 && before.contact_ticks > 10);
+  build_world(&w);
+  w.ode.before_step = exchange_balls;
+  replay again = play_in(&w);
+  check_alike(&again, &before);
+  CHECK(again.info.pointers == 16 && again.info.edits == 0);
+  CHECK(again.stats.bodies_lost == before.bodies_lost);
+}
+
+static void push_cube(void *arg)
+{
+  dBodyAddForce(arg, -300.0, 0.0, 0.0);
+}
+
+TEST(edits_and_locks_are_counted_and_drawing_is_none)
+{
+  small_world w;
+  hap_pose poses[2];
+  build_world(&w);
+  start_recording(&w, 1);
+  for (int i = 0; i < 30; ++i) {
+    sleep_ms(10);
+    (void)hap_session_poses(w.session, hap_session_now(w.session), &w.cube, 1, poses);
+    (void)hap_pointer_poses(w.session, w.hands[0], hap_session_now(w.session), poses, poses + 1);
+  }
+  CHECK(hap_session_post(w.session, push_cube, w.cube) == HAP_OK);
+  CHECK(hap_session_post(w.session, push_cube, w.cube) == HAP_OK);
+  CHECK(hap_session_lock(w.session) == HAP_OK && hap_session_unlock(w.session) == HAP_OK);
+  sleep_ms(300);
+  hap_stats before = stop_recording(&w);
+  CHECK(before.edits_run == 2 && before.locks == 1);
+  build_world(&w);
+  replay again = play_in(&w);
+  CHECK(again.status == HAP_END && again.info.edits == 3);
+  CHECK(again.difference.what != HAP_DIFFERENCE_NONE && again.difference.tick > 100);
 }
 
 static void change_model(rig *r, int look)
@@ -356,7 +458,119 @@ TEST(a_device_with_troubles_and_pointers_that_come_and_go)
         again.stats.missed_ticks >= before.missed_ticks - 3); /* but for those before the first */
 }
 
+static hap_pointer_id lost;
+
+static void lose_and_restart(rig *r, int look)
+{
+  if (look == 4) {
+    atomic_store(&hand.fail_read, 1);
+  } else if (look == 6) {
+    atomic_store(&hand.fail_read, 0);
+    atomic_store(&hand.fail_start, 1);
+    CHECK(hap_pointer_restart(r->session, lost) == HAP_ERROR_DEVICE);
+  } else if (look == 10) {
+    atomic_store(&hand.fail_start, 0);
+    CHECK(hap_pointer_restart(r->session, lost) == HAP_OK);
+    CHECK(hap_session_reset_fault(r->session) == HAP_OK);
+  } else if (look == 14) { /* nothing wrong with it */
+    CHECK(hap_pointer_restart(r->session, lost) == HAP_OK);
+  }
+}
+
+/* In how many ticks the pointer, whose id holds all the time, was out of the world. */
+static uint64_t ticks_paused(hap_session *session, hap_pointer_id id, hap_status *out_status)
+{
+  uint64_t paused = 0;
+  hap_pointer_state state;
+  for (*out_status = HAP_OK; *out_status >= HAP_OK && *out_status != HAP_END;) {
+    *out_status = hap_session_advance(session, 1);
+    CHECK(hap_pointer_get(session, id, &state, sizeof state) == HAP_OK);
+    paused += state.stamp_ns < hap_session_now(session);
+  }
+  return paused;
+}
+
+TEST(a_device_that_is_started_again)
+{
+  rig r;
+  hap_status status = HAP_OK;
+  hap_detail detail = {""};
+  hap_stats stats;
+  hap_play_difference difference;
+  rig_options options;
+  recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 1000);
+  s.devices[0] = "virtual:path=0:0/0.2/0.025"; /* elsewhere */
+  s.meanwhile = lose_and_restart;
+  REQUIRE(recorded_create(&s, &r));
+  lost = add_hand(&r);
+  hap_stats before = recorded_run(&s, &r);
+  CHECK(hap_pointer_remove(r.session, lost) == HAP_OK);
+  rig_destroy(&r);
+  hap_device_close(device);
+  CHECK(before.faults == 1 && before.contact_ticks > 10);
+  rig_options_init(&options);
+  options.scene = "row10";
+  REQUIRE(hap_player_open(recorded_path, 0, &options.player, &detail) == HAP_OK);
+  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
+  CHECK(hap_session_start(r.session) == HAP_OK);
+  CHECK(hap_pointer_restart(r.session, lost) == HAP_ERROR_STATE);
+  uint64_t paused = ticks_paused(r.session, lost, &status);
+  CHECK(status == HAP_END && paused > 20 && paused < before.ticks / 2);
+  CHECK(hap_player_difference(options.player, &difference, sizeof difference) == HAP_OK);
+  CHECK(difference.what == HAP_DIFFERENCE_NONE);
+  CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.ticks == before.ticks && stats.contact_ticks == before.contact_ticks);
+  CHECK(stats.slewed_ticks == before.slewed_ticks && stats.faults == before.faults);
+  rig_destroy(&r);
+  hap_player_close(options.player);
+}
+
 /* ---- other drives ---- */
+
+/* Even frames, a loop that stands, frames of more than two steps, more time than three steps. */
+static void draw_frames(rig *r)
+{
+  hap_pose pose;
+  for (int frame = 0; frame < 70; ++frame) {
+    int ms = frame < 20 ? 15 : frame == 20 ? 150 : frame < 40 ? 40 + frame % 3 : 12;
+    sleep_ms(ms);
+    double frame_s = frame % 20 == 19 ? 0.2 : frame % 9 == 5 ? 0.0 : 1e-3 * ms;
+    (void)hap_session_update(r->session, frame_s);
+    (void)hap_session_poses(r->session, hap_session_now(r->session), r->scene->bodies, 1, &pose);
+  }
+}
+
+TEST(a_frame_loop_with_pauses_and_hitches)
+{
+  for (int model = HAP_MODEL_IMPULSE; model <= HAP_MODEL_CONTACT; ++model) {
+    rig r;
+    rig_options options;
+    hap_detail detail = {""};
+    recorded_setup s = recorded_setup_of("row10", (hap_model)model, 0);
+    rig_options_init(&options);
+    options.scene = s.scene;
+    options.def.model = s.model;
+    options.def.drive = HAP_DRIVE_FRAME;
+    options.record = &s.record;
+    REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
+    hap_pointer_id id = add_hand(&r);
+    REQUIRE(hap_session_start(r.session) >= HAP_OK);
+    draw_frames(&r);
+    CHECK(hap_pointer_restart(r.session, id) == HAP_OK);
+    draw_frames(&r);
+    hap_stats before;
+    CHECK(hap_session_stop(r.session) == HAP_OK);
+    CHECK(hap_session_stats(r.session, &before, sizeof before) == HAP_OK);
+    rig_destroy(&r);
+    hap_device_close(device);
+    replay again = recorded_play("row10", 0);
+    check_alike(&again, &before);
+    CHECK(again.info.edits == 0);
+    CHECK(again.stats.stale_ticks == before.stale_ticks && before.stale_times > 10);
+    CHECK(again.stats.stale_times == before.stale_times && before.contact_ticks > 10);
+    CHECK(again.stats.frames_dropped == before.frames_dropped && before.frames_dropped > 10);
+  }
+}
 
 TEST(a_frame_loop)
 {
@@ -556,6 +770,7 @@ TEST(a_replay_takes_nothing_else)
   hap_pointer_def_init(&def, sizeof def);
   CHECK(hap_pointer_add(r.session, &def, &id) == HAP_ERROR_STATE);
   CHECK(hap_pointer_remove(r.session, id) == HAP_ERROR_STATE);
+  CHECK(hap_pointer_restart(r.session, id) == HAP_ERROR_STATE);
   CHECK(hap_pointer_set_target(r.session, id, &pose, NULL) == HAP_ERROR_STATE);
   CHECK(hap_session_set_model(r.session, HAP_MODEL_SINGLE) == HAP_ERROR_STATE);
   CHECK(hap_session_reset_fault(r.session) == HAP_ERROR_STATE);
@@ -593,8 +808,12 @@ int main(void)
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);
   RUN(a_step_that_takes_long);
+  RUN(sixteen_hands_and_bodies_that_callbacks_exchange);
+  RUN(edits_and_locks_are_counted_and_drawing_is_none);
   RUN(changes_of_model);
   RUN(a_device_with_troubles_and_pointers_that_come_and_go);
+  RUN(a_device_that_is_started_again);
+  RUN(a_frame_loop_with_pauses_and_hitches);
   RUN(a_frame_loop);
   RUN(at_its_limit_it_ends_and_the_session_goes_on);
   RUN(a_disk_that_hangs_makes_a_gap_that_is_told);

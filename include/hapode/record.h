@@ -89,8 +89,10 @@ typedef enum hap_record_end {
   HAP_RECORD_FAILED = 4    /* the file could not be written any more */
 } hap_record_end;
 
+/* Bytes of hap_record_def.note. */
 #define HAP_RECORD_NOTE_MAX 4096
 
+/* What is recorded where; see hap_record_def_init. */
 typedef struct hap_record_def {
   uint32_t size;      /* set by hap_record_def_init */
   uint32_t cookie;    /* set by hap_record_def_init */
@@ -114,6 +116,7 @@ HAP_API void hap_record_def_init(hap_record_def *def, size_t size_of_def);
 HAP_API HAP_NODISCARD hap_status hap_session_record(hap_session *session, const hap_record_def *def,
                                                     hap_detail *detail);
 
+/* How a recording stands. */
 typedef struct hap_record_state {
   uint32_t size;       /* bytes filled in */
   uint32_t end;        /* hap_record_end */
@@ -128,6 +131,7 @@ typedef struct hap_record_state {
 HAP_API hap_status hap_session_record_state(const hap_session *session, hap_record_state *out,
                                             size_t size_of_out, hap_detail *detail);
 
+/* A recording that is open, and how far its replay has come. */
 typedef struct hap_player hap_player;
 
 /* Flags of hap_player_open. */
@@ -144,10 +148,11 @@ HAP_API HAP_NODISCARD hap_status hap_player_open(const char *path, uint32_t flag
 /* [control] NULL is allowed. After its session was stopped. */
 HAP_API void hap_player_close(hap_player *player);
 
+/* What a recording is. */
 typedef struct hap_player_info {
-  uint32_t size; /* bytes filled in */
-  uint32_t end;  /* hap_record_end of the file */
-  uint64_t ticks;
+  uint32_t size;    /* bytes filled in */
+  uint32_t end;     /* hap_record_end of the file */
+  uint64_t ticks;   /* in the file */
   double seconds;   /* from the first to the last tick */
   uint64_t edits;   /* posted edits and locks, none of which is in the file */
   char system[64];  /* C library of the recording: of another one the last digits may differ */
@@ -168,7 +173,7 @@ HAP_API hap_status hap_player_get_def(const hap_player *player, hap_session_def 
 /* [control] The session, made with the player's def over a world that is built as the recorded one
  * was, plays: hap_session_start looks whether the world is the one (HAP_ERROR_WORLD), hap_session_advance
  * runs recorded ticks. Pointers come from the recording; hap_pointer_add, hap_pointer_remove,
- * hap_pointer_set_target, hap_session_set_model and hap_session_reset_fault are
+ * hap_pointer_restart, hap_pointer_set_target, hap_session_set_model and hap_session_reset_fault are
  * HAP_ERROR_STATE. Before the session's first start, once; the player outlives the
  * session's stop.
  *
@@ -181,7 +186,7 @@ HAP_API HAP_NODISCARD hap_status hap_session_play(hap_session *session, hap_play
 
 /* What a replay differs in. Values are fixed. */
 typedef enum hap_difference {
-  HAP_DIFFERENCE_NONE = 0,
+  HAP_DIFFERENCE_NONE = 0,    /* the replay is the recording, so far */
   HAP_DIFFERENCE_STEP = 1,    /* what a physics step gave to the loop; number: of the model */
   HAP_DIFFERENCE_PASS = 2,    /* contacts between bodies; number: of the pass */
   HAP_DIFFERENCE_POINTER = 3, /* number: hap_pointer_id.v */
@@ -189,6 +194,7 @@ typedef enum hap_difference {
   HAP_DIFFERENCE_TICK = 5 /* in something of the tick that the file has no values of: a velocity */
 } hap_difference;
 
+/* Where a replay is not the recording. */
 typedef struct hap_play_difference {
   uint32_t size; /* bytes filled in */
   uint32_t what; /* hap_difference: the first thing that differed */

@@ -43,7 +43,8 @@ struct hap_session {
 
   bool ran;                /* was started at least once */
   hapi_recorder *recorder; /* NULL: not recorded */
-  hap_player *player;      /* borrowed; NULL: no replay */
+  hap_player *player;      /* borrowed, until stop; NULL: no replay */
+  int64_t played_ns;       /* of a replay: of its newest tick */
 
   pthread_mutex_t detail_lock;
   hap_detail detail;
@@ -53,7 +54,7 @@ struct hap_session {
 hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
 
-/* session_record.c; begin and stop do nothing where there is no recorder */
+/* session_record.c; begin does nothing where there is no recorder, stop where there is no player either */
 hap_status hapi_record_begin(hap_session *session, hap_detail *detail);
 void hapi_record_stop(hap_session *session);
 void hapi_session_set_tapes(hap_session *session, hapi_tape *const tapes[HAPI_STREAMS]);

@@ -24,7 +24,6 @@ struct hap_player {
   hapi_tape tapes[HAPI_STREAMS];
   bool ticked; /* at least once */
   uint64_t window;
-  int64_t now_ns;
   uint64_t alike; /* ticks so far */
   bool found;     /* the first difference, since the last tick */
   hap_play_difference difference;
@@ -115,7 +114,7 @@ static bool found_first(hap_player *player)
   bool found = player->found;
   if (found) {
     player->difference.t =
-        1e-9 * (double)(player->now_ns - hapi_reader_whole(player->reader)->start_ns);
+        1e-9 * (double)(player->session->played_ns - hapi_reader_whole(player->reader)->start_ns);
     word_difference(&player->difference);
   }
   player->found = false;
@@ -355,12 +354,12 @@ static hap_status play_tick(hap_player *player, hap_detail *detail)
   if (status != HAP_OK) {
     return status;
   }
-  player->now_ns = cells->i[HAPI_TICK_TIME];
+  session->played_ns = cells->i[HAPI_TICK_TIME];
   count_missed(player, cells->u[HAPI_TICK_WINDOW]);
   hapi_exchange_expect(session->exchange, HAPI_CHANNEL_MODEL, model);
   hapi_exchange_expect(session->exchange, HAPI_CHANNEL_PATCHES, patches);
   hapi_tape_load(&player->tapes[HAPI_STREAM_HAPTIC], cells, count);
-  hapi_haptic_cycle(session->haptic, player->now_ns);
+  hapi_haptic_cycle(session->haptic, session->played_ns);
   hapi_reader_pop(player->reader, HAPI_STREAM_HAPTIC);
   status = check_after(player, HAPI_STREAM_HAPTIC, detail);
   bool diverged = status == HAP_OK && found_first(player);
@@ -380,7 +379,7 @@ hap_status hapi_play_advance(hap_session *session, uint64_t ticks)
 
 int64_t hapi_play_now(const hap_session *session)
 {
-  return session->player->now_ns;
+  return session->played_ns;
 }
 
 /* ---- start ---- */
@@ -432,7 +431,7 @@ hap_status hapi_play_begin(hap_session *session, int64_t *out_start_ns, hap_deta
 hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *detail)
 {
   hap_player *player = session->player;
-  player->now_ns = start_ns;
+  session->played_ns = start_ns;
   hapi_reader_pop(player->reader, HAPI_STREAM_HAPTIC);
   hapi_reader_pop(player->reader, HAPI_STREAM_PHYSICS);
   if (published(player, HAPI_CHANNEL_PATCHES) > 0) {

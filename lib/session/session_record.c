@@ -144,8 +144,8 @@ hap_status hapi_record_begin(hap_session *session, hap_detail *detail)
 void hapi_record_stop(hap_session *session)
 {
   hapi_tape *const none[HAPI_STREAMS] = {NULL, NULL, NULL};
+  hapi_session_set_tapes(session, none); /* a player may be gone before its session */
   if (session->recorder != NULL) {
-    hapi_session_set_tapes(session, none);
     hapi_recorder_stop(session->recorder);
   }
 }
