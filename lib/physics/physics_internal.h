@@ -388,12 +388,12 @@ struct hapi_physics {
 
   hapi_fair_lock lock;
   hapi_lock_figures lock_figures;
-  bool editable; /* in a callback that may create and destroy, or in an edit */
   pthread_mutex_t edits_lock;
   hapi_edit edits[HAPI_EDITS_MAX];
   uint32_t edit_first;
   uint32_t edit_count;
   bool edits_closed;
+  bool editable; /* in a callback that may create and destroy, or in an edit */
 
   hapi_body_table table;
   hapi_body_slot *bodies;      /* capacity.bodies */
@@ -429,6 +429,8 @@ struct hapi_physics {
   unsigned islands_threads; /* ODE's setting as it was found */
   bool said_not_probed;     /* of a transmission, once a session */
   bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
+  bool cycling;             /* not at the start */
+  uint16_t model_next;      /* hap_model wanted at the end of the cycle */
   hapi_thread thread;
   _Atomic int stop;
   _Atomic unsigned long cycle_thread; /* pthread_t of the thread in a cycle, 0: none */
@@ -443,12 +445,10 @@ struct hapi_physics {
   const hapi_cell *read;       /* replay: the same */
   const hapi_cell *read_end;   /* and the one of its end */
   uint64_t model_hash;         /* of the model of this cycle, 0: it has none */
-  uint16_t model_next;         /* hap_model wanted at its end */
-  bool cycling;                /* not at the start */
-  uint32_t locks;              /* hap_session_lock since the last cycle */
-  uint32_t missed_unrecorded;  /* steps, since then */
-  uint64_t dropped_unrecorded; /* likewise */
-  int64_t sent_ns;             /* of the model of this cycle */
+  int64_t sent_ns;             /* of that model */
+  uint64_t dropped_unrecorded; /* steps of frames, since the last cycle */
+  uint32_t missed_unrecorded;  /* steps, likewise */
+  uint32_t locks;              /* hap_session_lock, likewise */
 };
 
 /* tape_cycle.c: nothing without a tape. */
