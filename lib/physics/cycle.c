@@ -92,6 +92,7 @@ static void sync_in(hapi_physics *physics, int64_t now_ns)
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
+  hapi_joints_scan(physics);
   hapi_reconcile_take(physics);
   if (physics->model == HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);
@@ -112,6 +113,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
+  hapi_joints_leave(physics);
   physics->last_cycle_ns = now_ns;
   if (physics->model != HAP_MODEL_IMPULSE) {
     hapi_publish_poses(physics, now_ns);

@@ -176,6 +176,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
       fill_contact(&physics->contacts[i], i, &contacts[out->contact_count++]);
     }
   }
+  hapi_joints_publish(physics, out);
   fill_watch(physics, out);
   count_model(physics, out);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
