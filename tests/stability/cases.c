@@ -57,10 +57,12 @@ const case_row stability_cases[] = {
      .physics_hz = 1000},
   {"closed loop of hinges, redundant", build_loop,            3, 0.2,   0,    2e3, RELAXED, 1.0, TWO,     0.5},
   {"chain of 3",                       build_chain,           3, 0.05,  0,    2e2, RELAXED, 1.2, CONTACT, 0.2},
-  {"chain of 10",                      build_chain,          10, 0.05,  0,    2e2, RELAXED, 1.2, CONTACT, 1.1},
+  /* Where the hand is far, ODE alone has the chain, and at 60 Hz it opens the joints by millimetres. */
+  {"chain of 10",                      build_chain,          10, 0.05,  0,    2e2, RELAXED, 1.2, CONTACT, 1.1,
+     .late = true},
   /* At 60 Hz ODE alone lets it come apart when it is pushed, with the exact dWorldStep as well. */
   {"chain of 30",                      build_chain,          30, 0.05,  0,    2e2, RELAXED, 1.2, CONTACT, 3.1,
-     .physics_hz = 250},
+     .late = true, .physics_hz = 250},
   {"light stand of the paper's Fig. 8",build_lightstand,      0, 0,     0,    2e3, RELAXED, 5.6, CONTACT, 0.3},
   /* Single: ODE's explicit gyroscopic term makes energy. */
   {"top at 100 rad/s",                 build_top,             1, 0.2,   100,  2e3, RELAXED, 1.0, CONTACT, 1.0},
