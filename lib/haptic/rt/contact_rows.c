@@ -219,6 +219,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   source->pointer = source->joint = false;
   source->pushes_out = false;
   source->gives = c->gives;
+  source->stays = 0.0;
   return row;
 }
 

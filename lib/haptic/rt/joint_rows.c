@@ -39,10 +39,36 @@ typedef struct placed_joint {
   double across[2][3]; /* to the first axis and to each other */
   double arm_a[3];
   double arm_b[3];
-  double open[3]; /* from the anchor in a to the one in b */
+  double open[3];    /* from the anchor in a to the one in b */
+  double opening[3]; /* its rate, and what the turning of the bodies adds to that in a second */
+  double bend[3];
   bool driven;    /* a body of given motion takes part */
   double was[HAPI_JOINT_PARTS];
 } placed_joint;
+
+/* ---- what turns ---- */
+
+static bool turns(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_RESTING) == 0;
+}
+
+/* w x v */
+static void rate_of(const hapi_local_body *body, const double v[3], double out[3])
+{
+  if (turns(body)) {
+    hapi_v3_cross(body->start_twist + 3, v, out);
+  } else {
+    hapi_v3_set(out, 0.0, 0.0, 0.0);
+  }
+}
+
+/* w x (w x v) */
+static void bend_of(const hapi_local_body *body, const double v[3], double out[3])
+{
+  rate_of(body, v, out);
+  rate_of(body, out, out);
+}
 
 /* ---- rows ---- */
 
@@ -122,11 +148,21 @@ static double correction(const hapi_tick *tick, const hapi_softness *s, double e
   return fabs(slow) > fabs(fast) ? slow : fast;
 }
 
-static void correct(hapi_tick *tick, const hapi_softness *s, double error, hapi_row *row)
+/* An error, and what the turning of the bodies makes of it while the velocities that a row sees are
+ * constant: its second derivative. Along the chord of its circle a body keeps its speed and its distance from
+ * the joint; along the tangent it would lose one and gain the other. */
+typedef struct error_of {
+  double now;  /* m, rad */
+  double bend; /* m/s^2, rad/s^2 */
+} error_of;
+
+static void correct(hapi_tick *tick, const hapi_softness *s, error_of error, hapi_row *row)
 {
   hapi_row_source *source = &tick->world.sources[tick->world.solver.row_count - 1];
-  row->target = correction(tick, s, error);
-  source->pushes_out = !s->soft && fabs(row->target) > OPEN_LEAST;
+  double back = correction(tick, s, error.now);
+  source->stays = 0.5 * tick->period * error.bend;
+  row->target = source->stays + back;
+  source->pushes_out = !s->soft && fabs(back) > OPEN_LEAST;
   source->gives = source->gives || s->soft;
 }
 
@@ -135,13 +171,14 @@ static void hold_anchor(hapi_tick *tick, const placed_joint *j, int part,
 {
   hapi_row *row = anchor_row(tick, j, part, direction);
   if (row != NULL) {
-    correct(tick, s, hapi_v3_dot(j->open, direction), row);
+    error_of error = {hapi_v3_dot(j->open, direction), hapi_v3_dot(j->bend, direction)};
+    correct(tick, s, error, row);
     finish_row(tick, s->cfm);
   }
 }
 
 static void hold_turn(hapi_tick *tick, const placed_joint *j, int part, const double direction[3],
-                      double error)
+                      error_of error)
 {
   hapi_row *row = turn_row(tick, j, part, direction);
   if (row != NULL) {
@@ -169,10 +206,22 @@ static void hold_sprung_point(hapi_tick *tick, const placed_joint *j)
   hold_anchor(tick, j, PART_ANCHOR + 2, j->across[1], &j->in->linear);
 }
 
+/* The directions across a slider turn with its first body. */
 static void hold_line(hapi_tick *tick, const placed_joint *j)
 {
-  hold_anchor(tick, j, PART_ANCHOR, j->across[0], &j->in->linear);
-  hold_anchor(tick, j, PART_ANCHOR + 1, j->across[1], &j->in->linear);
+  for (int i = 0; i < 2; ++i) {
+    double turning[3];
+    double bending[3];
+    hapi_row *row = anchor_row(tick, j, PART_ANCHOR + i, j->across[i]);
+    if (row != NULL) {
+      rate_of(j->a, j->across[i], turning);
+      bend_of(j->a, j->across[i], bending);
+      double bend = hapi_v3_dot(j->across[i], j->bend) + 2.0 * hapi_v3_dot(turning, j->opening) +
+                    hapi_v3_dot(bending, j->open);
+      correct(tick, &j->in->linear, (error_of){hapi_v3_dot(j->open, j->across[i]), bend}, row);
+      finish_row(tick, j->in->linear.cfm);
+    }
+  }
 }
 
 /* ---- orientations ---- */
@@ -180,10 +229,32 @@ static void hold_line(hapi_tick *tick, const placed_joint *j)
 static void hold_axis(hapi_tick *tick, const placed_joint *j)
 {
   double error[3];
+  double bends[2][3];
+  double first[3];
+  double second[3];
+  bend_of(j->a, j->axes[0], bends[0]);
+  bend_of(j->b, j->axes[1], bends[1]);
   hapi_v3_cross(j->axes[0], j->axes[1], error);
+  hapi_v3_cross(bends[0], j->axes[1], first);
+  hapi_v3_cross(j->axes[0], bends[1], second);
+  hapi_v3_add(first, second, first);
   for (int i = 0; i < 2; ++i) {
-    hold_turn(tick, j, PART_TURN + i, j->across[i], hapi_v3_dot(error, j->across[i]));
+    error_of e = {hapi_v3_dot(error, j->across[i]), hapi_v3_dot(first, j->across[i])};
+    hold_turn(tick, j, PART_TURN + i, j->across[i], e);
   }
+}
+
+/* Second derivative of the cosine between the axes. */
+static double bend_of_cosine(const placed_joint *j)
+{
+  double rates[2][3];
+  double bends[2][3];
+  rate_of(j->a, j->axes[0], rates[0]);
+  rate_of(j->b, j->axes[1], rates[1]);
+  bend_of(j->a, j->axes[0], bends[0]);
+  bend_of(j->b, j->axes[1], bends[1]);
+  return hapi_v3_dot(bends[0], j->axes[1]) + 2.0 * hapi_v3_dot(rates[0], rates[1]) +
+         hapi_v3_dot(j->axes[0], bends[1]);
 }
 
 /* The angle between the two axes. */
@@ -195,8 +266,9 @@ static void hold_cross(hapi_tick *tick, const placed_joint *j)
   double cosine = hapi_v3_dot(j->axes[0], j->axes[1]);
   if (sine > 1e-9) { /* axes that have become parallel have no plane */
     hapi_v3_scale(1.0 / sine, normal, normal);
-    hold_turn(tick, j, PART_TURN, normal,
-              j->in->place.cos_axes * sine - j->in->place.sin_axes * cosine);
+    error_of error = {j->in->place.cos_axes * sine - j->in->place.sin_axes * cosine,
+                      -bend_of_cosine(j) / sine};
+    hold_turn(tick, j, PART_TURN, normal, error);
   }
 }
 
@@ -214,7 +286,7 @@ static void hold_orientation(hapi_tick *tick, const placed_joint *j)
   hapi_m3_apply(j->a->rotation, q + 1, error);
   hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, error, error); /* of half the angle; small */
   for (int i = 0; i < 3; ++i) {
-    hold_turn(tick, j, PART_TURN + i, world_axes[i], error[i]);
+    hold_turn(tick, j, PART_TURN + i, world_axes[i], (error_of){error[i], 0.0});
   }
 }
 
@@ -294,7 +366,7 @@ static void add_locked(hapi_tick *tick, const placed_joint *j, int which, double
   const hapi_model_limit *limit = &j->in->limits[which];
   hapi_row *row = axis_row(tick, j, which, 1, 1.0);
   if (row != NULL) {
-    correct(tick, &limit->stop, limit->low - position, row);
+    correct(tick, &limit->stop, (error_of){limit->low - position, 0.0}, row);
     finish_row(tick, limit->stop.cfm);
   }
 }
@@ -314,7 +386,7 @@ static void set_stop(hapi_tick *tick, const placed_joint *j, const hapi_model_li
   if (gap > 0.0) {
     row->target = -gap / tick->period;
   } else {
-    correct(tick, &limit->stop, -gap, row);
+    correct(tick, &limit->stop, (error_of){-gap, 0.0}, row);
   }
   double back = -limit->bounce * speed;
   if (limit->bounce > 0.0 && hits && speed < 0.0 && back > row->target) {
@@ -401,6 +473,28 @@ static void place_arms(placed_joint *j, const double anchor_a[3], const double a
   }
 }
 
+/* Of the way from one anchor to the other. */
+static void place_motion(placed_joint *j, const double anchor_a[3], const double anchor_b[3])
+{
+  const hapi_local_body *bodies[2] = {j->a, j->b};
+  const double *anchors[2] = {anchor_a, anchor_b};
+  hapi_v3_set(j->opening, 0.0, 0.0, 0.0);
+  hapi_v3_set(j->bend, 0.0, 0.0, 0.0);
+  for (int i = 0; i < 2; ++i) {
+    double arm[3];
+    double rate[3];
+    if (turns(bodies[i])) {
+      double sign = i == 0 ? -1.0 : 1.0;
+      hapi_body_arm(bodies[i], anchors[i], arm);
+      rate_of(bodies[i], arm, rate);
+      hapi_v3_add(rate, bodies[i]->start_twist, rate);
+      hapi_v3_madd(j->opening, sign, rate, j->opening);
+      bend_of(bodies[i], arm, rate);
+      hapi_v3_madd(j->bend, sign, rate, j->bend);
+    }
+  }
+}
+
 static void place(placed_joint *j)
 {
   const hapi_joint_place *in = &j->in->place;
@@ -414,6 +508,7 @@ static void place(placed_joint *j)
   hapi_body_vector(j->a, in->reference_a, j->across[0]);
   hapi_v3_cross(j->axes[0], j->across[0], j->across[1]);
   place_arms(j, anchor_a, anchor_b);
+  place_motion(j, anchor_a, anchor_b);
   j->driven = is_given(j->a) || is_given(j->b);
 }
 

@@ -328,7 +328,7 @@ static bool stop_push_out(hapi_tick *tick)
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (tick->world.sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], 0.0);
+      hapi_row_retarget(&solver->rows[i], tick->world.sources[i].stays);
     }
   }
   return any;

@@ -212,6 +212,7 @@ typedef struct hapi_row_source {
                       the velocity */
   bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
                       surface that moves, a spring */
+  double stays; /* m/s, of a row that pushes out: its target without that */
 } hapi_row_source;
 
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
