@@ -102,8 +102,8 @@ void scene_build_cart(scene *s)
 {
   const double edge = s->parameters.size;
   const double length = 0.3;
-  const dBodyID cart = scene_add_box(s, (const double[3]){edge, edge, edge / 2},
-                                     s->parameters.mass, (const double[3]){0, 0, 0});
+  const dBodyID cart = scene_add_box(s, (const double[3]){edge, edge, edge / 2}, s->parameters.mass,
+                                     (const double[3]){0, 0, 0});
   const dBodyID pole = add_rod(s, 0.3 * s->parameters.mass, (const double[3]){0, 0, 0},
                                (const double[3]){0, 0, -length});
   scene_add_slider(s, cart, (const double[3]){1, 0, 0});

@@ -111,7 +111,7 @@ typedef struct hap_stats {
   uint64_t stale_ticks;   /* ticks in which it was */
   uint64_t slewed_ticks;  /* ticks in which a force was held back by the slew limit */
   uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
-  uint32_t range_joints;  /* model CONTACT: joints that the loop holds itself, in the newest model */
+  uint32_t range_joints; /* model CONTACT: joints that the loop holds itself, in the newest model */
 } hap_stats;
 
 HAP_END_DECLS

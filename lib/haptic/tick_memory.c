@@ -33,8 +33,8 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   solver->free = hapi_alloc_array(places, sizeof *solver->free);
   solver->work = hapi_alloc_array(solver->work_count, sizeof *solver->work);
   return world->memory != NULL && world->old_memory != NULL && world->buckets != NULL &&
-         world->joints != NULL && world->joint_memory != NULL && world->sources != NULL && solver->rows != NULL && solver->v != NULL &&
-         solver->free != NULL && solver->work != NULL;
+         world->joints != NULL && world->joint_memory != NULL && world->sources != NULL &&
+         solver->rows != NULL && solver->v != NULL && solver->free != NULL && solver->work != NULL;
 }
 
 static void free_world(hapi_local_world *world)

@@ -289,8 +289,8 @@ static bool same_place(hapi_joint_kind kind, const hapi_joint_place *was, const 
     case HAPI_JOINT_SLIDER:
       return axis_a && same_slide(was, r);
     case HAPI_JOINT_UNIVERSAL:
-      return anchors && axis_a && near_to(was->axis_b, is->axis_b) &&
-             same_angle(kind, was, r, 0) && same_angle(kind, was, r, 1);
+      return anchors && axis_a && near_to(was->axis_b, is->axis_b) && same_angle(kind, was, r, 0) &&
+             same_angle(kind, was, r, 1);
     case HAPI_JOINT_HINGE2:
       return anchors && axis_a && near_to(was->axis_b, is->axis_b) && same_angle(kind, was, r, 0);
     case HAPI_JOINT_FIXED:

@@ -198,17 +198,15 @@ void hapi_joints_leave(hapi_physics *physics)
   }
 }
 
-/* Walks and models are counted from 1 again. */
 void hapi_joints_reset(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->joints.count; ++i) {
-    hapi_known_joint *known = &physics->joints.entries[i];
-    known->gathered_in = known->ranged_in = 0;
-    known->left_is_known = false;
-    known->slot = HAPI_NONE;
+  hapi_joint_table *table = &physics->joints;
+  table->count = 0;
+  if (table->bucket_count > 0) {
+    rebuild_buckets(table);
   }
   for (uint32_t i = 0; i < physics->config.capacity.joints; ++i) {
-    physics->joints.slots[i].joint = NULL;
+    table->slots[i].joint = NULL;
   }
 }
 
@@ -257,8 +255,9 @@ void hapi_joints_hold(hapi_physics *physics)
     again = false;
     for (uint32_t i = 0; i < table->count; ++i) {
       const hapi_known_joint *known = &table->entries[i];
-      again = (known->held && (hold_partner(physics, known, 0) || hold_partner(physics, known, 1))) ||
-              again;
+      again =
+          (known->held && (hold_partner(physics, known, 0) || hold_partner(physics, known, 1))) ||
+          again;
     }
   }
 }
@@ -307,8 +306,8 @@ static void fill_limit(const hapi_physics *physics, dJointID joint, parameter_fn
   if (out->flags == (HAPI_LIMIT_LOW | HAPI_LIMIT_HIGH) && out->low == out->high) {
     out->flags = HAPI_LIMIT_LOCKED;
   }
-  out->stop = softness_of(physics, get(joint, dParamStopERP + group),
-                          get(joint, dParamStopCFM + group));
+  out->stop =
+      softness_of(physics, get(joint, dParamStopERP + group), get(joint, dParamStopCFM + group));
   out->bounce = get(joint, dParamBounce + group);
   out->speed = get(joint, dParamVel + group);
   out->force = get(joint, dParamFMax + group);

@@ -503,8 +503,8 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
     return;
   }
   bool refused = known->gathered_in == range->number; /* with another body of its mechanism */
-  if (!refused && range->owned < range_capacity(physics) &&
-      hapi_mechanism_gather(physics, index) && mechanism_can_be_owned(physics)) {
+  if (!refused && range->owned < range_capacity(physics) && hapi_mechanism_gather(physics, index) &&
+      mechanism_can_be_owned(physics)) {
     own_mechanism(physics);
     return;
   }
@@ -605,7 +605,6 @@ void hapi_range_reset(hapi_physics *physics)
   hapi_range *range = &physics->range;
   memset(range->pair_places, 0, range->pair_place_count * sizeof *range->pair_places);
   range->number = 0;
-  hapi_joints_reset(physics);
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     physics->table.entries[i].ranged_in = 0;
     physics->table.entries[i].gathered_in = 0;

@@ -36,8 +36,8 @@ static bool allocate(hapi_physics *physics)
          hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
          physics->test.contacts != NULL && physics->test.rounds != NULL &&
          physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
-         hapi_joints_create(physics) &&
-         physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
+         hapi_joints_create(physics) && physics->contact_scratch != NULL &&
+         hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
 static bool init_locks(hapi_physics *physics)
@@ -174,6 +174,7 @@ static void build_first_model(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->begun = true;
+  hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
     give_world_back(physics);

@@ -53,14 +53,14 @@ typedef struct hapi_known_body {
   uint64_t seen; /* scan that found it */
   bool adopted;
   bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool enabled_before; /* scratch of the probe's flag pass */
-  uint32_t island;     /* scratch: number of the island under test, HAPI_NONE outside */
-  uint32_t member;     /* scratch: place in the test set and its snapshot */
-  uint64_t chosen_in;  /* scratch: model that it was chosen for */
-  uint64_t ranged_in;  /* scratch: walk that met it */
+  bool enabled_before;  /* scratch of the probe's flag pass */
+  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
+  uint32_t member;      /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in;   /* scratch: model that it was chosen for */
+  uint64_t ranged_in;   /* scratch: walk that met it */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
-  uint32_t slot;       /* local slot, HAPI_NONE: not local */
-  bool loop_owned;     /* in the newest message, also while its slot retires */
+  uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  bool loop_owned;      /* in the newest message, also while its slot retires */
   bool loop_touched;
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
@@ -89,12 +89,12 @@ typedef struct hapi_body_table {
 
 typedef struct hapi_known_joint {
   dJointID joint;
-  uint64_t seen; /* scan that found it */
-  dBodyID bodies[2];  /* in ODE's own order; the second is NULL: static world */
-  uint32_t index[2];  /* of the body table, in this cycle */
-  bool carried;       /* of a kind that the loop has */
-  bool usable;        /* place holds */
-  bool held;          /* scratch: switched off for the global step */
+  uint64_t seen;     /* scan that found it */
+  dBodyID bodies[2]; /* in ODE's own order; the second is NULL: static world */
+  uint32_t index[2]; /* of the body table, in this cycle */
+  bool carried;      /* of a kind that the loop has */
+  bool usable;       /* place holds */
+  bool held;         /* scratch: switched off for the global step */
   bool left_is_known;
   hapi_joint_kind kind;
   hapi_joint_place place; /* as it was set */
@@ -102,6 +102,7 @@ typedef struct hapi_known_joint {
   uint64_t gathered_in;   /* scratch: walk that met it */
   uint64_t ranged_in;     /* model that it is in */
   uint32_t slot;          /* HAPI_NONE: not in the newest model */
+  double meant[3][2];     /* scratch of soft.c */
 } hapi_known_joint;
 
 typedef struct hapi_joint_slot {
@@ -498,9 +499,9 @@ void hapi_mechanism_drop(hapi_physics *physics); /* they are not */
 bool hapi_joints_create(hapi_physics *physics);
 void hapi_joints_finish(hapi_joint_table *table);
 uint32_t hapi_joints_find(const hapi_joint_table *table, dJointID joint); /* HAPI_NONE */
-void hapi_joints_scan(hapi_physics *physics);   /* after the bodies' */
+void hapi_joints_scan(hapi_physics *physics);                             /* after the bodies' */
 void hapi_joints_leave(hapi_physics *physics);  /* last: what is left in ODE */
-void hapi_joints_reset(hapi_physics *physics);
+void hapi_joints_reset(hapi_physics *physics);  /* forgets all */
 void hapi_joints_hold(hapi_physics *physics);   /* those of owned bodies: off for the step */
 void hapi_joints_let_go(hapi_physics *physics); /* after it; their feedback is zero */
 void hapi_joints_publish(hapi_physics *physics, hapi_model *out);

@@ -134,12 +134,12 @@ typedef enum hapi_joint_kind {
 typedef struct hapi_joint_place {
   double anchor_a[3]; /* slider: the centre of a, and in b where it is at position 0 */
   double anchor_b[3];
-  double axis_a[3]; /* unit; slider: of the motion */
-  double axis_b[3]; /* hinge: where axis_a is to be */
+  double axis_a[3];      /* unit; slider: of the motion */
+  double axis_b[3];      /* hinge: where axis_a is to be */
   double reference_a[3]; /* unit, across axis_a */
   double reference_b[3];
-  double turn[4];    /* slider, fixed: orientation of b in the frame of a */
-  double cos_axes;   /* universal, hinge-2: of the angle that the axes shall have */
+  double turn[4];  /* slider, fixed: orientation of b in the frame of a */
+  double cos_axes; /* universal, hinge-2: of the angle that the axes shall have */
   double sin_axes;
 } hapi_joint_place;
 

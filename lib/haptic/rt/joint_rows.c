@@ -10,17 +10,19 @@
  * poses and not through the velocities; a stop is met within the tick, not after it; and a motor that
  * works against a stop is a row beside it, where ODE takes the one for the other. */
 
-#define OPEN_SLOP 1e-6  /* m, rad: an error that is left alone */
-#define OPEN_SHARE 0.5  /* of the rest, that goes within a tick ... */
-#define OPEN_SPEED 0.5  /* m/s, rad/s: ... but no faster, unless ODE's own correction is */
-#define OPEN_LEAST 1e-4 /* m/s, rad/s: less may stay in the velocity, it is not worth a second solve */
+#define OPEN_SLOP 1e-6 /* m, rad: an error that is left alone */
+#define OPEN_SHARE 0.5 /* of the rest, that goes within a tick ... */
+#define OPEN_SPEED 0.5 /* m/s, rad/s: ... but no faster, unless ODE's own correction is */
+#define OPEN_LEAST \
+  1e-4 /* m/s, rad/s: less may stay in the velocity, it is not worth a second solve */
 
 /* Of a row's own response, as softness: where joints hold a thing more than once, their rows cannot all
  * be met when the joints do not fit to the last micrometre, and would push against each other without
  * bound. 10 N on 0.1 kg make 1e-7 m/s of it. */
 #define REGULAR 1e-6
 
-#define STOP_FLOOR 1e-3 /* m, rad: a stop that is farther than this, and than a few ticks, has no row */
+#define STOP_FLOOR \
+  1e-3 /* m, rad: a stop that is farther than this, and than a few ticks, has no row */
 #define STOP_TICKS 3.0
 
 /* Parts of a joint: places of their impulses in the memory. */
@@ -34,15 +36,15 @@ typedef struct placed_joint {
   const hapi_model_joint *in;
   uint32_t index;
   hapi_local_body *a;
-  hapi_local_body *b; /* NULL: static world */
-  double axes[2][3];  /* world */
+  hapi_local_body *b;  /* NULL: static world */
+  double axes[2][3];   /* world */
   double across[2][3]; /* to the first axis and to each other */
   double arm_a[3];
   double arm_b[3];
   double open[3];    /* from the anchor in a to the one in b */
   double opening[3]; /* its rate, and what the turning of the bodies adds to that in a second */
   double bend[3];
-  bool driven;    /* a body of given motion takes part */
+  bool driven; /* a body of given motion takes part */
   double was[HAPI_JOINT_PARTS];
 } placed_joint;
 
@@ -166,8 +168,8 @@ static void correct(hapi_tick *tick, const hapi_softness *s, error_of error, hap
   source->gives = source->gives || s->soft;
 }
 
-static void hold_anchor(hapi_tick *tick, const placed_joint *j, int part,
-                        const double direction[3], const hapi_softness *s)
+static void hold_anchor(hapi_tick *tick, const placed_joint *j, int part, const double direction[3],
+                        const hapi_softness *s)
 {
   hapi_row *row = anchor_row(tick, j, part, direction);
   if (row != NULL) {

@@ -212,7 +212,7 @@ typedef struct hapi_row_source {
                       the velocity */
   bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
                       surface that moves, a spring */
-  double stays; /* m/s, of a row that pushes out: its target without that */
+  double stays;    /* m/s, of a row that pushes out: its target without that */
 } hapi_row_source;
 
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
@@ -242,7 +242,7 @@ typedef struct hapi_local_world {
   hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
-  hapi_row_source *sources; /* of the rows; 4 x capacity.contacts + 10 x capacity.joints */
+  hapi_row_source *sources;        /* of the rows; 4 x capacity.contacts + 10 x capacity.joints */
   hapi_solver solver;
   uint32_t row_capacity;
   uint32_t resting; /* bodies at the tick's begin */
@@ -338,9 +338,9 @@ void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenche
 void hapi_contact_wake(hapi_tick *tick);                      /* what is touched by what moves */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
-void hapi_joint_wake(hapi_tick *tick); /* what hangs on what moves */
-void hapi_joint_rows(hapi_tick *tick); /* joints -> rows */
-void hapi_guard(hapi_tick *tick);                             /* world wrench -> device wrench */
+void hapi_joint_wake(hapi_tick *tick);                /* what hangs on what moves */
+void hapi_joint_rows(hapi_tick *tick);                /* joints -> rows */
+void hapi_guard(hapi_tick *tick);                     /* world wrench -> device wrench */
 void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
 void hapi_trace_hash(hapi_tick *tick);
