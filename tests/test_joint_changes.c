@@ -173,6 +173,142 @@ TEST(moved_mechanism_goes_on_from_there)
   cw_close(&m.w);
 }
 
+/* The second bar alone, turned about its hinge: the first one is the loop's meanwhile. */
+static void fold(void *arg)
+{
+  mechanism *m = arg;
+  dMatrix3 r;
+  dVector3 at;
+  dJointGetHingeAnchor(m->joints[1], at);
+  dRFromAxisAndAngle(r, 0.0, 1.0, 0.0, 0.0);
+  dBodySetRotation(m->w.bodies[1], r);
+  dBodySetPosition(m->w.bodies[1], at[0] + 0.1, at[1], at[2]);
+}
+
+static void build_parallel(mechanism *m)
+{
+  dBodyID first = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
+  dBodyID second = add_body(m, 0.3, bar, 0.3, 0.0, 0.0);
+  dJointID held = add_hinge(m, NULL, first, AT(0.0, 0.0, 0.0), AT(0.0, 1.0, 0.0));
+  dJointSetHingeParam(held, dParamLoStop, 0.0);
+  dJointSetHingeParam(held, dParamHiStop, 0.0);
+  add_hinge(m, first, second, AT(0.2, 0.0, 0.0), AT(0.0, 1.0, 0.0));
+}
+
+TEST(body_that_is_moved_alone_waits_for_the_others)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_parallel, 9.81));
+  cw_run(&m.w, 8 * STEP_TICKS + 1);
+  CHECK(hap_session_post(m.w.session, fold, &m) == HAP_OK);
+  cw_run(&m.w, STEP_TICKS);
+  CHECK(openness(&m) <= CLOSED);
+  CHECK(dJointGetHingeAngle(m.joints[1]) > -1e-3);
+  cw_run(&m.w, 2 * STEP_TICKS);
+  CHECK(openness(&m) <= CLOSED);
+  CHECK(dJointGetHingeAngle(m.joints[1]) > 1e-3 || dJointGetHingeAngle(m.joints[1]) < -1e-3);
+  check_owned(&m, 2);
+  cw_close(&m.w);
+}
+
+/* A hinge that is set elsewhere while it turns: from there on the bar hangs at that point. */
+static void set_anchor(void *arg)
+{
+  mechanism *m = arg;
+  const dReal *at = dBodyGetPosition(m->w.bodies[0]);
+  dJointSetHingeAnchor(m->joints[0], at[0], at[1], at[2] + 0.05);
+  dJointSetHingeAxis(m->joints[0], 1.0, 0.0, 0.0);
+}
+
+TEST(hinge_set_anew_holds_there)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_pendulum, 9.81));
+  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  edit(&m, set_anchor);
+  cw_run(&m.w, 10 * STEP_TICKS); /* the loop had gone on while it was set */
+  dVector3 at;
+  dJointGetHingeAnchor2(m.joints[0], at);
+  for (int s = 0; s < 25; ++s) {
+    cw_run(&m.w, STEP_TICKS);
+    CHECK(openness(&m) <= CLOSED);
+    const double *x = m.w.position[0];
+    CHECK_NEAR(cw_norm((const double[3]){x[0] - at[0], x[1] - at[1], x[2] - at[2]}), 0.05, 1e-4);
+    CHECK_NEAR(x[0], at[0], 1e-5); /* it turns about x now */
+  }
+  check_owned(&m, 1);
+  cw_close(&m.w);
+}
+
+/* The stops count from where the axis was set. */
+static void set_zero(void *arg)
+{
+  mechanism *m = arg;
+  dJointSetHingeAxis(m->joints[0], 0.0, 1.0, 0.0);
+  dJointSetHingeParam(m->joints[0], dParamLoStop, 0.0);
+  dJointSetHingeParam(m->joints[0], dParamHiStop, 0.0);
+}
+
+TEST(angle_begins_where_the_axis_is_set)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_hinge, 9.81));
+  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  double before[3];
+  memcpy(before, m.w.position[0], sizeof before);
+  edit(&m, set_zero);
+  cw_run(&m.w, 20 * STEP_TICKS);
+  const double *x = m.w.position[0];
+  double way = cw_norm((const double[3]){x[0] - before[0], x[1] - before[1], x[2] - before[2]});
+  double angle = dJointGetHingeAngle(m.joints[0]);
+  printf("# held %.3g mm farther, at %.3g rad\n", 1e3 * way, angle);
+  CHECK(fabs(angle) < 1e-4);
+  CHECK(way < 0.05); /* a step's way; to the old zero it is 0.05 m and more */
+  CHECK(cw_norm(m.w.velocity[0]) < 1e-3);
+  cw_close(&m.w);
+}
+
+static void build_fixed_bar(mechanism *m)
+{
+  dBodyID first = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
+  dJointSetFixed(keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
+}
+
+static void fix_elsewhere(void *arg)
+{
+  mechanism *m = arg;
+  dBodySetPosition(m->w.bodies[0], 0.15, 0.05, 0.1);
+  dJointSetFixed(m->joints[0]);
+}
+
+TEST(fixed_joint_set_anew_holds_there)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_fixed_bar, 9.81));
+  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  edit(&m, fix_elsewhere);
+  CHECK_NEAR(m.w.position[0][0], 0.15, 1e-5);
+  CHECK_NEAR(m.w.position[0][2], 0.1, 1e-5);
+  check_owned(&m, 1);
+  cw_close(&m.w);
+}
+
+/* Stopped, changed and started again: nothing is remembered. */
+TEST(second_start_reads_the_joints_anew)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_fixed_bar, 9.81));
+  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  CHECK(hap_session_stop(m.w.session) == HAP_OK);
+  fix_elsewhere(&m);
+  CHECK(hap_session_start(m.w.session) == HAP_OK);
+  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  CHECK_NEAR(m.w.position[0][0], 0.15, 1e-5);
+  CHECK_NEAR(m.w.position[0][2], 0.1, 1e-5);
+  check_owned(&m, 1);
+  cw_close(&m.w);
+}
+
 TEST(feedback_is_zero)
 {
   mechanism m;
@@ -279,6 +415,11 @@ int main(void)
   RUN(disabled_joint_is_none);
   RUN(other_joints_leave_the_bodies_to_ode);
   RUN(moved_mechanism_goes_on_from_there);
+  RUN(body_that_is_moved_alone_waits_for_the_others);
+  RUN(hinge_set_anew_holds_there);
+  RUN(angle_begins_where_the_axis_is_set);
+  RUN(fixed_joint_set_anew_holds_there);
+  RUN(second_start_reads_the_joints_anew);
   RUN(feedback_is_zero);
   RUN(chain_longer_than_the_range_is_odes);
   RUN(joints_without_room_are_odes);

@@ -14,8 +14,8 @@
 
 /* Of what a joint was remembered as, against what its getters say. */
 #define SAME_PLACE 1e-7   /* m, and of unit vectors */
-#define SAME_ANGLE 1e-4   /* rad: ODE's measure of it suffers from a joint that is a little open */
-#define SAME_SLIDE 1e-6   /* m, likewise */
+#define SAME_ANGLE 1e-4   /* rad */
+#define SAME_SLIDE 1e-4   /* m */
 #define LEAST_ACROSS 1e-6 /* of two axes, below which they have no plane */
 
 static void pose_of(dBodyID body, hap_pose *out)
@@ -245,7 +245,22 @@ static double angle_about(const double axis[3], const double from[3], const doub
                hapi_v3_dot(from, to) - hapi_v3_dot(from, axis) * hapi_v3_dot(to, axis));
 }
 
-/* Whether a place as it was remembered gives the angle that ODE measures now. */
+/* How far the axes are from where they shall be to each other, rad. */
+static double axes_open(hapi_joint_kind kind, const hapi_joint_place *was, const reading *r)
+{
+  double a[3];
+  double b[3];
+  double across[3];
+  hapi_quat_rotate(r->a.quat_wxyz, was->axis_a, a);
+  hapi_quat_rotate(r->b.quat_wxyz, was->axis_b, b);
+  hapi_v3_cross(a, b, across);
+  return kind == HAPI_JOINT_HINGE
+             ? hapi_v3_norm(across)
+             : fabs(was->cos_axes * hapi_v3_norm(across) - was->sin_axes * hapi_v3_dot(a, b));
+}
+
+/* Whether a place as it was remembered gives the angle that ODE measures now. ODE takes all of a
+ * relative turn for one about the axis: where the joint is open, its angle is off by as much. */
 static bool same_angle(hapi_joint_kind kind, const hapi_joint_place *was, const reading *r,
                        int which)
 {
@@ -260,7 +275,8 @@ static bool same_angle(hapi_joint_kind kind, const hapi_joint_place *was, const 
   } else {
     hapi_quat_rotate(r->b.quat_wxyz, was->axis_b, axis);
   }
-  return fabs(sin(0.5 * (angle_about(axis, from, to) - r->positions[which]))) < SAME_ANGLE;
+  double apart = 2.0 * fabs(sin(0.5 * (angle_about(axis, from, to) - r->positions[which])));
+  return apart < SAME_ANGLE + 2.0 * axes_open(kind, was, r);
 }
 
 static bool same_slide(const hapi_joint_place *was, const reading *r)
