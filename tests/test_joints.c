@@ -337,6 +337,28 @@ TEST(redundant_hinges_let_it_turn)
   cw_close(&m.w);
 }
 
+/* At rest, but 5 mm aside of where its end is to hang. */
+static void build_open(mechanism *m)
+{
+  dBodyID body = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
+  add_ball(m, body, NULL, 0.0, 0.0, 0.0);
+  dBodySetPosition(body, 0.1, 0.005, 0.0);
+}
+
+TEST(open_joint_closes_and_nothing_moves_on)
+{
+  mechanism m;
+  REQUIRE(begin(&m, build_open, 0.0));
+  cw_run(&m.w, 10);
+  CHECK_NEAR(m.w.velocity[0][1], -0.1, 0.1); /* on its way */
+  CHECK(m.w.velocity[0][1] < -1e-3);
+  cw_run(&m.w, 4 * STEP_TICKS - 9);
+  CHECK(openness(&m) <= 2e-6);
+  CHECK(cw_norm(dBodyGetLinearVel(m.w.bodies[0])) < 1e-4);
+  CHECK(cw_norm(dBodyGetAngularVel(m.w.bodies[0])) < 1e-3);
+  cw_close(&m.w);
+}
+
 /* ---- closed forms ---- */
 
 static void build_pendulum(mechanism *m)
@@ -571,6 +593,7 @@ int main(void)
   RUN(four_bars_move_as_odes);
   RUN(closed_loop_that_does_not_fit_is_stable);
   RUN(redundant_hinges_let_it_turn);
+  RUN(open_joint_closes_and_nothing_moves_on);
   RUN(pendulum_has_its_period);
   RUN(motor_pushes_with_its_largest_force);
   RUN(stops_throw_back_their_share);
