@@ -55,6 +55,11 @@ const case_row stability_cases[] = {
   {"flap against stops of its hinge",  build_stop,            1, 0.5,   0,    2e3, TENSE,   1.0, TWO,     0.1},
   {"the same, world at 1 kHz",         build_stop,            1, 0.5,   0,    2e3, TENSE,   1.0, CONTACT, 0.1,
      .physics_hz = 1000},
+  {"flap, stops that throw back half", build_stop,            1, 0.5,   0.5,  2e3, TENSE,   1.0, CONTACT, 0.1},
+  {"cube on a rail with 0.2 mm of play",build_play,           1, 0.2,   1e-4, 2e3, TENSE,   1.0, CONTACT, 0.01},
+  /* gain: 10 kg times the 5 um that ODE's joints hang open until the loop has them. */
+  {"weight of 1000 links on 4 of them",build_weight,          4, 0.01,  1e3,  2e3, RELAXED, 1.2, CONTACT, 0.2,
+     .gain = 0.05},
   {"closed loop of hinges, redundant", build_loop,            3, 0.2,   0,    2e3, RELAXED, 1.0, TWO,     0.5},
   {"chain of 3",                       build_chain,           3, 0.05,  0,    2e2, RELAXED, 1.2, CONTACT, 0.2},
   /* Where the hand is far, ODE alone has the chain, and at 60 Hz it opens the joints by millimetres. */

@@ -10,7 +10,7 @@
  * poses and not through the velocities; a stop is met within the tick, not after it; and a motor that
  * works against a stop is a row beside it, where ODE takes the one for the other. */
 
-#define OPEN_SLOP 1e-6 /* m, rad: an error that is left alone */
+#define OPEN_SLOP 1e-7 /* m, rad: an error that is left alone */
 #define OPEN_SHARE 0.5 /* of the rest, that goes within a tick ... */
 #define OPEN_SPEED 0.5 /* m/s, rad/s: ... but no faster, unless ODE's own correction is */
 #define OPEN_LEAST \
@@ -378,6 +378,14 @@ static double speed_of(const placed_joint *j, const hapi_row *row)
   return hapi_row_start_speed(j->a, row->ja) + hapi_row_start_speed(j->b, row->jb);
 }
 
+/* Speed after the tick if the stop were not there, with the impulses of the last tick: what presses a body
+ * against a stop goes on while the stop throws it back. Without that, a pressed one hops on the stop. */
+static double pressed(const hapi_tick *tick, const hapi_row *row)
+{
+  const hapi_solver *solver = &tick->world.solver;
+  return hapi_dot6(row->ja, solver->v[row->a]) + hapi_dot6(row->jb, solver->v[row->b]);
+}
+
 /* A rigid stop may be reached within the tick, not passed; a soft one begins to push where ODE's does. */
 static void set_stop(hapi_tick *tick, const placed_joint *j, const hapi_model_limit *limit,
                      double gap, hapi_row *row)
@@ -390,7 +398,7 @@ static void set_stop(hapi_tick *tick, const placed_joint *j, const hapi_model_li
   } else {
     correct(tick, &limit->stop, (error_of){-gap, 0.0}, row);
   }
-  double back = -limit->bounce * speed;
+  double back = -limit->bounce * speed + fmin(pressed(tick, row) - speed, 0.0);
   if (limit->bounce > 0.0 && hits && speed < 0.0 && back > row->target) {
     row->target = back;
     tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
