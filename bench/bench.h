@@ -25,10 +25,13 @@ typedef struct bench {
 typedef hap_status (*bench_fn)(bench *b);
 
 hap_status bench_accuracy(bench *b);
+hap_status bench_edits(bench *b);
 hap_status bench_fig5(bench *b);
 hap_status bench_fig6(bench *b);
 hap_status bench_fig7(bench *b);
 hap_status bench_impedance(bench *b);
+hap_status bench_jitter(bench *b);
+hap_status bench_poses(bench *b);
 hap_status bench_scaling(bench *b);
 hap_status bench_stability(bench *b);
 hap_status bench_tick(bench *b);

@@ -122,7 +122,7 @@ static double next_push(const watcher *w)
  * caches: they take turns. */
 static hap_status watch_tick(watcher *w, size_t tick, double period_s, cycle *out, bool *out_ran)
 {
-  hap_stats stats;
+  hap_stats stats = {0};
   bool bare_first = ((tick / w->period_ticks + w->run) & 1) != 0;
   memset(out, 0, sizeof *out);
   out->v[CYCLE_T] = (double)tick / CYCLES_HAPTIC_HZ;

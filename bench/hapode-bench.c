@@ -18,11 +18,17 @@ typedef struct program {
 
 static const program programs[] = {
     {"accuracy", bench_accuracy, "what accuracy costs in time; --scene NAME: of one scene alone"},
+    {"edits", bench_edits,
+     "a world that threads change all the time under sixteen hands: ticks, steps, waits, forces"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
     {"impedance", bench_impedance,
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device"},
+    {"jitter", bench_jitter,
+     "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
+    {"poses", bench_poses,
+     "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
     {"stability", bench_stability,
      "where each integrator holds: stiffness, mass, contacts at once"},

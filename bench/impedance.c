@@ -94,13 +94,14 @@ static void conclude(const sums *s, impedance_point *out)
   out->contact_share = (double)s->touching / count;
 }
 
-static hap_status measure_point(bench *b, port_def *def, double hz, const impedance_truth *truth,
-                                impedance_point *out)
+static hap_status measure_point(bench *b, const port_def *common, double hz,
+                                const impedance_truth *truth, impedance_point *out)
 {
   port p;
+  port_def def = *common;
   sums s = {0};
   char device[256];
-  double preload = impedance_cases[def->body].preload;
+  double preload = impedance_cases[def.body].preload;
   double depth = preload / IMPEDANCE_STIFFNESS;
   if (truth->coupling_stiffness > 0.0) {
     depth += preload / truth->coupling_stiffness;
@@ -110,8 +111,8 @@ static hap_status measure_point(bench *b, port_def *def, double hz, const impeda
   snprintf(device, sizeof device,
            "virtual:path=0:0/0/%.17g,sine=0/0/%.17g,hz=%.17g,hand=rigid,max_force=" PORT_FORCE_MAX,
            depth - PORT_RADIUS, out->amplitude, out->hz);
-  def->device = device;
-  hap_status status = port_open(b, def, &p);
+  def.device = device;
+  hap_status status = port_open(b, &def, &p);
   if (status < HAP_OK) {
     return status;
   }

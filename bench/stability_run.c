@@ -94,9 +94,11 @@ static void add_bodies(stability_bed *s)
   const int each = s->point->contacts / sides;
   const int across = (int)ceil(sqrt(each));
   for (int i = 0; i < s->point->contacts; ++i) {
-    int place = i % each;
-    double x = PITCH * (place % across - 0.5 * (across - 1));
-    double y = PITCH * (place / across - 0.5 * ((each - 1) / across));
+    const int column = i % each % across;
+    const int row = i % each / across;
+    const int last_row = (each - 1) / across;
+    double x = PITCH * (column - 0.5 * (across - 1));
+    double y = PITCH * (row - 0.5 * last_row);
     (s->point->cubes ? add_cube : add_ball)(s, i, x, y, i < each ? -1.0 : 1.0);
   }
 }

@@ -14,6 +14,7 @@
 #include "bench/bench.h"
 #include "bench/tick_contact.h"
 #include "bench/tick_guard.h"
+#include "bench/tick_message.h"
 #include "haptic/rt/tick.h"
 #include "haptic/tick_memory.h"
 #include "sync/exchange.h"
@@ -50,7 +51,7 @@ static void close_bed(bed *t)
 
 static bool allocate(hapi_tick *tick, uint32_t count)
 {
-  const hapi_capacity capacity = {count, count, 1, 1, 1, 1};
+  const hapi_capacity capacity = {count, count, 1, 1, 1, 0, 0, 1};
   tick->period = 1e-9 * PERIOD_NS;
   return hapi_tick_memory_create(tick, &capacity);
 }
@@ -198,7 +199,7 @@ static void report(bench *b, hap_model model, uint32_t count, double ns)
 
 hap_status bench_tick(bench *b)
 {
-  double ns[MODEL_COUNT][SIZE_COUNT];
+  double ns[MODEL_COUNT][SIZE_COUNT] = {{0.0}};
   FILE *csv = bench_csv_open(
       b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
@@ -213,6 +214,7 @@ hap_status bench_tick(bench *b)
     }
   }
   status = status >= HAP_OK ? bench_tick_guard(b, csv) : status;
+  status = status >= HAP_OK ? bench_tick_message(b, csv) : status;
   status = status >= HAP_OK ? bench_tick_contact(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;

@@ -32,6 +32,9 @@ static const char *const at_rest = "virtual:path=0:-0.012/0/0.025,hand=rigid";
 static const char *const pushed =
     "virtual:path=0:-0.012/0/0.025;2:0.188/0/0.025,blend=linear,hand=rigid";
 
+#define HANDS_MAX 16
+#define HAND_PITCH 0.01 /* m, of four by four in front of a face */
+
 typedef struct tick_case {
   const char *name;
   const char *scene;
@@ -39,6 +42,7 @@ typedef struct tick_case {
   int block[3]; /* cubes along x, y, z that touch; 0: as the scene builds them */
   bool push;
   double bound_ns; /* 0: none, or that of ten bodies */
+  int hands;       /* 0: one */
 } tick_case;
 
 static const tick_case cases[] = {
@@ -56,6 +60,7 @@ static const tick_case cases[] = {
     {"wall8x8", "row10", 64, {8, 1, 8}, true, 0.0},
     {"block4x4x4", "row10", 64, {4, 4, 4}, false, 0.0},
     {"block4x4x4", "row10", 64, {4, 4, 4}, true, 0.0},
+    {"hands16", "row10", 10, {0, 0, 0}, true, 0.0, HANDS_MAX},
 };
 
 /* What a tick is measured by. */
@@ -108,17 +113,32 @@ static void arrange(const scene *s, const int block[3])
   }
 }
 
+static void put_hands(const tick_case *what, char specs[HANDS_MAX][160], rig_options *out)
+{
+  out->devices[0] = what->push ? pushed : at_rest;
+  out->device_count = 1;
+  for (int i = 0; i < what->hands; ++i) {
+    const int place[2] = {i % 4, i / 4};
+    double y = HAND_PITCH * (place[0] - 1.5);
+    double z = 0.025 + HAND_PITCH * (place[1] - 1.5);
+    snprintf(specs[i], sizeof specs[i],
+             "virtual:path=0:-0.012/%g/%g;2:0.188/%g/%g,blend=linear,hand=rigid", y, z, y, z);
+    out->devices[i] = specs[i];
+    out->device_count = (size_t)i + 1;
+  }
+}
+
 static hap_status open_bed(bench *b, const tick_case *what, tick_bed *t)
 {
   rig_options options;
+  char specs[HANDS_MAX][160];
   memset(t, 0, sizeof *t);
   t->what = what;
   t->ticks = b->quick ? 200 : 1000;
   rig_options_init(&options);
   options.parameters = cycles_scene(what->scene);
   options.count = what->count;
-  options.devices[0] = what->push ? pushed : at_rest;
-  options.device_count = 1;
+  put_hands(what, specs, &options);
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.model = HAP_MODEL_CONTACT;
   hap_status status = rig_create(&options, &t->rig, &b->detail);
@@ -254,6 +274,9 @@ static void report(bench *b, const tick_bed *t)
       t->what->name, phase, t->rig.scene->body_count, middle(t, CONTACTS), middle(t, ROWS),
       1e-3 * ns, 1e-3 * t->p99_ns, 1e-3 * middle(t, ODE_NS), middle(t, ODE_CONTACTS),
       1e-3 * t->pass_ns);
+  if (t->what->hands > 0) {
+    return; /* nothing to compare it with */
+  }
   bench_say(
       "  rows %.1f %%, solve %.1f %% (the second one %.1f), rest %.1f %%; %g sweeps, "
       "%g direct solves in the last solve; a row update %.1f ns",

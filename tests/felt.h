@@ -25,6 +25,9 @@ typedef struct felt_book {
   /* How it is broken. */
   atomic_int fail_read;
   atomic_int fail_write;
+  atomic_int fail_start;
+  atomic_int lost; /* as one that is unplugged: from this on nothing but a start brings it back */
+  int starts;
   atomic_int bad_pose;
   atomic_int block_ms;   /* the next read takes so long */
   double jump;           /* m, along x, that the device is off */
@@ -65,6 +68,11 @@ static inline void felt_describe(void *self, hap_device_info *out)
 static inline hap_status felt_start(void *self)
 {
   (void)self;
+  ++felt.starts;
+  if (atomic_load(&felt.fail_start) != 0) {
+    return HAP_ERROR_DEVICE;
+  }
+  atomic_store(&felt.lost, 0);
   return felt.hand->start(felt.self);
 }
 
@@ -88,6 +96,9 @@ static inline hap_status felt_read(void *self, int64_t time_ns, hap_pose *pose, 
   (void)self;
   if (block_ms > 0) {
     sleep_ms(block_ms);
+  }
+  if (atomic_load(&felt.lost) != 0) {
+    return HAP_ERROR_DEVICE;
   }
   hap_status status = felt.hand->read(felt.self, time_ns, pose, twist, buttons);
   felt_move(pose->position);
@@ -113,7 +124,7 @@ static inline hap_status felt_write(void *self, const hap_wrench *wanted, hap_wr
 {
   double change[3];
   (void)self;
-  if (atomic_load(&felt.fail_write) != 0) {
+  if (atomic_load(&felt.fail_write) != 0 || atomic_load(&felt.lost) != 0) {
     return HAP_ERROR_DEVICE;
   }
   hapi_v3_sub(wanted->force, felt.force, change);

@@ -67,6 +67,29 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
   }
 }
 
+/* Four cubes a millimetre apart: the floor's sixteen contacts have room, not those to the sides, which
+ * come before them in the list. */
+TEST(where_contacts_find_no_room_those_that_touch_are_kept)
+{
+  contact_world w;
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  for (int i = 0; i < 4; ++i) {
+    (void)cw_add_cube(&w, 0.5, 0.05, 0.051 * (i % 2), 0.051 * (i / 2), 0.025);
+  }
+  w.def.max_contacts = 18;
+  REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
+  for (int i = 0; i < 300; ++i) {
+    cw_tick(&w);
+    for (int k = 0; k < 4 && i > 50; ++k) {
+      CHECK_NEAR(w.position[k][2], 0.025, 3e-4);
+    }
+  }
+  CHECK(w.range_max == 4);
+  CHECK(cw_stats(&w).capacity_dropped > 0);
+  cw_close(&w);
+}
+
 /* Without Approx1 friction is a force of its own: there must be none before the touch. */
 TEST(a_box_falls_beside_a_wall_that_it_does_not_touch)
 {
@@ -102,6 +125,7 @@ int main(void)
   dInitODE2(0);
   RUN(a_session_that_starts_again_owns_what_it_owned);
   RUN(a_convex_body_without_room_for_its_points_stays_on_the_floor);
+  RUN(where_contacts_find_no_room_those_that_touch_are_kept);
   RUN(a_box_falls_beside_a_wall_that_it_does_not_touch);
   RUN(a_body_that_the_application_puts_to_sleep_stays_so);
   dCloseODE();

@@ -179,6 +179,7 @@ static void run(void)
   s.solver.rows = s.rows;
   s.solver.row_count = s.row_count;
   s.solver.v = s.v;
+  s.solver.free = s.free_v;
   s.solver.body_count = s.body_count;
   s.solver.work = s.work;
   s.solver.work_count = WORK;
@@ -761,6 +762,39 @@ TEST(islands_are_solved_one_by_one)
   CHECK(s.solver.sweeps <= 5);
 }
 
+/* Cubes on the ground, each pressed near a corner by a body that weighs nothing beside their springs. */
+static void make_star(uint32_t count)
+{
+  const uint32_t hub = count + 1;
+  set_up();
+  seed = count;
+  s.boxes[hub] = (box){.centre = {0.0, 0.0, 1.0}, .half = {0.1, 0.1, 0.1}, .mass = 4e-4};
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t body = add_cube(pow(10.0, uniform(-3.0, 0.0)), 0.2 * i, 0.0, 0.05, 0.05);
+    const double n[3] = {uniform(-0.3, 0.3), uniform(-0.3, 0.3), -1.0};
+    const double point[3] = {0.2 * i + uniform(-0.06, 0.06), uniform(-0.06, 0.06), 0.1};
+    add_face(body, GROUND, 2, 0.5);
+    hapi_row *row = add_row(body, hub, point, n);
+    memset(row->jb + 3, 0, 3 * sizeof(double)); /* the hub does not turn */
+    memset(row->bb + 3, 0, 3 * sizeof(double));
+    make_soft(row, 1e4, 0.0, uniform(-1e-4, 1e-3));
+  }
+  s.body_count = hub + 1;
+  s.solver.hub_count = 1;
+  fall();
+  s.v[hub][2] = -0.1;
+}
+
+TEST(many_bodies_about_a_light_one_are_solved_to_the_end)
+{
+  for (uint32_t count = 2; count <= 40; count += 19) {
+    make_star(count);
+    run();
+    CHECK(s.solver.residual < s.solver.tolerance && s.solver.sweeps <= 4);
+    check_complementarity(1e-7);
+  }
+}
+
 TEST(budget_and_limits_hold)
 {
   for (int limit = 0; limit < 4; ++limit) {
@@ -858,6 +892,7 @@ int main(void)
   RUN(an_unchanged_load_is_solved_at_once);
   RUN(the_same_input_gives_the_same_bits);
   RUN(islands_are_solved_one_by_one);
+  RUN(many_bodies_about_a_light_one_are_solved_to_the_end);
   RUN(budget_and_limits_hold);
   RUN(work_that_is_too_small_is_left_alone);
   RUN(hostile_input_ends);

@@ -29,9 +29,17 @@ typedef struct counters {
 static counters seen;
 static hap_device_info told;
 
+static hap_status open_gives; /* to "quiet", "full" and "none" */
+
 static hap_status fake_open(const char *args, void **self, hap_detail *detail)
 {
   ++seen.opens;
+  if (strcmp(args, "full") == 0) {
+    memset(detail->text, 'x', sizeof detail->text); /* no end */
+  }
+  if (args[0] != '\0' && strcmp(args, "fail") != 0) {
+    return open_gives;
+  }
   if (strcmp(args, "fail") == 0) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "fake: no");
   }
@@ -114,11 +122,13 @@ TEST(names_are_listed)
   CHECK(about != NULL && strstr(about, "path=") != NULL);
   CHECK(strcmp(hap_device_name_at(1, NULL), "replay") == 0);
   size_t count = 0;
-  while (hap_device_name_at(count, NULL) != NULL) {
-    const hap_device_ops *ops = hapi_registry_at(count);
+  for (const hap_device_ops *ops; (ops = hapi_registry_at(count)) != NULL; ++count) {
     CHECK(ops->abi == HAP_DEVICE_ABI && ops->size == sizeof *ops);
-    ++count;
+    CHECK(strcmp(hap_device_name_at(count, NULL), ops->name) == 0);
   }
+  CHECK(strcmp(hap_device_name_at(count, &about), "module") == 0); /* how all others are opened */
+  CHECK(about != NULL && strstr(about, ".so") != NULL);
+  ++count;
   CHECK(hap_device_name_at(count, &about) == NULL && about == NULL);
   CHECK(hap_device_name_at(SIZE_MAX, NULL) == NULL);
 }
@@ -159,8 +169,17 @@ TEST(abi_comes_first)
   ops.abi = HAP_DEVICE_ABI + 1;
   CHECK(open_fake(&ops, &device) == HAP_ERROR_UNSUPPORTED);
   ops.abi = HAP_DEVICE_ABI;
-  ops.size = (uint32_t)sizeof ops - 1;
+  ops.size = (uint32_t)offsetof(hap_device_ops, held) - 1;
   CHECK(open_fake(&ops, &device) == HAP_ERROR_UNSUPPORTED);
+}
+
+TEST(older_tables_without_optional_operations_are_served)
+{
+  hap_device *device = NULL;
+  hap_device_ops ops = fake_ops();
+  ops.size = (uint32_t)offsetof(hap_device_ops, held);
+  REQUIRE(open_fake(&ops, &device) == HAP_OK);
+  hap_device_close(device);
 }
 
 TEST(bad_tables_are_refused)
@@ -175,10 +194,37 @@ TEST(bad_tables_are_refused)
   ops = fake_ops();
   ops.pacing = 3;
   CHECK(open_fake(&ops, &device) == HAP_ERROR_UNSUPPORTED);
-  ops = fake_ops();
-  ops.zero = NULL;
-  CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
+  for (size_t at = offsetof(hap_device_ops, open); at <= offsetof(hap_device_ops, close);
+       at += sizeof ops.open) {
+    ops = fake_ops();
+    memset((char *)&ops + at, 0, sizeof ops.open);
+    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
+  }
   CHECK(seen.opens == 0);
+}
+
+/* A status that is none, no text, no self: it is said all the same. */
+TEST(what_open_does_wrong_is_said)
+{
+  static const struct {
+    hap_status gives;
+    const char *args;
+    hap_status status;
+    const char *said;
+  } cases[] = {{HAP_ERROR_IO, "quiet", HAP_ERROR_IO, "a file cannot be"},
+               {(hap_status)-999, "quiet", HAP_ERROR_DEVICE, "unknown status"},
+               {(hap_status)INT32_MIN, "full", HAP_ERROR_DEVICE, "xxxxxxx"},
+               {HAP_OK, "none", HAP_ERROR_DEVICE, "gave no self"}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    hap_device_ops ops = fake_ops();
+    hap_device *device = NULL;
+    hap_detail detail = {"of before"};
+    open_gives = cases[i].gives;
+    CHECK(hapi_device_open_ops(&ops, cases[i].args, &device, &detail) == cases[i].status);
+    CHECK(device == NULL && strstr(detail.text, cases[i].said) != NULL && seen.closes == 0);
+    CHECK(strstr(detail.text, "of before") == NULL);
+    CHECK(memchr(detail.text, '\0', sizeof detail.text) != NULL);
+  }
 }
 
 TEST(bad_info_closes_again)
@@ -576,7 +622,9 @@ int main(void)
   RUN(unknown_name_lists_the_known);
   RUN(null_is_refused);
   RUN(abi_comes_first);
+  RUN(older_tables_without_optional_operations_are_served);
   RUN(bad_tables_are_refused);
+  RUN(what_open_does_wrong_is_said);
   RUN(bad_info_closes_again);
   RUN(failed_open_keeps_its_text);
   RUN(info_has_a_name_and_fits_any_size);

@@ -238,10 +238,10 @@ TEST(messages_are_never_torn_in_either_direction)
 /* ---- the exchange ---- */
 
 static const hapi_capacity capacities[] = {
-    {1, 1, 1, 0, 0, 1},
-    {3, 5, 2, 0, 0, 7},
-    {64, 256, 4, 0, 0, 128},
-    {1024, 4096, 16, 0, 0, 2048},
+    {1, 1, 1, 0, 0, 0, 0, 1},
+    {3, 5, 2, 0, 0, 0, 0, 7},
+    {64, 256, 4, 0, 0, 0, 0, 128},
+    {1024, 4096, 16, 0, 0, 0, 0, 2048},
 };
 #define CAPACITIES (sizeof capacities / sizeof capacities[0])
 

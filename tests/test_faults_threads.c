@@ -102,6 +102,46 @@ TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
   felt_end(&f);
 }
 
+static void *look_often(void *wrong)
+{
+  while (atomic_load(&hangs) == 0) {
+    hap_pointer_state state;
+    if (hap_pointer_get(f.s.session, f.hand, &state, sizeof state) != HAP_OK) {
+      atomic_fetch_add((atomic_int *)wrong, 1);
+    }
+  }
+  return NULL;
+}
+
+/* Beside the loop, and others that look at the pointer. */
+TEST(a_lost_device_is_restarted_while_the_loop_runs)
+{
+  pthread_t looker;
+  atomic_int wrong;
+  atomic_init(&wrong, 0);
+  REQUIRE(begin_threads());
+  CHECK(wait_until(presses));
+  REQUIRE(pthread_create(&looker, NULL, look_often, &wrong) == 0);
+  for (int i = 0; i < 5; ++i) {
+    atomic_store(&felt.lost, 1);
+    CHECK(wait_until(lets_go));
+    atomic_store(&felt.fail_start, 1);
+    CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_DEVICE);
+    atomic_store(&felt.fail_start, 0);
+    CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_OK);
+    sleep_ms(20);
+    CHECK(lets_go());
+    CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
+    CHECK(wait_until(presses));
+  }
+  atomic_store(&hangs, 1);
+  pthread_join(looker, NULL);
+  atomic_store(&hangs, 0);
+  CHECK(hap_session_stop(f.s.session) == HAP_OK);
+  CHECK(atomic_load(&wrong) == 0);
+  felt_end(&f);
+}
+
 TEST(a_device_that_blocks_and_then_fails_is_zeroed)
 {
   REQUIRE(begin_threads());
@@ -221,6 +261,7 @@ int main(void)
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back);
   RUN(a_device_whose_read_takes_300_ms_is_felt_as_a_pause);
+  RUN(a_lost_device_is_restarted_while_the_loop_runs);
   RUN(a_device_that_blocks_and_then_fails_is_zeroed);
   RUN(a_process_that_is_stopped_and_continued_gives_no_burst);
   dCloseODE();

@@ -680,6 +680,20 @@ TEST(identity_takes_the_place_of_what_the_device_says)
   hap_device_close(device);
 }
 
+TEST(identity_without_a_quantum_leaves_the_devices_own)
+{
+  hap_device *device = NULL;
+  hap_device_info info;
+  hap_device_identity identity = some_identity();
+  REQUIRE(hap_device_open("virtual:quantum=2e-5,delay=1e-3", &device, NULL) == HAP_OK);
+  identity.quantum = 0.0;
+  identity.delay = 0.0;
+  CHECK(hap_device_set_identity(device, &identity, NULL) == HAP_OK);
+  CHECK(hap_device_get_info(device, &info, sizeof info) == HAP_OK);
+  CHECK(info.quantum == 2e-5 && info.delay == 0.0 && info.measures_velocity == 0);
+  hap_device_close(device);
+}
+
 int main(void)
 {
   int file = mkstemp(path);
@@ -707,6 +721,7 @@ int main(void)
   RUN(bad_files_are_refused_with_their_line);
   RUN(bad_identities_are_not_written);
   RUN(identity_takes_the_place_of_what_the_device_says);
+  RUN(identity_without_a_quantum_leaves_the_devices_own);
   remove(path);
   return tap_done();
 }

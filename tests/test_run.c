@@ -715,6 +715,25 @@ static void remove_folder(void)
   rmdir(folder);
 }
 
+/* One that starts again at the fourth time. */
+TEST(a_lost_device_ends_the_run_unless_it_is_to_be_waited_for)
+{
+  const char *module = getenv("HAPODE_BROKEN");
+  REQUIRE(module != NULL);
+  CHECK(run("--scene slide --lockstep --seconds 4 --device module:%s,break=unplugged", module) ==
+        1);
+  CHECK(says("could not be read"));
+  CHECK(run("--scene slide --lockstep --seconds 4 --reconnect --device module:%s,break=unplugged",
+            module) == 0);
+  CHECK(says("a device was lost") && says("the device is back"));
+  const char *faults = value_of("faults");
+  CHECK(faults != NULL && atoi(faults) == 1);
+  CHECK(run("--scene slide --lockstep --seconds 4 --reconnect --device "
+            "module:%s,break=unplugged_for_ever",
+            module) == 1);
+  CHECK(says("a device was lost") && says("could not be read"));
+}
+
 int main(void)
 {
   const char *base = getenv("TMPDIR");
@@ -751,6 +770,7 @@ int main(void)
   RUN(an_identification_that_fails_writes_nothing);
   RUN(the_picture_is_an_svg);
   RUN(without_gnuplot_one_line_says_so);
+  RUN(a_lost_device_ends_the_run_unless_it_is_to_be_waited_for);
   remove_folder();
   return tap_done();
 }

@@ -394,6 +394,7 @@ TEST(ids_of_removed_pointers_are_never_valid_again)
       CHECK(hap_pointer_get(s.session, ids[k], &state, sizeof state) == HAP_ERROR_NOT_FOUND);
       CHECK(hap_pointer_remove(s.session, ids[k]) == HAP_ERROR_NOT_FOUND);
       CHECK(hap_pointer_set_target(s.session, ids[k], &pose, NULL) == HAP_ERROR_NOT_FOUND);
+      CHECK(has(detail_of(&s), "it was removed"));
       CHECK(k == i || ids[k].v != ids[i].v);
     }
   }
@@ -432,6 +433,7 @@ TEST(a_device_serves_one_pointer)
   CHECK(hap_pointer_add(s[1].session, &def, &id[1]) == HAP_ERROR_STATE);
   const hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   CHECK(hap_pointer_set_target(s[0].session, id[0], &pose, NULL) == HAP_ERROR_STATE);
+  CHECK(has(detail_of(&s[0]), "has a device"));
   CHECK(hap_pointer_remove(s[0].session, id[0]) == HAP_OK);
   CHECK(hap_pointer_add(s[1].session, &def, &id[1]) == HAP_OK); /* free again */
   stage_end(&s[0]);

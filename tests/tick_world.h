@@ -21,7 +21,7 @@
 #define ROWS (4u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
 #define BUCKETS 32u
 
-static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, JOINTS};
+static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS};
 
 /* A tick with its memory, and a message to fill in. */
 static struct {

@@ -235,6 +235,14 @@ static int identify(const run_options *options)
                   detail.text[0] != '\0' ? detail.text : hap_status_text(status));
 }
 
+static int check_device(run_options *options)
+{
+  run_loop_catch_signals();
+  options->check.rate_hz = options->rig.def.haptic_hz;
+  options->check.stop = run_loop_stop_wanted;
+  return conform_run(&options->check, stdout) ? EXIT_GOOD : EXIT_FAILED;
+}
+
 static int run_session(run_options *options)
 {
   rig r;
@@ -269,6 +277,9 @@ int main(int argc, char **argv)
       printf("hapode-run %s\n", hap_version());
       break;
     case RUN_SESSION:
+      if (options.check.spec != NULL) {
+        return check_device(&options);
+      }
       return options.identify_path != NULL ? identify(&options) : run_session(&options);
   }
   return EXIT_GOOD;

@@ -10,8 +10,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-extern char **environ;
-
 bool plot_available(void)
 {
 #ifdef PLOT_DISABLED

@@ -28,16 +28,16 @@ typedef struct run_effects {
 hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail);
 
 /* HAP_ERROR_UNSUPPORTED for a wish that the model does not meet in this version. */
-hap_status run_effects_check(const run_effects *effects, hap_model model, hap_detail *detail);
+hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_detail *detail);
 
 /* The wish for the effect of that name, one of those that run_effects_list prints. */
-run_effect_wish *run_effects_wish(run_effects *effects, const char *name);
+run_effect_wish *run_effects_wish(run_effects *wanted, const char *name);
 
 /* What the session can be told of it. */
-void run_effects_apply(const run_effects *effects, hap_session_def *io);
+void run_effects_apply(const run_effects *wanted, hap_session_def *io);
 
 /* "testing=on,cross=off,...": what the model has. */
-void run_effects_print(const run_effects *effects, hap_model model, FILE *out);
+void run_effects_print(const run_effects *wanted, hap_model model, FILE *out);
 
 /* One line each: name, what it is, which models have it. */
 void run_effects_list(FILE *out);

@@ -12,6 +12,7 @@
 
 #define PAUSE_S 0.01 /* between two looks at the session */
 #define PROGRESS_S 0.1
+#define RECONNECT_S 0.5 /* between two tries */
 #define ROWS_AT_ONCE 64
 #define ROWS_MIN 2000 /* the reader may be away for 2 s at 1 kHz */
 #define ROWS_MAX 20000
@@ -23,6 +24,7 @@ typedef struct watch {
   run_loop *loop;
   double next_sample;   /* s */
   double next_progress; /* s, wall clock */
+  double next_try;      /* s, of a lost device */
   hap_detail *detail;
 } watch;
 
@@ -140,6 +142,30 @@ static void show_progress(watch *w, double t, const hap_stats *stats)
   w->next_progress = now + PROGRESS_S;
 }
 
+/* True: the fault is that of a lost device, which is being waited for. */
+static bool reconnect(watch *w, double t, const hap_stats *stats)
+{
+  hap_session *session = w->loop->rig->session;
+  const hap_pointer_id lost = {stats->fault_pointer};
+  bool device = stats->fault == HAP_FAULT_DEVICE_READ || stats->fault == HAP_FAULT_DEVICE_WRITE;
+  if (!w->loop->options->reconnect || !device || lost.v == 0) {
+    return false;
+  }
+  if (t < w->next_try) {
+    return true;
+  }
+  if (w->next_try == 0.0) {
+    fputs("hapode-run: a device was lost; it is started again as soon as it answers\n", stderr);
+  }
+  w->next_try = t + RECONNECT_S;
+  if (hap_pointer_restart(session, lost) >= HAP_OK) {
+    (void)hap_session_reset_fault(session);
+    fputs("hapode-run: the device is back\n", stderr);
+    w->next_try = 0.0;
+  }
+  return true;
+}
+
 /* What is to be done between two stretches of the run, at time t of it. */
 static hap_status look(watch *w, double t)
 {
@@ -153,7 +179,7 @@ static hap_status look(watch *w, double t)
     w->next_sample = t + run_picture_interval(loop->picture) - 0.5 * PAUSE_S;
   }
   show_progress(w, t, &stats);
-  if (stats.fault != HAP_FAULT_NONE) {
+  if (stats.fault != HAP_FAULT_NONE && !reconnect(w, t, &stats)) {
     (void)hap_session_detail(loop->rig->session, w->detail);
     return HAP_ERROR_DEVICE;
   }
@@ -221,5 +247,9 @@ hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
   run_progress_clear(&loop->progress);
   (void)hap_session_stats(session, stats, sizeof *stats);
   drain(loop);
+  if (status == HAP_OK && stats->fault != HAP_FAULT_NONE) { /* it was waited for to the end */
+    (void)hap_session_detail(session, detail);
+    return HAP_ERROR_DEVICE;
+  }
   return status != HAP_OK ? status : started;
 }

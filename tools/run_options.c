@@ -42,7 +42,7 @@ static hap_status take_number(run_options *options, const option *self, const ch
   if (end == value || *end != '\0' || !(number >= self->low && number <= self->high)) {
     return fail(detail, "\"%.60s\" is not a number from %g to %g", value, self->low, self->high);
   }
-  *(double *)((char *)options + self->offset) = number;
+  *(double *)((void *)((char *)options + self->offset)) = number;
   return HAP_OK;
 }
 
@@ -175,6 +175,26 @@ static hap_status take_lockstep(run_options *options, const option *self, const 
   return HAP_OK;
 }
 
+static hap_status take_reconnect(run_options *options, const option *self, const char *value,
+                                 hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->reconnect = true;
+  return HAP_OK;
+}
+
+static hap_status take_limits(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->check.limits = true;
+  return HAP_OK;
+}
+
 /* The action is the option's low. */
 static hap_status take_action(run_options *options, const option *self, const char *value,
                               hap_detail *detail)
@@ -199,6 +219,24 @@ static const option table[] = {
      "no session: moves the one --device, which nobody must hold, finds its\n"
      "mass, damping, friction, delay and quantum and writes them to FILE",
      take_text, offsetof(run_options, identify_path), 0, 0},
+    {"--reconnect", NULL,
+     "a device that was lost is started again until it answers; then the force\n"
+     "comes back over 20 ms (default: a lost device ends the run)",
+     take_reconnect, 0, 0, 0},
+    {"--check-device", "SPEC",
+     "no session: holds the device against the contract of hapode/device_impl.h, with\n"
+     "a small force; prints ok or not ok for each point; let go of the grip",
+     take_text, offsetof(run_options, check.spec), 0, 0},
+    {"--check-force", "N", "the largest force of the check (default 0.3), 0: none at all",
+     take_number, offsetof(run_options, check.force), 0, CONFORM_FORCE_MAX},
+    {"--check-limits", NULL,
+     "also ask for more than the device can, and for what is no number: if it is\n"
+     "wrong, it may give all its force for a moment",
+     take_limits, 0, 0, 0},
+    {"--check-unplug", "S", "also ask a person to pull its plug, S seconds for each turn",
+     take_number, offsetof(run_options, check.unplug_s), 0.001, 3600},
+    {"--check-wait", "S", "seconds of warning before it is energised (default 5)", take_number,
+     offsetof(run_options, check.wait_s), 0, 3600},
     {"--physics-hz", "F", "steps of the world a second, 1 to 1000 (default 60)", take_number,
      offsetof(run_options, rig.def.physics_hz), 1, 1000},
     {"--haptic-hz", "F", "ticks of the haptic loop a second, 100 to 20000 (default 1000)",
@@ -333,6 +371,9 @@ static hap_status check(run_options *o, hap_detail *detail)
        (o->plot_path != NULL && strcmp(o->black_box_path, o->plot_path) == 0))) {
     return fail(detail, "--black-box: the same file as --trace or --plot");
   }
+  if (o->check.spec != NULL && (o->identify_path != NULL || o->rig.device_count > 0)) {
+    return fail(detail, "--check-device: takes neither --device nor --identify");
+  }
   if (o->identify_path != NULL && o->rig.device_count != 1) {
     return fail(detail, "--identify: takes exactly one --device, there are %zu",
                 o->rig.device_count);
@@ -353,6 +394,8 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   memset(out, 0, sizeof *out);
   rig_options_init(&out->rig);
   out->model_age_s = -1.0;
+  out->check.force = CONFORM_FORCE_DEFAULT;
+  out->check.wait_s = 5.0;
   for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {
     status = take_option(argv, &at, out, detail);
   }

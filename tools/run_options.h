@@ -7,6 +7,7 @@
 
 #include <stdio.h>
 
+#include "tools/conform/conform.h"
 #include "tools/rig.h"
 #include "tools/run_effects.h"
 
@@ -23,10 +24,12 @@ typedef struct run_options {
   bool coupling_given;
   double seconds;     /* 0: as long as the scene says */
   double model_age_s; /* negative: not given */
+  bool reconnect;     /* start a lost device again */
   const char *trace_path;
   const char *plot_path;
   const char *black_box_path;
   const char *identify_path; /* not NULL: identify the device, no session */
+  conform_options check;     /* spec not NULL: check that device, no session */
   run_effects effects;
 } run_options;
 

@@ -25,6 +25,8 @@ have_package() {
     pkg-config) command -v pkg-config >/dev/null ;;
     clang) command -v clang >/dev/null ;;
     clang-format) command -v clang-format-14 >/dev/null ;;
+    clang-tidy-14 | cppcheck) command -v "$1" >/dev/null ;;
+    abigail-tools) command -v abidiff >/dev/null ;;
     gnuplot-nox) command -v gnuplot >/dev/null ;;
     python3) command -v python3 >/dev/null ;;
     *) return 1 ;;
@@ -55,7 +57,7 @@ install_packages() {
 
 # need_packages OPTIONAL...: installs what is missing; ends the script when a needed one stays away.
 need_packages() {
-  local needed optional
+  local needed optional package
   if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
     say "not a Debian: needs ${packages_needed[*]}, is better with $*"
     return 0
@@ -65,9 +67,11 @@ need_packages() {
   if [ $((${#needed[@]} + ${#optional[@]})) -eq 0 ]; then
     return 0
   fi
-  # an optional package that cannot be had must not take the needed ones with it
-  if ! install_packages "${needed[@]}" "${optional[@]}" && [ ${#needed[@]} -gt 0 ]; then
-    install_packages "${needed[@]}" || true
+  # a package that cannot be had must not take the others with it
+  if ! install_packages "${needed[@]}" "${optional[@]}"; then
+    for package in "${needed[@]}" "${optional[@]}"; do
+      install_packages "$package" || true
+    done
   fi
   mapfile -t needed < <(missing_packages "${packages_needed[@]}")
   mapfile -t optional < <(missing_packages "$@")

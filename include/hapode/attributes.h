@@ -5,6 +5,7 @@
 
 /* The only place where compiler extensions are used. */
 
+/* A function of the library: visible outside of it. */
 #ifndef HAP_API
 #if defined(__GNUC__)
 #define HAP_API __attribute__((visibility("default")))
@@ -13,6 +14,7 @@
 #endif
 #endif
 
+/* A status that must be looked at, and a text that is checked as printf's. */
 #if defined(__GNUC__)
 #define HAP_NODISCARD __attribute__((warn_unused_result))
 #define HAP_PRINTF(format_index, first_argument) \

@@ -16,7 +16,7 @@ typedef struct hap_device hap_device;
 
 /* What a device is and can hold. Zero in a limit means that the device does not know. */
 typedef struct hap_device_info {
-  char name[64];
+  char name[64];              /* for people: "virtual", a product's name */
   unsigned dof;               /* 3: force only; 6: force and torque */
   double max_force;           /* N, norm of the force vector the device may be asked for */
   double max_torque;          /* N m */
@@ -30,7 +30,8 @@ typedef struct hap_device_info {
 } hap_device_info;
 
 /* [control] Opens a device by its spec: a name, then ':' and arguments separated by commas, such
- * as "virtual", "virtual:sine=0.1/0/0,hz=1", "replay:hand.csv,scale=0.5". On failure *out is
+ * as "virtual", "virtual:sine=0.1/0/0,hz=1", "replay:hand.csv,scale=0.5"; or from a shared object,
+ * "module:/whole/path.so,ARGUMENTS" (docs/writing-a-device.md). On failure *out is
  * NULL and detail (may be NULL) says what was wrong and, for an unknown name, which exist.
  * May block. The caller owns the device and closes it after the session that uses it stopped. */
 HAP_API HAP_NODISCARD hap_status hap_device_open(const char *spec, hap_device **out,
@@ -73,12 +74,16 @@ HAP_API void hap_device_identity_init(hap_device_identity *identity, size_t size
 HAP_API HAP_NODISCARD hap_status hap_device_identity_read(const char *path,
                                                           hap_device_identity *out,
                                                           hap_detail *detail);
+
+/* [control] Writes *identity to a new file at path, or over what was there, in the form that
+ * hap_device_identity_read takes. HAP_ERROR_IO with the reason in detail (may be NULL). */
 HAP_API HAP_NODISCARD hap_status hap_device_identity_write(const char *path,
                                                            const hap_device_identity *identity,
                                                            hap_detail *detail);
 
 /* [control] From now on hap_device_get_info gives these figures in place of what the device says of
- * itself, and a pointer that is added takes them over. HAP_ERROR_STATE when a pointer has the
+ * itself, and a pointer that is added takes them over. A quantum of 0 leaves the device's own: none was
+ * seen, which is not to say that there is none. HAP_ERROR_STATE when a pointer has the
  * device, HAP_ERROR_ARGUMENT when the identity is that of a device of another name. */
 HAP_API HAP_NODISCARD hap_status hap_device_set_identity(hap_device *device,
                                                          const hap_device_identity *identity,

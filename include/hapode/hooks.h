@@ -10,10 +10,11 @@
 
 HAP_BEGIN_DECLS
 
+/* How much a line of the log matters. Values are never renumbered. */
 typedef enum hap_log_level {
-  HAP_LOG_ERROR = 0,
-  HAP_LOG_WARNING = 1,
-  HAP_LOG_INFO = 2
+  HAP_LOG_ERROR = 0,   /* something was not done */
+  HAP_LOG_WARNING = 1, /* it was done, but not as well as it should */
+  HAP_LOG_INFO = 2     /* what happens */
 } hap_log_level;
 
 /* The process-wide hooks. A member left NULL keeps its default: malloc, free, and a log that is

@@ -36,7 +36,15 @@ typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_di
 typedef void (*hap_step_fn)(void *user, double step_s);
 
 /* The application's world. From start to stop it is touched only under hap_session_lock, in a
- * posted edit, or in one of these callbacks.
+ * posted edit, in before_step, or in after_step. The other callbacks (surface, friction_direction, ODE's
+ * moved callbacks) come while lists of the world are in use: they read it, and what they want changed they
+ * post. docs/editing.md has more.
+ *
+ * What the session sets on bodies from start to stop, and gives back then: flag, idle time and angular
+ * threshold of auto-disable (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where that is off. By these
+ * it tells a body from a later one at its address. What the application sets of auto-disable meanwhile
+ * holds; an idle time set to the world's default alone reads as dBodySetAutoDisableFlag(body, 0), which
+ * leaves no other trace.
  *
  * Bodies known to the session: those of the geoms in space (and in spaces inside it), whatever is
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
@@ -79,26 +87,50 @@ HAP_API HAP_NODISCARD hap_status hap_session_create(const hap_session_def *def,
                                                     const hap_ode_def *ode, hap_session **out,
                                                     hap_detail *detail);
 
-/* [locked, or control before start] Makes known a body without geom and without joint. Forget it
- * before dBodyDestroy. */
+/* [locked, or control before start] Makes known a body without geom and without joint, or one that is about
+ * to lose its last. Forget it before dBodyDestroy: of such a body nobody else knows that it is gone. */
 HAP_API HAP_NODISCARD hap_status hap_session_adopt_body(hap_session *session, dBodyID body);
 
-/* [locked] Before dBodyDestroy: the session drops what it knows of the body. */
+/* [locked] Before dBodyDestroy: the session drops what it knows of the body, and gives back what it had
+ * set on it. HAP_ERROR_NOT_FOUND: it knew nothing, which is no harm. Without it a body that is gone is
+ * noticed at the next step all the same, also when a new one has got its address: it is counted
+ * (hap_stats.bodies_lost, HAP_BODY_LOST) and said once. A body that is forgotten and not destroyed comes in
+ * again as a new one. */
 HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 
 /* [locked] Before dGeomDestroy of a geom that a pointer may be near to, and after a change of the
- * triangles of a mesh. */
+ * triangles of a mesh. Without it the first is noticed at the next step, and of the second only what
+ * shows in 16 triangles spread over the mesh. */
 HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
 
 /* [locked, or control before start] ODE has no getter for a body's moved callback, so the session
- * can keep one silent in testing simulations only when it was set here (NULL: none). */
+ * can keep one silent in testing simulations only when it was set here (NULL: none). It holds until the body
+ * is forgotten or noticed to be gone; between stop and start nothing is noticed: forget it there. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                                                 void (*callback)(dBodyID));
 
-/* [any] Poses for drawing at time_ns (see hap_session_now): interpolated between physics steps one
- * H behind. HAP_STALE when physics is late by more than a step. Unknown bodies give HAP_ERROR_NOT_FOUND and leave out untouched. */
+/* [any] Poses for drawing at time_ns (see hap_session_now), of all bodies at one time, which lies behind
+ * time_ns by hap_stats.pose_delay_s: one physics step, and more where steps regularly come late. Bodies
+ * that the loop moves are where it had them at that time; the others are interpolated between two
+ * physics steps (slerp). So what touches is drawn touching, and with growing time_ns nothing goes back
+ * or jumps: bodies that come into the loop or leave it, and a change of model, do not show. The hand
+ * that belongs to it: hap_pointer_poses.
+ *
+ * A time that nobody knows yet gives the newest of each body, and HAP_STALE when that is later by more
+ * than a step (physics late or paused, time_ns in the future: a predicted time of display). At least
+ * 7 steps are kept (model SINGLE: 1.5), before which HAP_CLAMPED gives the oldest. Unknown bodies give
+ * HAP_ERROR_NOT_FOUND and leave out untouched: a body is known from the next step on, or from
+ * hap_session_adopt_body. One call for many bodies is cheaper than many; none of them keeps the
+ * haptic thread waiting. */
 HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                                      size_t count, hap_pose *out);
+
+/* [any] The same without delay: bodies that the loop moves after its newest tick, where hap_pointer_get
+ * has the hand; the others as they were at the last physics step, carried on by their last motion to
+ * that tick, for one step at most. Where that motion has changed they go back with the next step, and may
+ * meanwhile overlap. HAP_STALE when physics is late by more than a step. */
+HAP_API hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
+                                         hap_pose *out);
 
 /* [locked, or control before start] Bodies whose positions go into the trace, at most
  * HAP_TRACE_BODIES_MAX; replaces an earlier list. */

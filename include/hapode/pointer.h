@@ -17,7 +17,7 @@ HAP_BEGIN_DECLS
 /* Index and generation in one number: an id of a removed pointer is never valid again. 0 is
  * none. */
 typedef struct hap_pointer_id {
-  uint64_t v;
+  uint64_t v; /* to be compared with another one's, no more */
 } hap_pointer_id;
 
 /* Between the device and what touches the world. Values are fixed. */
@@ -99,13 +99,25 @@ typedef struct hap_pointer_def {
 /* [any] Fills *def with defaults. */
 HAP_API void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def);
 
-/* [control] Adds a pointer, also while running; it feels forces from the next sync on.
- * HAP_ERROR_CAPACITY beyond max_pointers; HAP_ERROR_STATE when the device is in use. */
+/* [control] Adds a pointer, also while running; it feels forces from the next sync on, ramped in as at
+ * the start. HAP_ERROR_CAPACITY beyond max_pointers; HAP_ERROR_STATE when the device serves another
+ * pointer, of this session or another one. */
 HAP_API HAP_NODISCARD hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def,
                                                  hap_pointer_id *out);
 
-/* [control] Zero force, device stopped, id invalid. */
+/* [control] Zero force, device stopped, id invalid; the last thing that the device was given is zero.
+ * Waits for the loop's next tick, not for the lock. HAP_ERROR_NOT_FOUND for an id of a pointer that was
+ * removed, here and below: its place may have another pointer by now, which has another id. */
 HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer);
+
+/* [control] Stops the pointer's device and starts it again: for one that was lost, unplugged or switched
+ * off, and has to be opened anew. Blocks as long as the device's start does; the loop and the other
+ * pointers go on. The pointer is out of the world meanwhile, its id stays valid. This alone brings no
+ * force back that a fault has taken: that does hap_session_reset_fault afterwards, over 20 ms. Without
+ * a fault the pointer comes in as one that was just added, also over 20 ms. HAP_ERROR_DEVICE: it did not
+ * start; the pointer stays out of the world, and this may be tried again. HAP_ERROR_STATE: the session is
+ * not started, or the pointer has no device. */
+HAP_API HAP_NODISCARD hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer);
 
 /* [app] Moves a pointer without device: pose and twist (may be NULL: at rest) in the device's
  * frame, from the next tick on. Values that are not finite or beyond 1e6 (m, m/s, rad/s), and a
@@ -123,8 +135,9 @@ typedef enum hap_guard_flag {
   HAP_GUARD_FAULT = 32      /* a fault is latched: on the way to zero, or there */
 } hap_guard_flag;
 
+/* What a pointer is doing, of its last tick. */
 typedef struct hap_pointer_state {
-  uint32_t size;
+  uint32_t size;             /* bytes that were filled in */
   uint32_t contacts;         /* bodies that push back now */
   int64_t stamp_ns;          /* of the tick */
   hap_pose device;           /* device's frame */
@@ -144,6 +157,14 @@ typedef struct hap_pointer_state {
 /* [any] State after the newest tick. */
 HAP_API hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
                                    hap_pointer_state *out, size_t size_of_out);
+
+/* [any] For drawing: the pointer (out_proxy) and the device (out_device) in the world at the time that
+ * hap_session_poses draws for time_ns, so that the drawn hand touches the drawn body. Either may be
+ * NULL. The two are apart only for a pointer that is a proxy; both turn with the device.
+ * HAP_STALE, HAP_CLAMPED: as hap_session_poses. HAP_ERROR_NOT_FOUND, and nothing is written: no such
+ * pointer, or no tick has had it yet. The newest: hap_pointer_get. */
+HAP_API hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,
+                                     hap_pose *out_proxy, hap_pose *out_device);
 
 HAP_END_DECLS
 

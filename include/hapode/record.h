@@ -14,6 +14,7 @@
 
 HAP_BEGIN_DECLS
 
+/* Pointers and bodies of a trace row; what is beyond is not traced. */
 #define HAP_TRACE_POINTERS_MAX 16
 #define HAP_TRACE_BODIES_MAX 16
 
@@ -25,7 +26,7 @@ typedef struct hap_trace_pointer {
 
 /* One tick. */
 typedef struct hap_trace_row {
-  uint64_t tick;
+  uint64_t tick;          /* number, from the first of the session */
   double t;               /* s since start */
   double tick_us;         /* us, computing time of the previous tick (this one is not over) */
   double model_age_s;     /* s */
@@ -48,7 +49,7 @@ HAP_API hap_status hap_session_trace_read(hap_session *session, hap_trace_row *r
 
 /* One tick of one pointer. Device's frame. */
 typedef struct hap_black_box_row {
-  uint64_t tick;
+  uint64_t tick;   /* number, from the first of the session */
   int64_t time_ns; /* of the session */
   hap_pointer_id pointer;
   uint32_t fault;     /* hap_fault latched at the end of the tick */

@@ -56,12 +56,13 @@ typedef enum hap_plane {
 
 /* Whether the guard shapes the force. Its checks, faults and limits always hold. */
 typedef enum hap_guard {
-  HAP_GUARD_ON = 0,
+  HAP_GUARD_ON = 0,     /* all of it */
   HAP_GUARD_MEASURE = 1 /* for measurements with simulated hands: no ramp-in, no fading with an old
                            model, no energy observer, no slew limit. A fault takes the force away
                            in one tick. Not for a device that a person holds. */
 } hap_guard;
 
+/* For hap_session_def.physics_latency_ticks. */
 #define HAP_LATENCY_DEFAULT (-1)
 
 typedef struct hap_session_def {
@@ -76,7 +77,8 @@ typedef struct hap_session_def {
   int32_t max_bodies;   /* bodies that the loop moves itself, 1..1024, default 64; it knows as many
                            again of those around them */
   int32_t max_contacts; /* contact points between bodies, pairs of geoms that are near, and pointer
-                           contacts, of each 1..4096, default 1024 */
+                           contacts, of each 1..4096, default 1024. Of contact points those nearest to
+                           a touch are kept: give at least 12 for each of max_bodies */
   int32_t max_pointers; /* 1..16, default 4 */
   int32_t rt_priority;  /* SCHED_FIFO priority of the haptic thread, 0..99; 0: do not ask for real
                            time. Default 80. Physics runs at half of it. */
@@ -103,7 +105,7 @@ HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
 
 /* [control] Stops, writes zero force to every device, frees. NULL is allowed. A lock that this
  * thread holds is given up; in a callback nothing happens. The world goes back
- * to the application as it is, with ODE's auto-disable as it was found. */
+ * to the application as it is, with ODE's auto-disable as it was found. Posted edits that still wait are run. */
 HAP_API void hap_session_destroy(hap_session *session);
 
 /* [control] THREADS: starts both threads; FRAME: the haptic one; LOCKSTEP: builds the first local
@@ -114,30 +116,45 @@ HAP_API HAP_NODISCARD hap_status hap_session_start(hap_session *session);
 /* [control] Zero force, then threads end. Idempotent. A stopped session can be started again. */
 HAP_API hap_status hap_session_stop(hap_session *session);
 
-/* [control] FRAME: runs the whole physics steps that fit into frame_s seconds [s, finite, >= 0]
- * plus the remainder of earlier calls, at most 3; the rest is dropped and counted
- * (HAP_DROPPED). HAP_FAULTED, HAP_BODY_LOST: see their texts. */
+/* [control] FRAME: runs the whole physics steps that fit into frame_s, the time since the last call
+ * [s, 0 .. 86400], plus the remainder of earlier calls, at most 3; the rest is dropped and counted
+ * (HAP_DROPPED, hap_stats.frames_dropped). Less time than the clock's is slow motion, none or no call a
+ * pause: the world stands, the loop goes on with what is near, and after two steps the force fades, to
+ * come back by itself. Model SINGLE needs another drive: its steps are those of the haptic loop.
+ * HAP_ERROR_ARGUMENT: frame_s is not such a time. HAP_ERROR_STATE: another drive,
+ * or not started. HAP_ERROR_THREAD: another thread than that of start (ODE keeps data for each thread), a
+ * callback, or this thread holds the lock. Nothing is done then, and the remainder stays.
+ * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_update(hap_session *session, double frame_s);
 
 /* [control] LOCKSTEP: runs that many haptic ticks and the physics steps that fall due.
  * HAP_FAULTED, HAP_BODY_LOST: see their texts. */
 HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
 
-/* [app] Between lock and unlock this thread alone may touch the ODE world. Waits at most one
- * physics step. Not recursive. Legal before start and after stop. HAP_ERROR_THREAD from a callback
- * or when this thread holds the lock. */
+/* [app] Between lock and unlock this thread alone may touch the ODE world. Served in order of arrival: it
+ * waits for at most one physics step, and for what application threads before it do under the lock. Not
+ * recursive. Physics waits while it is held (hap_stats.lock_held_ms_max), the haptic loop does not. Legal
+ * before start and after stop. HAP_ERROR_THREAD, with a text, from a callback or a posted edit, where
+ * the world may be touched without it, or when this thread has the lock. */
 HAP_API HAP_NODISCARD hap_status hap_session_lock(hap_session *session);
 
-/* [app] As lock, but gives up after timeout_ns (0: at once) with HAP_ERROR_TIMEOUT. */
+/* [app] As lock, but gives up after timeout_ns (0: at once; INT64_MAX: never) with HAP_ERROR_TIMEOUT.
+ * Below 0: HAP_ERROR_ARGUMENT. */
 HAP_API HAP_NODISCARD hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns);
 
-/* [app] The thread that locked. */
+/* [app] The thread that locked; any other, and one in a callback: HAP_ERROR_THREAD. */
 HAP_API hap_status hap_session_unlock(hap_session *session);
 
-/* [any] Runs edit(arg) in the physics thread before its next step. In order of posting; at most
- * 256 wait at a time (HAP_ERROR_CAPACITY). Edits not yet run when the session stops are run by
- * stop. */
+/* [physics] An edit of the world that hap_session_post was given. */
 typedef void (*hap_edit_fn)(void *arg);
+
+/* [any] Runs edit(arg) in the physics thread before its next step. In order of posting; at most
+ * 256 wait at a time (HAP_ERROR_CAPACITY: it is not taken). May be called in callbacks and in edits, and
+ * before start; not in a device's read or write, as it may wait for another thread that posts. What an
+ * edit posts runs at the next step. stop runs the edits that wait and what they post, 16 rounds of it; what
+ * is left then waits for the next start, or is run by destroy, which takes no more (HAP_ERROR_STATE). So
+ * what was taken is run, once. An edit is a callback: it may touch the world, adopt and forget, but not
+ * lock, start, stop, destroy, add or remove pointers. */
 HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit_fn edit,
                                                   void *arg);
 
@@ -145,7 +162,8 @@ HAP_API HAP_NODISCARD hap_status hap_session_post(hap_session *session, hap_edit
 HAP_API HAP_NODISCARD hap_status hap_session_set_model(hap_session *session, hap_model model);
 
 /* [any] Clears a latched fault; from the next tick on force is felt again, over 20 ms. Where the pointer
- * is more than 10 mm deep by then, the rest comes in at 0.2 m/s. A fault that lasts latches again. */
+ * is more than 10 mm deep by then, the rest comes in at 0.2 m/s. A fault that lasts latches again; a device
+ * that has to be opened anew first needs hap_pointer_restart. */
 HAP_API hap_status hap_session_reset_fault(hap_session *session);
 
 /* [any] Text of the last error or fault of this session; "" when there was none. */

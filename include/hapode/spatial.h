@@ -7,21 +7,21 @@
 
 /* Position [m] and orientation of a frame, seen from another one. */
 typedef struct hap_pose {
-  double position[3];
-  double quat_wxyz[4];
+  double position[3];  /* m */
+  double quat_wxyz[4]; /* a unit quaternion, w first */
 } hap_pose;
 
 /* Velocity [m/s] of a frame's origin and angular velocity [rad/s]. */
 typedef struct hap_twist {
-  double linear[3];
-  double angular[3];
+  double linear[3];  /* m/s */
+  double angular[3]; /* rad/s */
 } hap_twist;
 
 /* Force [N] and torque [N m]. On a pointer it is what the hand feels, the torque taken about the
  * pointer's origin. */
 typedef struct hap_wrench {
-  double force[3];
-  double torque[3];
+  double force[3];  /* N */
+  double torque[3]; /* N m */
 } hap_wrench;
 
 #endif

@@ -11,7 +11,7 @@ HAP_BEGIN_DECLS
 
 /* Why the guard took the force away. Values are never renumbered. */
 typedef enum hap_fault {
-  HAP_FAULT_NONE = 0,
+  HAP_FAULT_NONE = 0,         /* nothing */
   HAP_FAULT_DEVICE_READ = 1,  /* the device's read failed */
   HAP_FAULT_DEVICE_POSE = 2,  /* the device gave a pose that is not finite */
   HAP_FAULT_FORCE = 3,        /* a wrench was not finite */
@@ -70,10 +70,10 @@ typedef struct hap_stats {
   uint64_t capacity_dropped; /* bodies or contacts that found no room */
   uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept */
   uint64_t states_rejected;  /* non-finite states kept away from ODE */
-  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body */
+  uint64_t bodies_lost;      /* destroyed without hap_session_forget_body; said once */
 
   /* Momentum audit: what the hands gave to dynamic bodies, before the limits of the devices, against
-   * what the world got. */
+   * what the world got. A body that is destroyed takes what it was given since the last sync along. */
   double impulse_ns;        /* N s, norm of the net impulse on the bodies */
   double impulse_abs_ns;    /* N s, sum over ticks of the norms */
   double momentum_ratio;    /* world / hand along the net impulse; NaN while the net is below 5 %
@@ -111,6 +111,23 @@ typedef struct hap_stats {
   uint64_t stale_ticks;   /* ticks in which it was */
   uint64_t slewed_ticks;  /* ticks in which a force was held back by the slew limit */
   uint64_t energy_ticks;  /* ticks in which a force was held back by the energy observer */
+
+  /* Haptic thread: how late the system woke it up for a tick. 0 in lockstep and where a device sets the
+   * pace. */
+  double wake_us_mean;
+  double wake_us_p50;
+  double wake_us_p99;
+  double wake_us_p999;
+  double wake_us_max;
+
+  double pose_delay_s; /* by which hap_session_poses draws behind */
+
+  /* The world between threads. The haptic loop never waits for the lock. */
+  uint64_t locks;          /* times that application threads had the lock */
+  double lock_wait_ms_max; /* ms, longest wait of one of them; tries in vain do not count */
+  double lock_held_ms_max; /* ms, longest that one of them had it: physics cannot step meanwhile */
+  uint64_t edits_run;      /* of hap_session_post */
+
   uint32_t range_joints; /* model CONTACT: joints that the loop holds itself, in the newest model */
 } hap_stats;
 

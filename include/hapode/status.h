@@ -10,7 +10,7 @@ HAP_BEGIN_DECLS
 /* What every call returns: 0 is good, positive is information (the call did its work), negative
  * is an error (the call changed nothing). Values are never renumbered. */
 typedef enum hap_status {
-  HAP_OK = 0,
+  HAP_OK = 0, /* done */
 
   HAP_NO_REALTIME = 1, /* running, but without real-time scheduling or locked memory */
   HAP_STALE = 2,       /* the answer is older than one physics step */
@@ -19,6 +19,7 @@ typedef enum hap_status {
   HAP_END = 5,         /* nothing further to read */
   HAP_BODY_LOST = 6,   /* a body was destroyed without hap_session_forget_body; it was dropped */
   HAP_FAULTED = 7,     /* done, but a fault is latched and the force is zero */
+  HAP_CLAMPED = 8,     /* the time asked for is no longer kept; the oldest that is was given */
 
   HAP_ERROR_ARGUMENT = -1,      /* an argument is NULL, out of range or not finite */
   HAP_ERROR_UNINITIALISED = -2, /* a def struct did not go through its _init function */
@@ -38,7 +39,7 @@ typedef enum hap_status {
 
 /* Room for one sentence that says what was wrong, where, and what to do. Always terminated. */
 typedef struct hap_detail {
-  char text[512];
+  char text[512]; /* "" when there is nothing to say */
 } hap_detail;
 
 /* [any] Name of a status, such as "HAP_ERROR_ARGUMENT"; never NULL, also for unknown values. */

@@ -7,6 +7,7 @@
 
 HAP_BEGIN_DECLS
 
+/* Version of these headers; the library's own: hap_version. */
 #define HAP_VERSION_MAJOR 0
 #define HAP_VERSION_MINOR 1
 #define HAP_VERSION_PATCH 0

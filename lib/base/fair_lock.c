@@ -7,87 +7,104 @@
 
 #include "base/clock.h"
 
-#define PLACES (sizeof((hapi_fair_lock *)0)->waiters / sizeof(uint64_t))
+/* A lock that is given goes to the first waiter at once, asleep as it may be: nobody can come in
+ * between. So it is free only while nobody waits. */
+
+typedef struct hapi_fair_waiter {
+  struct hapi_fair_waiter *next;
+  pthread_cond_t served;
+  pthread_t thread;
+  bool has_it;
+} hapi_fair_waiter;
 
 bool hapi_fair_lock_init(hapi_fair_lock *lock)
 {
   memset(lock, 0, sizeof *lock);
-  pthread_condattr_t attributes;
   if (pthread_mutex_init(&lock->mutex, NULL) != 0) {
     return false;
   }
-  bool good = pthread_condattr_init(&attributes) == 0;
-  good = good && pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC) == 0;
-  good = good && pthread_cond_init(&lock->changed, &attributes) == 0;
-  if (!good) {
+  if (pthread_condattr_init(&lock->monotonic) != 0) {
     pthread_mutex_destroy(&lock->mutex);
     return false;
   }
-  pthread_condattr_destroy(&attributes);
+  if (pthread_condattr_setclock(&lock->monotonic, CLOCK_MONOTONIC) != 0) {
+    hapi_fair_lock_finish(lock);
+    return false;
+  }
   return true;
 }
 
 void hapi_fair_lock_finish(hapi_fair_lock *lock)
 {
-  pthread_cond_destroy(&lock->changed);
+  pthread_condattr_destroy(&lock->monotonic);
   pthread_mutex_destroy(&lock->mutex);
 }
 
-static void drop_those_who_gave_up(hapi_fair_lock *lock)
+static void enqueue(hapi_fair_lock *lock, hapi_fair_waiter *waiter)
 {
-  while (lock->count > 0 && lock->waiters[lock->first] == 0) {
-    lock->first = (lock->first + 1) % PLACES;
-    --lock->count;
+  if (lock->last != NULL) {
+    lock->last->next = waiter;
+  } else {
+    lock->first = waiter;
   }
+  lock->last = waiter;
+  ++lock->count;
 }
 
-static void give_up(hapi_fair_lock *lock, uint64_t ticket)
+static void leave_queue(hapi_fair_lock *lock, const hapi_fair_waiter *waiter)
 {
-  for (unsigned i = 0; i < PLACES; ++i) {
-    if (lock->waiters[i] == ticket) {
-      lock->waiters[i] = 0;
-    }
+  hapi_fair_waiter *before = NULL;
+  for (hapi_fair_waiter *at = lock->first; at != waiter; at = at->next) {
+    before = at;
   }
-  drop_those_who_gave_up(lock);
-  pthread_cond_broadcast(&lock->changed);
+  if (before != NULL) {
+    before->next = waiter->next;
+  } else {
+    lock->first = waiter->next;
+  }
+  if (waiter->next == NULL) {
+    lock->last = before;
+  }
+  --lock->count;
 }
 
-static bool wait_for_change(hapi_fair_lock *lock, int64_t deadline_ns)
+static bool wait_for_word(hapi_fair_lock *lock, hapi_fair_waiter *waiter, int64_t deadline_ns)
 {
   if (deadline_ns == INT64_MAX) {
-    return pthread_cond_wait(&lock->changed, &lock->mutex) == 0;
+    return pthread_cond_wait(&waiter->served, &lock->mutex) == 0;
   }
   struct timespec at = {.tv_sec = deadline_ns / HAPI_NS_PER_S,
                         .tv_nsec = deadline_ns % HAPI_NS_PER_S};
-  return pthread_cond_timedwait(&lock->changed, &lock->mutex, &at) == 0;
+  return pthread_cond_timedwait(&waiter->served, &lock->mutex, &at) == 0;
 }
 
-static bool my_turn(const hapi_fair_lock *lock, uint64_t ticket)
+static bool queue_up(hapi_fair_lock *lock, int64_t deadline_ns)
 {
-  return !lock->held && lock->waiters[lock->first] == ticket;
+  hapi_fair_waiter waiter = {.thread = pthread_self()};
+  if (pthread_cond_init(&waiter.served, &lock->monotonic) != 0) {
+    return false;
+  }
+  enqueue(lock, &waiter);
+  bool in_time = true;
+  while (!waiter.has_it && in_time) {
+    in_time = wait_for_word(lock, &waiter, deadline_ns);
+  }
+  if (!waiter.has_it) {
+    leave_queue(lock, &waiter);
+  }
+  pthread_cond_destroy(&waiter.served);
+  return waiter.has_it;
 }
 
 bool hapi_fair_lock_take(hapi_fair_lock *lock, int64_t deadline_ns)
 {
   pthread_mutex_lock(&lock->mutex);
-  if (lock->count == PLACES) {
-    pthread_mutex_unlock(&lock->mutex);
-    return false;
-  }
-  uint64_t ticket = ++lock->next_ticket;
-  lock->waiters[(lock->first + lock->count++) % PLACES] = ticket;
-  bool in_time = true;
-  while (!my_turn(lock, ticket) && in_time) {
-    in_time = wait_for_change(lock, deadline_ns);
-  }
-  bool had = my_turn(lock, ticket);
+  bool had = !lock->held;
   if (had) {
     lock->held = true;
     lock->holder = pthread_self();
-    lock->waiters[lock->first] = 0;
-    drop_those_who_gave_up(lock);
   } else {
-    give_up(lock, ticket);
+    had = queue_up(lock, deadline_ns);
   }
   pthread_mutex_unlock(&lock->mutex);
   return had;
@@ -96,8 +113,14 @@ bool hapi_fair_lock_take(hapi_fair_lock *lock, int64_t deadline_ns)
 void hapi_fair_lock_give(hapi_fair_lock *lock)
 {
   pthread_mutex_lock(&lock->mutex);
-  lock->held = false;
-  pthread_cond_broadcast(&lock->changed);
+  hapi_fair_waiter *next = lock->first;
+  lock->held = next != NULL;
+  if (next != NULL) {
+    leave_queue(lock, next);
+    lock->holder = next->thread;
+    next->has_it = true;
+    pthread_cond_signal(&next->served);
+  }
   pthread_mutex_unlock(&lock->mutex);
 }
 

@@ -39,4 +39,7 @@ static inline void hapi_pose_blend(const hap_pose *from, const hap_pose *to, dou
   hapi_quat_normalize(out->quat_wxyz);
 }
 
+/* The same along the arc, so that a body turns evenly; a share beyond 1 goes on. */
+void hapi_pose_slerp(const hap_pose *from, const hap_pose *to, double share, hap_pose *out);
+
 #endif

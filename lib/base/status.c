@@ -17,6 +17,7 @@ const char *hap_status_name(hap_status status)
     NAME(HAP_END);
     NAME(HAP_BODY_LOST);
     NAME(HAP_FAULTED);
+    NAME(HAP_CLAMPED);
     NAME(HAP_ERROR_ARGUMENT);
     NAME(HAP_ERROR_UNINITIALISED);
     NAME(HAP_ERROR_MEMORY);
@@ -53,6 +54,8 @@ const char *hap_status_text(hap_status status)
       return "a body was destroyed without hap_session_forget_body, it was dropped";
     case HAP_FAULTED:
       return "done, but a fault is latched and the force is zero";
+    case HAP_CLAMPED:
+      return "the time asked for is no longer kept, the oldest that is was given";
     case HAP_END:
       return "nothing further to read";
     case HAP_ERROR_ARGUMENT:

@@ -19,13 +19,21 @@ typedef struct hapi_pass_body {
   hap_twist twist;
 } hapi_pass_body;
 
+/* What a pass found between the geoms of a pair. */
+typedef struct hapi_pass_pair {
+  double spare;   /* m, gap less margin: how near to a touch, beside what speed and age may make */
+  uint32_t count; /* contacts */
+  bool left_out;  /* for want of room */
+} hapi_pass_pair;
+
 struct hapi_contact {
   hapi_contact_config config;
   hapi_near *near; /* newest one that the loop is ready for; NULL: none yet */
   hapi_poses *poses;
   hapi_pass_body *bodies; /* capacity.bodies */
+  hapi_pass_pair *pairs;  /* capacity.contacts */
   uint64_t number;
-  _Atomic uint64_t full_passes; /* pairs after which there was no room */
+  _Atomic uint64_t left_out; /* pairs without room for their contacts, sum over the passes */
   hapi_histogram pass_ns;
   hapi_thread thread;
   _Atomic int stop;

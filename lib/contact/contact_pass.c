@@ -13,7 +13,8 @@
 #define MARGIN_FLOOR 0.002 /* m */
 #define MARGIN_SPEED 1.5   /* of the way that the bodies' speed makes until the next pass */
 #define MARGIN_GRAVITY 9.81
-#define AGE_TICKS 2.0 /* from the poses of a pass to the use of its contacts */
+#define AGE_TICKS 2.0  /* from the poses of a pass to the use of its contacts */
+#define LIMIT_STEPS 40 /* halvings: a metre to a picometre */
 
 /* A geom of a pair where it is now. */
 typedef struct placed_geom {
@@ -22,6 +23,13 @@ typedef struct placed_geom {
   hapi_shape shape;
   hap_pose pose;
 } placed_geom;
+
+typedef struct placed_pair {
+  placed_geom a;
+  placed_geom b;
+  double margin;
+  hapi_patch patch;
+} placed_pair;
 
 static void take_poses(hapi_contact *contact)
 {
@@ -181,29 +189,114 @@ static bool allowed(const placed_geom *a, const placed_geom *b, const hapi_patch
          (b->in->open_edges == 0 || hapi_mesh_allows(b->in, b->shape.hull, point->normal));
 }
 
-static void pass_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_patches *out)
+/* The points of a pair, deepest first, that count; false: none. */
+static bool find_pair(const hapi_contact *contact, uint32_t index, placed_pair *out)
 {
-  placed_geom a;
-  placed_geom b;
-  hapi_patch patch;
-  if (!place_geom(contact, pair->geom_a, &a) || !place_geom(contact, pair->geom_b, &b) ||
-      !hapi_patch_find(&a.shape, &a.pose, &b.shape, &b.pose, margin_of(contact, &a, &b), &patch)) {
-    return;
+  const hapi_near_pair *pair = &hapi_near_pairs(contact->near)[index];
+  hapi_patch *patch = &out->patch;
+  int count = 0;
+  patch->count = 0;
+  if (!place_geom(contact, pair->geom_a, &out->a) || !place_geom(contact, pair->geom_b, &out->b)) {
+    return false;
   }
-  uint32_t first = out->contact_count;
-  for (int i = 0; i < patch.count && out->contact_count < contact->config.capacity.contacts; ++i) {
-    if (allowed(&a, &b, &patch.points[i])) {
-      hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
-      fill_contact(&a, &b, &patch.points[i], c);
-      c->key = pair->key;
-      c->surface = out->surface_count;
+  out->margin = margin_of(contact, &out->a, &out->b);
+  if (!hapi_patch_find(&out->a.shape, &out->a.pose, &out->b.shape, &out->b.pose, out->margin,
+                       patch)) {
+    return false;
+  }
+  for (int i = 0; i < patch->count; ++i) {
+    if (!allowed(&out->a, &out->b, &patch->points[i])) {
+      continue;
+    }
+    if (count < i) {
+      patch->points[count] = patch->points[i];
+    }
+    ++count;
+  }
+  patch->count = count;
+  return count > 0;
+}
+
+static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi_patches *out)
+{
+  for (int i = 0; i < found->patch.count; ++i) {
+    hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
+    fill_contact(&found->a, &found->b, &found->patch.points[i], c);
+    c->key = pair->key;
+    c->surface = out->surface_count;
+  }
+  hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+}
+
+/* Contacts of the pairs that count; false: there is no room for all of them. */
+static bool fill_pairs(hapi_contact *contact, hapi_patches *out)
+{
+  const uint32_t room = contact->config.capacity.contacts;
+  uint64_t wanted = 0;
+  out->contact_count = 0;
+  out->surface_count = 0;
+  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+    hapi_pass_pair *pair = &contact->pairs[i];
+    placed_pair found;
+    if (pair->left_out || !find_pair(contact, i, &found)) {
+      pair->count = 0;
+      continue;
+    }
+    pair->count = (uint32_t)found.patch.count;
+    pair->spare = found.patch.points[0].gap - found.margin;
+    wanted += pair->count;
+    if (wanted <= room) {
+      fill_pair(&found, &hapi_near_pairs(contact->near)[i], out);
     }
   }
-  if (out->contact_count == contact->config.capacity.contacts) {
-    atomic_fetch_add_explicit(&contact->full_passes, 1, memory_order_relaxed);
+  return wanted <= room;
+}
+
+/* ---- more than there is room for ---- */
+
+static uint64_t count_up_to(const hapi_contact *contact, double spare)
+{
+  uint64_t count = 0;
+  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+    count += contact->pairs[i].spare <= spare ? contact->pairs[i].count : 0;
   }
-  if (out->contact_count > first) {
-    hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+  return count;
+}
+
+/* The largest spare up to which there is room for all, from below and from above. */
+static void find_limit(const hapi_contact *contact, double *out_below, double *out_above)
+{
+  double least = 0.0; /* no spare is larger: a gap is within its margin */
+  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+    bool counts = contact->pairs[i].count > 0;
+    least = counts && contact->pairs[i].spare < least ? contact->pairs[i].spare : least;
+  }
+  *out_below = 2.0 * least - 1.0;
+  *out_above = 0.0;
+  for (int i = 0; i < LIMIT_STEPS; ++i) {
+    double middle = 0.5 * (*out_below + *out_above);
+    bool fits = count_up_to(contact, middle) <= contact->config.capacity.contacts;
+    *(fits ? out_below : out_above) = middle;
+  }
+}
+
+/* Whoever comes last in the list must not lose the ground under it to pairs that do not touch: first
+ * those go that would need to come nearest in order to. */
+static void leave_out_farthest(hapi_contact *contact)
+{
+  double below;
+  double above;
+  find_limit(contact, &below, &above);
+  uint64_t used = count_up_to(contact, below);
+  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+    hapi_pass_pair *pair = &contact->pairs[i];
+    if (pair->count == 0 || pair->spare <= below) {
+      continue;
+    }
+    bool fits = pair->spare <= above && used + pair->count <= contact->config.capacity.contacts;
+    used += fits ? pair->count : 0;
+    pair->left_out = !fits;
+    atomic_fetch_add_explicit(&contact->left_out, !fits, memory_order_relaxed);
   }
 }
 
@@ -211,11 +304,12 @@ static void pass(hapi_contact *contact, int64_t valid_from_ns)
 {
   place_bodies(contact);
   hapi_patches *out = hapi_exchange_patches_back(contact->config.exchange);
-  const hapi_near_pair *pairs = hapi_near_pairs(contact->near);
-  out->contact_count = 0;
-  out->surface_count = 0;
   for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
-    pass_pair(contact, &pairs[i], out);
+    contact->pairs[i].left_out = false;
+  }
+  if (!fill_pairs(contact, out)) {
+    leave_out_farthest(contact);
+    (void)fill_pairs(contact, out);
   }
   out->number = ++contact->number;
   out->model_number = contact->near->model_number;

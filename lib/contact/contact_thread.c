@@ -18,7 +18,8 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
   }
   contact->config = *config;
   contact->bodies = hapi_alloc_array(config->capacity.bodies, sizeof *contact->bodies);
-  if (contact->bodies == NULL) {
+  contact->pairs = hapi_alloc_array(config->capacity.contacts, sizeof *contact->pairs);
+  if (contact->bodies == NULL || contact->pairs == NULL) {
     hapi_contact_destroy(contact);
     return HAP_ERROR_MEMORY;
   }
@@ -33,6 +34,7 @@ void hapi_contact_destroy(hapi_contact *contact)
   }
   hapi_contact_stop_thread(contact);
   hapi_free(contact->bodies);
+  hapi_free(contact->pairs);
   hapi_free(contact);
 }
 
@@ -41,7 +43,7 @@ void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
   contact->near = NULL;
   contact->poses = NULL;
   contact->number = 0;
-  atomic_store(&contact->full_passes, 0);
+  atomic_store(&contact->left_out, 0);
   contact->start_ns = start_ns;
   hapi_histogram_reset(&contact->pass_ns);
 }
@@ -82,7 +84,7 @@ void hapi_contact_stop_thread(hapi_contact *contact)
 
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out)
 {
-  out->capacity_dropped += atomic_load_explicit(&contact->full_passes, memory_order_relaxed);
+  out->capacity_dropped += atomic_load_explicit(&contact->left_out, memory_order_relaxed);
   out->contact_us_mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
   out->contact_us_max = 1e-3 * (double)hapi_histogram_max_ns(&contact->pass_ns);
 }

@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/log.h"
 #include "base/vec.h"
+#include "device/module.h"
 
 #define CLAIMED 1u
 #define CLOSED 2u
@@ -18,34 +19,64 @@ static bool name_is_good(const char *name)
   return length > 0 && name[length] == '\0';
 }
 
-static bool ops_are_complete(const hap_device_ops *ops)
+/* The table of a device that was built before the optional operations ends there. */
+#define SIZE_LEAST offsetof(hap_device_ops, held)
+
+static const char *missing_operation(const hap_device_ops *ops)
 {
-  return ops->open != NULL && ops->describe != NULL && ops->start != NULL && ops->read != NULL &&
-         ops->write != NULL && ops->zero != NULL && ops->stop != NULL && ops->close != NULL;
+  const struct {
+    bool there;
+    const char *name;
+  } needed[] = {{ops->open != NULL, "open"},   {ops->describe != NULL, "describe"},
+                {ops->start != NULL, "start"}, {ops->read != NULL, "read"},
+                {ops->write != NULL, "write"}, {ops->zero != NULL, "zero"},
+                {ops->stop != NULL, "stop"},   {ops->close != NULL, "close"}};
+  for (size_t i = 0; i < sizeof needed / sizeof needed[0]; ++i) {
+    if (!needed[i].there) {
+      return needed[i].name;
+    }
+  }
+  return NULL;
 }
 
-static hap_status check_ops(const hap_device_ops *ops, hap_detail *detail)
+static hap_status check_abi(const hap_device_ops *ops, hap_detail *detail)
 {
   /* Nothing behind abi may be read before abi is known: its place could hold anything. */
   if (ops->abi != HAP_DEVICE_ABI) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "the device was built for device ABI %u, this library has %u", ops->abi,
-                     HAP_DEVICE_ABI);
+                     "the device was built for device ABI %u, this library has %u: %s", ops->abi,
+                     HAP_DEVICE_ABI,
+                     ops->abi > HAP_DEVICE_ABI ? "it needs a newer library"
+                                               : "build it anew with this library's headers");
   }
-  if (ops->size < sizeof *ops) {
+  if (ops->size < SIZE_LEAST) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "the device's table has %u bytes, this library needs %zu", ops->size,
-                     sizeof *ops);
+                     "the device's table has %u bytes, this library needs %zu: build it anew with "
+                     "this library's headers and set size to sizeof(hap_device_ops)",
+                     ops->size, SIZE_LEAST);
+  }
+  return HAP_OK;
+}
+
+static hap_status check_ops(const hap_device_ops *ops, hap_detail *detail)
+{
+  hap_status status = check_abi(ops, detail);
+  if (status < 0) {
+    return status;
   }
   if (!name_is_good(ops->name)) {
-    return hapi_fail(detail, HAP_ERROR_DEVICE, "the device's name is not made of [a-z0-9_-]");
+    return hapi_fail(detail, HAP_ERROR_DEVICE,
+                     "the device's name is missing or not made of [a-z0-9_-]");
   }
   if (ops->pacing > HAP_PACING_DEVICE) {
-    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "device '%s': unknown pacing %u", ops->name,
-                     ops->pacing);
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "device '%s': unknown pacing %u, known are 0 to %d", ops->name, ops->pacing,
+                     HAP_PACING_DEVICE);
   }
-  if (!ops_are_complete(ops)) {
-    return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s': an operation is missing", ops->name);
+  const char *missing = missing_operation(ops);
+  if (missing != NULL) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE,
+                     "device '%s': the operation '%s' is missing in its table", ops->name, missing);
   }
   return HAP_OK;
 }
@@ -80,16 +111,45 @@ static hap_status describe(hap_device *device, hap_detail *detail)
   return check_info(device->ops, info, detail);
 }
 
+/* The library last: the code of close is in it. */
 static void device_free(hap_device *device)
 {
+  void *library = device->library;
   device->ops->close(device->self);
   hapi_free(device);
+  hapi_module_unload(library);
+}
+
+/* What a device says of its failure, whatever it forgot to say. */
+static hap_status fail_open(const hap_device_ops *ops, hap_status status, hap_detail *detail)
+{
+  hap_status known = status >= HAP_ERROR_SYSTEM ? status : HAP_ERROR_DEVICE;
+  detail->text[sizeof detail->text - 1] = '\0';
+  if (detail->text[0] == '\0') {
+    return hapi_fail(detail, known, "device '%s' did not open: %s", ops->name,
+                     hap_status_text(status));
+  }
+  return known;
+}
+
+static hap_status open_self(hap_device *device, const char *args, hap_detail *detail)
+{
+  hap_status status = device->ops->open(args, &device->self, detail);
+  if (status < 0) {
+    return fail_open(device->ops, status, detail);
+  }
+  if (device->self == NULL) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s': open said '%s' and gave no self",
+                     device->ops->name, hap_status_text(status));
+  }
+  return HAP_OK;
 }
 
 hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap_device **out,
                                 hap_detail *detail)
 {
   *out = NULL;
+  detail->text[0] = '\0';
   hap_status status = check_ops(ops, detail);
   if (status < 0) {
     return status;
@@ -100,7 +160,7 @@ hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap
   }
   device->ops = ops;
   atomic_init(&device->holders.bits, 0);
-  status = ops->open(args, &device->self, detail);
+  status = open_self(device, args, detail);
   if (status < 0) {
     hapi_free(device);
     return status;
@@ -118,10 +178,9 @@ static hap_status fail_unknown(const char *name, size_t length, hap_detail *deta
 {
   char names[256] = "";
   size_t used = 0;
-  const hap_device_ops *ops;
-  for (size_t i = 0; (ops = hapi_registry_at(i)) != NULL && used < sizeof names; ++i) {
-    used +=
-        (size_t)snprintf(names + used, sizeof names - used, "%s%s", i > 0 ? ", " : "", ops->name);
+  const char *known;
+  for (size_t i = 0; (known = hap_device_name_at(i, NULL)) != NULL && used < sizeof names; ++i) {
+    used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i > 0 ? ", " : "", known);
   }
   int shown = length < 64 ? (int)length : 64;
   return hapi_fail(detail, HAP_ERROR_NOT_FOUND, "there is no device '%.*s'; there are: %s", shown,
@@ -130,7 +189,7 @@ static hap_status fail_unknown(const char *name, size_t length, hap_detail *deta
 
 hap_status hap_device_open(const char *spec, hap_device **out, hap_detail *detail)
 {
-  hap_detail unread; /* the ops are promised a detail */
+  hap_detail unread = {0}; /* the ops are promised a detail */
   hap_detail *text = detail != NULL ? detail : &unread;
   text->text[0] = '\0';
   if (out == NULL) {
@@ -141,16 +200,13 @@ hap_status hap_device_open(const char *spec, hap_device **out, hap_detail *detai
     return hapi_fail(text, HAP_ERROR_ARGUMENT, "hap_device_open: spec is NULL");
   }
   size_t length = strcspn(spec, ":");
-  const hap_device_ops *ops = hapi_registry_find(spec, length);
-  if (ops == NULL) {
-    return fail_unknown(spec, length, text);
-  }
   const char *args = spec[length] == ':' ? spec + length + 1 : "";
-  hap_status status = hapi_device_open_ops(ops, args, out, text);
-  if (status < 0 && text->text[0] == '\0') {
-    return hapi_fail(text, status, "device '%s': %s", ops->name, hap_status_text(status));
+  if (strlen(HAPI_MODULE_NAME) == length && memcmp(spec, HAPI_MODULE_NAME, length) == 0) {
+    return hapi_module_open(args, out, text);
   }
-  return status;
+  const hap_device_ops *ops = hapi_registry_find(spec, length);
+  return ops != NULL ? hapi_device_open_ops(ops, args, out, text)
+                     : fail_unknown(spec, length, text);
 }
 
 void hap_device_close(hap_device *device)

@@ -37,7 +37,7 @@ static const figure figures[] = {
 
 static double *value_of(hap_device_identity *identity, size_t index)
 {
-  return (double *)((char *)identity + figures[index].offset);
+  return (double *)((void *)((char *)identity + figures[index].offset));
 }
 
 void hap_device_identity_init(hap_device_identity *identity, size_t size_of_identity)
@@ -326,7 +326,9 @@ hap_status hap_device_set_identity(hap_device *device, const hap_device_identity
   device->info.damping = known.damping;
   device->info.friction = known.friction;
   device->info.delay = known.delay;
-  device->info.quantum = known.quantum;
+  if (known.quantum > 0.0) {
+    device->info.quantum = known.quantum;
+  }
   hapi_device_release(device);
   return HAP_OK;
 }

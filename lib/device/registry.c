@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "device/device.h"
+#include "device/module.h"
 
 /* Declared here and not in a header of the plugin: a device sees the library, never the other way
  * round, and these two names are all that the library knows of them. */
@@ -31,6 +32,12 @@ const hap_device_ops *hapi_registry_find(const char *name, size_t length)
 const char *hap_device_name_at(size_t index, const char **out_description)
 {
   const hap_device_ops *ops = hapi_registry_at(index);
+  if (index == sizeof built_in / sizeof built_in[0]) {
+    if (out_description != NULL) {
+      *out_description = HAPI_MODULE_HELP;
+    }
+    return HAPI_MODULE_NAME;
+  }
   if (out_description != NULL) {
     *out_description = ops != NULL ? ops->help : NULL;
   }

@@ -50,9 +50,15 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns);
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
                                    hap_pointer_id *out, hap_detail *detail);
 hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
+hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
+bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
+/* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more than
+ * grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
+hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int64_t time_ns,
+                                     int64_t grace_ns, hap_pose out_proxy_device[2]);
 
 void hapi_haptic_reset_fault(hapi_haptic *haptic);            /* [any] from the next tick on */
 void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the next tick on */

@@ -22,7 +22,9 @@ typedef enum hapi_pointer_phase {
   HAPI_POINTER_ADDED = 1,   /* by the application, not yet seen by the loop */
   HAPI_POINTER_ACTIVE = 2,  /* the loop uses it */
   HAPI_POINTER_LEAVING = 3, /* to be let go by the loop */
-  HAPI_POINTER_LEFT = 4     /* let go; the application cleans up */
+  HAPI_POINTER_LEFT = 4,    /* let go; the application cleans up */
+  HAPI_POINTER_PAUSING = 5, /* as LEAVING and LEFT, and its id stays valid: */
+  HAPI_POINTER_PAUSED = 6   /* its device is being started again, or did not start */
 } hapi_pointer_phase;
 
 typedef struct hapi_pointer_target {
@@ -49,6 +51,7 @@ typedef struct hapi_pointer_slot {
 /* Published for the statistics; each written by the haptic thread alone. */
 typedef struct hapi_haptic_figures {
   hapi_histogram tick_ns;
+  hapi_histogram wake_ns; /* from a deadline to the loop's waking up for it */
   _Atomic uint64_t ticks;
   _Atomic uint64_t missed_ticks;
   _Atomic uint64_t contact_ticks;

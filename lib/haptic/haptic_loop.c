@@ -84,6 +84,7 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
 static void reset_figures(hapi_haptic *haptic)
 {
   hapi_histogram_reset(&haptic->figures.tick_ns);
+  hapi_histogram_reset(&haptic->figures.wake_ns);
   STORE(ticks, 0);
   STORE(missed_ticks, 0);
   STORE(models_adopted, 0);
@@ -276,6 +277,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);
   publish_poses(haptic);
+  hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);
@@ -305,6 +307,12 @@ static void fill_times(const hapi_haptic *haptic, hap_stats *out)
   out->tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
   out->tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
   out->haptic_duty = 1e-6 * out->tick_us_mean * haptic->config.haptic_hz;
+  h = &haptic->figures.wake_ns;
+  out->wake_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
+  out->wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
+  out->wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
+  out->wake_us_p999 = 1e-3 * hapi_histogram_quantile_ns(h, 0.999);
+  out->wake_us_max = 1e-3 * hapi_histogram_max_ns(h);
 }
 
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)

@@ -30,10 +30,15 @@ static uint64_t window_of(const hapi_haptic *haptic, int64_t now_ns)
 static uint64_t wait_for(hapi_haptic *haptic, uint64_t next)
 {
   int64_t deadline = haptic->start_ns + hapi_clock_deadline(next, haptic->config.haptic_hz);
-  if (!device_paced(haptic)) {
+  bool sleeps = !device_paced(haptic);
+  if (sleeps) {
     hapi_clock_sleep_until(deadline);
   }
-  uint64_t window = window_of(haptic, hapi_clock_now());
+  int64_t now_ns = hapi_clock_now();
+  if (sleeps) {
+    hapi_histogram_add(&haptic->figures.wake_ns, now_ns - deadline);
+  }
+  uint64_t window = window_of(haptic, now_ns);
   if (window <= next) {
     return next;
   }

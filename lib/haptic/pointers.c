@@ -71,6 +71,11 @@ static bool is_ready(const hapi_pointer_slot *slot)
   return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
+static int phase_after(int way)
+{
+  return way == HAPI_POINTER_LEAVING ? HAPI_POINTER_LEFT : HAPI_POINTER_PAUSED;
+}
+
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
@@ -78,13 +83,14 @@ void hapi_pointers_follow(hapi_haptic *haptic)
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
     if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
       activate(haptic, i);
-      atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
-    } else if (phase == HAPI_POINTER_LEAVING) {
+      /* Fails when the application wants it back meanwhile: seen at the next tick. */
+      (void)atomic_compare_exchange_strong(&slot->phase, &phase, HAPI_POINTER_ACTIVE);
+    } else if (phase == HAPI_POINTER_LEAVING || phase == HAPI_POINTER_PAUSING) {
       haptic->tick.pointers[i].generation = 0;
       if (slot->ops != NULL) {
         slot->ops->zero(slot->self);
       }
-      atomic_store_explicit(&slot->phase, HAPI_POINTER_LEFT, memory_order_release);
+      atomic_store_explicit(&slot->phase, phase_after(phase), memory_order_release);
     }
   }
 }
@@ -248,8 +254,14 @@ static hapi_pointer_slot *find_slot(hapi_haptic *haptic, hap_pointer_id id)
   }
   hapi_pointer_slot *slot = &haptic->slots[index - 1];
   int phase = atomic_load(&slot->phase);
-  bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE;
+  bool there = phase == HAPI_POINTER_ADDED || phase == HAPI_POINTER_ACTIVE ||
+               phase == HAPI_POINTER_PAUSING || phase == HAPI_POINTER_PAUSED;
   return there && slot->generation == (uint32_t)(id.v >> 32) ? slot : NULL;
+}
+
+bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id)
+{
+  return find_slot(haptic, id) != NULL;
 }
 
 static uint32_t free_slot(hapi_haptic *haptic)
@@ -341,10 +353,10 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *d
 }
 
 /* The loop lets go of the pointer; when no loop runs, it is done here. */
-static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot)
+static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot, hapi_pointer_phase way)
 {
-  atomic_store(&slot->phase, HAPI_POINTER_LEAVING);
-  while (haptic->thread.running && atomic_load(&slot->phase) != HAPI_POINTER_LEFT) {
+  atomic_store(&slot->phase, (int)way);
+  while (haptic->thread.running && atomic_load(&slot->phase) != phase_after((int)way)) {
     hapi_clock_sleep_until(hapi_clock_now() + 1000000);
   }
   if (!haptic->thread.running) {
@@ -358,13 +370,34 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
-  leave_loop(haptic, slot);
+  leave_loop(haptic, slot, HAPI_POINTER_LEAVING);
   stop_device(slot);
   if (slot->def.device != NULL) {
     hapi_device_release(slot->def.device);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
   return HAP_OK;
+}
+
+/* Not in the loop's thread: start may block. */
+hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return hapi_fail(detail, HAP_ERROR_NOT_FOUND, "there is no such pointer");
+  }
+  if (slot->ops == NULL || !haptic->begun) {
+    return hapi_fail(
+        detail, HAP_ERROR_STATE,
+        slot->ops == NULL ? "the pointer has no device" : "the session is not started");
+  }
+  leave_loop(haptic, slot, HAPI_POINTER_PAUSING);
+  stop_device(slot);
+  hap_status status = start_device(haptic, slot, detail);
+  if (status >= HAP_OK) {
+    atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
+  }
+  return status;
 }
 
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,

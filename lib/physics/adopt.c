@@ -2,16 +2,9 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "base/pose.h"
 #include "physics/physics_internal.h"
 
-/* What the application says of its bodies, and what it asks of them. */
-
-bool hapi_physics_may_edit(hapi_physics *physics)
-{
-  return !physics->begun || physics->config.lockstep || hapi_physics_in_callback(physics) ||
-         hapi_fair_lock_is_mine(&physics->lock);
-}
+/* What the application says of its bodies. */
 
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 {
@@ -21,12 +14,7 @@ hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 
 hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 {
-  uint32_t index = hapi_bodies_find(&physics->table, body);
-  if (index == HAPI_NONE) {
-    return HAP_ERROR_NOT_FOUND;
-  }
-  hapi_bodies_forget(physics, index);
-  return HAP_OK;
+  return hapi_bodies_forget(physics, body);
 }
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
@@ -46,17 +34,7 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
                                            void (*callback)(struct dxBody *))
 {
-  uint32_t index = hapi_bodies_find(&physics->table, body);
-  if (index == HAPI_NONE) {
-    hap_status status = hapi_bodies_scan(physics);
-    index = hapi_bodies_find(&physics->table, body);
-    if (index == HAPI_NONE) {
-      return status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
-    }
-  }
-  physics->table.entries[index].moved_callback = callback;
-  dBodySetMovedCallback(body, callback);
-  return HAP_OK;
+  return hapi_bodies_set_moved_callback(physics, body, callback);
 }
 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
@@ -79,40 +57,4 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
   memcpy(physics->watch, watch, count * sizeof watch[0]);
   physics->watch_count = (uint32_t)count;
   return HAP_OK;
-}
-
-/* Drawn one interval behind: between the last but one and the last known poses. */
-static double share_at(const hapi_physics *physics, int64_t time_ns)
-{
-  double interval = (double)(physics->pose_times[1] - physics->pose_times[0]);
-  int64_t last = physics->pose_times[1];
-  double since = time_ns > last ? (double)(time_ns - last) : 0.0; /* no overflow for any time */
-  if (!(interval > 0.0)) {
-    return 1.0;
-  }
-  double share = since / interval;
-  return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
-}
-
-hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
-                              size_t count, hap_pose *out)
-{
-  pthread_mutex_lock(&physics->poses_lock);
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
-    if (index == HAPI_NONE || physics->table.entries[index].pose_count == 0) {
-      pthread_mutex_unlock(&physics->poses_lock);
-      return HAP_ERROR_NOT_FOUND;
-    }
-  }
-  double share = share_at(physics, time_ns);
-  int64_t interval = physics->pose_times[1] - physics->pose_times[0];
-  bool stale = interval > 0 && time_ns > physics->pose_times[1] + 2 * interval;
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
-    const hap_pose *poses = physics->table.entries[index].poses;
-    hapi_pose_blend(&poses[0], &poses[1], share, &out[i]);
-  }
-  pthread_mutex_unlock(&physics->poses_lock);
-  return stale ? HAP_STALE : HAP_OK;
 }

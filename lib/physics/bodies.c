@@ -1,12 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/log.h"
-#include "base/vec.h"
 #include "physics/physics_internal.h"
 
 /* ODE cannot list a world's bodies, so they are found through the space's geoms and the joints, at
@@ -61,22 +58,27 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
+  hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || drawn == NULL || buckets == NULL) {
     hapi_free(entries);
     hapi_free(handles);
+    hapi_free(drawn);
     hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
+    memcpy(drawn, table->drawn, table->high * sizeof *drawn);
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
+  hapi_free(table->drawn);
   hapi_free(table->buckets);
   table->entries = entries;
   table->handles = handles;
+  table->drawn = drawn;
   table->buckets = buckets;
   table->capacity = capacity;
   table->bucket_count = capacity * 4;
@@ -97,6 +99,7 @@ void hapi_bodies_finish(hapi_body_table *table)
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
+  hapi_free(table->drawn);
   hapi_free(table->buckets);
   memset(table, 0, sizeof *table);
 }
@@ -113,24 +116,13 @@ static uint32_t free_entry(hapi_body_table *table)
   return table->high;
 }
 
-/* Farthest point of the body's geoms from its origin, for the speed of its surface. */
-static double extent_of(dBodyID body)
+static void begin_entry(hapi_known_body *known, dBodyID body)
 {
-  const dReal *at = dBodyGetPosition(body);
-  double extent = 0.0;
-  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    dReal box[6];
-    double far2 = 0.0;
-    dGeomGetAABB(geom, box);
-    for (int k = 0; k < 3; ++k) {
-      double low = fabs(box[2 * k] - at[k]);
-      double high = fabs(box[2 * k + 1] - at[k]);
-      double far = low > high ? low : high;
-      far2 += far * far;
-    }
-    extent = far2 > extent * extent ? sqrt(far2) : extent;
-  }
-  return isfinite(extent) ? extent : 0.0;
+  memset(known, 0, sizeof *known);
+  known->body = body;
+  known->slot = HAPI_NONE;
+  known->island = HAPI_NONE;
+  hapi_extent_follow(known);
 }
 
 static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
@@ -139,13 +131,8 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
-  hapi_known_body *known = &table->entries[index];
-  memset(known, 0, sizeof *known);
-  known->body = body;
+  begin_entry(&table->entries[index], body);
   table->handles[index] = body;
-  known->slot = HAPI_NONE;
-  known->island = HAPI_NONE;
-  known->extent = extent_of(body);
   table->high = index == table->high ? index + 1 : table->high;
   ++table->used;
   insert_bucket(table, index);
@@ -153,32 +140,55 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   return HAP_OK;
 }
 
+/* What is known of the entry's body and points elsewhere. */
+static void drop_entry(hapi_physics *physics, uint32_t index)
+{
+  hapi_known_body *known = &physics->table.entries[index];
+  hapi_slots_drop_body(physics, index);
+  for (uint32_t i = 0; i < physics->watch_count; ++i) {
+    if (physics->watch[i] == index) {
+      physics->watch[i] = HAPI_NONE;
+    }
+  }
+  hapi_free(known->sleep.velocities);
+  memset(known, 0, sizeof *known);
+  known->slot = HAPI_NONE;
+}
+
+/* The entry of a body; where another one has come to be at the address of a destroyed one, the entry
+ * begins anew. */
+static uint32_t find_living(hapi_physics *physics, dBodyID body)
+{
+  hapi_body_table *table = &physics->table;
+  uint32_t index = hapi_bodies_find(table, body);
+  if (index != HAPI_NONE && hapi_mark_is_gone(&table->entries[index])) {
+    drop_entry(physics, index);
+    begin_entry(&table->entries[index], body);
+    hapi_poses_begin(physics, index);
+    ++table->replaced;
+  }
+  return index;
+}
+
 /* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
  * ones are gone; after the first one it asks for no more memory. */
 static bool see_body(hapi_physics *physics, dBodyID body)
 {
   hapi_body_table *table = &physics->table;
-  uint32_t index = hapi_bodies_find(table, body);
+  uint32_t index = find_living(physics, body);
   if (index == HAPI_NONE) {
     table->starved = table->starved || add(table, body, &index) < HAP_OK;
     if (table->starved) {
       return false;
     }
+    hapi_poses_begin(physics, index);
   }
   hapi_known_body *known = &table->entries[index];
   known->seen = table->scan;
   known->found = true;
-  /* ODE's auto-disable was switched off on the body that is known: where it is on, another body
-   * has come to be at the address of a destroyed one, or the application has set it anew. */
-  if (known->sleep.taken && dBodyGetAutoDisableFlag(body) != 0) {
-    hapi_slots_drop_body(physics, index);
-    hapi_free(known->sleep.velocities);
-    memset(&known->sleep, 0, sizeof known->sleep);
-    known->slot = HAPI_NONE;
-    known->extent = extent_of(body);
-  }
+  hapi_extent_follow(known);
   if (physics->begun) {
-    hapi_sleep_take(known);
+    hapi_sleep_follow(known);
   }
   return true;
 }
@@ -230,19 +240,31 @@ static void see_jointed(hapi_physics *physics)
 
 static void remove_entry(hapi_physics *physics, uint32_t index)
 {
-  hapi_body_table *table = &physics->table;
-  hapi_known_body *known = &table->entries[index];
-  hapi_slots_drop_body(physics, index);
-  for (uint32_t i = 0; i < physics->watch_count; ++i) {
-    if (physics->watch[i] == index) {
-      physics->watch[i] = HAPI_NONE;
-    }
+  drop_entry(physics, index);
+  physics->table.handles[index] = NULL;
+  --physics->table.used;
+}
+
+/* Once a run: an application that does it does it often. The statistics count on. */
+static void say_lost(hapi_physics *physics, uint32_t count)
+{
+  static const char *const text =
+      "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
+      "without "
+      "hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts them";
+  physics->table.lost += count;
+  if (count > 0 && !physics->table.said_lost) {
+    physics->table.said_lost = true;
+    hapi_log(HAP_LOG_WARNING, "%s", text);
+    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
   }
-  hapi_free(known->sleep.velocities);
-  memset(known, 0, sizeof *known);
-  known->slot = HAPI_NONE;
-  table->handles[index] = NULL;
-  --table->used;
+}
+
+/* Of an adopted body without geom and joint only the application knows whether it lives, unless another
+ * one is at its address. */
+static bool lives_unseen(const hapi_known_body *known)
+{
+  return known->adopted && !known->found && !hapi_mark_is_gone(known);
 }
 
 static void drop_unseen(hapi_physics *physics)
@@ -254,28 +276,21 @@ static void drop_unseen(hapi_physics *physics)
     if (known->body == NULL || known->seen == table->scan) {
       continue;
     }
-    if (known->adopted && !known->found) { /* only the application knows whether it lives */
+    if (lives_unseen(known)) {
       known->seen = table->scan;
       if (physics->begun) {
-        hapi_sleep_take(known);
+        hapi_sleep_follow(known);
       }
       continue;
     }
     remove_entry(physics, i);
     ++dropped;
   }
-  if (dropped == 0) {
-    return;
+  if (dropped > 0) {
+    rebuild_buckets(table);
   }
-  rebuild_buckets(table);
-  table->lost += dropped;
-  char text[192];
-  snprintf(text, sizeof text,
-           "%u bodies were destroyed without hap_session_forget_body, or lost their last geom and "
-           "joint without hap_session_adopt_body; they were dropped",
-           dropped);
-  hapi_log(HAP_LOG_WARNING, "%s", text);
-  physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
+  say_lost(physics, dropped + table->replaced);
+  table->replaced = 0;
 }
 
 static hap_status scan(hapi_physics *physics)
@@ -301,23 +316,49 @@ hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_
 {
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->poses_lock);
-  *out_index = hapi_bodies_find(&physics->table, body);
+  *out_index = find_living(physics, body);
   if (*out_index == HAPI_NONE) {
     status = add(&physics->table, body, out_index);
+    if (status >= HAP_OK) {
+      hapi_poses_begin(physics, *out_index);
+    }
   }
   pthread_mutex_unlock(&physics->poses_lock);
   if (status >= HAP_OK) {
     physics->table.entries[*out_index].adopted = true;
+    physics->table.entries[*out_index].found = false; /* its geoms may have gone since */
     physics->table.entries[*out_index].seen = physics->table.scan;
   }
   return status;
 }
 
-void hapi_bodies_forget(hapi_physics *physics, uint32_t index)
+hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body)
 {
   pthread_mutex_lock(&physics->poses_lock);
-  hapi_sleep_give_back(&physics->table.entries[index]);
-  remove_entry(physics, index);
-  rebuild_buckets(&physics->table);
+  uint32_t index = find_living(physics, body);
+  if (index != HAPI_NONE) {
+    hapi_sleep_give_back(&physics->table.entries[index]);
+    remove_entry(physics, index);
+    rebuild_buckets(&physics->table);
+  }
   pthread_mutex_unlock(&physics->poses_lock);
+  return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;
+}
+
+hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+                                          void (*callback)(dBodyID))
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->poses_lock);
+  uint32_t index = find_living(physics, body);
+  if (index == HAPI_NONE) {
+    status = scan(physics); /* it may have been made since the last one */
+    index = hapi_bodies_find(&physics->table, body);
+  }
+  if (index != HAPI_NONE) {
+    physics->table.entries[index].moved_callback = callback;
+    dBodySetMovedCallback(body, callback);
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+  return index != HAPI_NONE ? HAP_OK : status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
 }

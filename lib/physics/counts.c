@@ -25,8 +25,19 @@ void hapi_counts_range(hapi_physics *physics, double seconds)
 
 void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
 {
-  physics->figures.stats.frames_dropped += steps; /* in drive FRAME physics is the caller */
-  hapi_counts_show(physics);
+  /* In drive FRAME physics is the caller; but the table of bodies may be another's now. */
+  physics->figures.stats.frames_dropped += steps;
+  pthread_mutex_lock(&physics->shown_lock);
+  physics->shown.stats.frames_dropped = physics->figures.stats.frames_dropped;
+  pthread_mutex_unlock(&physics->shown_lock);
+}
+
+static void fill_lock(const hapi_physics *physics, hap_stats *out)
+{
+  const hapi_lock_figures *f = &physics->lock_figures;
+  out->locks = atomic_load(&f->count);
+  out->lock_wait_ms_max = 1e-6 * (double)atomic_load(&f->wait_most_ns);
+  out->lock_held_ms_max = 1e-6 * (double)atomic_load(&f->held_most_ns);
 }
 
 static void fill_times(const hapi_physics *physics, hap_stats *out)
@@ -74,6 +85,8 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   out->size = loop.size;
   out->impulse_abs_ns = loop.impulse_abs_ns;
   fill_times(physics, out);
+  fill_lock(physics, out);
   fill_momentum(physics, out);
   pthread_mutex_unlock(&physics->shown_lock);
+  out->pose_delay_s = hapi_poses_delay(physics);
 }

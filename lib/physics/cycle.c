@@ -79,24 +79,28 @@ static void global_step(hapi_physics *physics)
   hapi_sleep_note(physics);
 }
 
-static void sync_in(hapi_physics *physics, int64_t now_ns)
+static void call_step(hapi_physics *physics, hap_step_fn callback)
+{
+  if (callback != NULL && physics->step_s > 0.0) {
+    physics->editable = true;
+    callback(physics->ode.user, physics->step_s);
+    physics->editable = false;
+  }
+}
+
+static void sync_in(hapi_physics *physics)
 {
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
   dJointGroupEmpty(physics->contact_group);
   hapi_edits_run(physics);
   follow_model(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
-  if (physics->ode.before_step != NULL && physics->step_s > 0.0) {
-    physics->ode.before_step(physics->ode.user, physics->step_s);
-  }
+  call_step(physics, physics->ode.before_step);
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   hapi_joints_scan(physics);
   hapi_reconcile_take(physics);
-  if (physics->model == HAP_MODEL_IMPULSE) {
-    hapi_publish_poses(physics, now_ns);
-  }
   hapi_world_read_user_wrenches(physics);
   hapi_reconcile_own(physics);
 }
@@ -115,9 +119,10 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_reconcile_leave(physics);
   hapi_joints_leave(physics);
   physics->last_cycle_ns = now_ns;
-  if (physics->model != HAP_MODEL_IMPULSE) {
-    hapi_publish_poses(physics, now_ns);
-  }
+  /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
+  int64_t lag_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;
+  hapi_poses_publish(physics, physics->model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
+                     physics->config.lockstep ? now_ns : hapi_clock_now());
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5])
@@ -145,7 +150,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
-  sync_in(physics, now_ns);
+  sync_in(physics);
   if (!world_is_sound(physics)) {
     return;
   }
@@ -167,16 +172,12 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   sync_out(physics, now_ns, next_ns);
   seconds[4] += lap(&watch);
   note_times(physics, seconds);
-  if (physics->ode.after_step != NULL && physics->step_s > 0.0) {
-    physics->ode.after_step(physics->ode.user, physics->step_s);
-  }
+  call_step(physics, physics->ode.after_step);
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   hapi_physics_enter(physics);
-  atomic_store(&physics->cycle_thread, (unsigned long)pthread_self());
   run(physics, now_ns, next_ns);
-  atomic_store(&physics->cycle_thread, 0);
-  hapi_fair_lock_give(&physics->lock);
+  hapi_physics_leave(physics);
 }

@@ -8,7 +8,9 @@ hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg)
 {
   hap_status status = HAP_ERROR_CAPACITY;
   pthread_mutex_lock(&physics->edits_lock);
-  if (physics->edit_count < HAPI_EDITS_MAX) {
+  if (physics->edits_closed) {
+    status = HAP_ERROR_STATE;
+  } else if (physics->edit_count < HAPI_EDITS_MAX) {
     uint32_t at = (physics->edit_first + physics->edit_count++) % HAPI_EDITS_MAX;
     physics->edits[at] = (hapi_edit){edit, arg};
     status = HAP_OK;
@@ -36,7 +38,20 @@ void hapi_edits_run(hapi_physics *physics)
   uint32_t count = physics->edit_count; /* what an edit posts waits for the next step */
   pthread_mutex_unlock(&physics->edits_lock);
   hapi_edit edit;
+  physics->editable = true;
   for (uint32_t i = 0; i < count && take_edit(physics, &edit); ++i) {
     edit.run(edit.arg);
+    ++physics->figures.stats.edits_run;
   }
+  physics->editable = false;
+}
+
+void hapi_physics_close(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->edits_lock);
+  physics->edits_closed = true;
+  pthread_mutex_unlock(&physics->edits_lock);
+  hapi_physics_enter(physics);
+  hapi_edits_run(physics); /* all of them: no more can come */
+  hapi_physics_leave(physics);
 }

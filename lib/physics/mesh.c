@@ -12,6 +12,7 @@
  * mesh, with a box around every few of them. */
 
 #define CHUNK 32u
+#define SAMPLES 16u /* of a mesh, looked at in every walk */
 #define FOUND_MAX HAPI_NEAR_TRIANGLES
 
 static void destroy_mesh(hapi_mesh *mesh)
@@ -86,12 +87,42 @@ static bool read_mesh(dGeomID geom, hapi_mesh *mesh)
   return true;
 }
 
-static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom)
+/* Some of its triangles are where they were: another mesh may have come to be at the address of geom and
+ * data, or its corners may have been moved. */
+static bool samples_agree(const hapi_mesh *mesh)
+{
+  const double *at = dGeomGetPosition(mesh->geom);
+  double tolerance = 1e-9 * (1.0 + fabs(at[0]) + fabs(at[1]) + fabs(at[2]));
+  for (uint32_t i = 0; i < SAMPLES; ++i) {
+    uint32_t index = (uint32_t)((uint64_t)i * (mesh->count - 1) / (SAMPLES - 1));
+    const double *kept = mesh->corners + (size_t)9 * index;
+    double corners[9];
+    read_triangle(mesh->geom, index, corners);
+    for (int k = 0; k < 9; ++k) {
+      if (!(fabs(corners[k] - kept[k]) <= tolerance + 1e-9 * fabs(kept[k]))) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+static bool is_current(hapi_mesh *mesh, uint64_t walk)
+{
+  bool same = mesh->data == dGeomTriMeshGetTriMeshDataID(mesh->geom) &&
+              mesh->count == (uint32_t)dGeomTriMeshGetTriangleCount(mesh->geom);
+  if (!same || (mesh->checked_in != walk && mesh->count > 0 && !samples_agree(mesh))) {
+    return false;
+  }
+  mesh->checked_in = walk;
+  return true;
+}
+
+static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom, uint64_t walk)
 {
   for (uint32_t i = 0; i < meshes->count; ++i) {
-    const hapi_mesh *mesh = &meshes->meshes[i];
-    if (mesh->geom == geom && mesh->data == dGeomTriMeshGetTriMeshDataID(geom) &&
-        mesh->count == (uint32_t)dGeomTriMeshGetTriangleCount(geom)) {
+    hapi_mesh *mesh = &meshes->meshes[i];
+    if (mesh->geom == geom && is_current(mesh, walk)) {
       return mesh;
     }
   }
@@ -224,7 +255,7 @@ static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double
 uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6])
 {
   hapi_meshes *meshes = &physics->meshes;
-  const hapi_mesh *mesh = find_mesh(meshes, geom);
+  const hapi_mesh *mesh = find_mesh(meshes, geom, physics->range.number);
   double local[6];
   uint32_t found = 0;
   if (mesh == NULL) {

@@ -20,6 +20,7 @@ double hapi_body_mass(dBodyID body)
 
 bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double out[3])
 {
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
   bool given = physics->ode.friction_direction != NULL &&
                physics->ode.friction_direction(physics->ode.user, a, b, out);
   double length = given && hapi_finite(out, 3) ? hapi_v3_norm(out) : 0.0;
@@ -169,8 +170,9 @@ static bool reserve(hapi_surface_cache *cache)
   if (larger.entries == NULL) {
     return false;
   }
-  for (uint32_t i = 0; i < cache->capacity; ++i) {
-    const hapi_surface_entry *entry = &cache->entries[i];
+  const hapi_surface_entry *old = cache->entries;
+  for (uint32_t i = 0; old != NULL && i < cache->capacity; ++i) {
+    const hapi_surface_entry *entry = &old[i];
     if (entry->step == cache->step) {
       *cached(&larger, entry->a, entry->b) = *entry;
       ++larger.used;

@@ -14,6 +14,7 @@
 /* Life of the physics side: create, begin, end, destroy; what the session asks it for. */
 
 #define CANDIDATES_PER_CONTACT 8u
+#define LAST_ROUNDS 16 /* of edits, when the session stops: also of what edits post */
 
 static bool allocate(hapi_physics *physics)
 {
@@ -106,7 +107,6 @@ void hapi_physics_destroy(hapi_physics *physics)
     return;
   }
   hapi_physics_end(physics);
-  hapi_edits_run(physics); /* of a session that never started */
   if (physics->neighborhood.probe_geom != NULL) {
     dGeomDestroy(physics->neighborhood.probe_geom);
     dGeomDestroy(physics->neighborhood.plane_geom);
@@ -152,6 +152,7 @@ static void reset_figures(hapi_physics *physics)
 {
   memset(&physics->figures, 0, sizeof physics->figures);
   hapi_histogram_reset(&physics->cycle_ns);
+  hapi_lock_figures_reset(&physics->lock_figures);
   hapi_counts_show(physics);
 }
 
@@ -171,15 +172,8 @@ static void build_first_model(hapi_physics *physics)
   hapi_operating_point_measure(physics);
 }
 
-hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
+static void prepare(hapi_physics *physics)
 {
-  physics->begun = true;
-  hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
-  hap_status status = check_world(physics, detail);
-  if (status < HAP_OK) {
-    give_world_back(physics);
-    return status;
-  }
   reset_figures(physics);
   hapi_slots_reset(physics);
   hapi_range_reset(physics);
@@ -190,19 +184,34 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   physics->step_s = 0.0;
   physics->model_number = 0;
   physics->world_faulty = false;
+  physics->table.said_lost = false;
   physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
   if (physics->config.lockstep) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
     dRandSetSeed(0);
   }
+}
+
+hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
+{
+  physics->begun = true;
+  hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
+  hap_status status = check_world(physics, detail);
+  if (status < HAP_OK) {
+    give_world_back(physics);
+    return status;
+  }
+  hapi_physics_claim(physics); /* surfaces are asked for */
+  prepare(physics);
   build_first_model(physics);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
   physics->start_ns = *start_ns;
   physics->last_cycle_ns = *start_ns;
-  hapi_publish_poses(physics, *start_ns);
-  hapi_publish_poses(physics, *start_ns);
+  hapi_poses_reset(physics);
+  hapi_poses_publish(physics, *start_ns, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
   hapi_reconcile_leave(physics);
+  hapi_physics_unclaim(physics);
   hapi_counts_show(physics);
   return HAP_OK;
 }
@@ -214,11 +223,17 @@ void hapi_physics_end(hapi_physics *physics)
   }
   hapi_physics_stop_thread(physics);
   hapi_physics_enter(physics);
-  for (int round = 0; round < 16; ++round) {
-    hapi_edits_run(physics); /* also what the edits post */
+  for (int round = 0; round < LAST_ROUNDS; ++round) {
+    hapi_edits_run(physics);
   }
+  hapi_counts_show(physics);
   give_world_back(physics);
-  hapi_fair_lock_give(&physics->lock);
+  hapi_physics_leave(physics);
+}
+
+int64_t hapi_physics_last_cycle(const hapi_physics *physics)
+{
+  return physics->last_cycle_ns;
 }
 
 double hapi_physics_period(const hapi_physics *physics)
@@ -241,44 +256,7 @@ void hapi_physics_set_model(hapi_physics *physics, hap_model model)
   atomic_store(&physics->wanted_model, (int)model);
 }
 
-bool hapi_physics_in_callback(const hapi_physics *physics)
-{
-  return atomic_load(&physics->cycle_thread) == (unsigned long)pthread_self();
-}
-
 bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
   return physics->model != HAP_MODEL_IMPULSE;
-}
-
-void hapi_physics_enter(hapi_physics *physics)
-{
-  while (!hapi_fair_lock_take(&physics->lock, INT64_MAX)) {
-    hapi_clock_sleep_until(hapi_clock_now() + 1000000); /* more threads wait than it has places */
-  }
-}
-
-bool hapi_physics_lock_is_mine(hapi_physics *physics)
-{
-  return hapi_fair_lock_is_mine(&physics->lock);
-}
-
-hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
-{
-  if (hapi_physics_in_callback(physics) || hapi_fair_lock_is_mine(&physics->lock)) {
-    return HAP_ERROR_THREAD;
-  }
-  int64_t now = hapi_clock_now();
-  bool for_ever = timeout_ns < 0 || timeout_ns > INT64_MAX - now;
-  int64_t deadline = for_ever ? INT64_MAX : now + timeout_ns;
-  return hapi_fair_lock_take(&physics->lock, deadline) ? HAP_OK : HAP_ERROR_TIMEOUT;
-}
-
-hap_status hapi_physics_unlock(hapi_physics *physics)
-{
-  if (hapi_physics_in_callback(physics) || !hapi_fair_lock_is_mine(&physics->lock)) {
-    return HAP_ERROR_THREAD;
-  }
-  hapi_fair_lock_give(&physics->lock);
-  return HAP_OK;
 }

@@ -29,6 +29,7 @@ typedef struct hapi_physics_config {
   double physics_hz;
   double haptic_hz;
   bool lockstep;
+  bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
   int rt_priority;
   hapi_exchange *exchange;
   /* [physics] HAP_FAULT_NONE: something that the application should know, but no fault */
@@ -45,6 +46,10 @@ void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);
 void hapi_physics_end(hapi_physics *physics); /* gives the world back; idempotent */
 
+/* [control] After end, before anything of the session is destroyed: runs the edits that are left, which
+ * may call the session. Nothing can be posted any more. */
+void hapi_physics_close(hapi_physics *physics);
+
 /* [control] Between begin and end: the thread of drive THREADS. */
 hap_status hapi_physics_start_thread(hapi_physics *physics);
 void hapi_physics_stop_thread(hapi_physics *physics); /* idempotent */
@@ -52,6 +57,9 @@ void hapi_physics_stop_thread(hapi_physics *physics); /* idempotent */
 /* [physics] One cycle at now_ns, the next one being planned for next_ns: the world goes one period
  * on. Takes and gives the lock. */
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);
+
+/* [physics] Time that the last cycle was for. */
+int64_t hapi_physics_last_cycle(const hapi_physics *physics);
 
 /* [physics] Seconds from the last cycle to the next one in the model in force: H, or T in model
  * SINGLE; and as it will be after the next cycle. */
@@ -73,8 +81,12 @@ hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
                                      size_t count);
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom);
+/* [any] At the time drawn for time_ns; newest of all. */
 hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
-                              size_t count, hap_pose *out); /* [any] */
+                              size_t count, hap_pose *out);
+hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
+                                  hap_pose *out);
+int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns); /* [any] */
 
 /* session.h */
 void hapi_physics_set_model(hapi_physics *physics, hap_model model);     /* [any] */

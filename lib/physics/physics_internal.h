@@ -48,6 +48,13 @@ typedef struct hapi_sleep {
   bool ring_full;
 } hapi_sleep;
 
+typedef struct hapi_mark {
+  bool placed;
+  bool in_axis;
+  double idle_time;         /* s, the application's, which the mark stands in for */
+  double angular_threshold; /* rad/s, the same */
+} hapi_mark;
+
 typedef struct hapi_known_body {
   dBodyID body;  /* NULL: free entry */
   uint64_t seen; /* scan that found it */
@@ -64,17 +71,43 @@ typedef struct hapi_known_body {
   bool loop_touched;
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
+  uint64_t geoms_print; /* of the geoms that it was measured of */
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
   void (*moved_callback)(dBodyID);
   hapi_sleep sleep;
-  hap_pose poses[2]; /* at the last but one and the last cycle, for drawing */
-  int pose_count;
+  hapi_mark mark;
 } hapi_known_body;
+
+/* ---- poses.c: what is drawn ---- */
+
+#define HAPI_FRAMES 8u /* of the world, that are kept */
+#define HAPI_WAITS 16u
+
+/* Of a known body. Frame number n has place n % HAPI_FRAMES. */
+typedef struct hapi_drawn {
+  hap_pose poses[HAPI_FRAMES];
+  uint64_t first;          /* frame with a pose */
+  uint32_t led;            /* bits: in this frame the pose is only the loop's */
+  uint32_t slots[2];       /* in the trail: now, and before */
+  uint32_t generations[2]; /* 0: none */
+} hapi_drawn;
+
+typedef struct hapi_frames {
+  int64_t stamps[HAPI_FRAMES]; /* rising; time for which the poses hold in what is felt */
+  uint64_t count;              /* frames so far: the newest one is count - 1 */
+  uint64_t oldest;             /* that is kept; its place may be used by one that was taken back */
+  double waits_ns[HAPI_WAITS]; /* from the stamp of a frame until the next one was known */
+  uint32_t wait_count;
+  double delay_ns; /* at delay_from_ns, on its way to delay_wanted_ns */
+  double delay_wanted_ns;
+  int64_t delay_from_ns;
+} hapi_frames;
 
 typedef struct hapi_body_table {
   hapi_known_body *entries;
-  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
+  hapi_drawn *drawn; /* of each entry */
+  dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
   uint32_t *buckets; /* open addressing, entry index + 1 */
@@ -82,6 +115,8 @@ typedef struct hapi_body_table {
   uint32_t used;
   uint64_t scan;
   uint64_t lost;
+  uint32_t replaced; /* among them, not counted yet: another one is at the address */
+  bool said_lost;
   bool starved; /* the newest scan found no memory for a body: not all are known */
 } hapi_body_table;
 
@@ -267,8 +302,9 @@ typedef struct hapi_mesh {
   dGeomID geom;
   dTriMeshDataID data;
   uint32_t count;
-  double *corners; /* count x 9, geom's frame */
-  double *boxes;   /* of every few triangles, x 6 */
+  uint64_t checked_in; /* walk that looked whether it is the same mesh */
+  double *corners;     /* count x 9, geom's frame */
+  double *boxes;       /* of every few triangles, x 6 */
 } hapi_mesh;
 
 typedef struct hapi_near_triangle {
@@ -377,6 +413,14 @@ typedef struct hapi_edit {
   void *arg;
 } hapi_edit;
 
+/* Of the application's threads. Written by the one that has the lock. */
+typedef struct hapi_lock_figures {
+  _Atomic uint64_t count;
+  _Atomic int64_t wait_most_ns;
+  _Atomic int64_t held_most_ns;
+  int64_t taken_ns; /* by the one that has it */
+} hapi_lock_figures;
+
 struct hapi_physics {
   hapi_physics_config config;
   hap_ode_def ode;
@@ -384,10 +428,13 @@ struct hapi_physics {
   dContact *contact_scratch;
 
   hapi_fair_lock lock;
+  hapi_lock_figures lock_figures;
+  bool editable; /* in a callback that may create and destroy, or in an edit */
   pthread_mutex_t edits_lock;
   hapi_edit edits[HAPI_EDITS_MAX];
   uint32_t edit_first;
   uint32_t edit_count;
+  bool edits_closed;
 
   hapi_body_table table;
   hapi_body_slot *bodies;      /* capacity.bodies */
@@ -411,8 +458,8 @@ struct hapi_physics {
   bool has_new_state;    /* state came in this cycle */
   double probe_step_s;   /* H */
   int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
-  int64_t pose_times[2];
-  pthread_mutex_t poses_lock; /* physics and those who draw */
+  hapi_frames frames;
+  pthread_mutex_t poses_lock; /* physics and those who draw: frames, and the table's places */
 
   uint32_t watch[HAP_TRACE_BODIES_MAX]; /* body table entries */
   uint32_t watch_count;
@@ -441,7 +488,21 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
 hap_status hapi_bodies_scan(hapi_physics *physics);
 hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
-void hapi_bodies_forget(hapi_physics *physics, uint32_t index);
+hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body);
+hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+                                          void (*callback)(dBodyID));
+
+/* extent.c */
+void hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed */
+
+/* mark.c: tells a body from a later one at its address */
+void hapi_mark_place(hapi_known_body *known);
+bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
+/* What the application has set since, of auto-disable. */
+#define HAPI_MARK_TIME 1u
+#define HAPI_MARK_THRESHOLD 2u
+unsigned hapi_mark_follow(hapi_known_body *known);
+void hapi_mark_remove(hapi_known_body *known); /* idempotent */
 
 /* accelerance.c */
 /* Of a dynamic body at a rotation of ODE's. */
@@ -454,7 +515,7 @@ bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text);
 bool hapi_contact_is_sound(const dContactGeom *contact);
 
 /* sleep.c: ODE's auto-disable, kept by us because a probe would reset ODE's own */
-void hapi_sleep_take(hapi_known_body *known);               /* idempotent */
+void hapi_sleep_follow(hapi_known_body *known);             /* takes over; and what is set later */
 void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
 void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
 void hapi_sleep_note(hapi_physics *physics);                /* just after it */
@@ -603,10 +664,24 @@ void hapi_reconcile_leave(hapi_physics *physics);     /* last: what is left in O
 
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
-void hapi_publish_poses(hapi_physics *physics, int64_t now_ns);
 
-/* physics.c */
-void hapi_physics_enter(hapi_physics *physics); /* takes the lock, whoever waits */
+/* poses.c */
+void hapi_pose_read(dBodyID body, hap_pose *out);
+/* A step can leave a pose that is none, which is found out at the next cycle only. */
+bool hapi_pose_is_sound(dBodyID body);
+/* A frame of all bodies, for stamp_ns, at known_ns. */
+void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns);
+/* A body that is new can be drawn at once, as it is now. The caller holds poses_lock. */
+void hapi_poses_begin(hapi_physics *physics, uint32_t index);
+void hapi_poses_reset(hapi_physics *physics);
+double hapi_poses_delay(hapi_physics *physics); /* s */
+
+/* world_lock.c */
+void hapi_physics_enter(hapi_physics *physics); /* takes the lock, for calls of the application */
+void hapi_physics_leave(hapi_physics *physics);
+void hapi_physics_claim(hapi_physics *physics); /* this thread calls the application: it has the */
+void hapi_physics_unclaim(hapi_physics *physics); /* lock already, and may not take or give it */
+void hapi_lock_figures_reset(hapi_lock_figures *figures);
 
 /* counts.c */
 void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */

@@ -212,7 +212,7 @@ static hap_status cut_joints(hapi_physics *physics)
     dBodyID body = physics->table.entries[test->members[i]].body;
     int joints = dynamic(body) ? 0 : dBodyGetNumJoints(body);
     if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
-                      sizeof *test->cut)) {
+                      sizeof(dJointID))) {
       return HAP_ERROR_MEMORY;
     }
     for (int k = 0; k < joints; ++k) {
@@ -259,7 +259,7 @@ static hap_status switch_off(hapi_physics *physics)
   hapi_test_set *test = &physics->test;
   test->disabled_count = 0;
   if (!hapi_reserve((void **)&test->disabled, &test->disabled_capacity, 0, physics->table.high,
-                    sizeof *test->disabled)) {
+                    sizeof(dBodyID))) {
     return HAP_ERROR_MEMORY;
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
@@ -313,8 +313,8 @@ void hapi_test_leave(hapi_physics *physics)
   for (uint32_t i = 0; i < test->disabled_count; ++i) {
     dBodyEnable(test->disabled[i]);
   }
-  hapi_space_order_restore(physics);
   hapi_snapshot_restore(&physics->snapshot); /* also switches sleeping members off again */
+  hapi_space_order_restore(physics);         /* it asks where the geoms are: after the poses */
   test->cut_count = 0;
   test->disabled_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, test->islands_threads);

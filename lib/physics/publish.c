@@ -3,20 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
-
-static void read_pose(dBodyID body, hap_pose *out)
-{
-  hapi_v3_copy(dBodyGetPosition(body), out->position);
-  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
-}
-
-/* A step can leave a pose that is none, which is found out at the next cycle only. */
-static bool pose_is_sound(dBodyID body)
-{
-  return hapi_finite(dBodyGetPosition(body), 3) && hapi_finite(dBodyGetQuaternion(body), 4);
-}
 
 /* Row-major 3x3 of ODE's rows of four. */
 static void read_matrix(const dReal in[12], double out[9])
@@ -76,8 +65,6 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
   out->linear_threshold2 = linear * linear;
   out->angular_threshold2 = angular * angular;
   out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
-  hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
-  hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
   memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
   memcpy(out->response, slot->response, sizeof out->response);
 }
@@ -91,11 +78,13 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   out->generation = slot->generation;
   out->epoch = slot->epoch;
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
-  read_pose(body, &out->pose);
+  hapi_pose_read(body, &out->pose);
   hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
   memcpy(out->b, slot->b, sizeof out->b);
   memcpy(out->residual, slot->residual, sizeof out->residual);
+  hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
+  hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
   if (physics->model == HAP_MODEL_CONTACT) {
     fill_dynamics(physics, slot, out);
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
@@ -105,7 +94,7 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
       hapi_v3_copy(slot->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
-  bool sound = pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
+  bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
                hapi_finite(out->twist.angular, 3);
   physics->figures.stats.states_rejected += !sound;
   return sound;
@@ -135,7 +124,7 @@ static void fill_watch(hapi_physics *physics, hapi_model *out)
         physics->watch[i] != HAPI_NONE ? &physics->table.entries[physics->watch[i]] : NULL;
     bool local = known != NULL && known->slot != HAPI_NONE;
     out->watch_slot[i] = local ? known->slot : HAPI_SLOT_NONE;
-    if (known != NULL && pose_is_sound(known->body)) {
+    if (known != NULL && hapi_pose_is_sound(known->body)) {
       hapi_v3_copy(dBodyGetPosition(known->body), out->watch_position[i]);
     }
   }
@@ -159,6 +148,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->number = ++physics->model_number;
   out->state_ns = state_ns;
   out->valid_from_ns = valid_from_ns;
+  out->sent_ns = physics->config.frame ? hapi_clock_now() : 0;
   out->blend_s = physics->model == HAP_MODEL_IMPULSE ? physics->probe_step_s : 0.0;
   out->period_s = hapi_physics_next_period(physics);
   out->model = physics->model;
@@ -181,21 +171,4 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   count_model(physics, out);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);
-}
-
-void hapi_publish_poses(hapi_physics *physics, int64_t now_ns)
-{
-  pthread_mutex_lock(&physics->poses_lock);
-  physics->pose_times[0] = physics->pose_times[1];
-  physics->pose_times[1] = now_ns;
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL && pose_is_sound(known->body)) {
-      known->poses[0] = known->poses[1];
-      read_pose(known->body, &known->poses[1]);
-      known->poses[0] = known->pose_count == 0 ? known->poses[1] : known->poses[0];
-      known->pose_count = 1;
-    }
-  }
-  pthread_mutex_unlock(&physics->poses_lock);
 }

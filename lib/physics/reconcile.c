@@ -74,6 +74,19 @@ static bool sound(const hapi_state_body *in)
          hapi_finite(in->owned_twist.linear, 3) && hapi_finite(in->owned_twist.angular, 3);
 }
 
+/* The body is gone, and has taken with it what the loop gave to it since the last sync; or it is kinematic by
+ * now, and nothing moves it. */
+static void write_off(hapi_physics *physics, hapi_body_slot *slot, const hapi_state_body *in)
+{
+  if (sound(in)) {
+    take_impulse(slot, in);
+    hapi_v3_add(physics->figures.world_impulse, slot->new_impulse, physics->figures.world_impulse);
+    memset(slot->new_impulse, 0, sizeof slot->new_impulse);
+    memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
+    slot->pushed = false;
+  }
+}
+
 static void take_body(hapi_physics *physics, uint32_t index)
 {
   hapi_body_slot *slot = &physics->bodies[index];
@@ -81,10 +94,14 @@ static void take_body(hapi_physics *physics, uint32_t index)
   dBodyID body = ode_body(physics, slot);
   bool driven = (slot->flags & HAPI_BODY_DRIVEN) != 0;
   slot->loop_owned = false;
-  if (in != NULL && driven) {
+  if (in == NULL || slot->phase == HAPI_SLOT_FREE) {
+    return;
+  }
+  if (driven) {
     slot->owned_until_ns = in->owned_until_ns; /* it is the application's now */
   }
-  if (in == NULL || body == NULL || slot->phase == HAPI_SLOT_FREE || driven) {
+  if (driven || body == NULL) {
+    write_off(physics, slot, in);
     return;
   }
   if (!sound(in)) {

@@ -18,24 +18,23 @@ static void start_countdown(hapi_sleep *sleep)
   sleep->time_left = sleep->idle_time;
 }
 
-void hapi_sleep_take(hapi_known_body *known)
+static double squared(double value)
 {
-  dBodyID body = known->body;
-  hapi_sleep *sleep = &known->sleep;
-  if (sleep->taken) {
-    return;
-  }
-  memset(sleep, 0, sizeof *sleep);
-  sleep->taken = true;
-  sleep->awake = true;
-  sleep->automatic = dBodyGetAutoDisableFlag(body) != 0;
-  if (!sleep->automatic) {
-    return;
-  }
-  sleep->linear_threshold = dBodyGetAutoDisableLinearThreshold(body);
-  sleep->linear_threshold *= sleep->linear_threshold;
-  sleep->angular_threshold = dBodyGetAutoDisableAngularThreshold(body);
-  sleep->angular_threshold *= sleep->angular_threshold;
+  return value * value;
+}
+
+/* Those that have no mark in their place. */
+static bool were_changed(const hapi_sleep *sleep, dBodyID body)
+{
+  return sleep->linear_threshold != squared(dBodyGetAutoDisableLinearThreshold(body)) ||
+         sleep->idle_steps != dBodyGetAutoDisableSteps(body) ||
+         sleep->samples != dBodyGetAutoDisableAverageSamplesCount(body);
+}
+
+static void read_settings(hapi_sleep *sleep, dBodyID body)
+{
+  sleep->linear_threshold = squared(dBodyGetAutoDisableLinearThreshold(body));
+  sleep->angular_threshold = squared(dBodyGetAutoDisableAngularThreshold(body));
   sleep->idle_steps = dBodyGetAutoDisableSteps(body);
   sleep->idle_time = dBodyGetAutoDisableTime(body);
   sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
@@ -46,27 +45,90 @@ void hapi_sleep_take(hapi_known_body *known)
       hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
     }
   }
+}
+
+/* Switching it off also enables the body, and gives it the world's steps, time and samples. */
+static void switch_off(const hapi_sleep *sleep, dBodyID body)
+{
   bool enabled = dBodyIsEnabled(body) != 0;
-  dBodySetAutoDisableFlag(body, 0); /* also enables the body and resets its settings */
+  dBodySetAutoDisableFlag(body, 0);
+  dBodySetAutoDisableSteps(body, sleep->idle_steps);
+  dBodySetAutoDisableTime(body, sleep->idle_time);
+  if (dBodyGetAutoDisableAverageSamplesCount(body) != sleep->samples) {
+    dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
+  }
   if (!enabled) {
     dBodyDisable(body);
+  }
+}
+
+static void take(hapi_known_body *known)
+{
+  hapi_sleep *sleep = &known->sleep;
+  memset(sleep, 0, sizeof *sleep);
+  sleep->taken = true;
+  sleep->awake = true;
+  sleep->automatic = dBodyGetAutoDisableFlag(known->body) != 0;
+  if (sleep->automatic) {
+    read_settings(sleep, known->body);
+    switch_off(sleep, known->body);
+  }
+  hapi_mark_place(known);
+}
+
+/* With the settings that the application has given to the body by now. */
+static void take_again(hapi_known_body *known)
+{
+  hapi_mark_remove(known);
+  hapi_free(known->sleep.velocities);
+  take(known);
+}
+
+/* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other trace: the
+ * flag is off all the time. */
+static bool was_switched_off(const hapi_known_body *known, unsigned changed)
+{
+  return (changed & HAPI_MARK_TIME) != 0 &&
+         known->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body));
+}
+
+void hapi_sleep_follow(hapi_known_body *known)
+{
+  if (!known->sleep.taken) {
+    take(known);
+    return;
+  }
+  if (dBodyGetAutoDisableFlag(known->body) != 0) {
+    take_again(known);
+    return;
+  }
+  unsigned changed = hapi_mark_follow(known);
+  if (was_switched_off(known, changed)) {
+    take_again(known);
+  } else if (known->sleep.automatic && (changed != 0 || were_changed(&known->sleep, known->body))) {
+    dBodySetAutoDisableFlag(known->body, 1);
+    take_again(known);
+  }
+}
+
+/* What ODE counted before the session does not count any more. */
+static void restart_countdown(dBodyID body)
+{
+  int samples = dBodyGetAutoDisableAverageSamplesCount(body);
+  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)samples);
+  if (dBodyIsEnabled(body)) {
+    dBodyEnable(body);
   }
 }
 
 void hapi_sleep_give_back(hapi_known_body *known)
 {
   hapi_sleep *sleep = &known->sleep;
-  if (!sleep->taken || !sleep->automatic) {
-    sleep->taken = false;
-    return;
+  hapi_mark_remove(known);
+  if (sleep->taken && sleep->automatic) {
+    dBodySetAutoDisableFlag(known->body, 1);
+    restart_countdown(known->body);
   }
-  dBodyID body = known->body;
-  dBodySetAutoDisableLinearThreshold(body, sqrt(sleep->linear_threshold));
-  dBodySetAutoDisableAngularThreshold(body, sqrt(sleep->angular_threshold));
-  dBodySetAutoDisableSteps(body, sleep->idle_steps);
-  dBodySetAutoDisableTime(body, sleep->idle_time);
-  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
-  dBodySetAutoDisableFlag(body, 1);
   hapi_free(sleep->velocities);
   memset(sleep, 0, sizeof *sleep);
 }

@@ -80,14 +80,62 @@ hap_status hapi_space_order_save(hapi_physics *physics)
   return status;
 }
 
-/* Adding puts a geom in front: from the last to the first. */
-void hapi_space_order_restore(hapi_physics *physics)
+static int depth_of(dSpaceID space)
 {
-  hapi_test_set *test = &physics->test;
-  for (uint32_t i = test->order_count; i > 0; --i) {
-    dSpaceID space = dGeomGetSpace(test->order[i - 1]);
+  int depth = 0;
+  while ((space = dGeomGetSpace((dGeomID)space)) != NULL) {
+    ++depth;
+  }
+  return depth;
+}
+
+static void clean_all_around(dSpaceID space)
+{
+  dSpaceID outer = dGeomGetSpace((dGeomID)space);
+  while (outer != NULL) {
+    space = outer;
+    outer = dGeomGetSpace((dGeomID)space);
+  }
+  dSpaceClean(space);
+}
+
+/* Adding puts a geom in front: from the last to the first. */
+static void restore_space(const hapi_test_set *test, uint32_t first, uint32_t end)
+{
+  dSpaceID space = dGeomGetSpace(test->order[first]);
+  clean_all_around(space);
+  for (uint32_t i = end; i > first; --i) {
     dSpaceRemove(space, test->order[i - 1]);
     dSpaceAdd(space, test->order[i - 1]);
   }
-  test->order_count = 0;
+}
+
+/* ODE ends the process where a geom that is to be cleaned is behind one that is clean: so all of them
+ * are, before they change places. Inner spaces first, as a space whose list changes is to be cleaned, and
+ * goes to the front of the one that it is in. */
+static void restore_at(const hapi_test_set *test, int depth)
+{
+  uint32_t end = 0;
+  for (uint32_t first = 0; first < test->order_count; first = end) {
+    dSpaceID space = dGeomGetSpace(test->order[first]);
+    while (end < test->order_count && dGeomGetSpace(test->order[end]) == space) {
+      ++end;
+    }
+    if (depth_of(space) == depth) {
+      restore_space(test, first, end);
+    }
+  }
+}
+
+void hapi_space_order_restore(hapi_physics *physics)
+{
+  int deepest = 0;
+  for (uint32_t i = 0; i < physics->test.order_count; ++i) {
+    int depth = depth_of(dGeomGetSpace(physics->test.order[i]));
+    deepest = depth > deepest ? depth : deepest;
+  }
+  for (int depth = deepest; depth >= 0; --depth) {
+    restore_at(&physics->test, depth);
+  }
+  physics->test.order_count = 0;
 }

@@ -46,7 +46,7 @@ static double depth_along(const search *s, const double normal[3])
 
 static void try_direction(search *s, const double direction[3])
 {
-  double normal[3];
+  double normal[3] = {0.0, 0.0, 0.0};
   if (!(hapi_v3_unit(direction, normal) > 0.0)) {
     return;
   }
@@ -202,7 +202,8 @@ static bool descend(search *s, int steps, hapi_gjk *out)
 static void try_everywhere(search *s)
 {
   for (int i = 0; i < 27; ++i) {
-    double start[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+    const int cell[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+    double start[3] = {cell[0], cell[1], cell[2]};
     search local = *s;
     hapi_gjk unused;
     local.depth = DBL_MAX;
@@ -226,7 +227,7 @@ static void search_globally(search *s)
  * separating normal is known and GJK cannot be mistaken about it. */
 static bool settle_apart(search *s, hapi_gjk *out)
 {
-  hapi_gjk cores;
+  hapi_gjk cores = {0};
   if (hapi_gjk_nearest(s->a, s->b, s->normal, &cores)) {
     try_direction(s, cores.normal);
   }

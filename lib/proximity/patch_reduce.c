@@ -21,7 +21,7 @@ static bool covers(const hapi_spot *lower, const hapi_spot *upper, double near)
 static bool covered(const hapi_spot *spots, int count, int i, double near)
 {
   for (int k = 0; k < count; ++k) {
-    bool lower = spots[k].gap < spots[i].gap || (spots[k].gap == spots[i].gap && k < i);
+    bool lower = spots[k].gap < spots[i].gap || (k < i && spots[k].gap == spots[i].gap);
     if (lower && covers(&spots[k], &spots[i], near)) {
       return true;
     }

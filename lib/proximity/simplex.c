@@ -23,7 +23,7 @@ static void weighted(const double base[3], const double *tips[2], const double w
 {
   double sum[3] = {0.0, 0.0, 0.0};
   double edge[3];
-  for (int i = 1; i < count; ++i) {
+  for (int i = 1; i < count && i < 3; ++i) {
     hapi_v3_sub(tips[i - 1], base, edge);
     hapi_v3_madd(sum, weight[i], edge, sum);
   }

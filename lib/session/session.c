@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/thread.h"
+#include "session/frame_clock.h"
 
 const char *hap_model_name(hap_model model)
 {
@@ -55,6 +56,7 @@ void hap_session_destroy(hap_session *session)
   }
   (void)hapi_physics_unlock(session->physics); /* where this thread has it, stop would wait */
   hap_session_stop(session);
+  hapi_physics_close(session->physics);
   hapi_haptic_destroy(session->haptic);
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
@@ -134,6 +136,7 @@ hap_status hap_session_start(hap_session *session)
   hap_status status = begin(session);
   (void)hapi_physics_unlock(session->physics);
   session->started = true;
+  session->starter = pthread_self();
   if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {
     lock_memory(session);
     status = start_threads(session);
@@ -181,35 +184,49 @@ static hap_status outcome(const hap_session *session, uint64_t lost_before)
   return lost ? HAP_BODY_LOST : HAP_OK;
 }
 
-hap_status hap_session_update(hap_session *session, double frame_s)
+static hap_status check_update(hap_session *session, double frame_s)
 {
-  if (session == NULL || !(frame_s >= 0.0) || isinf(frame_s)) {
-    return session == NULL ? HAP_ERROR_ARGUMENT
-                           : hapi_session_fail(session, HAP_ERROR_ARGUMENT,
-                                               "frame_s is %g: not a length of time", frame_s);
+  if (!(frame_s >= 0.0 && frame_s <= HAPI_FRAME_S_MOST)) { /* false for NaN */
+    return hapi_session_fail(
+        session, HAP_ERROR_ARGUMENT,
+        "frame_s is %g: the seconds since the last call, 0 .. %g, are asked for", frame_s,
+        HAPI_FRAME_S_MOST);
   }
   if (!session->started || session->def.drive != HAP_DRIVE_FRAME) {
     return hapi_session_fail(session, HAP_ERROR_STATE,
                              "update belongs to drive FRAME between start and stop");
   }
+  if (pthread_equal(session->starter, pthread_self()) == 0) {
+    return hapi_session_fail(session, HAP_ERROR_THREAD,
+                             "update in another thread than start: call both in the frame loop's");
+  }
   if (!may_run(session)) {
     return hapi_session_fail(session, HAP_ERROR_THREAD,
                              "update in a callback or while this thread holds the lock");
   }
+  return HAP_OK;
+}
+
+hap_status hap_session_update(hap_session *session, double frame_s)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = check_update(session, frame_s);
+  if (status < HAP_OK) {
+    return status;
+  }
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
   double period = hapi_physics_next_period(session->physics);
-  double steps = floor((session->frame_remainder_s + frame_s) / period + 1e-9);
-  /* Of a time so long that its last digits are longer than a step, no remainder is known. */
-  double rest = session->frame_remainder_s + frame_s - steps * period;
-  session->frame_remainder_s = rest > 0.0 && rest < period ? rest : 0.0;
-  int count = steps > 3.0 ? 3 : (int)steps;
-  int64_t period_ns = (int64_t)llround(1e9 * period);
-  for (int i = 0; i < count; ++i) {
-    int64_t now = hapi_clock_now() - (count - 1 - i) * period_ns;
-    hapi_physics_cycle(session->physics, now, now + period_ns);
+  hapi_frame_steps steps =
+      hapi_frame_take(&session->frame_remainder_s, frame_s, period, hapi_clock_now(),
+                      hapi_physics_last_cycle(session->physics));
+  for (int i = 0; i < steps.count; ++i) {
+    int64_t now = steps.first_ns + i * steps.apart_ns;
+    hapi_physics_cycle(session->physics, now, now + (int64_t)llround(1e9 * period));
   }
-  if (steps > 3.0) {
-    hapi_physics_count_dropped_frames(session->physics, (uint64_t)fmin(steps - 3.0, 1e15));
+  if (steps.dropped > 0) {
+    hapi_physics_count_dropped_frames(session->physics, steps.dropped);
     return HAP_DROPPED;
   }
   return outcome(session, lost);
@@ -298,26 +315,65 @@ int64_t hap_session_now(const hap_session *session)
 
 /* ---- the world, between threads ---- */
 
+static hap_status say_why_not_locked(hap_session *session, hap_status status)
+{
+  if (status == HAP_ERROR_THREAD) {
+    return hapi_session_fail(session, status, "%s",
+                             hapi_physics_in_callback(session->physics)
+                                 ? "lock in a callback or a posted edit: there the world may be "
+                                   "touched without it"
+                                 : "lock by a thread that has the lock already: it is not "
+                                   "recursive, unlock first");
+  }
+  return status;
+}
+
 hap_status hap_session_lock(hap_session *session)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, -1);
+  return session == NULL ? HAP_ERROR_ARGUMENT
+                         : say_why_not_locked(session, hapi_physics_lock(session->physics, -1));
 }
 
 hap_status hap_session_try_lock(hap_session *session, int64_t timeout_ns)
 {
-  bool bad = session == NULL || timeout_ns < 0;
-  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_lock(session->physics, timeout_ns);
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (timeout_ns < 0) {
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "timeout_ns is %lld: below 0; hap_session_lock waits without end",
+                             (long long)timeout_ns);
+  }
+  return say_why_not_locked(session, hapi_physics_lock(session->physics, timeout_ns));
 }
 
 hap_status hap_session_unlock(hap_session *session)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT : hapi_physics_unlock(session->physics);
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_physics_unlock(session->physics);
+  return status < HAP_OK
+             ? hapi_session_fail(session, status, "unlock by a thread that does not have the lock")
+             : status;
 }
 
 hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
 {
-  bool bad = session == NULL || edit == NULL;
-  return bad ? HAP_ERROR_ARGUMENT : hapi_physics_post(session->physics, edit, arg);
+  if (session == NULL || edit == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_physics_post(session->physics, edit, arg);
+  if (status == HAP_ERROR_CAPACITY) {
+    return hapi_session_fail(
+        session, status,
+        "256 posted edits wait for the next physics step already; this one was "
+        "not taken");
+  }
+  return status < HAP_OK
+             ? hapi_session_fail(session, status,
+                                 "the session is being destroyed: the edit was not taken")
+             : status;
 }
 
 hap_status hap_session_set_model(hap_session *session, hap_model model)

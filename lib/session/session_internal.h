@@ -36,6 +36,7 @@ struct hap_session {
   uint64_t pass; /* of the contact thread's part, the next one */
 
   double frame_remainder_s; /* FRAME */
+  pthread_t starter;        /* thread of the last start */
 
   pthread_mutex_t detail_lock;
   hap_detail detail;

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <string.h>
 
 #include <hapode/ode.h>
@@ -7,6 +8,14 @@
 #include "base/alloc.h"
 #include "base/log.h"
 #include "session/session_internal.h"
+
+/* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows of at
+ * most 8 MB, which are some ticks apart where that is not enough for all. */
+#define TRAIL_STEPS 8.0
+#define TRAIL_ROWS_MOST 256u
+#define TRAIL_ROWS_LEAST 64u
+#define TRAIL_PLACES 131072u
+#define TRAIL_SPARE 16u
 
 /* What of the session has ODE types: create. The other calls of hapode/ode.h end in
  * lib/physics/adopt.c, through the session's physics. */
@@ -64,6 +73,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .physics_hz = def->physics_hz,
       .haptic_hz = def->haptic_hz,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
+      .frame = def->drive == HAP_DRIVE_FRAME,
       .rt_priority = def->rt_priority,
       .exchange = session->exchange,
       .report = note,
@@ -92,14 +102,22 @@ static hap_status create_contact(hap_session *session, const hapi_capacity *capa
  * that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss two. */
 static hapi_capacity capacity_of(const hap_session_def *def)
 {
-  return (hapi_capacity){
+  hapi_capacity capacity = {
       .bodies = 2 * (uint32_t)def->max_bodies + 16,
       .contacts = (uint32_t)def->max_contacts,
       .pointers = (uint32_t)def->max_pointers,
       .geoms = 8 * (uint32_t)def->max_bodies + 1024,
       .hull_points = (uint32_t)def->max_hull_points,
+      .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
   };
+  while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
+         capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {
+    capacity.trail_rows /= 2;
+  }
+  double ticks = TRAIL_STEPS * def->haptic_hz / def->physics_hz;
+  capacity.trail_stride = (uint32_t)ceil(ticks / (double)(capacity.trail_rows - TRAIL_SPARE));
+  return capacity;
 }
 
 static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap_detail *detail)
@@ -188,8 +206,11 @@ static hap_status may_edit(hap_session *session, const void *object)
     return HAP_ERROR_ARGUMENT;
   }
   if (!hapi_physics_may_edit(session->physics)) {
-    return hapi_session_fail(session, HAP_ERROR_THREAD,
-                             "take hap_session_lock first, or do it in a posted edit");
+    return hapi_session_fail(session, HAP_ERROR_THREAD, "%s",
+                             hapi_physics_in_callback(session->physics)
+                                 ? "not in a surface, direction or moved callback: post an edit, "
+                                   "or do it in before_step or after_step"
+                                 : "take hap_session_lock first, or do it in a posted edit");
   }
   return HAP_OK;
 }
@@ -230,6 +251,15 @@ hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyI
     return HAP_ERROR_ARGUMENT;
   }
   return hapi_physics_poses(session->physics, time_ns, bodies, count, out);
+}
+
+hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
+                                 hap_pose *out)
+{
+  if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return hapi_physics_poses_now(session->physics, bodies, count, out);
 }
 
 hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)

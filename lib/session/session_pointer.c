@@ -110,10 +110,37 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail.text) : status;
 }
 
+static hap_status say_why_not(const hap_session *session, hap_pointer_id pointer, hap_status status)
+{
+  if (status == HAP_ERROR_NOT_FOUND) {
+    return hapi_session_fail(session, status,
+                             "there is no pointer with the id %#llx: it was removed, or it is of "
+                             "another session",
+                             (unsigned long long)pointer.v);
+  }
+  if (status == HAP_ERROR_STATE) {
+    return hapi_session_fail(session, status,
+                             "the pointer has a device, which alone moves it: a target is for one "
+                             "without");
+  }
+  return status;
+}
+
 hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 {
-  return session == NULL ? HAP_ERROR_ARGUMENT
-                         : hapi_haptic_remove_pointer(session->haptic, pointer);
+  return session == NULL
+             ? HAP_ERROR_ARGUMENT
+             : say_why_not(session, pointer, hapi_haptic_remove_pointer(session->haptic, pointer));
+}
+
+hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer)
+{
+  hap_detail detail = {""};
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_haptic_restart_pointer(session->haptic, pointer, &detail);
+  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail.text) : status;
 }
 
 hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
@@ -132,7 +159,27 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                              "the target's twist is not finite or beyond 1e6 m/s or rad/s; the "
                              "pointer stays where it was");
   }
-  return hapi_haptic_set_target(session->haptic, pointer, pose, twist);
+  return say_why_not(session, pointer,
+                     hapi_haptic_set_target(session->haptic, pointer, pose, twist));
+}
+
+hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,
+                             hap_pose *out_proxy, hap_pose *out_device)
+{
+  hap_pose poses[2];
+  if (session == NULL || (out_proxy == NULL && out_device == NULL)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  int64_t drawn_ns = hapi_physics_drawn_time(session->physics, time_ns);
+  int64_t step_ns = (int64_t)(1e9 / session->def.physics_hz);
+  hap_status status = hapi_haptic_pointer_poses(session->haptic, pointer, drawn_ns, step_ns, poses);
+  if (status >= HAP_OK && out_proxy != NULL) {
+    *out_proxy = poses[0];
+  }
+  if (status >= HAP_OK && out_device != NULL) {
+    *out_device = poses[1];
+  }
+  return status;
 }
 
 hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
@@ -148,5 +195,5 @@ hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
     state.size = (uint32_t)size;
     memcpy(out, &state, size);
   }
-  return status;
+  return say_why_not(session, pointer, status);
 }

@@ -25,6 +25,7 @@ typedef struct channel {
 struct hapi_exchange {
   channel channels[CHANNELS];
   hapi_capacity capacity;
+  hapi_trail trail;
   size_t size;
 };
 
@@ -144,6 +145,14 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
       at += sizes[i];
     }
   }
+  e->trail.rows = capacity->trail_rows;
+  e->trail.stride = capacity->trail_stride;
+  e->trail.bodies = capacity->bodies;
+  e->trail.pointers = capacity->pointers;
+  if (hapi_trail_create(&e->trail) < HAP_OK) {
+    hapi_exchange_destroy(e);
+    return HAP_ERROR_MEMORY;
+  }
   hapi_exchange_reset(e);
   *out = e;
   return HAP_OK;
@@ -151,6 +160,9 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
 
 void hapi_exchange_destroy(hapi_exchange *exchange)
 {
+  if (exchange != NULL) {
+    hapi_trail_finish(&exchange->trail);
+  }
   hapi_free(exchange);
 }
 
@@ -164,6 +176,7 @@ void hapi_exchange_reset(hapi_exchange *exchange)
       lay_out((channel_name)i, c->places[k], &exchange->capacity);
     }
   }
+  hapi_trail_reset(&exchange->trail);
 }
 
 static void *back(hapi_exchange *exchange, channel_name name)
@@ -256,6 +269,11 @@ void hapi_exchange_patches_publish(hapi_exchange *exchange)
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
 {
   return take(exchange, PATCHES);
+}
+
+hapi_trail *hapi_exchange_trail(hapi_exchange *exchange)
+{
+  return &exchange->trail;
 }
 
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size)

@@ -11,6 +11,7 @@
 #include <hapode/status.h>
 
 #include "sync/messages.h"
+#include "sync/trail.h"
 
 typedef struct hapi_exchange hapi_exchange;
 
@@ -47,6 +48,9 @@ hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange);
 hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange);
 void hapi_exchange_patches_publish(hapi_exchange *exchange);
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange);
+
+/* [haptic] -> whoever draws. Not in the block: it is written round and round and stays in memory. */
+hapi_trail *hapi_exchange_trail(hapi_exchange *exchange);
 
 /* The whole block, for locking it into memory. */
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size);

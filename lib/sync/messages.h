@@ -28,9 +28,11 @@ typedef struct hapi_capacity {
   uint32_t bodies; /* slots: those of the range, and as many again for what lies around it */
   uint32_t contacts;
   uint32_t pointers;
-  uint32_t geoms;       /* near the pointers */
-  uint32_t hull_points; /* of all of them together */
-  uint32_t joints;      /* between bodies of the range */
+  uint32_t geoms;        /* near the pointers */
+  uint32_t hull_points;  /* of all of them together */
+  uint32_t trail_rows;   /* 0: none are kept */
+  uint32_t trail_stride; /* ticks from row to row */
+  uint32_t joints;       /* between bodies of the range */
 } hapi_capacity;
 
 enum {
@@ -58,6 +60,8 @@ typedef struct hapi_model_body {
   double residual[6]; /* velocity that the linear model missed (eq. 14), running total since the
                          slot's generation began: m/s, rad/s */
 
+  double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
+
   /* Model CONTACT only. */
   double mass;
   double inertia[9];         /* kg m^2, body frame, row-major */
@@ -69,9 +73,8 @@ typedef struct hapi_model_body {
   double linear_threshold2; /* m^2/s^2: damping acts above it */
   double angular_threshold2;
   double max_angular_speed; /* rad/s */
-  double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
-  double gain_taken[6];    /* of hapi_state_body.gain, the same */
-  double response[6][6];   /* MEASURED: velocity change per impulse at the centre, world axes */
+  double gain_taken[6];     /* of hapi_state_body.gain, the same */
+  double response[6][6];    /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;
 
 typedef struct hapi_model_contact {
@@ -163,8 +166,10 @@ typedef struct hapi_model {
   uint64_t number;       /* 1, 2, 3 ... */
   int64_t state_ns;      /* time for which poses, A and b hold */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
-  double blend_s;        /* model IMPULSE, interpolated: how long a body takes to its new pose */
-  double period_s;       /* H, of the next step */
+  int64_t
+      sent_ns; /* drive FRAME: when physics was at work, which may be later than state_ns; else 0 */
+  double blend_s;  /* model IMPULSE, interpolated: how long a body takes to its new pose */
+  double period_s; /* H, of the next step */
   hap_model model;
   hap_impulse_pose impulse_pose;
   uint32_t body_count;

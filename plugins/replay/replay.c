@@ -223,7 +223,14 @@ static void replay_zero(void *self)
 static void replay_stop(void *self)
 {
   replay_device *device = self;
+  hapi_output_zero(&device->output);
   hapi_timeline_stop(&device->timeline);
+}
+
+static void replay_held(void *self, hap_wrench *out)
+{
+  const replay_device *device = self;
+  hapi_output_get(&device->output, out);
 }
 
 const hap_device_ops hapi_replay_ops = {
@@ -242,4 +249,5 @@ const hap_device_ops hapi_replay_ops = {
     .zero = replay_zero,
     .stop = replay_stop,
     .close = replay_close,
+    .held = replay_held,
 };

@@ -314,7 +314,7 @@ static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
   count = count < SUBSTEPS_MAX ? count : SUBSTEPS_MAX;
   double from = device->start + hapi_timeline_seconds(from_ns);
   double length = hapi_timeline_seconds(way_ns) / (double)count;
-  hapi_hand_target target;
+  hapi_hand_target target = {0};
   hapi_motion_at(&device->motion, from, target.position[1], target.velocity[1]);
   for (uint64_t i = 0; i < count; ++i) {
     hapi_v3_copy(target.position[1], target.position[0]);
@@ -438,7 +438,14 @@ static void virtual_zero(void *self)
 static void virtual_stop(void *self)
 {
   virtual_device *device = self;
+  hapi_output_zero(&device->output);
   hapi_timeline_stop(&device->timeline);
+}
+
+static void virtual_held(void *self, hap_wrench *out)
+{
+  const virtual_device *device = self;
+  hapi_output_get(&device->output, out);
 }
 
 void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
@@ -470,4 +477,5 @@ const hap_device_ops hapi_virtual_ops = {
     .zero = virtual_zero,
     .stop = virtual_stop,
     .close = virtual_close,
+    .held = virtual_held,
 };

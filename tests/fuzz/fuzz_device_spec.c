@@ -9,6 +9,7 @@
 #include "tests/fuzz/fuzz.h"
 
 #define REPLAY "replay:"
+#define MODULE "module:"
 
 static const char places[] = "t,x,y,z\n0,0,0,0\n0.5,0.1,0,0\n1,0.1,-0.2,0.3\n";
 static const char poses[] =
@@ -17,9 +18,10 @@ static const char poses[] =
 /* False for a name that could be any file of the machine. */
 static bool is_harmless(const char *spec)
 {
-  size_t length = strlen(REPLAY);
-  return strncmp(spec, REPLAY, length) != 0 ||
-         memchr(spec + length, '/', strcspn(spec + length, ",")) == NULL;
+  size_t length = strcspn(spec, ":");
+  bool file =
+      strncmp(spec, REPLAY, strlen(REPLAY)) == 0 || strncmp(spec, MODULE, strlen(MODULE)) == 0;
+  return !file || memchr(spec + length, '/', strcspn(spec + length, ",")) == NULL;
 }
 
 static void open_recording(const char *recording, const char *rest)

@@ -48,6 +48,9 @@ static void check_def(const hap_session_def *def)
 
 static void check_options(const run_options *options)
 {
+  check_between(options->check.force, 0.0, CONFORM_FORCE_MAX);
+  check_between(options->check.wait_s, 0.0, 3600.0);
+  FUZZ_CHECK(options->check.spec == NULL || options->rig.device_count == 0);
   check_def(&options->rig.def);
   FUZZ_CHECK(options->seconds == 0.0 || options->seconds >= 0.001);
   check_between(options->seconds, 0.0, 86400.0);

@@ -195,6 +195,35 @@ static bool create(source *s, place *p)
   return status >= HAP_OK;
 }
 
+static void check_pose(hap_status status, const hap_pose *pose)
+{
+  FUZZ_CHECK(status >= HAP_OK || status == HAP_ERROR_NOT_FOUND);
+  if (status >= HAP_OK) {
+    const double *q = pose->quat_wxyz;
+    FUZZ_CHECK(hapi_finite(pose->position, 3));
+    FUZZ_CHECK(fabs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) < 1e-6);
+  }
+}
+
+/* Of any time. The cube is known from start to stop. */
+static void check_drawing(const place *p, hap_pointer_id id)
+{
+  int64_t now = hap_session_now(p->session);
+  const int64_t times[] = {INT64_MIN, 0, now - 12345678, now, now + 1, INT64_MAX};
+  for (size_t i = 0; i < sizeof times / sizeof times[0]; ++i) {
+    hap_pose pose;
+    hap_status status = hap_session_poses(p->session, times[i], &p->cube, 1, &pose);
+    FUZZ_CHECK(status >= HAP_OK);
+    check_pose(status, &pose);
+    status = hap_pointer_poses(p->session, id, times[i], &pose, NULL);
+    check_pose(status, &pose);
+    status = hap_pointer_poses(p->session, id, times[i], NULL, &pose);
+    check_pose(status, &pose);
+    FUZZ_CHECK(hap_session_poses_now(p->session, &p->cube, 1, &pose) >= HAP_OK);
+    check_pose(HAP_OK, &pose);
+  }
+}
+
 static void check_state(const place *p, hap_pointer_id id, const hap_pointer_def *def)
 {
   hap_pointer_state state;
@@ -204,6 +233,7 @@ static void check_state(const place *p, hap_pointer_id id, const hap_pointer_def
   FUZZ_CHECK(hapi_finite(dBodyGetPosition(p->cube), 3));
   FUZZ_CHECK(hapi_finite(dBodyGetLinearVel(p->cube), 3));
   FUZZ_CHECK(hapi_finite(dBodyGetAngularVel(p->cube), 3));
+  check_drawing(p, id);
 }
 
 static void move(source *s, const place *p, hap_pointer_id id)

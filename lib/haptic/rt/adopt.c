@@ -224,6 +224,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   tick->blend_s = model->blend_s;
   tick->adopted_ns = now_ns;
   tick->state_ns = model->state_ns;
+  tick->sent_ns = model->sent_ns;
   tick->physics_period = model->period_s;
   tick->watch_count = model->watch_count;
   memcpy(tick->watch_slot, model->watch_slot, sizeof tick->watch_slot);

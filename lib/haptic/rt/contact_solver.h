@@ -51,9 +51,12 @@ typedef struct hapi_row {
 typedef struct hapi_solver {
   hapi_row *rows;
   double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
-  double (*free)[6]; /* in: the same again, stays; for hapi_solver_calm */
+  double (*free)[6]; /* in: the same again, stays; for hubs and hapi_solver_calm */
   uint32_t row_count;
   uint32_t body_count;
+  /* The last bodies of all, always b in their rows: each may touch many others, as light pointers do. An
+   * island about them is solved part by part. */
+  uint32_t hub_count;
   double tolerance;       /* m/s: done when the largest correction of a sweep is below */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
@@ -74,9 +77,9 @@ typedef struct hapi_solver {
 
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */
-#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*4 + (size_t)(bodies)*600)
+#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*6 + (size_t)(bodies)*600)
 
-/* [haptic] Works in rows, v and work only, with 48 kB of stack; bounded by update_budget whatever
+/* [haptic] Works in rows, v and work only, with 56 kB of stack; bounded by update_budget whatever
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 

@@ -233,8 +233,10 @@ static double couplings_store(const hapi_tick *tick)
   return sum;
 }
 
-/* J that the written force gave to the hand since the last tick. */
-static double port_gave(hapi_tick_pointer *p)
+/* J that the written force gave to the hand in the seconds since the last tick. A way that no hand goes
+ * in that time is a jump: nobody put in what it would have cost, and nobody got more than at the
+ * fastest. */
+static double port_gave(hapi_tick_pointer *p, double seconds)
 {
   hapi_guard_pointer *g = &p->guard;
   hapi_v3_sub(p->device_pose.position, g->position, g->moved);
@@ -244,7 +246,12 @@ static double port_gave(hapi_tick_pointer *p)
     g->placed = true;
   }
   double gave = world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
-  return p->jumped ? fmax(gave, 0.0) : gave; /* nobody put in what a jump would have cost */
+  double way = hapi_v3_norm(g->moved);
+  double farthest = p->speed_limit * seconds;
+  if (!p->jumped) {
+    return gave;
+  }
+  return way > farthest ? fmax(gave, 0.0) * farthest / way : fmax(gave, 0.0);
 }
 
 static bool any(const double v[3])
@@ -256,11 +263,13 @@ static bool any(const double v[3])
 static bool settle_ports(hapi_tick *tick)
 {
   bool felt = false;
+  double seconds = 1e-9 * (double)(tick->now_ns - tick->guard.observed_ns);
+  tick->guard.observed_ns = tick->now_ns;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0) {
       felt = felt || any(p->device_wrench.force) || any(p->guard.written.force);
-      tick->guard.balance -= port_gave(p);
+      tick->guard.balance -= port_gave(p, seconds);
     }
   }
   return felt;
@@ -309,7 +318,6 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
  * that lasts, the ledger comes back to what is in the springs. */
 static void settle_debt(hapi_guard_state *guard, double period)
 {
-  guard->balance = fmax(guard->balance, -fmax(guard->stored_max, OVERDRAFT_LEAST));
   guard->touch_s += period;
   if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
     guard->balance += (guard->sprung - guard->balance) * fmin(period / DEBT_S, 1.0);

@@ -71,7 +71,8 @@ static void follow_age(hapi_tick *tick)
 {
   hapi_guard_state *guard = &tick->guard;
   double step = tick->physics_period;
-  double age = 1e-9 * (double)(tick->now_ns - tick->state_ns);
+  int64_t newest = tick->sent_ns > tick->state_ns ? tick->sent_ns : tick->state_ns;
+  double age = 1e-9 * (double)(tick->now_ns - newest);
   double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + tick->period;
   bool stale = tick->model_number != 0 && step > 0.0 && age > limit;
   guard->stale_times += stale && !guard->stale;

@@ -69,7 +69,9 @@ static void begin(hapi_tick *tick)
     begin_body(tick, body, solver->body_count++);
     tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
+  uint32_t first_hub = solver->body_count;
   hapi_proxy_begin(tick);
+  solver->hub_count = solver->body_count - first_hub;
 }
 
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
@@ -379,6 +381,7 @@ void hapi_local_world_step(hapi_tick *tick)
     }
   }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
+    /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): what is live is in the table */
     memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_pointer_forces(tick);

@@ -61,6 +61,75 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   }
 }
 
+/* The loop gave the body something that the world has not had yet. */
+static bool has_news(const hapi_local_body *body)
+{
+  return memcmp(body->impulse, body->given.impulse_taken, sizeof body->impulse) != 0 ||
+         memcmp(body->angular_impulse, body->given.impulse_taken + 3,
+                sizeof body->angular_impulse) != 0;
+}
+
+/* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body that
+ * it does not own and gave nothing takes the world's state then. */
+static bool leads(const hapi_tick *tick, const hapi_local_body *body)
+{
+  if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 || tick->model == HAP_MODEL_IMPULSE) {
+    return false;
+  }
+  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || has_news(body);
+}
+
+static void store(_Atomic double *to, const double *from, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    atomic_store_explicit(&to[i], from[i], memory_order_release);
+  }
+}
+
+static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
+{
+  for (uint32_t i = 0; i < tick->body_high; ++i) {
+    const hapi_local_body *body = &tick->bodies[i];
+    uint32_t generation = leads(tick, body) ? body->generation : 0;
+    if (generation != 0) {
+      store(places[i].pose, body->pose.position, 3);
+      store(places[i].pose + 3, body->pose.quat_wxyz, 4);
+    }
+    atomic_store_explicit(&places[i].generation, generation, memory_order_release);
+  }
+}
+
+static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    store(places[i].proxy, p->pose.position, 3);
+    store(places[i].device, p->handle_position, 3);
+    store(places[i].quat_wxyz, p->pose.quat_wxyz, 4);
+    atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
+    atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
+  }
+}
+
+void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
+{
+  if (trail->rows == 0 || trail->wait > 0) {
+    trail->wait -= trail->wait > 0;
+    return;
+  }
+  trail->wait = trail->stride - 1;
+  uint64_t row = atomic_load_explicit(&trail->written, memory_order_relaxed);
+  hapi_trail_row *head = &trail->heads[row % trail->rows];
+  /* A step goes from the tick's time to the next one's; model SINGLE shows the world as it is. */
+  int64_t step_ns = tick->model == HAP_MODEL_SINGLE ? 0 : (int64_t)(1e9 * tick->period + 0.5);
+  atomic_store_explicit(&head->time_ns, tick->now_ns, memory_order_release);
+  atomic_store_explicit(&head->bodies_ns, tick->now_ns + step_ns, memory_order_release);
+  atomic_store_explicit(&head->body_high, tick->body_high, memory_order_release);
+  trail_bodies(tick, hapi_trail_bodies(trail, row));
+  trail_pointers(tick, hapi_trail_pointers(trail, row));
+  atomic_store_explicit(&trail->written, row + 1, memory_order_release);
+}
+
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
 {
   hapi_poses_body *bodies = hapi_poses_bodies(out);

@@ -40,6 +40,7 @@
 #include "haptic/rt/contact_solver.h"
 #include "haptic/rt/velocity.h"
 #include "sync/messages.h"
+#include "sync/trail.h"
 
 /* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
 #define HAPI_STATE_LIMIT 1e6
@@ -73,6 +74,7 @@ typedef struct hapi_guard_state {
   double stored_max; /* J, largest energy of the pointer springs and owned bodies */
   double sprung;     /* J, sum over the contacts of the last tick */
   double touch_s;    /* s, since something is felt without a break */
+  int64_t observed_ns; /* time of the last tick */
   double given; /* J, of this tick: what contacts with things of given motion did on bodies that
                         the loop owns */
 } hapi_guard_state;
@@ -276,6 +278,7 @@ typedef struct hapi_tick {
   double blend_s;
   int64_t adopted_ns;
   int64_t state_ns;
+  int64_t sent_ns;
   uint32_t watch_count;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];
   double watch_position[HAP_TRACE_BODIES_MAX][3];
@@ -319,6 +322,7 @@ void hapi_guard_cut(hapi_tick_pointer *pointer);
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
+void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
 /* ---- the steps of hapi_tick_run, one file each ---- */

@@ -1,0 +1,142 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench edits: a world that three threads change 60 times a second each under the lock, and a fourth
+ * by posted edits, with sixteen hands in it that come and go. What it shows: the loop goes on, physics
+ * keeps its steps, nobody waits for the lock longer than a step, and no force jumps. */
+
+#include <math.h>
+
+#include "bench/bench.h"
+#include "bench/storm.h"
+
+#define MISSED_SHARE 0.01 /* of the ticks */
+
+typedef struct edits_case {
+  hap_drive drive;
+  hap_model model;
+  const char *drive_name;
+} edits_case;
+
+static const edits_case cases[] = {
+    {HAP_DRIVE_THREADS, HAP_MODEL_CONTACT, "threads"},
+    {HAP_DRIVE_THREADS, HAP_MODEL_ACCELERANCE, "threads"},
+    {HAP_DRIVE_FRAME, HAP_MODEL_CONTACT, "frame"},
+};
+#define CASES (sizeof cases / sizeof cases[0])
+
+static storm_def def_of(const bench *b, const edits_case *what)
+{
+  return (storm_def){.drive = what->drive,
+                     .model = what->model,
+                     .seconds = b->quick ? 2.0 : 60.0,
+                     .physics_hz = 60.0,
+                     .seed = 20111,
+                     .editors = 3,
+                     .editor_hz = 60.0,
+                     .posts = true,
+                     .hands = STORM_SPOTS,
+                     .churn = true,
+                     .rt_priority = 80,
+                     .telling = STORM_TELLS_HALF};
+}
+
+static void write_row(FILE *csv, const edits_case *what, const storm_def *def,
+                      const storm_result *r)
+{
+  const hap_stats *s = &r->stats;
+  fprintf(csv, "%s,%s,%g,%d,%d,%llu,%llu,%llu,%llu,%llu,%llu,%llu,%.4g,%llu,%.4g,%.4g,%.4g,%.4g,",
+          what->drive_name, hap_model_name(what->model), def->seconds, def->hands, def->editors,
+          (unsigned long long)r->edits, (unsigned long long)r->posts_run,
+          (unsigned long long)s->ticks, (unsigned long long)s->missed_ticks,
+          (unsigned long long)s->contact_ticks, (unsigned long long)s->physics_steps,
+          (unsigned long long)s->physics_missed, s->physics_ms_max, (unsigned long long)s->locks,
+          r->wait_ms_p50, r->wait_ms_p99, s->lock_wait_ms_max, s->lock_held_ms_max);
+  fprintf(csv, "%.4g,%.4g,%llu,%llu,%.6g,%.3g,%llu\n", r->peak, r->steepest,
+          (unsigned long long)r->lost, (unsigned long long)r->untold, s->impulse_abs_ns,
+          s->momentum_error_ns, (unsigned long long)r->faults);
+}
+
+static void report(bench *b, const edits_case *what, const storm_def *def, const storm_result *r)
+{
+  const hap_stats *s = &r->stats;
+  /* In drive FRAME physics is an ordinary thread, which others may keep from running. */
+  double step_ms = fmax(1e3 / def->physics_hz, s->physics_ms_max);
+  double missed = (double)s->missed_ticks / (double)(s->ticks + s->missed_ticks);
+  bench_say(
+      "%s, %s, %d hands, %g s: %llu edits, %llu of them by %llu posts; %.0f %% of the ticks in "
+      "contact",
+      what->drive_name, hap_model_name(what->model), def->hands, def->seconds,
+      (unsigned long long)r->edits, (unsigned long long)(2 * r->posts_run),
+      (unsigned long long)r->posts_run, 100.0 * (double)s->contact_ticks / (double)s->ticks);
+  bench_check(b, missed < MISSED_SHARE, "  %llu of %llu ticks missed: %.3f %% (bound %g)%s",
+              (unsigned long long)s->missed_ticks, (unsigned long long)(s->ticks + s->missed_ticks),
+              100.0 * missed, 100.0 * MISSED_SHARE, s->realtime != 0 ? "" : ", without real time");
+  bench_check(b, s->physics_missed == 0,
+              "  %llu of %llu physics steps missed, a cycle %.2f ms at most",
+              (unsigned long long)s->physics_missed,
+              (unsigned long long)(s->physics_steps + s->physics_missed), s->physics_ms_max);
+  bench_check(b, s->lock_wait_ms_max <= step_ms,
+              "  %llu times locked: waits of %.3f ms (median), %.3f (99 %%), %.3f at most (bound "
+              "%.1f, a step or the longest cycle); held %.3f at most",
+              (unsigned long long)s->locks, r->wait_ms_p50, r->wait_ms_p99, s->lock_wait_ms_max,
+              step_ms, s->lock_held_ms_max);
+  bench_check(
+      b, r->bad == 0 && r->unreleased == 0 && r->faults == 0 && r->unexpected == 0,
+      "  %llu forces written: %.2f N at most, steps of %.2f N at most; %llu bad, %llu devices "
+      "not released, %llu faults, %llu wrong answers",
+      (unsigned long long)r->writes, r->peak, r->steepest, (unsigned long long)r->bad,
+      (unsigned long long)r->unreleased, (unsigned long long)r->faults,
+      (unsigned long long)r->unexpected);
+  bench_check(b, s->momentum_error_ns <= 1e-6 * s->impulse_abs_ns,
+              "  momentum: hands gave %.3f N s in all, the world's share is off by %.2g; %llu of "
+              "%llu bodies that went without a word noticed "
+              "(the others had come since the last step)",
+              s->impulse_abs_ns, s->momentum_error_ns, (unsigned long long)r->lost,
+              (unsigned long long)r->untold);
+}
+
+static hap_status draw(bench *b, const storm_result results[CASES])
+{
+  FILE *script = bench_picture_begin(b, "edits", 700, 400);
+  if (script != NULL) {
+    fprintf(script, "$w << EOD\n");
+    for (size_t i = 0; i < CASES; ++i) {
+      const storm_result *r = &results[i];
+      fprintf(script, "\"%s, %s\" %g %g %g\n", cases[i].drive_name, hap_model_name(cases[i].model),
+              r->wait_ms_p50, r->wait_ms_p99, r->stats.lock_wait_ms_max);
+    }
+    fprintf(
+        script,
+        "EOD\nset title 'Waits for the lock while a world is edited'\n"
+        "set style data histograms\nset style fill solid 0.6\nset logscale y\n"
+        "set yrange [1e-5:100]\nset format y '%%g'\nset ylabel 'wait [ms]'\nset key top left\n"
+        "plot $w using 2:xtic(1) title 'median', $w using 3 title '99 %%', "
+        "$w using 4 title 'longest', %g with lines lc rgb '#606060' dt 2 title 'a physics step'\n",
+        1e3 / 60.0);
+  }
+  return bench_picture_end(b, "edits", script);
+}
+
+hap_status bench_edits(bench *b)
+{
+  static storm_result results[CASES];
+  FILE *csv =
+      bench_csv_open(b, "edits",
+                     "drive,model,seconds,hands,editors,edits,posts,ticks,missed_ticks,"
+                     "contact_ticks,physics_steps,physics_missed,physics_ms_max,locks,"
+                     "wait_ms_p50,wait_ms_p99,wait_ms_max,held_ms_max,peak_n,steepest_n,lost,"
+                     "untold,impulse_abs_ns,momentum_error_ns,faults");
+  hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
+  for (size_t i = 0; i < CASES && status >= HAP_OK; ++i) {
+    storm_def def = def_of(b, &cases[i]);
+    status = storm_run(&def, &results[i], &b->detail);
+    if (status >= HAP_OK) {
+      write_row(csv, &cases[i], &def, &results[i]);
+      report(b, &cases[i], &def, &results[i]);
+    }
+  }
+  hap_status closed = bench_csv_close(b, csv);
+  status = status >= HAP_OK ? closed : status;
+  return status >= HAP_OK ? draw(b, results) : status;
+}

@@ -1,0 +1,89 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "physics/physics_internal.h"
+
+/* How far a body reaches from its origin. Measured anew when its geoms have changed: the box around a
+ * geom, which it is taken from, is another one in each orientation. */
+
+static double measure(dBodyID body)
+{
+  const dReal *at = dBodyGetPosition(body);
+  double extent = 0.0;
+  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    dReal box[6];
+    double far2 = 0.0;
+    dGeomGetAABB(geom, box);
+    for (int k = 0; k < 3; ++k) {
+      double low = fabs(box[2 * k] - at[k]);
+      double high = fabs(box[2 * k + 1] - at[k]);
+      double far = low > high ? low : high;
+      far2 += far * far;
+    }
+    extent = far2 > extent * extent ? sqrt(far2) : extent;
+  }
+  return isfinite(extent) ? extent : 0.0;
+}
+
+static uint64_t mix(uint64_t print, uint64_t bits)
+{
+  uint64_t x = (print ^ bits) * 0x9e3779b97f4a7c15u;
+  return x ^ (x >> 29);
+}
+
+static uint64_t mix_numbers(uint64_t print, const double *values, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    uint64_t bits;
+    memcpy(&bits, &values[i], sizeof bits);
+    print = mix(print, bits);
+  }
+  return print;
+}
+
+/* Of the classes whose sizes can be set; the others are known by their address alone. */
+static int sizes_of(dGeomID geom, dVector3 out)
+{
+  switch (dGeomGetClass(geom)) {
+    case dSphereClass:
+      out[0] = dGeomSphereGetRadius(geom);
+      return 1;
+    case dBoxClass:
+      dGeomBoxGetLengths(geom, out);
+      return 3;
+    case dCapsuleClass:
+      dGeomCapsuleGetParams(geom, &out[0], &out[1]);
+      return 2;
+    case dCylinderClass:
+      dGeomCylinderGetParams(geom, &out[0], &out[1]);
+      return 2;
+    default:
+      return 0;
+  }
+}
+
+static uint64_t print_of(dBodyID body)
+{
+  uint64_t print = 1;
+  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    dVector3 sizes = {0};
+    print = mix(print, (uint64_t)(uintptr_t)geom);
+    print = mix_numbers(print, sizes, sizes_of(geom, sizes));
+    if (dGeomIsOffset(geom)) {
+      print = mix_numbers(print, dGeomGetOffsetPosition(geom), 3);
+      print = mix_numbers(print, dGeomGetOffsetRotation(geom), 12);
+    }
+  }
+  return print;
+}
+
+void hapi_extent_follow(hapi_known_body *known)
+{
+  uint64_t print = print_of(known->body);
+  if (print != known->geoms_print) {
+    known->geoms_print = print;
+    known->extent = measure(known->body);
+  }
+}

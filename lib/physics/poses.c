@@ -1,0 +1,410 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/pose.h"
+#include "physics/physics_internal.h"
+
+/* The world's poses for those who draw: a frame of all bodies at each step, and the time that is drawn.
+ *
+ * What is drawn lies behind by a delay: one step H, so that there is a frame after it as well as one
+ * before, or as much longer as frames really come late: physics needs its time to compute them, a frame
+ * loop asks for them when it draws, a world that is too large takes longer than H. A single hitch does not
+ * count. The delay follows slowly, so that the time that is drawn runs neither back nor visibly
+ * faster. */
+
+#define DELAY_MOST 6.0         /* H */
+#define HITCH 0.5              /* H, that a single wait is longer than all others */
+#define DELAY_RISES 0.25       /* s a second: drawn time goes at three quarters of its pace */
+#define DELAY_SINKS 0.05       /* s a second */
+#define FRAMES_APART 0.25      /* H: frames of model SINGLE are kept no closer */
+#define TIME_LIMIT (1LL << 61) /* ns */
+
+static double step_ns(const hapi_physics *physics)
+{
+  return 1e9 / physics->config.physics_hz;
+}
+
+static double delay_at(const hapi_frames *frames, int64_t time_ns)
+{
+  double since = time_ns > frames->delay_from_ns ? (double)(time_ns - frames->delay_from_ns) : 0.0;
+  double gap = frames->delay_wanted_ns - frames->delay_ns;
+  double way = since * (gap > 0.0 ? DELAY_RISES : DELAY_SINKS);
+  return fabs(gap) <= way ? frames->delay_wanted_ns : frames->delay_ns + copysign(way, gap);
+}
+
+/* The largest wait for a frame among the last ones; one that stands out is a hitch and does not count. */
+static double usual_wait(const hapi_frames *frames, double step)
+{
+  double largest = 0.0;
+  double second = 0.0;
+  for (unsigned i = 0; i < HAPI_WAITS; ++i) {
+    double wait = frames->waits_ns[i];
+    second = fmax(second, fmin(wait, largest));
+    largest = fmax(largest, wait);
+  }
+  return largest - second > HITCH * step ? second : largest;
+}
+
+static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
+{
+  double wait = (double)(known_ns - frames->stamps[(frames->count - 1) % HAPI_FRAMES]);
+  frames->waits_ns[frames->wait_count++ % HAPI_WAITS] = wait;
+  frames->delay_ns = delay_at(frames, known_ns);
+  frames->delay_from_ns = known_ns;
+  frames->delay_wanted_ns = fmin(fmax(usual_wait(frames, step), step), DELAY_MOST * step);
+}
+
+/* Number of the frame for stamp_ns. One that is not later than those before takes their place, as a
+ * change of model leads to. In model SINGLE, whose steps would soon use up the ring, a frame goes when the
+ * next one comes unless it is some way behind the one before; elsewhere that would show, where a late
+ * frame loop leaves two steps close together. */
+static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
+{
+  hapi_frames *frames = &physics->frames;
+  double step = step_ns(physics);
+  if (frames->count == 0) {
+    frames->delay_ns = frames->delay_wanted_ns = step;
+    frames->delay_from_ns = known_ns;
+  } else {
+    follow_waits(frames, step, known_ns);
+  }
+  while (frames->count > frames->oldest &&
+         frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
+    --frames->count;
+  }
+  if (physics->model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
+    int64_t newest = frames->stamps[(frames->count - 1) % HAPI_FRAMES];
+    int64_t before = frames->stamps[(frames->count - 2) % HAPI_FRAMES];
+    frames->count -= (double)(newest - before) < FRAMES_APART * step;
+  }
+  uint64_t frame = frames->count++;
+  frames->stamps[frame % HAPI_FRAMES] = stamp_ns;
+  if (frame >= frames->oldest + HAPI_FRAMES) {
+    frames->oldest = frame + 1 - HAPI_FRAMES;
+  }
+  return frame;
+}
+
+void hapi_pose_read(dBodyID body, hap_pose *out)
+{
+  hapi_v3_copy(dBodyGetPosition(body), out->position);
+  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+}
+
+bool hapi_pose_is_sound(dBodyID body)
+{
+  return hapi_finite(dBodyGetPosition(body), 3) && hapi_finite(dBodyGetQuaternion(body), 4);
+}
+
+/* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it exactly. */
+static bool led_by_loop(const hapi_physics *physics, const hapi_known_body *known)
+{
+  bool pushed = physics->model == HAP_MODEL_ACCELERANCE || physics->model == HAP_MODEL_CONTACT;
+  pushed = pushed && known->slot != HAPI_NONE && physics->bodies[known->slot].pushed;
+  return known->loop_owned || pushed;
+}
+
+static void note_slot(const hapi_physics *physics, const hapi_known_body *known, hapi_drawn *drawn)
+{
+  if (known->slot == HAPI_NONE) {
+    return;
+  }
+  uint32_t generation = physics->bodies[known->slot].generation;
+  if (drawn->slots[0] != known->slot || drawn->generations[0] != generation) {
+    drawn->slots[1] = drawn->slots[0];
+    drawn->generations[1] = drawn->generations[0];
+    drawn->slots[0] = known->slot;
+    drawn->generations[0] = generation;
+  }
+}
+
+static void add_pose(const hapi_physics *physics, uint32_t index, uint64_t frame)
+{
+  const hapi_known_body *known = &physics->table.entries[index];
+  hapi_drawn *drawn = &physics->table.drawn[index];
+  uint32_t bit = 1u << (frame % HAPI_FRAMES);
+  if (hapi_pose_is_sound(known->body)) {
+    hapi_pose_read(known->body, &drawn->poses[frame % HAPI_FRAMES]);
+    drawn->first = drawn->first > frame ? frame : drawn->first;
+  } else if (drawn->first < frame) {
+    drawn->poses[frame % HAPI_FRAMES] = drawn->poses[(frame - 1) % HAPI_FRAMES];
+  }
+  drawn->led = led_by_loop(physics, known) ? drawn->led | bit : drawn->led & ~bit;
+  note_slot(physics, known, drawn);
+}
+
+void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
+{
+  pthread_mutex_lock(&physics->poses_lock);
+  uint64_t frame = next_frame(physics, stamp_ns, known_ns);
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    if (physics->table.entries[i].body != NULL) {
+      add_pose(physics, i, frame);
+    }
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+}
+
+void hapi_poses_begin(hapi_physics *physics, uint32_t index)
+{
+  hapi_drawn *drawn = &physics->table.drawn[index];
+  uint64_t count = physics->frames.count;
+  memset(drawn, 0, sizeof *drawn);
+  drawn->first = count;
+  if (count > 0) {
+    add_pose(physics, index, count - 1);
+  }
+}
+
+void hapi_poses_reset(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->poses_lock);
+  memset(&physics->frames, 0, sizeof physics->frames);
+  for (uint32_t i = 0; i < physics->table.high; ++i) {
+    memset(&physics->table.drawn[i], 0, sizeof physics->table.drawn[i]);
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+}
+
+/* ---- drawing ---- */
+
+typedef struct drawing {
+  const hapi_physics *physics;
+  const hapi_frames *frames;
+  hapi_trail_view rows;
+  int64_t time_ns;
+  uint64_t row;         /* first one later than time_ns */
+  uint64_t frame;       /* the same of the frames */
+  uint64_t frame_first; /* that is kept */
+  bool newest;          /* beyond the last frame bodies go on as they went */
+} drawing;
+
+typedef struct sample {
+  int64_t time_ns;
+  uint64_t frame; /* count: not of a frame but of the trail */
+  hap_pose pose;
+} sample;
+
+static int64_t stamp_of(const drawing *d, uint64_t frame)
+{
+  return d->frames->stamps[frame % HAPI_FRAMES];
+}
+
+static bool is_led(const hapi_drawn *drawn, uint64_t frame)
+{
+  return (drawn->led >> (frame % HAPI_FRAMES) & 1u) != 0;
+}
+
+static void sample_frame(const drawing *d, const hapi_drawn *drawn, uint64_t frame, sample *out)
+{
+  out->time_ns = stamp_of(d, frame);
+  out->frame = frame;
+  out->pose = drawn->poses[frame % HAPI_FRAMES];
+}
+
+static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample *out)
+{
+  for (int i = 0; i < 2; ++i) {
+    if (drawn->generations[i] != 0 &&
+        hapi_trail_body_at(&d->rows, row, drawn->slots[i], drawn->generations[i], &out->pose)) {
+      out->time_ns = hapi_trail_time(&d->rows, row, HAPI_TRAIL_BODIES);
+      out->frame = d->frames->count;
+      return true;
+    }
+  }
+  return false;
+}
+
+/* The newest that is known of the body up to the time: in the trail, or in a frame where that is later. A
+ * frame that only repeats the loop is no better than the trail; it stands in where that does not
+ * reach. */
+static bool find_before(drawing *d, const hapi_drawn *drawn, sample *out)
+{
+  uint64_t first = drawn->first > d->frame_first ? drawn->first : d->frame_first;
+  uint64_t frame = d->frame;
+  while (frame > first && is_led(drawn, frame - 1)) {
+    --frame;
+  }
+  int64_t floor_ns = frame > first ? stamp_of(d, frame - 1) : INT64_MIN;
+  for (uint64_t row = drawn->generations[0] != 0 ? d->row : d->rows.first;
+       row > d->rows.first && hapi_trail_time(&d->rows, row - 1, HAPI_TRAIL_BODIES) > floor_ns;
+       --row) {
+    if (sample_row(d, drawn, row - 1, out)) {
+      return true;
+    }
+  }
+  if (d->frame > first) {
+    sample_frame(d, drawn, d->frame - 1, out);
+  }
+  return d->frame > first;
+}
+
+/* The next that is known of it after the time, in the same way. */
+static bool find_after(drawing *d, const hapi_drawn *drawn, sample *out)
+{
+  uint64_t next = d->frame > drawn->first ? d->frame : drawn->first;
+  uint64_t frame = next;
+  while (frame < d->frames->count && is_led(drawn, frame)) {
+    ++frame;
+  }
+  int64_t ceiling_ns = frame < d->frames->count ? stamp_of(d, frame) : INT64_MAX;
+  for (uint64_t row = drawn->generations[0] != 0 ? d->row : d->rows.end;
+       row < d->rows.end && hapi_trail_time(&d->rows, row, HAPI_TRAIL_BODIES) < ceiling_ns; ++row) {
+    if (sample_row(d, drawn, row, out)) {
+      return true;
+    }
+  }
+  if (next < d->frames->count) {
+    sample_frame(d, drawn, frame < d->frames->count ? frame : next, out);
+  }
+  return next < d->frames->count;
+}
+
+/* From the last but one frame through the last one, for one step at most. */
+static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last, hap_pose *out)
+{
+  uint64_t before = last->frame - 1;
+  bool known = d->newest && last->frame < d->frames->count && last->frame > d->frame_first &&
+               last->frame > drawn->first && !is_led(drawn, before);
+  if (!known) {
+    *out = last->pose;
+    return;
+  }
+  double interval = (double)(last->time_ns - stamp_of(d, before));
+  double since = fmin((double)(d->time_ns - last->time_ns), step_ns(d->physics));
+  hapi_pose_slerp(&drawn->poses[before % HAPI_FRAMES], &last->pose, 1.0 + since / interval, out);
+}
+
+static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
+{
+  sample before = {0};
+  sample after = {0};
+  bool has_before = find_before(d, drawn, &before);
+  if (!find_after(d, drawn, &after)) {
+    go_on(d, drawn, &before, out); /* a body has one sample at least */
+    return;
+  }
+  if (!has_before) {
+    *out = after.pose;
+    return;
+  }
+  double way = (double)(after.time_ns - before.time_ns);
+  double share = way > 0.0 ? (double)(d->time_ns - before.time_ns) / way : 0.0;
+  hapi_pose_slerp(&before.pose, &after.pose, fmin(fmax(share, 0.0), 1.0), out);
+}
+
+static void seek(drawing *d)
+{
+  const hapi_frames *frames = d->frames;
+  d->frame_first = frames->oldest;
+  d->frame = frames->count;
+  while (d->frame > d->frame_first && stamp_of(d, d->frame - 1) > d->time_ns) {
+    --d->frame;
+  }
+  d->row = hapi_trail_after(&d->rows, d->time_ns, HAPI_TRAIL_BODIES);
+}
+
+static int64_t newest_time(drawing *d)
+{
+  return d->rows.end > d->rows.first ? hapi_trail_time(&d->rows, d->rows.end - 1, HAPI_TRAIL_BODIES)
+                                     : stamp_of(d, d->frames->count - 1);
+}
+
+static int64_t drawn_time(const hapi_frames *frames, int64_t time_ns)
+{
+  int64_t time = time_ns > TIME_LIMIT ? TIME_LIMIT : time_ns < -TIME_LIMIT ? -TIME_LIMIT : time_ns;
+  return time - (int64_t)llround(delay_at(frames, time));
+}
+
+/* late_steps: from the last frame, that are in order. */
+static hap_status judge(const drawing *d, double late_steps)
+{
+  const hapi_frames *frames = d->frames;
+  double late = (double)(d->time_ns - stamp_of(d, frames->count - 1));
+  if (late > late_steps * step_ns(d->physics)) {
+    return HAP_STALE;
+  }
+  int64_t oldest_ns = stamp_of(d, d->frame_first);
+  /* At the start what lies a delay behind is before the first frame, and the same as it. */
+  double slack = d->frame_first == 0 ? delay_at(frames, oldest_ns) : 0.0;
+  return (double)(oldest_ns - d->time_ns) > slack ? HAP_CLAMPED : HAP_OK;
+}
+
+static bool all_known(const hapi_physics *physics, struct dxBody *const *bodies, size_t count)
+{
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
+    if (index == HAPI_NONE || physics->table.drawn[index].first >= physics->frames.count) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* False: the trail went on so far meanwhile that what was read of it may be torn. */
+static bool draw_all(drawing *d, struct dxBody *const *bodies, size_t count, hap_pose *out)
+{
+  seek(d);
+  for (size_t i = 0; i < count; ++i) {
+    draw(d, &d->physics->table.drawn[hapi_bodies_find(&d->physics->table, bodies[i])], &out[i]);
+  }
+  return hapi_trail_is_whole(&d->rows);
+}
+
+static drawing begin(const hapi_physics *physics)
+{
+  return (drawing){.physics = physics,
+                   .frames = &physics->frames,
+                   .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
+}
+
+hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
+                              size_t count, hap_pose *out)
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->poses_lock);
+  bool known = all_known(physics, bodies, count);
+  for (bool whole = !known || count == 0; !whole;) {
+    drawing d = begin(physics);
+    d.time_ns = drawn_time(&physics->frames, time_ns);
+    whole = draw_all(&d, bodies, count, out);
+    status = judge(&d, 1.0);
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+  return known ? status : HAP_ERROR_NOT_FOUND;
+}
+
+hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
+                                  hap_pose *out)
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->poses_lock);
+  bool known = all_known(physics, bodies, count);
+  for (bool whole = !known || count == 0; !whole;) {
+    drawing d = begin(physics);
+    d.newest = true;
+    d.time_ns = newest_time(&d);
+    whole = draw_all(&d, bodies, count, out);
+    status = judge(&d, 2.0);
+  }
+  pthread_mutex_unlock(&physics->poses_lock);
+  return known ? status : HAP_ERROR_NOT_FOUND;
+}
+
+int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)
+{
+  pthread_mutex_lock(&physics->poses_lock);
+  int64_t time = drawn_time(&physics->frames, time_ns);
+  pthread_mutex_unlock(&physics->poses_lock);
+  return time;
+}
+
+double hapi_poses_delay(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->poses_lock);
+  double delay = 1e-9 * physics->frames.delay_ns;
+  pthread_mutex_unlock(&physics->poses_lock);
+  return delay;
+}

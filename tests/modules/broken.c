@@ -1,0 +1,405 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* A device that is right in all, dof 6, but for what its argument says: "break=NAME". A module, like
+ * those that people write. break=none: nothing is wrong. */
+
+#define _POSIX_C_SOURCE 200809L
+
+#include <hapode/device_impl.h>
+
+#include <fcntl.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define FORCE_MAX 10.0
+#define TORQUE_MAX 0.5
+#define SMALL_FORCE 1.0 /* N, that no check may go beyond without being told to */
+#define TURN 0.3        /* rad */
+#define RATE 12.0       /* rad/s */
+
+typedef struct broken {
+  char fault[40];
+  bool started;
+  int starts;
+  int reads;
+  int reads_pushed; /* since the first force */
+  int64_t first_ns;
+  int64_t before_ns;
+  hap_wrench held;
+  bool pushed; /* since it was opened */
+  atomic_bool zeroed;
+  atomic_bool disturbed;
+  pthread_t loop;
+  pthread_mutex_t lock;
+} broken;
+
+static hap_device_ops ops;
+static hap_wrench shared;       /* of all devices, where that is the fault */
+static hap_wrench of_last_life; /* likewise */
+static int closes;
+
+static const hap_wrench some = {{1.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+
+static bool is(const broken *d, const char *fault)
+{
+  return strcmp(d->fault, fault) == 0;
+}
+
+static void rest_ms(double ms)
+{
+  const struct timespec time = {0, (long)(1e6 * ms)};
+  nanosleep(&time, NULL);
+}
+
+static int64_t clock_now(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+static void *wait_for_ever(void *unused)
+{
+  for (;;) {
+    rest_ms(500.0);
+  }
+  return unused;
+}
+
+static void leak(const broken *d)
+{
+  pthread_t thread;
+  static void *volatile kept;
+  if (is(d, "leak_memory")) {
+    kept = malloc(5000);
+    memset(kept, 1, 5000);
+  } else if (is(d, "leak_file")) {
+    (void)!open("/dev/null", O_RDONLY);
+  } else if (is(d, "leak_thread")) {
+    (void)pthread_create(&thread, NULL, wait_for_ever, NULL);
+  }
+}
+
+static void hold(broken *d, const hap_wrench *wrench)
+{
+  d->held = *wrench;
+  if (is(d, "shared")) {
+    shared = *wrench;
+  }
+  atomic_store(&d->zeroed, false);
+}
+
+/* ---- operations ---- */
+
+static hap_status broken_open(const char *args, void **self, hap_detail *detail)
+{
+  static const char key[] = "break=";
+  broken *d = calloc(1, sizeof *d);
+  if (d == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  const char *fault = strncmp(args, key, strlen(key)) == 0 ? args + strlen(key) : "none";
+  snprintf(d->fault, sizeof d->fault, "%.*s", (int)strcspn(fault, ","), fault);
+  const char *rest = strchr(fault, ',');
+  ops.help = is(d, "help_of_two_lines") ? "two\nlines" : "a device for tests: break=NAME";
+  if (rest != NULL && strcmp(rest, ",pacing=host") == 0) {
+    ops.pacing = HAP_PACING_HOST;
+  } else if (rest != NULL && strcmp(rest, ",pacing=device") == 0) {
+    ops.pacing = HAP_PACING_DEVICE;
+  } else if (rest != NULL && !is(d, "takes_any_argument")) {
+    snprintf(detail->text, sizeof detail->text, "%s",
+             is(d, "silent_refusal") ? "" : "there is no such argument");
+    *self = is(d, "self_of_failure") ? &shared : NULL;
+    free(d);
+    return HAP_ERROR_ARGUMENT;
+  }
+  pthread_mutex_init(&d->lock, NULL);
+  atomic_init(&d->zeroed, true);
+  if (is(d, "force_at_open")) {
+    hold(d, &some);
+  } else if (is(d, "force_of_last_life") && closes > 0) {
+    hold(d, &of_last_life);
+  }
+  leak(d);
+  *self = d;
+  return HAP_OK;
+}
+
+static void broken_describe(void *self, hap_device_info *out)
+{
+  const broken *d = self;
+  out->dof = 6;
+  out->max_force = is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
+  out->max_torque = TORQUE_MAX;
+  out->measures_velocity = is(d, "measures_twice") ? 2 : 1;
+}
+
+static hap_status broken_start(void *self)
+{
+  broken *d = self;
+  ++d->starts;
+  if (is(d, "start_fails") || (is(d, "starts_once") && d->starts > 1) ||
+      (is(d, "unplugged_for_ever") && d->reads > 500) ||
+      (is(d, "unplugged") && d->reads > 0 && d->starts < 4)) {
+    return HAP_ERROR_DEVICE;
+  }
+  if (is(d, "start_resumes") && d->starts > 1) {
+    atomic_store(&d->zeroed, false);
+  }
+  if (is(d, "force_at_start")) {
+    hold(d, &some);
+  }
+  d->loop = pthread_self();
+  d->first_ns = 0;
+  d->pushed = d->pushed && !is(d, "zero_is_for_ever");
+  d->started = true;
+  return HAP_OK;
+}
+
+/* A sine along x, y and about z. */
+static void move(const broken *d, double t, hap_pose *pose, hap_twist *twist)
+{
+  double s = sin(RATE * t);
+  double c = RATE * cos(RATE * t);
+  double wrong = is(d, "twist_is_double") ? 2.0 : is(d, "twist_is_against") ? -1.0 : 1.0;
+  double turned = is(d, "twist_in_degrees") ? 57.3 : 1.0;
+  double scale = is(d, "quaternion_is_not_unit") ? 1.01 : 1.0;
+  *pose = (hap_pose){{0.02 * s, 0.01 * s, 0.0},
+                     {scale * cos(0.5 * TURN * s), 0.0, 0.0, scale * sin(0.5 * TURN * s)}};
+  *twist = (hap_twist){{wrong * 0.02 * c, wrong * 0.01 * c, 0.0}, {0.0, 0.0, turned * TURN * c}};
+}
+
+static hap_status status_of_read(broken *d, int64_t time_ns)
+{
+  bool late = d->before_ns != 0 && time_ns - d->before_ns > 200000000;
+  d->before_ns = time_ns;
+  if (!d->started && !is(d, "read_before_start") && !(is(d, "read_after_stop") && d->starts > 0)) {
+    return HAP_ERROR_STATE;
+  }
+  if ((is(d, "pause_is_fatal") && late) || (is(d, "read_fails") && d->reads > 200) ||
+      (is(d, "zero_disturbs") && atomic_load(&d->disturbed)) ||
+      ((is(d, "unplugged") || is(d, "unplugged_for_ever")) && d->starts == 1 && d->reads > 500)) {
+    return HAP_ERROR_DEVICE;
+  }
+  return is(d, "odd_status") ? (hap_status)42 : HAP_OK;
+}
+
+static void spoil_read(const broken *d, hap_pose *pose, hap_twist *twist)
+{
+  const double nan = (double)NAN;
+  if (is(d, "pose_is_nan") && d->reads % 50 == 49) {
+    pose->position[1] = nan;
+  } else if (is(d, "pose_is_far")) {
+    pose->position[0] = 1e30;
+  } else if (is(d, "runs_away")) {
+    pose->position[2] += 5e-4 * d->reads_pushed;
+  } else if (is(d, "twist_is_nan")) {
+    twist->angular[2] = nan;
+  } else if (is(d, "jumps") && d->reads % 100 == 99) {
+    pose->position[0] += 0.2;
+  } else if (is(d, "read_is_slow")) {
+    rest_ms(ops.pacing == HAP_PACING_DEVICE ? 2.5 : 1.5);
+  } else if (is(d, "read_hangs")) {
+    rest_ms(990.0);
+    (void)wait_for_ever(NULL);
+  }
+}
+
+static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
+                              uint32_t *buttons)
+{
+  broken *d = self;
+  hap_pose here;
+  if (is(d, "zero_locks")) {
+    pthread_mutex_lock(&d->lock);
+    rest_ms(0.3);
+    pthread_mutex_unlock(&d->lock);
+  }
+  if (ops.pacing == HAP_PACING_DEVICE && d->started) {
+    rest_ms(0.9); /* its own clock */
+    time_ns = clock_now();
+  }
+  hap_status status = status_of_read(d, time_ns);
+  if (status < HAP_OK) {
+    return status;
+  }
+  d->first_ns = d->first_ns == 0 ? time_ns : d->first_ns;
+  ++d->reads;
+  d->reads_pushed += d->pushed;
+  move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, twist);
+  spoil_read(d, &here, twist);
+  if (is(d, "pose_is_not_filled_in")) {
+    memcpy(pose->position, here.position, sizeof here.position);
+  } else {
+    *pose = here;
+  }
+  if (!is(d, "buttons_are_not_filled_in")) {
+    *buttons = 0;
+  }
+  return status;
+}
+
+static double norm(const double v[3])
+{
+  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static bool shorten(const broken *d, double v[3], double limit)
+{
+  bool beyond = norm(v) > limit;
+  if (is(d, "no_limit")) {
+    return beyond;
+  }
+  double scale = beyond ? limit / norm(v) : 1.0;
+  for (int i = 0; i < 3; ++i) {
+    v[i] = is(d, "limit_per_axis") ? fmin(fmax(v[i], -0.5 * limit), 0.5 * limit) : scale * v[i];
+  }
+  return beyond;
+}
+
+static bool is_finite(const hap_wrench *w)
+{
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    sum += 0.0 * w->force[i] + 0.0 * w->torque[i];
+  }
+  return sum == 0.0;
+}
+
+static hap_status check_write(broken *d, const hap_wrench *wanted)
+{
+  bool finite = is_finite(wanted);
+  if (!d->started && !is(d, "write_before_start") &&
+      !(is(d, "write_after_stop") && d->starts > 0)) {
+    return HAP_ERROR_STATE;
+  }
+  if ((is(d, "runs_away") && d->reads_pushed > 110 && norm(wanted->force) > 0.0) ||
+      (is(d, "refuses_all_force") && norm(wanted->force) + norm(wanted->torque) > 0.0) ||
+      (is(d, "refuses_much_force") && !(finite && norm(wanted->force) <= SMALL_FORCE))) {
+    puts("# it was asked for what this check must not ask for");
+    return HAP_ERROR_DEVICE;
+  }
+  if (is(d, "zero_is_for_ever") && atomic_load(&d->zeroed) && d->pushed) {
+    return HAP_ERROR_DEVICE;
+  }
+  if (!finite && is(d, "nan_is_held")) {
+    hold(d, &some);
+  }
+  return finite || is(d, "nan_is_taken") ? HAP_OK : HAP_ERROR_ARGUMENT;
+}
+
+static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+{
+  broken *d = self;
+  hap_status status = check_write(d, wanted);
+  if (status < HAP_OK) {
+    return status;
+  }
+  hap_wrench given = *wanted;
+  double factor = is(d, "gives_double") ? 2.0 : is(d, "gives_against") ? -1.0 : 1.0;
+  for (int i = 0; i < 3; ++i) {
+    given.force[i] *= factor;
+    given.torque[i] *= factor;
+  }
+  bool saturated = shorten(d, given.force, FORCE_MAX);
+  saturated = shorten(d, given.torque, TORQUE_MAX) || saturated;
+  d->pushed = d->pushed || norm(given.force) > 0.0;
+  if (!is(d, "reached_is_not_filled_in")) {
+    *reached = given;
+  }
+  if (is(d, "reached_is_a_lie")) {
+    for (int i = 0; i < 3; ++i) {
+      given.force[i] *= 0.5;
+    }
+  }
+  hold(d, &given);
+  if (is(d, "write_is_slow")) {
+    rest_ms(1.5);
+  }
+  return saturated && !is(d, "limit_is_not_said") ? HAP_SATURATED : HAP_OK;
+}
+
+static void broken_zero(void *self)
+{
+  broken *d = self;
+  if (is(d, "zero_locks")) {
+    pthread_mutex_lock(&d->lock);
+    pthread_mutex_unlock(&d->lock);
+  } else if (is(d, "zero_is_slow")) {
+    rest_ms(1.5);
+  } else if (is(d, "zero_disturbs") && d->started && !pthread_equal(d->loop, pthread_self())) {
+    atomic_store(&d->disturbed, true);
+  } else if (is(d, "zero_does_nothing") && d->started) {
+    return;
+  } else if (is(d, "shared")) {
+    memset(&shared, 0, sizeof shared);
+  }
+  atomic_store(&d->zeroed, true);
+}
+
+static void broken_stop(void *self)
+{
+  broken *d = self;
+  bool again = !d->started && d->starts > 0;
+  if (!is(d, "stop_keeps_force")) {
+    broken_zero(self);
+  }
+  d->started = false;
+  if ((is(d, "second_stop_gives_force") && again) ||
+      (is(d, "stop_before_start_gives_force") && d->starts == 0)) {
+    hold(d, &some);
+  } else if (is(d, "zero_does_nothing")) {
+    atomic_store(&d->zeroed, true);
+  }
+}
+
+static void broken_close(void *self)
+{
+  broken *d = self;
+  if (d->pushed) {
+    of_last_life = some;
+    ++closes;
+  }
+  pthread_mutex_destroy(&d->lock);
+  free(d);
+}
+
+static void broken_held(void *self, hap_wrench *out)
+{
+  const broken *d = self;
+  memset(out, 0, sizeof *out);
+  if (is(d, "shared")) {
+    *out = shared;
+  } else if (!atomic_load(&d->zeroed)) {
+    *out = d->held;
+  }
+}
+
+static hap_device_ops ops = {
+    .abi = HAP_DEVICE_ABI,
+    .size = sizeof(hap_device_ops),
+    .name = "broken",
+    .pacing = HAP_PACING_VIRTUAL,
+    .open = broken_open,
+    .describe = broken_describe,
+    .start = broken_start,
+    .read = broken_read,
+    .write = broken_write,
+    .zero = broken_zero,
+    .stop = broken_stop,
+    .close = broken_close,
+    .held = broken_held,
+};
+
+const hap_device_ops *hapode_device_module(uint32_t host_abi)
+{
+  (void)host_abi;
+  return &ops;
+}

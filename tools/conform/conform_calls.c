@@ -1,0 +1,335 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "tools/conform/conform_internal.h"
+
+#include <dlfcn.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/vec.h"
+#include "device/device.h"
+#include "device/emergency.h"
+
+#define SHARE 0.05       /* of the device's own limits that the small force may be */
+#define TORQUE_ARM 0.01  /* m: small torque by small force */
+#define GRAIN 1e-6       /* N, N m: below it is no force */
+#define TRAVEL_MOST 0.05 /* m, under the small force, from where it began */
+
+bool conform_is_virtual(const conform *c)
+{
+  return c->ops->pacing == HAP_PACING_VIRTUAL;
+}
+
+double conform_period(const conform *c)
+{
+  return 1.0 / c->options->rate_hz;
+}
+
+bool conform_status_is_known(hap_status status)
+{
+  return status >= HAP_ERROR_SYSTEM && status <= HAP_FAULTED;
+}
+
+/* ---- open to close ---- */
+
+/* A module that leaves a thread behind would take the check with it when its code goes. */
+static void keep_code(const conform *c)
+{
+  Dl_info info;
+  void *address = NULL;
+  memcpy(&address, &c->ops->zero, sizeof address);
+  if (dladdr(address, &info) != 0) {
+    (void)dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE);
+  }
+}
+
+bool conform_open(conform *c, hap_detail *detail)
+{
+  conform_enter("open", CONFORM_BLOCK_LIMIT_S);
+  hap_status status = hap_device_open(c->options->spec, &c->device, detail);
+  conform_leave();
+  if (status < HAP_OK) {
+    return false;
+  }
+  c->ops = hapi_device_ops(c->device);
+  c->self = hapi_device_self(c->device);
+  c->info = *hapi_device_info(c->device);
+  keep_code(c);
+  return true;
+}
+
+void conform_close(conform *c)
+{
+  if (c->device == NULL) {
+    return;
+  }
+  if (c->running) {
+    conform_zero(c);
+    conform_stop(c);
+  }
+  conform_enter("close", CONFORM_BLOCK_LIMIT_S);
+  hap_device_close(c->device);
+  conform_leave();
+  c->device = NULL;
+}
+
+hap_status conform_start(conform *c)
+{
+  conform_enter("start", CONFORM_BLOCK_LIMIT_S);
+  hap_status status = c->ops->start(c->self);
+  conform_leave();
+  if (status < HAP_OK) {
+    return status;
+  }
+  c->running = true;
+  c->bounded = false;
+  (void)hapi_emergency_add(c->ops, c->self); /* so that signals take its force off */
+  c->begin_ns = conform_is_virtual(c) ? 0 : hapi_clock_now();
+  c->now_ns = c->begin_ns;
+  c->tick = 0;
+  return status;
+}
+
+void conform_stop(conform *c)
+{
+  if (c->running) {
+    hapi_emergency_remove(c->ops, c->self);
+    c->running = false;
+  }
+  conform_enter("stop", CONFORM_BLOCK_LIMIT_S);
+  c->ops->stop(c->self);
+  conform_leave();
+}
+
+/* ---- calls of a tick ---- */
+
+void conform_zero(conform *c)
+{
+  conform_enter("zero", CONFORM_TICK_LIMIT_S);
+  int64_t begin_ns = hapi_clock_now();
+  c->ops->zero(c->self);
+  hapi_histogram_add(&c->zeros, hapi_clock_now() - begin_ns);
+  conform_leave();
+}
+
+static void judge(conform *c, hap_status status, const conform_sample *s, bool buttons)
+{
+  const double *q = s->pose.quat_wxyz;
+  double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  ++c->read_count;
+  c->wrong.statuses += status < HAP_OK || !conform_status_is_known(status);
+  if (status < HAP_OK) {
+    return;
+  }
+  c->wrong.poses += !(hapi_finite(s->pose.position, 3) && fabs(square - 1.0) < 1e-6);
+  c->wrong.twists += !(hapi_finite(s->twist.linear, 3) && hapi_finite(s->twist.angular, 3));
+  c->wrong.buttons += !buttons;
+}
+
+hap_status conform_read(conform *c, conform_sample *out)
+{
+  uint32_t poison = c->read_count % 2 == 0 ? 0x5a5a5a5au : 0xa5a5a5a5u;
+  uint32_t buttons = poison;
+  memset(out, 0xff, sizeof *out); /* not a number: what is not filled in shows */
+  conform_enter("read", CONFORM_TICK_LIMIT_S);
+  int64_t begin_ns = hapi_clock_now();
+  hap_status status = c->ops->read(c->self, c->now_ns, &out->pose, &out->twist, &buttons);
+  int64_t end_ns = hapi_clock_now();
+  conform_leave();
+  if (c->running) {
+    hapi_histogram_add(&c->reads, end_ns - begin_ns);
+    judge(c, status, out, buttons != poison);
+  }
+  if (c->ops->pacing == HAP_PACING_DEVICE) {
+    c->now_ns = end_ns; /* the read has waited */
+  }
+  out->time = 1e-9 * (double)(c->now_ns - c->begin_ns);
+  return status;
+}
+
+hap_status conform_write(conform *c, const hap_wrench *wanted, hap_wrench *reached)
+{
+  memset(reached, 0xff, sizeof *reached);
+  conform_enter("write", CONFORM_TICK_LIMIT_S);
+  int64_t begin_ns = hapi_clock_now();
+  hap_status status = c->ops->write(c->self, wanted, reached);
+  if (c->running) {
+    hapi_histogram_add(&c->writes, hapi_clock_now() - begin_ns);
+  }
+  conform_leave();
+  return status;
+}
+
+/* As the haptic loop does: ticks that are missed are not made up for in a burst. */
+static void await_tick(conform *c)
+{
+  int64_t due_ns = c->begin_ns + hapi_clock_deadline(++c->tick, c->options->rate_hz);
+  if (conform_is_virtual(c)) {
+    c->now_ns = due_ns;
+    return;
+  }
+  if (c->ops->pacing == HAP_PACING_HOST) {
+    hapi_clock_sleep_until(due_ns);
+  }
+  c->now_ns = hapi_clock_now();
+  double passed = 1e-9 * (double)(c->now_ns - c->begin_ns) * c->options->rate_hz;
+  if (passed > (double)c->tick + 1.0) {
+    c->tick = (uint64_t)passed;
+  }
+}
+
+/* A hand may move it as it likes as long as there is no force. */
+static bool is_within(conform *c, const conform_sample *now)
+{
+  double way[3];
+  hapi_v3_sub(now->pose.position, c->origin, way);
+  if (!c->bounded || conform_is_virtual(c) || !(hapi_v3_norm(way) > TRAVEL_MOST)) {
+    return true;
+  }
+  conform_zero(c);
+  conform_fail(c,
+               "it has moved more than %g mm under %g N: the force was taken off; is it free to "
+               "fall? see --check-force 0",
+               1e3 * TRAVEL_MOST, c->options->force);
+  return false;
+}
+
+bool conform_tick(conform *c, conform_sample *out)
+{
+  await_tick(c);
+  bool good = conform_read(c, out) >= HAP_OK;
+  if (!good) {
+    conform_zero(c);
+  }
+  if (c->options->stop() || (good && !is_within(c, out))) {
+    conform_zero(c);
+    c->stopped = true;
+  }
+  return good && !c->stopped;
+}
+
+bool conform_reads_worse(const conform *c, const conform_wrong *then)
+{
+  const conform_wrong *now = &c->wrong;
+  return now->statuses > then->statuses || (then->poses == 0 && now->poses > 0) ||
+         (then->twists == 0 && now->twists > 0) || (then->buttons == 0 && now->buttons > 0);
+}
+
+void conform_pause(conform *c, double seconds)
+{
+  c->tick += (uint64_t)(seconds * c->options->rate_hz);
+  if (c->ops->pacing == HAP_PACING_DEVICE) {
+    hapi_clock_sleep_until(hapi_clock_now() + (int64_t)(1e9 * seconds));
+  }
+}
+
+/* ---- what it holds ---- */
+
+bool conform_held(const conform *c, hap_wrench *out)
+{
+  if (c->ops->size < offsetof(hap_device_ops, held) + sizeof c->ops->held || c->ops->held == NULL) {
+    return false;
+  }
+  memset(out, 0xff, sizeof *out);
+  conform_enter("held", CONFORM_TICK_LIMIT_S);
+  c->ops->held(c->self, out);
+  conform_leave();
+  return true;
+}
+
+bool conform_is_zero(const hap_wrench *wrench)
+{
+  bool zero = true;
+  for (int i = 0; i < 3; ++i) {
+    zero = zero && fabs(wrench->force[i]) <= GRAIN && fabs(wrench->torque[i]) <= GRAIN;
+  }
+  return zero;
+}
+
+void conform_expect_none(conform *c, const char *when)
+{
+  hap_wrench held;
+  if (conform_held(c, &held) && !conform_is_zero(&held)) {
+    conform_fail(c, "%s it holds %.3g N and %.3g N m", when, hapi_v3_norm(held.force),
+                 hapi_v3_norm(held.torque));
+  }
+}
+
+hap_wrench conform_small(const conform *c, int axis, double sign)
+{
+  hap_wrench small = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  double force = c->options->force;
+  double torque = TORQUE_ARM * force;
+  if (c->info.max_force > 0.0) {
+    force = fmin(force, SHARE * c->info.max_force);
+  }
+  if (c->info.max_torque > 0.0) {
+    torque = fmin(torque, SHARE * c->info.max_torque);
+  }
+  if (axis < 3) {
+    small.force[axis] = sign * force;
+  } else {
+    small.torque[axis - 3] = sign * torque;
+  }
+  return small;
+}
+
+int conform_axes(const conform *c)
+{
+  return c->info.dof == 6 ? 6 : 3;
+}
+
+/* ---- what a point needs ---- */
+
+bool conform_has_force(const conform *c)
+{
+  return c->options->force > 0.0;
+}
+
+bool conform_needs_force(conform *c)
+{
+  if (!conform_has_force(c)) {
+    conform_skip(c, "a check without force");
+  }
+  return conform_has_force(c) && conform_needs_reads(c);
+}
+
+bool conform_needs_reads(conform *c)
+{
+  if (!c->running || c->wrong.statuses > 0) {
+    conform_skip(c, "it cannot be started or read");
+    return false;
+  }
+  return true;
+}
+
+bool conform_needs_held(conform *c)
+{
+  hap_wrench held;
+  bool can = conform_held(c, &held);
+  if (!can) {
+    conform_skip(c, "the device has no operation 'held' that says what its motors were told");
+  }
+  return can;
+}
+
+bool conform_needs_zero(conform *c)
+{
+  if (c->zero_wrong) {
+    conform_skip(c, "zero does not take the force off");
+  }
+  return !c->zero_wrong && conform_needs_reads(c);
+}
+
+bool conform_needs_limits(conform *c)
+{
+  if (!conform_is_virtual(c) && !c->options->limits) {
+    conform_skip(c, "only with --check-limits: if the device is wrong, it gives all its force");
+    return false;
+  }
+  if (c->reached_wrong) {
+    conform_skip(c, "what was reached is not plausible");
+    return false;
+  }
+  return conform_needs_zero(c) && conform_needs_force(c);
+}
