@@ -99,8 +99,8 @@ TEST(disabled_joint_is_none)
   CHECK(cw_stats(&m.w).range_joints == 1 && cw_stats(&m.w).probe_steps == 0);
   CHECK(dJointIsEnabled(m.joints[0]) == 0 && dJointIsEnabled(m.joints[1]) != 0);
   cw_run(&m.w, 100);
-  dVector3 a;
-  dVector3 b;
+  dVector3 a = {0.0, 0.0, 0.0, 0.0};
+  dVector3 b = {0.0, 0.0, 0.0, 0.0};
   (void)anchors_of(m.joints[0], a, b);
   CHECK(fabs(a[2] - b[2]) > 0.05);
   cw_close(&m.w);

@@ -76,7 +76,7 @@ typedef struct reading {
 static void read_anchors(reading *r, void (*first)(dJointID, dVector3),
                          void (*second)(dJointID, dVector3))
 {
-  dVector3 at;
+  dVector3 at = {0.0, 0.0, 0.0, 0.0};
   (r->turned ? second : first)(r->joint, at);
   into(&r->a, at, r->place.anchor_a);
   (r->turned ? first : second)(r->joint, at);
@@ -319,7 +319,7 @@ static bool same_place(hapi_joint_kind kind, const hapi_joint_place *was, const 
 
 static void relative_pose(const hapi_known_joint *known, hap_pose *out)
 {
-  reading r;
+  reading r = {0};
   pose_of(known->bodies[0], &r.a);
   pose_of(known->bodies[1], &r.b);
   into(&r.a, r.b.position, out->position);

@@ -86,7 +86,8 @@ void build_weight(world *w, const case_row *row)
   double end = -length * row->n;
   dBodyID cube = add_cube(w, row->size * row->mass, WORLD_EDGE, AT(0.0, 0.0, end - 0.03));
   (void)add_hinge(w, cube, above, AT(0.0, 0.0, end), y);
-  double z = -length * (row->n / 2 + 0.5);
+  int middle = row->n / 2;
+  double z = -length * (middle + 0.5);
   add_hand(w, "path=0:-0.022/0/%g;0.3:0.005/0/%g;0.6:-0.022/0/%g,loop=1", z, z, z);
 }
 

@@ -460,7 +460,7 @@ static bool find_joint(hapi_tick *tick, uint32_t index, placed_joint *out)
   out->in = &tick->world.joints[index];
   out->index = index;
   return find_body(tick, out->in->body_a, out->in->generation_a, &out->a) &&
-         find_body(tick, out->in->body_b, out->in->generation_b, &out->b);
+         find_body(tick, out->in->body_b, out->in->generation_b, &out->b) && out->a != NULL;
 }
 
 static bool is_given(const hapi_local_body *body)
