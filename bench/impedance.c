@@ -26,7 +26,7 @@
 #define FIT_BOUND 0.01
 #define FIT_BOUND_PROXY 0.02 /* its velocities are half a tick old */
 #define SAMPLED_BOUND 1e-3
-#define TURNING_BOUND 0.02 /* of a flap: its A and b are those of the last physics step */
+#define TURNING_BOUND 0.02 /* of a flap through a proxy */
 #define STEADY 0.05        /* of the residual: above it the force is no sine, and Z says little */
 
 const impedance_variant impedance_variants[IMPEDANCE_VARIANTS] = {
@@ -291,7 +291,8 @@ static void report_curve(bench *b, int body, size_t variant, const impedance_tab
 {
   const impedance_curve *c = &table->curves[body][variant];
   bool bound = impedance_variants[variant].model == HAP_MODEL_CONTACT;
-  double sampled_bound = body == PORT_HINGE ? TURNING_BOUND : SAMPLED_BOUND;
+  bool turns = body == PORT_HINGE && impedance_variants[variant].coupling == HAP_COUPLING_PROXY;
+  double sampled_bound = turns ? TURNING_BOUND : SAMPLED_BOUND;
   worst low = find_worst(c, table->points, FIT_HZ);
   worst all = find_worst(c, table->points, HUGE_VAL);
   char name[64];

@@ -139,7 +139,8 @@ static hap_status crowd_open(bench *b, int count, crowd *c)
   for (int i = 0; i < count; ++i) {
     c->bodies[i] = dBodyCreate(c->world);
     dGeomSetBody(dCreateSphere(c->space, 0.01), c->bodies[i]);
-    dBodySetPosition(c->bodies[i], 0.1 * (i % 20), 0.1 * (i / 20 % 20), 0.1 * (i / 400));
+    const int cell[3] = {i % 20, i / 20 % 20, i / 400};
+    dBodySetPosition(c->bodies[i], 0.1 * cell[0], 0.1 * cell[1], 0.1 * cell[2]);
     dBodySetLinearVel(c->bodies[i], 0.0, 0.0, 0.2);
     dBodySetAngularVel(c->bodies[i], 1.0, 2.0, 3.0);
   }

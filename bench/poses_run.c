@@ -55,7 +55,7 @@ static void path_add(path *p, int64_t time_ns, const hap_pose *pose)
 static bool path_init(path *p, size_t capacity)
 {
   p->capacity = capacity;
-  p->times_ns = malloc(capacity * sizeof *p->times_ns);
+  p->times_ns = calloc(capacity, sizeof *p->times_ns);
   p->poses = malloc(capacity * sizeof *p->poses);
   return p->times_ns != NULL && p->poses != NULL;
 }
@@ -219,7 +219,7 @@ static hap_status draw_frame(run *r, int64_t now_ns, hap_detail *detail)
   hap_session *session = r->rig.session;
   hap_pose drawn[BODIES_MAX];
   hap_pose hand;
-  hap_stats stats;
+  hap_stats stats = {0};
   hap_status status = hap_session_poses(session, now_ns, r->rig.scene->bodies, r->bodies, drawn);
   if (status == HAP_OK) {
     status = hap_pointer_poses(session, r->rig.pointers[0], now_ns, &hand, NULL);

@@ -51,7 +51,7 @@ static void close_bed(bed *t)
 
 static bool allocate(hapi_tick *tick, uint32_t count)
 {
-  const hapi_capacity capacity = {count, count, 1, 1, 1};
+  const hapi_capacity capacity = {count, count, 1, 1, 1, 0, 0, 1};
   tick->period = 1e-9 * PERIOD_NS;
   return hapi_tick_memory_create(tick, &capacity);
 }

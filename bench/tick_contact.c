@@ -118,8 +118,9 @@ static void put_hands(const tick_case *what, char specs[HANDS_MAX][160], rig_opt
   out->devices[0] = what->push ? pushed : at_rest;
   out->device_count = 1;
   for (int i = 0; i < what->hands; ++i) {
-    double y = HAND_PITCH * (i % 4 - 1.5);
-    double z = 0.025 + HAND_PITCH * (i / 4 - 1.5);
+    const int place[2] = {i % 4, i / 4};
+    double y = HAND_PITCH * (place[0] - 1.5);
+    double z = 0.025 + HAND_PITCH * (place[1] - 1.5);
     snprintf(specs[i], sizeof specs[i],
              "virtual:path=0:-0.012/%g/%g;2:0.188/%g/%g,blend=linear,hand=rigid", y, z, y, z);
     out->devices[i] = specs[i];

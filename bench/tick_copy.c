@@ -34,12 +34,15 @@ static void copy_world(hapi_local_world *copy, const hapi_local_world *own,
   copy->memory = own->memory;
   copy->old_memory = own->old_memory;
   copy->buckets = own->buckets;
+  copy->joints = own->joints;
+  copy->joint_memory = own->joint_memory;
   copy->sources = own->sources;
   copy->solver.rows = own->solver.rows;
   copy->solver.v = own->solver.v;
   copy->solver.free = own->solver.free;
   copy->solver.work = own->solver.work;
   memcpy(copy->memory, from->memory, from->memory_count * sizeof *copy->memory);
+  memcpy(copy->joints, from->joints, from->joint_count * sizeof *copy->joints);
 }
 
 void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
@@ -62,6 +65,8 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
          c->contacts * sizeof *copy->ramp_generations);
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
   copy_world(&copy->world, &own.world, &from->world);
+  memcpy(copy->world.joint_memory, from->world.joint_memory,
+         c->joints * sizeof *copy->world.joint_memory);
 }
 
 static double since(int64_t begin_ns)
@@ -114,11 +119,12 @@ static bool stop_push_out(hapi_tick *tick)
   hapi_solver *solver = &tick->world.solver;
   bool any = false;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
-    any = any || (tick->world.sources[i].pushes_out && solver->rows[i].impulse > 0.0);
+    const hapi_row_source *source = &tick->world.sources[i];
+    any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (tick->world.sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], 0.0);
+      hapi_row_retarget(&solver->rows[i], tick->world.sources[i].stays);
     }
   }
   return any;
@@ -149,6 +155,7 @@ void tick_copy_parts(hapi_tick *copy, tick_parts *out)
   set_free_velocities(copy);
   int64_t begin_ns = hapi_clock_now();
   hapi_pointer_rows(copy);
+  hapi_joint_rows(copy);
   hapi_contact_rows(copy);
   out->rows = since(begin_ns);
   out->solve = solve(copy);

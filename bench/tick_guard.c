@@ -43,7 +43,7 @@ static void close_bed(guard_bed *g)
 
 static bool allocate(guard_bed *g, uint32_t count)
 {
-  const hapi_capacity capacity = {count, count, 1, 1, 1};
+  const hapi_capacity capacity = {count, count, 1, 1, 1, 0, 0, 1};
   g->box.pointers = 1;
   g->box.rows = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *g->box.rows);
   g->box.counts = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *g->box.counts);

@@ -65,3 +65,11 @@ dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
   dJointSetHingeParam(hinge, dParamFMax, s->parameters.hinge_torque);
   return hinge;
 }
+
+dJointID scene_add_slider(scene *s, dBodyID a, const double axis[3])
+{
+  const dJointID slider = dJointCreateSlider(s->world, NULL);
+  dJointAttach(slider, a, NULL);
+  dJointSetSliderAxis(slider, axis[0], axis[1], axis[2]);
+  return slider;
+}

@@ -42,6 +42,9 @@ void scene_add_block(scene *s, const double edges[3], const double centre[3]);
 dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
                          const double axis[3]);
 
+/* A slider on the world, through the body's centre. */
+dJointID scene_add_slider(scene *s, dBodyID a, const double axis[3]);
+
 /* cubes.c */
 void scene_build_flying_cube(scene *s);
 void scene_build_row(scene *s);
@@ -66,5 +69,9 @@ void scene_build_spheres(scene *s);
 /* mechanisms.c */
 void scene_build_door(scene *s);
 void scene_build_lightstand(scene *s);
+void scene_build_pendulum(scene *s);
+void scene_build_hinged(scene *s);
+void scene_build_cart(scene *s);
+void scene_build_chain(scene *s);
 
 #endif

@@ -7,6 +7,7 @@
 
 #include <scenes/build.h>
 
+#define ROD_RADIUS 0.02 /* m */
 #define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
 
 /* A panel of size x size in the plane y = 0 with its hinge along z through the origin. The hand
@@ -23,7 +24,7 @@ void scene_build_door(scene *s)
 /* A rod from one joint to the next, both in the plane y = 0. */
 static dBodyID add_rod(scene *s, double mass, const double from[3], const double to[3])
 {
-  const double radius = 0.02;
+  const double radius = ROD_RADIUS;
   const double x = to[0] - from[0];
   const double z = to[2] - from[2];
   const double length = hypot(x, z);
@@ -73,5 +74,52 @@ void scene_build_lightstand(scene *s)
   const dBodyID chain[] = {base, lower, upper, head};
   for (size_t i = 0; i + 1 < COUNT_OF(chain); ++i) {
     scene_add_hinge(s, chain[i + 1], chain[i], joints[i], axis);
+  }
+}
+
+/* A rod that hangs from a hinge along y at the origin. */
+void scene_build_pendulum(scene *s)
+{
+  const double end[3] = {0, 0, -s->parameters.size};
+  const dBodyID rod = add_rod(s, s->parameters.mass, (const double[3]){0, 0, 0}, end);
+  scene_add_hinge(s, rod, NULL, (const double[3]){0, 0, 0}, (const double[3]){0, 1, 0});
+}
+
+/* Two bars end to end along x, free in space, with a hinge along z where they meet. */
+void scene_build_hinged(scene *s)
+{
+  const double length = s->parameters.size;
+  const double edges[3] = {length, length / 4, length / 4};
+  const dBodyID near =
+      scene_add_box(s, edges, s->parameters.mass, (const double[3]){length / 2, 0, 0});
+  const dBodyID far =
+      scene_add_box(s, edges, s->parameters.mass, (const double[3]){-length / 2, 0, 0});
+  scene_add_hinge(s, near, far, (const double[3]){0, 0, 0}, (const double[3]){0, 0, 1});
+}
+
+/* A cart on a rail along x, with a pole that hangs from it. */
+void scene_build_cart(scene *s)
+{
+  const double edge = s->parameters.size;
+  const double length = 0.3;
+  const dBodyID cart = scene_add_box(s, (const double[3]){edge, edge, edge / 2}, s->parameters.mass,
+                                     (const double[3]){0, 0, 0});
+  const dBodyID pole = add_rod(s, 0.3 * s->parameters.mass, (const double[3]){0, 0, 0},
+                               (const double[3]){0, 0, -length});
+  scene_add_slider(s, cart, (const double[3]){1, 0, 0});
+  scene_add_hinge(s, pole, cart, (const double[3]){0, 0, 0}, (const double[3]){0, 1, 0});
+}
+
+/* Links that hang from the world, each in a hinge along y. */
+void scene_build_chain(scene *s)
+{
+  const double length = s->parameters.size;
+  dBodyID above = NULL;
+  for (int i = 0; i < s->count; ++i) {
+    const double top[3] = {0, 0, -length * i};
+    const double end[3] = {0, 0, -length * (i + 1)};
+    const dBodyID link = add_rod(s, s->parameters.mass, top, end);
+    scene_add_hinge(s, link, above, top, (const double[3]){0, 1, 0});
+    above = link;
   }
 }

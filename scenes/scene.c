@@ -131,23 +131,39 @@ static void create_world(scene *s)
   dWorldSetAutoDisableFlag(s->world, 0);
 }
 
-/* False, and nothing is moved, where joints hold the bodies: their anchors would stay. */
-static bool shift_bodies(scene *s)
+/* Where a joint hangs on the world, its place there is taken anew: the bodies are not turned, so that this
+ * changes nothing else. */
+static void shift_joint(dJointID joint, const double shift[3])
+{
+  dVector3 at;
+  dVector3 axis;
+  if (dJointGetBody(joint, 0) != NULL && dJointGetBody(joint, 1) != NULL) {
+    return;
+  }
+  if (dJointGetType(joint) == dJointTypeHinge) {
+    dJointGetHingeAxis(joint, axis);
+    dJointGetHingeAnchor2(joint, at);
+    dJointSetHingeAnchor(joint, at[0] + shift[0], at[1] + shift[1], at[2] + shift[2]);
+    dJointSetHingeAxis(joint, axis[0], axis[1], axis[2]);
+  } else if (dJointGetType(joint) == dJointTypeSlider) {
+    dJointGetSliderAxis(joint, axis);
+    dJointSetSliderAxis(joint, axis[0], axis[1], axis[2]);
+  }
+}
+
+static void shift_bodies(scene *s)
 {
   const double *shift = s->parameters.shift;
   if (shift[0] == 0 && shift[1] == 0 && shift[2] == 0) {
-    return true; /* bit for bit the scene itself */
-  }
-  for (size_t i = 0; i < s->body_count; ++i) {
-    if (dBodyGetNumJoints(s->bodies[i]) > 0) {
-      return false;
-    }
+    return; /* bit for bit the scene itself */
   }
   for (size_t i = 0; i < s->body_count; ++i) {
     const dReal *x = dBodyGetPosition(s->bodies[i]);
     dBodySetPosition(s->bodies[i], x[0] + shift[0], x[1] + shift[1], x[2] + shift[2]);
+    for (int k = 0; k < dBodyGetNumJoints(s->bodies[i]); ++k) {
+      shift_joint(dBodyGetJoint(s->bodies[i], k), shift);
+    }
   }
-  return true;
 }
 
 /* parameters were checked, count is in range */
@@ -170,11 +186,7 @@ static hap_status build(const scene_row *row, const scene_parameters *parameters
   create_world(s);
   row->build(s);
   assert(s->body_count == bodies);
-  if (!shift_bodies(s)) {
-    scene_destroy(s);
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' has joints and takes no shift",
-                row->parameters.name);
-  }
+  shift_bodies(s);
   *out = s;
   return HAP_OK;
 }

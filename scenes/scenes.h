@@ -35,7 +35,7 @@ typedef struct scene_parameters {
                                             world coordinates; borrowed */
   double hinge_torque;                   /* N m, friction of each hinge; 0: none */
   double shift[3]; /* m, by which the bodies stand beside where the scene has them, at the start;
-                      the hands and what never moves stay. 0 where a scene has joints. */
+                      the hands and what never moves stay; joints to the world come along. */
   double layer; /* m, ODE's contact surface layer: what rests lies this deep, so that a contact is
                    not lost to a gap of micrometres */
 } scene_parameters;
@@ -59,8 +59,7 @@ hap_status scene_create(const char *spec, scene **out, hap_detail *detail);
 
 /* Builds from changed parameters (a row that was copied and edited; the name tells which scene) and
  * N; 0: the default N, and the only N of a scene that has none. Fails as scene_create does;
- * HAP_ERROR_ARGUMENT also for a parameter that cannot be built, named in detail, such as a shift of
- * a scene with joints. */
+ * HAP_ERROR_ARGUMENT also for a parameter that cannot be built, named in detail. */
 hap_status scene_create_from(const scene_parameters *parameters, int count, scene **out,
                              hap_detail *detail);
 

@@ -238,10 +238,10 @@ TEST(messages_are_never_torn_in_either_direction)
 /* ---- the exchange ---- */
 
 static const hapi_capacity capacities[] = {
-    {1, 1, 1},
-    {3, 5, 2},
-    {64, 256, 4},
-    {1024, 4096, 16},
+    {1, 1, 1, 0, 0, 0, 0, 1},
+    {3, 5, 2, 0, 0, 0, 0, 7},
+    {64, 256, 4, 0, 0, 0, 0, 128},
+    {1024, 4096, 16, 0, 0, 0, 0, 2048},
 };
 #define CAPACITIES (sizeof capacities / sizeof capacities[0])
 
@@ -256,6 +256,8 @@ static void fill_model(hapi_model *m, const hapi_capacity *c, uint64_t seed)
   memset(hapi_model_bodies(m), (int)(mix(seed) & 0xff), c->bodies * sizeof(hapi_model_body));
   memset(hapi_model_contacts(m), (int)(mix(seed + 1) & 0xff),
          c->contacts * sizeof(hapi_model_contact));
+  m->joint_count = c->joints;
+  memset(hapi_model_joints(m), (int)(mix(seed + 2) & 0xff), c->joints * sizeof(hapi_model_joint));
 }
 
 static bool all_bytes(const void *block, size_t size, uint64_t byte)
@@ -274,7 +276,10 @@ static bool model_is(hapi_model *m, const hapi_capacity *c, uint64_t seed)
   return m->number == seed && m->state_ns == (int64_t)mix(seed) && m->body_count == c->bodies &&
          m->contact_count == c->contacts &&
          all_bytes(hapi_model_bodies(m), c->bodies * sizeof(hapi_model_body), mix(seed)) &&
-         all_bytes(hapi_model_contacts(m), c->contacts * sizeof(hapi_model_contact), mix(seed + 1));
+         all_bytes(hapi_model_contacts(m), c->contacts * sizeof(hapi_model_contact),
+                   mix(seed + 1)) &&
+         m->joint_count == c->joints &&
+         all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint), mix(seed + 2));
 }
 
 static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)

@@ -129,7 +129,8 @@ static replay check_setup(const recorded_setup *s)
 
 TEST(scenes_in_model_contact)
 {
-  static const char *const scenes[] = {"row10", "stack", "fig5", "clump8", "roll", "door"};
+  static const char *const scenes[] = {"row10", "stack", "fig5", "clump8",
+                                       "roll",  "door",  "cart", "chain"};
   for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
     recorded_setup s = recorded_setup_of(scenes[i], HAP_MODEL_CONTACT, 700);
     (void)check_setup(&s);

@@ -16,10 +16,12 @@
 #define CONTACTS 16u
 #define POINTERS 4u
 
-#define ROWS (4u * CONTACTS)
+#define JOINTS 6u
+
+#define ROWS (4u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
 #define BUCKETS 32u
 
-static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64};
+static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS};
 
 /* A tick with its memory, and a message to fill in. */
 static struct {
@@ -32,6 +34,8 @@ static struct {
   hapi_tick_pointer pointers[POINTERS];
   hapi_contact_memory memory[2][CONTACTS];
   uint32_t buckets[BUCKETS];
+  hapi_model_joint joints[JOINTS];
+  hapi_joint_memory joint_memory[JOINTS];
   hapi_row_source sources[ROWS];
   hapi_row rows[ROWS];
   double v[BODIES + POINTERS + 1][6];
@@ -49,6 +53,8 @@ static inline void set_up_world(void)
   world->old_memory = f.memory[1];
   world->buckets = f.buckets;
   world->bucket_count = BUCKETS;
+  world->joints = f.joints;
+  world->joint_memory = f.joint_memory;
   world->sources = f.sources;
   world->row_capacity = ROWS;
   world->solver.rows = f.rows;
@@ -106,6 +112,7 @@ static inline void begin_model(void)
 {
   f.model->body_count = 0;
   f.model->contact_count = 0;
+  f.model->joint_count = 0;
   ++f.model->number;
   f.model->state_ns = f.now_ns;
 }

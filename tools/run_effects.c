@@ -22,7 +22,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"cross", "cross accelerance between local bodies", 0, 0, 0},
     {"contacts", "contacts between bodies in the loop", CONTACT, 0, 0},
     {"passes", "contact passes between syncs", CONTACT, 0, 0},
-    {"joints", "joints in the loop", 0, 0, 0},
+    {"joints", "joints in the loop", CONTACT, 0, 0},
     {"range", "local range beyond the neighbours", CONTACT, 0, 0},
     {"restitution", "restitution in the loop", CONTACT, 0, 0},
     {"friction", "friction on the pointer", 0, 0, 0},

@@ -50,6 +50,12 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * jointed to them, and adopted ones. ODE cannot list a world's bodies: a body that is none of these
  * must be adopted, or a testing simulation would move it.
  *
+ * Joints belong to the application, and may come, change and go where the world may be touched. While
+ * model CONTACT moves the bodies of a ball, hinge, slider, universal, hinge-2 or fixed joint itself, ODE
+ * does not step the joint: it is switched off during the step, and its dJointFeedback is zero. A fixed
+ * joint (and a slider, across its axis) whose bodies the application moves against each other holds
+ * them as they then are.
+ *
  * ODE ends the process on numbers that are none, and so the world is looked at before each step: start
  * gives HAP_ERROR_WORLD and a running session latches HAP_FAULT_WORLD, steps nothing and says what to
  * set right. Masses are 1e-12 .. 1e12 kg, inertias positive definite, 1e-30 .. 1e30 kg m^2; positions up

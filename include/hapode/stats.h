@@ -127,6 +127,8 @@ typedef struct hap_stats {
   double lock_wait_ms_max; /* ms, longest wait of one of them; tries in vain do not count */
   double lock_held_ms_max; /* ms, longest that one of them had it: physics cannot step meanwhile */
   uint64_t edits_run;      /* of hap_session_post */
+
+  uint32_t range_joints; /* model CONTACT: joints that the loop holds itself, in the newest model */
 } hap_stats;
 
 HAP_END_DECLS

@@ -195,6 +195,7 @@ static bool find_pair(const hapi_contact *contact, uint32_t index, placed_pair *
   const hapi_near_pair *pair = &hapi_near_pairs(contact->near)[index];
   hapi_patch *patch = &out->patch;
   int count = 0;
+  patch->count = 0;
   if (!place_geom(contact, pair->geom_a, &out->a) || !place_geom(contact, pair->geom_b, &out->b)) {
     return false;
   }

@@ -15,7 +15,9 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   while (world->bucket_count < 2 * c->contacts) {
     world->bucket_count *= 2;
   }
-  world->row_capacity = (ROWS_PER_CONTACT + 1) * c->contacts;
+  world->row_capacity = (ROWS_PER_CONTACT + 1) * c->contacts + HAPI_JOINT_ROWS * c->joints;
+  world->joints = hapi_alloc_array(c->joints, sizeof *world->joints);
+  world->joint_memory = hapi_alloc_array(c->joints, sizeof *world->joint_memory);
   world->memory = hapi_alloc_array(c->contacts, sizeof *world->memory);
   world->old_memory = hapi_alloc_array(c->contacts, sizeof *world->old_memory);
   world->buckets = hapi_alloc_array(world->bucket_count, sizeof *world->buckets);
@@ -31,8 +33,8 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   solver->free = hapi_alloc_array(places, sizeof *solver->free);
   solver->work = hapi_alloc_array(solver->work_count, sizeof *solver->work);
   return world->memory != NULL && world->old_memory != NULL && world->buckets != NULL &&
-         world->sources != NULL && solver->rows != NULL && solver->v != NULL &&
-         solver->free != NULL && solver->work != NULL;
+         world->joints != NULL && world->joint_memory != NULL && world->sources != NULL &&
+         solver->rows != NULL && solver->v != NULL && solver->free != NULL && solver->work != NULL;
 }
 
 static void free_world(hapi_local_world *world)
@@ -40,6 +42,8 @@ static void free_world(hapi_local_world *world)
   hapi_free(world->memory);
   hapi_free(world->old_memory);
   hapi_free(world->buckets);
+  hapi_free(world->joints);
+  hapi_free(world->joint_memory);
   hapi_free(world->sources);
   hapi_free(world->solver.rows);
   hapi_free(world->solver.v);

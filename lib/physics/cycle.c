@@ -99,6 +99,7 @@ static void sync_in(hapi_physics *physics)
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
+  hapi_joints_scan(physics);
   hapi_reconcile_take(physics);
   hapi_world_read_user_wrenches(physics);
   hapi_reconcile_own(physics);
@@ -117,6 +118,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
+  hapi_joints_leave(physics);
   physics->last_cycle_ns = now_ns;
   /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
   int64_t lag_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;

@@ -10,8 +10,9 @@
 /* The range of model CONTACT: a walk from the neighbours over what they may touch before the next
  * sync, nearest first, until the loop's capacity is used. Each body gets one of four roles:
  *
- *   owned      free bodies of shapes that the contact thread knows: the loop moves them
- *   measured   jointed ones, or on ground that only ODE's collider knows: testing simulations
+ *   owned      bodies of shapes that the contact thread knows, free or in joints that the loop has: it
+ *              moves them
+ *   measured   in other joints, or on ground that only ODE's collider knows: testing simulations
  *   outside    beyond the capacity: a moving boundary
  *   driven     kinematic
  *
@@ -356,17 +357,6 @@ static void find_links(hapi_physics *physics, const hapi_known_body *known)
 
 /* ---- roles ---- */
 
-static bool has_joint(dBodyID body)
-{
-  int count = dBodyGetNumJoints(body);
-  for (int i = 0; i < count; ++i) {
-    if (dJointGetType(dBodyGetJoint(body, i)) != dJointTypeContact) {
-      return true;
-    }
-  }
-  return false;
-}
-
 /* What the pairs of a body would add to the message. */
 typedef struct need {
   uint32_t geoms;
@@ -399,21 +389,21 @@ static void need_link(hapi_physics *physics, const hapi_link *link, need *io)
   io->pairs += all ? count : physics->config.capacity.contacts + 1;
 }
 
-/* The loop must have all contacts of what it owns: ODE has none of them. */
-static bool has_room(hapi_physics *physics, const hapi_known_body *known)
+/* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of its
+ * mechanism that were looked at before. */
+static bool has_room(hapi_physics *physics, const hapi_known_body *known, need *io)
 {
   const hapi_range *range = &physics->range;
   const hapi_capacity *c = &physics->config.capacity;
-  need n = {0, 0, 0};
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    need_geom(physics, geom, &n);
+    need_geom(physics, geom, io);
   }
   for (uint32_t i = 0; i < range->link_count; ++i) {
-    need_link(physics, &range->links[i], &n);
+    need_link(physics, &range->links[i], io);
   }
-  return range->near->geom_count + n.geoms <= c->geoms &&
-         range->near->point_count + n.points <= c->hull_points &&
-         range->near->pair_count + n.pairs <= c->contacts;
+  return range->near->geom_count + io->geoms <= c->geoms &&
+         range->near->point_count + io->points <= c->hull_points &&
+         range->near->pair_count + io->pairs <= c->contacts;
 }
 
 /* One that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
@@ -422,10 +412,10 @@ static bool body_is_known(const hapi_physics *physics, dBodyID body)
   return body == NULL || hapi_bodies_find(&physics->table, body) != HAPI_NONE;
 }
 
-static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
+static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known, need *io)
 {
   const hapi_range *range = &physics->range;
-  if (has_joint(known->body) || range->links_missing) {
+  if (range->links_missing) {
     return false;
   }
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
@@ -439,7 +429,7 @@ static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known)
       return false;
     }
   }
-  return has_room(physics, known);
+  return has_room(physics, known, io);
 }
 
 static void take_links(hapi_physics *physics)
@@ -464,27 +454,62 @@ static void take_links(hapi_physics *physics)
   }
 }
 
-/* True: the loop moves the body, and the walk goes on from it. */
+/* A mechanism is owned as a whole: a joint between what the loop moves and what ODE moves would be in
+ * neither. Room for its bodies is taken first, then their contacts. */
+static bool mechanism_can_be_owned(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  need n = {0, 0, 0};
+  if (range->owned + range->moving > range_capacity(physics)) {
+    return false;
+  }
+  for (uint32_t i = 0; i < range->moving; ++i) {
+    const hapi_known_body *known = entry(physics, range->members[i]);
+    find_links(physics, known);
+    if (!can_be_owned(physics, known, &n)) {
+      return false;
+    }
+  }
+  for (uint32_t i = 0; i < range->member_count; ++i) {
+    if (!enqueue(physics, range->members[i])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static void own_mechanism(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  for (uint32_t i = 0; i < range->moving; ++i) {
+    const hapi_known_body *known = entry(physics, range->members[i]);
+    if (range->moving > 1) { /* else they were found last */
+      find_links(physics, known);
+    }
+    physics->bodies[known->slot].flags |= HAPI_BODY_OWNED;
+    ++range->owned;
+    take_links(physics);
+  }
+  hapi_mechanism_take(physics);
+}
+
+/* Seeds are what the pointers may touch. What is owned is walked on from. */
 static void expand(hapi_physics *physics, uint32_t index, bool seed)
 {
   hapi_range *range = &physics->range;
   hapi_known_body *known = entry(physics, index);
   hapi_body_slot *slot = &physics->bodies[known->slot];
-  if (!dynamic(known->body)) {
+  if (!dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
     return;
   }
-  if (range->owned == range_capacity(physics)) {
-    slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
+  bool refused = known->gathered_in == range->number; /* with another body of its mechanism */
+  if (!refused && range->owned < range_capacity(physics) && hapi_mechanism_gather(physics, index) &&
+      mechanism_can_be_owned(physics)) {
+    own_mechanism(physics);
     return;
   }
-  find_links(physics, known);
-  if (!can_be_owned(physics, known)) {
-    slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
-    return;
-  }
-  slot->flags |= HAPI_BODY_OWNED;
-  ++range->owned;
-  take_links(physics);
+  hapi_mechanism_drop(physics);
+  slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
 }
 
 static double fastest_pointer(const hapi_physics *physics)
@@ -509,6 +534,7 @@ static void begin_walk(hapi_physics *physics)
   range->number = physics->model_number + 1;
   range->count = range->owned = 0;
   range->pairs_noted = 0;
+  range->joint_count = range->member_count = range->moving = 0;
   range->fastest = fastest_pointer(physics);
 }
 
@@ -549,6 +575,7 @@ static void count_roles(hapi_physics *physics)
 {
   hap_stats *stats = &physics->figures.stats;
   stats->range_bodies = stats->edge_bodies = stats->measured_bodies = 0;
+  stats->range_joints = physics->range.joint_count;
   for (uint32_t i = 0; i < physics->range.count; ++i) {
     uint32_t flags = physics->bodies[entry(physics, physics->range.queue[i])->slot].flags;
     stats->range_bodies += (flags & HAPI_BODY_OWNED) != 0;
@@ -580,6 +607,7 @@ void hapi_range_reset(hapi_physics *physics)
   range->number = 0;
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     physics->table.entries[i].ranged_in = 0;
+    physics->table.entries[i].gathered_in = 0;
     physics->table.entries[i].chosen_in = 0;
     physics->table.entries[i].loop_owned = false;
   }
@@ -591,14 +619,16 @@ bool hapi_range_create(hapi_physics *physics)
   const hapi_capacity *c = &physics->config.capacity;
   range->queue = hapi_alloc_array(c->bodies, sizeof *range->queue);
   range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
+  range->members = hapi_alloc_array(c->bodies, sizeof *range->members);
+  range->joints = hapi_alloc_array(c->joints, sizeof *range->joints);
   range->pair_place_count = 4;
   while (range->pair_place_count < 4 * c->contacts) {
     range->pair_place_count *= 2;
   }
   range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
   range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
-  return range->queue != NULL && range->geoms != NULL && range->pair_places != NULL &&
-         range->box_geom != NULL;
+  return range->queue != NULL && range->geoms != NULL && range->members != NULL &&
+         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL;
 }
 
 void hapi_range_finish(hapi_physics *physics)
@@ -610,6 +640,8 @@ void hapi_range_finish(hapi_physics *physics)
   hapi_free(range->queue);
   hapi_free(range->geoms);
   hapi_free(range->links);
+  hapi_free(range->members);
+  hapi_free(range->joints);
   hapi_free(range->pair_places);
   memset(range, 0, sizeof *range);
 }

@@ -37,7 +37,8 @@ static bool allocate(hapi_physics *physics)
          hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
          physics->test.contacts != NULL && physics->test.rounds != NULL &&
          physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
-         physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
+         hapi_joints_create(physics) && physics->contact_scratch != NULL &&
+         hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
 static bool init_locks(hapi_physics *physics)
@@ -53,6 +54,7 @@ static hap_status check_world(hapi_physics *physics, hap_detail *detail)
   if (hapi_bodies_scan(physics) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the table of bodies");
   }
+  hapi_joints_scan(physics);
   hap_detail text;
   if (hapi_world_is_unsound(physics, &text)) {
     return hapi_fail(detail, HAP_ERROR_WORLD, "%s", text.text);
@@ -115,6 +117,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_bodies_finish(&physics->table);
   hapi_free(physics->surfaces.entries);
   hapi_range_finish(physics);
+  hapi_joints_finish(&physics->joints);
   hapi_meshes_finish(&physics->meshes);
   hapi_snapshot_finish(&physics->snapshot);
   hapi_test_finish(&physics->test);
@@ -194,6 +197,7 @@ static void prepare(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->begun = true;
+  hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
   if (status >= HAP_OK) {
     status = hapi_tape_world(physics, detail);

@@ -61,13 +61,14 @@ typedef struct hapi_known_body {
   uint64_t seen; /* scan that found it */
   bool adopted;
   bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool enabled_before; /* scratch of the probe's flag pass */
-  uint32_t island;     /* scratch: number of the island under test, HAPI_NONE outside */
-  uint32_t member;     /* scratch: place in the test set and its snapshot */
-  uint64_t chosen_in;  /* scratch: model that it was chosen for */
-  uint64_t ranged_in;  /* scratch: walk that met it */
-  uint32_t slot;       /* local slot, HAPI_NONE: not local */
-  bool loop_owned;     /* in the newest message, also while its slot retires */
+  bool enabled_before;  /* scratch of the probe's flag pass */
+  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
+  uint32_t member;      /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in;   /* scratch: model that it was chosen for */
+  uint64_t ranged_in;   /* scratch: walk that met it */
+  uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
+  uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  bool loop_owned;      /* in the newest message, also while its slot retires */
   bool loop_touched;
   double damping[2];    /* scratch of soft.c */
   double extent;        /* m, from the body's origin to the far corner of its geoms */
@@ -119,6 +120,42 @@ typedef struct hapi_body_table {
   bool said_lost;
   bool starved; /* the newest scan found no memory for a body: not all are known */
 } hapi_body_table;
+
+/* ---- joints.c: what is known of the world's joints ---- */
+
+typedef struct hapi_known_joint {
+  dJointID joint;
+  uint64_t seen;     /* scan that found it */
+  dBodyID bodies[2]; /* in ODE's own order; the second is NULL: static world */
+  uint32_t index[2]; /* of the body table, in this cycle */
+  bool carried;      /* of a kind that the loop has */
+  bool usable;       /* place holds */
+  bool held;         /* scratch: switched off for the global step */
+  bool left_is_known;
+  hapi_joint_kind kind;
+  hapi_joint_place place; /* as it was set */
+  hap_pose left;          /* of the second body in the first at the end of the last cycle */
+  uint64_t gathered_in;   /* scratch: walk that met it */
+  uint64_t ranged_in;     /* model that it is in */
+  uint32_t slot;          /* HAPI_NONE: not in the newest model */
+  double meant[3][2];     /* scratch of soft.c */
+} hapi_known_joint;
+
+typedef struct hapi_joint_slot {
+  dJointID joint; /* compared only; NULL: free */
+  uint32_t generation;
+} hapi_joint_slot;
+
+typedef struct hapi_joint_table {
+  hapi_known_joint *entries;
+  uint32_t count;
+  uint32_t capacity;
+  uint32_t *buckets; /* open addressing, entry index + 1 */
+  uint32_t bucket_count;
+  uint64_t scan;
+  bool starved;           /* the newest scan found no memory for a joint */
+  hapi_joint_slot *slots; /* capacity.joints */
+} hapi_joint_table;
 
 /* ---- what the loop knows, and what we told it ---- */
 
@@ -255,6 +292,11 @@ typedef struct hapi_range {
   uint32_t link_count;
   uint32_t link_capacity;
   bool links_missing; /* no memory for one */
+  uint32_t *members;  /* entries of the body table, of one mechanism; capacity.bodies */
+  uint32_t member_count;
+  uint32_t moving;  /* that are not kinematic; they come first */
+  uint32_t *joints; /* entries of the joint table; capacity.joints */
+  uint32_t joint_count;
 } hapi_range;
 
 typedef struct hapi_mesh {
@@ -403,6 +445,7 @@ struct hapi_physics {
   hapi_neighborhood neighborhood;
   hapi_surface_cache surfaces;
   hapi_range range;
+  hapi_joint_table joints;
   hapi_meshes meshes;
   hapi_snapshot snapshot;
   hapi_test_set test;
@@ -534,6 +577,30 @@ void hapi_range_finish(hapi_physics *physics);
 void hapi_range_reset(hapi_physics *physics);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
+
+/* mechanism.c */
+/* The bodies that joints tie to this one, itself first, into range.members, and their joints behind
+ * range.joints; false: they cannot be owned. */
+bool hapi_mechanism_gather(hapi_physics *physics, uint32_t known);
+void hapi_mechanism_take(hapi_physics *physics); /* the joints are in the model */
+void hapi_mechanism_drop(hapi_physics *physics); /* they are not */
+
+/* joints.c */
+bool hapi_joints_create(hapi_physics *physics);
+void hapi_joints_finish(hapi_joint_table *table);
+uint32_t hapi_joints_find(const hapi_joint_table *table, dJointID joint); /* HAPI_NONE */
+void hapi_joints_scan(hapi_physics *physics);                             /* after the bodies' */
+void hapi_joints_leave(hapi_physics *physics);  /* last: what is left in ODE */
+void hapi_joints_reset(hapi_physics *physics);  /* forgets all */
+void hapi_joints_hold(hapi_physics *physics);   /* those of owned bodies: off for the step */
+void hapi_joints_let_go(hapi_physics *physics); /* after it; their feedback is zero */
+void hapi_joints_publish(hapi_physics *physics, hapi_model *out);
+
+/* joint_place.c */
+bool hapi_joint_kind_of(dJointID joint, hapi_joint_kind *out); /* false: not one of the loop's */
+/* is_new: as it is now; else only where it is another than it was. Sets usable. */
+void hapi_joint_read(hapi_known_joint *known, bool is_new);
+void hapi_joint_leave(hapi_known_joint *known);
 
 /* mesh.c */
 /* Triangles of a static mesh that meet a box of the world, into physics->meshes.found;

@@ -279,8 +279,8 @@ static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last,
 
 static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
 {
-  sample before;
-  sample after;
+  sample before = {0};
+  sample after = {0};
   bool has_before = find_before(d, drawn, &before);
   if (!find_after(d, drawn, &after)) {
     go_on(d, drawn, &before, out); /* a body has one sample at least */

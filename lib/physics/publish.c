@@ -166,6 +166,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
       fill_contact(&physics->contacts[i], i, &contacts[out->contact_count++]);
     }
   }
+  hapi_joints_publish(physics, out);
   fill_watch(physics, out);
   count_model(physics, out);
   hapi_tape_model(physics);

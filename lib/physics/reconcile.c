@@ -240,13 +240,14 @@ void hapi_reconcile_hold(hapi_physics *physics)
       dBodyDisable(body);
     }
   }
+  hapi_joints_hold(physics);
 }
 
 void hapi_reconcile_let_go(hapi_physics *physics)
 {
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
-    dBodyID body = slot->loop_owned ? ode_body(physics, slot) : NULL;
+    dBodyID body = slot->loop_owned || slot->held ? ode_body(physics, slot) : NULL;
     if (body != NULL) {
       dBodySetForce(body, 0.0, 0.0, 0.0); /* as a step does; the loop has them from the message */
       dBodySetTorque(body, 0.0, 0.0, 0.0);
@@ -256,6 +257,7 @@ void hapi_reconcile_let_go(hapi_physics *physics)
     }
     slot->held = false;
   }
+  hapi_joints_let_go(physics);
 }
 
 /* What the pointers gave in the last interval acts over the global step. */

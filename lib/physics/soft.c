@@ -94,6 +94,73 @@ static double keep_of(double damping, double ratio)
   return 1.0 - pow(1.0 - fmin(fmax(damping, 0.0), 1.0), ratio);
 }
 
+/* Where a joint has error reduction and softness of its own: beside those of the world's rows. */
+typedef struct joint_parameters {
+  dJointType type;
+  dReal (*get)(dJointID, int);
+  void (*set)(dJointID, int, dReal);
+  int count;
+  int names[3][2];
+} joint_parameters;
+
+#define STOP(group)                                                          \
+  {                                                                          \
+    dParamStopERP + (group)*dParamGroup, dParamStopCFM + (group)*dParamGroup \
+  }
+
+static const joint_parameters own_parameters[] = {
+    {dJointTypeBall, dJointGetBallParam, dJointSetBallParam, 1, {{dParamERP, dParamCFM}}},
+    {dJointTypeFixed, dJointGetFixedParam, dJointSetFixedParam, 1, {{dParamERP, dParamCFM}}},
+    {dJointTypeHinge, dJointGetHingeParam, dJointSetHingeParam, 1, {STOP(0)}},
+    {dJointTypeSlider, dJointGetSliderParam, dJointSetSliderParam, 1, {STOP(0)}},
+    {dJointTypeUniversal, dJointGetUniversalParam, dJointSetUniversalParam, 2, {STOP(0), STOP(1)}},
+    {dJointTypeHinge2,
+     dJointGetHinge2Param,
+     dJointSetHinge2Param,
+     2,
+     {STOP(0), {dParamSuspensionERP, dParamSuspensionCFM}}},
+    {dJointTypeAMotor, dJointGetAMotorParam, dJointSetAMotorParam, 3, {STOP(0), STOP(1), STOP(2)}},
+    {dJointTypeLMotor, dJointGetLMotorParam, dJointSetLMotorParam, 3, {STOP(0), STOP(1), STOP(2)}},
+    {dJointTypePR, dJointGetPRParam, dJointSetPRParam, 2, {STOP(0), STOP(1)}},
+    {dJointTypePU, dJointGetPUParam, dJointSetPUParam, 3, {STOP(0), STOP(1), STOP(2)}},
+    {dJointTypePiston, dJointGetPistonParam, dJointSetPistonParam, 2, {STOP(0), STOP(1)}},
+};
+
+static const joint_parameters *parameters_of(dJointID joint)
+{
+  dJointType type = dJointGetType(joint);
+  for (size_t i = 0; i < sizeof own_parameters / sizeof own_parameters[0]; ++i) {
+    if (own_parameters[i].type == type) {
+      return &own_parameters[i];
+    }
+  }
+  return NULL;
+}
+
+static void convert_joint(hapi_known_joint *known, double ratio)
+{
+  const joint_parameters *own = parameters_of(known->joint);
+  for (int i = 0; own != NULL && i < own->count; ++i) {
+    double *meant = known->meant[i];
+    meant[0] = own->get(known->joint, own->names[i][0]);
+    meant[1] = own->get(known->joint, own->names[i][1]);
+    double erp = meant[0];
+    double cfm = meant[1];
+    hapi_soften(ratio, &erp, &cfm);
+    own->set(known->joint, own->names[i][0], erp);
+    own->set(known->joint, own->names[i][1], cfm);
+  }
+}
+
+static void restore_joint(const hapi_known_joint *known)
+{
+  const joint_parameters *own = parameters_of(known->joint);
+  for (int i = 0; own != NULL && i < own->count; ++i) {
+    own->set(known->joint, own->names[i][0], known->meant[i][0]);
+    own->set(known->joint, own->names[i][1], known->meant[i][1]);
+  }
+}
+
 void hapi_world_convert(hapi_physics *physics)
 {
   double ratio = step_ratio(physics);
@@ -107,6 +174,9 @@ void hapi_world_convert(hapi_physics *physics)
   dWorldSetERP(world, erp);
   dWorldSetCFM(world, cfm);
   physics->converted = true;
+  for (uint32_t i = 0; i < physics->joints.count; ++i) {
+    convert_joint(&physics->joints.entries[i], ratio);
+  }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
     if (known->body != NULL) {
@@ -128,6 +198,9 @@ void hapi_world_restore(hapi_physics *physics)
   physics->converted = false;
   dWorldSetERP(physics->ode.world, physics->meant_erp);
   dWorldSetCFM(physics->ode.world, physics->meant_cfm);
+  for (uint32_t i = 0; i < physics->joints.count; ++i) {
+    restore_joint(&physics->joints.entries[i]);
+  }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     const hapi_known_body *known = &physics->table.entries[i];
     if (known->body != NULL && (known->damping[0] != 0.0 || known->damping[1] != 0.0)) {

@@ -160,6 +160,21 @@ void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns)
 
 /* ---- the local model ---- */
 
+static uint64_t hash_joint(uint64_t hash, const hapi_model_joint *j)
+{
+  hash = hapi_hash_word(hash, ((uint64_t)j->kind << 32) | j->slot);
+  hash = hapi_hash_doubles(hash, j->place.anchor_a, 3);
+  hash = hapi_hash_doubles(hash, j->place.anchor_b, 3);
+  hash = hapi_hash_doubles(hash, j->place.axis_a, 3);
+  for (int i = 0; i < 2; ++i) {
+    const hapi_model_limit *l = &j->limits[i];
+    const double values[] = {l->low, l->high, l->bounce, l->speed, l->force};
+    hash = hapi_hash_word(hash, l->flags);
+    hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+  }
+  return hash;
+}
+
 static uint64_t hash_model(const hapi_physics *physics)
 {
   hapi_model *model = hapi_exchange_model_back(physics->config.exchange);
@@ -181,6 +196,9 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, c[i].point_body, 3);
     hash = hapi_hash_doubles(hash, c[i].normal_body, 3);
     hash = hapi_hash_doubles(hash, c[i].a[0], 18);
+  }
+  for (uint32_t i = 0; i < model->joint_count; ++i) {
+    hash = hash_joint(hash, &hapi_model_joints(model)[i]);
   }
   return hash;
 }

@@ -99,7 +99,7 @@ static hap_status create_contact(hap_session *session, const hapi_capacity *capa
 }
 
 /* Slots for the range, as many again for what stands around it, and some for those that have left and
- * that the loop has not let go of. Geoms: a few a body. */
+ * that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss two. */
 static hapi_capacity capacity_of(const hap_session_def *def)
 {
   hapi_capacity capacity = {
@@ -109,6 +109,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .geoms = 8 * (uint32_t)def->max_bodies + 1024,
       .hull_points = (uint32_t)def->max_hull_points,
       .trail_rows = TRAIL_ROWS_MOST,
+      .joints = 2 * (uint32_t)def->max_bodies + 16,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {

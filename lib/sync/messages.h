@@ -7,12 +7,13 @@
  * offsets, no pointers. Bodies and contacts have slots, small numbers that physics gives out; a
  * slot's generation tells one user of the slot from the next. World frame, SI.
  *
- *   physics -> haptic    hapi_model    bodies, pointer contacts
+ *   physics -> haptic    hapi_model    bodies, pointer contacts, joints
  *   haptic  -> physics   hapi_state    where they have come to, what was exchanged
  *   physics -> contact   hapi_near     geoms and pairs near the pointers   (model CONTACT)
  *   haptic  -> contact   hapi_poses    newest poses of the bodies          (model CONTACT)
  *   contact -> haptic    hapi_patches  contacts between bodies             (model CONTACT) */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <hapode/record.h>
@@ -31,6 +32,7 @@ typedef struct hapi_capacity {
   uint32_t hull_points;  /* of all of them together */
   uint32_t trail_rows;   /* 0: none are kept */
   uint32_t trail_stride; /* ticks from row to row */
+  uint32_t joints;       /* between bodies of the range */
 } hapi_capacity;
 
 enum {
@@ -89,6 +91,77 @@ typedef struct hapi_model_contact {
   hap_pose shape_pose;   /* in the body's frame */
 } hapi_model_contact;
 
+/* How a joint's error is taken back: ODE's parameters at the tick. */
+typedef struct hapi_softness {
+  double erp;
+  double cfm;
+  bool soft; /* a spring and damper: the correction stays in the velocity */
+} hapi_softness;
+
+enum {
+  HAPI_LIMIT_LOW = 1, /* there is such a stop */
+  HAPI_LIMIT_HIGH = 2,
+  HAPI_LIMIT_LOCKED = 4, /* both at the same place: neither stop nor motor */
+  HAPI_LIMIT_MOTOR = 8
+};
+
+/* Stops and motor of one free axis. Positions as ODE measures them: how far the first body is turned or
+ * moved against the second one, rad or m. */
+typedef struct hapi_model_limit {
+  uint32_t flags;
+  double low;
+  double high;
+  hapi_softness stop;
+  double bounce;
+  double speed;     /* of the motor: rad/s, m/s */
+  double force;     /* its largest torque or force: N m, N */
+  double motor_cfm; /* (rad/s)/(N m), (m/s)/N: the same at every step */
+  double fudge;     /* share of the force while it drives away from a stop */
+} hapi_model_limit;
+
+typedef enum hapi_joint_kind {
+  HAPI_JOINT_BALL,
+  HAPI_JOINT_HINGE,
+  HAPI_JOINT_SLIDER,
+  HAPI_JOINT_UNIVERSAL,
+  HAPI_JOINT_HINGE2,
+  HAPI_JOINT_FIXED
+} hapi_joint_kind;
+
+/* Where a joint is, in the frames of its bodies (static world: world frame). Two axes: the one of body a
+ * and the one of body b; a universal joint and a hinge-2 turn about both. An angle about an axis goes
+ * from something of b to something of a:
+ *
+ *   hinge               about axis_a from reference_b to reference_a
+ *   universal, hinge-2  about axis_a from axis_b to reference_a; about axis_b from reference_b to axis_a */
+typedef struct hapi_joint_place {
+  double anchor_a[3]; /* slider: the centre of a, and in b where it is at position 0 */
+  double anchor_b[3];
+  double axis_a[3];      /* unit; slider: of the motion */
+  double axis_b[3];      /* hinge: where axis_a is to be */
+  double reference_a[3]; /* unit, across axis_a */
+  double reference_b[3];
+  double turn[4];  /* slider, fixed: orientation of b in the frame of a */
+  double cos_axes; /* universal, hinge-2: of the angle that the axes shall have */
+  double sin_axes;
+} hapi_joint_place;
+
+/* A joint between two bodies of the model, or one and the static world. */
+typedef struct hapi_model_joint {
+  uint32_t slot;
+  uint32_t generation;
+  hapi_joint_kind kind;
+  uint32_t body_a; /* slot */
+  uint32_t generation_a;
+  uint32_t body_b; /* HAPI_SLOT_NONE: static world */
+  uint32_t generation_b;
+  hapi_joint_place place;
+  hapi_softness along;   /* hinge-2: the suspension, along axis_a */
+  hapi_softness linear;  /* anchors */
+  hapi_softness angular; /* orientations */
+  hapi_model_limit limits[2];
+} hapi_model_joint;
+
 typedef struct hapi_model {
   uint64_t number;       /* 1, 2, 3 ... */
   int64_t state_ns;      /* time for which poses, A and b hold */
@@ -102,9 +175,10 @@ typedef struct hapi_model {
   uint32_t body_count;
   uint32_t contact_count;
   uint32_t watch_count; /* traced bodies */
+  uint32_t joint_count; /* model CONTACT */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
-  uint32_t reserved;
+  uint32_t joints_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -117,6 +191,11 @@ static inline hapi_model_body *hapi_model_bodies(hapi_model *m)
 static inline hapi_model_contact *hapi_model_contacts(hapi_model *m)
 {
   return (hapi_model_contact *)(void *)((char *)m + m->contacts_offset);
+}
+
+static inline hapi_model_joint *hapi_model_joints(hapi_model *m)
+{
+  return (hapi_model_joint *)(void *)((char *)m + m->joints_offset);
 }
 
 /* ---- physics -> contact: what may touch what (model CONTACT) ---- */

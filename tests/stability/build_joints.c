@@ -22,7 +22,7 @@ static dJointID add_hinge(world *w, dBodyID a, dBodyID b, const double at[3], co
   return hinge;
 }
 
-/* Hangs on z through the origin; 0.1 rad either way. */
+/* Hangs on z through the origin; 0.1 rad either way. size: share of the speed that the stops throw back. */
 void build_stop(world *w, const case_row *row)
 {
   set_gravity(w, 0.0);
@@ -30,6 +30,7 @@ void build_stop(world *w, const case_row *row)
   dJointID hinge = add_hinge(w, flap, NULL, AT(0.0, 0.0, 0.0), AT(0.0, 0.0, 1.0));
   dJointSetHingeParam(hinge, dParamLoStop, -0.1);
   dJointSetHingeParam(hinge, dParamHiStop, 0.1);
+  dJointSetHingeParam(hinge, dParamBounce, row->size);
   add_hand(w, "path=0:0.25/-0.022/0;0.4:0.25/0.04/0;0.6:0.25/0.04/0;0.8:0.25/-0.022/0,loop=1");
 }
 
@@ -69,6 +70,40 @@ void build_chain(world *w, const case_row *row)
   }
   double z = -length * (row->n / 2 + 0.5);
   add_hand(w, "path=0:-0.02/0/%g;0.3:0.03/0/%g;0.6:-0.02/0/%g,loop=1", z, z, z);
+}
+
+/* n links in hinges along y, and below them a cube of size times their mass; pushed at the middle link. */
+void build_weight(world *w, const case_row *row)
+{
+  const double length = 0.05;
+  const double y[3] = {0.0, 1.0, 0.0};
+  dBodyID above = NULL;
+  for (int i = 0; i < row->n; ++i) {
+    dBodyID link = add_box(w, row->mass, AT(0.02, 0.02, 0.04), AT(0.0, 0.0, -length * (i + 0.5)));
+    (void)add_hinge(w, link, above, AT(0.0, 0.0, -length * i), y);
+    above = link;
+  }
+  double end = -length * row->n;
+  dBodyID cube = add_cube(w, row->size * row->mass, WORLD_EDGE, AT(0.0, 0.0, end - 0.03));
+  (void)add_hinge(w, cube, above, AT(0.0, 0.0, end), y);
+  int middle = row->n / 2;
+  double z = -length * (middle + 0.5);
+  add_hand(w, "path=0:-0.022/0/%g;0.3:0.005/0/%g;0.6:-0.022/0/%g,loop=1", z, z, z);
+}
+
+/* A cube on a rail along x that can go by size either way. */
+void build_play(world *w, const case_row *row)
+{
+  set_gravity(w, 0.0);
+  dBodyID cube = add_cube(w, row->mass, WORLD_EDGE, AT(0.0, 0.0, 0.0));
+  dJointID slider = dJointCreateSlider(w->world, NULL);
+  dJointAttach(slider, cube, NULL);
+  dJointSetSliderAxis(slider, 1.0, 0.0, 0.0);
+  dJointSetSliderParam(slider, dParamLoStop, -row->size);
+  dJointSetSliderParam(slider, dParamHiStop, row->size);
+  double x = 0.5 * WORLD_EDGE + POINTER;
+  add_hand(w, "path=0:%g/0.01/0;0.1:%g/0.01/0;0.2:%g/0.01/0,loop=1", -x - 0.002, -x + 0.005,
+           -x - 0.002);
 }
 
 /* A scene of the table, with its own hand. */

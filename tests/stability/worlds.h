@@ -67,9 +67,11 @@ void build_row_ends(world *w, const struct case_row *row);      /* a hand at eac
 void build_walls(world *w, const struct case_row *row);         /* a cube that two walls hold */
 void build_groove(world *w, const struct case_row *row);        /* a ball pressed into a V */
 void build_funnel(world *w, const struct case_row *row);        /* n balls */
-void build_stop(world *w, const struct case_row *row);  /* a flap against the stops of its hinge */
-void build_loop(world *w, const struct case_row *row);  /* four bars, four hinges */
-void build_chain(world *w, const struct case_row *row); /* n links on ball joints */
+void build_stop(world *w, const struct case_row *row);   /* a flap against the stops of its hinge */
+void build_loop(world *w, const struct case_row *row);   /* four bars, four hinges */
+void build_chain(world *w, const struct case_row *row);  /* n links on ball joints */
+void build_weight(world *w, const struct case_row *row); /* n links, a weight of size below */
+void build_play(world *w, const struct case_row *row);   /* a cube on a rail between stops */
 void build_lightstand(world *w, const struct case_row *row);
 void build_top(world *w, const struct case_row *row);   /* size: rad/s */
 void build_plate(world *w, const struct case_row *row); /* at its corner, on a floor */

@@ -33,12 +33,10 @@ static char *more_arguments(const char *spec)
     args = spec + strcspn(spec, ",");
   }
   args += *args != '\0';
-  size_t length = strlen(args);
-  char *more = malloc(length + sizeof extra + 1);
+  size_t size = strlen(args) + sizeof extra + 1;
+  char *more = malloc(size);
   if (more != NULL) {
-    memcpy(more, args, length);
-    memcpy(more + length, ",", 1);
-    memcpy(more + length + (length > 0), extra, sizeof extra);
+    (void)snprintf(more, size, "%s%s%s", args, *args != '\0' ? "," : "", extra);
   }
   return more;
 }

@@ -217,6 +217,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   }
   tick->live_count = model->body_count;
   adopt_contacts(tick, model);
+  hapi_joint_adopt(tick, model);
   tick->model_number = model->number;
   tick->model = model->model;
   tick->impulse_pose = model->impulse_pose;

@@ -216,9 +216,10 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   source->body_a = c->in->body_a;
   source->body_b = c->in->body_b;
   source->part = (uint8_t)part;
-  source->pointer = false;
+  source->pointer = source->joint = false;
   source->pushes_out = false;
   source->gives = c->gives;
+  source->stays = 0.0;
   return row;
 }
 
@@ -355,9 +356,10 @@ static bool find_contact(hapi_tick *tick, uint32_t index, placed_contact *out)
 
 /* What touches a body that moves is awake, as in ODE. Before any row: a body has all of its contacts,
  * the floor's as well, from the tick on in which it wakes. */
-static void wake_touched(hapi_tick *tick)
+void hapi_contact_wake(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->world.patches->contact_count; ++i) {
+  const hapi_patches *patches = tick->world.patches;
+  for (uint32_t i = 0; patches != NULL && i < patches->contact_count; ++i) {
     placed_contact c;
     if (find_contact(tick, i, &c) && (rests(c.a) || rests(c.b)) && place(&c) &&
         c.gap + tick->period * approach(&c) <= 0.0) {
@@ -371,9 +373,6 @@ void hapi_contact_rows(hapi_tick *tick)
   hapi_local_world *world = &tick->world;
   if (world->patches == NULL) {
     return;
-  }
-  if (world->resting > 0) {
-    wake_touched(tick);
   }
   for (uint32_t i = 0; i < world->patches->contact_count; ++i) {
     placed_contact c;

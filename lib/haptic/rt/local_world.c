@@ -300,7 +300,10 @@ static void account(hapi_tick *tick)
   for (uint32_t i = 0; i < world->solver.row_count; ++i) {
     const hapi_row *row = &world->solver.rows[i];
     const hapi_row_source *source = &world->sources[i];
-    if (!source->pointer) {
+    if (source->joint) {
+      const hapi_model_joint *joint = &world->joints[source->contact];
+      world->joint_memory[joint->slot].impulse[source->part] = row->impulse;
+    } else if (!source->pointer) {
       world->memory[source->contact].impulse[source->part] = row->impulse;
       world->active += source->part == 0 && row->impulse > 0.0;
     }
@@ -315,23 +318,32 @@ static void account(hapi_tick *tick)
   }
 }
 
-/* Push-out moves the bodies, and is not to stay in their velocities: poses first, then a second
- * solve without it. */
+/* Push-out and the closing of joints move the bodies, and are not to stay in their velocities: poses first,
+ * then a second solve without them. */
 static bool stop_push_out(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->world.solver;
   bool any = false;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
-    if (tick->world.sources[i].pushes_out && solver->rows[i].impulse > 0.0) {
-      any = true;
-    }
+    const hapi_row_source *source = &tick->world.sources[i];
+    any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (tick->world.sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], 0.0);
+      hapi_row_retarget(&solver->rows[i], tick->world.sources[i].stays);
     }
   }
   return any;
+}
+
+/* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
+static void wake(hapi_tick *tick)
+{
+  if (tick->world.resting > 0) {
+    hapi_joint_wake(tick);
+    hapi_contact_wake(tick);
+    hapi_joint_wake(tick);
+  }
 }
 
 static void solve(hapi_tick *tick)
@@ -348,6 +360,8 @@ void hapi_local_world_step(hapi_tick *tick)
   begin(tick);
   set_free_velocities(tick);
   hapi_pointer_rows(tick);
+  wake(tick);
+  hapi_joint_rows(tick);
   hapi_contact_rows(tick);
   solve(tick);
   bool again = stop_push_out(tick);

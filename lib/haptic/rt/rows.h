@@ -3,7 +3,7 @@
 #ifndef HAPODE_HAPTIC_RT_ROWS_H
 #define HAPODE_HAPTIC_RT_ROWS_H
 
-/* What contact rows and pointer rows share: placing things of a body, and one row's columns. */
+/* What contact, joint and pointer rows share: placing things of a body, and one row's columns. */
 
 #include "base/vec.h"
 #include "haptic/rt/tick.h"
@@ -53,18 +53,9 @@ static inline void hapi_body_arm(const hapi_local_body *body, const double point
   }
 }
 
-/* Jacobian and response of a unit impulse along direction, sign: -1 for the second body of a
- * contact. */
-static inline void hapi_row_column(const hapi_local_body *body, const double arm[3],
-                                   const double direction[3], double sign, double j[6], double b[6])
+/* What a unit impulse along j does to the body's velocity. */
+static inline void hapi_row_response(const hapi_local_body *body, const double j[6], double b[6])
 {
-  if (body == NULL) {
-    memset(j, 0, 6 * sizeof *j);
-    memset(b, 0, 6 * sizeof *b);
-    return;
-  }
-  hapi_v3_scale(sign, direction, j);
-  hapi_v3_cross(arm, j, j + 3);
   if (!hapi_body_responds(body)) {
     memset(b, 0, 6 * sizeof *b);
   } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
@@ -76,6 +67,30 @@ static inline void hapi_row_column(const hapi_local_body *body, const double arm
           hapi_v3_dot(body->given.response[i], j) + hapi_v3_dot(body->given.response[i] + 3, j + 3);
     }
   }
+}
+
+/* Jacobian and response of a unit impulse along direction, sign: -1 for the second body of a
+ * contact. */
+static inline void hapi_row_column(const hapi_local_body *body, const double arm[3],
+                                   const double direction[3], double sign, double j[6], double b[6])
+{
+  memset(j, 0, 6 * sizeof *j);
+  if (body != NULL) {
+    hapi_v3_scale(sign, direction, j);
+    hapi_v3_cross(arm, j, j + 3);
+  }
+  hapi_row_response(body, j, b);
+}
+
+/* The same of a turn about direction. */
+static inline void hapi_row_turn_column(const hapi_local_body *body, const double direction[3],
+                                        double sign, double j[6], double b[6])
+{
+  memset(j, 0, 6 * sizeof *j);
+  if (body != NULL) {
+    hapi_v3_scale(sign, direction, j + 3);
+  }
+  hapi_row_response(body, j, b);
 }
 
 /* Velocity along j before this tick. */

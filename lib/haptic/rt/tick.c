@@ -12,6 +12,8 @@ static void keep_arrays(const hapi_local_world *from, hapi_local_world *to)
   to->old_memory = from->old_memory;
   to->buckets = from->buckets;
   to->bucket_count = from->bucket_count;
+  to->joints = from->joints;
+  to->joint_memory = from->joint_memory;
   to->sources = from->sources;
   to->row_capacity = from->row_capacity;
   to->plane_mode = from->plane_mode;
@@ -34,6 +36,8 @@ static void clear_arrays(hapi_tick *tick)
   memset(w->memory, 0, c->contacts * sizeof *w->memory);
   memset(w->old_memory, 0, c->contacts * sizeof *w->old_memory);
   memset(w->buckets, 0, w->bucket_count * sizeof *w->buckets);
+  memset(w->joints, 0, c->joints * sizeof *w->joints);
+  memset(w->joint_memory, 0, c->joints * sizeof *w->joint_memory);
   memset(w->sources, 0, w->row_capacity * sizeof *w->sources);
   memset(w->solver.rows, 0, w->row_capacity * sizeof *w->solver.rows);
   memset(w->solver.v, 0, (c->bodies + c->pointers + 1) * sizeof *w->solver.v);

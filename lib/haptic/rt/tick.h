@@ -21,6 +21,7 @@
  *   proxy          pointers that are bodies behind a spring
  *   pointer_rows   pointer contacts as rows
  *   contact_rows   contacts between bodies as rows
+ *   joint_rows     joints likewise
  *   contact_solver, direct_solver  impulses of all rows
  *
  *   report    state for physics; trace row; hash
@@ -206,11 +207,14 @@ typedef struct hapi_row_source {
   uint32_t contact; /* of the patches, or of the pointers */
   uint32_t body_a;  /* slot; HAPI_SLOT_NONE: none */
   uint32_t body_b;
-  uint8_t part; /* 0 normal, 1 and 2 friction */
+  uint8_t part; /* 0 normal, 1 and 2 friction; of a joint: see joint_rows.c */
   bool pointer;
-  bool pushes_out; /* its target lifts a body out of another one: not to stay in the velocity */
+  bool joint;      /* contact is the index of a joint */
+  bool pushes_out; /* its target lifts a body out of another one, or closes a joint: not to stay in
+                      the velocity */
   bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
                       surface that moves, a spring */
+  double stays;    /* m/s, of a row that pushes out: its target without that */
 } hapi_row_source;
 
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
@@ -220,6 +224,15 @@ typedef struct hapi_contact_memory {
   double impulse[3]; /* N s: normal, friction 1 and 2 */
 } hapi_contact_memory;
 
+#define HAPI_JOINT_PARTS 12 /* three of anchors, three of turns, motor and stops of two axes */
+#define HAPI_JOINT_ROWS 10u /* at once */
+
+/* What is kept of a joint, by slot. */
+typedef struct hapi_joint_memory {
+  uint32_t generation;
+  double impulse[HAPI_JOINT_PARTS]; /* N s, N m s */
+} hapi_joint_memory;
+
 /* The bodies' contacts and the solver's arrays, model CONTACT. */
 typedef struct hapi_local_world {
   hapi_patches *patches;       /* of the contact thread, NULL: none yet */
@@ -228,7 +241,10 @@ typedef struct hapi_local_world {
   uint32_t memory_count;
   uint32_t *buckets;        /* of the matching; HAPI_MEMORY_BUCKETS */
   uint32_t bucket_count;    /* power of 2 */
-  hapi_row_source *sources; /* of the rows; 4 x capacity.contacts */
+  hapi_model_joint *joints; /* of the model in use; capacity.joints */
+  uint32_t joint_count;
+  hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
+  hapi_row_source *sources;        /* of the rows; 4 x capacity.contacts + 10 x capacity.joints */
   hapi_solver solver;
   uint32_t row_capacity;
   uint32_t resting; /* bodies at the tick's begin */
@@ -323,8 +339,12 @@ void hapi_proxy_free(hapi_tick *tick);                        /* velocities with
 void hapi_proxy_move(hapi_tick *tick);                        /* poses and forces on the hands */
 void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
+void hapi_contact_wake(hapi_tick *tick);                      /* what is touched by what moves */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
-void hapi_guard(hapi_tick *tick);                             /* world wrench -> device wrench */
+void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
+void hapi_joint_wake(hapi_tick *tick);                /* what hangs on what moves */
+void hapi_joint_rows(hapi_tick *tick);                /* joints -> rows */
+void hapi_guard(hapi_tick *tick);                     /* world wrench -> device wrench */
 void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
 void hapi_trace_hash(hapi_tick *tick);

@@ -1,0 +1,147 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TESTS_JOINT_WORLD_H
+#define HAPODE_TESTS_JOINT_WORLD_H
+
+/* Mechanisms in a contact_world. The hand stays near the first body, so that all of it is in the range, and
+ * touches nothing unless a test says so. Include after tap.h. */
+
+#include <math.h>
+
+#include "tests/contact_world.h"
+
+#define BALL 0.03  /* m, radius of the first body's geom */
+#define NEAR 0.005 /* m, from there to the hand's */
+#define PERIOD 1e-3
+#define STEP_TICKS 20 /* of a physics step at 50 Hz */
+#define JOINTS_MAX 32
+#define CLOSED 1e-4 /* m */
+
+typedef struct mechanism {
+  contact_world w;
+  dJointID joints[JOINTS_MAX];
+  int joint_count;
+} mechanism;
+
+typedef void (*build_fn)(mechanism *m);
+
+/* Box masses; the first body has a ball as its geom, the others have none. */
+static inline dBodyID add_body(mechanism *m, double mass, const double edges[3], double x, double y,
+                               double z)
+{
+  dMass box;
+  dMassSetBoxTotal(&box, mass, edges[0], edges[1], edges[2]);
+  dGeomID geom = m->w.body_count == 0 ? dCreateSphere(m->w.space, BALL) : NULL;
+  return cw_add(&m->w, geom, &box, x, y, z);
+}
+
+static const double bar[3] = {0.2, 0.04, 0.02};
+
+static inline dJointID keep(mechanism *m, dJointID joint, dBodyID a, dBodyID b)
+{
+  dJointAttach(joint, a, b);
+  m->joints[m->joint_count++] = joint;
+  return joint;
+}
+
+static inline dJointID add_ball(mechanism *m, dBodyID a, dBodyID b, double x, double y, double z)
+{
+  dJointID joint = keep(m, dJointCreateBall(m->w.world, NULL), a, b);
+  dJointSetBallAnchor(joint, x, y, z);
+  return joint;
+}
+
+static inline dJointID add_hinge(mechanism *m, dBodyID a, dBodyID b, const double at[3],
+                                 const double axis[3])
+{
+  dJointID joint = keep(m, dJointCreateHinge(m->w.world, NULL), a, b);
+  dJointSetHingeAnchor(joint, at[0], at[1], at[2]);
+  dJointSetHingeAxis(joint, axis[0], axis[1], axis[2]);
+  return joint;
+}
+
+static inline dJointID add_slider(mechanism *m, dBodyID a, dBodyID b, const double axis[3])
+{
+  dJointID joint = keep(m, dJointCreateSlider(m->w.world, NULL), a, b);
+  dJointSetSliderAxis(joint, axis[0], axis[1], axis[2]);
+  return joint;
+}
+
+#define AT(x, y, z) ((const double[3]){(x), (y), (z)})
+
+/* ---- runs ---- */
+
+static inline void open_mechanism(mechanism *m, build_fn build, double gravity)
+{
+  memset(m, 0, sizeof *m);
+  cw_open(&m->w, gravity);
+  m->w.def.physics_hz = 1.0 / (STEP_TICKS * PERIOD);
+  dWorldSetCFM(m->w.world, 1e-10);
+  build(m);
+}
+
+static inline bool start_mechanism(mechanism *m)
+{
+  return cw_start_following(&m->w, 0.0, 0.0, BALL + m->w.hand_def.radius + NEAR);
+}
+
+static inline bool begin(mechanism *m, build_fn build, double gravity)
+{
+  open_mechanism(m, build, gravity);
+  return start_mechanism(m);
+}
+
+/* Both anchors of a joint, as ODE has them; false: the joint has none. */
+static inline bool anchors_of(dJointID joint, dVector3 a, dVector3 b)
+{
+  switch (dJointGetType(joint)) {
+    case dJointTypeBall:
+      dJointGetBallAnchor(joint, a);
+      dJointGetBallAnchor2(joint, b);
+      return true;
+    case dJointTypeHinge:
+      dJointGetHingeAnchor(joint, a);
+      dJointGetHingeAnchor2(joint, b);
+      return true;
+    case dJointTypeUniversal:
+      dJointGetUniversalAnchor(joint, a);
+      dJointGetUniversalAnchor2(joint, b);
+      return true;
+    default:
+      return false;
+  }
+}
+
+/* m, how far the joints are open at the last sync. */
+static inline double openness(const mechanism *m)
+{
+  double widest = 0.0;
+  for (int i = 0; i < m->joint_count; ++i) {
+    dVector3 a;
+    dVector3 b;
+    if (m->joints[i] != NULL && anchors_of(m->joints[i], a, b)) {
+      widest = fmax(widest, cw_norm((const double[3]){a[0] - b[0], a[1] - b[1], a[2] - b[2]}));
+    }
+  }
+  return widest;
+}
+
+static inline double turn_between(dBodyID a, dBodyID b)
+{
+  const dReal *p = dBodyGetQuaternion(a);
+  const dReal *q = dBodyGetQuaternion(b);
+  double dot = fabs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3]);
+  return 2.0 * acos(fmin(dot, 1.0));
+}
+
+/* The loop owns all of it, and nothing is probed. */
+static inline void check_owned(const mechanism *m, uint32_t bodies)
+{
+  hap_stats stats = cw_stats(&m->w);
+  CHECK(stats.range_bodies == bodies);
+  CHECK(stats.range_joints == (uint32_t)m->joint_count);
+  CHECK(stats.measured_bodies == 0 && stats.probe_steps == 0);
+  CHECK(stats.fault == 0 && stats.states_rejected == 0);
+}
+
+#endif
