@@ -17,7 +17,8 @@
 
 #define PHYSICS_HZ 20.0
 #define LARGE_WORLD 1000
-#define FAR_WORLD 4000 /* bodies, one of them near */
+#define FAR_WORLD 4000 /* bodies, one or two of them near */
+#define FAR_GAP 0.5    /* m: nothing but the floor comes into the range of the near one */
 #define FAR_SHARE 0.05 /* of one global step: what the library does for all of them */
 #define WARM_CYCLES 4
 #define CYCLES_MAX 100
@@ -28,6 +29,7 @@ typedef struct world_case {
   int bodies;
   int pointers;
   int range;
+  double gap; /* m, between the bodies; 0: the scene's */
 } world_case;
 
 static const world_case cases[] = {
@@ -35,7 +37,7 @@ static const world_case cases[] = {
     {"fig7", 1000, 1, 64},  {"fig7", FAR_WORLD, 1, 64}, {"row10", 1, 1, 64},
     {"row10", 10, 1, 64},   {"row10", 100, 1, 64},      {"row10", 1000, 1, 1},
     {"row10", 1000, 1, 4},  {"row10", 1000, 1, 16},     {"row10", 1000, 1, 64},
-    {"row10", 1000, 4, 64}, {"row10", 1000, 16, 64},
+    {"row10", 1000, 4, 64}, {"row10", 1000, 16, 64},    {"fig7", FAR_WORLD, 1, 64, FAR_GAP},
 };
 
 /* Figures of a cycle; times in ms. */
@@ -51,6 +53,7 @@ enum {
 
 typedef struct world_bed {
   const world_case *what;
+  scene_parameters parameters;
   rig rig;
   bare bare;
   size_t cycles;
@@ -67,9 +70,11 @@ static hap_status open_bed(bench *b, const world_case *what, world_bed *w)
   w->what = what;
   w->cycles = what->bodies >= LARGE_WORLD ? (b->quick ? 6 : 20) : (b->quick ? 20 : CYCLES_MAX);
   rig_options_init(&options);
-  options.parameters = cycles_scene(what->scene);
+  scene_parameters *p = &w->parameters;
+  *p = *cycles_scene(what->scene);
+  p->gap = what->gap > 0.0 ? what->gap : p->gap;
+  options.parameters = p;
   options.count = what->bodies;
-  const scene_parameters *p = options.parameters;
   for (int i = 0; i < what->pointers; ++i) {
     double x = p->size / 2 + 4 * i * (p->size + p->gap);
     snprintf(w->specs[i], sizeof w->specs[i], "virtual:path=0:%.6f/0/%.6f,hand=rigid", x,

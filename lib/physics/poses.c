@@ -142,6 +142,9 @@ void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_n
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     if (physics->table.entries[i].body != NULL) {
       add_pose(physics, i, frame);
+      if (physics->step_s > 0.0) { /* here, as each body is at hand */
+        hapi_sleep_note(&physics->table.entries[i]);
+      }
     }
   }
   pthread_mutex_unlock(&physics->poses_lock);
