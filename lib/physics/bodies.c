@@ -60,11 +60,13 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
+  hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
   uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || drawn == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL || buckets == NULL) {
     hapi_free(entries);
     hapi_free(handles);
     hapi_free(drawn);
+    hapi_free(poses);
     hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
@@ -72,14 +74,19 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
     memcpy(entries, table->entries, table->high * sizeof *entries);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
     memcpy(drawn, table->drawn, table->high * sizeof *drawn);
+    for (size_t i = 0; i < HAPI_FRAMES; ++i) {
+      memcpy(poses + i * capacity, table->poses + i * table->capacity, table->high * sizeof *poses);
+    }
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
   hapi_free(table->drawn);
+  hapi_free(table->poses);
   hapi_free(table->buckets);
   table->entries = entries;
   table->handles = handles;
   table->drawn = drawn;
+  table->poses = poses;
   table->buckets = buckets;
   table->capacity = capacity;
   table->bucket_count = capacity * 4;
@@ -101,6 +108,7 @@ void hapi_bodies_finish(hapi_body_table *table)
   hapi_free(table->entries);
   hapi_free(table->handles);
   hapi_free(table->drawn);
+  hapi_free(table->poses);
   hapi_free(table->buckets);
   memset(table, 0, sizeof *table);
 }

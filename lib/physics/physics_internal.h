@@ -90,7 +90,6 @@ typedef struct hapi_known_body {
 
 /* Of a known body. Frame number n has place n % HAPI_FRAMES. */
 typedef struct hapi_drawn {
-  hap_pose poses[HAPI_FRAMES];
   uint64_t first;          /* frame with a pose */
   uint32_t led;            /* bits: in this frame the pose is only the loop's */
   uint32_t slots[2];       /* in the trail: now, and before */
@@ -111,6 +110,7 @@ typedef struct hapi_frames {
 typedef struct hapi_body_table {
   hapi_known_body *entries;
   hapi_drawn *drawn; /* of each entry */
+  hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
   dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
