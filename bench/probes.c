@@ -117,7 +117,7 @@ hap_status bench_scaling(bench *b)
       world *w = &worlds[m][i];
       status = measure(b, sizes[i], models[m], w);
       if (status >= HAP_OK) {
-        fprintf(csv, "%d,%g,%s,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,fig7,0,0,,\n", sizes[i],
+        fprintf(csv, "%d,%g,%s,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,fig7,0,0,,,\n", sizes[i],
                 w->neighbours, hap_model_name(models[m]), w->build_ms, w->step_ms, w->tick_us,
                 w->probes, w->probe_ms, w->island_step_ms, w->library_ms);
       }

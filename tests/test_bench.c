@@ -162,7 +162,7 @@ TEST(scaling_leaves_its_table)
 {
   check_program("scaling",
                 "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,island_step_ms,"
-                "library_ms,scene,range,owned,range_ms,publish_ms",
+                "library_ms,scene,range,owned,range_ms,publish_ms,gap",
                 21);
 }
 

@@ -51,7 +51,7 @@ typedef struct hap_stats {
   double physics_ms_p99;
   double physics_ms_max;
   double physics_duty;      /* mean cycle time / H */
-  double collide_ms_mean;   /* broad and narrow phase, contact joints */
+  double collide_ms_mean;   /* broad and narrow phase, contact joints and their end */
   double neighbour_ms_mean; /* neighbours and nearest points */
   double testing_ms_mean;   /* testing simulations and what they save and restore */
   double step_ms_mean;      /* the global step */

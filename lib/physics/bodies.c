@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/vec.h"
 #include "physics/physics_internal.h"
 
 /* ODE cannot list a world's bodies, so they are found through the space's geoms and the joints, at
@@ -59,11 +60,13 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
+  hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
   uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || drawn == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL || buckets == NULL) {
     hapi_free(entries);
     hapi_free(handles);
     hapi_free(drawn);
+    hapi_free(poses);
     hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
@@ -71,14 +74,19 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
     memcpy(entries, table->entries, table->high * sizeof *entries);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
     memcpy(drawn, table->drawn, table->high * sizeof *drawn);
+    for (size_t i = 0; i < HAPI_FRAMES; ++i) {
+      memcpy(poses + i * capacity, table->poses + i * table->capacity, table->high * sizeof *poses);
+    }
   }
   hapi_free(table->entries);
   hapi_free(table->handles);
   hapi_free(table->drawn);
+  hapi_free(table->poses);
   hapi_free(table->buckets);
   table->entries = entries;
   table->handles = handles;
   table->drawn = drawn;
+  table->poses = poses;
   table->buckets = buckets;
   table->capacity = capacity;
   table->bucket_count = capacity * 4;
@@ -100,6 +108,7 @@ void hapi_bodies_finish(hapi_body_table *table)
   hapi_free(table->entries);
   hapi_free(table->handles);
   hapi_free(table->drawn);
+  hapi_free(table->poses);
   hapi_free(table->buckets);
   memset(table, 0, sizeof *table);
 }
@@ -122,7 +131,6 @@ static void begin_entry(hapi_known_body *known, dBodyID body)
   known->body = body;
   known->slot = HAPI_NONE;
   known->island = HAPI_NONE;
-  hapi_extent_follow(known);
 }
 
 static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
@@ -155,19 +163,70 @@ static void drop_entry(hapi_physics *physics, uint32_t index)
   known->slot = HAPI_NONE;
 }
 
-/* The entry of a body; where another one has come to be at the address of a destroyed one, the entry
- * begins anew. */
-static uint32_t find_living(hapi_physics *physics, dBodyID body)
+/* Where another body has come to be at the address of a destroyed one, the entry begins anew. */
+static void follow_life(hapi_physics *physics, uint32_t index)
 {
   hapi_body_table *table = &physics->table;
-  uint32_t index = hapi_bodies_find(table, body);
-  if (index != HAPI_NONE && hapi_mark_is_gone(&table->entries[index])) {
+  hapi_known_body *known = &table->entries[index];
+  if (hapi_mark_is_gone(known)) {
+    dBodyID body = known->body;
     drop_entry(physics, index);
-    begin_entry(&table->entries[index], body);
+    begin_entry(known, body);
     hapi_poses_begin(physics, index);
     ++table->replaced;
   }
+}
+
+static uint32_t find_living(hapi_physics *physics, dBodyID body)
+{
+  uint32_t index = hapi_bodies_find(&physics->table, body);
+  if (index != HAPI_NONE) {
+    follow_life(physics, index);
+  }
   return index;
+}
+
+/* In a scan, which meets most bodies in the order of the one before. */
+static uint32_t find_next(hapi_body_table *table, dBodyID body)
+{
+  uint32_t last = table->last_seen;
+  uint32_t next = last != HAPI_NONE ? table->entries[last].next : HAPI_NONE;
+  uint32_t index =
+      next < table->high && table->handles[next] == body ? next : hapi_bodies_find(table, body);
+  if (last != HAPI_NONE && index != next) {
+    table->entries[last].next = index;
+  }
+  return index;
+}
+
+/* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
+ * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
+static void look_at(hapi_physics *physics, hapi_known_body *known)
+{
+  hapi_body_table *table = &physics->table;
+  dBodyID body = known->body;
+  known->seen = table->scan;
+  ++table->seen_count;
+  known->jointed = dBodyGetJoint(body, 0) != NULL;
+  table->jointed_count += known->jointed;
+  if (hapi_extent_follow(known)) {
+    known->measured_in = table->scan;
+  }
+  if (physics->begun) {
+    hapi_sleep_follow(known);
+  }
+  hapi_v3_copy(dBodyGetForce(body), known->user_force);
+  hapi_v3_copy(dBodyGetTorque(body), known->user_torque);
+  if (known->slot != HAPI_NONE) {
+    return;
+  }
+  double speed = hapi_extent_speed(known);
+  table->fastest = speed > table->fastest ? speed : table->fastest;
+  const char *unsound = hapi_body_unsoundness(body, known->jointed);
+  if (unsound != NULL && table->unsound_body == NULL) {
+    table->unsound_body = body;
+    table->unsound_text = unsound;
+  }
 }
 
 /* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
@@ -175,7 +234,10 @@ static uint32_t find_living(hapi_physics *physics, dBodyID body)
 static bool see_body(hapi_physics *physics, dBodyID body)
 {
   hapi_body_table *table = &physics->table;
-  uint32_t index = find_living(physics, body);
+  uint32_t index = find_next(table, body);
+  if (index != HAPI_NONE && table->entries[index].seen != table->scan) {
+    follow_life(physics, index);
+  }
   if (index == HAPI_NONE) {
     table->starved = table->starved || add(table, body, &index) < HAP_OK;
     if (table->starved) {
@@ -183,14 +245,32 @@ static bool see_body(hapi_physics *physics, dBodyID body)
     }
     hapi_poses_begin(physics, index);
   }
+  table->last_seen = index;
   hapi_known_body *known = &table->entries[index];
-  known->seen = table->scan;
   known->found = true;
-  hapi_extent_follow(known);
-  if (physics->begun) {
-    hapi_sleep_follow(known);
+  if (known->seen != table->scan) { /* by another of its geoms */
+    look_at(physics, known);
   }
   return true;
+}
+
+/* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is not is looked
+ * at again in each scan. */
+static void see_geom(hapi_physics *physics, dGeomID geom)
+{
+  hapi_body_table *table = &physics->table;
+  dBodyID body = dGeomGetBody(geom);
+  hapi_known_body *known =
+      body != NULL && see_body(physics, body) ? &table->entries[table->last_seen] : NULL;
+  bool same = known != NULL && known->sized && known->measured_in != table->scan;
+  bool posed = same || body == NULL || hapi_pose_is_sound(body);
+  if (same || (posed && hapi_geom_is_sound(geom))) {
+    return;
+  }
+  table->unsound_geom = posed && table->unsound_geom == NULL ? geom : table->unsound_geom;
+  if (known != NULL) {
+    known->geoms_print = 0;
+  }
 }
 
 static void see_space(hapi_physics *physics, dSpaceID space)
@@ -200,8 +280,8 @@ static void see_space(hapi_physics *physics, dSpaceID space)
     dGeomID geom = dSpaceGetGeom(space, i);
     if (dGeomIsSpace(geom)) {
       see_space(physics, (dSpaceID)geom);
-    } else if (dGeomGetBody(geom) != NULL) {
-      (void)see_body(physics, dGeomGetBody(geom));
+    } else {
+      see_geom(physics, geom);
     }
   }
 }
@@ -227,11 +307,12 @@ static bool see_partners(hapi_physics *physics, dBodyID body)
 static void see_jointed(hapi_physics *physics)
 {
   hapi_body_table *table = &physics->table;
-  bool found = true;
+  bool found = table->jointed_count > 0;
   while (found) {
     found = false;
     for (uint32_t i = 0; i < table->high; ++i) {
-      if (table->entries[i].body != NULL && table->entries[i].seen == table->scan) {
+      const hapi_known_body *known = &table->entries[i];
+      if (known->body != NULL && known->seen == table->scan && known->jointed) {
         found = see_partners(physics, table->entries[i].body) || found;
       }
     }
@@ -271,16 +352,14 @@ static void drop_unseen(hapi_physics *physics)
 {
   hapi_body_table *table = &physics->table;
   uint32_t dropped = 0;
-  for (uint32_t i = 0; i < table->high; ++i) {
+  bool all_seen = table->seen_count == table->used;
+  for (uint32_t i = 0; i < table->high && !all_seen; ++i) {
     hapi_known_body *known = &table->entries[i];
     if (known->body == NULL || known->seen == table->scan) {
       continue;
     }
     if (lives_unseen(known)) {
-      known->seen = table->scan;
-      if (physics->begun) {
-        hapi_sleep_follow(known);
-      }
+      look_at(physics, known);
       continue;
     }
     remove_entry(physics, i);
@@ -295,12 +374,19 @@ static void drop_unseen(hapi_physics *physics)
 
 static hap_status scan(hapi_physics *physics)
 {
-  ++physics->table.scan;
-  physics->table.starved = false;
+  hapi_body_table *table = &physics->table;
+  ++table->scan;
+  table->starved = false;
+  table->seen_count = table->jointed_count = 0;
+  table->last_seen = HAPI_NONE;
+  table->fastest = 0.0;
+  table->unsound_body = NULL;
+  table->unsound_text = NULL;
+  table->unsound_geom = NULL;
   see_space(physics, physics->ode.space);
   see_jointed(physics);
   drop_unseen(physics);
-  return physics->table.starved ? HAP_ERROR_MEMORY : HAP_OK;
+  return table->starved ? HAP_ERROR_MEMORY : HAP_OK;
 }
 
 /* Those who draw look bodies up in the table. */

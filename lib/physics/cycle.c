@@ -76,7 +76,6 @@ static void global_step(hapi_physics *physics)
   hapi_world_quickstep(physics, physics->step_s);
   hapi_world_restore(physics);
   hapi_reconcile_let_go(physics);
-  hapi_sleep_note(physics);
 }
 
 static void call_step(hapi_physics *physics, hap_step_fn callback)
@@ -90,8 +89,6 @@ static void call_step(hapi_physics *physics, hap_step_fn callback)
 
 static void sync_in(hapi_physics *physics)
 {
-  /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
-  dJointGroupEmpty(physics->contact_group);
   hapi_edits_run(physics);
   follow_model(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
@@ -101,7 +98,6 @@ static void sync_in(hapi_physics *physics)
   }
   hapi_joints_scan(physics);
   hapi_reconcile_take(physics);
-  hapi_world_read_user_wrenches(physics);
   hapi_reconcile_own(physics);
 }
 
@@ -151,6 +147,9 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
+  /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
+  dJointGroupEmpty(physics->contact_group);
+  seconds[0] = lap(&watch);
   sync_in(physics);
   if (!world_is_sound(physics)) {
     return;
@@ -158,7 +157,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_reconcile_push(physics);
   seconds[4] = lap(&watch);
   hapi_world_collide(physics);
-  seconds[0] = lap(&watch);
+  seconds[0] += lap(&watch);
   hapi_neighbors_collect(physics);
   seconds[1] = lap(&watch);
   global_step(physics);
@@ -166,7 +165,8 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_reconcile_residual(physics);
   hapi_reconcile_overwrite(physics);
   hapi_neighbors_find(physics);
-  seconds[1] += lap(&watch);
+  seconds[1] += lap(&watch) - physics->range.cover.boxes_s;
+  seconds[0] += physics->range.cover.boxes_s; /* which the next collision phase finds done */
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
   seconds[2] = lap(&watch);

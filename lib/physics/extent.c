@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/vec.h"
 #include "physics/physics_internal.h"
 
 /* How far a body reaches from its origin. Measured anew when its geoms have changed: the box around a
@@ -43,7 +44,7 @@ static uint64_t mix_numbers(uint64_t print, const double *values, int count)
   return print;
 }
 
-/* Of the classes whose sizes can be set; the others are known by their address alone. */
+/* Of the classes whose sizes can be set; the others are known by their address alone, 0. */
 static int sizes_of(dGeomID geom, dVector3 out)
 {
   switch (dGeomGetClass(geom)) {
@@ -64,13 +65,16 @@ static int sizes_of(dGeomID geom, dVector3 out)
   }
 }
 
-static uint64_t print_of(dBodyID body)
+static uint64_t print_of(dBodyID body, bool *out_sized)
 {
   uint64_t print = 1;
+  *out_sized = true;
   for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     dVector3 sizes = {0};
     print = mix(print, (uint64_t)(uintptr_t)geom);
-    print = mix_numbers(print, sizes, sizes_of(geom, sizes));
+    int count = sizes_of(geom, sizes);
+    *out_sized = *out_sized && count > 0;
+    print = mix_numbers(print, sizes, count);
     if (dGeomIsOffset(geom)) {
       print = mix_numbers(print, dGeomGetOffsetPosition(geom), 3);
       print = mix_numbers(print, dGeomGetOffsetRotation(geom), 12);
@@ -79,11 +83,22 @@ static uint64_t print_of(dBodyID body)
   return print;
 }
 
-void hapi_extent_follow(hapi_known_body *known)
+bool hapi_extent_follow(hapi_known_body *known)
 {
-  uint64_t print = print_of(known->body);
-  if (print != known->geoms_print) {
-    known->geoms_print = print;
-    known->extent = measure(known->body);
+  uint64_t print = print_of(known->body, &known->sized);
+  if (print == known->geoms_print) {
+    return false;
   }
+  known->geoms_print = print;
+  known->extent = measure(known->body);
+  return true;
+}
+
+double hapi_extent_speed(const hapi_known_body *known)
+{
+  if (!dBodyIsEnabled(known->body)) {
+    return 0.0;
+  }
+  return hapi_v3_norm(dBodyGetLinearVel(known->body)) +
+         known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
 }

@@ -351,7 +351,7 @@ static void find_links(hapi_physics *physics, const hapi_known_body *known)
                        box[3] - box[2] + 2.0 * reach, box[5] - box[4] + 2.0 * reach);
     dGeomSetPosition(range->box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
                      0.5 * (box[4] + box[5]));
-    dSpaceCollide2(range->box_geom, (dGeomID)physics->ode.space, physics, link_geom);
+    hapi_cover_ask(&range->cover, physics->ode.space, range->box_geom, physics, link_geom);
   }
 }
 
@@ -536,6 +536,7 @@ static void begin_walk(hapi_physics *physics)
   range->pairs_noted = 0;
   range->joint_count = range->member_count = range->moving = 0;
   range->fastest = fastest_pointer(physics);
+  hapi_cover_begin(&range->cover);
 }
 
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
@@ -628,7 +629,8 @@ bool hapi_range_create(hapi_physics *physics)
   range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
   range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
   return range->queue != NULL && range->geoms != NULL && range->members != NULL &&
-         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL;
+         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL &&
+         hapi_cover_create(&range->cover);
 }
 
 void hapi_range_finish(hapi_physics *physics)
@@ -637,6 +639,7 @@ void hapi_range_finish(hapi_physics *physics)
   if (range->box_geom != NULL) {
     dGeomDestroy(range->box_geom);
   }
+  hapi_cover_finish(&range->cover);
   hapi_free(range->queue);
   hapi_free(range->geoms);
   hapi_free(range->links);

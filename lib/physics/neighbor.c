@@ -24,14 +24,11 @@ static double reach_of(double relative_speed, double horizon_s)
 
 static double fastest_body(const hapi_physics *physics)
 {
-  double fastest = 0.0;
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    const hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL && dBodyIsEnabled(known->body)) {
-      double speed = hapi_v3_norm(dBodyGetLinearVel(known->body)) +
-                     known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
-      fastest = speed > fastest ? speed : fastest;
-    }
+  double fastest = physics->table.fastest;
+  for (uint32_t i = 0; i < physics->body_high; ++i) { /* what the loop moved since the scan */
+    uint32_t known = physics->bodies[i].known;
+    double speed = known != HAPI_NONE ? hapi_extent_speed(&physics->table.entries[known]) : 0.0;
+    fastest = speed > fastest ? speed : fastest;
   }
   return fastest;
 }
@@ -90,6 +87,7 @@ void hapi_neighbors_collect(hapi_physics *physics)
   const hapi_state_pointer *pointers = hapi_state_pointers(physics->state);
   double fastest = fastest_body(physics);
   hood->fastest = fastest;
+  hapi_cover_begin(&hood->cover);
   for (uint32_t i = 0; i < physics->state->pointer_count; ++i) {
     if (pointers[i].generation == 0) {
       continue;
@@ -103,7 +101,7 @@ void hapi_neighbors_collect(hapi_physics *physics)
     dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
     dGeomSetCollideBits(hood->probe_geom, ~0ul);
     dGeomSetCategoryBits(hood->probe_geom, ~0ul);
-    dSpaceCollide2(hood->probe_geom, (dGeomID)physics->ode.space, physics, collect_geom);
+    hapi_cover_ask(&hood->cover, physics->ode.space, hood->probe_geom, physics, collect_geom);
   }
 }
 
@@ -288,7 +286,8 @@ void hapi_neighbors_find(hapi_physics *physics)
   }
   int64_t begin_ns = hapi_clock_now();
   hapi_range_walk(physics, count);
-  hapi_counts_range(physics, 1e-9 * (double)(hapi_clock_now() - begin_ns));
+  hapi_counts_range(physics,
+                    1e-9 * (double)(hapi_clock_now() - begin_ns) - physics->range.cover.boxes_s);
   hapi_slots_end_model(physics);
 }
 

@@ -256,14 +256,3 @@ void hapi_world_quickstep(hapi_physics *physics, double step_s)
   ++physics->figures.stats.quickstep_calls;
   dWorldQuickStep(physics->ode.world, step_s);
 }
-
-void hapi_world_read_user_wrenches(hapi_physics *physics)
-{
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL) {
-      hapi_v3_copy(dBodyGetForce(known->body), known->user_force);
-      hapi_v3_copy(dBodyGetTorque(known->body), known->user_torque);
-    }
-  }
-}

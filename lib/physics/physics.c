@@ -37,8 +37,8 @@ static bool allocate(hapi_physics *physics)
          hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
          physics->test.contacts != NULL && physics->test.rounds != NULL &&
          physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
-         hapi_joints_create(physics) && physics->contact_scratch != NULL &&
-         hapi_bodies_init(&physics->table) == HAP_OK;
+         hapi_joints_create(physics) && hapi_cover_create(&hood->cover) &&
+         physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
 }
 
 static bool init_locks(hapi_physics *physics)
@@ -123,6 +123,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_test_finish(&physics->test);
   hapi_free(physics->bodies);
   hapi_free(physics->contacts);
+  hapi_cover_finish(&physics->neighborhood.cover);
   hapi_free(physics->neighborhood.candidates);
   hapi_free(physics->neighborhood.hits);
   hapi_free(physics->neighborhood.vertices);
@@ -164,7 +165,6 @@ double hapi_period_of(const hapi_physics *physics, hap_model model)
 static void build_first_model(hapi_physics *physics)
 {
   hapi_reconcile_take(physics);
-  hapi_world_read_user_wrenches(physics);
   hapi_world_collide(physics);
   hapi_neighbors_collect(physics);
   hapi_neighbors_find(physics);
@@ -175,7 +175,6 @@ static void build_first_model(hapi_physics *physics)
 static void prepare(hapi_physics *physics)
 {
   reset_figures(physics);
-  hapi_slots_reset(physics);
   hapi_range_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
@@ -197,6 +196,7 @@ static void prepare(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->begun = true;
+  hapi_slots_reset(physics);  /* of a session before: the scan leaves what is local to others */
   hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
   if (status >= HAP_OK) {

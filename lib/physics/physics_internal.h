@@ -57,27 +57,32 @@ typedef struct hapi_mark {
 } hapi_mark;
 
 typedef struct hapi_known_body {
-  dBodyID body;  /* NULL: free entry */
-  uint64_t seen; /* scan that found it */
+  dBodyID body;         /* NULL: free entry */
+  uint64_t seen;        /* scan that found it */
+  uint32_t next;        /* entry that the last scan saw after it; a guess */
+  uint32_t slot;        /* local slot, HAPI_NONE: not local */
+  uint64_t measured_in; /* scan that found its geoms changed */
   bool adopted;
   bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool enabled_before;  /* scratch of the probe's flag pass */
+  bool sized; /* all of its geoms are of classes whose sizes are in geoms_print */
+  bool jointed;
+  bool loop_owned; /* in the newest message, also while its slot retires */
+  bool loop_touched;
+  bool enabled_before; /* scratch of the probe's flag pass */
+  double extent;       /* m, from the body's origin to the far corner of its geoms */
+  uint64_t
+      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
+  double user_force[3]; /* accumulators before the last global step */
+  double user_torque[3];
+  hapi_mark mark;
+  hapi_sleep sleep;
   uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in;   /* scratch: model that it was chosen for */
   uint64_t ranged_in;   /* scratch: walk that met it */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
-  uint32_t slot;        /* local slot, HAPI_NONE: not local */
-  bool loop_owned;      /* in the newest message, also while its slot retires */
-  bool loop_touched;
   double damping[2];    /* scratch of soft.c */
-  double extent;        /* m, from the body's origin to the far corner of its geoms */
-  uint64_t geoms_print; /* of the geoms that it was measured of */
-  double user_force[3]; /* accumulators before the last global step */
-  double user_torque[3];
   void (*moved_callback)(dBodyID);
-  hapi_sleep sleep;
-  hapi_mark mark;
 } hapi_known_body;
 
 /* ---- poses.c: what is drawn ---- */
@@ -87,7 +92,6 @@ typedef struct hapi_known_body {
 
 /* Of a known body. Frame number n has place n % HAPI_FRAMES. */
 typedef struct hapi_drawn {
-  hap_pose poses[HAPI_FRAMES];
   uint64_t first;          /* frame with a pose */
   uint32_t led;            /* bits: in this frame the pose is only the loop's */
   uint32_t slots[2];       /* in the trail: now, and before */
@@ -108,6 +112,7 @@ typedef struct hapi_frames {
 typedef struct hapi_body_table {
   hapi_known_body *entries;
   hapi_drawn *drawn; /* of each entry */
+  hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
   dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high;     /* entries in use are below */
@@ -115,6 +120,13 @@ typedef struct hapi_body_table {
   uint32_t bucket_count;
   uint32_t used;
   uint64_t scan;
+  uint32_t seen_count;    /* entries that this scan saw */
+  uint32_t jointed_count; /* of those with joints */
+  uint32_t last_seen;
+  double fastest;       /* m/s, surface of the bodies that are awake and not local */
+  dBodyID unsound_body; /* the first one that the scan met, NULL: none; not of the local ones */
+  const char *unsound_text;
+  dGeomID unsound_geom;
   uint64_t lost;
   uint32_t replaced; /* among them, not counted yet: another one is at the address */
   bool said_lost;
@@ -228,6 +240,28 @@ typedef struct hapi_contact_slot {
   double measured[6][3]; /* scratch: a of this cycle's probes, before it is known to be good */
 } hapi_contact_slot;
 
+/* ---- cover.c ---- */
+
+typedef struct hapi_covered {
+  dReal box[6];
+  dGeomID geom;
+} hapi_covered;
+
+/* Of a round of questions to a space, in which nothing moves. Zeroed, then created. */
+typedef struct hapi_cover {
+  dGeomID box_geom; /* private, in no space */
+  bool filled;      /* found holds what is in the box */
+  bool has_box;
+  bool has_asked;
+  bool missing;   /* no memory for one */
+  dReal box[6];   /* also while it is not filled: what is to be in it */
+  dReal asked[6]; /* all questions of this round */
+  double boxes_s; /* spent in this round on ODE's boxes around what moved */
+  hapi_covered *found;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_cover;
+
 /* ---- neighbor.c ---- */
 
 typedef struct hapi_candidate {
@@ -250,7 +284,8 @@ typedef struct hapi_neighborhood {
   hapi_candidate *candidates;
   uint32_t candidate_capacity;
   uint32_t candidate_count;
-  struct hapi_hit *hits;    /* candidate_capacity */
+  struct hapi_hit *hits; /* candidate_capacity */
+  hapi_cover cover;
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
   double current_reach;
@@ -285,6 +320,7 @@ typedef struct hapi_range {
   double own_speed; /* m/s, while ODE calls back */
   double fastest;   /* m/s, of the pointers */
   dGeomID box_geom; /* private, in no space */
+  hapi_cover cover;
   dGeomID own_geom; /* while ODE calls back */
   dBodyID own_body;
   dReal own_box[6];
@@ -522,7 +558,9 @@ hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
                                           void (*callback)(dBodyID));
 
 /* extent.c */
-void hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed */
+bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
+/* m/s, of its surface; 0 for one that sleeps */
+double hapi_extent_speed(const hapi_known_body *known);
 
 /* mark.c: tells a body from a later one at its address */
 void hapi_mark_place(hapi_known_body *known);
@@ -539,7 +577,9 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
 
 /* soundness.c: what ODE would abort the process on, or make no number of. *out_text says what it is and
  * what to do. */
-bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text);
+bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text); /* after a scan */
+const char *hapi_body_unsoundness(dBodyID body, bool jointed);           /* NULL: it is sound */
+bool hapi_geom_is_sound(dGeomID geom);
 /* What a collider found is made of numbers. */
 bool hapi_contact_is_sound(const dContactGeom *contact);
 
@@ -547,13 +587,12 @@ bool hapi_contact_is_sound(const dContactGeom *contact);
 void hapi_sleep_follow(hapi_known_body *known);             /* takes over; and what is set later */
 void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
 void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
-void hapi_sleep_note(hapi_physics *physics);                /* just after it */
+void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes one */
 
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
-void hapi_world_read_user_wrenches(hapi_physics *physics);
-double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
+double hapi_body_mass(dBodyID body);                             /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
 bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
@@ -570,6 +609,15 @@ void hapi_soften(double step_ratio, double *erp, double *cfm);
  * by restore. */
 void hapi_world_convert(hapi_physics *physics);
 void hapi_world_restore(hapi_physics *physics);
+
+/* cover.c */
+bool hapi_cover_create(hapi_cover *cover);
+void hapi_cover_finish(hapi_cover *cover);
+void hapi_cover_begin(hapi_cover *cover); /* a round: what was moved since counts */
+/* As dSpaceCollide2(geom, space, data, callback), of a geom in no space that collides with all. The
+ * callback gets the geoms inside of nested spaces, or such a space to ask itself. */
+void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
+                    dNearCallback *callback);
 
 /* local_range.c: model CONTACT */
 bool hapi_range_create(hapi_physics *physics);

@@ -120,16 +120,21 @@ static void note_slot(const hapi_physics *physics, const hapi_known_body *known,
   }
 }
 
+static hap_pose *pose_in(const hapi_body_table *table, const hapi_drawn *drawn, uint64_t frame)
+{
+  return &table->poses[(frame % HAPI_FRAMES) * table->capacity + (size_t)(drawn - table->drawn)];
+}
+
 static void add_pose(const hapi_physics *physics, uint32_t index, uint64_t frame)
 {
   const hapi_known_body *known = &physics->table.entries[index];
   hapi_drawn *drawn = &physics->table.drawn[index];
   uint32_t bit = 1u << (frame % HAPI_FRAMES);
   if (hapi_pose_is_sound(known->body)) {
-    hapi_pose_read(known->body, &drawn->poses[frame % HAPI_FRAMES]);
+    hapi_pose_read(known->body, pose_in(&physics->table, drawn, frame));
     drawn->first = drawn->first > frame ? frame : drawn->first;
   } else if (drawn->first < frame) {
-    drawn->poses[frame % HAPI_FRAMES] = drawn->poses[(frame - 1) % HAPI_FRAMES];
+    *pose_in(&physics->table, drawn, frame) = *pose_in(&physics->table, drawn, frame - 1);
   }
   drawn->led = led_by_loop(physics, known) ? drawn->led | bit : drawn->led & ~bit;
   note_slot(physics, known, drawn);
@@ -142,6 +147,9 @@ void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_n
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     if (physics->table.entries[i].body != NULL) {
       add_pose(physics, i, frame);
+      if (physics->step_s > 0.0) { /* here, as each body is at hand */
+        hapi_sleep_note(&physics->table.entries[i]);
+      }
     }
   }
   pthread_mutex_unlock(&physics->poses_lock);
@@ -201,7 +209,7 @@ static void sample_frame(const drawing *d, const hapi_drawn *drawn, uint64_t fra
 {
   out->time_ns = stamp_of(d, frame);
   out->frame = frame;
-  out->pose = drawn->poses[frame % HAPI_FRAMES];
+  out->pose = *pose_in(&d->physics->table, drawn, frame);
 }
 
 static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample *out)
@@ -274,7 +282,8 @@ static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last,
   }
   double interval = (double)(last->time_ns - stamp_of(d, before));
   double since = fmin((double)(d->time_ns - last->time_ns), step_ns(d->physics));
-  hapi_pose_slerp(&drawn->poses[before % HAPI_FRAMES], &last->pose, 1.0 + since / interval, out);
+  hapi_pose_slerp(pose_in(&d->physics->table, drawn, before), &last->pose, 1.0 + since / interval,
+                  out);
 }
 
 static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)

@@ -207,18 +207,15 @@ void hapi_sleep_step(hapi_physics *physics, double step_s)
       start_countdown(&known->sleep); /* dBodyEnable does so; being woken by an island does not */
     }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
-    if (awake && (dBodyGetNumJoints(known->body) > 0 || touches_in_loop(known))) {
+    if (awake && (dBodyGetJoint(known->body, 0) != NULL || touches_in_loop(known))) {
       step_body(known, step_s);
     }
   }
 }
 
-void hapi_sleep_note(hapi_physics *physics)
+void hapi_sleep_note(hapi_known_body *known)
 {
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL && known->sleep.automatic) {
-      known->sleep.awake = dBodyIsEnabled(known->body) != 0;
-    }
+  if (known->sleep.automatic) {
+    known->sleep.awake = dBodyIsEnabled(known->body) != 0;
   }
 }

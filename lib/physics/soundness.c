@@ -63,7 +63,7 @@ static const char *damping_unsoundness(dBodyID body)
   return good ? NULL : "has a damping or a largest angular speed that is not a number, or above 1";
 }
 
-static const char *body_unsoundness(dBodyID body)
+static const char *state_unsoundness(dBodyID body)
 {
   const char *what = dBodyIsKinematic(body) ? NULL : mass_unsoundness(body);
   if (what != NULL) {
@@ -174,30 +174,28 @@ static bool joints_are_sound(dBodyID body)
   return true;
 }
 
+const char *hapi_body_unsoundness(dBodyID body, bool jointed)
+{
+  const char *what = state_unsoundness(body);
+  if (what == NULL && jointed && !joints_are_sound(body)) {
+    what = "has a joint with an anchor or a parameter that is not finite or beyond 1e12";
+  }
+  return what;
+}
+
 /* ---- geoms ---- */
 
 /* The box around a geom has all of its numbers in it. A collider would loop or end on them. */
-static dGeomID unsound_geom(dSpaceID space)
+bool hapi_geom_is_sound(dGeomID geom)
 {
-  int count = dSpaceGetNumGeoms(space);
-  for (int i = 0; i < count; ++i) {
-    dGeomID geom = dSpaceGetGeom(space, i);
-    dReal box[6];
-    if (dGeomIsSpace(geom)) {
-      dGeomID inside = unsound_geom((dSpaceID)geom);
-      if (inside != NULL) {
-        return inside;
-      }
-      continue;
-    }
-    dGeomGetAABB(geom, box);
-    for (int k = 0; k < 6; ++k) {
-      if (isnan(box[k])) { /* infinite is what a plane is */
-        return geom;
-      }
+  dReal box[6];
+  dGeomGetAABB(geom, box);
+  for (int k = 0; k < 6; ++k) {
+    if (isnan(box[k])) { /* infinite is what a plane is */
+      return false;
     }
   }
-  return NULL;
+  return true;
 }
 
 bool hapi_contact_is_sound(const dContactGeom *contact)
@@ -233,6 +231,21 @@ static void say(hap_detail *out, dBodyID body, const char *what)
            p[2], what, dBodyIsKinematic(body) ? "" : ", or make the body kinematic");
 }
 
+/* The local ones: since the scan they may have been given what the loop made of them. */
+static bool local_is_unsound(const hapi_physics *physics, hap_detail *out_text)
+{
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    uint32_t index = physics->bodies[i].known;
+    const hapi_known_body *known = index != HAPI_NONE ? &physics->table.entries[index] : NULL;
+    const char *what = known != NULL ? hapi_body_unsoundness(known->body, known->jointed) : NULL;
+    if (what != NULL) {
+      say(out_text, known->body, what);
+      return true;
+    }
+  }
+  return false;
+}
+
 bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text)
 {
   const hapi_body_table *table = &physics->table;
@@ -241,22 +254,17 @@ bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text)
     snprintf(out_text->text, sizeof out_text->text, "the world has %s: set it right", what);
     return true;
   }
-  for (uint32_t i = 0; i < table->high; ++i) {
-    dBodyID body = table->handles[i];
-    what = body != NULL ? body_unsoundness(body) : NULL;
-    if (body != NULL && what == NULL && !joints_are_sound(body)) {
-      what = "has a joint with an anchor or a parameter that is not finite or beyond 1e12";
-    }
-    if (what != NULL) {
-      say(out_text, body, what);
-      return true;
-    }
+  if (table->unsound_body != NULL) {
+    say(out_text, table->unsound_body, table->unsound_text);
+    return true;
   }
-  dGeomID geom = unsound_geom(physics->ode.space);
-  if (geom != NULL) {
+  if (local_is_unsound(physics, out_text)) {
+    return true;
+  }
+  if (table->unsound_geom != NULL) {
     snprintf(out_text->text, sizeof out_text->text,
              "a geom of class %d has a pose or size that is not a number: set it right",
-             dGeomGetClass(geom));
+             dGeomGetClass(table->unsound_geom));
   }
-  return geom != NULL;
+  return table->unsound_geom != NULL;
 }
