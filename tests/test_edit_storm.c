@@ -92,7 +92,7 @@ TEST(frame)
 }
 
 /* Told of what goes, lockstep has the same bits in every run, whatever addresses the heap gives. Ten seconds at
- * most: of two runs of a minute one pair was seen to differ, and why is not known yet. */
+ * most; in model contact pairs of runs of ten seconds and more were seen to differ, and why is not known yet. */
 TEST(lockstep_repeats_bit_by_bit)
 {
   for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_CONTACT; ++model) {

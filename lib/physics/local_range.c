@@ -167,6 +167,13 @@ static uint64_t key_of(dGeomID a, dGeomID b, uint32_t part)
   return mix(x + y) ^ mix(part + 1u); /* whichever of the two was met first */
 }
 
+/* A geom may get the address of a destroyed one: then its body's slot has another generation, and
+ * the pair is another one, to which no contact impulses are handed down. */
+static uint64_t holder_of(const hapi_near_geom *geom)
+{
+  return geom->body == HAPI_SLOT_NONE ? 0 : mix(((uint64_t)geom->body << 32) | geom->generation);
+}
+
 static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom_b, uint32_t part)
 {
   hapi_near *near = physics->range.near;
@@ -178,7 +185,9 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
     return;
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
-  pair->key = key_of(link->own, link->other, part);
+  const hapi_near_geom *geoms = hapi_near_geoms(near);
+  pair->key =
+      key_of(link->own, link->other, part) + holder_of(&geoms[geom_a]) + holder_of(&geoms[geom_b]);
   pair->geom_a = turned ? geom_b : geom_a;
   pair->geom_b = turned ? geom_a : geom_b;
   pair->surface = link->surface;
