@@ -367,3 +367,80 @@ hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double res
   memcpy(response, tidy.m, sizeof tidy.m);
   return excess > SOLVER_SLACK ? HAPI_ADMITTANCE_CLIPPED : HAPI_ADMITTANCE_GOOD;
 }
+
+/* ---- a joint ---- */
+
+/* Of the joint's answer, between none at all and one that lets nothing pass. A spring that is weaker than
+ * this within a step is not seen. */
+#define ROW_LEAST 1e-8
+
+static double scale_of(const double wrench[6])
+{
+  return fmax(hapi_v3_norm(wrench), hapi_v3_norm(wrench + 3));
+}
+
+/* An eigenvector u of value s in the measure of the free pair: wrench L^-T u, answered by 1 and softness
+ * 1 / s - 1. */
+static void row_of(const matrix *l, const matrix *vectors, int which, double share,
+                   hapi_constraint_row *out)
+{
+  matrix u = {{{0.0}}};
+  for (int i = 0; i < 6; ++i) {
+    u.m[i][0] = vectors->m[i][which];
+  }
+  solve_upper(l, 6, &u);
+  for (int i = 0; i < 6; ++i) {
+    out->wrench[i] = u.m[i][0];
+  }
+  double scale = 1.0 / scale_of(out->wrench);
+  for (int i = 0; i < 6; ++i) {
+    out->wrench[i] *= scale;
+  }
+  out->softness = scale * scale * (1.0 / share - 1.0);
+}
+
+/* b = L^T b L */
+static void from_measure(const matrix *l, matrix *b)
+{
+  matrix up = *l;
+  matrix half;
+  transpose(6, &up);
+  multiply_transposed(&up, b, 6, &half); /* b is symmetric */
+  multiply_transposed(&half, &up, 6, b);
+}
+
+hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[6][6],
+                                     hapi_constraint_row out[6], int *out_count)
+{
+  matrix bound;
+  matrix l;
+  matrix b;
+  matrix vectors;
+  double most = 0.0;
+  *out_count = 0;
+  memcpy(bound.m, free, sizeof bound.m);
+  memcpy(b.m, held, sizeof b.m);
+  symmetrise(6, &b);
+  if (!hapi_finite(&held[0][0], 36) || !cholesky(&bound, 6, &l)) {
+    return HAPI_ADMITTANCE_SINGULAR;
+  }
+  from_measure(&l, &b);
+  if (!plausible(&b, 6)) {
+    return HAPI_ADMITTANCE_SINGULAR;
+  }
+  eigen(&b, 6, &vectors);
+  for (bool taken[6] = {false}; *out_count < 6;) {
+    int best = -1;
+    for (int i = 0; i < 6; ++i) {
+      best = !taken[i] && (best < 0 || b.m[i][i] > b.m[best][best]) ? i : best;
+    }
+    double share = fmax(0.0, fmin(1.0, b.m[best][best]));
+    most = fmax(most, fabs(b.m[best][best] - share));
+    taken[best] = true;
+    if (share <= ROW_LEAST) {
+      break;
+    }
+    row_of(&l, &vectors, best, share, &out[(*out_count)++]);
+  }
+  return most > SOLVER_SLACK ? HAPI_ADMITTANCE_CLIPPED : HAPI_ADMITTANCE_GOOD;
+}

@@ -36,4 +36,18 @@ hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const dou
  * 1e-3. */
 hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double response[6][6]);
 
+/* One equation of a joint: wrench . (velocity of one body against the other) + softness impulse = target,
+ * where an impulse gives wrench x impulse to the one body and the reaction to the other. */
+typedef struct hapi_constraint_row {
+  double wrench[6]; /* force and torque about the centre of mass of the one; one of them of length 1 */
+  double softness;  /* (velocity along wrench) / impulse, >= 0 */
+} hapi_constraint_row;
+
+/* Equations that hold two bodies as a joint was seen to do. free[6][6]: relative velocity at the centre of
+ * the one by a unit impulse there, with no joint; held[6][6]: impulse of the joint by a unit of that
+ * velocity, with the sign turned. free^-1 >= held >= 0 for every direction, else it is CLIPPED;
+ * SINGULAR: no numbers, or far outside. Sorted, the stiffest first; *out_count is 0 to 6. */
+hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[6][6],
+                                     hapi_constraint_row out[6], int *out_count);
+
 #endif

@@ -169,6 +169,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[0] += physics->range.cover.boxes_s; /* which the next collision phase finds done */
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
+  hapi_joint_probes(physics);
   seconds[2] = lap(&watch);
   sync_out(physics, now_ns, next_ns);
   seconds[4] += lap(&watch);

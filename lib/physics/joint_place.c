@@ -223,6 +223,8 @@ static bool read_place(const hapi_known_joint *known, reading *r)
     case HAPI_JOINT_FIXED:
       read_fixed(r, known->bodies[1] != NULL);
       break;
+    case HAPI_JOINT_MEASURED:
+      break;
   }
   return good && place_is_finite(&r->place);
 }
@@ -310,6 +312,7 @@ static bool same_place(hapi_joint_kind kind, const hapi_joint_place *was, const 
     case HAPI_JOINT_HINGE2:
       return anchors && axis_a && near_to(was->axis_b, is->axis_b) && same_angle(kind, was, r, 0);
     case HAPI_JOINT_FIXED:
+    case HAPI_JOINT_MEASURED:
       return true; /* nothing of it can be read: see has_been_moved */
   }
   return false;

@@ -103,6 +103,8 @@ static void drop_unseen(hapi_joint_table *table)
   for (uint32_t i = 0; i < table->count; ++i) {
     if (table->entries[i].seen == table->scan) {
       table->entries[kept++] = table->entries[i];
+    } else {
+      hapi_free(table->entries[i].measurement);
     }
   }
   if (kept < table->count) {
@@ -111,8 +113,17 @@ static void drop_unseen(hapi_joint_table *table)
   }
 }
 
+static void forget_measurements(hapi_joint_table *table)
+{
+  for (uint32_t i = 0; i < table->count; ++i) {
+    hapi_free(table->entries[i].measurement);
+    table->entries[i].measurement = NULL;
+  }
+}
+
 void hapi_joints_finish(hapi_joint_table *table)
 {
+  forget_measurements(table);
   hapi_free(table->entries);
   hapi_free(table->buckets);
   hapi_free(table->slots);
@@ -151,6 +162,8 @@ static void look_at(hapi_physics *physics, hapi_known_joint *known, bool is_new)
   known->kind = kind;
   known->carried = carried;
   if (other) {
+    hapi_free(known->measurement);
+    known->measurement = NULL;
     known->usable = false;
     known->left_is_known = false;
   }
@@ -201,6 +214,7 @@ void hapi_joints_leave(hapi_physics *physics)
 void hapi_joints_reset(hapi_physics *physics)
 {
   hapi_joint_table *table = &physics->joints;
+  forget_measurements(table);
   table->count = 0;
   if (table->bucket_count > 0) {
     rebuild_buckets(table);
@@ -350,14 +364,28 @@ static void fill_parameters(const hapi_physics *physics, const hapi_known_joint 
       out->linear = softness_of(physics, dJointGetFixedParam(joint, dParamERP),
                                 dJointGetFixedParam(joint, dParamCFM));
       break;
+    case HAPI_JOINT_MEASURED:
+      break;
+  }
+}
+
+static void fill_limits(const hapi_physics *physics, const hapi_known_joint *known,
+                        hapi_model_joint *out)
+{
+  hapi_joint_axis axes[HAPI_JOINT_LIMITS];
+  int count = hapi_joint_axes(known, axes);
+  for (int i = 0; i < count; ++i) {
+    fill_limit(physics, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
   }
 }
 
 static void fill(hapi_physics *physics, const hapi_known_joint *known, hapi_model_joint *out)
 {
   memset(out, 0, sizeof *out);
-  const hapi_body_slot *a = slot_of(physics, known->index[0]);
-  const hapi_body_slot *b = slot_of(physics, known->index[1]);
+  const hapi_joint_measurement *measured = known->carried ? NULL : known->measurement;
+  uint32_t first = measured != NULL ? measured->first : 0;
+  const hapi_body_slot *a = slot_of(physics, known->index[first]);
+  const hapi_body_slot *b = slot_of(physics, known->index[1 - first]);
   out->slot = known->slot;
   out->generation = physics->joints.slots[known->slot].generation;
   out->kind = known->kind;
@@ -365,6 +393,13 @@ static void fill(hapi_physics *physics, const hapi_known_joint *known, hapi_mode
   out->generation_a = a->generation;
   out->body_b = b != NULL ? (uint32_t)(b - physics->bodies) : HAPI_SLOT_NONE;
   out->generation_b = b != NULL ? b->generation : 0;
+  if (measured != NULL) {
+    out->kind = HAPI_JOINT_MEASURED;
+    out->place = measured->place;
+    out->measured = measured->found;
+    fill_limits(physics, known, out);
+    return;
+  }
   out->place = known->place;
   fill_parameters(physics, known, out);
 }

@@ -58,6 +58,16 @@ static bool add_partner(hapi_physics *physics, uint32_t known)
   return (fixed || !refused) && add_member(physics, known);
 }
 
+/* Whether the loop has rows for it: of its kind, or those that testing simulations found. */
+static bool has_rows(const hapi_range *range, hapi_known_joint *known)
+{
+  if (known->carried) {
+    return known->usable;
+  }
+  known->wanted_in = range->number;
+  return known->measurement != NULL && known->measurement->good;
+}
+
 static bool add_joint(hapi_physics *physics, dJointID joint)
 {
   hapi_range *range = &physics->range;
@@ -67,7 +77,7 @@ static bool add_joint(hapi_physics *physics, dJointID joint)
   }
   hapi_known_joint *known = &physics->joints.entries[index];
   bool others = known->bodies[1] != NULL;
-  if (!known->carried || !known->usable || known->index[0] == HAPI_NONE ||
+  if (!has_rows(range, known) || known->index[0] == HAPI_NONE ||
       (others && known->index[1] == HAPI_NONE)) {
     return false;
   }

@@ -135,6 +135,30 @@ typedef struct hapi_body_table {
 
 /* ---- joints.c: what is known of the world's joints ---- */
 
+/* ---- joint_axes.c ---- */
+
+/* A free axis with its motor and stops. */
+typedef struct hapi_joint_axis {
+  dReal (*get)(dJointID, int);
+  int group;
+  uint32_t carrier; /* HAPI_CARRIER_*, of the joint's bodies in ODE's own order */
+  bool slides;
+  double direction[3]; /* world */
+  double position;
+} hapi_joint_axis;
+
+/* ---- joint_probe.c: joints that the loop has no rows of its own for ---- */
+
+typedef struct hapi_joint_measurement {
+  bool good;     /* what follows holds */
+  uint32_t first; /* of the joint's bodies, the one that was pushed */
+  hapi_measured_joint found;
+  hapi_joint_place place;
+  double turn[2][4];    /* orientations of the pushed body and the other one, world */
+  double held[6][6];    /* see hapi_admittance_rows, world axes */
+  double error;         /* 0.., what turning the measurement before this one on would have missed */
+} hapi_joint_measurement;
+
 typedef struct hapi_known_joint {
   dJointID joint;
   uint64_t seen;     /* scan that found it */
@@ -151,6 +175,8 @@ typedef struct hapi_known_joint {
   uint64_t ranged_in;     /* model that it is in */
   uint32_t slot;          /* HAPI_NONE: not in the newest model */
   double meant[3][2];     /* scratch of soft.c */
+  uint64_t wanted_in;     /* walk that would have taken it if it were measured */
+  hapi_joint_measurement *measurement; /* owned; NULL: none */
 } hapi_known_joint;
 
 typedef struct hapi_joint_slot {
@@ -507,6 +533,7 @@ struct hapi_physics {
   bool begun;
   unsigned islands_threads; /* ODE's setting as it was found */
   bool said_not_probed;     /* of a transmission, once a session */
+  bool said_not_held;       /* of a joint that cannot be measured, likewise */
   bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
   bool cycling;             /* not at the start */
   uint16_t model_next;      /* hap_model wanted at the end of the cycle */
@@ -605,6 +632,10 @@ bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double ou
 /* soft.c */
 /* Constraint parameters of step H as those of step T: the same spring and damper. */
 void hapi_soften(double step_ratio, double *erp, double *cfm);
+void hapi_joint_soften(hapi_known_joint *known, double step_ratio); /* its own parameters ... */
+void hapi_joint_restore(const hapi_known_joint *known);             /* ... and back */
+double hapi_joint_erp(const hapi_known_joint *known);
+void hapi_joint_leave_open(const hapi_known_joint *known, bool open, double step_ratio);
 /* Model SINGLE steps at T: ERP, CFM and damping of the world and its bodies as meant for H. Undone
  * by restore. */
 void hapi_world_convert(hapi_physics *physics);
@@ -649,6 +680,16 @@ bool hapi_joint_kind_of(dJointID joint, hapi_joint_kind *out); /* false: not one
 /* is_new: as it is now; else only where it is another than it was. Sets usable. */
 void hapi_joint_read(hapi_known_joint *known, bool is_new);
 void hapi_joint_leave(hapi_known_joint *known);
+void hapi_joint_probes(hapi_physics *physics); /* of the joints that the walk asks for */
+/* joint_axes.c */
+/* Motors and stops of other joints, as far as ODE says where their axes are. */
+typedef struct hapi_joint_limits {
+  double values[HAPI_JOINT_LIMITS][3];
+} hapi_joint_limits;
+
+int hapi_joint_axes(const hapi_known_joint *known, hapi_joint_axis out[HAPI_JOINT_LIMITS]);
+void hapi_joint_take_limits(const hapi_known_joint *known, hapi_joint_limits *out);
+void hapi_joint_give_limits(const hapi_known_joint *known, const hapi_joint_limits *limits);
 
 /* mesh.c */
 /* Triangles of a static mesh that meet a box of the world, into physics->meshes.found;
@@ -719,6 +760,8 @@ hap_status hapi_test_gather(hapi_physics *physics);
 hap_status hapi_test_gather_bodies(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
 hap_status hapi_test_enter(hapi_physics *physics);
+/* Two bodies (HAPI_NONE: none) and nothing that holds them but the joint. */
+hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2]);
 void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
 /* One testing simulation from the saved state; forces were added by prepare. */
 void hapi_test_rewind(hapi_physics *physics);

@@ -304,6 +304,47 @@ hap_status hapi_test_enter(hapi_physics *physics)
   return status;
 }
 
+static hap_status cut_others(hapi_physics *physics, dJointID kept)
+{
+  hapi_test_set *test = &physics->test;
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    dBodyID body = physics->table.entries[test->members[i]].body;
+    int joints = dBodyGetNumJoints(body);
+    if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
+                      sizeof(dJointID))) {
+      return HAP_ERROR_MEMORY;
+    }
+    for (int k = 0; k < joints; ++k) {
+      dJointID joint = dBodyGetJoint(body, k);
+      if (joint != kept && dJointIsEnabled(joint)) {
+        dJointDisable(joint);
+        test->cut[test->cut_count++] = joint;
+      }
+    }
+  }
+  return HAP_OK;
+}
+
+hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2])
+{
+  begin_gathering(physics);
+  physics->test.mechanisms = true;
+  physics->test.island_count = 1;
+  for (int i = 0; i < 2; ++i) {
+    if (index[i] != HAPI_NONE && !add_member(physics, index[i], 0)) {
+      return HAP_ERROR_MEMORY;
+    }
+  }
+  hap_status status = hapi_test_enter(physics);
+  if (status >= HAP_OK) {
+    status = cut_others(physics, joint);
+    if (status < HAP_OK) {
+      hapi_test_leave(physics);
+    }
+  }
+  return status;
+}
+
 void hapi_test_leave(hapi_physics *physics)
 {
   hapi_test_set *test = &physics->test;

@@ -110,6 +110,8 @@ typedef struct joint_parameters {
 
 static const joint_parameters own_parameters[] = {
     {dJointTypeBall, dJointGetBallParam, dJointSetBallParam, 1, {{dParamERP, dParamCFM}}},
+    {dJointTypeDBall, dJointGetDBallParam, dJointSetDBallParam, 1, {{dParamERP, dParamCFM}}},
+    {dJointTypeDHinge, dJointGetDHingeParam, dJointSetDHingeParam, 1, {{dParamERP, dParamCFM}}},
     {dJointTypeFixed, dJointGetFixedParam, dJointSetFixedParam, 1, {{dParamERP, dParamCFM}}},
     {dJointTypeHinge, dJointGetHingeParam, dJointSetHingeParam, 1, {STOP(0)}},
     {dJointTypeSlider, dJointGetSliderParam, dJointSetSliderParam, 1, {STOP(0)}},
@@ -137,7 +139,7 @@ static const joint_parameters *parameters_of(dJointID joint)
   return NULL;
 }
 
-static void convert_joint(hapi_known_joint *known, double ratio)
+void hapi_joint_soften(hapi_known_joint *known, double ratio)
 {
   const joint_parameters *own = parameters_of(known->joint);
   for (int i = 0; own != NULL && i < own->count; ++i) {
@@ -152,7 +154,30 @@ static void convert_joint(hapi_known_joint *known, double ratio)
   }
 }
 
-static void restore_joint(const hapi_known_joint *known)
+/* The largest error reduction of its own, 0 where it has none. */
+double hapi_joint_erp(const hapi_known_joint *known)
+{
+  const joint_parameters *own = parameters_of(known->joint);
+  double most = 0.0;
+  for (int i = 0; own != NULL && i < own->count; ++i) {
+    most = fmax(most, own->get(known->joint, own->names[i][0]));
+  }
+  return most;
+}
+
+/* Between soften and restore. */
+void hapi_joint_leave_open(const hapi_known_joint *known, bool open, double ratio)
+{
+  const joint_parameters *own = parameters_of(known->joint);
+  for (int i = 0; own != NULL && i < own->count; ++i) {
+    double erp = known->meant[i][0];
+    double cfm = known->meant[i][1];
+    hapi_soften(ratio, &erp, &cfm);
+    own->set(known->joint, own->names[i][0], open ? 0.0 : erp);
+  }
+}
+
+void hapi_joint_restore(const hapi_known_joint *known)
 {
   const joint_parameters *own = parameters_of(known->joint);
   for (int i = 0; own != NULL && i < own->count; ++i) {
@@ -175,7 +200,7 @@ void hapi_world_convert(hapi_physics *physics)
   dWorldSetCFM(world, cfm);
   physics->converted = true;
   for (uint32_t i = 0; i < physics->joints.count; ++i) {
-    convert_joint(&physics->joints.entries[i], ratio);
+    hapi_joint_soften(&physics->joints.entries[i], ratio);
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
@@ -199,7 +224,7 @@ void hapi_world_restore(hapi_physics *physics)
   dWorldSetERP(physics->ode.world, physics->meant_erp);
   dWorldSetCFM(physics->ode.world, physics->meant_cfm);
   for (uint32_t i = 0; i < physics->joints.count; ++i) {
-    restore_joint(&physics->joints.entries[i]);
+    hapi_joint_restore(&physics->joints.entries[i]);
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     const hapi_known_body *known = &physics->table.entries[i];

@@ -175,6 +175,19 @@ static uint64_t hash_joint(uint64_t hash, const hapi_model_joint *j)
   return hash;
 }
 
+static uint64_t hash_measured(uint64_t hash, const hapi_measured_joint *m)
+{
+  hash = hapi_hash_word(hash, ((uint64_t)m->carrier << 32) | m->row_count);
+  for (uint32_t i = 0; i < m->row_count; ++i) {
+    const hapi_measured_row *row = &m->rows[i];
+    const double values[] = {row->softness.erp, row->softness.cfm, row->error, row->speed};
+    hash = hapi_hash_doubles(hash, row->force, 3);
+    hash = hapi_hash_doubles(hash, row->torque, 3);
+    hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+  }
+  return hapi_hash_doubles(hash, m->given, 6);
+}
+
 static uint64_t hash_model(const hapi_physics *physics)
 {
   hapi_model *model = hapi_exchange_model_back(physics->config.exchange);
@@ -198,7 +211,9 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, c[i].a[0], 18);
   }
   for (uint32_t i = 0; i < model->joint_count; ++i) {
-    hash = hash_joint(hash, &hapi_model_joints(model)[i]);
+    const hapi_model_joint *joint = &hapi_model_joints(model)[i];
+    hash = hash_joint(hash, joint);
+    hash = joint->kind == HAPI_JOINT_MEASURED ? hash_measured(hash, &joint->measured) : hash;
   }
   return hash;
 }

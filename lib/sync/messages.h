@@ -125,8 +125,44 @@ typedef enum hapi_joint_kind {
   HAPI_JOINT_SLIDER,
   HAPI_JOINT_UNIVERSAL,
   HAPI_JOINT_HINGE2,
-  HAPI_JOINT_FIXED
+  HAPI_JOINT_FIXED,
+  HAPI_JOINT_MEASURED /* any other: the rows that testing simulations found */
 } hapi_joint_kind;
+
+#define HAPI_MEASURED_ROWS 6u
+#define HAPI_JOINT_LIMITS 3
+
+/* Wrench on the first body about its centre of mass, with the reaction on the second one. */
+typedef struct hapi_measured_row {
+  double force[3]; /* frame of the carrier; the longer of force and torque, N and N m, is 1 */
+  double torque[3];
+  hapi_softness softness;
+  double error;   /* m, rad: how far the row was open then */
+  double speed;   /* m/s, rad/s: that it asks for beside that, as of a motor */
+  double impulse; /* N s, N m s that it took in a tick then */
+} hapi_measured_row;
+
+enum { HAPI_CARRIER_FIRST = 0, HAPI_CARRIER_SECOND = 1, HAPI_CARRIER_WORLD = 2 };
+
+/* A free axis of such a joint, of which ODE says where it is. */
+typedef struct hapi_measured_axis {
+  double direction[3]; /* carrier's frame; of any length, see AMotor */
+  uint32_t carrier;
+  bool slides;
+  double position; /* as of hapi_model_limit, then */
+} hapi_measured_axis;
+
+/* What testing simulations found a joint to be, where its bodies were then: the two parts of
+ * hapi_joint_place that say that are turn and anchor_b, the centre of the first body in the second one. */
+typedef struct hapi_measured_joint {
+  uint32_t number; /* of the measurement: another one has other rows */
+  uint32_t row_count;
+  uint32_t carrier; /* 0, 1: the body that the rows turn with */
+  double ahead_s;   /* of hapi_model.state_ns: the measurement is for this time */
+  hapi_measured_row rows[HAPI_MEASURED_ROWS];
+  double given[6]; /* N, N m on the first body, carrier's frame: of a motor at its limit */
+  hapi_measured_axis axes[HAPI_JOINT_LIMITS];
+} hapi_measured_joint;
 
 /* Where a joint is, in the frames of its bodies (static world: world frame). Two axes: the one of body a
  * and the one of body b; a universal joint and a hinge-2 turn about both. An angle about an axis goes
@@ -159,7 +195,8 @@ typedef struct hapi_model_joint {
   hapi_softness along;   /* hinge-2: the suspension, along axis_a */
   hapi_softness linear;  /* anchors */
   hapi_softness angular; /* orientations */
-  hapi_model_limit limits[2];
+  hapi_model_limit limits[HAPI_JOINT_LIMITS];
+  hapi_measured_joint measured; /* of that kind */
 } hapi_model_joint;
 
 typedef struct hapi_model {

@@ -29,7 +29,8 @@
 enum {
   PART_ANCHOR = 0,
   PART_TURN = 3,
-  PART_AXIS = 6 /* three for each: motor, low stop, high stop */
+  PART_GIVEN = 6,
+  PART_AXIS = 7 /* three for each: motor, low stop, high stop */
 };
 
 typedef struct placed_joint {
@@ -37,13 +38,14 @@ typedef struct placed_joint {
   uint32_t index;
   hapi_local_body *a;
   hapi_local_body *b;  /* NULL: static world */
-  double axes[2][3];   /* world */
+  double axes[HAPI_JOINT_LIMITS][3]; /* world */
   double across[2][3]; /* to the first axis and to each other */
   double arm_a[3];
   double arm_b[3];
   double open[3];    /* from the anchor in a to the one in b */
   double opening[3]; /* its rate, and what the turning of the bodies adds to that in a second */
   double bend[3];
+  double turned[3]; /* the second body in the first, from where place.turn has it; small */
   bool driven; /* a body of given motion takes part */
   double was[HAPI_JOINT_PARTS];
 } placed_joint;
@@ -276,20 +278,107 @@ static void hold_cross(hapi_tick *tick, const placed_joint *j)
 
 static void hold_orientation(hapi_tick *tick, const placed_joint *j)
 {
-  const double *a = j->a->pose.quat_wxyz;
-  const double back_a[4] = {a[0], -a[1], -a[2], -a[3]};
-  const double *turn = j->in->place.turn;
-  const double back_turn[4] = {turn[0], -turn[1], -turn[2], -turn[3]};
-  const double none[4] = {1.0, 0.0, 0.0, 0.0};
-  double q[4];
-  double error[3];
-  hapi_quat_multiply(back_a, j->b != NULL ? j->b->pose.quat_wxyz : none, q);
-  hapi_quat_multiply(q, back_turn, q);
-  hapi_m3_apply(j->a->rotation, q + 1, error);
-  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, error, error); /* of half the angle; small */
   for (int i = 0; i < 3; ++i) {
-    hold_turn(tick, j, PART_TURN + i, world_axes[i], (error_of){error[i], 0.0});
+    hold_turn(tick, j, PART_TURN + i, world_axes[i], (error_of){j->turned[i], 0.0});
   }
+}
+
+/* ---- joints that testing simulations found ---- */
+
+static const hapi_local_body *carrier_of(const placed_joint *j)
+{
+  return j->in->measured.carrier == 0 ? j->a : j->b;
+}
+
+static void wrench_columns(const placed_joint *j, const double force[3], const double torque[3],
+                           hapi_row *row)
+{
+  double apart[3] = {0.0, 0.0, 0.0};
+  double moment[3];
+  memset(row->jb, 0, sizeof row->jb);
+  hapi_v3_copy(force, row->ja);
+  hapi_v3_copy(torque, row->ja + 3);
+  if (j->b != NULL) { /* the reaction, so that no momentum is made */
+    hapi_v3_sub(j->a->pose.position, j->b->pose.position, apart);
+    hapi_v3_cross(apart, force, moment);
+    hapi_v3_add(moment, torque, moment);
+    hapi_v3_scale(-1.0, force, row->jb);
+    hapi_v3_scale(-1.0, moment, row->jb + 3);
+  }
+  hapi_row_response(j->a, row->ja, row->ba);
+  hapi_row_response(j->b, row->jb, row->bb);
+}
+
+/* Second derivative of how far a row is open, at constant velocities: its directions turn with the
+ * carrier. */
+static double bend_of_row(const placed_joint *j, const double force[3], const double torque[3])
+{
+  const hapi_local_body *carrier = carrier_of(j);
+  double turning[3];
+  double bending[3];
+  double spin[3] = {0.0, 0.0, 0.0};
+  rate_of(carrier, force, turning);
+  bend_of(carrier, force, bending);
+  double bend = hapi_v3_dot(force, j->bend) + 2.0 * hapi_v3_dot(turning, j->opening) +
+                hapi_v3_dot(bending, j->open);
+  rate_of(carrier, torque, turning);
+  if (turns(j->b)) {
+    hapi_v3_copy(j->b->start_twist + 3, spin);
+  }
+  if (turns(j->a)) {
+    hapi_v3_sub(spin, j->a->start_twist + 3, spin);
+  }
+  return bend + hapi_v3_dot(turning, spin);
+}
+
+static void hold_measured_row(hapi_tick *tick, const placed_joint *j, int part)
+{
+  const hapi_measured_row *in = &j->in->measured.rows[part];
+  double force[3];
+  double torque[3];
+  hapi_row *row = next_row(tick, j, part);
+  if (row == NULL) {
+    return;
+  }
+  hapi_body_vector(carrier_of(j), in->force, force);
+  hapi_body_vector(carrier_of(j), in->torque, torque);
+  wrench_columns(j, force, torque, row);
+  double age = 1e-9 * (double)(tick->now_ns - tick->state_ns) - j->in->measured.ahead_s;
+  double way = hapi_v3_dot(force, j->open) + hapi_v3_dot(torque, j->turned) + in->speed * age;
+  error_of error = {in->error + way, bend_of_row(j, force, torque)};
+  correct(tick, &in->softness, error, row);
+  row->target += in->speed;
+  tick->world.sources[tick->world.solver.row_count - 1].stays += in->speed;
+  tick->world.sources[tick->world.solver.row_count - 1].gives |= in->speed != 0.0;
+  finish_row(tick, in->softness.cfm);
+}
+
+/* What a motor at its limit gives. */
+static void give_measured(hapi_tick *tick, const placed_joint *j)
+{
+  double force[3];
+  double torque[3];
+  const double *given = j->in->measured.given;
+  if (hapi_dot6(given, given) == 0.0) {
+    return;
+  }
+  hapi_row *row = next_row(tick, j, PART_GIVEN);
+  if (row != NULL) {
+    hapi_body_vector(carrier_of(j), given, force);
+    hapi_body_vector(carrier_of(j), given + 3, torque);
+    wrench_columns(j, force, torque, row);
+    row->lo = row->hi = tick->period;
+    tick->world.sources[tick->world.solver.row_count - 1].gives = true;
+    finish_row(tick, 0.0);
+  }
+}
+
+static void hold_measured(hapi_tick *tick, const placed_joint *j)
+{
+  for (uint32_t i = 0; i < j->in->measured.row_count; ++i) {
+    hold_measured_row(tick, j, (int)i);
+  }
+  give_measured(tick, j);
 }
 
 /* ---- stops and motors ---- */
@@ -329,6 +418,10 @@ static double position_of(const placed_joint *j, int which)
   if (j->in->kind == HAPI_JOINT_SLIDER) {
     return -hapi_v3_dot(j->open, j->axes[0]);
   }
+  if (j->in->kind == HAPI_JOINT_MEASURED) {
+    const hapi_measured_axis *axis = &j->in->measured.axes[which];
+    return axis->position - hapi_v3_dot(axis->slides ? j->open : j->turned, j->axes[which]);
+  }
   hapi_body_vector(j->b, j->in->place.reference_b, behind);
   if (which == 1) {
     return angle_about(j->axes[1], behind, j->axes[0]);
@@ -337,11 +430,32 @@ static double position_of(const placed_joint *j, int which)
   return angle_about(j->axes[0], hinge ? behind : j->axes[1], j->across[0]);
 }
 
+/* As of a slider: halfway between the centres. */
+static hapi_row *measured_slide(hapi_tick *tick, const placed_joint *j, int part,
+                                const double direction[3])
+{
+  double middle[3] = {0.0, 0.0, 0.0};
+  double moment[3];
+  hapi_row *row = next_row(tick, j, part);
+  if (row != NULL) {
+    if (j->b != NULL) {
+      hapi_v3_sub(j->b->pose.position, j->a->pose.position, middle);
+      hapi_v3_scale(0.5, middle, middle);
+    }
+    hapi_v3_cross(middle, direction, moment);
+    wrench_columns(j, direction, moment, row);
+  }
+  return row;
+}
+
 static hapi_row *axis_row(hapi_tick *tick, const placed_joint *j, int which, int part, double sign)
 {
   double direction[3];
   hapi_v3_scale(sign, j->axes[which], direction);
   part += PART_AXIS + 3 * which;
+  if (j->in->kind == HAPI_JOINT_MEASURED && j->in->measured.axes[which].slides) {
+    return measured_slide(tick, j, part, direction);
+  }
   return j->in->kind == HAPI_JOINT_SLIDER ? anchor_row(tick, j, part, direction)
                                           : turn_row(tick, j, part, direction);
 }
@@ -426,7 +540,7 @@ static void add_stop(hapi_tick *tick, const placed_joint *j, int which, double g
 
 static void add_limits(hapi_tick *tick, const placed_joint *j)
 {
-  for (int which = 0; which < 2; ++which) {
+  for (int which = 0; which < HAPI_JOINT_LIMITS; ++which) {
     const hapi_model_limit *limit = &j->in->limits[which];
     if (limit->flags == 0) {
       continue;
@@ -505,6 +619,29 @@ static void place_motion(placed_joint *j, const double anchor_a[3], const double
   }
 }
 
+static void find_turned(const placed_joint *j, double out[3])
+{
+  const double *a = j->a->pose.quat_wxyz;
+  const double back_a[4] = {a[0], -a[1], -a[2], -a[3]};
+  const double *turn = j->in->place.turn;
+  const double back_turn[4] = {turn[0], -turn[1], -turn[2], -turn[3]};
+  const double none[4] = {1.0, 0.0, 0.0, 0.0};
+  double q[4];
+  hapi_quat_multiply(back_a, j->b != NULL ? j->b->pose.quat_wxyz : none, q);
+  hapi_quat_multiply(q, back_turn, q);
+  hapi_m3_apply(j->a->rotation, q + 1, out);
+  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, out, out); /* of half the angle */
+}
+
+static void place_measured_axes(placed_joint *j)
+{
+  for (int i = 0; i < HAPI_JOINT_LIMITS; ++i) {
+    const hapi_measured_axis *axis = &j->in->measured.axes[i];
+    const hapi_local_body *carriers[] = {j->a, j->b, NULL};
+    hapi_body_vector(carriers[axis->carrier], axis->direction, j->axes[i]);
+  }
+}
+
 static void place(placed_joint *j)
 {
   const hapi_joint_place *in = &j->in->place;
@@ -513,12 +650,17 @@ static void place(placed_joint *j)
   hapi_body_point(j->a, in->anchor_a, anchor_a);
   hapi_body_point(j->b, in->anchor_b, anchor_b);
   hapi_v3_sub(anchor_b, anchor_a, j->open);
-  hapi_body_vector(j->a, in->axis_a, j->axes[0]);
-  hapi_body_vector(j->b, in->axis_b, j->axes[1]);
-  hapi_body_vector(j->a, in->reference_a, j->across[0]);
-  hapi_v3_cross(j->axes[0], j->across[0], j->across[1]);
+  if (j->in->kind == HAPI_JOINT_MEASURED) {
+    place_measured_axes(j);
+  } else {
+    hapi_body_vector(j->a, in->axis_a, j->axes[0]);
+    hapi_body_vector(j->b, in->axis_b, j->axes[1]);
+    hapi_body_vector(j->a, in->reference_a, j->across[0]);
+    hapi_v3_cross(j->axes[0], j->across[0], j->across[1]);
+  }
   place_arms(j, anchor_a, anchor_b);
   place_motion(j, anchor_a, anchor_b);
+  find_turned(j, j->turned);
   j->driven = is_given(j->a) || is_given(j->b);
 }
 
@@ -547,6 +689,9 @@ static void add_joint(hapi_tick *tick, const placed_joint *j)
     case HAPI_JOINT_FIXED:
       hold_point(tick, j);
       hold_orientation(tick, j);
+      break;
+    case HAPI_JOINT_MEASURED:
+      hold_measured(tick, j);
       break;
   }
   add_limits(tick, j);
@@ -598,6 +743,15 @@ void hapi_joint_wake(hapi_tick *tick)
   }
 }
 
+/* The rows of one measurement are not those of another. */
+static void adopt_measurement(const hapi_measured_joint *in, hapi_joint_memory *memory)
+{
+  memory->measurement = in->number;
+  for (uint32_t i = 0; i < in->row_count; ++i) {
+    memory->impulse[i] = in->rows[i].impulse;
+  }
+}
+
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model)
 {
   hapi_local_world *world = &tick->world;
@@ -609,6 +763,9 @@ void hapi_joint_adopt(hapi_tick *tick, hapi_model *model)
     if (memory->generation != in[i].generation) {
       memset(memory, 0, sizeof *memory);
       memory->generation = in[i].generation;
+    }
+    if (in[i].kind == HAPI_JOINT_MEASURED && memory->measurement != in[i].measured.number) {
+      adopt_measurement(&in[i].measured, memory);
     }
   }
 }

@@ -224,12 +224,13 @@ typedef struct hapi_contact_memory {
   double impulse[3]; /* N s: normal, friction 1 and 2 */
 } hapi_contact_memory;
 
-#define HAPI_JOINT_PARTS 12 /* three of anchors, three of turns, motor and stops of two axes */
+#define HAPI_JOINT_PARTS 16 /* six that hold, one given, motor and stops of three axes */
 #define HAPI_JOINT_ROWS 10u /* at once */
 
 /* What is kept of a joint, by slot. */
 typedef struct hapi_joint_memory {
   uint32_t generation;
+  uint32_t measurement; /* whose rows the impulses are of */
   double impulse[HAPI_JOINT_PARTS]; /* N s, N m s */
 } hapi_joint_memory;
 
