@@ -66,6 +66,18 @@ dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
   return hinge;
 }
 
+dJointID scene_add_piston(scene *s, dBodyID a, dBodyID b, const double anchor[3],
+                          const double axis[3], double force)
+{
+  const dJointID piston = dJointCreatePiston(s->world, NULL);
+  dJointAttach(piston, a, b);
+  dJointSetPistonAnchor(piston, anchor[0], anchor[1], anchor[2]);
+  dJointSetPistonAxis(piston, axis[0], axis[1], axis[2]);
+  dJointSetPistonParam(piston, dParamFMax1, force);
+  dJointSetPistonParam(piston, dParamFMax2, s->parameters.hinge_torque);
+  return piston;
+}
+
 dJointID scene_add_slider(scene *s, dBodyID a, const double axis[3])
 {
   const dJointID slider = dJointCreateSlider(s->world, NULL);

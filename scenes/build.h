@@ -43,6 +43,8 @@ dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
                          const double axis[3]);
 
 /* A slider on the world, through the body's centre. */
+dJointID scene_add_piston(scene *s, dBodyID a, dBodyID b, const double anchor[3],
+                          const double axis[3], double force);
 dJointID scene_add_slider(scene *s, dBodyID a, const double axis[3]);
 
 /* cubes.c */
@@ -69,6 +71,7 @@ void scene_build_spheres(scene *s);
 /* mechanisms.c */
 void scene_build_door(scene *s);
 void scene_build_lightstand(scene *s);
+void scene_build_telescope(scene *s);
 void scene_build_pendulum(scene *s);
 void scene_build_hinged(scene *s);
 void scene_build_cart(scene *s);

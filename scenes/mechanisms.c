@@ -55,13 +55,16 @@ static void add_dice(scene *s)
   dBodySetRotation(capsule, rotation);
 }
 
-/* The paper's Fig. 8: lamp head, two arms and a heavy base, hinges along y whose friction holds the
- * pose; dice beside it. */
-void scene_build_lightstand(scene *s)
+static const double head_joint[3] = {0.072, 0, 0.268};
+
+/* Lamp head, two arms and a heavy base, hinges along y whose friction holds the pose; dice beside it. Out:
+ * the head and the upper arm, which are not joined. */
+static void add_stand(scene *s, dBodyID *out_head, dBodyID *out_upper)
 {
   const double head_radius = 0.035;
   const double base_edges[3] = {0.16, 0.16, 0.03};
-  const double joints[3][3] = {{0, 0, 0.04}, {-0.036, 0, 0.19}, {0.072, 0, 0.268}};
+  const double joints[3][3] = {
+      {0, 0, 0.04}, {-0.036, 0, 0.19}, {head_joint[0], head_joint[1], head_joint[2]}};
   const double axis[3] = {0, 1, 0};
   scene_add_floor(s);
   const dBodyID head = scene_add_cylinder(s, head_radius, 0.05, s->parameters.mass,
@@ -71,10 +74,32 @@ void scene_build_lightstand(scene *s)
   const dBodyID lower = add_rod(s, 0.4, joints[0], joints[1]);
   const dBodyID base = scene_add_box(
       s, base_edges, 2.0, (const double[3]){0, 0, base_edges[2] / 2 - s->parameters.layer});
-  const dBodyID chain[] = {base, lower, upper, head};
-  for (size_t i = 0; i + 1 < COUNT_OF(chain); ++i) {
-    scene_add_hinge(s, chain[i + 1], chain[i], joints[i], axis);
-  }
+  scene_add_hinge(s, lower, base, joints[0], axis);
+  scene_add_hinge(s, upper, lower, joints[1], axis);
+  *out_head = head;
+  *out_upper = upper;
+}
+
+/* The paper's Fig. 8. */
+void scene_build_lightstand(scene *s)
+{
+  dBodyID head;
+  dBodyID upper;
+  add_stand(s, &head, &upper);
+  scene_add_hinge(s, head, upper, head_joint, (const double[3]){0, 1, 0});
+}
+
+/* The same with a joint that ODE has and the loop does not: the head slides along the upper arm and turns
+ * about it, each against friction. */
+void scene_build_telescope(scene *s)
+{
+  const double hold = 2; /* N: twice the weight of the head */
+  dBodyID head;
+  dBodyID upper;
+  add_stand(s, &head, &upper);
+  const double along = hypot(0.108, 0.078);
+  scene_add_piston(s, head, upper, head_joint, (const double[3]){0.108 / along, 0, 0.078 / along},
+                   hold);
 }
 
 /* A rod that hangs from a hinge along y at the origin. */

@@ -380,8 +380,16 @@ static void build_overdetermined(test_world *w, bool walls)
   dJointID fixed = dJointCreateFixed(w->world, NULL);
   dJointAttach(fixed, cube, NULL);
   dJointSetFixed(fixed);
-  /* One that the loop does not have, without rows: it would own the cube. */
-  dJointAttach(dJointCreateAMotor(w->world, NULL), cube, NULL);
+  /* A shape that the loop does not know: it would own the cube. */
+  static const double corners[] = {0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0};
+  static const dTriIndex triangle[] = {0, 1, 2};
+  dTriMeshDataID data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 3, triangle, 3,
+                              3 * (int)sizeof(dTriIndex));
+  dGeomID inside = dCreateTriMesh(w->space, data, NULL, NULL, NULL);
+  dGeomSetCategoryBits(inside, 0); /* touches nothing */
+  dGeomSetCollideBits(inside, 0);
+  dGeomSetBody(inside, cube);
 }
 
 TEST(an_overdetermined_body_stays_in_bounds)
@@ -417,6 +425,113 @@ TEST(an_overdetermined_body_stays_in_bounds)
   }
 }
 
+/* ---- equations of a joint ---- */
+
+static void random_spd(double out[6][6])
+{
+  double half[6][6];
+  for (int i = 0; i < 36; ++i) {
+    half[i / 6][i % 6] = random_number();
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      out[i][k] = i == k ? 0.1 : 0.0;
+      for (int j = 0; j < 6; ++j) {
+        out[i][k] += half[i][j] * half[k][j];
+      }
+    }
+  }
+}
+
+/* held of rows w with softness c that do not meet each other: sum w w^T / (w free w + c), with each made
+ * orthogonal to those before it. */
+static void hold_by(const double free[6][6], double rows[6][6], const double softness[6], int count,
+                    double out[6][6])
+{
+  memset(out, 0, 36 * sizeof **out);
+  for (int r = 0; r < count; ++r) {
+    double answer[6];
+    for (int s = 0; s <= r; ++s) {
+      for (int i = 0; i < 6; ++i) {
+        answer[i] = 0.0;
+        for (int k = 0; k < 6; ++k) {
+          answer[i] += free[i][k] * rows[s][k];
+        }
+      }
+      double size = 0.0;
+      double along = 0.0;
+      for (int i = 0; i < 6; ++i) {
+        size += rows[s][i] * answer[i];
+        along += rows[r][i] * answer[i];
+      }
+      for (int i = 0; i < 6 && s < r; ++i) {
+        rows[r][i] -= along / size * rows[s][i];
+      }
+      for (int i = 0; i < 36 && s == r; ++i) {
+        out[i / 6][i % 6] += rows[r][i / 6] * rows[r][i % 6] / (size + softness[r]);
+      }
+    }
+  }
+}
+
+/* Whatever rows come out, together they answer as those that went in. */
+TEST(rows_answer_as_the_joint_does)
+{
+  for (int round = 0; round < 200; ++round) {
+    double free[6][6];
+    double rows[6][6];
+    double softness[6];
+    double held[6][6];
+    double again[6][6];
+    hapi_constraint_row found[6];
+    int count = round % 7;
+    int out = -1;
+    random_spd(free);
+    for (int r = 0; r < 6; ++r) {
+      softness[r] = round % 3 == 0 ? 0.0 : pow(10.0, 2.0 * random_number());
+      for (int i = 0; i < 6; ++i) {
+        rows[r][i] = random_number();
+      }
+    }
+    hold_by((const double(*)[6])free, rows, softness, count, held);
+    CHECK(hapi_admittance_rows((const double(*)[6])free, (const double(*)[6])held, found, &out) ==
+          HAPI_ADMITTANCE_GOOD);
+    CHECK(out == count);
+    for (int r = 0; r < out; ++r) {
+      memcpy(rows[r], found[r].wrench, sizeof rows[r]);
+      softness[r] = found[r].softness;
+      double size = fmax(hapi_v3_norm(rows[r]), hapi_v3_norm(rows[r] + 3));
+      CHECK_NEAR(size, 1.0, 1e-12);
+      CHECK(softness[r] >= 0.0 && (round % 3 != 0 || softness[r] < 1e-9));
+    }
+    hold_by((const double(*)[6])free, rows, softness, out, again);
+    for (int i = 0; i < 36; ++i) {
+      CHECK_NEAR(again[i / 6][i % 6], held[i / 6][i % 6], 1e-7);
+    }
+  }
+}
+
+TEST(rows_of_what_is_no_joint_are_refused)
+{
+  double free[6][6];
+  double held[6][6] = {{0.0}};
+  hapi_constraint_row found[6];
+  int out = -1;
+  random_spd(free);
+  held[2][3] = NAN;
+  CHECK(hapi_admittance_rows((const double(*)[6])free, (const double(*)[6])held, found, &out) ==
+        HAPI_ADMITTANCE_SINGULAR);
+  held[2][3] = 0.0;
+  held[1][1] = 1e6; /* pushes back more than it was pushed */
+  CHECK(hapi_admittance_rows((const double(*)[6])free, (const double(*)[6])held, found, &out) ==
+        HAPI_ADMITTANCE_SINGULAR);
+  CHECK(out == 0);
+  held[1][1] = -0.1 / free[1][1]; /* draws on what gives way */
+  CHECK(hapi_admittance_rows((const double(*)[6])free, (const double(*)[6])held, found, &out) ==
+        HAPI_ADMITTANCE_CLIPPED);
+  CHECK(out == 0);
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -427,6 +542,8 @@ int main(void)
   RUN(the_bounds_hold_for_every_direction);
   RUN(what_friction_does_is_kept);
   RUN(a_singular_probe_keeps_the_last_good_one);
+  RUN(rows_answer_as_the_joint_does);
+  RUN(rows_of_what_is_no_joint_are_refused);
   RUN(an_overdetermined_body_stays_in_bounds);
   dCloseODE();
   return tap_done();

@@ -130,7 +130,7 @@ typedef struct hap_stats {
 
   uint32_t range_joints; /* model CONTACT: joints that the loop holds itself, in the newest model */
   uint32_t measured_joints; /* of these, the ones whose equations come from testing simulations */
-  double joint_error;       /* 0.., the largest share by which such equations were off at the end of the
+  double joint_error; /* 0.., the largest share by which such equations were off at the end of the
                                last interval: they turn with a body until the next sync */
 } hap_stats;
 

@@ -429,13 +429,15 @@ hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[
     return HAPI_ADMITTANCE_SINGULAR;
   }
   eigen(&b, 6, &vectors);
+  for (int i = 0; i < 6; ++i) {
+    most = fmax(most, fabs(b.m[i][i] - fmax(0.0, fmin(1.0, b.m[i][i]))));
+  }
   for (bool taken[6] = {false}; *out_count < 6;) {
     int best = -1;
     for (int i = 0; i < 6; ++i) {
       best = !taken[i] && (best < 0 || b.m[i][i] > b.m[best][best]) ? i : best;
     }
     double share = fmax(0.0, fmin(1.0, b.m[best][best]));
-    most = fmax(most, fabs(b.m[best][best] - share));
     taken[best] = true;
     if (share <= ROW_LEAST) {
       break;

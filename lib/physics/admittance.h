@@ -39,8 +39,9 @@ hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double res
 /* One equation of a joint: wrench . (velocity of one body against the other) + softness impulse = target,
  * where an impulse gives wrench x impulse to the one body and the reaction to the other. */
 typedef struct hapi_constraint_row {
-  double wrench[6]; /* force and torque about the centre of mass of the one; one of them of length 1 */
-  double softness;  /* (velocity along wrench) / impulse, >= 0 */
+  double
+      wrench[6]; /* force and torque about the centre of mass of the one; one of them of length 1 */
+  double softness; /* (velocity along wrench) / impulse, >= 0 */
 } hapi_constraint_row;
 
 /* Equations that hold two bodies as a joint was seen to do. free[6][6]: relative velocity at the centre of

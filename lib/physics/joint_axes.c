@@ -48,14 +48,15 @@ static void read_motor(dJointID joint, int which, bool turned, hapi_joint_axis *
 {
   static const uint32_t euler[] = {HAPI_CARRIER_SECOND, HAPI_CARRIER_FIRST, HAPI_CARRIER_FIRST};
   static const uint32_t user[] = {HAPI_CARRIER_WORLD, HAPI_CARRIER_FIRST, HAPI_CARRIER_SECOND};
-  dVector3 axis;
+  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
   dJointGetAMotorAxis(joint, which, axis);
   hapi_v3_copy(axis, out->direction);
   out->position = dJointGetAMotorAngle(joint, which);
   out->carrier = dJointGetAMotorMode(joint) == dAMotorEuler
                      ? euler[which]
                      : user[dJointGetAMotorAxisRel(joint, which)];
-  if (turned && out->carrier != HAPI_CARRIER_WORLD) { /* ODE answers for the order of dJointAttach */
+  if (turned &&
+      out->carrier != HAPI_CARRIER_WORLD) { /* ODE answers for the order of dJointAttach */
     out->carrier = 1 - out->carrier;
   }
 }
@@ -63,7 +64,7 @@ static void read_motor(dJointID joint, int which, bool turned, hapi_joint_axis *
 static void read_sliding(dJointID joint, int which, bool turned, hapi_joint_axis *out)
 {
   bool piston = dJointGetType(joint) == dJointTypePiston;
-  dVector3 axis;
+  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
   out->slides = which == 0;
   out->carrier = HAPI_CARRIER_FIRST;
   if (piston) {

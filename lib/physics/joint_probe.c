@@ -22,33 +22,34 @@
  * is as it was, 2; one whose bodies rest, none. ODE's exact stepper makes them (dWorldStep): at most six
  * equations, and no friction. */
 
-#define PUSH_SPEED 1e-3 /* m/s, that a push gives in a step */
+#define PUSH_SPEED 1e-3   /* m/s, that a push gives in a step */
 #define SPRING_SHARE 0.98 /* of a rigid joint's impulse: below it the row is a spring */
 #define SPRING_WAY 1e-6   /* m, rad */
-#define MOMENTUM_SLACK 0.02 /* of the impulse, that may have no reaction: ODE's PR joint, when open */
-#define ANSWER_LEAST 1e-6   /* of a push: less is rounding */
-#define GIVEN_LEAST 1e-9    /* of the impulse, that is not the rows' */
-#define SAME_POSE 1e-9      /* m, rad: a joint is as it was */
-#define SAME_TARGET 1e-7    /* m/s, rad/s */
-#define TURNED_LEAST 1e-4   /* rad, from which on it can be seen with which body rows turn */
-#define BETTER 0.5          /* of the other carrier's error */
+#define MOMENTUM_SLACK \
+  0.02                    /* of the impulse, that may have no reaction: ODE's PR joint, when open */
+#define ANSWER_LEAST 1e-6 /* of a push: less is rounding */
+#define GIVEN_LEAST 1e-9  /* of the impulse, that is not the rows' */
+#define SAME_POSE 1e-9    /* m, rad: a joint is as it was */
+#define SAME_TARGET 1e-7  /* m/s, rad/s */
+#define TURNED_LEAST 1e-4 /* rad, from which on it can be seen with which body rows turn */
+#define BETTER 0.5        /* of the other carrier's error */
 
 typedef struct pair {
   hapi_physics *physics;
   hapi_known_joint *known;
   hapi_joint_measurement *m;
-  dBodyID bodies[2];  /* the one that is pushed and the other; NULL: static world */
+  dBodyID bodies[2]; /* the one that is pushed and the other; NULL: static world */
   uint32_t index[2];
   hap_pose pose[2];   /* in the middle of the next interval */
   hapi_free_body own; /* the pushed one, where it is at the sync */
   double mass;
-  double inertia[9];  /* world */
-  double apart[3];    /* from the other's centre to its own */
-  double free[6][6];  /* see hapi_admittance_rows */
+  double inertia[9];     /* world */
+  double apart[3];       /* from the other's centre to its own */
+  double free[6][6];     /* see hapi_admittance_rows */
   double reaction[6][6]; /* of the other: velocity by the reaction to an impulse */
-  double period;      /* s, of the tick */
-  double ratio;       /* of the tick to the world's step */
-  double damping[2][3]; /* as the application has set it */
+  double period;         /* s, of the tick */
+  double ratio;          /* of the tick to the world's step */
+  double damping[2][3];  /* as the application has set it */
   int gyroscopic[2];
   hapi_measured_axis axes[HAPI_JOINT_LIMITS]; /* in the middle of the next interval */
   double lost; /* share of the joint's impulses that had no reaction */
@@ -108,7 +109,7 @@ static void find_masses(pair *p)
   for (int k = 0; k < 6; ++k) {
     double unit[6] = {0.0};
     double moved[6];
-    twists t;
+    twists t = {{{0.0}}};
     double speed[6];
     unit[k] = 1.0;
     move_wrench(p, unit, moved);
@@ -131,7 +132,7 @@ static void find_pose(pair *p, int which)
   hap_pose *out = &p->pose[which];
   *out = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   if (body != NULL) {
-    hap_twist twist;
+    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     hapi_v3_copy(dBodyGetPosition(body), out->position);
     memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
     hapi_v3_copy(dBodyGetLinearVel(body), twist.linear);
@@ -547,10 +548,11 @@ static void write_rows(pair *p, const hapi_constraint_row rows[6], int count, co
 
 static void say_not_held(hapi_physics *physics, bool whole)
 {
-  const char *text = whole ? "a joint answers pushes with numbers that no joint can have; its bodies are "
-                             "left to ODE between syncs"
-                           : "a joint does not give one body back what it takes from the other (ODE's PU "
-                             "joint does not); its bodies are left to ODE between syncs";
+  const char *text =
+      whole ? "a joint answers pushes with numbers that no joint can have; its bodies are "
+              "left to ODE between syncs"
+            : "a joint does not give one body back what it takes from the other (ODE's PU "
+              "joint does not); its bodies are left to ODE between syncs";
   if (!physics->said_not_held) {
     hapi_log(HAP_LOG_WARNING, "%s", text);
     physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
@@ -575,8 +577,8 @@ static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *w
   answer base;
   hap_stats *stats = &p->physics->figures.stats;
   find_held(p, with, held);
-  hapi_admittance kind = hapi_admittance_rows((const double(*)[6])p->free, (const double(*)[6])held,
-                                              rows, &count);
+  hapi_admittance kind =
+      hapi_admittance_rows((const double(*)[6])p->free, (const double(*)[6])held, rows, &count);
   bool whole = p->lost <= MOMENTUM_SLACK; /* false for NaN */
   stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
   if (!whole || kind == HAPI_ADMITTANCE_SINGULAR) {
@@ -686,7 +688,8 @@ static void measure_pair(pair *p, const hapi_joint_place *place, bool same)
   step(p, &without);
   dJointEnable(p->known->joint);
   if (!same || !is_the_same(p, &with, &without)) {
-    p->m->good = measure_rows(p, place, &with, &without); /* if not, the last rows serve once more */
+    p->m->good =
+        measure_rows(p, place, &with, &without); /* if not, the last rows serve once more */
   }
 }
 

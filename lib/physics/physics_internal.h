@@ -150,13 +150,13 @@ typedef struct hapi_joint_axis {
 /* ---- joint_probe.c: joints that the loop has no rows of its own for ---- */
 
 typedef struct hapi_joint_measurement {
-  bool good;     /* what follows holds */
+  bool good;      /* what follows holds */
   uint32_t first; /* of the joint's bodies, the one that was pushed */
   hapi_measured_joint found;
   hapi_joint_place place;
-  double turn[2][4];    /* orientations of the pushed body and the other one, world */
-  double held[6][6];    /* see hapi_admittance_rows, world axes */
-  double error;         /* 0.., what turning the measurement before this one on would have missed */
+  double turn[2][4]; /* orientations of the pushed body and the other one, world */
+  double held[6][6]; /* see hapi_admittance_rows, world axes */
+  double error;      /* 0.., what turning the measurement before this one on would have missed */
 } hapi_joint_measurement;
 
 typedef struct hapi_known_joint {

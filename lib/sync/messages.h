@@ -142,7 +142,11 @@ typedef struct hapi_measured_row {
   double impulse; /* N s, N m s that it took in a tick then */
 } hapi_measured_row;
 
-enum { HAPI_CARRIER_FIRST = 0, HAPI_CARRIER_SECOND = 1, HAPI_CARRIER_WORLD = 2 };
+enum {
+  HAPI_CARRIER_FIRST = 0,
+  HAPI_CARRIER_SECOND = 1,
+  HAPI_CARRIER_WORLD = 2
+};
 
 /* A free axis of such a joint, of which ODE says where it is. */
 typedef struct hapi_measured_axis {

@@ -37,16 +37,16 @@ typedef struct placed_joint {
   const hapi_model_joint *in;
   uint32_t index;
   hapi_local_body *a;
-  hapi_local_body *b;  /* NULL: static world */
+  hapi_local_body *b;                /* NULL: static world */
   double axes[HAPI_JOINT_LIMITS][3]; /* world */
-  double across[2][3]; /* to the first axis and to each other */
+  double across[2][3];               /* to the first axis and to each other */
   double arm_a[3];
   double arm_b[3];
   double open[3];    /* from the anchor in a to the one in b */
   double opening[3]; /* its rate, and what the turning of the bodies adds to that in a second */
   double bend[3];
   double turned[3]; /* the second body in the first, from where place.turn has it; small */
-  bool driven; /* a body of given motion takes part */
+  bool driven;      /* a body of given motion takes part */
   double was[HAPI_JOINT_PARTS];
 } placed_joint;
 

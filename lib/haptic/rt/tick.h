@@ -230,7 +230,7 @@ typedef struct hapi_contact_memory {
 /* What is kept of a joint, by slot. */
 typedef struct hapi_joint_memory {
   uint32_t generation;
-  uint32_t measurement; /* whose rows the impulses are of */
+  uint32_t measurement;             /* whose rows the impulses are of */
   double impulse[HAPI_JOINT_PARTS]; /* N s, N m s */
 } hapi_joint_memory;
 
