@@ -311,12 +311,6 @@ static void check_start(const char *spec)
   close_run(&r);
 }
 
-static const char *const names[] = {
-    "fig5",   "fig6",         "fig7",          "slide",    "row10",   "stack", "wedge",
-    "door",   "lightstand",   "pile",          "tower",    "topple",  "edge",  "hit",
-    "roll",   "roll_capsule", "roll_cylinder", "clump8",   "spheres", "hold",  "pendulum",
-    "hinged", "cart",         "chain",         "telescope"};
-
 TEST(every_scene_builds)
 {
   size_t count = 0;

@@ -85,6 +85,7 @@ int hapi_joint_axes(const hapi_known_joint *known, hapi_joint_axis out[HAPI_JOIN
   bool turned = dJointGetBody(known->joint, 0) == NULL;
   bool motor = kind != NULL && kind->type == dJointTypeAMotor;
   int count = motor ? dJointGetAMotorNumAxes(known->joint) : kind != NULL ? kind->count : 0;
+  count = count < HAPI_JOINT_LIMITS ? count : HAPI_JOINT_LIMITS;
   for (int i = 0; i < count; ++i) {
     memset(&out[i], 0, sizeof out[i]);
     out[i].get = kind->get;

@@ -649,8 +649,8 @@ static bool all_rest(const pair *p)
 /* Where the axes of motors and stops are. ODE finds the angles of an AMotor as it steps. */
 static void read_axes(pair *p)
 {
-  hapi_joint_axis axes[HAPI_JOINT_LIMITS];
-  hapi_joint_axis stepped[HAPI_JOINT_LIMITS];
+  hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
+  hapi_joint_axis stepped[HAPI_JOINT_LIMITS] = {{0}};
   bool motor = dJointGetType(p->known->joint) == dJointTypeAMotor;
   bool second = p->m->first == 1;
   twists ignored;

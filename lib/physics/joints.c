@@ -372,7 +372,7 @@ static void fill_parameters(const hapi_physics *physics, const hapi_known_joint 
 static void fill_limits(const hapi_physics *physics, const hapi_known_joint *known,
                         hapi_model_joint *out)
 {
-  hapi_joint_axis axes[HAPI_JOINT_LIMITS];
+  hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
   int count = hapi_joint_axes(known, axes);
   for (int i = 0; i < count; ++i) {
     fill_limit(physics, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
