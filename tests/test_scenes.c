@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 
 #include <scenes/scenes.h>
+#include <tests/scene_names.h>
 #include <tests/tap.h>
 
 #define CONTACTS_MAX 8
