@@ -7,6 +7,7 @@
 
 #include "physics/admittance.h"
 #include "tests/physics_world.h"
+#include "tests/unknown_shape.h"
 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
@@ -357,8 +358,8 @@ static void check_responses(test_world *w, int *measured)
 }
 
 /* A cube pressed 0.2 mm into two walls and the floor, or one held by two hinges that are the same and
- * a fixed joint: more constraints than the body has ways to move, and CFM 0. */
-static void build_overdetermined(test_world *w, bool walls)
+ * a fixed joint: more constraints than the body has ways to move, and CFM 0. Data of a geom, or NULL. */
+static dTriMeshDataID build_overdetermined(test_world *w, bool walls)
 {
   dBodyID cube = world_add_cube(w, 0.1, 1.0, 0.0, 0.0, 0.05);
   dWorldSetCFM(w->world, 0.0);
@@ -367,7 +368,7 @@ static void build_overdetermined(test_world *w, bool walls)
     dGeomSetPosition(dCreateBox(w->space, 0.1, 1.0, 1.0), 0.0998, 0.0, 0.5);
     dGeomSetPosition(dCreateBox(w->space, 1.0, 0.1, 1.0), 0.0, 0.0998, 0.5);
     dGeomSetPosition(dCreateBox(w->space, 1.0, 0.1, 1.0), 0.0, -0.0998, 0.5);
-    return;
+    return NULL;
   }
   /* A free one beside it, for which model CONTACT probes it. */
   (void)world_add_cube(w, 0.1, 1.0, 0.0, 0.1, 0.05);
@@ -380,16 +381,7 @@ static void build_overdetermined(test_world *w, bool walls)
   dJointID fixed = dJointCreateFixed(w->world, NULL);
   dJointAttach(fixed, cube, NULL);
   dJointSetFixed(fixed);
-  /* A shape that the loop does not know: it would own the cube. */
-  static const double corners[] = {0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0};
-  static const dTriIndex triangle[] = {0, 1, 2};
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 3, triangle, 3,
-                              3 * (int)sizeof(dTriIndex));
-  dGeomID inside = dCreateTriMesh(w->space, data, NULL, NULL, NULL);
-  dGeomSetCategoryBits(inside, 0); /* touches nothing */
-  dGeomSetCollideBits(inside, 0);
-  dGeomSetBody(inside, cube);
+  return add_unknown_shape(w->space, cube); /* else the loop would own it */
 }
 
 TEST(an_overdetermined_body_stays_in_bounds)
@@ -399,7 +391,7 @@ TEST(an_overdetermined_body_stays_in_bounds)
     int iterations = i % 4 < 2 ? 5 : 50;
     world_open(&w, 9.81, iterations);
     w.def.model = i / 4 == 0 ? HAP_MODEL_ACCELERANCE : HAP_MODEL_CONTACT;
-    build_overdetermined(&w, i % 2 == 0);
+    dTriMeshDataID data = build_overdetermined(&w, i % 2 == 0);
     REQUIRE(world_start(&w, 0.01, -0.061, 0.02, 0.06));
     double most = 0.0;
     int measured = 0;
@@ -422,6 +414,9 @@ TEST(an_overdetermined_body_stays_in_bounds)
     CHECK(most > 1.0 && most < (iterations == 5 ? 15.0 : 6.5));
     CHECK(hapi_v3_norm(dBodyGetLinearVel(w.bodies[0])) < 0.5 && stats.faults == 0);
     world_close(&w);
+    if (data != NULL) {
+      dGeomTriMeshDataDestroy(data);
+    }
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "haptic/coupling_gains.h"
 #include "tests/contact_world.h"
+#include "tests/unknown_shape.h"
 
 #define T 1e-3
 #define HAND_RADIUS 0.01
@@ -188,15 +189,7 @@ TEST(a_measured_body_is_pushed_through_the_proxy)
   cw_open(&w, 0.0);
   dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
   dJointAttach(dJointCreateSlider(w.world, NULL), cube, NULL);
-  static const double corners[] = {0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0};
-  static const dTriIndex triangle[] = {0, 1, 2};
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 3, triangle, 3,
-                              3 * (int)sizeof(dTriIndex));
-  dGeomID inside = dCreateTriMesh(w.space, data, NULL, NULL, NULL);
-  dGeomSetCategoryBits(inside, 0); /* touches nothing */
-  dGeomSetCollideBits(inside, 0);
-  dGeomSetBody(inside, cube);
+  dTriMeshDataID data = add_unknown_shape(w.space, cube);
   w.hand_def.stiffness = 1e5;
   use_proxy(&w, 400.0);
   REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.001, 0.002));
@@ -207,6 +200,7 @@ TEST(a_measured_body_is_pushed_through_the_proxy)
   CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 0.01 * w.impulse[0]);
   CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 0.01);
   cw_close(&w);
+  dGeomTriMeshDataDestroy(data);
 }
 
 /* Two hands on one cube, one through a proxy and one direct: each has its own coupling. */
