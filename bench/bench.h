@@ -17,6 +17,7 @@ typedef struct bench {
   bool quick;        /* shorter sweeps, fewer repeats */
   bool verify;       /* say "ok" or "off" */
   const char *scene; /* accuracy, tick: this one alone; NULL: all */
+  const char *only;  /* stability: such points alone, KEY=VALUE,...; NULL: all */
   int off;           /* checks that were off */
   hap_detail detail; /* why a program failed */
 } bench;

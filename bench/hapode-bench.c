@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE]: measures, writes NAME.csv and
+/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]: measures, writes NAME.csv and
  * NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
@@ -31,7 +31,9 @@ static const program programs[] = {
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
     {"stability", bench_stability,
-     "where each integrator holds: stiffness, mass, contacts at once"},
+     "where each integrator holds: stiffness, mass, contacts at once; --only KEY=VALUE/VALUE,...: "
+     "of "
+     "such points alone, by the names of the table"},
     {"tick", bench_tick,
      "the haptic loop alone: time of a tick; --scene NAME: of one case with contacts"},
 };
@@ -40,9 +42,10 @@ static const program programs[] = {
 
 static void print_usage(FILE *to)
 {
-  fprintf(to,
-          "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE]\n"
-          "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
+  fprintf(
+      to,
+      "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]\n"
+      "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
   }
@@ -74,6 +77,8 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
       b->out = arguments[++i];
     } else if (strcmp(argument, "--scene") == 0 && i + 1 < count) {
       b->scene = arguments[++i];
+    } else if (strcmp(argument, "--only") == 0 && i + 1 < count) {
+      b->only = arguments[++i];
     } else if (argument[0] == '-' || *out != NULL) {
       fprintf(stderr, "hapode-bench: \"%s\" is not understood\n", argument);
       return false;
@@ -86,6 +91,10 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
     fprintf(stderr, "hapode-bench: which bench?\n");
   } else if (b->scene != NULL && (*out)->run != bench_accuracy && (*out)->run != bench_tick) {
     fprintf(stderr, "hapode-bench: %s has no scenes to choose from\n", (*out)->name);
+    return false;
+  }
+  if (*out != NULL && b->only != NULL && (*out)->run != bench_stability) {
+    fprintf(stderr, "hapode-bench: %s has no points to choose from\n", (*out)->name);
     return false;
   }
   return *out != NULL && b->out[0] != '\0';

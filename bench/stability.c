@@ -71,7 +71,12 @@ static hap_status add_point(bench *b, stability_table *table, const char *name,
   if (table->count == STABILITY_ROWS_MAX) {
     return bench_fail(b, HAP_ERROR_CAPACITY, "more points than the table has room for");
   }
-  hap_status status = stability_run(b, point, SECONDS, &row.result);
+  bool takes = false;
+  hap_status status = stability_filter(b, &row, &takes);
+  if (status < HAP_OK || !takes) {
+    return status;
+  }
+  status = stability_run(b, point, SECONDS, &row.result);
   if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
     status = feel(b, table, &row);
   }
@@ -185,6 +190,10 @@ static void check_proxy(bench *b, const stability_table *table)
       softest = fmin(softest, row->felt / row->expected);
     }
   }
+  if (points == 0) {
+    bench_skip(b, "implicit+proxy: no point was asked for");
+    return;
+  }
   bench_check(b, stable == points,
               "implicit+proxy: %zu of %zu points stable, energy_ratio at most %.4f (bound %.2f)",
               stable, points, worst, STABILITY_RATIO);
@@ -232,17 +241,14 @@ static void say_counts(const stability_table *table)
         stable += table->rows[r].result.stable;
       }
     }
-    bench_say("%s, pointer at the device: %zu of %zu points stable", integrators[i].name, stable,
-              points);
+    if (points > 0) {
+      bench_say("%s, pointer at the device: %zu of %zu points stable", integrators[i].name, stable,
+                points);
+    }
   }
 }
 
 /* ---- the program ---- */
-
-static const char *layout_word(stability_layout layout)
-{
-  return layout == STABILITY_FREE ? "free" : layout == STABILITY_BACKED ? "backed" : "cage";
-}
 
 static hap_status write_table(bench *b, const stability_table *table)
 {
@@ -255,11 +261,8 @@ static hap_status write_table(bench *b, const stability_table *table)
     const stability_point *p = &row->point;
     fprintf(csv, "%s,%g,%g,%d,%d,%.6g,%s,%s,%s,%g,%g,%d,%g,", row->integrator, p->stiffness,
             p->mass, p->contacts, row->result.stable, row->result.energy_ratio,
-            p->coupling == HAP_COUPLING_DIRECT  ? "direct"
-            : p->coupling == HAP_COUPLING_PROXY ? "proxy"
-                                                : "auto",
-            layout_word(p->layout), stability_hand_word(p->hand), p->delay_ticks, p->quantum,
-            p->missed, row->result.held);
+            stability_coupling_word(p->coupling), stability_layout_word(p->layout),
+            stability_hand_word(p->hand), p->delay_ticks, p->quantum, p->missed, row->result.held);
     if (is_proxy(row)) {
       fprintf(csv, "%.6g,%.6g", row->felt, row->expected);
     } else {
@@ -282,6 +285,13 @@ static hap_status measure(bench *b, stability_table *table)
   return status;
 }
 
+static hap_status check_points(bench *b, const stability_table *table)
+{
+  return table->count > 0 ? HAP_OK
+                          : bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
+                                       b->only != NULL ? b->only : "");
+}
+
 hap_status bench_stability(bench *b)
 {
   stability_table *table = calloc(1, sizeof *table);
@@ -290,13 +300,18 @@ hap_status bench_stability(bench *b)
   }
   hap_status status = measure(b, table);
   if (status >= HAP_OK) {
+    status = check_points(b, table);
+  }
+  if (status >= HAP_OK) {
     status = write_table(b, table);
   }
   if (status >= HAP_OK) {
     say_counts(table);
     check_proxy(b, table);
-    check_explicit(b, table);
-    status = stability_draw(b, table);
+    if (b->only == NULL) { /* else it may have no points, and the planes have holes */
+      check_explicit(b, table);
+      status = stability_draw(b, table);
+    }
   }
   free(table);
   return status;

@@ -261,6 +261,18 @@ const char *stability_hand_word(stability_hand hand)
   return hand == STABILITY_NONE ? "none" : hand == STABILITY_RELAXED ? "relaxed" : "tense";
 }
 
+const char *stability_layout_word(stability_layout layout)
+{
+  return layout == STABILITY_FREE ? "free" : layout == STABILITY_BACKED ? "backed" : "cage";
+}
+
+const char *stability_coupling_word(hap_coupling coupling)
+{
+  return coupling == HAP_COUPLING_DIRECT  ? "direct"
+         : coupling == HAP_COUPLING_PROXY ? "proxy"
+                                          : "auto";
+}
+
 static double in_series(const stability_point *p, double held)
 {
   double k = p->stiffness * p->contacts / (p->layout == STABILITY_CAGE ? 2 : 1);

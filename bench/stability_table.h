@@ -20,6 +20,13 @@ typedef struct stability_table {
   size_t count;
 } stability_table;
 
+/* ---- stability_filter.c ---- */
+
+/* Whether --only takes the point. */
+hap_status stability_filter(bench *b, const stability_row *row, bool *out_takes);
+
+/* ---- stability_picture.c ---- */
+
 /* stability.svg. Points that differ in layout and hand alone are one: the worst of them. */
 hap_status stability_draw(bench *b, const stability_table *table);
 

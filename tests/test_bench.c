@@ -283,6 +283,37 @@ TEST(accuracy_knows_its_scenes)
   CHECK(count_lines(file_in_folder("said", ""), "slides") == 1);
 }
 
+/* The whole map takes minutes; a part of it has no picture. */
+TEST(stability_of_some_points_alone)
+{
+  const char *const arguments[] = {
+      "stability", "--quick",
+      "--only",    "stiffness=1,mass=1e-3/2,contacts=8,layout=cage,coupling=proxy/auto",
+      "--out",     folder,
+      NULL};
+  REQUIRE(run(arguments, environ) == 0);
+  const char *path = file_in_folder("stability", ".csv");
+  CHECK(count_lines(path, "implicit+proxy,1,0.001,8,1,") == 2);
+  CHECK(count_lines(path, "") == 3); /* the header as well */
+  CHECK(!exists(file_in_folder("stability", ".svg")));
+  unlink(file_in_folder("stability", ".csv"));
+}
+
+TEST(stability_knows_its_points)
+{
+  static const char *const wrong[] = {
+      "stiff=1", "mass", "mass=", "mass=1/", "mass=1x", "hand=,body=cube"};
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    const char *const arguments[] = {"stability", "--only", wrong[i], "--out", folder, NULL};
+    CHECK(run(arguments, environ) == 1);
+    CHECK(count_lines(file_in_folder("said", ""), "keys are integrator, stiffness") == 1);
+  }
+  const char *const none[] = {"stability", "--only", "mass=3", "--out", folder, NULL};
+  CHECK(run(none, environ) == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "no such point") == 1);
+  unlink(file_in_folder("stability", ".csv"));
+}
+
 TEST(without_gnuplot_a_line_says_that_there_is_no_picture)
 {
   const char *const arguments[] = {"fig5", "--out", folder, NULL};
@@ -304,6 +335,7 @@ TEST(wrong_usage_is_2_and_says_what_there_is)
       {"fig5", "--fast", NULL},
       {"fig5", "--out", NULL},
       {"fig5", "--scene", "slide", NULL},
+      {"fig5", "--only", "mass=1", NULL},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     CHECK(run(cases[i], environ) == 2);
@@ -338,6 +370,8 @@ int main(void)
   RUN(tick_leaves_its_table);
   RUN(accuracy_sets_models_side_by_side);
   RUN(accuracy_knows_its_scenes);
+  RUN(stability_of_some_points_alone);
+  RUN(stability_knows_its_points);
   RUN(without_gnuplot_a_line_says_that_there_is_no_picture);
   RUN(wrong_usage_is_2_and_says_what_there_is);
   RUN(a_folder_that_cannot_be_is_1);

@@ -9,6 +9,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
 #include "tests/contact_world.h"
 
 static double height(const contact_world *w)
@@ -120,6 +122,100 @@ TEST(a_body_that_the_application_puts_to_sleep_stays_so)
   cw_close(&w);
 }
 
+/* A row as one of its bodies has it. */
+typedef struct row_side {
+  const double *j;
+  const double *b;
+} row_side;
+
+static bool find_side(const hapi_tick *tick, uint32_t index, uint32_t slot, row_side *out)
+{
+  const hapi_row *row = &tick->world.solver.rows[index];
+  const hapi_row_source *source = &tick->world.sources[index];
+  bool is_a = source->body_a == slot;
+  *out = is_a ? (row_side){row->ja, row->ba} : (row_side){row->jb, row->bb};
+  return is_a || (!source->pointer && source->body_b == slot);
+}
+
+/* How many rows act on the body beside one of a pointer. What an N s of one makes of the other is what
+ * one of the other makes of it. */
+static int check_body(const hapi_tick *tick, uint32_t slot)
+{
+  int met = 0;
+  for (uint32_t i = 0; i < tick->world.solver.row_count; ++i) {
+    for (uint32_t k = i + 1; k < tick->world.solver.row_count; ++k) {
+      row_side one;
+      row_side other;
+      if (tick->world.sources[i].pointer && find_side(tick, i, slot, &one) &&
+          find_side(tick, k, slot, &other)) {
+        double size = sqrt(hapi_dot6(one.j, one.b) * hapi_dot6(other.j, other.b));
+        CHECK_NEAR(hapi_dot6(one.j, other.b), hapi_dot6(other.j, one.b), 1e-9 * size);
+        ++met;
+      }
+    }
+  }
+  return met;
+}
+
+static int check_measured(const contact_world *w)
+{
+  const hapi_tick *tick = &w->session->haptic->tick;
+  int met = 0;
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    if ((tick->bodies[tick->live[i]].flags & HAPI_BODY_MEASURED) != 0) {
+      met += check_body(tick, tick->live[i]);
+    }
+  }
+  return met;
+}
+
+/* A cube with a joint that the loop does not have, between the hand and another cube: rows that answered
+ * each by a measurement of its own would make energy. */
+TEST(a_measured_body_answers_all_that_touch_it_alike)
+{
+  contact_world w;
+  int met = 0;
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.025);
+  dJointAttach(dJointCreateAMotor(w.world, NULL), cube, NULL);
+  (void)cw_add_cube(&w, 0.2, 0.05, 0.0755, 0.0, 0.025);
+  REQUIRE(cw_start(&w, -0.012, 0.003, 0.035));
+  cw_move_hand(&w, 0.1, 0.0, 0.0);
+  for (int i = 0; i < 300; ++i) {
+    cw_tick(&w);
+    met += check_measured(&w);
+  }
+  CHECK(cw_stats(&w).measured_bodies == 1 && cw_stats(&w).range_bodies == 1);
+  CHECK(met > 100);
+  CHECK(w.position[1][0] > 0.08); /* it was pushed on */
+  cw_close(&w);
+}
+
+/* The same of a cube that only two hands touch. */
+TEST(a_measured_body_answers_two_hands_alike)
+{
+  const hap_pose pose = {{-0.008, -0.012, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  contact_world w;
+  hap_pointer_id other;
+  int met = 0;
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  dBodyID cube = cw_add_cube(&w, 2.0, 0.05, 0.025, 0.0, 0.025);
+  dJointAttach(dJointCreateAMotor(w.world, NULL), cube, NULL);
+  REQUIRE(cw_start(&w, -0.012, 0.01, 0.03));
+  CHECK(hap_pointer_add(w.session, &w.hand_def, &other) == HAP_OK);
+  CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
+  cw_move_hand(&w, 0.02, 0.0, 0.0);
+  for (int i = 0; i < 200; ++i) {
+    cw_tick(&w);
+    met += check_measured(&w);
+  }
+  CHECK(cw_stats(&w).measured_bodies == 1);
+  CHECK(met > 10);
+  cw_close(&w);
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -128,6 +224,8 @@ int main(void)
   RUN(where_contacts_find_no_room_those_that_touch_are_kept);
   RUN(a_box_falls_beside_a_wall_that_it_does_not_touch);
   RUN(a_body_that_the_application_puts_to_sleep_stays_so);
+  RUN(a_measured_body_answers_all_that_touch_it_alike);
+  RUN(a_measured_body_answers_two_hands_alike);
   dCloseODE();
   return tap_done();
 }

@@ -37,6 +37,8 @@ static const hard_point points[] = {
      {PROXY, 1e3, 0.1, 64, true, STABILITY_BACKED, STABILITY_TENSE, 0, 0, false}},
     {"64 light, stiff cubes between two sides",
      {AUTO, 1e6, 1e-3, 64, true, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+    {"the same, behind an encoder: they are shaken until not all of them can be the loop's",
+     {PROXY, 1e6, 1e-3, 64, true, STABILITY_CAGE, STABILITY_NONE, 0, 3e-5, false}},
     {"64 heavy, soft cubes between two sides, late device",
      {AUTO, 100, 10, 64, true, STABILITY_CAGE, STABILITY_RELAXED, 2, 3e-5, true}},
     {"the same, softer and without a hand",

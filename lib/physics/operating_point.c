@@ -98,6 +98,7 @@ static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], co
   if (kind == HAPI_ADMITTANCE_SINGULAR) {
     ++stats->probes_singular; /* the last good one stays, or the body is outside */
     slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
+    slot->flags |= slot->measured ? (uint32_t)HAPI_BODY_WHOLE : 0u;
     return;
   }
   memcpy(slot->response, a, sizeof slot->response);
@@ -108,6 +109,7 @@ static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], co
     }
   }
   slot->measured = true;
+  slot->flags |= HAPI_BODY_WHOLE;
 }
 
 static void measure_body(hapi_physics *physics, hapi_body_slot *slot, const double base[6])

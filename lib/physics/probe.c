@@ -120,13 +120,26 @@ static bool gather_island(hapi_physics *physics, uint32_t start)
   return good;
 }
 
+/* Model CONTACT: whether more than one pointer contact acts on the body. Then all of it must answer by
+ * one matrix. */
+static bool is_whole(const hapi_physics *physics, uint32_t body)
+{
+  uint32_t contacts = 0;
+  for (uint32_t i = 0; i < physics->contact_high && contacts < 2; ++i) {
+    const hapi_contact_slot *contact = &physics->contacts[i];
+    contacts += contact->phase == HAPI_SLOT_LIVE && contact->body == body;
+  }
+  return physics->bodies[body].linked || contacts > 1;
+}
+
 static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact_slot *contact)
 {
   if (contact->phase != HAPI_SLOT_LIVE || contact->body == HAPI_SLOT_NONE) {
     return false;
   }
   uint32_t flags = physics->bodies[contact->body].flags;
-  bool needs = physics->model == HAP_MODEL_ACCELERANCE || (flags & HAPI_BODY_MEASURED) != 0;
+  bool needs = physics->model == HAP_MODEL_ACCELERANCE ||
+               ((flags & HAPI_BODY_MEASURED) != 0 && !is_whole(physics, contact->body));
   return needs && (flags & HAPI_BODY_DRIVEN) == 0;
 }
 
@@ -185,7 +198,8 @@ hap_status hapi_test_gather_bodies(hapi_physics *physics)
   begin_gathering(physics);
   for (uint32_t i = 0; i < physics->body_high && status >= HAP_OK; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
-    if (slot->phase == HAPI_SLOT_LIVE && slot->linked && (slot->flags & HAPI_BODY_MEASURED) != 0) {
+    if (slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_MEASURED) != 0 &&
+        is_whole(physics, i)) {
       bool testable = false;
       uint32_t first = test->member_count;
       status = gather_body(physics, slot, &testable);

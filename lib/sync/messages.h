@@ -44,7 +44,9 @@ enum {
                             it goes on with its twist, and ODE gets what the loop gave to it */
   HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
   HAPI_BODY_GYROSCOPIC = 32,
-  HAPI_BODY_TOUCHED = 64 /* of the loop's message: a contact carried it in this tick */
+  HAPI_BODY_TOUCHED = 64, /* of the loop's message: a contact carried it in this tick */
+  HAPI_BODY_WHOLE = 128   /* of a MEASURED one: all its rows go by response; else those of its only
+                             pointer contact by that contact's a */
 };
 
 /* ---- physics -> haptic: the local model ---- */

@@ -19,6 +19,7 @@
 /* A body as whoever moves it has it, loop or ODE, and as the hand meets it. */
 typedef struct seen_body {
   bool there;
+  bool owned;
   hap_pose pose;
   hap_twist twist;
   hap_pose met_pose;
@@ -60,6 +61,7 @@ static void see_bodies(const bounds *b, seen_body seen[WORLD_BODIES_MAX])
   for (int i = 0; i < b->w->body_count; ++i) {
     dBodyID body = b->w->bodies[i];
     seen[i].there = body != NULL;
+    seen[i].owned = false;
     if (body != NULL) {
       memcpy(seen[i].pose.position, dBodyGetPosition(body), 3 * sizeof(double));
       memcpy(seen[i].pose.quat_wxyz, dBodyGetQuaternion(body), 4 * sizeof(double));
@@ -77,6 +79,7 @@ static void see_bodies(const bounds *b, seen_body seen[WORLD_BODIES_MAX])
       seen[index].met_twist = body->twist;
     }
     if (index >= 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+      seen[index].owned = true;
       seen[index].pose = body->pose;
       seen[index].twist = body->twist;
     }
@@ -124,6 +127,59 @@ static bool body_is_finite(const seen_body *s, dBodyID body)
 static double length4(const double q[4])
 {
   return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+}
+
+/* ---- times ---- */
+
+/* Whether the force of a pointer contact is that of the tick's own time, as the body feels it; else it is
+ * that of the time after it. */
+static bool is_now(const hapi_tick *tick, const hapi_local_contact *c)
+{
+  const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  const hapi_row *row = &tick->world.solver.rows[c->row];
+  double stiffness =
+      tick->period * tick->period * c->ramp.share * p->stiffness * hapi_dot6(row->ja, row->ba);
+  return stiffness <= (p->proxied ? 0.25 : 4.0); /* lib/haptic/rt/pointer_rows.c */
+}
+
+/* J of which springs and bodies are ahead of the hands' work. */
+static double contacts_ahead(const bounds *b)
+{
+  const hapi_tick *tick = tick_of(b);
+  double sum = 0.0;
+  for (uint32_t i = 0; i < tick->contact_count && b->model == HAP_MODEL_CONTACT; ++i) {
+    const hapi_local_contact *c = &tick->contacts[i];
+    if (c->row == HAPI_NO_ROW || c->body == HAPI_SLOT_NONE) {
+      continue;
+    }
+    const hapi_local_body *body = &tick->bodies[c->body];
+    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    double arm[3];
+    double velocity[3];
+    hapi_v3_sub(c->point_now, body->pose.position, arm);
+    hapi_v3_cross(body->twist.angular, arm, velocity);
+    hapi_v3_add(velocity, body->twist.linear, velocity);
+    if (is_now(tick, c)) {
+      sum += 0.5 * tick->period * hapi_v3_dot(c->force, velocity);
+    } else if (!p->proxied) {
+      sum += tick->period * hapi_v3_dot(c->force, p->twist.linear);
+    }
+  }
+  return sum;
+}
+
+/* The same of a body that falls: its pose is half a tick ahead of its velocity. One that ODE moves has come to
+ * it, or goes from it, with pose and velocity of one time. */
+static double fall_ahead(const bounds *b, int index, const seen_body *s)
+{
+  dMass mass;
+  dVector3 gravity;
+  if (!s->owned) {
+    return 0.0;
+  }
+  dBodyGetMass(b->w->bodies[index], &mass);
+  dWorldGetGravity(b->w->world, gravity);
+  return -0.5 * tick_of(b)->period * mass.mass * hapi_v3_dot(gravity, s->twist.linear);
 }
 
 /* ---- springs and hands ---- */
@@ -195,7 +251,7 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
   for (int i = 0; i < b->w->body_count; ++i) {
     if (seen[i].there) {
       kinetic += kinetic_of(b->w->bodies[i], &seen[i]);
-      height += height_of(b, i, &seen[i]);
+      height += height_of(b, i, &seen[i]) - fall_ahead(b, i, &seen[i]);
       double way[3];
       hapi_v3_sub(seen[i].pose.position, b->w->start[i], way);
       b->way = fmax(b->way, hapi_v3_norm(way));
@@ -203,6 +259,7 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       b->unit = fmax(b->unit, fabs(length4(seen[i].pose.quat_wxyz) - 1.0));
     }
   }
+  kinetic -= contacts_ahead(b);
   if (b->ticks == 0) {
     b->given = b->row->given + kinetic + height;
   }

@@ -20,6 +20,10 @@
  * Gain. Stricter, where the loop moves what is touched: with the springs' energy added, the left side
  * never rises by more than that above what it was at any earlier time. So what was lost before, to
  * friction or the devices' damping, does not hide what is made later.
+ * Times. All of it is taken at the time of the hands' work, which is that of the newest tick. The loop's
+ * bodies are then half a tick ahead with their velocities and a whole one with their poses: what the
+ * forces of the springs and the weight do on them in that half is taken back. A spring that is integrated
+ * implicitly is a tick ahead of a hand that it is coupled to directly: likewise.
  * Late. Where ODE moves what is touched, in all models but contact and for jointed bodies, it hears of
  * the hand at the end of an interval: what the hand gave in the last interval is not held against it.
  * Depth. By ODE's collider, between a ball at the pointer and the body's shape where the loop has it. v

@@ -34,7 +34,6 @@ typedef struct case_row {
   double depth;              /* m, of penetration at the start */
   double gain;               /* of the largest stored energy, 0.01 */
   bool late;                 /* ODE moves what is touched: bodies answer an interval later */
-  unsigned fails;            /* models known to fail: run and printed as TODO, not judged */
 } case_row;
 
 extern const case_row stability_cases[];

@@ -10,8 +10,6 @@
  * go in circles, sweeps lead out. */
 #define DIRECT_ROUNDS 8
 #define DEAR_RUNS 32u
-#define UNSOLVED \
-  3e-3 /* m/s: what is left undone and may add energy; below, asking costs too much */
 #define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
 
 /* ---- preparation ---- */
@@ -248,51 +246,8 @@ static bool stays_dear(hapi_solver *solver)
   return true;
 }
 
-/* Energy that the impulses add beyond what the targets ask for, which is what the rows minimise when no
- * friction slides. Along the ray from no impulses to these it is s^2 b / 2 - s a [J]. */
-static void energy_along(const hapi_solver *solver, double *out_a, double *out_b)
+void hapi_solver_sweep_on(hapi_solver *solver)
 {
-  *out_a = 0.0;
-  *out_b = 0.0;
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row *row = &solver->rows[i];
-    if (row->impulse != 0.0) {
-      double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
-      if (row->paired) {
-        without -= hapi_dot6(row->jb, solver->free[row->b]);
-      }
-      *out_a += row->impulse * without;
-      *out_b += row->impulse * (without - hapi_row_error(solver, row));
-    }
-  }
-}
-
-/* Bounds hold for any share: a friction's goes with its normal's. */
-static void scale(hapi_solver *solver, double share)
-{
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    solver->rows[i].impulse = share > 0.0 ? share * solver->rows[i].impulse : 0.0;
-  }
-  for (uint32_t i = 0; i < solver->body_count; ++i) {
-    for (int k = 0; k < 6; ++k) {
-      double change = share > 0.0 ? share * (solver->v[i][k] - solver->free[i][k]) : 0.0;
-      solver->v[i][k] = solver->free[i][k] + change; /* share 0: whatever v is */
-    }
-  }
-}
-
-void hapi_solver_calm(hapi_solver *solver)
-{
-  double a = 0.0;
-  double b = 0.0;
-  if (solver->row_count == 0 || solver->residual < UNSOLVED) {
-    return;
-  }
-  energy_along(solver, &a, &b);
-  if (0.5 * b <= a) {
-    return;
-  }
-  scale(solver, a > 0.0 ? a / b : 0.0); /* where it is least; none if a or b are no numbers */
   for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
     solver->residual = sweep(solver);
   }

@@ -83,9 +83,11 @@ typedef struct hapi_solver {
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 
-/* [haptic] After a run. Impulses of an island that is too large to be solved within the budget may leave
- * more energy than none at all, and as warm start more again from tick to tick: such are shortened to
- * where they leave least, and swept again. */
+/* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave more
+ * energy than none at all, and as warm start more again from tick to tick: such are shortened to where
+ * they leave least, and swept again. What then still leaves more is shortened again, to none where the
+ * impulses are no numbers: whatever the run has found, beyond what the rows' targets give it adds no
+ * energy. Costs two sweeps where nothing is to be done, and nothing where the run has ended well. */
 void hapi_solver_calm(hapi_solver *solver);
 
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
@@ -93,7 +95,10 @@ void hapi_solver_calm(hapi_solver *solver);
  * In their order; v, row_count and body_count are set before. */
 void hapi_row_ready(hapi_solver *solver, uint32_t index);
 
-/* ---- inner: between contact_solver.c and direct_solver.c ---- */
+/* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
+
+/* A few sweeps more, two at least. */
+void hapi_solver_sweep_on(hapi_solver *solver);
 
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
  * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */

@@ -29,28 +29,12 @@ typedef struct lists {
 
 /* ---- islands ---- */
 
-static uint16_t root(uint16_t *parent, uint16_t i)
-{
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
-static void unite(uint16_t *parent, uint32_t i, uint32_t j)
-{
-  uint16_t a = root(parent, (uint16_t)i);
-  uint16_t b = root(parent, (uint16_t)j);
-  parent[a > b ? a : b] = a > b ? b : a;
-}
-
 static void chain_rows(hapi_solver *solver, uint16_t *leaf, lists *out)
 {
   for (uint32_t i = solver->row_count; i-- > 0;) {
     hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0) {
-      uint16_t r = root(leaf, (uint16_t)(row->moves_a ? row->a : row->b));
+      uint16_t r = hapi_root(leaf, (uint16_t)(row->moves_a ? row->a : row->b));
       row->next = out->leaf_head[r];
       out->leaf_tail[r] = out->leaf_head[r] == HAPI_NO_SOLVER_ROW ? i : out->leaf_tail[r];
       out->leaf_head[r] = i;
@@ -64,7 +48,7 @@ static void chain_leaves(hapi_solver *solver, uint16_t *whole, lists *out)
     if (out->leaf_head[i] == HAPI_NO_SOLVER_ROW) {
       continue;
     }
-    uint16_t r = root(whole, (uint16_t)i);
+    uint16_t r = hapi_root(whole, (uint16_t)i);
     if (out->head[r] == HAPI_NO_SOLVER_ROW) {
       out->head[r] = out->leaf_head[i];
       out->first_leaf[r] = (uint16_t)i;
@@ -89,9 +73,9 @@ static void split(hapi_solver *solver, lists *out)
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0 && row->paired && row->moves_a) {
-      unite(whole, row->a, row->b);
+      hapi_unite(whole, row->a, row->b);
       if (!hapi_is_hub(solver, row->b)) {
-        unite(leaf, row->a, row->b);
+        hapi_unite(leaf, row->a, row->b);
       }
     }
   }
@@ -333,8 +317,12 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   bool sticking = solver->sweeps % 3 == 0;
   double due = hapi_island_inspect(is, sticking);
   uint32_t spent = 0;
-  if (!(due >= solver->tolerance)) {
+  if (due < solver->tolerance) {
     solver->direct_residual = fmax(solver->direct_residual, due);
+    return 0;
+  }
+  if (!isfinite(due)) { /* nothing can begin from it */
+    solver->direct_residual = HUGE_VAL;
     return 0;
   }
   if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {

@@ -92,11 +92,11 @@ static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool
   is->used_rows += row->state != HAPI_ROW_FIXED;
 }
 
-/* The states of the rows, for the next round; returns the largest correction due, m/s. */
 double hapi_island_inspect(hapi_island *is, bool sticking)
 {
   const hapi_solver *solver = is->solver;
   double largest = 0.0;
+  double sum = 0.0;
   is->free_rows = 0;
   is->used_rows = 0;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
@@ -109,10 +109,11 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     double wanted = p + is->error[i] * row->inverse;
     bool inside = (p > lo && p < hi) || (wanted > lo && wanted < hi);
     double due = fabs(hapi_clamp(wanted, lo, hi) - p) * row->response;
-    largest = due <= largest ? largest : due; /* NaN stays, unless the next row hides it */
+    largest = due > largest ? due : largest;
+    sum += due + is->error[i];
     classify(is, i, !inside, hi, sticking);
   }
-  return largest;
+  return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
 /* The row whose error drives this row's impulse. */

@@ -59,8 +59,25 @@ static inline bool hapi_is_hub(const hapi_solver *solver, uint32_t body)
   return body + solver->hub_count >= solver->body_count;
 }
 
-/* The states of the rows, for the next round; returns the largest correction due, m/s. `sticking` takes
- * the friction of all contacts that push for free. */
+/* Sets of bodies, each named by its lowest: parent[i] begins as i. */
+static inline uint16_t hapi_root(uint16_t *parent, uint16_t i)
+{
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
+  }
+  return i;
+}
+
+static inline void hapi_unite(uint16_t *parent, uint32_t i, uint32_t j)
+{
+  uint16_t a = hapi_root(parent, (uint16_t)i);
+  uint16_t b = hapi_root(parent, (uint16_t)j);
+  parent[a > b ? a : b] = a > b ? b : a;
+}
+
+/* The states of the rows, for the next round; returns the largest correction due, m/s; NaN if one is no
+ * number. `sticking` takes the friction of all contacts that push for free. */
 double hapi_island_inspect(hapi_island *is, bool sticking);
 
 /* The bodies, but for hubs that are held; false: too many. */

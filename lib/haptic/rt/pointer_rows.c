@@ -181,6 +181,14 @@ static bool fix(hapi_row *row, const spring *p, double period)
   return force > 0.0;
 }
 
+/* Eq. 6. Only of a contact that is the only thing to touch the body: rows of one body that answer by
+ * different matrices make energy, without bound where they are many. */
+static bool has_own_probes(const hapi_local_body *body)
+{
+  return body != NULL &&
+         (body->flags & (HAPI_BODY_MEASURED | HAPI_BODY_WHOLE)) == HAPI_BODY_MEASURED;
+}
+
 /* The columns of the body and, of a proxy, of the pointer: w then is the body's speed less the
  * proxy's, and s is 0. */
 static void set_columns(const hapi_local_contact *contact, const placed_pointer *at, hapi_row *row,
@@ -193,7 +201,7 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   hapi_body_arm(at->body, at->point, arm);
   hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
   hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
-  if (at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) { /* eq. 6: its own probes */
+  if (has_own_probes(at->body)) {
     for (int i = 0; i < 6; ++i) {
       row->ba[i] = hapi_v3_dot(contact->a[i], into);
     }
