@@ -13,61 +13,25 @@
 
 #define FIRST_CAPACITY 64u
 
-static uint32_t hash_of(dBodyID body)
-{
-  uint64_t x = (uint64_t)(uintptr_t)body;
-  x = (x ^ (x >> 33)) * 0xff51afd7ed558ccdu;
-  return (uint32_t)(x ^ (x >> 33));
-}
-
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
 {
-  if (body == NULL || table->bucket_count == 0) {
-    return HAPI_NONE;
-  }
-  uint32_t mask = table->bucket_count - 1;
-  for (uint32_t at = hash_of(body) & mask; table->buckets[at] != 0; at = (at + 1) & mask) {
-    uint32_t index = table->buckets[at] - 1;
-    if (table->entries[index].body == body) {
-      return index;
-    }
-  }
-  return HAPI_NONE;
-}
-
-static void insert_bucket(hapi_body_table *table, uint32_t index)
-{
-  uint32_t mask = table->bucket_count - 1;
-  uint32_t at = hash_of(table->entries[index].body) & mask;
-  while (table->buckets[at] != 0) {
-    at = (at + 1) & mask;
-  }
-  table->buckets[at] = index + 1;
-}
-
-static void rebuild_buckets(hapi_body_table *table)
-{
-  memset(table->buckets, 0, table->bucket_count * sizeof *table->buckets);
-  for (uint32_t i = 0; i < table->high; ++i) {
-    if (table->entries[i].body != NULL) {
-      insert_bucket(table, i);
-    }
-  }
+  return hapi_index_get(&table->by_address, hapi_index_address(body));
 }
 
 static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
+  if (!hapi_index_reserve(&table->by_address, capacity)) {
+    return HAP_ERROR_MEMORY;
+  }
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
-  uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL || buckets == NULL) {
+  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL) {
     hapi_free(entries);
     hapi_free(handles);
     hapi_free(drawn);
     hapi_free(poses);
-    hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
@@ -82,15 +46,11 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
-  hapi_free(table->buckets);
   table->entries = entries;
   table->handles = handles;
   table->drawn = drawn;
   table->poses = poses;
-  table->buckets = buckets;
   table->capacity = capacity;
-  table->bucket_count = capacity * 4;
-  rebuild_buckets(table);
   return HAP_OK;
 }
 
@@ -109,7 +69,7 @@ void hapi_bodies_finish(hapi_body_table *table)
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
-  hapi_free(table->buckets);
+  hapi_index_finish(&table->by_address);
   memset(table, 0, sizeof *table);
 }
 
@@ -125,9 +85,10 @@ static uint32_t free_entry(hapi_body_table *table)
   return table->high;
 }
 
-static void begin_entry(hapi_known_body *known, dBodyID body)
+static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID body)
 {
   memset(known, 0, sizeof *known);
+  known->birth = ++table->births;
   known->body = body;
   known->slot = HAPI_NONE;
   known->island = HAPI_NONE;
@@ -139,11 +100,11 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
-  begin_entry(&table->entries[index], body);
+  begin_entry(table, &table->entries[index], body);
   table->handles[index] = body;
   table->high = index == table->high ? index + 1 : table->high;
   ++table->used;
-  insert_bucket(table, index);
+  hapi_index_put(&table->by_address, hapi_index_address(body), index);
   *out_index = index;
   return HAP_OK;
 }
@@ -171,7 +132,7 @@ static void follow_life(hapi_physics *physics, uint32_t index)
   if (hapi_mark_is_gone(known)) {
     dBodyID body = known->body;
     drop_entry(physics, index);
-    begin_entry(known, body);
+    begin_entry(table, known, body);
     hapi_poses_begin(physics, index);
     ++table->replaced;
   }
@@ -209,6 +170,9 @@ static void look_at(hapi_physics *physics, hapi_known_body *known)
   ++table->seen_count;
   known->jointed = dBodyGetJoint(body, 0) != NULL;
   table->jointed_count += known->jointed;
+  if (table->geoms_forgotten && !known->sized) {
+    known->geoms_print = 0;
+  }
   if (hapi_extent_follow(known)) {
     known->measured_in = table->scan;
   }
@@ -321,9 +285,11 @@ static void see_jointed(hapi_physics *physics)
 
 static void remove_entry(hapi_physics *physics, uint32_t index)
 {
+  hapi_body_table *table = &physics->table;
+  hapi_index_remove(&table->by_address, hapi_index_address(table->handles[index]));
   drop_entry(physics, index);
-  physics->table.handles[index] = NULL;
-  --physics->table.used;
+  table->handles[index] = NULL;
+  --table->used;
 }
 
 /* Once a run: an application that does it does it often. The statistics count on. */
@@ -365,9 +331,6 @@ static void drop_unseen(hapi_physics *physics)
     remove_entry(physics, i);
     ++dropped;
   }
-  if (dropped > 0) {
-    rebuild_buckets(table);
-  }
   say_lost(physics, dropped + table->replaced);
   table->replaced = 0;
 }
@@ -386,6 +349,7 @@ static hap_status scan(hapi_physics *physics)
   see_space(physics, physics->ode.space);
   see_jointed(physics);
   drop_unseen(physics);
+  table->geoms_forgotten = false;
   return table->starved ? HAP_ERROR_MEMORY : HAP_OK;
 }
 
@@ -425,7 +389,6 @@ hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body)
   if (index != HAPI_NONE) {
     hapi_sleep_give_back(&physics->table.entries[index]);
     remove_entry(physics, index);
-    rebuild_buckets(&physics->table);
   }
   pthread_mutex_unlock(&physics->poses_lock);
   return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;

@@ -71,9 +71,10 @@ static uint64_t print_of(dBodyID body, bool *out_sized)
   *out_sized = true;
   for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     dVector3 sizes = {0};
-    print = mix(print, (uint64_t)(uintptr_t)geom);
     int count = sizes_of(geom, sizes);
     *out_sized = *out_sized && count > 0;
+    uint64_t address = (uint64_t)(uintptr_t)geom; /* not where sizes say enough: lockstep */
+    print = mix(print, count > 0 ? (uint64_t)dGeomGetClass(geom) : address);
     print = mix_numbers(print, sizes, count);
     if (dGeomIsOffset(geom)) {
       print = mix_numbers(print, dGeomGetOffsetPosition(geom), 3);

@@ -13,13 +13,14 @@
 
 #include "base/fair_lock.h"
 #include "base/histogram.h"
+#include "base/index.h"
 #include "base/thread.h"
 #include "physics/admittance.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
 
-#define HAPI_NONE 0xffffffffu
+#define HAPI_NONE HAPI_INDEX_NONE
 #define HAPI_EDITS_MAX 256
 #define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
 #define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
@@ -58,6 +59,7 @@ typedef struct hapi_mark {
 
 typedef struct hapi_known_body {
   dBodyID body;         /* NULL: free entry */
+  uint64_t birth;       /* number of this life of the entry, from 1: addresses come again */
   uint64_t seen;        /* scan that found it */
   uint32_t next;        /* entry that the last scan saw after it; a guess */
   uint32_t slot;        /* local slot, HAPI_NONE: not local */
@@ -115,9 +117,9 @@ typedef struct hapi_body_table {
   hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
   dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
-  uint32_t high;     /* entries in use are below */
-  uint32_t *buckets; /* open addressing, entry index + 1 */
-  uint32_t bucket_count;
+  uint32_t high; /* entries in use are below */
+  hapi_index by_address;
+  uint64_t births; /* entries begun so far */
   uint32_t used;
   uint64_t scan;
   uint32_t seen_count;    /* entries that this scan saw */
@@ -130,13 +132,23 @@ typedef struct hapi_body_table {
   uint64_t lost;
   uint32_t replaced; /* among them, not counted yet: another one is at the address */
   bool said_lost;
-  bool starved; /* the newest scan found no memory for a body: not all are known */
+  bool starved;         /* the newest scan found no memory for a body: not all are known */
+  bool geoms_forgotten; /* since the newest scan: another one may be at the address of one */
 } hapi_body_table;
 
 /* ---- joints.c: what is known of the world's joints ---- */
 
+/* What a joint is known by. Not by its address: that may be one of a joint that was destroyed, or not,
+ * as the heap likes, and lockstep would go another way. */
+typedef struct hapi_joint_name {
+  uint64_t births[2]; /* of its bodies, in ODE's own order; 0: static world */
+  dJointType type;
+  uint32_t rank; /* among those of the same bodies and type, the oldest first */
+} hapi_joint_name;
+
 typedef struct hapi_known_joint {
   dJointID joint;
+  hapi_joint_name name;
   uint64_t seen;     /* scan that found it */
   dBodyID bodies[2]; /* in ODE's own order; the second is NULL: static world */
   uint32_t index[2]; /* of the body table, in this cycle */
@@ -154,7 +166,7 @@ typedef struct hapi_known_joint {
 } hapi_known_joint;
 
 typedef struct hapi_joint_slot {
-  dJointID joint; /* compared only; NULL: free */
+  uint32_t taken; /* by which entry, + 1; 0: free */
   uint32_t generation;
 } hapi_joint_slot;
 
@@ -162,8 +174,8 @@ typedef struct hapi_joint_table {
   hapi_known_joint *entries;
   uint32_t count;
   uint32_t capacity;
-  uint32_t *buckets; /* open addressing, entry index + 1 */
-  uint32_t bucket_count;
+  hapi_index by_address;
+  hapi_index by_name;
   uint64_t scan;
   bool starved;           /* the newest scan found no memory for a joint */
   hapi_joint_slot *slots; /* capacity.joints */
@@ -306,6 +318,12 @@ typedef struct hapi_pair_place {
   uint64_t walk; /* that noted it */
 } hapi_pair_place;
 
+typedef struct hapi_geom_name {
+  dGeomID geom;    /* compared only */
+  uint64_t number; /* from 1; 0: it was forgotten */
+  uint64_t walk;   /* newest one that met it */
+} hapi_geom_name;
+
 typedef struct hapi_range {
   hapi_near *near; /* message being written */
   dGeomID *geoms;  /* of its geoms; capacity.geoms */
@@ -316,6 +334,11 @@ typedef struct hapi_range {
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
+  hapi_geom_name *names;
+  uint32_t name_count;
+  uint32_t name_capacity;
+  hapi_index names_by_address;
+  uint64_t names_given;
   bool pair_found;  /* scratch */
   double own_speed; /* m/s, while ODE calls back */
   double fastest;   /* m/s, of the pointers */
@@ -623,6 +646,7 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
 bool hapi_range_create(hapi_physics *physics);
 void hapi_range_finish(hapi_physics *physics);
 void hapi_range_reset(hapi_physics *physics);
+void hapi_range_forget_geom(hapi_range *range, dGeomID geom);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 
