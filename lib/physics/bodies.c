@@ -24,11 +24,13 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
     return HAP_ERROR_MEMORY;
   }
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
+  hapi_known_rest *rests = hapi_alloc_array(capacity, sizeof *rests);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
-  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL) {
+  if (entries == NULL || rests == NULL || handles == NULL || drawn == NULL || poses == NULL) {
     hapi_free(entries);
+    hapi_free(rests);
     hapi_free(handles);
     hapi_free(drawn);
     hapi_free(poses);
@@ -36,6 +38,7 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
+    memcpy(rests, table->rests, table->high * sizeof *rests);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
     memcpy(drawn, table->drawn, table->high * sizeof *drawn);
     for (size_t i = 0; i < HAPI_FRAMES; ++i) {
@@ -43,10 +46,15 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
     }
   }
   hapi_free(table->entries);
+  hapi_free(table->rests);
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
+  for (uint32_t i = 0; i < capacity; ++i) {
+    entries[i].rest = &rests[i];
+  }
   table->entries = entries;
+  table->rests = rests;
   table->handles = handles;
   table->drawn = drawn;
   table->poses = poses;
@@ -63,9 +71,10 @@ hap_status hapi_bodies_init(hapi_body_table *table)
 void hapi_bodies_finish(hapi_body_table *table)
 {
   for (uint32_t i = 0; i < table->high; ++i) {
-    hapi_free(table->entries[i].sleep.velocities);
+    hapi_free(table->rests[i].sleep.velocities);
   }
   hapi_free(table->entries);
+  hapi_free(table->rests);
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
@@ -87,9 +96,10 @@ static uint32_t free_entry(hapi_body_table *table)
 
 static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID body)
 {
-  memset(known, 0, sizeof *known);
-  known->birth = ++table->births;
-  known->body = body;
+  hapi_known_rest *rest = known->rest;
+  memset(rest, 0, sizeof *rest);
+  *known = (hapi_known_body){.body = body, .rest = rest};
+  rest->birth = ++table->births;
   known->slot = HAPI_NONE;
   known->island = HAPI_NONE;
 }
@@ -119,8 +129,9 @@ static void drop_entry(hapi_physics *physics, uint32_t index)
       physics->watch[i] = HAPI_NONE;
     }
   }
-  hapi_free(known->sleep.velocities);
-  memset(known, 0, sizeof *known);
+  hapi_free(known->rest->sleep.velocities);
+  memset(known->rest, 0, sizeof *known->rest);
+  *known = (hapi_known_body){.rest = known->rest};
   known->slot = HAPI_NONE;
 }
 
@@ -160,6 +171,24 @@ static uint32_t find_next(hapi_body_table *table, dBodyID body)
   return index;
 }
 
+static bool is_zero(const dReal *v)
+{
+  return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
+}
+
+/* What is written must go back to memory: not where nobody pushes. */
+static void follow_push(hapi_known_body *known)
+{
+  const dReal *force = dBodyGetForce(known->body);
+  const dReal *torque = dBodyGetTorque(known->body);
+  bool pushed = !is_zero(force) || !is_zero(torque);
+  if (pushed || known->pushed) {
+    hapi_v3_copy(force, known->rest->user_force);
+    hapi_v3_copy(torque, known->rest->user_torque);
+  }
+  known->pushed = pushed;
+}
+
 /* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
  * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
 static void look_at(hapi_physics *physics, hapi_known_body *known)
@@ -173,14 +202,11 @@ static void look_at(hapi_physics *physics, hapi_known_body *known)
   if (table->geoms_forgotten && !known->sized) {
     known->geoms_print = 0;
   }
-  if (hapi_extent_follow(known)) {
-    known->measured_in = table->scan;
-  }
+  known->measured = hapi_extent_follow(known);
   if (physics->begun) {
     hapi_sleep_follow(known);
   }
-  hapi_v3_copy(dBodyGetForce(body), known->user_force);
-  hapi_v3_copy(dBodyGetTorque(body), known->user_torque);
+  follow_push(known);
   if (known->slot != HAPI_NONE) {
     return;
   }
@@ -226,7 +252,7 @@ static void see_geom(hapi_physics *physics, dGeomID geom)
   dBodyID body = dGeomGetBody(geom);
   hapi_known_body *known =
       body != NULL && see_body(physics, body) ? &table->entries[table->last_seen] : NULL;
-  bool same = known != NULL && known->sized && known->measured_in != table->scan;
+  bool same = known != NULL && known->sized && !known->measured;
   bool posed = same || body == NULL || hapi_pose_is_sound(body);
   if (same || (posed && hapi_geom_is_sound(geom))) {
     return;
@@ -311,7 +337,7 @@ static void say_lost(hapi_physics *physics, uint32_t count)
  * one is at its address. */
 static bool lives_unseen(const hapi_known_body *known)
 {
-  return known->adopted && !known->found && !hapi_mark_is_gone(known);
+  return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
 }
 
 static void drop_unseen(hapi_physics *physics)
@@ -375,7 +401,7 @@ hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_
   }
   pthread_mutex_unlock(&physics->poses_lock);
   if (status >= HAP_OK) {
-    physics->table.entries[*out_index].adopted = true;
+    physics->table.entries[*out_index].rest->adopted = true;
     physics->table.entries[*out_index].found = false; /* its geoms may have gone since */
     physics->table.entries[*out_index].seen = physics->table.scan;
   }
@@ -405,7 +431,7 @@ hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
     index = hapi_bodies_find(&physics->table, body);
   }
   if (index != HAPI_NONE) {
-    physics->table.entries[index].moved_callback = callback;
+    physics->table.entries[index].rest->moved_callback = callback;
     dBodySetMovedCallback(body, callback);
   }
   pthread_mutex_unlock(&physics->poses_lock);

@@ -174,7 +174,7 @@ static void read_bodies(const hapi_physics *physics, dJointID joint, hapi_known_
     out->index[i] = index;
     out->name.births[i] = out->bodies[i] == NULL ? 0
                           : index == HAPI_NONE   ? UNKNOWN_BIRTH
-                                                 : physics->table.entries[index].birth;
+                                                 : physics->table.entries[index].rest->birth;
   }
 }
 
@@ -222,9 +222,11 @@ void hapi_joints_scan(hapi_physics *physics)
 {
   ++physics->joints.scan;
   physics->joints.starved = false;
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
+  uint32_t end = physics->table.jointed_count > 0 ? physics->table.high : 0;
+  for (uint32_t i = 0; i < end; ++i) {
     dBodyID body = physics->table.handles[i];
-    for (int k = body != NULL ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
+    bool jointed = body != NULL && physics->table.entries[i].jointed;
+    for (int k = jointed ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
       dJointID joint = dBodyGetJoint(body, k - 1);
       if (dJointGetType(joint) != dJointTypeContact) {
         see(physics, joint);

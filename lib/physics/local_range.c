@@ -43,7 +43,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
 {
   hapi_range *range = &physics->range;
   hapi_known_body *body = entry(physics, known);
-  if (body->ranged_in == range->number) {
+  if (body->rest->ranged_in == range->number) {
     return true;
   }
   uint32_t slot = hapi_slots_body(physics, known);
@@ -52,7 +52,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
     return false;
   }
   hapi_body_slot *local = &physics->bodies[slot];
-  body->ranged_in = range->number;
+  body->rest->ranged_in = range->number;
   local->wanted = true;
   local->linked = false;
   local->edge = false;
@@ -560,7 +560,7 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
   if (!dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
     return;
   }
-  bool refused = known->gathered_in == range->number; /* with another body of its mechanism */
+  bool refused = known->rest->gathered_in == range->number; /* with another body of its mechanism */
   if (!refused && range->owned < range_capacity(physics) && hapi_mechanism_gather(physics, index) &&
       mechanism_can_be_owned(physics)) {
     own_mechanism(physics);
@@ -667,9 +667,9 @@ void hapi_range_reset(hapi_physics *physics)
   range->name_count = 0;
   hapi_index_clear(&range->names_by_address);
   for (uint32_t i = 0; i < physics->table.high; ++i) {
-    physics->table.entries[i].ranged_in = 0;
-    physics->table.entries[i].gathered_in = 0;
-    physics->table.entries[i].chosen_in = 0;
+    physics->table.entries[i].rest->ranged_in = 0;
+    physics->table.entries[i].rest->gathered_in = 0;
+    physics->table.entries[i].rest->chosen_in = 0;
     physics->table.entries[i].loop_owned = false;
   }
 }

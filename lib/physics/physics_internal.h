@@ -35,9 +35,6 @@
 /* ---- bodies.c: what is known of the world's bodies ---- */
 
 typedef struct hapi_sleep {
-  bool taken;
-  bool awake;     /* after the last global step */
-  bool automatic; /* ODE's flag as the application set it; kept by us while the session runs */
   double linear_threshold;  /* m/s, squared as ODE keeps it */
   double angular_threshold; /* rad/s, squared */
   int idle_steps;
@@ -51,40 +48,50 @@ typedef struct hapi_sleep {
 } hapi_sleep;
 
 typedef struct hapi_mark {
-  bool placed;
-  bool in_axis;
   double idle_time;         /* s, the application's, which the mark stands in for */
   double angular_threshold; /* rad/s, the same */
 } hapi_mark;
 
-typedef struct hapi_known_body {
-  dBodyID body;         /* NULL: free entry */
-  uint64_t birth;       /* number of this life of the entry, from 1: addresses come again */
-  uint64_t seen;        /* scan that found it */
-  uint32_t next;        /* entry that the last scan saw after it; a guess */
-  uint32_t slot;        /* local slot, HAPI_NONE: not local */
-  uint64_t measured_in; /* scan that found its geoms changed */
+/* What a step does not look at where the body is far from the pointers and nothing has changed. */
+typedef struct hapi_known_rest {
+  uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
   bool adopted;
-  bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool sized; /* all of its geoms are of classes whose sizes are in geoms_print */
-  bool jointed;
-  bool loop_owned; /* in the newest message, also while its slot retires */
-  bool loop_touched;
-  bool enabled_before; /* scratch of the probe's flag pass */
-  double extent;       /* m, from the body's origin to the far corner of its geoms */
-  uint64_t
-      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in;   /* scratch: model that it was chosen for */
   uint64_t ranged_in;   /* scratch: walk that met it */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
   double damping[2];    /* scratch of soft.c */
   void (*moved_callback)(dBodyID);
+} hapi_known_rest;
+
+/* 64 bytes: a scan goes through the memory of all of them. */
+typedef struct hapi_known_body {
+  dBodyID body;          /* NULL: free entry */
+  hapi_known_rest *rest; /* the entry's */
+  uint64_t seen;         /* scan that found it */
+  uint32_t next;         /* entry that the last scan saw after it; a guess */
+  uint32_t slot;         /* local slot, HAPI_NONE: not local */
+  double extent;         /* m, from the body's origin to the far corner of its geoms */
+  uint64_t
+      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
+  uint32_t island; /* scratch: number of the island under test, HAPI_NONE outside */
+  bool found;      /* at least once, by a geom or a joint: it is gone when it is found no more */
+  bool sized;      /* all of its geoms are of classes whose sizes are in geoms_print */
+  bool measured;   /* the last scan found its geoms changed */
+  bool jointed;
+  bool loop_owned; /* in the newest message, also while its slot retires */
+  bool loop_touched;
+  bool pushed; /* user_force or user_torque is not 0 */
+  bool mark_placed;
+  bool mark_in_axis;
+  bool sleep_taken;
+  bool
+      sleep_automatic; /* ODE's flag as the application set it; kept by us while the session runs */
+  bool awake;          /* after the last global step */
 } hapi_known_body;
 
 /* ---- poses.c: what is drawn ---- */
@@ -113,9 +120,10 @@ typedef struct hapi_frames {
 
 typedef struct hapi_body_table {
   hapi_known_body *entries;
-  hapi_drawn *drawn; /* of each entry */
-  hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
-  dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
+  hapi_known_rest *rests; /* of each entry */
+  hapi_drawn *drawn;      /* of each entry */
+  hap_pose *poses;        /* HAPI_FRAMES x capacity: a frame is written from end to end */
+  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high; /* entries in use are below */
   hapi_index by_address;
