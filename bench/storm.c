@@ -284,6 +284,9 @@ static void drive(storm *s, uint64_t round)
     }
     expect(s, hap_session_advance(s->session, 1) >= HAP_OK);
     s->now_ns += MS;
+    if (s->def.ticked != NULL) {
+      s->def.ticked(s->session, s->def.ticked_arg);
+    }
     return;
   }
   sleep_ns(MS);

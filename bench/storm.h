@@ -26,6 +26,8 @@ typedef struct storm_def {
   bool restarts;    /* the session is stopped and started again in the middle */
   int rt_priority;
   storm_telling telling;
+  void (*ticked)(hap_session *session, void *arg); /* LOCKSTEP: after each tick; may be NULL */
+  void *ticked_arg;
 } storm_def;
 
 typedef struct storm_result {

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Histogram, fair lock, clock, the door to the heap, status texts. */
+/* Histogram, fair lock, clock, the door to the heap, index, status texts. */
 
 #include "tests/tap.h"
 
@@ -16,6 +16,7 @@
 #include "base/clock.h"
 #include "base/fair_lock.h"
 #include "base/histogram.h"
+#include "base/index.h"
 #include "base/log.h"
 #include "base/thread.h"
 
@@ -408,6 +409,64 @@ TEST(heap_zeroes_and_goes_through_the_hooks)
   CHECK(heap.logs == 1);
 }
 
+/* ---- index ---- */
+
+#define KEYS 48u
+
+static uint64_t key_number(uint32_t i)
+{
+  return i == 0 ? 0 : i == 1 ? UINT64_MAX : i % 2 == 0 ? i : hapi_index_mix(i);
+}
+
+/* Against an array. values: HAPI_INDEX_NONE where there is no key. */
+static void check_index(const hapi_index *index, const uint32_t values[KEYS])
+{
+  for (uint32_t i = 0; i < KEYS; ++i) {
+    CHECK(hapi_index_get(index, key_number(i)) == values[i]);
+  }
+}
+
+TEST(index_finds_what_was_put_and_not_removed)
+{
+  hapi_index index = {0};
+  uint32_t values[KEYS];
+  uint32_t count = 0;
+  uint64_t random = 1;
+  memset(values, 0xff, sizeof values);
+  check_index(&index, values);
+  hapi_index_clear(&index);
+  REQUIRE(hapi_index_reserve(&index, KEYS / 2));
+  for (uint32_t round = 0; round < 20000; ++round) {
+    random = hapi_index_mix(random + round);
+    uint32_t i = (uint32_t)(random % KEYS);
+    bool there = values[i] != HAPI_INDEX_NONE;
+    if (there && random >> 63 == 0) { /* another value of the key that is there */
+      values[i] = round;
+      hapi_index_put(&index, key_number(i), round);
+    } else if (there || count == KEYS / 2) {
+      count -= there;
+      values[i] = HAPI_INDEX_NONE;
+      hapi_index_remove(&index, key_number(i));
+    } else {
+      ++count;
+      values[i] = round;
+      hapi_index_put(&index, key_number(i), round);
+    }
+    if (round % 16 == 0) {
+      check_index(&index, values);
+    }
+  }
+  CHECK(hapi_index_reserve(&index, 100 * KEYS)); /* what is there stays */
+  check_index(&index, values);
+  CHECK(!hapi_index_reserve(&index, UINT32_MAX)); /* more than there can be */
+  check_index(&index, values);
+  hapi_index_clear(&index);
+  memset(values, 0xff, sizeof values);
+  check_index(&index, values);
+  hapi_index_finish(&index);
+  check_index(&index, values);
+}
+
 TEST(fail_writes_and_cuts_the_text)
 {
   hap_detail detail;
@@ -456,6 +515,7 @@ int main(void)
   RUN(fair_lock_goes_on_behind_one_who_gave_up);
   RUN(thread_starts_with_or_without_real_time_and_joins_twice);
   RUN(heap_zeroes_and_goes_through_the_hooks);
+  RUN(index_finds_what_was_put_and_not_removed);
   RUN(fail_writes_and_cuts_the_text);
   RUN(every_status_has_a_name_and_a_text);
   return tap_done();

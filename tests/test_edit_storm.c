@@ -7,6 +7,7 @@
 #include "tests/tap.h"
 
 #include "bench/storm.h"
+#include "tests/repeat.h"
 
 static double seconds = 2.0;
 
@@ -91,23 +92,33 @@ TEST(frame)
   CHECK(r.lost > 0);
 }
 
-/* Told of what goes, lockstep has the same bits in every run, whatever addresses the heap gives. Ten seconds at
- * most; in model contact pairs of runs of ten seconds and more were seen to differ, and why is not known yet. */
+static void note(hap_session *session, void *log)
+{
+  repeat_note(log, session);
+}
+
+static void run_told(repeat_log *log, const void *arg)
+{
+  storm_result r;
+  storm_def def = *(const storm_def *)arg;
+  def.ticked = note;
+  def.ticked_arg = log;
+  check(&def, &r);
+  CHECK(r.stats.ticks == log->count && r.stats.trace_hash != 0);
+}
+
+/* Told of what goes, lockstep has the same bits in every run, whatever addresses the heap gives. */
 TEST(lockstep_repeats_bit_by_bit)
 {
+  int seeds = seconds < 30.0 ? 1 : 3;
   for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_CONTACT; ++model) {
-    storm_result r[2];
     storm_def def = usual(HAP_DRIVE_LOCKSTEP, (hap_model)model);
     def.telling = STORM_TELLS;
     def.restarts = false;
-    def.seconds = fmin(seconds, 10.0);
-    for (int i = 0; i < 2; ++i) {
-      void *shift = malloc(i == 0 ? 100 : 100000); /* other addresses */
-      check(&def, &r[i]);
-      free(shift);
+    for (int i = 0; i < seeds; ++i) {
+      def.seed += (uint64_t)i;
+      CHECK(repeat_run(run_told, &def));
     }
-    CHECK(r[0].stats.trace_hash == r[1].stats.trace_hash && r[0].stats.trace_hash != 0);
-    CHECK(r[0].stats.ticks == r[1].stats.ticks && r[0].peak == r[1].peak);
   }
 }
 
@@ -128,6 +139,7 @@ int main(int argc, char **argv)
   if (argc > 1) {
     seconds = strcmp(argv[1], "long") == 0 ? 60.0 : strtod(argv[1], NULL);
   }
+  repeat_init();
   dInitODE2(0);
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(threads_in_model_contact);

@@ -40,7 +40,7 @@ static const hapi_known_body *known_of(stage *s)
 
 static const hapi_sleep *sleep_of(stage *s)
 {
-  return &known_of(s)->sleep;
+  return &known_of(s)->rest->sleep;
 }
 
 static double extent_of(stage *s)

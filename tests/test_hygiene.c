@@ -140,6 +140,13 @@ static void inertia(things *t, double bad)
   m.I[0] = bad;
   dBodySetMass(t->w.bodies[0], &m);
 }
+static void inertia_product(things *t, double bad)
+{
+  dMass m;
+  dBodyGetMass(t->w.bodies[0], &m);
+  m.I[1] = m.I[4] = bad;
+  dBodySetMass(t->w.bodies[0], &m);
+}
 static void anchor(things *t, double bad)
 {
   dJointSetHingeAnchor(t->hinge, bad, 0.0, 0.0);
@@ -175,6 +182,7 @@ static const damage damages[] = {
     {"damping", damping, "damping", 1 | 2 | 4},
     {"mass", mass, "mass", 2 | 8},
     {"inertia", inertia, "inertia", 1},
+    {"product of inertia", inertia_product, "inertia", 1},
     {"joint anchor", anchor, "joint", 1 | 2 | 4},
     {"joint motor", motor, "joint", 1 | 2 | 4},
     {"joint stop", stop, "joint", 1 | 2},

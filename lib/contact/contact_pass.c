@@ -300,7 +300,7 @@ static void leave_out_farthest(hapi_contact *contact)
   }
 }
 
-/* Without the keys, which are made of addresses. */
+/* Without the keys, which are counted through all runs of a session. */
 static uint64_t hash_patches(hapi_patches *patches)
 {
   const hapi_patch_contact *c = hapi_patches_contacts(patches);

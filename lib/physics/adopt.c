@@ -28,6 +28,8 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
     hapi_candidate *candidate = &physics->neighborhood.candidates[i];
     candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
   }
+  physics->table.geoms_forgotten = true;
+  hapi_range_forget_geom(&physics->range, (dGeomID)(uintptr_t)geom);
   hapi_meshes_forget(&physics->meshes, (dGeomID)(uintptr_t)geom);
 }
 

@@ -13,65 +13,32 @@
 
 #define FIRST_CAPACITY 64u
 
-static uint32_t hash_of(dBodyID body)
-{
-  uint64_t x = (uint64_t)(uintptr_t)body;
-  x = (x ^ (x >> 33)) * 0xff51afd7ed558ccdu;
-  return (uint32_t)(x ^ (x >> 33));
-}
-
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
 {
-  if (body == NULL || table->bucket_count == 0) {
-    return HAPI_NONE;
-  }
-  uint32_t mask = table->bucket_count - 1;
-  for (uint32_t at = hash_of(body) & mask; table->buckets[at] != 0; at = (at + 1) & mask) {
-    uint32_t index = table->buckets[at] - 1;
-    if (table->entries[index].body == body) {
-      return index;
-    }
-  }
-  return HAPI_NONE;
-}
-
-static void insert_bucket(hapi_body_table *table, uint32_t index)
-{
-  uint32_t mask = table->bucket_count - 1;
-  uint32_t at = hash_of(table->entries[index].body) & mask;
-  while (table->buckets[at] != 0) {
-    at = (at + 1) & mask;
-  }
-  table->buckets[at] = index + 1;
-}
-
-static void rebuild_buckets(hapi_body_table *table)
-{
-  memset(table->buckets, 0, table->bucket_count * sizeof *table->buckets);
-  for (uint32_t i = 0; i < table->high; ++i) {
-    if (table->entries[i].body != NULL) {
-      insert_bucket(table, i);
-    }
-  }
+  return hapi_index_get(&table->by_address, hapi_index_address(body));
 }
 
 static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
+  if (!hapi_index_reserve(&table->by_address, capacity)) {
+    return HAP_ERROR_MEMORY;
+  }
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
+  hapi_known_rest *rests = hapi_alloc_array(capacity, sizeof *rests);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
-  uint32_t *buckets = hapi_alloc_array((size_t)capacity * 4, sizeof *buckets);
-  if (entries == NULL || handles == NULL || drawn == NULL || poses == NULL || buckets == NULL) {
+  if (entries == NULL || rests == NULL || handles == NULL || drawn == NULL || poses == NULL) {
     hapi_free(entries);
+    hapi_free(rests);
     hapi_free(handles);
     hapi_free(drawn);
     hapi_free(poses);
-    hapi_free(buckets);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
+    memcpy(rests, table->rests, table->high * sizeof *rests);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
     memcpy(drawn, table->drawn, table->high * sizeof *drawn);
     for (size_t i = 0; i < HAPI_FRAMES; ++i) {
@@ -79,18 +46,19 @@ static hap_status grow(hapi_body_table *table, uint32_t capacity)
     }
   }
   hapi_free(table->entries);
+  hapi_free(table->rests);
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
-  hapi_free(table->buckets);
+  for (uint32_t i = 0; i < capacity; ++i) {
+    entries[i].rest = &rests[i];
+  }
   table->entries = entries;
+  table->rests = rests;
   table->handles = handles;
   table->drawn = drawn;
   table->poses = poses;
-  table->buckets = buckets;
   table->capacity = capacity;
-  table->bucket_count = capacity * 4;
-  rebuild_buckets(table);
   return HAP_OK;
 }
 
@@ -103,13 +71,14 @@ hap_status hapi_bodies_init(hapi_body_table *table)
 void hapi_bodies_finish(hapi_body_table *table)
 {
   for (uint32_t i = 0; i < table->high; ++i) {
-    hapi_free(table->entries[i].sleep.velocities);
+    hapi_free(table->rests[i].sleep.velocities);
   }
   hapi_free(table->entries);
+  hapi_free(table->rests);
   hapi_free(table->handles);
   hapi_free(table->drawn);
   hapi_free(table->poses);
-  hapi_free(table->buckets);
+  hapi_index_finish(&table->by_address);
   memset(table, 0, sizeof *table);
 }
 
@@ -125,10 +94,12 @@ static uint32_t free_entry(hapi_body_table *table)
   return table->high;
 }
 
-static void begin_entry(hapi_known_body *known, dBodyID body)
+static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID body)
 {
-  memset(known, 0, sizeof *known);
-  known->body = body;
+  hapi_known_rest *rest = known->rest;
+  memset(rest, 0, sizeof *rest);
+  *known = (hapi_known_body){.body = body, .rest = rest};
+  rest->birth = ++table->births;
   known->slot = HAPI_NONE;
   known->island = HAPI_NONE;
 }
@@ -139,11 +110,11 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
-  begin_entry(&table->entries[index], body);
+  begin_entry(table, &table->entries[index], body);
   table->handles[index] = body;
   table->high = index == table->high ? index + 1 : table->high;
   ++table->used;
-  insert_bucket(table, index);
+  hapi_index_put(&table->by_address, hapi_index_address(body), index);
   *out_index = index;
   return HAP_OK;
 }
@@ -158,8 +129,9 @@ static void drop_entry(hapi_physics *physics, uint32_t index)
       physics->watch[i] = HAPI_NONE;
     }
   }
-  hapi_free(known->sleep.velocities);
-  memset(known, 0, sizeof *known);
+  hapi_free(known->rest->sleep.velocities);
+  memset(known->rest, 0, sizeof *known->rest);
+  *known = (hapi_known_body){.rest = known->rest};
   known->slot = HAPI_NONE;
 }
 
@@ -171,7 +143,7 @@ static void follow_life(hapi_physics *physics, uint32_t index)
   if (hapi_mark_is_gone(known)) {
     dBodyID body = known->body;
     drop_entry(physics, index);
-    begin_entry(known, body);
+    begin_entry(table, known, body);
     hapi_poses_begin(physics, index);
     ++table->replaced;
   }
@@ -199,6 +171,24 @@ static uint32_t find_next(hapi_body_table *table, dBodyID body)
   return index;
 }
 
+static bool is_zero(const dReal *v)
+{
+  return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
+}
+
+/* What is written must go back to memory: not where nobody pushes. */
+static void follow_push(hapi_known_body *known)
+{
+  const dReal *force = dBodyGetForce(known->body);
+  const dReal *torque = dBodyGetTorque(known->body);
+  bool pushed = !is_zero(force) || !is_zero(torque);
+  if (pushed || known->pushed) {
+    hapi_v3_copy(force, known->rest->user_force);
+    hapi_v3_copy(torque, known->rest->user_torque);
+  }
+  known->pushed = pushed;
+}
+
 /* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
  * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
 static void look_at(hapi_physics *physics, hapi_known_body *known)
@@ -209,14 +199,14 @@ static void look_at(hapi_physics *physics, hapi_known_body *known)
   ++table->seen_count;
   known->jointed = dBodyGetJoint(body, 0) != NULL;
   table->jointed_count += known->jointed;
-  if (hapi_extent_follow(known)) {
-    known->measured_in = table->scan;
+  if (table->geoms_forgotten && !known->sized) {
+    known->geoms_print = 0;
   }
+  known->measured = hapi_extent_follow(known);
   if (physics->begun) {
     hapi_sleep_follow(known);
   }
-  hapi_v3_copy(dBodyGetForce(body), known->user_force);
-  hapi_v3_copy(dBodyGetTorque(body), known->user_torque);
+  follow_push(known);
   if (known->slot != HAPI_NONE) {
     return;
   }
@@ -262,7 +252,7 @@ static void see_geom(hapi_physics *physics, dGeomID geom)
   dBodyID body = dGeomGetBody(geom);
   hapi_known_body *known =
       body != NULL && see_body(physics, body) ? &table->entries[table->last_seen] : NULL;
-  bool same = known != NULL && known->sized && known->measured_in != table->scan;
+  bool same = known != NULL && known->sized && !known->measured;
   bool posed = same || body == NULL || hapi_pose_is_sound(body);
   if (same || (posed && hapi_geom_is_sound(geom))) {
     return;
@@ -321,9 +311,11 @@ static void see_jointed(hapi_physics *physics)
 
 static void remove_entry(hapi_physics *physics, uint32_t index)
 {
+  hapi_body_table *table = &physics->table;
+  hapi_index_remove(&table->by_address, hapi_index_address(table->handles[index]));
   drop_entry(physics, index);
-  physics->table.handles[index] = NULL;
-  --physics->table.used;
+  table->handles[index] = NULL;
+  --table->used;
 }
 
 /* Once a run: an application that does it does it often. The statistics count on. */
@@ -345,7 +337,7 @@ static void say_lost(hapi_physics *physics, uint32_t count)
  * one is at its address. */
 static bool lives_unseen(const hapi_known_body *known)
 {
-  return known->adopted && !known->found && !hapi_mark_is_gone(known);
+  return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
 }
 
 static void drop_unseen(hapi_physics *physics)
@@ -365,9 +357,6 @@ static void drop_unseen(hapi_physics *physics)
     remove_entry(physics, i);
     ++dropped;
   }
-  if (dropped > 0) {
-    rebuild_buckets(table);
-  }
   say_lost(physics, dropped + table->replaced);
   table->replaced = 0;
 }
@@ -386,6 +375,7 @@ static hap_status scan(hapi_physics *physics)
   see_space(physics, physics->ode.space);
   see_jointed(physics);
   drop_unseen(physics);
+  table->geoms_forgotten = false;
   return table->starved ? HAP_ERROR_MEMORY : HAP_OK;
 }
 
@@ -411,7 +401,7 @@ hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_
   }
   pthread_mutex_unlock(&physics->poses_lock);
   if (status >= HAP_OK) {
-    physics->table.entries[*out_index].adopted = true;
+    physics->table.entries[*out_index].rest->adopted = true;
     physics->table.entries[*out_index].found = false; /* its geoms may have gone since */
     physics->table.entries[*out_index].seen = physics->table.scan;
   }
@@ -425,7 +415,6 @@ hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body)
   if (index != HAPI_NONE) {
     hapi_sleep_give_back(&physics->table.entries[index]);
     remove_entry(physics, index);
-    rebuild_buckets(&physics->table);
   }
   pthread_mutex_unlock(&physics->poses_lock);
   return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;
@@ -442,7 +431,7 @@ hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
     index = hapi_bodies_find(&physics->table, body);
   }
   if (index != HAPI_NONE) {
-    physics->table.entries[index].moved_callback = callback;
+    physics->table.entries[index].rest->moved_callback = callback;
     dBodySetMovedCallback(body, callback);
   }
   pthread_mutex_unlock(&physics->poses_lock);

@@ -45,9 +45,9 @@ static uint64_t mix_numbers(uint64_t print, const double *values, int count)
 }
 
 /* Of the classes whose sizes can be set; the others are known by their address alone, 0. */
-static int sizes_of(dGeomID geom, dVector3 out)
+static int sizes_of(dGeomID geom, int kind, dVector3 out)
 {
-  switch (dGeomGetClass(geom)) {
+  switch (kind) {
     case dSphereClass:
       out[0] = dGeomSphereGetRadius(geom);
       return 1;
@@ -71,9 +71,11 @@ static uint64_t print_of(dBodyID body, bool *out_sized)
   *out_sized = true;
   for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     dVector3 sizes = {0};
-    print = mix(print, (uint64_t)(uintptr_t)geom);
-    int count = sizes_of(geom, sizes);
+    int kind = dGeomGetClass(geom);
+    int count = sizes_of(geom, kind, sizes);
     *out_sized = *out_sized && count > 0;
+    uint64_t address = (uint64_t)(uintptr_t)geom; /* not where sizes say enough: lockstep */
+    print = mix(print, count > 0 ? (uint64_t)kind : address);
     print = mix_numbers(print, sizes, count);
     if (dGeomIsOffset(geom)) {
       print = mix_numbers(print, dGeomGetOffsetPosition(geom), 3);

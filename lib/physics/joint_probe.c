@@ -19,7 +19,7 @@
  * the other way at its beginning.
  *
  * Steps: with and without the joint 2, the pushes 6, without error reduction 1, each spring 1; a joint that
- * is as it was, 2; one whose bodies rest, none. ODE's exact stepper makes them (dWorldStep): at most six
+ * is as it was, 3; one whose bodies rest, none. ODE's exact stepper makes them (dWorldStep): at most six
  * equations, and no friction. */
 
 #define PUSH_SPEED 1e-3   /* m/s, that a push gives in a step */
@@ -31,6 +31,7 @@
 #define GIVEN_LEAST 1e-9  /* of the impulse, that is not the rows' */
 #define SAME_POSE 1e-9    /* m, rad: a joint is as it was */
 #define SAME_TARGET 1e-7  /* m/s, rad/s */
+#define SAME_ANSWER 1e-5  /* of a push */
 #define TURNED_LEAST 1e-4 /* rad, from which on it can be seen with which body rows turn */
 #define BETTER 0.5        /* of the other carrier's error */
 
@@ -150,7 +151,9 @@ static bool begin_pair(hapi_physics *physics, hapi_known_joint *known, pair *p)
   p->period = 1.0 / physics->config.haptic_hz;
   p->ratio = physics->config.physics_hz / physics->config.haptic_hz;
   bool second = known->bodies[0] == NULL || dBodyIsKinematic(known->bodies[0]);
-  p->m->first = second ? 1 : 0;
+  uint32_t first = second ? 1 : 0;
+  p->m->good = p->m->good && p->m->first == first;
+  p->m->first = first;
   for (int i = 0; i < 2; ++i) {
     p->bodies[i] = known->bodies[second ? 1 - i : i];
     p->index[i] = known->index[second ? 1 - i : i];
@@ -271,15 +274,19 @@ static void compare_reaction(const pair *p, const double impulse[6], const twist
   }
 }
 
-/* One column of the joint's answer: impulse by a unit of the wrench. */
-static void push(pair *p, int axis, const twists *base, double out[6], double io_reaction[2])
+/* That gives the body PUSH_SPEED or so in a step. */
+static double push_size(const pair *p, int axis)
+{
+  return PUSH_SPEED / p->period * (axis < 3 ? p->mass : p->inertia[4 * (axis - 3)]);
+}
+
+/* The joint's answer to a wrench: out of the step, impulse. */
+static void push(pair *p, const double wrench[6], const twists *base, double out[6],
+                 double io_reaction[2])
 {
   twists with;
   twists without = *base;
-  double wrench[6] = {0.0};
   double change[6];
-  double force = PUSH_SPEED / p->period * (axis < 3 ? p->mass : p->inertia[4 * (axis - 3)]);
-  wrench[axis] = force;
   begin_step(p);
   dBodyAddForce(p->bodies[0], wrench[0], wrench[1], wrench[2]);
   dBodyAddTorque(p->bodies[0], wrench[3], wrench[4], wrench[5]);
@@ -290,9 +297,6 @@ static void push(pair *p, int axis, const twists *base, double out[6], double io
   }
   impulse_of(p, &with, &without, out);
   compare_reaction(p, out, &with, &without, io_reaction);
-  for (int i = 0; i < 6; ++i) {
-    out[i] /= p->period * force;
-  }
 }
 
 static void find_held(pair *p, const twists *base, double out[6][6])
@@ -300,7 +304,12 @@ static void find_held(pair *p, const twists *base, double out[6][6])
   double columns[6][6];
   double reaction[2] = {0.0, 0.0};
   for (int k = 0; k < 6; ++k) {
-    push(p, k, base, columns[k], reaction);
+    double wrench[6] = {0.0};
+    wrench[k] = push_size(p, k);
+    push(p, wrench, base, columns[k], reaction);
+    for (int i = 0; i < 6; ++i) {
+      columns[k][i] /= p->period * wrench[k];
+    }
   }
   for (int i = 0; i < 6; ++i) { /* per wrench to per velocity: times the mass of the body */
     for (int k = 0; k < 3; ++k) {
@@ -640,6 +649,27 @@ static bool is_the_same(const pair *p, const twists *with, const twists *without
   return true;
 }
 
+/* One push along all axes: a joint set otherwise, or bodies of another mass, answer otherwise. */
+static bool answers_the_same(pair *p, const twists *with)
+{
+  double wrench[6];
+  double speed[6];
+  double impulse[6];
+  double reaction[2] = {0.0, 0.0};
+  for (int k = 0; k < 6; ++k) {
+    wrench[k] = (1.0 + 0.1 * k) * push_size(p, k);
+  }
+  push(p, wrench, with, impulse, reaction);
+  respond(&p->own, wrench, speed);
+  double off[6];
+  for (int i = 0; i < 6; ++i) {
+    off[i] = impulse[i] + p->period * dot6(p->m->held[i], speed);
+  }
+  double least = SAME_ANSWER * PUSH_SPEED;
+  return hapi_v3_norm(off) <= least * p->mass && fabs(off[3]) <= least * p->inertia[0] &&
+         fabs(off[4]) <= least * p->inertia[4] && fabs(off[5]) <= least * p->inertia[8];
+}
+
 static bool all_rest(const pair *p)
 {
   return !dBodyIsEnabled(p->bodies[0]) &&
@@ -687,7 +717,7 @@ static void measure_pair(pair *p, const hapi_joint_place *place, bool same)
   dJointDisable(p->known->joint);
   step(p, &without);
   dJointEnable(p->known->joint);
-  if (!same || !is_the_same(p, &with, &without)) {
+  if (!same || !is_the_same(p, &with, &without) || !answers_the_same(p, &with)) {
     p->m->good =
         measure_rows(p, place, &with, &without); /* if not, the last rows serve once more */
   }

@@ -11,6 +11,7 @@
  * cycle on in which they are there: some of what they hold can be read at that time only. */
 
 #define FIRST_CAPACITY 16u
+#define UNKNOWN_BIRTH UINT64_MAX /* of a body that there was no memory for */
 
 /* A softness from which on a constraint is a spring, not a rigid one with rounding; as of contacts. */
 #define SOFT_CFM 1e-6
@@ -20,80 +21,91 @@
 
 /* ---- the table ---- */
 
-static uint32_t hash_of(dJointID joint)
-{
-  uint64_t x = (uint64_t)(uintptr_t)joint;
-  x = (x ^ (x >> 33)) * 0xff51afd7ed558ccdu;
-  return (uint32_t)(x ^ (x >> 33));
-}
-
 uint32_t hapi_joints_find(const hapi_joint_table *table, dJointID joint)
 {
-  if (table->bucket_count == 0) {
-    return HAPI_NONE;
-  }
-  uint32_t mask = table->bucket_count - 1;
-  for (uint32_t at = hash_of(joint) & mask; table->buckets[at] != 0; at = (at + 1) & mask) {
-    if (table->entries[table->buckets[at] - 1].joint == joint) {
-      return table->buckets[at] - 1;
-    }
-  }
-  return HAPI_NONE;
+  return hapi_index_get(&table->by_address, hapi_index_address(joint));
 }
 
-static void insert_bucket(hapi_joint_table *table, uint32_t index)
+static uint64_t key_of(const hapi_joint_name *name)
 {
-  uint32_t mask = table->bucket_count - 1;
-  uint32_t at = hash_of(table->entries[index].joint) & mask;
-  while (table->buckets[at] != 0) {
-    at = (at + 1) & mask;
-  }
-  table->buckets[at] = index + 1;
+  uint64_t bodies = hapi_index_mix(hapi_index_mix(name->births[0]) + name->births[1]);
+  return bodies + ((uint64_t)name->type << 32) + name->rank;
 }
 
-static void rebuild_buckets(hapi_joint_table *table)
+static bool same_kin(const hapi_joint_name *a, const hapi_joint_name *b)
 {
-  memset(table->buckets, 0, table->bucket_count * sizeof *table->buckets);
+  return a->births[0] == b->births[0] && a->births[1] == b->births[1] && a->type == b->type;
+}
+
+static uint32_t find_named(const hapi_joint_table *table, const hapi_joint_name *name)
+{
+  uint32_t index = hapi_index_get(&table->by_name, key_of(name));
+  bool same = index != HAPI_NONE && same_kin(&table->entries[index].name, name) &&
+              table->entries[index].name.rank == name->rank;
+  return same ? index : HAPI_NONE;
+}
+
+static void index_all(hapi_joint_table *table)
+{
+  hapi_index_clear(&table->by_address);
+  hapi_index_clear(&table->by_name);
   for (uint32_t i = 0; i < table->count; ++i) {
-    insert_bucket(table, i);
+    hapi_index_put(&table->by_address, hapi_index_address(table->entries[i].joint), i);
+    hapi_index_put(&table->by_name, key_of(&table->entries[i].name), i);
   }
 }
 
 static bool grow(hapi_joint_table *table)
 {
   uint32_t capacity = table->capacity > 0 ? 2 * table->capacity : FIRST_CAPACITY;
+  if (!hapi_index_reserve(&table->by_address, capacity) ||
+      !hapi_index_reserve(&table->by_name, capacity)) {
+    return false;
+  }
   hapi_known_joint *entries = hapi_alloc_array(capacity, sizeof *entries);
-  uint32_t *buckets = hapi_alloc_array((size_t)4 * capacity, sizeof *buckets);
-  if (entries == NULL || buckets == NULL) {
-    hapi_free(entries);
-    hapi_free(buckets);
+  if (entries == NULL) {
     return false;
   }
   if (table->count > 0) {
     memcpy(entries, table->entries, table->count * sizeof *entries);
   }
   hapi_free(table->entries);
-  hapi_free(table->buckets);
   table->entries = entries;
-  table->buckets = buckets;
   table->capacity = capacity;
-  table->bucket_count = 4 * capacity;
-  rebuild_buckets(table);
   return true;
 }
 
-/* NULL: no memory. */
-static hapi_known_joint *add(hapi_joint_table *table, dJointID joint)
+/* HAPI_NONE: no memory. */
+static uint32_t add(hapi_joint_table *table, const hapi_joint_name *name)
 {
-  if (table->count == table->capacity && !grow(table)) {
-    return NULL;
+  if (table->starved || (table->count == table->capacity && !grow(table))) {
+    table->starved = true;
+    return HAPI_NONE;
   }
   hapi_known_joint *known = &table->entries[table->count];
   memset(known, 0, sizeof *known);
-  known->joint = joint;
+  known->name = *name;
   known->slot = HAPI_NONE;
-  insert_bucket(table, table->count++);
-  return known;
+  hapi_index_put(&table->by_name, key_of(name), table->count);
+  return table->count++;
+}
+
+/* Of an address one entry at most. */
+static void set_address(hapi_joint_table *table, uint32_t index, dJointID joint)
+{
+  hapi_known_joint *known = &table->entries[index];
+  if (known->joint == joint) {
+    return;
+  }
+  uint32_t other = hapi_joints_find(table, joint);
+  if (other != HAPI_NONE) {
+    table->entries[other].joint = NULL; /* it has gone, or its turn is still to come */
+  }
+  if (known->joint != NULL) {
+    hapi_index_remove(&table->by_address, hapi_index_address(known->joint));
+  }
+  known->joint = joint;
+  hapi_index_put(&table->by_address, hapi_index_address(joint), index);
 }
 
 /* In their order: the order of a walk over them does not depend on what was destroyed when. */
@@ -101,15 +113,20 @@ static void drop_unseen(hapi_joint_table *table)
 {
   uint32_t kept = 0;
   for (uint32_t i = 0; i < table->count; ++i) {
-    if (table->entries[i].seen == table->scan) {
-      table->entries[kept++] = table->entries[i];
+    const hapi_known_joint *known = &table->entries[i];
+    bool seen = known->seen == table->scan;
+    if (known->slot != HAPI_NONE) {
+      table->slots[known->slot].taken = seen ? kept + 1 : 0;
+    }
+    if (seen) {
+      table->entries[kept++] = *known;
     } else {
-      hapi_free(table->entries[i].measurement);
+      hapi_free(known->measurement);
     }
   }
   if (kept < table->count) {
     table->count = kept;
-    rebuild_buckets(table);
+    index_all(table);
   }
 }
 
@@ -125,8 +142,9 @@ void hapi_joints_finish(hapi_joint_table *table)
 {
   forget_measurements(table);
   hapi_free(table->entries);
-  hapi_free(table->buckets);
   hapi_free(table->slots);
+  hapi_index_finish(&table->by_address);
+  hapi_index_finish(&table->by_name);
   memset(table, 0, sizeof *table);
 }
 
@@ -147,55 +165,80 @@ static bool is_local(const hapi_physics *physics, uint32_t body)
 /* One that is far from the pointers is read when it is new, and again when it comes near. */
 static void look_at(hapi_physics *physics, hapi_known_joint *known, bool is_new)
 {
-  dBodyID a = dJointGetBody(known->joint, 0);
-  dBodyID b = dJointGetBody(known->joint, 1);
-  dBodyID first = a != NULL ? a : b; /* ODE's own order: the world comes second */
-  dBodyID second = a != NULL ? b : NULL;
-  hapi_joint_kind kind = HAPI_JOINT_BALL;
-  bool carried = hapi_joint_kind_of(known->joint, &kind);
-  bool other = is_new || first != known->bodies[0] || second != known->bodies[1] ||
-               kind != known->kind || carried != known->carried;
-  known->bodies[0] = first;
-  known->bodies[1] = second;
-  known->index[0] = hapi_bodies_find(&physics->table, first);
-  known->index[1] = hapi_bodies_find(&physics->table, second);
-  known->kind = kind;
-  known->carried = carried;
-  if (other) {
-    hapi_free(known->measurement);
-    known->measurement = NULL;
-    known->usable = false;
-    known->left_is_known = false;
-  }
   bool near = is_local(physics, known->index[0]) || is_local(physics, known->index[1]);
-  if (carried && (other || near || known->left_is_known)) {
-    hapi_joint_read(known, other);
+  known->seen = physics->joints.scan;
+  known->carried = hapi_joint_kind_of(known->joint, &known->kind);
+  if (known->carried && (is_new || near || known->left_is_known)) {
+    hapi_joint_read(known, is_new);
+  }
+}
+
+/* ODE's own order: the world comes second. */
+static void read_bodies(const hapi_physics *physics, dJointID joint, hapi_known_joint *out)
+{
+  dBodyID a = dJointGetBody(joint, 0);
+  dBodyID b = dJointGetBody(joint, 1);
+  out->bodies[0] = a != NULL ? a : b;
+  out->bodies[1] = a != NULL ? b : NULL;
+  for (int i = 0; i < 2; ++i) {
+    uint32_t index = hapi_bodies_find(&physics->table, out->bodies[i]);
+    out->index[i] = index;
+    out->name.births[i] = out->bodies[i] == NULL ? 0
+                          : index == HAPI_NONE   ? UNKNOWN_BIRTH
+                                                 : physics->table.entries[index].rest->birth;
+  }
+}
+
+/* The entry of a joint that this scan meets for the first time, after all older ones of its bodies. */
+static uint32_t find_entry(const hapi_joint_table *table, uint32_t at_address,
+                           hapi_joint_name *io_name)
+{
+  uint32_t index = at_address;
+  if (index != HAPI_NONE && table->entries[index].name.rank == 0 &&
+      same_kin(&table->entries[index].name, io_name)) {
+    return index;
+  }
+  for (io_name->rank = 0;; ++io_name->rank) {
+    index = find_named(table, io_name);
+    if (index == HAPI_NONE || table->entries[index].seen != table->scan) {
+      return index;
+    }
   }
 }
 
 static void see(hapi_physics *physics, dJointID joint)
 {
   hapi_joint_table *table = &physics->joints;
+  hapi_known_joint found = {0};
   uint32_t index = hapi_joints_find(table, joint);
-  hapi_known_joint *known =
-      index != HAPI_NONE ? &table->entries[index] : (table->starved ? NULL : add(table, joint));
-  if (known == NULL) {
-    table->starved = true;
-  } else if (known->seen != table->scan) {
-    known->seen = table->scan;
-    look_at(physics, known, index == HAPI_NONE);
+  if (index != HAPI_NONE && table->entries[index].seen == table->scan) {
+    return; /* by its other body */
+  }
+  read_bodies(physics, joint, &found);
+  found.name.type = dJointGetType(joint);
+  index = find_entry(table, index, &found.name);
+  bool is_new = index == HAPI_NONE;
+  index = is_new ? add(table, &found.name) : index;
+  if (index != HAPI_NONE) {
+    hapi_known_joint *known = &table->entries[index];
+    set_address(table, index, joint);
+    memcpy(known->bodies, found.bodies, sizeof known->bodies);
+    memcpy(known->index, found.index, sizeof known->index);
+    look_at(physics, known, is_new);
   }
 }
 
+/* A body has its newest joint first. */
 void hapi_joints_scan(hapi_physics *physics)
 {
   ++physics->joints.scan;
   physics->joints.starved = false;
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
+  uint32_t end = physics->table.jointed_count > 0 ? physics->table.high : 0;
+  for (uint32_t i = 0; i < end; ++i) {
     dBodyID body = physics->table.handles[i];
-    int count = body != NULL ? dBodyGetNumJoints(body) : 0;
-    for (int k = 0; k < count; ++k) {
-      dJointID joint = dBodyGetJoint(body, k);
+    bool jointed = body != NULL && physics->table.entries[i].jointed;
+    for (int k = jointed ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
+      dJointID joint = dBodyGetJoint(body, k - 1);
       if (dJointGetType(joint) != dJointTypeContact) {
         see(physics, joint);
       }
@@ -216,11 +259,9 @@ void hapi_joints_reset(hapi_physics *physics)
   hapi_joint_table *table = &physics->joints;
   forget_measurements(table);
   table->count = 0;
-  if (table->bucket_count > 0) {
-    rebuild_buckets(table);
-  }
+  index_all(table);
   for (uint32_t i = 0; i < physics->config.capacity.joints; ++i) {
-    table->slots[i].joint = NULL;
+    table->slots[i].taken = 0;
   }
 }
 
@@ -405,30 +446,26 @@ static void fill(hapi_physics *physics, const hapi_known_joint *known, hapi_mode
 }
 
 /* A place among those that the loop keeps impulses for. The range takes no more joints than there are. */
-static void take_slot(hapi_joint_table *table, hapi_known_joint *known)
+static void take_slot(hapi_joint_table *table, uint32_t index)
 {
   uint32_t at = 0;
-  while (table->slots[at].joint != NULL) {
+  while (table->slots[at].taken != 0) {
     ++at;
   }
-  table->slots[at].joint = known->joint;
+  table->slots[at].taken = index + 1;
   ++table->slots[at].generation;
-  known->slot = at;
+  table->entries[index].slot = at;
 }
 
 static void free_slots(hapi_physics *physics)
 {
   hapi_joint_table *table = &physics->joints;
   for (uint32_t i = 0; i < physics->config.capacity.joints; ++i) {
-    uint32_t index =
-        table->slots[i].joint != NULL ? hapi_joints_find(table, table->slots[i].joint) : HAPI_NONE;
-    bool kept = index != HAPI_NONE && table->entries[index].slot == i &&
-                table->entries[index].ranged_in == physics->model_number;
-    if (!kept) {
-      table->slots[i].joint = NULL;
-      if (index != HAPI_NONE && table->entries[index].slot == i) {
-        table->entries[index].slot = HAPI_NONE;
-      }
+    hapi_joint_slot *slot = &table->slots[i];
+    hapi_known_joint *known = slot->taken != 0 ? &table->entries[slot->taken - 1] : NULL;
+    if (known != NULL && known->ranged_in != physics->model_number) {
+      known->slot = HAPI_NONE;
+      slot->taken = 0;
     }
   }
 }
@@ -443,9 +480,9 @@ void hapi_joints_publish(hapi_physics *physics, hapi_model *out)
   }
   free_slots(physics);
   for (uint32_t i = 0; i < range->joint_count; ++i) {
-    hapi_known_joint *known = &physics->joints.entries[range->joints[i]];
+    const hapi_known_joint *known = &physics->joints.entries[range->joints[i]];
     if (known->slot == HAPI_NONE) {
-      take_slot(&physics->joints, known);
+      take_slot(&physics->joints, range->joints[i]);
     }
     fill(physics, known, &joints[out->joint_count++]);
   }

@@ -20,6 +20,7 @@
 
 #define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
 #define LINK_GRAVITY 9.81
+#define NAMES_PER_GEOM 4u /* of the message; 2 are needed */
 
 static uint32_t range_capacity(const hapi_physics *physics)
 {
@@ -42,7 +43,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
 {
   hapi_range *range = &physics->range;
   hapi_known_body *body = entry(physics, known);
-  if (body->ranged_in == range->number) {
+  if (body->rest->ranged_in == range->number) {
     return true;
   }
   uint32_t slot = hapi_slots_body(physics, known);
@@ -51,7 +52,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
     return false;
   }
   hapi_body_slot *local = &physics->bodies[slot];
-  body->ranged_in = range->number;
+  body->rest->ranged_in = range->number;
   local->wanted = true;
   local->linked = false;
   local->edge = false;
@@ -153,30 +154,73 @@ static uint32_t take_geom(hapi_physics *physics, dGeomID geom)
 
 /* ---- pairs ---- */
 
-static uint64_t mix(uint64_t x)
+static uint64_t key_of(uint64_t a, uint64_t b, uint32_t part)
 {
-  x = (x ^ (x >> 33)) * 0xff51afd7ed558ccdu;
-  x = (x ^ (x >> 33)) * 0xc4ceb9fe1a85ec53u;
-  return x ^ (x >> 33);
+  uint64_t both = hapi_index_mix(a) + hapi_index_mix(b); /* whichever of the two was met first */
+  return hapi_index_mix(both) ^ hapi_index_mix(part + 1u);
 }
 
-static uint64_t key_of(dGeomID a, dGeomID b, uint32_t part)
+static bool is_current(const hapi_range *range, const hapi_geom_name *name)
 {
-  uint64_t x = mix((uint64_t)(uintptr_t)a);
-  uint64_t y = mix((uint64_t)(uintptr_t)b);
-  return mix(x + y) ^ mix(part + 1u); /* whichever of the two was met first */
+  return name->walk + 1 >= range->number;
 }
 
-/* A geom may get the address of a destroyed one: then its body's slot has another generation, and
- * the pair is another one, to which no contact impulses are handed down. */
+static void drop_old_names(hapi_range *range)
+{
+  uint32_t kept = 0;
+  hapi_index_clear(&range->names_by_address);
+  for (uint32_t i = 0; i < range->name_count; ++i) {
+    if (is_current(range, &range->names[i])) {
+      range->names[kept] = range->names[i];
+      hapi_index_put(&range->names_by_address, hapi_index_address(range->names[i].geom), kept++);
+    }
+  }
+  range->name_count = kept;
+}
+
+/* A number that the geom has as long as it stays in the range. A new one may have the address of a geom
+ * that was forgotten, or another one, as the heap likes: what goes on with the contact impulses of
+ * the old one must not hang on it. */
+static uint64_t name_of(hapi_range *range, dGeomID geom)
+{
+  uint32_t at = hapi_index_get(&range->names_by_address, hapi_index_address(geom));
+  if (at == HAPI_INDEX_NONE && range->name_count == range->name_capacity) {
+    drop_old_names(range); /* of two walks, each with capacity.geoms at most: there is room */
+  }
+  if (at == HAPI_INDEX_NONE) {
+    at = range->name_count++;
+    range->names[at] = (hapi_geom_name){.geom = geom};
+    hapi_index_put(&range->names_by_address, hapi_index_address(geom), at);
+  }
+  hapi_geom_name *name = &range->names[at];
+  if (name->number == 0 || !is_current(range, name)) {
+    name->number = ++range->names_given;
+  }
+  name->walk = range->number;
+  return name->number;
+}
+
+void hapi_range_forget_geom(hapi_range *range, dGeomID geom)
+{
+  uint32_t at = hapi_index_get(&range->names_by_address, hapi_index_address(geom));
+  if (at != HAPI_INDEX_NONE) {
+    range->names[at].number = 0;
+  }
+}
+
+/* Where nobody said that a geom was destroyed: its body's slot has another generation, if the body has
+ * gone, too. */
 static uint64_t holder_of(const hapi_near_geom *geom)
 {
-  return geom->body == HAPI_SLOT_NONE ? 0 : mix(((uint64_t)geom->body << 32) | geom->generation);
+  return geom->body == HAPI_SLOT_NONE
+             ? 0
+             : hapi_index_mix(((uint64_t)geom->body << 32) | geom->generation);
 }
 
 static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom_b, uint32_t part)
 {
-  hapi_near *near = physics->range.near;
+  hapi_range *range = &physics->range;
+  hapi_near *near = range->near;
   uint32_t geom_a = take_geom(physics, link->own);
   bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
@@ -186,8 +230,8 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
   const hapi_near_geom *geoms = hapi_near_geoms(near);
-  pair->key =
-      key_of(link->own, link->other, part) + holder_of(&geoms[geom_a]) + holder_of(&geoms[geom_b]);
+  pair->key = key_of(name_of(range, link->own), name_of(range, link->other), part) +
+              holder_of(&geoms[geom_a]) + holder_of(&geoms[geom_b]);
   pair->geom_a = turned ? geom_b : geom_a;
   pair->geom_b = turned ? geom_a : geom_b;
   pair->surface = link->surface;
@@ -259,16 +303,21 @@ static hapi_pair_place *pair_place(hapi_range *range, uint64_t key)
   return &range->pair_places[at];
 }
 
+static uint64_t meeting_of(dGeomID own, dGeomID other)
+{
+  return key_of(hapi_index_address(own), hapi_index_address(other), 0);
+}
+
 static bool met_before(hapi_range *range, dGeomID own, dGeomID other)
 {
-  (void)pair_place(range, key_of(own, other, 0));
+  (void)pair_place(range, meeting_of(own, other));
   return range->pair_found;
 }
 
 static void note_pair(hapi_physics *physics, const hapi_link *link)
 {
   hapi_range *range = &physics->range;
-  uint64_t key = key_of(link->own, link->other, 0);
+  uint64_t key = meeting_of(link->own, link->other);
   hapi_pair_place *place = pair_place(range, key);
   if (!range->pair_found && 2 * range->pairs_noted < range->pair_place_count) {
     place->key = key;
@@ -511,7 +560,7 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
   if (!dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
     return;
   }
-  bool refused = known->gathered_in == range->number; /* with another body of its mechanism */
+  bool refused = known->rest->gathered_in == range->number; /* with another body of its mechanism */
   if (!refused && range->owned < range_capacity(physics) && hapi_mechanism_gather(physics, index) &&
       mechanism_can_be_owned(physics)) {
     own_mechanism(physics);
@@ -615,10 +664,12 @@ void hapi_range_reset(hapi_physics *physics)
   hapi_range *range = &physics->range;
   memset(range->pair_places, 0, range->pair_place_count * sizeof *range->pair_places);
   range->number = 0;
+  range->name_count = 0;
+  hapi_index_clear(&range->names_by_address);
   for (uint32_t i = 0; i < physics->table.high; ++i) {
-    physics->table.entries[i].ranged_in = 0;
-    physics->table.entries[i].gathered_in = 0;
-    physics->table.entries[i].chosen_in = 0;
+    physics->table.entries[i].rest->ranged_in = 0;
+    physics->table.entries[i].rest->gathered_in = 0;
+    physics->table.entries[i].rest->chosen_in = 0;
     physics->table.entries[i].loop_owned = false;
   }
 }
@@ -636,10 +687,13 @@ bool hapi_range_create(hapi_physics *physics)
     range->pair_place_count *= 2;
   }
   range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
+  range->name_capacity = NAMES_PER_GEOM * c->geoms;
+  range->names = hapi_alloc_array(range->name_capacity, sizeof *range->names);
   range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
   return range->queue != NULL && range->geoms != NULL && range->members != NULL &&
-         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL &&
-         hapi_cover_create(&range->cover);
+         range->joints != NULL && range->pair_places != NULL && range->names != NULL &&
+         hapi_index_reserve(&range->names_by_address, range->name_capacity) &&
+         range->box_geom != NULL && hapi_cover_create(&range->cover);
 }
 
 void hapi_range_finish(hapi_physics *physics)
@@ -655,5 +709,7 @@ void hapi_range_finish(hapi_physics *physics)
   hapi_free(range->members);
   hapi_free(range->joints);
   hapi_free(range->pair_places);
+  hapi_free(range->names);
+  hapi_index_finish(&range->names_by_address);
   memset(range, 0, sizeof *range);
 }

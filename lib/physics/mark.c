@@ -44,9 +44,9 @@ static void place_axis(hapi_known_body *known)
 {
   dBodyID body = known->body;
   bool left_over = axis_is_there(body); /* of a session that lost sight of it */
-  known->mark.in_axis =
+  known->mark_in_axis =
       dBodyGetFiniteRotationMode(body) == 0 && (left_over || axis_is(body, 0.0, 0.0, 0.0));
-  if (known->mark.in_axis) {
+  if (known->mark_in_axis) {
     dBodySetFiniteRotationAxis(body, mark_axis[0], mark_axis[1], mark_axis[2]);
   }
 }
@@ -54,14 +54,14 @@ static void place_axis(hapi_known_body *known)
 static void place_time(hapi_known_body *known)
 {
   double time = dBodyGetAutoDisableTime(known->body);
-  known->mark.idle_time =
+  known->rest->mark.idle_time =
       time == MARK_TIME ? dWorldGetAutoDisableTime(dBodyGetWorld(known->body)) : time;
   dBodySetAutoDisableTime(known->body, MARK_TIME);
 }
 
 static void place_threshold(hapi_known_body *known)
 {
-  known->mark.angular_threshold =
+  known->rest->mark.angular_threshold =
       threshold_is_there(known->body)
           ? dWorldGetAutoDisableAngularThreshold(dBodyGetWorld(known->body))
           : dBodyGetAutoDisableAngularThreshold(known->body);
@@ -73,24 +73,24 @@ void hapi_mark_place(hapi_known_body *known)
   place_time(known);
   place_threshold(known);
   place_axis(known);
-  known->mark.placed = true;
+  known->mark_placed = true;
 }
 
 bool hapi_mark_is_gone(const hapi_known_body *known)
 {
-  return known->mark.placed && !time_is_there(known->body) && !threshold_is_there(known->body) &&
-         !(known->mark.in_axis && axis_is_there(known->body));
+  return known->mark_placed && !time_is_there(known->body) && !threshold_is_there(known->body) &&
+         !(known->mark_in_axis && axis_is_there(known->body));
 }
 
 unsigned hapi_mark_follow(hapi_known_body *known)
 {
   dBodyID body = known->body;
-  bool axis = known->mark.in_axis && axis_is_there(body);
+  bool axis = known->mark_in_axis && axis_is_there(body);
   if (axis && dBodyGetFiniteRotationMode(body) != 0) {
     dBodySetFiniteRotationAxis(body, 0.0, 0.0, 0.0); /* the mode is the application's wish */
     axis = false;
   }
-  known->mark.in_axis = axis;
+  known->mark_in_axis = axis;
   unsigned changed = 0;
   if (!time_is_there(body)) {
     place_time(known);
@@ -105,17 +105,17 @@ unsigned hapi_mark_follow(hapi_known_body *known)
 
 void hapi_mark_remove(hapi_known_body *known)
 {
-  if (!known->mark.placed) {
+  if (!known->mark_placed) {
     return;
   }
   if (time_is_there(known->body)) {
-    dBodySetAutoDisableTime(known->body, known->mark.idle_time);
+    dBodySetAutoDisableTime(known->body, known->rest->mark.idle_time);
   }
   if (threshold_is_there(known->body)) {
-    dBodySetAutoDisableAngularThreshold(known->body, known->mark.angular_threshold);
+    dBodySetAutoDisableAngularThreshold(known->body, known->rest->mark.angular_threshold);
   }
-  if (known->mark.in_axis && axis_is_there(known->body)) {
+  if (known->mark_in_axis && axis_is_there(known->body)) {
     dBodySetFiniteRotationAxis(known->body, 0.0, 0.0, 0.0);
   }
-  known->mark.placed = false;
+  known->mark_placed = false;
 }

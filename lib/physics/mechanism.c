@@ -22,7 +22,7 @@ static bool add_member(hapi_physics *physics, uint32_t known)
 {
   hapi_range *range = &physics->range;
   bool moves = !dBodyIsKinematic(entry(physics, known)->body);
-  entry(physics, known)->gathered_in = range->number;
+  entry(physics, known)->rest->gathered_in = range->number;
   if (range->member_count == physics->config.capacity.bodies ||
       range->owned + range->moving + moves > physics->config.max_bodies) {
     ++physics->figures.stats.capacity_dropped;
@@ -54,7 +54,7 @@ static bool add_partner(hapi_physics *physics, uint32_t known)
     return true;
   }
   bool fixed = dBodyIsKinematic(entry(physics, known)->body);
-  bool refused = entry(physics, known)->gathered_in == range->number;
+  bool refused = entry(physics, known)->rest->gathered_in == range->number;
   return (fixed || !refused) && add_member(physics, known);
 }
 

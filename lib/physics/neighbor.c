@@ -204,7 +204,7 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
     bool has_body = dGeomGetBody(hits[i].geom) != NULL;
     uint32_t index = known_of(physics, &hits[i]);
     hapi_known_body *known = index != HAPI_NONE ? &physics->table.entries[index] : NULL;
-    bool counted = known != NULL && known->chosen_in == physics->model_number + 1;
+    bool counted = known != NULL && known->rest->chosen_in == physics->model_number + 1;
     bool room = chosen < physics->config.capacity.contacts && (!has_body || known != NULL) &&
                 (known == NULL || counted || bodies < physics->config.max_bodies);
     if (!room) {
@@ -212,7 +212,7 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
       continue;
     }
     if (known != NULL && !counted) {
-      known->chosen_in = physics->model_number + 1;
+      known->rest->chosen_in = physics->model_number + 1;
       ++bodies;
     }
     hits[chosen++] = hits[i];
@@ -297,7 +297,7 @@ uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     const hapi_body_slot *slot = &physics->bodies[i];
     count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
-             physics->table.entries[slot->known].chosen_in == physics->model_number;
+             physics->table.entries[slot->known].rest->chosen_in == physics->model_number;
   }
   return count;
 }

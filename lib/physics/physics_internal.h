@@ -13,13 +13,14 @@
 
 #include "base/fair_lock.h"
 #include "base/histogram.h"
+#include "base/index.h"
 #include "base/thread.h"
 #include "physics/admittance.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
 
-#define HAPI_NONE 0xffffffffu
+#define HAPI_NONE HAPI_INDEX_NONE
 #define HAPI_EDITS_MAX 256
 #define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
 #define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
@@ -34,9 +35,6 @@
 /* ---- bodies.c: what is known of the world's bodies ---- */
 
 typedef struct hapi_sleep {
-  bool taken;
-  bool awake;     /* after the last global step */
-  bool automatic; /* ODE's flag as the application set it; kept by us while the session runs */
   double linear_threshold;  /* m/s, squared as ODE keeps it */
   double angular_threshold; /* rad/s, squared */
   int idle_steps;
@@ -50,39 +48,50 @@ typedef struct hapi_sleep {
 } hapi_sleep;
 
 typedef struct hapi_mark {
-  bool placed;
-  bool in_axis;
   double idle_time;         /* s, the application's, which the mark stands in for */
   double angular_threshold; /* rad/s, the same */
 } hapi_mark;
 
-typedef struct hapi_known_body {
-  dBodyID body;         /* NULL: free entry */
-  uint64_t seen;        /* scan that found it */
-  uint32_t next;        /* entry that the last scan saw after it; a guess */
-  uint32_t slot;        /* local slot, HAPI_NONE: not local */
-  uint64_t measured_in; /* scan that found its geoms changed */
+/* What a step does not look at where the body is far from the pointers and nothing has changed. */
+typedef struct hapi_known_rest {
+  uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
   bool adopted;
-  bool found; /* at least once, by a geom or a joint: it is gone when it is found no more */
-  bool sized; /* all of its geoms are of classes whose sizes are in geoms_print */
-  bool jointed;
-  bool loop_owned; /* in the newest message, also while its slot retires */
-  bool loop_touched;
-  bool enabled_before; /* scratch of the probe's flag pass */
-  double extent;       /* m, from the body's origin to the far corner of its geoms */
-  uint64_t
-      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint32_t island;      /* scratch: number of the island under test, HAPI_NONE outside */
   uint32_t member;      /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in;   /* scratch: model that it was chosen for */
   uint64_t ranged_in;   /* scratch: walk that met it */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
   double damping[2];    /* scratch of soft.c */
   void (*moved_callback)(dBodyID);
+} hapi_known_rest;
+
+/* 64 bytes: a scan goes through the memory of all of them. */
+typedef struct hapi_known_body {
+  dBodyID body;          /* NULL: free entry */
+  hapi_known_rest *rest; /* the entry's */
+  uint64_t seen;         /* scan that found it */
+  uint32_t next;         /* entry that the last scan saw after it; a guess */
+  uint32_t slot;         /* local slot, HAPI_NONE: not local */
+  double extent;         /* m, from the body's origin to the far corner of its geoms */
+  uint64_t
+      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
+  uint32_t island; /* scratch: number of the island under test, HAPI_NONE outside */
+  bool found;      /* at least once, by a geom or a joint: it is gone when it is found no more */
+  bool sized;      /* all of its geoms are of classes whose sizes are in geoms_print */
+  bool measured;   /* the last scan found its geoms changed */
+  bool jointed;
+  bool loop_owned; /* in the newest message, also while its slot retires */
+  bool loop_touched;
+  bool pushed; /* user_force or user_torque is not 0 */
+  bool mark_placed;
+  bool mark_in_axis;
+  bool sleep_taken;
+  bool
+      sleep_automatic; /* ODE's flag as the application set it; kept by us while the session runs */
+  bool awake;          /* after the last global step */
 } hapi_known_body;
 
 /* ---- poses.c: what is drawn ---- */
@@ -111,13 +120,14 @@ typedef struct hapi_frames {
 
 typedef struct hapi_body_table {
   hapi_known_body *entries;
-  hapi_drawn *drawn; /* of each entry */
-  hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
-  dBodyID *handles;  /* body of each entry once more, close together: for walks over all bodies */
+  hapi_known_rest *rests; /* of each entry */
+  hapi_drawn *drawn;      /* of each entry */
+  hap_pose *poses;        /* HAPI_FRAMES x capacity: a frame is written from end to end */
+  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
-  uint32_t high;     /* entries in use are below */
-  uint32_t *buckets; /* open addressing, entry index + 1 */
-  uint32_t bucket_count;
+  uint32_t high; /* entries in use are below */
+  hapi_index by_address;
+  uint64_t births; /* entries begun so far */
   uint32_t used;
   uint64_t scan;
   uint32_t seen_count;    /* entries that this scan saw */
@@ -130,10 +140,9 @@ typedef struct hapi_body_table {
   uint64_t lost;
   uint32_t replaced; /* among them, not counted yet: another one is at the address */
   bool said_lost;
-  bool starved; /* the newest scan found no memory for a body: not all are known */
+  bool starved;         /* the newest scan found no memory for a body: not all are known */
+  bool geoms_forgotten; /* since the newest scan: another one may be at the address of one */
 } hapi_body_table;
-
-/* ---- joints.c: what is known of the world's joints ---- */
 
 /* ---- joint_axes.c ---- */
 
@@ -159,8 +168,19 @@ typedef struct hapi_joint_measurement {
   double error;      /* 0.., what turning the measurement before this one on would have missed */
 } hapi_joint_measurement;
 
+/* ---- joints.c: what is known of the world's joints ---- */
+
+/* What a joint is known by. Not by its address: that may be one of a joint that was destroyed, or not,
+ * as the heap likes, and lockstep would go another way. */
+typedef struct hapi_joint_name {
+  uint64_t births[2]; /* of its bodies, in ODE's own order; 0: static world */
+  dJointType type;
+  uint32_t rank; /* among those of the same bodies and type, the oldest first */
+} hapi_joint_name;
+
 typedef struct hapi_known_joint {
   dJointID joint;
+  hapi_joint_name name;
   uint64_t seen;     /* scan that found it */
   dBodyID bodies[2]; /* in ODE's own order; the second is NULL: static world */
   uint32_t index[2]; /* of the body table, in this cycle */
@@ -180,7 +200,7 @@ typedef struct hapi_known_joint {
 } hapi_known_joint;
 
 typedef struct hapi_joint_slot {
-  dJointID joint; /* compared only; NULL: free */
+  uint32_t taken; /* by which entry, + 1; 0: free */
   uint32_t generation;
 } hapi_joint_slot;
 
@@ -188,8 +208,8 @@ typedef struct hapi_joint_table {
   hapi_known_joint *entries;
   uint32_t count;
   uint32_t capacity;
-  uint32_t *buckets; /* open addressing, entry index + 1 */
-  uint32_t bucket_count;
+  hapi_index by_address;
+  hapi_index by_name;
   uint64_t scan;
   bool starved;           /* the newest scan found no memory for a joint */
   hapi_joint_slot *slots; /* capacity.joints */
@@ -332,6 +352,12 @@ typedef struct hapi_pair_place {
   uint64_t walk; /* that noted it */
 } hapi_pair_place;
 
+typedef struct hapi_geom_name {
+  dGeomID geom;    /* compared only */
+  uint64_t number; /* from 1; 0: it was forgotten */
+  uint64_t walk;   /* newest one that met it */
+} hapi_geom_name;
+
 typedef struct hapi_range {
   hapi_near *near; /* message being written */
   dGeomID *geoms;  /* of its geoms; capacity.geoms */
@@ -342,6 +368,11 @@ typedef struct hapi_range {
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
+  hapi_geom_name *names;
+  uint32_t name_count;
+  uint32_t name_capacity;
+  hapi_index names_by_address;
+  uint64_t names_given;
   bool pair_found;  /* scratch */
   double own_speed; /* m/s, while ODE calls back */
   double fastest;   /* m/s, of the pointers */
@@ -654,6 +685,7 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
 bool hapi_range_create(hapi_physics *physics);
 void hapi_range_finish(hapi_physics *physics);
 void hapi_range_reset(hapi_physics *physics);
+void hapi_range_forget_geom(hapi_range *range, dGeomID geom);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 

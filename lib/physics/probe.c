@@ -27,7 +27,7 @@ static bool add_member(hapi_physics *physics, uint32_t index, uint32_t island)
     return false;
   }
   physics->table.entries[index].island = island;
-  physics->table.entries[index].member = test->member_count;
+  physics->table.entries[index].rest->member = test->member_count;
   test->members[test->member_count++] = index;
   return true;
 }
@@ -255,7 +255,7 @@ static hap_status save_members(hapi_physics *physics)
   hapi_snapshot_clear(&physics->snapshot);
   for (uint32_t i = 0; i < test->member_count; ++i) {
     const hapi_known_body *known = &physics->table.entries[test->members[i]];
-    hapi_snapshot_add_body(&physics->snapshot, known->body, known->moved_callback);
+    hapi_snapshot_add_body(&physics->snapshot, known->body, known->rest->moved_callback);
     int count = test->mechanisms ? dBodyGetNumJoints(known->body) : 0; /* ours have no feedback */
     for (int k = 0; k < count; ++k) {
       dJointFeedback *feedback = dJointGetFeedback(dBodyGetJoint(known->body, k));
@@ -308,7 +308,7 @@ hap_status hapi_test_enter(hapi_physics *physics)
   for (uint32_t i = 0; i < test->member_count; ++i) {
     const hapi_known_body *known = &physics->table.entries[test->members[i]];
     dBodyEnable(known->body); /* a sleeping body would answer A = 0 */
-    if (known->moved_callback != NULL) {
+    if (known->rest->moved_callback != NULL) {
       dBodySetMovedCallback(known->body, NULL);
     }
   }
@@ -384,8 +384,10 @@ static void add_user_wrench(const hapi_known_body *known)
   if (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0 || t[0] != 0.0 || t[1] != 0.0 || t[2] != 0.0) {
     return;
   }
-  dBodySetForce(known->body, known->user_force[0], known->user_force[1], known->user_force[2]);
-  dBodySetTorque(known->body, known->user_torque[0], known->user_torque[1], known->user_torque[2]);
+  dBodySetForce(known->body, known->rest->user_force[0], known->rest->user_force[1],
+                known->rest->user_force[2]);
+  dBodySetTorque(known->body, known->rest->user_torque[0], known->rest->user_torque[1],
+                 known->rest->user_torque[2]);
 }
 
 void hapi_test_rewind(hapi_physics *physics)
@@ -404,7 +406,7 @@ void hapi_test_step(hapi_physics *physics)
 
 const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known)
 {
-  return &physics->snapshot.bodies[physics->table.entries[known].member];
+  return &physics->snapshot.bodies[physics->table.entries[known].rest->member];
 }
 
 void hapi_test_finish(hapi_test_set *test)

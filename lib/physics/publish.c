@@ -52,11 +52,11 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
     dWorldGetGravity(physics->ode.world, gravity);
     hapi_v3_copy(gravity, out->gravity);
   }
-  hapi_v3_copy(known->user_force, out->user_wrench);
-  hapi_v3_copy(known->user_torque, out->user_wrench + 3);
+  hapi_v3_copy(known->rest->user_force, out->user_wrench);
+  hapi_v3_copy(known->rest->user_torque, out->user_wrench + 3);
   hapi_v3_copy(out->gravity, slot->falls);
   if (out->mass > 0.0) {
-    hapi_v3_madd(slot->falls, 1.0 / out->mass, known->user_force, slot->falls);
+    hapi_v3_madd(slot->falls, 1.0 / out->mass, known->rest->user_force, slot->falls);
   }
   double linear = dBodyGetLinearDampingThreshold(body);
   double angular = dBodyGetAngularDampingThreshold(body);

@@ -64,12 +64,12 @@ static void switch_off(const hapi_sleep *sleep, dBodyID body)
 
 static void take(hapi_known_body *known)
 {
-  hapi_sleep *sleep = &known->sleep;
+  hapi_sleep *sleep = &known->rest->sleep;
   memset(sleep, 0, sizeof *sleep);
-  sleep->taken = true;
-  sleep->awake = true;
-  sleep->automatic = dBodyGetAutoDisableFlag(known->body) != 0;
-  if (sleep->automatic) {
+  known->sleep_taken = true;
+  known->awake = true;
+  known->sleep_automatic = dBodyGetAutoDisableFlag(known->body) != 0;
+  if (known->sleep_automatic) {
     read_settings(sleep, known->body);
     switch_off(sleep, known->body);
   }
@@ -80,7 +80,7 @@ static void take(hapi_known_body *known)
 static void take_again(hapi_known_body *known)
 {
   hapi_mark_remove(known);
-  hapi_free(known->sleep.velocities);
+  hapi_free(known->rest->sleep.velocities);
   take(known);
 }
 
@@ -89,12 +89,12 @@ static void take_again(hapi_known_body *known)
 static bool was_switched_off(const hapi_known_body *known, unsigned changed)
 {
   return (changed & HAPI_MARK_TIME) != 0 &&
-         known->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body));
+         known->rest->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body));
 }
 
 void hapi_sleep_follow(hapi_known_body *known)
 {
-  if (!known->sleep.taken) {
+  if (!known->sleep_taken) {
     take(known);
     return;
   }
@@ -105,7 +105,8 @@ void hapi_sleep_follow(hapi_known_body *known)
   unsigned changed = hapi_mark_follow(known);
   if (was_switched_off(known, changed)) {
     take_again(known);
-  } else if (known->sleep.automatic && (changed != 0 || were_changed(&known->sleep, known->body))) {
+  } else if (known->sleep_automatic &&
+             (changed != 0 || were_changed(&known->rest->sleep, known->body))) {
     dBodySetAutoDisableFlag(known->body, 1);
     take_again(known);
   }
@@ -123,14 +124,15 @@ static void restart_countdown(dBodyID body)
 
 void hapi_sleep_give_back(hapi_known_body *known)
 {
-  hapi_sleep *sleep = &known->sleep;
+  hapi_sleep *sleep = &known->rest->sleep;
   hapi_mark_remove(known);
-  if (sleep->taken && sleep->automatic) {
+  if (known->sleep_taken && known->sleep_automatic) {
     dBodySetAutoDisableFlag(known->body, 1);
     restart_countdown(known->body);
   }
   hapi_free(sleep->velocities);
   memset(sleep, 0, sizeof *sleep);
+  known->sleep_taken = known->sleep_automatic = known->awake = false;
 }
 
 /* Takes a sample; true when the mean over all samples is known. */
@@ -169,7 +171,7 @@ static bool is_idle(hapi_sleep *sleep, dBodyID body)
 
 static void step_body(hapi_known_body *known, double step_s)
 {
-  hapi_sleep *sleep = &known->sleep;
+  hapi_sleep *sleep = &known->rest->sleep;
   if (is_idle(sleep, known->body)) {
     --sleep->steps_left;
     sleep->time_left -= step_s;
@@ -190,21 +192,22 @@ static bool touches_in_loop(const hapi_known_body *known)
 }
 
 /* With no samples ODE never puts a body to sleep; nor do we where they found no memory. */
-static bool can_sleep(const hapi_sleep *sleep)
+static bool can_sleep(const hapi_known_body *known)
 {
-  return sleep->automatic && (sleep->samples == 1 || sleep->velocities != NULL);
+  const hapi_sleep *sleep = &known->rest->sleep;
+  return known->sleep_automatic && (sleep->samples == 1 || sleep->velocities != NULL);
 }
 
 void hapi_sleep_step(hapi_physics *physics, double step_s)
 {
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
-    if (known->body == NULL || !can_sleep(&known->sleep)) {
+    if (known->body == NULL || !can_sleep(known)) {
       continue;
     }
     bool awake = dBodyIsEnabled(known->body) != 0;
-    if (awake && !known->sleep.awake) {
-      start_countdown(&known->sleep); /* dBodyEnable does so; being woken by an island does not */
+    if (awake && !known->awake) { /* dBodyEnable does so; being woken by an island does not */
+      start_countdown(&known->rest->sleep);
     }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
     if (awake && (dBodyGetJoint(known->body, 0) != NULL || touches_in_loop(known))) {
@@ -215,7 +218,7 @@ void hapi_sleep_step(hapi_physics *physics, double step_s)
 
 void hapi_sleep_note(hapi_known_body *known)
 {
-  if (known->sleep.automatic) {
-    known->sleep.awake = dBodyIsEnabled(known->body) != 0;
+  if (known->sleep_automatic) {
+    known->awake = dBodyIsEnabled(known->body) != 0;
   }
 }

@@ -205,11 +205,11 @@ void hapi_world_convert(hapi_physics *physics)
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     hapi_known_body *known = &physics->table.entries[i];
     if (known->body != NULL) {
-      known->damping[0] = dBodyGetLinearDamping(known->body);
-      known->damping[1] = dBodyGetAngularDamping(known->body);
-      if (known->damping[0] != 0.0 || known->damping[1] != 0.0) {
-        dBodySetLinearDamping(known->body, keep_of(known->damping[0], ratio));
-        dBodySetAngularDamping(known->body, keep_of(known->damping[1], ratio));
+      known->rest->damping[0] = dBodyGetLinearDamping(known->body);
+      known->rest->damping[1] = dBodyGetAngularDamping(known->body);
+      if (known->rest->damping[0] != 0.0 || known->rest->damping[1] != 0.0) {
+        dBodySetLinearDamping(known->body, keep_of(known->rest->damping[0], ratio));
+        dBodySetAngularDamping(known->body, keep_of(known->rest->damping[1], ratio));
       }
     }
   }
@@ -228,9 +228,9 @@ void hapi_world_restore(hapi_physics *physics)
   }
   for (uint32_t i = 0; i < physics->table.high; ++i) {
     const hapi_known_body *known = &physics->table.entries[i];
-    if (known->body != NULL && (known->damping[0] != 0.0 || known->damping[1] != 0.0)) {
-      dBodySetLinearDamping(known->body, known->damping[0]);
-      dBodySetAngularDamping(known->body, known->damping[1]);
+    if (known->body != NULL && (known->rest->damping[0] != 0.0 || known->rest->damping[1] != 0.0)) {
+      dBodySetLinearDamping(known->body, known->rest->damping[0]);
+      dBodySetAngularDamping(known->body, known->rest->damping[1]);
     }
   }
 }

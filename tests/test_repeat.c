@@ -1,0 +1,257 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Lockstep has the same bits in every run, whatever addresses ODE's heap gives to what the application
+ * makes in place of what it destroyed. */
+
+#include "tests/tap.h"
+
+#include "tests/contact_world.h"
+#include "tests/repeat.h"
+
+#define EDGE 0.1    /* m, of the cubes */
+#define SLAB 0.2    /* m, their ground is so thick */
+#define TICKS 1000  /* of a run */
+#define EDIT_AT 130 /* an edit every so many ticks: physics steps every 50 */
+
+typedef struct scene {
+  contact_world w;
+  dGeomID slab;
+  dGeomID geoms[2]; /* of the two bodies */
+  dJointID joints[2];
+  int joint_count;
+  int edits;
+} scene;
+
+typedef struct edit_case {
+  const char *name;
+  void (*begin)(scene *s); /* may be NULL */
+  void (*edit)(scene *s);
+} edit_case;
+
+static void add_box_geom(scene *s, int i, double edge)
+{
+  s->geoms[i] = dCreateBox(s->w.space, edge, edge, EDGE);
+  dGeomSetBody(s->geoms[i], s->w.bodies[i]);
+}
+
+static void set_mass(dBodyID body)
+{
+  dMass mass;
+  dMassSetBoxTotal(&mass, 0.5, EDGE, EDGE, EDGE);
+  dBodySetMass(body, &mass);
+}
+
+static void add_cube(scene *s, int i, double x)
+{
+  s->w.bodies[i] = dBodyCreate(s->w.world);
+  set_mass(s->w.bodies[i]);
+  dBodySetPosition(s->w.bodies[i], x, 0.0, 0.5 * EDGE);
+  add_box_geom(s, i, EDGE);
+}
+
+static void add_slab(scene *s, double length)
+{
+  s->slab = dCreateBox(s->w.space, length, length, SLAB);
+  dGeomSetPosition(s->slab, 0.0, 0.0, -0.5 * SLAB);
+}
+
+/* ---- the edits, all told ---- */
+
+static void drop_geom(scene *s, dGeomID geom)
+{
+  CHECK(hap_session_forget_geom(s->w.session, geom) == HAP_OK);
+  dGeomDestroy(geom);
+}
+
+static void replace_geom(scene *s)
+{
+  drop_geom(s, s->geoms[0]);
+  add_box_geom(s, 0, EDGE + 0.001 * (s->edits % 3));
+}
+
+static void replace_geom_by_its_like(scene *s)
+{
+  drop_geom(s, s->geoms[0]);
+  add_box_geom(s, 0, EDGE);
+}
+
+static void replace_slab(scene *s)
+{
+  drop_geom(s, s->slab);
+  add_slab(s, 2.0 + 0.001 * (s->edits % 3));
+}
+
+/* A cube as a convex geom, of two sizes. */
+static void add_convex(scene *s, int size)
+{
+  static const dReal planes[] = {1, 0,  0, 0.05, -1, 0, 0, 0.05, 0, 1, 0,  0.05,
+                                 0, -1, 0, 0.05, 0,  0, 1, 0.05, 0, 0, -1, 0.05};
+  static const unsigned polygons[] = {4, 1, 3, 7, 5, 4, 0, 4, 6, 2, 4, 2, 6, 7, 3,
+                                      4, 0, 1, 5, 4, 4, 4, 5, 7, 6, 4, 0, 2, 3, 1};
+  static dReal points[2][24];
+  for (int i = 0; i < 8; ++i) {
+    double half = 0.05 + 0.005 * size;
+    points[size][3 * i] = (i & 1) != 0 ? half : -half;
+    points[size][3 * i + 1] = (i & 2) != 0 ? half : -half;
+    points[size][3 * i + 2] = (i & 4) != 0 ? 0.05 : -0.05;
+  }
+  s->geoms[0] = dCreateConvex(s->w.space, planes, 6, points[size], 8, polygons);
+  dGeomSetBody(s->geoms[0], s->w.bodies[0]);
+}
+
+static void begin_convex(scene *s)
+{
+  dGeomDestroy(s->geoms[0]);
+  add_convex(s, 0);
+}
+
+static void replace_convex(scene *s)
+{
+  drop_geom(s, s->geoms[0]);
+  add_convex(s, (s->edits + 1) % 2);
+}
+
+static void hinge(scene *s, dBodyID other)
+{
+  const dReal *at = dBodyGetPosition(s->w.bodies[0]);
+  dJointID joint = dJointCreateHinge(s->w.world, NULL);
+  dJointAttach(joint, s->w.bodies[0], other);
+  dJointSetHingeAnchor(joint, at[0], at[1], at[2]);
+  dJointSetHingeAxis(joint, 0.0, 0.0, 1.0);
+  s->joints[s->joint_count++] = joint;
+}
+
+static void begin_hinge(scene *s)
+{
+  hinge(s, s->w.bodies[1]);
+}
+
+static void drop_joints(scene *s)
+{
+  while (s->joint_count > 0) {
+    dJointDestroy(s->joints[--s->joint_count]);
+  }
+}
+
+static void replace_hinge(scene *s)
+{
+  drop_joints(s);
+  hinge(s, s->w.bodies[1]);
+}
+
+/* Two of the same kind between the same bodies, which change addresses. */
+static void balls(scene *s)
+{
+  const dReal *at = dBodyGetPosition(s->w.bodies[0]);
+  for (int i = 0; i < 2; ++i) {
+    dJointID joint = dJointCreateBall(s->w.world, NULL);
+    dJointAttach(joint, s->w.bodies[0], s->w.bodies[1]);
+    dJointSetBallAnchor(joint, at[0] + 0.06, at[1] + 0.03 * (2 * i - 1), at[2]);
+    s->joints[s->joint_count++] = joint;
+  }
+}
+
+static void replace_balls(scene *s)
+{
+  if (s->edits % 2 == 0) {
+    drop_joints(s);
+  } else { /* the other way round */
+    dJointDestroy(s->joints[0]);
+    dJointDestroy(s->joints[1]);
+    s->joint_count = 0;
+  }
+  balls(s);
+}
+
+static void fix(scene *s)
+{
+  dJointID joint = dJointCreateFixed(s->w.world, NULL);
+  dJointAttach(joint, s->w.bodies[0], s->w.bodies[1]);
+  dJointSetFixed(joint);
+  s->joints[s->joint_count++] = joint;
+}
+
+static void replace_fixed(scene *s)
+{
+  drop_joints(s);
+  fix(s);
+}
+
+static void replace_body_on_hinge(scene *s)
+{
+  double x = dBodyGetPosition(s->w.bodies[1])[0];
+  drop_joints(s);
+  CHECK(hap_session_forget_body(s->w.session, s->w.bodies[1]) == HAP_OK);
+  drop_geom(s, s->geoms[1]);
+  dBodyDestroy(s->w.bodies[1]);
+  add_cube(s, 1, x);
+  hinge(s, s->w.bodies[1]);
+}
+
+/* ---- a run ---- */
+
+/* Two cubes on a slab; a hand pushes the first one on, again and again. */
+static void run_case(repeat_log *log, const void *arg)
+{
+  const edit_case *c = arg;
+  static scene s;
+  memset(&s, 0, sizeof s);
+  cw_open(&s.w, CW_GRAVITY);
+  add_slab(&s, 2.0);
+  add_cube(&s, 0, 0.0);
+  add_cube(&s, 1, EDGE + 0.02);
+  s.w.body_count = 2;
+  dQuaternion turned = {0.98, 0.0, 0.0, 0.2};
+  dBodySetQuaternion(s.w.bodies[0], turned);
+  if (c->begin != NULL) {
+    c->begin(&s);
+  }
+  CHECK(cw_start(&s.w, -0.07, 0.01, 0.5 * EDGE));
+  hap_status status = HAP_OK;
+  for (int i = 0; i < TICKS && status == HAP_OK; ++i) {
+    if (i % EDIT_AT == EDIT_AT - 1) {
+      c->edit(&s);
+      ++s.edits;
+    }
+    s.w.hand_at[0] = -0.06 + 5e-5 * i + 0.02 * sin(0.02 * i);
+    cw_put_hand(&s.w, 0.0, 0.0, 0.0);
+    status = hap_session_advance(s.w.session, 1);
+    repeat_note(log, s.w.session);
+  }
+  hap_stats stats = cw_stats(&s.w);
+  CHECK(status == HAP_OK && stats.contact_ticks > 100 && stats.faults == 0);
+  CHECK(stats.bodies_lost == 0 && stats.range_bodies == 2);
+  cw_close(&s.w);
+}
+
+TEST(what_is_replaced)
+{
+  static const edit_case cases[] = {
+      {"a geom of a body", NULL, replace_geom},
+      {"a geom by its like", NULL, replace_geom_by_its_like},
+      {"a convex geom", begin_convex, replace_convex},
+      {"a static geom", NULL, replace_slab},
+      {"a joint", begin_hinge, replace_hinge},
+      {"two joints of the same bodies", balls, replace_balls},
+      {"a fixed joint", fix, replace_fixed},
+      {"a body and its joint", begin_hinge, replace_body_on_hinge},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    bool same = repeat_run(run_case, &cases[i]);
+    if (!same) {
+      printf("# in another place: %s\n", cases[i].name);
+    }
+    CHECK(same);
+  }
+}
+
+int main(void)
+{
+  repeat_init();
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(what_is_replaced);
+  dCloseODE();
+  return tap_done();
+}
