@@ -75,6 +75,8 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   def.radius = p->radius;
   def.stiffness = options->stiffness > 0.0 ? options->stiffness : p->stiffness;
   def.damping = p->damping;
+  def.friction = p->friction;
+  def.finger_radius = p->finger_radius;
   def.max_force = options->max_force > 0.0 ? options->max_force : def.max_force;
   def.coupling = options->coupling;
   def.coupling_stiffness = options->coupling_stiffness;

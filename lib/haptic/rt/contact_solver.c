@@ -25,7 +25,8 @@ static bool valid(const hapi_solver *solver, uint32_t index)
 {
   const hapi_row *row = &solver->rows[index];
   bool numbers = hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
-                 row->softness >= 0.0 && (row->normal >= 0 ? row->mu >= 0.0 : row->lo <= row->hi);
+                 row->softness >= 0.0 &&
+                 (row->normal >= 0 ? row->mu >= 0.0 && row->round <= index : row->lo <= row->hi);
   bool partners = row->a < solver->body_count && row->b < solver->body_count &&
                   (row->normal < 0 ||
                    ((uint32_t)row->normal < index && same_bodies(row, &solver->rows[row->normal])));
@@ -134,6 +135,7 @@ static double change(hapi_row *row, double error, double lo, double hi)
 static double change_friction(hapi_row *row, double error, double p)
 {
   double hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+  hi = row->round > 0 ? hapi_row_left(row, hi) : hi;
   return change(row, error, -hi, hi);
 }
 

@@ -3,7 +3,7 @@
 #ifndef HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
 #define HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
 
-/* Impulses of contacts, by ODE's friction pyramid: the box LCP on the level of velocities.
+/* Impulses of contacts, by ODE's friction pyramid or within a ball: the box LCP on the level of velocities.
  *
  *   w = ja.v[a] + jb.v[b],   v = free velocity + sum over rows of (ba, bb) impulse
  *   lo < impulse < hi:  w + softness impulse = target
@@ -42,10 +42,12 @@ typedef struct hapi_row {
   uint32_t a;         /* index into v */
   uint32_t b;         /* several static partners may share one index, whose v stays as it is */
   uint32_t next;      /* inner: of the same island */
-  uint8_t triple;     /* inner: a normal whose two frictions come next, all of use */
-  uint8_t moves_a;    /* inner: a responds */
-  uint8_t paired;     /* inner: b responds */
-  uint8_t state;      /* inner, of direct_solver.c */
+  uint8_t round;  /* frictions before it, in a row, with which it shares a ball of radius mu p: they
+                      come first, and it has what they leave; 0: the pyramid */
+  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
+  uint8_t moves_a; /* inner: a responds */
+  uint8_t paired;  /* inner: b responds */
+  uint8_t state;   /* inner, of direct_solver.c */
 } hapi_row;
 
 typedef struct hapi_solver {
@@ -121,6 +123,16 @@ static inline double hapi_clamp(double x, double lo, double hi)
   return y < hi ? y : hi;
 }
 
+/* N s, what the frictions before it leave of the ball's radius */
+static inline double hapi_row_left(const hapi_row *row, double radius)
+{
+  double left = radius * radius;
+  for (uint32_t i = 1; i <= row->round; ++i) {
+    left -= row[-(int)i].impulse * row[-(int)i].impulse;
+  }
+  return left > 0.0 ? sqrt(left) : 0.0;
+}
+
 static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, double *out_lo,
                                    double *out_hi)
 {
@@ -129,6 +141,7 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   if (row->normal >= 0) {
     double p = rows[row->normal].impulse;
     *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+    *out_hi = row->round > 0 ? hapi_row_left(row, *out_hi) : *out_hi;
     *out_lo = -*out_hi;
   }
 }

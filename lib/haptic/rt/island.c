@@ -84,7 +84,8 @@ static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool
   if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
     row->state = HAPI_ROW_FREE;
     is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
-  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE) {
+  } else if (row->normal >= 0 && row->round == 0 && hi > 0.0 &&
+             rows[row->normal].state == HAPI_ROW_FREE) {
     row->state = HAPI_ROW_TIED;
     is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
   }
