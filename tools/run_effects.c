@@ -25,7 +25,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"joints", "joints in the loop", CONTACT, 0, 0},
     {"range", "local range beyond the neighbours", CONTACT, 0, 0},
     {"restitution", "restitution in the loop", CONTACT, 0, 0},
-    {"friction", "friction on the pointer", 0, EVERY, 0},
+    {"friction", "friction on the pointer (--friction)", 0, EVERY, EVERY},
     {"torque", "torque on the pointer", 0, EVERY, 0},
     {"gyro", "gyroscopic term in the loop", CONTACT, 0, 0},
     {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
