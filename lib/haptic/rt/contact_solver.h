@@ -42,8 +42,9 @@ typedef struct hapi_row {
   uint32_t a;         /* index into v */
   uint32_t b;         /* several static partners may share one index, whose v stays as it is */
   uint32_t next;      /* inner: of the same island */
-  uint8_t round;  /* frictions before it, in a row, with which it shares a ball of radius mu p: they
-                      come first, and it has what they leave; 0: the pyramid */
+  uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
+                      vector, no longer than mu p: how many; 0: the pyramid */
+  uint8_t round;  /* of the others: how many of them come before */
   uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
   uint8_t moves_a; /* inner: a responds */
   uint8_t paired;  /* inner: b responds */
@@ -97,6 +98,21 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index);
 
 /* ---- inner: between contact_solver.c and direct_solver.c ---- */
 
+/* The radius of a ball of frictions [N s]. */
+static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
+{
+  double p = rows[first->normal].impulse;
+  return p > 0.0 ? first->mu * p : 0.0;
+}
+
+/* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out of it,
+ * where the friction slides against the motion; returns the correction, m/s. */
+double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
+                        bool *out_slides);
+
+/* One update of the ball that begins with the row; returns the correction, m/s. */
+double hapi_ball_update(hapi_solver *solver, hapi_row *first);
+
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
  * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
@@ -127,8 +143,8 @@ static inline double hapi_clamp(double x, double lo, double hi)
 static inline double hapi_row_left(const hapi_row *row, double radius)
 {
   double left = radius * radius;
-  for (uint32_t i = 1; i <= row->round; ++i) {
-    left -= row[-(int)i].impulse * row[-(int)i].impulse;
+  for (int i = 1; i <= row->round; ++i) {
+    left -= row[-i].impulse * row[-i].impulse;
   }
   return left > 0.0 ? sqrt(left) : 0.0;
 }

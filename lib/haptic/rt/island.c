@@ -84,13 +84,44 @@ static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool
   if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
     row->state = HAPI_ROW_FREE;
     is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
-  } else if (row->normal >= 0 && row->round == 0 && hi > 0.0 &&
-             rows[row->normal].state == HAPI_ROW_FREE) {
+  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE) {
     row->state = HAPI_ROW_TIED;
     is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
   }
   is->free_rows += row->state == HAPI_ROW_FREE;
   is->used_rows += row->state != HAPI_ROW_FIXED;
+}
+
+/* The same of frictions that are one vector: free, or along the force and as large as the normal lets it. */
+static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
+{
+  hapi_row *rows = is->solver->rows;
+  hapi_row *row = &rows[first];
+  const hapi_row *normal = &rows[row->normal];
+  double radius = hapi_ball_radius(rows, row);
+  double wanted[3];
+  double norm2 = 0.0;
+  bool slides;
+  for (uint32_t i = first; i < first + row->ball; ++i) {
+    is->error[i] = rows[i].inverse != 0.0 ? hapi_row_error(is->solver, &rows[i]) : 0.0;
+    norm2 += rows[i].impulse * rows[i].impulse;
+  }
+  double due = hapi_ball_wanted(row, radius, is->error + first, wanted, &slides);
+  bool inside = !slides || norm2 < (1.0 - 1e-9) * radius * radius;
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    hapi_row *each = &rows[first + i];
+    each->state = HAPI_ROW_FIXED;
+    if (radius > 0.0 && (inside || sticking)) {
+      each->state = HAPI_ROW_FREE;
+      is->gain[first + i] = 1.0 / (each->softness + SOFTENING * each->response);
+    } else if (radius > 0.0 && normal->state == HAPI_ROW_FREE) {
+      each->state = HAPI_ROW_TIED;
+      is->gain[first + i] = row->mu * (wanted[i] / radius) * is->gain[row->normal];
+    }
+    is->free_rows += each->state == HAPI_ROW_FREE;
+    is->used_rows += each->state != HAPI_ROW_FIXED;
+  }
+  return due;
 }
 
 /* The states of the rows, for the next round; returns the largest correction due, m/s. */
@@ -104,6 +135,11 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     const hapi_row *row = &solver->rows[i];
     double lo;
     double hi;
+    if (row->ball > 0 || row->round > 0) {
+      double due = row->ball > 0 ? inspect_ball(is, i, sticking) : 0.0;
+      largest = due <= largest ? largest : due;
+      continue;
+    }
     hapi_row_bounds(solver->rows, row, &lo, &hi);
     double p = row->impulse;
     is->error[i] = hapi_row_error(solver, row);
@@ -462,6 +498,12 @@ void hapi_island_settle(hapi_island *is)
     hapi_row *row = &rows[i];
     double lo;
     double hi;
+    if (row->ball > 0) {
+      (void)hapi_ball_update(is->solver, row);
+    }
+    if (row->ball > 0 || row->round > 0) {
+      continue;
+    }
     hapi_row_bounds(rows, row, &lo, &hi);
     double wanted = row->impulse + hapi_row_error(is->solver, row) * row->inverse;
     hapi_row_push(is->solver, row, hapi_clamp(wanted, lo, hi) - row->impulse);

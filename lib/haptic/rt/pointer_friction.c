@@ -220,11 +220,18 @@ static void set_speed(hapi_friction *f, const hapi_tick_pointer *p, const hapi_l
 
 /* Directions at right angles, the first along the force that there is when all sticks: a force that is
  * too large for the ball then is one number, and the ball's surface no affair of the others. */
-static void set_axes(hapi_friction *f, const hapi_tick_pointer *p)
+void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead,
+                       const double gain[3])
 {
+  double ahead[4];
   double pull[4];
+  memcpy(ahead, f->speed, sizeof ahead);
+  if (gain != NULL) {
+    hapi_v3_add(ahead, gain, ahead);
+    across(f->normal, ahead);
+  }
   for (int i = 0; i < 4; ++i) {
-    pull[i] = p->stiffness * f->stretch[i] + p->damping * f->speed[i];
+    pull[i] = p->stiffness * (f->stretch[i] + lead * ahead[i]) + p->damping * ahead[i];
   }
   double along[3];
   set_tangent(f->normal, pull, along);
@@ -266,7 +273,6 @@ hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *co
   measure_stretch(f, p, body);
   f->stretch[3] = p->finger_radius * f->now.turn;
   set_speed(f, p, body);
-  set_axes(f, p);
   return f;
 }
 

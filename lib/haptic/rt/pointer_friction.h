@@ -23,11 +23,17 @@ static inline void hapi_friction_foot(const hapi_tick_pointer *p, const double n
   hapi_v3_madd(p->pose.position, -hapi_v3_dot(normal, apart), normal, out);
 }
 
-/* Where the contact's friction stands in this tick; NULL: it has none. normal: out of the body; point: of
+/* Where the contact's friction stands in this tick, but for the axes; NULL: it has none. normal: out of the body; point: of
  * the surface, below the pointer. Once in each tick in which the contact is closed: after one without,
  * it begins anew. */
 hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
                                    const double normal[3], const double point[3]);
+
+/* Sets the axes along the force that there is when all sticks. lead: how far the spring's is foreseen, with
+ * the speed and what the pointer gets of it besides (m/s; NULL: nothing): where pointer or body follow
+ * the force within the tick, only that tells where they slide. */
+void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead,
+                       const double gain[3]);
 
 /* The force of spring and damper on the body, at most limit [N]: for those who know the normal force. */
 void hapi_friction_push(const hapi_friction *f, double limit, double out[4]);

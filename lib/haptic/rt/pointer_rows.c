@@ -242,6 +242,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
     return;
   }
   row->mu = 0.0;
+  row->ball = row->round = 0;
   row->normal = -1;
   row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
   world->sources[number] = (hapi_row_source){
@@ -315,11 +316,13 @@ static bool add_friction_row(hapi_tick *tick, uint32_t index, const placed_point
   set_friction_columns(contact, at, f, f->axes[axis], row);
   fill_friction_spring(at, f, f->axes[axis], row, &p);
   row->mu = contact->mu;
+  row->ball = axis == 0 ? (uint8_t)f->axis_count : 0;
   row->round = (uint8_t)axis;
   row->normal = (int32_t)contact->row;
   row->impulse = axis == 0 ? tick->period * f->pull : 0.0;
   if (at->pointer->integration == HAP_INTEGRATION_EXPLICIT) {
     row->normal = -1;
+    row->ball = 0;
     row->lo = row->hi = fmin(row->impulse, contact->mu * normal->hi);
     row->softness = row->target = 0.0;
   } else if (!soften(row, at->pointer, &p, tick->period)) {
@@ -335,6 +338,24 @@ static bool add_friction_row(hapi_tick *tick, uint32_t index, const placed_point
   return true;
 }
 
+/* A proxy goes, and a light body is taken, to where the force leaves them at the tick's end. */
+static void aim(const hapi_tick *tick, const hapi_local_contact *contact, const placed_pointer *at,
+                hapi_friction *f)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  double gain[3] = {0.0, 0.0, 0.0};
+  double lead = 0.0;
+  if (p->proxied) {
+    hapi_v3_sub(p->free_velocity, p->proxy_velocity, gain);
+  }
+  if (contact->row != HAPI_NO_ROW && p->integration != HAP_INTEGRATION_EXPLICIT) {
+    const hapi_row *normal = &tick->world.solver.rows[contact->row];
+    double a = hapi_dot6(normal->ja, normal->ba) + hapi_dot6(normal->jb, normal->bb);
+    lead = by_midpoint(p, tick->period * tick->period * a * p->stiffness) ? 0.0 : tick->period;
+  }
+  hapi_friction_aim(f, p, lead, gain);
+}
+
 /* After the normal's row. */
 static void add_friction(hapi_tick *tick, uint32_t index, const placed_pointer *at)
 {
@@ -342,7 +363,11 @@ static void add_friction(hapi_tick *tick, uint32_t index, const placed_pointer *
   double foot[3];
   hapi_friction_foot(at->pointer, at->normal, at->point, foot);
   hapi_friction *f = hapi_friction_begin(tick, contact, at->normal, foot);
-  if (f == NULL || contact->row == HAPI_NO_ROW) {
+  if (f == NULL) {
+    return;
+  }
+  aim(tick, contact, at, f);
+  if (contact->row == HAPI_NO_ROW) {
     return;
   }
   uint32_t wanted = at->pointer->integration == HAP_INTEGRATION_EXPLICIT ? 1 : f->axis_count;

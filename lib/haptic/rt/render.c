@@ -90,6 +90,7 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
     return;
   }
   double limit = c->mu * normal_force;
+  hapi_friction_aim(f, p, 0.0, NULL);
   hapi_friction_push(f, limit, push);
   hapi_friction_wrench(f, p, push, at->point, &on_body);
   hapi_friction_wrench(f, p, push, p->pose.position, &on_hand);
