@@ -13,8 +13,9 @@
  * spring as long as it was. */
 
 #define ROLLED_COSINE 0.99875 /* 0.05 rad: of 10 mm, the arc is 0.2 um longer than the tangent */
-#define TURNED 1.0            /* rad: half a turn could not be told from its opposite */
-#define AT_LIMIT 1e-6         /* of the limit: less is rounding */
+#define OTHER_FACE_COSINE 0.5
+#define TURNED 1.0    /* rad: half a turn could not be told from its opposite */
+#define AT_LIMIT 1e-6 /* of the limit: less is rounding */
 
 static const double no_turn[4] = {1.0, 0.0, 0.0, 0.0};
 
@@ -93,7 +94,7 @@ static double norm4(const double a[4])
 
 /* ---- anchors ---- */
 
-/* A unit vector across `from`, turned with it on the shortest way to `to`. */
+/* A vector across `from`, turned with it on the shortest way to `to`, less than a right angle away. */
 static void carry(const double from[3], const double to[3], double io[3])
 {
   double sum[3];
@@ -102,26 +103,79 @@ static void carry(const double from[3], const double to[3], double io[3])
   hapi_v3_madd(io, -along, sum, io);
 }
 
-/* Where anchors would be set now. */
+/* The anchors as they would be set now. The marks are one direction of the surface, in both frames. */
 static void see(hapi_friction *f, const hapi_tick_pointer *p, const hapi_local_body *body,
-                const double point[3])
+                const double normal[3], const double point[3])
 {
+  static const double any[3] = {0.0, 0.0, 0.0};
   double apart[3];
+  double mark[3];
   hapi_friction_place *now = &f->now;
   hapi_v3_sub(point, p->pose.position, apart);
   hapi_quat_unrotate(pointer_turn(p), apart, now->anchor_pointer);
   point_to_body(body, point, now->anchor_body);
-  hapi_quat_unrotate(pointer_turn(p), f->normal, now->normal_pointer);
-  to_body(body, f->normal, now->normal_body);
+  hapi_quat_unrotate(pointer_turn(p), normal, now->normal_pointer);
+  to_body(body, normal, now->normal_body);
+  if (p->finger_radius > 0.0) {
+    set_tangent(normal, any, mark);
+    hapi_quat_unrotate(pointer_turn(p), mark, now->mark_pointer);
+    to_body(body, mark, now->mark_body);
+  }
 }
 
-/* A direction of the surface in each of the two. */
-static void see_marks(hapi_friction *f, const hapi_tick_pointer *p, const hapi_local_body *body)
+/* The directions of the surface in which the anchors see each other: the mean of the two surfaces' that
+ * were one when they were set. So a way and the way back are the same, and what rolls to and fro, or tilts
+ * about something else than the contact, comes back to where it was. */
+static void set_normal(hapi_friction *f, const double of_pointer[3], const double of_body[3])
 {
-  double mark[3];
-  set_tangent(f->normal, f->stretch, mark);
-  hapi_quat_unrotate(pointer_turn(p), mark, f->now.mark_pointer);
-  to_body(body, mark, f->now.mark_body);
+  hapi_v3_add(of_pointer, of_body, f->normal);
+  hapi_v3_scale(1.0 / hapi_v3_norm(f->normal), f->normal, f->normal);
+}
+
+/* How far the pointer is ahead of the body along the surface. The force acts half-way between the
+ * anchors: so the spring keeps its energy while the surface tilts. */
+static void slide(hapi_friction *f, const hapi_tick_pointer *p, const hapi_local_body *body,
+                  const double normal_of_body[3])
+{
+  double apart[3];
+  double of_body[3];
+  hapi_quat_rotate(pointer_turn(p), f->set.anchor_pointer, f->at);
+  hapi_v3_add(f->at, p->pose.position, f->at);
+  point_from_body(body, f->set.anchor_body, of_body);
+  hapi_v3_sub(f->at, of_body, apart);
+  double height = hapi_v3_dot(f->normal, apart);
+  hapi_v3_madd(f->at, -0.5 * height, f->normal, f->at);
+  from_body(body, f->set.stretch_body, f->stretch);
+  carry(normal_of_body, f->normal, f->stretch);
+  hapi_v3_add(f->stretch, apart, f->stretch);
+  across(f->normal, f->stretch);
+}
+
+/* How far the pointer has turned against the body about the normal since the anchors were set: rad. */
+static double turn_since(const hapi_friction *f, const hapi_tick_pointer *p,
+                         const hapi_local_body *body, const double of_pointer[3],
+                         const double of_body[3])
+{
+  double a[3];
+  double b[3];
+  double cross[3];
+  hapi_quat_rotate(pointer_turn(p), f->set.mark_pointer, a);
+  from_body(body, f->set.mark_body, b);
+  carry(of_pointer, f->normal, a);
+  carry(of_body, f->normal, b);
+  hapi_v3_cross(b, a, cross);
+  return atan2(hapi_v3_dot(cross, f->normal), hapi_v3_dot(a, b));
+}
+
+/* Stretch and turn that there are, for anchors that are set now. */
+static void see_stretch(hapi_friction *f, const hapi_local_body *body, const double normal[3],
+                        double turn)
+{
+  double flat[3];
+  hapi_v3_copy(f->stretch, flat);
+  carry(f->normal, normal, flat);
+  to_body(body, flat, f->now.stretch_body);
+  f->now.turn = turn;
 }
 
 /* Where the contact is now, with a share of the spring's stretch. */
@@ -129,67 +183,45 @@ static void set_anchors(hapi_friction *f, double share)
 {
   f->set = f->now;
   f->set.turn *= share;
-  hapi_v3_madd(f->set.anchor_body, -share, f->stretch_body, f->set.anchor_body);
-}
-
-/* The stretch that there was stays. */
-static void keep_stretch(hapi_friction *f, const hapi_tick_pointer *p, const hapi_local_body *body)
-{
-  across(f->normal, f->stretch);
-  to_body(body, f->stretch, f->stretch_body);
-  see_marks(f, p, body);
-  set_anchors(f, 1.0);
-}
-
-/* How far the pointer is ahead of the body along the surface. The force acts at the pointer's anchor: so
- * the spring keeps its energy while the surface tilts. */
-static void slide(hapi_friction *f, const hapi_tick_pointer *p, const hapi_local_body *body)
-{
-  double of_body[3];
-  hapi_quat_rotate(pointer_turn(p), f->set.anchor_pointer, f->at);
-  hapi_v3_add(f->at, p->pose.position, f->at);
-  point_from_body(body, f->set.anchor_body, of_body);
-  hapi_v3_sub(f->at, of_body, f->stretch);
-  across(f->normal, f->stretch);
-  to_body(body, f->stretch, f->stretch_body);
-}
-
-/* How far the pointer has turned against the body about the normal since the anchors were set: rad. */
-static double turn_since(const hapi_friction *f, const hapi_tick_pointer *p,
-                         const hapi_local_body *body)
-{
-  double a[3];
-  double b[3];
-  double cross[3];
-  hapi_v3_copy(f->set.mark_pointer, a);
-  hapi_v3_copy(f->set.mark_body, b);
-  carry(f->set.normal_pointer, f->now.normal_pointer, a);
-  carry(f->set.normal_body, f->now.normal_body, b);
-  hapi_quat_rotate(pointer_turn(p), a, a);
-  from_body(body, b, b);
-  hapi_v3_cross(b, a, cross);
-  return atan2(hapi_v3_dot(cross, f->normal), hapi_v3_dot(a, b));
-}
-
-static bool has_rolled(const hapi_friction *f)
-{
-  return hapi_v3_dot(f->set.normal_pointer, f->now.normal_pointer) < ROLLED_COSINE ||
-         hapi_v3_dot(f->set.normal_body, f->now.normal_body) < ROLLED_COSINE;
+  hapi_v3_scale(share, f->set.stretch_body, f->set.stretch_body);
 }
 
 static void measure_stretch(hapi_friction *f, const hapi_tick_pointer *p,
-                            const hapi_local_body *body)
+                            const hapi_local_body *body, const double normal[3])
 {
+  double of_pointer[3];
+  double of_body[3];
   double turn = 0.0;
-  slide(f, p, body);
+  hapi_quat_rotate(pointer_turn(p), f->set.normal_pointer, of_pointer);
+  from_body(body, f->set.normal_body, of_body);
+  set_normal(f, of_pointer, of_body);
+  slide(f, p, body, of_body);
   if (p->finger_radius > 0.0) {
-    turn = turn_since(f, p, body);
-    see_marks(f, p, body);
+    turn = turn_since(f, p, body, of_pointer, of_body);
   }
-  f->now.turn = f->set.turn + turn;
-  if (has_rolled(f) || fabs(turn) > TURNED) {
+  see_stretch(f, body, normal, f->set.turn + turn);
+  f->stretch[3] = p->finger_radius * f->now.turn;
+  if (hapi_v3_dot(of_pointer, normal) < ROLLED_COSINE ||
+      hapi_v3_dot(of_body, normal) < ROLLED_COSINE || fabs(turn) > TURNED) {
     set_anchors(f, 1.0);
   }
+}
+
+/* Whether anchors of the tick before hold: not after a jump, nor for another face. */
+static bool goes_on(const hapi_friction *f, const hapi_tick *tick,
+                    const hapi_local_contact *contact, const hapi_local_body *body,
+                    const double normal[3])
+{
+  const hapi_tick_pointer *p = &tick->pointers[contact->pointer];
+  double of_pointer[3];
+  double of_body[3];
+  if (f->generation != contact->generation || f->tick + 1 != tick->tick || p->jumped) {
+    return false;
+  }
+  hapi_quat_rotate(pointer_turn(p), f->set.normal_pointer, of_pointer);
+  from_body(body, f->set.normal_body, of_body);
+  return hapi_v3_dot(of_pointer, normal) > OTHER_FACE_COSINE &&
+         hapi_v3_dot(of_body, normal) > OTHER_FACE_COSINE;
 }
 
 /* ---- one tick ---- */
@@ -258,20 +290,21 @@ hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *co
       contact->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[contact->body];
   uint32_t epoch = body != NULL ? body->epoch : 0;
   hapi_friction *f = &tick->frictions[contact->slot];
-  bool goes_on = f->generation == contact->generation && f->tick + 1 == tick->tick && !p->jumped;
-  if (!goes_on) {
+  bool same = goes_on(f, tick, contact, body, normal);
+  if (!same) {
     memset(f, 0, sizeof *f);
   }
-  hapi_v3_copy(normal, f->normal);
-  see(f, p, body, point);
-  if (!goes_on || f->epoch != epoch) { /* that a body was put somewhere else is no motion */
-    keep_stretch(f, p, body);
+  see(f, p, body, normal, point);
+  if (!same || f->epoch != epoch) { /* that a body was put somewhere else is no motion */
+    across(normal, f->stretch);
+    hapi_v3_copy(normal, f->normal);
+    see_stretch(f, body, normal, f->now.turn);
+    set_anchors(f, 1.0);
   }
   f->generation = contact->generation;
   f->tick = tick->tick;
   f->epoch = epoch;
-  measure_stretch(f, p, body);
-  f->stretch[3] = p->finger_radius * f->now.turn;
+  measure_stretch(f, p, body, normal);
   set_speed(f, p, body);
   return f;
 }

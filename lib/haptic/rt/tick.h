@@ -191,7 +191,8 @@ typedef struct hapi_friction_place {
   double
       mark_pointer[3]; /* unit, along the surface: one direction when they were set; soft finger */
   double mark_body[3];
-  double turn; /* rad, of the pointer against the body about the normal */
+  double stretch_body[3]; /* m, of the pointer ahead of the body, in the body's frame */
+  double turn;            /* rad, likewise, about the normal */
 } hapi_friction_place;
 
 /* Friction of a pointer contact, by its slot; see pointer_friction.h. Of four numbers: along the surface
@@ -203,13 +204,12 @@ typedef struct hapi_friction {
   hapi_friction_place set;
   hapi_friction_place now; /* the anchors if they were set in this tick */
   double normal[3];
-  double at[3];           /* m, world: where the force acts */
-  double stretch[4];      /* m, of the pointer ahead of the body */
-  double stretch_body[3]; /* m, the same in the body's frame */
-  double speed[4];        /* m/s, at which it grows */
-  double pull;            /* N, of spring and damper where nothing slides */
-  double axes[3][4];      /* unit, at right angles; the first along the pull */
-  uint32_t axis_count;    /* 2; 3 with torsion */
+  double at[3];        /* m, world: where the force acts */
+  double stretch[4];   /* m, of the pointer ahead of the body */
+  double speed[4];     /* m/s, at which it grows */
+  double pull;         /* N, of spring and damper where nothing slides */
+  double axes[3][4];   /* unit, at right angles; the first along the pull */
+  uint32_t axis_count; /* 2; 3 with torsion */
 } hapi_friction;
 
 typedef struct hapi_local_contact {
