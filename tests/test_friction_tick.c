@@ -106,8 +106,8 @@ static double creep_of(const shake *how)
 TEST(what_sticks_does_not_creep_in_a_million_ticks)
 {
   static const shake all[] = {
-      {HAP_MODEL_SINGLE, 0.0, 0.02, 0.0},      {HAP_MODEL_CONTACT, 0.0, 0.02, 0.0},
-      {HAP_MODEL_CONTACT, 0.005, 0.02, 0.0},   {HAP_MODEL_CONTACT, 0.0, 0.0, 200.0 * M_PI},
+      {HAP_MODEL_SINGLE, 0.0, 0.02, 0.0},          {HAP_MODEL_CONTACT, 0.0, 0.02, 0.0},
+      {HAP_MODEL_CONTACT, 0.005, 0.02, 0.0},       {HAP_MODEL_CONTACT, 0.0, 0.0, 200.0 * M_PI},
       {HAP_MODEL_SINGLE, 0.0, 0.02, 200.0 * M_PI}, {HAP_MODEL_CONTACT, 0.0, 0.3, 0.0},
       {HAP_MODEL_CONTACT, 0.005, 0.3, 0.0},
   };
