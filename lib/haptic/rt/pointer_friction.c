@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/vec.h"
+#include "haptic/rt/rows.h"
 
 /* The anchors stay where they are as long as nothing slides: displacements are taken from them as they
  * are placed now, and not summed up from velocities, so that no noise and no motion that comes back makes
@@ -164,7 +165,7 @@ static double turn_since(const hapi_friction *f, const hapi_tick_pointer *p,
   carry(of_pointer, f->normal, a);
   carry(of_body, f->normal, b);
   hapi_v3_cross(b, a, cross);
-  return atan2(hapi_v3_dot(cross, f->normal), hapi_v3_dot(a, b));
+  return hapi_row_angle(hapi_v3_dot(cross, f->normal), hapi_v3_dot(a, b));
 }
 
 /* Stretch and turn that there are, for anchors that are set now. */
