@@ -218,12 +218,12 @@ static void set_ball(hapi_solver *solver, hapi_row *first, const double impulses
 double hapi_ball_update(hapi_solver *solver, hapi_row *first)
 {
   double radius = hapi_ball_radius(solver->rows, first);
-  double old[3];
-  double errors[3];
-  double wanted[3];
+  double old[3] = {0.0};
+  double errors[3] = {0.0};
+  double wanted[3] = {0.0};
   double norm2 = 0.0;
   double largest = 0.0;
-  bool slides;
+  bool slides = false;
   for (int i = 0; i < first->ball; ++i) {
     hapi_row *row = &first[i];
     old[i] = row->impulse;
