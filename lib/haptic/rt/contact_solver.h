@@ -35,7 +35,8 @@ typedef struct hapi_row {
   double impulse;  /* N s; in: warm start, out: result */
   double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
   double response; /* inner: 1 / inverse */
-  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact */
+  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
+                         ball that slides: [0] its part of the force's direction */
   double drive;       /* inner: target without the part of a partner that does not respond */
   int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
                       the bounds are lo .. hi */
