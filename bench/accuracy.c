@@ -16,7 +16,8 @@
  *                  is half way to the next ones and, in rows "default" of model contact, above what a
  *                  run at 1.3 times that rate has there; 0 when contact is shorter than 4 steps
  *   rest_share     of the ticks with contact, those in which no hand moves
- *   start_um       the worst start */
+ *   start_um       the worst start
+ *   torque_*       as force_rel_rms and noise_floor, of the torque; 0: the hands feel none */
 
 #include <math.h>
 #include <string.h>
@@ -33,7 +34,7 @@
 static const char header[] =
     "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms,"
     "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,pose_median_mm,"
-    "force_rms_n,rest_share,start_um";
+    "force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor";
 
 static bool is_default(const accuracy_row *row)
 {
@@ -47,8 +48,9 @@ static void write_row(FILE *csv, const accuracy_row *r)
           r->knob, r->value, e->force, e->impulse_ratio, e->peak_ratio);
   fprintf(csv, "%.4g,%.4g,%.4g,%g,%.6g,0,%s,", r->tick_us, r->physics_ms, r->duty, r->haptic_hz,
           r->noise_floor, r->hand);
-  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g\n", 1e3 * e->pose_max, e->line_n, r->hand_speed,
-          1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um);
+  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g,%.6g,%.6g\n", 1e3 * e->pose_max, e->line_n,
+          r->hand_speed, 1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um, e->torque,
+          r->torque_floor);
 }
 
 static hap_status write_table(bench *b, const accuracy_table *table)
@@ -63,13 +65,14 @@ static hap_status write_table(bench *b, const accuracy_table *table)
 /* ---- numbers ---- */
 
 /* A scene cannot be followed more closely than it follows itself. */
-static void check_force(bench *b, const accuracy_row *r)
+static void check_error(bench *b, const accuracy_row *r, const char *what, double error,
+                        double floor)
 {
-  double bound = fmax(r->bound, 2.0 * r->noise_floor);
-  bench_check(b, r->errors.force <= bound,
-              "%s at %g Hz: force error %.3f %% (bound %.3f %%%s; noise floor %.3f %%)", r->scene,
-              r->physics_hz, 100.0 * r->errors.force, 100.0 * bound,
-              bound > r->bound ? ", twice the noise floor" : "", 100.0 * r->noise_floor);
+  double bound = fmax(r->bound, 2.0 * floor);
+  bench_check(b, error <= bound,
+              "%s at %g Hz: %s error %.3f %% (bound %.3f %%%s; noise floor %.3f %%)", r->scene,
+              r->physics_hz, what, 100.0 * error, 100.0 * bound,
+              bound > r->bound ? ", twice the noise floor" : "", 100.0 * floor);
 }
 
 static void check_row(bench *b, const accuracy_row *r)
@@ -77,7 +80,10 @@ static void check_row(bench *b, const accuracy_row *r)
   const accuracy_errors *e = &r->errors;
   double line = fmax(LINE_BOUND_N, LINE_BOUND * e->force_rms);
   if (r->bound > 0.0) {
-    check_force(b, r);
+    check_error(b, r, "force", e->force, r->noise_floor);
+  }
+  if (r->bound > 0.0 && e->torque > 0.0) {
+    check_error(b, r, "torque", e->torque, r->torque_floor);
   }
   bench_check(b, e->peak_ratio <= PEAK_BOUND, "%s at %g Hz: peak ratio %.4f (bound %g)", r->scene,
               r->physics_hz, e->peak_ratio, PEAK_BOUND);

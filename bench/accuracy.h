@@ -43,8 +43,9 @@ hap_status accuracy_recorded_hand(bench *b, const accuracy_scene *which, char *o
 /* ---- accuracy_run.c ---- */
 
 typedef struct accuracy_frame {
-  double force[SCENE_POINTERS_MAX][3]; /* N, on the hands */
-  double hand[SCENE_POINTERS_MAX][3];  /* m */
+  double force[SCENE_POINTERS_MAX][3];  /* N, on the hands */
+  double torque[SCENE_POINTERS_MAX][3]; /* N m, likewise */
+  double hand[SCENE_POINTERS_MAX][3];   /* m */
   double body[HAP_TRACE_BODIES_MAX][3];
   uint32_t local; /* bit k: the loop moves body k itself */
 } accuracy_frame;
@@ -75,6 +76,7 @@ void accuracy_motion_free(accuracy_motion *m); /* zeroed allowed */
 
 typedef struct accuracy_errors {
   double force;         /* RMS of the difference / RMS of the reference, while either touches */
+  double torque;        /* the same; 0: the hands feel none */
   double impulse_ratio; /* sums of the forces' norms */
   double peak_ratio;
   double pose_max;    /* m, over the bodies while the loop moves them */
@@ -109,6 +111,7 @@ typedef struct accuracy_row {
   double duty; /* computing time of all threads / simulated time */
   double haptic_hz;
   double noise_floor;
+  double torque_floor; /* the same of the torque */
   char hand[16];
   double hand_speed;
   double rest_share;

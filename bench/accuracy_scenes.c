@@ -35,6 +35,7 @@ static const accuracy_scene scenes[] = {
     {.name = "chain", .base = "chain", .bound = 0.005},
     {.name = "lightstand", .base = "lightstand", .bound = 0.03, .starts_quick = 3},
     {.name = "telescope", .base = "telescope", .bound = 0.03, .starts_quick = 3},
+    {.name = "grasp", .base = "grasp", .bound = 0.03, .speeds = true},
     {.name = "hold", .base = "hold", .seconds_quick = 3, .starts_quick = 2, .rests = true},
     {.name = "recorded",
      .base = "row10",

@@ -55,6 +55,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   copy->contacts = own.contacts;
   copy->ramps = own.ramps;
   copy->ramp_generations = own.ramp_generations;
+  copy->frictions = own.frictions;
   copy->pointers = own.pointers;
   copy->hashing = false; /* only lockstep does */
   memcpy(copy->bodies, from->bodies, from->body_high * sizeof *copy->bodies);
@@ -63,6 +64,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   memcpy(copy->ramps, from->ramps, c->contacts * sizeof *copy->ramps);
   memcpy(copy->ramp_generations, from->ramp_generations,
          c->contacts * sizeof *copy->ramp_generations);
+  memcpy(copy->frictions, from->frictions, c->contacts * sizeof *copy->frictions);
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
   copy_world(&copy->world, &own.world, &from->world);
   memcpy(copy->world.joint_memory, from->world.joint_memory,

@@ -62,6 +62,9 @@ void scene_build_clump(scene *s);
 void scene_build_tall_box(scene *s);
 void scene_build_table(scene *s);
 
+/* grasp.c */
+void scene_build_grasp(scene *s);
+
 /* round.c */
 void scene_build_ball(scene *s);
 void scene_build_lying_capsule(scene *s);

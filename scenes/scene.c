@@ -94,6 +94,8 @@ static const char *bad_parameter(const scene_parameters *p)
       {"iterations", p->iterations, 1, false},
       {"hinge_torque", p->hinge_torque, 0, false},
       {"layer", p->layer, 0, false},
+      {"friction", p->friction, 0, false},
+      {"finger_radius", p->finger_radius, 0, false},
       {"shift", p->shift[0], -SHIFT_MAX, false},
       {"shift", p->shift[1], -SHIFT_MAX, false},
       {"shift", p->shift[2], -SHIFT_MAX, false},

@@ -36,6 +36,8 @@ typedef struct scene_parameters {
   double hinge_torque;                   /* N m, friction of each hinge; 0: none */
   double shift[3]; /* m, by which the bodies stand beside where the scene has them, at the start;
                       the hands and what never moves stay; joints to the world come along. */
+  double friction; /* of the pointers; 0: none */
+  double finger_radius; /* m, of the pointers; 0: no soft fingers */
   double layer; /* m, ODE's contact surface layer: what rests lies this deep, so that a contact is
                    not lost to a gap of micrometres */
 } scene_parameters;

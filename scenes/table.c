@@ -406,6 +406,31 @@ static const scene_row rows[] = {
                         {"virtual:path=0:0.025/0/0.22;0.5:0.025/0/0.2076,blend=smooth,hand=rigid"}},
      .bodies = 4,
      .build = scene_build_hold},
+    {.parameters =
+         {.name = "grasp",
+          .text = "two fingers grip a box beside its middle, lift it, carry it and put it down",
+          .mass = 0.3,
+          .size = 0.06,
+          .mu = 0.5,
+          .gravity = 9.81,
+          .gap = 0,
+          .radius = 0.01,
+          .stiffness = 2000,
+          .damping = 5,
+          .duration = 2.8,
+          .friction = 0.6,
+          .finger_radius = 0.008,
+          .layer = 1e-4,
+          .iterations = 50,
+          .pointers = 2,
+          .hands = {"virtual:dof=6,path=0:-0.0415/0.006/0.03;0.3:-0.0375/0.006/0.03;0.9:-0.0375/"
+                    "0.006/0.08;1.7:-0.0175/0.086/0.08;2.4:-0.0175/0.086/0.0305;2.8:-0.0275/0.086/"
+                    "0.0305,blend=smooth,hand=rigid",
+                    "virtual:dof=6,path=0:0.0415/0.006/0.03;0.3:0.0375/0.006/0.03;0.9:0.0375/"
+                    "0.006/0.08;1.7:0.0575/0.086/0.08;2.4:0.0575/0.086/0.0305;2.8:0.0675/0.086/"
+                    "0.0305,blend=smooth,hand=rigid"}},
+     .bodies = 1,
+     .build = scene_build_grasp},
     {.parameters = {.name = "pendulum",
                     .text = "a rod that hangs from a hinge is pushed aside and comes back",
                     .mass = 0.5,

@@ -239,8 +239,12 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
 
 TEST(what_this_version_cannot_do_is_said)
 {
-  CHECK(run("--effects friction=on") == 2);
-  CHECK(says("friction=on") && says("not supported in this version"));
+  CHECK(run("--effects gyro=off") == 2);
+  CHECK(says("gyro=off") && says("not supported in this version"));
+  CHECK(run("--effects friction=on") == 2 && says("--friction"));
+  CHECK(run("--effects friction=off --friction 0.3") == 2 && says("friction=off"));
+  CHECK(run("--lockstep --seconds 0.05 --friction 0.3 --finger-radius 0.004") == 0);
+  CHECK(strstr(ran.out, "friction=on") != NULL);
   CHECK(run("--effects testing=off") == 2);
   CHECK(says("testing=off") && says("not supported in this version"));
   CHECK(run("--model accelerance --effects contacts=on") == 2);

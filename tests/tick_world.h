@@ -18,7 +18,7 @@
 
 #define JOINTS 6u
 
-#define ROWS (4u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
+#define ROWS (7u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
 #define BUCKETS 32u
 
 static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS};
@@ -31,6 +31,7 @@ static struct {
   hapi_local_contact contacts[CONTACTS];
   hapi_ramp ramps[CONTACTS];
   uint32_t ramp_generations[CONTACTS];
+  hapi_friction frictions[CONTACTS];
   hapi_tick_pointer pointers[POINTERS];
   hapi_contact_memory memory[2][CONTACTS];
   uint32_t buckets[BUCKETS];
@@ -80,6 +81,7 @@ static inline void set_up(void)
   f.tick.contacts = f.contacts;
   f.tick.ramps = f.ramps;
   f.tick.ramp_generations = f.ramp_generations;
+  f.tick.frictions = f.frictions;
   f.tick.pointers = f.pointers;
   set_up_world();
   hapi_tick_reset(&f.tick);

@@ -10,6 +10,7 @@ void rig_options_init(rig_options *options)
   memset(options, 0, sizeof *options);
   options->scene = "row10";
   options->coupling = HAP_COUPLING_AUTO;
+  options->friction = options->finger_radius = -1.0;
   hap_session_def_init(&options->def, sizeof options->def);
 }
 
@@ -75,6 +76,8 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   def.radius = p->radius;
   def.stiffness = options->stiffness > 0.0 ? options->stiffness : p->stiffness;
   def.damping = p->damping;
+  def.friction = options->friction >= 0.0 ? options->friction : p->friction;
+  def.finger_radius = options->finger_radius >= 0.0 ? options->finger_radius : p->finger_radius;
   def.max_force = options->max_force > 0.0 ? options->max_force : def.max_force;
   def.coupling = options->coupling;
   def.coupling_stiffness = options->coupling_stiffness;

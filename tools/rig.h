@@ -24,6 +24,8 @@ typedef struct rig_options {
       *identities[RIG_POINTERS_MAX]; /* files for the devices; NULL: as they say themselves */
   double max_force;                  /* N; 0: 20 */
   double stiffness;                  /* N/m, of the pointers' contacts; 0: the scene's */
+  double friction;                   /* of the pointers; < 0: the scene's */
+  double finger_radius;              /* m, of the pointers; < 0: the scene's */
   hap_coupling coupling;
   double coupling_stiffness; /* N/m, of hap_pointer_def */
   hap_session_def def;

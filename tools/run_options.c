@@ -266,6 +266,12 @@ static const option table[] = {
      offsetof(run_options, rig.max_force), 1e-6, 1e6},
     {"--stiffness", "F", "of the pointers' contacts, N/m (default: the scene's)", take_number,
      offsetof(run_options, rig.stiffness), 1e-3, 1e9},
+    {"--friction", "MU", "of the pointers, 0 to 10 (default: the scene's)", take_number,
+     offsetof(run_options, rig.friction), 0, 10},
+    {"--finger-radius", "M",
+     "radius by which the pointers, as soft fingers, hold against turning (default:\n"
+     "the scene's), 0: not",
+     take_number, offsetof(run_options, rig.finger_radius), 0, 1},
     {"--coupling", "NAME[:K]",
      "of hand and world: direct, proxy or auto (default), which takes the proxy for\n"
      "more than the device holds; K: what it holds, N/m (default: its own figures)",
@@ -379,6 +385,22 @@ static hap_status join_coupling(run_options *o, hap_detail *detail)
   return HAP_OK;
 }
 
+/* --friction and the effect "friction" are two names of one thing. */
+static hap_status join_friction(run_options *o, hap_detail *detail)
+{
+  run_effect_wish *wish = run_effects_wish(&o->effects, "friction");
+  bool given = o->rig.friction > 0.0;
+  if (*wish == RUN_EFFECT_OFF && given) {
+    return fail(detail, "--friction: --effects asks for something else by friction=off");
+  }
+  if (*wish == RUN_EFFECT_ON && !given) {
+    return fail(detail, "--effects: friction=on needs to know how much: --friction MU");
+  }
+  o->rig.friction = *wish == RUN_EFFECT_OFF ? 0.0 : o->rig.friction;
+  *wish = given ? RUN_EFFECT_ON : *wish;
+  return HAP_OK;
+}
+
 static bool same(const char *a, const char *b)
 {
   return a != NULL && b != NULL && strcmp(a, b) == 0;
@@ -463,7 +485,7 @@ static hap_status check(run_options *o, hap_detail *detail)
                 o->rig.device_count);
   }
   if (check_recording(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
-      join_coupling(o, detail) < HAP_OK) {
+      join_coupling(o, detail) < HAP_OK || join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {

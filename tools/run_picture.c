@@ -40,6 +40,7 @@ struct run_picture {
   size_t pointers;
   bool has_body;
   double start[HAP_TRACE_POINTERS_MAX][3]; /* m, where the pointers were first */
+  double body_start[3];                    /* likewise */
   bin *bins;
   sample *samples;
   size_t rows;
@@ -100,6 +101,9 @@ static void note_start(run_picture *picture, const hap_trace_row *row)
     for (int k = 0; k < 3; ++k) {
       picture->start[i][k] = row->pointers[i].position[k];
     }
+  }
+  for (int k = 0; k < 3 && row->body_count > 0; ++k) {
+    picture->body_start[k] = row->body_position[0][k];
   }
 }
 
@@ -235,6 +239,13 @@ static void draw_position(const run_picture *picture, FILE *script)
     for (size_t i = 0; i < picture->pointers; ++i) {
       fprintf(script, "%s using 1:%zu with lines lt %zu title 'hand %zu'",
               i == 0 ? "plot $run" : ", ''", 6 + 5 * i, 1 + i % 6, i);
+    }
+    if (picture->has_body) {
+      const double *at = picture->body_start;
+      fprintf(script,
+              ", '' using 1:(sqrt(($%zu-(%.6g))**2+($%zu-(%.6g))**2+($%zu-(%.6g))**2)) with lines "
+              "lc rgb '#606060' dashtype 2 title 'first body'",
+              first + 3, 1e3 * at[0], first + 4, 1e3 * at[1], first + 5, 1e3 * at[2]);
     }
     fputc('\n', script);
     return;

@@ -12,6 +12,7 @@
 #include <ode/ode.h>
 
 #include <hapode/attributes.h>
+#include <hapode/pointer.h>
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/status.h>
@@ -31,13 +32,20 @@ typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParamet
  * dContactFDir1. The part across each contact's normal is used. False: ODE's own direction. */
 typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_direction[3]);
 
+/* [physics] What friction a pointer has against a geom: *io_mu arrives with hap_pointer_def.friction. Called
+ * once a step for each geom near the pointer, after it and never in testing simulations. 0: none; above
+ * 10 is taken for 10 (84 degrees). A number that is not finite or below 0 is HAP_FAULT_WORLD, and no
+ * friction. What changes is felt from the next step on: more of it holds, less of it slides. */
+typedef void (*hap_pointer_surface_fn)(void *user, hap_pointer_id pointer, dGeomID geom,
+                                       double *io_mu);
+
 /* [physics] Forces in (before) and results out (after) of a global step of step_s seconds; never
  * called for testing simulations. */
 typedef void (*hap_step_fn)(void *user, double step_s);
 
 /* The application's world. From start to stop it is touched only under hap_session_lock, in a
- * posted edit, in before_step, or in after_step. The other callbacks (surface, friction_direction, ODE's
- * moved callbacks) come while lists of the world are in use: they read it, and what they want changed they
+ * posted edit, in before_step, or in after_step. The other callbacks (surface, friction_direction,
+ * pointer_surface, ODE's moved callbacks) come while lists of the world are in use: they read it, and what they want changed they
  * post. docs/editing.md has more.
  *
  * What the session sets on bodies from start to stop, and gives back then: flag, idle time and angular
@@ -62,18 +70,20 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * to 1e9 m (in the loop 1e6), speeds 1e8 m/s and 1e7 rad/s, forces and torques 1e12, gravity 1e6 m/s^2,
  * ERP 0 .. 10, CFM 0 .. 1e12, dampings at most 1, joint parameters 1e12 (ODE does not show the motors
  * of a Plane2D joint: those are not looked at); no NaN in geoms. A surface with such a number, or with
- * a friction, softness or slip below 0, is a fault as well, and no contact. */
+ * a friction, softness or slip below 0, is a fault as well, and no contact; a pointer's friction that is
+ * none, and no friction. */
 typedef struct hap_ode_def {
-  uint32_t size;                       /* set by hap_ode_def_init */
-  uint32_t cookie;                     /* set by hap_ode_def_init */
-  dWorldID world;                      /* borrowed; one session per world */
-  dSpaceID space;                      /* borrowed */
-  hap_surface_fn surface;              /* NULL: every pair collides with mu = infinity */
-  hap_step_fn before_step;             /* may be NULL */
-  hap_step_fn after_step;              /* may be NULL */
-  void *user;                          /* handed to all of them */
-  int32_t max_contacts_per_pair;       /* 1..64, default 8; the loop keeps at most 4 */
-  hap_direction_fn friction_direction; /* may be NULL */
+  uint32_t size;                          /* set by hap_ode_def_init */
+  uint32_t cookie;                        /* set by hap_ode_def_init */
+  dWorldID world;                         /* borrowed; one session per world */
+  dSpaceID space;                         /* borrowed */
+  hap_surface_fn surface;                 /* NULL: every pair collides with mu = infinity */
+  hap_step_fn before_step;                /* may be NULL */
+  hap_step_fn after_step;                 /* may be NULL */
+  void *user;                             /* handed to all of them */
+  int32_t max_contacts_per_pair;          /* 1..64, default 8; the loop keeps at most 4 */
+  hap_direction_fn friction_direction;    /* may be NULL */
+  hap_pointer_surface_fn pointer_surface; /* NULL: the pointer's own friction against everything */
 } hap_ode_def;
 
 /* [any] */

@@ -69,7 +69,8 @@ typedef struct hap_pointer_def {
   double mass;        /* kg, 0..1e6, default 0: of the coupling's proxy */
   double stiffness;   /* N/m, 0..1e9, default 1000: k of eq. 7 */
   double damping;     /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact */
-  double friction;    /* reserved; must be 0 in this version */
+  double friction;    /* 0..10, default 0: Coulomb friction against what it touches, sticking and
+                         sliding; hap_ode_def.pointer_surface says another one for a geom */
   const double *hull_xyz;     /* reserved for 6-DoF tools; must be NULL in this version */
   size_t hull_points;         /* must be 0 in this version */
   hap_pose pose_world_device; /* pose of the device's frame in the world, default identity */
@@ -94,6 +95,13 @@ typedef struct hap_pointer_def {
   double max_slew; /* N/s at the device, >= 0: fastest change of the force, also on the way to zero
                       after a fault, which takes 100 ms at most; the torque's is in the same
                       proportion to its limit. 0 (default): the whole force in 2 ms */
+  double
+      finger_radius; /* m, 0..100, default 0: off. Of a soft finger, which holds what it touches against
+                           turning about the contact's normal by up to friction x normal force x this
+                           radius: 2/3 of that of a patch with even pressure. Sliding and turning share
+                           one limit (docs/numerics.md). Needs friction. A pointer whose device has 3
+                           degrees of freedom does not turn itself; others turn with the device, whose
+                           torque is about the pointer's centre. */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */

@@ -45,6 +45,9 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->radius = def->radius;
   p->stiffness = def->stiffness;
   p->damping = def->damping;
+  p->friction = def->friction;
+  p->finger_radius = def->finger_radius;
+  p->turns = !slot->has_device || info->dof == 6;
   p->motion_scale = def->motion_scale;
   p->force_scale = def->force_scale;
   p->pose_world_device = def->pose_world_device;

@@ -4,10 +4,11 @@
 
 #include "base/alloc.h"
 
-#define ROWS_PER_CONTACT 3u   /* and one for a pointer's */
-#define DIRECT_ROWS 1024u     /* of an island: what it costs is bounded by the updates */
-#define SOLVER_TOLERANCE 1e-7 /* m/s */
-#define SOLVER_UPDATES 20000u /* row updates a solve, rarely needed: about 240 us */
+#define ROWS_PER_CONTACT 3u
+#define ROWS_PER_POINTER_CONTACT 4u /* with friction of a soft finger */
+#define DIRECT_ROWS 1024u           /* of an island: what it costs is bounded by the updates */
+#define SOLVER_TOLERANCE 1e-7       /* m/s */
+#define SOLVER_UPDATES 20000u       /* row updates a solve, rarely needed: about 240 us */
 
 static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
 {
@@ -15,7 +16,8 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   while (world->bucket_count < 2 * c->contacts) {
     world->bucket_count *= 2;
   }
-  world->row_capacity = (ROWS_PER_CONTACT + 1) * c->contacts + HAPI_JOINT_ROWS * c->joints;
+  world->row_capacity =
+      (ROWS_PER_CONTACT + ROWS_PER_POINTER_CONTACT) * c->contacts + HAPI_JOINT_ROWS * c->joints;
   world->joints = hapi_alloc_array(c->joints, sizeof *world->joints);
   world->joint_memory = hapi_alloc_array(c->joints, sizeof *world->joint_memory);
   world->memory = hapi_alloc_array(c->contacts, sizeof *world->memory);
@@ -59,10 +61,11 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   tick->contacts = hapi_alloc_array(c->contacts, sizeof *tick->contacts);
   tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
   tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
+  tick->frictions = hapi_alloc_array(c->contacts, sizeof *tick->frictions);
   tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
   return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
-         tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL &&
-         allocate_world(&tick->world, c);
+         tick->ramps != NULL && tick->ramp_generations != NULL && tick->frictions != NULL &&
+         tick->pointers != NULL && allocate_world(&tick->world, c);
 }
 
 void hapi_tick_memory_destroy(hapi_tick *tick)
@@ -72,6 +75,7 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
   hapi_free(tick->contacts);
   hapi_free(tick->ramps);
   hapi_free(tick->ramp_generations);
+  hapi_free(tick->frictions);
   hapi_free(tick->pointers);
   free_world(&tick->world);
 }

@@ -61,6 +61,14 @@ static double perturbation(hapi_physics *physics, const hapi_contact_slot *conta
   return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
 }
 
+#define TORSION 3 /* the axis after x, y and z: a torque about the normal, for soft fingers */
+
+static bool has_axis(const hapi_physics *physics, const hapi_contact_slot *contact, int axis)
+{
+  return axis != TORSION || (physics->model == HAP_MODEL_ACCELERANCE && contact->mu > 0.0 &&
+                             contact->finger_radius > 0.0);
+}
+
 /* One column of eq. 5 and 6 for each contact of the round. */
 static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, int axis)
 {
@@ -69,8 +77,23 @@ static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, in
   double acceleration[6];
   acceleration_since_snapshot(physics, body->known, acceleration);
   for (int i = 0; i < 6; ++i) {
-    contact->measured[i][axis] = (acceleration[i] - body->b[i]) / force;
+    double change = acceleration[i] - body->b[i];
+    if (axis == TORSION) {
+      contact->measured_turn[i] = change / (force * contact->finger_radius);
+    } else {
+      contact->measured[i][axis] = change / force;
+    }
   }
+}
+
+/* As large as the force at the finger's radius. */
+static void twist(hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  dBodyID body = physics->table.entries[body_of(physics, contact)->known].body;
+  double torque[3];
+  hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, torque);
+  hapi_v3_scale(perturbation(physics, contact) * contact->finger_radius, torque, torque);
+  dBodyAddTorque(body, torque[0], torque[1], torque[2]);
 }
 
 static void push(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
@@ -102,6 +125,22 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
   out->inverse_mass = 1.0 / mass.mass;
 }
 
+/* Within 0 and what it is of the free body: about the normal, the direction that is used. What only a
+ * contact makes of a torque is left as it is measured. */
+static void keep_turn(hapi_contact_slot *contact, const hapi_free_body *free,
+                      const double normal[3])
+{
+  double of_free[3];
+  hapi_m3_apply(free->inverse_inertia, normal, of_free);
+  double most = hapi_v3_dot(normal, of_free);
+  double turn = hapi_v3_dot(normal, contact->measured_turn + 3);
+  double kept = fmin(fmax(turn, 0.0), most);
+  if (hapi_finite(contact->measured_turn, 6)) {
+    memcpy(contact->turn, contact->measured_turn, sizeof contact->turn);
+    hapi_v3_madd(contact->turn + 3, kept - turn, normal, contact->turn + 3);
+  }
+}
+
 /* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that does
  * not give way. */
 static void keep(hapi_physics *physics, hapi_contact_slot *contact)
@@ -118,6 +157,9 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
     hapi_quat_rotate(tested->quat, contact->point_body, arm);
     hapi_quat_rotate(tested->quat, contact->normal_body, normal);
     kind = hapi_admittance_tidy_point(&free, arm, normal, contact->measured);
+    if (has_axis(physics, contact, TORSION)) {
+      keep_turn(contact, &free, normal);
+    }
   }
   stats->probes_singular += kind == HAPI_ADMITTANCE_SINGULAR;
   stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
@@ -127,22 +169,46 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
   }
 }
 
-/* Three probes for the contacts of one round. */
-static void measure_round(hapi_physics *physics, uint32_t round)
+static bool any_has_axis(const hapi_physics *physics, uint32_t round, int axis)
 {
   const hapi_test_set *test = &physics->test;
-  for (int axis = 0; axis < 3; ++axis) {
-    hapi_test_rewind(physics);
-    for (uint32_t i = 0; i < test->contact_count; ++i) {
-      const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
-      if (contact->round == round) {
+  bool any = false;
+  for (uint32_t i = 0; i < test->contact_count; ++i) {
+    const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+    any = any || (contact->round == round && has_axis(physics, contact, axis));
+  }
+  return any;
+}
+
+static void perturb(hapi_physics *physics, uint32_t round, int axis)
+{
+  const hapi_test_set *test = &physics->test;
+  hapi_test_rewind(physics);
+  for (uint32_t i = 0; i < test->contact_count; ++i) {
+    const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+    if (contact->round == round && has_axis(physics, contact, axis)) {
+      if (axis == TORSION) {
+        twist(physics, contact);
+      } else {
         push(physics, contact, axis);
       }
     }
+  }
+}
+
+/* Three probes for the contacts of one round, and a fourth one for soft fingers. */
+static void measure_round(hapi_physics *physics, uint32_t round)
+{
+  const hapi_test_set *test = &physics->test;
+  for (int axis = 0; axis <= TORSION; ++axis) {
+    if (!any_has_axis(physics, round, axis)) {
+      continue;
+    }
+    perturb(physics, round, axis);
     hapi_test_step(physics);
     for (uint32_t i = 0; i < test->contact_count; ++i) {
       hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
-      if (contact->round == round) {
+      if (contact->round == round && has_axis(physics, contact, axis)) {
         measure_column(physics, contact, axis);
       }
     }

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -163,6 +164,27 @@ static void place_shape(dGeomID geom, hapi_contact_slot *slot)
   }
 }
 
+#define FRICTION_MOST 10.0 /* as between bodies */
+
+/* What the application says of the pair. */
+static double friction_of(hapi_physics *physics, const hapi_hit *hit,
+                          const hapi_state_pointer *pointer)
+{
+  double mu = pointer->friction;
+  if (physics->ode.pointer_surface == NULL) {
+    return mu;
+  }
+  hap_pointer_id id = {((uint64_t)pointer->generation << 32) | (hit->pointer + 1)};
+  physics->ode.pointer_surface(physics->ode.user, id, hit->geom, &mu);
+  if (!(mu >= 0.0 && mu <= DBL_MAX)) { /* NaN too */
+    physics->config.report(physics->config.user, HAP_FAULT_WORLD,
+                           "the pointer_surface callback gave a friction that is not finite or "
+                           "below 0: the pointer slides on the geom without any");
+    return 0.0;
+  }
+  return fmin(mu, FRICTION_MOST);
+}
+
 static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
@@ -186,6 +208,7 @@ static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
   slot->placed = true;
   slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
   slot->stiffness = pointer->stiffness;
+  slot->finger_radius = pointer->finger_radius;
 }
 
 static uint32_t known_of(const hapi_physics *physics, const hapi_hit *hit)
@@ -257,6 +280,7 @@ static void take_hit(hapi_physics *physics, const hapi_hit *hit)
   }
   contact->wanted = true;
   place_contact(contact, hit, pointer);
+  contact->mu = friction_of(physics, hit, pointer);
   if (body != NULL) {
     take_body(&physics->bodies[slot], body);
   }

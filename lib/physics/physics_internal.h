@@ -281,9 +281,13 @@ typedef struct hapi_contact_slot {
   double distance;       /* m, then */
   double speed;          /* m/s, pointer against body */
   double stiffness;      /* N/m, the pointer's */
+  double mu;             /* of the pair, as the application says */
+  double finger_radius;  /* m, the pointer's; 0: no torsion */
   double last_force[3];  /* on the body, newest message */
   double a[6][3];
+  double turn[6];        /* the same of a torque about the normal */
   double measured[6][3]; /* scratch: a of this cycle's probes, before it is known to be good */
+  double measured_turn[6];
 } hapi_contact_slot;
 
 /* ---- cover.c ---- */

@@ -111,6 +111,8 @@ static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_mod
   hapi_v3_copy(slot->point_body, out->point_body);
   hapi_v3_copy(slot->normal_body, out->normal_body);
   memcpy(out->a, slot->a, sizeof out->a);
+  memcpy(out->turn, slot->turn, sizeof out->turn);
+  out->mu = slot->mu;
   out->has_shape = slot->has_shape;
   out->shape = slot->shape;
   out->shape_pose = slot->shape_pose;

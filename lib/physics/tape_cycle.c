@@ -209,6 +209,8 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, c[i].point_body, 3);
     hash = hapi_hash_doubles(hash, c[i].normal_body, 3);
     hash = hapi_hash_doubles(hash, c[i].a[0], 18);
+    hash = hapi_hash_doubles(hash, c[i].turn, 6);
+    hash = hapi_hash_doubles(hash, &c[i].mu, 1);
   }
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     const hapi_model_joint *joint = &hapi_model_joints(model)[i];

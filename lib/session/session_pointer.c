@@ -46,6 +46,8 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
       {between(d->mass, 0.0, 1e6), "mass is not in 0 .. 1e6 kg"},
       {between(d->stiffness, 0.0, 1e9), "stiffness is not in 0 .. 1e9 N/m"},
       {between(d->damping, 0.0, 1e6), "damping is not in 0 .. 1e6 N s/m"},
+      {between(d->friction, 0.0, 10.0), "friction is not in 0 .. 10"},
+      {between(d->finger_radius, 0.0, 100.0), "finger_radius is not in 0 .. 100 m"},
       {between(d->motion_scale, 1e-6, 1e6), "motion_scale is not in 1e-6 .. 1e6"},
       {between(d->force_scale, 0.0, 1e6), "force_scale is not in 0 .. 1e6"},
       {between(d->max_force, 1e-6, 1e6), "max_force is not in 1e-6 .. 1e6 N"},
@@ -76,9 +78,8 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
 
 hap_status hapi_session_check_pointer(const hap_pointer_def *d, hap_detail *detail)
 {
-  if (d->friction != 0.0 || d->hull_xyz != NULL || d->hull_points != 0) {
-    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "this version has sphere pointers without friction");
+  if (d->hull_xyz != NULL || d->hull_points != 0) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "this version has sphere pointers");
   }
   return check_numbers(d, detail);
 }

@@ -89,6 +89,8 @@ typedef struct hapi_model_contact {
   double point_body[3];  /* contact point, body frame (world frame for the static world) */
   double normal_body[3]; /* unit, out of the body */
   double a[6][3];        /* accelerance of eq. 6: force at the contact point, world axes */
+  double turn[6];        /* the same of a torque about the normal: soft finger, model ACCELERANCE */
+  double mu;             /* friction of the pointer against the body; 0: none */
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
 } hapi_model_contact;
@@ -403,6 +405,8 @@ typedef struct hapi_state_pointer {
   uint32_t collide_bits;
   double radius;
   double stiffness;
+  double friction;
+  double finger_radius;
   hap_pose pose;
   hap_twist twist;
 } hapi_state_pointer;

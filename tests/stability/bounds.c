@@ -190,7 +190,12 @@ static double spring_energy(const bounds *b)
   double sum = 0.0;
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *c = &tick->contacts[i];
-    sum += 0.5 * hapi_v3_dot(c->force, c->force) / tick->pointers[c->pointer].stiffness;
+    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    sum += 0.5 * hapi_v3_dot(c->force, c->force) / p->stiffness;
+    if (p->finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
+      double turn = tick->frictions[c->slot].stretch[3];
+      sum += 0.5 * p->stiffness * turn * turn;
+    }
   }
   for (int i = 0; i < b->w->hand_count; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];

@@ -32,6 +32,8 @@ typedef struct case_row {
   double coupling_stiffness; /* N/m, of a proxy; its damping is 0 then */
   double given;              /* J, that the world has at its start without having been given it */
   double depth;              /* m, of penetration at the start */
+  double mu;                 /* of the hands, 0 */
+  double finger;             /* m, radius of soft fingers, 0 */
   double gain;               /* of the largest stored energy, 0.01 */
   bool late;                 /* ODE moves what is touched: bodies answer an interval later */
 } case_row;

@@ -132,7 +132,7 @@ static bool open_session(world *w)
 
 static bool open_hand(world *w, const case_row *row, int index)
 {
-  char spec[512];
+  char spec[640];
   bool rigid = row->hand == RIGID;
   (void)snprintf(spec, sizeof spec, "virtual:hand=%s,max_force=%g,device_damping=%g,%s%s%s%s",
                  hand_words[row->hand], w->max_force, w->device_damping,
@@ -154,6 +154,8 @@ static void take_parameters(world *w, const case_row *row, hap_model model)
   w->device_damping = row->device_damping > 0.0 ? row->device_damping : w->device_damping;
   w->max_force = row->max_force > 0.0 ? row->max_force : w->max_force;
   w->pointer.stiffness = row->k;
+  w->pointer.friction = row->mu;
+  w->pointer.finger_radius = row->finger;
   w->pointer.max_force = 1e6; /* the device's limit is the one that counts */
   dWorldSetCFM(w->world, row->cfm < 0.0 ? 0.0 : row->cfm > 0.0 ? row->cfm : 1e-12);
   if (row->coupling_stiffness > 0.0 && model == HAP_MODEL_CONTACT) {

@@ -36,7 +36,7 @@ typedef struct world {
   dSurfaceParameters surface;
   hap_session_def def;
   hap_pointer_def pointer;
-  char motions[WORLD_HANDS_MAX][192]; /* arguments of the virtual device */
+  char motions[WORLD_HANDS_MAX][320]; /* arguments of the virtual device */
   int hand_count;
   double device_damping; /* N s/m */
   double max_force;      /* N, of the device */
@@ -90,5 +90,10 @@ void build_squeeze(world *w, const struct case_row *row);   /* between two hands
 void build_fixed(world *w, const struct case_row *row);     /* a fixed joint to the world */
 void build_asleep(world *w, const struct case_row *row);
 void build_impacts(world *w, const struct case_row *row); /* n balls, one after the other */
+void build_rub(world *w, const struct case_row *row); /* n cubes on each other, across the top */
+void build_rub_sliding(world *w, const struct case_row *row); /* the floor has mu = 0 */
+void build_rub_ball(world *w, const struct case_row *row);    /* rolled along the floor */
+void build_rub_top(world *w, const struct case_row *row);     /* size: rad/s */
+void build_pinch(world *w, const struct case_row *row);       /* lifted between two hands */
 
 #endif

@@ -160,6 +160,8 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->point_body, in->point_body, sizeof out->point_body);
   memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
   memcpy(out->a, in->a, sizeof out->a);
+  memcpy(out->turn, in->turn, sizeof out->turn);
+  out->mu = in->mu;
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
   out->shape_pose = in->shape_pose;

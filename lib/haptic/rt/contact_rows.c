@@ -205,6 +205,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   uint32_t at = world->solver.row_count++;
   hapi_row *row = &world->solver.rows[at];
   hapi_row_source *source = &world->sources[at];
+  row->ball = row->round = 0;
   hapi_row_column(c->a, c->arm_a, direction, 1.0, row->ja, row->ba);
   hapi_row_column(c->b, c->arm_b, direction, -1.0, row->jb, row->bb);
   row->a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;

@@ -64,7 +64,7 @@ static void join_triple(hapi_solver *solver, uint32_t last)
     return;
   }
   hapi_row *r = &solver->rows[normal];
-  r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal &&
+  r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal && r[1].ball == 0 &&
               r[1].inverse != 0.0 && r[2].inverse != 0.0;
   if (r->triple) {
     r[1].coupling[0] = couple(&r[1], &r[0]);
@@ -172,12 +172,85 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
   return largest;
 }
 
+double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
+                        bool *out_slides)
+{
+  double norm2 = 0.0;
+  double d = 0.0;
+  double largest = 0.0;
+  for (int i = 0; i < first->ball; ++i) {
+    out[i] = first[i].impulse + errors[i] * first[i].inverse;
+    norm2 += out[i] * out[i];
+    d = fmax(d, first[i].inverse != 0.0 ? first[i].response : 0.0);
+  }
+  *out_slides = norm2 > radius * radius;
+  if (*out_slides) { /* one step for all, or the direction would be that of the easiest row */
+    norm2 = 0.0;
+    for (int i = 0; i < first->ball; ++i) {
+      out[i] = first[i].inverse != 0.0 ? first[i].impulse + errors[i] / d : 0.0;
+      norm2 += out[i] * out[i];
+    }
+    double share = norm2 > radius * radius ? radius / sqrt(norm2) : 1.0;
+    for (int i = 0; i < first->ball; ++i) {
+      out[i] *= share;
+    }
+  }
+  for (int i = 0; i < first->ball; ++i) {
+    double response = *out_slides ? d : first[i].response;
+    largest = fmax(largest, fabs(out[i] - first[i].impulse) * response);
+  }
+  return largest;
+}
+
+static void set_ball(hapi_solver *solver, hapi_row *first, const double impulses[3])
+{
+  for (int i = 0; i < first->ball; ++i) {
+    if (impulses[i] != first[i].impulse) {
+      hapi_row_push(solver, &first[i], impulses[i] - first[i].impulse);
+      first[i].impulse = impulses[i];
+    }
+  }
+}
+
+/* First as if it stuck, row by row. */
+double hapi_ball_update(hapi_solver *solver, hapi_row *first)
+{
+  double radius = hapi_ball_radius(solver->rows, first);
+  double old[3] = {0.0};
+  double errors[3] = {0.0};
+  double wanted[3] = {0.0};
+  double norm2 = 0.0;
+  double largest = 0.0;
+  bool slides = false;
+  for (int i = 0; i < first->ball; ++i) {
+    hapi_row *row = &first[i];
+    old[i] = row->impulse;
+    errors[i] = row->inverse != 0.0 ? hapi_row_error(solver, row) : 0.0;
+  }
+  for (int i = 0; i < first->ball && radius > 0.0; ++i) {
+    hapi_row *row = &first[i];
+    double error = row->inverse != 0.0 ? hapi_row_error(solver, row) : 0.0;
+    hapi_row_push(solver, row, error * row->inverse);
+    norm2 += row->impulse * row->impulse;
+    largest = fmax(largest, fabs(error));
+  }
+  if (radius > 0.0 && norm2 <= radius * radius) {
+    return largest;
+  }
+  set_ball(solver, first, old);
+  largest = hapi_ball_wanted(first, radius, errors, wanted, &slides);
+  set_ball(solver, first, wanted);
+  return largest;
+}
+
 static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, double largest)
 {
   for (uint32_t i = first; i < end; ++i) {
     hapi_row *row = &solver->rows[i];
-    double correction = row->triple ? update_triple(solver, row) : update(solver, row);
-    i += row->triple ? 2 : 0;
+    double correction = row->triple     ? update_triple(solver, row)
+                        : row->ball > 0 ? hapi_ball_update(solver, row)
+                                        : update(solver, row);
+    i += row->triple ? 2 : row->ball > 0 ? row->ball - 1u : 0;
     largest = correction > largest ? correction : largest;
   }
   return largest;

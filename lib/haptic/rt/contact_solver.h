@@ -3,7 +3,7 @@
 #ifndef HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
 #define HAPODE_HAPTIC_RT_CONTACT_SOLVER_H
 
-/* Impulses of contacts, by ODE's friction pyramid: the box LCP on the level of velocities.
+/* Impulses of contacts, by ODE's friction pyramid or within a ball: the box LCP on the level of velocities.
  *
  *   w = ja.v[a] + jb.v[b],   v = free velocity + sum over rows of (ba, bb) impulse
  *   lo < impulse < hi:  w + softness impulse = target
@@ -35,17 +35,21 @@ typedef struct hapi_row {
   double impulse;  /* N s; in: warm start, out: result */
   double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
   double response; /* inner: 1 / inverse */
-  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact */
+  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
+                         ball that slides: [0] its part of the force's direction */
   double drive;       /* inner: target without the part of a partner that does not respond */
   int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
                       the bounds are lo .. hi */
   uint32_t a;         /* index into v */
   uint32_t b;         /* several static partners may share one index, whose v stays as it is */
   uint32_t next;      /* inner: of the same island */
-  uint8_t triple;     /* inner: a normal whose two frictions come next, all of use */
-  uint8_t moves_a;    /* inner: a responds */
-  uint8_t paired;     /* inner: b responds */
-  uint8_t state;      /* inner, of direct_solver.c */
+  uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
+                      vector, no longer than mu p: how many; 0: the pyramid */
+  uint8_t round;  /* of the others: how many of them come before */
+  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
+  uint8_t moves_a; /* inner: a responds */
+  uint8_t paired;  /* inner: b responds */
+  uint8_t state;   /* inner, of direct_solver.c */
 } hapi_row;
 
 typedef struct hapi_solver {
@@ -100,6 +104,21 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index);
 /* A few sweeps more, two at least. */
 void hapi_solver_sweep_on(hapi_solver *solver);
 
+/* The radius of a ball of frictions [N s]. */
+static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
+{
+  double p = rows[first->normal].impulse;
+  return p > 0.0 ? first->mu * p : 0.0;
+}
+
+/* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out of it,
+ * where the friction slides against the motion; returns the correction, m/s. */
+double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
+                        bool *out_slides);
+
+/* One update of the ball that begins with the row; returns the correction, m/s. */
+double hapi_ball_update(hapi_solver *solver, hapi_row *first);
+
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
  * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
@@ -126,6 +145,16 @@ static inline double hapi_clamp(double x, double lo, double hi)
   return y < hi ? y : hi;
 }
 
+/* N s, what the frictions before it leave of the ball's radius */
+static inline double hapi_row_left(const hapi_row *row, double radius)
+{
+  double left = radius * radius;
+  for (int i = 1; i <= row->round; ++i) {
+    left -= row[-i].impulse * row[-i].impulse;
+  }
+  return left > 0.0 ? sqrt(left) : 0.0;
+}
+
 static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, double *out_lo,
                                    double *out_hi)
 {
@@ -134,6 +163,7 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   if (row->normal >= 0) {
     double p = rows[row->normal].impulse;
     *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+    *out_hi = row->round > 0 ? hapi_row_left(row, *out_hi) : *out_hi;
     *out_lo = -*out_hi;
   }
 }

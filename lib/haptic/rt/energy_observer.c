@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include "base/vec.h"
+#include "haptic/rt/pointer_friction.h"
 #include "haptic/rt/rows.h"
 
 /* The ledger of what the hands may get back. It gains what a hand puts in, and what the world loses;
@@ -29,7 +30,7 @@
  * nothing is touched the ledger stands still, and a surplus is forgotten: it must not pay for what a
  * later touch makes of nothing.
  *
- * Torques are left out: they are zero for a ball without friction. */
+ * Torques are left out: those of friction on a device that has some are small beside its forces' work. */
 
 #define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
 #define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
@@ -115,14 +116,16 @@ static double bodies_lose(const hapi_tick *tick, double *io_stored)
   return sum;
 }
 
-/* J that a force at a point does on a body in this tick: with the mean of its velocities. */
-static double work_on(const hapi_tick *tick, const hapi_local_body *body, const double point[3],
-                      const double force[3])
+/* J that a contact does on a body in this tick: with the mean of its velocities. */
+static double work_on(const hapi_tick *tick, const hapi_local_body *body,
+                      const hapi_local_contact *c)
 {
+  const double *force = c->force;
   double arm[3];
   double moment[3];
-  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_sub(c->point_now, body->pose.position, arm);
   hapi_v3_cross(arm, force, moment);
+  hapi_v3_add(moment, c->couple, moment);
   double after = hapi_v3_dot(force, body->twist.linear) + hapi_v3_dot(moment, body->twist.angular);
   double before =
       hapi_v3_dot(force, body->start_twist) + hapi_v3_dot(moment, body->start_twist + 3);
@@ -165,7 +168,7 @@ static double surfaces_give(const hapi_tick *tick, double *io_stored)
     }
     *io_stored += half_compliance(&tick->pointers[c->pointer]) * force2;
     if (body != NULL && !is_owned(tick, body)) {
-      sum -= work_on(tick, body, c->point_now, c->force);
+      sum -= work_on(tick, body, c);
     }
   }
   return sum;
@@ -208,14 +211,18 @@ static double ramps_give(hapi_tick *tick)
     hapi_ramp *r = &c->ramp;
     double share = r->share * p->guard.felt;
     double energy = spring_energy(p, share, r->depth - r->excess);
+    double rubs = c->mu > 0.0 ? hapi_friction_energy(tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
       sum += energy - spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+      sum +=
+          (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
       r->felt_share = share;
       r->felt_excess = r->excess;
+      r->felt = p->guard.felt;
     }
-    r->sprung = energy;
-    guard->sprung += energy;
+    r->sprung = energy + p->guard.felt * rubs;
+    guard->sprung += r->sprung;
   }
   return sum - gone;
 }
@@ -333,7 +340,8 @@ static void forget(hapi_tick *tick)
     tick->pointers[i].guard.placed = false;
   }
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    tick->contacts[i].ramp.felt_share = tick->contacts[i].ramp.sprung = 0.0;
+    hapi_ramp *r = &tick->contacts[i].ramp;
+    r->felt_share = r->felt = r->sprung = 0.0;
   }
 }
 

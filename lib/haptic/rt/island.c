@@ -92,6 +92,56 @@ static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool
   is->used_rows += row->state != HAPI_ROW_FIXED;
 }
 
+/* What a row of a ball that slides has more of softness: across the force F it goes with the slip e, as
+ * the two are parallel, e_t = (|e| / F) F_t. */
+static double slip_softness(const hapi_island *is, const hapi_row *row, uint32_t index)
+{
+  return 1.0 / is->gain[index] - row->softness - SOFTENING * row->response;
+}
+
+static void slide_ball(hapi_island *is, uint32_t first, double radius, const double wanted[3])
+{
+  hapi_row *row = &is->solver->rows[first];
+  double slip = 0.0;
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    row[i].coupling[0] = wanted[i] / radius;
+    slip += is->error[first + i] * row[i].coupling[0];
+  }
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    row[i].state = HAPI_ROW_SLIDING;
+    is->gain[first + i] =
+        1.0 / (fmax(slip, 0.0) / radius + row[i].softness + SOFTENING * row[i].response);
+  }
+}
+
+/* The states of frictions that are one vector: free, or along the force and as large as the normal lets
+ * it, while they turn with the slip. */
+static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
+{
+  hapi_row *row = &is->solver->rows[first];
+  double radius = hapi_ball_radius(is->solver->rows, row);
+  double wanted[3];
+  double norm2 = 0.0;
+  bool slides;
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    is->error[first + i] = row[i].inverse != 0.0 ? hapi_row_error(is->solver, &row[i]) : 0.0;
+    norm2 += row[i].impulse * row[i].impulse;
+    row[i].state = HAPI_ROW_FIXED;
+  }
+  double due = hapi_ball_wanted(row, radius, is->error + first, wanted, &slides);
+  bool inside = !slides || norm2 < (1.0 - 1e-9) * radius * radius;
+  for (uint32_t i = 0; i < row->ball && radius > 0.0 && (inside || sticking); ++i) {
+    row[i].state = HAPI_ROW_FREE;
+    is->gain[first + i] = 1.0 / (row[i].softness + SOFTENING * row[i].response);
+    ++is->free_rows;
+  }
+  if (radius > 0.0 && row->state == HAPI_ROW_FIXED) {
+    slide_ball(is, first, radius, wanted);
+  }
+  is->used_rows += row->state != HAPI_ROW_FIXED ? row->ball : 0;
+  return due;
+}
+
 double hapi_island_inspect(hapi_island *is, bool sticking)
 {
   const hapi_solver *solver = is->solver;
@@ -103,6 +153,11 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     const hapi_row *row = &solver->rows[i];
     double lo;
     double hi;
+    if (row->ball > 0 || row->round > 0) {
+      double due = row->ball > 0 ? inspect_ball(is, i, sticking) : 0.0;
+      largest = due <= largest ? largest : due;
+      continue;
+    }
     hapi_row_bounds(solver->rows, row, &lo, &hi);
     double p = row->impulse;
     is->error[i] = hapi_row_error(solver, row);
@@ -120,6 +175,45 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
 static const hapi_row *source(const hapi_island *is, const hapi_row *row)
 {
   return row->state == HAPI_ROW_TIED ? &is->solver->rows[row->normal] : row;
+}
+
+/* Rows whose errors drive a row's impulse, and how much; of a ball that slides its normal, and its rows
+ * across the force. */
+typedef struct drive {
+  const hapi_row *from;
+  double gain;
+  double error;
+} drive;
+
+#define DRIVES 4
+
+static int drives_of(const hapi_island *is, uint32_t index, drive out[DRIVES])
+{
+  const hapi_row *rows = is->solver->rows;
+  const hapi_row *row = &rows[index];
+  if (row->state != HAPI_ROW_SLIDING) {
+    const hapi_row *from = source(is, row);
+    out[0] = (drive){from, is->gain[index], is->error[from - rows]};
+    return 1;
+  }
+  const hapi_row *first = row - row->round;
+  uint32_t at = index - row->round;
+  int32_t normal = row->normal;
+  double along = 0.0;
+  bool free = rows[normal].state == HAPI_ROW_FREE;
+  double share = free ? row->mu * row->coupling[0] * is->gain[normal] : 0.0;
+  out[0] = (drive){&rows[normal], share, is->error[normal]};
+  for (int i = 0; i < first->ball; ++i) {
+    along += first[i].impulse * first[i].coupling[0];
+  }
+  for (int i = 0; i < first->ball; ++i) {
+    double across = first[i].impulse - along * first[i].coupling[0];
+    double part = (&first[i] == row ? 1.0 : 0.0) - row->coupling[0] * first[i].coupling[0];
+    double slip = slip_softness(is, &first[i], at + (uint32_t)i);
+    out[1 + i] =
+        (drive){&first[i], part * is->gain[index], is->error[at + (uint32_t)i] - slip * across};
+  }
+  return 1 + first->ball;
 }
 
 /* ---- structure of the matrix ---- */
@@ -262,13 +356,16 @@ static void assemble(hapi_island *is)
     if (row->state == HAPI_ROW_FIXED) {
       continue;
     }
-    const hapi_row *from = source(is, row);
-    double push = is->gain[i] * is->error[from - rows];
-    add_row(is, is->local[row->a], is->gain[i], row->ba, from);
-    add_to(is, is->local[row->a], push, row->ba);
-    if (row->paired) {
-      add_row(is, is->local[row->b], is->gain[i], row->bb, from);
-      add_to(is, is->local[row->b], push, row->bb);
+    drive drives[DRIVES];
+    int count = drives_of(is, i, drives);
+    for (int k = 0; k < count; ++k) {
+      const drive *d = &drives[k];
+      add_row(is, is->local[row->a], d->gain, row->ba, d->from);
+      add_to(is, is->local[row->a], d->gain * d->error, row->ba);
+      if (row->paired) {
+        add_row(is, is->local[row->b], d->gain, row->bb, d->from);
+        add_to(is, is->local[row->b], d->gain * d->error, row->bb);
+      }
     }
   }
 }
@@ -386,30 +483,62 @@ static void restore_velocities(hapi_island *is)
   }
 }
 
+/* Impulse that dv asks for. */
+static double asked(const hapi_island *is, uint32_t index)
+{
+  const hapi_row *row = &is->solver->rows[index];
+  drive drives[DRIVES];
+  double p = row->impulse;
+  int count = row->state != HAPI_ROW_FIXED ? drives_of(is, index, drives) : 0;
+  for (int k = 0; k < count; ++k) {
+    const hapi_row *from = drives[k].from;
+    double w = moved(is, is->local[from->a], from->ja);
+    if (from->paired) {
+      w += moved(is, is->local[from->b], from->jb);
+    }
+    p += drives[k].gain * (drives[k].error - w);
+  }
+  return p;
+}
+
+static void push_to(hapi_island *is, uint32_t index, double p)
+{
+  hapi_row *row = &is->solver->rows[index];
+  hapi_row_push(is->solver, row, p - is->saved_impulse[index]);
+  row->impulse = p;
+}
+
+static void push_ball(hapi_island *is, uint32_t first)
+{
+  const hapi_row *row = &is->solver->rows[first];
+  double radius = hapi_ball_radius(is->solver->rows, row);
+  double p[3] = {0.0};
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    p[i] = asked(is, first + i);
+  }
+  double norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  double share = norm > radius ? radius / norm : 1.0;
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    push_to(is, first + i, share * p[i]);
+  }
+}
+
 /* What the rows of dv ask for, cut at the bounds: a normal comes before its frictions. The
  * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a set
  * of active rows that cannot be gives impulses so large that nothing of the velocities would be left. */
 static void push_rows(hapi_island *is)
 {
-  hapi_row *rows = is->solver->rows;
+  const hapi_row *rows = is->solver->rows;
   restore_velocities(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    hapi_row *row = &rows[i];
-    double p = row->impulse;
     double lo;
     double hi;
-    if (row->state != HAPI_ROW_FIXED) {
-      const hapi_row *from = source(is, row);
-      double w = moved(is, is->local[from->a], from->ja);
-      if (from->paired) {
-        w += moved(is, is->local[from->b], from->jb);
-      }
-      p += is->gain[i] * (is->error[from - rows] - w);
+    if (rows[i].ball > 0) {
+      push_ball(is, i);
+    } else if (rows[i].round == 0) {
+      hapi_row_bounds(rows, &rows[i], &lo, &hi);
+      push_to(is, i, hapi_clamp(asked(is, i), lo, hi));
     }
-    hapi_row_bounds(rows, row, &lo, &hi);
-    p = hapi_clamp(p, lo, hi);
-    hapi_row_push(is->solver, row, p - is->saved_impulse[i]);
-    row->impulse = p;
   }
 }
 
@@ -462,6 +591,12 @@ void hapi_island_settle(hapi_island *is)
     hapi_row *row = &rows[i];
     double lo;
     double hi;
+    if (row->ball > 0) {
+      (void)hapi_ball_update(is->solver, row);
+    }
+    if (row->ball > 0 || row->round > 0) {
+      continue;
+    }
     hapi_row_bounds(rows, row, &lo, &hi);
     double wanted = row->impulse + hapi_row_error(is->solver, row) * row->inverse;
     hapi_row_push(is->solver, row, hapi_clamp(wanted, lo, hi) - row->impulse);

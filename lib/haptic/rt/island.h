@@ -20,7 +20,8 @@
 enum {
   HAPI_ROW_FIXED,
   HAPI_ROW_FREE,
-  HAPI_ROW_TIED
+  HAPI_ROW_TIED,
+  HAPI_ROW_SLIDING /* of a ball */
 };
 
 typedef struct hapi_body_set {

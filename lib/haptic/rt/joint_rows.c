@@ -89,6 +89,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_joint *j, int part)
   row->a = j->a->row;
   row->b = j->b != NULL ? j->b->row : HAPI_STATIC_ROW;
   row->mu = 0.0;
+  row->ball = row->round = 0;
   row->normal = -1;
   row->lo = -HUGE_VAL;
   row->hi = HUGE_VAL;
@@ -383,32 +384,13 @@ static void hold_measured(hapi_tick *tick, const placed_joint *j)
 
 /* ---- stops and motors ---- */
 
-/* The angle of a sine and a cosine, in -pi .. pi, to 1e-13: halved until the series is short. */
-static double angle_of(double sine, double cosine)
-{
-  double length = sqrt(sine * sine + cosine * cosine);
-  double down = fabs(cosine) + length;
-  if (!(down > 0.0)) {
-    return 0.0;
-  }
-  double t = sine / down; /* tan of the half, up to 1 */
-  for (int i = 0; i < 3; ++i) {
-    t = t / (1.0 + sqrt(1.0 + t * t));
-  }
-  double t2 = t * t;
-  double small =
-      t * (1.0 - t2 * (1.0 / 3 - t2 * (1.0 / 5 - t2 * (1.0 / 7 - t2 * (1.0 / 9 - t2 / 11)))));
-  double angle = 16.0 * small;
-  return cosine < 0.0 ? copysign(M_PI, sine) - angle : angle;
-}
-
 /* About a unit axis from one direction to another; both need not be across it. */
 static double angle_about(const double axis[3], const double from[3], const double to[3])
 {
   double normal[3];
   hapi_v3_cross(from, to, normal);
-  return angle_of(hapi_v3_dot(normal, axis),
-                  hapi_v3_dot(from, to) - hapi_v3_dot(from, axis) * hapi_v3_dot(to, axis));
+  return hapi_row_angle(hapi_v3_dot(normal, axis),
+                        hapi_v3_dot(from, to) - hapi_v3_dot(from, axis) * hapi_v3_dot(to, axis));
 }
 
 /* Of a free axis, as ODE measures it. */

@@ -4,6 +4,7 @@
 
 #include "haptic/rt/ball_nearest.h"
 #include "haptic/rt/contact_ramp.h"
+#include "haptic/rt/pointer_friction.h"
 #include "haptic/rt/rows.h"
 
 /* Pointer contacts as rows of the solver: the spring and damper of eq. 7, integrated so that no
@@ -22,7 +23,10 @@
  * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
  * negative damper of T k. So a proxy's contacts take the second form, for the proxy: a body that is
  * not light stays where it is at the tick in it, as it would be damped by T k: with v the proxy's speed
- * into it and u the body's along -n, f = k (g + T (v' - u' + u)) + d (v' - u'). */
+ * into it and u the body's along -n, f = k (g + T (v' - u' + u)) + d (v' - u').
+ *
+ * Friction's spring (pointer_friction.h) pulls to both sides: two rows or three more of the same kind,
+ * with the stretch for g, the body's speed along the axis for w and the pointer's for s. */
 
 #define MIDPOINT_LIMIT 4.0
 #define PROXY_LIMIT 0.25  /* of T^2 k over the body's mass: it swings at 80 Hz and less, at 1 kHz */
@@ -116,6 +120,7 @@ typedef struct spring {
   double s;
   double body_a; /* 1/kg, of the body alone */
   double body_w; /* m/s, likewise */
+  bool pulls;    /* too: of friction */
 } spring;
 
 #define NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
@@ -124,6 +129,11 @@ typedef struct spring {
  * would be with nothing else in touch. */
 static void linearise(const spring *p, double period, double *out_c, double *out_force)
 {
+  if (p->pulls) {
+    *out_c = 0.25 * period * p->k;
+    *out_force = p->k * p->depth + *out_c * p->w;
+    return;
+  }
   double before = p->depth - 0.5 * period * (p->s - p->w);
   double w = p->free;
   double slope = 0.0;
@@ -240,6 +250,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
     return;
   }
   row->mu = 0.0;
+  row->ball = row->round = 0;
   row->normal = -1;
   row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
   world->sources[number] = (hapi_row_source){
@@ -247,6 +258,132 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, d
   contact->row = number;
   ++world->solver.row_count;
   hapi_row_ready(&world->solver, number);
+}
+
+/* The columns of an axis of friction, at the place where it acts; as above. */
+static void set_friction_columns(const hapi_local_contact *contact, const placed_pointer *at,
+                                 const hapi_friction *f, const double axis[4], hapi_row *row)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  double arm[3] = {0.0, 0.0, 0.0};
+  double couple[6] = {0.0};
+  hapi_body_arm(at->body, f->at, arm);
+  hapi_row_column(at->body, arm, axis, 1.0, row->ja, row->ba);
+  if (at->body != NULL) {
+    hapi_v3_madd(row->ja + 3, p->finger_radius * axis[3], at->normal, row->ja + 3);
+    hapi_row_response(at->body, row->ja, row->ba);
+  }
+  if (at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) {
+    hapi_v3_sub(f->at, at->point, arm);
+    hapi_v3_cross(arm, axis, couple + 3);
+    hapi_v3_madd(couple + 3, p->finger_radius * axis[3], at->normal, couple + 3);
+    hapi_row_response(at->body, couple, row->ba);
+    for (int i = 0; i < 6; ++i) {
+      row->ba[i] += hapi_v3_dot(contact->a[i], axis);
+    }
+  }
+  memset(row->jb, 0, sizeof row->jb);
+  memset(row->bb, 0, sizeof row->bb);
+  row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
+  row->b = HAPI_STATIC_ROW;
+  if (p->proxied) {
+    hapi_v3_scale(-1.0, axis, row->jb);
+    hapi_v3_scale(p->response, row->jb, row->bb);
+    row->b = p->row;
+  }
+}
+
+static double along(const double axis[4], const double v[4])
+{
+  return hapi_v3_dot(axis, v) + axis[3] * v[3];
+}
+
+static void fill_friction_spring(const placed_pointer *at, const hapi_friction *f,
+                                 const double axis[4], const hapi_row *row, spring *out)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  *out = (spring){.k = p->stiffness, .d = p->damping, .pulls = true};
+  out->depth = along(axis, f->stretch);
+  out->body_w = hapi_row_start_speed(at->body, row->ja);
+  out->w = out->body_w + (p->proxied ? hapi_v3_dot(row->jb, p->proxy_velocity) : 0.0);
+  out->s = along(axis, f->speed) + out->w;
+  out->body_a = hapi_dot6(row->ja, row->ba);
+  out->a = out->body_a + hapi_dot6(row->jb, row->bb);
+}
+
+/* Eq. 7 as it stands gives the first axis its impulse; else each is a soft row in the ball. */
+static bool add_friction_row(hapi_tick *tick, uint32_t index, const placed_pointer *at,
+                             const hapi_friction *f, uint32_t axis)
+{
+  hapi_local_world *world = &tick->world;
+  const hapi_local_contact *contact = &tick->contacts[index];
+  const hapi_row *normal = &world->solver.rows[contact->row];
+  uint32_t number = world->solver.row_count;
+  hapi_row *row = &world->solver.rows[number];
+  spring p;
+  set_friction_columns(contact, at, f, f->axes[axis], row);
+  fill_friction_spring(at, f, f->axes[axis], row, &p);
+  row->mu = contact->mu;
+  row->ball = axis == 0 ? (uint8_t)f->axis_count : 0;
+  row->round = (uint8_t)axis;
+  row->normal = (int32_t)contact->row;
+  row->impulse = axis == 0 ? tick->period * f->pull : 0.0;
+  if (at->pointer->integration == HAP_INTEGRATION_EXPLICIT) {
+    row->normal = -1;
+    row->ball = 0;
+    row->lo = row->hi = fmin(row->impulse, contact->mu * normal->hi);
+    row->softness = row->target = 0.0;
+  } else if (!soften(row, at->pointer, &p, tick->period)) {
+    return false;
+  }
+  world->sources[number] = (hapi_row_source){.contact = index,
+                                             .body_a = contact->body,
+                                             .body_b = HAPI_SLOT_NONE,
+                                             .part = (uint8_t)(1 + axis),
+                                             .pointer = true};
+  ++world->solver.row_count;
+  hapi_row_ready(&world->solver, number);
+  return true;
+}
+
+/* A proxy goes, and a light body is taken, to where the force leaves them at the tick's end. */
+static void aim(const hapi_tick *tick, const hapi_local_contact *contact, const placed_pointer *at,
+                hapi_friction *f)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  double gain[3] = {0.0, 0.0, 0.0};
+  double lead = 0.0;
+  if (p->proxied) {
+    hapi_v3_sub(p->free_velocity, p->proxy_velocity, gain);
+  }
+  if (contact->row != HAPI_NO_ROW && p->integration != HAP_INTEGRATION_EXPLICIT) {
+    const hapi_row *normal = &tick->world.solver.rows[contact->row];
+    double a = hapi_dot6(normal->ja, normal->ba) + hapi_dot6(normal->jb, normal->bb);
+    lead = by_midpoint(p, tick->period * tick->period * a * p->stiffness) ? 0.0 : tick->period;
+  }
+  hapi_friction_aim(f, p, lead, gain);
+}
+
+/* After the normal's row. */
+static void add_friction(hapi_tick *tick, uint32_t index, const placed_pointer *at)
+{
+  const hapi_local_contact *contact = &tick->contacts[index];
+  double foot[3];
+  hapi_friction_foot(at->pointer, at->normal, at->point, foot);
+  hapi_friction *f = hapi_friction_begin(tick, contact, at->normal, foot);
+  if (f == NULL) {
+    return;
+  }
+  aim(tick, contact, at, f);
+  if (contact->row == HAPI_NO_ROW) {
+    return;
+  }
+  uint32_t wanted = at->pointer->integration == HAP_INTEGRATION_EXPLICIT ? 1 : f->axis_count;
+  uint32_t added = 0;
+  while (added < wanted && add_friction_row(tick, index, at, f, added)) {
+    ++added;
+  }
+  f->axis_count = added;
 }
 
 static double closing_speed(const placed_pointer *at, const double velocity[3])
@@ -297,6 +434,10 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   } else {
     push_static(c, &at, share, speed);
   }
+  bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
+  if (c->mu > 0.0 && pushes && at.depth > 0.0) {
+    add_friction(tick, index, &at);
+  }
 }
 
 void hapi_pointer_rows(hapi_tick *tick)
@@ -323,8 +464,49 @@ static void push_outside(hapi_tick *tick, hapi_local_body *body, const hapi_loca
   double moment[3];
   hapi_v3_sub(c->point_now, body->pose.position, arm);
   hapi_v3_cross(arm, c->force, moment);
+  hapi_v3_add(moment, c->couple, moment);
   hapi_v3_madd(body->impulse, tick->period, c->force, body->impulse);
   hapi_v3_madd(body->angular_impulse, tick->period, moment, body->angular_impulse);
+}
+
+/* Of rows, or by eq. 7 as it stands: then nothing answers. */
+static void friction_force(const hapi_tick *tick, const hapi_local_contact *c,
+                           const hapi_friction *f, double limit, double out[4])
+{
+  if (c->row == HAPI_NO_ROW) {
+    hapi_friction_push(f, limit, out);
+    return;
+  }
+  memset(out, 0, 4 * sizeof *out);
+  for (uint32_t i = 0; i < f->axis_count; ++i) {
+    double force = tick->world.solver.rows[c->row + 1 + i].impulse / tick->period;
+    for (int k = 0; k < 4; ++k) {
+      out[k] += force * f->axes[i][k];
+    }
+  }
+}
+
+/* Adds friction to the normal force. */
+static void rub(hapi_tick *tick, hapi_local_contact *c)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  hapi_friction *f = hapi_friction_now(tick, c);
+  double push[4];
+  hap_wrench wrench;
+  hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
+  if (f == NULL) {
+    return;
+  }
+  double limit = c->mu * hapi_v3_norm(c->force);
+  friction_force(tick, c, f, limit, push);
+  hapi_friction_wrench(f, p, push, c->point_now, &wrench);
+  hapi_v3_add(c->force, wrench.force, c->force);
+  hapi_v3_copy(wrench.torque, c->couple);
+  if (p->turns) {
+    hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
+    hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
+  }
+  hapi_friction_end(f, p, push, limit);
 }
 
 static void feel(hapi_tick *tick, hapi_local_contact *c)
@@ -334,6 +516,9 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
   if (c->row != HAPI_NO_ROW) {
     double force = tick->world.solver.rows[c->row].impulse / tick->period;
     hapi_v3_scale(-force, c->normal_now, c->force);
+  }
+  if (c->mu > 0.0) {
+    rub(tick, c);
   }
   if (c->force[0] == 0.0 && c->force[1] == 0.0 && c->force[2] == 0.0) {
     return;

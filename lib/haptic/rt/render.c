@@ -4,6 +4,7 @@
 
 #include "base/vec.h"
 #include "haptic/rt/contact_ramp.h"
+#include "haptic/rt/pointer_friction.h"
 
 /* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
 
@@ -60,11 +61,61 @@ static double normal_force(hapi_local_contact *c, hapi_tick_pointer *p, const ha
   return force;
 }
 
+/* J/s that the body's motion, which is given, does on the spring of its friction. */
+static double loads(const hapi_local_body *body, const plane *at, const hap_wrench *push)
+{
+  double arm[3];
+  double moment[3];
+  if (body == NULL) {
+    return 0.0;
+  }
+  hapi_v3_sub(at->point, body->pose.position, arm);
+  hapi_v3_cross(arm, push->force, moment);
+  hapi_v3_add(moment, push->torque, moment);
+  return -hapi_v3_dot(push->force, body->twist.linear) - hapi_v3_dot(moment, body->twist.angular);
+}
+
+/* Adds to the contact's force on the body what friction makes of the normal force. */
+static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, const plane *at,
+                double normal_force)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  double foot[3];
+  double push[4];
+  hap_wrench on_body;
+  hap_wrench on_hand;
+  hapi_friction_foot(p, at->normal, at->point, foot);
+  hapi_friction *f = hapi_friction_begin(tick, c, at->normal, foot);
+  if (f == NULL) {
+    return;
+  }
+  double limit = c->mu * normal_force;
+  hapi_friction_aim(f, p, 0.0, NULL);
+  hapi_friction_push(f, limit, push);
+  hapi_friction_wrench(f, p, push, at->point, &on_body);
+  hapi_friction_wrench(f, p, push, p->pose.position, &on_hand);
+  hapi_friction_end(f, p, push, limit);
+  hapi_v3_add(c->force, on_body.force, c->force);
+  hapi_v3_copy(on_body.torque, c->couple);
+  if (p->turns) {
+    hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
+  }
+  p->guard.force2 += hapi_v3_dot(push, push) + push[3] * push[3];
+  p->guard.power += loads(body, at, &on_body);
+  if (body != NULL) {
+    double turning = p->finger_radius * push[3];
+    for (int i = 0; i < 6; ++i) {
+      body->acceleration[i] += turning * c->turn[i];
+    }
+  }
+}
+
 /* f_o = -f_d goes to the body: as impulse to physics, and through A into its acceleration. */
 static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane *at, double period)
 {
   double moment[3];
   hapi_v3_cross(at->arm, c->force, moment);
+  hapi_v3_add(moment, c->couple, moment);
   hapi_v3_madd(body->impulse, period, c->force, body->impulse);
   hapi_v3_madd(body->angular_impulse, period, moment, body->angular_impulse);
   for (int i = 0; i < 6; ++i) {
@@ -88,6 +139,7 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[c->body];
   plane at;
   hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+  hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
   if (p->generation != c->pointer_generation) {
     return; /* another pointer has come to its place: its contacts come with the next model */
   }
@@ -96,10 +148,14 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   if (force == 0.0 || tick->fault != HAP_FAULT_NONE) {
     return;
   }
-  hapi_v3_madd(p->wrench.force, force, at.normal, p->wrench.force);
+  hapi_v3_scale(-force, at.normal, c->force);
+  if (c->mu > 0.0) {
+    rub(tick, c, body, &at, force);
+    force = hapi_v3_norm(c->force);
+  }
+  hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
   ++p->contacts;
   ++tick->pushing;
-  hapi_v3_scale(-force, at.normal, c->force);
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
     body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
     body->pushed = true;

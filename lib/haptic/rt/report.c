@@ -56,6 +56,8 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
     pointers[i].collide_bits = in->collide_bits;
     pointers[i].radius = in->radius;
     pointers[i].stiffness = in->stiffness;
+    pointers[i].friction = in->friction;
+    pointers[i].finger_radius = in->finger_radius;
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
   }

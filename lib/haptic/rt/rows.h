@@ -93,6 +93,25 @@ static inline void hapi_row_turn_column(const hapi_local_body *body, const doubl
   hapi_row_response(body, j, b);
 }
 
+/* The angle of a sine and a cosine, in -pi .. pi, to 1e-13: halved until the series is short. */
+static inline double hapi_row_angle(double sine, double cosine)
+{
+  double length = sqrt(sine * sine + cosine * cosine);
+  double down = fabs(cosine) + length;
+  if (!(down > 0.0)) {
+    return 0.0;
+  }
+  double t = sine / down; /* tan of the half, up to 1 */
+  for (int i = 0; i < 3; ++i) {
+    t = t / (1.0 + sqrt(1.0 + t * t));
+  }
+  double t2 = t * t;
+  double small =
+      t * (1.0 - t2 * (1.0 / 3 - t2 * (1.0 / 5 - t2 * (1.0 / 7 - t2 * (1.0 / 9 - t2 / 11)))));
+  double angle = 16.0 * small;
+  return cosine < 0.0 ? copysign(M_PI, sine) - angle : angle;
+}
+
 /* Velocity along j before this tick. */
 static inline double hapi_row_start_speed(const hapi_local_body *body, const double j[6])
 {

@@ -33,6 +33,7 @@ static void clear_arrays(hapi_tick *tick)
   memset(tick->contacts, 0, c->contacts * sizeof *tick->contacts);
   memset(tick->ramps, 0, c->contacts * sizeof *tick->ramps);
   memset(tick->ramp_generations, 0, c->contacts * sizeof *tick->ramp_generations);
+  memset(tick->frictions, 0, c->contacts * sizeof *tick->frictions);
   memset(w->memory, 0, c->contacts * sizeof *w->memory);
   memset(w->old_memory, 0, c->contacts * sizeof *w->old_memory);
   memset(w->buckets, 0, w->bucket_count * sizeof *w->buckets);
@@ -58,6 +59,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.contacts = tick->contacts;
   fresh.ramps = tick->ramps;
   fresh.ramp_generations = tick->ramp_generations;
+  fresh.frictions = tick->frictions;
   fresh.pointers = tick->pointers;
   keep_arrays(&tick->world, &fresh.world);
   fresh.hash = 0xcbf29ce484222325u;

@@ -85,6 +85,9 @@ typedef struct hapi_tick_pointer {
   double radius;
   double stiffness;
   double damping;
+  double friction;
+  double finger_radius; /* m, of the torsion; 0: none */
+  bool turns;           /* with the device, and gives it torque; else only friction goes by it */
   double motion_scale;
   double force_scale;
   double max_force;   /* N at the device */
@@ -174,9 +177,40 @@ typedef struct hapi_ramp {
 
   /* Of the energy observer, at the last tick: */
   double felt_share; /* with what the guard took */
+  double felt;       /* what the guard left of friction */
   double felt_excess;
   double sprung; /* J in the spring, as it was felt */
 } hapi_ramp;
+
+/* Where the anchors of a contact's friction are. */
+typedef struct hapi_friction_place {
+  double anchor_pointer[3]; /* m, in the pointer's frame */
+  double anchor_body[3];
+  double normal_pointer[3]; /* of the surface */
+  double normal_body[3];
+  double
+      mark_pointer[3]; /* unit, along the surface: one direction when they were set; soft finger */
+  double mark_body[3];
+  double stretch_body[3]; /* m, of the pointer ahead of the body, in the body's frame */
+  double turn;            /* rad, likewise, about the normal */
+} hapi_friction_place;
+
+/* Friction of a pointer contact, by its slot; see pointer_friction.h. Of four numbers: along the surface
+ * in world axes, and about the normal times the finger's radius. */
+typedef struct hapi_friction {
+  uint32_t generation; /* of the contact */
+  uint32_t epoch;      /* of the body */
+  uint64_t tick;       /* the last in which the contact was closed */
+  hapi_friction_place set;
+  hapi_friction_place now; /* the anchors if they were set in this tick */
+  double normal[3];
+  double at[3];        /* m, world: where the force acts */
+  double stretch[4];   /* m, of the pointer ahead of the body */
+  double speed[4];     /* m/s, at which it grows */
+  double pull;         /* N, of spring and damper where nothing slides */
+  double axes[3][4];   /* unit, at right angles; the first along the pull */
+  uint32_t axis_count; /* 2; 3 with torsion */
+} hapi_friction;
 
 typedef struct hapi_local_contact {
   uint32_t slot;
@@ -188,8 +222,11 @@ typedef struct hapi_local_contact {
   double point_body[3];
   double normal_body[3];
   double a[6][3];
+  double turn[6]; /* acceleration by one N m about the normal; soft finger */
+  double mu;      /* 0: no friction */
   hapi_ramp ramp;
-  double force[3]; /* on the body */
+  double force[3];  /* on the body */
+  double couple[3]; /* N m, on the body about the contact point; friction */
 
   /* Model CONTACT. */
   bool has_shape; /* asked at every tick */
@@ -264,6 +301,7 @@ typedef struct hapi_tick {
   hapi_local_contact *contacts; /* of the model, contact_count */
   hapi_ramp *ramps;             /* by contact slot, of the model before: to go on with */
   uint32_t *ramp_generations;   /* by contact slot */
+  hapi_friction *frictions;     /* by contact slot */
   hapi_tick_pointer *pointers;  /* capacity.pointers */
   uint32_t live_count;
   uint32_t contact_count;

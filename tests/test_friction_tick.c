@@ -1,0 +1,126 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Friction of a pointer's contact in the tick alone: what sticks does not creep, what rolls does not
+ * slide, anchors go over from model to model, energy. */
+
+#include "tests/tap.h"
+
+#include "tests/tick_world.h"
+
+#define K 1000.0
+#define MU 0.8
+#define RADIUS 0.01
+
+/* A body at slot 0 that the test moves, its surface through the origin across x, and a pointer. */
+static hapi_tick_pointer *surface_and_pointer(hap_model model, double finger)
+{
+  set_up();
+  f.model->model = model;
+  hapi_tick_pointer *p = add_pointer(0, -RADIUS - 0.001, 0.0, 0.0);
+  p->turns = true;
+  p->finger_radius = finger;
+  begin_model();
+  add_body(0)->flags = HAPI_BODY_DRIVEN;
+  add_contact(0, 0, 0)->mu = MU;
+  adopt();
+  run(1);
+  return p;
+}
+
+/* The same message again: what a sync brings when nothing happened. */
+static void sync_again(void)
+{
+  hap_pose pose = f.bodies[0].pose;
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_DRIVEN;
+  body->pose = pose;
+  add_contact(0, 0, 0)->mu = MU;
+  adopt();
+}
+
+static void turn_body(double about_x, double about_y)
+{
+  double spin[4] = {cos(0.5 * about_x), sin(0.5 * about_x), 0.0, 0.0};
+  double tilt[4] = {cos(0.5 * about_y), 0.0, sin(0.5 * about_y), 0.0};
+  hapi_quat_multiply(tilt, spin, f.bodies[0].pose.quat_wxyz);
+  f.bodies[0].to = f.bodies[0].pose;
+}
+
+static double rounded(double x, double quantum)
+{
+  return quantum * floor(x / quantum + 0.5);
+}
+
+/* -1 .. 1 */
+static double noise(uint64_t *state)
+{
+  *state = *state * 6364136223846793005u + 1442695040888963407u;
+  return (double)(int64_t)*state / 9223372036854775808.0;
+}
+
+typedef struct shake {
+  hap_model model;
+  double finger;
+  double tilt; /* rad */
+  double spin; /* rad in all */
+} shake;
+
+static void put(hapi_tick_pointer *p, double x, double y, double z)
+{
+  hapi_v3_set(p->device_pose.position, x, y, z);
+}
+
+/* m, by which the point that sticks has crept after a million ticks. */
+static double creep_of(const shake *how)
+{
+  const int ticks = 1000000;
+  uint64_t state = 7;
+  hapi_tick_pointer *p = surface_and_pointer(how->model, how->finger);
+  put(p, -RADIUS + 0.002, 0.0, 0.0);
+  run(30);
+  put(p, -RADIUS + 0.002, 2e-4, -1e-4);
+  run(2);
+  double before[3];
+  hapi_v3_copy(p->wrench.force, before);
+  for (int i = 0; i < ticks; ++i) {
+    double share = (double)i / ticks;
+    double swing = sin(2.0 * M_PI * 1000.0 * share);
+    turn_body(how->spin * share, how->tilt * swing);
+    put(p, rounded(-RADIUS + 0.002 + 1e-5 * noise(&state), 3e-5),
+        rounded(2e-4 + 2e-5 * noise(&state), 3e-5), rounded(-1e-4 + 2e-5 * noise(&state), 3e-5));
+    if (i % 16 == 0) {
+      sync_again();
+    }
+    run(1);
+  }
+  turn_body(0.0, 0.0);
+  put(p, -RADIUS + 0.002, 2e-4, -1e-4);
+  run(2);
+  CHECK(hapi_v3_norm(before) > 2.0);
+  hapi_v3_sub(p->wrench.force, before, before);
+  return hapi_v3_norm(before) / K;
+}
+
+TEST(what_sticks_does_not_creep_in_a_million_ticks)
+{
+  static const shake all[] = {
+      {HAP_MODEL_SINGLE, 0.0, 0.02, 0.0},          {HAP_MODEL_CONTACT, 0.0, 0.02, 0.0},
+      {HAP_MODEL_CONTACT, 0.005, 0.02, 0.0},       {HAP_MODEL_CONTACT, 0.0, 0.0, 200.0 * M_PI},
+      {HAP_MODEL_SINGLE, 0.0, 0.02, 200.0 * M_PI}, {HAP_MODEL_CONTACT, 0.0, 0.3, 0.0},
+      {HAP_MODEL_CONTACT, 0.005, 0.3, 0.0},
+  };
+  for (size_t i = 0; i < sizeof all / sizeof all[0]; ++i) {
+    double creep = creep_of(&all[i]);
+    printf("# tilt %g, spin %g: %g um\n", all[i].tilt, all[i].spin, 1e6 * creep);
+    CHECK(creep < (all[i].tilt < 0.05 ? 1e-10 : 2e-4)); /* rolls 2 mm to and fro, 1000 times */
+  }
+}
+
+int main(void)
+{
+  RUN(what_sticks_does_not_creep_in_a_million_ticks);
+  hapi_exchange_destroy(f.exchange);
+  return tap_done();
+}
