@@ -12,6 +12,7 @@
 #include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
 #include "tests/contact_world.h"
+#include "tests/unknown_shape.h"
 
 static double height(const contact_world *w)
 {
@@ -169,7 +170,7 @@ static int check_measured(const contact_world *w)
   return met;
 }
 
-/* A cube with a joint that the loop does not have, between the hand and another cube: rows that answered
+/* A cube with a shape that the loop does not know, between the hand and another cube: rows that answered
  * each by a measurement of its own would make energy. */
 TEST(a_measured_body_answers_all_that_touch_it_alike)
 {
@@ -178,7 +179,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   cw_open(&w, CW_GRAVITY);
   cw_add_floor(&w);
   dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.025);
-  dJointAttach(dJointCreateAMotor(w.world, NULL), cube, NULL);
+  dTriMeshDataID data = add_unknown_shape(w.space, cube);
   (void)cw_add_cube(&w, 0.2, 0.05, 0.0755, 0.0, 0.025);
   REQUIRE(cw_start(&w, -0.012, 0.003, 0.035));
   cw_move_hand(&w, 0.1, 0.0, 0.0);
@@ -190,6 +191,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   CHECK(met > 100);
   CHECK(w.position[1][0] > 0.08); /* it was pushed on */
   cw_close(&w);
+  dGeomTriMeshDataDestroy(data);
 }
 
 /* The same of a cube that only two hands touch. */
@@ -202,7 +204,7 @@ TEST(a_measured_body_answers_two_hands_alike)
   cw_open(&w, CW_GRAVITY);
   cw_add_floor(&w);
   dBodyID cube = cw_add_cube(&w, 2.0, 0.05, 0.025, 0.0, 0.025);
-  dJointAttach(dJointCreateAMotor(w.world, NULL), cube, NULL);
+  dTriMeshDataID data = add_unknown_shape(w.space, cube);
   REQUIRE(cw_start(&w, -0.012, 0.01, 0.03));
   CHECK(hap_pointer_add(w.session, &w.hand_def, &other) == HAP_OK);
   CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
@@ -214,6 +216,7 @@ TEST(a_measured_body_answers_two_hands_alike)
   CHECK(cw_stats(&w).measured_bodies == 1);
   CHECK(met > 10);
   cw_close(&w);
+  dGeomTriMeshDataDestroy(data);
 }
 
 int main(void)
