@@ -33,7 +33,8 @@
 static const char header[] =
     "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms,"
     "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,pose_median_mm,"
-    "force_rms_n,rest_share,start_um";
+    "force_rms_n,rest_share,start_um,"
+    "torque_rel_rms";
 
 static bool is_default(const accuracy_row *row)
 {
@@ -47,8 +48,8 @@ static void write_row(FILE *csv, const accuracy_row *r)
           r->knob, r->value, e->force, e->impulse_ratio, e->peak_ratio);
   fprintf(csv, "%.4g,%.4g,%.4g,%g,%.6g,0,%s,", r->tick_us, r->physics_ms, r->duty, r->haptic_hz,
           r->noise_floor, r->hand);
-  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g\n", 1e3 * e->pose_max, e->line_n, r->hand_speed,
-          1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um);
+  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g,%.6g\n", 1e3 * e->pose_max, e->line_n,
+          r->hand_speed, 1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um, e->torque);
 }
 
 static hap_status write_table(bench *b, const accuracy_table *table)
@@ -72,12 +73,24 @@ static void check_force(bench *b, const accuracy_row *r)
               bound > r->bound ? ", twice the noise floor" : "", 100.0 * r->noise_floor);
 }
 
+static void check_torque(bench *b, const accuracy_row *r)
+{
+  double bound = fmax(r->bound, 2.0 * r->torque_floor);
+  bench_check(b, r->errors.torque <= bound,
+              "%s at %g Hz: torque error %.3f %% (bound %.3f %%%s; noise floor %.3f %%)", r->scene,
+              r->physics_hz, 100.0 * r->errors.torque, 100.0 * bound,
+              bound > r->bound ? ", twice the noise floor" : "", 100.0 * r->torque_floor);
+}
+
 static void check_row(bench *b, const accuracy_row *r)
 {
   const accuracy_errors *e = &r->errors;
   double line = fmax(LINE_BOUND_N, LINE_BOUND * e->force_rms);
   if (r->bound > 0.0) {
     check_force(b, r);
+  }
+  if (r->bound > 0.0 && e->torque > 0.0) {
+    check_torque(b, r);
   }
   bench_check(b, e->peak_ratio <= PEAK_BOUND, "%s at %g Hz: peak ratio %.4f (bound %g)", r->scene,
               r->physics_hz, e->peak_ratio, PEAK_BOUND);

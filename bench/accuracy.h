@@ -25,10 +25,10 @@ typedef struct accuracy_scene {
   const char *recording; /* file of HAPODE_SHARED/data that moves the hand; NULL: the scene's own */
   double seconds;        /* of the window; 0: the scene's own */
   double seconds_quick;  /* 0: the same */
-  double bound;          /* force error of model contact at 20 Hz; at 60 Hz half of it */
-  int starts_quick;      /* a long run at 1000 iterations is dear; 0: all */
-  bool speeds;           /* the hand's motion can be made faster and slower */
-  bool rests;            /* the hand hardly moves: that is the scene */
+  double bound;     /* error of force and torque of model contact at 20 Hz; at 60 Hz half of it */
+  int starts_quick; /* a long run at 1000 iterations is dear; 0: all */
+  bool speeds;      /* the hand's motion can be made faster and slower */
+  bool rests;       /* the hand hardly moves: that is the scene */
 } accuracy_scene;
 
 const accuracy_scene *accuracy_scene_at(size_t index); /* NULL past the end */
@@ -43,8 +43,9 @@ hap_status accuracy_recorded_hand(bench *b, const accuracy_scene *which, char *o
 /* ---- accuracy_run.c ---- */
 
 typedef struct accuracy_frame {
-  double force[SCENE_POINTERS_MAX][3]; /* N, on the hands */
-  double hand[SCENE_POINTERS_MAX][3];  /* m */
+  double force[SCENE_POINTERS_MAX][3];  /* N, on the hands */
+  double torque[SCENE_POINTERS_MAX][3]; /* N m */
+  double hand[SCENE_POINTERS_MAX][3];   /* m */
   double body[HAP_TRACE_BODIES_MAX][3];
   uint32_t local; /* bit k: the loop moves body k itself */
 } accuracy_frame;
@@ -83,6 +84,7 @@ typedef struct accuracy_errors {
                            above what is half way to the next ones and what the control has */
   bool lines;         /* contact is long enough to tell one */
   double force_rms;   /* N, of the reference while either touches */
+  double torque;      /* as force; 0: the reference has none */
 } accuracy_errors;
 
 /* control: as test, at another physics rate; may be NULL. False: nothing is touched in the reference,
@@ -109,11 +111,12 @@ typedef struct accuracy_row {
   double duty; /* computing time of all threads / simulated time */
   double haptic_hz;
   double noise_floor;
+  double torque_floor;
   char hand[16];
   double hand_speed;
   double rest_share;
   double start_um; /* the worst start */
-  double bound;    /* on errors.force; 0: none */
+  double bound;    /* on errors.force and .torque; 0: none */
 } accuracy_row;
 
 typedef struct accuracy_table {

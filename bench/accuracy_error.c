@@ -39,8 +39,10 @@ static double difference(const accuracy_frame *a, const accuracy_frame *b, size_
 /* ---- forces ---- */
 
 typedef struct sums {
-  double error;     /* N^2 */
-  double reference; /* N^2 */
+  double error;          /* N^2 */
+  double reference;      /* N^2 */
+  double turn_error;     /* (N m)^2 */
+  double turn_reference; /* (N m)^2 */
   double impulse[2];
   double peak[2];
   size_t ticks;
@@ -65,6 +67,10 @@ static void add_tick(const accuracy_frame *reference, const accuracy_frame *test
     double f = reference->force[i / 3][i % 3];
     s->error += e * e;
     s->reference += f * f;
+    double t = reference->torque[i / 3][i % 3];
+    double d = test->torque[i / 3][i % 3] - t;
+    s->turn_error += d * d;
+    s->turn_reference += t * t;
   }
   add_norms(reference, &s->impulse[0], &s->peak[0]);
   add_norms(test, &s->impulse[1], &s->peak[1]);
@@ -168,6 +174,7 @@ bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *t
     return false;
   }
   out->force = sqrt(s.error / s.reference);
+  out->torque = s.turn_reference > 0.0 ? sqrt(s.turn_error / s.turn_reference) : 0.0;
   out->force_rms = sqrt(s.reference / (double)s.ticks);
   out->impulse_ratio = s.impulse[1] / s.impulse[0];
   out->peak_ratio = s.peak[1] / s.peak[0];

@@ -57,6 +57,7 @@ static void note_frame(const rig *r, const hap_trace_row *row, accuracy_frame *o
 {
   for (size_t i = 0; i < row->pointer_count && i < SCENE_POINTERS_MAX; ++i) {
     memcpy(out->force[i], row->pointers[i].force, sizeof out->force[i]);
+    memcpy(out->torque[i], row->pointers[i].torque, sizeof out->torque[i]);
     memcpy(out->hand[i], row->pointers[i].position, sizeof out->hand[i]);
   }
   memcpy(out->body, row->body_position, sizeof out->body);

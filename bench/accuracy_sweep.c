@@ -42,7 +42,8 @@ typedef struct sweep {
   size_t start[ACCURACY_STARTS_MAX]; /* indices into starts */
   accuracy_motion references[ACCURACY_STARTS_MAX];
   double noise_floor;
-  size_t worst; /* index of the worst start in the newest row */
+  double torque_floor; /* the same of the torque */
+  size_t worst;        /* index of the worst start in the newest row */
 } sweep;
 
 /* What is run beside the default, and how the table calls it. */
@@ -127,6 +128,7 @@ static hap_status raise_floor(sweep *s, const accuracy_motion *a, const accuracy
     return untouched(s);
   }
   s->noise_floor = fmax(s->noise_floor, errors.force);
+  s->torque_floor = fmax(s->torque_floor, errors.torque);
   return HAP_OK;
 }
 
@@ -148,7 +150,7 @@ static hap_status make_references(sweep *s)
   for (size_t i = 0; i < s->start_count && status >= HAP_OK; ++i) {
     status = run_reference(s, starts[s->start[i]], ACCURACY_HAPTIC_HZ, &s->references[i]);
   }
-  s->noise_floor = 0.0;
+  s->noise_floor = s->torque_floor = 0.0;
   if (status >= HAP_OK) {
     status = raise_floor(s, &s->references[0], &s->references[1]);
   }
@@ -166,6 +168,7 @@ static double further_from_1(double a, double b)
 static void take_worst(accuracy_errors *worst, const accuracy_errors *e)
 {
   worst->force = fmax(worst->force, e->force);
+  worst->torque = fmax(worst->torque, e->torque);
   worst->impulse_ratio = further_from_1(worst->impulse_ratio, e->impulse_ratio);
   worst->peak_ratio = further_from_1(worst->peak_ratio, e->peak_ratio);
   worst->pose_max = fmax(worst->pose_max, e->pose_max);
@@ -204,6 +207,7 @@ static void begin_row(const sweep *s, const setting *set, accuracy_row *row)
   row->value = set->value;
   row->haptic_hz = ACCURACY_HAPTIC_HZ;
   row->noise_floor = s->noise_floor;
+  row->torque_floor = s->torque_floor;
   row->hand_speed = accuracy_hand_speed(&s->references[0]);
   row->rest_share = s->scene->rests ? 0.0 : accuracy_rest_share(&s->references[0]);
   row->errors.impulse_ratio = row->errors.peak_ratio = 1.0;
@@ -316,6 +320,7 @@ static hap_status measure_contact(sweep *s)
   if (status >= HAP_OK && s->worst > 0) {
     status = raise_floor_by_step(s, s->worst);
     s->table->rows[s->table->count - 1].noise_floor = s->noise_floor;
+    s->table->rows[s->table->count - 1].torque_floor = s->torque_floor;
   }
   return status;
 }

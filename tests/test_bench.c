@@ -225,7 +225,7 @@ TEST(tick_leaves_its_table)
 #define ACCURACY_COLUMNS                                                                         \
   "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms," \
   "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,"               \
-  "pose_median_mm,force_rms_n,rest_share,start_um"
+  "pose_median_mm,force_rms_n,rest_share,start_um,torque_rel_rms"
 
 /* Force error of a row of accuracy.csv that begins so; *out_count: how many rows do. */
 static double force_error(const char *begin, int *out_count)

@@ -197,6 +197,13 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, c[i].normal_body, 3);
     hash = hapi_hash_doubles(hash, c[i].a[0], 18);
   }
+  hapi_tool_point *tools = hapi_model_tools(model);
+  for (uint32_t i = 0; i < model->tool_count; ++i) {
+    hash = hapi_hash_word(hash, tools[i].pointer);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_a, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_b, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.normal, 3);
+  }
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     hash = hash_joint(hash, &hapi_model_joints(model)[i]);
   }

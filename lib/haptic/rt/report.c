@@ -31,13 +31,16 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
 static void report_contacts(const hapi_tick *tick, hapi_state *out)
 {
   hapi_state_contact *contacts = hapi_state_contacts(out);
+  uint32_t count = 0;
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *in = &tick->contacts[i];
-    contacts[i].slot = in->slot;
-    contacts[i].generation = in->generation;
-    hapi_v3_copy(in->force, contacts[i].force);
+    if (in->slot != HAPI_SLOT_NONE) { /* else physics does not know it */
+      contacts[count].slot = in->slot;
+      contacts[count].generation = in->generation;
+      hapi_v3_copy(in->force, contacts[count++].force);
+    }
   }
-  out->contact_count = tick->contact_count;
+  out->contact_count = count;
 }
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
@@ -58,6 +61,11 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
     pointers[i].stiffness = in->stiffness;
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
+    pointers[i].is_tool = in->hull != NULL;
+    pointers[i].extent = in->extent;
+    if (in->generation != 0 && in->hull != NULL) {
+      hapi_state_hulls(out)[i] = *in->hull;
+    }
   }
 }
 
@@ -142,4 +150,13 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
   }
   out->body_count = tick->live_count;
   out->model_number = tick->model_number;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *in = &tick->pointers[i];
+    hapi_poses_pointer *to = &hapi_poses_pointers(out)[i];
+    to->generation = in->hull != NULL ? in->generation : 0;
+    if (to->generation != 0) {
+      to->pose = in->pose;
+      to->twist = in->twist;
+    }
+  }
 }

@@ -1,7 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "sync/mesh_filter.h"
+
+#include <math.h>
+#include <stddef.h>
+
 #include "base/vec.h"
-#include "contact/contact_internal.h"
 
 /* A body that slides over a mesh must not feel the seams between its triangles. A contact whose
  * normal is the triangle's own counts always; one that leans over an edge only when no neighbour
@@ -10,11 +14,11 @@
 #define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
 #define TRIANGLE 8u
 
-bool hapi_mesh_allows(const hapi_near_geom *triangle, const double *corners, const double normal[3])
+bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
   double sides[3][3];
   double own[3];
-  if ((triangle->open_edges & TRIANGLE) == 0) {
+  if ((open_edges & TRIANGLE) == 0) {
     return true;
   }
   for (int i = 0; i < 3; ++i) {
@@ -30,7 +34,7 @@ bool hapi_mesh_allows(const hapi_near_geom *triangle, const double *corners, con
     double outward[3];
     hapi_v3_cross(sides[i], own, outward);
     bool over = hapi_v3_dot(outward, normal) > 1e-9 * hapi_v3_norm(outward);
-    if (over && (triangle->open_edges & (1u << i)) == 0) {
+    if (over && (open_edges & (1u << i)) == 0) {
       return false;
     }
   }
