@@ -35,7 +35,7 @@ static const accuracy_scene scenes[] = {
     {.name = "chain", .base = "chain", .bound = 0.005},
     {.name = "lightstand", .base = "lightstand", .bound = 0.03, .starts_quick = 3},
     {.name = "lever", .base = "lever", .bound = 0.03, .starts_quick = 3},
-    {.name = "peg", .base = "peg", .bound = 0.08, .starts_quick = 3},
+    {.name = "peg", .base = "peg", .bound = 0.08, .starts_quick = 3, .start_most = 2e-4},
     {.name = "hold", .base = "hold", .seconds_quick = 3, .starts_quick = 2, .rests = true},
     {.name = "recorded",
      .base = "row10",

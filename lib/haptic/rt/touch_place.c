@@ -141,9 +141,9 @@ static bool place_ball(const touch *c)
 bool hapi_touch_place(const hapi_patch_contact *in, const hapi_touch_frame *a,
                       const hapi_touch_frame *b, hapi_touch_spot *out)
 {
+  /* cppcheck-suppress ctuuninitvar ; out is written only, its normal before it is read */
   const touch at = {in, a, b, out};
   const touch *c = &at;
-  /* cppcheck-suppress ctuuninitvar ; out is written only, its normal before it is read */
   switch (c->in->touch) {
     case HAPI_TOUCH_FACE_A:
       frame_vector(c->a, c->in->normal, c->out->normal);
