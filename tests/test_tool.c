@@ -95,6 +95,17 @@ TEST(no_force_jumps_when_a_tool_tilts_through_flat)
   }
 }
 
+static dTriMeshDataID mesh_data; /* of the newest one */
+
+static void end_with_mesh(tool_world *w)
+{
+  tool_end(w);
+  if (mesh_data != NULL) {
+    dGeomTriMeshDataDestroy(mesh_data);
+  }
+  mesh_data = NULL;
+}
+
 typedef struct shape_case {
   const char *name;
   dGeomID (*make)(dSpaceID space);
@@ -167,6 +178,7 @@ static dGeomID make_mesh(dSpaceID space)
   dTriMeshDataID data = dGeomTriMeshDataCreate();
   dGeomTriMeshDataBuildSingle(data, corners, 3 * sizeof(float), 4, indices, 6,
                               3 * sizeof(dTriIndex));
+  mesh_data = data;
   return dCreateTriMesh(space, data, NULL, NULL, NULL);
 }
 
@@ -206,10 +218,175 @@ TEST(every_shape_is_felt_with_the_stiffness)
                  w.state.contacts);
         }
         CHECK(good);
-        tool_end(&w);
+        end_with_mesh(&w);
       }
     }
   }
+}
+
+/* Over the seams of a fan of triangles, level and a little tilted: as over the plane that they are. */
+static dGeomID make_fan(dSpaceID space)
+{
+  static float corners[9 * 3] = {0.003f, 0.001f, 0.0f};
+  static dTriIndex indices[8 * 3];
+  for (int i = 0; i < 8; ++i) {
+    corners[3 * (i + 1)] = 0.2f * cosf(0.785398f * (float)i);
+    corners[3 * (i + 1) + 1] = 0.2f * sinf(0.785398f * (float)i);
+    indices[3 * i] = 0;
+    indices[3 * i + 1] = (dTriIndex)(i + 1);
+    indices[3 * i + 2] = (dTriIndex)((i + 1) % 8 + 1);
+  }
+  dTriMeshDataID data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildSingle(data, corners, 3 * sizeof(float), 9, indices, 24,
+                              3 * sizeof(dTriIndex));
+  mesh_data = data;
+  return dCreateTriMesh(space, data, NULL, NULL, NULL);
+}
+
+TEST(seams_of_a_mesh_are_not_felt)
+{
+  static const double angles[] = {0.0, 0.02, 0.3};
+  for (int m = 0; m < 4; ++m) {
+    for (int i = 0; i < 3; ++i) {
+      tool_world w;
+      tool_begin(&w, all_models[m]);
+      make_fan(w.space);
+      CHECK(tool_start(&w));
+      double low = HALF * (cos(angles[i]) + sin(angles[i]));
+      tool_go(&w, -0.03, 0.002, low + 0.004, angles[i]);
+      tool_run(&w, 60);
+      tool_move(&w, -0.03, 0.002, low - 0.001, angles[i], 100);
+      tool_run(&w, 60);
+      double before = w.state.wrench.force[2];
+      double least = before;
+      double most = before;
+      for (int k = 1; k <= 300; ++k) {
+        tool_move(&w, -0.03 + 0.0002 * k, 0.002, low - 0.001, angles[i], 1);
+        least = fmin(least, w.state.wrench.force[2]);
+        most = fmax(most, w.state.wrench.force[2]);
+        CHECK(fabs(w.state.wrench.force[0]) < 1e-6 && fabs(w.state.wrench.force[1]) < 1e-6);
+      }
+      printf("# model %d at %g rad: %.4f N, then %.4f .. %.4f N\n", (int)all_models[m], angles[i],
+             before, least, most);
+      CHECK(least > 0.8 * before && most < 1.2 * before);
+      CHECK(i == 1 || fabs(before - 1.0) < 1e-6);
+      end_with_mesh(&w);
+    }
+  }
+}
+
+TEST(a_bad_hull_is_refused_with_a_reason)
+{
+  static const double bad[][12] = {
+      {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0},
+      {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 3.0, 0.0, 0.0},
+      {1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 1.0, 2.0, 3.0},
+      {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, (double)NAN},
+      {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 101.0},
+  };
+  static const char *const reasons[] = {"lie in a plane", "lie on a line", "are all at one place",
+                                        "coordinate 2 of point 3", "within 100 m"};
+  tool_world w;
+  hap_pointer_id id;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  CHECK(tool_start(&w));
+  for (int i = 0; i < 5; ++i) {
+    hap_pointer_def def = w.tool_def;
+    def.hull_xyz = bad[i];
+    def.hull_points = 4;
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_detail(w.session, &w.detail) == HAP_OK);
+    if (strstr(w.detail.text, reasons[i]) == NULL) {
+      printf("# \"%s\" does not say \"%s\"\n", w.detail.text, reasons[i]);
+      CHECK(!"the reason");
+    }
+  }
+  static const size_t counts[] = {0, 3, 65};
+  for (int i = 0; i < 3; ++i) {
+    hap_pointer_def def = w.tool_def;
+    def.hull_points = counts[i];
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+  }
+  hap_pointer_def def = w.tool_def;
+  def.hull_xyz = NULL;
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+  def = w.tool_def;
+  def.radius = -1e-9;
+  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_add(w.session, &w.tool_def, &id) == HAP_OK); /* and the good one is good */
+  tool_end(&w);
+}
+
+/* The points were copied. */
+TEST(the_callers_points_may_go)
+{
+  tool_world w;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  tool_add_floor(&w);
+  CHECK(tool_start(&w));
+  memset(w.hull, 0, sizeof w.hull);
+  press(&w, 0.001, 0.0);
+  CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9);
+  tool_end(&w);
+}
+
+/* By a device of 3 dof a tool is moved, and not turned; it gets no torque. */
+TEST(a_device_of_three_degrees_does_not_turn_a_tool)
+{
+  static const double half[3] = {HALF, HALF, HALF};
+  static const double middle[3] = {0.05, 0.0, 0.0};
+  for (int dof = 3; dof <= 6; dof += 3) {
+    tool_world w;
+    char spec[200];
+    tool_begin(&w, HAP_MODEL_CONTACT);
+    tool_set_box(&w, half, middle);
+    tool_add_floor(&w);
+    snprintf(spec, sizeof spec,
+             "virtual:dof=%d,orientation=0.99/0/0.05/0,path=0:0/0/0.02;0.1:0/0/0.009,max_force=100,"
+             "max_torque=10",
+             dof);
+    CHECK(hap_device_open(spec, &w.tool_def.device, &w.detail) == HAP_OK);
+    CHECK(tool_start(&w));
+    CHECK(hap_session_advance(w.session, 200) == HAP_OK);
+    CHECK(hap_pointer_get(w.session, w.tool, &w.state, sizeof w.state) == HAP_OK);
+    if (dof == 3) {
+      CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9); /* level */
+      CHECK(hapi_v3_norm(w.state.wrench.torque) == 0.0);
+    } else {
+      CHECK(w.state.wrench.force[2] > 1.0 && w.state.wrench.torque[1] < -0.04); /* 0.05 rad */
+    }
+    hap_device *device = w.tool_def.device;
+    hap_session_destroy(w.session);
+    w.session = NULL;
+    hap_device_close(device);
+    tool_end(&w);
+  }
+}
+
+/* Scaled hands: what the device gets is the same energy a joule of the world has. */
+TEST(torque_is_scaled_by_force_over_motion)
+{
+  static const double half[3] = {HALF, HALF, HALF};
+  static const double middle[3] = {0.05, 0.0, 0.0};
+  tool_world w;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  tool_set_box(&w, half, middle);
+  w.tool_def.motion_scale = 4.0;
+  w.tool_def.force_scale = 2.0;
+  w.tool_def.max_torque = 0.01; /* N m at the device */
+  tool_add_floor(&w);
+  CHECK(tool_start(&w));
+  tool_go(&w, 0.0, 0.0, 0.25 * (HALF + 0.004), 0.0);
+  tool_run(&w, 60);
+  tool_move(&w, 0.0, 0.0, 0.25 * (HALF - 0.0001), 0.0, 100);
+  tool_run(&w, 60);
+  CHECK_NEAR(w.state.wrench.torque[1], -0.005, 1e-9); /* 0.0025 N m at the device */
+  CHECK(w.state.guard == 0);
+  tool_move(&w, 0.0, 0.0, 0.25 * (HALF - 0.001), 0.0, 100);
+  tool_run(&w, 60);
+  CHECK_NEAR(w.state.wrench.torque[1], -0.02, 1e-9); /* 0.01 N m at the device: its limit */
+  CHECK((w.state.guard & HAP_GUARD_SATURATED) != 0);
+  tool_end(&w);
 }
 
 int main(void)
@@ -220,6 +397,11 @@ int main(void)
   RUN(a_tilted_face_turns_back_as_a_bed_of_springs);
   RUN(no_force_jumps_when_a_tool_tilts_through_flat);
   RUN(every_shape_is_felt_with_the_stiffness);
+  RUN(seams_of_a_mesh_are_not_felt);
+  RUN(a_bad_hull_is_refused_with_a_reason);
+  RUN(the_callers_points_may_go);
+  RUN(a_device_of_three_degrees_does_not_turn_a_tool);
+  RUN(torque_is_scaled_by_force_over_motion);
   dCloseODE();
   return tap_done();
 }

@@ -10,19 +10,16 @@
 /* Contacts of the pointers that are hulls: as those between bodies, with the pointer as the first
  * body. */
 
-/* Points of one key before they are reduced: a mesh has many triangles. */
-#define GROUP_POINTS 128u
-
 typedef struct placed_tool {
   const hapi_near_tool *in;
   hap_pose pose;
   hap_twist twist;
 } placed_tool;
 
+/* The points of one key: of a mesh with many triangles there are many. */
 typedef struct group {
-  hapi_tool_point points[GROUP_POINTS];
-  double gaps[GROUP_POINTS];
-  uint32_t count;
+  hapi_tool_point points[HAPI_TOOL_SPOTS];
+  hapi_tool_spots spots;
   uint32_t pairs;
 } group;
 
@@ -58,10 +55,24 @@ static double margin_of(const hapi_contact *contact, const placed_tool *tool,
   return hapi_pass_margin(contact, speed + hapi_v3_norm(apart));
 }
 
-static bool counts(const hapi_placed_geom *geom, const hapi_patch_point *point)
+/* The corners of a triangle in the world. */
+static void corners_of(const hapi_placed_geom *geom, double out[9])
 {
-  return geom->in->open_edges == 0 ||
-         hapi_mesh_allows(geom->in->open_edges, geom->shape.hull, point->normal);
+  for (int k = 0; k < 3; ++k) {
+    hapi_pose_point(geom->pose.position, geom->pose.quat_wxyz, geom->shape.hull + 3 * k,
+                    out + 3 * k);
+  }
+}
+
+static bool counts(const hapi_placed_geom *geom, hapi_patch_point *io)
+{
+  double corners[9];
+  if (geom->in->open_edges == 0) {
+    return true;
+  }
+  corners_of(geom, corners);
+  hapi_mesh_straighten(corners, io);
+  return hapi_mesh_allows(geom->in->open_edges, corners, io->normal);
 }
 
 static void add_pair(const hapi_contact *contact, const placed_tool *tool,
@@ -80,11 +91,12 @@ static void add_pair(const hapi_contact *contact, const placed_tool *tool,
   if (!hapi_tool_patch(&a, &b, margin_of(contact, tool, &geom), tool->in->extent, &patch)) {
     return;
   }
-  for (int i = 0; i < patch.count && io->count < GROUP_POINTS; ++i) {
+  for (int i = 0; i < patch.count && io->spots.count < HAPI_TOOL_SPOTS; ++i) {
     if (!counts(&geom, &patch.points[i])) {
       continue;
     }
-    hapi_tool_point *out = &io->points[io->count];
+    uint32_t at = io->spots.count++;
+    hapi_tool_point *out = &io->points[at];
     memset(out, 0, sizeof *out);
     out->pointer = tool->in->pointer;
     out->pointer_generation = tool->in->generation;
@@ -94,24 +106,29 @@ static void add_pair(const hapi_contact *contact, const placed_tool *tool,
     out->at.body_a = HAPI_SLOT_NONE;
     out->at.body_b = geom.in->body;
     out->at.generation_b = geom.in->generation;
-    io->gaps[io->count++] = patch.points[i].gap;
+    hapi_v3_copy(out->at.core_a, io->spots.places[at]);
+    hapi_v3_copy(patch.points[i].normal, io->spots.normals[at]);
+    io->spots.gaps[at] = patch.points[i].gap;
   }
   ++io->pairs;
 }
 
 /* Nearest first is the order of the pairs: what finds no room is the farthest. */
-static void take_group(hapi_contact *contact, group *io, hapi_patches *out)
+static void take_group(hapi_contact *contact, const group *in, hapi_patches *out)
 {
-  uint32_t count = io->count;
-  if (io->pairs > 1) {
-    count = hapi_tool_points_reduce(io->points, io->gaps, count);
+  uint32_t kept[HAPI_TOOL_PAIR_POINTS];
+  uint32_t count = in->spots.count;
+  if (in->pairs > 1) {
+    count = hapi_tool_reduce(&in->spots, kept);
   }
   if (out->tool_count + count > contact->config.capacity.tool_points) {
     atomic_fetch_add_explicit(&contact->left_out, 1, memory_order_relaxed);
     return;
   }
-  memcpy(&hapi_patches_tools(out)[out->tool_count], io->points, count * sizeof *io->points);
-  out->tool_count += count;
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t from = in->pairs > 1 ? kept[i] : i;
+    hapi_patches_tools(out)[out->tool_count++] = in->points[from];
+  }
 }
 
 void hapi_tool_pass(hapi_contact *contact, hapi_patches *out)
@@ -123,7 +140,7 @@ void hapi_tool_pass(hapi_contact *contact, hapi_patches *out)
     placed_tool tool;
     uint64_t key = pairs[i].key;
     place_tool(contact, pairs[i].tool, &tool);
-    found.count = found.pairs = 0;
+    found.spots.count = found.pairs = 0;
     for (; i < contact->near->tool_pair_count && pairs[i].key == key; ++i) {
       add_pair(contact, &tool, &pairs[i], &found);
     }

@@ -12,8 +12,6 @@
  * ACCELERANCE have their points from here, each a contact with an A of its own; model CONTACT asks here
  * what is near, and its contact thread finds the points. */
 
-#define POINTS_MOST 128u /* with one geom, before they are reduced: a mesh has many triangles */
-
 /* The pointer in the world, as proximity and the messages see it. */
 static hapi_touch_side side_of_pointer(hapi_physics *physics, uint32_t index, const hap_pose *pose)
 {
@@ -50,7 +48,7 @@ typedef struct search {
   bool has_body;
   double margin;
   uint64_t key;
-  hapi_found_point found[POINTS_MOST];
+  hapi_found_point found[HAPI_TOOL_SPOTS];
   uint32_t count;
   uint32_t patches;
 } search;
@@ -79,9 +77,13 @@ static void add_shape(search *s, hapi_touch_side *other, const double *corners, 
   if (!hapi_tool_patch(&s->tool, other, s->margin, s->pointer->extent, &patch)) {
     return;
   }
-  for (int i = 0; i < patch.count && s->count < POINTS_MOST; ++i) {
-    if (corners == NULL || hapi_mesh_allows(open_edges, corners, patch.points[i].normal)) {
-      add_point(s, other, &patch.points[i]);
+  for (int i = 0; i < patch.count && s->count < HAPI_TOOL_SPOTS; ++i) {
+    hapi_patch_point *point = &patch.points[i];
+    if (corners != NULL) {
+      hapi_mesh_straighten(corners, point);
+    }
+    if (corners == NULL || hapi_mesh_allows(open_edges, corners, point->normal)) {
+      add_point(s, other, point);
     }
   }
   ++s->patches;
@@ -154,26 +156,26 @@ static void add_geom(search *s, dGeomID geom)
   }
 }
 
-/* Of several patches few points, the deepest first. */
 static void reduce(search *s)
 {
-  hapi_tool_point points[POINTS_MOST];
-  double gaps[POINTS_MOST];
+  hapi_tool_spots spots;
+  uint32_t kept[HAPI_TOOL_PAIR_POINTS];
+  hapi_found_point found[HAPI_TOOL_PAIR_POINTS];
   if (s->patches < 2) {
     return;
   }
   for (uint32_t i = 0; i < s->count; ++i) {
-    points[i] = s->found[i].tool;
-    points[i].at.surface = i; /* where it comes from */
-    gaps[i] = s->found[i].gap;
+    hapi_v3_copy(s->found[i].tool.at.core_a, spots.places[i]);
+    hapi_v3_copy(s->found[i].normal, spots.normals[i]);
+    spots.gaps[i] = s->found[i].gap;
   }
-  hapi_found_point kept[HAPI_TOOL_PAIR_POINTS];
-  memset(kept, 0, sizeof kept);
-  uint32_t count = hapi_tool_points_reduce(points, gaps, s->count);
+  spots.count = s->count;
+  uint32_t count = hapi_tool_reduce(&spots, kept);
+  memset(found, 0, sizeof found);
   for (uint32_t i = 0; i < count; ++i) {
-    kept[i] = s->found[points[i].at.surface];
+    found[i] = s->found[kept[i]];
   }
-  memcpy(s->found, kept, count * sizeof kept[0]);
+  memcpy(s->found, found, count * sizeof found[0]);
   s->count = count;
 }
 

@@ -51,7 +51,8 @@ static void measure_axis(span *s, int axis)
     low = fmin(low, hapi_v3_dot(way, s->axes[axis]));
     high = fmax(high, hapi_v3_dot(way, s->axes[axis]));
   }
-  s->sizes[axis] = high - low;
+  bool any = farthest > 1e-9 * s->sizes[0]; /* less is rounding */
+  s->sizes[axis] = any || axis == 0 ? high - low : 0.0;
 }
 
 static hap_status check_span(const double *points, size_t count, hap_detail *detail)

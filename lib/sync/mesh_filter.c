@@ -14,6 +14,30 @@
 #define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
 #define TRIANGLE 8u
 
+#define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
+
+void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
+{
+  double sides[2][3];
+  double own[3];
+  hapi_v3_sub(corners + 3, corners, sides[0]);
+  hapi_v3_sub(corners + 6, corners, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], own);
+  double area = hapi_v3_norm(own);
+  double lean = area > 0.0 ? hapi_v3_dot(own, io->normal) / area : 0.0;
+  if (io->touch != HAPI_TOUCH_FACE_A || fabs(lean) < FLAT_COSINE) {
+    return;
+  }
+  double apart[3];
+  hapi_v3_scale((lean < 0.0 ? -1.0 : 1.0) / area, own, own);
+  hapi_v3_sub(io->core_a, corners, apart);
+  io->touch = HAPI_TOUCH_FACE_B;
+  io->slide = HAPI_SLIDE_NONE;
+  io->gap = hapi_v3_dot(own, apart) - io->ball_a;
+  hapi_v3_copy(own, io->normal);
+  hapi_v3_copy(corners, io->core_b);
+}
+
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
   double sides[3][3];

@@ -2,7 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "sync/touch_local.h"
 
-#include <string.h>
+#include <math.h>
+#include <stdbool.h>
 
 #include "base/vec.h"
 
@@ -79,54 +80,127 @@ bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double 
   return true;
 }
 
-static void swap(hapi_tool_point *points, double *gaps, uint32_t a, uint32_t b)
+/* ---- of many points few ---- */
+
+/* See tool_place.c: on a steeper face what lies behind the deepest points adds nothing. */
+#define SLOPE_MOST 0.08
+#define SAME_COSINE 0.99 /* of the normals: points of one face */
+#define DEEPER 1e-7 /* m: a point that is not more than that deeper than the others adds nothing */
+
+/* Points that push the same way, of those not yet dealt with. */
+typedef struct face {
+  const hapi_tool_spots *in;
+  uint32_t members[HAPI_TOOL_SPOTS];
+  uint32_t count;
+  uint32_t deepest;
+} face;
+
+static double off_line(const face *f, uint32_t index, const uint32_t ends[2], double out_off[3])
 {
-  hapi_tool_point point = points[a];
-  double gap = gaps[a];
-  points[a] = points[b];
-  gaps[a] = gaps[b];
-  points[b] = point;
-  gaps[b] = gap;
+  double line[3];
+  double arm[3];
+  hapi_v3_sub(f->in->places[ends[1]], f->in->places[ends[0]], line);
+  hapi_v3_sub(f->in->places[index], f->in->places[ends[0]], arm);
+  double length2 = hapi_v3_dot(line, line);
+  hapi_v3_madd(arm, length2 > 0.0 ? -hapi_v3_dot(arm, line) / length2 : 0.0, line, out_off);
+  return hapi_v3_norm(out_off);
 }
 
-/* m, of where the points are on the hull; two with the same place and other directions are apart, too. */
-static double apart(const hapi_tool_point *p, const hapi_tool_point *q)
+/* m, what a point's distance from others is worth when it is higher than the deepest. */
+static double worth(const face *f, uint32_t index, double distance)
 {
-  double way[3];
-  double turn[3];
-  hapi_v3_sub(p->at.core_a, q->at.core_a, way);
-  hapi_v3_sub(p->at.normal, q->at.normal, turn);
-  return hapi_v3_norm(way) + p->same_within * hapi_v3_norm(turn);
+  return distance - (f->in->gaps[index] - f->in->gaps[f->deepest]) / SLOPE_MOST;
 }
 
-static double nearest_chosen(const hapi_tool_point *points, uint32_t chosen, uint32_t index)
+static uint32_t farthest_from(const face *f, uint32_t from)
 {
-  double nearest = HUGE_VAL;
-  for (uint32_t i = 0; i < chosen; ++i) {
-    nearest = fmin(nearest, apart(&points[i], &points[index]));
+  uint32_t best = from;
+  double most = 0.0;
+  for (uint32_t i = 0; i < f->count; ++i) {
+    double way[3];
+    hapi_v3_sub(f->in->places[f->members[i]], f->in->places[from], way);
+    double value = worth(f, f->members[i], hapi_v3_norm(way));
+    if (value > most) {
+      most = value;
+      best = f->members[i];
+    }
   }
-  return nearest;
+  return best;
 }
 
-uint32_t hapi_tool_points_reduce(hapi_tool_point *points, double *gaps, uint32_t count)
+/* The farthest from a line, on the other side than `beside` where that is not NULL. */
+static uint32_t farthest_off(const face *f, const uint32_t ends[2], const double *beside)
 {
+  uint32_t best = ends[0];
+  double most = 0.0;
+  for (uint32_t i = 0; i < f->count; ++i) {
+    double off[3];
+    double distance = worth(f, f->members[i], off_line(f, f->members[i], ends, off));
+    if (distance > most && (beside == NULL || hapi_v3_dot(off, beside) < 0.0)) {
+      most = distance;
+      best = f->members[i];
+    }
+  }
+  return best;
+}
+
+static bool add_index(uint32_t *kept, uint32_t *io_count, uint32_t index)
+{
+  for (uint32_t i = 0; i < *io_count; ++i) {
+    if (kept[i] == index) {
+      return false;
+    }
+  }
+  if (*io_count < HAPI_TOOL_PAIR_POINTS) {
+    kept[(*io_count)++] = index;
+  }
+  return true;
+}
+
+/* Its corners, and its deepest point where none of them is. */
+static void keep_face(const face *f, uint32_t *kept, uint32_t *io_count)
+{
+  double beside[3];
+  uint32_t ends[2] = {farthest_from(f, f->deepest), 0};
+  ends[1] = farthest_from(f, ends[0]);
+  uint32_t third = farthest_off(f, ends, NULL);
+  (void)off_line(f, third, ends, beside);
+  const uint32_t corners[4] = {ends[0], ends[1], third, farthest_off(f, ends, beside)};
+  double least = HUGE_VAL;
+  for (int i = 0; i < 4; ++i) {
+    least = fmin(least, f->in->gaps[corners[i]]);
+  }
+  if (f->in->gaps[f->deepest] < least - DEEPER) {
+    (void)add_index(kept, io_count, f->deepest);
+  }
+  for (int i = 0; i < 4; ++i) {
+    (void)add_index(kept, io_count, corners[i]);
+  }
+}
+
+uint32_t hapi_tool_reduce(const hapi_tool_spots *in, uint32_t out_kept[HAPI_TOOL_PAIR_POINTS])
+{
+  bool done[HAPI_TOOL_SPOTS] = {false};
   uint32_t kept = 0;
-  for (; kept < count && kept < HAPI_TOOL_PAIR_POINTS; ++kept) {
-    uint32_t best = kept;
-    double best_worth = -HUGE_VAL;
-    for (uint32_t i = kept; i < count; ++i) {
-      double worth = kept == 0 ? -gaps[i] : nearest_chosen(points, kept, i);
-      if (worth > best_worth) {
-        best = i;
-        best_worth = worth;
+  for (;;) {
+    uint32_t first = HAPI_TOOL_SPOTS; /* the deepest of what is left */
+    for (uint32_t i = 0; i < in->count; ++i) {
+      if (!done[i] && (first == HAPI_TOOL_SPOTS || in->gaps[i] < in->gaps[first])) {
+        first = i;
       }
     }
-    if (kept > 0 && best_worth < 0.02 * points[0].same_within) {
-      break; /* what is left repeats what there is: seams of triangles */
+    if (first == HAPI_TOOL_SPOTS || kept == HAPI_TOOL_PAIR_POINTS) {
+      return kept;
     }
-    swap(points, gaps, kept, best);
+    face f = {.in = in, .deepest = first};
+    for (uint32_t i = 0; i < in->count; ++i) {
+      if (!done[i] && hapi_v3_dot(in->normals[i], in->normals[first]) > SAME_COSINE) {
+        f.members[f.count++] = i;
+        done[i] = true;
+      }
+    }
+    keep_face(&f, out_kept, &kept);
   }
-  return kept;
 }
 
 uint64_t hapi_tool_key(uint64_t geom_key, uint32_t pointer, uint32_t generation)

@@ -24,17 +24,25 @@ void hapi_touch_localise(const hapi_touch_side *a, const hapi_touch_side *b,
 bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double margin,
                      double extent, hapi_patch *out);
 
-/* Points of a pointer's hull with one mesh: of more than a few the deepest, and those that are farthest
- * from each other and from its direction. gaps: of the points, in their order; both are sorted. Returns
- * how many there are left. */
-uint32_t hapi_tool_points_reduce(hapi_tool_point *points, double *gaps, uint32_t count);
+#define HAPI_TOOL_SPOTS 128u      /* of a hull and a mesh, before they are reduced */
+#define HAPI_TOOL_PAIR_POINTS 12u /* ... and after */
+
+/* Where a hull touches the triangles of a mesh. */
+typedef struct hapi_tool_spots {
+  double places[HAPI_TOOL_SPOTS][3];  /* m, on the hull */
+  double normals[HAPI_TOOL_SPOTS][3]; /* world */
+  double gaps[HAPI_TOOL_SPOTS];
+  uint32_t count;
+} hapi_tool_spots;
+
+/* What is enough of them: of those that push the same way the corners and the deepest. Else the seams of
+ * triangles would have shares of the stiffness. Returns how many. */
+uint32_t hapi_tool_reduce(const hapi_tool_spots *in, uint32_t out_kept[HAPI_TOOL_PAIR_POINTS]);
 
 /* Of the same pair, by what a and b are. */
 uint64_t hapi_tool_key(uint64_t geom_key, uint32_t pointer, uint32_t generation);
 
 /* How far apart two points of a hull of that extent may be to be one that went on. */
 double hapi_tool_same_within(double extent);
-
-#define HAPI_TOOL_PAIR_POINTS 8u /* of a pointer's hull and a mesh, at most */
 
 #endif
