@@ -166,12 +166,131 @@ TEST(momentum_and_spin_go_to_a_free_body)
   }
 }
 
+/* What is pressed goes: the body, then the pointer. */
+TEST(a_body_and_a_tool_may_go_while_they_touch)
+{
+  static const double half[3] = {0.02, 0.02, 0.02};
+  for (int m = 0; m < 4; ++m) {
+    tool_world w;
+    tool_begin(&w, all_models[m]);
+    dWorldSetContactSurfaceLayer(w.world, 1e-4);
+    tool_add_floor(&w);
+    dBodyID body = add_box(&w, 1.0, half, (const double[3]){0.0, 0.0, 0.0199});
+    dGeomID geom = dBodyGetFirstGeom(body);
+    CHECK(tool_start(&w));
+    tool_go(&w, 0.0, 0.0, 0.0399 + HALF + 0.004, 0.0);
+    tool_run(&w, 60);
+    tool_move(&w, 0.0, 0.0, 0.0399 + HALF - 0.001, 0.0, 100);
+    tool_run(&w, 100);
+    CHECK_NEAR(w.state.wrench.force[2], 1.0, 0.02);
+    CHECK(hap_session_lock(w.session) == HAP_OK);
+    CHECK(hap_session_forget_geom(w.session, geom) == HAP_OK);
+    CHECK(hap_session_forget_body(w.session, body) == HAP_OK);
+    dGeomDestroy(geom);
+    dBodyDestroy(body);
+    CHECK(hap_session_unlock(w.session) == HAP_OK);
+    tool_run(&w, 60);
+    CHECK(hapi_v3_norm(w.state.wrench.force) == 0.0 && w.state.contacts == 0);
+    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(&w, 60);
+    tool_move(&w, 0.0, 0.0, HALF - 0.001, 0.0, 100);
+    tool_run(&w, 60);
+    CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9);
+    CHECK(hap_pointer_remove(w.session, w.tool) == HAP_OK);
+    CHECK(hap_session_advance(w.session, 60) == HAP_OK);
+    CHECK(hap_pointer_add(w.session, &w.tool_def, &w.tool) == HAP_OK); /* in its place */
+    w.state.stamp_ns = 0;
+    tool_run(&w, 200);
+    CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9);
+    tool_end(&w);
+  }
+}
+
+/* Deep at once, and turned over in a tick: what a hand cannot have done gives no blow. */
+TEST(a_tool_that_arrives_deep_comes_in_slowly)
+{
+  for (int m = 0; m < 4; ++m) {
+    tool_world w;
+    tool_begin(&w, all_models[m]);
+    tool_add_floor(&w);
+    CHECK(tool_start(&w));
+    tool_go(&w, 0.0, 0.0, HALF - 0.005, 0.0);
+    tool_run(&w, 100);
+    printf("# model %d: %.3f N, at most %.3f N a tick\n", (int)all_models[m],
+           w.state.wrench.force[2], w.steepest);
+    CHECK_NEAR(w.state.wrench.force[2], 5.0, 1e-9);
+    CHECK(w.steepest <= 0.3); /* 5 N in 20 ms */
+    tool_end(&w);
+  }
+}
+
+/* A stack of three cubes of 2 g under a tool that presses, tilts and turns on it: it stays, and the hand gets
+ * nothing back that it did not put in. */
+TEST(a_stack_of_light_cubes_stays_calm_under_a_tool)
+{
+  static const double half[3] = {HALF, HALF, HALF};
+  tool_world w;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  dWorldSetContactSurfaceLayer(w.world, 1e-4);
+  dWorldSetQuickStepNumIterations(w.world, 100);
+  tool_add_floor(&w);
+  dBodyID cubes[3];
+  for (int i = 0; i < 3; ++i) {
+    cubes[i] =
+        add_box(&w, 0.002, half, (const double[3]){0.0, 0.0, HALF + (2 * HALF - 1e-4) * i - 1e-4});
+  }
+  CHECK(tool_start(&w));
+  double top = 6 * HALF - 3e-4;
+  tool_go(&w, 0.0, 0.0, top + HALF + 0.004, 0.0);
+  tool_run(&w, 60);
+  tool_move(&w, 0.0, 0.0, top + HALF - 0.003, 0.0, 150);
+  for (int i = 0; i < 2000; ++i) {
+    tool_go(&w, 0.0, 0.0, top + HALF - 0.003, 0.01 * sin(0.02 * i));
+    w.twist.angular[1] = 0.01 * 20.0 * cos(0.02 * i);
+    tool_step(&w);
+  }
+  CHECK_NEAR(w.state.wrench.force[2], 3.0, 0.1);
+  CHECK(w.steepest < 0.1);
+  CHECK(w.work_most < 0.01 * 0.5 * K * 0.003 * 0.003);
+  CHECK(hap_session_stop(w.session) == HAP_OK);
+  for (int i = 0; i < 3; ++i) {
+    const dReal *at = dBodyGetPosition(cubes[i]);
+    printf("# cube %d at %.3f %.3f %.3f mm\n", i, 1e3 * at[0], 1e3 * at[1], 1e3 * at[2]);
+    CHECK(fabs(at[0]) + fabs(at[1]) < 1e-3);
+  }
+  printf("# the hand got at most %.3g J, and %.3g J at the end\n", w.work_most, w.work);
+  tool_end(&w);
+}
+
+/* Between two walls that are nearer to each other than the tool is wide. */
+TEST(a_tool_wedged_between_walls_is_held_in_the_middle)
+{
+  for (int m = 0; m < 4; ++m) {
+    tool_world w;
+    tool_begin(&w, all_models[m]);
+    for (int side = -1; side <= 1; side += 2) {
+      dGeomID wall = dCreateBox(w.space, 0.1, 0.2, 0.2);
+      dGeomSetPosition(wall, side * (0.05 + HALF - 0.0005), 0.0, 0.0);
+    }
+    CHECK(tool_start(&w));
+    tool_go(&w, 0.0002, 0.0, 0.0, 0.0);
+    tool_run(&w, 400);
+    CHECK_NEAR(w.state.wrench.force[0], -K * 0.0004, 1e-9);
+    CHECK(w.state.contacts == 8);
+    tool_end(&w);
+  }
+}
+
 int main(void)
 {
   dInitODE2(0);
   RUN(a_pushed_cube_feels_as_if_the_world_were_stepped_at_the_haptic_rate);
   RUN(several_bodies_are_felt_at_once);
   RUN(momentum_and_spin_go_to_a_free_body);
+  RUN(a_body_and_a_tool_may_go_while_they_touch);
+  RUN(a_tool_that_arrives_deep_comes_in_slowly);
+  RUN(a_stack_of_light_cubes_stays_calm_under_a_tool);
+  RUN(a_tool_wedged_between_walls_is_held_in_the_middle);
   dCloseODE();
   return tap_done();
 }
