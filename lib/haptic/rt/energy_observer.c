@@ -19,6 +19,8 @@
  *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
  *            a spring that is under load: the world's work, to either side. What is in the spring of a
  *            contact that is no more is lost.
+ *   shares   that the points of a hull have of its stiffness are no entry: what their changes make is to be
+ *            paid by the hand, which made them by tilting the hull.
  *
  * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
  * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
@@ -207,10 +209,10 @@ static double ramps_give(hapi_tick *tick)
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
     hapi_ramp *r = &c->ramp;
     double share = r->share * p->guard.felt;
-    double energy = spring_energy(p, share, r->depth - r->excess);
+    double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
-      sum += energy - spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - r->felt_excess);
       r->felt_share = share;
       r->felt_excess = r->excess;
     }

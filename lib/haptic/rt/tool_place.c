@@ -179,7 +179,7 @@ static void follow_pair(hapi_tick *tick, hapi_tool_pair *pair, hapi_local_contac
       continue;
     }
     tool->felt = share * c->weight;
-    c->ramp.share = tool->felt;
+    c->ramp.share = share;
     c->ramp.depth = tool->depth;
     c->ramp.excess = pair->ramp.excess;
     tool->depth -= pair->ramp.excess;
