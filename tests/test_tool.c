@@ -429,6 +429,12 @@ TEST(a_tools_proxy_yields_along_and_turns)
   CHECK(force > 0.05);
   CHECK_NEAR(-KV * sink, force, 1e-6); /* the coupling's spring */
   CHECK_NEAR(kr * turn, torque, 1e-6);
+  hap_pose proxy;
+  hap_pose device;
+  CHECK(hap_pointer_poses(w.session, w.tool, hap_session_now(w.session) + (int64_t)40e6, &proxy,
+                          &device) >= HAP_OK);
+  CHECK_NEAR(2.0 * asin(proxy.quat_wxyz[2]), turn, 1e-9); /* drawn as it is felt */
+  CHECK(device.quat_wxyz[0] == 1.0 && proxy.quat_wxyz[2] != 0.0);
   CHECK(torque < -0.01 * force && torque > -0.03 * force); /* the push lies under the face */
   tool_end(&w);
 }

@@ -171,7 +171,7 @@ HAP_API hap_status hap_pointer_get(const hap_session *session, hap_pointer_id po
 
 /* [any] For drawing: the pointer (out_proxy) and the device (out_device) in the world at the time that
  * hap_session_poses draws for time_ns, so that the drawn hand touches the drawn body. Either may be
- * NULL. The two are apart only for a pointer that is a proxy; both turn with the device.
+ * NULL. The two are apart only for a pointer that is a proxy; a sphere turns with the device also then.
  * HAP_STALE, HAP_CLAMPED: as hap_session_poses. HAP_ERROR_NOT_FOUND, and nothing is written: no such
  * pointer, or no tick has had it yet. The newest: hap_pointer_get. */
 HAP_API hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,

@@ -113,7 +113,8 @@ static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
     const hapi_tick_pointer *p = &tick->pointers[i];
     store(places[i].proxy, p->pose.position, 3);
     store(places[i].device, p->handle_position, 3);
-    store(places[i].quat_wxyz, p->pose.quat_wxyz, 4);
+    store(places[i].proxy_quat, p->pose.quat_wxyz, 4);
+    store(places[i].device_quat, p->handle_quat, 4);
     atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
     atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
   }
