@@ -35,8 +35,7 @@ static void add_wall(scene *s, dBodyID body, const double edges[3], double x, do
   dGeomSetOffsetPosition(wall, x, y, 0);
 }
 
-/* A block on the floor with a square hole through it, which stands on the table as free as the floor's
- * friction lets it: its first geom is a wall of the hole, like the other three. */
+/* A block on the floor with a square hole through it, as free as the floor's friction lets it: four walls. */
 void scene_build_peg(scene *s)
 {
   const scene_parameters *p = &s->parameters;
@@ -50,9 +49,9 @@ void scene_build_peg(scene *s)
   const dBodyID block = scene_add_box(s, (const double[3]){wall, outer, height}, p->mass,
                                       (const double[3]){0, 0, height / 2 - p->layer});
   dGeomSetOffsetPosition(dBodyGetFirstGeom(block), -middle, 0, 0);
-  add_wall(s, block, (const double[3]){wall, outer, height}, middle, 0);
   add_wall(s, block, (const double[3]){hole, wall, height}, 0, -middle);
   add_wall(s, block, (const double[3]){hole, wall, height}, 0, middle);
+  add_wall(s, block, (const double[3]){wall, outer, height}, middle, 0); /* ODE's first geom */
   dMassSetBoxTotal(&mass, p->mass, outer, outer, height);
   dBodySetMass(block, &mass);
 }
