@@ -149,7 +149,7 @@ typedef enum hap_guard_flag {
 /* What a pointer is doing, of its last tick. */
 typedef struct hap_pointer_state {
   uint32_t size;             /* bytes that were filled in */
-  uint32_t contacts;         /* bodies that push back now */
+  uint32_t contacts;         /* bodies that push back now; of a tool the points at which they do */
   int64_t stamp_ns;          /* of the tick */
   hap_pose device;           /* device's frame */
   hap_pose proxy;            /* pointer in the world: of the proxy where there is one */
