@@ -596,6 +596,13 @@ TEST(bad_specs_say_why)
       {"virtual:max_force=0", "max_force"},
       {"virtual:orientation=0/0/0/0", "orientation"},
       {"virtual:dof=4", "3 or 6"},
+      {"virtual:turn=0:0/0/0", "turn needs dof=6"},
+      {"virtual:device_turn_damping=1,dof=3", "needs dof=6"},
+      {"virtual:dof=6,turn=0:0/0", "turn: waypoint 1: expected T:rx/ry/rz"},
+      {"virtual:dof=6,turn=0:0/0/0;1:0/3.1/0", "waypoint 2 is a turn by 3.1 rad"},
+      {"virtual:dof=6,turn=0:0/0/0;1:0/1/0,loop=1", "the turn must end where it begins"},
+      {"virtual:dof=6,turn_hz=2", "without turn_sine"},
+      {"virtual:dof=6,hand=rigid,inertia=1", "rigid"},
       {"virtual:start=1e300", "start"}};
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
     hap_device *device = NULL;

@@ -183,19 +183,9 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
   if (!entries[PATH].given) {
     return HAP_OK;
   }
-  hap_status status =
-      hapi_motion_set_path(motion, entries[PATH].text, entries[PATH].length, detail);
-  if (status < 0 || !motion->loop) {
-    return status;
-  }
-  const hapi_waypoint *last = &motion->waypoints[motion->count - 1];
-  double jump[3];
-  hapi_v3_sub(last->position, motion->waypoints[0].position, jump);
-  if (hapi_v3_norm(jump) > 1e-9) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "virtual: loop=1 would jump: the path must end where it begins");
-  }
-  return HAP_OK;
+  const hapi_motion_text text = {"path", "T:x/y/z in s and m (at most 1000 m)", entries[PATH].text,
+                                 entries[PATH].length};
+  return hapi_motion_set_path(motion, &text, detail);
 }
 
 static hap_status set_turning(virtual_device *device, const hapi_argument *entries,
@@ -218,8 +208,9 @@ static hap_status set_turning(virtual_device *device, const hapi_argument *entri
   if (!entries[TURN].given) {
     return HAP_OK;
   }
-  hap_status status =
-      hapi_motion_set_path(turning, entries[TURN].text, entries[TURN].length, detail);
+  const hapi_motion_text text = {"turn", "T:rx/ry/rz in s and rad", entries[TURN].text,
+                                 entries[TURN].length};
+  hap_status status = hapi_motion_set_path(turning, &text, detail);
   for (size_t i = 0; status >= HAP_OK && i < turning->count; ++i) {
     if (!(hapi_v3_norm(turning->waypoints[i].position) <= TURN_MOST)) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
