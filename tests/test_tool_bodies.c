@@ -166,6 +166,38 @@ TEST(momentum_and_spin_go_to_a_free_body)
   }
 }
 
+/* In a joint that the loop does not have the body is measured, and a tool that meets it first of all has its
+ * response as well. */
+TEST(a_measured_body_answers_to_a_tool)
+{
+  static const double half[3] = {0.02, 0.02, 0.02};
+  tool_world w;
+  double impulse = 0.0;
+  hap_stats stats;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  dWorldSetGravity(w.world, 0.0, 0.0, 0.0);
+  dBodyID body = add_box(&w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
+  dJointID plane = dJointCreatePlane2D(w.world, NULL);
+  dJointAttach(plane, body, NULL);
+  CHECK(tool_start(&w));
+  tool_go(&w, -0.034, 0.005, 0.0, 0.0);
+  tool_run(&w, 60);
+  for (int i = 0; i < 160; ++i) {
+    tool_move(&w, -0.034 + 0.0001 * fmin(i, 80), 0.005, 0.0, 0.0, 1);
+    impulse -= 1e-3 * w.state.wrench.force[0];
+  }
+  CHECK(hap_session_stats(w.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.measured_bodies == 1);
+  tool_go(&w, -0.2, 0.0, 0.0, 0.0);
+  tool_run(&w, 100);
+  CHECK(hap_session_stop(w.session) == HAP_OK);
+  printf("# %.5f of %.5f N s\n", 0.5 * dBodyGetLinearVel(body)[0], impulse);
+  CHECK(impulse > 0.01 && impulse < 0.2);
+  CHECK_NEAR(0.5 * dBodyGetLinearVel(body)[0], impulse, 0.02 * impulse);
+  CHECK(fabs(dBodyGetAngularVel(body)[2]) > 0.05); /* it was pushed beside its middle */
+  tool_end(&w);
+}
+
 /* What is pressed goes: the body, then the pointer. */
 TEST(a_body_and_a_tool_may_go_while_they_touch)
 {
@@ -325,6 +357,7 @@ int main(void)
   RUN(a_pushed_cube_feels_as_if_the_world_were_stepped_at_the_haptic_rate);
   RUN(several_bodies_are_felt_at_once);
   RUN(momentum_and_spin_go_to_a_free_body);
+  RUN(a_measured_body_answers_to_a_tool);
   RUN(a_body_and_a_tool_may_go_while_they_touch);
   RUN(a_tool_that_arrives_deep_comes_in_slowly);
   RUN(no_round_on_a_wall_gives_energy);
