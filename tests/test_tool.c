@@ -89,8 +89,8 @@ TEST(no_force_jumps_when_a_tool_tilts_through_flat)
     tool_move(&w, 0.0, 0.0, HALF - 0.002, 0.3, 1000);
     printf("# model %d: at most %.4f N and %.6f N m a tick\n", (int)all_models[i], w.steepest,
            w.steepest_torque);
-    CHECK(w.steepest < 0.15);
-    CHECK(w.steepest_torque < 0.002);
+    CHECK(w.steepest < 0.04);
+    CHECK(w.steepest_torque < 0.001);
     tool_end(&w);
   }
 }
