@@ -25,10 +25,11 @@ typedef struct accuracy_scene {
   const char *recording; /* file of HAPODE_SHARED/data that moves the hand; NULL: the scene's own */
   double seconds;        /* of the window; 0: the scene's own */
   double seconds_quick;  /* 0: the same */
-  double bound;          /* force error of model contact at 20 Hz; at 60 Hz half of it */
-  int starts_quick;      /* a long run at 1000 iterations is dear; 0: all */
-  bool speeds;           /* the hand's motion can be made faster and slower */
-  bool rests;            /* the hand hardly moves: that is the scene */
+  double bound;      /* error of force and torque of model contact at 20 Hz; at 60 Hz half of it */
+  int starts_quick;  /* a long run at 1000 iterations is dear; 0: all */
+  double start_most; /* m: from farther off it is another scene; 0: all starts */
+  bool speeds;       /* the hand's motion can be made faster and slower */
+  bool rests;        /* the hand hardly moves: that is the scene */
 } accuracy_scene;
 
 const accuracy_scene *accuracy_scene_at(size_t index); /* NULL past the end */
@@ -116,7 +117,7 @@ typedef struct accuracy_row {
   double hand_speed;
   double rest_share;
   double start_um; /* the worst start */
-  double bound;    /* on errors.force; 0: none */
+  double bound;    /* on errors.force and .torque; 0: none */
 } accuracy_row;
 
 typedef struct accuracy_table {

@@ -7,7 +7,7 @@
 #include "bench/accuracy.h"
 
 /* A device's own limit would be part of the comparison. */
-#define NO_LIMIT ",hand=rigid,max_force=1000"
+#define NO_LIMIT ",hand=rigid,max_force=1000,max_torque=1000"
 
 /* A finger that comes down to the row and pushes it along: turned and shifted so that it meets the
  * first cube's face. The window has one push; later ones meet a row that lies still. */
@@ -36,6 +36,8 @@ static const accuracy_scene scenes[] = {
     {.name = "lightstand", .base = "lightstand", .bound = 0.03, .starts_quick = 3},
     {.name = "telescope", .base = "telescope", .bound = 0.03, .starts_quick = 3},
     {.name = "grasp", .base = "grasp", .bound = 0.03, .speeds = true},
+    {.name = "lever", .base = "lever", .bound = 0.03, .starts_quick = 3},
+    {.name = "peg", .base = "peg", .bound = 0.08, .starts_quick = 3, .start_most = 2e-4},
     {.name = "hold", .base = "hold", .seconds_quick = 3, .starts_quick = 2, .rests = true},
     {.name = "recorded",
      .base = "row10",
@@ -69,12 +71,12 @@ static void write_part(writer *w, const char *part, size_t length)
   w->text[w->used] = '\0';
 }
 
-/* "path=T:x/y/z;T:x/y/z" with each T stretched; false: no such thing. */
+/* "path=T:x/y/z;T:x/y/z", or turn= for path=, with each T stretched; false: no such thing. */
 static bool write_path(writer *w, const char *path, size_t length, double stretch)
 {
   const char *end = path + length;
   const char *at = path + strlen("path=");
-  write_part(w, path, strlen("path="));
+  write_part(w, path, strlen("path=")); /* as long as the other one */
   while (at < end) {
     char *after = NULL;
     char time[32];
@@ -111,7 +113,7 @@ bool accuracy_hand(const char *spec, double stretch, char *out, size_t size)
       write_part(&w, ",", 1);
     }
     first = false;
-    if (strncmp(at, "path=", 5) != 0) {
+    if (strncmp(at, "path=", 5) != 0 && strncmp(at, "turn=", 5) != 0) {
       write_part(&w, at, length);
     } else if (!write_path(&w, at, length, stretch)) {
       return false;

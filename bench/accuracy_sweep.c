@@ -42,8 +42,8 @@ typedef struct sweep {
   size_t start[ACCURACY_STARTS_MAX]; /* indices into starts */
   accuracy_motion references[ACCURACY_STARTS_MAX];
   double noise_floor;
-  double torque_floor;
-  size_t worst; /* index of the worst start in the newest row */
+  double torque_floor; /* the same of the torque */
+  size_t worst;        /* index of the worst start in the newest row */
 } sweep;
 
 /* What is run beside the default, and how the table calls it. */
@@ -384,6 +384,15 @@ static hap_status set_hands(sweep *s, double stretch)
   return HAP_OK;
 }
 
+static size_t starts_of(const accuracy_scene *which)
+{
+  size_t count = ACCURACY_STARTS_MAX;
+  while (which->start_most > 0.0 && count > 2 && starts[count - 1] > which->start_most) {
+    --count;
+  }
+  return count;
+}
+
 static hap_status begin_sweep(bench *b, const accuracy_scene *which, accuracy_table *table,
                               sweep *s)
 {
@@ -400,10 +409,11 @@ static hap_status begin_sweep(bench *b, const accuracy_scene *which, accuracy_ta
                : which->seconds > 0.0                 ? which->seconds
                                                       : base->duration;
   size_t fewer = b->quick ? (size_t)which->starts_quick : 0;
-  s->start_count = fewer > 0 ? fewer : ACCURACY_STARTS_MAX;
+  size_t all = starts_of(which);
+  s->start_count = fewer > 0 ? fewer : all;
   for (size_t i = 0; i < s->start_count; ++i) {
     /* the smallest ones, and of fewer starts the last is the largest */
-    s->start[i] = i > 1 && i + 1 == s->start_count ? ACCURACY_STARTS_MAX - 1 : i;
+    s->start[i] = i > 1 && i + 1 == s->start_count ? all - 1 : i;
   }
   return set_hands(s, 1.0);
 }

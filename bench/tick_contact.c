@@ -26,12 +26,19 @@
 #define BARE_SHARE 0.75   /* of ten bodies, of plain ODE's time */
 #define LARGE_NS 200000.0 /* 64 bodies and about 700 contacts */
 #define PASS_NS 25000.0   /* ten bodies */
+#define TOOL_NS 60000.0   /* a tool in three contacts and more with a stand of four bodies */
 
 /* 2 mm in front of the first cube, and through it from there. */
 static const char *const at_rest = "virtual:path=0:-0.012/0/0.025,hand=rigid";
 static const char *const pushed =
     "virtual:path=0:-0.012/0/0.025;2:0.188/0/0.025,blend=linear,hand=rigid";
 
+/* A tool flat on the head of the stand, which turns and slides there. */
+static const char *const tool_pressed =
+    "virtual:dof=6,path=0:0.092/0/0.275;0.2:0.092/0/0.2688;2:0.097/0.003/0.2686,"
+    "turn=0:0/0/0;0.2:0/0/0;2:0/0/0.3,hand=rigid";
+
+#define TOOL_ROUNDING 1e-3 /* m */
 #define HANDS_MAX 16
 #define HAND_PITCH 0.01 /* m, of four by four in front of a face */
 
@@ -43,6 +50,7 @@ typedef struct tick_case {
   bool push;
   double bound_ns; /* 0: none, or that of ten bodies */
   int hands;       /* 0: one */
+  double tool[3];  /* m, edges of a box that is the pointer; 0: a sphere */
 } tick_case;
 
 static const tick_case cases[] = {
@@ -60,7 +68,8 @@ static const tick_case cases[] = {
     {"wall8x8", "row10", 64, {8, 1, 8}, true, 0.0},
     {"block4x4x4", "row10", 64, {4, 4, 4}, false, 0.0},
     {"block4x4x4", "row10", 64, {4, 4, 4}, true, 0.0},
-    {"hands16", "row10", 10, {0, 0, 0}, true, 0.0, HANDS_MAX},
+    {"hands16", "row10", 10, {0, 0, 0}, true, 0.0, HANDS_MAX, {0.0}},
+    {"tool", "lightstand", 0, {0, 0, 0}, true, TOOL_NS, 0, {0.04, 0.04, 0.02}},
 };
 
 /* What a tick is measured by. */
@@ -81,6 +90,7 @@ enum {
 
 typedef struct tick_bed {
   const tick_case *what;
+  scene_parameters parameters;
   rig rig;
   bare bare;
   hapi_tick copy;
@@ -115,7 +125,7 @@ static void arrange(const scene *s, const int block[3])
 
 static void put_hands(const tick_case *what, char specs[HANDS_MAX][160], rig_options *out)
 {
-  out->devices[0] = what->push ? pushed : at_rest;
+  out->devices[0] = what->tool[0] > 0.0 ? tool_pressed : what->push ? pushed : at_rest;
   out->device_count = 1;
   for (int i = 0; i < what->hands; ++i) {
     const int place[2] = {i % 4, i / 4};
@@ -136,7 +146,10 @@ static hap_status open_bed(bench *b, const tick_case *what, tick_bed *t)
   t->what = what;
   t->ticks = b->quick ? 200 : 1000;
   rig_options_init(&options);
-  options.parameters = cycles_scene(what->scene);
+  t->parameters = *cycles_scene(what->scene);
+  memcpy(t->parameters.tool, what->tool, sizeof t->parameters.tool);
+  t->parameters.radius = what->tool[0] > 0.0 ? TOOL_ROUNDING : t->parameters.radius;
+  options.parameters = &t->parameters;
   options.count = what->count;
   put_hands(what, specs, &options);
   options.def.drive = HAP_DRIVE_LOCKSTEP;

@@ -45,6 +45,19 @@ static void copy_world(hapi_local_world *copy, const hapi_local_world *own,
   memcpy(copy->joints, from->joints, from->joint_count * sizeof *copy->joints);
 }
 
+/* The hulls themselves stay where they are: nobody writes to them. */
+static void copy_tools(hapi_tool_world *copy, const hapi_tool_world *own,
+                       const hapi_tool_world *from)
+{
+  copy->tools = own->tools;
+  copy->old_tools = own->old_tools;
+  copy->old_contacts = own->old_contacts;
+  copy->pairs = own->pairs;
+  copy->hulls = own->hulls;
+  memcpy(copy->tools, from->tools, from->count * sizeof *copy->tools);
+  memcpy(copy->pairs, from->pairs, from->pair_count * sizeof *copy->pairs);
+}
+
 void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
 {
   const hapi_capacity *c = &from->capacity;
@@ -67,6 +80,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   memcpy(copy->frictions, from->frictions, c->contacts * sizeof *copy->frictions);
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
   copy_world(&copy->world, &own.world, &from->world);
+  copy_tools(&copy->tool, &own.tool, &from->tool);
   memcpy(copy->world.joint_memory, from->world.joint_memory,
          c->joints * sizeof *copy->world.joint_memory);
 }

@@ -80,4 +80,8 @@ void scene_build_hinged(scene *s);
 void scene_build_cart(scene *s);
 void scene_build_chain(scene *s);
 
+/* tools.c */
+void scene_build_lever(scene *s);
+void scene_build_peg(scene *s);
+
 #endif

@@ -17,20 +17,22 @@
 /* The row of the parameter table that a scene is built from. SI units. */
 typedef struct scene_parameters {
   const char *name;
-  const char *text;                      /* one line: what happens */
-  int count_default;                     /* N of "name:N"; 0: the scene has no N */
-  double mass;                           /* kg, of the bodies that are pushed */
-  double size;                           /* m, edge of the cubes or the like */
-  double mu;                             /* friction, 0 or more, dInfinity allowed */
-  double gravity;                        /* m/s^2, downwards along -z */
-  double gap;                            /* m, between bodies at the start (fig5: to the pointer,
+  const char *text;  /* one line: what happens */
+  int count_default; /* N of "name:N"; 0: the scene has no N */
+  double mass;       /* kg, of the bodies that are pushed */
+  double size;       /* m, edge of the cubes or the like */
+  double mu;         /* friction, 0 or more, dInfinity allowed */
+  double gravity;    /* m/s^2, downwards along -z */
+  double gap;        /* m, between bodies at the start (fig5: to the pointer,
                                             wedge: to the wall); slightly negative: they touch */
-  double radius;                         /* m, of the pointer */
-  double stiffness;                      /* N/m, pointer contact */
-  double damping;                        /* N s/m, pointer contact */
-  double duration;                       /* s, a run that shows the scene */
-  int iterations;                        /* QuickStep */
-  int pointers;                          /* 1 .. SCENE_POINTERS_MAX */
+  double radius;     /* m, of the pointer; of a tool: of its rounding */
+  double tool[3];    /* m, edges of the box that the pointer is, its rounding not
+                                            counted; 0: it is a sphere */
+  double stiffness;  /* N/m, pointer contact */
+  double damping;    /* N s/m, pointer contact */
+  double duration;   /* s, a run that shows the scene */
+  int iterations;    /* QuickStep */
+  int pointers;      /* 1 .. SCENE_POINTERS_MAX */
   const char *hands[SCENE_POINTERS_MAX]; /* specs of the virtual device for a simulated hand, in
                                             world coordinates; borrowed */
   double hinge_torque;                   /* N m, friction of each hinge; 0: none */

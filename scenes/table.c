@@ -505,6 +505,50 @@ static const scene_row rows[] = {
                     .hands = {"virtual:path=0:-0.031/0/-0.05;1:-0.005/0/-0.05;2:-0.031/0/"
                               "-0.05,blend=smooth,hand=rigid"}},
      .build = scene_build_chain},
+    {.parameters = {.name = "lever",
+                    .text = "a tool turns a lever down against a spring, to its limit and back",
+                    .mass = 0.3,
+                    .size = 0.2,
+                    .mu = 0.5,
+                    .gravity = 0,
+                    .gap = 0,
+                    .radius = 1e-3,
+                    .tool = {0.03, 0.018, 0.018},
+                    .stiffness = 1000,
+                    .damping = 2,
+                    .duration = 2.4,
+                    .layer = 1e-4,
+                    .iterations = 50,
+                    .pointers = 1,
+                    .hands = {"virtual:dof=6,path=0:0.16/0.003/0.0225;1.1:0.157/0.003/-0.016;1.3:"
+                              "0.157/0.003/-0.014;2.4:0.16/0.003/0.0225,turn=0:0/0.02/0;1.1:0/0.16/"
+                              "0.01;1.3:0/0.17/0;2.4:0/0.02/0,blend=smooth,hand=rigid"}},
+     .bodies = 1,
+     .build = scene_build_lever},
+    {.parameters =
+         {.name = "peg",
+          .text = "a tool is put into the hole of a block with 0.5 mm of play and pulls it "
+                  "along",
+          .mass = 1,
+          .size = 0.02,
+          .mu = 0.3,
+          .gravity = 9.81,
+          .gap = 5e-4,
+          .radius = 5e-4,
+          .tool = {0.019, 0.019, 0.049},
+          .stiffness = 1000,
+          .damping = 5,
+          .duration = 2.4,
+          .layer = 1e-4,
+          .iterations =
+              50,
+          .pointers = 1,
+          .hands = {"virtual:dof=6,path=0:0.0003/0.0001/0.0701;0.6:0.0006/0.0001/0.042;1.2:0.0081/"
+                    "0.0004/0.0401;1.8:0.003/-0.0003/0.0405;2:0.0047/-0.0001/0.0408;2.4:"
+                    "0.0048/-0.0001/0.0702,turn=0:0/0.01/0;0.6:0.004/0.008/0;1.2:0/0.02/0.01;"
+                    "1.8:0.005/-0.01/-0.01;2:0.002/0/0;2.4:0/0/0,blend=smooth,hand=rigid"}},
+     .bodies = 1,
+     .build = scene_build_peg},
 };
 
 const scene_row *scene_row_at(size_t index)

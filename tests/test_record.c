@@ -129,8 +129,8 @@ static replay check_setup(const recorded_setup *s)
 
 TEST(scenes_in_model_contact)
 {
-  static const char *const scenes[] = {"row10", "stack", "fig5", "clump8", "grasp",
-                                       "roll",  "door",  "cart", "chain"};
+  static const char *const scenes[] = {"row10", "stack", "fig5",  "clump8", "grasp", "roll",
+                                       "door",  "cart",  "chain", "lever",  "peg"};
   for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
     recorded_setup s = recorded_setup_of(scenes[i], HAP_MODEL_CONTACT, 700);
     (void)check_setup(&s);
@@ -139,7 +139,7 @@ TEST(scenes_in_model_contact)
 
 TEST(scenes_in_the_paper_s_models)
 {
-  static const char *const scenes[] = {"row10", "stack", "fig5", "grasp"};
+  static const char *const scenes[] = {"row10", "stack", "fig5", "grasp", "peg"};
   for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
     for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_ACCELERANCE; ++model) {
       recorded_setup s = recorded_setup_of(scenes[i], (hap_model)model, 400);

@@ -514,7 +514,8 @@ TEST(bad_pointer_defs_are_named)
   }
   hap_pointer_def def = pointer_def(NULL);
   def.hull_points = 4;
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
+  CHECK(has(detail_of(&s), "hull_xyz is NULL"));
   def = pointer_def(NULL);
   def.coupling = HAP_COUPLING_PROXY; /* without a device that says what it can hold */
   CHECK(hap_pointer_add(s.session, &def, &id) < HAP_OK && id.v == 0);

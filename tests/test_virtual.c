@@ -13,6 +13,7 @@
 
 #include "base/vec.h"
 #include "device/device.h"
+#include "plugins/virtual/virtual.h"
 
 #define PI 3.14159265358979323846
 #define T0 5000000000LL /* ns; the device must not care where time begins */
@@ -428,6 +429,72 @@ TEST(reads_are_reproducible)
   rig_close(&b);
 }
 
+/* Turns about a fixed axis: the quaternion's angle and the angular velocity are the script's. */
+TEST(a_rigid_hand_turns_by_its_script)
+{
+  rig r;
+  REQUIRE(rig_open(&r, "virtual:dof=6,orientation=0/1/0/0,turn=0:0/0/0;1:0/0.4/0,blend=linear"));
+  CHECK(rig_read(&r, 0) == HAP_OK);
+  CHECK_NEAR(r.pose.quat_wxyz[1], 1.0, 1e-15);
+  CHECK(rig_read(&r, 500000000) == HAP_OK);
+  double q[4] = {cos(0.1), 0.0, sin(0.1), 0.0};
+  double base[4] = {0.0, 1.0, 0.0, 0.0};
+  hapi_quat_multiply(q, base, q);
+  for (int i = 0; i < 4; ++i) {
+    CHECK_NEAR(r.pose.quat_wxyz[i], q[i], 1e-12);
+  }
+  CHECK_NEAR(r.twist.angular[1], 0.4, 1e-12);
+  CHECK_NEAR(r.twist.angular[0], 0.0, 1e-12);
+  rig_close(&r);
+}
+
+/* Held on: the angle at which the wrist's spring balances the torque; and the first instant, in which it is
+ * an inertia alone. */
+TEST(a_wrist_gives_way_to_a_torque)
+{
+  rig r;
+  hap_wrench twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.3}};
+  REQUIRE(rig_open(&r, "virtual:dof=6,hand=tense,inertia=0.002,turn_damping=0.1,turn_stiffness=3"));
+  CHECK(rig_read(&r, 0) == HAP_OK);
+  CHECK(r.ops->write(r.self, &twist, &r.reached) == HAP_OK);
+  CHECK(rig_read(&r, 100000) == HAP_OK);
+  CHECK_NEAR(r.twist.angular[2], 0.3 * 1e-4 / 0.002, 0.01 * 0.3 * 1e-4 / 0.002);
+  for (int i = 1; i <= 3000; ++i) {
+    CHECK(rig_read(&r, 100000 + 1000000LL * i) == HAP_OK);
+    CHECK(r.ops->write(r.self, &twist, &r.reached) == HAP_OK);
+  }
+  CHECK_NEAR(2.0 * asin(r.pose.quat_wxyz[3]), 0.1, 1e-6);
+  CHECK_NEAR(hapi_v3_norm(r.pose.position), 0.0, 1e-12); /* a torque moves nothing along */
+  rig_close(&r);
+}
+
+/* A free handle: what the torque did is what it has of energy, about whatever axes it turns. */
+TEST(turning_does_the_work_of_the_torque)
+{
+  rig r;
+  hapi_virtual_port port;
+  double work = 0.0;
+  REQUIRE(rig_open(&r, "virtual:dof=6,hand=none,device_mass=1,device_inertia=0.01,delay=0.0015"));
+  CHECK(rig_read(&r, 0) == HAP_OK);
+  for (int i = 1; i <= 1000; ++i) {
+    double t = 1e-3 * i;
+    hap_wrench twist = {{0.0, 0.0, 0.0}, {0.05 * cos(7.0 * t), 0.08 * sin(5.0 * t), 0.03}};
+    double before[3];
+    hapi_virtual_get_port(r.self, &port);
+    hapi_v3_copy(r.twist.angular, before);
+    CHECK(r.ops->write(r.self, &twist, &r.reached) == HAP_OK);
+    CHECK(rig_read(&r, 1000000LL * i) == HAP_OK);
+    hapi_v3_add(before, r.twist.angular, before);
+    work += 0.5 * 1e-3 * hapi_v3_dot(port.torque, before); /* to the order of a delayed tick */
+  }
+  hapi_virtual_get_port(r.self, &port);
+  double energy = 0.5 * port.inertia * hapi_v3_dot(port.turn_rate, port.turn_rate);
+  CHECK(energy > 1e-3);
+  CHECK_NEAR(port.work, energy, 1e-6 * energy);
+  CHECK_NEAR(work, energy, 0.02 * energy);
+  rig_close(&r);
+}
+
 TEST(force_is_limited)
 {
   rig r;
@@ -529,6 +596,13 @@ TEST(bad_specs_say_why)
       {"virtual:max_force=0", "max_force"},
       {"virtual:orientation=0/0/0/0", "orientation"},
       {"virtual:dof=4", "3 or 6"},
+      {"virtual:turn=0:0/0/0", "turn needs dof=6"},
+      {"virtual:device_turn_damping=1,dof=3", "needs dof=6"},
+      {"virtual:dof=6,turn=0:0/0", "turn: waypoint 1: expected T:rx/ry/rz"},
+      {"virtual:dof=6,turn=0:0/0/0;1:0/3.1/0", "waypoint 2 is a turn by 3.1 rad"},
+      {"virtual:dof=6,turn=0:0/0/0;1:0/1/0,loop=1", "the turn must end where it begins"},
+      {"virtual:dof=6,turn_hz=2", "without turn_sine"},
+      {"virtual:dof=6,hand=rigid,inertia=1", "rigid"},
       {"virtual:start=1e300", "start"}};
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
     hap_device *device = NULL;
@@ -560,6 +634,9 @@ int main(void)
   RUN(hand_follows_the_script);
   RUN(reads_are_reproducible);
   RUN(force_is_limited);
+  RUN(a_rigid_hand_turns_by_its_script);
+  RUN(a_wrist_gives_way_to_a_torque);
+  RUN(turning_does_the_work_of_the_torque);
   RUN(zero_works_in_a_signal_handler);
   RUN(start_forgets_the_force);
   RUN(long_pauses_are_bounded);

@@ -52,6 +52,15 @@ static hap_status take_identity(const char *path, hap_device *device, hap_detail
   return status < HAP_OK ? status : hap_device_set_identity(device, &identity, detail);
 }
 
+static void set_tool(const double edges[3], double out[8][3])
+{
+  for (int i = 0; i < 8; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out[i][k] = (i >> k & 1) != 0 ? 0.5 * edges[k] : -0.5 * edges[k];
+    }
+  }
+}
+
 static hap_status add_pointer(const rig_options *options, rig *r, size_t index, hap_detail *detail)
 {
   const scene_parameters *p = &r->scene->parameters;
@@ -73,12 +82,20 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
     return status;
   }
   def.device = r->devices[index];
+  double hull[8][3];
   def.radius = p->radius;
+  if (p->tool[0] > 0.0) {
+    set_tool(p->tool, hull);
+    def.hull_xyz = &hull[0][0];
+    def.hull_points = 8;
+  }
   def.stiffness = options->stiffness > 0.0 ? options->stiffness : p->stiffness;
   def.damping = p->damping;
   def.friction = options->friction >= 0.0 ? options->friction : p->friction;
   def.finger_radius = options->finger_radius >= 0.0 ? options->finger_radius : p->finger_radius;
-  def.max_force = options->max_force > 0.0 ? options->max_force : def.max_force;
+  if (options->max_force > 0.0) { /* and torque as on an arm of a metre */
+    def.max_force = def.max_torque = options->max_force;
+  }
   def.coupling = options->coupling;
   def.coupling_stiffness = options->coupling_stiffness;
   status = hap_pointer_add(r->session, &def, &r->pointers[index]);

@@ -26,7 +26,7 @@ static const effect effects[RUN_EFFECTS] = {
     {"range", "local range beyond the neighbours", CONTACT, 0, 0},
     {"restitution", "restitution in the loop", CONTACT, 0, 0},
     {"friction", "friction on the pointer (--friction)", 0, EVERY, EVERY},
-    {"torque", "torque on the pointer", 0, EVERY, 0},
+    {"torque", "torque on a pointer that is a tool", 0, EVERY, 0},
     {"gyro", "gyroscopic term in the loop", CONTACT, 0, 0},
     {"shape", "shape at every tick instead of a plane", CONTACT, 0, CONTACT},
     {"proxy", "coupling by a proxy (--coupling)", 0, CONTACT, CONTACT},

@@ -31,8 +31,11 @@ static void print_scene(const scene_parameters *p, FILE *out)
   }
   fprintf(out, "mass %g kg, size %g m, mu %g, gravity %g m/s^2, gap %g m\n", p->mass, p->size,
           p->mu, p->gravity, p->gap);
-  fprintf(out, "%15spointer: radius %g m, k %g N/m, d %g N s/m", "", p->radius, p->stiffness,
-          p->damping);
+  fprintf(out, "%15spointer: ", "");
+  if (p->tool[0] > 0.0) {
+    fprintf(out, "box %g x %g x %g m, rounded by ", p->tool[0], p->tool[1], p->tool[2]);
+  }
+  fprintf(out, "radius %g m, k %g N/m, d %g N s/m", p->radius, p->stiffness, p->damping);
   if (p->friction > 0.0) {
     fprintf(out, ", friction %g, finger radius %g m", p->friction, p->finger_radius);
   }

@@ -65,21 +65,33 @@ typedef struct hap_pointer_def {
   uint32_t cookie;    /* set by hap_pointer_def_init */
   hap_device *device; /* borrowed, one pointer per device; NULL: hap_pointer_set_target moves it,
                          and it is not in the world before the first target */
-  double radius;      /* m, 1e-6..100, default 0.01: the pointer is a sphere */
-  double mass;        /* kg, 0..1e6, default 0: of the coupling's proxy */
-  double stiffness;   /* N/m, 0..1e9, default 1000: k of eq. 7 */
-  double damping;     /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact */
-  double friction;    /* 0..10, default 0: Coulomb friction against what it touches, sticking and
-                         sliding; hap_ode_def.pointer_surface says another one for a geom */
-  const double *hull_xyz;     /* reserved for 6-DoF tools; must be NULL in this version */
-  size_t hull_points;         /* must be 0 in this version */
+  double radius; /* m, 1e-6..100, default 0.01: the pointer is a sphere. With a hull 0..100: it is
+                         rounded by a ball of that radius, which is swept over it; 0: sharp */
+  double mass;   /* kg, 0..1e6, default 0: of the coupling's proxy */
+  double stiffness; /* N/m, 0..1e9, default 1000: k of eq. 7. The points at which a hull touches one
+                         geom and is pushed the same way have it together, each the same share: a
+                         flat push feels k, a face of the half width r that is tilted on a plane
+                         turns back with k r^2 about its middle */
+  double damping; /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact; shared likewise */
+  double friction; /* 0..10, default 0: Coulomb friction against what it touches, sticking and
+                          sliding; hap_ode_def.pointer_surface says another one for a geom. With a
+                          hull 0 in this version */
+  const double *hull_xyz; /* m, x, y, z of each point, within 100 of the pointer's origin; copied.
+                                 NULL (default): a sphere. Else the pointer is a tool: their convex
+                                 hull, in the pointer's frame, which turns with the device. It must
+                                 have a thickness: points in a plane or on a line are refused. Touches
+                                 all but heightfields and geoms of user-made classes */
+  size_t hull_points;     /* 4..64; 0 (default) without hull_xyz */
   hap_pose pose_world_device; /* pose of the device's frame in the world, default identity */
   double motion_scale;        /* world metres per device metre, > 0, default 1 */
   double force_scale;         /* device newtons per world newton, >= 0, default 1. The stiffness
                                  felt at the device is stiffness x motion_scale x force_scale. */
   double max_force;           /* N at the device, > 0; the device's own limit holds as well.
                                  Default 20. */
-  double max_torque;          /* N m at the device, > 0, default 1 */
+  double max_torque;          /* N m at the device, > 0, default 1. The torque, about the pointer's
+                                 origin, is scaled by force_scale / motion_scale. A device of 3 dof
+                                 gets none, and does not turn a tool: that keeps the orientation of
+                                 pose_world_device */
   hap_coupling coupling;      /* default HAP_COUPLING_AUTO */
   uint32_t collide_bits;      /* the pointer touches geoms whose category bits meet these; default
                                  all */
@@ -146,7 +158,7 @@ typedef enum hap_guard_flag {
 /* What a pointer is doing, of its last tick. */
 typedef struct hap_pointer_state {
   uint32_t size;             /* bytes that were filled in */
-  uint32_t contacts;         /* bodies that push back now */
+  uint32_t contacts;         /* bodies that push back now; of a tool the points at which they do */
   int64_t stamp_ns;          /* of the tick */
   hap_pose device;           /* device's frame */
   hap_pose proxy;            /* pointer in the world: of the proxy where there is one */
@@ -168,7 +180,7 @@ HAP_API hap_status hap_pointer_get(const hap_session *session, hap_pointer_id po
 
 /* [any] For drawing: the pointer (out_proxy) and the device (out_device) in the world at the time that
  * hap_session_poses draws for time_ns, so that the drawn hand touches the drawn body. Either may be
- * NULL. The two are apart only for a pointer that is a proxy; both turn with the device.
+ * NULL. The two are apart only for a pointer that is a proxy; a sphere turns with the device also then.
  * HAP_STALE, HAP_CLAMPED: as hap_session_poses. HAP_ERROR_NOT_FOUND, and nothing is written: no such
  * pointer, or no tick has had it yet. The newest: hap_pointer_get. */
 HAP_API hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,

@@ -10,6 +10,7 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "contact/contact.h"
+#include "sync/touch_local.h"
 
 /* Where a body of the pass is. By slot. */
 typedef struct hapi_pass_body {
@@ -41,9 +42,24 @@ struct hapi_contact {
   hapi_tape *tape; /* of a recording or a replay; NULL: none */
 };
 
-/* mesh_filter.c: whether a contact with a triangle of a mesh is one with the mesh. normal out of the
- * triangle. */
-bool hapi_mesh_allows(const hapi_near_geom *triangle, const double *corners,
-                      const double normal[3]);
+/* tool_pass.c: contacts of the pointers that are hulls. The bodies of the pass have been placed. */
+void hapi_tool_pass(hapi_contact *contact, hapi_patches *out);
+
+/* contact_pass.c */
+/* A geom of a pair where it is now. */
+typedef struct hapi_placed_geom {
+  const hapi_near_geom *in;
+  const hapi_pass_body *body; /* NULL: static world */
+  hapi_shape shape;
+  hap_pose pose;
+} hapi_placed_geom;
+
+/* False: of a body that is not where the pass knows. */
+bool hapi_pass_place_geom(const hapi_contact *contact, uint32_t index, hapi_placed_geom *out);
+hapi_touch_side hapi_pass_side_of(const hapi_placed_geom *geom);
+double hapi_pass_extent(const hapi_placed_geom *geom); /* m, about the origin of its body */
+/* m, how far surfaces may come nearer until the contacts are found anew; speed: m/s, of the one against
+ * the other. */
+double hapi_pass_margin(const hapi_contact *contact, double speed);
 
 #endif

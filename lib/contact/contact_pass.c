@@ -7,6 +7,7 @@
 #include "base/thread.h"
 #include "base/vec.h"
 #include "contact/contact_internal.h"
+#include "sync/mesh_filter.h"
 
 /* One pass: pairs and poses in, contacts out, each with what the tick needs to place it anew. */
 
@@ -16,17 +17,9 @@
 #define AGE_TICKS 2.0  /* from the poses of a pass to the use of its contacts */
 #define LIMIT_STEPS 40 /* halvings: a metre to a picometre */
 
-/* A geom of a pair where it is now. */
-typedef struct placed_geom {
-  const hapi_near_geom *in;
-  const hapi_pass_body *body; /* NULL: static world */
-  hapi_shape shape;
-  hap_pose pose;
-} placed_geom;
-
 typedef struct placed_pair {
-  placed_geom a;
-  placed_geom b;
+  hapi_placed_geom a;
+  hapi_placed_geom b;
   double margin;
   hapi_patch patch;
 } placed_pair;
@@ -75,7 +68,7 @@ static void place_bodies(hapi_contact *contact)
   }
 }
 
-static bool place_geom(const hapi_contact *contact, uint32_t index, placed_geom *out)
+bool hapi_pass_place_geom(const hapi_contact *contact, uint32_t index, hapi_placed_geom *out)
 {
   const hapi_near_geom *in = &hapi_near_geoms(contact->near)[index];
   out->in = in;
@@ -95,98 +88,65 @@ static bool place_geom(const hapi_contact *contact, uint32_t index, placed_geom 
   return body->known && body->generation == in->generation;
 }
 
-static double radius_of(const placed_geom *geom)
+double hapi_pass_extent(const hapi_placed_geom *geom)
 {
   const hapi_shape *s = &geom->shape;
   double offset = geom->body != NULL ? hapi_v3_norm(geom->in->pose.position) : 0.0;
   return offset + hapi_v3_norm(s->half) + s->radius + geom->in->extent;
 }
 
-/* Along the normal: how far the surfaces may come nearer until the contacts are found anew. */
-static double margin_of(const hapi_contact *contact, const placed_geom *a, const placed_geom *b)
+double hapi_pass_margin(const hapi_contact *contact, double speed)
 {
-  const placed_geom *geoms[2] = {a, b};
   double seconds = 1.0 / contact->config.contact_hz + AGE_TICKS / contact->config.haptic_hz;
+  return MARGIN_FLOOR + MARGIN_SPEED * speed * seconds + 0.5 * MARGIN_GRAVITY * seconds * seconds;
+}
+
+/* Along the normal. */
+static double margin_of(const hapi_contact *contact, const hapi_placed_geom *a,
+                        const hapi_placed_geom *b)
+{
+  const hapi_placed_geom *geoms[2] = {a, b};
   double apart[3] = {0.0, 0.0, 0.0};
   double speed = 0.0;
   for (int i = 0; i < 2; ++i) {
     const hapi_pass_body *body = geoms[i]->body;
     if (body != NULL) {
       hapi_v3_madd(apart, i == 0 ? 1.0 : -1.0, body->twist.linear, apart);
-      speed += hapi_v3_norm(body->twist.angular) * radius_of(geoms[i]);
+      speed += hapi_v3_norm(body->twist.angular) * hapi_pass_extent(geoms[i]);
     }
   }
-  speed += hapi_v3_norm(apart);
-  return MARGIN_FLOOR + MARGIN_SPEED * speed * seconds + 0.5 * MARGIN_GRAVITY * seconds * seconds;
+  return hapi_pass_margin(contact, speed + hapi_v3_norm(apart));
 }
 
-static void point_to_body(const placed_geom *geom, const double world[3], double out[3])
+hapi_touch_side hapi_pass_side_of(const hapi_placed_geom *geom)
 {
-  if (geom->body == NULL) {
-    hapi_v3_copy(world, out);
-    return;
-  }
-  hapi_pose_unpoint(geom->body->pose.position, geom->body->pose.quat_wxyz, world, out);
+  return (hapi_touch_side){.body = geom->body != NULL ? &geom->body->pose : NULL,
+                           .pose = geom->pose,
+                           .shape = geom->shape,
+                           .shape_pose = geom->in->pose};
 }
 
-static void vector_to_body(const placed_geom *geom, const double world[3], double out[3])
+static void fill_contact(const hapi_placed_geom *a, const hapi_placed_geom *b,
+                         const hapi_patch_point *in, hapi_patch_contact *out)
 {
-  if (geom->body == NULL) {
-    hapi_v3_copy(world, out);
-    return;
-  }
-  hapi_quat_unrotate(geom->body->pose.quat_wxyz, world, out);
-}
-
-static void fill_axis(const placed_geom *geom, double rim, double out[3])
-{
-  const double z[3] = {0.0, 0.0, 1.0};
-  hapi_v3_set(out, 0.0, 0.0, 0.0);
-  if (rim > 0.0) {
-    double world[3];
-    hapi_quat_rotate(geom->pose.quat_wxyz, z, world);
-    vector_to_body(geom, world, out);
-  }
-}
-
-static void fill_contact(const placed_geom *a, const placed_geom *b, const hapi_patch_point *in,
-                         hapi_patch_contact *out)
-{
-  const placed_geom *face = in->touch == HAPI_TOUCH_FACE_A ? a : b;
-  const placed_geom *target = in->touch == HAPI_TOUCH_BALL_A ? b : a;
+  const hapi_touch_side side_a = hapi_pass_side_of(a);
+  const hapi_touch_side side_b = hapi_pass_side_of(b);
   out->body_a = a->in->body;
   out->generation_a = a->in->generation;
   out->body_b = b->in->body;
   out->generation_b = b->in->generation;
-  out->touch = in->touch;
-  point_to_body(a, in->core_a, out->core_a);
-  point_to_body(b, in->core_b, out->core_b);
-  out->ball_a = in->ball_a;
-  out->ball_b = in->ball_b;
-  out->rim_a = in->rim_a;
-  out->rim_b = in->rim_b;
-  fill_axis(a, in->rim_a, out->axis_a);
-  fill_axis(b, in->rim_b, out->axis_b);
-  out->slide = in->slide;
-  vector_to_body(a, in->edge_a, out->edge_a);
-  vector_to_body(b, in->edge_b, out->edge_b);
-  hapi_v3_copy(in->normal, out->normal);
-  if (in->touch == HAPI_TOUCH_FACE_A || in->touch == HAPI_TOUCH_FACE_B) {
-    vector_to_body(face, in->normal, out->normal);
-  }
-  out->shape = target->shape;
-  out->shape.hull = NULL; /* of another message; a ball against a hull is no BALL */
-  out->shape.hull_count = 0;
-  out->shape_pose = target->in->pose;
+  hapi_touch_localise(&side_a, &side_b, in, out);
 }
 
 /* A triangle's neighbours in the mesh hide its edges. */
-static bool allowed(const placed_geom *a, const placed_geom *b, const hapi_patch_point *point)
+static bool allowed(const hapi_placed_geom *a, const hapi_placed_geom *b,
+                    const hapi_patch_point *point)
 {
   double into[3];
   hapi_v3_scale(-1.0, point->normal, into);
-  return (a->in->open_edges == 0 || hapi_mesh_allows(a->in, a->shape.hull, into)) &&
-         (b->in->open_edges == 0 || hapi_mesh_allows(b->in, b->shape.hull, point->normal));
+  return (a->in->open_edges == 0 || hapi_mesh_allows(a->in->open_edges, a->shape.hull, into)) &&
+         (b->in->open_edges == 0 ||
+          hapi_mesh_allows(b->in->open_edges, b->shape.hull, point->normal));
 }
 
 /* The points of a pair, deepest first, that count; false: none. */
@@ -196,7 +156,8 @@ static bool find_pair(const hapi_contact *contact, uint32_t index, placed_pair *
   hapi_patch *patch = &out->patch;
   int count = 0;
   patch->count = 0;
-  if (!place_geom(contact, pair->geom_a, &out->a) || !place_geom(contact, pair->geom_b, &out->b)) {
+  if (!hapi_pass_place_geom(contact, pair->geom_a, &out->a) ||
+      !hapi_pass_place_geom(contact, pair->geom_b, &out->b)) {
     return false;
   }
   out->margin = margin_of(contact, &out->a, &out->b);
@@ -311,6 +272,13 @@ static uint64_t hash_patches(hapi_patches *patches)
     hash = hapi_hash_doubles(hash, c[i].core_b, 3);
     hash = hapi_hash_doubles(hash, c[i].normal, 3);
   }
+  const hapi_tool_point *tools = hapi_patches_tools(patches);
+  for (uint32_t i = 0; i < patches->tool_count; ++i) {
+    hash = hapi_hash_word(hash, ((uint64_t)tools[i].pointer << 32) | tools[i].at.body_b);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_a, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_b, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.normal, 3);
+  }
   return hash;
 }
 
@@ -347,6 +315,7 @@ static void pass(hapi_contact *contact, int64_t valid_from_ns)
     leave_out_farthest(contact);
     (void)fill_pairs(contact, out);
   }
+  hapi_tool_pass(contact, out);
   out->number = ++contact->number;
   out->model_number = contact->near->model_number;
   out->valid_from_ns = valid_from_ns;

@@ -36,7 +36,8 @@ typedef struct hapi_pointer_target {
 typedef struct hapi_pointer_slot {
   _Atomic int phase;
   _Atomic uint32_t generation; /* written while EMPTY */
-  hap_pointer_def def;
+  hap_pointer_def def;         /* hull_xyz NULL: the vertices are copied */
+  hapi_tool_hull hull;
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;
   bool has_device; /* also in a replay, where there are no ops */
@@ -145,7 +146,8 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
 void hapi_tape_ticked(hapi_haptic *haptic);
 /* Replay only; false: no more of them come now. */
 bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
-bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out);
+bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
+                         hapi_tool_hull *out_hull);
 
 /* pointers.c: what the loop does with the slots */
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */

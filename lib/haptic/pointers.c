@@ -5,12 +5,14 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/vec.h"
 #include "device/device.h"
 #include "device/emergency.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 
 #define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
+#define GRIP_MOST 0.05   /* m, at the device: arm that a handle has against turning */
 #define SLEW_S 0.002     /* from no force to all of it, where the application says nothing else */
 #define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
@@ -33,6 +35,34 @@ static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slo
   p->coupling_reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
 }
 
+static void set_hull(hapi_haptic *haptic, uint32_t index)
+{
+  const hapi_tool_hull *hull = &haptic->slots[index].hull;
+  hapi_tick_pointer *p = &haptic->tick.pointers[index];
+  double farthest = 0.0;
+  haptic->tick.tool.hulls[index] = *hull;
+  p->hull = &haptic->tick.tool.hulls[index];
+  for (uint32_t i = 0; i < hull->count; ++i) {
+    farthest = fmax(farthest, hapi_v3_norm(hull->points[i]));
+  }
+  p->extent += farthest;
+}
+
+/* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long tool's:
+ * the device's grip is not as long. */
+static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *p)
+{
+  const hapi_tool_hull *hull = &slot->hull;
+  double sum = 0.0;
+  for (uint32_t i = 0; i < hull->count; ++i) {
+    sum += hapi_v3_dot(hull->points[i], hull->points[i]) / hull->count;
+  }
+  double arm = fmin(sqrt(sum) + slot->def.radius, GRIP_MOST * slot->def.motion_scale);
+  p->spin_stiffness = arm * arm * p->coupling_stiffness;
+  p->spin_damping = arm * arm * p->coupling_damping;
+  p->proxy_inertia = arm * arm * p->proxy_mass;
+}
+
 static void activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -43,6 +73,11 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->generation = slot->generation;
   p->collide_bits = def->collide_bits;
   p->radius = def->radius;
+  p->three_dof = slot->has_device && info->dof < 6;
+  p->extent = def->radius;
+  if (slot->hull.count > 0) {
+    set_hull(haptic, index);
+  }
   p->stiffness = def->stiffness;
   p->damping = def->damping;
   p->friction = def->friction;
@@ -61,6 +96,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->speed_limit = slot->has_device ? SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
+  set_spin_coupling(slot, p);
   p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;
   p->slew_torque = p->max_torque * (p->slew_force / p->max_force);
   p->device_pose.quat_wxyz[0] = 1.0;
@@ -77,9 +113,11 @@ static bool is_ready(const hapi_pointer_slot *slot)
 static void prepare_slot(hapi_pointer_slot *slot);
 
 /* One that was paused has the id that it had. */
-static void take_in(hapi_haptic *haptic, uint32_t index, const hapi_joined *joined)
+static void take_in(hapi_haptic *haptic, uint32_t index, const hapi_joined *joined,
+                    const hapi_tool_hull *hull)
 {
   hapi_pointer_slot *slot = &haptic->slots[index];
+  slot->hull = *hull;
   slot->def = joined->def;
   slot->info = joined->info;
   slot->has_device = joined->has_device != 0;
@@ -96,14 +134,15 @@ static void follow_tape(hapi_haptic *haptic)
 {
   uint32_t index = 0;
   hapi_joined joined;
+  hapi_tool_hull hull;
   for (bool more = true; more;) {
     bool pauses = false;
     more = hapi_tape_next_leave(haptic, &index, &pauses);
     if (more) {
       haptic->tick.pointers[index].generation = 0;
       atomic_store(&haptic->slots[index].phase, pauses ? HAPI_POINTER_PAUSED : HAPI_POINTER_EMPTY);
-    } else if (hapi_tape_next_join(haptic, &index, &joined)) {
-      take_in(haptic, index, &joined);
+    } else if (hapi_tape_next_join(haptic, &index, &joined, &hull)) {
+      take_in(haptic, index, &joined, &hull);
       more = true;
     }
   }
@@ -363,6 +402,12 @@ static void prepare_slot(hapi_pointer_slot *slot)
 static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
 {
   slot->def = *def;
+  slot->def.hull_xyz = NULL;
+  memset(&slot->hull, 0, sizeof slot->hull);
+  slot->hull.count = (uint32_t)def->hull_points;
+  if (def->hull_points > 0) {
+    memcpy(slot->hull.points, def->hull_xyz, 3 * def->hull_points * sizeof(double));
+  }
   slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
   slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
   slot->has_device = def->device != NULL;

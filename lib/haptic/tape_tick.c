@@ -91,6 +91,31 @@ void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches)
 
 /* ---- pointers come and go ---- */
 
+static void put_hull(hapi_haptic *haptic, uint32_t index)
+{
+  const hapi_tool_hull *hull = &haptic->slots[index].hull;
+  for (uint32_t i = 0; i < hull->count; i += 2) {
+    hapi_cell *cell = hapi_tape_put(haptic->tape, HAPI_CELL_HULL, index);
+    memset(cell->d, 0, sizeof cell->d);
+    hapi_v3_copy(hull->points[i], cell->d);
+    if (i + 1 < hull->count) {
+      hapi_v3_copy(hull->points[i + 1], cell->d + 3);
+    }
+  }
+}
+
+static void get_hull(hapi_haptic *haptic, uint32_t index, uint32_t count, hapi_tool_hull *out)
+{
+  out->count = count <= HAPI_TOOL_POINTS_MAX ? count : 0;
+  for (uint32_t i = 0; i < out->count; i += 2) {
+    const hapi_cell *cell = hapi_tape_get(haptic->tape, HAPI_CELL_HULL, index);
+    hapi_v3_copy(cell->d, out->points[i]);
+    if (i + 1 < out->count) {
+      hapi_v3_copy(cell->d + 3, out->points[i + 1]);
+    }
+  }
+}
+
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -111,6 +136,7 @@ void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
     memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_JOIN, index)->d, bytes + i * HAPI_CELL_BYTES,
            HAPI_CELL_BYTES);
   }
+  put_hull(haptic, index);
 }
 
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses)
@@ -132,7 +158,8 @@ bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pa
   return *out_index < haptic->config.capacity.pointers;
 }
 
-bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out)
+bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
+                         hapi_tool_hull *out_hull)
 {
   hapi_tape *tape = haptic->tape;
   char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES];
@@ -145,6 +172,7 @@ bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *
            HAPI_CELL_BYTES);
   }
   memcpy(out, bytes, sizeof *out);
+  get_hull(haptic, *out_index, (uint32_t)out->def.hull_points, out_hull);
   return !tape->broken && *out_index < haptic->config.capacity.pointers;
 }
 

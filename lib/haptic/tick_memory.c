@@ -16,8 +16,8 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   while (world->bucket_count < 2 * c->contacts) {
     world->bucket_count *= 2;
   }
-  world->row_capacity =
-      (ROWS_PER_CONTACT + ROWS_PER_POINTER_CONTACT) * c->contacts + HAPI_JOINT_ROWS * c->joints;
+  world->row_capacity = (ROWS_PER_CONTACT + ROWS_PER_POINTER_CONTACT) * c->contacts +
+                        2 * c->tool_points + HAPI_JOINT_ROWS * c->joints;
   world->joints = hapi_alloc_array(c->joints, sizeof *world->joints);
   world->joint_memory = hapi_alloc_array(c->joints, sizeof *world->joint_memory);
   world->memory = hapi_alloc_array(c->contacts, sizeof *world->memory);
@@ -53,19 +53,42 @@ static void free_world(hapi_local_world *world)
   hapi_free(world->solver.work);
 }
 
+static bool allocate_tools(hapi_tool_world *w, const hapi_capacity *c)
+{
+  size_t tools = (size_t)2 * c->tool_points;
+  w->tools = hapi_alloc_array(tools, sizeof *w->tools);
+  w->old_tools = hapi_alloc_array(tools, sizeof *w->old_tools);
+  w->old_contacts = hapi_alloc_array(tools, sizeof *w->old_contacts);
+  w->pairs = hapi_alloc_array(HAPI_TOOL_PAIRS(c), sizeof *w->pairs);
+  w->hulls = hapi_alloc_array(c->pointers, sizeof *w->hulls);
+  return w->tools != NULL && w->old_tools != NULL && w->old_contacts != NULL && w->pairs != NULL &&
+         w->hulls != NULL;
+}
+
+static void free_tools(hapi_tool_world *w)
+{
+  hapi_free(w->tools);
+  hapi_free(w->old_tools);
+  hapi_free(w->old_contacts);
+  hapi_free(w->pairs);
+  hapi_free(w->hulls);
+}
+
 bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
 {
   tick->capacity = *c;
   tick->bodies = hapi_alloc_array(c->bodies, sizeof *tick->bodies);
   tick->live = hapi_alloc_array(c->bodies, sizeof *tick->live);
-  tick->contacts = hapi_alloc_array(c->contacts, sizeof *tick->contacts);
+  tick->contacts =
+      hapi_alloc_array(c->contacts + (size_t)2 * c->tool_points, sizeof *tick->contacts);
   tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
   tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
   tick->frictions = hapi_alloc_array(c->contacts, sizeof *tick->frictions);
   tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
   return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
          tick->ramps != NULL && tick->ramp_generations != NULL && tick->frictions != NULL &&
-         tick->pointers != NULL && allocate_world(&tick->world, c);
+         tick->pointers != NULL && allocate_tools(&tick->tool, c) &&
+         allocate_world(&tick->world, c);
 }
 
 void hapi_tick_memory_destroy(hapi_tick *tick)
@@ -77,5 +100,6 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
   hapi_free(tick->ramp_generations);
   hapi_free(tick->frictions);
   hapi_free(tick->pointers);
+  free_tools(&tick->tool);
   free_world(&tick->world);
 }

@@ -237,32 +237,137 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
   pair->surface = link->surface;
 }
 
-/* The triangles of static ground near a geom, each as a geom of its own. */
-static void add_mesh(hapi_physics *physics, const hapi_link *link)
+/* Index of the triangle's geom in the message, in the static world; HAPI_NONE: no room. */
+static uint32_t add_triangle(hapi_physics *physics, const hapi_near_triangle *triangle)
 {
   hapi_range *range = &physics->range;
   hapi_near *near = range->near;
+  if (near->geom_count == physics->config.capacity.geoms ||
+      near->point_count + 3 > physics->config.capacity.hull_points) {
+    ++physics->figures.stats.capacity_dropped;
+    return HAPI_NONE;
+  }
+  hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
+  memset(out, 0, sizeof *out);
+  fill_static(out);
+  out->shape.kind = HAPI_SHAPE_HULL;
+  out->shape.hull_count = 3;
+  out->hull_first = near->point_count;
+  out->open_edges = triangle->open_edges;
+  out->pose.quat_wxyz[0] = 1.0;
+  memcpy(hapi_near_points(near) + (size_t)3 * near->point_count, triangle->corners,
+         sizeof triangle->corners);
+  near->point_count += 3;
+  range->geoms[near->geom_count] = NULL; /* not to be found by its geom */
+  return near->geom_count++;
+}
+
+/* The triangles of static ground near a geom, each as a geom of its own. */
+static void add_mesh(hapi_physics *physics, const hapi_link *link)
+{
   uint32_t count = hapi_mesh_near(physics, link->other, link->box);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    if (near->geom_count == physics->config.capacity.geoms ||
-        near->point_count + 3 > physics->config.capacity.hull_points) {
-      ++physics->figures.stats.capacity_dropped;
+    const hapi_near_triangle *triangle = &physics->meshes.found[i];
+    uint32_t geom = add_triangle(physics, triangle);
+    if (geom == HAPI_NONE) {
       return;
     }
-    const hapi_near_triangle *triangle = &physics->meshes.found[i];
-    hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
-    memset(out, 0, sizeof *out);
-    fill_static(out);
-    out->shape.kind = HAPI_SHAPE_HULL;
-    out->shape.hull_count = 3;
-    out->hull_first = near->point_count;
-    out->open_edges = triangle->open_edges;
-    out->pose.quat_wxyz[0] = 1.0;
-    memcpy(hapi_near_points(near) + (size_t)3 * near->point_count, triangle->corners,
-           sizeof triangle->corners);
-    near->point_count += 3;
-    range->geoms[near->geom_count] = NULL; /* not to be found by its geom */
-    add_pair(physics, link, near->geom_count++, triangle->index + 1);
+    add_pair(physics, link, geom, triangle->index + 1);
+  }
+}
+
+/* ---- pointers that are hulls ---- */
+
+/* Index of the pointer in the message. */
+static uint32_t take_tool(hapi_physics *physics, uint32_t pointer)
+{
+  hapi_near *near = physics->range.near;
+  const hapi_state_pointer *in = &hapi_state_pointers(physics->state)[pointer];
+  for (uint32_t i = 0; i < near->tool_count; ++i) {
+    if (hapi_near_tools(near)[i].pointer == pointer) {
+      return i;
+    }
+  }
+  hapi_near_tool *out = &hapi_near_tools(near)[near->tool_count];
+  out->pointer = pointer;
+  out->generation = in->generation;
+  out->radius = in->radius;
+  out->extent = in->extent;
+  out->pose = in->pose;
+  out->twist = in->twist;
+  out->hull = hapi_state_hulls(physics->state)[pointer];
+  return near->tool_count++;
+}
+
+static void add_tool_pair(hapi_physics *physics, const hapi_hit *hit, uint32_t geom)
+{
+  hapi_near *near = physics->range.near;
+  if (geom == HAPI_NONE || near->tool_pair_count == physics->config.capacity.contacts) {
+    ++physics->figures.stats.capacity_dropped;
+    return;
+  }
+  hapi_near_tool_pair *pair = &hapi_near_tool_pairs(near)[near->tool_pair_count++];
+  pair->key = hapi_tool_geom_key(physics, hit->geom, hit->pointer);
+  pair->tool = take_tool(physics, hit->pointer);
+  pair->geom = geom;
+}
+
+/* The corners of a mesh that a body carries, in the body's frame. */
+static void hold_triangle(hapi_physics *physics, dBodyID body, hapi_near_geom *out)
+{
+  double *corners = hapi_near_points(physics->range.near) + (size_t)3 * out->hull_first;
+  uint32_t slot = entry(physics, hapi_bodies_find(&physics->table, body))->slot;
+  out->body = slot;
+  out->generation = physics->bodies[slot].generation;
+  for (int k = 0; k < 3; ++k) {
+    double *corner = corners + (size_t)3 * k;
+    hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
+    out->extent = fmax(out->extent, hapi_v3_norm(corner));
+  }
+}
+
+static void add_tool_mesh(hapi_physics *physics, const hapi_hit *hit)
+{
+  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
+  dBodyID body = dGeomGetBody(hit->geom);
+  double box[6];
+  double far = pointer->extent +
+               hapi_neighbors_reach(hapi_v3_norm(pointer->twist.linear) +
+                                        pointer->extent * hapi_v3_norm(pointer->twist.angular),
+                                    2.0 * physics->probe_step_s);
+  for (int k = 0; k < 6; ++k) {
+    box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
+  }
+  uint32_t count = hapi_mesh_near(physics, hit->geom, box);
+  for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
+    uint32_t geom = add_triangle(physics, &physics->meshes.found[i]);
+    if (geom != HAPI_NONE && body != NULL) {
+      hold_triangle(physics, body, &hapi_near_geoms(physics->range.near)[geom]);
+    }
+    add_tool_pair(physics, hit, geom);
+  }
+}
+
+/* What the hulls may touch, for the contact thread. A body that they touch and that the loop does not own is
+ * measured as a whole: its contacts are not known before. */
+static void take_tools(hapi_physics *physics, uint32_t hit_count)
+{
+  for (uint32_t i = 0; i < hit_count; ++i) {
+    const hapi_hit *hit = &physics->neighborhood.hits[i];
+    dBodyID body = dGeomGetBody(hit->geom);
+    uint32_t known = hapi_bodies_find(&physics->table, body);
+    if (hit->tool_count == 0 ||
+        (body != NULL && (known == HAPI_NONE || entry(physics, known)->slot == HAPI_NONE))) {
+      continue;
+    }
+    if (body != NULL) {
+      physics->bodies[entry(physics, known)->slot].linked = true;
+    }
+    if (dGeomGetClass(hit->geom) == dTriMeshClass) {
+      add_tool_mesh(physics, hit);
+    } else {
+      add_tool_pair(physics, hit, take_geom(physics, hit->geom));
+    }
   }
 }
 
@@ -589,6 +694,7 @@ static void begin_walk(hapi_physics *physics)
   range->near->geom_count = 0;
   range->near->pair_count = 0;
   range->near->point_count = 0;
+  range->near->tool_count = range->near->tool_pair_count = 0;
   range->number = physics->model_number + 1;
   range->count = range->owned = 0;
   range->pairs_noted = 0;
@@ -615,6 +721,7 @@ void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
   for (uint32_t next = 0; next < range->count; ++next) {
     expand(physics, range->queue[next], next < seeds);
   }
+  take_tools(physics, hit_count);
 }
 
 /* ---- the message to the contact thread ---- */

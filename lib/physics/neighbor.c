@@ -18,7 +18,7 @@
 #define REACH_FLOOR 0.005       /* m */
 #define REACH_ACCELERATION 15.0 /* m/s^2: a hand, or a body that is hit */
 
-static double reach_of(double relative_speed, double horizon_s)
+double hapi_neighbors_reach(double relative_speed, double horizon_s)
 {
   return REACH_FLOOR + relative_speed * horizon_s + REACH_ACCELERATION * horizon_s * horizon_s;
 }
@@ -94,11 +94,14 @@ void hapi_neighbors_collect(hapi_physics *physics)
       continue;
     }
     const double *at = pointers[i].pose.position;
+    bool is_tool = pointers[i].is_tool != 0;
+    double size = is_tool ? pointers[i].extent : pointers[i].radius;
     double speed = fastest + hapi_v3_norm(pointers[i].twist.linear);
-    double reach = reach_of(speed, 2.0 * physics->probe_step_s);
+    speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
+    double reach = hapi_neighbors_reach(speed, 2.0 * physics->probe_step_s);
     hood->current_pointer = i;
     hood->current_reach = reach;
-    dGeomSphereSetRadius(hood->probe_geom, pointers[i].radius + reach);
+    dGeomSphereSetRadius(hood->probe_geom, size + reach);
     dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
     dGeomSetCollideBits(hood->probe_geom, ~0ul);
     dGeomSetCategoryBits(hood->probe_geom, ~0ul);
@@ -118,6 +121,12 @@ double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer, con
   return hapi_v3_norm(difference);
 }
 
+double hapi_neighbors_spin(dGeomID geom, double distance)
+{
+  dBodyID body = dGeomGetBody(geom);
+  return body != NULL ? distance * hapi_v3_norm(dBodyGetAngularVel(body)) : 0.0;
+}
+
 /* Nearest points for where the pointer will be at the time of the model, which is later than now in
  * model IMPULSE; where that would put its centre inside the body, for where it is now: the far face
  * must not be taken for the near one. */
@@ -134,9 +143,17 @@ static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate,
     found = hapi_geom_nearest(physics, candidate->geom, pointer->pose.position, pointer->radius,
                               candidate->reach, out);
   }
-  return found &&
-         out->distance <=
-             reach_of(hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
+  return found && out->distance <=
+                      hapi_neighbors_reach(
+                          hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
+}
+
+static bool find_hit(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out)
+{
+  out->tool_count = 0;
+  return hapi_state_pointers(physics->state)[candidate->pointer].is_tool != 0
+             ? hapi_tool_find(physics, candidate, out)
+             : find_nearest(physics, candidate, &out->nearest);
 }
 
 static int by_distance(const void *a, const void *b)
@@ -216,6 +233,11 @@ static uint32_t known_of(const hapi_physics *physics, const hapi_hit *hit)
   return hapi_bodies_find(&physics->table, dGeomGetBody(hit->geom));
 }
 
+static uint32_t contacts_of(const hapi_hit *hit)
+{
+  return hit->tool_count > 0 ? hit->tool_count : 1;
+}
+
 /* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
  * those lose them then. */
 static uint32_t choose(hapi_physics *physics, uint32_t count)
@@ -223,12 +245,15 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
   hapi_hit *hits = physics->neighborhood.hits;
   uint32_t bodies = 0;
   uint32_t chosen = 0;
+  uint32_t contacts = 0;
   for (uint32_t i = 0; i < count; ++i) {
     bool has_body = dGeomGetBody(hits[i].geom) != NULL;
     uint32_t index = known_of(physics, &hits[i]);
     hapi_known_body *known = index != HAPI_NONE ? &physics->table.entries[index] : NULL;
     bool counted = known != NULL && known->rest->chosen_in == physics->model_number + 1;
-    bool room = chosen < physics->config.capacity.contacts && (!has_body || known != NULL) &&
+    uint32_t more = contacts_of(&hits[i]);
+    bool room = contacts + more <= physics->config.capacity.contacts &&
+                (!has_body || known != NULL) &&
                 (known == NULL || counted || bodies < physics->config.max_bodies);
     if (!room) {
       ++physics->figures.stats.capacity_dropped;
@@ -238,6 +263,7 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
       known->rest->chosen_in = physics->model_number + 1;
       ++bodies;
     }
+    contacts += more;
     hits[chosen++] = hits[i];
   }
   return chosen;
@@ -249,6 +275,10 @@ static void keep_places(hapi_physics *physics, const hapi_hit *hit)
   uint32_t index = known_of(physics, hit);
   uint32_t slot = index != HAPI_NONE ? physics->table.entries[index].slot : HAPI_SLOT_NONE;
   uint32_t generation = hapi_state_pointers(physics->state)[hit->pointer].generation;
+  if (hit->tool_count > 0) {
+    hapi_tool_keep_places(physics, hit, slot);
+    return;
+  }
   hapi_contact_slot *contact =
       hapi_slots_find_contact(physics, slot, hit->geom, hit->pointer, generation);
   if (contact != NULL) {
@@ -271,6 +301,13 @@ static void take_hit(hapi_physics *physics, const hapi_hit *hit)
   const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
   uint32_t slot = body != NULL ? hapi_slots_body(physics, known_of(physics, hit)) : HAPI_SLOT_NONE;
   hapi_contact_slot *contact = NULL;
+  if (hit->tool_count > 0 && (body == NULL || slot != HAPI_NONE)) {
+    hapi_tool_take(physics, hit, slot);
+    if (body != NULL) {
+      take_body(&physics->bodies[slot], body);
+    }
+    return;
+  }
   if (body == NULL || slot != HAPI_NONE) {
     contact = hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
   }
@@ -290,11 +327,11 @@ void hapi_neighbors_find(hapi_physics *physics)
 {
   hapi_neighborhood *hood = &physics->neighborhood;
   uint32_t count = 0;
+  physics->tools.count = 0;
   hapi_slots_begin_model(physics);
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
-    if (hood->candidates[i].geom != NULL &&
-        find_nearest(physics, &hood->candidates[i], &hit->nearest)) {
+    if (hood->candidates[i].geom != NULL && find_hit(physics, &hood->candidates[i], hit)) {
       hit->geom = hood->candidates[i].geom;
       hit->pointer = hood->candidates[i].pointer;
       ++count;

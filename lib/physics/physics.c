@@ -126,6 +126,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_cover_finish(&physics->neighborhood.cover);
   hapi_free(physics->neighborhood.candidates);
   hapi_free(physics->neighborhood.hits);
+  hapi_free(physics->tools.points);
   hapi_free(physics->neighborhood.vertices);
   hapi_free(physics->neighborhood.hull);
   hapi_free(physics->contact_scratch);

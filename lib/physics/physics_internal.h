@@ -19,6 +19,7 @@
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
+#include "sync/touch_local.h"
 
 #define HAPI_NONE HAPI_INDEX_NONE
 #define HAPI_EDITS_MAX 256
@@ -288,6 +289,8 @@ typedef struct hapi_contact_slot {
   double turn[6];        /* the same of a torque about the normal */
   double measured[6][3]; /* scratch: a of this cycle's probes, before it is known to be good */
   double measured_turn[6];
+  bool is_tool; /* a point of a hull's patch */
+  hapi_tool_point tool;
 } hapi_contact_slot;
 
 /* ---- cover.c ---- */
@@ -324,7 +327,25 @@ typedef struct hapi_hit {
   dGeomID geom;
   uint32_t pointer;
   hapi_nearest nearest; /* a: pointer, b: geom */
+  uint32_t tool_first;  /* of a hull: into the points of hapi_tool_search */
+  uint32_t tool_count;  /* 0: a sphere */
 } hapi_hit;
+
+/* ---- tool.c ---- */
+
+typedef struct hapi_found_point {
+  hapi_tool_point tool;
+  double gap;
+  double normal[3]; /* world, out of the geom */
+  uint32_t slot;    /* of the contact that it goes on with; HAPI_NONE: none */
+} hapi_found_point;
+
+/* Points of all hits of a cycle. */
+typedef struct hapi_tool_search {
+  hapi_found_point *points;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_tool_search;
 
 typedef struct hapi_neighborhood {
   dGeomID probe_geom;     /* private sphere, in no space */
@@ -569,9 +590,11 @@ struct hapi_physics {
   unsigned islands_threads; /* ODE's setting as it was found */
   bool said_not_probed;     /* of a transmission, once a session */
   bool said_not_held;       /* of a joint that cannot be measured, likewise */
-  bool world_faulty;        /* holds a state that ODE would abort on: not stepped */
-  bool cycling;             /* not at the start */
-  uint16_t model_next;      /* hap_model wanted at the end of the cycle */
+  bool said_not_touched;    /* of a heightfield by a hull, likewise */
+  hapi_tool_search tools;
+  bool world_faulty;   /* holds a state that ODE would abort on: not stepped */
+  bool cycling;        /* not at the start */
+  uint16_t model_next; /* hap_model wanted at the end of the cycle */
   hapi_thread thread;
   _Atomic int stop;
   _Atomic unsigned long cycle_thread; /* pthread_t of the thread in a cycle, 0: none */
@@ -752,9 +775,19 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
 void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
 void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
 double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
-                            const double point[3]); /* m/s, relative */
+                            const double point[3]);                   /* m/s, relative */
+double hapi_neighbors_reach(double relative_speed, double horizon_s); /* m */
+/* m/s, at a distance from the centre of the geom's body, by its turning */
+double hapi_neighbors_spin(dGeomID geom, double distance);
 /* Dynamic bodies that a pointer may touch, of the newest model. */
 uint32_t hapi_neighbors_bodies(const hapi_physics *physics);
+
+/* tool.c: pointers that are hulls */
+bool hapi_tool_knows(dGeomID geom); /* whether they can touch it */
+bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out);
+uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t pointer);
+void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
+void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
 
 /* slots.c */
 uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known); /* live slot; HAPI_NONE: full */
@@ -764,6 +797,9 @@ hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body,
 /* The one there is, or a new one in a place that is free or not wanted; NULL: full. */
 hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
                                       uint32_t pointer, uint32_t pointer_generation);
+/* In a place that is free or not wanted; NULL: full. */
+hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                          uint32_t pointer, uint32_t pointer_generation);
 void hapi_slots_begin_model(hapi_physics *physics); /* nothing wanted yet */
 void hapi_slots_end_model(hapi_physics *physics);   /* what is not wanted retires */
 void hapi_slots_release(hapi_physics *physics);     /* retired ones the loop is done with */

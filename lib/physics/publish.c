@@ -118,6 +118,22 @@ static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_mod
   out->shape_pose = slot->shape_pose;
 }
 
+/* False: a point of a hull, and no room for more of them. */
+static bool fill_tool(hapi_physics *physics, const hapi_contact_slot *slot, hapi_model *out,
+                      hapi_model_contact *contact)
+{
+  if (!slot->is_tool) {
+    return true;
+  }
+  if (out->tool_count == physics->config.capacity.tool_points) {
+    ++physics->figures.stats.capacity_dropped;
+    return false;
+  }
+  hapi_model_tools(out)[out->tool_count] = slot->tool;
+  contact->tool = ++out->tool_count;
+  return true;
+}
+
 static void fill_watch(hapi_physics *physics, hapi_model *out)
 {
   out->watch_count = physics->watch_count;
@@ -157,6 +173,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->impulse_pose = physics->config.impulse_pose;
   out->body_count = 0;
   out->contact_count = 0;
+  out->tool_count = 0;
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     if (physics->bodies[i].phase == HAPI_SLOT_LIVE &&
         fill_body(physics, i, &bodies[out->body_count])) {
@@ -165,7 +182,9 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   }
   for (uint32_t i = 0; i < physics->contact_high; ++i) {
     if (physics->contacts[i].phase == HAPI_SLOT_LIVE) {
-      fill_contact(&physics->contacts[i], i, &contacts[out->contact_count++]);
+      hapi_model_contact *contact = &contacts[out->contact_count];
+      fill_contact(&physics->contacts[i], i, contact);
+      out->contact_count += fill_tool(physics, &physics->contacts[i], out, contact);
     }
   }
   hapi_joints_publish(physics, out);

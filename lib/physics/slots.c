@@ -88,10 +88,14 @@ hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeo
 {
   hapi_contact_slot *slot =
       hapi_slots_find_contact(physics, body, geom, pointer, pointer_generation);
-  if (slot != NULL) {
-    return slot;
-  }
-  slot = contact_place(physics);
+  return slot != NULL ? slot
+                      : hapi_slots_new_contact(physics, body, geom, pointer, pointer_generation);
+}
+
+hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+                                          uint32_t pointer, uint32_t pointer_generation)
+{
+  hapi_contact_slot *slot = contact_place(physics);
   if (slot == NULL) {
     return NULL;
   }

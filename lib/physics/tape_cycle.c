@@ -212,6 +212,13 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, c[i].turn, 6);
     hash = hapi_hash_doubles(hash, &c[i].mu, 1);
   }
+  hapi_tool_point *tools = hapi_model_tools(model);
+  for (uint32_t i = 0; i < model->tool_count; ++i) {
+    hash = hapi_hash_word(hash, tools[i].pointer);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_a, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.core_b, 3);
+    hash = hapi_hash_doubles(hash, tools[i].at.normal, 3);
+  }
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     const hapi_model_joint *joint = &hapi_model_joints(model)[i];
     hash = hash_joint(hash, joint);

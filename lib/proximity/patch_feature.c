@@ -112,6 +112,34 @@ static bool on_cap(const hapi_solid *cylinder, const double d[3])
   return local[0] * local[0] + local[1] * local[1] < cap_tilt * cap_tilt;
 }
 
+static void move_corners(hapi_feature *io, const double way[3])
+{
+  for (int i = 0; i < io->count; ++i) {
+    hapi_v3_add(io->corner[i], way, io->corner[i]);
+  }
+  hapi_v3_add(io->center, way, io->center);
+}
+
+/* Of a rounded hull the flat part of its surface. */
+static void raise_face(const hapi_solid *hull, hapi_feature *io)
+{
+  double way[3];
+  if (hull->ball > 0.0) {
+    hapi_v3_scale(hull->ball, io->normal, way);
+    move_corners(io, way);
+  }
+}
+
+/* What of a rounded hull comes nearest along d: the corners of the core, each with its ball. */
+static void round_hull(const hapi_solid *hull, const double d[3], hapi_feature *out)
+{
+  feature_clear(out);
+  hapi_hull_feature(hull, d, out);
+  out->ball = hull->ball;
+  hapi_v3_scale(hull->ball, d, out->lift);
+  move_corners(out, out->lift);
+}
+
 bool hapi_feature_face(const hapi_solid *solid, const double d[3], hapi_feature *out)
 {
   feature_clear(out);
@@ -121,12 +149,17 @@ bool hapi_feature_face(const hapi_solid *solid, const double d[3], hapi_feature 
     cylinder_cap(solid, d, out);
   } else if (solid->kind == HAPI_SHAPE_HULL) {
     hapi_hull_feature(solid, d, out);
+    raise_face(solid, out);
   }
   return out->count > 2 && out->area > 0.0;
 }
 
 void hapi_feature_along(const hapi_solid *solid, const double d[3], hapi_feature *out)
 {
+  if (solid->kind == HAPI_SHAPE_HULL && solid->ball > 0.0) {
+    round_hull(solid, d, out);
+    return;
+  }
   if (solid->kind == HAPI_SHAPE_BOX || solid->kind == HAPI_SHAPE_HULL ||
       (solid->kind == HAPI_SHAPE_CYLINDER && on_cap(solid, d))) {
     hapi_feature_face(solid, d, out);

@@ -72,7 +72,7 @@ static bool add_faces(const general *g, bool is_a)
 
 static bool is_polytope(const hapi_solid *solid)
 {
-  return solid->kind == HAPI_SHAPE_BOX || solid->kind == HAPI_SHAPE_HULL;
+  return solid->kind == HAPI_SHAPE_BOX || (solid->kind == HAPI_SHAPE_HULL && solid->ball == 0.0);
 }
 
 static bool add_edges(const general *g)

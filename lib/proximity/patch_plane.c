@@ -63,6 +63,7 @@ static int hull_spots(const hapi_solid *hull, const hapi_frame *frame, const hap
     double point[3];
     hapi_solid_to_world(hull, hull->hull + 3 * i, point);
     hapi_v3_add(hull->center, point, point);
+    hapi_v3_madd(point, -hull->ball, frame->normal, point);
     hapi_spot spot = spot_of(frame, point);
     if (!(spot.gap <= pair->margin)) {
       continue;
@@ -105,7 +106,7 @@ bool hapi_patch_plane(const hapi_pair *pair)
   bool plane_is_a = pair->a->kind == HAPI_SHAPE_PLANE;
   const hapi_solid *plane = plane_is_a ? pair->a : pair->b;
   const hapi_solid *solid = plane_is_a ? pair->b : pair->a;
-  static const hapi_feature corners = {.count = 1};
+  hapi_feature corners = {.count = 1, .ball = solid->ball};
   hapi_spot spots[HAPI_SPOTS_MAX];
   hapi_frame frame;
   int count = 0;
@@ -124,6 +125,7 @@ bool hapi_patch_plane(const hapi_pair *pair)
   if (solid->kind == HAPI_SHAPE_BOX) {
     count = box_spots(solid, &frame, pair->margin, spots);
   } else {
+    hapi_v3_scale(-solid->ball, frame.normal, corners.lift);
     count = hull_spots(solid, &frame, pair, spots);
   }
   hapi_patch_add_spots(pair, plane_is_a, &frame, &corners, spots, count);

@@ -42,7 +42,8 @@ static bool sphere_hull(const hapi_pair *pair)
 {
   hapi_gjk start;
   hapi_gjk cores;
-  hapi_patch_point p = {.touch = HAPI_TOUCH_FACE_B, .ball_a = pair->a->ball};
+  hapi_patch_point p = {
+      .touch = HAPI_TOUCH_FACE_B, .ball_a = pair->a->ball, .ball_b = pair->b->ball};
   hapi_patch_guess(pair->a, pair->b, &start);
   if (!hapi_patch_axis(pair->a, pair->b, &start, &cores)) {
     return false;

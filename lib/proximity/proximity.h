@@ -30,6 +30,7 @@ typedef struct hapi_shape {
                          and cylinder */
   const double *hull; /* count x 3, local, borrowed */
   size_t hull_count;
+  double rounding; /* m: hull: radius of a ball that is swept over it */
 } hapi_shape;
 
 typedef struct hapi_nearest {

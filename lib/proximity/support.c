@@ -45,8 +45,10 @@ static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
       round[0] = shape->radius;
       solid->half[2] = shape->half[2];
       break;
-    case HAPI_SHAPE_PLANE:
     case HAPI_SHAPE_HULL:
+      round[1] = shape->rounding;
+      break;
+    case HAPI_SHAPE_PLANE:
       break;
   }
   solid->disc = round[0];

@@ -8,8 +8,8 @@
 /* A shape at a pose, in world axes about an origin near the pair: 10 km from the world's origin a
  * coordinate has a grain of 2e-12 m, the small numbers here have not.
  *
- * Every solid is a core blown up by a ball. Sphere: point; capsule: segment; others: themselves
- * with no ball. Distances of cores are exact for round shapes, and the cores of a shallow contact
+ * Every solid is a core blown up by a ball. Sphere: point; capsule: segment; hull:
+ * itself, with a ball where it is rounded; others: themselves with no ball. Distances of cores are exact for round shapes, and the cores of a shallow contact
  * of round shapes are still apart. */
 typedef struct hapi_solid {
   hapi_shape_kind kind;

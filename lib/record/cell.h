@@ -31,6 +31,8 @@ typedef enum hapi_cell_kind {
   HAPI_CELL_FORCE = 7, /* to be written: d[0..2] force, d[3..5] torque; u[6]: hash of the pointer */
   HAPI_CELL_REACHED = 8, /* what the device made of it, where that is something else */
   HAPI_CELL_BODY = 9,    /* d[0..2] position, d[3..6] quaternion; word: slot */
+  HAPI_CELL_HULL = 10,   /* behind the JOINs of a pointer that is one: d[0..2] a vertex, d[3..5] the
+                            next one */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
   HAPI_CELL_WORLD = 16,  /* hapi_world_word; flags: hap_model at the start */
   HAPI_CELL_CYCLE = 17,  /* hapi_cycle_word; word: edits that were run; flags: hap_model wanted */
@@ -122,8 +124,11 @@ typedef struct hapi_joined {
 
 static_assert(sizeof(hapi_joined) <= HAPI_JOIN_CELLS * HAPI_CELL_BYTES, "room in the cells");
 
-/* Of a tick with everything in it. */
-#define HAPI_PACKET_MAX (1u + 16u * (1u + HAPI_JOIN_CELLS + 4u) + HAPI_CELL_BODIES)
+#define HAPI_HULL_CELLS(points) (((uint32_t)(points) + 1u) / 2u)
+
+/* Of a tick with everything in it; 64 vertices are the most. */
+#define HAPI_PACKET_MAX \
+  (1u + 16u * (1u + HAPI_JOIN_CELLS + HAPI_HULL_CELLS(64u) + 4u) + HAPI_CELL_BODIES)
 
 #define HAPI_HASH_BEGIN 0xcbf29ce484222325u
 

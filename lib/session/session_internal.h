@@ -67,6 +67,7 @@ int64_t hapi_play_now(const hap_session *session);
 
 /* session_pointer.c; detail may be NULL */
 hap_status hapi_session_check_pointer(const hap_pointer_def *def, hap_detail *detail);
+hap_status hapi_session_check_hull(const hap_pointer_def *def, hap_detail *detail);
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
 

@@ -98,6 +98,8 @@ static hap_status create_contact(hap_session *session, const hapi_capacity *capa
   return hapi_contact_create(&config, &session->contact);
 }
 
+#define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
+
 /* Slots for the range, as many again for what stands around it, and some for those that have left and
  * that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss two. */
 static hapi_capacity capacity_of(const hap_session_def *def)
@@ -110,6 +112,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .hull_points = (uint32_t)def->max_hull_points,
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
+      .tool_points = TOOL_POINTS,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {

@@ -273,8 +273,28 @@ static hap_status run_ready_passes(hap_player *player, hap_detail *detail)
 
 /* ---- a tick ---- */
 
-static hap_status check_join(const hap_player *player, const hapi_cell *cells, hap_detail *detail)
+/* The vertices are in the HULL cells behind the JOINs. */
+static bool read_hull(const hapi_cell *cells, uint32_t count, hapi_joined *io,
+                      double points[HAPI_TOOL_POINTS_MAX + 1][3])
 {
+  size_t wanted = io->def.hull_points;
+  if (wanted > HAPI_TOOL_POINTS_MAX || HAPI_HULL_CELLS(wanted) > count) {
+    return false;
+  }
+  for (uint32_t i = 0; i < HAPI_HULL_CELLS(wanted); ++i) {
+    if (cells[i].kind != HAPI_CELL_HULL) {
+      return false;
+    }
+    memcpy(points[2 * i], cells[i].d, 6 * sizeof(double));
+  }
+  io->def.hull_xyz = wanted > 0 ? &points[0][0] : NULL;
+  return true;
+}
+
+static hap_status check_join(const hap_player *player, const hapi_cell *cells, uint32_t count,
+                             hap_detail *detail)
+{
+  double points[HAPI_TOOL_POINTS_MAX + 1][3];
   char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES];
   hapi_joined joined;
   for (uint32_t i = 0; i < HAPI_JOIN_CELLS; ++i) {
@@ -287,6 +307,7 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, h
   bool good = cells[0].index < player->session->def.max_pointers && joined.generation != 0 &&
               joined.def.cookie == HAPI_POINTER_COOKIE && joined.def.device == NULL &&
               joined.def.hull_xyz == NULL &&
+              read_hull(cells + HAPI_JOIN_CELLS, count - HAPI_JOIN_CELLS, &joined, points) &&
               hapi_finite(figures, sizeof figures / sizeof figures[0]) &&
               memchr(info->name, '\0', sizeof info->name) != NULL;
   if (joined.has_device != 0 && joined.def.velocity == HAP_VELOCITY_ESTIMATED) {
@@ -308,7 +329,7 @@ static hap_status check_packet(const hap_player *player, const hapi_cell *cells,
   for (uint32_t i = 1; i < count; ++i) {
     if (cells[i].kind == HAPI_CELL_JOIN) {
       hap_status status = i + HAPI_JOIN_CELLS <= count
-                              ? check_join(player, &cells[i], detail)
+                              ? check_join(player, &cells[i], count - i, detail)
                               : contradicts(player, "a pointer comes in part", detail);
       if (status < HAP_OK) {
         return status;

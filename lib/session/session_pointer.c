@@ -42,7 +42,8 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
     bool good;
     const char *what;
   } rules[] = {
-      {between(d->radius, 1e-6, 100.0), "radius is not in 1e-6 .. 100 m"},
+      {between(d->radius, d->hull_points > 0 ? 0.0 : 1e-6, 100.0),
+       "radius is not in 1e-6 .. 100 m (of a hull 0 .. 100 m)"},
       {between(d->mass, 0.0, 1e6), "mass is not in 0 .. 1e6 kg"},
       {between(d->stiffness, 0.0, 1e9), "stiffness is not in 0 .. 1e9 N/m"},
       {between(d->damping, 0.0, 1e6), "damping is not in 0 .. 1e6 N s/m"},
@@ -78,10 +79,12 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
 
 hap_status hapi_session_check_pointer(const hap_pointer_def *d, hap_detail *detail)
 {
-  if (d->hull_xyz != NULL || d->hull_points != 0) {
-    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "this version has sphere pointers");
+  if (d->hull_points != 0 && (d->friction != 0.0 || d->finger_radius != 0.0)) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "friction and finger_radius of a hull are not in this version: leave them 0");
   }
-  return check_numbers(d, detail);
+  hap_status status = check_numbers(d, detail);
+  return status >= HAP_OK ? hapi_session_check_hull(d, detail) : status;
 }
 
 /* A replay has the pointers of the recording, and what moved them. */

@@ -44,6 +44,7 @@ static size_t lay_out_model(hapi_model *m, const hapi_capacity *c)
   m->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_model_body));
   m->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_model_contact));
   m->joints_offset = place_array(&at, c->joints, sizeof(hapi_model_joint));
+  m->tools_offset = place_array(&at, c->tool_points, sizeof(hapi_tool_point));
   return at;
 }
 
@@ -53,6 +54,7 @@ static size_t lay_out_state(hapi_state *s, const hapi_capacity *c)
   s->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_state_body));
   s->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_state_contact));
   s->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_state_pointer));
+  s->hulls_offset = place_array(&at, c->pointers, sizeof(hapi_tool_hull));
   s->pointer_count = c->pointers;
   return at;
 }
@@ -64,6 +66,8 @@ static size_t lay_out_near(hapi_near *n, const hapi_capacity *c)
   n->geoms_offset = place_array(&at, c->geoms, sizeof(hapi_near_geom));
   n->pairs_offset = place_array(&at, c->contacts, sizeof(hapi_near_pair));
   n->points_offset = place_array(&at, c->hull_points, 3 * sizeof(double));
+  n->tools_offset = place_array(&at, c->pointers, sizeof(hapi_near_tool));
+  n->tool_pairs_offset = place_array(&at, c->contacts, sizeof(hapi_near_tool_pair));
   return at;
 }
 
@@ -71,6 +75,7 @@ static size_t lay_out_poses(hapi_poses *p, const hapi_capacity *c)
 {
   size_t at = sizeof *p;
   p->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_poses_body));
+  p->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_poses_pointer));
   return at;
 }
 
@@ -79,6 +84,7 @@ static size_t lay_out_patches(hapi_patches *p, const hapi_capacity *c)
   size_t at = sizeof *p;
   p->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_patch_contact));
   p->surfaces_offset = place_array(&at, c->contacts, sizeof(hapi_surface));
+  p->tools_offset = place_array(&at, c->tool_points, sizeof(hapi_tool_point));
   return at;
 }
 

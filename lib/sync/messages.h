@@ -33,7 +33,16 @@ typedef struct hapi_capacity {
   uint32_t trail_rows;   /* 0: none are kept */
   uint32_t trail_stride; /* ticks from row to row */
   uint32_t joints;       /* between bodies of the range */
+  uint32_t tool_points;  /* contacts of pointers that are hulls */
 } hapi_capacity;
+
+#define HAPI_TOOL_POINTS_MAX 64u /* vertices of a pointer's hull */
+
+/* A pointer's hull, in the pointer's frame. */
+typedef struct hapi_tool_hull {
+  uint32_t count; /* 0: the pointer is a sphere */
+  double points[HAPI_TOOL_POINTS_MAX][3];
+} hapi_tool_hull;
 
 enum {
   HAPI_BODY_DRIVEN = 1,    /* moved by the application: keeps its twist, feels no force */
@@ -48,6 +57,44 @@ enum {
   HAPI_BODY_WHOLE = 128   /* of a MEASURED one: all its rows go by response; else those of its only
                              pointer contact by that contact's a */
 };
+
+/* ---- how two shapes touch ---- */
+
+/* A point of hapi_patch with everything in the frames of the bodies, to be placed anew at every
+ * tick. Static world: world frame. */
+typedef struct hapi_patch_contact {
+  uint64_t key; /* of the pair; contacts of a pair follow each other */
+  uint32_t body_a;
+  uint32_t generation_a;
+  uint32_t body_b; /* HAPI_SLOT_NONE: static world */
+  uint32_t generation_b;
+  uint32_t surface; /* index into the message's surfaces */
+  hapi_touch touch;
+  double core_a[3];
+  double core_b[3];
+  double ball_a;
+  double ball_b;
+  double rim_a;
+  double rim_b;
+  double axis_a[3]; /* of the rims */
+  double axis_b[3];
+  hapi_slide slide;
+  double edge_a[3]; /* EDGES and slides */
+  double edge_b[3];
+  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
+  hapi_shape shape; /* BALL: what the ball touches */
+  hap_pose shape_pose;
+} hapi_patch_contact;
+
+/* A point of a patch between a pointer's hull (a) and a geom of a body (b). Side a is in the pointer's
+ * frame. */
+typedef struct hapi_tool_point {
+  uint32_t pointer;
+  uint32_t pointer_generation;
+  double
+      same_within; /* m, in the pointer's frame: a new point that is nearer to an old one is it */
+  hapi_patch_contact at;
+} hapi_tool_point;
 
 /* ---- physics -> haptic: the local model ---- */
 
@@ -93,6 +140,7 @@ typedef struct hapi_model_contact {
   double mu;             /* friction of the pointer against the body; 0: none */
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
+  uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
 } hapi_model_contact;
 
 /* How a joint's error is taken back: ODE's parameters at the tick. */
@@ -221,9 +269,11 @@ typedef struct hapi_model {
   uint32_t contact_count;
   uint32_t watch_count; /* traced bodies */
   uint32_t joint_count; /* model CONTACT */
+  uint32_t tool_count;  /* other models: model CONTACT has them of the contact thread */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
+  uint32_t tools_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -241,6 +291,11 @@ static inline hapi_model_contact *hapi_model_contacts(hapi_model *m)
 static inline hapi_model_joint *hapi_model_joints(hapi_model *m)
 {
   return (hapi_model_joint *)(void *)((char *)m + m->joints_offset);
+}
+
+static inline hapi_tool_point *hapi_model_tools(hapi_model *m)
+{
+  return (hapi_tool_point *)(void *)((char *)m + m->tools_offset);
 }
 
 /* ---- physics -> contact: what may touch what (model CONTACT) ---- */
@@ -298,16 +353,37 @@ typedef struct hapi_near_body {
   hap_twist twist;
 } hapi_near_body;
 
+/* A pointer that is a hull. */
+typedef struct hapi_near_tool {
+  uint32_t pointer;
+  uint32_t generation;
+  double radius; /* m, of the rounding */
+  double extent; /* m, from the frame's origin to the farthest point of the surface */
+  hap_pose pose; /* world, for one that the loop has not yet told */
+  hap_twist twist;
+  hapi_tool_hull hull;
+} hapi_near_tool;
+
+typedef struct hapi_near_tool_pair {
+  uint64_t key; /* of a mesh: of all of its triangles */
+  uint32_t tool;
+  uint32_t geom;
+} hapi_near_tool_pair;
+
 typedef struct hapi_near {
   uint64_t model_number; /* of the model that it belongs to */
   uint32_t body_count;
   uint32_t geom_count;
   uint32_t pair_count;
   uint32_t point_count;
+  uint32_t tool_count;
+  uint32_t tool_pair_count; /* those of a key follow each other */
   uint32_t bodies_offset;
   uint32_t geoms_offset;
   uint32_t pairs_offset;
   uint32_t points_offset;
+  uint32_t tools_offset;
+  uint32_t tool_pairs_offset;
 } hapi_near;
 
 static inline hapi_near_body *hapi_near_bodies(hapi_near *n)
@@ -330,6 +406,16 @@ static inline double *hapi_near_points(hapi_near *n)
   return (double *)(void *)((char *)n + n->points_offset);
 }
 
+static inline hapi_near_tool *hapi_near_tools(hapi_near *n)
+{
+  return (hapi_near_tool *)(void *)((char *)n + n->tools_offset);
+}
+
+static inline hapi_near_tool_pair *hapi_near_tool_pairs(hapi_near *n)
+{
+  return (hapi_near_tool_pair *)(void *)((char *)n + n->tool_pairs_offset);
+}
+
 /* ---- haptic -> contact: where the bodies are (model CONTACT) ---- */
 
 typedef struct hapi_poses_body {
@@ -339,10 +425,17 @@ typedef struct hapi_poses_body {
   hap_twist twist;
 } hapi_poses_body;
 
+typedef struct hapi_poses_pointer {
+  uint32_t generation; /* 0: no hull here */
+  hap_pose pose;
+  hap_twist twist;
+} hapi_poses_pointer;
+
 typedef struct hapi_poses {
   uint64_t model_number; /* the local model in use */
   uint32_t body_count;
   uint32_t bodies_offset;
+  uint32_t pointers_offset; /* capacity.pointers */
 } hapi_poses;
 
 static inline hapi_poses_body *hapi_poses_bodies(hapi_poses *p)
@@ -350,33 +443,12 @@ static inline hapi_poses_body *hapi_poses_bodies(hapi_poses *p)
   return (hapi_poses_body *)(void *)((char *)p + p->bodies_offset);
 }
 
-/* ---- contact -> haptic: contacts between bodies (model CONTACT) ---- */
+static inline hapi_poses_pointer *hapi_poses_pointers(hapi_poses *p)
+{
+  return (hapi_poses_pointer *)(void *)((char *)p + p->pointers_offset);
+}
 
-/* A point of hapi_patch with everything in the frames of the bodies, to be placed anew at every
- * tick. Static world: world frame. */
-typedef struct hapi_patch_contact {
-  uint64_t key; /* of the pair; contacts of a pair follow each other */
-  uint32_t body_a;
-  uint32_t generation_a;
-  uint32_t body_b; /* HAPI_SLOT_NONE: static world */
-  uint32_t generation_b;
-  uint32_t surface; /* index into the message's surfaces */
-  hapi_touch touch;
-  double core_a[3];
-  double core_b[3];
-  double ball_a;
-  double ball_b;
-  double rim_a;
-  double rim_b;
-  double axis_a[3]; /* of the rims */
-  double axis_b[3];
-  hapi_slide slide;
-  double edge_a[3]; /* EDGES and slides */
-  double edge_b[3];
-  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
-  hapi_shape shape; /* BALL: what the ball touches */
-  hap_pose shape_pose;
-} hapi_patch_contact;
+/* ---- contact -> haptic: contacts between bodies (model CONTACT) ---- */
 
 typedef struct hapi_patches {
   uint64_t number;       /* 1, 2, 3 ... */
@@ -384,8 +456,10 @@ typedef struct hapi_patches {
   int64_t valid_from_ns; /* the loop uses the message from this time on */
   uint32_t contact_count;
   uint32_t surface_count;
+  uint32_t tool_count; /* of pointers that are hulls; those of a key follow each other */
   uint32_t contacts_offset;
   uint32_t surfaces_offset;
+  uint32_t tools_offset;
 } hapi_patches;
 
 static inline hapi_patch_contact *hapi_patches_contacts(hapi_patches *p)
@@ -396,6 +470,11 @@ static inline hapi_patch_contact *hapi_patches_contacts(hapi_patches *p)
 static inline hapi_surface *hapi_patches_surfaces(hapi_patches *p)
 {
   return (hapi_surface *)(void *)((char *)p + p->surfaces_offset);
+}
+
+static inline hapi_tool_point *hapi_patches_tools(hapi_patches *p)
+{
+  return (hapi_tool_point *)(void *)((char *)p + p->tools_offset);
 }
 
 /* ---- haptic -> physics: the state of the loop after a tick ---- */
@@ -409,6 +488,8 @@ typedef struct hapi_state_pointer {
   double finger_radius;
   hap_pose pose;
   hap_twist twist;
+  uint32_t is_tool; /* a hull: see hapi_state_hulls */
+  double extent;    /* m, of a hull as in hapi_near_tool, else the radius */
 } hapi_state_pointer;
 
 typedef struct hapi_state_body {
@@ -448,7 +529,7 @@ typedef struct hapi_state {
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t pointers_offset;
-  uint32_t reserved;
+  uint32_t hulls_offset;
 } hapi_state;
 
 static inline hapi_state_body *hapi_state_bodies(hapi_state *s)
@@ -464,6 +545,12 @@ static inline hapi_state_contact *hapi_state_contacts(hapi_state *s)
 static inline hapi_state_pointer *hapi_state_pointers(hapi_state *s)
 {
   return (hapi_state_pointer *)(void *)((char *)s + s->pointers_offset);
+}
+
+/* By pointer; of one that is a sphere not set. */
+static inline hapi_tool_hull *hapi_state_hulls(hapi_state *s)
+{
+  return (hapi_tool_hull *)(void *)((char *)s + s->hulls_offset);
 }
 
 #endif

@@ -120,8 +120,8 @@ bool hapi_trail_pointer_at(hapi_trail_view *view, uint64_t row, uint32_t index, 
   }
   read_numbers(place->proxy, out_proxy_device[0].position, 3);
   read_numbers(place->device, out_proxy_device[1].position, 3);
-  read_numbers(place->quat_wxyz, out_proxy_device[0].quat_wxyz, 4);
-  read_numbers(place->quat_wxyz, out_proxy_device[1].quat_wxyz, 4);
+  read_numbers(place->proxy_quat, out_proxy_device[0].quat_wxyz, 4);
+  read_numbers(place->device_quat, out_proxy_device[1].quat_wxyz, 4);
   return true;
 }
 

@@ -26,11 +26,12 @@ typedef struct hapi_trail_body {
 } hapi_trail_body;
 
 typedef struct hapi_trail_pointer {
-  _Atomic uint32_t generation; /* 0: no pointer here */
-  _Atomic uint32_t proxied;    /* it moves as a body does: at the time of the bodies */
-  _Atomic double proxy[3];     /* m, world */
-  _Atomic double device[3];    /* m, world */
-  _Atomic double quat_wxyz[4]; /* of both */
+  _Atomic uint32_t generation;   /* 0: no pointer here */
+  _Atomic uint32_t proxied;      /* it moves as a body does: at the time of the bodies */
+  _Atomic double proxy[3];       /* m, world */
+  _Atomic double device[3];      /* m, world */
+  _Atomic double proxy_quat[4];  /* w, x, y, z */
+  _Atomic double device_quat[4]; /* another one for the proxy of a hull alone */
 } hapi_trail_pointer;
 
 typedef struct hapi_trail_row {

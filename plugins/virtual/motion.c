@@ -39,40 +39,52 @@ static size_t waypoint_count(const char *text, size_t length)
   return count;
 }
 
-static hap_status waypoints_read(hapi_motion *motion, const char *text, const char *stop,
+static hap_status waypoints_read(hapi_motion *motion, const hapi_motion_text *text,
                                  hap_detail *detail)
 {
-  const char *at = text;
+  const char *at = text->text;
+  const char *stop = at + text->length;
   for (size_t i = 0; i < motion->count; ++i) {
     const char *end = memchr(at, ';', (size_t)(stop - at));
     end = end != NULL ? end : stop;
     if (!waypoint_read(at, end, &motion->waypoints[i])) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                       "virtual: path: waypoint %zu: expected T:x/y/z in s and m (at most 1000 m), "
-                       "not '%.*s'",
-                       i + 1, (int)(end - at < 60 ? end - at : 60), at);
+                       "virtual: %s: waypoint %zu: expected %s, not '%.*s'", text->key, i + 1,
+                       text->expected, (int)(end - at < 60 ? end - at : 60), at);
     }
     if (i > 0 && !(motion->waypoints[i].time - motion->waypoints[i - 1].time >= TIME_STEP)) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                       "virtual: path: waypoint %zu: its time must be later than that of the one "
+                       "virtual: %s: waypoint %zu: its time must be later than that of the one "
                        "before (by 1 us at least)",
-                       i + 1);
+                       text->key, i + 1);
     }
     at = end + 1;
   }
   return HAP_OK;
 }
 
-hap_status hapi_motion_set_path(hapi_motion *motion, const char *text, size_t length,
+static hap_status check_loop(const hapi_motion *motion, const char *key, hap_detail *detail)
+{
+  double jump[3];
+  hapi_v3_sub(motion->waypoints[motion->count - 1].position, motion->waypoints[0].position, jump);
+  if (motion->loop && hapi_v3_norm(jump) > 1e-9) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "virtual: loop=1 would jump: the %s must end where it begins", key);
+  }
+  return HAP_OK;
+}
+
+hap_status hapi_motion_set_path(hapi_motion *motion, const hapi_motion_text *text,
                                 hap_detail *detail)
 {
-  motion->count = waypoint_count(text, length);
+  motion->count = waypoint_count(text->text, text->length);
   motion->waypoints = hapi_alloc_array(motion->count, sizeof *motion->waypoints);
   if (motion->waypoints == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: no memory for %zu waypoints",
                      motion->count);
   }
-  return waypoints_read(motion, text, text + length, detail);
+  hap_status status = waypoints_read(motion, text, detail);
+  return status >= HAP_OK ? check_loop(motion, text->key, detail) : status;
 }
 
 void hapi_motion_finish(hapi_motion *motion)

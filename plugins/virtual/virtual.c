@@ -47,6 +47,9 @@ typedef struct virtual_device {
   hapi_hand hand; /* with the mechanism; rigid: its place alone */
   kick kick;
   hapi_delay delay;
+  hapi_motion turning; /* dof=6: rotation vector, rad, from the orientation on */
+  hapi_hand wrist; /* the same model: its positions are a rotation vector, its mass an inertia */
+  hapi_delay torque_delay;
   double work; /* J, see virtual.h */
   measured measured;
   hapi_output output;
@@ -75,6 +78,14 @@ enum argument {
   QUANTUM,
   KICK,
   DOF,
+  TURN,
+  TURN_SINE,
+  TURN_HZ,
+  INERTIA,
+  TURN_DAMPING,
+  TURN_STIFFNESS,
+  DEVICE_INERTIA,
+  DEVICE_TURN_DAMPING,
   ARGUMENT_COUNT
 };
 
@@ -96,6 +107,18 @@ static const hapi_hand_def presets[] = {
     [TENSE] = {0.3, 10.0, 800.0, 0.0},
     [NOBODY] = {0.0, 0.0, 0.0, 0.0},
 };
+
+/* The same of turning the handle, with a wrist: round numbers again. */
+static const hapi_hand_def wrists[] = {
+    [RIGID] = {1.0, 0.0, 0.0, 0.0}, /* not used */
+    [RELAXED] = {1e-3, 0.02, 1.0, 0.0},
+    [TENSE] = {1.5e-3, 0.06, 5.0, 0.0},
+    [NOBODY] = {0.0, 0.0, 0.0, 0.0},
+};
+
+#define TURN_MOST 3.0      /* rad: a rotation vector has no use at 2 pi */
+#define INERTIA_LEAST 1e-7 /* kg m^2 */
+#define GRIP 0.05          /* m, arm that gives a mechanism's inertia where the spec does not */
 
 static const char *const blend_words[] = {"smooth", "linear", NULL};
 static const char *const switch_words[] = {"0", "1", NULL};
@@ -131,6 +154,20 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
     [QUANTUM] = {"quantum", HAPI_ARGUMENT_NUMBER, false, 0.0, 0.1, "m from 0 to 0.1"},
     [KICK] = {"kick", HAPI_ARGUMENT_TEXT, .expected = "T:vx/vy/vz in s and m/s (at most 100 m/s)"},
     [DOF] = {"dof", HAPI_ARGUMENT_WORD, .expected = "3 or 6", .words = dof_words},
+    [TURN] = {"turn", HAPI_ARGUMENT_TEXT, .expected = "T:rx/ry/rz;T:rx/ry/rz in s and rad"},
+    [TURN_SINE] = {"turn_sine", HAPI_ARGUMENT_VECTOR, false, -3.0, 3.0,
+                   "ax/ay/az in rad, each within 3"},
+    [TURN_HZ] = {"turn_hz", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4, "a number from 0 to 10000",
+                 .number = {1.0}},
+    [INERTIA] = {"inertia", HAPI_ARGUMENT_NUMBER, false, 1e-7, 1e3, "kg m^2 from 1e-7 to 1000"},
+    [TURN_DAMPING] = {"turn_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4,
+                      "N m s/rad from 0 to 1e4"},
+    [TURN_STIFFNESS] = {"turn_stiffness", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e6,
+                        "N m/rad from 0 to 1e6"},
+    [DEVICE_INERTIA] = {"device_inertia", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e3,
+                        "kg m^2 from 0 to 1000"},
+    [DEVICE_TURN_DAMPING] = {"device_turn_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4,
+                             "N m s/rad from 0 to 1e4"},
 };
 
 static hap_status set_motion(virtual_device *device, const hapi_argument *entries,
@@ -146,24 +183,53 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
   if (!entries[PATH].given) {
     return HAP_OK;
   }
-  hap_status status =
-      hapi_motion_set_path(motion, entries[PATH].text, entries[PATH].length, detail);
-  if (status < 0 || !motion->loop) {
-    return status;
+  const hapi_motion_text text = {"path", "T:x/y/z in s and m (at most 1000 m)", entries[PATH].text,
+                                 entries[PATH].length};
+  return hapi_motion_set_path(motion, &text, detail);
+}
+
+static hap_status set_turning(virtual_device *device, const hapi_argument *entries,
+                              hap_detail *detail)
+{
+  hapi_motion *turning = &device->turning;
+  for (int i = TURN; entries[DOF].word == 0 && i <= DEVICE_TURN_DAMPING; ++i) {
+    if (entries[i].given) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: %s needs dof=6", entries[i].key);
+    }
   }
-  const hapi_waypoint *last = &motion->waypoints[motion->count - 1];
-  double jump[3];
-  hapi_v3_sub(last->position, motion->waypoints[0].position, jump);
-  if (hapi_v3_norm(jump) > 1e-9) {
+  if (entries[TURN_HZ].given && !entries[TURN_SINE].given) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "virtual: loop=1 would jump: the path must end where it begins");
+                     "virtual: turn_hz has no effect without turn_sine");
   }
-  return HAP_OK;
+  turning->blend = device->motion.blend;
+  turning->loop = device->motion.loop;
+  turning->hz = entries[TURN_HZ].number[0];
+  hapi_v3_copy(entries[TURN_SINE].number, turning->sine);
+  if (!entries[TURN].given) {
+    return HAP_OK;
+  }
+  const hapi_motion_text text = {"turn", "T:rx/ry/rz in s and rad", entries[TURN].text,
+                                 entries[TURN].length};
+  hap_status status = hapi_motion_set_path(turning, &text, detail);
+  for (size_t i = 0; status >= HAP_OK && i < turning->count; ++i) {
+    if (!(hapi_v3_norm(turning->waypoints[i].position) <= TURN_MOST)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                       "virtual: turn: waypoint %zu is a turn by %g rad; at most %g", i + 1,
+                       hapi_v3_norm(turning->waypoints[i].position), TURN_MOST);
+    }
+  }
+  return status;
+}
+
+static bool is_tuned(const hapi_argument *entries)
+{
+  return entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given ||
+         entries[INERTIA].given || entries[TURN_DAMPING].given || entries[TURN_STIFFNESS].given;
 }
 
 static hap_status check_hand(const hapi_argument *entries, size_t word, hap_detail *detail)
 {
-  bool tuned = entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given;
+  bool tuned = is_tuned(entries);
   if (tuned && (word == RIGID || word == NOBODY)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "virtual: hand=%s has no mass, damping or stiffness", hand_words[word]);
@@ -178,9 +244,23 @@ static hap_status check_hand(const hapi_argument *entries, size_t word, hap_deta
   return HAP_OK;
 }
 
+static void set_wrist(virtual_device *device, const hapi_argument *entries, size_t word)
+{
+  hapi_hand_def def = wrists[word];
+  double device_inertia = entries[DEVICE_INERTIA].given
+                              ? entries[DEVICE_INERTIA].number[0]
+                              : GRIP * GRIP * entries[DEVICE_MASS].number[0];
+  def.mass = entries[INERTIA].given ? entries[INERTIA].number[0] : def.mass;
+  def.damping = entries[TURN_DAMPING].given ? entries[TURN_DAMPING].number[0] : def.damping;
+  def.stiffness = entries[TURN_STIFFNESS].given ? entries[TURN_STIFFNESS].number[0] : def.stiffness;
+  def.mass = fmax(def.mass + device_inertia, INERTIA_LEAST);
+  def.drag = entries[DEVICE_TURN_DAMPING].number[0];
+  hapi_hand_init(&device->wrist, &def);
+}
+
 static hap_status set_hand(virtual_device *device, const hapi_argument *entries, hap_detail *detail)
 {
-  bool tuned = entries[MASS].given || entries[DAMPING].given || entries[STIFFNESS].given;
+  bool tuned = is_tuned(entries);
   size_t word = entries[HAND].given || !tuned ? entries[HAND].word : RELAXED;
   hap_status status = check_hand(entries, word, detail);
   if (status < 0) {
@@ -195,6 +275,7 @@ static hap_status set_hand(virtual_device *device, const hapi_argument *entries,
   device->yields = word != RIGID;
   device->held = word != NOBODY;
   hapi_hand_init(&device->hand, &def);
+  set_wrist(device, entries, word);
   return HAP_OK;
 }
 
@@ -256,10 +337,14 @@ static hap_status configure(virtual_device *device, const char *args, hap_detail
     status = set_motion(device, entries, detail);
   }
   if (status >= 0) {
+    status = set_turning(device, entries, detail);
+  }
+  if (status >= 0) {
     status = set_kick(device, &table, detail);
   }
-  if (status >= 0 &&
-      !hapi_delay_init(&device->delay, (uint64_t)llround(device->info.delay * 1e9))) {
+  uint64_t delay_ns = (uint64_t)llround(device->info.delay * 1e9);
+  if (status >= 0 && !(hapi_delay_init(&device->delay, delay_ns) &&
+                       hapi_delay_init(&device->torque_delay, delay_ns))) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: no memory for the delay");
   }
   return status;
@@ -269,7 +354,9 @@ static void virtual_close(void *self)
 {
   virtual_device *device = self;
   hapi_motion_finish(&device->motion);
+  hapi_motion_finish(&device->turning);
   hapi_delay_finish(&device->delay);
+  hapi_delay_finish(&device->torque_delay);
   hapi_free(device);
 }
 
@@ -299,10 +386,65 @@ static hap_status virtual_start(void *self)
   virtual_device *device = self;
   hapi_output_zero(&device->output);
   hapi_delay_clear(&device->delay);
+  hapi_delay_clear(&device->torque_delay);
   device->kick.done = false;
   device->work = 0.0;
   hapi_timeline_start(&device->timeline);
   return HAP_OK;
+}
+
+/* w = J(x) x' of a rotation vector x: the left Jacobian of its exponential. */
+static void spin_matrix(const double x[3], double out[9])
+{
+  double angle = hapi_v3_norm(x);
+  double angle2 = angle * angle;
+  bool small = angle < 1e-3;
+  double first = small ? 0.5 - angle2 / 24.0 : (1.0 - cos(angle)) / angle2;
+  double second = small ? 1.0 / 6.0 - angle2 / 120.0 : (angle - sin(angle)) / (angle2 * angle);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out[3 * i + k] = second * x[i] * x[k] + (i == k ? 1.0 - second * angle2 : 0.0);
+    }
+  }
+  out[1] -= first * x[2];
+  out[2] += first * x[1];
+  out[3] += first * x[2];
+  out[5] -= first * x[0];
+  out[6] -= first * x[1];
+  out[7] += first * x[0];
+}
+
+/* The handle's turning over a step: as the hand's motion, in rotation vectors. The torque that acts on
+ * them is J^T times the device's, so that both do the same work. */
+static void turn_hand(virtual_device *device, double from, double length)
+{
+  hapi_hand_target target = {0};
+  double matrix[9];
+  double torque[3];
+  double before[3];
+  hapi_v3_copy(device->wrist.position, before);
+  spin_matrix(before, matrix);
+  hapi_m3_apply_transposed(matrix, device->torque_delay.acting, torque);
+  hapi_motion_at(&device->turning, from, target.position[0], target.velocity[0]);
+  hapi_motion_at(&device->turning, from + length, target.position[1], target.velocity[1]);
+  for (int axis = 0; axis < 3; ++axis) {
+    double push[2];
+    hapi_hand_push(&device->wrist, axis, &target, torque[axis], push);
+    hapi_hand_step_axis(&device->wrist, axis, length, push);
+    device->work += torque[axis] * (device->wrist.position[axis] - before[axis]);
+  }
+}
+
+/* J that the torque gave to a rigid wrist on its way from there. */
+static double rigid_turn_work(const virtual_device *device, const double from[3])
+{
+  double matrix[9];
+  double way[3];
+  double turn[3];
+  spin_matrix(from, matrix);
+  hapi_v3_sub(device->wrist.position, from, way);
+  hapi_m3_apply(matrix, way, turn);
+  return hapi_v3_dot(device->torque_delay.acting, turn);
 }
 
 /* Hand and mechanism from one time to another under the force that acts, in steps short enough for
@@ -326,6 +468,9 @@ static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
       hapi_hand_push(&device->hand, axis, &target, device->delay.acting[axis], push);
       hapi_friction_step(&device->hand, axis, device->info.friction, length, push);
     }
+    if (device->info.dof == 6) {
+      turn_hand(device, from + length * (double)i, length);
+    }
   }
 }
 
@@ -339,6 +484,12 @@ static void place_hand(virtual_device *device, uint64_t at_ns)
     hapi_v3_set(velocity, 0.0, 0.0, 0.0);
   }
   hapi_hand_place(&device->hand, position, velocity);
+  hapi_motion_at(&device->turning, device->start + hapi_timeline_seconds(at_ns), position,
+                 velocity);
+  if (!device->held) {
+    hapi_v3_set(velocity, 0.0, 0.0, 0.0);
+  }
+  hapi_hand_place(&device->wrist, position, velocity);
 }
 
 static void kick_hand(virtual_device *device, uint64_t now_ns)
@@ -356,19 +507,24 @@ static void move(virtual_device *device, uint64_t before_ns)
   hap_wrench given;
   hapi_output_get(&device->output, &given);
   hapi_delay_give(&device->delay, before_ns, given.force);
+  hapi_delay_give(&device->torque_delay, before_ns, given.torque);
   for (uint64_t at_ns = before_ns; at_ns < now_ns;) {
     uint64_t to_ns = hapi_delay_take(&device->delay, at_ns);
+    (void)hapi_delay_take(&device->torque_delay, at_ns); /* changes at the same times */
     kick_hand(device, at_ns);
     if (!device->kick.done && device->kick.at_ns < to_ns) {
       to_ns = device->kick.at_ns;
     }
     to_ns = to_ns < now_ns ? to_ns : now_ns;
     double way[3];
+    double turn[3];
     hapi_v3_copy(device->hand.position, way);
+    hapi_v3_copy(device->wrist.position, turn);
     if (device->yields) {
       move_hand(device, at_ns, to_ns);
     } else {
       place_hand(device, to_ns);
+      device->work += rigid_turn_work(device, turn);
     }
     hapi_v3_sub(device->hand.position, way, way);
     device->work += hapi_v3_dot(device->delay.acting, way);
@@ -396,6 +552,19 @@ static void measure(virtual_device *device, bool first, uint64_t way_ns)
   }
 }
 
+static void show_turn(const virtual_device *device, hap_pose *pose, hap_twist *twist)
+{
+  const double *x = device->wrist.position;
+  double angle = hapi_v3_norm(x);
+  double part = angle < 1e-6 ? 0.5 : sin(0.5 * angle) / angle;
+  double turn[4] = {cos(0.5 * angle), part * x[0], part * x[1], part * x[2]};
+  double matrix[9];
+  hapi_quat_multiply(turn, device->orientation, pose->quat_wxyz);
+  hapi_quat_normalize(pose->quat_wxyz);
+  spin_matrix(x, matrix);
+  hapi_m3_apply(matrix, device->wrist.velocity, twist->angular);
+}
+
 static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
                                uint32_t *buttons)
 {
@@ -415,7 +584,7 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_
   *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_v3_copy(device->measured.position, pose->position);
   hapi_v3_copy(device->measured.velocity, twist->linear);
-  memcpy(pose->quat_wxyz, device->orientation, sizeof pose->quat_wxyz);
+  show_turn(device, pose, twist);
   *buttons = 0;
   return HAP_OK;
 }
@@ -455,6 +624,10 @@ void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
   hapi_v3_copy(device->delay.acting, out->force);
   hapi_v3_copy(device->hand.position, out->position);
   hapi_v3_copy(device->hand.velocity, out->velocity);
+  hapi_v3_copy(device->torque_delay.acting, out->torque);
+  hapi_v3_copy(device->wrist.position, out->turn);
+  hapi_v3_copy(device->wrist.velocity, out->turn_rate);
+  out->inertia = device->yields ? device->wrist.def.mass : 0.0;
   out->mass = device->yields ? device->hand.def.mass : 0.0;
 }
 
@@ -467,7 +640,8 @@ const hap_device_ops hapi_virtual_ops = {
         "sine=ax/ay/az, hz=F, start=S, orientation=w/x/y/z, "
         "hand=rigid|relaxed|tense|none, mass=, damping=, stiffness=, kick=T:vx/vy/vz, "
         "max_force=, max_torque=, rated_stiffness=, device_mass=, device_damping=, friction=, "
-        "delay=, quantum=, dof=3|6",
+        "delay=, quantum=, dof=3|6; dof=6: turn=T:rx/ry/rz;..., turn_sine=, turn_hz=, inertia=, "
+        "turn_damping=, turn_stiffness=, device_inertia=, device_turn_damping=",
     .pacing = HAP_PACING_VIRTUAL,
     .open = virtual_open,
     .describe = virtual_describe,

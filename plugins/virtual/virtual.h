@@ -6,11 +6,15 @@
 /* What only a simulated device can tell: the truth behind its measurements. For tests and bench. */
 
 typedef struct hapi_virtual_port {
-  double work;        /* J that the force which really acted gave to hand and device since start */
-  double force[3];    /* N that acts now */
-  double position[3]; /* m, not rounded */
-  double velocity[3]; /* m/s */
-  double mass;        /* kg of hand and device; 0: a rigid hand */
+  double work;         /* J that the force which really acted gave to hand and device since start */
+  double force[3];     /* N that acts now */
+  double position[3];  /* m, not rounded */
+  double velocity[3];  /* m/s */
+  double mass;         /* kg of hand and device; 0: a rigid hand */
+  double torque[3];    /* N m that acts now */
+  double turn[3];      /* rad, rotation vector from the spec's orientation on */
+  double turn_rate[3]; /* rad/s */
+  double inertia;      /* kg m^2, as mass */
 } hapi_virtual_port;
 
 /* self: hapi_device_self of a device "virtual". At the time of its newest read; by the thread that

@@ -61,7 +61,8 @@ void fuzz_one(const uint8_t *data, size_t size)
                         .loop = (data[0] & 2) != 0};
   hap_detail detail;
   fuzz_detail_spoil(&detail);
-  hap_status status = hapi_motion_set_path(&motion, text, strlen(text), &detail);
+  const hapi_motion_text path = {"path", "T:x/y/z", text, strlen(text)};
+  hap_status status = hapi_motion_set_path(&motion, &path, &detail);
   fuzz_check_answer(status, status >= HAP_OK ? &motion : NULL, &detail);
   if (status >= HAP_OK) {
     check_motion(&motion);

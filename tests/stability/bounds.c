@@ -191,7 +191,9 @@ static double spring_energy(const bounds *b)
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *c = &tick->contacts[i];
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
-    sum += 0.5 * hapi_v3_dot(c->force, c->force) / p->stiffness;
+    if (c->weight > 0.0) {
+      sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->stiffness);
+    }
     if (p->finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
       double turn = tick->frictions[c->slot].stretch[3];
       sum += 0.5 * p->stiffness * turn * turn;
@@ -204,6 +206,9 @@ static double spring_energy(const bounds *b)
       hapi_v3_sub(p->proxy_position, p->handle_position, apart);
       hapi_v3_sub(apart, p->offset, apart);
       sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
+    }
+    if (p->proxied && p->hull != NULL) {
+      sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->spin_stiffness;
     }
   }
   return sum;
@@ -227,7 +232,12 @@ static void look_at_hand(bounds *b, int index, double *work, double *kinetic)
   hapi_v3_sub(p->guard.wanted.force, p->guard.written.force, held_back);
   b->cut += fmin(0.0, hapi_v3_dot(held_back, way));
   *work += now->work;
-  *kinetic += 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
+  *kinetic += 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity) +
+              0.5 * now->inertia * hapi_v3_dot(now->turn_rate, now->turn_rate);
+  double turn[3];
+  hapi_v3_sub(now->turn, was.turn, turn);
+  hapi_v3_sub(p->guard.wanted.torque, p->guard.written.torque, held_back);
+  b->cut += fmin(0.0, hapi_v3_dot(held_back, turn));
   double written = hapi_v3_norm(p->guard.written.force);
   b->force = fmax(b->force, fmax(written, hapi_v3_norm(now->force)));
   b->finite = b->finite && all_finite(now->position, 3) && all_finite(now->velocity, 3) &&
@@ -290,8 +300,8 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
     int index = index_of_slot(b, c->body);
     dContactGeom found;
     dQuaternion q;
-    if (index < 0 || b->clones[index] == NULL) {
-      continue;
+    if (index < 0 || b->clones[index] == NULL || c->tool != 0) {
+      continue; /* a tool is no ball */
     }
     const seen_body *s = &seen[index];
     memcpy(q, s->met_pose.quat_wxyz, 4 * sizeof(double));

@@ -26,7 +26,7 @@
  * implicitly is a tick ahead of a hand that it is coupled to directly: likewise.
  * Late. Where ODE moves what is touched, in all models but contact and for jointed bodies, it hears of
  * the hand at the end of an interval: what the hand gave in the last interval is not held against it.
- * Depth. By ODE's collider, between a ball at the pointer and the body's shape where the loop has it. v
+ * Depth. Not of tools. By ODE's collider, between a ball at the pointer and the body's shape where the loop has it. v
  * is the speed of pointer and body together.
  * Momentum. The interval is a physics step and the tick in which its result is taken; model impulse
  * takes it a step later. */

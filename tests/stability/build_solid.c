@@ -41,6 +41,51 @@ void build_press(world *w, const case_row *row)
   press_at(w, 0.003, 0.002, row->n * (EDGE - WORLD_LAYER), 0.02);
 }
 
+#define TOOL_HALF 0.01     /* m, of a cube */
+#define TOOL_ROUNDING 1e-3 /* m, around it */
+
+static void take_tool(world *w)
+{
+  static double corners[8][3];
+  for (int i = 0; i < 8; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      corners[i][k] = (i >> k & 1) != 0 ? TOOL_HALF : -TOOL_HALF;
+    }
+  }
+  w->pointer.hull_xyz = &corners[0][0];
+  w->pointer.hull_points = 8;
+  w->pointer.radius = TOOL_ROUNDING;
+}
+
+/* Comes down, turns to and fro by 4 degrees about two axes, slides, and goes up again. */
+void build_tool_press(world *w, const case_row *row)
+{
+  const double edge = row->n > 0 ? EDGE : 0.0;
+  double low = row->n * (edge - WORLD_LAYER) + TOOL_HALF + TOOL_ROUNDING;
+  add_floor(w);
+  for (int i = 0; i < row->n; ++i) {
+    (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, EDGE * (i + 0.5) - WORLD_LAYER * (i + 1)));
+  }
+  take_tool(w);
+  add_hand(w,
+           "dof=6,path=0:0/0/%.6g;0.3:0/0/%.6g;1:0.004/0.002/%.6g;1.3:0/0/%.6g,"
+           "turn=0:0.02/0.03/0;0.4:0.05/-0.03/0;0.7:-0.07/0.05/0;1:0/-0.03/0.1;1.3:0/0/0",
+           low + 0.02, low - 0.004, low - 0.003, low + 0.02);
+}
+
+/* 0.6 mm too wide for the gap. */
+void build_tool_wedge(world *w, const case_row *row)
+{
+  double wall = TOOL_HALF + TOOL_ROUNDING - 3e-4;
+  (void)row;
+  (void)add_block(w, AT(0.1, 0.2, 0.2), AT(-wall - 0.05, 0.0, 0.0));
+  (void)add_block(w, AT(0.1, 0.2, 0.2), AT(wall + 0.05, 0.0, 0.0));
+  take_tool(w);
+  add_hand(w,
+           "dof=6,path=0:0/0/0.13;0.3:0/0/0.09;1:0.001/0.002/0.08,"
+           "turn=0:0/0/0;0.4:0/0.03/0;0.7:0.02/-0.05/0.02;1:0/0.02/-0.03");
+}
+
 void build_press_unequal(world *w, const case_row *row)
 {
   add_floor(w);

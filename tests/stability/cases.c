@@ -161,6 +161,16 @@ const case_row stability_cases[] = {
      .mu = 0.8, .finger = 6e-3},
   {"pinched softly through proxies",   build_pinch,           1, 0.05,  0,    1e4, TENSE,   2.0, CONTACT, 0.5,
      .coupling_stiffness = 1e3, .mu = 0.8, .finger = 6e-3},
+  /* gain: what the shares of the tool's points make when it tilts under load (docs/numerics.md); the energy
+   * observer, which is off here, gives none of it to the hand: tests/test_tool_bodies.c. */
+  {"tool on a wall, 2 kN/m",           build_tool_press,      0, 0,     0,    2e3, RELAXED, 1.4, TWO,     0.01,
+     .gain = 0.05},
+  {"tool on a wall, 1 MN/m",           build_tool_press,      0, 0,     0,    1e6, TENSE,   1.4, CONTACT, 0.01},
+  {"tool on a stack of 5 light cubes", build_tool_press,      5, 5e-3,  0,    2e3, RELAXED, 1.4, CONTACT, 0.05,
+     .gain = 0.05},
+  {"tool on a stack, 1 MN/m",          build_tool_press,      3, 5e-3,  0,    1e6, TENSE,   1.4, CONTACT, 0.05},
+  {"tool wedged between walls",        build_tool_wedge,      0, 0,     0,    2e3, RELAXED, 1.1, TWO,     0.01},
+  {"tool wedged between walls, 1 MN/m",build_tool_wedge,      0, 0,     0,    1e6, TENSE,   1.1, CONTACT, 0.01},
   /* Hand-over between two threads: the sessions of tests/test_exchange.c under the thread sanitizer. */
 };
 /* clang-format on */

@@ -56,7 +56,9 @@ bool world_start(world *w, const struct case_row *row, hap_model model);
 void world_close(world *w);
 
 /* What moves and what the hand does. Lengths in m, the hand's device is at the world's origin. */
-void build_press(world *w, const struct case_row *row); /* n cubes on each other, from above */
+void build_press(world *w, const struct case_row *row);      /* n cubes on each other, from above */
+void build_tool_press(world *w, const struct case_row *row); /* the same with a tool, which turns */
+void build_tool_wedge(world *w, const struct case_row *row); /* ... between two walls */
 void build_press_unequal(world *w, const struct case_row *row); /* two cubes; size: upper / lower */
 void build_push(world *w, const struct case_row *row); /* a cube, of edge size, along the floor */
 void build_push_sliding(world *w, const struct case_row *row);  /* mu = 0 */

@@ -162,6 +162,7 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->a, in->a, sizeof out->a);
   memcpy(out->turn, in->turn, sizeof out->turn);
   out->mu = in->mu;
+  out->weight = 1.0;
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
   out->shape_pose = in->shape_pose;
@@ -174,15 +175,17 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
 static void adopt_contacts(hapi_tick *tick, hapi_model *model)
 {
   const hapi_model_contact *in = hapi_model_contacts(model);
+  hapi_tool_set_aside(tick);
   remember_ramps(tick);
   tick->contact_count = 0;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
     /* The pointer may have gone while the message was on its way. */
-    if (tick->pointers[pointer].generation == in[i].pointer_generation) {
+    if (in[i].tool == 0 && tick->pointers[pointer].generation == in[i].pointer_generation) {
       adopt_contact(tick, &in[i], &tick->contacts[tick->contact_count++]);
     }
   }
+  hapi_tool_adopt_model(tick, model);
 }
 
 /* Bodies that are not in the new model. */

@@ -85,4 +85,5 @@ void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches)
     hapi_v3_copy(contacts[i].core_a, memory->core_a);
     match(world, memory, old_count);
   }
+  hapi_tool_adopt_patches(tick, patches);
 }

@@ -20,26 +20,25 @@
 
 /* Where a device jumped, none of the depth counts: nobody put in the energy that it stands for. The
  * surface is where the device is, goes back with it, and does not come after it. */
-static inline void hapi_contact_ramp_begin(hapi_local_contact *c, double depth, bool jumped)
+static inline void hapi_contact_ramp_begin(hapi_ramp *r, double depth, bool jumped)
 {
   bool deep = depth > 0.0;
-  c->seen = true;
-  c->ramp = (hapi_ramp){.share = deep && !jumped ? 0.0 : 1.0,
-                        .excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
-                        .held = deep && jumped};
+  *r = (hapi_ramp){.share = deep && !jumped ? 0.0 : 1.0,
+                   .excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
+                   .held = deep && jumped};
 }
 
 /* Share of its force that a contact of the pointer has, and the part of its depth that counts in
  * *io_depth. One that arrives with depth starts at zero; one that closes later has all of it. A pointer
  * that draws back out of an excess depth has it off for good. Once a tick. */
-static inline double hapi_contact_ramp(hapi_local_contact *c, const hapi_tick_pointer *p,
-                                       double *io_depth, double period)
+static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_tick_pointer *p,
+                                      double *io_depth, double period)
 {
   double depth = *io_depth;
   double most = fmax(HAPI_RAMP_DEPTH, HAPI_PRESS_SPEED * period);
-  hapi_ramp *r = &c->ramp;
-  if (!c->seen || depth - fmax(r->depth, 0.0) > most) {
-    hapi_contact_ramp_begin(c, depth, p->jump_s > 0.0);
+  if (!*io_seen || depth - fmax(r->depth, 0.0) > most) {
+    hapi_contact_ramp_begin(r, depth, p->jump_s > 0.0);
+    *io_seen = true;
   } else if (r->share < 1.0 || r->excess > 0.0) {
     double comes_in = r->held ? 0.0 : HAPI_RAMP_SPEED * period;
     r->share = depth > 0.0 ? fmin(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
@@ -48,6 +47,12 @@ static inline double hapi_contact_ramp(hapi_local_contact *c, const hapi_tick_po
   r->depth = depth;
   *io_depth = depth - r->excess;
   return r->share;
+}
+
+static inline double hapi_contact_ramp(hapi_local_contact *c, const hapi_tick_pointer *p,
+                                       double *io_depth, double period)
+{
+  return hapi_ramp_follow(&c->ramp, &c->seen, p, io_depth, period);
 }
 
 #endif

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "haptic/rt/ball_nearest.h"
 #include "haptic/rt/rows.h"
+#include "haptic/rt/touch_place.h"
 
 /* Contacts between bodies as rows of the solver. Every contact is placed anew from the poses of its
  * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
@@ -34,131 +34,23 @@ typedef struct placed_contact {
   double arm_b[3];
 } placed_contact;
 
-/* What of a contact belongs to one of its bodies. */
-typedef struct side {
-  const hapi_local_body *body;
-  const double *core;
-  const double *axis;
-  double ball;
-  double rim;
-} side;
-
-/* Surface point: ball and rim lie towards direction. */
-static void surface_point(const side *s, const double direction[3], double out[3])
+static hapi_touch_frame frame_of(const hapi_local_body *body)
 {
-  hapi_body_point(s->body, s->core, out);
-  hapi_v3_madd(out, s->ball, direction, out);
-  if (s->rim > 0.0) {
-    double axis[3];
-    double across[3];
-    hapi_body_vector(s->body, s->axis, axis);
-    hapi_v3_madd(direction, -hapi_v3_dot(direction, axis), axis, across);
-    double length = hapi_v3_norm(across);
-    if (length > 1e-9) {
-      hapi_v3_madd(out, s->rim / length, across, out);
-    }
-  }
-}
-
-#define SLIDE_MAX 0.1 /* m between two passes */
-
-/* The point of the pushed body goes on to where the border of the face is now. */
-static void slide(const placed_contact *c, double a[3], double b[3])
-{
-  bool face_is_a = c->in->touch == HAPI_TOUCH_FACE_A;
-  double *fixed = face_is_a ? a : b;
-  double *pushed = face_is_a ? b : a;
-  double edge[3];
-  double border[3];
-  double apart[3];
-  hapi_v3_sub(fixed, pushed, apart);
-  if (c->in->slide == HAPI_SLIDE_EDGE) {
-    hapi_body_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
-    hapi_body_vector(face_is_a ? c->a : c->b, face_is_a ? c->in->edge_a : c->in->edge_b, border);
-    double way = hapi_v3_dot(apart, border) / hapi_v3_dot(edge, border);
-    if (fabs(way) < SLIDE_MAX) { /* false for edges that have become parallel */
-      hapi_v3_madd(pushed, way, edge, pushed);
-    }
-  } else if (c->in->slide == HAPI_SLIDE_CORNER) {
-    hapi_body_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
-    double up = -hapi_v3_dot(apart, edge) / hapi_v3_dot(c->normal, edge);
-    if (fabs(up) < SLIDE_MAX) {
-      hapi_v3_madd(fixed, up, c->normal, pushed);
-    }
-  }
-}
-
-static void place_surfaces(placed_contact *c)
-{
-  double a[3];
-  double b[3];
-  double apart[3];
-  double back[3];
-  const hapi_patch_contact *in = c->in;
-  const side side_a = {c->a, in->core_a, in->axis_a, in->ball_a, in->rim_a};
-  const side side_b = {c->b, in->core_b, in->axis_b, in->ball_b, in->rim_b};
-  hapi_v3_scale(-1.0, c->normal, back);
-  surface_point(&side_a, back, a);
-  surface_point(&side_b, c->normal, b);
-  slide(c, a, b);
-  hapi_v3_sub(a, b, apart);
-  c->gap = hapi_v3_dot(c->normal, apart);
-  hapi_v3_madd(a, -0.5 * c->gap, c->normal, c->point);
-}
-
-/* Crossing edges: the normal turns with both. Edges that have become parallel keep the last one. */
-static void edge_normal(placed_contact *c)
-{
-  double a[3];
-  double b[3];
-  double across[3];
-  hapi_body_vector(c->a, c->in->edge_a, a);
-  hapi_body_vector(c->b, c->in->edge_b, b);
-  hapi_v3_cross(a, b, across);
-  double length = hapi_v3_norm(across);
-  hapi_v3_copy(c->in->normal, c->normal);
-  if (length > 1e-3) {
-    double sign = hapi_v3_dot(across, c->in->normal) < 0.0 ? -1.0 : 1.0;
-    hapi_v3_scale(sign / length, across, c->normal);
-  }
-}
-
-/* A ball is asked anew where it touches the other shape. */
-static bool place_ball(placed_contact *c)
-{
-  bool ball_is_a = c->in->touch == HAPI_TOUCH_BALL_A;
-  const hapi_local_body *ball = ball_is_a ? c->a : c->b;
-  const hapi_local_body *other = ball_is_a ? c->b : c->a;
-  double center[3];
-  hapi_nearest nearest;
-  hapi_body_point(ball, ball_is_a ? c->in->core_a : c->in->core_b, center);
-  if (!hapi_ball_nearest(center, ball_is_a ? c->in->ball_a : c->in->ball_b, &c->in->shape,
-                         &c->in->shape_pose, other != NULL ? &other->pose : NULL, &nearest)) {
-    return false;
-  }
-  hapi_v3_scale(ball_is_a ? 1.0 : -1.0, nearest.normal, c->normal);
-  c->gap = nearest.distance;
-  hapi_v3_madd(nearest.point_a, -0.5 * nearest.distance, nearest.normal, c->point);
-  return true;
+  return body != NULL ? (hapi_touch_frame){&body->pose, body->rotation}
+                      : (hapi_touch_frame){NULL, NULL};
 }
 
 static bool place(placed_contact *c)
 {
-  switch (c->in->touch) {
-    case HAPI_TOUCH_FACE_A:
-      hapi_body_vector(c->a, c->in->normal, c->normal);
-      break;
-    case HAPI_TOUCH_FACE_B:
-      hapi_body_vector(c->b, c->in->normal, c->normal);
-      break;
-    case HAPI_TOUCH_EDGES:
-      edge_normal(c);
-      break;
-    case HAPI_TOUCH_BALL_A:
-    case HAPI_TOUCH_BALL_B:
-      return place_ball(c);
+  hapi_touch_spot spot;
+  hapi_touch_frame a = frame_of(c->a);
+  hapi_touch_frame b = frame_of(c->b);
+  if (!hapi_touch_place(c->in, &a, &b, &spot)) {
+    return false;
   }
-  place_surfaces(c);
+  hapi_v3_copy(spot.normal, c->normal);
+  hapi_v3_copy(spot.point, c->point);
+  c->gap = spot.gap;
   return true;
 }
 

@@ -10,7 +10,8 @@
  * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by it
  * begin anew (contact_ramp.h), also those that come with the next models. */
 
-#define JUMP_S 0.01 /* and two steps of physics: a model for the new place has come */
+#define SPIN_MOST 100.0 /* rad/s, of a hand: about three times what a wrist makes */
+#define JUMP_S 0.01     /* and two steps of physics: a model for the new place has come */
 
 static bool plausible(const double *values, int count)
 {
@@ -20,6 +21,23 @@ static bool plausible(const double *values, int count)
     }
   }
   return true;
+}
+
+/* A hull on a device that gives no torque cannot be turned by it either: the hand could not feel what
+ * it does by turning. */
+static void place_turn(hapi_tick_pointer *p)
+{
+  const double *frame = p->pose_world_device.quat_wxyz;
+  if (p->hull != NULL && p->three_dof) {
+    memcpy(p->pose.quat_wxyz, frame, sizeof p->pose.quat_wxyz);
+    hapi_v3_set(p->twist.angular, 0.0, 0.0, 0.0);
+  } else {
+    hapi_quat_multiply(frame, p->device_pose.quat_wxyz, p->pose.quat_wxyz);
+    hapi_quat_normalize(p->pose.quat_wxyz);
+    hapi_quat_rotate(frame, p->device_twist.angular, p->twist.angular);
+  }
+  memcpy(p->handle_quat, p->pose.quat_wxyz, sizeof p->handle_quat);
+  hapi_v3_copy(p->twist.angular, p->handle_spin);
 }
 
 /* False: the frame and the scale take it out of the world. */
@@ -34,11 +52,9 @@ static bool place_pointer(hapi_tick_pointer *p)
     return false;
   }
   hapi_v3_copy(at, p->pose.position);
-  hapi_quat_multiply(frame->quat_wxyz, p->device_pose.quat_wxyz, p->pose.quat_wxyz);
-  hapi_quat_normalize(p->pose.quat_wxyz);
+  place_turn(p);
   hapi_v3_scale(p->motion_scale, p->device_twist.linear, scaled);
   hapi_quat_rotate(frame->quat_wxyz, scaled, p->twist.linear);
-  hapi_quat_rotate(frame->quat_wxyz, p->device_twist.angular, p->twist.angular);
   hapi_v3_copy(p->pose.position, p->handle_position);
   hapi_v3_copy(p->twist.linear, p->handle_velocity);
   p->device_good = p->device_pose;
@@ -46,12 +62,24 @@ static bool place_pointer(hapi_tick_pointer *p)
   return true;
 }
 
+/* rad, to the third order of a small angle */
+static double turn_between(const double a[4], const double b[4])
+{
+  double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  return 2.0 * sqrt(fmax(1.0 - dot * dot, 0.0));
+}
+
 /* Whatever time has passed: what counts is how deep it may be at once. */
 static bool jumps(const hapi_tick_pointer *p, double period)
 {
   double way[3];
+  if (!p->placed || !(p->speed_limit > 0.0)) {
+    return false;
+  }
   hapi_v3_sub(p->device_pose.position, p->device_good.position, way);
-  return p->placed && p->speed_limit > 0.0 && hapi_v3_norm(way) > p->speed_limit * period;
+  return hapi_v3_norm(way) > p->speed_limit * period ||
+         (p->hull != NULL && !p->three_dof &&
+          turn_between(p->device_pose.quat_wxyz, p->device_good.quat_wxyz) > SPIN_MOST * period);
 }
 
 static void begin_proxy_anew(hapi_tick_pointer *p)
@@ -59,14 +87,21 @@ static void begin_proxy_anew(hapi_tick_pointer *p)
   hapi_v3_copy(p->handle_position, p->proxy_position);
   hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
   hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+  memcpy(p->proxy_quat, p->handle_quat, sizeof p->proxy_quat);
+  hapi_v3_copy(p->handle_spin, p->proxy_spin);
+  hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
 }
 
 /* A velocity that is a difference of such positions would be felt through every damper. */
 static void check_speed(hapi_tick_pointer *p)
 {
   double *v = p->device_twist.linear;
+  double *w = p->device_twist.angular;
   if (p->jumped || (p->speed_limit > 0.0 && hapi_v3_norm(v) > p->speed_limit)) {
     hapi_v3_set(v, 0.0, 0.0, 0.0);
+  }
+  if (p->hull != NULL && (p->jumped || (p->speed_limit > 0.0 && hapi_v3_norm(w) > SPIN_MOST))) {
+    hapi_v3_set(w, 0.0, 0.0, 0.0);
   }
 }
 
@@ -90,11 +125,17 @@ void hapi_coupling_read(hapi_tick *tick)
   }
 }
 
+/* A newton metre is a newton on an arm, and the arm is shorter at the device by the motion's scale. */
+double hapi_coupling_torque_scale(const hapi_tick_pointer *p)
+{
+  return p->three_dof ? 0.0 : p->force_scale / p->motion_scale;
+}
+
 void hapi_coupling_write(hapi_tick_pointer *p)
 {
   const double *q = p->pose_world_device.quat_wxyz;
   hapi_quat_unrotate(q, p->wrench.force, p->device_wrench.force);
   hapi_quat_unrotate(q, p->wrench.torque, p->device_wrench.torque);
   hapi_v3_scale(p->force_scale, p->device_wrench.force, p->device_wrench.force);
-  hapi_v3_scale(p->force_scale, p->device_wrench.torque, p->device_wrench.torque);
+  hapi_v3_scale(hapi_coupling_torque_scale(p), p->device_wrench.torque, p->device_wrench.torque);
 }

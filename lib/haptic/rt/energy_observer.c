@@ -20,6 +20,8 @@
  *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
  *            a spring that is under load: the world's work, to either side. What is in the spring of a
  *            contact that is no more is lost.
+ *   shares   that the points of a hull have of its stiffness are no entry: what their changes make is to be
+ *            paid by the hand, which made them by tilting the hull.
  *
  * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
  * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
@@ -30,7 +32,8 @@
  * nothing is touched the ledger stands still, and a surplus is forgotten: it must not pay for what a
  * later touch makes of nothing.
  *
- * Torques are left out: those of friction on a device that has some are small beside its forces' work. */
+ * A torque is paid as a force is, for the turn that the device made; those of friction on a device that does
+ * not turn a hull are left out: they are small beside its forces' work. */
 
 #define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
 #define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
@@ -166,7 +169,7 @@ static double surfaces_give(const hapi_tick *tick, double *io_stored)
     if (!(force2 > 0.0)) {
       continue;
     }
-    *io_stored += half_compliance(&tick->pointers[c->pointer]) * force2;
+    *io_stored += half_compliance(&tick->pointers[c->pointer]) * force2 / c->weight;
     if (body != NULL && !is_owned(tick, body)) {
       sum -= work_on(tick, body, c);
     }
@@ -210,11 +213,11 @@ static double ramps_give(hapi_tick *tick)
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
     hapi_ramp *r = &c->ramp;
     double share = r->share * p->guard.felt;
-    double energy = spring_energy(p, share, r->depth - r->excess);
+    double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
     double rubs = c->mu > 0.0 ? hapi_friction_energy(tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
-      sum += energy - spring_energy(p, r->felt_share, r->depth - r->felt_excess);
+      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - r->felt_excess);
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
       r->felt_share = share;
@@ -235,9 +238,26 @@ static double couplings_store(const hapi_tick *tick)
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->proxied) {
       sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling_stiffness;
+      if (p->hull != NULL) {
+        sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->spin_stiffness;
+      }
     }
   }
   return sum;
+}
+
+/* To the third order of the turn of a tick; of a sphere none. */
+static void note_turn(hapi_tick_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  if (p->hull == NULL) {
+    return;
+  }
+  double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
+  double q[4];
+  hapi_quat_multiply(p->device_pose.quat_wxyz, back, q);
+  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
+  memcpy(g->quat, p->device_pose.quat_wxyz, sizeof g->quat);
 }
 
 /* J that the written force gave to the hand in the seconds since the last tick. A way that no hand goes
@@ -248,11 +268,14 @@ static double port_gave(hapi_tick_pointer *p, double seconds)
   hapi_guard_pointer *g = &p->guard;
   hapi_v3_sub(p->device_pose.position, g->position, g->moved);
   hapi_v3_copy(p->device_pose.position, g->position);
+  note_turn(p);
   if (!g->placed) {
     hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
+    hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
     g->placed = true;
   }
-  double gave = world_per_device(p) * hapi_v3_dot(g->written.force, g->moved);
+  double gave = world_per_device(p) * (hapi_v3_dot(g->written.force, g->moved) +
+                                       hapi_v3_dot(g->written.torque, g->turned));
   double way = hapi_v3_norm(g->moved);
   double farthest = p->speed_limit * seconds;
   if (!p->jumped) {
@@ -275,29 +298,30 @@ static bool settle_ports(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0) {
-      felt = felt || any(p->device_wrench.force) || any(p->guard.written.force);
+      felt = felt || any(p->device_wrench.force) || any(p->guard.written.force) ||
+             any(p->guard.written.torque);
       tick->guard.balance -= port_gave(p, seconds);
     }
   }
   return felt;
 }
 
-/* J that the force to be written would give over a tick, if the device goes on as it went. */
-static double port_would_give(const hapi_tick_pointer *p)
+/* J that a force on a way, or a torque on a turn, gives; world units. */
+static double would_give(const hapi_tick_pointer *p, const double force[3], const double way[3])
 {
-  return p->generation == 0 || hapi_v3_dot(p->guard.moved, p->guard.moved) < MOVED_LEAST
+  return p->generation == 0 || hapi_v3_dot(way, way) < MOVED_LEAST
              ? 0.0
-             : world_per_device(p) * hapi_v3_dot(p->device_wrench.force, p->guard.moved);
+             : world_per_device(p) * hapi_v3_dot(force, way);
 }
 
-/* Leaves a share of the force's part along the motion. */
-static void hold_back(hapi_tick_pointer *p, double share)
+/* Leaves a share of the force's part along the motion, where it gives. */
+static void hold_back(hapi_tick_pointer *p, double force[3], const double way[3], double share)
 {
-  double *force = p->device_wrench.force;
-  const double *moved = p->guard.moved;
-  double along = hapi_v3_dot(force, moved) / hapi_v3_dot(moved, moved);
-  hapi_v3_madd(force, -(1.0 - share) * along, moved, force);
-  p->guard.flags |= HAP_GUARD_ENERGY;
+  if (would_give(p, force, way) > 0.0) {
+    double along = hapi_v3_dot(force, way) / hapi_v3_dot(way, way);
+    hapi_v3_madd(force, -(1.0 - share) * along, way, force);
+    p->guard.flags |= HAP_GUARD_ENERGY;
+  }
 }
 
 static void pay_no_more_than(hapi_tick *tick, double budget)
@@ -305,18 +329,20 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
   double out = 0.0;
   double in = 0.0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
-    double gives = port_would_give(&tick->pointers[i]);
-    out += fmax(gives, 0.0);
-    in += fmax(-gives, 0.0);
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    double gives = would_give(p, p->device_wrench.force, p->guard.moved);
+    double turns = would_give(p, p->device_wrench.torque, p->guard.turned);
+    out += fmax(gives, 0.0) + fmax(turns, 0.0);
+    in += fmax(-gives, 0.0) + fmax(-turns, 0.0);
   }
   if (out - in <= fmax(budget, 0.0)) {
     return;
   }
   double share = fmin(fmax((budget + in) / out, 0.0), 1.0);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
-    if (port_would_give(&tick->pointers[i]) > 0.0) {
-      hold_back(&tick->pointers[i], share);
-    }
+    hapi_tick_pointer *p = &tick->pointers[i];
+    hold_back(p, p->device_wrench.force, p->guard.moved, share);
+    hold_back(p, p->device_wrench.torque, p->guard.turned, share);
   }
 }
 

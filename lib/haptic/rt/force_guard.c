@@ -39,6 +39,9 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     tick->contacts[i].seen = false; /* the hand may be anywhere by now */
   }
+  for (uint32_t i = 0; i < tick->tool.pair_count; ++i) {
+    tick->tool.pairs[i].seen = false;
+  }
 }
 
 void hapi_guard_cut(hapi_tick_pointer *pointer)
@@ -148,19 +151,28 @@ static void limit_norm(hapi_tick_pointer *p)
   p->guard.flags |= force || torque ? HAP_GUARD_SATURATED : 0;
 }
 
+static void report_torque(hapi_tick_pointer *p)
+{
+  double scale = hapi_coupling_torque_scale(p);
+  hapi_quat_rotate(p->pose_world_device.quat_wxyz, p->device_wrench.torque, p->wrench.torque);
+  hapi_v3_scale(scale > 0.0 ? 1.0 / scale : 0.0, p->wrench.torque, p->wrench.torque);
+}
+
 /* What is reported is what the hand feels. */
 static void report_written(hapi_tick_pointer *p)
 {
   const double *q = p->pose_world_device.quat_wxyz;
   p->guard.written = p->device_wrench;
+  if (p->three_dof) {
+    hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
+  }
   if (p->guard.flags == 0) {
     return;
   }
   if (p->force_scale > 0.0) {
     hapi_quat_rotate(q, p->device_wrench.force, p->wrench.force);
-    hapi_quat_rotate(q, p->device_wrench.torque, p->wrench.torque);
     hapi_v3_scale(1.0 / p->force_scale, p->wrench.force, p->wrench.force);
-    hapi_v3_scale(1.0 / p->force_scale, p->wrench.torque, p->wrench.torque);
+    report_torque(p);
   } else if ((p->guard.flags & HAP_GUARD_FAULT) != 0) {
     memset(&p->wrench, 0, sizeof p->wrench); /* it may be not finite */
   }

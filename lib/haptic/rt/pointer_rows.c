@@ -42,6 +42,9 @@ typedef struct placed_pointer {
   double normal[3];      /* out of the body */
   double point[3];
   double depth;
+  double share; /* of the stiffness, that is felt */
+  double arm
+      [3]; /* from the pointer's origin to the point; of a sphere 0: it pushes through its centre */
 } placed_pointer;
 
 static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
@@ -66,6 +69,18 @@ static void place_by_plane(const hapi_local_contact *c, placed_pointer *at)
   at->depth = at->pointer->radius - hapi_v3_dot(at->normal, apart);
 }
 
+/* Where hapi_tool_place found it. */
+static bool place_tool(const hapi_tick *tick, const hapi_local_contact *c, placed_pointer *at)
+{
+  const hapi_local_tool *tool = &tick->tool.tools[c->tool - 1];
+  hapi_v3_copy(c->normal_now, at->normal);
+  hapi_v3_copy(c->point_now, at->point);
+  hapi_v3_sub(at->point, at->pointer->pose.position, at->arm);
+  at->depth = tool->depth;
+  at->share = tool->felt;
+  return tool->placed;
+}
+
 static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
 {
   at->pointer = &tick->pointers[c->pointer];
@@ -73,18 +88,26 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
   if (at->pointer->generation != c->pointer_generation) {
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
+  if (c->tool != 0) {
+    return place_tool(tick, c, at);
+  }
+  hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
   bool ask = c->has_shape && tick->world.plane_mode == HAP_PLANE_WHERE_NEEDED;
   if (!ask || !place_by_shape(c, at)) {
     place_by_plane(c, at);
   }
+  hapi_v3_copy(at->normal, c->normal_now);
+  hapi_v3_copy(at->point, c->point_now);
+  at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->period);
   return true;
 }
 
 /* Spring and damper where neither side answers: eq. 7 as it stands. */
-static void push_static(hapi_local_contact *c, const placed_pointer *at, double share, double speed)
+static void push_static(hapi_local_contact *c, const placed_pointer *at, double speed)
 {
   const hapi_tick_pointer *p = at->pointer;
-  double force = at->depth > 0.0 ? share * (p->stiffness * at->depth + p->damping * speed) : 0.0;
+  double force =
+      at->depth > 0.0 ? at->share * (p->stiffness * at->depth + p->damping * speed) : 0.0;
   hapi_v3_scale(force > 0.0 ? -force : 0.0, at->normal, c->force);
 }
 
@@ -199,6 +222,34 @@ static bool has_own_probes(const hapi_local_body *body)
          (body->flags & (HAPI_BODY_MEASURED | HAPI_BODY_WHOLE)) == HAPI_BODY_MEASURED;
 }
 
+/* Of the pointer where it touches. */
+static void point_velocity(const placed_pointer *at, const double linear[3],
+                           const double angular[3], double out[3])
+{
+  hapi_v3_copy(linear, out);
+  if (at->pointer->hull != NULL) {
+    double swing[3];
+    hapi_v3_cross(angular, at->arm, swing);
+    hapi_v3_add(out, swing, out);
+  }
+}
+
+static void set_proxy_column(const placed_pointer *at, hapi_row *row, spring *out)
+{
+  const hapi_tick_pointer *p = at->pointer;
+  hapi_v3_copy(at->normal, row->jb);
+  hapi_v3_scale(p->response, row->jb, row->bb);
+  row->b = p->row;
+  out->w += hapi_v3_dot(row->jb, p->proxy_velocity);
+  out->free += hapi_v3_dot(row->jb, p->free_velocity);
+  if (p->hull != NULL) {
+    hapi_v3_cross(at->arm, at->normal, row->jb + 3);
+    hapi_v3_scale(p->spin_response, row->jb + 3, row->bb + 3);
+    out->w += hapi_v3_dot(row->jb + 3, p->proxy_spin);
+    out->free += hapi_v3_dot(row->jb + 3, p->free_spin);
+  }
+}
+
 /* The columns of the body and, of a proxy, of the pointer: w then is the body's speed less the
  * proxy's, and s is 0. */
 static void set_columns(const hapi_local_contact *contact, const placed_pointer *at, hapi_row *row,
@@ -207,11 +258,12 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   const hapi_tick_pointer *p = at->pointer;
   double into[3];
   double arm[3];
+  double velocity[3];
   hapi_v3_scale(-1.0, at->normal, into);
   hapi_body_arm(at->body, at->point, arm);
   hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
   hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
-  if (has_own_probes(at->body)) {
+  if (contact->tool == 0 && has_own_probes(at->body)) {
     for (int i = 0; i < 6; ++i) {
       row->ba[i] = hapi_v3_dot(contact->a[i], into);
     }
@@ -220,26 +272,23 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   row->b = HAPI_STATIC_ROW;
   out->w = out->free = out->body_w = hapi_row_start_speed(at->body, row->ja);
   out->body_a = hapi_dot6(row->ja, row->ba);
-  out->s = hapi_v3_dot(into, p->twist.linear);
+  point_velocity(at, p->twist.linear, p->twist.angular, velocity);
+  out->s = hapi_v3_dot(into, velocity);
   if (p->proxied) {
-    hapi_v3_copy(at->normal, row->jb);
-    hapi_v3_scale(p->response, row->jb, row->bb);
-    row->b = p->row;
-    out->w += hapi_v3_dot(row->jb, p->proxy_velocity);
-    out->free += hapi_v3_dot(row->jb, p->free_velocity);
+    set_proxy_column(at, row, out);
     out->s = 0.0;
   }
   out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
 }
 
-static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at, double share)
+static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
 {
   hapi_local_world *world = &tick->world;
   hapi_local_contact *contact = &tick->contacts[index];
   uint32_t number = world->solver.row_count;
   hapi_row *row = &world->solver.rows[number];
-  spring p = {.k = share * at->pointer->stiffness,
-              .d = at->depth > 0.0 ? share * at->pointer->damping : 0.0,
+  spring p = {.k = at->share * at->pointer->stiffness,
+              .d = at->depth > 0.0 ? at->share * at->pointer->damping : 0.0,
               .depth = at->depth};
   set_columns(contact, at, row, &p);
   bool pushes = at->pointer->integration == HAP_INTEGRATION_EXPLICIT
@@ -400,6 +449,11 @@ static double closing_speed(const placed_pointer *at, const double velocity[3])
   return speed;
 }
 
+static double size_of(const hapi_tick_pointer *p)
+{
+  return p->hull != NULL ? p->extent : p->radius;
+}
+
 static void take_contact(hapi_tick *tick, uint32_t index)
 {
   hapi_local_contact *c = &tick->contacts[index];
@@ -410,29 +464,34 @@ static void take_contact(hapi_tick *tick, uint32_t index)
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
     return;
   }
-  hapi_v3_copy(at.normal, c->normal_now);
-  hapi_v3_copy(at.point, c->point_now);
-  double share = hapi_contact_ramp(c, at.pointer, &at.depth, tick->period);
   const hapi_tick_pointer *p = at.pointer;
-  double speed = closing_speed(&at, p->proxied ? p->free_velocity : p->twist.linear);
+  double velocity[3];
+  point_velocity(&at, p->proxied ? p->free_velocity : p->twist.linear,
+                 p->proxied ? p->free_spin : p->twist.angular, velocity);
+  double speed = closing_speed(&at, velocity);
   double way = tick->period * speed;
   /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
-  double motion = p->proxied ? closing_speed(&at, p->proxy_velocity) : speed;
+  double motion = speed;
+  if (p->proxied) {
+    point_velocity(&at, p->proxy_velocity, p->proxy_spin, velocity);
+    motion = closing_speed(&at, velocity);
+  }
   if (at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
-    at.pointer->near_stiffness += at.pointer->stiffness;
+    at.pointer->near_stiffness += c->weight * at.pointer->stiffness;
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
-  bool comes = at.depth > 0.0 || (at.depth + way > 0.0 && tick->period * motion < 0.25 * p->radius);
+  bool comes =
+      at.depth > 0.0 || (at.depth + way > 0.0 && tick->period * motion < 0.25 * size_of(p));
   if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 &&
       (at.depth > 0.0 || at.pointer->proxied)) {
     hapi_local_wake(tick, at.body);
   }
-  if (!comes || share <= 0.0) {
+  if (!comes || at.share <= 0.0) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   } else if (hapi_body_responds(at.body) || at.pointer->proxied) {
-    add_row(tick, index, &at, share);
+    add_row(tick, index, &at);
   } else {
-    push_static(c, &at, share, speed);
+    push_static(c, &at, speed);
   }
   bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
   if (c->mu > 0.0 && pushes && at.depth > 0.0) {
@@ -442,6 +501,7 @@ static void take_contact(hapi_tick *tick, uint32_t index)
 
 void hapi_pointer_rows(hapi_tick *tick)
 {
+  hapi_tool_place(tick);
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     take_contact(tick, i);
   }
@@ -524,6 +584,13 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
+  if (c->tool != 0) {
+    double arm[3];
+    double moment[3];
+    hapi_v3_sub(c->point_now, p->pose.position, arm);
+    hapi_v3_cross(c->force, arm, moment); /* of the opposite force */
+    hapi_v3_add(p->wrench.torque, moment, p->wrench.torque);
+  }
   ++p->contacts;
   ++tick->pushing;
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {

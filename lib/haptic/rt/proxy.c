@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "base/vec.h"
+#include "base/pose.h"
 #include "haptic/rt/tick.h"
 
 /* Coupling "proxy" (docs/numerics.md): the pointer is a light body of mass m behind one spring k and
@@ -8,6 +8,9 @@
  *
  *   (m + T d + T^2 k) v' = m v + T k (h - x) + T d u + impulses of the contacts
  *   force on the hand = k (x' - h) + d (v' - u),   x' = x + T v'
+ *
+ * A hull's turning likewise, of the inertia I, with w for v and for the way the vector 2 sin(angle / 2)
+ * along the axis, which is the moment of a potential at any angle and the angle for small ones.
  *
  * It is one body more in the solver, so that contacts of one pointer know of each other. However many
  * push, the device feels k at most. */
@@ -31,6 +34,21 @@ static void begin_proxy(hapi_tick_pointer *p)
   hapi_v3_copy(p->pose.position, p->proxy_position);
   hapi_v3_copy(p->twist.linear, p->proxy_velocity);
   hapi_v3_scale(-1.0 / p->coupling_stiffness, p->wrench.force, p->offset);
+  memcpy(p->proxy_quat, p->pose.quat_wxyz, sizeof p->proxy_quat);
+  hapi_v3_copy(p->twist.angular, p->proxy_spin);
+  hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
+  if (p->hull != NULL) {
+    hapi_v3_scale(-1.0 / p->spin_stiffness, p->wrench.torque, p->offset_turn);
+  }
+}
+
+/* 2 sin(angle / 2) along the axis of the turn that brings one to the other. */
+static void rotation_between(const double from[4], const double to[4], double out[3])
+{
+  double back[4] = {from[0], -from[1], -from[2], -from[3]};
+  double q[4];
+  hapi_quat_multiply(to, back, q);
+  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, out); /* q and -q are the same turn */
 }
 
 /* Nothing touches, and the pointer would not leap to the device: a proxy with mass swings about it. */
@@ -39,8 +57,11 @@ static bool is_idle(const hapi_tick_pointer *p, double period)
   double leap[3];
   hapi_v3_sub(p->handle_position, p->proxy_position, leap);
   hapi_v3_madd(leap, -period, p->proxy_velocity, leap);
+  double turn[3];
+  rotation_between(p->proxy_quat, p->handle_quat, turn);
   return p->contacts == 0 && hapi_v3_norm(p->offset) < OFFSET_LEAST &&
-         hapi_v3_norm(leap) < LEAP_MOST;
+         hapi_v3_norm(leap) < LEAP_MOST &&
+         (p->hull == NULL || p->extent * hapi_v3_norm(turn) < LEAP_MOST);
 }
 
 static void choose(hapi_tick_pointer *p, double period)
@@ -73,6 +94,7 @@ static void end_proxy(hapi_tick *tick, uint32_t index)
       tick->contacts[i].seen = false;
     }
   }
+  hapi_tool_forget(tick, index);
 }
 
 void hapi_proxy_none(hapi_tick *tick)
@@ -97,10 +119,35 @@ static double response(const hapi_tick *tick, const hapi_tick_pointer *p)
   return 1.0 / (p->proxy_mass + t * p->coupling_damping + t * t * p->coupling_stiffness);
 }
 
+static double spin_response(const hapi_tick *tick, const hapi_tick_pointer *p)
+{
+  double t = tick->period;
+  double resists = p->proxy_inertia + t * p->spin_damping + t * t * p->spin_stiffness;
+  return p->three_dof ? 0.0 : 1.0 / resists; /* a hand that feels no torque does not turn it */
+}
+
 /* End of the spring on the device's side. */
 static void far_end(const hapi_tick_pointer *p, double out[3])
 {
   hapi_v3_add(p->handle_position, p->offset, out);
+}
+
+/* Likewise of the turning. */
+static void far_turn(const hapi_tick_pointer *p, double out[4])
+{
+  double turn[4] = {0.0, p->offset_turn[0], p->offset_turn[1], p->offset_turn[2]};
+  double change[4];
+  hapi_quat_multiply(turn, p->handle_quat, change);
+  for (int i = 0; i < 4; ++i) {
+    out[i] = p->handle_quat[i] + 0.5 * change[i];
+  }
+  hapi_quat_normalize(out);
+}
+
+static void show_turn(hapi_tick_pointer *p)
+{
+  memcpy(p->pose.quat_wxyz, p->proxy_quat, sizeof p->pose.quat_wxyz);
+  hapi_v3_copy(p->proxy_spin, p->twist.angular);
 }
 
 static void place(const hapi_tick *tick, hapi_tick_pointer *p)
@@ -108,6 +155,11 @@ static void place(const hapi_tick *tick, hapi_tick_pointer *p)
   hapi_v3_scale(1.0 - fmin(1.0, tick->period / OFFSET_DECAY_S), p->offset, p->offset);
   hapi_v3_copy(p->proxy_position, p->pose.position);
   hapi_v3_copy(p->proxy_velocity, p->twist.linear);
+  if (p->hull != NULL) {
+    hapi_v3_scale(1.0 - fmin(1.0, tick->period / OFFSET_DECAY_S), p->offset_turn, p->offset_turn);
+    show_turn(p);
+    p->spin_response = spin_response(tick, p);
+  }
 }
 
 void hapi_proxy_begin(hapi_tick *tick)
@@ -127,6 +179,21 @@ void hapi_proxy_begin(hapi_tick *tick)
       p->response = response(tick, p);
     }
   }
+}
+
+static void set_free_spin(const hapi_tick *tick, hapi_tick_pointer *p, double w[3])
+{
+  double t = tick->period;
+  double end[4];
+  double way[3];
+  far_turn(p, end);
+  rotation_between(p->proxy_quat, end, way);
+  for (int k = 0; k < 3; ++k) {
+    w[k] =
+        p->spin_response * (p->proxy_inertia * p->proxy_spin[k] + t * p->spin_stiffness * way[k] +
+                            t * p->spin_damping * p->handle_spin[k]);
+  }
+  hapi_v3_copy(w, p->free_spin);
 }
 
 /* Velocities that the proxies would have with nothing in touch. */
@@ -149,6 +216,29 @@ void hapi_proxy_free(hapi_tick *tick)
       v[k + 3] = 0.0;
     }
     hapi_v3_copy(v, p->free_velocity);
+    if (p->hull != NULL) {
+      set_free_spin(tick, p, v + 3);
+    }
+  }
+}
+
+static void turn_proxy(const hapi_tick *tick, hapi_tick_pointer *p, const double spin[3])
+{
+  double t = tick->period;
+  double end[4];
+  double away[3];
+  hap_pose pose = {.position = {0.0, 0.0, 0.0}};
+  hap_twist twist = {.linear = {0.0, 0.0, 0.0}};
+  memcpy(pose.quat_wxyz, p->proxy_quat, sizeof pose.quat_wxyz);
+  hapi_v3_copy(spin, twist.angular);
+  hapi_pose_move(&pose, &twist, t);
+  memcpy(p->proxy_quat, pose.quat_wxyz, sizeof p->proxy_quat);
+  hapi_v3_copy(spin, p->proxy_spin);
+  far_turn(p, end);
+  rotation_between(end, p->proxy_quat, away);
+  for (int k = 0; k < 3; ++k) {
+    p->wrench.torque[k] =
+        p->spin_stiffness * away[k] + p->spin_damping * (spin[k] - p->handle_spin[k]);
   }
 }
 
@@ -157,11 +247,14 @@ static void move(hapi_tick *tick, uint32_t index)
   hapi_tick_pointer *p = &tick->pointers[index];
   const double *v = tick->world.solver.v[p->row];
   double end[3];
-  if (!hapi_finite(v, 3)) {
+  if (!hapi_finite(v, 6)) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, index + 1);
     hapi_v3_copy(p->handle_position, p->proxy_position);
     hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
     hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+    memcpy(p->proxy_quat, p->handle_quat, sizeof p->proxy_quat);
+    hapi_v3_copy(p->handle_spin, p->proxy_spin);
+    hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
     return;
   }
   hapi_v3_copy(v, p->proxy_velocity);
@@ -170,6 +263,9 @@ static void move(hapi_tick *tick, uint32_t index)
   for (int k = 0; k < 3; ++k) {
     p->wrench.force[k] = p->coupling_stiffness * (p->proxy_position[k] - end[k]) +
                          p->coupling_damping * (v[k] - p->handle_velocity[k]);
+  }
+  if (p->hull != NULL) {
+    turn_proxy(tick, p, v + 3);
   }
 }
 
@@ -181,6 +277,9 @@ void hapi_proxy_move(hapi_tick *tick)
       move(tick, i);
       hapi_v3_copy(p->proxy_position, p->pose.position);
       hapi_v3_copy(p->proxy_velocity, p->twist.linear);
+      if (p->hull != NULL) {
+        show_turn(p);
+      }
     }
   }
 }

@@ -27,11 +27,37 @@ static void place_plane(const hapi_local_contact *c, const hapi_local_body *body
   hapi_v3_add(body->pose.position, out->arm, out->point);
 }
 
-/* Rate at which the pointer goes into the plane [m/s]. */
-static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *body, const plane *at)
+/* Where hapi_tool_place found it. */
+static void place_tool(const hapi_local_contact *c, const hapi_local_body *body, plane *out)
+{
+  hapi_v3_copy(c->point_now, out->point);
+  hapi_v3_copy(c->normal_now, out->normal);
+  hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
+  if (body != NULL) {
+    hapi_v3_sub(c->point_now, body->pose.position, out->arm);
+  }
+}
+
+/* Of the pointer where the contact is; a sphere's turning moves nothing along the normal. */
+static void pointer_velocity(const hapi_tick_pointer *p, const plane *at, double out[3])
+{
+  double arm[3];
+  double swing[3];
+  hapi_v3_copy(p->twist.linear, out);
+  if (p->hull != NULL) {
+    hapi_v3_sub(at->point, p->pose.position, arm);
+    hapi_v3_cross(p->twist.angular, arm, swing);
+    hapi_v3_add(out, swing, out);
+  }
+}
+
+/* Rate at which the pointer goes into the plane [m/s]. *out_own: how much of it its own motion makes. */
+static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *body, const plane *at,
+                           double *out_own)
 {
   double relative[3];
-  hapi_v3_copy(p->twist.linear, relative);
+  pointer_velocity(p, at, relative);
+  *out_own = -hapi_v3_dot(at->normal, relative);
   if (body != NULL) {
     double surface[3];
     hapi_v3_cross(body->twist.angular, at->arm, surface);
@@ -41,23 +67,38 @@ static double closing_rate(const hapi_tick_pointer *p, const hapi_local_body *bo
   return -hapi_v3_dot(at->normal, relative);
 }
 
-/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for the
- * energy observer how fast the body's motion, which is given, loads the spring, and its energy. */
-static double normal_force(hapi_local_contact *c, hapi_tick_pointer *p, const hapi_local_body *body,
-                           const plane *at, double period)
+/* Depth, and the share of the stiffness, of a sphere or of one point of a hull. */
+static double depth_of(const hapi_tick *tick, hapi_local_contact *c, const plane *at,
+                       double *out_depth)
 {
+  const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  if (c->tool != 0) {
+    *out_depth = tick->tool.tools[c->tool - 1].depth;
+    return tick->tool.tools[c->tool - 1].felt;
+  }
   double apart[3];
   hapi_v3_sub(p->pose.position, at->point, apart);
-  double depth = p->radius - hapi_v3_dot(at->normal, apart);
-  double share = hapi_contact_ramp(c, p, &depth, period);
+  *out_depth = p->radius - hapi_v3_dot(at->normal, apart);
+  return hapi_contact_ramp(c, p, out_depth, tick->period);
+}
+
+/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for the
+ * energy observer how fast the body's motion, which is given, loads the spring, and its energy. */
+static double normal_force(hapi_tick *tick, hapi_local_contact *c, const hapi_local_body *body,
+                           const plane *at)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  double depth = 0.0;
+  double own = 0.0;
+  double share = depth_of(tick, c, at, &depth);
   if (!(depth > 0.0)) {
     return 0.0;
   }
-  double closing = closing_rate(p, body, at);
+  double closing = closing_rate(p, body, at, &own);
   double force = p->stiffness * depth + p->damping * closing;
   force = force > 0.0 ? share * force : 0.0;
-  p->guard.force2 += force * force;
-  p->guard.power += force * (closing + hapi_v3_dot(at->normal, p->twist.linear));
+  p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
+  p->guard.power += force * (closing - own);
   return force;
 }
 
@@ -133,6 +174,16 @@ static void audit(hapi_tick *tick, const double vector[3], double norm)
   tick->hand_impulse_abs += tick->period * norm;
 }
 
+/* Torque about the pointer's origin. */
+static void turn_pointer(hapi_tick_pointer *p, const plane *at, double force)
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(at->point, p->pose.position, arm);
+  hapi_v3_cross(arm, at->normal, moment);
+  hapi_v3_madd(p->wrench.torque, force, moment, p->wrench.torque);
+}
+
 static void render_contact(hapi_tick *tick, hapi_local_contact *c)
 {
   hapi_tick_pointer *p = &tick->pointers[c->pointer];
@@ -143,8 +194,15 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
   if (p->generation != c->pointer_generation) {
     return; /* another pointer has come to its place: its contacts come with the next model */
   }
-  place_plane(c, body, &at);
-  double force = normal_force(c, p, body, &at, tick->period);
+  if (c->tool != 0 && !tick->tool.tools[c->tool - 1].placed) {
+    return;
+  }
+  if (c->tool != 0) {
+    place_tool(c, body, &at);
+  } else {
+    place_plane(c, body, &at);
+  }
+  double force = normal_force(tick, c, body, &at);
   if (force == 0.0 || tick->fault != HAP_FAULT_NONE) {
     return;
   }
@@ -154,6 +212,9 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
     force = hapi_v3_norm(c->force);
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
+  if (c->tool != 0) {
+    turn_pointer(p, &at, force);
+  }
   ++p->contacts;
   ++tick->pushing;
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
@@ -178,6 +239,7 @@ void hapi_render(hapi_tick *tick)
     }
   }
   tick->pushing = 0;
+  hapi_tool_place(tick);
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     render_contact(tick, &tick->contacts[i]);
   }

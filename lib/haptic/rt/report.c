@@ -31,13 +31,16 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
 static void report_contacts(const hapi_tick *tick, hapi_state *out)
 {
   hapi_state_contact *contacts = hapi_state_contacts(out);
+  uint32_t count = 0;
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *in = &tick->contacts[i];
-    contacts[i].slot = in->slot;
-    contacts[i].generation = in->generation;
-    hapi_v3_copy(in->force, contacts[i].force);
+    if (in->slot != HAPI_SLOT_NONE) { /* else physics does not know it */
+      contacts[count].slot = in->slot;
+      contacts[count].generation = in->generation;
+      hapi_v3_copy(in->force, contacts[count++].force);
+    }
   }
-  out->contact_count = tick->contact_count;
+  out->contact_count = count;
 }
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
@@ -60,6 +63,11 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
     pointers[i].finger_radius = in->finger_radius;
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
+    pointers[i].is_tool = in->hull != NULL;
+    pointers[i].extent = in->extent;
+    if (in->generation != 0 && in->hull != NULL) {
+      hapi_state_hulls(out)[i] = *in->hull;
+    }
   }
 }
 
@@ -107,7 +115,8 @@ static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
     const hapi_tick_pointer *p = &tick->pointers[i];
     store(places[i].proxy, p->pose.position, 3);
     store(places[i].device, p->handle_position, 3);
-    store(places[i].quat_wxyz, p->pose.quat_wxyz, 4);
+    store(places[i].proxy_quat, p->pose.quat_wxyz, 4);
+    store(places[i].device_quat, p->handle_quat, 4);
     atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
     atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
   }
@@ -144,4 +153,13 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
   }
   out->body_count = tick->live_count;
   out->model_number = tick->model_number;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *in = &tick->pointers[i];
+    hapi_poses_pointer *to = &hapi_poses_pointers(out)[i];
+    to->generation = in->hull != NULL ? in->generation : 0;
+    if (to->generation != 0) {
+      to->pose = in->pose;
+      to->twist = in->twist;
+    }
+  }
 }

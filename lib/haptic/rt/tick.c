@@ -30,7 +30,14 @@ static void clear_arrays(hapi_tick *tick)
   const hapi_local_world *w = &tick->world;
   memset(tick->bodies, 0, c->bodies * sizeof *tick->bodies);
   memset(tick->live, 0, c->bodies * sizeof *tick->live);
-  memset(tick->contacts, 0, c->contacts * sizeof *tick->contacts);
+  size_t tools = (size_t)2 * c->tool_points;
+  memset(tick->contacts, 0, (c->contacts + tools) * sizeof *tick->contacts);
+  if (tools > 0) {
+    memset(tick->tool.tools, 0, tools * sizeof *tick->tool.tools);
+    memset(tick->tool.old_tools, 0, tools * sizeof *tick->tool.old_tools);
+    memset(tick->tool.old_contacts, 0, tools * sizeof *tick->tool.old_contacts);
+    memset(tick->tool.pairs, 0, HAPI_TOOL_PAIRS(c) * sizeof *tick->tool.pairs);
+  }
   memset(tick->ramps, 0, c->contacts * sizeof *tick->ramps);
   memset(tick->ramp_generations, 0, c->contacts * sizeof *tick->ramp_generations);
   memset(tick->frictions, 0, c->contacts * sizeof *tick->frictions);
@@ -61,6 +68,8 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.ramp_generations = tick->ramp_generations;
   fresh.frictions = tick->frictions;
   fresh.pointers = tick->pointers;
+  fresh.tool = tick->tool;
+  fresh.tool.count = fresh.tool.pair_count = 0;
   keep_arrays(&tick->world, &fresh.world);
   fresh.hash = 0xcbf29ce484222325u;
   *tick = fresh;

@@ -24,6 +24,12 @@
  *   joint_rows     joints likewise
  *   contact_solver, direct_solver  impulses of all rows
  *
+ * Pointers that are hulls:
+ *
+ *   tool_adopt   their contacts, of a new model or new patches, go on from the old ones
+ *   tool_place   where these are now, and what part of the stiffness each has
+ *   touch_place  one of them, or of those between bodies
+ *
  *   report    state for physics; trace row; hash
  *   black_box what came out, kept for the case of a fault
  */
@@ -51,7 +57,9 @@ typedef struct hapi_guard_pointer {
   double share;       /* 0..1, of the ramp-in */
   bool placed;        /* position and moved are of the device as it is now */
   double position[3]; /* at the last tick */
+  double quat[4];
   double moved[3];    /* since the tick before */
+  double turned[3];   /* rad, likewise, of a device that gives torque */
   hap_wrench wanted;  /* before the guard */
   hap_wrench written; /* at the last tick; in force until the next write */
   uint32_t flags;     /* hap_guard_flag, of the last tick */
@@ -83,6 +91,9 @@ typedef struct hapi_tick_pointer {
   uint32_t generation; /* 0: no pointer here */
   uint32_t collide_bits;
   double radius;
+  const hapi_tool_hull *hull; /* NULL: a sphere */
+  double extent;              /* m, from the origin to the farthest point of the surface */
+  bool three_dof;             /* the device has no torque, and does not turn a hull */
   double stiffness;
   double damping;
   double friction;
@@ -134,6 +145,18 @@ typedef struct hapi_tick_pointer {
   double free_velocity[3]; /* m/s, of the proxy with nothing in touch */
   uint32_t row;            /* place in the solver's velocities; 0: direct */
   double response;         /* 1/kg, change of the proxy's velocity by one N s */
+
+  /* The same of a hull's turning; zero for a sphere. */
+  double spin_stiffness; /* N m/rad */
+  double spin_damping;   /* N m s/rad */
+  double proxy_inertia;  /* kg m^2 */
+  double handle_quat[4];
+  double handle_spin[3];
+  double proxy_quat[4];
+  double proxy_spin[3];  /* rad/s */
+  double offset_turn[3]; /* rad */
+  double free_spin[3];   /* rad/s */
+  double spin_response;  /* 1/(kg m^2) */
 } hapi_tick_pointer;
 
 typedef struct hapi_local_body {
@@ -227,8 +250,10 @@ typedef struct hapi_local_contact {
   hapi_ramp ramp;
   double force[3];  /* on the body */
   double couple[3]; /* N m, on the body about the contact point; friction */
+  uint32_t tool;    /* of a hull: 1 + index into the tick's tools; 0: of a sphere */
+  double weight;    /* 0..1, share of the pointer's stiffness; of a sphere 1 */
 
-  /* Model CONTACT. */
+  /* Model CONTACT, and of hulls all. */
   bool has_shape; /* asked at every tick */
   hapi_shape shape;
   hap_pose shape_pose;
@@ -236,6 +261,43 @@ typedef struct hapi_local_contact {
   double normal_now[3]; /* world, out of the body */
   double point_now[3];
 } hapi_local_contact;
+
+/* A contact of a pointer that is a hull, beside its hapi_local_contact. */
+typedef struct hapi_local_tool {
+  hapi_tool_point in;
+  uint32_t pair; /* index */
+  uint32_t next; /* of the same pair; HAPI_SLOT_NONE: the last one */
+  double member; /* 0..1: one that is new, or no longer there, comes and goes slowly */
+  bool leaving;  /* no longer there */
+  bool placed;   /* in this tick */
+  double claim;  /* 0..1, in this tick: its part of the stiffness before it is shared */
+  double depth;  /* m, in this tick, less the pair's excess */
+  double felt;   /* 0..1, share of the stiffness in this tick */
+} hapi_local_tool;
+
+/* What the contacts of a hull with one geom have in common. */
+typedef struct hapi_tool_pair {
+  uint64_t key;
+  uint32_t pointer;
+  uint32_t first; /* of its tools, by their next */
+  bool seen;
+  hapi_ramp ramp; /* of the deepest of them */
+  double depth;   /* m, of the deepest, at the last tick */
+} hapi_tool_pair;
+
+/* Of those that are leaving, and of new ones before the old are dropped. */
+#define HAPI_TOOL_PAIRS(capacity) ((size_t)3 * (capacity)->tool_points)
+
+/* The contacts of all hulls. They stand behind the spheres' in the tick's contacts, in the same order. */
+typedef struct hapi_tool_world {
+  hapi_local_tool *tools;     /* 2 x capacity.tool_points: new ones and those that are leaving */
+  hapi_local_tool *old_tools; /* scratch of adopting */
+  hapi_local_contact *old_contacts; /* likewise */
+  hapi_tool_pair *pairs;            /* HAPI_TOOL_PAIRS */
+  hapi_tool_hull *hulls;            /* capacity.pointers */
+  uint32_t count;
+  uint32_t pair_count;
+} hapi_tool_world;
 
 #define HAPI_NO_ROW 0xffffffffu
 
@@ -296,17 +358,19 @@ typedef struct hapi_tick {
   double period; /* s, T */
   bool hashing;  /* lockstep */
 
-  hapi_local_body *bodies;      /* by slot, capacity.bodies */
-  uint32_t *live;               /* slots in the model, live_count */
-  hapi_local_contact *contacts; /* of the model, contact_count */
-  hapi_ramp *ramps;             /* by contact slot, of the model before: to go on with */
-  uint32_t *ramp_generations;   /* by contact slot */
-  hapi_friction *frictions;     /* by contact slot */
-  hapi_tick_pointer *pointers;  /* capacity.pointers */
+  hapi_local_body *bodies; /* by slot, capacity.bodies */
+  uint32_t *live;          /* slots in the model, live_count */
+  /* Of spheres, then of hulls, contact_count in all; capacity.contacts + 2 x capacity.tool_points. */
+  hapi_local_contact *contacts;
+  hapi_ramp *ramps;            /* by contact slot, of the model before: to go on with */
+  uint32_t *ramp_generations;  /* by contact slot */
+  hapi_friction *frictions;    /* by contact slot */
+  hapi_tick_pointer *pointers; /* capacity.pointers */
   uint32_t live_count;
   uint32_t contact_count;
   uint32_t body_high;
   hapi_local_world world;
+  hapi_tool_world tool;
 
   uint64_t tick;
   int64_t now_ns;
@@ -381,11 +445,17 @@ void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenche
 void hapi_contact_wake(hapi_tick *tick);                      /* what is touched by what moves */
 void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
-void hapi_joint_wake(hapi_tick *tick);                /* what hangs on what moves */
-void hapi_joint_rows(hapi_tick *tick);                /* joints -> rows */
-void hapi_guard(hapi_tick *tick);                     /* world wrench -> device wrench */
+void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
+void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */
+void hapi_tool_set_aside(hapi_tick *tick); /* before a model's spheres are taken: their places */
+void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model); /* ... and after them */
+void hapi_tool_adopt_patches(hapi_tick *tick, hapi_patches *patches);
+void hapi_tool_place(hapi_tick *tick);                    /* all contacts of hulls, once a tick */
+void hapi_tool_forget(hapi_tick *tick, uint32_t pointer); /* its contacts begin as deep ones do */
+void hapi_guard(hapi_tick *tick);                         /* world wrench -> device wrench */
 void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
+double hapi_coupling_torque_scale(const hapi_tick_pointer *pointer); /* device / world */
 void hapi_trace_hash(hapi_tick *tick);
 
 #endif

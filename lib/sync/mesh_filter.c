@@ -1,0 +1,66 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "sync/mesh_filter.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "base/vec.h"
+
+/* A body that slides over a mesh must not feel the seams between its triangles. A contact whose
+ * normal is the triangle's own counts always; one that leans over an edge only when no neighbour
+ * goes on behind that edge in the same plane or higher. */
+
+#define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
+#define TRIANGLE 8u
+
+#define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
+
+void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
+{
+  double sides[2][3];
+  double own[3];
+  hapi_v3_sub(corners + 3, corners, sides[0]);
+  hapi_v3_sub(corners + 6, corners, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], own);
+  double area = hapi_v3_norm(own);
+  double lean = area > 0.0 ? hapi_v3_dot(own, io->normal) / area : 0.0;
+  if (io->touch != HAPI_TOUCH_FACE_A || fabs(lean) < FLAT_COSINE) {
+    return;
+  }
+  double apart[3];
+  hapi_v3_scale((lean < 0.0 ? -1.0 : 1.0) / area, own, own);
+  hapi_v3_sub(io->core_a, corners, apart);
+  io->touch = HAPI_TOUCH_FACE_B;
+  io->slide = HAPI_SLIDE_NONE;
+  io->gap = hapi_v3_dot(own, apart) - io->ball_a;
+  hapi_v3_copy(own, io->normal);
+  hapi_v3_copy(corners, io->core_b);
+}
+
+bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
+{
+  double sides[3][3];
+  double own[3];
+  if ((open_edges & TRIANGLE) == 0) {
+    return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    hapi_v3_sub(corners + (size_t)3 * ((i + 1) % 3), corners + (size_t)3 * i, sides[i]);
+  }
+  hapi_v3_cross(sides[0], sides[1], own);
+  double area = hapi_v3_norm(own);
+  double lean = area > 0.0 ? hapi_v3_dot(own, normal) / area : 1.0;
+  if (fabs(lean) >= OWN_NORMAL_COSINE) {
+    return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    double outward[3];
+    hapi_v3_cross(sides[i], own, outward);
+    bool over = hapi_v3_dot(outward, normal) > 1e-9 * hapi_v3_norm(outward);
+    if (over && (open_edges & (1u << i)) == 0) {
+      return false;
+    }
+  }
+  return true;
+}

@@ -1,0 +1,171 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TESTS_TOOL_WORLD_H
+#define HAPODE_TESTS_TOOL_WORLD_H
+
+/* A lockstep session with a pointer that is a hull, a cube of 20 mm if nothing else is said, moved by
+ * the test. Public API only. Include after tap.h. */
+
+#include <math.h>
+#include <string.h>
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+typedef struct tool_world {
+  dWorldID world;
+  dSpaceID space;
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_pointer_def tool_def;
+  hap_session *session;
+  hap_pointer_id tool;
+  double hull[64 * 3];
+  hap_pose pose;
+  hap_twist twist;
+  hap_pointer_state state; /* of the newest tick */
+  hap_detail detail;
+  double steepest;        /* N, between two ticks, since it was set to 0 */
+  double steepest_torque; /* N m */
+  double work;            /* J, that the tool's wrench did on the hand */
+  double work_most;
+} tool_world;
+
+static inline bool tool_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)user;
+  (void)a;
+  (void)b;
+  io->mode = dContactApprox1;
+  io->mu = 0.5;
+  return true;
+}
+
+/* Corners of a box about (x, y, z). */
+static inline void tool_set_box(tool_world *w, const double half[3], const double middle[3])
+{
+  for (int i = 0; i < 8; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      w->hull[3 * i + k] = middle[k] + ((i >> k & 1) != 0 ? half[k] : -half[k]);
+    }
+  }
+  w->tool_def.hull_xyz = w->hull;
+  w->tool_def.hull_points = 8;
+}
+
+static inline void tool_begin(tool_world *w, hap_model model)
+{
+  static const double half[3] = {0.01, 0.01, 0.01};
+  static const double middle[3] = {0.0, 0.0, 0.0};
+  memset(w, 0, sizeof *w);
+  w->world = dWorldCreate();
+  w->space = dHashSpaceCreate(NULL);
+  dWorldSetGravity(w->world, 0.0, 0.0, -9.81);
+  hap_session_def_init(&w->def, sizeof w->def);
+  w->def.drive = HAP_DRIVE_LOCKSTEP;
+  w->def.model = model;
+  w->def.guard = HAP_GUARD_MEASURE;
+  hap_ode_def_init(&w->ode, sizeof w->ode);
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  w->ode.surface = tool_surface;
+  hap_pointer_def_init(&w->tool_def, sizeof w->tool_def);
+  w->tool_def.coupling = HAP_COUPLING_DIRECT;
+  w->tool_def.radius = 0.0;
+  w->tool_def.max_force = 1e4;
+  w->tool_def.max_torque = 1e4;
+  w->pose.quat_wxyz[0] = 1.0;
+  tool_set_box(w, half, middle);
+}
+
+static inline void tool_add_floor(tool_world *w)
+{
+  dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
+}
+
+static inline bool tool_start(tool_world *w)
+{
+  bool good = hap_session_create(&w->def, &w->ode, &w->session, &w->detail) == HAP_OK &&
+              hap_pointer_add(w->session, &w->tool_def, &w->tool) == HAP_OK &&
+              hap_session_start(w->session) == HAP_OK;
+  if (!good && w->session != NULL) {
+    (void)hap_session_detail(w->session, &w->detail);
+  }
+  if (!good) {
+    printf("# %s\n", w->detail.text);
+  }
+  return good;
+}
+
+static inline void tool_end(tool_world *w)
+{
+  hap_session_destroy(w->session);
+  dSpaceDestroy(w->space);
+  dWorldDestroy(w->world);
+}
+
+static inline void tool_step(tool_world *w)
+{
+  hap_pointer_state before = w->state;
+  double way[3];
+  double turn[3];
+  CHECK(hap_pointer_set_target(w->session, w->tool, &w->pose, &w->twist) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, w->tool, &w->state, sizeof w->state) == HAP_OK);
+  if (before.stamp_ns == 0) {
+    return;
+  }
+  double change[2] = {0.0, 0.0};
+  for (int k = 0; k < 3; ++k) {
+    change[0] += pow(w->state.wrench.force[k] - before.wrench.force[k], 2.0);
+    change[1] += pow(w->state.wrench.torque[k] - before.wrench.torque[k], 2.0);
+    way[k] = w->state.proxy.position[k] - before.proxy.position[k];
+    turn[k] = 0.5 * 1e-3 * (w->state.twist.angular[k] + before.twist.angular[k]);
+    w->work += 0.5 * (w->state.wrench.force[k] + before.wrench.force[k]) * way[k] +
+               0.5 * (w->state.wrench.torque[k] + before.wrench.torque[k]) * turn[k];
+  }
+  w->work_most = fmax(w->work_most, w->work);
+  w->steepest = fmax(w->steepest, sqrt(change[0]));
+  w->steepest_torque = fmax(w->steepest_torque, sqrt(change[1]));
+}
+
+static inline void tool_run(tool_world *w, int ticks)
+{
+  for (int i = 0; i < ticks; ++i) {
+    tool_step(w);
+  }
+}
+
+/* Turned by an angle about y. */
+static inline void tool_go(tool_world *w, double x, double y, double z, double angle)
+{
+  w->pose = (hap_pose){{x, y, z}, {cos(0.5 * angle), 0.0, sin(0.5 * angle), 0.0}};
+  memset(&w->twist, 0, sizeof w->twist);
+}
+
+static inline double tool_angle(const tool_world *w)
+{
+  return 2.0 * atan2(w->pose.quat_wxyz[2], w->pose.quat_wxyz[0]);
+}
+
+/* There in that many ticks, evenly, turning about y. */
+static inline void tool_move(tool_world *w, double x, double y, double z, double angle, int ticks)
+{
+  const double to[3] = {x, y, z};
+  double from[3];
+  double before = tool_angle(w);
+  memcpy(from, w->pose.position, sizeof from);
+  for (int i = 1; i <= ticks; ++i) {
+    double share = (double)i / ticks;
+    tool_go(w, from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]),
+            from[2] + share * (to[2] - from[2]), before + share * (angle - before));
+    for (int k = 0; k < 3; ++k) {
+      w->twist.linear[k] = (to[k] - from[k]) / ticks * 1e3;
+    }
+    w->twist.angular[1] = (angle - before) / ticks * 1e3;
+    tool_step(w);
+  }
+  memset(&w->twist, 0, sizeof w->twist);
+}
+
+#endif
