@@ -118,8 +118,42 @@ TEST(what_sticks_does_not_creep_in_a_million_ticks)
   }
 }
 
+/* The body turns about the place where it touches the pointer, which rests: as it goes round the ball by
+ * 0.6 rad, the contact moves by 5 mm on both. */
+TEST(what_rolls_does_not_slide)
+{
+  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
+  for (int m = 0; m < 2; ++m) {
+    hapi_tick_pointer *p = surface_and_pointer(models[m], 0.0);
+    const double step[4] = {cos(5e-4), 0.0, sin(5e-4), 0.0};
+    double normal[3] = {-1.0, 0.0, 0.0};
+    put(p, -RADIUS + 0.002, 0.0, 0.0);
+    run(30);
+    for (int i = 0; i < 600; ++i) {
+      static const double out[3] = {-1.0, 0.0, 0.0};
+      hap_pose *pose = &f.bodies[0].pose;
+      double foot[3];
+      double apart[3];
+      hapi_v3_sub(p->pose.position, pose->position, apart);
+      hapi_v3_madd(p->pose.position, -hapi_v3_dot(normal, apart), normal, foot);
+      hapi_v3_sub(pose->position, foot, apart);
+      hapi_quat_rotate(step, apart, apart);
+      hapi_v3_add(foot, apart, pose->position);
+      hapi_quat_multiply(step, pose->quat_wxyz, pose->quat_wxyz);
+      f.bodies[0].to = *pose;
+      hapi_quat_rotate(pose->quat_wxyz, out, normal);
+      run(1);
+    }
+    double along = hapi_v3_dot(p->wrench.force, normal);
+    hapi_v3_madd(p->wrench.force, -along, normal, normal);
+    CHECK_NEAR(along, 2.0, 1e-2);
+    CHECK(hapi_v3_norm(normal) < 2e-3); /* N; of 1.6 that hold */
+  }
+}
+
 int main(void)
 {
+  RUN(what_rolls_does_not_slide);
   RUN(what_sticks_does_not_creep_in_a_million_ticks);
   hapi_exchange_destroy(f.exchange);
   return tap_done();
