@@ -153,6 +153,10 @@ static void count_model(hapi_physics *physics, const hapi_model *model)
   hap_stats *stats = &physics->figures.stats;
   stats->neighbours = hapi_neighbors_bodies(physics);
   stats->pointer_contacts = model->contact_count;
+  if (physics->model == HAP_MODEL_CONTACT && physics->range.number == model->number) {
+    stats->pointer_contacts +=
+        physics->range.near->tool_pair_count; /* whose points are found later */
+  }
   if (stats->neighbours > stats->neighbours_max) {
     stats->neighbours_max = stats->neighbours;
   }
