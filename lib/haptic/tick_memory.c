@@ -60,9 +60,10 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   tick->ramps = hapi_alloc_array(c->contacts, sizeof *tick->ramps);
   tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
   tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
+  tick->crosses = hapi_alloc_array(c->crosses, sizeof *tick->crosses);
   return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
          tick->ramps != NULL && tick->ramp_generations != NULL && tick->pointers != NULL &&
-         allocate_world(&tick->world, c);
+         tick->crosses != NULL && allocate_world(&tick->world, c);
 }
 
 void hapi_tick_memory_destroy(hapi_tick *tick)
@@ -73,5 +74,6 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
   hapi_free(tick->ramps);
   hapi_free(tick->ramp_generations);
   hapi_free(tick->pointers);
+  hapi_free(tick->crosses);
   free_world(&tick->world);
 }

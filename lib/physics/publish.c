@@ -155,6 +155,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->impulse_pose = physics->config.impulse_pose;
   out->body_count = 0;
   out->contact_count = 0;
+  out->cross_count = 0;
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     if (physics->bodies[i].phase == HAPI_SLOT_LIVE &&
         fill_body(physics, i, &bodies[out->body_count])) {
@@ -163,6 +164,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   }
   for (uint32_t i = 0; i < physics->contact_high; ++i) {
     if (physics->contacts[i].phase == HAPI_SLOT_LIVE) {
+      hapi_cross_publish(physics, i, out->contact_count, out);
       fill_contact(&physics->contacts[i], i, &contacts[out->contact_count++]);
     }
   }

@@ -110,6 +110,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .hull_points = (uint32_t)def->max_hull_points,
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
+      .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {

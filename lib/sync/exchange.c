@@ -44,6 +44,7 @@ static size_t lay_out_model(hapi_model *m, const hapi_capacity *c)
   m->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_model_body));
   m->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_model_contact));
   m->joints_offset = place_array(&at, c->joints, sizeof(hapi_model_joint));
+  m->crosses_offset = place_array(&at, c->crosses, sizeof(hapi_model_cross));
   return at;
 }
 

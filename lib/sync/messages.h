@@ -33,6 +33,7 @@ typedef struct hapi_capacity {
   uint32_t trail_rows;   /* 0: none are kept */
   uint32_t trail_stride; /* ticks from row to row */
   uint32_t joints;       /* between bodies of the range */
+  uint32_t crosses;      /* cross accelerances; 0: none are measured */
 } hapi_capacity;
 
 enum {
@@ -90,6 +91,14 @@ typedef struct hapi_model_contact {
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
 } hapi_model_contact;
+
+/* Cross accelerance: what a force at a pointer contact does to another body. */
+typedef struct hapi_model_cross {
+  uint32_t
+      contact;   /* index in the message; the blocks of a contact follow each other, in its order */
+  uint32_t body; /* slot */
+  double a[6][3]; /* world axes, as hapi_model_contact.a */
+} hapi_model_cross;
 
 /* How a joint's error is taken back: ODE's parameters at the tick. */
 typedef struct hapi_softness {
@@ -176,9 +185,11 @@ typedef struct hapi_model {
   uint32_t contact_count;
   uint32_t watch_count; /* traced bodies */
   uint32_t joint_count; /* model CONTACT */
+  uint32_t cross_count; /* model ACCELERANCE */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
+  uint32_t crosses_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -196,6 +207,11 @@ static inline hapi_model_contact *hapi_model_contacts(hapi_model *m)
 static inline hapi_model_joint *hapi_model_joints(hapi_model *m)
 {
   return (hapi_model_joint *)(void *)((char *)m + m->joints_offset);
+}
+
+static inline hapi_model_cross *hapi_model_crosses(hapi_model *m)
+{
+  return (hapi_model_cross *)(void *)((char *)m + m->crosses_offset);
 }
 
 /* ---- physics -> contact: what may touch what (model CONTACT) ---- */

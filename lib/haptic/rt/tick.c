@@ -32,6 +32,9 @@ static void clear_arrays(hapi_tick *tick)
   memset(tick->live, 0, c->bodies * sizeof *tick->live);
   memset(tick->contacts, 0, c->contacts * sizeof *tick->contacts);
   memset(tick->ramps, 0, c->contacts * sizeof *tick->ramps);
+  if (c->crosses > 0) {
+    memset(tick->crosses, 0, c->crosses * sizeof *tick->crosses);
+  }
   memset(tick->ramp_generations, 0, c->contacts * sizeof *tick->ramp_generations);
   memset(w->memory, 0, c->contacts * sizeof *w->memory);
   memset(w->old_memory, 0, c->contacts * sizeof *w->old_memory);
@@ -59,6 +62,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.ramps = tick->ramps;
   fresh.ramp_generations = tick->ramp_generations;
   fresh.pointers = tick->pointers;
+  fresh.crosses = tick->crosses;
   keep_arrays(&tick->world, &fresh.world);
   fresh.hash = 0xcbf29ce484222325u;
   *tick = fresh;

@@ -264,8 +264,10 @@ typedef struct hapi_tick {
   hapi_ramp *ramps;             /* by contact slot, of the model before: to go on with */
   uint32_t *ramp_generations;   /* by contact slot */
   hapi_tick_pointer *pointers;  /* capacity.pointers */
+  hapi_model_cross *crosses;    /* of the model, contact: an index here; capacity.crosses */
   uint32_t live_count;
   uint32_t contact_count;
+  uint32_t cross_count;
   uint32_t body_high;
   hapi_local_world world;
 
