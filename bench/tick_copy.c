@@ -56,6 +56,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   copy->ramps = own.ramps;
   copy->ramp_generations = own.ramp_generations;
   copy->pointers = own.pointers;
+  copy->crosses = own.crosses;
   copy->hashing = false; /* only lockstep does */
   memcpy(copy->bodies, from->bodies, from->body_high * sizeof *copy->bodies);
   memcpy(copy->live, from->live, from->live_count * sizeof *copy->live);
@@ -64,6 +65,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   memcpy(copy->ramp_generations, from->ramp_generations,
          c->contacts * sizeof *copy->ramp_generations);
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
+  memcpy(copy->crosses, from->crosses, from->cross_count * sizeof *copy->crosses);
   copy_world(&copy->world, &own.world, &from->world);
   memcpy(copy->world.joint_memory, from->world.joint_memory,
          c->joints * sizeof *copy->world.joint_memory);

@@ -210,7 +210,7 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--lockstep=1", "--lockstep", "no value"},
       {"--rt-priority 100", "--rt-priority", "0 to 99"},
       {"--impulse-pose bent", "--impulse-pose", "held nor interpolated"},
-      {"--probe twice", "--probe", "shared nor paper"},
+      {"--probe twice", "--probe", "shared, paper or operating"},
       {"--model-age 0.01", "--model-age", "--lockstep"},
       {"--lockstep --model-age 150", "--model-age", "at most 20 s"},
       {"--effects friction", "--effects", "NAME=on"},
@@ -221,6 +221,7 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--coupling proxy --model accelerance", "--coupling", "--model contact"},
       {"--coupling proxy --effects proxy=off", "--coupling", "--effects"},
       {"--effects proxy=on --model impulse", "--effects", "not supported"},
+      {"--effects cross=on", "--effects", "not supported"},
       {"--scene fig5:3", "--scene", "takes no N"},
       {"--scene row10:x", "--scene", "number from 1"},
       {"--device virtual:colour=1", "--device", "path"},
@@ -251,6 +252,9 @@ TEST(what_this_version_cannot_do_is_said)
   CHECK(run("--lockstep --seconds 0.05 --effects shape=off,contacts=on") == 0);
   CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL);
   CHECK(strstr(ran.out, "testing=auto") != NULL);
+  CHECK(run("--model accelerance --lockstep --seconds 0.05 --probe operating "
+            "--effects cross=on") == 0);
+  CHECK(strstr(ran.out, "cross=on") != NULL);
 }
 
 /* ---- files ---- */
