@@ -65,6 +65,8 @@ typedef struct accuracy_run_def {
   double haptic_hz; /* a multiple of 1 kHz */
   double contact_hz;
   int latency_ticks;
+  hap_probe probe;
+  hap_cross cross;
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */
@@ -96,6 +98,9 @@ double accuracy_hand_speed(const accuracy_motion *m); /* m/s, the largest */
 double accuracy_rest_share(const accuracy_motion *m);
 
 /* ---- accuracy_sweep.c ---- */
+
+#define ACCURACY_OPERATING "operating"   /* knobs of model accelerance: its ways of testing */
+#define ACCURACY_CROSS "operating_cross" /* the same with cross accelerance */
 
 typedef struct accuracy_row {
   char scene[16];

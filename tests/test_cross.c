@@ -480,6 +480,34 @@ TEST(b_and_the_forces_make_the_base_again)
   world_close(&w);
 }
 
+/* Two cubes side by side on the floor are one island; friction holds both. */
+TEST(what_does_not_answer_has_no_block)
+{
+  for (int pushed = 0; pushed < 2; ++pushed) {
+    on_floor f;
+    test_world *w = &f.w;
+    double force = pushed != 0 ? 4.0 * LIMIT : 0.0;
+    world_open(w, GRAVITY, 1000);
+    w->mu = MU;
+    w->def.probe = HAP_PROBE_OPERATING;
+    w->def.cross = HAP_CROSS_ON;
+    dCreatePlane(w->space, 0, 0, 1, 0);
+    for (int i = 0; i < 2; ++i) {
+      world_add_cube(w, EDGE, MASS, i * (EDGE - OVERLAP), 0, EDGE / 2 - OVERLAP);
+    }
+    REQUIRE(world_create_session(w, NULL) == HAP_OK);
+    world_add_pointer(w, RADIUS, -EDGE / 2 - RADIUS - GAP, 0, EDGE / 2);
+    world_add_pointer(w, RADIUS, EDGE, 0, EDGE + RADIUS + 0.005);
+    REQUIRE(hap_session_start(w->session) == HAP_OK);
+    f.contact = world_contact(w, w->bodies[0], 0);
+    REQUIRE(f.contact != NULL && world_slot(w, w->bodies[1]) != NULL);
+    measure_with(&f, force, 0.0, 0.0);
+    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->cross_count);
+    CHECK((block(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
+    world_close(w);
+  }
+}
+
 /* Not yet touched: a perturbation away from the row would find the cube alone. */
 TEST(perturbations_go_into_the_body)
 {
@@ -532,6 +560,7 @@ int main(void)
   RUN(a_cube_that_friction_holds_gives_no_way);
   RUN(a_cube_that_slides_answers_with_its_mass);
   RUN(b_and_the_forces_make_the_base_again);
+  RUN(what_does_not_answer_has_no_block);
   RUN(perturbations_go_into_the_body);
   RUN(operating_probes_are_as_many_as_shared_ones);
   dCloseODE();
