@@ -232,6 +232,24 @@ TEST(with_too_few_places_the_largest_stay)
   world_close(&w);
 }
 
+/* A perturbation of nothing, as of a body without weight, divides nothing by nothing. */
+TEST(a_block_that_is_no_number_is_left_out)
+{
+  test_world w;
+  open_pair(&w, HAP_CROSS_ON, 0.5, 0.2);
+  join_fixed(&w);
+  REQUIRE(start_above(&w, -0.02));
+  const hap_stats *stats = &world_physics(&w)->figures.stats;
+  world_slot(&w, w.bodies[0])->mass = 0.0;
+  measure(&w);
+  CHECK(stats->probes_singular == 2 &&
+        stats->probes_clipped == 0); /* A of the contact, and its block */
+  CHECK(block(&w, w.bodies[0], w.bodies[1]) == NULL);
+  CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
+  CHECK(world_contact(&w, w.bodies[0], 0)->a[0][0] > 0.1); /* the last good one */
+  world_close(&w);
+}
+
 /* ---- in the loop ---- */
 
 static const hapi_local_body *local(const test_world *w, int body)
@@ -553,6 +571,7 @@ int main(void)
   RUN(a_hinged_pair_has_its_closed_form);
   RUN(what_nothing_ties_has_no_block_and_no_probe_is_added);
   RUN(with_too_few_places_the_largest_stay);
+  RUN(a_block_that_is_no_number_is_left_out);
   RUN(the_second_cube_of_a_row_moves_between_syncs);
   RUN(an_impulse_counts_once_and_what_answers_follows_the_world);
   RUN(two_hands_on_a_pair_leave_no_residual);

@@ -252,9 +252,24 @@ TEST(what_this_version_cannot_do_is_said)
   CHECK(run("--lockstep --seconds 0.05 --effects shape=off,contacts=on") == 0);
   CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL);
   CHECK(strstr(ran.out, "testing=auto") != NULL);
-  CHECK(run("--model accelerance --lockstep --seconds 0.05 --probe operating "
-            "--effects cross=on") == 0);
-  CHECK(strstr(ran.out, "cross=on") != NULL);
+}
+
+/* Of two bodies that touch. */
+TEST(ways_of_testing_can_be_chosen)
+{
+  static const char *const ways[] = {"", "--effects cross=on", "--probe operating",
+                                     "--probe operating --effects cross=on"};
+  char hashes[4][24];
+  for (int i = 0; i < 4; ++i) {
+    CHECK(run("--model accelerance --scene stack --physics-hz 20 --lockstep --seconds 0.7 %s",
+              ways[i]) == 0);
+    REQUIRE(value_of("trace_hash") != NULL && value_of("effects") != NULL);
+    CHECK((strstr(value_of("effects"), "cross=on") != NULL) == (i % 2 != 0));
+    snprintf(hashes[i], sizeof hashes[i], "%s", value_of("trace_hash"));
+    for (int k = 0; k < i; ++k) {
+      CHECK(strcmp(hashes[k], hashes[i]) != 0);
+    }
+  }
 }
 
 /* ---- files ---- */
@@ -855,6 +870,7 @@ int main(void)
   RUN(an_unknown_name_is_answered_with_those_that_exist);
   RUN(a_wrong_value_is_answered_with_what_is_allowed);
   RUN(what_this_version_cannot_do_is_said);
+  RUN(ways_of_testing_can_be_chosen);
   RUN(a_malformed_recording_names_its_line);
   RUN(files_that_cannot_be_written_are_found_before_the_run);
   RUN(a_full_disk_is_a_failure_that_the_hand_does_not_feel);
