@@ -7,7 +7,7 @@
  *   knob, value    what differs from the library's defaults; default: nothing, the worst of ten
  *                  starts that are 1 um to 1 mm apart. operating, operating_cross: probes about the
  *                  operating point, without and with cross accelerance; also the worst start, with
- *                  --quick the first one
+ *                  --quick the first one, and eq4 the default from there
  *   force_rel_rms  RMS of the difference / RMS of the reference, while either is in contact
  *   duty           computing time of all threads / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
@@ -44,7 +44,8 @@ static bool is_default(const accuracy_row *row)
 
 static bool is_way_of_testing(const accuracy_row *row)
 {
-  return strcmp(row->knob, ACCURACY_OPERATING) == 0 || strcmp(row->knob, ACCURACY_CROSS) == 0;
+  return strcmp(row->knob, ACCURACY_EQ4) == 0 || strcmp(row->knob, ACCURACY_OPERATING) == 0 ||
+         strcmp(row->knob, ACCURACY_CROSS) == 0;
 }
 
 static void write_row(FILE *csv, const accuracy_row *r)

@@ -99,8 +99,10 @@ double accuracy_rest_share(const accuracy_motion *m);
 
 /* ---- accuracy_sweep.c ---- */
 
-#define ACCURACY_OPERATING "operating"   /* knobs of model accelerance: its ways of testing */
-#define ACCURACY_CROSS "operating_cross" /* the same with cross accelerance */
+/* Knobs of model accelerance: its ways of testing. */
+#define ACCURACY_EQ4 "eq4" /* the default's, from the starts of the other two */
+#define ACCURACY_OPERATING "operating"
+#define ACCURACY_CROSS "operating_cross" /* with cross accelerance as well */
 
 typedef struct accuracy_row {
   char scene[16];
