@@ -67,6 +67,8 @@ typedef struct accuracy_run_def {
   double haptic_hz; /* a multiple of 1 kHz */
   double contact_hz;
   int latency_ticks;
+  hap_probe probe;
+  hap_cross cross;
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */
@@ -99,6 +101,11 @@ double accuracy_hand_speed(const accuracy_motion *m); /* m/s, the largest */
 double accuracy_rest_share(const accuracy_motion *m);
 
 /* ---- accuracy_sweep.c ---- */
+
+/* Knobs of model accelerance: its ways of testing. */
+#define ACCURACY_EQ4 "eq4" /* the default's, from the starts of the other two */
+#define ACCURACY_OPERATING "operating"
+#define ACCURACY_CROSS "operating_cross" /* with cross accelerance as well */
 
 typedef struct accuracy_row {
   char scene[16];

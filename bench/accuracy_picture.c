@@ -12,16 +12,31 @@
 #define ERROR_LEAST 1.2e-5 /* just inside of the axis */
 #define ERROR_MOST 80.0
 
-static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                   HAP_MODEL_CONTACT};
-static const int points[] = {4, 8, 6, 7}; /* gnuplot's shapes */
+/* What a panel shows. place: where a point's physics rate is written; the models' points are often
+ * near each other, and those of contact lie on its default of 60 Hz, which has its own mark. */
+typedef struct series {
+  hap_model model;
+  const char *knob;
+  const char *title;
+  int point; /* gnuplot's shape */
+  const char *place;
+} series;
 
-/* Where a point's physics rate is written: the models' points are often near each other, and those
- * of contact lie on its default of 60 Hz, which has its own mark. */
-static const char *const places[] = {NULL, "left offset -0.3,0.9", "left offset 0.6,0.3",
-                                     "center offset 0,-0.9"};
+static const series all_series[] = {
+    {HAP_MODEL_SINGLE, "default", "single", 4, NULL},
+    {HAP_MODEL_IMPULSE, "default", "impulse", 8, "left offset -0.3,0.9"},
+    {HAP_MODEL_ACCELERANCE, "default", "accelerance (eq. 4)", 6, "left offset 0.6,0.3"},
+    {HAP_MODEL_CONTACT, "default", "contact", 7, "center offset 0,-0.9"},
+    {HAP_MODEL_ACCELERANCE, ACCURACY_OPERATING, "accelerance, operating point", 2, NULL},
+    {HAP_MODEL_ACCELERANCE, ACCURACY_CROSS, "accelerance, operating point + cross", 10, NULL},
+};
 
-#define MODEL_COUNT (sizeof models / sizeof models[0])
+#define SERIES_COUNT (sizeof all_series / sizeof all_series[0])
+
+static bool is_of(const accuracy_row *row, const series *of)
+{
+  return row->model == of->model && strcmp(row->knob, of->knob) == 0;
+}
 
 static bool is_default(const accuracy_row *row)
 {
@@ -39,14 +54,14 @@ static void put_point(FILE *script, const accuracy_row *row)
   fprintf(script, "%.6g %.6g %g\n", row->duty, error_of(row), row->physics_hz);
 }
 
-/* Blocks $m0 .. of the panel's models, $d with the library's own default, $f with the floor. */
+/* Blocks $m0 .. of the panel's series, $d with the library's own default, $f with the floor. */
 static void put_data(FILE *script, const accuracy_row *rows, size_t count)
 {
   double noise_floor = 0.0;
-  for (size_t m = 0; m < MODEL_COUNT; ++m) {
+  for (size_t m = 0; m < SERIES_COUNT; ++m) {
     fprintf(script, "$m%zu << EOD\n", m);
     for (size_t i = 0; i < count; ++i) {
-      if (is_default(&rows[i]) && rows[i].model == models[m]) {
+      if (is_of(&rows[i], &all_series[m])) {
         put_point(script, &rows[i]);
       }
     }
@@ -65,27 +80,29 @@ static void put_data(FILE *script, const accuracy_row *rows, size_t count)
 static void plot_models(FILE *script)
 {
   fprintf(script, "plot noise with lines lc rgb '#909090' dt 2 title 'noise floor'");
-  for (size_t m = 0; m < MODEL_COUNT; ++m) {
-    fprintf(script, ", $m%zu with linespoints lt %zu pt %d ps 0.6 title '%s'", m, m + 1, points[m],
-            hap_model_name(models[m]));
-    if (places[m] != NULL) {
+  for (size_t m = 0; m < SERIES_COUNT; ++m) {
+    const series *of = &all_series[m];
+    fprintf(script, ", $m%zu with linespoints lt %zu pt %d ps 0.6 title '%s'", m, m + 1, of->point,
+            of->title);
+    if (of->place != NULL) {
       fprintf(script, ", $m%zu using (%s):2:(sprintf('%%g', $3)) with labels %s font ',8' notitle",
-              m, models[m] == HAP_MODEL_CONTACT ? "$3 == 60 ? NaN : $1" : "$1", places[m]);
+              m, of->model == HAP_MODEL_CONTACT ? "$3 == 60 ? NaN : $1" : "$1", of->place);
     }
   }
   fprintf(script, ", $d with points pt 6 ps 1.5 lw 1.5 lc rgb 'black' title 'contact, default'\n");
 }
 
 /* The key has the last place to itself. */
-static void draw_key(FILE *script)
+static void draw_key(const bench *b, FILE *script)
 {
   fprintf(script,
           "reset\nunset border\nunset tics\nunset xlabel\nunset ylabel\nset key center center\n"
           "set xrange [0:1]\nset yrange [0:1]\n"
           "plot 2 with lines lc rgb '#909090' dt 2 title 'noise floor of the reference'");
-  for (size_t m = 0; m < MODEL_COUNT; ++m) {
-    fprintf(script, ", 2 with linespoints lt %zu pt %d ps 0.6 title '%s'", m + 1, points[m],
-            hap_model_name(models[m]));
+  for (size_t m = 0; m < SERIES_COUNT; ++m) {
+    bool fewer = b->quick && strcmp(all_series[m].knob, "default") != 0;
+    fprintf(script, ", 2 with linespoints lt %zu pt %d ps 0.6 title '%s%s'", m + 1,
+            all_series[m].point, all_series[m].title, fewer ? " (first start)" : "");
   }
   fprintf(script,
           ", 2 with points pt 6 ps 1.5 lw 1.5 lc rgb 'black' title 'contact, default (60 Hz)'\n");
@@ -132,7 +149,7 @@ hap_status accuracy_draw(bench *b, const accuracy_table *table)
     put_data(script, &table->rows[i], rows_of_scene(table, i));
     plot_models(script);
   }
-  draw_key(script);
+  draw_key(b, script);
   fprintf(script, "unset multiplot\n");
   return bench_picture_end(b, "accuracy", script);
 }

@@ -20,6 +20,8 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->haptic_hz = library.haptic_hz;
   def->contact_hz = library.contact_hz;
   def->latency_ticks = library.physics_latency_ticks;
+  def->probe = library.probe;
+  def->cross = library.cross;
 }
 
 static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
@@ -37,6 +39,8 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.def.haptic_hz = def->haptic_hz;
   options.def.contact_hz = def->contact_hz;
   options.def.physics_latency_ticks = def->latency_ticks;
+  options.def.probe = def->probe;
+  options.def.cross = def->cross;
   options.def.trace_rows = 8; /* read after each tick */
   hap_status status = rig_create(&options, r, &b->detail);
   return status >= HAP_OK ? hap_session_start(r->session) : status;

@@ -55,6 +55,8 @@ typedef struct setting {
   double contact_hz;
   int latency_ticks;
   size_t start_count;
+  hap_probe probe;
+  hap_cross cross;
 } setting;
 
 void accuracy_table_free(accuracy_table *table)
@@ -225,6 +227,8 @@ static hap_status run_model(const sweep *s, const setting *set, size_t i, double
   def.physics_hz = physics_hz;
   def.contact_hz = set->contact_hz > 0.0 ? set->contact_hz : def.contact_hz;
   def.latency_ticks = set->latency_ticks;
+  def.probe = set->probe;
+  def.cross = set->cross;
   return run_from(s, &def, starts[s->start[i]], 0, out);
 }
 
@@ -325,12 +329,37 @@ static hap_status measure_contact(sweep *s)
   return status;
 }
 
+static const struct {
+  const char *knob;
+  hap_probe probe;
+  hap_cross cross;
+} ways[] = {{ACCURACY_EQ4, HAP_PROBE_SHARED, HAP_CROSS_OFF},
+            {ACCURACY_OPERATING, HAP_PROBE_OPERATING, HAP_CROSS_OFF},
+            {ACCURACY_CROSS, HAP_PROBE_OPERATING, HAP_CROSS_ON}};
+
+/* How model accelerance can test. From all starts the first way is the default row. */
+static hap_status sweep_probes(sweep *s)
+{
+  hap_status status = HAP_OK;
+  for (size_t i = s->bench->quick ? 0 : 1; i < COUNT(ways) && status >= HAP_OK; ++i) {
+    setting set = setting_of(s, HAP_MODEL_ACCELERANCE, ways[i].knob, 0.0);
+    set.probe = ways[i].probe;
+    set.cross = ways[i].cross;
+    set.start_count = s->bench->quick ? 1 : s->start_count;
+    status = measure(s, &set);
+  }
+  return status;
+}
+
 static hap_status sweep_models(sweep *s)
 {
   hap_status status = measure_contact(s);
   for (size_t i = 0; i < COUNT(models) && status >= HAP_OK; ++i) {
     setting set = setting_of(s, models[i], "default", 0.0);
     status = models[i] != HAP_MODEL_CONTACT ? measure(s, &set) : status;
+  }
+  if (status >= HAP_OK) {
+    status = sweep_probes(s);
   }
   if (status >= HAP_OK && s->physics_hz == SINGLE_AT_HZ) {
     setting set = setting_of(s, HAP_MODEL_SINGLE, "default", 0.0);

@@ -70,6 +70,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   copy->ramp_generations = own.ramp_generations;
   copy->frictions = own.frictions;
   copy->pointers = own.pointers;
+  copy->crosses = own.crosses;
   copy->hashing = false; /* only lockstep does */
   memcpy(copy->bodies, from->bodies, from->body_high * sizeof *copy->bodies);
   memcpy(copy->live, from->live, from->live_count * sizeof *copy->live);
@@ -79,6 +80,7 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
          c->contacts * sizeof *copy->ramp_generations);
   memcpy(copy->frictions, from->frictions, c->contacts * sizeof *copy->frictions);
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
+  memcpy(copy->crosses, from->crosses, from->cross_count * sizeof *copy->crosses);
   copy_world(&copy->world, &own.world, &from->world);
   copy_tools(&copy->tool, &own.tool, &from->tool);
   memcpy(copy->world.joint_memory, from->world.joint_memory,

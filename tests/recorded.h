@@ -35,6 +35,8 @@ typedef struct recorded_setup {
   uint64_t ticks;                      /* at least, however many are missed */
   void (*meanwhile)(rig *r, int look); /* about every 50 ms */
   hap_record_def record;               /* its path is the file's */
+  hap_probe probe;
+  hap_cross cross;
 } recorded_setup;
 
 static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model model, int ms)
@@ -52,6 +54,8 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   rig_options_init(&options);
   options.scene = s->scene;
   options.def.model = s->model;
+  options.def.probe = s->probe;
+  options.def.cross = s->cross;
   options.record = &s->record;
   for (int i = 0; i < 3 && s->devices[i] != NULL; ++i) {
     options.devices[options.device_count++] = s->devices[i];

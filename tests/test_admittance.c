@@ -282,6 +282,100 @@ TEST(what_friction_does_is_kept)
   }
 }
 
+/* ---- another body ---- */
+
+/* Of two bodies that constraints tie together: what a force at an arm of the first does to the second. */
+static void tied(const hapi_free_body bodies[2], int constraints, const double arm[3],
+                 double out[6][3])
+{
+  double r[12][12] = {{0.0}};
+  double second[6][6];
+  for (int b = 0; b < 2; ++b) {
+    for (int i = 0; i < 3; ++i) {
+      r[6 * b + i][6 * b + i] = bodies[b].inverse_mass;
+      for (int k = 0; k < 3; ++k) {
+        r[6 * b + 3 + i][6 * b + 3 + k] = bodies[b].inverse_inertia[3 * i + k];
+      }
+    }
+  }
+  for (int c = 0; c < constraints; ++c) {
+    double j[12];
+    double answer[12] = {0.0};
+    double size = 0.0;
+    for (int i = 0; i < 12; ++i) {
+      const hapi_free_body *body = &bodies[i / 6];
+      double length = sqrt(body->inverse_mass / body->inverse_inertia[0]);
+      j[i] = random_number() * (i % 6 < 3 ? 1.0 : length);
+    }
+    for (int i = 0; i < 144; ++i) {
+      answer[i / 12] += r[i / 12][i % 12] * j[i % 12];
+    }
+    for (int i = 0; i < 12; ++i) {
+      size += j[i] * answer[i];
+    }
+    for (int i = 0; i < 144; ++i) {
+      r[i / 12][i % 12] -= answer[i / 12] * answer[i % 12] / size;
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    memcpy(second[i], r[6 + i], sizeof second[i]);
+  }
+  at_arm(second, arm, out);
+}
+
+TEST(what_ties_a_body_to_another_is_left_alone)
+{
+  double most = 0.0;
+  for (int round = 0; round < 400; ++round) {
+    double size = sizes[round % 4];
+    const hapi_free_body bodies[2] = {random_body(size), random_body(size)};
+    double a[6][3];
+    double before[6][3];
+    double arm[3];
+    double share = -1.0;
+    random_vector(arm);
+    hapi_v3_scale(size, arm, arm);
+    tied(bodies, round % 11, arm, a);
+    memcpy(before, a, sizeof a);
+    CHECK(hapi_admittance_tidy_cross(&bodies[0], arm, &bodies[1], a, &share) ==
+          HAPI_ADMITTANCE_GOOD);
+    CHECK(memcmp(a, before, sizeof a) == 0);
+    CHECK((share > 1e-3) == (round % 11 > 0) && share <= 0.5 + 1e-9);
+    most = fmax(most, share);
+  }
+  printf("# the largest share is %.4f\n", most);
+  CHECK(most > 0.45);
+}
+
+TEST(a_block_that_cannot_be_is_cut_or_refused)
+{
+  const hapi_free_body cube = {.inverse_mass = 2.0, .inverse_inertia = {5, 0, 0, 0, 5, 0, 0, 0, 5}};
+  const double arm[3] = {0.0, 0.0, 0.0};
+  const struct {
+    double share; /* of a cube glued to one like it: half */
+    hapi_admittance kind;
+    double left;
+  } cases[] = {
+      {0.5, HAPI_ADMITTANCE_GOOD, 0.5},         {0.74, HAPI_ADMITTANCE_GOOD, 0.74},
+      {-0.74, HAPI_ADMITTANCE_GOOD, -0.74},     {0.8, HAPI_ADMITTANCE_CLIPPED, 0.75},
+      {-5.0, HAPI_ADMITTANCE_CLIPPED, -0.75},   {11.0, HAPI_ADMITTANCE_SINGULAR, 11.0},
+      {1e300, HAPI_ADMITTANCE_SINGULAR, 1e300},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    double a[6][3] = {{0.0}};
+    double share = -1.0;
+    a[0][1] = 2.0 * cases[i].share;
+    CHECK(hapi_admittance_tidy_cross(&cube, arm, &cube, a, &share) == cases[i].kind);
+    CHECK_NEAR(a[0][1] / 2.0, cases[i].left, 1e-12 * fabs(cases[i].left));
+    CHECK_NEAR(share, cases[i].kind == HAPI_ADMITTANCE_SINGULAR ? 0.0 : fabs(cases[i].left), 1e-9);
+  }
+  double a[6][3] = {{0.0}};
+  double share = -1.0;
+  a[5][2] = (double)NAN;
+  CHECK(hapi_admittance_tidy_cross(&cube, arm, &cube, a, &share) == HAPI_ADMITTANCE_SINGULAR);
+  CHECK(share == 0.0);
+}
+
 /* ---- in a world ---- */
 
 /* A probe whose force is so small that it drowns in the rounding of the velocity: a cube at 1 m/s gets
@@ -536,6 +630,8 @@ int main(void)
   RUN(numbers_that_are_none_are_refused_and_nothing_is_changed);
   RUN(the_bounds_hold_for_every_direction);
   RUN(what_friction_does_is_kept);
+  RUN(what_ties_a_body_to_another_is_left_alone);
+  RUN(a_block_that_cannot_be_is_cut_or_refused);
   RUN(a_singular_probe_keeps_the_last_good_one);
   RUN(rows_answer_as_the_joint_does);
   RUN(rows_of_what_is_no_joint_are_refused);

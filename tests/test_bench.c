@@ -252,18 +252,27 @@ TEST(accuracy_sets_models_side_by_side)
   const char *const arguments[] = {"accuracy", "--quick", "--scene", "slide",
                                    "--out",    folder,    NULL};
   const char *const rows[] = {
-      "slide,contact,20,default,0,",     "slide,contact,60,default,0,",
-      "slide,accelerance,20,default,0,", "slide,accelerance,60,default,0,",
-      "slide,impulse,20,default,0,",     "slide,impulse,60,default,0,",
+      "slide,contact,20,default,0,",
+      "slide,contact,60,default,0,",
+      "slide,accelerance,20,default,0,",
+      "slide,accelerance,60,default,0,",
+      "slide,impulse,20,default,0,",
+      "slide,impulse,60,default,0,",
       "slide,single,1000,default,0,",
+      "slide,accelerance,20,operating,0,",
+      "slide,accelerance,60,operating,0,",
+      "slide,accelerance,20,operating_cross,0,",
+      "slide,accelerance,60,operating_cross,0,",
+      "slide,accelerance,60,eq4,0,",
   };
   enum {
+    DEFAULTS = 7,
     ROWS = sizeof rows / sizeof rows[0]
   };
   double errors[ROWS];
   REQUIRE(run(arguments, environ) == 0);
   CHECK(count_rows(file_in_folder("accuracy", ".csv"), ACCURACY_COLUMNS) >= ROWS);
-  CHECK(count_lines(file_in_folder("accuracy", ".csv"), ",default,") == ROWS);
+  CHECK(count_lines(file_in_folder("accuracy", ".csv"), ",default,") == DEFAULTS);
   for (int i = 0; i < ROWS; ++i) {
     int count = 0;
     errors[i] = force_error(rows[i], &count);
@@ -273,6 +282,8 @@ TEST(accuracy_sets_models_side_by_side)
   CHECK(errors[1] < 0.01 && errors[1] < 0.5 * errors[3]);
   CHECK(errors[4] > 0.5); /* friction: a force on the last known pose is not near */
   CHECK(errors[6] < 1e-3);
+  CHECK(errors[8] < 0.5 * errors[11]); /* the cube slides: eq. 4 asks one that rests */
+  CHECK(errors[9] == errors[7] && errors[10] == errors[8]); /* a body alone */
   CHECK(!plot_available() || exists(file_in_folder("accuracy", ".svg")));
 }
 

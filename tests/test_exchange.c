@@ -238,10 +238,10 @@ TEST(messages_are_never_torn_in_either_direction)
 /* ---- the exchange ---- */
 
 static const hapi_capacity capacities[] = {
-    {1, 1, 1, 0, 0, 0, 0, 1},
-    {3, 5, 2, 0, 0, 0, 0, 7},
-    {64, 256, 4, 0, 0, 0, 0, 128},
-    {1024, 4096, 16, 0, 0, 0, 0, 2048},
+    {1, 1, 1, 0, 0, 0, 0, 1, 1},
+    {3, 5, 2, 0, 0, 0, 0, 7, 9},
+    {64, 256, 4, 0, 0, 0, 0, 128, 512},
+    {1024, 4096, 16, 0, 0, 0, 0, 2048, 8192},
 };
 #define CAPACITIES (sizeof capacities / sizeof capacities[0])
 
@@ -258,6 +258,8 @@ static void fill_model(hapi_model *m, const hapi_capacity *c, uint64_t seed)
          c->contacts * sizeof(hapi_model_contact));
   m->joint_count = c->joints;
   memset(hapi_model_joints(m), (int)(mix(seed + 2) & 0xff), c->joints * sizeof(hapi_model_joint));
+  m->cross_count = c->crosses;
+  memset(hapi_model_crosses(m), (int)(mix(seed + 3) & 0xff), c->crosses * sizeof(hapi_model_cross));
 }
 
 static bool all_bytes(const void *block, size_t size, uint64_t byte)
@@ -279,7 +281,9 @@ static bool model_is(hapi_model *m, const hapi_capacity *c, uint64_t seed)
          all_bytes(hapi_model_contacts(m), c->contacts * sizeof(hapi_model_contact),
                    mix(seed + 1)) &&
          m->joint_count == c->joints &&
-         all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint), mix(seed + 2));
+         all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint), mix(seed + 2)) &&
+         m->cross_count == c->crosses &&
+         all_bytes(hapi_model_crosses(m), c->crosses * sizeof(hapi_model_cross), mix(seed + 3));
 }
 
 static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)

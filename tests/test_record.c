@@ -148,6 +148,24 @@ TEST(scenes_in_the_paper_s_models)
   }
 }
 
+TEST(ways_of_testing)
+{
+  static const char *const scenes[] = {"stack", "spheres"};
+  for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
+    recorded_setup s = recorded_setup_of(scenes[i], HAP_MODEL_ACCELERANCE, 400);
+    s.probe = HAP_PROBE_OPERATING;
+    s.cross = HAP_CROSS_ON;
+    (void)check_setup(&s);
+    hap_player *player = NULL;
+    hap_session_def def;
+    hap_session_def_init(&def, sizeof def);
+    REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
+    CHECK(hap_player_get_def(player, &def) == HAP_OK);
+    CHECK(def.probe == HAP_PROBE_OPERATING && def.cross == HAP_CROSS_ON);
+    hap_player_close(player);
+  }
+}
+
 TEST(two_pointers_and_a_replayed_motion)
 {
   char spec[400];
@@ -806,6 +824,7 @@ int main(void)
   dInitODE2(0);
   RUN(scenes_in_model_contact);
   RUN(scenes_in_the_paper_s_models);
+  RUN(ways_of_testing);
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);
   RUN(a_step_that_takes_long);

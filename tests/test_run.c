@@ -210,7 +210,7 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--lockstep=1", "--lockstep", "no value"},
       {"--rt-priority 100", "--rt-priority", "0 to 99"},
       {"--impulse-pose bent", "--impulse-pose", "held nor interpolated"},
-      {"--probe twice", "--probe", "shared nor paper"},
+      {"--probe twice", "--probe", "shared, paper or operating"},
       {"--model-age 0.01", "--model-age", "--lockstep"},
       {"--lockstep --model-age 150", "--model-age", "at most 20 s"},
       {"--effects friction", "--effects", "NAME=on"},
@@ -221,6 +221,7 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--coupling proxy --model accelerance", "--coupling", "--model contact"},
       {"--coupling proxy --effects proxy=off", "--coupling", "--effects"},
       {"--effects proxy=on --model impulse", "--effects", "not supported"},
+      {"--effects cross=on", "--effects", "not supported"},
       {"--scene fig5:3", "--scene", "takes no N"},
       {"--scene row10:x", "--scene", "number from 1"},
       {"--device virtual:colour=1", "--device", "path"},
@@ -255,6 +256,19 @@ TEST(what_this_version_cannot_do_is_said)
   CHECK(run("--lockstep --seconds 0.05 --effects shape=off,contacts=on") == 0);
   CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL);
   CHECK(strstr(ran.out, "testing=auto") != NULL);
+}
+
+TEST(ways_of_testing_can_be_chosen)
+{
+  static const char *const ways[] = {"--effects cross=on", "--probe operating", ""};
+  char hashes[3][24];
+  for (int i = 0; i < 3; ++i) { /* two bodies that touch */
+    CHECK(run("--model accelerance --scene stack --physics-hz 20 --lockstep --seconds 0.7 %s",
+              ways[i]) == 0);
+    CHECK((strstr(value_of("effects"), "cross=on") != NULL) == (i == 0));
+    snprintf(hashes[i], sizeof hashes[i], "%s", value_of("trace_hash"));
+  }
+  CHECK(strcmp(hashes[0], hashes[2]) != 0 && strcmp(hashes[1], hashes[2]) != 0);
 }
 
 /* ---- files ---- */
@@ -855,6 +869,7 @@ int main(void)
   RUN(an_unknown_name_is_answered_with_those_that_exist);
   RUN(a_wrong_value_is_answered_with_what_is_allowed);
   RUN(what_this_version_cannot_do_is_said);
+  RUN(ways_of_testing_can_be_chosen);
   RUN(a_malformed_recording_names_its_line);
   RUN(files_that_cannot_be_written_are_found_before_the_run);
   RUN(a_full_disk_is_a_failure_that_the_hand_does_not_feel);

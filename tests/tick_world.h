@@ -17,11 +17,12 @@
 #define POINTERS 4u
 
 #define JOINTS 6u
+#define CROSSES 6u
 
 #define ROWS (7u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
 #define BUCKETS 32u
 
-static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS};
+static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS, CROSSES};
 
 /* A tick with its memory, and a message to fill in. */
 static struct {
@@ -33,6 +34,7 @@ static struct {
   uint32_t ramp_generations[CONTACTS];
   hapi_friction frictions[CONTACTS];
   hapi_tick_pointer pointers[POINTERS];
+  hapi_model_cross crosses[CROSSES];
   hapi_contact_memory memory[2][CONTACTS];
   uint32_t buckets[BUCKETS];
   hapi_model_joint joints[JOINTS];
@@ -83,6 +85,7 @@ static inline void set_up(void)
   f.tick.ramp_generations = f.ramp_generations;
   f.tick.frictions = f.frictions;
   f.tick.pointers = f.pointers;
+  f.tick.crosses = f.crosses;
   set_up_world();
   hapi_tick_reset(&f.tick);
   if (hapi_exchange_create(&capacity, &f.exchange) != HAP_OK) {
@@ -115,6 +118,7 @@ static inline void begin_model(void)
   f.model->body_count = 0;
   f.model->contact_count = 0;
   f.model->joint_count = 0;
+  f.model->cross_count = 0;
   ++f.model->number;
   f.model->state_ns = f.now_ns;
 }
@@ -141,6 +145,16 @@ static inline hapi_model_contact *add_contact(uint32_t slot, uint32_t body, uint
   contact->pointer_generation = 1;
   contact->normal_body[0] = -1.0;
   return contact;
+}
+
+/* Of the newest contact, to x of a body. */
+static inline void add_cross(uint32_t body, double along_x)
+{
+  hapi_model_cross *cross = &hapi_model_crosses(f.model)[f.model->cross_count++];
+  memset(cross, 0, sizeof *cross);
+  cross->contact = f.model->contact_count - 1;
+  cross->body = body;
+  cross->a[0][0] = along_x;
 }
 
 /* A of a free body with inertia of a ball. */

@@ -19,7 +19,7 @@ typedef struct effect {
 
 static const effect effects[RUN_EFFECTS] = {
     {"testing", "testing simulations", BIT(HAP_MODEL_ACCELERANCE), CONTACT, 0},
-    {"cross", "cross accelerance between local bodies", 0, 0, 0},
+    {"cross", "cross accelerance between local bodies", 0, 0, BIT(HAP_MODEL_ACCELERANCE)},
     {"contacts", "contacts between bodies in the loop", CONTACT, 0, 0},
     {"passes", "contact passes between syncs", CONTACT, 0, 0},
     {"joints", "joints in the loop", CONTACT, 0, 0},
@@ -136,6 +136,9 @@ void run_effects_apply(const run_effects *wanted, hap_session_def *io)
   for (size_t i = 0; i < RUN_EFFECTS; ++i) {
     if (strcmp(effects[i].name, "shape") == 0 && wanted->wish[i] == RUN_EFFECT_OFF) {
       io->plane = HAP_PLANE_ALWAYS;
+    }
+    if (strcmp(effects[i].name, "cross") == 0 && wanted->wish[i] == RUN_EFFECT_ON) {
+      io->cross = HAP_CROSS_ON;
     }
   }
 }

@@ -133,13 +133,17 @@ static hap_status take_pose(run_options *options, const option *self, const char
 static hap_status take_probe(run_options *options, const option *self, const char *value,
                              hap_detail *detail)
 {
+  static const char *const names[] = {[HAP_PROBE_SHARED] = "shared",
+                                      [HAP_PROBE_PAPER] = "paper",
+                                      [HAP_PROBE_OPERATING] = "operating"};
   (void)self;
-  bool paper = strcmp(value, "paper") == 0;
-  if (!paper && strcmp(value, "shared") != 0) {
-    return fail(detail, "\"%.60s\" is neither shared nor paper", value);
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    if (strcmp(value, names[i]) == 0) {
+      options->rig.def.probe = (hap_probe)i;
+      return HAP_OK;
+    }
   }
-  options->rig.def.probe = paper ? HAP_PROBE_PAPER : HAP_PROBE_SHARED;
-  return HAP_OK;
+  return fail(detail, "\"%.60s\" is not shared, paper or operating", value);
 }
 
 static hap_status take_priority(run_options *options, const option *self, const char *value,
@@ -260,7 +264,9 @@ static const option table[] = {
      take_number, offsetof(run_options, model_age_s), 0, 200},
     {"--impulse-pose", "NAME", "model impulse shows bodies held or interpolated (default)",
      take_pose, 0, 0, 0},
-    {"--probe", "NAME", "model accelerance: shared zero probe (default) or as in the paper",
+    {"--probe", "NAME",
+     "model accelerance: shared zero probe (default), as in the paper, or operating:\n"
+     "about the forces that the pointers give",
      take_probe, 0, 0, 0},
     {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
      offsetof(run_options, rig.max_force), 1e-6, 1e6},

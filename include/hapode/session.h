@@ -43,9 +43,19 @@ typedef enum hap_impulse_pose {
 
 /* How model ACCELERANCE tests. */
 typedef enum hap_probe {
-  HAP_PROBE_SHARED = 0, /* one zero probe for all neighbours: 1 + 3N steps */
-  HAP_PROBE_PAPER = 1   /* four steps for each neighbour: 4N steps */
+  HAP_PROBE_SHARED = 0,   /* one zero probe for all neighbours: 1 + 3N steps */
+  HAP_PROBE_PAPER = 1,    /* four steps for each neighbour: 4N steps */
+  HAP_PROBE_OPERATING = 2 /* as SHARED, about the operating point: every testing simulation has the
+                             forces that the pointers give, and is perturbed by 1 % of the weight */
 } hap_probe;
+
+/* Whether model ACCELERANCE lets a pointer's force move other bodies than the one it acts on. */
+typedef enum hap_cross {
+  HAP_CROSS_OFF = 0, /* each A is of one body (the paper) */
+  HAP_CROSS_ON = 1   /* and of the local bodies of its island as well, by the same testing
+                        simulations. Of at most 8 max_bodies pairs of a contact and a body, those that
+                        answer most; hap_stats.capacity_dropped counts the others */
+} hap_cross;
 
 /* What model CONTACT takes a body's surface for, where a pointer touches it. */
 typedef enum hap_plane {
@@ -98,6 +108,7 @@ typedef struct hap_session_def {
   int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
                               mesh there, 0..1048576, default 4096 */
   hap_guard guard;         /* default HAP_GUARD_ON */
+  hap_cross cross;         /* model ACCELERANCE, default HAP_CROSS_OFF */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

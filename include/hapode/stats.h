@@ -67,8 +67,9 @@ typedef struct hap_stats {
   uint32_t neighbours; /* dynamic bodies in the newest model */
   uint32_t neighbours_max;
   uint32_t pointer_contacts; /* pointer-geom pairs in the newest model */
-  uint64_t capacity_dropped; /* bodies or contacts that found no room */
-  uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept */
+  uint64_t capacity_dropped; /* bodies, contacts or cross accelerances that found no room */
+  uint64_t probes_singular;  /* probes whose A could not be used; the last good one was kept, of
+                                cross accelerances none */
   uint64_t states_rejected;  /* non-finite states kept away from ODE */
   uint64_t bodies_lost;      /* destroyed without hap_session_forget_body; said once */
 

@@ -85,9 +85,10 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   tick->ramp_generations = hapi_alloc_array(c->contacts, sizeof *tick->ramp_generations);
   tick->frictions = hapi_alloc_array(c->contacts, sizeof *tick->frictions);
   tick->pointers = hapi_alloc_array(c->pointers, sizeof *tick->pointers);
+  tick->crosses = hapi_alloc_array(c->crosses, sizeof *tick->crosses);
   return tick->bodies != NULL && tick->live != NULL && tick->contacts != NULL &&
          tick->ramps != NULL && tick->ramp_generations != NULL && tick->frictions != NULL &&
-         tick->pointers != NULL && allocate_tools(&tick->tool, c) &&
+         tick->pointers != NULL && tick->crosses != NULL && allocate_tools(&tick->tool, c) &&
          allocate_world(&tick->world, c);
 }
 
@@ -101,5 +102,6 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
   hapi_free(tick->frictions);
   hapi_free(tick->pointers);
   free_tools(&tick->tool);
+  hapi_free(tick->crosses);
   free_world(&tick->world);
 }

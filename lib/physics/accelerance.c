@@ -17,21 +17,39 @@ static hapi_body_slot *body_of(hapi_physics *physics, const hapi_contact_slot *c
   return &physics->bodies[contact->body];
 }
 
-static void acceleration_since_snapshot(const hapi_physics *physics, uint32_t known, double out[6])
+/* Probes about the forces that the pointers give: friction and contacts are then as they are under
+ * the hand, where eq. 4 asks what another force than the hand's would do to a world without it. */
+static bool at_operating_point(const hapi_physics *physics)
 {
-  const hapi_body_state *before = hapi_test_state(physics, known);
-  const dReal *linear = dBodyGetLinearVel(before->body);
-  const dReal *angular = dBodyGetAngularVel(before->body);
-  for (int i = 0; i < 3; ++i) {
-    out[i] = (linear[i] - before->linear[i]) / physics->probe_step_s;
-    out[3 + i] = (angular[i] - before->angular[i]) / physics->probe_step_s;
+  return physics->config.probe == HAP_PROBE_OPERATING && physics->model == HAP_MODEL_ACCELERANCE;
+}
+
+static void add_force(const hapi_physics *physics, const hapi_contact_slot *contact,
+                      const double force[3])
+{
+  dBodyID body = physics->table.entries[physics->bodies[contact->body].known].body;
+  double arm[3];
+  double moment[3];
+  hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
+  hapi_v3_cross(arm, force, moment); /* not at a place: far from the origin that has lost digits */
+  dBodyAddForce(body, force[0], force[1], force[2]);
+  dBodyAddTorque(body, moment[0], moment[1], moment[2]);
+}
+
+static void begin_probe(hapi_physics *physics)
+{
+  const hapi_test_set *test = &physics->test;
+  hapi_test_rewind(physics);
+  for (uint32_t i = 0; i < test->contact_count && at_operating_point(physics); ++i) {
+    const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+    add_force(physics, contact, contact->last_force);
   }
 }
 
-/* Eq. 3 with no force: b. */
+/* Eq. 3 with no force, or those of the operating point: b, from which those are taken out later. */
 static void measure_b(hapi_physics *physics)
 {
-  hapi_test_rewind(physics);
+  begin_probe(physics);
   hapi_test_step(physics);
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
@@ -40,7 +58,7 @@ static void measure_b(hapi_physics *physics)
       continue;
     }
     double b[6];
-    acceleration_since_snapshot(physics, slot->known, b);
+    hapi_test_acceleration(physics, slot->known, b);
     slot->b_is_good = hapi_finite(b, 6);
     if (slot->b_is_good) {
       memcpy(slot->b, b, sizeof b);
@@ -51,7 +69,7 @@ static void measure_b(hapi_physics *physics)
 /* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. Before the
  * first touch that is zero and cannot be used: then the peak of the force that the touch will give,
  * v sqrt(k m). At least a small share of the weight. */
-static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact)
+static double size_of_eq4(hapi_physics *physics, const hapi_contact_slot *contact)
 {
   double last = hapi_v3_norm(contact->last_force);
   double mass = body_of(physics, contact)->mass;
@@ -69,13 +87,27 @@ static bool has_axis(const hapi_physics *physics, const hapi_contact_slot *conta
                              contact->finger_radius > 0.0);
 }
 
+/* About the operating point it is small, and goes into the body: a pull at a body that does not feel
+ * the pointer yet would take it off what stands behind it. */
+static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
+{
+  const hapi_body_slot *body = body_of(physics, contact);
+  double normal[3];
+  if (!at_operating_point(physics)) {
+    return size_of_eq4(physics, contact);
+  }
+  hapi_quat_rotate(hapi_test_state(physics, body->known)->quat, contact->normal_body, normal);
+  double size = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body->mass;
+  return axis != TORSION && normal[axis] > 0.0 ? -size : size;
+}
+
 /* One column of eq. 5 and 6 for each contact of the round. */
 static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, int axis)
 {
   const hapi_body_slot *body = body_of(physics, contact);
-  double force = perturbation(physics, contact);
+  double force = perturbation(physics, contact, axis);
   double acceleration[6];
-  acceleration_since_snapshot(physics, body->known, acceleration);
+  hapi_test_acceleration(physics, body->known, acceleration);
   for (int i = 0; i < 6; ++i) {
     double change = acceleration[i] - body->b[i];
     if (axis == TORSION) {
@@ -83,6 +115,9 @@ static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, in
     } else {
       contact->measured[i][axis] = change / force;
     }
+  }
+  if (axis != TORSION) {
+    hapi_cross_column(physics, contact, axis, force);
   }
 }
 
@@ -92,21 +127,15 @@ static void twist(hapi_physics *physics, const hapi_contact_slot *contact)
   dBodyID body = physics->table.entries[body_of(physics, contact)->known].body;
   double torque[3];
   hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, torque);
-  hapi_v3_scale(perturbation(physics, contact) * contact->finger_radius, torque, torque);
+  hapi_v3_scale(perturbation(physics, contact, TORSION) * contact->finger_radius, torque, torque);
   dBodyAddTorque(body, torque[0], torque[1], torque[2]);
 }
 
 static void push(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
 {
-  dBodyID body = physics->table.entries[body_of(physics, contact)->known].body;
   double force[3] = {0.0, 0.0, 0.0};
-  double arm[3];
-  double moment[3];
-  force[axis] = perturbation(physics, contact);
-  hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
-  hapi_v3_cross(arm, force, moment); /* not at a place: far from the origin that has lost digits */
-  dBodyAddForce(body, force[0], force[1], force[2]);
-  dBodyAddTorque(body, moment[0], moment[1], moment[2]);
+  force[axis] = perturbation(physics, contact, axis);
+  add_force(physics, contact, force);
 }
 
 void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out)
@@ -183,7 +212,7 @@ static bool any_has_axis(const hapi_physics *physics, uint32_t round, int axis)
 static void perturb(hapi_physics *physics, uint32_t round, int axis)
 {
   const hapi_test_set *test = &physics->test;
-  hapi_test_rewind(physics);
+  begin_probe(physics);
   for (uint32_t i = 0; i < test->contact_count; ++i) {
     const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
     if (contact->round == round && has_axis(physics, contact, axis)) {
@@ -217,8 +246,27 @@ static void measure_round(hapi_physics *physics, uint32_t round)
     hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
     if (contact->round == round) {
       keep(physics, contact);
+      hapi_cross_keep(physics, test->contacts[i]);
     }
   }
+}
+
+/* The loop adds A f itself, with the A that it is given: b + A f is what was measured with f, whatever
+ * became of A. */
+static void take_forces_out(hapi_physics *physics)
+{
+  const hapi_test_set *test = &physics->test;
+  if (!at_operating_point(physics)) {
+    return;
+  }
+  for (uint32_t i = 0; i < test->contact_count; ++i) {
+    const hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
+    hapi_body_slot *body = body_of(physics, contact);
+    for (int k = 0; k < 6 && body->b_is_good; ++k) {
+      body->b[k] -= hapi_v3_dot(contact->a[k], contact->last_force);
+    }
+  }
+  hapi_cross_take_out(physics);
 }
 
 /* Numbers the contacts of each island from 0; how many rounds that makes. With probe=paper each
@@ -252,6 +300,7 @@ void hapi_accelerance_measure(hapi_physics *physics)
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
     return;
   }
+  physics->cross_count = 0;
   if (physics->test.contact_count == 0) {
     return;
   }
@@ -262,5 +311,6 @@ void hapi_accelerance_measure(hapi_physics *physics)
     }
     measure_round(physics, round);
   }
+  take_forces_out(physics);
   hapi_test_leave(physics);
 }

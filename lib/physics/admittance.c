@@ -333,19 +333,94 @@ hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const dou
   return HAPI_ADMITTANCE_CLIPPED;
 }
 
+/* ---- the same for another body ---- */
+
+static void free_wrench(const hapi_free_body *body, matrix *out)
+{
+  memset(out, 0, sizeof *out);
+  for (int i = 0; i < 3; ++i) {
+    out->m[i][i] = body->inverse_mass;
+    for (int k = 0; k < 3; ++k) {
+      out->m[3 + i][3 + k] = body->inverse_inertia[3 * i + k];
+    }
+  }
+}
+
+/* b = b L^-T, of three columns */
+static void solve_rows(const matrix *l, matrix *b)
+{
+  for (int i = 0; i < N_MAX; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < k; ++j) {
+        b->m[i][k] -= l->m[k][j] * b->m[i][j];
+      }
+      b->m[i][k] /= l->m[k][k];
+    }
+  }
+}
+
+/* The largest that it makes of a vector of length 1; NaN where it cannot be used. */
+static double size_of(const matrix *b)
+{
+  matrix gram = {{{0.0}}};
+  matrix vectors;
+  for (int i = 0; i < N_MAX; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (!(fabs(b->m[i][k]) <= ENTRY_MOST)) { /* false for NaN */
+        return (double)NAN;
+      }
+      for (int j = 0; j < 3; ++j) {
+        gram.m[k][j] += b->m[i][k] * b->m[i][j];
+      }
+    }
+  }
+  eigen(&gram, 3, &vectors);
+  return sqrt(fmax(0.0, fmax(gram.m[0][0], fmax(gram.m[1][1], gram.m[2][2]))));
+}
+
+/* Why half: the answers of point and body together are a matrix between 0 and 1 in this measure, and
+ * this is a block beside its diagonal. */
+hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const double arm[3],
+                                           const hapi_free_body *other, double a[6][3],
+                                           double *out_share)
+{
+  const double most = 0.5 + FRICTION_SLACK;
+  double free[6][3];
+  matrix bounds[2];
+  matrix l[2];
+  matrix b = {{{0.0}}};
+  *out_share = 0.0;
+  free_point(pushed, arm, free);
+  at_point(free, arm, &bounds[0]);
+  free_wrench(other, &bounds[1]);
+  if (!hapi_finite(&a[0][0], 18) || !cholesky(&bounds[0], 3, &l[0]) ||
+      !cholesky(&bounds[1], 6, &l[1])) {
+    return HAPI_ADMITTANCE_SINGULAR;
+  }
+  for (int i = 0; i < 6; ++i) {
+    memcpy(b.m[i], a[i], sizeof a[i]);
+  }
+  solve_lower(&l[1], 6, &b);
+  solve_rows(&l[0], &b);
+  double size = size_of(&b);
+  if (!isfinite(size)) {
+    return HAPI_ADMITTANCE_SINGULAR;
+  }
+  *out_share = fmin(size, most);
+  for (int i = 0; size > most && i < 6; ++i) {
+    hapi_v3_scale(most / size, a[i], a[i]);
+  }
+  return size > most ? HAPI_ADMITTANCE_CLIPPED : HAPI_ADMITTANCE_GOOD;
+}
+
 /* ---- a wrench at the centre of mass ---- */
 
 hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double response[6][6])
 {
-  matrix bound = {{{0.0}}};
+  matrix bound;
   matrix l;
   matrix b;
-  for (int i = 0; i < 3; ++i) {
-    bound.m[i][i] = body->inverse_mass;
-    for (int k = 0; k < 3; ++k) {
-      bound.m[3 + i][3 + k] = body->inverse_inertia[3 * i + k];
-    }
-  }
+  free_wrench(body, &bound);
   memcpy(b.m, response, sizeof b.m);
   symmetrise(6, &b);
   matrix tidy = b;

@@ -31,6 +31,14 @@ typedef enum hapi_admittance {
 hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const double arm[3],
                                            const double normal[3], double a[6][3]);
 
+/* The same force to another body, which something ties to the first: the acceleration of that one's
+ * centre of mass. In the measure of the two free bodies it is half of a free body's at most, and with
+ * friction three quarters; what is more is scaled down to that. *out_share: what it is then, 0 where
+ * SINGULAR. */
+hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const double arm[3],
+                                           const hapi_free_body *other, double a[6][3],
+                                           double *out_share);
+
 /* Wrench at the centre of mass to acceleration. Made symmetric and brought within the bounds in any
  * case: the rows of the loop are solved with it. CLIPPED only for more than the rounding of a solver,
  * 1e-3. */

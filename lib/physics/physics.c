@@ -23,6 +23,7 @@ static bool allocate(hapi_physics *physics)
   hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts; /* grows when needed */
   physics->bodies = hapi_alloc_array(c->bodies, sizeof *physics->bodies);
   physics->contacts = hapi_alloc_array(c->contacts, sizeof *physics->contacts);
+  physics->crosses = hapi_alloc_array(c->crosses, sizeof *physics->crosses);
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
   physics->test.contacts = hapi_alloc_array(c->contacts, sizeof *physics->test.contacts);
@@ -33,9 +34,9 @@ static bool allocate(hapi_physics *physics)
   hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
   physics->contact_scratch =
       hapi_alloc_array((size_t)physics->ode.max_contacts_per_pair, sizeof(dContact));
-  return physics->bodies != NULL && physics->contacts != NULL && hood->candidates != NULL &&
-         hood->hits != NULL && hood->vertices != NULL && hood->hull != NULL &&
-         physics->test.contacts != NULL && physics->test.rounds != NULL &&
+  return physics->bodies != NULL && physics->contacts != NULL && physics->crosses != NULL &&
+         hood->candidates != NULL && hood->hits != NULL && hood->vertices != NULL &&
+         hood->hull != NULL && physics->test.contacts != NULL && physics->test.rounds != NULL &&
          physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
          hapi_joints_create(physics) && hapi_cover_create(&hood->cover) &&
          physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
@@ -123,6 +124,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_test_finish(&physics->test);
   hapi_free(physics->bodies);
   hapi_free(physics->contacts);
+  hapi_free(physics->crosses);
   hapi_cover_finish(&physics->neighborhood.cover);
   hapi_free(physics->neighborhood.candidates);
   hapi_free(physics->neighborhood.hits);
@@ -183,6 +185,7 @@ static void prepare(hapi_physics *physics)
   physics->state = NULL;
   physics->step_s = 0.0;
   physics->model_number = 0;
+  physics->cross_count = 0;
   physics->world_faulty = false;
   physics->table.said_lost = false;
   physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);

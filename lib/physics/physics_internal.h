@@ -260,6 +260,8 @@ typedef struct hapi_body_slot {
   double exchanged[6];   /* N, N m: mean wrench from the loop in the last interval */
   double response[6][6]; /* measured */
   bool measured;         /* response and b hold a measurement */
+
+  double cross[6][3]; /* scratch: the answer to the contact of its island in this round */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
@@ -292,6 +294,18 @@ typedef struct hapi_contact_slot {
   bool is_tool; /* a point of a hull's patch */
   hapi_tool_point tool;
 } hapi_contact_slot;
+
+/* ---- cross.c ---- */
+
+/* Of a contact and a body that it does not push. */
+typedef struct hapi_cross {
+  uint32_t contact; /* slot */
+  uint32_t contact_generation;
+  uint32_t body; /* slot */
+  uint32_t body_generation;
+  double response; /* (m/s^2)/N of the body's surface */
+  double a[6][3];
+} hapi_cross;
 
 /* ---- cover.c ---- */
 
@@ -560,6 +574,8 @@ struct hapi_physics {
   hapi_contact_slot *contacts; /* capacity.contacts */
   uint32_t body_high;          /* slots that were ever used are below */
   uint32_t contact_high;
+  hapi_cross *crosses; /* of the newest testing simulations; capacity.crosses */
+  uint32_t cross_count;
   hapi_neighborhood neighborhood;
   hapi_surface_cache surfaces;
   hapi_range range;
@@ -839,10 +855,22 @@ void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
 void hapi_test_rewind(hapi_physics *physics);
 void hapi_test_step(hapi_physics *physics);
 const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known); /* saved */
+/* m/s^2, rad/s^2 of a body under test, over the step. */
+void hapi_test_acceleration(const hapi_physics *physics, uint32_t known, double out[6]);
 void hapi_test_finish(hapi_test_set *test);
 
 /* accelerance.c: eq. 3-6 */
 void hapi_accelerance_measure(hapi_physics *physics);
+
+/* cross.c: cross accelerance, nothing where it is off */
+/* After a testing simulation with a force [N] at the contact: what the others did. */
+void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, int axis,
+                       double force);
+void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index); /* after three of them */
+void hapi_cross_take_out(hapi_physics *physics); /* of b: what last_force does by the blocks */
+/* Those of a contact that is the one of this number in the message. */
+void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t number,
+                        hapi_model *out);
 
 /* reconcile.c: eq. 12-14, momentum */
 void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */

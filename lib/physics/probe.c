@@ -409,6 +409,17 @@ const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t kno
   return &physics->snapshot.bodies[physics->table.entries[known].rest->member];
 }
 
+void hapi_test_acceleration(const hapi_physics *physics, uint32_t known, double out[6])
+{
+  const hapi_body_state *before = hapi_test_state(physics, known);
+  const dReal *linear = dBodyGetLinearVel(before->body);
+  const dReal *angular = dBodyGetAngularVel(before->body);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = (linear[i] - before->linear[i]) / physics->probe_step_s;
+    out[3 + i] = (angular[i] - before->angular[i]) / physics->probe_step_s;
+  }
+}
+
 void hapi_test_finish(hapi_test_set *test)
 {
   hapi_free(test->contacts);

@@ -178,6 +178,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->body_count = 0;
   out->contact_count = 0;
   out->tool_count = 0;
+  out->cross_count = 0;
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     if (physics->bodies[i].phase == HAPI_SLOT_LIVE &&
         fill_body(physics, i, &bodies[out->body_count])) {
@@ -187,6 +188,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   for (uint32_t i = 0; i < physics->contact_high; ++i) {
     if (physics->contacts[i].phase == HAPI_SLOT_LIVE) {
       hapi_model_contact *contact = &contacts[out->contact_count];
+      hapi_cross_publish(physics, i, out->contact_count, out);
       fill_contact(&physics->contacts[i], i, contact);
       out->contact_count += fill_tool(physics, &physics->contacts[i], out, contact);
     }

@@ -219,6 +219,11 @@ static uint64_t hash_model(const hapi_physics *physics)
     hash = hapi_hash_doubles(hash, tools[i].at.core_b, 3);
     hash = hapi_hash_doubles(hash, tools[i].at.normal, 3);
   }
+  for (uint32_t i = 0; i < model->cross_count; ++i) {
+    const hapi_model_cross *x = &hapi_model_crosses(model)[i];
+    hash = hapi_hash_word(hash, ((uint64_t)x->contact << 32) | x->body);
+    hash = hapi_hash_doubles(hash, x->a[0], 18);
+  }
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     const hapi_model_joint *joint = &hapi_model_joints(model)[i];
     hash = hash_joint(hash, joint);

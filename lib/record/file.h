@@ -67,7 +67,7 @@ typedef struct hapi_file_info {
   int32_t guard;
   uint32_t joined_size; /* of hapi_joined */
   uint32_t note_size;
-  uint32_t reserved;
+  int32_t cross; /* 0 in files of before */
 } hapi_file_info;
 
 typedef struct hapi_file_end {

@@ -95,11 +95,12 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->physics_latency_ticks, -1, 20000, "physics_latency_ticks"},
       {def->trace_rows, 0, 1048576, "trace_rows"},
       {def->impulse_pose, 0, 1, "impulse_pose"},
-      {def->probe, 0, 1, "probe"},
+      {def->probe, 0, 2, "probe"},
       {def->max_edge_probes, 0, 1024, "max_edge_probes"},
       {def->plane, 0, 1, "plane"},
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
+      {def->cross, 0, 1, "cross"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

@@ -113,6 +113,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
+      .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {

@@ -547,6 +547,7 @@ hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
   d.plane = (hap_plane)info->plane;
   d.max_hull_points = info->max_hull_points;
   d.guard = (hap_guard)info->guard;
+  d.cross = (hap_cross)info->cross;
   memcpy(def, &d, size < sizeof d ? size : sizeof d);
   return HAP_OK;
 }

@@ -77,6 +77,7 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   out->plane = (int32_t)def->plane;
   out->max_hull_points = def->max_hull_points;
   out->guard = (int32_t)def->guard;
+  out->cross = (int32_t)def->cross;
 }
 
 /* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */

@@ -45,6 +45,7 @@ static size_t lay_out_model(hapi_model *m, const hapi_capacity *c)
   m->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_model_contact));
   m->joints_offset = place_array(&at, c->joints, sizeof(hapi_model_joint));
   m->tools_offset = place_array(&at, c->tool_points, sizeof(hapi_tool_point));
+  m->crosses_offset = place_array(&at, c->crosses, sizeof(hapi_model_cross));
   return at;
 }
 

@@ -34,6 +34,7 @@ typedef struct hapi_capacity {
   uint32_t trail_stride; /* ticks from row to row */
   uint32_t joints;       /* between bodies of the range */
   uint32_t tool_points;  /* contacts of pointers that are hulls */
+  uint32_t crosses;      /* cross accelerances; 0: none are measured */
 } hapi_capacity;
 
 #define HAPI_TOOL_POINTS_MAX 64u /* vertices of a pointer's hull */
@@ -142,6 +143,14 @@ typedef struct hapi_model_contact {
   hap_pose shape_pose;   /* in the body's frame */
   uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
 } hapi_model_contact;
+
+/* Cross accelerance: what a force at a pointer contact does to another body. */
+typedef struct hapi_model_cross {
+  uint32_t
+      contact;   /* index in the message; the blocks of a contact follow each other, in its order */
+  uint32_t body; /* slot */
+  double a[6][3]; /* world axes, as hapi_model_contact.a */
+} hapi_model_cross;
 
 /* How a joint's error is taken back: ODE's parameters at the tick. */
 typedef struct hapi_softness {
@@ -270,10 +279,12 @@ typedef struct hapi_model {
   uint32_t watch_count; /* traced bodies */
   uint32_t joint_count; /* model CONTACT */
   uint32_t tool_count;  /* other models: model CONTACT has them of the contact thread */
+  uint32_t cross_count; /* model ACCELERANCE */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
   uint32_t tools_offset;
+  uint32_t crosses_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -296,6 +307,11 @@ static inline hapi_model_joint *hapi_model_joints(hapi_model *m)
 static inline hapi_tool_point *hapi_model_tools(hapi_model *m)
 {
   return (hapi_tool_point *)(void *)((char *)m + m->tools_offset);
+}
+
+static inline hapi_model_cross *hapi_model_crosses(hapi_model *m)
+{
+  return (hapi_model_cross *)(void *)((char *)m + m->crosses_offset);
 }
 
 /* ---- physics -> contact: what may touch what (model CONTACT) ---- */

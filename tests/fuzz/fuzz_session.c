@@ -82,7 +82,9 @@ static void edit_session(source *s, hap_session_def *def)
   } else if (field == 12) {
     def->impulse_pose = (hap_impulse_pose)(take_byte(s) % 3);
   } else if (field == 13) {
-    def->probe = (hap_probe)(take_byte(s) % 3);
+    unsigned byte = take_byte(s);
+    def->probe = (hap_probe)(byte % 4);
+    def->cross = (hap_cross)(byte / 4 % 3);
   } else if (field == 14) {
     def->plane = (hap_plane)(take_byte(s) % 3);
   } else {
@@ -160,7 +162,8 @@ static void check_def(const hap_session_def *def)
       {def->max_hull_points, 0, 1048576},
       {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
       {def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
-      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_PAPER},
+      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_OPERATING},
+      {def->cross, HAP_CROSS_OFF, HAP_CROSS_ON},
       {def->plane, HAP_PLANE_WHERE_NEEDED, HAP_PLANE_ALWAYS},
       {def->flags, 0, 0},
   };

@@ -172,16 +172,35 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   }
 }
 
+/* Those of contact number from of the message, which is number to here; *at: the first of them. */
+static void adopt_crosses(hapi_tick *tick, hapi_model *model, uint32_t from, uint32_t to,
+                          uint32_t *at)
+{
+  const hapi_model_cross *in = hapi_model_crosses(model);
+  while (*at < model->cross_count && in[*at].contact < from) {
+    ++*at; /* of a contact that was left out */
+  }
+  for (; *at < model->cross_count && in[*at].contact == from; ++*at) {
+    if (tick->bodies[in[*at].body].live) {
+      tick->crosses[tick->cross_count] = in[*at];
+      tick->crosses[tick->cross_count++].contact = to;
+    }
+  }
+}
+
 static void adopt_contacts(hapi_tick *tick, hapi_model *model)
 {
   const hapi_model_contact *in = hapi_model_contacts(model);
   hapi_tool_set_aside(tick);
+  uint32_t cross = 0;
   remember_ramps(tick);
   tick->contact_count = 0;
+  tick->cross_count = 0;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
     /* The pointer may have gone while the message was on its way. */
     if (in[i].tool == 0 && tick->pointers[pointer].generation == in[i].pointer_generation) {
+      adopt_crosses(tick, model, i, tick->contact_count, &cross);
       adopt_contact(tick, &in[i], &tick->contacts[tick->contact_count++]);
     }
   }

@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include "base/pose.h"
+#include "base/vec.h"
 #include "haptic/rt/tick.h"
 
 /* Local dynamics simulation (paper section 5.2). */
@@ -41,11 +42,31 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   }
 }
 
+/* What the forces of this tick do to other bodies than those they act on. The impulse is the pushed
+ * body's alone: to the world it is given once, and the world passes it on by itself. So a body that is
+ * moved by this only is not pushed, and has the world's state again at the sync. */
+static void accelerate_others(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->cross_count; ++i) {
+    const hapi_model_cross *cross = &tick->crosses[i];
+    const double *force = tick->contacts[cross->contact].force;
+    hapi_local_body *body = &tick->bodies[cross->body];
+    if (force[0] == 0.0 && force[1] == 0.0 && force[2] == 0.0) {
+      continue;
+    }
+    body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+    for (int k = 0; k < 6; ++k) {
+      body->acceleration[k] += hapi_v3_dot(cross->a[k], force);
+    }
+  }
+}
+
 void hapi_local_step(hapi_tick *tick)
 {
   if (tick->model != HAP_MODEL_ACCELERANCE) {
     return;
   }
+  accelerate_others(tick);
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
     if ((body->flags & HAPI_BODY_DRIVEN) != 0) {

@@ -39,6 +39,9 @@ static void clear_arrays(hapi_tick *tick)
     memset(tick->tool.pairs, 0, HAPI_TOOL_PAIRS(c) * sizeof *tick->tool.pairs);
   }
   memset(tick->ramps, 0, c->contacts * sizeof *tick->ramps);
+  if (c->crosses > 0) {
+    memset(tick->crosses, 0, c->crosses * sizeof *tick->crosses);
+  }
   memset(tick->ramp_generations, 0, c->contacts * sizeof *tick->ramp_generations);
   memset(tick->frictions, 0, c->contacts * sizeof *tick->frictions);
   memset(w->memory, 0, c->contacts * sizeof *w->memory);
@@ -70,6 +73,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.pointers = tick->pointers;
   fresh.tool = tick->tool;
   fresh.tool.count = fresh.tool.pair_count = 0;
+  fresh.crosses = tick->crosses;
   keep_arrays(&tick->world, &fresh.world);
   fresh.hash = 0xcbf29ce484222325u;
   *tick = fresh;

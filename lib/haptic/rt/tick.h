@@ -366,8 +366,10 @@ typedef struct hapi_tick {
   uint32_t *ramp_generations;  /* by contact slot */
   hapi_friction *frictions;    /* by contact slot */
   hapi_tick_pointer *pointers; /* capacity.pointers */
+  hapi_model_cross *crosses;   /* of the model, contact: an index here; capacity.crosses */
   uint32_t live_count;
   uint32_t contact_count;
+  uint32_t cross_count;
   uint32_t body_high;
   hapi_local_world world;
   hapi_tool_world tool;
