@@ -408,6 +408,35 @@ TEST(auto_without_a_force_stays_direct)
   }
 }
 
+/* A hand that taps: between two touches the coupling does not change, and after the last it does. */
+TEST(a_hop_does_not_change_the_coupling)
+{
+  contact_world w;
+  REQUIRE(open_many(&w, 4, 1000.0));
+  cw_move_hand(&w, 0.0, 0.0, -0.05);
+  while (state_of(&w).contacts < 4 && w.ticks < 1000) {
+    cw_tick(&w);
+  }
+  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+  int apart = 0;
+  for (int i = 0; i < 44; ++i) { /* 2 mm away and back */
+    cw_move_hand(&w, 0.0, 0.0, i < 20 ? 0.1 : -0.1);
+    cw_tick(&w);
+    CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+    apart += state_of(&w).contacts == 0;
+  }
+  CHECK(apart > 20 && apart < 44);
+  apart = 0;
+  cw_move_hand(&w, 0.0, 0.0, 0.1);
+  for (int i = 0; i < 200; ++i) {
+    cw_tick(&w);
+    apart = state_of(&w).contacts == 0 ? apart + 1 : 0;
+    CHECK(apart >= 50 || state_of(&w).coupling == HAP_COUPLING_PROXY);
+  }
+  CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT);
+  cw_close(&w);
+}
+
 /* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the device
  * is, not where it would leap. */
 TEST(a_heavy_proxy_is_let_go_of_at_the_device)
@@ -668,6 +697,7 @@ int main(void)
   RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
   RUN(the_change_while_pressing_has_no_jump);
   RUN(auto_without_a_force_stays_direct);
+  RUN(a_hop_does_not_change_the_coupling);
   RUN(a_heavy_proxy_is_let_go_of_at_the_device);
   RUN(a_proxy_is_refused_where_it_cannot_be);
   RUN(the_guard_leaves_an_impact_through_a_proxy_alone);

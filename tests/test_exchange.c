@@ -238,10 +238,10 @@ TEST(messages_are_never_torn_in_either_direction)
 /* ---- the exchange ---- */
 
 static const hapi_capacity capacities[] = {
-    {1, 1, 1, 0, 0, 0, 0, 1, 1},
-    {3, 5, 2, 0, 0, 0, 0, 7, 9},
-    {64, 256, 4, 0, 0, 0, 0, 128, 512},
-    {1024, 4096, 16, 0, 0, 0, 0, 2048, 8192},
+    {1, 1, 1, 0, 0, 0, 0, 1, 2, 1},
+    {3, 5, 2, 0, 0, 0, 0, 7, 3, 9},
+    {64, 256, 4, 0, 0, 0, 0, 128, 64, 512},
+    {1024, 4096, 16, 0, 0, 0, 0, 2048, 64, 8192},
 };
 #define CAPACITIES (sizeof capacities / sizeof capacities[0])
 
@@ -260,6 +260,9 @@ static void fill_model(hapi_model *m, const hapi_capacity *c, uint64_t seed)
   memset(hapi_model_joints(m), (int)(mix(seed + 2) & 0xff), c->joints * sizeof(hapi_model_joint));
   m->cross_count = c->crosses;
   memset(hapi_model_crosses(m), (int)(mix(seed + 3) & 0xff), c->crosses * sizeof(hapi_model_cross));
+  m->tool_count = c->tool_points;
+  memset(hapi_model_tools(m), (int)(mix(seed + 4) & 0xff),
+         c->tool_points * sizeof(hapi_tool_point));
 }
 
 static bool all_bytes(const void *block, size_t size, uint64_t byte)
@@ -283,7 +286,9 @@ static bool model_is(hapi_model *m, const hapi_capacity *c, uint64_t seed)
          m->joint_count == c->joints &&
          all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint), mix(seed + 2)) &&
          m->cross_count == c->crosses &&
-         all_bytes(hapi_model_crosses(m), c->crosses * sizeof(hapi_model_cross), mix(seed + 3));
+         all_bytes(hapi_model_crosses(m), c->crosses * sizeof(hapi_model_cross), mix(seed + 3)) &&
+         m->tool_count == c->tool_points &&
+         all_bytes(hapi_model_tools(m), c->tool_points * sizeof(hapi_tool_point), mix(seed + 4));
 }
 
 static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)

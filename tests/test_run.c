@@ -4,6 +4,7 @@
 /* The program hapode-run as its users meet it: exit codes, messages, summary, trace, picture.
  * HAPODE_RUN: path of the program. */
 
+#include "tests/scene_names.h"
 #include "tests/tap.h"
 
 #include <fcntl.h>
@@ -541,26 +542,22 @@ TEST(a_recording_runs_in_lockstep)
 
 TEST(every_scene_runs_in_every_model)
 {
-  const char *const scenes[] = {"fig5",  "fig6",  "fig7", "slide",      "row10",
-                                "stack", "wedge", "door", "lightstand", "pile:20"};
-  const char *const models[] = {"single", "impulse", "accelerance"};
+  const char *const models[] = {"single", "impulse", "accelerance", "contact"};
   const char *const finite[] = {"peak_force_n", "impulse_ns", "physics_ms_mean", "tick_us_p99"};
-  for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     for (size_t k = 0; k < sizeof models / sizeof models[0]; ++k) {
-      int code = run("--scene %s --model %s --lockstep --seconds 0.4", scenes[i], models[k]);
+      int code = run("--scene %s --model %s --lockstep --seconds 0.4", names[i], models[k]);
       bool good = code == 0 && number_of("ticks") == 400.0 && number_of("faults") == 0.0;
       for (size_t n = 0; n < sizeof finite / sizeof finite[0]; ++n) {
         good = good && isfinite(number_of(finite[n]));
       }
       if (!good) {
-        printf("# %s, %s: exit %d, %.300s\n", scenes[i], models[k], code, ran.err);
+        printf("# %s, %s: exit %d, %.300s\n", names[i], models[k], code, ran.err);
       }
       CHECK(good);
     }
   }
 }
-
-/* ---- the end of a run ---- */
 
 TEST(a_device_fault_ends_the_run_with_1)
 {
@@ -829,11 +826,11 @@ TEST(a_recording_that_cannot_be_is_said)
 
 static void remove_folder(void)
 {
-  const char *const names[] = {"out",      "err",        "bad.csv",  "trace.csv", "threads.csv",
+  const char *const files[] = {"out",      "err",        "bad.csv",  "trace.csv", "threads.csv",
                                "two.csv",  "same.csv",   "same.svg", "push.csv",  "far.csv",
                                "it's.svg", "device.txt", "a.rec"};
-  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
-    unlink(file_in_folder(names[i]));
+  for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+    unlink(file_in_folder(files[i]));
   }
   rmdir(folder);
 }

@@ -22,7 +22,13 @@
 #define ROWS (7u * CONTACTS + HAPI_JOINT_ROWS * JOINTS)
 #define BUCKETS 32u
 
-static const hapi_capacity capacity = {BODIES, CONTACTS, POINTERS, 16, 64, 0, 0, JOINTS, CROSSES};
+static const hapi_capacity capacity = {.bodies = BODIES,
+                                       .contacts = CONTACTS,
+                                       .pointers = POINTERS,
+                                       .geoms = 16,
+                                       .hull_points = 64,
+                                       .joints = JOINTS,
+                                       .crosses = CROSSES};
 
 /* A tick with its memory, and a message to fill in. */
 static struct {

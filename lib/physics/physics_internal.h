@@ -16,6 +16,7 @@
 #include "base/index.h"
 #include "base/thread.h"
 #include "physics/admittance.h"
+#include "physics/joint_probe.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
@@ -144,30 +145,6 @@ typedef struct hapi_body_table {
   bool starved;         /* the newest scan found no memory for a body: not all are known */
   bool geoms_forgotten; /* since the newest scan: another one may be at the address of one */
 } hapi_body_table;
-
-/* ---- joint_axes.c ---- */
-
-/* A free axis with its motor and stops. */
-typedef struct hapi_joint_axis {
-  dReal (*get)(dJointID, int);
-  int group;
-  uint32_t carrier; /* HAPI_CARRIER_*, of the joint's bodies in ODE's own order */
-  bool slides;
-  double direction[3]; /* world */
-  double position;
-} hapi_joint_axis;
-
-/* ---- joint_probe.c: joints that the loop has no rows of its own for ---- */
-
-typedef struct hapi_joint_measurement {
-  bool good;      /* what follows holds */
-  uint32_t first; /* of the joint's bodies, the one that was pushed */
-  hapi_measured_joint found;
-  hapi_joint_place place;
-  double turn[2][4]; /* orientations of the pushed body and the other one, world */
-  double held[6][6]; /* see hapi_admittance_rows, world axes */
-  double error;      /* 0.., what turning the measurement before this one on would have missed */
-} hapi_joint_measurement;
 
 /* ---- joints.c: what is known of the world's joints ---- */
 
@@ -757,11 +734,6 @@ void hapi_joint_read(hapi_known_joint *known, bool is_new);
 void hapi_joint_leave(hapi_known_joint *known);
 void hapi_joint_probes(hapi_physics *physics); /* of the joints that the walk asks for */
 /* joint_axes.c */
-/* Motors and stops of other joints, as far as ODE says where their axes are. */
-typedef struct hapi_joint_limits {
-  double values[HAPI_JOINT_LIMITS][3];
-} hapi_joint_limits;
-
 int hapi_joint_axes(const hapi_known_joint *known, hapi_joint_axis out[HAPI_JOINT_LIMITS]);
 void hapi_joint_take_limits(const hapi_known_joint *known, hapi_joint_limits *out);
 void hapi_joint_give_limits(const hapi_known_joint *known, const hapi_joint_limits *limits);

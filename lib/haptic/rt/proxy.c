@@ -18,7 +18,10 @@
 #define KEEP_SHARE 0.9 /* of what the device holds: below it the coupling may be direct again */
 #define OFFSET_DECAY_S 0.02 /* time constant */
 #define OFFSET_LEAST 1e-9   /* m */
-#define LEAP_MOST 1e-4      /* m, of the pointer when the coupling becomes direct again */
+/* An AUTO proxy goes back to direct where the pointer leaps by less than this, m, and when nothing has touched
+ * for so long, s: what hops on a stiff spring comes back within it. */
+#define LEAP_MOST 1e-4
+#define REST_S 0.05
 
 static bool is_above(const hapi_tick_pointer *p)
 {
@@ -73,8 +76,9 @@ static void choose(hapi_tick_pointer *p, double period)
     p->coupling_reason = !p->hold_known ? HAP_COUPLING_UNKNOWN
                          : wanted       ? HAP_COUPLING_ABOVE
                                         : HAP_COUPLING_WITHIN;
-    if (p->proxied && !wanted && !is_idle(p, period)) {
-      wanted = true; /* back at the end of the touch, when there is no force to jump */
+    p->idle_s = p->proxied && !wanted && p->contacts == 0 ? p->idle_s + period : 0.0;
+    if (p->proxied && !wanted && (p->idle_s < REST_S || !is_idle(p, period))) {
+      wanted = true; /* back after the touch, when there is no force to jump */
       p->coupling_reason = HAP_COUPLING_ABOVE;
     }
   }

@@ -138,6 +138,7 @@ typedef struct hapi_tick_pointer {
   double near_stiffness;    /* N/m, sum over the contacts near the pointer, as they are found */
   double contact_stiffness; /* N/m, the same of the last tick, whole */
   bool proxied;             /* the pointer is a proxy */
+  double idle_s;            /* s, that a proxy of coupling AUTO has touched nothing */
   hap_coupling_reason coupling_reason;
   double proxy_position[3];
   double proxy_velocity[3];
