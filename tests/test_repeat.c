@@ -178,6 +178,23 @@ static void replace_fixed(scene *s)
   fix(s);
 }
 
+/* One that the loop has to measure; along another axis each time. */
+static void slide(scene *s)
+{
+  const dReal *at = dBodyGetPosition(s->w.bodies[0]);
+  dJointID joint = dJointCreatePiston(s->w.world, NULL);
+  dJointAttach(joint, s->w.bodies[0], s->w.bodies[1]);
+  dJointSetPistonAnchor(joint, at[0], at[1], at[2]);
+  dJointSetPistonAxis(joint, 1.0, 0.1 * (s->edits % 3), 0.0);
+  s->joints[s->joint_count++] = joint;
+}
+
+static void replace_slide(scene *s)
+{
+  drop_joints(s);
+  slide(s);
+}
+
 static void replace_body_on_hinge(scene *s)
 {
   double x = dBodyGetPosition(s->w.bodies[1])[0];
@@ -235,6 +252,7 @@ TEST(what_is_replaced)
       {"a joint", begin_hinge, replace_hinge},
       {"two joints of the same bodies", balls, replace_balls},
       {"a fixed joint", fix, replace_fixed},
+      {"a joint that is measured", slide, replace_slide},
       {"a body and its joint", begin_hinge, replace_body_on_hinge},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {

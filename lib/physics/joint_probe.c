@@ -733,7 +733,11 @@ static void measure(hapi_physics *physics, hapi_known_joint *known)
   }
   find_place(&p, &place);
   bool same = p.m->good && same_place(&place, &p.m->place);
-  if ((same && all_rest(&p)) || hapi_test_enter_pair(physics, known->joint, p.index) < HAP_OK) {
+  if (same && all_rest(&p)) {
+    return;
+  }
+  if (hapi_test_enter_pair(physics, known->joint, p.index) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
     return;
   }
   dWorldID world = physics->ode.world;
@@ -775,6 +779,9 @@ void hapi_joint_probes(hapi_physics *physics)
     }
     if (known->measurement == NULL) {
       known->measurement = hapi_alloc(sizeof *known->measurement);
+      if (known->measurement == NULL) {
+        hapi_log(HAP_LOG_ERROR, "no memory for what a joint is; its bodies are left to ODE");
+      }
     }
     if (known->measurement != NULL && (taken || !known->measurement->good)) {
       measure(physics, known);
