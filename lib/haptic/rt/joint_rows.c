@@ -637,6 +637,7 @@ static void place(placed_joint *j)
   } else {
     hapi_body_vector(j->a, in->axis_a, j->axes[0]);
     hapi_body_vector(j->b, in->axis_b, j->axes[1]);
+    hapi_v3_set(j->axes[2], 0.0, 0.0, 0.0); /* only measured ones have a third */
     hapi_body_vector(j->a, in->reference_a, j->across[0]);
     hapi_v3_cross(j->axes[0], j->across[0], j->across[1]);
   }
