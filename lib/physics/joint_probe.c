@@ -562,11 +562,7 @@ static void say_not_held(hapi_physics *physics, bool whole)
               "left to ODE between syncs"
             : "a joint does not give one body back what it takes from the other (ODE's PU "
               "joint does not); its bodies are left to ODE between syncs";
-  if (!physics->said_not_held) {
-    hapi_log(HAP_LOG_WARNING, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
-  }
-  physics->said_not_held = true;
+  hapi_physics_say_once(physics, &physics->said_not_held, text);
 }
 
 static void keep_place(pair *p, const hapi_joint_place *place)

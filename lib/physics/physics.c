@@ -276,3 +276,12 @@ bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
   return physics->model != HAP_MODEL_IMPULSE;
 }
+
+void hapi_physics_say_once(hapi_physics *physics, bool *io_said, const char *text)
+{
+  if (!*io_said) {
+    hapi_log(HAP_LOG_WARNING, "%s", text);
+    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
+  }
+  *io_said = true;
+}

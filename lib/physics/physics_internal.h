@@ -709,6 +709,10 @@ void hapi_range_forget_geom(hapi_range *range, dGeomID geom);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 
+/* physics.c */
+/* To the log and the application. */
+void hapi_physics_say_once(hapi_physics *physics, bool *io_said, const char *text);
+
 /* mechanism.c */
 /* The bodies that joints tie to this one, itself first, into range.members, and their joints behind
  * range.joints; false: they cannot be owned. */

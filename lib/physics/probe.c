@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "base/alloc.h"
-#include "base/log.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -95,14 +94,10 @@ static void drop_island(hapi_physics *physics, uint32_t first)
 
 static void say_not_probed(hapi_physics *physics)
 {
-  if (!physics->said_not_probed) {
-    const char *text =
-        "bodies with a transmission joint are not probed: a pointer feels them as "
-        "moved by the application";
-    hapi_log(HAP_LOG_WARNING, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
-  }
-  physics->said_not_probed = true;
+  const char *text =
+      "bodies with a transmission joint are not probed: a pointer feels them as "
+      "moved by the application";
+  hapi_physics_say_once(physics, &physics->said_not_probed, text);
 }
 
 static bool gather_island(hapi_physics *physics, uint32_t start)

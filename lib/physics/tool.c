@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/log.h"
 #include "base/pose.h"
 #include "physics/physics_internal.h"
 #include "sync/mesh_filter.h"
@@ -132,14 +131,10 @@ bool hapi_tool_knows(dGeomID geom)
 
 static void say_not_touched(hapi_physics *physics)
 {
-  if (!physics->said_not_touched) {
-    const char *text =
-        "a pointer that is a hull does not touch heightfields and geoms of user-made "
-        "classes; take a trimesh there";
-    hapi_log(HAP_LOG_WARNING, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
-  }
-  physics->said_not_touched = true;
+  const char *text =
+      "a pointer that is a hull does not touch heightfields and geoms of user-made "
+      "classes; take a trimesh there";
+  hapi_physics_say_once(physics, &physics->said_not_touched, text);
 }
 
 static void add_geom(search *s, dGeomID geom)
