@@ -177,25 +177,27 @@ static const hapi_row *source(const hapi_island *is, const hapi_row *row)
   return row->state == HAPI_ROW_TIED ? &is->solver->rows[row->normal] : row;
 }
 
-/* Rows whose errors drive a row's impulse, and how much; of a ball that slides its normal, and its rows
- * across the force. */
+/* A row whose error drives another row's impulse, and how much. */
 typedef struct drive {
   const hapi_row *from;
   double gain;
   double error;
 } drive;
 
-#define DRIVES 4
+/* The one drive of a row that is free or tied: nearly all are, and this is in the innermost loops. */
+static inline drive drive_of(const hapi_island *is, const hapi_row *row, uint32_t index)
+{
+  const hapi_row *from = source(is, row);
+  return (drive){from, is->gain[index], is->error[from - is->solver->rows]};
+}
 
-static int drives_of(const hapi_island *is, uint32_t index, drive out[DRIVES])
+#define SLIDING_DRIVES 4
+
+/* Of a row of a ball that slides: its normal, and the ball's rows across the force; returns how many. */
+static int sliding_drives(const hapi_island *is, uint32_t index, drive out[SLIDING_DRIVES])
 {
   const hapi_row *rows = is->solver->rows;
   const hapi_row *row = &rows[index];
-  if (row->state != HAPI_ROW_SLIDING) {
-    const hapi_row *from = source(is, row);
-    out[0] = (drive){from, is->gain[index], is->error[from - rows]};
-    return 1;
-  }
   const hapi_row *first = row - row->round;
   uint32_t at = index - row->round;
   int32_t normal = row->normal;
@@ -339,6 +341,25 @@ static void add_to(hapi_island *is, uint16_t local, double s, const double b[6])
   }
 }
 
+static inline void add_drive(hapi_island *is, const hapi_row *row, drive d)
+{
+  add_row(is, is->local[row->a], d.gain, row->ba, d.from);
+  add_to(is, is->local[row->a], d.gain * d.error, row->ba);
+  if (row->paired) {
+    add_row(is, is->local[row->b], d.gain, row->bb, d.from);
+    add_to(is, is->local[row->b], d.gain * d.error, row->bb);
+  }
+}
+
+static void add_sliding(hapi_island *is, uint32_t index)
+{
+  drive drives[SLIDING_DRIVES];
+  int count = sliding_drives(is, index, drives);
+  for (int k = 0; k < count; ++k) {
+    add_drive(is, &is->solver->rows[index], drives[k]);
+  }
+}
+
 /* Matrix and right side, dv = sum of gain b e, with the errors of the last look. One walk for
  * both: the rows are more than fits into a near cache. */
 static void assemble(hapi_island *is)
@@ -353,19 +374,10 @@ static void assemble(hapi_island *is)
   }
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (row->state == HAPI_ROW_FIXED) {
-      continue;
-    }
-    drive drives[DRIVES];
-    int count = drives_of(is, i, drives);
-    for (int k = 0; k < count; ++k) {
-      const drive *d = &drives[k];
-      add_row(is, is->local[row->a], d->gain, row->ba, d->from);
-      add_to(is, is->local[row->a], d->gain * d->error, row->ba);
-      if (row->paired) {
-        add_row(is, is->local[row->b], d->gain, row->bb, d->from);
-        add_to(is, is->local[row->b], d->gain * d->error, row->bb);
-      }
+    if (row->state == HAPI_ROW_SLIDING) {
+      add_sliding(is, i);
+    } else if (row->state != HAPI_ROW_FIXED) {
+      add_drive(is, row, drive_of(is, row, i));
     }
   }
 }
@@ -483,22 +495,35 @@ static void restore_velocities(hapi_island *is)
   }
 }
 
-/* Impulse that dv asks for. */
-static double asked(const hapi_island *is, uint32_t index)
+static inline double answer(const hapi_island *is, drive d)
 {
-  const hapi_row *row = &is->solver->rows[index];
-  drive drives[DRIVES];
-  double p = row->impulse;
-  int count = row->state != HAPI_ROW_FIXED ? drives_of(is, index, drives) : 0;
+  double w = moved(is, is->local[d.from->a], d.from->ja);
+  if (d.from->paired) {
+    w += moved(is, is->local[d.from->b], d.from->jb);
+  }
+  return d.gain * (d.error - w);
+}
+
+static double sliding_asked(const hapi_island *is, uint32_t index)
+{
+  drive drives[SLIDING_DRIVES];
+  double p = is->solver->rows[index].impulse;
+  int count = sliding_drives(is, index, drives);
   for (int k = 0; k < count; ++k) {
-    const hapi_row *from = drives[k].from;
-    double w = moved(is, is->local[from->a], from->ja);
-    if (from->paired) {
-      w += moved(is, is->local[from->b], from->jb);
-    }
-    p += drives[k].gain * (drives[k].error - w);
+    p += answer(is, drives[k]);
   }
   return p;
+}
+
+/* Impulse that dv asks for. */
+static inline double asked(const hapi_island *is, uint32_t index)
+{
+  const hapi_row *row = &is->solver->rows[index];
+  if (row->state == HAPI_ROW_SLIDING) {
+    return sliding_asked(is, index);
+  }
+  return row->state == HAPI_ROW_FIXED ? row->impulse
+                                      : row->impulse + answer(is, drive_of(is, row, index));
 }
 
 static void push_to(hapi_island *is, uint32_t index, double p)
