@@ -78,7 +78,12 @@ void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   memcpy(copy->ramps, from->ramps, c->contacts * sizeof *copy->ramps);
   memcpy(copy->ramp_generations, from->ramp_generations,
          c->contacts * sizeof *copy->ramp_generations);
-  memcpy(copy->frictions, from->frictions, c->contacts * sizeof *copy->frictions);
+  for (uint32_t i = 0; i < from->contact_count; ++i) { /* not all there is room for: caches */
+    uint32_t slot = from->contacts[i].slot;
+    if (slot != HAPI_SLOT_NONE) {
+      copy->frictions[slot] = from->frictions[slot];
+    }
+  }
   memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
   memcpy(copy->crosses, from->crosses, from->cross_count * sizeof *copy->crosses);
   copy_world(&copy->world, &own.world, &from->world);

@@ -17,6 +17,17 @@ static inline void hapi_v3_copy(const double a[3], double out[3])
   out[2] = a[2];
 }
 
+/* fmin and fmax without their calls, of which a tick would make a thousand; the bound where x is no number. */
+static inline double hapi_min(double x, double bound)
+{
+  return x < bound ? x : bound;
+}
+
+static inline double hapi_max(double x, double bound)
+{
+  return x > bound ? x : bound;
+}
+
 static inline void hapi_v3_set(double out[3], double x, double y, double z)
 {
   out[0] = x;

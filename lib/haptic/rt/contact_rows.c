@@ -129,15 +129,15 @@ static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
   row->softness = s->cfm / tick->period;
   row->target = c->gap > 0.0 ? -c->gap / tick->period : s->motion[2];
   if (deep > 0.0) {
-    double push = fmin(s->erp * deep / tick->period, s->max_push);
-    push = soft ? push : fmin(push, PUSH_OUT_MAX);
+    double push = hapi_min(s->erp * deep / tick->period, s->max_push);
+    push = soft ? push : hapi_min(push, PUSH_OUT_MAX);
     row->target += push;
     tick->world.sources[tick->world.solver.row_count - 1].pushes_out =
         !soft && push > PUSH_OUT_LEAST;
   }
   bool hits = c->gap + tick->period * speed < 0.0;
   if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
-    row->target = fmax(row->target, -s->bounce * speed + s->motion[2]);
+    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
     tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
   }
 }
@@ -151,7 +151,7 @@ static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, 
   row->target = s->motion[part - 1];
   row->softness = (slips ? s->slip[part - 1] : s->cfm) / tick->period;
   row->normal = share ? normal : -1;
-  row->mu = share ? fmin(mu, MU_MOST) : 0.0;
+  row->mu = share ? hapi_min(mu, MU_MOST) : 0.0;
   row->hi = share ? 0.0 : mu * tick->period; /* without Approx1 mu is a force */
   row->lo = -row->hi;
 }

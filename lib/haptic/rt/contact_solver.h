@@ -163,7 +163,9 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   if (row->normal >= 0) {
     double p = rows[row->normal].impulse;
     *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
-    *out_hi = row->round > 0 ? hapi_row_left(row, *out_hi) : *out_hi;
+    if (row->round > 0) {
+      *out_hi = hapi_row_left(row, *out_hi);
+    }
     *out_lo = -*out_hi;
   }
 }

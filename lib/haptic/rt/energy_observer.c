@@ -281,7 +281,7 @@ static double port_gave(hapi_tick_pointer *p, double seconds)
   if (!p->jumped) {
     return gave;
   }
-  return way > farthest ? fmax(gave, 0.0) * farthest / way : fmax(gave, 0.0);
+  return way > farthest ? hapi_max(gave, 0.0) * farthest / way : hapi_max(gave, 0.0);
 }
 
 static bool any(const double v[3])
@@ -332,13 +332,13 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
     const hapi_tick_pointer *p = &tick->pointers[i];
     double gives = would_give(p, p->device_wrench.force, p->guard.moved);
     double turns = would_give(p, p->device_wrench.torque, p->guard.turned);
-    out += fmax(gives, 0.0) + fmax(turns, 0.0);
-    in += fmax(-gives, 0.0) + fmax(-turns, 0.0);
+    out += hapi_max(gives, 0.0) + hapi_max(turns, 0.0);
+    in += hapi_max(-gives, 0.0) + hapi_max(-turns, 0.0);
   }
-  if (out - in <= fmax(budget, 0.0)) {
+  if (out - in <= hapi_max(budget, 0.0)) {
     return;
   }
-  double share = fmin(fmax((budget + in) / out, 0.0), 1.0);
+  double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     hold_back(p, p->device_wrench.force, p->guard.moved, share);
@@ -353,7 +353,7 @@ static void settle_debt(hapi_guard_state *guard, double period)
 {
   guard->touch_s += period;
   if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
-    guard->balance += (guard->sprung - guard->balance) * fmin(period / DEBT_S, 1.0);
+    guard->balance += (guard->sprung - guard->balance) * hapi_min(period / DEBT_S, 1.0);
   }
 }
 
@@ -382,15 +382,15 @@ void hapi_energy_observe(hapi_tick *tick)
   }
   given += ramps_give(tick);
   if (!settle_ports(tick)) {
-    guard->balance = fmin(guard->balance, 0.0);
+    guard->balance = hapi_min(guard->balance, 0.0);
     guard->touch_s = 0.0;
     return;
   }
   double stored = 0.0;
   stored += couplings_store(tick);
   guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
-  guard->stored_max = fmax(guard->stored_max, stored);
-  double overdraft = fmax(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
+  guard->stored_max = hapi_max(stored, guard->stored_max);
+  double overdraft = hapi_max(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
   settle_debt(guard, tick->period);
   pay_no_more_than(tick, guard->balance + overdraft);
 }

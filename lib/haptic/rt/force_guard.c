@@ -82,7 +82,7 @@ static void follow_age(hapi_tick *tick)
   guard->stale_ticks += stale;
   guard->stale = stale;
   double change = stale ? tick->period / FADE_S : step > 0.0 ? -tick->period / step : 0.0;
-  guard->age_loss = fmin(fmax(guard->age_loss + change, 0.0), 1.0);
+  guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
 }
 
 /* What the device shall get before the limits. */
@@ -100,7 +100,7 @@ static void want(hapi_tick *tick, hapi_tick_pointer *p)
   if (tick->guard.mode == HAP_GUARD_MEASURE) {
     return;
   }
-  g->share = fmin(g->share + tick->period / RAMP_IN_S, 1.0);
+  g->share = hapi_min(g->share + tick->period / RAMP_IN_S, 1.0);
   double share = g->share * (1.0 - tick->guard.age_loss);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= tick->guard.age_loss > 0.0 ? HAP_GUARD_STALE : 0;
@@ -137,8 +137,8 @@ static void limit_slew(const hapi_tick *tick, hapi_tick_pointer *p)
 {
   const hapi_guard_pointer *g = &p->guard;
   bool fault = tick->fault != HAP_FAULT_NONE;
-  double force_rate = fault ? fmax(p->slew_force, p->max_force / FADE_S) : p->slew_force;
-  double torque_rate = fault ? fmax(p->slew_torque, p->max_torque / FADE_S) : p->slew_torque;
+  double force_rate = fault ? hapi_max(p->slew_force, p->max_force / FADE_S) : p->slew_force;
+  double torque_rate = fault ? hapi_max(p->slew_torque, p->max_torque / FADE_S) : p->slew_torque;
   bool force = slew(g->written.force, tick->period * force_rate, p->device_wrench.force);
   bool torque = slew(g->written.torque, tick->period * torque_rate, p->device_wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;

@@ -61,8 +61,8 @@ static uint32_t find_window(const hapi_velocity *velocity, int axis)
     if (slope < low || slope > high) {
       break;
     }
-    low = fmax(low, slope - velocity->quantum * per_s);
-    high = fmin(high, slope + velocity->quantum * per_s);
+    low = hapi_max(slope - velocity->quantum * per_s, low);
+    high = hapi_min(slope + velocity->quantum * per_s, high);
   }
   return age - 1;
 }
