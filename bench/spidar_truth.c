@@ -17,14 +17,15 @@ double spidar_random(uint64_t *seed)
 
 static void random_axis(uint64_t *seed, double out[3])
 {
+  double v[3] = {0.0, 0.0, 0.0};
   double size = 0.0;
   while (size < 0.1 || size > 1.0) {
     for (int i = 0; i < 3; ++i) {
-      out[i] = spidar_random(seed);
+      v[i] = spidar_random(seed);
     }
-    size = hapi_v3_norm(out);
+    size = hapi_v3_norm(v);
   }
-  hapi_v3_scale(1.0 / size, out, out);
+  hapi_v3_scale(1.0 / size, v, out);
 }
 
 static void turn_to(const double axis[3], double angle, double quat[4])
@@ -313,6 +314,7 @@ void spidar_random_qp(const hapi_spidar_model *model, uint64_t *seed, hapi_spida
   out->n = model != NULL ? model->strings : 1 + (int)(3.999 * (1.0 + spidar_random(seed)));
   hap_pose pose;
   hapi_spidar_rows strings;
+  memset(&strings, 0, sizeof strings);
   if (model != NULL) {
     spidar_random_pose(model, 1.0, seed, &pose);
     hapi_spidar_rows_at(model, &pose, &strings);

@@ -116,14 +116,15 @@ TEST(bad_matrices_are_survived)
 
 static void random_direction(uint64_t *seed, double out[3])
 {
+  double v[3] = {0.0, 0.0, 0.0};
   double size = 0.0;
   while (size < 0.1 || size > 1.0) {
     for (int i = 0; i < 3; ++i) {
-      out[i] = spidar_random(seed);
+      v[i] = spidar_random(seed);
     }
-    size = hapi_v3_norm(out);
+    size = hapi_v3_norm(v);
   }
-  hapi_v3_scale(1.0 / size, out, out);
+  hapi_v3_scale(1.0 / size, v, out);
 }
 
 /* At the centre of the workspace, that is home for all but one: 0.97 of 1 N and 0.975 of 0.02 N m at least. */
