@@ -250,25 +250,26 @@ static bool try_set(const hapi_spidar_box_qp *qp, int code, double *x)
   double a[8][8] = {{0.0}};
   double b[8][8] = {{0.0}};
   int kind[8];
+  int free[8];
+  int count = 0;
   for (int i = 0; i < qp->n; ++i, code /= 3) {
     kind[i] = code % 3;
-    x[i] = kind[i] == 0 ? qp->low[i] : qp->high[i];
-  }
-  for (int i = 0; i < qp->n; ++i) {
-    a[i][i] = 1.0;
-    b[i][0] = x[i];
-    for (int k = 0; k < qp->n && kind[i] == 2; ++k) {
-      a[i][k] = entry(qp, i, k);
-      b[i][0] = qp->g[i];
+    x[i] = kind[i] == 0 ? qp->low[i] : kind[i] == 1 ? qp->high[i] : 0.0;
+    if (kind[i] == 2) {
+      free[count++] = i;
     }
   }
-  if (!eliminate(a, qp->n, b, 1)) {
-    return false;
+  for (int r = 0; r < count; ++r) {
+    b[r][0] = -gradient(qp, x, free[r]);
+    for (int c = 0; c < count; ++c) {
+      a[r][c] = entry(qp, free[r], free[c]);
+    }
   }
-  bool good = true;
-  for (int i = 0; i < qp->n; ++i) {
-    x[i] = b[i][0];
-    good = good && x[i] >= qp->low[i] - 1e-9 && x[i] <= qp->high[i] + 1e-9;
+  bool good = eliminate(a, count, b, 1);
+  for (int r = 0; r < count && good; ++r) {
+    double value = b[r][0];
+    x[free[r]] = value;
+    good = value >= qp->low[free[r]] - 1e-9 && value <= qp->high[free[r]] + 1e-9;
   }
   for (int i = 0; i < qp->n && good; ++i) {
     double slope = gradient(qp, x, i);
