@@ -373,7 +373,7 @@ TEST(friction_holds_a_god_object_to_the_cone)
 {
   for (size_t i = 0; i < 2; ++i) {
     contact_world w;
-    open_world(&w, rigid_couplings[i], i == 0 ? 0.5 : 10.0);
+    open_world(&w, rigid_couplings[i], i == 0 ? 0.5 : 5.0);
     w.hand_def.friction = 0.5;
     cw_add_floor(&w);
     REQUIRE(start(&w, 0.0, 0.0, RADIUS + 0.001));
