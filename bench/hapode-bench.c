@@ -18,6 +18,8 @@ typedef struct program {
 
 static const program programs[] = {
     {"accuracy", bench_accuracy, "what accuracy costs in time; --scene NAME: of one scene alone"},
+    {"couplings", bench_couplings,
+     "direct and proxy against god-object and virtual coupling: force, depth, stability, drag"},
     {"edits", bench_edits,
      "a world that threads change all the time under sixteen hands: ticks, steps, waits, forces"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},

@@ -90,4 +90,8 @@ hap_status impedance_draw(bench *b, const impedance_table *table);
 
 hap_status zwidth_run(bench *b);
 
+/* N/m, the stiffest that a desktop stylus without a hand feels and holds: direct of a wall, else of a
+ * coupling's spring before a wall that does not give (1 MN/m). */
+hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out);
+
 #endif
