@@ -11,9 +11,9 @@
 #define PHYSICS_HZ 60.0
 #define ITERATIONS 1000 /* of the reference */
 #define ITERATIONS_QUICK 200
-#define SHIFT 1e-5      /* m, against the hand: nothing touches by luck */
-#define AIR_HZ 2.0      /* well below the resonance of tool and spring */
-#define AIR_WAY 0.01    /* m */
+#define SHIFT 1e-5   /* m, against the hand: nothing touches by luck */
+#define AIR_HZ 2.0   /* well below the resonance of tool and spring */
+#define AIR_WAY 0.01 /* m */
 #define AIR_STIFFNESS 2000.0
 #define AIR_DAMPING 5.0
 #define AIR_SETTLE 2000 /* ticks */
@@ -71,8 +71,7 @@ static hap_status measure_coupling(bench *b, const scene_parameters *which, size
                                    accuracy_motion *motion)
 {
   hap_status status = run(b, which, HAP_MODEL_CONTACT, couplings_compared[c], motion);
-  if (status >= HAP_OK &&
-      !accuracy_compare(reference, motion, NULL, PHYSICS_HZ, &out->errors)) {
+  if (status >= HAP_OK && !accuracy_compare(reference, motion, NULL, PHYSICS_HZ, &out->errors)) {
     status = bench_fail(b, HAP_ERROR_STATE, "%s: the hand touches nothing", which->name);
   }
   out->deepest = motion->deepest;
@@ -139,8 +138,8 @@ static hap_status measure_air(bench *b, hap_coupling coupling, couplings_column 
     def.coupling_damping = AIR_DAMPING;
   }
   snprintf(device, sizeof device,
-           "virtual:path=0:0/0/-0.2,sine=0/0/%g,hz=%g,hand=rigid,max_force=" PORT_FORCE_MAX, AIR_WAY,
-           AIR_HZ);
+           "virtual:path=0:0/0/-0.2,sine=0/0/%g,hz=%g,hand=rigid,max_force=" PORT_FORCE_MAX,
+           AIR_WAY, AIR_HZ);
   hap_status status = port_open(b, &def, &p);
   if (status < HAP_OK) {
     return status;
@@ -182,8 +181,8 @@ static hap_status write_table(bench *b, const couplings_table *table)
     for (size_t i = 0; i < COUPLINGS_SCENES; ++i) {
       const couplings_cell *cell = &column->scenes[i];
       fprintf(csv, "%s,%s,%.6g,%.6g,%.6g,%.6g,%.4g,,,\n", name, couplings_scenes[i],
-              cell->errors.force, cell->errors.torque, cell->errors.peak_ratio,
-              1e3 * cell->deepest, cell->tick_us);
+              cell->errors.force, cell->errors.torque, cell->errors.peak_ratio, 1e3 * cell->deepest,
+              cell->tick_us);
     }
     fprintf(csv, "%s,stylus,,,,,,%.6g,,\n", name, column->stiffness);
     fprintf(csv, "%s,air,,,,,,,%.6g,%.6g\n", name, column->mass, column->damping);
@@ -201,10 +200,11 @@ static void report(bench *b, const couplings_table *table)
     for (size_t i = 0; i < COUPLINGS_SCENES; ++i) {
       const couplings_cell *cell = &column->scenes[i];
       double most = rigid ? DEPTH_SHARE * table->columns[0].scenes[i].deepest : HUGE_VAL;
-      bench_check(b, cell->deepest <= most,
-                  "%s, %s: force error %.3g %%, peak ratio %.3f, %.4g mm in the bodies, tick %.2f us",
-                  name, couplings_scenes[i], 100.0 * cell->errors.force, cell->errors.peak_ratio,
-                  1e3 * cell->deepest, cell->tick_us);
+      bench_check(
+          b, cell->deepest <= most,
+          "%s, %s: force error %.3g %%, peak ratio %.3f, %.4g mm in the bodies, tick %.2f us", name,
+          couplings_scenes[i], 100.0 * cell->errors.force, cell->errors.peak_ratio,
+          1e3 * cell->deepest, cell->tick_us);
     }
     double mass = couplings_compared[c] == HAP_COUPLING_VIRTUAL ? TOOL_MASS : 0.0;
     bench_check(b, fabs(column->mass - mass) <= MASS_BOUND * TOOL_MASS,

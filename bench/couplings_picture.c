@@ -50,21 +50,23 @@ static void draw_scenes(FILE *script, const couplings_table *table, bool depths)
   }
   fprintf(script,
           "EOD\nset style data histograms\nset style fill solid 0.8\nset xlabel ''\n"
-          "set logscale y\nset key top left\n");
+          "set logscale y\nset format y '10^{%%L}'\nset key top right\n");
   if (depths) {
-    fprintf(script,
-            "set title 'deepest of the pointer in bodies'\nset ylabel '[mm]'\nset yrange [%g:100]\n",
-            DEPTH_LEAST);
+    fprintf(
+        script,
+        "set title 'deepest of the pointer in bodies'\nset ylabel '[mm]'\nset yrange [%g:1e4]\n",
+        DEPTH_LEAST);
   } else {
-    fprintf(script, "set title 'force error against single'\nset ylabel '[%%]'\n"
-                    "set yrange [0.01:1000]\n");
+    fprintf(script,
+            "set title 'force error against single'\nset ylabel '[%%]'\n"
+            "set yrange [0.001:1e5]\n");
   }
   fprintf(script, "plot ");
   for (size_t c = 0; c < COUPLINGS; ++c) {
     fprintf(script, "%s$s using %zu:xtic(1) lt %zu title '%s'", c > 0 ? ", " : "", c + 2, c + 1,
             hap_coupling_name(couplings_compared[c]));
   }
-  fprintf(script, "\nunset logscale y\nset yrange [*:*]\n");
+  fprintf(script, "\nunset logscale y\nset format y '%%g'\nset yrange [*:*]\n");
 }
 
 static void draw_device(FILE *script, const couplings_table *table)
@@ -77,7 +79,7 @@ static void draw_device(FILE *script, const couplings_table *table)
   }
   fprintf(script,
           "EOD\nset title 'stiffest wall that a desktop stylus holds and feels'\n"
-          "set ylabel '[N/m]'\nset yrange [0:*]\n"
+          "set ylabel '[N/m]'\nset yrange [0:800]\nset bmargin 4\n"
           "plot $d using 2:xtic(1) lt 2 notitle, $d using 0:2:(sprintf('%%.0f', $2)) with labels "
           "offset 0,0.7 notitle\n");
 }

@@ -396,8 +396,8 @@ TEST(friction_holds_a_god_object_to_the_cone)
     double across = hypot(w.force[0], w.force[1]);
     CHECK(across < 0.5 * w.force[2] + 1e-6 && (i == 1 || across > 0.5 * w.force[2] - 1e-6));
     hap_pointer_state state = state_of(&w);
-    CHECK_NEAR(hypot(state.proxy.position[0] - 0.012, state.proxy.position[1] + 0.016),
-               across / KV, 1e-6);
+    CHECK_NEAR(hypot(state.proxy.position[0] - 0.012, state.proxy.position[1] + 0.016), across / KV,
+               1e-6);
     cw_close(&w);
   }
 }
@@ -506,6 +506,190 @@ TEST(a_virtual_tool_hits_as_a_body_without_rebound)
   cw_close(&w);
 }
 
+/* ---- what may be asked for ---- */
+
+TEST(what_cannot_be_is_refused)
+{
+  const struct {
+    double mass;
+    double inertia;
+    bool good;
+  } values[] = {{0.1, 0.0, true},  {1e-6, 0.0, true}, {1e6, 1e12, true}, {0.0, 0.0, false},
+                {-1.0, 0.0, false}, {NAN, 0.0, false}, {HUGE_VAL, 0.0, false},
+                {0.1, -1.0, false}, {0.1, NAN, false}, {0.1, HUGE_VAL, false}};
+  for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
+    hap_pointer_id id;
+    contact_world w;
+    open_world(&w, HAP_COUPLING_VIRTUAL, 0.0);
+    REQUIRE(start(&w, 0.0, 0.0, 0.0));
+    hap_pointer_def def = w.hand_def;
+    def.virtual_mass = values[i].mass;
+    def.virtual_inertia = values[i].inertia;
+    hap_status status = hap_pointer_add(w.session, &def, &id);
+    CHECK(status == (values[i].good ? HAP_OK : HAP_ERROR_ARGUMENT));
+    cw_close(&w);
+  }
+  CHECK(strcmp(hap_coupling_name(HAP_COUPLING_GOD_OBJECT), "god-object") == 0);
+  CHECK(strcmp(hap_coupling_name(HAP_COUPLING_VIRTUAL), "virtual") == 0);
+  CHECK(hap_coupling_name((hap_coupling)5) == NULL && hap_coupling_name((hap_coupling)-1) == NULL);
+}
+
+TEST(a_spring_is_asked_for_as_for_a_proxy)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    hap_pointer_id id;
+    contact_world w;
+    open_world(&w, rigid_couplings[i], 0.0);
+    REQUIRE(start(&w, 0.0, 0.0, 0.0));
+    hap_pointer_def def = w.hand_def;
+    def.coupling_stiffness = 0.0; /* and no device that says what it holds */
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+    def = w.hand_def;
+    def.force_scale = 0.0;
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+    def = w.hand_def;
+    def.coupling = (hap_coupling)5;
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
+    cw_close(&w);
+    open_world(&w, HAP_COUPLING_DIRECT, 0.0);
+    w.hand_def.coupling_damping = w.hand_def.coupling_stiffness = 0.0;
+    w.def.model = HAP_MODEL_ACCELERANCE;
+    REQUIRE(start(&w, 0.0, 0.0, 0.0));
+    def = w.hand_def;
+    def.coupling = rigid_couplings[i];
+    def.coupling_stiffness = KV;
+    CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
+    cw_close(&w);
+  }
+}
+
+static void change_model(contact_world *w, hap_model model)
+{
+  CHECK(hap_session_set_model(w->session, model) == HAP_OK);
+  for (int i = 0; i < 200 && cw_stats(w).model != (uint32_t)model; ++i) {
+    cw_tick(w);
+  }
+}
+
+/* Pressed into the floor: direct in another model, and out of it again, slowly, in contact. */
+TEST(another_model_ends_it_and_contact_begins_it_anew)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    contact_world w;
+    open_world(&w, rigid_couplings[i], 5.0);
+    cw_add_floor(&w);
+    REQUIRE(start(&w, 0.0, 0.0, RADIUS + 0.001));
+    go_to(&w, (const double[3]){0.0, 0.0, RADIUS - 0.002}, 50);
+    cw_run(&w, 300);
+    CHECK_NEAR(w.force[2], 0.002 * KV, 1e-4);
+    change_model(&w, HAP_MODEL_ACCELERANCE);
+    hap_pointer_state state = state_of(&w);
+    CHECK(state.coupling == HAP_COUPLING_DIRECT && state.coupling_reason == HAP_COUPLING_MODEL);
+    cw_run(&w, 100);
+    CHECK_NEAR(w.force[2], 0.002 * w.hand_def.stiffness, 1e-4);
+    change_model(&w, HAP_MODEL_CONTACT);
+    double before = w.force[2];
+    double jump = 0.0;
+    for (int t = 0; t < 500; ++t) {
+      cw_tick(&w);
+      jump = fmax(jump, fabs(w.force[2] - before));
+      before = w.force[2];
+    }
+    state = state_of(&w);
+    CHECK(state.coupling == (uint32_t)rigid_couplings[i]);
+    CHECK_NEAR(w.force[2], 0.002 * KV, 1e-4);
+    CHECK_NEAR(state.proxy.position[2], RADIUS, 1e-8);
+    CHECK(jump < 0.3 * 0.002 * w.hand_def.stiffness);
+    cw_close(&w);
+  }
+}
+
+/* A device that leaps has not been pressed in: no force, and going on from there is felt. */
+TEST(a_device_that_leaps_begins_anew)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    hap_detail detail = {""};
+    contact_world w;
+    open_world(&w, rigid_couplings[i], 1.0);
+    cw_add_floor(&w);
+    cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
+    w.ode.world = w.world;
+    w.ode.space = w.space;
+    w.ode.user = &w;
+    REQUIRE(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
+    REQUIRE(hap_device_open("virtual:hand=rigid,max_force=1000,blend=linear,"
+                            "path=0:0/0/0.03;0.3:0/0/0.02;0.3001:0/0/-0.03;1:0/0/-0.032",
+                            &w.hand_def.device, &detail) == HAP_OK);
+    REQUIRE(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
+    REQUIRE(hap_session_start(w.session) == HAP_OK);
+    double peak = 0.0;
+    for (int t = 0; t < 1000; ++t) {
+      CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+      hap_pointer_state state = state_of(&w);
+      peak = fmax(peak, hapi_v3_norm(state.wrench.force));
+    }
+    printf("# peak %.3f N\n", peak);
+    CHECK(peak < 2.0 * 0.002 * KV && cw_stats(&w).faults == 0);
+    hap_session_stop(w.session);
+    hap_device *device = w.hand_def.device;
+    cw_close(&w);
+    hap_device_close(device);
+  }
+}
+
+/* What was put over the pointer lets it out slowly. */
+TEST(a_body_that_is_put_over_the_pointer_lets_it_out)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    contact_world w;
+    open_world(&w, rigid_couplings[i], 2.0);
+    dGeomID wall = dCreateBox(w.space, 0.1, 0.1, 0.1);
+    dGeomSetPosition(wall, 0.0, 0.0, -1.0);
+    REQUIRE(start(&w, 0.0, 0.0, 0.05 + RADIUS - 0.004));
+    cw_run(&w, 100);
+    CHECK(cw_norm(w.force) == 0.0);
+    CHECK(hap_session_lock(w.session) == HAP_OK);
+    dGeomSetPosition(wall, 0.0, 0.0, 0.0);
+    CHECK(hap_session_unlock(w.session) == HAP_OK);
+    double jump = 0.0;
+    double before = 0.0;
+    for (int t = 0; t < 300; ++t) {
+      cw_tick(&w);
+      jump = fmax(jump, fabs(w.force[2] - before));
+      before = w.force[2];
+    }
+    CHECK_NEAR(w.force[2], 0.004 * KV, 1e-3);
+    CHECK(jump < 0.3 * 0.004 * KV);
+    cw_close(&w);
+  }
+}
+
+/* The same run twice, in lockstep. */
+TEST(lockstep_repeats_them)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    uint64_t hashes[2];
+    for (int k = 0; k < 2; ++k) {
+      contact_world w;
+      open_world(&w, rigid_couplings[i], 2.0);
+      w.hand_def.friction = 0.4;
+      dWorldSetGravity(w.world, 0.0, 0.0, -CW_GRAVITY);
+      cw_add_floor(&w);
+      cw_add_cube(&w, 0.3, 0.05, 0.0, 0.0, 0.025);
+      cw_add_cube(&w, 0.3, 0.05, 0.051, 0.0, 0.025);
+      REQUIRE(cw_start(&w, -0.045, 0.003, 0.02));
+      for (int t = 0; t < 800; ++t) {
+        cw_move_hand(&w, 0.1 * sin(0.02 * t) + 0.05, 0.02 * cos(0.05 * t), 0.0);
+        cw_tick(&w);
+      }
+      hashes[k] = cw_stats(&w).trace_hash;
+      CHECK(hashes[k] != 0 && w.position[1][0] > 0.055);
+      cw_close(&w);
+    }
+    CHECK(hashes[0] == hashes[1]);
+  }
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -525,6 +709,12 @@ int main(void)
   RUN(in_the_air_the_virtual_tool_is_felt_as_its_mass);
   RUN(the_virtual_tool_swings_at_its_resonance);
   RUN(a_virtual_tool_hits_as_a_body_without_rebound);
+  RUN(what_cannot_be_is_refused);
+  RUN(a_spring_is_asked_for_as_for_a_proxy);
+  RUN(another_model_ends_it_and_contact_begins_it_anew);
+  RUN(a_device_that_leaps_begins_anew);
+  RUN(a_body_that_is_put_over_the_pointer_lets_it_out);
+  RUN(lockstep_repeats_them);
   dCloseODE();
   return tap_done();
 }

@@ -111,8 +111,7 @@ TEST(a_tool_stands_on_its_edge_where_the_springs_agree)
   for (int k = 0; k <= 60000; ++k) {
     double a = 1e-5 * k;
     double lift = HALF * (cos(a) + sin(a)) - z;
-    double energy =
-        0.5 * KV * lift * lift + 4.0 * spin_stiffness() * (1.0 - cos(0.5 * (0.6 - a)));
+    double energy = 0.5 * KV * lift * lift + 4.0 * spin_stiffness() * (1.0 - cos(0.5 * (0.6 - a)));
     wanted = energy < best ? a : wanted;
     best = fmin(best, energy);
   }

@@ -47,8 +47,7 @@ void run_coupling_print(const run_coupling *coupling, size_t pointers, FILE *out
   fputs("coupling: ", out);
   for (size_t i = 0; i < pointers; ++i) {
     const hap_pointer_state *state = &coupling->stiffest[i];
-    fprintf(out, "%s%s (", i > 0 ? " + " : "",
-            hap_coupling_name((hap_coupling)state->coupling));
+    fprintf(out, "%s%s (", i > 0 ? " + " : "", hap_coupling_name((hap_coupling)state->coupling));
     print_reason(state, out);
     fputc(')', out);
   }

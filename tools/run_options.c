@@ -113,10 +113,11 @@ static hap_status take_coupling(run_options *options, const option *self, const 
     options->coupling_given = true;
     return bare ? HAP_OK : take_number(options, self, value + length + 1, detail);
   }
-  return fail(detail,
-              "\"%.60s\" is not direct, proxy:K, auto:K, god-object:K or virtual:K; K in N/m, and may "
-              "be left out",
-              value);
+  return fail(
+      detail,
+      "\"%.60s\" is not direct, proxy:K, auto:K, god-object:K or virtual:K; K in N/m, and may "
+      "be left out",
+      value);
 }
 
 static hap_status take_pose(run_options *options, const option *self, const char *value,

@@ -33,11 +33,13 @@ typedef enum hap_coupling {
   /* The two that the literature knows, to compare with. Their contacts do not give: the pointer does not
    * enter bodies, and stiffness, damping and integration of hap_pointer_def have no part in them; the
    * spring to the device, and where they are in force, are those of PROXY. docs/numerics.md. */
-  HAP_COUPLING_GOD_OBJECT = 3, /* constraint-based: the pointer has no mass and is, of all places out of the
+  HAP_COUPLING_GOD_OBJECT =
+      3, /* constraint-based: the pointer has no mass and is, of all places out of the
                                   bodies that it can slide to, where the spring to the device is shortest
                                   (Zilles and Salisbury 1995; tools: Ortega, Redon and Coquillart 2007).
                                   In the air it is the device, and there is no force */
-  HAP_COUPLING_VIRTUAL = 4 /* virtual coupling: the pointer is a rigid body of virtual_mass that the spring
+  HAP_COUPLING_VIRTUAL =
+      4 /* virtual coupling: the pointer is a rigid body of virtual_mass that the spring
                               pulls, and meets bodies as such, without rebound (Colgate, Stanley and Brown
                               1995; McNeely, Puterbaugh and Troy 1999). In the air its mass is felt */
 } hap_coupling;
@@ -127,9 +129,11 @@ typedef struct hap_pointer_def {
                            one limit (docs/numerics.md). Needs friction. A pointer whose device has 3
                            degrees of freedom does not turn itself; others turn with the device, whose
                            torque is about the pointer's centre. */
-  double virtual_mass;    /* kg, 1e-6..1e6, default 0.1: of HAP_COUPLING_VIRTUAL. It is felt in the air, and
+  double
+      virtual_mass; /* kg, 1e-6..1e6, default 0.1: of HAP_COUPLING_VIRTUAL. It is felt in the air, and
                              swings on the spring at sqrt(coupling_stiffness / virtual_mass) */
-  double virtual_inertia; /* kg m^2, 0..1e12: of its hull about every axis through the pointer's origin;
+  double
+      virtual_inertia; /* kg m^2, 0..1e12: of its hull about every axis through the pointer's origin;
                              0 (default): of a ball of that mass as large as the hull (docs/numerics.md) */
 } hap_pointer_def;
 
@@ -188,7 +192,8 @@ typedef struct hap_pointer_state {
   uint32_t guard;            /* hap_guard_flag bits */
   double coupling_stiffness; /* N/m at the device, of the proxy's spring; 0: there is none */
   double coupling_damping;   /* N s/m at the device */
-  double contact_stiffness;  /* N/m at the device, sum over the contacts near the pointer; 0 where they
+  double
+      contact_stiffness; /* N/m at the device, sum over the contacts near the pointer; 0 where they
                                 do not give (god-object, virtual) */
 } hap_pointer_state;
 

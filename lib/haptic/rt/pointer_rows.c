@@ -36,7 +36,7 @@
   1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
 #define NEAR_S 5e-3
 #define PUSHED_OUT_LEAST 1e-9 /* m, of a rigid contact: what is deeper is no rounding */
-#define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
+#define RIGID_SLACK 1e-4      /* m: bodies gain speed within the tick */
 
 typedef struct placed_pointer {
   hapi_tick_pointer *pointer;
@@ -550,9 +550,48 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   }
 }
 
+/* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels it. */
+static void add_brake(hapi_tick *tick, const hapi_tick_pointer *p, const double way[3], int first,
+                      double most)
+{
+  hapi_local_world *world = &tick->world;
+  uint32_t number = world->solver.row_count;
+  hapi_row *row = &world->solver.rows[number];
+  memset(row, 0, sizeof *row);
+  hapi_v3_scale(-1.0 / hapi_v3_norm(way), way, row->jb + first);
+  hapi_v3_scale(first == 0 ? p->response : p->spin_response, row->jb + first, row->bb + first);
+  row->a = HAPI_STATIC_ROW;
+  row->b = p->row;
+  row->hi = HUGE_VAL;
+  row->target = -most;
+  row->normal = -1;
+  world->sources[number] =
+      (hapi_row_source){.body_a = HAPI_SLOT_NONE, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  ++world->solver.row_count;
+  hapi_row_ready(&world->solver, number);
+}
+
+/* A god-object that has been let go would leap to the device. One that is held needs none. */
+static void brake(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0 || !p->rigid || p->contacts > 0) {
+      continue;
+    }
+    if (hapi_v3_norm(p->free_velocity) > p->speed_most) {
+      add_brake(tick, p, p->free_velocity, 0, p->speed_most);
+    }
+    if (p->hull != NULL && hapi_v3_norm(p->free_spin) > p->spin_most) {
+      add_brake(tick, p, p->free_spin, 3, p->spin_most);
+    }
+  }
+}
+
 void hapi_pointer_rows(hapi_tick *tick)
 {
   hapi_tool_place(tick);
+  brake(tick);
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     take_contact(tick, i);
   }

@@ -158,8 +158,7 @@ static bool swings(const hapi_tick *tick, const hapi_tick_pointer *p, double k, 
 static double response(const hapi_tick *tick, const hapi_tick_pointer *p)
 {
   double t = tick->period;
-  double k =
-      swings(tick, p, p->coupling_stiffness, p->proxy_mass) ? 0.0 : p->coupling_stiffness;
+  double k = swings(tick, p, p->coupling_stiffness, p->proxy_mass) ? 0.0 : p->coupling_stiffness;
   return 1.0 / (p->proxy_mass + t * p->coupling_damping + t * t * k);
 }
 
@@ -270,6 +269,11 @@ static void set_reach(const hapi_tick *tick, hapi_tick_pointer *p, const double 
   if (p->hull != NULL) {
     p->reach += tick->period * p->extent * hapi_v3_norm(p->free_spin);
   }
+  p->speed_most =
+      is_god_object(p) ? hapi_v3_norm(p->handle_velocity) + CATCH_UP : HUGE_VAL;
+  p->spin_most = is_god_object(p) && p->hull != NULL
+                     ? hapi_v3_norm(p->handle_spin) + CATCH_UP / p->extent
+                     : HUGE_VAL;
 }
 
 /* Velocities that the proxies would have with nothing in touch. */
@@ -347,35 +351,27 @@ static void turn_proxy(const hapi_tick *tick, hapi_tick_pointer *p, const double
     rotation_between(end, p->proxy_quat, away);
   }
   for (int k = 0; k < 3; ++k) {
-    double carried = p->pushed_out ? p->carried[3 + k] : 0.0;
     p->wrench.torque[k] =
-        p->spin_stiffness * away[k] + p->spin_damping * (spin[k] + carried - p->handle_spin[k]);
+        p->spin_stiffness * away[k] + p->spin_damping * (spin[k] - p->handle_spin[k]);
   }
 }
 
-/* The part of its motion that a god-object may make in a tick. */
-static double allowed(const hapi_tick *tick, const hapi_tick_pointer *p, const double v[6])
+/* s, that a god-object moves: in the tick in which something lets it go, before it is braked, less. */
+static double moving_time(const hapi_tick *tick, const hapi_tick_pointer *p, const double v[6])
 {
-  double share = 1.0;
-  if (is_god_object(p)) {
-    double speed = hapi_v3_norm(v);
-    double most = hapi_v3_norm(p->handle_velocity) + CATCH_UP;
-    share = speed > most ? most / speed : 1.0;
-  }
-  if (is_god_object(p) && p->hull != NULL) {
-    double speed = hapi_v3_norm(v + 3);
-    double most = hapi_v3_norm(p->handle_spin) + CATCH_UP / p->extent;
-    share = speed > most ? fmin(share, most / speed) : share;
-  }
-  return share * tick->period;
+  double speed = hapi_v3_norm(v) / p->speed_most;
+  double spin = p->hull != NULL ? hapi_v3_norm(v + 3) / p->spin_most : 0.0;
+  return is_god_object(p) && p->contacts == 0 ? tick->period / fmax(1.0, fmax(speed, spin))
+                                              : tick->period;
 }
 
-/* From where it was; force and velocity are those of the last solve. */
+/* From where it was; velocity and force are those of the last solve. */
 static void move_rigid(const hapi_tick *tick, hapi_tick_pointer *p, const double at[3],
                        const double quat[4])
 {
-  const double *v = p->pushed_out ? p->move_velocity : tick->world.solver.v[p->row];
-  double seconds = allowed(tick, p, v);
+  const double *solved = tick->world.solver.v[p->row];
+  const double *v = p->pushed_out ? p->move_velocity : solved;
+  double seconds = moving_time(tick, p, v);
   hapi_v3_madd(at, seconds, v, p->proxy_position);
   memcpy(p->proxy_quat, quat, sizeof p->proxy_quat);
   if (p->hull != NULL) {
@@ -383,7 +379,7 @@ static void move_rigid(const hapi_tick *tick, hapi_tick_pointer *p, const double
   }
   if (is_god_object(p)) { /* which has no momentum to keep: as it moves */
     for (int i = 0; i < 6; ++i) {
-      p->carried[i] = p->pushed_out ? v[i] - tick->world.solver.v[p->row][i] : 0.0;
+      p->carried[i] = v[i] - solved[i];
     }
     hapi_v3_scale(seconds / tick->period, v, p->proxy_velocity);
     hapi_v3_scale(seconds / tick->period, v + 3, p->proxy_spin);
@@ -400,8 +396,6 @@ static void release(const hapi_tick *tick, hapi_tick_pointer *p)
   bool there = hapi_v3_norm(way) <= tick->period * CATCH_UP &&
                (p->hull == NULL || p->extent * hapi_v3_norm(turn) <= tick->period * CATCH_UP);
   bool free = p->near_rows == 0 || p->coupling_damping == 0.0;
-  hapi_v3_set(p->wrench.force, 0.0, 0.0, 0.0);
-  hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
   if (there && free && hapi_v3_norm(p->offset) == 0.0) {
     hapi_proxy_begin_anew(p);
   }
@@ -414,6 +408,7 @@ static void move(hapi_tick *tick, uint32_t index)
   double end[3];
   double at[3];
   double quat[4];
+  const hap_wrench contacts = p->wrench;
   if (!hapi_finite(v, 6) || (p->pushed_out && !hapi_finite(p->move_velocity, 6))) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, index + 1);
     hapi_proxy_begin_anew(p);
@@ -424,21 +419,20 @@ static void move(hapi_tick *tick, uint32_t index)
   hapi_v3_copy(v, p->proxy_velocity);
   hapi_v3_madd(p->proxy_position, tick->period, v, p->proxy_position);
   far_end(p, end);
-  double carried[3] = {0.0, 0.0, 0.0};
-  if (p->pushed_out) {
-    hapi_v3_copy(p->carried, carried);
-  }
   const double *from =
       swings(tick, p, p->coupling_stiffness, p->proxy_mass) ? at : p->proxy_position;
   for (int k = 0; k < 3; ++k) {
     p->wrench.force[k] = p->coupling_stiffness * (from[k] - end[k]) +
-                         p->coupling_damping * (v[k] + carried[k] - p->handle_velocity[k]);
+                         p->coupling_damping * (v[k] - p->handle_velocity[k]);
   }
   if (p->hull != NULL) {
     turn_proxy(tick, p, v + 3);
   }
   if (p->rigid) {
     move_rigid(tick, p, at, quat);
+  }
+  if (is_god_object(p)) {
+    p->wrench = contacts; /* which is the spring's, but for what brakes it (pointer_rows.c) */
   }
   if (is_god_object(p) && p->contacts == 0) {
     release(tick, p);

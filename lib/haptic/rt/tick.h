@@ -148,6 +148,8 @@ typedef struct hapi_tick_pointer {
   uint32_t row;            /* place in the solver's velocities; 0: direct */
   double response;         /* 1/kg, change of the proxy's velocity by one N s */
   double reach;            /* m, of a rigid one: how far it may come in this tick */
+  double speed_most;       /* m/s, rad/s: likewise, along the way to where the device is */
+  double spin_most;
   uint32_t near_rows;      /* likewise: contacts within that */
   bool pushed_out;         /* likewise: in this tick it moves by move_velocity */
   double move_velocity[6];
