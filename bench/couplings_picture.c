@@ -8,7 +8,7 @@
 
 static void put_force(FILE *script, const accuracy_motion *m)
 {
-  for (size_t t = 0; t < m->count; t += 2) {
+  for (size_t t = 0; t < m->count; t += 4) {
     const double *f = m->frames[t].force[0];
     fprintf(script, "%.4g %.5g\n", (double)t / ACCURACY_HAPTIC_HZ,
             sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));

@@ -20,7 +20,7 @@ typedef struct impedance_variant {
 } impedance_variant;
 
 #define IMPEDANCE_VARIANTS 5
-extern const impedance_variant impedance_variants[IMPEDANCE_VARIANTS];
+extern impedance_variant impedance_variants[IMPEDANCE_VARIANTS]; /* --coupling changes one */
 
 /* A body behind the spring and damper of the contact, and those of the coupling where there is a
  * proxy: what is in series adds up in 1/Z. */
@@ -32,6 +32,8 @@ typedef struct impedance_truth {
   double damping;            /* N s/m */
   double coupling_stiffness; /* N/m; 0: direct */
   double coupling_damping;   /* N s/m */
+  bool rigid;                /* the contact does not give: the body goes with the tool */
+  double tool_mass;          /* kg */
 } impedance_truth;
 
 typedef struct impedance_point {

@@ -514,9 +514,10 @@ TEST(what_cannot_be_is_refused)
     double mass;
     double inertia;
     bool good;
-  } values[] = {{0.1, 0.0, true},  {1e-6, 0.0, true}, {1e6, 1e12, true}, {0.0, 0.0, false},
-                {-1.0, 0.0, false}, {NAN, 0.0, false}, {HUGE_VAL, 0.0, false},
-                {0.1, -1.0, false}, {0.1, NAN, false}, {0.1, HUGE_VAL, false}};
+  } values[] = {{0.1, 0.0, true},       {1e-6, 0.0, true},  {1e6, 1e12, true},
+                {0.0, 0.0, false},      {-1.0, 0.0, false}, {NAN, 0.0, false},
+                {HUGE_VAL, 0.0, false}, {0.1, -1.0, false}, {0.1, NAN, false},
+                {0.1, HUGE_VAL, false}};
   for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
     hap_pointer_id id;
     contact_world w;

@@ -269,8 +269,7 @@ static void set_reach(const hapi_tick *tick, hapi_tick_pointer *p, const double 
   if (p->hull != NULL) {
     p->reach += tick->period * p->extent * hapi_v3_norm(p->free_spin);
   }
-  p->speed_most =
-      is_god_object(p) ? hapi_v3_norm(p->handle_velocity) + CATCH_UP : HUGE_VAL;
+  p->speed_most = is_god_object(p) ? hapi_v3_norm(p->handle_velocity) + CATCH_UP : HUGE_VAL;
   p->spin_most = is_god_object(p) && p->hull != NULL
                      ? hapi_v3_norm(p->handle_spin) + CATCH_UP / p->extent
                      : HUGE_VAL;
