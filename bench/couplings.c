@@ -82,13 +82,13 @@ static hap_status measure_coupling(bench *b, const scene_parameters *which, size
 static hap_status measure_scene(bench *b, size_t index, couplings_table *table)
 {
   const scene_parameters *which = find_scene(couplings_scenes[index]);
-  accuracy_motion reference;
+  accuracy_motion reference = {.count = 0};
   if (which == NULL) {
     return bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", couplings_scenes[index]);
   }
   hap_status status = run(b, which, HAP_MODEL_SINGLE, HAP_COUPLING_DIRECT, &reference);
   for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
-    accuracy_motion motion;
+    accuracy_motion motion = {.count = 0};
     status = measure_coupling(b, which, c, &reference, &table->columns[c].scenes[index], &motion);
     if (status >= HAP_OK && index == 0) {
       table->motions[c] = motion;

@@ -104,7 +104,7 @@ static hap_status measure_point(bench *b, const port_def *common, double hz,
   sums s = {0};
   char device[256];
   double preload = impedance_cases[def.body].preload;
-  double depth = truth->rigid ? 0.0 : preload / IMPEDANCE_STIFFNESS;
+  double depth = preload / IMPEDANCE_STIFFNESS;
   if (truth->coupling_stiffness > 0.0) {
     depth += preload / truth->coupling_stiffness;
   }
@@ -151,9 +151,13 @@ static hap_status measure_curve(bench *b, port_body body, size_t variant, impeda
   };
   bool steady = true;
   c->truth = impedance_truth_of(body);
-  if (def.coupling != HAP_COUPLING_DIRECT) {
-    c->truth.rigid = def.coupling != HAP_COUPLING_PROXY;
-    c->truth.tool_mass = def.coupling == HAP_COUPLING_VIRTUAL ? TOOL_MASS : 0.0;
+  if (def.coupling == HAP_COUPLING_GOD_OBJECT || def.coupling == HAP_COUPLING_VIRTUAL) {
+    def.coupling_stiffness = IMPEDANCE_STIFFNESS; /* which is all that gives */
+    def.coupling_damping = IMPEDANCE_DAMPING;
+    c->truth.rigid = true;
+    c->truth.mass += def.coupling == HAP_COUPLING_VIRTUAL ? TOOL_MASS : 0.0;
+  }
+  if (def.coupling == HAP_COUPLING_PROXY) {
     c->truth.coupling_stiffness = def.coupling_stiffness = COUPLING_STIFFNESS;
     c->truth.coupling_damping = def.coupling_damping = COUPLING_DAMPING;
   }

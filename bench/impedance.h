@@ -32,8 +32,7 @@ typedef struct impedance_truth {
   double damping;            /* N s/m */
   double coupling_stiffness; /* N/m; 0: direct */
   double coupling_damping;   /* N s/m */
-  bool rigid;                /* the contact does not give: the body goes with the tool */
-  double tool_mass;          /* kg */
+  bool rigid; /* stiffness and damping are the coupling's, the mass has the tool's in it */
 } impedance_truth;
 
 typedef struct impedance_point {

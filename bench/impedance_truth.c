@@ -57,10 +57,9 @@ impedance_truth impedance_truth_of(port_body body)
 double complex impedance_of(const impedance_truth *truth, double hz)
 {
   double w = 2.0 * M_PI * hz;
-  double complex compliance =
-      truth->rigid ? 0.0 : 1.0 / (truth->stiffness + I * w * truth->damping);
+  double complex compliance = 1.0 / (truth->stiffness + I * w * truth->damping);
   if (!truth->grounded) {
-    compliance += 1.0 / (truth->body_stiffness - w * w * (truth->mass + truth->tool_mass));
+    compliance += 1.0 / (truth->body_stiffness - w * w * truth->mass);
   }
   if (truth->coupling_stiffness > 0.0) {
     compliance += 1.0 / (truth->coupling_stiffness + I * w * truth->coupling_damping);
