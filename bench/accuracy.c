@@ -8,6 +8,7 @@
  *                  starts that are 1 um to 1 mm apart. operating, operating_cross: probes about the
  *                  operating point, without and with cross accelerance; also the worst start, with
  *                  --quick the first one, and eq4 the default from there
+ *                  proxy, god-object, virtual (--coupling): through that, value N/m, all starts
  *   force_rel_rms  RMS of the difference / RMS of the reference, while either is in contact
  *   duty           computing time of all threads / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
@@ -47,6 +48,12 @@ static bool is_way_of_testing(const accuracy_row *row)
 {
   return strcmp(row->knob, ACCURACY_EQ4) == 0 || strcmp(row->knob, ACCURACY_OPERATING) == 0 ||
          strcmp(row->knob, ACCURACY_CROSS) == 0;
+}
+
+static bool is_coupling(const accuracy_row *row)
+{
+  hap_coupling coupling;
+  return bench_find_coupling(row->knob, &coupling);
 }
 
 static void write_row(FILE *csv, const accuracy_row *r)
@@ -129,7 +136,7 @@ static void report(bench *b, const accuracy_table *table)
     } else if (is_default(r) && bounded) {
       bench_say("%s at %g Hz: %s: force error %.3g %%, peak ratio %.3f", r->scene, r->physics_hz,
                 hap_model_name(r->model), 100.0 * r->errors.force, r->errors.peak_ratio);
-    } else if (is_way_of_testing(r) && bounded) {
+    } else if ((is_way_of_testing(r) || is_coupling(r)) && bounded) {
       bench_say("%s at %g Hz: %s, %s: force error %.3g %%, peak ratio %.3f", r->scene,
                 r->physics_hz, hap_model_name(r->model), r->knob, 100.0 * r->errors.force,
                 r->errors.peak_ratio);

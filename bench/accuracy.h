@@ -55,6 +55,7 @@ typedef struct accuracy_motion {
   accuracy_frame *frames; /* at 1 kHz, whatever the loop's own rate */
   size_t count;
   size_t bodies;
+  double deepest; /* m, that a pointer was in a body */
   hap_stats stats;
 } accuracy_motion;
 
@@ -69,6 +70,9 @@ typedef struct accuracy_run_def {
   int latency_ticks;
   hap_probe probe;
   hap_cross cross;
+  hap_coupling coupling;     /* default: direct */
+  double coupling_stiffness; /* N/m */
+  double coupling_damping;   /* N s/m */
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */

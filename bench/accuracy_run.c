@@ -22,6 +22,7 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->latency_ticks = library.physics_latency_ticks;
   def->probe = library.probe;
   def->cross = library.cross;
+  def->coupling = HAP_COUPLING_DIRECT;
 }
 
 static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
@@ -41,6 +42,9 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.def.physics_latency_ticks = def->latency_ticks;
   options.def.probe = def->probe;
   options.def.cross = def->cross;
+  options.coupling = def->coupling;
+  options.coupling_stiffness = def->coupling_stiffness;
+  options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
   hap_status status = rig_create(&options, r, &b->detail);
   return status >= HAP_OK ? hap_session_start(r->session) : status;
@@ -68,6 +72,16 @@ static void note_frame(const rig *r, const hap_trace_row *row, accuracy_frame *o
   out->local = local_bodies(r, row->body_count);
 }
 
+static double deepest_now(const rig *r)
+{
+  const hapi_tick *tick = &r->session->haptic->tick;
+  double deepest = 0.0;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    deepest = fmax(deepest, tick->contacts[i].ramp.depth);
+  }
+  return deepest;
+}
+
 /* With a faster loop every frame is the first of its ticks: the one at that time. */
 static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *out)
 {
@@ -83,6 +97,7 @@ static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *
         note_frame(r, &row, &out->frames[i]);
         out->bodies = row.body_count;
       }
+      out->deepest = fmax(out->deepest, deepest_now(r));
     }
   }
   return status;

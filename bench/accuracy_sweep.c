@@ -57,6 +57,7 @@ typedef struct setting {
   size_t start_count;
   hap_probe probe;
   hap_cross cross;
+  hap_coupling coupling; /* DIRECT, or with the spring and damper of the scene's contacts */
 } setting;
 
 void accuracy_table_free(accuracy_table *table)
@@ -229,6 +230,11 @@ static hap_status run_model(const sweep *s, const setting *set, size_t i, double
   def.latency_ticks = set->latency_ticks;
   def.probe = set->probe;
   def.cross = set->cross;
+  def.coupling = set->coupling;
+  if (set->coupling != HAP_COUPLING_DIRECT) {
+    def.coupling_stiffness = s->parameters.stiffness;
+    def.coupling_damping = s->parameters.damping;
+  }
   return run_from(s, &def, starts[s->start[i]], 0, out);
 }
 
@@ -351,9 +357,20 @@ static hap_status sweep_probes(sweep *s)
   return status;
 }
 
+/* From all starts, as a row of its own. */
+static hap_status sweep_coupling(sweep *s)
+{
+  setting set = setting_of(s, HAP_MODEL_CONTACT, s->bench->coupling, s->parameters.stiffness);
+  set.start_count = s->start_count;
+  return bench_find_coupling(s->bench->coupling, &set.coupling) ? measure(s, &set) : HAP_OK;
+}
+
 static hap_status sweep_models(sweep *s)
 {
   hap_status status = measure_contact(s);
+  if (status >= HAP_OK && s->bench->coupling != NULL) {
+    status = sweep_coupling(s);
+  }
   for (size_t i = 0; i < COUNT(models) && status >= HAP_OK; ++i) {
     setting set = setting_of(s, models[i], "default", 0.0);
     status = models[i] != HAP_MODEL_CONTACT ? measure(s, &set) : status;

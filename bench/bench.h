@@ -10,6 +10,7 @@
 #include <stdio.h>
 
 #include <hapode/attributes.h>
+#include <hapode/pointer.h>
 #include <hapode/status.h>
 
 typedef struct bench {
@@ -18,6 +19,9 @@ typedef struct bench {
   bool verify;       /* say "ok" or "off" */
   const char *scene; /* accuracy, tick: this one alone; NULL: all */
   const char *only;  /* stability: such points alone, KEY=VALUE,...; NULL: all */
+  const char
+      *coupling;     /* accuracy, impedance: a name of hap_coupling that is measured as well; NULL:
+                              none */
   int off;           /* checks that were off */
   hap_detail detail; /* why a program failed */
 } bench;
@@ -26,6 +30,7 @@ typedef struct bench {
 typedef hap_status (*bench_fn)(bench *b);
 
 hap_status bench_accuracy(bench *b);
+hap_status bench_couplings(bench *b);
 hap_status bench_edits(bench *b);
 hap_status bench_fig5(bench *b);
 hap_status bench_fig6(bench *b);
@@ -45,6 +50,9 @@ FILE *bench_csv_open(bench *b, const char *name, const char *header);
 hap_status bench_csv_close(bench *b, FILE *csv); /* NULL: what open said */
 
 hap_status bench_fail(bench *b, hap_status status, const char *format, ...) HAP_PRINTF(3, 4);
+
+/* One with a spring, by its name; false: there is none. */
+bool bench_find_coupling(const char *name, hap_coupling *out);
 
 /* A measured number as a line of stdout. */
 void bench_say(const char *format, ...) HAP_PRINTF(1, 2);

@@ -115,3 +115,14 @@ bool bench_within(double value, double wanted, double relative)
 {
   return fabs(value - wanted) <= relative * fabs(wanted);
 }
+
+bool bench_find_coupling(const char *name, hap_coupling *out)
+{
+  for (int i = 0; hap_coupling_name((hap_coupling)i) != NULL; ++i) {
+    if (strcmp(name, hap_coupling_name((hap_coupling)i)) == 0) {
+      *out = (hap_coupling)i;
+      return *out != HAP_COUPLING_DIRECT && *out != HAP_COUPLING_AUTO;
+    }
+  }
+  return false;
+}

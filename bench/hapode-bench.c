@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]: measures, writes NAME.csv and
- * NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
+/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling NAME]: measures,
+ * writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
 
@@ -17,14 +17,20 @@ typedef struct program {
 } program;
 
 static const program programs[] = {
-    {"accuracy", bench_accuracy, "what accuracy costs in time; --scene NAME: of one scene alone"},
+    {"accuracy", bench_accuracy,
+     "what accuracy costs in time; --scene NAME: of one scene alone; --coupling NAME: through it "
+     "too"},
+    {"couplings", bench_couplings,
+     "direct and proxy against god-object and virtual coupling: force, depth, stability, drag"},
     {"edits", bench_edits,
      "a world that threads change all the time under sixteen hands: ticks, steps, waits, forces"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
     {"impedance", bench_impedance,
-     "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device"},
+     "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device; "
+     "--coupling\n"
+     "             NAME: through it in the proxy's place"},
     {"jitter", bench_jitter,
      "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
     {"poses", bench_poses,
@@ -47,6 +53,7 @@ static void print_usage(FILE *to)
   fprintf(
       to,
       "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]\n"
+      "                    [--coupling NAME]\n"
       "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
@@ -61,6 +68,13 @@ static const program *find_program(const char *name)
     }
   }
   return NULL;
+}
+
+static bool takes_coupling(const program *p, const char *name)
+{
+  hap_coupling coupling;
+  return (p->run == bench_accuracy || p->run == bench_impedance) &&
+         bench_find_coupling(name, &coupling);
 }
 
 /* False: not understood, and stderr says what. */
@@ -81,6 +95,8 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
       b->scene = arguments[++i];
     } else if (strcmp(argument, "--only") == 0 && i + 1 < count) {
       b->only = arguments[++i];
+    } else if (strcmp(argument, "--coupling") == 0 && i + 1 < count) {
+      b->coupling = arguments[++i];
     } else if (argument[0] == '-' || *out != NULL) {
       fprintf(stderr, "hapode-bench: \"%s\" is not understood\n", argument);
       return false;
@@ -93,6 +109,12 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
     fprintf(stderr, "hapode-bench: which bench?\n");
   } else if (b->scene != NULL && (*out)->run != bench_accuracy && (*out)->run != bench_tick) {
     fprintf(stderr, "hapode-bench: %s has no scenes to choose from\n", (*out)->name);
+    return false;
+  }
+  if (*out != NULL && b->coupling != NULL && !takes_coupling(*out, b->coupling)) {
+    fprintf(
+        stderr,
+        "hapode-bench: --coupling is proxy, god-object or virtual, for accuracy and impedance\n");
     return false;
   }
   if (*out != NULL && b->only != NULL && (*out)->run != bench_stability) {

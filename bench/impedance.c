@@ -22,6 +22,8 @@
 #define FORCE_SHARE 0.3     /* of the preload: the contact stays closed */
 #define COUPLING_STIFFNESS 3200.0
 #define COUPLING_DAMPING 0.2
+#define VARIANT_COUPLED 1
+#define TOOL_MASS 0.1 /* kg, of a virtual tool: the library's default */
 #define FIT_HZ 50.0
 #define FIT_BOUND 0.01
 #define FIT_BOUND_PROXY 0.02 /* its velocities are half a tick old */
@@ -29,7 +31,7 @@
 #define TURNING_BOUND 0.02 /* of a flap through a proxy */
 #define STEADY 0.05        /* of the residual: above it the force is no sine, and Z says little */
 
-const impedance_variant impedance_variants[IMPEDANCE_VARIANTS] = {
+impedance_variant impedance_variants[IMPEDANCE_VARIANTS] = {
     {"contact", HAP_MODEL_CONTACT, HAP_COUPLING_DIRECT},
     {"contact, proxy", HAP_MODEL_CONTACT, HAP_COUPLING_PROXY},
     {"accelerance", HAP_MODEL_ACCELERANCE, HAP_COUPLING_DIRECT},
@@ -149,6 +151,12 @@ static hap_status measure_curve(bench *b, port_body body, size_t variant, impeda
   };
   bool steady = true;
   c->truth = impedance_truth_of(body);
+  if (def.coupling == HAP_COUPLING_GOD_OBJECT || def.coupling == HAP_COUPLING_VIRTUAL) {
+    def.coupling_stiffness = IMPEDANCE_STIFFNESS; /* which is all that gives */
+    def.coupling_damping = IMPEDANCE_DAMPING;
+    c->truth.rigid = true;
+    c->truth.mass += def.coupling == HAP_COUPLING_VIRTUAL ? TOOL_MASS : 0.0;
+  }
   if (def.coupling == HAP_COUPLING_PROXY) {
     c->truth.coupling_stiffness = def.coupling_stiffness = COUPLING_STIFFNESS;
     c->truth.coupling_damping = def.coupling_damping = COUPLING_DAMPING;
@@ -201,7 +209,7 @@ static void write_point(FILE *csv, int body, size_t variant, const impedance_poi
   double w = 2.0 * M_PI * p->hz;
   const impedance_variant *v = &impedance_variants[variant];
   fprintf(csv, "%s,%s,%s,%.6g,%.6g", impedance_cases[body].name, hap_model_name(v->model),
-          v->coupling == HAP_COUPLING_PROXY ? "proxy" : "direct", p->hz, p->amplitude);
+          hap_coupling_name(v->coupling), p->hz, p->amplitude);
   fprintf(csv, ",%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", creal(p->felt), cimag(p->felt) / w,
           -creal(p->felt) / (w * w), creal(p->truth), cimag(p->truth) / w,
           -creal(p->truth) / (w * w));
@@ -290,7 +298,8 @@ static void report_fit(bench *b, const char *name, const impedance_curve *c, boo
 static void report_curve(bench *b, int body, size_t variant, const impedance_table *table)
 {
   const impedance_curve *c = &table->curves[body][variant];
-  bool bound = impedance_variants[variant].model == HAP_MODEL_CONTACT;
+  /* What is felt through those of the literature is said only. */
+  bool bound = impedance_variants[variant].model == HAP_MODEL_CONTACT && !c->truth.rigid;
   bool turns = body == PORT_HINGE && impedance_variants[variant].coupling == HAP_COUPLING_PROXY;
   double sampled_bound = turns ? TURNING_BOUND : SAMPLED_BOUND;
   worst low = find_worst(c, table->points, FIT_HZ);
@@ -326,11 +335,22 @@ static hap_status run_impedance(bench *b, impedance_table *table)
   return status >= HAP_OK ? impedance_draw(b, table) : status;
 }
 
+static void choose_coupling(const char *name)
+{
+  impedance_variant *v = &impedance_variants[VARIANT_COUPLED];
+  if (bench_find_coupling(name, &v->coupling) && v->coupling != HAP_COUPLING_PROXY) {
+    v->name = v->coupling == HAP_COUPLING_VIRTUAL ? "contact, virtual" : "contact, god-object";
+  }
+}
+
 hap_status bench_impedance(bench *b)
 {
   impedance_table *table = calloc(1, sizeof *table);
   if (table == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the curves");
+  }
+  if (b->coupling != NULL) {
+    choose_coupling(b->coupling);
   }
   hap_status status = run_impedance(b, table);
   free(table);

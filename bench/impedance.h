@@ -20,7 +20,7 @@ typedef struct impedance_variant {
 } impedance_variant;
 
 #define IMPEDANCE_VARIANTS 5
-extern const impedance_variant impedance_variants[IMPEDANCE_VARIANTS];
+extern impedance_variant impedance_variants[IMPEDANCE_VARIANTS]; /* --coupling changes one */
 
 /* A body behind the spring and damper of the contact, and those of the coupling where there is a
  * proxy: what is in series adds up in 1/Z. */
@@ -32,6 +32,7 @@ typedef struct impedance_truth {
   double damping;            /* N s/m */
   double coupling_stiffness; /* N/m; 0: direct */
   double coupling_damping;   /* N s/m */
+  bool rigid; /* stiffness and damping are the coupling's, the mass has the tool's in it */
 } impedance_truth;
 
 typedef struct impedance_point {
@@ -89,5 +90,9 @@ hap_status impedance_draw(bench *b, const impedance_table *table);
 /* ---- zwidth.c ---- */
 
 hap_status zwidth_run(bench *b);
+
+/* N/m, the stiffest that a desktop stylus without a hand feels and holds: direct of a wall, else of a
+ * coupling's spring before a wall that does not give (1 MN/m). */
+hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out);
 
 #endif

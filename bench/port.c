@@ -149,6 +149,7 @@ static hap_status add_pointer(bench *b, port *p, const port_def *def)
   pointer.coupling = def->coupling;
   pointer.coupling_stiffness = def->coupling_stiffness;
   pointer.coupling_damping = def->coupling_damping;
+  pointer.virtual_mass = def->virtual_mass > 0.0 ? def->virtual_mass : pointer.virtual_mass;
   pointer.max_force = 1e6;
   status = hap_pointer_add(p->session, &pointer, &p->pointer);
   if (status >= HAP_OK) {

@@ -43,6 +43,7 @@ typedef struct port_def {
   hap_coupling coupling;
   double coupling_stiffness; /* N/m; 0: from the device's figures */
   double coupling_damping;   /* N s/m */
+  double virtual_mass;       /* kg; 0: the default */
   double stiffness;          /* N/m, of the contact */
   double damping;            /* N s/m, of the contact */
 } port_def;

@@ -70,6 +70,7 @@ typedef struct stability_result {
 const char *stability_hand_word(stability_hand hand); /* as the virtual device spells it */
 const char *stability_layout_word(stability_layout layout);
 const char *stability_coupling_word(hap_coupling coupling);
+bool stability_is_rigid(hap_coupling coupling); /* contacts that do not give */
 
 hap_status stability_run(bench *b, const stability_point *point, double seconds,
                          stability_result *out);

@@ -223,7 +223,7 @@ static double springs(const stability_bed *s)
   const hapi_tick *tick = &s->session->haptic->tick;
   const hapi_tick_pointer *p = &tick->pointers[0];
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+  for (uint32_t i = 0; i < tick->contact_count && !p->rigid; ++i) {
     const double *force = tick->contacts[i].force;
     sum += 0.5 * hapi_v3_dot(force, force) / s->point->stiffness;
   }
@@ -232,6 +232,7 @@ static double springs(const stability_bed *s)
     hapi_v3_sub(p->proxy_position, p->handle_position, apart);
     hapi_v3_sub(apart, p->offset, apart);
     sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
+    sum += 0.5 * p->proxy_mass * hapi_v3_dot(p->proxy_velocity, p->proxy_velocity);
   }
   return sum;
 }
@@ -268,15 +269,19 @@ const char *stability_layout_word(stability_layout layout)
 
 const char *stability_coupling_word(hap_coupling coupling)
 {
-  return coupling == HAP_COUPLING_DIRECT  ? "direct"
-         : coupling == HAP_COUPLING_PROXY ? "proxy"
-                                          : "auto";
+  return hap_coupling_name(coupling);
+}
+
+bool stability_is_rigid(hap_coupling coupling)
+{
+  return coupling == HAP_COUPLING_GOD_OBJECT || coupling == HAP_COUPLING_VIRTUAL;
 }
 
 static double in_series(const stability_point *p, double held)
 {
   double k = p->stiffness * p->contacts / (p->layout == STABILITY_CAGE ? 2 : 1);
-  return p->coupling == HAP_COUPLING_DIRECT ? k : k * held / (k + held);
+  double series = stability_is_rigid(p->coupling) ? held : k * held / (k + held);
+  return p->coupling == HAP_COUPLING_DIRECT ? k : series;
 }
 
 static void write_hand(const stability_point *p, char out[128])

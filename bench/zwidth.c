@@ -24,6 +24,7 @@
 #define STIFFNESS_LEAST 1.0
 #define STIFFNESS_MOST 1e6
 #define STIFFNESS_STEP 1.003 /* how well a limit is found */
+#define COUPLING_STEP 1.01   /* the same between couplings */
 #define HAND_MASS 1e-3       /* kg, of the weak spring's end: the least that the device takes */
 #define LINEAR_BOUND 0.01
 #define STATES 4 /* of the loop: place, velocity, the forces of two ticks */
@@ -182,14 +183,17 @@ typedef struct trial {
   hap_coupling coupling;
   double k; /* of the wall */
   double b;
-  double coupling_stiffness; /* N/m, known from an earlier run */
+  double coupling_stiffness; /* N/m, known from an earlier run, or */
+  bool given;                /* told to the library */
   bool stable;
 } trial;
 
 static double felt_stiffness(const trial *t)
 {
   double c = t->coupling_stiffness;
-  return t->coupling == HAP_COUPLING_PROXY ? t->k * c / (t->k + c) : t->k;
+  return t->coupling == HAP_COUPLING_DIRECT  ? t->k
+         : t->coupling == HAP_COUPLING_PROXY ? t->k * c / (t->k + c)
+                                             : c;
 }
 
 static void spell_device(const trial *t, char *out, size_t size)
@@ -214,7 +218,8 @@ static hap_status run_trial(bench *b, trial *t)
                   .model = HAP_MODEL_CONTACT,
                   .coupling = t->coupling,
                   .stiffness = t->k,
-                  .damping = t->b};
+                  .damping = t->b,
+                  .coupling_stiffness = t->given ? t->coupling_stiffness : 0.0};
   spell_device(t, device, sizeof device);
   hap_status status = port_open(b, &def, &p);
   if (status < HAP_OK) {
@@ -260,6 +265,24 @@ static hap_status find_direct(bench *b, const zwidth_device *d, double damping, 
     *(t.stable ? &low : &high) = t.k;
   }
   *out = any ? low : 0.0;
+  return status;
+}
+
+hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out)
+{
+  trial t = {.device = &devices[0], .k = STIFFNESS_MOST, .coupling = coupling};
+  double low = 10.0 * STIFFNESS_LEAST;
+  double high = STIFFNESS_MOST;
+  hap_status status = HAP_OK;
+  t.given = coupling != HAP_COUPLING_DIRECT;
+  *out = 0.0;
+  for (double middle = low; status >= HAP_OK && high > low * COUPLING_STEP;
+       middle = sqrt(low * high)) {
+    *(t.given ? &t.coupling_stiffness : &t.k) = middle;
+    status = run_trial(b, &t);
+    *(t.stable ? &low : &high) = middle;
+    *out = t.stable ? felt_stiffness(&t) : *out;
+  }
   return status;
 }
 

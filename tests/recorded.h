@@ -37,6 +37,9 @@ typedef struct recorded_setup {
   hap_record_def record;               /* its path is the file's */
   hap_probe probe;
   hap_cross cross;
+  hap_coupling coupling; /* with a spring; else as the rig has it */
+  double coupling_stiffness;
+  double virtual_mass;
 } recorded_setup;
 
 static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model model, int ms)
@@ -57,6 +60,11 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   options.def.probe = s->probe;
   options.def.cross = s->cross;
   options.record = &s->record;
+  if (s->coupling_stiffness > 0.0) {
+    options.coupling = s->coupling;
+    options.coupling_stiffness = s->coupling_stiffness;
+    options.virtual_mass = s->virtual_mass;
+  }
   for (int i = 0; i < 3 && s->devices[i] != NULL; ++i) {
     options.devices[options.device_count++] = s->devices[i];
   }

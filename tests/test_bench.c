@@ -208,6 +208,19 @@ TEST(poses_are_drawn_within_their_bound)
   unlink(file_in_folder("poses_cost", ".csv"));
 }
 
+TEST(couplings_are_side_by_side)
+{
+  const char *const arguments[] = {"couplings", "--verify", "--quick", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "couplings: 0 off") == 1);
+  CHECK(count_rows(file_in_folder("couplings", ".csv"),
+                   "coupling,scene,force_rel_rms,torque_rel_rms,peak_ratio,penetration_mm,tick_us,"
+                   "stable_stiffness,mass_felt,damping_felt") == 24);
+  CHECK(!plot_available() || exists(file_in_folder("couplings", ".svg")));
+  unlink(file_in_folder("couplings", ".csv"));
+  unlink(file_in_folder("couplings", ".svg"));
+}
+
 TEST(impedance_is_that_of_the_closed_forms)
 {
   const char *const arguments[] = {"impedance", "--verify", "--quick", "--out", folder, NULL};
@@ -396,6 +409,7 @@ int main(void)
   RUN(spidar_numerics_hold);
   RUN(scaling_leaves_its_table);
   RUN(poses_are_drawn_within_their_bound);
+  RUN(couplings_are_side_by_side);
   RUN(impedance_is_that_of_the_closed_forms);
   RUN(tick_leaves_its_table);
   RUN(accuracy_sets_models_side_by_side);

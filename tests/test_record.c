@@ -166,6 +166,19 @@ TEST(ways_of_testing)
   }
 }
 
+/* The mass is not the default's: it is in the file. */
+TEST(couplings_of_the_literature)
+{
+  static const char *const scenes[] = {"slide", "peg"};
+  for (int i = 0; i < 4; ++i) {
+    recorded_setup s = recorded_setup_of(scenes[i / 2], HAP_MODEL_CONTACT, 700);
+    s.coupling = i % 2 == 0 ? HAP_COUPLING_GOD_OBJECT : HAP_COUPLING_VIRTUAL;
+    s.coupling_stiffness = 800.0;
+    s.virtual_mass = 0.25;
+    (void)check_setup(&s);
+  }
+}
+
 TEST(two_pointers_and_a_replayed_motion)
 {
   char spec[400];
@@ -825,6 +838,7 @@ int main(void)
   RUN(scenes_in_model_contact);
   RUN(scenes_in_the_paper_s_models);
   RUN(ways_of_testing);
+  RUN(couplings_of_the_literature);
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);
   RUN(a_step_that_takes_long);

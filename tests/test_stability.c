@@ -19,6 +19,8 @@ typedef struct hard_point {
 
 #define PROXY .integration = HAP_INTEGRATION_IMPLICIT, .coupling = HAP_COUPLING_PROXY
 #define AUTO .integration = HAP_INTEGRATION_AUTO, .coupling = HAP_COUPLING_AUTO
+#define GOD .integration = HAP_INTEGRATION_AUTO, .coupling = HAP_COUPLING_GOD_OBJECT
+#define VIRTUAL .integration = HAP_INTEGRATION_AUTO, .coupling = HAP_COUPLING_VIRTUAL
 
 /* stiffness, mass, contacts, cubes, layout, hand, delay in ticks, quantum, missed ticks */
 static const hard_point points[] = {
@@ -43,6 +45,18 @@ static const hard_point points[] = {
      {AUTO, 100, 10, 64, true, STABILITY_CAGE, STABILITY_RELAXED, 2, 3e-5, true}},
     {"the same, softer and without a hand",
      {PROXY, 10, 10, 64, true, STABILITY_CAGE, STABILITY_NONE, 1.5, 3e-5, false}},
+    {"god-object, light bodies between two sides",
+     {GOD, 1e3, 1e-3, 8, false, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+    {"god-object, cubes on a floor, real device",
+     {GOD, 1e3, 0.1, 8, true, STABILITY_BACKED, STABILITY_TENSE, 2, 3e-5, true}},
+    {"god-object, pushed away",
+     {GOD, 1e3, 1e-3, 8, false, STABILITY_FREE, STABILITY_TENSE, 0.5, 3e-5, true}},
+    {"virtual, light bodies between two sides",
+     {VIRTUAL, 1e3, 1e-3, 8, false, STABILITY_CAGE, STABILITY_NONE, 0, 0, false}},
+    {"virtual, cubes on a floor, real device",
+     {VIRTUAL, 1e3, 0.1, 8, true, STABILITY_BACKED, STABILITY_TENSE, 2, 3e-5, true}},
+    {"virtual, pushed away",
+     {VIRTUAL, 1e3, 1.0, 8, false, STABILITY_FREE, STABILITY_TENSE, 0.5, 3e-5, true}},
 };
 
 static bench unused; /* takes the text of an error */

@@ -28,6 +28,8 @@ typedef struct rig_options {
   double finger_radius;              /* m, of the pointers; < 0: the scene's */
   hap_coupling coupling;
   double coupling_stiffness; /* N/m, of hap_pointer_def */
+  double coupling_damping;   /* N s/m, likewise */
+  double virtual_mass;       /* kg, likewise; 0: the default */
   hap_session_def def;
   const hap_record_def *record; /* not NULL: the session is recorded */
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */

@@ -16,7 +16,7 @@ void run_coupling_look(run_coupling *io, const rig *r)
 
 static void print_reason(const hap_pointer_state *state, FILE *out)
 {
-  bool proxy = state->coupling == HAP_COUPLING_PROXY;
+  bool spring = state->coupling != HAP_COUPLING_DIRECT;
   switch ((hap_coupling_reason)state->coupling_reason) {
     case HAP_COUPLING_ASKED:
       fputs("ASKED", out);
@@ -37,7 +37,7 @@ static void print_reason(const hap_pointer_state *state, FILE *out)
               state->coupling_stiffness);
       break;
   }
-  if (proxy && state->coupling_reason == HAP_COUPLING_ASKED) {
+  if (spring && state->coupling_reason == HAP_COUPLING_ASKED) {
     fprintf(out, ": a spring of %.4g N/m", state->coupling_stiffness);
   }
 }
@@ -47,8 +47,7 @@ void run_coupling_print(const run_coupling *coupling, size_t pointers, FILE *out
   fputs("coupling: ", out);
   for (size_t i = 0; i < pointers; ++i) {
     const hap_pointer_state *state = &coupling->stiffest[i];
-    fprintf(out, "%s%s (", i > 0 ? " + " : "",
-            state->coupling == HAP_COUPLING_PROXY ? "proxy" : "direct");
+    fprintf(out, "%s%s (", i > 0 ? " + " : "", hap_coupling_name((hap_coupling)state->coupling));
     print_reason(state, out);
     fputc(')', out);
   }

@@ -96,17 +96,15 @@ static hap_status take_effects(run_options *options, const option *self, const c
   return run_effects_parse(value, &options->effects, detail);
 }
 
-/* direct, proxy[:K], auto[:K] */
+/* A name of hap_coupling, with :K where there is a spring. */
 static hap_status take_coupling(run_options *options, const option *self, const char *value,
                                 hap_detail *detail)
 {
-  static const char *const names[] = {[HAP_COUPLING_DIRECT] = "direct",
-                                      [HAP_COUPLING_PROXY] = "proxy",
-                                      [HAP_COUPLING_AUTO] = "auto"};
   size_t length = strcspn(value, ":");
-  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+  const char *name = NULL;
+  for (int i = 0; (name = hap_coupling_name((hap_coupling)i)) != NULL; ++i) {
     bool bare = value[length] == '\0';
-    if (strlen(names[i]) != length || memcmp(value, names[i], length) != 0 ||
+    if (strlen(name) != length || memcmp(value, name, length) != 0 ||
         (i == HAP_COUPLING_DIRECT && !bare)) {
       continue;
     }
@@ -115,7 +113,11 @@ static hap_status take_coupling(run_options *options, const option *self, const 
     options->coupling_given = true;
     return bare ? HAP_OK : take_number(options, self, value + length + 1, detail);
   }
-  return fail(detail, "\"%.60s\" is not direct, proxy, proxy:K, auto or auto:K, K in N/m", value);
+  return fail(
+      detail,
+      "\"%.60s\" is not direct, proxy:K, auto:K, god-object:K or virtual:K; K in N/m, and may "
+      "be left out",
+      value);
 }
 
 static hap_status take_pose(run_options *options, const option *self, const char *value,
@@ -280,8 +282,11 @@ static const option table[] = {
      take_number, offsetof(run_options, rig.finger_radius), 0, 1},
     {"--coupling", "NAME[:K]",
      "of hand and world: direct, proxy or auto (default), which takes the proxy for\n"
-     "more than the device holds; K: what it holds, N/m (default: its own figures)",
+     "more than the device holds; god-object or virtual, as in the literature. K: what\n"
+     "the device holds, N/m (default: its own figures)",
      take_coupling, offsetof(run_options, rig.coupling_stiffness), 1e-3, 1e9},
+    {"--virtual-mass", "KG", "of the tool of coupling virtual (default 0.1)", take_number,
+     offsetof(run_options, rig.virtual_mass), 1e-6, 1e6},
     {"--effects", "LIST", "such as friction=off,torque=auto; see --list", take_effects, 0, 0, 0},
     {"--trace", "FILE", "every tick as a row of a CSV file", take_text,
      offsetof(run_options, trace_path), 0, 0},
@@ -375,19 +380,24 @@ static hap_status join_coupling(run_options *o, hap_detail *detail)
 {
   static const run_effect_wish wishes[] = {[HAP_COUPLING_DIRECT] = RUN_EFFECT_OFF,
                                            [HAP_COUPLING_PROXY] = RUN_EFFECT_ON,
-                                           [HAP_COUPLING_AUTO] = RUN_EFFECT_AUTO};
+                                           [HAP_COUPLING_AUTO] = RUN_EFFECT_AUTO,
+                                           [HAP_COUPLING_GOD_OBJECT] = RUN_EFFECT_ON,
+                                           [HAP_COUPLING_VIRTUAL] = RUN_EFFECT_ON};
   static const hap_coupling couplings[] = {[RUN_EFFECT_OFF] = HAP_COUPLING_DIRECT,
                                            [RUN_EFFECT_ON] = HAP_COUPLING_PROXY,
                                            [RUN_EFFECT_AUTO] = HAP_COUPLING_AUTO};
   run_effect_wish *proxy = run_effects_wish(&o->effects, "proxy");
-  if (o->rig.coupling == HAP_COUPLING_PROXY && o->rig.def.model != HAP_MODEL_CONTACT) {
-    return fail(detail, "--coupling: proxy needs --model contact");
+  if (wishes[o->rig.coupling] == RUN_EFFECT_ON && o->rig.def.model != HAP_MODEL_CONTACT) {
+    return fail(detail, "--coupling: %s needs --model contact", hap_coupling_name(o->rig.coupling));
   }
   if (o->coupling_given && *proxy != RUN_EFFECT_AUTO && *proxy != wishes[o->rig.coupling]) {
     return fail(detail, "--coupling: --effects asks for something else by proxy=");
   }
+  if (o->rig.virtual_mass > 0.0 && o->rig.coupling != HAP_COUPLING_VIRTUAL) {
+    return fail(detail, "--virtual-mass: it belongs to --coupling virtual");
+  }
   *proxy = o->coupling_given ? wishes[o->rig.coupling] : *proxy;
-  o->rig.coupling = couplings[*proxy];
+  o->rig.coupling = o->coupling_given ? o->rig.coupling : couplings[*proxy];
   return HAP_OK;
 }
 

@@ -27,10 +27,25 @@ typedef enum hap_coupling {
                               hand feels is never stiffer than the spring, however many contacts
                               push. Model contact only: in another one, when the session changes its
                               model, the pointer is direct meanwhile */
-  HAP_COUPLING_AUTO = 2   /* direct, and a proxy as soon as the stiffnesses of the contacts near the
+  HAP_COUPLING_AUTO = 2,  /* direct, and a proxy as soon as the stiffnesses of the contacts near the
                               pointer add up to more than the device can hold; where it does not say
                               what that is, and in other models than contact, direct */
+  /* The two that the literature knows, to compare with. Their contacts do not give: the pointer does not
+   * enter bodies, and stiffness, damping and integration of hap_pointer_def have no part in them; the
+   * spring to the device, and where they are in force, are those of PROXY. docs/numerics.md. */
+  HAP_COUPLING_GOD_OBJECT =
+      3, /* constraint-based: the pointer has no mass and is, of all places out of the
+                                  bodies that it can slide to, where the spring to the device is shortest
+                                  (Zilles and Salisbury 1995; tools: Ortega, Redon and Coquillart 2007).
+                                  In the air it is the device, and there is no force */
+  HAP_COUPLING_VIRTUAL =
+      4 /* virtual coupling: the pointer is a rigid body of virtual_mass that the spring
+                              pulls, and meets bodies as such, without rebound (Colgate, Stanley and Brown
+                              1995; McNeely, Puterbaugh and Troy 1999). In the air its mass is felt */
 } hap_coupling;
+
+/* [any] Name of a coupling as programs spell it ("god-object"); NULL for an unknown value. */
+HAP_API const char *hap_coupling_name(hap_coupling coupling);
 
 /* Why a pointer has the coupling that it has. Values are fixed. */
 typedef enum hap_coupling_reason {
@@ -67,7 +82,7 @@ typedef struct hap_pointer_def {
                          and it is not in the world before the first target */
   double radius; /* m, 1e-6..100, default 0.01: the pointer is a sphere. With a hull 0..100: it is
                          rounded by a ball of that radius, which is swept over it; 0: sharp */
-  double mass;   /* kg, 0..1e6, default 0: of the coupling's proxy */
+  double mass;   /* kg, 0..1e6, default 0: of HAP_COUPLING_PROXY and AUTO's proxy */
   double stiffness; /* N/m, 0..1e9, default 1000: k of eq. 7. The points at which a hull touches one
                          geom and is pushed the same way have it together, each the same share: a
                          flat push feels k, a face of the half width r that is tilted on a plane
@@ -114,6 +129,12 @@ typedef struct hap_pointer_def {
                            one limit (docs/numerics.md). Needs friction. A pointer whose device has 3
                            degrees of freedom does not turn itself; others turn with the device, whose
                            torque is about the pointer's centre. */
+  double
+      virtual_mass; /* kg, 1e-6..1e6, default 0.1: of HAP_COUPLING_VIRTUAL. It is felt in the air, and
+                             swings on the spring at sqrt(coupling_stiffness / virtual_mass) */
+  double
+      virtual_inertia; /* kg m^2, 0..1e12: of its hull about every axis through the pointer's origin;
+                             0 (default): of a ball of that mass as large as the hull (docs/numerics.md) */
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. */
@@ -166,12 +187,14 @@ typedef struct hap_pointer_state {
   hap_wrench wrench;         /* on the hand, world frame, after the guard: what was written to the
                            device, divided by force_scale */
   uint32_t buttons;          /* bit 0 is the first one */
-  uint32_t coupling;         /* hap_coupling in force: direct or proxy */
+  uint32_t coupling;         /* hap_coupling in force: never HAP_COUPLING_AUTO */
   uint32_t coupling_reason;  /* hap_coupling_reason */
   uint32_t guard;            /* hap_guard_flag bits */
   double coupling_stiffness; /* N/m at the device, of the proxy's spring; 0: there is none */
   double coupling_damping;   /* N s/m at the device */
-  double contact_stiffness;  /* N/m at the device, sum over the contacts near the pointer */
+  double
+      contact_stiffness; /* N/m at the device, sum over the contacts near the pointer; 0 where they
+                                do not give (god-object, virtual) */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. */
@@ -180,7 +203,7 @@ HAP_API hap_status hap_pointer_get(const hap_session *session, hap_pointer_id po
 
 /* [any] For drawing: the pointer (out_proxy) and the device (out_device) in the world at the time that
  * hap_session_poses draws for time_ns, so that the drawn hand touches the drawn body. Either may be
- * NULL. The two are apart only for a pointer that is a proxy; a sphere turns with the device also then.
+ * NULL. The two are apart only for a pointer that is a proxy, god-object or virtual tool; a sphere turns with the device also then.
  * HAP_STALE, HAP_CLAMPED: as hap_session_poses. HAP_ERROR_NOT_FOUND, and nothing is written: no such
  * pointer, or no tick has had it yet. The newest: hap_pointer_get. */
 HAP_API hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,

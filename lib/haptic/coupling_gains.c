@@ -7,6 +7,23 @@
 #define MARGIN 0.8        /* of the stiffness at which damping is used up */
 #define DAMPING_SHARE 0.5 /* of what the stiffness leaves */
 
+const char *hap_coupling_name(hap_coupling coupling)
+{
+  switch (coupling) {
+    case HAP_COUPLING_DIRECT:
+      return "direct";
+    case HAP_COUPLING_PROXY:
+      return "proxy";
+    case HAP_COUPLING_AUTO:
+      return "auto";
+    case HAP_COUPLING_GOD_OBJECT:
+      return "god-object";
+    case HAP_COUPLING_VIRTUAL:
+      return "virtual";
+  }
+  return NULL;
+}
+
 hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
                                            const hap_pointer_def *pointer, double period)
 {

@@ -16,6 +16,12 @@ typedef struct hapi_coupling_gains {
   double damping;   /* N s/m at the device */
 } hapi_coupling_gains;
 
+/* Whether there is always a spring between device and pointer. */
+static inline bool hapi_coupling_has_spring(hap_coupling coupling)
+{
+  return coupling != HAP_COUPLING_DIRECT && coupling != HAP_COUPLING_AUTO;
+}
+
 /* period in s, of the haptic loop. */
 hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
                                            const hap_pointer_def *pointer, double period);

@@ -13,10 +13,18 @@
 
 #define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
 #define GRIP_MOST 0.05   /* m, at the device: arm that a handle has against turning */
+#define BALL_INERTIA 0.4 /* m r^2 */
 #define SLEW_S 0.002     /* from no force to all of it, where the application says nothing else */
 #define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
 /* ---- the loop's side ---- */
+
+static double mass_of(const hap_pointer_def *def)
+{
+  return def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
+         : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
+                                                  : def->mass;
+}
 
 /* In the world, where a metre of the device is motion_scale metres and a newton its share. */
 static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
@@ -27,11 +35,14 @@ static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slo
   double scale = def->motion_scale * def->force_scale;
   p->coupling = def->coupling;
   p->integration = def->integration;
+  if (def->coupling == HAP_COUPLING_GOD_OBJECT || def->coupling == HAP_COUPLING_VIRTUAL) {
+    p->integration = HAP_INTEGRATION_IMPLICIT; /* there is no spring of a contact */
+  }
   p->hold_known = gains.known && scale > 0.0;
   p->hold = p->hold_known ? gains.stiffness / scale : HUGE_VAL;
   p->coupling_stiffness = p->hold_known ? p->hold : 0.0;
   p->coupling_damping = p->hold_known ? gains.damping / scale : 0.0;
-  p->proxy_mass = def->mass;
+  p->proxy_mass = mass_of(def);
   p->coupling_reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
 }
 
@@ -57,10 +68,16 @@ static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *
   for (uint32_t i = 0; i < hull->count; ++i) {
     sum += hapi_v3_dot(hull->points[i], hull->points[i]) / hull->count;
   }
-  double arm = fmin(sqrt(sum) + slot->def.radius, GRIP_MOST * slot->def.motion_scale);
+  double reach = sqrt(sum) + slot->def.radius;
+  double arm = fmin(reach, GRIP_MOST * slot->def.motion_scale);
   p->spin_stiffness = arm * arm * p->coupling_stiffness;
   p->spin_damping = arm * arm * p->coupling_damping;
   p->proxy_inertia = arm * arm * p->proxy_mass;
+  if (slot->def.coupling == HAP_COUPLING_VIRTUAL) {
+    p->proxy_inertia = slot->def.virtual_inertia > 0.0
+                           ? slot->def.virtual_inertia
+                           : BALL_INERTIA * reach * reach * p->proxy_mass;
+  }
 }
 
 static void activate(hapi_haptic *haptic, uint32_t index)
@@ -252,7 +269,8 @@ void hapi_pointers_write(hapi_haptic *haptic)
 static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
 {
   double scale = p->motion_scale * p->force_scale;
-  out->coupling = p->proxied ? HAP_COUPLING_PROXY : HAP_COUPLING_DIRECT;
+  hap_coupling spring = p->rigid ? p->coupling : HAP_COUPLING_PROXY;
+  out->coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT;
   out->coupling_reason = (uint32_t)p->coupling_reason;
   out->coupling_stiffness = p->proxied ? scale * p->coupling_stiffness : 0.0;
   out->coupling_damping = p->proxied ? scale * p->coupling_damping : 0.0;
@@ -422,21 +440,23 @@ static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_s
                                  hap_detail *detail)
 {
   const hap_pointer_def *def = &slot->def;
-  if (def->coupling != HAP_COUPLING_PROXY) {
+  const char *name = hap_coupling_name(def->coupling);
+  if (!hapi_coupling_has_spring(def->coupling)) {
     return HAP_OK;
   }
   hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.period);
   double scale = def->motion_scale * def->force_scale;
   if (gains.known && !(gains.stiffness <= scale * WORLD_STIFFNESS_MOST)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "coupling proxy: with force_scale %g the spring of %g N/m has no use; take "
+                     "coupling %s: with force_scale %g the spring of %g N/m has no use; take "
                      "coupling direct or a larger force_scale",
-                     def->force_scale, gains.stiffness);
+                     name, def->force_scale, gains.stiffness);
   }
   if (!gains.known) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "coupling proxy: the device gives neither damping nor rated stiffness; set "
-                     "coupling_stiffness, or have the device identified");
+                     "coupling %s: the device gives neither damping nor rated stiffness; set "
+                     "coupling_stiffness, or have the device identified",
+                     name);
   }
   return HAP_OK;
 }

@@ -44,6 +44,7 @@ void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
   d.max_torque = 1.0;
   d.coupling = HAP_COUPLING_AUTO;
   d.collide_bits = 0xffffffffu;
+  d.virtual_mass = 0.1;
   hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "haptic/coupling_gains.h"
 #include "haptic/rt/tick.h"
 #include "session/session_internal.h"
 
@@ -61,12 +62,14 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
       {between(d->coupling_damping, 0.0, 1e6), "coupling_damping is not in 0 .. 1e6 N s/m"},
       {d->coupling_damping == 0.0 || d->coupling_stiffness > 0.0,
        "coupling_damping is given without coupling_stiffness"},
-      {between(d->coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_AUTO),
+      {between(d->coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_VIRTUAL),
        "coupling is not one of hap_coupling"},
       {between(d->integration, HAP_INTEGRATION_AUTO, HAP_INTEGRATION_MIDPOINT),
        "integration is not one of hap_integration"},
       {between(d->hand_damping, 0.0, 1e3), "hand_damping is not in 0 .. 1e3 N s/m"},
       {between(d->max_slew, 0.0, 1e12), "max_slew is not in 0 .. 1e12 N/s"},
+      {between(d->virtual_mass, 1e-6, 1e6), "virtual_mass is not in 1e-6 .. 1e6 kg"},
+      {between(d->virtual_inertia, 0.0, 1e12), "virtual_inertia is not in 0 .. 1e12 kg m^2"},
       {good_pose(&d->pose_world_device),
        "pose_world_device is not within 1000 km with a unit quaternion"},
   };
@@ -111,11 +114,11 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   if (status >= HAP_OK) {
     status = hapi_session_check_pointer(&d, &detail);
   }
-  if (status >= HAP_OK && d.coupling == HAP_COUPLING_PROXY &&
+  if (status >= HAP_OK && hapi_coupling_has_spring(d.coupling) &&
       session->def.model != HAP_MODEL_CONTACT) {
     status = hapi_fail(&detail, HAP_ERROR_UNSUPPORTED,
-                       "coupling proxy needs model contact; the session has model %s",
-                       hap_model_name(session->def.model));
+                       "coupling %s needs model contact; the session has model %s",
+                       hap_coupling_name(d.coupling), hap_model_name(session->def.model));
   }
   if (status >= HAP_OK) {
     hapi_quat_normalize(d.pose_world_device.quat_wxyz);

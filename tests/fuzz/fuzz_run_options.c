@@ -59,9 +59,10 @@ static void check_options(const run_options *options)
   check_between(options->rig.max_force, 0.0, 1e6);
   FUZZ_CHECK(options->rig.stiffness == 0.0 || options->rig.stiffness >= 1e-3);
   check_between(options->rig.stiffness, 0.0, 1e9);
-  check_between(options->rig.coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_AUTO);
+  check_between(options->rig.coupling, HAP_COUPLING_DIRECT, HAP_COUPLING_VIRTUAL);
   check_between(options->rig.coupling_stiffness, 0.0, 1e9);
-  FUZZ_CHECK(options->rig.coupling != HAP_COUPLING_PROXY ||
+  FUZZ_CHECK(options->rig.coupling == HAP_COUPLING_DIRECT ||
+             options->rig.coupling == HAP_COUPLING_AUTO ||
              options->rig.def.model == HAP_MODEL_CONTACT);
   FUZZ_CHECK(options->rig.scene != NULL && options->rig.scene[0] != '\0');
   FUZZ_CHECK(options->rig.device_count <= RIG_POINTERS_MAX);

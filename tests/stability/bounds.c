@@ -137,8 +137,8 @@ static bool is_now(const hapi_tick *tick, const hapi_local_contact *c)
 {
   const hapi_tick_pointer *p = &tick->pointers[c->pointer];
   const hapi_row *row = &tick->world.solver.rows[c->row];
-  double stiffness =
-      tick->period * tick->period * c->ramp.share * p->stiffness * hapi_dot6(row->ja, row->ba);
+  double k = p->rigid ? p->coupling_stiffness : c->ramp.share * p->stiffness;
+  double stiffness = tick->period * tick->period * k * hapi_dot6(row->ja, row->ba);
   return stiffness <= (p->proxied ? 0.25 : 4.0); /* lib/haptic/rt/pointer_rows.c */
 }
 
@@ -159,10 +159,31 @@ static double contacts_ahead(const bounds *b)
     hapi_v3_sub(c->point_now, body->pose.position, arm);
     hapi_v3_cross(body->twist.angular, arm, velocity);
     hapi_v3_add(velocity, body->twist.linear, velocity);
+    if (p->rigid && p->proxy_mass > 0.0) {
+      continue; /* a body that another one hits */
+    }
     if (is_now(tick, c)) {
       sum += 0.5 * tick->period * hapi_v3_dot(c->force, velocity);
     } else if (!p->proxied) {
       sum += tick->period * hapi_v3_dot(c->force, p->twist.linear);
+    }
+  }
+  return sum;
+}
+
+/* The same of a virtual tool that swings on its spring: pose and velocity are half a tick apart. */
+static double tools_ahead(const bounds *b)
+{
+  const hapi_tick *tick = tick_of(b);
+  double sum = 0.0;
+  for (int i = 0; i < b->w->hand_count; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->rigid && p->proxy_mass > 0.0) {
+      double apart[3];
+      hapi_v3_sub(p->proxy_position, p->handle_position, apart);
+      hapi_v3_sub(apart, p->offset, apart);
+      sum += 0.5 * tick->period * p->coupling_stiffness * hapi_v3_dot(apart, p->proxy_velocity);
+      sum += 0.5 * tick->period * hapi_v3_dot(p->wrench.torque, p->proxy_spin);
     }
   }
   return sum;
@@ -191,6 +212,9 @@ static double spring_energy(const bounds *b)
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     const hapi_local_contact *c = &tick->contacts[i];
     const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    if (p->rigid) {
+      continue;
+    }
     if (c->weight > 0.0) {
       sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->stiffness);
     }
@@ -206,9 +230,11 @@ static double spring_energy(const bounds *b)
       hapi_v3_sub(p->proxy_position, p->handle_position, apart);
       hapi_v3_sub(apart, p->offset, apart);
       sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
+      sum += 0.5 * p->proxy_mass * hapi_v3_dot(p->proxy_velocity, p->proxy_velocity);
     }
     if (p->proxied && p->hull != NULL) {
       sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->spin_stiffness;
+      sum += 0.5 * p->proxy_inertia * hapi_v3_dot(p->proxy_spin, p->proxy_spin);
     }
   }
   return sum;
@@ -274,7 +300,7 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       b->unit = fmax(b->unit, fabs(length4(seen[i].pose.quat_wxyz) - 1.0));
     }
   }
-  kinetic -= contacts_ahead(b);
+  kinetic -= contacts_ahead(b) + tools_ahead(b);
   if (b->ticks == 0) {
     b->given = b->row->given + kinetic + height;
   }
@@ -315,7 +341,8 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       hapi_v3_sub(found.pos, at, arm);
       double speed = hapi_v3_norm(p->twist.linear) + hapi_v3_norm(s->met_twist.linear) +
                      hapi_v3_norm(s->met_twist.angular) * hapi_v3_norm(arm);
-      double allowed = hapi_v3_norm(c->force) / p->stiffness + speed * step + b->row->depth;
+      double yields = p->rigid ? 0.0 : hapi_v3_norm(c->force) / p->stiffness;
+      double allowed = yields + speed * step + b->row->depth;
       b->depth = fmax(b->depth, found.depth);
       b->deeper = fmax(b->deeper, found.depth / (allowed + LEAST_DEPTH));
     }

@@ -30,6 +30,7 @@ typedef struct case_row {
   double origin;             /* m, along x, of the whole scene */
   double cfm;                /* 1e-12; negative: 0 */
   double coupling_stiffness; /* N/m, of a proxy; its damping is 0 then */
+  hap_coupling coupling;     /* with it: god-object or virtual, and not a proxy */
   double given;              /* J, that the world has at its start without having been given it */
   double depth;              /* m, of penetration at the start */
   double mu;                 /* of the hands, 0 */

@@ -159,7 +159,7 @@ static void take_parameters(world *w, const case_row *row, hap_model model)
   w->pointer.max_force = 1e6; /* the device's limit is the one that counts */
   dWorldSetCFM(w->world, row->cfm < 0.0 ? 0.0 : row->cfm > 0.0 ? row->cfm : 1e-12);
   if (row->coupling_stiffness > 0.0 && model == HAP_MODEL_CONTACT) {
-    w->pointer.coupling = HAP_COUPLING_PROXY;
+    w->pointer.coupling = row->coupling != HAP_COUPLING_DIRECT ? row->coupling : HAP_COUPLING_PROXY;
     w->pointer.coupling_stiffness = row->coupling_stiffness;
   }
 }

@@ -82,16 +82,6 @@ static bool jumps(const hapi_tick_pointer *p, double period)
           turn_between(p->device_pose.quat_wxyz, p->device_good.quat_wxyz) > SPIN_MOST * period);
 }
 
-static void begin_proxy_anew(hapi_tick_pointer *p)
-{
-  hapi_v3_copy(p->handle_position, p->proxy_position);
-  hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
-  hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
-  memcpy(p->proxy_quat, p->handle_quat, sizeof p->proxy_quat);
-  hapi_v3_copy(p->handle_spin, p->proxy_spin);
-  hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
-}
-
 /* A velocity that is a difference of such positions would be felt through every damper. */
 static void check_speed(hapi_tick_pointer *p)
 {
@@ -120,7 +110,7 @@ void hapi_coupling_read(hapi_tick *tick)
     if (!good || !place_pointer(p)) {
       hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
     } else if (p->jumped) {
-      begin_proxy_anew(p);
+      hapi_proxy_begin_anew(p);
     }
   }
 }

@@ -140,6 +140,12 @@ static double half_compliance(const hapi_tick_pointer *p)
   return p->stiffness > 0.0 ? 0.5 / p->stiffness : 0.0;
 }
 
+/* J in the spring of a contact of model CONTACT with that force. */
+static double contact_stores(const hapi_tick_pointer *p, const hapi_local_contact *c, double force2)
+{
+  return p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
+}
+
 /* The same of the paper's models, as hapi_render has noted it: another walk over the contacts would
  * cost as much as a tenth of the tick. */
 static double rendered_gives(const hapi_tick *tick, double *io_stored)
@@ -169,7 +175,7 @@ static double surfaces_give(const hapi_tick *tick, double *io_stored)
     if (!(force2 > 0.0)) {
       continue;
     }
-    *io_stored += half_compliance(&tick->pointers[c->pointer]) * force2 / c->weight;
+    *io_stored += contact_stores(&tick->pointers[c->pointer], c, force2);
     if (body != NULL && !is_owned(tick, body)) {
       sum -= work_on(tick, body, c);
     }
@@ -182,7 +188,7 @@ static double spring_energy(const hapi_tick_pointer *p, double share, double dep
 {
   double k = share * p->stiffness;
   double force = k * depth;
-  if (!(depth > 0.0) || !(k > 0.0)) {
+  if (!(depth > 0.0) || !(k > 0.0) || p->rigid) {
     return 0.0;
   }
   return force <= p->guard.limit ? 0.5 * force * depth
@@ -230,7 +236,7 @@ static double ramps_give(hapi_tick *tick)
   return sum - gone;
 }
 
-/* J in the springs between devices and proxies. */
+/* J in the springs between devices and proxies, and in the motion of proxies with mass. */
 static double couplings_store(const hapi_tick *tick)
 {
   double sum = 0.0;
@@ -238,7 +244,9 @@ static double couplings_store(const hapi_tick *tick)
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->proxied) {
       sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling_stiffness;
+      sum += 0.5 * p->proxy_mass * hapi_v3_dot(p->proxy_velocity, p->proxy_velocity);
       if (p->hull != NULL) {
+        sum += 0.5 * p->proxy_inertia * hapi_v3_dot(p->proxy_spin, p->proxy_spin);
         sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->spin_stiffness;
       }
     }

@@ -369,6 +369,7 @@ void hapi_local_world_step(hapi_tick *tick)
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
+    hapi_proxy_push_out(tick);
     solve(tick);
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];

@@ -251,6 +251,12 @@ static void set_speed(hapi_friction *f, const hapi_tick_pointer *p, const hapi_l
   f->speed[3] = p->finger_radius * hapi_v3_dot(f->normal, spin);
 }
 
+/* Of a rigid contact the coupling's is all that there is. */
+static double stiffness_of(const hapi_tick_pointer *p)
+{
+  return p->rigid ? p->coupling_stiffness : p->stiffness;
+}
+
 /* Directions at right angles, the first along the force that there is when all sticks: a force that is
  * too large for the ball then is one number, and the ball's surface no affair of the others. */
 void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead,
@@ -264,7 +270,7 @@ void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead
     across(f->normal, ahead);
   }
   for (int i = 0; i < 4; ++i) {
-    pull[i] = p->stiffness * (f->stretch[i] + lead * ahead[i]) + p->damping * ahead[i];
+    pull[i] = stiffness_of(p) * (f->stretch[i] + lead * ahead[i]) + p->damping * ahead[i];
   }
   double along[3];
   set_tangent(f->normal, pull, along);
@@ -331,6 +337,10 @@ void hapi_friction_wrench(const hapi_friction *f, const hapi_tick_pointer *p, co
 void hapi_friction_end(hapi_friction *f, const hapi_tick_pointer *p, const double push[4],
                        double limit)
 {
+  if (p->rigid) { /* what slides begins anew at the next tick */
+    f->generation = norm4(push) >= limit * (1.0 - AT_LIMIT) ? 0 : f->generation;
+    return;
+  }
   double spring = p->stiffness * norm4(f->stretch);
   if (spring > limit && norm4(push) >= limit * (1.0 - AT_LIMIT)) {
     set_anchors(f, limit / spring);
@@ -340,7 +350,7 @@ void hapi_friction_end(hapi_friction *f, const hapi_tick_pointer *p, const doubl
 double hapi_friction_energy(const hapi_tick *tick, const hapi_local_contact *contact)
 {
   const hapi_friction *f = hapi_friction_now(tick, contact);
-  return f == NULL
+  return f == NULL || tick->pointers[contact->pointer].rigid
              ? 0.0
              : 0.5 * tick->pointers[contact->pointer].stiffness * dot4(f->stretch, f->stretch);
 }

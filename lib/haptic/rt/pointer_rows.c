@@ -35,6 +35,8 @@
 #define NEAR_FLOOR \
   1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
 #define NEAR_S 5e-3
+#define PUSHED_OUT_LEAST 1e-9 /* m, of a rigid contact: what is deeper is no rounding */
+#define RIGID_SLACK 1e-4      /* m: bodies gain speed within the tick */
 
 typedef struct placed_pointer {
   hapi_tick_pointer *pointer;
@@ -182,9 +184,25 @@ static double lateness(double t)
   return t <= DAMPER_LIMIT ? 0.0 : t <= DAMPER_IMPLICIT ? 0.5 : 1.0;
 }
 
+/* A contact of a god-object or virtual tool does not give: w' >= g / T, so that the depth g is 0 at the
+ * tick's end. Friction likewise brings the stretch back to 0. That is for the poses; what lifts out of a body
+ * does not stay in velocities and forces, and the body that a god-object pushes is taken where it is at the
+ * tick, as a proxy's is: w' >= u, u the body's along -n (set_staying). */
+static bool stiffen(hapi_row *row, const spring *p, double period)
+{
+  row->lo = 0.0;
+  row->hi = HUGE_VAL;
+  row->softness = 0.0;
+  row->target = p->depth / period;
+  return true;
+}
+
 /* Spring and damper as a soft row; false: there is none. */
 static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring *p, double period)
 {
+  if (pointer->rigid) {
+    return stiffen(row, p, period);
+  }
   double c = period * p->k;
   double force = p->k * (p->depth + period * p->s);
   double late = 1.0;
@@ -202,6 +220,19 @@ static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring
   row->softness = c > 0.0 ? 1.0 / (period * c) : 0.0;
   row->target = c > 0.0 ? force / c : 0.0;
   return c > 0.0;
+}
+
+static void set_staying(const hapi_tick *tick, const placed_pointer *at, const spring *p,
+                        double staying, hapi_row_source *source)
+{
+  const hapi_tick_pointer *pointer = at->pointer;
+  double a = tick->period * p->body_a;
+  bool takes = pointer->coupling == HAP_COUPLING_GOD_OBJECT && hapi_body_responds(at->body) &&
+               tick->period * a * pointer->coupling_stiffness <= PROXY_LIMIT &&
+               a * pointer->coupling_damping <= DAMPER_LIMIT;
+  double lift = p->depth / tick->period - staying;
+  source->stays = staying + (takes ? p->body_w : 0.0);
+  source->pushes_out = lift > PUSHED_OUT_LEAST / tick->period || (takes && p->body_w != 0.0);
 }
 
 /* Eq. 7 as it stands: the row's impulse is given. */
@@ -290,6 +321,10 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
   spring p = {.k = at->share * at->pointer->stiffness,
               .d = at->depth > 0.0 ? at->share * at->pointer->damping : 0.0,
               .depth = at->depth};
+  if (at->pointer->rigid) {
+    p.depth *= at->depth > 0.0 ? contact->ramp.share : 1.0;
+    ++at->pointer->near_rows;
+  }
   set_columns(contact, at, row, &p);
   bool pushes = at->pointer->integration == HAP_INTEGRATION_EXPLICIT
                     ? fix(row, &p, tick->period)
@@ -304,6 +339,9 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
   row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
   world->sources[number] = (hapi_row_source){
       .contact = index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  if (at->pointer->rigid) {
+    set_staying(tick, at, &p, fmin(p.depth, 0.0) / tick->period, &world->sources[number]);
+  }
   contact->row = number;
   ++world->solver.row_count;
   hapi_row_ready(&world->solver, number);
@@ -390,6 +428,9 @@ static bool add_friction_row(hapi_tick *tick, uint32_t index, const placed_point
                                              .body_b = HAPI_SLOT_NONE,
                                              .part = (uint8_t)(1 + axis),
                                              .pointer = true};
+  if (at->pointer->rigid) {
+    set_staying(tick, at, &p, p.depth / tick->period, &world->sources[number]);
+  }
   ++world->solver.row_count;
   hapi_row_ready(&world->solver, number);
   return true;
@@ -454,6 +495,15 @@ static double size_of(const hapi_tick_pointer *p)
   return p->hull != NULL ? p->extent : p->radius;
 }
 
+/* Whether a rigid contact may close within the tick, wherever the others send the pointer. */
+static bool may_close(const hapi_tick *tick, const hapi_local_contact *c, const placed_pointer *at)
+{
+  static const double still[3] = {0.0, 0.0, 0.0};
+  double comes = fmax(closing_speed(at, still), 0.0);
+  bool leaves = c->tool != 0 && tick->tool.tools[c->tool - 1].leaving;
+  return !leaves && at->depth + at->pointer->reach + tick->period * comes + RIGID_SLACK > 0.0;
+}
+
 static void take_contact(hapi_tick *tick, uint32_t index)
 {
   hapi_local_contact *c = &tick->contacts[index];
@@ -476,7 +526,7 @@ static void take_contact(hapi_tick *tick, uint32_t index)
     point_velocity(&at, p->proxy_velocity, p->proxy_spin, velocity);
     motion = closing_speed(&at, velocity);
   }
-  if (at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
+  if (!p->rigid && at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
     at.pointer->near_stiffness += c->weight * at.pointer->stiffness;
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
@@ -486,7 +536,8 @@ static void take_contact(hapi_tick *tick, uint32_t index)
       (at.depth > 0.0 || at.pointer->proxied)) {
     hapi_local_wake(tick, at.body);
   }
-  if (!comes || at.share <= 0.0) {
+  bool acts = p->rigid ? may_close(tick, c, &at) : comes && at.share > 0.0;
+  if (!acts) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   } else if (hapi_body_responds(at.body) || at.pointer->proxied) {
     add_row(tick, index, &at);
@@ -494,14 +545,53 @@ static void take_contact(hapi_tick *tick, uint32_t index)
     push_static(c, &at, speed);
   }
   bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
-  if (c->mu > 0.0 && pushes && at.depth > 0.0) {
+  if (c->mu > 0.0 && pushes && (p->rigid || at.depth > 0.0)) {
     add_friction(tick, index, &at);
+  }
+}
+
+/* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels it. */
+static void add_brake(hapi_tick *tick, const hapi_tick_pointer *p, const double way[3], int first,
+                      double most)
+{
+  hapi_local_world *world = &tick->world;
+  uint32_t number = world->solver.row_count;
+  hapi_row *row = &world->solver.rows[number];
+  memset(row, 0, sizeof *row);
+  hapi_v3_scale(-1.0 / hapi_v3_norm(way), way, row->jb + first);
+  hapi_v3_scale(first == 0 ? p->response : p->spin_response, row->jb + first, row->bb + first);
+  row->a = HAPI_STATIC_ROW;
+  row->b = p->row;
+  row->hi = HUGE_VAL;
+  row->target = -most;
+  row->normal = -1;
+  world->sources[number] =
+      (hapi_row_source){.body_a = HAPI_SLOT_NONE, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  ++world->solver.row_count;
+  hapi_row_ready(&world->solver, number);
+}
+
+/* A god-object that has been let go would leap to the device. One that is held needs none. */
+static void brake(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0 || !p->rigid || p->contacts > 0) {
+      continue;
+    }
+    if (hapi_v3_norm(p->free_velocity) > p->speed_most) {
+      add_brake(tick, p, p->free_velocity, 0, p->speed_most);
+    }
+    if (p->hull != NULL && hapi_v3_norm(p->free_spin) > p->spin_most) {
+      add_brake(tick, p, p->free_spin, 3, p->spin_most);
+    }
   }
 }
 
 void hapi_pointer_rows(hapi_tick *tick)
 {
   hapi_tool_place(tick);
+  brake(tick);
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     take_contact(tick, i);
   }

@@ -13,7 +13,11 @@
  * along the axis, which is the moment of a potential at any angle and the angle for small ones.
  *
  * It is one body more in the solver, so that contacts of one pointer know of each other. However many
- * push, the device feels k at most. */
+ * push, the device feels k at most.
+ *
+ * Two couplings of the literature are the same body with contacts that do not give (pointer_rows.c): the
+ * "god-object", of no mass, which is where the spring is shortest among all places out of the bodies, and
+ * the "virtual" tool of virtual coupling, whose mass is its own. */
 
 #define KEEP_SHARE 0.9 /* of what the device holds: below it the coupling may be direct again */
 #define OFFSET_DECAY_S 0.02 /* time constant */
@@ -22,6 +26,20 @@
  * for so long, s: what hops on a stiff spring comes back within it. */
 #define LEAP_MOST 1e-4
 #define REST_S 0.05
+/* How much faster than the device a god-object comes after it, m/s, where something has let it go: what is
+ * farther away than that in a step of physics, the loop does not know. */
+#define CATCH_UP 0.5
+#define SWING_LIMIT 0.25 /* of T^2 k over the mass: it swings at 80 Hz and less, at 1 kHz */
+
+void hapi_proxy_begin_anew(hapi_tick_pointer *p)
+{
+  hapi_v3_copy(p->handle_position, p->proxy_position);
+  hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
+  hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+  memcpy(p->proxy_quat, p->handle_quat, sizeof p->proxy_quat);
+  hapi_v3_copy(p->handle_spin, p->proxy_spin);
+  hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
+}
 
 static bool is_above(const hapi_tick_pointer *p)
 {
@@ -67,9 +85,23 @@ static bool is_idle(const hapi_tick_pointer *p, double period)
          (p->hull == NULL || p->extent * hapi_v3_norm(turn) < LEAP_MOST);
 }
 
-static void choose(hapi_tick_pointer *p, double period)
+/* Their contacts begin as those do that arrive deep. */
+static void forget_contacts(hapi_tick *tick, uint32_t index)
 {
-  bool wanted = p->coupling == HAP_COUPLING_PROXY;
+  for (uint32_t i = 0; i < tick->contact_count; ++i) {
+    if (tick->contacts[i].pointer == index) {
+      tick->contacts[i].seen = false;
+    }
+  }
+  hapi_tool_forget(tick, index);
+}
+
+static void choose(hapi_tick *tick, uint32_t index)
+{
+  hapi_tick_pointer *p = &tick->pointers[index];
+  double period = tick->period;
+  bool rigid = p->coupling == HAP_COUPLING_GOD_OBJECT || p->coupling == HAP_COUPLING_VIRTUAL;
+  bool wanted = rigid || p->coupling == HAP_COUPLING_PROXY;
   p->coupling_reason = HAP_COUPLING_ASKED;
   if (p->coupling == HAP_COUPLING_AUTO) {
     wanted = is_above(p);
@@ -84,6 +116,10 @@ static void choose(hapi_tick_pointer *p, double period)
   }
   if (wanted && !p->proxied) {
     begin_proxy(p);
+    p->rigid = rigid;
+    if (rigid) {
+      forget_contacts(tick, index);
+    }
   }
   p->proxied = wanted;
 }
@@ -91,14 +127,9 @@ static void choose(hapi_tick_pointer *p, double period)
 /* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones do. */
 static void end_proxy(hapi_tick *tick, uint32_t index)
 {
-  tick->pointers[index].proxied = false;
+  tick->pointers[index].proxied = tick->pointers[index].rigid = false;
   tick->pointers[index].row = 0;
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    if (tick->contacts[i].pointer == index) {
-      tick->contacts[i].seen = false;
-    }
-  }
-  hapi_tool_forget(tick, index);
+  forget_contacts(tick, index);
 }
 
 void hapi_proxy_none(hapi_tick *tick)
@@ -117,16 +148,25 @@ void hapi_proxy_none(hapi_tick *tick)
   }
 }
 
+/* A virtual tool that is not light for its spring takes it as it is at the tick: implicit Euler would damp
+ * its swings. */
+static bool swings(const hapi_tick *tick, const hapi_tick_pointer *p, double k, double inertia)
+{
+  return p->rigid && tick->period * tick->period * k <= SWING_LIMIT * inertia;
+}
+
 static double response(const hapi_tick *tick, const hapi_tick_pointer *p)
 {
   double t = tick->period;
-  return 1.0 / (p->proxy_mass + t * p->coupling_damping + t * t * p->coupling_stiffness);
+  double k = swings(tick, p, p->coupling_stiffness, p->proxy_mass) ? 0.0 : p->coupling_stiffness;
+  return 1.0 / (p->proxy_mass + t * p->coupling_damping + t * t * k);
 }
 
 static double spin_response(const hapi_tick *tick, const hapi_tick_pointer *p)
 {
   double t = tick->period;
-  double resists = p->proxy_inertia + t * p->spin_damping + t * t * p->spin_stiffness;
+  double k = swings(tick, p, p->spin_stiffness, p->proxy_inertia) ? 0.0 : p->spin_stiffness;
+  double resists = p->proxy_inertia + t * p->spin_damping + t * t * k;
   return p->three_dof ? 0.0 : 1.0 / resists; /* a hand that feels no torque does not turn it */
 }
 
@@ -154,6 +194,21 @@ static void show_turn(hapi_tick_pointer *p)
   hapi_v3_copy(p->proxy_spin, p->twist.angular);
 }
 
+static bool is_god_object(const hapi_tick_pointer *p)
+{
+  return p->rigid && p->coupling == HAP_COUPLING_GOD_OBJECT;
+}
+
+/* What is left of the offsets would keep a god-object from being where the device is. */
+static void end_offsets(hapi_tick_pointer *p)
+{
+  if (hapi_v3_norm(p->offset) < OFFSET_LEAST &&
+      p->extent * hapi_v3_norm(p->offset_turn) < OFFSET_LEAST) {
+    hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
+    hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
+  }
+}
+
 static void place(const hapi_tick *tick, hapi_tick_pointer *p)
 {
   hapi_v3_scale(1.0 - fmin(1.0, tick->period / OFFSET_DECAY_S), p->offset, p->offset);
@@ -164,6 +219,11 @@ static void place(const hapi_tick *tick, hapi_tick_pointer *p)
     show_turn(p);
     p->spin_response = spin_response(tick, p);
   }
+  if (is_god_object(p)) {
+    end_offsets(p);
+  }
+  p->pushed_out = false;
+  p->near_rows = 0;
 }
 
 void hapi_proxy_begin(hapi_tick *tick)
@@ -174,7 +234,7 @@ void hapi_proxy_begin(hapi_tick *tick)
     if (p->generation == 0) {
       continue;
     }
-    choose(p, tick->period);
+    choose(tick, i);
     p->contact_stiffness = p->near_stiffness;
     p->near_stiffness = 0.0;
     if (p->proxied) {
@@ -200,6 +260,21 @@ static void set_free_spin(const hapi_tick *tick, hapi_tick_pointer *p, double w[
   hapi_v3_copy(w, p->free_spin);
 }
 
+/* The most that a rigid pointer may come towards anything: without a damper a god-object goes all the way
+ * to the device. */
+static void set_reach(const hapi_tick *tick, hapi_tick_pointer *p, const double way[3])
+{
+  double going = tick->period * hapi_v3_norm(p->free_velocity);
+  p->reach = is_god_object(p) ? fmax(going, hapi_v3_norm(way)) : going;
+  if (p->hull != NULL) {
+    p->reach += tick->period * p->extent * hapi_v3_norm(p->free_spin);
+  }
+  p->speed_most = is_god_object(p) ? hapi_v3_norm(p->handle_velocity) + CATCH_UP : HUGE_VAL;
+  p->spin_most = is_god_object(p) && p->hull != NULL
+                     ? hapi_v3_norm(p->handle_spin) + CATCH_UP / p->extent
+                     : HUGE_VAL;
+}
+
 /* Velocities that the proxies would have with nothing in touch. */
 void hapi_proxy_free(hapi_tick *tick)
 {
@@ -223,26 +298,105 @@ void hapi_proxy_free(hapi_tick *tick)
     if (p->hull != NULL) {
       set_free_spin(tick, p, v + 3);
     }
+    if (p->rigid) {
+      set_reach(tick, p, way);
+    }
   }
+}
+
+/* The damper's part of the motion that the rows now leave out (pointer_rows.c), as it was at the last tick. */
+static void leave_out_carried(const hapi_tick *tick, const hapi_tick_pointer *p)
+{
+  const hapi_solver *solver = &tick->world.solver;
+  double change[6];
+  hapi_v3_scale(-tick->period * p->coupling_damping * p->response, p->carried, change);
+  hapi_v3_scale(-tick->period * p->spin_damping * p->spin_response, p->carried + 3, change + 3);
+  hapi_madd6(solver->v[p->row], 1.0, change);
+  hapi_madd6(solver->free[p->row], 1.0, change);
+}
+
+/* What lifts them out of bodies is not to stay in their velocities, as with the bodies. */
+void hapi_proxy_push_out(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation != 0 && p->rigid) {
+      memcpy(p->move_velocity, tick->world.solver.v[p->row], sizeof p->move_velocity);
+      p->pushed_out = true;
+      leave_out_carried(tick, p);
+    }
+  }
+}
+
+static void turn_by(double quat[4], const double spin[3], double seconds)
+{
+  hap_pose pose = {.position = {0.0, 0.0, 0.0}};
+  hap_twist twist = {.linear = {0.0, 0.0, 0.0}};
+  memcpy(pose.quat_wxyz, quat, sizeof pose.quat_wxyz);
+  hapi_v3_copy(spin, twist.angular);
+  hapi_pose_move(&pose, &twist, seconds);
+  memcpy(quat, pose.quat_wxyz, sizeof pose.quat_wxyz);
 }
 
 static void turn_proxy(const hapi_tick *tick, hapi_tick_pointer *p, const double spin[3])
 {
-  double t = tick->period;
   double end[4];
   double away[3];
-  hap_pose pose = {.position = {0.0, 0.0, 0.0}};
-  hap_twist twist = {.linear = {0.0, 0.0, 0.0}};
-  memcpy(pose.quat_wxyz, p->proxy_quat, sizeof pose.quat_wxyz);
-  hapi_v3_copy(spin, twist.angular);
-  hapi_pose_move(&pose, &twist, t);
-  memcpy(p->proxy_quat, pose.quat_wxyz, sizeof p->proxy_quat);
-  hapi_v3_copy(spin, p->proxy_spin);
   far_turn(p, end);
   rotation_between(end, p->proxy_quat, away);
+  turn_by(p->proxy_quat, spin, tick->period);
+  hapi_v3_copy(spin, p->proxy_spin);
+  if (!swings(tick, p, p->spin_stiffness, p->proxy_inertia)) {
+    rotation_between(end, p->proxy_quat, away);
+  }
   for (int k = 0; k < 3; ++k) {
     p->wrench.torque[k] =
         p->spin_stiffness * away[k] + p->spin_damping * (spin[k] - p->handle_spin[k]);
+  }
+}
+
+/* s, that a god-object moves: in the tick in which something lets it go, before it is braked, less. */
+static double moving_time(const hapi_tick *tick, const hapi_tick_pointer *p, const double v[6])
+{
+  double speed = hapi_v3_norm(v) / p->speed_most;
+  double spin = p->hull != NULL ? hapi_v3_norm(v + 3) / p->spin_most : 0.0;
+  return is_god_object(p) && p->contacts == 0 ? tick->period / fmax(1.0, fmax(speed, spin))
+                                              : tick->period;
+}
+
+/* From where it was; velocity and force are those of the last solve. */
+static void move_rigid(const hapi_tick *tick, hapi_tick_pointer *p, const double at[3],
+                       const double quat[4])
+{
+  const double *solved = tick->world.solver.v[p->row];
+  const double *v = p->pushed_out ? p->move_velocity : solved;
+  double seconds = moving_time(tick, p, v);
+  hapi_v3_madd(at, seconds, v, p->proxy_position);
+  memcpy(p->proxy_quat, quat, sizeof p->proxy_quat);
+  if (p->hull != NULL) {
+    turn_by(p->proxy_quat, v + 3, seconds);
+  }
+  if (is_god_object(p)) { /* which has no momentum to keep: as it moves */
+    for (int i = 0; i < 6; ++i) {
+      p->carried[i] = v[i] - solved[i];
+    }
+    hapi_v3_scale(seconds / tick->period, v, p->proxy_velocity);
+    hapi_v3_scale(seconds / tick->period, v + 3, p->proxy_spin);
+  }
+}
+
+/* With nothing in touch a god-object is the device. */
+static void release(const hapi_tick *tick, hapi_tick_pointer *p)
+{
+  double way[3];
+  double turn[3];
+  hapi_v3_sub(p->handle_position, p->proxy_position, way);
+  rotation_between(p->proxy_quat, p->handle_quat, turn);
+  bool there = hapi_v3_norm(way) <= tick->period * CATCH_UP &&
+               (p->hull == NULL || p->extent * hapi_v3_norm(turn) <= tick->period * CATCH_UP);
+  bool free = p->near_rows == 0 || p->coupling_damping == 0.0;
+  if (there && free && hapi_v3_norm(p->offset) == 0.0) {
+    hapi_proxy_begin_anew(p);
   }
 }
 
@@ -251,25 +405,36 @@ static void move(hapi_tick *tick, uint32_t index)
   hapi_tick_pointer *p = &tick->pointers[index];
   const double *v = tick->world.solver.v[p->row];
   double end[3];
-  if (!hapi_finite(v, 6)) {
+  double at[3];
+  double quat[4];
+  const hap_wrench contacts = p->wrench;
+  if (!hapi_finite(v, 6) || (p->pushed_out && !hapi_finite(p->move_velocity, 6))) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, index + 1);
-    hapi_v3_copy(p->handle_position, p->proxy_position);
-    hapi_v3_copy(p->handle_velocity, p->proxy_velocity);
-    hapi_v3_set(p->offset, 0.0, 0.0, 0.0);
-    memcpy(p->proxy_quat, p->handle_quat, sizeof p->proxy_quat);
-    hapi_v3_copy(p->handle_spin, p->proxy_spin);
-    hapi_v3_set(p->offset_turn, 0.0, 0.0, 0.0);
+    hapi_proxy_begin_anew(p);
     return;
   }
+  hapi_v3_copy(p->proxy_position, at);
+  memcpy(quat, p->proxy_quat, sizeof quat);
   hapi_v3_copy(v, p->proxy_velocity);
   hapi_v3_madd(p->proxy_position, tick->period, v, p->proxy_position);
   far_end(p, end);
+  const double *from =
+      swings(tick, p, p->coupling_stiffness, p->proxy_mass) ? at : p->proxy_position;
   for (int k = 0; k < 3; ++k) {
-    p->wrench.force[k] = p->coupling_stiffness * (p->proxy_position[k] - end[k]) +
+    p->wrench.force[k] = p->coupling_stiffness * (from[k] - end[k]) +
                          p->coupling_damping * (v[k] - p->handle_velocity[k]);
   }
   if (p->hull != NULL) {
     turn_proxy(tick, p, v + 3);
+  }
+  if (p->rigid) {
+    move_rigid(tick, p, at, quat);
+  }
+  if (is_god_object(p)) {
+    p->wrench = contacts; /* which is the spring's, but for what brakes it (pointer_rows.c) */
+  }
+  if (is_god_object(p) && p->contacts == 0) {
+    release(tick, p);
   }
 }
 

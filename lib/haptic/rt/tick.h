@@ -137,7 +137,8 @@ typedef struct hapi_tick_pointer {
   double handle_velocity[3];
   double near_stiffness;    /* N/m, sum over the contacts near the pointer, as they are found */
   double contact_stiffness; /* N/m, the same of the last tick, whole */
-  bool proxied;             /* the pointer is a proxy */
+  bool proxied;             /* the pointer is a proxy, of whatever coupling */
+  bool rigid;               /* it is one whose contacts do not give: god-object and virtual tool */
   double idle_s;            /* s, that a proxy of coupling AUTO has touched nothing */
   hap_coupling_reason coupling_reason;
   double proxy_position[3];
@@ -146,6 +147,14 @@ typedef struct hapi_tick_pointer {
   double free_velocity[3]; /* m/s, of the proxy with nothing in touch */
   uint32_t row;            /* place in the solver's velocities; 0: direct */
   double response;         /* 1/kg, change of the proxy's velocity by one N s */
+  double reach;            /* m, of a rigid one: how far it may come in this tick */
+  double speed_most;       /* m/s, rad/s: likewise, along the way to where the device is */
+  double spin_most;
+  uint32_t near_rows; /* likewise: contacts within that */
+  bool pushed_out;    /* likewise: in this tick it moves by move_velocity */
+  double move_velocity[6];
+  double
+      carried[6]; /* of a god-object: that of the bodies under it, as far as forces leave it out */
 
   /* The same of a hull's turning; zero for a sphere. */
   double spin_stiffness; /* N m/rad */
@@ -440,13 +449,15 @@ void hapi_local_step(hapi_tick *tick);       /* eq. 8-11, 14 */
 void hapi_local_world_step(hapi_tick *tick); /* model CONTACT: b and c in one */
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body); /* a resting one, before its rows */
 void hapi_proxy_begin(hapi_tick *tick);                       /* direct or proxy, and why */
+void hapi_proxy_begin_anew(hapi_tick_pointer *pointer);       /* where the device is */
 void hapi_proxy_none(hapi_tick *tick);                        /* other models: all are direct */
 void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
-void hapi_proxy_move(hapi_tick *tick);                        /* poses and forces on the hands */
-void hapi_pointer_rows(hapi_tick *tick);                      /* pointer contacts -> rows */
-void hapi_pointer_forces(hapi_tick *tick);                    /* rows -> wrenches */
-void hapi_contact_wake(hapi_tick *tick);                      /* what is touched by what moves */
-void hapi_contact_rows(hapi_tick *tick);                      /* contacts between bodies -> rows */
+void hapi_proxy_push_out(hapi_tick *tick); /* rigid ones: moved by the velocities as they are now */
+void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
+void hapi_pointer_rows(hapi_tick *tick);   /* pointer contacts -> rows */
+void hapi_pointer_forces(hapi_tick *tick); /* rows -> wrenches */
+void hapi_contact_wake(hapi_tick *tick);   /* what is touched by what moves */
+void hapi_contact_rows(hapi_tick *tick);   /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
 void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
 void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */

@@ -1,0 +1,238 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "bench/couplings.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/impedance.h"
+
+#define PHYSICS_HZ 60.0
+#define ITERATIONS 1000 /* of the reference */
+#define ITERATIONS_QUICK 200
+#define SHIFT 1e-5   /* m, against the hand: nothing touches by luck */
+#define AIR_HZ 2.0   /* well below the resonance of tool and spring */
+#define AIR_WAY 0.01 /* m */
+#define AIR_STIFFNESS 2000.0
+#define AIR_DAMPING 5.0
+#define AIR_SETTLE 2000 /* ticks */
+#define AIR_TICKS 1000  /* two periods */
+#define TOOL_MASS 0.1   /* kg, the library's default */
+#define MASS_BOUND 0.02
+#define DEPTH_SHARE 0.01 /* of a pointer that does not give, of that of a direct one */
+
+const hap_coupling couplings_compared[COUPLINGS] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY,
+                                                    HAP_COUPLING_VIRTUAL, HAP_COUPLING_GOD_OBJECT};
+const char *const couplings_scenes[COUPLINGS_SCENES] = {"slide", "row10", "wedge", "peg"};
+
+/* ---- scenes ---- */
+
+static const scene_parameters *find_scene(const char *name)
+{
+  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
+    if (strcmp(scene_table_at(i)->name, name) == 0) {
+      return scene_table_at(i);
+    }
+  }
+  return NULL;
+}
+
+static hap_status run(bench *b, const scene_parameters *which, hap_model model,
+                      hap_coupling coupling, accuracy_motion *out)
+{
+  accuracy_run_def def;
+  scene_parameters parameters = *which;
+  char hand[ACCURACY_SPEC_MAX];
+  if (!accuracy_hand(which->hands[0], 1.0, hand, sizeof hand)) {
+    return bench_fail(b, HAP_ERROR_ARGUMENT, "%s: no hand can be made of \"%s\"", which->name,
+                      which->hands[0]);
+  }
+  accuracy_run_def_init(&def);
+  parameters.shift[0] = -SHIFT;
+  if (model == HAP_MODEL_SINGLE) {
+    parameters.iterations = b->quick ? ITERATIONS_QUICK : ITERATIONS;
+  }
+  def.parameters = &parameters;
+  def.hands[0] = hand;
+  def.seconds = which->duration;
+  def.model = model;
+  def.physics_hz = PHYSICS_HZ;
+  def.coupling = coupling;
+  if (coupling != HAP_COUPLING_DIRECT) {
+    def.coupling_stiffness = which->stiffness;
+    def.coupling_damping = which->damping;
+  }
+  return accuracy_run(b, &def, out);
+}
+
+static hap_status measure_coupling(bench *b, const scene_parameters *which, size_t c,
+                                   const accuracy_motion *reference, couplings_cell *out,
+                                   accuracy_motion *motion)
+{
+  hap_status status = run(b, which, HAP_MODEL_CONTACT, couplings_compared[c], motion);
+  if (status >= HAP_OK && !accuracy_compare(reference, motion, NULL, PHYSICS_HZ, &out->errors)) {
+    status = bench_fail(b, HAP_ERROR_STATE, "%s: the hand touches nothing", which->name);
+  }
+  out->deepest = motion->deepest;
+  out->tick_us = motion->stats.tick_us_mean;
+  return status;
+}
+
+static hap_status measure_scene(bench *b, size_t index, couplings_table *table)
+{
+  const scene_parameters *which = find_scene(couplings_scenes[index]);
+  accuracy_motion reference = {.count = 0};
+  if (which == NULL) {
+    return bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", couplings_scenes[index]);
+  }
+  hap_status status = run(b, which, HAP_MODEL_SINGLE, HAP_COUPLING_DIRECT, &reference);
+  for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
+    accuracy_motion motion = {.count = 0};
+    status = measure_coupling(b, which, c, &reference, &table->columns[c].scenes[index], &motion);
+    if (status >= HAP_OK && index == 0) {
+      table->motions[c] = motion;
+    } else {
+      accuracy_motion_free(&motion);
+    }
+  }
+  if (status >= HAP_OK && index == 0) {
+    table->reference = reference;
+  } else {
+    accuracy_motion_free(&reference);
+  }
+  return status;
+}
+
+/* ---- in the air ---- */
+
+/* The part of force and motion at the frequency of the hand. */
+static hap_status listen(bench *b, port *p, double complex *out_force, double complex *out_motion)
+{
+  hap_status status = HAP_OK;
+  *out_force = *out_motion = 0.0;
+  for (int i = 0; i < AIR_SETTLE && status >= HAP_OK; ++i) {
+    status = port_advance(b, p);
+  }
+  for (int i = 0; i < AIR_TICKS && status >= HAP_OK; ++i) {
+    status = port_advance(b, p);
+    double complex wave = cexp(-2.0 * M_PI * I * AIR_HZ * PORT_TICK_S * i);
+    *out_force -= p->state.wrench.force[2] * wave;
+    *out_motion += p->state.device.position[2] * wave;
+  }
+  return status;
+}
+
+static hap_status measure_air(bench *b, hap_coupling coupling, couplings_column *out)
+{
+  port p;
+  char device[256];
+  const double w = 2.0 * M_PI * AIR_HZ;
+  port_def def = {.body = PORT_WALL,
+                  .device = device,
+                  .model = HAP_MODEL_CONTACT,
+                  .coupling = coupling,
+                  .stiffness = AIR_STIFFNESS};
+  if (coupling != HAP_COUPLING_DIRECT) {
+    def.coupling_stiffness = AIR_STIFFNESS;
+    def.coupling_damping = AIR_DAMPING;
+  }
+  snprintf(device, sizeof device,
+           "virtual:path=0:0/0/-0.2,sine=0/0/%g,hz=%g,hand=rigid,max_force=" PORT_FORCE_MAX,
+           AIR_WAY, AIR_HZ);
+  hap_status status = port_open(b, &def, &p);
+  if (status < HAP_OK) {
+    return status;
+  }
+  double complex force;
+  double complex motion;
+  status = listen(b, &p, &force, &motion);
+  out->mass = -creal(force / motion) / (w * w);
+  out->damping = cimag(force / motion) / w;
+  port_close(&p);
+  return status;
+}
+
+/* ---- all ---- */
+
+static hap_status measure(bench *b, couplings_table *table)
+{
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < COUPLINGS_SCENES && status >= HAP_OK; ++i) {
+    status = measure_scene(b, i, table);
+  }
+  for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
+    status = zwidth_of_coupling(b, couplings_compared[c], &table->columns[c].stiffness);
+    if (status >= HAP_OK) {
+      status = measure_air(b, couplings_compared[c], &table->columns[c]);
+    }
+  }
+  return status;
+}
+
+static hap_status write_table(bench *b, const couplings_table *table)
+{
+  FILE *csv = bench_csv_open(b, "couplings",
+                             "coupling,scene,force_rel_rms,torque_rel_rms,peak_ratio,"
+                             "penetration_mm,tick_us,stable_stiffness,mass_felt,damping_felt");
+  for (size_t c = 0; c < COUPLINGS && csv != NULL; ++c) {
+    const couplings_column *column = &table->columns[c];
+    const char *name = hap_coupling_name(couplings_compared[c]);
+    for (size_t i = 0; i < COUPLINGS_SCENES; ++i) {
+      const couplings_cell *cell = &column->scenes[i];
+      fprintf(csv, "%s,%s,%.6g,%.6g,%.6g,%.6g,%.4g,,,\n", name, couplings_scenes[i],
+              cell->errors.force, cell->errors.torque, cell->errors.peak_ratio, 1e3 * cell->deepest,
+              cell->tick_us);
+    }
+    fprintf(csv, "%s,stylus,,,,,,%.6g,,\n", name, column->stiffness);
+    fprintf(csv, "%s,air,,,,,,,%.6g,%.6g\n", name, column->mass, column->damping);
+  }
+  return bench_csv_close(b, csv);
+}
+
+static void report(bench *b, const couplings_table *table)
+{
+  for (size_t c = 0; c < COUPLINGS; ++c) {
+    const couplings_column *column = &table->columns[c];
+    const char *name = hap_coupling_name(couplings_compared[c]);
+    bool rigid = couplings_compared[c] == HAP_COUPLING_VIRTUAL ||
+                 couplings_compared[c] == HAP_COUPLING_GOD_OBJECT;
+    for (size_t i = 0; i < COUPLINGS_SCENES; ++i) {
+      const couplings_cell *cell = &column->scenes[i];
+      double most = rigid ? DEPTH_SHARE * table->columns[0].scenes[i].deepest : HUGE_VAL;
+      bench_check(
+          b, cell->deepest <= most,
+          "%s, %s: force error %.3g %%, peak ratio %.3f, %.4g mm in the bodies, tick %.2f us", name,
+          couplings_scenes[i], 100.0 * cell->errors.force, cell->errors.peak_ratio,
+          1e3 * cell->deepest, cell->tick_us);
+    }
+    double mass = couplings_compared[c] == HAP_COUPLING_VIRTUAL ? TOOL_MASS : 0.0;
+    bench_check(b, fabs(column->mass - mass) <= MASS_BOUND * TOOL_MASS,
+                "%s: in the air %.4f kg and %.4f N s/m", name, column->mass, column->damping);
+    bench_say("%s: a desktop stylus holds %.4g N/m", name, column->stiffness);
+  }
+}
+
+static void free_motions(couplings_table *table)
+{
+  accuracy_motion_free(&table->reference);
+  for (size_t c = 0; c < COUPLINGS; ++c) {
+    accuracy_motion_free(&table->motions[c]);
+  }
+}
+
+hap_status bench_couplings(bench *b)
+{
+  couplings_table table;
+  memset(&table, 0, sizeof table);
+  hap_status status = measure(b, &table);
+  if (status >= HAP_OK) {
+    status = write_table(b, &table);
+  }
+  if (status >= HAP_OK) {
+    report(b, &table);
+    status = couplings_draw(b, &table);
+  }
+  free_motions(&table);
+  return status;
+}
