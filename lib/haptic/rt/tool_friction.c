@@ -14,6 +14,7 @@
  * them: a hull that has turned about the one corner that held it holds no more than that by the next. */
 
 #define ALIKE_COSINE 0.95 /* of the normals */
+#define MORE_MOST 1.5     /* of the largest stretch */
 #define SPREAD_LEAST 1e-5 /* m, of points from their middle: nearer ones say nothing of a turn */
 
 typedef struct fit {
@@ -116,6 +117,7 @@ void hapi_tool_friction_begin(const hapi_tick *tick, const hapi_local_contact *c
   hapi_v3_cross(normal, arm, swing);
   hapi_v3_madd(found.stretch, found.turn, swing, out);
   double length = hapi_v3_norm(out);
-  hapi_v3_scale(length > found.most ? found.most / length : 1.0, out, out);
+  double most = MORE_MOST * found.most;
+  hapi_v3_scale(length > most ? most / length : 1.0, out, out);
   out[3] = found.stretch[3];
 }
