@@ -17,16 +17,16 @@
 
 typedef struct ground {
   hap_model model;
-  bool box;      /* a static box instead of the floor */
+  bool box; /* a static box instead of the floor */
   bool proxied;
   double finger; /* m */
 } ground;
 
 static const ground grounds[] = {
-    {HAP_MODEL_SINGLE, false, false, 0.0},    {HAP_MODEL_IMPULSE, false, false, 0.0},
+    {HAP_MODEL_SINGLE, false, false, 0.0},     {HAP_MODEL_IMPULSE, false, false, 0.0},
     {HAP_MODEL_ACCELERANCE, true, false, 0.0}, {HAP_MODEL_CONTACT, false, false, 0.0},
-    {HAP_MODEL_CONTACT, true, false, 0.0},    {HAP_MODEL_CONTACT, true, false, 0.006},
-    {HAP_MODEL_CONTACT, true, true, 0.0},     {HAP_MODEL_SINGLE, true, false, 0.006},
+    {HAP_MODEL_CONTACT, true, false, 0.0},     {HAP_MODEL_CONTACT, true, false, 0.006},
+    {HAP_MODEL_CONTACT, true, true, 0.0},      {HAP_MODEL_SINGLE, true, false, 0.006},
 };
 #define GROUNDS (sizeof grounds / sizeof grounds[0])
 
@@ -277,8 +277,7 @@ TEST(a_face_that_sticks_does_not_creep)
     crept c = creep(r, 10000);
     printf("# %s%s%s%s, %.1f and %.1f of the limit, tilt %.3f: %.3f um, %.2g rad in 10 s\n",
            hap_model_name(r->model), r->round ? ", round" : "", r->narrow ? ", at an edge" : "",
-           r->proxied ? ", proxy" : "",
-           r->share, r->twist, r->tilt, 1e6 * c.way, c.turn);
+           r->proxied ? ", proxy" : "", r->share, r->twist, r->tilt, 1e6 * c.way, c.turn);
     CHECK(c.way <= 1e-4);
     CHECK(fabs(c.turn) * HALF <= 1e-4);
   }
@@ -430,8 +429,8 @@ static void go_to(tool_world *w, const station *from, const station *to, int tic
  * off: the shares change between points that were pulled by unlike ways. J of the best round for the hand. */
 static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored)
 {
-  static const station stations[] = {{0, 0.07, 0},     {0, 0.07, 0.06},  {0, 0, 0.06},
-                                     {0, -0.07, 0.06}, {0, -0.07, 0}, {0, 0, 0}};
+  static const station stations[] = {{0, 0.07, 0},     {0, 0.07, 0.06}, {0, 0, 0.06},
+                                     {0, -0.07, 0.06}, {0, -0.07, 0},   {0, 0, 0}};
   double best = -HUGE_VAL;
   const ground g = {model, true, false, 0.0};
   tool_world w;

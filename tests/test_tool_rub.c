@@ -39,11 +39,11 @@ typedef struct motion {
 
 typedef struct drag {
   const char *what;
-  double mu;       /* of the tool */
+  double mu; /* of the tool */
   double floor_mu;
-  double beside;   /* m, of the middle */
-  double turn;     /* rad, of the tool about the vertical */
-  double finger;   /* m */
+  double beside; /* m, of the middle */
+  double turn;   /* rad, of the tool about the vertical */
+  double finger; /* m */
   bool proxied;
 } drag;
 
@@ -131,16 +131,35 @@ TEST(a_block_is_dragged_as_if_the_world_were_stepped_at_the_haptic_rate)
       double torque = error_of(test.torque, reference.torque, FRAMES);
       double apart[3];
       hapi_v3_sub(test.end, reference.end, apart);
-      printf("# %s, %g Hz: force %.3f %%, torque %.3f %%, %.3f mm, %.2g rad; it went %.2f mm and "
-             "%.3f rad\n",
-             drags[i].what, hz, 100.0 * force, 100.0 * torque, 1e3 * hapi_v3_norm(apart),
-             test.turn - reference.turn, 1e3 * test.end[0], test.turn);
+      printf(
+          "# %s, %g Hz: force %.3f %%, torque %.3f %%, %.3f mm, %.2g rad; it went %.2f mm and "
+          "%.3f rad\n",
+          drags[i].what, hz, 100.0 * force, 100.0 * torque, 1e3 * hapi_v3_norm(apart),
+          test.turn - reference.turn, 1e3 * test.end[0], test.turn);
       CHECK(force < 0.02);
       CHECK(torque < 0.03);
       CHECK(hapi_v3_norm(apart) < 5e-4);
       CHECK(fabs(test.turn - reference.turn) < 0.01);
       CHECK((drags[i].mu > drags[i].floor_mu) == (test.end[0] > 0.01)); /* what slides stays */
     }
+  }
+}
+
+/* Lockstep has the same bits each time, also with what is found by the contact thread. */
+TEST(lockstep_repeats)
+{
+  static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
+                                  HAP_MODEL_CONTACT};
+  static const drag how = {"", 0.6, 0.3, 0.008, 0.5, 0.005, true};
+  static motion first;
+  static motion second;
+  for (int m = 0; m < 4; ++m) {
+    memset(&first, 0, sizeof first);
+    memset(&second, 0, sizeof second);
+    drag_block(&how, all[m], 60.0, &first);
+    drag_block(&how, all[m], 60.0, &second);
+    CHECK(memcmp(&first, &second, sizeof first) == 0);
+    CHECK(hapi_v3_norm(first.force[FRAMES / 2]) > 1.0);
   }
 }
 
@@ -384,6 +403,7 @@ int main(void)
   dInitODE2(0);
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(a_block_is_dragged_as_if_the_world_were_stepped_at_the_haptic_rate);
+  RUN(lockstep_repeats);
   RUN(momentum_and_spin_go_to_a_free_body);
   RUN(lever_and_peg_with_friction_feel_as_the_reference);
   RUN(a_box_that_flat_fingers_hold_does_not_creep);

@@ -15,8 +15,8 @@
 
 #define ROLLED_COSINE 0.99875 /* 0.05 rad: of 10 mm, the arc is 0.2 um longer than the tangent */
 #define OTHER_FACE_COSINE 0.5
-#define TURNED 1.0    /* rad: half a turn could not be told from its opposite */
-#define AT_LIMIT 1e-6 /* of the limit: less is rounding */
+#define TURNED 1.0     /* rad: half a turn could not be told from its opposite */
+#define AT_LIMIT 1e-6  /* of the limit: less is rounding */
 #define LEAP_SHARE 0.2 /* of the distance in which a hull's point is the same */
 
 static const double no_turn[4] = {1.0, 0.0, 0.0, 0.0};
