@@ -283,6 +283,51 @@ TEST(a_face_that_sticks_does_not_creep)
   }
 }
 
+/* What is held stays held when the session changes its model, whoever finds the contacts then. */
+TEST(a_change_of_model_lets_nothing_go)
+{
+  static const hap_model next[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE,
+                                   HAP_MODEL_IMPULSE, HAP_MODEL_CONTACT};
+  const ground g = {HAP_MODEL_CONTACT, true, false, 0.005};
+  tool_world w;
+  REQUIRE(press(&w, &g));
+  stand(&w, 4e-4, 0.0, HALF - DEEP, 0.02);
+  tool_run(&w, 50);
+  double force = w.state.wrench.force[0];
+  double torque = w.state.wrench.torque[2];
+  CHECK(force < -0.39 && torque < -4e-3);
+  for (int m = 0; m < 5; ++m) {
+    CHECK(hap_session_set_model(w.session, next[m]) == HAP_OK);
+    tool_run(&w, 100);
+    CHECK(w.state.contacts == 4);
+    CHECK_NEAR(w.state.wrench.force[0], force, 1e-3);
+    CHECK_NEAR(w.state.wrench.torque[2], torque, 1e-5);
+  }
+  tool_end(&w);
+}
+
+/* A device of 3 dof does not turn its tool, and gets no torque; a world that turns under it does not move it. */
+TEST(a_device_without_torque_feels_it_slide)
+{
+  tool_world w;
+  tool_begin(&w, HAP_MODEL_CONTACT);
+  w.tool_def.friction = MU;
+  w.tool_def.finger_radius = 0.005;
+  REQUIRE(hap_device_open("virtual:path=0:0/0/0.013;0.3:0/0/0.008;1:0.01/0.005/0.008,blend=linear,"
+                          "hand=rigid",
+                          &w.tool_def.device, &w.detail) == HAP_OK);
+  tool_add_floor(&w);
+  REQUIRE(tool_start(&w));
+  CHECK(hap_session_advance(w.session, 900) == HAP_OK);
+  CHECK(hap_pointer_get(w.session, w.tool, &w.state, sizeof w.state) == HAP_OK);
+  CHECK_NEAR(w.state.wrench.force[2], LOAD, 1e-6);
+  CHECK_NEAR(w.state.wrench.force[0], -MU * LOAD * 2.0 / sqrt(5.0), 1e-3);
+  CHECK_NEAR(w.state.wrench.force[1], -MU * LOAD / sqrt(5.0), 1e-3);
+  hap_device *device = w.tool_def.device;
+  tool_end(&w);
+  hap_device_close(device);
+}
+
 /* ---- what the application says ---- */
 
 static struct {
@@ -507,6 +552,8 @@ int main(void)
   RUN(a_face_slides_as_coulomb_says);
   RUN(a_face_holds_against_turning);
   RUN(a_face_that_sticks_does_not_creep);
+  RUN(a_change_of_model_lets_nothing_go);
+  RUN(a_device_without_torque_feels_it_slide);
   RUN(each_geom_has_its_friction);
   RUN(no_round_gives_energy);
   RUN(no_round_that_sticks_gives_energy);
