@@ -350,7 +350,7 @@ typedef struct hapi_local_world {
   hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
-  hapi_row_source *sources;        /* of the rows; 4 x capacity.contacts + 10 x capacity.joints */
+  hapi_row_source *sources;        /* of the rows; row_capacity */
   hapi_solver solver;
   uint32_t row_capacity;
   uint32_t resting; /* bodies at the tick's begin */
