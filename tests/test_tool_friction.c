@@ -328,6 +328,36 @@ TEST(a_device_without_torque_feels_it_slide)
   hap_device_close(device);
 }
 
+/* On a box that is smaller than the face and shrinks: its corners are the same points of the patch as
+ * before, and hold what they held, but where they are now. */
+TEST(points_that_leap_hold_where_they_are)
+{
+  static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
+  for (int m = 0; m < 2; ++m) {
+    tool_world w;
+    tool_begin(&w, all[m]);
+    w.tool_def.friction = MU;
+    dGeomID box = dCreateBox(w.space, 0.016, 0.016, 0.1);
+    dGeomSetPosition(box, 0.0, 0.0, -0.05);
+    REQUIRE(tool_start(&w));
+    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(&w, 40);
+    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    stand(&w, 2e-4, 0.0, HALF - DEEP, 0.04);
+    tool_run(&w, 40);
+    double stiffness = 2.0 * K * 0.008 * 0.008;
+    CHECK_NEAR(w.state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
+    CHECK(hap_session_lock(w.session) == HAP_OK);
+    dGeomBoxSetLengths(box, 0.0136, 0.0136, 0.1);
+    CHECK(hap_session_unlock(w.session) == HAP_OK);
+    tool_run(&w, 80);
+    stiffness = 2.0 * K * 0.0068 * 0.0068;
+    CHECK_NEAR(w.state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
+    CHECK_NEAR(w.state.wrench.force[0], -K * 2e-4, 0.01 * K * 2e-4);
+    tool_end(&w);
+  }
+}
+
 /* Over the seam between two triangles: held as by a floor, along and about the normal, and no more. */
 TEST(a_mesh_holds_as_a_floor)
 {
@@ -569,7 +599,8 @@ TEST(no_round_that_sticks_gives_energy)
           go_to(&w, &s[r < 3 ? k : (5 - k) % 5], &s[r < 3 ? (k + 1) % 5 : 4 - k], 40);
         }
       }
-      printf("# %s, round %d: %.3g mJ in five\n", hap_model_name(grounds[i].model), r, 1e3 * w.work);
+      printf("# %s, round %d: %.3g mJ in five\n", hap_model_name(grounds[i].model), r,
+             1e3 * w.work);
       CHECK(w.work < 0.01 * 0.5 * LOAD * DEEP);
       CHECK(w.work_most < 0.01 * 0.5 * LOAD * DEEP);
       tool_end(&w);
@@ -586,6 +617,7 @@ int main(void)
   RUN(a_face_that_sticks_does_not_creep);
   RUN(a_change_of_model_lets_nothing_go);
   RUN(a_device_without_torque_feels_it_slide);
+  RUN(points_that_leap_hold_where_they_are);
   RUN(a_mesh_holds_as_a_floor);
   RUN(each_geom_has_its_friction);
   RUN(no_round_gives_energy);

@@ -51,10 +51,11 @@ static void stretch_of(const hapi_tick *tick, const hapi_local_contact *c, doubl
 static void add_mean(const hapi_tick *tick, const hapi_local_contact *c, fit *io)
 {
   double stretch[4];
-  double weight = hapi_friction_of(tick, c)->stiffness;
+  const hapi_friction *f = hapi_friction_of(tick, c);
+  double weight = f->stiffness;
   stretch_of(tick, c, stretch);
   io->weight += weight;
-  hapi_v3_madd(io->middle, weight, c->point_now, io->middle);
+  hapi_v3_madd(io->middle, weight, f->at, io->middle); /* the point may have leapt since */
   hapi_v3_madd(io->stretch, weight, stretch, io->stretch);
   io->stretch[3] += weight * stretch[3];
   io->most = fmax(io->most, hapi_v3_norm(stretch));
@@ -67,9 +68,10 @@ static void add_moment(const hapi_tick *tick, const hapi_local_contact *c, const
   double stretch[4];
   double arm[3];
   double across[3];
-  double weight = hapi_friction_of(tick, c)->stiffness;
+  const hapi_friction *f = hapi_friction_of(tick, c);
+  double weight = f->stiffness;
   stretch_of(tick, c, stretch);
-  hapi_v3_sub(c->point_now, in->middle, arm);
+  hapi_v3_sub(f->at, in->middle, arm);
   hapi_v3_cross(normal, arm, across);
   io[0] += weight * hapi_v3_dot(across, stretch); /* of the mean nothing is left in the sum */
   io[1] += weight * hapi_v3_dot(across, across);
