@@ -185,7 +185,8 @@ static void hold_tool(tool_world *w, hand *h, int tick)
 static void make_round(tool_world *w)
 {
   for (int i = 0; i < 32; ++i) {
-    double angle = 2.0 * M_PI * (i / 2 + 0.25) / 16.0;
+    int corner = i / 2;
+    double angle = 2.0 * M_PI * (corner + 0.25) / 16.0;
     w->hull[3 * i] = HALF * cos(angle);
     w->hull[3 * i + 1] = HALF * sin(angle);
     w->hull[3 * i + 2] = i % 2 == 0 ? -HALF : HALF;

@@ -125,7 +125,8 @@ TEST(a_block_is_dragged_as_if_the_world_were_stepped_at_the_haptic_rate)
   static motion reference;
   static motion test;
   for (size_t i = 0; i < sizeof drags / sizeof drags[0]; ++i) {
-    for (double hz = 20.0; hz < 61.0; hz += 40.0) {
+    for (int k = 0; k < 2; ++k) {
+      double hz = k == 0 ? 20.0 : 60.0;
       drag_block(&drags[i], HAP_MODEL_SINGLE, hz, &reference);
       drag_block(&drags[i], HAP_MODEL_CONTACT, hz, &test);
       double force = error_of(test.force, reference.force, FRAMES);
@@ -367,7 +368,7 @@ static held hold_box(const hold *h, double seconds)
   char hands[2][256];
   double depth = h->grip * p.mass * p.gravity / (2.0 * 0.5) / p.stiffness;
   rig r;
-  hap_trace_row row;
+  hap_trace_row row = {0};
   p.friction = 0.5;
   p.finger_radius = 0.0;
   p.radius = 0.001;
