@@ -51,6 +51,8 @@ typedef struct tick_case {
   double bound_ns; /* 0: none, or that of ten bodies */
   int hands;       /* 0: one */
   double tool[3];  /* m, edges of a box that is the pointer; 0: a sphere */
+  double friction; /* of the pointer; 0: the scene's */
+  double finger;   /* m, likewise */
 } tick_case;
 
 static const tick_case cases[] = {
@@ -70,6 +72,8 @@ static const tick_case cases[] = {
     {"block4x4x4", "row10", 64, {4, 4, 4}, true, 0.0},
     {"hands16", "row10", 10, {0, 0, 0}, true, 0.0, HANDS_MAX, {0.0}},
     {"tool", "lightstand", 0, {0, 0, 0}, true, TOOL_NS, 0, {0.04, 0.04, 0.02}},
+    {"tool_rubs", "lightstand", 0, {0, 0, 0}, true, TOOL_NS, 0, {0.04, 0.04, 0.02}, 0.5},
+    {"tool_twists", "lightstand", 0, {0, 0, 0}, true, TOOL_NS, 0, {0.04, 0.04, 0.02}, 0.5, 0.006},
 };
 
 /* What a tick is measured by. */
@@ -149,6 +153,8 @@ static hap_status open_bed(bench *b, const tick_case *what, tick_bed *t)
   t->parameters = *cycles_scene(what->scene);
   memcpy(t->parameters.tool, what->tool, sizeof t->parameters.tool);
   t->parameters.radius = what->tool[0] > 0.0 ? TOOL_ROUNDING : t->parameters.radius;
+  t->parameters.friction = what->friction > 0.0 ? what->friction : t->parameters.friction;
+  t->parameters.finger_radius = what->finger > 0.0 ? what->finger : t->parameters.finger_radius;
   options.parameters = &t->parameters;
   options.count = what->count;
   put_hands(what, specs, &options);

@@ -52,6 +52,7 @@ static void options_of(const scenario *s, rig_options *out)
   out->def.max_bodies = 16; /* less to clear: more rounds a second */
   out->def.max_contacts = 128;
   out->def.trace_rows = 64;
+  out->friction = 0.5;
   for (size_t i = 0; i < 2 && s->devices[i] != NULL; ++i) {
     out->devices[out->device_count++] = s->devices[i];
   }
@@ -157,6 +158,11 @@ TEST(every_model_in_lockstep_with_failing_allocations)
 TEST(every_model_with_joints_with_failing_allocations)
 {
   run_each("lightstand", HAP_DRIVE_LOCKSTEP, NULL, NULL);
+}
+
+TEST(every_model_with_a_tool_with_failing_allocations)
+{
+  run_each("lever", HAP_DRIVE_LOCKSTEP, NULL, NULL);
 }
 
 TEST(every_model_in_a_frame_loop_with_failing_allocations)
@@ -376,6 +382,7 @@ int main(void)
   dAllocateODEDataForThread(dAllocateMaskAll);
   RUN(every_model_in_lockstep_with_failing_allocations);
   RUN(every_model_with_joints_with_failing_allocations);
+  RUN(every_model_with_a_tool_with_failing_allocations);
   RUN(every_model_in_a_frame_loop_with_failing_allocations);
   RUN(every_model_in_threads_with_failing_allocations);
   RUN(two_devices_with_failing_allocations);

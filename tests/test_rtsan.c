@@ -112,7 +112,7 @@ TEST(the_sanitizer_catches_what_it_should)
 
 static hapi_exchange *exchange;
 static hapi_haptic *haptic;
-static hap_device *devices[2];
+static hap_device *devices[3];
 
 /* A body and a wall, met by two pointers with virtual devices. */
 static void publish_model(uint64_t number)
@@ -151,6 +151,30 @@ static void publish_model(uint64_t number)
   hapi_exchange_model_publish(exchange);
 }
 
+#define TOOL_HALF 0.01 /* m, of the third pointer, a cube */
+
+/* Its lower face against a floor of its own, with friction; now and then it is found to have other points. */
+static void publish_tool(hapi_patches *patches)
+{
+  hapi_tool_point *tools = hapi_patches_tools(patches);
+  patches->tool_count = 4;
+  memset(tools, 0, 4 * sizeof *tools);
+  for (uint32_t i = 0; i < 4; ++i) {
+    double half = patches->number % 7 == 0 ? 0.5 * TOOL_HALF : TOOL_HALF;
+    tools[i].pointer = 2;
+    tools[i].pointer_generation = 1;
+    tools[i].same_within = 0.002;
+    tools[i].mu = 0.5;
+    tools[i].at.key = 7;
+    tools[i].at.body_a = tools[i].at.body_b = HAPI_SLOT_NONE;
+    tools[i].at.touch = HAPI_TOUCH_FACE_B;
+    hapi_v3_set(tools[i].at.core_a, i % 2 != 0 ? half : -half, i / 2 != 0 ? half : -half,
+                -TOOL_HALF);
+    hapi_v3_set(tools[i].at.core_b, 0.0, 0.0, -0.05);
+    tools[i].at.normal[2] = 1.0;
+  }
+}
+
 /* Four corners of the body on a floor with friction, and a ball of it. */
 static void publish_patches(uint64_t number)
 {
@@ -179,12 +203,22 @@ static void publish_patches(uint64_t number)
                      .mu2 = 0.5,
                      .erp = 0.01,
                      .max_push = 1.0};
+  publish_tool(patches);
   hapi_exchange_patches_publish(exchange);
 }
 
 static bool set_up(void)
 {
-  const hapi_capacity capacity = {16, 16, 4, 16, 64};
+  static const char *const specs[3] = {
+      "virtual:sine=0.02/0/0,hz=2,hand=tense", "virtual:path=0:-0.1/0/0;5:0.02/0/0",
+      "virtual:dof=6,path=0:0/0/0;2:0/0/-0.042;10:0.1/0/-0.042,turn=0:0/0/0;10:0/0/1"};
+  static double corners[8][3];
+  const hapi_capacity capacity = {.bodies = 16,
+                                  .contacts = 16,
+                                  .pointers = 4,
+                                  .geoms = 16,
+                                  .hull_points = 64,
+                                  .tool_points = 8};
   hap_detail detail;
   if (hapi_exchange_create(&capacity, &exchange) != HAP_OK) {
     return false;
@@ -195,14 +229,21 @@ static bool set_up(void)
                                .trace_rows = 1000,
                                .exchange = exchange};
   bool good = hapi_haptic_create(&config, &haptic) == HAP_OK;
-  for (int i = 0; i < 2 && good; ++i) {
+  for (int i = 0; i < 24; ++i) {
+    corners[i / 3][i % 3] = (i / 3 >> i % 3 & 1) != 0 ? TOOL_HALF : -TOOL_HALF;
+  }
+  for (int i = 0; i < 3 && good; ++i) {
     hap_pointer_def def;
     hap_pointer_id id;
     hap_pointer_def_init(&def, sizeof def);
-    good = hap_device_open(i == 0 ? "virtual:sine=0.02/0/0,hz=2,hand=tense"
-                                  : "virtual:path=0:-0.1/0/0;5:0.02/0/0",
-                           &devices[i], &detail) == HAP_OK;
+    good = hap_device_open(specs[i], &devices[i], &detail) == HAP_OK;
     def.device = devices[i];
+    if (i == 2) {
+      def.hull_xyz = &corners[0][0];
+      def.hull_points = 8;
+      def.radius = 0.0;
+      def.finger_radius = 0.005;
+    }
     good = good && hapi_haptic_add_pointer(haptic, &def, &id, &detail) == HAP_OK;
   }
   return good && hapi_haptic_begin(haptic, 0, &detail) == HAP_OK;
@@ -210,6 +251,7 @@ static bool set_up(void)
 
 static void cycles(void)
 {
+  int rubbed = 0; /* ticks in which the tool feels friction, in model CONTACT */
   for (int i = 0; i < TICKS; ++i) {
     if (i % 10 == 0) {
       publish_model((uint64_t)i / 10 + 1);
@@ -218,12 +260,14 @@ static void cycles(void)
     __rtsan_realtime_enter();
     hapi_haptic_cycle(haptic, i * TICK_NS);
     __rtsan_realtime_exit();
+    const double *force = haptic->tick.pointers[2].wrench.force;
+    rubbed += hypot(force[0], force[1]) > 0.1 * force[2] && force[2] > 1.0;
   }
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   hapi_haptic_stats(haptic, &stats);
-  if (stats.ticks != TICKS || stats.contact_ticks < 100 || stats.models_adopted < 900 ||
-      stats.contact_passes < 900 || stats.solver_sweeps < 1000) {
+  if (rubbed < 500 || stats.ticks != TICKS || stats.contact_ticks < 100 ||
+      stats.models_adopted < 900 || stats.contact_passes < 900 || stats.solver_sweeps < 1000) {
     fprintf(stderr, "the loop did not do its work\n");
     _exit(1);
   }
@@ -274,6 +318,7 @@ int main(void)
   hapi_exchange_destroy(exchange);
   hap_device_close(devices[0]);
   hap_device_close(devices[1]);
+  hap_device_close(devices[2]);
   return tap_done();
 }
 

@@ -260,6 +260,31 @@ TEST(a_falling_neighbour_falls_at_the_worlds_speed)
   stage_end(&s);
 }
 
+/* Its frame and its first target together take it out of the world: a fault, and poses that are poses. */
+TEST(a_hand_that_never_came_in_has_a_pose)
+{
+  stage s;
+  hap_pointer_def def;
+  hap_pointer_id id;
+  hap_pose poses[2];
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(&s) == HAP_OK);
+  hap_pointer_def_init(&def, sizeof def);
+  def.pose_world_device.position[0] = 9e5;
+  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
+  move_hand(&s, id, 9e5, 0.0);
+  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 100) >= HAP_OK);
+  CHECK(figures(&s).fault == HAP_FAULT_DEVICE_POSE);
+  const int64_t times[] = {0, hap_session_now(s.session), INT64_MAX};
+  for (int i = 0; i < 6; ++i) {
+    CHECK(hap_pointer_poses(s.session, id, times[i / 2], &poses[0], &poses[1]) >= HAP_OK);
+    const double *q = poses[i % 2].quat_wxyz;
+    CHECK_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1.0, 1e-9);
+  }
+  stage_end(&s);
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -274,6 +299,7 @@ int main(void)
   RUN(a_transmission_is_not_probed_and_that_is_said);
   RUN(edits_of_a_session_that_never_ran_are_run);
   RUN(a_falling_neighbour_falls_at_the_worlds_speed);
+  RUN(a_hand_that_never_came_in_has_a_pose);
   dCloseODE();
   return tap_done();
 }

@@ -89,8 +89,9 @@ typedef struct hap_pointer_def {
                          turns back with k r^2 about its middle */
   double damping; /* N s/m, 0..1e6, default 0: d of eq. 7, acts while in contact; shared likewise */
   double friction; /* 0..10, default 0: Coulomb friction against what it touches, sticking and
-                          sliding; hap_ode_def.pointer_surface says another one for a geom. With a
-                          hull 0 in this version */
+                          sliding; hap_ode_def.pointer_surface says another one for a geom. Each point
+                          at which a hull touches has its own share of it, so that a face also holds
+                          against turning (docs/numerics.md) */
   const double *hull_xyz; /* m, x, y, z of each point, within 100 of the pointer's origin; copied.
                                  NULL (default): a sphere. Else the pointer is a tool: their convex
                                  hull, in the pointer's frame, which turns with the device. It must
@@ -128,7 +129,8 @@ typedef struct hap_pointer_def {
                            radius: 2/3 of that of a patch with even pressure. Sliding and turning share
                            one limit (docs/numerics.md). Needs friction. A pointer whose device has 3
                            degrees of freedom does not turn itself; others turn with the device, whose
-                           torque is about the pointer's centre. */
+                           torque is about the pointer's centre. Of a hull it is the radius at each of
+                           its points, beside the arms that these have. */
   double
       virtual_mass; /* kg, 1e-6..1e6, default 0.1: of HAP_COUPLING_VIRTUAL. It is felt in the air, and
                              swings on the spring at sqrt(coupling_stiffness / virtual_mass) */

@@ -101,6 +101,7 @@ static void add_pair(const hapi_contact *contact, const placed_tool *tool,
     out->pointer = tool->in->pointer;
     out->pointer_generation = tool->in->generation;
     out->same_within = hapi_tool_same_within(tool->in->extent);
+    out->mu = pair->mu;
     hapi_touch_localise(&a, &b, &patch.points[i], &out->at);
     out->at.key = pair->key;
     out->at.body_a = HAPI_SLOT_NONE;

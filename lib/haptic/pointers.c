@@ -118,6 +118,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->slew_torque = p->max_torque * (p->slew_force / p->max_force);
   p->device_pose.quat_wxyz[0] = 1.0;
   p->device_good.quat_wxyz[0] = 1.0;
+  p->handle_quat[0] = p->proxy_quat[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
 

@@ -16,8 +16,9 @@ static bool allocate_world(hapi_local_world *world, const hapi_capacity *c)
   while (world->bucket_count < 2 * c->contacts) {
     world->bucket_count *= 2;
   }
-  world->row_capacity = (ROWS_PER_CONTACT + ROWS_PER_POINTER_CONTACT) * c->contacts +
-                        2 * c->pointers + 2 * c->tool_points + HAPI_JOINT_ROWS * c->joints;
+  world->row_capacity = ROWS_PER_CONTACT * c->contacts +
+                        ROWS_PER_POINTER_CONTACT * (c->contacts + 2 * c->tool_points) +
+                        2 * c->pointers + HAPI_JOINT_ROWS * c->joints;
   world->joints = hapi_alloc_array(c->joints, sizeof *world->joints);
   world->joint_memory = hapi_alloc_array(c->joints, sizeof *world->joint_memory);
   world->memory = hapi_alloc_array(c->contacts, sizeof *world->memory);

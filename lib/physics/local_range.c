@@ -310,6 +310,7 @@ static void add_tool_pair(hapi_physics *physics, const hapi_hit *hit, uint32_t g
   pair->key = hapi_tool_geom_key(physics, hit->geom, hit->pointer);
   pair->tool = take_tool(physics, hit->pointer);
   pair->geom = geom;
+  pair->mu = hit->mu;
 }
 
 /* The corners of a mesh that a body carries, in the body's frame. */

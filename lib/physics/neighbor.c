@@ -295,13 +295,14 @@ static void take_body(hapi_body_slot *local, dBodyID body)
                                          : 0;
 }
 
-static void take_hit(hapi_physics *physics, const hapi_hit *hit)
+static void take_hit(hapi_physics *physics, hapi_hit *hit)
 {
   dBodyID body = dGeomGetBody(hit->geom);
   const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
   uint32_t slot = body != NULL ? hapi_slots_body(physics, known_of(physics, hit)) : HAPI_SLOT_NONE;
   hapi_contact_slot *contact = NULL;
   if (hit->tool_count > 0 && (body == NULL || slot != HAPI_NONE)) {
+    hit->mu = friction_of(physics, hit, pointer);
     hapi_tool_take(physics, hit, slot);
     if (body != NULL) {
       take_body(&physics->bodies[slot], body);

@@ -320,6 +320,7 @@ typedef struct hapi_hit {
   hapi_nearest nearest; /* a: pointer, b: geom */
   uint32_t tool_first;  /* of a hull: into the points of hapi_tool_search */
   uint32_t tool_count;  /* 0: a sphere */
+  double mu;            /* of a hull, of all of its points, once it is taken */
 } hapi_hit;
 
 /* ---- tool.c ---- */

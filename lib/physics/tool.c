@@ -321,7 +321,10 @@ static void place_slot(hapi_physics *physics, hapi_contact_slot *slot, const hap
   slot->placed = slot->is_tool = slot->wanted = true;
   slot->speed = hapi_neighbors_speed(hit->geom, pointer, slot->point_world);
   slot->stiffness = pointer->stiffness;
+  slot->finger_radius = pointer->finger_radius;
+  slot->mu = hit->mu;
   slot->tool = point->tool;
+  slot->tool.mu = hit->mu;
   slot->tool.at.body_b = slot->body;
   slot->tool.at.generation_b =
       slot->body != HAPI_SLOT_NONE ? physics->bodies[slot->body].generation : 0;

@@ -82,10 +82,6 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
 
 hap_status hapi_session_check_pointer(const hap_pointer_def *d, hap_detail *detail)
 {
-  if (d->hull_points != 0 && (d->friction != 0.0 || d->finger_radius != 0.0)) {
-    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "friction and finger_radius of a hull are not in this version: leave them 0");
-  }
   hap_status status = check_numbers(d, detail);
   return status >= HAP_OK ? hapi_session_check_hull(d, detail) : status;
 }

@@ -94,6 +94,7 @@ typedef struct hapi_tool_point {
   uint32_t pointer_generation;
   double
       same_within; /* m, in the pointer's frame: a new point that is nearer to an old one is it */
+  double mu;       /* friction of the pointer against the geom; 0: none */
   hapi_patch_contact at;
 } hapi_tool_point;
 
@@ -384,6 +385,7 @@ typedef struct hapi_near_tool_pair {
   uint64_t key; /* of a mesh: of all of its triangles */
   uint32_t tool;
   uint32_t geom;
+  double mu; /* of its points */
 } hapi_near_tool_pair;
 
 typedef struct hapi_near {

@@ -264,12 +264,30 @@ static void move(source *s, const place *p, hap_pointer_id id)
   }
 }
 
+/* A cube as large as the sphere, with friction. */
+static void take_hull(source *s, hap_pointer_def *def)
+{
+  static double corners[8][3];
+  for (int i = 0; i < 24; ++i) {
+    corners[i / 3][i % 3] = (i / 3 >> i % 3 & 1) != 0 ? 0.01 : -0.01;
+  }
+  def->hull_xyz = &corners[0][0];
+  def->hull_points = 8;
+  def->radius = 0.0;
+  def->friction = 0.5;
+  def->finger_radius = take_double(s);
+}
+
 static void run(source *s, const place *p)
 {
   hap_pointer_def def;
   hap_pointer_id id;
+  uint8_t kind = take_byte(s);
   hap_pointer_def_init(&def, sizeof def);
-  for (int edits = take_byte(s) % EDITS_MAX; edits > 0; --edits) {
+  if ((kind & 128) != 0) {
+    take_hull(s, &def);
+  }
+  for (int edits = kind % EDITS_MAX; edits > 0; --edits) {
     edit_pointer(s, &def);
   }
   if (hap_pointer_add(p->session, &def, &id) < HAP_OK) {

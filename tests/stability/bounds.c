@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "device/device.h"
 #include "haptic/haptic_internal.h"
+#include "haptic/rt/pointer_friction.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 
@@ -219,8 +220,8 @@ static double spring_energy(const bounds *b)
       sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->stiffness);
     }
     if (p->finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
-      double turn = tick->frictions[c->slot].stretch[3];
-      sum += 0.5 * p->stiffness * turn * turn;
+      double turn = hapi_friction_of(tick, c)->stretch[3];
+      sum += 0.5 * c->weight * p->stiffness * turn * turn;
     }
   }
   for (int i = 0; i < b->w->hand_count; ++i) {

@@ -18,6 +18,10 @@ dGeomID add_block(world *w, const double edges[3], const double at[3]); /* never
 void add_floor(world *w);                                               /* z = 0 */
 void set_gravity(world *w, double gravity);                             /* m/s^2, along -z */
 
+#define TOOL_HALF 0.01     /* m, of a cube */
+#define TOOL_ROUNDING 1e-3 /* m, around it */
+void take_tool(world *w);  /* the hands are such cubes */
+
 /* A hand with this motion, as the virtual device spells it. */
 void add_hand(world *w, const char *format, ...) HAP_PRINTF(2, 3);
 

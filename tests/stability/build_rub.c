@@ -58,21 +58,51 @@ void build_rub_top(world *w, const case_row *row)
            -HALF - w->pointer.radius + 0.002, -HALF - w->pointer.radius - APART);
 }
 
+/* With the face flat at first, then turning and tilting on it. */
+void build_tool_rub(world *w, const case_row *row)
+{
+  const double edge = row->n > 0 ? WORLD_EDGE : 0.0;
+  double low = row->n * (edge - WORLD_LAYER) + TOOL_HALF + TOOL_ROUNDING;
+  double z = low - 0.004;
+  add_floor(w);
+  for (int i = 0; i < row->n; ++i) {
+    (void)add_cube(w, row->mass, WORLD_EDGE,
+                   AT(0.0, 0.0, WORLD_EDGE * (i + 0.5) - WORLD_LAYER * (i + 1)));
+  }
+  take_tool(w);
+  add_hand(w,
+           "dof=6,path=0:0.003/0.002/%.6g;0.2:0.003/0.002/%.6g;0.4:0.018/0.002/%.6g;"
+           "0.6:0.003/-0.013/%.6g;0.8:-0.012/0.002/%.6g;1:0.003/0.002/%.6g,"
+           "turn=0:0/0/0;0.2:0/0/0;0.4:0/0/0.3;0.6:0.03/0.02/-0.3;0.8:-0.02/0.06/0;1:0/0/0,loop=1",
+           low + APART, z, z, z, z, low + APART);
+}
+
 /* Two fingers lift a cube beside its middle, swing it, put it down and let go. */
-void build_pinch(world *w, const case_row *row)
+static void pinch(world *w, const case_row *row, double reach, const char *more)
 {
   double beside = 0.3 * HALF;
   double z = HALF - WORLD_LAYER;
   add_floor(w);
   (void)add_cube(w, row->mass, WORLD_EDGE, AT(0.0, 0.0, z));
   for (int side = -1; side <= 1; side += 2) {
-    double x = side * (HALF + w->pointer.radius);
+    double x = side * (HALF + reach);
     double open = x + side * APART;
     double close = x - side * DEEP;
     add_hand(w,
-             "path=0:%g/%g/%g;0.15:%g/%g/%g;0.4:%g/%g/%g;0.6:%g/%g/%g;0.8:%g/%g/%g;0.9:%g/%g/%g;"
+             "%spath=0:%g/%g/%g;0.15:%g/%g/%g;0.4:%g/%g/%g;0.6:%g/%g/%g;0.8:%g/%g/%g;0.9:%g/%g/%g;"
              "1:%g/%g/%g,loop=1",
-             open, beside, z, close, beside, z, close, beside, z + 0.03, close, beside + 0.05,
+             more, open, beside, z, close, beside, z, close, beside, z + 0.03, close, beside + 0.05,
              z + 0.03, close, beside, z + 0.001, close, beside, z, open, beside, z);
   }
+}
+
+void build_pinch(world *w, const case_row *row)
+{
+  pinch(w, row, w->pointer.radius, "");
+}
+
+void build_tool_pinch(world *w, const case_row *row)
+{
+  take_tool(w);
+  pinch(w, row, TOOL_HALF + TOOL_ROUNDING, "dof=6,");
 }

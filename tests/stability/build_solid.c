@@ -41,10 +41,7 @@ void build_press(world *w, const case_row *row)
   press_at(w, 0.003, 0.002, row->n * (EDGE - WORLD_LAYER), 0.02);
 }
 
-#define TOOL_HALF 0.01     /* m, of a cube */
-#define TOOL_ROUNDING 1e-3 /* m, around it */
-
-static void take_tool(world *w)
+void take_tool(world *w)
 {
   static double corners[8][3];
   for (int i = 0; i < 8; ++i) {

@@ -97,5 +97,7 @@ void build_rub_sliding(world *w, const struct case_row *row); /* the floor has m
 void build_rub_ball(world *w, const struct case_row *row);    /* rolled along the floor */
 void build_rub_top(world *w, const struct case_row *row);     /* size: rad/s */
 void build_pinch(world *w, const struct case_row *row);       /* lifted between two hands */
+void build_tool_rub(world *w, const struct case_row *row);    /* a tool across the top, and round */
+void build_tool_pinch(world *w, const struct case_row *row);  /* lifted between two flat fingers */
 
 #endif

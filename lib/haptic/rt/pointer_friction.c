@@ -15,8 +15,9 @@
 
 #define ROLLED_COSINE 0.99875 /* 0.05 rad: of 10 mm, the arc is 0.2 um longer than the tangent */
 #define OTHER_FACE_COSINE 0.5
-#define TURNED 1.0    /* rad: half a turn could not be told from its opposite */
-#define AT_LIMIT 1e-6 /* of the limit: less is rounding */
+#define TURNED 1.0     /* rad: half a turn could not be told from its opposite */
+#define AT_LIMIT 1e-6  /* of the limit: less is rounding */
+#define LEAP_SHARE 0.2 /* of the distance in which a hull's point is the same */
 
 static const double no_turn[4] = {1.0, 0.0, 0.0, 0.0};
 
@@ -208,6 +209,23 @@ static void measure_stretch(hapi_friction *f, const hapi_tick_pointer *p,
   }
 }
 
+/* A new patch may have the point of a hull elsewhere, all at once: more than what it has been pulled by. */
+static bool leaps(const hapi_friction *f, const hapi_tick *tick, const hapi_local_contact *contact,
+                  const double normal[3], const double point[3])
+{
+  const hapi_tick_pointer *p = &tick->pointers[contact->pointer];
+  double way[3];
+  if (contact->tool == 0) {
+    return false;
+  }
+  hapi_quat_rotate(pointer_turn(p), f->set.anchor_pointer, way);
+  hapi_v3_add(way, p->pose.position, way);
+  hapi_v3_sub(point, way, way);
+  across(normal, way);
+  double most = LEAP_SHARE * tick->tool.tools[contact->tool - 1].in.same_within;
+  return hapi_v3_norm(way) > most + hapi_v3_norm(f->stretch);
+}
+
 /* Whether anchors of the tick before hold: not after a jump, nor for another face. */
 static bool goes_on(const hapi_friction *f, const hapi_tick *tick,
                     const hapi_local_contact *contact, const hapi_local_body *body,
@@ -216,7 +234,8 @@ static bool goes_on(const hapi_friction *f, const hapi_tick *tick,
   const hapi_tick_pointer *p = &tick->pointers[contact->pointer];
   double of_pointer[3];
   double of_body[3];
-  if (f->generation != contact->generation || f->tick + 1 != tick->tick || p->jumped) {
+  bool same = contact->tool != 0 || f->generation == contact->generation;
+  if (!same || f->slid || f->tick + 1 != tick->tick || p->jumped) {
     return false;
   }
   hapi_quat_rotate(pointer_turn(p), f->set.normal_pointer, of_pointer);
@@ -251,16 +270,9 @@ static void set_speed(hapi_friction *f, const hapi_tick_pointer *p, const hapi_l
   f->speed[3] = p->finger_radius * hapi_v3_dot(f->normal, spin);
 }
 
-/* Of a rigid contact the coupling's is all that there is. */
-static double stiffness_of(const hapi_tick_pointer *p)
-{
-  return p->rigid ? p->coupling_stiffness : p->stiffness;
-}
-
 /* Directions at right angles, the first along the force that there is when all sticks: a force that is
  * too large for the ball then is one number, and the ball's surface no affair of the others. */
-void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead,
-                       const double gain[3])
+void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
 {
   double ahead[4];
   double pull[4];
@@ -270,7 +282,7 @@ void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead
     across(f->normal, ahead);
   }
   for (int i = 0; i < 4; ++i) {
-    pull[i] = stiffness_of(p) * (f->stretch[i] + lead * ahead[i]) + p->damping * ahead[i];
+    pull[i] = f->stiffness * (f->stretch[i] + lead * ahead[i]) + f->damping * ahead[i];
   }
   double along[3];
   set_tangent(f->normal, pull, along);
@@ -283,7 +295,6 @@ void hapi_friction_aim(hapi_friction *f, const hapi_tick_pointer *p, double lead
   f->axes[1][3] = 0.0;
   hapi_v3_scale(-turning, along, f->axes[2]);
   f->axes[2][3] = sliding;
-  f->axis_count = p->finger_radius > 0.0 ? 3 : 2;
 }
 
 hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
@@ -296,10 +307,14 @@ hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *co
   const hapi_local_body *body =
       contact->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[contact->body];
   uint32_t epoch = body != NULL ? body->epoch : 0;
-  hapi_friction *f = &tick->frictions[contact->slot];
-  bool same = goes_on(f, tick, contact, body, normal);
+  hapi_friction *f = hapi_friction_of(tick, contact);
+  bool same = goes_on(f, tick, contact, body, normal) && !leaps(f, tick, contact, normal, point);
   if (!same) {
+    double stretch[4];
+    hapi_tool_friction_begin(tick, contact, normal, point, stretch);
     memset(f, 0, sizeof *f);
+    hapi_v3_copy(stretch, f->stretch);
+    f->now.turn = stretch[3];
   }
   see(f, p, body, normal, point);
   if (!same || f->epoch != epoch) { /* that a body was put somewhere else is no motion */
@@ -311,6 +326,11 @@ hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *co
   f->generation = contact->generation;
   f->tick = tick->tick;
   f->epoch = epoch;
+  f->rigid = p->rigid;
+  f->stiffness = p->rigid ? p->coupling_stiffness : contact->weight * p->stiffness;
+  f->damping = p->rigid ? p->damping : contact->weight * p->damping;
+  f->left = 1.0;
+  f->axis_count = p->finger_radius > 0.0 ? 3 : 2;
   measure_stretch(f, p, body, normal);
   set_speed(f, p, body);
   return f;
@@ -334,23 +354,21 @@ void hapi_friction_wrench(const hapi_friction *f, const hapi_tick_pointer *p, co
   hapi_v3_madd(out->torque, p->finger_radius * push[3], f->normal, out->torque);
 }
 
-void hapi_friction_end(hapi_friction *f, const hapi_tick_pointer *p, const double push[4],
-                       double limit)
+void hapi_friction_end(hapi_friction *f, const double push[4], double limit)
 {
-  if (p->rigid) { /* what slides begins anew at the next tick */
-    f->generation = norm4(push) >= limit * (1.0 - AT_LIMIT) ? 0 : f->generation;
+  if (f->rigid) {
+    f->slid = norm4(push) >= limit * (1.0 - AT_LIMIT);
     return;
   }
-  double spring = p->stiffness * norm4(f->stretch);
+  double spring = f->stiffness * norm4(f->stretch);
   if (spring > limit && norm4(push) >= limit * (1.0 - AT_LIMIT)) {
-    set_anchors(f, limit / spring);
+    f->left = limit / spring;
+    set_anchors(f, f->left);
   }
 }
 
 double hapi_friction_energy(const hapi_tick *tick, const hapi_local_contact *contact)
 {
   const hapi_friction *f = hapi_friction_now(tick, contact);
-  return f == NULL || tick->pointers[contact->pointer].rigid
-             ? 0.0
-             : 0.5 * tick->pointers[contact->pointer].stiffness * dot4(f->stretch, f->stretch);
+  return f == NULL || f->rigid ? 0.0 : 0.5 * f->stiffness * dot4(f->stretch, f->stretch);
 }

@@ -360,7 +360,7 @@ static void set_friction_columns(const hapi_local_contact *contact, const placed
     hapi_v3_madd(row->ja + 3, p->finger_radius * axis[3], at->normal, row->ja + 3);
     hapi_row_response(at->body, row->ja, row->ba);
   }
-  if (at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) {
+  if (contact->tool == 0 && at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) {
     hapi_v3_sub(f->at, at->point, arm);
     hapi_v3_cross(arm, axis, couple + 3);
     hapi_v3_madd(couple + 3, p->finger_radius * axis[3], at->normal, couple + 3);
@@ -378,6 +378,12 @@ static void set_friction_columns(const hapi_local_contact *contact, const placed
     hapi_v3_scale(p->response, row->jb, row->bb);
     row->b = p->row;
   }
+  if (p->proxied && p->hull != NULL) {
+    hapi_v3_sub(f->at, p->pose.position, arm);
+    hapi_v3_cross(arm, row->jb, row->jb + 3);
+    hapi_v3_madd(row->jb + 3, -p->finger_radius * axis[3], at->normal, row->jb + 3);
+    hapi_v3_scale(p->spin_response, row->jb + 3, row->bb + 3);
+  }
 }
 
 static double along(const double axis[4], const double v[4])
@@ -389,10 +395,13 @@ static void fill_friction_spring(const placed_pointer *at, const hapi_friction *
                                  const double axis[4], const hapi_row *row, spring *out)
 {
   const hapi_tick_pointer *p = at->pointer;
-  *out = (spring){.k = p->stiffness, .d = p->damping, .pulls = true};
+  *out = (spring){.k = f->stiffness, .d = f->damping, .pulls = true};
   out->depth = along(axis, f->stretch);
   out->body_w = hapi_row_start_speed(at->body, row->ja);
-  out->w = out->body_w + (p->proxied ? hapi_v3_dot(row->jb, p->proxy_velocity) : 0.0);
+  out->w = out->body_w;
+  if (p->proxied) {
+    out->w += hapi_v3_dot(row->jb, p->proxy_velocity) + hapi_v3_dot(row->jb + 3, p->proxy_spin);
+  }
   out->s = along(axis, f->speed) + out->w;
   out->body_a = hapi_dot6(row->ja, row->ba);
   out->a = out->body_a + hapi_dot6(row->jb, row->bb);
@@ -446,12 +455,20 @@ static void aim(const hapi_tick *tick, const hapi_local_contact *contact, const 
   if (p->proxied) {
     hapi_v3_sub(p->free_velocity, p->proxy_velocity, gain);
   }
+  if (p->proxied && p->hull != NULL) {
+    double arm[3];
+    double spin[3];
+    hapi_v3_sub(f->at, p->pose.position, arm);
+    hapi_v3_sub(p->free_spin, p->proxy_spin, spin);
+    hapi_v3_cross(spin, arm, spin);
+    hapi_v3_add(gain, spin, gain);
+  }
   if (contact->row != HAPI_NO_ROW && p->integration != HAP_INTEGRATION_EXPLICIT) {
     const hapi_row *normal = &tick->world.solver.rows[contact->row];
     double a = hapi_dot6(normal->ja, normal->ba) + hapi_dot6(normal->jb, normal->bb);
-    lead = by_midpoint(p, tick->period * tick->period * a * p->stiffness) ? 0.0 : tick->period;
+    lead = by_midpoint(p, tick->period * tick->period * a * f->stiffness) ? 0.0 : tick->period;
   }
-  hapi_friction_aim(f, p, lead, gain);
+  hapi_friction_aim(f, lead, gain);
 }
 
 /* After the normal's row. */
@@ -652,11 +669,21 @@ static void rub(hapi_tick *tick, hapi_local_contact *c)
   hapi_friction_wrench(f, p, push, c->point_now, &wrench);
   hapi_v3_add(c->force, wrench.force, c->force);
   hapi_v3_copy(wrench.torque, c->couple);
-  if (p->turns) {
+  if (p->turns || p->hull != NULL) {
     hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
     hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
   }
-  hapi_friction_end(f, p, push, limit);
+  hapi_friction_end(f, push, limit);
+}
+
+/* About the pointer's origin, of the normal force. */
+static void turn_tool(hapi_tick_pointer *p, const hapi_local_contact *c)
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(c->point_now, p->pose.position, arm);
+  hapi_v3_cross(c->force, arm, moment); /* of the opposite force */
+  hapi_v3_add(p->wrench.torque, moment, p->wrench.torque);
 }
 
 static void feel(hapi_tick *tick, hapi_local_contact *c)
@@ -667,6 +694,9 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
     double force = tick->world.solver.rows[c->row].impulse / tick->period;
     hapi_v3_scale(-force, c->normal_now, c->force);
   }
+  if (c->tool != 0) {
+    turn_tool(p, c);
+  }
   if (c->mu > 0.0) {
     rub(tick, c);
   }
@@ -674,13 +704,6 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
-  if (c->tool != 0) {
-    double arm[3];
-    double moment[3];
-    hapi_v3_sub(c->point_now, p->pose.position, arm);
-    hapi_v3_cross(c->force, arm, moment); /* of the opposite force */
-    hapi_v3_add(p->wrench.torque, moment, p->wrench.torque);
-  }
   ++p->contacts;
   ++tick->pushing;
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {

@@ -131,17 +131,17 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
     return;
   }
   double limit = c->mu * normal_force;
-  hapi_friction_aim(f, p, 0.0, NULL);
+  hapi_friction_aim(f, 0.0, NULL);
   hapi_friction_push(f, limit, push);
   hapi_friction_wrench(f, p, push, at->point, &on_body);
   hapi_friction_wrench(f, p, push, p->pose.position, &on_hand);
-  hapi_friction_end(f, p, push, limit);
+  hapi_friction_end(f, push, limit);
   hapi_v3_add(c->force, on_body.force, c->force);
   hapi_v3_copy(on_body.torque, c->couple);
-  if (p->turns) {
+  if (p->turns || p->hull != NULL) {
     hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
   }
-  p->guard.force2 += hapi_v3_dot(push, push) + push[3] * push[3];
+  p->guard.force2 += (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
   p->guard.power += loads(body, at, &on_body);
   if (body != NULL) {
     double turning = p->finger_radius * push[3];
@@ -207,14 +207,14 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   hapi_v3_scale(-force, at.normal, c->force);
+  if (c->tool != 0) {
+    turn_pointer(p, &at, force);
+  }
   if (c->mu > 0.0) {
     rub(tick, c, body, &at, force);
     force = hapi_v3_norm(c->force);
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
-  if (c->tool != 0) {
-    turn_pointer(p, &at, force);
-  }
   ++p->contacts;
   ++tick->pushing;
   if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {

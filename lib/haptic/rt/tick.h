@@ -28,6 +28,7 @@
  *
  *   tool_adopt   their contacts, of a new model or new patches, go on from the old ones
  *   tool_place   where these are now, and what part of the stiffness each has
+ *   tool_friction  how far the points of a pair have been pulled along, for one that comes to them
  *   touch_place  one of them, or of those between bodies
  *
  *   report    state for physics; trace row; hash
@@ -228,8 +229,8 @@ typedef struct hapi_friction_place {
   double turn;            /* rad, likewise, about the normal */
 } hapi_friction_place;
 
-/* Friction of a pointer contact, by its slot; see pointer_friction.h. Of four numbers: along the surface
- * in world axes, and about the normal times the finger's radius. */
+/* Friction of a pointer contact, of a sphere's by its slot; see pointer_friction.h. Of four numbers: along
+ * the surface in world axes, and about the normal times the finger's radius. */
 typedef struct hapi_friction {
   uint32_t generation; /* of the contact */
   uint32_t epoch;      /* of the body */
@@ -237,11 +238,16 @@ typedef struct hapi_friction {
   hapi_friction_place set;
   hapi_friction_place now; /* the anchors if they were set in this tick */
   double normal[3];
-  double at[3];        /* m, world: where the force acts */
-  double stretch[4];   /* m, of the pointer ahead of the body */
-  double speed[4];     /* m/s, at which it grows */
-  double pull;         /* N, of spring and damper where nothing slides */
-  double axes[3][4];   /* unit, at right angles; the first along the pull */
+  double at[3];      /* m, world: where the force acts */
+  double stretch[4]; /* m, of the pointer ahead of the body */
+  double speed[4];   /* m/s, at which it grows */
+  double stiffness;  /* N/m, in this tick */
+  double damping;    /* N s/m */
+  bool rigid;        /* the contact does not give, and what slides begins anew at the next tick: */
+  bool slid;         /* it did; the stiffness is the coupling's then */
+  double left;       /* 0..1, share of the stretch that sliding has left in this tick */
+  double pull;       /* N, of spring and damper where nothing slides */
+  double axes[3][4]; /* unit, at right angles; the first along the pull */
   uint32_t axis_count; /* 2; 3 with torsion */
 } hapi_friction;
 
@@ -283,6 +289,7 @@ typedef struct hapi_local_tool {
   double claim;  /* 0..1, in this tick: its part of the stiffness before it is shared */
   double depth;  /* m, in this tick, less the pair's excess */
   double felt;   /* 0..1, share of the stiffness in this tick */
+  hapi_friction friction;
 } hapi_local_tool;
 
 /* What the contacts of a hull with one geom have in common. */
@@ -354,7 +361,7 @@ typedef struct hapi_local_world {
   hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
-  hapi_row_source *sources;        /* of the rows; 4 x capacity.contacts + 10 x capacity.joints */
+  hapi_row_source *sources;        /* of the rows; row_capacity */
   hapi_solver solver;
   uint32_t row_capacity;
   uint32_t resting; /* bodies at the tick's begin */
@@ -374,7 +381,7 @@ typedef struct hapi_tick {
   hapi_local_contact *contacts;
   hapi_ramp *ramps;            /* by contact slot, of the model before: to go on with */
   uint32_t *ramp_generations;  /* by contact slot */
-  hapi_friction *frictions;    /* by contact slot */
+  hapi_friction *frictions;    /* by contact slot; of spheres */
   hapi_tick_pointer *pointers; /* capacity.pointers */
   hapi_model_cross *crosses;   /* of the model, contact: an index here; capacity.crosses */
   uint32_t live_count;

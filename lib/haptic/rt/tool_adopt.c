@@ -85,6 +85,7 @@ static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
   if (old != HAPI_SLOT_NONE) {
     *c = w->old_contacts[old];
     tool->member = w->old_tools[old].member;
+    tool->friction = w->old_tools[old].friction;
     w->old_tools[old].member = -1.0;
   } else {
     memset(c, 0, sizeof *c);
@@ -96,6 +97,7 @@ static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
   c->body = in->at.body_b;
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
+  c->mu = in->mu;
   c->tool = at + 1;
   c->row = HAPI_NO_ROW;
   ++w->count;
@@ -188,6 +190,7 @@ void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model)
     c->slot = contacts[i].slot;
     c->generation = contacts[i].generation;
     memcpy(c->a, contacts[i].a, sizeof c->a);
+    memcpy(c->turn, contacts[i].turn, sizeof c->turn);
   }
   end(tick, old_count);
 }
