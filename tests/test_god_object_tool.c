@@ -145,6 +145,79 @@ TEST(a_tool_rests_in_a_corner)
   }
 }
 
+/* Flat on the floor it holds within the cone, slides at its surface, and sticks where it has come to. */
+TEST(friction_holds_a_tool_to_the_cone)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    tool_world w;
+    begin(&w, rigid_couplings[i]);
+    w.tool_def.friction = 0.5;
+    tool_add_floor(&w);
+    CHECK(tool_start(&w));
+    tool_go(&w, 0.0, 0.0, HALF + 0.002, 0.0);
+    tool_run(&w, 60);
+    tool_move(&w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
+    tool_run(&w, 300);
+    CHECK_NEAR(w.state.wrench.force[2], 0.004 * KV, 1e-4);
+    double held = w.state.proxy.position[0];
+    tool_move(&w, 0.0015, 0.001, HALF - 0.004, 0.0, 100); /* 1.8 mm of 2 */
+    tool_run(&w, 2000);
+    CHECK_NEAR(w.state.proxy.position[0], held, 1e-8);
+    CHECK_NEAR(w.state.wrench.force[0], -0.0015 * KV, 1e-4);
+    CHECK_NEAR(w.state.wrench.force[1], -0.001 * KV, 1e-4);
+    tool_move(&w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
+    tool_run(&w, 500);
+    CHECK_NEAR(w.state.wrench.force[0], 0.0, 1e-5);
+    tool_move(&w, 0.012, -0.016, HALF - 0.004, 0.0, 400);
+    CHECK_NEAR(w.state.wrench.force[0], -0.5 * w.state.wrench.force[2] * 0.6, 0.02);
+    CHECK_NEAR(w.state.wrench.force[1], 0.5 * w.state.wrench.force[2] * 0.8, 0.02);
+    tool_run(&w, 300);
+    double slid = w.state.proxy.position[0];
+    printf("# at rest %.6f of the cone\n", hypot(w.state.wrench.force[0], w.state.wrench.force[1]) /
+                                               (0.5 * w.state.wrench.force[2]));
+    CHECK(hypot(w.state.wrench.force[0], w.state.wrench.force[1]) <
+          0.5 * w.state.wrench.force[2] + 1e-6);
+    tool_move(&w, 0.0114, -0.0152, HALF - 0.004, 0.0, 100); /* 1 mm back */
+    CHECK_NEAR(w.state.proxy.position[0], slid, i == 0 ? 1e-6 : 1e-4);
+    tool_end(&w);
+  }
+}
+
+/* Four corners on the floor, each with its part of the force: they hold a twist of up to mu N r. */
+TEST(friction_holds_a_tool_against_turning)
+{
+  for (size_t i = 0; i < 2; ++i) {
+    tool_world w;
+    const double most = 0.5 * 0.004 * KV * sqrt(2.0) * HALF;
+    begin(&w, rigid_couplings[i]);
+    w.tool_def.friction = 0.5;
+    tool_add_floor(&w);
+    CHECK(tool_start(&w));
+    tool_go(&w, 0.0, 0.0, HALF + 0.002, 0.0);
+    tool_run(&w, 60);
+    tool_move(&w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
+    for (int k = 1; k <= 500; ++k) {
+      double angle = 0.5 * k / 500.0 * most / spin_stiffness();
+      w.pose.quat_wxyz[0] = cos(0.5 * angle);
+      w.pose.quat_wxyz[3] = sin(0.5 * angle);
+      tool_step(&w);
+    }
+    tool_run(&w, 500);
+    CHECK_NEAR(w.state.wrench.torque[2], -0.5 * most, 0.01 * most);
+    CHECK_NEAR(w.state.proxy.quat_wxyz[3], 0.0, 1e-7);
+    for (int k = 1; k <= 500; ++k) {
+      double angle = (0.5 + k / 500.0) * most / spin_stiffness();
+      w.pose.quat_wxyz[0] = cos(0.5 * angle);
+      w.pose.quat_wxyz[3] = sin(0.5 * angle);
+      tool_step(&w);
+    }
+    printf("# turning, torque %.4f of the most\n", w.state.wrench.torque[2] / most);
+    CHECK_NEAR(w.state.wrench.torque[2], -most, 0.03 * most);
+    CHECK(w.state.proxy.quat_wxyz[3] > 1e-2);
+    tool_end(&w);
+  }
+}
+
 /* A cube is pushed along the floor, at its speed once all is even, by mu m g. */
 TEST(a_tool_pushes_a_cube)
 {
@@ -203,6 +276,8 @@ int main(void)
   RUN(a_tool_lies_on_the_floor);
   RUN(a_tool_stands_on_its_edge_where_the_springs_agree);
   RUN(a_tool_rests_in_a_corner);
+  RUN(friction_holds_a_tool_to_the_cone);
+  RUN(friction_holds_a_tool_against_turning);
   RUN(a_tool_pushes_a_cube);
   RUN(the_virtual_tool_is_felt_as_its_inertia);
   dCloseODE();
