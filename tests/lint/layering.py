@@ -30,6 +30,7 @@ LAYERS = {
     "examples": [],
     "tools": ["*"],
     "tools/conform": ["*"],
+    "tools/spidar-emulator": ["*"],
     "bench": ["*"],
     "tests": ["*"],
     "tests/*": ["*"],
