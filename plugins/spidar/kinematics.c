@@ -10,7 +10,9 @@
 #define STEPS_ALONE 24   /* of one string left out */
 #define STEP_MAX 0.01    /* m */
 #define TURN_MAX 0.3     /* rad, of a step */
-#define STILL 1e-7       /* m, a step below it has arrived: 1/100 of a count and less */
+/* m. After a step of this size what is left is below 1/50 of a count: 1/100 of the step by the damping, its
+ * square over some 50 mm by the curvature. */
+#define STILL 2e-5
 /* Damping over the gradient: leaves a share of step / (10 TURN_LENGTH) of the way, which vanishes with it,
  * as the error of the linearisation does. */
 #define DAMPING (0.1 / TURN_LENGTH)
@@ -69,9 +71,10 @@ typedef struct normal {
   double worst;         /* largest |r| */
 } normal;
 
-static void add_row(normal *e, const double *row, double r)
+/* n is a constant where it is called, here and below: the loops are unrolled for 3 and for 6. */
+static inline void add_row(normal *e, int n, const double *row, double r)
 {
-  for (int a = 0; a < e->n; ++a) {
+  for (int a = 0; a < n; ++a) {
     e->g[a] += row[a] * r;
     for (int b = 0; b <= a; ++b) {
       e->h[a][b] += row[a] * row[b];
@@ -91,41 +94,61 @@ typedef struct measured {
   uint32_t strings;
 } measured;
 
+static inline void equations_of(const hapi_spidar_rows *rows, const measured *given, int strings,
+                                int n, normal *out)
+{
+  memset(out, 0, sizeof *out);
+  out->n = n;
+  for (int i = 0; i < strings; ++i) {
+    if ((given->strings >> i & 1u) != 0) {
+      double row[6];
+      double r = rows->length[i] - given->lengths[i];
+      double size = fabs(r);
+      row_of(rows, i, row);
+      add_row(out, n, row, r);
+      out->cost += r * r;
+      out->worst = size > out->worst ? size : out->worst;
+    }
+  }
+}
+
 static void equations_at(const hapi_spidar_model *model, const hap_pose *pose,
                          const measured *given, normal *out)
 {
   hapi_spidar_rows rows;
   hapi_spidar_rows_at(model, pose, &rows);
-  memset(out, 0, sizeof *out);
-  out->n = model->dof;
-  for (int i = 0; i < model->strings; ++i) {
-    if ((given->strings >> i & 1u) != 0) {
-      double row[6];
-      double r = rows.length[i] - given->lengths[i];
-      row_of(&rows, i, row);
-      add_row(out, row, r);
-      out->cost += r * r;
-      out->worst = fmax(out->worst, fabs(r));
-    }
+  if (model->dof == 6) {
+    equations_of(&rows, given, model->strings, 6, out);
+  } else {
+    equations_of(&rows, given, model->strings, 3, out);
   }
+}
+
+static inline bool solve_n(const normal *e, double added, int n, double *out)
+{
+  hapi_spidar_matrix l;
+  double trace = 0.0;
+  for (int a = 0; a < n; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      l[a][b] = e->h[a][b];
+    }
+    trace += e->h[a][a];
+    out[a] = e->g[a];
+  }
+  for (int a = 0; a < n; ++a) {
+    l[a][a] += added + FLOOR * trace;
+  }
+  if (!hapi_spidar_cholesky(l, n)) {
+    return false;
+  }
+  hapi_spidar_substitute(l, n, out);
+  return true;
 }
 
 /* (h + added)^-1 g; 0 where that does not exist. */
 static void solve_normal(const normal *e, double added, double out[6])
 {
-  hapi_spidar_matrix l;
-  double trace = 0.0;
-  memcpy(l, e->h, sizeof l);
-  for (int a = 0; a < e->n; ++a) {
-    trace += e->h[a][a];
-  }
-  for (int a = 0; a < e->n; ++a) {
-    l[a][a] += added + FLOOR * trace;
-    out[a] = e->g[a];
-  }
-  if (hapi_spidar_cholesky(l, e->n)) {
-    hapi_spidar_substitute(l, e->n, out);
-  } else {
+  if (!(e->n == 6 ? solve_n(e, added, 6, out) : solve_n(e, added, 3, out))) {
     memset(out, 0, 6 * sizeof *out);
   }
 }
@@ -147,19 +170,13 @@ static double find_step(const normal *e, double damping, double step[6])
   return fmax(way, turn) / shorter;
 }
 
-/* Back to where a grip can be: the box of the motors, and that of the workspace, which lies beside the
- * motors in some. */
-static void confine(const hapi_spidar_solver *solver, const hapi_spidar_model *model,
-                    hap_pose *pose)
+/* Back to where a grip can be. */
+static void confine(const hapi_spidar_solver *solver, hap_pose *pose)
 {
   for (int axis = 0; axis < 3; ++axis) {
-    double low = -WORKSPACES * model->workspace[axis];
-    double high = -low;
-    for (int i = 0; i < model->strings; ++i) {
-      low = fmin(low, model->motor[i][axis]);
-      high = fmax(high, model->motor[i][axis]);
-    }
-    pose->position[axis] = fmax(low, fmin(high, pose->position[axis]));
+    double x = pose->position[axis];
+    x = x < solver->low[axis] ? solver->low[axis] : x;
+    pose->position[axis] = x > solver->high[axis] ? solver->high[axis] : x;
   }
   double *q = pose->quat_wxyz;
   double sine = hapi_v3_norm(q + 1);
@@ -181,7 +198,7 @@ static void move(const hapi_spidar_solver *solver, const hapi_spidar_model *mode
     hapi_quat_multiply(turn, pose->quat_wxyz, pose->quat_wxyz);
     hapi_quat_normalize(pose->quat_wxyz);
   }
-  confine(solver, model, pose);
+  confine(solver, pose);
 }
 
 /* Steps until one is below STILL or none is left; true: arrived. */
@@ -215,9 +232,26 @@ static bool is_outside(const hapi_spidar_solver *solver, const hapi_spidar_model
 {
   bool outside = fabs(solver->pose.quat_wxyz[0]) < solver->work_cos;
   for (int axis = 0; axis < 3; ++axis) {
-    outside = outside || fabs(solver->pose.position[axis]) > model->workspace[axis];
+    outside =
+        outside || fabs(solver->pose.position[axis] - model->centre[axis]) > model->workspace[axis];
   }
   return outside;
+}
+
+/* The box of the motors, and that of home and the workspace, which lie beside the motors in some. */
+static void set_box(hapi_spidar_solver *solver, const hapi_spidar_model *model)
+{
+  for (int axis = 0; axis < 3; ++axis) {
+    double reach = WORKSPACES * model->workspace[axis];
+    double low = fmin(0.0, model->centre[axis]) - reach;
+    double high = fmax(0.0, model->centre[axis]) + reach;
+    for (int i = 0; i < model->strings; ++i) {
+      low = fmin(low, model->motor[i][axis]);
+      high = fmax(high, model->motor[i][axis]);
+    }
+    solver->low[axis] = low;
+    solver->high[axis] = high;
+  }
 }
 
 void hapi_spidar_solver_init(hapi_spidar_solver *solver, const hapi_spidar_model *model,
@@ -226,6 +260,7 @@ void hapi_spidar_solver_init(hapi_spidar_solver *solver, const hapi_spidar_model
   double half = 0.5 * fmin(model->workspace_turn + BEYOND, TURN_ENDS);
   memset(solver, 0, sizeof *solver);
   solver->damping = DAMPING;
+  set_box(solver, model);
   solver->half_cos = cos(half);
   solver->half_sin = sin(half);
   solver->work_cos = model->dof == 6 ? cos(0.5 * model->workspace_turn) : -1.0;
@@ -256,6 +291,7 @@ hapi_spidar_fit hapi_spidar_solve(hapi_spidar_solver *solver, const hapi_spidar_
 void hapi_spidar_twist(const hapi_spidar_model *model, const hap_pose *pose,
                        const double rates[HAPI_SPIDAR_STRINGS_MAX], hap_twist *out)
 {
+  const measured given = {rates, (1u << model->strings) - 1u};
   hapi_spidar_rows rows;
   normal e;
   double v[6];
@@ -263,13 +299,14 @@ void hapi_spidar_twist(const hapi_spidar_model *model, const hap_pose *pose,
   if (!hapi_finite(rates, model->strings)) {
     return;
   }
-  memset(&e, 0, sizeof e);
-  e.n = model->dof;
   hapi_spidar_rows_at(model, pose, &rows);
   for (int i = 0; i < model->strings; ++i) {
-    double row[6];
-    row_of(&rows, i, row);
-    add_row(&e, row, -rates[i]);
+    rows.length[i] = 0.0; /* the rates take the place of the lengths */
+  }
+  if (model->dof == 6) {
+    equations_of(&rows, &given, model->strings, 6, &e);
+  } else {
+    equations_of(&rows, &given, model->strings, 3, &e);
   }
   solve_normal(&e, 0.0, v);
   hapi_v3_copy(v, out->linear);

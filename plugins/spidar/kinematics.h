@@ -51,6 +51,8 @@ typedef struct hapi_spidar_solver {
   double half_cos; /* of half the largest turn that a pose may have, and its sine */
   double half_sin;
   double work_cos; /* of half the workspace's turn */
+  double low[3];   /* m, where a grip can be */
+  double high[3];
 } hapi_spidar_solver;
 
 /* [control] Begins at start, NULL: at home. Not on the tick: it computes a sine. */

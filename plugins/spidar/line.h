@@ -27,10 +27,10 @@ typedef struct hapi_spidar_line {
   hapi_spidar_port port;
   hapi_spidar_cycle cycle;
   hapi_spidar_counts counts;
-  double step_rate;  /* counts/s that a string may do; a faster one is a wrong reply */
-  double taken;      /* s, of the newest good reply */
-  double waiting;    /* s, of the oldest command without an answer; < 0: there is none */
-  bool cut;          /* a command was sent in part: the next one needs zeros before it */
+  double step_rate;   /* counts/s that a string may do; a faster one is a wrong reply */
+  double taken;       /* s, of the newest good reply */
+  double waiting;     /* s, of the oldest command without an answer; < 0: there is none */
+  bool cut;           /* a command was sent in part: the next one needs zeros before it */
   uint32_t bad_steps; /* replies in a row that jumped */
 } hapi_spidar_line;
 
@@ -42,8 +42,7 @@ HAP_NODISCARD hap_status hapi_spidar_line_find(const hapi_spidar_port *port,
 /* [control] Tells all boards the lengths of each other's commands, and makes ready for cycles. */
 HAP_NODISCARD hap_status hapi_spidar_line_begin(hapi_spidar_line *line,
                                                 const hapi_spidar_port *port,
-                                                const hapi_spidar_boards *boards,
-                                                double step_rate);
+                                                const hapi_spidar_boards *boards, double step_rate);
 
 /* [haptic] Sends a current to each motor, in the order of board ids and channels. 0 or -errno. */
 int hapi_spidar_line_send(hapi_spidar_line *line, const int16_t *currents);
@@ -55,7 +54,7 @@ int hapi_spidar_line_receive(hapi_spidar_line *line);
 double hapi_spidar_line_silence(const hapi_spidar_line *line);
 
 /* [control] One exchange, at most timeout s. HAP_ERROR_TIMEOUT, HAP_ERROR_DEVICE. */
-HAP_NODISCARD hap_status hapi_spidar_line_exchange(hapi_spidar_line *line,
-                                                   const int16_t *currents, double timeout);
+HAP_NODISCARD hap_status hapi_spidar_line_exchange(hapi_spidar_line *line, const int16_t *currents,
+                                                   double timeout);
 
 #endif

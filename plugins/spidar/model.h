@@ -44,7 +44,8 @@ typedef struct hapi_spidar_model {
   double torque_weight; /* 1/m^2, of the square of the missing torque */
   double spread_weight; /* of the sum of squared tensions */
 
-  double workspace[3];   /* m, half lengths of the box about home in which the device is used */
+  double centre[3];      /* m, middle of the workspace */
+  double workspace[3];   /* m, half lengths of the box about it in which the device is used */
   double workspace_turn; /* rad, largest turn from the attitude at home; 0 for 3 dof */
   double residual;       /* m, beyond which the lengths do not fit a pose: slack or broken string */
 

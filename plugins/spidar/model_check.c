@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "plugins/spidar/kinematics.h"
 #include "plugins/spidar/matrix.h"
+#include "plugins/spidar/tensions.h"
 
 #define POINT_MAX 10.0   /* m */
 #define LENGTH_MIN 0.005 /* m, of a string at home */
@@ -18,6 +19,7 @@
 /* Least eigenvalue of J^T J, in which a string counts up to 1 along its own direction: below it the strings
  * tell a direction thirty times worse than each alone. */
 #define TELL_MIN 1e-3
+#define UNBALANCED 0.2 /* of min_tension: what may be left */
 
 typedef struct range {
   const char *name;
@@ -60,6 +62,9 @@ static hap_status check_device(const hapi_spidar_model *m, hap_detail *detail)
       {"tension_rate_n_per_s", m->tension_rate, 1.0, 1e7},
       {"torque_weight_per_m2", m->torque_weight, turns ? 1.0 : 0.0, turns ? 1e8 : 0.0},
       {"spread_weight", m->spread_weight, 1e-6, 10.0},
+      {"centre_mm (here in m), x", m->centre[0], -POINT_MAX, POINT_MAX},
+      {"centre_mm (here in m), y", m->centre[1], -POINT_MAX, POINT_MAX},
+      {"centre_mm (here in m), z", m->centre[2], -POINT_MAX, POINT_MAX},
       {"workspace_mm (here in m), x", m->workspace[0], 1e-3, POINT_MAX},
       {"workspace_mm (here in m), y", m->workspace[1], 1e-3, POINT_MAX},
       {"workspace_mm (here in m), z", m->workspace[2], 1e-3, POINT_MAX},
@@ -152,14 +157,15 @@ static bool tells(const hapi_spidar_model *m, const hap_pose *pose)
   return hapi_spidar_cholesky(h, m->dof);
 }
 
-/* Home, then the corners of the workspace and half way to them, each turned about each axis both ways. */
+/* The corners of the workspace and its centre, each not turned, and turned about each axis both ways. */
 static void sample_at(const hapi_spidar_model *m, int index, hap_pose *out)
 {
   hapi_spidar_home(out);
   int corner = index % 9;
   int turn = index / 9;
+  hapi_v3_copy(m->centre, out->position);
   for (int axis = 0; axis < 3 && corner < 8; ++axis) {
-    out->position[axis] = ((corner >> axis & 1) != 0 ? 1.0 : -1.0) * m->workspace[axis];
+    out->position[axis] += ((corner >> axis & 1) != 0 ? 1.0 : -1.0) * m->workspace[axis];
   }
   if (turn > 0 && m->dof == 6) {
     double half = 0.5 * m->workspace_turn * (turn % 2 != 0 ? 1.0 : -1.0);
@@ -184,6 +190,33 @@ static hap_status check_workspace(const hapi_spidar_model *m, hap_detail *detail
   return HAP_OK;
 }
 
+/* Whether tensions within their limits can pull at the grip without moving it. */
+static hap_status check_balance(const hapi_spidar_model *m, hap_detail *detail)
+{
+  const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hapi_spidar_model free = *m;
+  hapi_spidar_tensions state;
+  double tension[HAPI_SPIDAR_STRINGS_MAX];
+  hap_pose pose;
+  hap_wrench left;
+  free.spread_weight = 1e-6;
+  hapi_spidar_home(&pose);
+  hapi_v3_copy(m->centre, pose.position);
+  hapi_spidar_tensions_init(&state, &free);
+  hap_status status = hapi_spidar_tensions_solve(&state, &free, &pose, &none, tension, &left);
+  double force = hapi_v3_norm(left.force);
+  double torque = hapi_v3_norm(left.torque);
+  if (status < HAP_OK || force > UNBALANCED * m->min_tension ||
+      torque > UNBALANCED * TURN_LENGTH * m->min_tension) {
+    return hapi_fail(detail, HAP_ERROR_FORMAT,
+                     "at the centre of the workspace the strings cannot hold the grip: within "
+                     "their tensions %.3g N and %.3g N m are left; move centre_mm, or look at the "
+                     "motor and grip points",
+                     force, torque);
+  }
+  return HAP_OK;
+}
+
 hap_status hapi_spidar_model_check(const hapi_spidar_model *model, hap_detail *detail)
 {
   hap_status status = check_name(model->name, detail);
@@ -196,5 +229,8 @@ hap_status hapi_spidar_model_check(const hapi_spidar_model *model, hap_detail *d
   if (status >= HAP_OK) {
     status = check_distinct(model, detail);
   }
-  return status >= HAP_OK ? check_workspace(model, detail) : status;
+  if (status >= HAP_OK) {
+    status = check_workspace(model, detail);
+  }
+  return status >= HAP_OK ? check_balance(model, detail) : status;
 }

@@ -35,7 +35,8 @@ static const figure device_figures[] = {
     {"torque_weight_per_m2", AT(torque_weight), 1, 1.0, false,
      "missing torque against missing force, squares of both"},
     {"spread_weight", AT(spread_weight), 1, 1.0, false, "small tensions against missing force"},
-    {"workspace_mm", AT(workspace), 3, 1000.0, false, "to each side of home"},
+    {"centre_mm", AT(centre), 3, 1000.0, false, "of the workspace"},
+    {"workspace_mm", AT(workspace), 3, 1000.0, false, "to each side of its centre"},
     {"workspace_deg", AT(workspace_turn), 1, DEGREES, false, "largest turn"},
     {"residual_mm", AT(residual), 1, 1000.0, false,
      "beyond it a length does not fit: a string is slack or broken"},
@@ -229,8 +230,9 @@ static hap_status take_device(reader *r, const char *key, const char *value)
   }
   return fail_line(r,
                    "known are version, name, board, strings, dof, min_tension_n, max_tension_n, "
-                   "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, workspace_mm, "
-                   "workspace_deg, residual_mm, heat_tension_n, heat_time_s and string_N.KEY, not ",
+                   "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, centre_mm, "
+                   "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s and "
+                   "string_N.KEY, not ",
                    key);
 }
 

@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <linux/serial.h>
 #include <poll.h>
 #include <stdio.h>
@@ -44,7 +45,8 @@ static hap_status fail_open(const char *path, int error, hap_detail *detail)
 {
   const char *help = "";
   if (error == EACCES || error == EPERM) {
-    help = "; install 60-hapode-spidar.rules (docs/spidar.md), or join the group that owns the port";
+    help =
+        "; install 60-hapode-spidar.rules (docs/spidar.md), or join the group that owns the port";
   } else if (error == ENOENT || error == ENXIO || error == ENODEV || error == EIO) {
     help = "; is it plugged in? \"hapode-run --list\" lists the ports there are";
   }
@@ -109,8 +111,7 @@ static hap_status set_up(int fd, const char *path, hap_detail *detail)
   return HAP_OK;
 }
 
-hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path,
-                                   hap_detail *detail)
+hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path, hap_detail *detail)
 {
   int fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
@@ -147,14 +148,13 @@ int hapi_spidar_serial_latency(const char *path)
 {
   char file[HAPI_SPIDAR_PATH_MAX + 64];
   char text[16] = "";
-  char *real = realpath(path, NULL);
-  if (real == NULL) {
+  char real[PATH_MAX];
+  if (realpath(path, real) == NULL) {
     return -1;
   }
   const char *name = strrchr(real, '/');
-  snprintf(file, sizeof file, "/sys/bus/usb-serial/devices/%s/latency_timer",
+  snprintf(file, sizeof file, "/sys/bus/usb-serial/devices/%.200s/latency_timer",
            name != NULL ? name + 1 : real);
-  hapi_spidar_serial_free_path(real);
   int fd = open(file, O_RDONLY | O_CLOEXEC);
   ssize_t count = fd >= 0 ? read(fd, text, sizeof text - 1) : -1;
   if (fd >= 0) {
@@ -193,7 +193,8 @@ static void serial_await(void *self, double seconds)
 {
   const hapi_spidar_serial *serial = self;
   struct pollfd file = {serial->fd, POLLIN, 0};
-  const struct timespec timeout = {(time_t)seconds, (long)(1e9 * (seconds - (double)(time_t)seconds))};
+  const struct timespec timeout = {(time_t)seconds,
+                                   (long)(1e9 * (seconds - (double)(time_t)seconds))};
   (void)ppoll(&file, 1, &timeout, NULL);
 }
 
@@ -211,8 +212,8 @@ static void serial_flush(void *self)
 
 void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out)
 {
-  *out = (hapi_spidar_port){serial, serial_send, serial_receive, serial_await, serial_now,
-                            serial_flush};
+  *out = (hapi_spidar_port){serial,       serial_send, serial_receive,
+                            serial_await, serial_now,  serial_flush};
 }
 
 void hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count)

@@ -1,0 +1,44 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Heat of the motors. Current goes as tension, heat as its square, and leaves through one thermal resistance and
+ * capacity. In units of what heat_tension makes in the end: heat_time d share/dt = (tension / heat_tension)^2 -
+ * share. */
+
+#include "base/vec.h"
+#include "plugins/spidar/tensions.h"
+
+#define LIMITED_FROM 0.8
+
+void hapi_spidar_heat_init(hapi_spidar_heat *heat, double share)
+{
+  for (int i = 0; i < HAPI_SPIDAR_STRINGS_MAX; ++i) {
+    heat->share[i] = fmax(0.0, fmin(1.0, share));
+  }
+}
+
+/* The power that may come in, in units of that of heat_tension: at share 1 just what goes out. step is the length
+ * of the next step over heat_time, which must not go beyond 1 either. */
+static double allowed_power(const hapi_spidar_model *model, double share, double step)
+{
+  double most = model->max_tension / model->heat_tension;
+  double left = fmax(0.0, 1.0 - share);
+  double open = fmin(1.0, left / (1.0 - LIMITED_FROM));
+  double power = 1.0 + fmax(0.0, most * most - 1.0) * open * open;
+  return step > 0.0 ? fmin(power, 1.0 + left / step) : power;
+}
+
+void hapi_spidar_heat_step(hapi_spidar_heat *heat, const hapi_spidar_model *model,
+                           const double tension[HAPI_SPIDAR_STRINGS_MAX], double seconds,
+                           double out_most[HAPI_SPIDAR_STRINGS_MAX])
+{
+  double step = seconds > 0.0 && seconds < HUGE_VAL ? seconds / model->heat_time : 0.0;
+  for (int i = 0; i < model->strings; ++i) {
+    double held = hapi_finite(&tension[i], 1) ? tension[i] : model->max_tension;
+    double ratio = held / model->heat_tension;
+    /* implicit: good for a step of any length */
+    heat->share[i] = (heat->share[i] + step * ratio * ratio) / (1.0 + step);
+    double power = allowed_power(model, heat->share[i], step);
+    out_most[i] = fmin(model->max_tension, model->heat_tension * sqrt(power));
+  }
+}
