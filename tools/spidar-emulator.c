@@ -23,6 +23,9 @@
 #define WAKE_MOST_S 1e-3
 #define BEHIND_MOST_S 1.0 /* more, and the machine was asleep: simulated time stands still for it */
 #define SAY_MAX 1024
+#define AHEAD_S \
+  1e-3 /* that bytes may wait for the line: as with a port, the host notices the rest */
+#define READ_MOST 256
 
 typedef struct program {
   emulator emulator;
@@ -110,13 +113,18 @@ static bool follow_plug(program *p)
   return true;
 }
 
+static bool may_read(const program *p, double now)
+{
+  return p->master >= 0 && p->emulator.wire.free < now + AHEAD_S;
+}
+
 static void exchange(program *p, double now)
 {
   uint8_t bytes[4096];
   if (p->master < 0) {
     return;
   }
-  ssize_t count = read(p->master, bytes, sizeof bytes);
+  ssize_t count = may_read(p, now) ? read(p->master, bytes, READ_MOST) : 0;
   if (count > 0) {
     emulator_write(&p->emulator, bytes, (int)count, now);
   }
@@ -206,7 +214,8 @@ static void await(program *p, double now)
   double wait = next >= 0.0 && next - now < WAKE_MOST_S ? next - now : WAKE_MOST_S;
   wait = wait > WAKE_LEAST_S ? wait : WAKE_LEAST_S;
   const struct timespec timeout = {0, (long)(1e9 * wait)};
-  struct pollfd files[2] = {{p->master, POLLIN, 0}, {p->input ? STDIN_FILENO : -1, POLLIN, 0}};
+  struct pollfd files[2] = {{may_read(p, now) ? p->master : -1, POLLIN, 0},
+                            {p->input ? STDIN_FILENO : -1, POLLIN, 0}};
   if (ppoll(files, 2, &timeout, NULL) > 0 && files[1].revents != 0) {
     read_commands(p);
   }

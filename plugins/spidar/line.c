@@ -8,8 +8,10 @@
 #include "base/log.h"
 
 #define ANSWER_S 10e-3 /* for BOARD_INFO */
-#define SEND_S 50e-3   /* for a port that is full */
-#define STEP_LEAST 32  /* counts, whatever the time between two replies was */
+#define INFO_SIZE 7    /* of that reply, the same for all models */
+#define ANY_MODEL 1
+#define SEND_S 50e-3  /* for a port that is full */
+#define STEP_LEAST 32 /* counts, whatever the time between two replies was */
 #define EXCHANGE_S 5e-3
 
 /* Waits for a port that is full. */
@@ -26,27 +28,6 @@ static int send_patiently(const hapi_spidar_port *port, const uint8_t *bytes, in
 
 /* ---- who is there ---- */
 
-/* Number of bytes that came until nothing more can come, or -errno. */
-static int collect(const hapi_spidar_port *port, uint8_t *bytes, int size, double seconds)
-{
-  double end = port->now(port->self) + seconds;
-  int used = 0;
-  for (;;) {
-    int count = port->receive(port->self, bytes + used, size - used);
-    if (count < 0) {
-      return count;
-    }
-    used += count;
-    double left = end - port->now(port->self);
-    if (used == size || left <= 0.0) {
-      return used;
-    }
-    if (count == 0) {
-      port->await(port->self, left);
-    }
-  }
-}
-
 static bool is_board(const hapi_spidar_frame *frame)
 {
   const hapi_spidar_kind *kind = hapi_spidar_kind_find(frame->info[0]);
@@ -57,30 +38,56 @@ static bool is_board(const hapi_spidar_frame *frame)
   return frame->info[2] == kind->motors && frame->info[4] == kind->forces;
 }
 
-/* 1: *out_model is that of a board with that id; 0: there is none; -errno. */
-static int ask(const hapi_spidar_port *port, int id, uint8_t *out_model)
+/* The model that a board of that id tells somewhere in these bytes; 0: it does not. Replies to what was sent
+ * before, and garbage of boards that were just switched on, may be among them. */
+static int find_answer(const uint8_t *bytes, int count, int id)
+{
+  hapi_spidar_frame frame;
+  for (int i = 0; i + INFO_SIZE <= count; ++i) {
+    if (bytes[i] == hapi_spidar_header(HAPI_SPIDAR_BOARD_INFO, id) &&
+        hapi_spidar_decode(bytes + i, INFO_SIZE, ANY_MODEL, HAPI_SPIDAR_FROM_BOARD, &frame) &&
+        is_board(&frame)) {
+      return frame.info[0];
+    }
+  }
+  return 0;
+}
+
+/* The model of the board, 0 when there is none, or -errno. */
+static int await_answer(const hapi_spidar_port *port, int id)
+{
+  uint8_t bytes[256];
+  int used = 0;
+  double end = port->now(port->self) + ANSWER_S;
+  for (double left = ANSWER_S; left > 0.0; left = end - port->now(port->self)) {
+    int count = port->receive(port->self, bytes + used, (int)sizeof bytes - used);
+    if (count < 0) {
+      return count;
+    }
+    used += count;
+    int model = find_answer(bytes, used, id);
+    if (model > 0) {
+      return model;
+    }
+    if (used == (int)sizeof bytes) {
+      used = INFO_SIZE - 1; /* an answer may have begun in the last of them */
+      memmove(bytes, bytes + sizeof bytes - (size_t)used, (size_t)used);
+    }
+    if (count == 0) {
+      port->await(port->self, left);
+    }
+  }
+  return 0;
+}
+
+static int ask(const hapi_spidar_port *port, int id)
 {
   /* The zeros before it end a command that a board may have received in part. */
   uint8_t bytes[HAPI_SPIDAR_FRAME_MAX + 1 + 26] = {0};
-  uint8_t answer[7];
-  hapi_spidar_frame frame;
   bytes[HAPI_SPIDAR_FRAME_MAX] = hapi_spidar_header(HAPI_SPIDAR_BOARD_INFO, id);
   port->flush(port->self);
   int sent = send_patiently(port, bytes, (int)sizeof bytes);
-  if (sent < 0) {
-    return sent;
-  }
-  int count = collect(port, answer, (int)sizeof answer, ANSWER_S);
-  if (count < (int)sizeof answer) {
-    return count < 0 ? count : 0;
-  }
-  /* BOARD_INFO is the same for all models. */
-  if (!hapi_spidar_decode(answer, sizeof answer, 1, HAPI_SPIDAR_FROM_BOARD, &frame) ||
-      frame.board != id || frame.command != HAPI_SPIDAR_BOARD_INFO || !is_board(&frame)) {
-    return 0;
-  }
-  *out_model = frame.info[0];
-  return 1;
+  return sent < 0 ? sent : await_answer(port, id);
 }
 
 static hap_status fail_port(int error, hap_detail *detail)
@@ -88,11 +95,11 @@ static hap_status fail_port(int error, hap_detail *detail)
   return hapi_fail(detail, HAP_ERROR_DEVICE, "the port failed: %s", strerror(-error));
 }
 
-/* Twice, as garbage of boards that were just switched on may spoil an answer. */
-static int ask_twice(const hapi_spidar_port *port, int id, uint8_t *out_model)
+/* Twice, as garbage may spoil an answer. */
+static int ask_twice(const hapi_spidar_port *port, int id)
 {
-  int found = ask(port, id, out_model);
-  return found == 0 ? ask(port, id, out_model) : found;
+  int model = ask(port, id);
+  return model == 0 ? ask(port, id) : model;
 }
 
 hap_status hapi_spidar_line_find(const hapi_spidar_port *port, hapi_spidar_boards *out,
@@ -100,14 +107,13 @@ hap_status hapi_spidar_line_find(const hapi_spidar_port *port, hapi_spidar_board
 {
   memset(out, 0, sizeof *out);
   for (int id = 0; id < HAPI_SPIDAR_BOARDS; ++id) {
-    uint8_t model = 0;
-    int found = ask_twice(port, id, &model);
-    if (found < 0) {
-      return fail_port(found, detail);
+    int model = ask_twice(port, id);
+    if (model < 0) {
+      return fail_port(model, detail);
     }
-    if (found > 0) {
+    if (model > 0) {
       out->id[out->count] = (uint8_t)id;
-      out->model[out->count++] = model;
+      out->model[out->count++] = (uint8_t)model;
     }
   }
   if (out->count == 0) {
@@ -163,8 +169,9 @@ int hapi_spidar_line_send(hapi_spidar_line *line, const int16_t *currents)
 {
   int sent = send_once(line, currents);
   line->cut = sent == -EAGAIN;
+  line->sent = line->port.now(line->port.self);
   if (line->waiting < 0.0) {
-    line->waiting = line->port.now(line->port.self);
+    line->waiting = line->sent;
   }
   return sent == -EAGAIN ? 0 : sent; /* a cycle without an answer, as others are */
 }
@@ -180,6 +187,7 @@ static bool take_cycle(hapi_spidar_line *line, const int16_t *raw)
   }
   line->bad_steps = 0;
   line->taken = now;
+  line->sampled = line->sent;
   line->waiting = -1.0;
   return true;
 }

@@ -28,7 +28,9 @@ typedef struct hapi_spidar_line {
   hapi_spidar_cycle cycle;
   hapi_spidar_counts counts;
   double step_rate;   /* counts/s that a string may do; a faster one is a wrong reply */
+  double sent;        /* s, of the newest command */
   double taken;       /* s, of the newest good reply */
+  double sampled;     /* s, of the command it answers, when the boards looked at their encoders */
   double waiting;     /* s, of the oldest command without an answer; < 0: there is none */
   bool cut;           /* a command was sent in part: the next one needs zeros before it */
   uint32_t bad_steps; /* replies in a row that jumped */

@@ -92,7 +92,8 @@ static void settle(int fd)
     about.flags |= ASYNC_LOW_LATENCY;
     (void)ioctl(fd, TIOCSSERIAL, &about);
   }
-  (void)tcflush(fd, TCIOFLUSH);
+  /* Not the output: it may be the zeros of whoever had the port before. */
+  (void)tcflush(fd, TCIFLUSH);
 }
 
 static hap_status set_up(int fd, const char *path, hap_detail *detail)

@@ -110,7 +110,10 @@ hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state, const hapi_sp
 static void direction_of(int index, double out[3])
 {
   int code = index < DIRECTIONS / 2 ? index : index + 1; /* not the middle of the cube */
-  hapi_v3_set(out, code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1);
+  int digits[3] = {code % 3, code / 3 % 3, code / 9};
+  for (int axis = 0; axis < 3; ++axis) {
+    out[axis] = digits[axis] - 1;
+  }
   hapi_v3_scale(1.0 / hapi_v3_norm(out), out, out);
 }
 
