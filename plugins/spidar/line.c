@@ -59,7 +59,8 @@ static int await_answer(const hapi_spidar_port *port, int id)
   uint8_t bytes[256];
   int used = 0;
   double end = port->now(port->self) + ANSWER_S;
-  for (double left = ANSWER_S; left > 0.0; left = end - port->now(port->self)) {
+  for (;;) {
+    double left = end - port->now(port->self);
     int count = port->receive(port->self, bytes + used, (int)sizeof bytes - used);
     if (count < 0) {
       return count;
@@ -73,11 +74,13 @@ static int await_answer(const hapi_spidar_port *port, int id)
       used = INFO_SIZE - 1; /* an answer may have begun in the last of them */
       memmove(bytes, bytes + sizeof bytes - (size_t)used, (size_t)used);
     }
+    if (count == 0 && left <= 0.0) {
+      return 0;
+    }
     if (count == 0) {
       port->await(port->self, left);
     }
   }
-  return 0;
 }
 
 static int ask(const hapi_spidar_port *port, int id)

@@ -20,6 +20,7 @@
 #define POOR_S 0.3        /* lengths may fit no pose for so long: slack strings being wound in */
 #define PERIOD_S 1e-3     /* between two writes, at least */
 #define WRITE_LATE_S 0.01 /* a longer pause between two writes counts as this */
+#define LITTLE 0.01       /* of the greatest force */
 #define WRAP 65536.0
 
 _Static_assert(ATOMIC_BOOL_LOCK_FREE == 2, "zero is called from signal handlers");
@@ -262,13 +263,15 @@ static void lower_zero(hapi_spidar_device *device)
   atomic_store(&device->zeroed, false);
 }
 
-/* What the tensions give, turned to the device's frame. Of no wrench at all the rest that the least tensions
- * leave, some mN, is not told as a force. */
+/* What the tensions give, turned to the device's frame. Of no wrench at all the little that the least tensions
+ * leave is not told as a force; a geometry in which they do not balance is told. */
 static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
                          const hap_wrench *given)
 {
+  bool little = hapi_v3_norm(given->force) < LITTLE * device->max_force &&
+                hapi_v3_norm(given->torque) < LITTLE * device->max_torque;
   memset(&device->held, 0, sizeof device->held);
-  if (!is_zero(wanted)) {
+  if (!is_zero(wanted) || !little) {
     hapi_quat_rotate(device->rotate, given->force, device->held.force);
     if (device->model.dof == 6) {
       hapi_quat_rotate(device->rotate, given->torque, device->held.torque);
