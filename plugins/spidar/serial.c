@@ -124,7 +124,9 @@ hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path,
   }
   close(fd);
   if (status >= HAP_OK) {
-    snprintf(serial->path, sizeof serial->path, "%s", path);
+    if (strcmp(serial->path, path) != 0) { /* opened anew, it stays: others may be reading it */
+      snprintf(serial->path, sizeof serial->path, "%s", path);
+    }
     int latency = hapi_spidar_serial_latency(path);
     if (latency > 1) {
       hapi_log(HAP_LOG_WARNING,

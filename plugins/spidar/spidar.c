@@ -338,13 +338,11 @@ static bool reopen(hapi_spidar_device *device)
   memcpy(path, device->serial.path, sizeof path);
   hapi_spidar_serial_shut(&device->serial);
   if (hapi_spidar_serial_open(&device->serial, path, &detail) < HAP_OK) {
-    snprintf(device->why, sizeof device->why, "%.150s", detail.text);
     set_cause(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
   hapi_spidar_serial_port(&device->serial, &port);
   if (hapi_spidar_line_find(&port, &found, &detail) < HAP_OK) {
-    snprintf(device->why, sizeof device->why, "%.150s", detail.text);
     set_cause(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
@@ -530,6 +528,39 @@ static void spidar_describe(void *self, hap_device_info *out)
   }
 }
 
+static const char *text_of(hapi_spidar_cause cause)
+{
+  switch (cause) {
+    case HAPI_SPIDAR_WELL:
+      return "";
+    case HAPI_SPIDAR_HUNG_UP:
+      return "the port is gone: was the cable pulled?";
+    case HAPI_SPIDAR_SILENT:
+      return "no whole answer within the timeout: are all boards switched on?";
+    case HAPI_SPIDAR_JUMPED:
+      return "positions jumped further than a string can go: was a board reset?";
+    case HAPI_SPIDAR_MISFIT:
+      return "the lengths of the strings fit no pose: is one slack or broken, is the model right, "
+             "was the grip at home at the start?";
+    case HAPI_SPIDAR_STALLED:
+      return "nothing was written for too long and the guard took the force off";
+    case HAPI_SPIDAR_NOT_OPENED:
+      return "the port does not open or no board answers";
+    case HAPI_SPIDAR_OTHER_BOARDS:
+      return "not the boards that were there before answer";
+  }
+  return "";
+}
+
+static void spidar_explain(void *self, hap_detail *out)
+{
+  hapi_spidar_device *device = self;
+  const char *text = text_of((hapi_spidar_cause)atomic_load(&device->cause));
+  if (text[0] != '\0') {
+    (void)hapi_fail(out, HAP_ERROR_DEVICE, "%.200s: %s", device->serial.path, text);
+  }
+}
+
 const hap_device_ops hapi_spidar_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),
@@ -547,4 +578,5 @@ const hap_device_ops hapi_spidar_ops = {
     .stop = spidar_stop,
     .close = spidar_close,
     .held = spidar_held,
+    .explain = spidar_explain,
 };

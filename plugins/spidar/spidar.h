@@ -21,7 +21,7 @@ typedef enum hapi_spidar_cause {
   HAPI_SPIDAR_JUMPED,      /* positions that no string can have reached */
   HAPI_SPIDAR_MISFIT,      /* lengths that fit no pose, with all strings taut */
   HAPI_SPIDAR_STALLED,     /* the guard took the force off */
-  HAPI_SPIDAR_NOT_OPENED,  /* start: the port does not open; see why */
+  HAPI_SPIDAR_NOT_OPENED,  /* start: the port does not open, or no board answers */
   HAPI_SPIDAR_OTHER_BOARDS /* start: not the boards that it was opened with */
 } hapi_spidar_cause;
 
@@ -49,7 +49,6 @@ typedef struct hapi_spidar_device {
   bool asked;         /* a command went out since the newest read */
   atomic_bool zeroed; /* raised by zero, lowered by write */
   _Atomic int cause;  /* hapi_spidar_cause */
-  char why[160];      /* of HAPI_SPIDAR_NOT_OPENED and _OTHER_BOARDS; the application's thread */
   hapi_spidar_solver solver;
   hapi_spidar_rates rates;
   hap_twist twist; /* of the grip, frame of the model */

@@ -19,7 +19,7 @@
 #define WRIST_STIFFNESS 1.0
 #define WRIST_DAMPING 0.02
 
-static const char default_path[] = "0:0/0/0;1:0/0/0;3:0.03/0/0;3.5:0.03/0/0;5.5:0/0/0";
+static const char default_path[] = "0:0/0/0;1:0/0/0;3:0.055/0/0;3.5:0.055/0/0;5.5:0/0/0";
 
 static void set_hand(emulator *e, emulator_hand hand)
 {
