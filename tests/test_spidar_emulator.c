@@ -694,68 +694,70 @@ TEST(nobody_holds_it_and_nobody_pulls)
 
 /* ---- commands ---- */
 
+static const char *const good_commands[] = {"lose reply",
+                                            "lose command 3",
+                                            "double reply 0",
+                                            "stray reply 5 255",
+                                            "stray command 1 0",
+                                            " silent 1 1 ",
+                                            "silent all 0",
+                                            "late 0.002",
+                                            "garbage 10",
+                                            "report 1 B5M",
+                                            "saturate 100",
+                                            "power",
+                                            "unplug",
+                                            "unplug 0.5",
+                                            "plug",
+                                            "push 1 -2 .5",
+                                            "hand none",
+                                            "state",
+                                            "quit"};
+static const char *const bad_commands[] = {"",
+                                           "lose",
+                                           "lose it",
+                                           "lose reply x",
+                                           "lose reply 1 2",
+                                           "stray reply 1",
+                                           "stray reply 1 256",
+                                           "silent 2 1",
+                                           "silent 1 2",
+                                           "silent 1",
+                                           "late",
+                                           "late -1",
+                                           "garbage",
+                                           "report 2 B3M",
+                                           "report 1 B9M",
+                                           "saturate 4096",
+                                           "power 1",
+                                           "unplug -1",
+                                           "push 1 2",
+                                           "push 1 2 999",
+                                           "hand",
+                                           "hand left",
+                                           "state now",
+                                           "lose reply 1 2 3 4 5 6 7",
+                                           "quitt"};
+
 TEST(commands_are_understood_or_refused)
 {
-  static const char *const good[] = {"lose reply",
-                                     "lose command 3",
-                                     "double reply 0",
-                                     "stray reply 5 255",
-                                     "stray command 1 0",
-                                     " silent 1 1 ",
-                                     "silent all 0",
-                                     "late 0.002",
-                                     "garbage 10",
-                                     "report 1 B5M",
-                                     "saturate 100",
-                                     "power",
-                                     "unplug",
-                                     "unplug 0.5",
-                                     "plug",
-                                     "push 1 -2 .5",
-                                     "hand none",
-                                     "state",
-                                     "quit"};
-  static const char *const bad[] = {"",
-                                    "lose",
-                                    "lose it",
-                                    "lose reply x",
-                                    "lose reply 1 2",
-                                    "stray reply 1",
-                                    "stray reply 1 256",
-                                    "silent 2 1",
-                                    "silent 1 2",
-                                    "silent 1",
-                                    "late",
-                                    "late -1",
-                                    "garbage",
-                                    "report 2 B3M",
-                                    "report 1 B9M",
-                                    "saturate 4096",
-                                    "power 1",
-                                    "unplug -1",
-                                    "push 1 2",
-                                    "push 1 2 999",
-                                    "hand",
-                                    "hand left",
-                                    "state now",
-                                    "lose reply 1 2 3 4 5 6 7",
-                                    "quitt"};
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   stage *s = set_stage(&def);
   emulator_action action;
   hap_detail detail = {""};
   REQUIRE(s != NULL);
-  for (size_t i = 0; i < sizeof good / sizeof good[0]; ++i) {
-    bool taken = emulator_parse(&s->emulator, good[i], &action, &detail) == HAP_OK;
+  for (size_t i = 0; i < sizeof good_commands / sizeof good_commands[0]; ++i) {
+    bool taken = emulator_parse(&s->emulator, good_commands[i], &action, &detail) == HAP_OK;
     if (!taken) {
-      printf("# %s\n", good[i]);
+      printf("# %s\n", good_commands[i]);
     }
     CHECK(taken);
   }
-  for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-    bool refused = emulator_parse(&s->emulator, bad[i], &action, &detail) == HAP_ERROR_FORMAT;
+  for (size_t i = 0; i < sizeof bad_commands / sizeof bad_commands[0]; ++i) {
+    bool refused =
+        emulator_parse(&s->emulator, bad_commands[i], &action, &detail) == HAP_ERROR_FORMAT;
     if (!refused) {
-      printf("# %s\n", bad[i]);
+      printf("# %s\n", bad_commands[i]);
     }
     CHECK(refused);
   }

@@ -14,6 +14,10 @@
 
 #include "plugins/spidar/cycle.h"
 
+/* What takes the force off all boards. */
+#define HAPI_SPIDAR_ZEROS_BEFORE 16 /* the currents of a B5M */
+#define HAPI_SPIDAR_ZEROS_MAX (HAPI_SPIDAR_ZEROS_BEFORE + HAPI_SPIDAR_COMMANDS_MAX)
+
 /* Between the two, in memory that both have. */
 typedef struct hapi_spidar_pulse {
   atomic_uint beats;   /* goes up with every write of currents */
@@ -30,7 +34,7 @@ typedef struct hapi_spidar_guard {
 bool hapi_spidar_guard_init(hapi_spidar_guard *guard);
 void hapi_spidar_guard_finish(hapi_spidar_guard *guard);
 
-/* [control] Forks. zeros: what takes the force off all boards, at most HAPI_SPIDAR_COMMANDS_MAX bytes. stall_s:
+/* [control] Forks. zeros: what takes the force off all boards, at most HAPI_SPIDAR_ZEROS_MAX bytes. stall_s:
  * without a beat for so long while pulling, it sends them. False: there is no guard. */
 bool hapi_spidar_guard_start(hapi_spidar_guard *guard, int port, const uint8_t *zeros, int count,
                              double stall_s);

@@ -8,7 +8,8 @@
 #include "base/log.h"
 
 #define ANSWER_S 10e-3 /* for BOARD_INFO */
-#define INFO_SIZE 7    /* of that reply, the same for all models */
+#define TRIES 3
+#define INFO_SIZE 7 /* of that reply, the same for all models */
 #define ANY_MODEL 1
 #define SEND_S 50e-3  /* for a port that is full */
 #define STEP_LEAST 32 /* counts, whatever the time between two replies was */
@@ -98,11 +99,14 @@ static hap_status fail_port(int error, hap_detail *detail)
   return hapi_fail(detail, HAP_ERROR_DEVICE, "the port failed: %s", strerror(-error));
 }
 
-/* Twice, as garbage may spoil an answer. */
-static int ask_twice(const hapi_spidar_port *port, int id)
+/* Several times, as garbage may spoil an answer and a busy machine delay it. */
+static int ask_often(const hapi_spidar_port *port, int id)
 {
-  int model = ask(port, id);
-  return model == 0 ? ask(port, id) : model;
+  int model = 0;
+  for (int i = 0; i < TRIES && model == 0; ++i) {
+    model = ask(port, id);
+  }
+  return model;
 }
 
 hap_status hapi_spidar_line_find(const hapi_spidar_port *port, hapi_spidar_boards *out,
@@ -110,7 +114,7 @@ hap_status hapi_spidar_line_find(const hapi_spidar_port *port, hapi_spidar_board
 {
   memset(out, 0, sizeof *out);
   for (int id = 0; id < HAPI_SPIDAR_BOARDS; ++id) {
-    int model = ask_twice(port, id);
+    int model = ask_often(port, id);
     if (model < 0) {
       return fail_port(model, detail);
     }
@@ -172,9 +176,8 @@ int hapi_spidar_line_send(hapi_spidar_line *line, const int16_t *currents)
 {
   int sent = send_once(line, currents);
   line->cut = sent == -EAGAIN;
-  line->sent = line->port.now(line->port.self);
   if (line->waiting < 0.0) {
-    line->waiting = line->sent;
+    line->waiting = line->port.now(line->port.self);
   }
   return sent == -EAGAIN ? 0 : sent; /* a cycle without an answer, as others are */
 }
@@ -190,7 +193,6 @@ static bool take_cycle(hapi_spidar_line *line, const int16_t *raw)
   }
   line->bad_steps = 0;
   line->taken = now;
-  line->sampled = line->sent;
   line->waiting = -1.0;
   return true;
 }

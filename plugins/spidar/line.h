@@ -28,15 +28,13 @@ typedef struct hapi_spidar_line {
   hapi_spidar_cycle cycle;
   hapi_spidar_counts counts;
   double step_rate;   /* counts/s that a string may do; a faster one is a wrong reply */
-  double sent;        /* s, of the newest command */
   double taken;       /* s, of the newest good reply */
-  double sampled;     /* s, of the command it answers, when the boards looked at their encoders */
   double waiting;     /* s, of the oldest command without an answer; < 0: there is none */
   bool cut;           /* a command was sent in part: the next one needs zeros before it */
   uint32_t bad_steps; /* replies in a row that jumped */
 } hapi_spidar_line;
 
-/* [control] Asks all ids for a board, which takes some 80 ms. HAP_ERROR_DEVICE: none, or the port
+/* [control] Asks all ids for a board, which takes some 200 ms. HAP_ERROR_DEVICE: none, or the port
  * failed; detail says which. */
 HAP_NODISCARD hap_status hapi_spidar_line_find(const hapi_spidar_port *port,
                                                hapi_spidar_boards *out, hap_detail *detail);

@@ -189,12 +189,16 @@ static void set_limits(hapi_spidar_device *device, const hapi_argument *entries)
   }
 }
 
+/* Zeros before the commands end one that was cut in the middle of its currents: else the next header would be
+ * taken for a current, and a great one. */
 static void prepare_zeros(hapi_spidar_device *device)
 {
   const int16_t none[HAPI_SPIDAR_CYCLE_MOTORS] = {0};
   hapi_spidar_cycle cycle;
   hapi_spidar_cycle_init(&cycle, &device->boards);
-  device->zero_count = hapi_spidar_cycle_commands(&cycle, none, device->zeros);
+  device->zero_count = HAPI_SPIDAR_ZEROS_BEFORE;
+  device->zero_count +=
+      hapi_spidar_cycle_commands(&cycle, none, device->zeros + HAPI_SPIDAR_ZEROS_BEFORE);
 }
 
 static hap_status read_arguments(hapi_spidar_device *device, hapi_argument *entries,

@@ -95,13 +95,13 @@ static hapi_spidar_fit solve_pose(hapi_spidar_device *device)
   return hapi_spidar_solve(&device->solver, &device->model, lengths);
 }
 
-static void update_twist(hapi_spidar_device *device)
+/* At the times of the reads, so that poses and twists are of one motion, whatever the port delays. */
+static void update_twist(hapi_spidar_device *device, int64_t time_ns)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
   double rates[HAPI_SPIDAR_STRINGS_MAX];
-  int64_t sampled_ns = (int64_t)(1e9 * device->line.sampled);
   read_counts(device, counts);
-  hapi_spidar_rates_update(&device->rates, &device->model, sampled_ns, counts, rates);
+  hapi_spidar_rates_update(&device->rates, &device->model, time_ns, counts, rates);
   hapi_spidar_twist(&device->model, &device->solver.pose, rates, &device->twist);
 }
 
@@ -113,7 +113,7 @@ static bool judge_fit(hapi_spidar_device *device, hapi_spidar_fit fit)
   if (!poor || device->poor < 0.0) {
     device->poor = poor ? now : -1.0;
   }
-  return !poor || now - device->poor < POOR_S;
+  return !poor || now - fmax(device->poor, device->taut) < POOR_S;
 }
 
 static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist *twist)
@@ -147,7 +147,7 @@ static bool needs_restart(const hapi_spidar_device *device)
 }
 
 /* What has come, into pose and twist. */
-static hap_status take_answer(hapi_spidar_device *device)
+static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
 {
   int taken = hapi_spidar_line_receive(&device->line);
   if (taken < 0) {
@@ -155,7 +155,7 @@ static hap_status take_answer(hapi_spidar_device *device)
   }
   if (taken > 0) {
     hapi_spidar_fit fit = solve_pose(device);
-    update_twist(device);
+    update_twist(device, time_ns);
     if (!judge_fit(device, fit)) {
       return fail(device, HAPI_SPIDAR_MISFIT);
     }
@@ -183,7 +183,6 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
                               uint32_t *buttons)
 {
   hapi_spidar_device *device = self;
-  (void)time_ns; /* the newest state, whatever the deadline was */
   if (!device->running) {
     return HAP_ERROR_STATE;
   }
@@ -193,7 +192,7 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   if (atomic_load(&device->guard.pulse->stalled)) {
     return fail(device, HAPI_SPIDAR_STALLED);
   }
-  hap_status status = take_answer(device);
+  hap_status status = take_answer(device, time_ns);
   hap_status asked = needs_restart(device) ? HAP_OK : ask(device);
   to_frame(device, pose, twist);
   *buttons = 0;
@@ -232,6 +231,7 @@ static bool pull(hapi_spidar_device *device, const hap_wrench *wanted, hap_wrenc
   double passed = since_write(device);
   bool slack = atomic_load(&device->zeroed);
   if (slack) {
+    device->taut = device->written;
     memset(device->tensions.tension, 0, sizeof device->tensions.tension);
     memset(device->rest, 0, sizeof device->rest);
   }

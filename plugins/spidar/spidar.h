@@ -41,7 +41,7 @@ typedef struct hapi_spidar_device {
   double offset[3]; /* where the model's origin is in the device's frame */
   double rotate[4]; /* the model's axes in it */
 
-  uint8_t zeros[HAPI_SPIDAR_COMMANDS_MAX]; /* takes the force off; never changes after open */
+  uint8_t zeros[HAPI_SPIDAR_ZEROS_MAX]; /* takes the force off; never changes after open */
   int zero_count;
 
   /* Ticks. */
@@ -53,6 +53,7 @@ typedef struct hapi_spidar_device {
   hapi_spidar_rates rates;
   hap_twist twist; /* of the grip, frame of the model */
   double poor;     /* s, when the lengths began to fit no pose; < 0: they do */
+  double taut;     /* s, when the strings began to be pulled after a zero */
   hapi_spidar_tensions tensions;
   hapi_spidar_heat heat;
   double written; /* s, of the newest write; < 0: the strings had no tension before */

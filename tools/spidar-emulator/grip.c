@@ -14,7 +14,7 @@ void grip_def_init(grip_def *def, const hapi_spidar_model *model)
                     .string_stiffness = 2e4,
                     .string_damping = 5.0,
                     .rotor_mass = 0.01,
-                    .rotor_damping = 0.05};
+                    .rotor_damping = 0.5};
 }
 
 void grip_init(grip *g, const grip_def *def)

@@ -18,7 +18,8 @@ typedef struct grip_def {
   double rotor_damping;           /* N s/m */
 } grip_def;
 
-/* Round numbers: a grip of 60 g, thin strings of polyethylene, small motors. */
+/* Round numbers: a grip of 60 g, thin strings of polyethylene, small motors that are driven by a voltage and so
+ * are brakes without one. */
 void grip_def_init(grip_def *def, const hapi_spidar_model *model);
 
 typedef struct grip {
