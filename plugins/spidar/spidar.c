@@ -136,6 +136,7 @@ static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist
 static hap_status fail(hapi_spidar_device *device, hapi_spidar_cause cause)
 {
   set_cause(device, cause);
+  atomic_store(&device->told, (int)cause);
   return HAP_ERROR_DEVICE;
 }
 
@@ -338,16 +339,16 @@ static bool reopen(hapi_spidar_device *device)
   memcpy(path, device->serial.path, sizeof path);
   hapi_spidar_serial_shut(&device->serial);
   if (hapi_spidar_serial_open(&device->serial, path, &detail) < HAP_OK) {
-    set_cause(device, HAPI_SPIDAR_NOT_OPENED);
+    (void)fail(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
   hapi_spidar_serial_port(&device->serial, &port);
   if (hapi_spidar_line_find(&port, &found, &detail) < HAP_OK) {
-    set_cause(device, HAPI_SPIDAR_NOT_OPENED);
+    (void)fail(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
   if (memcmp(&found, &device->boards, sizeof found) != 0) {
-    set_cause(device, HAPI_SPIDAR_OTHER_BOARDS);
+    (void)fail(device, HAPI_SPIDAR_OTHER_BOARDS);
     return false;
   }
   return true;
@@ -464,6 +465,7 @@ static hap_status spidar_start(void *self)
     return HAP_ERROR_DEVICE;
   }
   set_cause(device, HAPI_SPIDAR_WELL);
+  atomic_store(&device->told, HAPI_SPIDAR_WELL);
   if (device->stall > 0.0 &&
       !hapi_spidar_guard_start(&device->guard, device->serial.fd, device->zeros, device->zero_count,
                                device->stall)) {
@@ -505,6 +507,7 @@ static hap_status spidar_open(const char *args, void **self, hap_detail *detail)
   device->guard.channel = -1;
   atomic_init(&device->zeroed, true);
   atomic_init(&device->cause, HAPI_SPIDAR_WELL);
+  atomic_init(&device->told, HAPI_SPIDAR_WELL);
   hapi_spidar_heat_init(&device->heat, 0.0);
   hap_status status = hapi_spidar_configure(device, args, detail);
   if (status < HAP_OK) {
@@ -555,7 +558,7 @@ static const char *text_of(hapi_spidar_cause cause)
 static void spidar_explain(void *self, hap_detail *out)
 {
   hapi_spidar_device *device = self;
-  const char *text = text_of((hapi_spidar_cause)atomic_load(&device->cause));
+  const char *text = text_of((hapi_spidar_cause)atomic_load(&device->told));
   if (text[0] != '\0') {
     (void)hapi_fail(out, HAP_ERROR_DEVICE, "%.200s: %s", device->serial.path, text);
   }

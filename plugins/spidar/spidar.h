@@ -48,7 +48,8 @@ typedef struct hapi_spidar_device {
   bool running;
   bool asked;         /* a command went out since the newest read */
   atomic_bool zeroed; /* raised by zero, lowered by write */
-  _Atomic int cause;  /* hapi_spidar_cause */
+  _Atomic int cause;  /* hapi_spidar_cause, of now */
+  _Atomic int told;   /* of the last failure since start, which may be over */
   hapi_spidar_solver solver;
   hapi_spidar_rates rates;
   hap_twist twist; /* of the grip, frame of the model */

@@ -133,13 +133,25 @@ static void tick_boards(emulator *e, double time)
 
 /* ---- the hand ---- */
 
+/* Whoever starts the device finds the grip at home. */
+static void follow_motors(emulator *e)
+{
+  bool pulls = false;
+  for (int i = 0; i < e->model->strings; ++i) {
+    pulls = pulls || e->pull[i] != 0.0;
+  }
+  if (!pulls) {
+    e->drawn = emulator_time(e);
+  }
+}
+
 static void hold(const emulator *e, hap_wrench *out)
 {
   double place[3] = {0.0, 0.0, 0.0};
   double speed[3] = {0.0, 0.0, 0.0};
   const grip *g = &e->grip;
   if (e->hand == EMULATOR_HAND_PUSH) {
-    hapi_motion_at(&e->path, emulator_time(e), place, speed);
+    hapi_motion_at(&e->path, emulator_time(e) - e->drawn, place, speed);
   }
   double side = g->pose.quat_wxyz[0] < 0.0 ? -2.0 : 2.0;
   for (int k = 0; k < 3; ++k) {
@@ -157,6 +169,7 @@ static void step(emulator *e)
     hold(e, &other);
   }
   tick_boards(e, emulator_time(e));
+  follow_motors(e);
   grip_step(&e->grip, e->pull, &other, 1.0 / EMULATOR_STEP_HZ);
   ++e->steps;
 }

@@ -14,7 +14,7 @@
 #define EMULATOR_EVENTS_MAX 256
 
 typedef enum emulator_hand {
-  EMULATOR_HAND_PUSH, /* follows the path like a relaxed hand */
+  EMULATOR_HAND_PUSH, /* follows the path like a relaxed hand; at home while no motor pulls */
   EMULATOR_HAND_HOLD, /* the same, and the path stays at home */
   EMULATOR_HAND_NONE  /* the grip hangs free in its strings; no gravity */
 } emulator_hand;
@@ -65,6 +65,7 @@ typedef struct emulator {
   wire wire;
   grip grip;
   hapi_motion path;
+  double drawn;   /* s, since when motors have been pulling; the hand's path begins then */
   double push[3]; /* N, on the grip, beside the hand */
   uint64_t steps; /* done */
   double next_tick[HAPI_SPIDAR_BOARDS];
