@@ -34,6 +34,7 @@ hap_status bench_impedance(bench *b);
 hap_status bench_jitter(bench *b);
 hap_status bench_poses(bench *b);
 hap_status bench_scaling(bench *b);
+hap_status bench_spidar(bench *b);
 hap_status bench_stability(bench *b);
 hap_status bench_tick(bench *b);
 

@@ -30,6 +30,8 @@ static const program programs[] = {
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
+    {"spidar", bench_spidar,
+     "string devices: poses from rounded counts, tensions, times; numerics alone, no device"},
     {"stability", bench_stability,
      "where each integrator holds: stiffness, mass, contacts at once; --only KEY=VALUE/VALUE,...: "
      "of "

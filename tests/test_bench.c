@@ -158,6 +158,24 @@ TEST(fig7_leaves_its_table)
   check_program("fig7", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
 }
 
+/* Of the checks those that are no times hold on every machine. */
+TEST(spidar_numerics_hold)
+{
+  const char *const arguments[] = {"spidar", "--quick", "--verify", "--out", folder, NULL};
+  int status = run(arguments, environ);
+  CHECK(status == 0 || status == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "ok ") >= 7 * 6);
+  CHECK(count_rows(file_in_folder("spidar", ".csv"),
+                   "model,strings,dof,position_mm,turn_deg,position_rms_mm,turn_rms_deg,bound_mm,"
+                   "bound_deg,excess_counts,calls,lost,velocity_mm_s,velocity_windows_mm_s,"
+                   "velocity_difference_mm_s,angular_rad_s,angular_windows_rad_s,"
+                   "angular_difference_rad_s,qp_gap,qp_brute_n,changes,force_reached,"
+                   "torque_reached,force_n,torque_nm,solve_us,tensions_us,jump_us") == 7);
+  CHECK(!plot_available() || exists(file_in_folder("spidar", ".svg")));
+  unlink(file_in_folder("spidar", ".csv"));
+  unlink(file_in_folder("spidar", ".svg"));
+}
+
 TEST(scaling_leaves_its_table)
 {
   check_program("scaling",
@@ -375,6 +393,7 @@ int main(void)
   RUN(fig6_leaves_its_table);
   RUN(fig7_leaves_its_table);
   RUN(jitter_leaves_its_table);
+  RUN(spidar_numerics_hold);
   RUN(scaling_leaves_its_table);
   RUN(poses_are_drawn_within_their_bound);
   RUN(impedance_is_that_of_the_closed_forms);

@@ -5,11 +5,10 @@
 #include <string.h>
 
 /* Block principal pivoting: all variables that are on the wrong side change over at once, which needs one to
- * four sets. It may go round in circles: when the number of the wrong ones has not fallen for BLOCKS times, a
- * primal active set goes on from where it got to, one variable at a time, downhill, which ends. Judice, Pires,
- * "A block principal pivoting algorithm for large-scale strictly monotone linear complementarity problems",
- * Computers and Operations Research 21(5), 1994; Nocedal, Wright, "Numerical Optimization", 16.5. */
-#define BLOCKS 2
+ * four sets. It may go round in circles: as soon as the number of the wrong ones does not fall, a primal active set
+ * goes on from where it got to, one variable at a time, downhill, which ends. Judice, Pires, "A block principal
+ * pivoting algorithm for large-scale strictly monotone linear complementarity problems", Computers and Operations
+ * Research 21(5), 1994; Nocedal, Wright, "Numerical Optimization", 16.5. */
 #define SETS_MAX 100
 /* A variable on its bound whose gradient is 0 is right on both sides; rounding must not decide for ever. */
 #define ROUNDING 1e-12
@@ -172,19 +171,20 @@ int hapi_spidar_box_qp_solve(const hapi_spidar_box_qp *qp, hapi_spidar_at at[HAP
                              double out_x[HAPI_SPIDAR_ORDER_MAX])
 {
   int fewest = HAPI_SPIDAR_ORDER_MAX + 1;
-  int blocks = BLOCKS;
   int sets = 0;
   memset(out_x, 0, HAPI_SPIDAR_ORDER_MAX * sizeof *out_x);
-  for (; blocks > 0 && solve_free(qp, at, out_x); ++sets) {
+  for (; solve_free(qp, at, out_x); ++sets) {
     hapi_spidar_at next[HAPI_SPIDAR_ORDER_MAX];
     int wrong = count_wrong(qp, at, out_x, next);
     if (wrong == 0) {
       clip(qp, out_x); /* of what rounding left */
       return sets;
     }
-    blocks = wrong < fewest ? BLOCKS : blocks - 1;
-    fewest = wrong < fewest ? wrong : fewest;
+    if (wrong >= fewest) {
+      break;
+    }
+    fewest = wrong;
     memcpy(at, next, (size_t)qp->n * sizeof *at);
   }
-  return descend(qp, at, out_x, sets);
+  return descend(qp, at, out_x, sets + 1);
 }

@@ -116,22 +116,41 @@ static void derive(const problem *p, const hapi_spidar_rows *rows, const hapi_sp
   }
 }
 
-/* The pose that fits, from that of the round before. */
-static void place(problem *p, size_t index, const double *lengths)
+/* The pose that fits, from start; m, the largest error of a length there. */
+static double place_from(const problem *p, const hap_pose *start, const double *lengths,
+                         hap_pose *out)
 {
-  const hapi_spidar_sample *sample = &p->samples[index];
   hapi_spidar_solver solver;
-  if (sample->known) {
-    p->poses[index] = sample->pose;
-    return;
-  }
-  hapi_spidar_solver_init(&solver, &p->model, &p->poses[index]);
+  hapi_spidar_solver_init(&solver, &p->model, start);
   int calls = 0;
   while (hapi_spidar_solve(&solver, &p->model, lengths) == HAPI_SPIDAR_FIT_MOVING &&
          calls < CALLS) {
     ++calls;
   }
-  p->poses[index] = solver.pose;
+  *out = solver.pose;
+  return solver.residual;
+}
+
+/* From that of the round before, and where this does not fit from the middle of the workspace: samples need not
+ * lie on one way, and from another one's pose a search may end elsewhere. */
+static void place(problem *p, size_t index, const double *lengths)
+{
+  const hapi_spidar_sample *sample = &p->samples[index];
+  hap_pose *pose = &p->poses[index];
+  if (sample->known) {
+    *pose = sample->pose;
+    return;
+  }
+  double error = place_from(p, pose, lengths, pose);
+  if (error > p->model.residual) {
+    hap_pose middle;
+    hap_pose other;
+    hapi_spidar_home(&middle);
+    hapi_v3_copy(p->model.centre, middle.position);
+    if (place_from(p, &middle, lengths, &other) < error) {
+      *pose = other;
+    }
+  }
 }
 
 static void add_errors(const problem *p, size_t index, const double *error, equations *e)

@@ -9,11 +9,12 @@
 #include "plugins/spidar/tensions.h"
 
 #define LIMITED_FROM 0.8
+#define HELD_MAX 10.0 /* of max_tension: no motor holds more, a bad number does */
 
 void hapi_spidar_heat_init(hapi_spidar_heat *heat, double share)
 {
   for (int i = 0; i < HAPI_SPIDAR_STRINGS_MAX; ++i) {
-    heat->share[i] = fmax(0.0, fmin(1.0, share));
+    heat->share[i] = share >= 0.0 && share <= 1.0 ? share : 1.0;
   }
 }
 
@@ -34,7 +35,8 @@ void hapi_spidar_heat_step(hapi_spidar_heat *heat, const hapi_spidar_model *mode
 {
   double step = seconds > 0.0 && seconds < HUGE_VAL ? seconds / model->heat_time : 0.0;
   for (int i = 0; i < model->strings; ++i) {
-    double held = hapi_finite(&tension[i], 1) ? tension[i] : model->max_tension;
+    double held =
+        fabs(tension[i]) <= HELD_MAX * model->max_tension ? tension[i] : model->max_tension;
     double ratio = held / model->heat_tension;
     /* implicit: good for a step of any length */
     heat->share[i] = (heat->share[i] + step * ratio * ratio) / (1.0 + step);

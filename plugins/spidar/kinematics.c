@@ -19,9 +19,12 @@
 #define DAMPING_MOST 1e6
 #define FLOOR 1e-12 /* of the matrix: it can be inverted where the strings fail to tell the pose */
 #define BEYOND \
-  0.6981317008        /* rad, 40 degrees: a pose may be turned by as much more than the workspace */
-#define TURN_ENDS 3.0 /* rad */
-#define WORKSPACES 2.0 /* to each side, as far may the grip be besides */
+  0.6981317008 /* rad, 40 degrees: a pose may be turned by as much more than the workspace */
+/* Without a suspect the others fit about as well as without the best one. */
+#define SUSPECT_RATIO 3.0
+#define SUSPECT_SHARE 0.05 /* of model.residual */
+#define TURN_ENDS 3.0      /* rad */
+#define WORKSPACES 2.0     /* to each side, as far may the grip be besides */
 
 void hapi_spidar_home(hap_pose *out)
 {
@@ -315,21 +318,45 @@ void hapi_spidar_twist(const hapi_spidar_model *model, const hap_pose *pose,
   }
 }
 
+/* What is left when one string is not asked. */
+typedef struct without {
+  double residual; /* m, of the others; HUGE_VAL: no pose was found */
+  double error;    /* m, of the one, measured minus fitting */
+} without;
+
+static without leave_out(const hapi_spidar_model *model, const hap_pose *good,
+                         const double *lengths, int string)
+{
+  const uint32_t all = (1u << model->strings) - 1u;
+  const measured others = {lengths, all & ~(1u << string)};
+  hapi_spidar_solver solver;
+  hapi_spidar_rows rows;
+  hapi_spidar_solver_init(&solver, model, good);
+  if (!descend(&solver, model, &others, STEPS_ALONE)) {
+    return (without){HUGE_VAL, 0.0};
+  }
+  hapi_spidar_rows_at(model, &solver.pose, &rows);
+  return (without){solver.residual, lengths[string] - rows.length[string]};
+}
+
 void hapi_spidar_diagnose(const hapi_spidar_model *model, const hap_pose *good,
                           const double lengths[HAPI_SPIDAR_STRINGS_MAX], hapi_spidar_diagnosis *out)
 {
-  const uint32_t all = (1u << model->strings) - 1u;
+  without left[HAPI_SPIDAR_STRINGS_MAX];
+  double least = HUGE_VAL;
   memset(out, 0, sizeof *out);
+  if (!hapi_finite(lengths, model->strings)) {
+    return;
+  }
   for (int i = 0; i < model->strings; ++i) {
-    const measured others = {lengths, all & ~(1u << i)};
-    hapi_spidar_solver solver;
-    hapi_spidar_rows rows;
-    hapi_spidar_solver_init(&solver, model, good);
-    if (hapi_finite(lengths, model->strings) && descend(&solver, model, &others, STEPS_ALONE) &&
-        solver.residual <= model->residual) {
-      hapi_spidar_rows_at(model, &solver.pose, &rows);
+    left[i] = leave_out(model, good, lengths, i);
+    least = fmin(least, left[i].residual);
+  }
+  double like_least = SUSPECT_RATIO * least + SUSPECT_SHARE * model->residual;
+  for (int i = 0; i < model->strings && least <= model->residual; ++i) {
+    if (left[i].residual <= like_least) {
       out->suspects |= 1u << i;
-      out->error[i] = lengths[i] - rows.length[i];
+      out->error[i] = left[i].error;
     }
   }
 }

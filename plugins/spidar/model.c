@@ -19,7 +19,7 @@
  * which the boards' own heat limit sums. */
 #define HEAT_SHARE 0.5
 #define HEAT_TIME 20.0
-/* Of 1 N at the middle of the workspace 0.97 N and more are reached in all directions. */
+/* Of 1 N at the middle of the workspace 0.97 N and more are reached in all directions (t1 needs less). */
 #define SPREAD 0.0075
 
 /* Signs of eight figures of one size. */
@@ -108,8 +108,8 @@ static const hapi_spidar_model models[] = {
      .min_tension = 0.3,
      .max_tension = 20.0,
      .tension_rate = 4000.0,
-     .torque_weight = 1700.0,
-     .spread_weight = SPREAD,
+     .torque_weight = 2600.0,
+     .spread_weight = 0.003,
      /* At home these strings cannot hold a grip that is not turned: their pulls have no balance. */
      .centre = MM(0, 40, -48),
      .workspace = MM(20, 20, 20),

@@ -16,9 +16,11 @@
 #define LENGTH_MIN 0.005 /* m, of a string at home */
 #define APART 1e-4       /* m, between the ends of two strings */
 #define TURN_LENGTH 0.02 /* m, as in kinematics.c */
-/* Least eigenvalue of J^T J, in which a string counts up to 1 along its own direction: below it the strings
- * tell a direction thirty times worse than each alone. */
-#define TELL_MIN 1e-3
+/* Least eigenvalue of J^T J, in which a string counts 1 along its own direction: below it they
+ * tell a direction seven times worse than one string tells its own. */
+#define TELL_MIN 0.02
+#define GRID 3
+#define TURNS 54
 #define UNBALANCED 0.2 /* of min_tension: what may be left */
 
 typedef struct range {
@@ -157,26 +159,28 @@ static bool tells(const hapi_spidar_model *m, const hap_pose *pose)
   return hapi_spidar_cholesky(h, m->dof);
 }
 
-/* The corners of the workspace and its centre, each not turned, and turned about each axis both ways. */
+/* A grid of GRID points to each side over the workspace; not turned, and half and wholly turned about the 26
+ * directions to faces, edges and corners of a cube. */
 static void sample_at(const hapi_spidar_model *m, int index, hap_pose *out)
 {
-  hapi_spidar_home(out);
-  int corner = index % 9;
-  int turn = index / 9;
-  hapi_v3_copy(m->centre, out->position);
-  for (int axis = 0; axis < 3 && corner < 8; ++axis) {
-    out->position[axis] += ((corner >> axis & 1) != 0 ? 1.0 : -1.0) * m->workspace[axis];
+  double axis[3];
+  int turn = index % TURNS;
+  int point = index / TURNS;
+  for (int i = 0; i < 3; ++i, point /= GRID, turn /= 3) {
+    double share = 2.0 * (point % GRID) / (GRID - 1) - 1.0;
+    int digit = turn % 3;
+    out->position[i] = m->centre[i] + share * m->workspace[i];
+    axis[i] = digit - 1;
   }
-  if (turn > 0 && m->dof == 6) {
-    double half = 0.5 * m->workspace_turn * (turn % 2 != 0 ? 1.0 : -1.0);
-    out->quat_wxyz[0] = cos(half);
-    out->quat_wxyz[1 + (turn - 1) / 2] = sin(half);
-  }
+  double size = hapi_v3_norm(axis);
+  double half = size > 0.0 ? 0.5 * m->workspace_turn * (turn > 0 ? 0.5 : 1.0) : 0.0;
+  out->quat_wxyz[0] = cos(half);
+  hapi_v3_scale(size > 0.0 ? sin(half) / size : 0.0, axis, out->quat_wxyz + 1);
 }
 
 static hap_status check_workspace(const hapi_spidar_model *m, hap_detail *detail)
 {
-  for (int i = 0; i < 9 * 7; ++i) {
+  for (int i = 0; i < GRID * GRID * GRID * TURNS; ++i) {
     hap_pose pose;
     sample_at(m, i, &pose);
     if (!tells(m, &pose)) {
@@ -230,7 +234,7 @@ hap_status hapi_spidar_model_check(const hapi_spidar_model *model, hap_detail *d
     status = check_distinct(model, detail);
   }
   if (status >= HAP_OK) {
-    status = check_workspace(model, detail);
+    status = check_balance(model, detail);
   }
-  return status >= HAP_OK ? check_balance(model, detail) : status;
+  return status >= HAP_OK ? check_workspace(model, detail) : status;
 }

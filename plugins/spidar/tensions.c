@@ -5,6 +5,7 @@
 #include "base/vec.h"
 
 #define CAPABILITY_REACHED 0.9
+#define SANE_MAX 1e6  /* m, N, N m */
 #define DIRECTIONS 26 /* to faces, edges and corners of a cube */
 
 void hapi_spidar_tensions_init(hapi_spidar_tensions *state, const hapi_spidar_model *model)
@@ -58,7 +59,8 @@ static void set_box(const hapi_spidar_tensions *state, const hapi_spidar_model *
 {
   double step = state->seconds > 0.0 ? model->tension_rate * state->seconds : HUGE_VAL;
   for (int i = 0; i < qp->n; ++i) {
-    double most = fmax(model->min_tension, fmin(model->max_tension, state->most[i]));
+    bool room = state->most[i] >= model->min_tension; /* false for NaN */
+    double most = room ? fmin(model->max_tension, state->most[i]) : model->min_tension;
     double high = fmin(most, state->tension[i] + step);
     double low = fmax(model->min_tension, state->tension[i] - step);
     qp->high[i] = high;
@@ -75,6 +77,16 @@ static bool is_saturated(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at)
   return saturated;
 }
 
+/* Finite, and so that their squares are. */
+static bool is_sane(const double *values, int count)
+{
+  bool sane = true;
+  for (int i = 0; i < count; ++i) {
+    sane = sane && fabs(values[i]) <= SANE_MAX;
+  }
+  return sane;
+}
+
 hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state, const hapi_spidar_model *model,
                                       const hap_pose *pose, const hap_wrench *wanted,
                                       double out_tension[HAPI_SPIDAR_STRINGS_MAX],
@@ -83,9 +95,8 @@ hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state, const hapi_sp
   static const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_spidar_rows rows;
   hapi_spidar_box_qp qp;
-  bool finite =
-      hapi_finite(wanted->force, 3) && (model->dof == 3 || hapi_finite(wanted->torque, 3));
-  bool placed = hapi_finite(pose->position, 3) && hapi_finite(pose->quat_wxyz, 4);
+  bool finite = is_sane(wanted->force, 3) && (model->dof == 3 || is_sane(wanted->torque, 3));
+  bool placed = is_sane(pose->position, 3) && is_sane(pose->quat_wxyz, 4);
   if (placed) {
     hapi_spidar_rows_at(model, pose, &rows);
     set_matrix(model, &rows, finite ? wanted : &none, &qp);
@@ -110,10 +121,8 @@ hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state, const hapi_sp
 static void direction_of(int index, double out[3])
 {
   int code = index < DIRECTIONS / 2 ? index : index + 1; /* not the middle of the cube */
-  int digits[3] = {code % 3, code / 3 % 3, code / 9};
-  for (int axis = 0; axis < 3; ++axis) {
-    out[axis] = digits[axis] - 1;
-  }
+  const double digits[3] = {-1.0, 0.0, 1.0};
+  hapi_v3_set(out, digits[code % 3], digits[code / 3 % 3], digits[code / 9]);
   hapi_v3_scale(1.0 / hapi_v3_norm(out), out, out);
 }
 

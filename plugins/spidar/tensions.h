@@ -28,7 +28,7 @@ void hapi_spidar_tensions_init(hapi_spidar_tensions *state, const hapi_spidar_mo
 /* The tensions whose wrench on the grip at pose is nearest to wanted, within min_tension .. most and the rate; from 0
  * they rise with the rate to min_tension. Torque of a model of 3 dof is not looked at. reached is what the tensions
  * give, 0 torque for 3 dof; it may be NULL. HAP_SATURATED: a string is as taut as it may be now.
- * HAP_ERROR_ARGUMENT: wanted or pose is not finite; then the tensions are those of no wrench at the pose, or
+ * HAP_ERROR_ARGUMENT: wanted or pose is not finite or beyond 1e6; then the tensions are those of no wrench at the pose, or
  * when that is not finite, unchanged. */
 HAP_NODISCARD hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state,
                                                     const hapi_spidar_model *model,
@@ -51,12 +51,13 @@ typedef struct hapi_spidar_heat {
   double share[HAPI_SPIDAR_STRINGS_MAX];
 } hapi_spidar_heat;
 
-/* All motors alike. 0 for a device that was off for some heat_time, more where nobody knows. */
+/* All motors alike. 0 for a device that was off for some heat_time, more where nobody knows; what is not within
+ * 0..1 is taken as 1. */
 void hapi_spidar_heat_init(hapi_spidar_heat *heat, double share);
 
 /* The tensions [N] were held for seconds. out_most: what each motor may do now; it falls smoothly from
  * max_tension, at share 0.8, to heat_tension at share 1, and no share goes beyond 1 for tensions that keep it.
- * A tension that is not finite counts as max_tension, seconds that are not finite or below 0 as none. */
+ * A tension that is not finite or far beyond max_tension counts as that, seconds that are not finite or below 0 as none. */
 void hapi_spidar_heat_step(hapi_spidar_heat *heat, const hapi_spidar_model *model,
                            const double tension[HAPI_SPIDAR_STRINGS_MAX], double seconds,
                            double out_most[HAPI_SPIDAR_STRINGS_MAX]);
