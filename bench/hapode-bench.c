@@ -27,6 +27,7 @@ static const program programs[] = {
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device"},
     {"jitter", bench_jitter,
      "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
+    {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
