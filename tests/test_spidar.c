@@ -28,7 +28,7 @@ typedef struct hands {
 
 static bool open_device(hands *h, const char *arguments, hap_detail *detail)
 {
-  char spec[300];
+  char spec[500];
   snprintf(spec, sizeof spec, "spidar:%s%s", machine.port, arguments);
   if (hap_device_open(spec, &h->device, detail) < HAP_OK) {
     return false;
@@ -203,6 +203,40 @@ TEST(the_frame_has_z_up)
   CHECK(push(&h, 0.0, 500) == HAP_OK);
   hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
+}
+
+/* ---- home ---- */
+
+/* The file of a calibration tells where the grip is when a start does not find it at home. */
+TEST(a_home_that_was_told_holds_until_the_boards_are_switched_off)
+{
+  hands h;
+  char command[600];
+  char file[128];
+  char argument[300];
+  double place[3];
+  hap_detail detail = {""};
+  snprintf(file, sizeof file, "%s/home.txt", machine.folder);
+  snprintf(command, sizeof command,
+           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1",
+           getenv("HAPODE_RUN"), file, machine.port, machine.folder);
+  REQUIRE(system(command) == 0);
+  snprintf(argument, sizeof argument, ",timeout=5,rotate=1/0/0/0,model=%s", file);
+  REQUIRE(open_device(&h, argument, &detail));
+  REQUIRE(emulated_tell(&machine, "push 2.4 0 0")); /* away from home before it is started */
+  emulated_sleep(1.0);
+  CHECK(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 0.0, 300) == HAP_OK);
+  REQUIRE(emulated_state(&machine, "position", place, 3));
+  CHECK(place[0] > 0.01);
+  CHECK_NEAR(h.pose.position[0], place[0], 1e-3);
+  REQUIRE(emulated_tell(&machine, "push 0 0 0"));
+  CHECK(push(&h, 0.0, 500) == HAP_OK);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+  unlink(file);
+  snprintf(file, sizeof file, "%s/out", machine.folder);
+  unlink(file);
 }
 
 /* ---- what goes wrong ---- */
@@ -395,6 +429,7 @@ int main(void)
   RUN(boards_that_do_not_fit_are_named);
   RUN(the_hand_feels_what_was_reached);
   RUN(the_frame_has_z_up);
+  RUN(a_home_that_was_told_holds_until_the_boards_are_switched_off);
   RUN(boards_that_are_silent_fail_and_come_back_by_themselves);
   RUN(a_cable_is_pulled_and_put_in_again);
   RUN(a_process_that_is_killed_leaves_no_force);

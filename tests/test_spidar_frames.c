@@ -269,7 +269,7 @@ TEST(cycles_come_in_pieces)
   hapi_spidar_cycle cycle;
   int16_t raw[8] = {0};
   int16_t seen[HAPI_SPIDAR_CYCLE_MOTORS];
-  uint8_t bytes[64];
+  uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, &two_b3m);
   for (int piece = 1; piece <= 34; ++piece) {
     move(8, raw);
@@ -289,7 +289,7 @@ TEST(of_several_cycles_the_newest_is_taken)
   hapi_spidar_cycle cycle;
   int16_t raw[8] = {0};
   int16_t seen[HAPI_SPIDAR_CYCLE_MOTORS];
-  uint8_t bytes[64];
+  uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, &two_b3m);
   for (int i = 0; i < 40; ++i) { /* more than the buffer holds */
     move(8, raw);
@@ -313,7 +313,7 @@ TEST(who_is_silent_is_told)
 {
   hapi_spidar_cycle cycle;
   int16_t raw[8] = {0};
-  uint8_t bytes[64];
+  uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, &two_b3m);
   CHECK(hapi_spidar_cycle_silent(&cycle) == 0);
   make_replies(&two_b3m, raw, bytes);
@@ -373,7 +373,7 @@ static void damage_one(const hapi_spidar_boards *boards, damage_kind damage, int
   hapi_spidar_counts counts = {.motors = motors_of(boards)};
   int16_t raw[8];
   int16_t seen[HAPI_SPIDAR_CYCLE_MOTORS];
-  uint8_t bytes[64];
+  uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, boards);
   for (int i = 0; i < 8; ++i) {
     raw[i] = (int16_t)throw_dice();

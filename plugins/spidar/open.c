@@ -267,6 +267,12 @@ hap_status hapi_spidar_configure(hapi_spidar_device *device, const char *args, h
   return HAP_OK;
 }
 
+void hapi_spidar_forget_home(hapi_spidar_device *device)
+{
+  device->model.calibrated = false;
+  device->model_calibrated = false;
+}
+
 void hapi_spidar_release(hapi_spidar_device *device)
 {
   hapi_spidar_guard_finish(&device->guard);

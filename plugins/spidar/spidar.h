@@ -69,6 +69,9 @@ HAP_NODISCARD hap_status hapi_spidar_configure(hapi_spidar_device *device, const
                                                hap_detail *detail);
 void hapi_spidar_release(hapi_spidar_device *device);
 
+/* [control] At the next start the grip is at home, whatever a file said. Not while it is started. */
+void hapi_spidar_forget_home(hapi_spidar_device *device);
+
 extern const hap_device_ops hapi_spidar_ops;
 
 #endif

@@ -107,7 +107,10 @@ static void take_all(board *b, const hapi_spidar_frame *frame)
       b->current[i] = clip(b, frame->shared[i]);
     } else {
       b->target[i] = frame->shared[i];
-      b->target_velocity[i] = b->mode == BOARD_DIRECT ? frame->shared[kind->motors + i] : 0;
+      b->target_velocity[i] = 0;
+      if (b->mode == BOARD_DIRECT) {
+        b->target_velocity[i] = frame->shared[kind->motors + i];
+      }
     }
   }
 }
@@ -269,6 +272,9 @@ void board_tick(board *b, const int32_t counts[HAPI_SPIDAR_MOTORS])
   for (int i = 0; i < motors; ++i) {
     b->velocity[i] = (int16_t)(counts[i] - b->counts[i]);
     b->counts[i] = counts[i];
-    b->output[i] = b->mode == BOARD_CURRENT ? b->current[i] : control(b, i, motors);
+    b->output[i] = b->current[i];
+    if (b->mode != BOARD_CURRENT) {
+      b->output[i] = control(b, i, motors);
+    }
   }
 }
