@@ -249,8 +249,8 @@ static bool try_set(const hapi_spidar_box_qp *qp, int code, double *x)
 {
   double a[8][8] = {{0.0}};
   double b[8][8] = {{0.0}};
-  int kind[8];
-  int free[8];
+  int kind[8] = {0};
+  int free[8] = {0};
   int count = 0;
   for (int i = 0; i < qp->n; ++i, code /= 3) {
     kind[i] = code % 3;
