@@ -166,7 +166,7 @@ TEST(the_hand_feels_what_was_reached)
   REQUIRE(h.ops->start(h.self) == HAP_OK);
   CHECK(push(&h, 2.0, 1500) == HAP_OK);
   h.ops->held(h.self, &held);
-  CHECK_NEAR(held.force[0], 1.95, 0.06);
+  CHECK_NEAR(held.force[0], 1.91, 0.05); /* not all that was wanted, and said so */
   REQUIRE(emulated_state(&machine, "force", force, 3));
   CHECK_NEAR(force[0], held.force[0], 0.15);
   CHECK_NEAR(force[1], 0.0, 0.05);
