@@ -191,6 +191,7 @@ static void report(bench *b, const setup *s, const figures *f)
 static hap_status run_one(bench *b, setup *s, FILE *csv)
 {
   figures f;
+  memset(&f, 0, sizeof f);
   bool started = start_emulator(s);
   hap_status status =
       started ? measure(b, s, &f) : bench_fail(b, HAP_ERROR_SYSTEM, "line: no spidar-emulator");
