@@ -33,6 +33,7 @@ static const program programs[] = {
      "             NAME: through it in the proxy's place"},
     {"jitter", bench_jitter,
      "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
+    {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},

@@ -176,6 +176,18 @@ TEST(spidar_numerics_hold)
   unlink(file_in_folder("spidar", ".svg"));
 }
 
+/* Its share of late ticks is the machine's; that all were answered is not. */
+TEST(the_line_of_a_spidar_is_measured)
+{
+  const char *const arguments[] = {"line", "--quick", "--verify", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "ok ") == 2);
+  CHECK(count_rows(file_in_folder("line", ".csv"),
+                   "model,boards,realtime,ticks,late,missed,late_share,tick_us_p50,tick_us_p99,"
+                   "tick_us_max") == 2);
+  unlink(file_in_folder("line", ".csv"));
+}
+
 TEST(scaling_leaves_its_table)
 {
   check_program("scaling",
@@ -407,6 +419,7 @@ int main(void)
   RUN(fig7_leaves_its_table);
   RUN(jitter_leaves_its_table);
   RUN(spidar_numerics_hold);
+  RUN(the_line_of_a_spidar_is_measured);
   RUN(scaling_leaves_its_table);
   RUN(poses_are_drawn_within_their_bound);
   RUN(couplings_are_side_by_side);

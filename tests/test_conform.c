@@ -295,7 +295,7 @@ TEST(a_device_that_does_not_open_is_said)
   CHECK(strstr(output, "# module /nowhere/libfoo.so: cannot be opened") != NULL);
   CHECK(strstr(output, "not ok 1 - open\nBail out!") != NULL);
   CHECK(check("no_such_device", NULL) == 1);
-  CHECK(strstr(output, "there are: virtual, replay, module") != NULL);
+  CHECK(strstr(output, "there are: virtual, replay, spidar, module") != NULL);
   CHECK(check(getenv("HAPODE_BROKEN"), NULL) == 1); /* no name before the path */
 }
 

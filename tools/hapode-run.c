@@ -12,6 +12,7 @@
 #include "tools/plot.h"
 #include "tools/rig.h"
 #include "tools/run_black_box.h"
+#include "tools/run_calibrate.h"
 #include "tools/run_identify.h"
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
@@ -251,11 +252,12 @@ static int refuse(const rig *r, hap_status status, const hap_detail *detail)
 }
 
 /* A device that cannot be opened as asked for is wrong usage. */
-static int identify(const run_options *options)
+static int run_alone(const run_options *options,
+                     hap_status (*run)(const run_options *options, FILE *out, hap_detail *detail))
 {
   hap_detail detail = {""};
   run_loop_catch_signals();
-  hap_status status = run_identify(options, stdout, &detail);
+  hap_status status = run(options, stdout, &detail);
   if (status == HAP_OK) {
     return EXIT_GOOD;
   }
@@ -323,7 +325,11 @@ int main(int argc, char **argv)
       if (options.check.spec != NULL) {
         return check_device(&options);
       }
-      return options.identify_path != NULL ? identify(&options) : run_session(&options);
+      if (options.calibrate_path != NULL) {
+        return run_alone(&options, run_calibrate);
+      }
+      return options.identify_path != NULL ? run_alone(&options, run_identify)
+                                           : run_session(&options);
   }
   return EXIT_GOOD;
 }

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "device/device.h"
+
 void rig_options_init(rig_options *options)
 {
   memset(options, 0, sizeof *options);
@@ -52,6 +54,26 @@ static hap_status take_identity(const char *path, hap_device *device, hap_detail
   return status < HAP_OK ? status : hap_device_set_identity(device, &identity, detail);
 }
 
+/* A device of hardware has its own frame: its origin is put where the scene's own hand begins. */
+static void place_device(const hap_device *device, const char *hand, hap_pose *out)
+{
+  hap_device *scenes_own = NULL;
+  hap_twist twist;
+  uint32_t buttons;
+  if (hapi_device_ops(device)->pacing == HAP_PACING_VIRTUAL || hand == NULL ||
+      hap_device_open(hand, &scenes_own, NULL) < HAP_OK) {
+    return;
+  }
+  const hap_device_ops *ops = hapi_device_ops(scenes_own);
+  void *self = hapi_device_self(scenes_own);
+  hap_pose pose;
+  if (ops->start(self) >= HAP_OK && ops->read(self, 0, &pose, &twist, &buttons) >= HAP_OK) {
+    memcpy(out->position, pose.position, sizeof out->position);
+  }
+  ops->stop(self);
+  hap_device_close(scenes_own);
+}
+
 static void set_tool(const double edges[3], double out[8][3])
 {
   for (int i = 0; i < 8; ++i) {
@@ -82,6 +104,8 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
     return status;
   }
   def.device = r->devices[index];
+  const char *hand = index < (size_t)p->pointers ? p->hands[index] : NULL;
+  place_device(def.device, hand, &def.pose_world_device);
   double hull[8][3];
   def.radius = p->radius;
   if (p->tool[0] > 0.0) {

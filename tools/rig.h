@@ -4,7 +4,7 @@
 #define HAPODE_TOOLS_RIG_H
 
 /* A scene with a session over it and its pointers: what hapode-run, hapode-bench and the tests set
- * up alike. Public API only. */
+ * up alike. */
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>

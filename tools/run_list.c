@@ -2,6 +2,9 @@
  * SPDX-License-Identifier: MIT */
 #include "tools/run_list.h"
 
+#include <string.h>
+
+#include "device/device.h"
 #include "scenes/scenes.h"
 #include "tools/run_effects.h"
 
@@ -49,6 +52,26 @@ static void print_scene(const scene_parameters *p, FILE *out)
   }
 }
 
+/* Of hardware: whether it is there, and else why it cannot be used. */
+static void print_device(const char *name, const char *text, FILE *out)
+{
+  const hap_device_ops *ops = hapi_registry_find(name, strlen(name));
+  hap_device *device = NULL;
+  hap_device_info info;
+  hap_detail detail = {""};
+  fprintf(out, "  %-12s %s\n", name, text != NULL ? text : "");
+  if (ops == NULL || ops->pacing == HAP_PACING_VIRTUAL) {
+    return;
+  }
+  if (hap_device_open(name, &device, &detail) < HAP_OK) {
+    fprintf(out, "%15snot usable now: %s\n", "", detail.text);
+    return;
+  }
+  (void)hap_device_get_info(device, &info, sizeof info);
+  fprintf(out, "%15sthere is one: %s, %g N\n", "", info.name, info.max_force);
+  hap_device_close(device);
+}
+
 void run_list_print(FILE *out)
 {
   const scene_parameters *p;
@@ -64,7 +87,7 @@ void run_list_print(FILE *out)
   }
   fputs("\ndevices:\n", out);
   for (size_t i = 0; (name = hap_device_name_at(i, &text)) != NULL; ++i) {
-    fprintf(out, "  %-12s %s\n", name, text != NULL ? text : "");
+    print_device(name, text, out);
   }
   fputs("\neffects (in most the model decides; auto is always right):\n", out);
   run_effects_list(out);

@@ -235,6 +235,10 @@ static const option table[] = {
      "no session: moves the one --device, which nobody must hold, finds its\n"
      "mass, damping, friction, delay and quantum and writes them to FILE",
      take_text, offsetof(run_options, identify_path), 0, 0},
+    {"--calibrate", "FILE",
+     "no session: a person holds the grip of the one --device, a spidar, at its\n"
+     "home and presses Enter; its model with that home is written to FILE",
+     take_text, offsetof(run_options, calibrate_path), 0, 0},
     {"--reconnect", NULL,
      "a device that was lost is started again until it answers; then the force\n"
      "comes back over 20 ms (default: a lost device ends the run)",
@@ -465,6 +469,22 @@ static hap_status check_recording(const run_options *o, hap_detail *detail)
   return HAP_OK;
 }
 
+static hap_status check_calibrate(const run_options *o, hap_detail *detail)
+{
+  if (o->calibrate_path == NULL) {
+    return HAP_OK;
+  }
+  if (o->identify_path != NULL || o->check.spec != NULL || o->record_path != NULL ||
+      o->play_path != NULL) {
+    return fail(detail, "--calibrate: not with --identify, --check-device, --record or --play");
+  }
+  if (o->rig.device_count != 1) {
+    return fail(detail, "--calibrate: takes exactly one --device, there are %zu",
+                o->rig.device_count);
+  }
+  return HAP_OK;
+}
+
 /* What only several options together can get wrong. */
 static hap_status check(run_options *o, hap_detail *detail)
 {
@@ -500,8 +520,9 @@ static hap_status check(run_options *o, hap_detail *detail)
     return fail(detail, "--identify: takes exactly one --device, there are %zu",
                 o->rig.device_count);
   }
-  if (check_recording(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
-      join_coupling(o, detail) < HAP_OK || join_friction(o, detail) < HAP_OK) {
+  if (check_calibrate(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
+      join_recording(o, detail) < HAP_OK || join_coupling(o, detail) < HAP_OK ||
+      join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {

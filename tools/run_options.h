@@ -28,8 +28,9 @@ typedef struct run_options {
   const char *trace_path;
   const char *plot_path;
   const char *black_box_path;
-  const char *identify_path; /* not NULL: identify the device, no session */
-  conform_options check;     /* spec not NULL: check that device, no session */
+  const char *identify_path;  /* not NULL: identify the device, no session */
+  const char *calibrate_path; /* not NULL: calibrate the device, no session */
+  conform_options check;      /* spec not NULL: check that device, no session */
   run_effects effects;
   const char *record_path;
   double record_limit_mib; /* 0: the default */

@@ -87,6 +87,11 @@ typedef struct hap_device_ops {
   /* Optional, NULL or beyond size: what the motors were told last; zero where they are off. Called by
    * the thread that writes, or when none does, from open to close. For checks. */
   void (*held)(void *self, hap_wrench *out);
+
+  /* Optional, NULL or beyond size: why start, read or write failed last, in one sentence that says what
+   * to do; out arrives empty and stays so when nothing failed. Any thread, from open to close, at the same
+   * time as any other operation; never blocks. */
+  void (*explain)(void *self, hap_detail *out);
 } hap_device_ops;
 
 /* The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is the

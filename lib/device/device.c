@@ -249,6 +249,16 @@ const hap_device_info *hapi_device_info(const hap_device *device)
   return &device->info;
 }
 
+void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out)
+{
+  out->text[0] = '\0';
+  if (ops->size >= offsetof(hap_device_ops, explain) + sizeof ops->explain &&
+      ops->explain != NULL) {
+    ops->explain(self, out);
+    out->text[sizeof out->text - 1] = '\0';
+  }
+}
+
 bool hapi_device_claim(hap_device *device)
 {
   unsigned nobody = 0;

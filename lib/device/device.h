@@ -37,6 +37,9 @@ void *hapi_device_self(const hap_device *device);
 /* [any] Lives as long as the device. */
 const hap_device_info *hapi_device_info(const hap_device *device);
 
+/* [any] What the device says of its last failure; "" when it says nothing. */
+void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out);
+
 /* [control] A pointer takes the device; false when another one has it or it was closed. */
 HAP_NODISCARD bool hapi_device_claim(hap_device *device);
 

@@ -6,12 +6,14 @@
 #include "device/module.h"
 
 /* Declared here and not in a header of the plugin: a device sees the library, never the other way
- * round, and these two names are all that the library knows of them. */
+ * round, and these names are all that the library knows of them. */
 extern const hap_device_ops hapi_virtual_ops;
 extern const hap_device_ops hapi_replay_ops;
+extern const hap_device_ops hapi_spidar_ops;
 
 /* A list and not self-registration: constructors would be lost in a static library. */
-static const hap_device_ops *const built_in[] = {&hapi_virtual_ops, &hapi_replay_ops};
+static const hap_device_ops *const built_in[] = {&hapi_virtual_ops, &hapi_replay_ops,
+                                                 &hapi_spidar_ops};
 
 const hap_device_ops *hapi_registry_at(size_t index)
 {

@@ -58,6 +58,8 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *d
                                    hap_pointer_id *out, hap_detail *detail);
 hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
 hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail);
+/* [any] What the pointer's device says of its last failure; "" when it says nothing. */
+void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);

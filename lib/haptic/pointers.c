@@ -315,7 +315,10 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
                      slot->ops->name);
   }
   if (slot->ops->start(slot->self) < HAP_OK) {
-    return hapi_fail(detail, HAP_ERROR_DEVICE, "device %s did not start", slot->ops->name);
+    hap_detail why;
+    hapi_device_explain(slot->ops, slot->self, &why);
+    return hapi_fail(detail, HAP_ERROR_DEVICE, "device %s did not start%s%.400s", slot->ops->name,
+                     why.text[0] != '\0' ? ": " : "", why.text);
   }
   if (!hapi_emergency_add(slot->ops, slot->self)) {
     slot->ops->zero(slot->self);
@@ -512,10 +515,26 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   leave_loop(haptic, slot, HAPI_POINTER_LEAVING);
   stop_device(slot);
   if (slot->def.device != NULL) {
+    pthread_mutex_lock(&slot->target_lock); /* nobody is asking it to explain itself */
     hapi_device_release(slot->def.device);
+    pthread_mutex_unlock(&slot->target_lock);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
   return HAP_OK;
+}
+
+void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out)
+{
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  out->text[0] = '\0';
+  if (slot == NULL) {
+    return;
+  }
+  pthread_mutex_lock(&slot->target_lock);
+  if (find_slot(haptic, id) == slot && slot->ops != NULL) { /* not removed in between */
+    hapi_device_explain(slot->ops, slot->self, out);
+  }
+  pthread_mutex_unlock(&slot->target_lock);
 }
 
 /* Not in the loop's thread: start may block. */

@@ -11,7 +11,6 @@
 #include "device/emergency.h"
 
 #define SHARE 0.05       /* of the device's own limits that the small force may be */
-#define TORQUE_ARM 0.01  /* m: small torque by small force */
 #define GRAIN 1e-6       /* N, N m: below it is no force */
 #define TRAVEL_MOST 0.05 /* m, under the small force, from where it began */
 
@@ -259,7 +258,7 @@ hap_wrench conform_small(const conform *c, int axis, double sign)
 {
   hap_wrench small = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   double force = c->options->force;
-  double torque = TORQUE_ARM * force;
+  double torque = CONFORM_TORQUE_ARM * force;
   if (c->info.max_force > 0.0) {
     force = fmin(force, SHARE * c->info.max_force);
   }

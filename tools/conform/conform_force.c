@@ -31,6 +31,10 @@ static bool is_plausible(const hap_wrench *wanted, const hap_wrench *reached, ha
   double norm = 0.0;
   flatten(wanted, w);
   flatten(reached, r);
+  for (int i = 3; i < 6; ++i) { /* as forces, so that both kinds can be compared */
+    w[i] /= CONFORM_TORQUE_ARM;
+    r[i] /= CONFORM_TORQUE_ARM;
+  }
   for (int i = 0; i < 6; ++i) {
     along += w[i] * r[i];
     square += w[i] * w[i];

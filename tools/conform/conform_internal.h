@@ -121,6 +121,8 @@ bool conform_is_zero(const hap_wrench *wrench);
 /* Fails the point when the device says that it holds a force; when says in which case. */
 void conform_expect_none(conform *c, const char *when);
 
+#define CONFORM_TORQUE_ARM 0.01 /* m: small torque by small force */
+
 /* Of the small force along axis 0..2, or of the small torque about axis 3..5. */
 hap_wrench conform_small(const conform *c, int axis, double sign);
 int conform_axes(const conform *c); /* 3 or 6 */

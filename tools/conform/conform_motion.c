@@ -13,6 +13,7 @@
 #define WINDOW 20u
 #define GRAIN 1e-6      /* m, of a window */
 #define GRAIN_TURN 1e-4 /* rad */
+#define TURN_ARM 0.02   /* m, on which a device may measure turning by its quantum */
 #define PAUSE_S 0.4
 
 /* ---- a record at rest ---- */
@@ -184,7 +185,7 @@ void conform_twist_fits(conform *c)
     judge_fit(c, &way, GRAIN + 2.0 * c->info.quantum, "metres");
   }
   if (turn.speed > 0.0 || turned) {
-    judge_fit(c, &turn, GRAIN_TURN, "radians");
+    judge_fit(c, &turn, GRAIN_TURN + 2.0 * c->info.quantum / TURN_ARM, "radians");
   }
   if (!c->failed && !moved && !turned) {
     conform_skip(c, "it did not move: nothing to compare");

@@ -1,0 +1,77 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PLUGINS_SPIDAR_SPIDAR_H
+#define HAPODE_PLUGINS_SPIDAR_SPIDAR_H
+
+/* The device: open.c finds the port and the boards and reads the arguments, spidar.c does the ticks. */
+
+#include <hapode/device_impl.h>
+
+#include "plugins/spidar/calibration.h"
+#include "plugins/spidar/guard.h"
+#include "plugins/spidar/rates.h"
+#include "plugins/spidar/serial.h"
+#include "plugins/spidar/tensions.h"
+
+/* Why the device does not work. */
+typedef enum hapi_spidar_cause {
+  HAPI_SPIDAR_WELL,
+  HAPI_SPIDAR_HUNG_UP,     /* the port is gone */
+  HAPI_SPIDAR_SILENT,      /* no whole answer for longer than the timeout */
+  HAPI_SPIDAR_JUMPED,      /* positions that no string can have reached */
+  HAPI_SPIDAR_MISFIT,      /* lengths that fit no pose, with all strings taut */
+  HAPI_SPIDAR_STALLED,     /* the guard took the force off */
+  HAPI_SPIDAR_NOT_OPENED,  /* start: the port does not open, or no board answers */
+  HAPI_SPIDAR_OTHER_BOARDS /* start: not the boards that it was opened with */
+} hapi_spidar_cause;
+
+typedef struct hapi_spidar_device {
+  hapi_spidar_serial serial;
+  hapi_spidar_guard guard;
+  hapi_spidar_boards boards;
+  hapi_spidar_line line;
+  hapi_spidar_model model;
+  bool model_calibrated; /* by a file: else the grip is taken to be at home at the first start */
+
+  /* Arguments. */
+  double timeout; /* s, of silence */
+  double stall;   /* s, without a write, until the guard takes the force off; 0: no guard */
+  double max_force;
+  double max_torque;
+  double offset[3]; /* where the model's origin is in the device's frame */
+  double rotate[4]; /* the model's axes in it */
+
+  uint8_t zeros[HAPI_SPIDAR_ZEROS_MAX]; /* takes the force off; never changes after open */
+  int zero_count;
+
+  /* Ticks. */
+  bool running;
+  bool asked;         /* a command went out since the newest read */
+  atomic_bool zeroed; /* raised by zero, lowered by write */
+  _Atomic int cause;  /* hapi_spidar_cause, of now */
+  _Atomic int told;   /* of the last failure since start, which may be over */
+  hapi_spidar_solver solver;
+  hapi_spidar_rates rates;
+  hap_twist twist; /* of the grip, frame of the model */
+  double poor;     /* s, when the lengths began to fit no pose; < 0: they do */
+  double taut;     /* s, when the strings began to be pulled after a zero */
+  hapi_spidar_tensions tensions;
+  hapi_spidar_heat heat;
+  double written; /* s, of the newest write; < 0: the strings had no tension before */
+  int16_t current[HAPI_SPIDAR_STRINGS_MAX];
+  double rest[HAPI_SPIDAR_STRINGS_MAX]; /* counts of current, that rounding left over */
+  hap_wrench held;                      /* in the device's frame */
+} hapi_spidar_device;
+
+/* [control] open.c: reads the arguments, finds port and boards. On failure everything is to be closed by
+ * hapi_spidar_release. */
+HAP_NODISCARD hap_status hapi_spidar_configure(hapi_spidar_device *device, const char *args,
+                                               hap_detail *detail);
+void hapi_spidar_release(hapi_spidar_device *device);
+
+/* [control] At the next start the grip is at home, whatever a file said. Not while it is started. */
+void hapi_spidar_forget_home(hapi_spidar_device *device);
+
+extern const hap_device_ops hapi_spidar_ops;
+
+#endif

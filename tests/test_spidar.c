@@ -1,0 +1,440 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The device spidar on a pseudo-terminal with an emulator behind it. Time is real here: everything waits
+ * until it has happened, generously, and nothing asks how long it took. */
+
+#include "tests/tap.h"
+
+#include <stdint.h>
+
+#include <hapode/hapode.h>
+
+#include "base/clock.h"
+#include "base/vec.h"
+#include "device/device.h"
+#include "tests/spidar_rig.h"
+#include "tools/rig.h"
+
+static emulated machine;
+
+/* A device, driven by hand. */
+typedef struct hands {
+  hap_device *device;
+  const hap_device_ops *ops;
+  void *self;
+  hap_pose pose;
+} hands;
+
+static bool open_device(hands *h, const char *arguments, hap_detail *detail)
+{
+  char spec[500];
+  snprintf(spec, sizeof spec, "spidar:%s%s", machine.port, arguments);
+  if (hap_device_open(spec, &h->device, detail) < HAP_OK) {
+    return false;
+  }
+  h->ops = hapi_device_ops(h->device);
+  h->self = hapi_device_self(h->device);
+  return true;
+}
+
+static hap_status read_once(hands *h)
+{
+  hap_twist twist;
+  uint32_t buttons;
+  return h->ops->read(h->self, hapi_clock_now(), &h->pose, &twist, &buttons);
+}
+
+/* Ticks with that force; the first error, or HAP_OK. */
+static hap_status push(hands *h, double x, int ticks)
+{
+  const hap_wrench wanted = {{x, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  for (int i = 0; i < ticks; ++i) {
+    hap_wrench reached;
+    hapi_clock_sleep_until(hapi_clock_now() + 1000000);
+    hap_status status = read_once(h);
+    if (status >= HAP_OK) {
+      status = h->ops->write(h->self, &wanted, &reached);
+    }
+    if (status < HAP_OK) {
+      return status;
+    }
+  }
+  return HAP_OK;
+}
+
+/* Reads until one gives that; false: none does. */
+static bool await_status(hands *h, hap_status wanted)
+{
+  double end = emulated_clock() + 20.0;
+  while (emulated_clock() < end) {
+    if (read_once(h) == wanted) {
+      return true;
+    }
+    emulated_sleep(1e-3);
+  }
+  return false;
+}
+
+static bool explains(const hands *h, const char *word)
+{
+  hap_detail why = {""};
+  hapi_device_explain(h->ops, h->self, &why);
+  if (strstr(why.text, word) == NULL) {
+    printf("# it says \"%s\"\n", why.text);
+    return false;
+  }
+  return true;
+}
+
+/* ---- specs ---- */
+
+TEST(wrong_arguments_are_refused_before_a_port_is_touched)
+{
+  static const struct {
+    const char *spec;
+    const char *word;
+  } rows[] = {{"spidar:/no/such/port", "is it plugged in"},
+              {"spidar:/dev/null", "not a serial port"},
+              {"spidar:/dev/null,", "last comma"},
+              {"spidar:/dev/null,modle=x4r", "modle"},
+              {"spidar:/dev/null,model=x9", "there is no model 'x9'"},
+              {"spidar:/dev/null,model=./nothing.txt", "nothing.txt"},
+              {"spidar:model=x9", "there is no model 'x9'"},
+              {"spidar:/dev/null,timeout=0", "timeout"},
+              {"spidar:/dev/null,stall=0.01", "stall"},
+              {"spidar:/dev/null,rotate=0/0/0/0", "rotate"},
+              {"spidar:/dev/null,offset=1/2", "offset"},
+              {"spidar:/dev/null,max_force=-1", "max_force"}};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    hap_device *device = NULL;
+    hap_detail detail = {""};
+    CHECK(hap_device_open(rows[i].spec, &device, &detail) < HAP_OK && device == NULL);
+    if (strstr(detail.text, rows[i].word) == NULL) {
+      printf("# %s: %s\n", rows[i].spec, detail.text);
+    }
+    CHECK(strstr(detail.text, rows[i].word) != NULL);
+  }
+}
+
+TEST(the_port_is_found_and_is_for_one_alone)
+{
+  hap_device *device = NULL;
+  hap_device *second = NULL;
+  hap_device_info info;
+  hap_detail detail = {""};
+  setenv("HAPODE_SPIDAR_PORT", machine.port, 1);
+  CHECK(hap_device_open("spidar", &device, &detail) == HAP_OK);
+  if (device == NULL) {
+    printf("# %s\n", detail.text);
+    return;
+  }
+  REQUIRE(hap_device_get_info(device, &info, sizeof info) == HAP_OK);
+  CHECK(strcmp(info.name, "spidar-x4r") == 0 && info.dof == 6);
+  CHECK(info.max_force > 5.0 && info.max_force < 40.0 && info.max_torque > 0.05);
+  CHECK(hap_device_open("spidar", &second, &detail) < HAP_OK);
+  CHECK(strstr(detail.text, "in use") != NULL);
+  unsetenv("HAPODE_SPIDAR_PORT");
+  hap_device_close(device);
+}
+
+TEST(boards_that_do_not_fit_are_named)
+{
+  hands h;
+  hap_detail detail = {""};
+  REQUIRE(emulated_tell(&machine, "report 0 B3F"));
+  CHECK(!open_device(&h, "", &detail));
+  CHECK(strstr(detail.text, "B3F 0, B3M 1") != NULL);
+  CHECK(!open_device(&h, ",model=x4r", &detail));
+  CHECK(strstr(detail.text, "7 motors") != NULL && strstr(detail.text, "8 strings") != NULL);
+  REQUIRE(emulated_tell(&machine, "report 0 B3M"));
+  REQUIRE(emulated_tell(&machine, "silent all 1"));
+  CHECK(!open_device(&h, "", &detail));
+  CHECK(strstr(detail.text, "no motor board answers") != NULL);
+  REQUIRE(emulated_tell(&machine, "silent all 0"));
+}
+
+/* ---- force ---- */
+
+TEST(the_hand_feels_what_was_reached)
+{
+  hands h;
+  hap_wrench held;
+  double force[3];
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, ",timeout=5,rotate=1/0/0/0", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 2.0, 1500) == HAP_OK);
+  h.ops->held(h.self, &held);
+  CHECK_NEAR(held.force[0], 1.91, 0.05); /* not all that was wanted, and said so */
+  REQUIRE(emulated_state(&machine, "force", force, 3));
+  CHECK_NEAR(force[0], held.force[0], 0.15);
+  CHECK_NEAR(force[1], 0.0, 0.05);
+  CHECK_NEAR(h.pose.position[0], 2.0 / 150.0, 2e-3); /* the hand's spring gave way */
+  CHECK(push(&h, 0.0, 10) == HAP_OK);
+  h.ops->zero(h.self);
+  CHECK(emulated_await(&machine, true));
+  h.ops->held(h.self, &held);
+  CHECK(hapi_v3_norm(held.force) == 0.0);
+  CHECK(push(&h, 2.0, 10) == HAP_OK);
+  CHECK(emulated_await(&machine, false));
+  h.ops->stop(h.self);
+  CHECK(emulated_await(&machine, true));
+  hap_device_close(h.device);
+}
+
+/* x to the right, y away from the user, z up: the makers' z comes towards the user, their y is up. */
+TEST(the_frame_has_z_up)
+{
+  hands h;
+  double place[3];
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, ",timeout=5,offset=1/0/0", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  REQUIRE(emulated_tell(&machine, "push 0 3 1.5"));
+  CHECK(push(&h, 0.0, 1500) == HAP_OK);
+  REQUIRE(emulated_state(&machine, "position", place, 3));
+  CHECK(place[1] > 0.015);
+  CHECK_NEAR(h.pose.position[0], 1.0 + place[0], 2e-3);
+  CHECK_NEAR(h.pose.position[1], -place[2], 2e-3);
+  CHECK_NEAR(h.pose.position[2], place[1], 2e-3);
+  CHECK_NEAR(fabs(h.pose.quat_wxyz[0]), 1.0, 1e-3);
+  REQUIRE(emulated_tell(&machine, "push 0 0 0"));
+  CHECK(push(&h, 0.0, 500) == HAP_OK);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+}
+
+/* ---- home ---- */
+
+/* The file of a calibration tells where the grip is when a start does not find it at home. */
+TEST(a_home_that_was_told_holds_until_the_boards_are_switched_off)
+{
+  hands h;
+  char command[600];
+  char file[128];
+  char argument[300];
+  double place[3];
+  hap_detail detail = {""};
+  snprintf(file, sizeof file, "%s/home.txt", machine.folder);
+  snprintf(command, sizeof command,
+           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1",
+           getenv("HAPODE_RUN"), file, machine.port, machine.folder);
+  REQUIRE(system(command) == 0);
+  snprintf(argument, sizeof argument, ",timeout=5,rotate=1/0/0/0,model=%s", file);
+  REQUIRE(open_device(&h, argument, &detail));
+  REQUIRE(emulated_tell(&machine, "push 2.4 0 0")); /* away from home before it is started */
+  emulated_sleep(1.0);
+  CHECK(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 0.0, 300) == HAP_OK);
+  REQUIRE(emulated_state(&machine, "position", place, 3));
+  CHECK(place[0] > 0.01);
+  CHECK_NEAR(h.pose.position[0], place[0], 1e-3);
+  REQUIRE(emulated_tell(&machine, "push 0 0 0"));
+  CHECK(push(&h, 0.0, 500) == HAP_OK);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+  unlink(file);
+  snprintf(file, sizeof file, "%s/out", machine.folder);
+  unlink(file);
+}
+
+/* ---- what goes wrong ---- */
+
+TEST(boards_that_are_silent_fail_and_come_back_by_themselves)
+{
+  hands h;
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, ",timeout=0.3", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  REQUIRE(await_status(&h, HAP_OK));
+  hapi_device_explain(h.ops, h.self, &detail);
+  CHECK(detail.text[0] == '\0');
+  REQUIRE(emulated_tell(&machine, "silent 1 1"));
+  CHECK(await_status(&h, HAP_ERROR_DEVICE));
+  CHECK(explains(&h, "no whole answer"));
+  REQUIRE(emulated_tell(&machine, "silent 1 0"));
+  CHECK(await_status(&h, HAP_OK));
+  h.ops->stop(h.self);
+  hap_device_close(h.device);
+}
+
+TEST(a_cable_is_pulled_and_put_in_again)
+{
+  hands h;
+  hap_detail detail = {""};
+  char line[128];
+  REQUIRE(open_device(&h, ",timeout=5", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 1.0, 20) == HAP_OK);
+  REQUIRE(emulated_tell(&machine, "unplug"));
+  CHECK(await_status(&h, HAP_ERROR_DEVICE));
+  CHECK(explains(&h, "cable"));
+  CHECK(push(&h, 1.0, 1) == HAP_ERROR_DEVICE);
+  h.ops->stop(h.self);
+  CHECK(h.ops->start(h.self) == HAP_ERROR_DEVICE);
+  CHECK(explains(&h, "does not open"));
+  CHECK(read_once(&h) == HAP_ERROR_STATE);
+  REQUIRE(emulated_tell(&machine, "plug"));
+  REQUIRE(emulated_line(&machine, "port: ", line, sizeof line));
+  CHECK(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 1.0, 20) == HAP_OK);
+  h.ops->stop(h.self);
+  CHECK(emulated_await(&machine, true));
+  hap_device_close(h.device);
+}
+
+/* ---- the guard ---- */
+
+/* Ends as the process that drives the device ends. */
+static void die_with_force(int number)
+{
+  pid_t child = fork();
+  if (child == 0) {
+    hands h;
+    hap_detail detail = {""};
+    if (!open_device(&h, ",timeout=10", &detail) || h.ops->start(h.self) < HAP_OK) {
+      _exit(1);
+    }
+    for (;;) {
+      (void)push(&h, 3.0, 100);
+    }
+  }
+  CHECK(emulated_await(&machine, false));
+  emulated_sleep(0.5); /* beyond start, whose tensions are currents, too */
+  CHECK(!emulated_is_limp(&machine));
+  CHECK(kill(child, number) == 0);
+  int status = 0;
+  CHECK(waitpid(child, &status, 0) == child && WIFSIGNALED(status) && WTERMSIG(status) == number);
+  CHECK(emulated_await(&machine, true));
+}
+
+TEST(a_process_that_is_killed_leaves_no_force)
+{
+  die_with_force(SIGKILL);
+  die_with_force(SIGTERM);
+  hands h;
+  hap_detail detail = {""};
+  CHECK(open_device(&h, "", &detail)); /* the guard has let go of the port */
+  hap_device_close(h.device);
+}
+
+TEST(a_loop_that_hangs_leaves_no_force)
+{
+  hands h;
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, ",timeout=5,stall=0.4", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 3.0, 50) == HAP_OK);
+  CHECK(emulated_await(&machine, true)); /* nobody wrote in the meantime */
+  CHECK(push(&h, 3.0, 1) == HAP_ERROR_DEVICE);
+  CHECK(explains(&h, "guard"));
+  CHECK(emulated_is_limp(&machine));
+  h.ops->stop(h.self);
+  CHECK(h.ops->start(h.self) == HAP_OK);
+  CHECK(push(&h, 1.0, 10) == HAP_OK);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+}
+
+/* ---- a whole session ---- */
+
+typedef struct felt {
+  double most;  /* N, that was asked for */
+  double asked; /* N, sums of samples in which the force was more than 2 N */
+  double given; /* N, at the grip */
+  int samples;
+} felt;
+
+/* The force on the pointer against that of the strings, while the emulated hand pushes the row. */
+static void compare(rig *r, felt *out)
+{
+  hap_pointer_state state;
+  double force[3];
+  if (hap_pointer_get(r->session, r->pointers[0], &state, sizeof state) < HAP_OK ||
+      !emulated_state(&machine, "force", force, 3)) {
+    return;
+  }
+  double asked = -state.wrench.force[0];
+  out->most = fmax(out->most, asked);
+  if (asked > 2.0) {
+    out->asked += asked;
+    out->given -= force[0];
+    ++out->samples;
+  }
+}
+
+TEST(a_row_of_cubes_is_felt)
+{
+  rig r;
+  rig_options options;
+  hap_detail detail = {""};
+  char spec[300];
+  felt seen = {0.0, 0.0, 0.0, 0};
+  hap_stats stats;
+  REQUIRE(emulated_tell(&machine, "hand push"));
+  snprintf(spec, sizeof spec, "spidar:%s,timeout=5,stall=10", machine.port);
+  rig_options_init(&options);
+  options.devices[0] = spec;
+  options.device_count = 1;
+  dInitODE2(0);
+  hap_status status = rig_create(&options, &r, &detail);
+  if (status < HAP_OK) {
+    printf("# %s\n", detail.text);
+  }
+  REQUIRE(status >= HAP_OK);
+  REQUIRE(hap_session_start(r.session) >= HAP_OK);
+  double end = emulated_clock() + 60.0;
+  do {
+    emulated_sleep(5e-3);
+    compare(&r, &seen);
+    REQUIRE(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+  } while (seen.samples < 200 && stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
+  if (stats.fault != HAP_FAULT_NONE) {
+    (void)hap_session_detail(r.session, &detail);
+    printf("# %s\n", detail.text);
+  }
+  const dReal *first = dBodyGetPosition(r.scene->bodies[0]);
+  printf("# at most %.2f N asked, %d samples: mean %.3f N asked, %.3f N given, row at %.4f m\n",
+         seen.most, seen.samples, seen.asked / seen.samples, seen.given / seen.samples, first[0]);
+  CHECK(stats.fault == HAP_FAULT_NONE && seen.samples == 200);
+  CHECK(seen.most > 3.0); /* ten cubes of 0.1 kg on mu 0.5 move at 4.9 N */
+  CHECK_NEAR(seen.given / seen.asked, 0.98, 0.08);
+  REQUIRE(emulated_tell(&machine, "unplug"));
+  end = emulated_clock() + 20.0;
+  do {
+    emulated_sleep(5e-3);
+    (void)hap_session_stats(r.session, &stats, sizeof stats);
+  } while (stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
+  CHECK(stats.fault == HAP_FAULT_DEVICE_READ || stats.fault == HAP_FAULT_DEVICE_WRITE);
+  CHECK(hap_session_detail(r.session, &detail) == HAP_OK && strstr(detail.text, "cable") != NULL);
+  CHECK(hap_pointer_restart(r.session, r.pointers[0]) < HAP_OK);
+  CHECK(hap_session_detail(r.session, &detail) == HAP_OK && strstr(detail.text, "open") != NULL);
+  hap_session_stop(r.session);
+  rig_destroy(&r);
+  dCloseODE();
+}
+
+int main(void)
+{
+  static const char *const arguments[] = {"--hand", "hold", "--first-count", "32700", "--fifo",
+                                          "40",     NULL};
+  signal(SIGPIPE, SIG_IGN);
+  if (!emulated_start(&machine, arguments)) {
+    printf("1..0 # SKIP no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR\n");
+    return 0;
+  }
+  RUN(wrong_arguments_are_refused_before_a_port_is_touched);
+  RUN(the_port_is_found_and_is_for_one_alone);
+  RUN(boards_that_do_not_fit_are_named);
+  RUN(the_hand_feels_what_was_reached);
+  RUN(the_frame_has_z_up);
+  RUN(a_home_that_was_told_holds_until_the_boards_are_switched_off);
+  RUN(boards_that_are_silent_fail_and_come_back_by_themselves);
+  RUN(a_cable_is_pulled_and_put_in_again);
+  RUN(a_process_that_is_killed_leaves_no_force);
+  RUN(a_loop_that_hangs_leaves_no_force);
+  RUN(a_row_of_cubes_is_felt);
+  emulated_stop(&machine);
+  return tap_done();
+}
