@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "haptic/rt/contact_solver.h"
 #include "tests/tick_world.h"
 
 #define K 1000.0
@@ -151,8 +152,45 @@ TEST(what_rolls_does_not_slide)
   }
 }
 
+/* What one row's impulse does to another is what that one's does to it: else they make energy. */
+TEST(all_rows_of_a_measured_body_answer_by_one_matrix)
+{
+  set_up();
+  f.model->model = HAP_MODEL_CONTACT;
+  hapi_tick_pointer *p = add_pointer(0, -RADIUS + 0.001, 0.0, 0.0);
+  p->turns = true;
+  p->finger_radius = 0.005;
+  begin_model();
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_MEASURED | HAPI_BODY_WHOLE;
+  body->pose.position[1] = 0.03; /* an arm */
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      body->response[i][k] =
+          (i == k ? 2.0 : 0.1 / (1.0 + i + k)) * (i < 3 ? 1.0 : 30.0) * (k < 3 ? 1.0 : 30.0);
+    }
+  }
+  add_contact(0, 0, 0)->mu = MU; /* whose own probes say something else */
+  adopt();
+  run(1);
+  for (int i = 0; i < 20; ++i) {
+    put(p, -RADIUS + 0.001, 1e-5 * i, -2e-5 * i);
+    run(1);
+  }
+  const hapi_solver *solver = &f.tick.world.solver;
+  CHECK(solver->row_count == 4);
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    for (uint32_t k = 0; k < i; ++k) {
+      double there = hapi_dot6(solver->rows[i].ja, solver->rows[k].ba);
+      double back = hapi_dot6(solver->rows[k].ja, solver->rows[i].ba);
+      CHECK_NEAR(there, back, 1e-12 * (fabs(there) + fabs(back) + 1.0));
+    }
+  }
+}
+
 int main(void)
 {
+  RUN(all_rows_of_a_measured_body_answer_by_one_matrix);
   RUN(what_rolls_does_not_slide);
   RUN(what_sticks_does_not_creep_in_a_million_ticks);
   hapi_exchange_destroy(f.exchange);

@@ -360,7 +360,7 @@ static void set_friction_columns(const hapi_local_contact *contact, const placed
     hapi_v3_madd(row->ja + 3, p->finger_radius * axis[3], at->normal, row->ja + 3);
     hapi_row_response(at->body, row->ja, row->ba);
   }
-  if (contact->tool == 0 && at->body != NULL && (at->body->flags & HAPI_BODY_MEASURED) != 0) {
+  if (contact->tool == 0 && has_own_probes(at->body)) {
     hapi_v3_sub(f->at, at->point, arm);
     hapi_v3_cross(arm, axis, couple + 3);
     hapi_v3_madd(couple + 3, p->finger_radius * axis[3], at->normal, couple + 3);
