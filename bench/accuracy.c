@@ -20,7 +20,12 @@
  *                  run at 1.3 times that rate has there; 0 when contact is shorter than 4 steps
  *   rest_share     of the ticks with contact, those in which no hand moves
  *   start_um       the worst start
- *   torque_*       as force_rel_rms and noise_floor, of the torque; 0: the hands feel none */
+ *   torque_*       as force_rel_rms and noise_floor, of the torque; 0: the hands feel none
+ *   joint_*        the widest any joint opens at any tick, from anchor to anchor, and of those that slide
+ *                  across the axis; 0: no joints. open: between bodies that the loop moves, in the loop;
+ *                  world: of the same in ODE's world; left: there, of the others, which ODE alone
+ *                  moves; floor: in the world of the references; turn: of axes, or of bodies that
+ *                  cannot turn, the largest of open and world */
 
 #include <math.h>
 #include <string.h>
@@ -33,11 +38,14 @@
 #define POSE_MAX_BOUND 5e-3
 #define LINE_BOUND_N 5e-3
 #define LINE_BOUND 0.002 /* of the force */
+#define JOINT_BOUND 1e-4
+#define DEGREES (180.0 / M_PI)
 
 static const char header[] =
     "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms,"
     "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,pose_median_mm,"
-    "force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor";
+    "force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor,"
+    "joint_open_mm,joint_world_mm,joint_left_mm,joint_floor_mm,joint_turn_deg";
 
 static bool is_default(const accuracy_row *row)
 {
@@ -63,9 +71,11 @@ static void write_row(FILE *csv, const accuracy_row *r)
           r->knob, r->value, e->force, e->impulse_ratio, e->peak_ratio);
   fprintf(csv, "%.4g,%.4g,%.4g,%g,%.6g,0,%s,", r->tick_us, r->physics_ms, r->duty, r->haptic_hz,
           r->noise_floor, r->hand);
-  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g,%.6g,%.6g\n", 1e3 * e->pose_max, e->line_n,
+  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g,%.6g,%.6g,", 1e3 * e->pose_max, e->line_n,
           r->hand_speed, 1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um, e->torque,
           r->torque_floor);
+  fprintf(csv, "%.4g,%.4g,%.4g,%.4g,%.4g\n", 1e3 * e->joint_loop, 1e3 * e->joint_world,
+          1e3 * e->joint_left, 1e3 * r->joint_floor, DEGREES * e->joint_turn);
 }
 
 static hap_status write_table(bench *b, const accuracy_table *table)
@@ -114,6 +124,16 @@ static void check_row(bench *b, const accuracy_row *r)
   }
 }
 
+static void check_joints(bench *b, const accuracy_row *r)
+{
+  const accuracy_errors *e = &r->errors;
+  bench_check(b, e->joint_loop <= JOINT_BOUND && e->joint_world <= JOINT_BOUND,
+              "%s at %g Hz: joints open by %.3g mm in the loop, %.3g mm in the world (bound %g mm; "
+              "reference %.3g mm, left to ODE alone %.3g mm), and turn by %.2g degrees",
+              r->scene, r->physics_hz, 1e3 * e->joint_loop, 1e3 * e->joint_world, 1e3 * JOINT_BOUND,
+              1e3 * r->joint_floor, 1e3 * e->joint_left, DEGREES * e->joint_turn);
+}
+
 static void check_rest(bench *b, const accuracy_row *r)
 {
   bench_check(b, r->rest_share <= REST_BOUND,
@@ -133,6 +153,9 @@ static void report(bench *b, const accuracy_table *table)
     }
     if (is_default(r) && r->model == HAP_MODEL_CONTACT && bounded) {
       check_row(b, r);
+      if (r->joints > 0) {
+        check_joints(b, r);
+      }
     } else if (is_default(r) && bounded) {
       bench_say("%s at %g Hz: %s: force error %.3g %%, peak ratio %.3f", r->scene, r->physics_hz,
                 hap_model_name(r->model), 100.0 * r->errors.force, r->errors.peak_ratio);

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "bench/bench.h"
+#include "bench/joint_gauge.h"
 #include "tools/rig.h"
 
 #define ACCURACY_HAPTIC_HZ 1000.0
@@ -56,6 +57,10 @@ typedef struct accuracy_motion {
   size_t count;
   size_t bodies;
   double deepest; /* m, that a pointer was in a body */
+  size_t joints;
+  joint_opening joints_loop;  /* the widest at any tick, between bodies that the loop moves */
+  joint_opening joints_world; /* of the same in ODE's world */
+  joint_opening joints_left;  /* in ODE's world, of the others: ODE alone moves them */
   hap_stats stats;
 } accuracy_motion;
 
@@ -92,6 +97,10 @@ typedef struct accuracy_errors {
                            above what is half way to the next ones and what the control has */
   bool lines;         /* contact is long enough to tell one */
   double force_rms;   /* N, of the reference while either touches */
+  double joint_loop;  /* m, the widest joint of the test itself, as in accuracy_motion */
+  double joint_world; /* m */
+  double joint_left;  /* m */
+  double joint_turn;  /* rad, of those that the loop moves, in either world */
 } accuracy_errors;
 
 /* control: as test, at another physics rate; may be NULL. False: nothing is touched in the reference,
@@ -129,6 +138,8 @@ typedef struct accuracy_row {
   double rest_share;
   double start_um; /* the worst start */
   double bound;    /* on errors.force and .torque; 0: none */
+  size_t joints;
+  double joint_floor; /* m, the widest joint of the references */
 } accuracy_row;
 
 typedef struct accuracy_table {

@@ -179,6 +179,10 @@ bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *t
   out->impulse_ratio = s.impulse[1] / s.impulse[0];
   out->peak_ratio = s.peak[1] / s.peak[0];
   out->lines = largest_line(reference, test, control, physics_hz, &out->line_n);
+  out->joint_loop = test->joints_loop.way;
+  out->joint_world = test->joints_world.way;
+  out->joint_left = test->joints_left.way;
+  out->joint_turn = fmax(test->joints_loop.turn, test->joints_world.turn);
   return compare_poses(reference, test, out);
 }
 

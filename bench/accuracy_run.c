@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "bench/accuracy.h"
 #include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
@@ -25,7 +26,27 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->coupling = HAP_COUPLING_DIRECT;
 }
 
-static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
+/* Before the start: the joints are as the scene has built them. The loop's poses are read through the list of
+ * the trace. */
+static hap_status open_gauge(const scene *s, joint_gauge *out, hap_detail *detail)
+{
+  hap_status status = joint_gauge_init(out, s->bodies, s->body_count, detail);
+  if (status >= HAP_OK && out->count > 0 && s->body_count > HAP_TRACE_BODIES_MAX) {
+    status = hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "%s: joints, and more than %d bodies",
+                       s->parameters.name, HAP_TRACE_BODIES_MAX);
+  }
+  return status;
+}
+
+static hap_status explain(bench *b, const rig *r, hap_status status)
+{
+  if (status < HAP_OK) {
+    (void)hap_session_detail(r->session, &b->detail);
+  }
+  return status;
+}
+
+static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_gauge *gauge)
 {
   rig_options options;
   rig_options_init(&options);
@@ -47,7 +68,10 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
   hap_status status = rig_create(&options, r, &b->detail);
-  return status >= HAP_OK ? hap_session_start(r->session) : status;
+  if (status >= HAP_OK) {
+    status = open_gauge(r->scene, gauge, &b->detail);
+  }
+  return status >= HAP_OK ? explain(b, r, hap_session_start(r->session)) : status;
 }
 
 /* The trace does not say which bodies are local; the loop's own list does. */
@@ -72,6 +96,23 @@ static void note_frame(const rig *r, const hap_trace_row *row, accuracy_frame *o
   out->local = local_bodies(r, row->body_count);
 }
 
+static void read_joints(const rig *r, const joint_gauge *gauge, accuracy_motion *out)
+{
+  const hapi_tick *tick = &r->session->haptic->tick;
+  hap_pose loop[HAP_TRACE_BODIES_MAX] = {{{0.0}, {0.0}}};
+  hap_pose world[HAP_TRACE_BODIES_MAX];
+  bool local[HAP_TRACE_BODIES_MAX] = {false};
+  for (size_t i = 0; i < tick->watch_count; ++i) {
+    local[i] = tick->watch_slot[i] != HAPI_SLOT_NONE;
+    if (local[i]) {
+      loop[i] = tick->bodies[tick->watch_slot[i]].pose;
+    }
+    world[i] = joint_gauge_pose(r->scene->bodies[i]);
+  }
+  joint_gauge_read(gauge, loop, local, &out->joints_loop, NULL);
+  joint_gauge_read(gauge, world, local, &out->joints_world, &out->joints_left);
+}
+
 static double deepest_now(const rig *r)
 {
   const hapi_tick *tick = &r->session->haptic->tick;
@@ -83,7 +124,8 @@ static double deepest_now(const rig *r)
 }
 
 /* With a faster loop every frame is the first of its ticks: the one at that time. */
-static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *out)
+static hap_status record(const rig *r, const joint_gauge *gauge, uint64_t ticks_a_frame,
+                         accuracy_motion *out)
 {
   hap_trace_row row;
   size_t got = 0;
@@ -98,6 +140,7 @@ static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *
         out->bodies = row.body_count;
       }
       out->deepest = fmax(out->deepest, deepest_now(r));
+      read_joints(r, gauge, out);
     }
   }
   return status;
@@ -106,6 +149,7 @@ static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *
 hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *out)
 {
   rig r;
+  joint_gauge gauge;
   memset(out, 0, sizeof *out);
   memset(&r, 0, sizeof r);
   out->count = (size_t)lround(def->seconds * ACCURACY_HAPTIC_HZ);
@@ -113,15 +157,14 @@ hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *
   if (out->frames == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for a run");
   }
-  hap_status status = open_rig(b, def, &r);
+  hap_status status = open_rig(b, def, &r, &gauge);
   if (status >= HAP_OK) {
-    status = record(&r, (uint64_t)lround(def->haptic_hz / ACCURACY_HAPTIC_HZ), out);
+    out->joints = gauge.count;
+    uint64_t ticks_a_frame = (uint64_t)lround(def->haptic_hz / ACCURACY_HAPTIC_HZ);
+    status = explain(b, &r, record(&r, &gauge, ticks_a_frame, out));
     (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
   }
   if (r.session != NULL) {
-    if (status < HAP_OK) {
-      (void)hap_session_detail(r.session, &b->detail);
-    }
     rig_destroy(&r);
   }
   if (status < HAP_OK) {

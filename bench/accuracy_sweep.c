@@ -179,6 +179,10 @@ static void take_worst(accuracy_errors *worst, const accuracy_errors *e)
   worst->lines = worst->lines || e->lines;
   worst->line_n = fmax(worst->line_n, e->line_n);
   worst->force_rms = fmax(worst->force_rms, e->force_rms);
+  worst->joint_loop = fmax(worst->joint_loop, e->joint_loop);
+  worst->joint_world = fmax(worst->joint_world, e->joint_world);
+  worst->joint_left = fmax(worst->joint_left, e->joint_left);
+  worst->joint_turn = fmax(worst->joint_turn, e->joint_turn);
 }
 
 typedef struct times {
@@ -199,6 +203,16 @@ static void note_times(const accuracy_motion *m, size_t i, times *out)
   out->duty[i] = spent / seconds;
 }
 
+static double widest_of_references(const sweep *s)
+{
+  double widest = 0.0;
+  for (size_t i = 0; i < s->start_count; ++i) {
+    const accuracy_motion *m = &s->references[i];
+    widest = fmax(widest, fmax(m->joints_world.way, m->joints_left.way));
+  }
+  return widest;
+}
+
 static void begin_row(const sweep *s, const setting *set, accuracy_row *row)
 {
   memset(row, 0, sizeof *row);
@@ -211,6 +225,8 @@ static void begin_row(const sweep *s, const setting *set, accuracy_row *row)
   row->haptic_hz = ACCURACY_HAPTIC_HZ;
   row->noise_floor = s->noise_floor;
   row->torque_floor = s->torque_floor;
+  row->joints = s->references[0].joints;
+  row->joint_floor = widest_of_references(s);
   row->hand_speed = accuracy_hand_speed(&s->references[0]);
   row->rest_share = s->scene->rests ? 0.0 : accuracy_rest_share(&s->references[0]);
   row->errors.impulse_ratio = row->errors.peak_ratio = 1.0;
