@@ -232,32 +232,47 @@ static void build_pair(mechanism *m)
   dBodySetLinearVel(second, 0.0, 0.0, -1.8);
 }
 
+typedef struct both {
+  joint_opening loop;
+  joint_opening world;
+} both;
+
+static void read_both(const mechanism *m, const joint_gauge *gauge, both *out)
+{
+  hap_pose poses[2];
+  CHECK(hap_session_poses_now(m->w.session, m->w.bodies, 2, poses) == HAP_OK);
+  joint_gauge_read(gauge, poses, NULL, &out->loop, NULL);
+  poses[0] = joint_gauge_pose(m->w.bodies[0]);
+  poses[1] = joint_gauge_pose(m->w.bodies[1]);
+  joint_gauge_read(gauge, poses, NULL, &out->world, NULL);
+}
+
+/* A joint that has to be measured is the loop's one step late, and then closes what ODE has opened. */
+static int ticks_until_held(size_t k)
+{
+  return kinds[k].join == join_piston ? 3 * STEP_TICKS : 0;
+}
+
 static void check_kind(size_t k)
 {
   mechanism m;
   joint_gauge gauge;
-  joint_opening loop = {0.0, 0.0};
-  joint_opening world = {0.0, 0.0};
-  hap_pose poses[2];
+  both worst = {{0.0, 0.0}, {0.0, 0.0}};
   joined_by = kinds[k].join;
   open_mechanism(&m, build_pair, 1.0);
   REQUIRE(joint_gauge_init(&gauge, m.w.bodies, 2, NULL) == HAP_OK);
   CHECK(gauge.count == 2);
   REQUIRE(start_mechanism(&m));
-  for (int t = 0; t < (int)lround(SECONDS / PERIOD); ++t) {
+  cw_run(&m.w, ticks_until_held(k));
+  for (int t = ticks_until_held(k); t < (int)lround(SECONDS / PERIOD); ++t) {
     cw_tick(&m.w);
-    CHECK(hap_session_poses_now(m.w.session, m.w.bodies, 2, poses) == HAP_OK);
-    joint_gauge_read(&gauge, poses, NULL, &loop, NULL);
-    poses[0] = joint_gauge_pose(m.w.bodies[0]);
-    poses[1] = joint_gauge_pose(m.w.bodies[1]);
-    joint_gauge_read(&gauge, poses, NULL, &world, NULL);
+    read_both(&m, &gauge, &worst);
   }
-  printf(
-      "# %s: open by %.3g mm in the loop, %.3g mm in the world, turned by %.3g mrad, %.3g mrad\n",
-      kinds[k].name, 1e3 * loop.way, 1e3 * world.way, 1e3 * loop.turn, 1e3 * world.turn);
-  CHECK(loop.way <= CLOSED && world.way <= CLOSED);
-  CHECK(loop.turn <= ALIGNED && world.turn <= ALIGNED);
-  check_owned(&m, 2);
+  printf("# %s: open by %.3g mm in the loop, %.3g mm in the world, turned by %.3g mrad\n",
+         kinds[k].name, 1e3 * worst.loop.way, 1e3 * worst.world.way, 1e3 * worst.loop.turn);
+  CHECK(worst.loop.way <= CLOSED && worst.world.way <= CLOSED);
+  CHECK(worst.loop.turn <= ALIGNED && worst.world.turn <= ALIGNED);
+  CHECK(cw_stats(&m.w).range_joints == 2);
   cw_close(&m.w);
 }
 
