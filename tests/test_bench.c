@@ -268,7 +268,8 @@ TEST(tick_leaves_its_table)
 #define ACCURACY_COLUMNS                                                                         \
   "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms," \
   "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,"               \
-  "pose_median_mm,force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor"
+  "pose_median_mm,force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor,joint_open_mm,"    \
+  "joint_world_mm,joint_left_mm,joint_floor_mm,joint_turn_deg"
 
 /* Force error of a row of accuracy.csv that begins so; *out_count: how many rows do. */
 static double force_error(const char *begin, int *out_count)
@@ -328,6 +329,16 @@ TEST(accuracy_sets_models_side_by_side)
   CHECK(errors[8] < 0.5 * errors[11]); /* the cube slides: eq. 4 asks one that rests */
   CHECK(errors[9] == errors[7] && errors[10] == errors[8]); /* a body alone */
   CHECK(!plot_available() || exists(file_in_folder("accuracy", ".svg")));
+}
+
+TEST(accuracy_says_how_far_joints_open)
+{
+  const char *const arguments[] = {"accuracy", "--quick", "--verify", "--scene",
+                                   "lever",    "--out",   folder,     NULL};
+  REQUIRE(run(arguments, environ) == 0);
+  CHECK(count_rows(file_in_folder("accuracy", ".csv"), ACCURACY_COLUMNS) > 0);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   lever at 20 Hz: joints open by") == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   lever at 60 Hz: joints open by") == 1);
 }
 
 TEST(accuracy_knows_its_scenes)
@@ -426,6 +437,7 @@ int main(void)
   RUN(impedance_is_that_of_the_closed_forms);
   RUN(tick_leaves_its_table);
   RUN(accuracy_sets_models_side_by_side);
+  RUN(accuracy_says_how_far_joints_open);
   RUN(accuracy_knows_its_scenes);
   RUN(stability_of_some_points_alone);
   RUN(stability_knows_its_points);
