@@ -46,6 +46,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
+  options.def.lookback = def->model == HAP_MODEL_SINGLE ? 0.0 : 0.1;
   hap_status status = rig_create(&options, r, &b->detail);
   return status >= HAP_OK ? hap_session_start(r->session) : status;
 }

@@ -109,6 +109,9 @@ typedef struct hap_session_def {
                               mesh there, 0..1048576, default 4096 */
   hap_guard guard;         /* default HAP_GUARD_ON */
   hap_cross cross;         /* model ACCELERANCE, default HAP_CROSS_OFF */
+  double lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
+                      are gone over as model SINGLE would have had them, for hap_stats.force_error; in
+                      LOCKSTEP all of the time is, whatever the share. 0: never */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

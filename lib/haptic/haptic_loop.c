@@ -317,6 +317,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_exchange_state_publish(haptic->config.exchange);
   publish_poses(haptic);
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
+  hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);

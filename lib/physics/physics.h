@@ -29,6 +29,7 @@ typedef struct hapi_physics_config {
   hap_probe probe;
   double physics_hz;
   double haptic_hz;
+  double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
   bool lockstep;
   bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
   int rt_priority;

@@ -17,6 +17,7 @@
 #include "base/thread.h"
 #include "physics/admittance.h"
 #include "physics/joint_probe.h"
+#include "physics/lookback.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
@@ -561,6 +562,7 @@ struct hapi_physics {
   hapi_meshes meshes;
   hapi_snapshot snapshot;
   hapi_test_set test;
+  hapi_lookback lookback;
 
   _Atomic int wanted_model;
   hap_model model;  /* in force in this cycle */
@@ -671,6 +673,9 @@ void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
+/* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
+void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
+                              const dBodyID bodies[2], dSurfaceParameters *surface);
 double hapi_body_mass(dBodyID body);                             /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
@@ -825,6 +830,9 @@ hap_status hapi_test_gather(hapi_physics *physics);
 hap_status hapi_test_gather_bodies(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
 hap_status hapi_test_enter(hapi_physics *physics);
+/* These bodies, with whatever joints tie them to; those that slept are awake then. */
+hap_status hapi_test_enter_bodies(hapi_physics *physics, const hapi_lookback_body *bodies,
+                                  uint32_t count);
 /* Two bodies (HAPI_NONE: none) and nothing that holds them but the joint. */
 hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2]);
 void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
@@ -838,6 +846,17 @@ void hapi_test_finish(hapi_test_set *test);
 
 /* accelerance.c: eq. 3-6 */
 void hapi_accelerance_measure(hapi_physics *physics);
+
+/* lookback.c: nothing where it is not asked for */
+void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
+void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
+void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
+                       const dSurfaceParameters *surface); /* a pair that collides */
+void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
+void hapi_lookback_reset(hapi_physics *physics);
+void hapi_lookback_finish(hapi_lookback *lookback);
+/* lookback_step.c: goes over rows until they are done or seconds have passed; negative: all. */
+hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
 
 /* cross.c: cross accelerance, nothing where it is off */
 /* After a testing simulation with a force [N] at the contact: what the others did. */

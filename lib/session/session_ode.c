@@ -71,6 +71,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .impulse_pose = def->impulse_pose,
       .probe = def->probe,
       .physics_hz = def->physics_hz,
+      .lookback_share = def->lookback,
       .haptic_hz = def->haptic_hz,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
       .frame = def->drive == HAP_DRIVE_FRAME,
@@ -113,6 +114,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
+      .path_rows = def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
       .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
