@@ -54,6 +54,7 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
   haptic->tick.world.plane_mode = config->plane;
+  haptic->tick.world.solver.max_sweeps = config->max_sweeps;
   haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
   *out = haptic;

@@ -24,6 +24,7 @@ typedef struct hapi_physics_config {
   hapi_capacity capacity;
   uint32_t max_bodies;      /* that the loop may move itself; capacity.bodies is more */
   uint32_t max_edge_probes; /* model CONTACT: bodies at the border of the range, a cycle */
+  int32_t range_hops;       /* of hap_session_def */
   hap_model model;
   hap_impulse_pose impulse_pose;
   hap_probe probe;

@@ -63,9 +63,11 @@ typedef struct hapi_known_rest {
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint32_t member;      /* scratch: place in the test set and its snapshot */
-  uint64_t chosen_in;   /* scratch: model that it was chosen for */
-  uint64_t ranged_in;   /* scratch: walk that met it */
+  uint32_t member;    /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in; /* scratch: model that it was chosen for */
+  uint64_t ranged_in; /* scratch: walk that met it */
+  int32_t hops; /* scratch: of that walk, from the neighbours; of a mechanism they are those of
+                           the body that it was met by */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
   double damping[2];    /* scratch of soft.c */
   void (*moved_callback)(dBodyID);
@@ -383,6 +385,7 @@ typedef struct hapi_range {
   uint32_t *queue; /* entries of the body table; capacity.bodies */
   uint32_t count;
   uint32_t owned;
+  int32_t hops;                 /* of what is put into the queue now */
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
