@@ -17,6 +17,7 @@
 #define MEMORY_S 10.0    /* older windows fade from the figures */
 #define NEAR_M 0.5       /* from a pointer, that may take part */
 #define BODIES_MAX 128u  /* nearer ones first */
+#define DEAR 2.0         /* times the budget, for one step */
 #define BODIES_MOST 256u /* with what joints tie to them */
 
 static bool asked_for(const hapi_physics *physics)
@@ -178,7 +179,7 @@ void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
   w->seconds = w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics->config.physics_hz;
   w->body_count = w->pair_count = w->touch_count = w->row_count = w->next = w->touched = 0;
   hapi_index_clear(&w->pair_of);
-  w->wrong2 = w->right2 = 0.0;
+  w->wrong2 = w->right2 = w->spent_s = 0.0;
   w->from_ns = first_row(physics, now_ns);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
   w->spoilt = !add_near(physics) || !add_jointed(physics) ||
@@ -253,8 +254,7 @@ void hapi_lookback_note(hapi_physics *physics)
   hapi_lookback *w = &physics->lookback;
   for (uint32_t i = 0; i < physics->contact_high && w->phase == HAPI_LOOKBACK_OPEN; ++i) {
     const hapi_contact_slot *slot = &physics->contacts[i];
-    if (slot->phase == HAPI_SLOT_LIVE) {
-      w->spoilt = w->spoilt || slot->is_tool;
+    if (slot->phase == HAPI_SLOT_LIVE && !slot->is_tool) {
       note_touch(physics, slot);
     }
   }
@@ -283,6 +283,10 @@ static void take_row(hapi_physics *physics, int64_t time_ns, const hapi_path_poi
   }
   if (w->row_count == 0) {
     set_lags(w, time_ns);
+  }
+  for (uint32_t i = 0; i < count; ++i) { /* what a hull's many points would do is not reckoned here */
+    bool pushes = hapi_v3_dot(pointers[i].wrench.force, pointers[i].wrench.force) > 0.0;
+    w->spoilt = w->spoilt || (pointers[i].is_tool != 0 && pushes);
   }
   w->times_ns[w->row_count] = time_ns;
   memcpy(&w->path[w->row_count * count], pointers, count * sizeof *w->path);
@@ -347,6 +351,15 @@ static double budget(const hapi_physics *physics)
              : physics->config.lookback_share / physics->config.physics_hz;
 }
 
+/* A world in which one step takes all of the time that there is: the figure would be long out of date, and
+ * physics late. */
+static bool too_dear(const hapi_physics *physics)
+{
+  const hapi_lookback *w = &physics->lookback;
+  return !physics->config.lockstep && w->next > 0 &&
+         w->spent_s > DEAR * budget(physics) * (double)w->next;
+}
+
 void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns)
 {
   hapi_lookback *w = &physics->lookback;
@@ -362,7 +375,7 @@ void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns)
     w->phase = HAPI_LOOKBACK_GOING;
   }
   if (w->phase == HAPI_LOOKBACK_GOING && !w->spoilt) {
-    w->spoilt = hapi_lookback_run(physics, budget(physics)) < HAP_OK;
+    w->spoilt = hapi_lookback_run(physics, budget(physics)) < HAP_OK || too_dear(physics);
   }
   if (w->phase == HAPI_LOOKBACK_GOING && (w->spoilt || w->next >= w->row_count)) {
     end(physics);

@@ -78,7 +78,8 @@ typedef struct hapi_lookback {
   hapi_path_pointer *path; /* rows x pointers */
   uint32_t path_capacity;
   uint32_t row_count;
-  uint32_t next; /* row to go over */
+  uint32_t next;  /* row to go over */
+  double spent_s; /* on those before */
 
   double wrong2; /* N^2, of this window: sums over the rows in which either touches */
   double right2;

@@ -11,7 +11,7 @@
 /* Going over a window: the reference of a tick is what ODE and eq. 7 make of it at the haptic rate, with the
  * bodies where they are by that reckoning. */
 
-#define ITERATIONS 100 /* of QuickStep, at least: twice and more what a world is stepped with */
+#define ITERATIONS 2 /* times those of the world: what they leave undone shows as well */
 
 /* ---- which geoms there still are ---- */
 
@@ -154,6 +154,33 @@ static bool press(hapi_physics *physics, hapi_lookback_touch *t, const hapi_path
   return true;
 }
 
+/* Before the first row: a spring along the surface that was loaded before the window is as long as the force
+ * says. That of several contacts cannot be told apart: they begin without. */
+static void load(hapi_physics *physics, uint32_t index, const hapi_path_pointer *p)
+{
+  hapi_lookback *w = &physics->lookback;
+  hapi_lookback_touch *only = NULL;
+  hapi_nearest at = {.distance = 0.0};
+  uint32_t closed = 0;
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    hapi_lookback_touch *t = &w->touches[i];
+    hapi_nearest near;
+    if (t->there && t->pointer == index && t->generation == p->generation &&
+        hapi_geom_nearest(physics, t->geom, p->pose.position, p->radius, p->radius, &near) &&
+        near.distance < 0.0) {
+      at = near;
+      only = t;
+      ++closed;
+    }
+  }
+  if (closed == 1 && only->mu > 0.0) {
+    const double *f = p->wrench.force;
+    hapi_v3_madd(f, -hapi_v3_dot(f, at.normal), at.normal, only->stretch);
+    hapi_v3_scale(-1.0 / p->stiffness, only->stretch, only->stretch);
+    only->closed = true;
+  }
+}
+
 static void push(hapi_physics *physics, const hapi_lookback_touch *t, const double force[3],
                  const double at[3])
 {
@@ -213,6 +240,9 @@ static void go_over(hapi_physics *physics, uint32_t row)
   }
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_path_pointer *p = &w->path[row * count + i];
+    if (p->generation != 0 && row == 0) {
+      load(physics, i, p);
+    }
     if (p->generation != 0) {
       push_pointer(physics, i, p, period);
     }
@@ -269,8 +299,7 @@ static void go(hapi_physics *physics, double seconds)
   int iterations = dWorldGetQuickStepNumIterations(physics->ode.world);
   hap_model model = physics->model;
   physics->model = HAP_MODEL_SINGLE; /* whose step this is */
-  dWorldSetQuickStepNumIterations(physics->ode.world,
-                                  iterations > ITERATIONS / 2 ? 2 * iterations : ITERATIONS);
+  dWorldSetQuickStepNumIterations(physics->ode.world, ITERATIONS * iterations);
   hapi_world_convert(physics);
   put_states(physics);
   if (w->next == 0) {
@@ -280,6 +309,7 @@ static void go(hapi_physics *physics, double seconds)
          (seconds < 0.0 || 1e-9 * (double)(hapi_clock_now() - begin_ns) < seconds)) {
     go_over(physics, w->next++);
   }
+  w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   take_states(physics);
   dJointGroupEmpty(physics->contact_group);
   hapi_world_restore(physics);

@@ -108,6 +108,7 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->cross, 0, 1, "cross"},
       {def->max_sweeps, 0, 10000, "max_sweeps"},
       {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
+      {def->lookback, 0.0, 0.5, "lookback"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

@@ -16,7 +16,7 @@
 
 typedef struct hapi_path_pointer {
   uint32_t generation; /* 0: no pointer here */
-  uint32_t turns;      /* with the device, and gives it torque */
+  uint32_t is_tool;    /* a hull */
   double radius;       /* m */
   double stiffness;    /* N/m */
   double damping;      /* N s/m */

@@ -150,7 +150,7 @@ void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     out[i] = (hapi_path_pointer){.generation = p->generation,
-                                 .turns = p->turns,
+                                 .is_tool = p->hull != NULL,
                                  .radius = p->radius,
                                  .stiffness = p->stiffness,
                                  .damping = p->damping,
