@@ -13,7 +13,8 @@
 
 #define WINDOW_S 0.25
 #define WINDOW_STEPS 4.0 /* of physics, at least */
-#define FIRST_STEPS 2.0  /* of the first one, so that there is a figure soon; the next are twice as long each */
+#define FIRST_STEPS \
+  2.0 /* of the first one, so that there is a figure soon; the next are twice as long each */
 #define MEMORY_S 10.0    /* older windows fade from the figures */
 #define NEAR_M 0.5       /* from a pointer, that may take part */
 #define BODIES_MAX 128u  /* nearer ones first */
@@ -62,8 +63,8 @@ static bool add_body(hapi_physics *physics, uint32_t known)
 {
   hapi_lookback *w = &physics->lookback;
   const hapi_known_body *entry = &physics->table.entries[known];
-  if (w->body_count == BODIES_MOST || !hapi_reserve((void **)&w->bodies, &w->body_capacity,
-                                                    w->body_count, 1, sizeof *w->bodies)) {
+  if (w->body_count == BODIES_MOST ||
+      !hapi_reserve((void **)&w->bodies, &w->body_capacity, w->body_count, 1, sizeof *w->bodies)) {
     return false;
   }
   hapi_lookback_body *body = &w->bodies[w->body_count++];
@@ -165,7 +166,8 @@ static void note_times(hapi_physics *physics, int64_t now_ns)
     const hapi_body_slot *slot = index != HAPI_NONE ? &physics->bodies[index] : NULL;
     bool loops = slot != NULL && physics->model != HAP_MODEL_IMPULSE &&
                  (slot->loop_owned || (physics->model == HAP_MODEL_ACCELERANCE && slot->pushed));
-    w->bodies[i].lag_ns = loops ? -physics->state->now_ns - ticks_ns(physics, 1.0) : -now_ns; /* and the first row's time */
+    w->bodies[i].lag_ns = loops ? -physics->state->now_ns - ticks_ns(physics, 1.0)
+                                : -now_ns; /* and the first row's time */
   }
 }
 
@@ -176,15 +178,16 @@ void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
     return;
   }
   double most = fmax(WINDOW_S, WINDOW_STEPS / physics->config.physics_hz);
-  w->seconds = w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics->config.physics_hz;
+  w->seconds =
+      w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics->config.physics_hz;
   w->body_count = w->pair_count = w->touch_count = w->row_count = w->next = w->touched = 0;
   hapi_index_clear(&w->pair_of);
   w->wrong2 = w->right2 = w->spent_s = 0.0;
   w->from_ns = first_row(physics, now_ns);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
-  w->spoilt = !add_near(physics) || !add_jointed(physics) ||
-              !hapi_reserve((void **)&w->states, &w->state_capacity, 0, w->body_count,
-                            sizeof *w->states);
+  w->spoilt =
+      !add_near(physics) || !add_jointed(physics) ||
+      !hapi_reserve((void **)&w->states, &w->state_capacity, 0, w->body_count, sizeof *w->states);
   if (!w->spoilt) {
     keep_states(physics);
     note_times(physics, now_ns);
@@ -284,7 +287,8 @@ static void take_row(hapi_physics *physics, int64_t time_ns, const hapi_path_poi
   if (w->row_count == 0) {
     set_lags(w, time_ns);
   }
-  for (uint32_t i = 0; i < count; ++i) { /* what a hull's many points would do is not reckoned here */
+  for (uint32_t i = 0; i < count;
+       ++i) { /* what a hull's many points would do is not reckoned here */
     bool pushes = hapi_v3_dot(pointers[i].wrench.force, pointers[i].wrench.force) > 0.0;
     w->spoilt = w->spoilt || (pointers[i].is_tool != 0 && pushes);
   }
@@ -315,7 +319,7 @@ static bool still_there(const hapi_physics *physics)
     }
     if (w->phase == HAPI_LOOKBACK_OPEN && known->slot != HAPI_NONE) {
       const hapi_body_slot *slot = &physics->bodies[known->slot];
-      if (slot->placed && (slot->pose_changed || slot->velocity_changed)) {
+      if (slot->pose_changed || slot->velocity_changed) {
         return false;
       }
     }
@@ -346,9 +350,8 @@ static void end(hapi_physics *physics)
 
 static double budget(const hapi_physics *physics)
 {
-  return physics->config.lockstep
-             ? -1.0
-             : physics->config.lookback_share / physics->config.physics_hz;
+  return physics->config.lockstep ? -1.0
+                                  : physics->config.lookback_share / physics->config.physics_hz;
 }
 
 /* A world in which one step takes all of the time that there is: the figure would be long out of date, and

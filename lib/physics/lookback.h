@@ -20,17 +20,17 @@
 struct hapi_body_state;
 
 typedef struct hapi_lookback_body {
-  uint32_t known;    /* entry of the body table */
-  uint64_t birth;    /* of that life of the entry */
-  int64_t lag_ns;    /* from the time of its state to the window's first row */
-  double wrench[6];  /* the application's, at each step */
+  uint32_t known;   /* entry of the body table */
+  uint64_t birth;   /* of that life of the entry */
+  int64_t lag_ns;   /* from the time of its state to the window's first row */
+  double wrench[6]; /* the application's, at each step */
 } hapi_lookback_body;
 
 typedef struct hapi_lookback_pair {
   dGeomID a; /* as the application was asked */
   dGeomID b;
   dSurfaceParameters surface;
-  bool there;          /* scratch: both geoms still are */
+  bool there; /* scratch: both geoms still are */
 } hapi_lookback_pair;
 
 /* Of a pointer and a geom. */
@@ -52,7 +52,7 @@ typedef enum hapi_lookback_phase {
 
 typedef struct hapi_lookback {
   hapi_lookback_phase phase;
-  bool spoilt; /* something happened that cannot be gone over */
+  bool spoilt;     /* something happened that cannot be gone over */
   int64_t from_ns; /* rows before are not of it */
   int64_t to_ns;
   double seconds; /* that it is open */

@@ -87,8 +87,8 @@ static void collide(hapi_physics *physics)
     dBodyID body_b = dGeomGetBody(pair->b);
     body_a = under_test(physics, body_a) ? body_a : NULL;
     body_b = under_test(physics, body_b) ? body_b : NULL;
-    bool awake = (body_a != NULL && dBodyIsEnabled(body_a)) ||
-                 (body_b != NULL && dBodyIsEnabled(body_b));
+    bool awake =
+        (body_a != NULL && dBodyIsEnabled(body_a)) || (body_b != NULL && dBodyIsEnabled(body_b));
     if (awake) {
       const dGeomID geoms[2] = {pair->a, pair->b};
       const dBodyID bodies[2] = {body_a, body_b};

@@ -679,7 +679,7 @@ void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
                               const dBodyID bodies[2], dSurfaceParameters *surface);
-double hapi_body_mass(dBodyID body);                             /* 0 for a kinematic one */
+double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
 bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
@@ -854,7 +854,7 @@ void hapi_accelerance_measure(hapi_physics *physics);
 void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
 void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
 void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
-                       const dSurfaceParameters *surface); /* a pair that collides */
+                       const dSurfaceParameters *surface);      /* a pair that collides */
 void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
 void hapi_lookback_reset(hapi_physics *physics);
 void hapi_lookback_finish(hapi_lookback *lookback);

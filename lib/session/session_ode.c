@@ -115,7 +115,8 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
-      .path_rows = def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
+      .path_rows =
+          def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
       .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
