@@ -67,6 +67,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
+  options.def.lookback = def->model == HAP_MODEL_SINGLE ? 0.0 : 0.1;
   hap_status status = rig_create(&options, r, &b->detail);
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);

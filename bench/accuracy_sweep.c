@@ -272,6 +272,7 @@ static hap_status measure_start(sweep *s, const setting *set, size_t i, accuracy
     status = untouched(s);
   }
   note_times(&motion, i, t);
+  if (getenv("LB")) fprintf(stderr, "LB %s %s %g %s %g start %zu err %.5f est %.5f n %.4f win %llu spoilt %llu rest %g floor %.5f\n", s->scene->name, hap_model_name(set->model), s->physics_hz, set->knob, set->value, i, out->force, motion.stats.force_error, motion.stats.force_error_n, (unsigned long long)motion.stats.lookbacks, (unsigned long long)motion.stats.lookbacks_spoilt, 0.0, s->noise_floor);
   accuracy_motion_free(&motion);
   accuracy_motion_free(&control);
   return status;

@@ -37,6 +37,8 @@ typedef struct recorded_setup {
   hap_record_def record;               /* its path is the file's */
   hap_probe probe;
   hap_cross cross;
+  int32_t max_sweeps;
+  int32_t range_hops;
   hap_coupling coupling; /* with a spring; else as the rig has it */
   double coupling_stiffness;
   double virtual_mass;
@@ -44,7 +46,7 @@ typedef struct recorded_setup {
 
 static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model model, int ms)
 {
-  recorded_setup s = {.scene = scene_name, .model = model, .ms = ms};
+  recorded_setup s = {.scene = scene_name, .model = model, .ms = ms, .range_hops = HAP_RANGE_ALL};
   hap_record_def_init(&s.record, sizeof s.record);
   s.record.path = recorded_path;
   return s;
@@ -59,6 +61,8 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   options.def.model = s->model;
   options.def.probe = s->probe;
   options.def.cross = s->cross;
+  options.def.max_sweeps = s->max_sweeps;
+  options.def.range_hops = s->range_hops;
   options.record = &s->record;
   if (s->coupling_stiffness > 0.0) {
     options.coupling = s->coupling;

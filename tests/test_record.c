@@ -166,6 +166,22 @@ TEST(ways_of_testing)
   }
 }
 
+/* The range ends before the row does, and two sweeps do not solve it. */
+TEST(a_loop_of_less_accuracy)
+{
+  recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 900);
+  s.max_sweeps = 2;
+  s.range_hops = 3;
+  (void)check_setup(&s);
+  hap_player *player = NULL;
+  hap_session_def def;
+  hap_session_def_init(&def, sizeof def);
+  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def) == HAP_OK);
+  CHECK(def.max_sweeps == 2 && def.range_hops == 3);
+  hap_player_close(player);
+}
+
 /* The mass is not the default's: it is in the file. */
 TEST(couplings_of_the_literature)
 {
@@ -838,6 +854,7 @@ int main(void)
   RUN(scenes_in_model_contact);
   RUN(scenes_in_the_paper_s_models);
   RUN(ways_of_testing);
+  RUN(a_loop_of_less_accuracy);
   RUN(couplings_of_the_literature);
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);

@@ -493,6 +493,31 @@ TEST(another_machine_version_or_library_is_told)
   release(&f);
 }
 
+/* What it has not is as it was before there was a choice. */
+TEST(a_file_of_before_plays)
+{
+  file f = fresh("row10", 300);
+  block *b = &f.blocks[0];
+  uint32_t more = (uint32_t)(sizeof(hapi_file_info) - HAPI_FILE_INFO_LEAST);
+  b->head.size -= more;
+  char *bytes = (char *)b->bytes;
+  memmove(bytes + HAPI_FILE_INFO_LEAST, bytes + sizeof(hapi_file_info),
+          b->head.size - HAPI_FILE_INFO_LEAST);
+  pack(&f);
+  replay again = recorded_play("row10", 0);
+  hap_player *player = NULL;
+  hap_session_def def;
+  hap_session_def_init(&def, sizeof def);
+  CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
+  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def) == HAP_OK);
+  CHECK(def.max_sweeps == 0 && def.range_hops == HAP_RANGE_ALL);
+  hap_player_close(player);
+  b->head.size = HAPI_FILE_INFO_LEAST - 4;
+  CHECK(open_changed(&f, "what was recorded") == HAP_ERROR_FORMAT);
+  release(&f);
+}
+
 TEST(another_scene_is_told)
 {
   file f = fresh("row10", 200);
@@ -538,6 +563,7 @@ int main(void)
   RUN(no_file_is_larger_than_its_limit);
   RUN(a_ring_that_is_full_ends_the_recording);
   RUN(another_machine_version_or_library_is_told);
+  RUN(a_file_of_before_plays);
   RUN(another_scene_is_told);
   RUN(no_file_and_no_recording);
   dCloseODE();

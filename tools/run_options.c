@@ -274,6 +274,10 @@ static const option table[] = {
      "model accelerance: shared zero probe (default), as in the paper, or operating:\n"
      "about the forces that the pointers give",
      take_probe, 0, 0, 0},
+    {"--lookback", "SHARE",
+     "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
+     "model single has them: the error of the felt force, as force_error",
+     take_number, offsetof(run_options, rig.def.lookback), 0, 0.5},
     {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
      offsetof(run_options, rig.max_force), 1e-6, 1e6},
     {"--stiffness", "F", "of the pointers' contacts, N/m (default: the scene's)", take_number,

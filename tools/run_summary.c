@@ -101,4 +101,10 @@ void run_summary_print(const run_options *options, const hap_stats *stats, FILE 
   fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->trace_hash);
   count(out, "faults", stats->faults);
   print_more(stats, out);
+  if (options->rig.def.lookback > 0.0) {
+    number(out, "force_error", stats->force_error);
+    number(out, "force_error_n", stats->force_error_n);
+    count(out, "lookbacks", stats->lookbacks);
+    count(out, "lookbacks_spoilt", stats->lookbacks_spoilt);
+  }
 }

@@ -72,6 +72,9 @@ typedef enum hap_guard {
                            in one tick. Not for a device that a person holds. */
 } hap_guard;
 
+/* For hap_session_def.range_hops: as far as max_bodies goes. */
+#define HAP_RANGE_ALL (-1)
+
 /* For hap_session_def.physics_latency_ticks. */
 #define HAP_LATENCY_DEFAULT (-1)
 
@@ -109,6 +112,19 @@ typedef struct hap_session_def {
                               mesh there, 0..1048576, default 4096 */
   hap_guard guard;         /* default HAP_GUARD_ON */
   hap_cross cross;         /* model ACCELERANCE, default HAP_CROSS_OFF */
+  int32_t
+      max_sweeps; /* model CONTACT: sweeps over the rows of contacts and joints in each solve of a
+                         tick, 2..10000; direct solves come between them, from the second one on, so that
+                         2 means none. 0 (default): until it is solved or the tick's budget is used.
+                         Fewer are cheaper; what is not solved is in hap_stats.solver_residual_max */
+  int32_t
+      range_hops; /* model CONTACT: how far the range goes from the neighbours, in contacts, 0..1024:
+                         0 is the neighbours alone, 1 what may touch them as well. What hangs together by
+                         joints counts as one. What stands beyond answers as max_edge_probes says.
+                         HAP_RANGE_ALL (default): as far as max_bodies goes */
+  double lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
+                      are gone over as model SINGLE would have had them, for hap_stats.force_error; in
+                      LOCKSTEP all of the time is, whatever the share. 0: never */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

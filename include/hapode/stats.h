@@ -133,6 +133,14 @@ typedef struct hap_stats {
   uint32_t measured_joints; /* of these, the ones whose equations come from testing simulations */
   double joint_error; /* 0.., the largest share by which such equations were off at the end of the
                                last interval: they turn with a body until the next sync */
+
+  /* Where hap_session_def.lookback is above 0: the felt force against that of model SINGLE from the same
+   * state with the pointers on the same way, over windows of a quarter of a second. */
+  double force_error;        /* RMS of the difference / RMS of the force, of the last windows with contact;
+                                0 before the first */
+  double force_error_n;      /* N, RMS of the difference in the newest one */
+  uint64_t lookbacks;        /* windows gone over */
+  uint64_t lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile */
 } hap_stats;
 
 HAP_END_DECLS

@@ -54,6 +54,7 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
   haptic->tick.world.plane_mode = config->plane;
+  haptic->tick.world.solver.max_sweeps = config->max_sweeps;
   haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
   *out = haptic;
@@ -317,6 +318,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_exchange_state_publish(haptic->config.exchange);
   publish_poses(haptic);
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
+  hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
   publish_figures(haptic, begin_ns);

@@ -154,8 +154,14 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   if (!world_is_sound(physics)) {
     return;
   }
-  hapi_reconcile_push(physics);
   seconds[4] = lap(&watch);
+  hapi_lookback_follow(physics, now_ns);
+  seconds[2] = lap(&watch);
+  if (physics->model == HAP_MODEL_IMPULSE) {
+    hapi_lookback_open(physics, now_ns);
+  }
+  hapi_reconcile_push(physics);
+  seconds[4] += lap(&watch);
   hapi_world_collide(physics);
   seconds[0] += lap(&watch);
   hapi_neighbors_collect(physics);
@@ -170,8 +176,12 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
   hapi_joint_probes(physics);
-  seconds[2] = lap(&watch);
+  seconds[2] += lap(&watch);
+  hapi_lookback_note(physics);
   sync_out(physics, now_ns, next_ns);
+  if (physics->model != HAP_MODEL_IMPULSE) {
+    hapi_lookback_open(physics, now_ns);
+  }
   seconds[4] += lap(&watch);
   note_times(physics, seconds);
   call_step(physics, physics->ode.after_step);

@@ -53,6 +53,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
   }
   hapi_body_slot *local = &physics->bodies[slot];
   body->rest->ranged_in = range->number;
+  body->rest->hops = range->hops;
   local->wanted = true;
   local->linked = false;
   local->edge = false;
@@ -645,6 +646,7 @@ static bool mechanism_can_be_owned(hapi_physics *physics)
 static void own_mechanism(hapi_physics *physics)
 {
   hapi_range *range = &physics->range;
+  ++range->hops;
   for (uint32_t i = 0; i < range->moving; ++i) {
     const hapi_known_body *known = entry(physics, range->members[i]);
     if (range->moving > 1) { /* else they were found last */
@@ -657,6 +659,12 @@ static void own_mechanism(hapi_physics *physics)
   hapi_mechanism_take(physics);
 }
 
+static bool within_hops(const hapi_physics *physics, const hapi_known_body *known)
+{
+  int32_t most = physics->config.range_hops;
+  return most == HAP_RANGE_ALL || known->rest->hops <= most;
+}
+
 /* Seeds are what the pointers may touch. What is owned is walked on from. */
 static void expand(hapi_physics *physics, uint32_t index, bool seed)
 {
@@ -667,8 +675,9 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
     return;
   }
   bool refused = known->rest->gathered_in == range->number; /* with another body of its mechanism */
-  if (!refused && range->owned < range_capacity(physics) && hapi_mechanism_gather(physics, index) &&
-      mechanism_can_be_owned(physics)) {
+  range->hops = known->rest->hops;
+  if (!refused && within_hops(physics, known) && range->owned < range_capacity(physics) &&
+      hapi_mechanism_gather(physics, index) && mechanism_can_be_owned(physics)) {
     own_mechanism(physics);
     return;
   }
@@ -699,6 +708,7 @@ static void begin_walk(hapi_physics *physics)
   range->number = physics->model_number + 1;
   range->count = range->owned = 0;
   range->pairs_noted = 0;
+  range->hops = 0;
   range->joint_count = range->member_count = range->moving = 0;
   range->fastest = fastest_pointer(physics);
   hapi_cover_begin(&range->cover);

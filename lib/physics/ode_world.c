@@ -59,8 +59,11 @@ static void soften(const hapi_physics *physics, dSurfaceParameters *s)
   s->mode |= dContactSoftERP | dContactSoftCFM;
 }
 
-static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *surface)
+void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
+                              const dBodyID bodies[2], dSurfaceParameters *surface)
 {
+  dGeomID a = geoms[0];
+  dGeomID b = geoms[1];
   dContact *contacts = physics->contact_scratch;
   double direction[3];
   int count =
@@ -81,7 +84,7 @@ static void make_contacts(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceP
       set_direction(&contacts[i], direction);
     }
     dJointID joint = dJointCreateContact(physics->ode.world, physics->contact_group, &contacts[i]);
-    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
+    dJointAttach(joint, bodies[0], bodies[1]);
   }
 }
 
@@ -138,6 +141,7 @@ static bool ask_application(hapi_physics *physics, dGeomID a, dGeomID b, dSurfac
                            "softness or slip below 0: the pair has no contact");
     return false;
   }
+  hapi_lookback_ask(physics, a, b, out);
   return true;
 }
 
@@ -227,7 +231,9 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
       !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
     return;
   }
-  make_contacts(physics, turned ? b : a, turned ? a : b, &surface);
+  const dGeomID geoms[2] = {turned ? b : a, turned ? a : b};
+  const dBodyID bodies[2] = {dGeomGetBody(geoms[0]), dGeomGetBody(geoms[1])};
+  hapi_world_make_contacts(physics, geoms, bodies, &surface);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */

@@ -24,11 +24,13 @@ typedef struct hapi_physics_config {
   hapi_capacity capacity;
   uint32_t max_bodies;      /* that the loop may move itself; capacity.bodies is more */
   uint32_t max_edge_probes; /* model CONTACT: bodies at the border of the range, a cycle */
+  int32_t range_hops;       /* of hap_session_def */
   hap_model model;
   hap_impulse_pose impulse_pose;
   hap_probe probe;
   double physics_hz;
   double haptic_hz;
+  double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
   bool lockstep;
   bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
   int rt_priority;

@@ -17,6 +17,7 @@
 #include "base/thread.h"
 #include "physics/admittance.h"
 #include "physics/joint_probe.h"
+#include "physics/lookback.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
@@ -62,9 +63,11 @@ typedef struct hapi_known_rest {
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint32_t member;      /* scratch: place in the test set and its snapshot */
-  uint64_t chosen_in;   /* scratch: model that it was chosen for */
-  uint64_t ranged_in;   /* scratch: walk that met it */
+  uint32_t member;    /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in; /* scratch: model that it was chosen for */
+  uint64_t ranged_in; /* scratch: walk that met it */
+  int32_t hops; /* scratch: of that walk, from the neighbours; of a mechanism they are those of
+                           the body that it was met by */
   uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
   double damping[2];    /* scratch of soft.c */
   void (*moved_callback)(dBodyID);
@@ -382,6 +385,7 @@ typedef struct hapi_range {
   uint32_t *queue; /* entries of the body table; capacity.bodies */
   uint32_t count;
   uint32_t owned;
+  int32_t hops;                 /* of what is put into the queue now */
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
@@ -561,6 +565,7 @@ struct hapi_physics {
   hapi_meshes meshes;
   hapi_snapshot snapshot;
   hapi_test_set test;
+  hapi_lookback lookback;
 
   _Atomic int wanted_model;
   hap_model model;  /* in force in this cycle */
@@ -671,7 +676,10 @@ void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
-double hapi_body_mass(dBodyID body);                             /* 0 for a kinematic one */
+/* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
+void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
+                              const dBodyID bodies[2], dSurfaceParameters *surface);
+double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
 bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
@@ -825,6 +833,9 @@ hap_status hapi_test_gather(hapi_physics *physics);
 hap_status hapi_test_gather_bodies(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
 hap_status hapi_test_enter(hapi_physics *physics);
+/* These bodies, with whatever joints tie them to; those that slept are awake then. */
+hap_status hapi_test_enter_bodies(hapi_physics *physics, const hapi_lookback_body *bodies,
+                                  uint32_t count);
 /* Two bodies (HAPI_NONE: none) and nothing that holds them but the joint. */
 hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2]);
 void hapi_test_leave(hapi_physics *physics); /* as if nothing had been */
@@ -838,6 +849,17 @@ void hapi_test_finish(hapi_test_set *test);
 
 /* accelerance.c: eq. 3-6 */
 void hapi_accelerance_measure(hapi_physics *physics);
+
+/* lookback.c: nothing where it is not asked for */
+void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
+void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
+void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
+                       const dSurfaceParameters *surface);      /* a pair that collides */
+void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
+void hapi_lookback_reset(hapi_physics *physics);
+void hapi_lookback_finish(hapi_lookback *lookback);
+/* lookback_step.c: goes over rows until they are done or seconds have passed; negative: all. */
+hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
 
 /* cross.c: cross accelerance, nothing where it is off */
 /* After a testing simulation with a force [N] at the contact: what the others did. */

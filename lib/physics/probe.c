@@ -334,6 +334,20 @@ static hap_status cut_others(hapi_physics *physics, dJointID kept)
   return HAP_OK;
 }
 
+hap_status hapi_test_enter_bodies(hapi_physics *physics, const hapi_lookback_body *bodies,
+                                  uint32_t count)
+{
+  begin_gathering(physics);
+  physics->test.mechanisms = true;
+  physics->test.island_count = 1;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (!add_member(physics, bodies[i].known, 0)) {
+      return HAP_ERROR_MEMORY;
+    }
+  }
+  return hapi_test_enter(physics);
+}
+
 hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2])
 {
   begin_gathering(physics);

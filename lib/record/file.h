@@ -8,6 +8,7 @@
  * those of the machine that wrote it: only the same kind of machine can replay it anyway. */
 
 #include <assert.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <hapode/session.h>
@@ -67,8 +68,12 @@ typedef struct hapi_file_info {
   int32_t guard;
   uint32_t joined_size; /* of hapi_joined */
   uint32_t note_size;
-  int32_t cross; /* 0 in files of before */
+  int32_t cross;        /* 0 in files of before */
+  int32_t max_sweeps;   /* files of before end before it; what a file lacks is 0 */
+  int32_t range_hops_1; /* hap_session_def.range_hops + 1 */
 } hapi_file_info;
+
+#define HAPI_FILE_INFO_LEAST offsetof(hapi_file_info, max_sweeps)
 
 typedef struct hapi_file_end {
   uint32_t end; /* hapi_record_end */

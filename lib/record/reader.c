@@ -253,17 +253,20 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
     reader->incomplete = false; /* there is nothing to play */
     return status == HAP_END ? broken_off(reader, detail) : status;
   }
-  if (reader->head.type != HAPI_BLOCK_INFO || reader->head.size < sizeof *info) {
+  if (reader->head.type != HAPI_BLOCK_INFO || reader->head.size < HAPI_FILE_INFO_LEAST) {
     return bad(reader, "it should tell what was recorded, and does not", detail);
   }
-  memcpy(info, reader->bytes, sizeof *info);
-  if (info->note_size > HAPI_NOTE_MAX || reader->head.size != sizeof *info + info->note_size ||
+  memset(info, 0, sizeof *info);
+  memcpy(info, reader->bytes, HAPI_FILE_INFO_LEAST);
+  size_t size = reader->head.size - (size_t)info->note_size; /* wraps where the note is too long */
+  if (info->note_size > HAPI_NOTE_MAX || size < HAPI_FILE_INFO_LEAST || size > sizeof *info ||
       !terminated(info->library, sizeof info->library) ||
       !terminated(info->machine, sizeof info->machine) ||
       !terminated(info->system, sizeof info->system) || !terminated(info->ode, sizeof info->ode)) {
     return bad(reader, "it tells what was recorded in a form that there is not", detail);
   }
-  memcpy(reader->note, (const char *)reader->bytes + sizeof *info, info->note_size);
+  memcpy(info, reader->bytes, size);
+  memcpy(reader->note, (const char *)reader->bytes + size, info->note_size);
   return check_build(reader, ode, detail);
 }
 

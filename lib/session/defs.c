@@ -27,6 +27,7 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
   d.max_edge_probes = 4;
   d.max_hull_points = 4096;
+  d.range_hops = HAP_RANGE_ALL;
   hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
@@ -78,6 +79,9 @@ static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
   if (def->flags != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "flags has unknown bits 0x%x", def->flags);
   }
+  if (def->max_sweeps == 1) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_sweeps is 1: a solve is 2 sweeps at least");
+  }
   return HAP_OK;
 }
 
@@ -102,6 +106,9 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
       {def->cross, 0, 1, "cross"},
+      {def->max_sweeps, 0, 10000, "max_sweeps"},
+      {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
+      {def->lookback, 0.0, 0.5, "lookback"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

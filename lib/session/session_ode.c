@@ -67,10 +67,12 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .capacity = *capacity,
       .max_bodies = (uint32_t)def->max_bodies,
       .max_edge_probes = (uint32_t)def->max_edge_probes,
+      .range_hops = def->range_hops,
       .model = def->model,
       .impulse_pose = def->impulse_pose,
       .probe = def->probe,
       .physics_hz = def->physics_hz,
+      .lookback_share = def->lookback,
       .haptic_hz = def->haptic_hz,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
       .frame = def->drive == HAP_DRIVE_FRAME,
@@ -113,6 +115,8 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
+      .path_rows =
+          def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
       .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
@@ -137,6 +141,7 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .rt_priority = def->rt_priority,
         .trace_rows = (uint32_t)def->trace_rows,
         .plane = def->plane,
+        .max_sweeps = (uint32_t)def->max_sweeps,
         .guard = def->guard,
         .exchange = session->exchange,
     };

@@ -548,6 +548,8 @@ hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
   d.max_hull_points = info->max_hull_points;
   d.guard = (hap_guard)info->guard;
   d.cross = (hap_cross)info->cross;
+  d.max_sweeps = info->max_sweeps;
+  d.range_hops = info->range_hops_1 - 1;
   memcpy(def, &d, size < sizeof d ? size : sizeof d);
   return HAP_OK;
 }

@@ -78,6 +78,8 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   out->max_hull_points = def->max_hull_points;
   out->guard = (int32_t)def->guard;
   out->cross = (int32_t)def->cross;
+  out->max_sweeps = def->max_sweeps;
+  out->range_hops_1 = def->range_hops + 1;
 }
 
 /* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */

@@ -21,6 +21,7 @@ struct hapi_exchange {
   channel channels[HAPI_CHANNELS];
   hapi_capacity capacity;
   hapi_trail trail;
+  hapi_path path;
   size_t size;
 };
 
@@ -151,7 +152,9 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   e->trail.stride = capacity->trail_stride;
   e->trail.bodies = capacity->bodies;
   e->trail.pointers = capacity->pointers;
-  if (hapi_trail_create(&e->trail) < HAP_OK) {
+  e->path.rows = capacity->path_rows;
+  e->path.pointers = capacity->pointers;
+  if (hapi_trail_create(&e->trail) < HAP_OK || hapi_path_create(&e->path) < HAP_OK) {
     hapi_exchange_destroy(e);
     return HAP_ERROR_MEMORY;
   }
@@ -167,6 +170,7 @@ void hapi_exchange_destroy(hapi_exchange *exchange)
   }
   if (exchange != NULL) {
     hapi_trail_finish(&exchange->trail);
+    hapi_path_finish(&exchange->path);
   }
   hapi_free(exchange);
 }
@@ -184,6 +188,7 @@ void hapi_exchange_reset(hapi_exchange *exchange)
     }
   }
   hapi_trail_reset(&exchange->trail);
+  hapi_path_reset(&exchange->path);
 }
 
 static void *back(hapi_exchange *exchange, hapi_channel name)
@@ -330,6 +335,11 @@ void hapi_exchange_patches_publish(hapi_exchange *exchange)
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
 {
   return take(exchange, HAPI_CHANNEL_PATCHES);
+}
+
+hapi_path *hapi_exchange_path(hapi_exchange *exchange)
+{
+  return &exchange->path;
 }
 
 hapi_trail *hapi_exchange_trail(hapi_exchange *exchange)

@@ -12,6 +12,7 @@
 #include <hapode/status.h>
 
 #include "sync/messages.h"
+#include "sync/path.h"
 #include "sync/trail.h"
 
 typedef struct hapi_exchange hapi_exchange;
@@ -81,6 +82,7 @@ void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t n
 hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
 /* [haptic] -> whoever draws. Not in the block: it is written round and round and stays in memory. */
 hapi_trail *hapi_exchange_trail(hapi_exchange *exchange);
+hapi_path *hapi_exchange_path(hapi_exchange *exchange); /* [haptic] -> [physics] */
 
 /* The whole block, for locking it into memory. */
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size);

@@ -32,11 +32,11 @@ static void repair(uint8_t *data, size_t size, bool own_build)
     if (block.stored > size - at - sizeof block) {
       return;
     }
-    if (first && own_build && block.stored >= sizeof(hapi_file_info)) {
+    if (first && own_build && block.stored >= HAPI_FILE_INFO_LEAST) {
       hapi_file_info info;
-      memcpy(&info, bytes, sizeof info);
+      memcpy(&info, bytes, HAPI_FILE_INFO_LEAST);
       hapi_file_describe(&info);
-      memcpy(bytes, &info, sizeof info);
+      memcpy(bytes, &info, HAPI_FILE_INFO_LEAST);
     }
     block.crc = hapi_file_crc_block(&block, bytes);
     memcpy(data + at, &block, sizeof block);

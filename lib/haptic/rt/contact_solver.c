@@ -345,7 +345,8 @@ void hapi_solver_run(hapi_solver *solver)
       solver->residual = sweep(solver);
       left -= left < rows ? left : rows;
     } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
-    if (solver->residual < solver->tolerance || left < rows) {
+    if (solver->residual < solver->tolerance || left < rows ||
+        solver->sweeps == solver->max_sweeps) {
       break;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of

@@ -141,6 +141,26 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
   atomic_store_explicit(&trail->written, row + 1, memory_order_release);
 }
 
+void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
+{
+  hapi_path_pointer *out = hapi_path_next(path);
+  if (out == NULL) {
+    return;
+  }
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    out[i] = (hapi_path_pointer){.generation = p->generation,
+                                 .is_tool = p->hull != NULL,
+                                 .radius = p->radius,
+                                 .stiffness = p->stiffness,
+                                 .damping = p->damping,
+                                 .pose = p->pose,
+                                 .twist = p->twist,
+                                 .wrench = p->wrench};
+  }
+  hapi_path_send(path, tick->now_ns);
+}
+
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
 {
   hapi_poses_body *bodies = hapi_poses_bodies(out);

@@ -47,6 +47,7 @@
 #include "haptic/rt/contact_solver.h"
 #include "haptic/rt/velocity.h"
 #include "sync/messages.h"
+#include "sync/path.h"
 #include "sync/trail.h"
 
 /* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
@@ -445,6 +446,7 @@ void hapi_guard_cut(hapi_tick_pointer *pointer);
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
 void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
+void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
 /* ---- the steps of hapi_tick_run, one file each ---- */

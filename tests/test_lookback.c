@@ -1,0 +1,246 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Physics goes over short times of the past again, as model SINGLE has them: what it says of the felt
+ * force, and that it changes nothing else. */
+
+#include "tests/tap.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+#include "tests/contact_world.h"
+
+#define TICKS 1500
+#define SPEED 0.1 /* m/s, of the hand */
+#define EDGE 0.1  /* m */
+#define RADIUS 0.01
+
+/* A row of cubes on a floor, the last of which hangs on a hinge, and one that sleeps; the hand comes along x. */
+static void begin(contact_world *w, hap_model model, double physics_hz, double lookback)
+{
+  cw_open(w, CW_GRAVITY);
+  w->def.model = model;
+  w->def.physics_hz = physics_hz;
+  w->def.lookback = lookback;
+  cw_add_floor(w);
+  for (int i = 0; i < 3; ++i) {
+    cw_add_cube(w, 0.3, EDGE, 1.02 * EDGE * i, 0.0, 0.5 * EDGE);
+  }
+  cw_add_cube(w, 0.3, EDGE, 0.0, 3.0 * EDGE, 0.5 * EDGE);
+  dBodyDisable(w->bodies[3]);
+  cw_add_cube(w, 0.3, EDGE, 4.5 * EDGE, 0.0, 0.6 * EDGE);
+  dJointID hinge = dJointCreateHinge(w->world, NULL);
+  dJointAttach(hinge, w->bodies[4], NULL);
+  dJointSetHingeAnchor(hinge, 4.5 * EDGE, 0.0, 3.0 * EDGE);
+  dJointSetHingeAxis(hinge, 0.0, 1.0, 0.0);
+  w->hand_def.radius = RADIUS;
+  w->hand_velocity[0] = SPEED;
+}
+
+static void start(contact_world *w, double z)
+{
+  CHECK(cw_start(w, -0.5 * EDGE - RADIUS - 1e-3, 0.0, z));
+}
+
+typedef struct course {
+  double force[TICKS][3];
+  hap_stats stats;
+  int surface_calls;
+} course;
+
+static void run(contact_world *w, double z, course *out)
+{
+  start(w, z);
+  for (int i = 0; i < TICKS; ++i) {
+    cw_tick(w);
+    memcpy(out->force[i], w->force, sizeof out->force[i]);
+  }
+  out->stats = cw_stats(w);
+  out->surface_calls = w->surface_calls;
+  cw_close(w);
+}
+
+static void play(hap_model model, double physics_hz, double lookback, course *out)
+{
+  contact_world w;
+  begin(&w, model, physics_hz, lookback);
+  run(&w, 0.5 * EDGE, out);
+}
+
+/* RMS of the difference / RMS of the reference. */
+static double error_of(const course *c, const course *reference)
+{
+  double wrong = 0.0;
+  double right = 0.0;
+  for (int i = 0; i < TICKS; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      double d = c->force[i][k] - reference->force[i][k];
+      wrong += d * d;
+      right += reference->force[i][k] * reference->force[i][k];
+    }
+  }
+  return sqrt(wrong / right);
+}
+
+static const struct {
+  hap_model model;
+  double physics_hz;
+  const char *name;
+} cases[] = {{HAP_MODEL_CONTACT, 20.0, "contact at 20 Hz"},
+             {HAP_MODEL_CONTACT, 60.0, "contact at 60 Hz, where ticks and steps do not meet"},
+             {HAP_MODEL_ACCELERANCE, 20.0, "accelerance at 20 Hz"},
+             {HAP_MODEL_ACCELERANCE, 60.0, "accelerance at 60 Hz"},
+             {HAP_MODEL_IMPULSE, 20.0, "impulse at 20 Hz"},
+             {HAP_MODEL_IMPULSE, 60.0, "impulse at 60 Hz"}};
+
+#define CASES (sizeof cases / sizeof cases[0])
+
+TEST(estimates_the_error_of_the_force)
+{
+  static course reference;
+  static course c;
+  play(HAP_MODEL_SINGLE, 20.0, 0.1, &reference);
+  CHECK(reference.stats.lookbacks == 0); /* it is the reference itself */
+  for (size_t i = 0; i < CASES; ++i) {
+    play(cases[i].model, cases[i].physics_hz, 0.1, &c);
+    double error = error_of(&c, &reference);
+    double estimate = c.stats.force_error;
+    printf("# %s: error %.4f, estimate %.4f\n", cases[i].name, error, estimate);
+    CHECK(c.stats.lookbacks >= 4 && c.stats.lookbacks_spoilt == 0);
+    CHECK(estimate > 0.0 && isfinite(estimate));
+    CHECK(estimate < 3.0 * error + 1e-3 && error < 3.0 * estimate + 1e-3);
+  }
+}
+
+TEST(changes_no_bit)
+{
+  static course without;
+  static course with;
+  for (size_t i = 0; i < CASES; ++i) {
+    play(cases[i].model, cases[i].physics_hz, 0.0, &without);
+    play(cases[i].model, cases[i].physics_hz, 0.1, &with);
+    CHECK(without.stats.lookbacks == 0 && with.stats.lookbacks > 0);
+    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+    CHECK(without.surface_calls == with.surface_calls); /* nor calls the application */
+  }
+}
+
+TEST(friction_on_the_pointer_is_part_of_it)
+{
+  static course c;
+  contact_world w;
+  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
+  w.hand_def.friction = 0.8;
+  run(&w, 0.7 * EDGE, &c);
+  printf("# force error %.4f\n", c.stats.force_error);
+  CHECK(c.stats.force_error > 0.0 && c.stats.force_error < 0.05);
+}
+
+/* ---- windows that cannot be gone over ---- */
+
+TEST(a_body_that_the_application_moves_spoils_the_window)
+{
+  contact_world w;
+  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
+  start(&w, 0.5 * EDGE);
+  cw_run(&w, 420);
+  uint64_t before = cw_stats(&w).lookbacks;
+  dBodySetLinearVel(w.bodies[0], 0.0, 0.3, 0.0);
+  cw_run(&w, 300);
+  CHECK(cw_stats(&w).lookbacks_spoilt == 1);
+  cw_run(&w, 600);
+  CHECK(cw_stats(&w).lookbacks_spoilt == 1 && cw_stats(&w).lookbacks > before);
+  cw_close(&w);
+}
+
+TEST(bodies_and_geoms_that_go_away_meanwhile)
+{
+  contact_world w;
+  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
+  start(&w, 0.5 * EDGE);
+  for (int i = 0; i < 3; ++i) { /* at several places of a window */
+    cw_run(&w, 230);
+    dGeomID geom = dBodyGetFirstGeom(w.bodies[i]);
+    CHECK(hap_session_forget_geom(w.session, geom) == HAP_OK);
+    CHECK(hap_session_forget_body(w.session, w.bodies[i]) == HAP_OK);
+    dGeomDestroy(geom);
+    dBodyDestroy(w.bodies[i]);
+    w.bodies[i] = NULL;
+  }
+  cw_run(&w, 300);
+  CHECK(cw_stats(&w).lookbacks_spoilt >= 2);
+  CHECK(cw_stats(&w).faults == 0);
+  cw_close(&w);
+}
+
+TEST(a_change_of_model_ends_the_window)
+{
+  contact_world w;
+  begin(&w, HAP_MODEL_IMPULSE, 20.0, 0.1);
+  start(&w, 0.5 * EDGE);
+  cw_run(&w, 450);
+  CHECK(hap_session_set_model(w.session, HAP_MODEL_SINGLE) == HAP_OK);
+  cw_run(&w, 300);
+  uint64_t seen = cw_stats(&w).lookbacks;
+  CHECK(hap_session_set_model(w.session, HAP_MODEL_CONTACT) == HAP_OK);
+  cw_run(&w, 900);
+  CHECK(cw_stats(&w).lookbacks > seen);
+  CHECK(cw_stats(&w).lookbacks_spoilt <= 2);
+  cw_close(&w);
+}
+
+/* ---- the setting ---- */
+
+TEST(refuses_other_shares)
+{
+  const double wrong[] = {-0.1, 0.6, (double)NAN, (double)INFINITY};
+  contact_world w;
+  cw_open(&w, 0.0);
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    hap_detail detail = {""};
+    w.def.lookback = wrong[i];
+    w.ode.world = w.world;
+    w.ode.space = w.space;
+    CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
+    CHECK(strstr(detail.text, "lookback") != NULL);
+  }
+  cw_close(&w);
+}
+
+TEST(threads_have_a_figure_too)
+{
+  contact_world w;
+  begin(&w, HAP_MODEL_ACCELERANCE, 60.0, 0.4);
+  w.def.drive = HAP_DRIVE_THREADS;
+  w.def.rt_priority = 0;
+  w.def.trace_rows = 0;
+  start(&w, 0.5 * EDGE);
+  hap_stats stats = cw_stats(&w);
+  for (int i = 0; i < 1000 && stats.lookbacks < 3;
+       ++i) { /* the hand stays where it is, in the cube */
+    hap_pose pose = {{-0.5 * EDGE, 0.0, 0.5 * EDGE}, {1.0, 0.0, 0.0, 0.0}};
+    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_set_target(w.session, w.hand, &pose, &twist) == HAP_OK);
+    hapi_clock_sleep_until(hapi_clock_now() + 20000000);
+    stats = cw_stats(&w);
+  }
+  CHECK(stats.lookbacks >= 3);
+  cw_close(&w);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  RUN(estimates_the_error_of_the_force);
+  RUN(changes_no_bit);
+  RUN(friction_on_the_pointer_is_part_of_it);
+  RUN(a_body_that_the_application_moves_spoils_the_window);
+  RUN(bodies_and_geoms_that_go_away_meanwhile);
+  RUN(a_change_of_model_ends_the_window);
+  RUN(refuses_other_shares);
+  RUN(threads_have_a_figure_too);
+  int failed = tap_done();
+  dCloseODE();
+  return failed;
+}
