@@ -88,9 +88,7 @@ static void echo(int master, const line_floor_def *def)
     if (count <= 0) {
       return;
     }
-    have += (int)count;
-    if (have >= def->command) {
-      have = 0;
+    for (have += (int)count; have >= def->command; have -= def->command) {
       hapi_clock_sleep_until(hapi_clock_now() + (int64_t)(1e9 * def->wait));
       (void)!write(master, reply, (size_t)def->reply);
     }
