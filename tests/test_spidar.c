@@ -132,6 +132,8 @@ TEST(the_port_is_found_and_is_for_one_alone)
   REQUIRE(hap_device_get_info(device, &info, sizeof info) == HAP_OK);
   CHECK(strcmp(info.name, "spidar-x4r") == 0 && info.dof == 6);
   CHECK(info.max_force > 5.0 && info.max_force < 40.0 && info.max_torque > 0.05);
+  CHECK(info.mass == 0.0 && info.damping == 0.0 && info.friction == 0.0); /* nobody knows them */
+  CHECK_NEAR(info.delay, 1e-3 + 74 * 5e-6, 1e-9); /* a tick and the commands on the line */
   CHECK(hap_device_open("spidar", &second, &detail) < HAP_OK);
   CHECK(strstr(detail.text, "in use") != NULL);
   unsetenv("HAPODE_SPIDAR_PORT");
@@ -215,14 +217,18 @@ TEST(a_home_that_was_told_holds_until_the_boards_are_switched_off)
   char file[128];
   char argument[300];
   double place[3];
+  hap_device_info info;
   hap_detail detail = {""};
   snprintf(file, sizeof file, "%s/home.txt", machine.folder);
   snprintf(command, sizeof command,
-           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1",
-           getenv("HAPODE_RUN"), file, machine.port, machine.folder);
+           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1 && "
+           "sed -i 's/^mass_kg = 0 /mass_kg = 0.07 /' %s",
+           getenv("HAPODE_RUN"), file, machine.port, machine.folder, file);
   REQUIRE(system(command) == 0);
   snprintf(argument, sizeof argument, ",timeout=5,rotate=1/0/0/0,model=%s", file);
   REQUIRE(open_device(&h, argument, &detail));
+  REQUIRE(hap_device_get_info(h.device, &info, sizeof info) == HAP_OK);
+  CHECK(info.mass == 0.07);
   REQUIRE(emulated_tell(&machine, "push 2.4 0 0")); /* away from home before it is started */
   emulated_sleep(1.0);
   CHECK(h.ops->start(h.self) == HAP_OK);

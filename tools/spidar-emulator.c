@@ -259,6 +259,7 @@ static void print_help(void)
       "                      B5M for x5r and x5l\n"
       "  --hand push|hold|none\n"
       "  --path T:x/y/z;...  of the hand, s and m from home, repeated\n"
+      "  --turn T:x/y/z;...  of the hand, s and rotation vector in rad, repeated\n"
       "  --first-count N     of the encoders at power-on, default 0\n"
       "  --script FILE       lines \"SECONDS COMMAND\"\n"
       "  --link PATH         a symbolic link to the port, renewed when it is plugged in again\n"
@@ -365,6 +366,9 @@ static bool take_option(int option, program *p, emulator_def *def, choice *chose
     case 'p':
       def->path = optarg;
       return true;
+    case 't':
+      def->turn = optarg;
+      return true;
     case 'c':
       if (!read_count(optarg, -1e6, 1e6, &count)) {
         return false;
@@ -389,17 +393,13 @@ static bool take_option(int option, program *p, emulator_def *def, choice *chose
 /* 0: go on; else the exit status plus one. */
 static int read_options(int argc, char **argv, program *p, emulator_def *def)
 {
-  static const struct option options[] = {{"model", required_argument, NULL, 'm'},
-                                          {"boards", required_argument, NULL, 'b'},
-                                          {"hand", required_argument, NULL, 'h'},
-                                          {"path", required_argument, NULL, 'p'},
-                                          {"first-count", required_argument, NULL, 'c'},
-                                          {"script", required_argument, NULL, 's'},
-                                          {"link", required_argument, NULL, 'l'},
-                                          {"fifo", required_argument, NULL, 'f'},
-                                          {"packet", required_argument, NULL, 'k'},
-                                          {"help", no_argument, NULL, '?' + 256},
-                                          {NULL, 0, NULL, 0}};
+  static const struct option options[] = {
+      {"model", required_argument, NULL, 'm'},       {"boards", required_argument, NULL, 'b'},
+      {"hand", required_argument, NULL, 'h'},        {"path", required_argument, NULL, 'p'},
+      {"first-count", required_argument, NULL, 'c'}, {"script", required_argument, NULL, 's'},
+      {"link", required_argument, NULL, 'l'},        {"fifo", required_argument, NULL, 'f'},
+      {"packet", required_argument, NULL, 'k'},      {"turn", required_argument, NULL, 't'},
+      {"help", no_argument, NULL, '?' + 256},        {NULL, 0, NULL, 0}};
   choice chosen = {"x4r", NULL};
   int option;
   while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {

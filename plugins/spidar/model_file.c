@@ -43,6 +43,9 @@ static const figure device_figures[] = {
      "beyond it a length does not fit: a string is slack or broken"},
     {"heat_tension_n", AT(heat_tension), 1, 1.0, false, "that a motor bears for ever"},
     {"heat_time_s", AT(heat_time), 1, 1.0, false, "thermal time constant of a motor"},
+    {"mass_kg", AT(mass), 1, 1.0, false, "of the mechanism, felt at the grip; 0: not known"},
+    {"damping_ns_per_m", AT(damping), 1, 1.0, false, "the same"},
+    {"friction_n", AT(friction), 1, 1.0, false, "the same"},
 };
 #define DEVICE_FIGURES (sizeof device_figures / sizeof device_figures[0])
 
@@ -200,7 +203,8 @@ static hap_status take_device(reader *r, const char *key, const char *value)
       &r->file,
       "known are version, name, board, strings, dof, min_tension_n, max_tension_n, "
       "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, centre_mm, "
-      "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s and "
+      "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s, "
+                   "mass_kg, damping_ns_per_m, friction_n and "
       "string_N.KEY, not ",
       key);
 }
