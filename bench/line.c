@@ -16,7 +16,8 @@
 #include "device/device.h"
 #include "plugins/spidar/spidar.h"
 
-#define LATE_MOST 0.005  /* share of the ticks */
+#define LATE_MOST 0.005 /* share of the ticks */
+#define PULLED_MS_MOST 5.0
 #define FLOOR_MOST 0.001 /* of a machine that is idle */
 #define SEGMENTS 12      /* of each, in turns */
 #define SEGMENT_TICKS 5000
@@ -30,6 +31,7 @@ typedef struct setup {
   pid_t emulator;
   int input; /* its stdin: it ends with us */
   char spec[128];
+  double pulled_ms;
 } setup;
 
 /* ---- the emulator ---- */
@@ -129,7 +131,27 @@ static hap_status alternate(const bench *b, subject *s, line_floor *lowest, line
   return status;
 }
 
-static hap_status measure_with(bench *b, const setup *s, line_floor *lowest, line_figures out[2])
+/* ms, from when the emulator is told to pull the cable out until a tick fails and says so; < 0: none does. */
+static double pull_cable(const setup *s, subject *measured)
+{
+  static const char word[] = "unplug\n";
+  int64_t begin_ns = hapi_clock_now();
+  if (write(s->input, word, sizeof word - 1) != (ssize_t)sizeof word - 1) {
+    return -1.0;
+  }
+  for (int i = 0; i < 1000; ++i) {
+    if (tick(measured) == LINE_FAILED) {
+      int64_t passed_ns = hapi_clock_now() - begin_ns;
+      hap_detail why = {""};
+      hapi_device_explain(measured->ops, measured->self, &why);
+      return strstr(why.text, "cable") != NULL ? 1e-6 * (double)passed_ns : -1.0;
+    }
+    hapi_clock_sleep_until(hapi_clock_now() + (int64_t)(1e9 / LINE_HZ));
+  }
+  return -1.0;
+}
+
+static hap_status measure_with(bench *b, setup *s, line_floor *lowest, line_figures out[2])
 {
   hap_device *device = NULL;
   hap_status status = hap_device_open(s->spec, &device, &b->detail);
@@ -140,6 +162,7 @@ static hap_status measure_with(bench *b, const setup *s, line_floor *lowest, lin
   status = measured.ops->start(measured.self);
   if (status >= HAP_OK) {
     status = alternate(b, &measured, lowest, out);
+    s->pulled_ms = pull_cable(s, &measured);
   } else {
     status = bench_fail(b, status, "line: the device did not start");
   }
@@ -193,14 +216,21 @@ static void report(bench *b, const setup *s, const line_figures figures[2], FILE
   bench_check(b, f->failed == 0, "line: %s: %llu of %llu ticks failed", s->boards,
               (unsigned long long)f->failed, (unsigned long long)f->ticks);
   judge(b, s, figures);
-  fprintf(csv, "%s,%s,%d,%llu,%llu,%llu,%.6f,%.2f,%.2f,%.2f,%llu,%llu,%llu,%.6f\n", s->model,
+  bool pulled = s->pulled_ms >= 0.0 && s->pulled_ms <= PULLED_MS_MOST;
+  const char *text = "line: %s: a pulled cable failed with its cause after %.2f ms";
+  if (pulled || s->pulled_ms < 0.0 || (!b->quick && late_share(&figures[1]) <= FLOOR_MOST)) {
+    bench_check(b, pulled, text, s->boards, s->pulled_ms);
+  } else {
+    bench_skip(b, text, s->boards, s->pulled_ms); /* once, on a machine that may be late itself */
+  }
+  fprintf(csv, "%s,%s,%d,%llu,%llu,%llu,%.6f,%.2f,%.2f,%.2f,%llu,%llu,%llu,%.6f,%.2f\n", s->model,
           s->boards, f->realtime ? 1 : 0, (unsigned long long)f->ticks, (unsigned long long)f->late,
           (unsigned long long)f->missed, late_share(f),
           1e-3 * hapi_histogram_quantile_ns(&f->tick_ns, 0.5),
           1e-3 * hapi_histogram_quantile_ns(&f->tick_ns, 0.99),
           1e-3 * hapi_histogram_max_ns(&f->tick_ns), (unsigned long long)figures[1].ticks,
           (unsigned long long)figures[1].late, (unsigned long long)figures[1].missed,
-          late_share(&figures[1]));
+          late_share(&figures[1]), s->pulled_ms);
 }
 
 static hap_status run_one(bench *b, setup *s, FILE *csv)
@@ -226,7 +256,7 @@ hap_status bench_line(bench *b)
   FILE *csv = bench_csv_open(b, "line",
                              "model,boards,realtime,ticks,late,missed,late_share,tick_us_p50,"
                              "tick_us_p99,tick_us_max,floor_ticks,floor_late,floor_missed,"
-                             "floor_late_share");
+                             "floor_late_share,pulled_ms");
   if (csv == NULL) {
     return bench_csv_close(b, csv);
   }
