@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include <fcntl.h>
 #include <stdint.h>
 
 #include <hapode/hapode.h>
@@ -13,6 +14,7 @@
 #include "base/clock.h"
 #include "base/vec.h"
 #include "device/device.h"
+#include "plugins/spidar/serial.h"
 #include "tests/spidar_rig.h"
 #include "tools/rig.h"
 
@@ -263,6 +265,27 @@ TEST(boards_that_are_silent_fail_and_come_back_by_themselves)
   CHECK(await_status(&h, HAP_OK));
   h.ops->stop(h.self);
   hap_device_close(h.device);
+}
+
+/* Each way by itself: a device that reads and writes would be told by either. */
+TEST(a_port_that_was_hung_up_fails_to_read_and_to_write)
+{
+  hapi_spidar_serial serial;
+  hapi_spidar_port port;
+  hap_detail detail = {""};
+  char name[64];
+  uint8_t byte = 0;
+  int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  REQUIRE(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0 &&
+          ptsname_r(master, name, sizeof name) == 0);
+  REQUIRE(hapi_spidar_serial_init(&serial, &detail) == HAP_OK);
+  REQUIRE(hapi_spidar_serial_open(&serial, name, &detail) == HAP_OK);
+  hapi_spidar_serial_port(&serial, &port);
+  CHECK(port.receive(port.self, &byte, 1) == 0 && port.send(port.self, &byte, 1) == 0);
+  close(master);
+  CHECK(port.receive(port.self, &byte, 1) == -EIO);
+  CHECK(port.send(port.self, &byte, 1) == -EIO);
+  hapi_spidar_serial_finish(&serial);
 }
 
 TEST(a_cable_is_pulled_and_put_in_again)
@@ -533,6 +556,7 @@ int main(void)
   RUN(the_frame_has_z_up);
   RUN(a_home_that_was_told_holds_until_the_boards_are_switched_off);
   RUN(boards_that_are_silent_fail_and_come_back_by_themselves);
+  RUN(a_port_that_was_hung_up_fails_to_read_and_to_write);
   RUN(a_cable_is_pulled_and_put_in_again);
   RUN(a_process_that_is_killed_leaves_no_force);
   RUN(a_loop_that_hangs_leaves_no_force);
