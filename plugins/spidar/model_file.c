@@ -204,7 +204,7 @@ static hap_status take_device(reader *r, const char *key, const char *value)
       "known are version, name, board, strings, dof, min_tension_n, max_tension_n, "
       "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, centre_mm, "
       "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s, "
-                   "mass_kg, damping_ns_per_m, friction_n and "
+      "mass_kg, damping_ns_per_m, friction_n and "
       "string_N.KEY, not ",
       key);
 }
