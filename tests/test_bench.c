@@ -181,10 +181,14 @@ TEST(the_line_of_a_spidar_is_measured)
 {
   const char *const arguments[] = {"line", "--quick", "--verify", "--out", folder, NULL};
   CHECK(run(arguments, environ) == 0);
-  CHECK(count_lines(file_in_folder("said", ""), "ok ") == 2);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   line: two B3M: 0 of 2000 ticks failed") == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   line: one B5M: 0 of 2000 ticks failed") == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "by the machine alone (too few to judge)") == 2);
+  CHECK(count_lines(file_in_folder("said", ""), "a pulled cable failed with its cause after") == 2);
   CHECK(count_rows(file_in_folder("line", ".csv"),
                    "model,boards,realtime,ticks,late,missed,late_share,tick_us_p50,tick_us_p99,"
-                   "tick_us_max") == 2);
+                   "tick_us_max,floor_ticks,floor_late,floor_missed,floor_late_share,pulled_ms") ==
+        2);
   unlink(file_in_folder("line", ".csv"));
 }
 

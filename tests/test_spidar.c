@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include <fcntl.h>
 #include <stdint.h>
 
 #include <hapode/hapode.h>
@@ -13,6 +14,7 @@
 #include "base/clock.h"
 #include "base/vec.h"
 #include "device/device.h"
+#include "plugins/spidar/serial.h"
 #include "tests/spidar_rig.h"
 #include "tools/rig.h"
 
@@ -132,6 +134,8 @@ TEST(the_port_is_found_and_is_for_one_alone)
   REQUIRE(hap_device_get_info(device, &info, sizeof info) == HAP_OK);
   CHECK(strcmp(info.name, "spidar-x4r") == 0 && info.dof == 6);
   CHECK(info.max_force > 5.0 && info.max_force < 40.0 && info.max_torque > 0.05);
+  CHECK(info.mass == 0.0 && info.damping == 0.0 && info.friction == 0.0); /* nobody knows them */
+  CHECK_NEAR(info.delay, 1e-3 + 74 * 5e-6, 1e-9); /* a tick and the commands on the line */
   CHECK(hap_device_open("spidar", &second, &detail) < HAP_OK);
   CHECK(strstr(detail.text, "in use") != NULL);
   unsetenv("HAPODE_SPIDAR_PORT");
@@ -215,14 +219,18 @@ TEST(a_home_that_was_told_holds_until_the_boards_are_switched_off)
   char file[128];
   char argument[300];
   double place[3];
+  hap_device_info info;
   hap_detail detail = {""};
   snprintf(file, sizeof file, "%s/home.txt", machine.folder);
   snprintf(command, sizeof command,
-           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1",
-           getenv("HAPODE_RUN"), file, machine.port, machine.folder);
+           "echo | \"%s\" --calibrate %s --device spidar:%s,timeout=5 >%s/out 2>&1 && "
+           "sed -i 's/^mass_kg = 0 /mass_kg = 0.07 /' %s",
+           getenv("HAPODE_RUN"), file, machine.port, machine.folder, file);
   REQUIRE(system(command) == 0);
   snprintf(argument, sizeof argument, ",timeout=5,rotate=1/0/0/0,model=%s", file);
   REQUIRE(open_device(&h, argument, &detail));
+  REQUIRE(hap_device_get_info(h.device, &info, sizeof info) == HAP_OK);
+  CHECK(info.mass == 0.07);
   REQUIRE(emulated_tell(&machine, "push 2.4 0 0")); /* away from home before it is started */
   emulated_sleep(1.0);
   CHECK(h.ops->start(h.self) == HAP_OK);
@@ -257,6 +265,27 @@ TEST(boards_that_are_silent_fail_and_come_back_by_themselves)
   CHECK(await_status(&h, HAP_OK));
   h.ops->stop(h.self);
   hap_device_close(h.device);
+}
+
+/* Each way by itself: a device that reads and writes would be told by either. */
+TEST(a_port_that_was_hung_up_fails_to_read_and_to_write)
+{
+  hapi_spidar_serial serial;
+  hapi_spidar_port port;
+  hap_detail detail = {""};
+  char name[64];
+  uint8_t byte = 0;
+  int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  REQUIRE(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0 &&
+          ptsname_r(master, name, sizeof name) == 0);
+  REQUIRE(hapi_spidar_serial_init(&serial, &detail) == HAP_OK);
+  REQUIRE(hapi_spidar_serial_open(&serial, name, &detail) == HAP_OK);
+  hapi_spidar_serial_port(&serial, &port);
+  CHECK(port.receive(port.self, &byte, 1) == 0 && port.send(port.self, &byte, 1) == 0);
+  close(master);
+  CHECK(port.receive(port.self, &byte, 1) == -EIO);
+  CHECK(port.send(port.self, &byte, 1) == -EIO);
+  hapi_spidar_serial_finish(&serial);
 }
 
 TEST(a_cable_is_pulled_and_put_in_again)
@@ -339,69 +368,108 @@ TEST(a_loop_that_hangs_leaves_no_force)
 
 /* ---- a whole session ---- */
 
+#define SAMPLES 200
+#define LEAST_N 2.0 /* that a sample is worth */
+
 typedef struct felt {
-  double most;  /* N, that was asked for */
-  double asked; /* N, sums of samples in which the force was more than 2 N */
-  double given; /* N, at the grip */
+  double most;        /* N, that was asked for */
+  double force[2];    /* sums of asked * asked and of asked * given */
+  double torque[2];   /* the same */
+  double torque_most; /* N m, that was asked for */
   int samples;
 } felt;
 
-/* The force on the pointer against that of the strings, while the emulated hand pushes the row. */
-static void compare(rig *r, felt *out)
+/* From the frame with z up to the makers'. */
+static void to_makers(const double v[3], double out[3])
+{
+  out[0] = v[0];
+  out[1] = v[2];
+  out[2] = -v[1];
+}
+
+static void add(const double asked[3], const double given[3], double sums[2])
+{
+  sums[0] += hapi_v3_dot(asked, asked);
+  sums[1] += hapi_v3_dot(asked, given);
+}
+
+/* The wrench on the hand against that of the strings, while the emulated hand pushes. */
+static void compare(rig *r, emulated *e, felt *out)
 {
   hap_pointer_state state;
-  double force[3];
+  double asked[2][3];
+  double given[2][3];
   if (hap_pointer_get(r->session, r->pointers[0], &state, sizeof state) < HAP_OK ||
-      !emulated_state(&machine, "force", force, 3)) {
+      !emulated_state(e, "force", given[0], 3) || !emulated_state(e, "torque", given[1], 3)) {
     return;
   }
-  double asked = -state.wrench.force[0];
-  out->most = fmax(out->most, asked);
-  if (asked > 2.0) {
-    out->asked += asked;
-    out->given -= force[0];
+  to_makers(state.wrench.force, asked[0]);
+  to_makers(state.wrench.torque, asked[1]);
+  out->most = fmax(out->most, hapi_v3_norm(asked[0]));
+  out->torque_most = fmax(out->torque_most, hapi_v3_norm(asked[1]));
+  if (hapi_v3_norm(asked[0]) > LEAST_N) {
+    add(asked[0], given[0], out->force);
+    add(asked[1], given[1], out->torque);
     ++out->samples;
   }
+}
+
+static bool begin_scene(const char *name, const char *port, rig *r)
+{
+  rig_options options;
+  hap_detail detail = {""};
+  char spec[300];
+  snprintf(spec, sizeof spec, "spidar:%s,timeout=5,stall=10", port);
+  rig_options_init(&options);
+  options.scene = name;
+  options.devices[0] = spec;
+  options.device_count = 1;
+  hap_status status = rig_create(&options, r, &detail);
+  if (status < HAP_OK) {
+    printf("# %s\n", detail.text);
+    return false;
+  }
+  return hap_session_start(r->session) >= HAP_OK;
+}
+
+/* Until there are samples enough, or a fault. */
+static hap_fault feel(rig *r, emulated *e, felt *seen)
+{
+  hap_stats stats;
+  hap_detail detail = {""};
+  double end = emulated_clock() + 60.0;
+  memset(seen, 0, sizeof *seen);
+  do {
+    emulated_sleep(5e-3);
+    compare(r, e, seen);
+    if (hap_session_stats(r->session, &stats, sizeof stats) < HAP_OK) {
+      return HAP_FAULT_WORLD;
+    }
+  } while (seen->samples < SAMPLES && stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
+  if (stats.fault != HAP_FAULT_NONE) {
+    (void)hap_session_detail(r->session, &detail);
+    printf("# %s\n", detail.text);
+  }
+  printf("# %d samples, at most %.2f N and %.4f N m asked; given of it %.3f and %.3f\n",
+         seen->samples, seen->most, seen->torque_most, seen->force[1] / fmax(seen->force[0], 1e-9),
+         seen->torque[1] / fmax(seen->torque[0], 1e-9));
+  return stats.fault;
 }
 
 TEST(a_row_of_cubes_is_felt)
 {
   rig r;
-  rig_options options;
-  hap_detail detail = {""};
-  char spec[300];
-  felt seen = {0.0, 0.0, 0.0, 0};
+  felt seen;
   hap_stats stats;
+  hap_detail detail = {""};
   REQUIRE(emulated_tell(&machine, "hand push"));
-  snprintf(spec, sizeof spec, "spidar:%s,timeout=5,stall=10", machine.port);
-  rig_options_init(&options);
-  options.devices[0] = spec;
-  options.device_count = 1;
   dInitODE2(0);
-  hap_status status = rig_create(&options, &r, &detail);
-  if (status < HAP_OK) {
-    printf("# %s\n", detail.text);
-  }
-  REQUIRE(status >= HAP_OK);
-  REQUIRE(hap_session_start(r.session) >= HAP_OK);
-  double end = emulated_clock() + 60.0;
-  do {
-    emulated_sleep(5e-3);
-    compare(&r, &seen);
-    REQUIRE(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
-  } while (seen.samples < 200 && stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
-  if (stats.fault != HAP_FAULT_NONE) {
-    (void)hap_session_detail(r.session, &detail);
-    printf("# %s\n", detail.text);
-  }
-  const dReal *first = dBodyGetPosition(r.scene->bodies[0]);
-  printf("# at most %.2f N asked, %d samples: mean %.3f N asked, %.3f N given, row at %.4f m\n",
-         seen.most, seen.samples, seen.asked / seen.samples, seen.given / seen.samples, first[0]);
-  CHECK(stats.fault == HAP_FAULT_NONE && seen.samples == 200);
+  REQUIRE(begin_scene("row10", machine.port, &r));
+  CHECK(feel(&r, &machine, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
   CHECK(seen.most > 3.0); /* ten cubes of 0.1 kg on mu 0.5 move at 4.9 N */
-  CHECK_NEAR(seen.given / seen.asked, 0.98, 0.08);
+  CHECK_NEAR(seen.force[1] / seen.force[0], 0.98, 0.08);
   REQUIRE(emulated_tell(&machine, "unplug"));
-  end = emulated_clock() + 20.0;
+  double end = emulated_clock() + 20.0;
   do {
     emulated_sleep(5e-3);
     (void)hap_session_stats(r.session, &stats, sizeof stats);
@@ -413,6 +481,63 @@ TEST(a_row_of_cubes_is_felt)
   hap_session_stop(r.session);
   rig_destroy(&r);
   dCloseODE();
+}
+
+/* Down onto the lever as its own hand does it, turning along with it; the makers' y is up and their z towards the
+ * user. */
+TEST(a_tool_that_turns_a_lever_is_felt)
+{
+  static const char *const arguments[] = {
+      "--hand", "push",
+      "--fifo", "40",
+      "--path", "0:0/0/0;1.5:0/0/0;3:-0.003/-0.04/0;5:-0.003/-0.04/0;6:0/0/0",
+      "--turn", "0:0/0/0;1.5:0/0/0;3:0/0.01/-0.16;5:0/0.01/-0.16;6:0/0/0",
+      NULL};
+  emulated other;
+  rig r;
+  felt seen;
+  REQUIRE(emulated_start(&other, arguments));
+  dInitODE2(0);
+  REQUIRE(begin_scene("lever", other.port, &r));
+  CHECK(feel(&r, &other, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
+  CHECK(seen.torque_most > 0.01);
+  CHECK_NEAR(seen.force[1] / seen.force[0], 0.98, 0.08);
+  CHECK_NEAR(seen.torque[1] / seen.torque[0], 0.96, 0.12);
+  hap_session_stop(r.session);
+  rig_destroy(&r);
+  dCloseODE();
+  emulated_stop(&other);
+}
+
+/* hapode-run, told so, starts a device again whose cable was pulled. */
+TEST(a_run_goes_on_when_the_cable_is_in_again)
+{
+  static const char *const arguments[] = {"--hand", "push", "--fifo", "40", NULL};
+  emulated other;
+  char command[600];
+  char said[128];
+  REQUIRE(emulated_start(&other, arguments));
+  snprintf(said, sizeof said, "%s/out", other.folder);
+  snprintf(command, sizeof command,
+           "\"%s\" --scene row10 --seconds 8 --reconnect --device spidar:%s,timeout=5,stall=10 "
+           ">%s 2>&1",
+           getenv("HAPODE_RUN"), other.port, said);
+  pid_t child = fork();
+  if (child == 0) {
+    int status = system(command);
+    _exit(WIFEXITED(status) ? WEXITSTATUS(status) : 99);
+  }
+  CHECK(emulated_await(&other, false));
+  emulated_sleep(1.0); /* beyond start */
+  REQUIRE(emulated_tell(&other, "unplug 0.5"));
+  int status = 0;
+  CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  snprintf(command, sizeof command,
+           "grep -q 'a device was lost' %s && grep -q 'the device is back' %s", said, said);
+  CHECK(system(command) == 0);
+  CHECK(emulated_await(&other, true));
+  unlink(said);
+  emulated_stop(&other);
 }
 
 int main(void)
@@ -431,9 +556,12 @@ int main(void)
   RUN(the_frame_has_z_up);
   RUN(a_home_that_was_told_holds_until_the_boards_are_switched_off);
   RUN(boards_that_are_silent_fail_and_come_back_by_themselves);
+  RUN(a_port_that_was_hung_up_fails_to_read_and_to_write);
   RUN(a_cable_is_pulled_and_put_in_again);
   RUN(a_process_that_is_killed_leaves_no_force);
   RUN(a_loop_that_hangs_leaves_no_force);
+  RUN(a_tool_that_turns_a_lever_is_felt);
+  RUN(a_run_goes_on_when_the_cable_is_in_again);
   RUN(a_row_of_cubes_is_felt);
   emulated_stop(&machine);
   return tap_done();

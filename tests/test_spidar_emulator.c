@@ -587,6 +587,25 @@ TEST(silence_is_measured)
   emulator_finish(&s->emulator);
 }
 
+/* Five of them are 5 ms. */
+TEST(a_pulled_cable_is_noticed_by_the_next_tick)
+{
+  const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
+  hapi_spidar_line line;
+  for (int part = 0; part < 10; ++part) {
+    stage *s = set_stage(&def);
+    REQUIRE(begin(s, &line));
+    (void)tick(s, &line, taut);
+    CHECK(tick(s, &line, taut));
+    s->now += 1e-4 * part; /* answers are under way, or all there */
+    tell(s, "unplug");
+    s->now += CYCLE_S;
+    CHECK(hapi_spidar_line_receive(&line) == -EIO);
+    CHECK(hapi_spidar_line_send(&line, taut) == -EIO);
+    emulator_finish(&s->emulator);
+  }
+}
+
 /* A port that takes only a part of the bytes is as one that takes none. */
 TEST(a_command_that_was_cut_is_ended_by_zeros)
 {
@@ -820,6 +839,7 @@ int main(void)
   RUN(a_wrong_byte_in_the_commands_costs_one_cycle);
   RUN(late_replies_are_taken_when_they_come);
   RUN(silence_is_measured);
+  RUN(a_pulled_cable_is_noticed_by_the_next_tick);
   RUN(a_command_that_was_cut_is_ended_by_zeros);
   RUN(positions_that_jump_are_not_believed);
   RUN(what_is_asked_for_is_felt);

@@ -205,6 +205,18 @@ static void workspace_flat(hapi_spidar_model *m)
 {
   m->workspace[1] = 0.0;
 }
+static void mass_negative(hapi_spidar_model *m)
+{
+  m->mass = -0.1;
+}
+static void damping_nan(hapi_spidar_model *m)
+{
+  m->damping = NAN;
+}
+static void friction_endless(hapi_spidar_model *m)
+{
+  m->friction = INFINITY;
+}
 static void offset_nan(hapi_spidar_model *m)
 {
   m->offset[1] = NAN;
@@ -235,6 +247,9 @@ static const struct {
     {motors_all_above, "cannot hold the grip"},
     {workspace_too_large, "do not tell the pose"},
     {workspace_flat, "workspace_mm"},
+    {mass_negative, "mass_kg"},
+    {damping_nan, "damping_ns_per_m"},
+    {friction_endless, "friction_n"},
     {offset_nan, "string_1: its offset"},
 };
 
@@ -283,7 +298,8 @@ static bool same(const hapi_spidar_model *a, const hapi_spidar_model *b)
          memcmp(a->centre, b->centre, sizeof a->centre) == 0 &&
          memcmp(a->workspace, b->workspace, sizeof a->workspace) == 0 &&
          a->workspace_turn == b->workspace_turn && a->heat_tension == b->heat_tension &&
-         a->heat_time == b->heat_time;
+         a->heat_time == b->heat_time && a->mass == b->mass && a->damping == b->damping &&
+         a->friction == b->friction;
 }
 
 /* To the last bit, as the built-in figures have few digits. */
@@ -294,6 +310,9 @@ TEST(models_are_read_as_they_were_written)
       hapi_spidar_model m = *hapi_spidar_model_at(k);
       hapi_spidar_model back;
       hap_detail detail = {""};
+      m.mass = 0.125 * calibrated;
+      m.damping = 0.25 * calibrated;
+      m.friction = 0.5 * calibrated;
       for (int i = 0; i < m.strings && calibrated != 0; ++i) {
         m.offset[i] = 0.125 * (i - 3);
         m.calibrated = true;

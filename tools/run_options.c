@@ -237,7 +237,8 @@ static const option table[] = {
      take_text, offsetof(run_options, identify_path), 0, 0},
     {"--calibrate", "FILE",
      "no session: a person holds the grip of the one --device, a spidar, at its\n"
-     "home and presses Enter; its model with that home is written to FILE",
+     "home, then moves it all over its workspace for --seconds (default 60) or\n"
+     "until Enter; the model with what was found is written to FILE",
      take_text, offsetof(run_options, calibrate_path), 0, 0},
     {"--reconnect", NULL,
      "a device that was lost is started again until it answers; then the force\n"

@@ -26,6 +26,8 @@
 #define AHEAD_S \
   1e-3 /* that bytes may wait for the line: as with a port, the host notices the rest */
 #define READ_MOST 256
+#define PACKET_S \
+  300e-6 /* no adapter hands on bytes one by one; its latency timer is 1 ms at best */
 
 typedef struct program {
   emulator emulator;
@@ -34,7 +36,8 @@ typedef struct program {
   int slave;  /* kept open, so that a host may come and go */
   const char *link;
   const char *script;
-  double start; /* s, of the clock, at simulated time 0 */
+  double start;  /* s, of the clock, at simulated time 0 */
+  double packet; /* s, for which replies are collected: each write wakes a thread of the kernel */
   char line[256];
   size_t line_used;
   bool input; /* stdin may say more */
@@ -128,7 +131,8 @@ static void exchange(program *p, double now)
   if (count > 0) {
     emulator_write(&p->emulator, bytes, (int)count, now);
   }
-  int replies = emulator_read(&p->emulator, now, bytes, sizeof bytes);
+  bool whole = wire_packet(&p->emulator.wire, p->packet) <= now;
+  int replies = whole ? emulator_read(&p->emulator, now, bytes, sizeof bytes) : 0;
   if (replies > 0) {
     (void)!write(p->master, bytes, (size_t)replies); /* nobody reads: lost, as on a line */
   }
@@ -210,7 +214,7 @@ static bool load_script(program *p)
 
 static void await(program *p, double now)
 {
-  double next = wire_next(&p->emulator.wire);
+  double next = wire_packet(&p->emulator.wire, p->packet);
   double wait = next >= 0.0 && next - now < WAKE_MOST_S ? next - now : WAKE_MOST_S;
   wait = wait > WAKE_LEAST_S ? wait : WAKE_LEAST_S;
   const struct timespec timeout = {0, (long)(1e9 * wait)};
@@ -255,9 +259,13 @@ static void print_help(void)
       "                      B5M for x5r and x5l\n"
       "  --hand push|hold|none\n"
       "  --path T:x/y/z;...  of the hand, s and m from home, repeated\n"
+      "  --turn T:x/y/z;...  of the hand, s and rotation vector in rad, repeated\n"
       "  --first-count N     of the encoders at power-on, default 0\n"
       "  --script FILE       lines \"SECONDS COMMAND\"\n"
       "  --link PATH         a symbolic link to the port, renewed when it is plugged in again\n"
+      "  --packet SECONDS    for which replies are collected, as a USB adapter does; 0: byte by "
+      "byte,\n"
+      "                      default 0.0003\n"
       "  --fifo PRIORITY     SCHED_FIFO, 1 to 99\n\n"
       "commands:\n%s",
       emulator_help);
@@ -319,6 +327,12 @@ static bool read_count(const char *text, double least, double most, int *out)
   return end != NULL && *end == '\0' && value >= least && value <= most;
 }
 
+static bool read_seconds(const char *text, double *out)
+{
+  const char *end = hapi_number_read(text, out);
+  return end != NULL && *end == '\0' && *out >= 0.0 && *out <= 1.0;
+}
+
 static bool set_fifo(const char *text)
 {
   int priority = 0;
@@ -352,6 +366,9 @@ static bool take_option(int option, program *p, emulator_def *def, choice *chose
     case 'p':
       def->path = optarg;
       return true;
+    case 't':
+      def->turn = optarg;
+      return true;
     case 'c':
       if (!read_count(optarg, -1e6, 1e6, &count)) {
         return false;
@@ -364,6 +381,8 @@ static bool take_option(int option, program *p, emulator_def *def, choice *chose
     case 'l':
       p->link = optarg;
       return true;
+    case 'k':
+      return read_seconds(optarg, &p->packet);
     case 'f':
       return set_fifo(optarg);
     default:
@@ -379,6 +398,7 @@ static int read_options(int argc, char **argv, program *p, emulator_def *def)
       {"hand", required_argument, NULL, 'h'},        {"path", required_argument, NULL, 'p'},
       {"first-count", required_argument, NULL, 'c'}, {"script", required_argument, NULL, 's'},
       {"link", required_argument, NULL, 'l'},        {"fifo", required_argument, NULL, 'f'},
+      {"packet", required_argument, NULL, 'k'},      {"turn", required_argument, NULL, 't'},
       {"help", no_argument, NULL, '?' + 256},        {NULL, 0, NULL, 0}};
   choice chosen = {"x4r", NULL};
   int option;
@@ -407,7 +427,7 @@ static int read_options(int argc, char **argv, program *p, emulator_def *def)
 
 int main(int argc, char **argv)
 {
-  static program p = {.master = -1, .slave = -1, .input = true};
+  static program p = {.master = -1, .slave = -1, .input = true, .packet = PACKET_S};
   emulator_def def = {.model = &p.model};
   hap_detail detail = {""};
   const struct sigaction stop = {.sa_handler = want_stop};

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/def.h"
+#include "base/key_file.h"
 #include "base/log.h"
 #include "base/number.h"
 #include "device/device.h"
@@ -86,66 +87,27 @@ hap_status hapi_device_identity_give(const hap_device_identity *identity, hap_de
 /* ---- reading ---- */
 
 typedef struct reader {
-  const char *path;
-  FILE *file;
-  unsigned long line;
-  char text[512];
+  hapi_key_file file;
   bool known[FIGURES];
   bool named;
   bool versioned;
   hap_device_identity identity;
-  hap_detail *detail;
 } reader;
 
-static hap_status fail_line(const reader *r, const char *what, const char *item)
-{
-  return hapi_fail(r->detail, HAP_ERROR_FORMAT, "%.200s, line %lu: %s%.60s", r->path, r->line, what,
-                   item);
-}
-
-/* Cuts the line into key and value, both trimmed; an empty key: nothing but a comment. */
-static bool cut_line(char *text, char **key, char **value)
-{
-  static const char blanks[] = " \t\r\n";
-  *key = text + strspn(text, blanks);
-  *value = *key + strlen(*key);
-  if (**key == '#' || **key == '\0') {
-    **key = '\0';
-    return true;
-  }
-  char *equals = strchr(*key, '=');
-  if (equals == NULL) {
-    return false;
-  }
-  *value = equals + 1 + strspn(equals + 1, blanks);
-  do {
-    *equals = '\0';
-  } while (equals-- > *key && strchr(blanks, *equals) != NULL);
-  for (char *end = *value + strlen(*value); end > *value && strchr(blanks, end[-1]) != NULL;) {
-    *--end = '\0';
-  }
-  return **key != '\0';
-}
-
-/* A number, and behind it nothing but a comment. */
 static bool number_of(const char *value, double *out)
 {
   const char *end = hapi_number_read(value, out);
-  if (end == NULL) {
-    return false;
-  }
-  end += strspn(end, " \t");
-  return *end == '\0' || *end == '#';
+  return end != NULL && *end == '\0';
 }
 
 static hap_status take_version(reader *r, const char *value)
 {
   double version = 0.0;
   if (!number_of(value, &version)) {
-    return fail_line(r, "version: expected a number, not ", value);
+    return hapi_key_file_fail(&r->file, "version: expected a number, not ", value);
   }
   if (version != VERSION) {
-    return fail_line(r, "this library reads version 1, not ", value);
+    return hapi_key_file_fail(&r->file, "this library reads version 1, not ", value);
   }
   r->versioned = true;
   return HAP_OK;
@@ -154,10 +116,11 @@ static hap_status take_version(reader *r, const char *value)
 static hap_status take_name(reader *r, const char *value)
 {
   if (r->named) {
-    return fail_line(r, "given twice: ", "device");
+    return hapi_key_file_fail(&r->file, "given twice: ", "device");
   }
   if (*value == '\0' || strlen(value) >= sizeof r->identity.device) {
-    return fail_line(r, "device: expected a name of 1 to 63 characters, not ", value);
+    return hapi_key_file_fail(&r->file, "device: expected a name of 1 to 63 characters, not ",
+                              value);
   }
   snprintf(r->identity.device, sizeof r->identity.device, "%s", value);
   r->named = true;
@@ -171,58 +134,40 @@ static hap_status take_figure(reader *r, const char *key, const char *value)
     ++i;
   }
   if (i == FIGURES) {
-    return fail_line(r,
-                     "known are version, device, mass, damping, friction, delay, quantum and "
-                     "residual, not ",
-                     key);
+    return hapi_key_file_fail(
+        &r->file,
+        "known are version, device, mass, damping, friction, delay, quantum and "
+        "residual, not ",
+        key);
   }
   if (r->known[i]) {
-    return fail_line(r, "given twice: ", key);
+    return hapi_key_file_fail(&r->file, "given twice: ", key);
   }
   double number = 0.0;
   if (!number_of(value, &number) || number < 0.0 || number > figures[i].most) {
-    return hapi_fail(r->detail, HAP_ERROR_FORMAT,
-                     "%.200s, line %lu: %s: expected a number from 0 to %g, not %.60s", r->path,
-                     r->line, key, figures[i].most, value);
+    return hapi_fail(r->file.detail, HAP_ERROR_FORMAT,
+                     "%.200s, line %lu: %s: expected a number from 0 to %g, not %.60s",
+                     r->file.path, r->file.line, key, figures[i].most, value);
   }
   r->known[i] = true;
   *value_of(&r->identity, i) = number;
   return HAP_OK;
 }
 
-static hap_status take_line(reader *r)
+static hap_status take_line(void *self, const hapi_key_file *file, char *key, char *value)
 {
-  char *key = NULL;
-  char *value = NULL;
-  if (!cut_line(r->text, &key, &value)) {
-    return fail_line(r, "expected key = value, not ", r->text);
-  }
-  if (*key == '\0') {
-    return HAP_OK;
+  reader *r = self;
+  bool name = strcmp(key, "device") == 0;
+  if (!name) { /* which may have a '#' */
+    hapi_key_file_uncomment(value);
   }
   if (strcmp(key, "version") == 0 && !r->versioned) {
     return take_version(r, value);
   }
   if (!r->versioned) {
-    return fail_line(r, "expected version = 1 before all else, not ", key);
+    return hapi_key_file_fail(file, "expected version = 1 before all else, not ", key);
   }
-  return strcmp(key, "device") == 0 ? take_name(r, value) : take_figure(r, key, value);
-}
-
-/* A line of more than the buffer and one with a zero byte have no line end where it should be. */
-static hap_status read_lines(reader *r)
-{
-  hap_status status = HAP_OK;
-  while (status >= 0 && fgets(r->text, sizeof r->text, r->file) != NULL) {
-    ++r->line;
-    bool whole = strchr(r->text, '\n') != NULL || feof(r->file) != 0;
-    status = whole ? take_line(r) : fail_line(r, "longer than 510 characters, or not text", "");
-  }
-  if (status >= 0 && ferror(r->file) != 0) {
-    return hapi_fail(r->detail, HAP_ERROR_IO, "%.200s, line %lu: cannot be read: %s", r->path,
-                     r->line + 1, strerror(errno));
-  }
-  return status;
+  return name ? take_name(r, value) : take_figure(r, key, value);
 }
 
 static hap_status check_complete(const reader *r)
@@ -231,10 +176,7 @@ static hap_status check_complete(const reader *r)
   for (size_t i = 0; i < FIGURES && missing == NULL; ++i) {
     missing = r->known[i] ? NULL : figures[i].key;
   }
-  return missing == NULL ? HAP_OK
-                         : hapi_fail(r->detail, HAP_ERROR_FORMAT,
-                                     "%.200s, line %lu: the file ends without a line %s = ...",
-                                     r->path, r->line + 1, missing);
+  return missing == NULL ? HAP_OK : hapi_key_file_lacks(&r->file, "", missing);
 }
 
 hap_status hap_device_identity_read(const char *path, hap_device_identity *out, hap_detail *detail)
@@ -242,14 +184,9 @@ hap_status hap_device_identity_read(const char *path, hap_device_identity *out, 
   if (path == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the path of the identity is NULL");
   }
-  reader r = {.path = path, .detail = detail};
+  reader r = {.file = {.path = path, .detail = detail}};
   hap_device_identity_init(&r.identity, sizeof r.identity);
-  r.file = fopen(path, "r");
-  if (r.file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
-  }
-  hap_status status = read_lines(&r);
-  fclose(r.file);
+  hap_status status = hapi_key_file_read(&r.file, take_line, &r);
   if (status >= 0) {
     status = check_complete(&r);
   }

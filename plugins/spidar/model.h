@@ -52,6 +52,11 @@ typedef struct hapi_spidar_model {
   /* Thermal model of a motor and its string, docs/spidar.md, "Heat". */
   double heat_tension; /* N, that the motor bears for ever, > min_tension */
   double heat_time;    /* s, its thermal time constant */
+
+  /* Of the mechanism, motors and all, as felt at the grip; 0: not known. No maker publishes them. */
+  double mass;     /* kg */
+  double damping;  /* N s/m */
+  double friction; /* N, Coulomb */
 } hapi_spidar_model;
 
 /* [any] A built-in model by its name, in any case of letters: x4r, x4l, x5r, x5l, t1, x3r, x3r4. NULL: there

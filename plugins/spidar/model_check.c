@@ -74,6 +74,9 @@ static hap_status check_device(const hapi_spidar_model *m, hap_detail *detail)
       {"residual_mm (here in m)", m->residual, 1e-5, 0.1},
       {"heat_tension_n", m->heat_tension, m->min_tension * 1.01, 1e3},
       {"heat_time_s", m->heat_time, 1.0, 1e5},
+      {"mass_kg", m->mass, 0.0, 1e2},
+      {"damping_ns_per_m", m->damping, 0.0, 1e3},
+      {"friction_n", m->friction, 0.0, 1e3},
   };
   if (m->strings < HAPI_SPIDAR_STRINGS_MIN || m->strings > HAPI_SPIDAR_STRINGS_MAX) {
     return hapi_fail(detail, HAP_ERROR_FORMAT, "strings is %d, not within 4 .. 8", m->strings);

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/key_file.h"
 #include "base/log.h"
 #include "base/number.h"
 #include "plugins/spidar/model.h"
@@ -42,6 +43,9 @@ static const figure device_figures[] = {
      "beyond it a length does not fit: a string is slack or broken"},
     {"heat_tension_n", AT(heat_tension), 1, 1.0, false, "that a motor bears for ever"},
     {"heat_time_s", AT(heat_time), 1, 1.0, false, "thermal time constant of a motor"},
+    {"mass_kg", AT(mass), 1, 1.0, false, "of the mechanism, felt at the grip; 0: not known"},
+    {"damping_ns_per_m", AT(damping), 1, 1.0, false, "the same"},
+    {"friction_n", AT(friction), 1, 1.0, false, "the same"},
 };
 #define DEVICE_FIGURES (sizeof device_figures / sizeof device_figures[0])
 
@@ -65,49 +69,14 @@ static double *values_at(hapi_spidar_model *model, const figure *f, int string)
 /* ---- reading ---- */
 
 typedef struct reader {
-  const char *path;
-  FILE *file;
-  unsigned long line;
-  char text[512];
+  hapi_key_file file;
   bool versioned;
   bool named;
   bool boarded;
   bool known[DEVICE_FIGURES];
   bool known_of_string[HAPI_SPIDAR_STRINGS_MAX][STRING_FIGURES];
   hapi_spidar_model model;
-  hap_detail *detail;
 } reader;
-
-static hap_status fail_line(const reader *r, const char *what, const char *item)
-{
-  return hapi_fail(r->detail, HAP_ERROR_FORMAT, "%.200s, line %lu: %s%.60s", r->path, r->line, what,
-                   item);
-}
-
-/* Takes the comment and the blanks off, and cuts at the first '='. False: there is none. */
-static bool cut_line(char *text, char **key, char **value)
-{
-  static const char blanks[] = " \t\r\n";
-  text[strcspn(text, "#")] = '\0';
-  *key = text + strspn(text, blanks);
-  char *end = *key + strlen(*key);
-  while (end > *key && strchr(blanks, end[-1]) != NULL) {
-    *--end = '\0';
-  }
-  *value = end;
-  if (**key == '\0') {
-    return true;
-  }
-  char *equals = strchr(*key, '=');
-  if (equals == NULL || equals == *key) {
-    return false;
-  }
-  *value = equals + 1 + strspn(equals + 1, blanks);
-  do {
-    *equals = '\0';
-  } while (equals-- > *key && strchr(blanks, *equals) != NULL);
-  return true;
-}
 
 /* count numbers between blanks, and no more. */
 static bool numbers_of(const char *text, int count, double *out)
@@ -131,12 +100,13 @@ static hap_status take_figure(reader *r, const figure *f, int string, const char
   bool *known =
       string < 0 ? &r->known[f - device_figures] : &r->known_of_string[string][f - string_figures];
   if (*known) {
-    return fail_line(r, "given twice: ", f->key);
+    return hapi_key_file_fail(&r->file, "given twice: ", f->key);
   }
   if (!numbers_of(value, f->count, numbers)) {
-    return hapi_fail(r->detail, HAP_ERROR_FORMAT,
-                     "%.200s, line %lu: %s: expected %d decimal number%s, not '%.60s'", r->path,
-                     r->line, f->key, f->count, f->count > 1 ? "s with blanks between" : "", value);
+    return hapi_fail(r->file.detail, HAP_ERROR_FORMAT,
+                     "%.200s, line %lu: %s: expected %d decimal number%s, not '%.60s'",
+                     r->file.path, r->file.line, f->key, f->count,
+                     f->count > 1 ? "s with blanks between" : "", value);
   }
   double *out = values_at(&r->model, f, string < 0 ? 0 : string);
   for (int i = 0; i < f->count; ++i) {
@@ -151,22 +121,23 @@ static hap_status take_string(reader *r, const char *key, const char *value)
 {
   const char *digit = key + strlen(STRING_PREFIX);
   if (digit[0] < '0' || digit[0] > '7' || digit[1] != '.') {
-    return fail_line(r, "expected string_0. to string_7. before a key, not ", key);
+    return hapi_key_file_fail(&r->file, "expected string_0. to string_7. before a key, not ", key);
   }
   int string = digit[0] - '0';
   if (string >= r->model.strings) {
-    return hapi_fail(
-        r->detail, HAP_ERROR_FORMAT,
-        "%.200s, line %lu: %.60s, but %s strings = %d: they count from 0", r->path, r->line, key,
-        r->model.strings == 0 ? "before the line strings = N," : "there are", r->model.strings);
+    return hapi_fail(r->file.detail, HAP_ERROR_FORMAT,
+                     "%.200s, line %lu: %.60s, but %s strings = %d: they count from 0",
+                     r->file.path, r->file.line, key,
+                     r->model.strings == 0 ? "before the line strings = N," : "there are",
+                     r->model.strings);
   }
   for (size_t i = 0; i < STRING_FIGURES; ++i) {
     if (strcmp(digit + 2, string_figures[i].key) == 0) {
       return take_figure(r, &string_figures[i], string, value);
     }
   }
-  return fail_line(
-      r,
+  return hapi_key_file_fail(
+      &r->file,
       "of a string are known motor_mm, grip_mm, metres_per_count, volts_per_newton and "
       "offset_m, not ",
       digit + 2);
@@ -175,10 +146,10 @@ static hap_status take_string(reader *r, const char *key, const char *value)
 static hap_status take_name(reader *r, const char *value)
 {
   if (r->named) {
-    return fail_line(r, "given twice: ", "name");
+    return hapi_key_file_fail(&r->file, "given twice: ", "name");
   }
   if (*value == '\0' || strlen(value) >= sizeof r->model.name) {
-    return fail_line(r, "name: expected 1 to 31 characters, not ", value);
+    return hapi_key_file_fail(&r->file, "name: expected 1 to 31 characters, not ", value);
   }
   snprintf(r->model.name, sizeof r->model.name, "%s", value);
   r->named = true;
@@ -189,7 +160,7 @@ static hap_status take_board(reader *r, const char *value)
 {
   bool uart = strcmp(value, "uart") == 0;
   if (r->boarded || (!uart && strcmp(value, "usb") != 0)) {
-    return fail_line(r, "board: expected once uart or usb, not ", value);
+    return hapi_key_file_fail(&r->file, "board: expected once uart or usb, not ", value);
   }
   r->model.board = uart ? HAPI_SPIDAR_UART : HAPI_SPIDAR_USB;
   r->boarded = true;
@@ -200,12 +171,12 @@ static hap_status take_board(reader *r, const char *value)
 static hap_status take_whole(reader *r, const char *key, const char *value, int *out)
 {
   if (*out != 0) {
-    return fail_line(r, "given twice: ", key);
+    return hapi_key_file_fail(&r->file, "given twice: ", key);
   }
   if (value[0] < '1' || value[0] > '8' || value[1] != '\0') {
-    return hapi_fail(r->detail, HAP_ERROR_FORMAT,
-                     "%.200s, line %lu: %s: expected a whole number from %s, not '%.60s'", r->path,
-                     r->line, key, *key == 'd' ? "3 and 6" : "4 to 8", value);
+    return hapi_fail(r->file.detail, HAP_ERROR_FORMAT,
+                     "%.200s, line %lu: %s: expected a whole number from %s, not '%.60s'",
+                     r->file.path, r->file.line, key, *key == 'd' ? "3 and 6" : "4 to 8", value);
   }
   *out = value[0] - '0';
   return HAP_OK;
@@ -215,7 +186,7 @@ static hap_status take_version(reader *r, const char *value)
 {
   double version = 0.0;
   if (!numbers_of(value, 1, &version) || version != VERSION) {
-    return fail_line(r, "version: this library reads version 1, not ", value);
+    return hapi_key_file_fail(&r->file, "version: this library reads version 1, not ", value);
   }
   r->versioned = true;
   return HAP_OK;
@@ -228,28 +199,24 @@ static hap_status take_device(reader *r, const char *key, const char *value)
       return take_figure(r, &device_figures[i], -1, value);
     }
   }
-  return fail_line(r,
-                   "known are version, name, board, strings, dof, min_tension_n, max_tension_n, "
-                   "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, centre_mm, "
-                   "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s and "
-                   "string_N.KEY, not ",
-                   key);
+  return hapi_key_file_fail(
+      &r->file,
+      "known are version, name, board, strings, dof, min_tension_n, max_tension_n, "
+      "tension_rate_n_per_s, torque_weight_per_m2, spread_weight, centre_mm, "
+      "workspace_mm, workspace_deg, residual_mm, heat_tension_n, heat_time_s, "
+      "mass_kg, damping_ns_per_m, friction_n and "
+      "string_N.KEY, not ",
+      key);
 }
 
-static hap_status take_line(reader *r)
+static hap_status take_line(void *self, const hapi_key_file *file, char *key, char *value)
 {
-  char *key = NULL;
-  char *value = NULL;
-  if (!cut_line(r->text, &key, &value)) {
-    return fail_line(r, "expected key = value, not ", key);
-  }
-  if (*key == '\0') {
-    return HAP_OK;
-  }
+  reader *r = self;
+  hapi_key_file_uncomment(value);
   if (!r->versioned) {
     return strcmp(key, "version") == 0
                ? take_version(r, value)
-               : fail_line(r, "expected version = 1 before all else, not ", key);
+               : hapi_key_file_fail(file, "expected version = 1 before all else, not ", key);
   }
   if (strncmp(key, STRING_PREFIX, strlen(STRING_PREFIX)) == 0) {
     return take_string(r, key, value);
@@ -267,29 +234,6 @@ static hap_status take_line(reader *r)
                                  : take_device(r, key, value);
 }
 
-/* A line of more than the buffer and one with a zero byte have no line end where it should be. */
-static hap_status read_lines(reader *r)
-{
-  hap_status status = HAP_OK;
-  while (status >= HAP_OK && fgets(r->text, sizeof r->text, r->file) != NULL) {
-    ++r->line;
-    bool whole = strchr(r->text, '\n') != NULL || feof(r->file) != 0;
-    status = whole ? take_line(r) : fail_line(r, "longer than 510 characters, or not text", "");
-  }
-  if (status >= HAP_OK && ferror(r->file) != 0) {
-    return hapi_fail(r->detail, HAP_ERROR_IO, "%.200s, line %lu: cannot be read: %s", r->path,
-                     r->line + 1, strerror(errno));
-  }
-  return status;
-}
-
-static hap_status fail_missing(const reader *r, const char *prefix, const char *key)
-{
-  return hapi_fail(r->detail, HAP_ERROR_FORMAT,
-                   "%.200s, line %lu: the file ends without a line %s%s = ...", r->path,
-                   r->line + 1, prefix, key);
-}
-
 static hap_status check_strings(reader *r)
 {
   int offsets = 0;
@@ -299,15 +243,15 @@ static hap_status check_strings(reader *r)
     offsets += r->known_of_string[s][OFFSET_FIGURE];
     for (size_t i = 0; i < STRING_FIGURES; ++i) {
       if (string_figures[i].needed && !r->known_of_string[s][i]) {
-        return fail_missing(r, prefix, string_figures[i].key);
+        return hapi_key_file_lacks(&r->file, prefix, string_figures[i].key);
       }
     }
   }
   r->model.calibrated = offsets > 0;
   if (offsets != 0 && offsets != r->model.strings) {
-    return hapi_fail(r->detail, HAP_ERROR_FORMAT,
+    return hapi_fail(r->file.detail, HAP_ERROR_FORMAT,
                      "%.200s: offset_m is given for %d strings of %d; give it for all or for none",
-                     r->path, offsets, r->model.strings);
+                     r->file.path, offsets, r->model.strings);
   }
   return HAP_OK;
 }
@@ -321,7 +265,7 @@ static hap_status check_complete(reader *r)
   for (size_t i = 0; i < DEVICE_FIGURES && missing == NULL; ++i) {
     missing = r->known[i] || !device_figures[i].needed ? NULL : device_figures[i].key;
   }
-  return missing != NULL ? fail_missing(r, "", missing) : check_strings(r);
+  return missing != NULL ? hapi_key_file_lacks(&r->file, "", missing) : check_strings(r);
 }
 
 /* What the file does not say. */
@@ -343,19 +287,15 @@ static hap_status check_whole(reader *r)
   hap_detail why;
   fill_in(r);
   hap_status status = hapi_spidar_model_check(&r->model, &why);
-  return status >= HAP_OK ? HAP_OK
-                          : hapi_fail(r->detail, status, "%.200s: %.300s", r->path, why.text);
+  return status >= HAP_OK
+             ? HAP_OK
+             : hapi_fail(r->file.detail, status, "%.200s: %.300s", r->file.path, why.text);
 }
 
 hap_status hapi_spidar_model_read(const char *path, hapi_spidar_model *out, hap_detail *detail)
 {
-  reader r = {.path = path, .detail = detail};
-  r.file = fopen(path, "r");
-  if (r.file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
-  }
-  hap_status status = read_lines(&r);
-  fclose(r.file);
+  reader r = {.file = {.path = path, .detail = detail}};
+  hap_status status = hapi_key_file_read(&r.file, take_line, &r);
   if (status >= HAP_OK) {
     status = check_complete(&r);
   }

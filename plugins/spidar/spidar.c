@@ -19,6 +19,7 @@
 #define ANSWER_S 0.25                /* for an exchange of start */
 #define POOR_S 0.3        /* lengths may fit no pose for so long: slack strings being wound in */
 #define PERIOD_S 1e-3     /* between two writes, at least */
+#define BYTE_S 5e-6       /* 10 bits of 2 Mbit/s */
 #define WRITE_LATE_S 0.01 /* a longer pause between two writes counts as this */
 #define LITTLE 0.01       /* of the greatest force */
 #define WRAP 65536.0
@@ -518,6 +519,12 @@ static hap_status spidar_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
+/* A force acts when its command has gone out; a read tells the positions of when the tick before asked. */
+static double delay_of(const hapi_spidar_device *device)
+{
+  return PERIOD_S + BYTE_S * (device->zero_count - HAPI_SPIDAR_ZEROS_BEFORE);
+}
+
 static void spidar_describe(void *self, hap_device_info *out)
 {
   const hapi_spidar_device *device = self;
@@ -526,6 +533,10 @@ static void spidar_describe(void *self, hap_device_info *out)
   out->dof = (unsigned)model->dof;
   out->max_force = device->max_force;
   out->max_torque = model->dof == 6 ? device->max_torque : 0.0;
+  out->mass = model->mass;
+  out->damping = model->damping;
+  out->friction = model->friction;
+  out->delay = delay_of(device);
   for (int i = 0; i < model->strings; ++i) {
     out->quantum = fmax(out->quantum, fabs(model->metres_per_count[i]));
   }

@@ -61,6 +61,20 @@ static hap_status check_boards(const emulator_def *def, hap_detail *detail)
   return HAP_OK;
 }
 
+static hap_status set_motions(emulator *e, const emulator_def *def, hap_detail *detail)
+{
+  const char *path = def->path != NULL ? def->path : default_path;
+  const hapi_motion_text text = {"path", "T:x/y/z;... in s and m", path, strlen(path)};
+  e->path.loop = e->turn.loop = true;
+  hap_status status = hapi_motion_set_path(&e->path, &text, detail);
+  if (status >= HAP_OK && def->turn != NULL) {
+    const hapi_motion_text turn = {"turn", "T:x/y/z;... in s and rad", def->turn,
+                                   strlen(def->turn)};
+    status = hapi_motion_set_path(&e->turn, &turn, detail);
+  }
+  return status;
+}
+
 hap_status emulator_init(emulator *e, const emulator_def *def, hap_detail *detail)
 {
   memset(e, 0, sizeof *e);
@@ -68,10 +82,7 @@ hap_status emulator_init(emulator *e, const emulator_def *def, hap_detail *detai
   if (status < HAP_OK) {
     return status;
   }
-  const char *path = def->path != NULL ? def->path : default_path;
-  const hapi_motion_text text = {"path", "T:x/y/z;... in s and m", path, strlen(path)};
-  e->path.loop = true;
-  status = hapi_motion_set_path(&e->path, &text, detail);
+  status = set_motions(e, def, detail);
   if (status < HAP_OK) {
     emulator_finish(e);
     return status;
@@ -98,6 +109,7 @@ hap_status emulator_init(emulator *e, const emulator_def *def, hap_detail *detai
 void emulator_finish(emulator *e)
 {
   hapi_motion_finish(&e->path);
+  hapi_motion_finish(&e->turn);
 }
 
 /* ---- motors and encoders ---- */
@@ -145,20 +157,34 @@ static void follow_motors(emulator *e)
   }
 }
 
+/* How the grip is turned from the attitude of that rotation vector, world axes. */
+static void unturn(const double quat[4], const double turn[3], double out[4])
+{
+  double angle = hapi_v3_norm(turn);
+  double share = angle > 0.0 ? -sin(0.5 * angle) / angle : 0.0;
+  const double back[4] = {cos(0.5 * angle), share * turn[0], share * turn[1], share * turn[2]};
+  hapi_quat_multiply(quat, back, out);
+}
+
 static void hold(const emulator *e, hap_wrench *out)
 {
   double place[3] = {0.0, 0.0, 0.0};
   double speed[3] = {0.0, 0.0, 0.0};
+  double turn[3] = {0.0, 0.0, 0.0};
+  double rate[3] = {0.0, 0.0, 0.0};
+  double off[4];
   const grip *g = &e->grip;
   if (e->hand == EMULATOR_HAND_PUSH) {
     hapi_motion_at(&e->path, emulator_time(e) - e->drawn, place, speed);
+    hapi_motion_at(&e->turn, emulator_time(e) - e->drawn, turn, rate);
   }
-  double side = g->pose.quat_wxyz[0] < 0.0 ? -2.0 : 2.0;
+  unturn(g->pose.quat_wxyz, turn, off);
+  double side = off[0] < 0.0 ? -2.0 : 2.0;
   for (int k = 0; k < 3; ++k) {
     out->force[k] += HAND_STIFFNESS * (place[k] - g->pose.position[k]) +
                      HAND_DAMPING * (speed[k] - g->twist.linear[k]);
     out->torque[k] =
-        -WRIST_STIFFNESS * side * g->pose.quat_wxyz[1 + k] - WRIST_DAMPING * g->twist.angular[k];
+        -WRIST_STIFFNESS * side * off[1 + k] - WRIST_DAMPING * (g->twist.angular[k] - rate[k]);
   }
 }
 

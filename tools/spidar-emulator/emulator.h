@@ -28,6 +28,7 @@ typedef struct emulator_def {
   emulator_hand hand;
   const char
       *path; /* of the hand, "T:x/y/z;...", m from home, repeated; NULL: to and fro along x */
+  const char *turn; /* of the hand, the same with rotation vectors in rad; NULL: not turned */
 } emulator_def;
 
 typedef enum emulator_action_kind {
@@ -65,6 +66,7 @@ typedef struct emulator {
   wire wire;
   grip grip;
   hapi_motion path;
+  hapi_motion turn;
   double drawn;   /* s, since when motors have been pulling; the hand's path begins then */
   double push[3]; /* N, on the grip, beside the hand */
   uint64_t steps; /* done */

@@ -104,6 +104,15 @@ double wire_next(const wire *w)
   return w->reply_count > 0 ? w->replies[0].time : -1.0;
 }
 
+double wire_packet(const wire *w, double length)
+{
+  double end = wire_next(w);
+  for (int i = 1; i < w->reply_count && w->replies[i].time <= w->replies[0].time + length; ++i) {
+    end = w->replies[i].time;
+  }
+  return end;
+}
+
 /* ---- commands ---- */
 
 static void hear(wire *w, uint8_t byte, double time)

@@ -61,4 +61,8 @@ int wire_to_host(wire *w, double time, uint8_t *out, int size);
 /* When the next byte reaches the host; < 0: none is under way. */
 double wire_next(const wire *w);
 
+/* When the last byte does of those that come within length [s] of the next one: what an adapter that collects
+ * bytes for so long hands on at once; < 0: none is under way. */
+double wire_packet(const wire *w, double length);
+
 #endif
