@@ -219,7 +219,8 @@ static void report(bench *b, hap_model model, uint32_t count, double ns)
   const char *name = hap_model_name(model);
   bool moves = model == HAP_MODEL_ACCELERANCE || model == HAP_MODEL_CONTACT;
   if (count == NEIGHBOURS_MAX && moves) {
-    bench_check(b, ns <= MANY_NS, text, name, count, count, ns, ns / count, " (bound 30 us a tick)");
+    bench_check(b, ns <= MANY_NS, text, name, count, count, ns, ns / count,
+                " (bound 30 us a tick)");
   } else if ((count == 8 || count == 64) && model != HAP_MODEL_CONTACT) {
     bench_check(b, ns / count <= BOUND_NS, text, name, count, count, ns, ns / count, " (bound 60)");
   } else {
