@@ -30,9 +30,8 @@ typedef struct turn {
 } turn;
 
 static const char *const columns =
-    "hz,turn,source,realtime,ticks,missed,wake_us_p50,wake_us_p99,wake_us_p999,wake_us_max,"
-    "tick_us_p50,tick_us_p99,tick_us_max,minor_faults,major_faults,voluntary_switches,"
-    "involuntary_switches";
+    "rate_hz,policy,p50_us,p99_us,p999_us,max_us,missed,source,turn,ticks,tick_us_p50,tick_us_p99,"
+    "tick_us_max,minor_faults,major_faults,voluntary_switches,involuntary_switches";
 
 static void wait_for(double seconds)
 {
@@ -157,11 +156,12 @@ static bool run_cyclictest(double hz, double seconds, bool realtime, turn *out)
 
 static void write_row(FILE *csv, double hz, int number, const char *source, const turn *t)
 {
-  fprintf(csv, "%.0f,%d,%s,%d,%llu,%llu", hz, number, source, t->realtime ? 1 : 0,
-          (unsigned long long)t->ticks, (unsigned long long)t->missed);
+  fprintf(csv, "%.0f,%s", hz, t->realtime ? "fifo" : "other");
   for (int i = 0; i < 4; ++i) {
     fprintf(csv, ",%.1f", t->wake_us[i]);
   }
+  fprintf(csv, ",%llu,%s,%d,%llu", (unsigned long long)t->missed, source, number,
+          (unsigned long long)t->ticks);
   if (strcmp(source, "hapode") != 0) {
     fprintf(csv, ",,,,,,,\n");
     return;
@@ -292,7 +292,7 @@ static hap_status draw(bench *b, const rate *rates, size_t count)
 
 hap_status bench_jitter(bench *b)
 {
-  rate rates[] = {{.hz = 1000.0}, {.hz = 4000.0}};
+  rate rates[] = {{.hz = 1000.0}, {.hz = 4000.0}, {.hz = 10000.0}};
   const size_t count = sizeof rates / sizeof rates[0];
   const double seconds = b->quick ? 1.0 : 15.0;
   FILE *csv = bench_csv_open(b, "jitter", columns);

@@ -64,6 +64,8 @@ static const tick_case cases[] = {
     {"row10", "row10", 10, {0, 0, 0}, true, 0.0},
     {"pile64", "pile", 64, {0, 0, 0}, false, LARGE_NS},
     {"pile64", "pile", 64, {0, 0, 0}, true, LARGE_NS},
+    {"row64", "row10", 64, {0, 0, 0}, false, 0.0},
+    {"row64", "row10", 64, {0, 0, 0}, true, 0.0},
     {"wall32x2", "row10", 64, {32, 1, 2}, false, LARGE_NS},
     {"wall32x2", "row10", 64, {32, 1, 2}, true, LARGE_NS},
     {"wall8x8", "row10", 64, {8, 1, 8}, false, 0.0},

@@ -203,10 +203,10 @@ TEST(scaling_leaves_its_table)
 TEST(jitter_leaves_its_table)
 {
   check_program("jitter",
-                "hz,turn,source,realtime,ticks,missed,wake_us_p50,wake_us_p99,wake_us_p999,"
-                "wake_us_max,tick_us_p50,tick_us_p99,tick_us_max,minor_faults,major_faults,"
-                "voluntary_switches,involuntary_switches",
-                8);
+                "rate_hz,policy,p50_us,p99_us,p999_us,max_us,missed,source,turn,ticks,tick_us_p50,"
+                "tick_us_p99,tick_us_max,minor_faults,major_faults,voluntary_switches,"
+                "involuntary_switches",
+                12);
 }
 
 TEST(poses_are_drawn_within_their_bound)

@@ -74,6 +74,11 @@ TEST(missing_arguments_are_refused)
   CHECK(refused(&s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
   s.ode.max_contacts_per_pair = 65;
   CHECK(refused(&s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
+  s.ode.max_contacts_per_pair = 8;
+  s.ode.island_threads = 0;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "island_threads"));
+  s.ode.island_threads = 65;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "island_threads"));
   stage_end(&s);
 }
 

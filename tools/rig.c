@@ -139,6 +139,7 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   ode.space = r->scene->space;
   ode.surface = scene_surface;
   ode.user = r->scene;
+  ode.island_threads = options->island_threads != 0 ? options->island_threads : ode.island_threads;
   hap_session_def def = options->def;
   if (options->player != NULL) {
     (void)hap_player_get_def(options->player, &def);

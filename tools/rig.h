@@ -30,6 +30,7 @@ typedef struct rig_options {
   double coupling_stiffness; /* N/m, of hap_pointer_def */
   double coupling_damping;   /* N s/m, likewise */
   double virtual_mass;       /* kg, likewise; 0: the default */
+  int island_threads;        /* of hap_ode_def; 0: the default */
   hap_session_def def;
   const hap_record_def *record; /* not NULL: the session is recorded */
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */

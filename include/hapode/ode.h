@@ -84,6 +84,12 @@ typedef struct hap_ode_def {
   int32_t max_contacts_per_pair;          /* 1..64, default 8; the loop keeps at most 4 */
   hap_direction_fn friction_direction;    /* may be NULL */
   hap_pointer_surface_fn pointer_surface; /* NULL: the pointer's own friction against everything */
+  /* 1..64, default 1: threads that step islands of the world at once. More than 1: the library gives the
+   * world a pool of ODE's while the session runs, and ODE's default at stop, whatever was set with
+   * dWorldSetStepThreadingImplementation. They have the priority of the thread that starts the session.
+   * Not used in testing simulations, in LOCKSTEP and while recording, which repeat bit by bit. It pays where
+   * there are many islands and cores that nothing else needs; one island is stepped by one thread. */
+  int32_t island_threads;
 } hap_ode_def;
 
 /* [any] */

@@ -131,7 +131,10 @@ static inline void hapi_quat_normalize(double q[4])
     q[1] = q[2] = q[3] = 0.0;
     return;
   }
-  double s = 1.0 / sqrt(n2);
+  /* After a small turn it is nearly of unit length: there the series is exact to rounding, and no root
+   * and division have to be waited for. */
+  double off = n2 - 1.0;
+  double s = fabs(off) < 1e-4 ? 1.0 - off * (0.5 - off * (0.375 - 0.3125 * off)) : 1.0 / sqrt(n2);
   for (int i = 0; i < 4; ++i) {
     q[i] *= s;
   }
@@ -183,6 +186,13 @@ static inline void hapi_m3_turn(const double r[9], const double m[9], double out
       out[3 * i + k] = hapi_v3_dot(rm + 3 * i, r + 3 * k);
     }
   }
+}
+
+/* Whether it is a number times the unit matrix: a tensor that no turn changes. */
+static inline bool hapi_m3_is_scalar(const double m[9])
+{
+  bool off = m[1] != 0.0 || m[2] != 0.0 || m[3] != 0.0 || m[5] != 0.0 || m[6] != 0.0 || m[7] != 0.0;
+  return !off && m[0] == m[4] && m[4] == m[8];
 }
 
 /* By the adjugate; a singular one becomes 0. out is not m */

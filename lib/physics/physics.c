@@ -146,6 +146,7 @@ static void give_world_back(hapi_physics *physics)
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_bodies_scan(physics); /* a body without memory for it was given nothing */
   release_bodies(physics);
+  hapi_islands_end(physics);
   if (physics->islands_threads != 0) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
     physics->islands_threads = 0;
@@ -211,6 +212,11 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   if (status < HAP_OK) {
     give_world_back(physics);
     return status;
+  }
+  if (!hapi_islands_begin(physics)) {
+    give_world_back(physics);
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for island_threads = %d",
+                     physics->ode.island_threads);
   }
   hapi_physics_claim(physics); /* surfaces are asked for */
   prepare(physics);

@@ -509,6 +509,11 @@ typedef struct hapi_test_set {
   unsigned islands_threads; /* ODE's setting, restored after the probes */
 } hapi_test_set;
 
+typedef struct hapi_islands {
+  dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
+  dThreadingThreadPoolID pool;
+} hapi_islands;
+
 typedef struct hapi_physics_counts {
   hap_stats stats; /* physics' part */
   double collide_s;
@@ -587,9 +592,10 @@ struct hapi_physics {
   double meant_cfm;
   bool begun;
   unsigned islands_threads; /* ODE's setting as it was found */
-  bool said_not_probed;     /* of a transmission, once a session */
-  bool said_not_held;       /* of a joint that cannot be measured, likewise */
-  bool said_not_touched;    /* of a heightfield by a hull, likewise */
+  hapi_islands islands;
+  bool said_not_probed;  /* of a transmission, once a session */
+  bool said_not_held;    /* of a joint that cannot be measured, likewise */
+  bool said_not_touched; /* of a heightfield by a hull, likewise */
   hapi_tool_search tools;
   bool world_faulty;   /* holds a state that ODE would abort on: not stepped */
   bool cycling;        /* not at the start */
@@ -679,6 +685,12 @@ void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
                               const dBodyID bodies[2], dSurfaceParameters *surface);
+
+/* Threads for the islands of the global step, between begin and end of a session; false: not to be had. */
+bool hapi_islands_begin(hapi_physics *physics);
+void hapi_islands_end(hapi_physics *physics);
+void hapi_islands_rest(hapi_physics *physics); /* for testing simulations */
+void hapi_islands_go_on(hapi_physics *physics);
 double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */

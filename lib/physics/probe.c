@@ -296,6 +296,7 @@ hap_status hapi_test_enter(hapi_physics *physics)
   }
   test->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+  hapi_islands_rest(physics);
   status = cut_joints(physics);
   if (status >= HAP_OK) {
     status = switch_off(physics);
@@ -382,6 +383,7 @@ void hapi_test_leave(hapi_physics *physics)
   test->cut_count = 0;
   test->disabled_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, test->islands_threads);
+  hapi_islands_go_on(physics);
 }
 
 /* The application's forces of the last step act in a probe as well: it may add them at each step,

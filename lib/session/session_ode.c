@@ -29,6 +29,7 @@ void hap_ode_def_init(hap_ode_def *def, size_t size_of_def)
   memset(&d, 0, sizeof d);
   d.cookie = HAPI_ODE_COOKIE;
   d.max_contacts_per_pair = 8;
+  d.island_threads = 1;
   memset(def, 0, size_of_def);
   d.size = (uint32_t)size_of_def;
   memcpy(def, &d, size_of_def < sizeof d ? size_of_def : sizeof d);
@@ -43,6 +44,10 @@ static hap_status check_ode(const hap_ode_def *def, hap_detail *detail)
   if (def->max_contacts_per_pair < 1 || def->max_contacts_per_pair > 64) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_contacts_per_pair is %d, not in 1 .. 64",
                      def->max_contacts_per_pair);
+  }
+  if (def->island_threads < 1 || def->island_threads > 64) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "island_threads is %d, not in 1 .. 64",
+                     def->island_threads);
   }
   if (dCheckConfiguration("ODE_double_precision") == 0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "the ODE library loaded is single precision");

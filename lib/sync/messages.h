@@ -72,18 +72,19 @@ typedef struct hapi_patch_contact {
   uint32_t generation_b;
   uint32_t surface; /* index into the message's surfaces */
   hapi_touch touch;
+  hapi_slide slide;
   double core_a[3];
   double core_b[3];
+  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
   double ball_a;
   double ball_b;
   double rim_a;
   double rim_b;
+  /* The others are for some contacts only: a tick that comes by a thousand leaves them where they are. */
   double axis_a[3]; /* of the rims */
   double axis_b[3];
-  hapi_slide slide;
   double edge_a[3]; /* EDGES and slides */
   double edge_b[3];
-  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
   hapi_shape shape; /* BALL: what the ball touches */
   hap_pose shape_pose;
 } hapi_patch_contact;

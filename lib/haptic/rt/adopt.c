@@ -58,6 +58,12 @@ static void disown(hapi_tick *tick, hapi_local_body *body)
   }
 }
 
+static void take_given(hapi_local_body *body, const hapi_model_body *in)
+{
+  body->given = *in;
+  body->round = hapi_m3_is_scalar(in->inertia) && hapi_m3_is_scalar(in->inverse_inertia);
+}
+
 /* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is
  * known of it. One that has been let go keeps its pose until physics has had it. */
 static void adopt_contact_body(hapi_tick *tick, hapi_local_body *body, const hapi_model_body *in,
@@ -84,7 +90,7 @@ static void adopt_contact_body(hapi_tick *tick, hapi_local_body *body, const hap
   }
   body->flags = flags;
   body->epoch = in->epoch;
-  body->given = *in;
+  take_given(body, in);
   memcpy(body->residual_taken, in->residual, sizeof body->residual_taken);
   memset(body->residual, 0, sizeof body->residual);
 }
@@ -119,7 +125,7 @@ static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_mode
     return;
   }
   disown(tick, body);
-  body->given = *in;
+  take_given(body, in);
   /* What a pointer pushed keeps the loop's state: a new model replaces what is known of the body,
    * never where the body is. */
   bool keeps = !is_new && body->epoch == in->epoch && stays_linear && was_linear &&

@@ -29,9 +29,7 @@ typedef struct placed_contact {
   double normal[3]; /* from b to a */
   double point[3];  /* between the surfaces */
   double gap;
-  bool gives;      /* see hapi_row_source */
-  double arm_a[3]; /* to point */
-  double arm_b[3];
+  bool gives; /* see hapi_row_source */
 } placed_contact;
 
 static hapi_touch_frame frame_of(const hapi_local_body *body)
@@ -90,38 +88,82 @@ static bool gives(const placed_contact *c)
   return moves || (s->flags & HAPI_SURFACE_SOFT) != 0 || is_given(c->a) || is_given(c->b);
 }
 
-static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t index, int part,
-                          const double direction[3])
+/* The columns of a body in the rows of a contact, `side` 0: ja and ba, 1: jb and bb. */
+static inline double *column_of(hapi_row *row, int side, int response)
+{
+  return side == 0 ? (response == 0 ? row->ja : row->ba) : (response == 0 ? row->jb : row->bb);
+}
+
+/* The same of a body that answers by its mass, which most do. */
+static inline void free_column(const hapi_local_body *body, const double j[6], double b[6])
+{
+  const double *inertia = body->inverse_inertia;
+  hapi_v3_scale(body->inverse_mass, j, b);
+  hapi_m3_apply(inertia, j + 3, b + 3);
+}
+
+static inline void set_columns(const placed_contact *c, int side, double directions[3][3],
+                               hapi_row *rows, uint32_t count)
+{
+  const hapi_local_body *body = side == 0 ? c->a : c->b;
+  double arm[3];
+  if (body == NULL) {
+    for (uint32_t i = 0; i < count; ++i) {
+      memset(column_of(&rows[i], side, 0), 0, sizeof rows->ja);
+      memset(column_of(&rows[i], side, 1), 0, sizeof rows->ba);
+    }
+    return;
+  }
+  bool is_free = hapi_body_responds(body) && (body->flags & HAPI_BODY_MEASURED) == 0;
+  hapi_body_arm(body, c->point, arm);
+  for (uint32_t i = 0; i < count; ++i) {
+    double *j = column_of(&rows[i], side, 0);
+    double *b = column_of(&rows[i], side, 1);
+    hapi_v3_scale(side == 0 ? 1.0 : -1.0, directions[i], j);
+    hapi_v3_cross(arm, j, j + 3);
+    if (is_free) {
+      free_column(body, j, b);
+    } else {
+      hapi_row_response(body, j, b);
+    }
+  }
+}
+
+/* What the rows of a contact have in common; their parts, 0 normal, 1 and 2 friction. */
+static void begin_rows(hapi_tick *tick, const placed_contact *c, uint32_t index, uint32_t first,
+                       const uint8_t *parts, uint32_t count)
 {
   hapi_local_world *world = &tick->world;
-  uint32_t at = world->solver.row_count++;
-  hapi_row *row = &world->solver.rows[at];
-  hapi_row_source *source = &world->sources[at];
-  row->ball = row->round = 0;
-  hapi_row_column(c->a, c->arm_a, direction, 1.0, row->ja, row->ba);
-  hapi_row_column(c->b, c->arm_b, direction, -1.0, row->jb, row->bb);
-  row->a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
-  row->b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
-  row->mu = 0.0;
-  row->normal = -1;
-  row->impulse = world->memory[index].impulse[part];
-  source->contact = index;
-  source->body_a = c->in->body_a;
-  source->body_b = c->in->body_b;
-  source->part = (uint8_t)part;
-  source->pointer = source->joint = false;
-  source->pushes_out = false;
-  source->gives = c->gives;
-  source->stays = 0.0;
-  return row;
+  const hapi_contact_memory *memory = &world->memory[index];
+  const hapi_row_source source = {
+      .contact = index, .body_a = c->in->body_a, .body_b = c->in->body_b, .gives = c->gives};
+  uint32_t a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
+  uint32_t b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
+  for (uint32_t i = 0; i < count; ++i) {
+    hapi_row *row = &world->solver.rows[first + i];
+    row->ball = row->round = 0;
+    row->a = a;
+    row->b = b;
+    row->mu = 0.0;
+    row->normal = -1;
+    row->impulse = memory->impulse[parts[i]];
+    world->sources[first + i] = source;
+    world->sources[first + i].part = parts[i];
+  }
+}
+
+/* m/s along the normal before the tick; negative: they come nearer. */
+static double closing(const placed_contact *c, const hapi_row *row)
+{
+  return hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
 }
 
 /* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
  * deeper than the surface layer. Coming in faster than the threshold: back with its share. */
-static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
+static void set_normal(const hapi_tick *tick, const placed_contact *c, hapi_row *row,
+                       hapi_row_source *source)
 {
   const hapi_surface *s = c->surface;
-  double speed = hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
   double deep = -c->gap - s->layer - PUSH_OUT_SLOP;
   bool soft = (s->flags & HAPI_SURFACE_SOFT) != 0;
   row->lo = 0.0;
@@ -132,13 +174,15 @@ static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
     double push = hapi_min(s->erp * deep / tick->period, s->max_push);
     push = soft ? push : hapi_min(push, PUSH_OUT_MAX);
     row->target += push;
-    tick->world.sources[tick->world.solver.row_count - 1].pushes_out =
-        !soft && push > PUSH_OUT_LEAST;
+    source->pushes_out = !soft && push > PUSH_OUT_LEAST;
   }
-  bool hits = c->gap + tick->period * speed < 0.0;
-  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
+  if ((s->flags & HAPI_SURFACE_BOUNCE) == 0) {
+    return;
+  }
+  double speed = closing(c, row);
+  if (c->gap + tick->period * speed < 0.0 && -speed > s->bounce_speed) {
     row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
-    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
+    source->pushes_out = false;
   }
 }
 
@@ -156,26 +200,47 @@ static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, 
   row->lo = -row->hi;
 }
 
+/* The parts of a contact that have rows. With Approx1 friction is bounded by the normal impulse; a
+ * force mu is there from the touch on. */
+static uint32_t list_parts(const hapi_tick *tick, const placed_contact *c, uint32_t index,
+                           uint8_t parts[3])
+{
+  const hapi_surface *s = c->surface;
+  bool touches = tick->world.memory[index].impulse[0] > 0.0 || c->gap <= 0.0;
+  uint32_t count = 1;
+  parts[0] = 0;
+  if (s->mu > 0.0 && (touches || (s->flags & HAPI_SURFACE_APPROX1_1) != 0)) {
+    parts[count++] = 1;
+  }
+  if (s->mu2 > 0.0 && (touches || (s->flags & HAPI_SURFACE_APPROX1_2) != 0)) {
+    parts[count++] = 2;
+  }
+  return count;
+}
+
 static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
 {
-  const hapi_local_world *world = &tick->world;
-  int32_t normal = (int32_t)world->solver.row_count;
-  double t1[3];
-  double t2[3];
+  hapi_solver *solver = &tick->world.solver;
+  uint32_t first = solver->row_count;
+  hapi_row *rows = &solver->rows[first];
+  double directions[3][3];
+  uint8_t parts[3];
+  uint32_t count = list_parts(tick, c, index, parts);
   c->gives = gives(c);
-  hapi_body_arm(c->a, c->point, c->arm_a);
-  hapi_body_arm(c->b, c->point, c->arm_b);
-  friction_directions(c->surface, c->normal, t1, t2);
-  set_normal(tick, c, next_row(tick, c, index, 0, c->normal));
-  /* With Approx1 friction is bounded by the normal impulse; a force mu is there from the touch on. */
-  bool touches = world->memory[index].impulse[0] > 0.0 || c->gap <= 0.0;
-  const uint32_t flags = c->surface->flags;
-  if (c->surface->mu > 0.0 && (touches || (flags & HAPI_SURFACE_APPROX1_1) != 0)) {
-    set_friction(tick, c->surface, next_row(tick, c, index, 1, t1), 1, normal);
+  hapi_v3_copy(c->normal, directions[0]);
+  friction_directions(c->surface, c->normal, directions[1], directions[2]);
+  if (count == 2 && parts[1] == 2) {
+    hapi_v3_copy(directions[2], directions[1]);
   }
-  if (c->surface->mu2 > 0.0 && (touches || (flags & HAPI_SURFACE_APPROX1_2) != 0)) {
-    set_friction(tick, c->surface, next_row(tick, c, index, 2, t2), 2, normal);
+  begin_rows(tick, c, index, first, parts, count);
+  set_columns(c, 0, directions, rows, count);
+  set_columns(c, 1, directions, rows, count);
+  set_normal(tick, c, &rows[0], &tick->world.sources[first]);
+  for (uint32_t i = 1; i < count; ++i) {
+    set_friction(tick, c->surface, &rows[i], parts[i], (int32_t)first);
   }
+  solver->row_count += count;
+  hapi_contact_ready(solver, first, count);
 }
 
 /* A body that the contact was made for, and that is where the contact thread thought it was. */
@@ -271,11 +336,7 @@ void hapi_contact_rows(hapi_tick *tick)
     placed_contact c;
     bool room = world->solver.row_count + 3 <= world->row_capacity;
     if (find_contact(tick, i, &c) && room && place(&c) && is_near(tick, &c)) {
-      uint32_t first = world->solver.row_count;
       add_contact(tick, &c, i);
-      for (uint32_t row = first; row < world->solver.row_count; ++row) {
-        hapi_row_ready(&world->solver, row);
-      }
     } else {
       memset(world->memory[i].impulse, 0, sizeof world->memory[i].impulse);
     }

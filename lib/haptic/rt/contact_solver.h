@@ -19,30 +19,28 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* One scalar row. Three rows of a contact stand together: normal, then its two frictions. Chains of
+#include "base/lanes.h"
+
+/* One scalar row, in the order in which a sweep reads it. Three rows of a contact stand together: normal, then its two frictions. Chains of
  * bodies converge best in their order, beginning at the hand. A body that does not respond in one
  * row must not respond in any. */
 typedef struct hapi_row {
-  double ja[6]; /* row of the Jacobian, linear and angular */
-  double jb[6]; /* 0 for a static partner */
-  double ba[6]; /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
-  double bb[6];
-  double softness; /* (m/s)/(N s), >= 0 */
-  double target;   /* m/s */
-  double lo;       /* N s; may be -HUGE_VAL */
-  double hi;       /* N s; may be HUGE_VAL */
-  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
+  double ja[6];    /* row of the Jacobian, linear and angular */
+  double ba[6];    /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
   double impulse;  /* N s; in: warm start, out: result */
+  double drive;    /* inner: target without the part of a partner that does not respond */
+  double softness; /* (m/s)/(N s), >= 0 */
   double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
   double response; /* inner: 1 / inverse */
+  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
   double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
                          ball that slides: [0] its part of the force's direction */
-  double drive;       /* inner: target without the part of a partner that does not respond */
-  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
-                      the bounds are lo .. hi */
+  double lo;          /* N s; may be -HUGE_VAL */
+  double hi;          /* N s; may be HUGE_VAL */
   uint32_t a;         /* index into v */
   uint32_t b;         /* several static partners may share one index, whose v stays as it is */
-  uint32_t next;      /* inner: of the same island */
+  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
+                      the bounds are lo .. hi */
   uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
                       vector, no longer than mu p: how many; 0: the pyramid */
   uint8_t round;  /* of the others: how many of them come before */
@@ -50,6 +48,10 @@ typedef struct hapi_row {
   uint8_t moves_a; /* inner: a responds */
   uint8_t paired;  /* inner: b responds */
   uint8_t state;   /* inner, of direct_solver.c */
+  uint32_t next;   /* inner: of the same island */
+  double target;   /* m/s */
+  double jb[6]; /* 0 for a static partner; a sweep reads this and the next where b responds only */
+  double bb[6];
 } hapi_row;
 
 typedef struct hapi_solver {
@@ -100,6 +102,9 @@ void hapi_solver_calm(hapi_solver *solver);
  * In their order; v, row_count and body_count are set before. */
 void hapi_row_ready(hapi_solver *solver, uint32_t index);
 
+/* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its frictions. */
+void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
+
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
 
 /* A few sweeps more, two at least. */
@@ -124,19 +129,20 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first);
  * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
 
-/* Two sums side by side: half the latency, and two lanes for the compiler. */
+/* Two sums side by side, of the even and of the odd. */
 static inline double hapi_dot6(const double a[6], const double b[6])
 {
-  double even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];
-  double odd = a[1] * b[1] + a[3] * b[3] + a[5] * b[5];
-  return even + odd;
+  hapi_two sum = hapi_two_mul(hapi_two_load(a), hapi_two_load(b));
+  sum = hapi_two_madd(sum, hapi_two_load(a + 2), hapi_two_load(b + 2));
+  return hapi_two_sum(hapi_two_madd(sum, hapi_two_load(a + 4), hapi_two_load(b + 4)));
 }
 
 /* v += s b */
 static inline void hapi_madd6(double v[6], double s, const double b[6])
 {
-  for (int i = 0; i < 6; ++i) {
-    v[i] += s * b[i];
+  hapi_two share = hapi_two_all(s);
+  for (int i = 0; i < 6; i += 2) {
+    hapi_two_store(v + i, hapi_two_madd(hapi_two_load(v + i), share, hapi_two_load(b + i)));
   }
 }
 

@@ -58,9 +58,17 @@ static bool spins(const double w[3])
   return hapi_v3_dot(w, w) > 0.0;
 }
 
+static double round_energy(const hapi_local_body *body, const double w[3])
+{
+  return 0.5 * body->given.inertia[0] * hapi_v3_dot(w, w);
+}
+
 static double spin_before(const hapi_local_body *body)
 {
   double local[3];
+  if (body->round) {
+    return round_energy(body, body->start_twist + 3);
+  }
   if (!spins(body->start_twist + 3)) {
     return 0.0;
   }
@@ -71,6 +79,9 @@ static double spin_before(const hapi_local_body *body)
 static double spin_after(const hapi_local_body *body)
 {
   double local[3];
+  if (body->round) {
+    return round_energy(body, body->twist.angular);
+  }
   if (!spins(body->twist.angular)) {
     return 0.0;
   }

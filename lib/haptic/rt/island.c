@@ -311,14 +311,10 @@ uint32_t hapi_island_plan(hapi_island *is)
 /* ---- numbers ---- */
 
 /* block += s b j^T */
-static void add_outer(double *restrict block, double s, const double *restrict b,
-                      const double *restrict j)
+static void add_outer(double block[36], double s, const double b[6], const double j[6])
 {
   for (int i = 0; i < 6; ++i) {
-    double sb = s * b[i];
-    for (int k = 0; k < 6; ++k) {
-      block[6 * i + k] += sb * j[k];
-    }
+    hapi_madd6(block + 6 * i, s * b[i], j);
   }
 }
 
@@ -395,9 +391,7 @@ static void eliminate(double m[36], int k)
     if (i != k) {
       double f = m[6 * i + k];
       m[6 * i + k] = 0.0;
-      for (int c = 0; c < 6; ++c) {
-        m[6 * i + c] -= f * m[6 * k + c];
-      }
+      hapi_madd6(m + 6 * i, -f, m + 6 * k);
     }
   }
 }
@@ -415,14 +409,17 @@ static void invert(double m[36])
 static void multiply_sub(const double a[36], const double b[36], double out[36])
 {
   for (int i = 0; i < 6; ++i) {
-    double row[6];
-    memcpy(row, out + 6 * i, sizeof row);
+    double *row = out + 6 * i;
+    hapi_two sums[3] = {hapi_two_load(row), hapi_two_load(row + 2), hapi_two_load(row + 4)};
     for (int k = 0; k < 6; ++k) {
-      for (int c = 0; c < 6; ++c) {
-        row[c] -= a[6 * i + k] * b[6 * k + c];
+      hapi_two share = hapi_two_all(-a[6 * i + k]);
+      for (int c = 0; c < 3; ++c) {
+        sums[c] = hapi_two_madd(sums[c], share, hapi_two_load(b + 6 * k + 2 * c));
       }
     }
-    memcpy(out + 6 * i, row, sizeof row);
+    for (int c = 0; c < 3; ++c) {
+      hapi_two_store(row + 2 * c, sums[c]);
+    }
   }
 }
 

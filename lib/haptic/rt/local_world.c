@@ -29,7 +29,7 @@ static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, do
     return;
   }
   hapi_v3_madd(v, tick->period, given->gravity, v);
-  hapi_v3_madd(v, tick->period / given->mass, given->user_wrench, v);
+  hapi_v3_madd(v, tick->period * body->inverse_mass, given->user_wrench, v);
   hapi_m3_apply(body->inverse_inertia, given->user_wrench + 3, turn);
   hapi_v3_madd(v + 3, tick->period, turn, v + 3);
 }
@@ -53,7 +53,11 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   body->row = row;
   if ((body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
     body->inverse_mass = 1.0 / body->given.mass;
-    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+    if (body->round) {
+      memcpy(body->inverse_inertia, body->given.inverse_inertia, sizeof body->inverse_inertia);
+    } else {
+      hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+    }
   }
 }
 
@@ -99,8 +103,9 @@ static void set_free_velocities(hapi_tick *tick)
 static void turn(double quat[4], const double w[3], double seconds)
 {
   double half2 = 0.25 * seconds * seconds * hapi_v3_dot(w, w);
-  double sinc = 1.0 - half2 / 6.0 * (1.0 - half2 / 20.0 * (1.0 - half2 / 42.0));
-  double cosine = 1.0 - half2 / 2.0 * (1.0 - half2 / 12.0 * (1.0 - half2 / 30.0));
+  double sinc =
+      1.0 - half2 * (1.0 / 6.0) * (1.0 - half2 * (1.0 / 20.0) * (1.0 - half2 * (1.0 / 42.0)));
+  double cosine = 1.0 - half2 * 0.5 * (1.0 - half2 * (1.0 / 12.0) * (1.0 - half2 * (1.0 / 30.0)));
   double q[4] = {cosine, 0.5 * seconds * sinc * w[0], 0.5 * seconds * sinc * w[1],
                  0.5 * seconds * sinc * w[2]};
   hapi_quat_multiply(q, quat, quat);
@@ -140,13 +145,22 @@ static void turn_gyroscopic(hapi_local_body *body, double seconds, uint32_t subs
   }
 }
 
+static bool is_gyroscopic(const hapi_local_body *body)
+{
+  const uint32_t both = HAPI_BODY_GYROSCOPIC | HAPI_BODY_OWNED;
+  return (body->flags & both) == both && !body->round;
+}
+
 static void move_body(hapi_local_body *body, double seconds)
 {
-  double angle = seconds * hapi_v3_norm(body->twist.angular);
-  double wanted = angle / TURN_MAX;
-  uint32_t substeps = wanted < TURN_SUBSTEPS ? (uint32_t)wanted + 1 : TURN_SUBSTEPS;
+  const double *w = body->twist.angular;
+  uint32_t substeps = 1;
+  if (!(seconds * seconds * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX)) {
+    double wanted = seconds * hapi_v3_norm(w) / TURN_MAX;
+    substeps = wanted < TURN_SUBSTEPS ? (uint32_t)wanted + 1 : TURN_SUBSTEPS;
+  }
   hapi_v3_madd(body->pose.position, seconds, body->twist.linear, body->pose.position);
-  if ((body->flags & HAPI_BODY_GYROSCOPIC) != 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+  if (is_gyroscopic(body)) {
     turn_gyroscopic(body, seconds, substeps);
     return;
   }
@@ -160,7 +174,7 @@ static void follow_inertia(hapi_local_body *body)
 {
   double local[3];
   double momentum[3];
-  if ((body->flags & HAPI_BODY_GYROSCOPIC) != 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+  if (is_gyroscopic(body)) {
     hapi_m3_apply_transposed(body->rotation, body->twist.angular, local);
     hapi_m3_apply(body->given.inertia, local, momentum);
     hapi_m3_apply(body->rotation, momentum, local);
@@ -187,9 +201,10 @@ static void damp(hapi_local_body *body)
 
 static void limit_spin(hapi_local_body *body)
 {
-  double speed = hapi_v3_norm(body->twist.angular);
-  if (speed > body->given.max_angular_speed) {
-    hapi_v3_scale(body->given.max_angular_speed / speed, body->twist.angular, body->twist.angular);
+  double *w = body->twist.angular;
+  double most = body->given.max_angular_speed;
+  if (hapi_v3_dot(w, w) > most * most) {
+    hapi_v3_scale(most / hapi_v3_norm(w), w, w);
   }
 }
 

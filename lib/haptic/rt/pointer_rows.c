@@ -150,16 +150,26 @@ typedef struct spring {
 
 #define NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
 
+/* Whether the middle of the next tick is in touch as `before`, that of the last one, is: then the secant
+ * is one line. */
+static bool stays_closed(const spring *p, double before, double period)
+{
+  double next = p->depth + 0.5 * period * p->s; /* with w' = 0 */
+  double slope = 0.25 * period * period * p->a * p->k;
+  double way = p->free + 0.5 * period * p->a * p->k * (before + next);
+  return before > 0.0 && next * (1.0 + slope) >= 0.5 * period * way;
+}
+
 /* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
  * would be with nothing else in touch. */
 static void linearise(const spring *p, double period, double *out_c, double *out_force)
 {
-  if (p->pulls) {
+  double before = p->depth - 0.5 * period * (p->s - p->w);
+  if (p->pulls || stays_closed(p, before, period)) {
     *out_c = 0.25 * period * p->k;
     *out_force = p->k * p->depth + *out_c * p->w;
     return;
   }
-  double before = p->depth - 0.5 * period * (p->s - p->w);
   double w = p->free;
   double slope = 0.0;
   double force = 0.0;

@@ -191,9 +191,11 @@ typedef struct hapi_local_body {
   /* Model CONTACT. */
   hapi_model_body given;  /* of the newest model */
   uint64_t entered_model; /* with which the loop came to own the body */
-  bool waiting;           /* for its first contacts: goes on with its twist until they are known */
-  uint32_t row;           /* place in the solver's velocities */
-  double rotation[9];     /* of pose */
+  bool
+      round; /* the same inertia about all axes, as cubes and balls have: it does not turn with them */
+  bool waiting;       /* for its first contacts: goes on with its twist until they are known */
+  uint32_t row;       /* place in the solver's velocities */
+  double rotation[9]; /* of pose */
   double inverse_mass;
   double inverse_inertia[9]; /* world */
   double start_twist[6];     /* before this tick */

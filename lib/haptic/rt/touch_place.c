@@ -39,20 +39,25 @@ typedef struct side {
   double rim;
 } side;
 
+static void add_rim(const side *s, const double direction[3], double out[3])
+{
+  double axis[3];
+  double across[3];
+  frame_vector(s->frame, s->axis, axis);
+  hapi_v3_madd(direction, -hapi_v3_dot(direction, axis), axis, across);
+  double length = hapi_v3_norm(across);
+  if (length > 1e-9) {
+    hapi_v3_madd(out, s->rim / length, across, out);
+  }
+}
+
 /* Surface point: ball and rim lie towards direction. */
-static void surface_point(const side *s, const double direction[3], double out[3])
+static inline void surface_point(const side *s, const double direction[3], double out[3])
 {
   frame_point(s->frame, s->core, out);
   hapi_v3_madd(out, s->ball, direction, out);
   if (s->rim > 0.0) {
-    double axis[3];
-    double across[3];
-    frame_vector(s->frame, s->axis, axis);
-    hapi_v3_madd(direction, -hapi_v3_dot(direction, axis), axis, across);
-    double length = hapi_v3_norm(across);
-    if (length > 1e-9) {
-      hapi_v3_madd(out, s->rim / length, across, out);
-    }
+    add_rim(s, direction, out);
   }
 }
 

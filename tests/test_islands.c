@@ -1,0 +1,143 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Threads that step islands of the world: what the world does, and that nothing of them is left or used
+ * where runs repeat bit by bit. */
+
+#include "tests/tap.h"
+
+#include <dirent.h>
+
+#include "tools/rig.h"
+
+#define CUBES 40
+
+static int thread_count(void)
+{
+  int count = 0;
+  DIR *tasks = opendir("/proc/self/task");
+  for (struct dirent *entry = readdir(tasks); entry != NULL; entry = readdir(tasks)) {
+    count += entry->d_name[0] != '.';
+  }
+  (void)closedir(tasks);
+  return count;
+}
+
+static bool open_rig(hap_drive drive, hap_model model, int threads, rig *out)
+{
+  static scene_parameters parameters = {.name = ""};
+  rig_options options;
+  hap_detail detail = {""};
+  rig_options_init(&options);
+  for (size_t i = 0; strcmp(parameters.name, "fig7") != 0; ++i) {
+    parameters = *scene_table_at(i);
+  }
+  parameters.gap = 0.05;
+  options.parameters = &parameters;
+  options.count = CUBES;
+  options.devices[0] = "virtual:path=0:-0.012/0/0.025;0.5:0.02/0/0.025,hand=rigid";
+  options.device_count = 1;
+  options.island_threads = threads;
+  options.def.drive = drive;
+  options.def.model = model;
+  hap_status status = rig_create(&options, out, &detail);
+  printf("%s%s", status < HAP_OK ? "# " : "", status < HAP_OK ? detail.text : "");
+  return status >= HAP_OK;
+}
+
+/* Frames of 10 ms, one second, in which each cube is pushed sideways and up by a force of its own. */
+static void run_frames(int threads, double out[CUBES][3])
+{
+  rig r;
+  int before = thread_count();
+  REQUIRE(open_rig(HAP_DRIVE_FRAME, HAP_MODEL_IMPULSE, threads, &r));
+  REQUIRE(hap_session_start(r.session) >= HAP_OK);
+  CHECK(thread_count() - before >= (threads > 1 ? threads : 0) + 1);
+  int running = thread_count();
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(hap_session_lock(r.session) >= HAP_OK);
+    for (int k = 0; k < CUBES; ++k) {
+      dBodyEnable(r.scene->bodies[k]);
+      dBodyAddForce(r.scene->bodies[k], 0.0, 0.05 * k, 0.0);
+    }
+    hap_session_unlock(r.session);
+    CHECK(hap_session_update(r.session, 0.01) >= HAP_OK);
+  }
+  CHECK(thread_count() == running);
+  hap_session_stop(r.session);
+  CHECK(thread_count() == before);
+  for (int k = 0; k < CUBES; ++k) {
+    memcpy(out[k], dBodyGetPosition(r.scene->bodies[k]), 3 * sizeof(double));
+  }
+  dWorldQuickStep(r.scene->world, 0.001); /* by the caller's thread again */
+  rig_destroy(&r);
+}
+
+/* Each cube by itself is solved as before; only which of them comes first is not given. */
+TEST(threads_step_the_same_world)
+{
+  static double alone[CUBES][3];
+  static double shared[CUBES][3];
+  run_frames(1, alone);
+  run_frames(3, shared);
+  CHECK(alone[CUBES - 1][1] > 0.05);
+  for (int k = 1; k < CUBES; ++k) { /* the hand pushes the first */
+    for (int i = 0; i < 3; ++i) {
+      CHECK_NEAR(shared[k][i], alone[k][i], 1e-3);
+    }
+  }
+}
+
+static uint64_t hash_of(hap_model model, int threads)
+{
+  rig r;
+  hap_stats stats = {0};
+  int before = thread_count();
+  if (!open_rig(HAP_DRIVE_LOCKSTEP, model, threads, &r)) {
+    return 0;
+  }
+  CHECK(hap_session_start(r.session) >= HAP_OK);
+  CHECK(thread_count() == before);
+  CHECK(hap_session_advance(r.session, 400) >= HAP_OK);
+  CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
+  rig_destroy(&r);
+  return stats.trace_hash;
+}
+
+TEST(lockstep_has_none)
+{
+  CHECK(hash_of(HAP_MODEL_CONTACT, 1) != 0);
+  CHECK(hash_of(HAP_MODEL_CONTACT, 1) == hash_of(HAP_MODEL_CONTACT, 4));
+  CHECK(hash_of(HAP_MODEL_ACCELERANCE, 1) == hash_of(HAP_MODEL_ACCELERANCE, 4));
+}
+
+/* Probes between the steps of a pool; sessions one after the other have a pool each. */
+TEST(testing_simulations_go_without)
+{
+  for (int i = 0; i < 2; ++i) {
+    rig r;
+    hap_stats stats = {0};
+    REQUIRE(open_rig(HAP_DRIVE_FRAME, HAP_MODEL_ACCELERANCE, 2, &r));
+    for (int again = 0; again < 2; ++again) {
+      REQUIRE(hap_session_start(r.session) >= HAP_OK);
+      for (int frame = 0; frame < 30; ++frame) {
+        CHECK(hap_session_update(r.session, 0.02) >= HAP_OK);
+      }
+      CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
+      CHECK(stats.probe_steps > 0 && stats.faults == 0);
+      hap_session_stop(r.session);
+    }
+    rig_destroy(&r);
+  }
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  dAllocateODEDataForThread(dAllocateMaskAll);
+  RUN(threads_step_the_same_world);
+  RUN(lockstep_has_none);
+  RUN(testing_simulations_go_without);
+  dCloseODE();
+  return tap_done();
+}

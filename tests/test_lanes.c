@@ -1,0 +1,197 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The solver two numbers at a time against the same sources in plain C (`plain_`, see meson.build): the
+ * same bits, from the rows' preparation to direct solves and what is done with islands that are not
+ * solved. */
+
+#include "tests/tap.h"
+
+#include <stdint.h>
+
+#include "base/lanes.h"
+#include "haptic/rt/contact_solver.h"
+
+#define BODIES 24u
+#define CONTACTS 90u
+#define ROWS (3 * CONTACTS + 8)
+#define WORK (HAPI_SOLVER_WORK(ROWS, BODIES))
+
+void plain_hapi_solver_run(hapi_solver *solver);
+void plain_hapi_solver_calm(hapi_solver *solver);
+void plain_hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
+
+typedef struct problem {
+  hapi_row rows[ROWS];
+  double v[BODIES][6];
+  double free_v[BODIES][6];
+  double work[WORK];
+  hapi_solver solver;
+} problem;
+
+static problem wide;
+static problem plain;
+static uint64_t state;
+
+static double next(void) /* -1 .. 1 */
+{
+  state = state * 6364136223846793005u + 1442695040888963407u;
+  return (double)(int64_t)state / 9.3e18;
+}
+
+static void fill(hapi_row *row, uint32_t a, uint32_t b, double inertia[BODIES][6])
+{
+  memset(row, 0, sizeof *row);
+  row->a = a;
+  row->b = b;
+  for (int k = 0; k < 6; ++k) {
+    row->ja[k] = next();
+    row->jb[k] = b != 0 ? next() : 0.0;
+    row->ba[k] = row->ja[k] * inertia[a][k];
+    row->bb[k] = row->jb[k] * inertia[b][k];
+  }
+  row->hi = HUGE_VAL;
+  row->normal = -1;
+  row->impulse = 1e-3 * next();
+  row->target = 0.1 * next();
+  row->softness = 0.01 * fabs(next());
+}
+
+/* Contacts between bodies of unlike mass, some with the world, and a few rows by themselves. */
+static void make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
+{
+  double inertia[BODIES][6];
+  memset(&wide, 0, sizeof wide);
+  state = seed;
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      inertia[i][k] = i == 0 ? 0.0 : exp(3.0 * next());
+      wide.v[i][k] = wide.free_v[i][k] = i == 0 ? 0.0 : next();
+    }
+  }
+  uint32_t count = 0;
+  for (uint32_t c = 0; c < CONTACTS; ++c) {
+    uint32_t a = 1 + c % (BODIES - 1);
+    uint32_t b = c % 3 == 0 ? 0 : a > 1 ? a - 1 : BODIES - 1;
+    for (int part = 0; part < 3; ++part) {
+      fill(&wide.rows[count + (uint32_t)part], a, b, inertia);
+      wide.rows[count + (uint32_t)part].normal = part == 0 ? -1 : (int32_t)count;
+      wide.rows[count + (uint32_t)part].mu = part == 0 ? 0.0 : 0.6;
+    }
+    count += 3;
+  }
+  for (; count < ROWS; ++count) {
+    fill(&wide.rows[count], 1 + count % (BODIES - 1), 0, inertia);
+  }
+  wide.solver = (hapi_solver){.row_count = ROWS,
+                              .body_count = BODIES,
+                              .tolerance = 1e-9,
+                              .update_budget = budget,
+                              .direct_rows = direct_rows,
+                              .work_count = WORK};
+  plain = wide;
+  for (int i = 0; i < 2; ++i) {
+    problem *p = i == 0 ? &wide : &plain;
+    p->solver.rows = p->rows;
+    p->solver.v = p->v;
+    p->solver.free = p->free_v;
+    p->solver.work = p->work;
+  }
+}
+
+static void compare(void)
+{
+  CHECK(memcmp(wide.v, plain.v, sizeof wide.v) == 0);
+  for (uint32_t i = 0; i < ROWS; ++i) {
+    CHECK(memcmp(&wide.rows[i].impulse, &plain.rows[i].impulse, sizeof(double)) == 0);
+    CHECK_NEAR(wide.rows[i].inverse, plain.rows[i].inverse, 0.0);
+  }
+  CHECK(wide.solver.sweeps == plain.solver.sweeps && wide.solver.sweeps >= 2);
+  CHECK(wide.solver.direct_solves == plain.solver.direct_solves);
+  CHECK_NEAR(wide.solver.residual, plain.solver.residual, 0.0);
+}
+
+static bool is_plain(void)
+{
+#ifdef HAPODE_PLAIN_LANES
+  snprintf(tap_skip, sizeof tap_skip, "built in plain C");
+  return true;
+#else
+  return false;
+#endif
+}
+
+TEST(sweeps)
+{
+  for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
+    make(seed, 20000, 0);
+    hapi_solver_run(&wide.solver);
+    plain_hapi_solver_run(&plain.solver);
+    compare();
+  }
+}
+
+TEST(direct_solves)
+{
+  uint32_t solves = 0;
+  for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
+    make(seed, 200000, ROWS);
+    hapi_solver_run(&wide.solver);
+    plain_hapi_solver_run(&plain.solver);
+    compare();
+    solves += wide.solver.direct_solves;
+  }
+  CHECK(is_plain() || solves > 0);
+}
+
+/* As the tick makes them: contact by contact, from last impulses. */
+TEST(contacts_one_by_one)
+{
+  for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
+    make(seed, 1000, 0);
+    for (uint32_t i = 0; i < ROWS; i += i < 3 * CONTACTS ? 3 : 1) {
+      uint32_t count = i < 3 * CONTACTS ? 3 : 1;
+      hapi_contact_ready(&wide.solver, i, count);
+      plain_hapi_contact_ready(&plain.solver, i, count);
+    }
+    wide.solver.ready = plain.solver.ready = true;
+    hapi_solver_run(&wide.solver);
+    plain_hapi_solver_run(&plain.solver);
+    hapi_solver_calm(&wide.solver);
+    plain_hapi_solver_calm(&plain.solver);
+    compare();
+  }
+}
+
+/* All rows of a contact at once are what they are one by one, but for the order of sums. */
+TEST(contact_as_rows)
+{
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    make(seed, 1000, 0);
+    for (uint32_t i = 0; i < 3 * CONTACTS; ++i) {
+      hapi_row_ready(&plain.solver, i);
+    }
+    for (uint32_t i = 0; i < 3 * CONTACTS; i += 3) {
+      hapi_contact_ready(&wide.solver, i, 3);
+    }
+    for (uint32_t i = 0; i < 3 * CONTACTS; ++i) {
+      CHECK_NEAR(wide.rows[i].impulse, plain.rows[i].impulse, 1e-12);
+      CHECK_NEAR(wide.rows[i].drive, plain.rows[i].drive, 1e-12);
+      CHECK(wide.rows[i].triple == plain.rows[i].triple);
+    }
+    for (uint32_t i = 0; i < BODIES; ++i) {
+      for (int k = 0; k < 6; ++k) {
+        CHECK_NEAR(wide.v[i][k], plain.v[i][k], 1e-12);
+      }
+    }
+  }
+}
+
+int main(void)
+{
+  RUN(sweeps);
+  RUN(direct_solves);
+  RUN(contacts_one_by_one);
+  RUN(contact_as_rows);
+  return tap_done();
+}
