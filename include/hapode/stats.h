@@ -133,6 +133,12 @@ typedef struct hap_stats {
   uint32_t measured_joints; /* of these, the ones whose equations come from testing simulations */
   double joint_error; /* 0.., the largest share by which such equations were off at the end of the
                                last interval: they turn with a body until the next sync */
+  double
+      range_error; /* model CONTACT with the effect testing on: by how much the loop moved neighbours
+                         otherwise in an interval than testing simulations of the whole world, made at its
+                         begin with the pointers' forces, foretold: root of the sums of squares, over
+                         that of what they foretold. 0 without it. The forecast is linear in the
+                         pointer's impulse: what begins or ends to touch or slide is not in it */
 } hap_stats;
 
 HAP_END_DECLS

@@ -78,7 +78,7 @@ static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
   if (def->flags != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "flags has unknown bits 0x%x", def->flags);
   }
-  return HAP_OK;
+  return hapi_session_check_effects(def, detail);
 }
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail)
@@ -98,10 +98,8 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->impulse_pose, 0, 1, "impulse_pose"},
       {def->probe, 0, 2, "probe"},
       {def->max_edge_probes, 0, 1024, "max_edge_probes"},
-      {def->plane, 0, 1, "plane"},
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
-      {def->cross, 0, 1, "cross"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

@@ -70,6 +70,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .model = def->model,
       .impulse_pose = def->impulse_pose,
       .probe = def->probe,
+      .effects = hapi_session_pack_effects(def),
       .physics_hz = def->physics_hz,
       .haptic_hz = def->haptic_hz,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
@@ -113,7 +114,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
-      .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
+      .crosses = 8 * (uint32_t)def->max_bodies,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {
@@ -136,7 +137,6 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
         .rt_priority = def->rt_priority,
         .trace_rows = (uint32_t)def->trace_rows,
-        .plane = def->plane,
         .guard = def->guard,
         .exchange = session->exchange,
     };

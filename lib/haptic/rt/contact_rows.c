@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/rows.h"
 #include "haptic/rt/touch_place.h"
 
@@ -116,12 +117,23 @@ static hapi_row *next_row(hapi_tick *tick, const placed_contact *c, uint32_t ind
   return row;
 }
 
-/* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
- * deeper than the surface layer. Coming in faster than the threshold: back with its share. */
-static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
+/* What comes in faster than the threshold goes back with its share. */
+static void bounce(hapi_tick *tick, const placed_contact *c, hapi_row *row)
 {
   const hapi_surface *s = c->surface;
   double speed = hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
+  bool hits = c->gap + tick->period * speed < 0.0;
+  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
+    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
+    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
+  }
+}
+
+/* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
+ * deeper than the surface layer. */
+static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
+{
+  const hapi_surface *s = c->surface;
   double deep = -c->gap - s->layer - PUSH_OUT_SLOP;
   bool soft = (s->flags & HAPI_SURFACE_SOFT) != 0;
   row->lo = 0.0;
@@ -135,10 +147,10 @@ static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row)
     tick->world.sources[tick->world.solver.row_count - 1].pushes_out =
         !soft && push > PUSH_OUT_LEAST;
   }
-  bool hits = c->gap + tick->period * speed < 0.0;
-  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
-    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
-    tick->world.sources[tick->world.solver.row_count - 1].pushes_out = false;
+  if (HAPI_HAS_RESTITUTION && tick->bounces) {
+    uint64_t begin = hapi_effect_begin(tick);
+    bounce(tick, c, row);
+    hapi_effect_end(tick, HAP_EFFECT_RESTITUTION, begin);
   }
 }
 
