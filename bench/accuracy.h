@@ -74,7 +74,7 @@ typedef struct accuracy_run_def {
   double contact_hz;
   int latency_ticks;
   hap_probe probe;
-  hap_cross cross;
+  hap_effect_wish cross;
   hap_coupling coupling;     /* default: direct */
   double coupling_stiffness; /* N/m */
   double coupling_damping;   /* N s/m */

@@ -22,7 +22,7 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->contact_hz = library.contact_hz;
   def->latency_ticks = library.physics_latency_ticks;
   def->probe = library.probe;
-  def->cross = library.cross;
+  def->cross = (hap_effect_wish)library.effects[HAP_EFFECT_CROSS];
   def->coupling = HAP_COUPLING_DIRECT;
 }
 
@@ -62,7 +62,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.def.contact_hz = def->contact_hz;
   options.def.physics_latency_ticks = def->latency_ticks;
   options.def.probe = def->probe;
-  options.def.cross = def->cross;
+  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)def->cross;
   options.coupling = def->coupling;
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;

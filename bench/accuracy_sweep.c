@@ -56,7 +56,7 @@ typedef struct setting {
   int latency_ticks;
   size_t start_count;
   hap_probe probe;
-  hap_cross cross;
+  hap_effect_wish cross;
   hap_coupling coupling; /* DIRECT, or with the spring and damper of the scene's contacts */
 } setting;
 
@@ -355,10 +355,10 @@ static hap_status measure_contact(sweep *s)
 static const struct {
   const char *knob;
   hap_probe probe;
-  hap_cross cross;
-} ways[] = {{ACCURACY_EQ4, HAP_PROBE_SHARED, HAP_CROSS_OFF},
-            {ACCURACY_OPERATING, HAP_PROBE_OPERATING, HAP_CROSS_OFF},
-            {ACCURACY_CROSS, HAP_PROBE_OPERATING, HAP_CROSS_ON}};
+  hap_effect_wish cross;
+} ways[] = {{ACCURACY_EQ4, HAP_PROBE_SHARED, HAP_EFFECT_OFF},
+            {ACCURACY_OPERATING, HAP_PROBE_OPERATING, HAP_EFFECT_OFF},
+            {ACCURACY_CROSS, HAP_PROBE_OPERATING, HAP_EFFECT_ON}};
 
 /* How model accelerance can test. From all starts the first way is the default row. */
 static hap_status sweep_probes(sweep *s)

@@ -24,6 +24,9 @@ static const program programs[] = {
      "direct and proxy against god-object and virtual coupling: force, depth, stability, drag"},
     {"edits", bench_edits,
      "a world that threads change all the time under sixteen hands: ticks, steps, waits, forces"},
+    {"effects", bench_effects,
+     "what each effect costs in a scene, and everything on against all left to the library; "
+     "--scene NAME"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
@@ -108,7 +111,8 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
   }
   if (*out == NULL) {
     fprintf(stderr, "hapode-bench: which bench?\n");
-  } else if (b->scene != NULL && (*out)->run != bench_accuracy && (*out)->run != bench_tick) {
+  } else if (b->scene != NULL && (*out)->run != bench_accuracy && (*out)->run != bench_effects &&
+             (*out)->run != bench_tick) {
     fprintf(stderr, "hapode-bench: %s has no scenes to choose from\n", (*out)->name);
     return false;
   }

@@ -107,6 +107,9 @@ static inline hap_status world_create_session(test_world *w, hap_surface_fn surf
 {
   hap_detail detail = {""};
   hap_ode_def ode;
+  if (w->def.model == HAP_MODEL_ACCELERANCE) { /* also of free bodies: it is what is looked at */
+    w->def.effects[HAP_EFFECT_TESTING] = HAP_EFFECT_ON;
+  }
   hap_ode_def_init(&ode, sizeof ode);
   ode.world = w->world;
   ode.space = w->space;

@@ -36,9 +36,9 @@ typedef struct recorded_setup {
   void (*meanwhile)(rig *r, int look); /* about every 50 ms */
   hap_record_def record;               /* its path is the file's */
   hap_probe probe;
-  hap_cross cross;
   int32_t max_sweeps;
   int32_t range_hops;
+  hap_effect_wish cross;
   hap_coupling coupling; /* with a spring; else as the rig has it */
   double coupling_stiffness;
   double virtual_mass;
@@ -60,9 +60,9 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   options.scene = s->scene;
   options.def.model = s->model;
   options.def.probe = s->probe;
-  options.def.cross = s->cross;
   options.def.max_sweeps = s->max_sweeps;
   options.def.range_hops = s->range_hops;
+  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)s->cross;
   options.record = &s->record;
   if (s->coupling_stiffness > 0.0) {
     options.coupling = s->coupling;

@@ -62,10 +62,10 @@ static bool start_above(test_world *w, double x)
 }
 
 /* Two cubes along x, their joint in the origin. */
-static void open_pair(test_world *w, hap_cross cross, double mass_a, double mass_b)
+static void open_pair(test_world *w, hap_effect_wish cross, double mass_a, double mass_b)
 {
   world_open(w, 0.0, 1000);
-  w->def.cross = cross;
+  w->def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
   world_add_cube(w, EDGE, mass_a, -APART, 0, 0);
   world_add_cube(w, EDGE, mass_b, APART, 0, 0);
 }
@@ -115,7 +115,7 @@ TEST(a_fixed_pair_answers_as_one_body)
   test_world w;
   const double mass[2] = {0.5, 0.2};
   double expected[6][3];
-  open_pair(&w, HAP_CROSS_ON, mass[0], mass[1]);
+  open_pair(&w, HAP_EFFECT_ON, mass[0], mass[1]);
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
   measure(&w);
@@ -159,7 +159,7 @@ TEST(a_hinged_pair_has_its_closed_form)
 {
   test_world w;
   double expected[6][3];
-  open_pair(&w, HAP_CROSS_ON, 0.4, 0.4);
+  open_pair(&w, HAP_EFFECT_ON, 0.4, 0.4);
   join_hinge(&w);
   REQUIRE(start_above(&w, -0.02));
   measure(&w);
@@ -176,7 +176,7 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
   uint64_t probes[2];
   for (int joined = 0; joined < 2; ++joined) {
     test_world w;
-    open_pair(&w, HAP_CROSS_ON, 0.4, 0.4);
+    open_pair(&w, HAP_EFFECT_ON, 0.4, 0.4);
     if (joined != 0) {
       join_fixed(&w);
     }
@@ -198,7 +198,7 @@ TEST(with_too_few_places_the_largest_stay)
   test_world w;
   hapi_cross all[6];
   world_open(&w, 0.0, 200);
-  w.def.cross = HAP_CROSS_ON;
+  w.def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
   for (int i = 0; i < 3; ++i) {
     world_add_cube(&w, EDGE, 0.2 + 0.3 * i, 2 * APART * i, 0, 0);
   }
@@ -236,7 +236,7 @@ TEST(with_too_few_places_the_largest_stay)
 TEST(a_block_that_is_no_number_is_left_out)
 {
   test_world w;
-  open_pair(&w, HAP_CROSS_ON, 0.5, 0.2);
+  open_pair(&w, HAP_EFFECT_ON, 0.5, 0.2);
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
   const hap_stats *stats = &world_physics(&w)->figures.stats;
@@ -260,11 +260,11 @@ static const hapi_local_body *local(const test_world *w, int body)
 
 /* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so that the
  * loop knows it. */
-static bool open_row(test_world *w, hap_cross cross)
+static bool open_row(test_world *w, hap_effect_wish cross)
 {
   world_open(w, 0.0, 1000);
   w->mu = 0.0;
-  w->def.cross = cross;
+  w->def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
   w->def.guard = HAP_GUARD_MEASURE;
   for (int i = 0; i < 3; ++i) {
     world_add_cube(w, EDGE, 0.5, EDGE / 2 + i * (EDGE - OVERLAP), 0, 0);
@@ -282,20 +282,20 @@ static bool open_row(test_world *w, hap_cross cross)
 
 TEST(the_second_cube_of_a_row_moves_between_syncs)
 {
-  for (int cross = HAP_CROSS_OFF; cross <= HAP_CROSS_ON; ++cross) {
+  for (int cross = HAP_EFFECT_OFF; cross <= HAP_EFFECT_ON; ++cross) {
     test_world w;
-    REQUIRE(open_row(&w, (hap_cross)cross));
+    REQUIRE(open_row(&w, (hap_effect_wish)cross));
     CHECK(hap_session_advance(w.session, 40) == HAP_OK); /* the first sync is at 50 */
     double first = local(&w, 0)->twist.linear[0];
     double second = local(&w, 1)->twist.linear[0];
     CHECK(first > 0.005);
-    CHECK_NEAR(second, cross == HAP_CROSS_ON ? first : 0.0, 1e-6 * first);
+    CHECK_NEAR(second, cross == HAP_EFFECT_ON ? first : 0.0, 1e-6 * first);
     CHECK(dBodyGetLinearVel(w.bodies[1])[0] == 0.0);
     CHECK(hap_session_advance(w.session, 10) == HAP_OK); /* the step of the sync, not yet in use */
     double world = dBodyGetLinearVel(w.bodies[1])[0];
     double missed = world_slot(&w, w.bodies[1])->residual[0]; /* eq. 14 */
     CHECK(world > 0.005);
-    CHECK_NEAR(missed, cross == HAP_CROSS_ON ? 0.0 : world, 1e-5 * world);
+    CHECK_NEAR(missed, cross == HAP_EFFECT_ON ? 0.0 : world, 1e-5 * world);
     world_close(&w);
   }
 }
@@ -304,7 +304,7 @@ TEST(the_second_cube_of_a_row_moves_between_syncs)
 TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
 {
   test_world w;
-  REQUIRE(open_row(&w, HAP_CROSS_ON));
+  REQUIRE(open_row(&w, HAP_EFFECT_ON));
   CHECK(hap_session_advance(w.session, 60) == HAP_OK);
   CHECK((local(&w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
   CHECK((local(&w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
@@ -326,9 +326,9 @@ TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
 TEST(two_hands_on_a_pair_leave_no_residual)
 {
   double missed[2];
-  for (int cross = HAP_CROSS_OFF; cross <= HAP_CROSS_ON; ++cross) {
+  for (int cross = HAP_EFFECT_OFF; cross <= HAP_EFFECT_ON; ++cross) {
     test_world w;
-    open_pair(&w, (hap_cross)cross, 0.5, 0.3);
+    open_pair(&w, (hap_effect_wish)cross, 0.5, 0.3);
     w.def.guard = HAP_GUARD_MEASURE;
     join_fixed(&w);
     REQUIRE(world_create_session(&w, NULL) == HAP_OK);
@@ -341,7 +341,7 @@ TEST(two_hands_on_a_pair_leave_no_residual)
     CHECK(hap_session_advance(w.session, 50) == HAP_OK);
     const hapi_body_slot *slots[2] = {world_slot(&w, w.bodies[0]), world_slot(&w, w.bodies[1])};
     CHECK(slots[0]->pushed && slots[1]->pushed);
-    missed[cross] = fmax(fabs(slots[0]->residual[2]), fabs(slots[1]->residual[2]));
+    missed[cross - HAP_EFFECT_OFF] = fmax(fabs(slots[0]->residual[2]), fabs(slots[1]->residual[2]));
     hap_stats stats = world_stats(&w);
     CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
     world_close(&w);
@@ -350,7 +350,7 @@ TEST(two_hands_on_a_pair_leave_no_residual)
   CHECK(missed[0] > 1e-3 && missed[1] < 0.02 * missed[0]);
 }
 
-static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_cross cross)
+static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_effect_wish cross)
 {
   rig r;
   rig_options options;
@@ -363,7 +363,7 @@ static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_cross cross
   options.def.physics_hz = 20.0;
   options.def.model = HAP_MODEL_ACCELERANCE;
   options.def.probe = probe;
-  options.def.cross = cross;
+  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
   if (rig_create(&options, &r, &detail) < HAP_OK) {
     CHECK(!"a scene");
     return 0;
@@ -378,12 +378,12 @@ static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_cross cross
 
 TEST(a_body_alone_does_not_feel_the_switch)
 {
-  CHECK(hash_of("slide", HAP_PROBE_SHARED, HAP_CROSS_OFF) ==
-        hash_of("slide", HAP_PROBE_SHARED, HAP_CROSS_ON));
-  CHECK(hash_of("stack", HAP_PROBE_SHARED, HAP_CROSS_OFF) !=
-        hash_of("stack", HAP_PROBE_SHARED, HAP_CROSS_ON));
-  CHECK(hash_of("slide", HAP_PROBE_SHARED, HAP_CROSS_OFF) !=
-        hash_of("slide", HAP_PROBE_OPERATING, HAP_CROSS_OFF));
+  CHECK(hash_of("slide", HAP_PROBE_SHARED, HAP_EFFECT_OFF) ==
+        hash_of("slide", HAP_PROBE_SHARED, HAP_EFFECT_ON));
+  CHECK(hash_of("stack", HAP_PROBE_SHARED, HAP_EFFECT_OFF) !=
+        hash_of("stack", HAP_PROBE_SHARED, HAP_EFFECT_ON));
+  CHECK(hash_of("slide", HAP_PROBE_SHARED, HAP_EFFECT_OFF) !=
+        hash_of("slide", HAP_PROBE_OPERATING, HAP_EFFECT_OFF));
 }
 
 /* ---- operating point ---- */
@@ -405,7 +405,7 @@ static bool open_floor(on_floor *f, hap_probe probe, double side)
   world_open(w, GRAVITY, 1000);
   w->mu = MU;
   w->def.probe = probe;
-  w->def.cross = HAP_CROSS_ON;
+  w->def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
   dCreatePlane(w->space, 0, 0, 1, 0);
   dBodyID cube = world_add_cube(w, EDGE, MASS, 0, 0, EDGE / 2 - OVERLAP);
   if (world_create_session(w, NULL) < HAP_OK) {
@@ -479,7 +479,7 @@ TEST(b_and_the_forces_make_the_base_again)
   test_world w;
   double base[3];
   double wanted = 3.0 / 1.5;
-  REQUIRE(open_row(&w, HAP_CROSS_ON));
+  REQUIRE(open_row(&w, HAP_EFFECT_ON));
   hapi_physics *physics = world_physics(&w);
   physics->config.probe = HAP_PROBE_OPERATING;
   hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
@@ -508,7 +508,7 @@ TEST(what_does_not_answer_has_no_block)
     world_open(w, GRAVITY, 1000);
     w->mu = MU;
     w->def.probe = HAP_PROBE_OPERATING;
-    w->def.cross = HAP_CROSS_ON;
+    w->def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
     dCreatePlane(w->space, 0, 0, 1, 0);
     for (int i = 0; i < 2; ++i) {
       world_add_cube(w, EDGE, MASS, i * (EDGE - OVERLAP), 0, EDGE / 2 - OVERLAP);
@@ -550,7 +550,7 @@ TEST(operating_probes_are_as_many_as_shared_ones)
   uint64_t steps[2];
   for (int k = 0; k < 2; ++k) {
     test_world w;
-    open_pair(&w, HAP_CROSS_OFF, 0.4, 0.4);
+    open_pair(&w, HAP_EFFECT_OFF, 0.4, 0.4);
     w.def.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
     join_fixed(&w);
     REQUIRE(start_above(&w, -0.02));

@@ -154,14 +154,14 @@ TEST(ways_of_testing)
   for (size_t i = 0; i < sizeof scenes / sizeof scenes[0]; ++i) {
     recorded_setup s = recorded_setup_of(scenes[i], HAP_MODEL_ACCELERANCE, 400);
     s.probe = HAP_PROBE_OPERATING;
-    s.cross = HAP_CROSS_ON;
+    s.cross = HAP_EFFECT_ON;
     (void)check_setup(&s);
     hap_player *player = NULL;
     hap_session_def def;
     hap_session_def_init(&def, sizeof def);
     REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
     CHECK(hap_player_get_def(player, &def) == HAP_OK);
-    CHECK(def.probe == HAP_PROBE_OPERATING && def.cross == HAP_CROSS_ON);
+    CHECK(def.probe == HAP_PROBE_OPERATING && def.effects[HAP_EFFECT_CROSS] == HAP_EFFECT_ON);
     hap_player_close(player);
   }
 }

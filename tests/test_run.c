@@ -167,7 +167,7 @@ TEST(help_list_and_version_are_answered)
                                "replay",       "impulse",
                                "accelerance",  "contact",
                                "testing",      "k 2000 N/m",
-                               "duration 2 s", "contact auto or as told"};
+                               "duration 2 s", "accelerance (never off), contact"};
   for (size_t i = 0; i < sizeof there / sizeof there[0]; ++i) {
     if (strstr(ran.out, there[i]) == NULL) {
       printf("# --list does not tell of %s\n", there[i]);
@@ -239,29 +239,29 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
   }
 }
 
-TEST(what_this_version_cannot_do_is_said)
+TEST(what_a_model_cannot_do_is_said)
 {
-  CHECK(run("--effects gyro=off") == 2);
-  CHECK(says("gyro=off") && says("not supported in this version"));
-  CHECK(run("--effects friction=on") == 2 && says("--friction"));
+  CHECK(run("--model accelerance --effects gyro=on") == 2);
+  CHECK(says("gyro=on") && says("use model contact"));
   CHECK(run("--effects friction=off --friction 0.3") == 2 && says("friction=off"));
   CHECK(run("--lockstep --seconds 0.05 --friction 0.3 --finger-radius 0.004") == 0);
   CHECK(strstr(ran.out, "friction=on") != NULL);
-  CHECK(run("--effects testing=off") == 2);
-  CHECK(says("testing=off") && says("not supported in this version"));
+  CHECK(run("--model accelerance --effects testing=off") == 2);
+  CHECK(says("testing=off") && says("use model contact"));
   CHECK(run("--model accelerance --effects contacts=on") == 2);
-  CHECK(says("contacts=on") && says("not supported in this version"));
-  CHECK(run("--model impulse --effects testing=on") == 2);
+  CHECK(says("contacts=on") && says("use model contact"));
   CHECK(run("--model accelerance --lockstep --seconds 0.05 "
             "--effects friction=off,torque=auto --effects testing=on") == 0);
   CHECK(run("--lockstep --seconds 0.05 --effects shape=off,contacts=on") == 0);
-  CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL);
-  CHECK(strstr(ran.out, "testing=auto") != NULL);
+  CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL &&
+        strstr(ran.out, "testing=off") != NULL);
+  CHECK(run("--lockstep --seconds 0.5 --effects all=on --effects-table") == 0 &&
+        strstr(ran.out, "testing=on,cross=off") != NULL && strstr(ran.out, "asked for") != NULL);
 }
 
 TEST(ways_of_testing_can_be_chosen)
 {
-  static const char *const ways[] = {"--effects cross=on", "--probe operating", ""};
+  const char *const ways[] = {"", "--effects cross=off --probe operating", "--effects cross=off"};
   char hashes[3][24];
   for (int i = 0; i < 3; ++i) { /* two bodies that touch */
     CHECK(run("--model accelerance --scene stack --physics-hz 20 --lockstep --seconds 0.7 %s",
@@ -382,14 +382,14 @@ TEST(the_coupling_can_be_chosen_and_is_reported)
     const char *coupling;
     const char *effect;
   } cases[] = {
-      {"", "direct (UNKNOWN: 2000 N/m near, the device does not say what it holds)", "proxy=auto"},
+      {"", "direct (UNKNOWN: 2000 N/m near, the device does not say what it holds)", "proxy=off"},
       {"--effects proxy=off", "direct (ASKED)", "proxy=off"},
       {"--coupling virtual:500", "virtual (ASKED: a spring of 500 N/m)", "proxy=on"},
       {"--coupling proxy:500", "proxy (ASKED: a spring of 500 N/m)", "proxy=on"},
       {"--coupling=auto:3000", "direct (WITHIN: 2000 N/m near, no more than the device holds)",
-       "proxy=auto"},
+       "proxy=off"},
       {"--coupling=auto:3000 --stiffness 8000",
-       "proxy (ABOVE: 8000 N/m near, the device holds 3000 N/m)", "proxy=auto"},
+       "proxy (ABOVE: 8000 N/m near, the device holds 3000 N/m)", "proxy=on"},
       {"--model accelerance", "direct (MODEL: only model contact has a proxy)", "proxy=off"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
@@ -865,7 +865,7 @@ int main(void)
   RUN(help_list_and_version_are_answered);
   RUN(an_unknown_name_is_answered_with_those_that_exist);
   RUN(a_wrong_value_is_answered_with_what_is_allowed);
-  RUN(what_this_version_cannot_do_is_said);
+  RUN(what_a_model_cannot_do_is_said);
   RUN(ways_of_testing_can_be_chosen);
   RUN(a_malformed_recording_names_its_line);
   RUN(files_that_cannot_be_written_are_found_before_the_run);

@@ -131,8 +131,6 @@ static const struct {
     WHOLE_FIELD(impulse_pose, 2),
     WHOLE_FIELD(probe, 3),
     WHOLE_FIELD(probe, -1),
-    WHOLE_FIELD(cross, 2),
-    WHOLE_FIELD(cross, -1),
     WHOLE_FIELD(max_sweeps, -1),
     WHOLE_FIELD(max_sweeps, 1),
     WHOLE_FIELD(max_sweeps, 10001),

@@ -181,9 +181,14 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
   }
   if (stats.size > 0) { /* it was started */
     tell(loop->options, status, &stats);
-    run_summary_print(loop->options, &stats, stdout);
+    hap_effect_info effects[HAP_EFFECTS];
+    (void)hap_session_effects(loop->rig->session, effects, HAP_EFFECTS, sizeof effects[0]);
+    run_summary_print(loop->options, &stats, effects, stdout);
     if (recording->player == NULL) {
       run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
+    }
+    if (loop->options->effects_table) {
+      run_effects_table(effects, stdout);
     }
     if (!run_recording_print(recording, loop->options, loop->rig->session, stdout, &detail)) {
       code = complain(EXIT_FAILED, detail.text);

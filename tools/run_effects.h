@@ -3,41 +3,30 @@
 #ifndef HAPODE_TOOLS_RUN_EFFECTS_H
 #define HAPODE_TOOLS_RUN_EFFECTS_H
 
-/* Parts of the simulation that a scene may or may not call for. Few are switches in this version: the
- * model decides, and asking for another state is refused. */
+/* The effects of a session (hapode/effects.h) as a program is told of them and tells of them. */
 
 #include <stdbool.h>
 #include <stdio.h>
 
 #include <hapode/hapode.h>
 
-#define RUN_EFFECTS 14
-
-typedef enum run_effect_wish {
-  RUN_EFFECT_AUTO = 0, /* also: not named */
-  RUN_EFFECT_OFF,
-  RUN_EFFECT_ON
-} run_effect_wish;
-
 typedef struct run_effects {
-  run_effect_wish wish[RUN_EFFECTS];
+  hap_effect_wish wish[HAP_EFFECTS];
+  bool of_all[HAP_EFFECTS]; /* by "all=": left out where the model cannot */
 } run_effects;
 
-/* Takes a list such as "friction=off,torque=auto" over what was there. On failure detail says what
- * the list may hold. */
+/* Takes a list such as "friction=off,torque=auto" over what was there; "all=on" is for all that the model can
+ * fulfil. On failure detail says what the list may hold. */
 hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail);
 
-/* HAP_ERROR_UNSUPPORTED for a wish that the model does not meet in this version. */
-hap_status run_effects_check(const run_effects *wanted, hap_model model, hap_detail *detail);
+/* Into the def, whose model is known by now. HAP_ERROR_UNSUPPORTED for a wish that it cannot fulfil. */
+hap_status run_effects_apply(const run_effects *wanted, hap_session_def *io, hap_detail *detail);
 
-/* The wish for the effect of that name, one of those that run_effects_list prints. */
-run_effect_wish *run_effects_wish(run_effects *wanted, const char *name);
+/* "testing=on,cross=off,...": on, off or partly. */
+void run_effects_print(const hap_effect_info effects[HAP_EFFECTS], FILE *out);
 
-/* What the session can be told of it. */
-void run_effects_apply(const run_effects *wanted, hap_session_def *io);
-
-/* "testing=on,cross=off,...": what the model has. */
-void run_effects_print(const run_effects *wanted, hap_model model, FILE *out);
+/* A line each: what was wished for, what came of it and why, for how many, and what it costs. */
+void run_effects_table(const hap_effect_info effects[HAP_EFFECTS], FILE *out);
 
 /* One line each: name, what it is, which models have it. */
 void run_effects_list(FILE *out);

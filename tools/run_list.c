@@ -89,6 +89,6 @@ void run_list_print(FILE *out)
   for (size_t i = 0; (name = hap_device_name_at(i, &text)) != NULL; ++i) {
     print_device(name, text, out);
   }
-  fputs("\neffects (in most the model decides; auto is always right):\n", out);
+  fputs("\neffects (NAME=on, off or auto, which is the default):\n", out);
   run_effects_list(out);
 }

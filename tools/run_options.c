@@ -171,6 +171,16 @@ static hap_status take_no_realtime(run_options *options, const option *self, con
   return HAP_OK;
 }
 
+static hap_status take_effects_table(run_options *options, const option *self, const char *value,
+                                     hap_detail *detail)
+{
+  (void)self;
+  (void)value;
+  (void)detail;
+  options->effects_table = true;
+  return HAP_OK;
+}
+
 static hap_status take_lockstep(run_options *options, const option *self, const char *value,
                                 hap_detail *detail)
 {
@@ -296,7 +306,10 @@ static const option table[] = {
      take_coupling, offsetof(run_options, rig.coupling_stiffness), 1e-3, 1e9},
     {"--virtual-mass", "KG", "of the tool of coupling virtual (default 0.1)", take_number,
      offsetof(run_options, rig.virtual_mass), 1e-6, 1e6},
-    {"--effects", "LIST", "such as friction=off,torque=auto; see --list", take_effects, 0, 0, 0},
+    {"--effects", "LIST", "such as friction=off,torque=auto, or all=on; see --list", take_effects,
+     0, 0, 0},
+    {"--effects-table", NULL, "after the summary, a line for each effect: why, and what it costs",
+     take_effects_table, 0, 0, 0},
     {"--trace", "FILE", "every tick as a row of a CSV file", take_text,
      offsetof(run_options, trace_path), 0, 0},
     {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
@@ -384,46 +397,31 @@ static hap_status take_option(char **argv, int *at, run_options *out, hap_detail
   return status < HAP_OK ? fail(detail, "%s: %.480s", found->name, why.text) : HAP_OK;
 }
 
-/* --coupling and the effect "proxy" are two names of one thing. */
+/* --coupling says it of the pointers, the effect "proxy" of those that leave it to the library. */
 static hap_status join_coupling(run_options *o, hap_detail *detail)
 {
-  static const run_effect_wish wishes[] = {[HAP_COUPLING_DIRECT] = RUN_EFFECT_OFF,
-                                           [HAP_COUPLING_PROXY] = RUN_EFFECT_ON,
-                                           [HAP_COUPLING_AUTO] = RUN_EFFECT_AUTO,
-                                           [HAP_COUPLING_GOD_OBJECT] = RUN_EFFECT_ON,
-                                           [HAP_COUPLING_VIRTUAL] = RUN_EFFECT_ON};
-  static const hap_coupling couplings[] = {[RUN_EFFECT_OFF] = HAP_COUPLING_DIRECT,
-                                           [RUN_EFFECT_ON] = HAP_COUPLING_PROXY,
-                                           [RUN_EFFECT_AUTO] = HAP_COUPLING_AUTO};
-  run_effect_wish *proxy = run_effects_wish(&o->effects, "proxy");
-  if (wishes[o->rig.coupling] == RUN_EFFECT_ON && o->rig.def.model != HAP_MODEL_CONTACT) {
-    return fail(detail, "--coupling: %s needs --model contact", hap_coupling_name(o->rig.coupling));
+  hap_coupling coupling = o->rig.coupling;
+  hap_effect_wish proxy =
+      o->effects.of_all[HAP_EFFECT_PROXY] ? HAP_EFFECT_AUTO : o->effects.wish[HAP_EFFECT_PROXY];
+  bool spring = coupling != HAP_COUPLING_DIRECT && coupling != HAP_COUPLING_AUTO;
+  if (spring && o->rig.def.model != HAP_MODEL_CONTACT) {
+    return fail(detail, "--coupling: %s needs --model contact", hap_coupling_name(coupling));
   }
-  if (o->coupling_given && *proxy != RUN_EFFECT_AUTO && *proxy != wishes[o->rig.coupling]) {
+  if (o->coupling_given && coupling != HAP_COUPLING_AUTO && proxy != HAP_EFFECT_AUTO &&
+      spring != (proxy == HAP_EFFECT_ON)) {
     return fail(detail, "--coupling: --effects asks for something else by proxy=");
   }
-  if (o->rig.virtual_mass > 0.0 && o->rig.coupling != HAP_COUPLING_VIRTUAL) {
+  if (o->rig.virtual_mass > 0.0 && coupling != HAP_COUPLING_VIRTUAL) {
     return fail(detail, "--virtual-mass: it belongs to --coupling virtual");
   }
-  *proxy = o->coupling_given ? wishes[o->rig.coupling] : *proxy;
-  o->rig.coupling = o->coupling_given ? o->rig.coupling : couplings[*proxy];
   return HAP_OK;
 }
 
-/* --friction and the effect "friction" are two names of one thing. */
-static hap_status join_friction(run_options *o, hap_detail *detail)
+static hap_status join_friction(const run_options *o, hap_detail *detail)
 {
-  run_effect_wish *wish = run_effects_wish(&o->effects, "friction");
-  bool given = o->rig.friction > 0.0;
-  if (*wish == RUN_EFFECT_OFF && given) {
-    return fail(detail, "--friction: --effects asks for something else by friction=off");
-  }
-  if (*wish == RUN_EFFECT_ON && !given) {
-    return fail(detail, "--effects: friction=on needs to know how much: --friction MU");
-  }
-  o->rig.friction = *wish == RUN_EFFECT_OFF ? 0.0 : o->rig.friction;
-  *wish = given ? RUN_EFFECT_ON : *wish;
-  return HAP_OK;
+  return o->effects.wish[HAP_EFFECT_FRICTION] == HAP_EFFECT_OFF && o->rig.friction > 0.0
+             ? fail(detail, "--friction: --effects asks for something else by friction=off")
+             : HAP_OK;
 }
 
 static bool same(const char *a, const char *b)
@@ -434,14 +432,15 @@ static bool same(const char *a, const char *b)
 /* --record and the effect "recording" are two names of one thing. */
 static hap_status join_recording(run_options *o, hap_detail *detail)
 {
-  run_effect_wish *wish = run_effects_wish(&o->effects, "recording");
-  if (*wish == RUN_EFFECT_ON && o->record_path == NULL) {
+  hap_effect_wish *wish = &o->effects.wish[HAP_EFFECT_RECORDING];
+  bool named = !o->effects.of_all[HAP_EFFECT_RECORDING];
+  if (*wish == HAP_EFFECT_ON && named && o->record_path == NULL) {
     return fail(detail, "--effects: recording=on needs a file: --record FILE");
   }
-  if (*wish == RUN_EFFECT_OFF && o->record_path != NULL) {
+  if (*wish == HAP_EFFECT_OFF && o->record_path != NULL) {
     return fail(detail, "--record: --effects asks for something else by recording=off");
   }
-  *wish = o->record_path != NULL ? RUN_EFFECT_ON : *wish;
+  *wish = *wish == HAP_EFFECT_ON ? HAP_EFFECT_AUTO : *wish; /* the file says it */
   return HAP_OK;
 }
 
@@ -530,11 +529,9 @@ static hap_status check(run_options *o, hap_detail *detail)
       join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
-  if (run_effects_check(&o->effects, def->model, &why) < HAP_OK) {
-    return fail(detail, "--effects: %.480s", why.text);
-  }
-  run_effects_apply(&o->effects, def);
-  return HAP_OK;
+  return run_effects_apply(&o->effects, def, &why) < HAP_OK
+             ? fail(detail, "--effects: %.480s", why.text)
+             : HAP_OK;
 }
 
 hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail *detail)

@@ -32,6 +32,7 @@ typedef struct run_options {
   const char *calibrate_path; /* not NULL: calibrate the device, no session */
   conform_options check;      /* spec not NULL: check that device, no session */
   run_effects effects;
+  bool effects_table; /* why, and what they cost */
   const char *record_path;
   double record_limit_mib; /* 0: the default */
   const char *play_path;   /* not NULL: no devices, all from the file */

@@ -81,7 +81,8 @@ static void print_more(const hap_stats *stats, FILE *out)
   count(out, "energy_ticks", stats->energy_ticks);
 }
 
-void run_summary_print(const run_options *options, const hap_stats *stats, FILE *out)
+void run_summary_print(const run_options *options, const hap_stats *stats,
+                       const hap_effect_info effects[HAP_EFFECTS], FILE *out)
 {
   print_setup(options, out);
   count(out, "ticks", stats->ticks);
@@ -97,7 +98,7 @@ void run_summary_print(const run_options *options, const hap_stats *stats, FILE 
   count(out, "neighbours_max", stats->neighbours_max);
   number(out, "momentum_ratio", stats->momentum_ratio);
   fputs("effects: ", out);
-  run_effects_print(&options->effects, options->rig.def.model, out);
+  run_effects_print(effects, out);
   fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->trace_hash);
   count(out, "faults", stats->faults);
   print_more(stats, out);

@@ -8,7 +8,8 @@
 #include "tools/run_options.h"
 
 /* One "key: value" a line, keys and order as in design.md section 9. New keys go to the end. */
-void run_summary_print(const run_options *options, const hap_stats *stats, FILE *out);
+void run_summary_print(const run_options *options, const hap_stats *stats,
+                       const hap_effect_info effects[HAP_EFFECTS], FILE *out);
 
 /* The devices' specs, several joined by " + ". */
 void run_summary_devices(const rig_options *options, char *out, size_t size);

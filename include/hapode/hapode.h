@@ -8,6 +8,7 @@
 
 #include <hapode/attributes.h>
 #include <hapode/device.h>
+#include <hapode/effects.h>
 #include <hapode/hooks.h>
 #include <hapode/pointer.h>
 #include <hapode/record.h>

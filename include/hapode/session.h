@@ -49,21 +49,6 @@ typedef enum hap_probe {
                              forces that the pointers give, and is perturbed by 1 % of the weight */
 } hap_probe;
 
-/* Whether model ACCELERANCE lets a pointer's force move other bodies than the one it acts on. */
-typedef enum hap_cross {
-  HAP_CROSS_OFF = 0, /* each A is of one body (the paper) */
-  HAP_CROSS_ON = 1   /* and of the local bodies of its island as well, by the same testing
-                        simulations. Of at most 8 max_bodies pairs of a contact and a body, those that
-                        answer most; hap_stats.capacity_dropped counts the others */
-} hap_cross;
-
-/* What model CONTACT takes a body's surface for, where a pointer touches it. */
-typedef enum hap_plane {
-  HAP_PLANE_WHERE_NEEDED = 0, /* the shape itself at every tick; a plane for convex geoms and
-                                 meshes */
-  HAP_PLANE_ALWAYS = 1        /* the plane at the nearest point of the last physics step: cheaper */
-} hap_plane;
-
 /* Whether the guard shapes the force. Its checks, faults and limits always hold. */
 typedef enum hap_guard {
   HAP_GUARD_ON = 0,     /* all of it */
@@ -74,6 +59,9 @@ typedef enum hap_guard {
 
 /* For hap_session_def.range_hops: as far as max_bodies goes. */
 #define HAP_RANGE_ALL (-1)
+
+/* Room in hap_session_def for effects that may come. */
+#define HAP_EFFECT_PLACES 32
 
 /* For hap_session_def.physics_latency_ticks. */
 #define HAP_LATENCY_DEFAULT (-1)
@@ -107,11 +95,9 @@ typedef struct hap_session_def {
                               physics step (7 steps of their island, of at most 64 bodies), 0..1024,
                               default 4; the others answer with their own mass alone until the next
                               step */
-  hap_plane plane;         /* model CONTACT, default HAP_PLANE_WHERE_NEEDED */
   int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
                               mesh there, 0..1048576, default 4096 */
   hap_guard guard;         /* default HAP_GUARD_ON */
-  hap_cross cross;         /* model ACCELERANCE, default HAP_CROSS_OFF */
   int32_t
       max_sweeps; /* model CONTACT: sweeps over the rows of contacts and joints in each solve of a
                          tick, 2..10000; direct solves come between them, from the second one on, so that
@@ -125,6 +111,10 @@ typedef struct hap_session_def {
   double lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
                       are gone over as model SINGLE would have had them, for hap_stats.force_error; in
                       LOCKSTEP all of the time is, whatever the share. 0: never */
+  uint8_t
+      effects[HAP_EFFECT_PLACES]; /* hap_effect_wish by hap_effect (hapode/effects.h), default all
+                                         HAP_EFFECT_AUTO; places beyond HAP_EFFECTS are 0. A wish that
+                                         the model cannot fulfil is an error */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

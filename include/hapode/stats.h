@@ -141,6 +141,12 @@ typedef struct hap_stats {
   double force_error_n;      /* N, RMS of the difference in the newest one */
   uint64_t lookbacks;        /* windows gone over */
   uint64_t lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile */
+  double
+      range_error; /* model CONTACT with the effect testing on: by how much the loop moved neighbours
+                         otherwise in an interval than testing simulations of the whole world, made at its
+                         begin with the pointers' forces, foretold: root of the sums of squares, over
+                         that of what they foretold. 0 without it. The forecast is linear in the
+                         pointer's impulse: what begins or ends to touch or slide is not in it */
 } hap_stats;
 
 HAP_END_DECLS

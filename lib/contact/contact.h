@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/effects.h>
 #include <hapode/stats.h>
 
 #include "record/tape.h"
@@ -45,6 +46,10 @@ bool hapi_contact_has_news(hapi_contact *contact);
  * first local model of model CONTACT. */
 void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns);
 
+/* [contact] Whether there is anything to find in what it has taken. */
+bool hapi_contact_has_work(const hapi_contact *contact);
+
+void hapi_contact_effects(const hapi_contact *contact, hap_effect_info *out); /* [any] likewise */
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out); /* [any] its part of *out */
 
 #endif

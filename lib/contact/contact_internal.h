@@ -34,6 +34,7 @@ struct hapi_contact {
   hapi_pass_body *bodies; /* capacity.bodies */
   hapi_pass_pair *pairs;  /* capacity.contacts */
   uint64_t number;
+  uint32_t lingers;          /* passes that are made although nothing is left to find */
   _Atomic uint64_t left_out; /* pairs without room for their contacts, sum over the passes */
   hapi_histogram pass_ns;
   hapi_thread thread;

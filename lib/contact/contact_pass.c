@@ -14,7 +14,8 @@
 #define MARGIN_FLOOR 0.002 /* m */
 #define MARGIN_SPEED 1.5   /* of the way that the bodies' speed makes until the next pass */
 #define MARGIN_GRAVITY 9.81
-#define AGE_TICKS 2.0  /* from the poses of a pass to the use of its contacts */
+#define AGE_TICKS 2.0 /* from the poses of a pass to the use of its contacts */
+#define LINGER_PASSES 20u
 #define LIMIT_STEPS 40 /* halvings: a metre to a picometre */
 
 typedef struct placed_pair {
@@ -317,17 +318,29 @@ static void pass(hapi_contact *contact, int64_t valid_from_ns)
   }
   hapi_tool_pass(contact, out);
   out->number = ++contact->number;
+  bool found = out->contact_count + out->tool_count > 0;
+  contact->lingers = found ? LINGER_PASSES : contact->lingers - (contact->lingers > 0);
   out->model_number = contact->near->model_number;
   out->valid_from_ns = valid_from_ns;
   follow_tape(contact, out);
   hapi_exchange_patches_publish(contact->config.exchange);
 }
 
+/* What was found last is taken back where there is nothing any more; points of hulls go slowly. */
+bool hapi_contact_has_work(const hapi_contact *contact)
+{
+  const hapi_near *near = contact->near;
+  return near != NULL && contact->poses != NULL &&
+         (near->pair_count + near->tool_pair_count > 0 || contact->lingers > 0 ||
+          near->always != 0);
+}
+
 void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
 {
   int64_t begin_ns = hapi_clock_now();
+  bool news = hapi_contact_has_news(contact) || hapi_tape_plays(contact->tape);
   take_near(contact);
-  if (contact->near == NULL || contact->poses == NULL) {
+  if (!hapi_contact_has_work(contact) || (!news && contact->near->between == 0)) {
     return;
   }
   unsigned before = hapi_denormals_flush();

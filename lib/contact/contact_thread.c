@@ -48,13 +48,14 @@ void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
   contact->near = NULL;
   contact->poses = NULL;
   contact->number = 0;
+  contact->lingers = 0;
   atomic_store(&contact->left_out, 0);
   contact->start_ns = start_ns;
   hapi_histogram_reset(&contact->pass_ns);
 }
 
 /* Between two passes the thread looks once a millisecond whether there is a body that waits for its
- * first contacts. */
+ * first contacts. Where nothing can touch anything it sleeps until physics says otherwise. */
 static void *contact_main(void *arg)
 {
   const int64_t look_ns = 1000000;
@@ -69,7 +70,12 @@ static void *contact_main(void *arg)
       due =
           now >= due ? due + ((now - due) / period + 1) * period : due; /* late ones are left out */
     }
-    hapi_clock_sleep_until(now + pause < due ? now + pause : due);
+    if (hapi_contact_has_work(contact)) {
+      hapi_clock_sleep_until(now + pause < due ? now + pause : due);
+    } else {
+      hapi_clock_sleep_until(now + pause);
+      hapi_exchange_near_wait(contact->config.exchange);
+    }
   }
   return NULL;
 }
@@ -84,7 +90,14 @@ hap_status hapi_contact_start_thread(hapi_contact *contact)
 void hapi_contact_stop_thread(hapi_contact *contact)
 {
   atomic_store(&contact->stop, 1);
+  hapi_exchange_near_ring(contact->config.exchange);
   hapi_thread_join(&contact->thread);
+}
+
+void hapi_contact_effects(const hapi_contact *contact, hap_effect_info *out)
+{
+  double mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
+  out[HAP_EFFECT_CONTACTS].contact_us = out[HAP_EFFECT_PASSES].contact_us = mean;
 }
 
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out)

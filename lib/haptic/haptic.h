@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/effects.h>
 #include <hapode/pointer.h>
 #include <hapode/record.h>
 #include <hapode/session.h>
@@ -24,7 +25,6 @@ typedef struct hapi_haptic_config {
   bool lockstep;
   int rt_priority;
   uint32_t trace_rows;
-  hap_plane plane;     /* model CONTACT */
   uint32_t max_sweeps; /* model CONTACT; 0: as many as it takes */
   hap_guard guard;
   hapi_exchange *exchange;
@@ -76,6 +76,7 @@ void hapi_haptic_reset_fault(hapi_haptic *haptic);            /* [any] from the 
 void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the next tick on */
 bool hapi_haptic_has_fault(const hapi_haptic *haptic);        /* [any] latched at the last tick */
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out); /* [any] its part of *out */
+void hapi_haptic_effects(const hapi_haptic *haptic, hap_effect_info *out); /* [any] likewise */
 size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity);
 /* [app] */
 size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity);

@@ -10,6 +10,7 @@
 
 #include <hapode/device_impl.h>
 
+#include "base/effect_figures.h"
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "haptic/haptic.h"
@@ -81,6 +82,21 @@ typedef struct hapi_haptic_figures {
   _Atomic double hand_impulse_abs;
 } hapi_haptic_figures;
 
+/* States that the loop tells: of what pointers have. */
+enum {
+  HAPI_LOOP_TORQUE,
+  HAPI_LOOP_PROXY,
+  HAPI_LOOP_OBSERVER,
+  HAPI_LOOP_NOTED
+};
+
+typedef struct hapi_loop_effects {
+  uint64_t begin; /* cycles, of the sampled tick */
+  _Atomic uint64_t samples;
+  _Atomic double spent_ns[HAP_EFFECTS];
+  _Atomic uint64_t shown[HAPI_LOOP_NOTED];
+} hapi_loop_effects;
+
 /* One writer (haptic), one reader (application). */
 typedef struct hapi_trace_ring {
   hap_trace_row *rows;
@@ -99,6 +115,7 @@ struct hapi_haptic {
   hapi_black_box black_box;
   pthread_mutex_t black_box_lock; /* between its readers */
   hapi_haptic_figures figures;
+  hapi_loop_effects effects;
   hapi_thread thread;
   _Atomic int stop;
   _Atomic int reset_fault;
@@ -148,6 +165,12 @@ void hapi_tape_ticked(hapi_haptic *haptic);
 bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
                          hapi_tool_hull *out_hull);
+
+/* loop_effects.c */
+void hapi_loop_effects_reset(hapi_haptic *haptic);
+void hapi_loop_sample_begin(hapi_haptic *haptic);
+void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns);
+void hapi_loop_note_effects(hapi_haptic *haptic); /* after a model was adopted */
 
 /* pointers.c: what the loop does with the slots */
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */

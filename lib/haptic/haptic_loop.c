@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "device/emergency.h"
 #include "haptic/haptic_internal.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/tick_memory.h"
 
 #define STORE(field, value) \
@@ -53,7 +54,6 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   }
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
-  haptic->tick.world.plane_mode = config->plane;
   haptic->tick.world.solver.max_sweeps = config->max_sweeps;
   haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
@@ -123,6 +123,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   memset(haptic->tick.pointers, 0,
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
   reset_figures(haptic);
+  hapi_loop_effects_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);
   hapi_black_box_reset(&haptic->black_box);
   pthread_mutex_unlock(&haptic->black_box_lock);
@@ -215,6 +216,7 @@ static void receive(hapi_haptic *haptic, int64_t now_ns)
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
     STORE(models_adopted, LOAD(models_adopted) + 1);
+    hapi_loop_note_effects(haptic);
     publish_poses(haptic); /* the contact thread looks for new bodies */
   }
   receive_patches(haptic, now_ns);
@@ -298,6 +300,7 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   }
   int64_t spent = hapi_clock_now() - begin_ns;
   hapi_histogram_add(&haptic->figures.tick_ns, spent);
+  hapi_loop_sample_end(haptic, spent);
   haptic->last_tick_us = 1e-3 * (double)spent;
 }
 
@@ -305,6 +308,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
 {
   int64_t begin_ns = hapi_clock_now();
   unsigned before = hapi_denormals_flush();
+  hapi_loop_sample_begin(haptic);
   hapi_tape_tick(haptic, now_ns);
   hapi_pointers_follow(haptic);
   follow_faults(haptic);
@@ -312,7 +316,9 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
+  uint64_t recording = hapi_effect_begin(&haptic->tick);
   hapi_tape_ticked(haptic);
+  hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
   hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
   hapi_exchange_state_publish(haptic->config.exchange);

@@ -100,6 +100,8 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->friction = def->friction;
   p->finger_radius = def->finger_radius;
   p->turns = !slot->has_device || info->dof == 6;
+  hapi_tick_feel(p, hapi_wish(haptic->tick.wishes, HAP_EFFECT_TORQUE), false);
+  haptic->tick.proxies = true; /* until the next model says what is wished for */
   p->motion_scale = def->motion_scale;
   p->force_scale = def->force_scale;
   p->pose_world_device = def->pose_world_device;

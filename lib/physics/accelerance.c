@@ -198,6 +198,86 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
   }
 }
 
+/* ---- bodies that nothing holds ---- */
+
+/* What a step makes of such a body is known without one. Damping and the limit of its turning are ODE's own
+ * affair, and so is an inertia that turns with it; and what sleeps has no contacts to be seen. */
+static bool is_free(dBodyID body)
+{
+  dMass mass;
+  double inertia[9];
+  dBodyGetMass(body, &mass);
+  for (int i = 0; i < 9; ++i) {
+    inertia[i] = mass.I[4 * (i / 3) + i % 3];
+  }
+  bool limited = dBodyGetMaxAngularSpeed(body) < (double)dInfinity;
+  return dBodyIsEnabled(body) && dBodyGetNumJoints(body) == 0 && !limited &&
+         dBodyGetLinearDamping(body) == 0.0 && dBodyGetAngularDamping(body) == 0.0 &&
+         (dBodyGetGyroscopicMode(body) == 0 || hapi_turns_alike(inertia));
+}
+
+static void fill_free(const hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
+{
+  hapi_free_body free;
+  dVector3 gravity = {0.0, 0.0, 0.0};
+  hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);
+  if (dBodyGetGravityMode(body) != 0) {
+    dWorldGetGravity(physics->ode.world, gravity);
+  }
+  const hapi_known_rest *rest = physics->table.entries[slot->known].rest; /* as a probe has them */
+  hapi_v3_madd(gravity, free.inverse_mass, rest->user_force, slot->b);
+  hapi_m3_apply(free.inverse_inertia, rest->user_torque, slot->b + 3);
+}
+
+/* Of a force at the contact point: 1/m, and I^-1 times the arm crossed with it. */
+static void fill_free_contact(dBodyID body, hapi_contact_slot *contact)
+{
+  hapi_free_body free;
+  double arm[3];
+  double normal[3];
+  hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);
+  hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
+  hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, normal);
+  for (int axis = 0; axis < 3; ++axis) {
+    double unit[3] = {axis == 0, axis == 1, axis == 2};
+    double moment[3];
+    double turn[3];
+    hapi_v3_cross(arm, unit, moment);
+    hapi_m3_apply(free.inverse_inertia, moment, turn);
+    for (int i = 0; i < 3; ++i) {
+      contact->a[i][axis] = i == axis ? free.inverse_mass : 0.0;
+      contact->a[3 + i][axis] = turn[i];
+    }
+  }
+  memset(contact->turn, 0, sizeof contact->turn);
+  hapi_m3_apply(free.inverse_inertia, normal, contact->turn + 3);
+  contact->probed = true;
+}
+
+/* The effect testing=auto: before the islands are gathered. */
+static void take_free(hapi_physics *physics)
+{
+  bool looks = physics->model == HAP_MODEL_ACCELERANCE &&
+               hapi_wish(physics->wishes, HAP_EFFECT_TESTING) == HAP_EFFECT_AUTO &&
+               physics->config.probe != HAP_PROBE_PAPER;
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    hapi_body_slot *slot = &physics->bodies[i];
+    bool live = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
+    dBodyID body = live ? physics->table.entries[slot->known].body : NULL;
+    slot->known_free = looks && body != NULL && is_free(body);
+    if (slot->known_free) {
+      fill_free(physics, slot, body);
+    }
+  }
+  for (uint32_t i = 0; looks && i < physics->contact_high; ++i) {
+    hapi_contact_slot *contact = &physics->contacts[i];
+    if (contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+        physics->bodies[contact->body].known_free) {
+      fill_free_contact(physics->table.entries[physics->bodies[contact->body].known].body, contact);
+    }
+  }
+}
+
 static bool any_has_axis(const hapi_physics *physics, uint32_t round, int axis)
 {
   const hapi_test_set *test = &physics->test;
@@ -292,6 +372,7 @@ void hapi_accelerance_measure(hapi_physics *physics)
   if (physics->model != HAP_MODEL_ACCELERANCE && physics->model != HAP_MODEL_CONTACT) {
     return;
   }
+  take_free(physics);
   hap_status status = hapi_test_gather(physics);
   if (status >= HAP_OK && physics->test.contact_count > 0) {
     status = hapi_test_enter(physics);

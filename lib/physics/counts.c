@@ -51,6 +51,7 @@ static void fill_times(const hapi_physics *physics, hap_stats *out)
   out->step_ms_mean = per_cycle * f->step_s;
   out->range_ms_mean = per_cycle * f->range_s;
   out->publish_ms_mean = per_cycle * f->publish_s;
+  out->range_error = f->foretold2 > 0.0 ? sqrt(f->range_error2 / f->foretold2) : 0.0;
   out->physics_ms_mean = 1e-6 * hapi_histogram_mean_ns(&physics->cycle_ns);
   out->physics_ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&physics->cycle_ns, 0.99);
   out->physics_ms_max = 1e-6 * hapi_histogram_max_ns(&physics->cycle_ns);

@@ -42,6 +42,7 @@ static void follow_model(hapi_physics *physics)
     physics->step_s = 0.0;
   }
   physics->model = wanted;
+  physics->wishes = hapi_tape_wanted_effects(physics);
   physics->probe_step_s =
       1.0 / (wanted == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
 }
@@ -96,7 +97,9 @@ static void sync_in(hapi_physics *physics)
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
+  int64_t begin_ns = hapi_clock_now();
   hapi_joints_scan(physics);
+  physics->figures.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_reconcile_take(physics);
   hapi_reconcile_own(physics);
 }
@@ -176,6 +179,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
   hapi_joint_probes(physics);
+  hapi_range_error_measure(physics);
   seconds[2] += lap(&watch);
   hapi_lookback_note(physics);
   sync_out(physics, now_ns, next_ns);

@@ -363,7 +363,9 @@ static void fill_limit(const hapi_physics *physics, dJointID joint, parameter_fn
   }
   out->stop =
       softness_of(physics, get(joint, dParamStopERP + group), get(joint, dParamStopCFM + group));
-  out->bounce = get(joint, dParamBounce + group);
+  out->bounce = hapi_wish_is_off(physics->wishes, HAP_EFFECT_RESTITUTION)
+                    ? 0.0
+                    : get(joint, dParamBounce + group);
   out->speed = get(joint, dParamVel + group);
   out->force = get(joint, dParamFMax + group);
   out->motor_cfm = get(joint, dParamCFM + group);

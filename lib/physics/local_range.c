@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -580,7 +581,8 @@ static bool body_is_known(const hapi_physics *physics, dBodyID body)
 static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known, need *io)
 {
   const hapi_range *range = &physics->range;
-  if (range->links_missing) {
+  if (range->links_missing ||
+      (range->link_count > 0 && hapi_wish_is_off(physics->wishes, HAP_EFFECT_CONTACTS))) {
     return false;
   }
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
@@ -604,6 +606,8 @@ static void take_links(hapi_physics *physics)
     const hapi_link *link = &range->links[i];
     dBodyID body = dGeomGetBody(link->other);
     note_pair(physics, link);
+    range->bounces +=
+        (link->surface.flags & HAPI_SURFACE_BOUNCE) != 0 && link->surface.bounce > 0.0;
     uint32_t known = hapi_bodies_find(&physics->table, body);
     if (body != NULL && (known == HAPI_NONE || !enqueue(physics, known))) {
       continue;
@@ -619,6 +623,13 @@ static void take_links(hapi_physics *physics)
   }
 }
 
+/* Without the range beyond them the loop owns neighbours only. */
+static bool may_own(const hapi_physics *physics, const hapi_known_body *known)
+{
+  return !hapi_wish_is_off(physics->wishes, HAP_EFFECT_RANGE) ||
+         known->rest->chosen_in == physics->model_number + 1;
+}
+
 /* A mechanism is owned as a whole: a joint between what the loop moves and what ODE moves would be in
  * neither. Room for its bodies is taken first, then their contacts. */
 static bool mechanism_can_be_owned(hapi_physics *physics)
@@ -630,6 +641,9 @@ static bool mechanism_can_be_owned(hapi_physics *physics)
   }
   for (uint32_t i = 0; i < range->moving; ++i) {
     const hapi_known_body *known = entry(physics, range->members[i]);
+    if (!may_own(physics, known)) {
+      return false;
+    }
     find_links(physics, known);
     if (!can_be_owned(physics, known, &n)) {
       return false;
@@ -652,7 +666,8 @@ static void own_mechanism(hapi_physics *physics)
     if (range->moving > 1) { /* else they were found last */
       find_links(physics, known);
     }
-    physics->bodies[known->slot].flags |= HAPI_BODY_OWNED;
+    physics->bodies[known->slot].flags |=
+        range->link_count > 0 ? HAPI_BODY_OWNED : HAPI_BODY_OWNED | HAPI_BODY_ALONE;
     ++range->owned;
     take_links(physics);
   }
@@ -682,7 +697,27 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
     return;
   }
   hapi_mechanism_drop(physics);
-  slot->flags |= seed ? HAPI_BODY_MEASURED : 0u;
+  bool tests = !hapi_wish_is_off(physics->wishes, HAP_EFFECT_TESTING);
+  slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
+}
+
+/* The effect range=on: also what no chain of contacts leads to, as long as there is room. */
+static void expand_further(hapi_physics *physics)
+{
+  hapi_range *range = &physics->range;
+  for (uint32_t i = 0; i < physics->table.high && range->owned < range_capacity(physics); ++i) {
+    const hapi_known_body *known = entry(physics, i);
+    if (known->body == NULL || !dynamic(known->body) || known->rest->ranged_in == range->number) {
+      continue;
+    }
+    uint32_t next = range->count;
+    if (!enqueue(physics, i)) {
+      return;
+    }
+    for (; next < range->count; ++next) {
+      expand(physics, range->queue[next], false);
+    }
+  }
 }
 
 static double fastest_pointer(const hapi_physics *physics)
@@ -706,7 +741,9 @@ static void begin_walk(hapi_physics *physics)
   range->near->point_count = 0;
   range->near->tool_count = range->near->tool_pair_count = 0;
   range->number = physics->model_number + 1;
-  range->count = range->owned = 0;
+  range->count = range->owned = range->seeds = range->bounces = 0;
+  range->near->between = !hapi_wish_is_off(physics->wishes, HAP_EFFECT_PASSES);
+  range->near->always = hapi_wish_is_on(physics->wishes, HAP_EFFECT_PASSES);
   range->pairs_noted = 0;
   range->hops = 0;
   range->joint_count = range->member_count = range->moving = 0;
@@ -728,10 +765,18 @@ void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
       enqueue(physics, known);
     }
   }
-  uint32_t seeds = range->count;
-  for (uint32_t next = 0; next < range->count; ++next) {
-    expand(physics, range->queue[next], next < seeds);
+  range->seeds = range->count;
+  for (uint32_t next = 0; next < range->seeds; ++next) {
+    expand(physics, range->queue[next], true);
   }
+  int64_t begin_ns = hapi_clock_now();
+  for (uint32_t next = range->seeds; next < range->count; ++next) {
+    expand(physics, range->queue[next], false);
+  }
+  if (hapi_wish_is_on(physics->wishes, HAP_EFFECT_RANGE)) {
+    expand_further(physics);
+  }
+  physics->figures.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   take_tools(physics, hit_count);
 }
 

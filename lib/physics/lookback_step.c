@@ -93,7 +93,7 @@ static void collide(hapi_physics *physics)
       const dGeomID geoms[2] = {pair->a, pair->b};
       const dBodyID bodies[2] = {body_a, body_b};
       dSurfaceParameters surface = pair->surface;
-      hapi_world_make_contacts(physics, geoms, bodies, &surface);
+      hapi_world_make_contacts(physics, geoms, bodies, &surface, false);
     }
   }
 }

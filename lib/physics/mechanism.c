@@ -59,10 +59,17 @@ static bool add_partner(hapi_physics *physics, uint32_t known)
 }
 
 /* Whether the loop has rows for it: of its kind, or those that testing simulations found. */
-static bool has_rows(const hapi_range *range, hapi_known_joint *known)
+static bool has_rows(const hapi_physics *physics, hapi_known_joint *known)
 {
+  const hapi_range *range = &physics->range;
+  if (hapi_wish_is_off(physics->wishes, HAP_EFFECT_JOINTS)) {
+    return false;
+  }
   if (known->carried) {
     return known->usable;
+  }
+  if (hapi_wish_is_off(physics->wishes, HAP_EFFECT_TESTING)) {
+    return false;
   }
   known->wanted_in = range->number;
   return known->measurement != NULL && known->measurement->good;
@@ -77,7 +84,7 @@ static bool add_joint(hapi_physics *physics, dJointID joint)
   }
   hapi_known_joint *known = &physics->joints.entries[index];
   bool others = known->bodies[1] != NULL;
-  if (!has_rows(range, known) || known->index[0] == HAPI_NONE ||
+  if (!has_rows(physics, known) || known->index[0] == HAPI_NONE ||
       (others && known->index[1] == HAPI_NONE)) {
     return false;
   }

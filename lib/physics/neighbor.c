@@ -167,11 +167,19 @@ static int by_distance(const void *a, const void *b)
 #define SAME_PLANE_COSINE 0.7
 
 /* The shape itself, in the body's frame, for the loop to ask. */
-static void place_shape(dGeomID geom, hapi_contact_slot *slot)
+static void place_shape(const hapi_physics *physics, dGeomID geom, hapi_contact_slot *slot)
 {
   dBodyID body = dGeomGetBody(geom);
   hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hap_effect_wish wish = hapi_wish(physics->wishes, HAP_EFFECT_SHAPE);
   slot->has_shape = hapi_shape_of_geom(geom, &slot->shape, &world);
+  slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
+                       : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
+                                                              : HAP_REASON_CALLED;
+  if (wish == HAP_EFFECT_OFF ||
+      (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_FLAT)) {
+    slot->has_shape = false;
+  }
   slot->shape_pose = world;
   if (slot->has_shape && body != NULL) {
     const dReal *q = dBodyGetQuaternion(body);
@@ -188,6 +196,9 @@ static double friction_of(hapi_physics *physics, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
   double mu = pointer->friction;
+  if (hapi_wish_is_off(physics->wishes, HAP_EFFECT_FRICTION)) {
+    return 0.0;
+  }
   if (physics->ode.pointer_surface == NULL) {
     return mu;
   }
@@ -202,7 +213,7 @@ static double friction_of(hapi_physics *physics, const hapi_hit *hit,
   return fmin(mu, FRICTION_MOST);
 }
 
-static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
+static void place_contact(const hapi_physics *physics, hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
   dBodyID body = dGeomGetBody(hit->geom);
@@ -218,7 +229,7 @@ static void place_contact(hapi_contact_slot *slot, const hapi_hit *hit,
     ++slot->generation;
     memset(slot->last_force, 0, sizeof slot->last_force);
   }
-  place_shape(hit->geom, slot);
+  place_shape(physics, hit->geom, slot);
   hapi_v3_copy(normal, slot->normal_body);
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
@@ -317,7 +328,7 @@ static void take_hit(hapi_physics *physics, hapi_hit *hit)
     return;
   }
   contact->wanted = true;
-  place_contact(contact, hit, pointer);
+  place_contact(physics, contact, hit, pointer);
   contact->mu = friction_of(physics, hit, pointer);
   if (body != NULL) {
     take_body(&physics->bodies[slot], body);

@@ -59,8 +59,20 @@ static void soften(const hapi_physics *physics, dSurfaceParameters *s)
   s->mode |= dContactSoftERP | dContactSoftCFM;
 }
 
+/* Of a pair that the loop carries: for testing simulations alone, and switched off but for these. */
+static void attach(hapi_physics *physics, const dContact *contact, const dBodyID bodies[2],
+                   bool carried)
+{
+  dJointGroupID group = carried ? physics->carried_group : physics->contact_group;
+  dJointID joint = dJointCreateContact(physics->ode.world, group, contact);
+  dJointAttach(joint, bodies[0], bodies[1]);
+  if (carried) {
+    dJointDisable(joint);
+  }
+}
+
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
-                              const dBodyID bodies[2], dSurfaceParameters *surface)
+                              const dBodyID bodies[2], dSurfaceParameters *surface, bool carried)
 {
   dGeomID a = geoms[0];
   dGeomID b = geoms[1];
@@ -83,8 +95,7 @@ void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
     if (directed) {
       set_direction(&contacts[i], direction);
     }
-    dJointID joint = dJointCreateContact(physics->ode.world, physics->contact_group, &contacts[i]);
-    dJointAttach(joint, bodies[0], bodies[1]);
+    attach(physics, &contacts[i], bodies, carried);
   }
 }
 
@@ -227,13 +238,14 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   }
   dSurfaceParameters surface;
   bool turned;
-  if (carried_by_loop(physics, body_a) || carried_by_loop(physics, body_b) ||
+  bool carried = carried_by_loop(physics, body_a) || carried_by_loop(physics, body_b);
+  if ((carried && !hapi_range_error_wanted(physics)) ||
       !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
     return;
   }
   const dGeomID geoms[2] = {turned ? b : a, turned ? a : b};
   const dBodyID bodies[2] = {dGeomGetBody(geoms[0]), dGeomGetBody(geoms[1])};
-  hapi_world_make_contacts(physics, geoms, bodies, &surface);
+  hapi_world_make_contacts(physics, geoms, bodies, &surface, carried);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */
@@ -251,6 +263,7 @@ static void collide_inside(hapi_physics *physics, dSpaceID space)
 
 void hapi_world_collide(hapi_physics *physics)
 {
+  dJointGroupEmpty(physics->carried_group);
   dJointGroupEmpty(physics->contact_group);
   ++physics->surfaces.step; /* forgets what the surfaces were */
   physics->surfaces.used = 0;

@@ -135,7 +135,9 @@ void hapi_operating_point_measure(hapi_physics *physics)
   if (physics->model != HAP_MODEL_CONTACT) {
     return;
   }
-  choose(physics);
+  if (!hapi_wish_is_off(physics->wishes, HAP_EFFECT_TESTING)) {
+    choose(physics);
+  }
   hap_status status = hapi_test_gather_bodies(physics);
   if (status >= HAP_OK && physics->test.body_count > 0) {
     status = hapi_test_enter(physics);

@@ -85,6 +85,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->model = config->model;
   physics->latency_s = -1.0;
   atomic_init(&physics->wanted_model, (int)config->model);
+  atomic_init(&physics->wanted_effects, config->effects);
   if (!init_locks(physics) || !allocate(physics)) {
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
@@ -92,6 +93,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->neighborhood.probe_geom = dCreateSphere(NULL, 1.0);
   physics->neighborhood.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
   physics->contact_group = dJointGroupCreate(0);
+  physics->carried_group = dJointGroupCreate(0);
   hapi_slots_reset(physics);
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
@@ -114,6 +116,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   }
   if (physics->contact_group != NULL) {
     dJointGroupDestroy(physics->contact_group);
+    dJointGroupDestroy(physics->carried_group);
   }
   hapi_bodies_finish(&physics->table);
   hapi_free(physics->surfaces.entries);
@@ -143,6 +146,7 @@ void hapi_physics_destroy(hapi_physics *physics)
 static void give_world_back(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->contact_group);
+  dJointGroupEmpty(physics->carried_group);
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_bodies_scan(physics); /* a body without memory for it was given nothing */
   release_bodies(physics);
@@ -175,6 +179,7 @@ static void build_first_model(hapi_physics *physics)
   hapi_neighbors_find(physics);
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
+  hapi_range_error_measure(physics);
 }
 
 static void prepare(hapi_physics *physics)
@@ -184,6 +189,7 @@ static void prepare(hapi_physics *physics)
   hapi_lookback_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
+  physics->wishes = atomic_load(&physics->wanted_effects);
   physics->probe_step_s = hapi_period_of(physics, physics->model);
   physics->state = NULL;
   physics->step_s = 0.0;
@@ -278,6 +284,25 @@ void hapi_physics_set_latency(hapi_physics *physics, double seconds)
 void hapi_physics_set_model(hapi_physics *physics, hap_model model)
 {
   atomic_store(&physics->wanted_model, (int)model);
+}
+
+hap_model hapi_physics_wanted_model(hapi_physics *physics)
+{
+  return (hap_model)atomic_load(&physics->wanted_model);
+}
+
+/* Several threads may wish for something at a time. */
+void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effect_wish wish)
+{
+  uint32_t before = atomic_load(&physics->wanted_effects);
+  while (!atomic_compare_exchange_weak(&physics->wanted_effects, &before,
+                                       hapi_wish_set(before, effect, wish))) {
+  }
+}
+
+uint32_t hapi_physics_wanted_effects(hapi_physics *physics)
+{
+  return atomic_load(&physics->wanted_effects);
 }
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)

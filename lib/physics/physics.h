@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/effects.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
@@ -28,6 +29,7 @@ typedef struct hapi_physics_config {
   hap_model model;
   hap_impulse_pose impulse_pose;
   hap_probe probe;
+  uint32_t effects; /* wishes at the start, base/wishes.h */
   double physics_hz;
   double haptic_hz;
   double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
@@ -97,7 +99,13 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
 int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns); /* [any] */
 
 /* session.h */
-void hapi_physics_set_model(hapi_physics *physics, hap_model model);     /* [any] */
+void hapi_physics_set_model(hapi_physics *physics, hap_model model); /* [any] */
+hap_model hapi_physics_wanted_model(hapi_physics *physics);          /* [any] */
+/* [any] From the next cycle on. */
+void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effect_wish wish);
+uint32_t hapi_physics_wanted_effects(hapi_physics *physics); /* [any] as in base/wishes.h */
+/* [any] Its part of HAP_EFFECTS places. */
+void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out);
 hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns); /* negative: for ever */
 bool hapi_physics_lock_is_mine(hapi_physics *physics);
 hap_status hapi_physics_unlock(hapi_physics *physics);

@@ -11,10 +11,12 @@
 
 #include <hapode/ode.h>
 
+#include "base/effect_figures.h"
 #include "base/fair_lock.h"
 #include "base/histogram.h"
 #include "base/index.h"
 #include "base/thread.h"
+#include "base/wishes.h"
 #include "physics/admittance.h"
 #include "physics/joint_probe.h"
 #include "physics/lookback.h"
@@ -240,6 +242,13 @@ typedef struct hapi_body_slot {
   double exchanged[6];   /* N, N m: mean wrench from the loop in the last interval */
   double response[6][6]; /* measured */
   bool measured;         /* response and b hold a measurement */
+  bool known_free;       /* model ACCELERANCE: nothing holds it, so nothing was measured */
+
+  bool foretold; /* range_error.c: what the world was going to do with an owned body */
+  double foretold_a[6][3];
+  double foretold_b[6];
+  double foretold_twist[6]; /* then */
+  double foretold_gain[3];  /* N s, likewise */
 
   double cross[6][3]; /* scratch: the answer to the contact of its island in this round */
 } hapi_body_slot;
@@ -256,7 +265,8 @@ typedef struct hapi_contact_slot {
   uint32_t round; /* scratch: order among the contacts of its island */
   double point_body[3];
   double normal_body[3];
-  bool has_shape; /* one with a closed form */
+  bool has_shape;                 /* one with a closed form, and it is wished for */
+  hap_effect_reason shape_reason; /* what there would be without a wish */
   hapi_shape shape;
   hap_pose shape_pose;   /* body frame */
   bool placed;           /* what follows holds, of the last model */
@@ -386,6 +396,8 @@ typedef struct hapi_range {
   uint32_t count;
   uint32_t owned;
   int32_t hops;                 /* of what is put into the queue now */
+  uint32_t seeds;               /* neighbours: the first of the queue */
+  uint32_t bounces;             /* surfaces of this walk that give back speed */
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
@@ -521,7 +533,13 @@ typedef struct hapi_physics_counts {
   double testing_s;
   double step_s;
   double publish_s;
-  double range_s; /* part of neighbour_s */
+  double range_s;      /* part of neighbour_s */
+  double beyond_s;     /* part of range_s: bodies that are no neighbours */
+  double joints_s;     /* of joints: their scan and their part of the message; of publish_s */
+  double cross_s;      /* part of testing_s */
+  double foretold2;    /* m^2/s^2, sum over what testing simulations foretold of owned bodies ... */
+  double range_error2; /* ... and over what the loop made different from it */
+  hapi_effect_figures effects[HAP_EFFECTS];
   uint64_t cycles;
   double world_impulse[3]; /* given to the world: predictions and overwrites */
   double hand_impulse[3];  /* given to the bodies, as the loop reported */
@@ -545,6 +563,7 @@ struct hapi_physics {
   hapi_physics_config config;
   hap_ode_def ode;
   dJointGroupID contact_group;
+  dJointGroupID carried_group; /* contacts of what the loop owns, see range_error.c */
   dContact *contact_scratch;
 
   hapi_fair_lock lock;
@@ -573,9 +592,11 @@ struct hapi_physics {
   hapi_lookback lookback;
 
   _Atomic int wanted_model;
-  hap_model model;  /* in force in this cycle */
-  double step_s;    /* of this cycle's global step */
-  double latency_s; /* negative: the model's own */
+  _Atomic uint32_t wanted_effects; /* base/wishes.h */
+  uint32_t wishes;                 /* in force in this cycle */
+  hap_model model;                 /* in force in this cycle */
+  double step_s;                   /* of this cycle's global step */
+  double latency_s;                /* negative: the model's own */
   uint64_t model_number;
   hapi_state *state;     /* newest message of the loop; NULL: none yet */
   bool has_new_state;    /* state came in this cycle */
@@ -619,19 +640,6 @@ struct hapi_physics {
   uint32_t missed_unrecorded;  /* steps, likewise */
   uint32_t locks;              /* hap_session_lock, likewise */
 };
-
-/* tape_cycle.c: nothing without a tape. */
-hap_status hapi_tape_world(hapi_physics *physics,
-                           hap_detail *detail); /* the one of the recording */
-void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns);
-void hapi_tape_started(hapi_physics *physics);
-void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns);
-void hapi_tape_edits(hapi_physics *physics, uint32_t count);
-void hapi_tape_state(hapi_physics *physics, bool taken);
-hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end);
-int64_t hapi_tape_sent(hapi_physics *physics); /* hapi_model.sent_ns */
-void hapi_tape_model(hapi_physics *physics);   /* it is ready, and not yet published */
-void hapi_tape_cycled(hapi_physics *physics);
 
 /* physics.c: H, or T in model SINGLE */
 double hapi_period_of(const hapi_physics *physics, hap_model model);
@@ -684,7 +692,8 @@ void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
-                              const dBodyID bodies[2], dSurfaceParameters *surface);
+                              const dBodyID bodies[2], dSurfaceParameters *surface,
+                              bool carried);
 
 /* Threads for the islands of the global step, between begin and end of a session; false: not to be had. */
 bool hapi_islands_begin(hapi_physics *physics);
@@ -843,6 +852,8 @@ bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t coun
 hap_status hapi_test_gather(hapi_physics *physics);
 /* The islands of the measured bodies of model CONTACT. */
 hap_status hapi_test_gather_bodies(hapi_physics *physics);
+/* The islands of the neighbours that the loop owns, as far as they can be undone. */
+hap_status hapi_test_gather_owned(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
 hap_status hapi_test_enter(hapi_physics *physics);
 /* These bodies, with whatever joints tie them to; those that slept are awake then. */
@@ -914,11 +925,10 @@ void hapi_physics_claim(hapi_physics *physics); /* this thread calls the applica
 void hapi_physics_unclaim(hapi_physics *physics); /* lock already, and may not take or give it */
 void hapi_lock_figures_reset(hapi_lock_figures *figures);
 
-/* counts.c */
-void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */
-void hapi_counts_range(hapi_physics *physics, double seconds);
-
 /* edits.c */
 void hapi_edits_run(hapi_physics *physics);
+
+#include "physics/effects.h"
+#include "physics/tape_cycle.h"
 
 #endif

@@ -135,7 +135,7 @@ static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact
   uint32_t flags = physics->bodies[contact->body].flags;
   bool needs = physics->model == HAP_MODEL_ACCELERANCE ||
                ((flags & HAPI_BODY_MEASURED) != 0 && !is_whole(physics, contact->body));
-  return needs && (flags & HAPI_BODY_DRIVEN) == 0;
+  return needs && (flags & HAPI_BODY_DRIVEN) == 0 && !physics->bodies[contact->body].known_free;
 }
 
 static void begin_gathering(hapi_physics *physics)
@@ -210,6 +210,31 @@ hap_status hapi_test_gather_bodies(hapi_physics *physics)
     }
   }
   return status;
+}
+
+hap_status hapi_test_gather_owned(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  begin_gathering(physics);
+  for (uint32_t i = 0; i < physics->body_high; ++i) {
+    const hapi_body_slot *slot = &physics->bodies[i];
+    bool owned = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_OWNED) != 0;
+    if (!owned || (slot->flags & HAPI_BODY_RESTING) != 0 ||
+        physics->table.entries[slot->known].rest->chosen_in != physics->model_number + 1) {
+      continue;
+    }
+    uint32_t first = test->member_count;
+    bool known = physics->table.entries[slot->known].island != HAPI_NONE;
+    if (!known && !gather_island(physics, slot->known)) {
+      return HAP_ERROR_MEMORY;
+    }
+    if (!known && !can_be_undone(physics, first)) {
+      drop_island(physics, first);
+    } else {
+      test->bodies[test->body_count++] = i;
+    }
+  }
+  return HAP_OK;
 }
 
 /* ODE's island search goes through kinematic bodies: their joints to the outside are cut. */

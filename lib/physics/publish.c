@@ -15,8 +15,7 @@ static void read_matrix(const dReal in[12], double out[9])
   }
 }
 
-/* A ball or a cube turns the same about every axis: nothing gyroscopic about it. */
-static bool turns_alike(const double inertia[9])
+bool hapi_turns_alike(const double inertia[9])
 {
   double off = fabs(inertia[1]) + fabs(inertia[2]) + fabs(inertia[5]);
   double spread = fabs(inertia[0] - inertia[4]) + fabs(inertia[0] - inertia[8]);
@@ -29,14 +28,24 @@ static double keep_per_tick(const hapi_physics *physics, double damping)
   return pow(1.0 - share, physics->config.physics_hz / physics->config.haptic_hz);
 }
 
-static void fill_mass(dBodyID body, hapi_model_body *out)
+/* Whether the loop is to let its inertia turn. One that does not spin yet may do so before the next sync:
+ * that is the tick's to see. */
+static bool is_gyroscopic(const hapi_physics *physics, dBodyID body, const double inertia[9])
+{
+  hap_effect_wish wish = hapi_wish(physics->wishes, HAP_EFFECT_GYRO);
+  bool turns = dBodyGetMaxAngularSpeed(body) > 0.0;
+  return dBodyGetGyroscopicMode(body) != 0 && wish != HAP_EFFECT_OFF &&
+         (wish == HAP_EFFECT_ON || (turns && !hapi_turns_alike(inertia)));
+}
+
+static void fill_mass(const hapi_physics *physics, dBodyID body, hapi_model_body *out)
 {
   dMass mass;
   dBodyGetMass(body, &mass);
   out->mass = mass.mass;
   read_matrix(mass.I, out->inertia);
   hapi_m3_invert(out->inertia, out->inverse_inertia);
-  if (dBodyGetGyroscopicMode(body) != 0 && !turns_alike(out->inertia)) {
+  if (is_gyroscopic(physics, body, out->inertia)) {
     out->flags |= HAPI_BODY_GYROSCOPIC;
   }
 }
@@ -46,7 +55,7 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
 {
   const hapi_known_body *known = &physics->table.entries[slot->known];
   dBodyID body = known->body;
-  fill_mass(body, out);
+  fill_mass(physics, body, out);
   if (dBodyGetGravityMode(body) != 0) {
     dVector3 gravity;
     dWorldGetGravity(physics->ode.world, gravity);
@@ -148,6 +157,20 @@ static void fill_watch(hapi_physics *physics, hapi_model *out)
   }
 }
 
+static uint32_t count_bounces(const hapi_physics *physics, hapi_model *model)
+{
+  if (physics->model != HAP_MODEL_CONTACT) {
+    return 0;
+  }
+  uint32_t count = physics->range.number == model->number ? physics->range.bounces : 0;
+  for (uint32_t i = 0; i < model->joint_count; ++i) {
+    for (int k = 0; k < HAPI_JOINT_LIMITS; ++k) {
+      count += hapi_model_joints(model)[i].limits[k].bounce > 0.0;
+    }
+  }
+  return count;
+}
+
 static void count_model(hapi_physics *physics, const hapi_model *model)
 {
   hap_stats *stats = &physics->figures.stats;
@@ -175,6 +198,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->period_s = hapi_period_of(physics, hapi_tape_wanted_model(physics, true));
   out->model = physics->model;
   out->impulse_pose = physics->config.impulse_pose;
+  out->wishes = physics->wishes;
   out->body_count = 0;
   out->contact_count = 0;
   out->tool_count = 0;
@@ -193,9 +217,14 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
       out->contact_count += fill_tool(physics, &physics->contacts[i], out, contact);
     }
   }
+  int64_t begin_ns = hapi_clock_now();
   hapi_joints_publish(physics, out);
+  physics->figures.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  out->bounces = count_bounces(physics, out);
   fill_watch(physics, out);
   count_model(physics, out);
+  out->touches = physics->figures.stats.pointer_contacts;
+  hapi_effects_note(physics, out);
   hapi_tape_model(physics);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);

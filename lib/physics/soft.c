@@ -84,6 +84,9 @@ bool hapi_world_surface(hapi_physics *physics, hapi_link *link)
   } else {
     out->flags &= ~(uint32_t)HAPI_SURFACE_FDIR1;
   }
+  if (hapi_wish_is_off(physics->wishes, HAP_EFFECT_RESTITUTION)) {
+    out->flags &= ~(uint32_t)HAPI_SURFACE_BOUNCE;
+  }
   return true;
 }
 

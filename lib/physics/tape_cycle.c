@@ -136,6 +136,7 @@ hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
     memcpy(physics->note->u, here.u, sizeof here.u);
     physics->note->u[HAPI_WORLD_SEED] = dRandGetSeed();
     physics->note->flags = (uint16_t)atomic_load(&physics->wanted_model);
+    physics->note->word = atomic_load(&physics->wanted_effects);
     return HAP_OK;
   }
   physics->read = hapi_tape_get(physics->tape, HAPI_CELL_WORLD, 0);
@@ -146,6 +147,7 @@ hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
   if (hap_model_name((hap_model)physics->read->flags) != NULL) {
     atomic_store(&physics->wanted_model, (int)physics->read->flags);
   }
+  atomic_store(&physics->wanted_effects, physics->read->word);
   return HAP_OK;
 }
 
@@ -312,6 +314,20 @@ void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   physics->locks = 0;
   physics->missed_unrecorded = 0;
   physics->dropped_unrecorded = 0;
+}
+
+/* Those that this cycle goes by. */
+uint32_t hapi_tape_wanted_effects(hapi_physics *physics)
+{
+  if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
+    atomic_store(&physics->wanted_effects, (uint32_t)(physics->read->u[HAPI_CYCLE_LOCKS] >> 32));
+  }
+  uint32_t wanted = atomic_load(&physics->wanted_effects);
+  if (cycle_note(physics) != NULL) {
+    uint64_t *word = &physics->note->u[HAPI_CYCLE_LOCKS];
+    *word = (*word & 0xffffffffu) | (uint64_t)wanted << 32;
+  }
+  return wanted;
 }
 
 void hapi_tape_edits(hapi_physics *physics, uint32_t count)

@@ -34,7 +34,8 @@ typedef enum hapi_cell_kind {
   HAPI_CELL_HULL = 10,   /* behind the JOINs of a pointer that is one: d[0..2] a vertex, d[3..5] the
                             next one */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
-  HAPI_CELL_WORLD = 16,  /* hapi_world_word; flags: hap_model at the start */
+  HAPI_CELL_WORLD =
+      16, /* hapi_world_word; flags: hap_model, word: effects wished for, at the start */
   HAPI_CELL_CYCLE = 17,  /* hapi_cycle_word; word: edits that were run; flags: hap_model wanted */
   HAPI_CELL_CYCLED = 18, /* hapi_cycled_word; flags: hap_model wanted then, of the next cycle */
   /* contact, packets of one cell */
@@ -63,11 +64,13 @@ typedef enum hapi_world_word {
 } hapi_world_word;
 
 typedef enum hapi_cycle_word {
-  HAPI_CYCLE_TIME = 0,   /* ns */
-  HAPI_CYCLE_NEXT = 1,   /* ns */
-  HAPI_CYCLE_STATE = 2,  /* message taken */
-  HAPI_CYCLE_SEED = 3,   /* of ODE */
-  HAPI_CYCLE_LOCKS = 4,  /* hap_session_lock since the cycle before */
+  HAPI_CYCLE_TIME = 0,  /* ns */
+  HAPI_CYCLE_NEXT = 1,  /* ns */
+  HAPI_CYCLE_STATE = 2, /* message taken */
+  HAPI_CYCLE_SEED = 3,  /* of ODE */
+  HAPI_CYCLE_LOCKS =
+      4, /* low half: hap_session_lock since the cycle before; high half: effects wished
+                            for, as in base/wishes.h */
   HAPI_CYCLE_MISSED = 5, /* steps, likewise */
   HAPI_CYCLE_DROPPED = 6 /* drive FRAME: steps that frames had too much, likewise */
 } hapi_cycle_word;

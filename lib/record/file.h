@@ -17,7 +17,7 @@
 
 #define HAPI_FILE_MAGIC "HAPODREC"
 #define HAPI_FILE_BYTE_ORDER 0x01020304u
-#define HAPI_FILE_VERSION 1u
+#define HAPI_FILE_VERSION 2u
 #define HAPI_BLOCK_MARK 0x4b4c4248u /* "HBLK" */
 #define HAPI_BLOCK_CELLS 1024u      /* at most in a block */
 #define HAPI_BLOCK_BYTES (HAPI_BLOCK_CELLS * 64u)
@@ -63,12 +63,12 @@ typedef struct hapi_file_info {
   int32_t impulse_pose;
   int32_t probe;
   int32_t max_edge_probes;
-  int32_t plane;
+  int32_t unused; /* 0 */
   int32_t max_hull_points;
   int32_t guard;
   uint32_t joined_size; /* of hapi_joined */
   uint32_t note_size;
-  int32_t cross;        /* 0 in files of before */
+  uint32_t effects;     /* wishes at the start, as in base/wishes.h */
   int32_t max_sweeps;   /* files of before end before it; what a file lacks is 0 */
   int32_t range_hops_1; /* hap_session_def.range_hops + 1 */
 } hapi_file_info;

@@ -62,7 +62,7 @@ static const char *take_cycle(hapi_grammar *g, const hapi_cell *cell)
     return "a physics step with a message that it had before";
   }
   g->state = state != 0 ? state : g->state;
-  g->edits += cell->word + cell->u[HAPI_CYCLE_LOCKS];
+  g->edits += cell->word + (cell->u[HAPI_CYCLE_LOCKS] & 0xffffffffu);
   g->cycling = true;
   return NULL;
 }

@@ -82,7 +82,7 @@ static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
   if (def->max_sweeps == 1) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_sweeps is 1: a solve is 2 sweeps at least");
   }
-  return HAP_OK;
+  return hapi_session_check_effects(def, detail);
 }
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail)
@@ -102,10 +102,8 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->impulse_pose, 0, 1, "impulse_pose"},
       {def->probe, 0, 2, "probe"},
       {def->max_edge_probes, 0, 1024, "max_edge_probes"},
-      {def->plane, 0, 1, "plane"},
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
-      {def->cross, 0, 1, "cross"},
       {def->max_sweeps, 0, 10000, "max_sweeps"},
       {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
       {def->lookback, 0.0, 0.5, "lookback"},

@@ -69,6 +69,11 @@ int64_t hapi_play_now(const hap_session *session);
 hap_status hapi_session_check_pointer(const hap_pointer_def *def, hap_detail *detail);
 hap_status hapi_session_check_hull(const hap_pointer_def *def, hap_detail *detail);
 
+/* session_effects.c: hap_session_def.effects, and as one word (base/wishes.h) */
+hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail);
+uint32_t hapi_session_pack_effects(const hap_session_def *def);
+void hapi_session_unpack_effects(uint32_t packed, hap_session_def *io);
+
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
 
 #endif

@@ -76,6 +76,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .model = def->model,
       .impulse_pose = def->impulse_pose,
       .probe = def->probe,
+      .effects = hapi_session_pack_effects(def),
       .physics_hz = def->physics_hz,
       .lookback_share = def->lookback,
       .haptic_hz = def->haptic_hz,
@@ -122,7 +123,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .tool_points = TOOL_POINTS,
       .path_rows =
           def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
-      .crosses = def->cross == HAP_CROSS_ON ? 8 * (uint32_t)def->max_bodies : 0,
+      .crosses = 8 * (uint32_t)def->max_bodies,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {
@@ -145,7 +146,6 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
         .rt_priority = def->rt_priority,
         .trace_rows = (uint32_t)def->trace_rows,
-        .plane = def->plane,
         .max_sweeps = (uint32_t)def->max_sweeps,
         .guard = def->guard,
         .exchange = session->exchange,

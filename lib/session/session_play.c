@@ -544,12 +544,11 @@ hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
   d.impulse_pose = (hap_impulse_pose)info->impulse_pose;
   d.probe = (hap_probe)info->probe;
   d.max_edge_probes = info->max_edge_probes;
-  d.plane = (hap_plane)info->plane;
   d.max_hull_points = info->max_hull_points;
   d.guard = (hap_guard)info->guard;
-  d.cross = (hap_cross)info->cross;
   d.max_sweeps = info->max_sweeps;
   d.range_hops = info->range_hops_1 - 1;
+  hapi_session_unpack_effects(info->effects, &d);
   memcpy(def, &d, size < sizeof d ? size : sizeof d);
   return HAP_OK;
 }

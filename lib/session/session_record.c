@@ -6,6 +6,7 @@
 #include <hapode/record.h>
 
 #include "base/log.h"
+#include "base/wishes.h"
 #include "record/recorder.h"
 #include "session/session_internal.h"
 
@@ -52,6 +53,10 @@ static hap_status check_session(const hap_session *session, hap_detail *detail)
                      "the session has been started before: what it remembers of that is not in a "
                      "recording; create a new one");
   }
+  if (hapi_wish_is_off(hapi_physics_wanted_effects(session->physics), HAP_EFFECT_RECORDING)) {
+    return hapi_fail(detail, HAP_ERROR_STATE,
+                     "the effect recording is off: set it to auto by hap_session_set_effect first");
+  }
   if (session->def.drive == HAP_DRIVE_LOCKSTEP) {
     return hapi_fail(detail, HAP_ERROR_STATE,
                      "a lockstep session is not recorded: it does the same on every run by itself");
@@ -74,12 +79,11 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   out->impulse_pose = (int32_t)def->impulse_pose;
   out->probe = (int32_t)def->probe;
   out->max_edge_probes = def->max_edge_probes;
-  out->plane = (int32_t)def->plane;
   out->max_hull_points = def->max_hull_points;
   out->guard = (int32_t)def->guard;
-  out->cross = (int32_t)def->cross;
   out->max_sweeps = def->max_sweeps;
   out->range_hops_1 = def->range_hops + 1;
+  out->effects = hapi_session_pack_effects(def);
 }
 
 /* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */

@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "sync/exchange.h"
 
+#include <semaphore.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "base/alloc.h"
@@ -23,6 +25,8 @@ struct hapi_exchange {
   hapi_trail trail;
   hapi_path path;
   size_t size;
+  sem_t near_bell; /* rung when there is something to find again */
+  _Atomic int near_is_empty;
 };
 
 /* Blocks start on cache lines of their own. */
@@ -140,6 +144,7 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   hapi_exchange *e = (hapi_exchange *)(void *)memory;
   e->capacity = *capacity;
   e->size = size;
+  sem_init(&e->near_bell, 0, 0);
   char *at = memory + round_up(sizeof(hapi_exchange));
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
     e->channels[i].size = sizes[i];
@@ -171,6 +176,7 @@ void hapi_exchange_destroy(hapi_exchange *exchange)
   if (exchange != NULL) {
     hapi_trail_finish(&exchange->trail);
     hapi_path_finish(&exchange->path);
+    sem_destroy(&exchange->near_bell);
   }
   hapi_free(exchange);
 }
@@ -187,6 +193,7 @@ void hapi_exchange_reset(hapi_exchange *exchange)
       lay_out((hapi_channel)i, c->places[k], &exchange->capacity);
     }
   }
+  atomic_store(&exchange->near_is_empty, 1);
   hapi_trail_reset(&exchange->trail);
   hapi_path_reset(&exchange->path);
 }
@@ -297,9 +304,28 @@ hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
   return back(exchange, HAPI_CHANNEL_NEAR);
 }
 
+/* Physics alone writes near_is_empty, and the contact thread waits only while it is set: no post is lost, and
+ * one too many costs a look. */
 void hapi_exchange_near_publish(hapi_exchange *exchange)
 {
+  const hapi_near *near = back(exchange, HAPI_CHANNEL_NEAR);
+  int empty = near->pair_count + near->tool_pair_count == 0 && near->always == 0;
   publish(exchange, HAPI_CHANNEL_NEAR);
+  if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
+    sem_post(&exchange->near_bell);
+  }
+}
+
+void hapi_exchange_near_wait(hapi_exchange *exchange)
+{
+  if (atomic_load(&exchange->near_is_empty) != 0) {
+    (void)sem_wait(&exchange->near_bell); /* a signal may end it early */
+  }
+}
+
+void hapi_exchange_near_ring(hapi_exchange *exchange)
+{
+  sem_post(&exchange->near_bell);
 }
 
 hapi_near *hapi_exchange_near_take(hapi_exchange *exchange)

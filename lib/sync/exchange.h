@@ -40,6 +40,9 @@ hapi_state *hapi_exchange_state_take(hapi_exchange *exchange);
 hapi_near *hapi_exchange_near_back(hapi_exchange *exchange);
 void hapi_exchange_near_publish(hapi_exchange *exchange);
 hapi_near *hapi_exchange_near_take(hapi_exchange *exchange);
+/* [contact] Waits while the newest message has nothing to find; may come back early. */
+void hapi_exchange_near_wait(hapi_exchange *exchange);
+void hapi_exchange_near_ring(hapi_exchange *exchange); /* [any] ends such a wait */
 
 /* [haptic] -> [contact] */
 hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange);

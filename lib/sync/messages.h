@@ -56,9 +56,16 @@ enum {
   HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
   HAPI_BODY_GYROSCOPIC = 32,
   HAPI_BODY_TOUCHED = 64, /* of the loop's message: a contact carried it in this tick */
-  HAPI_BODY_WHOLE = 128   /* of a MEASURED one: all its rows go by response; else those of its only
+  HAPI_BODY_ALONE =
+      256,              /* an OWNED one that nothing can touch before the next sync: it waits for no
+                            contacts */
+  HAPI_BODY_WHOLE = 128 /* of a MEASURED one: all its rows go by response; else those of its only
                              pointer contact by that contact's a */
 };
+
+/* A body that turns more slowly is taken to be one that does not: what the gyroscopic term would add in a tick
+ * is a millionth of its turning. */
+#define HAPI_SPIN_LEAST 1e-3 /* rad/s */
 
 /* ---- how two shapes touch ---- */
 
@@ -277,6 +284,10 @@ typedef struct hapi_model {
   double period_s; /* H, of the next step */
   hap_model model;
   hap_impulse_pose impulse_pose;
+  uint32_t wishes; /* of the effects, base/wishes.h */
+  uint32_t
+      touches; /* pairs of a pointer and a geom that are near, also those whose points come later */
+  uint32_t bounces; /* surfaces and stops that give back speed; model CONTACT */
   uint32_t body_count;
   uint32_t contact_count;
   uint32_t watch_count; /* traced bodies */
@@ -398,6 +409,8 @@ typedef struct hapi_near {
   uint32_t point_count;
   uint32_t tool_count;
   uint32_t tool_pair_count; /* those of a key follow each other */
+  uint32_t between;         /* passes are made between two syncs as well */
+  uint32_t always;          /* and also where there is nothing to find */
   uint32_t bodies_offset;
   uint32_t geoms_offset;
   uint32_t pairs_offset;

@@ -43,8 +43,10 @@ static void check_def(const hap_session_def *def)
   check_between(def->drive, HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP);
   check_between(def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);
   check_between(def->probe, HAP_PROBE_SHARED, HAP_PROBE_OPERATING);
-  check_between(def->cross, HAP_CROSS_OFF, HAP_CROSS_ON);
-  check_between(def->plane, HAP_PLANE_WHERE_NEEDED, HAP_PLANE_ALWAYS);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    FUZZ_CHECK(hap_effect_check((hap_effect)i, (hap_effect_wish)def->effects[i], def->model,
+                                NULL) == HAP_OK);
+  }
 }
 
 static void check_options(const run_options *options)

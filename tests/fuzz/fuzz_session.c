@@ -84,9 +84,10 @@ static void edit_session(source *s, hap_session_def *def)
   } else if (field == 13) {
     unsigned byte = take_byte(s);
     def->probe = (hap_probe)(byte % 4);
-    def->cross = (hap_cross)(byte / 4 % 3);
+    def->effects[HAP_EFFECT_CROSS] = (uint8_t)(byte / 4 % 3);
   } else if (field == 14) {
-    def->plane = (hap_plane)(take_byte(s) % 3);
+    unsigned byte = take_byte(s);
+    def->effects[byte % HAP_EFFECT_PLACES] = (uint8_t)(byte / HAP_EFFECT_PLACES % 4);
   } else {
     def->flags = take_byte(s);
   }
@@ -163,12 +164,13 @@ static void check_def(const hap_session_def *def)
       {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
       {def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
       {def->probe, HAP_PROBE_SHARED, HAP_PROBE_OPERATING},
-      {def->cross, HAP_CROSS_OFF, HAP_CROSS_ON},
-      {def->plane, HAP_PLANE_WHERE_NEEDED, HAP_PLANE_ALWAYS},
       {def->flags, 0, 0},
   };
   for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; ++i) {
     FUZZ_CHECK(ranges[i][0] >= ranges[i][1] && ranges[i][0] <= ranges[i][2]);
+  }
+  for (int i = 0; i < HAP_EFFECT_PLACES; ++i) {
+    FUZZ_CHECK(def->effects[i] <= (i < HAP_EFFECTS ? HAP_EFFECT_ON : HAP_EFFECT_AUTO));
   }
 }
 

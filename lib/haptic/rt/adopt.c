@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/pose.h"
+#include "base/vec.h"
 #include "haptic/rt/tick.h"
 
 /* A body that comes in has the world's state, advanced by the age of the model. */
@@ -80,6 +81,9 @@ static void adopt_contact_body(hapi_tick *tick, hapi_local_body *body, const hap
     add_new_impulse(body, in);
     body->entered_model = tick->adopting;
   }
+  if ((in->flags & HAPI_BODY_ALONE) != 0) {
+    body->entered_model = 0;
+  }
   if (owned && owns && (body->pushed || (body->flags & HAPI_BODY_RESTING) == 0)) {
     /* Physics puts a body to sleep that moved too little, unless it was pushed meanwhile. */
     if (body->pushed || (flags & HAPI_BODY_RESTING) == 0) {
@@ -155,6 +159,11 @@ static void remember_ramps(hapi_tick *tick)
   }
 }
 
+static bool rubs(const hapi_tick *tick, double mu)
+{
+  return HAPI_HAS_FRICTION && (mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
+}
+
 static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_local_contact *out)
 {
   memset(out, 0, sizeof *out);
@@ -168,6 +177,7 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->a, in->a, sizeof out->a);
   memcpy(out->turn, in->turn, sizeof out->turn);
   out->mu = in->mu;
+  out->rubs = rubs(tick, in->mu);
   out->weight = 1.0;
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
@@ -231,6 +241,51 @@ static void leave(hapi_tick *tick, hapi_model *model)
   }
 }
 
+/* Nothing that is near: nothing can be touched before the next sync, and nothing be given. */
+static bool observes(const hapi_tick *tick, const hapi_model *model)
+{
+  bool felt = model->contact_count + model->touches > 0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &tick->pointers[i];
+    felt = felt || (p->generation != 0 && (hapi_v3_norm(p->guard.written.force) > 0.0 ||
+                                           hapi_v3_norm(p->guard.written.torque) > 0.0));
+  }
+  hap_effect_wish wish = hapi_wish(model->wishes, HAP_EFFECT_OBSERVER);
+  return wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && felt);
+}
+
+static bool may_be_proxy(const hapi_tick_pointer *p, uint32_t wishes)
+{
+  bool asked = p->coupling == HAP_COUPLING_AUTO && !hapi_wish_is_off(wishes, HAP_EFFECT_PROXY);
+  return p->generation != 0 &&
+         (p->proxied || asked ||
+          (p->coupling != HAP_COUPLING_AUTO && p->coupling != HAP_COUPLING_DIRECT));
+}
+
+/* What the model says of the effects. Before the contacts are taken. */
+static void adopt_effects(hapi_tick *tick, hapi_model *model)
+{
+  const hapi_model_contact *contacts = hapi_model_contacts(model);
+  bool observed = tick->guard.observes;
+  tick->wishes = model->wishes;
+  tick->bounces = HAPI_HAS_RESTITUTION &&
+                  (model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION));
+  tick->guard.observes = observes(tick, model);
+  if (tick->guard.observes && !observed) {
+    hapi_energy_resume(tick);
+  }
+  bool proxies = false;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    bool any = false;
+    for (uint32_t k = 0; k < model->contact_count && !any; ++k) {
+      any = contacts[k].pointer == i && rubs(tick, contacts[k].mu);
+    }
+    proxies = proxies || may_be_proxy(&tick->pointers[i], model->wishes);
+    hapi_tick_feel(&tick->pointers[i], hapi_wish(model->wishes, HAP_EFFECT_TORQUE), any);
+  }
+  tick->proxies = HAPI_HAS_PROXY && proxies;
+}
+
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
 {
   double age_s = 1e-9 * (double)(now_ns - model->state_ns);
@@ -246,6 +301,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
     }
   }
   tick->live_count = model->body_count;
+  adopt_effects(tick, model);
   adopt_contacts(tick, model);
   hapi_joint_adopt(tick, model);
   tick->model_number = model->number;

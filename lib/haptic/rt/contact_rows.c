@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/rows.h"
 #include "haptic/rt/touch_place.h"
 
@@ -158,9 +159,22 @@ static double closing(const placed_contact *c, const hapi_row *row)
   return hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
 }
 
+/* What comes in faster than the threshold goes back with its share. */
+static void bounce(const hapi_tick *tick, const placed_contact *c, hapi_row *row,
+                   hapi_row_source *source)
+{
+  const hapi_surface *s = c->surface;
+  double speed = closing(c, row);
+  bool hits = c->gap + tick->period * speed < 0.0;
+  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
+    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
+    source->pushes_out = false;
+  }
+}
+
 /* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
- * deeper than the surface layer. Coming in faster than the threshold: back with its share. */
-static void set_normal(const hapi_tick *tick, const placed_contact *c, hapi_row *row,
+ * deeper than the surface layer. */
+static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row,
                        hapi_row_source *source)
 {
   const hapi_surface *s = c->surface;
@@ -176,13 +190,10 @@ static void set_normal(const hapi_tick *tick, const placed_contact *c, hapi_row 
     row->target += push;
     source->pushes_out = !soft && push > PUSH_OUT_LEAST;
   }
-  if ((s->flags & HAPI_SURFACE_BOUNCE) == 0) {
-    return;
-  }
-  double speed = closing(c, row);
-  if (c->gap + tick->period * speed < 0.0 && -speed > s->bounce_speed) {
-    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
-    source->pushes_out = false;
+  if (HAPI_HAS_RESTITUTION && tick->bounces) {
+    uint64_t begin = hapi_effect_begin(tick);
+    bounce(tick, c, row, source);
+    hapi_effect_end(tick, HAP_EFFECT_RESTITUTION, begin);
   }
 }
 

@@ -13,6 +13,14 @@
 #define SPIN_MOST 100.0 /* rad/s, of a hand: about three times what a wrist makes */
 #define JUMP_S 0.01     /* and two steps of physics: a model for the new place has come */
 
+/* A sphere has torque of friction alone, and only on a device that turns it. */
+void hapi_tick_feel(hapi_tick_pointer *p, hap_effect_wish wish, bool rubs)
+{
+  bool called = !p->three_dof && (p->hull != NULL || (p->turns && rubs));
+  p->feels_torque =
+      HAPI_HAS_TORQUE && (wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && called));
+}
+
 static bool plausible(const double *values, int count)
 {
   for (int i = 0; i < count; ++i) {
@@ -118,7 +126,7 @@ void hapi_coupling_read(hapi_tick *tick)
 /* A newton metre is a newton on an arm, and the arm is shorter at the device by the motion's scale. */
 double hapi_coupling_torque_scale(const hapi_tick_pointer *p)
 {
-  return p->three_dof ? 0.0 : p->force_scale / p->motion_scale;
+  return p->three_dof || !p->feels_torque ? 0.0 : p->force_scale / p->motion_scale;
 }
 
 void hapi_coupling_write(hapi_tick_pointer *p)

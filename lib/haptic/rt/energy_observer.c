@@ -390,6 +390,16 @@ static void forget(hapi_tick *tick)
   }
 }
 
+/* What the devices did meanwhile nobody watched; what is owed is owed still. */
+void hapi_energy_resume(hapi_tick *tick)
+{
+  tick->guard.observed_ns = tick->now_ns;
+  tick->guard.given = 0.0;
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    tick->pointers[i].guard.placed = false;
+  }
+}
+
 void hapi_energy_observe(hapi_tick *tick)
 {
   hapi_guard_state *guard = &tick->guard;

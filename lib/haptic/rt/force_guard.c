@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include "base/vec.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/tick.h"
 
 /* The last thing between the simulation and the motors, in this order: finite, age of the local model,
@@ -163,7 +164,7 @@ static void report_written(hapi_tick_pointer *p)
 {
   const double *q = p->pose_world_device.quat_wxyz;
   p->guard.written = p->device_wrench;
-  if (p->three_dof) {
+  if (p->three_dof || !p->feels_torque) {
     hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
   }
   if (p->guard.flags == 0) {
@@ -217,8 +218,10 @@ void hapi_guard(hapi_tick *tick)
       want(tick, &tick->pointers[i]);
     }
   }
-  if (tick->guard.mode == HAP_GUARD_ON) {
+  if (HAPI_HAS_OBSERVER && tick->guard.observes && tick->guard.mode == HAP_GUARD_ON) {
+    uint64_t begin = hapi_effect_begin(tick);
     hapi_energy_observe(tick);
+    hapi_effect_end(tick, HAP_EFFECT_OBSERVER, begin);
   }
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "base/pose.h"
 #include "base/vec.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/tick.h"
 
 /* Local dynamics simulation (paper section 5.2). */
@@ -66,7 +67,11 @@ void hapi_local_step(hapi_tick *tick)
   if (tick->model != HAP_MODEL_ACCELERANCE) {
     return;
   }
-  accelerate_others(tick);
+  if (HAPI_HAS_CROSS && tick->cross_count > 0) {
+    uint64_t begin = hapi_effect_begin(tick);
+    accelerate_others(tick);
+    hapi_effect_end(tick, HAP_EFFECT_CROSS, begin);
+  }
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
     if ((body->flags & HAPI_BODY_DRIVEN) != 0) {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/pose.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/rows.h"
 
 /* The local world of model CONTACT: bodies near the pointers with their own contacts, stepped by the
@@ -39,7 +40,7 @@ static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, do
 static bool waits(const hapi_tick *tick, const hapi_local_body *body)
 {
   const hapi_patches *patches = tick->world.patches;
-  return (body->flags & HAPI_BODY_OWNED) != 0 &&
+  return (body->flags & HAPI_BODY_OWNED) != 0 && body->entered_model != 0 &&
          (patches == NULL || patches->model_number < body->entered_model);
 }
 
@@ -74,7 +75,13 @@ static void begin(hapi_tick *tick)
     tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
   uint32_t first_hub = solver->body_count;
-  hapi_proxy_begin(tick);
+  if (HAPI_HAS_PROXY && tick->proxies) {
+    uint64_t begin = hapi_effect_begin(tick);
+    hapi_proxy_begin(tick);
+    hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
+  } else {
+    hapi_pointers_direct(tick);
+  }
   solver->hub_count = solver->body_count - first_hub;
 }
 
@@ -93,7 +100,11 @@ static void set_free_velocities(hapi_tick *tick)
     const hapi_local_body *body = &tick->bodies[tick->live[i]];
     free_velocity(tick, body, tick->world.solver.v[body->row]);
   }
-  hapi_proxy_free(tick);
+  if (HAPI_HAS_PROXY && tick->proxies) {
+    uint64_t begin = hapi_effect_begin(tick);
+    hapi_proxy_free(tick);
+    hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
+  }
   memcpy(tick->world.solver.free, tick->world.solver.v,
          tick->world.solver.body_count * sizeof *tick->world.solver.free);
 }
@@ -145,14 +156,20 @@ static void turn_gyroscopic(hapi_local_body *body, double seconds, uint32_t subs
   }
 }
 
-static bool is_gyroscopic(const hapi_local_body *body)
+/* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what hardly
+ * spins goes on as it is. */
+static bool wobbles(const hapi_tick *tick, const hapi_local_body *body)
 {
   const uint32_t both = HAPI_BODY_GYROSCOPIC | HAPI_BODY_OWNED;
-  return (body->flags & both) == both && !body->round;
+  const double *w = body->twist.angular;
+  return HAPI_HAS_GYRO && (body->flags & both) == both && !body->round &&
+         (hapi_v3_dot(w, w) > HAPI_SPIN_LEAST * HAPI_SPIN_LEAST ||
+          hapi_wish_is_on(tick->wishes, HAP_EFFECT_GYRO));
 }
 
-static void move_body(hapi_local_body *body, double seconds)
+static void move_body(hapi_tick *tick, hapi_local_body *body)
 {
+  double seconds = tick->period;
   const double *w = body->twist.angular;
   uint32_t substeps = 1;
   if (!(seconds * seconds * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX)) {
@@ -160,8 +177,10 @@ static void move_body(hapi_local_body *body, double seconds)
     substeps = wanted < TURN_SUBSTEPS ? (uint32_t)wanted + 1 : TURN_SUBSTEPS;
   }
   hapi_v3_madd(body->pose.position, seconds, body->twist.linear, body->pose.position);
-  if (is_gyroscopic(body)) {
+  if (wobbles(tick, body)) {
+    uint64_t begin = hapi_effect_begin(tick);
     turn_gyroscopic(body, seconds, substeps);
+    hapi_effect_end(tick, HAP_EFFECT_GYRO, begin);
     return;
   }
   for (uint32_t i = 0; i < substeps; ++i) {
@@ -170,11 +189,11 @@ static void move_body(hapi_local_body *body, double seconds)
 }
 
 /* A new angular velocity for the orientation before the tick, at the one after it. */
-static void follow_inertia(hapi_local_body *body)
+static void follow_inertia(const hapi_tick *tick, hapi_local_body *body)
 {
   double local[3];
   double momentum[3];
-  if (is_gyroscopic(body)) {
+  if (wobbles(tick, body)) {
     hapi_m3_apply_transposed(body->rotation, body->twist.angular, local);
     hapi_m3_apply(body->given.inertia, local, momentum);
     hapi_m3_apply(body->rotation, momentum, local);
@@ -233,7 +252,7 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
     return;
   }
-  move_body(body, tick->period);
+  move_body(tick, body);
   damp(body);
   if (!sound(body)) {
     body->pose = before;
@@ -289,7 +308,7 @@ static double work_on(hapi_tick *tick, uint32_t slot, const double j[6], double 
 /* Of a row with a pointer, or with something that the loop does not own. */
 static void account_row(hapi_tick *tick, const hapi_row *row, const hapi_row_source *source)
 {
-  if (!source->pointer) {
+  if (HAPI_HAS_OBSERVER && !source->pointer && tick->guard.observes) {
     tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
                          work_on(tick, source->body_b, row->jb, row->impulse);
   }
@@ -355,19 +374,64 @@ static bool stop_push_out(hapi_tick *tick)
 static void wake(hapi_tick *tick)
 {
   if (tick->world.resting > 0) {
-    hapi_joint_wake(tick);
-    hapi_contact_wake(tick);
-    hapi_joint_wake(tick);
+    if (HAPI_HAS_JOINTS) {
+      hapi_joint_wake(tick);
+    }
+    if (HAPI_HAS_CONTACTS) {
+      hapi_contact_wake(tick);
+    }
+    if (HAPI_HAS_JOINTS) {
+      hapi_joint_wake(tick);
+    }
+  }
+}
+
+/* The solver's time by the rows that each effect has in it. */
+static void share_out(hapi_tick *tick, uint64_t cycles)
+{
+  const hapi_local_world *world = &tick->world;
+  uint32_t count = world->solver.row_count;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_row_source *source = &world->sources[i];
+    if (!source->pointer || source->part > 0) {
+      hap_effect effect = source->pointer ? HAP_EFFECT_FRICTION
+                          : source->joint ? HAP_EFFECT_JOINTS
+                                          : HAP_EFFECT_CONTACTS;
+      tick->sample.spent[effect] += cycles / count;
+    }
   }
 }
 
 static void solve(hapi_tick *tick)
 {
+  uint64_t begin = hapi_effect_begin(tick);
   hapi_solver_run(&tick->world.solver);
   hapi_solver_calm(&tick->world.solver);
   double residual = tick->world.solver.residual;
   tick->residual_max = residual > tick->residual_max ? residual : tick->residual_max;
   tick->sweeps += tick->world.solver.sweeps;
+  if (tick->sample.on) {
+    share_out(tick, hapi_cycles() - begin);
+  }
+}
+
+static void add_joints(hapi_tick *tick)
+{
+  if (HAPI_HAS_JOINTS && tick->world.joint_count > 0) {
+    uint64_t begin = hapi_effect_begin(tick);
+    hapi_joint_rows(tick);
+    hapi_effect_end(tick, HAP_EFFECT_JOINTS, begin);
+  }
+}
+
+static void add_contacts(hapi_tick *tick)
+{
+  const hapi_patches *patches = tick->world.patches;
+  if (HAPI_HAS_CONTACTS && patches != NULL && patches->contact_count > 0) {
+    uint64_t begin = hapi_effect_begin(tick);
+    hapi_contact_rows(tick);
+    hapi_effect_end(tick, HAP_EFFECT_CONTACTS, begin);
+  }
 }
 
 void hapi_local_world_step(hapi_tick *tick)
@@ -376,22 +440,24 @@ void hapi_local_world_step(hapi_tick *tick)
   set_free_velocities(tick);
   hapi_pointer_rows(tick);
   wake(tick);
-  hapi_joint_rows(tick);
-  hapi_contact_rows(tick);
+  add_joints(tick);
+  add_contacts(tick);
   solve(tick);
   bool again = stop_push_out(tick);
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     step_body(tick, &tick->bodies[tick->live[i]]);
   }
   if (again) {
-    hapi_proxy_push_out(tick);
+    if (HAPI_HAS_PROXY && tick->proxies) {
+      hapi_proxy_push_out(tick);
+    }
     solve(tick);
     for (uint32_t i = 0; i < tick->live_count; ++i) {
       hapi_local_body *body = &tick->bodies[tick->live[i]];
       if (hapi_body_responds(body)) {
         take_velocity(body, tick->world.solver.v[body->row]);
         limit_spin(body);
-        follow_inertia(body);
+        follow_inertia(tick, body);
         damp(body);
       }
     }
@@ -401,6 +467,10 @@ void hapi_local_world_step(hapi_tick *tick)
     memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_pointer_forces(tick);
-  hapi_proxy_move(tick);
+  if (HAPI_HAS_PROXY && tick->proxies) {
+    uint64_t begin_proxies = hapi_effect_begin(tick);
+    hapi_proxy_move(tick);
+    hapi_effect_end(tick, HAP_EFFECT_PROXY, begin_proxies);
+  }
   account(tick);
 }

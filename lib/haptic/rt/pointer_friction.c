@@ -300,7 +300,7 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
 hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
                                    const double normal[3], const double point[3])
 {
-  if (!(contact->mu > 0.0)) {
+  if (!contact->rubs) {
     return NULL;
   }
   const hapi_tick_pointer *p = &tick->pointers[contact->pointer];

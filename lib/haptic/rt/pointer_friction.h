@@ -61,7 +61,7 @@ static inline hapi_friction *hapi_friction_now(const hapi_tick *tick,
                                                const hapi_local_contact *contact)
 {
   hapi_friction *f = hapi_friction_of(tick, contact);
-  bool acts = contact->mu > 0.0 && f->generation == contact->generation && f->tick == tick->tick;
+  bool acts = contact->rubs && f->generation == contact->generation && f->tick == tick->tick;
   return acts ? f : NULL;
 }
 

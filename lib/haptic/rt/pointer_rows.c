@@ -4,6 +4,7 @@
 
 #include "haptic/rt/ball_nearest.h"
 #include "haptic/rt/contact_ramp.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/pointer_friction.h"
 #include "haptic/rt/rows.h"
 
@@ -62,6 +63,14 @@ static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
   return true;
 }
 
+static bool ask_shape(hapi_tick *tick, const hapi_local_contact *c, placed_pointer *at)
+{
+  uint64_t begin = hapi_effect_begin(tick);
+  bool found = place_by_shape(c, at);
+  hapi_effect_end(tick, HAP_EFFECT_SHAPE, begin);
+  return found;
+}
+
 static void place_by_plane(const hapi_local_contact *c, placed_pointer *at)
 {
   double apart[3];
@@ -94,8 +103,7 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
     return place_tool(tick, c, at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  bool ask = c->has_shape && tick->world.plane_mode == HAP_PLANE_WHERE_NEEDED;
-  if (!ask || !place_by_shape(c, at)) {
+  if (!HAPI_HAS_SHAPE || !c->has_shape || !ask_shape(tick, c, at)) {
     place_by_plane(c, at);
   }
   hapi_v3_copy(at->normal, c->normal_now);
@@ -572,8 +580,10 @@ static void take_contact(hapi_tick *tick, uint32_t index)
     push_static(c, &at, speed);
   }
   bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
-  if (c->mu > 0.0 && pushes && (p->rigid || at.depth > 0.0)) {
+  if (HAPI_HAS_FRICTION && c->rubs && pushes && (p->rigid || at.depth > 0.0)) {
+    uint64_t begin = hapi_effect_begin(tick);
     add_friction(tick, index, &at);
+    hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
   }
 }
 
@@ -615,10 +625,23 @@ static void brake(hapi_tick *tick)
   }
 }
 
+void hapi_pointers_direct(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    hapi_tick_pointer *p = &tick->pointers[i];
+    p->coupling_reason = HAP_COUPLING_ASKED;
+    p->contact_stiffness = p->near_stiffness;
+    p->near_stiffness = 0.0;
+    p->row = 0;
+  }
+}
+
 void hapi_pointer_rows(hapi_tick *tick)
 {
   hapi_tool_place(tick);
-  brake(tick);
+  if (HAPI_HAS_PROXY && tick->proxies) {
+    brake(tick);
+  }
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     take_contact(tick, i);
   }
@@ -679,7 +702,7 @@ static void rub(hapi_tick *tick, hapi_local_contact *c)
   hapi_friction_wrench(f, p, push, c->point_now, &wrench);
   hapi_v3_add(c->force, wrench.force, c->force);
   hapi_v3_copy(wrench.torque, c->couple);
-  if (p->turns || p->hull != NULL) {
+  if (HAPI_HAS_TORQUE && p->feels_torque) {
     hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
     hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
   }
@@ -704,11 +727,15 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
     double force = tick->world.solver.rows[c->row].impulse / tick->period;
     hapi_v3_scale(-force, c->normal_now, c->force);
   }
-  if (c->tool != 0) {
+  if (HAPI_HAS_TORQUE && c->tool != 0 && p->feels_torque) {
+    uint64_t begin = hapi_effect_begin(tick);
     turn_tool(p, c);
+    hapi_effect_end(tick, HAP_EFFECT_TORQUE, begin);
   }
-  if (c->mu > 0.0) {
+  if (HAPI_HAS_FRICTION && c->rubs) {
+    uint64_t begin = hapi_effect_begin(tick);
     rub(tick, c);
+    hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
   }
   if (c->force[0] == 0.0 && c->force[1] == 0.0 && c->force[2] == 0.0) {
     return;

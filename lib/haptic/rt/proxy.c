@@ -102,8 +102,16 @@ static void choose(hapi_tick *tick, uint32_t index)
   double period = tick->period;
   bool rigid = p->coupling == HAP_COUPLING_GOD_OBJECT || p->coupling == HAP_COUPLING_VIRTUAL;
   bool wanted = rigid || p->coupling == HAP_COUPLING_PROXY;
+  hap_effect_wish wish = hapi_wish(tick->wishes, HAP_EFFECT_PROXY);
   p->coupling_reason = HAP_COUPLING_ASKED;
-  if (p->coupling == HAP_COUPLING_AUTO) {
+  if (p->coupling == HAP_COUPLING_AUTO && wish != HAP_EFFECT_AUTO) {
+    wanted = wish == HAP_EFFECT_ON && p->hold_known;
+    p->coupling_reason =
+        wish == HAP_EFFECT_ON && !wanted ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
+    if (p->proxied && !wanted) {
+      forget_contacts(tick, index); /* in the middle of a touch: as end_proxy does */
+    }
+  } else if (p->coupling == HAP_COUPLING_AUTO) {
     wanted = is_above(p);
     p->coupling_reason = !p->hold_known ? HAP_COUPLING_UNKNOWN
                          : wanted       ? HAP_COUPLING_ABOVE

@@ -4,6 +4,7 @@
 
 #include "base/vec.h"
 #include "haptic/rt/contact_ramp.h"
+#include "haptic/rt/effect_clock.h"
 #include "haptic/rt/pointer_friction.h"
 
 /* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
@@ -97,8 +98,10 @@ static double normal_force(hapi_tick *tick, hapi_local_contact *c, const hapi_lo
   double closing = closing_rate(p, body, at, &own);
   double force = p->stiffness * depth + p->damping * closing;
   force = force > 0.0 ? share * force : 0.0;
-  p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
-  p->guard.power += force * (closing - own);
+  if (HAPI_HAS_OBSERVER && tick->guard.observes) {
+    p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
+    p->guard.power += force * (closing - own);
+  }
   return force;
 }
 
@@ -138,7 +141,7 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
   hapi_friction_end(f, push, limit);
   hapi_v3_add(c->force, on_body.force, c->force);
   hapi_v3_copy(on_body.torque, c->couple);
-  if (p->turns || p->hull != NULL) {
+  if (HAPI_HAS_TORQUE && p->feels_torque) {
     hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
   }
   p->guard.force2 += (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
@@ -207,11 +210,15 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   hapi_v3_scale(-force, at.normal, c->force);
-  if (c->tool != 0) {
+  if (HAPI_HAS_TORQUE && c->tool != 0 && p->feels_torque) {
+    uint64_t begin = hapi_effect_begin(tick);
     turn_pointer(p, &at, force);
+    hapi_effect_end(tick, HAP_EFFECT_TORQUE, begin);
   }
-  if (c->mu > 0.0) {
+  if (HAPI_HAS_FRICTION && c->rubs) {
+    uint64_t begin = hapi_effect_begin(tick);
     rub(tick, c, body, &at, force);
+    hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
     force = hapi_v3_norm(c->force);
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);

@@ -16,7 +16,6 @@ static void keep_arrays(const hapi_local_world *from, hapi_local_world *to)
   to->joint_memory = from->joint_memory;
   to->sources = from->sources;
   to->row_capacity = from->row_capacity;
-  to->plane_mode = from->plane_mode;
   to->solver = from->solver;
   to->solver.row_count = to->solver.body_count = 0;
   to->solver.dear_rows = to->solver.dear_runs = 0;
@@ -64,6 +63,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.period = tick->period;
   fresh.hashing = tick->hashing;
   fresh.guard.mode = tick->guard.mode;
+  fresh.guard.observes = true;
   fresh.bodies = tick->bodies;
   fresh.live = tick->live;
   fresh.contacts = tick->contacts;
@@ -87,7 +87,9 @@ void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
   if (tick->model == HAP_MODEL_CONTACT) {
     hapi_local_world_step(tick);
   } else {
-    hapi_proxy_none(tick);
+    if (HAPI_HAS_PROXY) {
+      hapi_proxy_none(tick);
+    }
     hapi_local_place(tick);
     hapi_render(tick);
     hapi_local_step(tick);

@@ -44,7 +44,9 @@
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
 
+#include "base/wishes.h"
 #include "haptic/rt/contact_solver.h"
+#include "haptic/rt/has.h"
 #include "haptic/rt/velocity.h"
 #include "sync/messages.h"
 #include "sync/path.h"
@@ -76,6 +78,7 @@ typedef struct hapi_guard_state {
   hap_guard mode;
   double age_loss; /* 0..1, share of the force that the age of the local model has taken */
   bool stale;
+  bool observes; /* the energy observer watches, if the mode has one */
   uint64_t stale_times;
   uint64_t stale_ticks;
   uint64_t slewed_ticks;
@@ -100,6 +103,7 @@ typedef struct hapi_tick_pointer {
   double damping;
   double friction;
   double finger_radius; /* m, of the torsion; 0: none */
+  bool feels_torque;    /* torque is worked out, and given to a device that can take it */
   bool turns;           /* with the device, and gives it torque; else only friction goes by it */
   double motion_scale;
   double force_scale;
@@ -265,7 +269,8 @@ typedef struct hapi_local_contact {
   double normal_body[3];
   double a[6][3];
   double turn[6]; /* acceleration by one N m about the normal; soft finger */
-  double mu;      /* 0: no friction */
+  double mu;
+  bool rubs; /* friction is worked out: there is some, or it was asked for */
   hapi_ramp ramp;
   double force[3];  /* on the body */
   double couple[3]; /* N m, on the body about the contact point; friction */
@@ -370,8 +375,13 @@ typedef struct hapi_local_world {
   uint32_t resting; /* bodies at the tick's begin */
   uint32_t active;  /* contacts between bodies that push in this tick */
   uint64_t late_passes;
-  hap_plane plane_mode;
 } hapi_local_world;
+
+/* See effect_clock.h; cycles. */
+typedef struct hapi_effect_sample {
+  bool on; /* this tick is looked at */
+  uint64_t spent[HAP_EFFECTS];
+} hapi_effect_sample;
 
 typedef struct hapi_tick {
   hapi_capacity capacity;
@@ -393,6 +403,11 @@ typedef struct hapi_tick {
   uint32_t body_high;
   hapi_local_world world;
   hapi_tool_world tool;
+
+  uint32_t wishes; /* of the model in use, base/wishes.h */
+  bool bounces;    /* some contact or stop of it gives back speed */
+  bool proxies;    /* some pointer is or may become one */
+  hapi_effect_sample sample;
 
   uint64_t tick;
   int64_t now_ns;
@@ -465,10 +480,11 @@ void hapi_proxy_none(hapi_tick *tick);                        /* other models: a
 void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
 void hapi_proxy_push_out(hapi_tick *tick); /* rigid ones: moved by the velocities as they are now */
 void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
-void hapi_pointer_rows(hapi_tick *tick);   /* pointer contacts -> rows */
-void hapi_pointer_forces(hapi_tick *tick); /* rows -> wrenches */
-void hapi_contact_wake(hapi_tick *tick);   /* what is touched by what moves */
-void hapi_contact_rows(hapi_tick *tick);   /* contacts between bodies -> rows */
+void hapi_pointers_direct(hapi_tick *tick); /* instead of proxy_begin where there can be none */
+void hapi_pointer_rows(hapi_tick *tick);    /* pointer contacts -> rows */
+void hapi_pointer_forces(hapi_tick *tick);  /* rows -> wrenches */
+void hapi_contact_wake(hapi_tick *tick);    /* what is touched by what moves */
+void hapi_contact_rows(hapi_tick *tick);    /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
 void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
 void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */
@@ -478,7 +494,9 @@ void hapi_tool_adopt_patches(hapi_tick *tick, hapi_patches *patches);
 void hapi_tool_place(hapi_tick *tick);                    /* all contacts of hulls, once a tick */
 void hapi_tool_forget(hapi_tick *tick, uint32_t pointer); /* its contacts begin as deep ones do */
 void hapi_guard(hapi_tick *tick);                         /* world wrench -> device wrench */
-void hapi_energy_observe(hapi_tick *tick);            /* part of the guard, on device wrenches */
+void hapi_energy_observe(hapi_tick *tick); /* part of the guard, on device wrenches */
+void hapi_energy_resume(hapi_tick *tick);  /* after ticks that were not observed */
+void hapi_tick_feel(hapi_tick_pointer *pointer, hap_effect_wish wish, bool rubs); /* feels_torque */
 void hapi_coupling_write(hapi_tick_pointer *pointer); /* world wrench -> device wrench */
 double hapi_coupling_torque_scale(const hapi_tick_pointer *pointer); /* device / world */
 void hapi_trace_hash(hapi_tick *tick);

@@ -1,0 +1,143 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/cycles.h"
+#include "haptic/haptic_internal.h"
+
+/* The loop's part of what is told of the effects: their time, and the state of those that pointers have. */
+
+#define SAMPLE_TICKS 64u
+
+void hapi_loop_effects_reset(hapi_haptic *haptic)
+{
+  hapi_loop_effects *e = &haptic->effects;
+  atomic_store(&e->samples, 0);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    atomic_store(&e->spent_ns[i], 0.0);
+  }
+  for (int i = 0; i < HAPI_LOOP_NOTED; ++i) {
+    atomic_store(&e->shown[i], 0);
+  }
+}
+
+void hapi_loop_sample_begin(hapi_haptic *haptic)
+{
+  hapi_effect_sample *sample = &haptic->tick.sample;
+  sample->on = HAPI_HAS_CYCLES && haptic->tick.tick % SAMPLE_TICKS == 0;
+  if (sample->on) {
+    memset(sample->spent, 0, sizeof sample->spent);
+    haptic->effects.begin = hapi_cycles();
+  }
+}
+
+void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns)
+{
+  hapi_loop_effects *e = &haptic->effects;
+  hapi_effect_sample *sample = &haptic->tick.sample;
+  if (!sample->on) {
+    return;
+  }
+  uint64_t whole = hapi_cycles() - e->begin;
+  double scale = whole > 0 ? (double)spent_ns / (double)whole : 0.0;
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    double before = atomic_load_explicit(&e->spent_ns[i], memory_order_relaxed);
+    atomic_store_explicit(&e->spent_ns[i], before + scale * (double)sample->spent[i],
+                          memory_order_relaxed);
+  }
+  atomic_store_explicit(&e->samples, atomic_load_explicit(&e->samples, memory_order_relaxed) + 1,
+                        memory_order_relaxed);
+  sample->on = false;
+}
+
+/* ---- states ---- */
+
+static void note_torque(const hapi_tick_pointer *p, hapi_effect_figures *io)
+{
+  hap_effect_reason why = p->three_dof ? HAP_REASON_NO_TORQUE : HAP_REASON_ROUND;
+  hapi_effect_note(io, p->feels_torque, why);
+}
+
+static void note_proxy(const hapi_tick_pointer *p, hapi_effect_figures *io)
+{
+  hap_effect_reason why = p->coupling != HAP_COUPLING_AUTO ? HAP_REASON_COUPLING
+                          : p->hold_known                  ? HAP_REASON_WITHIN
+                                                           : HAP_REASON_DEVICE_UNKNOWN;
+  hapi_effect_note(io, p->proxied, why);
+}
+
+/* In one word each: a reader never sees half of it. */
+static uint64_t packed(const hapi_effect_figures *f)
+{
+  return (uint64_t)f->on | (uint64_t)f->of << 16 | (uint64_t)f->reason << 32 |
+         (uint64_t)f->state << 48;
+}
+
+static hapi_effect_figures unpacked(uint64_t word)
+{
+  return (hapi_effect_figures){.on = (uint32_t)(word & 0xffffu),
+                               .of = (uint32_t)(word >> 16 & 0xffffu),
+                               .reason = (uint32_t)(word >> 32 & 0xffffu),
+                               .state = (uint32_t)(word >> 48)};
+}
+
+static void note_observer(const hapi_tick *tick, hapi_effect_figures *out)
+{
+  hapi_effect_note(out, tick->guard.observes && tick->guard.mode == HAP_GUARD_ON,
+                   tick->guard.mode == HAP_GUARD_MEASURE ? HAP_REASON_MEASURING : HAP_REASON_FAR);
+  hapi_effect_sum_up(out, hapi_wish(tick->wishes, HAP_EFFECT_OBSERVER), HAP_REASON_NOT_YET);
+}
+
+void hapi_loop_note_effects(hapi_haptic *haptic)
+{
+  const hapi_tick *tick = &haptic->tick;
+  hapi_effect_figures f[HAPI_LOOP_NOTED] = {{0}};
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    if (tick->pointers[i].generation != 0) {
+      note_torque(&tick->pointers[i], &f[HAPI_LOOP_TORQUE]);
+      note_proxy(&tick->pointers[i], &f[HAPI_LOOP_PROXY]);
+    }
+  }
+  hapi_effect_sum_up(&f[HAPI_LOOP_TORQUE], hapi_wish(tick->wishes, HAP_EFFECT_TORQUE),
+                     HAP_REASON_FAR);
+  hapi_effect_sum_up(&f[HAPI_LOOP_PROXY], hapi_wish(tick->wishes, HAP_EFFECT_PROXY),
+                     HAP_REASON_FAR);
+  note_observer(tick, &f[HAPI_LOOP_OBSERVER]);
+  for (int i = 0; i < HAPI_LOOP_NOTED; ++i) {
+    atomic_store_explicit(&haptic->effects.shown[i], packed(&f[i]), memory_order_relaxed);
+  }
+}
+
+static void fill_state(const hapi_haptic *haptic, int noted, hap_effect_info *out)
+{
+  hapi_effect_figures f =
+      unpacked(atomic_load_explicit(&haptic->effects.shown[noted], memory_order_relaxed));
+  out->state = f.state;
+  out->reason = f.reason;
+  out->on = f.on;
+  out->of = f.of;
+}
+
+/* What has no part of its own in a tick, or none that can be told from the rest. */
+static bool has_time(int effect)
+{
+  return effect != HAP_EFFECT_TESTING && effect != HAP_EFFECT_PASSES && effect != HAP_EFFECT_RANGE;
+}
+
+void hapi_haptic_effects(const hapi_haptic *haptic, hap_effect_info *out)
+{
+  const hapi_loop_effects *e = &haptic->effects;
+  uint64_t samples = atomic_load_explicit(&e->samples, memory_order_relaxed);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    if (samples > 0 && has_time(i)) {
+      double ns = atomic_load_explicit(&e->spent_ns[i], memory_order_relaxed);
+      out[i].tick_us = 1e-3 * ns / (double)samples;
+    }
+  }
+  fill_state(haptic, HAPI_LOOP_TORQUE, &out[HAP_EFFECT_TORQUE]);
+  fill_state(haptic, HAPI_LOOP_OBSERVER, &out[HAP_EFFECT_OBSERVER]);
+  if (out[HAP_EFFECT_PROXY].reason != HAP_REASON_NOT_IN_MODEL) {
+    fill_state(haptic, HAPI_LOOP_PROXY, &out[HAP_EFFECT_PROXY]);
+  }
+}

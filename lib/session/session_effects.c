@@ -1,0 +1,245 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include <hapode/effects.h>
+
+#include "base/log.h"
+#include "base/wishes.h"
+#include "session/session_internal.h"
+
+/* The effects of a session: names, what a model can fulfil, wishes and states. */
+
+#define BIT(model) (1u << (unsigned)(model))
+#define ACCELERANCE BIT(HAP_MODEL_ACCELERANCE)
+#define CONTACT BIT(HAP_MODEL_CONTACT)
+#define EVERY (BIT(HAP_MODEL_SINGLE) | BIT(HAP_MODEL_IMPULSE) | ACCELERANCE | CONTACT)
+
+typedef struct effect_row {
+  const char *name;
+  const char *text;
+  unsigned has;   /* models that can have it */
+  unsigned needs; /* of these, the ones that are made of it */
+} effect_row;
+
+static const effect_row effects[HAP_EFFECTS] = {
+    [HAP_EFFECT_TESTING] = {"testing", "testing simulations", ACCELERANCE | CONTACT, ACCELERANCE},
+    [HAP_EFFECT_CROSS] = {"cross", "cross accelerance between local bodies", ACCELERANCE, 0},
+    [HAP_EFFECT_CONTACTS] = {"contacts", "contacts between bodies in the loop", CONTACT, 0},
+    [HAP_EFFECT_PASSES] = {"passes", "contact passes between syncs", CONTACT, 0},
+    [HAP_EFFECT_JOINTS] = {"joints", "joints in the loop", CONTACT, 0},
+    [HAP_EFFECT_RANGE] = {"range", "local range beyond the neighbours", CONTACT, 0},
+    [HAP_EFFECT_RESTITUTION] = {"restitution", "restitution in the loop", CONTACT, 0},
+    [HAP_EFFECT_FRICTION] = {"friction", "friction on the pointer", EVERY, 0},
+    [HAP_EFFECT_TORQUE] = {"torque", "torque on the hand", EVERY, 0},
+    [HAP_EFFECT_GYRO] = {"gyro", "gyroscopic term in the loop", CONTACT, 0},
+    [HAP_EFFECT_SHAPE] = {"shape", "shape at every tick instead of a plane", CONTACT, 0},
+    [HAP_EFFECT_PROXY] = {"proxy", "coupling by a proxy", CONTACT, 0},
+    [HAP_EFFECT_OBSERVER] = {"observer", "energy observer", EVERY, 0},
+    [HAP_EFFECT_RECORDING] = {"recording", "recording for a replay bit for bit", 0, 0},
+};
+
+static const char *const wishes[] = {"auto", "off", "on"};
+
+static bool is_effect(hap_effect effect)
+{
+  return (int)effect >= 0 && (int)effect < HAP_EFFECTS;
+}
+
+static bool is_wish(hap_effect_wish wish)
+{
+  return (int)wish >= HAP_EFFECT_AUTO && (int)wish <= HAP_EFFECT_ON;
+}
+
+const char *hap_effect_name(hap_effect effect)
+{
+  return is_effect(effect) ? effects[effect].name : NULL;
+}
+
+const char *hap_effect_text(hap_effect effect)
+{
+  return is_effect(effect) ? effects[effect].text : NULL;
+}
+
+const char *hap_effect_wish_name(hap_effect_wish wish)
+{
+  return is_wish(wish) ? wishes[wish] : NULL;
+}
+
+const char *hap_effect_reason_text(hap_effect_reason reason)
+{
+  static const char *const texts[] = {
+      [HAP_REASON_NOT_YET] = "no sync so far",
+      [HAP_REASON_ASKED] = "asked for",
+      [HAP_REASON_CALLED] = "the scene calls for it",
+      [HAP_REASON_MODEL] = "the model is made of it",
+      [HAP_REASON_NOT_IN_MODEL] = "not in this model",
+      [HAP_REASON_FAR] = "nothing is near",
+      [HAP_REASON_ASLEEP] = "what is near sleeps",
+      [HAP_REASON_FREE] = "free",
+      [HAP_REASON_ALONE] = "alone",
+      [HAP_REASON_OWNED] = "the loop simulates it all",
+      [HAP_REASON_NO_BOUNCE] = "nothing bounces",
+      [HAP_REASON_NO_FRICTION] = "no friction",
+      [HAP_REASON_NO_TORQUE] = "device without torque",
+      [HAP_REASON_ROUND] = "a sphere without friction",
+      [HAP_REASON_SYMMETRIC] = "symmetric inertia",
+      [HAP_REASON_LOCKED] = "rotation locked",
+      [HAP_REASON_STILL] = "does not spin",
+      [HAP_REASON_NOT_IN_WORLD] = "off in the world",
+      [HAP_REASON_FLAT] = "flat",
+      [HAP_REASON_NO_CLOSED_FORM] = "no closed form",
+      [HAP_REASON_WITHIN] = "the device can hold it",
+      [HAP_REASON_DEVICE_UNKNOWN] = "device not known",
+      [HAP_REASON_COUPLING] = "as the pointer's coupling says",
+      [HAP_REASON_MEASURING] = "the guard only measures",
+      [HAP_REASON_NOT_RECORDED] = "not recorded",
+      [HAP_REASON_OUTSIDE] = "beyond what the loop can simulate",
+  };
+  size_t index = (size_t)reason;
+  return index < sizeof texts / sizeof texts[0] ? texts[index] : "";
+}
+
+/* ---- what can be wished for ---- */
+
+static hap_status refuse(hap_effect effect, hap_effect_wish wish, hap_model model,
+                         hap_detail *detail)
+{
+  const effect_row *e = &effects[effect];
+  if (effect == HAP_EFFECT_RECORDING) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "recording=on: a recording needs a file: call hap_session_record");
+  }
+  if (wish == HAP_EFFECT_OFF) {
+    return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                     "%s=off is not supported: model %s is made of %s; use model contact", e->name,
+                     hap_model_name(model), e->text);
+  }
+  return hapi_fail(
+      detail, HAP_ERROR_UNSUPPORTED,
+      "%s=on is not supported in model %s, which has no %s; use model %s", e->name,
+      hap_model_name(model), e->text,
+      hap_model_name((e->has & CONTACT) != 0 ? HAP_MODEL_CONTACT : HAP_MODEL_ACCELERANCE));
+}
+
+hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap_model model,
+                            hap_detail *detail)
+{
+  if (!is_effect(effect) || !is_wish(wish) || (int)model < 0 || hap_model_name(model) == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "there is no effect %d, wish %d or model %d",
+                     (int)effect, (int)wish, (int)model);
+  }
+  bool lacks = wish == HAP_EFFECT_ON && (effects[effect].has & BIT(model)) == 0;
+  bool needs = wish == HAP_EFFECT_OFF && (effects[effect].needs & BIT(model)) != 0;
+  return lacks || needs ? refuse(effect, wish, model, detail) : HAP_OK;
+}
+
+static hap_status check_guard(const hap_session_def *def, hap_effect effect, hap_effect_wish wish,
+                              hap_detail *detail)
+{
+  return effect == HAP_EFFECT_OBSERVER && wish == HAP_EFFECT_ON && def->guard == HAP_GUARD_MEASURE
+             ? hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                         "observer=on is not supported with HAP_GUARD_MEASURE, which leaves the "
+                         "force as it is; use HAP_GUARD_ON")
+             : HAP_OK;
+}
+
+hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail)
+{
+  hap_status status = HAP_OK;
+  for (int i = 0; i < HAP_EFFECT_PLACES && status >= HAP_OK; ++i) {
+    int wish = def->effects[i];
+    if (i >= HAP_EFFECTS ? wish != 0 : !is_wish((hap_effect_wish)wish)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects[%d] is %d, not %s", i, wish,
+                       i >= HAP_EFFECTS ? "0: there is no such effect" : "a hap_effect_wish");
+    }
+    if (i < HAP_EFFECTS) {
+      status = hap_effect_check((hap_effect)i, (hap_effect_wish)wish, def->model, detail);
+    }
+    if (status >= HAP_OK) {
+      status = check_guard(def, (hap_effect)i, (hap_effect_wish)wish, detail);
+    }
+  }
+  return status;
+}
+
+uint32_t hapi_session_pack_effects(const hap_session_def *def)
+{
+  uint32_t packed = 0;
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    packed = hapi_wish_set(packed, (hap_effect)i, (hap_effect_wish)def->effects[i]);
+  }
+  return packed;
+}
+
+void hapi_session_unpack_effects(uint32_t packed, hap_session_def *io)
+{
+  memset(io->effects, 0, sizeof io->effects);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    io->effects[i] = (uint8_t)hapi_wish(packed, (hap_effect)i);
+  }
+}
+
+hap_status hap_session_set_effect(hap_session *session, hap_effect effect, hap_effect_wish wish)
+{
+  hap_detail detail = {""};
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (session->player != NULL) {
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "the session plays a recording, and what happened is in it");
+  }
+  hap_status status =
+      hap_effect_check(effect, wish, hapi_physics_wanted_model(session->physics), &detail);
+  if (status >= HAP_OK) {
+    status = check_guard(&session->def, effect, wish, &detail);
+  }
+  if (status >= HAP_OK && effect == HAP_EFFECT_RECORDING && wish == HAP_EFFECT_OFF &&
+      session->recorder != NULL) {
+    status = hapi_fail(&detail, HAP_ERROR_STATE,
+                       "recording=off: the session is recorded, until it is stopped");
+  }
+  if (status < HAP_OK) {
+    return hapi_session_fail(session, status, "%s", detail.text);
+  }
+  hapi_physics_set_effect(session->physics, effect, wish);
+  return HAP_OK;
+}
+
+/* ---- what they do ---- */
+
+static void fill_recording(const hap_session *session, hap_effect_info *out)
+{
+  bool on = session->recorder != NULL;
+  out->state = on ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF;
+  out->reason = on                            ? HAP_REASON_ASKED
+                : out->wish == HAP_EFFECT_OFF ? HAP_REASON_ASKED
+                                              : HAP_REASON_NOT_RECORDED;
+  out->on = out->of = 0;
+}
+
+hap_status hap_session_effects(const hap_session *session, hap_effect_info *out, size_t count,
+                               size_t size_of_one)
+{
+  hap_effect_info all[HAP_EFFECTS];
+  if (session == NULL || out == NULL || size_of_one < sizeof out->size) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  size_t size = size_of_one < sizeof all[0] ? size_of_one : sizeof all[0];
+  memset(all, 0, sizeof all);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    all[i].size = (uint32_t)size;
+    all[i].effect = (uint32_t)i;
+    all[i].tick_us = all[i].physics_ms = all[i].contact_us = (double)NAN;
+  }
+  hapi_physics_effects(session->physics, all);
+  hapi_haptic_effects(session->haptic, all);
+  hapi_contact_effects(session->contact, all);
+  fill_recording(session, &all[HAP_EFFECT_RECORDING]);
+  for (size_t i = 0; i < count && i < HAP_EFFECTS; ++i) {
+    memcpy((char *)out + i * size_of_one, &all[i], size);
+  }
+  return count <= HAP_EFFECTS ? HAP_OK : HAP_ERROR_ARGUMENT;
+}
