@@ -373,7 +373,7 @@ TEST(a_loop_that_hangs_leaves_no_force)
 
 typedef struct felt {
   double most;        /* N, that was asked for */
-  double force[2];    /* sums of asked * asked and of asked * given */
+  double force[2];    /* sums of what was asked, and of what was given along it */
   double torque[2];   /* the same */
   double torque_most; /* N m, that was asked for */
   int samples;
@@ -389,8 +389,11 @@ static void to_makers(const double v[3], double out[3])
 
 static void add(const double asked[3], const double given[3], double sums[2])
 {
-  sums[0] += hapi_v3_dot(asked, asked);
-  sums[1] += hapi_v3_dot(asked, given);
+  double length = hapi_v3_norm(asked);
+  if (length > 0.0) {
+    sums[0] += length;
+    sums[1] += hapi_v3_dot(asked, given) / length;
+  }
 }
 
 /* The wrench on the hand against that of the strings, while the emulated hand pushes. */
