@@ -16,6 +16,7 @@
 #include "base/index.h"
 #include "base/thread.h"
 #include "physics/admittance.h"
+#include "physics/islands.h"
 #include "physics/joint_probe.h"
 #include "physics/physics.h"
 #include "proximity/proximity.h"
@@ -505,11 +506,6 @@ typedef struct hapi_test_set {
   unsigned islands_threads; /* ODE's setting, restored after the probes */
 } hapi_test_set;
 
-typedef struct hapi_islands {
-  dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
-  dThreadingThreadPoolID pool;
-} hapi_islands;
-
 typedef struct hapi_physics_counts {
   hap_stats stats; /* physics' part */
   double collide_s;
@@ -677,13 +673,7 @@ void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
-
-/* Threads for the islands of the global step, between begin and end of a session; false: not to be had. */
-bool hapi_islands_begin(hapi_physics *physics);
-void hapi_islands_end(hapi_physics *physics);
-void hapi_islands_rest(hapi_physics *physics); /* for testing simulations */
-void hapi_islands_go_on(hapi_physics *physics);
-double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
+double hapi_body_mass(dBodyID body);                             /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */
 bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
