@@ -18,6 +18,7 @@
 #include "base/thread.h"
 #include "base/wishes.h"
 #include "physics/admittance.h"
+#include "physics/islands.h"
 #include "physics/joint_probe.h"
 #include "physics/lookback.h"
 #include "physics/physics.h"
@@ -521,11 +522,6 @@ typedef struct hapi_test_set {
   unsigned islands_threads; /* ODE's setting, restored after the probes */
 } hapi_test_set;
 
-typedef struct hapi_islands {
-  dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
-  dThreadingThreadPoolID pool;
-} hapi_islands;
-
 typedef struct hapi_physics_counts {
   hap_stats stats; /* physics' part */
   double collide_s;
@@ -695,11 +691,6 @@ void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
                               const dBodyID bodies[2], dSurfaceParameters *surface,
                               bool carried);
 
-/* Threads for the islands of the global step, between begin and end of a session; false: not to be had. */
-bool hapi_islands_begin(hapi_physics *physics);
-void hapi_islands_end(hapi_physics *physics);
-void hapi_islands_rest(hapi_physics *physics); /* for testing simulations */
-void hapi_islands_go_on(hapi_physics *physics);
 double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* What the pair's surface is, from the application's callback; false: no contact. */

@@ -97,43 +97,6 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index)
   }
 }
 
-/* v += b0 d0 + b1 d1 + b2 d2 */
-static void push_triple(double v[6], const double d[3], const double b0[6], const double b1[6],
-                        const double b2[6])
-{
-  const hapi_two share[3] = {hapi_two_all(d[0]), hapi_two_all(d[1]), hapi_two_all(d[2])};
-  for (int k = 0; k < 6; k += 2) {
-    hapi_two sum = hapi_two_mul(share[0], hapi_two_load(b0 + k));
-    sum = hapi_two_madd(sum, share[1], hapi_two_load(b1 + k));
-    sum = hapi_two_madd(sum, share[2], hapi_two_load(b2 + k));
-    hapi_two_store(v + k, hapi_two_add(hapi_two_load(v + k), sum));
-  }
-}
-
-static double half_width(const hapi_row *friction, double p)
-{
-  return p > 0.0 ? friction->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
-}
-
-/* Warm start of three rows that are a triple. */
-static void start_triple(hapi_solver *solver, hapi_row *r)
-{
-  r[0].impulse = hapi_clamp(r[0].impulse, r[0].lo, r[0].hi);
-  double p = r[0].impulse;
-  for (int i = 1; i < 3; ++i) {
-    double most = half_width(&r[i], p);
-    r[i].impulse = hapi_clamp(r[i].impulse, -most, most);
-  }
-  const double impulses[3] = {p, r[1].impulse, r[2].impulse};
-  if (p == 0.0 && impulses[1] == 0.0 && impulses[2] == 0.0) {
-    return;
-  }
-  push_triple(solver->v[r->a], impulses, r[0].ba, r[1].ba, r[2].ba);
-  if (r->paired) {
-    push_triple(solver->v[r->b], impulses, r[0].bb, r[1].bb, r[2].bb);
-  }
-}
-
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
 {
   hapi_row *r = &solver->rows[first];
@@ -143,10 +106,6 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
   }
   if (may_join) {
     join_triple(solver, first + 2);
-  }
-  if (r->triple) {
-    start_triple(solver, r);
-    return;
   }
   for (uint32_t i = 0; i < count; ++i) {
     if (r[i].inverse != 0.0) {
@@ -187,10 +146,28 @@ static double change(hapi_row *row, double error, double lo, double hi)
   return hapi_clamp(wanted, lo - old, hi - old);
 }
 
+static double half_width(const hapi_row *friction, double p)
+{
+  return p > 0.0 ? friction->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+}
+
 static double change_friction(hapi_row *row, double error, double p)
 {
   double hi = half_width(row, p);
   return change(row, error, -hi, hi);
+}
+
+/* v += b0 d0 + b1 d1 + b2 d2 */
+static void push_triple(double v[6], const double d[3], const double b0[6], const double b1[6],
+                        const double b2[6])
+{
+  const hapi_two share[3] = {hapi_two_all(d[0]), hapi_two_all(d[1]), hapi_two_all(d[2])};
+  for (int k = 0; k < 6; k += 2) {
+    hapi_two sum = hapi_two_mul(share[0], hapi_two_load(b0 + k));
+    sum = hapi_two_madd(sum, share[1], hapi_two_load(b1 + k));
+    sum = hapi_two_madd(sum, share[2], hapi_two_load(b2 + k));
+    hapi_two_store(v + k, hapi_two_add(hapi_two_load(v + k), sum));
+  }
 }
 
 /* As three updates, but the velocities are read and written once: what the first changes do to the
