@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "bench/accuracy.h"
 #include "haptic/haptic_internal.h"
@@ -23,13 +24,20 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->probe = library.probe;
   def->cross = library.cross;
   def->coupling = HAP_COUPLING_DIRECT;
+  def->max_sweeps = library.max_sweeps;
+  def->range_hops = library.range_hops;
+  def->max_edge_probes = library.max_edge_probes;
+  def->plane = library.plane;
+  def->integration = HAP_INTEGRATION_AUTO;
 }
 
 static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
 {
   rig_options options;
+  scene_parameters parameters = *def->parameters;
+  parameters.iterations = def->iterations > 0 ? def->iterations : parameters.iterations;
   rig_options_init(&options);
-  options.parameters = def->parameters;
+  options.parameters = &parameters;
   options.max_force = UNLIMITED_N;
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);
@@ -42,6 +50,11 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r)
   options.def.physics_latency_ticks = def->latency_ticks;
   options.def.probe = def->probe;
   options.def.cross = def->cross;
+  options.def.max_sweeps = def->max_sweeps;
+  options.def.range_hops = def->range_hops;
+  options.def.max_edge_probes = def->max_edge_probes;
+  options.def.plane = def->plane;
+  options.integration = def->integration;
   options.coupling = def->coupling;
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
@@ -82,23 +95,32 @@ static double deepest_now(const rig *r)
   return deepest;
 }
 
-/* With a faster loop every frame is the first of its ticks: the one at that time. */
-static hap_status record(const rig *r, uint64_t ticks_a_frame, accuracy_motion *out)
+static double seconds_of(clockid_t clock)
+{
+  struct timespec t;
+  clock_gettime(clock, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* A frame is the newest tick at its time: with a faster loop the first of its ticks, with a slower one
+ * the same for as long as it lasts. */
+static hap_status record(const rig *r, double haptic_hz, accuracy_motion *out)
 {
   hap_trace_row row;
   size_t got = 0;
+  double ticks = 0.0;
   hap_status status = HAP_OK;
+  memset(&row, 0, sizeof row);
   for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
-    for (uint64_t tick = 0; tick < ticks_a_frame && status >= HAP_OK; ++tick) {
+    double newest = floor((double)i * haptic_hz / ACCURACY_HAPTIC_HZ + 1e-9);
+    for (; ticks <= newest && status >= HAP_OK; ticks += 1.0) {
       status = hap_session_advance(r->session, 1);
       hap_status read = hap_session_trace_read(r->session, &row, 1, &got);
       status = status >= HAP_OK ? read : status;
-      if (tick == 0 && got == 1) {
-        note_frame(r, &row, &out->frames[i]);
-        out->bodies = row.body_count;
-      }
       out->deepest = fmax(out->deepest, deepest_now(r));
     }
+    note_frame(r, &row, &out->frames[i]);
+    out->bodies = row.body_count;
   }
   return status;
 }
@@ -115,7 +137,12 @@ hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *
   }
   hap_status status = open_rig(b, def, &r);
   if (status >= HAP_OK) {
-    status = record(&r, (uint64_t)lround(def->haptic_hz / ACCURACY_HAPTIC_HZ), out);
+    double wall = seconds_of(CLOCK_MONOTONIC);
+    double used = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+    status = record(&r, def->haptic_hz, out);
+    used = seconds_of(CLOCK_THREAD_CPUTIME_ID) - used;
+    wall = seconds_of(CLOCK_MONOTONIC) - wall;
+    out->share = wall > 0.0 ? fmin(used / wall, 1.0) : 1.0;
     (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
   }
   if (r.session != NULL) {

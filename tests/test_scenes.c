@@ -580,6 +580,15 @@ TEST(clump_touches_eight_at_once)
   close_run(&r);
 }
 
+TEST(field_is_touched_all_at_once)
+{
+  felt f[SCENE_POINTERS_MAX];
+  run r;
+  REQUIRE(play_rigid(&r, "field", 0.3, f));
+  CHECK(f[0].at_once == 16 && r.s->body_count == 16);
+  close_run(&r);
+}
+
 TEST(spheres_push_all_on)
 {
   felt f[SCENE_POINTERS_MAX];
@@ -870,6 +879,7 @@ static void run_all(void)
   RUN(hit_collides_at_a_metre_a_second);
   RUN(round_bodies_roll_to_and_fro);
   RUN(clump_touches_eight_at_once);
+  RUN(field_is_touched_all_at_once);
   RUN(spheres_push_all_on);
   RUN(hold_stays_under_the_hand);
   RUN(paths_reach_the_first_body);
