@@ -16,6 +16,7 @@
 
 #define ACCURACY_HAPTIC_HZ 1000.0
 #define ACCURACY_SPEC_MAX 1024
+#define ACCURACY_REFERENCE_ITERATIONS 1000
 #define ACCURACY_STARTS_MAX 10
 #define ACCURACY_SCENES_MAX 32
 #define ACCURACY_NAME_MAX 16
@@ -171,6 +172,8 @@ bool accuracy_knob_has_value(const char *knob); /* else its name says it all */
 /* Starts of a scene: indices of the offsets of accuracy_start. */
 size_t accuracy_starts(const accuracy_scene *which, bool quick, size_t out[ACCURACY_STARTS_MAX]);
 double accuracy_start(size_t index); /* m */
+
+double accuracy_seconds(const accuracy_scene *which, bool quick); /* of a run */
 
 /* About proportional to the time of a row. The first one of a group makes the references. */
 double accuracy_point_cost(const accuracy_plan *plan, const accuracy_group *group,

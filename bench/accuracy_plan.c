@@ -12,12 +12,12 @@
 #include "bench/cycles.h"
 
 #define SPEEDS_AT_HZ 20.0
-#define REFERENCE_COST 1200.0 /* a tick of 1000 iterations */
-#define TICK_COST 250.0       /* one of the loop's, in iterations of QuickStep */
-#define STEP_COST 300.0       /* what a physics step takes beside its iterations, likewise */
-#define PROBES 4.0            /* testing simulations beside a step of model ACCELERANCE */
-#define FLOOR_REFERENCES 4.0  /* two at 2 kHz, in runs of a reference */
-#define SCENE_SPEED 0.1       /* m/s, about that of most hands */
+#define TICK_COST 250.0 /* one of the loop's, in iterations of QuickStep */
+#define STEP_COST 300.0 /* what a physics step takes beside its iterations, likewise */
+#define PROBES 4.0      /* testing simulations beside a step of model ACCELERANCE */
+#define BODIES_GUESSED 3
+#define FLOOR_REFERENCES 4.0 /* two at 2 kHz, in runs of a reference */
+#define SCENE_SPEED 0.1      /* m/s, about that of most hands */
 
 /* Against the hand, so that no scene's gap to a wall is closed. The first two differ by 1 um, which is
  * one of the noise floors. */
@@ -356,6 +356,9 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
   out->quick = b->quick;
   writer w = {.bench = b, .plan = out, .status = HAP_OK};
   for (size_t i = 0; i < count; ++i) {
+    if (cycles_scene(scenes[i]->base) == NULL) {
+      w.status = bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", scenes[i]->base);
+    }
     for (size_t k = 0; k < (b->quick ? COUNT(rates_quick) : COUNT(rates)); ++k) {
       add_rate(&w, scenes[i], b->quick ? rates_quick[k] : rates[k]);
     }
@@ -374,9 +377,16 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
 
 /* ---- what it takes ---- */
 
-static double run_cost(const accuracy_run_def *def, double seconds)
+/* Rows of a step grow with the bodies. */
+static double step_cost(const scene_parameters *p, int its)
 {
-  double step = STEP_COST + (def->iterations > 0 ? def->iterations : 50);
+  int bodies = p->count_default > 0 ? p->count_default : BODIES_GUESSED;
+  return STEP_COST + (double)(its > 0 ? its : p->iterations) * bodies;
+}
+
+static double run_cost(const scene_parameters *p, const accuracy_run_def *def, double seconds)
+{
+  double step = step_cost(p, def->iterations);
   double ticks = seconds * def->haptic_hz;
   if (def->model == HAP_MODEL_SINGLE) {
     return ticks * step;
@@ -385,18 +395,27 @@ static double run_cost(const accuracy_run_def *def, double seconds)
   return ticks * TICK_COST + seconds * def->physics_hz * (1.0 + tests) * step;
 }
 
+double accuracy_seconds(const accuracy_scene *which, bool quick)
+{
+  return quick && which->seconds_quick > 0.0 ? which->seconds_quick
+         : which->seconds > 0.0              ? which->seconds
+                                             : cycles_scene(which->base)->duration;
+}
+
 double accuracy_point_cost(const accuracy_plan *plan, const accuracy_group *group,
                            const accuracy_point *point)
 {
   size_t used[ACCURACY_STARTS_MAX];
+  const scene_parameters *p = cycles_scene(group->scene->base);
   size_t all = accuracy_starts(group->scene, plan->quick, used);
-  double seconds = group->hand_speed > 0.0 ? SCENE_SPEED / group->hand_speed : 1.0;
+  double slower = group->hand_speed > 0.0 ? SCENE_SPEED / group->hand_speed : 1.0;
+  double seconds = slower * accuracy_seconds(group->scene, plan->quick);
   bool first = point == &plan->points[group->first];
   bool main = first && point->all_starts;
   double references = !first ? 0.0 : FLOOR_REFERENCES + (main ? (double)all : 2.0);
   double runs = point->all_starts ? (double)all * (main ? 2.0 : 1.0) : 1.0;
-  return references * seconds * ACCURACY_HAPTIC_HZ * REFERENCE_COST +
-         runs * run_cost(&point->def, seconds);
+  return references * seconds * ACCURACY_HAPTIC_HZ * step_cost(p, ACCURACY_REFERENCE_ITERATIONS) +
+         runs * run_cost(p, &point->def, seconds);
 }
 
 /* The dearest first, each to the shard that has least. */

@@ -10,7 +10,6 @@
 #include "bench/accuracy.h"
 #include "bench/cycles.h"
 
-#define REFERENCE_ITERATIONS 1000
 #define CONTROL_RATE 1.3 /* times the physics rate: shares none of its harmonics up to the 5th */
 #define CONTROL_HZ_MOST 500.0
 #define HAND_HZ 20.0
@@ -63,7 +62,7 @@ static hap_status run_reference(const sweep *s, size_t index, double haptic_hz,
   def.model = HAP_MODEL_SINGLE;
   def.physics_hz = s->group->physics_hz; /* what soft constraints are converted from */
   def.haptic_hz = haptic_hz;
-  def.iterations = REFERENCE_ITERATIONS;
+  def.iterations = ACCURACY_REFERENCE_ITERATIONS;
   return run_from(s, &def, index, out);
 }
 
@@ -303,17 +302,11 @@ static hap_status begin_sweep(bench *b, const accuracy_plan *plan, const accurac
                               sweep *s)
 {
   const accuracy_scene *which = group->scene;
-  const scene_parameters *base = cycles_scene(which->base);
   memset(s, 0, sizeof *s);
   s->bench = b;
   s->group = group;
-  if (base == NULL) {
-    return bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", which->base);
-  }
-  s->parameters = *base;
-  s->seconds = plan->quick && which->seconds_quick > 0.0 ? which->seconds_quick
-               : which->seconds > 0.0                    ? which->seconds
-                                                         : base->duration;
+  s->parameters = *cycles_scene(which->base); /* the plan has looked */
+  s->seconds = accuracy_seconds(which, plan->quick);
   s->start_count = accuracy_starts(which, plan->quick, s->start);
   hap_status status = set_hands(s, 1.0);
   return status >= HAP_OK && group->hand_speed > 0.0 ? set_speed(s) : status;
