@@ -10,7 +10,7 @@
  *                  --quick the first one, and eq4 the default from there
  *                  proxy, god-object, virtual (--coupling): through that, value N/m, all starts
  *   force_rel_rms  RMS of the difference / RMS of the reference, while either is in contact
- *   duty           computing time of all threads / simulated time
+ *   duty           processor time of physics, contact passes and loop / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
  *                  worst one of model contact, or 1 um apart
  *   estimate       0, reserved

@@ -61,7 +61,7 @@ typedef struct accuracy_motion {
   size_t count;
   size_t bodies;
   double deepest; /* m, that a pointer was in a body */
-  double share;   /* of the processor that the run had: what times were, had nobody else run */
+  double used_s;  /* of the processor, for all that was computed */
   hap_stats stats;
 } accuracy_motion;
 

@@ -4,6 +4,7 @@
 /* The rows of the table before they are measured. At each physics rate every model as it is, then
  * the knobs, one at a time and the others as by default. */
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -130,6 +131,13 @@ static accuracy_point point_of(const writer *w, hap_model model, const char *kno
   return p;
 }
 
+static bool is_same(const accuracy_point *a, const accuracy_point *b)
+{
+  return a->def.model == b->def.model && strcmp(a->knob, b->knob) == 0 && a->value == b->value &&
+         a->physics_hz == b->physics_hz;
+}
+
+/* A row is known by its model, knob, value and rate. */
 static void add(writer *w, const accuracy_point *point)
 {
   accuracy_plan *plan = w->plan;
@@ -143,6 +151,9 @@ static void add(writer *w, const accuracy_point *point)
   plan->points[plan->count] = *point;
   if (point->def.model == HAP_MODEL_SINGLE) { /* its steps are the loop's */
     plan->points[plan->count].physics_hz = point->def.haptic_hz;
+  }
+  for (size_t i = w->group->first; i < plan->count; ++i) {
+    assert(!is_same(&plan->points[i], &plan->points[plan->count]));
   }
   ++plan->count;
   ++w->group->count;
@@ -231,10 +242,12 @@ static void add_ages(writer *w, hap_model model)
 {
   int step = (int)(ACCURACY_HAPTIC_HZ / w->group->physics_hz);
   const int ages[] = {0, 1, step / 2, step};
+  int oldest = -1;
   for (size_t i = 0; i < COUNT(ages); ++i) {
-    if (i > 0 && ages[i] <= ages[i - 1]) {
+    if (ages[i] <= oldest) {
       continue;
     }
+    oldest = ages[i];
     accuracy_point p = point_of(w, model, ACCURACY_AGE, ages[i] / ACCURACY_HAPTIC_HZ);
     p.def.latency_ticks = ages[i];
     add(w, &p);

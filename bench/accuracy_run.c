@@ -95,10 +95,10 @@ static double deepest_now(const rig *r)
   return deepest;
 }
 
-static double seconds_of(clockid_t clock)
+static double used_seconds(void)
 {
   struct timespec t;
-  clock_gettime(clock, &t);
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
@@ -137,12 +137,9 @@ hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *
   }
   hap_status status = open_rig(b, def, &r);
   if (status >= HAP_OK) {
-    double wall = seconds_of(CLOCK_MONOTONIC);
-    double used = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+    double before = used_seconds();
     status = record(&r, def->haptic_hz, out);
-    used = seconds_of(CLOCK_THREAD_CPUTIME_ID) - used;
-    wall = seconds_of(CLOCK_MONOTONIC) - wall;
-    out->share = wall > 0.0 ? fmin(used / wall, 1.0) : 1.0;
+    out->used_s = used_seconds() - before;
     (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
   }
   if (r.session != NULL) {

@@ -156,16 +156,12 @@ typedef struct times {
   double duty[ACCURACY_STARTS_MAX];
 } times;
 
+/* All in one thread: what it used of the processor is not stretched by what else runs there. */
 static void note_times(const accuracy_motion *m, size_t i, times *out)
 {
-  const hap_stats *stats = &m->stats;
-  double seconds = (double)m->count / ACCURACY_HAPTIC_HZ;
-  double spent = 1e-6 * stats->tick_us_mean * (double)stats->ticks +
-                 1e-3 * stats->physics_ms_mean * (double)stats->physics_steps +
-                 1e-6 * stats->contact_us_mean * (double)stats->contact_passes;
-  out->tick_us[i] = m->share * stats->tick_us_mean;
-  out->physics_ms[i] = m->share * stats->physics_ms_mean;
-  out->duty[i] = m->share * spent / seconds;
+  out->tick_us[i] = m->stats.tick_us_mean;
+  out->physics_ms[i] = m->stats.physics_ms_mean;
+  out->duty[i] = m->used_s * ACCURACY_HAPTIC_HZ / (double)m->count;
 }
 
 static void begin_row(const sweep *s, const accuracy_point *point, accuracy_row *row)
