@@ -10,10 +10,10 @@
  *                  --quick the first one, and eq4 the default from there
  *                  proxy, god-object, virtual (--coupling): through that, value N/m, all starts
  *   force_rel_rms  RMS of the difference / RMS of the reference, while either is in contact
- *   duty           computing time of all threads / simulated time
+ *   duty           processor time of physics, contact passes and loop / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
  *                  worst one of model contact, or 1 um apart
- *   estimate       0, reserved
+ *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none
  *   pose_*_mm      distance of the bodies that the loop moves from their reference
  *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
  *                  is half way to the next ones and, in rows "default" of model contact, above what a
@@ -27,8 +27,11 @@
  *                  moves; floor: in the world of the references; turn: of axes, or of bodies that
  *                  cannot turn, the largest of open and world */
 
+#include <limits.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "bench/accuracy.h"
 
@@ -39,17 +42,13 @@
 #define LINE_BOUND_N 5e-3
 #define LINE_BOUND 0.002 /* of the force */
 #define JOINT_BOUND 1e-4
+#define ESTIMATE_FACTOR 3.0
+#define ESTIMATE_SHARE 0.9
 #define DEGREES (180.0 / M_PI)
-
-static const char header[] =
-    "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms,"
-    "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,pose_median_mm,"
-    "force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor,"
-    "joint_open_mm,joint_world_mm,joint_left_mm,joint_floor_mm,joint_turn_deg";
 
 static bool is_default(const accuracy_row *row)
 {
-  return strcmp(row->knob, "default") == 0;
+  return strcmp(row->knob, ACCURACY_DEFAULT) == 0;
 }
 
 static bool is_way_of_testing(const accuracy_row *row)
@@ -64,50 +63,52 @@ static bool is_coupling(const accuracy_row *row)
   return bench_find_coupling(row->knob, &coupling);
 }
 
-static void write_row(FILE *csv, const accuracy_row *r)
-{
-  const accuracy_errors *e = &r->errors;
-  fprintf(csv, "%s,%s,%g,%s,%g,%.6g,%.6g,%.6g,", r->scene, hap_model_name(r->model), r->physics_hz,
-          r->knob, r->value, e->force, e->impulse_ratio, e->peak_ratio);
-  fprintf(csv, "%.4g,%.4g,%.4g,%g,%.6g,0,%s,", r->tick_us, r->physics_ms, r->duty, r->haptic_hz,
-          r->noise_floor, r->hand);
-  fprintf(csv, "%.5g,%.5g,%.4g,%.5g,%.4g,%.3g,%g,%.6g,%.6g,", 1e3 * e->pose_max, e->line_n,
-          r->hand_speed, 1e3 * e->pose_median, e->force_rms, r->rest_share, r->start_um, e->torque,
-          r->torque_floor);
-  fprintf(csv, "%.4g,%.4g,%.4g,%.4g,%.4g\n", 1e3 * e->joint_loop, 1e3 * e->joint_world,
-          1e3 * e->joint_left, 1e3 * r->joint_floor, DEGREES * e->joint_turn);
-}
-
 static hap_status write_table(bench *b, const accuracy_table *table)
 {
-  FILE *csv = bench_csv_open(b, "accuracy", header);
+  FILE *csv = bench_csv_open(b, "accuracy", NULL);
+  if (csv != NULL) {
+    accuracy_write_header(csv);
+  }
   for (size_t i = 0; i < table->count && csv != NULL; ++i) {
-    write_row(csv, &table->rows[i]);
+    accuracy_write_row(csv, &table->rows[i]);
   }
   return bench_csv_close(b, csv);
 }
 
 /* ---- numbers ---- */
 
+/* On errors.force and .torque; 0: none. */
+static double bound_of(const accuracy_row *r)
+{
+  for (size_t i = 0; accuracy_scene_at(i) != NULL; ++i) {
+    if (strcmp(accuracy_scene_at(i)->name, r->scene) == 0) {
+      return (r->physics_hz == 60.0 ? 0.5 : 1.0) * accuracy_scene_at(i)->bound;
+    }
+  }
+  return 0.0;
+}
+
 /* A scene cannot be followed more closely than it follows itself. */
 static void check_error(bench *b, const accuracy_row *r, const char *what, double error,
                         double floor)
 {
-  double bound = fmax(r->bound, 2.0 * floor);
+  double of_scene = bound_of(r);
+  double bound = fmax(of_scene, 2.0 * floor);
   bench_check(b, error <= bound,
               "%s at %g Hz: %s error %.3f %% (bound %.3f %%%s; noise floor %.3f %%)", r->scene,
               r->physics_hz, what, 100.0 * error, 100.0 * bound,
-              bound > r->bound ? ", twice the noise floor" : "", 100.0 * floor);
+              bound > of_scene ? ", twice the noise floor" : "", 100.0 * floor);
 }
 
 static void check_row(bench *b, const accuracy_row *r)
 {
   const accuracy_errors *e = &r->errors;
+  double of_scene = bound_of(r);
   double line = fmax(LINE_BOUND_N, LINE_BOUND * e->force_rms);
-  if (r->bound > 0.0) {
+  if (of_scene > 0.0) {
     check_error(b, r, "force", e->force, r->noise_floor);
   }
-  if (r->bound > 0.0 && e->torque > 0.0) {
+  if (of_scene > 0.0 && e->torque > 0.0) {
     check_error(b, r, "torque", e->torque, r->torque_floor);
   }
   bench_check(b, e->peak_ratio <= PEAK_BOUND, "%s at %g Hz: peak ratio %.4f (bound %g)", r->scene,
@@ -116,7 +117,7 @@ static void check_row(bench *b, const accuracy_row *r)
               "%s at %g Hz: local pose %.3f mm, at most %.3f mm (bounds %g and %g mm)", r->scene,
               r->physics_hz, 1e3 * e->pose_median, 1e3 * e->pose_max, 1e3 * POSE_MEDIAN_BOUND,
               1e3 * POSE_MAX_BOUND);
-  if (e->lines) {
+  if (e->lines > 0.0) {
     bench_check(b, e->line_n <= line, "%s at %g Hz: line %.2f mN (bound %.2f mN)", r->scene,
                 r->physics_hz, 1e3 * e->line_n, 1e3 * line);
   } else {
@@ -132,6 +133,30 @@ static void check_joints(bench *b, const accuracy_row *r)
               "reference %.3g mm, left to ODE alone %.3g mm), and turn by %.2g degrees",
               r->scene, r->physics_hz, 1e3 * e->joint_loop, 1e3 * e->joint_world, 1e3 * JOINT_BOUND,
               1e3 * r->joint_floor, 1e3 * e->joint_left, DEGREES * e->joint_turn);
+}
+
+/* Whether what the session says of its error is right, where there is more to it than noise. */
+static void check_estimates(bench *b, const accuracy_table *table)
+{
+  size_t judged = 0;
+  size_t good = 0;
+  size_t without = 0;
+  for (size_t i = 0; i < table->count; ++i) {
+    const accuracy_row *r = &table->rows[i];
+    bool single = strcmp(r->model, hap_model_name(HAP_MODEL_SINGLE)) == 0;
+    if (!single && r->errors.force > r->noise_floor) {
+      double ratio = r->estimate / r->errors.force;
+      ++judged;
+      without += r->estimate == 0.0;
+      good += ratio >= 1.0 / ESTIMATE_FACTOR && ratio <= ESTIMATE_FACTOR;
+    }
+  }
+  if (judged > 0) {
+    bench_check(b, (double)good >= ESTIMATE_SHARE * (double)judged,
+                "estimate of the force error: %zu of %zu rows within a factor of %g (%g %% wanted), "
+                "%zu without any",
+                good, judged, ESTIMATE_FACTOR, 100.0 * ESTIMATE_SHARE, without);
+  }
 }
 
 static void check_rest(bench *b, const accuracy_row *r)
@@ -151,20 +176,20 @@ static void report(bench *b, const accuracy_table *table)
       before = r->scene;
       check_rest(b, r);
     }
-    if (is_default(r) && r->model == HAP_MODEL_CONTACT && bounded) {
+    if (accuracy_row_is(r, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) && bounded) {
       check_row(b, r);
-      if (r->joints > 0) {
+      if (r->joint_floor > 0.0) {
         check_joints(b, r);
       }
     } else if (is_default(r) && bounded) {
       bench_say("%s at %g Hz: %s: force error %.3g %%, peak ratio %.3f", r->scene, r->physics_hz,
-                hap_model_name(r->model), 100.0 * r->errors.force, r->errors.peak_ratio);
+                r->model, 100.0 * r->errors.force, r->errors.peak_ratio);
     } else if ((is_way_of_testing(r) || is_coupling(r)) && bounded) {
       bench_say("%s at %g Hz: %s, %s: force error %.3g %%, peak ratio %.3f", r->scene,
-                r->physics_hz, hap_model_name(r->model), r->knob, 100.0 * r->errors.force,
-                r->errors.peak_ratio);
+                r->physics_hz, r->model, r->knob, 100.0 * r->errors.force, r->errors.peak_ratio);
     }
   }
+  check_estimates(b, table);
 }
 
 /* ---- the program ---- */
@@ -194,25 +219,151 @@ static size_t choose_scenes(bench *b, const accuracy_scene **out)
   return count;
 }
 
-hap_status bench_accuracy(bench *b)
+/* The rows that are there, in the order of the plan. */
+static hap_status fill_table(bench *b, const accuracy_plan *plan, const accuracy_row *rows,
+                             accuracy_table *out)
 {
-  const accuracy_scene *scenes[ACCURACY_SCENES_MAX];
-  accuracy_table table = {0};
-  size_t count = choose_scenes(b, scenes);
-  if (count == 0) {
-    return bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene \"%s\"", b->scene != NULL ? b->scene : "");
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < plan->count && status >= HAP_OK; ++i) {
+    status = accuracy_table_add(b, out, &rows[i]);
   }
-  hap_status status = accuracy_jobs(b, scenes, count, &table);
+  for (size_t i = 0; i < out->count; i += accuracy_rows_of_scene(out, i)) {
+    accuracy_mark_front(&out->rows[i], accuracy_rows_of_scene(out, i));
+  }
+  return status;
+}
+
+static hap_status finish(bench *b, const accuracy_plan *plan, const accuracy_row *rows)
+{
+  accuracy_table table = {0};
+  hap_status status = fill_table(b, plan, rows, &table);
   if (status >= HAP_OK) {
     status = write_table(b, &table);
   }
   if (status >= HAP_OK) {
     report(b, &table);
+    for (size_t i = 0; i < table.count; i += accuracy_rows_of_scene(&table, i)) {
+      accuracy_report_front(&table.rows[i], accuracy_rows_of_scene(&table, i));
+    }
     status = b->scene == NULL || strcmp(b->scene, "hold") == 0 ? accuracy_check_hold(b) : HAP_OK;
   }
   if (status >= HAP_OK) {
     status = accuracy_draw(b, &table);
   }
   accuracy_table_free(&table);
+  return status;
+}
+
+static size_t processors(void)
+{
+  long count = sysconf(_SC_NPROCESSORS_ONLN);
+  return count > 1 ? (size_t)count : 1;
+}
+
+static size_t rows_there(const accuracy_plan *plan, const accuracy_row *rows)
+{
+  size_t there = 0;
+  for (size_t i = 0; i < plan->count; ++i) {
+    there += rows[i].scene[0] != '\0';
+  }
+  return there;
+}
+
+/* A shard's processes are the scheduler's business: it has one. */
+static hap_status measure(bench *b, const accuracy_plan *plan, const accuracy_identity *identity,
+                          accuracy_row *rows)
+{
+  accuracy_work work = {.plan = plan, .shard = identity->shard - 1, .have = rows};
+  size_t *shard_of = calloc(plan->group_count + 1, sizeof *shard_of);
+  if (shard_of == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the plan");
+  }
+  work.shard_of = shard_of;
+  work.processes = b->shards > 0 ? 1 : processors();
+  hap_status status = accuracy_deal(b, plan, identity->shards, shard_of);
+  if (status >= HAP_OK) {
+    status = accuracy_rows_open(b, plan, identity, rows, &work.file);
+  }
+  if (status >= HAP_OK) {
+    size_t there = rows_there(plan, rows);
+    if (there > 0) {
+      fprintf(stderr, "accuracy: goes on from %zu finished rows; --fresh begins anew\n", there);
+    }
+    status = accuracy_jobs(b, &work);
+    close(work.file);
+  }
+  free(shard_of);
+  return status;
+}
+
+static hap_status run(bench *b, const accuracy_plan *plan, accuracy_row *rows)
+{
+  accuracy_identity identity;
+  char path[PATH_MAX];
+  hap_status status = accuracy_identify(b, plan, &identity);
+  if (status >= HAP_OK) {
+    status = measure(b, plan, &identity, rows);
+  }
+  if (status < HAP_OK || !accuracy_rows_path(b, &identity, path, sizeof path)) {
+    return status;
+  }
+  if (b->shards > 0) {
+    bench_say("shard %zu of %zu is done: %s; when all are, hapode-bench accuracy --merge FILE...",
+              identity.shard, identity.shards, path);
+    return HAP_OK;
+  }
+  memset(rows, 0, plan->count * sizeof *rows); /* the file has these as well */
+  status = accuracy_rows_read(b, path, plan, rows);
+  if (status >= HAP_OK) {
+    status = finish(b, plan, rows);
+  }
+  if (status >= HAP_OK) {
+    unlink(path); /* the next run measures anew */
+  }
+  return status;
+}
+
+static hap_status run_or_merge(bench *b)
+{
+  const accuracy_scene *scenes[ACCURACY_SCENES_MAX];
+  accuracy_plan plan = {0};
+  size_t count = choose_scenes(b, scenes);
+  if (count == 0) {
+    return bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene \"%s\"", b->scene != NULL ? b->scene : "");
+  }
+  hap_status status = accuracy_plan_make(b, scenes, count, &plan);
+  if (status < HAP_OK) {
+    return status;
+  }
+  accuracy_row *rows = calloc(plan.count + 1, sizeof *rows);
+  if (rows == NULL) {
+    status = bench_fail(b, HAP_ERROR_MEMORY, "no memory for the rows");
+  } else if (b->merge != NULL) {
+    status = accuracy_merge(b, &plan, rows);
+    status = status >= HAP_OK ? finish(b, &plan, rows) : status;
+  } else {
+    status = run(b, &plan, rows);
+  }
+  free(rows);
+  accuracy_plan_free(&plan);
+  return status;
+}
+
+hap_status bench_accuracy(bench *b)
+{
+  accuracy_settings settings;
+  bench merging = *b;
+  if (b->merge == NULL) {
+    return run_or_merge(b);
+  }
+  hap_status status = accuracy_merge_settings(b, &settings);
+  if (status >= HAP_OK) { /* as the shards were run */
+    merging.quick = settings.quick;
+    merging.scene = strcmp(settings.scene, "all") != 0 ? settings.scene : NULL;
+    merging.coupling = strcmp(settings.coupling, "none") != 0 ? settings.coupling : NULL;
+    status = run_or_merge(&merging);
+    b->off = merging.off;
+    b->detail = merging.detail;
+  }
   return status;
 }

@@ -3,9 +3,11 @@
 #ifndef HAPODE_BENCH_ACCURACY_H
 #define HAPODE_BENCH_ACCURACY_H
 
-/* The parts of hapode-bench accuracy: what is measured (accuracy_scenes.c), one run
- * (accuracy_run.c), two runs side by side (accuracy_error.c), all runs of a scene
- * (accuracy_sweep.c), scenes side by side (accuracy_jobs.c), picture, numbers with a bound. */
+/* The parts of hapode-bench accuracy: what is measured (accuracy_scenes.c, accuracy_plan.c), one run
+ * (accuracy_run.c), two runs side by side (accuracy_error.c), the rows that share their references
+ * (accuracy_sweep.c), those of all scenes at once (accuracy_jobs.c), a row as text
+ * (accuracy_table.c), the file of finished rows (accuracy_rows.c), files of several machines
+ * (accuracy_merge.c), what is worth its time (accuracy_front.c), picture, numbers with a bound. */
 
 #include <stdint.h>
 
@@ -15,8 +17,11 @@
 
 #define ACCURACY_HAPTIC_HZ 1000.0
 #define ACCURACY_SPEC_MAX 1024
+#define ACCURACY_REFERENCE_ITERATIONS 1000
 #define ACCURACY_STARTS_MAX 10
 #define ACCURACY_SCENES_MAX 32
+#define ACCURACY_NAME_MAX 16
+#define ACCURACY_SHARDS_MAX 10000
 
 /* ---- accuracy_scenes.c ---- */
 
@@ -61,16 +66,18 @@ typedef struct accuracy_motion {
   joint_opening joints_loop;  /* the widest at any tick, between bodies that the loop moves */
   joint_opening joints_world; /* of the same in ODE's world */
   joint_opening joints_left;  /* in ODE's world, of the others: ODE alone moves them */
+  double used_s;  /* of the processor, for all that was computed */
   hap_stats stats;
 } accuracy_motion;
 
+/* Every knob is here, and only open_rig of accuracy_run.c hands them on. */
 typedef struct accuracy_run_def {
-  const scene_parameters *parameters; /* shift and iterations as they shall be */
+  const scene_parameters *parameters; /* shift as it shall be */
   const char *hands[SCENE_POINTERS_MAX];
   double seconds;
   hap_model model;
   double physics_hz;
-  double haptic_hz; /* a multiple of 1 kHz */
+  double haptic_hz;
   double contact_hz;
   int latency_ticks;
   hap_probe probe;
@@ -78,6 +85,13 @@ typedef struct accuracy_run_def {
   hap_coupling coupling;     /* default: direct */
   double coupling_stiffness; /* N/m */
   double coupling_damping;   /* N s/m */
+  int iterations;            /* of QuickStep; 0: the scene's */
+  int32_t max_sweeps;
+  int32_t range_hops;
+  int32_t max_edge_probes;
+  hap_effect_wish shape;
+  double lookback;
+  hap_integration integration;
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */
@@ -95,7 +109,7 @@ typedef struct accuracy_errors {
   double pose_median; /* m */
   double line_n;      /* N, largest line of the difference at the physics rate or 5 harmonics,
                            above what is half way to the next ones and what the control has */
-  bool lines;         /* contact is long enough to tell one */
+  double lines;       /* 1: contact is long enough to tell one */
   double force_rms;   /* N, of the reference while either touches */
   double joint_loop;  /* m, the widest joint of the test itself, as in accuracy_motion */
   double joint_world; /* m */
@@ -113,17 +127,80 @@ double accuracy_hand_speed(const accuracy_motion *m); /* m/s, the largest */
 /* Share of the ticks with contact in which no hand moves faster than 1 % of that. */
 double accuracy_rest_share(const accuracy_motion *m);
 
-/* ---- accuracy_sweep.c ---- */
+/* ---- accuracy_plan.c ---- */
 
-/* Knobs of model accelerance: its ways of testing. */
-#define ACCURACY_EQ4 "eq4" /* the default's, from the starts of the other two */
+/* Knobs whose name says it all; their value is 0. */
+#define ACCURACY_DEFAULT "default"
+#define ACCURACY_EQ4 \
+  "eq4" /* model accelerance: the default's probes, from the starts of the others */
+#define ACCURACY_PAPER "paper" /* four testing simulations for each neighbour */
 #define ACCURACY_OPERATING "operating"
 #define ACCURACY_CROSS "operating_cross" /* with cross accelerance as well */
+#define ACCURACY_DIAL "dial"             /* a row of the path of a setting of all knobs at once */
+#define ACCURACY_SPEED "hand_speed"
+#define ACCURACY_AGE "model_age"
+
+#define ACCURACY_PAPER_HZ 20.0   /* the paper's physics rate */
+#define ACCURACY_DEFAULT_HZ 60.0 /* the library's */
+
+/* A row of the table that is to be measured. */
+typedef struct accuracy_point {
+  char knob[ACCURACY_NAME_MAX];
+  double value;
+  double physics_hz; /* as the table says it: of model SINGLE the loop's rate */
+  bool all_starts;   /* else the first one */
+  accuracy_run_def def;
+} accuracy_point;
+
+/* Points that are held against the same references. */
+typedef struct accuracy_group {
+  const accuracy_scene *scene;
+  double physics_hz; /* what soft constraints of the references are converted from */
+  double hand_speed; /* m/s; 0: as the scene has it */
+  size_t first;      /* of the points */
+  size_t count;
+  double cost; /* about proportional to the time that it takes */
+} accuracy_group;
+
+typedef struct accuracy_plan {
+  accuracy_group *groups;
+  size_t group_count;
+  size_t group_capacity;
+  accuracy_point *points;
+  size_t count;
+  size_t capacity;
+  bool quick;
+} accuracy_plan;
+
+/* All rows of these scenes, in the order of the table. */
+hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, size_t count,
+                              accuracy_plan *out);
+void accuracy_plan_free(accuracy_plan *plan); /* zeroed allowed */
+
+bool accuracy_knob_has_value(const char *knob); /* else its name says it all */
+
+/* Starts of a scene: indices of the offsets of accuracy_start. */
+size_t accuracy_starts(const accuracy_scene *which, bool quick, size_t out[ACCURACY_STARTS_MAX]);
+double accuracy_start(size_t index); /* m */
+
+double accuracy_seconds(const accuracy_scene *which, bool quick); /* of a run */
+
+/* About proportional to the time of a row. The first one of a group makes the references. */
+double accuracy_point_cost(const accuracy_plan *plan, const accuracy_group *group,
+                           const accuracy_point *point);
+
+/* Which of so many shards, from 0, measures each group: none has much more to do than another one.
+ * out: group_count. */
+hap_status accuracy_deal(bench *b, const accuracy_plan *plan, size_t shards, size_t *out);
+
+uint64_t accuracy_plan_hash(const accuracy_plan *plan);
+
+/* ---- accuracy_table.c ---- */
 
 typedef struct accuracy_row {
-  char scene[16];
-  char knob[16];
-  hap_model model;
+  char scene[ACCURACY_NAME_MAX];
+  char knob[ACCURACY_NAME_MAX];
+  char model[ACCURACY_NAME_MAX];
   double physics_hz;
   double value; /* of the knob: Hz, s or m/s; 0 for "default" */
   accuracy_errors errors;
@@ -133,13 +210,15 @@ typedef struct accuracy_row {
   double haptic_hz;
   double noise_floor;
   double torque_floor; /* the same of the torque */
-  char hand[16];
+  double estimate;     /* of errors.force, from the worst start, by the session itself; 0: none */
+  char hand[ACCURACY_NAME_MAX];
   double hand_speed;
   double rest_share;
-  double start_um; /* the worst start */
-  double bound;    /* on errors.force and .torque; 0: none */
-  size_t joints;
   double joint_floor; /* m, the widest joint of the references */
+  double start_um;    /* the worst start */
+  double starts;      /* how many */
+  double first_force; /* errors.force from the first start alone */
+  double front;       /* 1: nothing of its scene is as good in less time */
 } accuracy_row;
 
 typedef struct accuracy_table {
@@ -151,15 +230,109 @@ typedef struct accuracy_table {
 hap_status accuracy_table_add(bench *b, accuracy_table *table, const accuracy_row *row);
 void accuracy_table_free(accuracy_table *table); /* zeroed allowed */
 
-/* Adds all rows of a scene. */
-hap_status accuracy_sweep(bench *b, const accuracy_scene *which, accuracy_table *table);
+void accuracy_write_header(FILE *csv);
+void accuracy_write_row(FILE *csv, const accuracy_row *row);
+
+/* A line of the file; false: it is none that accuracy_write_row makes. */
+bool accuracy_read_row(const char *line, accuracy_row *out);
+bool accuracy_is_header(const char *line);
+
+bool accuracy_row_is(const accuracy_row *row, hap_model model, const char *knob);
+
+/* ---- accuracy_sweep.c ---- */
+
+/* Where finished rows go. */
+typedef hap_status (*accuracy_done_fn)(void *user, size_t point, const accuracy_row *row);
+
+/* Measures the points of a group. have: rows by point, of those whose scene is not empty; they are not
+ * measured again. */
+hap_status accuracy_sweep(bench *b, const accuracy_plan *plan, const accuracy_group *group,
+                          const accuracy_row *have, accuracy_done_fn done, void *user);
+
+/* ---- accuracy_rows.c ---- */
+
+/* The file of finished rows. Its head says of which build, settings and shard it is; the rows are in
+ * the order in which they were finished. */
+typedef struct accuracy_identity {
+  char build[40];     /* of program, library and ODE */
+  char settings[200]; /* what was asked for */
+  char machine[80];   /* whose times these are */
+  size_t rows;        /* of the plan */
+  size_t shard;       /* 1 .. shards */
+  size_t shards;
+} accuracy_identity;
+
+hap_status accuracy_identify(bench *b, const accuracy_plan *plan, accuracy_identity *out);
+
+/* "K/N" of a shard, 1 <= K <= N. */
+bool accuracy_read_shard(const char *text, size_t *shard, size_t *shards);
+
+hap_status accuracy_rows_head(bench *b, const char *path, accuracy_identity *out);
+
+/* rows: by point of the plan, which is the file's. What is not in the file stays as it is. A last line that
+ * breaks off is left out. HAP_ERROR_FORMAT with a text. */
+hap_status accuracy_rows_read(bench *b, const char *path, const accuracy_plan *plan,
+                              accuracy_row *rows);
+
+/* Opens the run's file, new or to go on with: then its rows are in have. Nobody else has it open. */
+hap_status accuracy_rows_open(bench *b, const accuracy_plan *plan,
+                              const accuracy_identity *identity, accuracy_row *have, int *out_file);
+
+/* One write, so that several processes can do it. */
+hap_status accuracy_rows_append(bench *b, int file, const accuracy_row *row);
+
+/* Path of the run's file. */
+bool accuracy_rows_path(const bench *b, const accuracy_identity *identity, char *out, size_t size);
+
+/* ---- accuracy_merge.c ---- */
+
+typedef struct accuracy_settings {
+  bool quick;
+  char scene[32];    /* "all": every one */
+  char coupling[32]; /* "none" */
+} accuracy_settings;
+
+/* What the first of the files b->merge was run with. */
+hap_status accuracy_merge_settings(bench *b, accuracy_settings *out);
+
+/* The rows of the files b->merge, which are all shards of one run. */
+hap_status accuracy_merge(bench *b, const accuracy_plan *plan, accuracy_row *rows);
 
 /* ---- accuracy_jobs.c ---- */
 
-/* The sweeps of these scenes, each in a process of its own and as many at a time as there are
- * processors; rows in the order of the scenes. */
-hap_status accuracy_jobs(bench *b, const accuracy_scene *const *scenes, size_t count,
-                         accuracy_table *table);
+/* Measures what have lacks of the groups that mine says, each group in a process of its own and at
+ * most so many at a time; finished rows go to file. */
+typedef struct accuracy_work {
+  const accuracy_plan *plan;
+  const size_t *shard_of; /* of each group */
+  size_t shard;           /* from 0: which are done */
+  size_t processes;
+  const accuracy_row *have;
+  int file;
+} accuracy_work;
+
+hap_status accuracy_jobs(bench *b, const accuracy_work *work);
+
+/* ---- accuracy_front.c ---- */
+
+/* Whether a row is a choice that somebody could make for the scene as it is. */
+bool accuracy_is_choice(const accuracy_row *row);
+
+/* What counts on the front: the error from the first start, as far as it can be told. */
+double accuracy_front_error(const accuracy_row *row);
+
+/* Sets front in the rows of a scene, which stand together. */
+void accuracy_mark_front(accuracy_row *rows, size_t count);
+
+#define ACCURACY_LABEL_MAX 80
+
+/* What a row is: "contact 20 Hz, iterations 5". */
+void accuracy_label(const accuracy_row *row, char out[ACCURACY_LABEL_MAX]);
+
+/* Says how far the paper's choice and the default are from the front of their scene. */
+void accuracy_report_front(const accuracy_row *rows, size_t count);
+
+size_t accuracy_rows_of_scene(const accuracy_table *table, size_t first);
 
 /* ---- accuracy_hold.c, accuracy_picture.c ---- */
 

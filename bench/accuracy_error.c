@@ -178,7 +178,7 @@ bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *t
   out->force_rms = sqrt(s.reference / (double)s.ticks);
   out->impulse_ratio = s.impulse[1] / s.impulse[0];
   out->peak_ratio = s.peak[1] / s.peak[0];
-  out->lines = largest_line(reference, test, control, physics_hz, &out->line_n);
+  out->lines = largest_line(reference, test, control, physics_hz, &out->line_n) ? 1.0 : 0.0;
   out->joint_loop = test->joints_loop.way;
   out->joint_world = test->joints_world.way;
   out->joint_left = test->joints_left.way;

@@ -1,117 +1,241 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <assert.h>
+
+/* The groups of a run, each in a process of its own: no session exists yet, so that a process can be
+ * split, and what one leaves behind in ODE does not matter to the next. A finished row goes into the
+ * file at once; a pipe says so to the parent, which shows how far it is. */
+
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "bench/accuracy.h"
 
-#define JOBS_MAX ACCURACY_SCENES_MAX
+#define LOOK_MS 200
+#define LINE_EVERY_S 30.0 /* where stderr is no terminal */
 
-/* A process says here how it went, then its rows. */
-typedef struct report {
-  hap_status status;
+/* From a process to its parent; shorter than PIPE_BUF, so that it arrives in one piece. */
+typedef struct news {
+  hap_status status; /* below 0: why the process ends */
+  double cost;       /* of the row that is finished */
   hap_detail detail;
+} news;
+
+typedef struct progress {
+  bool terminal;
   size_t rows;
-} report;
+  size_t finished;
+  double cost; /* of what was to be done in this run */
+  double done;
+  double began;  /* s */
+  double spoken; /* s, of the newest line */
+} progress;
 
-static bool write_report(FILE *to, const report *r, const accuracy_table *table)
+/* ---- how far ---- */
+
+static double now_s(void)
 {
-  return fwrite(r, sizeof *r, 1, to) == 1 &&
-         fwrite(table->rows, sizeof *table->rows, table->count, to) == table->count &&
-         fflush(to) == 0;
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* In the new process. It leaves without a look at the buffers that it has inherited. */
-static void work(bench *b, const accuracy_scene *which, FILE *to)
+static void write_left(double seconds)
 {
-  accuracy_table table = {0};
-  report r = {.status = accuracy_sweep(b, which, &table)};
-  r.detail = b->detail;
-  r.rows = table.count;
-  bool written = write_report(to, &r, &table);
-  accuracy_table_free(&table);
-  _exit(written ? 0 : 1);
-}
-
-static hap_status read_report(bench *b, const accuracy_scene *which, FILE *from,
-                              accuracy_table *table)
-{
-  report r;
-  accuracy_row row;
-  rewind(from);
-  if (fread(&r, sizeof r, 1, from) != 1) {
-    return bench_fail(b, HAP_ERROR_IO, "%s: its process did not end well", which->name);
+  if (seconds < 90.0) {
+    fprintf(stderr, "about %.0f s left", seconds);
+  } else if (seconds < 5400.0) {
+    fprintf(stderr, "about %.0f min left", seconds / 60.0);
+  } else {
+    fprintf(stderr, "about %.1f h left", seconds / 3600.0);
   }
-  hap_status status = r.status;
-  if (status < HAP_OK) {
-    b->detail = r.detail;
-  }
-  for (size_t i = 0; i < r.rows && status >= HAP_OK; ++i) {
-    status = fread(&row, sizeof row, 1, from) == 1
-                 ? accuracy_table_add(b, table, &row)
-                 : bench_fail(b, HAP_ERROR_IO, "%s: rows are missing", which->name);
-  }
-  return status;
 }
 
-static size_t processors(void)
+static void show(progress *p)
 {
-  long count = sysconf(_SC_NPROCESSORS_ONLN);
-  return count > 1 ? (size_t)count : 1;
+  double now = now_s();
+  if (p->finished == p->rows || (!p->terminal && now - p->spoken < LINE_EVERY_S)) {
+    return;
+  }
+  p->spoken = now;
+  fprintf(stderr, "%saccuracy: %zu of %zu rows", p->terminal ? "\r" : "", p->finished, p->rows);
+  if (p->done > 0.0) {
+    fputs(", ", stderr);
+    write_left((now - p->began) * (p->cost - p->done) / p->done);
+  }
+  fputs(p->terminal ? "\033[K" : "\n", stderr);
 }
 
-/* No session exists yet, so that a process can be split. Twice through the list: what takes long
- * begins first, or the last scene would run alone. */
-static hap_status run_all(bench *b, const accuracy_scene *const *scenes, size_t count,
-                          FILE *const *files)
+static void end_progress(const progress *p)
 {
+  if (p->terminal) {
+    fputs("\r\033[K", stderr);
+  }
+}
+
+/* ---- in a process of its own ---- */
+
+typedef struct worker {
+  bench *bench;
+  const accuracy_work *work;
+  const accuracy_group *group;
+  int to; /* the pipe */
+} worker;
+
+/* The parent is gone when nobody reads any more. */
+static bool tell(const worker *w, const news *n)
+{
+  return write(w->to, n, sizeof *n) == (ssize_t)sizeof *n;
+}
+
+static hap_status take_row(void *user, size_t point, const accuracy_row *row)
+{
+  const worker *w = user;
+  const accuracy_plan *plan = w->work->plan;
+  news n = {.status = accuracy_rows_append(w->bench, w->work->file, row)};
+  n.cost = accuracy_point_cost(plan, w->group, &plan->points[point]);
+  if (n.status >= HAP_OK && !tell(w, &n)) {
+    return bench_fail(w->bench, HAP_ERROR_SYSTEM, "the run was ended");
+  }
+  return n.status;
+}
+
+/* It leaves without a look at the buffers that it has inherited. */
+static void work_on(worker *w)
+{
+  news n;
+  memset(&n, 0, sizeof n);
+  prctl(PR_SET_PDEATHSIG, SIGKILL); /* a run that is killed ends as a whole */
+  n.status = accuracy_sweep(w->bench, w->work->plan, w->group, w->work->have, take_row, w);
+  n.detail = w->bench->detail;
+  _exit(n.status >= HAP_OK || tell(w, &n) ? 0 : 1);
+}
+
+/* ---- in the parent ---- */
+
+static bool is_due(const accuracy_work *work, size_t group)
+{
+  const accuracy_group *g = &work->plan->groups[group];
+  for (size_t i = g->first; i < g->first + g->count && work->shard_of[group] == work->shard; ++i) {
+    if (work->have[i].scene[0] == '\0') {
+      return true;
+    }
+  }
+  return false;
+}
+
+static progress count_rows(const accuracy_work *work)
+{
+  progress p = {.terminal = isatty(STDERR_FILENO) == 1, .began = now_s()};
+  p.spoken = p.began;
+  for (size_t k = 0; k < work->plan->group_count; ++k) {
+    const accuracy_group *g = &work->plan->groups[k];
+    for (size_t i = g->first; i < g->first + g->count && work->shard_of[k] == work->shard; ++i) {
+      bool there = work->have[i].scene[0] != '\0';
+      ++p.rows;
+      p.finished += there;
+      p.cost += there ? 0.0 : accuracy_point_cost(work->plan, g, &work->plan->points[i]);
+    }
+  }
+  return p;
+}
+
+static void read_news(bench *b, int from, progress *p, hap_status *io)
+{
+  struct pollfd wait = {.fd = from, .events = POLLIN};
+  news n;
+  while (poll(&wait, 1, 0) == 1 && read(from, &n, sizeof n) == (ssize_t)sizeof n) {
+    if (n.status >= HAP_OK) {
+      ++p->finished;
+      p->done += n.cost;
+    } else if (*io >= HAP_OK) {
+      *io = n.status;
+      b->detail = n.detail;
+    }
+  }
+}
+
+/* The dearest group of those that are due; group_count: none. */
+static size_t next_group(const accuracy_work *work, const bool *begun)
+{
+  const accuracy_plan *plan = work->plan;
+  size_t next = plan->group_count;
+  for (size_t i = 0; i < plan->group_count; ++i) {
+    bool dearer = next == plan->group_count || plan->groups[i].cost > plan->groups[next].cost;
+    next = !begun[i] && dearer && is_due(work, i) ? i : next;
+  }
+  return next;
+}
+
+static hap_status begin_process(bench *b, const accuracy_work *work, size_t group, int to)
+{
+  worker w = {.bench = b, .work = work, .group = &work->plan->groups[group], .to = to};
+  pid_t child = fork();
+  if (child == 0) {
+    work_on(&w);
+  }
+  return child > 0 ? HAP_OK
+                   : bench_fail(b, HAP_ERROR_SYSTEM, "no process for a scene: %s", strerror(errno));
+}
+
+/* Until one has ended. */
+static void wait_for_one(bench *b, int from, progress *p, hap_status *io)
+{
+  int result = 0;
+  struct pollfd wait = {.fd = from, .events = POLLIN};
+  pid_t child = 0;
+  while (child == 0) {
+    (void)poll(&wait, 1, LOOK_MS);
+    child = waitpid(-1, &result, WNOHANG);
+    read_news(b, from, p, io);
+    show(p);
+  }
+  if ((!WIFEXITED(result) || WEXITSTATUS(result) != 0) && *io >= HAP_OK) {
+    *io = bench_fail(b, HAP_ERROR_SYSTEM, "a scene's process did not end well");
+  }
+}
+
+/* Of one that fails the others finish what they have begun. */
+static hap_status run_all(bench *b, const accuracy_work *work, const int pipe_ends[2], bool *begun)
+{
+  progress p = count_rows(work);
   size_t running = 0;
   hap_status status = HAP_OK;
-  for (size_t turn = 0; turn < 2 * count && status >= HAP_OK; ++turn) {
-    size_t i = turn % count;
-    bool is_long = scenes[i]->starts_quick > 0;
-    if (is_long != (turn < count)) {
-      continue;
-    }
-    if (running == processors()) {
-      (void)waitpid(-1, NULL, 0);
+  for (;;) {
+    size_t next = status >= HAP_OK ? next_group(work, begun) : work->plan->group_count;
+    if (next < work->plan->group_count && running < work->processes) {
+      status = begin_process(b, work, next, pipe_ends[1]);
+      begun[next] = true;
+      running += status >= HAP_OK;
+    } else if (running > 0) {
+      wait_for_one(b, pipe_ends[0], &p, &status);
       --running;
+    } else {
+      break;
     }
-    pid_t child = fork();
-    if (child == 0) {
-      work(b, scenes[i], files[i]);
-    }
-    running += child > 0;
-    status = child > 0 ? HAP_OK : bench_fail(b, HAP_ERROR_MEMORY, "no process for a scene");
   }
-  for (; running > 0; --running) {
-    (void)waitpid(-1, NULL, 0);
-  }
+  end_progress(&p);
   return status;
 }
 
-hap_status accuracy_jobs(bench *b, const accuracy_scene *const *scenes, size_t count,
-                         accuracy_table *table)
+hap_status accuracy_jobs(bench *b, const accuracy_work *work)
 {
-  FILE *files[JOBS_MAX] = {NULL};
-  hap_status status = HAP_OK;
-  assert(count <= JOBS_MAX);
-  for (size_t i = 0; i < count && i < JOBS_MAX && status >= HAP_OK; ++i) {
-    files[i] = tmpfile();
-    status = files[i] != NULL ? HAP_OK : bench_fail(b, HAP_ERROR_IO, "no file for a scene");
+  int ends[2];
+  bool *begun = calloc(work->plan->group_count + 1, sizeof *begun);
+  if (begun == NULL || pipe(ends) != 0) {
+    free(begun);
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the processes");
   }
-  if (status >= HAP_OK) {
-    status = run_all(b, scenes, count, files);
-  }
-  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
-    status = read_report(b, scenes[i], files[i], table);
-  }
-  for (size_t i = 0; i < JOBS_MAX; ++i) {
-    if (files[i] != NULL) {
-      fclose(files[i]);
-    }
-  }
+  hap_status status = run_all(b, work, ends, begun);
+  close(ends[0]);
+  close(ends[1]);
+  free(begun);
   return status;
 }

@@ -1,5 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+
+/* accuracy.svg: a panel for each scene, on the same axes. accuracy_SCENE.svg: the same of one scene,
+ * large, with the points of the front told by their knobs. Every point is a row's error from the first
+ * start, which all rows have; a thin line goes up from a model's default to its worst start. */
+
 #include <math.h>
 #include <string.h>
 
@@ -7,126 +12,223 @@
 #include "tools/plot.h"
 
 #define COLUMNS 4
-#define PANEL_WIDTH 330
-#define PANEL_HEIGHT 270
+#define PANEL_WIDTH 400
+#define PANEL_HEIGHT 320
+#define SCENE_WIDTH 1150
+#define SCENE_HEIGHT 620
 #define ERROR_LEAST 1.2e-5 /* just inside of the axis */
 #define ERROR_MOST 80.0
+#define TIME_LEAST 1.05e-4
+#define TIME_MOST 9.5
+#define FRONT_LINES 24 /* that the margin has room for */
 
-/* What a panel shows. place: where a point's physics rate is written; the models' points are often
- * near each other, and those of contact lie on its default of 60 Hz, which has its own mark. */
 typedef struct series {
   hap_model model;
-  const char *knob;
   const char *title;
   int point; /* gnuplot's shape */
-  const char *place;
 } series;
 
 static const series all_series[] = {
-    {HAP_MODEL_SINGLE, "default", "single", 4, NULL},
-    {HAP_MODEL_IMPULSE, "default", "impulse", 8, "left offset -0.3,0.9"},
-    {HAP_MODEL_ACCELERANCE, "default", "accelerance (eq. 4)", 6, "left offset 0.6,0.3"},
-    {HAP_MODEL_CONTACT, "default", "contact", 7, "center offset 0,-0.9"},
-    {HAP_MODEL_ACCELERANCE, ACCURACY_OPERATING, "accelerance, operating point", 2, NULL},
-    {HAP_MODEL_ACCELERANCE, ACCURACY_CROSS, "accelerance, operating point + cross", 10, NULL},
+    {HAP_MODEL_SINGLE, "single", 4},
+    {HAP_MODEL_IMPULSE, "impulse", 8},
+    {HAP_MODEL_ACCELERANCE, "accelerance", 6},
+    {HAP_MODEL_CONTACT, "contact", 7},
 };
 
 #define SERIES_COUNT (sizeof all_series / sizeof all_series[0])
 
-static bool is_of(const accuracy_row *row, const series *of)
+static bool is_default_of(const accuracy_row *row, const series *of)
 {
-  return row->model == of->model && strcmp(row->knob, of->knob) == 0;
+  return accuracy_row_is(row, of->model, ACCURACY_DEFAULT);
 }
 
-static bool is_default(const accuracy_row *row)
+static bool is_knob_of(const accuracy_row *row, const series *of)
 {
-  return strcmp(row->knob, "default") == 0;
+  return strcmp(row->model, hap_model_name(of->model)) == 0 &&
+         strcmp(row->knob, ACCURACY_DEFAULT) != 0 && accuracy_is_choice(row);
 }
 
-/* What lies beyond the axis is drawn at its end. */
-static double error_of(const accuracy_row *row)
+static bool is_our_default(const accuracy_row *row)
 {
-  return fmin(fmax(row->errors.force, ERROR_LEAST), ERROR_MOST);
+  return accuracy_row_is(row, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) &&
+         row->physics_hz == ACCURACY_DEFAULT_HZ;
 }
 
+static bool is_papers(const accuracy_row *row)
+{
+  return accuracy_row_is(row, HAP_MODEL_ACCELERANCE, ACCURACY_PAPER) &&
+         row->physics_hz == ACCURACY_PAPER_HZ;
+}
+
+/* What lies beyond an axis is drawn at its end. */
+static double shown(double error)
+{
+  return fmin(fmax(error, ERROR_LEAST), ERROR_MOST);
+}
+
+static double shown_time(const accuracy_row *row)
+{
+  return fmin(fmax(row->duty, TIME_LEAST), TIME_MOST);
+}
+
+/* time, error from the first start, error from the worst one, physics rate */
 static void put_point(FILE *script, const accuracy_row *row)
 {
-  fprintf(script, "%.6g %.6g %g\n", row->duty, error_of(row), row->physics_hz);
+  fprintf(script, "%.6g %.6g %.6g %g\n", shown_time(row), shown(row->first_force),
+          shown(row->errors.force), row->physics_hz);
 }
 
-/* Blocks $m0 .. of the panel's series, $d with the library's own default, $f with the floor. */
+typedef bool (*is_fn)(const accuracy_row *row, const series *of);
+
+static void put_block(FILE *script, const char *name, size_t number, is_fn is,
+                      const accuracy_row *rows, size_t count)
+{
+  fprintf(script, "$%s%zu << EOD\n", name, number);
+  for (size_t i = 0; i < count; ++i) {
+    if (is(&rows[i], &all_series[number])) {
+      put_point(script, &rows[i]);
+    }
+  }
+  fprintf(script, "EOD\n");
+}
+
+static bool is_marked(const accuracy_row *row, const series *of)
+{
+  (void)of;
+  return is_our_default(row);
+}
+
+static bool is_the_papers(const accuracy_row *row, const series *of)
+{
+  (void)of;
+  return is_papers(row);
+}
+
+static bool is_dial(const accuracy_row *row, const series *of)
+{
+  (void)of;
+  return strcmp(row->knob, ACCURACY_DIAL) == 0;
+}
+
+/* The front by rising time; *out_next is used up. */
+static const accuracy_row *next_on_front(const accuracy_row *rows, size_t count,
+                                         const accuracy_row *after)
+{
+  const accuracy_row *next = NULL;
+  for (size_t i = 0; i < count; ++i) {
+    const accuracy_row *row = &rows[i];
+    bool later = after == NULL || row->duty > after->duty ||
+                 (row->duty == after->duty && row > after); /* alike: in the table's order */
+    if (row->front > 0.0 && later && (next == NULL || row->duty < next->duty)) {
+      next = row;
+    }
+  }
+  return next;
+}
+
+static void put_front(FILE *script, const accuracy_row *rows, size_t count)
+{
+  fprintf(script, "$front << EOD\n");
+  int number = 0;
+  for (const accuracy_row *row = next_on_front(rows, count, NULL); row != NULL;
+       row = next_on_front(rows, count, row)) {
+    fprintf(script, "%.6g %.6g %d\n", shown_time(row), shown(accuracy_front_error(row)), ++number);
+  }
+  fprintf(script, "EOD\n");
+}
+
 static void put_data(FILE *script, const accuracy_row *rows, size_t count)
 {
   double noise_floor = 0.0;
   for (size_t m = 0; m < SERIES_COUNT; ++m) {
-    fprintf(script, "$m%zu << EOD\n", m);
-    for (size_t i = 0; i < count; ++i) {
-      if (is_of(&rows[i], &all_series[m])) {
-        put_point(script, &rows[i]);
-      }
-    }
-    fprintf(script, "EOD\n");
+    put_block(script, "default", m, is_default_of, rows, count);
+    put_block(script, "knob", m, is_knob_of, rows, count);
   }
-  fprintf(script, "$d << EOD\n");
+  put_block(script, "ours", 0, is_marked, rows, count);
+  put_block(script, "paper", 0, is_the_papers, rows, count);
+  put_block(script, "dial", 0, is_dial, rows, count);
+  put_front(script, rows, count);
   for (size_t i = 0; i < count; ++i) {
-    if (is_default(&rows[i]) && rows[i].model == HAP_MODEL_CONTACT && rows[i].physics_hz == 60.0) {
-      put_point(script, &rows[i]);
-      noise_floor = rows[i].noise_floor;
-    }
+    noise_floor = is_our_default(&rows[i]) ? rows[i].noise_floor : noise_floor;
   }
-  fprintf(script, "EOD\nnoise = %.6g\n", fmax(noise_floor, ERROR_LEAST));
+  fprintf(script, "noise = %.6g\n", shown(noise_floor));
 }
 
-static void plot_models(FILE *script)
+/* What all pictures show, from the back to the front. size: of the points. */
+static void plot_scene(FILE *script, double size, bool numbers)
 {
-  fprintf(script, "plot noise with lines lc rgb '#909090' dt 2 title 'noise floor'");
+  fprintf(script, "plot noise with lines lc rgb '#909090' dt 2 notitle");
   for (size_t m = 0; m < SERIES_COUNT; ++m) {
-    const series *of = &all_series[m];
-    fprintf(script, ", $m%zu with linespoints lt %zu pt %d ps 0.6 title '%s'", m, m + 1, of->point,
-            of->title);
-    if (of->place != NULL) {
-      fprintf(script, ", $m%zu using (%s):2:(sprintf('%%g', $3)) with labels %s font ',8' notitle",
-              m, of->model == HAP_MODEL_CONTACT ? "$3 == 60 ? NaN : $1" : "$1", of->place);
-    }
+    fprintf(script, ", $knob%zu with points lt %zu pt 7 ps %.2g notitle", m, m + 1, 0.45 * size);
   }
-  fprintf(script, ", $d with points pt 6 ps 1.5 lw 1.5 lc rgb 'black' title 'contact, default'\n");
-}
-
-/* The key has the last place to itself. */
-static void draw_key(const bench *b, FILE *script)
-{
-  fprintf(script,
-          "reset\nunset border\nunset tics\nunset xlabel\nunset ylabel\nset key center center\n"
-          "set xrange [0:1]\nset yrange [0:1]\n"
-          "plot 2 with lines lc rgb '#909090' dt 2 title 'noise floor of the reference'");
   for (size_t m = 0; m < SERIES_COUNT; ++m) {
-    bool fewer = b->quick && strcmp(all_series[m].knob, "default") != 0;
-    fprintf(script, ", 2 with linespoints lt %zu pt %d ps 0.6 title '%s%s'", m + 1,
-            all_series[m].point, all_series[m].title, fewer ? " (first start)" : "");
+    fprintf(script,
+            ", $default%zu using 1:2:(0):($3-$2) with vectors nohead lt %zu lw 0.7 notitle"
+            ", $default%zu with linespoints lt %zu pt %d ps %.2g notitle",
+            m, m + 1, m, m + 1, all_series[m].point, 0.8 * size);
+  }
+  fprintf(script, ", $front with steps lc rgb 'black' lw 1.2 notitle");
+  if (numbers) {
+    fprintf(script,
+            ", $front using 1:2:(sprintf('%%d', $3)) with labels left offset 0.4,-0.5 "
+            "font ',10' notitle");
   }
   fprintf(script,
-          ", 2 with points pt 6 ps 1.5 lw 1.5 lc rgb 'black' title 'contact, default (60 Hz)'\n");
+          ", $dial0 with linespoints lc rgb '#000080' lw 2.5 pt 13 ps %.2g notitle"
+          ", $paper0 with points pt 3 ps %.2g lw 1.8 lc rgb 'black' notitle"
+          ", $ours0 with points pt 6 ps %.2g lw 1.8 lc rgb 'black' notitle\n",
+          0.9 * size, 1.5 * size, 1.7 * size);
 }
 
-static size_t rows_of_scene(const accuracy_table *table, size_t first)
+/* What stands for what, as titles of lines that are out of sight. */
+static void plot_key(FILE *script, bool dial)
 {
-  size_t end = first;
-  while (end < table->count && strcmp(table->rows[end].scene, table->rows[first].scene) == 0) {
-    ++end;
+  fprintf(script, "plot 1e9 with lines lc rgb '#909090' dt 2 title 'noise floor of the reference'");
+  for (size_t m = 0; m < SERIES_COUNT; ++m) {
+    fprintf(script,
+            ", 1e9 with linespoints lt %zu pt %d ps 0.8 title '%s, as it is, by physics rate'",
+            m + 1, all_series[m].point, all_series[m].title);
   }
-  return end - first;
+  fprintf(
+      script,
+      ", 1e9 with points pt 7 ps 0.45 lc rgb '#606060' title 'one knob changed (model by colour)'"
+      ", 1e9 with lines lc rgb 'black' lw 1.2 title 'front: nothing is as good in less time'"
+      ", 1e9 with points pt 3 ps 1.5 lw 1.8 lc rgb 'black' title 'the paper''s choice (20 Hz)'"
+      ", 1e9 with points pt 6 ps 1.7 lw 1.8 lc rgb 'black' title 'the default (60 Hz)'");
+  if (dial) {
+    fprintf(script, ", 1e9 with linespoints lc rgb '#000080' lw 2.5 pt 13 ps 0.9 title 'the dial'");
+  }
+  fputc('\n', script);
 }
+
+static bool has_dial(const accuracy_row *rows, size_t count)
+{
+  bool has = false;
+  for (size_t i = 0; i < count; ++i) {
+    has = has || is_dial(&rows[i], NULL);
+  }
+  return has;
+}
+
+static void set_axes(FILE *script)
+{
+  fprintf(script,
+          "set termoption noenhanced\nset logscale xy\n"
+          "set xlabel 'computing time / simulated time'\nset ylabel 'force error'\n");
+}
+
+/* ---- all scenes ---- */
 
 static size_t count_scenes(const accuracy_table *table)
 {
   size_t scenes = 0;
-  for (size_t i = 0; i < table->count; i += rows_of_scene(table, i)) {
+  for (size_t i = 0; i < table->count; i += accuracy_rows_of_scene(table, i)) {
     ++scenes;
   }
   return scenes;
 }
 
-hap_status accuracy_draw(bench *b, const accuracy_table *table)
+static hap_status draw_all(bench *b, const accuracy_table *table)
 {
   size_t lines = count_scenes(table) / COLUMNS + 1; /* room for the key */
   FILE *script =
@@ -134,22 +236,84 @@ hap_status accuracy_draw(bench *b, const accuracy_table *table)
   if (script == NULL) {
     return bench_picture_end(b, "accuracy", script);
   }
-  fprintf(
-      script,
-      "set multiplot layout %zu,%d title 'Force error and computing time, by model and physics "
-      "rate [Hz]'\n"
-      "set logscale xy\nset format x '10^{%%L}'\nset format y '10^{%%L}'\nset yrange [1e-5:100]\n"
-      "set xrange [1e-4:10]\nunset key\nset ylabel 'force error'\n"
-      "set xlabel 'computing time / simulated time'\n",
-      lines, COLUMNS);
-  for (size_t i = 0; i < table->count; i += rows_of_scene(table, i)) {
+  set_axes(script);
+  fprintf(script,
+          "set xrange [1e-4:10]\nset yrange [1e-5:100]\nunset key\n"
+          "set xtics ('1e-4' 1e-4, '1e-3' 1e-3, '0.01' 0.01, '0.1' 0.1, '1' 1, '10' 10)\n"
+          "set ytics ('1e-5' 1e-5, '1e-4' 1e-4, '1e-3' 1e-3, '1 %%%%' 0.01, '10 %%%%' 0.1, '1' 1, "
+          "'10' 10, '100' 100)\n"
+          "set multiplot layout %zu,%d title 'Force error (first start; thin: up to the worst) and "
+          "computing time'\n",
+          lines, COLUMNS);
+  for (size_t i = 0; i < table->count; i += accuracy_rows_of_scene(table, i)) {
     fprintf(script, "set title ");
     plot_string(script, table->rows[i].scene);
-    fprintf(script, " noenhanced\n");
-    put_data(script, &table->rows[i], rows_of_scene(table, i));
-    plot_models(script);
+    fputc('\n', script);
+    put_data(script, &table->rows[i], accuracy_rows_of_scene(table, i));
+    plot_scene(script, 0.7, false);
   }
-  draw_key(b, script);
+  fprintf(script,
+          "unset title\nunset border\nunset tics\nunset grid\nunset xlabel\nunset ylabel\n"
+          "set key center center\n");
+  plot_key(script, has_dial(table->rows, table->count));
   fprintf(script, "unset multiplot\n");
   return bench_picture_end(b, "accuracy", script);
+}
+
+/* ---- one scene ---- */
+
+/* The front by its numbers, in the right margin. */
+static void list_front(FILE *script, const accuracy_row *rows, size_t count)
+{
+  int number = 0;
+  fprintf(script, "set label 'on the front: error, time' at screen 0.66,0.6 font ',11'\n");
+  for (const accuracy_row *row = next_on_front(rows, count, NULL);
+       row != NULL && number < FRONT_LINES; row = next_on_front(rows, count, row)) {
+    char label[ACCURACY_LABEL_MAX];
+    char text[ACCURACY_LABEL_MAX + 40];
+    accuracy_label(row, label);
+    ++number;
+    snprintf(text, sizeof text, "%d  %s: %.3g %%, %.2g", number, label,
+             100.0 * accuracy_front_error(row), row->duty);
+    fprintf(script, "set label ");
+    plot_string(script, text);
+    fprintf(script, " at screen 0.66,%.4g font ',10'\n", 0.6 - 0.024 * number);
+  }
+}
+
+static hap_status draw_scene(bench *b, const accuracy_row *rows, size_t count)
+{
+  char name[2 * ACCURACY_NAME_MAX + 16];
+  snprintf(name, sizeof name, "accuracy_%s", rows->scene);
+  FILE *script = bench_picture_begin(b, name, SCENE_WIDTH, SCENE_HEIGHT);
+  if (script == NULL) {
+    return bench_picture_end(b, name, script);
+  }
+  set_axes(script);
+  fprintf(script, "set format y '%%g'\nset format x '%%g'\nset title ");
+  plot_string(script, rows->scene);
+  fprintf(script, "\nset key outside\nunset key\nset rmargin at screen 0.64\n");
+  list_front(script, rows, count);
+  put_data(script, rows, count);
+  fprintf(script, "set multiplot\n");
+  plot_scene(script, 1.0, true);
+  fprintf(script,
+          "unset label\nunset title\nunset border\nunset tics\nunset grid\nunset xlabel\n"
+          "unset ylabel\nset xrange [1:2]\nset yrange [1:2]\nset lmargin at screen 0.65\n"
+          "set rmargin at screen 0.99\nset bmargin at screen 0.62\nset tmargin at screen 0.97\n"
+          "set key inside left top Left reverse font ',10'\n");
+  plot_key(script, has_dial(rows, count));
+  fprintf(script, "unset multiplot\n");
+  return bench_picture_end(b, name, script);
+}
+
+hap_status accuracy_draw(bench *b, const accuracy_table *table)
+{
+  hap_status status = draw_all(b, table);
+  bool draws = plot_available();
+  for (size_t i = 0; i < table->count && status >= HAP_OK && draws;
+       i += accuracy_rows_of_scene(table, i)) {
+    status = draw_scene(b, &table->rows[i], accuracy_rows_of_scene(table, i));
+  }
+  return status;
 }

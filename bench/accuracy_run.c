@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/log.h"
 #include "bench/accuracy.h"
@@ -24,6 +25,11 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->probe = library.probe;
   def->cross = (hap_effect_wish)library.effects[HAP_EFFECT_CROSS];
   def->coupling = HAP_COUPLING_DIRECT;
+  def->max_sweeps = library.max_sweeps;
+  def->range_hops = library.range_hops;
+  def->max_edge_probes = library.max_edge_probes;
+  def->shape = (hap_effect_wish)library.effects[HAP_EFFECT_SHAPE];
+  def->integration = HAP_INTEGRATION_AUTO;
 }
 
 /* Before the start: the joints are as the scene has built them. The loop's poses are read through the list of
@@ -49,8 +55,10 @@ static hap_status explain(bench *b, const rig *r, hap_status status)
 static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_gauge *gauge)
 {
   rig_options options;
+  scene_parameters parameters = *def->parameters;
+  parameters.iterations = def->iterations > 0 ? def->iterations : parameters.iterations;
   rig_options_init(&options);
-  options.parameters = def->parameters;
+  options.parameters = &parameters;
   options.max_force = UNLIMITED_N;
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);
@@ -63,11 +71,16 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.def.physics_latency_ticks = def->latency_ticks;
   options.def.probe = def->probe;
   options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)def->cross;
+  options.def.max_sweeps = def->max_sweeps;
+  options.def.range_hops = def->range_hops;
+  options.def.max_edge_probes = def->max_edge_probes;
+  options.def.effects[HAP_EFFECT_SHAPE] = (uint8_t)def->shape;
+  options.integration = def->integration;
   options.coupling = def->coupling;
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
-  options.def.lookback = def->model == HAP_MODEL_SINGLE ? 0.0 : 0.1;
+  options.def.lookback = def->lookback;
   hap_status status = rig_create(&options, r, &b->detail);
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);
@@ -124,25 +137,34 @@ static double deepest_now(const rig *r)
   return deepest;
 }
 
-/* With a faster loop every frame is the first of its ticks: the one at that time. */
-static hap_status record(const rig *r, const joint_gauge *gauge, uint64_t ticks_a_frame,
-                         accuracy_motion *out)
+static double used_seconds(void)
+{
+  struct timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* A frame is the newest tick at its time: with a faster loop the first of its ticks, with a slower one
+ * the same for as long as it lasts. */
+static hap_status record(const rig *r, const joint_gauge *gauge, double haptic_hz,
+                          accuracy_motion *out)
 {
   hap_trace_row row;
   size_t got = 0;
+  double ticks = 0.0;
   hap_status status = HAP_OK;
+  memset(&row, 0, sizeof row);
   for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
-    for (uint64_t tick = 0; tick < ticks_a_frame && status >= HAP_OK; ++tick) {
+    double newest = floor((double)i * haptic_hz / ACCURACY_HAPTIC_HZ + 1e-9);
+    for (; ticks <= newest && status >= HAP_OK; ticks += 1.0) {
       status = hap_session_advance(r->session, 1);
       hap_status read = hap_session_trace_read(r->session, &row, 1, &got);
       status = status >= HAP_OK ? read : status;
-      if (tick == 0 && got == 1) {
-        note_frame(r, &row, &out->frames[i]);
-        out->bodies = row.body_count;
-      }
       out->deepest = fmax(out->deepest, deepest_now(r));
       read_joints(r, gauge, out);
     }
+    note_frame(r, &row, &out->frames[i]);
+    out->bodies = row.body_count;
   }
   return status;
 }
@@ -161,8 +183,9 @@ hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *
   hap_status status = open_rig(b, def, &r, &gauge);
   if (status >= HAP_OK) {
     out->joints = gauge.count;
-    uint64_t ticks_a_frame = (uint64_t)lround(def->haptic_hz / ACCURACY_HAPTIC_HZ);
-    status = explain(b, &r, record(&r, &gauge, ticks_a_frame, out));
+    double before = used_seconds();
+    status = explain(b, &r, record(&r, &gauge, def->haptic_hz, out));
+    out->used_s = used_seconds() - before;
     (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
   }
   if (r.session != NULL) {

@@ -20,8 +20,13 @@ typedef struct bench {
   const char *scene; /* accuracy, tick: this one alone; NULL: all */
   const char *only;  /* stability: such points alone, KEY=VALUE,...; NULL: all */
   const char
-      *coupling;     /* accuracy, impedance: a name of hap_coupling that is measured as well; NULL:
+      *coupling; /* accuracy, impedance: a name of hap_coupling that is measured as well; NULL:
                               none */
+  size_t shard;  /* accuracy: 1 .. shards, the part that is measured */
+  size_t shards; /* 0: all of it */
+  const char *const *merge; /* accuracy: files of shards to make the table of; NULL: measure */
+  size_t merge_count;
+  bool fresh;        /* accuracy: do not go on from what an earlier run has finished */
   int off;           /* checks that were off */
   hap_detail detail; /* why a program failed */
 } bench;
@@ -47,7 +52,7 @@ hap_status bench_tick(bench *b);
 
 /* ---- csv.c ---- */
 
-/* Opens OUT/NAME.csv and writes its header line; NULL on failure. */
+/* Opens OUT/NAME.csv and writes its header line, NULL: none; NULL on failure. */
 FILE *bench_csv_open(bench *b, const char *name, const char *header);
 hap_status bench_csv_close(bench *b, FILE *csv); /* NULL: what open said */
 

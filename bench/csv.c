@@ -35,7 +35,9 @@ FILE *bench_csv_open(bench *b, const char *name, const char *header)
     (void)bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
     return NULL;
   }
-  fprintf(csv, "%s\n", header);
+  if (header != NULL) {
+    fprintf(csv, "%s\n", header);
+  }
   return csv;
 }
 

@@ -49,6 +49,10 @@ static hap_status open_watcher(bench *b, const cycles_def *def, watcher *w)
   options.def.guard = HAP_GUARD_MEASURE;
   options.def.model = def->model;
   options.def.haptic_hz = CYCLES_HAPTIC_HZ;
+  if (def->max_bodies > 0) {
+    options.def.max_bodies = def->max_bodies;
+    options.def.max_contacts = 12 * def->max_bodies;
+  }
   if (def->model != HAP_MODEL_SINGLE) {
     options.def.physics_hz = def->physics_hz;
   }

@@ -37,7 +37,8 @@ typedef struct cycles_def {
   hap_model model;
   double physics_hz; /* unused by model SINGLE */
   double seconds;
-  int repeats; /* 1 .. CYCLES_REPEATS_MAX */
+  int repeats;        /* 1 .. CYCLES_REPEATS_MAX */
+  int32_t max_bodies; /* of the session; 0: its default */
 } cycles_def;
 
 #define CYCLES_REPEATS_MAX 9

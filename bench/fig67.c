@@ -3,29 +3,21 @@
 
 /* The paper's Fig. 6 and 7: duty factors (time of a physics cycle / its period) while one cube, and
  * while ten cubes that do not touch at first, are pushed. Method 1: single, 1 ms; 2: accelerance,
- * 50 ms, with and without the testing simulations; 3: impulse, 50 ms. A cycle is all that the
- * physics side does: collision, neighbours, testing simulations, global step, messages.
+ * 50 ms, with and without the testing simulations; 3: impulse, 50 ms; and contact, 50 ms. A cycle is
+ * all that the physics side does: collision, neighbours, testing simulations, global step, messages.
  *
- * Fig. 7 goes on with rows that touch, longer and longer, until single passes duty 1. */
+ * Fig. 7 goes on with 1 to 4000 cubes in a row that touch, or stand far from each other, and with 1
+ * to 256 that a large pointer touches at once: where does each model pass duty 1? */
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench/cycles.h"
+#include "bench/fig67.h"
 
 #define PHYSICS_HZ 20.0 /* the paper's 50 ms */
-#define DUTY_BOUND 0.25 /* the paper's, for methods 2 and 3 */
-#define SWEEP_MAX 16
 #define SPEC_MAX 512
-
-typedef struct group {
-  int bodies;
-  const char *layout;
-  cycles single;
-  cycles accelerance;
-  cycles impulse;
-} group;
+#define FAR_GAP 0.25 /* m: nothing reaches its neighbour between two physics steps */
 
 typedef struct plan {
   scene_parameters parameters;
@@ -33,49 +25,81 @@ typedef struct plan {
   const char *layout;
   const char *device;
   double seconds;
+  double single_seconds; /* of model SINGLE, which has 50 cycles for one of the others */
   int repeats;
+  int32_t max_bodies; /* of the session; 0: its default */
 } plan;
 
-static double duty(const cycles *c, size_t step, bool testing)
+const fig67_series fig67_all[FIG67_SERIES] = {
+    {FIG67_SINGLE, false, "single", "single, 1 ms", 1},
+    {FIG67_ACCELERANCE, true, "accelerance", "accelerance, 50 ms", 7},
+    {FIG67_ACCELERANCE, false, "accelerance", "accelerance without testing", 5},
+    {FIG67_IMPULSE, false, "impulse", "impulse, 50 ms", 9},
+    {FIG67_CONTACT, false, "contact", "contact, 50 ms", 13},
+};
+
+static const hap_model models[FIG67_MODELS] = {
+    [FIG67_SINGLE] = HAP_MODEL_SINGLE,
+    [FIG67_ACCELERANCE] = HAP_MODEL_ACCELERANCE,
+    [FIG67_IMPULSE] = HAP_MODEL_IMPULSE,
+    [FIG67_CONTACT] = HAP_MODEL_CONTACT,
+};
+
+double fig67_duty(const cycles *c, size_t step, bool testing)
 {
   const double *v = c->rows[step].v;
   return 1e-3 * (v[CYCLE_UNTESTED] + (testing ? v[CYCLE_TESTING] : 0.0)) / c->period_s;
 }
 
+static double mean_duty(const cycles *c, bool testing)
+{
+  double ms = cycles_mean(c, CYCLE_UNTESTED) + (testing ? cycles_mean(c, CYCLE_TESTING) : 0.0);
+  return 1e-3 * ms / c->period_s;
+}
+
+double fig67_typical(const fig67_group *g, size_t series)
+{
+  const cycles *c = &g->of[fig67_all[series].model];
+  double *duties = calloc(c->count + 1, sizeof *duties);
+  if (duties == NULL) {
+    return (double)NAN;
+  }
+  for (size_t i = 0; i < c->count; ++i) {
+    duties[i] = fig67_duty(c, i, fig67_all[series].testing);
+  }
+  double median = bench_median(duties, c->count);
+  free(duties);
+  return median;
+}
+
 /* ---- measure ---- */
 
-static void free_group(group *g)
+static void free_group(fig67_group *g)
 {
-  cycles_free(&g->single);
-  cycles_free(&g->accelerance);
-  cycles_free(&g->impulse);
+  for (size_t i = 0; i < FIG67_MODELS; ++i) {
+    cycles_free(&g->of[i]);
+  }
 }
 
-static hap_status measure_model(bench *b, const plan *p, hap_model model, cycles *out)
-{
-  cycles_def def = {
-      .parameters = &p->parameters,
-      .count = p->count,
-      .device = p->device,
-      .model = model,
-      .physics_hz = PHYSICS_HZ,
-      .seconds = p->seconds,
-      .repeats = p->repeats,
-  };
-  return cycles_measure(b, &def, out);
-}
-
-static hap_status measure_group(bench *b, const plan *p, group *out)
+static hap_status measure_group(bench *b, const plan *p, fig67_group *out)
 {
   memset(out, 0, sizeof *out);
   out->bodies = p->count > 0 ? p->count : 1;
   out->layout = p->layout;
-  hap_status status = measure_model(b, p, HAP_MODEL_SINGLE, &out->single);
-  if (status >= HAP_OK) {
-    status = measure_model(b, p, HAP_MODEL_ACCELERANCE, &out->accelerance);
-  }
-  if (status >= HAP_OK) {
-    status = measure_model(b, p, HAP_MODEL_IMPULSE, &out->impulse);
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < FIG67_MODELS && status >= HAP_OK; ++i) {
+    bool single = i == FIG67_SINGLE && p->single_seconds > 0.0;
+    cycles_def def = {
+        .parameters = &p->parameters,
+        .count = p->count,
+        .device = p->device,
+        .model = models[i],
+        .physics_hz = PHYSICS_HZ,
+        .seconds = single ? p->single_seconds : p->seconds,
+        .repeats = p->repeats,
+        .max_bodies = p->max_bodies,
+    };
+    status = cycles_measure(b, &def, &out->of[i]);
   }
   if (status < HAP_OK) {
     free_group(out);
@@ -94,127 +118,26 @@ static plan plan_of(const bench *b, const char *name, const char *layout)
 
 /* ---- table ---- */
 
-static void write_cycles(FILE *csv, const group *g, const cycles *c, const char *model,
-                         bool testing)
+static void write_group(FILE *csv, const fig67_group *g)
 {
-  for (size_t i = 0; i < c->count; ++i) {
-    fprintf(csv, "%s,%zu,%.3f,%.6g,%d,%d,%s,%g\n", model, i, c->rows[i].v[CYCLE_T],
-            duty(c, i, testing), testing, g->bodies, g->layout, c->rows[i].v[CYCLE_NEIGHBOURS]);
+  for (size_t i = 0; i < FIG67_SERIES; ++i) {
+    const cycles *c = &g->of[fig67_all[i].model];
+    bool testing = fig67_all[i].testing;
+    for (size_t k = 0; k < c->count; ++k) {
+      fprintf(csv, "%s,%zu,%.3f,%.6g,%d,%d,%s,%g,%.4g\n", fig67_all[i].name, k,
+              c->rows[k].v[CYCLE_T], fig67_duty(c, k, testing), testing, g->bodies, g->layout,
+              c->rows[k].v[CYCLE_NEIGHBOURS], c->tick_us);
+    }
   }
 }
 
-static void write_group(FILE *csv, const group *g)
+static hap_status write_table(bench *b, const char *name, const fig67_group *groups, size_t count)
 {
-  write_cycles(csv, g, &g->single, "single", false);
-  write_cycles(csv, g, &g->accelerance, "accelerance", true);
-  write_cycles(csv, g, &g->accelerance, "accelerance", false);
-  write_cycles(csv, g, &g->impulse, "impulse", false);
-}
-
-static hap_status write_table(bench *b, const char *name, const group *groups, size_t count)
-{
-  FILE *csv = bench_csv_open(b, name, "model,step,t,duty,testing,bodies,layout,neighbours");
+  FILE *csv = bench_csv_open(b, name, "model,step,t,duty,testing,bodies,layout,neighbours,tick_us");
   for (size_t i = 0; i < count && csv != NULL; ++i) {
     write_group(csv, &groups[i]);
   }
   return bench_csv_close(b, csv);
-}
-
-/* ---- pictures ---- */
-
-static void put_data(FILE *script, const char *name, const cycles *c, bool testing)
-{
-  fprintf(script, "$%s << EOD\n", name);
-  for (size_t i = 0; i < c->count; ++i) {
-    fprintf(script, "%.3f %.6g\n", c->rows[i].v[CYCLE_T], duty(c, i, testing));
-  }
-  fprintf(script, "EOD\n");
-}
-
-static void put_group(FILE *script, const group *g)
-{
-  put_data(script, "single", &g->single, false);
-  put_data(script, "tested", &g->accelerance, true);
-  put_data(script, "untested", &g->accelerance, false);
-  put_data(script, "impulse", &g->impulse, false);
-  fprintf(script,
-          "set xlabel 'time [s] (a step is 1 ms in method 1, else 50 ms)'\n"
-          "set ylabel 'duty factor'\n");
-}
-
-static const char single_line[] = "$single with lines lt 1 title '1: single, 1 ms'";
-static const char slow_lines[] =
-    "$tested with linespoints lt 2 pt 7 ps 0.4 title '2: accelerance, 50 ms', "
-    "$untested with linespoints lt 3 pt 5 ps 0.4 title '2: the same without testing', "
-    "$impulse with linespoints lt 4 pt 9 ps 0.4 title '3: impulse, 50 ms'";
-
-static hap_status draw_fig6(bench *b, const group *g)
-{
-  FILE *script = bench_picture_begin(b, "fig6", 800, 500);
-  if (script != NULL) {
-    put_group(script, g);
-    fprintf(script,
-            "set title 'One cube (logarithmic: all of it is far below the paper''s 0.25)'\n"
-            "set logscale y\nset format y '%%g'\nset yrange [5e-5:1]\n"
-            "set key right at graph 0.98,0.8\n"
-            "plot %s, %s, %g with lines lc rgb '#606060' dt 2 title '%g (paper)'\n",
-            single_line, slow_lines, DUTY_BOUND, DUTY_BOUND);
-  }
-  return bench_picture_end(b, "fig6", script);
-}
-
-static double mean_duty(const cycles *c, bool testing)
-{
-  double ms = cycles_mean(c, CYCLE_UNTESTED) + (testing ? cycles_mean(c, CYCLE_TESTING) : 0.0);
-  return 1e-3 * ms / c->period_s;
-}
-
-static double single_duty(const group *g)
-{
-  return mean_duty(&g->single, false);
-}
-
-static double tested_duty(const group *g)
-{
-  return mean_duty(&g->accelerance, true);
-}
-
-static double impulse_duty(const group *g)
-{
-  return mean_duty(&g->impulse, false);
-}
-
-static void draw_sweep(FILE *script, const group *groups, size_t count)
-{
-  fprintf(script, "$sweep << EOD\n");
-  for (size_t i = 1; i < count; ++i) {
-    fprintf(script, "%d %.6g %.6g %.6g\n", groups[i].bodies, single_duty(&groups[i]),
-            tested_duty(&groups[i]), impulse_duty(&groups[i]));
-  }
-  fprintf(script,
-          "EOD\nset title '(c) mean over a run by the number of cubes, in a row that touches'\n"
-          "set xlabel 'cubes'\nset xrange [0:*]\nset yrange [0:1.5<*]\n"
-          "set key left at graph 0.02,0.6\n"
-          "plot $sweep using 1:2 with linespoints lt 1 pt 7 ps 0.5 title '1: single, 1 ms', "
-          "$sweep using 1:3 with linespoints lt 2 pt 7 ps 0.5 title '2: accelerance, 50 ms', "
-          "$sweep using 1:4 with linespoints lt 4 pt 9 ps 0.5 title '3: impulse, 50 ms', "
-          "1 with lines lc rgb '#606060' dt 2 notitle\n");
-}
-
-static hap_status draw_fig7(bench *b, const group *groups, size_t count)
-{
-  FILE *script = bench_picture_begin(b, "fig7", 900, 1200);
-  if (script != NULL) {
-    put_group(script, &groups[0]);
-    fprintf(script,
-            "set multiplot layout 3,1\nset yrange [0:*]\nset key top left\n"
-            "set title '(a) %d cubes, apart at first'\nplot %s, %s\n"
-            "set title '(b) enlarged (the paper''s axis ends at 0.25)'\nplot %s\n",
-            groups[0].bodies, single_line, slow_lines, slow_lines);
-    draw_sweep(script, groups, count);
-    fprintf(script, "unset multiplot\n");
-  }
-  return bench_picture_end(b, "fig7", script);
 }
 
 /* ---- numbers ---- */
@@ -223,7 +146,7 @@ static double largest_duty(const cycles *c, bool testing)
 {
   double largest = 0.0;
   for (size_t i = 0; i < c->count; ++i) {
-    largest = fmax(largest, duty(c, i, testing));
+    largest = fmax(largest, fig67_duty(c, i, testing));
   }
   return largest;
 }
@@ -232,19 +155,22 @@ static double smallest_duty(const cycles *c, bool testing)
 {
   double smallest = largest_duty(c, testing);
   for (size_t i = 0; i < c->count; ++i) {
-    smallest = fmin(smallest, duty(c, i, testing));
+    smallest = fmin(smallest, fig67_duty(c, i, testing));
   }
   return smallest;
 }
 
-static void check_below(bench *b, const group *g, const char *model, const cycles *c, bool testing)
+static void check_below(bench *b, const fig67_group *g, const char *model, const cycles *c,
+                        bool testing)
 {
   double largest = largest_duty(c, testing);
-  bench_check(b, largest < DUTY_BOUND, "%d bodies, %s, %s: largest duty factor %.4f (bound %g)",
-              g->bodies, g->layout, model, largest, DUTY_BOUND);
+  bench_check(b, largest < FIG67_DUTY_BOUND,
+              "%d bodies, %s, %s: largest duty factor %.4f (bound %g)", g->bodies, g->layout, model,
+              largest, FIG67_DUTY_BOUND);
 }
 
-static void check_flat(bench *b, const group *g, const char *model, const cycles *c, bool testing)
+static void check_flat(bench *b, const fig67_group *g, const char *model, const cycles *c,
+                       bool testing)
 {
   double low = smallest_duty(c, testing);
   double high = largest_duty(c, testing);
@@ -254,9 +180,9 @@ static void check_flat(bench *b, const group *g, const char *model, const cycles
 }
 
 /* What a cycle consists of, by model, in means over the run. */
-static void say_parts(const group *g)
+static void say_parts(const fig67_group *g)
 {
-  const cycles *c = &g->accelerance;
+  const cycles *c = &g->of[FIG67_ACCELERANCE];
   double collide = cycles_mean(c, CYCLE_COLLIDE);
   double step = cycles_mean(c, CYCLE_STEP);
   double neighbours = cycles_mean(c, CYCLE_NEIGHBOURS);
@@ -266,7 +192,8 @@ static void say_parts(const group *g)
       g->bodies, g->layout, collide, step, cycles_mean(c, CYCLE_ISLAND), neighbours,
       cycles_mean(c, CYCLE_PROBES) / neighbours);
   bench_say("%d bodies, %s: duty factor accelerance / impulse = %.2f; (C + 5 S) / (C + S) = %.2f",
-            g->bodies, g->layout, tested_duty(g) / impulse_duty(g),
+            g->bodies, g->layout,
+            mean_duty(&g->of[FIG67_ACCELERANCE], true) / mean_duty(&g->of[FIG67_IMPULSE], false),
             (collide + 5.0 * step) / (collide + step));
 }
 
@@ -277,9 +204,9 @@ static double against_bare(const cycles *c)
 }
 
 /* The same over the cycles with exactly one neighbour, where nothing is shared. */
-static void check_one_neighbour(bench *b, const group *g)
+static void check_one_neighbour(bench *b, const fig67_group *g)
 {
-  const cycles *c = &g->accelerance;
+  const cycles *c = &g->of[FIG67_ACCELERANCE];
   double testing = 0.0;
   double island = 0.0;
   size_t count = 0;
@@ -303,20 +230,20 @@ static void check_one_neighbour(bench *b, const group *g)
 }
 
 /* The bounds are for ten cubes: beside a world of one the fixed part of a cycle is not small. */
-static void check_parts(bench *b, const group *g, bool bounded)
+static void check_parts(bench *b, const fig67_group *g, bool bounded)
 {
-  const cycles *c = &g->accelerance;
+  const cycles *c = &g->of[FIG67_ACCELERANCE];
   double ratio = cycles_probe_ratio(c);
   double island = ratio * cycles_mean(c, CYCLE_PROBES) / cycles_mean(c, CYCLE_NEIGHBOURS);
-  double impulse = against_bare(&g->impulse);
+  double impulse = against_bare(&g->of[FIG67_IMPULSE]);
   const char *testing =
       "%d bodies, %s: testing = %.3f island steps per neighbour, %.3f x (number "
       "of simulations x one island step)%s";
   const char *plain =
       "%d bodies, %s: impulse cycle / bare collide + step = %.4f ms / %.4f ms = "
       "%.3f%s";
-  double cycle_ms = cycles_mean(&g->impulse, CYCLE_UNTESTED);
-  double bare_ms = cycles_mean(&g->impulse, CYCLE_BARE);
+  double cycle_ms = cycles_mean(&g->of[FIG67_IMPULSE], CYCLE_UNTESTED);
+  double bare_ms = cycles_mean(&g->of[FIG67_IMPULSE], CYCLE_BARE);
   if (bounded) {
     bench_check(b, island <= 4.2 && ratio <= 1.1, testing, g->bodies, g->layout, island, ratio,
                 " (bounds 4.2 and 1.1)");
@@ -331,87 +258,190 @@ static void check_parts(bench *b, const group *g, bool bounded)
 
 /* The two methods move the cubes differently, and cubes that touch cost more: each is held against
  * plain ODE on its own states. */
-static void check_untested(bench *b, const group *g)
+static void check_untested(bench *b, const fig67_group *g)
 {
-  double untested = against_bare(&g->accelerance);
-  double impulse = against_bare(&g->impulse);
+  double untested = against_bare(&g->of[FIG67_ACCELERANCE]);
+  double impulse = against_bare(&g->of[FIG67_IMPULSE]);
   bench_check(b, bench_within(untested, impulse, 0.25),
               "%d bodies, %s: without testing, cycle / bare: accelerance %.3f, impulse %.3f, ratio "
               "%.3f (bound 0.75 .. 1.25)",
               g->bodies, g->layout, untested, impulse, untested / impulse);
 }
 
-static void report_fig7_group(bench *b, const group *g)
+static void report_fig7_group(bench *b, const fig67_group *g)
 {
-  check_below(b, g, "accelerance", &g->accelerance, true);
-  check_below(b, g, "impulse", &g->impulse, false);
-  check_flat(b, g, "accelerance", &g->accelerance, true);
-  check_flat(b, g, "impulse", &g->impulse, false);
+  check_below(b, g, "accelerance", &g->of[FIG67_ACCELERANCE], true);
+  check_below(b, g, "impulse", &g->of[FIG67_IMPULSE], false);
+  check_flat(b, g, "accelerance", &g->of[FIG67_ACCELERANCE], true);
+  check_flat(b, g, "impulse", &g->of[FIG67_IMPULSE], false);
   say_parts(g);
   check_parts(b, g, true);
   check_untested(b, g);
 }
 
-/* groups[1] and on are the sweep, by rising number. */
-static void report_sweep(bench *b, const group *groups, size_t count)
+/* ---- where a model is too slow ---- */
+
+/* Where the line through two points reaches duty 1, of whatever grows with the bodies in proportion or
+ * by a power. */
+static double crossing(double bodies_a, double duty_a, double bodies_b, double duty_b)
+{
+  double slope = log(duty_b / duty_a) / log(bodies_b / bodies_a);
+  return bodies_b * exp(-log(duty_b) / slope);
+}
+
+static bool is_of(const fig67_group *g, const char *layout)
+{
+  return strcmp(g->layout, layout) == 0;
+}
+
+/* Groups of a layout stand together by rising number of bodies. */
+static double find_crossing(const fig67_group *groups, size_t count, const char *layout,
+                            size_t series, bool *out_beyond)
+{
+  const fig67_group *before = NULL;
+  const fig67_group *last = NULL;
+  for (size_t i = 0; i < count; ++i) {
+    if (!is_of(&groups[i], layout)) {
+      continue;
+    }
+    before = last;
+    last = &groups[i];
+    if (before != NULL && fig67_typical(last, series) > 1.0) {
+      break;
+    }
+  }
+  if (before == NULL || !(fig67_typical(last, series) > fig67_typical(before, series))) {
+    return (double)NAN;
+  }
+  *out_beyond = fig67_typical(last, series) <= 1.0;
+  return crossing(before->bodies, fig67_typical(before, series), last->bodies,
+                  fig67_typical(last, series));
+}
+
+static void say_crossings(const fig67_group *groups, size_t count, const char *layout,
+                          const char *what)
+{
+  for (size_t s = 0; s < FIG67_SERIES; ++s) {
+    bool beyond = false;
+    double bodies = find_crossing(groups, count, layout, s, &beyond);
+    if (isfinite(bodies)) {
+      bench_say("%s: %s passes duty 1 at %.0f%s", what, fig67_all[s].title, bodies,
+                beyond ? ", by the last two points: it is below 1 in all that were measured" : "");
+    } else {
+      bench_say("%s: %s does not grow towards duty 1", what, fig67_all[s].title);
+    }
+  }
+}
+
+static void say_typical(const fig67_group *g)
+{
+  bench_say(
+      "%d cubes, %s: duty factor of single %.4f, accelerance %.4f, impulse %.4f, contact "
+      "%.4f; tick of contact %.1f us",
+      g->bodies, g->layout, fig67_typical(g, 0), fig67_typical(g, 1), fig67_typical(g, 3),
+      fig67_typical(g, 4), g->of[FIG67_CONTACT].tick_us);
+}
+
+/* Where single first is too slow, the others are not. */
+static void check_single(bench *b, const fig67_group *groups, size_t count)
+{
+  const fig67_group *slow = NULL;
+  for (size_t i = 0; i < count && slow == NULL; ++i) {
+    bool touching = is_of(&groups[i], FIG67_TOUCHING);
+    slow = touching && fig67_typical(&groups[i], 0) > 1.0 ? &groups[i] : NULL;
+  }
+  bench_check(b, slow != NULL, "single passes duty 1 in a row that touches%s",
+              slow != NULL ? "" : " (wanted)");
+  if (slow != NULL) {
+    double tested = fig67_typical(slow, 1);
+    double impulse = fig67_typical(slow, 3);
+    bench_check(b, tested < FIG67_DUTY_BOUND && impulse < FIG67_DUTY_BOUND,
+                "at %d cubes accelerance and impulse are at %.4f and %.4f (bound %g)", slow->bodies,
+                tested, impulse, FIG67_DUTY_BOUND);
+  }
+}
+
+static void report_sweeps(bench *b, const fig67_group *groups, size_t count)
 {
   for (size_t i = 1; i < count; ++i) {
-    const group *g = &groups[i];
-    bench_say("%d cubes that touch: duty factor of single %.3f, accelerance %.4f, impulse %.4f",
-              g->bodies, single_duty(g), tested_duty(g), impulse_duty(g));
+    say_typical(&groups[i]);
   }
-  const group *last = &groups[count - 1];
-  double high = single_duty(last);
-  if (count < 3 || high <= 1.0) {
-    bench_check(b, high > 1.0, "single reaches duty %.3f at %d cubes (wanted: past 1)", high,
-                last->bodies);
-    return;
-  }
-  const group *before = &groups[count - 2];
-  double low = single_duty(before);
-  double cubes = before->bodies + (last->bodies - before->bodies) * (1.0 - low) / (high - low);
-  bench_check(b, true, "single passes duty 1 at %.0f cubes", cubes);
-  bench_check(b, tested_duty(last) < DUTY_BOUND && impulse_duty(last) < DUTY_BOUND,
-              "at %d cubes accelerance and impulse are at %.4f and %.4f (bound %g)", last->bodies,
-              tested_duty(last), impulse_duty(last), DUTY_BOUND);
+  check_single(b, groups, count);
+  say_crossings(groups, count, FIG67_TOUCHING, "cubes that touch");
+  say_crossings(groups, count, FIG67_SEPARATE, "cubes apart");
+  say_crossings(groups, count, FIG67_AT_ONCE, "cubes touched at once");
 }
 
 /* ---- the two programs ---- */
 
-static const int sweep_full[] = {10, 20, 40, 70, 100, 130, 160, 200, 250, 300, 400, 600, 900, 0};
-static const int sweep_quick[] = {10, 100, 200, 300, 600, 1000, 0};
+static const int touching_full[] = {10, 1, 20, 40, 80, 130, 200, 300, 1000, 4000, 0};
+static const int touching_quick[] = {10, 1, 80, 300, 0};
+static const int separate_full[] = {1, 10, 80, 300, 1000, 4000, 0};
+static const int separate_quick[] = {10, 80, 300, 0};
+static const int at_once_full[] = {1, 2, 4, 8, 16, 32, 64, 128, 256, 0};
+static const int at_once_quick[] = {1, 16, 256, 0};
 
-/* Rows that touch, from a moment at which the hand has just reached them, until single is too
- * slow. */
-static hap_status sweep(bench *b, const plan *of, group *groups, size_t *count)
+typedef struct sweep_def {
+  const int *sizes;
+  plan plan;
+} sweep_def;
+
+static double seconds_for(const bench *b, int bodies, bool single)
 {
-  char device[SPEC_MAX];
-  const int *sizes = b->quick ? sweep_quick : sweep_full;
-  plan p = *of;
-  snprintf(device, sizeof device, "%s,start=0.7", p.parameters.hands[0]);
-  p.device = device;
-  p.layout = "touching";
-  p.parameters.gap = cycles_scene("row10")->gap;
-  for (int i = 0; sizes[i] != 0; ++i) {
-    bool bounded = i == 0; /* the ten cubes whose parts are checked */
-    p.count = sizes[i];
-    p.seconds = bounded ? 1.5 : b->quick ? 0.25 : 0.5;
-    p.repeats = bounded ? of->repeats : 3;
+  double seconds = b->quick ? 0.25 : 0.5;
+  return !single ? seconds : bodies >= 1000 ? 0.1 : bodies >= 300 ? 0.2 : seconds;
+}
+
+static hap_status sweep(bench *b, const sweep_def *def, fig67_group *groups, size_t *count)
+{
+  plan p = def->plan;
+  for (int i = 0; def->sizes[i] != 0; ++i) {
+    bool bounded = *count == 1; /* the ten cubes whose parts are checked */
+    p.count = def->sizes[i];
+    p.seconds = bounded ? 1.5 : seconds_for(b, p.count, false);
+    p.single_seconds = bounded ? 1.5 : seconds_for(b, p.count, true);
+    p.repeats = bounded ? def->plan.repeats : 3;
     hap_status status = measure_group(b, &p, &groups[*count]);
     if (status < HAP_OK) {
       return status;
     }
     ++*count;
-    if (single_duty(&groups[*count - 1]) > 1.0) {
-      break;
-    }
   }
   return HAP_OK;
 }
 
+static int by_bodies(const void *a, const void *b)
+{
+  const fig67_group *x = a;
+  const fig67_group *y = b;
+  int layouts = strcmp(x->layout, y->layout);
+  return layouts != 0 ? layouts : (x->bodies > y->bodies) - (x->bodies < y->bodies);
+}
+
+/* groups[0] is there. Rows begin at a moment at which the hand has just reached them. */
+static hap_status sweep_all(bench *b, const plan *of, fig67_group *groups, size_t *count)
+{
+  char device[SPEC_MAX];
+  sweep_def row = {b->quick ? touching_quick : touching_full, *of};
+  sweep_def field = {b->quick ? at_once_quick : at_once_full, plan_of(b, "field", FIG67_AT_ONCE)};
+  snprintf(device, sizeof device, "%s,start=0.7", of->parameters.hands[0]);
+  row.plan.device = device;
+  row.plan.layout = FIG67_TOUCHING;
+  row.plan.parameters.gap = cycles_scene("row10")->gap;
+  field.plan.max_bodies = FIG67_AT_ONCE_MOST;
+  hap_status status = sweep(b, &row, groups, count);
+  if (status >= HAP_OK) {
+    row.sizes = b->quick ? separate_quick : separate_full;
+    row.plan.layout = FIG67_SEPARATE;
+    row.plan.parameters.gap = FAR_GAP;
+    status = sweep(b, &row, groups, count);
+  }
+  return status >= HAP_OK ? sweep(b, &field, groups, count) : status;
+}
+
 hap_status bench_fig6(bench *b)
 {
-  group g;
+  fig67_group g;
   plan p = plan_of(b, "fig6", "alone");
   hap_status status = measure_group(b, &p, &g);
   if (status < HAP_OK) {
@@ -419,38 +449,46 @@ hap_status bench_fig6(bench *b)
   }
   status = write_table(b, "fig6", &g, 1);
   if (status >= HAP_OK) {
-    check_below(b, &g, "single", &g.single, false);
-    check_below(b, &g, "accelerance", &g.accelerance, true);
-    check_below(b, &g, "impulse", &g.impulse, false);
+    check_below(b, &g, "single", &g.of[FIG67_SINGLE], false);
+    check_below(b, &g, "accelerance", &g.of[FIG67_ACCELERANCE], true);
+    check_below(b, &g, "impulse", &g.of[FIG67_IMPULSE], false);
+    check_below(b, &g, "contact", &g.of[FIG67_CONTACT], false);
     say_parts(&g);
     check_parts(b, &g, false);
     check_untested(b, &g);
-    status = draw_fig6(b, &g);
+    status = fig6_draw(b, &g);
   }
   free_group(&g);
   return status;
 }
 
+static hap_status finish_fig7(bench *b, fig67_group *groups, size_t count)
+{
+  hap_status status = write_table(b, "fig7", groups, count);
+  if (status >= HAP_OK) {
+    bench_say("10 cubes, apart at first: duty factor of single up to %.3f",
+              largest_duty(&groups[0].of[FIG67_SINGLE], false));
+    report_fig7_group(b, &groups[0]);
+    report_fig7_group(b, &groups[1]);
+    qsort(groups + 1, count - 1, sizeof *groups, by_bodies);
+    report_sweeps(b, groups, count);
+    status = fig7_draw(b, groups, count);
+  }
+  return status;
+}
+
 hap_status bench_fig7(bench *b)
 {
-  group groups[SWEEP_MAX];
+  fig67_group groups[FIG67_GROUPS_MAX];
   size_t count = 0;
   plan p = plan_of(b, "fig7", "apart");
   hap_status status = measure_group(b, &p, &groups[0]);
   if (status >= HAP_OK) {
     count = 1;
-    status = sweep(b, &p, groups, &count);
+    status = sweep_all(b, &p, groups, &count);
   }
   if (status >= HAP_OK) {
-    status = write_table(b, "fig7", groups, count);
-  }
-  if (status >= HAP_OK) {
-    bench_say("10 cubes, apart at first: duty factor of single up to %.3f",
-              largest_duty(&groups[0].single, false));
-    report_fig7_group(b, &groups[0]);
-    report_fig7_group(b, &groups[1]);
-    report_sweep(b, groups, count);
-    status = draw_fig7(b, groups, count);
+    status = finish_fig7(b, groups, count);
   }
   for (size_t i = 0; i < count; ++i) {
     free_group(&groups[i]);

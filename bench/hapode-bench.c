@@ -1,13 +1,14 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling NAME]: measures,
- * writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
+/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling NAME]
+ * [--shard K/N | --merge FILE...] [--fresh]: measures, writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
 
 #include <ode/ode.h>
 
+#include "bench/accuracy.h"
 #include "bench/bench.h"
 
 typedef struct program {
@@ -19,7 +20,11 @@ typedef struct program {
 static const program programs[] = {
     {"accuracy", bench_accuracy,
      "what accuracy costs in time; --scene NAME: of one scene alone; --coupling NAME: through it "
-     "too"},
+     "too;\n"
+     "             --shard K/N: one of N parts, for as many processes or machines; --merge "
+     "FILE...: the\n"
+     "             table of all of them; --fresh: not from what a run that was killed has "
+     "finished"},
     {"couplings", bench_couplings,
      "direct and proxy against god-object and virtual coupling: force, depth, stability, drag"},
     {"edits", bench_edits,
@@ -57,7 +62,7 @@ static void print_usage(FILE *to)
   fprintf(
       to,
       "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]\n"
-      "                    [--coupling NAME]\n"
+      "                    [--coupling NAME] [--shard K/N | --merge FILE...] [--fresh]\n"
       "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
@@ -81,52 +86,117 @@ static bool takes_coupling(const program *p, const char *name)
          bench_find_coupling(name, &coupling);
 }
 
+/* The value of an option, "--name VALUE" or "--name=VALUE"; NULL: it is another argument. */
+static const char *value_of(const char *name, int count, char **arguments, int *io)
+{
+  const char *argument = arguments[*io];
+  size_t length = strlen(name);
+  if (strncmp(argument, name, length) == 0 && argument[length] == '=') {
+    return argument + length + 1;
+  }
+  if (strcmp(argument, name) == 0 && *io + 1 < count) {
+    ++*io;
+    return arguments[*io];
+  }
+  return NULL;
+}
+
+/* The files after --merge, up to the next option. */
+static void take_files(int count, char **arguments, bench *b, int *io)
+{
+  b->merge = (const char *const *)(void *)(arguments + *io + 1);
+  while (*io + 1 < count && arguments[*io + 1][0] != '-') {
+    ++b->merge_count;
+    ++*io;
+  }
+}
+
+/* An argument that is no name; false: there is no such. */
+static bool take_option(int count, char **arguments, bench *b, int *io)
+{
+  const struct {
+    const char *name;
+    const char **out;
+  } texts[] = {{"--out", &b->out},
+               {"--scene", &b->scene},
+               {"--only", &b->only},
+               {"--coupling", &b->coupling}};
+  const char *argument = arguments[*io];
+  for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
+    const char *value = value_of(texts[i].name, count, arguments, io);
+    if (value != NULL) {
+      *texts[i].out = value;
+      return true;
+    }
+  }
+  const char *shard = value_of("--shard", count, arguments, io);
+  if (shard != NULL) {
+    b->shards = 0;
+    if (!accuracy_read_shard(shard, &b->shard, &b->shards)) {
+      fprintf(stderr, "hapode-bench: --shard is K/N, 1 <= K <= N <= %d, not \"%s\"\n",
+              ACCURACY_SHARDS_MAX, shard);
+      return false;
+    }
+    return true;
+  }
+  if (strcmp(argument, "--merge") == 0) {
+    take_files(count, arguments, b, io);
+    return true;
+  }
+  b->quick = b->quick || strcmp(argument, "--quick") == 0;
+  b->verify = b->verify || strcmp(argument, "--verify") == 0;
+  b->fresh = b->fresh || strcmp(argument, "--fresh") == 0;
+  return strcmp(argument, "--quick") == 0 || strcmp(argument, "--verify") == 0 ||
+         strcmp(argument, "--fresh") == 0;
+}
+
+/* That the bench takes what was given; stderr says what it does not. */
+static bool fits(const program *p, const bench *b)
+{
+  const char *wrong = NULL;
+  bool of_accuracy = b->shards > 0 || b->merge != NULL || b->fresh;
+  if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick) {
+    wrong = "has no scenes to choose from";
+  } else if (b->coupling != NULL && !takes_coupling(p, b->coupling)) {
+    wrong =
+        "does not take this --coupling, which is proxy, god-object or virtual, for accuracy and "
+        "impedance";
+  } else if (b->only != NULL && p->run != bench_stability) {
+    wrong = "has no points to choose from";
+  } else if (of_accuracy && p->run != bench_accuracy) {
+    wrong = "is done at once: --shard, --merge and --fresh are for accuracy";
+  } else if (b->merge != NULL && b->merge_count == 0) {
+    wrong = "--merge needs the files of the shards";
+  } else if (b->merge != NULL &&
+             (b->shards > 0 || b->fresh || b->quick || b->scene != NULL || b->coupling != NULL)) {
+    wrong = "--merge takes all but --out and --verify from its files";
+  }
+  if (wrong != NULL) {
+    fprintf(stderr, "hapode-bench: %s %s\n", p->name, wrong);
+  }
+  return wrong == NULL && b->out[0] != '\0';
+}
+
 /* False: not understood, and stderr says what. */
 static bool read_arguments(int count, char **arguments, bench *b, const program **out)
 {
   *out = NULL;
   for (int i = 1; i < count; ++i) {
     const char *argument = arguments[i];
-    if (strcmp(argument, "--quick") == 0) {
-      b->quick = true;
-    } else if (strcmp(argument, "--verify") == 0) {
-      b->verify = true;
-    } else if (strncmp(argument, "--out=", 6) == 0) {
-      b->out = argument + 6;
-    } else if (strcmp(argument, "--out") == 0 && i + 1 < count) {
-      b->out = arguments[++i];
-    } else if (strcmp(argument, "--scene") == 0 && i + 1 < count) {
-      b->scene = arguments[++i];
-    } else if (strcmp(argument, "--only") == 0 && i + 1 < count) {
-      b->only = arguments[++i];
-    } else if (strcmp(argument, "--coupling") == 0 && i + 1 < count) {
-      b->coupling = arguments[++i];
-    } else if (argument[0] == '-' || *out != NULL) {
+    if (argument[0] == '-' ? !take_option(count, arguments, b, &i) : *out != NULL) {
       fprintf(stderr, "hapode-bench: \"%s\" is not understood\n", argument);
       return false;
-    } else if ((*out = find_program(argument)) == NULL) {
+    }
+    if (argument[0] != '-' && (*out = find_program(argument)) == NULL) {
       fprintf(stderr, "hapode-bench: there is no bench \"%s\"\n", argument);
       return false;
     }
   }
   if (*out == NULL) {
     fprintf(stderr, "hapode-bench: which bench?\n");
-  } else if (b->scene != NULL && (*out)->run != bench_accuracy && (*out)->run != bench_effects &&
-             (*out)->run != bench_tick) {
-    fprintf(stderr, "hapode-bench: %s has no scenes to choose from\n", (*out)->name);
     return false;
   }
-  if (*out != NULL && b->coupling != NULL && !takes_coupling(*out, b->coupling)) {
-    fprintf(
-        stderr,
-        "hapode-bench: --coupling is proxy, god-object or virtual, for accuracy and impedance\n");
-    return false;
-  }
-  if (*out != NULL && b->only != NULL && (*out)->run != bench_stability) {
-    fprintf(stderr, "hapode-bench: %s has no points to choose from\n", (*out)->name);
-    return false;
-  }
-  return *out != NULL && b->out[0] != '\0';
+  return fits(*out, b);
 }
 
 static int run(const program *p, bench *b)

@@ -57,6 +57,7 @@ void scene_build_tower(scene *s);
 void scene_build_hold(scene *s);
 void scene_build_pair(scene *s);
 void scene_build_clump(scene *s);
+void scene_build_field(scene *s);
 
 /* tipping.c */
 void scene_build_tall_box(scene *s);

@@ -150,3 +150,17 @@ void scene_build_clump(scene *s)
     dBodySetRotation(cube, rotation);
   }
 }
+
+/* A square of cubes that stand the gap apart, about the z axis. The first cubes are those in the
+ * corner at -x, -y. */
+void scene_build_field(scene *s)
+{
+  const scene_parameters *p = &s->parameters;
+  const int side = (int)ceil(sqrt(s->count));
+  const double pitch = p->size + p->gap;
+  scene_add_floor(s);
+  for (int i = 0; i < s->count; ++i) {
+    add_cube(s, pitch * (i / side - 0.5 * (side - 1)), pitch * (i % side - 0.5 * (side - 1)),
+             layer_height(s, 0));
+  }
+}

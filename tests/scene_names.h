@@ -6,9 +6,9 @@
 /* The scenes that a user is told of. */
 
 static const char *const names[] = {
-    "fig5",   "fig6",         "fig7",          "slide",     "row10",   "stack", "wedge",
-    "door",   "lightstand",   "pile",          "tower",     "topple",  "edge",  "hit",
-    "roll",   "roll_capsule", "roll_cylinder", "clump8",    "spheres", "hold",  "pendulum",
-    "hinged", "cart",         "chain",         "telescope", "grasp",   "lever", "peg"};
+    "fig5",          "fig6",      "fig7",  "slide",   "row10", "stack",    "wedge",  "door",
+    "lightstand",    "pile",      "tower", "topple",  "edge",  "hit",      "roll",   "roll_capsule",
+    "roll_cylinder", "clump8",    "field", "spheres", "hold",  "pendulum", "hinged", "cart",
+    "chain",         "telescope", "grasp", "lever",   "peg"};
 
 #endif

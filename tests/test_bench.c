@@ -150,12 +150,13 @@ TEST(edits_leaves_its_table)
 
 TEST(fig6_leaves_its_table)
 {
-  check_program("fig6", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
+  check_program("fig6", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us", 1000);
 }
 
 TEST(fig7_leaves_its_table)
 {
-  check_program("fig7", "model,step,t,duty,testing,bodies,layout,neighbours", 1000);
+  check_program("fig7", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us", 1000);
+  unlink(file_in_folder("fig7_sizes", ".svg"));
 }
 
 /* Of the checks those that are no times hold on every machine. */
@@ -272,8 +273,9 @@ TEST(tick_leaves_its_table)
 #define ACCURACY_COLUMNS                                                                         \
   "scene,model,physics_hz,knob,value,force_rel_rms,impulse_ratio,peak_ratio,tick_us,physics_ms," \
   "duty,haptic_hz,noise_floor,estimate,hand,pose_error_mm,sync_line_n,hand_speed,"               \
-  "pose_median_mm,force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor,joint_open_mm,"    \
-  "joint_world_mm,joint_left_mm,joint_floor_mm,joint_turn_deg"
+  "pose_median_mm,force_rms_n,rest_share,start_um,torque_rel_rms,torque_floor,starts,"           \
+  "first_rel_rms,lines,front,joint_open_mm,joint_world_mm,joint_left_mm,joint_floor_mm,"         \
+  "joint_turn_deg"
 
 /* Force error of a row of accuracy.csv that begins so; *out_count: how many rows do. */
 static double force_error(const char *begin, int *out_count)
@@ -312,6 +314,16 @@ TEST(accuracy_sets_models_side_by_side)
       "slide,accelerance,20,operating_cross,0,",
       "slide,accelerance,60,operating_cross,0,",
       "slide,accelerance,60,eq4,0,",
+      "slide,accelerance,20,paper,0,",
+      "slide,contact,20,explicit,0,",
+      "slide,contact,20,implicit,0,",
+      "slide,contact,20,midpoint,0,",
+      "slide,contact,20,plane,0,",
+      "slide,contact,20,sweeps,2,",
+      "slide,contact,20,range_hops,0,",
+      "slide,contact,20,iterations,5,",
+      "slide,contact,20,haptic_hz,500,",
+      "slide,contact,20,haptic_hz,2000,",
   };
   enum {
     DEFAULTS = 7,
@@ -332,7 +344,15 @@ TEST(accuracy_sets_models_side_by_side)
   CHECK(errors[6] < 1e-3);
   CHECK(errors[8] < 0.5 * errors[11]); /* the cube slides: eq. 4 asks one that rests */
   CHECK(errors[9] == errors[7] && errors[10] == errors[8]); /* a body alone */
+  CHECK(errors[12] > 0.5);                              /* the paper's probes are those of eq. 4 */
+  CHECK(errors[13] < 1e-6);                             /* the reference is explicit as well */
+  CHECK(errors[14] > 0.01);                             /* 1 kHz is slow for this spring */
+  CHECK(errors[17] > 2e-4 && errors[17] != errors[13]); /* two sweeps do not solve it */
+  CHECK(errors[18] < 0.01 && errors[19] < 0.01);        /* a body alone needs neither */
+  CHECK(errors[20] > 1.5e-3 && errors[21] < errors[20]);
   CHECK(!plot_available() || exists(file_in_folder("accuracy", ".svg")));
+  CHECK(!plot_available() || exists(file_in_folder("accuracy_slide", ".svg")));
+  CHECK(!exists(file_in_folder("accuracy", ".rows")));
 }
 
 TEST(accuracy_says_how_far_joints_open)
@@ -449,7 +469,8 @@ int main(void)
   RUN(wrong_usage_is_2_and_says_what_there_is);
   RUN(a_folder_that_cannot_be_is_1);
   const char *const left[] = {"fig5.csv",     "fig5.svg",     "fig5_summary.csv",
-                              "accuracy.csv", "accuracy.svg", "said"};
+                              "accuracy.csv", "accuracy.svg", "accuracy_slide.svg",
+                              "said"};
   for (size_t i = 0; i < sizeof left / sizeof left[0]; ++i) {
     unlink(file_in_folder(left[i], ""));
   }

@@ -126,52 +126,6 @@ TEST(the_range_is_the_touched_island_when_it_fits)
   cw_close(&w);
 }
 
-/* The rest of the row answers with no more than one body's own mass. */
-TEST(the_range_ends_after_so_many_contacts)
-{
-  static const int hops[] = {0, 1, 4, 5, HAP_RANGE_ALL};
-  static const uint32_t bodies[] = {1, 2, 5, 6, 6};
-  for (size_t i = 0; i < sizeof hops / sizeof hops[0]; ++i) {
-    contact_world w;
-    cw_open(&w, G);
-    w.def.physics_hz = 100.0;
-    w.def.range_hops = hops[i];
-    cw_add_floor(&w);
-    for (int k = 0; k < 6; ++k) {
-      cw_add_cube(&w, 1.0, 0.05, 0.05 * k, 0.0, 0.0249);
-    }
-    REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
-    cw_run(&w, 200);
-    CHECK(w.range_min == bodies[i] && w.range_max == bodies[i]);
-    CHECK(cw_stats(&w).edge_bodies == (bodies[i] < 6 ? 1u : 0u));
-    cw_close(&w);
-  }
-}
-
-/* Three cubes on a string of hinges, then a free one: one contact away from the first. */
-TEST(what_hangs_together_is_one_hop)
-{
-  for (int hops = 0; hops < 2; ++hops) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    w.def.physics_hz = 100.0;
-    w.def.range_hops = hops;
-    for (int k = 0; k < 4; ++k) {
-      cw_add_cube(&w, 1.0, 0.05, 0.051 * k, 0.0, 0.0);
-    }
-    for (int k = 0; k < 2; ++k) {
-      dJointID hinge = dJointCreateHinge(w.world, 0);
-      dJointAttach(hinge, w.bodies[k], w.bodies[k + 1]);
-      dJointSetHingeAnchor(hinge, 0.0255 + 0.051 * k, 0.0, 0.0);
-      dJointSetHingeAxis(hinge, 0.0, 0.0, 1.0);
-    }
-    REQUIRE(cw_start(&w, -0.036, 0.0, 0.0));
-    cw_run(&w, 100);
-    CHECK(w.range_min == 3u + (uint32_t)hops && w.range_max == 3u + (uint32_t)hops);
-    cw_close(&w);
-  }
-}
-
 /* Outside of the range a body does not wake: the nearest three answer at once. */
 TEST(what_does_not_fit_is_left_out_from_the_far_end)
 {
@@ -920,8 +874,6 @@ int main(void)
   RUN(a_sleeping_body_wakes_when_another_one_hits_it);
   RUN(a_tower_falls_asleep_in_its_whole);
   RUN(the_range_is_the_touched_island_when_it_fits);
-  RUN(the_range_ends_after_so_many_contacts);
-  RUN(what_hangs_together_is_one_hop);
   RUN(what_does_not_fit_is_left_out_from_the_far_end);
   RUN(what_enters_and_leaves_the_range_keeps_its_motion);
   RUN(a_ball_that_flies_in_hits_what_is_near_the_hand);

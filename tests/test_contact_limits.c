@@ -219,6 +219,82 @@ TEST(a_measured_body_answers_two_hands_alike)
   dGeomTriMeshDataDestroy(data);
 }
 
+/* The rest of the row answers with no more than one body's own mass. */
+TEST(the_range_ends_after_so_many_contacts)
+{
+  static const int hops[] = {0, 1, 4, 5, HAP_RANGE_ALL};
+  static const uint32_t bodies[] = {1, 2, 5, 6, 6};
+  for (size_t i = 0; i < sizeof hops / sizeof hops[0]; ++i) {
+    contact_world w;
+    cw_open(&w, CW_GRAVITY);
+    w.def.physics_hz = 100.0;
+    w.def.range_hops = hops[i];
+    cw_add_floor(&w);
+    for (int k = 0; k < 6; ++k) {
+      cw_add_cube(&w, 1.0, 0.05, 0.05 * k, 0.0, 0.0249);
+    }
+    REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
+    cw_run(&w, 200);
+    CHECK(w.range_min == bodies[i] && w.range_max == bodies[i]);
+    CHECK(cw_stats(&w).edge_bodies == (bodies[i] < 6 ? 1u : 0u));
+    cw_close(&w);
+  }
+}
+
+/* Three cubes on a string of hinges, then a free one: one contact away from the first. */
+TEST(what_hangs_together_is_one_hop)
+{
+  for (int hops = 0; hops < 2; ++hops) {
+    contact_world w;
+    cw_open(&w, 0.0);
+    w.def.physics_hz = 100.0;
+    w.def.range_hops = hops;
+    for (int k = 0; k < 4; ++k) {
+      cw_add_cube(&w, 1.0, 0.05, 0.051 * k, 0.0, 0.0);
+    }
+    for (int k = 0; k < 2; ++k) {
+      dJointID hinge = dJointCreateHinge(w.world, 0);
+      dJointAttach(hinge, w.bodies[k], w.bodies[k + 1]);
+      dJointSetHingeAnchor(hinge, 0.0255 + 0.051 * k, 0.0, 0.0);
+      dJointSetHingeAxis(hinge, 0.0, 0.0, 1.0);
+    }
+    REQUIRE(cw_start(&w, -0.036, 0.0, 0.0));
+    cw_run(&w, 100);
+    CHECK(w.range_min == 3u + (uint32_t)hops && w.range_max == 3u + (uint32_t)hops);
+    cw_close(&w);
+  }
+}
+
+/* A tower under a hand. A tick has two solves at most; two sweeps alone, without the direct solve that comes
+ * next, leave it undone. */
+TEST(sweeps_are_no_more_than_asked)
+{
+  static const int32_t most[] = {0, 2, 3, 10000};
+  double sweeps[4];
+  double undone[4];
+  for (int i = 0; i < 4; ++i) {
+    contact_world w;
+    cw_open(&w, CW_GRAVITY);
+    w.def.max_sweeps = most[i];
+    cw_add_floor(&w);
+    for (int k = 0; k < 6; ++k) {
+      cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0249 + 0.0499 * k);
+    }
+    REQUIRE(cw_start(&w, 0.0, 0.0, 0.308));
+    cw_run(&w, 300);
+    hap_stats stats = cw_stats(&w);
+    CHECK(w.range_max == 6 && fabs(w.force[2]) > 1.0);
+    sweeps[i] = (double)stats.solver_sweeps / (double)stats.ticks;
+    undone[i] = stats.solver_residual_max;
+    cw_close(&w);
+  }
+  printf("# sweeps a tick %.2f %.2f %.2f %.2f, undone %.2g %.2g %.2g %.2g m/s\n", sweeps[0],
+         sweeps[1], sweeps[2], sweeps[3], undone[0], undone[1], undone[2], undone[3]);
+  CHECK(sweeps[1] <= 4.0 && sweeps[2] <= 6.0);
+  CHECK(undone[1] > 10.0 * undone[0]);
+  CHECK(sweeps[3] == sweeps[0] && undone[3] == undone[0]);
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -229,6 +305,9 @@ int main(void)
   RUN(a_body_that_the_application_puts_to_sleep_stays_so);
   RUN(a_measured_body_answers_all_that_touch_it_alike);
   RUN(a_measured_body_answers_two_hands_alike);
+  RUN(the_range_ends_after_so_many_contacts);
+  RUN(what_hangs_together_is_one_hop);
+  RUN(sweeps_are_no_more_than_asked);
   dCloseODE();
   return tap_done();
 }

@@ -572,6 +572,9 @@ TEST(clump_touches_eight_at_once)
 {
   felt f[SCENE_POINTERS_MAX];
   run r;
+  REQUIRE(play_rigid(&r, "field", 0.3, f) && r.s->body_count == 16);
+  CHECK(f[0].at_once == 16);
+  close_run(&r);
   REQUIRE(play_rigid(&r, "clump8", 0.4, f));
   CHECK(f[0].at_once == 8 && r.s->body_count == 8);
   for (size_t i = 0; i < r.s->body_count; ++i) {

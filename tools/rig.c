@@ -123,6 +123,7 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   def.coupling = options->coupling;
   def.coupling_stiffness = options->coupling_stiffness;
   def.coupling_damping = options->coupling_damping;
+  def.integration = options->integration;
   def.virtual_mass = options->virtual_mass > 0.0 ? options->virtual_mass : def.virtual_mass;
   status = hap_pointer_add(r->session, &def, &r->pointers[index]);
   if (status < HAP_OK) {

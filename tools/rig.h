@@ -34,6 +34,7 @@ typedef struct rig_options {
   hap_session_def def;
   const hap_record_def *record; /* not NULL: the session is recorded */
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */
+  hap_integration integration; /* of the pointers */
 } rig_options;
 
 typedef enum rig_part {

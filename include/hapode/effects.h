@@ -18,7 +18,7 @@ HAP_BEGIN_DECLS
  * the session begins with is in hap_session_def.effects, by these numbers. Values are fixed. */
 typedef enum hap_effect {
   HAP_EFFECT_TESTING = 0,     /* testing simulations of what the loop does not simulate itself */
-  HAP_EFFECT_CROSS = 1,       /* ACCELERANCE: cross accelerance between local bodies */
+  HAP_EFFECT_CROSS = 1,       /* ACCELERANCE: cross accelerance between local bodies; auto: off */
   HAP_EFFECT_CONTACTS = 2,    /* CONTACT: contacts between bodies in the loop */
   HAP_EFFECT_PASSES = 3,      /* CONTACT: contacts found anew between syncs */
   HAP_EFFECT_JOINTS = 4,      /* CONTACT: joints in the loop */
@@ -77,7 +77,8 @@ typedef enum hap_effect_reason {
   HAP_REASON_COUPLING = 22,       /* the pointer's coupling says it */
   HAP_REASON_MEASURING = 23,      /* HAP_GUARD_MEASURE */
   HAP_REASON_NOT_RECORDED = 24,   /* hap_session_record was not called */
-  HAP_REASON_OUTSIDE = 25 /* it cannot be simulated by the loop, or there is no room for it */
+  HAP_REASON_OUTSIDE = 25, /* it cannot be simulated by the loop, or there is no room for it */
+  HAP_REASON_NOT_PAPERS = 26 /* model ACCELERANCE is the paper's; what is not must be asked for */
 } hap_effect_reason;
 
 /* What an effect is doing. Times are wall-clock, also in lockstep. */

@@ -15,7 +15,7 @@
 static bool is_on(const hapi_physics *physics)
 {
   return physics->config.capacity.crosses > 0 && physics->model == HAP_MODEL_ACCELERANCE &&
-         !hapi_wish_is_off(physics->wishes, HAP_EFFECT_CROSS);
+         hapi_wish_is_on(physics->wishes, HAP_EFFECT_CROSS);
 }
 
 /* A body that the loop moves, which is under test with the contact and is not the one it pushes. */

@@ -212,7 +212,11 @@ static void note_model_accelerance(hapi_physics *physics, hapi_model *model)
   }
   cross->on = cross->of = model->cross_count;
   sum_up(physics, HAP_EFFECT_TESTING, HAP_REASON_FAR);
-  sum_up(physics, HAP_EFFECT_CROSS, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
+  if (hapi_wish_is_on(physics->wishes, HAP_EFFECT_CROSS)) {
+    sum_up(physics, HAP_EFFECT_CROSS, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
+  } else {
+    set(physics, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_PAPERS);
+  }
 }
 
 static void note_others(hapi_physics *physics)
