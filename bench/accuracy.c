@@ -152,10 +152,11 @@ static void check_estimates(bench *b, const accuracy_table *table)
     }
   }
   if (judged > 0) {
-    bench_check(b, (double)good >= ESTIMATE_SHARE * (double)judged,
-                "estimate of the force error: %zu of %zu rows within a factor of %g (%g %% wanted), "
-                "%zu without any",
-                good, judged, ESTIMATE_FACTOR, 100.0 * ESTIMATE_SHARE, without);
+    bench_check(
+        b, (double)good >= ESTIMATE_SHARE * (double)judged,
+        "estimate of the force error: %zu of %zu rows within a factor of %g (%g %% wanted), "
+        "%zu without any",
+        good, judged, ESTIMATE_FACTOR, 100.0 * ESTIMATE_SHARE, without);
   }
 }
 

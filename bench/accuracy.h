@@ -66,7 +66,7 @@ typedef struct accuracy_motion {
   joint_opening joints_loop;  /* the widest at any tick, between bodies that the loop moves */
   joint_opening joints_world; /* of the same in ODE's world */
   joint_opening joints_left;  /* in ODE's world, of the others: ODE alone moves them */
-  double used_s;  /* of the processor, for all that was computed */
+  double used_s;              /* of the processor, for all that was computed */
   hap_stats stats;
 } accuracy_motion;
 

@@ -147,7 +147,7 @@ static double used_seconds(void)
 /* A frame is the newest tick at its time: with a faster loop the first of its ticks, with a slower one
  * the same for as long as it lasts. */
 static hap_status record(const rig *r, const joint_gauge *gauge, double haptic_hz,
-                          accuracy_motion *out)
+                         accuracy_motion *out)
 {
   hap_trace_row row;
   size_t got = 0;

@@ -10,7 +10,7 @@
 #include "bench/accuracy.h"
 #include "bench/cycles.h"
 
-#define LOOKBACK 0.1 /* in lockstep any share is all of the time */
+#define LOOKBACK 0.1     /* in lockstep any share is all of the time */
 #define CONTROL_RATE 1.3 /* times the physics rate: shares none of its harmonics up to the 5th */
 #define CONTROL_HZ_MOST 500.0
 #define HAND_HZ 20.0

@@ -348,8 +348,7 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
     REQUIRE(cw_start(&w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
     cw_run(&w, 60);
     CHECK(i == 0 ? look(&w, HAP_EFFECT_CROSS).state != HAP_EFFECT_IS_OFF
-                 : is_off(&w, HAP_EFFECT_CROSS,
-                          i == 1 ? HAP_REASON_ALONE : HAP_REASON_NOT_PAPERS));
+                 : is_off(&w, HAP_EFFECT_CROSS, i == 1 ? HAP_REASON_ALONE : HAP_REASON_NOT_PAPERS));
     cw_close(&w);
   }
 }

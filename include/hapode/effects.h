@@ -77,7 +77,7 @@ typedef enum hap_effect_reason {
   HAP_REASON_COUPLING = 22,       /* the pointer's coupling says it */
   HAP_REASON_MEASURING = 23,      /* HAP_GUARD_MEASURE */
   HAP_REASON_NOT_RECORDED = 24,   /* hap_session_record was not called */
-  HAP_REASON_OUTSIDE = 25, /* it cannot be simulated by the loop, or there is no room for it */
+  HAP_REASON_OUTSIDE = 25,   /* it cannot be simulated by the loop, or there is no room for it */
   HAP_REASON_NOT_PAPERS = 26 /* model ACCELERANCE is the paper's; what is not must be asked for */
 } hap_effect_reason;
 

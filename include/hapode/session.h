@@ -108,7 +108,8 @@ typedef struct hap_session_def {
                          0 is the neighbours alone, 1 what may touch them as well. What hangs together by
                          joints counts as one. What stands beyond answers as max_edge_probes says.
                          HAP_RANGE_ALL (default): as far as max_bodies goes */
-  double lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
+  double
+      lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
                       are gone over as model SINGLE would have had them, for hap_stats.force_error; in
                       LOCKSTEP all of the time is, whatever the share. 0: never */
   uint8_t

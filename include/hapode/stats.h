@@ -136,11 +136,12 @@ typedef struct hap_stats {
 
   /* Where hap_session_def.lookback is above 0: the felt force against that of model SINGLE from the same
    * state with the pointers on the same way, over windows of a quarter of a second. */
-  double force_error;        /* RMS of the difference / RMS of the force, of the last windows with contact;
+  double force_error; /* RMS of the difference / RMS of the force, of the last windows with contact;
                                 0 before the first */
-  double force_error_n;      /* N, RMS of the difference in the newest one */
-  uint64_t lookbacks;        /* windows gone over */
-  uint64_t lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile */
+  double force_error_n; /* N, RMS of the difference in the newest one */
+  uint64_t lookbacks;   /* windows gone over */
+  uint64_t
+      lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile */
   double
       range_error; /* model CONTACT with the effect testing on: by how much the loop moved neighbours
                          otherwise in an interval than testing simulations of the whole world, made at its

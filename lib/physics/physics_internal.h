@@ -688,8 +688,7 @@ void hapi_world_collide(hapi_physics *physics);
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
-                              const dBodyID bodies[2], dSurfaceParameters *surface,
-                              bool carried);
+                              const dBodyID bodies[2], dSurfaceParameters *surface, bool carried);
 
 double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
