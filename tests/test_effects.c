@@ -347,8 +347,10 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
     }
     REQUIRE(cw_start(&w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
     cw_run(&w, 60);
-    CHECK(i == 0 ? look(&w, HAP_EFFECT_CROSS).state != HAP_EFFECT_IS_OFF
-                 : is_off(&w, HAP_EFFECT_CROSS, i == 1 ? HAP_REASON_ALONE : HAP_REASON_NOT_PAPERS));
+    hap_effect_info info = look(&w, HAP_EFFECT_CROSS);
+    CHECK(i == 2 ? is_off(&w, HAP_EFFECT_CROSS, HAP_REASON_NOT_PAPERS)
+                 : info.reason == HAP_REASON_ASKED);
+    CHECK((info.on > 0) == (i == 0));
     cw_close(&w);
   }
 }

@@ -32,10 +32,10 @@ typedef struct hapi_capacity {
   uint32_t hull_points;  /* of all of them together */
   uint32_t trail_rows;   /* 0: none are kept */
   uint32_t trail_stride; /* ticks from row to row */
-  uint32_t path_rows;    /* 0: none are kept */
   uint32_t joints;       /* between bodies of the range */
   uint32_t tool_points;  /* contacts of pointers that are hulls */
   uint32_t crosses;      /* cross accelerances; 0: none are measured */
+  uint32_t path_rows;    /* 0: none are kept */
 } hapi_capacity;
 
 #define HAPI_TOOL_POINTS_MAX 64u /* vertices of a pointer's hull */
