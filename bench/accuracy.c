@@ -13,7 +13,8 @@
  *   duty           processor time of physics, contact passes and loop / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
  *                  worst one of model contact, or 1 um apart
- *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none
+ *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none, with
+ *                  --quick beside the default
  *   pose_*_mm      distance of the bodies that the loop moves from their reference
  *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
  *                  is half way to the next ones and, in rows "default" of model contact, above what a
@@ -156,7 +157,7 @@ static void check_estimates(bench *b, const accuracy_table *table)
     bench_check(
         b, (double)good >= ESTIMATE_SHARE * (double)judged,
         "estimate of the force error: %zu of %zu rows within a factor of %g (%g %% wanted), "
-        "%zu more have none: tools, and contact too short for a window",
+        "%zu more have none: tools, contact too short for a window, knobs with --quick",
         good, judged, ESTIMATE_FACTOR, 100.0 * ESTIMATE_SHARE, without);
   }
 }
