@@ -29,6 +29,7 @@ hap_status accuracy_merge_settings(bench *b, accuracy_settings *out)
 static hap_status check_heads(bench *b, const accuracy_identity *here,
                               const accuracy_identity *heads)
 {
+  /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): there is one for each file, and one file at least */
   if (strcmp(heads[0].settings, here->settings) != 0) {
     return bench_fail(b, HAP_ERROR_STATE,
                       "%s is of a run with \"%s\", which here would be \"%s\": merge with the "

@@ -278,6 +278,7 @@ static hap_status write_head(bench *b, int file, const accuracy_identity *identi
 static hap_status check_same(bench *b, const char *path, const accuracy_identity *here)
 {
   accuracy_identity there;
+  memset(&there, 0, sizeof there);
   hap_status status = accuracy_rows_head(b, path, &there);
   const char *what = status < HAP_OK                               ? NULL
                      : strcmp(there.settings, here->settings) != 0 ? "other settings"

@@ -91,6 +91,7 @@ static const char *value_of(const char *name, int count, char **arguments, int *
 {
   const char *argument = arguments[*io];
   size_t length = strlen(name);
+  /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): no argument is NULL */
   if (strncmp(argument, name, length) == 0 && argument[length] == '=') {
     return argument + length + 1;
   }

@@ -160,7 +160,8 @@ void scene_build_field(scene *s)
   const double pitch = p->size + p->gap;
   scene_add_floor(s);
   for (int i = 0; i < s->count; ++i) {
-    add_cube(s, pitch * (i / side - 0.5 * (side - 1)), pitch * (i % side - 0.5 * (side - 1)),
+    int row = i / side;
+    add_cube(s, pitch * (row - 0.5 * (side - 1)), pitch * (i % side - 0.5 * (side - 1)),
              layer_height(s, 0));
   }
 }

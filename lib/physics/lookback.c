@@ -18,6 +18,7 @@
 #define MEMORY_S 10.0    /* older windows fade from the figures */
 #define NEAR_M 0.5       /* from a pointer, that may take part */
 #define BODIES_MAX 128u  /* nearer ones first */
+#define REACHES 18       /* 0.5 m to 1 mm */
 #define DEAR 2.0         /* times the budget, for one step */
 #define BODIES_MOST 256u /* with what joints tie to them */
 
@@ -95,14 +96,15 @@ static double apart(const hapi_physics *physics, const hapi_known_body *known)
 static bool add_near(hapi_physics *physics)
 {
   hapi_lookback *w = &physics->lookback;
-  for (double reach = NEAR_M; reach > 1e-3; reach *= 0.7) {
+  double reach = NEAR_M;
+  for (int i = 0; i < REACHES; ++i, reach *= 0.7) {
     uint32_t count = 0;
     w->body_count = 0;
     bool good = true;
-    for (uint32_t i = 0; i < physics->table.high && count <= BODIES_MAX && good; ++i) {
-      const hapi_known_body *known = &physics->table.entries[i];
+    for (uint32_t k = 0; k < physics->table.high && count <= BODIES_MAX && good; ++k) {
+      const hapi_known_body *known = &physics->table.entries[k];
       if (known->body != NULL && apart(physics, known) < reach) {
-        good = ++count > BODIES_MAX || add_body(physics, i);
+        good = ++count > BODIES_MAX || add_body(physics, k);
       }
     }
     if (!good || count <= BODIES_MAX) {

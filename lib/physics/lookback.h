@@ -16,8 +16,7 @@
 
 #include "base/index.h"
 #include "physics/physics.h"
-
-struct hapi_body_state;
+#include "physics/snapshot.h"
 
 typedef struct hapi_lookback_body {
   uint32_t known;   /* entry of the body table */
@@ -60,7 +59,7 @@ typedef struct hapi_lookback {
   hapi_lookback_body *bodies;
   uint32_t body_count;
   uint32_t body_capacity;
-  struct hapi_body_state *states; /* of them, at the step that comes */
+  hapi_body_state *states; /* of them, at the step that comes */
   uint32_t state_capacity;
   unsigned long seed;
 
@@ -87,5 +86,16 @@ typedef struct hapi_lookback {
   double wrong2_sum; /* of all windows, the older the less */
   double right2_sum;
 } hapi_lookback;
+
+/* lookback.c: nothing where it is not asked for */
+void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
+void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
+void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
+                       const dSurfaceParameters *surface);      /* a pair that collides */
+void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
+void hapi_lookback_reset(hapi_physics *physics);
+void hapi_lookback_finish(hapi_lookback *w);
+/* lookback_step.c: goes over rows until they are done or seconds have passed; negative: all. */
+hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
 
 #endif

@@ -100,17 +100,25 @@ static void collide(hapi_physics *physics)
 
 /* ---- pointers ---- */
 
+typedef struct closing {
+  hapi_nearest at;
+  double speed[3]; /* m/s, of the pointer against the body */
+  double period;   /* s */
+} closing;
+
 /* Stick, and slip at mu times the normal force; eq. 7 along the surface. */
-static void rub(hapi_lookback_touch *t, const hapi_path_pointer *p, const hapi_nearest *at,
-                const double speed[3], double limit, double period, double io_force[3])
+static void rub(hapi_lookback_touch *t, const hapi_path_pointer *p, const closing *c, double limit,
+                double io_force[3])
 {
+  const hapi_nearest *at = &c->at;
+  const double *speed = c->speed;
   double v[3];
   double f[3];
   hapi_v3_madd(speed, -hapi_v3_dot(speed, at->normal), at->normal, v);
   if (!t->closed) {
     hapi_v3_set(t->stretch, 0.0, 0.0, 0.0);
   }
-  hapi_v3_madd(t->stretch, period, v, t->stretch);
+  hapi_v3_madd(t->stretch, c->period, v, t->stretch);
   hapi_v3_madd(t->stretch, -hapi_v3_dot(t->stretch, at->normal), at->normal, t->stretch);
   hapi_v3_scale(p->stiffness, t->stretch, f);
   hapi_v3_madd(f, p->damping, v, f);
@@ -130,27 +138,27 @@ static void rub(hapi_lookback_touch *t, const hapi_path_pointer *p, const hapi_n
 static bool press(hapi_physics *physics, hapi_lookback_touch *t, const hapi_path_pointer *p,
                   double period, double force[3], double point[3])
 {
-  hapi_nearest at;
-  double speed[3];
+  closing c = {.period = period};
+  const hapi_nearest *at = &c.at;
   dVector3 of_body = {0.0};
   dBodyID body = dGeomGetBody(t->geom);
-  if (!hapi_geom_nearest(physics, t->geom, p->pose.position, p->radius, p->radius, &at) ||
-      at.distance >= 0.0) {
+  if (!hapi_geom_nearest(physics, t->geom, p->pose.position, p->radius, p->radius, &c.at) ||
+      at->distance >= 0.0) {
     t->closed = false;
     return false;
   }
   if (under_test(physics, body)) {
-    dBodyGetPointVel(body, at.point_b[0], at.point_b[1], at.point_b[2], of_body);
+    dBodyGetPointVel(body, at->point_b[0], at->point_b[1], at->point_b[2], of_body);
   }
-  hapi_v3_sub(p->twist.linear, of_body, speed);
-  double normal = -p->stiffness * at.distance - p->damping * hapi_v3_dot(speed, at.normal);
+  hapi_v3_sub(p->twist.linear, of_body, c.speed);
+  double normal = -p->stiffness * at->distance - p->damping * hapi_v3_dot(c.speed, at->normal);
   normal = normal > 0.0 ? normal : 0.0;
-  hapi_v3_scale(normal, at.normal, force);
+  hapi_v3_scale(normal, at->normal, force);
   if (t->mu > 0.0) {
-    rub(t, p, &at, speed, t->mu * normal, period, force);
+    rub(t, p, &c, t->mu * normal, force);
   }
   t->closed = true;
-  hapi_v3_copy(at.point_b, point);
+  hapi_v3_copy(at->point_b, point);
   return true;
 }
 

@@ -22,6 +22,7 @@
 #include "physics/joint_probe.h"
 #include "physics/lookback.h"
 #include "physics/physics.h"
+#include "physics/snapshot.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
 #include "sync/touch_local.h"
@@ -466,36 +467,6 @@ typedef struct hapi_surface_cache {
   uint64_t step;
 } hapi_surface_cache;
 
-/* ---- snapshot.c ---- */
-
-typedef struct hapi_body_state {
-  dBodyID body;
-  dReal position[4];
-  dReal quat[4];
-  dReal rotation[12];
-  dReal linear[4];
-  dReal angular[4];
-  dReal force[4];
-  dReal torque[4];
-  bool enabled;
-  void (*moved_callback)(dBodyID);
-} hapi_body_state;
-
-typedef struct hapi_feedback_state {
-  dJointFeedback *feedback;
-  dJointFeedback saved;
-} hapi_feedback_state;
-
-typedef struct hapi_snapshot {
-  hapi_body_state *bodies;
-  uint32_t body_count;
-  uint32_t body_capacity;
-  hapi_feedback_state *feedbacks;
-  uint32_t feedback_count;
-  uint32_t feedback_capacity;
-  unsigned long seed;
-} hapi_snapshot;
-
 /* ---- probe.c: the islands under test ---- */
 
 typedef struct hapi_test_set {
@@ -820,17 +791,6 @@ void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE
 void hapi_slots_renew(hapi_body_slot *slot);   /* and forgets what it summed up, too */
 void hapi_slots_reset(hapi_physics *physics);
 
-/* snapshot.c */
-hap_status hapi_snapshot_reserve(hapi_snapshot *snapshot, uint32_t bodies, uint32_t feedbacks);
-void hapi_snapshot_finish(hapi_snapshot *snapshot);
-void hapi_snapshot_clear(hapi_snapshot *snapshot);
-void hapi_snapshot_add_body(hapi_snapshot *snapshot, dBodyID body, void (*moved_callback)(dBodyID));
-void hapi_snapshot_add_feedback(hapi_snapshot *snapshot, dJointFeedback *feedback);
-/* Poses, velocities, accumulators and seed, to begin the next probe from. */
-void hapi_snapshot_rewind(const hapi_snapshot *snapshot);
-/* Rewinds, and restores flags and feedback as well. */
-void hapi_snapshot_restore(const hapi_snapshot *snapshot);
-
 /* space_order.c */
 hap_status hapi_space_order_save(hapi_physics *physics); /* when a member sleeps */
 void hapi_space_order_restore(hapi_physics *physics);
@@ -862,17 +822,6 @@ void hapi_test_finish(hapi_test_set *test);
 
 /* accelerance.c: eq. 3-6 */
 void hapi_accelerance_measure(hapi_physics *physics);
-
-/* lookback.c: nothing where it is not asked for */
-void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
-void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
-void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
-                       const dSurfaceParameters *surface);      /* a pair that collides */
-void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
-void hapi_lookback_reset(hapi_physics *physics);
-void hapi_lookback_finish(hapi_lookback *lookback);
-/* lookback_step.c: goes over rows until they are done or seconds have passed; negative: all. */
-hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
 
 /* cross.c: cross accelerance, nothing where it is off */
 /* After a testing simulation with a force [N] at the contact: what the others did. */

@@ -31,41 +31,14 @@ void hapi_path_reset(hapi_path *path)
   atomic_store(&path->read, atomic_load(&path->written));
 }
 
-static uint64_t place_of(const hapi_path *path, uint64_t row)
-{
-  return row % path->rows;
-}
-
-hapi_path_pointer *hapi_path_next(hapi_path *path)
-{
-  if (path->rows == 0) {
-    return NULL;
-  }
-  uint64_t written = atomic_load_explicit(&path->written, memory_order_relaxed);
-  uint64_t read = atomic_load_explicit(&path->read, memory_order_acquire);
-  if (written - read >= path->rows) {
-    uint64_t dropped = atomic_load_explicit(&path->dropped, memory_order_relaxed);
-    atomic_store_explicit(&path->dropped, dropped + 1, memory_order_release);
-    return NULL;
-  }
-  return path->places + place_of(path, written) * path->pointers;
-}
-
-void hapi_path_send(hapi_path *path, int64_t time_ns)
-{
-  uint64_t written = atomic_load_explicit(&path->written, memory_order_relaxed);
-  path->times_ns[place_of(path, written)] = time_ns;
-  atomic_store_explicit(&path->written, written + 1, memory_order_release);
-}
-
 bool hapi_path_look(const hapi_path *path, int64_t *time_ns, const hapi_path_pointer **pointers)
 {
   uint64_t read = atomic_load_explicit(&path->read, memory_order_relaxed);
   if (path->rows == 0 || read == atomic_load_explicit(&path->written, memory_order_acquire)) {
     return false;
   }
-  *time_ns = path->times_ns[place_of(path, read)];
-  *pointers = path->places + place_of(path, read) * path->pointers;
+  *time_ns = path->times_ns[(read % path->rows)];
+  *pointers = path->places + (read % path->rows) * path->pointers;
   return true;
 }
 

@@ -9,6 +9,7 @@
 
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <hapode/spatial.h>
@@ -44,8 +45,27 @@ void hapi_path_reset(hapi_path *path);
 
 /* [haptic] Pointers of the next row, to be filled in, then sent; NULL: nothing is kept, or there is no
  * room. */
-hapi_path_pointer *hapi_path_next(hapi_path *path);
-void hapi_path_send(hapi_path *path, int64_t time_ns);
+static inline hapi_path_pointer *hapi_path_next(hapi_path *path)
+{
+  if (path->rows == 0) {
+    return NULL;
+  }
+  uint64_t written = atomic_load_explicit(&path->written, memory_order_relaxed);
+  uint64_t read = atomic_load_explicit(&path->read, memory_order_acquire);
+  if (written - read >= path->rows) {
+    uint64_t dropped = atomic_load_explicit(&path->dropped, memory_order_relaxed);
+    atomic_store_explicit(&path->dropped, dropped + 1, memory_order_release);
+    return NULL;
+  }
+  return path->places + (written % path->rows) * path->pointers;
+}
+
+static inline void hapi_path_send(hapi_path *path, int64_t time_ns)
+{
+  uint64_t written = atomic_load_explicit(&path->written, memory_order_relaxed);
+  path->times_ns[(written % path->rows)] = time_ns;
+  atomic_store_explicit(&path->written, written + 1, memory_order_release);
+}
 
 /* [physics] The oldest row not yet taken; false: there is none. It stays until it is let go. */
 bool hapi_path_look(const hapi_path *path, int64_t *time_ns, const hapi_path_pointer **pointers);

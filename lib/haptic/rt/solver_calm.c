@@ -99,6 +99,7 @@ static bool measure(hapi_solver *solver, rays *r)
       without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
       double a = row->impulse * without;
       double b = a - row->impulse * hapi_row_error(solver, row);
+      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign): cleared above, for every island */
       of->a += a;
       of->b += b;
       of->size += fabs(a) + fabs(b);
