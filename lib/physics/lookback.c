@@ -148,17 +148,6 @@ static int64_t first_row(const hapi_physics *physics, int64_t now_ns)
                                              : physics->state->now_ns + ticks_ns(physics, 0.5);
 }
 
-static void keep_states(hapi_physics *physics)
-{
-  hapi_lookback *w = &physics->lookback;
-  hapi_snapshot states = {.bodies = w->states, .body_capacity = w->state_capacity};
-  hapi_snapshot_clear(&states);
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    hapi_snapshot_add_body(&states, physics->table.entries[w->bodies[i].known].body, NULL);
-  }
-  w->seed = states.seed;
-}
-
 /* A body of the loop is where the loop has it, any other where the world's step has left it. */
 static void note_times(hapi_physics *physics, int64_t now_ns)
 {
@@ -191,7 +180,7 @@ void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
       !add_near(physics) || !add_jointed(physics) ||
       !hapi_reserve((void **)&w->states, &w->state_capacity, 0, w->body_count, sizeof *w->states);
   if (!w->spoilt) {
-    keep_states(physics);
+    hapi_lookback_keep(physics);
     note_times(physics, now_ns);
   }
   w->phase = HAPI_LOOKBACK_OPEN;

@@ -95,7 +95,9 @@ void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
 void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
 void hapi_lookback_reset(hapi_physics *physics);
 void hapi_lookback_finish(hapi_lookback *w);
-/* lookback_step.c: goes over rows until they are done or seconds have passed; negative: all. */
+/* lookback_step.c */
+void hapi_lookback_keep(hapi_physics *physics); /* the states that its bodies have now */
+/* Goes over rows until they are done or seconds have passed; negative: all. */
 hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
 
 #endif

@@ -289,7 +289,7 @@ static void even_out(hapi_physics *physics)
   }
 }
 
-static void take_states(hapi_physics *physics)
+void hapi_lookback_keep(hapi_physics *physics)
 {
   hapi_lookback *w = &physics->lookback;
   hapi_snapshot states = {.bodies = w->states, .body_capacity = w->state_capacity};
@@ -318,7 +318,7 @@ static void go(hapi_physics *physics, double seconds)
     go_over(physics, w->next++);
   }
   w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  take_states(physics);
+  hapi_lookback_keep(physics);
   dJointGroupEmpty(physics->contact_group);
   hapi_world_restore(physics);
   dWorldSetQuickStepNumIterations(physics->ode.world, iterations);
