@@ -89,6 +89,7 @@ typedef struct accuracy_run_def {
   int32_t max_sweeps;
   int32_t range_hops;
   int32_t max_edge_probes;
+  double accuracy; /* of all of these that are HAP_BY_ACCURACY */
   hap_effect_wish shape;
   double lookback;
   hap_integration integration;

@@ -104,10 +104,49 @@ static bool is_the_papers(const accuracy_row *row, const series *of)
   return is_papers(row);
 }
 
-static bool is_dial(const accuracy_row *row, const series *of)
+/* A path is that of the library's model at the rate of the paper; its middle is the default there. */
+static bool is_dial(const accuracy_row *row)
 {
-  (void)of;
-  return strcmp(row->knob, ACCURACY_DIAL) == 0;
+  return accuracy_row_is(row, HAP_MODEL_CONTACT, ACCURACY_DIAL) &&
+         row->physics_hz == ACCURACY_PAPER_HZ;
+}
+
+static double dial_of(const accuracy_row *row)
+{
+  bool middle = accuracy_row_is(row, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) &&
+                row->physics_hz == ACCURACY_PAPER_HZ;
+  return middle ? HAP_ACCURACY_DEFAULT : is_dial(row) ? row->value : -1.0;
+}
+
+static const accuracy_row *next_of_dial(const accuracy_row *rows, size_t count, double after)
+{
+  const accuracy_row *next = NULL;
+  for (size_t i = 0; i < count; ++i) {
+    double at = dial_of(&rows[i]);
+    if (at > after && (next == NULL || at < dial_of(next))) {
+      next = &rows[i];
+    }
+  }
+  return next;
+}
+
+static bool has_dial(const accuracy_row *rows, size_t count)
+{
+  bool has = false;
+  for (size_t i = 0; i < count; ++i) {
+    has = has || is_dial(&rows[i]);
+  }
+  return has;
+}
+
+static void put_dial(FILE *script, const accuracy_row *rows, size_t count)
+{
+  fprintf(script, "$dial0 << EOD\n");
+  for (const accuracy_row *row = has_dial(rows, count) ? next_of_dial(rows, count, -1.0) : NULL;
+       row != NULL; row = next_of_dial(rows, count, dial_of(row))) {
+    put_point(script, row);
+  }
+  fprintf(script, "EOD\n");
 }
 
 /* The front by rising time; *out_next is used up. */
@@ -146,7 +185,7 @@ static void put_data(FILE *script, const accuracy_row *rows, size_t count)
   }
   put_block(script, "ours", 0, is_marked, rows, count);
   put_block(script, "paper", 0, is_the_papers, rows, count);
-  put_block(script, "dial", 0, is_dial, rows, count);
+  put_dial(script, rows, count);
   put_front(script, rows, count);
   for (size_t i = 0; i < count; ++i) {
     noise_floor = is_our_default(&rows[i]) ? rows[i].noise_floor : noise_floor;
@@ -196,18 +235,11 @@ static void plot_key(FILE *script, bool dial)
       ", 1e9 with points pt 3 ps 1.5 lw 1.8 lc rgb 'black' title 'the paper''s choice (20 Hz)'"
       ", 1e9 with points pt 6 ps 1.7 lw 1.8 lc rgb 'black' title 'the default (60 Hz)'");
   if (dial) {
-    fprintf(script, ", 1e9 with linespoints lc rgb '#000080' lw 2.5 pt 13 ps 0.9 title 'the dial'");
+    fprintf(script,
+            ", 1e9 with linespoints lc rgb '#000080' lw 2.5 pt 13 ps 0.9 title 'the dial of "
+            "contact, 0 to 1, at 20 Hz'");
   }
   fputc('\n', script);
-}
-
-static bool has_dial(const accuracy_row *rows, size_t count)
-{
-  bool has = false;
-  for (size_t i = 0; i < count; ++i) {
-    has = has || is_dial(&rows[i], NULL);
-  }
-  return has;
 }
 
 static void set_axes(FILE *script)

@@ -48,6 +48,9 @@ static const double hops[] = {0.0, 2.0, 1.0, 4.0, 8.0};
 static const double edge_probes[] = {0.0, 16.0, 64.0};
 static const double haptic_rates[] = {500.0, 2000.0, 5000.0, 10000.0};
 
+static const double positions[] = {0.0, 0.2, 0.4, 0.8, 1.0, 0.1, 0.3, 0.6, 0.7, 0.9};
+
+static const values dial = VALUES(positions, 5);
 static const values all_speeds = VALUES(speeds, 2);
 
 static const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE};
@@ -238,6 +241,16 @@ static void add_plane_and_integrations(writer *w)
   }
 }
 
+/* Its middle is the default. */
+static void add_dial(writer *w, hap_model model)
+{
+  for (size_t i = 0; i < (w->plan->quick ? dial.quick : dial.count); ++i) {
+    accuracy_point p = point_of(w, model, ACCURACY_DIAL, dial.all[i]);
+    p.def.accuracy = dial.all[i];
+    add(w, &p);
+  }
+}
+
 static void add_ages(writer *w, hap_model model)
 {
   int step = (int)(ACCURACY_HAPTIC_HZ / w->group->physics_hz);
@@ -326,6 +339,10 @@ static void add_knobs(writer *w)
     }
   }
   add_plane_and_integrations(w);
+  add_dial(w, HAP_MODEL_CONTACT);
+  if (!w->plan->quick) {
+    add_dial(w, HAP_MODEL_ACCELERANCE);
+  }
   for (size_t m = 0; m < COUNT(models); ++m) {
     add_ages(w, models[m]);
   }

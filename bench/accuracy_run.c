@@ -28,6 +28,7 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->max_sweeps = library.max_sweeps;
   def->range_hops = library.range_hops;
   def->max_edge_probes = library.max_edge_probes;
+  def->accuracy = library.accuracy;
   def->shape = (hap_effect_wish)library.effects[HAP_EFFECT_SHAPE];
   def->integration = HAP_INTEGRATION_AUTO;
 }
@@ -74,6 +75,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.def.max_sweeps = def->max_sweeps;
   options.def.range_hops = def->range_hops;
   options.def.max_edge_probes = def->max_edge_probes;
+  options.def.accuracy = def->accuracy;
   options.def.effects[HAP_EFFECT_SHAPE] = (uint8_t)def->shape;
   options.integration = def->integration;
   options.coupling = def->coupling;

@@ -481,7 +481,7 @@ TEST(b_and_the_forces_make_the_base_again)
   double wanted = 3.0 / 1.5;
   REQUIRE(open_row(&w, HAP_EFFECT_ON));
   hapi_physics *physics = world_physics(&w);
-  physics->config.probe = HAP_PROBE_OPERATING;
+  physics->dial.settings.probe = HAP_PROBE_OPERATING;
   hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
   REQUIRE(contact != NULL && block(&w, w.bodies[0], w.bodies[1]) != NULL);
   hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);

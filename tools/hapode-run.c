@@ -184,6 +184,10 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
     hap_effect_info effects[HAP_EFFECTS];
     (void)hap_session_effects(loop->rig->session, effects, HAP_EFFECTS, sizeof effects[0]);
     run_summary_print(loop->options, &stats, effects, stdout);
+    hap_accuracy_info accuracy;
+    if (hap_session_accuracy(loop->rig->session, &accuracy, sizeof accuracy) >= HAP_OK) {
+      run_summary_accuracy(&accuracy, stdout);
+    }
     if (recording->player == NULL) {
       run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
     }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define LATENCY_TICKS_MAX 20000.0
+#define LOOKBACK_SHARE 0.1 /* for --force-error */
 
 typedef struct option option;
 
@@ -289,6 +290,17 @@ static const option table[] = {
      "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
      "model single has them: the error of the felt force, as force_error",
      take_number, offsetof(run_options, rig.def.lookback), 0, 0.5},
+    {"--accuracy", "A", "0 to 1 (default 0.5): the dial of all settings that are not given",
+     take_number, offsetof(run_options, rig.def.accuracy), 0, 1},
+    {"--force-error", "SHARE",
+     "of the force, 0.001 to 1: the dial goes to the least accuracy with which looking back\n"
+     "tells no more (--lookback 0.1 where that is not given)",
+     take_number, offsetof(run_options, rig.def.force_error_wanted), 0.001, 1},
+    {"--tick-share", "SHARE",
+     "of a tick's period, 0.01 to 1: the dial of the tick is turned back to fit into it",
+     take_number, offsetof(run_options, rig.def.tick_share), 0.01, 1},
+    {"--physics-share", "SHARE", "of a period of physics, likewise", take_number,
+     offsetof(run_options, rig.def.physics_share), 0.01, 1},
     {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
      offsetof(run_options, rig.max_force), 1e-6, 1e6},
     {"--stiffness", "F", "of the pointers' contacts, N/m (default: the scene's)", take_number,
@@ -508,6 +520,9 @@ static hap_status check(run_options *o, hap_detail *detail)
                   o->model_age_s, LATENCY_TICKS_MAX, LATENCY_TICKS_MAX / def->haptic_hz);
     }
     def->physics_latency_ticks = (int32_t)ticks;
+  }
+  if (def->force_error_wanted > 0.0 && def->lookback == 0.0) {
+    def->lookback = LOOKBACK_SHARE;
   }
   if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
     return fail(detail, "--plot: the same file as --trace");

@@ -109,3 +109,19 @@ void run_summary_print(const run_options *options, const hap_stats *stats,
     count(out, "lookbacks_spoilt", stats->lookbacks_spoilt);
   }
 }
+
+static void print_side(const char *name, const hap_accuracy_side *side, FILE *out)
+{
+  fprintf(out, "accuracy_%s: %g (%s)\n", name, side->accuracy,
+          hap_accuracy_reason_text((hap_accuracy_reason)side->reason));
+  if (side->share > 0.0) {
+    fprintf(out, "load_%s: %g of %g, turned %" PRIu64 " times\n", name, side->load, side->share,
+            side->turns);
+  }
+}
+
+void run_summary_accuracy(const hap_accuracy_info *info, FILE *out)
+{
+  print_side("tick", &info->tick, out);
+  print_side("physics", &info->physics, out);
+}

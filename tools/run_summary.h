@@ -11,6 +11,9 @@
 void run_summary_print(const run_options *options, const hap_stats *stats,
                        const hap_effect_info effects[HAP_EFFECTS], FILE *out);
 
+/* Where the dials stand, and why; what of their budgets is used. */
+void run_summary_accuracy(const hap_accuracy_info *info, FILE *out);
+
 /* The devices' specs, several joined by " + ". */
 void run_summary_devices(const rig_options *options, char *out, size_t size);
 

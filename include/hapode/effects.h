@@ -77,8 +77,9 @@ typedef enum hap_effect_reason {
   HAP_REASON_COUPLING = 22,       /* the pointer's coupling says it */
   HAP_REASON_MEASURING = 23,      /* HAP_GUARD_MEASURE */
   HAP_REASON_NOT_RECORDED = 24,   /* hap_session_record was not called */
-  HAP_REASON_OUTSIDE = 25,   /* it cannot be simulated by the loop, or there is no room for it */
-  HAP_REASON_NOT_PAPERS = 26 /* model ACCELERANCE is the paper's; what is not must be asked for */
+  HAP_REASON_OUTSIDE = 25,    /* it cannot be simulated by the loop, or there is no room for it */
+  HAP_REASON_NOT_PAPERS = 26, /* model ACCELERANCE is the paper's; what is not must be asked for */
+  HAP_REASON_ACCURACY = 27    /* the accuracy asked for or affordable is too low (accuracy.h) */
 } hap_effect_reason;
 
 /* What an effect is doing. Times are wall-clock, also in lockstep. */

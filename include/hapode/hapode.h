@@ -6,6 +6,7 @@
 /* Everything but the parts with ODE types (hapode/ode.h) and the part for people who write a
  * device (hapode/device_impl.h). */
 
+#include <hapode/accuracy.h>
 #include <hapode/attributes.h>
 #include <hapode/device.h>
 #include <hapode/effects.h>

@@ -43,10 +43,11 @@ typedef enum hap_impulse_pose {
 
 /* How model ACCELERANCE tests. */
 typedef enum hap_probe {
-  HAP_PROBE_SHARED = 0,   /* one zero probe for all neighbours: 1 + 3N steps */
-  HAP_PROBE_PAPER = 1,    /* four steps for each neighbour: 4N steps */
-  HAP_PROBE_OPERATING = 2 /* as SHARED, about the operating point: every testing simulation has the
-                             forces that the pointers give, and is perturbed by 1 % of the weight */
+  HAP_PROBE_SHARED = 0,    /* one zero probe for all neighbours: 1 + 3N steps */
+  HAP_PROBE_PAPER = 1,     /* four steps for each neighbour: 4N steps */
+  HAP_PROBE_OPERATING = 2, /* as SHARED, about the operating point: every testing simulation has the
+                              forces that the pointers give, and is perturbed by 1 % of the weight */
+  HAP_PROBE_BY_ACCURACY = 3 /* SHARED or OPERATING, as hap_session_def.accuracy says */
 } hap_probe;
 
 /* Whether the guard shapes the force. Its checks, faults and limits always hold. */
@@ -56,6 +57,9 @@ typedef enum hap_guard {
                            model, no energy observer, no slew limit. A fault takes the force away
                            in one tick. Not for a device that a person holds. */
 } hap_guard;
+
+/* For single settings of hap_session_def: as its accuracy says. */
+#define HAP_BY_ACCURACY (-2)
 
 /* For hap_session_def.range_hops: as far as max_bodies goes. */
 #define HAP_RANGE_ALL (-1)
@@ -72,8 +76,8 @@ typedef struct hap_session_def {
   hap_drive drive;      /* default HAP_DRIVE_THREADS */
   hap_model model;      /* default HAP_MODEL_CONTACT */
   double physics_hz;    /* Hz, 1..1000 and at most haptic_hz, default 60; unused by model SINGLE */
-  double contact_hz;    /* Hz, 20..1000, default 200: how often model CONTACT finds the contacts
-                           between bodies anew */
+  double contact_hz;    /* Hz, 20..1000: how often model CONTACT finds the contacts between bodies
+                           anew. HAP_BY_ACCURACY (default): 200 at HAP_ACCURACY_DEFAULT */
   double haptic_hz;     /* Hz, 100..20000, default 1000 */
   int32_t max_bodies;   /* bodies that the loop moves itself, 1..1024, default 64; it knows as many
                            again of those around them */
@@ -89,12 +93,13 @@ typedef struct hap_session_def {
                                     always has 0. */
   int32_t trace_rows; /* rows kept for hap_session_trace_read, 0..1048576, default 0: none */
   hap_impulse_pose impulse_pose; /* default HAP_IMPULSE_INTERPOLATED */
-  hap_probe probe;               /* model ACCELERANCE, default HAP_PROBE_SHARED */
+  hap_probe probe;               /* model ACCELERANCE, default HAP_PROBE_BY_ACCURACY: SHARED at
+                                    HAP_ACCURACY_DEFAULT */
   uint32_t flags;                /* no bit is defined; an unknown bit is an error */
   int32_t max_edge_probes; /* model CONTACT: bodies at the border of the range that are probed at a
-                              physics step (7 steps of their island, of at most 64 bodies), 0..1024,
-                              default 4; the others answer with their own mass alone until the next
-                              step */
+                              physics step (7 steps of their island, of at most 64 bodies), 0..1024;
+                              the others answer with their own mass alone until the next step.
+                              HAP_BY_ACCURACY (default): 4 at HAP_ACCURACY_DEFAULT */
   int32_t max_hull_points; /* of all convex geoms near the pointers, and 3 for each triangle of a
                               mesh there, 0..1048576, default 4096 */
   hap_guard guard;         /* default HAP_GUARD_ON */
@@ -107,7 +112,8 @@ typedef struct hap_session_def {
       range_hops; /* model CONTACT: how far the range goes from the neighbours, in contacts, 0..1024:
                          0 is the neighbours alone, 1 what may touch them as well. What hangs together by
                          joints counts as one. What stands beyond answers as max_edge_probes says.
-                         HAP_RANGE_ALL (default): as far as max_bodies goes */
+                         HAP_RANGE_ALL: as far as max_bodies goes. HAP_BY_ACCURACY (default): that at
+                         HAP_ACCURACY_DEFAULT */
   double
       lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
                       are gone over as model SINGLE would have had them, for hap_stats.force_error; in
@@ -116,6 +122,22 @@ typedef struct hap_session_def {
       effects[HAP_EFFECT_PLACES]; /* hap_effect_wish by hap_effect (hapode/effects.h), default all
                                          HAP_EFFECT_AUTO; places beyond HAP_EFFECTS are 0. A wish that
                                          the model cannot fulfil is an error */
+  double accuracy; /* 0..1, default HAP_ACCURACY_DEFAULT (hapode/accuracy.h): what the settings
+                      that are HAP_BY_ACCURACY come to. In steps of 0.01 */
+  double
+      force_error_wanted; /* 0.001..1, of the force: the dial goes to the least accuracy with which
+                                looking back tells no more. 0 (default): it stays at accuracy. Needs
+                                lookback above 0 */
+  double
+      tick_share; /* 0.01..1, share of the haptic period that a tick may take: the dial of the tick
+                           is turned back as far as it takes. 0 (default): no budget. Not in drive
+                           LOCKSTEP */
+  double physics_share; /* 0.01..1, the same of a cycle of physics and its period */
+  int32_t
+      iterations;    /* of QuickStep in all steps of physics, 1..10000. 0: as many as the world has.
+                           HAP_BY_ACCURACY (default): these at HAP_ACCURACY_DEFAULT, else in
+                           proportion */
+  uint32_t reserved; /* 0 */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

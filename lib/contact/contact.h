@@ -20,7 +20,6 @@ typedef struct hapi_contact hapi_contact;
 
 typedef struct hapi_contact_config {
   hapi_capacity capacity;
-  double contact_hz;
   double haptic_hz;
   int rt_priority;
   hapi_exchange *exchange;
@@ -45,6 +44,9 @@ bool hapi_contact_has_news(hapi_contact *contact);
 /* [contact] One pass; the loop uses its contacts from valid_from_ns on. Nothing happens before the
  * first local model of model CONTACT. */
 void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns);
+
+/* [contact] Seconds from one pass to the next one, as physics asks for. */
+double hapi_contact_period(const hapi_contact *contact);
 
 /* [contact] Whether there is anything to find in what it has taken. */
 bool hapi_contact_has_work(const hapi_contact *contact);

@@ -98,7 +98,7 @@ double hapi_pass_extent(const hapi_placed_geom *geom)
 
 double hapi_pass_margin(const hapi_contact *contact, double speed)
 {
-  double seconds = 1.0 / contact->config.contact_hz + AGE_TICKS / contact->config.haptic_hz;
+  double seconds = hapi_contact_period(contact) + AGE_TICKS / contact->config.haptic_hz;
   return MARGIN_FLOOR + MARGIN_SPEED * speed * seconds + 0.5 * MARGIN_GRAVITY * seconds * seconds;
 }
 

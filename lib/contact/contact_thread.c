@@ -9,6 +9,8 @@
 
 /* Life of the contact thread, and its pace. */
 
+#define CONTACT_HZ 200.0 /* until the first message says more */
+
 hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact **out)
 {
   *out = NULL;
@@ -54,17 +56,22 @@ void hapi_contact_begin(hapi_contact *contact, int64_t start_ns)
   hapi_histogram_reset(&contact->pass_ns);
 }
 
+double hapi_contact_period(const hapi_contact *contact)
+{
+  return 1.0 / (contact->near != NULL ? contact->near->contact_hz : CONTACT_HZ);
+}
+
 /* Between two passes the thread looks once a millisecond whether there is a body that waits for its
  * first contacts. Where nothing can touch anything it sleeps until physics says otherwise. */
 static void *contact_main(void *arg)
 {
   const int64_t look_ns = 1000000;
   hapi_contact *contact = arg;
-  int64_t period = (int64_t)llround(1e9 / contact->config.contact_hz);
-  int64_t pause = period < look_ns ? period : look_ns;
   int64_t due = contact->start_ns;
   while (atomic_load_explicit(&contact->stop, memory_order_acquire) == 0) {
     int64_t now = hapi_clock_now();
+    int64_t period = (int64_t)llround(1e9 * hapi_contact_period(contact));
+    int64_t pause = period < look_ns ? period : look_ns;
     if (now >= due || hapi_contact_has_news(contact)) {
       hapi_contact_pass(contact, 0); /* due at once */
       due =

@@ -25,7 +25,6 @@ typedef struct hapi_haptic_config {
   bool lockstep;
   int rt_priority;
   uint32_t trace_rows;
-  uint32_t max_sweeps; /* model CONTACT; 0: as many as it takes */
   hap_guard guard;
   hapi_exchange *exchange;
 } hapi_haptic_config;

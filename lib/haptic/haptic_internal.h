@@ -124,6 +124,8 @@ struct hapi_haptic {
   bool begun;
   int64_t start_ns;
   double last_tick_us;
+  int64_t tick_budget_ns; /* of the model in use */
+  hapi_tick_load load;
 
   hapi_tape *tape;            /* of a recording or a replay; NULL: none */
   hapi_cell *note;            /* recording: first cell of the packet */

@@ -54,7 +54,6 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
   }
   haptic->tick.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
-  haptic->tick.world.solver.max_sweeps = config->max_sweeps;
   haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
   *out = haptic;
@@ -117,6 +116,14 @@ static void reset_figures(hapi_haptic *haptic)
   atomic_store(&haptic->outside_fault, HAP_FAULT_NONE);
 }
 
+static void report(hapi_haptic *haptic)
+{
+  hapi_state *state = hapi_exchange_state_back(haptic->config.exchange);
+  hapi_tick_report(&haptic->tick, state);
+  state->load = haptic->load;
+  hapi_exchange_state_publish(haptic->config.exchange);
+}
+
 hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *detail)
 {
   hapi_tick_reset(&haptic->tick);
@@ -132,6 +139,8 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   haptic->pending_patches = NULL;
   haptic->start_ns = start_ns;
   haptic->last_tick_us = 0.0;
+  haptic->tick_budget_ns = 0;
+  memset(&haptic->load, 0, sizeof haptic->load);
   hap_status status = hapi_pointers_start_devices(haptic, detail);
   if (status < HAP_OK) {
     return status;
@@ -144,8 +153,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_tape_begun(haptic);
   haptic->tick.now_ns = start_ns;
   hapi_coupling_read(&haptic->tick);
-  hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
-  hapi_exchange_state_publish(haptic->config.exchange);
+  report(haptic);
   return HAP_OK;
 }
 
@@ -213,6 +221,7 @@ static void receive(hapi_haptic *haptic, int64_t now_ns)
   take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
     haptic->tick.now_ns = now_ns;
+    haptic->tick_budget_ns = haptic->pending->tick_budget_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
     STORE(models_adopted, LOAD(models_adopted) + 1);
@@ -270,6 +279,15 @@ static uint64_t fault_pointer(const hapi_tick *tick)
   return ((uint64_t)tick->fault_generation << 32) | tick->fault_pointer;
 }
 
+static void note_load(hapi_haptic *haptic, int64_t spent_ns)
+{
+  if (haptic->tick_budget_ns > 0) {
+    ++haptic->load.ticks;
+    haptic->load.over += spent_ns > haptic->tick_budget_ns;
+    haptic->load.spent_ns += (double)spent_ns;
+  }
+}
+
 static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
 {
   const hapi_tick *tick = &haptic->tick;
@@ -302,6 +320,7 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   hapi_histogram_add(&haptic->figures.tick_ns, spent);
   hapi_loop_sample_end(haptic, spent);
   haptic->last_tick_us = 1e-3 * (double)spent;
+  note_load(haptic, spent);
 }
 
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
@@ -320,8 +339,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tape_ticked(haptic);
   hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
-  hapi_tick_report(&haptic->tick, hapi_exchange_state_back(haptic->config.exchange));
-  hapi_exchange_state_publish(haptic->config.exchange);
+  report(haptic);
   publish_poses(haptic);
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));

@@ -21,7 +21,8 @@ static hapi_body_slot *body_of(hapi_physics *physics, const hapi_contact_slot *c
  * the hand, where eq. 4 asks what another force than the hand's would do to a world without it. */
 static bool at_operating_point(const hapi_physics *physics)
 {
-  return physics->config.probe == HAP_PROBE_OPERATING && physics->model == HAP_MODEL_ACCELERANCE;
+  return physics->dial.settings.probe == HAP_PROBE_OPERATING &&
+         physics->model == HAP_MODEL_ACCELERANCE;
 }
 
 static void add_force(const hapi_physics *physics, const hapi_contact_slot *contact,
@@ -259,7 +260,7 @@ static void take_free(hapi_physics *physics)
 {
   bool looks = physics->model == HAP_MODEL_ACCELERANCE &&
                hapi_wish(physics->wishes, HAP_EFFECT_TESTING) == HAP_EFFECT_AUTO &&
-               physics->config.probe != HAP_PROBE_PAPER;
+               physics->dial.settings.probe != HAP_PROBE_PAPER;
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     bool live = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
@@ -360,11 +361,11 @@ static uint32_t plan_rounds(hapi_physics *physics)
     hapi_contact_slot *contact = &physics->contacts[test->contacts[i]];
     uint32_t known = body_of(physics, contact)->known;
     uint32_t *count = &test->rounds[physics->table.entries[known].island];
-    contact->round = physics->config.probe == HAP_PROBE_PAPER ? i : *count;
+    contact->round = physics->dial.settings.probe == HAP_PROBE_PAPER ? i : *count;
     ++*count;
     most = *count > most ? *count : most;
   }
-  return physics->config.probe == HAP_PROBE_PAPER ? test->contact_count : most;
+  return physics->dial.settings.probe == HAP_PROBE_PAPER ? test->contact_count : most;
 }
 
 void hapi_accelerance_measure(hapi_physics *physics)
@@ -387,7 +388,7 @@ void hapi_accelerance_measure(hapi_physics *physics)
   }
   uint32_t rounds = plan_rounds(physics);
   for (uint32_t round = 0; round < rounds; ++round) {
-    if (round == 0 || physics->config.probe == HAP_PROBE_PAPER) {
+    if (round == 0 || physics->dial.settings.probe == HAP_PROBE_PAPER) {
       measure_b(physics);
     }
     measure_round(physics, round);

@@ -71,6 +71,13 @@ static void fill_momentum(const hapi_physics *physics, hap_stats *out)
       meaningful ? hapi_v3_dot(f->world_impulse, f->hand_impulse) / net2 : (double)NAN;
 }
 
+void hapi_physics_accuracy(hapi_physics *physics, hap_accuracy_info *out)
+{
+  pthread_mutex_lock(&physics->shown_lock);
+  *out = physics->shown.accuracy;
+  pthread_mutex_unlock(&physics->shown_lock);
+}
+
 uint64_t hapi_physics_bodies_lost(hapi_physics *physics)
 {
   pthread_mutex_lock(&physics->shown_lock);

@@ -92,6 +92,7 @@ static void sync_in(hapi_physics *physics)
 {
   hapi_edits_run(physics);
   follow_model(physics);
+  hapi_dial_follow(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   call_step(physics, physics->ode.before_step);
   if (hapi_bodies_scan(physics) < HAP_OK) {
@@ -125,7 +126,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
                      physics->config.lockstep ? now_ns : hapi_clock_now());
 }
 
-static void note_times(hapi_physics *physics, const double seconds[5])
+static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)
 {
   hapi_physics_counts *f = &physics->figures;
   hap_stats *s = &f->stats;
@@ -143,6 +144,7 @@ static void note_times(hapi_physics *physics, const double seconds[5])
   s->last_step_ms = 1e3 * seconds[3];
   s->last_publish_ms = 1e3 * seconds[4];
   hapi_histogram_add(&physics->cycle_ns, (int64_t)(1e9 * total));
+  hapi_dial_note(physics, total, looked_s);
   hapi_counts_show(physics);
 }
 
@@ -157,9 +159,10 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   if (!world_is_sound(physics)) {
     return;
   }
+  hapi_dial_enter(physics);
   seconds[4] = lap(&watch);
   hapi_lookback_follow(physics, now_ns);
-  seconds[2] = lap(&watch);
+  double looked_s = seconds[2] = lap(&watch);
   if (physics->model == HAP_MODEL_IMPULSE) {
     hapi_lookback_open(physics, now_ns);
   }
@@ -186,8 +189,9 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   if (physics->model != HAP_MODEL_IMPULSE) {
     hapi_lookback_open(physics, now_ns);
   }
+  hapi_dial_leave(physics);
   seconds[4] += lap(&watch);
-  note_times(physics, seconds);
+  note_times(physics, seconds, looked_s);
   call_step(physics, physics->ode.after_step);
 }
 

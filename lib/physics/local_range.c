@@ -676,7 +676,7 @@ static void own_mechanism(hapi_physics *physics)
 
 static bool within_hops(const hapi_physics *physics, const hapi_known_body *known)
 {
-  int32_t most = physics->config.range_hops;
+  int32_t most = physics->dial.settings.range_hops;
   return most == HAP_RANGE_ALL || known->rest->hops <= most;
 }
 
@@ -743,6 +743,7 @@ static void begin_walk(hapi_physics *physics)
   range->number = physics->model_number + 1;
   range->count = range->owned = range->seeds = range->bounces = 0;
   range->near->between = !hapi_wish_is_off(physics->wishes, HAP_EFFECT_PASSES);
+  range->near->contact_hz = physics->dial.settings.contact_hz;
   range->near->always = hapi_wish_is_on(physics->wishes, HAP_EFFECT_PASSES);
   range->pairs_noted = 0;
   range->hops = 0;

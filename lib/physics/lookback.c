@@ -336,13 +336,17 @@ static void end(hapi_physics *physics)
     w->right2_sum = keep * w->right2_sum + w->right2;
     s->force_error = w->right2_sum > 0.0 ? sqrt(w->wrong2_sum / w->right2_sum) : HUGE_VAL;
     s->force_error_n = sqrt(w->wrong2 / w->touched);
+    hapi_dial_note_error(physics, w->right2 > 0.0 ? sqrt(w->wrong2 / w->right2) : HUGE_VAL,
+                         w->seconds);
   }
 }
 
 static double budget(const hapi_physics *physics)
 {
-  return physics->config.lockstep ? -1.0
-                                  : physics->config.lookback_share / physics->config.physics_hz;
+  return physics->config.lockstep
+             ? -1.0
+             : fmin(physics->config.lookback_share / physics->config.physics_hz,
+                    hapi_dial_spare(physics));
 }
 
 /* A world in which one step takes all of the time that there is: the figure would be long out of date, and

@@ -176,8 +176,12 @@ static void place_shape(const hapi_physics *physics, dGeomID geom, hapi_contact_
   slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
                        : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
                                                               : HAP_REASON_CALLED;
+  if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
+      !physics->dial.settings.shapes) {
+    slot->shape_reason = HAP_REASON_ACCURACY;
+  }
   if (wish == HAP_EFFECT_OFF ||
-      (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_FLAT)) {
+      (wish == HAP_EFFECT_AUTO && slot->shape_reason != HAP_REASON_CALLED)) {
     slot->has_shape = false;
   }
   slot->shape_pose = world;

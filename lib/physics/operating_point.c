@@ -36,7 +36,7 @@ static double exchanged_norm(const hapi_body_slot *slot)
 /* Those that took most of the loop's impulse first. */
 static void choose(hapi_physics *physics)
 {
-  for (uint32_t n = 0; n < physics->config.max_edge_probes; ++n) {
+  for (uint32_t n = 0; n < physics->dial.settings.edge_probes; ++n) {
     hapi_body_slot *best = NULL;
     for (uint32_t i = 0; i < physics->body_high; ++i) {
       hapi_body_slot *slot = &physics->bodies[i];

@@ -86,6 +86,11 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->latency_s = -1.0;
   atomic_init(&physics->wanted_model, (int)config->model);
   atomic_init(&physics->wanted_effects, config->effects);
+  physics->dial.knobs = config->knobs;
+  atomic_init(&physics->dial.wanted, config->accuracy);
+  atomic_init(&physics->dial.force_error, config->force_error_wanted);
+  atomic_init(&physics->dial.share[HAPI_DIAL_TICK], config->tick_share);
+  atomic_init(&physics->dial.share[HAPI_DIAL_PHYSICS], config->physics_share);
   if (!init_locks(physics) || !allocate(physics)) {
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
@@ -173,6 +178,7 @@ double hapi_period_of(const hapi_physics *physics, hap_model model)
 
 static void build_first_model(hapi_physics *physics)
 {
+  hapi_dial_enter(physics);
   hapi_reconcile_take(physics);
   hapi_world_collide(physics);
   hapi_neighbors_collect(physics);
@@ -180,6 +186,7 @@ static void build_first_model(hapi_physics *physics)
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
   hapi_range_error_measure(physics);
+  hapi_dial_leave(physics);
 }
 
 static void prepare(hapi_physics *physics)
@@ -187,6 +194,7 @@ static void prepare(hapi_physics *physics)
   reset_figures(physics);
   hapi_range_reset(physics);
   hapi_lookback_reset(physics);
+  hapi_dial_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
   physics->wishes = atomic_load(&physics->wanted_effects);
@@ -303,6 +311,22 @@ void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effec
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics)
 {
   return atomic_load(&physics->wanted_effects);
+}
+
+void hapi_physics_set_accuracy(hapi_physics *physics, double accuracy)
+{
+  atomic_store(&physics->dial.wanted, accuracy);
+}
+
+void hapi_physics_set_force_error(hapi_physics *physics, double wanted)
+{
+  atomic_store(&physics->dial.force_error, wanted);
+}
+
+void hapi_physics_set_budget(hapi_physics *physics, double tick_share, double physics_share)
+{
+  atomic_store(&physics->dial.share[HAPI_DIAL_TICK], tick_share);
+  atomic_store(&physics->dial.share[HAPI_DIAL_PHYSICS], physics_share);
 }
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)

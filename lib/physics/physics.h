@@ -9,10 +9,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/accuracy.h>
 #include <hapode/effects.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
+#include "physics/dial_settings.h"
 #include "record/tape.h"
 #include "sync/exchange.h"
 
@@ -23,12 +25,14 @@ typedef struct hapi_physics hapi_physics;
 
 typedef struct hapi_physics_config {
   hapi_capacity capacity;
-  uint32_t max_bodies;      /* that the loop may move itself; capacity.bodies is more */
-  uint32_t max_edge_probes; /* model CONTACT: bodies at the border of the range, a cycle */
-  int32_t range_hops;       /* of hap_session_def */
+  uint32_t max_bodies; /* that the loop may move itself; capacity.bodies is more */
   hap_model model;
   hap_impulse_pose impulse_pose;
-  hap_probe probe;
+  hapi_knobs knobs;
+  double accuracy; /* as in hap_session_def, also the next three */
+  double force_error_wanted;
+  double tick_share;
+  double physics_share;
   uint32_t effects; /* wishes at the start, base/wishes.h */
   double physics_hz;
   double haptic_hz;
@@ -106,7 +110,12 @@ void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effec
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics); /* [any] as in base/wishes.h */
 /* [any] Its part of HAP_EFFECTS places. */
 void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out);
-hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns); /* negative: for ever */
+/* [any] From the next cycle on; as in hap_session_def. */
+void hapi_physics_set_accuracy(hapi_physics *physics, double accuracy);
+void hapi_physics_set_force_error(hapi_physics *physics, double wanted);
+void hapi_physics_set_budget(hapi_physics *physics, double tick_share, double physics_share);
+void hapi_physics_accuracy(hapi_physics *physics, hap_accuracy_info *out); /* [any] */
+hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns);   /* negative: for ever */
 bool hapi_physics_lock_is_mine(hapi_physics *physics);
 hap_status hapi_physics_unlock(hapi_physics *physics);
 hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg); /* [any] */

@@ -18,6 +18,7 @@
 #include "base/thread.h"
 #include "base/wishes.h"
 #include "physics/admittance.h"
+#include "physics/dial.h"
 #include "physics/islands.h"
 #include "physics/joint_probe.h"
 #include "physics/lookback.h"
@@ -507,6 +508,7 @@ typedef struct hapi_physics_counts {
   double foretold2;    /* m^2/s^2, sum over what testing simulations foretold of owned bodies ... */
   double range_error2; /* ... and over what the loop made different from it */
   hapi_effect_figures effects[HAP_EFFECTS];
+  hap_accuracy_info accuracy;
   uint64_t cycles;
   double world_impulse[3]; /* given to the world: predictions and overwrites */
   double hand_impulse[3];  /* given to the bodies, as the loop reported */
@@ -557,6 +559,7 @@ struct hapi_physics {
   hapi_snapshot snapshot;
   hapi_test_set test;
   hapi_lookback lookback;
+  hapi_dial dial;
 
   _Atomic int wanted_model;
   _Atomic uint32_t wanted_effects; /* base/wishes.h */

@@ -9,6 +9,9 @@
 /* Physics' part of a recording: what a cycle has from outside, and a hash of the local model that it
  * made of it. */
 
+#define MODEL_BITS 0xffu
+#define LOW_HALF 0xffffffffu
+
 /* Recording: the cell of a cycle until it has taken its message; NULL: none. */
 static hapi_cell *cycle_note(const hapi_physics *physics)
 {
@@ -144,8 +147,9 @@ hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
     return other_world(physics->read, &here, detail);
   }
   dRandSetSeed((unsigned long)physics->read->u[HAPI_WORLD_SEED]);
-  if (hap_model_name((hap_model)physics->read->flags) != NULL) {
-    atomic_store(&physics->wanted_model, (int)physics->read->flags);
+  hap_model model = (hap_model)(physics->read->flags & MODEL_BITS);
+  if (hap_model_name(model) != NULL) {
+    atomic_store(&physics->wanted_model, (int)model);
   }
   atomic_store(&physics->wanted_effects, physics->read->word);
   return HAP_OK;
@@ -308,7 +312,7 @@ void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     physics->read = hapi_tape_get(physics->tape, HAPI_CELL_CYCLE, 0);
     physics->read_end = hapi_tape_get(physics->tape, HAPI_CELL_CYCLED, 0);
     dRandSetSeed((unsigned long)physics->read->u[HAPI_CYCLE_SEED]);
-    physics->figures.stats.physics_missed += physics->read->u[HAPI_CYCLE_MISSED];
+    physics->figures.stats.physics_missed += physics->read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
     physics->figures.stats.frames_dropped += physics->read->u[HAPI_CYCLE_DROPPED];
   }
   physics->locks = 0;
@@ -325,9 +329,32 @@ uint32_t hapi_tape_wanted_effects(hapi_physics *physics)
   uint32_t wanted = atomic_load(&physics->wanted_effects);
   if (cycle_note(physics) != NULL) {
     uint64_t *word = &physics->note->u[HAPI_CYCLE_LOCKS];
-    *word = (*word & 0xffffffffu) | (uint64_t)wanted << 32;
+    *word = (*word & LOW_HALF) | (uint64_t)wanted << 32;
   }
   return wanted;
+}
+
+void hapi_tape_dials(hapi_physics *physics, int io_percent[2])
+{
+  for (unsigned i = 0; i < 2; ++i) {
+    unsigned shift = 32 + 8 * i;
+    if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
+      io_percent[i] = hapi_cell_dial(physics->read->u[HAPI_CYCLE_MISSED], shift);
+    } else if (cycle_note(physics) != NULL) {
+      physics->note->u[HAPI_CYCLE_MISSED] |= (uint64_t)(io_percent[i] + 1) << shift;
+    }
+  }
+}
+
+int hapi_tape_dial_at_start(hapi_physics *physics, int percent)
+{
+  if (hapi_tape_plays(physics->tape)) {
+    return hapi_cell_dial(physics->read->flags, 8);
+  }
+  if (hapi_tape_records(physics->tape)) {
+    physics->note->flags |= (uint16_t)((percent + 1) << 8);
+  }
+  return percent;
 }
 
 void hapi_tape_edits(hapi_physics *physics, uint32_t count)

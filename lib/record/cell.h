@@ -35,7 +35,8 @@ typedef enum hapi_cell_kind {
                             next one */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
   HAPI_CELL_WORLD =
-      16, /* hapi_world_word; flags: hap_model, word: effects wished for, at the start */
+      16, /* hapi_world_word; flags: hap_model, and in the high byte the position of the dials + 1;
+             word: effects wished for, at the start */
   HAPI_CELL_CYCLE = 17,  /* hapi_cycle_word; word: edits that were run; flags: hap_model wanted */
   HAPI_CELL_CYCLED = 18, /* hapi_cycled_word; flags: hap_model wanted then, of the next cycle */
   /* contact, packets of one cell */
@@ -71,9 +72,18 @@ typedef enum hapi_cycle_word {
   HAPI_CYCLE_LOCKS =
       4, /* low half: hap_session_lock since the cycle before; high half: effects wished
                             for, as in base/wishes.h */
-  HAPI_CYCLE_MISSED = 5, /* steps, likewise */
+  HAPI_CYCLE_MISSED = 5, /* low half: steps, likewise; high half: hapi_cycle_dials */
   HAPI_CYCLE_DROPPED = 6 /* drive FRAME: steps that frames had too much, likewise */
 } hapi_cycle_word;
+
+/* Positions of the dials of a cycle [percent], each + 1 in a byte; 0, of a recording without: the default. */
+#define HAPI_DIAL_OF_NONE 50
+
+static inline int hapi_cell_dial(uint64_t word, unsigned shift)
+{
+  int percent = (int)(word >> shift & 0xffu) - 1;
+  return percent < 0 || percent > 100 ? HAPI_DIAL_OF_NONE : percent;
+}
 
 typedef enum hapi_cycled_word {
   HAPI_CYCLED_MODEL = 0, /* number of the local model; 0: the world was not sound, and none came */

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include <hapode/accuracy.h>
 #include <hapode/pointer.h>
 
 #include "base/log.h"
@@ -18,16 +19,20 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.drive = HAP_DRIVE_THREADS;
   d.model = HAP_MODEL_CONTACT;
   d.physics_hz = 60.0;
-  d.contact_hz = 200.0;
+  d.contact_hz = HAP_BY_ACCURACY;
   d.haptic_hz = 1000.0;
   d.max_bodies = 64;
   d.max_contacts = 1024;
   d.max_pointers = 4;
   d.rt_priority = 80;
   d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
-  d.max_edge_probes = 4;
+  d.max_edge_probes = HAP_BY_ACCURACY;
+  d.max_sweeps = HAP_BY_ACCURACY;
+  d.iterations = HAP_BY_ACCURACY;
+  d.probe = HAP_PROBE_BY_ACCURACY;
+  d.accuracy = HAP_ACCURACY_DEFAULT;
   d.max_hull_points = 4096;
-  d.range_hops = HAP_RANGE_ALL;
+  d.range_hops = HAP_BY_ACCURACY;
   hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
@@ -74,6 +79,26 @@ static hap_status check_numbers(const number_rule *rules, size_t count, hap_deta
   return status;
 }
 
+/* HAP_BY_ACCURACY, or a number within its limits. */
+static hap_status check_knobs(const hap_session_def *def, hap_detail *detail)
+{
+  const number_rule rules[] = {
+      {def->contact_hz, 20.0, 1000.0, "contact_hz"},
+      {def->max_edge_probes, 0, 1024, "max_edge_probes"},
+      {def->max_sweeps, 0, 10000, "max_sweeps"},
+      {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
+      {def->iterations, 0, 10000, "iterations"},
+  };
+  for (size_t i = 0; i < sizeof rules / sizeof rules[0]; ++i) {
+    const number_rule *r = &rules[i];
+    if (r->value != HAP_BY_ACCURACY && !(r->value >= r->low && r->value <= r->high)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not HAP_BY_ACCURACY or in %g .. %g",
+                       r->name, r->value, r->low, r->high);
+    }
+  }
+  return HAP_OK;
+}
+
 static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
 {
   if (def->flags != 0) {
@@ -82,7 +107,14 @@ static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
   if (def->max_sweeps == 1) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_sweeps is 1: a solve is 2 sweeps at least");
   }
-  return hapi_session_check_effects(def, detail);
+  if (def->reserved != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "reserved is %u, not 0", def->reserved);
+  }
+  hap_status status = check_knobs(def, detail);
+  if (status >= HAP_OK) {
+    status = hapi_session_check_dial(def, detail);
+  }
+  return status >= HAP_OK ? hapi_session_check_effects(def, detail) : status;
 }
 
 hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail)
@@ -92,7 +124,6 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->model, 0, 3, "model"},
       {def->haptic_hz, 100.0, 20000.0, "haptic_hz"},
       {def->physics_hz, 1.0, 1000.0, "physics_hz"},
-      {def->contact_hz, 20.0, 1000.0, "contact_hz"},
       {def->max_bodies, 1, 1024, "max_bodies"},
       {def->max_contacts, 1, 4096, "max_contacts"},
       {def->max_pointers, 1, HAP_TRACE_POINTERS_MAX, "max_pointers"},
@@ -100,13 +131,11 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->physics_latency_ticks, -1, 20000, "physics_latency_ticks"},
       {def->trace_rows, 0, 1048576, "trace_rows"},
       {def->impulse_pose, 0, 1, "impulse_pose"},
-      {def->probe, 0, 2, "probe"},
-      {def->max_edge_probes, 0, 1024, "max_edge_probes"},
+      {def->probe, 0, 3, "probe"},
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
-      {def->max_sweeps, 0, 10000, "max_sweeps"},
-      {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
       {def->lookback, 0.0, 0.5, "lookback"},
+
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

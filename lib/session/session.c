@@ -108,7 +108,7 @@ static void prepare_loop(hap_session *session, int64_t start_ns)
   hapi_contact_pass(session->contact, start_ns);
   hapi_haptic_receive(session->haptic, start_ns);
   atomic_store(&session->tick, 0);
-  session->base = session->step = session->pass = 0;
+  session->base = session->step = session->pass_tick = 0;
   session->frame_remainder_s = 0.0;
 }
 
@@ -288,11 +288,12 @@ static void step_when_due(hap_session *session)
  * are used from the next tick on. */
 static void find_contacts_when_due(hap_session *session)
 {
-  double period = 1.0 / session->def.contact_hz;
-  bool due = session->tick >= ticks_of(session, period, session->pass);
+  double period = hapi_contact_period(session->contact);
+  bool due = session->tick >= session->pass_tick;
   if (due) {
-    session->pass =
+    uint64_t next =
         (uint64_t)floor((double)session->tick / (period * session->def.haptic_hz) + 1e-6) + 1;
+    session->pass_tick = ticks_of(session, period, next);
   }
   if (due || hapi_contact_has_news(session->contact)) {
     int64_t half_tick = (int64_t)(0.5e9 / session->def.haptic_hz);

@@ -97,6 +97,7 @@ const char *hap_effect_reason_text(hap_effect_reason reason)
       [HAP_REASON_NOT_RECORDED] = "not recorded",
       [HAP_REASON_OUTSIDE] = "beyond what the loop can simulate",
       [HAP_REASON_NOT_PAPERS] = "not the paper's",
+      [HAP_REASON_ACCURACY] = "not at this accuracy",
   };
   size_t index = (size_t)reason;
   return index < sizeof texts / sizeof texts[0] ? texts[index] : "";

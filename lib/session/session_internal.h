@@ -36,7 +36,7 @@ struct hap_session {
   _Atomic uint64_t tick;
   uint64_t base;
   uint64_t step;
-  uint64_t pass; /* of the contact thread's part, the next one */
+  uint64_t pass_tick; /* of the next one of the contact thread's part */
 
   double frame_remainder_s; /* FRAME */
   pthread_t starter;        /* thread of the last start */
@@ -68,6 +68,9 @@ int64_t hapi_play_now(const hap_session *session);
 /* session_pointer.c; detail may be NULL */
 hap_status hapi_session_check_pointer(const hap_pointer_def *def, hap_detail *detail);
 hap_status hapi_session_check_hull(const hap_pointer_def *def, hap_detail *detail);
+
+/* session_accuracy.c: what turns the dial */
+hap_status hapi_session_check_dial(const hap_session_def *def, hap_detail *detail);
 
 /* session_effects.c: hap_session_def.effects, and as one word (base/wishes.h) */
 hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail);

@@ -84,6 +84,8 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   out->max_sweeps = def->max_sweeps;
   out->range_hops_1 = def->range_hops + 1;
   out->effects = hapi_session_pack_effects(def);
+  out->iterations = def->iterations;
+  out->accuracy = def->accuracy;
 }
 
 /* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */

@@ -284,7 +284,10 @@ typedef struct hapi_model {
   double period_s; /* H, of the next step */
   hap_model model;
   hap_impulse_pose impulse_pose;
-  uint32_t wishes; /* of the effects, base/wishes.h */
+  uint32_t wishes;        /* of the effects, base/wishes.h */
+  uint32_t max_sweeps;    /* of hapi_solver */
+  uint32_t row_updates;   /* its update_budget; 0: as it was */
+  int64_t tick_budget_ns; /* ticks that take longer are counted; 0: none are */
   uint32_t
       touches; /* pairs of a pointer and a geom that are near, also those whose points come later */
   uint32_t bounces; /* surfaces and stops that give back speed; model CONTACT */
@@ -411,6 +414,7 @@ typedef struct hapi_near {
   uint32_t tool_pair_count; /* those of a key follow each other */
   uint32_t between;         /* passes are made between two syncs as well */
   uint32_t always;          /* and also where there is nothing to find */
+  double contact_hz;        /* passes are made so often */
   uint32_t bodies_offset;
   uint32_t geoms_offset;
   uint32_t pairs_offset;
@@ -549,12 +553,20 @@ typedef struct hapi_state_contact {
   double force[3]; /* N on the body at this tick */
 } hapi_state_contact;
 
+/* Since the begin, of the ticks for which there was a budget. */
+typedef struct hapi_tick_load {
+  uint64_t ticks;
+  uint64_t over;
+  double spent_ns;
+} hapi_tick_load;
+
 typedef struct hapi_state {
   uint64_t model_number;   /* the local model in use; 0: none yet */
   int64_t now_ns;          /* time for which the poses hold */
   double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
   double owned_impulse[3]; /* N s, what bodies that the loop owns got of it, and from bodies that it
                               does not own */
+  hapi_tick_load load;
   hap_model model;
   uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */
   uint32_t contact_count;

@@ -37,12 +37,18 @@ static void check_def(const hap_session_def *def)
   FUZZ_CHECK(hap_model_name(def->model) != NULL);
   check_between(def->haptic_hz, 100.0, 20000.0);
   check_between(def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz));
-  check_between(def->contact_hz, 20.0, 1000.0);
+  FUZZ_CHECK(def->contact_hz == HAP_BY_ACCURACY ||
+             (def->contact_hz >= 20.0 && def->contact_hz <= 1000.0));
+  check_between(def->accuracy, 0.0, 1.0);
+  check_between(def->force_error_wanted, 0.0, 1.0);
+  FUZZ_CHECK(def->force_error_wanted == 0.0 || def->lookback > 0.0);
+  check_between(def->tick_share, 0.0, 1.0);
+  check_between(def->physics_share, 0.0, 1.0);
   check_between(def->rt_priority, 0, 99);
   check_between(def->physics_latency_ticks, -1, 20000);
   check_between(def->drive, HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP);
   check_between(def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);
-  check_between(def->probe, HAP_PROBE_SHARED, HAP_PROBE_OPERATING);
+  check_between(def->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY);
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     FUZZ_CHECK(hap_effect_check((hap_effect)i, (hap_effect_wish)def->effects[i], def->model,
                                 NULL) == HAP_OK);

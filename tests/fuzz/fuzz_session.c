@@ -83,13 +83,20 @@ static void edit_session(source *s, hap_session_def *def)
     def->impulse_pose = (hap_impulse_pose)(take_byte(s) % 3);
   } else if (field == 13) {
     unsigned byte = take_byte(s);
-    def->probe = (hap_probe)(byte % 4);
-    def->effects[HAP_EFFECT_CROSS] = (uint8_t)(byte / 4 % 3);
+    def->probe = (hap_probe)(byte % 5);
+    def->effects[HAP_EFFECT_CROSS] = (uint8_t)(byte / 5 % 3);
   } else if (field == 14) {
     unsigned byte = take_byte(s);
     def->effects[byte % HAP_EFFECT_PLACES] = (uint8_t)(byte / HAP_EFFECT_PLACES % 4);
   } else {
-    def->flags = take_byte(s);
+    unsigned byte = take_byte(s);
+    double *const dials[] = {&def->accuracy, &def->force_error_wanted, &def->tick_share,
+                             &def->physics_share};
+    if (byte < 128) {
+      def->flags = byte;
+    } else {
+      *dials[byte % 4] = take_double(s);
+    }
   }
 }
 
@@ -151,7 +158,8 @@ static void check_def(const hap_session_def *def)
 {
   const double ranges[][3] = {
       {def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz)},
-      {def->contact_hz, 20.0, 1000.0},
+      {def->contact_hz, def->contact_hz == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 20.0, 1000.0},
+      {def->accuracy, 0.0, 1.0},
       {def->haptic_hz, 100.0, 20000.0},
       {def->max_bodies, 1, 1024},
       {def->max_contacts, 1, 4096},
@@ -159,11 +167,11 @@ static void check_def(const hap_session_def *def)
       {def->rt_priority, 0, 99},
       {def->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
       {def->trace_rows, 0, 1048576},
-      {def->max_edge_probes, 0, 1024},
+      {def->max_edge_probes, def->max_edge_probes == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 0, 1024},
       {def->max_hull_points, 0, 1048576},
       {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
       {def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
-      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_OPERATING},
+      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY},
       {def->flags, 0, 0},
   };
   for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; ++i) {

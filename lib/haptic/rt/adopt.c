@@ -268,6 +268,10 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
   const hapi_model_contact *contacts = hapi_model_contacts(model);
   bool observed = tick->guard.observes;
   tick->wishes = model->wishes;
+  tick->world.solver.max_sweeps = model->max_sweeps;
+  if (model->row_updates > 0) {
+    tick->world.solver.update_budget = model->row_updates;
+  }
   tick->bounces = HAPI_HAS_RESTITUTION &&
                   (model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION));
   tick->guard.observes = observes(tick, model);

@@ -1,0 +1,93 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "physics/dial_settings.h"
+
+/* The order in which accuracy is given up, and in which it is bought. Measured by hapode-bench accuracy over
+ * all scenes (docs/accuracy.md): first goes what costs most for what it adds to the force, last what the
+ * force cannot do without. */
+
+/* A row holds from its position on up to the next one's. */
+typedef struct tick_row {
+  int from; /* percent */
+  double contact_hz;
+  uint32_t max_sweeps;
+  uint32_t row_updates;
+  int32_t range_hops;
+  bool shapes;
+} tick_row;
+
+/* Sweeps first: what one tick leaves undone the next one goes on with. A plane instead of a shape is wrong
+ * where things roll, a shorter range where they push each other: these go last. */
+static const tick_row tick_rows[] = {
+    {0, 50.0, 2, 1250, 1, false},
+    {10, 100.0, 2, 2500, 4, false},
+    {20, 100.0, 2, 2500, HAP_RANGE_ALL, true},
+    {30, 100.0, 4, 5000, HAP_RANGE_ALL, true},
+    {40, 150.0, 8, 10000, HAP_RANGE_ALL, true},
+    {50, 200.0, 0, 20000, HAP_RANGE_ALL, true},
+    {70, 333.0, 0, 20000, HAP_RANGE_ALL, true},
+    {80, 500.0, 0, 20000, HAP_RANGE_ALL, true},
+    {100, 1000.0, 0, 20000, HAP_RANGE_ALL, true},
+};
+
+typedef struct physics_row {
+  int from;
+  hap_probe probe;
+  uint32_t edge_probes;
+  double iterations; /* times those of the world */
+} physics_row;
+
+/* Iterations last: a world that is solved too badly pushes on the loop with forces that are not there. */
+static const physics_row physics_rows[] = {
+    {0, HAP_PROBE_SHARED, 0, 0.25},     {10, HAP_PROBE_SHARED, 1, 0.5},
+    {20, HAP_PROBE_SHARED, 1, 0.75},    {30, HAP_PROBE_SHARED, 2, 1.0},
+    {50, HAP_PROBE_SHARED, 4, 1.0},     {60, HAP_PROBE_OPERATING, 4, 1.0},
+    {70, HAP_PROBE_OPERATING, 8, 1.0},  {80, HAP_PROBE_OPERATING, 16, 2.0},
+    {90, HAP_PROBE_OPERATING, 32, 2.0}, {100, HAP_PROBE_OPERATING, 64, 4.0},
+};
+
+/* A row update takes about this on a slow processor. No solve may run past its tick on account of the
+ * rows alone; where it is slower still, a budget turns the dial. */
+#define UPDATE_S 12e-9
+#define TICK_SHARE 0.8
+
+static const tick_row *tick_row_of(int percent)
+{
+  const tick_row *row = tick_rows;
+  for (size_t i = 0; i < sizeof tick_rows / sizeof tick_rows[0]; ++i) {
+    row = percent >= tick_rows[i].from ? &tick_rows[i] : row;
+  }
+  return row;
+}
+
+static const physics_row *physics_row_of(int percent)
+{
+  const physics_row *row = physics_rows;
+  for (size_t i = 0; i < sizeof physics_rows / sizeof physics_rows[0]; ++i) {
+    row = percent >= physics_rows[i].from ? &physics_rows[i] : row;
+  }
+  return row;
+}
+
+static uint32_t updates_within(uint32_t updates, double period_s)
+{
+  double most = TICK_SHARE * period_s / UPDATE_S;
+  return most < updates ? (uint32_t)most : updates;
+}
+
+void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_percent,
+                        double period_s, hapi_settings *out)
+{
+  const tick_row *tick = tick_row_of(tick_percent);
+  const physics_row *physics = physics_row_of(physics_percent);
+  bool by_accuracy = knobs->iterations == HAP_BY_ACCURACY;
+  out->contact_hz = knobs->contact_hz > 0.0 ? knobs->contact_hz : tick->contact_hz;
+  out->max_sweeps = knobs->max_sweeps >= 0 ? (uint32_t)knobs->max_sweeps : tick->max_sweeps;
+  out->row_updates = updates_within(tick->row_updates, period_s);
+  out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
+  out->shapes = tick->shapes;
+  out->probe = knobs->probe != HAP_PROBE_BY_ACCURACY ? knobs->probe : physics->probe;
+  out->edge_probes = knobs->edge_probes >= 0 ? (uint32_t)knobs->edge_probes : physics->edge_probes;
+  out->iterations = by_accuracy ? physics->iterations : knobs->iterations == 0 ? 1.0 : 0.0;
+  out->fixed_iterations = knobs->iterations > 0 ? knobs->iterations : 0;
+}
