@@ -24,6 +24,7 @@ void hapi_dial_reset(hapi_physics *physics)
   dial->asked = dial->aim = percent;
   dial->error_turn = (hapi_turn){0.0};
   dial->error_in_force = 0.0;
+  dial->settles = false;
   dial->ticks_seen = dial->over_seen = 0;
   dial->ns_seen = dial->looked_s = dial->rest_s = 0.0;
   for (int i = 0; i < HAPI_DIALS; ++i) {
@@ -119,6 +120,8 @@ static void follow_wishes(hapi_physics *physics)
   dial->asked = dial->aim = asked;
 }
 
+/* One step at a time, and the window after a turn is left out: in it things come to where they are under the new
+ * settings. */
 void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
 {
   hapi_dial *dial = &physics->dial;
@@ -126,14 +129,19 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
   if (!(wanted > 0.0) || hapi_tape_plays(physics->tape)) {
     return;
   }
+  if (dial->settles) {
+    dial->settles = false;
+    return;
+  }
   double load = error / wanted;
   int steps = hapi_turn_by(&dial->error_turn, load > 1.0 ? load : ERROR_SPAN * load, seconds);
-  int aim = dial->aim + STEP * steps;
+  int aim = dial->aim + STEP * (steps > 0 ? 1 : steps);
   aim = aim < 0 ? 0 : aim > HAPI_DIAL_MOST ? HAPI_DIAL_MOST : aim;
   for (int i = 0; i < HAPI_DIALS; ++i) {
     hapi_dial_side *side = &dial->sides[i];
     side->percent = side->percent >= dial->aim || side->percent > aim ? aim : side->percent;
   }
+  dial->settles = aim != dial->aim;
   dial->aim = aim;
 }
 

@@ -41,6 +41,7 @@ typedef struct hapi_dial {
   int asked;              /* percent, that aim began at */
   double error_in_force;
   hapi_turn error_turn;
+  bool settles; /* since the last turn for it */
   hapi_dial_side sides[HAPI_DIALS];
   uint64_t ticks_seen; /* of the loop's figures */
   uint64_t over_seen;
