@@ -43,6 +43,8 @@
 #define LINE_BOUND_N 5e-3
 #define LINE_BOUND 0.002 /* of the force */
 #define JOINT_BOUND 1e-4
+#define DIAL_ERROR 0.05
+#define DIAL_SHARE 0.10
 #define ESTIMATE_FACTOR 3.0
 #define ESTIMATE_SHARE 0.9
 #define DEGREES (180.0 / M_PI)
@@ -169,6 +171,20 @@ static void check_estimates(bench *b, const accuracy_table *table)
   }
 }
 
+/* What the dial comes to at its default. The haptic thread's share of a core is that of its ticks by the clock,
+ * or less where all that the session does takes less of the processor's time. */
+static void check_dial(bench *b, const accuracy_row *r)
+{
+  double ticks = 1e-6 * r->tick_us * r->haptic_hz;
+  double share = fmin(ticks, r->duty);
+  bench_check(
+      b, r->errors.force <= DIAL_ERROR && share <= DIAL_SHARE,
+      "%s at %g Hz: the dial at its default: force error %.3g %% (%g %%), %.3g %% of a core "
+      "(%g %%)",
+      r->scene, r->physics_hz, 100.0 * r->errors.force, 100.0 * DIAL_ERROR, 100.0 * share,
+      100.0 * DIAL_SHARE);
+}
+
 static void check_rest(bench *b, const accuracy_row *r)
 {
   bench_check(b, r->rest_share <= REST_BOUND,
@@ -188,6 +204,9 @@ static void report(bench *b, const accuracy_table *table)
     }
     if (accuracy_row_is(r, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) && bounded) {
       check_row(b, r);
+      if (r->physics_hz == ACCURACY_PAPER_HZ) {
+        check_dial(b, r);
+      }
       if (r->joint_floor > 0.0) {
         check_joints(b, r);
       }

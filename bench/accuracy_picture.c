@@ -118,12 +118,15 @@ static double dial_of(const accuracy_row *row)
   return middle ? HAP_ACCURACY_DEFAULT : is_dial(row) ? row->value : -1.0;
 }
 
+/* The row of the next position; NULL: there is none. */
 static const accuracy_row *next_of_dial(const accuracy_row *rows, size_t count, double after)
 {
   const accuracy_row *next = NULL;
+  double nearest = HUGE_VAL;
   for (size_t i = 0; i < count; ++i) {
     double at = dial_of(&rows[i]);
-    if (at > after && (next == NULL || at < dial_of(next))) {
+    if (at > after && at < nearest) {
+      nearest = at;
       next = &rows[i];
     }
   }
@@ -142,9 +145,10 @@ static bool has_dial(const accuracy_row *rows, size_t count)
 static void put_dial(FILE *script, const accuracy_row *rows, size_t count)
 {
   fprintf(script, "$dial0 << EOD\n");
-  for (const accuracy_row *row = has_dial(rows, count) ? next_of_dial(rows, count, -1.0) : NULL;
-       row != NULL; row = next_of_dial(rows, count, dial_of(row))) {
+  const accuracy_row *row = has_dial(rows, count) ? next_of_dial(rows, count, -1.0) : NULL;
+  while (row != NULL) {
     put_point(script, row);
+    row = next_of_dial(rows, count, dial_of(row));
   }
   fprintf(script, "EOD\n");
 }

@@ -69,7 +69,8 @@ TEST(a_side_has_its_own_settings)
   hapi_dial_settings(&by_accuracy, 50, 50, 1e-3, &middle);
   hapi_dial_settings(&by_accuracy, 0, 50, 1e-3, &tick);
   hapi_dial_settings(&by_accuracy, 50, 0, 1e-3, &physics);
-  CHECK(tick.max_sweeps == 2 && !tick.shapes && tick.range_hops == 1);
+  CHECK(tick.max_sweeps == 2 && tick.sweeps_alone && !middle.sweeps_alone && !tick.shapes &&
+        tick.range_hops == 1);
   CHECK(tick.iterations == middle.iterations && tick.edge_probes == middle.edge_probes);
   CHECK(physics.max_sweeps == 0 && physics.shapes && physics.range_hops == HAP_RANGE_ALL);
   CHECK(physics.iterations < middle.iterations && physics.edge_probes < middle.edge_probes);
@@ -207,7 +208,7 @@ TEST(accuracy_costs_sweeps_and_buys_force)
                      difference(force[1], force[2])};
   printf("# off the force at 1: %.3g at 0, %.3g at 0.2, %.3g at 0.5; sweeps %.3g, %.3g\n", error[0],
          error[1], error[2], low, middle);
-  CHECK(low <= 2.0 && middle > low);
+  CHECK(low <= 3.0 && middle > low);
   CHECK(error[2] < 0.005 && error[1] > 2.0 * error[2] && error[0] > 2.0 * error[1]);
 }
 

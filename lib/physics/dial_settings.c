@@ -11,23 +11,24 @@ typedef struct tick_row {
   int from; /* percent */
   double contact_hz;
   uint32_t max_sweeps;
+  bool sweeps_alone;
   uint32_t row_updates;
   int32_t range_hops;
   bool shapes;
 } tick_row;
 
-/* Sweeps first: what one tick leaves undone the next one goes on with. A plane instead of a shape is wrong
- * where things roll, a shorter range where they push each other: these go last. */
+/* Direct solves first, then sweeps: what one tick leaves undone the next one goes on with. A plane instead of a
+ * shape is wrong where things roll, a shorter range where they push each other: these go last. */
 static const tick_row tick_rows[] = {
-    {0, 50.0, 2, 1250, 1, false},
-    {10, 100.0, 2, 2500, 4, false},
-    {20, 100.0, 2, 2500, HAP_RANGE_ALL, true},
-    {30, 100.0, 4, 5000, HAP_RANGE_ALL, true},
-    {40, 150.0, 8, 10000, HAP_RANGE_ALL, true},
-    {50, 200.0, 0, 20000, HAP_RANGE_ALL, true},
-    {70, 333.0, 0, 20000, HAP_RANGE_ALL, true},
-    {80, 500.0, 0, 20000, HAP_RANGE_ALL, true},
-    {100, 1000.0, 0, 20000, HAP_RANGE_ALL, true},
+    {0, 50.0, 2, true, 1250, 1, false},
+    {10, 100.0, 2, true, 2500, 4, false},
+    {20, 100.0, 3, true, 2500, HAP_RANGE_ALL, true},
+    {30, 150.0, 6, true, 5000, HAP_RANGE_ALL, true},
+    {40, 200.0, 16, true, 10000, HAP_RANGE_ALL, true},
+    {50, 200.0, 0, false, 20000, HAP_RANGE_ALL, true},
+    {70, 333.0, 0, false, 20000, HAP_RANGE_ALL, true},
+    {80, 500.0, 0, false, 20000, HAP_RANGE_ALL, true},
+    {100, 1000.0, 0, false, 20000, HAP_RANGE_ALL, true},
 };
 
 typedef struct physics_row {
@@ -83,6 +84,7 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   bool by_accuracy = knobs->iterations == HAP_BY_ACCURACY;
   out->contact_hz = knobs->contact_hz > 0.0 ? knobs->contact_hz : tick->contact_hz;
   out->max_sweeps = knobs->max_sweeps >= 0 ? (uint32_t)knobs->max_sweeps : tick->max_sweeps;
+  out->sweeps_alone = knobs->max_sweeps < 0 && tick->sweeps_alone;
   out->row_updates = updates_within(tick->row_updates, period_s);
   out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
   out->shapes = tick->shapes;

@@ -360,8 +360,9 @@ void hapi_solver_run(hapi_solver *solver)
   solver->sweeps = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
-  bool dear = solver->direct_rows > 0 && stays_dear(solver);
-  bool direct = solver->direct_rows > 0 && !dear;
+  bool may = solver->direct_rows > 0 && !solver->sweeps_alone;
+  bool dear = may && stays_dear(solver);
+  bool direct = may && !dear;
   left = dear ? sweeps_alone(rows, left) : left;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);

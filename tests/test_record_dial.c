@@ -1,0 +1,60 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* A dial that the application and the clock turn while a session is recorded: a replay turns it likewise. */
+
+#include "tests/tap.h"
+
+#include "tests/recorded.h"
+
+static void turn_the_dial(rig *r, int look)
+{
+  static const double places[] = {0.9, 0.1, 0.0, 1.0};
+  if (look % 4 == 3 && look < 16) {
+    CHECK(hap_session_set_accuracy(r->session, places[look / 4]) == HAP_OK);
+  }
+  if (look == 17) { /* 10 us: the clock turns it, and is in the recording */
+    CHECK(hap_session_set_budget(r->session, 0.01, 0.01) == HAP_OK);
+  }
+}
+
+TEST(a_dial_that_is_turned)
+{
+  for (int i = 0; i < 2; ++i) {
+    recorded_setup s =
+        recorded_setup_of("row10", i == 0 ? HAP_MODEL_CONTACT : HAP_MODEL_ACCELERANCE, 1800);
+    s.accuracy = 0.3;
+    s.meanwhile = turn_the_dial;
+    hap_stats before = recorded_make(&s);
+    rig r;
+    rig_options options;
+    hap_accuracy_info info;
+    replay again = recorded_play("row10", 0);
+    check_alike(&again, &before);
+    rig_options_init(&options);
+    options.scene = "row10";
+    REQUIRE(hap_player_open(recorded_path, 0, &options.player, NULL) == HAP_OK);
+    REQUIRE(rig_create(&options, &r, NULL) == HAP_OK);
+    CHECK(hap_session_set_accuracy(r.session, 0.5) == HAP_ERROR_STATE);
+    CHECK(hap_session_set_budget(r.session, 0.0, 0.0) == HAP_ERROR_STATE);
+    CHECK(hap_session_start(r.session) == HAP_OK);
+    CHECK(hap_session_advance(r.session, 100) == HAP_OK);
+    CHECK(hap_session_accuracy(r.session, &info, sizeof info) == HAP_OK);
+    CHECK_NEAR(info.tick.accuracy, 0.3, 1e-9);
+    CHECK(hap_session_advance(r.session, 200) == HAP_OK);
+    CHECK(hap_session_accuracy(r.session, &info, sizeof info) == HAP_OK);
+    CHECK_NEAR(info.tick.accuracy, 0.9, 1e-9);
+    rig_destroy(&r);
+    hap_player_close(options.player);
+  }
+}
+
+int main(void)
+{
+  recorded_init();
+  dInitODE2(0);
+  RUN(a_dial_that_is_turned);
+  dCloseODE();
+  unlink(recorded_path);
+  return tap_done();
+}
