@@ -106,14 +106,6 @@ TEST(no_solve_is_longer_than_a_tick)
 
 /* ---- turning ---- */
 
-TEST(a_load_that_is_too_much_turns_at_once)
-{
-  hapi_turn turn = {0.0};
-  CHECK(hapi_turn_by(&turn, 1.01, 0.01) == 1);
-  CHECK(hapi_turn_by(&turn, 2.5, 0.01) == 3);
-  CHECK(hapi_turn_by(&turn, 0.99, 100.0) == 0); /* neither too much nor room */
-}
-
 static double until_back(hapi_turn *turn)
 {
   for (int i = 1; i <= 2000; ++i) {
@@ -122,6 +114,26 @@ static double until_back(hapi_turn *turn)
     }
   }
   return (double)INFINITY;
+}
+
+TEST(a_load_that_is_too_much_turns_at_once)
+{
+  hapi_turn turn = {0.0};
+  CHECK(hapi_turn_by(&turn, 1.01, 0.01) == 1);
+  CHECK(hapi_turn_by(&turn, 2.5, 0.01) == 3);
+  CHECK(hapi_turn_by(&turn, 0.99, 100.0) == 0); /* neither too much nor room */
+}
+
+/* Down to where it fits is one turn, in however many steps: it does not make the way back longer. */
+TEST(a_long_way_down_is_not_held_against_it)
+{
+  hapi_turn once = {0.0};
+  hapi_turn often = {0.0};
+  (void)hapi_turn_by(&once, 1.5, 0.01);
+  for (int i = 0; i < 8; ++i) {
+    (void)hapi_turn_by(&often, 1.5, 0.01);
+  }
+  CHECK(until_back(&often) <= until_back(&once));
 }
 
 TEST(a_dial_does_not_go_to_and_fro)
@@ -543,6 +555,7 @@ int main(void)
   RUN(what_was_given_stays);
   RUN(no_solve_is_longer_than_a_tick);
   RUN(a_load_that_is_too_much_turns_at_once);
+  RUN(a_long_way_down_is_not_held_against_it);
   RUN(a_dial_does_not_go_to_and_fro);
   RUN(accuracy_costs_sweeps_and_buys_force);
   RUN(the_session_tells_where_it_stands);

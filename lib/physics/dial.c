@@ -11,7 +11,6 @@
 #define LOOK_TICKS 100u
 #define LOOK_CYCLES 4u
 #define OVER_SHARE 0.05 /* of the ticks, that may be above the budget: threads are interrupted */
-#define HELD_LOAD 0.8   /* neither too much nor room for more */
 #define BURST 1.5       /* times the budget, for one cycle */
 #define ERROR_SPAN 2.0  /* less than the wanted error by this: a lower accuracy is tried */
 #define REST_KEEP 0.75
@@ -57,9 +56,7 @@ static void look_at_ticks(hapi_physics *physics, double budget_s)
     return;
   }
   double mean_s = 1e-9 * (told->spent_ns - dial->ns_seen) / (double)ticks;
-  double load = mean_s / budget_s;
-  bool often = (double)over > OVER_SHARE * (double)ticks;
-  load = often ? fmax(load, 1.0 + OVER_SHARE) : over > 0 ? fmax(load, HELD_LOAD) : load;
+  double load = fmax(mean_s / budget_s, (double)over / (OVER_SHARE * (double)ticks));
   turn(&dial->sides[HAPI_DIAL_TICK], dial->aim, load, (double)ticks / physics->config.haptic_hz);
   dial->ticks_seen = told->ticks;
   dial->over_seen = told->over;

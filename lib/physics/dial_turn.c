@@ -16,14 +16,16 @@ int hapi_turn_by(hapi_turn *turn, double load, double seconds)
   turn->low_s = load < ROOM ? turn->low_s + seconds : 0.0;
   if (load > 1.0) {
     double longer = 2.0 * turn->patience_s;
-    if (turn->since_s < SOON * turn->patience_s) {
+    if (turn->tried && turn->since_s < SOON * turn->patience_s) {
       turn->patience_s = longer < PATIENCE_MOST_S ? longer : PATIENCE_MOST_S;
     }
+    turn->tried = false;
     return load > FAR_OVER ? FAR_STEPS : 1;
   }
   if (turn->low_s < turn->patience_s) {
     return 0;
   }
   turn->low_s = turn->since_s = 0.0;
+  turn->tried = true;
   return -1;
 }

@@ -3,6 +3,8 @@
 #ifndef HAPODE_PHYSICS_DIAL_TURN_H
 #define HAPODE_PHYSICS_DIAL_TURN_H
 
+#include <stdbool.h>
+
 /* When a dial is turned: at once where a load is above 1, and back where it has been low for a while. A load
  * that comes again soon after that makes the next while twice as long, so that a dial between two
  * positions does not go to and fro. */
@@ -10,6 +12,7 @@
 typedef struct hapi_turn {
   double low_s;      /* that the load has been low */
   double since_s;    /* the last turn back */
+  bool tried;        /* it is the last turn */
   double patience_s; /* that it is to be low; 0: not begun */
 } hapi_turn;
 
