@@ -129,6 +129,7 @@ TEST(a_long_way_down_is_not_held_against_it)
 {
   hapi_turn once = {0.0};
   hapi_turn often = {0.0};
+  CHECK(until_back(&once) == until_back(&often));
   (void)hapi_turn_by(&once, 1.5, 0.01);
   for (int i = 0; i < 8; ++i) {
     (void)hapi_turn_by(&often, 1.5, 0.01);
@@ -196,6 +197,26 @@ static double push_row(double accuracy, double force[TICKS])
   }
   cw_close(&w);
   return sweeps;
+}
+
+/* As many sweeps, with direct solves between them or not: the dial's are without. */
+TEST(below_its_middle_there_are_no_direct_solves)
+{
+  static double force[2][TICKS];
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    open_row(&w, 4);
+    w.def.accuracy = 0.2;
+    w.def.max_sweeps = i == 0 ? HAP_BY_ACCURACY : 3;
+    REQUIRE(start_row(&w));
+    for (int k = 0; k < TICKS; ++k) {
+      cw_tick(&w);
+      force[i][k] = w.force[0];
+    }
+    CHECK(accuracy_of(&w).max_sweeps == 3);
+    cw_close(&w);
+  }
+  CHECK(memcmp(force[0], force[1], sizeof force[0]) != 0);
 }
 
 static double difference(const double *a, const double *b)
@@ -558,6 +579,7 @@ int main(void)
   RUN(a_long_way_down_is_not_held_against_it);
   RUN(a_dial_does_not_go_to_and_fro);
   RUN(accuracy_costs_sweeps_and_buys_force);
+  RUN(below_its_middle_there_are_no_direct_solves);
   RUN(the_session_tells_where_it_stands);
   RUN(contacts_are_found_as_often_as_it_says);
   RUN(the_worlds_iterations_are_the_applications);

@@ -49,11 +49,26 @@ TEST(a_dial_that_is_turned)
   }
 }
 
+/* Set between record and start: it is not in the def. */
+TEST(a_dial_that_was_turned_before_the_start)
+{
+  recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 400);
+  rig r;
+  s.accuracy = 0.5;
+  REQUIRE(recorded_create(&s, &r));
+  CHECK(hap_session_set_accuracy(r.session, 0.0) == HAP_OK);
+  hap_stats before = recorded_run(&s, &r);
+  rig_destroy(&r);
+  replay again = recorded_play("row10", 0);
+  check_alike(&again, &before);
+}
+
 int main(void)
 {
   recorded_init();
   dInitODE2(0);
   RUN(a_dial_that_is_turned);
+  RUN(a_dial_that_was_turned_before_the_start);
   dCloseODE();
   unlink(recorded_path);
   return tap_done();

@@ -1,0 +1,180 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* How budgets turn the dials: with times that are made up, and no clock. */
+
+#include "tests/tap.h"
+
+#include "tests/physics_world.h"
+
+#define PERIOD_NS 1e6
+#define SHARE 0.1
+#define MS 1e-3
+
+static hapi_tick_load told; /* by the loop, so far */
+
+static hapi_physics *begin(test_world *w)
+{
+  static const double edges[3] = {0.1, 0.1, 0.1};
+  told = (hapi_tick_load){0};
+  world_open(w, 0.0, 20);
+  (void)world_add_box(w, edges, 1.0, 0.0, 0.0, 0.0);
+  if (world_create_session(w, NULL) < HAP_OK || hap_session_start(w->session) < HAP_OK) {
+    return NULL;
+  }
+  return world_physics(w);
+}
+
+static void set_shares(hapi_physics *physics, double tick, double cycle)
+{
+  atomic_store(&physics->dial.share[HAPI_DIAL_TICK], tick);
+  atomic_store(&physics->dial.share[HAPI_DIAL_PHYSICS], cycle);
+}
+
+/* So many ticks of a share of their period, of which some are over the budget; a cycle looks at them. */
+static int tell_ticks(hapi_physics *physics, uint64_t ticks, double share, uint64_t over)
+{
+  told.ticks += ticks;
+  told.over += over;
+  told.spent_ns += (double)ticks * share * PERIOD_NS;
+  physics->state->load = told;
+  hapi_dial_follow(physics);
+  return physics->dial.sides[HAPI_DIAL_TICK].percent;
+}
+
+static int tell_cycles(hapi_physics *physics, int cycles, double seconds)
+{
+  for (int i = 0; i < cycles; ++i) {
+    hapi_dial_note(physics, seconds, 0.0);
+    hapi_dial_follow(physics);
+  }
+  return physics->dial.sides[HAPI_DIAL_PHYSICS].percent;
+}
+
+TEST(ticks_that_fit_change_nothing)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, 0.0);
+  for (int i = 0; i < 100; ++i) {
+    CHECK(tell_ticks(physics, 100, 0.09, 4) == 50); /* 4 % are over: somebody else had the core */
+  }
+  world_close(&w);
+}
+
+TEST(a_mean_that_is_over_turns_the_tick)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, 0.0);
+  CHECK(tell_ticks(physics, 99, 0.11, 0) == 50); /* not looked at yet */
+  CHECK(tell_ticks(physics, 1, 0.11, 0) == 40);
+  CHECK(tell_ticks(physics, 100, 0.3, 0) == 10); /* far over: three steps */
+  CHECK(tell_ticks(physics, 100, 0.3, 0) == 0);
+  CHECK(tell_ticks(physics, 100, 0.3, 0) == 0);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_LEAST);
+  CHECK_NEAR(physics->figures.accuracy.tick.load, 0.3, 1e-9);
+  world_close(&w);
+}
+
+TEST(many_ticks_that_are_over_turn_it_as_well)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, 0.0);
+  CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
+  CHECK(tell_ticks(physics, 16, 0.05, 7) == 40); /* too few of both */
+  CHECK(tell_ticks(physics, 1, 0.05, 7) == 10);  /* most of them: at once */
+  world_close(&w);
+}
+
+TEST(room_brings_it_back_as_far_as_was_asked)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, 0.0);
+  CHECK(tell_ticks(physics, 100, 0.3, 0) == 20);
+  int percent = 20;
+  for (int i = 0; i < 100; ++i) {
+    int now = tell_ticks(physics, 100, 0.05, 0);
+    CHECK(now == percent || now == percent + 10);
+    percent = now;
+  }
+  CHECK(percent == 50 && physics->figures.accuracy.tick.reason == HAP_ACCURACY_ASKED);
+  CHECK(physics->figures.accuracy.tick.turns == 4);
+  for (int i = 0; i < 100; ++i) {
+    CHECK(tell_ticks(physics, 100, 0.07, 0) == 50);
+  }
+  world_close(&w);
+}
+
+TEST(what_is_asked_for_later_waits_for_the_budget)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, 0.0);
+  CHECK(tell_ticks(physics, 100, 0.11, 0) == 40);
+  CHECK(hap_session_set_accuracy(w.session, 0.9) == HAP_OK);
+  CHECK(tell_ticks(physics, 100, 0.09, 0) == 40);
+  CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 90);
+  CHECK(hap_session_set_accuracy(w.session, 0.3) == HAP_OK);
+  CHECK(tell_ticks(physics, 100, 0.09, 0) == 30);
+  set_shares(physics, 0.0, 0.0);
+  CHECK(hap_session_set_accuracy(w.session, 0.7) == HAP_OK);
+  CHECK(tell_ticks(physics, 100, 0.5, 0) == 70);
+  world_close(&w);
+}
+
+/* 20 Hz: a tenth is 5 ms. */
+TEST(cycles_that_are_over_turn_physics)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, 0.0, SHARE);
+  CHECK(tell_cycles(physics, 40, 4.5 * MS) == 50);
+  CHECK(tell_cycles(physics, 3, 5.5 * MS) == 50);
+  CHECK(tell_cycles(physics, 1, 5.5 * MS) == 40);
+  CHECK(tell_cycles(physics, 1, 8.0 * MS) == 30); /* one alone, by more than half */
+  CHECK(physics->figures.accuracy.physics.reason == HAP_ACCURACY_BUDGET);
+  CHECK(tell_cycles(physics, 400, 1.0 * MS) == 50);
+  CHECK(physics->dial.sides[HAPI_DIAL_TICK].percent == 50);
+  world_close(&w);
+}
+
+TEST(looking_back_has_what_is_left)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  CHECK(hapi_dial_spare(physics) == HUGE_VAL);
+  set_shares(physics, 0.0, SHARE);
+  for (int i = 0; i < 40; ++i) {
+    hapi_dial_note(physics, 9.0 * MS, 7.0 * MS);
+    hapi_dial_follow(physics);
+  }
+  CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 50); /* it does not count */
+  CHECK_NEAR(hapi_dial_spare(physics), 3.0 * MS, 1e-6);
+  hapi_dial_note(physics, 6.0 * MS, 0.0);
+  CHECK(hapi_dial_spare(physics) == 0.0);
+  world_close(&w);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  RUN(ticks_that_fit_change_nothing);
+  RUN(a_mean_that_is_over_turns_the_tick);
+  RUN(many_ticks_that_are_over_turn_it_as_well);
+  RUN(room_brings_it_back_as_far_as_was_asked);
+  RUN(what_is_asked_for_later_waits_for_the_budget);
+  RUN(cycles_that_are_over_turn_physics);
+  RUN(looking_back_has_what_is_left);
+  dCloseODE();
+  return tap_done();
+}
