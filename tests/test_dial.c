@@ -474,7 +474,7 @@ TEST(a_budget_turns_the_tick_back)
   w.def.tick_share = 0.01;
   hap_accuracy_info info = run_threads(&w, tick_at_least);
   CHECK(tick_at_least(&info) && info.tick.accuracy == 0.0 && info.tick.turns >= 2);
-  CHECK(info.tick.share == 0.01 && info.tick.load > 0.01);
+  CHECK(info.tick.share == 0.01 && info.tick.load > 0.19); /* all of them are over */
   CHECK(info.max_sweeps == 2 && info.range_hops == 1);
   CHECK(info.physics.accuracy == 0.5 && info.physics.reason == HAP_ACCURACY_ASKED);
   CHECK(hap_session_set_budget(w.session, 0.0, 0.0) == HAP_OK);
