@@ -91,6 +91,7 @@ typedef struct accuracy_run_def {
   int32_t max_edge_probes;
   hap_effect_wish shape;
   double lookback;
+  double reuse;
   hap_integration integration;
 } accuracy_run_def;
 

@@ -116,6 +116,13 @@ typedef struct hap_session_def {
       effects[HAP_EFFECT_PLACES]; /* hap_effect_wish by hap_effect (hapode/effects.h), default all
                                          HAP_EFFECT_AUTO; places beyond HAP_EFFECTS are 0. A wish that
                                          the model cannot fulfil is an error */
+  double
+      reuse; /* m, 0..0.01, default 1e-6: what testing simulations found of an island is used again
+                while its contacts and joints are the same and none of its bodies, measured where it
+                moves most, has moved by more than this since, nor would in a step by how its velocity
+                and the forces on it have changed: A without a step, b with one, and with none where
+                all has stayed within a hundredth of this. 0: measured anew at each step, as with the
+                effect testing on and with HAP_PROBE_PAPER */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

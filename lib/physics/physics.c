@@ -125,6 +125,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_meshes_finish(&physics->meshes);
   hapi_snapshot_finish(&physics->snapshot);
   hapi_test_finish(&physics->test);
+  hapi_reuse_finish(physics);
   hapi_lookback_finish(&physics->lookback);
   hapi_free(physics->bodies);
   hapi_free(physics->contacts);
@@ -187,6 +188,7 @@ static void prepare(hapi_physics *physics)
   reset_figures(physics);
   hapi_range_reset(physics);
   hapi_lookback_reset(physics);
+  hapi_reuse_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
   physics->wishes = atomic_load(&physics->wanted_effects);

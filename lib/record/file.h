@@ -71,6 +71,7 @@ typedef struct hapi_file_info {
   uint32_t effects;     /* wishes at the start, as in base/wishes.h */
   int32_t max_sweeps;   /* files of before end before it; what a file lacks is 0 */
   int32_t range_hops_1; /* hap_session_def.range_hops + 1 */
+  double reuse;
 } hapi_file_info;
 
 #define HAPI_FILE_INFO_LEAST offsetof(hapi_file_info, max_sweeps)

@@ -28,6 +28,7 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.max_edge_probes = 4;
   d.max_hull_points = 4096;
   d.range_hops = HAP_RANGE_ALL;
+  d.reuse = 1e-6;
   hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
@@ -107,6 +108,7 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->max_sweeps, 0, 10000, "max_sweeps"},
       {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
       {def->lookback, 0.0, 0.5, "lookback"},
+      {def->reuse, 0.0, 0.01, "reuse"},
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {
