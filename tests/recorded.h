@@ -38,6 +38,7 @@ typedef struct recorded_setup {
   hap_probe probe;
   int32_t max_sweeps;
   int32_t range_hops;
+  double reuse;
   hap_effect_wish cross;
   hap_coupling coupling; /* with a spring; else as the rig has it */
   double coupling_stiffness;
@@ -46,7 +47,8 @@ typedef struct recorded_setup {
 
 static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model model, int ms)
 {
-  recorded_setup s = {.scene = scene_name, .model = model, .ms = ms, .range_hops = HAP_RANGE_ALL};
+  recorded_setup s = {
+      .scene = scene_name, .model = model, .ms = ms, .range_hops = HAP_RANGE_ALL, .reuse = 1e-6};
   hap_record_def_init(&s.record, sizeof s.record);
   s.record.path = recorded_path;
   return s;
@@ -62,6 +64,7 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   options.def.probe = s->probe;
   options.def.max_sweeps = s->max_sweeps;
   options.def.range_hops = s->range_hops;
+  options.def.reuse = s->reuse;
   options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)s->cross;
   options.record = &s->record;
   if (s->coupling_stiffness > 0.0) {

@@ -75,7 +75,6 @@ static void measure_b(hapi_physics *physics)
     double b[6];
     hapi_test_acceleration(physics, slot->known, b);
     slot->b_is_good = hapi_finite(b, 6);
-    hapi_reuse_tested(physics, book_of(physics), slot, b);
     if (!slot->b_is_good) {
       hapi_reuse_spoil(physics, book_of(physics), slot->known);
     }

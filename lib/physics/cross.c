@@ -150,10 +150,10 @@ void hapi_cross_begin(hapi_physics *physics, const hapi_reuse_book *book)
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_cross *cross = &physics->crosses[i];
     const hapi_contact_slot *contact = &physics->contacts[cross->contact];
-    bool stays = contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-                 holds(physics, cross, cross->contact) &&
-                 hapi_reuse_kind_of(physics, book, physics->bodies[contact->body].known) !=
-                     HAPI_REUSE_NONE;
+    bool stays =
+        contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+        holds(physics, cross, cross->contact) &&
+        hapi_reuse_kind_of(physics, book, physics->bodies[contact->body].known) != HAPI_REUSE_NONE;
     if (stays) {
       physics->crosses[physics->cross_count++] = *cross;
     }

@@ -257,7 +257,6 @@ typedef struct hapi_body_slot {
 
   hapi_print_place prints[HAPI_REUSE_BOOKS]; /* reuse.h, of the island that begins with it */
   uint32_t next_pushed;                      /* scratch */
-  double tested[6];                          /* what the newest probe without a push gave it */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
@@ -268,8 +267,8 @@ typedef struct hapi_contact_slot {
   uint32_t pointer_generation;
   dGeomID geom; /* compared only, never used */
   bool wanted;
-  bool probed;    /* a holds a measured accelerance */
-  uint32_t round; /* scratch: order among the contacts of its island */
+  bool probed;          /* a holds a measured accelerance */
+  uint32_t round;       /* scratch: order among the contacts of its island */
   uint32_t next_pushed; /* scratch of reuse.c */
   double point_body[3];
   double normal_body[3];

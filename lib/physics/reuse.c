@@ -9,9 +9,6 @@
 
 /* b is added up at every tick: what it may be off is less than what A may. */
 #define SHARE_OF_B 0.01
-/* By how much of hap_session_def.reuse a testing simulation without a push may come out otherwise, with all
- * that has a getter as it was: several values may be off at once. */
-#define MORE_THAN_SEEN 4.0
 
 bool hapi_reuse_wanted(const hapi_physics *physics)
 {
@@ -172,9 +169,9 @@ static bool begin_round(hapi_physics *physics, hapi_reuse_book *book)
   book->touch_count = 0;
   ++book->round;
   book->island_count = 0;
-  book->in_use = hapi_reuse_wanted(physics) &&
-                 hapi_reserve((void **)&book->islands, &book->island_capacity, 0,
-                              physics->test.island_count, sizeof *book->islands);
+  book->in_use =
+      hapi_reuse_wanted(physics) && hapi_reserve((void **)&book->islands, &book->island_capacity, 0,
+                                                 physics->test.island_count, sizeof *book->islands);
   return book->in_use;
 }
 
@@ -303,25 +300,6 @@ void hapi_reuse_spoil(hapi_physics *physics, hapi_reuse_book *book, uint32_t kno
 {
   if (book->in_use) {
     island_of(physics, book, known)->spoiled = true;
-  }
-}
-
-void hapi_reuse_tested(hapi_physics *physics, hapi_reuse_book *book, hapi_body_slot *slot,
-                       const double base[6])
-{
-  hapi_reuse_island *island = book->in_use ? island_of(physics, book, slot->known) : NULL;
-  double step2 = physics->probe_step_s * physics->probe_step_s;
-  double extent = physics->table.entries[slot->known].extent;
-  double arm = extent > 0.0 ? extent : 1.0;
-  double way = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    double off = step2 * (i < 3 ? 1.0 : arm) * fabs(base[i] - slot->tested[i]);
-    way = off <= way ? way : off;
-  }
-  memcpy(slot->tested, base, sizeof slot->tested);
-  if (island != NULL && island->kind == HAPI_REUSE_A && island->has_joints &&
-      !(way <= MORE_THAN_SEEN * physics->config.reuse)) {
-    island->kind = HAPI_REUSE_NONE;
   }
 }
 

@@ -53,7 +53,7 @@ typedef struct hapi_reuse_island {
   hapi_reuse_kind kind;
   uint32_t first_member; /* in the test set, as it was gathered */
   uint32_t member_count;
-  uint32_t slot; /* of the first member */
+  uint32_t slot;  /* of the first member */
   uint32_t first; /* its items */
   uint32_t count;
   uint32_t first_touch;
@@ -82,7 +82,7 @@ typedef struct hapi_reuse_book {
   hapi_touch_print *old_touches;
   uint32_t old_touch_capacity;
   uint64_t round;
-  bool in_use; /* this round */
+  bool in_use;                /* this round */
   hapi_member_birth *members; /* scratch: of an island, in the order of their births */
   uint32_t member_capacity;
   hapi_reuse_island *islands;
@@ -109,8 +109,6 @@ typedef struct hapi_reuse {
   hapi_contact_notes notes;
 } hapi_reuse;
 
-struct hapi_body_slot;
-
 /* reuse.c */
 bool hapi_reuse_wanted(const hapi_physics *physics);
 /* After the islands of a round are gathered: of which it was all found out before. bodies: what is pushed
@@ -122,10 +120,6 @@ hapi_reuse_kind hapi_reuse_kind_of(const hapi_physics *physics, const hapi_reuse
                                    uint32_t known);
 /* Islands of other kinds leave the test set, and what is pushed in them; gathered again they are there. */
 void hapi_reuse_select(hapi_physics *physics, const hapi_reuse_book *book, hapi_reuse_kind kind);
-/* What a body under test did without a push: where the island's A was to be used again and it is not what it
- * was, something without a getter has changed, and A is measured after all. */
-void hapi_reuse_tested(hapi_physics *physics, hapi_reuse_book *book, struct hapi_body_slot *slot,
-                       const double base[6]);
 /* The island of a body under test: what was found is no good, and nothing of it is used again. */
 void hapi_reuse_spoil(hapi_physics *physics, hapi_reuse_book *book, uint32_t known);
 void hapi_reuse_keep(hapi_physics *physics, hapi_reuse_book *book); /* last, unless it failed */

@@ -108,9 +108,9 @@ static const joint_reader *reader_of(dJointType type)
 
 static void print_parameters(hapi_printer *p, dJointID joint, const joint_reader *reader)
 {
-  static const int names[] = {dParamLoStop,        dParamHiStop,       dParamVel,
-                              dParamFMax,          dParamFudgeFactor,  dParamBounce,
-                              dParamCFM,           dParamStopERP,      dParamStopCFM,
+  static const int names[] = {dParamLoStop,        dParamHiStop,        dParamVel,
+                              dParamFMax,          dParamFudgeFactor,   dParamBounce,
+                              dParamCFM,           dParamStopERP,       dParamStopCFM,
                               dParamSuspensionERP, dParamSuspensionCFM, dParamERP};
   for (int group = 0; group < reader->groups; ++group) {
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {

@@ -154,9 +154,9 @@ static const dContact *noted(const hapi_physics *physics, dJointID joint)
 
 static uint64_t hash_of_surface(const dSurfaceParameters *s)
 {
-  const double values[] = {s->mode,      s->mu,         s->mu2,      s->rho,      s->rho2,
-                           s->rhoN,      s->bounce,     s->bounce_vel, s->soft_erp, s->soft_cfm,
-                           s->motion1,   s->motion2,    s->motionN,  s->slip1,    s->slip2};
+  const double values[] = {s->mode,    s->mu,      s->mu2,        s->rho,      s->rho2,
+                           s->rhoN,    s->bounce,  s->bounce_vel, s->soft_erp, s->soft_cfm,
+                           s->motion1, s->motion2, s->motionN,    s->slip1,    s->slip2};
   uint64_t hash = 0xcbf29ce484222325u;
   for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
     uint64_t bits;
