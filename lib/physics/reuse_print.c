@@ -319,13 +319,34 @@ static bool sort_members(hapi_printer *p)
   return true;
 }
 
+/* A body that goes farther than that within a step will be elsewhere, or will have another velocity: what is
+ * found now cannot be used again. Most islands that a hand pushes are left out here. */
+static bool moves_on(const hapi_printer *p)
+{
+  const hapi_physics *physics = p->physics;
+  double most = physics->config.reuse / physics->probe_step_s;
+  for (uint32_t i = 0; i < p->island->member_count; ++i) {
+    uint32_t known = physics->test.members[p->island->first_member + i];
+    const hapi_known_body *entry = &physics->table.entries[known];
+    double arm = entry->extent > 0.0 ? entry->extent : 1.0;
+    if (hapi_v3_norm(dBodyGetLinearVel(entry->body)) > most ||
+        arm * hapi_v3_norm(dBodyGetAngularVel(entry->body)) > most) {
+      return true;
+    }
+  }
+  return false;
+}
+
 bool hapi_print_island(hapi_physics *physics, hapi_reuse_book *book, uint32_t island, bool bodies)
 {
   hapi_reuse_island *of = &book->islands[island];
   hapi_printer p = {physics, book, of, true};
   of->first = book->count;
   of->first_touch = book->touch_count;
-  p.good = sort_members(&p);
+  p.good = !moves_on(&p) && sort_members(&p);
+  if (!p.good) {
+    return false;
+  }
   print_world(&p);
   for (uint32_t i = 0; i < of->member_count && p.good; ++i) {
     print_member(&p, book->members[i].known);
