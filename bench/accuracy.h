@@ -92,6 +92,7 @@ typedef struct accuracy_run_def {
   double accuracy; /* of all of these that are HAP_BY_ACCURACY */
   hap_effect_wish shape;
   double lookback;
+  double reuse;
   hap_integration integration;
 } accuracy_run_def;
 

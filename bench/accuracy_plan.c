@@ -46,6 +46,7 @@ static const double iterations[] = {5.0, 100.0, 10.0, 20.0, 50.0, 200.0, 500.0};
 static const double sweeps[] = {2.0, 4.0, 3.0, 6.0, 10.0, 20.0};
 static const double hops[] = {0.0, 2.0, 1.0, 4.0, 8.0};
 static const double edge_probes[] = {0.0, 16.0, 64.0};
+static const double reuses[] = {0.0, 1e-7, 1e-6, 1e-5, 1e-4};
 static const double haptic_rates[] = {500.0, 2000.0, 5000.0, 10000.0};
 
 static const double positions[] = {0.0, 0.2, 0.4, 0.8, 1.0, 0.1, 0.3, 0.6, 0.7, 0.9};
@@ -191,6 +192,11 @@ static void turn_edge_probes(accuracy_run_def *def, double value)
   def->max_edge_probes = (int32_t)value;
 }
 
+static void turn_reuse(accuracy_run_def *def, double value)
+{
+  def->reuse = value;
+}
+
 static void turn_haptic_hz(accuracy_run_def *def, double value)
 {
   def->haptic_hz = value;
@@ -200,14 +206,15 @@ static const struct {
   const char *name;
   turn_fn turn;
   values values;
-  bool all_models; /* else model CONTACT alone */
+  size_t models; /* so many of the first ones; with all of them model SINGLE too */
 } knobs[] = {
-    {"contact_hz", turn_contact_hz, VALUES(contact_rates, 4), false},
-    {"iterations", turn_iterations, VALUES(iterations, 2), true},
-    {"sweeps", turn_sweeps, VALUES(sweeps, 2), false},
-    {"range_hops", turn_hops, VALUES(hops, 2), false},
-    {"edge_probes", turn_edge_probes, VALUES(edge_probes, 0), false},
-    {"haptic_hz", turn_haptic_hz, VALUES(haptic_rates, 2), true},
+    {"contact_hz", turn_contact_hz, VALUES(contact_rates, 4), 1},
+    {"iterations", turn_iterations, VALUES(iterations, 2), COUNT(models)},
+    {"sweeps", turn_sweeps, VALUES(sweeps, 2), 1},
+    {"range_hops", turn_hops, VALUES(hops, 2), 1},
+    {"edge_probes", turn_edge_probes, VALUES(edge_probes, 0), 1},
+    {"reuse", turn_reuse, VALUES(reuses, 0), 2},
+    {"haptic_hz", turn_haptic_hz, VALUES(haptic_rates, 2), COUNT(models)},
 };
 
 static void add_knob(writer *w, size_t knob, hap_model model)
@@ -331,10 +338,10 @@ static void add_knobs(writer *w)
   bool single = w->group->physics_hz == ACCURACY_DEFAULT_HZ && !w->plan->quick;
   for (size_t knob = 0; knob < COUNT(knobs); ++knob) {
     add_knob(w, knob, HAP_MODEL_CONTACT);
-    for (size_t m = 1; m < COUNT(models) && knobs[knob].all_models && !w->plan->quick; ++m) {
+    for (size_t m = 1; m < knobs[knob].models && !w->plan->quick; ++m) {
       add_knob(w, knob, models[m]);
     }
-    if (single && knobs[knob].all_models) {
+    if (single && knobs[knob].models == COUNT(models)) {
       add_knob(w, knob, HAP_MODEL_SINGLE);
     }
   }

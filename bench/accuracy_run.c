@@ -29,6 +29,7 @@ void accuracy_run_def_init(accuracy_run_def *def)
   def->range_hops = library.range_hops;
   def->max_edge_probes = library.max_edge_probes;
   def->accuracy = library.accuracy;
+  def->reuse = library.reuse;
   def->shape = (hap_effect_wish)library.effects[HAP_EFFECT_SHAPE];
   def->integration = HAP_INTEGRATION_AUTO;
 }
@@ -83,6 +84,7 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.coupling_damping = def->coupling_damping;
   options.def.trace_rows = 8; /* read after each tick */
   options.def.lookback = def->lookback;
+  options.def.reuse = def->reuse;
   hap_status status = rig_create(&options, r, &b->detail);
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);

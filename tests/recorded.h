@@ -39,6 +39,7 @@ typedef struct recorded_setup {
   int32_t max_sweeps;
   int32_t range_hops;
   double accuracy;
+  double reuse;
   hap_effect_wish cross;
   hap_coupling coupling; /* with a spring; else as the rig has it */
   double coupling_stiffness;
@@ -53,7 +54,8 @@ static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model
                       .probe = HAP_PROBE_BY_ACCURACY,
                       .max_sweeps = HAP_BY_ACCURACY,
                       .range_hops = HAP_BY_ACCURACY,
-                      .accuracy = HAP_ACCURACY_DEFAULT};
+                      .accuracy = HAP_ACCURACY_DEFAULT,
+                      .reuse = HAP_BY_ACCURACY};
   hap_record_def_init(&s.record, sizeof s.record);
   s.record.path = recorded_path;
   return s;
@@ -70,6 +72,7 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   options.def.max_sweeps = s->max_sweeps;
   options.def.range_hops = s->range_hops;
   options.def.accuracy = s->accuracy;
+  options.def.reuse = s->reuse;
   options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)s->cross;
   options.record = &s->record;
   if (s->coupling_stiffness > 0.0) {

@@ -20,7 +20,8 @@ static const hapi_knobs by_accuracy = {.contact_hz = HAP_BY_ACCURACY,
                                        .max_sweeps = HAP_BY_ACCURACY,
                                        .range_hops = HAP_BY_ACCURACY,
                                        .edge_probes = HAP_BY_ACCURACY,
-                                       .iterations = HAP_BY_ACCURACY};
+                                       .iterations = HAP_BY_ACCURACY,
+                                       .reuse = HAP_BY_ACCURACY};
 
 /* ---- the table ---- */
 
@@ -38,6 +39,7 @@ static void check_more(const hapi_settings *a, const hapi_settings *b)
   CHECK(a->edge_probes <= b->edge_probes);
   CHECK(a->iterations <= b->iterations);
   CHECK(a->shapes <= b->shapes);
+  CHECK(a->reuse >= b->reuse);
 }
 
 TEST(more_accuracy_is_more_of_everything)
@@ -58,6 +60,7 @@ TEST(the_default_is_what_the_library_is_without)
   hapi_dial_settings(&by_accuracy, HAPI_DIAL_DEFAULT, HAPI_DIAL_DEFAULT, 1e-3, &s);
   CHECK(s.contact_hz == 200.0 && s.probe == HAP_PROBE_SHARED && s.max_sweeps == 0);
   CHECK(s.range_hops == HAP_RANGE_ALL && s.edge_probes == 4 && s.iterations == 1.0 && s.shapes);
+  CHECK(s.reuse == 1e-6);
   CHECK(hapi_dial_percent(HAP_ACCURACY_DEFAULT) == HAPI_DIAL_DEFAULT);
 }
 
@@ -83,13 +86,15 @@ TEST(what_was_given_stays)
                             .max_sweeps = 0,
                             .range_hops = 3,
                             .edge_probes = 0,
-                            .iterations = 33};
+                            .iterations = 33,
+                            .reuse = 1e-3};
   const hapi_knobs worlds = {.iterations = 0};
   hapi_settings s;
   for (int percent = 0; percent <= 100; percent += 50) {
     hapi_dial_settings(&given, percent, percent, 1e-3, &s);
     CHECK(s.contact_hz == 77.0 && s.probe == HAP_PROBE_PAPER && s.max_sweeps == 0);
     CHECK(s.range_hops == 3 && s.edge_probes == 0 && s.fixed_iterations == 33);
+    CHECK(s.reuse == 1e-3);
     hapi_dial_settings(&worlds, percent, percent, 1e-3, &s);
     CHECK(s.iterations == 1.0 && s.fixed_iterations == 0 && s.range_hops == 0);
   }

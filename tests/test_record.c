@@ -182,6 +182,20 @@ TEST(a_loop_of_less_accuracy)
   hap_player_close(player);
 }
 
+/* Testing simulations that are used again are so in the replay. */
+TEST(testing_simulations_that_are_not_made)
+{
+  recorded_setup s = recorded_setup_of("slide", HAP_MODEL_ACCELERANCE, 900);
+  s.reuse = 1e-4;
+  (void)check_setup(&s);
+  hap_player *player = NULL;
+  hap_session_def def;
+  hap_session_def_init(&def, sizeof def);
+  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def) == HAP_OK && def.reuse == 1e-4);
+  hap_player_close(player);
+}
+
 /* The mass is not the default's: it is in the file. */
 TEST(couplings_of_the_literature)
 {
@@ -855,6 +869,7 @@ int main(void)
   RUN(scenes_in_the_paper_s_models);
   RUN(ways_of_testing);
   RUN(a_loop_of_less_accuracy);
+  RUN(testing_simulations_that_are_not_made);
   RUN(couplings_of_the_literature);
   RUN(two_pointers_and_a_replayed_motion);
   RUN(a_stall_of_physics);

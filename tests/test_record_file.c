@@ -511,7 +511,7 @@ TEST(a_file_of_before_plays)
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
   REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
   CHECK(hap_player_get_def(player, &def) == HAP_OK);
-  CHECK(def.max_sweeps == 0 && def.range_hops == HAP_RANGE_ALL);
+  CHECK(def.max_sweeps == 0 && def.range_hops == HAP_RANGE_ALL && def.reuse == 0.0);
   hap_player_close(player);
   b->head.size = HAPI_FILE_INFO_LEAST - 4;
   CHECK(open_changed(&f, "what was recorded") == HAP_ERROR_FORMAT);

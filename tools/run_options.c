@@ -286,6 +286,10 @@ static const option table[] = {
      "model accelerance: shared zero probe (default), as in the paper, or operating:\n"
      "about the forces that the pointers give",
      take_probe, 0, 0, 0},
+    {"--reuse", "M",
+     "what testing simulations found is used again while nothing has moved by more, in\n"
+     "metres, 0 to 0.01 (default 1e-6); 0: each step measures anew",
+     take_number, offsetof(run_options, rig.def.reuse), 0, 0.01},
     {"--lookback", "SHARE",
      "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
      "model single has them: the error of the felt force, as force_error",

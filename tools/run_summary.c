@@ -71,6 +71,7 @@ static void print_more(const hap_stats *stats, FILE *out)
   count(out, "physics_steps", stats->physics_steps);
   count(out, "physics_missed", stats->physics_missed);
   count(out, "probe_steps", stats->probe_steps);
+  count(out, "probes_reused", stats->probes_reused);
   number(out, "tick_us_max", stats->tick_us_max);
   number(out, "model_age_s_max", stats->model_age_max_s);
   count(out, "saturated_ticks", stats->saturated_ticks);

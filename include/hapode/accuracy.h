@@ -53,6 +53,7 @@ typedef struct hap_accuracy_info {
   int32_t iterations;   /* of QuickStep, in the newest physics step */
   uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where the effect shape is auto */
   uint32_t row_updates; /* the most a solve of a tick may make */
+  double reuse;         /* m */
 } hap_accuracy_info;
 
 /* [any] Turns the dial, 0..1, from the next sync on. HAP_ERROR_ARGUMENT: not such a number;

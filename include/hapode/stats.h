@@ -148,6 +148,8 @@ typedef struct hap_stats {
                          begin with the pointers' forces, foretold: root of the sums of squares, over
                          that of what they foretold. 0 without it. The forecast is linear in the
                          pointer's impulse: what begins or ends to touch or slide is not in it */
+  uint64_t
+      probes_reused; /* contacts and bodies whose A was used again at a step (hap_session_def.reuse) */
 } hap_stats;
 
 HAP_END_DECLS

@@ -47,6 +47,22 @@ static void begin_probe(hapi_physics *physics)
   }
 }
 
+static hapi_reuse_book *book_of(hapi_physics *physics)
+{
+  return &physics->reuse.books[0];
+}
+
+/* Of a body of model CONTACT that answers as a whole b is found with that answer, operating_point.c. */
+static bool takes_b(const hapi_physics *physics, uint32_t index)
+{
+  const hapi_body_slot *slot = &physics->bodies[index];
+  bool tested = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
+                physics->table.entries[slot->known].island != HAPI_NONE;
+  bool whole = physics->model == HAP_MODEL_CONTACT && (slot->flags & HAPI_BODY_MEASURED) != 0 &&
+               hapi_test_is_whole(physics, index);
+  return tested && !whole;
+}
+
 /* Eq. 3 with no force, or those of the operating point: b, from which those are taken out later. */
 static void measure_b(hapi_physics *physics)
 {
@@ -54,13 +70,15 @@ static void measure_b(hapi_physics *physics)
   hapi_test_step(physics);
   for (uint32_t i = 0; i < physics->body_high; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
-    if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0 ||
-        physics->table.entries[slot->known].island == HAPI_NONE) {
+    if (!takes_b(physics, i)) {
       continue;
     }
     double b[6];
     hapi_test_acceleration(physics, slot->known, b);
     slot->b_is_good = hapi_finite(b, 6);
+    if (!slot->b_is_good) {
+      hapi_reuse_spoil(physics, book_of(physics), slot->known);
+    }
     if (slot->b_is_good) {
       memcpy(slot->b, b, sizeof b);
     }
@@ -80,6 +98,13 @@ static double size_of_eq4(hapi_physics *physics, const hapi_contact_slot *contac
   return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
 }
 
+double hapi_accelerance_push(hapi_physics *physics, const hapi_contact_slot *contact)
+{
+  return at_operating_point(physics)
+             ? HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body_of(physics, contact)->mass
+             : size_of_eq4(physics, contact);
+}
+
 #define TORSION 3 /* the axis after x, y and z: a torque about the normal, for soft fingers */
 
 static bool has_axis(const hapi_physics *physics, const hapi_contact_slot *contact, int axis)
@@ -94,11 +119,11 @@ static double perturbation(hapi_physics *physics, const hapi_contact_slot *conta
 {
   const hapi_body_slot *body = body_of(physics, contact);
   double normal[3];
+  double size = hapi_accelerance_push(physics, contact);
   if (!at_operating_point(physics)) {
-    return size_of_eq4(physics, contact);
+    return size;
   }
   hapi_quat_rotate(hapi_test_state(physics, body->known)->quat, contact->normal_body, normal);
-  double size = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body->mass;
   return axis != TORSION && normal[axis] > 0.0 ? -size : size;
 }
 
@@ -196,6 +221,8 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
   if (kind != HAPI_ADMITTANCE_SINGULAR) {
     memcpy(contact->a, contact->measured, sizeof contact->a);
     contact->probed = true;
+  } else {
+    hapi_reuse_spoil(physics, book_of(physics), slot->known);
   }
 }
 
@@ -368,24 +395,8 @@ static uint32_t plan_rounds(hapi_physics *physics)
   return physics->dial.settings.probe == HAP_PROBE_PAPER ? test->contact_count : most;
 }
 
-void hapi_accelerance_measure(hapi_physics *physics)
+static void measure_rounds(hapi_physics *physics)
 {
-  if (physics->model != HAP_MODEL_ACCELERANCE && physics->model != HAP_MODEL_CONTACT) {
-    return;
-  }
-  take_free(physics);
-  hap_status status = hapi_test_gather(physics);
-  if (status >= HAP_OK && physics->test.contact_count > 0) {
-    status = hapi_test_enter(physics);
-  }
-  if (status < HAP_OK) {
-    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
-    return;
-  }
-  physics->cross_count = 0;
-  if (physics->test.contact_count == 0) {
-    return;
-  }
   uint32_t rounds = plan_rounds(physics);
   for (uint32_t round = 0; round < rounds; ++round) {
     if (round == 0 || physics->dial.settings.probe == HAP_PROBE_PAPER) {
@@ -394,5 +405,56 @@ void hapi_accelerance_measure(hapi_physics *physics)
     measure_round(physics, round);
   }
   take_forces_out(physics);
-  hapi_test_leave(physics);
+}
+
+/* Islands whose A holds still. All are gathered again then. */
+static hap_status measure_b_alone(hapi_physics *physics)
+{
+  if (!hapi_reuse_has(book_of(physics), HAPI_REUSE_A)) {
+    return HAP_OK;
+  }
+  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_A);
+  hap_status status = hapi_test_enter(physics);
+  if (status >= HAP_OK) {
+    measure_b(physics);
+    take_forces_out(physics);
+    hapi_test_leave(physics);
+    status = hapi_test_gather(physics);
+  }
+  return status;
+}
+
+static hap_status measure(hapi_physics *physics)
+{
+  hap_status status = hapi_test_gather(physics);
+  if (status >= HAP_OK) {
+    hapi_reuse_look(physics, book_of(physics), false);
+    status = measure_b_alone(physics);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  hapi_cross_begin(physics, book_of(physics));
+  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_NONE);
+  if (physics->test.contact_count > 0) {
+    status = hapi_test_enter(physics);
+    if (status < HAP_OK) {
+      return status;
+    }
+    measure_rounds(physics);
+    hapi_test_leave(physics);
+  }
+  hapi_reuse_keep(physics, book_of(physics));
+  return HAP_OK;
+}
+
+void hapi_accelerance_measure(hapi_physics *physics)
+{
+  if (physics->model != HAP_MODEL_ACCELERANCE && physics->model != HAP_MODEL_CONTACT) {
+    return;
+  }
+  take_free(physics);
+  if (measure(physics) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
+  }
 }

@@ -130,6 +130,44 @@ void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index)
   }
 }
 
+static bool holds(const hapi_physics *physics, const hapi_cross *cross, uint32_t contact)
+{
+  const hapi_body_slot *body = &physics->bodies[cross->body];
+  return cross->contact == contact &&
+         cross->contact_generation == physics->contacts[contact].generation &&
+         body->phase == HAPI_SLOT_LIVE && cross->body_generation == body->generation;
+}
+
+bool hapi_cross_is_full(const hapi_physics *physics)
+{
+  return is_on(physics) && physics->cross_count == physics->config.capacity.crosses;
+}
+
+void hapi_cross_begin(hapi_physics *physics, const hapi_reuse_book *book)
+{
+  uint32_t count = is_on(physics) ? physics->cross_count : 0;
+  physics->cross_count = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_cross *cross = &physics->crosses[i];
+    const hapi_contact_slot *contact = &physics->contacts[cross->contact];
+    bool stays =
+        contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+        holds(physics, cross, cross->contact) &&
+        hapi_reuse_kind_of(physics, book, physics->bodies[contact->body].known) != HAPI_REUSE_NONE;
+    if (stays) {
+      physics->crosses[physics->cross_count++] = *cross;
+    }
+  }
+}
+
+/* Not one whose b was used again, with nothing in it of what the block adds. */
+static bool is_tested(const hapi_physics *physics, const hapi_cross *cross)
+{
+  const hapi_body_slot *body = &physics->bodies[cross->body];
+  return holds(physics, cross, cross->contact) &&
+         physics->table.entries[body->known].island != HAPI_NONE;
+}
+
 /* b without what the loop is going to add by the blocks that it is given. */
 void hapi_cross_take_out(hapi_physics *physics)
 {
@@ -137,18 +175,10 @@ void hapi_cross_take_out(hapi_physics *physics)
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_cross *cross = &physics->crosses[i];
     double *b = physics->bodies[cross->body].b;
-    for (int k = 0; k < 6; ++k) {
+    for (int k = 0; k < 6 && is_tested(physics, cross); ++k) {
       b[k] -= hapi_v3_dot(cross->a[k], physics->contacts[cross->contact].last_force);
     }
   }
-}
-
-static bool holds(const hapi_physics *physics, const hapi_cross *cross, uint32_t contact)
-{
-  const hapi_body_slot *body = &physics->bodies[cross->body];
-  return cross->contact == contact &&
-         cross->contact_generation == physics->contacts[contact].generation &&
-         body->phase == HAPI_SLOT_LIVE && cross->body_generation == body->generation;
 }
 
 void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t number,

@@ -178,6 +178,7 @@ static void tell(hapi_physics *physics)
   out->edge_probes = (int32_t)s->edge_probes;
   out->shapes = s->shapes;
   out->row_updates = s->row_updates;
+  out->reuse = s->reuse;
 }
 
 void hapi_dial_follow(hapi_physics *physics)

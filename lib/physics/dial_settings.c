@@ -36,15 +36,16 @@ typedef struct physics_row {
   hap_probe probe;
   uint32_t edge_probes;
   double iterations; /* times those of the world */
+  double reuse;      /* m */
 } physics_row;
 
 /* Iterations last: a world that is solved too badly pushes on the loop with forces that are not there. */
 static const physics_row physics_rows[] = {
-    {0, HAP_PROBE_SHARED, 0, 0.25},     {10, HAP_PROBE_SHARED, 1, 0.5},
-    {20, HAP_PROBE_SHARED, 1, 0.75},    {30, HAP_PROBE_SHARED, 2, 1.0},
-    {50, HAP_PROBE_SHARED, 4, 1.0},     {60, HAP_PROBE_OPERATING, 4, 1.0},
-    {70, HAP_PROBE_OPERATING, 8, 1.0},  {80, HAP_PROBE_OPERATING, 16, 2.0},
-    {90, HAP_PROBE_OPERATING, 32, 2.0}, {100, HAP_PROBE_OPERATING, 64, 4.0},
+    {0, HAP_PROBE_SHARED, 0, 0.25, 1e-4},    {10, HAP_PROBE_SHARED, 1, 0.5, 1e-4},
+    {20, HAP_PROBE_SHARED, 1, 0.75, 1e-5},   {30, HAP_PROBE_SHARED, 2, 1.0, 1e-5},
+    {40, HAP_PROBE_SHARED, 4, 1.0, 1e-6},    {60, HAP_PROBE_OPERATING, 4, 1.0, 1e-6},
+    {70, HAP_PROBE_OPERATING, 8, 1.0, 1e-7}, {80, HAP_PROBE_OPERATING, 16, 2.0, 1e-7},
+    {90, HAP_PROBE_OPERATING, 32, 2.0, 0.0}, {100, HAP_PROBE_OPERATING, 64, 4.0, 0.0},
 };
 
 /* A row update takes about this on a slow processor. No solve may run past its tick on account of the
@@ -91,5 +92,6 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   out->probe = knobs->probe != HAP_PROBE_BY_ACCURACY ? knobs->probe : physics->probe;
   out->edge_probes = knobs->edge_probes >= 0 ? (uint32_t)knobs->edge_probes : physics->edge_probes;
   out->iterations = by_accuracy ? physics->iterations : knobs->iterations == 0 ? 1.0 : 0.0;
+  out->reuse = knobs->reuse >= 0.0 ? knobs->reuse : physics->reuse;
   out->fixed_iterations = knobs->iterations > 0 ? knobs->iterations : 0;
 }

@@ -22,6 +22,7 @@ typedef struct hapi_knobs {
   int32_t range_hops;
   int32_t edge_probes;
   int32_t iterations;
+  double reuse;
 } hapi_knobs;
 
 typedef struct hapi_settings {
@@ -34,7 +35,8 @@ typedef struct hapi_settings {
   uint32_t edge_probes;
   double iterations; /* times those of the world; 0: fixed_iterations */
   int32_t fixed_iterations;
-  bool shapes; /* where the effect is auto */
+  double reuse; /* m */
+  bool shapes;  /* where the effect is auto */
 } hapi_settings;
 
 /* period_s: of a tick. */

@@ -68,6 +68,8 @@ static void attach(hapi_physics *physics, const dContact *contact, const dBodyID
   dJointAttach(joint, bodies[0], bodies[1]);
   if (carried) {
     dJointDisable(joint);
+  } else if (hapi_reuse_wanted(physics)) {
+    hapi_reuse_note(physics, joint, contact);
   }
 }
 
@@ -267,6 +269,7 @@ void hapi_world_collide(hapi_physics *physics)
   dJointGroupEmpty(physics->contact_group);
   ++physics->surfaces.step; /* forgets what the surfaces were */
   physics->surfaces.used = 0;
+  physics->reuse.notes.count = 0;
   collide_inside(physics, physics->ode.space);
 }
 

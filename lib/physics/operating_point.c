@@ -85,7 +85,23 @@ static void acceleration(const hapi_physics *physics, const hapi_body_slot *slot
   }
 }
 
-/* b without the wrench of the operating point, which the loop's rows give anew. */
+static hapi_reuse_book *book_of(hapi_physics *physics)
+{
+  return &physics->reuse.books[1];
+}
+
+/* Without the wrench of the operating point, which the loop's rows give anew. */
+static void keep_b(hapi_body_slot *slot, const double base[6])
+{
+  for (int i = 0; i < 6; ++i) {
+    slot->b[i] = base[i];
+    for (int k = 0; k < 6; ++k) {
+      slot->b[i] -= slot->response[i][k] * slot->exchanged[k];
+    }
+  }
+  slot->flags |= HAPI_BODY_WHOLE;
+}
+
 static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], const double base[6])
 {
   hap_stats *stats = &physics->figures.stats;
@@ -99,17 +115,12 @@ static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], co
     ++stats->probes_singular; /* the last good one stays, or the body is outside */
     slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
     slot->flags |= slot->measured ? (uint32_t)HAPI_BODY_WHOLE : 0u;
+    hapi_reuse_spoil(physics, book_of(physics), slot->known);
     return;
   }
   memcpy(slot->response, a, sizeof slot->response);
-  for (int i = 0; i < 6; ++i) {
-    slot->b[i] = base[i];
-    for (int k = 0; k < 6; ++k) {
-      slot->b[i] -= a[i][k] * slot->exchanged[k];
-    }
-  }
+  keep_b(slot, base);
   slot->measured = true;
-  slot->flags |= HAPI_BODY_WHOLE;
 }
 
 static void measure_body(hapi_physics *physics, hapi_body_slot *slot, const double base[6])
@@ -130,6 +141,80 @@ static void measure_body(hapi_physics *physics, hapi_body_slot *slot, const doub
   keep(physics, slot, a, base);
 }
 
+/* The step that all differences are taken from. */
+static void measure_base(hapi_physics *physics)
+{
+  const hapi_test_set *test = &physics->test;
+  begin_probe(physics);
+  hapi_test_step(physics);
+  for (uint32_t i = 0; i < test->body_count; ++i) {
+    acceleration(physics, &physics->bodies[test->bodies[i]], test->base[i]);
+  }
+}
+
+/* Islands whose response holds still. All are gathered again then. */
+static hap_status measure_b_alone(hapi_physics *physics)
+{
+  if (!hapi_reuse_has(book_of(physics), HAPI_REUSE_A)) {
+    return HAP_OK;
+  }
+  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_A);
+  hap_status status = hapi_test_enter(physics);
+  if (status < HAP_OK) {
+    return status;
+  }
+  measure_base(physics);
+  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
+    hapi_body_slot *slot = &physics->bodies[physics->test.bodies[i]];
+    if (hapi_finite(physics->test.base[i], 6)) {
+      keep_b(slot, physics->test.base[i]);
+    } else {
+      hapi_reuse_spoil(physics, book_of(physics), slot->known);
+    }
+  }
+  hapi_test_leave(physics);
+  return hapi_test_gather_bodies(physics);
+}
+
+/* The flags are of this cycle, the response of another. */
+static void take_again(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
+    hapi_body_slot *slot = &physics->bodies[physics->test.bodies[i]];
+    if (hapi_reuse_kind_of(physics, book_of(physics), slot->known) != HAPI_REUSE_NONE) {
+      slot->flags |= HAPI_BODY_WHOLE;
+    }
+  }
+}
+
+static hap_status measure(hapi_physics *physics)
+{
+  hapi_test_set *test = &physics->test;
+  hap_status status = hapi_test_gather_bodies(physics);
+  if (status >= HAP_OK) {
+    hapi_reuse_look(physics, book_of(physics), true);
+    status = measure_b_alone(physics);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  take_again(physics);
+  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_NONE);
+  if (test->body_count > 0) {
+    status = hapi_test_enter(physics);
+    if (status < HAP_OK) {
+      return status;
+    }
+    measure_base(physics);
+    for (uint32_t i = 0; i < test->body_count; ++i) {
+      measure_body(physics, &physics->bodies[test->bodies[i]], test->base[i]);
+    }
+    hapi_test_leave(physics);
+  }
+  hapi_reuse_keep(physics, book_of(physics));
+  return HAP_OK;
+}
+
 void hapi_operating_point_measure(hapi_physics *physics)
 {
   if (physics->model != HAP_MODEL_CONTACT) {
@@ -138,24 +223,7 @@ void hapi_operating_point_measure(hapi_physics *physics)
   if (!hapi_wish_is_off(physics->wishes, HAP_EFFECT_TESTING)) {
     choose(physics);
   }
-  hap_status status = hapi_test_gather_bodies(physics);
-  if (status >= HAP_OK && physics->test.body_count > 0) {
-    status = hapi_test_enter(physics);
-  }
-  if (status < HAP_OK) {
+  if (measure(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last response stays");
-    return;
   }
-  if (physics->test.body_count == 0) {
-    return;
-  }
-  begin_probe(physics);
-  hapi_test_step(physics);
-  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
-    acceleration(physics, &physics->bodies[physics->test.bodies[i]], physics->test.base[i]);
-  }
-  for (uint32_t i = 0; i < physics->test.body_count; ++i) {
-    measure_body(physics, &physics->bodies[physics->test.bodies[i]], physics->test.base[i]);
-  }
-  hapi_test_leave(physics);
 }

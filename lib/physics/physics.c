@@ -130,6 +130,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_meshes_finish(&physics->meshes);
   hapi_snapshot_finish(&physics->snapshot);
   hapi_test_finish(&physics->test);
+  hapi_reuse_finish(physics);
   hapi_lookback_finish(&physics->lookback);
   hapi_free(physics->bodies);
   hapi_free(physics->contacts);
@@ -195,6 +196,7 @@ static void prepare(hapi_physics *physics)
   hapi_range_reset(physics);
   hapi_lookback_reset(physics);
   hapi_dial_reset(physics);
+  hapi_reuse_reset(physics);
   hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
   physics->model = (hap_model)atomic_load(&physics->wanted_model);
   physics->wishes = atomic_load(&physics->wanted_effects);

@@ -23,6 +23,7 @@
 #include "physics/joint_probe.h"
 #include "physics/lookback.h"
 #include "physics/physics.h"
+#include "physics/reuse.h"
 #include "physics/snapshot.h"
 #include "proximity/proximity.h"
 #include "record/tape.h"
@@ -254,6 +255,9 @@ typedef struct hapi_body_slot {
   double foretold_gain[3];  /* N s, likewise */
 
   double cross[6][3]; /* scratch: the answer to the contact of its island in this round */
+
+  hapi_print_place prints[HAPI_REUSE_BOOKS]; /* reuse.h, of the island that begins with it */
+  uint32_t next_pushed;                      /* scratch */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
@@ -264,8 +268,9 @@ typedef struct hapi_contact_slot {
   uint32_t pointer_generation;
   dGeomID geom; /* compared only, never used */
   bool wanted;
-  bool probed;    /* a holds a measured accelerance */
-  uint32_t round; /* scratch: order among the contacts of its island */
+  bool probed;          /* a holds a measured accelerance */
+  uint32_t round;       /* scratch: order among the contacts of its island */
+  uint32_t next_pushed; /* scratch of reuse.c */
   double point_body[3];
   double normal_body[3];
   bool has_shape;                 /* one with a closed form, and it is wished for */
@@ -558,6 +563,7 @@ struct hapi_physics {
   hapi_meshes meshes;
   hapi_snapshot snapshot;
   hapi_test_set test;
+  hapi_reuse reuse;
   hapi_lookback lookback;
   hapi_dial dial;
 
@@ -805,6 +811,8 @@ bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t coun
 hap_status hapi_test_gather(hapi_physics *physics);
 /* The islands of the measured bodies of model CONTACT. */
 hap_status hapi_test_gather_bodies(hapi_physics *physics);
+/* Model CONTACT: whether it must answer all that acts on it by one matrix. */
+bool hapi_test_is_whole(const hapi_physics *physics, uint32_t body);
 /* The islands of the neighbours that the loop owns, as far as they can be undone. */
 hap_status hapi_test_gather_owned(hapi_physics *physics);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. */
@@ -825,8 +833,13 @@ void hapi_test_finish(hapi_test_set *test);
 
 /* accelerance.c: eq. 3-6 */
 void hapi_accelerance_measure(hapi_physics *physics);
+/* N, of the next testing simulations; their directions are of the contact. */
+double hapi_accelerance_push(hapi_physics *physics, const hapi_contact_slot *contact);
 
 /* cross.c: cross accelerance, nothing where it is off */
+bool hapi_cross_is_full(const hapi_physics *physics);
+/* Before the islands that are measured are: blocks of others stay, where A is used again. */
+void hapi_cross_begin(hapi_physics *physics, const hapi_reuse_book *book);
 /* After a testing simulation with a force [N] at the contact: what the others did. */
 void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, int axis,
                        double force);

@@ -115,9 +115,8 @@ static bool gather_island(hapi_physics *physics, uint32_t start)
   return good;
 }
 
-/* Model CONTACT: whether more than one pointer contact acts on the body. Then all of it must answer by
- * one matrix. */
-static bool is_whole(const hapi_physics *physics, uint32_t body)
+/* More than one pointer contact acts on the body, or another body may. */
+bool hapi_test_is_whole(const hapi_physics *physics, uint32_t body)
 {
   uint32_t contacts = 0;
   for (uint32_t i = 0; i < physics->contact_high && contacts < 2; ++i) {
@@ -134,7 +133,7 @@ static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact
   }
   uint32_t flags = physics->bodies[contact->body].flags;
   bool needs = physics->model == HAP_MODEL_ACCELERANCE ||
-               ((flags & HAPI_BODY_MEASURED) != 0 && !is_whole(physics, contact->body));
+               ((flags & HAPI_BODY_MEASURED) != 0 && !hapi_test_is_whole(physics, contact->body));
   return needs && (flags & HAPI_BODY_DRIVEN) == 0 && !physics->bodies[contact->body].known_free;
 }
 
@@ -194,7 +193,7 @@ hap_status hapi_test_gather_bodies(hapi_physics *physics)
   for (uint32_t i = 0; i < physics->body_high && status >= HAP_OK; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
     if (slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_MEASURED) != 0 &&
-        is_whole(physics, i)) {
+        hapi_test_is_whole(physics, i)) {
       bool testable = false;
       uint32_t first = test->member_count;
       status = gather_body(physics, slot, &testable);

@@ -74,6 +74,7 @@ typedef struct hapi_file_info {
   double accuracy;
   int32_t iterations;
   int32_t reserved; /* 0 */
+  double reuse;
 } hapi_file_info;
 
 #define HAPI_FILE_INFO_LEAST offsetof(hapi_file_info, max_sweeps)

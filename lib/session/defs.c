@@ -33,6 +33,7 @@ void hap_session_def_init(hap_session_def *def, size_t size_of_def)
   d.accuracy = HAP_ACCURACY_DEFAULT;
   d.max_hull_points = 4096;
   d.range_hops = HAP_BY_ACCURACY;
+  d.reuse = HAP_BY_ACCURACY;
   hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
@@ -88,6 +89,7 @@ static hap_status check_knobs(const hap_session_def *def, hap_detail *detail)
       {def->max_sweeps, 0, 10000, "max_sweeps"},
       {def->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
       {def->iterations, 0, 10000, "iterations"},
+      {def->reuse, 0.0, 0.01, "reuse"},
   };
   for (size_t i = 0; i < sizeof rules / sizeof rules[0]; ++i) {
     const number_rule *r = &rules[i];
@@ -135,7 +137,6 @@ hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail
       {def->max_hull_points, 0, 1048576, "max_hull_points"},
       {def->guard, 0, 1, "guard"},
       {def->lookback, 0.0, 0.5, "lookback"},
-
   };
   hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
   if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {

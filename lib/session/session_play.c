@@ -550,6 +550,7 @@ hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
   d.range_hops = info->range_hops_1 - 1;
   d.iterations = info->iterations;
   d.accuracy = info->accuracy;
+  d.reuse = info->reuse;
   hapi_session_unpack_effects(info->effects, &d);
   memcpy(def, &d, size < sizeof d ? size : sizeof d);
   return HAP_OK;

@@ -83,6 +83,7 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   out->guard = (int32_t)def->guard;
   out->max_sweeps = def->max_sweeps;
   out->range_hops_1 = def->range_hops + 1;
+  out->reuse = def->reuse;
   out->effects = hapi_session_pack_effects(def);
   out->iterations = def->iterations;
   out->accuracy = def->accuracy;
