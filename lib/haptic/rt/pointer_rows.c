@@ -53,8 +53,12 @@ typedef struct placed_pointer {
 static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
 {
   hapi_nearest nearest;
+  hapi_touch_frame frame = {NULL, NULL};
+  if (at->body != NULL) {
+    frame = (hapi_touch_frame){&at->body->pose, at->body->rotation};
+  }
   if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->radius, &c->shape, &c->shape_pose,
-                         at->body != NULL ? &at->body->pose : NULL, &nearest)) {
+                         &frame, &nearest)) {
     return false;
   }
   hapi_v3_copy(nearest.normal, at->normal);
@@ -627,9 +631,11 @@ static void brake(hapi_tick *tick)
 
 void hapi_pointers_direct(hapi_tick *tick)
 {
+  bool off = hapi_wish_is_off(tick->wishes, HAP_EFFECT_PROXY);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
-    p->coupling_reason = HAP_COUPLING_ASKED;
+    bool unknown = p->coupling == HAP_COUPLING_AUTO && !p->hold_known && !off;
+    p->coupling_reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
     p->contact_stiffness = p->near_stiffness;
     p->near_stiffness = 0.0;
     p->row = 0;
