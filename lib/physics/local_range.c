@@ -701,7 +701,8 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
   slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
 }
 
-/* The effect range=on: also what no chain of contacts leads to, as long as there is room. */
+/* The effect range=on: also what no chain of contacts leads to, as long as there is room, where there are
+ * neighbours: a range begins at them. */
 static void expand_further(hapi_physics *physics)
 {
   hapi_range *range = &physics->range;
@@ -773,7 +774,7 @@ void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
   for (uint32_t next = range->seeds; next < range->count; ++next) {
     expand(physics, range->queue[next], false);
   }
-  if (hapi_wish_is_on(physics->wishes, HAP_EFFECT_RANGE)) {
+  if (range->seeds > 0 && hapi_wish_is_on(physics->wishes, HAP_EFFECT_RANGE)) {
     expand_further(physics);
   }
   physics->figures.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);

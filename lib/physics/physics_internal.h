@@ -483,6 +483,7 @@ typedef struct hapi_test_set {
   bool mechanisms; /* there are joints other than contacts */
   dGeomID *order;  /* geoms of the spaces that sleeping members are in, space by space */
   uint32_t order_count;
+  bool keeps_order; /* of all members' spaces, not of sleeping ones alone */
   uint32_t order_capacity;
   dJointID *cut; /* joints of kinematic bodies to the outside, disabled for the probe */
   uint32_t cut_count;
@@ -656,6 +657,7 @@ void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes
 
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
+void hapi_world_collide_carried(hapi_physics *physics); /* what the loop carries: carried_group */
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
