@@ -403,6 +403,7 @@ typedef struct hapi_range {
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
+  bool refused; /* a body within the hops that the loop cannot own */
   hapi_geom_name *names;
   uint32_t name_count;
   uint32_t name_capacity;
@@ -504,7 +505,7 @@ typedef struct hapi_physics_counts {
   double range_s;      /* part of neighbour_s */
   double beyond_s;     /* part of range_s: bodies that are no neighbours */
   double joints_s;     /* of joints: their scan and their part of the message; of publish_s */
-  double cross_s;      /* part of testing_s */
+  double cross_s;      /* part of testing_s and publish_s */
   double foretold2;    /* m^2/s^2, sum over what testing simulations foretold of owned bodies ... */
   double range_error2; /* ... and over what the loop made different from it */
   hapi_effect_figures effects[HAP_EFFECTS];
@@ -832,7 +833,7 @@ void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, 
 void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index); /* after three of them */
 void hapi_cross_take_out(hapi_physics *physics); /* of b: what last_force does by the blocks */
 /* Those of a contact that is the one of this number in the message. */
-void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t number,
+void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number,
                         hapi_model *out);
 
 /* reconcile.c: eq. 12-14, momentum */
