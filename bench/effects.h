@@ -10,7 +10,7 @@
 
 #define EFFECTS_SCENES_MAX 40
 #define EFFECTS_VARIANTS_MAX 32
-#define EFFECTS_ROUNDS_MAX 25
+#define EFFECTS_ROUNDS_MAX 101
 
 typedef struct effects_run {
   const scene_parameters *parameters;

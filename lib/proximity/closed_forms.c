@@ -39,7 +39,7 @@ static void point_box(const double half[3], const double p[3], surface *out)
 {
   double gap[3];
   for (int i = 0; i < 3; ++i) {
-    out->point[i] = fmin(fmax(p[i], -half[i]), half[i]);
+    out->point[i] = hapi_min(hapi_max(p[i], -half[i]), half[i]);
     gap[i] = p[i] - out->point[i];
   }
   static const double unused[3] = {0.0, 0.0, 1.0};
