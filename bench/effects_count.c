@@ -8,9 +8,7 @@
 #include "bench/effects.h"
 
 /* Instructions of a tick: effects-tick, which lies beside this program, under valgrind's callgrind, which
- * counts inside of hapi_tick_run alone. */
-
-#define COUNT_TICKS 500.0
+ * counts inside of one function alone. */
 
 static bool beside(const char *name, char *out, size_t size)
 {
@@ -49,31 +47,25 @@ static double read_count(FILE *in)
   return count;
 }
 
-double effects_instructions(bench *b, const char *of, const char *list, const char *without)
+double effects_instructions(const effects_counting *of)
 {
-  static int can = -1;
-  const char *why = NULL;
   char program[PATH_MAX];
   char name[64] = "effects-tick";
   char command[2 * PATH_MAX];
-  if (can < 0) {
-    can = effects_can_count(&why) && !b->quick;
+  if (of->without != NULL) {
+    snprintf(name, sizeof name, "effects-tick-without-%s", of->without);
   }
-  if (without != NULL && without[0] != '\0') {
-    snprintf(name, sizeof name, "effects-tick-without-%s", without);
-  }
-  if (can == 0 || !beside(name, program, sizeof program)) {
+  if (!beside(name, program, sizeof program)) {
     return -1.0;
   }
-  snprintf(
-      command, sizeof command,
-      "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=hapi_tick_run "
-      "'%s' %s %s %g 2>&1",
-      program, of, list, COUNT_TICKS);
+  snprintf(command, sizeof command,
+           "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=%s "
+           "'%s' %s %s %d 2>&1",
+           of->inside, program, of->scene, of->list, of->ticks);
   FILE *in = popen(command, "r"); /* NOLINT(cert-env33-c): names of the library's own */
   if (in == NULL) {
     return -1.0;
   }
   double count = read_count(in);
-  return pclose(in) == 0 && count > 0.0 ? count / COUNT_TICKS : -1.0;
+  return pclose(in) == 0 && count > 0.0 ? count / of->ticks : -1.0;
 }

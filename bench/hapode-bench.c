@@ -156,7 +156,8 @@ static bool fits(const program *p, const bench *b)
 {
   const char *wrong = NULL;
   bool of_accuracy = b->shards > 0 || b->merge != NULL || b->fresh;
-  if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick) {
+  if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
+      p->run != bench_effects) {
     wrong = "has no scenes to choose from";
   } else if (b->coupling != NULL && !takes_coupling(p, b->coupling)) {
     wrong =

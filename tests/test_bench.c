@@ -129,6 +129,37 @@ TEST(fig5_is_as_the_paper_and_the_closed_form_say)
   CHECK(count_lines(file_in_folder("said", ""), "fig5: 0 off") == 1);
 }
 
+#define EFFECTS_COLUMNS                                                                      \
+  "scene,effect,state,reason,tick_us,physics_ms,instructions,contact_us,total_ms,force_rel," \
+  "model,own_tick_us,own_physics_ms,own_contact_us"
+
+/* A scene of which each effect is measured: in model contact 12 are on, off and auto beside all of them, in
+ * accelerance five, of which testing cannot be off. Instructions are no time; without valgrind they are not
+ * counted. */
+TEST(effects_are_alike_and_leave_no_code)
+{
+  const char *const arguments[] = {"effects", "--quick", "--verify", "--scene",
+                                   "slide",   "--out",   folder,     NULL};
+  CHECK(run(arguments, environ) == 0);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   slide, contact: force of auto is") == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "ok   slide, accelerance: force of auto is") == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "skip instructions are not counted") == 1 ||
+        count_lines(file_in_folder("said", ""), "ok   slide: a tick with gyro=off takes") == 1);
+  CHECK(count_rows(file_in_folder("effects", ".csv"), EFFECTS_COLUMNS) ==
+        3 + 3 * 12 + 3 + 3 * 5 - 1);
+  CHECK(!plot_available() || exists(file_in_folder("effects", ".svg")));
+  unlink(file_in_folder("effects", ".csv"));
+  unlink(file_in_folder("effects", ".svg"));
+}
+
+TEST(effects_knows_its_scenes)
+{
+  const char *const arguments[] = {"effects", "--scene", "slides", "--out", folder, NULL};
+  CHECK(run(arguments, environ) == 1);
+  CHECK(count_lines(file_in_folder("said", ""), "slides") == 1);
+  unlink(file_in_folder("effects", ".csv"));
+}
+
 /* Of the checks those that are no times hold on every machine. */
 TEST(edits_leaves_its_table)
 {
@@ -449,6 +480,8 @@ int main(void)
   }
   RUN(fig5_leaves_its_tables);
   RUN(fig5_is_as_the_paper_and_the_closed_form_say);
+  RUN(effects_are_alike_and_leave_no_code);
+  RUN(effects_knows_its_scenes);
   RUN(edits_leaves_its_table);
   RUN(fig6_leaves_its_table);
   RUN(fig7_leaves_its_table);

@@ -346,11 +346,13 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
       dJointSetFixed(joint);
     }
     REQUIRE(cw_start(&w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
-    cw_run(&w, 60);
+    cw_run(&w, 130); /* two ticks of them are looked at */
     hap_effect_info info = look(&w, HAP_EFFECT_CROSS);
     CHECK(i == 2 ? is_off(&w, HAP_EFFECT_CROSS, HAP_REASON_NOT_PAPERS)
                  : info.reason == HAP_REASON_ASKED);
     CHECK((info.on > 0) == (i == 0));
+    CHECK((info.physics_ms > 0.0) == (i < 2)); /* that there is none has to be found out */
+    CHECK(isnan(info.tick_us) || (info.tick_us > 0.0) == (i == 0));
     cw_close(&w);
   }
 }

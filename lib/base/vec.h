@@ -175,6 +175,17 @@ static inline void hapi_m3_apply_transposed(const double m[9], const double v[3]
 }
 
 /* out = r m r^T: a tensor of the body in world axes; out is none of the two */
+static inline void hapi_m3_multiply(const double a[9], const double b[9], double out[9])
+{
+  double product[9];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      product[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
+    }
+  }
+  memcpy(out, product, sizeof product);
+}
+
 static inline void hapi_m3_turn(const double r[9], const double m[9], double out[9])
 {
   double rm[9];

@@ -337,7 +337,9 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_write(haptic);
   uint64_t recording = hapi_effect_begin(&haptic->tick);
   hapi_tape_ticked(haptic);
-  hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
+  if (hapi_tape_records(haptic->tape)) {
+    hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
+  }
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
   report(haptic);
   publish_poses(haptic);

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
@@ -16,6 +17,19 @@ static bool is_on(const hapi_physics *physics)
 {
   return physics->config.capacity.crosses > 0 && physics->model == HAP_MODEL_ACCELERANCE &&
          hapi_wish_is_on(physics->wishes, HAP_EFFECT_CROSS);
+}
+
+/* The time that the effect takes: 0 is handed on where it is off. */
+static int64_t begin_time(const hapi_physics *physics)
+{
+  return is_on(physics) ? hapi_clock_now() : 0;
+}
+
+static void end_time(hapi_physics *physics, int64_t begin_ns)
+{
+  if (begin_ns != 0) {
+    physics->figures.cross_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  }
 }
 
 /* A body that the loop moves, which is under test with the contact and is not the one it pushes. */
@@ -33,6 +47,7 @@ static bool answers(const hapi_physics *physics, const hapi_contact_slot *contac
 void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, int axis,
                        double force)
 {
+  int64_t begin_ns = begin_time(physics);
   uint32_t bodies = is_on(physics) ? physics->body_high : 0;
   for (uint32_t i = 0; i < bodies; ++i) {
     hapi_body_slot *slot = &physics->bodies[i];
@@ -44,6 +59,7 @@ void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, 
       }
     }
   }
+  end_time(physics, begin_ns);
 }
 
 /* (m/s^2)/N, of the body's surface. */
@@ -116,6 +132,7 @@ void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index)
 {
   const hapi_contact_slot *contact = &physics->contacts[contact_index];
   hap_stats *stats = &physics->figures.stats;
+  int64_t begin_ns = begin_time(physics);
   uint32_t bodies = is_on(physics) ? physics->body_high : 0;
   for (uint32_t i = 0; i < bodies; ++i) {
     double share = 0.0;
@@ -128,6 +145,7 @@ void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index)
       keep_block(physics, contact_index, i);
     }
   }
+  end_time(physics, begin_ns);
 }
 
 static bool holds(const hapi_physics *physics, const hapi_cross *cross, uint32_t contact)
@@ -171,6 +189,7 @@ static bool is_tested(const hapi_physics *physics, const hapi_cross *cross)
 /* b without what the loop is going to add by the blocks that it is given. */
 void hapi_cross_take_out(hapi_physics *physics)
 {
+  int64_t begin_ns = begin_time(physics);
   uint32_t count = is_on(physics) ? physics->cross_count : 0;
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_cross *cross = &physics->crosses[i];
@@ -179,11 +198,12 @@ void hapi_cross_take_out(hapi_physics *physics)
       b[k] -= hapi_v3_dot(cross->a[k], physics->contacts[cross->contact].last_force);
     }
   }
+  end_time(physics, begin_ns);
 }
 
-void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t number,
-                        hapi_model *out)
+void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number, hapi_model *out)
 {
+  int64_t begin_ns = begin_time(physics);
   uint32_t count = is_on(physics) ? physics->cross_count : 0;
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_cross *cross = &physics->crosses[i];
@@ -194,4 +214,5 @@ void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t 
       memcpy(place->a, cross->a, sizeof place->a);
     }
   }
+  end_time(physics, begin_ns);
 }

@@ -696,12 +696,14 @@ static void expand(hapi_physics *physics, uint32_t index, bool seed)
     own_mechanism(physics);
     return;
   }
+  range->refused = range->refused || within_hops(physics, known);
   hapi_mechanism_drop(physics);
   bool tests = !hapi_wish_is_off(physics->wishes, HAP_EFFECT_TESTING);
   slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
 }
 
-/* The effect range=on: also what no chain of contacts leads to, as long as there is room. */
+/* The effect range=on: also what no chain of contacts leads to, as long as there is room: once
+ * all is in that chains lead to, and where there are neighbours, as a range begins at them. */
 static void expand_further(hapi_physics *physics)
 {
   hapi_range *range = &physics->range;
@@ -746,6 +748,7 @@ static void begin_walk(hapi_physics *physics)
   range->near->contact_hz = physics->dial.settings.contact_hz;
   range->near->always = hapi_wish_is_on(physics->wishes, HAP_EFFECT_PASSES);
   range->pairs_noted = 0;
+  range->refused = false;
   range->hops = 0;
   range->joint_count = range->member_count = range->moving = 0;
   range->fastest = fastest_pointer(physics);
@@ -774,7 +777,7 @@ void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
   for (uint32_t next = range->seeds; next < range->count; ++next) {
     expand(physics, range->queue[next], false);
   }
-  if (hapi_wish_is_on(physics->wishes, HAP_EFFECT_RANGE)) {
+  if (range->seeds > 0 && !range->refused && hapi_wish_is_on(physics->wishes, HAP_EFFECT_RANGE)) {
     expand_further(physics);
   }
   physics->figures.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);

@@ -59,16 +59,13 @@ static void soften(const hapi_physics *physics, dSurfaceParameters *s)
   s->mode |= dContactSoftERP | dContactSoftCFM;
 }
 
-/* Of a pair that the loop carries: for testing simulations alone, and switched off but for these. */
 static void attach(hapi_physics *physics, const dContact *contact, const dBodyID bodies[2],
                    bool carried)
 {
   dJointGroupID group = carried ? physics->carried_group : physics->contact_group;
   dJointID joint = dJointCreateContact(physics->ode.world, group, contact);
   dJointAttach(joint, bodies[0], bodies[1]);
-  if (carried) {
-    dJointDisable(joint);
-  } else if (hapi_reuse_wanted(physics)) {
+  if (!carried && hapi_reuse_wanted(physics)) {
     hapi_reuse_note(physics, joint, contact);
   }
 }
@@ -226,9 +223,15 @@ static bool carried_by_loop(const hapi_physics *physics, dBodyID body)
   return known != HAPI_NONE && physics->table.entries[known].loop_owned;
 }
 
+typedef struct collision {
+  hapi_physics *physics;
+  bool carried; /* the pairs that the loop carries, else the others */
+} collision;
+
 static void near_callback(void *data, dGeomID a, dGeomID b)
 {
-  hapi_physics *physics = data;
+  const collision *c = data;
+  hapi_physics *physics = c->physics;
   if (dGeomIsSpace(a) || dGeomIsSpace(b)) {
     dSpaceCollide2(a, b, data, near_callback); /* what is inside of one is met by itself */
     return;
@@ -241,8 +244,7 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   dSurfaceParameters surface;
   bool turned;
   bool carried = carried_by_loop(physics, body_a) || carried_by_loop(physics, body_b);
-  if ((carried && !hapi_range_error_wanted(physics)) ||
-      !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
+  if (carried != c->carried || !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
     return;
   }
   const dGeomID geoms[2] = {turned ? b : a, turned ? a : b};
@@ -251,26 +253,32 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */
-static void collide_inside(hapi_physics *physics, dSpaceID space)
+static void collide_inside(collision *c, dSpaceID space)
 {
-  dSpaceCollide(space, physics, near_callback);
+  dSpaceCollide(space, c, near_callback);
   int count = dSpaceGetNumGeoms(space);
   for (int i = 0; i < count; ++i) {
     dGeomID geom = dSpaceGetGeom(space, i);
     if (dGeomIsSpace(geom)) {
-      collide_inside(physics, (dSpaceID)geom);
+      collide_inside(c, (dSpaceID)geom);
     }
   }
 }
 
 void hapi_world_collide(hapi_physics *physics)
 {
-  dJointGroupEmpty(physics->carried_group);
+  collision c = {physics, false};
   dJointGroupEmpty(physics->contact_group);
   ++physics->surfaces.step; /* forgets what the surfaces were */
   physics->surfaces.used = 0;
   physics->reuse.notes.count = 0;
-  collide_inside(physics, physics->ode.space);
+  collide_inside(&c, physics->ode.space);
+}
+
+void hapi_world_collide_carried(hapi_physics *physics)
+{
+  collision c = {physics, true};
+  collide_inside(&c, physics->ode.space);
 }
 
 void hapi_world_quickstep(hapi_physics *physics, double step_s)

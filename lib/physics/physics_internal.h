@@ -409,6 +409,7 @@ typedef struct hapi_range {
   hapi_pair_place *pair_places; /* open addressing, a power of 2 */
   uint32_t pair_place_count;
   uint32_t pairs_noted;
+  bool refused; /* a body within the hops that the loop cannot own */
   hapi_geom_name *names;
   uint32_t name_count;
   uint32_t name_capacity;
@@ -489,6 +490,7 @@ typedef struct hapi_test_set {
   bool mechanisms; /* there are joints other than contacts */
   dGeomID *order;  /* geoms of the spaces that sleeping members are in, space by space */
   uint32_t order_count;
+  bool keeps_order; /* of all members' spaces, not of sleeping ones alone */
   uint32_t order_capacity;
   dJointID *cut; /* joints of kinematic bodies to the outside, disabled for the probe */
   uint32_t cut_count;
@@ -509,7 +511,7 @@ typedef struct hapi_physics_counts {
   double range_s;      /* part of neighbour_s */
   double beyond_s;     /* part of range_s: bodies that are no neighbours */
   double joints_s;     /* of joints: their scan and their part of the message; of publish_s */
-  double cross_s;      /* part of testing_s */
+  double cross_s;      /* part of testing_s and publish_s */
   double foretold2;    /* m^2/s^2, sum over what testing simulations foretold of owned bodies ... */
   double range_error2; /* ... and over what the loop made different from it */
   hapi_effect_figures effects[HAP_EFFECTS];
@@ -665,6 +667,7 @@ void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes
 
 /* ode_world.c */
 void hapi_world_collide(hapi_physics *physics);
+void hapi_world_collide_carried(hapi_physics *physics); /* what the loop carries: carried_group */
 void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
 /* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
 void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
@@ -846,7 +849,7 @@ void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, 
 void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index); /* after three of them */
 void hapi_cross_take_out(hapi_physics *physics); /* of b: what last_force does by the blocks */
 /* Those of a contact that is the one of this number in the message. */
-void hapi_cross_publish(const hapi_physics *physics, uint32_t contact, uint32_t number,
+void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number,
                         hapi_model *out);
 
 /* reconcile.c: eq. 12-14, momentum */

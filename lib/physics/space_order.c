@@ -7,7 +7,9 @@
 
 /* A geom that moves goes to the front of its space's list, and the order of the list is the order in
  * which contacts are found. Geoms of awake bodies have moved in the global step already and do not
- * go again; those of a sleeping body move only in the probes. For these the order is put back. */
+ * go again; those of a sleeping body move only in the probes. For these the order is put back, and for all
+ * where a test set asks for it: model CONTACT cleans the space before its probes, and what is clean goes
+ * to the front once more. */
 
 bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
 {
@@ -73,7 +75,7 @@ hap_status hapi_space_order_save(hapi_physics *physics)
   test->order_count = 0;
   for (uint32_t i = 0; i < test->member_count && status >= HAP_OK; ++i) {
     dBodyID body = physics->table.handles[test->members[i]];
-    if (!dBodyIsEnabled(body)) {
+    if (test->keeps_order || !dBodyIsEnabled(body)) {
       status = save_spaces_of(test, body);
     }
   }
@@ -136,6 +138,9 @@ void hapi_space_order_restore(hapi_physics *physics)
   }
   for (int depth = deepest; depth >= 0; --depth) {
     restore_at(&physics->test, depth);
+  }
+  if (physics->test.keeps_order && physics->test.order_count > 0) {
+    dSpaceClean(physics->ode.space); /* as they were: what is dirty does not go to the front */
   }
   physics->test.order_count = 0;
 }

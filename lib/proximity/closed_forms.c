@@ -39,7 +39,7 @@ static void point_box(const double half[3], const double p[3], surface *out)
 {
   double gap[3];
   for (int i = 0; i < 3; ++i) {
-    out->point[i] = fmin(fmax(p[i], -half[i]), half[i]);
+    out->point[i] = hapi_min(hapi_max(p[i], -half[i]), half[i]);
     gap[i] = p[i] - out->point[i];
   }
   static const double unused[3] = {0.0, 0.0, 1.0};
@@ -105,11 +105,12 @@ static bool point_core(const hapi_solid *solid, const double p[3], surface *out)
   return false;
 }
 
-static bool sphere_solid(const hapi_solid *sphere, const hapi_solid *solid, hapi_nearest *out)
+static bool sphere_solid(const double center[3], double radius, const hapi_solid *solid,
+                         hapi_nearest *out)
 {
   double gap[3];
   surface local;
-  hapi_v3_sub(sphere->center, solid->center, gap);
+  hapi_v3_sub(center, solid->center, gap);
   hapi_solid_to_local(solid, gap, gap);
   if (!point_core(solid, gap, &local)) {
     return false;
@@ -118,7 +119,7 @@ static bool sphere_solid(const hapi_solid *sphere, const hapi_solid *solid, hapi
   hapi_solid_to_world(solid, local.point, out->point_b);
   hapi_v3_add(solid->center, out->point_b, out->point_b);
   hapi_v3_madd(out->point_b, solid->ball, out->normal, out->point_b);
-  out->distance = local.distance - solid->ball - sphere->ball;
+  out->distance = local.distance - solid->ball - radius;
   hapi_v3_madd(out->point_b, out->distance, out->normal, out->point_a);
   return true;
 }
@@ -161,10 +162,23 @@ bool hapi_closed_form(const hapi_solid *a, const hapi_solid *b, hapi_nearest *ou
   if (second->kind == HAPI_SHAPE_PLANE) {
     found = solid_plane(first, second, out);
   } else if (first->kind == HAPI_SHAPE_SPHERE) {
-    found = sphere_solid(first, second, out);
+    found = sphere_solid(first->center, first->ball, second, out);
   }
   if (found && swapped) {
     hapi_nearest_swap(out);
   }
   return found;
+}
+
+bool hapi_closed_form_ball(double radius, const hapi_solid *solid, hapi_nearest *out)
+{
+  static const double origin[3] = {0.0, 0.0, 0.0};
+  if (solid->kind != HAPI_SHAPE_PLANE) {
+    return sphere_solid(origin, radius, solid, out);
+  }
+  hapi_solid_axis(solid, 2, out->normal);
+  hapi_v3_scale(-radius, out->normal, out->point_a);
+  out->distance = -hapi_v3_dot(solid->center, out->normal) - radius;
+  hapi_v3_madd(out->point_a, -out->distance, out->normal, out->point_b);
+  return true;
 }

@@ -27,33 +27,38 @@ void hapi_solid_to_world(const hapi_solid *solid, const double vector[3], double
 /* m; products of six lengths must not overflow. */
 static const double length_max = 1e30;
 
-static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
+void hapi_solid_size(hapi_solid *solid, const hapi_shape *shape)
 {
-  double round[2] = {0.0, 0.0}; /* disc, ball */
+  hapi_v3_set(solid->half, 0.0, 0.0, 0.0);
+  solid->disc = solid->ball = 0.0;
   switch (shape->kind) {
     case HAPI_SHAPE_SPHERE:
-      round[1] = shape->radius;
+      solid->ball = shape->radius;
       break;
     case HAPI_SHAPE_BOX:
       hapi_v3_copy(shape->half, solid->half);
       break;
     case HAPI_SHAPE_CAPSULE:
-      round[1] = shape->radius;
+      solid->ball = shape->radius;
       solid->half[2] = shape->half[2];
       break;
     case HAPI_SHAPE_CYLINDER:
-      round[0] = shape->radius;
+      solid->disc = shape->radius;
       solid->half[2] = shape->half[2];
       break;
     case HAPI_SHAPE_HULL:
-      round[1] = shape->rounding;
+      solid->ball = shape->rounding;
       break;
     case HAPI_SHAPE_PLANE:
       break;
   }
-  solid->disc = round[0];
-  solid->ball = round[1];
+}
+
+static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
+{
+  hapi_solid_size(solid, shape);
   const double *h = solid->half;
+  double round[2] = {solid->disc, solid->ball};
   solid->reach = sqrt(hapi_v3_dot(h, h) + solid->disc * solid->disc);
   return hapi_finite(h, 3) && hapi_finite(round, 2) && h[0] >= 0.0 && h[1] >= 0.0 && h[2] >= 0.0 &&
          round[0] >= 0.0 && round[1] >= 0.0;

@@ -28,6 +28,9 @@ typedef struct hapi_solid {
 bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose *pose,
                       const double origin[3]);
 
+/* half, disc and ball, which closed forms need beside kind, center and rotation; nothing is checked. */
+void hapi_solid_size(hapi_solid *solid, const hapi_shape *shape);
+
 /* Both of a pair, from the position of a. False as above, and for two planes. */
 bool hapi_pair_place(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
                      const hap_pose *pose_b, hapi_solid out[2]);

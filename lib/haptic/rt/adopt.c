@@ -256,7 +256,8 @@ static bool observes(const hapi_tick *tick, const hapi_model *model)
 
 static bool may_be_proxy(const hapi_tick_pointer *p, uint32_t wishes)
 {
-  bool asked = p->coupling == HAP_COUPLING_AUTO && !hapi_wish_is_off(wishes, HAP_EFFECT_PROXY);
+  bool asked = p->coupling == HAP_COUPLING_AUTO && p->hold_known &&
+               !hapi_wish_is_off(wishes, HAP_EFFECT_PROXY);
   return p->generation != 0 &&
          (p->proxied || asked ||
           (p->coupling != HAP_COUPLING_AUTO && p->coupling != HAP_COUPLING_DIRECT));

@@ -5,23 +5,44 @@
 #include "base/vec.h"
 #include "proximity/closed_forms.h"
 
-bool hapi_ball_nearest(const double center[3], double radius, const hapi_shape *shape,
-                       const hap_pose *pose_local, const hap_pose *pose_body, hapi_nearest *out)
+/* The shape about the ball's centre, as a closed form wants it. Most geoms stand in their body as they are. */
+static void place(const double center[3], const hapi_shape *shape, const hap_pose *pose_local,
+                  const hapi_touch_frame *frame, hapi_solid *out)
 {
-  hapi_solid solids[2];
-  hapi_shape ball = {.kind = HAPI_SHAPE_SPHERE, .radius = radius};
-  hap_pose at = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
-  hap_pose pose = *pose_local;
-  hapi_v3_copy(center, at.position);
-  if (pose_body != NULL) {
-    hapi_pose_point(pose_body->position, pose_body->quat_wxyz, pose_local->position, pose.position);
-    hapi_quat_multiply(pose_body->quat_wxyz, pose_local->quat_wxyz, pose.quat_wxyz);
+  const double *q = pose_local->quat_wxyz;
+  bool turned = q[1] != 0.0 || q[2] != 0.0 || q[3] != 0.0;
+  double at[3];
+  hapi_v3_copy(pose_local->position, at);
+  if (turned || frame->pose == NULL) {
+    hapi_quat_to_matrix(q, out->rotation);
   }
-  if (shape->kind == HAPI_SHAPE_HULL || !hapi_pair_place(&ball, &at, shape, &pose, solids) ||
-      !hapi_closed_form(&solids[0], &solids[1], out)) {
+  if (frame->pose != NULL) {
+    hapi_m3_apply(frame->rotation, at, at);
+    hapi_v3_add(frame->pose->position, at, at);
+    if (turned) {
+      hapi_m3_multiply(frame->rotation, out->rotation, out->rotation);
+    } else {
+      memcpy(out->rotation, frame->rotation, sizeof out->rotation);
+    }
+  }
+  hapi_v3_sub(at, center, out->center);
+  out->kind = shape->kind;
+  hapi_solid_size(out, shape);
+}
+
+bool hapi_ball_nearest(const double center[3], double radius, const hapi_shape *shape,
+                       const hap_pose *pose_local, const hapi_touch_frame *frame,
+                       hapi_nearest *out)
+{
+  hapi_solid solid;
+  if (shape->kind == HAPI_SHAPE_HULL) {
+    return false;
+  }
+  place(center, shape, pose_local, frame, &solid);
+  if (!hapi_closed_form_ball(radius, &solid, out)) {
     return false;
   }
   hapi_v3_add(out->point_a, center, out->point_a); /* the solids stand about the ball's centre */
   hapi_v3_add(out->point_b, center, out->point_b);
-  return true;
+  return hapi_finite(out->point_b, 3) && hapi_finite(&out->distance, 1);
 }

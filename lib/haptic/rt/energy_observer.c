@@ -328,9 +328,7 @@ static bool settle_ports(hapi_tick *tick)
 /* J that a force on a way, or a torque on a turn, gives; world units. */
 static double would_give(const hapi_tick_pointer *p, const double force[3], const double way[3])
 {
-  return p->generation == 0 || hapi_v3_dot(way, way) < MOVED_LEAST
-             ? 0.0
-             : world_per_device(p) * hapi_v3_dot(force, way);
+  return hapi_v3_dot(way, way) < MOVED_LEAST ? 0.0 : world_per_device(p) * hapi_v3_dot(force, way);
 }
 
 /* Leaves a share of the force's part along the motion, where it gives. */
@@ -349,6 +347,9 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
   double in = 0.0;
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
     double gives = would_give(p, p->device_wrench.force, p->guard.moved);
     double turns = would_give(p, p->device_wrench.torque, p->guard.turned);
     out += hapi_max(gives, 0.0) + hapi_max(turns, 0.0);
@@ -360,6 +361,9 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
   double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
+    if (p->generation == 0) {
+      continue;
+    }
     hold_back(p, p->device_wrench.force, p->guard.moved, share);
     hold_back(p, p->device_wrench.torque, p->guard.turned, share);
   }

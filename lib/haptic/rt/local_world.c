@@ -5,6 +5,7 @@
 
 #include "base/pose.h"
 #include "haptic/rt/effect_clock.h"
+#include "haptic/rt/gyro.h"
 #include "haptic/rt/rows.h"
 
 /* The local world of model CONTACT: bodies near the pointers with their own contacts, stepped by the
@@ -109,53 +110,6 @@ static void set_free_velocities(hapi_tick *tick)
          tick->world.solver.body_count * sizeof *tick->world.solver.free);
 }
 
-/* The turn that a constant angular velocity makes, by the exponential map. Small angles: the sine
- * and cosine by their series, good to 1e-12 for the half of TURN_MAX. */
-static void turn(double quat[4], const double w[3], double seconds)
-{
-  double half2 = 0.25 * seconds * seconds * hapi_v3_dot(w, w);
-  double sinc =
-      1.0 - half2 * (1.0 / 6.0) * (1.0 - half2 * (1.0 / 20.0) * (1.0 - half2 * (1.0 / 42.0)));
-  double cosine = 1.0 - half2 * 0.5 * (1.0 - half2 * (1.0 / 12.0) * (1.0 - half2 * (1.0 / 30.0)));
-  double q[4] = {cosine, 0.5 * seconds * sinc * w[0], 0.5 * seconds * sinc * w[1],
-                 0.5 * seconds * sinc * w[2]};
-  hapi_quat_multiply(q, quat, quat);
-  hapi_quat_normalize(quat);
-}
-
-/* Angular velocity of an angular momentum at an orientation. */
-static void spin_of(const hapi_model_body *given, const double quat[4], const double momentum[3],
-                    double out[3])
-{
-  double local[3];
-  double spin[3];
-  hapi_quat_unrotate(quat, momentum, local);
-  hapi_m3_apply(given->inverse_inertia, local, spin);
-  hapi_quat_rotate(quat, spin, out);
-}
-
-/* The angular momentum stays, the angular velocity follows the inertia that turns: a midpoint step
- * each, which loses no energy to the second order. */
-static void turn_gyroscopic(hapi_local_body *body, double seconds, uint32_t substeps)
-{
-  double local[3];
-  double momentum[3];
-  double *w = body->twist.angular;
-  double step = seconds / (double)substeps;
-  hapi_quat_unrotate(body->pose.quat_wxyz, w, local);
-  hapi_m3_apply(body->given.inertia, local, momentum);
-  hapi_quat_rotate(body->pose.quat_wxyz, momentum, momentum);
-  for (uint32_t i = 0; i < substeps; ++i) {
-    double middle[4];
-    double spin[3];
-    memcpy(middle, body->pose.quat_wxyz, sizeof middle);
-    turn(middle, w, 0.5 * step);
-    spin_of(&body->given, middle, momentum, spin);
-    turn(body->pose.quat_wxyz, spin, step);
-    spin_of(&body->given, body->pose.quat_wxyz, momentum, w);
-  }
-}
-
 /* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what hardly
  * spins goes on as it is. */
 static bool wobbles(const hapi_tick *tick, const hapi_local_body *body)
@@ -179,25 +133,12 @@ static void move_body(hapi_tick *tick, hapi_local_body *body)
   hapi_v3_madd(body->pose.position, seconds, body->twist.linear, body->pose.position);
   if (wobbles(tick, body)) {
     uint64_t begin = hapi_effect_begin(tick);
-    turn_gyroscopic(body, seconds, substeps);
+    hapi_gyro_turn(body, seconds, substeps);
     hapi_effect_end(tick, HAP_EFFECT_GYRO, begin);
     return;
   }
   for (uint32_t i = 0; i < substeps; ++i) {
-    turn(body->pose.quat_wxyz, body->twist.angular, seconds / (double)substeps);
-  }
-}
-
-/* A new angular velocity for the orientation before the tick, at the one after it. */
-static void follow_inertia(const hapi_tick *tick, hapi_local_body *body)
-{
-  double local[3];
-  double momentum[3];
-  if (wobbles(tick, body)) {
-    hapi_m3_apply_transposed(body->rotation, body->twist.angular, local);
-    hapi_m3_apply(body->given.inertia, local, momentum);
-    hapi_m3_apply(body->rotation, momentum, local);
-    spin_of(&body->given, body->pose.quat_wxyz, local, body->twist.angular);
+    hapi_turn(body->pose.quat_wxyz, body->twist.angular, seconds / (double)substeps);
   }
 }
 
@@ -457,7 +398,9 @@ void hapi_local_world_step(hapi_tick *tick)
       if (hapi_body_responds(body)) {
         take_velocity(body, tick->world.solver.v[body->row]);
         limit_spin(body);
-        follow_inertia(tick, body);
+        if (wobbles(tick, body)) {
+          hapi_gyro_follow(body);
+        }
         damp(body);
       }
     }

@@ -372,3 +372,42 @@ double hapi_friction_energy(const hapi_tick *tick, const hapi_local_contact *con
   const hapi_friction *f = hapi_friction_now(tick, contact);
   return f == NULL || f->rigid ? 0.0 : 0.5 * f->stiffness * dot4(f->stretch, f->stretch);
 }
+
+/* Of rows, or by eq. 7 as it stands: then nothing answers. */
+static void friction_force(const hapi_tick *tick, const hapi_local_contact *c,
+                           const hapi_friction *f, double limit, double out[4])
+{
+  if (c->row == HAPI_NO_ROW) {
+    hapi_friction_push(f, limit, out);
+    return;
+  }
+  memset(out, 0, 4 * sizeof *out);
+  for (uint32_t i = 0; i < f->axis_count; ++i) {
+    double force = tick->world.solver.rows[c->row + 1 + i].impulse / tick->period;
+    for (int k = 0; k < 4; ++k) {
+      out[k] += force * f->axes[i][k];
+    }
+  }
+}
+
+void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c)
+{
+  hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  hapi_friction *f = hapi_friction_now(tick, c);
+  double push[4];
+  hap_wrench wrench;
+  hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
+  if (f == NULL) {
+    return;
+  }
+  double limit = c->mu * hapi_v3_norm(c->force);
+  friction_force(tick, c, f, limit, push);
+  hapi_friction_wrench(f, p, push, c->point_now, &wrench);
+  hapi_v3_add(c->force, wrench.force, c->force);
+  hapi_v3_copy(wrench.torque, c->couple);
+  if (HAPI_HAS_TORQUE && p->feels_torque) {
+    hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
+    hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
+  }
+  hapi_friction_end(f, push, limit);
+}

@@ -48,6 +48,9 @@ void hapi_friction_wrench(const hapi_friction *f, const hapi_tick_pointer *p, co
 /* Once the force of the tick is known: a contact that slides drags the body's anchor along. */
 void hapi_friction_end(hapi_friction *f, const double push[4], double limit);
 
+/* Once the rows are solved: adds friction to the normal force on the body, and its torque on the hand. */
+void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c);
+
 /* What is kept of the contact. */
 static inline hapi_friction *hapi_friction_of(const hapi_tick *tick,
                                               const hapi_local_contact *contact)

@@ -53,8 +53,12 @@ typedef struct placed_pointer {
 static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
 {
   hapi_nearest nearest;
+  hapi_touch_frame frame = {NULL, NULL};
+  if (at->body != NULL) {
+    frame = (hapi_touch_frame){&at->body->pose, at->body->rotation};
+  }
   if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->radius, &c->shape, &c->shape_pose,
-                         at->body != NULL ? &at->body->pose : NULL, &nearest)) {
+                         &frame, &nearest)) {
     return false;
   }
   hapi_v3_copy(nearest.normal, at->normal);
@@ -627,9 +631,11 @@ static void brake(hapi_tick *tick)
 
 void hapi_pointers_direct(hapi_tick *tick)
 {
+  bool off = hapi_wish_is_off(tick->wishes, HAP_EFFECT_PROXY);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
-    p->coupling_reason = HAP_COUPLING_ASKED;
+    bool unknown = p->coupling == HAP_COUPLING_AUTO && !p->hold_known && !off;
+    p->coupling_reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
     p->contact_stiffness = p->near_stiffness;
     p->near_stiffness = 0.0;
     p->row = 0;
@@ -669,46 +675,6 @@ static void push_outside(hapi_tick *tick, hapi_local_body *body, const hapi_loca
   hapi_v3_madd(body->angular_impulse, tick->period, moment, body->angular_impulse);
 }
 
-/* Of rows, or by eq. 7 as it stands: then nothing answers. */
-static void friction_force(const hapi_tick *tick, const hapi_local_contact *c,
-                           const hapi_friction *f, double limit, double out[4])
-{
-  if (c->row == HAPI_NO_ROW) {
-    hapi_friction_push(f, limit, out);
-    return;
-  }
-  memset(out, 0, 4 * sizeof *out);
-  for (uint32_t i = 0; i < f->axis_count; ++i) {
-    double force = tick->world.solver.rows[c->row + 1 + i].impulse / tick->period;
-    for (int k = 0; k < 4; ++k) {
-      out[k] += force * f->axes[i][k];
-    }
-  }
-}
-
-/* Adds friction to the normal force. */
-static void rub(hapi_tick *tick, hapi_local_contact *c)
-{
-  hapi_tick_pointer *p = &tick->pointers[c->pointer];
-  hapi_friction *f = hapi_friction_now(tick, c);
-  double push[4];
-  hap_wrench wrench;
-  hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
-  if (f == NULL) {
-    return;
-  }
-  double limit = c->mu * hapi_v3_norm(c->force);
-  friction_force(tick, c, f, limit, push);
-  hapi_friction_wrench(f, p, push, c->point_now, &wrench);
-  hapi_v3_add(c->force, wrench.force, c->force);
-  hapi_v3_copy(wrench.torque, c->couple);
-  if (HAPI_HAS_TORQUE && p->feels_torque) {
-    hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
-    hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
-  }
-  hapi_friction_end(f, push, limit);
-}
-
 /* About the pointer's origin, of the normal force. */
 static void turn_tool(hapi_tick_pointer *p, const hapi_local_contact *c)
 {
@@ -734,7 +700,7 @@ static void feel(hapi_tick *tick, hapi_local_contact *c)
   }
   if (HAPI_HAS_FRICTION && c->rubs) {
     uint64_t begin = hapi_effect_begin(tick);
-    rub(tick, c);
+    hapi_friction_rub(tick, c);
     hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
   }
   if (c->force[0] == 0.0 && c->force[1] == 0.0 && c->force[2] == 0.0) {

@@ -134,7 +134,7 @@ static bool place_ball(const touch *c)
   hapi_nearest nearest;
   frame_point(ball, ball_is_a ? c->in->core_a : c->in->core_b, center);
   if (!hapi_ball_nearest(center, ball_is_a ? c->in->ball_a : c->in->ball_b, &c->in->shape,
-                         &c->in->shape_pose, other->pose, &nearest)) {
+                         &c->in->shape_pose, other, &nearest)) {
     return false;
   }
   hapi_v3_scale(ball_is_a ? 1.0 : -1.0, nearest.normal, c->out->normal);
