@@ -140,20 +140,6 @@ TEST(friction_on_the_pointer_is_part_of_it)
   CHECK(c.stats.force_error > 0.0 && c.stats.force_error < 0.05);
 }
 
-TEST(few_iterations_of_the_world_are_not_taken_for_an_error)
-{
-  static course reference;
-  static course c;
-  contact_world w;
-  play(HAP_MODEL_SINGLE, 60.0, 0.0, &reference);
-  begin(&w, HAP_MODEL_CONTACT, 60.0, 0.1);
-  dWorldSetQuickStepNumIterations(w.world, 3);
-  run(&w, 0.5 * EDGE, &c);
-  double error = error_of(&c, &reference);
-  printf("# error %.4f, estimate %.4f\n", error, c.stats.force_error);
-  CHECK(c.stats.force_error < 1.5 * error && error < 1.5 * c.stats.force_error);
-}
-
 /* ---- whole scenes ---- */
 
 #define SCENE_TICKS 3000
@@ -167,6 +153,7 @@ typedef struct play_def {
   double friction;  /* of the pointers; < 0: the scene's */
   bool interrupted; /* somebody touches a body now and then: no window goes on from another one */
   double lookback;
+  int iterations; /* of the world; 0: the scene's */
 } play_def;
 
 typedef struct scene_course {
@@ -210,6 +197,9 @@ static void play_scene(const play_def *def, scene_course *out)
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   if (def->model == HAP_MODEL_SINGLE) {
     dWorldSetQuickStepNumIterations(r.scene->world, SCENE_ITERATIONS);
+  }
+  if (def->iterations > 0) {
+    dWorldSetQuickStepNumIterations(r.scene->world, def->iterations);
   }
   REQUIRE(hap_session_start(r.session) == HAP_OK);
   out->ticks = (size_t)fmin(1e3 * r.scene->parameters.duration, SCENE_TICKS);
@@ -270,11 +260,11 @@ static void check_scene(const play_def *def, double factor)
 
 TEST(hulls_are_part_of_it)
 {
-  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0},
-                           {"lever", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0},
-                           {"lever", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0},
-                           {"peg", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, false, 0.0},
-                           {"peg", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0}};
+  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"lever", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"lever", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"peg", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"peg", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0, 0}};
   for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
     check_scene(&defs[i], 1.5);
   }
@@ -283,14 +273,14 @@ TEST(hulls_are_part_of_it)
 /* Physics looks for what is near where the pointer was a tick before: on what is round that is another normal. */
 TEST(round_things_are_felt_as_model_single_has_them)
 {
-  const play_def def = {"chain", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0};
+  const play_def def = {"chain", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0};
   check_scene(&def, 1.5);
 }
 
 TEST(soft_fingers_are_part_of_it)
 {
-  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0},
-                           {"grasp", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0}};
+  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0, 0}};
   for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
     check_scene(&defs[i], 1.5);
   }
@@ -299,8 +289,8 @@ TEST(soft_fingers_are_part_of_it)
 /* Springs along the surface that are loaded when a window begins, of spheres and of hulls. */
 TEST(a_window_may_begin_in_the_midst_of_a_grip)
 {
-  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, true, 0.0},
-                           {"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, true, 0.0}};
+  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, true, 0.0, 0},
+                           {"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, true, 0.0, 0}};
   for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
     check_scene(&defs[i], 0.5);
   }
@@ -309,14 +299,24 @@ TEST(a_window_may_begin_in_the_midst_of_a_grip)
 /* A stack creeps under a hand that rests on it. */
 TEST(what_adds_up_from_window_to_window_is_seen)
 {
-  const play_def def = {"hold", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0};
+  const play_def def = {"hold", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0, 0};
   check_scene(&def, 1.5);
+}
+
+/* With twice as many as that a stack would sink in the reference, by a tenth of the force. */
+TEST(few_iterations_of_the_world_are_not_taken_for_an_error)
+{
+  static scene_course c;
+  const play_def def = {"hold", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.1, 5};
+  play_scene(&def, &c);
+  printf("# estimate %.5f\n", c.stats.force_error);
+  CHECK(c.stats.lookbacks >= 3 && c.stats.force_error < 0.005);
 }
 
 /* Each of its forces is held for two milliseconds. */
 TEST(a_slow_loop_is_held_against_a_fast_one)
 {
-  const play_def def = {"lever", HAP_MODEL_CONTACT, 20.0, 500.0, -1.0, false, 0.0};
+  const play_def def = {"lever", HAP_MODEL_CONTACT, 20.0, 500.0, -1.0, false, 0.0, 0};
   check_scene(&def, 1.5);
 }
 
@@ -324,10 +324,10 @@ TEST(changes_no_bit_of_hulls_and_friction)
 {
   static scene_course without;
   static scene_course with;
-  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, false, 0.0},
-                           {"peg", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, 0.6, false, 0.0},
-                           {"grasp", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0},
-                           {"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, true, 0.0}};
+  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, false, 0.0, 0},
+                           {"peg", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, 0.6, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, true, 0.0, 0}};
   for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
     play_def looks = defs[i];
     looks.lookback = 0.1;
@@ -436,12 +436,12 @@ int main(void)
   RUN(estimates_the_error_of_the_force);
   RUN(changes_no_bit);
   RUN(friction_on_the_pointer_is_part_of_it);
-  RUN(few_iterations_of_the_world_are_not_taken_for_an_error);
   RUN(hulls_are_part_of_it);
   RUN(round_things_are_felt_as_model_single_has_them);
   RUN(soft_fingers_are_part_of_it);
   RUN(a_window_may_begin_in_the_midst_of_a_grip);
   RUN(what_adds_up_from_window_to_window_is_seen);
+  RUN(few_iterations_of_the_world_are_not_taken_for_an_error);
   RUN(a_slow_loop_is_held_against_a_fast_one);
   RUN(changes_no_bit_of_hulls_and_friction);
   RUN(a_body_that_the_application_moves_spoils_the_window);
