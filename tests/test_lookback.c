@@ -338,6 +338,51 @@ TEST(changes_no_bit_of_hulls_and_friction)
   }
 }
 
+/* A box that the hand holds comes down on a mesh in the static world; there are no bodies. */
+static void play_mesh(hap_model model, double lookback, course *out)
+{
+  static const double corners[] = {-0.3, -0.3, 0.0, 0.3, -0.3, 0.0, 0.3, 0.3, 0.0, -0.3, 0.3, 0.0};
+  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
+  double hull[24];
+  contact_world w;
+  cw_open(&w, CW_GRAVITY);
+  dTriMeshDataID data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
+                              3 * (int)sizeof(dTriIndex));
+  dCreateTriMesh(w.space, data, NULL, NULL, NULL);
+  for (int i = 0; i < 24; ++i) {
+    hull[i] = (i / 3 >> i % 3 & 1) != 0 ? RADIUS : -RADIUS;
+  }
+  w.def.model = model;
+  w.def.lookback = lookback;
+  w.hand_def.hull_xyz = hull;
+  w.hand_def.hull_points = 8;
+  w.hand_def.radius = 0.0;
+  w.hand_def.friction = 0.5;
+  w.hand_velocity[0] = 0.01;
+  w.hand_velocity[2] = -0.01;
+  CHECK(cw_start(&w, 0.0, 0.0, 1.3 * RADIUS));
+  cw_run(&w, TICKS / 2);
+  out->stats = cw_stats(&w);
+  cw_close(&w);
+  dGeomTriMeshDataDestroy(data);
+}
+
+TEST(a_hull_may_touch_a_mesh_and_nothing_else)
+{
+  static course without;
+  static course with;
+  const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE};
+  for (size_t i = 0; i < sizeof models / sizeof models[0]; ++i) {
+    play_mesh(models[i], 0.0, &without);
+    play_mesh(models[i], 0.1, &with);
+    printf("# force error %.5f\n", with.stats.force_error);
+    CHECK(with.stats.lookbacks > 0 && with.stats.lookbacks_spoilt == 0);
+    CHECK(with.stats.force_error > 0.0 && with.stats.force_error < 0.01);
+    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+  }
+}
+
 /* ---- windows that cannot be gone over ---- */
 
 TEST(a_body_that_the_application_moves_spoils_the_window)
@@ -444,6 +489,7 @@ int main(void)
   RUN(few_iterations_of_the_world_are_not_taken_for_an_error);
   RUN(a_slow_loop_is_held_against_a_fast_one);
   RUN(changes_no_bit_of_hulls_and_friction);
+  RUN(a_hull_may_touch_a_mesh_and_nothing_else);
   RUN(a_body_that_the_application_moves_spoils_the_window);
   RUN(bodies_and_geoms_that_go_away_meanwhile);
   RUN(a_change_of_model_ends_the_window);
