@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 
 /* hapode-bench accuracy: what accuracy costs in time. Every scene with a prescribed motion of the
- * hand, in every model, against model SINGLE at 1 kHz with 1000 iterations. Columns:
+ * hand, in every model, against model SINGLE at 1 kHz with 1000 iterations, twice the scene's at least. Columns:
  *
  *   knob, value    what differs from the library's defaults; default: nothing, the worst of ten
  *                  starts that are 1 um to 1 mm apart. operating, operating_cross: probes about the
@@ -14,7 +14,7 @@
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
  *                  worst one of model contact, or 1 um apart
  *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none, with
- *                  --quick beside the default
+ *                  --quick beside the default alone, unless --estimates all
  *   pose_*_mm      distance of the bodies that the loop moves from their reference
  *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
  *                  is half way to the next ones and, in rows "default" of model contact, above what a
@@ -141,8 +141,8 @@ static void check_joints(bench *b, const accuracy_row *r)
 /* Whether the session was asked for the row's error, where there is more to it than noise. */
 static bool is_estimated(const bench *b, const accuracy_row *r)
 {
-  return strcmp(r->model, hap_model_name(HAP_MODEL_SINGLE)) != 0 && (!b->quick || is_default(r)) &&
-         r->errors.force > r->noise_floor;
+  return strcmp(r->model, hap_model_name(HAP_MODEL_SINGLE)) != 0 &&
+         (accuracy_estimates_all(b) || is_default(r)) && r->errors.force > r->noise_floor;
 }
 
 /* Whether what the session says of its error is right; nothing said is wrong. The bound is on the whole table. */
@@ -389,6 +389,7 @@ hap_status bench_accuracy(bench *b)
   if (status >= HAP_OK) { /* as the shards were run */
     merging.quick = settings.quick;
     merging.scene = strcmp(settings.scene, "all") != 0 ? settings.scene : NULL;
+    merging.estimates = settings.estimates;
     merging.coupling = strcmp(settings.coupling, "none") != 0 ? settings.coupling : NULL;
     status = run_or_merge(&merging);
     b->off = merging.off;

@@ -17,7 +17,6 @@
 
 #define ACCURACY_HAPTIC_HZ 1000.0
 #define ACCURACY_SPEC_MAX 1024
-#define ACCURACY_REFERENCE_ITERATIONS 1000
 #define ACCURACY_STARTS_MAX 10
 #define ACCURACY_SCENES_MAX 32
 #define ACCURACY_NAME_MAX 16
@@ -172,6 +171,7 @@ typedef struct accuracy_plan {
   size_t count;
   size_t capacity;
   bool quick;
+  bool estimates_all;
 } accuracy_plan;
 
 /* All rows of these scenes, in the order of the table. */
@@ -179,11 +179,16 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
                               accuracy_plan *out);
 void accuracy_plan_free(accuracy_plan *plan); /* zeroed allowed */
 
+bool accuracy_estimates_all(const bench *b); /* else beside the default alone */
+
 bool accuracy_knob_has_value(const char *knob); /* else its name says it all */
 
 /* Starts of a scene: indices of the offsets of accuracy_start. */
 size_t accuracy_starts(const accuracy_scene *which, bool quick, size_t out[ACCURACY_STARTS_MAX]);
 double accuracy_start(size_t index); /* m */
+
+/* QuickStep iterations of the scene's references. */
+int accuracy_reference_iterations(const scene_parameters *p);
 
 double accuracy_seconds(const accuracy_scene *which, bool quick); /* of a run */
 
@@ -292,6 +297,7 @@ typedef struct accuracy_settings {
   bool quick;
   char scene[32];    /* "all": every one */
   char coupling[32]; /* "none" */
+  char estimates[8]; /* all, default */
 } accuracy_settings;
 
 /* What the first of the files b->merge was run with. */

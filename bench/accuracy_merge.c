@@ -16,8 +16,8 @@ hap_status accuracy_merge_settings(bench *b, accuracy_settings *out)
   if (status < HAP_OK) {
     return status;
   }
-  if (sscanf(head.settings, "%7[^,], scene %31[^,], coupling %31[^,],", kind, out->scene,
-             out->coupling) != 3) {
+  if (sscanf(head.settings, "%7[^,], scene %31[^,], coupling %31[^,], estimates %7[^,],", kind,
+             out->scene, out->coupling, out->estimates) != 4) {
     return bench_fail(b, HAP_ERROR_FORMAT, "%s: its settings \"%s\" are not understood",
                       b->merge[0], head.settings);
   }

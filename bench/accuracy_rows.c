@@ -93,9 +93,10 @@ hap_status accuracy_identify(bench *b, const accuracy_plan *plan, accuracy_ident
   }
   snprintf(out->build, sizeof out->build, "%016" PRIx64, hash);
   snprintf(out->settings, sizeof out->settings,
-           "%s, scene %s, coupling %s, %zu rows (%016" PRIx64 ")", plan->quick ? "quick" : "full",
-           b->scene != NULL ? b->scene : "all", b->coupling != NULL ? b->coupling : "none",
-           plan->count, accuracy_plan_hash(plan));
+           "%s, scene %s, coupling %s, estimates %s, %zu rows (%016" PRIx64 ")",
+           plan->quick ? "quick" : "full", b->scene != NULL ? b->scene : "all",
+           b->coupling != NULL ? b->coupling : "none",
+           accuracy_estimates_all(b) ? "all" : "default", plan->count, accuracy_plan_hash(plan));
   name_machine(out->machine, sizeof out->machine);
   out->rows = plan->count;
   out->shard = b->shard > 0 ? b->shard : 1;

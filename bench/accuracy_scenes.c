@@ -19,7 +19,7 @@ static const accuracy_scene scenes[] = {
     {.name = "row10", .base = "row10", .bound = 0.01, .starts_quick = 3, .speeds = true},
     {.name = "wedge", .base = "wedge", .bound = 0.005},
     {.name = "stack", .base = "stack", .bound = 0.03},
-    {.name = "tower", .base = "tower", .bound = 0.03},
+    {.name = "tower", .base = "tower", .bound = 0.03, .starts_quick = 3},
     {.name = "topple", .base = "topple", .bound = 0.01, .speeds = true},
     {.name = "edge", .base = "edge", .bound = 0.03},
     {.name = "hit", .base = "hit", .bound = 0.06},

@@ -63,7 +63,7 @@ static hap_status run_reference(const sweep *s, size_t index, double haptic_hz,
   def.model = HAP_MODEL_SINGLE;
   def.physics_hz = s->group->physics_hz; /* what soft constraints are converted from */
   def.haptic_hz = haptic_hz;
-  def.iterations = ACCURACY_REFERENCE_ITERATIONS;
+  def.iterations = accuracy_reference_iterations(&s->parameters);
   return run_from(s, &def, index, out);
 }
 
@@ -240,8 +240,8 @@ static hap_status measure_estimate(sweep *s, const accuracy_point *point, accura
 {
   accuracy_run_def def = point->def;
   accuracy_motion motion;
-  bool quick_alone = s->bench->quick && strcmp(point->knob, ACCURACY_DEFAULT) != 0;
-  if (def.model == HAP_MODEL_SINGLE || quick_alone) {
+  bool asked = accuracy_estimates_all(s->bench) || strcmp(point->knob, ACCURACY_DEFAULT) == 0;
+  if (def.model == HAP_MODEL_SINGLE || !asked) {
     return HAP_OK; /* SINGLE is what it is held against */
   }
   def.lookback = LOOKBACK;

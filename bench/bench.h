@@ -26,9 +26,11 @@ typedef struct bench {
   size_t shards; /* 0: all of it */
   const char *const *merge; /* accuracy: files of shards to make the table of; NULL: measure */
   size_t merge_count;
-  bool fresh;        /* accuracy: do not go on from what an earlier run has finished */
-  int off;           /* checks that were off */
-  hap_detail detail; /* why a program failed */
+  const char *estimates; /* accuracy: all, default: rows beside which the session's own estimate is
+                            measured; NULL: with quick those of the default, else all */
+  bool fresh;            /* accuracy: do not go on from what an earlier run has finished */
+  int off;               /* checks that were off */
+  hap_detail detail;     /* why a program failed */
 } bench;
 
 /* Status, and on failure a text in bench.detail. */

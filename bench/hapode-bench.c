@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 
 /* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling NAME]
- * [--shard K/N | --merge FILE...] [--fresh]: measures, writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
+ * [--estimates all|default] [--shard K/N | --merge FILE...] [--fresh]: measures, writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
 
@@ -21,6 +21,8 @@ static const program programs[] = {
     {"accuracy", bench_accuracy,
      "what accuracy costs in time; --scene NAME: of one scene alone; --coupling NAME: through it "
      "too;\n"
+     "             --estimates all|default: beside which rows the session's own estimate of the "
+     "error;\n"
      "             --shard K/N: one of N parts, for as many processes or machines; --merge "
      "FILE...: the\n"
      "             table of all of them; --fresh: not from what a run that was killed has "
@@ -62,7 +64,8 @@ static void print_usage(FILE *to)
   fprintf(
       to,
       "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]\n"
-      "                    [--coupling NAME] [--shard K/N | --merge FILE...] [--fresh]\n"
+      "                    [--coupling NAME] [--estimates all|default] [--shard K/N | --merge "
+      "FILE...] [--fresh]\n"
       "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
@@ -121,7 +124,8 @@ static bool take_option(int count, char **arguments, bench *b, int *io)
   } texts[] = {{"--out", &b->out},
                {"--scene", &b->scene},
                {"--only", &b->only},
-               {"--coupling", &b->coupling}};
+               {"--coupling", &b->coupling},
+               {"--estimates", &b->estimates}};
   const char *argument = arguments[*io];
   for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
     const char *value = value_of(texts[i].name, count, arguments, io);
@@ -156,6 +160,8 @@ static bool fits(const program *p, const bench *b)
 {
   const char *wrong = NULL;
   bool of_accuracy = b->shards > 0 || b->merge != NULL || b->fresh;
+  bool known = b->estimates == NULL || strcmp(b->estimates, "all") == 0 ||
+               strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects) {
     wrong = "has no scenes to choose from";
@@ -165,12 +171,14 @@ static bool fits(const program *p, const bench *b)
         "impedance";
   } else if (b->only != NULL && p->run != bench_stability) {
     wrong = "has no points to choose from";
+  } else if (b->estimates != NULL && (p->run != bench_accuracy || !known)) {
+    wrong = "does not take this --estimates, which is all or default, for accuracy";
   } else if (of_accuracy && p->run != bench_accuracy) {
     wrong = "is done at once: --shard, --merge and --fresh are for accuracy";
   } else if (b->merge != NULL && b->merge_count == 0) {
     wrong = "--merge needs the files of the shards";
-  } else if (b->merge != NULL &&
-             (b->shards > 0 || b->fresh || b->quick || b->scene != NULL || b->coupling != NULL)) {
+  } else if (b->merge != NULL && (b->shards > 0 || b->fresh || b->quick || b->scene != NULL ||
+                                  b->coupling != NULL || b->estimates != NULL)) {
     wrong = "--merge takes all but --out and --verify from its files";
   }
   if (wrong != NULL) {

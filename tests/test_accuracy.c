@@ -180,6 +180,9 @@ TEST(wrong_parts_are_usage)
       {"fig5 --shard 1/2", "are for accuracy"},
       {"accuracy --merge a --quick", "from its files"},
       {"tick --fresh", "are for accuracy"},
+      {"accuracy --estimates some", "which is all or default"},
+      {"fig5 --estimates all", "for accuracy"},
+      {"accuracy --merge a --estimates all", "from its files"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     CHECK(shell("$B %s", cases[i].arguments) == 2);

@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "tests/contact_world.h"
+#include "tools/rig.h"
 
 #define TICKS 1500
 #define SPEED 0.1 /* m/s, of the hand */
@@ -139,6 +140,249 @@ TEST(friction_on_the_pointer_is_part_of_it)
   CHECK(c.stats.force_error > 0.0 && c.stats.force_error < 0.05);
 }
 
+/* ---- whole scenes ---- */
+
+#define SCENE_TICKS 3000
+#define SCENE_ITERATIONS 200 /* of the reference that looking back makes, at least */
+
+typedef struct play_def {
+  const char *scene;
+  hap_model model;
+  double physics_hz;
+  double haptic_hz;
+  double friction;  /* of the pointers; < 0: the scene's */
+  bool interrupted; /* somebody touches a body now and then: no window goes on from another one */
+  double lookback;
+  int iterations; /* of the world; 0: the scene's */
+} play_def;
+
+typedef struct scene_course {
+  double force[SCENE_TICKS][3 * SCENE_POINTERS_MAX]; /* by 1 ms */
+  size_t ticks;
+  hap_stats stats;
+} scene_course;
+
+static void set_up(const play_def *def, rig_options *options)
+{
+  rig_options_init(options);
+  options->scene = def->scene;
+  options->coupling = HAP_COUPLING_DIRECT;
+  options->max_force = 1000.0;
+  options->friction = def->friction;
+  options->def.drive = HAP_DRIVE_LOCKSTEP;
+  options->def.guard = HAP_GUARD_MEASURE;
+  options->def.model = def->model;
+  options->def.physics_hz = def->physics_hz;
+  options->def.haptic_hz = def->haptic_hz;
+  options->def.trace_rows = 4;
+  options->def.lookback = def->lookback;
+}
+
+/* Changes nothing that anybody could feel. */
+static void nudge(const rig *r)
+{
+  dBodyID body = r->scene->bodies[0];
+  const dReal *v = dBodyGetLinearVel(body);
+  dBodySetLinearVel(body, v[0], v[1], v[2] + 1e-12);
+}
+
+static void play_scene(const play_def *def, scene_course *out)
+{
+  rig r;
+  rig_options options;
+  hap_detail detail = {""};
+  hap_trace_row row;
+  size_t count = 0;
+  set_up(def, &options);
+  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
+  if (def->model == HAP_MODEL_SINGLE) {
+    dWorldSetQuickStepNumIterations(r.scene->world, SCENE_ITERATIONS);
+  }
+  if (def->iterations > 0) {
+    dWorldSetQuickStepNumIterations(r.scene->world, def->iterations);
+  }
+  REQUIRE(hap_session_start(r.session) == HAP_OK);
+  out->ticks = (size_t)fmin(1e3 * r.scene->parameters.duration, SCENE_TICKS);
+  size_t every = (size_t)(1e3 / def->haptic_hz);
+  for (size_t i = 0; i < out->ticks; ++i) {
+    if (i % every == 0) {
+      CHECK(hap_session_advance(r.session, 1) == HAP_OK);
+      CHECK(hap_session_trace_read(r.session, &row, 1, &count) == HAP_OK && count == 1);
+    }
+    for (size_t p = 0; p < row.pointer_count && p < SCENE_POINTERS_MAX; ++p) {
+      memcpy(&out->force[i][3 * p], row.pointers[p].force, 3 * sizeof(double));
+    }
+    if (def->interrupted && i % 600 == 599) {
+      nudge(&r);
+    }
+  }
+  CHECK(hap_session_stats(r.session, &out->stats, sizeof out->stats) == HAP_OK);
+  rig_destroy(&r);
+}
+
+static double scene_error(const scene_course *c, const scene_course *reference)
+{
+  double wrong = 0.0;
+  double right = 0.0;
+  for (size_t i = 0; i < c->ticks; ++i) {
+    for (size_t k = 0; k < 3 * SCENE_POINTERS_MAX; ++k) {
+      double d = c->force[i][k] - reference->force[i][k];
+      wrong += d * d;
+      right += reference->force[i][k] * reference->force[i][k];
+    }
+  }
+  return sqrt(wrong / right);
+}
+
+/* What is told beside what it is. */
+static void check_scene(const play_def *def, double factor)
+{
+  static scene_course reference;
+  static scene_course c;
+  play_def single = *def;
+  play_def with = *def;
+  memset(&reference, 0, sizeof reference);
+  memset(&c, 0, sizeof c);
+  single.model = HAP_MODEL_SINGLE;
+  single.haptic_hz = 1000.0;
+  play_scene(&single, &reference);
+  with.lookback = 0.1;
+  play_scene(&with, &c);
+  double error = scene_error(&c, &reference);
+  double estimate = c.stats.force_error;
+  printf("# %s, %s at %g Hz, loop at %g Hz%s: error %.5f, estimate %.5f\n", def->scene,
+         hap_model_name(def->model), def->physics_hz, def->haptic_hz,
+         def->interrupted ? ", interrupted" : "", error, estimate);
+  CHECK(c.stats.lookbacks >= 3 && (c.stats.lookbacks_spoilt > 0) == def->interrupted);
+  CHECK(estimate > 0.0 && estimate < factor * error);
+  CHECK(def->interrupted || error < factor * estimate); /* else what went before is not seen */
+}
+
+TEST(hulls_are_part_of_it)
+{
+  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"lever", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"lever", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"peg", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"peg", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0, 0}};
+  for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
+    check_scene(&defs[i], 1.5);
+  }
+}
+
+/* Physics looks for what is near where the pointer was a tick before: on what is round that is another normal. */
+TEST(round_things_are_felt_as_model_single_has_them)
+{
+  const play_def def = {"chain", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0};
+  check_scene(&def, 1.5);
+}
+
+TEST(soft_fingers_are_part_of_it)
+{
+  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_ACCELERANCE, 60.0, 1000.0, -1.0, false, 0.0, 0}};
+  for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
+    check_scene(&defs[i], 1.5);
+  }
+}
+
+/* Springs along the surface that are loaded when a window begins, of spheres and of hulls. */
+TEST(a_window_may_begin_in_the_midst_of_a_grip)
+{
+  const play_def defs[] = {{"grasp", HAP_MODEL_CONTACT, 60.0, 1000.0, -1.0, true, 0.0, 0},
+                           {"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, true, 0.0, 0}};
+  for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
+    check_scene(&defs[i], 0.5);
+  }
+}
+
+/* A stack creeps under a hand that rests on it. */
+TEST(what_adds_up_from_window_to_window_is_seen)
+{
+  const play_def def = {"hold", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, -1.0, false, 0.0, 0};
+  check_scene(&def, 1.5);
+}
+
+/* With twice as many as that a stack would sink in the reference, by a tenth of the force. */
+TEST(few_iterations_of_the_world_are_not_taken_for_an_error)
+{
+  static scene_course c;
+  const play_def def = {"hold", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.1, 5};
+  play_scene(&def, &c);
+  printf("# estimate %.5f\n", c.stats.force_error);
+  CHECK(c.stats.lookbacks >= 3 && c.stats.force_error < 0.005);
+}
+
+/* Each of its forces is held for two milliseconds. */
+TEST(a_slow_loop_is_held_against_a_fast_one)
+{
+  const play_def def = {"lever", HAP_MODEL_CONTACT, 20.0, 500.0, -1.0, false, 0.0, 0};
+  check_scene(&def, 1.5);
+}
+
+TEST(changes_no_bit_of_hulls_and_friction)
+{
+  static scene_course without;
+  static scene_course with;
+  const play_def defs[] = {{"lever", HAP_MODEL_CONTACT, 60.0, 1000.0, 0.6, false, 0.0, 0},
+                           {"peg", HAP_MODEL_ACCELERANCE, 20.0, 1000.0, 0.6, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_IMPULSE, 60.0, 1000.0, -1.0, false, 0.0, 0},
+                           {"grasp", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, true, 0.0, 0}};
+  for (size_t i = 0; i < sizeof defs / sizeof defs[0]; ++i) {
+    play_def looks = defs[i];
+    looks.lookback = 0.1;
+    play_scene(&defs[i], &without);
+    play_scene(&looks, &with);
+    CHECK(without.stats.lookbacks == 0 && with.stats.lookbacks > 0);
+    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+  }
+}
+
+/* A box that the hand holds comes down on a mesh in the static world; there are no bodies. */
+static void play_mesh(hap_model model, double lookback, course *out)
+{
+  static const double corners[] = {-0.3, -0.3, 0.0, 0.3, -0.3, 0.0, 0.3, 0.3, 0.0, -0.3, 0.3, 0.0};
+  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
+  double hull[24];
+  contact_world w;
+  cw_open(&w, CW_GRAVITY);
+  dTriMeshDataID data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
+                              3 * (int)sizeof(dTriIndex));
+  dCreateTriMesh(w.space, data, NULL, NULL, NULL);
+  for (int i = 0; i < 24; ++i) {
+    hull[i] = (i / 3 >> i % 3 & 1) != 0 ? RADIUS : -RADIUS;
+  }
+  w.def.model = model;
+  w.def.lookback = lookback;
+  w.hand_def.hull_xyz = hull;
+  w.hand_def.hull_points = 8;
+  w.hand_def.radius = 0.0;
+  w.hand_def.friction = 0.5;
+  w.hand_velocity[0] = 0.01;
+  w.hand_velocity[2] = -0.01;
+  CHECK(cw_start(&w, 0.0, 0.0, 1.3 * RADIUS));
+  cw_run(&w, TICKS / 2);
+  out->stats = cw_stats(&w);
+  cw_close(&w);
+  dGeomTriMeshDataDestroy(data);
+}
+
+TEST(a_hull_may_touch_a_mesh_and_nothing_else)
+{
+  static course without;
+  static course with;
+  const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE};
+  for (size_t i = 0; i < sizeof models / sizeof models[0]; ++i) {
+    play_mesh(models[i], 0.0, &without);
+    play_mesh(models[i], 0.1, &with);
+    printf("# force error %.5f\n", with.stats.force_error);
+    CHECK(with.stats.lookbacks > 0 && with.stats.lookbacks_spoilt == 0);
+    CHECK(with.stats.force_error > 0.0 && with.stats.force_error < 0.01);
+    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+  }
+}
+
 /* ---- windows that cannot be gone over ---- */
 
 TEST(a_body_that_the_application_moves_spoils_the_window)
@@ -237,6 +481,15 @@ int main(void)
   RUN(estimates_the_error_of_the_force);
   RUN(changes_no_bit);
   RUN(friction_on_the_pointer_is_part_of_it);
+  RUN(hulls_are_part_of_it);
+  RUN(round_things_are_felt_as_model_single_has_them);
+  RUN(soft_fingers_are_part_of_it);
+  RUN(a_window_may_begin_in_the_midst_of_a_grip);
+  RUN(what_adds_up_from_window_to_window_is_seen);
+  RUN(few_iterations_of_the_world_are_not_taken_for_an_error);
+  RUN(a_slow_loop_is_held_against_a_fast_one);
+  RUN(changes_no_bit_of_hulls_and_friction);
+  RUN(a_hull_may_touch_a_mesh_and_nothing_else);
   RUN(a_body_that_the_application_moves_spoils_the_window);
   RUN(bodies_and_geoms_that_go_away_meanwhile);
   RUN(a_change_of_model_ends_the_window);

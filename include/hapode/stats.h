@@ -134,8 +134,9 @@ typedef struct hap_stats {
   double joint_error; /* 0.., the largest share by which such equations were off at the end of the
                                last interval: they turn with a body until the next sync */
 
-  /* Where hap_session_def.lookback is above 0: the felt force against that of model SINGLE from the same
-   * state with the pointers on the same way, over windows of a quarter of a second. */
+  /* Where hap_session_def.lookback is above 0: the felt force against that of model SINGLE with the pointers on the
+   * same way, over windows of a quarter of a second. A window begins from the state of the session; one that
+   * follows directly, as in LOCKSTEP, where model SINGLE would be, for at most ten seconds on end. */
   double force_error; /* RMS of the difference / RMS of the force, of the last windows with contact;
                                 0 before the first */
   double force_error_n; /* N, RMS of the difference in the newest one */

@@ -118,7 +118,7 @@ static void follow_wishes(hapi_physics *physics)
 }
 
 /* One step at a time, and the window after a turn is left out: in it things come to where they are under the new
- * settings. */
+ * settings. Those that come then begin where the session is, not with what the old settings have added up. */
 void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
 {
   hapi_dial *dial = &physics->dial;
@@ -128,6 +128,7 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
   }
   if (dial->settles) {
     dial->settles = false;
+    physics->lookback.end_ns = 0;
     return;
   }
   double load = error / wanted;
@@ -138,7 +139,10 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
     hapi_dial_side *side = &dial->sides[i];
     side->percent = side->percent >= dial->aim || side->percent > aim ? aim : side->percent;
   }
-  dial->settles = aim != dial->aim;
+  if (aim != dial->aim) {
+    dial->settles = true;
+    physics->lookback.end_ns = 0;
+  }
   dial->aim = aim;
 }
 

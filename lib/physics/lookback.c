@@ -15,12 +15,12 @@
 #define WINDOW_STEPS 4.0 /* of physics, at least */
 #define FIRST_STEPS \
   2.0 /* of the first one, so that there is a figure soon; the next are twice as long each */
-#define MEMORY_S 10.0    /* older windows fade from the figures */
-#define NEAR_M 0.5       /* from a pointer, that may take part */
-#define BODIES_MAX 128u  /* nearer ones first */
-#define REACHES 18       /* 0.5 m to 1 mm */
-#define DEAR 2.0         /* times the budget, for one step */
-#define BODIES_MOST 256u /* with what joints tie to them */
+#define MEMORY_S 10.0   /* older windows fade from the figures */
+#define CHAIN_S 10.0    /* for so long a reference goes on from window to window */
+#define NEAR_M 0.5      /* from a pointer, that may take part */
+#define BODIES_MAX 128u /* nearer ones first */
+#define REACHES 18      /* 0.5 m to 1 mm */
+#define DEAR 2.0        /* times the budget, for one step */
 
 static bool asked_for(const hapi_physics *physics)
 {
@@ -31,6 +31,9 @@ void hapi_lookback_reset(hapi_physics *physics)
 {
   hapi_lookback *w = &physics->lookback;
   w->phase = HAPI_LOOKBACK_IDLE;
+  w->end_ns = 0;
+  w->touch_count = 0;
+  w->lean = false;
   w->right2_sum = w->wrong2_sum = 0.0;
   w->seconds = 0.0;
 }
@@ -41,6 +44,10 @@ void hapi_lookback_finish(hapi_lookback *w)
   hapi_free(w->states);
   hapi_free(w->pairs);
   hapi_free(w->touches);
+  hapi_free(w->springs);
+  hapi_free(w->ended);
+  hapi_free(w->ends);
+  hapi_lookback_hand_finish(&w->hand);
   hapi_free(w->times_ns);
   hapi_free(w->path);
   hapi_index_finish(&w->pair_of);
@@ -48,7 +55,7 @@ void hapi_lookback_finish(hapi_lookback *w)
   memset(w, 0, sizeof *w);
 }
 
-/* ---- opening ---- */
+/* ---- what is near ---- */
 
 static bool has(const hapi_lookback *w, uint32_t known)
 {
@@ -60,11 +67,166 @@ static bool has(const hapi_lookback *w, uint32_t known)
   return false;
 }
 
+static uint64_t key_of(dGeomID a, dGeomID b)
+{
+  uint64_t x = hapi_index_address(a);
+  uint64_t y = hapi_index_address(b);
+  return hapi_index_mix(x < y ? x : y) ^ (x < y ? y : x);
+}
+
+void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
+                       const dSurfaceParameters *surface)
+{
+  hapi_lookback *w = &physics->lookback;
+  if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt) {
+    return;
+  }
+  uint32_t body_a = hapi_bodies_find(&physics->table, dGeomGetBody(a));
+  uint32_t body_b = hapi_bodies_find(&physics->table, dGeomGetBody(b));
+  if (!(body_a != HAPI_NONE && has(w, body_a)) && !(body_b != HAPI_NONE && has(w, body_b))) {
+    return;
+  }
+  uint32_t at = hapi_index_get(&w->pair_of, key_of(a, b));
+  if (at == HAPI_INDEX_NONE) {
+    if (!hapi_reserve((void **)&w->pairs, &w->pair_capacity, w->pair_count, 1, sizeof *w->pairs) ||
+        !hapi_index_reserve(&w->pair_of, w->pair_count + 1)) {
+      w->spoilt = true;
+      return;
+    }
+    at = w->pair_count++;
+    hapi_index_put(&w->pair_of, key_of(a, b), at);
+  }
+  w->pairs[at] = (hapi_lookback_pair){.a = a, .b = b, .surface = *surface};
+  w->pairs[at].surface.mode &= ~dContactFDir1; /* a direction is the application's, at each step */
+}
+
+/* The pair's place; HAPI_NONE: none left. */
+static uint32_t place_of(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
+{
+  uint32_t free = HAPI_NONE;
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    const hapi_lookback_touch *t = &w->touches[i];
+    if (t->geom == touch->geom && t->pointer == touch->pointer &&
+        t->generation == touch->generation) {
+      return i;
+    }
+    free = t->geom == NULL ? i : free;
+  }
+  if (free == HAPI_NONE && w->touch_count < most &&
+      hapi_reserve((void **)&w->touches, &w->touch_capacity, w->touch_count, 1,
+                   sizeof *w->touches)) {
+    free = w->touch_count++;
+    memset(&w->touches[free], 0, sizeof w->touches[free]);
+  }
+  return free;
+}
+
+static void note_touch(hapi_physics *physics, const hapi_lookback_touch *touch)
+{
+  hapi_lookback *w = &physics->lookback;
+  uint32_t at = place_of(w, physics->config.capacity.contacts, touch);
+  if (at == HAPI_NONE) {
+    w->spoilt = true;
+    return;
+  }
+  hapi_lookback_touch *t = &w->touches[at];
+  if (t->geom == NULL) {
+    uint32_t generation = t->contact_generation;
+    *t = *touch;
+    t->contact_generation = generation + 1;
+    t->key = touch->is_tool ? hapi_tool_geom_key(physics, touch->geom, touch->pointer) : 0;
+  }
+  t->mu = touch->mu;
+  t->noted = true;
+}
+
+static void note_slots(hapi_physics *physics)
+{
+  for (uint32_t i = 0; i < physics->contact_high; ++i) {
+    const hapi_contact_slot *slot = &physics->contacts[i];
+    const hapi_lookback_touch touch = {.geom = slot->geom,
+                                       .pointer = slot->pointer,
+                                       .generation = slot->pointer_generation,
+                                       .is_tool = slot->is_tool,
+                                       .mu = slot->mu};
+    if (slot->phase == HAPI_SLOT_LIVE) {
+      note_touch(physics, &touch);
+    }
+  }
+}
+
+/* Of model CONTACT, whose points of hulls have no slots. */
+static void note_hits(hapi_physics *physics)
+{
+  const hapi_neighborhood *hood = &physics->neighborhood;
+  for (uint32_t i = 0; i < hood->hit_count; ++i) {
+    const hapi_hit *hit = &hood->hits[i];
+    const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[hit->pointer];
+    const hapi_lookback_touch touch = {.geom = hit->geom,
+                                       .pointer = hit->pointer,
+                                       .generation = pointer->generation,
+                                       .is_tool = true,
+                                       .mu = hit->mu};
+    if (hit->tool_count > 0) {
+      note_touch(physics, &touch);
+    }
+  }
+}
+
+void hapi_lookback_note(hapi_physics *physics)
+{
+  if (physics->lookback.phase != HAPI_LOOKBACK_OPEN) {
+    return;
+  }
+  note_slots(physics);
+  if (physics->model == HAP_MODEL_CONTACT) {
+    note_hits(physics);
+  }
+}
+
+/* The place of the pair whose contact the spring is of; HAPI_NONE: none that is near. */
+static uint32_t touch_of(const hapi_physics *physics, const hapi_state_spring *spring)
+{
+  const hapi_lookback *w = &physics->lookback;
+  const hapi_contact_slot *slot =
+      spring->slot != HAPI_SLOT_NONE ? &physics->contacts[spring->slot] : NULL;
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    const hapi_lookback_touch *t = &w->touches[i];
+    bool same = slot != NULL ? t->geom == slot->geom && t->pointer == slot->pointer &&
+                                   t->generation == slot->pointer_generation
+                             : t->is_tool && t->key == spring->key;
+    if (t->geom != NULL && same) {
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
+static void take_springs(hapi_physics *physics)
+{
+  hapi_lookback *w = &physics->lookback;
+  const hapi_state_spring *in = hapi_state_springs(physics->state);
+  w->spring_count = 0;
+  if (!hapi_reserve((void **)&w->springs, &w->spring_capacity, 0, physics->state->spring_count,
+                    sizeof *w->springs)) {
+    w->spoilt = true;
+    return;
+  }
+  for (uint32_t i = 0; i < physics->state->spring_count; ++i) {
+    uint32_t touch = touch_of(physics, &in[i]);
+    if (touch != HAPI_NONE && hapi_finite(in[i].stretch_body, 3) && hapi_finite(&in[i].turn, 1)) {
+      w->springs[w->spring_count++] = (hapi_lookback_spring){.touch = touch, .in = in[i]};
+    }
+  }
+}
+
+/* ---- opening ---- */
+
 static bool add_body(hapi_physics *physics, uint32_t known)
 {
   hapi_lookback *w = &physics->lookback;
   const hapi_known_body *entry = &physics->table.entries[known];
-  if (w->body_count == BODIES_MOST ||
+  if (w->body_count == HAPI_LOOKBACK_BODIES ||
       !hapi_reserve((void **)&w->bodies, &w->body_capacity, w->body_count, 1, sizeof *w->bodies)) {
     return false;
   }
@@ -162,6 +324,36 @@ static void note_times(hapi_physics *physics, int64_t now_ns)
   }
 }
 
+/* What the last window had is kept beside what this one will have. */
+static void turn_over(hapi_lookback *w)
+{
+  hapi_lookback_body *bodies = w->ended;
+  hapi_body_state *states = w->ends;
+  uint32_t body_capacity = w->ended_capacity;
+  uint32_t state_capacity = w->ends_capacity;
+  w->ended = w->bodies;
+  w->ended_count = w->body_count;
+  w->ended_capacity = w->body_capacity;
+  w->ends = w->states;
+  w->ends_capacity = w->state_capacity;
+  w->bodies = bodies;
+  w->body_capacity = body_capacity;
+  w->states = states;
+  w->state_capacity = state_capacity;
+  w->body_count = 0;
+}
+
+/* Places of pairs that were not near while the last window was open are free again. */
+static void begin_touches(hapi_lookback *w)
+{
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    if (!w->touches[i].noted) {
+      w->touches[i].geom = NULL;
+    }
+    w->touches[i].noted = false;
+  }
+}
+
 void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
 {
   hapi_lookback *w = &physics->lookback;
@@ -171,13 +363,16 @@ void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
   double most = fmax(WINDOW_S, WINDOW_STEPS / physics->config.physics_hz);
   w->seconds =
       w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics->config.physics_hz;
-  w->body_count = w->pair_count = w->touch_count = w->row_count = w->next = w->touched = 0;
+  turn_over(w);
+  begin_touches(w);
+  memset(w->hand.hull_of, 0, sizeof w->hand.hull_of);
+  w->pair_count = w->row_count = w->next = w->touched = 0;
   hapi_index_clear(&w->pair_of);
   w->wrong2 = w->right2 = w->spent_s = 0.0;
   w->from_ns = first_row(physics, now_ns);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
   w->spoilt =
-      !add_near(physics) || !add_jointed(physics) ||
+      !hapi_lookback_hand_ready(physics) || !add_near(physics) || !add_jointed(physics) ||
       !hapi_reserve((void **)&w->states, &w->state_capacity, 0, w->body_count, sizeof *w->states);
   if (!w->spoilt) {
     hapi_lookback_keep(physics);
@@ -185,74 +380,10 @@ void hapi_lookback_open(hapi_physics *physics, int64_t now_ns)
   }
   w->phase = HAPI_LOOKBACK_OPEN;
   hapi_lookback_note(physics);
+  take_springs(physics);
 }
 
 /* ---- while it is open ---- */
-
-static uint64_t key_of(dGeomID a, dGeomID b)
-{
-  uint64_t x = hapi_index_address(a);
-  uint64_t y = hapi_index_address(b);
-  return hapi_index_mix(x < y ? x : y) ^ (x < y ? y : x);
-}
-
-void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
-                       const dSurfaceParameters *surface)
-{
-  hapi_lookback *w = &physics->lookback;
-  if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt) {
-    return;
-  }
-  uint32_t body_a = hapi_bodies_find(&physics->table, dGeomGetBody(a));
-  uint32_t body_b = hapi_bodies_find(&physics->table, dGeomGetBody(b));
-  if (!(body_a != HAPI_NONE && has(w, body_a)) && !(body_b != HAPI_NONE && has(w, body_b))) {
-    return;
-  }
-  uint32_t at = hapi_index_get(&w->pair_of, key_of(a, b));
-  if (at == HAPI_INDEX_NONE) {
-    if (!hapi_reserve((void **)&w->pairs, &w->pair_capacity, w->pair_count, 1, sizeof *w->pairs) ||
-        !hapi_index_reserve(&w->pair_of, w->pair_count + 1)) {
-      w->spoilt = true;
-      return;
-    }
-    at = w->pair_count++;
-    hapi_index_put(&w->pair_of, key_of(a, b), at);
-  }
-  w->pairs[at] = (hapi_lookback_pair){.a = a, .b = b, .surface = *surface};
-  w->pairs[at].surface.mode &= ~dContactFDir1; /* a direction is the application's, at each step */
-}
-
-static void note_touch(hapi_physics *physics, const hapi_contact_slot *slot)
-{
-  hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < w->touch_count; ++i) {
-    if (w->touches[i].geom == slot->geom && w->touches[i].pointer == slot->pointer &&
-        w->touches[i].generation == slot->pointer_generation) {
-      w->touches[i].mu = slot->mu;
-      return;
-    }
-  }
-  if (!hapi_reserve((void **)&w->touches, &w->touch_capacity, w->touch_count, 1,
-                    sizeof *w->touches)) {
-    w->spoilt = true;
-    return;
-  }
-  w->touches[w->touch_count++] = (hapi_lookback_touch){.geom = slot->geom,
-                                                       .pointer = slot->pointer,
-                                                       .generation = slot->pointer_generation,
-                                                       .mu = slot->mu};
-}
-
-void hapi_lookback_note(hapi_physics *physics)
-{
-  hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < physics->contact_high && w->phase == HAPI_LOOKBACK_OPEN; ++i) {
-    const hapi_contact_slot *slot = &physics->contacts[i];
-    if (slot->phase == HAPI_SLOT_LIVE && !slot->is_tool) {
-      note_touch(physics, slot);
-    }
-  }
-}
 
 static void set_lags(hapi_lookback *w, int64_t first_ns)
 {
@@ -261,11 +392,20 @@ static void set_lags(hapi_lookback *w, int64_t first_ns)
   }
 }
 
+/* False: what it would feel is not reckoned here. */
+static bool take_kind(hapi_physics *physics, uint32_t index, const hapi_path_pointer *in)
+{
+  bool pushes = hapi_v3_dot(in->wrench.force, in->wrench.force) > 0.0;
+  return in->generation == 0 ||
+         (!(in->rigid != 0 && pushes) &&
+          (in->is_tool == 0 || hapi_lookback_hand_take_hull(physics, index, in->generation)));
+}
+
 static void take_row(hapi_physics *physics, int64_t time_ns, const hapi_path_pointer *pointers)
 {
   hapi_lookback *w = &physics->lookback;
   uint32_t count = physics->config.capacity.pointers;
-  if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt || time_ns < w->from_ns || time_ns >= w->to_ns) {
+  if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt || time_ns < w->from_ns) {
     return;
   }
   if (!hapi_reserve((void **)&w->times_ns, &w->time_capacity, w->row_count, 1,
@@ -278,10 +418,8 @@ static void take_row(hapi_physics *physics, int64_t time_ns, const hapi_path_poi
   if (w->row_count == 0) {
     set_lags(w, time_ns);
   }
-  for (uint32_t i = 0; i < count;
-       ++i) { /* what a hull's many points would do is not reckoned here */
-    bool pushes = hapi_v3_dot(pointers[i].wrench.force, pointers[i].wrench.force) > 0.0;
-    w->spoilt = w->spoilt || (pointers[i].is_tool != 0 && pushes);
+  for (uint32_t i = 0; i < count; ++i) {
+    w->spoilt = w->spoilt || !take_kind(physics, i, &pointers[i]);
   }
   w->times_ns[w->row_count] = time_ns;
   memcpy(&w->path[w->row_count * count], pointers, count * sizeof *w->path);
@@ -320,15 +458,27 @@ static bool still_there(const hapi_physics *physics)
 
 /* ---- what comes out ---- */
 
+/* The next window may go on where this one's reference has ended. */
+static void link_up(hapi_physics *physics)
+{
+  hapi_lookback *w = &physics->lookback;
+  w->chain_s += 1e-9 * (double)(w->to_ns - w->from_ns);
+  if (w->row_count > 0 && w->chain_s < CHAIN_S) {
+    w->end_ns = w->times_ns[w->row_count - 1] + ticks_ns(physics, 1.0);
+  }
+}
+
 static void end(hapi_physics *physics)
 {
   hapi_lookback *w = &physics->lookback;
   hap_stats *s = &physics->figures.stats;
   w->phase = HAPI_LOOKBACK_IDLE;
+  w->end_ns = 0;
   if (w->spoilt) {
     ++s->lookbacks_spoilt;
     return;
   }
+  link_up(physics);
   double keep = exp(-1e-9 * (double)(w->to_ns - w->from_ns) / MEMORY_S);
   ++s->lookbacks;
   if (w->touched > 0) {
@@ -350,12 +500,14 @@ static double budget(const hapi_physics *physics)
 }
 
 /* A world in which one step takes all of the time that there is: the figure would be long out of date, and
- * physics late. */
-static bool too_dear(const hapi_physics *physics)
+ * physics late. The next windows make do with less. */
+static bool too_dear(hapi_physics *physics)
 {
-  const hapi_lookback *w = &physics->lookback;
-  return !physics->config.lockstep && w->next > 0 &&
-         w->spent_s > DEAR * budget(physics) * (double)w->next;
+  hapi_lookback *w = &physics->lookback;
+  bool dear = !physics->config.lockstep && w->next > 0 &&
+              w->spent_s > DEAR * budget(physics) * (double)w->next;
+  w->lean = w->lean || dear;
+  return dear;
 }
 
 void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns)

@@ -17,6 +17,8 @@
 #include "base/index.h"
 #include "physics/physics.h"
 #include "physics/snapshot.h"
+#include "sync/messages.h"
+#include "sync/path.h"
 
 typedef struct hapi_lookback_body {
   uint32_t known;   /* entry of the body table */
@@ -32,16 +34,49 @@ typedef struct hapi_lookback_pair {
   bool there; /* scratch: both geoms still are */
 } hapi_lookback_pair;
 
-/* Of a pointer and a geom. */
+/* Of a pointer and a geom: a place of the reference's contacts. */
 typedef struct hapi_lookback_touch {
-  dGeomID geom;
+  dGeomID geom; /* NULL: a free place */
   uint32_t pointer;
   uint32_t generation;
+  bool is_tool;
   double mu;
-  double stretch[3]; /* m, of the pointer ahead of the geom's body along the surface */
-  bool closed;       /* at the last step */
+  uint64_t key;                /* of a hull and the geom, as the loop has it */
+  uint32_t contact_generation; /* for one contact after another */
+  bool placed;                 /* at the last step it was near, ... */
+  double normal_body[3];       /* ... and this was the normal */
   bool there;
+  bool noted; /* while this window was open */
 } hapi_lookback_touch;
+
+/* How far a contact was pulled along the surface before the first row. */
+typedef struct hapi_lookback_spring {
+  uint32_t touch; /* of a sphere */
+  hapi_state_spring in;
+} hapi_lookback_spring;
+
+#define HAPI_LOOKBACK_BODIES 256u /* with what joints tie to those that are near */
+
+/* lookback_hand.c: what the hands feel in the reference */
+typedef struct hapi_lookback_hand {
+  bool ready; /* there is memory */
+  bool begun; /* a tick of it has been gone over */
+  uint32_t
+      hull_of[HAP_TRACE_POINTERS_MAX]; /* generation of the pointer, in this window; 0: not known */
+  struct hapi_tick *tick;
+  hapi_model *model;
+  hapi_state_pointer *told;       /* what physics knows of the pointers */
+  struct hapi_found_point *found; /* scratch */
+} hapi_lookback_hand;
+
+/* A time of the window at which a step begins. */
+typedef struct hapi_lookback_moment {
+  const hapi_path_pointer *row;
+  const hapi_path_pointer *next; /* row; NULL: there is none */
+  double share;                  /* of the way to it */
+  double later_s;                /* than the row */
+  double period;                 /* s, of the step */
+} hapi_lookback_moment;
 
 typedef enum hapi_lookback_phase {
   HAPI_LOOKBACK_IDLE = 0, /* the next one opens at the end of the cycle */
@@ -51,6 +86,7 @@ typedef enum hapi_lookback_phase {
 
 typedef struct hapi_lookback {
   hapi_lookback_phase phase;
+  bool lean;       /* the time is short: fewer iterations */
   bool spoilt;     /* something happened that cannot be gone over */
   int64_t from_ns; /* rows before are not of it */
   int64_t to_ns;
@@ -62,6 +98,15 @@ typedef struct hapi_lookback {
   hapi_body_state *states; /* of them, at the step that comes */
   uint32_t state_capacity;
   unsigned long seed;
+  hapi_lookback_body *ended; /* of the window before */
+  uint32_t ended_count;
+  uint32_t ended_capacity;
+  hapi_body_state *ends; /* where its reference left them */
+  uint32_t ends_capacity;
+  int64_t end_ns;   /* when; 0: it does not count any more */
+  bool chained;     /* this one goes on from there */
+  double chain_s;   /* since a reference began where the session was */
+  double haptic_hz; /* scratch: of the loop, while the reference's own rate is in force */
 
   hapi_lookback_pair *pairs;
   uint32_t pair_count;
@@ -70,6 +115,10 @@ typedef struct hapi_lookback {
   hapi_lookback_touch *touches;
   uint32_t touch_count;
   uint32_t touch_capacity;
+  hapi_lookback_spring *springs;
+  uint32_t spring_count;
+  uint32_t spring_capacity;
+  hapi_lookback_hand hand;
   hapi_index geoms; /* scratch: that there are */
 
   int64_t *times_ns; /* of the rows */
@@ -99,5 +148,15 @@ void hapi_lookback_finish(hapi_lookback *w);
 void hapi_lookback_keep(hapi_physics *physics); /* the states that its bodies have now */
 /* Goes over rows until they are done or seconds have passed; negative: all. */
 hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
+/* lookback_hand.c */
+bool hapi_lookback_hand_ready(hapi_physics *physics);    /* false: no memory */
+void hapi_lookback_hand_begin(hapi_lookback_hand *hand); /* nothing is touched */
+void hapi_lookback_hand_finish(hapi_lookback_hand *hand);
+/* Keeps the pointer's hull; false: it is no more, or another one than before in this window. */
+bool hapi_lookback_hand_take_hull(hapi_physics *physics, uint32_t pointer, uint32_t generation);
+/* A tick: pushes the bodies. False: something is touched that the window does not know. */
+bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at);
+const double *hapi_lookback_felt(const hapi_lookback *w,
+                                 uint32_t pointer); /* N on the hand, in it */
 
 #endif

@@ -8,10 +8,13 @@
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
-/* Going over a window: the reference of a tick is what ODE and eq. 7 make of it at the haptic rate, with the
- * bodies where they are by that reckoning. */
+/* Going over a window: the reference of a tick is what ODE and the loop's tick of model SINGLE make of it, with
+ * the bodies where they are by that reckoning. */
 
-#define ITERATIONS 2 /* times those of the world: what they leave undone shows as well */
+#define ITERATIONS 2         /* times those of the world: what they leave undone shows as well */
+#define ITERATIONS_LEAST 200 /* where there is time for them */
+#define RATE_HZ 1000.0       /* at least, of its steps */
+#define APART_M 0.5          /* from the session's body: it would not know what is there */
 
 /* ---- which geoms there still are ---- */
 
@@ -49,7 +52,7 @@ static bool find_geoms(hapi_physics *physics)
     w->pairs[i].there = there(w, w->pairs[i].a) && there(w, w->pairs[i].b);
   }
   for (uint32_t i = 0; i < w->touch_count; ++i) {
-    w->touches[i].there = there(w, w->touches[i].geom);
+    w->touches[i].there = w->touches[i].geom != NULL && there(w, w->touches[i].geom);
   }
   return true;
 }
@@ -98,128 +101,25 @@ static void collide(hapi_physics *physics)
   }
 }
 
-/* ---- pointers ---- */
+/* ---- what comes out ---- */
 
-typedef struct closing {
-  hapi_nearest at;
-  double speed[3]; /* m/s, of the pointer against the body */
-  double period;   /* s */
-} closing;
-
-/* Stick, and slip at mu times the normal force; eq. 7 along the surface. */
-static void rub(hapi_lookback_touch *t, const hapi_path_pointer *p, const closing *c, double limit,
-                double io_force[3])
-{
-  const hapi_nearest *at = &c->at;
-  const double *speed = c->speed;
-  double v[3];
-  double f[3];
-  hapi_v3_madd(speed, -hapi_v3_dot(speed, at->normal), at->normal, v);
-  if (!t->closed) {
-    hapi_v3_set(t->stretch, 0.0, 0.0, 0.0);
-  }
-  hapi_v3_madd(t->stretch, c->period, v, t->stretch);
-  hapi_v3_madd(t->stretch, -hapi_v3_dot(t->stretch, at->normal), at->normal, t->stretch);
-  hapi_v3_scale(p->stiffness, t->stretch, f);
-  hapi_v3_madd(f, p->damping, v, f);
-  double size = hapi_v3_norm(f);
-  if (size > limit) {
-    hapi_v3_scale(limit / size, f, f);
-    double length = hapi_v3_norm(t->stretch);
-    double most = limit / p->stiffness;
-    if (length > most) {
-      hapi_v3_scale(most / length, t->stretch, t->stretch);
-    }
-  }
-  hapi_v3_sub(io_force, f, io_force);
-}
-
-/* N on the hand. */
-static bool press(hapi_physics *physics, hapi_lookback_touch *t, const hapi_path_pointer *p,
-                  double period, double force[3], double point[3])
-{
-  closing c = {.period = period};
-  const hapi_nearest *at = &c.at;
-  dVector3 of_body = {0.0};
-  dBodyID body = dGeomGetBody(t->geom);
-  if (!hapi_geom_nearest(physics, t->geom, p->pose.position, p->radius, p->radius, &c.at) ||
-      at->distance >= 0.0) {
-    t->closed = false;
-    return false;
-  }
-  if (under_test(physics, body)) {
-    dBodyGetPointVel(body, at->point_b[0], at->point_b[1], at->point_b[2], of_body);
-  }
-  hapi_v3_sub(p->twist.linear, of_body, c.speed);
-  double normal = -p->stiffness * at->distance - p->damping * hapi_v3_dot(c.speed, at->normal);
-  normal = normal > 0.0 ? normal : 0.0;
-  hapi_v3_scale(normal, at->normal, force);
-  if (t->mu > 0.0) {
-    rub(t, p, &c, t->mu * normal, force);
-  }
-  t->closed = true;
-  hapi_v3_copy(at->point_b, point);
-  return true;
-}
-
-/* Before the first row: a spring along the surface that was loaded before the window is as long as the force
- * says. That of several contacts cannot be told apart: they begin without. */
-static void load(hapi_physics *physics, uint32_t index, const hapi_path_pointer *p)
+/* What is felt is held until the next row. */
+static void compare(hapi_physics *physics, const hapi_path_pointer *row)
 {
   hapi_lookback *w = &physics->lookback;
-  hapi_lookback_touch *only = NULL;
-  hapi_nearest at = {.distance = 0.0};
-  uint32_t closed = 0;
-  for (uint32_t i = 0; i < w->touch_count; ++i) {
-    hapi_lookback_touch *t = &w->touches[i];
-    hapi_nearest near;
-    if (t->there && t->pointer == index && t->generation == p->generation &&
-        hapi_geom_nearest(physics, t->geom, p->pose.position, p->radius, p->radius, &near) &&
-        near.distance < 0.0) {
-      at = near;
-      only = t;
-      ++closed;
+  for (uint32_t i = 0; i < physics->config.capacity.pointers; ++i) {
+    double wrong[3];
+    const double *felt = row[i].wrench.force;
+    const double *right = hapi_lookback_felt(w, i);
+    if (row[i].generation == 0) {
+      continue;
     }
-  }
-  if (closed == 1 && only->mu > 0.0) {
-    const double *f = p->wrench.force;
-    hapi_v3_madd(f, -hapi_v3_dot(f, at.normal), at.normal, only->stretch);
-    hapi_v3_scale(-1.0 / p->stiffness, only->stretch, only->stretch);
-    only->closed = true;
-  }
-}
-
-static void push(hapi_physics *physics, const hapi_lookback_touch *t, const double force[3],
-                 const double at[3])
-{
-  dBodyID body = dGeomGetBody(t->geom);
-  if (under_test(physics, body) && !dBodyIsKinematic(body)) {
-    dBodyEnable(body);
-    dBodyAddForceAtPos(body, -force[0], -force[1], -force[2], at[0], at[1], at[2]);
-  }
-}
-
-static void push_pointer(hapi_physics *physics, uint32_t index, const hapi_path_pointer *p,
-                         double period)
-{
-  hapi_lookback *w = &physics->lookback;
-  double sum[3] = {0.0};
-  double wrong[3];
-  for (uint32_t i = 0; i < w->touch_count; ++i) {
-    hapi_lookback_touch *t = &w->touches[i];
-    double force[3];
-    double point[3];
-    if (t->there && t->pointer == index && t->generation == p->generation &&
-        press(physics, t, p, period, force, point)) {
-      hapi_v3_add(sum, force, sum);
-      push(physics, t, force, point);
+    hapi_v3_sub(felt, right, wrong);
+    if (hapi_v3_dot(right, right) > 0.0 || hapi_v3_dot(felt, felt) > 0.0) {
+      w->wrong2 += hapi_v3_dot(wrong, wrong);
+      w->right2 += hapi_v3_dot(right, right);
+      ++w->touched;
     }
-  }
-  hapi_v3_sub(p->wrench.force, sum, wrong);
-  if (hapi_v3_dot(sum, sum) > 0.0 || hapi_v3_dot(p->wrench.force, p->wrench.force) > 0.0) {
-    w->wrong2 += hapi_v3_dot(wrong, wrong);
-    w->right2 += hapi_v3_dot(sum, sum);
-    ++w->touched;
   }
 }
 
@@ -238,26 +138,56 @@ static void add_wrenches(hapi_physics *physics)
   }
 }
 
-static void go_over(hapi_physics *physics, uint32_t row)
+/* One that is no more is not to be stepped: ODE would abort the process. */
+static bool sound(const hapi_physics *physics)
+{
+  const hapi_lookback *w = &physics->lookback;
+  for (uint32_t i = 0; i < w->body_count; ++i) {
+    if (!hapi_pose_is_sound(physics->table.entries[w->bodies[i].known].body)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static double period_of(const hapi_physics *physics, uint32_t row)
+{
+  const hapi_lookback *w = &physics->lookback;
+  return row + 1 < w->row_count ? 1e-9 * (double)(w->times_ns[row + 1] - w->times_ns[row])
+                                : 1.0 / w->haptic_hz;
+}
+
+/* Steps from a row to the next one. */
+static int parts_of(double haptic_hz)
+{
+  return haptic_hz < RATE_HZ ? (int)ceil(RATE_HZ / haptic_hz - 1e-6) : 1;
+}
+
+static bool go_over(hapi_physics *physics, uint32_t row)
 {
   hapi_lookback *w = &physics->lookback;
   uint32_t count = physics->config.capacity.pointers;
-  double period = 1.0 / physics->config.haptic_hz;
-  if (row + 1 < w->row_count) {
-    period = 1e-9 * (double)(w->times_ns[row + 1] - w->times_ns[row]);
-  }
-  for (uint32_t i = 0; i < count; ++i) {
-    const hapi_path_pointer *p = &w->path[row * count + i];
-    if (p->generation != 0 && row == 0) {
-      load(physics, i, p);
+  int parts = parts_of(w->haptic_hz);
+  double period = period_of(physics, row) / parts;
+  for (int i = 0; i < parts; ++i) {
+    const hapi_lookback_moment at = {
+        .row = &w->path[row * count],
+        .next = row + 1 < w->row_count ? &w->path[(row + 1) * count] : NULL,
+        .share = (double)i / parts,
+        .later_s = i * period,
+        .period = period};
+    if (!hapi_lookback_feel(physics, &at)) {
+      return false;
     }
-    if (p->generation != 0) {
-      push_pointer(physics, i, p, period);
+    compare(physics, at.row);
+    add_wrenches(physics);
+    collide(physics);
+    hapi_world_quickstep(physics, period);
+    if (!sound(physics)) {
+      return false;
     }
   }
-  add_wrenches(physics);
-  collide(physics);
-  hapi_world_quickstep(physics, period);
+  return true;
 }
 
 static void put_states(hapi_physics *physics)
@@ -300,41 +230,104 @@ void hapi_lookback_keep(hapi_physics *physics)
   w->seed = states.seed;
 }
 
-static void go(hapi_physics *physics, double seconds)
+static const hapi_body_state *end_of(const hapi_lookback *w, const hapi_lookback_body *body)
+{
+  for (uint32_t i = 0; i < w->ended_count; ++i) {
+    if (w->ended[i].known == body->known && w->ended[i].birth == body->birth) {
+      return &w->ends[i];
+    }
+  }
+  return NULL;
+}
+
+/* Whether the reference of the window before ended when this one begins, and not too far from where the
+ * session is. */
+static bool can_chain(const hapi_lookback *w)
+{
+  double apart_s = 1e-9 * fabs((double)(w->times_ns[0] - w->end_ns));
+  bool good = w->end_ns != 0 && apart_s < 0.5 / w->haptic_hz;
+  for (uint32_t i = 0; i < w->body_count && good; ++i) {
+    const hapi_body_state *end = end_of(w, &w->bodies[i]);
+    double apart[3] = {0.0};
+    if (end != NULL) {
+      hapi_v3_sub(end->position, w->states[i].position, apart);
+    }
+    good = hapi_v3_norm(apart) < APART_M;
+  }
+  return good;
+}
+
+/* Goes on from there; a body that was not part of it comes in as the session has it. */
+static void chain(hapi_physics *physics)
+{
+  hapi_lookback *w = &physics->lookback;
+  w->chained = can_chain(w);
+  w->chain_s = w->chained ? w->chain_s : 0.0;
+  if (!w->chained) {
+    hapi_lookback_hand_begin(&w->hand);
+  }
+  for (uint32_t i = 0; i < w->body_count && w->chained; ++i) {
+    const hapi_body_state *end = end_of(w, &w->bodies[i]);
+    if (end != NULL) {
+      w->states[i] = *end;
+      w->bodies[i].lag_ns = 0;
+    }
+  }
+}
+
+static int iterations_of(const hapi_lookback *w, int world)
+{
+  int more = ITERATIONS * world;
+  return !w->lean && more < ITERATIONS_LEAST ? ITERATIONS_LEAST : more;
+}
+
+static bool go(hapi_physics *physics, double seconds)
 {
   hapi_lookback *w = &physics->lookback;
   int64_t begin_ns = hapi_clock_now();
   int iterations = dWorldGetQuickStepNumIterations(physics->ode.world);
   hap_model model = physics->model;
+  bool good = true;
   physics->model = HAP_MODEL_SINGLE; /* whose step this is */
-  dWorldSetQuickStepNumIterations(physics->ode.world, ITERATIONS * iterations);
+  w->haptic_hz = physics->config.haptic_hz;
+  physics->config.haptic_hz = parts_of(w->haptic_hz) * w->haptic_hz;
+  dWorldSetQuickStepNumIterations(physics->ode.world,
+                                  iterations_of(w, physics->dial.own_iterations));
   hapi_world_convert(physics);
+  bool first = w->next == 0;
+  if (first) {
+    chain(physics);
+  }
   put_states(physics);
-  if (w->next == 0) {
+  if (first) {
     even_out(physics);
   }
-  while (w->next < w->row_count &&
+  while (good && w->next < w->row_count &&
          (seconds < 0.0 || 1e-9 * (double)(hapi_clock_now() - begin_ns) < seconds)) {
-    go_over(physics, w->next++);
+    good = go_over(physics, w->next++);
   }
   w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_lookback_keep(physics);
   dJointGroupEmpty(physics->contact_group);
   hapi_world_restore(physics);
   dWorldSetQuickStepNumIterations(physics->ode.world, iterations);
+  physics->config.haptic_hz = w->haptic_hz;
   physics->model = model;
+  return good;
 }
 
 hap_status hapi_lookback_run(hapi_physics *physics, double seconds)
 {
   hapi_lookback *w = &physics->lookback;
+  uint64_t searched = physics->range.number;
   if (!find_geoms(physics)) {
     return HAP_ERROR_MEMORY;
   }
   hap_status status = hapi_test_enter_bodies(physics, w->bodies, w->body_count);
   if (status >= HAP_OK) {
-    go(physics, seconds);
+    status = w->row_count == 0 || go(physics, seconds) ? status : HAP_ERROR_STATE;
     hapi_test_leave(physics);
   }
+  physics->range.number = searched; /* of the meshes that were asked */
   return status;
 }

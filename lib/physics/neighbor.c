@@ -354,7 +354,7 @@ void hapi_neighbors_find(hapi_physics *physics)
     }
   }
   qsort(hood->hits, count, sizeof *hood->hits, by_distance); /* nearest first, for capacity */
-  count = choose(physics, count);
+  count = hood->hit_count = choose(physics, count);
   for (uint32_t i = 0; i < count; ++i) {
     keep_places(physics, &hood->hits[i]);
   }

@@ -353,6 +353,17 @@ typedef struct hapi_found_point {
   uint32_t slot;    /* of the contact that it goes on with; HAPI_NONE: none */
 } hapi_found_point;
 
+/* A hull that is looked at beside a geom. */
+typedef struct hapi_tool_at {
+  dGeomID geom;
+  uint32_t index; /* of the pointer */
+  const hapi_state_pointer *pointer;
+  const hapi_tool_hull *hull;
+  uint64_t key;   /* of the two */
+  double reach;   /* m, at most */
+  double horizon; /* s, for which what may come to touch is of interest */
+} hapi_tool_at;
+
 /* Points of all hits of a cycle. */
 typedef struct hapi_tool_search {
   hapi_found_point *points;
@@ -369,6 +380,7 @@ typedef struct hapi_neighborhood {
   uint32_t candidate_capacity;
   uint32_t candidate_count;
   struct hapi_hit *hits; /* candidate_capacity */
+  uint32_t hit_count;    /* that the newest model has */
   hapi_cover cover;
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
@@ -780,6 +792,9 @@ uint32_t hapi_neighbors_bodies(const hapi_physics *physics);
 /* tool.c: pointers that are hulls */
 bool hapi_tool_knows(dGeomID geom); /* whether they can touch it */
 bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out);
+/* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
+uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
+                          hapi_found_point out[HAPI_TOOL_SPOTS]);
 uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
 void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body);

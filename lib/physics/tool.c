@@ -12,10 +12,10 @@
  * what is near, and its contact thread finds the points. */
 
 /* The pointer in the world, as proximity and the messages see it. */
-static hapi_touch_side side_of_pointer(hapi_physics *physics, uint32_t index, const hap_pose *pose)
+static hapi_touch_side side_of_pointer(const hapi_tool_at *at, const hap_pose *pose)
 {
-  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[index];
-  const hapi_tool_hull *hull = &hapi_state_hulls(physics->state)[index];
+  const hapi_state_pointer *pointer = at->pointer;
+  const hapi_tool_hull *hull = at->hull;
   return (hapi_touch_side){.body = pose,
                            .pose = *pose,
                            .shape = {.kind = HAPI_SHAPE_HULL,
@@ -185,29 +185,46 @@ uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t 
   return hapi_tool_key(key, pointer, hapi_state_pointers(physics->state)[pointer].generation);
 }
 
-static void begin(search *s, hapi_physics *physics, const hapi_candidate *candidate,
-                  const hap_pose *pose)
+static void begin(search *s, hapi_physics *physics, const hapi_tool_at *at, const hap_pose *pose)
 {
-  dBodyID body = dGeomGetBody(candidate->geom);
+  dBodyID body = dGeomGetBody(at->geom);
   s->physics = physics;
-  s->index = candidate->pointer;
-  s->pointer = &hapi_state_pointers(physics->state)[candidate->pointer];
-  s->tool = side_of_pointer(physics, candidate->pointer, pose);
+  s->index = at->index;
+  s->pointer = at->pointer;
+  s->tool = side_of_pointer(at, pose);
   s->has_body = body != NULL;
   if (s->has_body) {
     hapi_pose_read(body, &s->body_pose);
   }
-  s->key = hapi_tool_geom_key(physics, candidate->geom, candidate->pointer);
+  s->key = at->key;
   s->count = s->patches = 0;
 }
 
 /* How fast a point of the pointer may come nearer to the geom. */
-static double speed_of(const hapi_physics *physics, const hapi_candidate *candidate)
+static double speed_of(const hapi_tool_at *at)
 {
-  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[candidate->pointer];
-  return hapi_neighbors_speed(candidate->geom, pointer, pointer->pose.position) +
+  const hapi_state_pointer *pointer = at->pointer;
+  return hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
          pointer->extent * hapi_v3_norm(pointer->twist.angular) +
-         hapi_neighbors_spin(candidate->geom, pointer->extent);
+         hapi_neighbors_spin(at->geom, pointer->extent);
+}
+
+/* The points of the pointer where that pose puts it. */
+static void find(search *s, hapi_physics *physics, const hapi_tool_at *at, const hap_pose *pose)
+{
+  begin(s, physics, at, pose);
+  s->margin = fmin(at->reach, hapi_neighbors_reach(speed_of(at), at->horizon));
+  add_geom(s, at->geom);
+}
+
+uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
+                          hapi_found_point out[HAPI_TOOL_SPOTS])
+{
+  search s;
+  find(&s, physics, at, &at->pointer->pose);
+  reduce(&s);
+  memcpy(out, s.found, s.count * sizeof *out);
+  return s.count;
 }
 
 static void fill_hit(hapi_physics *physics, const search *s, hapi_hit *out)
@@ -233,15 +250,19 @@ bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi
 {
   search s;
   const hapi_state_pointer *pointer = &hapi_state_pointers(physics->state)[candidate->pointer];
-  double horizon = physics->probe_step_s;
+  const hapi_tool_at at = {.geom = candidate->geom,
+                           .index = candidate->pointer,
+                           .pointer = pointer,
+                           .hull = &hapi_state_hulls(physics->state)[candidate->pointer],
+                           .key = hapi_tool_geom_key(physics, candidate->geom, candidate->pointer),
+                           .reach = candidate->reach,
+                           .horizon = physics->probe_step_s};
   hap_pose pose = pointer->pose;
   if (!hapi_physics_steps_to_now(physics)) {
-    hapi_pose_move(&pose, &pointer->twist, horizon);
+    hapi_pose_move(&pose, &pointer->twist, at.horizon);
   }
   for (int attempt = 0; attempt < 2; ++attempt) {
-    begin(&s, physics, candidate, &pose);
-    s.margin = fmin(candidate->reach, hapi_neighbors_reach(speed_of(physics, candidate), horizon));
-    add_geom(&s, candidate->geom);
+    find(&s, physics, &at, &pose);
     bool buried = s.count == 0 || s.found[0].gap < -0.25 * pointer->extent;
     if (!buried || hapi_physics_steps_to_now(physics)) {
       break;

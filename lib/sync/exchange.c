@@ -62,6 +62,8 @@ static size_t lay_out_state(hapi_state *s, const hapi_capacity *c)
   s->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_state_pointer));
   s->hulls_offset = place_array(&at, c->pointers, sizeof(hapi_tool_hull));
   s->pointer_count = c->pointers;
+  s->spring_capacity = c->path_rows > 0 ? c->contacts + 2 * c->tool_points : 0;
+  s->springs_offset = place_array(&at, s->spring_capacity, sizeof(hapi_state_spring));
   return at;
 }
 

@@ -561,6 +561,16 @@ typedef struct hapi_tick_load {
   double spent_ns;
 } hapi_tick_load;
 
+/* How far a pointer contact that is closed is pulled along the surface, of those with friction. */
+typedef struct hapi_state_spring {
+  uint32_t slot;       /* of the contact; HAPI_SLOT_NONE: of a point of a hull, by the next two */
+  uint32_t generation; /* of the contact */
+  uint64_t key;        /* of hull and geom */
+  double place[3];     /* m, of the point on the hull */
+  double stretch_body[3]; /* m, of the pointer ahead of the body, in the body's frame */
+  double turn;            /* rad, likewise, about the normal */
+} hapi_state_spring;
+
 typedef struct hapi_state {
   uint64_t model_number;   /* the local model in use; 0: none yet */
   int64_t now_ns;          /* time for which the poses hold */
@@ -576,6 +586,9 @@ typedef struct hapi_state {
   uint32_t contacts_offset;
   uint32_t pointers_offset;
   uint32_t hulls_offset;
+  uint32_t spring_count;
+  uint32_t spring_capacity; /* 0: nobody wants to know */
+  uint32_t springs_offset;
 } hapi_state;
 
 static inline hapi_state_body *hapi_state_bodies(hapi_state *s)
@@ -591,6 +604,11 @@ static inline hapi_state_contact *hapi_state_contacts(hapi_state *s)
 static inline hapi_state_pointer *hapi_state_pointers(hapi_state *s)
 {
   return (hapi_state_pointer *)(void *)((char *)s + s->pointers_offset);
+}
+
+static inline hapi_state_spring *hapi_state_springs(hapi_state *s)
+{
+  return (hapi_state_spring *)(void *)((char *)s + s->springs_offset);
 }
 
 /* By pointer; of one that is a sphere not set. */

@@ -16,14 +16,18 @@
 #include <hapode/status.h>
 
 typedef struct hapi_path_pointer {
-  uint32_t generation; /* 0: no pointer here */
-  uint32_t is_tool;    /* a hull */
-  double radius;       /* m */
-  double stiffness;    /* N/m */
-  double damping;      /* N s/m */
-  hap_pose pose;       /* world */
-  hap_twist twist;     /* world */
-  hap_wrench wrench;   /* N, N m, world, on the hand */
+  uint32_t generation;  /* 0: no pointer here */
+  uint32_t is_tool;     /* a hull */
+  uint32_t turns;       /* with the device, and gives it torque */
+  uint32_t three_dof;   /* the device has no torque */
+  uint32_t rigid;       /* its contacts do not give */
+  double radius;        /* m */
+  double stiffness;     /* N/m */
+  double damping;       /* N s/m */
+  double finger_radius; /* m; 0: no torsion */
+  hap_pose pose;        /* world */
+  hap_twist twist;      /* world */
+  hap_wrench wrench;    /* N, N m, world, on the hand */
 } hapi_path_pointer;
 
 typedef struct hapi_path {

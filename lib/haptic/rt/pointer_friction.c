@@ -297,6 +297,33 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
   f->axes[2][3] = sliding;
 }
 
+/* Anchors that are set now, where the spring is as long as in `stretch`. */
+static void set_anew(hapi_friction *f, const hapi_local_body *body, const double normal[3])
+{
+  across(normal, f->stretch);
+  hapi_v3_copy(normal, f->normal);
+  see_stretch(f, body, normal, f->now.turn);
+  set_anchors(f, 1.0);
+}
+
+void hapi_friction_resume(hapi_tick *tick, const hapi_local_contact *contact,
+                          const double normal[3], const double point[3],
+                          const double stretch_body[3], double turn)
+{
+  const hapi_tick_pointer *p = &tick->pointers[contact->pointer];
+  const hapi_local_body *body =
+      contact->body == HAPI_SLOT_NONE ? NULL : &tick->bodies[contact->body];
+  hapi_friction *f = hapi_friction_of(tick, contact);
+  memset(f, 0, sizeof *f);
+  from_body(body, stretch_body, f->stretch);
+  f->now.turn = turn;
+  see(f, p, body, normal, point);
+  set_anew(f, body, normal);
+  f->generation = contact->generation;
+  f->tick = tick->tick - 1;
+  f->epoch = body != NULL ? body->epoch : 0;
+}
+
 hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
                                    const double normal[3], const double point[3])
 {
@@ -318,10 +345,7 @@ hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *co
   }
   see(f, p, body, normal, point);
   if (!same || f->epoch != epoch) { /* that a body was put somewhere else is no motion */
-    across(normal, f->stretch);
-    hapi_v3_copy(normal, f->normal);
-    see_stretch(f, body, normal, f->now.turn);
-    set_anchors(f, 1.0);
+    set_anew(f, body, normal);
   }
   f->generation = contact->generation;
   f->tick = tick->tick;

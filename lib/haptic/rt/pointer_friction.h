@@ -33,6 +33,12 @@ static inline void hapi_friction_foot(const hapi_tick_pointer *p, const double n
 hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
                                    const double normal[3], const double point[3]);
 
+/* As if the contact had been closed in the tick before, with its spring that long: for a tick that is begun in the midst
+ * of something. stretch_body: m, of the pointer ahead of the body, in the body's frame; turn: rad. */
+void hapi_friction_resume(hapi_tick *tick, const hapi_local_contact *contact,
+                          const double normal[3], const double point[3],
+                          const double stretch_body[3], double turn);
+
 /* Sets the axes along the force that there is when all sticks. lead: how far the spring's is foreseen, with
  * the speed and what the pointer gets of it besides (m/s; NULL: nothing): where pointer or body follow
  * the force within the tick, only that tells where they slide. */

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/vec.h"
+#include "haptic/rt/pointer_friction.h"
 #include "haptic/rt/tick.h"
 
 static void report_bodies(const hapi_tick *tick, hapi_state *out)
@@ -43,6 +44,28 @@ static void report_contacts(const hapi_tick *tick, hapi_state *out)
   out->contact_count = count;
 }
 
+static void report_springs(const hapi_tick *tick, hapi_state *out)
+{
+  out->spring_count = 0;
+  for (uint32_t i = 0; i < tick->contact_count && out->spring_count < out->spring_capacity; ++i) {
+    const hapi_local_contact *c = &tick->contacts[i];
+    const hapi_friction *f = c->rubs ? hapi_friction_of(tick, c) : NULL;
+    if (f == NULL || f->tick + 1 != tick->tick || f->rigid || !(f->stiffness > 0.0)) {
+      continue;
+    }
+    hapi_state_spring *to = &hapi_state_springs(out)[out->spring_count++];
+    to->slot = c->tool != 0 ? HAPI_SLOT_NONE : c->slot;
+    to->generation = c->generation;
+    if (c->tool != 0) {
+      const hapi_patch_contact *at = &tick->tool.tools[c->tool - 1].in.at;
+      to->key = at->key;
+      hapi_v3_copy(at->core_a, to->place);
+    }
+    hapi_v3_scale(f->left, f->now.stretch_body, to->stretch_body);
+    to->turn = f->left * f->now.turn;
+  }
+}
+
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
 {
   hapi_v3_copy(tick->hand_impulse, out->hand_impulse);
@@ -52,6 +75,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   out->model = tick->model;
   report_bodies(tick, out);
   report_contacts(tick, out);
+  report_springs(tick, out);
   hapi_state_pointer *pointers = hapi_state_pointers(out);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     const hapi_tick_pointer *in = &tick->pointers[i];
@@ -151,9 +175,13 @@ void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
     const hapi_tick_pointer *p = &tick->pointers[i];
     out[i] = (hapi_path_pointer){.generation = p->generation,
                                  .is_tool = p->hull != NULL,
+                                 .turns = p->turns,
+                                 .three_dof = p->three_dof,
+                                 .rigid = p->rigid,
                                  .radius = p->radius,
                                  .stiffness = p->stiffness,
                                  .damping = p->damping,
+                                 .finger_radius = p->finger_radius,
                                  .pose = p->pose,
                                  .twist = p->twist,
                                  .wrench = p->wrench};
