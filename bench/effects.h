@@ -25,9 +25,9 @@ typedef struct effects_run {
 typedef struct effects_result {
   double tick_us; /* medians over the rounds; this and the next two by the clock */
   double physics_ms;
-  double contact_us;                    /* a pass */
-  double total_ms;                      /* processor's time of a simulated second, all threads' work */
-  uint32_t neighbours;                  /* most at once, at the syncs that were looked at */
+  double contact_us;   /* a pass */
+  double total_ms;     /* processor's time of a simulated second, all threads' work */
+  uint32_t neighbours; /* most at once, at the syncs that were looked at */
   hap_effect_info effects[HAP_EFFECTS]; /* in the middle of the contact, see look */
   double *force;                        /* N, of all pointers, tick by tick; owned */
   size_t count;

@@ -122,7 +122,7 @@ hap_status fig7_draw(bench *b, const fig67_group *groups, size_t count)
     put_group(script, &groups[0]);
     fprintf(script,
             "set title '%d cubes, apart at first: all models'\nset logscale y\n"
-            "set format y '%%g'\nset yrange [5e-4:1]\nset key outside right top Left reverse\n",
+            "set format y '%%g'\nset yrange [1e-4:1]\nset key outside right top Left reverse\n",
             groups[0].bodies);
     plot_times(script);
   }

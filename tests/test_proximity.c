@@ -4,9 +4,7 @@
 
 #include <stdint.h>
 
-#include "base/pose.h"
 #include "base/vec.h"
-#include "haptic/rt/ball_nearest.h"
 #include "proximity/gjk.h"
 #include "tests/tap.h"
 
@@ -674,48 +672,6 @@ TEST(closed_forms_against_gjk)
   each_pair(core_pair, 300);
 }
 
-/* As the tick asks: a shape in the frame of a body, as it is or turned, or in the world. */
-static void ball_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
-{
-  thing ball;
-  thing other;
-  hapi_nearest world;
-  hapi_nearest local;
-  hap_pose body = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
-  double rotation[9];
-  pair_make(&ball, &other, HAPI_SHAPE_SPHERE, kind_b, 2.0, state);
-  if (kind_a > HAPI_SHAPE_CAPSULE || kind_b == HAPI_SHAPE_HULL) {
-    return;
-  }
-  hap_pose in_body = other.pose;
-  hapi_touch_frame frame = {NULL, NULL};
-  if (kind_a != HAPI_SHAPE_SPHERE) { /* turned, or as it is */
-    random_quat(state, body.quat_wxyz);
-    random_direction(state, body.position);
-    if (kind_a == HAPI_SHAPE_BOX) {
-      in_body = (hap_pose){.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
-    }
-    hapi_quat_to_matrix(body.quat_wxyz, rotation);
-    frame = (hapi_touch_frame){&body, rotation};
-    hapi_pose_point(body.position, body.quat_wxyz, in_body.position, other.pose.position);
-    hapi_quat_multiply(body.quat_wxyz, in_body.quat_wxyz, other.pose.quat_wxyz);
-  }
-  REQUIRE(nearest(&ball, &other, &world));
-  REQUIRE(hapi_ball_nearest(ball.pose.position, ball.shape.radius, &other.shape, &in_body, &frame,
-                            &local));
-  CHECK_NEAR(local.distance, world.distance, 1e-12);
-  for (int i = 0; i < 3; ++i) {
-    CHECK_NEAR(local.normal[i], world.normal[i], 1e-9);
-    CHECK_NEAR(local.point_a[i], world.point_a[i], 1e-9);
-    CHECK_NEAR(local.point_b[i], world.point_b[i], 1e-9);
-  }
-}
-
-TEST(a_ball_in_the_frame_of_a_body)
-{
-  each_pair(ball_pair, 100);
-}
-
 static void box_to_hull(const thing *box, thing *hull, double corners[24])
 {
   for (int i = 0; i < 24; ++i) {
@@ -928,7 +884,6 @@ int main(void)
   RUN(distance_follows_the_approach);
   RUN(millimetre_against_hundred_metres);
   RUN(closed_forms_against_gjk);
-  RUN(a_ball_in_the_frame_of_a_body);
   RUN(box_and_hull_of_its_corners);
   RUN(overlap_agrees_with_distance);
   RUN(coincident_frames);

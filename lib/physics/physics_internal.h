@@ -864,8 +864,7 @@ void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, 
 void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index); /* after three of them */
 void hapi_cross_take_out(hapi_physics *physics); /* of b: what last_force does by the blocks */
 /* Those of a contact that is the one of this number in the message. */
-void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number,
-                        hapi_model *out);
+void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number, hapi_model *out);
 
 /* reconcile.c: eq. 12-14, momentum */
 void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */

@@ -17,7 +17,7 @@ static void place(const double center[3], const hapi_shape *shape, const hap_pos
     hapi_quat_to_matrix(q, out->rotation);
   }
   if (frame->pose != NULL) {
-    hapi_m3_apply(frame->rotation, at, at);
+    hapi_m3_apply(frame->rotation, pose_local->position, at);
     hapi_v3_add(frame->pose->position, at, at);
     if (turned) {
       hapi_m3_multiply(frame->rotation, out->rotation, out->rotation);
@@ -31,8 +31,7 @@ static void place(const double center[3], const hapi_shape *shape, const hap_pos
 }
 
 bool hapi_ball_nearest(const double center[3], double radius, const hapi_shape *shape,
-                       const hap_pose *pose_local, const hapi_touch_frame *frame,
-                       hapi_nearest *out)
+                       const hap_pose *pose_local, const hapi_touch_frame *frame, hapi_nearest *out)
 {
   hapi_solid solid;
   if (shape->kind == HAPI_SHAPE_HULL) {
