@@ -357,7 +357,6 @@ void hapi_solver_sweep_on(hapi_solver *solver)
 /* Each row has its bodies to itself: what is due after its update is rounding. */
 static void run_apart(hapi_solver *solver)
 {
-  solver->direct_solves = solver->sweeps = 0;
   (void)sweep(solver);
   solver->residual = 0.0;
   check_finite(solver);
@@ -367,10 +366,6 @@ void hapi_solver_run(hapi_solver *solver)
 {
   uint32_t rows = solver->row_count;
   uint64_t left = solver->update_budget;
-  if (solver->apart && solver->ready && rows > 0) {
-    run_apart(solver);
-    return;
-  }
   solver->sweeps = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
@@ -379,6 +374,10 @@ void hapi_solver_run(hapi_solver *solver)
   left = dear ? sweeps_alone(rows, left) : left;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
+  }
+  if (solver->apart && rows > 0) {
+    run_apart(solver);
+    return;
   }
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
