@@ -180,14 +180,15 @@ static void list_members(const hapi_physics *physics, hapi_reuse_book *book)
 {
   const hapi_test_set *test = &physics->test;
   book->island_count = test->island_count;
-  memset(book->islands, 0, book->island_count * sizeof *book->islands);
+  for (uint32_t i = 0; i < book->island_count; ++i) {
+    book->islands[i] = (hapi_reuse_island){.pushed = HAPI_NONE};
+  }
   for (uint32_t i = test->member_count; i-- > 0;) {
     const hapi_known_body *known = &physics->table.entries[test->members[i]];
     hapi_reuse_island *island = &book->islands[known->island];
     island->first_member = i;
     ++island->member_count;
     island->slot = known->slot;
-    island->pushed = HAPI_NONE;
   }
 }
 

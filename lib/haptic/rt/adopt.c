@@ -63,6 +63,15 @@ static void take_given(hapi_local_body *body, const hapi_model_body *in)
 {
   body->given = *in;
   body->round = hapi_m3_is_scalar(in->inertia) && hapi_m3_is_scalar(in->inverse_inertia);
+  body->forced = false;
+  for (int i = 0; i < 6; ++i) {
+    body->forced = body->forced || in->user_wrench[i] != 0.0;
+  }
+  bool by_mass = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0;
+  body->inverse_mass = by_mass ? 1.0 / in->mass : 0.0;
+  if (body->round) {
+    memcpy(body->inverse_inertia, in->inverse_inertia, sizeof body->inverse_inertia);
+  }
 }
 
 /* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is

@@ -3,8 +3,7 @@
 #ifndef HAPODE_HAPTIC_RT_CONTACT_RAMP_H
 #define HAPODE_HAPTIC_RT_CONTACT_RAMP_H
 
-#include <math.h>
-
+#include "base/vec.h"
 #include "haptic/rt/tick.h"
 
 /* A contact that is already deep when it arrives gets its full force after this time. */
@@ -24,7 +23,7 @@ static inline void hapi_contact_ramp_begin(hapi_ramp *r, double depth, bool jump
 {
   bool deep = depth > 0.0;
   *r = (hapi_ramp){.share = deep && !jumped ? 0.0 : 1.0,
-                   .excess = fmax(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
+                   .excess = hapi_max(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
                    .held = deep && jumped};
 }
 
@@ -35,14 +34,14 @@ static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_ti
                                       double *io_depth, double period)
 {
   double depth = *io_depth;
-  double most = fmax(HAPI_RAMP_DEPTH, HAPI_PRESS_SPEED * period);
-  if (!*io_seen || depth - fmax(r->depth, 0.0) > most) {
+  double most = hapi_max(HAPI_PRESS_SPEED * period, HAPI_RAMP_DEPTH);
+  if (!*io_seen || depth - hapi_max(r->depth, 0.0) > most) {
     hapi_contact_ramp_begin(r, depth, p->jump_s > 0.0);
     *io_seen = true;
   } else if (r->share < 1.0 || r->excess > 0.0) {
     double comes_in = r->held ? 0.0 : HAPI_RAMP_SPEED * period;
-    r->share = depth > 0.0 ? fmin(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
-    r->excess = fmax(fmin(r->excess, depth) - comes_in, 0.0);
+    r->share = depth > 0.0 ? hapi_min(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
+    r->excess = hapi_max(hapi_min(r->excess, depth) - comes_in, 0.0);
   }
   r->depth = depth;
   *io_depth = depth - r->excess;

@@ -98,9 +98,8 @@ static inline double *column_of(hapi_row *row, int side, int response)
 /* The same of a body that answers by its mass, which most do. */
 static inline void free_column(const hapi_local_body *body, const double j[6], double b[6])
 {
-  const double *inertia = body->inverse_inertia;
   hapi_v3_scale(body->inverse_mass, j, b);
-  hapi_m3_apply(inertia, j + 3, b + 3);
+  hapi_body_spin_up(body, j + 3, b + 3);
 }
 
 static inline void set_columns(const placed_contact *c, int side, double directions[3][3],
@@ -143,6 +142,7 @@ static void begin_rows(hapi_tick *tick, const placed_contact *c, uint32_t index,
   for (uint32_t i = 0; i < count; ++i) {
     hapi_row *row = &world->solver.rows[first + i];
     row->ball = row->round = 0;
+    row->single = c->b == NULL;
     row->a = a;
     row->b = b;
     row->mu = 0.0;

@@ -35,7 +35,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
 {
   hapi_row *row = &solver->rows[index];
   double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
-  double of_b = hapi_dot6(row->jb, row->bb);
+  double of_b = row->single ? 0.0 : hapi_dot6(row->jb, row->bb);
   double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
@@ -47,7 +47,8 @@ static void prepare(hapi_solver *solver, uint32_t index)
   row->response = d;
   row->moves_a = of_a != 0.0;
   row->paired = of_b != 0.0;
-  row->drive = row->target - (row->paired ? 0.0 : hapi_dot6(row->jb, solver->v[row->b]));
+  bool moved = !row->paired && !row->single; /* by a partner that does not respond */
+  row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
 }
 
 static double couple(const hapi_row *row, const hapi_row *other)
@@ -353,6 +354,14 @@ void hapi_solver_sweep_on(hapi_solver *solver)
   check_finite(solver);
 }
 
+/* Each row has its bodies to itself: what is due after its update is rounding. */
+static void run_apart(hapi_solver *solver)
+{
+  (void)sweep(solver);
+  solver->residual = 0.0;
+  check_finite(solver);
+}
+
 void hapi_solver_run(hapi_solver *solver)
 {
   uint32_t rows = solver->row_count;
@@ -366,6 +375,10 @@ void hapi_solver_run(hapi_solver *solver)
   left = dear ? sweeps_alone(rows, left) : left;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
+  }
+  if (solver->apart && rows > 0) {
+    run_apart(solver);
+    return;
   }
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {

@@ -44,6 +44,7 @@ typedef struct hapi_row {
   uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
                       vector, no longer than mu p: how many; 0: the pyramid */
   uint8_t round;  /* of the others: how many of them come before */
+  uint8_t single; /* a static partner: jb and bb are 0 and are not looked at */
   uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
   uint8_t moves_a; /* inner: a responds */
   uint8_t paired;  /* inner: b responds */
@@ -74,6 +75,7 @@ typedef struct hapi_solver {
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
+  bool apart; /* in: no two rows have a body in common: one sweep solves them */
   uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
   uint32_t dear_runs; /* inner: since then */
   bool too_dear;      /* inner: an island was too large or too dear for the budget */

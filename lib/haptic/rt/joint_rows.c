@@ -90,6 +90,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_joint *j, int part)
   row->b = j->b != NULL ? j->b->row : HAPI_STATIC_ROW;
   row->mu = 0.0;
   row->ball = row->round = 0;
+  row->single = j->b == NULL;
   row->normal = -1;
   row->lo = -HUGE_VAL;
   row->hi = HUGE_VAL;

@@ -31,9 +31,11 @@ static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, do
     return;
   }
   hapi_v3_madd(v, tick->period, given->gravity, v);
-  hapi_v3_madd(v, tick->period * body->inverse_mass, given->user_wrench, v);
-  hapi_m3_apply(body->inverse_inertia, given->user_wrench + 3, turn);
-  hapi_v3_madd(v + 3, tick->period, turn, v + 3);
+  if (body->forced) {
+    hapi_v3_madd(v, tick->period * body->inverse_mass, given->user_wrench, v);
+    hapi_m3_apply(body->inverse_inertia, given->user_wrench + 3, turn);
+    hapi_v3_madd(v + 3, tick->period, turn, v + 3);
+  }
 }
 
 /* A body that came into the range moves on with its twist until the contact thread has seen it:
@@ -53,13 +55,9 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
   body->waiting = waits(tick, body);
   body->row = row;
-  if ((body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
-    body->inverse_mass = 1.0 / body->given.mass;
-    if (body->round) {
-      memcpy(body->inverse_inertia, body->given.inverse_inertia, sizeof body->inverse_inertia);
-    } else {
-      hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
-    }
+  body->rowed = false;
+  if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
+    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
   }
 }
 
@@ -69,6 +67,7 @@ static void begin(hapi_tick *tick)
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
   solver->body_count = 1;
   solver->row_count = 0;
+  solver->apart = true;
   tick->world.resting = 0;
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
@@ -137,8 +136,9 @@ static void move_body(hapi_tick *tick, hapi_local_body *body)
     hapi_effect_end(tick, HAP_EFFECT_GYRO, begin);
     return;
   }
+  double step = substeps == 1 ? seconds : seconds / (double)substeps;
   for (uint32_t i = 0; i < substeps; ++i) {
-    hapi_turn(body->pose.quat_wxyz, body->twist.angular, seconds / (double)substeps);
+    hapi_turn(body->pose.quat_wxyz, body->twist.angular, step);
   }
 }
 
@@ -380,9 +380,11 @@ void hapi_local_world_step(hapi_tick *tick)
   begin(tick);
   set_free_velocities(tick);
   hapi_pointer_rows(tick);
+  uint32_t of_pointers = tick->world.solver.row_count;
   wake(tick);
   add_joints(tick);
   add_contacts(tick);
+  tick->world.solver.apart &= tick->world.solver.row_count == of_pointers;
   solve(tick);
   bool again = stop_push_out(tick);
   for (uint32_t i = 0; i < tick->live_count; ++i) {

@@ -334,6 +334,16 @@ static void set_columns(const hapi_local_contact *contact, const placed_pointer 
   out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
 }
 
+/* Whether all rows so far have their bodies to themselves. */
+static void note_body(hapi_solver *solver, const placed_pointer *at)
+{
+  bool alone = !at->pointer->proxied && at->body != NULL && !at->body->rowed;
+  solver->apart = solver->apart && alone;
+  if (at->body != NULL) {
+    at->body->rowed = true;
+  }
+}
+
 static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
 {
   hapi_local_world *world = &tick->world;
@@ -357,6 +367,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
   }
   row->mu = 0.0;
   row->ball = row->round = 0;
+  row->single = !at->pointer->proxied;
   row->normal = -1;
   row->impulse = tick->period * -hapi_v3_dot(contact->force, at->normal);
   world->sources[number] = (hapi_row_source){
@@ -366,6 +377,7 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
   }
   contact->row = number;
   ++world->solver.row_count;
+  note_body(&world->solver, at);
   hapi_row_ready(&world->solver, number);
 }
 
@@ -442,6 +454,8 @@ static bool add_friction_row(hapi_tick *tick, uint32_t index, const placed_point
   set_friction_columns(contact, at, f, f->axes[axis], row);
   fill_friction_spring(at, f, f->axes[axis], row, &p);
   row->mu = contact->mu;
+  row->single = !at->pointer->proxied;
+  world->solver.apart = false;
   row->ball = axis == 0 ? (uint8_t)f->axis_count : 0;
   row->round = (uint8_t)axis;
   row->normal = (int32_t)contact->row;
@@ -603,6 +617,7 @@ static void add_brake(hapi_tick *tick, const hapi_tick_pointer *p, const double 
   hapi_v3_scale(first == 0 ? p->response : p->spin_response, row->jb + first, row->bb + first);
   row->a = HAPI_STATIC_ROW;
   row->b = p->row;
+  world->solver.apart = false;
   row->hi = HUGE_VAL;
   row->target = -most;
   row->normal = -1;

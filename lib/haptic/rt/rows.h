@@ -53,6 +53,17 @@ static inline void hapi_body_arm(const hapi_local_body *body, const double point
   }
 }
 
+/* Of a torque, to the angular velocity of a body that answers by its mass. */
+static inline void hapi_body_spin_up(const hapi_local_body *body, const double torque[3],
+                                     double out[3])
+{
+  if (body->round) {
+    hapi_v3_scale(body->inverse_inertia[0], torque, out);
+  } else {
+    hapi_m3_apply(body->inverse_inertia, torque, out);
+  }
+}
+
 /* What a unit impulse along j does to the body's velocity. */
 static inline void hapi_row_response(const hapi_local_body *body, const double j[6], double b[6])
 {
@@ -60,7 +71,7 @@ static inline void hapi_row_response(const hapi_local_body *body, const double j
     memset(b, 0, 6 * sizeof *b);
   } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
     hapi_v3_scale(body->inverse_mass, j, b);
-    hapi_m3_apply(body->inverse_inertia, j + 3, b + 3);
+    hapi_body_spin_up(body, j + 3, b + 3);
   } else {
     for (int i = 0; i < 6; ++i) {
       b[i] =

@@ -197,10 +197,12 @@ typedef struct hapi_local_body {
   uint64_t entered_model; /* with which the loop came to own the body */
   bool
       round; /* the same inertia about all axes, as cubes and balls have: it does not turn with them */
-  bool waiting;       /* for its first contacts: goes on with its twist until they are known */
-  uint32_t row;       /* place in the solver's velocities */
-  double rotation[9]; /* of pose */
-  double inverse_mass;
+  bool forced;         /* the application pushes it */
+  bool rowed;          /* scratch: it has a row in this tick */
+  bool waiting;        /* for its first contacts: goes on with its twist until they are known */
+  uint32_t row;        /* place in the solver's velocities */
+  double rotation[9];  /* of pose */
+  double inverse_mass; /* 0 where it is not used: driven and measured ones */
   double inverse_inertia[9]; /* world */
   double start_twist[6];     /* before this tick */
   double gain[6];
