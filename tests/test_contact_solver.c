@@ -721,49 +721,6 @@ TEST(an_unchanged_load_is_solved_at_once)
   check_complementarity(1e-9);
 }
 
-/* Cubes that come to the ground side by side, each on a spring under its edge. */
-static void make_apart(bool apart)
-{
-  set_up();
-  s.solver.apart = apart;
-  for (uint32_t i = 0; i < 20; ++i) {
-    double point[3] = {0.2 * i + 0.03, 0.01, 0.0};
-    uint32_t body = add_cube(1.0 + i, 0.2 * i, 0.0, 0.05, 0.05);
-    hapi_row *row = add_row(body, GROUND, point, (double[3]){0.0, 0.0, 1.0});
-    row->softness = 0.01 * i;
-    row->target = i % 3 == 0 ? -1.0 : 0.1; /* of every third it stays open */
-    row->impulse = 0.02 * i;
-    row->single = apart;
-    if (apart) { /* which is not looked at */
-      memset(row->jb, 0x40, sizeof row->jb);
-      memset(row->bb, 0x40, sizeof row->bb);
-    }
-    s.v[body][2] = -0.5;
-  }
-}
-
-TEST(rows_that_share_no_body_take_one_sweep)
-{
-  static double p[ROWS];
-  make_apart(false);
-  run();
-  CHECK(s.solver.sweeps >= 2);
-  for (uint32_t i = 0; i < s.row_count; ++i) {
-    p[i] = s.rows[i].impulse;
-  }
-  make_apart(true);
-  run();
-  CHECK(s.solver.sweeps == 1 && s.solver.direct_solves == 0 && s.solver.residual == 0.0);
-  for (uint32_t i = 0; i < s.row_count; ++i) {
-    CHECK((i % 3 == 0) == (p[i] == 0.0));
-    CHECK_NEAR(s.rows[i].impulse, p[i], 1e-15 * p[i]);
-  }
-  make_apart(true);
-  s.v[3][2] = (double)NAN;
-  run();
-  CHECK(s.solver.residual == HUGE_VAL);
-}
-
 TEST(the_same_input_gives_the_same_bits)
 {
   static double v[BODIES][6];
@@ -933,7 +890,6 @@ int main(void)
   RUN(a_heavy_box_rests_on_light_ones);
   RUN(warm_started_ticks_need_few_sweeps);
   RUN(an_unchanged_load_is_solved_at_once);
-  RUN(rows_that_share_no_body_take_one_sweep);
   RUN(the_same_input_gives_the_same_bits);
   RUN(islands_are_solved_one_by_one);
   RUN(many_bodies_about_a_light_one_are_solved_to_the_end);
