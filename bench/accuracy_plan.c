@@ -345,7 +345,7 @@ static void add_knobs(writer *w)
   bool single = w->group->physics_hz == ACCURACY_DEFAULT_HZ && !w->plan->quick;
   for (size_t knob = 0; knob < COUNT(knobs); ++knob) {
     add_knob(w, knob, HAP_MODEL_CONTACT);
-    for (size_t m = 1; m < knobs[knob].models && !w->plan->quick; ++m) {
+    for (size_t m = 1; m < COUNT(models) && m < knobs[knob].models && !w->plan->quick; ++m) {
       add_knob(w, knob, models[m]);
     }
     if (single && knobs[knob].models == COUNT(models)) {
