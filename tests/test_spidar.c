@@ -372,9 +372,9 @@ TEST(a_loop_that_hangs_leaves_no_force)
 #define LEAST_N 2.0 /* that a sample is worth */
 
 typedef struct felt {
-  double most;        /* N, that was asked for */
-  double force[2];    /* sums of what was asked, and of what was given along it */
-  double torque[2];   /* the same */
+  double most;           /* N, that was asked for */
+  double force[SAMPLES]; /* share of what was asked that was given along it, in each sample */
+  double torque[SAMPLES];
   double torque_most; /* N m, that was asked for */
   int samples;
 } felt;
@@ -387,13 +387,25 @@ static void to_makers(const double v[3], double out[3])
   out[2] = -v[1];
 }
 
-static void add(const double asked[3], const double given[3], double sums[2])
+static double share(const double asked[3], const double given[3])
 {
-  double length = hapi_v3_norm(asked);
-  if (length > 0.0) {
-    sums[0] += length;
-    sums[1] += hapi_v3_dot(asked, given) / length;
-  }
+  double size2 = hapi_v3_dot(asked, asked);
+  return size2 > 0.0 ? hapi_v3_dot(asked, given) / size2 : 0.0;
+}
+
+static int by_value(const void *a, const void *b)
+{
+  double x = *(const double *)a;
+  double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* The median: the two are not asked for at the same moment, and a thread that waits for a processor in between
+ * spoils a sample, not the device. */
+static double middle(double shares[SAMPLES], int count)
+{
+  qsort(shares, (size_t)count, sizeof *shares, by_value);
+  return count > 0 ? shares[count / 2] : 0.0;
 }
 
 /* The wrench on the hand against that of the strings, while the emulated hand pushes. */
@@ -411,9 +423,8 @@ static void compare(rig *r, emulated *e, felt *out)
   out->most = fmax(out->most, hapi_v3_norm(asked[0]));
   out->torque_most = fmax(out->torque_most, hapi_v3_norm(asked[1]));
   if (hapi_v3_norm(asked[0]) > LEAST_N) {
-    add(asked[0], given[0], out->force);
-    add(asked[1], given[1], out->torque);
-    ++out->samples;
+    out->force[out->samples] = share(asked[0], given[0]);
+    out->torque[out->samples++] = share(asked[1], given[1]);
   }
 }
 
@@ -454,8 +465,8 @@ static hap_fault feel(rig *r, emulated *e, felt *seen)
     printf("# %s\n", detail.text);
   }
   printf("# %d samples, at most %.2f N and %.4f N m asked; given of it %.3f and %.3f\n",
-         seen->samples, seen->most, seen->torque_most, seen->force[1] / fmax(seen->force[0], 1e-9),
-         seen->torque[1] / fmax(seen->torque[0], 1e-9));
+         seen->samples, seen->most, seen->torque_most, middle(seen->force, seen->samples),
+         middle(seen->torque, seen->samples));
   return stats.fault;
 }
 
@@ -470,7 +481,7 @@ TEST(a_row_of_cubes_is_felt)
   REQUIRE(begin_scene("row10", machine.port, &r));
   CHECK(feel(&r, &machine, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
   CHECK(seen.most > 3.0); /* ten cubes of 0.1 kg on mu 0.5 move at 4.9 N */
-  CHECK_NEAR(seen.force[1] / seen.force[0], 0.98, 0.08);
+  CHECK_NEAR(seen.force[seen.samples / 2], 0.98, 0.08);
   REQUIRE(emulated_tell(&machine, "unplug"));
   double end = emulated_clock() + 20.0;
   do {
@@ -504,8 +515,8 @@ TEST(a_tool_that_turns_a_lever_is_felt)
   REQUIRE(begin_scene("lever", other.port, &r));
   CHECK(feel(&r, &other, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
   CHECK(seen.torque_most > 0.01);
-  CHECK_NEAR(seen.force[1] / seen.force[0], 0.98, 0.08);
-  CHECK_NEAR(seen.torque[1] / seen.torque[0], 0.96, 0.12);
+  CHECK_NEAR(seen.force[seen.samples / 2], 0.98, 0.08);
+  CHECK_NEAR(seen.torque[seen.samples / 2], 0.96, 0.12);
   hap_session_stop(r.session);
   rig_destroy(&r);
   dCloseODE();
