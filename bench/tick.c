@@ -16,6 +16,7 @@
 #include "bench/tick_contact.h"
 #include "bench/tick_guard.h"
 #include "bench/tick_message.h"
+#include "bench/tick_rate.h"
 #include "haptic/rt/tick.h"
 #include "haptic/tick_memory.h"
 #include "sync/exchange.h"
@@ -235,6 +236,7 @@ hap_status bench_tick(bench *b)
       b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
   bool only = b->scene != NULL && strcmp(b->scene, "neighbours") == 0;
+  bool rates = b->scene != NULL && strcmp(b->scene, "rates") == 0;
   for (size_t m = 0; m < MODEL_COUNT && (b->scene == NULL || only); ++m) {
     for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
       status = measure(b, models[m], sizes[i], &ns[m][i]);
@@ -245,9 +247,10 @@ hap_status bench_tick(bench *b)
       }
     }
   }
-  status = status >= HAP_OK && !only ? bench_tick_guard(b, csv) : status;
-  status = status >= HAP_OK && !only ? bench_tick_message(b, csv) : status;
-  status = status >= HAP_OK && !only ? bench_tick_contact(b, csv) : status;
+  status = status >= HAP_OK && !only && !rates ? bench_tick_guard(b, csv) : status;
+  status = status >= HAP_OK && !only && !rates ? bench_tick_message(b, csv) : status;
+  status = status >= HAP_OK && !only && !rates ? bench_tick_contact(b, csv) : status;
+  status = status >= HAP_OK && (b->scene == NULL || rates) ? bench_tick_rate(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;
   return status >= HAP_OK && b->scene == NULL ? draw(b, ns) : status;

@@ -8,6 +8,7 @@
 
 #include "bench/tick_contact.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,10 +24,13 @@
 #define WARM_TICKS 300
 #define PASSES 401
 #define BARE_ITERATIONS 10
-#define BARE_SHARE 0.75   /* of ten bodies, of plain ODE's time */
-#define LARGE_NS 200000.0 /* 64 bodies and about 700 contacts */
-#define PASS_NS 25000.0   /* ten bodies */
-#define TOOL_NS 60000.0   /* a tool in three contacts and more with a stand of four bodies */
+#define BARE_SHARE 0.75    /* of ten bodies, of plain ODE's time */
+#define LARGE_NS 200000.0  /* 64 bodies and about 700 contacts */
+#define MIDDLE_NS 100000.0 /* 64 bodies and 400 contacts */
+#define JOINED 37  /* of 64 in a row: 4 contacts each with the floor, 36 times 4 between them */
+#define APART 0.01 /* m */
+#define PASS_NS 25000.0 /* ten bodies */
+#define TOOL_NS 60000.0 /* a tool in three contacts and more with a stand of four bodies */
 
 /* 2 mm in front of the first cube, and through it from there. */
 static const char *const at_rest = "virtual:path=0:-0.012/0/0.025,hand=rigid";
@@ -53,6 +57,7 @@ typedef struct tick_case {
   double tool[3];  /* m, edges of a box that is the pointer; 0: a sphere */
   double friction; /* of the pointer; 0: the scene's */
   double finger;   /* m, likewise */
+  int joined;      /* of a block, so many columns touch in x, the others stand APART; 0: all */
 } tick_case;
 
 static const tick_case cases[] = {
@@ -66,6 +71,8 @@ static const tick_case cases[] = {
     {"pile64", "pile", 64, {0, 0, 0}, true, LARGE_NS},
     {"row64", "row10", 64, {0, 0, 0}, false, 0.0},
     {"row64", "row10", 64, {0, 0, 0}, true, 0.0},
+    {"row37of64", "row10", 64, {64, 1, 1}, false, MIDDLE_NS, .joined = JOINED},
+    {"row37of64", "row10", 64, {64, 1, 1}, true, MIDDLE_NS, .joined = JOINED},
     {"wall32x2", "row10", 64, {32, 1, 2}, false, LARGE_NS},
     {"wall32x2", "row10", 64, {32, 1, 2}, true, LARGE_NS},
     {"wall8x8", "row10", 64, {8, 1, 8}, false, 0.0},
@@ -115,8 +122,9 @@ static void close_bed(tick_bed *t)
 }
 
 /* In columns of z; the first cube stays in front of the hand. */
-static void arrange(const scene *s, const int block[3])
+static void arrange(const scene *s, const tick_case *what)
 {
+  const int *block = what->block;
   const scene_parameters *p = &s->parameters;
   double pitch = p->size + p->gap;
   for (int i = 0; block[0] > 0 && i < s->count; ++i) {
@@ -124,7 +132,8 @@ static void arrange(const scene *s, const int block[3])
     int y = i / block[2] % block[1];
     int z = i % block[2];
     y -= y >= (block[1] + 1) / 2 ? block[1] : 0;
-    dBodySetPosition(s->bodies[i], p->size / 2 + pitch * x, pitch * y,
+    double apart = what->joined > 0 ? APART * fmax(0.0, x - what->joined + 1) : 0.0;
+    dBodySetPosition(s->bodies[i], p->size / 2 + pitch * x + apart, pitch * y,
                      p->size / 2 - p->layer + z * (p->size - p->layer));
   }
 }
@@ -170,7 +179,7 @@ static hap_status open_bed(bench *b, const tick_case *what, tick_bed *t)
     return status;
   }
   dWorldSetQuickStepNumIterations(t->bare.scene->world, BARE_ITERATIONS);
-  arrange(t->rig.scene, what->block);
+  arrange(t->rig.scene, what);
   double *values = calloc(FIGURES * t->ticks, sizeof *values);
   for (int i = 0; i < FIGURES; ++i) {
     t->values[i] = values + (size_t)i * t->ticks;
