@@ -45,6 +45,7 @@
 #define JOINT_BOUND 1e-4
 #define DIAL_ERROR 0.05
 #define DIAL_SHARE 0.10
+#define DIAL_SLACK 1.1
 #define ESTIMATE_FACTOR 3.0
 #define ESTIMATE_SHARE 0.9
 #define DEGREES (180.0 / M_PI)
@@ -185,6 +186,37 @@ static void check_dial(bench *b, const accuracy_row *r)
       100.0 * DIAL_SHARE);
 }
 
+/* A row of the dial's path, of model contact at the paper's rate; NULL: it was not measured. */
+static const accuracy_row *dial_row(const accuracy_table *table, const char *of, double position)
+{
+  for (size_t i = 0; i < table->count; ++i) {
+    const accuracy_row *r = &table->rows[i];
+    if (accuracy_row_is(r, HAP_MODEL_CONTACT, ACCURACY_DIAL) && strcmp(r->scene, of) == 0 &&
+        r->physics_hz == ACCURACY_PAPER_HZ && r->value == position) {
+      return r;
+    }
+  }
+  return NULL;
+}
+
+/* That turning it does something, and the right way: at 1 the force is no worse than at the default, at 0 a tick
+ * takes no longer than at 1. */
+static void check_dial_ends(bench *b, const accuracy_table *table, const accuracy_row *middle)
+{
+  const accuracy_row *least = dial_row(table, middle->scene, 0.0);
+  const accuracy_row *most = dial_row(table, middle->scene, 1.0);
+  if (least == NULL || most == NULL) {
+    return; /* another hand's speed or coupling */
+  }
+  double bound = fmax(DIAL_SLACK * middle->errors.force, 2.0 * middle->noise_floor);
+  bench_check(b, most->errors.force <= bound && least->tick_us <= DIAL_SLACK * most->tick_us,
+              "%s at %g Hz: the dial at 0, its default, 1: force error %.3g, %.3g, %.3g %%; a tick "
+              "%.3g, %.3g, %.3g us",
+              middle->scene, middle->physics_hz, 100.0 * least->errors.force,
+              100.0 * middle->errors.force, 100.0 * most->errors.force, least->tick_us,
+              middle->tick_us, most->tick_us);
+}
+
 static void check_rest(bench *b, const accuracy_row *r)
 {
   bench_check(b, r->rest_share <= REST_BOUND,
@@ -206,6 +238,7 @@ static void report(bench *b, const accuracy_table *table)
       check_row(b, r);
       if (r->physics_hz == ACCURACY_PAPER_HZ) {
         check_dial(b, r);
+        check_dial_ends(b, table, r);
       }
       if (r->joint_floor > 0.0) {
         check_joints(b, r);
