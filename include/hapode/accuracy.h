@@ -47,7 +47,7 @@ typedef struct hap_accuracy_info {
   hap_accuracy_side tick;
   hap_accuracy_side physics;
   double contact_hz;    /* Hz */
-  int32_t max_sweeps;   /* 0: until it is solved, with direct solves */
+  int32_t max_sweeps;   /* of a solve; 0: until it is solved, or row_updates are made */
   int32_t range_hops;   /* HAP_RANGE_ALL: as far as max_bodies goes */
   int32_t edge_probes;  /* a physics step */
   int32_t iterations;   /* of QuickStep, in the newest physics step */

@@ -29,7 +29,6 @@ typedef struct hapi_settings {
   double contact_hz;
   hap_probe probe;
   uint32_t max_sweeps;  /* 0: until it is solved */
-  bool sweeps_alone;    /* without direct solves */
   uint32_t row_updates; /* the most, in a solve of a tick */
   int32_t range_hops;
   uint32_t edge_probes;

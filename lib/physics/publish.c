@@ -200,7 +200,6 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->impulse_pose = physics->config.impulse_pose;
   out->wishes = physics->wishes;
   out->max_sweeps = physics->dial.settings.max_sweeps;
-  out->sweeps_alone = physics->dial.settings.sweeps_alone;
   out->row_updates = physics->dial.settings.row_updates;
   out->tick_budget_ns = hapi_dial_tick_budget(physics);
   out->body_count = 0;

@@ -279,7 +279,6 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
   bool observed = tick->guard.observes;
   tick->wishes = model->wishes;
   tick->world.solver.max_sweeps = model->max_sweeps;
-  tick->world.solver.sweeps_alone = model->sweeps_alone != 0;
   if (model->row_updates > 0) {
     tick->world.solver.update_budget = model->row_updates;
   }

@@ -369,7 +369,7 @@ void hapi_solver_run(hapi_solver *solver)
   solver->sweeps = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
-  bool may = solver->direct_rows > 0 && !solver->sweeps_alone;
+  bool may = solver->direct_rows > 0;
   bool dear = may && stays_dear(solver);
   bool direct = may && !dear;
   left = dear ? sweeps_alone(rows, left) : left;

@@ -67,7 +67,6 @@ typedef struct hapi_solver {
   double tolerance;       /* m/s: done when the largest correction of a sweep is below */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
-  bool sweeps_alone;      /* no direct solves */
   uint32_t max_sweeps;    /* beyond two; 0: what update_budget allows */
   uint32_t direct_rows;   /* islands of at most this many free rows are solved directly; 0: none */
   double *work;           /* for direct solves; an island that does not fit is left to sweeps */
