@@ -79,6 +79,23 @@ TEST(a_mean_that_is_over_turns_the_tick)
   world_close(&w);
 }
 
+/* Where nothing is left to be turned back it is said all the same. */
+TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, SHARE);
+  CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
+  CHECK(tell_ticks(physics, 100, 0.09, 0) == 0);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ASKED);
+  CHECK(tell_ticks(physics, 100, 0.11, 0) == 0);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_LEAST);
+  CHECK(tell_cycles(physics, 4, 5.5 * MS) == 0);
+  CHECK(physics->figures.accuracy.physics.reason == HAP_ACCURACY_LEAST);
+  world_close(&w);
+}
+
 TEST(many_ticks_that_are_over_turn_it_as_well)
 {
   test_world w;
@@ -170,6 +187,7 @@ int main(void)
   dInitODE2(0);
   RUN(ticks_that_fit_change_nothing);
   RUN(a_mean_that_is_over_turns_the_tick);
+  RUN(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit);
   RUN(many_ticks_that_are_over_turn_it_as_well);
   RUN(room_brings_it_back_as_far_as_was_asked);
   RUN(what_is_asked_for_later_waits_for_the_budget);

@@ -151,8 +151,11 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
 static uint32_t reason_of(const hapi_physics *physics, const hapi_dial_side *side)
 {
   const hapi_dial *dial = &physics->dial;
+  if (side->percent == 0 && side->load > 1.0) {
+    return HAP_ACCURACY_LEAST;
+  }
   if (side->percent < dial->aim) {
-    return side->percent == 0 && side->load > 1.0 ? HAP_ACCURACY_LEAST : HAP_ACCURACY_BUDGET;
+    return HAP_ACCURACY_BUDGET;
   }
   return dial->error_in_force > 0.0 ? HAP_ACCURACY_ERROR : HAP_ACCURACY_ASKED;
 }
