@@ -182,6 +182,49 @@ TEST(looking_back_has_what_is_left)
   world_close(&w);
 }
 
+/* ---- a wanted error ---- */
+
+#define WANTED 0.05
+#define WINDOW 0.25 /* s */
+
+/* So many windows; the one after a turn is left out. */
+static int tell_error(hapi_physics *physics, int windows, double error)
+{
+  for (int i = 0; i < windows; ++i) {
+    hapi_dial_note_error(physics, error, WINDOW);
+  }
+  hapi_dial_follow(physics);
+  return physics->dial.sides[HAPI_DIAL_TICK].percent;
+}
+
+TEST(an_error_as_wanted_turns_nothing)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  atomic_store(&physics->dial.force_error, WANTED);
+  CHECK(tell_error(physics, 100, 0.99 * WANTED) == 50);
+  CHECK(tell_error(physics, 100, 0.7 * WANTED) == 50);
+  CHECK(tell_error(physics, 100, 0.4 * WANTED) == 50);
+  world_close(&w);
+}
+
+TEST(a_larger_error_turns_both_up_and_a_small_one_down)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  atomic_store(&physics->dial.force_error, WANTED);
+  CHECK(tell_error(physics, 1, 1.1 * WANTED) == 60);
+  CHECK(tell_error(physics, 1, 9.0 * WANTED) == 60); /* left out */
+  CHECK(tell_error(physics, 1, 9.0 * WANTED) == 70); /* one step, however wrong it was */
+  CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 70);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(tell_error(physics, 2, 0.2 * WANTED) == 70); /* not for long enough */
+  CHECK(tell_error(physics, 40, 0.2 * WANTED) < 70);
+  world_close(&w);
+}
+
 int main(void)
 {
   dInitODE2(0);
@@ -193,6 +236,8 @@ int main(void)
   RUN(what_is_asked_for_later_waits_for_the_budget);
   RUN(cycles_that_are_over_turn_physics);
   RUN(looking_back_has_what_is_left);
+  RUN(an_error_as_wanted_turns_nothing);
+  RUN(a_larger_error_turns_both_up_and_a_small_one_down);
   dCloseODE();
   return tap_done();
 }

@@ -132,7 +132,8 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
     return;
   }
   double load = error / wanted;
-  int steps = hapi_turn_by(&dial->error_turn, load > 1.0 ? load : ERROR_SPAN * load, seconds);
+  load = load > 1.0 ? load : fmin(ERROR_SPAN * load, 1.0); /* what is as wanted is not too much */
+  int steps = hapi_turn_by(&dial->error_turn, load, seconds);
   int aim = dial->aim + STEP * (steps > 0 ? 1 : steps);
   aim = aim < 0 ? 0 : aim > HAPI_DIAL_MOST ? HAPI_DIAL_MOST : aim;
   for (int i = 0; i < HAPI_DIALS; ++i) {
