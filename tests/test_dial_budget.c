@@ -103,6 +103,7 @@ TEST(many_ticks_that_are_over_turn_it_as_well)
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
+  CHECK_NEAR(physics->figures.accuracy.tick.load, SHARE * 0.06 / 0.05, 1e-9);
   CHECK(tell_ticks(physics, 16, 0.05, 7) == 40); /* too few of both */
   CHECK(tell_ticks(physics, 1, 0.05, 7) == 10);  /* most of them: at once */
   world_close(&w);

@@ -686,6 +686,9 @@ TEST(bad_arguments_change_nothing)
   /* this guard only measures */
   CHECK(hap_session_set_effect(w.session, HAP_EFFECT_OBSERVER, HAP_EFFECT_ON) ==
         HAP_ERROR_UNSUPPORTED);
+  memset(&info, 0xee, sizeof info);
+  CHECK(hap_session_effects(w.session, &info, HAP_EFFECTS + 1, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(info.size == 0xeeeeeeeeu); /* nothing is changed */
   CHECK(hap_session_effects(w.session, NULL, 1, sizeof info) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_effects(w.session, &info, 1, 2) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_effects(w.session, &info, 1, sizeof info) == HAP_OK && info.effect == 0);

@@ -124,8 +124,9 @@ HAP_API hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap
 HAP_API HAP_NODISCARD hap_status hap_session_set_effect(hap_session *session, hap_effect effect,
                                                         hap_effect_wish wish);
 
-/* [any] The first count effects (HAP_EFFECTS: all) into an array of elements of size_of_one bytes: sizeof
- * *out of the caller's build. */
+/* [any] As of the last sync: the first count effects (HAP_EFFECTS: all) into an array of elements of
+ * size_of_one bytes: sizeof *out of the caller's build. HAP_ERROR_ARGUMENT: a NULL, more than HAP_EFFECTS, or
+ * elements that have no room for their size. */
 HAP_API hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
                                        size_t count, size_t size_of_one);
 
