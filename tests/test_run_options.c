@@ -1,11 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The command line of hapode-run: what options come to together. */
+/* hapode-run: what its options come to together, and what the dial has come to. */
 
 #include "tests/tap.h"
 
-#include "tools/run_options.h"
+#include "tools/run_summary.h"
 
 #define WORDS_MAX 16
 #define INDENT 28
@@ -91,6 +91,32 @@ TEST(the_help_is_indented)
   fclose(help);
 }
 
+TEST(the_summary_says_what_accuracy_comes_to)
+{
+  char text[400] = "";
+  hap_accuracy_info info = {.tick = {.accuracy = 0.1, .share = 0.2, .load = 0.3, .turns = 4},
+                            .physics = {.accuracy = 0.6, .reason = HAP_ACCURACY_BUDGET},
+                            .contact_hz = 100.0,
+                            .max_sweeps = 2,
+                            .range_hops = 4,
+                            .probe = HAP_PROBE_OPERATING,
+                            .edge_probes = 3,
+                            .iterations = 20,
+                            .reuse = 1e-6};
+  FILE *summary = tmpfile();
+  REQUIRE(summary != NULL);
+  run_summary_accuracy(&info, summary);
+  rewind(summary);
+  CHECK(fread(text, 1, sizeof text - 1, summary) > 0);
+  fclose(summary);
+  CHECK(strcmp(text,
+               "accuracy_tick: 0.1 (asked for)\n"
+               "load_tick: 0.3 of 0.2, turned 4 times\n"
+               "accuracy_physics: 0.6 (as much as fits)\n"
+               "accuracy_settings: contact_hz=100,max_sweeps=2,range_hops=4,shapes=0,"
+               "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06\n") == 0);
+}
+
 int main(void)
 {
   RUN(a_wanted_error_needs_looking_back);
@@ -98,5 +124,6 @@ int main(void)
   RUN(a_budget_needs_a_clock);
   RUN(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out);
   RUN(the_help_is_indented);
+  RUN(the_summary_says_what_accuracy_comes_to);
   return tap_done();
 }
