@@ -253,6 +253,23 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
   cw_close(&w);
 }
 
+TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
+{
+  static const double corners[8][3] = {
+      {-HAND, -HAND, -HAND}, {HAND, -HAND, -HAND}, {-HAND, HAND, -HAND}, {HAND, HAND, -HAND},
+      {-HAND, -HAND, HAND},  {HAND, -HAND, HAND},  {-HAND, HAND, HAND},  {HAND, HAND, HAND}};
+  contact_world w;
+  REQUIRE(open_on_floor(&w, 1));
+  w.hand_def.hull_xyz = &corners[0][0];
+  w.hand_def.hull_points = 8;
+  w.hand_def.radius = 0.001;
+  REQUIRE(start_left(&w, 0.002));
+  cw_run(&w, 60);
+  CHECK(cw_stats(&w).contact_ticks > 0);
+  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
+  cw_close(&w);
+}
+
 TEST(the_range_that_has_no_room_is_told)
 {
   contact_world w;
@@ -809,6 +826,7 @@ int main(void)
   RUN(why_a_body_has_no_gyroscopic_term);
   RUN(friction_calls_for_friction_and_for_torque);
   RUN(a_plane_needs_no_shape_and_a_convex_geom_has_none);
+  RUN(a_tool_that_touches_is_near_and_has_no_closed_form);
   RUN(the_range_that_has_no_room_is_told);
   RUN(a_coupling_of_its_own_is_a_reason);
   RUN(what_the_device_can_hold_decides_on_the_proxy);
