@@ -71,10 +71,8 @@ typedef enum hap_effect_reason {
   HAP_REASON_STILL = 16,        /* it does not spin */
   HAP_REASON_NOT_IN_WORLD = 17, /* ODE's gyroscopic mode is off for it */
   HAP_REASON_FLAT = 18,         /* the plane is the shape */
-  HAP_REASON_NO_CLOSED_FORM =
-      19,                 /* of a convex geom or a mesh there is the plane only, of a pointer's
-                                     hull its points */
-  HAP_REASON_WITHIN = 20, /* the device can hold what it touches */
+  HAP_REASON_NO_CLOSED_FORM = 19, /* a plane of a convex geom or a mesh, points of a hull */
+  HAP_REASON_WITHIN = 20,         /* the device can hold what it touches */
   HAP_REASON_DEVICE_UNKNOWN = 21, /* nobody knows what the device can hold */
   HAP_REASON_COUPLING = 22,       /* the pointer's coupling says it */
   HAP_REASON_MEASURING = 23,      /* HAP_GUARD_MEASURE */
