@@ -256,6 +256,22 @@ TEST(the_session_tells_where_it_stands)
   cw_close(&w);
 }
 
+/* The first model is a sync. */
+TEST(it_tells_so_from_the_start)
+{
+  contact_world w;
+  open_row(&w, 2);
+  w.def.accuracy = 0.1;
+  w.def.lookback = 0.1;
+  w.def.force_error_wanted = 0.3;
+  REQUIRE(start_row(&w));
+  hap_accuracy_info info = accuracy_of(&w);
+  CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
+  CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(info.max_sweeps == 2 && info.range_hops == 4 && info.contact_hz == 100.0);
+  cw_close(&w);
+}
+
 static double passes_in(double accuracy)
 {
   contact_world w;
@@ -574,6 +590,7 @@ int main(void)
   RUN(a_dial_does_not_go_to_and_fro);
   RUN(accuracy_costs_sweeps_and_buys_force);
   RUN(the_session_tells_where_it_stands);
+  RUN(it_tells_so_from_the_start);
   RUN(contacts_are_found_as_often_as_it_says);
   RUN(the_worlds_iterations_are_the_applications);
   RUN(it_is_turned_while_the_session_runs);

@@ -79,6 +79,23 @@ TEST(a_mean_that_is_over_turns_the_tick)
   world_close(&w);
 }
 
+/* Where nothing is left to be turned back it is said all the same. */
+TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  set_shares(physics, SHARE, SHARE);
+  CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
+  CHECK(tell_ticks(physics, 100, 0.09, 0) == 0);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ASKED);
+  CHECK(tell_ticks(physics, 100, 0.11, 0) == 0);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_LEAST);
+  CHECK(tell_cycles(physics, 4, 5.5 * MS) == 0);
+  CHECK(physics->figures.accuracy.physics.reason == HAP_ACCURACY_LEAST);
+  world_close(&w);
+}
+
 TEST(many_ticks_that_are_over_turn_it_as_well)
 {
   test_world w;
@@ -86,6 +103,7 @@ TEST(many_ticks_that_are_over_turn_it_as_well)
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
+  CHECK_NEAR(physics->figures.accuracy.tick.load, SHARE * 0.06 / 0.05, 1e-9);
   CHECK(tell_ticks(physics, 16, 0.05, 7) == 40); /* too few of both */
   CHECK(tell_ticks(physics, 1, 0.05, 7) == 10);  /* most of them: at once */
   world_close(&w);
@@ -165,16 +183,62 @@ TEST(looking_back_has_what_is_left)
   world_close(&w);
 }
 
+/* ---- a wanted error ---- */
+
+#define WANTED 0.05
+#define WINDOW 0.25 /* s */
+
+/* So many windows; the one after a turn is left out. */
+static int tell_error(hapi_physics *physics, int windows, double error)
+{
+  for (int i = 0; i < windows; ++i) {
+    hapi_dial_note_error(physics, error, WINDOW);
+  }
+  hapi_dial_follow(physics);
+  return physics->dial.sides[HAPI_DIAL_TICK].percent;
+}
+
+TEST(an_error_as_wanted_turns_nothing)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  atomic_store(&physics->dial.force_error, WANTED);
+  CHECK(tell_error(physics, 100, 0.99 * WANTED) == 50);
+  CHECK(tell_error(physics, 100, 0.7 * WANTED) == 50);
+  CHECK(tell_error(physics, 100, 0.4 * WANTED) == 50);
+  world_close(&w);
+}
+
+TEST(a_larger_error_turns_both_up_and_a_small_one_down)
+{
+  test_world w;
+  hapi_physics *physics = begin(&w);
+  REQUIRE(physics != NULL);
+  atomic_store(&physics->dial.force_error, WANTED);
+  CHECK(tell_error(physics, 1, 1.1 * WANTED) == 60);
+  CHECK(tell_error(physics, 1, 9.0 * WANTED) == 60); /* left out */
+  CHECK(tell_error(physics, 1, 9.0 * WANTED) == 70); /* one step, however wrong it was */
+  CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 70);
+  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(tell_error(physics, 2, 0.2 * WANTED) == 70); /* not for long enough */
+  CHECK(tell_error(physics, 40, 0.2 * WANTED) < 70);
+  world_close(&w);
+}
+
 int main(void)
 {
   dInitODE2(0);
   RUN(ticks_that_fit_change_nothing);
   RUN(a_mean_that_is_over_turns_the_tick);
+  RUN(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit);
   RUN(many_ticks_that_are_over_turn_it_as_well);
   RUN(room_brings_it_back_as_far_as_was_asked);
   RUN(what_is_asked_for_later_waits_for_the_budget);
   RUN(cycles_that_are_over_turn_physics);
   RUN(looking_back_has_what_is_left);
+  RUN(an_error_as_wanted_turns_nothing);
+  RUN(a_larger_error_turns_both_up_and_a_small_one_down);
   dCloseODE();
   return tap_done();
 }

@@ -253,6 +253,23 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
   cw_close(&w);
 }
 
+TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
+{
+  static const double corners[8][3] = {
+      {-HAND, -HAND, -HAND}, {HAND, -HAND, -HAND}, {-HAND, HAND, -HAND}, {HAND, HAND, -HAND},
+      {-HAND, -HAND, HAND},  {HAND, -HAND, HAND},  {-HAND, HAND, HAND},  {HAND, HAND, HAND}};
+  contact_world w;
+  REQUIRE(open_on_floor(&w, 1));
+  w.hand_def.hull_xyz = &corners[0][0];
+  w.hand_def.hull_points = 8;
+  w.hand_def.radius = 0.001;
+  REQUIRE(start_left(&w, 0.002));
+  cw_run(&w, 60);
+  CHECK(cw_stats(&w).contact_ticks > 0);
+  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
+  cw_close(&w);
+}
+
 TEST(the_range_that_has_no_room_is_told)
 {
   contact_world w;
@@ -686,6 +703,9 @@ TEST(bad_arguments_change_nothing)
   /* this guard only measures */
   CHECK(hap_session_set_effect(w.session, HAP_EFFECT_OBSERVER, HAP_EFFECT_ON) ==
         HAP_ERROR_UNSUPPORTED);
+  memset(&info, 0xee, sizeof info);
+  CHECK(hap_session_effects(w.session, &info, HAP_EFFECTS + 1, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(info.size == 0xeeeeeeeeu); /* nothing is changed */
   CHECK(hap_session_effects(w.session, NULL, 1, sizeof info) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_effects(w.session, &info, 1, 2) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_effects(w.session, &info, 1, sizeof info) == HAP_OK && info.effect == 0);
@@ -806,6 +826,7 @@ int main(void)
   RUN(why_a_body_has_no_gyroscopic_term);
   RUN(friction_calls_for_friction_and_for_torque);
   RUN(a_plane_needs_no_shape_and_a_convex_geom_has_none);
+  RUN(a_tool_that_touches_is_near_and_has_no_closed_form);
   RUN(the_range_that_has_no_room_is_told);
   RUN(a_coupling_of_its_own_is_a_reason);
   RUN(what_the_device_can_hold_decides_on_the_proxy);

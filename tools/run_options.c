@@ -293,7 +293,7 @@ static const option table[] = {
     {"--lookback", "SHARE",
      "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
      "model single has them: the error of the felt force, as force_error",
-     take_number, offsetof(run_options, rig.def.lookback), 0, 0.5},
+     take_number, offsetof(run_options, lookback), 0, 0.5},
     {"--accuracy", "A", "0 to 1 (default 0.5): the dial of all settings that are not given",
      take_number, offsetof(run_options, rig.def.accuracy), 0, 1},
     {"--force-error", "SHARE",
@@ -505,6 +505,46 @@ static hap_status check_calibrate(const run_options *o, hap_detail *detail)
   return HAP_OK;
 }
 
+static hap_status check_error(run_options *o, hap_detail *detail)
+{
+  hap_session_def *def = &o->rig.def;
+  bool wanted = def->force_error_wanted > 0.0;
+  if (wanted && o->lookback == 0.0) {
+    return fail(detail,
+                "--force-error: --lookback 0 leaves nothing that tells the error; give it 0.1, "
+                "say, or leave it out");
+  }
+  def->lookback = wanted ? LOOKBACK_SHARE : 0.0;
+  if (o->lookback >= 0.0) {
+    def->lookback = o->lookback;
+  }
+  return def->lookback > 0.0 && def->model == HAP_MODEL_SINGLE
+             ? fail(detail,
+                    "%s: --model single is what the force is held against, so that it has no "
+                    "error; take another one",
+                    wanted ? "--force-error" : "--lookback")
+             : HAP_OK;
+}
+
+static hap_status check_budget(const run_options *o, hap_detail *detail)
+{
+  const hap_session_def *def = &o->rig.def;
+  const char *name = def->tick_share > 0.0 ? "--tick-share" : "--physics-share";
+  bool budget = def->tick_share > 0.0 || def->physics_share > 0.0;
+  if (budget && def->drive == HAP_DRIVE_LOCKSTEP) {
+    return fail(detail,
+                "%s: not with --lockstep, which does the same on every run, however long it "
+                "takes; give --accuracy instead",
+                name);
+  }
+  return def->tick_share > 0.0 && def->model != HAP_MODEL_CONTACT
+             ? fail(detail,
+                    "--tick-share: a tick of --model %s has nothing that could be left out; take "
+                    "--model contact, or leave it away",
+                    hap_model_name(def->model))
+             : HAP_OK;
+}
+
 /* What only several options together can get wrong. */
 static hap_status check(run_options *o, hap_detail *detail)
 {
@@ -525,9 +565,6 @@ static hap_status check(run_options *o, hap_detail *detail)
     }
     def->physics_latency_ticks = (int32_t)ticks;
   }
-  if (def->force_error_wanted > 0.0 && def->lookback == 0.0) {
-    def->lookback = LOOKBACK_SHARE;
-  }
   if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
     return fail(detail, "--plot: the same file as --trace");
   }
@@ -543,7 +580,8 @@ static hap_status check(run_options *o, hap_detail *detail)
     return fail(detail, "--identify: takes exactly one --device, there are %zu",
                 o->rig.device_count);
   }
-  if (check_calibrate(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
+  if (check_calibrate(o, detail) < HAP_OK || check_error(o, detail) < HAP_OK ||
+      check_budget(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
       join_recording(o, detail) < HAP_OK || join_coupling(o, detail) < HAP_OK ||
       join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
@@ -559,6 +597,7 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   memset(out, 0, sizeof *out);
   rig_options_init(&out->rig);
   out->model_age_s = -1.0;
+  out->lookback = -1.0;
   out->check.force = CONFORM_FORCE_DEFAULT;
   out->check.wait_s = 5.0;
   for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {
@@ -575,11 +614,13 @@ void run_options_help(FILE *out)
       out);
   for (size_t i = 0; i < OPTIONS; ++i) {
     const option *o = &table[i];
-    size_t line = strcspn(o->help, "\n");
-    fprintf(out, "  %-15s %-9s %.*s\n", o->name, o->value != NULL ? o->value : "", (int)line,
-            o->help);
-    if (o->help[line] != '\0') {
-      fprintf(out, "%28s%s\n", "", o->help + line + 1);
+    const char *line = o->help;
+    int length = (int)strcspn(line, "\n");
+    fprintf(out, "  %-15s %-9s %.*s\n", o->name, o->value != NULL ? o->value : "", length, line);
+    while (line[length] != '\0') {
+      line += length + 1;
+      length = (int)strcspn(line, "\n");
+      fprintf(out, "%28s%.*s\n", "", length, line);
     }
   }
   fputs(

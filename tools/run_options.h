@@ -24,6 +24,7 @@ typedef struct run_options {
   bool coupling_given;
   double seconds;     /* 0: as long as the scene says */
   double model_age_s; /* negative: not given */
+  double lookback;    /* likewise */
   bool reconnect;     /* start a lost device again */
   const char *trace_path;
   const char *plot_path;

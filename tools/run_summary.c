@@ -121,8 +121,23 @@ static void print_side(const char *name, const hap_accuracy_side *side, FILE *ou
   }
 }
 
+/* By the names of hap_session_def, as they could be given one by one; shapes is of the effect shape. */
+static void print_settings(const hap_accuracy_info *info, FILE *out)
+{
+  static const char *const probes[] = {[HAP_PROBE_SHARED] = "shared",
+                                       [HAP_PROBE_PAPER] = "paper",
+                                       [HAP_PROBE_OPERATING] = "operating"};
+  const char *probe =
+      info->probe < sizeof probes / sizeof probes[0] ? probes[info->probe] : "unknown";
+  fprintf(out, "accuracy_settings: contact_hz=%g,max_sweeps=%d,range_hops=%d,shapes=%u,probe=%s,",
+          info->contact_hz, info->max_sweeps, info->range_hops, info->shapes, probe);
+  fprintf(out, "max_edge_probes=%d,iterations=%d,reuse=%g\n", info->edge_probes, info->iterations,
+          info->reuse);
+}
+
 void run_summary_accuracy(const hap_accuracy_info *info, FILE *out)
 {
   print_side("tick", &info->tick, out);
   print_side("physics", &info->physics, out);
+  print_settings(info, out);
 }

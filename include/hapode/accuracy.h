@@ -16,7 +16,8 @@ HAP_BEGIN_DECLS
  * can still be felt, and 1, all that the library has; HAP_ACCURACY_DEFAULT is what the single settings of
  * hap_session_def are by default. Each setting that is HAP_BY_ACCURACY there follows it, any other one
  * stays as it was given. What the tick does and what the physics thread does have a dial each: both go where
- * hap_session_def.accuracy says, and a time budget turns back the one that takes too long. */
+ * hap_session_def.accuracy says, and a time budget turns back the one that takes too long. The tick's has something
+ * to turn in model CONTACT alone. */
 #define HAP_ACCURACY_DEFAULT 0.5
 
 /* Why a dial stands where it does. Values are fixed. */
@@ -27,12 +28,14 @@ typedef enum hap_accuracy_reason {
   HAP_ACCURACY_LEAST = 3   /* at 0, and it does not fit: the share is too small for the scene */
 } hap_accuracy_reason;
 
-/* A side of the session: the haptic thread's ticks, or the physics thread's cycles. */
+/* A side of the session: the haptic thread's ticks, or the physics thread's cycles. load is what the budget
+ * goes by, and may be above what was used in the mean: of ticks the larger one of their mean and of share
+ * times the part of them that was over it / 5 %, of cycles the larger one of their mean and 2/3 of
+ * the longest. */
 typedef struct hap_accuracy_side {
   double accuracy; /* 0..1, in force */
   double share;    /* of a tick or a period of physics, that the budget allows; 0: no budget */
-  double load; /* share that was used when it was last looked at; 0: not looked at, as there is no
-                      budget */
+  double load;     /* when it was last looked at; above share: too much. 0: not yet, or no budget */
   uint64_t turns;  /* times that the budget turned it, either way, since start */
   uint32_t reason; /* hap_accuracy_reason */
   uint32_t reserved;
@@ -67,11 +70,12 @@ HAP_API HAP_NODISCARD hap_status hap_session_set_accuracy(hap_session *session, 
 HAP_API HAP_NODISCARD hap_status hap_session_set_force_error(hap_session *session, double wanted);
 
 /* [any] As hap_session_def.tick_share and .physics_share, from the next sync on; 0: no budget.
- * HAP_ERROR_UNSUPPORTED in drive LOCKSTEP. Else as hap_session_set_accuracy. */
+ * HAP_ERROR_UNSUPPORTED in drive LOCKSTEP, but for none. Else as hap_session_set_accuracy. */
 HAP_API HAP_NODISCARD hap_status hap_session_set_budget(hap_session *session, double tick_share,
                                                         double physics_share);
 
-/* [any] As of the last sync. size_of_out: sizeof *out of the caller's build. */
+/* [any] As of the last sync; before the first start all but size is 0. size_of_out: sizeof *out of the
+ * caller's build. */
 HAP_API hap_status hap_session_accuracy(const hap_session *session, hap_accuracy_info *out,
                                         size_t size_of_out);
 

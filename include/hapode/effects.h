@@ -71,7 +71,7 @@ typedef enum hap_effect_reason {
   HAP_REASON_STILL = 16,        /* it does not spin */
   HAP_REASON_NOT_IN_WORLD = 17, /* ODE's gyroscopic mode is off for it */
   HAP_REASON_FLAT = 18,         /* the plane is the shape */
-  HAP_REASON_NO_CLOSED_FORM = 19, /* of a convex geom or a mesh there is the plane only */
+  HAP_REASON_NO_CLOSED_FORM = 19, /* a plane of a convex geom or a mesh, points of a hull */
   HAP_REASON_WITHIN = 20,         /* the device can hold what it touches */
   HAP_REASON_DEVICE_UNKNOWN = 21, /* nobody knows what the device can hold */
   HAP_REASON_COUPLING = 22,       /* the pointer's coupling says it */
@@ -124,8 +124,9 @@ HAP_API hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap
 HAP_API HAP_NODISCARD hap_status hap_session_set_effect(hap_session *session, hap_effect effect,
                                                         hap_effect_wish wish);
 
-/* [any] The first count effects (HAP_EFFECTS: all) into an array of elements of size_of_one bytes: sizeof
- * *out of the caller's build. */
+/* [any] As of the last sync: the first count effects (HAP_EFFECTS: all) into an array of elements of
+ * size_of_one bytes: sizeof *out of the caller's build. HAP_ERROR_ARGUMENT: a NULL, more than HAP_EFFECTS, or
+ * elements that have no room for their size. */
 HAP_API hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
                                        size_t count, size_t size_of_one);
 

@@ -106,8 +106,9 @@ typedef struct hap_session_def {
   int32_t
       max_sweeps; /* model CONTACT: sweeps over the rows of contacts and joints in each solve of a
                          tick, 2..10000; direct solves come between them, from the second one on, so that
-                         2 means none. 0 (default): until it is solved or the tick's budget is used.
-                         Fewer are cheaper; what is not solved is in hap_stats.solver_residual_max */
+                         2 means none. 0: until it is solved or the tick's budget is used.
+                         Fewer are cheaper; what is not solved is in hap_stats.solver_residual_max.
+                         HAP_BY_ACCURACY (default): 0 at HAP_ACCURACY_DEFAULT */
   int32_t
       range_hops; /* model CONTACT: how far the range goes from the neighbours, in contacts, 0..1024:
                          0 is the neighbours alone, 1 what may touch them as well. What hangs together by
@@ -123,7 +124,8 @@ typedef struct hap_session_def {
                                          HAP_EFFECT_AUTO; places beyond HAP_EFFECTS are 0. A wish that
                                          the model cannot fulfil is an error */
   double accuracy; /* 0..1, default HAP_ACCURACY_DEFAULT (hapode/accuracy.h): what the settings
-                      that are HAP_BY_ACCURACY come to. In steps of 0.01 */
+                      that are HAP_BY_ACCURACY come to. They change at its
+                      tenths (docs/accuracy.md) */
   double
       force_error_wanted; /* 0.001..1, of the force: the dial goes to the least accuracy with which
                                 looking back tells no more. 0 (default): it stays at accuracy. Needs

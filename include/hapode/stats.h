@@ -142,7 +142,8 @@ typedef struct hap_stats {
   double force_error_n; /* N, RMS of the difference in the newest one */
   uint64_t lookbacks;   /* windows gone over */
   uint64_t
-      lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile */
+      lookbacks_spoilt; /* that could not be: something was moved, added or removed meanwhile, or
+                           there was too much of it for lookback's share */
   double
       range_error; /* model CONTACT with the effect testing on: by how much the loop moved neighbours
                          otherwise in an interval than testing simulations of the whole world, made at its

@@ -16,23 +16,6 @@
 #define REST_KEEP 0.75
 #define ITERATIONS_MOST 10000
 
-void hapi_dial_reset(hapi_physics *physics)
-{
-  hapi_dial *dial = &physics->dial;
-  int percent = hapi_tape_dial_at_start(physics, hapi_dial_percent(atomic_load(&dial->wanted)));
-  dial->asked = dial->aim = percent;
-  dial->error_turn = (hapi_turn){0.0};
-  dial->error_in_force = 0.0;
-  dial->settles = false;
-  dial->ticks_seen = dial->over_seen = 0;
-  dial->ns_seen = dial->looked_s = dial->rest_s = 0.0;
-  for (int i = 0; i < HAPI_DIALS; ++i) {
-    dial->sides[i] = (hapi_dial_side){.percent = percent};
-  }
-  hapi_dial_settings(&dial->knobs, percent, percent, 1.0 / physics->config.haptic_hz,
-                     &dial->settings);
-}
-
 /* ---- what a side has to do for its budget ---- */
 
 static void turn(hapi_dial_side *side, int aim, double load, double seconds)
@@ -132,7 +115,8 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
     return;
   }
   double load = error / wanted;
-  int steps = hapi_turn_by(&dial->error_turn, load > 1.0 ? load : ERROR_SPAN * load, seconds);
+  load = load > 1.0 ? load : fmin(ERROR_SPAN * load, 1.0); /* what is as wanted is not too much */
+  int steps = hapi_turn_by(&dial->error_turn, load, seconds);
   int aim = dial->aim + STEP * (steps > 0 ? 1 : steps);
   aim = aim < 0 ? 0 : aim > HAPI_DIAL_MOST ? HAPI_DIAL_MOST : aim;
   for (int i = 0; i < HAPI_DIALS; ++i) {
@@ -151,8 +135,11 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
 static uint32_t reason_of(const hapi_physics *physics, const hapi_dial_side *side)
 {
   const hapi_dial *dial = &physics->dial;
+  if (side->percent == 0 && side->load > 1.0) {
+    return HAP_ACCURACY_LEAST;
+  }
   if (side->percent < dial->aim) {
-    return side->percent == 0 && side->load > 1.0 ? HAP_ACCURACY_LEAST : HAP_ACCURACY_BUDGET;
+    return HAP_ACCURACY_BUDGET;
   }
   return dial->error_in_force > 0.0 ? HAP_ACCURACY_ERROR : HAP_ACCURACY_ASKED;
 }
@@ -183,6 +170,24 @@ static void tell(hapi_physics *physics)
   out->shapes = s->shapes;
   out->row_updates = s->row_updates;
   out->reuse = s->reuse;
+}
+
+void hapi_dial_reset(hapi_physics *physics)
+{
+  hapi_dial *dial = &physics->dial;
+  int percent = hapi_tape_dial_at_start(physics, hapi_dial_percent(atomic_load(&dial->wanted)));
+  dial->asked = dial->aim = percent;
+  dial->error_turn = (hapi_turn){0.0};
+  dial->error_in_force = atomic_load(&dial->force_error);
+  dial->settles = false;
+  dial->ticks_seen = dial->over_seen = 0;
+  dial->ns_seen = dial->looked_s = dial->rest_s = 0.0;
+  for (int i = 0; i < HAPI_DIALS; ++i) {
+    dial->sides[i] = (hapi_dial_side){.percent = percent};
+  }
+  hapi_dial_settings(&dial->knobs, percent, percent, 1.0 / physics->config.haptic_hz,
+                     &dial->settings);
+  tell(physics);
 }
 
 void hapi_dial_follow(hapi_physics *physics)

@@ -188,6 +188,7 @@ static void note_model_contact(hapi_physics *physics, hapi_model *model)
 {
   hap_effect_reason alone = far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE;
   hap_effect_reason none = far(model) ? HAP_REASON_FAR : HAP_REASON_OWNED;
+  bool tools = physics->range.near->tool_pair_count > 0; /* hulls, which have points instead */
   note_bodies(physics, model);
   note_tool_pairs(physics);
   note_passes(physics, model);
@@ -197,7 +198,7 @@ static void note_model_contact(hapi_physics *physics, hapi_model *model)
   sum_up(physics, HAP_EFFECT_CONTACTS, alone);
   sum_up(physics, HAP_EFFECT_RANGE, alone);
   sum_up(physics, HAP_EFFECT_GYRO, alone);
-  sum_up(physics, HAP_EFFECT_SHAPE, HAP_REASON_FAR);
+  sum_up(physics, HAP_EFFECT_SHAPE, tools ? HAP_REASON_NO_CLOSED_FORM : HAP_REASON_FAR);
 }
 
 static void note_model_accelerance(hapi_physics *physics, hapi_model *model)

@@ -226,7 +226,7 @@ hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
                                size_t size_of_one)
 {
   hap_effect_info all[HAP_EFFECTS];
-  if (session == NULL || out == NULL || size_of_one < sizeof out->size) {
+  if (session == NULL || out == NULL || count > HAP_EFFECTS || size_of_one < sizeof out->size) {
     return HAP_ERROR_ARGUMENT;
   }
   size_t size = size_of_one < sizeof all[0] ? size_of_one : sizeof all[0];
@@ -240,8 +240,8 @@ hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
   hapi_haptic_effects(session->haptic, all);
   hapi_contact_effects(session->contact, all);
   fill_recording(session, &all[HAP_EFFECT_RECORDING]);
-  for (size_t i = 0; i < count && i < HAP_EFFECTS; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     memcpy((char *)out + i * size_of_one, &all[i], size);
   }
-  return count <= HAP_EFFECTS ? HAP_OK : HAP_ERROR_ARGUMENT;
+  return HAP_OK;
 }

@@ -1,0 +1,129 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-run: what its options come to together, and what the dial has come to. */
+
+#include "tests/tap.h"
+
+#include "tools/run_summary.h"
+
+#define WORDS_MAX 16
+#define INDENT 28
+
+static run_options options;
+static hap_detail why;
+
+static hap_status parse(const char *arguments)
+{
+  static char words[400];
+  char *argv[WORDS_MAX] = {words};
+  int argc = 1;
+  why.text[0] = '\0';
+  snprintf(words, sizeof words, "hapode-run %s", arguments);
+  for (char *rest = NULL, *word = strtok_r(words + sizeof "hapode-run" - 1, " ", &rest);
+       word != NULL && argc < WORDS_MAX; word = strtok_r(NULL, " ", &rest)) {
+    argv[argc++] = word;
+  }
+  return run_options_parse(argc, argv, &options, &why);
+}
+
+/* Refused, with a text that begins with the option and has this in it. */
+static bool refused(const char *arguments, const char *option, const char *text)
+{
+  bool good = parse(arguments) < HAP_OK && strncmp(why.text, option, strlen(option)) == 0 &&
+              why.text[strlen(option)] == ':' && strstr(why.text, text) != NULL;
+  if (!good) {
+    printf("# %s: %s\n", arguments, why.text);
+  }
+  return good;
+}
+
+TEST(a_wanted_error_needs_looking_back)
+{
+  CHECK(parse("--seconds 1") == HAP_OK && options.rig.def.lookback == 0.0);
+  CHECK(parse("--lookback 0.3") == HAP_OK && options.rig.def.lookback == 0.3);
+  CHECK(parse("--force-error 0.05") == HAP_OK && options.rig.def.lookback == 0.1);
+  CHECK(parse("--force-error 0.05 --lookback 0.3") == HAP_OK && options.rig.def.lookback == 0.3);
+  CHECK(refused("--force-error 0.05 --lookback 0", "--force-error", "--lookback 0"));
+}
+
+TEST(the_reference_has_no_error)
+{
+  CHECK(refused("--model single --lookback 0.1", "--lookback", "single"));
+  CHECK(refused("--model single --force-error 0.1", "--force-error", "single"));
+  CHECK(parse("--model single --lookback 0") == HAP_OK);
+  CHECK(parse("--model impulse --force-error 0.1") == HAP_OK);
+}
+
+TEST(a_budget_needs_a_clock)
+{
+  CHECK(refused("--lockstep --tick-share 0.1", "--tick-share", "--accuracy"));
+  CHECK(refused("--physics-share 0.1 --lockstep", "--physics-share", "--accuracy"));
+  CHECK(parse("--tick-share 0.1 --physics-share 0.2") == HAP_OK);
+  CHECK(options.rig.def.tick_share == 0.1 && options.rig.def.physics_share == 0.2);
+}
+
+TEST(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out)
+{
+  CHECK(refused("--model accelerance --tick-share 0.1", "--tick-share", "contact"));
+  CHECK(refused("--tick-share 0.1 --model single", "--tick-share", "contact"));
+  CHECK(parse("--model accelerance --physics-share 0.1") == HAP_OK);
+}
+
+/* Each line of the help begins an option, or goes on below its text. */
+TEST(the_help_is_indented)
+{
+  char line[400];
+  FILE *help = tmpfile();
+  REQUIRE(help != NULL);
+  run_options_help(help);
+  rewind(help);
+  bool table = false;
+  int below = 0;
+  while (fgets(line, sizeof line, help) != NULL && strncmp(line, "A summary", 9) != 0) {
+    table = table || strncmp(line, "  --", 4) == 0;
+    if (table && line[0] != '\n' && strncmp(line, "  --", 4) != 0) {
+      CHECK(strspn(line, " ") == INDENT);
+      ++below;
+    }
+  }
+  CHECK(below > 10);
+  fclose(help);
+}
+
+TEST(the_summary_says_what_accuracy_comes_to)
+{
+  char text[400] = "";
+  hap_accuracy_info info = {.tick = {.accuracy = 0.1, .share = 0.2, .load = 0.3, .turns = 4},
+                            .physics = {.accuracy = 0.6, .reason = HAP_ACCURACY_BUDGET},
+                            .contact_hz = 100.0,
+                            .max_sweeps = 2,
+                            .range_hops = 4,
+                            .probe = HAP_PROBE_OPERATING,
+                            .edge_probes = 3,
+                            .iterations = 20,
+                            .reuse = 1e-6};
+  FILE *summary = tmpfile();
+  REQUIRE(summary != NULL);
+  run_summary_accuracy(&info, summary);
+  rewind(summary);
+  CHECK(fread(text, 1, sizeof text - 1, summary) > 0);
+  fclose(summary);
+  CHECK(strcmp(text,
+               "accuracy_tick: 0.1 (asked for)\n"
+               "load_tick: 0.3 of 0.2, turned 4 times\n"
+               "accuracy_physics: 0.6 (as much as fits)\n"
+               "accuracy_settings: contact_hz=100,max_sweeps=2,range_hops=4,shapes=0,"
+               "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06\n") == 0);
+}
+
+int main(void)
+{
+  RUN(a_wanted_error_needs_looking_back);
+  RUN(the_reference_has_no_error);
+  RUN(a_budget_needs_a_clock);
+  RUN(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out);
+  RUN(the_help_is_indented);
+  RUN(the_summary_says_what_accuracy_comes_to);
+  return tap_done();
+}
