@@ -187,6 +187,7 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->turn, in->turn, sizeof out->turn);
   out->mu = in->mu;
   out->rubs = rubs(tick, in->mu);
+  tick->rubs |= out->rubs;
   out->weight = 1.0;
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
@@ -221,6 +222,7 @@ static void adopt_contacts(hapi_tick *tick, hapi_model *model)
   remember_ramps(tick);
   tick->contact_count = 0;
   tick->cross_count = 0;
+  tick->rubs = false;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
     /* The pointer may have gone while the message was on its way. */

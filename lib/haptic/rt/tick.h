@@ -19,7 +19,7 @@
  *   adopt_patches  new contacts between bodies, with the impulses of the old ones
  *   local_world    free velocities, poses; calls the next four
  *   proxy          pointers that are bodies behind a spring
- *   pointer_rows   pointer contacts as rows
+ *   pointer_rows   pointer contacts as rows; pointer_friction_rows
  *   contact_rows   contacts between bodies as rows
  *   joint_rows     joints likewise
  *   contact_solver, direct_solver  impulses of all rows
@@ -408,6 +408,7 @@ typedef struct hapi_tick {
 
   uint32_t wishes; /* of the model in use, base/wishes.h */
   bool bounces;    /* some contact or stop of it gives back speed */
+  bool rubs;       /* some contact of a pointer does */
   bool proxies;    /* some pointer is or may become one */
   hapi_effect_sample sample;
 
@@ -485,8 +486,9 @@ void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
 void hapi_pointers_direct(hapi_tick *tick); /* instead of proxy_begin where there can be none */
 void hapi_pointer_rows(hapi_tick *tick);    /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);  /* rows -> wrenches */
-void hapi_contact_wake(hapi_tick *tick);    /* what is touched by what moves */
-void hapi_contact_rows(hapi_tick *tick);    /* contacts between bodies -> rows */
+void hapi_pointer_forces_with_friction(hapi_tick *tick); /* its part where some contact rubs */
+void hapi_contact_wake(hapi_tick *tick);                 /* what is touched by what moves */
+void hapi_contact_rows(hapi_tick *tick);                 /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
 void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
 void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */
