@@ -369,6 +369,7 @@ typedef struct hapi_local_world {
   uint32_t *buckets;        /* of the matching; HAPI_MEMORY_BUCKETS */
   uint32_t bucket_count;    /* power of 2 */
   hapi_model_joint *joints; /* of the model in use; capacity.joints */
+  uint32_t buckets_used;    /* likewise; scratch of the matching */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
   hapi_row_source *sources;        /* of the rows; row_capacity */
