@@ -129,6 +129,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_tick_reset(&haptic->tick);
   memset(haptic->tick.pointers, 0,
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
+  haptic->tick.pointer_high = 0;
   reset_figures(haptic);
   hapi_loop_effects_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);

@@ -92,6 +92,8 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->radius = def->radius;
   p->three_dof = slot->has_device && info->dof < 6;
   p->extent = def->radius;
+  haptic->tick.pointer_high =
+      index >= haptic->tick.pointer_high ? index + 1 : haptic->tick.pointer_high;
   if (slot->hull.count > 0) {
     set_hull(haptic, index);
   }
@@ -223,7 +225,7 @@ static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_inp
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {
@@ -249,7 +251,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 
 void hapi_pointers_write(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {
@@ -282,7 +284,7 @@ static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
 
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     const hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {

@@ -256,7 +256,7 @@ static void leave(hapi_tick *tick, hapi_model *model)
 static bool observes(const hapi_tick *tick, const hapi_model *model)
 {
   bool felt = model->contact_count + model->touches > 0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     felt = felt || (p->generation != 0 && (hapi_v3_norm(p->guard.written.force) > 0.0 ||
                                            hapi_v3_norm(p->guard.written.torque) > 0.0));
@@ -292,7 +292,7 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
     hapi_energy_resume(tick);
   }
   bool proxies = false;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     bool any = false;
     for (uint32_t k = 0; k < model->contact_count && !any; ++k) {
       any = contacts[k].pointer == i && rubs(tick, contacts[k].mu);

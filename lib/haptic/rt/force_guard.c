@@ -33,7 +33,7 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   }
   tick->fault = HAP_FAULT_NONE;
   tick->fault_pointer = tick->fault_generation = 0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].guard.share = 0.0;
     tick->pointers[i].jump_s = 0.0; /* whoever resets knows where the device is */
   }
@@ -61,7 +61,7 @@ static bool usable(const double v[3])
 
 static void check_finite(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && !(usable(p->wrench.force) && usable(p->wrench.torque))) {
       hapi_tick_fault(tick, HAP_FAULT_FORCE, i + 1);
@@ -213,7 +213,7 @@ void hapi_guard(hapi_tick *tick)
   uint32_t flags = 0;
   check_finite(tick);
   follow_age(tick);
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     if (tick->pointers[i].generation != 0) {
       want(tick, &tick->pointers[i]);
     }
@@ -223,7 +223,7 @@ void hapi_guard(hapi_tick *tick)
     hapi_energy_observe(tick);
     hapi_effect_end(tick, HAP_EFFECT_OBSERVER, begin);
   }
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;

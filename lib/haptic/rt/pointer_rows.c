@@ -310,7 +310,7 @@ static void add_brake(hapi_tick *tick, const hapi_tick_pointer *p, const double 
 /* A god-object that has been let go would leap to the device. One that is held needs none. */
 static void brake(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0 || !p->rigid || p->contacts > 0) {
       continue;
@@ -327,7 +327,7 @@ static void brake(hapi_tick *tick)
 void hapi_pointers_direct(hapi_tick *tick)
 {
   bool off = hapi_wish_is_off(tick->wishes, HAP_EFFECT_PROXY);
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     bool unknown = p->coupling == HAP_COUPLING_AUTO && !p->hold_known && !off;
     p->coupling_reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
@@ -350,7 +350,7 @@ void hapi_pointer_rows(hapi_tick *tick)
 
 void hapi_pointer_forces(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].contacts = 0;
     tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }

@@ -405,6 +405,7 @@ typedef struct hapi_tick {
   uint32_t cross_count;
   uint32_t body_high;
   hapi_local_world world;
+  uint32_t pointer_high; /* from here on no pointer has come yet */
   hapi_tool_world tool;
 
   uint32_t wishes; /* of the model in use, base/wishes.h */
