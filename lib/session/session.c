@@ -250,7 +250,7 @@ hap_status hap_session_update(hap_session *session, double frame_s)
   return outcome(session, lost);
 }
 
-/* Whole ones. Signed, as other numbers are dear to convert; no session lasts as long as half of them. */
+/* Whole ones; signed on the way, as unsigned numbers are dear to convert. */
 static uint64_t ticks_of(const hap_session *session, double period, uint64_t steps)
 {
   return (uint64_t)(int64_t)((double)steps * period * session->def.haptic_hz + 1e-6);
