@@ -235,7 +235,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     if (!hapi_tape_plays(haptic->tape)) {
       ask_device(slot, now_ns, &in);
     }
-    hapi_tape_input(haptic, i, &in);
+    if (haptic->tape != NULL) {
+      hapi_tape_input(haptic, i, &in);
+    }
     if (in.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
@@ -261,7 +263,9 @@ void hapi_pointers_write(hapi_haptic *haptic)
     if (slot->ops != NULL) {
       out.failed = slot->ops->write(slot->self, &p->device_wrench, &out.reached) < HAP_OK;
     }
-    hapi_tape_output(haptic, i, &out);
+    if (haptic->tape != NULL) {
+      hapi_tape_output(haptic, i, &out);
+    }
     if (out.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
     }
