@@ -80,6 +80,11 @@ static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *
   }
 }
 
+static bool is_unturned(const double q[4])
+{
+  return q[0] == 1.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0;
+}
+
 static void activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -87,13 +92,13 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   const hap_device_info *info = &slot->info;
   hapi_tick_pointer *p = &haptic->tick.pointers[index];
   memset(p, 0, sizeof *p);
+  haptic->tick.pointer_high =
+      index >= haptic->tick.pointer_high ? index + 1 : haptic->tick.pointer_high;
   p->generation = slot->generation;
   p->collide_bits = def->collide_bits;
   p->radius = def->radius;
   p->three_dof = slot->has_device && info->dof < 6;
   p->extent = def->radius;
-  haptic->tick.pointer_high =
-      index >= haptic->tick.pointer_high ? index + 1 : haptic->tick.pointer_high;
   if (slot->hull.count > 0) {
     set_hull(haptic, index);
   }
@@ -107,6 +112,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->motion_scale = def->motion_scale;
   p->force_scale = def->force_scale;
   p->pose_world_device = def->pose_world_device;
+  p->aligned = is_unturned(def->pose_world_device.quat_wxyz);
   p->max_force =
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
   p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque

@@ -112,6 +112,7 @@ typedef struct hapi_tick_pointer {
   double slew_force;  /* N/s at the device */
   double slew_torque; /* N m/s at the device */
   hap_pose pose_world_device;
+  bool aligned; /* by it the device's axes are the world's: no turning to be worked out */
 
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
@@ -368,8 +369,8 @@ typedef struct hapi_local_world {
   uint32_t memory_count;
   uint32_t *buckets;        /* of the matching; HAPI_MEMORY_BUCKETS */
   uint32_t bucket_count;    /* power of 2 */
-  hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t buckets_used;    /* likewise; scratch of the matching */
+  hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
   hapi_row_source *sources;        /* of the rows; row_capacity */
@@ -404,8 +405,8 @@ typedef struct hapi_tick {
   uint32_t contact_count;
   uint32_t cross_count;
   uint32_t body_high;
-  hapi_local_world world;
   uint32_t pointer_high; /* from here on no pointer has come yet */
+  hapi_local_world world;
   hapi_tool_world tool;
 
   uint32_t wishes; /* of the model in use, base/wishes.h */
