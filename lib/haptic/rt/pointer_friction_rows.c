@@ -10,7 +10,8 @@
 /* Friction's spring (pointer_friction.h) as rows beside that of the contact's normal. Apart from those, which
  * without friction are to be none the slower for it. */
 
-/* The columns of an axis of friction, at the place where it acts; as above. */
+/* The columns of an axis of friction, at the place where it acts: body and, of a proxy, pointer, as those of the
+ * normal in pointer_rows.c. */
 static void set_friction_columns(const hapi_local_contact *contact, const hapi_placed_pointer *at,
                                  const hapi_friction *f, const double axis[4], hapi_row *row)
 {

@@ -405,13 +405,13 @@ typedef struct hapi_tick {
   uint32_t contact_count;
   uint32_t cross_count;
   uint32_t body_high;
-  uint32_t pointer_high; /* from here on no pointer has come yet */
+  uint32_t pointer_high; /* from here on no pointer has come yet; before it some may have left */
   hapi_local_world world;
   hapi_tool_world tool;
 
   uint32_t wishes; /* of the model in use, base/wishes.h */
   bool bounces;    /* some contact or stop of it gives back speed */
-  bool rubs;       /* some contact of a pointer does */
+  bool rubs;       /* some contact of a pointer rubs */
   bool proxies;    /* some pointer is or may become one */
   hapi_effect_sample sample;
 
