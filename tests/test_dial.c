@@ -268,7 +268,7 @@ TEST(it_tells_so_from_the_start)
   hap_accuracy_info info = accuracy_of(&w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
   CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_ERROR);
-  CHECK(info.max_sweeps == 2 && info.range_hops == 4 && info.contact_hz == 100.0);
+  CHECK(info.max_sweeps == 0 && info.row_updates == 600 && info.contact_hz == 100.0);
   cw_close(&w);
 }
 
