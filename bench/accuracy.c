@@ -385,13 +385,23 @@ static hap_status run(bench *b, const accuracy_plan *plan, accuracy_row *rows)
   return status;
 }
 
+static hap_status say_scenes(bench *b)
+{
+  char names[400] = "";
+  for (size_t i = 0, used = 0; accuracy_scene_at(i) != NULL && used < sizeof names; ++i) {
+    used += (size_t)snprintf(names + used, sizeof names - used, " %s", accuracy_scene_at(i)->name);
+  }
+  return bench_fail(b, HAP_ERROR_NOT_FOUND, "--scene: \"%s\" cannot be measured; of%s",
+                    b->scene != NULL ? b->scene : "", names);
+}
+
 static hap_status run_or_merge(bench *b)
 {
   const accuracy_scene *scenes[ACCURACY_SCENES_MAX];
   accuracy_plan plan = {0};
   size_t count = choose_scenes(b, scenes);
   if (count == 0) {
-    return bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene \"%s\"", b->scene != NULL ? b->scene : "");
+    return say_scenes(b);
   }
   hap_status status = accuracy_plan_make(b, scenes, count, &plan);
   if (status < HAP_OK) {

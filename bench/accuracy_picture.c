@@ -146,9 +146,16 @@ static void put_dial(FILE *script, const accuracy_row *rows, size_t count)
 {
   fprintf(script, "$dial0 << EOD\n");
   const accuracy_row *row = has_dial(rows, count) ? next_of_dial(rows, count, -1.0) : NULL;
+  const accuracy_row *ends[2] = {row, row};
   while (row != NULL) {
     put_point(script, row);
+    ends[1] = row;
     row = next_of_dial(rows, count, dial_of(row));
+  }
+  fprintf(script, "EOD\n$ends << EOD\n");
+  for (int i = 0; i < 2 && ends[i] != NULL; ++i) {
+    fprintf(script, "%.6g %.6g %g\n", shown_time(ends[i]), shown(accuracy_front_error(ends[i])),
+            dial_of(ends[i]));
   }
   fprintf(script, "EOD\n");
 }
@@ -219,8 +226,14 @@ static void plot_scene(FILE *script, double size, bool numbers)
   fprintf(script,
           ", $dial0 with linespoints lc rgb '#000080' lw 2.5 pt 13 ps %.2g notitle"
           ", $paper0 with points pt 3 ps %.2g lw 1.8 lc rgb 'black' notitle"
-          ", $ours0 with points pt 6 ps %.2g lw 1.8 lc rgb 'black' notitle\n",
+          ", $ours0 with points pt 6 ps %.2g lw 1.8 lc rgb 'black' notitle",
           0.9 * size, 1.5 * size, 1.7 * size);
+  if (numbers) {
+    fprintf(script,
+            ", $ends using 1:2:(sprintf('dial %%g', $3)) with labels left offset 0.6,0.7 "
+            "font ',10' tc rgb '#000080' notitle");
+  }
+  fprintf(script, "\n");
 }
 
 /* What stands for what, as titles of lines that are out of sight. */

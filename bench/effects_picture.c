@@ -20,6 +20,10 @@ static void draw_wholes(FILE *script, const effects_column *columns, size_t coun
           "plot $w using 2:xtic(1) lt 2 title 'all on', $w using 3 lt 1 title 'auto'\n");
 }
 
+/* Behind the six of all pictures: as many effects are drawn side by side. */
+static const char *const more_colours[] = {"#000000", "#f0e442", "#882255", "#999999",
+                                           "#332288", "#88ccaa", "#661100", "#bbcc33"};
+
 static void draw_each(FILE *script, const effects_column *columns, size_t count)
 {
   fprintf(script, "$e << EOD\n");
@@ -35,7 +39,11 @@ static void draw_each(FILE *script, const effects_column *columns, size_t count)
   fprintf(
       script,
       "EOD\nset title 'an effect that is on, less with it off (below 0.01: lost in the noise)'\n"
-      "set yrange [0.01:*]\nset key outside right top noenhanced\nplot ");
+      "set yrange [0.01:*]\nset key outside right top noenhanced\n");
+  for (size_t i = 0; i < sizeof more_colours / sizeof more_colours[0]; ++i) {
+    fprintf(script, "set linetype %zu lc rgb '%s' lw 1.5\n", 7 + i, more_colours[i]);
+  }
+  fprintf(script, "plot ");
   for (int k = 0; k < HAP_EFFECTS; ++k) {
     if (k != HAP_EFFECT_CROSS && k != HAP_EFFECT_RECORDING) {
       fprintf(script, "%s$e using %d%s lt %d title '%s'", k > 0 ? ", " : "", k + 2,

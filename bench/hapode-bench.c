@@ -82,11 +82,13 @@ static const program *find_program(const char *name)
   return NULL;
 }
 
-static bool takes_coupling(const program *p, const char *name)
+#define BAD_SHARD SIZE_MAX
+#define TEXT_OF(number) TEXT_OF_(number)
+#define TEXT_OF_(number) #number
+
+static bool takes_coupling(const program *p)
 {
-  hap_coupling coupling;
-  return (p->run == bench_accuracy || p->run == bench_impedance) &&
-         bench_find_coupling(name, &coupling);
+  return p->run == bench_accuracy || p->run == bench_impedance;
 }
 
 /* The value of an option, "--name VALUE" or "--name=VALUE"; NULL: it is another argument. */
@@ -138,9 +140,7 @@ static bool take_option(int count, char **arguments, bench *b, int *io)
   if (shard != NULL) {
     b->shards = 0;
     if (!accuracy_read_shard(shard, &b->shard, &b->shards)) {
-      fprintf(stderr, "hapode-bench: --shard is K/N, 1 <= K <= N <= %d, not \"%s\"\n",
-              ACCURACY_SHARDS_MAX, shard);
-      return false;
+      b->shard = BAD_SHARD;
     }
     return true;
   }
@@ -159,22 +159,27 @@ static bool take_option(int count, char **arguments, bench *b, int *io)
 static bool fits(const program *p, const bench *b)
 {
   const char *wrong = NULL;
-  bool of_accuracy = b->shards > 0 || b->merge != NULL || b->fresh;
+  bool of_accuracy = b->shards > 0 || b->shard == BAD_SHARD || b->merge != NULL || b->fresh;
+  hap_coupling coupling;
   bool known = b->estimates == NULL || strcmp(b->estimates, "all") == 0 ||
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects) {
     wrong = "has no scenes to choose from";
-  } else if (b->coupling != NULL && !takes_coupling(p, b->coupling)) {
-    wrong =
-        "does not take this --coupling, which is proxy, god-object or virtual, for accuracy and "
-        "impedance";
+  } else if (b->coupling != NULL && !takes_coupling(p)) {
+    wrong = "has no couplings to choose from: --coupling is for accuracy and impedance";
+  } else if (b->coupling != NULL && !bench_find_coupling(b->coupling, &coupling)) {
+    wrong = "takes --coupling proxy, god-object or virtual";
   } else if (b->only != NULL && p->run != bench_stability) {
     wrong = "has no points to choose from";
-  } else if (b->estimates != NULL && (p->run != bench_accuracy || !known)) {
-    wrong = "does not take this --estimates, which is all or default, for accuracy";
+  } else if (b->estimates != NULL && p->run != bench_accuracy) {
+    wrong = "has no estimates to choose from: --estimates is for accuracy";
+  } else if (!known) {
+    wrong = "takes --estimates all or default";
   } else if (of_accuracy && p->run != bench_accuracy) {
     wrong = "is done at once: --shard, --merge and --fresh are for accuracy";
+  } else if (b->shard == BAD_SHARD) {
+    wrong = "takes --shard K/N, 1 <= K <= N <= " TEXT_OF(ACCURACY_SHARDS_MAX);
   } else if (b->merge != NULL && b->merge_count == 0) {
     wrong = "--merge needs the files of the shards";
   } else if (b->merge != NULL && (b->shards > 0 || b->fresh || b->quick || b->scene != NULL ||
@@ -228,9 +233,11 @@ int main(int argc, char **argv)
 {
   bench b = {.out = "."};
   const program *p = NULL;
-  if (argc == 2 && (strcmp(argv[1], "--list") == 0 || strcmp(argv[1], "--help") == 0)) {
-    print_usage(stdout);
-    return 0;
+  for (int i = 1; i < argc; ++i) {
+    if (strcmp(argv[i], "--list") == 0 || strcmp(argv[i], "--help") == 0) {
+      print_usage(stdout);
+      return 0;
+    }
   }
   if (!read_arguments(argc, argv, &b, &p)) {
     print_usage(stderr);

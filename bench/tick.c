@@ -229,15 +229,38 @@ static void report(bench *b, hap_model model, uint32_t count, double ns)
   }
 }
 
+static const char *const parts[] = {"neighbours", "guard", "message", "rates"};
+#define PART_COUNT (sizeof parts / sizeof parts[0])
+
+static bool asked(const bench *b, const char *part)
+{
+  return b->scene == NULL || strcmp(b->scene, part) == 0;
+}
+
+static hap_status check_scene(bench *b)
+{
+  bool found = b->scene == NULL || tick_contact_has(b->scene);
+  for (size_t i = 0; i < PART_COUNT; ++i) {
+    found = found || strcmp(b->scene, parts[i]) == 0;
+  }
+  return found ? HAP_OK
+               : bench_fail(
+                     b, HAP_ERROR_NOT_FOUND,
+                     "--scene: there is no \"%s\"; neighbours, guard, message, rates, or one of%s",
+                     b->scene, tick_contact_names());
+}
+
 hap_status bench_tick(bench *b)
 {
+  hap_status status = check_scene(b);
+  if (status < HAP_OK) {
+    return status;
+  }
   double ns[MODEL_COUNT][SIZE_COUNT] = {{0.0}};
   FILE *csv = bench_csv_open(
       b, "tick", "model,neighbours,contacts,tick_ns,ns_per_neighbour," TICK_CONTACT_COLUMNS);
-  hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
-  bool only = b->scene != NULL && strcmp(b->scene, "neighbours") == 0;
-  bool rates = b->scene != NULL && strcmp(b->scene, "rates") == 0;
-  for (size_t m = 0; m < MODEL_COUNT && (b->scene == NULL || only); ++m) {
+  status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
+  for (size_t m = 0; m < MODEL_COUNT && asked(b, "neighbours"); ++m) {
     for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
       status = measure(b, models[m], sizes[i], &ns[m][i]);
       if (status >= HAP_OK) {
@@ -247,10 +270,10 @@ hap_status bench_tick(bench *b)
       }
     }
   }
-  status = status >= HAP_OK && !only && !rates ? bench_tick_guard(b, csv) : status;
-  status = status >= HAP_OK && !only && !rates ? bench_tick_message(b, csv) : status;
-  status = status >= HAP_OK && !only && !rates ? bench_tick_contact(b, csv) : status;
-  status = status >= HAP_OK && (b->scene == NULL || rates) ? bench_tick_rate(b, csv) : status;
+  status = status >= HAP_OK && asked(b, "guard") ? bench_tick_guard(b, csv) : status;
+  status = status >= HAP_OK && asked(b, "message") ? bench_tick_message(b, csv) : status;
+  status = status >= HAP_OK ? bench_tick_contact(b, csv) : status;
+  status = status >= HAP_OK && asked(b, "rates") ? bench_tick_rate(b, csv) : status;
   hap_status closed = bench_csv_close(b, csv);
   status = status >= HAP_OK ? closed : status;
   return status >= HAP_OK && b->scene == NULL ? draw(b, ns) : status;

@@ -9,6 +9,9 @@
 #define TICK_CONTACT_COLUMNS "p99_ns,scene,phase,rows,sweeps,ode_ns,pass_ns"
 #define TICK_CONTACT_EMPTY ",,,,,,"
 
+bool tick_contact_has(const char *name); /* that there is such a case */
+const char *tick_contact_names(void);    /* " cube stack ..." */
+
 /* The rows of model CONTACT. Neighbours are the bodies that the loop moves. */
 hap_status bench_tick_contact(bench *b, FILE *csv);
 
