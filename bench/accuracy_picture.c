@@ -154,7 +154,7 @@ static void put_dial(FILE *script, const accuracy_row *rows, size_t count)
   }
   fprintf(script, "EOD\n$ends << EOD\n");
   for (int i = 0; i < 2 && ends[i] != NULL; ++i) {
-    fprintf(script, "%.6g %.6g %g\n", shown_time(ends[i]), shown(accuracy_front_error(ends[i])),
+    fprintf(script, "%.6g %.6g %g\n", shown_time(ends[i]), shown(ends[i]->first_force),
             dial_of(ends[i]));
   }
   fprintf(script, "EOD\n");

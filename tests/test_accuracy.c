@@ -180,7 +180,9 @@ TEST(wrong_parts_are_usage)
       {"fig5 --shard 1/2", "are for accuracy"},
       {"accuracy --merge a --quick", "from its files"},
       {"tick --fresh", "are for accuracy"},
-      {"accuracy --estimates some", "which is all or default"},
+      {"accuracy --coupling nope", "takes --coupling proxy"},
+      {"tick --coupling proxy", "for accuracy and impedance"},
+      {"accuracy --estimates some", "takes --estimates all or default"},
       {"fig5 --estimates all", "for accuracy"},
       {"accuracy --merge a --estimates all", "from its files"},
   };
