@@ -187,11 +187,29 @@ TEST(contact_as_rows)
   }
 }
 
+/* A row by itself of which the sum is known, added up one by one. */
+TEST(single_as_row)
+{
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    make(seed, 1000, 0);
+    for (uint32_t i = 3 * CONTACTS; i < ROWS; ++i) {
+      wide.rows[i].single = plain.rows[i].single = 1;
+      double response = hapi_dot6_fresh(wide.rows[i].ja, wide.rows[i].ba);
+      CHECK_NEAR(response, hapi_dot6(wide.rows[i].ja, wide.rows[i].ba), 0.0);
+      hapi_single_ready(&wide.solver, i, response);
+      hapi_row_ready(&plain.solver, i);
+    }
+    CHECK(memcmp(wide.rows, plain.rows, sizeof wide.rows) == 0);
+    CHECK(memcmp(wide.v, plain.v, sizeof wide.v) == 0);
+  }
+}
+
 int main(void)
 {
   RUN(sweeps);
   RUN(direct_solves);
   RUN(contacts_one_by_one);
   RUN(contact_as_rows);
+  RUN(single_as_row);
   return tap_done();
 }

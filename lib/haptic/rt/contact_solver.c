@@ -30,12 +30,11 @@ static bool valid(const hapi_solver *solver, uint32_t index)
   return numbers && partners;
 }
 
-/* A row left out keeps no impulse: its normal's frictions get none either. */
-static void prepare(hapi_solver *solver, uint32_t index)
+/* of_a, of_b: j A j^T of both sides, 0 only if they do not respond to j. A row left out keeps no impulse: its
+ * normal's frictions get none either. */
+static void prepare_by(hapi_solver *solver, uint32_t index, double of_a, double of_b)
 {
   hapi_row *row = &solver->rows[index];
-  double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
-  double of_b = row->single ? 0.0 : hapi_dot6(row->jb, row->bb);
   double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
@@ -49,6 +48,13 @@ static void prepare(hapi_solver *solver, uint32_t index)
   row->paired = of_b != 0.0;
   bool moved = !row->paired && !row->single; /* by a partner that does not respond */
   row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
+}
+
+static void prepare(hapi_solver *solver, uint32_t index)
+{
+  const hapi_row *row = &solver->rows[index];
+  double of_a = hapi_dot6(row->ja, row->ba);
+  prepare_by(solver, index, of_a, row->single ? 0.0 : hapi_dot6(row->jb, row->bb));
 }
 
 static double couple(const hapi_row *row, const hapi_row *other)
@@ -93,6 +99,14 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index)
 {
   prepare(solver, index);
   join_triple(solver, index);
+  if (solver->rows[index].inverse != 0.0) {
+    warm_start(solver, &solver->rows[index]);
+  }
+}
+
+void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
+{
+  prepare_by(solver, index, response, 0.0);
   if (solver->rows[index].inverse != 0.0) {
     warm_start(solver, &solver->rows[index]);
   }

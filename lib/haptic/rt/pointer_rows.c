@@ -42,15 +42,18 @@
 typedef struct placed_pointer {
   hapi_tick_pointer *pointer;
   hapi_local_body *body; /* NULL: static world */
-  double normal[3];      /* out of the body */
-  double point[3];
+  const double *normal;  /* out of the body: normal_now and point_now of the contact */
+  const double *point;
   double depth;
   double share; /* of the stiffness, that is felt */
+  double j[6];  /* of the body, of a force into it at the point; NULL: the force alone */
+  double w;     /* m/s, along it before the tick */
+  double own;   /* m/s, likewise of the pointer, with nothing in touch */
   double arm
       [3]; /* from the pointer's origin to the point; of a sphere 0: it pushes through its centre */
 } placed_pointer;
 
-static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
+static bool place_by_shape(hapi_local_contact *c, placed_pointer *at)
 {
   hapi_nearest nearest;
   hapi_touch_frame frame = {NULL, NULL};
@@ -61,13 +64,13 @@ static bool place_by_shape(const hapi_local_contact *c, placed_pointer *at)
                          &frame, &nearest)) {
     return false;
   }
-  hapi_v3_copy(nearest.normal, at->normal);
-  hapi_v3_copy(nearest.point_b, at->point);
+  hapi_v3_copy(nearest.normal, c->normal_now);
+  hapi_v3_copy(nearest.point_b, c->point_now);
   at->depth = -nearest.distance;
   return true;
 }
 
-static bool ask_shape(hapi_tick *tick, const hapi_local_contact *c, placed_pointer *at)
+static bool ask_shape(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
 {
   uint64_t begin = hapi_effect_begin(tick);
   bool found = place_by_shape(c, at);
@@ -75,11 +78,11 @@ static bool ask_shape(hapi_tick *tick, const hapi_local_contact *c, placed_point
   return found;
 }
 
-static void place_by_plane(const hapi_local_contact *c, placed_pointer *at)
+static void place_by_plane(hapi_local_contact *c, placed_pointer *at)
 {
   double apart[3];
-  hapi_body_point(at->body, c->point_body, at->point);
-  hapi_body_vector(at->body, c->normal_body, at->normal);
+  hapi_body_point(at->body, c->point_body, c->point_now);
+  hapi_body_vector(at->body, c->normal_body, c->normal_now);
   hapi_v3_sub(at->pointer->pose.position, at->point, apart);
   at->depth = at->pointer->radius - hapi_v3_dot(at->normal, apart);
 }
@@ -88,8 +91,6 @@ static void place_by_plane(const hapi_local_contact *c, placed_pointer *at)
 static bool place_tool(const hapi_tick *tick, const hapi_local_contact *c, placed_pointer *at)
 {
   const hapi_local_tool *tool = &tick->tool.tools[c->tool - 1];
-  hapi_v3_copy(c->normal_now, at->normal);
-  hapi_v3_copy(c->point_now, at->point);
   hapi_v3_sub(at->point, at->pointer->pose.position, at->arm);
   at->depth = tool->depth;
   at->share = tool->felt;
@@ -100,6 +101,8 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
 {
   at->pointer = &tick->pointers[c->pointer];
   at->body = hapi_row_body(tick, c->body);
+  at->normal = c->normal_now;
+  at->point = c->point_now;
   if (at->pointer->generation != c->pointer_generation) {
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
@@ -110,8 +113,6 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, placed_pointer *at)
   if (!HAPI_HAS_SHAPE || !c->has_shape || !ask_shape(tick, c, at)) {
     place_by_plane(c, at);
   }
-  hapi_v3_copy(at->normal, c->normal_now);
-  hapi_v3_copy(at->point, c->point_now);
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->period);
   return true;
 }
@@ -287,9 +288,25 @@ static void point_velocity(const placed_pointer *at, const double linear[3],
   }
 }
 
+/* Where the body gives way, and how fast. */
+static void set_way(placed_pointer *at)
+{
+  double arm[3];
+  hapi_v3_scale(-1.0, at->normal, at->j);
+  hapi_v3_set(at->j + 3, 0.0, 0.0, 0.0);
+  at->w = 0.0;
+  if (at->body != NULL) {
+    hapi_body_arm(at->body, at->point, arm);
+    hapi_v3_cross(arm, at->j, at->j + 3);
+    at->w = hapi_row_start_speed(at->body, at->j);
+  }
+}
+
 static void set_proxy_column(const placed_pointer *at, hapi_row *row, spring *out)
 {
   const hapi_tick_pointer *p = at->pointer;
+  memset(row->jb, 0, sizeof row->jb);
+  memset(row->bb, 0, sizeof row->bb);
   hapi_v3_copy(at->normal, row->jb);
   hapi_v3_scale(p->response, row->jb, row->bb);
   row->b = p->row;
@@ -308,30 +325,28 @@ static void set_proxy_column(const placed_pointer *at, hapi_row *row, spring *ou
 static void set_columns(const hapi_local_contact *contact, const placed_pointer *at, hapi_row *row,
                         spring *out)
 {
-  const hapi_tick_pointer *p = at->pointer;
-  double into[3];
-  double arm[3];
-  double velocity[3];
-  hapi_v3_scale(-1.0, at->normal, into);
-  hapi_body_arm(at->body, at->point, arm);
-  hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
-  hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
+  if (at->body != NULL) {
+    hapi_v3_copy(at->j, row->ja);
+    hapi_v3_copy(at->j + 3, row->ja + 3);
+  } else {
+    memset(row->ja, 0, sizeof row->ja);
+  }
+  hapi_row_response(at->body, row->ja, row->ba);
   if (contact->tool == 0 && has_own_probes(at->body)) {
     for (int i = 0; i < 6; ++i) {
-      row->ba[i] = hapi_v3_dot(contact->a[i], into);
+      row->ba[i] = hapi_v3_dot(contact->a[i], at->j);
     }
   }
   row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
   row->b = HAPI_STATIC_ROW;
-  out->w = out->free = out->body_w = hapi_row_start_speed(at->body, row->ja);
-  out->body_a = hapi_dot6(row->ja, row->ba);
-  point_velocity(at, p->twist.linear, p->twist.angular, velocity);
-  out->s = hapi_v3_dot(into, velocity);
-  if (p->proxied) {
+  out->w = out->free = out->body_w = at->w;
+  out->a = out->body_a = hapi_dot6_fresh(row->ja, row->ba);
+  out->s = at->own;
+  if (at->pointer->proxied) {
     set_proxy_column(at, row, out);
+    out->a += hapi_dot6_fresh(row->jb, row->bb);
     out->s = 0.0;
   }
-  out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
 }
 
 /* Whether all rows so far have their bodies to themselves. */
@@ -378,7 +393,11 @@ static void add_row(hapi_tick *tick, uint32_t index, const placed_pointer *at)
   contact->row = number;
   ++world->solver.row_count;
   note_body(&world->solver, at);
-  hapi_row_ready(&world->solver, number);
+  if (row->single) {
+    hapi_single_ready(&world->solver, number, p.body_a);
+  } else {
+    hapi_row_ready(&world->solver, number);
+  }
 }
 
 /* The columns of an axis of friction, at the place where it acts; as above. */
@@ -501,7 +520,8 @@ static void aim(const hapi_tick *tick, const hapi_local_contact *contact, const 
   }
   if (contact->row != HAPI_NO_ROW && p->integration != HAP_INTEGRATION_EXPLICIT) {
     const hapi_row *normal = &tick->world.solver.rows[contact->row];
-    double a = hapi_dot6(normal->ja, normal->ba) + hapi_dot6(normal->jb, normal->bb);
+    double a = hapi_dot6(normal->ja, normal->ba);
+    a += p->proxied ? hapi_dot6(normal->jb, normal->bb) : 0.0;
     lead = by_midpoint(p, tick->period * tick->period * a * f->stiffness) ? 0.0 : tick->period;
   }
   hapi_friction_aim(f, lead, gain);
@@ -529,20 +549,6 @@ static void add_friction(hapi_tick *tick, uint32_t index, const placed_pointer *
   f->axis_count = added;
 }
 
-static double closing_speed(const placed_pointer *at, const double velocity[3])
-{
-  double speed = -hapi_v3_dot(at->normal, velocity);
-  if (at->body != NULL) {
-    double j[6];
-    double b[6];
-    double arm[3];
-    hapi_body_arm(at->body, at->point, arm);
-    hapi_row_column(at->body, arm, at->normal, 1.0, j, b);
-    speed += hapi_row_start_speed(at->body, j);
-  }
-  return speed;
-}
-
 static double size_of(const hapi_tick_pointer *p)
 {
   return p->hull != NULL ? p->extent : p->radius;
@@ -551,8 +557,7 @@ static double size_of(const hapi_tick_pointer *p)
 /* Whether a rigid contact may close within the tick, wherever the others send the pointer. */
 static bool may_close(const hapi_tick *tick, const hapi_local_contact *c, const placed_pointer *at)
 {
-  static const double still[3] = {0.0, 0.0, 0.0};
-  double comes = fmax(closing_speed(at, still), 0.0);
+  double comes = fmax(-at->w, 0.0);
   bool leaves = c->tool != 0 && tick->tool.tools[c->tool - 1].leaving;
   return !leaves && at->depth + at->pointer->reach + tick->period * comes + RIGID_SLACK > 0.0;
 }
@@ -571,13 +576,15 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   double velocity[3];
   point_velocity(&at, p->proxied ? p->free_velocity : p->twist.linear,
                  p->proxied ? p->free_spin : p->twist.angular, velocity);
-  double speed = closing_speed(&at, velocity);
+  set_way(&at);
+  at.own = hapi_v3_dot(at.j, velocity);
+  double speed = at.own - at.w;
   double way = tick->period * speed;
   /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
   double motion = speed;
   if (p->proxied) {
     point_velocity(&at, p->proxy_velocity, p->proxy_spin, velocity);
-    motion = closing_speed(&at, velocity);
+    motion = hapi_v3_dot(at.j, velocity) - at.w;
   }
   if (!p->rigid && at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
     at.pointer->near_stiffness += c->weight * at.pointer->stiffness;
