@@ -11,6 +11,7 @@
 
 #include "base/lanes.h"
 #include "haptic/rt/contact_solver.h"
+#include "haptic/rt/gyro.h"
 
 #define BODIES 24u
 #define CONTACTS 90u
@@ -204,6 +205,38 @@ TEST(single_as_row)
   }
 }
 
+static void random_quat(double out[4], double length)
+{
+  for (int i = 0; i < 4; ++i) {
+    out[i] = next();
+  }
+  hapi_quat_normalize(out);
+  for (int i = 0; i < 4; ++i) {
+    out[i] *= length;
+  }
+}
+
+/* Two bodies at once turn as each by itself does, also one that has no unit length. */
+TEST(two_turns)
+{
+  state = 7;
+  for (int i = 0; i < 1000; ++i) {
+    double quats[2][4];
+    double alone[2][4];
+    double spins[2][3];
+    for (int k = 0; k < 2; ++k) {
+      random_quat(quats[k], i % 10 == 0 && k == i % 20 / 10 ? 2.0 + next() : 1.0);
+      for (int axis = 0; axis < 3; ++axis) {
+        spins[k][axis] = i % 7 == 0 ? 0.0 : 40.0 * next();
+      }
+      memcpy(alone[k], quats[k], sizeof alone[k]);
+      hapi_turn(alone[k], spins[k], 1e-3);
+    }
+    hapi_turn_two(quats[0], spins[0], quats[1], spins[1], 1e-3);
+    CHECK(memcmp(quats, alone, sizeof quats) == 0);
+  }
+}
+
 int main(void)
 {
   RUN(sweeps);
@@ -211,5 +244,6 @@ int main(void)
   RUN(contacts_one_by_one);
   RUN(contact_as_rows);
   RUN(single_as_row);
+  RUN(two_turns);
   return tap_done();
 }
