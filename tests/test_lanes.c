@@ -188,15 +188,19 @@ TEST(contact_as_rows)
   }
 }
 
-/* A row by itself of which the sum is known, added up one by one. */
+/* A row by itself of which the sum is known, added up one by one; one that cannot be used likewise. */
 TEST(single_as_row)
 {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     make(seed, 1000, 0);
     for (uint32_t i = 3 * CONTACTS; i < ROWS; ++i) {
-      wide.rows[i].single = plain.rows[i].single = 1;
-      double response = hapi_dot6_fresh(wide.rows[i].ja, wide.rows[i].ba);
-      CHECK_NEAR(response, hapi_dot6(wide.rows[i].ja, wide.rows[i].ba), 0.0);
+      hapi_row *row = &wide.rows[i];
+      row->single = 1;
+      row->target = i % 4 == 1 ? NAN : row->target;
+      row->hi = i % 4 == 2 ? -1.0 : row->hi;
+      plain.rows[i] = *row;
+      double response = hapi_dot6_fresh(row->ja, row->ba);
+      CHECK_NEAR(response, hapi_dot6(row->ja, row->ba), 0.0);
       hapi_single_ready(&wide.solver, i, response);
       hapi_row_ready(&plain.solver, i);
     }

@@ -75,7 +75,7 @@ typedef struct hapi_solver {
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
-  bool apart; /* in: no two rows have a body in common: one sweep solves them */
+  bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
   uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
   uint32_t dear_runs; /* inner: since then */
   bool too_dear;      /* inner: an island was too large or too dear for the budget */

@@ -51,8 +51,7 @@ static bool waits(const hapi_tick *tick, const hapi_local_body *body)
 static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
 {
   hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
-  hapi_v3_copy(body->twist.linear, body->start_twist);
-  hapi_v3_copy(body->twist.angular, body->start_twist + 3);
+  memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
   body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
   body->waiting = waits(tick, body);
   body->row = row;
@@ -60,8 +59,10 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
     hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
   }
+  free_velocity(tick, body, tick->world.solver.v[row]);
 }
 
+/* Bodies and proxies with the velocities that they would have with nothing in touch. */
 static void begin(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->world.solver;
@@ -79,11 +80,13 @@ static void begin(hapi_tick *tick)
   if (HAPI_HAS_PROXY && tick->proxies) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_proxy_begin(tick);
+    hapi_proxy_free(tick);
     hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
   } else {
     hapi_pointers_direct(tick);
   }
   solver->hub_count = solver->body_count - first_hub;
+  memcpy(solver->free, solver->v, solver->body_count * sizeof *solver->free);
 }
 
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
@@ -93,21 +96,6 @@ void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
   free_velocity(tick, body, tick->world.solver.v[body->row]);
   memcpy(tick->world.solver.free[body->row], tick->world.solver.v[body->row],
          sizeof tick->world.solver.free[0]);
-}
-
-static void set_free_velocities(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    free_velocity(tick, body, tick->world.solver.v[body->row]);
-  }
-  if (HAPI_HAS_PROXY && tick->proxies) {
-    uint64_t begin = hapi_effect_begin(tick);
-    hapi_proxy_free(tick);
-    hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
-  }
-  memcpy(tick->world.solver.free, tick->world.solver.v,
-         tick->world.solver.body_count * sizeof *tick->world.solver.free);
 }
 
 /* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what hardly
@@ -180,8 +168,7 @@ static bool sound(const hap_twist *twist, const double position[3])
 
 static void take_velocity(hapi_local_body *body, const double v[6])
 {
-  hapi_v3_copy(v, body->twist.linear);
-  hapi_v3_copy(v + 3, body->twist.angular);
+  memcpy(&body->twist, v, sizeof body->twist);
 }
 
 static void stop_body(hapi_tick *tick, hapi_local_body *body)
@@ -243,6 +230,9 @@ static void step_bodies(hapi_tick *tick)
   uint32_t count = 0;
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if ((body->flags & HAPI_BODY_OWNED) == 0) { /* others have none */
+      memset(body->residual, 0, sizeof body->residual);
+    }
     if (hapi_body_responds(body)) {
       take_velocity(body, tick->world.solver.v[body->row]);
       limit_spin(body);
@@ -263,9 +253,8 @@ static void step_bodies(hapi_tick *tick)
 }
 
 /* What the rows gave to bodies that the loop does not own is for physics to pass on. */
-static void give_outside(hapi_tick *tick, uint32_t slot, const double j[6], double impulse)
+static void give_outside(hapi_local_body *body, const double j[6], double impulse)
 {
-  hapi_local_body *body = hapi_row_body(tick, slot);
   if (body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
     body->pushed = true;
     hapi_v3_madd(body->impulse, impulse, j, body->impulse);
@@ -306,20 +295,28 @@ static double work_on(hapi_tick *tick, uint32_t slot, const double j[6], double 
   return 0.5 * impulse * hapi_dot6(j, mean);
 }
 
-/* Of a row with a pointer, or with something that the loop does not own. */
+/* Of a row with a pointer. */
+static void account_pointer(hapi_tick *tick, const hapi_row *row, hapi_local_body *body)
+{
+  body->flags |= HAPI_BODY_TOUCHED;
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    give_outside(body, row->ja, row->impulse);
+    return;
+  }
+  hapi_madd6(body->gain, row->impulse, row->ja);
+  hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
+}
+
+/* Of a row with something that the loop does not own. */
 static void account_row(hapi_tick *tick, const hapi_row *row, const hapi_row_source *source)
 {
-  if (HAPI_HAS_OBSERVER && !source->pointer && tick->guard.observes) {
+  if (HAPI_HAS_OBSERVER && tick->guard.observes) {
     tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
                          work_on(tick, source->body_b, row->jb, row->impulse);
   }
-  give_outside(tick, source->body_a, row->ja, row->impulse);
-  give_outside(tick, source->body_b, row->jb, row->impulse);
-  if (source->pointer && is_owned(tick, source->body_a)) {
-    hapi_local_body *body = &tick->bodies[source->body_a];
-    hapi_madd6(body->gain, row->impulse, row->ja);
-  }
-  if (is_owned(tick, source->body_a) && (source->pointer || is_outside(tick, source->body_b))) {
+  give_outside(hapi_row_body(tick, source->body_a), row->ja, row->impulse);
+  give_outside(hapi_row_body(tick, source->body_b), row->jb, row->impulse);
+  if (is_owned(tick, source->body_a) && is_outside(tick, source->body_b)) {
     hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
   }
   if (is_owned(tick, source->body_b) && is_outside(tick, source->body_a)) {
@@ -335,10 +332,16 @@ static void account(hapi_tick *tick)
   for (uint32_t i = 0; i < world->solver.row_count; ++i) {
     const hapi_row *row = &world->solver.rows[i];
     const hapi_row_source *source = &world->sources[i];
+    if (source->pointer) {
+      if (row->impulse != 0.0 && source->body_a != HAPI_SLOT_NONE) {
+        account_pointer(tick, row, &tick->bodies[source->body_a]);
+      }
+      continue;
+    }
     if (source->joint) {
       const hapi_model_joint *joint = &world->joints[source->contact];
       world->joint_memory[joint->slot].impulse[source->part] = row->impulse;
-    } else if (!source->pointer) {
+    } else {
       world->memory[source->contact].impulse[source->part] = row->impulse;
       world->active += source->part == 0 && row->impulse > 0.0;
     }
@@ -347,7 +350,7 @@ static void account(hapi_tick *tick)
     }
     touch(tick, source->body_a);
     touch(tick, source->body_b);
-    if (source->pointer || source->gives) {
+    if (source->gives) {
       account_row(tick, row, source);
     }
   }
@@ -359,6 +362,9 @@ static bool stop_push_out(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->world.solver;
   bool any = false;
+  if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
+    return false;
+  }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row_source *source = &tick->world.sources[i];
     any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
@@ -438,7 +444,6 @@ static void add_contacts(hapi_tick *tick)
 void hapi_local_world_step(hapi_tick *tick)
 {
   begin(tick);
-  set_free_velocities(tick);
   hapi_pointer_rows(tick);
   uint32_t of_pointers = tick->world.solver.row_count;
   wake(tick);
@@ -464,10 +469,6 @@ void hapi_local_world_step(hapi_tick *tick)
         damp(body);
       }
     }
-  }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): what is live is in the table */
-    memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_pointer_forces(tick);
   if (HAPI_HAS_PROXY && tick->proxies) {

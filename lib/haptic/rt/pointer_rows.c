@@ -173,16 +173,10 @@ static bool stays_closed(const spring *p, double before, double period)
   return before > 0.0 && next * (1.0 + slope) >= 0.5 * period * way;
 }
 
-/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
- * would be with nothing else in touch. */
-static void linearise(const spring *p, double period, double *out_c, double *out_force)
+/* Where a contact begins or ends. */
+static void search_line(const spring *p, double before, double period, double *out_c,
+                        double *out_force)
 {
-  double before = p->depth - 0.5 * period * (p->s - p->w);
-  if (p->pulls || stays_closed(p, before, period)) {
-    *out_c = 0.25 * period * p->k;
-    *out_force = p->k * p->depth + *out_c * p->w;
-    return;
-  }
   double w = p->free;
   double slope = 0.0;
   double force = 0.0;
@@ -193,6 +187,19 @@ static void linearise(const spring *p, double period, double *out_c, double *out
   force = secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
   *out_c = 0.5 * period * slope;
   *out_force = force + *out_c * w;
+}
+
+/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
+ * would be with nothing else in touch. */
+static inline void linearise(const spring *p, double period, double *out_c, double *out_force)
+{
+  double before = p->depth - 0.5 * period * (p->s - p->w);
+  if (p->pulls || stays_closed(p, before, period)) {
+    *out_c = 0.25 * period * p->k;
+    *out_force = p->k * p->depth + *out_c * p->w;
+  } else {
+    search_line(p, before, period, out_c, out_force);
+  }
 }
 
 static bool by_midpoint(const hapi_tick_pointer *p, double stiffness)
@@ -221,7 +228,8 @@ static bool stiffen(hapi_row *row, const spring *p, double period)
 }
 
 /* Spring and damper as a soft row; false: there is none. */
-static bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring *p, double period)
+static inline bool soften(hapi_row *row, const hapi_tick_pointer *pointer, const spring *p,
+                          double period)
 {
   if (pointer->rigid) {
     return stiffen(row, p, period);
@@ -678,11 +686,12 @@ void hapi_pointer_rows(hapi_tick *tick)
 /* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
 static void audit(hapi_tick *tick, const double force[3])
 {
-  if (!hapi_finite(force, 3)) {
+  double norm = hapi_v3_norm(force);
+  if (!hapi_finite(&norm, 1)) {
     return;
   }
   hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
-  tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
+  tick->hand_impulse_abs += tick->period * norm;
 }
 
 /* A body outside of the range has no row, but gets what it took at the next sync. */
