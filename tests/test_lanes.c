@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/lanes.h"
+#include "base/pose.h"
 #include "haptic/rt/contact_solver.h"
 #include "haptic/rt/gyro.h"
 
@@ -226,18 +227,27 @@ TEST(two_turns)
   state = 7;
   for (int i = 0; i < 1000; ++i) {
     double quats[2][4];
+    double moved[2][4]; /* by eq. 11 */
     double alone[2][4];
+    double moved_alone[2][4];
     double spins[2][3];
     for (int k = 0; k < 2; ++k) {
       random_quat(quats[k], i % 10 == 0 && k == i % 20 / 10 ? 2.0 + next() : 1.0);
       for (int axis = 0; axis < 3; ++axis) {
         spins[k][axis] = i % 7 == 0 ? 0.0 : 40.0 * next();
       }
-      memcpy(alone[k], quats[k], sizeof alone[k]);
+    }
+    memcpy(alone, quats, sizeof alone);
+    memcpy(moved, quats, sizeof moved);
+    memcpy(moved_alone, quats, sizeof moved_alone);
+    for (int k = 0; k < 2; ++k) {
       hapi_turn(alone[k], spins[k], 1e-3);
+      hapi_quat_move(moved_alone[k], spins[k], 1e-3);
     }
     hapi_turn_two(quats[0], spins[0], quats[1], spins[1], 1e-3);
+    hapi_two_turns_move(moved[0], spins[0], moved[1], spins[1], 1e-3);
     CHECK(memcmp(quats, alone, sizeof quats) == 0);
+    CHECK(memcmp(moved, moved_alone, sizeof moved) == 0);
   }
 }
 

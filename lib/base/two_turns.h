@@ -3,8 +3,8 @@
 #ifndef HAPODE_BASE_TWO_TURNS_H
 #define HAPODE_BASE_TWO_TURNS_H
 
-/* The quaternions of two bodies at once, with the bits of vec.h. How a body turns is one long chain of
- * operations that wait for each other: two chains side by side take the time of one. */
+/* The quaternions of two bodies at once, with the bits of vec.h and pose.h. How a body turns is one long chain
+ * of operations that wait for each other: two chains side by side take the time of one. */
 
 #include "base/lanes.h"
 #include "base/vec.h"
@@ -74,6 +74,22 @@ static inline void hapi_two_quats_normalize(hapi_two_quats q, double a[4], doubl
   q.y = hapi_two_mul(q.y, s);
   q.z = hapi_two_mul(q.z, s);
   hapi_two_quats_store(q, a, b);
+}
+
+/* The turns of two hapi_pose_move. */
+static inline void hapi_two_turns_move(double quat_a[4], const double w_a[3], double quat_b[4],
+                                       const double w_b[3], double seconds)
+{
+  const hapi_two half = hapi_two_all(0.5 * seconds);
+  const hapi_two_quats turn = {hapi_two_all(0.0), hapi_two_of(w_a[0], w_b[0]),
+                               hapi_two_of(w_a[1], w_b[1]), hapi_two_of(w_a[2], w_b[2])};
+  hapi_two_quats q = hapi_two_quats_load(quat_a, quat_b);
+  hapi_two_quats rate = hapi_two_quats_multiply(turn, q);
+  q.w = hapi_two_madd(q.w, half, rate.w);
+  q.x = hapi_two_madd(q.x, half, rate.x);
+  q.y = hapi_two_madd(q.y, half, rate.y);
+  q.z = hapi_two_madd(q.z, half, rate.z);
+  hapi_two_quats_normalize(q, quat_a, quat_b);
 }
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/pose.h"
+#include "haptic/rt/body_step.h"
 #include "haptic/rt/effect_clock.h"
 #include "haptic/rt/gyro.h"
 #include "haptic/rt/rows.h"
@@ -14,7 +15,6 @@
 
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
-#define TURNING 8u /* bodies that turn together: their chains of operations wait side by side */
 
 /* Velocity after the tick if nothing touched the body. */
 static void free_velocity(const hapi_tick *tick, const hapi_local_body *body, double v[6])
@@ -157,24 +157,9 @@ static void limit_spin(hapi_local_body *body)
   }
 }
 
-static bool sound(const hap_twist *twist, const double position[3])
-{
-  double sum = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    sum += fabs(twist->linear[i]) + fabs(twist->angular[i]) + fabs(position[i]);
-  }
-  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
-}
-
 static void take_velocity(hapi_local_body *body, const double v[6])
 {
   memcpy(&body->twist, v, sizeof body->twist);
-}
-
-static void stop_body(hapi_tick *tick, hapi_local_body *body)
-{
-  memset(&body->twist, 0, sizeof body->twist);
-  hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
 }
 
 static void step_body(hapi_tick *tick, hapi_local_body *body)
@@ -182,9 +167,9 @@ static void step_body(hapi_tick *tick, hapi_local_body *body)
   hap_pose before = body->pose;
   move_body(tick, body);
   damp(body);
-  if (!sound(&body->twist, body->pose.position)) {
+  if (!hapi_body_sound(&body->twist, body->pose.position)) {
     body->pose = before;
-    stop_body(tick, body);
+    hapi_body_stop(tick, body);
   }
 }
 
@@ -194,19 +179,6 @@ static bool turns_once(const hapi_tick *tick, const hapi_local_body *body)
   const double *w = body->twist.angular;
   return tick->period * tick->period * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX &&
          !wobbles(tick, body);
-}
-
-/* Where the body goes, without its turn; false: it does not go at all. */
-static bool shift_body(hapi_tick *tick, hapi_local_body *body)
-{
-  double position[3];
-  hapi_v3_madd(body->pose.position, tick->period, body->twist.linear, position);
-  if (!sound(&body->twist, position)) {
-    stop_body(tick, body);
-    return false;
-  }
-  hapi_v3_copy(position, body->pose.position);
-  return true;
 }
 
 /* The rest of their step, of bodies that turn once. */
@@ -226,7 +198,7 @@ static void turn_bodies(hapi_local_body *const bodies[], uint32_t count, double 
 
 static void step_bodies(hapi_tick *tick)
 {
-  hapi_local_body *turning[TURNING];
+  hapi_local_body *turning[HAPI_TURNING];
   uint32_t count = 0;
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     hapi_local_body *body = &tick->bodies[tick->live[i]];
@@ -241,10 +213,10 @@ static void step_bodies(hapi_tick *tick)
     }
     if (!turns_once(tick, body)) {
       step_body(tick, body);
-    } else if (shift_body(tick, body)) {
+    } else if (hapi_body_shift(tick, body)) {
       turning[count++] = body;
     }
-    if (count == TURNING) {
+    if (count == HAPI_TURNING) {
       turn_bodies(turning, count, tick->period);
       count = 0;
     }

@@ -205,7 +205,7 @@ typedef struct hapi_local_body {
   double inverse_inertia[9]; /* world */
 
   double residual[6];     /* of eq. 14, to be added in this tick */
-  double acceleration[6]; /* sum of A f in this tick */
+  double acceleration[6]; /* sum of A f in this tick; 0 between ticks, of a body that answers */
   double b[6];
   hapi_model_body given; /* of the newest model */
   hap_pose from;         /* model IMPULSE: pose at adoption, and pose to reach */
