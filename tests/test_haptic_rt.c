@@ -644,6 +644,34 @@ TEST(scales_and_frame_keep_virtual_work)
   }
 }
 
+static void press_wall(bool aligned, hapi_tick_pointer *out)
+{
+  hapi_tick_pointer *p = pointer_before_wall();
+  p->aligned = aligned;
+  p->motion_scale = 0.7;
+  p->force_scale = 1.3;
+  hapi_v3_set(p->pose_world_device.position, 0.3, -0.2, 0.1);
+  hapi_v3_set(p->device_pose.position, -0.44, 0.7, -0.9);
+  memcpy(p->device_pose.quat_wxyz, (double[4]){0.5, -0.1, 0.7, 0.3}, 4 * sizeof(double));
+  hapi_v3_set(p->device_twist.linear, 0.02, -0.05, 0.03);
+  hapi_v3_set(p->device_twist.angular, 0.5, 0.2, -0.1);
+  run(1);
+  *out = *p;
+}
+
+/* The turning is left out, and no bit is another. */
+TEST(an_aligned_device_is_as_one_that_is_turned_by_nothing)
+{
+  hapi_tick_pointer turned;
+  hapi_tick_pointer aligned;
+  press_wall(false, &turned);
+  press_wall(true, &aligned);
+  CHECK(turned.device_wrench.force[0] < -1.0);
+  CHECK(memcmp(&turned.pose, &aligned.pose, sizeof turned.pose) == 0);
+  CHECK(memcmp(&turned.twist, &aligned.twist, sizeof turned.twist) == 0);
+  CHECK(memcmp(&turned.device_wrench, &aligned.device_wrench, sizeof turned.device_wrench) == 0);
+}
+
 /* ---- model IMPULSE and SINGLE ---- */
 
 static void impulse_model(hap_impulse_pose shown, double x, double sign)
@@ -851,6 +879,7 @@ int main(void)
   RUN(a_local_state_that_is_not_finite_is_stopped);
   RUN(a_force_that_overflows_is_not_written);
   RUN(scales_and_frame_keep_virtual_work);
+  RUN(an_aligned_device_is_as_one_that_is_turned_by_nothing);
   RUN(impulse_interpolates_from_the_last_but_one_to_the_last_pose);
   RUN(impulse_holds_the_last_pose_and_sums_the_impulse);
   RUN(a_bounce_conserves_energy);

@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "base/histogram.h"
 
+#include <string.h>
+
 /* A single writer needs no read-modify-write. */
 static void increase(_Atomic uint64_t *value, uint64_t by)
 {
@@ -9,15 +11,16 @@ static void increase(_Atomic uint64_t *value, uint64_t by)
   atomic_store_explicit(value, old + by, memory_order_relaxed);
 }
 
+/* The octave by the exponent of a double, which rounds up to the next one only far beyond the last bucket. */
 static unsigned bucket_of(uint64_t ns)
 {
   if (ns < 16) {
     return (unsigned)ns;
   }
-  unsigned octave = 0;
-  while ((ns >> octave) >= 32) {
-    ++octave;
-  }
+  double value = (double)(int64_t)ns;
+  uint64_t bits;
+  memcpy(&bits, &value, sizeof bits);
+  unsigned octave = (unsigned)(bits >> 52) - (1023 + 4);
   unsigned index = 16 * (octave + 1) + (unsigned)((ns >> octave) - 16);
   return index < HAPI_HISTOGRAM_BUCKETS ? index : HAPI_HISTOGRAM_BUCKETS - 1;
 }

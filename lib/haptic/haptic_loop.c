@@ -129,6 +129,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_tick_reset(&haptic->tick);
   memset(haptic->tick.pointers, 0,
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
+  haptic->tick.pointer_high = 0;
   reset_figures(haptic);
   hapi_loop_effects_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);
@@ -203,8 +204,10 @@ static void take_messages(hapi_haptic *haptic)
   if (patches) {
     haptic->pending_patches = hapi_exchange_patches_take(haptic->config.exchange);
   }
-  hapi_tape_taken(haptic, model && haptic->pending != NULL,
-                  patches && haptic->pending_patches != NULL);
+  if (haptic->tape != NULL) {
+    hapi_tape_taken(haptic, model && haptic->pending != NULL,
+                    patches && haptic->pending_patches != NULL);
+  }
 }
 
 static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
@@ -323,22 +326,31 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   note_load(haptic, spent);
 }
 
+static void note_tick(hapi_haptic *haptic)
+{
+  uint64_t recording = hapi_effect_begin(&haptic->tick);
+  hapi_tape_ticked(haptic);
+  if (hapi_tape_records(haptic->tape)) {
+    hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
+  }
+}
+
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
 {
   int64_t begin_ns = hapi_clock_now();
   unsigned before = hapi_denormals_flush();
   hapi_loop_sample_begin(haptic);
-  hapi_tape_tick(haptic, now_ns);
+  if (haptic->tape != NULL) {
+    hapi_tape_tick(haptic, now_ns);
+  }
   hapi_pointers_follow(haptic);
   follow_faults(haptic);
   receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
-  uint64_t recording = hapi_effect_begin(&haptic->tick);
-  hapi_tape_ticked(haptic);
-  if (hapi_tape_records(haptic->tape)) {
-    hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
+  if (haptic->tape != NULL) {
+    note_tick(haptic);
   }
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
   report(haptic);

@@ -93,7 +93,7 @@ void hapi_loop_note_effects(hapi_haptic *haptic)
 {
   const hapi_tick *tick = &haptic->tick;
   hapi_effect_figures f[HAPI_LOOP_NOTED] = {{0}};
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     if (tick->pointers[i].generation != 0) {
       note_torque(&tick->pointers[i], &f[HAPI_LOOP_TORQUE]);
       note_proxy(&tick->pointers[i], &f[HAPI_LOOP_PROXY]);

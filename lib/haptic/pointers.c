@@ -80,6 +80,11 @@ static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *
   }
 }
 
+static bool is_unturned(const double q[4])
+{
+  return q[0] == 1.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0;
+}
+
 static void activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -87,6 +92,8 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   const hap_device_info *info = &slot->info;
   hapi_tick_pointer *p = &haptic->tick.pointers[index];
   memset(p, 0, sizeof *p);
+  haptic->tick.pointer_high =
+      index >= haptic->tick.pointer_high ? index + 1 : haptic->tick.pointer_high;
   p->generation = slot->generation;
   p->collide_bits = def->collide_bits;
   p->radius = def->radius;
@@ -105,6 +112,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->motion_scale = def->motion_scale;
   p->force_scale = def->force_scale;
   p->pose_world_device = def->pose_world_device;
+  p->aligned = is_unturned(def->pose_world_device.quat_wxyz);
   p->max_force =
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
   p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque
@@ -223,7 +231,7 @@ static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_inp
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {
@@ -233,7 +241,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     if (!hapi_tape_plays(haptic->tape)) {
       ask_device(slot, now_ns, &in);
     }
-    hapi_tape_input(haptic, i, &in);
+    if (haptic->tape != NULL) {
+      hapi_tape_input(haptic, i, &in);
+    }
     if (in.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
@@ -249,7 +259,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 
 void hapi_pointers_write(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {
@@ -259,7 +269,9 @@ void hapi_pointers_write(hapi_haptic *haptic)
     if (slot->ops != NULL) {
       out.failed = slot->ops->write(slot->self, &p->device_wrench, &out.reached) < HAP_OK;
     }
-    hapi_tape_output(haptic, i, &out);
+    if (haptic->tape != NULL) {
+      hapi_tape_output(haptic, i, &out);
+    }
     if (out.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
     }
@@ -282,7 +294,7 @@ static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
 
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     const hapi_tick_pointer *p = &haptic->tick.pointers[i];
     if (p->generation == 0) {

@@ -455,6 +455,7 @@ static void take_slot(hapi_joint_table *table, uint32_t index)
     ++at;
   }
   table->slots[at].taken = index + 1;
+  table->slot_high = at >= table->slot_high ? at + 1 : table->slot_high;
   ++table->slots[at].generation;
   table->entries[index].slot = at;
 }
@@ -462,7 +463,7 @@ static void take_slot(hapi_joint_table *table, uint32_t index)
 static void free_slots(hapi_physics *physics)
 {
   hapi_joint_table *table = &physics->joints;
-  for (uint32_t i = 0; i < physics->config.capacity.joints; ++i) {
+  for (uint32_t i = 0; i < table->slot_high; ++i) {
     hapi_joint_slot *slot = &table->slots[i];
     hapi_known_joint *known = slot->taken != 0 ? &table->entries[slot->taken - 1] : NULL;
     if (known != NULL && known->ranged_in != physics->model_number) {

@@ -56,6 +56,7 @@ static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
   }
   memset(hand->tick, 0, sizeof *hand->tick);
   hand->tick->capacity = *capacity;
+  hand->tick->pointer_high = capacity->pointers;
   list_parts(hand->tick, parts);
   for (int i = 0; i < PARTS; ++i) {
     *parts[i].array = hapi_alloc_array(parts[i].count, parts[i].size);

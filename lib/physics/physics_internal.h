@@ -200,6 +200,7 @@ typedef struct hapi_joint_table {
   uint64_t scan;
   bool starved;           /* the newest scan found no memory for a joint */
   hapi_joint_slot *slots; /* capacity.joints */
+  uint32_t slot_high;     /* from here on none was ever taken */
 } hapi_joint_table;
 
 /* ---- what the loop knows, and what we told it ---- */

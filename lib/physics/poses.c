@@ -41,8 +41,8 @@ static double usual_wait(const hapi_frames *frames, double step)
   double second = 0.0;
   for (unsigned i = 0; i < HAPI_WAITS; ++i) {
     double wait = frames->waits_ns[i];
-    second = fmax(second, fmin(wait, largest));
-    largest = fmax(largest, wait);
+    second = hapi_max(second, hapi_min(wait, largest));
+    largest = hapi_max(largest, wait);
   }
   return largest - second > HITCH * step ? second : largest;
 }

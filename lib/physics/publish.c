@@ -25,6 +25,9 @@ bool hapi_turns_alike(const double inertia[9])
 static double keep_per_tick(const hapi_physics *physics, double damping)
 {
   double share = damping < 0.0 ? 0.0 : damping > 1.0 ? 1.0 : damping; /* lost in a step of H */
+  if (share == 0.0) {
+    return 1.0;
+  }
   return pow(1.0 - share, physics->config.physics_hz / physics->config.haptic_hz);
 }
 

@@ -250,9 +250,10 @@ hap_status hap_session_update(hap_session *session, double frame_s)
   return outcome(session, lost);
 }
 
+/* Whole ones; signed on the way, as unsigned numbers are dear to convert. */
 static uint64_t ticks_of(const hap_session *session, double period, uint64_t steps)
 {
-  return (uint64_t)floor((double)steps * period * session->def.haptic_hz + 1e-6);
+  return (uint64_t)(int64_t)((double)steps * period * session->def.haptic_hz + 1e-6);
 }
 
 static int64_t time_of(const hap_session *session, uint64_t tick)

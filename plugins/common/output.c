@@ -17,7 +17,7 @@ void hapi_output_init(hapi_output *output, double max_force, double max_torque)
 /* True when it had to. The largest component comes out first, so that no square overflows. */
 static bool shorten(const double wanted[3], double limit, double out[3])
 {
-  double largest = fmax(fabs(wanted[0]), fmax(fabs(wanted[1]), fabs(wanted[2])));
+  double largest = hapi_max(fabs(wanted[0]), hapi_max(fabs(wanted[1]), fabs(wanted[2])));
   hapi_v3_copy(wanted, out);
   if (largest == 0.0) {
     return false;

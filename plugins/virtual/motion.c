@@ -155,9 +155,17 @@ static void path_at(const hapi_motion *motion, double time, double position[3], 
   hapi_v3_scale(slope / duration, way, velocity);
 }
 
+static bool swings(const hapi_motion *motion)
+{
+  return motion->sine[0] != 0.0 || motion->sine[1] != 0.0 || motion->sine[2] != 0.0;
+}
+
 void hapi_motion_at(const hapi_motion *motion, double time, double position[3], double velocity[3])
 {
   path_at(motion, time, position, velocity);
+  if (!swings(motion)) {
+    return;
+  }
   double turns = motion->hz * time;
   double angle = TWO_PI * (turns - floor(turns)); /* whole turns off: sin is exact at long times */
   hapi_v3_madd(position, sin(angle), motion->sine, position);

@@ -42,9 +42,10 @@ typedef struct virtual_device {
   hapi_motion motion;
   double start; /* s of the script at the first read */
   double orientation[4];
-  bool yields;    /* else rigid: exactly on the script */
-  bool held;      /* else nobody has the device in his hand */
-  hapi_hand hand; /* with the mechanism; rigid: its place alone */
+  double told_orientation[4]; /* dof=3: at every read */
+  bool yields;                /* else rigid: exactly on the script */
+  bool held;                  /* else nobody has the device in his hand */
+  hapi_hand hand;             /* with the mechanism; rigid: its place alone */
   kick kick;
   hapi_delay delay;
   hapi_motion turning; /* dof=6: rotation vector, rad, from the orientation on */
@@ -180,6 +181,8 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
   hapi_v3_copy(entries[SINE].number, motion->sine);
   device->start = entries[START].number[0];
   memcpy(device->orientation, entries[ORIENTATION].number, sizeof device->orientation);
+  memcpy(device->told_orientation, device->orientation, sizeof device->told_orientation);
+  hapi_quat_normalize(device->told_orientation);
   if (!entries[PATH].given) {
     return HAP_OK;
   }
@@ -393,6 +396,11 @@ static hap_status virtual_start(void *self)
   return HAP_OK;
 }
 
+static bool turns(const virtual_device *device)
+{
+  return device->info.dof == 6;
+}
+
 /* w = J(x) x' of a rotation vector x: the left Jacobian of its exponential. */
 static void spin_matrix(const double x[3], double out[9])
 {
@@ -468,28 +476,31 @@ static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
       hapi_hand_push(&device->hand, axis, &target, device->delay.acting[axis], push);
       hapi_friction_step(&device->hand, axis, device->info.friction, length, push);
     }
-    if (device->info.dof == 6) {
+    if (turns(device)) {
       turn_hand(device, from + length * (double)i, length);
     }
   }
 }
 
-/* To where the script is at that time. */
-static void place_hand(virtual_device *device, uint64_t at_ns)
+/* To where a script is at that time. */
+static void place(const virtual_device *device, const hapi_motion *motion, uint64_t at_ns,
+                  hapi_hand *hand)
 {
   double position[3];
   double velocity[3];
-  hapi_motion_at(&device->motion, device->start + hapi_timeline_seconds(at_ns), position, velocity);
+  hapi_motion_at(motion, device->start + hapi_timeline_seconds(at_ns), position, velocity);
   if (!device->held) {
     hapi_v3_set(velocity, 0.0, 0.0, 0.0);
   }
-  hapi_hand_place(&device->hand, position, velocity);
-  hapi_motion_at(&device->turning, device->start + hapi_timeline_seconds(at_ns), position,
-                 velocity);
-  if (!device->held) {
-    hapi_v3_set(velocity, 0.0, 0.0, 0.0);
+  hapi_hand_place(hand, position, velocity);
+}
+
+static void place_hand(virtual_device *device, uint64_t at_ns)
+{
+  place(device, &device->motion, at_ns, &device->hand);
+  if (turns(device)) {
+    place(device, &device->turning, at_ns, &device->wrist);
   }
-  hapi_hand_place(&device->wrist, position, velocity);
 }
 
 static void kick_hand(virtual_device *device, uint64_t now_ns)
@@ -507,10 +518,14 @@ static void move(virtual_device *device, uint64_t before_ns)
   hap_wrench given;
   hapi_output_get(&device->output, &given);
   hapi_delay_give(&device->delay, before_ns, given.force);
-  hapi_delay_give(&device->torque_delay, before_ns, given.torque);
+  if (turns(device)) {
+    hapi_delay_give(&device->torque_delay, before_ns, given.torque);
+  }
   for (uint64_t at_ns = before_ns; at_ns < now_ns;) {
     uint64_t to_ns = hapi_delay_take(&device->delay, at_ns);
-    (void)hapi_delay_take(&device->torque_delay, at_ns); /* changes at the same times */
+    if (turns(device)) {
+      (void)hapi_delay_take(&device->torque_delay, at_ns); /* changes at the same times */
+    }
     kick_hand(device, at_ns);
     if (!device->kick.done && device->kick.at_ns < to_ns) {
       to_ns = device->kick.at_ns;
@@ -524,7 +539,7 @@ static void move(virtual_device *device, uint64_t before_ns)
       move_hand(device, at_ns, to_ns);
     } else {
       place_hand(device, to_ns);
-      device->work += rigid_turn_work(device, turn);
+      device->work += turns(device) ? rigid_turn_work(device, turn) : 0.0;
     }
     hapi_v3_sub(device->hand.position, way, way);
     device->work += hapi_v3_dot(device->delay.acting, way);
@@ -554,6 +569,10 @@ static void measure(virtual_device *device, bool first, uint64_t way_ns)
 
 static void show_turn(const virtual_device *device, hap_pose *pose, hap_twist *twist)
 {
+  if (!turns(device)) {
+    memcpy(pose->quat_wxyz, device->told_orientation, sizeof pose->quat_wxyz);
+    return;
+  }
   const double *x = device->wrist.position;
   double angle = hapi_v3_norm(x);
   double part = angle < 1e-6 ? 0.5 : sin(0.5 * angle) / angle;

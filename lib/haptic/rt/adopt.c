@@ -188,6 +188,7 @@ static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_lo
   memcpy(out->turn, in->turn, sizeof out->turn);
   out->mu = in->mu;
   out->rubs = rubs(tick, in->mu);
+  tick->rubs |= out->rubs;
   out->weight = 1.0;
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
@@ -222,6 +223,7 @@ static void adopt_contacts(hapi_tick *tick, hapi_model *model)
   remember_ramps(tick);
   tick->contact_count = 0;
   tick->cross_count = 0;
+  tick->rubs = false;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
     /* The pointer may have gone while the message was on its way. */
@@ -255,7 +257,7 @@ static void leave(hapi_tick *tick, hapi_model *model)
 static bool observes(const hapi_tick *tick, const hapi_model *model)
 {
   bool felt = model->contact_count + model->touches > 0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     felt = felt || (p->generation != 0 && (hapi_v3_norm(p->guard.written.force) > 0.0 ||
                                            hapi_v3_norm(p->guard.written.torque) > 0.0));
@@ -291,7 +293,7 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
     hapi_energy_resume(tick);
   }
   bool proxies = false;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     bool any = false;
     for (uint32_t k = 0; k < model->contact_count && !any; ++k) {
       any = contacts[k].pointer == i && rubs(tick, contacts[k].mu);

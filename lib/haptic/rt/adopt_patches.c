@@ -15,13 +15,18 @@
 static uint32_t bucket_of(const hapi_local_world *world, uint64_t key)
 {
   uint64_t x = (key ^ (key >> 31)) * 0x9e3779b97f4a7c15u;
-  return (uint32_t)(x >> 32) & (world->bucket_count - 1);
+  return (uint32_t)(x >> 32) & (world->buckets_used - 1);
 }
 
-/* First old contact of each pair, by key. There are more buckets than contacts: it ends. */
+/* First old contact of each pair, by key. There are more buckets than contacts: it ends. No more of them are
+ * used than these contacts call for: all there are would take longer to clear than the rest takes. */
 static void index_old(hapi_local_world *world, uint32_t count)
 {
-  memset(world->buckets, 0, world->bucket_count * sizeof *world->buckets);
+  world->buckets_used = 1;
+  while (world->buckets_used < world->bucket_count && world->buckets_used < 2 * count) {
+    world->buckets_used *= 2;
+  }
+  memset(world->buckets, 0, world->buckets_used * sizeof *world->buckets);
   for (uint32_t i = 0; i < count; ++i) {
     uint64_t key = world->old_memory[i].key;
     if (i > 0 && world->old_memory[i - 1].key == key) {
@@ -29,7 +34,7 @@ static void index_old(hapi_local_world *world, uint32_t count)
     }
     uint32_t at = bucket_of(world, key);
     while (world->buckets[at] != NO_ENTRY) {
-      at = (at + 1) & (world->bucket_count - 1);
+      at = (at + 1) & (world->buckets_used - 1);
     }
     world->buckets[at] = i + 1;
   }
@@ -38,7 +43,7 @@ static void index_old(hapi_local_world *world, uint32_t count)
 static uint32_t first_of(const hapi_local_world *world, uint64_t key, uint32_t count)
 {
   uint32_t at = bucket_of(world, key);
-  for (; world->buckets[at] != NO_ENTRY; at = (at + 1) & (world->bucket_count - 1)) {
+  for (; world->buckets[at] != NO_ENTRY; at = (at + 1) & (world->buckets_used - 1)) {
     if (world->old_memory[world->buckets[at] - 1].key == key) {
       return world->buckets[at] - 1;
     }

@@ -33,7 +33,7 @@ static void fill_tick(hapi_black_box *box, const hapi_tick *tick)
   uint32_t count = 0;
   box->newest = (box->newest + 1) % HAP_BLACK_BOX_TICKS;
   hap_black_box_row *rows = box->rows + (size_t)box->newest * box->pointers;
-  for (uint32_t i = 0; i < box->pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     if (tick->pointers[i].generation != 0) {
       fill(tick, i, &rows[count++]);
     }

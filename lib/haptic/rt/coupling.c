@@ -31,6 +31,24 @@ static bool plausible(const double *values, int count)
   return true;
 }
 
+static void to_world(const hapi_tick_pointer *p, const double device[3], double world[3])
+{
+  if (p->aligned) {
+    hapi_v3_copy(device, world);
+  } else {
+    hapi_quat_rotate(p->pose_world_device.quat_wxyz, device, world);
+  }
+}
+
+static void to_device(const hapi_tick_pointer *p, const double world[3], double device[3])
+{
+  if (p->aligned) {
+    hapi_v3_copy(world, device);
+  } else {
+    hapi_quat_unrotate(p->pose_world_device.quat_wxyz, world, device);
+  }
+}
+
 /* A hull on a device that gives no torque cannot be turned by it either: the hand could not feel what
  * it does by turning. */
 static void place_turn(hapi_tick_pointer *p)
@@ -40,9 +58,13 @@ static void place_turn(hapi_tick_pointer *p)
     memcpy(p->pose.quat_wxyz, frame, sizeof p->pose.quat_wxyz);
     hapi_v3_set(p->twist.angular, 0.0, 0.0, 0.0);
   } else {
-    hapi_quat_multiply(frame, p->device_pose.quat_wxyz, p->pose.quat_wxyz);
+    if (p->aligned) {
+      memcpy(p->pose.quat_wxyz, p->device_pose.quat_wxyz, sizeof p->pose.quat_wxyz);
+    } else {
+      hapi_quat_multiply(frame, p->device_pose.quat_wxyz, p->pose.quat_wxyz);
+    }
     hapi_quat_normalize(p->pose.quat_wxyz);
-    hapi_quat_rotate(frame, p->device_twist.angular, p->twist.angular);
+    to_world(p, p->device_twist.angular, p->twist.angular);
   }
   memcpy(p->handle_quat, p->pose.quat_wxyz, sizeof p->handle_quat);
   hapi_v3_copy(p->twist.angular, p->handle_spin);
@@ -51,18 +73,18 @@ static void place_turn(hapi_tick_pointer *p)
 /* False: the frame and the scale take it out of the world. */
 static bool place_pointer(hapi_tick_pointer *p)
 {
-  const hap_pose *frame = &p->pose_world_device;
   double scaled[3];
   double at[3];
   hapi_v3_scale(p->motion_scale, p->device_pose.position, scaled);
-  hapi_pose_point(frame->position, frame->quat_wxyz, scaled, at);
+  to_world(p, scaled, at);
+  hapi_v3_add(at, p->pose_world_device.position, at);
   if (!plausible(at, 3)) {
     return false;
   }
   hapi_v3_copy(at, p->pose.position);
   place_turn(p);
   hapi_v3_scale(p->motion_scale, p->device_twist.linear, scaled);
-  hapi_quat_rotate(frame->quat_wxyz, scaled, p->twist.linear);
+  to_world(p, scaled, p->twist.linear);
   hapi_v3_copy(p->pose.position, p->handle_position);
   hapi_v3_copy(p->twist.linear, p->handle_velocity);
   p->device_good = p->device_pose;
@@ -103,15 +125,27 @@ static void check_speed(hapi_tick_pointer *p)
   }
 }
 
+/* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
+static bool input_is_plausible(const hapi_tick_pointer *p)
+{
+  const double *at = p->device_pose.position;
+  const double *q = p->device_pose.quat_wxyz;
+  const double *v = p->device_twist.linear;
+  const double *w = p->device_twist.angular;
+  double sum = hapi_v3_dot(at, at) + q[0] * q[0] + hapi_v3_dot(q + 1, q + 1) + hapi_v3_dot(v, v) +
+               hapi_v3_dot(w, w);
+  return sum <= HAPI_STATE_LIMIT * HAPI_STATE_LIMIT ||
+         (plausible(at, 3) && plausible(q, 4) && plausible(v, 3) && plausible(w, 3));
+}
+
 void hapi_coupling_read(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;
     }
-    bool good = plausible(p->device_pose.position, 3) && plausible(p->device_pose.quat_wxyz, 4) &&
-                plausible(p->device_twist.linear, 3) && plausible(p->device_twist.angular, 3);
+    bool good = input_is_plausible(p);
     p->jumped = good && jumps(p, tick->period);
     p->jump_s = p->jumped ? JUMP_S + 2.0 * tick->physics_period : p->jump_s - tick->period;
     check_speed(p);
@@ -131,9 +165,13 @@ double hapi_coupling_torque_scale(const hapi_tick_pointer *p)
 
 void hapi_coupling_write(hapi_tick_pointer *p)
 {
-  const double *q = p->pose_world_device.quat_wxyz;
-  hapi_quat_unrotate(q, p->wrench.force, p->device_wrench.force);
-  hapi_quat_unrotate(q, p->wrench.torque, p->device_wrench.torque);
+  double torque_scale = hapi_coupling_torque_scale(p);
+  to_device(p, p->wrench.force, p->device_wrench.force);
   hapi_v3_scale(p->force_scale, p->device_wrench.force, p->device_wrench.force);
-  hapi_v3_scale(hapi_coupling_torque_scale(p), p->device_wrench.torque, p->device_wrench.torque);
+  if (torque_scale == 0.0) {
+    hapi_v3_set(p->device_wrench.torque, 0.0, 0.0, 0.0);
+  } else {
+    to_device(p, p->wrench.torque, p->device_wrench.torque);
+    hapi_v3_scale(torque_scale, p->device_wrench.torque, p->device_wrench.torque);
+  }
 }

@@ -162,7 +162,7 @@ static double contact_stores(const hapi_tick_pointer *p, const hapi_local_contac
 static double rendered_gives(const hapi_tick *tick, double *io_stored)
 {
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->guard.force2 > 0.0) {
       *io_stored += half_compliance(p) * p->guard.force2;
@@ -208,7 +208,7 @@ static double spring_energy(const hapi_tick_pointer *p, double share, double dep
 
 static void note_limits(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0) {
       p->guard.limit = p->force_scale > 0.0 ? p->max_force / p->force_scale : 0.0;
@@ -251,7 +251,7 @@ static double ramps_give(hapi_tick *tick)
 static double couplings_store(const hapi_tick *tick)
 {
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->proxied) {
       sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling_stiffness;
@@ -314,7 +314,7 @@ static bool settle_ports(hapi_tick *tick)
   bool felt = false;
   double seconds = 1e-9 * (double)(tick->now_ns - tick->guard.observed_ns);
   tick->guard.observed_ns = tick->now_ns;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0) {
       felt = felt || any(p->device_wrench.force) || any(p->guard.written.force) ||
@@ -345,7 +345,7 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
 {
   double out = 0.0;
   double in = 0.0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;
@@ -359,7 +359,7 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
     return;
   }
   double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;
@@ -385,7 +385,7 @@ static void forget(hapi_tick *tick)
 {
   tick->guard.balance = 0.0;
   tick->guard.sprung = tick->guard.touch_s = 0.0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].guard.placed = false;
   }
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
@@ -399,7 +399,7 @@ void hapi_energy_resume(hapi_tick *tick)
 {
   tick->guard.observed_ns = tick->now_ns;
   tick->guard.given = 0.0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].guard.placed = false;
   }
 }

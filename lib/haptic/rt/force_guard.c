@@ -33,7 +33,7 @@ void hapi_tick_reset_fault(hapi_tick *tick)
   }
   tick->fault = HAP_FAULT_NONE;
   tick->fault_pointer = tick->fault_generation = 0;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].guard.share = 0.0;
     tick->pointers[i].jump_s = 0.0; /* whoever resets knows where the device is */
   }
@@ -50,20 +50,29 @@ void hapi_guard_cut(hapi_tick_pointer *pointer)
   memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
 }
 
-static bool usable(const double v[3])
+static bool usable_number(double x)
 {
-  bool good = true;
-  for (int i = 0; i < 3; ++i) {
-    good = good && fabs(v[i]) <= WRENCH_LIMIT; /* false for NaN */
-  }
-  return good;
+  return fabs(x) <= WRENCH_LIMIT; /* false for NaN */
+}
+
+static bool usable_vector(const double v[3])
+{
+  return usable_number(v[0]) && usable_number(v[1]) && usable_number(v[2]);
+}
+
+/* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
+static bool usable(const hap_wrench *w)
+{
+  return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
+             WRENCH_LIMIT * WRENCH_LIMIT ||
+         (usable_vector(w->force) && usable_vector(w->torque));
 }
 
 static void check_finite(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
-    if (p->generation != 0 && !(usable(p->wrench.force) && usable(p->wrench.torque))) {
+    if (p->generation != 0 && !usable(&p->wrench)) {
       hapi_tick_fault(tick, HAP_FAULT_FORCE, i + 1);
     }
   }
@@ -183,7 +192,7 @@ static void report_written(hapi_tick_pointer *p)
 static void check_written(hapi_tick *tick, uint32_t index)
 {
   hapi_tick_pointer *p = &tick->pointers[index];
-  if (!(usable(p->device_wrench.force) && usable(p->device_wrench.torque))) {
+  if (!usable(&p->device_wrench)) {
     hapi_tick_fault(tick, HAP_FAULT_FORCE, index + 1);
     p->guard.flags = HAP_GUARD_FAULT;
     memset(&p->device_wrench, 0, sizeof p->device_wrench);
@@ -213,7 +222,7 @@ void hapi_guard(hapi_tick *tick)
   uint32_t flags = 0;
   check_finite(tick);
   follow_age(tick);
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     if (tick->pointers[i].generation != 0) {
       want(tick, &tick->pointers[i]);
     }
@@ -223,7 +232,7 @@ void hapi_guard(hapi_tick *tick)
     hapi_energy_observe(tick);
     hapi_effect_end(tick, HAP_EFFECT_OBSERVER, begin);
   }
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;

@@ -142,7 +142,7 @@ static void end_proxy(hapi_tick *tick, uint32_t index)
 
 void hapi_proxy_none(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0) {
       continue;
@@ -236,7 +236,7 @@ static void place(const hapi_tick *tick, hapi_tick_pointer *p)
 
 void hapi_proxy_begin(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     p->row = 0;
     if (p->generation == 0) {
@@ -287,7 +287,7 @@ static void set_reach(const hapi_tick *tick, hapi_tick_pointer *p, const double 
 void hapi_proxy_free(hapi_tick *tick)
 {
   double t = tick->period;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation == 0 || !p->proxied) {
       continue;
@@ -326,7 +326,7 @@ static void leave_out_carried(const hapi_tick *tick, const hapi_tick_pointer *p)
 /* What lifts them out of bodies is not to stay in their velocities, as with the bodies. */
 void hapi_proxy_push_out(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->rigid) {
       memcpy(p->move_velocity, tick->world.solver.v[p->row], sizeof p->move_velocity);
@@ -448,7 +448,7 @@ static void move(hapi_tick *tick, uint32_t index)
 
 void hapi_proxy_move(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0 && p->proxied) {
       move(tick, i);

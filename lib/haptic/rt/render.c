@@ -237,7 +237,7 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
 
 void hapi_render(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     tick->pointers[i].contacts = 0;
     tick->pointers[i].guard.force2 = tick->pointers[i].guard.power = 0.0;
     tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};

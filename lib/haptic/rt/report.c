@@ -66,6 +66,31 @@ static void report_springs(const hapi_tick *tick, hapi_state *out)
   }
 }
 
+/* The places of those that have not come yet were cleared at start. */
+static void report_pointers(const hapi_tick *tick, hapi_state *out)
+{
+  hapi_state_pointer *pointers = hapi_state_pointers(out);
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
+    const hapi_tick_pointer *in = &tick->pointers[i];
+    pointers[i].generation = in->generation;
+    if (in->generation == 0) {
+      continue;
+    }
+    pointers[i].collide_bits = in->collide_bits;
+    pointers[i].radius = in->radius;
+    pointers[i].stiffness = in->stiffness;
+    pointers[i].friction = in->friction;
+    pointers[i].finger_radius = in->finger_radius;
+    pointers[i].pose = in->pose;
+    pointers[i].twist = in->twist;
+    pointers[i].is_tool = in->hull != NULL;
+    pointers[i].extent = in->extent;
+    if (in->hull != NULL) {
+      hapi_state_hulls(out)[i] = *in->hull;
+    }
+  }
+}
+
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
 {
   hapi_v3_copy(tick->hand_impulse, out->hand_impulse);
@@ -76,23 +101,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   report_bodies(tick, out);
   report_contacts(tick, out);
   report_springs(tick, out);
-  hapi_state_pointer *pointers = hapi_state_pointers(out);
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
-    const hapi_tick_pointer *in = &tick->pointers[i];
-    pointers[i].generation = in->generation;
-    pointers[i].collide_bits = in->collide_bits;
-    pointers[i].radius = in->radius;
-    pointers[i].stiffness = in->stiffness;
-    pointers[i].friction = in->friction;
-    pointers[i].finger_radius = in->finger_radius;
-    pointers[i].pose = in->pose;
-    pointers[i].twist = in->twist;
-    pointers[i].is_tool = in->hull != NULL;
-    pointers[i].extent = in->extent;
-    if (in->generation != 0 && in->hull != NULL) {
-      hapi_state_hulls(out)[i] = *in->hull;
-    }
-  }
+  report_pointers(tick, out);
 }
 
 /* The loop gave the body something that the world has not had yet. */
@@ -113,11 +122,17 @@ static bool leads(const hapi_tick *tick, const hapi_local_body *body)
   return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || has_news(body);
 }
 
-static void store(_Atomic double *to, const double *from, int count)
+static void store_position(_Atomic double *to, const double from[3])
 {
-  for (int i = 0; i < count; ++i) {
-    atomic_store_explicit(&to[i], from[i], memory_order_release);
-  }
+  atomic_store_explicit(&to[0], from[0], memory_order_release);
+  atomic_store_explicit(&to[1], from[1], memory_order_release);
+  atomic_store_explicit(&to[2], from[2], memory_order_release);
+}
+
+static void store_quat(_Atomic double *to, const double from[4])
+{
+  store_position(to, from);
+  atomic_store_explicit(&to[3], from[3], memory_order_release);
 }
 
 static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
@@ -126,8 +141,8 @@ static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
     const hapi_local_body *body = &tick->bodies[i];
     uint32_t generation = leads(tick, body) ? body->generation : 0;
     if (generation != 0) {
-      store(places[i].pose, body->pose.position, 3);
-      store(places[i].pose + 3, body->pose.quat_wxyz, 4);
+      store_position(places[i].pose, body->pose.position);
+      store_quat(places[i].pose + 3, body->pose.quat_wxyz);
     }
     atomic_store_explicit(&places[i].generation, generation, memory_order_release);
   }
@@ -135,12 +150,14 @@ static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
 
 static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
 {
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
-    store(places[i].proxy, p->pose.position, 3);
-    store(places[i].device, p->handle_position, 3);
-    store(places[i].proxy_quat, p->pose.quat_wxyz, 4);
-    store(places[i].device_quat, p->handle_quat, 4);
+    if (p->generation != 0) {
+      store_position(places[i].proxy, p->pose.position);
+      store_position(places[i].device, p->handle_position);
+      store_quat(places[i].proxy_quat, p->pose.quat_wxyz);
+      store_quat(places[i].device_quat, p->handle_quat);
+    }
     atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
     atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
   }
@@ -201,7 +218,7 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
   }
   out->body_count = tick->live_count;
   out->model_number = tick->model_number;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *in = &tick->pointers[i];
     hapi_poses_pointer *to = &hapi_poses_pointers(out)[i];
     to->generation = in->hull != NULL ? in->generation : 0;

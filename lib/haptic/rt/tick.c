@@ -71,6 +71,7 @@ void hapi_tick_reset(hapi_tick *tick)
   fresh.ramp_generations = tick->ramp_generations;
   fresh.frictions = tick->frictions;
   fresh.pointers = tick->pointers;
+  fresh.pointer_high = tick->capacity.pointers;
   fresh.tool = tick->tool;
   fresh.tool.count = fresh.tool.pair_count = 0;
   fresh.crosses = tick->crosses;

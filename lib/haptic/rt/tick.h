@@ -19,7 +19,7 @@
  *   adopt_patches  new contacts between bodies, with the impulses of the old ones
  *   local_world    free velocities, poses; calls the next four
  *   proxy          pointers that are bodies behind a spring
- *   pointer_rows   pointer contacts as rows
+ *   pointer_rows   pointer contacts as rows; pointer_friction_rows
  *   contact_rows   contacts between bodies as rows
  *   joint_rows     joints likewise
  *   contact_solver, direct_solver  impulses of all rows
@@ -112,6 +112,7 @@ typedef struct hapi_tick_pointer {
   double slew_force;  /* N/s at the device */
   double slew_torque; /* N m/s at the device */
   hap_pose pose_world_device;
+  bool aligned; /* by it the device's axes are the world's: no turning to be worked out */
 
   hap_pose device_pose;   /* in, device frame */
   hap_twist device_twist; /* in, device frame */
@@ -370,6 +371,7 @@ typedef struct hapi_local_world {
   uint32_t memory_count;
   uint32_t *buckets;        /* of the matching; HAPI_MEMORY_BUCKETS */
   uint32_t bucket_count;    /* power of 2 */
+  uint32_t buckets_used;    /* likewise; scratch of the matching */
   hapi_model_joint *joints; /* of the model in use; capacity.joints */
   uint32_t joint_count;
   hapi_joint_memory *joint_memory; /* by slot; capacity.joints */
@@ -405,11 +407,13 @@ typedef struct hapi_tick {
   uint32_t contact_count;
   uint32_t cross_count;
   uint32_t body_high;
+  uint32_t pointer_high; /* from here on no pointer has come yet */
   hapi_local_world world;
   hapi_tool_world tool;
 
   uint32_t wishes; /* of the model in use, base/wishes.h */
   bool bounces;    /* some contact or stop of it gives back speed */
+  bool rubs;       /* some contact of a pointer does */
   bool proxies;    /* some pointer is or may become one */
   hapi_effect_sample sample;
 
@@ -487,8 +491,9 @@ void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
 void hapi_pointers_direct(hapi_tick *tick); /* instead of proxy_begin where there can be none */
 void hapi_pointer_rows(hapi_tick *tick);    /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);  /* rows -> wrenches */
-void hapi_contact_wake(hapi_tick *tick);    /* what is touched by what moves */
-void hapi_contact_rows(hapi_tick *tick);    /* contacts between bodies -> rows */
+void hapi_pointer_forces_with_friction(hapi_tick *tick); /* its part where some contact rubs */
+void hapi_contact_wake(hapi_tick *tick);                 /* what is touched by what moves */
+void hapi_contact_rows(hapi_tick *tick);                 /* contacts between bodies -> rows */
 void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
 void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
 void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */

@@ -100,6 +100,7 @@ static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
   c->mu = in->mu;
   c->rubs =
       HAPI_HAS_FRICTION && (in->mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
+  tick->rubs |= c->rubs;
   c->tool = at + 1;
   c->row = HAPI_NO_ROW;
   ++w->count;
@@ -171,6 +172,9 @@ static void put_back(hapi_tick *tick)
   }
   memcpy(&tick->contacts[tick->contact_count], w->old_contacts, w->count * sizeof *w->old_contacts);
   tick->contact_count += w->count;
+  for (uint32_t i = 0; i < w->count; ++i) {
+    tick->rubs |= w->old_contacts[i].rubs;
+  }
 }
 
 void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model)

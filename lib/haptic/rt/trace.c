@@ -48,7 +48,7 @@ static uint64_t hash_doubles(uint64_t hash, const double *values, int count)
 void hapi_trace_hash(hapi_tick *tick)
 {
   uint64_t hash = tick->hash;
-  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
     if (p->generation != 0) {
       hash = hash_doubles(hash, p->pose.position, 3);
