@@ -10,7 +10,9 @@
 #include <stdint.h>
 
 #include "base/lanes.h"
+#include "base/pose.h"
 #include "haptic/rt/contact_solver.h"
+#include "haptic/rt/gyro.h"
 
 #define BODIES 24u
 #define CONTACTS 90u
@@ -187,11 +189,75 @@ TEST(contact_as_rows)
   }
 }
 
+/* A row by itself of which the sum is known, added up one by one; one that cannot be used likewise. */
+TEST(single_as_row)
+{
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    make(seed, 1000, 0);
+    for (uint32_t i = 3 * CONTACTS; i < ROWS; ++i) {
+      hapi_row *row = &wide.rows[i];
+      row->single = 1;
+      row->target = i % 4 == 1 ? NAN : row->target;
+      row->hi = i % 4 == 2 ? -1.0 : row->hi;
+      plain.rows[i] = *row;
+      double response = hapi_dot6_fresh(row->ja, row->ba);
+      CHECK_NEAR(response, hapi_dot6(row->ja, row->ba), 0.0);
+      hapi_single_ready(&wide.solver, i, response);
+      hapi_row_ready(&plain.solver, i);
+    }
+    CHECK(memcmp(wide.rows, plain.rows, sizeof wide.rows) == 0);
+    CHECK(memcmp(wide.v, plain.v, sizeof wide.v) == 0);
+  }
+}
+
+static void random_quat(double out[4], double length)
+{
+  for (int i = 0; i < 4; ++i) {
+    out[i] = next();
+  }
+  hapi_quat_normalize(out);
+  for (int i = 0; i < 4; ++i) {
+    out[i] *= length;
+  }
+}
+
+/* Two bodies at once turn as each by itself does, also one that has no unit length. */
+TEST(two_turns)
+{
+  state = 7;
+  for (int i = 0; i < 1000; ++i) {
+    double quats[2][4];
+    double moved[2][4]; /* by eq. 11 */
+    double alone[2][4];
+    double moved_alone[2][4];
+    double spins[2][3];
+    for (int k = 0; k < 2; ++k) {
+      random_quat(quats[k], i % 10 == 0 && k == i % 20 / 10 ? 2.0 + next() : 1.0);
+      for (int axis = 0; axis < 3; ++axis) {
+        spins[k][axis] = i % 7 == 0 ? 0.0 : 40.0 * next();
+      }
+    }
+    memcpy(alone, quats, sizeof alone);
+    memcpy(moved, quats, sizeof moved);
+    memcpy(moved_alone, quats, sizeof moved_alone);
+    for (int k = 0; k < 2; ++k) {
+      hapi_turn(alone[k], spins[k], 1e-3);
+      hapi_quat_move(moved_alone[k], spins[k], 1e-3);
+    }
+    hapi_turn_two(quats[0], spins[0], quats[1], spins[1], 1e-3);
+    hapi_two_turns_move(moved[0], spins[0], moved[1], spins[1], 1e-3);
+    CHECK(memcmp(quats, alone, sizeof quats) == 0);
+    CHECK(memcmp(moved, moved_alone, sizeof moved) == 0);
+  }
+}
+
 int main(void)
 {
   RUN(sweeps);
   RUN(direct_solves);
   RUN(contacts_one_by_one);
   RUN(contact_as_rows);
+  RUN(single_as_row);
+  RUN(two_turns);
   return tap_done();
 }

@@ -28,6 +28,17 @@ static inline hapi_two hapi_two_all(double x)
   return _mm_set1_pd(x);
 }
 
+static inline hapi_two hapi_two_of(double first, double second)
+{
+  return _mm_set_pd(second, first);
+}
+
+static inline void hapi_two_split(hapi_two x, double *first, double *second)
+{
+  _mm_storel_pd(first, x);
+  _mm_storeh_pd(second, x);
+}
+
 static inline hapi_two hapi_two_add(hapi_two a, hapi_two b)
 {
   return _mm_add_pd(a, b);
@@ -70,6 +81,17 @@ static inline void hapi_two_store(double at[2], hapi_two x)
 static inline hapi_two hapi_two_all(double x)
 {
   return (hapi_two){x, x};
+}
+
+static inline hapi_two hapi_two_of(double first, double second)
+{
+  return (hapi_two){first, second};
+}
+
+static inline void hapi_two_split(hapi_two x, double *first, double *second)
+{
+  *first = x.first;
+  *second = x.second;
 }
 
 static inline hapi_two hapi_two_add(hapi_two a, hapi_two b)

@@ -7,18 +7,25 @@
 
 #include "base/vec.h"
 
-/* Eq. 10 and 11 of the paper: pose after seconds of a twist; the turn in it is small. The quaternion
- * is normalised because eq. 11 leaves the unit sphere. */
+/* Eq. 11 of the paper: orientation after seconds of an angular velocity; the turn in them is small. The
+ * quaternion is normalised because eq. 11 leaves the unit sphere. */
+static inline void hapi_quat_move(double quat[4], const double w[3], double seconds)
+{
+  double turn[4] = {0.0, w[0], w[1], w[2]};
+  double rate[4];
+  hapi_quat_multiply(turn, quat, rate);
+  quat[0] += 0.5 * seconds * rate[0]; /* no loop: in pairs they would wait for each other */
+  quat[1] += 0.5 * seconds * rate[1];
+  quat[2] += 0.5 * seconds * rate[2];
+  quat[3] += 0.5 * seconds * rate[3];
+  hapi_quat_normalize(quat);
+}
+
+/* The same of a pose and a twist, with eq. 10. */
 static inline void hapi_pose_move(hap_pose *pose, const hap_twist *twist, double seconds)
 {
-  double turn[4] = {0.0, twist->angular[0], twist->angular[1], twist->angular[2]};
-  double rate[4];
   hapi_v3_madd(pose->position, seconds, twist->linear, pose->position);
-  hapi_quat_multiply(turn, pose->quat_wxyz, rate);
-  for (int i = 0; i < 4; ++i) {
-    pose->quat_wxyz[i] += 0.5 * seconds * rate[i];
-  }
-  hapi_quat_normalize(pose->quat_wxyz);
+  hapi_quat_move(pose->quat_wxyz, twist->angular, seconds);
 }
 
 /* Between two poses, share 0..1; the shorter of the two turns, as q and -q are the same. */

@@ -135,9 +135,10 @@ static inline void hapi_quat_normalize(double q[4])
    * and division have to be waited for. */
   double off = n2 - 1.0;
   double s = fabs(off) < 1e-4 ? 1.0 - off * (0.5 - off * (0.375 - 0.3125 * off)) : 1.0 / sqrt(n2);
-  for (int i = 0; i < 4; ++i) {
-    q[i] *= s;
-  }
+  q[0] *= s;
+  q[1] *= s;
+  q[2] *= s;
+  q[3] *= s;
 }
 
 /* Row-major 3x3 of a unit quaternion. */

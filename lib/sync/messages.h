@@ -124,17 +124,17 @@ typedef struct hapi_model_body {
 
   /* Model CONTACT only. */
   double mass;
-  double inertia[9];         /* kg m^2, body frame, row-major */
-  double inverse_inertia[9]; /* body frame, row-major */
-  double gravity[3];         /* m/s^2; zero where the body has none */
-  double user_wrench[6];     /* N, N m about the centre of mass: the application's, held */
-  double linear_keep;        /* share of the velocity that damping leaves after a tick */
+  double gravity[3];     /* m/s^2; zero where the body has none */
+  double user_wrench[6]; /* N, N m about the centre of mass: the application's, held */
+  double linear_keep;    /* share of the velocity that damping leaves after a tick */
   double angular_keep;
   double linear_threshold2; /* m^2/s^2: damping acts above it */
   double angular_threshold2;
-  double max_angular_speed; /* rad/s */
-  double gain_taken[6];     /* of hapi_state_body.gain, the same */
-  double response[6][6];    /* MEASURED: velocity change per impulse at the centre, world axes */
+  double max_angular_speed;  /* rad/s */
+  double inertia[9];         /* kg m^2, body frame, row-major */
+  double inverse_inertia[9]; /* body frame, row-major */
+  double gain_taken[6];      /* of hapi_state_body.gain, the same */
+  double response[6][6];     /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;
 
 typedef struct hapi_model_contact {
@@ -541,10 +541,12 @@ typedef struct hapi_state_body {
                                 body while the loop did not own it */
   double angular_impulse[3]; /* N m s, the same about the centre of mass */
   double residual[6];        /* how much of hapi_model_body.residual is in the twist */
-  double gain[6];      /* N s, N m s, running total of what pointers gave while the loop owned it */
-  hap_pose owned_pose; /* where the loop left it when it owned it for the last time ... */
+  double gain[6]; /* N s, N m s, running total of what pointers gave while the loop owned it */
+  int64_t
+      owned_until_ns;  /* when the loop owned it for the last time; 0: it never did. The tick's own
+                             time while it owns it */
+  hap_pose owned_pose; /* where the loop left it then */
   hap_twist owned_twist;
-  int64_t owned_until_ns; /* ... then; 0: it never did. The tick's own time while it owns it */
 } hapi_state_body;
 
 typedef struct hapi_state_contact {

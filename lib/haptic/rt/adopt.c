@@ -130,6 +130,7 @@ static void adopt_body(hapi_tick *tick, const hapi_model *model, const hapi_mode
   }
   body->to = in->pose;
   body->live = true;
+  memset(body->acceleration, 0, sizeof body->acceleration);
   bool was_linear = is_linear(tick->model, body->flags);
   bool stays_linear = is_linear(model->model, in->flags);
   if (model->model == HAP_MODEL_CONTACT && !stays_linear) {

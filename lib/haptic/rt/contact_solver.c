@@ -19,15 +19,20 @@ static bool same_bodies(const hapi_row *row, const hapi_row *other)
   return row->a == other->a && row->b == other->b;
 }
 
-static bool valid(const hapi_solver *solver, uint32_t index)
+static bool valid(const hapi_solver *solver, const hapi_row *row, double d)
+{
+  return d > 1e-200 && d < 1e200 && hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
+         row->softness >= 0.0 && row->a < solver->body_count && row->b < solver->body_count;
+}
+
+static bool has_bounds(const hapi_solver *solver, uint32_t index)
 {
   const hapi_row *row = &solver->rows[index];
-  bool numbers = hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
-                 row->softness >= 0.0 && (row->normal >= 0 ? row->mu >= 0.0 : row->lo <= row->hi);
-  bool partners = row->a < solver->body_count && row->b < solver->body_count &&
-                  (row->normal < 0 ||
-                   ((uint32_t)row->normal < index && same_bodies(row, &solver->rows[row->normal])));
-  return numbers && partners;
+  if (row->normal < 0) {
+    return row->lo <= row->hi;
+  }
+  return row->mu >= 0.0 && (uint32_t)row->normal < index &&
+         same_bodies(row, &solver->rows[row->normal]);
 }
 
 /* A row left out keeps no impulse: its normal's frictions get none either. */
@@ -39,7 +44,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
   double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
-  if (!(d > 1e-200 && d < 1e200) || !valid(solver, index)) {
+  if (!valid(solver, row, d) || !has_bounds(solver, index)) {
     row->impulse = 0.0;
     return;
   }
@@ -95,6 +100,26 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index)
   join_triple(solver, index);
   if (solver->rows[index].inverse != 0.0) {
     warm_start(solver, &solver->rows[index]);
+  }
+}
+
+void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
+{
+  hapi_row *row = &solver->rows[index];
+  double d = response + row->softness;
+  row->inverse = 0.0;
+  row->triple = row->paired = 0;
+  if (!valid(solver, row, d) || !(row->lo <= row->hi)) {
+    row->impulse = 0.0;
+    return;
+  }
+  row->inverse = 1.0 / d;
+  row->response = d;
+  row->moves_a = response != 0.0;
+  row->drive = row->target;
+  row->impulse = hapi_clamp(row->impulse, row->lo, row->hi);
+  if (row->impulse != 0.0) {
+    hapi_madd6(solver->v[row->a], row->impulse, row->ba);
   }
 }
 
@@ -310,10 +335,17 @@ static double sweep(hapi_solver *solver)
 /* Non-finite velocities must not pass for a solution. */
 static void check_finite(hapi_solver *solver)
 {
+  const hapi_two zero = hapi_two_all(0.0);
+  hapi_two sum[3] = {zero, zero, zero}; /* of x - x, which is 0 for numbers only */
   for (uint32_t i = 0; i < solver->body_count; ++i) {
-    if (!hapi_finite(solver->v[i], 6)) {
-      solver->residual = HUGE_VAL;
+    for (int k = 0; k < 3; ++k) {
+      hapi_two x = hapi_two_load(solver->v[i] + 2 * k);
+      sum[k] = hapi_two_add(sum[k], hapi_two_sub(x, x));
     }
+  }
+  double all = hapi_two_sum(hapi_two_add(hapi_two_add(sum[0], sum[1]), sum[2]));
+  if (!(all == 0.0)) {
+    solver->residual = HUGE_VAL;
   }
 }
 
@@ -357,7 +389,18 @@ void hapi_solver_sweep_on(hapi_solver *solver)
 /* Each row has its bodies to itself: what is due after its update is rounding. */
 static void run_apart(hapi_solver *solver)
 {
-  (void)sweep(solver);
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    double old = row->impulse;
+    if (row->inverse == 0.0) {
+      continue;
+    }
+    double *v = solver->v[row->a];
+    double wanted = (row->drive - row->softness * old - hapi_dot6(row->ja, v)) * row->inverse;
+    hapi_madd6(v, hapi_clamp(wanted, row->lo - old, row->hi - old), row->ba);
+    row->impulse = hapi_clamp(old + wanted, row->lo, row->hi);
+  }
+  solver->sweeps = 1;
   solver->residual = 0.0;
   check_finite(solver);
 }

@@ -74,7 +74,7 @@ typedef struct hapi_solver {
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
-  bool apart; /* in: no two rows have a body in common: one sweep solves them */
+  bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
   uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
   uint32_t dear_runs; /* inner: since then */
   bool too_dear;      /* inner: an island was too large or too dear for the budget */
@@ -103,6 +103,9 @@ void hapi_solver_calm(hapi_solver *solver);
  * soon as one is filled in, while it is at hand: there are more of them than fit into a near cache.
  * In their order; v, row_count and body_count are set before. */
 void hapi_row_ready(hapi_solver *solver, uint32_t index);
+
+/* The same of a single row without another one's bounds, of which ja.ba is known. */
+void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
 
 /* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its frictions. */
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
@@ -137,6 +140,15 @@ static inline double hapi_dot6(const double a[6], const double b[6])
   hapi_two sum = hapi_two_mul(hapi_two_load(a), hapi_two_load(b));
   sum = hapi_two_madd(sum, hapi_two_load(a + 2), hapi_two_load(b + 2));
   return hapi_two_sum(hapi_two_madd(sum, hapi_two_load(a + 4), hapi_two_load(b + 4)));
+}
+
+/* The same bits, of numbers that were written one by one just before: a pair of them would have to wait until
+ * both are in the cache. */
+static inline double hapi_dot6_fresh(const double a[6], const double b[6])
+{
+  double even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];
+  double odd = a[1] * b[1] + a[3] * b[3] + a[5] * b[5];
+  return even + odd;
 }
 
 /* v += s b */

@@ -1,46 +1,64 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include "base/pose.h"
-#include "base/vec.h"
+#include "base/two_turns.h"
+#include "haptic/rt/body_step.h"
 #include "haptic/rt/effect_clock.h"
-#include "haptic/rt/tick.h"
 
 /* Local dynamics simulation (paper section 5.2). */
 
 /* Eq. 9, and 14 in the first tick of a model. */
 static void accelerate(hapi_local_body *body, double period)
 {
-  for (int i = 0; i < 3; ++i) {
-    body->twist.linear[i] += (body->acceleration[i] + body->b[i]) * period + body->residual[i];
-    body->twist.angular[i] +=
-        (body->acceleration[3 + i] + body->b[3 + i]) * period + body->residual[3 + i];
+  const hapi_two t = hapi_two_all(period);
+  const hapi_two zero = hapi_two_all(0.0);
+  double v[6];
+  memcpy(v, &body->twist, sizeof v);
+  for (int i = 0; i < 6; i += 2) {
+    hapi_two sum = hapi_two_add(hapi_two_load(body->acceleration + i), hapi_two_load(body->b + i));
+    sum = hapi_two_madd(hapi_two_load(body->residual + i), sum, t);
+    hapi_two_store(v + i, hapi_two_add(hapi_two_load(v + i), sum));
+    hapi_two_store(body->acceleration + i, zero);
+    hapi_two_store(body->residual + i, zero);
   }
-  for (int i = 0; i < 6; ++i) {
-    body->residual[i] = 0.0;
+  memcpy(&body->twist, v, sizeof v);
+}
+
+/* Eq. 10 and 11, of bodies that may go. */
+static void turn_bodies(hapi_local_body *const bodies[], uint32_t count, double seconds)
+{
+  for (uint32_t i = 0; i + 1 < count; i += 2) {
+    hapi_two_turns_move(bodies[i]->pose.quat_wxyz, bodies[i]->twist.angular,
+                        bodies[i + 1]->pose.quat_wxyz, bodies[i + 1]->twist.angular, seconds);
+  }
+  if (count % 2 != 0) {
+    hapi_quat_move(bodies[count - 1]->pose.quat_wxyz, bodies[count - 1]->twist.angular, seconds);
   }
 }
 
-static bool sound(const hapi_local_body *body)
+static void step_bodies(hapi_tick *tick)
 {
-  double sum = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    sum +=
-        fabs(body->twist.linear[i]) + fabs(body->twist.angular[i]) + fabs(body->pose.position[i]);
+  hapi_local_body *turning[HAPI_TURNING];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if ((body->flags & HAPI_BODY_DRIVEN) != 0) {
+      hapi_pose_move(&body->pose, &body->twist, tick->period);
+      continue;
+    }
+    if ((body->flags & HAPI_BODY_RESTING) != 0) {
+      continue;
+    }
+    accelerate(body, tick->period);
+    if (hapi_body_shift(tick, body)) {
+      turning[count++] = body;
+    }
+    if (count == HAPI_TURNING) {
+      turn_bodies(turning, count, tick->period);
+      count = 0;
+    }
   }
-  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
-}
-
-/* A state that is not finite stays here: the body stops where it last was and the guard latches. */
-static void step_body(hapi_tick *tick, hapi_local_body *body)
-{
-  hap_pose before = body->pose;
-  accelerate(body, tick->period);
-  hapi_pose_move(&body->pose, &body->twist, tick->period);
-  if (!sound(body)) {
-    body->pose = before;
-    body->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
-  }
+  turn_bodies(turning, count, tick->period);
 }
 
 /* What the forces of this tick do to other bodies than those they act on. The impulse is the pushed
@@ -72,14 +90,7 @@ void hapi_local_step(hapi_tick *tick)
     accelerate_others(tick);
     hapi_effect_end(tick, HAP_EFFECT_CROSS, begin);
   }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    hapi_local_body *body = &tick->bodies[tick->live[i]];
-    if ((body->flags & HAPI_BODY_DRIVEN) != 0) {
-      hapi_pose_move(&body->pose, &body->twist, tick->period);
-    } else if ((body->flags & HAPI_BODY_RESTING) == 0) {
-      step_body(tick, body);
-    }
-  }
+  step_bodies(tick);
 }
 
 /* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/pose.h"
+#include "haptic/rt/body_step.h"
 #include "haptic/rt/effect_clock.h"
 #include "haptic/rt/gyro.h"
 #include "haptic/rt/rows.h"
@@ -50,8 +51,7 @@ static bool waits(const hapi_tick *tick, const hapi_local_body *body)
 static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
 {
   hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
-  hapi_v3_copy(body->twist.linear, body->start_twist);
-  hapi_v3_copy(body->twist.angular, body->start_twist + 3);
+  memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
   body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
   body->waiting = waits(tick, body);
   body->row = row;
@@ -59,8 +59,10 @@ static void begin_body(hapi_tick *tick, hapi_local_body *body, uint32_t row)
   if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
     hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
   }
+  free_velocity(tick, body, tick->world.solver.v[row]);
 }
 
+/* Bodies and proxies with the velocities that they would have with nothing in touch. */
 static void begin(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->world.solver;
@@ -78,11 +80,13 @@ static void begin(hapi_tick *tick)
   if (HAPI_HAS_PROXY && tick->proxies) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_proxy_begin(tick);
+    hapi_proxy_free(tick);
     hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
   } else {
     hapi_pointers_direct(tick);
   }
   solver->hub_count = solver->body_count - first_hub;
+  memcpy(solver->free, solver->v, solver->body_count * sizeof *solver->free);
 }
 
 void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
@@ -92,21 +96,6 @@ void hapi_local_wake(hapi_tick *tick, hapi_local_body *body)
   free_velocity(tick, body, tick->world.solver.v[body->row]);
   memcpy(tick->world.solver.free[body->row], tick->world.solver.v[body->row],
          sizeof tick->world.solver.free[0]);
-}
-
-static void set_free_velocities(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    free_velocity(tick, body, tick->world.solver.v[body->row]);
-  }
-  if (HAPI_HAS_PROXY && tick->proxies) {
-    uint64_t begin = hapi_effect_begin(tick);
-    hapi_proxy_free(tick);
-    hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
-  }
-  memcpy(tick->world.solver.free, tick->world.solver.v,
-         tick->world.solver.body_count * sizeof *tick->world.solver.free);
 }
 
 /* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what hardly
@@ -168,44 +157,76 @@ static void limit_spin(hapi_local_body *body)
   }
 }
 
-static bool sound(const hapi_local_body *body)
-{
-  double sum = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    sum +=
-        fabs(body->twist.linear[i]) + fabs(body->twist.angular[i]) + fabs(body->pose.position[i]);
-  }
-  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
-}
-
 static void take_velocity(hapi_local_body *body, const double v[6])
 {
-  hapi_v3_copy(v, body->twist.linear);
-  hapi_v3_copy(v + 3, body->twist.angular);
+  memcpy(&body->twist, v, sizeof body->twist);
 }
 
 static void step_body(hapi_tick *tick, hapi_local_body *body)
 {
   hap_pose before = body->pose;
-  if (hapi_body_responds(body)) {
-    take_velocity(body, tick->world.solver.v[body->row]);
-    limit_spin(body);
-  } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
-    return;
-  }
   move_body(tick, body);
   damp(body);
-  if (!sound(body)) {
+  if (!hapi_body_sound(&body->twist, body->pose.position)) {
     body->pose = before;
-    memset(&body->twist, 0, sizeof body->twist);
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
+    hapi_body_stop(tick, body);
   }
 }
 
-/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
-static void give_outside(hapi_tick *tick, uint32_t slot, const double j[6], double impulse)
+/* Whether one turn is all of its turning. */
+static bool turns_once(const hapi_tick *tick, const hapi_local_body *body)
 {
-  hapi_local_body *body = hapi_row_body(tick, slot);
+  const double *w = body->twist.angular;
+  return tick->period * tick->period * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX &&
+         !wobbles(tick, body);
+}
+
+/* The rest of their step, of bodies that turn once. */
+static void turn_bodies(hapi_local_body *const bodies[], uint32_t count, double seconds)
+{
+  for (uint32_t i = 0; i + 1 < count; i += 2) {
+    hapi_turn_two(bodies[i]->pose.quat_wxyz, bodies[i]->twist.angular,
+                  bodies[i + 1]->pose.quat_wxyz, bodies[i + 1]->twist.angular, seconds);
+  }
+  if (count % 2 != 0) {
+    hapi_turn(bodies[count - 1]->pose.quat_wxyz, bodies[count - 1]->twist.angular, seconds);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    damp(bodies[i]);
+  }
+}
+
+static void step_bodies(hapi_tick *tick)
+{
+  hapi_local_body *turning[HAPI_TURNING];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < tick->live_count; ++i) {
+    hapi_local_body *body = &tick->bodies[tick->live[i]];
+    if ((body->flags & HAPI_BODY_OWNED) == 0) { /* others have none */
+      memset(body->residual, 0, sizeof body->residual);
+    }
+    if (hapi_body_responds(body)) {
+      take_velocity(body, tick->world.solver.v[body->row]);
+      limit_spin(body);
+    } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
+      continue;
+    }
+    if (!turns_once(tick, body)) {
+      step_body(tick, body);
+    } else if (hapi_body_shift(tick, body)) {
+      turning[count++] = body;
+    }
+    if (count == HAPI_TURNING) {
+      turn_bodies(turning, count, tick->period);
+      count = 0;
+    }
+  }
+  turn_bodies(turning, count, tick->period);
+}
+
+/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
+static void give_outside(hapi_local_body *body, const double j[6], double impulse)
+{
   if (body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
     body->pushed = true;
     hapi_v3_madd(body->impulse, impulse, j, body->impulse);
@@ -246,20 +267,28 @@ static double work_on(hapi_tick *tick, uint32_t slot, const double j[6], double 
   return 0.5 * impulse * hapi_dot6(j, mean);
 }
 
-/* Of a row with a pointer, or with something that the loop does not own. */
+/* Of a row with a pointer. */
+static void account_pointer(hapi_tick *tick, const hapi_row *row, hapi_local_body *body)
+{
+  body->flags |= HAPI_BODY_TOUCHED;
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    give_outside(body, row->ja, row->impulse);
+    return;
+  }
+  hapi_madd6(body->gain, row->impulse, row->ja);
+  hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
+}
+
+/* Of a row with something that the loop does not own. */
 static void account_row(hapi_tick *tick, const hapi_row *row, const hapi_row_source *source)
 {
-  if (HAPI_HAS_OBSERVER && !source->pointer && tick->guard.observes) {
+  if (HAPI_HAS_OBSERVER && tick->guard.observes) {
     tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
                          work_on(tick, source->body_b, row->jb, row->impulse);
   }
-  give_outside(tick, source->body_a, row->ja, row->impulse);
-  give_outside(tick, source->body_b, row->jb, row->impulse);
-  if (source->pointer && is_owned(tick, source->body_a)) {
-    hapi_local_body *body = &tick->bodies[source->body_a];
-    hapi_madd6(body->gain, row->impulse, row->ja);
-  }
-  if (is_owned(tick, source->body_a) && (source->pointer || is_outside(tick, source->body_b))) {
+  give_outside(hapi_row_body(tick, source->body_a), row->ja, row->impulse);
+  give_outside(hapi_row_body(tick, source->body_b), row->jb, row->impulse);
+  if (is_owned(tick, source->body_a) && is_outside(tick, source->body_b)) {
     hapi_v3_madd(tick->owned_impulse, row->impulse, row->ja, tick->owned_impulse);
   }
   if (is_owned(tick, source->body_b) && is_outside(tick, source->body_a)) {
@@ -275,10 +304,16 @@ static void account(hapi_tick *tick)
   for (uint32_t i = 0; i < world->solver.row_count; ++i) {
     const hapi_row *row = &world->solver.rows[i];
     const hapi_row_source *source = &world->sources[i];
+    if (source->pointer) {
+      if (row->impulse != 0.0 && source->body_a != HAPI_SLOT_NONE) {
+        account_pointer(tick, row, &tick->bodies[source->body_a]);
+      }
+      continue;
+    }
     if (source->joint) {
       const hapi_model_joint *joint = &world->joints[source->contact];
       world->joint_memory[joint->slot].impulse[source->part] = row->impulse;
-    } else if (!source->pointer) {
+    } else {
       world->memory[source->contact].impulse[source->part] = row->impulse;
       world->active += source->part == 0 && row->impulse > 0.0;
     }
@@ -287,7 +322,7 @@ static void account(hapi_tick *tick)
     }
     touch(tick, source->body_a);
     touch(tick, source->body_b);
-    if (source->pointer || source->gives) {
+    if (source->gives) {
       account_row(tick, row, source);
     }
   }
@@ -299,6 +334,9 @@ static bool stop_push_out(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->world.solver;
   bool any = false;
+  if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
+    return false;
+  }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row_source *source = &tick->world.sources[i];
     any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
@@ -378,7 +416,6 @@ static void add_contacts(hapi_tick *tick)
 void hapi_local_world_step(hapi_tick *tick)
 {
   begin(tick);
-  set_free_velocities(tick);
   hapi_pointer_rows(tick);
   uint32_t of_pointers = tick->world.solver.row_count;
   wake(tick);
@@ -387,9 +424,7 @@ void hapi_local_world_step(hapi_tick *tick)
   tick->world.solver.apart &= tick->world.solver.row_count == of_pointers;
   solve(tick);
   bool again = stop_push_out(tick);
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    step_body(tick, &tick->bodies[tick->live[i]]);
-  }
+  step_bodies(tick);
   if (again) {
     if (HAPI_HAS_PROXY && tick->proxies) {
       hapi_proxy_push_out(tick);
@@ -406,10 +441,6 @@ void hapi_local_world_step(hapi_tick *tick)
         damp(body);
       }
     }
-  }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): what is live is in the table */
-    memset(tick->bodies[tick->live[i]].residual, 0, sizeof tick->bodies[0].residual);
   }
   hapi_pointer_forces(tick);
   if (HAPI_HAS_PROXY && tick->proxies) {

@@ -14,11 +14,12 @@
 /* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
 static inline void hapi_pointer_audit(hapi_tick *tick, const double force[3])
 {
-  if (!hapi_finite(force, 3)) {
+  double norm = hapi_v3_norm(force);
+  if (!hapi_finite(&norm, 1)) {
     return;
   }
   hapi_v3_madd(tick->hand_impulse, tick->period, force, tick->hand_impulse);
-  tick->hand_impulse_abs += tick->period * hapi_v3_norm(force);
+  tick->hand_impulse_abs += tick->period * norm;
 }
 
 /* A body outside of the range has no row, but gets what it took at the next sync. */

@@ -132,7 +132,8 @@ static void aim(const hapi_tick *tick, const hapi_local_contact *contact,
   }
   if (contact->row != HAPI_NO_ROW && p->integration != HAP_INTEGRATION_EXPLICIT) {
     const hapi_row *normal = &tick->world.solver.rows[contact->row];
-    double a = hapi_dot6(normal->ja, normal->ba) + hapi_dot6(normal->jb, normal->bb);
+    double a = hapi_dot6(normal->ja, normal->ba);
+    a += p->proxied ? hapi_dot6(normal->jb, normal->bb) : 0.0;
     lead = hapi_spring_by_midpoint(p, tick->period * tick->period * a * f->stiffness)
                ? 0.0
                : tick->period;

@@ -16,7 +16,7 @@
 #define NEAR_S 5e-3
 #define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
 
-static bool place_by_shape(const hapi_local_contact *c, hapi_placed_pointer *at)
+static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at)
 {
   hapi_nearest nearest;
   hapi_touch_frame frame = {NULL, NULL};
@@ -27,13 +27,13 @@ static bool place_by_shape(const hapi_local_contact *c, hapi_placed_pointer *at)
                          &frame, &nearest)) {
     return false;
   }
-  hapi_v3_copy(nearest.normal, at->normal);
-  hapi_v3_copy(nearest.point_b, at->point);
+  hapi_v3_copy(nearest.normal, c->normal_now);
+  hapi_v3_copy(nearest.point_b, c->point_now);
   at->depth = -nearest.distance;
   return true;
 }
 
-static bool ask_shape(hapi_tick *tick, const hapi_local_contact *c, hapi_placed_pointer *at)
+static bool ask_shape(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *at)
 {
   uint64_t begin = hapi_effect_begin(tick);
   bool found = place_by_shape(c, at);
@@ -41,11 +41,11 @@ static bool ask_shape(hapi_tick *tick, const hapi_local_contact *c, hapi_placed_
   return found;
 }
 
-static void place_by_plane(const hapi_local_contact *c, hapi_placed_pointer *at)
+static void place_by_plane(hapi_local_contact *c, hapi_placed_pointer *at)
 {
   double apart[3];
-  hapi_body_point(at->body, c->point_body, at->point);
-  hapi_body_vector(at->body, c->normal_body, at->normal);
+  hapi_body_point(at->body, c->point_body, c->point_now);
+  hapi_body_vector(at->body, c->normal_body, c->normal_now);
   hapi_v3_sub(at->pointer->pose.position, at->point, apart);
   at->depth = at->pointer->radius - hapi_v3_dot(at->normal, apart);
 }
@@ -54,8 +54,6 @@ static void place_by_plane(const hapi_local_contact *c, hapi_placed_pointer *at)
 static bool place_tool(const hapi_tick *tick, const hapi_local_contact *c, hapi_placed_pointer *at)
 {
   const hapi_local_tool *tool = &tick->tool.tools[c->tool - 1];
-  hapi_v3_copy(c->normal_now, at->normal);
-  hapi_v3_copy(c->point_now, at->point);
   hapi_v3_sub(at->point, at->pointer->pose.position, at->arm);
   at->depth = tool->depth;
   at->share = tool->felt;
@@ -66,6 +64,8 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *a
 {
   at->pointer = &tick->pointers[c->pointer];
   at->body = hapi_row_body(tick, c->body);
+  at->normal = c->normal_now;
+  at->point = c->point_now;
   if (at->pointer->generation != c->pointer_generation) {
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
@@ -76,8 +76,6 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *a
   if (!HAPI_HAS_SHAPE || !c->has_shape || !ask_shape(tick, c, at)) {
     place_by_plane(c, at);
   }
-  hapi_v3_copy(at->normal, c->normal_now);
-  hapi_v3_copy(at->point, c->point_now);
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->period);
   return true;
 }
@@ -113,9 +111,25 @@ static void point_velocity(const hapi_placed_pointer *at, const double linear[3]
   }
 }
 
+/* Where the body gives way, and how fast. */
+static void set_way(hapi_placed_pointer *at)
+{
+  double arm[3];
+  hapi_v3_scale(-1.0, at->normal, at->j);
+  hapi_v3_set(at->j + 3, 0.0, 0.0, 0.0);
+  at->w = 0.0;
+  if (at->body != NULL) {
+    hapi_body_arm(at->body, at->point, arm);
+    hapi_v3_cross(arm, at->j, at->j + 3);
+    at->w = hapi_row_start_speed(at->body, at->j);
+  }
+}
+
 static void set_proxy_column(const hapi_placed_pointer *at, hapi_row *row, hapi_pointer_spring *out)
 {
   const hapi_tick_pointer *p = at->pointer;
+  memset(row->jb, 0, sizeof row->jb);
+  memset(row->bb, 0, sizeof row->bb);
   hapi_v3_copy(at->normal, row->jb);
   hapi_v3_scale(p->response, row->jb, row->bb);
   row->b = p->row;
@@ -134,30 +148,28 @@ static void set_proxy_column(const hapi_placed_pointer *at, hapi_row *row, hapi_
 static void set_columns(const hapi_local_contact *contact, const hapi_placed_pointer *at,
                         hapi_row *row, hapi_pointer_spring *out)
 {
-  const hapi_tick_pointer *p = at->pointer;
-  double into[3];
-  double arm[3];
-  double velocity[3];
-  hapi_v3_scale(-1.0, at->normal, into);
-  hapi_body_arm(at->body, at->point, arm);
-  hapi_row_column(at->body, arm, into, 1.0, row->ja, row->ba);
-  hapi_row_column(NULL, arm, into, 1.0, row->jb, row->bb);
+  if (at->body != NULL) {
+    hapi_v3_copy(at->j, row->ja);
+    hapi_v3_copy(at->j + 3, row->ja + 3);
+  } else {
+    memset(row->ja, 0, sizeof row->ja);
+  }
+  hapi_row_response(at->body, row->ja, row->ba);
   if (contact->tool == 0 && hapi_body_has_own_probes(at->body)) {
     for (int i = 0; i < 6; ++i) {
-      row->ba[i] = hapi_v3_dot(contact->a[i], into);
+      row->ba[i] = hapi_v3_dot(contact->a[i], at->j);
     }
   }
   row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
   row->b = HAPI_STATIC_ROW;
-  out->w = out->free = out->body_w = hapi_row_start_speed(at->body, row->ja);
-  out->body_a = hapi_dot6(row->ja, row->ba);
-  point_velocity(at, p->twist.linear, p->twist.angular, velocity);
-  out->s = hapi_v3_dot(into, velocity);
-  if (p->proxied) {
+  out->w = out->free = out->body_w = at->w;
+  out->a = out->body_a = hapi_dot6_fresh(row->ja, row->ba);
+  out->s = at->own;
+  if (at->pointer->proxied) {
     set_proxy_column(at, row, out);
+    out->a += hapi_dot6_fresh(row->jb, row->bb);
     out->s = 0.0;
   }
-  out->a = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
 }
 
 /* Whether all rows so far have their bodies to themselves. */
@@ -205,21 +217,11 @@ static void add_row(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *
   contact->row = number;
   ++world->solver.row_count;
   note_body(&world->solver, at);
-  hapi_row_ready(&world->solver, number);
-}
-
-static double closing_speed(const hapi_placed_pointer *at, const double velocity[3])
-{
-  double speed = -hapi_v3_dot(at->normal, velocity);
-  if (at->body != NULL) {
-    double j[6];
-    double b[6];
-    double arm[3];
-    hapi_body_arm(at->body, at->point, arm);
-    hapi_row_column(at->body, arm, at->normal, 1.0, j, b);
-    speed += hapi_row_start_speed(at->body, j);
+  if (row->single) {
+    hapi_single_ready(&world->solver, number, p.body_a);
+  } else {
+    hapi_row_ready(&world->solver, number);
   }
-  return speed;
 }
 
 static double size_of(const hapi_tick_pointer *p)
@@ -231,8 +233,7 @@ static double size_of(const hapi_tick_pointer *p)
 static bool may_close(const hapi_tick *tick, const hapi_local_contact *c,
                       const hapi_placed_pointer *at)
 {
-  static const double still[3] = {0.0, 0.0, 0.0};
-  double comes = fmax(closing_speed(at, still), 0.0);
+  double comes = fmax(-at->w, 0.0);
   bool leaves = c->tool != 0 && tick->tool.tools[c->tool - 1].leaving;
   return !leaves && at->depth + at->pointer->reach + tick->period * comes + RIGID_SLACK > 0.0;
 }
@@ -251,13 +252,15 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   double velocity[3];
   point_velocity(&at, p->proxied ? p->free_velocity : p->twist.linear,
                  p->proxied ? p->free_spin : p->twist.angular, velocity);
-  double speed = closing_speed(&at, velocity);
+  set_way(&at);
+  at.own = hapi_v3_dot(at.j, velocity);
+  double speed = at.own - at.w;
   double way = tick->period * speed;
   /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
   double motion = speed;
   if (p->proxied) {
     point_velocity(&at, p->proxy_velocity, p->proxy_spin, velocity);
-    motion = closing_speed(&at, velocity);
+    motion = hapi_v3_dot(at.j, velocity) - at.w;
   }
   if (!p->rigid && at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
     at.pointer->near_stiffness += c->weight * at.pointer->stiffness;

@@ -38,10 +38,13 @@
 typedef struct hapi_placed_pointer {
   hapi_tick_pointer *pointer;
   hapi_local_body *body; /* NULL: static world */
-  double normal[3];      /* out of the body */
-  double point[3];
+  const double *normal;  /* out of the body: normal_now and point_now of the contact */
+  const double *point;
   double depth;
   double share; /* of the stiffness, that is felt */
+  double j[6];  /* of the body, of a force into it at the point; NULL: the force alone */
+  double w;     /* m/s, along it before the tick */
+  double own;   /* m/s, likewise of the pointer, with nothing in touch */
   double arm
       [3]; /* from the pointer's origin to the point; of a sphere 0: it pushes through its centre */
 } hapi_placed_pointer;
@@ -94,17 +97,10 @@ static inline bool hapi_spring_stays_closed(const hapi_pointer_spring *p, double
   return before > 0.0 && next * (1.0 + slope) >= 0.5 * period * way;
 }
 
-/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
- * would be with nothing else in touch. */
-static inline void hapi_spring_linearise(const hapi_pointer_spring *p, double period, double *out_c,
-                                         double *out_force)
+/* Where a contact begins or ends. */
+static inline void hapi_spring_search(const hapi_pointer_spring *p, double before, double period,
+                                      double *out_c, double *out_force)
 {
-  double before = p->depth - 0.5 * period * (p->s - p->w);
-  if (p->pulls || hapi_spring_stays_closed(p, before, period)) {
-    *out_c = 0.25 * period * p->k;
-    *out_force = p->k * p->depth + *out_c * p->w;
-    return;
-  }
   double w = p->free;
   double slope = 0.0;
   double force = 0.0;
@@ -115,6 +111,20 @@ static inline void hapi_spring_linearise(const hapi_pointer_spring *p, double pe
   force = hapi_spring_secant(p->k, before, p->depth + 0.5 * period * (p->s - w), &slope);
   *out_c = 0.5 * period * slope;
   *out_force = force + *out_c * w;
+}
+
+/* The spring as a line of the new speed, force = *out_force - *out_c w': about the speed that there
+ * would be with nothing else in touch. */
+static inline void hapi_spring_linearise(const hapi_pointer_spring *p, double period, double *out_c,
+                                         double *out_force)
+{
+  double before = p->depth - 0.5 * period * (p->s - p->w);
+  if (p->pulls || hapi_spring_stays_closed(p, before, period)) {
+    *out_c = 0.25 * period * p->k;
+    *out_force = p->k * p->depth + *out_c * p->w;
+  } else {
+    hapi_spring_search(p, before, period, out_c, out_force);
+  }
 }
 
 static inline bool hapi_spring_by_midpoint(const hapi_tick_pointer *p, double stiffness)

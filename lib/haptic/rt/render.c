@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
+#include "base/lanes.h"
 #include "base/vec.h"
 #include "haptic/rt/contact_ramp.h"
 #include "haptic/rt/effect_clock.h"
@@ -162,8 +163,10 @@ static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane 
   hapi_v3_add(moment, c->couple, moment);
   hapi_v3_madd(body->impulse, period, c->force, body->impulse);
   hapi_v3_madd(body->angular_impulse, period, moment, body->angular_impulse);
-  for (int i = 0; i < 6; ++i) {
-    body->acceleration[i] += hapi_v3_dot(c->a[i], c->force);
+  for (int i = 0; i < 6; i += 2) { /* in pairs, as they are read soon after */
+    double *sum = body->acceleration + i;
+    hapi_two more = hapi_two_of(hapi_v3_dot(c->a[i], c->force), hapi_v3_dot(c->a[i + 1], c->force));
+    hapi_two_store(sum, hapi_two_add(hapi_two_load(sum), more));
   }
 }
 
@@ -238,12 +241,6 @@ void hapi_render(hapi_tick *tick)
     tick->pointers[i].contacts = 0;
     tick->pointers[i].guard.force2 = tick->pointers[i].guard.power = 0.0;
     tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    double *acceleration = tick->bodies[tick->live[i]].acceleration;
-    for (int k = 0; k < 6; ++k) {
-      acceleration[k] = 0.0;
-    }
   }
   tick->pushing = 0;
   hapi_tool_place(tick);

@@ -176,40 +176,43 @@ typedef struct hapi_tick_pointer {
   double spin_response;  /* 1/(kg m^2) */
 } hapi_tick_pointer;
 
+/* Hundreds of them are more than a near cache holds: what every tick reads or tells stands together, first
+ * that of all models, then that of some; what a sync writes and few ask for comes last. */
 typedef struct hapi_local_body {
   uint32_t generation;
   uint32_t flags;
   uint32_t epoch;
-  bool live;   /* in the model in use */
-  bool pushed; /* since it was adopted */
-  hap_pose pose;
-  hap_twist twist;
-  double b[6];
-  double residual[6];       /* of eq. 14, to be added in this tick */
-  double residual_taken[6]; /* what has been added so far */
-  double acceleration[6];   /* sum of A f in this tick */
-  hap_pose from;            /* model IMPULSE: pose at adoption, and pose to reach */
-  hap_pose to;
-  double impulse[3];
-  double angular_impulse[3];
-
-  /* Model CONTACT. */
-  hapi_model_body given;  /* of the newest model */
-  uint64_t entered_model; /* with which the loop came to own the body */
+  uint32_t row; /* place in the solver's velocities */
+  bool live;    /* in the model in use */
+  bool pushed;  /* since it was adopted */
   bool
       round; /* the same inertia about all axes, as cubes and balls have: it does not turn with them */
-  bool forced;         /* the application pushes it */
-  bool rowed;          /* scratch: it has a row in this tick */
-  bool waiting;        /* for its first contacts: goes on with its twist until they are known */
-  uint32_t row;        /* place in the solver's velocities */
-  double rotation[9];  /* of pose */
-  double inverse_mass; /* 0 where it is not used: driven and measured ones */
-  double inverse_inertia[9]; /* world */
-  double start_twist[6];     /* before this tick */
+  bool forced;  /* the application pushes it */
+  bool rowed;   /* scratch: it has a row in this tick */
+  bool waiting; /* for its first contacts: goes on with its twist until they are known */
+  hap_pose pose;
+  hap_twist twist;
+  double impulse[3];
+  double angular_impulse[3];
+  double residual_taken[6]; /* of eq. 14, what has been added so far */
   double gain[6];
+  int64_t owned_until_ns;
+
+  /* Model CONTACT. */
+  uint64_t entered_model;    /* with which the loop came to own the body */
+  double start_twist[6];     /* before this tick */
+  double rotation[9];        /* of pose */
+  double inverse_mass;       /* 0 where it is not used: driven and measured ones */
+  double inverse_inertia[9]; /* world */
+
+  double residual[6];     /* of eq. 14, to be added in this tick */
+  double acceleration[6]; /* sum of A f in this tick; 0 between ticks, of a body that answers */
+  double b[6];
+  hapi_model_body given; /* of the newest model */
+  hap_pose from;         /* model IMPULSE: pose at adoption, and pose to reach */
+  hap_pose to;
   hap_pose owned_pose;
   hap_twist owned_twist;
-  int64_t owned_until_ns;
 } hapi_local_body;
 
 /* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
@@ -261,32 +264,31 @@ typedef struct hapi_friction {
   uint32_t axis_count; /* 2; 3 with torsion */
 } hapi_friction;
 
+/* Likewise. */
 typedef struct hapi_local_contact {
   uint32_t slot;
   uint32_t body;
   uint32_t pointer;
   uint32_t pointer_generation;
   uint32_t generation;
-  bool seen; /* rendered at least once */
+  uint32_t tool;  /* of a hull: 1 + index into the tick's tools; 0: of a sphere */
+  uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
+  bool seen;      /* rendered at least once */
+  bool rubs;      /* friction is worked out: there is some, or it was asked for */
+  bool has_shape; /* model CONTACT: asked at every tick */
   double point_body[3];
   double normal_body[3];
+  hapi_ramp ramp;
+  double mu;
+  double weight;        /* 0..1, share of the pointer's stiffness; of a sphere 1 */
+  double force[3];      /* on the body */
+  double couple[3];     /* N m, on the body about the contact point; friction */
+  double normal_now[3]; /* model CONTACT, and of hulls all: world, out of the body */
+  double point_now[3];
   double a[6][3];
   double turn[6]; /* acceleration by one N m about the normal; soft finger */
-  double mu;
-  bool rubs; /* friction is worked out: there is some, or it was asked for */
-  hapi_ramp ramp;
-  double force[3];  /* on the body */
-  double couple[3]; /* N m, on the body about the contact point; friction */
-  uint32_t tool;    /* of a hull: 1 + index into the tick's tools; 0: of a sphere */
-  double weight;    /* 0..1, share of the pointer's stiffness; of a sphere 1 */
-
-  /* Model CONTACT, and of hulls all. */
-  bool has_shape; /* asked at every tick */
   hapi_shape shape;
   hap_pose shape_pose;
-  uint32_t row;         /* in this tick, HAPI_NO_ROW */
-  double normal_now[3]; /* world, out of the body */
-  double point_now[3];
 } hapi_local_contact;
 
 /* A contact of a pointer that is a hull, beside its hapi_local_contact. */
