@@ -81,6 +81,7 @@ static void begin(hapi_tick *tick)
     uint64_t begin = hapi_effect_begin(tick);
     hapi_proxy_begin(tick);
     hapi_proxy_free(tick);
+    hapi_pointers_brake(tick);
     hapi_effect_end(tick, HAP_EFFECT_PROXY, begin);
   } else {
     hapi_pointers_direct(tick);

@@ -238,6 +238,25 @@ static bool may_close(const hapi_tick *tick, const hapi_local_contact *c,
   return !leaves && at->depth + at->pointer->reach + tick->period * comes + RIGID_SLACK > 0.0;
 }
 
+/* Not in line, and with what friction asks for alone: where nothing rubs, what was placed stays in registers. */
+static __attribute__((noinline, cold)) void rub(hapi_tick *tick, uint32_t index,
+                                                hapi_tick_pointer *pointer, hapi_local_body *body,
+                                                double depth)
+{
+  const hapi_local_contact *c = &tick->contacts[index];
+  const hapi_placed_pointer at = {.pointer = pointer,
+                                  .body = body,
+                                  .normal = c->normal_now,
+                                  .point = c->point_now,
+                                  .depth = depth};
+  bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
+  if (pushes && (pointer->rigid || depth > 0.0)) {
+    uint64_t begin = hapi_effect_begin(tick);
+    hapi_pointer_friction_rows(tick, index, &at);
+    hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
+  }
+}
+
 static void take_contact(hapi_tick *tick, uint32_t index)
 {
   hapi_local_contact *c = &tick->contacts[index];
@@ -280,11 +299,8 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   } else {
     push_static(c, &at, speed);
   }
-  bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
-  if (HAPI_HAS_FRICTION && c->rubs && pushes && (p->rigid || at.depth > 0.0)) {
-    uint64_t begin = hapi_effect_begin(tick);
-    hapi_pointer_friction_rows(tick, index, &at);
-    hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);
+  if (HAPI_HAS_FRICTION && c->rubs) {
+    rub(tick, index, at.pointer, at.body, at.depth);
   }
 }
 
@@ -311,7 +327,7 @@ static void add_brake(hapi_tick *tick, const hapi_tick_pointer *p, const double 
 }
 
 /* A god-object that has been let go would leap to the device. One that is held needs none. */
-static void brake(hapi_tick *tick)
+void hapi_pointers_brake(hapi_tick *tick)
 {
   for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     const hapi_tick_pointer *p = &tick->pointers[i];
@@ -343,9 +359,6 @@ void hapi_pointers_direct(hapi_tick *tick)
 void hapi_pointer_rows(hapi_tick *tick)
 {
   hapi_tool_place(tick);
-  if (HAPI_HAS_PROXY && tick->proxies) {
-    brake(tick);
-  }
   for (uint32_t i = 0; i < tick->contact_count; ++i) {
     take_contact(tick, i);
   }

@@ -488,6 +488,7 @@ void hapi_proxy_none(hapi_tick *tick);                        /* other models: a
 void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
 void hapi_proxy_push_out(hapi_tick *tick); /* rigid ones: moved by the velocities as they are now */
 void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
+void hapi_pointers_brake(hapi_tick *tick); /* rows of god-objects that have been let go */
 void hapi_pointers_direct(hapi_tick *tick); /* instead of proxy_begin where there can be none */
 void hapi_pointer_rows(hapi_tick *tick);    /* pointer contacts -> rows */
 void hapi_pointer_forces(hapi_tick *tick);  /* rows -> wrenches */
