@@ -284,8 +284,8 @@ typedef struct hapi_model {
   double period_s; /* H, of the next step */
   hap_model model;
   hap_impulse_pose impulse_pose;
-  uint32_t wishes;     /* of the effects, base/wishes.h */
-  uint32_t max_sweeps; /* of hapi_solver */
+  uint32_t wishes;        /* of the effects, base/wishes.h */
+  uint32_t max_sweeps;    /* of hapi_solver */
   uint32_t row_updates;   /* its update_budget; 0: as it was */
   int64_t tick_budget_ns; /* ticks that take longer are counted; 0: none are */
   uint32_t
