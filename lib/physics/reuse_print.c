@@ -362,6 +362,8 @@ bool hapi_print_island(hapi_physics *physics, hapi_reuse_book *book, uint32_t is
   }
   of->count = book->count - of->first;
   of->touch_count = book->touch_count - of->first_touch;
-  sort_touches(book->touches + of->first_touch, of->touch_count);
+  if (of->touch_count > 0) { /* else there may be none at all yet, nor a place for them */
+    sort_touches(book->touches + of->first_touch, of->touch_count);
+  }
   return p.good;
 }
