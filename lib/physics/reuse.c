@@ -213,6 +213,17 @@ static void list_pushed(hapi_physics *physics, hapi_reuse_book *book, bool bodie
   }
 }
 
+/* Without any touch there may be no list either. */
+static bool touches_stay(const hapi_reuse_book *book, const hapi_reuse_island *island,
+                         const hapi_print_place *place, double slack)
+{
+  if (island->touch_count == 0 || place->touch_count == 0) {
+    return island->touch_count == place->touch_count;
+  }
+  return touches_are_same(book->touches + island->first_touch, island->touch_count,
+                          book->old_touches + place->first_touch, place->touch_count, slack);
+}
+
 static hapi_reuse_kind kind_of(hapi_physics *physics, const hapi_reuse_book *book,
                                const hapi_reuse_island *island)
 {
@@ -223,9 +234,7 @@ static hapi_reuse_kind kind_of(hapi_physics *physics, const hapi_reuse_book *boo
   }
   compare(book->items + island->first, book->old + place->first, place->count, way);
   if (way[0] > physics->dial.settings.reuse ||
-      !touches_are_same(book->touches + island->first_touch, island->touch_count,
-                        book->old_touches + place->first_touch, place->touch_count,
-                        physics->dial.settings.reuse)) {
+      !touches_stay(book, island, place, physics->dial.settings.reuse)) {
     return HAPI_REUSE_NONE;
   }
   bool all = way[1] <= SHARE_OF_B * physics->dial.settings.reuse && !island->has_joints;
