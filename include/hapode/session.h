@@ -125,7 +125,7 @@ typedef struct hap_session_def {
                                          the model cannot fulfil is an error */
   double accuracy; /* 0..1, default HAP_ACCURACY_DEFAULT (hapode/accuracy.h): what the settings
                       that are HAP_BY_ACCURACY come to. They change at its
-                      twentieths and tenths (docs/accuracy.md) */
+                      tenths (docs/accuracy.md) */
   double
       force_error_wanted; /* 0.001..1, of the force: the dial goes to the least accuracy with which
                                 looking back tells no more. 0 (default): it stays at accuracy. Needs

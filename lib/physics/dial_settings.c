@@ -21,10 +21,9 @@ typedef struct tick_row {
  * carry each other, a plane instead of a shape where they roll: the last resort of a budget. */
 static const tick_row tick_rows[] = {
     {0, 50.0, 300, 1, false},
-    {5, 50.0, 300, 4, true},
-    {10, 100.0, 600, HAP_RANGE_ALL, true},
-    {20, 100.0, 1250, HAP_RANGE_ALL, true},
-    {30, 100.0, 2500, HAP_RANGE_ALL, true},
+    {10, 50.0, 300, 4, true},
+    {20, 100.0, 600, HAP_RANGE_ALL, true},
+    {30, 100.0, 1250, HAP_RANGE_ALL, true},
     {40, 200.0, 2500, HAP_RANGE_ALL, true},
     {50, 200.0, 20000, HAP_RANGE_ALL, true},
     {70, 333.0, 20000, HAP_RANGE_ALL, true},
