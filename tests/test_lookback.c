@@ -383,6 +383,23 @@ TEST(a_hull_may_touch_a_mesh_and_nothing_else)
   }
 }
 
+/* What is near is near the pointer's surface: its middle may be far off. */
+TEST(a_pointer_of_metres_is_near_what_it_touches)
+{
+  contact_world w;
+  begin(&w, HAP_MODEL_CONTACT, 60.0, 0.1);
+  w.hand_def.radius = 2.0;
+  w.hand_velocity[0] = 0.0;
+  w.hand_velocity[2] = -0.01;
+  CHECK(cw_start(&w, 0.0, 0.0, EDGE + 2.0 + 1e-4));
+  cw_run(&w, TICKS / 2);
+  hap_stats stats = cw_stats(&w);
+  cw_close(&w);
+  printf("# force error %.5f\n", stats.force_error);
+  CHECK(stats.lookbacks > 0 && stats.lookbacks_spoilt == 0);
+  CHECK(stats.force_error > 0.0 && stats.force_error < 0.02);
+}
+
 /* ---- windows that cannot be gone over ---- */
 
 TEST(a_body_that_the_application_moves_spoils_the_window)
@@ -490,6 +507,7 @@ int main(void)
   RUN(a_slow_loop_is_held_against_a_fast_one);
   RUN(changes_no_bit_of_hulls_and_friction);
   RUN(a_hull_may_touch_a_mesh_and_nothing_else);
+  RUN(a_pointer_of_metres_is_near_what_it_touches);
   RUN(a_body_that_the_application_moves_spoils_the_window);
   RUN(bodies_and_geoms_that_go_away_meanwhile);
   RUN(a_change_of_model_ends_the_window);

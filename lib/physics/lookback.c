@@ -239,7 +239,7 @@ static bool add_body(hapi_physics *physics, uint32_t known)
   return true;
 }
 
-/* m, from the nearest pointer to the body's surface */
+/* m, from the nearest pointer's surface to the body's */
 static double apart(const hapi_physics *physics, const hapi_known_body *known)
 {
   const hapi_state_pointer *pointers = hapi_state_pointers(physics->state);
@@ -248,7 +248,7 @@ static double apart(const hapi_physics *physics, const hapi_known_body *known)
     if (pointers[i].generation != 0) {
       double d[3];
       hapi_v3_sub(dBodyGetPosition(known->body), pointers[i].pose.position, d);
-      least = fmin(least, hapi_v3_norm(d) - known->extent);
+      least = fmin(least, hapi_v3_norm(d) - pointers[i].extent - known->extent);
     }
   }
   return least;
