@@ -8,10 +8,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "bench/stability_table.h"
 
 #define SECONDS 5.0
+#define SPEAK_S 60.0    /* between two lines about how far it is */
 #define MIDDLE_MASS 0.1 /* kg, of the map over contacts */
 #define MIDDLE_CONTACTS 8
 #define QUANTUM 3e-5     /* m, an encoder */
@@ -68,18 +70,33 @@ static hap_status feel(bench *b, const stability_table *table, stability_row *ro
   return stability_feel(b, &row->point, &row->felt);
 }
 
+static void say_how_far(stability_table *table)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  double seconds = (double)now.tv_sec;
+  if (table->spoken == 0.0) {
+    table->spoken = seconds;
+  } else if (seconds - table->spoken >= SPEAK_S) {
+    fprintf(stderr, "stability: %zu of %zu points\n", table->count, table->planned);
+    table->spoken = seconds;
+  }
+}
+
 static hap_status add_point(bench *b, stability_table *table, const char *name,
                             const stability_point *point)
 {
   stability_row row = {.integrator = name, .point = *point};
-  if (table->count == STABILITY_ROWS_MAX) {
+  if (table->planned > STABILITY_ROWS_MAX) {
     return bench_fail(b, HAP_ERROR_CAPACITY, "more points than the table has room for");
   }
   bool takes = false;
   hap_status status = stability_filter(b, &row, &takes);
-  if (status < HAP_OK || !takes) {
+  if (status < HAP_OK || !takes || table->planning) {
+    table->planned += takes && table->planning;
     return status;
   }
+  say_how_far(table);
   status = stability_run(b, point, SECONDS, &row.result);
   if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
     status = feel(b, table, &row);
@@ -305,9 +322,10 @@ static hap_status measure(bench *b, stability_table *table)
 
 static hap_status check_points(bench *b, const stability_table *table)
 {
-  return table->count > 0 ? HAP_OK
-                          : bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
-                                       b->only != NULL ? b->only : "");
+  return table->planned > 0
+             ? HAP_OK
+             : bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
+                          b->only != NULL ? b->only : "");
 }
 
 hap_status bench_stability(bench *b)
@@ -316,9 +334,14 @@ hap_status bench_stability(bench *b)
   if (table == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
   }
+  table->planning = true;
   hap_status status = measure(b, table);
+  table->planning = false;
   if (status >= HAP_OK) {
     status = check_points(b, table);
+  }
+  if (status >= HAP_OK) {
+    status = measure(b, table);
   }
   if (status >= HAP_OK) {
     status = write_table(b, table);

@@ -18,6 +18,9 @@ typedef struct stability_row {
 typedef struct stability_table {
   stability_row rows[STABILITY_ROWS_MAX];
   size_t count;
+  size_t planned; /* points that --only takes */
+  bool planning;  /* they are counted, not measured */
+  double spoken;  /* s, of the newest line about how far it is */
 } stability_table;
 
 /* ---- stability_filter.c ---- */
