@@ -27,6 +27,7 @@
 typedef struct accuracy_scene {
   const char *name;      /* in the table of results */
   const char *base;      /* in the table of the scenes */
+  int count;             /* N of the scene; 0: its own */
   const char *recording; /* file of HAPODE_SHARED/data that moves the hand; NULL: the scene's own */
   double seconds;        /* of the window; 0: the scene's own */
   double seconds_quick;  /* 0: the same */
@@ -129,6 +130,9 @@ double accuracy_hand_speed(const accuracy_motion *m); /* m/s, the largest */
 double accuracy_rest_share(const accuracy_motion *m);
 
 /* ---- accuracy_plan.c ---- */
+
+/* As in the table of the scenes, which has its base. */
+scene_parameters accuracy_parameters(const accuracy_scene *which);
 
 /* Knobs whose name says it all; their value is 0. */
 #define ACCURACY_DEFAULT "default"

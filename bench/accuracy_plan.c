@@ -422,6 +422,13 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
 
 /* ---- what it takes ---- */
 
+scene_parameters accuracy_parameters(const accuracy_scene *which)
+{
+  scene_parameters p = *cycles_scene(which->base);
+  p.count_default = which->count > 0 ? which->count : p.count_default;
+  return p;
+}
+
 /* Rows of a step grow with the bodies. */
 static double step_cost(const scene_parameters *p, int its)
 {
@@ -458,7 +465,8 @@ double accuracy_point_cost(const accuracy_plan *plan, const accuracy_group *grou
                            const accuracy_point *point)
 {
   size_t used[ACCURACY_STARTS_MAX];
-  const scene_parameters *p = cycles_scene(group->scene->base);
+  const scene_parameters parameters = accuracy_parameters(group->scene);
+  const scene_parameters *p = &parameters;
   size_t all = accuracy_starts(group->scene, plan->quick, used);
   double slower = group->hand_speed > 0.0 ? SCENE_SPEED / group->hand_speed : 1.0;
   double seconds = slower * accuracy_seconds(group->scene, plan->quick);

@@ -15,6 +15,9 @@
   ",scale=0.15,rotate=0.8991/-0.018/-0.4357/-0.0371,offset=0.005/-0.0342/-0.036,start=1.5"
 
 static const accuracy_scene scenes[] = {
+    {.name = "fig5", .base = "fig5", .bound = 0.005, .rests = true},
+    {.name = "fig6", .base = "fig6", .bound = 0.005},
+    {.name = "fig7", .base = "fig7", .bound = 0.02, .starts_quick = 3},
     {.name = "slide", .base = "slide", .bound = 0.005, .speeds = true},
     {.name = "row10", .base = "row10", .bound = 0.01, .starts_quick = 3, .speeds = true},
     {.name = "wedge", .base = "wedge", .bound = 0.005},
@@ -45,6 +48,8 @@ static const accuracy_scene scenes[] = {
      .seconds = 3,
      .bound = 0.03,
      .starts_quick = 3},
+    {.name = "field", .base = "field", .bound = 0.005, .starts_quick = 3},
+    {.name = "pile8", .base = "pile", .count = 8, .bound = 0.05, .starts_quick = 2},
 };
 
 const accuracy_scene *accuracy_scene_at(size_t index)

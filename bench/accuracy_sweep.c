@@ -337,7 +337,7 @@ static hap_status begin_sweep(bench *b, const accuracy_plan *plan, const accurac
   memset(s, 0, sizeof *s);
   s->bench = b;
   s->group = group;
-  s->parameters = *cycles_scene(which->base); /* the plan has looked */
+  s->parameters = accuracy_parameters(which); /* the plan has looked */
   s->seconds = accuracy_seconds(which, plan->quick);
   s->start_count = accuracy_starts(which, plan->quick, s->start);
   hap_status status = set_hands(s, 1.0);
