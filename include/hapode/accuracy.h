@@ -55,7 +55,8 @@ typedef struct hap_accuracy_info {
   int32_t edge_probes;  /* a physics step */
   int32_t iterations;   /* of QuickStep, in the newest physics step */
   uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where the effect shape is auto */
-  uint32_t row_updates; /* the most a solve of a tick may make */
+  uint32_t row_updates; /* the most a solve of a tick may make; with a pointer of coupling GOD_OBJECT or VIRTUAL
+                           twice as many, as far as the period has time for them */
   double reuse;         /* m */
 } hap_accuracy_info;
 
