@@ -70,6 +70,27 @@ TEST(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out)
   CHECK(parse("--model accelerance --physics-share 0.1") == HAP_OK);
 }
 
+TEST(single_settings_stay_when_they_are_given)
+{
+  const hap_session_def *def = &options.rig.def;
+  CHECK(parse("--seconds 1") == HAP_OK && def->iterations == HAP_BY_ACCURACY);
+  CHECK(def->max_sweeps == HAP_BY_ACCURACY && def->range_hops == HAP_BY_ACCURACY);
+  CHECK(def->max_edge_probes == HAP_BY_ACCURACY);
+  CHECK(parse("--iterations 500 --sweeps 4 --range 0 --edge-probes 7") == HAP_OK);
+  CHECK(def->iterations == 500 && def->max_sweeps == 4);
+  CHECK(def->range_hops == 0 && def->max_edge_probes == 7);
+  CHECK(parse("--iterations world --range all --edge-probes 0") == HAP_OK);
+  CHECK(def->iterations == 0 && def->range_hops == HAP_RANGE_ALL && def->max_edge_probes == 0);
+  CHECK(refused("--iterations 0", "--iterations", "1 to 10000"));
+  CHECK(refused("--iterations worlds", "--iterations", "1 to 10000"));
+  CHECK(refused("--sweeps 1", "--sweeps", "2 to 10000"));
+  CHECK(refused("--sweeps 2.5", "--sweeps", "whole number"));
+  CHECK(refused("--range -1", "--range", "0 to 1024"));
+  CHECK(refused("--range nan", "--range", "0 to 1024"));
+  CHECK(refused("--edge-probes 1e3x", "--edge-probes", "0 to 1024"));
+  CHECK(refused("--edge-probes 1025", "--edge-probes", "0 to 1024"));
+}
+
 /* Each line of the help begins an option, or goes on below its text. */
 TEST(the_help_is_indented)
 {
@@ -102,7 +123,8 @@ TEST(the_summary_says_what_accuracy_comes_to)
                             .probe = HAP_PROBE_OPERATING,
                             .edge_probes = 3,
                             .iterations = 20,
-                            .reuse = 1e-6};
+                            .reuse = 1e-6,
+                            .row_updates = 300};
   FILE *summary = tmpfile();
   REQUIRE(summary != NULL);
   run_summary_accuracy(&info, summary);
@@ -114,7 +136,8 @@ TEST(the_summary_says_what_accuracy_comes_to)
                "load_tick: 0.3 of 0.2, turned 4 times\n"
                "accuracy_physics: 0.6 (as much as fits)\n"
                "accuracy_settings: contact_hz=100,max_sweeps=2,range_hops=4,shapes=0,"
-               "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06\n") == 0);
+               "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06,"
+               "row_updates=300\n") == 0);
 }
 
 int main(void)
@@ -123,6 +146,7 @@ int main(void)
   RUN(the_reference_has_no_error);
   RUN(a_budget_needs_a_clock);
   RUN(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out);
+  RUN(single_settings_stay_when_they_are_given);
   RUN(the_help_is_indented);
   RUN(the_summary_says_what_accuracy_comes_to);
   return tap_done();

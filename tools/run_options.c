@@ -47,6 +47,34 @@ static hap_status take_number(run_options *options, const option *self, const ch
   return HAP_OK;
 }
 
+static hap_status take_count(run_options *options, const option *self, const char *value,
+                             hap_detail *detail)
+{
+  char *end = NULL;
+  double number = strtod(value, &end);
+  if (end == value || *end != '\0' || !(number >= self->low && number <= self->high) ||
+      number != floor(number)) {
+    return fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
+                self->high);
+  }
+  *(int32_t *)((void *)((char *)options + self->offset)) = (int32_t)number;
+  return HAP_OK;
+}
+
+static hap_status take_iterations(run_options *options, const option *self, const char *value,
+                                  hap_detail *detail)
+{
+  options->rig.def.iterations = 0; /* as many as the world has */
+  return strcmp(value, "world") == 0 ? HAP_OK : take_count(options, self, value, detail);
+}
+
+static hap_status take_range(run_options *options, const option *self, const char *value,
+                             hap_detail *detail)
+{
+  options->rig.def.range_hops = HAP_RANGE_ALL;
+  return strcmp(value, "all") == 0 ? HAP_OK : take_count(options, self, value, detail);
+}
+
 static hap_status take_text(run_options *options, const option *self, const char *value,
                             hap_detail *detail)
 {
@@ -273,8 +301,26 @@ static const option table[] = {
      offsetof(run_options, rig.def.physics_hz), 1, 1000},
     {"--haptic-hz", "F", "ticks of the haptic loop a second, 100 to 20000 (default 1000)",
      take_number, offsetof(run_options, rig.def.haptic_hz), 100, 20000},
-    {"--contact-hz", "F", "model contact: contact passes a second, 20 to 1000 (default 200)",
+    {"--contact-hz", "F",
+     "model contact: contact passes a second, 20 to 1000 (default: as --accuracy says,\n"
+     "200 at 0.5)",
      take_number, offsetof(run_options, rig.def.contact_hz), 20, 1000},
+    {"--iterations", "N|world",
+     "of QuickStep, 1 to 10000, or as many as the scene has whatever --accuracy says\n"
+     "(default: these at 0.5)",
+     take_iterations, offsetof(run_options, rig.def.iterations), 1, 10000},
+    {"--sweeps", "N",
+     "model contact: over all rows, in each solve of a tick, 2 to 10000; 2: no direct\n"
+     "solve (default: until it is solved, or the tick has no more time)",
+     take_count, offsetof(run_options, rig.def.max_sweeps), 2, 10000},
+    {"--range", "N|all",
+     "model contact: bodies of the loop, so many contacts from the neighbours, 0 to\n"
+     "1024, or all that hang together (default: all, from --accuracy 0.2 on)",
+     take_range, offsetof(run_options, rig.def.range_hops), 0, 1024},
+    {"--edge-probes", "N",
+     "model contact: bodies at the border of that range that are probed in a step of\n"
+     "physics, 0 to 1024 (default: as --accuracy says, 4 at 0.5)",
+     take_count, offsetof(run_options, rig.def.max_edge_probes), 0, 1024},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
     {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_lockstep, 0, 0, 0},
@@ -288,7 +334,8 @@ static const option table[] = {
      take_probe, 0, 0, 0},
     {"--reuse", "M",
      "what testing simulations found is used again while nothing has moved by more, in\n"
-     "metres, 0 to 0.01 (default 1e-6); 0: each step measures anew",
+     "metres, 0 to 0.01 (default: as --accuracy says, 1e-6 at 0.5); 0: each step\n"
+     "measures anew",
      take_number, offsetof(run_options, rig.def.reuse), 0, 0.01},
     {"--lookback", "SHARE",
      "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
