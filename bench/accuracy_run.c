@@ -61,7 +61,6 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   parameters.iterations = def->iterations > 0 ? def->iterations : parameters.iterations;
   rig_options_init(&options);
   options.parameters = &parameters;
-  options.count = parameters.count_default;
   options.max_force = UNLIMITED_N;
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);

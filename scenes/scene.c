@@ -219,11 +219,13 @@ hap_status scene_create_from(const scene_parameters *parameters, int count, scen
                 parameters->name, bad);
   }
   const int count_max = row->parameters.count_default > 0 ? SCENE_COUNT_MAX : 0;
-  if (count < 0 || count > count_max) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s': N is 0 .. %d, not %d; there are: %s",
-                parameters->name, count_max, count, list_scenes(all, sizeof all));
+  const int count_min = count_max > 0 ? 1 : 0;
+  const int wanted = count != 0 ? count : parameters->count_default;
+  if (wanted < count_min || wanted > count_max) {
+    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s': N is %d .. %d, not %d; there are: %s",
+                parameters->name, count_min, count_max, wanted, list_scenes(all, sizeof all));
   }
-  return build(row, parameters, count > 0 ? count : row->parameters.count_default, out, detail);
+  return build(row, parameters, wanted, out, detail);
 }
 
 hap_status scene_create(const char *spec, scene **out, hap_detail *detail)

@@ -726,6 +726,28 @@ static void check_refused(scene_parameters p, int count)
   CHECK(detail.text[0] != '\0');
 }
 
+TEST(a_copied_row_may_have_an_n_of_its_own)
+{
+  REQUIRE(row_of("slide") != NULL && row_of("fig7") != NULL);
+  scene_parameters p = *row_of("fig7");
+  scene *s = NULL;
+  p.count_default = 3;
+  REQUIRE(scene_create_from(&p, 0, &s, NULL) == HAP_OK);
+  CHECK(s->count == 3 && s->body_count == 3);
+  scene_destroy(s);
+  REQUIRE(scene_create_from(&p, 4, &s, NULL) == HAP_OK);
+  CHECK(s->count == 4 && s->body_count == 4);
+  scene_destroy(s);
+  for (p.count_default = -1; p.count_default < 1; ++p.count_default) {
+    check_refused(p, 0);
+  }
+  p.count_default = 1000000;
+  check_refused(p, 0);
+  p = *row_of("slide");
+  p.count_default = 2;
+  check_refused(p, 0);
+}
+
 TEST(bad_parameters_are_refused)
 {
   REQUIRE(row_of("slide") != NULL && row_of("fig7") != NULL);
@@ -879,6 +901,7 @@ static void run_all(void)
   RUN(bad_specs_are_refused_with_a_list);
   RUN(long_names_do_not_cut_the_list);
   RUN(edited_parameters_are_used);
+  RUN(a_copied_row_may_have_an_n_of_its_own);
   RUN(bad_parameters_are_refused);
   RUN(shift_moves_what_can_move);
   RUN(infinite_friction_stays_finite);
