@@ -277,7 +277,7 @@ TEST(it_tells_so_from_the_start)
   REQUIRE(start_row(&w));
   hap_accuracy_info info = accuracy_of(&w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
-  CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_UNTOLD);
   CHECK(info.max_sweeps == 0 && info.row_updates == 300 && info.contact_hz == 50.0);
   cw_close(&w);
 }
@@ -418,6 +418,29 @@ static hap_accuracy_info look_for_error(double from, double wanted)
   }
   cw_close(&w);
   return info;
+}
+
+/* What is not touched, and what spoils every window, has no error. */
+TEST(it_says_when_no_error_has_been_told)
+{
+  contact_world w;
+  open_row(&w, 2);
+  w.def.lookback = 0.1;
+  w.def.force_error_wanted = 0.02;
+  REQUIRE(start_row(&w));
+  for (int i = 0; i < 1000; ++i) { /* away, and back as far */
+    cw_move_hand(&w, i < 500 ? -0.1 : 0.1, 0.0, 0.0);
+    cw_tick(&w);
+  }
+  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_UNTOLD);
+  CHECK(accuracy_of(&w).physics.reason == HAP_ACCURACY_UNTOLD && accuracy_of(&w).accuracy == 0.5);
+  stroke(&w, 1000);
+  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(accuracy_of(&w).physics.reason == HAP_ACCURACY_ERROR);
+  CHECK(hap_session_set_force_error(w.session, 0.0) == HAP_OK);
+  cw_run(&w, 600);
+  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_ASKED);
+  cw_close(&w);
 }
 
 TEST(a_wanted_error_is_looked_for)
@@ -606,6 +629,7 @@ int main(void)
   RUN(the_worlds_iterations_are_the_applications);
   RUN(it_is_turned_while_the_session_runs);
   RUN(a_shape_that_is_asked_for_stays);
+  RUN(it_says_when_no_error_has_been_told);
   RUN(a_wanted_error_is_looked_for);
   RUN(without_a_wanted_error_it_goes_back);
   RUN(a_budget_turns_the_tick_back);

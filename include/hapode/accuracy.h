@@ -20,12 +20,14 @@ HAP_BEGIN_DECLS
  * to turn in model CONTACT alone. */
 #define HAP_ACCURACY_DEFAULT 0.5
 
-/* Why a dial stands where it does. Values are fixed. */
+/* Why a dial stands where it does. UNTOLD: nothing was touched so far, or looking back comes to no end
+ * (hap_stats.lookbacks_spoilt). Values are fixed. */
 typedef enum hap_accuracy_reason {
   HAP_ACCURACY_ASKED = 0,  /* at hap_session_def.accuracy */
   HAP_ACCURACY_ERROR = 1,  /* as force_error_wanted calls for */
   HAP_ACCURACY_BUDGET = 2, /* as much as fits into the share of time */
-  HAP_ACCURACY_LEAST = 3   /* at 0, and it does not fit: the share is too small for the scene */
+  HAP_ACCURACY_LEAST = 3,  /* at 0, and it does not fit: the share is too small for the scene */
+  HAP_ACCURACY_UNTOLD = 4  /* as ASKED: an error is wanted, and none has been told yet */
 } hap_accuracy_reason;
 
 /* A side of the session: the haptic thread's ticks, or the physics thread's cycles. load is what the budget
@@ -55,8 +57,8 @@ typedef struct hap_accuracy_info {
   int32_t edge_probes;  /* a physics step */
   int32_t iterations;   /* of QuickStep, in the newest physics step */
   uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where the effect shape is auto */
-  uint32_t row_updates; /* the most a solve of a tick may make; with a pointer of coupling GOD_OBJECT or VIRTUAL
-                           twice as many, as far as the period has time for them */
+  uint32_t row_updates; /* the most a solve of a tick may make; twice as many, where there is time,
+                           with a pointer of coupling GOD_OBJECT or VIRTUAL */
   double reuse;         /* m */
 } hap_accuracy_info;
 

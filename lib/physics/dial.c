@@ -106,7 +106,8 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
 {
   hapi_dial *dial = &physics->dial;
   double wanted = atomic_load(&dial->force_error);
-  if (!(wanted > 0.0) || hapi_tape_plays(physics->tape)) {
+  dial->told = wanted > 0.0;
+  if (!dial->told || hapi_tape_plays(physics->tape)) {
     return;
   }
   if (dial->settles) {
@@ -141,7 +142,9 @@ static uint32_t reason_of(const hapi_physics *physics, const hapi_dial_side *sid
   if (side->percent < dial->aim) {
     return HAP_ACCURACY_BUDGET;
   }
-  return dial->error_in_force > 0.0 ? HAP_ACCURACY_ERROR : HAP_ACCURACY_ASKED;
+  return dial->error_in_force == 0.0 ? HAP_ACCURACY_ASKED
+         : dial->told                ? HAP_ACCURACY_ERROR
+                                     : HAP_ACCURACY_UNTOLD;
 }
 
 static void tell(hapi_physics *physics)
@@ -179,7 +182,7 @@ void hapi_dial_reset(hapi_physics *physics)
   dial->asked = dial->aim = percent;
   dial->error_turn = (hapi_turn){0.0};
   dial->error_in_force = atomic_load(&dial->force_error);
-  dial->settles = false;
+  dial->settles = dial->told = false;
   dial->ticks_seen = dial->over_seen = 0;
   dial->ns_seen = dial->looked_s = dial->rest_s = 0.0;
   for (int i = 0; i < HAPI_DIALS; ++i) {

@@ -42,6 +42,7 @@ typedef struct hapi_dial {
   double error_in_force;
   hapi_turn error_turn;
   bool settles; /* since the last turn for it */
+  bool told;    /* an error, since one is wanted */
   hapi_dial_side sides[HAPI_DIALS];
   uint64_t ticks_seen; /* of the loop's figures */
   uint64_t over_seen;

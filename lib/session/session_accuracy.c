@@ -18,6 +18,7 @@ const char *hap_accuracy_reason_text(hap_accuracy_reason reason)
       [HAP_ACCURACY_ASKED] = "asked for",
       [HAP_ACCURACY_ERROR] = "for the error that is wanted",
       [HAP_ACCURACY_BUDGET] = "as much as fits",
+      [HAP_ACCURACY_UNTOLD] = "no error has been told yet",
       [HAP_ACCURACY_LEAST] = "the least there is, and it does not fit",
   };
   size_t index = (size_t)reason;
