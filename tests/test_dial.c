@@ -107,16 +107,6 @@ TEST(no_solve_is_longer_than_a_tick)
   hapi_dial_settings(&by_accuracy, 100, 100, 1e-3, &slow);
   hapi_dial_settings(&by_accuracy, 100, 100, 1e-4, &fast);
   CHECK(fast.row_updates < slow.row_updates && fast.row_updates > 1000);
-  CHECK(fast.rigid_updates == fast.row_updates);
-}
-
-TEST(rigid_pointers_have_twice_the_updates)
-{
-  for (int percent = 0; percent <= 100; ++percent) {
-    hapi_settings s;
-    hapi_dial_settings(&by_accuracy, percent, percent, 1e-3, &s);
-    CHECK(s.rigid_updates == 2 * s.row_updates);
-  }
 }
 
 /* ---- turning ---- */
@@ -618,7 +608,6 @@ int main(void)
   RUN(a_side_has_its_own_settings);
   RUN(what_was_given_stays);
   RUN(no_solve_is_longer_than_a_tick);
-  RUN(rigid_pointers_have_twice_the_updates);
   RUN(a_load_that_is_too_much_turns_at_once);
   RUN(a_long_way_down_is_not_held_against_it);
   RUN(a_dial_does_not_go_to_and_fro);

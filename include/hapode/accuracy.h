@@ -57,8 +57,7 @@ typedef struct hap_accuracy_info {
   int32_t edge_probes;  /* a physics step */
   int32_t iterations;   /* of QuickStep, in the newest physics step */
   uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where the effect shape is auto */
-  uint32_t row_updates; /* the most a solve of a tick may make; twice as many, where there is time,
-                           with a pointer of coupling GOD_OBJECT or VIRTUAL */
+  uint32_t row_updates; /* the most a solve of a tick may make */
   double reuse;         /* m */
 } hap_accuracy_info;
 

@@ -25,7 +25,7 @@ static const tick_row tick_rows[] = {
     {20, 100.0, 600, HAP_RANGE_ALL, true},
     {30, 100.0, 1250, HAP_RANGE_ALL, true},
     {40, 200.0, 2500, HAP_RANGE_ALL, true},
-    {50, 200.0, 10000, HAP_RANGE_ALL, true},
+    {50, 200.0, 20000, HAP_RANGE_ALL, true},
     {70, 333.0, 20000, HAP_RANGE_ALL, true},
     {80, 500.0, 20000, HAP_RANGE_ALL, true},
     {100, 1000.0, 20000, HAP_RANGE_ALL, true},
@@ -52,9 +52,6 @@ static const physics_row physics_rows[] = {
  * rows alone; where it is slower still, a budget turns the dial. */
 #define UPDATE_S 12e-9
 #define TICK_SHARE 0.8
-
-/* What is rigid does not give way to what a solve leaves undone: it shows as depth and as energy. */
-#define RIGID_TIMES 2u
 
 static const tick_row *tick_row_of(int percent)
 {
@@ -89,7 +86,6 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   out->contact_hz = knobs->contact_hz > 0.0 ? knobs->contact_hz : tick->contact_hz;
   out->max_sweeps = knobs->max_sweeps > 0 ? (uint32_t)knobs->max_sweeps : 0;
   out->row_updates = updates_within(tick->row_updates, period_s);
-  out->rigid_updates = updates_within(RIGID_TIMES * tick->row_updates, period_s);
   out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
   out->shapes = tick->shapes;
   out->probe = knobs->probe != HAP_PROBE_BY_ACCURACY ? knobs->probe : physics->probe;

@@ -28,9 +28,8 @@ typedef struct hapi_knobs {
 typedef struct hapi_settings {
   double contact_hz;
   hap_probe probe;
-  uint32_t max_sweeps;    /* 0: until it is solved */
-  uint32_t row_updates;   /* the most, in a solve of a tick */
-  uint32_t rigid_updates; /* of one with a rigid pointer in it: god-object or virtual tool */
+  uint32_t max_sweeps;  /* 0: until it is solved */
+  uint32_t row_updates; /* the most, in a solve of a tick */
   int32_t range_hops;
   uint32_t edge_probes;
   double iterations; /* times those of the world; 0: fixed_iterations */

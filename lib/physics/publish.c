@@ -204,7 +204,6 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->wishes = physics->wishes;
   out->max_sweeps = physics->dial.settings.max_sweeps;
   out->row_updates = physics->dial.settings.row_updates;
-  out->rigid_updates = physics->dial.settings.rigid_updates;
   out->tick_budget_ns = hapi_dial_tick_budget(physics);
   out->body_count = 0;
   out->contact_count = 0;

@@ -287,7 +287,6 @@ typedef struct hapi_model {
   uint32_t wishes;        /* of the effects, base/wishes.h */
   uint32_t max_sweeps;    /* of hapi_solver */
   uint32_t row_updates;   /* its update_budget; 0: as it was */
-  uint32_t rigid_updates; /* the same where a pointer is rigid; not 0 where that is not */
   int64_t tick_budget_ns; /* ticks that take longer are counted; 0: none are */
   uint32_t
       touches; /* pairs of a pointer and a geom that are near, also those whose points come later */

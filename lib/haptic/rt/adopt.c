@@ -275,12 +275,6 @@ static bool may_be_proxy(const hapi_tick_pointer *p, uint32_t wishes)
           (p->coupling != HAP_COUPLING_AUTO && p->coupling != HAP_COUPLING_DIRECT));
 }
 
-static bool is_rigid(const hapi_tick_pointer *p)
-{
-  return p->generation != 0 &&
-         (p->coupling == HAP_COUPLING_GOD_OBJECT || p->coupling == HAP_COUPLING_VIRTUAL);
-}
-
 /* What the model says of the effects. Before the contacts are taken. */
 static void adopt_effects(hapi_tick *tick, hapi_model *model)
 {
@@ -288,6 +282,9 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
   bool observed = tick->guard.observes;
   tick->wishes = model->wishes;
   tick->world.solver.max_sweeps = model->max_sweeps;
+  if (model->row_updates > 0) {
+    tick->world.solver.update_budget = model->row_updates;
+  }
   tick->bounces = HAPI_HAS_RESTITUTION &&
                   (model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION));
   tick->guard.observes = observes(tick, model);
@@ -295,20 +292,15 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
     hapi_energy_resume(tick);
   }
   bool proxies = false;
-  bool rigid = false;
   for (uint32_t i = 0; i < tick->pointer_high; ++i) {
     bool any = false;
     for (uint32_t k = 0; k < model->contact_count && !any; ++k) {
       any = contacts[k].pointer == i && rubs(tick, contacts[k].mu);
     }
     proxies = proxies || may_be_proxy(&tick->pointers[i], model->wishes);
-    rigid = rigid || is_rigid(&tick->pointers[i]);
     hapi_tick_feel(&tick->pointers[i], hapi_wish(model->wishes, HAP_EFFECT_TORQUE), any);
   }
   tick->proxies = HAPI_HAS_PROXY && proxies;
-  if (model->row_updates > 0) {
-    tick->world.solver.update_budget = rigid ? model->rigid_updates : model->row_updates;
-  }
 }
 
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)

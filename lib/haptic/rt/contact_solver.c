@@ -12,6 +12,13 @@
 #define DEAR_RUNS 32u
 #define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
 
+/* After so many runs in vain direct solves rest. With 8000 row updates for sweeps meanwhile a row of 20 to 30
+ * cubes that is pushed costs half of what the vain ones do, and its force is as near; with 4000 it is
+ * up to twice as far off. */
+#define VAIN_RUNS 4u
+#define VAIN_REST 16u
+#define VAIN_ALONE 8000u
+
 /* ---- preparation ---- */
 
 static bool same_bodies(const hapi_row *row, const hapi_row *other)
@@ -349,10 +356,10 @@ static void check_finite(hapi_solver *solver)
   }
 }
 
-/* What is left for sweeps where a direct solve is too dear: more of them gain little. */
-static uint64_t sweeps_alone(uint32_t rows, uint64_t left)
+/* What is left for sweeps where direct solves are left out: more of them gain little. */
+static uint64_t sweeps_alone(uint32_t rows, uint64_t left, uint32_t updates)
 {
-  uint64_t enough = 2 * (uint64_t)rows > SWEEPS_ALONE ? 2 * (uint64_t)rows : SWEEPS_ALONE;
+  uint64_t enough = 2 * (uint64_t)rows > updates ? 2 * (uint64_t)rows : updates;
   return left < enough ? left : enough;
 }
 
@@ -362,10 +369,24 @@ static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
   if (left + 3 * (uint64_t)rows >= solver->update_budget) {
     solver->dear_rows = rows;
     solver->dear_runs = 0;
+    solver->dear_updates = SWEEPS_ALONE;
   }
 }
 
-/* An island that was too dear in the last runs will be so in this one: finding out costs as much as
+/* Direct solves that led to nothing better, one of them dearer than all the sweeps in place of it. */
+static void note_vain(hapi_solver *solver, uint32_t dearest)
+{
+  bool vain = dearest > SWEEPS_ALONE && solver->direct_solves == 0;
+  solver->vain_runs = vain ? solver->vain_runs + 1 : 0;
+  if (solver->vain_runs >= VAIN_RUNS && solver->dear_rows == 0) {
+    solver->dear_rows = solver->row_count;
+    solver->dear_runs = DEAR_RUNS - VAIN_REST;
+    solver->dear_updates = VAIN_ALONE;
+    solver->vain_runs = VAIN_RUNS - 1;
+  }
+}
+
+/* What was too dear or in vain in the last runs will be so in this one: finding out costs as much as
  * two sweeps. */
 static bool stays_dear(hapi_solver *solver)
 {
@@ -415,7 +436,8 @@ void hapi_solver_run(hapi_solver *solver)
   bool may = solver->direct_rows > 0;
   bool dear = may && stays_dear(solver);
   bool direct = may && !dear;
-  left = dear ? sweeps_alone(rows, left) : left;
+  uint32_t dearest = 0;
+  left = dear ? sweeps_alone(rows, left, solver->dear_updates) : left;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
   }
@@ -438,6 +460,7 @@ void hapi_solver_run(hapi_solver *solver)
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       left -= spent;
+      dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */
       if (direct && solver->direct_residual < solver->tolerance) {
         solver->residual = solver->direct_residual;
@@ -445,9 +468,12 @@ void hapi_solver_run(hapi_solver *solver)
       }
       if (!direct) {
         note_dear(solver, left, rows);
-        left = sweeps_alone(rows, left);
+        left = sweeps_alone(rows, left, SWEEPS_ALONE);
       }
     }
+  }
+  if (may && !dear) {
+    note_vain(solver, dearest);
   }
   check_finite(solver);
 }

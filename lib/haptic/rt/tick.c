@@ -18,7 +18,7 @@ static void keep_arrays(const hapi_local_world *from, hapi_local_world *to)
   to->row_capacity = from->row_capacity;
   to->solver = from->solver;
   to->solver.row_count = to->solver.body_count = 0;
-  to->solver.dear_rows = to->solver.dear_runs = 0;
+  to->solver.dear_rows = to->solver.dear_runs = to->solver.vain_runs = 0;
   to->solver.ready = true; /* as hapi_local_world_step makes them */
 }
 

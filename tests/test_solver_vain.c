@@ -1,0 +1,82 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Direct solves that are in vain rest: a long row of cubes that is pushed along the floor. */
+
+#include "tests/tap.h"
+
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
+#include "tests/contact_world.h"
+
+#define EDGE 0.05
+#define RADIUS 0.01
+#define SPEED 0.1
+#define SETTLES 300
+#define TICKS 600
+
+typedef struct figures {
+  int rests;    /* ticks whose last solve had no direct ones on account of those before */
+  int solved;   /* ticks whose last solve had some that were accepted */
+  double most;  /* row updates of the sweeps of a tick */
+  double force; /* N, mean */
+  uint32_t rows;
+} figures;
+
+static figures push_row(int count)
+{
+  contact_world w;
+  figures out = {0};
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  for (int i = 0; i < count; ++i) {
+    cw_add_cube(&w, 0.15, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
+  }
+  w.def.physics_hz = 60.0;
+  w.hand_def.radius = RADIUS;
+  w.hand_velocity[0] = SPEED;
+  CHECK(cw_start(&w, -0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE));
+  const hapi_solver *solver = &w.session->haptic->tick.world.solver;
+  uint64_t before = 0;
+  for (int i = 0; i < SETTLES + TICKS; ++i) {
+    cw_tick(&w);
+    double updates = (double)(cw_stats(&w).solver_sweeps - before) * solver->row_count;
+    before = cw_stats(&w).solver_sweeps;
+    if (i >= SETTLES) {
+      out.rests += solver->dear_runs > 0 && solver->dear_rows > 0;
+      out.solved += solver->direct_solves > 0;
+      out.most = updates > out.most ? updates : out.most;
+      out.force -= w.force[0] / TICKS;
+    }
+  }
+  out.rows = solver->row_count;
+  cw_close(&w);
+  printf("# %d cubes: %u rows, %d rest, %d solved, %g updates, %.3f N\n", count, out.rows,
+         out.rests, out.solved, out.most, out.force);
+  return out;
+}
+
+/* Not too dear, and solved only now and then: it is tried again. A tick has two solves, and what slides is felt. */
+TEST(what_is_in_vain_rests)
+{
+  figures f = push_row(36);
+  CHECK(f.rests > TICKS / 4 && f.solved > TICKS / 10);
+  CHECK(f.most < 2.0 * (8000.0 + 2.0 * f.rows));
+  CHECK_NEAR(f.force, 0.5 * 36 * 0.15 * 9.81, 0.05 * 36 * 0.15 * 9.81);
+}
+
+TEST(what_is_solved_does_not)
+{
+  figures f = push_row(3);
+  CHECK(f.rests == 0 && f.solved > 0);
+}
+
+int main(void)
+{
+  dInitODE2(0);
+  RUN(what_is_in_vain_rests);
+  RUN(what_is_solved_does_not);
+  int failed = tap_done();
+  dCloseODE();
+  return failed;
+}
