@@ -60,7 +60,7 @@ TEST(the_default_is_what_the_library_is_without)
   hapi_dial_settings(&by_accuracy, HAPI_DIAL_DEFAULT, HAPI_DIAL_DEFAULT, 1e-3, &s);
   CHECK(s.contact_hz == 200.0 && s.probe == HAP_PROBE_SHARED && s.max_sweeps == 0);
   CHECK(s.range_hops == HAP_RANGE_ALL && s.edge_probes == 4 && s.iterations == 1.0 && s.shapes);
-  CHECK(s.reuse == 1e-6);
+  CHECK(s.reuse == 1e-7);
   CHECK(hapi_dial_percent(HAP_ACCURACY_DEFAULT) == HAPI_DIAL_DEFAULT);
 }
 

@@ -334,7 +334,7 @@ static const option table[] = {
      take_probe, 0, 0, 0},
     {"--reuse", "M",
      "what testing simulations found is used again while nothing has moved by more, in\n"
-     "metres, 0 to 0.01 (default: as --accuracy says, 1e-6 at 0.5); 0: each step\n"
+     "metres, 0 to 0.01 (default: as --accuracy says, 1e-7 at 0.5); 0: each step\n"
      "measures anew",
      take_number, offsetof(run_options, rig.def.reuse), 0, 0.01},
     {"--lookback", "SHARE",

@@ -146,7 +146,7 @@ typedef struct hap_session_def {
                    by more than this since, nor would in a step by how its velocity and the forces on it have
                    changed: A without a step, b with one, and with none where all has stayed within a
                    hundredth of this. 0: measured anew at each step, as with the effect testing on and with
-                   HAP_PROBE_PAPER. HAP_BY_ACCURACY (default): 1e-6 at HAP_ACCURACY_DEFAULT */
+                   HAP_PROBE_PAPER. HAP_BY_ACCURACY (default): 1e-7 at HAP_ACCURACY_DEFAULT */
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

@@ -41,11 +41,12 @@ typedef struct physics_row {
 
 /* Iterations last: a world that is solved too badly pushes on the loop with forces that are not there. */
 static const physics_row physics_rows[] = {
-    {0, HAP_PROBE_SHARED, 0, 0.5, 1e-4},     {10, HAP_PROBE_SHARED, 1, 0.5, 1e-4},
-    {20, HAP_PROBE_SHARED, 1, 0.75, 1e-5},   {30, HAP_PROBE_SHARED, 2, 1.0, 1e-5},
-    {40, HAP_PROBE_SHARED, 4, 1.0, 1e-6},    {60, HAP_PROBE_OPERATING, 4, 1.0, 1e-6},
-    {70, HAP_PROBE_OPERATING, 8, 1.0, 1e-7}, {80, HAP_PROBE_OPERATING, 16, 2.0, 1e-7},
-    {90, HAP_PROBE_OPERATING, 32, 2.0, 0.0}, {100, HAP_PROBE_OPERATING, 64, 4.0, 0.0},
+    {0, HAP_PROBE_SHARED, 0, 0.5, 1e-4},      {10, HAP_PROBE_SHARED, 1, 0.5, 1e-4},
+    {20, HAP_PROBE_SHARED, 1, 0.75, 1e-5},    {30, HAP_PROBE_SHARED, 2, 1.0, 1e-5},
+    {40, HAP_PROBE_SHARED, 4, 1.0, 1e-6},     {50, HAP_PROBE_SHARED, 4, 1.0, 1e-7},
+    {60, HAP_PROBE_OPERATING, 4, 1.0, 1e-7},  {70, HAP_PROBE_OPERATING, 8, 1.0, 1e-7},
+    {80, HAP_PROBE_OPERATING, 16, 2.0, 1e-7}, {90, HAP_PROBE_OPERATING, 32, 2.0, 0.0},
+    {100, HAP_PROBE_OPERATING, 64, 4.0, 0.0},
 };
 
 /* A row update takes about this on a slow processor. No solve may run past its tick on account of the
