@@ -373,7 +373,7 @@ static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
   }
 }
 
-/* Direct solves that led to nothing better, one of them dearer than all the sweeps in place of it. */
+/* Direct solves that led to nothing better, one of them as dear as all sweeps where they are too dear. */
 static void note_vain(hapi_solver *solver, uint32_t dearest)
 {
   bool vain = dearest > SWEEPS_ALONE && solver->direct_solves == 0;
