@@ -82,6 +82,10 @@ static void near_callback(void *data, dGeomID x, dGeomID y)
   }
   int count = dCollide(x, y, CONTACTS_PER_PAIR, &contacts[0].geom, sizeof *contacts);
   for (int i = 0; i < count; ++i) {
+    const dReal *n = contacts[i].geom.normal;
+    if (dCalcVectorDot3(n, n) < 0.98) {
+      continue; /* ODE would abort on a contact without a normal */
+    }
     contacts[i].surface = surface;
     dJointID joint = dJointCreateContact(b->scene->world, b->contacts, &contacts[i]);
     dJointAttach(joint, dGeomGetBody(x), dGeomGetBody(y));

@@ -416,6 +416,31 @@ TEST(a_contact_that_is_no_number_is_dropped_and_counted)
   world_close(&w);
 }
 
+/* Where a convex geom and a box just touch, ODE's collider gives the normal (0, 0, 0). */
+TEST(a_contact_without_a_normal_is_dropped_and_counted)
+{
+  static const dReal planes[] = {1.0, 0.0,  0.0, 0.05, -1.0, 0.0, 0.0, 0.05, 0.0, 1.0, 0.0,  0.05,
+                                 0.0, -1.0, 0.0, 0.05, 0.0,  0.0, 1.0, 0.05, 0.0, 0.0, -1.0, 0.05};
+  static const dReal points[] = {-0.05, -0.05, -0.05, 0.05,  -0.05, -0.05, 0.05, 0.05,
+                                 -0.05, -0.05, 0.05,  -0.05, -0.05, -0.05, 0.05, 0.05,
+                                 -0.05, 0.05,  0.05,  0.05,  0.05,  -0.05, 0.05, 0.05};
+  static const unsigned faces[] = {4, 1, 2, 6, 5, 4, 0, 4, 7, 3, 4, 3, 7, 6, 2,
+                                   4, 0, 1, 5, 4, 4, 4, 5, 6, 7, 4, 0, 3, 2, 1};
+  for (int model = 0; model <= HAP_MODEL_CONTACT; ++model) {
+    test_world w;
+    dMass mass;
+    world_open(&w, 0.0, 20);
+    w.def.model = (hap_model)model;
+    dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
+    (void)world_add(&w, dCreateConvex(w.space, planes, 6, points, 8, faces), &mass, 0.0, 0.0, 0.0);
+    (void)world_add(&w, dCreateBox(w.space, 0.1, 0.1, 0.1), &mass, -0.1, 0.01, 0.075);
+    REQUIRE(world_start(&w, RADIUS, 5.0, 0.0, 0.0));
+    CHECK(hap_session_advance(w.session, 200) == HAP_OK);
+    CHECK(world_stats(&w).contacts_rejected > 0 && all_finite(&w));
+    world_close(&w);
+  }
+}
+
 /* ---- pointers ---- */
 
 TEST(targets_beyond_the_world_change_nothing)
@@ -497,6 +522,7 @@ int main(void)
   RUN(a_world_that_was_set_right_goes_on);
   RUN(no_surface_that_is_no_number_reaches_a_contact);
   RUN(a_contact_that_is_no_number_is_dropped_and_counted);
+  RUN(a_contact_without_a_normal_is_dropped_and_counted);
   RUN(targets_beyond_the_world_change_nothing);
   RUN(a_pointer_out_of_the_world_stays_where_it_was);
   RUN(long_frame_times_are_one_call_long_and_no_frame_times_are_refused);

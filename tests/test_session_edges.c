@@ -109,6 +109,40 @@ TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
   }
 }
 
+/* Two sessions would step the world of each other, which ends in an abort of the process. */
+TEST(a_world_has_one_session_at_a_time)
+{
+  stage s;
+  hap_session *second = NULL;
+  hap_detail why = {""};
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(&s) == HAP_OK);
+  CHECK(hap_session_create(&s.def, &s.ode, &second, &why) == HAP_ERROR_STATE && second == NULL);
+  CHECK(strstr(why.text, "already has a session") != NULL);
+  CHECK(hap_session_start(s.session) == HAP_OK && hap_session_stop(s.session) == HAP_OK);
+  CHECK(hap_session_create(&s.def, &s.ode, &second, NULL) == HAP_ERROR_STATE && second == NULL);
+
+  stage other; /* another world has its own */
+  CHECK(stage_run(&other, HAP_DRIVE_LOCKSTEP));
+  hap_session_destroy(s.session);
+  CHECK(hap_session_create(&s.def, &s.ode, &s.session, &why) == HAP_OK);
+  stage_end(&other);
+  stage_end(&s);
+}
+
+/* A create that fails leaves the world free. */
+TEST(a_session_that_could_not_be_created_has_no_claim_on_the_world)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  const double nothing = (double)NAN;
+  dBodySetLinearVel(s.cube, nothing, 0.0, 0.0);
+  CHECK(stage_create(&s) == HAP_ERROR_WORLD);
+  dBodySetLinearVel(s.cube, 0.0, 0.0, 0.0);
+  CHECK(stage_create(&s) == HAP_OK);
+  stage_end(&s);
+}
+
 static void *hold_the_lock(void *arg)
 {
   stage *s = arg;
@@ -291,6 +325,8 @@ int main(void)
   RUN(a_new_hand_does_not_feel_what_the_old_one_touched);
   RUN(a_hand_without_a_target_is_not_in_the_world);
   RUN(no_impulse_is_lost_on_a_body_that_the_application_moves);
+  RUN(a_world_has_one_session_at_a_time);
+  RUN(a_session_that_could_not_be_created_has_no_claim_on_the_world);
   RUN(a_lock_can_be_waited_for_as_long_as_there_is_time);
   RUN(a_session_is_destroyed_by_the_thread_that_has_its_lock);
   RUN(a_surface_that_is_no_number_does_not_reach_ode);

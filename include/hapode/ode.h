@@ -98,7 +98,8 @@ HAP_API void hap_ode_def_init(hap_ode_def *def, size_t size_of_def);
 /* [control] Creates a session over the world. ODE must be initialised (dInitODE2). Nothing moves
  * before start. On failure *out is NULL and detail (may be NULL) says what to do.
  * HAP_ERROR_UNINITIALISED, HAP_ERROR_ARGUMENT (field named in detail), HAP_ERROR_UNSUPPORTED (model
- * CONTACT), HAP_ERROR_WORLD (a body that cannot be simulated), HAP_ERROR_MEMORY. */
+ * CONTACT), HAP_ERROR_WORLD (a body that cannot be simulated), HAP_ERROR_STATE (the world already has a
+ * session), HAP_ERROR_MEMORY. */
 HAP_API HAP_NODISCARD hap_status hap_session_create(const hap_session_def *def,
                                                     const hap_ode_def *ode, hap_session **out,
                                                     hap_detail *detail);

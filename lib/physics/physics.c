@@ -80,6 +80,11 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   if (physics == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
+  if (!hapi_claim_take(&physics->claim, ode->world)) {
+    hapi_free(physics);
+    return hapi_fail(detail, HAP_ERROR_STATE,
+                     "the world already has a session: destroy that one first");
+  }
   physics->config = *config;
   physics->ode = *ode;
   physics->model = config->model;
@@ -146,6 +151,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   pthread_mutex_destroy(&physics->edits_lock);
   pthread_mutex_destroy(&physics->poses_lock);
   pthread_mutex_destroy(&physics->shown_lock);
+  hapi_claim_release(&physics->claim);
   hapi_free(physics);
 }
 

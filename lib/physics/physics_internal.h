@@ -18,6 +18,7 @@
 #include "base/thread.h"
 #include "base/wishes.h"
 #include "physics/admittance.h"
+#include "physics/claim.h"
 #include "physics/dial.h"
 #include "physics/islands.h"
 #include "physics/joint_probe.h"
@@ -551,6 +552,7 @@ typedef struct hapi_lock_figures {
 struct hapi_physics {
   hapi_physics_config config;
   hap_ode_def ode;
+  hapi_claim claim; /* of ode.world */
   dJointGroupID contact_group;
   dJointGroupID carried_group; /* contacts of what the loop owns, see range_error.c */
   dContact *contact_scratch;

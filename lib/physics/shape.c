@@ -92,7 +92,7 @@ static bool nearest_by_collider(hapi_physics *physics, dGeomID geom, const doubl
   for (int i = 0; i < count; ++i) {
     double apart[3];
     hapi_v3_sub(center, contacts[i].pos, apart);
-    if (hapi_v3_norm(apart) < best) {
+    if (hapi_contact_is_sound(&contacts[i]) && hapi_v3_norm(apart) < best) {
       best = hapi_v3_norm(apart);
       nearest = &contacts[i];
     }
@@ -120,7 +120,9 @@ static uint32_t vertices_below(hapi_physics *physics, dGeomID geom, const double
   int found =
       dCollide(geom, hood->plane_geom, HAPI_HULL_POINTS, hood->vertices, sizeof hood->vertices[0]);
   for (int i = 0; i < found && count < HAPI_HULL_POINTS; ++i) {
-    hapi_v3_copy(hood->vertices[i].pos, &hood->hull[(size_t)3 * count++]);
+    if (hapi_contact_is_sound(&hood->vertices[i])) {
+      hapi_v3_copy(hood->vertices[i].pos, &hood->hull[(size_t)3 * count++]);
+    }
   }
   return count;
 }

@@ -13,16 +13,18 @@
  * such a quaternion in one step. Finite numbers have limits too: beyond them the products of a step
  * overflow. */
 
-#define MASS_LEAST 1e-12       /* kg */
-#define MASS_MOST 1e12         /* kg */
-#define INERTIA_LEAST 1e-30    /* kg m^2 */
-#define INERTIA_MOST 1e30      /* kg m^2 */
-#define DEFINITE 1e-12         /* determinant of an inertia, of the product of its diagonal */
-#define POSITION_MOST 1e9      /* m */
-#define SPEED_MOST 1e8         /* m/s */
-#define SPIN_MOST 1e7          /* rad/s */
-#define WRENCH_MOST 1e12       /* N, N m */
-#define GRAVITY_MOST 1e6       /* m/s^2 */
+#define MASS_LEAST 1e-12    /* kg */
+#define MASS_MOST 1e12      /* kg */
+#define INERTIA_LEAST 1e-30 /* kg m^2 */
+#define INERTIA_MOST 1e30   /* kg m^2 */
+#define DEFINITE 1e-12      /* determinant of an inertia, of the product of its diagonal */
+#define POSITION_MOST 1e9   /* m */
+#define SPEED_MOST 1e8      /* m/s */
+#define SPIN_MOST 1e7       /* rad/s */
+#define WRENCH_MOST 1e12    /* N, N m */
+#define GRAVITY_MOST 1e6    /* m/s^2 */
+#define NORMAL_LEAST 0.99   /* length of a contact's normal */
+#define NORMAL_MOST 1.01
 #define ERP_MOST 10.0          /* ODE means 0 .. 1 */
 #define JOINT_NUMBER_MOST 1e12 /* speeds, softness, error reduction of joints */
 
@@ -229,10 +231,13 @@ bool hapi_geom_is_sound(dGeomID geom)
   return true;
 }
 
+/* ODE's collider of a convex geom and a box gives the normal (0, 0, 0) where the two just touch.
+ * QuickStep divides by the effective mass along it, makes NaN of it and aborts the process. */
 bool hapi_contact_is_sound(const dContactGeom *contact)
 {
-  return within(contact->pos, 2.0 * POSITION_MOST) && within(contact->normal, 1.001) &&
-         fabs(contact->depth) <= POSITION_MOST;
+  double length = hapi_v3_norm(contact->normal); /* false for NaN */
+  return within(contact->pos, 2.0 * POSITION_MOST) && length > NORMAL_LEAST &&
+         length < NORMAL_MOST && fabs(contact->depth) <= POSITION_MOST;
 }
 
 /* ---- the world ---- */
