@@ -66,9 +66,8 @@ hap_status effects_draw(bench *b, const effects_column *columns, size_t count);
 
 typedef struct effects_counting {
   const char *scene;
-  const char *list;    /* of effects, as for hapode-run */
-  const char *without; /* the build without this one; NULL: the whole */
-  const char *inside;  /* the function, with all that it calls */
+  const char *list;   /* of effects, as for hapode-run */
+  const char *inside; /* the function, with all that it calls */
   int ticks;
 } effects_counting;
 

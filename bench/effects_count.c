@@ -30,7 +30,7 @@ bool effects_can_count(const char **out_why_not)
   if (system("valgrind --version >/dev/null 2>&1") != 0) { /* NOLINT(cert-env33-c): a fixed text */
     *out_why_not = "there is no valgrind";
   } else if (!beside("effects-tick", path, sizeof path)) {
-    *out_why_not = "there is no effects-tick beside this program (ninja effects-builds)";
+    *out_why_not = "there is no effects-tick beside this program (ninja effects-tick)";
   }
   return *out_why_not == NULL;
 }
@@ -50,12 +50,8 @@ static double read_count(FILE *in)
 double effects_instructions(const effects_counting *of)
 {
   char program[PATH_MAX];
-  char name[64] = "effects-tick";
   char command[2 * PATH_MAX];
-  if (of->without != NULL) {
-    snprintf(name, sizeof name, "effects-tick-without-%s", of->without);
-  }
-  if (!beside(name, program, sizeof program)) {
+  if (!beside("effects-tick", program, sizeof program)) {
     return -1.0;
   }
   snprintf(command, sizeof command,

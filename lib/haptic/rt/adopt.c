@@ -171,7 +171,7 @@ static void remember_ramps(hapi_tick *tick)
 
 static bool rubs(const hapi_tick *tick, double mu)
 {
-  return HAPI_HAS_FRICTION && (mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
+  return (mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
 }
 
 static void adopt_contact(hapi_tick *tick, const hapi_model_contact *in, hapi_local_contact *out)
@@ -285,8 +285,7 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
   if (model->row_updates > 0) {
     tick->world.solver.update_budget = model->row_updates;
   }
-  tick->bounces = HAPI_HAS_RESTITUTION &&
-                  (model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION));
+  tick->bounces = model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION);
   tick->guard.observes = observes(tick, model);
   if (tick->guard.observes && !observed) {
     hapi_energy_resume(tick);
@@ -300,7 +299,7 @@ static void adopt_effects(hapi_tick *tick, hapi_model *model)
     proxies = proxies || may_be_proxy(&tick->pointers[i], model->wishes);
     hapi_tick_feel(&tick->pointers[i], hapi_wish(model->wishes, HAP_EFFECT_TORQUE), any);
   }
-  tick->proxies = HAPI_HAS_PROXY && proxies;
+  tick->proxies = proxies;
 }
 
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)

@@ -190,7 +190,7 @@ static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row,
     row->target += push;
     source->pushes_out = !soft && push > PUSH_OUT_LEAST;
   }
-  if (HAPI_HAS_RESTITUTION && tick->bounces) {
+  if (tick->bounces) {
     uint64_t begin = hapi_effect_begin(tick);
     bounce(tick, c, row, source);
     hapi_effect_end(tick, HAP_EFFECT_RESTITUTION, begin);

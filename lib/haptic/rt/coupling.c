@@ -17,8 +17,7 @@
 void hapi_tick_feel(hapi_tick_pointer *p, hap_effect_wish wish, bool rubs)
 {
   bool called = !p->three_dof && (p->hull != NULL || (p->turns && rubs));
-  p->feels_torque =
-      HAPI_HAS_TORQUE && (wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && called));
+  p->feels_torque = (wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && called));
 }
 
 static bool plausible(const double *values, int count)

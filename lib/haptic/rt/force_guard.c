@@ -227,7 +227,7 @@ void hapi_guard(hapi_tick *tick)
       want(tick, &tick->pointers[i]);
     }
   }
-  if (HAPI_HAS_OBSERVER && tick->guard.observes && tick->guard.mode == HAP_GUARD_ON) {
+  if (tick->guard.observes && tick->guard.mode == HAP_GUARD_ON) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_energy_observe(tick);
     hapi_effect_end(tick, HAP_EFFECT_OBSERVER, begin);

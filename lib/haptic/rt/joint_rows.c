@@ -495,7 +495,7 @@ static void set_stop(hapi_tick *tick, const placed_joint *j, const hapi_model_li
   } else {
     correct(tick, &limit->stop, (error_of){-gap, 0.0}, row);
   }
-  if (!HAPI_HAS_RESTITUTION || !tick->bounces || !hits || !(limit->bounce > 0.0)) {
+  if (!tick->bounces || !hits || !(limit->bounce > 0.0)) {
     return;
   }
   double back = -limit->bounce * speed + fmin(pressed(tick, row) - speed, 0.0);

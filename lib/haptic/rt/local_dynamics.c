@@ -85,7 +85,7 @@ void hapi_local_step(hapi_tick *tick)
   if (tick->model != HAP_MODEL_ACCELERANCE) {
     return;
   }
-  if (HAPI_HAS_CROSS && tick->cross_count > 0) {
+  if (tick->cross_count > 0) {
     uint64_t begin = hapi_effect_begin(tick);
     accelerate_others(tick);
     hapi_effect_end(tick, HAP_EFFECT_CROSS, begin);

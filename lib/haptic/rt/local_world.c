@@ -77,7 +77,7 @@ static void begin(hapi_tick *tick)
     tick->world.resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
   uint32_t first_hub = solver->body_count;
-  if (HAPI_HAS_PROXY && tick->proxies) {
+  if (tick->proxies) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_proxy_begin(tick);
     hapi_proxy_free(tick);
@@ -105,7 +105,7 @@ static bool wobbles(const hapi_tick *tick, const hapi_local_body *body)
 {
   const uint32_t both = HAPI_BODY_GYROSCOPIC | HAPI_BODY_OWNED;
   const double *w = body->twist.angular;
-  return HAPI_HAS_GYRO && (body->flags & both) == both && !body->round &&
+  return (body->flags & both) == both && !body->round &&
          (hapi_v3_dot(w, w) > HAPI_SPIN_LEAST * HAPI_SPIN_LEAST ||
           hapi_wish_is_on(tick->wishes, HAP_EFFECT_GYRO));
 }
@@ -283,7 +283,7 @@ static void account_pointer(hapi_tick *tick, const hapi_row *row, hapi_local_bod
 /* Of a row with something that the loop does not own. */
 static void account_row(hapi_tick *tick, const hapi_row *row, const hapi_row_source *source)
 {
-  if (HAPI_HAS_OBSERVER && tick->guard.observes) {
+  if (tick->guard.observes) {
     tick->guard.given += work_on(tick, source->body_a, row->ja, row->impulse) +
                          work_on(tick, source->body_b, row->jb, row->impulse);
   }
@@ -354,15 +354,9 @@ static bool stop_push_out(hapi_tick *tick)
 static void wake(hapi_tick *tick)
 {
   if (tick->world.resting > 0) {
-    if (HAPI_HAS_JOINTS) {
-      hapi_joint_wake(tick);
-    }
-    if (HAPI_HAS_CONTACTS) {
-      hapi_contact_wake(tick);
-    }
-    if (HAPI_HAS_JOINTS) {
-      hapi_joint_wake(tick);
-    }
+    hapi_joint_wake(tick);
+    hapi_contact_wake(tick);
+    hapi_joint_wake(tick);
   }
 }
 
@@ -397,7 +391,7 @@ static void solve(hapi_tick *tick)
 
 static void add_joints(hapi_tick *tick)
 {
-  if (HAPI_HAS_JOINTS && tick->world.joint_count > 0) {
+  if (tick->world.joint_count > 0) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_joint_rows(tick);
     hapi_effect_end(tick, HAP_EFFECT_JOINTS, begin);
@@ -407,7 +401,7 @@ static void add_joints(hapi_tick *tick)
 static void add_contacts(hapi_tick *tick)
 {
   const hapi_patches *patches = tick->world.patches;
-  if (HAPI_HAS_CONTACTS && patches != NULL && patches->contact_count > 0) {
+  if (patches != NULL && patches->contact_count > 0) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_contact_rows(tick);
     hapi_effect_end(tick, HAP_EFFECT_CONTACTS, begin);
@@ -427,7 +421,7 @@ void hapi_local_world_step(hapi_tick *tick)
   bool again = stop_push_out(tick);
   step_bodies(tick);
   if (again) {
-    if (HAPI_HAS_PROXY && tick->proxies) {
+    if (tick->proxies) {
       hapi_proxy_push_out(tick);
     }
     solve(tick);
@@ -444,7 +438,7 @@ void hapi_local_world_step(hapi_tick *tick)
     }
   }
   hapi_pointer_forces(tick);
-  if (HAPI_HAS_PROXY && tick->proxies) {
+  if (tick->proxies) {
     uint64_t begin_proxies = hapi_effect_begin(tick);
     hapi_proxy_move(tick);
     hapi_effect_end(tick, HAP_EFFECT_PROXY, begin_proxies);

@@ -53,7 +53,7 @@ static inline void hapi_pointer_press(hapi_tick *tick, hapi_local_contact *c)
     double force = tick->world.solver.rows[c->row].impulse / tick->period;
     hapi_v3_scale(-force, c->normal_now, c->force);
   }
-  if (HAPI_HAS_TORQUE && c->tool != 0 && p->feels_torque) {
+  if (c->tool != 0 && p->feels_torque) {
     uint64_t begin = hapi_effect_begin(tick);
     hapi_pointer_turn_tool(p, c);
     hapi_effect_end(tick, HAP_EFFECT_TORQUE, begin);

@@ -429,7 +429,7 @@ void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c)
   hapi_friction_wrench(f, p, push, c->point_now, &wrench);
   hapi_v3_add(c->force, wrench.force, c->force);
   hapi_v3_copy(wrench.torque, c->couple);
-  if (HAPI_HAS_TORQUE && p->feels_torque) {
+  if (p->feels_torque) {
     hapi_friction_wrench(f, p, push, p->pose.position, &wrench);
     hapi_v3_sub(p->wrench.torque, wrench.torque, p->wrench.torque);
   }

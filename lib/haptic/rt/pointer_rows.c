@@ -73,7 +73,7 @@ static bool place(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *a
     return place_tool(tick, c, at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  if (!HAPI_HAS_SHAPE || !c->has_shape || !ask_shape(tick, c, at)) {
+  if (!c->has_shape || !ask_shape(tick, c, at)) {
     place_by_plane(c, at);
   }
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->period);
@@ -299,7 +299,7 @@ static void take_contact(hapi_tick *tick, uint32_t index)
   } else {
     push_static(c, &at, speed);
   }
-  if (HAPI_HAS_FRICTION && c->rubs) {
+  if (c->rubs) {
     rub(tick, index, at.pointer, at.body, at.depth);
   }
 }
@@ -371,7 +371,7 @@ void hapi_pointer_forces(hapi_tick *tick)
     tick->pointers[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }
   tick->pushing = 0;
-  if (HAPI_HAS_FRICTION && tick->rubs) {
+  if (tick->rubs) {
     hapi_pointer_forces_with_friction(tick);
     return;
   }

@@ -99,7 +99,7 @@ static double normal_force(hapi_tick *tick, hapi_local_contact *c, const hapi_lo
   double closing = closing_rate(p, body, at, &own);
   double force = p->stiffness * depth + p->damping * closing;
   force = force > 0.0 ? share * force : 0.0;
-  if (HAPI_HAS_OBSERVER && tick->guard.observes) {
+  if (tick->guard.observes) {
     p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
     p->guard.power += force * (closing - own);
   }
@@ -142,7 +142,7 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
   hapi_friction_end(f, push, limit);
   hapi_v3_add(c->force, on_body.force, c->force);
   hapi_v3_copy(on_body.torque, c->couple);
-  if (HAPI_HAS_TORQUE && p->feels_torque) {
+  if (p->feels_torque) {
     hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
   }
   p->guard.force2 += (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
@@ -213,12 +213,12 @@ static void render_contact(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   hapi_v3_scale(-force, at.normal, c->force);
-  if (HAPI_HAS_TORQUE && c->tool != 0 && p->feels_torque) {
+  if (c->tool != 0 && p->feels_torque) {
     uint64_t begin = hapi_effect_begin(tick);
     turn_pointer(p, &at, force);
     hapi_effect_end(tick, HAP_EFFECT_TORQUE, begin);
   }
-  if (HAPI_HAS_FRICTION && c->rubs) {
+  if (c->rubs) {
     uint64_t begin = hapi_effect_begin(tick);
     rub(tick, c, body, &at, force);
     hapi_effect_end(tick, HAP_EFFECT_FRICTION, begin);

@@ -88,9 +88,7 @@ void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
   if (tick->model == HAP_MODEL_CONTACT) {
     hapi_local_world_step(tick);
   } else {
-    if (HAPI_HAS_PROXY) {
-      hapi_proxy_none(tick);
-    }
+    hapi_proxy_none(tick);
     hapi_local_place(tick);
     hapi_render(tick);
     hapi_local_step(tick);

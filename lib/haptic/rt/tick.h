@@ -46,7 +46,6 @@
 
 #include "base/wishes.h"
 #include "haptic/rt/contact_solver.h"
-#include "haptic/rt/has.h"
 #include "haptic/rt/velocity.h"
 #include "sync/messages.h"
 #include "sync/path.h"

@@ -98,8 +98,7 @@ static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
   c->mu = in->mu;
-  c->rubs =
-      HAPI_HAS_FRICTION && (in->mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
+  c->rubs = (in->mu > 0.0 || hapi_wish_is_on(tick->wishes, HAP_EFFECT_FRICTION));
   tick->rubs |= c->rubs;
   c->tool = at + 1;
   c->row = HAPI_NO_ROW;
