@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 #define FEWEST_PLACES 16u
 #define MOST_PLACES 0x80000000u
@@ -62,6 +63,7 @@ void hapi_index_clear(hapi_index *index)
 
 void hapi_index_put(hapi_index *index, uint64_t key, uint32_t value)
 {
+  HAPI_ASSERT(index->place_count > 0 && value < HAPI_INDEX_NONE);
   index->places[place_of(index, key)] = (hapi_index_place){key, value + 1};
 }
 

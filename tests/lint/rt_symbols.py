@@ -15,6 +15,7 @@ ALLOWED = set("""
     memcpy memset memmove memcmp
     sqrt fabs fmin fmax floor ceil trunc round rint nearbyint
     __stack_chk_fail _GLOBAL_OFFSET_TABLE_
+    hapi_assert_failed
 """.split())
 SANITIZER = re.compile(r"__(asan|ubsan|tsan|sanitizer)_\w+$")
 
