@@ -201,8 +201,8 @@ static void look(stability_bed *s)
   s->kinetic = 0.0;
   for (uint32_t i = 0; i < tick->live_count; ++i) {
     const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    uint32_t known = physics->bodies[tick->live[i]].known;
-    int index = known == HAPI_NONE ? -1 : index_of(s, physics->table.entries[known].body);
+    uint32_t known = physics->near.slots.bodies[tick->live[i]].known;
+    int index = known == HAPI_NONE ? -1 : index_of(s, physics->world.bodies.entries[known].body);
     if (index >= 0) {
       local[index] = true;
       s->kinetic += kinetic_of(s, body->twist.linear, body->twist.angular);

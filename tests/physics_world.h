@@ -180,13 +180,13 @@ static inline hapi_contact_slot *world_contact(const test_world *w, dBodyID body
 {
   hapi_physics *physics = world_physics(w);
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    hapi_contact_slot *slot = &physics->contacts[i];
+    hapi_contact_slot *slot = &physics->near.slots.contacts[i];
     if (slot->phase != HAPI_SLOT_LIVE || slot->pointer != pointer) {
       continue;
     }
     dBodyID of = NULL;
     if (slot->body != HAPI_SLOT_NONE) {
-      of = physics->table.entries[physics->bodies[slot->body].known].body;
+      of = physics->world.bodies.entries[physics->near.slots.bodies[slot->body].known].body;
     }
     if (of == body) {
       return slot;
@@ -200,7 +200,7 @@ static inline int world_count_contacts(const test_world *w)
   hapi_physics *physics = world_physics(w);
   int count = 0;
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    count += physics->contacts[i].phase == HAPI_SLOT_LIVE;
+    count += physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE;
   }
   return count;
 }
@@ -208,9 +208,9 @@ static inline int world_count_contacts(const test_world *w)
 static inline hapi_body_slot *world_slot(const test_world *w, dBodyID body)
 {
   hapi_physics *physics = world_physics(w);
-  uint32_t known = hapi_bodies_find(&physics->table, body);
-  uint32_t slot = known != HAPI_NONE ? physics->table.entries[known].slot : HAPI_NONE;
-  return slot != HAPI_NONE ? &physics->bodies[slot] : NULL;
+  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
+  uint32_t slot = known != HAPI_NONE ? physics->world.bodies.entries[known].slot : HAPI_NONE;
+  return slot != HAPI_NONE ? &physics->near.slots.bodies[slot] : NULL;
 }
 
 /* Everything about a body that a getter of ODE gives and a step can change. */

@@ -180,8 +180,8 @@ static inline uint64_t repeat_hash_joints(const hapi_joint_table *table)
 static inline uint64_t repeat_hash_contacts(const hapi_physics *physics)
 {
   uint64_t hash = HAPI_HASH_BEGIN;
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    const hapi_contact_slot *contact = &physics->contacts[i];
+  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
+    const hapi_contact_slot *contact = &physics->near.slots.contacts[i];
     hash = hapi_hash_word(hash, ((uint64_t)contact->generation << 32) | contact->phase);
     hash = hapi_hash_doubles(hash, contact->point_world, 3);
     hash = hapi_hash_doubles(hash, contact->last_force, 3);
@@ -199,9 +199,10 @@ static inline void repeat_note(repeat_log *log, hap_session *session)
     CHECK(!"a row of the log");
     return;
   }
-  log->rows[log->count++] = (repeat_row){
-      {stats.trace_hash, repeat_hash_bodies(&physics->table), repeat_hash_joints(&physics->joints),
-       repeat_hash_contacts(physics), repeat_hash_extents(&physics->table)}};
+  log->rows[log->count++] =
+      (repeat_row){{stats.trace_hash, repeat_hash_bodies(&physics->world.bodies),
+                    repeat_hash_joints(&physics->world.joints), repeat_hash_contacts(physics),
+                    repeat_hash_extents(&physics->world.bodies)}};
 }
 
 /* The same in all of it? Says where it begins to differ, stage by stage. */

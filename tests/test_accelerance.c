@@ -47,12 +47,12 @@ static bool start_at(test_world *w, hap_surface_fn surface, const double at[3])
 static uint64_t measure(test_world *w)
 {
   hapi_physics *physics = world_physics(w);
-  uint64_t before = physics->figures.stats.probe_steps;
-  uint64_t calls = physics->figures.stats.quickstep_calls;
+  uint64_t before = physics->counts.own.stats.probe_steps;
+  uint64_t calls = physics->counts.own.stats.quickstep_calls;
   hapi_accelerance_measure(physics);
-  CHECK(physics->figures.stats.quickstep_calls - calls ==
-        physics->figures.stats.probe_steps - before);
-  return physics->figures.stats.probe_steps - before;
+  CHECK(physics->counts.own.stats.quickstep_calls - calls ==
+        physics->counts.own.stats.probe_steps - before);
+  return physics->counts.own.stats.probe_steps - before;
 }
 
 /* Measures with a last force of this size along -z, as if the pointer had pushed with it. */
@@ -473,9 +473,9 @@ static void check_all_measured(const test_world *w)
 {
   const hapi_physics *physics = world_physics(w);
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    const hapi_contact_slot *contact = &physics->contacts[i];
+    const hapi_contact_slot *contact = &physics->near.slots.contacts[i];
     bool moves = contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-                 physics->bodies[contact->body].mass > 0.0;
+                 physics->near.slots.bodies[contact->body].mass > 0.0;
     for (int axis = 0; axis < 3 && moves; ++axis) {
       CHECK(contact->probed && contact->a[axis][axis] > 0.1);
     }
@@ -491,7 +491,7 @@ static uint64_t count_probes(void (*build)(test_world *w), hap_probe probe, int 
   CHECK(world_count_contacts(&w) == contacts);
   uint64_t probes = measure(&w);
   check_all_measured(&w);
-  hap_stats before = world_physics(&w)->figures.stats;
+  hap_stats before = world_physics(&w)->counts.own.stats;
   CHECK(hap_session_advance(w.session, 51) == HAP_OK); /* to the first step, which is in it */
   hap_stats after = world_stats(&w);
   CHECK(after.physics_steps == 1);
@@ -692,7 +692,7 @@ TEST(bodies_known_only_by_joints_are_undone_too)
   glue(&w, w.bodies[1], w.bodies[0]);
   glue(&w, w.bodies[1], w.bodies[2]);
   REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
-  CHECK(world_physics(&w)->table.used == 3);
+  CHECK(world_physics(&w)->world.bodies.used == 3);
   for (int i = 0; i < 3; ++i) {
     body_read(w.bodies[i], &before[i]);
   }

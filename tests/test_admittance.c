@@ -5,7 +5,7 @@
 
 #include "tests/tap.h"
 
-#include "physics/admittance.h"
+#include "probe/admittance.h"
 #include "tests/physics_world.h"
 #include "tests/unknown_shape.h"
 
@@ -398,7 +398,7 @@ TEST(a_singular_probe_keeps_the_last_good_one)
     slot->mass = round == 1 ? 1.35e-16 * w.def.physics_hz / 0.0981 : 1.0;
     contact->speed = 0.0;
     hapi_accelerance_measure(physics);
-    CHECK(physics->figures.stats.probes_singular == (round > 0));
+    CHECK(physics->counts.own.stats.probes_singular == (round > 0));
     CHECK_NEAR(contact->measured[0][0], round == 1 ? 1.64 : 1.0, 0.05);
     CHECK_NEAR(contact->a[0][0], 1.0, 1e-9);
     CHECK(round != 1 || memcmp(good, contact->a, sizeof good) == 0);
@@ -411,12 +411,12 @@ TEST(a_singular_probe_keeps_the_last_good_one)
 static void check_contacts(test_world *w)
 {
   hapi_physics *physics = world_physics(w);
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    const hapi_contact_slot *c = &physics->contacts[i];
+  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
+    const hapi_contact_slot *c = &physics->near.slots.contacts[i];
     if (c->phase != HAPI_SLOT_LIVE || !c->probed || c->body == HAPI_SLOT_NONE) {
       continue;
     }
-    dBodyID body = physics->table.entries[physics->bodies[c->body].known].body;
+    dBodyID body = physics->world.bodies.entries[physics->near.slots.bodies[c->body].known].body;
     hapi_free_body free;
     double arm[3];
     double normal[3];
@@ -433,13 +433,13 @@ static void check_contacts(test_world *w)
 static void check_responses(test_world *w, int *measured)
 {
   hapi_physics *physics = world_physics(w);
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    const hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    const hapi_body_slot *slot = &physics->near.slots.bodies[i];
     if (slot->phase != HAPI_SLOT_LIVE || !slot->measured) {
       continue;
     }
     hapi_free_body free;
-    dBodyID body = physics->table.entries[slot->known].body;
+    dBodyID body = physics->world.bodies.entries[slot->known].body;
     double response[6][6];
     memcpy(response, slot->response, sizeof response);
     hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);

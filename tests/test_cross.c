@@ -30,9 +30,10 @@ static const hapi_cross *block(const test_world *w, dBodyID pushed, dBodyID othe
   const hapi_physics *physics = world_physics(w);
   const hapi_contact_slot *contact = world_contact(w, pushed, 0);
   const hapi_body_slot *body = world_slot(w, other);
-  for (uint32_t i = 0; i < physics->cross_count; ++i) {
-    const hapi_cross *cross = &physics->crosses[i];
-    if (&physics->contacts[cross->contact] == contact && &physics->bodies[cross->body] == body) {
+  for (uint32_t i = 0; i < physics->research.cross_count; ++i) {
+    const hapi_cross *cross = &physics->research.crosses[i];
+    if (&physics->near.slots.contacts[cross->contact] == contact &&
+        &physics->near.slots.bodies[cross->body] == body) {
       return cross;
     }
   }
@@ -125,8 +126,8 @@ TEST(a_fixed_pair_answers_as_one_body)
   expect_rigid(mass, contact->point_world, expected);
   check_block(cross, expected);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_physics(&w)->cross_count == 2);
-  CHECK(world_physics(&w)->figures.stats.probes_clipped == 0);
+  CHECK(world_physics(&w)->research.cross_count == 2);
+  CHECK(world_physics(&w)->counts.own.stats.probes_clipped == 0);
   world_close(&w);
 }
 
@@ -181,12 +182,12 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
       join_fixed(&w);
     }
     REQUIRE(start_above(&w, -0.02));
-    const hap_stats *stats = &world_physics(&w)->figures.stats;
+    const hap_stats *stats = &world_physics(&w)->counts.own.stats;
     uint64_t before = stats->probe_steps;
     measure(&w);
     probes[joined] = stats->probe_steps - before;
     CHECK(world_count_contacts(&w) == 2);
-    CHECK(world_physics(&w)->cross_count == (joined != 0 ? 2u : 0u));
+    CHECK(world_physics(&w)->research.cross_count == (joined != 0 ? 2u : 0u));
     world_close(&w);
   }
   CHECK(probes[0] == 1 + 3 && probes[1] == 1 + 6);
@@ -211,13 +212,13 @@ TEST(with_too_few_places_the_largest_stay)
   hapi_physics *physics = world_physics(&w);
   CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w.def.max_bodies);
   measure(&w);
-  REQUIRE(physics->cross_count == 6);
-  CHECK(physics->figures.stats.capacity_dropped == 0);
-  memcpy(all, physics->crosses, sizeof all);
+  REQUIRE(physics->research.cross_count == 6);
+  CHECK(physics->counts.own.stats.capacity_dropped == 0);
+  memcpy(all, physics->research.crosses, sizeof all);
   physics->config.capacity.crosses = 4;
   measure(&w);
-  REQUIRE(physics->cross_count == 4);
-  CHECK(physics->figures.stats.capacity_dropped == 2);
+  REQUIRE(physics->research.cross_count == 4);
+  CHECK(physics->counts.own.stats.capacity_dropped == 2);
   for (int i = 0; i < 6; ++i) {
     int larger = 0;
     bool kept = false;
@@ -225,7 +226,7 @@ TEST(with_too_few_places_the_largest_stay)
       larger += all[k].response > all[i].response;
     }
     for (uint32_t k = 0; k < 4; ++k) {
-      kept = kept || memcmp(physics->crosses[k].a, all[i].a, sizeof all[i].a) == 0;
+      kept = kept || memcmp(physics->research.crosses[k].a, all[i].a, sizeof all[i].a) == 0;
     }
     CHECK(kept == (larger < 4));
   }
@@ -239,7 +240,7 @@ TEST(a_block_that_is_no_number_is_left_out)
   open_pair(&w, HAP_EFFECT_ON, 0.5, 0.2);
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
-  const hap_stats *stats = &world_physics(&w)->figures.stats;
+  const hap_stats *stats = &world_physics(&w)->counts.own.stats;
   world_slot(&w, w.bodies[0])->mass = 0.0;
   measure(&w);
   CHECK(stats->probes_singular == 2 &&
@@ -255,7 +256,7 @@ TEST(a_block_that_is_no_number_is_left_out)
 static const hapi_local_body *local(const test_world *w, int body)
 {
   const hapi_body_slot *slot = world_slot(w, w->bodies[body]);
-  return &w->session->haptic->tick.bodies[slot - world_physics(w)->bodies];
+  return &w->session->haptic->tick.bodies[slot - world_physics(w)->near.slots.bodies];
 }
 
 /* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so that the
@@ -481,7 +482,7 @@ TEST(b_and_the_forces_make_the_base_again)
   double wanted = 3.0 / 1.5;
   REQUIRE(open_row(&w, HAP_EFFECT_ON));
   hapi_physics *physics = world_physics(&w);
-  physics->dial.settings.probe = HAP_PROBE_OPERATING;
+  physics->cycle.settings.probe = HAP_PROBE_OPERATING;
   hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
   REQUIRE(contact != NULL && block(&w, w.bodies[0], w.bodies[1]) != NULL);
   hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);
@@ -520,7 +521,7 @@ TEST(what_does_not_answer_has_no_block)
     f.contact = world_contact(w, w->bodies[0], 0);
     REQUIRE(f.contact != NULL && world_slot(w, w->bodies[1]) != NULL);
     measure_with(&f, force, 0.0, 0.0);
-    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->cross_count);
+    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->research.cross_count);
     CHECK((block(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
     world_close(w);
   }
@@ -554,7 +555,7 @@ TEST(operating_probes_are_as_many_as_shared_ones)
     w.def.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
     join_fixed(&w);
     REQUIRE(start_above(&w, -0.02));
-    const hap_stats *stats = &world_physics(&w)->figures.stats;
+    const hap_stats *stats = &world_physics(&w)->counts.own.stats;
     uint64_t before = stats->probe_steps;
     measure(&w);
     steps[k] = stats->probe_steps - before;

@@ -5,9 +5,9 @@
 
 #include "tests/tap.h"
 
+#include "accuracy/dial_settings.h"
+#include "accuracy/dial_turn.h"
 #include "base/clock.h"
-#include "physics/dial_settings.h"
-#include "physics/dial_turn.h"
 #include "tests/contact_world.h"
 
 #define EDGE 0.1

@@ -37,7 +37,7 @@ static int tell_ticks(hapi_physics *physics, uint64_t ticks, double share, uint6
   told.ticks += ticks;
   told.over += over;
   told.spent_ns += (double)ticks * share * PERIOD_NS;
-  physics->state->load = told;
+  physics->cycle.state->load = told;
   hapi_dial_follow(physics);
   return physics->dial.sides[HAPI_DIAL_TICK].percent;
 }
@@ -74,8 +74,8 @@ TEST(a_mean_that_is_over_turns_the_tick)
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 10); /* far over: three steps */
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 0);
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 0);
-  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_LEAST);
-  CHECK_NEAR(physics->figures.accuracy.tick.load, 0.3, 1e-9);
+  CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_LEAST);
+  CHECK_NEAR(physics->counts.own.accuracy.tick.load, 0.3, 1e-9);
   world_close(&w);
 }
 
@@ -88,11 +88,11 @@ TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
   set_shares(physics, SHARE, SHARE);
   CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
   CHECK(tell_ticks(physics, 100, 0.09, 0) == 0);
-  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ASKED);
+  CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_ASKED);
   CHECK(tell_ticks(physics, 100, 0.11, 0) == 0);
-  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_LEAST);
+  CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_LEAST);
   CHECK(tell_cycles(physics, 4, 5.5 * MS) == 0);
-  CHECK(physics->figures.accuracy.physics.reason == HAP_ACCURACY_LEAST);
+  CHECK(physics->counts.own.accuracy.physics.reason == HAP_ACCURACY_LEAST);
   world_close(&w);
 }
 
@@ -103,7 +103,7 @@ TEST(many_ticks_that_are_over_turn_it_as_well)
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
-  CHECK_NEAR(physics->figures.accuracy.tick.load, SHARE * 0.06 / 0.05, 1e-9);
+  CHECK_NEAR(physics->counts.own.accuracy.tick.load, SHARE * 0.06 / 0.05, 1e-9);
   CHECK(tell_ticks(physics, 16, 0.05, 7) == 40); /* too few of both */
   CHECK(tell_ticks(physics, 1, 0.05, 7) == 10);  /* most of them: at once */
   world_close(&w);
@@ -122,8 +122,8 @@ TEST(room_brings_it_back_as_far_as_was_asked)
     CHECK(now == percent || now == percent + 10);
     percent = now;
   }
-  CHECK(percent == 50 && physics->figures.accuracy.tick.reason == HAP_ACCURACY_ASKED);
-  CHECK(physics->figures.accuracy.tick.turns == 4);
+  CHECK(percent == 50 && physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_ASKED);
+  CHECK(physics->counts.own.accuracy.tick.turns == 4);
   for (int i = 0; i < 100; ++i) {
     CHECK(tell_ticks(physics, 100, 0.07, 0) == 50);
   }
@@ -159,7 +159,7 @@ TEST(cycles_that_are_over_turn_physics)
   CHECK(tell_cycles(physics, 3, 5.5 * MS) == 50);
   CHECK(tell_cycles(physics, 1, 5.5 * MS) == 40);
   CHECK(tell_cycles(physics, 1, 8.0 * MS) == 30); /* one alone, by more than half */
-  CHECK(physics->figures.accuracy.physics.reason == HAP_ACCURACY_BUDGET);
+  CHECK(physics->counts.own.accuracy.physics.reason == HAP_ACCURACY_BUDGET);
   CHECK(tell_cycles(physics, 400, 1.0 * MS) == 50);
   CHECK(physics->dial.sides[HAPI_DIAL_TICK].percent == 50);
   world_close(&w);
@@ -220,7 +220,7 @@ TEST(a_larger_error_turns_both_up_and_a_small_one_down)
   CHECK(tell_error(physics, 1, 9.0 * WANTED) == 60); /* left out */
   CHECK(tell_error(physics, 1, 9.0 * WANTED) == 70); /* one step, however wrong it was */
   CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 70);
-  CHECK(physics->figures.accuracy.tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_ERROR);
   CHECK(tell_error(physics, 2, 0.2 * WANTED) == 70); /* not for long enough */
   CHECK(tell_error(physics, 40, 0.2 * WANTED) < 70);
   world_close(&w);

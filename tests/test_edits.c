@@ -34,7 +34,7 @@ static hap_pointer_state state_of(stage *s, hap_pointer_id id)
 
 static const hapi_known_body *known_of(stage *s)
 {
-  const hapi_body_table *table = &s->session->physics->table;
+  const hapi_body_table *table = &s->session->physics->world.bodies;
   return &table->entries[hapi_bodies_find(table, s->cube)];
 }
 

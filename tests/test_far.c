@@ -166,7 +166,7 @@ static bool open_far(test_world *w)
 
 static const hapi_known_body *known_of(const test_world *w, dBodyID body)
 {
-  const hapi_body_table *table = &world_physics(w)->table;
+  const hapi_body_table *table = &world_physics(w)->world.bodies;
   return &table->entries[hapi_bodies_find(table, body)];
 }
 
@@ -192,7 +192,7 @@ TEST(the_fastest_of_all_bodies_sets_the_reach)
 {
   test_world w;
   REQUIRE(open_far(&w));
-  const hapi_neighborhood *hood = &world_physics(&w)->neighborhood;
+  const hapi_neighbors *hood = &world_physics(&w)->near.neighbors;
   dBodySetLinearVel(w.bodies[FAR_BODIES / 2], 0, 3.0, 0);
   world_step(&w, 1);
   CHECK(hood->fastest > 3.0 && hood->fastest < 3.1);
@@ -289,7 +289,7 @@ TEST(a_bad_geom_is_found_behind_a_bad_pose)
 
 static void check_table(const test_world *w, int count)
 {
-  const hapi_body_table *table = &world_physics(w)->table;
+  const hapi_body_table *table = &world_physics(w)->world.bodies;
   CHECK(table->used == (uint32_t)count);
   for (int i = 0; i < w->body_count; ++i) {
     uint32_t index = w->bodies[i] != NULL ? hapi_bodies_find(table, w->bodies[i]) : HAPI_NONE;

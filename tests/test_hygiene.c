@@ -256,7 +256,7 @@ TEST(a_velocity_that_a_step_made_is_in_no_residual)
   const hapi_body_slot *slot = world_slot(&t.w, t.w.bodies[0]);
   REQUIRE(slot != NULL);
   dBodySetLinearVel(t.w.bodies[0], no_number, 0.0, 0.0);
-  physics->has_new_state = true;
+  physics->cycle.has_new_state = true;
   hapi_reconcile_residual(physics);
   CHECK(hapi_finite(slot->residual, 6));
   dBodySetLinearVel(t.w.bodies[0], 0.0, 0.0, 0.0);

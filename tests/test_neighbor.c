@@ -231,8 +231,9 @@ TEST(a_body_is_touched_at_two_geoms)
   hapi_physics *physics = world_physics(&w);
   double sum = 0.0;
   for (uint32_t i = 0; i < 2; ++i) {
-    CHECK(physics->contacts[i].phase == HAPI_SLOT_LIVE && physics->contacts[i].probed);
-    sum += physics->contacts[i].distance;
+    CHECK(physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE &&
+          physics->near.slots.contacts[i].probed);
+    sum += physics->near.slots.contacts[i].distance;
   }
   CHECK_NEAR(sum, 0.002 + 0.01, 1e-9);
   world_close(&w);
@@ -265,7 +266,7 @@ TEST(nested_spaces_are_searched)
   check_contact(&w, cube, &e);
   world_step(&w, 2);
   check_contact(&w, cube, &e);
-  CHECK(world_physics(&w)->table.used == 1);
+  CHECK(world_physics(&w)->world.bodies.used == 1);
   world_close(&w);
 }
 

@@ -502,8 +502,8 @@ static int count_roles(const contact_world *w, uint32_t flag)
 {
   const hapi_physics *physics = w->session->physics;
   int count = 0;
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    const hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    const hapi_body_slot *slot = &physics->near.slots.bodies[i];
     count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & flag) != 0;
   }
   return count;

@@ -266,7 +266,7 @@ static void unsettle(test_world *w)
 
 static bool under_test(const test_world *w, dBodyID body)
 {
-  const hapi_body_table *table = &world_physics(w)->table;
+  const hapi_body_table *table = &world_physics(w)->world.bodies;
   uint32_t known = hapi_bodies_find(table, body);
   return known != HAPI_NONE && table->entries[known].island != HAPI_NONE;
 }
@@ -295,9 +295,9 @@ TEST(probes_leave_every_bit)
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &before[i]);
   }
-  uint64_t probes = world_physics(&w)->figures.stats.probe_steps;
+  uint64_t probes = world_physics(&w)->counts.own.stats.probe_steps;
   hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->figures.stats.probe_steps >= probes + 4);
+  CHECK(world_physics(&w)->counts.own.stats.probe_steps >= probes + 4);
   CHECK(dRandGetSeed() == 123456789);
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &after[i]);
@@ -351,9 +351,9 @@ TEST(callbacks_are_silent_in_probes)
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(moved_calls == w.body_count); /* once for each body that the step moved */
   int surfaces = w.surface_calls;
-  uint64_t probes = world_physics(&w)->figures.stats.probe_steps;
+  uint64_t probes = world_physics(&w)->counts.own.stats.probe_steps;
   hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->figures.stats.probe_steps >= probes + 4);
+  CHECK(world_physics(&w)->counts.own.stats.probe_steps >= probes + 4);
   CHECK(moved_calls == w.body_count);
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(w.surface_calls == surfaces);

@@ -81,3 +81,22 @@ void hapi_free(void *memory)
     current.release(memory, current.user);
   }
 }
+
+bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
+{
+  if (used + count <= *capacity) {
+    return true;
+  }
+  uint32_t wanted = 2 * (used + count) + 64;
+  void *more = hapi_alloc_array(wanted, size);
+  if (more == NULL) {
+    return false;
+  }
+  if (used > 0) {
+    memcpy(more, *array, used * size);
+  }
+  hapi_free(*array);
+  *array = more;
+  *capacity = wanted;
+  return true;
+}

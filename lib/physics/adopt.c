@@ -19,18 +19,19 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 {
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    if (physics->contacts[i].phase == HAPI_SLOT_LIVE && physics->contacts[i].geom == geom) {
-      physics->contacts[i].phase = HAPI_SLOT_FREE;
+  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
+    if (physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE &&
+        physics->near.slots.contacts[i].geom == geom) {
+      physics->near.slots.contacts[i].phase = HAPI_SLOT_FREE;
     }
   }
-  for (uint32_t i = 0; i < physics->neighborhood.candidate_count; ++i) {
-    hapi_candidate *candidate = &physics->neighborhood.candidates[i];
+  for (uint32_t i = 0; i < physics->near.neighbors.candidate_count; ++i) {
+    hapi_candidate *candidate = &physics->near.neighbors.candidates[i];
     candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
   }
-  physics->table.geoms_forgotten = true;
-  hapi_range_forget_geom(&physics->range, (dGeomID)(uintptr_t)geom);
-  hapi_meshes_forget(&physics->meshes, (dGeomID)(uintptr_t)geom);
+  physics->world.bodies.geoms_forgotten = true;
+  hapi_range_forget_geom(&physics->near.range, (dGeomID)(uintptr_t)geom);
+  hapi_meshes_forget(&physics->near.meshes, (dGeomID)(uintptr_t)geom);
 }
 
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
@@ -51,12 +52,12 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
     return status;
   }
   for (size_t i = 0; i < count; ++i) {
-    watch[i] = hapi_bodies_find(&physics->table, bodies[i]);
+    watch[i] = hapi_bodies_find(&physics->world.bodies, bodies[i]);
     if (watch[i] == HAPI_NONE) {
       return HAP_ERROR_NOT_FOUND;
     }
   }
-  memcpy(physics->watch, watch, count * sizeof watch[0]);
-  physics->watch_count = (uint32_t)count;
+  memcpy(physics->account.watch, watch, count * sizeof watch[0]);
+  physics->account.watch_count = (uint32_t)count;
   return HAP_OK;
 }

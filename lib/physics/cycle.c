@@ -36,14 +36,15 @@ static double lead_of(const hapi_physics *physics, hap_model model)
 static void follow_model(hapi_physics *physics)
 {
   hap_model wanted = hapi_tape_wanted_model(physics, false);
-  double since_last = physics->probe_step_s;
-  physics->step_s = since_last + lead_of(physics, wanted) - lead_of(physics, physics->model);
-  if (physics->step_s < 1e-9) {
-    physics->step_s = 0.0;
+  double since_last = physics->cycle.probe_step_s;
+  physics->cycle.step_s =
+      since_last + lead_of(physics, wanted) - lead_of(physics, physics->cycle.model);
+  if (physics->cycle.step_s < 1e-9) {
+    physics->cycle.step_s = 0.0;
   }
-  physics->model = wanted;
-  physics->wishes = hapi_tape_wanted_effects(physics);
-  physics->probe_step_s =
+  physics->cycle.model = wanted;
+  physics->cycle.wishes = hapi_tape_wanted_effects(physics);
+  physics->cycle.probe_step_s =
       1.0 / (wanted == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
 }
 
@@ -68,23 +69,23 @@ static bool world_is_sound(hapi_physics *physics)
 
 static void global_step(hapi_physics *physics)
 {
-  if (physics->step_s <= 0.0) {
+  if (physics->cycle.step_s <= 0.0) {
     return;
   }
-  hapi_sleep_step(physics, physics->step_s);
+  hapi_sleep_step(physics, physics->cycle.step_s);
   hapi_reconcile_hold(physics);
   hapi_world_convert(physics);
-  hapi_world_quickstep(physics, physics->step_s);
+  hapi_world_quickstep(physics, physics->cycle.step_s);
   hapi_world_restore(physics);
   hapi_reconcile_let_go(physics);
 }
 
 static void call_step(hapi_physics *physics, hap_step_fn callback)
 {
-  if (callback != NULL && physics->step_s > 0.0) {
-    physics->editable = true;
-    callback(physics->ode.user, physics->step_s);
-    physics->editable = false;
+  if (callback != NULL && physics->cycle.step_s > 0.0) {
+    physics->lock.editable = true;
+    callback(physics->world.ode.user, physics->cycle.step_s);
+    physics->lock.editable = false;
   }
 }
 
@@ -94,13 +95,13 @@ static void sync_in(hapi_physics *physics)
   follow_model(physics);
   hapi_dial_follow(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
-  call_step(physics, physics->ode.before_step);
+  call_step(physics, physics->world.ode.before_step);
   if (hapi_bodies_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   int64_t begin_ns = hapi_clock_now();
   hapi_joints_scan(physics);
-  physics->figures.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_reconcile_take(physics);
   hapi_reconcile_own(physics);
 }
@@ -108,27 +109,28 @@ static void sync_in(hapi_physics *physics)
 static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   int64_t half_tick = (int64_t)(0.5e9 / physics->config.haptic_hz); /* clocks are rounded */
-  int64_t state_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns : now_ns;
+  int64_t state_ns = physics->cycle.model == HAP_MODEL_IMPULSE ? next_ns : now_ns;
   int64_t valid_ns = state_ns;
-  if (physics->model != HAP_MODEL_SINGLE && physics->latency_s >= 0.0) {
-    valid_ns = now_ns + (int64_t)llround(1e9 * physics->latency_s);
-  } else if (physics->model >= HAP_MODEL_ACCELERANCE && physics->config.lockstep &&
-             !hapi_tape_plays(physics->tape)) {
+  if (physics->cycle.model != HAP_MODEL_SINGLE && physics->wanted.latency_s >= 0.0) {
+    valid_ns = now_ns + (int64_t)llround(1e9 * physics->wanted.latency_s);
+  } else if (physics->cycle.model >= HAP_MODEL_ACCELERANCE && physics->config.lockstep &&
+             !hapi_tape_plays(physics->tape.tape)) {
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
   hapi_joints_leave(physics);
-  physics->last_cycle_ns = now_ns;
+  physics->cycle.last_cycle_ns = now_ns;
   /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
-  int64_t lag_ns = physics->model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;
-  hapi_poses_publish(physics, physics->model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
+  int64_t lag_ns = physics->cycle.model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;
+  hapi_poses_publish(physics,
+                     physics->cycle.model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
                      physics->config.lockstep ? now_ns : hapi_clock_now());
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)
 {
-  hapi_physics_counts *f = &physics->figures;
+  hapi_physics_counts *f = &physics->counts.own;
   hap_stats *s = &f->stats;
   double total = seconds[0] + seconds[1] + seconds[2] + seconds[3] + seconds[4];
   f->collide_s += seconds[0];
@@ -137,13 +139,13 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
   f->step_s += seconds[3];
   f->publish_s += seconds[4];
   ++f->cycles;
-  s->physics_steps += physics->step_s > 0.0;
+  s->physics_steps += physics->cycle.step_s > 0.0;
   s->last_collide_ms = 1e3 * seconds[0];
   s->last_neighbour_ms = 1e3 * seconds[1];
   s->last_testing_ms = 1e3 * seconds[2];
   s->last_step_ms = 1e3 * seconds[3];
   s->last_publish_ms = 1e3 * seconds[4];
-  hapi_histogram_add(&physics->cycle_ns, (int64_t)(1e9 * total));
+  hapi_histogram_add(&physics->counts.cycle_ns, (int64_t)(1e9 * total));
   hapi_dial_note(physics, total, looked_s);
   hapi_counts_show(physics);
 }
@@ -153,7 +155,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
-  dJointGroupEmpty(physics->contact_group);
+  dJointGroupEmpty(physics->world.contact_group);
   seconds[0] = lap(&watch);
   sync_in(physics);
   if (!world_is_sound(physics)) {
@@ -163,7 +165,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[4] = lap(&watch);
   hapi_lookback_follow(physics, now_ns);
   double looked_s = seconds[2] = lap(&watch);
-  if (physics->model == HAP_MODEL_IMPULSE) {
+  if (physics->cycle.model == HAP_MODEL_IMPULSE) {
     hapi_lookback_open(physics, now_ns);
   }
   hapi_reconcile_push(physics);
@@ -177,8 +179,8 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_reconcile_residual(physics);
   hapi_reconcile_overwrite(physics);
   hapi_neighbors_find(physics);
-  seconds[1] += lap(&watch) - physics->range.cover.boxes_s;
-  seconds[0] += physics->range.cover.boxes_s; /* which the next collision phase finds done */
+  seconds[1] += lap(&watch) - physics->near.range.cover.boxes_s;
+  seconds[0] += physics->near.range.cover.boxes_s; /* which the next collision phase finds done */
   hapi_range_error_measure(physics); /* first: it leaves the space as it finds it, which is clean */
   hapi_accelerance_measure(physics);
   hapi_operating_point_measure(physics);
@@ -186,13 +188,13 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[2] += lap(&watch);
   hapi_lookback_note(physics);
   sync_out(physics, now_ns, next_ns);
-  if (physics->model != HAP_MODEL_IMPULSE) {
+  if (physics->cycle.model != HAP_MODEL_IMPULSE) {
     hapi_lookback_open(physics, now_ns);
   }
   hapi_dial_leave(physics);
   seconds[4] += lap(&watch);
   note_times(physics, seconds, looked_s);
-  call_step(physics, physics->ode.after_step);
+  call_step(physics, physics->world.ode.after_step);
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)

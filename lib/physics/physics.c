@@ -19,34 +19,39 @@
 static bool allocate(hapi_physics *physics)
 {
   const hapi_capacity *c = &physics->config.capacity;
-  hapi_neighborhood *hood = &physics->neighborhood;
+  hapi_neighbors *hood = &physics->near.neighbors;
   hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts; /* grows when needed */
-  physics->bodies = hapi_alloc_array(c->bodies, sizeof *physics->bodies);
-  physics->contacts = hapi_alloc_array(c->contacts, sizeof *physics->contacts);
-  physics->crosses = hapi_alloc_array(c->crosses, sizeof *physics->crosses);
+  physics->near.slots.bodies = hapi_alloc_array(c->bodies, sizeof *physics->near.slots.bodies);
+  physics->near.slots.contacts =
+      hapi_alloc_array(c->contacts, sizeof *physics->near.slots.contacts);
+  physics->research.crosses = hapi_alloc_array(c->crosses, sizeof *physics->research.crosses);
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
-  physics->test.contacts = hapi_alloc_array(c->contacts, sizeof *physics->test.contacts);
-  physics->test.bodies = hapi_alloc_array(c->bodies, sizeof *physics->test.bodies);
-  physics->test.base = hapi_alloc_array(c->bodies, sizeof *physics->test.base);
-  physics->test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->test.rounds);
+  physics->probe.test.contacts =
+      hapi_alloc_array(c->contacts, sizeof *physics->probe.test.contacts);
+  physics->probe.test.bodies = hapi_alloc_array(c->bodies, sizeof *physics->probe.test.bodies);
+  physics->probe.test.base = hapi_alloc_array(c->bodies, sizeof *physics->probe.test.base);
+  physics->probe.test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->probe.test.rounds);
   hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
   hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
-  physics->contact_scratch =
-      hapi_alloc_array((size_t)physics->ode.max_contacts_per_pair, sizeof(dContact));
-  return physics->bodies != NULL && physics->contacts != NULL && physics->crosses != NULL &&
-         hood->candidates != NULL && hood->hits != NULL && hood->vertices != NULL &&
-         hood->hull != NULL && physics->test.contacts != NULL && physics->test.rounds != NULL &&
-         physics->test.bodies != NULL && physics->test.base != NULL && hapi_range_create(physics) &&
+  physics->world.contact_scratch =
+      hapi_alloc_array((size_t)physics->world.ode.max_contacts_per_pair, sizeof(dContact));
+  return physics->near.slots.bodies != NULL && physics->near.slots.contacts != NULL &&
+         physics->research.crosses != NULL && hood->candidates != NULL && hood->hits != NULL &&
+         hood->vertices != NULL && hood->hull != NULL && physics->probe.test.contacts != NULL &&
+         physics->probe.test.rounds != NULL && physics->probe.test.bodies != NULL &&
+         physics->probe.test.base != NULL && hapi_range_create(physics) &&
          hapi_joints_create(physics) && hapi_cover_create(&hood->cover) &&
-         physics->contact_scratch != NULL && hapi_bodies_init(&physics->table) == HAP_OK;
+         physics->world.contact_scratch != NULL &&
+         hapi_bodies_init(&physics->world.bodies) == HAP_OK;
 }
 
 static bool init_locks(hapi_physics *physics)
 {
-  return pthread_mutex_init(&physics->edits_lock, NULL) == 0 &&
-         pthread_mutex_init(&physics->poses_lock, NULL) == 0 &&
-         pthread_mutex_init(&physics->shown_lock, NULL) == 0 && hapi_fair_lock_init(&physics->lock);
+  return pthread_mutex_init(&physics->edits.lock, NULL) == 0 &&
+         pthread_mutex_init(&physics->drawing.lock, NULL) == 0 &&
+         pthread_mutex_init(&physics->counts.lock, NULL) == 0 &&
+         hapi_fair_lock_init(&physics->lock.fair);
 }
 
 /* The world as it is must be one that can be stepped. */
@@ -65,9 +70,9 @@ static hap_status check_world(hapi_physics *physics, hap_detail *detail)
 
 static void release_bodies(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    if (physics->table.entries[i].body != NULL) {
-      hapi_sleep_give_back(&physics->table.entries[i]);
+  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
+    if (physics->world.bodies.entries[i].body != NULL) {
+      hapi_sleep_give_back(&physics->world.bodies.entries[i]);
     }
   }
 }
@@ -80,17 +85,18 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   if (physics == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
-  if (!hapi_claim_take(&physics->claim, ode->world)) {
+  if (!hapi_claim_take(&physics->world.claim, ode->world)) {
     hapi_free(physics);
     return hapi_fail(detail, HAP_ERROR_STATE,
                      "the world already has a session: destroy that one first");
   }
   physics->config = *config;
-  physics->ode = *ode;
-  physics->model = config->model;
-  physics->latency_s = -1.0;
-  atomic_init(&physics->wanted_model, (int)config->model);
-  atomic_init(&physics->wanted_effects, config->effects);
+  physics->cycle.config = &physics->config;
+  physics->world.ode = *ode;
+  physics->cycle.model = config->model;
+  physics->wanted.latency_s = -1.0;
+  atomic_init(&physics->wanted.model, (int)config->model);
+  atomic_init(&physics->wanted.effects, config->effects);
   physics->dial.knobs = config->knobs;
   atomic_init(&physics->dial.wanted, config->accuracy);
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
@@ -100,10 +106,10 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
-  physics->neighborhood.probe_geom = dCreateSphere(NULL, 1.0);
-  physics->neighborhood.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
-  physics->contact_group = dJointGroupCreate(0);
-  physics->carried_group = dJointGroupCreate(0);
+  physics->near.neighbors.probe_geom = dCreateSphere(NULL, 1.0);
+  physics->near.neighbors.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
+  physics->world.contact_group = dJointGroupCreate(0);
+  physics->world.carried_group = dJointGroupCreate(0);
   hapi_slots_reset(physics);
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
@@ -120,61 +126,62 @@ void hapi_physics_destroy(hapi_physics *physics)
     return;
   }
   hapi_physics_end(physics);
-  if (physics->neighborhood.probe_geom != NULL) {
-    dGeomDestroy(physics->neighborhood.probe_geom);
-    dGeomDestroy(physics->neighborhood.plane_geom);
+  if (physics->near.neighbors.probe_geom != NULL) {
+    dGeomDestroy(physics->near.neighbors.probe_geom);
+    dGeomDestroy(physics->near.neighbors.plane_geom);
   }
-  if (physics->contact_group != NULL) {
-    dJointGroupDestroy(physics->contact_group);
-    dJointGroupDestroy(physics->carried_group);
+  if (physics->world.contact_group != NULL) {
+    dJointGroupDestroy(physics->world.contact_group);
+    dJointGroupDestroy(physics->world.carried_group);
   }
-  hapi_bodies_finish(&physics->table);
-  hapi_free(physics->surfaces.entries);
+  hapi_bodies_finish(&physics->world.bodies);
+  hapi_free(physics->world.surfaces.entries);
   hapi_range_finish(physics);
-  hapi_joints_finish(&physics->joints);
-  hapi_meshes_finish(&physics->meshes);
-  hapi_snapshot_finish(&physics->snapshot);
-  hapi_test_finish(&physics->test);
+  hapi_joints_finish(&physics->world.joints);
+  hapi_meshes_finish(&physics->near.meshes);
+  hapi_snapshot_finish(&physics->probe.snapshot);
+  hapi_test_finish(&physics->probe.test);
   hapi_reuse_finish(physics);
   hapi_lookback_finish(&physics->lookback);
-  hapi_free(physics->bodies);
-  hapi_free(physics->contacts);
-  hapi_free(physics->crosses);
-  hapi_cover_finish(&physics->neighborhood.cover);
-  hapi_free(physics->neighborhood.candidates);
-  hapi_free(physics->neighborhood.hits);
-  hapi_free(physics->tools.points);
-  hapi_free(physics->neighborhood.vertices);
-  hapi_free(physics->neighborhood.hull);
-  hapi_free(physics->contact_scratch);
-  hapi_fair_lock_finish(&physics->lock);
-  pthread_mutex_destroy(&physics->edits_lock);
-  pthread_mutex_destroy(&physics->poses_lock);
-  pthread_mutex_destroy(&physics->shown_lock);
-  hapi_claim_release(&physics->claim);
+  hapi_free(physics->near.slots.bodies);
+  hapi_free(physics->near.slots.contacts);
+  hapi_free(physics->research.crosses);
+  hapi_cover_finish(&physics->near.neighbors.cover);
+  hapi_free(physics->near.neighbors.candidates);
+  hapi_free(physics->near.neighbors.hits);
+  hapi_free(physics->near.tools.points);
+  hapi_free(physics->near.neighbors.vertices);
+  hapi_free(physics->near.neighbors.hull);
+  hapi_free(physics->world.contact_scratch);
+  hapi_fair_lock_finish(&physics->lock.fair);
+  pthread_mutex_destroy(&physics->edits.lock);
+  pthread_mutex_destroy(&physics->drawing.lock);
+  pthread_mutex_destroy(&physics->counts.lock);
+  hapi_claim_release(&physics->world.claim);
   hapi_free(physics);
 }
 
 static void give_world_back(hapi_physics *physics)
 {
-  dJointGroupEmpty(physics->contact_group);
-  dJointGroupEmpty(physics->carried_group);
+  dJointGroupEmpty(physics->world.contact_group);
+  dJointGroupEmpty(physics->world.carried_group);
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_bodies_scan(physics); /* a body without memory for it was given nothing */
   release_bodies(physics);
   hapi_islands_end(physics);
-  if (physics->islands_threads != 0) {
-    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, physics->islands_threads);
-    physics->islands_threads = 0;
+  if (physics->world.islands_threads != 0) {
+    dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world,
+                                                 physics->world.islands_threads);
+    physics->world.islands_threads = 0;
   }
   physics->begun = false;
 }
 
 static void reset_figures(hapi_physics *physics)
 {
-  memset(&physics->figures, 0, sizeof physics->figures);
-  hapi_histogram_reset(&physics->cycle_ns);
-  hapi_lock_figures_reset(&physics->lock_figures);
+  memset(&physics->counts.own, 0, sizeof physics->counts.own);
+  hapi_histogram_reset(&physics->counts.cycle_ns);
+  hapi_lock_figures_reset(&physics->lock.figures);
   hapi_counts_show(physics);
 }
 
@@ -203,21 +210,22 @@ static void prepare(hapi_physics *physics)
   hapi_lookback_reset(physics);
   hapi_dial_reset(physics);
   hapi_reuse_reset(physics);
-  hapi_meshes_finish(&physics->meshes); /* the application may have changed them */
-  physics->model = (hap_model)atomic_load(&physics->wanted_model);
-  physics->wishes = atomic_load(&physics->wanted_effects);
-  physics->probe_step_s = hapi_period_of(physics, physics->model);
-  physics->state = NULL;
-  physics->step_s = 0.0;
-  physics->model_number = 0;
-  physics->cross_count = 0;
+  hapi_meshes_finish(&physics->near.meshes); /* the application may have changed them */
+  physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
+  physics->cycle.wishes = atomic_load(&physics->wanted.effects);
+  physics->cycle.probe_step_s = hapi_period_of(physics, physics->cycle.model);
+  physics->cycle.state = NULL;
+  physics->cycle.step_s = 0.0;
+  physics->cycle.model_number = 0;
+  physics->research.cross_count = 0;
   physics->world_faulty = false;
-  physics->table.said_lost = false;
-  physics->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->ode.world);
-  if (physics->config.lockstep || physics->tape != NULL) {
-    dWorldSetStepIslandsProcessingMaxThreadCount(physics->ode.world, 1);
+  physics->world.bodies.said_lost = false;
+  physics->world.islands_threads =
+      dWorldGetStepIslandsProcessingMaxThreadCount(physics->world.ode.world);
+  if (physics->config.lockstep || physics->tape.tape != NULL) {
+    dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world, 1);
   }
-  if (physics->config.lockstep && physics->tape == NULL) {
+  if (physics->config.lockstep && physics->tape.tape == NULL) {
     dRandSetSeed(0);
   }
 }
@@ -238,15 +246,15 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   if (!hapi_islands_begin(physics)) {
     give_world_back(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for island_threads = %d",
-                     physics->ode.island_threads);
+                     physics->world.ode.island_threads);
   }
   hapi_physics_claim(physics); /* surfaces are asked for */
   prepare(physics);
   build_first_model(physics);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
   hapi_tape_start(physics, start_ns);
-  physics->start_ns = *start_ns;
-  physics->last_cycle_ns = *start_ns;
+  physics->pace.start_ns = *start_ns;
+  physics->cycle.last_cycle_ns = *start_ns;
   hapi_poses_reset(physics);
   hapi_poses_publish(physics, *start_ns, *start_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
@@ -274,51 +282,51 @@ void hapi_physics_end(hapi_physics *physics)
 
 int64_t hapi_physics_last_cycle(const hapi_physics *physics)
 {
-  return physics->last_cycle_ns;
+  return physics->cycle.last_cycle_ns;
 }
 
 double hapi_physics_period(const hapi_physics *physics)
 {
-  return hapi_period_of(physics, physics->model);
+  return hapi_period_of(physics, physics->cycle.model);
 }
 
 double hapi_physics_next_period(const hapi_physics *physics)
 {
-  return hapi_period_of(physics, (hap_model)atomic_load(&physics->wanted_model));
+  return hapi_period_of(physics, (hap_model)atomic_load(&physics->wanted.model));
 }
 
 void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)
 {
-  physics->tape = tape;
+  physics->tape.tape = tape;
 }
 
 void hapi_physics_set_latency(hapi_physics *physics, double seconds)
 {
-  physics->latency_s = seconds;
+  physics->wanted.latency_s = seconds;
 }
 
 void hapi_physics_set_model(hapi_physics *physics, hap_model model)
 {
-  atomic_store(&physics->wanted_model, (int)model);
+  atomic_store(&physics->wanted.model, (int)model);
 }
 
 hap_model hapi_physics_wanted_model(hapi_physics *physics)
 {
-  return (hap_model)atomic_load(&physics->wanted_model);
+  return (hap_model)atomic_load(&physics->wanted.model);
 }
 
 /* Several threads may wish for something at a time. */
 void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effect_wish wish)
 {
-  uint32_t before = atomic_load(&physics->wanted_effects);
-  while (!atomic_compare_exchange_weak(&physics->wanted_effects, &before,
+  uint32_t before = atomic_load(&physics->wanted.effects);
+  while (!atomic_compare_exchange_weak(&physics->wanted.effects, &before,
                                        hapi_wish_set(before, effect, wish))) {
   }
 }
 
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics)
 {
-  return atomic_load(&physics->wanted_effects);
+  return atomic_load(&physics->wanted.effects);
 }
 
 void hapi_physics_set_accuracy(hapi_physics *physics, double accuracy)
@@ -339,14 +347,5 @@ void hapi_physics_set_budget(hapi_physics *physics, double tick_share, double ph
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
-  return physics->model != HAP_MODEL_IMPULSE;
-}
-
-void hapi_physics_say_once(hapi_physics *physics, bool *io_said, const char *text)
-{
-  if (!*io_said) {
-    hapi_log(HAP_LOG_WARNING, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
-  }
-  *io_said = true;
+  return physics->cycle.model != HAP_MODEL_IMPULSE;
 }

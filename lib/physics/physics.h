@@ -14,37 +14,13 @@
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
-#include "physics/dial_settings.h"
 #include "record/tape.h"
-#include "sync/exchange.h"
+#include "world/config.h"
 
 struct hap_ode_def;
 struct dxBody; /* dBodyID is a pointer to it */
 
 typedef struct hapi_physics hapi_physics;
-
-typedef struct hapi_physics_config {
-  hapi_capacity capacity;
-  uint32_t max_bodies; /* that the loop may move itself; capacity.bodies is more */
-  hap_model model;
-  hap_impulse_pose impulse_pose;
-  hapi_knobs knobs;
-  double accuracy; /* as in hap_session_def, also the next three */
-  double force_error_wanted;
-  double tick_share;
-  double physics_share;
-  uint32_t effects; /* wishes at the start, base/wishes.h */
-  double physics_hz;
-  double haptic_hz;
-  double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
-  bool lockstep;
-  bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
-  int rt_priority;
-  hapi_exchange *exchange;
-  /* [physics] HAP_FAULT_NONE: something that the application should know, but no fault */
-  void (*report)(void *user, hap_fault fault, const char *text);
-  void *user;
-} hapi_physics_config;
 
 hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
                                hapi_physics **out, hap_detail *detail);

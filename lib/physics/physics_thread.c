@@ -16,8 +16,8 @@ static int64_t nanoseconds(double seconds)
 
 static void count_missed(hapi_physics *physics, int64_t deadlines)
 {
-  physics->figures.stats.physics_missed += (uint64_t)deadlines; /* shown with the next cycle */
-  physics->missed_unrecorded += (uint32_t)deadlines;
+  physics->counts.own.stats.physics_missed += (uint64_t)deadlines; /* shown with the next cycle */
+  physics->tape.missed_unrecorded += (uint32_t)deadlines;
 }
 
 /* Where the next cycle belongs: at its deadline, or, when that has passed by whole periods, at the
@@ -37,12 +37,12 @@ static void *physics_main(void *arg)
   hapi_physics *physics = arg;
   dAllocateODEDataForThread(dAllocateMaskAll);
   int64_t period = nanoseconds(hapi_physics_period(physics));
-  int64_t deadline = physics->start_ns;
+  int64_t deadline = physics->pace.start_ns;
   if (hapi_physics_steps_to_now(physics)) {
     deadline += period; /* the first model is for the start already */
   }
-  while (atomic_load_explicit(&physics->stop, memory_order_acquire) == 0) {
-    bool single = physics->model == HAP_MODEL_SINGLE;
+  while (atomic_load_explicit(&physics->pace.stop, memory_order_acquire) == 0) {
+    bool single = physics->cycle.model == HAP_MODEL_SINGLE;
     /* SINGLE works between two ticks: after the one before its time and before the one at it. */
     hapi_clock_sleep_until(single ? deadline - period / 2 : deadline);
     hapi_physics_cycle(physics, deadline,
@@ -56,13 +56,13 @@ static void *physics_main(void *arg)
 
 hap_status hapi_physics_start_thread(hapi_physics *physics)
 {
-  atomic_store(&physics->stop, 0);
-  return hapi_thread_start(&physics->thread, physics_main, physics, "hapode-physics",
+  atomic_store(&physics->pace.stop, 0);
+  return hapi_thread_start(&physics->pace.thread, physics_main, physics, "hapode-physics",
                            physics->config.rt_priority / 2);
 }
 
 void hapi_physics_stop_thread(hapi_physics *physics)
 {
-  atomic_store(&physics->stop, 1);
-  hapi_thread_join(&physics->thread);
+  atomic_store(&physics->pace.stop, 1);
+  hapi_thread_join(&physics->pace.thread);
 }

@@ -62,7 +62,7 @@ static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
  * frame loop leaves two steps close together. */
 static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
 {
-  hapi_frames *frames = &physics->frames;
+  hapi_frames *frames = &physics->drawing.frames;
   double step = step_ns(physics);
   if (frames->count == 0) {
     frames->delay_ns = frames->delay_wanted_ns = step;
@@ -74,7 +74,7 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
          frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
     --frames->count;
   }
-  if (physics->model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
+  if (physics->cycle.model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
     int64_t newest = frames->stamps[(frames->count - 1) % HAPI_FRAMES];
     int64_t before = frames->stamps[(frames->count - 2) % HAPI_FRAMES];
     frames->count -= (double)(newest - before) < FRAMES_APART * step;
@@ -101,8 +101,9 @@ bool hapi_pose_is_sound(dBodyID body)
 /* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it exactly. */
 static bool led_by_loop(const hapi_physics *physics, const hapi_known_body *known)
 {
-  bool pushed = physics->model == HAP_MODEL_ACCELERANCE || physics->model == HAP_MODEL_CONTACT;
-  pushed = pushed && known->slot != HAPI_NONE && physics->bodies[known->slot].pushed;
+  bool pushed =
+      physics->cycle.model == HAP_MODEL_ACCELERANCE || physics->cycle.model == HAP_MODEL_CONTACT;
+  pushed = pushed && known->slot != HAPI_NONE && physics->near.slots.bodies[known->slot].pushed;
   return known->loop_owned || pushed;
 }
 
@@ -111,7 +112,7 @@ static void note_slot(const hapi_physics *physics, const hapi_known_body *known,
   if (known->slot == HAPI_NONE) {
     return;
   }
-  uint32_t generation = physics->bodies[known->slot].generation;
+  uint32_t generation = physics->near.slots.bodies[known->slot].generation;
   if (drawn->slots[0] != known->slot || drawn->generations[0] != generation) {
     drawn->slots[1] = drawn->slots[0];
     drawn->generations[1] = drawn->generations[0];
@@ -127,14 +128,15 @@ static hap_pose *pose_in(const hapi_body_table *table, const hapi_drawn *drawn, 
 
 static void add_pose(const hapi_physics *physics, uint32_t index, uint64_t frame)
 {
-  const hapi_known_body *known = &physics->table.entries[index];
-  hapi_drawn *drawn = &physics->table.drawn[index];
+  const hapi_known_body *known = &physics->world.bodies.entries[index];
+  hapi_drawn *drawn = &physics->world.bodies.drawn[index];
   uint32_t bit = 1u << (frame % HAPI_FRAMES);
   if (hapi_pose_is_sound(known->body)) {
-    hapi_pose_read(known->body, pose_in(&physics->table, drawn, frame));
+    hapi_pose_read(known->body, pose_in(&physics->world.bodies, drawn, frame));
     drawn->first = drawn->first > frame ? frame : drawn->first;
   } else if (drawn->first < frame) {
-    *pose_in(&physics->table, drawn, frame) = *pose_in(&physics->table, drawn, frame - 1);
+    *pose_in(&physics->world.bodies, drawn, frame) =
+        *pose_in(&physics->world.bodies, drawn, frame - 1);
   }
   drawn->led = led_by_loop(physics, known) ? drawn->led | bit : drawn->led & ~bit;
   note_slot(physics, known, drawn);
@@ -142,23 +144,23 @@ static void add_pose(const hapi_physics *physics, uint32_t index, uint64_t frame
 
 void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
 {
-  pthread_mutex_lock(&physics->poses_lock);
+  pthread_mutex_lock(&physics->drawing.lock);
   uint64_t frame = next_frame(physics, stamp_ns, known_ns);
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    if (physics->table.entries[i].body != NULL) {
+  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
+    if (physics->world.bodies.entries[i].body != NULL) {
       add_pose(physics, i, frame);
-      if (physics->step_s > 0.0) { /* here, as each body is at hand */
-        hapi_sleep_note(&physics->table.entries[i]);
+      if (physics->cycle.step_s > 0.0) { /* here, as each body is at hand */
+        hapi_sleep_note(&physics->world.bodies.entries[i]);
       }
     }
   }
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_unlock(&physics->drawing.lock);
 }
 
 void hapi_poses_begin(hapi_physics *physics, uint32_t index)
 {
-  hapi_drawn *drawn = &physics->table.drawn[index];
-  uint64_t count = physics->frames.count;
+  hapi_drawn *drawn = &physics->world.bodies.drawn[index];
+  uint64_t count = physics->drawing.frames.count;
   memset(drawn, 0, sizeof *drawn);
   drawn->first = count;
   if (count > 0) {
@@ -168,12 +170,12 @@ void hapi_poses_begin(hapi_physics *physics, uint32_t index)
 
 void hapi_poses_reset(hapi_physics *physics)
 {
-  pthread_mutex_lock(&physics->poses_lock);
-  memset(&physics->frames, 0, sizeof physics->frames);
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    memset(&physics->table.drawn[i], 0, sizeof physics->table.drawn[i]);
+  pthread_mutex_lock(&physics->drawing.lock);
+  memset(&physics->drawing.frames, 0, sizeof physics->drawing.frames);
+  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
+    memset(&physics->world.bodies.drawn[i], 0, sizeof physics->world.bodies.drawn[i]);
   }
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_unlock(&physics->drawing.lock);
 }
 
 /* ---- drawing ---- */
@@ -209,7 +211,7 @@ static void sample_frame(const drawing *d, const hapi_drawn *drawn, uint64_t fra
 {
   out->time_ns = stamp_of(d, frame);
   out->frame = frame;
-  out->pose = *pose_in(&d->physics->table, drawn, frame);
+  out->pose = *pose_in(&d->physics->world.bodies, drawn, frame);
 }
 
 static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample *out)
@@ -282,8 +284,8 @@ static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last,
   }
   double interval = (double)(last->time_ns - stamp_of(d, before));
   double since = fmin((double)(d->time_ns - last->time_ns), step_ns(d->physics));
-  hapi_pose_slerp(pose_in(&d->physics->table, drawn, before), &last->pose, 1.0 + since / interval,
-                  out);
+  hapi_pose_slerp(pose_in(&d->physics->world.bodies, drawn, before), &last->pose,
+                  1.0 + since / interval, out);
 }
 
 static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
@@ -344,8 +346,9 @@ static hap_status judge(const drawing *d, double late_steps)
 static bool all_known(const hapi_physics *physics, struct dxBody *const *bodies, size_t count)
 {
   for (size_t i = 0; i < count; ++i) {
-    uint32_t index = hapi_bodies_find(&physics->table, bodies[i]);
-    if (index == HAPI_NONE || physics->table.drawn[index].first >= physics->frames.count) {
+    uint32_t index = hapi_bodies_find(&physics->world.bodies, bodies[i]);
+    if (index == HAPI_NONE ||
+        physics->world.bodies.drawn[index].first >= physics->drawing.frames.count) {
       return false;
     }
   }
@@ -357,7 +360,8 @@ static bool draw_all(drawing *d, struct dxBody *const *bodies, size_t count, hap
 {
   seek(d);
   for (size_t i = 0; i < count; ++i) {
-    draw(d, &d->physics->table.drawn[hapi_bodies_find(&d->physics->table, bodies[i])], &out[i]);
+    draw(d, &d->physics->world.bodies.drawn[hapi_bodies_find(&d->physics->world.bodies, bodies[i])],
+         &out[i]);
   }
   return hapi_trail_is_whole(&d->rows);
 }
@@ -365,7 +369,7 @@ static bool draw_all(drawing *d, struct dxBody *const *bodies, size_t count, hap
 static drawing begin(const hapi_physics *physics)
 {
   return (drawing){.physics = physics,
-                   .frames = &physics->frames,
+                   .frames = &physics->drawing.frames,
                    .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
 }
 
@@ -373,15 +377,15 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
                               size_t count, hap_pose *out)
 {
   hap_status status = HAP_OK;
-  pthread_mutex_lock(&physics->poses_lock);
+  pthread_mutex_lock(&physics->drawing.lock);
   bool known = all_known(physics, bodies, count);
   for (bool whole = !known || count == 0; !whole;) {
     drawing d = begin(physics);
-    d.time_ns = drawn_time(&physics->frames, time_ns);
+    d.time_ns = drawn_time(&physics->drawing.frames, time_ns);
     whole = draw_all(&d, bodies, count, out);
     status = judge(&d, 1.0);
   }
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_unlock(&physics->drawing.lock);
   return known ? status : HAP_ERROR_NOT_FOUND;
 }
 
@@ -389,7 +393,7 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
                                   hap_pose *out)
 {
   hap_status status = HAP_OK;
-  pthread_mutex_lock(&physics->poses_lock);
+  pthread_mutex_lock(&physics->drawing.lock);
   bool known = all_known(physics, bodies, count);
   for (bool whole = !known || count == 0; !whole;) {
     drawing d = begin(physics);
@@ -398,22 +402,22 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
     whole = draw_all(&d, bodies, count, out);
     status = judge(&d, 2.0);
   }
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_unlock(&physics->drawing.lock);
   return known ? status : HAP_ERROR_NOT_FOUND;
 }
 
 int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)
 {
-  pthread_mutex_lock(&physics->poses_lock);
-  int64_t time = drawn_time(&physics->frames, time_ns);
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_lock(&physics->drawing.lock);
+  int64_t time = drawn_time(&physics->drawing.frames, time_ns);
+  pthread_mutex_unlock(&physics->drawing.lock);
   return time;
 }
 
 double hapi_poses_delay(hapi_physics *physics)
 {
-  pthread_mutex_lock(&physics->poses_lock);
-  double delay = 1e-9 * physics->frames.delay_ns;
-  pthread_mutex_unlock(&physics->poses_lock);
+  pthread_mutex_lock(&physics->drawing.lock);
+  double delay = 1e-9 * physics->drawing.frames.delay_ns;
+  pthread_mutex_unlock(&physics->drawing.lock);
   return delay;
 }

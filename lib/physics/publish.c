@@ -35,7 +35,7 @@ static double keep_per_tick(const hapi_physics *physics, double damping)
  * that is the tick's to see. */
 static bool is_gyroscopic(const hapi_physics *physics, dBodyID body, const double inertia[9])
 {
-  hap_effect_wish wish = hapi_wish(physics->wishes, HAP_EFFECT_GYRO);
+  hap_effect_wish wish = hapi_wish(physics->cycle.wishes, HAP_EFFECT_GYRO);
   bool turns = dBodyGetMaxAngularSpeed(body) > 0.0;
   return dBodyGetGyroscopicMode(body) != 0 && wish != HAP_EFFECT_OFF &&
          (wish == HAP_EFFECT_ON || (turns && !hapi_turns_alike(inertia)));
@@ -56,12 +56,12 @@ static void fill_mass(const hapi_physics *physics, dBodyID body, hapi_model_body
 /* What the loop needs to move the body itself. */
 static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_model_body *out)
 {
-  const hapi_known_body *known = &physics->table.entries[slot->known];
+  const hapi_known_body *known = &physics->world.bodies.entries[slot->known];
   dBodyID body = known->body;
   fill_mass(physics, body, out);
   if (dBodyGetGravityMode(body) != 0) {
     dVector3 gravity;
-    dWorldGetGravity(physics->ode.world, gravity);
+    dWorldGetGravity(physics->world.ode.world, gravity);
     hapi_v3_copy(gravity, out->gravity);
   }
   hapi_v3_copy(known->rest->user_force, out->user_wrench);
@@ -83,8 +83,8 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
 
 static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *out)
 {
-  hapi_body_slot *slot = &physics->bodies[index];
-  dBodyID body = physics->table.entries[slot->known].body;
+  hapi_body_slot *slot = &physics->near.slots.bodies[index];
+  dBodyID body = physics->world.bodies.entries[slot->known].body;
   memset(out, 0, sizeof *out);
   out->slot = index;
   out->generation = slot->generation;
@@ -97,7 +97,7 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   memcpy(out->residual, slot->residual, sizeof out->residual);
   hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
   hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
-  if (physics->model == HAP_MODEL_CONTACT) {
+  if (physics->cycle.model == HAP_MODEL_CONTACT) {
     fill_dynamics(physics, slot, out);
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
       memset(out->b, 0, sizeof out->b); /* the loop knows it better, or nobody measured it */
@@ -108,7 +108,7 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   }
   bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
                hapi_finite(out->twist.angular, 3);
-  physics->figures.stats.states_rejected += !sound;
+  physics->counts.own.stats.states_rejected += !sound;
   return sound;
 }
 
@@ -138,7 +138,7 @@ static bool fill_tool(hapi_physics *physics, const hapi_contact_slot *slot, hapi
     return true;
   }
   if (out->tool_count == physics->config.capacity.tool_points) {
-    ++physics->figures.stats.capacity_dropped;
+    ++physics->counts.own.stats.capacity_dropped;
     return false;
   }
   hapi_model_tools(out)[out->tool_count] = slot->tool;
@@ -148,10 +148,11 @@ static bool fill_tool(hapi_physics *physics, const hapi_contact_slot *slot, hapi
 
 static void fill_watch(hapi_physics *physics, hapi_model *out)
 {
-  out->watch_count = physics->watch_count;
-  for (uint32_t i = 0; i < physics->watch_count; ++i) {
-    const hapi_known_body *known =
-        physics->watch[i] != HAPI_NONE ? &physics->table.entries[physics->watch[i]] : NULL;
+  out->watch_count = physics->account.watch_count;
+  for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
+    const hapi_known_body *known = physics->account.watch[i] != HAPI_NONE
+                                       ? &physics->world.bodies.entries[physics->account.watch[i]]
+                                       : NULL;
     bool local = known != NULL && known->slot != HAPI_NONE;
     out->watch_slot[i] = local ? known->slot : HAPI_SLOT_NONE;
     if (known != NULL && hapi_pose_is_sound(known->body)) {
@@ -162,10 +163,10 @@ static void fill_watch(hapi_physics *physics, hapi_model *out)
 
 static uint32_t count_bounces(const hapi_physics *physics, hapi_model *model)
 {
-  if (physics->model != HAP_MODEL_CONTACT) {
+  if (physics->cycle.model != HAP_MODEL_CONTACT) {
     return 0;
   }
-  uint32_t count = physics->range.number == model->number ? physics->range.bounces : 0;
+  uint32_t count = physics->near.range.number == model->number ? physics->near.range.bounces : 0;
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     for (int k = 0; k < HAPI_JOINT_LIMITS; ++k) {
       count += hapi_model_joints(model)[i].limits[k].bounce > 0.0;
@@ -176,12 +177,12 @@ static uint32_t count_bounces(const hapi_physics *physics, hapi_model *model)
 
 static void count_model(hapi_physics *physics, const hapi_model *model)
 {
-  hap_stats *stats = &physics->figures.stats;
+  hap_stats *stats = &physics->counts.own.stats;
   stats->neighbours = hapi_neighbors_bodies(physics);
   stats->pointer_contacts = model->contact_count;
-  if (physics->model == HAP_MODEL_CONTACT && physics->range.number == model->number) {
+  if (physics->cycle.model == HAP_MODEL_CONTACT && physics->near.range.number == model->number) {
     stats->pointer_contacts +=
-        physics->range.near->tool_pair_count; /* whose points are found later */
+        physics->near.range.near->tool_pair_count; /* whose points are found later */
   }
   if (stats->neighbours > stats->neighbours_max) {
     stats->neighbours_max = stats->neighbours;
@@ -193,43 +194,43 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
   hapi_model_body *bodies = hapi_model_bodies(out);
   hapi_model_contact *contacts = hapi_model_contacts(out);
-  out->number = ++physics->model_number;
+  out->number = ++physics->cycle.model_number;
   out->state_ns = state_ns;
   out->valid_from_ns = valid_from_ns;
   out->sent_ns = hapi_tape_sent(physics);
-  out->blend_s = physics->model == HAP_MODEL_IMPULSE ? physics->probe_step_s : 0.0;
+  out->blend_s = physics->cycle.model == HAP_MODEL_IMPULSE ? physics->cycle.probe_step_s : 0.0;
   out->period_s = hapi_period_of(physics, hapi_tape_wanted_model(physics, true));
-  out->model = physics->model;
+  out->model = physics->cycle.model;
   out->impulse_pose = physics->config.impulse_pose;
-  out->wishes = physics->wishes;
-  out->max_sweeps = physics->dial.settings.max_sweeps;
-  out->row_updates = physics->dial.settings.row_updates;
+  out->wishes = physics->cycle.wishes;
+  out->max_sweeps = physics->cycle.settings.max_sweeps;
+  out->row_updates = physics->cycle.settings.row_updates;
   out->tick_budget_ns = hapi_dial_tick_budget(physics);
   out->body_count = 0;
   out->contact_count = 0;
   out->tool_count = 0;
   out->cross_count = 0;
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    if (physics->bodies[i].phase == HAPI_SLOT_LIVE &&
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    if (physics->near.slots.bodies[i].phase == HAPI_SLOT_LIVE &&
         fill_body(physics, i, &bodies[out->body_count])) {
       ++out->body_count;
     }
   }
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    if (physics->contacts[i].phase == HAPI_SLOT_LIVE) {
+  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
+    if (physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE) {
       hapi_model_contact *contact = &contacts[out->contact_count];
       hapi_cross_publish(physics, i, out->contact_count, out);
-      fill_contact(&physics->contacts[i], i, contact);
-      out->contact_count += fill_tool(physics, &physics->contacts[i], out, contact);
+      fill_contact(&physics->near.slots.contacts[i], i, contact);
+      out->contact_count += fill_tool(physics, &physics->near.slots.contacts[i], out, contact);
     }
   }
   int64_t begin_ns = hapi_clock_now();
   hapi_joints_publish(physics, out);
-  physics->figures.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   out->bounces = count_bounces(physics, out);
   fill_watch(physics, out);
   count_model(physics, out);
-  out->touches = physics->figures.stats.pointer_contacts;
+  out->touches = physics->counts.own.stats.pointer_contacts;
   hapi_effects_note(physics, out);
   hapi_tape_model(physics);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */

@@ -9,16 +9,16 @@
 
 static hapi_state_body *message_of(hapi_physics *physics, uint32_t slot_index)
 {
-  if (physics->state == NULL || slot_index >= physics->state->body_high) {
+  if (physics->cycle.state == NULL || slot_index >= physics->cycle.state->body_high) {
     return NULL;
   }
-  hapi_state_body *body = &hapi_state_bodies(physics->state)[slot_index];
-  return body->generation == physics->bodies[slot_index].generation ? body : NULL;
+  hapi_state_body *body = &hapi_state_bodies(physics->cycle.state)[slot_index];
+  return body->generation == physics->near.slots.bodies[slot_index].generation ? body : NULL;
 }
 
 static dBodyID ode_body(const hapi_physics *physics, const hapi_body_slot *slot)
 {
-  return slot->known == HAPI_NONE ? NULL : physics->table.entries[slot->known].body;
+  return slot->known == HAPI_NONE ? NULL : physics->world.bodies.entries[slot->known].body;
 }
 
 static void read_velocity(dBodyID body, double out[6])
@@ -80,7 +80,8 @@ static void write_off(hapi_physics *physics, hapi_body_slot *slot, const hapi_st
 {
   if (sound(in)) {
     take_impulse(slot, in);
-    hapi_v3_add(physics->figures.world_impulse, slot->new_impulse, physics->figures.world_impulse);
+    hapi_v3_add(physics->counts.own.world_impulse, slot->new_impulse,
+                physics->counts.own.world_impulse);
     memset(slot->new_impulse, 0, sizeof slot->new_impulse);
     memset(slot->new_angular_impulse, 0, sizeof slot->new_angular_impulse);
     slot->pushed = false;
@@ -89,7 +90,7 @@ static void write_off(hapi_physics *physics, hapi_body_slot *slot, const hapi_st
 
 static void take_body(hapi_physics *physics, uint32_t index)
 {
-  hapi_body_slot *slot = &physics->bodies[index];
+  hapi_body_slot *slot = &physics->near.slots.bodies[index];
   const hapi_state_body *in = message_of(physics, index);
   dBodyID body = ode_body(physics, slot);
   bool driven = (slot->flags & HAPI_BODY_DRIVEN) != 0;
@@ -105,15 +106,15 @@ static void take_body(hapi_physics *physics, uint32_t index)
     return;
   }
   if (!sound(in)) {
-    ++physics->figures.stats.states_rejected;
+    ++physics->counts.own.stats.states_rejected;
     hapi_slots_renew(slot);
     return;
   }
   take_impulse(slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
   if (slot->loop_owned) {
-    physics->table.entries[slot->known].loop_owned = true;
-    physics->table.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
+    physics->world.bodies.entries[slot->known].loop_owned = true;
+    physics->world.bodies.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
   }
   memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(slot, body)) {
@@ -123,12 +124,13 @@ static void take_body(hapi_physics *physics, uint32_t index)
 
 static void take_forces(hapi_physics *physics)
 {
-  const hapi_state_contact *in = hapi_state_contacts(physics->state);
-  for (uint32_t i = 0; i < physics->contact_high; ++i) {
-    memset(physics->contacts[i].last_force, 0, sizeof physics->contacts[i].last_force);
+  const hapi_state_contact *in = hapi_state_contacts(physics->cycle.state);
+  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
+    memset(physics->near.slots.contacts[i].last_force, 0,
+           sizeof physics->near.slots.contacts[i].last_force);
   }
-  for (uint32_t i = 0; i < physics->state->contact_count; ++i) {
-    hapi_contact_slot *contact = &physics->contacts[in[i].slot];
+  for (uint32_t i = 0; i < physics->cycle.state->contact_count; ++i) {
+    hapi_contact_slot *contact = &physics->near.slots.contacts[in[i].slot];
     if (contact->phase == HAPI_SLOT_LIVE && contact->generation == in[i].generation &&
         hapi_finite(in[i].force, 3)) {
       hapi_v3_copy(in[i].force, contact->last_force);
@@ -139,7 +141,7 @@ static void take_forces(hapi_physics *physics)
 /* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an impulse. */
 static void take_owned_impulse(hapi_physics *physics, const hapi_state *state)
 {
-  hapi_physics_counts *f = &physics->figures;
+  hapi_physics_counts *f = &physics->counts.own;
   for (int i = 0; i < 3; ++i) {
     f->world_impulse[i] += state->owned_impulse[i] - f->owned_taken[i];
     f->owned_taken[i] = state->owned_impulse[i];
@@ -149,20 +151,20 @@ static void take_owned_impulse(hapi_physics *physics, const hapi_state *state)
 void hapi_reconcile_take(hapi_physics *physics)
 {
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
-  physics->has_new_state = newest != NULL;
+  physics->cycle.has_new_state = newest != NULL;
   hapi_tape_state(physics, newest != NULL);
   if (newest == NULL) {
     return; /* the loop has stopped or is late: nothing is taken twice */
   }
-  physics->state = newest;
-  hapi_v3_copy(newest->hand_impulse, physics->figures.hand_impulse);
+  physics->cycle.state = newest;
+  hapi_v3_copy(newest->hand_impulse, physics->counts.own.hand_impulse);
   take_owned_impulse(physics, newest);
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    if (ode_body(physics, &physics->bodies[i]) != NULL) {
-      physics->table.entries[physics->bodies[i].known].loop_owned = false;
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    if (ode_body(physics, &physics->near.slots.bodies[i]) != NULL) {
+      physics->world.bodies.entries[physics->near.slots.bodies[i].known].loop_owned = false;
     }
   }
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
     take_body(physics, i);
   }
   take_forces(physics);
@@ -191,8 +193,8 @@ static void take_last_state(hapi_physics *physics, const hapi_body_slot *slot, d
                             const hapi_state_body *in)
 {
   hap_pose pose = in->owned_pose;
-  double since = 1e-9 * (double)(in->owned_until_ns - physics->last_cycle_ns);
-  since = since > physics->step_s ? physics->step_s : since < 0.0 ? 0.0 : since;
+  double since = 1e-9 * (double)(in->owned_until_ns - physics->cycle.last_cycle_ns);
+  since = since > physics->cycle.step_s ? physics->cycle.step_s : since < 0.0 ? 0.0 : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
   if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */
@@ -204,11 +206,11 @@ static void take_last_state(hapi_physics *physics, const hapi_body_slot *slot, d
 /* Model CONTACT: where the loop owns a body, its state is the body's. */
 void hapi_reconcile_own(hapi_physics *physics)
 {
-  if (!physics->has_new_state) {
+  if (!physics->cycle.has_new_state) {
     return;
   }
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     const hapi_state_body *in = slot->phase == HAPI_SLOT_FREE ? NULL : message_of(physics, i);
     dBodyID body = in != NULL ? ode_body(physics, slot) : NULL;
     if (body == NULL) {
@@ -232,8 +234,8 @@ void hapi_reconcile_own(hapi_physics *physics)
 /* ... and ODE does not step it. */
 void hapi_reconcile_hold(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     dBodyID body = slot->loop_owned ? ode_body(physics, slot) : NULL;
     slot->held = body != NULL && dBodyIsEnabled(body);
     if (slot->held) {
@@ -245,8 +247,8 @@ void hapi_reconcile_hold(hapi_physics *physics)
 
 void hapi_reconcile_let_go(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     dBodyID body = slot->loop_owned || slot->held ? ode_body(physics, slot) : NULL;
     if (body != NULL) {
       dBodySetForce(body, 0.0, 0.0, 0.0); /* as a step does; the loop has them from the message */
@@ -265,13 +267,13 @@ static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
 {
   const double *p = slot->new_impulse;
   const double *l = slot->new_angular_impulse;
-  double rate = 1.0 / physics->step_s;
+  double rate = 1.0 / physics->cycle.step_s;
   if (!dBodyIsEnabled(body)) {
     dBodyEnable(body);
   }
   dBodyAddForce(body, p[0] * rate, p[1] * rate, p[2] * rate);
   dBodyAddTorque(body, l[0] * rate, l[1] * rate, l[2] * rate);
-  hapi_v3_add(physics->figures.world_impulse, p, physics->figures.world_impulse);
+  hapi_v3_add(physics->counts.own.world_impulse, p, physics->counts.own.world_impulse);
   hapi_v3_scale(rate, p, slot->exchanged);
   hapi_v3_scale(rate, l, slot->exchanged + 3);
   memset(slot->new_impulse, 0, sizeof slot->new_impulse);
@@ -280,8 +282,8 @@ static void push_body(hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
 
 void hapi_reconcile_push(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high && physics->step_s > 0.0; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high && physics->cycle.step_s > 0.0; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     memset(slot->exchanged, 0, sizeof slot->exchanged);
     if (body != NULL && (any(slot->new_impulse) || any(slot->new_angular_impulse))) {
@@ -293,14 +295,16 @@ void hapi_reconcile_push(hapi_physics *physics)
 /* Whether the loop moved the body by A and b in the interval that the message closes. */
 static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t index)
 {
-  bool moves = physics->has_new_state && physics->bodies[index].phase != HAPI_SLOT_FREE &&
-               (physics->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
+  bool moves = physics->cycle.has_new_state &&
+               physics->near.slots.bodies[index].phase != HAPI_SLOT_FREE &&
+               (physics->near.slots.bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
   const hapi_state_body *in = moves ? message_of(physics, index) : NULL;
-  if (in == NULL || in->epoch != physics->bodies[index].epoch) {
+  if (in == NULL || in->epoch != physics->near.slots.bodies[index].epoch) {
     return NULL;
   }
-  bool linear = physics->state->model == HAP_MODEL_ACCELERANCE ||
-                (physics->state->model == HAP_MODEL_CONTACT && (in->flags & HAPI_BODY_OWNED) == 0);
+  bool linear =
+      physics->cycle.state->model == HAP_MODEL_ACCELERANCE ||
+      (physics->cycle.state->model == HAP_MODEL_CONTACT && (in->flags & HAPI_BODY_OWNED) == 0);
   return linear ? in : NULL;
 }
 
@@ -309,11 +313,11 @@ static const hapi_state_body *moved_by_loop(hapi_physics *physics, uint32_t inde
  * found before and is still on its way to the loop does not count twice. */
 void hapi_reconcile_residual(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     const hapi_state_body *in = moved_by_loop(physics, i);
     dBodyID body = slot->phase == HAPI_SLOT_LIVE ? ode_body(physics, slot) : NULL;
-    if (in == NULL || body == NULL || physics->step_s <= 0.0) {
+    if (in == NULL || body == NULL || physics->cycle.step_s <= 0.0) {
       continue;
     }
     double world[6];
@@ -336,7 +340,7 @@ void hapi_reconcile_residual(hapi_physics *physics)
  * for a body alone the two are equal, and what another body pushes is moved by the world only. */
 static void overwrite(hapi_physics *physics, uint32_t index)
 {
-  hapi_body_slot *slot = &physics->bodies[index];
+  hapi_body_slot *slot = &physics->near.slots.bodies[index];
   const hapi_state_body *in = moved_by_loop(physics, index);
   dBodyID body = ode_body(physics, slot);
   if (in != NULL && body != NULL && slot->pushed) {
@@ -348,15 +352,15 @@ static void overwrite(hapi_physics *physics, uint32_t index)
 
 void hapi_reconcile_overwrite(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
     overwrite(physics, i);
   }
 }
 
 void hapi_reconcile_leave(hapi_physics *physics)
 {
-  for (uint32_t i = 0; i < physics->body_high; ++i) {
-    hapi_body_slot *slot = &physics->bodies[i];
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    hapi_body_slot *slot = &physics->near.slots.bodies[i];
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : ode_body(physics, slot);
     slot->placed = body != NULL;
     if (body != NULL) {

@@ -15,15 +15,15 @@
 /* Recording: the cell of a cycle until it has taken its message; NULL: none. */
 static hapi_cell *cycle_note(const hapi_physics *physics)
 {
-  bool running = hapi_tape_records(physics->tape) && physics->note != NULL &&
-                 physics->note->kind == HAPI_CELL_CYCLE;
-  return running ? physics->note : NULL;
+  bool running = hapi_tape_records(physics->tape.tape) && physics->tape.note != NULL &&
+                 physics->tape.note->kind == HAPI_CELL_CYCLE;
+  return running ? physics->tape.note : NULL;
 }
 
 static void commit(hapi_physics *physics)
 {
-  hapi_tape_commit(physics->tape);
-  physics->note = NULL;
+  hapi_tape_commit(physics->tape.tape);
+  physics->tape.note = NULL;
 }
 
 const char *hapi_physics_ode_configuration(void)
@@ -93,16 +93,16 @@ static uint64_t hash_settings(dWorldID world)
 
 static void describe_world(hapi_physics *physics, hapi_cell *out)
 {
-  out->u[HAPI_WORLD_HASH] = hash_settings(physics->ode.world);
-  for (uint32_t i = 0; i < physics->table.high; ++i) {
-    dBodyID body = physics->table.entries[i].body;
+  out->u[HAPI_WORLD_HASH] = hash_settings(physics->world.ode.world);
+  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
+    dBodyID body = physics->world.bodies.entries[i].body;
     if (body != NULL) {
       out->u[HAPI_WORLD_HASH] = hash_body(out->u[HAPI_WORLD_HASH], body);
       out->u[HAPI_WORLD_JOINTS] += (uint64_t)dBodyGetNumJoints(body);
       ++out->u[HAPI_WORLD_BODIES];
     }
   }
-  hash_space(physics->ode.space, out);
+  hash_space(physics->world.ode.space, out);
 }
 
 static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap_detail *detail)
@@ -126,41 +126,41 @@ static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap
 hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
 {
   hapi_cell here = {0};
-  if (physics->tape == NULL) {
+  if (physics->tape.tape == NULL) {
     return HAP_OK;
   }
-  physics->locks = 0;
-  physics->missed_unrecorded = 0;
-  physics->dropped_unrecorded = 0;
+  physics->tape.locks = 0;
+  physics->tape.missed_unrecorded = 0;
+  physics->tape.dropped_unrecorded = 0;
   describe_world(physics, &here);
-  if (hapi_tape_records(physics->tape)) {
-    hapi_tape_open(physics->tape);
-    physics->note = hapi_tape_put(physics->tape, HAPI_CELL_WORLD, 0);
-    memcpy(physics->note->u, here.u, sizeof here.u);
-    physics->note->u[HAPI_WORLD_SEED] = dRandGetSeed();
-    physics->note->flags = (uint16_t)atomic_load(&physics->wanted_model);
-    physics->note->word = atomic_load(&physics->wanted_effects);
+  if (hapi_tape_records(physics->tape.tape)) {
+    hapi_tape_open(physics->tape.tape);
+    physics->tape.note = hapi_tape_put(physics->tape.tape, HAPI_CELL_WORLD, 0);
+    memcpy(physics->tape.note->u, here.u, sizeof here.u);
+    physics->tape.note->u[HAPI_WORLD_SEED] = dRandGetSeed();
+    physics->tape.note->flags = (uint16_t)atomic_load(&physics->wanted.model);
+    physics->tape.note->word = atomic_load(&physics->wanted.effects);
     return HAP_OK;
   }
-  physics->read = hapi_tape_get(physics->tape, HAPI_CELL_WORLD, 0);
-  if (physics->read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
-    return other_world(physics->read, &here, detail);
+  physics->tape.read = hapi_tape_get(physics->tape.tape, HAPI_CELL_WORLD, 0);
+  if (physics->tape.read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
+    return other_world(physics->tape.read, &here, detail);
   }
-  dRandSetSeed((unsigned long)physics->read->u[HAPI_WORLD_SEED]);
-  hap_model model = (hap_model)(physics->read->flags & MODEL_BITS);
+  dRandSetSeed((unsigned long)physics->tape.read->u[HAPI_WORLD_SEED]);
+  hap_model model = (hap_model)(physics->tape.read->flags & MODEL_BITS);
   if (hap_model_name(model) != NULL) {
-    atomic_store(&physics->wanted_model, (int)model);
+    atomic_store(&physics->wanted.model, (int)model);
   }
-  atomic_store(&physics->wanted_effects, physics->read->word);
+  atomic_store(&physics->wanted.effects, physics->tape.read->word);
   return HAP_OK;
 }
 
 void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns)
 {
-  if (hapi_tape_records(physics->tape)) {
-    physics->note->i[HAPI_WORLD_TIME] = *io_start_ns;
-  } else if (hapi_tape_plays(physics->tape)) {
-    *io_start_ns = physics->read->i[HAPI_WORLD_TIME];
+  if (hapi_tape_records(physics->tape.tape)) {
+    physics->tape.note->i[HAPI_WORLD_TIME] = *io_start_ns;
+  } else if (hapi_tape_plays(physics->tape.tape)) {
+    *io_start_ns = physics->tape.read->i[HAPI_WORLD_TIME];
   }
 }
 
@@ -240,21 +240,22 @@ static uint64_t hash_model(const hapi_physics *physics)
 
 static void compare_model(hapi_physics *physics, uint64_t recorded)
 {
-  const hapi_difference difference = {.what = HAPI_DIFFERS_STEP, .number = physics->model_number};
-  if (recorded != physics->model_hash) {
-    hapi_tape_differ(physics->tape, &difference);
+  const hapi_difference difference = {.what = HAPI_DIFFERS_STEP,
+                                      .number = physics->cycle.model_number};
+  if (recorded != physics->tape.model_hash) {
+    hapi_tape_differ(physics->tape.tape, &difference);
   }
 }
 
 /* Before the loop can take the model: its tick then comes later in the recording. */
 static void put_end(hapi_physics *physics, uint64_t number)
 {
-  hapi_tape_open(physics->tape);
-  hapi_cell *cell = hapi_tape_put(physics->tape, HAPI_CELL_CYCLED, 0);
-  cell->flags = physics->model_next;
+  hapi_tape_open(physics->tape.tape);
+  hapi_cell *cell = hapi_tape_put(physics->tape.tape, HAPI_CELL_CYCLED, 0);
+  cell->flags = physics->tape.model_next;
   cell->u[HAPI_CYCLED_MODEL] = number;
-  cell->u[HAPI_CYCLED_HASH] = physics->model_hash;
-  cell->i[HAPI_CYCLED_SENT] = physics->sent_ns;
+  cell->u[HAPI_CYCLED_HASH] = physics->tape.model_hash;
+  cell->i[HAPI_CYCLED_SENT] = physics->tape.sent_ns;
   commit(physics);
 }
 
@@ -262,33 +263,33 @@ static void put_end(hapi_physics *physics, uint64_t number)
  * time that it is for. */
 int64_t hapi_tape_sent(hapi_physics *physics)
 {
-  physics->sent_ns = 0;
-  if (physics->cycling && hapi_tape_plays(physics->tape)) {
-    physics->sent_ns = physics->read_end->i[HAPI_CYCLED_SENT];
-  } else if (physics->cycling && physics->config.frame) {
-    physics->sent_ns = hapi_clock_now();
+  physics->tape.sent_ns = 0;
+  if (physics->tape.cycling && hapi_tape_plays(physics->tape.tape)) {
+    physics->tape.sent_ns = physics->tape.read_end->i[HAPI_CYCLED_SENT];
+  } else if (physics->tape.cycling && physics->config.frame) {
+    physics->tape.sent_ns = hapi_clock_now();
   }
-  return physics->sent_ns;
+  return physics->tape.sent_ns;
 }
 
 void hapi_tape_model(hapi_physics *physics)
 {
-  if (physics->tape == NULL) {
+  if (physics->tape.tape == NULL) {
     return;
   }
-  physics->model_hash = hash_model(physics);
-  if (hapi_tape_records(physics->tape) && physics->cycling) {
-    put_end(physics, physics->model_number);
+  physics->tape.model_hash = hash_model(physics);
+  if (hapi_tape_records(physics->tape.tape) && physics->tape.cycling) {
+    put_end(physics, physics->cycle.model_number);
   }
 }
 
 void hapi_tape_started(hapi_physics *physics)
 {
-  if (hapi_tape_records(physics->tape)) {
-    physics->note->u[HAPI_WORLD_MODEL_HASH] = physics->model_hash;
+  if (hapi_tape_records(physics->tape.tape)) {
+    physics->tape.note->u[HAPI_WORLD_MODEL_HASH] = physics->tape.model_hash;
     commit(physics);
-  } else if (hapi_tape_plays(physics->tape)) {
-    compare_model(physics, physics->read->u[HAPI_WORLD_MODEL_HASH]);
+  } else if (hapi_tape_plays(physics->tape.tape)) {
+    compare_model(physics, physics->tape.read->u[HAPI_WORLD_MODEL_HASH]);
   }
 }
 
@@ -296,39 +297,40 @@ void hapi_tape_started(hapi_physics *physics)
 
 void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
-  physics->model_hash = 0;
-  physics->model_next = (uint16_t)atomic_load(&physics->wanted_model);
-  physics->cycling = true;
-  if (hapi_tape_records(physics->tape)) {
-    hapi_tape_open(physics->tape);
-    physics->note = hapi_tape_put(physics->tape, HAPI_CELL_CYCLE, 0);
-    physics->note->i[HAPI_CYCLE_TIME] = now_ns;
-    physics->note->i[HAPI_CYCLE_NEXT] = next_ns;
-    physics->note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
-    physics->note->u[HAPI_CYCLE_LOCKS] = physics->locks;
-    physics->note->u[HAPI_CYCLE_MISSED] = physics->missed_unrecorded;
-    physics->note->u[HAPI_CYCLE_DROPPED] = physics->dropped_unrecorded;
-  } else if (hapi_tape_plays(physics->tape)) {
-    physics->read = hapi_tape_get(physics->tape, HAPI_CELL_CYCLE, 0);
-    physics->read_end = hapi_tape_get(physics->tape, HAPI_CELL_CYCLED, 0);
-    dRandSetSeed((unsigned long)physics->read->u[HAPI_CYCLE_SEED]);
-    physics->figures.stats.physics_missed += physics->read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
-    physics->figures.stats.frames_dropped += physics->read->u[HAPI_CYCLE_DROPPED];
+  physics->tape.model_hash = 0;
+  physics->tape.model_next = (uint16_t)atomic_load(&physics->wanted.model);
+  physics->tape.cycling = true;
+  if (hapi_tape_records(physics->tape.tape)) {
+    hapi_tape_open(physics->tape.tape);
+    physics->tape.note = hapi_tape_put(physics->tape.tape, HAPI_CELL_CYCLE, 0);
+    physics->tape.note->i[HAPI_CYCLE_TIME] = now_ns;
+    physics->tape.note->i[HAPI_CYCLE_NEXT] = next_ns;
+    physics->tape.note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
+    physics->tape.note->u[HAPI_CYCLE_LOCKS] = physics->tape.locks;
+    physics->tape.note->u[HAPI_CYCLE_MISSED] = physics->tape.missed_unrecorded;
+    physics->tape.note->u[HAPI_CYCLE_DROPPED] = physics->tape.dropped_unrecorded;
+  } else if (hapi_tape_plays(physics->tape.tape)) {
+    physics->tape.read = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLE, 0);
+    physics->tape.read_end = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLED, 0);
+    dRandSetSeed((unsigned long)physics->tape.read->u[HAPI_CYCLE_SEED]);
+    physics->counts.own.stats.physics_missed += physics->tape.read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
+    physics->counts.own.stats.frames_dropped += physics->tape.read->u[HAPI_CYCLE_DROPPED];
   }
-  physics->locks = 0;
-  physics->missed_unrecorded = 0;
-  physics->dropped_unrecorded = 0;
+  physics->tape.locks = 0;
+  physics->tape.missed_unrecorded = 0;
+  physics->tape.dropped_unrecorded = 0;
 }
 
 /* Those that this cycle goes by. */
 uint32_t hapi_tape_wanted_effects(hapi_physics *physics)
 {
-  if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
-    atomic_store(&physics->wanted_effects, (uint32_t)(physics->read->u[HAPI_CYCLE_LOCKS] >> 32));
+  if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
+    atomic_store(&physics->wanted.effects,
+                 (uint32_t)(physics->tape.read->u[HAPI_CYCLE_LOCKS] >> 32));
   }
-  uint32_t wanted = atomic_load(&physics->wanted_effects);
+  uint32_t wanted = atomic_load(&physics->wanted.effects);
   if (cycle_note(physics) != NULL) {
-    uint64_t *word = &physics->note->u[HAPI_CYCLE_LOCKS];
+    uint64_t *word = &physics->tape.note->u[HAPI_CYCLE_LOCKS];
     *word = (*word & LOW_HALF) | (uint64_t)wanted << 32;
   }
   return wanted;
@@ -338,21 +340,21 @@ void hapi_tape_dials(hapi_physics *physics, int io_percent[2])
 {
   for (unsigned i = 0; i < 2; ++i) {
     unsigned shift = 32 + 8 * i;
-    if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
-      io_percent[i] = hapi_cell_dial(physics->read->u[HAPI_CYCLE_MISSED], shift);
+    if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
+      io_percent[i] = hapi_cell_dial(physics->tape.read->u[HAPI_CYCLE_MISSED], shift);
     } else if (cycle_note(physics) != NULL) {
-      physics->note->u[HAPI_CYCLE_MISSED] |= (uint64_t)(io_percent[i] + 1) << shift;
+      physics->tape.note->u[HAPI_CYCLE_MISSED] |= (uint64_t)(io_percent[i] + 1) << shift;
     }
   }
 }
 
 int hapi_tape_dial_at_start(hapi_physics *physics, int percent)
 {
-  if (hapi_tape_plays(physics->tape)) {
-    return hapi_cell_dial(physics->read->flags, 8);
+  if (hapi_tape_plays(physics->tape.tape)) {
+    return hapi_cell_dial(physics->tape.read->flags, 8);
   }
-  if (hapi_tape_records(physics->tape)) {
-    physics->note->flags |= (uint16_t)((percent + 1) << 8);
+  if (hapi_tape_records(physics->tape.tape)) {
+    physics->tape.note->flags |= (uint16_t)((percent + 1) << 8);
   }
   return percent;
 }
@@ -380,27 +382,27 @@ void hapi_tape_state(hapi_physics *physics, bool taken)
 /* at_end: asked for after the step, for the next one. */
 hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end)
 {
-  int wanted = atomic_load(&physics->wanted_model);
-  if (hapi_tape_plays(physics->tape) && physics->read->kind == HAPI_CELL_CYCLE) {
-    uint16_t flags = at_end ? physics->read_end->flags : physics->read->flags;
-    wanted = hap_model_name((hap_model)flags) != NULL ? (int)flags : (int)physics->model;
-    atomic_store(&physics->wanted_model, wanted);
+  int wanted = atomic_load(&physics->wanted.model);
+  if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
+    uint16_t flags = at_end ? physics->tape.read_end->flags : physics->tape.read->flags;
+    wanted = hap_model_name((hap_model)flags) != NULL ? (int)flags : (int)physics->cycle.model;
+    atomic_store(&physics->wanted.model, wanted);
   } else if (at_end) {
-    physics->model_next = (uint16_t)wanted;
+    physics->tape.model_next = (uint16_t)wanted;
   } else if (cycle_note(physics) != NULL) {
-    physics->note->flags = (uint16_t)wanted;
+    physics->tape.note->flags = (uint16_t)wanted;
   }
   return (hap_model)wanted;
 }
 
 void hapi_tape_cycled(hapi_physics *physics)
 {
-  physics->cycling = false;
-  if (hapi_tape_records(physics->tape)) {
-    if (physics->model_hash == 0) { /* the world was not sound */
+  physics->tape.cycling = false;
+  if (hapi_tape_records(physics->tape.tape)) {
+    if (physics->tape.model_hash == 0) { /* the world was not sound */
       put_end(physics, 0);
     }
-  } else if (hapi_tape_plays(physics->tape)) {
-    compare_model(physics, physics->read_end->u[HAPI_CYCLED_HASH]);
+  } else if (hapi_tape_plays(physics->tape.tape)) {
+    compare_model(physics, physics->tape.read_end->u[HAPI_CYCLED_HASH]);
   }
 }

@@ -3,9 +3,30 @@
 #ifndef HAPODE_PHYSICS_TAPE_CYCLE_H
 #define HAPODE_PHYSICS_TAPE_CYCLE_H
 
-/* Physics' part of a recording. Included by physics_internal.h. */
+/* Physics' part of a recording. */
 
-#include "physics/physics.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/session.h>
+
+#include "record/tape.h"
+
+typedef struct hapi_physics hapi_physics;
+
+typedef struct hapi_taping {
+  hapi_tape *tape;             /* of a recording or a replay; NULL: none */
+  hapi_cell *note;             /* recording: the cell of this cycle */
+  const hapi_cell *read;       /* replay: the same */
+  const hapi_cell *read_end;   /* and the one of its end */
+  uint64_t model_hash;         /* of the model of this cycle, 0: it has none */
+  int64_t sent_ns;             /* of that model */
+  uint64_t dropped_unrecorded; /* steps of frames, since the last cycle */
+  uint32_t missed_unrecorded;  /* steps, likewise */
+  uint32_t locks;              /* hap_session_lock, likewise */
+  uint16_t model_next;         /* hap_model wanted at the end of the cycle */
+  bool cycling;                /* not at the start */
+} hapi_taping;
 
 /* tape_cycle.c: nothing without a tape. */
 hap_status hapi_tape_world(hapi_physics *physics,

@@ -8,22 +8,22 @@
 
 bool hapi_physics_in_callback(const hapi_physics *physics)
 {
-  return atomic_load(&physics->cycle_thread) == (unsigned long)pthread_self();
+  return atomic_load(&physics->lock.cycle_thread) == (unsigned long)pthread_self();
 }
 
 void hapi_physics_claim(hapi_physics *physics)
 {
-  atomic_store(&physics->cycle_thread, (unsigned long)pthread_self());
+  atomic_store(&physics->lock.cycle_thread, (unsigned long)pthread_self());
 }
 
 void hapi_physics_unclaim(hapi_physics *physics)
 {
-  atomic_store(&physics->cycle_thread, 0);
+  atomic_store(&physics->lock.cycle_thread, 0);
 }
 
 void hapi_physics_enter(hapi_physics *physics)
 {
-  while (!hapi_fair_lock_take(&physics->lock, INT64_MAX)) {
+  while (!hapi_fair_lock_take(&physics->lock.fair, INT64_MAX)) {
     hapi_clock_sleep_until(hapi_clock_now() + 1000000); /* the system has no means to wait with */
   }
   hapi_physics_claim(physics);
@@ -32,20 +32,20 @@ void hapi_physics_enter(hapi_physics *physics)
 void hapi_physics_leave(hapi_physics *physics)
 {
   hapi_physics_unclaim(physics);
-  hapi_fair_lock_give(&physics->lock);
+  hapi_fair_lock_give(&physics->lock.fair);
 }
 
 bool hapi_physics_lock_is_mine(hapi_physics *physics)
 {
-  return hapi_fair_lock_is_mine(&physics->lock);
+  return hapi_fair_lock_is_mine(&physics->lock.fair);
 }
 
 bool hapi_physics_may_edit(hapi_physics *physics)
 {
   if (hapi_physics_in_callback(physics)) {
-    return physics->editable;
+    return physics->lock.editable;
   }
-  return !physics->begun || physics->config.lockstep || hapi_fair_lock_is_mine(&physics->lock);
+  return !physics->begun || physics->config.lockstep || hapi_fair_lock_is_mine(&physics->lock.fair);
 }
 
 /* ---- the application's side ---- */
@@ -66,30 +66,30 @@ void hapi_lock_figures_reset(hapi_lock_figures *figures)
 
 hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
 {
-  if (hapi_physics_in_callback(physics) || hapi_fair_lock_is_mine(&physics->lock)) {
+  if (hapi_physics_in_callback(physics) || hapi_fair_lock_is_mine(&physics->lock.fair)) {
     return HAP_ERROR_THREAD;
   }
   int64_t now = hapi_clock_now();
   bool for_ever = timeout_ns < 0 || timeout_ns > INT64_MAX - now;
   int64_t deadline = for_ever ? INT64_MAX : now + timeout_ns;
-  if (!hapi_fair_lock_take(&physics->lock, deadline)) {
+  if (!hapi_fair_lock_take(&physics->lock.fair, deadline)) {
     return HAP_ERROR_TIMEOUT;
   }
-  hapi_lock_figures *figures = &physics->lock_figures;
+  hapi_lock_figures *figures = &physics->lock.figures;
   figures->taken_ns = hapi_clock_now();
   atomic_fetch_add_explicit(&figures->count, 1, memory_order_relaxed);
   raise_to(&figures->wait_most_ns, figures->taken_ns - now);
-  ++physics->locks;
+  ++physics->tape.locks;
   return HAP_OK;
 }
 
 hap_status hapi_physics_unlock(hapi_physics *physics)
 {
-  if (hapi_physics_in_callback(physics) || !hapi_fair_lock_is_mine(&physics->lock)) {
+  if (hapi_physics_in_callback(physics) || !hapi_fair_lock_is_mine(&physics->lock.fair)) {
     return HAP_ERROR_THREAD;
   }
-  hapi_lock_figures *figures = &physics->lock_figures;
+  hapi_lock_figures *figures = &physics->lock.figures;
   raise_to(&figures->held_most_ns, hapi_clock_now() - figures->taken_ns);
-  hapi_fair_lock_give(&physics->lock);
+  hapi_fair_lock_give(&physics->lock.fair);
   return HAP_OK;
 }

@@ -10,6 +10,9 @@ import sys
 
 import lint
 
+# The physics side, in the order of the data flow.
+PHYSICS_SIDE = ["lib/world", "lib/near", "lib/probe", "lib/research", "lib/accuracy", "lib/physics"]
+
 # Folder: folders whose headers it may include besides its own and include/hapode. "*": any.
 LAYERS = {
     "include/hapode": [],
@@ -22,7 +25,13 @@ LAYERS = {
     "lib/contact": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record"],
     "lib/haptic": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/device",
                    "lib/record"],
-    "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record"],
+    "lib/world": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
+    "lib/near": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
+    "lib/probe": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
+    "lib/research": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
+    "lib/accuracy": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record",
+                     *PHYSICS_SIDE],
+    "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/session": ["lib/*"],
     "plugins/skeleton": [],
     "plugins/*": ["lib/base", "plugins/common"],
@@ -35,8 +44,8 @@ LAYERS = {
     "tests": ["*"],
     "tests/*": ["*"],
 }
-ODE_USERS = ["lib/physics/*", "include/hapode/ode.h", "scenes/*", "examples/*", "tests/*",
-             "bench/*", "tools/*"]
+ODE_USERS = [folder + "/*" for folder in PHYSICS_SIDE] + [
+    "include/hapode/ode.h", "scenes/*", "examples/*", "tests/*", "bench/*", "tools/*"]
 HAPODE_ODE_USERS = ODE_USERS + ["lib/session/*ode*.c"]
 
 MODULES = ("plugins/skeleton/",)  # no part of the library: a heap of their own, no header of lib/

@@ -46,8 +46,8 @@ static bool all_finite(const double *values, int count)
 static int index_of_slot(const bounds *b, uint32_t slot)
 {
   const hapi_physics *physics = b->w->session->physics;
-  uint32_t known = slot == HAPI_SLOT_NONE ? HAPI_NONE : physics->bodies[slot].known;
-  dBodyID body = known == HAPI_NONE ? NULL : physics->table.entries[known].body;
+  uint32_t known = slot == HAPI_SLOT_NONE ? HAPI_NONE : physics->near.slots.bodies[slot].known;
+  dBodyID body = known == HAPI_NONE ? NULL : physics->world.bodies.entries[known].body;
   for (int i = 0; i < b->w->body_count; ++i) {
     if (body != NULL && b->w->bodies[i] == body) {
       return i;

@@ -1,0 +1,500 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/pose.h"
+#include "base/vec.h"
+#include "haptic/rt/pointer_friction.h"
+#include "haptic/rt/tick.h"
+#include "physics/physics_internal.h"
+
+/* The hands of a window: a tick of the loop in model SINGLE that nobody feels. What of it is near comes as a
+ * message of physics, as in a session of that model; so hulls, friction and soft fingers are the loop's own
+ * code. */
+
+#define SAME_PLANE_COSINE 0.7 /* as for the contacts of a session */
+
+typedef struct part {
+  void **array;
+  size_t count;
+  size_t size;
+} part;
+
+#define PARTS 12
+
+/* Of all that a tick of model SINGLE uses. */
+static void list_parts(hapi_tick *t, part out[PARTS])
+{
+  const hapi_capacity *c = &t->capacity;
+  size_t tools = (size_t)2 * c->tool_points;
+  const part all[PARTS] = {
+      {(void **)&t->bodies, c->bodies, sizeof *t->bodies},
+      {(void **)&t->live, c->bodies, sizeof *t->live},
+      {(void **)&t->contacts, c->contacts + tools, sizeof *t->contacts},
+      {(void **)&t->ramps, c->contacts, sizeof *t->ramps},
+      {(void **)&t->ramp_generations, c->contacts, sizeof *t->ramp_generations},
+      {(void **)&t->frictions, c->contacts, sizeof *t->frictions},
+      {(void **)&t->pointers, c->pointers, sizeof *t->pointers},
+      {(void **)&t->tool.tools, tools, sizeof *t->tool.tools},
+      {(void **)&t->tool.old_tools, tools, sizeof *t->tool.old_tools},
+      {(void **)&t->tool.old_contacts, tools, sizeof *t->tool.old_contacts},
+      {(void **)&t->tool.pairs, HAPI_TOOL_PAIRS(c), sizeof *t->tool.pairs},
+      {(void **)&t->tool.hulls, c->pointers, sizeof *t->tool.hulls},
+  };
+  memcpy(out, all, sizeof all);
+}
+
+static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
+{
+  part parts[PARTS];
+  bool good = true;
+  hand->tick = hapi_alloc(sizeof *hand->tick);
+  if (hand->tick == NULL) {
+    return false;
+  }
+  memset(hand->tick, 0, sizeof *hand->tick);
+  hand->tick->capacity = *capacity;
+  hand->tick->pointer_high = capacity->pointers;
+  list_parts(hand->tick, parts);
+  for (int i = 0; i < PARTS; ++i) {
+    *parts[i].array = hapi_alloc_array(parts[i].count, parts[i].size);
+    good = good && *parts[i].array != NULL;
+  }
+  return good;
+}
+
+static bool create_model(hapi_lookback_hand *hand, const hapi_capacity *c)
+{
+  size_t bodies = sizeof(hapi_model);
+  size_t contacts = bodies + c->bodies * sizeof(hapi_model_body);
+  size_t tools = contacts + (c->contacts + c->tool_points) * sizeof(hapi_model_contact);
+  size_t size = tools + c->tool_points * sizeof(hapi_tool_point);
+  hand->model = hapi_alloc(size);
+  if (hand->model == NULL) {
+    return false;
+  }
+  memset(hand->model, 0, size);
+  hand->model->model = HAP_MODEL_SINGLE;
+  hand->model->bodies_offset = (uint32_t)bodies;
+  hand->model->contacts_offset = (uint32_t)contacts;
+  hand->model->tools_offset = (uint32_t)tools;
+  return true;
+}
+
+void hapi_lookback_hand_finish(hapi_lookback_hand *hand)
+{
+  part parts[PARTS];
+  if (hand->tick != NULL) {
+    list_parts(hand->tick, parts);
+    for (int i = 0; i < PARTS; ++i) {
+      hapi_free(*parts[i].array);
+    }
+  }
+  hapi_free(hand->tick);
+  hapi_free(hand->model);
+  hapi_free(hand->found);
+  hapi_free(hand->told);
+  memset(hand, 0, sizeof *hand);
+}
+
+bool hapi_lookback_hand_ready(hapi_physics *physics)
+{
+  hapi_lookback_hand *hand = &physics->lookback.hand;
+  const hapi_capacity *all = &physics->config.capacity;
+  const hapi_capacity capacity = {.bodies = HAPI_LOOKBACK_BODIES,
+                                  .contacts = all->contacts,
+                                  .pointers = all->pointers,
+                                  .tool_points = all->tool_points};
+  if (hand->ready) {
+    return true;
+  }
+  hand->found = hapi_alloc_array(HAPI_TOOL_SPOTS, sizeof *hand->found);
+  hand->told = hapi_alloc_array(capacity.pointers, sizeof *hand->told);
+  hand->ready = hand->found != NULL && hand->told != NULL && create_tick(hand, &capacity) &&
+                create_model(hand, &capacity);
+  if (!hand->ready) {
+    hapi_lookback_hand_finish(hand);
+    return false;
+  }
+  hapi_lookback_hand_begin(hand);
+  return true;
+}
+
+void hapi_lookback_hand_begin(hapi_lookback_hand *hand)
+{
+  hapi_tick *t = hand->tick;
+  part parts[PARTS];
+  list_parts(t, parts);
+  for (int i = 0; i < PARTS - 1; ++i) { /* the hulls stay */
+    memset(*parts[i].array, 0, parts[i].count * parts[i].size);
+  }
+  t->live_count = t->contact_count = t->body_high = 0;
+  t->tool.count = t->tool.pair_count = 0;
+  t->tick = 1;
+  memset(hand->told, 0, t->capacity.pointers * sizeof *hand->told);
+  hand->begun = false;
+}
+
+bool hapi_lookback_hand_take_hull(hapi_physics *physics, uint32_t pointer, uint32_t generation)
+{
+  hapi_lookback_hand *hand = &physics->lookback.hand;
+  const hapi_state_pointer *in = &hapi_state_pointers(physics->cycle.state)[pointer];
+  if (hand->hull_of[pointer] == 0 && in->generation == generation) {
+    hand->tick->tool.hulls[pointer] = hapi_state_hulls(physics->cycle.state)[pointer];
+    hand->hull_of[pointer] = generation;
+  }
+  return hand->hull_of[pointer] == generation;
+}
+
+/* ---- what is near ---- */
+
+static void blend(const double a[3], const double b[3], double share, double out[3])
+{
+  for (int i = 0; i < 3; ++i) {
+    out[i] = a[i] + share * (b[i] - a[i]);
+  }
+}
+
+/* Where the pointer was then: on the way from a row to the next one, or straight on from the last. */
+static void place_pointer(const hapi_lookback_moment *at, uint32_t index, hapi_tick_pointer *p)
+{
+  const hapi_path_pointer *in = &at->row[index];
+  const hapi_path_pointer *next = at->next != NULL ? &at->next[index] : NULL;
+  p->pose = in->pose;
+  p->twist = in->twist;
+  if (next != NULL && next->generation == in->generation) {
+    hapi_pose_blend(&in->pose, &next->pose, at->share, &p->pose);
+    blend(in->twist.linear, next->twist.linear, at->share, p->twist.linear);
+    blend(in->twist.angular, next->twist.angular, at->share, p->twist.angular);
+  } else {
+    hapi_pose_move(&p->pose, &p->twist, at->later_s);
+  }
+}
+
+static double extent_of(const hapi_tool_hull *hull, double radius)
+{
+  double farthest = 0.0;
+  for (uint32_t i = 0; i < hull->count; ++i) {
+    farthest = fmax(farthest, hapi_v3_norm(hull->points[i]));
+  }
+  return farthest + radius;
+}
+
+static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
+{
+  for (uint32_t i = 0; i < t->capacity.pointers; ++i) {
+    const hapi_path_pointer *in = &at->row[i];
+    hapi_tick_pointer *p = &t->pointers[i];
+    if (p->generation != in->generation) {
+      memset(p, 0, sizeof *p);
+      p->generation = in->generation;
+      p->hull = in->is_tool != 0 ? &t->tool.hulls[i] : NULL;
+      p->extent = p->hull != NULL ? extent_of(p->hull, in->radius) : in->radius;
+    }
+    p->radius = in->radius;
+    p->stiffness = in->stiffness;
+    p->damping = in->damping;
+    p->finger_radius = in->finger_radius;
+    p->turns = in->turns != 0;
+    p->three_dof = in->three_dof != 0;
+    if (p->generation != 0) {
+      place_pointer(at, i, p);
+    }
+  }
+}
+
+/* What physics knows of the pointers when it looks for what is near: those of the tick before, of new ones those
+ * of now. */
+static void tell(hapi_lookback_hand *hand)
+{
+  for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
+    const hapi_tick_pointer *p = &hand->tick->pointers[i];
+    hand->told[i] = (hapi_state_pointer){.generation = p->generation,
+                                         .radius = p->radius,
+                                         .stiffness = p->stiffness,
+                                         .finger_radius = p->finger_radius,
+                                         .pose = p->pose,
+                                         .twist = p->twist,
+                                         .is_tool = p->hull != NULL,
+                                         .extent = p->extent};
+  }
+}
+
+static bool all_are_told(const hapi_lookback_hand *hand)
+{
+  for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
+    if (hand->told[i].generation != hand->tick->pointers[i].generation) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Its place among the window's bodies; HAPI_SLOT_NONE: the static world. False: one that is not among them. */
+static bool body_of(const hapi_physics *physics, dGeomID geom, uint32_t *out)
+{
+  dBodyID body = dGeomGetBody(geom);
+  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
+  bool found = known != HAPI_NONE && physics->world.bodies.entries[known].island != HAPI_NONE;
+  *out = found ? physics->world.bodies.entries[known].rest->member : HAPI_SLOT_NONE;
+  return found || body == NULL;
+}
+
+static hapi_model_contact *add_contact(hapi_physics *physics, const hapi_lookback_touch *t,
+                                       uint32_t body)
+{
+  hapi_lookback *w = &physics->lookback;
+  hapi_model *m = w->hand.model;
+  hapi_model_contact *out = &hapi_model_contacts(m)[m->contact_count++];
+  memset(out, 0, sizeof *out);
+  out->slot = (uint32_t)(t - w->touches);
+  out->generation = t->contact_generation;
+  out->body = body;
+  out->pointer = t->pointer;
+  out->pointer_generation = t->generation;
+  out->mu = t->mu;
+  return out;
+}
+
+static void add_sphere(hapi_physics *physics, hapi_lookback_touch *t, uint32_t body,
+                       const hapi_state_pointer *p, double period)
+{
+  hapi_nearest at;
+  double normal[3];
+  const double *center = p->pose.position;
+  double reach = hapi_neighbors_reach(hapi_neighbors_speed(t->geom, p, center), period);
+  if (!hapi_geom_nearest(physics, t->geom, center, p->radius, reach, &at)) {
+    t->placed = false;
+    ++t->contact_generation;
+    return;
+  }
+  hapi_v3_copy(at.normal, normal);
+  if (body != HAPI_SLOT_NONE) {
+    hapi_quat_unrotate(dBodyGetQuaternion(dGeomGetBody(t->geom)), at.normal, normal);
+  }
+  t->contact_generation +=
+      t->placed && hapi_v3_dot(normal, t->normal_body) < SAME_PLANE_COSINE; /* another face */
+  t->placed = true;
+  hapi_v3_copy(normal, t->normal_body);
+  hapi_model_contact *out = add_contact(physics, t, body);
+  hapi_v3_copy(normal, out->normal_body);
+  hapi_v3_copy(at.point_b, out->point_body);
+  if (body != HAPI_SLOT_NONE) {
+    dBodyID of = dGeomGetBody(t->geom);
+    hapi_pose_unpoint(dBodyGetPosition(of), dBodyGetQuaternion(of), at.point_b, out->point_body);
+  }
+}
+
+/* False: there are more points than the loop has room for. */
+static bool add_tool(hapi_physics *physics, hapi_lookback_touch *t, uint32_t body,
+                     const hapi_state_pointer *p, double period)
+{
+  hapi_lookback_hand *hand = &physics->lookback.hand;
+  hapi_model *m = hand->model;
+  double spin = p->extent * hapi_v3_norm(p->twist.angular);
+  double speed = hapi_neighbors_speed(t->geom, p, p->pose.position) + spin +
+                 hapi_neighbors_spin(t->geom, p->extent);
+  const hapi_tool_at at = {.geom = t->geom,
+                           .index = t->pointer,
+                           .pointer = p,
+                           .hull = &hand->tick->tool.hulls[t->pointer],
+                           .key = t->key,
+                           .reach = hapi_neighbors_reach(speed, period),
+                           .horizon = period};
+  uint32_t count = hapi_tool_points(physics, &at, hand->found);
+  if (m->tool_count + count > hand->tick->capacity.tool_points) {
+    return false;
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    hapi_tool_point *to = &hapi_model_tools(m)[m->tool_count];
+    *to = hand->found[i].tool;
+    to->mu = t->mu;
+    to->at.body_b = body;
+    to->at.generation_b = body != HAPI_SLOT_NONE ? 1 : 0;
+    add_contact(physics, t, body)->tool = ++m->tool_count;
+  }
+  return true;
+}
+
+/* False: something is touched that the window does not know. */
+static bool add_touches(hapi_physics *physics, double period)
+{
+  hapi_lookback *w = &physics->lookback;
+  const hapi_tick *tick = w->hand.tick;
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    hapi_lookback_touch *t = &w->touches[i];
+    uint32_t body;
+    const hapi_tick_pointer *of = &tick->pointers[t->pointer];
+    if (!t->there || of->generation == 0 || t->generation != of->generation) {
+      continue;
+    }
+    if (!body_of(physics, t->geom, &body)) {
+      return false;
+    }
+    const hapi_state_pointer *p = &w->hand.told[t->pointer];
+    if (of->hull == NULL) {
+      add_sphere(physics, t, body, p, period);
+    } else if (!add_tool(physics, t, body, p, period)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static void add_bodies(hapi_physics *physics)
+{
+  const hapi_lookback *w = &physics->lookback;
+  hapi_model *m = w->hand.model;
+  for (uint32_t i = 0; i < w->body_count; ++i) {
+    dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
+    hapi_model_body *out = &hapi_model_bodies(m)[m->body_count++];
+    memset(out, 0, sizeof *out);
+    out->slot = i;
+    out->generation = 1;
+    out->flags = dBodyIsKinematic(body) ? HAPI_BODY_DRIVEN : 0;
+    hapi_pose_read(body, &out->pose);
+    hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
+    hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
+  }
+}
+
+/* ---- the first tick ---- */
+
+static void resume_ramp(hapi_ramp *ramp, bool *seen)
+{
+  *seen = true; /* what is deep then was so before */
+  ramp->share = 1.0;
+  ramp->depth = HUGE_VAL;
+}
+
+static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
+                          const hapi_state_spring *spring)
+{
+  double normal[3];
+  double point[3];
+  double foot[3];
+  hapi_v3_copy(c->normal_now, normal);
+  hapi_v3_copy(c->point_now, point);
+  if (c->tool == 0) {
+    const hap_pose *pose = c->body != HAPI_SLOT_NONE ? &t->bodies[c->body].pose : NULL;
+    hapi_v3_copy(c->normal_body, normal);
+    hapi_v3_copy(c->point_body, point);
+    if (pose != NULL) {
+      hapi_quat_rotate(pose->quat_wxyz, c->normal_body, normal);
+      hapi_pose_point(pose->position, pose->quat_wxyz, c->point_body, point);
+    }
+  }
+  hapi_friction_foot(&t->pointers[c->pointer], normal, point, foot);
+  hapi_friction_resume(t, c, normal, foot, spring->stretch_body, spring->turn);
+}
+
+static bool is_of(const hapi_tick *t, const hapi_local_contact *c,
+                  const hapi_lookback_spring *spring)
+{
+  return c->tool == 0 ? c->slot == spring->touch
+                      : spring->in.slot == HAPI_SLOT_NONE &&
+                            t->tool.tools[c->tool - 1].in.at.key == spring->in.key;
+}
+
+/* The one that the contact had: of a hull's points the nearest. */
+static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_local_contact *c)
+{
+  const hapi_tick *t = w->hand.tick;
+  const hapi_state_spring *found = NULL;
+  double least = HUGE_VAL;
+  for (uint32_t i = 0; i < w->spring_count; ++i) {
+    double way[3];
+    double far = 0.0;
+    if (!is_of(t, c, &w->springs[i])) {
+      continue;
+    }
+    if (c->tool != 0) {
+      hapi_v3_sub(w->springs[i].in.place, t->tool.tools[c->tool - 1].in.at.core_a, way);
+      far = hapi_v3_norm(way);
+    }
+    if (far < least && (c->tool == 0 || far < t->tool.tools[c->tool - 1].in.same_within)) {
+      least = far;
+      found = &w->springs[i].in;
+    }
+  }
+  return found;
+}
+
+/* The window begins in the midst of what the loop does: nothing comes in slowly, and springs along a surface are as long
+ * as they were. */
+static void resume(hapi_lookback *w)
+{
+  hapi_tick *t = w->hand.tick;
+  for (uint32_t i = 0; i < t->tool.pair_count; ++i) {
+    resume_ramp(&t->tool.pairs[i].ramp, &t->tool.pairs[i].seen);
+  }
+  hapi_tool_place(t); /* says where the points of hulls are */
+  for (uint32_t i = 0; i < t->contact_count; ++i) {
+    hapi_local_contact *c = &t->contacts[i];
+    const hapi_state_spring *spring = c->rubs ? find_spring(w, c) : NULL;
+    resume_ramp(&c->ramp, &c->seen);
+    if (spring != NULL && (c->tool == 0 || t->tool.tools[c->tool - 1].placed)) {
+      resume_spring(t, c, spring);
+    }
+  }
+}
+
+/* ---- the tick ---- */
+
+static void push_bodies(hapi_physics *physics, double period)
+{
+  const hapi_lookback *w = &physics->lookback;
+  for (uint32_t i = 0; i < w->body_count; ++i) {
+    hapi_local_body *from = &w->hand.tick->bodies[i];
+    dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
+    const double *f = from->impulse;
+    const double *m = from->angular_impulse;
+    if (from->pushed && !dBodyIsKinematic(body)) {
+      dBodyEnable(body);
+      dBodyAddForce(body, f[0] / period, f[1] / period, f[2] / period);
+      dBodyAddTorque(body, m[0] / period, m[1] / period, m[2] / period);
+    }
+  }
+}
+
+bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at)
+{
+  hapi_lookback *w = &physics->lookback;
+  hapi_tick *t = w->hand.tick;
+  hapi_model *m = w->hand.model;
+  m->body_count = m->contact_count = m->tool_count = 0;
+  m->wishes = hapi_wish_set(physics->cycle.wishes, HAP_EFFECT_OBSERVER, HAP_EFFECT_OFF);
+  ++m->number;
+  take_pointers(t, at);
+  if (!all_are_told(&w->hand)) {
+    tell(&w->hand);
+  }
+  add_bodies(physics);
+  if (!add_touches(physics, at->period)) {
+    return false;
+  }
+  t->period = at->period;
+  hapi_tick_adopt(t, m, t->now_ns);
+  hapi_local_place(t);
+  for (uint32_t i = 0; i < w->body_count; ++i) {
+    hapi_v3_set(t->bodies[i].impulse, 0.0, 0.0, 0.0);
+    hapi_v3_set(t->bodies[i].angular_impulse, 0.0, 0.0, 0.0);
+    t->bodies[i].pushed = false;
+  }
+  if (!w->hand.begun) {
+    resume(w);
+    w->hand.begun = true;
+  }
+  hapi_render(t);
+  ++t->tick;
+  tell(&w->hand);
+  push_bodies(physics, at->period);
+  return true;
+}
+
+const double *hapi_lookback_felt(const hapi_lookback *w, uint32_t pointer)
+{
+  return w->hand.tick->pointers[pointer].wrench.force;
+}

@@ -1,0 +1,41 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_NEAR_COVER_H
+#define HAPODE_NEAR_COVER_H
+
+/* Space queries of one round: several boxes that lie close together are asked for as one. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+typedef struct hapi_covered {
+  dReal box[6];
+  dGeomID geom;
+} hapi_covered;
+
+/* Of a round of questions to a space, in which nothing moves. Zeroed, then created. */
+typedef struct hapi_cover {
+  dGeomID box_geom; /* private, in no space */
+  bool filled;      /* found holds what is in the box */
+  bool has_box;
+  bool has_asked;
+  bool missing;   /* no memory for one */
+  dReal box[6];   /* also while it is not filled: what is to be in it */
+  dReal asked[6]; /* all questions of this round */
+  double boxes_s; /* spent in this round on ODE's boxes around what moved */
+  hapi_covered *found;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_cover;
+
+bool hapi_cover_create(hapi_cover *cover);
+void hapi_cover_finish(hapi_cover *cover);
+void hapi_cover_begin(hapi_cover *cover); /* a round: what was moved since counts */
+/* As dSpaceCollide2(geom, space, data, callback), of a geom in no space that collides with all. The
+ * callback gets the geoms inside of nested spaces, or such a space to ask itself. */
+void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
+                    dNearCallback *callback);
+
+#endif

@@ -1,0 +1,284 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Triangles of static meshes near a box. ODE's own search keeps a cache that the whole process
+ * shares, and gives contacts, not triangles; so the triangles are read once, in the order of the
+ * mesh, with a box around every few of them. */
+
+#define CHUNK 32u
+#define SAMPLES 16u /* of a mesh, looked at in every walk */
+#define FOUND_MAX HAPI_NEAR_TRIANGLES
+
+static void destroy_mesh(hapi_mesh *mesh)
+{
+  hapi_free(mesh->corners);
+  hapi_free(mesh->boxes);
+  memset(mesh, 0, sizeof *mesh);
+}
+
+void hapi_meshes_finish(hapi_meshes *meshes)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    destroy_mesh(&meshes->meshes[i]);
+  }
+  hapi_free(meshes->meshes);
+  memset(meshes, 0, sizeof *meshes);
+}
+
+void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    if (meshes->meshes[i].geom == geom) {
+      destroy_mesh(&meshes->meshes[i]);
+      meshes->meshes[i] = meshes->meshes[--meshes->count];
+      return;
+    }
+  }
+}
+
+static void grow_box(double box[6], const double *point, bool first)
+{
+  for (int k = 0; k < 3; ++k) {
+    box[2 * k] = first || point[k] < box[2 * k] ? point[k] : box[2 * k];
+    box[2 * k + 1] = first || point[k] > box[2 * k + 1] ? point[k] : box[2 * k + 1];
+  }
+}
+
+/* ODE gives the corners in the world: kept in the geom's frame, as the geom may be moved. */
+static void read_triangle(dGeomID geom, uint32_t index, double out[9])
+{
+  dVector3 corners[3];
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  dGeomTriMeshGetTriangle(geom, (int)index, &corners[0], &corners[1], &corners[2]);
+  for (int i = 0; i < 3; ++i) {
+    hapi_pose_unpoint(dGeomGetPosition(geom), quat, corners[i], out + 3 * i);
+  }
+}
+
+static bool read_mesh(dGeomID geom, hapi_mesh *mesh)
+{
+  uint32_t count = (uint32_t)dGeomTriMeshGetTriangleCount(geom);
+  uint32_t chunks = (count + CHUNK - 1) / CHUNK;
+  memset(mesh, 0, sizeof *mesh);
+  mesh->corners = hapi_alloc_array(count, 9 * sizeof(double));
+  mesh->boxes = hapi_alloc_array(chunks, 6 * sizeof(double));
+  if (mesh->corners == NULL || mesh->boxes == NULL) {
+    destroy_mesh(mesh);
+    return false;
+  }
+  mesh->geom = geom;
+  mesh->data = dGeomTriMeshGetTriMeshDataID(geom);
+  mesh->count = count;
+  for (uint32_t i = 0; i < count; ++i) {
+    double *corners = mesh->corners + (size_t)9 * i;
+    double *box = mesh->boxes + (size_t)6 * (i / CHUNK);
+    read_triangle(geom, i, corners);
+    for (int k = 0; k < 3; ++k) {
+      grow_box(box, corners + 3 * k, i % CHUNK == 0 && k == 0);
+    }
+  }
+  return true;
+}
+
+/* Some of its triangles are where they were: another mesh may have come to be at the address of geom and
+ * data, or its corners may have been moved. */
+static bool samples_agree(const hapi_mesh *mesh)
+{
+  const double *at = dGeomGetPosition(mesh->geom);
+  double tolerance = 1e-9 * (1.0 + fabs(at[0]) + fabs(at[1]) + fabs(at[2]));
+  for (uint32_t i = 0; i < SAMPLES; ++i) {
+    uint32_t index = (uint32_t)((uint64_t)i * (mesh->count - 1) / (SAMPLES - 1));
+    const double *kept = mesh->corners + (size_t)9 * index;
+    double corners[9];
+    read_triangle(mesh->geom, index, corners);
+    for (int k = 0; k < 9; ++k) {
+      if (!(fabs(corners[k] - kept[k]) <= tolerance + 1e-9 * fabs(kept[k]))) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+static bool is_current(hapi_mesh *mesh, uint64_t walk)
+{
+  bool same = mesh->data == dGeomTriMeshGetTriMeshDataID(mesh->geom) &&
+              mesh->count == (uint32_t)dGeomTriMeshGetTriangleCount(mesh->geom);
+  if (!same || (mesh->checked_in != walk && mesh->count > 0 && !samples_agree(mesh))) {
+    return false;
+  }
+  mesh->checked_in = walk;
+  return true;
+}
+
+static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom, uint64_t walk)
+{
+  for (uint32_t i = 0; i < meshes->count; ++i) {
+    hapi_mesh *mesh = &meshes->meshes[i];
+    if (mesh->geom == geom && is_current(mesh, walk)) {
+      return mesh;
+    }
+  }
+  hapi_meshes_forget(meshes, geom);
+  if (!hapi_reserve((void **)&meshes->meshes, &meshes->capacity, meshes->count, 1,
+                    sizeof *meshes->meshes) ||
+      !read_mesh(geom, &meshes->meshes[meshes->count])) {
+    return NULL;
+  }
+  return &meshes->meshes[meshes->count++];
+}
+
+static bool boxes_meet(const double a[6], const double b[6])
+{
+  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
+         b[4] <= a[5];
+}
+
+/* A box of the world in the geom's frame: one that holds it. */
+static void box_to_geom(dGeomID geom, const double box[6], double out[6])
+{
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  for (int i = 0; i < 8; ++i) {
+    double corner[3] = {box[i & 1], box[2 + ((i >> 1) & 1)], box[4 + ((i >> 2) & 1)]};
+    hapi_pose_unpoint(dGeomGetPosition(geom), quat, corner, corner);
+    grow_box(out, corner, i == 0);
+  }
+}
+
+/* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
+
+static const double *corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
+{
+  return meshes->found[edge / 3].corners + (size_t)3 * ((edge % 3 + which) % 3);
+}
+
+static bool same_point(const double *a, const double *b)
+{
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool same_edge(const hapi_meshes *meshes, uint32_t a, uint32_t b)
+{
+  const double *p = corner(meshes, a, 0);
+  const double *q = corner(meshes, a, 1);
+  const double *r = corner(meshes, b, 0);
+  const double *s = corner(meshes, b, 1);
+  return (same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s));
+}
+
+/* Of both directions the same. */
+static uint32_t edge_hash(const hapi_meshes *meshes, uint32_t edge)
+{
+  uint64_t sum = 0;
+  for (uint32_t end = 0; end < 2; ++end) {
+    uint64_t mixed = 0;
+    for (int k = 0; k < 3; ++k) {
+      uint64_t bits;
+      memcpy(&bits, &corner(meshes, edge, end)[k], sizeof bits);
+      mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
+      mixed ^= mixed >> 32;
+    }
+    sum += mixed;
+  }
+  return (uint32_t)(sum ^ (sum >> 29));
+}
+
+/* Whether the triangle of edge `other` lies level with that of `edge` or above it. */
+static bool closes(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
+{
+  const double *triangle = meshes->found[edge / 3].corners;
+  double sides[2][3];
+  double normal[3];
+  double rise[3];
+  hapi_v3_sub(triangle + 3, triangle, sides[0]);
+  hapi_v3_sub(triangle + 6, triangle, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], normal);
+  hapi_v3_sub(corner(meshes, other, 2), corner(meshes, edge, 0), rise);
+  return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
+}
+
+static void meet_edge(hapi_meshes *meshes, uint32_t edge)
+{
+  uint32_t mask = HAPI_EDGE_PLACES - 1;
+  uint32_t at = edge_hash(meshes, edge) & mask;
+  for (; meshes->places[at] != 0; at = (at + 1) & mask) {
+    uint32_t other = meshes->places[at] - 1;
+    if (same_edge(meshes, edge, other)) {
+      if (closes(meshes, edge, other)) {
+        meshes->found[edge / 3].open_edges &= ~(1u << (edge % 3));
+      }
+      if (closes(meshes, other, edge)) {
+        meshes->found[other / 3].open_edges &= ~(1u << (other % 3));
+      }
+    }
+  }
+  meshes->places[at] = edge + 1;
+}
+
+static void find_open_edges(hapi_meshes *meshes, uint32_t count)
+{
+  memset(meshes->places, 0, sizeof meshes->places);
+  for (uint32_t i = 0; i < count; ++i) {
+    meshes->found[i].open_edges = 15;
+  }
+  for (uint32_t edge = 0; edge < 3 * count; ++edge) {
+    meet_edge(meshes, edge);
+  }
+}
+
+static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
+                             hapi_meshes *meshes, uint32_t found)
+{
+  uint32_t end = (chunk + 1) * CHUNK < mesh->count ? (chunk + 1) * CHUNK : mesh->count;
+  for (uint32_t i = chunk * CHUNK; i < end && found < FOUND_MAX; ++i) {
+    const double *corners = mesh->corners + (size_t)9 * i;
+    double own[6];
+    for (int k = 0; k < 3; ++k) {
+      grow_box(own, corners + 3 * k, k == 0);
+    }
+    if (boxes_meet(own, box)) {
+      memcpy(meshes->found[found].corners, corners, sizeof meshes->found[found].corners);
+      meshes->found[found++].index = i;
+    }
+  }
+  return found;
+}
+
+uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6])
+{
+  hapi_meshes *meshes = &physics->near.meshes;
+  const hapi_mesh *mesh = find_mesh(meshes, geom, physics->near.range.number);
+  double local[6];
+  uint32_t found = 0;
+  if (mesh == NULL) {
+    ++physics->counts.own.stats.capacity_dropped;
+    return FOUND_MAX; /* ODE collides it: a body that the loop moved would fall through */
+  }
+  box_to_geom(geom, box, local);
+  for (uint32_t chunk = 0; chunk < (mesh->count + CHUNK - 1) / CHUNK; ++chunk) {
+    if (boxes_meet(mesh->boxes + (size_t)6 * chunk, local)) {
+      found = search_chunk(mesh, chunk, local, meshes, found);
+    }
+  }
+  if (found == FOUND_MAX) {
+    return found; /* too many: the caller leaves them to ODE */
+  }
+  find_open_edges(meshes, found);
+  dQuaternion quat;
+  dGeomGetQuaternion(geom, quat);
+  for (uint32_t i = 0; i < found; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      double *corner = meshes->found[i].corners + 3 * k;
+      hapi_pose_point(dGeomGetPosition(geom), quat, corner, corner);
+    }
+  }
+  return found;
+}

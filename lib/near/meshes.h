@@ -1,0 +1,47 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_NEAR_MESHES_H
+#define HAPODE_NEAR_MESHES_H
+
+/* Triangles of static meshes near a geom. */
+
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+typedef struct hapi_physics hapi_physics;
+
+#define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
+#define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
+
+typedef struct hapi_mesh {
+  dGeomID geom;
+  dTriMeshDataID data;
+  uint32_t count;
+  uint64_t checked_in; /* walk that looked whether it is the same mesh */
+  double *corners;     /* count x 9, geom's frame */
+  double *boxes;       /* of every few triangles, x 6 */
+} hapi_mesh;
+
+typedef struct hapi_near_triangle {
+  double corners[9]; /* world */
+  uint32_t index;
+  uint32_t open_edges; /* as in hapi_near_geom */
+} hapi_near_triangle;
+
+typedef struct hapi_meshes {
+  hapi_mesh *meshes;
+  uint32_t count;
+  uint32_t capacity;
+  hapi_near_triangle found[HAPI_NEAR_TRIANGLES];
+  uint32_t places[HAPI_EDGE_PLACES]; /* of their edges, + 1; open addressing */
+} hapi_meshes;
+
+/* Triangles of a static mesh that meet a box of the world, into near.meshes.found;
+ * HAPI_NEAR_TRIANGLES: there may be more, or there is no memory for them, and they are not to be
+ * used. */
+uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]);
+void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
+void hapi_meshes_finish(hapi_meshes *meshes);
+
+#endif

@@ -1,0 +1,385 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Neighbours: the bodies that a pointer may touch before the next sync (paper section 4.1). In two
+ * passes. Before the global step the space is asked for what is near; its geoms are clean then, and
+ * asking moves nothing in its lists. After the step the nearest points are taken. */
+
+#define REACH_FLOOR 0.005       /* m */
+#define REACH_ACCELERATION 15.0 /* m/s^2: a hand, or a body that is hit */
+
+double hapi_neighbors_reach(double relative_speed, double horizon_s)
+{
+  return REACH_FLOOR + relative_speed * horizon_s + REACH_ACCELERATION * horizon_s * horizon_s;
+}
+
+static double fastest_body(const hapi_physics *physics)
+{
+  double fastest = physics->world.bodies.fastest;
+  for (uint32_t i = 0; i < physics->near.slots.body_high;
+       ++i) { /* what the loop moved since the scan */
+    uint32_t known = physics->near.slots.bodies[i].known;
+    double speed =
+        known != HAPI_NONE ? hapi_extent_speed(&physics->world.bodies.entries[known]) : 0.0;
+    fastest = speed > fastest ? speed : fastest;
+  }
+  return fastest;
+}
+
+/* How many geoms are near is the world's affair: the lists grow as they must. */
+static bool grow(hapi_neighbors *hood)
+{
+  uint32_t capacity = 2 * hood->candidate_capacity;
+  hapi_candidate *candidates = hapi_alloc_array(capacity, sizeof *candidates);
+  hapi_hit *hits = hapi_alloc_array(capacity, sizeof *hits);
+  if (candidates == NULL || hits == NULL) {
+    hapi_free(candidates);
+    hapi_free(hits);
+    return false;
+  }
+  memcpy(candidates, hood->candidates, hood->candidate_count * sizeof *candidates);
+  hapi_free(hood->candidates);
+  hapi_free(hood->hits);
+  hood->candidates = candidates;
+  hood->hits = hits;
+  hood->candidate_capacity = capacity;
+  return true;
+}
+
+static void collect_geom(void *data, dGeomID a, dGeomID b)
+{
+  hapi_physics *physics = data;
+  hapi_neighbors *hood = &physics->near.neighbors;
+  dGeomID geom = a == hood->probe_geom ? b : a;
+  if (dGeomIsSpace(geom)) {
+    dSpaceCollide2(hood->probe_geom, geom, data, collect_geom);
+    return;
+  }
+  const hapi_state_pointer *pointer =
+      &hapi_state_pointers(physics->cycle.state)[hood->current_pointer];
+  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass ||
+      (dGeomGetCategoryBits(geom) & pointer->collide_bits) == 0) {
+    return;
+  }
+  if (hood->candidate_count == hood->candidate_capacity && !grow(hood)) {
+    ++physics->counts.own.stats.capacity_dropped;
+    return;
+  }
+  hapi_candidate *candidate = &hood->candidates[hood->candidate_count++];
+  candidate->geom = geom;
+  candidate->pointer = hood->current_pointer;
+  candidate->reach = hood->current_reach;
+}
+
+void hapi_neighbors_collect(hapi_physics *physics)
+{
+  hapi_neighbors *hood = &physics->near.neighbors;
+  hood->candidate_count = 0;
+  if (physics->cycle.state == NULL) {
+    return;
+  }
+  const hapi_state_pointer *pointers = hapi_state_pointers(physics->cycle.state);
+  double fastest = fastest_body(physics);
+  hood->fastest = fastest;
+  hapi_cover_begin(&hood->cover);
+  for (uint32_t i = 0; i < physics->cycle.state->pointer_count; ++i) {
+    if (pointers[i].generation == 0) {
+      continue;
+    }
+    const double *at = pointers[i].pose.position;
+    bool is_tool = pointers[i].is_tool != 0;
+    double size = is_tool ? pointers[i].extent : pointers[i].radius;
+    double speed = fastest + hapi_v3_norm(pointers[i].twist.linear);
+    speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
+    double reach = hapi_neighbors_reach(speed, 2.0 * physics->cycle.probe_step_s);
+    hood->current_pointer = i;
+    hood->current_reach = reach;
+    dGeomSphereSetRadius(hood->probe_geom, size + reach);
+    dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
+    dGeomSetCollideBits(hood->probe_geom, ~0ul);
+    dGeomSetCategoryBits(hood->probe_geom, ~0ul);
+    hapi_cover_ask(&hood->cover, physics->world.ode.space, hood->probe_geom, physics, collect_geom);
+  }
+}
+
+double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer, const double point[3])
+{
+  dVector3 velocity = {0.0, 0.0, 0.0, 0.0};
+  dBodyID body = dGeomGetBody(geom);
+  if (body != NULL) {
+    dBodyGetPointVel(body, point[0], point[1], point[2], velocity);
+  }
+  double difference[3];
+  hapi_v3_sub(pointer->twist.linear, velocity, difference);
+  return hapi_v3_norm(difference);
+}
+
+double hapi_neighbors_spin(dGeomID geom, double distance)
+{
+  dBodyID body = dGeomGetBody(geom);
+  return body != NULL ? distance * hapi_v3_norm(dBodyGetAngularVel(body)) : 0.0;
+}
+
+/* Nearest points for where the pointer will be at the time of the model, which is later than now in
+ * model IMPULSE; where that would put its centre inside the body, for where it is now: the far face
+ * must not be taken for the near one. */
+static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate, hapi_nearest *out)
+{
+  const hapi_state_pointer *pointer =
+      &hapi_state_pointers(physics->cycle.state)[candidate->pointer];
+  double horizon = physics->cycle.probe_step_s;
+  double ahead = hapi_physics_steps_to_now(physics) ? 0.0 : horizon;
+  double there[3];
+  hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
+  bool found =
+      hapi_geom_nearest(physics, candidate->geom, there, pointer->radius, candidate->reach, out);
+  if (!found || out->distance < -pointer->radius) {
+    found = hapi_geom_nearest(physics, candidate->geom, pointer->pose.position, pointer->radius,
+                              candidate->reach, out);
+  }
+  return found && out->distance <=
+                      hapi_neighbors_reach(
+                          hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
+}
+
+static bool find_hit(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out)
+{
+  out->tool_count = 0;
+  return hapi_state_pointers(physics->cycle.state)[candidate->pointer].is_tool != 0
+             ? hapi_tool_find(physics, candidate, out)
+             : find_nearest(physics, candidate, &out->nearest);
+}
+
+static int by_distance(const void *a, const void *b)
+{
+  double x = ((const hapi_hit *)a)->nearest.distance;
+  double y = ((const hapi_hit *)b)->nearest.distance;
+  return (x > y) - (x < y);
+}
+
+/* A plane that turned far is another contact: it does not go on with the force of the old one. */
+#define SAME_PLANE_COSINE 0.7
+
+/* The shape itself, in the body's frame, for the loop to ask. */
+static void place_shape(const hapi_physics *physics, dGeomID geom, hapi_contact_slot *slot)
+{
+  dBodyID body = dGeomGetBody(geom);
+  hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hap_effect_wish wish = hapi_wish(physics->cycle.wishes, HAP_EFFECT_SHAPE);
+  slot->has_shape = hapi_shape_of_geom(geom, &slot->shape, &world);
+  slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
+                       : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
+                                                              : HAP_REASON_CALLED;
+  if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
+      !physics->cycle.settings.shapes) {
+    slot->shape_reason = HAP_REASON_ACCURACY;
+  }
+  if (wish == HAP_EFFECT_OFF ||
+      (wish == HAP_EFFECT_AUTO && slot->shape_reason != HAP_REASON_CALLED)) {
+    slot->has_shape = false;
+  }
+  slot->shape_pose = world;
+  if (slot->has_shape && body != NULL) {
+    const dReal *q = dBodyGetQuaternion(body);
+    double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
+    hapi_pose_unpoint(dBodyGetPosition(body), q, world.position, slot->shape_pose.position);
+    hapi_quat_multiply(inverse, world.quat_wxyz, slot->shape_pose.quat_wxyz);
+  }
+}
+
+#define FRICTION_MOST 10.0 /* as between bodies */
+
+/* What the application says of the pair. */
+static double friction_of(hapi_physics *physics, const hapi_hit *hit,
+                          const hapi_state_pointer *pointer)
+{
+  double mu = pointer->friction;
+  if (hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_FRICTION)) {
+    return 0.0;
+  }
+  if (physics->world.ode.pointer_surface == NULL) {
+    return mu;
+  }
+  hap_pointer_id id = {((uint64_t)pointer->generation << 32) | (hit->pointer + 1)};
+  physics->world.ode.pointer_surface(physics->world.ode.user, id, hit->geom, &mu);
+  if (!(mu >= 0.0 && mu <= DBL_MAX)) { /* NaN too */
+    physics->config.report(physics->config.user, HAP_FAULT_WORLD,
+                           "the pointer_surface callback gave a friction that is not finite or "
+                           "below 0: the pointer slides on the geom without any");
+    return 0.0;
+  }
+  return fmin(mu, FRICTION_MOST);
+}
+
+static void place_contact(const hapi_physics *physics, hapi_contact_slot *slot, const hapi_hit *hit,
+                          const hapi_state_pointer *pointer)
+{
+  dBodyID body = dGeomGetBody(hit->geom);
+  double normal[3];
+  hapi_v3_copy(hit->nearest.point_b, slot->point_body);
+  hapi_v3_copy(hit->nearest.normal, normal);
+  if (body != NULL) {
+    const dReal *q = dBodyGetQuaternion(body);
+    hapi_pose_unpoint(dBodyGetPosition(body), q, hit->nearest.point_b, slot->point_body);
+    hapi_quat_unrotate(q, hit->nearest.normal, normal);
+  }
+  if (slot->placed && hapi_v3_dot(normal, slot->normal_body) < SAME_PLANE_COSINE) {
+    ++slot->generation;
+    memset(slot->last_force, 0, sizeof slot->last_force);
+  }
+  place_shape(physics, hit->geom, slot);
+  hapi_v3_copy(normal, slot->normal_body);
+  hapi_v3_copy(hit->nearest.point_b, slot->point_world);
+  slot->distance = hit->nearest.distance;
+  slot->placed = true;
+  slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
+  slot->stiffness = pointer->stiffness;
+  slot->finger_radius = pointer->finger_radius;
+}
+
+static uint32_t known_of(const hapi_physics *physics, const hapi_hit *hit)
+{
+  return hapi_bodies_find(&physics->world.bodies, dGeomGetBody(hit->geom));
+}
+
+static uint32_t contacts_of(const hapi_hit *hit)
+{
+  return hit->tool_count > 0 ? hit->tool_count : 1;
+}
+
+/* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
+ * those lose them then. */
+static uint32_t choose(hapi_physics *physics, uint32_t count)
+{
+  hapi_hit *hits = physics->near.neighbors.hits;
+  uint32_t bodies = 0;
+  uint32_t chosen = 0;
+  uint32_t contacts = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    bool has_body = dGeomGetBody(hits[i].geom) != NULL;
+    uint32_t index = known_of(physics, &hits[i]);
+    hapi_known_body *known = index != HAPI_NONE ? &physics->world.bodies.entries[index] : NULL;
+    bool counted = known != NULL && known->rest->chosen_in == physics->cycle.model_number + 1;
+    uint32_t more = contacts_of(&hits[i]);
+    bool room = contacts + more <= physics->config.capacity.contacts &&
+                (!has_body || known != NULL) &&
+                (known == NULL || counted || bodies < physics->config.max_bodies);
+    if (!room) {
+      ++physics->counts.own.stats.capacity_dropped;
+      continue;
+    }
+    if (known != NULL && !counted) {
+      known->rest->chosen_in = physics->cycle.model_number + 1;
+      ++bodies;
+    }
+    contacts += more;
+    hits[chosen++] = hits[i];
+  }
+  return chosen;
+}
+
+/* What the chosen hits have already is kept from those that need a new place. */
+static void keep_places(hapi_physics *physics, const hapi_hit *hit)
+{
+  uint32_t index = known_of(physics, hit);
+  uint32_t slot = index != HAPI_NONE ? physics->world.bodies.entries[index].slot : HAPI_SLOT_NONE;
+  uint32_t generation = hapi_state_pointers(physics->cycle.state)[hit->pointer].generation;
+  if (hit->tool_count > 0) {
+    hapi_tool_keep_places(physics, hit, slot);
+    return;
+  }
+  hapi_contact_slot *contact =
+      hapi_slots_find_contact(physics, slot, hit->geom, hit->pointer, generation);
+  if (contact != NULL) {
+    contact->wanted = true;
+  }
+}
+
+static void take_body(hapi_body_slot *local, dBodyID body)
+{
+  local->wanted = true;
+  local->mass = hapi_body_mass(body);
+  local->flags = dBodyIsKinematic(body)  ? HAPI_BODY_DRIVEN
+                 : !dBodyIsEnabled(body) ? HAPI_BODY_RESTING
+                                         : 0;
+}
+
+static void take_hit(hapi_physics *physics, hapi_hit *hit)
+{
+  dBodyID body = dGeomGetBody(hit->geom);
+  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->cycle.state)[hit->pointer];
+  uint32_t slot = body != NULL ? hapi_slots_body(physics, known_of(physics, hit)) : HAPI_SLOT_NONE;
+  hapi_contact_slot *contact = NULL;
+  if (hit->tool_count > 0 && (body == NULL || slot != HAPI_NONE)) {
+    hit->mu = friction_of(physics, hit, pointer);
+    hapi_tool_take(physics, hit, slot);
+    if (body != NULL) {
+      take_body(&physics->near.slots.bodies[slot], body);
+    }
+    return;
+  }
+  if (body == NULL || slot != HAPI_NONE) {
+    contact = hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
+  }
+  if (contact == NULL) {
+    ++physics->counts.own.stats.capacity_dropped; /* until the loop has let go of an old slot */
+    return;
+  }
+  contact->wanted = true;
+  place_contact(physics, contact, hit, pointer);
+  contact->mu = friction_of(physics, hit, pointer);
+  if (body != NULL) {
+    take_body(&physics->near.slots.bodies[slot], body);
+  }
+}
+
+void hapi_neighbors_find(hapi_physics *physics)
+{
+  hapi_neighbors *hood = &physics->near.neighbors;
+  uint32_t count = 0;
+  physics->near.tools.count = 0;
+  hapi_slots_begin_model(physics);
+  for (uint32_t i = 0; i < hood->candidate_count; ++i) {
+    hapi_hit *hit = &hood->hits[count];
+    if (hood->candidates[i].geom != NULL && find_hit(physics, &hood->candidates[i], hit)) {
+      hit->geom = hood->candidates[i].geom;
+      hit->pointer = hood->candidates[i].pointer;
+      ++count;
+    }
+  }
+  qsort(hood->hits, count, sizeof *hood->hits, by_distance); /* nearest first, for capacity */
+  count = hood->hit_count = choose(physics, count);
+  for (uint32_t i = 0; i < count; ++i) {
+    keep_places(physics, &hood->hits[i]);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    take_hit(physics, &hood->hits[i]);
+  }
+  int64_t begin_ns = hapi_clock_now();
+  hapi_range_walk(physics, count);
+  hapi_counts_range(
+      physics, 1e-9 * (double)(hapi_clock_now() - begin_ns) - physics->near.range.cover.boxes_s);
+  hapi_slots_end_model(physics);
+}
+
+uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
+{
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
+    const hapi_body_slot *slot = &physics->near.slots.bodies[i];
+    count +=
+        slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
+        physics->world.bodies.entries[slot->known].rest->chosen_in == physics->cycle.model_number;
+  }
+  return count;
+}

@@ -1,0 +1,59 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_NEAR_NEIGHBORS_H
+#define HAPODE_NEAR_NEIGHBORS_H
+
+/* Geoms near the pointers: which bodies and contacts a model has. */
+
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+#include "near/cover.h"
+#include "proximity/proximity.h"
+#include "sync/messages.h"
+
+typedef struct hapi_physics hapi_physics;
+
+typedef struct hapi_candidate {
+  dGeomID geom;
+  uint32_t pointer;
+  double reach; /* m, that it was found with */
+} hapi_candidate;
+
+typedef struct hapi_hit {
+  dGeomID geom;
+  uint32_t pointer;
+  hapi_nearest nearest; /* a: pointer, b: geom */
+  uint32_t tool_first;  /* of a hull: into the points of hapi_tool_search */
+  uint32_t tool_count;  /* 0: a sphere */
+  double mu;            /* of a hull, of all of its points, once it is taken */
+} hapi_hit;
+
+typedef struct hapi_neighbors {
+  dGeomID probe_geom;     /* private sphere, in no space */
+  dGeomID plane_geom;     /* private plane, in no space */
+  dContactGeom *vertices; /* HAPI_HULL_POINTS, of a convex geom */
+  double *hull;           /* the same, x, y, z */
+  hapi_candidate *candidates;
+  uint32_t candidate_capacity;
+  uint32_t candidate_count;
+  struct hapi_hit *hits; /* candidate_capacity */
+  uint32_t hit_count;    /* that the newest model has */
+  hapi_cover cover;
+  double fastest;           /* m/s, of all awake bodies' surfaces */
+  uint32_t current_pointer; /* while ODE calls back */
+  double current_reach;
+} hapi_neighbors;
+
+void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
+void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
+double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
+                            const double point[3]);                   /* m/s, relative */
+double hapi_neighbors_reach(double relative_speed, double horizon_s); /* m */
+/* m/s, at a distance from the centre of the geom's body, by its turning */
+double hapi_neighbors_spin(dGeomID geom, double distance);
+/* Dynamic bodies that a pointer may touch, of the newest model. */
+uint32_t hapi_neighbors_bodies(const hapi_physics *physics);
+
+#endif

@@ -1,0 +1,165 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* Geoms as shapes for proximity. ODE has no getters for the points of a convex geom: its collider
+ * with a plane lists the vertices below the plane, so two planes back to back give all of them. For
+ * a trimesh or a heightfield the collider is asked with a sphere that is as large as the reach. */
+
+#define FALLBACK_CONTACTS 64
+
+static void pose_of(dGeomID geom, hap_pose *out)
+{
+  hapi_v3_copy(dGeomGetPosition(geom), out->position);
+  dGeomGetQuaternion(geom, out->quat_wxyz);
+}
+
+/* The turn that brings z to a unit vector n. */
+static void turn_z_to(const double n[3], double quat[4])
+{
+  if (n[2] < -0.999999) {
+    quat[0] = quat[2] = quat[3] = 0.0;
+    quat[1] = 1.0;
+    return;
+  }
+  quat[0] = 1.0 + n[2];
+  quat[1] = -n[1];
+  quat[2] = n[0];
+  quat[3] = 0.0;
+  hapi_quat_normalize(quat);
+}
+
+static void plane_of(dGeomID geom, hapi_shape *shape, hap_pose *pose)
+{
+  dVector4 plane;
+  dGeomPlaneGetParams(geom, plane);
+  shape->kind = HAPI_SHAPE_PLANE;
+  hapi_v3_scale(plane[3], plane, pose->position);
+  turn_z_to(plane, pose->quat_wxyz);
+}
+
+bool hapi_shape_of_geom(dGeomID geom, hapi_shape *out_shape, hap_pose *out_pose)
+{
+  dReal length = 0.0;
+  dVector3 sides;
+  memset(out_shape, 0, sizeof *out_shape);
+  switch (dGeomGetClass(geom)) {
+    case dSphereClass:
+      out_shape->kind = HAPI_SHAPE_SPHERE;
+      out_shape->radius = dGeomSphereGetRadius(geom);
+      break;
+    case dBoxClass:
+      out_shape->kind = HAPI_SHAPE_BOX;
+      dGeomBoxGetLengths(geom, sides);
+      hapi_v3_scale(0.5, sides, out_shape->half);
+      break;
+    case dCapsuleClass:
+      out_shape->kind = HAPI_SHAPE_CAPSULE;
+      dGeomCapsuleGetParams(geom, &out_shape->radius, &length);
+      out_shape->half[2] = 0.5 * length;
+      break;
+    case dCylinderClass:
+      out_shape->kind = HAPI_SHAPE_CYLINDER;
+      dGeomCylinderGetParams(geom, &out_shape->radius, &length);
+      out_shape->half[2] = 0.5 * length;
+      break;
+    case dPlaneClass:
+      plane_of(geom, out_shape, out_pose);
+      return true;
+    default:
+      return false;
+  }
+  pose_of(geom, out_pose);
+  return true;
+}
+
+/* Nearest of the points where a large sphere meets the surface. The depth that ODE gives is along
+ * the triangle's normal and says nothing beside an edge; the points are on the surface. */
+static bool nearest_by_collider(hapi_physics *physics, dGeomID geom, const double center[3],
+                                double radius, double reach, hapi_nearest *out)
+{
+  dContactGeom contacts[FALLBACK_CONTACTS];
+  dGeomID sphere = physics->near.neighbors.probe_geom;
+  double best = HUGE_VAL;
+  const dContactGeom *nearest = NULL;
+  dGeomSphereSetRadius(sphere, radius + reach);
+  dGeomSetPosition(sphere, center[0], center[1], center[2]);
+  int count = dCollide(sphere, geom, FALLBACK_CONTACTS, contacts, sizeof contacts[0]);
+  for (int i = 0; i < count; ++i) {
+    double apart[3];
+    hapi_v3_sub(center, contacts[i].pos, apart);
+    if (hapi_contact_is_sound(&contacts[i]) && hapi_v3_norm(apart) < best) {
+      best = hapi_v3_norm(apart);
+      nearest = &contacts[i];
+    }
+  }
+  if (nearest == NULL) {
+    return false;
+  }
+  hapi_v3_copy(nearest->pos, out->point_b);
+  hapi_v3_copy(nearest->normal, out->normal); /* ODE's points into the first geom, the sphere */
+  if (best > 1e-9) {
+    hapi_v3_sub(center, nearest->pos, out->normal);
+    hapi_v3_scale(1.0 / best, out->normal, out->normal);
+  }
+  out->distance = best - radius;
+  hapi_v3_madd(out->point_b, out->distance, out->normal, out->point_a);
+  return out->distance <= reach;
+}
+
+/* Appends the vertices of a convex geom on the lower side of the plane normal . x = offset. */
+static uint32_t vertices_below(hapi_physics *physics, dGeomID geom, const double normal[3],
+                               double offset, uint32_t count)
+{
+  hapi_neighbors *hood = &physics->near.neighbors;
+  dGeomPlaneSetParams(hood->plane_geom, normal[0], normal[1], normal[2], offset);
+  int found =
+      dCollide(geom, hood->plane_geom, HAPI_HULL_POINTS, hood->vertices, sizeof hood->vertices[0]);
+  for (int i = 0; i < found && count < HAPI_HULL_POINTS; ++i) {
+    if (hapi_contact_is_sound(&hood->vertices[i])) {
+      hapi_v3_copy(hood->vertices[i].pos, &hood->hull[(size_t)3 * count++]);
+    }
+  }
+  return count;
+}
+
+bool hapi_hull_of_convex(hapi_physics *physics, dGeomID geom, hapi_shape *shape, hap_pose *pose)
+{
+  const double up[3] = {0.0, 0.0, 1.0};
+  const double down[3] = {0.0, 0.0, -1.0};
+  dReal box[6];
+  dGeomGetAABB(geom, box);
+  double middle = 0.5 * (box[4] + box[5]);
+  uint32_t count = vertices_below(physics, geom, up, middle, 0);
+  count = vertices_below(physics, geom, down, -middle, count);
+  memset(shape, 0, sizeof *shape);
+  shape->kind = HAPI_SHAPE_HULL;
+  shape->hull = physics->near.neighbors.hull;
+  shape->hull_count = count;
+  *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  return count > 0;
+}
+
+bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[3], double radius,
+                       double reach, hapi_nearest *out)
+{
+  hapi_shape shape;
+  hap_pose pose;
+  hapi_shape pointer = {.kind = HAPI_SHAPE_SPHERE, .radius = radius};
+  hap_pose at = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
+  hapi_v3_copy(center, at.position);
+  bool convex =
+      dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(physics, geom, &shape, &pose);
+  if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
+    return nearest_by_collider(physics, geom, center, radius, reach, out);
+  }
+  /* A hull is worth asking first whether it is near at all (libccd): its box says little. */
+  if (convex && !hapi_overlap(&pointer, &at, &shape, &pose, reach)) {
+    return false;
+  }
+  return hapi_nearest_points(&pointer, &at, &shape, &pose, out) && out->distance <= reach;
+}

@@ -1,0 +1,52 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_NEAR_TOOLS_H
+#define HAPODE_NEAR_TOOLS_H
+
+/* Pointers that are hulls: the points where they may touch a geom. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+#include "near/neighbors.h"
+#include "sync/messages.h"
+#include "sync/touch_local.h"
+
+typedef struct hapi_found_point {
+  hapi_tool_point tool;
+  double gap;
+  double normal[3]; /* world, out of the geom */
+  uint32_t slot;    /* of the contact that it goes on with; HAPI_NONE: none */
+} hapi_found_point;
+
+/* A hull that is looked at beside a geom. */
+typedef struct hapi_tool_at {
+  dGeomID geom;
+  uint32_t index; /* of the pointer */
+  const hapi_state_pointer *pointer;
+  const hapi_tool_hull *hull;
+  uint64_t key;   /* of the two */
+  double reach;   /* m, at most */
+  double horizon; /* s, for which what may come to touch is of interest */
+} hapi_tool_at;
+
+/* Points of all hits of a cycle. */
+typedef struct hapi_tool_search {
+  hapi_found_point *points;
+  uint32_t count;
+  uint32_t capacity;
+  bool said_not_touched; /* of a heightfield by a hull, once a session */
+} hapi_tool_search;
+
+bool hapi_tool_knows(dGeomID geom); /* whether they can touch it */
+bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out);
+/* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
+uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
+                          hapi_found_point out[HAPI_TOOL_SPOTS]);
+uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t pointer);
+void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
+void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
+
+#endif

@@ -1,0 +1,29 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PROBE_JOINT_PROBE_H
+#define HAPODE_PROBE_JOINT_PROBE_H
+
+/* What is kept of joints that the loop has no rows of its own for. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ode/ode.h>
+
+#include "sync/messages.h"
+
+typedef struct hapi_physics hapi_physics;
+
+typedef struct hapi_joint_measurement {
+  bool good;      /* what follows holds */
+  uint32_t first; /* of the joint's bodies, the one that was pushed */
+  hapi_measured_joint found;
+  hapi_joint_place place;
+  double turn[2][4]; /* orientations of the pushed body and the other one, world */
+  double held[6][6]; /* see hapi_admittance_rows, world axes */
+  double error;      /* 0.., what turning the measurement before this one on would have missed */
+} hapi_joint_measurement;
+
+void hapi_joint_probes(hapi_physics *physics); /* of the joints that the walk asks for */
+
+#endif

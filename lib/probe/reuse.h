@@ -1,0 +1,146 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_PROBE_REUSE_H
+#define HAPODE_PROBE_REUSE_H
+
+/* Testing simulations that need not be made again (hap_session_def.reuse). All that decides what they
+ * find is written down when they are made: of the world, of each body of the island, of its contacts,
+ * joints and pushes. At the next step it is written down anew and held against that, value by value; no flag
+ * says that something has changed, as the application may change anything. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/ode.h>
+
+typedef struct hapi_physics hapi_physics;
+
+/* One value of an island. Off by d it moves a body by d x weight in a step. */
+typedef struct hapi_print_item {
+  double value;   /* when A was measured */
+  double value_b; /* when b was */
+  double weight;  /* m per unit of the value; negative: it must be the same */
+} hapi_print_item;
+
+/* A point where two bodies touch, or one and the static world. Those of a pair are a set: colliders find the same
+ * points in another order, or one of them twice, when a body has moved by its last digit. */
+typedef struct hapi_touch_print {
+  uint64_t births[2]; /* 0: static world; the points of an island are sorted by them */
+  uint64_t surface;   /* hash */
+  double arm;         /* m, to the far point of the first body */
+  double position[3];
+  double normal[3];
+  double direction[3]; /* first one of friction, if it is given */
+  double depth;
+} hapi_touch_print;
+
+/* Where the items of an island are, kept with the slot of its first body. */
+typedef struct hapi_print_place {
+  uint64_t round; /* of the book; 0: none */
+  uint32_t first;
+  uint32_t count;
+  uint32_t first_touch;
+  uint32_t touch_count;
+} hapi_print_place;
+
+typedef enum hapi_reuse_kind {
+  HAPI_REUSE_NONE = 0, /* A and b are measured */
+  HAPI_REUSE_A,        /* b alone is */
+  HAPI_REUSE_ALL       /* no step is made of the island */
+} hapi_reuse_kind;
+
+typedef struct hapi_reuse_island {
+  hapi_reuse_kind kind;
+  uint32_t first_member; /* in the test set, as it was gathered */
+  uint32_t member_count;
+  uint32_t slot;  /* of the first member */
+  uint32_t first; /* its items */
+  uint32_t count;
+  uint32_t first_touch;
+  uint32_t touch_count;
+  uint32_t pushed; /* first of what is pushed in it: contact slot or body slot; HAPI_NONE: none */
+  uint32_t pushed_count;
+  bool spoiled;    /* the items do not stand for what the slots hold */
+  bool has_joints; /* the application's: not all of what they are has a getter */
+} hapi_reuse_island;
+
+typedef struct hapi_member_birth {
+  uint64_t birth;
+  uint32_t known;
+} hapi_member_birth;
+
+/* Of one round of testing simulations in each cycle. */
+typedef struct hapi_reuse_book {
+  hapi_print_item *items; /* of this round */
+  uint32_t count;
+  uint32_t capacity;
+  hapi_print_item *old; /* of the round before */
+  uint32_t old_capacity;
+  hapi_touch_print *touches;
+  uint32_t touch_count;
+  uint32_t touch_capacity;
+  hapi_touch_print *old_touches;
+  uint32_t old_touch_capacity;
+  uint64_t round;
+  bool in_use;                /* this round */
+  hapi_member_birth *members; /* scratch: of an island, in the order of their births */
+  uint32_t member_capacity;
+  hapi_reuse_island *islands;
+  uint32_t island_count;
+  uint32_t island_capacity;
+} hapi_reuse_book;
+
+/* Contacts of the step, as they were given to ODE, which has no getter for them. */
+typedef struct hapi_contact_note {
+  dJointID joint; /* compared only */
+  dContact contact;
+} hapi_contact_note;
+
+typedef struct hapi_contact_notes {
+  hapi_contact_note *list;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_contact_notes;
+
+#define HAPI_REUSE_BOOKS 2 /* accelerance.c, operating_point.c */
+
+typedef struct hapi_reuse {
+  hapi_reuse_book books[HAPI_REUSE_BOOKS];
+  hapi_contact_notes notes;
+} hapi_reuse;
+
+/* reuse.c */
+bool hapi_reuse_wanted(const hapi_physics *physics);
+/* After the islands of a round are gathered: of which it was all found out before. bodies: what is pushed
+ * are bodies, else contacts. */
+void hapi_reuse_look(hapi_physics *physics, hapi_reuse_book *book, bool bodies);
+bool hapi_reuse_has(const hapi_reuse_book *book, hapi_reuse_kind kind);
+/* Of the island of a body; HAPI_REUSE_NONE where it is not under test. */
+hapi_reuse_kind hapi_reuse_kind_of(const hapi_physics *physics, const hapi_reuse_book *book,
+                                   uint32_t known);
+/* Islands of other kinds leave the test set, and what is pushed in them; gathered again they are there. */
+void hapi_reuse_select(hapi_physics *physics, const hapi_reuse_book *book, hapi_reuse_kind kind);
+/* The island of a body under test: what was found is no good, and nothing of it is used again. */
+void hapi_reuse_spoil(hapi_physics *physics, hapi_reuse_book *book, uint32_t known);
+void hapi_reuse_keep(hapi_physics *physics, hapi_reuse_book *book); /* last, unless it failed */
+void hapi_reuse_reset(hapi_physics *physics);
+void hapi_reuse_finish(hapi_physics *physics);
+
+/* reuse_print.c */
+typedef struct hapi_printer {
+  hapi_physics *physics;
+  hapi_reuse_book *book;
+  hapi_reuse_island *island;
+  bool good; /* false: something has no getter, or there is no memory */
+} hapi_printer;
+
+void hapi_print_value(hapi_printer *p, double value, double weight); /* weight as in an item */
+void hapi_print_vector(hapi_printer *p, const double *values, int count, double weight);
+bool hapi_print_island(hapi_physics *physics, hapi_reuse_book *book, uint32_t island, bool bodies);
+/* A contact joint that is made for the step. */
+void hapi_reuse_note(hapi_physics *physics, dJointID joint, const dContact *contact);
+
+/* reuse_joint.c: a joint of the application, of bodies whose far points are within arm. */
+void hapi_print_joint(hapi_printer *p, dJointID joint, double arm);
+
+#endif

@@ -1,0 +1,439 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "physics/physics_internal.h"
+
+/* ODE cannot list a world's bodies, so they are found through the space's geoms and the joints, at
+ * every cycle: what the application added or destroyed in between is seen at once, and no pointer
+ * to a destroyed body is followed. */
+
+#define FIRST_CAPACITY 64u
+
+uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
+{
+  return hapi_index_get(&table->by_address, hapi_index_address(body));
+}
+
+static hap_status grow(hapi_body_table *table, uint32_t capacity)
+{
+  if (!hapi_index_reserve(&table->by_address, capacity)) {
+    return HAP_ERROR_MEMORY;
+  }
+  hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
+  hapi_known_rest *rests = hapi_alloc_array(capacity, sizeof *rests);
+  dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
+  hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
+  hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
+  if (entries == NULL || rests == NULL || handles == NULL || drawn == NULL || poses == NULL) {
+    hapi_free(entries);
+    hapi_free(rests);
+    hapi_free(handles);
+    hapi_free(drawn);
+    hapi_free(poses);
+    return HAP_ERROR_MEMORY;
+  }
+  if (table->entries != NULL) {
+    memcpy(entries, table->entries, table->high * sizeof *entries);
+    memcpy(rests, table->rests, table->high * sizeof *rests);
+    memcpy(handles, table->handles, table->high * sizeof(dBodyID));
+    memcpy(drawn, table->drawn, table->high * sizeof *drawn);
+    for (size_t i = 0; i < HAPI_FRAMES; ++i) {
+      memcpy(poses + i * capacity, table->poses + i * table->capacity, table->high * sizeof *poses);
+    }
+  }
+  hapi_free(table->entries);
+  hapi_free(table->rests);
+  hapi_free(table->handles);
+  hapi_free(table->drawn);
+  hapi_free(table->poses);
+  for (uint32_t i = 0; i < capacity; ++i) {
+    entries[i].rest = &rests[i];
+  }
+  table->entries = entries;
+  table->rests = rests;
+  table->handles = handles;
+  table->drawn = drawn;
+  table->poses = poses;
+  table->capacity = capacity;
+  return HAP_OK;
+}
+
+hap_status hapi_bodies_init(hapi_body_table *table)
+{
+  memset(table, 0, sizeof *table);
+  return grow(table, FIRST_CAPACITY);
+}
+
+void hapi_bodies_finish(hapi_body_table *table)
+{
+  for (uint32_t i = 0; i < table->high; ++i) {
+    hapi_free(table->rests[i].sleep.velocities);
+  }
+  hapi_free(table->entries);
+  hapi_free(table->rests);
+  hapi_free(table->handles);
+  hapi_free(table->drawn);
+  hapi_free(table->poses);
+  hapi_index_finish(&table->by_address);
+  memset(table, 0, sizeof *table);
+}
+
+static uint32_t free_entry(hapi_body_table *table)
+{
+  if (table->used < table->high) {
+    for (uint32_t i = 0; i < table->high; ++i) {
+      if (table->entries[i].body == NULL) {
+        return i;
+      }
+    }
+  }
+  return table->high;
+}
+
+static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID body)
+{
+  hapi_known_rest *rest = known->rest;
+  memset(rest, 0, sizeof *rest);
+  *known = (hapi_known_body){.body = body, .rest = rest};
+  rest->birth = ++table->births;
+  known->slot = HAPI_NONE;
+  known->island = HAPI_NONE;
+}
+
+static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
+{
+  uint32_t index = free_entry(table);
+  if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
+    return HAP_ERROR_MEMORY;
+  }
+  begin_entry(table, &table->entries[index], body);
+  table->handles[index] = body;
+  table->high = index == table->high ? index + 1 : table->high;
+  ++table->used;
+  hapi_index_put(&table->by_address, hapi_index_address(body), index);
+  *out_index = index;
+  return HAP_OK;
+}
+
+/* What is known of the entry's body and points elsewhere. */
+static void drop_entry(hapi_physics *physics, uint32_t index)
+{
+  hapi_known_body *known = &physics->world.bodies.entries[index];
+  hapi_slots_drop_body(physics, index);
+  for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
+    if (physics->account.watch[i] == index) {
+      physics->account.watch[i] = HAPI_NONE;
+    }
+  }
+  hapi_free(known->rest->sleep.velocities);
+  memset(known->rest, 0, sizeof *known->rest);
+  *known = (hapi_known_body){.rest = known->rest};
+  known->slot = HAPI_NONE;
+}
+
+/* Where another body has come to be at the address of a destroyed one, the entry begins anew. */
+static void follow_life(hapi_physics *physics, uint32_t index)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  hapi_known_body *known = &table->entries[index];
+  if (hapi_mark_is_gone(known)) {
+    dBodyID body = known->body;
+    drop_entry(physics, index);
+    begin_entry(table, known, body);
+    hapi_poses_begin(physics, index);
+    ++table->replaced;
+  }
+}
+
+static uint32_t find_living(hapi_physics *physics, dBodyID body)
+{
+  uint32_t index = hapi_bodies_find(&physics->world.bodies, body);
+  if (index != HAPI_NONE) {
+    follow_life(physics, index);
+  }
+  return index;
+}
+
+/* In a scan, which meets most bodies in the order of the one before. */
+static uint32_t find_next(hapi_body_table *table, dBodyID body)
+{
+  uint32_t last = table->last_seen;
+  uint32_t next = last != HAPI_NONE ? table->entries[last].next : HAPI_NONE;
+  uint32_t index =
+      next < table->high && table->handles[next] == body ? next : hapi_bodies_find(table, body);
+  if (last != HAPI_NONE && index != next) {
+    table->entries[last].next = index;
+  }
+  return index;
+}
+
+static bool is_zero(const dReal *v)
+{
+  return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
+}
+
+/* What is written must go back to memory: not where nobody pushes. */
+static void follow_push(hapi_known_body *known)
+{
+  const dReal *force = dBodyGetForce(known->body);
+  const dReal *torque = dBodyGetTorque(known->body);
+  bool pushed = !is_zero(force) || !is_zero(torque);
+  if (pushed || known->pushed) {
+    hapi_v3_copy(force, known->rest->user_force);
+    hapi_v3_copy(torque, known->rest->user_torque);
+  }
+  known->pushed = pushed;
+}
+
+/* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
+ * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
+static void look_at(hapi_physics *physics, hapi_known_body *known)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  dBodyID body = known->body;
+  known->seen = table->scan;
+  ++table->seen_count;
+  known->jointed = dBodyGetJoint(body, 0) != NULL;
+  table->jointed_count += known->jointed;
+  if (table->geoms_forgotten && !known->sized) {
+    known->geoms_print = 0;
+  }
+  known->measured = hapi_extent_follow(known);
+  if (physics->begun) {
+    hapi_sleep_follow(known);
+  }
+  follow_push(known);
+  if (known->slot != HAPI_NONE) {
+    return;
+  }
+  double speed = hapi_extent_speed(known);
+  table->fastest = speed > table->fastest ? speed : table->fastest;
+  const char *unsound = hapi_body_unsoundness(body, known->jointed);
+  if (unsound != NULL && table->unsound_body == NULL) {
+    table->unsound_body = body;
+    table->unsound_text = unsound;
+  }
+}
+
+/* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
+ * ones are gone; after the first one it asks for no more memory. */
+static bool see_body(hapi_physics *physics, dBodyID body)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  uint32_t index = find_next(table, body);
+  if (index != HAPI_NONE && table->entries[index].seen != table->scan) {
+    follow_life(physics, index);
+  }
+  if (index == HAPI_NONE) {
+    table->starved = table->starved || add(table, body, &index) < HAP_OK;
+    if (table->starved) {
+      return false;
+    }
+    hapi_poses_begin(physics, index);
+  }
+  table->last_seen = index;
+  hapi_known_body *known = &table->entries[index];
+  known->found = true;
+  if (known->seen != table->scan) { /* by another of its geoms */
+    look_at(physics, known);
+  }
+  return true;
+}
+
+/* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is not is looked
+ * at again in each scan. */
+static void see_geom(hapi_physics *physics, dGeomID geom)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  dBodyID body = dGeomGetBody(geom);
+  hapi_known_body *known =
+      body != NULL && see_body(physics, body) ? &table->entries[table->last_seen] : NULL;
+  bool same = known != NULL && known->sized && !known->measured;
+  bool posed = same || body == NULL || hapi_pose_is_sound(body);
+  if (same || (posed && hapi_geom_is_sound(geom))) {
+    return;
+  }
+  table->unsound_geom = posed && table->unsound_geom == NULL ? geom : table->unsound_geom;
+  if (known != NULL) {
+    known->geoms_print = 0;
+  }
+}
+
+static void see_space(hapi_physics *physics, dSpaceID space)
+{
+  int count = dSpaceGetNumGeoms(space);
+  for (int i = 0; i < count; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    if (dGeomIsSpace(geom)) {
+      see_space(physics, (dSpaceID)geom);
+    } else {
+      see_geom(physics, geom);
+    }
+  }
+}
+
+/* The bodies that joints connect to this one; true when one of them was not seen in this scan. */
+static bool see_partners(hapi_physics *physics, dBodyID body)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  bool found = false;
+  int joints = dBodyGetNumJoints(body);
+  for (int k = 0; k < 2 * joints; ++k) {
+    dBodyID other = dJointGetBody(dBodyGetJoint(body, k / 2), k % 2);
+    uint32_t index = hapi_bodies_find(table, other);
+    bool seen = index != HAPI_NONE && table->entries[index].seen == table->scan;
+    if (other != NULL && !seen) {
+      found = see_body(physics, other) || found;
+    }
+  }
+  return found;
+}
+
+/* Bodies without a geom are known by their joints to known ones: walks until nothing is new. */
+static void see_jointed(hapi_physics *physics)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  bool found = table->jointed_count > 0;
+  while (found) {
+    found = false;
+    for (uint32_t i = 0; i < table->high; ++i) {
+      const hapi_known_body *known = &table->entries[i];
+      if (known->body != NULL && known->seen == table->scan && known->jointed) {
+        found = see_partners(physics, table->entries[i].body) || found;
+      }
+    }
+  }
+}
+
+static void remove_entry(hapi_physics *physics, uint32_t index)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  hapi_index_remove(&table->by_address, hapi_index_address(table->handles[index]));
+  drop_entry(physics, index);
+  table->handles[index] = NULL;
+  --table->used;
+}
+
+/* Once a run: an application that does it does it often. The statistics count on. */
+static void say_lost(hapi_physics *physics, uint32_t count)
+{
+  static const char *const text =
+      "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
+      "without "
+      "hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts them";
+  physics->world.bodies.lost += count;
+  if (count > 0 && !physics->world.bodies.said_lost) {
+    physics->world.bodies.said_lost = true;
+    hapi_log(HAP_LOG_WARNING, "%s", text);
+    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
+  }
+}
+
+/* Of an adopted body without geom and joint only the application knows whether it lives, unless another
+ * one is at its address. */
+static bool lives_unseen(const hapi_known_body *known)
+{
+  return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
+}
+
+static void drop_unseen(hapi_physics *physics)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  uint32_t dropped = 0;
+  bool all_seen = table->seen_count == table->used;
+  for (uint32_t i = 0; i < table->high && !all_seen; ++i) {
+    hapi_known_body *known = &table->entries[i];
+    if (known->body == NULL || known->seen == table->scan) {
+      continue;
+    }
+    if (lives_unseen(known)) {
+      look_at(physics, known);
+      continue;
+    }
+    remove_entry(physics, i);
+    ++dropped;
+  }
+  say_lost(physics, dropped + table->replaced);
+  table->replaced = 0;
+}
+
+static hap_status scan(hapi_physics *physics)
+{
+  hapi_body_table *table = &physics->world.bodies;
+  ++table->scan;
+  table->starved = false;
+  table->seen_count = table->jointed_count = 0;
+  table->last_seen = HAPI_NONE;
+  table->fastest = 0.0;
+  table->unsound_body = NULL;
+  table->unsound_text = NULL;
+  table->unsound_geom = NULL;
+  see_space(physics, physics->world.ode.space);
+  see_jointed(physics);
+  drop_unseen(physics);
+  table->geoms_forgotten = false;
+  return table->starved ? HAP_ERROR_MEMORY : HAP_OK;
+}
+
+/* Those who draw look bodies up in the table. */
+hap_status hapi_bodies_scan(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->drawing.lock);
+  hap_status status = scan(physics);
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return status;
+}
+
+hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index)
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->drawing.lock);
+  *out_index = find_living(physics, body);
+  if (*out_index == HAPI_NONE) {
+    status = add(&physics->world.bodies, body, out_index);
+    if (status >= HAP_OK) {
+      hapi_poses_begin(physics, *out_index);
+    }
+  }
+  pthread_mutex_unlock(&physics->drawing.lock);
+  if (status >= HAP_OK) {
+    physics->world.bodies.entries[*out_index].rest->adopted = true;
+    physics->world.bodies.entries[*out_index].found = false; /* its geoms may have gone since */
+    physics->world.bodies.entries[*out_index].seen = physics->world.bodies.scan;
+  }
+  return status;
+}
+
+hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body)
+{
+  pthread_mutex_lock(&physics->drawing.lock);
+  uint32_t index = find_living(physics, body);
+  if (index != HAPI_NONE) {
+    hapi_sleep_give_back(&physics->world.bodies.entries[index]);
+    remove_entry(physics, index);
+  }
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;
+}
+
+hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+                                          void (*callback)(dBodyID))
+{
+  hap_status status = HAP_OK;
+  pthread_mutex_lock(&physics->drawing.lock);
+  uint32_t index = find_living(physics, body);
+  if (index == HAPI_NONE) {
+    status = scan(physics); /* it may have been made since the last one */
+    index = hapi_bodies_find(&physics->world.bodies, body);
+  }
+  if (index != HAPI_NONE) {
+    physics->world.bodies.entries[index].rest->moved_callback = callback;
+    dBodySetMovedCallback(body, callback);
+  }
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return index != HAPI_NONE ? HAP_OK : status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
+}

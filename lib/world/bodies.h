@@ -1,0 +1,142 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_WORLD_BODIES_H
+#define HAPODE_WORLD_BODIES_H
+
+/* What is known of the world's bodies: a table with an entry for each. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/ode.h>
+
+#include "base/index.h"
+
+#define HAPI_NONE HAPI_INDEX_NONE
+
+typedef struct hapi_physics hapi_physics;
+
+/* ODE's auto-disable, kept by the physics side: a testing simulation would reset ODE's own. */
+typedef struct hapi_sleep {
+  double linear_threshold;  /* m/s, squared as ODE keeps it */
+  double angular_threshold; /* rad/s, squared */
+  int idle_steps;
+  double idle_time; /* s */
+  int samples;
+  int steps_left;
+  double time_left;
+  double *velocities; /* samples x 6, ring; NULL for up to one */
+  int next_sample;
+  bool ring_full;
+} hapi_sleep;
+
+/* Values of the application that the mark of a body stands in for. */
+typedef struct hapi_mark {
+  double idle_time;         /* s */
+  double angular_threshold; /* rad/s */
+} hapi_mark;
+
+/* What a step does not read for a body that is far from the pointers and has not changed. */
+typedef struct hapi_known_rest {
+  uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
+  bool adopted;
+  double user_force[3]; /* accumulators before the last global step */
+  double user_torque[3];
+  hapi_mark mark;
+  hapi_sleep sleep;
+  uint32_t member;    /* scratch: place in the test set and its snapshot */
+  uint64_t chosen_in; /* scratch: model that it was chosen for */
+  uint64_t ranged_in; /* scratch: walk that met it */
+  int32_t hops; /* scratch: of that walk, from the neighbours; of a mechanism they are those of
+                           the body that it was met by */
+  uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
+  double damping[2];    /* scratch of soften.c */
+  void (*moved_callback)(dBodyID);
+} hapi_known_rest;
+
+/* 64 bytes: a scan goes through the memory of all of them. */
+typedef struct hapi_known_body {
+  dBodyID body;          /* NULL: free entry */
+  hapi_known_rest *rest; /* the entry's */
+  uint64_t seen;         /* scan that found it */
+  uint32_t next;         /* entry that the last scan saw after it; a guess */
+  uint32_t slot;         /* local slot, HAPI_NONE: not local */
+  double extent;         /* m, from the body's origin to the far corner of its geoms */
+  uint64_t
+      geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
+  uint32_t island; /* scratch: number of the island under test, HAPI_NONE outside */
+  bool found;      /* at least once, by a geom or a joint: it is gone when it is found no more */
+  bool sized;      /* all of its geoms are of classes whose sizes are in geoms_print */
+  bool measured;   /* the last scan found its geoms changed */
+  bool jointed;
+  bool loop_owned; /* in the newest message, also while its slot retires */
+  bool loop_touched;
+  bool pushed; /* user_force or user_torque is not 0 */
+  bool mark_placed;
+  bool mark_in_axis;
+  bool sleep_taken;
+  bool
+      sleep_automatic; /* ODE's flag as the application set it; kept by us while the session runs */
+  bool awake;          /* after the last global step */
+} hapi_known_body;
+
+typedef struct hapi_drawn hapi_drawn;
+
+typedef struct hapi_body_table {
+  hapi_known_body *entries;
+  hapi_known_rest *rests; /* of each entry */
+  hapi_drawn *drawn;      /* of each entry */
+  hap_pose *poses;        /* HAPI_FRAMES x capacity: a frame is written from end to end */
+  dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
+  uint32_t capacity;
+  uint32_t high; /* entries in use are below */
+  hapi_index by_address;
+  uint64_t births; /* entries begun so far */
+  uint32_t used;
+  uint64_t scan;
+  uint32_t seen_count;    /* entries that this scan saw */
+  uint32_t jointed_count; /* of those with joints */
+  uint32_t last_seen;
+  double fastest;       /* m/s, surface of the bodies that are awake and not local */
+  dBodyID unsound_body; /* the first one that the scan met, NULL: none; not of the local ones */
+  const char *unsound_text;
+  dGeomID unsound_geom;
+  uint64_t lost;
+  uint32_t replaced; /* among them, not counted yet: another one is at the address */
+  bool said_lost;
+  bool starved;         /* the newest scan found no memory for a body: not all are known */
+  bool geoms_forgotten; /* since the newest scan: another one may be at the address of one */
+} hapi_body_table;
+
+/* bodies.c */
+hap_status hapi_bodies_init(hapi_body_table *table);
+void hapi_bodies_finish(hapi_body_table *table);
+uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
+/* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
+hap_status hapi_bodies_scan(hapi_physics *physics);
+hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
+hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body);
+hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+                                          void (*callback)(dBodyID));
+
+/* extent.c */
+bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
+/* m/s, of its surface; 0 for one that sleeps */
+double hapi_extent_speed(const hapi_known_body *known);
+
+/* mark.c: tells a body from a later one at its address */
+void hapi_mark_place(hapi_known_body *known);
+bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
+/* What the application has set since, of auto-disable. */
+#define HAPI_MARK_TIME 1u
+#define HAPI_MARK_THRESHOLD 2u
+unsigned hapi_mark_follow(hapi_known_body *known);
+void hapi_mark_remove(hapi_known_body *known); /* idempotent */
+
+/* sleep.c */
+void hapi_sleep_follow(hapi_known_body *known);             /* takes over; and what is set later */
+void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
+void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
+void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes one */
+
+#endif

@@ -1,0 +1,39 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_WORLD_CONFIG_H
+#define HAPODE_WORLD_CONFIG_H
+
+/* What the physics side is created with. Constant from then on. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/session.h>
+
+#include "sync/exchange.h"
+#include "world/settings.h"
+
+typedef struct hapi_physics_config {
+  hapi_capacity capacity;
+  uint32_t max_bodies; /* that the loop may move itself; capacity.bodies is more */
+  hap_model model;
+  hap_impulse_pose impulse_pose;
+  hapi_knobs knobs;
+  double accuracy; /* as in hap_session_def, also the next three */
+  double force_error_wanted;
+  double tick_share;
+  double physics_share;
+  uint32_t effects; /* wishes at the start, base/wishes.h */
+  double physics_hz;
+  double haptic_hz;
+  double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
+  bool lockstep;
+  bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
+  int rt_priority;
+  hapi_exchange *exchange;
+  /* [physics] HAP_FAULT_NONE: something that the application should know, but no fault */
+  void (*report)(void *user, hap_fault fault, const char *text);
+  void *user;
+} hapi_physics_config;
+
+#endif

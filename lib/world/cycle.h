@@ -1,0 +1,34 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_WORLD_CYCLE_H
+#define HAPODE_WORLD_CYCLE_H
+
+/* What is in force in this cycle of physics. physics/cycle.c writes it, all parts read it. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/session.h>
+
+#include "base/wishes.h"
+#include "sync/messages.h"
+#include "world/config.h"
+#include "world/settings.h"
+
+typedef struct hapi_cycle {
+  const hapi_physics_config *config;
+  hapi_settings settings; /* of the dial */
+  hap_model model;
+  uint32_t wishes;     /* effects, base/wishes.h */
+  double step_s;       /* of this cycle's global step */
+  double probe_step_s; /* H */
+  uint64_t model_number;
+  int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
+  hapi_state *state;     /* newest message of the loop; NULL: none yet */
+  bool has_new_state;    /* state came in this cycle */
+} hapi_cycle;
+
+/* To the log and the application, unless *io_said. */
+void hapi_say_once(const hapi_cycle *cycle, bool *io_said, const char *text);
+
+#endif
