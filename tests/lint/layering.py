@@ -1,7 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""layering.py ROOT: what may include what (design.md section 2), one door to the heap, no exit."""
+"""layering.py ROOT: what may include what, between folders and inside them, one door to the heap,
+no exit.
+
+Inside a folder the order of the .c files in meson.build is the flow: a file knows those before it.
+An arrow goes from a file to one whose header it includes or one of whose functions it names."""
 import fnmatch
 import os
 import posixpath
@@ -52,6 +56,23 @@ MODULES = ("plugins/skeleton/",)  # no part of the library: a heap of their own,
 
 QUITTERS = ("lib/base/assert.c",        # a mistake of this library, in builds with asserts
             "plugins/spidar/guard.c")  # forks a process of its own, which ends
+
+# Arrows against the flow that a part may have, by the folders of the part; None: any, for now.
+# Other folders have none.
+BACKWARD_MAX = {
+    "physics": (["lib/physics", "lib/world", "lib/near", "lib/probe", "lib/research",
+                 "lib/accuracy"], 15),
+    "tick": (["lib/haptic/rt", "lib/solver", "lib/guard"], None),
+    "lib/contact": (["lib/contact"], 2),
+    "lib/device": (["lib/device"], 5),
+    "lib/haptic": (["lib/haptic", "lib/loop"], 1),
+    "lib/session": (["lib/session"], 2),
+    "plugins/spidar": (["plugins/spidar"], 5),
+}
+LISTED = re.compile(r"'([^'\n]+\.c)'")
+# A function that other files may call: its definition begins in the first column.
+DEFINITION = re.compile(
+    r"^(?!static\b|typedef\b)[A-Za-z_][\w \t\n*]*?\b(\w+)\([^;{}]*\)\s*\{", re.M)
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.M)
 # a call of the heap, but not of a member or of a hook with such a name
@@ -121,6 +142,58 @@ def check_ode(root, files):
                 yield f"{name}:{line}: must not include {target}"
 
 
+def listed_units(root, files):
+    """{name without ".c": its place in the lists of the meson.build files}"""
+    places = {}
+    for build in lint.project_files(root):
+        if posixpath.basename(build) == "meson.build":
+            for name in LISTED.findall(lint.read(root, build)):
+                path = posixpath.normpath(posixpath.join(posixpath.dirname(build), name))
+                if path in files:
+                    places.setdefault(path[:-2], len(places))
+    return places
+
+
+def arrows_inside(root, files):
+    """Pairs of units of one folder; a unit is a .c file with its header."""
+    texts = {name: lint.without_comments(lint.read(root, name)) for name in files}
+    definer = {match.group(1): name[:-2] for name, text in texts.items() if name.endswith(".c")
+               for match in DEFINITION.finditer(text)}
+    arrows = set()
+    for name, text in texts.items():
+        ends = {definer[word] for word in set(re.findall(r"\w+", text)) if word in definer}
+        ends |= {path[:-2] for _, _, path in includes(root, name) if path is not None}
+        arrows |= {(name[:-2], end) for end in ends if end != name[:-2] and
+                   posixpath.dirname(end) == posixpath.dirname(name)}
+    return arrows
+
+
+def part_of(folder):
+    for part, (folders, most) in BACKWARD_MAX.items():
+        if folder in folders:
+            return part, most
+    return folder, 0
+
+
+def check_flow(root, files, tap):
+    places = listed_units(root, files)
+    tap.point("every file is in a list of meson.build",
+              [name for name in files if name.endswith(".c") and name[:-2] not in places])
+    parts = {}  # part: [most, arrows, those against the flow]
+    for begin, end in sorted(arrows_inside(root, files)):
+        if begin in places and end in places:
+            part, most = part_of(posixpath.dirname(begin))
+            row = parts.setdefault(part, [most, 0, []])
+            row[1] += 1
+            if places[end] > places[begin]:
+                row[2].append(f"{begin} -> {posixpath.basename(end)}")
+    for part, (most, count, backward) in sorted(parts.items()):
+        print(f"# {part}: {len(backward)} of {count} arrows against the flow")
+        if most is not None:
+            tap.point(f"{part}: at most {most} arrows against the flow",
+                      backward if len(backward) > most else [])
+
+
 def check_calls(root, files, pattern):
     for name in files:
         for number, line in enumerate(lint.without_comments(lint.read(root, name)).split("\n"), 1):
@@ -155,6 +228,7 @@ def main(root):
     inside = [n for n in files if n.startswith(("lib/", "plugins/"))]
     tap.point("there are files to check", [] if inside else ["no .c or .h file in lib/"])
     tap.point("includes go one way", check_layers(root, files))
+    check_flow(root, inside, tap)
     tap.point("ODE is included only where it may", check_ode(root, files))
     tap.point("lib/base/alloc.c is the one door to the heap",
               check_calls(root, [n for n in inside if n != "lib/base/alloc.c" and
