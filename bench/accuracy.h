@@ -3,11 +3,9 @@
 #ifndef HAPODE_BENCH_ACCURACY_H
 #define HAPODE_BENCH_ACCURACY_H
 
-/* The parts of hapode-bench accuracy: what is measured (accuracy_scenes.c, accuracy_plan.c), one run
- * (accuracy_run.c), two runs side by side (accuracy_error.c), the rows that share their references
- * (accuracy_sweep.c), those of all scenes at once (accuracy_jobs.c), a row as text
- * (accuracy_table.c), the file of finished rows (accuracy_rows.c), files of several machines
- * (accuracy_merge.c), what is worth its time (accuracy_front.c), picture, numbers with a bound. */
+/* hapode-bench accuracy: runs and the comparison of two (accuracy_run.c), what is measured
+ * (accuracy_plan.c), rows as text and in files (accuracy_rows.c), the measurement, what is worth its
+ * time, and the picture (accuracy.c). */
 
 #include <stdint.h>
 
@@ -22,7 +20,7 @@
 #define ACCURACY_NAME_MAX 16
 #define ACCURACY_SHARDS_MAX 10000
 
-/* ---- accuracy_scenes.c ---- */
+/* ---- accuracy_run.c: scenes ---- */
 
 typedef struct accuracy_scene {
   const char *name;      /* in the table of results */
@@ -47,7 +45,7 @@ bool accuracy_hand(const char *spec, double stretch, char *out, size_t size);
 /* The spec of the recorded hand; HAP_ERROR_NOT_FOUND without the file. */
 hap_status accuracy_recorded_hand(bench *b, const accuracy_scene *which, char *out, size_t size);
 
-/* ---- accuracy_run.c ---- */
+/* ---- accuracy_run.c: runs ---- */
 
 typedef struct accuracy_frame {
   double force[SCENE_POINTERS_MAX][3];  /* N, on the hands */
@@ -100,7 +98,7 @@ void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */
 hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *out);
 void accuracy_motion_free(accuracy_motion *m); /* zeroed allowed */
 
-/* ---- accuracy_error.c ---- */
+/* ---- accuracy_run.c: comparison ---- */
 
 typedef struct accuracy_errors {
   double force;         /* RMS of the difference / RMS of the reference, while either touches */
@@ -206,7 +204,7 @@ hap_status accuracy_deal(bench *b, const accuracy_plan *plan, size_t shards, siz
 
 uint64_t accuracy_plan_hash(const accuracy_plan *plan);
 
-/* ---- accuracy_table.c ---- */
+/* ---- accuracy_rows.c: a row ---- */
 
 typedef struct accuracy_row {
   char scene[ACCURACY_NAME_MAX];
@@ -244,23 +242,12 @@ void accuracy_table_free(accuracy_table *table); /* zeroed allowed */
 void accuracy_write_header(FILE *csv);
 void accuracy_write_row(FILE *csv, const accuracy_row *row);
 
-/* A line of the file; false: it is none that accuracy_write_row makes. */
-bool accuracy_read_row(const char *line, accuracy_row *out);
-bool accuracy_is_header(const char *line);
+/* How many rows from the first on are of its scene. */
+size_t accuracy_rows_of_scene(const accuracy_table *table, size_t first);
 
 bool accuracy_row_is(const accuracy_row *row, hap_model model, const char *knob);
 
-/* ---- accuracy_sweep.c ---- */
-
-/* Where finished rows go. */
-typedef hap_status (*accuracy_done_fn)(void *user, size_t point, const accuracy_row *row);
-
-/* Measures the points of a group. have: rows by point, of those whose scene is not empty; they are not
- * measured again. */
-hap_status accuracy_sweep(bench *b, const accuracy_plan *plan, const accuracy_group *group,
-                          const accuracy_row *have, accuracy_done_fn done, void *user);
-
-/* ---- accuracy_rows.c ---- */
+/* ---- accuracy_rows.c: the file ---- */
 
 /* The file of finished rows. Its head says of which build, settings and shard it is; the rows are in
  * the order in which they were finished. */
@@ -278,8 +265,6 @@ hap_status accuracy_identify(bench *b, const accuracy_plan *plan, accuracy_ident
 /* "K/N" of a shard, 1 <= K <= N. */
 bool accuracy_read_shard(const char *text, size_t *shard, size_t *shards);
 
-hap_status accuracy_rows_head(bench *b, const char *path, accuracy_identity *out);
-
 /* rows: by point of the plan, which is the file's. What is not in the file stays as it is. A last line that
  * breaks off is left out. HAP_ERROR_FORMAT with a text. */
 hap_status accuracy_rows_read(bench *b, const char *path, const accuracy_plan *plan,
@@ -295,7 +280,7 @@ hap_status accuracy_rows_append(bench *b, int file, const accuracy_row *row);
 /* Path of the run's file. */
 bool accuracy_rows_path(const bench *b, const accuracy_identity *identity, char *out, size_t size);
 
-/* ---- accuracy_merge.c ---- */
+/* ---- accuracy_rows.c: files of several machines ---- */
 
 typedef struct accuracy_settings {
   bool quick;
@@ -309,48 +294,5 @@ hap_status accuracy_merge_settings(bench *b, accuracy_settings *out);
 
 /* The rows of the files b->merge, which are all shards of one run. */
 hap_status accuracy_merge(bench *b, const accuracy_plan *plan, accuracy_row *rows);
-
-/* ---- accuracy_jobs.c ---- */
-
-/* Measures what have lacks of the groups that mine says, each group in a process of its own and at
- * most so many at a time; finished rows go to file. */
-typedef struct accuracy_work {
-  const accuracy_plan *plan;
-  const size_t *shard_of; /* of each group */
-  size_t shard;           /* from 0: which are done */
-  size_t processes;
-  const accuracy_row *have;
-  int file;
-} accuracy_work;
-
-hap_status accuracy_jobs(bench *b, const accuracy_work *work);
-
-/* ---- accuracy_front.c ---- */
-
-/* Whether a row is a choice that somebody could make for the scene as it is. */
-bool accuracy_is_choice(const accuracy_row *row);
-
-/* What counts on the front: the error from the first start, as far as it can be told. */
-double accuracy_front_error(const accuracy_row *row);
-
-/* Sets front in the rows of a scene, which stand together. */
-void accuracy_mark_front(accuracy_row *rows, size_t count);
-
-#define ACCURACY_LABEL_MAX 80
-
-/* What a row is: "contact 20 Hz, iterations 5". */
-void accuracy_label(const accuracy_row *row, char out[ACCURACY_LABEL_MAX]);
-
-/* Says how far the paper's choice and the default are from the front of their scene. */
-void accuracy_report_front(const accuracy_row *rows, size_t count);
-
-size_t accuracy_rows_of_scene(const accuracy_table *table, size_t first);
-
-/* ---- accuracy_hold.c, accuracy_picture.c ---- */
-
-/* A hand that rests on a stack for 10 s: force of model contact against dWorldStep. */
-hap_status accuracy_check_hold(bench *b);
-
-hap_status accuracy_draw(bench *b, const accuracy_table *table);
 
 #endif

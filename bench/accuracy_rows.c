@@ -1,14 +1,12 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The file of finished rows: what a run that was killed goes on from, and what a shard leaves. It is
- * a few lines that begin with # and say whose rows these are, then a table as accuracy.csv. */
-
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -18,6 +16,178 @@
 #include <ode/ode.h>
 
 #include "bench/accuracy.h"
+
+#define TABLE_GROWTH 256
+#define NOT_A_NUMBER 1e9 /* what a run that came to no number has in the table */
+
+/* One line is one column of accuracy.csv, in its order, which only grows at the end. */
+typedef struct column {
+  const char *name;
+  size_t offset;
+  double scale;       /* what stands in the table / what the row has; 0: a text */
+  const char *format; /* of the number */
+} column;
+
+#define TEXT(name, member)                          \
+  {                                                 \
+    name, offsetof(accuracy_row, member), 0.0, NULL \
+  }
+#define NUMBER(name, member, scale, format)             \
+  {                                                     \
+    name, offsetof(accuracy_row, member), scale, format \
+  }
+
+static const column columns[] = {
+    TEXT("scene", scene),
+    TEXT("model", model),
+    NUMBER("physics_hz", physics_hz, 1.0, "%g"),
+    TEXT("knob", knob),
+    NUMBER("value", value, 1.0, "%g"),
+    NUMBER("force_rel_rms", errors.force, 1.0, "%.6g"),
+    NUMBER("impulse_ratio", errors.impulse_ratio, 1.0, "%.6g"),
+    NUMBER("peak_ratio", errors.peak_ratio, 1.0, "%.6g"),
+    NUMBER("tick_us", tick_us, 1.0, "%.4g"),
+    NUMBER("physics_ms", physics_ms, 1.0, "%.4g"),
+    NUMBER("duty", duty, 1.0, "%.4g"),
+    NUMBER("haptic_hz", haptic_hz, 1.0, "%g"),
+    NUMBER("noise_floor", noise_floor, 1.0, "%.6g"),
+    NUMBER("estimate", estimate, 1.0, "%.6g"),
+    TEXT("hand", hand),
+    NUMBER("pose_error_mm", errors.pose_max, 1e3, "%.5g"),
+    NUMBER("sync_line_n", errors.line_n, 1.0, "%.5g"),
+    NUMBER("hand_speed", hand_speed, 1.0, "%.4g"),
+    NUMBER("pose_median_mm", errors.pose_median, 1e3, "%.5g"),
+    NUMBER("force_rms_n", errors.force_rms, 1.0, "%.4g"),
+    NUMBER("rest_share", rest_share, 1.0, "%.3g"),
+    NUMBER("start_um", start_um, 1.0, "%g"),
+    NUMBER("torque_rel_rms", errors.torque, 1.0, "%.6g"),
+    NUMBER("torque_floor", torque_floor, 1.0, "%.6g"),
+    NUMBER("starts", starts, 1.0, "%g"),
+    NUMBER("first_rel_rms", first_force, 1.0, "%.6g"),
+    NUMBER("lines", errors.lines, 1.0, "%g"),
+    NUMBER("front", front, 1.0, "%g"),
+    NUMBER("joint_open_mm", errors.joint_loop, 1e3, "%.4g"),
+    NUMBER("joint_world_mm", errors.joint_world, 1e3, "%.4g"),
+    NUMBER("joint_left_mm", errors.joint_left, 1e3, "%.4g"),
+    NUMBER("joint_floor_mm", joint_floor, 1e3, "%.4g"),
+    NUMBER("joint_turn_deg", errors.joint_turn, 180.0 / M_PI, "%.4g"),
+};
+
+#define COLUMN_COUNT (sizeof columns / sizeof columns[0])
+
+void accuracy_table_free(accuracy_table *table)
+{
+  free(table->rows);
+  memset(table, 0, sizeof *table);
+}
+
+hap_status accuracy_table_add(bench *b, accuracy_table *table, const accuracy_row *row)
+{
+  if (table->count == table->capacity) {
+    size_t capacity = table->capacity + TABLE_GROWTH;
+    accuracy_row *rows = realloc(table->rows, capacity * sizeof *rows);
+    if (rows == NULL) {
+      return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
+    }
+    table->rows = rows;
+    table->capacity = capacity;
+  }
+  table->rows[table->count] = *row;
+  ++table->count;
+  return HAP_OK;
+}
+
+size_t accuracy_rows_of_scene(const accuracy_table *table, size_t first)
+{
+  size_t end = first;
+  while (end < table->count && strcmp(table->rows[end].scene, table->rows[first].scene) == 0) {
+    ++end;
+  }
+  return end - first;
+}
+
+bool accuracy_row_is(const accuracy_row *row, hap_model model, const char *knob)
+{
+  return strcmp(row->model, hap_model_name(model)) == 0 && strcmp(row->knob, knob) == 0;
+}
+
+/* ---- as text ---- */
+
+void accuracy_write_header(FILE *csv)
+{
+  for (size_t i = 0; i < COLUMN_COUNT; ++i) {
+    fprintf(csv, "%s%s", i > 0 ? "," : "", columns[i].name);
+  }
+  fputc('\n', csv);
+}
+
+void accuracy_write_row(FILE *csv, const accuracy_row *row)
+{
+  for (size_t i = 0; i < COLUMN_COUNT; ++i) {
+    const column *c = &columns[i];
+    const char *at = (const char *)row + c->offset;
+    char number[40];
+    if (c->scale != 0.0) {
+      double value = c->scale * *(const double *)(const void *)at;
+      /* NOLINTNEXTLINE(clang-diagnostic-format-nonliteral): from the table above */
+      snprintf(number, sizeof number, c->format, isfinite(value) ? value : NOT_A_NUMBER);
+      at = number;
+    }
+    fprintf(csv, "%s%s", i > 0 ? "," : "", at);
+  }
+  fputc('\n', csv);
+}
+
+/* The field up to the next comma; NULL: it does not fit, or it is not a number of its own. */
+static const char *read_field(const char *text, const column *c, accuracy_row *out)
+{
+  char field[ACCURACY_NAME_MAX + 16];
+  size_t length = strcspn(text, ",\n");
+  char *to = (char *)out + c->offset;
+  char *end = NULL;
+  if (length == 0 || length >= (c->scale != 0.0 ? sizeof field : ACCURACY_NAME_MAX)) {
+    return NULL;
+  }
+  memcpy(field, text, length);
+  field[length] = '\0';
+  if (c->scale == 0.0) {
+    memcpy(to, field, length + 1);
+  } else {
+    double value = strtod(field, &end) / c->scale;
+    memcpy(to, &value, sizeof value);
+  }
+  return end == NULL || *end == '\0' ? text + length : NULL;
+}
+
+/* A line of the file; false: it is none that accuracy_write_row makes. */
+static bool accuracy_read_row(const char *line, accuracy_row *out)
+{
+  memset(out, 0, sizeof *out);
+  for (size_t i = 0; i < COLUMN_COUNT; ++i) {
+    line = read_field(line, &columns[i], out);
+    if (line == NULL || *line != (i + 1 < COLUMN_COUNT ? ',' : '\n')) {
+      return false;
+    }
+    ++line;
+  }
+  return *line == '\0';
+}
+
+static bool accuracy_is_header(const char *line)
+{
+  for (size_t i = 0; i < COLUMN_COUNT; ++i) {
+    size_t length = strlen(columns[i].name);
+    if (strncmp(line, columns[i].name, length) != 0 ||
+        line[length] != (i + 1 < COLUMN_COUNT ? ',' : '\n')) {
+      return false;
+    }
+    line += length + 1;
+  }
+  return true;
+}
+
+/* The file of finished rows: what a run that was killed goes on from, and what a shard leaves. It is
+ * a few lines that begin with # and say whose rows these are, then a table as accuracy.csv. */
 
 #define LINE_LENGTH 1024
 #define LOCK_TRIES 50 /* of 20 ms: processes of a run that was killed end within moments */
@@ -203,7 +373,7 @@ static hap_status read_rows(bench *b, const char *path, FILE *file, const accura
   return HAP_OK;
 }
 
-hap_status accuracy_rows_head(bench *b, const char *path, accuracy_identity *out)
+static hap_status accuracy_rows_head(bench *b, const char *path, accuracy_identity *out)
 {
   FILE *file = fopen(path, "r");
   if (file == NULL) {
@@ -363,4 +533,175 @@ hap_status accuracy_rows_open(bench *b, const accuracy_plan *plan,
   }
   *out_file = file;
   return HAP_OK;
+}
+
+/* Files of several processes or machines, each with the finished rows of a shard, into one table. */
+
+hap_status accuracy_merge_settings(bench *b, accuracy_settings *out)
+{
+  accuracy_identity head;
+  char kind[8];
+  hap_status status = accuracy_rows_head(b, b->merge[0], &head);
+  if (status < HAP_OK) {
+    return status;
+  }
+  if (sscanf(head.settings, "%7[^,], scene %31[^,], coupling %31[^,], estimates %7[^,],", kind,
+             out->scene, out->coupling, out->estimates) != 4) {
+    return bench_fail(b, HAP_ERROR_FORMAT, "%s: its settings \"%s\" are not understood",
+                      b->merge[0], head.settings);
+  }
+  out->quick = strcmp(kind, "quick") == 0;
+  return HAP_OK;
+}
+
+/* All of one run, and of the plan that is made here. */
+static hap_status check_heads(bench *b, const accuracy_identity *here,
+                              const accuracy_identity *heads)
+{
+  /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): there is one for each file, and one file at least */
+  if (strcmp(heads[0].settings, here->settings) != 0) {
+    return bench_fail(b, HAP_ERROR_STATE,
+                      "%s is of a run with \"%s\", which here would be \"%s\": merge with the "
+                      "build, and with the recordings, that it was run with",
+                      b->merge[0], heads[0].settings, here->settings);
+  }
+  for (size_t i = 1; i < b->merge_count; ++i) {
+    const char *what = strcmp(heads[i].build, heads[0].build) != 0         ? "builds"
+                       : strcmp(heads[i].settings, heads[0].settings) != 0 ? "settings"
+                       : heads[i].shards != heads[0].shards                ? "numbers of shards"
+                                                                           : NULL;
+    if (what != NULL) {
+      return bench_fail(b, HAP_ERROR_STATE,
+                        "%s and %s are of different %s (%s, %s, shard %zu/%zu; %s, %s, shard "
+                        "%zu/%zu): run all shards alike",
+                        b->merge[0], b->merge[i], what, heads[0].build, heads[0].settings,
+                        heads[0].shard, heads[0].shards, heads[i].build, heads[i].settings,
+                        heads[i].shard, heads[i].shards);
+    }
+    if (strcmp(heads[i].machine, heads[0].machine) != 0) {
+      bench_say("times are of different machines: %s has %s, %s has %s", b->merge[0],
+                heads[0].machine, b->merge[i], heads[i].machine);
+    }
+  }
+  return HAP_OK;
+}
+
+/* Each shard once. */
+static hap_status check_shards(bench *b, const accuracy_identity *heads)
+{
+  for (size_t shard = 1; shard <= heads[0].shards; ++shard) {
+    size_t found = b->merge_count;
+    for (size_t i = 0; i < b->merge_count; ++i) {
+      if (heads[i].shard != shard) {
+        continue;
+      }
+      if (found < b->merge_count) {
+        return bench_fail(b, HAP_ERROR_STATE, "shard %zu of %zu is there twice: %s and %s", shard,
+                          heads[0].shards, b->merge[found], b->merge[i]);
+      }
+      found = i;
+    }
+    if (found == b->merge_count) {
+      return bench_fail(b, HAP_ERROR_NOT_FOUND, "shard %zu of %zu is missing", shard,
+                        heads[0].shards);
+    }
+  }
+  return HAP_OK;
+}
+
+/* That a file has its own rows, all of them and no others. */
+static hap_status check_rows(bench *b, const accuracy_plan *plan, const char *path,
+                             const accuracy_identity *head, const size_t *shard_of,
+                             const accuracy_row *rows)
+{
+  size_t missing = 0;
+  size_t others = 0;
+  for (size_t g = 0; g < plan->group_count; ++g) {
+    bool own = shard_of[g] + 1 == head->shard;
+    for (size_t i = 0; i < plan->groups[g].count; ++i) {
+      bool there = rows[plan->groups[g].first + i].scene[0] != '\0';
+      missing += own && !there;
+      others += !own && there;
+    }
+  }
+  if (others > 0) {
+    return bench_fail(b, HAP_ERROR_FORMAT, "%s: %zu rows are of another shard than %zu/%zu", path,
+                      others, head->shard, head->shards);
+  }
+  if (missing > 0) {
+    return bench_fail(b, HAP_ERROR_STATE,
+                      "%s: %zu rows are missing: shard %zu/%zu has not ended; run it again, and it "
+                      "goes on from there",
+                      path, missing, head->shard, head->shards);
+  }
+  return HAP_OK;
+}
+
+static void take_rows(const accuracy_plan *plan, const accuracy_row *from, accuracy_row *rows)
+{
+  for (size_t i = 0; i < plan->count; ++i) {
+    if (from[i].scene[0] != '\0') {
+      rows[i] = from[i];
+    }
+  }
+}
+
+typedef struct files {
+  accuracy_identity *heads; /* merge_count */
+  accuracy_row *rows;       /* of one file, by point */
+  size_t *shard_of;         /* by group */
+} files;
+
+static hap_status read_heads(bench *b, const accuracy_plan *plan, files *f)
+{
+  f->heads = calloc(b->merge_count, sizeof *f->heads);
+  f->rows = calloc(plan->count + 1, sizeof *f->rows);
+  f->shard_of = calloc(plan->group_count + 1, sizeof *f->shard_of);
+  if (f->heads == NULL || f->rows == NULL || f->shard_of == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %zu files", b->merge_count);
+  }
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < b->merge_count && status >= HAP_OK; ++i) {
+    status = accuracy_rows_head(b, b->merge[i], &f->heads[i]);
+  }
+  return status;
+}
+
+static hap_status read_files(bench *b, const accuracy_plan *plan, files *f, accuracy_row *out)
+{
+  hap_status status = accuracy_deal(b, plan, f->heads[0].shards, f->shard_of);
+  for (size_t i = 0; i < b->merge_count && status >= HAP_OK; ++i) {
+    memset(f->rows, 0, (plan->count + 1) * sizeof *f->rows);
+    status = accuracy_rows_read(b, b->merge[i], plan, f->rows);
+    if (status >= HAP_OK) {
+      status = check_rows(b, plan, b->merge[i], &f->heads[i], f->shard_of, f->rows);
+    }
+    if (status >= HAP_OK) {
+      take_rows(plan, f->rows, out);
+    }
+  }
+  return status;
+}
+
+hap_status accuracy_merge(bench *b, const accuracy_plan *plan, accuracy_row *rows)
+{
+  files f = {0};
+  accuracy_identity here;
+  hap_status status = accuracy_identify(b, plan, &here);
+  if (status >= HAP_OK) {
+    status = read_heads(b, plan, &f);
+  }
+  if (status >= HAP_OK) {
+    status = check_heads(b, &here, f.heads);
+  }
+  if (status >= HAP_OK) {
+    status = check_shards(b, f.heads);
+  }
+  if (status >= HAP_OK) {
+    status = read_files(b, plan, &f, rows);
+  }
+  free(f.heads);
+  free(f.rows);
+  free(f.shard_of);
+  return status;
 }

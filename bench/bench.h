@@ -52,7 +52,7 @@ hap_status bench_spidar(bench *b);
 hap_status bench_stability(bench *b);
 hap_status bench_tick(bench *b);
 
-/* ---- csv.c ---- */
+/* ---- tables, checks ---- */
 
 /* Opens OUT/NAME.csv and writes its header line, NULL: none; NULL on failure. */
 FILE *bench_csv_open(bench *b, const char *name, const char *header);
@@ -76,7 +76,7 @@ double bench_median(double *values, size_t count);                       /* sort
 double bench_quantile(const double *sorted, size_t count, double share); /* 0 of none */
 bool bench_within(double value, double wanted, double relative);         /* false for NaN */
 
-/* ---- picture.c ---- */
+/* ---- pictures ---- */
 
 /* The script of OUT/NAME.svg, see tools/plot.h; NULL when there is no gnuplot. */
 FILE *bench_picture_begin(bench *b, const char *name, int width, int height);

@@ -1,10 +1,372 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <math.h>
-#include <string.h>
 
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "bench/bench.h"
 #include "bench/cycles.h"
-#include "bench/effects.h"
+#include "tools/rig.h"
+
+/* What each effect costs in a scene. Lockstep, the scene's own hand. */
+
+#define EFFECTS_SCENES_MAX 40
+#define EFFECTS_VARIANTS_MAX 32
+#define EFFECTS_ROUNDS_MAX 101
+
+typedef struct effects_run {
+  const scene_parameters *parameters;
+  hap_model model;
+  int count;      /* N of the scene; 0: its own */
+  double seconds; /* 0: as long as the scene says */
+  double physics_hz;
+  int rounds;      /* at least; each has every variant once */
+  double budget_s; /* of the processor's time: more rounds while there is some */
+} effects_run;
+
+typedef struct effects_result {
+  double tick_us; /* medians over the rounds; this and the next two by the clock */
+  double physics_ms;
+  double contact_us;   /* a pass */
+  double total_ms;     /* processor's time of a simulated second, all threads' work */
+  uint32_t neighbours; /* most at once, at the syncs that were looked at */
+  hap_effect_info effects[HAP_EFFECTS]; /* in the middle of the contact, see look */
+  double *force;                        /* N, of all pointers, tick by tick; owned */
+  size_t count;
+} effects_result;
+
+/* A way to run the scene. */
+typedef struct effects_variant {
+  hap_effect_wish wishes[HAP_EFFECTS]; /* one that the model cannot fulfil is auto */
+  double aside;                        /* m, by which the bodies stand aside */
+  effects_result result;
+} effects_variant;
+
+/* What is drawn: time of an effect that is on less that of it off, of auto, and of all. */
+typedef struct effects_column {
+  char scene[32];
+  double off;               /* ms a simulated second, nothing but what cannot be off */
+  double cost[HAP_EFFECTS]; /* ms a simulated second of one that is on, less with it off */
+  double automatic;
+  double all;
+  bool each; /* cost was measured */
+} effects_column;
+
+typedef struct effects_counting {
+  const char *scene;
+  const char *list;   /* of effects, as for hapode-run */
+  const char *inside; /* the function, with all that it calls */
+  int ticks;
+} effects_counting;
+
+/* Instructions of a tick: effects-tick, which lies beside this program, under valgrind's callgrind, which
+ * counts inside of one function alone. */
+
+static bool beside(const char *name, char *out, size_t size)
+{
+  char self[PATH_MAX];
+  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+  if (length <= 0) {
+    return false;
+  }
+  self[length] = '\0';
+  char *slash = strrchr(self, '/');
+  int used = snprintf(out, size, "%.*s/%s", slash != NULL ? (int)(slash - self) : 0, self, name);
+  return used > 0 && (size_t)used < size && access(out, X_OK) == 0;
+}
+
+static bool effects_can_count(const char **out_why_not)
+{
+  char path[PATH_MAX];
+  *out_why_not = NULL;
+  if (system("valgrind --version >/dev/null 2>&1") != 0) { /* NOLINT(cert-env33-c): a fixed text */
+    *out_why_not = "there is no valgrind";
+  } else if (!beside("effects-tick", path, sizeof path)) {
+    *out_why_not = "there is no effects-tick beside this program (ninja effects-tick)";
+  }
+  return *out_why_not == NULL;
+}
+
+/* "refs: N" or "Collected : N" of what callgrind says. */
+static double read_count(FILE *in)
+{
+  char line[256];
+  double count = -1.0;
+  while (fgets(line, sizeof line, in) != NULL) {
+    const char *at = strstr(line, "Collected : ");
+    count = at != NULL ? strtod(at + strlen("Collected : "), NULL) : count;
+  }
+  return count;
+}
+
+/* A tick; -1: not known. */
+static double effects_instructions(const effects_counting *of)
+{
+  char program[PATH_MAX];
+  char command[2 * PATH_MAX];
+  if (!beside("effects-tick", program, sizeof program)) {
+    return -1.0;
+  }
+  snprintf(command, sizeof command,
+           "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=%s "
+           "'%s' %s %s %d 2>&1",
+           of->inside, program, of->scene, of->list, of->ticks);
+  FILE *in = popen(command, "r"); /* NOLINT(cert-env33-c): names of the library's own */
+  if (in == NULL) {
+    return -1.0;
+  }
+  double count = read_count(in);
+  return pclose(in) == 0 && count > 0.0 ? count / of->ticks : -1.0;
+}
+
+/* Left: what all scenes cost with everything on and as the library decides. Right: what single effects cost
+ * in some of them. */
+
+static void draw_wholes(FILE *script, const effects_column *columns, size_t count)
+{
+  fprintf(script, "$w << EOD\n");
+  for (size_t i = 0; i < count; ++i) {
+    fprintf(script, "\"%s\" %.6g %.6g\n", columns[i].scene, columns[i].all, columns[i].automatic);
+  }
+  fprintf(script,
+          "EOD\nset title 'all on, and as the library decides'\n"
+          "set ylabel 'ms a simulated second'\nset logscale y\nset style data histograms\n"
+          "set style fill solid 0.8\nset xtics rotate by -60 noenhanced\nset key top left\n"
+          "plot $w using 2:xtic(1) lt 2 title 'all on', $w using 3 lt 1 title 'auto'\n");
+}
+
+/* Behind the six of all pictures: as many effects are drawn side by side. */
+static const char *const more_colours[] = {"#000000", "#f0e442", "#882255", "#999999",
+                                           "#332288", "#88ccaa", "#661100", "#bbcc33"};
+
+static void draw_each(FILE *script, const effects_column *columns, size_t count)
+{
+  fprintf(script, "$e << EOD\n");
+  for (size_t i = 0; i < count; ++i) {
+    if (columns[i].each) {
+      fprintf(script, "\"%s\"", columns[i].scene);
+      for (int k = 0; k < HAP_EFFECTS; ++k) {
+        fprintf(script, " %.6g", fmax(columns[i].cost[k], 0.01));
+      }
+      fprintf(script, "\n");
+    }
+  }
+  fprintf(
+      script,
+      "EOD\nset title 'an effect that is on, less with it off (below 0.01: lost in the noise)'\n"
+      "set yrange [0.01:*]\nset key outside right top noenhanced\n");
+  for (size_t i = 0; i < sizeof more_colours / sizeof more_colours[0]; ++i) {
+    fprintf(script, "set linetype %zu lc rgb '%s' lw 1.5\n", 7 + i, more_colours[i]);
+  }
+  fprintf(script, "plot ");
+  for (int k = 0; k < HAP_EFFECTS; ++k) {
+    if (k != HAP_EFFECT_CROSS && k != HAP_EFFECT_RECORDING) {
+      fprintf(script, "%s$e using %d%s lt %d title '%s'", k > 0 ? ", " : "", k + 2,
+              k > 0 ? "" : ":xtic(1)", k + 1, hap_effect_name((hap_effect)k));
+    }
+  }
+  fprintf(script, "\n");
+}
+
+static hap_status effects_draw(bench *b, const effects_column *columns, size_t count)
+{
+  FILE *script = bench_picture_begin(b, "effects", 1300, 950);
+  bool any = false;
+  for (size_t i = 0; i < count; ++i) {
+    any = any || columns[i].each;
+  }
+  if (script != NULL) {
+    fprintf(script, "set multiplot layout %d,1\n", any ? 2 : 1);
+    draw_wholes(script, columns, count);
+    if (any) {
+      draw_each(script, columns, count);
+    }
+    fprintf(script, "unset multiplot\n");
+  }
+  return bench_picture_end(b, "effects", script);
+}
+
+#define HAPTIC_HZ 1000.0
+#define BLOCK 8u
+
+/* The times of a variant, round by round. */
+typedef struct times {
+  double total_ms[EFFECTS_ROUNDS_MAX];
+  double tick_us[EFFECTS_ROUNDS_MAX];
+  double physics_ms[EFFECTS_ROUNDS_MAX];
+  double contact_us[EFFECTS_ROUNDS_MAX];
+} times;
+
+static void effects_run_init(effects_run *run, const scene_parameters *parameters, hap_model model)
+{
+  memset(run, 0, sizeof *run);
+  run->parameters = parameters;
+  run->model = model;
+  run->rounds = 1;
+  run->physics_hz = 60.0;
+}
+
+static double used_seconds(void)
+{
+  struct timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static hap_status open_rig(bench *b, const effects_run *run, const effects_variant *variant,
+                           rig *out)
+{
+  rig_options options;
+  scene_parameters moved = *run->parameters;
+  moved.shift[0] += variant->aside;
+  rig_options_init(&options);
+  options.parameters = &moved;
+  options.count = run->count;
+  options.def.drive = HAP_DRIVE_LOCKSTEP;
+  options.def.model = run->model;
+  options.def.physics_hz = run->physics_hz;
+  options.def.haptic_hz = HAPTIC_HZ;
+  options.def.trace_rows = 2 * BLOCK;
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    hap_effect_wish wish = variant->wishes[i];
+    bool can = hap_effect_check((hap_effect)i, wish, run->model, NULL) >= HAP_OK;
+    options.def.effects[i] = (uint8_t)(can ? wish : HAP_EFFECT_AUTO);
+  }
+  hap_status status = rig_create(&options, out, &b->detail);
+  return status >= HAP_OK ? hap_session_start(out->session) : status;
+}
+
+static void take_rows(rig *r, effects_result *io)
+{
+  hap_trace_row rows[BLOCK];
+  size_t got = 0;
+  (void)hap_session_trace_read(r->session, rows, BLOCK, &got);
+  for (size_t i = 0; i < got; ++i) {
+    for (size_t p = 0; p < r->pointer_count; ++p) {
+      memcpy(&io->force[3 * (r->pointer_count * io->count + p)], rows[i].pointers[p].force,
+             3 * sizeof(double));
+    }
+    ++io->count;
+  }
+}
+
+/* The states are those of the last sync at which something was touched. */
+static void look(rig *r, uint64_t *io_touched, effects_result *io)
+{
+  hap_stats stats;
+  (void)hap_session_stats(r->session, &stats, sizeof stats);
+  if (*io_touched == 0 || stats.contact_ticks > *io_touched) {
+    (void)hap_session_effects(r->session, io->effects, HAP_EFFECTS, sizeof io->effects[0]);
+  }
+  *io_touched = stats.contact_ticks;
+  io->neighbours = stats.neighbours > io->neighbours ? stats.neighbours : io->neighbours;
+}
+
+static hap_status run_once(bench *b, const effects_run *run, size_t ticks, effects_variant *io,
+                           size_t round, times *out)
+{
+  rig r;
+  hap_stats stats;
+  memset(&r, 0, sizeof r);
+  hap_status status = open_rig(b, run, io, &r);
+  uint64_t touched = 0;
+  double used = 0.0;
+  io->result.count = 0;
+  for (size_t t = 0; t < ticks && status >= HAP_OK; t += BLOCK) {
+    double begin = used_seconds();
+    status = hap_session_advance(r.session, BLOCK);
+    used += used_seconds() - begin;
+    take_rows(&r, &io->result);
+    look(&r, &touched, &io->result);
+  }
+  if (status >= HAP_OK) {
+    (void)hap_session_stats(r.session, &stats, sizeof stats);
+    out->total_ms[round] = 1e3 * used / ((double)ticks / HAPTIC_HZ);
+    out->tick_us[round] = stats.tick_us_mean;
+    out->physics_ms[round] = stats.physics_ms_mean;
+    out->contact_us[round] = stats.contact_us_mean;
+    io->result.count *= r.pointer_count;
+  } else if (r.session != NULL) {
+    (void)hap_session_detail(r.session, &b->detail);
+  }
+  rig_destroy(&r);
+  return status;
+}
+
+static void take_medians(times *t, size_t rounds, effects_result *out)
+{
+  out->total_ms = bench_median(t->total_ms, rounds);
+  out->tick_us = bench_median(t->tick_us, rounds);
+  out->physics_ms = bench_median(t->physics_ms, rounds);
+  out->contact_us = bench_median(t->contact_us, rounds);
+}
+
+static hap_status run_rounds(bench *b, const effects_run *run, size_t ticks,
+                             effects_variant *variants, size_t count, times *all)
+{
+  hap_status status = HAP_OK;
+  double begin = used_seconds();
+  size_t round = 0;
+  for (bool more = true; more && status >= HAP_OK; ++round) {
+    for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+      size_t which = round % 2 == 0 ? i : count - 1 - i;
+      status = run_once(b, run, ticks, &variants[which], round, &all[which]);
+    }
+    double spent = used_seconds() - begin;
+    bool room = spent * (double)(round + 2) / (double)(round + 1) < run->budget_s;
+    more = round + 1 < EFFECTS_ROUNDS_MAX && (round + 1 < (size_t)run->rounds || room);
+  }
+  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+    take_medians(&all[i], round, &variants[i].result);
+  }
+  return status;
+}
+
+/* All variants in turn, forwards and backwards, so that what slows the machine down slows all of them. */
+static hap_status effects_run_variants(bench *b, const effects_run *run, effects_variant *variants,
+                                       size_t count)
+{
+  double seconds = run->seconds > 0.0 ? run->seconds : run->parameters->duration;
+  size_t ticks = (size_t)(seconds * HAPTIC_HZ) / BLOCK * BLOCK;
+  times *all = calloc(count, sizeof *all);
+  bool room = all != NULL;
+  for (size_t i = 0; i < count; ++i) {
+    effects_result *result = &variants[i].result;
+    memset(result, 0, sizeof *result);
+    result->force = calloc(ticks * 3 * SCENE_POINTERS_MAX, sizeof *result->force);
+    room = room && result->force != NULL;
+  }
+  hap_status status = room ? run_rounds(b, run, ticks, variants, count, all)
+                           : bench_fail(b, HAP_ERROR_MEMORY, "no memory for the runs of a scene");
+  free(all);
+  return status;
+}
+
+/* zeroed allowed */
+static void effects_variants_finish(effects_variant *variants, size_t count)
+{
+  for (size_t i = 0; i < count; ++i) {
+    free(variants[i].result.force);
+  }
+  memset(variants, 0, count * sizeof *variants);
+}
+
+/* Root of the sum of squares of the difference over that of the first; 0 without force. */
+static double effects_difference(const effects_result *a, const effects_result *b)
+{
+  double of2 = 0.0;
+  double apart2 = 0.0;
+  for (size_t i = 0; i < 3 * a->count && i < 3 * b->count; ++i) {
+    double apart = b->force[i] - a->force[i];
+    of2 += a->force[i] * a->force[i];
+    apart2 += apart * apart;
+  }
+  return of2 > 0.0 ? sqrt(apart2 / of2) : 0.0;
+}
 
 /* hapode-bench effects: each effect on, off and as the library decides, all on against all left to the
  * library, in models contact and accelerance. effects.csv and effects.svg. */
@@ -207,7 +569,7 @@ static void print_each(const subject *s)
   size_t next = WHOLES;
   for (int i = 0; i < HAP_EFFECTS && s->each; ++i) {
     const char *name = hap_effect_name((hap_effect)i);
-    double times[3] = {0.0, 0.0, 0.0};
+    double total_ms[3] = {0.0, 0.0, 0.0};
     if (!can(s, i, HAP_EFFECT_ON)) {
       continue;
     }
@@ -226,11 +588,11 @@ static void print_each(const subject *s)
                           effects_difference(automatic, r),
                           &r->effects[i]};
         print_row(s, &line, r);
-        times[w] = r->total_ms;
+        total_ms[w] = r->total_ms;
       }
     }
     if (s->column != NULL) {
-      s->column->cost[i] = times[HAP_EFFECT_ON] - times[HAP_EFFECT_OFF];
+      s->column->cost[i] = total_ms[HAP_EFFECT_ON] - total_ms[HAP_EFFECT_OFF];
     }
   }
 }

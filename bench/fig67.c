@@ -1,6 +1,198 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/cycles.h"
+
+/* hapode-bench fig6 and fig7: what is measured, and drawn. */
+
+#define FIG67_DUTY_BOUND 0.25 /* the paper's, for methods 2 and 3 */
+#define FIG67_GROUPS_MAX 40
+#define FIG67_AT_ONCE_MOST 256
+
+/* Layouts beside those of the scenes themselves. */
+#define FIG67_TOUCHING "touching"
+#define FIG67_SEPARATE "separate"
+#define FIG67_AT_ONCE "at_once"
+
+enum {
+  FIG67_SINGLE,
+  FIG67_ACCELERANCE,
+  FIG67_IMPULSE,
+  FIG67_CONTACT,
+  FIG67_MODELS
+};
+
+#define FIG67_SERIES 5 /* accelerance is there with its testing simulations and without */
+
+typedef struct fig67_series {
+  int model;
+  bool testing;
+  const char *name; /* in the table */
+  const char *title;
+  int point; /* gnuplot's shape */
+} fig67_series;
+
+extern const fig67_series fig67_all[FIG67_SERIES];
+
+typedef struct fig67_group {
+  int bodies;
+  const char *layout;
+  cycles of[FIG67_MODELS];
+} fig67_group;
+
+static double fig67_duty(const cycles *c, size_t step, bool testing)
+{
+  const double *v = c->rows[step].v;
+  return 1e-3 * (v[CYCLE_UNTESTED] + (testing ? v[CYCLE_TESTING] : 0.0)) / c->period_s;
+}
+
+/* Median over the cycles of a series. */
+static double fig67_typical(const fig67_group *g, size_t series)
+{
+  const cycles *c = &g->of[fig67_all[series].model];
+  double *duties = calloc(c->count + 1, sizeof *duties);
+  if (duties == NULL) {
+    return (double)NAN;
+  }
+  for (size_t i = 0; i < c->count; ++i) {
+    duties[i] = fig67_duty(c, i, fig67_all[series].testing);
+  }
+  double median = bench_median(duties, c->count);
+  free(duties);
+  return median;
+}
+
+/* Data blocks $time0 .. of a group's series over time. */
+static void put_group(FILE *script, const fig67_group *g)
+{
+  for (size_t i = 0; i < FIG67_SERIES; ++i) {
+    const cycles *c = &g->of[fig67_all[i].model];
+    fprintf(script, "$time%zu << EOD\n", i);
+    for (size_t k = 0; k < c->count; ++k) {
+      fprintf(script, "%.3f %.6g\n", c->rows[k].v[CYCLE_T], fig67_duty(c, k, fig67_all[i].testing));
+    }
+    fprintf(script, "EOD\n");
+  }
+}
+
+static void plot_times(FILE *script)
+{
+  fprintf(script, "set xlabel 'time [s]'\nset ylabel 'duty factor'\nplot ");
+  for (size_t i = 0; i < FIG67_SERIES; ++i) {
+    fprintf(script, "$time%zu with %s lt %zu pt %d ps 0.4 title '%s', ", i,
+            fig67_all[i].model == FIG67_SINGLE ? "lines" : "linespoints", i + 1, fig67_all[i].point,
+            fig67_all[i].title);
+  }
+  fprintf(script, "%g with lines lc rgb '#606060' dt 2 title '%g (paper)'\n", FIG67_DUTY_BOUND,
+          FIG67_DUTY_BOUND);
+}
+
+static hap_status fig6_draw(bench *b, const fig67_group *g)
+{
+  FILE *script = bench_picture_begin(b, "fig6", 1100, 500);
+  if (script != NULL) {
+    put_group(script, g);
+    fprintf(script,
+            "set title 'One cube (logarithmic: all of it is far below the paper''s "
+            "0.25)'\nset logscale y\nset format y '%%g'\nset yrange [5e-5:1]\n"
+            "set key outside right top Left reverse\n");
+    plot_times(script);
+  }
+  return bench_picture_end(b, "fig6", script);
+}
+
+/* ---- by the number of cubes ---- */
+
+/* $of0 .. of a layout: bodies and median duty. ticks: of model contact, the loop's own share. */
+static void put_sweep(FILE *script, const fig67_group *groups, size_t count, const char *layout)
+{
+  for (size_t s = 0; s < FIG67_SERIES; ++s) {
+    fprintf(script, "$of%zu << EOD\n", s);
+    for (size_t i = 0; i < count; ++i) {
+      if (strcmp(groups[i].layout, layout) == 0) {
+        fprintf(script, "%d %.6g\n", groups[i].bodies, fig67_typical(&groups[i], s));
+      }
+    }
+    fprintf(script, "EOD\n");
+  }
+  fprintf(script, "$ticks << EOD\n");
+  for (size_t i = 0; i < count; ++i) {
+    if (strcmp(groups[i].layout, layout) == 0) {
+      fprintf(script, "%d %.6g\n", groups[i].bodies,
+              1e-6 * CYCLES_HAPTIC_HZ * groups[i].of[FIG67_CONTACT].tick_us);
+    }
+  }
+  fprintf(script, "EOD\n");
+}
+
+static void plot_sweep(FILE *script, const char *title, const char *x_label, const char *range)
+{
+  fprintf(script,
+          "set title '%s'\nset xlabel '%s'\nset ylabel 'median duty factor'\nset xrange %s\n"
+          "plot 1 with lines lc rgb 'black' lw 1.5 notitle",
+          title, x_label, range);
+  for (size_t s = 0; s < FIG67_SERIES; ++s) {
+    fprintf(script, ", $of%zu with linespoints lt %zu pt %d ps 0.7 notitle", s, s + 1,
+            fig67_all[s].point);
+  }
+  fprintf(script, ", $ticks with linespoints lt 6 pt 2 ps 0.7 dt 3 notitle\n");
+}
+
+static void plot_key(FILE *script)
+{
+  fprintf(script,
+          "unset title\nunset border\nunset tics\nunset grid\nunset xlabel\n"
+          "unset ylabel\nset key center center Left reverse\n"
+          "plot 1e9 with lines lc rgb 'black' lw 1.5 title 'duty 1: too slow above'");
+  for (size_t s = 0; s < FIG67_SERIES; ++s) {
+    fprintf(script, ", 1e9 with linespoints lt %zu pt %d ps 0.7 title '%s'", s + 1,
+            fig67_all[s].point, fig67_all[s].title);
+  }
+  fprintf(script,
+          ", 1e9 with linespoints lt 6 pt 2 ps 0.7 dt 3 title 'contact: the haptic loop, "
+          "1 ms'\n");
+}
+
+static hap_status draw_sweeps(bench *b, const fig67_group *groups, size_t count)
+{
+  FILE *script = bench_picture_begin(b, "fig7_sizes", 1200, 900);
+  if (script != NULL) {
+    fprintf(script,
+            "set termoption noenhanced\nset multiplot layout 2,2 title 'Time of a physics "
+            "cycle / its period, by size'\nset logscale xy\nset format '%%g'\n"
+            "set yrange [1e-4:100]\n");
+    put_sweep(script, groups, count, FIG67_TOUCHING);
+    plot_sweep(script, "(a) a row that touches", "cubes", "[0.8:6000]");
+    put_sweep(script, groups, count, FIG67_SEPARATE);
+    plot_sweep(script, "(b) cubes far from each other, one is pushed", "cubes", "[0.8:6000]");
+    put_sweep(script, groups, count, FIG67_AT_ONCE);
+    plot_sweep(script, "(c) all are touched at once", "cubes = neighbours", "[0.8:320]");
+    plot_key(script);
+    fprintf(script, "unset multiplot\n");
+  }
+  return bench_picture_end(b, "fig7_sizes", script);
+}
+
+/* groups[0]: the ten cubes of the paper; the others by layout and rising number. */
+static hap_status fig7_draw(bench *b, const fig67_group *groups, size_t count)
+{
+  FILE *script = bench_picture_begin(b, "fig7", 1100, 500);
+  if (script != NULL) {
+    put_group(script, &groups[0]);
+    fprintf(script,
+            "set title '%d cubes, apart at first: all models'\nset logscale y\n"
+            "set format y '%%g'\nset yrange [1e-4:1]\nset key outside right top Left reverse\n",
+            groups[0].bodies);
+    plot_times(script);
+  }
+  hap_status status = bench_picture_end(b, "fig7", script);
+  return status >= HAP_OK && script != NULL ? draw_sweeps(b, groups, count) : status;
+}
+
 /* The paper's Fig. 6 and 7: duty factors (time of a physics cycle / its period) while one cube, and
  * while ten cubes that do not touch at first, are pushed. Method 1: single, 1 ms; 2: accelerance,
  * 50 ms, with and without the testing simulations; 3: impulse, 50 ms; and contact, 50 ms. A cycle is
@@ -8,12 +200,6 @@
  *
  * Fig. 7 goes on with 1 to 4000 cubes in a row that touch, or stand far from each other, and with 1
  * to 256 that a large pointer touches at once: where does each model pass duty 1? */
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "bench/fig67.h"
 
 #define PHYSICS_HZ 20.0 /* the paper's 50 ms */
 #define SPEC_MAX 512
@@ -45,31 +231,10 @@ static const hap_model models[FIG67_MODELS] = {
     [FIG67_CONTACT] = HAP_MODEL_CONTACT,
 };
 
-double fig67_duty(const cycles *c, size_t step, bool testing)
-{
-  const double *v = c->rows[step].v;
-  return 1e-3 * (v[CYCLE_UNTESTED] + (testing ? v[CYCLE_TESTING] : 0.0)) / c->period_s;
-}
-
 static double mean_duty(const cycles *c, bool testing)
 {
   double ms = cycles_mean(c, CYCLE_UNTESTED) + (testing ? cycles_mean(c, CYCLE_TESTING) : 0.0);
   return 1e-3 * ms / c->period_s;
-}
-
-double fig67_typical(const fig67_group *g, size_t series)
-{
-  const cycles *c = &g->of[fig67_all[series].model];
-  double *duties = calloc(c->count + 1, sizeof *duties);
-  if (duties == NULL) {
-    return (double)NAN;
-  }
-  for (size_t i = 0; i < c->count; ++i) {
-    duties[i] = fig67_duty(c, i, fig67_all[series].testing);
-  }
-  double median = bench_median(duties, c->count);
-  free(duties);
-  return median;
 }
 
 /* ---- measure ---- */

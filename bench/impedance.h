@@ -4,7 +4,7 @@
 #define HAPODE_BENCH_IMPEDANCE_H
 
 /* hapode-bench impedance: the dynamic stiffness Z(w) = F/X that a hand feels at the port, F on the
- * world, X into it, against closed forms; and how stiff a wall each device can hold (zwidth.c). */
+ * world, X into it, against closed forms; and how stiff a wall each device can hold. */
 
 #include "bench/port.h"
 
@@ -57,8 +57,6 @@ typedef struct impedance_table {
   impedance_curve curves[PORT_BODIES][IMPEDANCE_VARIANTS];
 } impedance_table;
 
-/* ---- impedance_truth.c ---- */
-
 typedef struct impedance_case {
   const char *name;
   const char *title;
@@ -70,26 +68,6 @@ extern const impedance_case impedance_cases[PORT_BODIES];
 
 #define IMPEDANCE_STIFFNESS 1000.0 /* N/m, of the contact */
 #define IMPEDANCE_DAMPING 2.0      /* N s/m */
-
-/* Without a coupling. */
-impedance_truth impedance_truth_of(port_body body);
-double complex impedance_of(const impedance_truth *truth, double hz);
-
-/* The same as model contact should render it, tick by tick. */
-double complex impedance_sampled(const impedance_truth *truth, double hz);
-
-/* Mass, stiffness and damping of the contact that fit the felt values best, up to hz_max; all else is
- * taken from the truth. */
-bool impedance_fit(const impedance_point *points, size_t count, double hz_max,
-                   const impedance_truth *truth, impedance_truth *out);
-
-/* ---- impedance_picture.c ---- */
-
-hap_status impedance_draw(bench *b, const impedance_table *table);
-
-/* ---- zwidth.c ---- */
-
-hap_status zwidth_run(bench *b);
 
 /* N/m, the stiffest that a desktop stylus without a hand feels and holds: direct of a wall, else of a
  * coupling's spring before a wall that does not give (1 MN/m). */

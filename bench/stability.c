@@ -1,16 +1,232 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench stability: where each integrator holds, over stiffness and mass and over stiffness and
- * the number of contacts at once, and what becomes of implicit+proxy with delay, encoder, missed
- * ticks and other hands. What a point is, and when it is stable: stability.h. */
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include "bench/stability_table.h"
+#include "bench/stability.h"
+
+#define STABILITY_ROWS_MAX 8192
+
+typedef struct stability_row {
+  const char *integrator;
+  stability_point point;
+  stability_result result;
+  double felt;     /* N/m at the hand, with a coupling that may be a proxy; 0: not measured */
+  double expected; /* N/m, coupling and contacts in series */
+} stability_row;
+
+typedef struct stability_table {
+  stability_row rows[STABILITY_ROWS_MAX];
+  size_t count;
+  size_t planned; /* points that --only takes */
+  bool planning;  /* they are counted, not measured */
+  double spoken;  /* s, of the newest line about how far it is */
+} stability_table;
+
+/* --only KEY=VALUE[/VALUE],...: points that have one of the values at each of the keys. */
+
+#define KEYS                                                                              \
+  "integrator, stiffness, mass, contacts, coupling, layout, hand, delay_ticks, quantum, " \
+  "missed, body"
+
+/* What a point has at a key: a word or, word NULL, a number. */
+typedef struct field {
+  const char *word;
+  double number;
+} field;
+
+static bool find_word(const stability_row *row, const char *key, size_t length, field *out)
+{
+  const stability_point *p = &row->point;
+  const struct {
+    const char *key;
+    const char *word;
+  } words[] = {
+      {"integrator", row->integrator},
+      {"coupling", stability_coupling_word(p->coupling)},
+      {"layout", stability_layout_word(p->layout)},
+      {"hand", stability_hand_word(p->hand)},
+      {"body", p->cubes ? "cube" : "ball"},
+  };
+  for (size_t i = 0; i < sizeof words / sizeof words[0]; ++i) {
+    if (strlen(words[i].key) == length && strncmp(words[i].key, key, length) == 0) {
+      out->word = words[i].word;
+      return true;
+    }
+  }
+  return false;
+}
+
+static bool find_number(const stability_row *row, const char *key, size_t length, field *out)
+{
+  const stability_point *p = &row->point;
+  const struct {
+    const char *key;
+    double number;
+  } numbers[] = {
+      {"stiffness", p->stiffness},     {"mass", p->mass},       {"contacts", p->contacts},
+      {"delay_ticks", p->delay_ticks}, {"quantum", p->quantum}, {"missed", p->missed ? 1.0 : 0.0},
+  };
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
+    if (strlen(numbers[i].key) == length && strncmp(numbers[i].key, key, length) == 0) {
+      *out = (field){.number = numbers[i].number};
+      return true;
+    }
+  }
+  return false;
+}
+
+/* *out_has: the value, up to `length`, is the field's. False: not a value of such a field. */
+static bool compare(const field *f, const char *value, size_t length, bool *out_has)
+{
+  if (f->word != NULL) {
+    *out_has = strlen(f->word) == length && strncmp(f->word, value, length) == 0;
+    return length > 0;
+  }
+  char *end = NULL;
+  *out_has = strtod(value, &end) == f->number;
+  return length > 0 && end == value + length;
+}
+
+/* One "KEY=VALUE/VALUE" of this length. */
+static bool look_at(const char *item, size_t length, const stability_row *row, bool *io_takes)
+{
+  size_t key = strcspn(item, "=,");
+  field f = {NULL, 0.0};
+  bool any = false;
+  if (key >= length || (!find_word(row, item, key, &f) && !find_number(row, item, key, &f))) {
+    return false;
+  }
+  for (size_t at = key; at < length;) {
+    const char *value = item + at + 1;
+    size_t size = strcspn(value, "/,");
+    bool has = false;
+    if (!compare(&f, value, size, &has)) {
+      return false;
+    }
+    any = any || has;
+    at += 1 + size;
+  }
+  *io_takes = *io_takes && any;
+  return true;
+}
+
+/* Whether --only takes the point. */
+static hap_status stability_filter(bench *b, const stability_row *row, bool *out_takes)
+{
+  *out_takes = true;
+  for (const char *item = b->only; item != NULL && *item != '\0';) {
+    size_t length = strcspn(item, ",");
+    if (!look_at(item, length, row, out_takes)) {
+      return bench_fail(b, HAP_ERROR_ARGUMENT,
+                        "--only: \"%.*s\" is not KEY=VALUE or KEY=VALUE/VALUE; keys are " KEYS,
+                        (int)length, item);
+    }
+    item += length + (item[length] == ',');
+  }
+  return HAP_OK;
+}
+
+#define PANEL_WIDTH 300
+#define PANEL_HEIGHT 300
+#define COLUMNS 4
+
+static const char *const names[COLUMNS] = {"explicit", "implicit", "midpoint", "implicit+proxy"};
+
+/* Balls and a plain device: no delay, encoder or missed tick. */
+static bool is_plain(const stability_row *row)
+{
+  const stability_point *p = &row->point;
+  return p->delay_ticks == 0.0 && p->quantum == 0.0 && !p->missed && !p->cubes;
+}
+
+static bool same_place(const stability_row *a, const stability_row *b)
+{
+  return strcmp(a->integrator, b->integrator) == 0 && a->point.stiffness == b->point.stiffness &&
+         a->point.mass == b->point.mass && a->point.contacts == b->point.contacts;
+}
+
+/* Its first row stands for a place of the map; stable if all are. */
+static bool stands_for(const stability_table *table, size_t index, bool *out_stable)
+{
+  *out_stable = true;
+  for (size_t i = 0; i < table->count; ++i) {
+    const stability_row *row = &table->rows[i];
+    if (is_plain(row) && same_place(row, &table->rows[index])) {
+      if (i < index) {
+        return false;
+      }
+      *out_stable = *out_stable && row->result.stable;
+    }
+  }
+  return true;
+}
+
+/* Block $s or $u: stiffness, mass and contacts of the stable or the other places. */
+static void put_places(FILE *script, const stability_table *table, const char *name, bool stable)
+{
+  fprintf(script, "%s << EOD\n", stable ? "$s" : "$u");
+  for (size_t i = 0; i < table->count; ++i) {
+    const stability_row *row = &table->rows[i];
+    bool holds = false;
+    if (is_plain(row) && strcmp(row->integrator, name) == 0 && stands_for(table, i, &holds) &&
+        holds == stable) {
+      fprintf(script, "%g %g %d\n", row->point.stiffness, row->point.mass, row->point.contacts);
+    }
+  }
+  fprintf(script, "NaN NaN NaN\nEOD\n"); /* gnuplot refuses an empty block */
+}
+
+/* column: 2 mass, with the middle number of contacts, 3 contacts, with the middle mass. */
+static void plot_panel(FILE *script, int column)
+{
+  const char *pick = column == 2 ? "($3 == 8 ? $2 : NaN)" : "($2 == 0.1 ? $3 : NaN)";
+  fprintf(script,
+          "plot $s using 1:%s with points pt 7 ps 0.9 lt 1 title 'stable', "
+          "$u using 1:%s with points pt 2 ps 0.9 lw 1.5 lt 2 title 'unstable'\n",
+          pick, pick);
+}
+
+static void draw_row(FILE *script, const stability_table *table, int column)
+{
+  fprintf(script, column == 2 ? "set yrange [3e-4:3e3]\nset ylabel 'mass of each body [kg]'\n"
+                                "set format y '10^{%%L}'\n"
+                              : "set yrange [0.7:90]\nset ylabel 'contacts at once'\n"
+                                "set format y '%%g'\nset ytics (1, 2, 4, 8, 16, 32, 64)\n");
+  for (int i = 0; i < COLUMNS; ++i) {
+    fprintf(script, "set title '%s%s' noenhanced\n", names[i],
+            column == 2 ? ", 8 contacts" : ", bodies of 0.1 kg");
+    put_places(script, table, names[i], true);
+    put_places(script, table, names[i], false);
+    plot_panel(script, column);
+  }
+}
+
+/* stability.svg. Points that differ in layout and hand alone are one: the worst of them. */
+static hap_status stability_draw(bench *b, const stability_table *table)
+{
+  FILE *script = bench_picture_begin(b, "stability", COLUMNS * PANEL_WIDTH, 2 * PANEL_HEIGHT);
+  if (script == NULL) {
+    return bench_picture_end(b, "stability", script);
+  }
+  fprintf(script,
+          "set multiplot layout 2,%d title 'Where each integrator holds: device of %g kg and %g N "
+          "s/m at %g Hz, pushed by 1 mm'\n"
+          "set logscale xy\nset format x '10^{%%L}'\nset xrange [0.3:3e6]\n"
+          "set xlabel 'stiffness of each contact [N/m]'\nset key below\n",
+          COLUMNS, STABILITY_DEVICE_MASS, STABILITY_DEVICE_DAMPING, STABILITY_HAPTIC_HZ);
+  draw_row(script, table, 2);
+  draw_row(script, table, 3);
+  fprintf(script, "unset multiplot\n");
+  return bench_picture_end(b, "stability", script);
+}
+
+/* hapode-bench stability: where each integrator holds, over stiffness and mass and over stiffness and
+ * the number of contacts at once, and what becomes of implicit+proxy with delay, encoder, missed
+ * ticks and other hands. What a point is, and when it is stable: stability.h. */
 
 #define SECONDS 5.0
 #define SPEAK_S 60.0    /* between two lines about how far it is */

@@ -6,10 +6,22 @@
 /* A session over a world that several threads change all the time, with hands in the middle of it that
  * come and go. For the bench and the tests. */
 
-#include "bench/storm_hand.h"
-#include "bench/storm_world.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/ode.h>
 
 #define STORM_EDITORS_MAX 4
+#define STORM_FORCE 10.0 /* N, of its devices */
+#define STORM_SLEW 5.0   /* N a tick at 1 kHz: the default slew limit of such a device */
+#define STORM_SPOTS 16   /* places where hands are */
+
+/* Whether the session is told before a body goes. */
+typedef enum storm_telling {
+  STORM_TELLS = 0,
+  STORM_TELLS_NOT,
+  STORM_TELLS_HALF
+} storm_telling;
 
 typedef struct storm_def {
   hap_drive drive;

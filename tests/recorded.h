@@ -9,17 +9,18 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "tests/files.h"
 #include "tools/rig.h"
 
 #define MS 1000000LL
 
-static char recorded_path[300];
+static char recorded_path[160];
 
-static inline void recorded_init(void)
+static inline bool recorded_init(void)
 {
-  const char *folder = getenv("TMPDIR");
-  snprintf(recorded_path, sizeof recorded_path, "%s/hapode-record-%d",
-           folder != NULL ? folder : "/tmp", (int)getpid());
+  bool good = folder_make();
+  snprintf(recorded_path, sizeof recorded_path, "%s", folder_path("session.rec"));
+  return good;
 }
 
 static inline void sleep_ms(int ms)

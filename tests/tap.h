@@ -3,31 +3,45 @@
 #ifndef HAPODE_TESTS_TAP_H
 #define HAPODE_TESTS_TAP_H
 
-/* Test Anything Protocol, version 13. A program runs test functions one after the other; a test is
- * one test point. CHECK* note a failure and go on, REQUIRE leaves the test.
+/* Test Anything Protocol, version 13. A test is one test point. CHECK* note a failure and go on,
+ * REQUIRE leaves the test.
  *
  *   TEST(name) { CHECK_NEAR(a, b, 1e-9); }
- *   int main(void) { RUN(name); return tap_done(); }
+ *
+ * make_main.py writes main: it runs all tests of a file in their order, with ODE initialised. A
+ * file with a main of its own lists its tests by RUN. What must come before ODE and the first test:
+ *
+ *   SET_UP { return folder_make(); }    false: no test is run (SKIP_ALL, BAIL_OUT)
  */
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static int tap_count;
-static int tap_failed_points;
-static int tap_failures;   /* in the running test */
-static char tap_skip[512]; /* reason; empty: not skipped */
+typedef struct tap_test {
+  const char *name;
+  void (*run)(void);
+} tap_test;
 
-static void tap_note(const char *file, int line, const char *what)
-{
-  ++tap_failures;
-  if (tap_failures <= 20) {
-    printf("# %s:%d: %s\n", file, line, what);
-  }
-}
+extern int tap_failures;         /* in the running test */
+extern const char *tap_argument; /* the program's first, or "" */
+
+void tap_note(const char *file, int line, const char *what);
+void tap_check_near(double a, double b, double tolerance, const char *file, int line,
+                    const char *what);
+void tap_skip(const char *format, ...);
+/* Both return false. */
+bool tap_skip_all(const char *reason);
+bool tap_bail_out(const char *reason);
+/* Functions that are called after the last test, the newest first. */
+void tap_at_end(void (*function)(void));
+void tap_run(void (*test)(void), const char *name);
+int tap_done(void);
+/* set_up: may be NULL. */
+int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc, char **argv);
 
 static inline void tap_check(bool good, const char *file, int line, const char *what)
 {
@@ -36,38 +50,13 @@ static inline void tap_check(bool good, const char *file, int line, const char *
   }
 }
 
-static inline void tap_check_near(double a, double b, double tolerance, const char *file, int line,
-                                  const char *what)
-{
-  if (!(fabs(a - b) <= tolerance)) { /* also when one is NaN */
-    char text[512];
-    snprintf(text, sizeof text, "%s: %.12g, %.12g differ by %.3g, more than %.3g", what, a, b,
-             fabs(a - b), tolerance);
-    tap_note(file, line, text);
-  }
-}
-
-static void tap_run(void (*test)(void), const char *name)
-{
-  tap_failures = 0;
-  tap_skip[0] = '\0';
-  test();
-  ++tap_count;
-  tap_failed_points += tap_failures != 0;
-  printf("%s %d - %s%s%s\n", tap_failures != 0 ? "not ok" : "ok", tap_count, name,
-         tap_skip[0] != '\0' && tap_failures == 0 ? " # SKIP " : "",
-         tap_failures == 0 ? tap_skip : "");
-  fflush(stdout);
-}
-
-static int tap_done(void)
-{
-  printf("1..%d\n", tap_count);
-  return tap_failed_points == 0 && tap_count > 0 ? 0 : 1;
-}
-
-#define TEST(name) static void name(void)
-#define RUN(name) tap_run(name, #name)
+#define TEST(name)        \
+  void test_##name(void); \
+  void test_##name(void)
+#define SET_UP           \
+  bool tap_set_up(void); \
+  bool tap_set_up(void)
+#define RUN(name) tap_run(test_##name, #name)
 #define CHECK(condition) tap_check((condition), __FILE__, __LINE__, #condition)
 #define CHECK_NEAR(a, b, tolerance) \
   tap_check_near((a), (b), (tolerance), __FILE__, __LINE__, #a " ~ " #b)
@@ -78,10 +67,10 @@ static int tap_done(void)
       return;                                            \
     }                                                    \
   } while (0)
-#define SKIP(...)                                     \
-  do {                                                \
-    snprintf(tap_skip, sizeof tap_skip, __VA_ARGS__); \
-    return;                                           \
+#define SKIP(...)          \
+  do {                     \
+    tap_skip(__VA_ARGS__); \
+    return;                \
   } while (0)
 
 #endif

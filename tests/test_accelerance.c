@@ -706,25 +706,3 @@ TEST(bodies_known_only_by_joints_are_undone_too)
   }
   world_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(free_body_has_its_closed_form);
-  RUN(closed_forms_with_1000_iterations);
-  RUN(closed_forms_with_200_iterations);
-  RUN(two_of_three_oracles_agree);
-  RUN(cube_on_a_floor_follows_the_secant);
-  RUN(b_of_a_resting_body_is_zero);
-  RUN(b_holds_the_forces_of_before_step);
-  RUN(counts_of_testing_simulations);
-  RUN(two_pointers_on_one_body);
-  RUN(ways_of_probing_agree);
-  RUN(far_bodies_are_not_stepped);
-  RUN(driven_bodies_do_not_link_islands);
-  RUN(sleepers_answer_like_those_awake);
-  RUN(bodies_known_only_by_joints_are_undone_too);
-  dCloseODE();
-  return tap_done();
-}

@@ -5,6 +5,7 @@
  * that do not belong together. On the quickest scene. HAPODE_BENCH: path of the program,
  * HAPODE_SOURCE: of the sources, for the job files. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <signal.h>
@@ -15,10 +16,7 @@
 #include <unistd.h>
 
 #define PATH_LENGTH 512
-#define TEXT_LENGTH 65536
 #define WHAT "--quick --scene topple"
-
-static char folder[200];
 
 /* Exit code of a shell's command; what it says goes to FOLDER/said. In the command $B is the program, $F
  * the folder and $S the sources. */
@@ -31,53 +29,30 @@ static int shell(const char *format, ...)
   vsnprintf(command, sizeof command, format, arguments);
   va_end(arguments);
   snprintf(whole, sizeof whole,
-           "B=\"$HAPODE_BENCH\" S=\"$HAPODE_SOURCE\" F=%s; {\n%s\n} >%s/said 2>&1", folder, command,
-           folder);
+           "B=\"$HAPODE_BENCH\" S=\"$HAPODE_SOURCE\" F=%s; {\n%s\n} >%s/said 2>&1", test_folder,
+           command, test_folder);
   int result = system(whole);
   return WIFEXITED(result) ? WEXITSTATUS(result) : -1;
 }
 
-static bool read_text(const char *name, char out[TEXT_LENGTH])
+/* Whole ones. */
+static int count_lines(const char *name)
 {
-  char path[PATH_LENGTH];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "r");
-  out[0] = '\0';
-  if (file == NULL) {
-    return false;
+  int lines = 0;
+  for (const char *c = file_text(folder_path(name)); *c != '\0'; ++c) {
+    lines += *c == '\n';
   }
-  out[fread(out, 1, TEXT_LENGTH - 1, file)] = '\0';
-  fclose(file);
-  return true;
+  return lines;
 }
 
 static bool said(const char *part)
 {
-  static char text[TEXT_LENGTH];
-  bool has = read_text("said", text) && strstr(text, part) != NULL;
+  const char *text = file_text(folder_path("said"));
+  bool has = strstr(text, part) != NULL;
   if (!has) {
     printf("# not \"%s\" but: %.600s\n", part, text);
   }
   return has;
-}
-
-static bool exists(const char *name)
-{
-  char path[PATH_LENGTH];
-  struct stat info;
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  return stat(path, &info) == 0;
-}
-
-static int count_lines(const char *name)
-{
-  static char text[TEXT_LENGTH];
-  int lines = 0;
-  (void)read_text(name, text);
-  for (const char *c = text; *c != '\0'; ++c) {
-    lines += *c == '\n';
-  }
-  return lines;
 }
 
 /* That two tables have the same rows but for what a clock says: up to peak_ratio, and from haptic_hz to
@@ -99,7 +74,7 @@ TEST(shards_of_the_slurm_file_make_the_table)
                   "sh $S/bench/jobs/accuracy.slurm " WHAT,
                   shard) == 0);
     CHECK(said("is done"));
-    CHECK(!exists("s/accuracy.csv"));
+    CHECK(!file_exists(folder_path("s/accuracy.csv")));
   }
   CHECK(shell("env -u SLURM_ARRAY_TASK_ID sh $S/bench/jobs/accuracy.slurm") != 0);
   CHECK(said("submit it as an array"));
@@ -107,7 +82,8 @@ TEST(shards_of_the_slurm_file_make_the_table)
                 "$F/s") == 0);
   CHECK(said("topple: the default is "));
   CHECK(count_lines("s/accuracy.csv") > 40);
-  CHECK(exists("s/accuracy-1-of-2.rows") && exists("s/accuracy-2-of-2.rows"));
+  CHECK(file_exists(folder_path("s/accuracy-1-of-2.rows")) &&
+        file_exists(folder_path("s/accuracy-2-of-2.rows")));
 }
 
 TEST(shards_under_parallel_make_the_same_table)
@@ -121,7 +97,7 @@ TEST(shards_under_parallel_make_the_same_table)
 
 TEST(a_shard_that_is_done_is_not_done_again)
 {
-  REQUIRE(exists("s/accuracy-1-of-2.rows"));
+  REQUIRE(file_exists(folder_path("s/accuracy-1-of-2.rows")));
   CHECK(shell("cp $F/s/accuracy-1-of-2.rows $F/kept; $B accuracy " WHAT
               " --shard 1/2 --out $F/s && cmp $F/kept $F/s/accuracy-1-of-2.rows") == 0);
 }
@@ -160,7 +136,7 @@ TEST(files_that_do_not_belong_together_are_refused)
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     CHECK(shell("$B accuracy --merge %s --out $F/m", cases[i].files) == 1);
     CHECK(said(cases[i].says));
-    CHECK(!exists("m/accuracy.csv"));
+    CHECK(!file_exists(folder_path("m/accuracy.csv")));
   }
 }
 
@@ -200,7 +176,7 @@ static pid_t begin_run(void)
   char out[PATH_LENGTH];
   char words[6][16] = {"accuracy", "--quick", "--scene", "topple", "--out"};
   snprintf(program, sizeof program, "%s", getenv("HAPODE_BENCH"));
-  snprintf(out, sizeof out, "%s/k", folder);
+  snprintf(out, sizeof out, "%s/k", test_folder);
   char *argv[] = {program, words[0], words[1], words[2], words[3], words[4], out, NULL};
   pid_t child = -1;
   return posix_spawn(&child, program, NULL, NULL, argv, environ) == 0 ? child : -1;
@@ -215,13 +191,13 @@ TEST(a_run_that_is_killed_goes_on_where_it_was)
   }
   CHECK(kill(child, SIGKILL) == 0 && waitpid(child, NULL, 0) == child);
   int there = count_lines("k/accuracy.rows") - 6;
-  REQUIRE(there >= 8 && !exists("k/accuracy.csv"));
+  REQUIRE(there >= 8 && !file_exists(folder_path("k/accuracy.csv")));
   /* in the middle of a row, as it may be */
   REQUIRE(shell("printf 'topple,contact,20' >>$F/k/accuracy.rows; cp $F/k/accuracy.rows $F/kept") ==
           0);
   REQUIRE(shell("$B accuracy " WHAT " --out $F/k") == 0);
   CHECK(said("goes on from "));
-  CHECK(!exists("k/accuracy.rows"));
+  CHECK(!file_exists(folder_path("k/accuracy.rows")));
   check_same_rows("s/accuracy.csv", "k/accuracy.csv");
   /* what was finished was not measured again: its times are the same */
   CHECK(shell("sed 1,6d $F/kept | sed '$d' | cut -d, -f1-11 | while read row; do grep -qF \"$row\" "
@@ -241,24 +217,9 @@ TEST(rows_of_another_build_or_setting_are_kept_and_told)
   CHECK(said("not a file of finished rows"));
 }
 
-int main(void)
+SET_UP
 {
-  const char *temporary = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/hapode-accuracy-XXXXXX",
-           temporary != NULL ? temporary : "/tmp");
-  if (getenv("HAPODE_BENCH") == NULL || getenv("HAPODE_SOURCE") == NULL ||
-      mkdtemp(folder) == NULL) {
-    printf("1..0 # SKIP needs HAPODE_BENCH, HAPODE_SOURCE and a folder for files\n");
-    return 0;
-  }
-  RUN(shards_of_the_slurm_file_make_the_table);
-  RUN(shards_under_parallel_make_the_same_table);
-  RUN(a_shard_that_is_done_is_not_done_again);
-  RUN(a_shard_may_have_nothing_to_do);
-  RUN(files_that_do_not_belong_together_are_refused);
-  RUN(wrong_parts_are_usage);
-  RUN(a_run_that_is_killed_goes_on_where_it_was);
-  RUN(rows_of_another_build_or_setting_are_kept_and_told);
-  (void)shell("rm -rf $F");
-  return tap_done();
+  return getenv("HAPODE_BENCH") != NULL && getenv("HAPODE_SOURCE") != NULL
+             ? folder_make()
+             : tap_skip_all("needs HAPODE_BENCH and HAPODE_SOURCE");
 }

@@ -620,22 +620,3 @@ TEST(rows_of_what_is_no_joint_are_refused)
         HAPI_ADMITTANCE_CLIPPED);
   CHECK(out == 0);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(what_constraints_leave_of_a_body_is_left_alone);
-  RUN(what_is_outside_is_brought_back_or_refused);
-  RUN(numbers_that_are_none_are_refused_and_nothing_is_changed);
-  RUN(the_bounds_hold_for_every_direction);
-  RUN(what_friction_does_is_kept);
-  RUN(what_ties_a_body_to_another_is_left_alone);
-  RUN(a_block_that_cannot_be_is_cut_or_refused);
-  RUN(a_singular_probe_keeps_the_last_good_one);
-  RUN(rows_answer_as_the_joint_does);
-  RUN(rows_of_what_is_no_joint_are_refused);
-  RUN(an_overdetermined_body_stays_in_bounds);
-  dCloseODE();
-  return tap_done();
-}

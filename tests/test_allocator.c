@@ -269,21 +269,7 @@ TEST(recording_and_replay_with_failing_allocations)
   unlink(recording);
 }
 
-int main(void)
+SET_UP
 {
-  if (!heap_install()) {
-    return 1;
-  }
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(create_with_failing_allocations);
-  RUN(a_lockstep_run_with_failing_allocations);
-  RUN(a_threaded_run_with_failing_allocations);
-  RUN(growing_worlds_with_failing_allocations);
-  RUN(without_memory_for_probes_the_force_is_still_felt);
-  RUN(virtual_device_with_failing_allocations);
-  RUN(replay_device_with_failing_allocations);
-  RUN(recording_and_replay_with_failing_allocations);
-  dCloseODE();
-  return tap_done();
+  return heap_install();
 }

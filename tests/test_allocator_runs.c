@@ -5,6 +5,7 @@
  * it: every model, drive and kind of pointer. What failed for want of memory works once there is
  * some, and what a session cannot see for want of memory it leaves alone. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <unistd.h>
@@ -24,13 +25,12 @@ typedef struct scenario {
 
 static scenario now; /* what fail_each runs */
 
-static char recording[] = "/tmp/hapode-allocator-XXXXXX";
-static char recorded_hand[64];
+static char recorded_hand[170];
 
 static bool write_recording(void)
 {
-  int descriptor = mkstemp(recording);
-  FILE *file = descriptor >= 0 ? fdopen(descriptor, "w") : NULL;
+  const char *path = folder_path("hand.csv");
+  FILE *file = fopen(path, "w");
   if (file == NULL) {
     return false;
   }
@@ -38,7 +38,7 @@ static bool write_recording(void)
   for (int i = 0; i < 100; ++i) {
     fprintf(file, "%g,%g,0,0,1,0,0,0\n", 0.01 * i, -0.1 + 1e-3 * i);
   }
-  snprintf(recorded_hand, sizeof recorded_hand, "replay:%s", recording);
+  snprintf(recorded_hand, sizeof recorded_hand, "replay:%s", path);
   return fclose(file) == 0;
 }
 
@@ -373,25 +373,7 @@ TEST(without_memory_for_its_contacts_a_body_stands_on_the_ground)
   }
 }
 
-int main(void)
+SET_UP
 {
-  if (!heap_install() || !write_recording()) {
-    return 1;
-  }
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(every_model_in_lockstep_with_failing_allocations);
-  RUN(every_model_with_joints_with_failing_allocations);
-  RUN(every_model_with_a_tool_with_failing_allocations);
-  RUN(every_model_in_a_frame_loop_with_failing_allocations);
-  RUN(every_model_in_threads_with_failing_allocations);
-  RUN(two_devices_with_failing_allocations);
-  RUN(bad_specs_with_failing_allocations);
-  RUN(without_memory_auto_disable_is_given_back_as_it_was);
-  RUN(without_memory_a_destroyed_body_is_noticed);
-  RUN(without_memory_no_probe_moves_a_body_that_is_not_known);
-  RUN(without_memory_for_its_contacts_a_body_stands_on_the_ground);
-  unlink(recording);
-  dCloseODE();
-  return tap_done();
+  return heap_install() && folder_make() && write_recording();
 }

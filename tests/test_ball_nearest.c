@@ -95,10 +95,3 @@ TEST(what_has_no_closed_form_and_what_is_no_number)
   center[0] = (double)NAN;
   CHECK(!hapi_ball_nearest(center, 0.1, &shape, &pose, &world, &nearest));
 }
-
-int main(void)
-{
-  RUN(a_shape_in_the_world_in_a_body_and_turned_in_it);
-  RUN(what_has_no_closed_form_and_what_is_no_number);
-  return tap_done();
-}

@@ -497,26 +497,3 @@ TEST(every_status_has_a_name_and_a_text)
            HAP_VERSION_PATCH);
   CHECK(strcmp(hap_version(), version) == 0);
 }
-
-int main(void)
-{
-  RUN(histogram_is_empty_at_first);
-  RUN(histogram_mean_and_maximum_are_exact);
-  RUN(histogram_gives_values_back_within_7_percent);
-  RUN(histogram_quantiles_of_a_known_set);
-  RUN(histogram_takes_any_number);
-  RUN(clock_deadlines_do_not_drift);
-  RUN(clock_deadlines_are_strictly_increasing);
-  RUN(clock_sleeps_until_a_time_and_not_longer_for_a_past_one);
-  RUN(fair_lock_lets_a_waiter_in_after_one_round_of_a_busy_holder);
-  RUN(fair_lock_excludes);
-  RUN(fair_lock_serves_in_order_of_arrival);
-  RUN(fair_lock_gives_up_in_time_and_blocks_nobody_by_it);
-  RUN(fair_lock_goes_on_behind_one_who_gave_up);
-  RUN(thread_starts_with_or_without_real_time_and_joins_twice);
-  RUN(heap_zeroes_and_goes_through_the_hooks);
-  RUN(index_finds_what_was_put_and_not_removed);
-  RUN(fail_writes_and_cuts_the_text);
-  RUN(every_status_has_a_name_and_a_text);
-  return tap_done();
-}

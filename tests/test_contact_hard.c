@@ -865,36 +865,3 @@ TEST(two_seconds_of_threads_and_a_late_contact_thread)
   run_threads(200.0, 2.0);
   run_threads(20.0, 1.5);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_body_falls_asleep_beside_the_hand_and_wakes_when_touched);
-  RUN(a_sleeping_body_wakes_when_another_one_hits_it);
-  RUN(a_tower_falls_asleep_in_its_whole);
-  RUN(the_range_is_the_touched_island_when_it_fits);
-  RUN(what_does_not_fit_is_left_out_from_the_far_end);
-  RUN(what_enters_and_leaves_the_range_keeps_its_motion);
-  RUN(a_ball_that_flies_in_hits_what_is_near_the_hand);
-  RUN(a_body_destroyed_under_the_hand_is_gone);
-  RUN(a_body_moved_by_the_application_stays_where_it_was_put);
-  RUN(a_body_put_back_under_the_hand_is_felt_there);
-  RUN(a_new_mass_counts_from_the_next_step);
-  RUN(a_geom_that_grows_is_felt_and_stands_on_its_new_faces);
-  RUN(a_body_added_in_front_of_another_is_pushed_with_it);
-  RUN(a_box_slides_over_triangles_as_over_a_plane);
-  RUN(a_ball_rolls_over_triangles_as_over_a_plane);
-  RUN(ridges_carry_a_box);
-  RUN(a_ball_on_a_heightfield_is_measured_and_felt);
-  RUN(a_hull_slides_as_a_box_does);
-  RUN(a_body_of_several_geoms_in_a_nested_space_stands);
-  RUN(a_pair_without_common_bits_or_refused_has_no_contact);
-  RUN(the_surface_of_a_pair_is_asked_once_a_step);
-  RUN(other_models_take_over_without_a_jump);
-  RUN(every_run_has_the_same_hash);
-  RUN(a_model_of_any_age_will_do);
-  RUN(two_seconds_of_threads_and_a_late_contact_thread);
-  dCloseODE();
-  return tap_done();
-}

@@ -294,20 +294,3 @@ TEST(sweeps_are_no_more_than_asked)
   CHECK(undone[1] > 10.0 * undone[0]);
   CHECK(sweeps[3] == sweeps[0] && undone[3] == undone[0]);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_session_that_starts_again_owns_what_it_owned);
-  RUN(a_convex_body_without_room_for_its_points_stays_on_the_floor);
-  RUN(where_contacts_find_no_room_those_that_touch_are_kept);
-  RUN(a_box_falls_beside_a_wall_that_it_does_not_touch);
-  RUN(a_body_that_the_application_puts_to_sleep_stays_so);
-  RUN(a_measured_body_answers_all_that_touch_it_alike);
-  RUN(a_measured_body_answers_two_hands_alike);
-  RUN(the_range_ends_after_so_many_contacts);
-  RUN(what_hangs_together_is_one_hop);
-  RUN(sweeps_are_no_more_than_asked);
-  dCloseODE();
-  return tap_done();
-}

@@ -865,36 +865,3 @@ TEST(a_hand_does_not_move_a_kinematic_body)
   CHECK(dBodyGetPosition(body)[0] == 0.0 && dBodyGetLinearVel(body)[0] == 0.0);
   cw_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(half_of_the_speed_comes_back);
-  RUN(nothing_comes_back_without_restitution);
-  RUN(below_the_threshold_nothing_bounces);
-  RUN(fig5_has_the_closed_forms_peak_and_impulse);
-  RUN(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives);
-  RUN(the_momentum_of_a_pushed_row_is_the_hands_impulse);
-  RUN(a_spinning_box_keeps_momentum_and_energy);
-  RUN(what_rolls_goes_on_rolling);
-  RUN(two_coefficients_along_a_given_direction);
-  RUN(friction_without_approx_is_a_force);
-  RUN(slip_is_a_speed_for_a_force);
-  RUN(a_belt_carries_a_box_at_its_speed);
-  RUN(a_soft_contact_sinks_by_its_spring);
-  RUN(the_surface_layer_is_not_pushed_out);
-  RUN(the_correcting_velocity_has_its_limit);
-  RUN(a_body_comes_out_of_the_ground_without_energy);
-  RUN(damping_is_meant_for_the_worlds_step);
-  RUN(user_forces_act_every_tick);
-  RUN(a_body_without_gravity_stays);
-  RUN(a_gram_on_a_spring_of_a_meganewton_stays_calm);
-  RUN(a_bounce_on_the_hand_gives_no_energy);
-  RUN(a_gram_squeezed_onto_the_floor_stays_there);
-  RUN(a_moving_platform_carries_a_box);
-  RUN(a_kinematic_wall_pushes_a_box_and_is_not_pushed);
-  RUN(a_hand_does_not_move_a_kinematic_body);
-  dCloseODE();
-  return tap_done();
-}

@@ -875,26 +875,3 @@ TEST(hostile_input_ends)
   run();
   CHECK(s.solver.residual == HUGE_VAL);
 }
-
-int main(void)
-{
-  RUN(a_block_sticks_and_slides);
-  RUN(without_friction_nothing_holds_and_with_infinite_friction_all);
-  RUN(a_soft_row_is_a_spring_and_a_damper);
-  RUN(two_bodies_collide);
-  RUN(fixed_bounds_hold);
-  RUN(a_moving_floor_carries_the_block_along);
-  RUN(random_problems_have_the_solution_of_one_active_set);
-  RUN(towers_chains_and_piles_agree_with_a_slow_solver);
-  RUN(direct_solves_and_sweeps_agree);
-  RUN(a_heavy_box_rests_on_light_ones);
-  RUN(warm_started_ticks_need_few_sweeps);
-  RUN(an_unchanged_load_is_solved_at_once);
-  RUN(the_same_input_gives_the_same_bits);
-  RUN(islands_are_solved_one_by_one);
-  RUN(many_bodies_about_a_light_one_are_solved_to_the_end);
-  RUN(budget_and_limits_hold);
-  RUN(work_that_is_too_small_is_left_alone);
-  RUN(hostile_input_ends);
-  return tap_done();
-}

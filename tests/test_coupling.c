@@ -680,30 +680,3 @@ TEST(eight_contacts_at_once_do_not_shake_the_device)
   CHECK(chosen < 1e-6);
   CHECK(shaking(HAP_COUPLING_AUTO, 64, 1e6) < 1e-6);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(gains_follow_the_device);
-  RUN(gains_are_not_invented);
-  RUN(a_wall_and_the_proxy_are_springs_in_series);
-  RUN(the_spring_is_the_devices_whatever_its_frame_and_scales);
-  RUN(in_the_air_the_proxy_is_at_the_device_and_gives_no_force);
-  RUN(a_driven_body_presses_through_the_proxy);
-  RUN(a_measured_body_is_pushed_through_the_proxy);
-  RUN(pointers_of_one_body_have_each_their_own_coupling);
-  RUN(a_proxy_passes_the_whole_impulse_on);
-  RUN(an_impact_through_the_proxy_has_the_time_of_its_spring);
-  RUN(auto_takes_the_proxy_for_more_than_the_device_holds);
-  RUN(the_change_while_pressing_has_no_jump);
-  RUN(auto_without_a_force_stays_direct);
-  RUN(a_hop_does_not_change_the_coupling);
-  RUN(a_heavy_proxy_is_let_go_of_at_the_device);
-  RUN(a_proxy_is_refused_where_it_cannot_be);
-  RUN(the_guard_leaves_an_impact_through_a_proxy_alone);
-  RUN(a_change_of_the_coupling_is_no_source_of_energy);
-  RUN(another_model_ends_the_proxy_and_contact_begins_it_anew);
-  RUN(eight_contacts_at_once_do_not_shake_the_device);
-  dCloseODE();
-  return tap_done();
-}

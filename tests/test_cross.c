@@ -563,26 +563,3 @@ TEST(operating_probes_are_as_many_as_shared_ones)
   }
   CHECK(steps[0] == 7 && steps[1] == 7);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_fixed_pair_answers_as_one_body);
-  RUN(a_hinged_pair_has_its_closed_form);
-  RUN(what_nothing_ties_has_no_block_and_no_probe_is_added);
-  RUN(with_too_few_places_the_largest_stay);
-  RUN(a_block_that_is_no_number_is_left_out);
-  RUN(the_second_cube_of_a_row_moves_between_syncs);
-  RUN(an_impulse_counts_once_and_what_answers_follows_the_world);
-  RUN(two_hands_on_a_pair_leave_no_residual);
-  RUN(a_body_alone_does_not_feel_the_switch);
-  RUN(a_cube_that_friction_holds_gives_no_way);
-  RUN(a_cube_that_slides_answers_with_its_mass);
-  RUN(b_and_the_forces_make_the_base_again);
-  RUN(what_does_not_answer_has_no_block);
-  RUN(perturbations_go_into_the_body);
-  RUN(operating_probes_are_as_many_as_shared_ones);
-  dCloseODE();
-  return tap_done();
-}

@@ -96,12 +96,3 @@ TEST(blocks_go_with_their_contact_and_their_body)
   CHECK(f.bodies[3].twist.linear[0] == 0.0);
   check_v3(f.bodies[2].twist.linear, 4.0 * T, 0.0, 0.0, 1e-15);
 }
-
-int main(void)
-{
-  RUN(a_force_moves_the_other_bodies_by_their_blocks);
-  RUN(a_body_that_only_answers_follows_the_world);
-  RUN(blocks_go_with_their_contact_and_their_body);
-  hapi_exchange_destroy(f.exchange);
-  return tap_done();
-}

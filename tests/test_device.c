@@ -615,32 +615,3 @@ TEST(sleep_ends_after_its_time)
   hapi_clock_sleep_until(0);
   CHECK(hapi_clock_now() >= begin);
 }
-
-int main(void)
-{
-  RUN(names_are_listed);
-  RUN(unknown_name_lists_the_known);
-  RUN(null_is_refused);
-  RUN(abi_comes_first);
-  RUN(older_tables_without_optional_operations_are_served);
-  RUN(bad_tables_are_refused);
-  RUN(what_open_does_wrong_is_said);
-  RUN(bad_info_closes_again);
-  RUN(failed_open_keeps_its_text);
-  RUN(info_has_a_name_and_fits_any_size);
-  RUN(close_zeroes_first);
-  RUN(one_device_serves_one_pointer);
-  RUN(every_failed_allocation_is_survived);
-  RUN(arguments_are_read);
-  RUN(bad_arguments_say_why);
-  RUN(long_arguments_are_cut_in_the_text);
-  RUN(numbers_are_those_of_strtod);
-  RUN(output_keeps_the_direction);
-  RUN(timeline_goes_forward_only);
-  RUN(each_status_has_name_and_text);
-  RUN(hooks_are_used);
-  RUN(fail_writes_and_cuts);
-  RUN(deadlines_do_not_drift);
-  RUN(sleep_ends_after_its_time);
-  return tap_done();
-}

@@ -599,33 +599,3 @@ TEST(an_older_caller_gets_what_it_has_room_for)
   CHECK(size == 24 && room[24] == 0x5a);
   cw_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(more_accuracy_is_more_of_everything);
-  RUN(the_default_is_what_the_library_is_without);
-  RUN(a_side_has_its_own_settings);
-  RUN(what_was_given_stays);
-  RUN(no_solve_is_longer_than_a_tick);
-  RUN(a_load_that_is_too_much_turns_at_once);
-  RUN(a_long_way_down_is_not_held_against_it);
-  RUN(a_dial_does_not_go_to_and_fro);
-  RUN(accuracy_costs_sweeps_and_buys_force);
-  RUN(the_session_tells_where_it_stands);
-  RUN(it_tells_so_from_the_start);
-  RUN(contacts_are_found_as_often_as_it_says);
-  RUN(the_worlds_iterations_are_the_applications);
-  RUN(it_is_turned_while_the_session_runs);
-  RUN(a_shape_that_is_asked_for_stays);
-  RUN(it_says_when_no_error_has_been_told);
-  RUN(a_wanted_error_is_looked_for);
-  RUN(without_a_wanted_error_it_goes_back);
-  RUN(a_budget_turns_the_tick_back);
-  RUN(a_budget_turns_physics_back);
-  RUN(a_budget_that_is_wide_leaves_all_as_it_is);
-  RUN(wrong_settings_are_refused_and_change_nothing);
-  RUN(an_older_caller_gets_what_it_has_room_for);
-  dCloseODE();
-  return tap_done();
-}

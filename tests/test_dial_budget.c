@@ -225,20 +225,3 @@ TEST(a_larger_error_turns_both_up_and_a_small_one_down)
   CHECK(tell_error(physics, 40, 0.2 * WANTED) < 70);
   world_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(ticks_that_fit_change_nothing);
-  RUN(a_mean_that_is_over_turns_the_tick);
-  RUN(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit);
-  RUN(many_ticks_that_are_over_turn_it_as_well);
-  RUN(room_brings_it_back_as_far_as_was_asked);
-  RUN(what_is_asked_for_later_waits_for_the_budget);
-  RUN(cycles_that_are_over_turn_physics);
-  RUN(looking_back_has_what_is_left);
-  RUN(an_error_as_wanted_turns_nothing);
-  RUN(a_larger_error_turns_both_up_and_a_small_one_down);
-  dCloseODE();
-  return tap_done();
-}

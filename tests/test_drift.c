@@ -232,15 +232,8 @@ TEST(nothing_in_the_loop_is_denormal)
   check_decay(HAP_MODEL_ACCELERANCE, false);
 }
 
-int main(int argc, char **argv)
+SET_UP
 {
-  ticks = argc > 1 && strcmp(argv[1], "long") == 0 ? 10000000 : ticks;
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(orientations_of_bodies_stay_unit);
-  RUN(orientations_that_are_shown_stay_unit);
-  RUN(orientations_of_pointers_stay_unit);
-  RUN(nothing_in_the_loop_is_denormal);
-  dCloseODE();
-  return tap_done();
+  ticks = strcmp(tap_argument, "long") == 0 ? 10000000 : ticks;
+  return true;
 }

@@ -202,11 +202,3 @@ TEST(every_edit_is_felt_without_a_jump)
     }
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(every_edit_is_felt_without_a_jump);
-  dCloseODE();
-  return tap_done();
-}

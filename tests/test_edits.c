@@ -740,29 +740,3 @@ TEST(a_mesh_that_is_built_anew_is_read_anew)
   CHECK_NEAR(height_after(true), 0.02, 1e-3);
   CHECK_NEAR(height_after(false), 0.02, 1e-3);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_body_at_the_address_of_a_destroyed_one_is_another_body);
-  RUN(a_lost_body_is_said_once_a_run_and_counted_always);
-  RUN(a_body_is_taken_for_itself_whatever_is_set_on_it);
-  RUN(settings_are_given_back_as_they_were);
-  RUN(settings_of_sleep_that_are_changed_while_running_hold);
-  RUN(finite_rotation_switched_on_while_running_is_odes);
-  RUN(a_body_that_was_asleep_counts_anew_after_the_session);
-  RUN(an_adopted_body_that_lost_its_geom_lives_when_it_is_adopted_again);
-  RUN(the_reach_of_a_body_is_that_of_its_geoms_now);
-  RUN(errors_of_the_lock_say_what_to_do);
-  RUN(the_loop_does_not_wait_for_the_lock);
-  RUN(a_hundred_threads_may_wait_for_the_lock);
-  RUN(a_surface_callback_may_not_forget);
-  RUN(an_edit_that_stop_or_destroy_runs_is_a_callback_too);
-  RUN(edits_that_post_themselves_end_with_the_session);
-  RUN(what_was_taken_is_run_once_whatever_threads_post);
-  RUN(a_full_queue_is_said);
-  RUN(a_sleeping_neighbour_may_lie_behind_geoms_that_rest);
-  RUN(a_mesh_that_is_built_anew_is_read_anew);
-  dCloseODE();
-  return tap_done();
-}

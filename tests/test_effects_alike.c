@@ -216,13 +216,3 @@ TEST(every_time_is_filled_in)
     CHECK(tick && physics && pass);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(auto_is_as_on_in_force);
-  RUN(what_is_off_is_felt);
-  RUN(every_time_is_filled_in);
-  dCloseODE();
-  return tap_done();
-}

@@ -443,18 +443,3 @@ TEST(exchange_is_never_torn_between_two_threads)
   CHECK(models > 0);
   hapi_exchange_destroy(t.exchange);
 }
-
-int main(void)
-{
-  RUN(nothing_can_be_taken_before_the_first_message);
-  RUN(a_message_is_taken_once);
-  RUN(the_newest_of_several_is_taken);
-  RUN(three_places_have_three_owners_in_every_order_of_calls);
-  RUN(neither_side_waits_for_the_other);
-  RUN(messages_are_never_torn_in_either_direction);
-  RUN(exchange_carries_full_messages_of_every_capacity);
-  RUN(exchange_arrays_are_aligned_and_within_its_block);
-  RUN(exchange_reset_forgets_everything);
-  RUN(exchange_is_never_torn_between_two_threads);
-  return tap_done();
-}

@@ -358,20 +358,3 @@ TEST(a_far_chain_without_geoms_is_known_by_its_joints)
   go_on(&w);
   world_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(many_questions_are_answered_as_ode_answers_each);
-  RUN(a_round_asks_the_space_seldom);
-  RUN(a_far_body_that_grows_is_measured_at_the_next_step);
-  RUN(the_fastest_of_all_bodies_sets_the_reach);
-  RUN(a_bad_body_is_kept_from_ode_wherever_it_is);
-  RUN(a_bad_geom_keeps_the_world_from_being_stepped_until_it_is_set_right);
-  RUN(a_bad_geom_is_found_behind_a_bad_pose);
-  RUN(the_scan_follows_whatever_the_order_becomes);
-  RUN(a_far_chain_without_geoms_is_known_by_its_joints);
-  dCloseODE();
-  return tap_done();
-}

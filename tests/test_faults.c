@@ -644,29 +644,3 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
   CHECK(stats.neighbours_max <= 2 && stats.pointer_contacts <= 2);
   felt_end(&f);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(physics_that_dies_fades_within_100_ms_and_comes_back_in_a_step);
-  RUN(dropped_ticks_give_the_hand_no_more_than_the_force_held_over_one_gap);
-  RUN(a_jittering_clock_gives_the_hand_no_more_than_the_force_held_over_one_tick);
-  RUN(a_loop_that_stood_still_while_the_hand_went_in_takes_the_surface_to_the_hand);
-  RUN(a_pose_that_is_nan_ramps_to_zero_and_a_reset_ramps_in);
-  RUN(unplugged_between_read_and_write_is_zero_at_once_and_comes_back_by_a_reset);
-  RUN(unplugged_before_the_read_is_zero_at_once_and_comes_back_by_a_reset);
-  RUN(a_device_that_was_lost_comes_back_by_a_restart_and_a_reset);
-  RUN(a_restart_without_a_fault_comes_in_over_the_ramp);
-  RUN(a_restart_has_its_place);
-  RUN(a_device_plugged_in_again_deep_in_a_body_comes_up_from_zero);
-  RUN(a_hand_that_went_into_a_body_during_a_fault_does_not_shoot_it_away);
-  RUN(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it);
-  RUN(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away);
-  RUN(a_body_put_over_the_hand_is_pushed_out_slowly);
-  RUN(a_device_that_jumps_for_a_tick_and_back_is_felt_as_a_dip);
-  RUN(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps);
-  RUN(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps);
-  dCloseODE();
-  return tap_done();
-}

@@ -254,16 +254,3 @@ TEST(a_process_that_is_stopped_and_continued_gives_no_burst)
   CHECK(t.work_most <= 0.01 * 0.5 * t.peak * t.peak / 1000.0 + 1e-3);
   unlink(trace_path);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back);
-  RUN(a_device_whose_read_takes_300_ms_is_felt_as_a_pause);
-  RUN(a_lost_device_is_restarted_while_the_loop_runs);
-  RUN(a_device_that_blocks_and_then_fails_is_zeroed);
-  RUN(a_process_that_is_stopped_and_continued_gives_no_burst);
-  dCloseODE();
-  return tap_done();
-}

@@ -501,20 +501,3 @@ TEST(wrong_calls_say_so_and_change_nothing)
     stage_end(&s);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(steps_lie_evenly_on_the_clock_at_any_frame_rate);
-  RUN(a_hitch_drops_what_is_beyond_three_steps_and_goes_on);
-  RUN(frame_time_may_go_slower_or_faster_than_the_clock_or_stand);
-  RUN(frames_that_come_unevenly_are_drawn_evenly);
-  RUN(slow_frames_are_felt_in_full);
-  RUN(a_hitch_fades_the_force_drops_time_and_is_over_within_two_syncs);
-  RUN(a_pause_stands_still_and_goes_on_where_it_was);
-  RUN(slow_motion_is_drawn_evenly);
-  RUN(wrong_calls_say_so_and_change_nothing);
-  dCloseODE();
-  return tap_done();
-}

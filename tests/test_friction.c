@@ -343,19 +343,3 @@ TEST(turning_and_sliding_share_one_limit)
     cw_close(&w);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(sticking_is_a_spring_of_the_contacts_stiffness);
-  RUN(sliding_is_coulombs_in_every_direction);
-  RUN(a_heavy_body_is_held_and_slid_on_as_a_wall);
-  RUN(sliding_pulls_a_free_body_along);
-  RUN(sticking_drags_a_block_over_the_floor);
-  RUN(soft_fingers_are_a_torsion_spring_of_k_r2);
-  RUN(beyond_their_limit_soft_fingers_slip_and_brake);
-  RUN(turning_and_sliding_share_one_limit);
-  dCloseODE();
-  return tap_done();
-}

@@ -187,9 +187,3 @@ TEST(balls_hold_what_they_say)
   CHECK(solved > 1940); /* with the pyramid as many: friction from above and below may jam */
   CHECK(pushes > 4000 && slides > 1000 && pushes - slides > 300);
 }
-
-int main(void)
-{
-  RUN(balls_hold_what_they_say);
-  return tap_done();
-}

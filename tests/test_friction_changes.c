@@ -245,19 +245,3 @@ TEST(a_conveyor_takes_the_hand_along)
     cw_close(&w);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(the_callback_says_the_friction_of_a_geom);
-  RUN(more_than_ten_is_ten);
-  RUN(a_friction_that_is_none_is_a_fault_with_a_text);
-  RUN(a_pointer_that_is_removed_lets_go);
-  RUN(a_body_that_is_destroyed_lets_go);
-  RUN(a_body_that_is_put_elsewhere_keeps_the_pull);
-  RUN(a_change_of_model_keeps_the_pull);
-  RUN(a_conveyor_takes_the_hand_along);
-  dCloseODE();
-  return tap_done();
-}

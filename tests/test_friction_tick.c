@@ -187,12 +187,3 @@ TEST(all_rows_of_a_measured_body_answer_by_one_matrix)
     }
   }
 }
-
-int main(void)
-{
-  RUN(all_rows_of_a_measured_body_answer_by_one_matrix);
-  RUN(what_rolls_does_not_slide);
-  RUN(what_sticks_does_not_creep_in_a_million_ticks);
-  hapi_exchange_destroy(f.exchange);
-  return tap_done();
-}

@@ -699,32 +699,3 @@ TEST(lockstep_repeats_them)
     CHECK(hashes[0] == hashes[1]);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(in_the_air_a_god_object_is_the_device_to_the_bit);
-  RUN(a_god_object_stays_on_a_plane);
-  RUN(a_god_objects_damper_resists_the_way_in);
-  RUN(a_god_object_in_a_corner_is_where_the_spring_is_shortest);
-  RUN(a_god_object_slides_over_an_edge);
-  RUN(a_thin_plate_holds_a_god_object);
-  RUN(held_still_all_couplings_are_springs_in_a_row);
-  RUN(a_free_cube_is_accelerated_by_the_force);
-  RUN(a_cube_bounces_on_a_god_object_in_the_time_of_its_spring);
-  RUN(two_hands_squeeze_a_cube);
-  RUN(a_driven_body_carries_a_god_object_with_it);
-  RUN(friction_holds_a_god_object_to_the_cone);
-  RUN(friction_of_a_god_object_draws_a_cube_along);
-  RUN(in_the_air_the_virtual_tool_is_felt_as_its_mass);
-  RUN(the_virtual_tool_swings_at_its_resonance);
-  RUN(a_virtual_tool_hits_as_a_body_without_rebound);
-  RUN(what_cannot_be_is_refused);
-  RUN(a_spring_is_asked_for_as_for_a_proxy);
-  RUN(another_model_ends_it_and_contact_begins_it_anew);
-  RUN(a_device_that_leaps_begins_anew);
-  RUN(a_body_that_is_put_over_the_pointer_lets_it_out);
-  RUN(lockstep_repeats_them);
-  dCloseODE();
-  return tap_done();
-}

@@ -268,18 +268,3 @@ TEST(the_virtual_tool_is_felt_as_its_inertia)
     tool_end(&w);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(in_the_air_a_god_object_tool_is_the_device_to_the_bit);
-  RUN(a_tool_lies_on_the_floor);
-  RUN(a_tool_stands_on_its_edge_where_the_springs_agree);
-  RUN(a_tool_rests_in_a_corner);
-  RUN(friction_holds_a_tool_to_the_cone);
-  RUN(friction_holds_a_tool_against_turning);
-  RUN(a_tool_pushes_a_cube);
-  RUN(the_virtual_tool_is_felt_as_its_inertia);
-  dCloseODE();
-  return tap_done();
-}

@@ -236,15 +236,3 @@ TEST(recorded_fingers_grip_a_box)
     rig_destroy(&r);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_box_that_is_held_does_not_creep);
-  RUN(with_less_grip_than_it_needs_the_box_slides);
-  RUN(without_soft_fingers_a_box_swings);
-  RUN(recorded_fingers_grip_a_box);
-  dCloseODE();
-  return tap_done();
-}

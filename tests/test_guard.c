@@ -712,37 +712,3 @@ TEST(a_loop_never_waits_for_a_reader)
   CHECK(read_box(1000) == 1); /* of the new fault, not of the old one */
   CHECK(read_rows[0].fault == HAP_FAULT_LOCAL_STATE);
 }
-
-int main(void)
-{
-  RUN(a_million_random_wrenches_keep_limit_and_slew);
-  RUN(a_force_beyond_the_limit_comes_to_it_in_its_own_direction);
-  RUN(the_ramp_comes_before_slew_and_slew_before_saturation);
-  RUN(what_the_observer_takes_goes_at_the_slew_bound);
-  RUN(a_pointer_comes_in_over_20_ms_and_so_after_a_reset);
-  RUN(a_fault_takes_the_force_away_in_100_ms_whatever_the_slew_limit);
-  RUN(a_reset_of_no_fault_changes_nothing);
-  RUN(a_force_that_is_not_finite_ramps_from_the_last_good_one_to_zero);
-  RUN(a_torque_that_is_not_finite_is_a_fault_too);
-  RUN(the_first_fault_is_the_one_that_stays);
-  RUN(a_device_that_failed_is_zeroed_at_once);
-  RUN(a_measuring_guard_keeps_checks_and_limits_alone);
-  RUN(a_stall_takes_the_force_down_and_the_next_model_brings_it_back);
-  RUN(a_model_of_two_steps_is_not_too_old);
-  RUN(without_a_model_and_in_model_single_nothing_grows_old);
-  RUN(a_wall_held_over_ticks_gives_back_no_more_than_was_put_in);
-  RUN(energy_counts_in_the_world_whatever_the_scales);
-  RUN(a_damper_that_drives_is_held_back);
-  RUN(a_wall_with_a_damper_is_left_alone);
-  RUN(an_honest_impact_is_felt_whole);
-  RUN(what_a_weight_or_a_drive_gives_is_felt);
-  RUN(a_device_has_not_moved_when_it_is_first_seen);
-  RUN(the_black_box_knows_no_age_before_the_first_model);
-  RUN(the_spring_of_a_contact_that_vanishes_is_lost);
-  RUN(nobody_pays_for_a_jump_but_what_it_gives_is_given);
-  RUN(the_black_box_keeps_the_last_256_ticks_until_the_reset);
-  RUN(each_pointer_has_its_rows);
-  RUN(a_loop_never_waits_for_a_reader);
-  hapi_exchange_destroy(f.exchange);
-  return tap_done();
-}

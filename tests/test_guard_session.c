@@ -543,23 +543,3 @@ TEST(a_slew_limit_of_the_application)
              1e-9); /* after a fault 10 N go in 100 ms at the least */
   end(&s, device);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_device_that_fails_is_zeroed_at_once);
-  RUN(other_faults_ramp_to_zero_and_a_reset_ramps_in);
-  RUN(every_fault_has_a_text);
-  RUN(an_emergency_takes_all_force_until_the_reset);
-  RUN(a_force_that_is_written_during_an_emergency_does_not_stay);
-  RUN(an_emergency_before_the_start_or_after_the_end_reaches_nobody);
-  RUN(there_are_places_for_64_devices);
-  RUN(devices_come_and_go_under_emergencies);
-  RUN(the_black_box_of_a_session);
-  RUN(faults_and_resets_race_with_readers);
-  RUN(a_stalled_physics_thread_is_a_state_and_no_fault);
-  RUN(lockstep_knows_no_stall);
-  RUN(a_slew_limit_of_the_application);
-  dCloseODE();
-  return tap_done();
-}

@@ -853,39 +853,3 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   hapi_haptic_destroy(haptic);
   hap_device_close(device);
 }
-
-int main(void)
-{
-  RUN(force_is_spring_on_depth);
-  RUN(damper_acts_only_in_contact_and_never_pulls);
-  RUN(damper_takes_the_speed_of_the_surface);
-  RUN(a_static_contact_takes_no_impulse);
-  RUN(one_step_of_eq_8_and_9_to_the_last_digit);
-  RUN(contact_turns_with_the_body);
-  RUN(quaternion_stays_unit_over_a_million_ticks);
-  RUN(free_fall_is_symplectic_euler);
-  RUN(several_pointers_on_one_body_add_up);
-  RUN(one_pointer_between_several_bodies);
-  RUN(a_driven_body_pushes_and_is_not_pushed);
-  RUN(a_resting_body_moves_only_after_a_push);
-  RUN(follows_hands_a_body_that_was_not_pushed_to_the_world);
-  RUN(a_body_that_comes_in_is_advanced_by_the_age_of_the_model);
-  RUN(residual_is_added_once_also_when_a_model_is_skipped);
-  RUN(a_contact_that_arrives_deep_ramps_from_zero);
-  RUN(contacts_of_a_pointer_that_has_gone_are_not_used);
-  RUN(saturation_keeps_the_direction);
-  RUN(bad_device_samples_latch_a_fault_and_go_no_further);
-  RUN(a_fault_that_goes_on_latches_again_after_a_reset);
-  RUN(a_local_state_that_is_not_finite_is_stopped);
-  RUN(a_force_that_overflows_is_not_written);
-  RUN(scales_and_frame_keep_virtual_work);
-  RUN(an_aligned_device_is_as_one_that_is_turned_by_nothing);
-  RUN(impulse_interpolates_from_the_last_but_one_to_the_last_pose);
-  RUN(impulse_holds_the_last_pose_and_sums_the_impulse);
-  RUN(a_bounce_conserves_energy);
-  RUN(totals_run_on_over_models_and_begin_anew_with_a_generation);
-  RUN(the_hash_tells_any_change);
-  RUN(ten_thousand_cycles_touch_no_new_memory);
-  hapi_exchange_destroy(f.exchange);
-  return tap_done();
-}

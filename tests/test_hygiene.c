@@ -510,22 +510,3 @@ TEST(long_frame_times_are_one_call_long_and_no_frame_times_are_refused)
   CHECK(hap_session_stop(w.session) == HAP_OK);
   world_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(nothing_that_is_no_number_reaches_the_world);
-  RUN(a_geom_at_no_place_of_its_body_is_said);
-  RUN(a_velocity_that_a_step_made_is_in_no_residual);
-  RUN(an_adopted_body_is_looked_at_too);
-  RUN(a_world_that_was_set_right_goes_on);
-  RUN(no_surface_that_is_no_number_reaches_a_contact);
-  RUN(a_contact_that_is_no_number_is_dropped_and_counted);
-  RUN(a_contact_without_a_normal_is_dropped_and_counted);
-  RUN(targets_beyond_the_world_change_nothing);
-  RUN(a_pointer_out_of_the_world_stays_where_it_was);
-  RUN(long_frame_times_are_one_call_long_and_no_frame_times_are_refused);
-  dCloseODE();
-  return tap_done();
-}

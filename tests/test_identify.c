@@ -3,6 +3,7 @@
 
 /* Identification of devices whose mechanism is known, its limits, and the file of an identity. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <locale.h>
@@ -499,7 +500,7 @@ TEST(failed_allocations_are_survived)
 
 /* ---- files ---- */
 
-static char path[] = "/tmp/hapode-identity-XXXXXX";
+static char path[160];
 
 static hap_device_identity some_identity(void)
 {
@@ -556,12 +557,6 @@ TEST(older_callers_are_served)
   CHECK(hap_device_identity_read(path, &old.identity, NULL) == HAP_ERROR_UNINITIALISED);
 }
 
-static void write_text(const char *text, size_t size)
-{
-  FILE *file = fopen(path, "w");
-  CHECK(file != NULL && fwrite(text, 1, size, file) == size && fclose(file) == 0);
-}
-
 #define HEAD "# comment\n\nversion = 1\ndevice = virtual\n"
 #define TAIL "friction=0\ndelay=0 # s\nquantum=0\nresidual=0"
 
@@ -573,7 +568,7 @@ TEST(files_may_be_written_by_hand)
   hap_device_identity read;
   hap_detail detail = {""};
   hap_device_identity_init(&read, sizeof read);
-  write_text(text, sizeof text - 1);
+  file_write_bytes(path, text, sizeof text - 1);
   CHECK(hap_device_identity_read(path, &read, &detail) == HAP_OK);
   CHECK(strcmp(read.device, "my own # device") == 0 && read.mass == 0.5 && read.damping == 1.0);
 }
@@ -604,7 +599,7 @@ TEST(bad_files_are_refused_with_their_line)
     hap_device_identity read = some_identity();
     const hap_device_identity before = read;
     hap_detail detail = {""};
-    write_text(bad[i][0], strlen(bad[i][0]));
+    file_write(path, bad[i][0]);
     CHECK(hap_device_identity_read(path, &read, &detail) == HAP_ERROR_FORMAT);
     CHECK(memcmp(&read, &before, sizeof read) == 0);
     CHECK(strstr(detail.text, path) != NULL);
@@ -617,10 +612,10 @@ TEST(bad_files_are_refused_with_their_line)
   hap_device_identity read = some_identity();
   hap_detail detail = {""};
   memset(endless, 'x', sizeof endless);
-  write_text(endless, sizeof endless);
+  file_write_bytes(path, endless, sizeof endless);
   CHECK(hap_device_identity_read(path, &read, &detail) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 1: longer") != NULL);
-  write_text("version = 1\nmass\0= 1\n", 21);
+  file_write_bytes(path, "version = 1\nmass\0= 1\n", 21);
   CHECK(hap_device_identity_read(path, &read, &detail) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 2") != NULL);
   CHECK(hap_device_identity_read("/nowhere/at/all", &read, &detail) == HAP_ERROR_IO);
@@ -694,34 +689,9 @@ TEST(identity_without_a_quantum_leaves_the_devices_own)
   hap_device_close(device);
 }
 
-int main(void)
+SET_UP
 {
-  int file = mkstemp(path);
-  if (file < 0) {
-    printf("Bail out! no temporary file\n");
-    return 1;
-  }
-  close(file);
-  RUN(known_mechanisms_are_found);
-  RUN(unusual_mechanisms_are_found);
-  RUN(held_devices_are_not_identified);
-  RUN(force_keeps_its_limit);
-  RUN(constant_force_does_not_matter);
-  RUN(runaways_are_stopped);
-  RUN(failing_devices_are_let_go);
-  RUN(quantum_is_seen_without_a_grid);
-  RUN(quantum_of_records);
-  RUN(person_can_stop_it);
-  RUN(an_emergency_ends_it);
-  RUN(bad_arguments_are_refused);
-  RUN(failed_allocations_are_survived);
-  RUN(files_come_back_in_any_locale);
-  RUN(older_callers_are_served);
-  RUN(files_may_be_written_by_hand);
-  RUN(bad_files_are_refused_with_their_line);
-  RUN(bad_identities_are_not_written);
-  RUN(identity_takes_the_place_of_what_the_device_says);
-  RUN(identity_without_a_quantum_leaves_the_devices_own);
-  remove(path);
-  return tap_done();
+  bool good = folder_make();
+  snprintf(path, sizeof path, "%s", folder_path("identity"));
+  return good;
 }

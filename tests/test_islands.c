@@ -130,14 +130,3 @@ TEST(testing_simulations_go_without)
     rig_destroy(&r);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(threads_step_the_same_world);
-  RUN(lockstep_has_none);
-  RUN(testing_simulations_go_without);
-  dCloseODE();
-  return tap_done();
-}

@@ -421,24 +421,3 @@ TEST(pushed_body_wakes_what_hangs_on_it)
   CHECK(cw_stats(&m.w).momentum_error_ns <= 1e-9 * cw_stats(&m.w).impulse_abs_ns + 1e-12);
   cw_close(&m.w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(joints_come_change_and_go);
-  RUN(disabled_joint_is_none);
-  RUN(other_joints_are_taken_over_a_sync_later);
-  RUN(moved_mechanism_goes_on_from_there);
-  RUN(body_that_is_moved_alone_waits_for_the_others);
-  RUN(hinge_set_anew_holds_there);
-  RUN(angle_begins_where_the_axis_is_set);
-  RUN(fixed_joint_set_anew_holds_there);
-  RUN(second_start_reads_the_joints_anew);
-  RUN(feedback_is_zero);
-  RUN(chain_longer_than_the_range_is_odes);
-  RUN(joints_without_room_are_odes);
-  RUN(pushed_body_wakes_what_hangs_on_it);
-  dCloseODE();
-  return tap_done();
-}

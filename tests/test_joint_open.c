@@ -400,18 +400,3 @@ TEST(other_models_open)
   CHECK(m.joints == 0 && m.joints_loop.way == 0.0 && m.joints_left.way == 0.0);
   accuracy_motion_free(&m);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(gauge_reads_what_is_open);
-  RUN(gauge_tells_what_the_loop_has_from_the_rest);
-  RUN(gauge_refuses_what_it_does_not_know);
-  RUN(no_kind_opens_in_the_loop);
-  RUN(what_ode_has_opened_is_closed_before_a_hand_touches);
-  RUN(scenes_stay_closed);
-  RUN(other_models_open);
-  dCloseODE();
-  return tap_done();
-}

@@ -501,28 +501,3 @@ TEST(joint_that_is_set_anew_at_rest_is_measured_anew)
     cw_close(&m.w);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(piston_is_odes);
-  RUN(prismatic_rotoide_is_odes);
-  RUN(joint_without_reaction_is_left_to_ode);
-  RUN(distance_between_points_is_odes);
-  RUN(double_hinge_is_odes);
-  RUN(plane_is_odes);
-  RUN(angular_motor_is_odes);
-  RUN(motor_at_its_limit_is_odes);
-  RUN(linear_motor_is_odes);
-  RUN(piston_on_a_spring_swings);
-  RUN(lift_goes_up_to_its_stop);
-  RUN(motor_gives_no_more_than_its_force);
-  RUN(stops_of_a_limb_hold);
-  RUN(probes_are_few_and_reused);
-  RUN(sleeping_joint_is_not_probed);
-  RUN(probes_leave_no_trace);
-  RUN(another_joint_is_measured_anew);
-  RUN(joint_that_is_set_anew_at_rest_is_measured_anew);
-  dCloseODE();
-  return tap_done();
-}

@@ -576,32 +576,3 @@ TEST(stops_at_pi_are_none)
   check_owned(&m, 1);
   cw_close(&m.w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(ball_is_odes);
-  RUN(hinge_is_odes);
-  RUN(slider_is_odes);
-  RUN(slider_on_the_world_is_odes);
-  RUN(universal_is_odes);
-  RUN(hinge2_is_odes);
-  RUN(fixed_is_odes);
-  RUN(fixed_to_the_world_stays);
-  RUN(kinematic_body_carries);
-  RUN(four_bars_move_as_odes);
-  RUN(closed_loop_that_does_not_fit_is_stable);
-  RUN(redundant_hinges_let_it_turn);
-  RUN(open_joint_closes_and_nothing_moves_on);
-  RUN(pendulum_has_its_period);
-  RUN(motor_pushes_with_its_largest_force);
-  RUN(stops_throw_back_their_share);
-  RUN(stop_holds_what_leans_on_it);
-  RUN(soft_stop_is_a_spring);
-  RUN(fudge_factor_holds_the_motor_back);
-  RUN(equal_stops_lock);
-  RUN(stops_at_pi_are_none);
-  dCloseODE();
-  return tap_done();
-}

@@ -3,6 +3,7 @@
 
 /* lib/base/key_file.h: what is a line, a key, a value, and where an error is said to be. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <stdlib.h>
@@ -10,13 +11,7 @@
 
 #include "base/key_file.h"
 
-static char path[] = "/tmp/test-key-file-XXXXXX";
-
-static void write_text(const char *text, size_t size)
-{
-  FILE *file = fopen(path, "w");
-  CHECK(file != NULL && fwrite(text, 1, size, file) == size && fclose(file) == 0);
-}
+static char path[160];
 
 /* All keys and values, as "LINE:KEY=VALUE;". */
 typedef struct heard {
@@ -38,7 +33,7 @@ static hap_status take(void *self, const hapi_key_file *file, char *key, char *v
 static hap_status read_text(const char *text, heard *h, hap_detail *detail)
 {
   hapi_key_file file = {.path = path, .detail = detail};
-  write_text(text, strlen(text));
+  file_write(path, text);
   h->text[0] = '\0';
   return hapi_key_file_read(&file, take, h);
 }
@@ -96,15 +91,15 @@ TEST(lines_have_an_end)
   memset(line, 'x', sizeof line);
   line[1] = '=';
   line[510] = '\n';
-  write_text(line, 511);
+  file_write_bytes(path, line, 511);
   CHECK(hapi_key_file_read(&file, take, &h) == HAP_OK);
   CHECK(strlen(h.text) == strlen("1:x=") + 508 + 1);
   line[510] = 'x';
   line[511] = '\n';
-  write_text(line, 512);
+  file_write_bytes(path, line, 512);
   CHECK(hapi_key_file_read(&file, take, &h) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 1: longer than 510") != NULL);
-  write_text("a=1\nb\0=2\n", 9);
+  file_write_bytes(path, "a=1\nb\0=2\n", 9);
   CHECK(hapi_key_file_read(&file, take, &h) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 2: longer") != NULL);
 }
@@ -138,20 +133,9 @@ TEST(what_cannot_be_read_says_why)
   CHECK(strcmp(detail.text, "/tmp, line 7: the file ends without a line of.it = ...") == 0);
 }
 
-int main(void)
+SET_UP
 {
-  int descriptor = mkstemp(path);
-  if (descriptor < 0) {
-    printf("Bail out! no temporary file\n");
-    return 1;
-  }
-  close(descriptor);
-  RUN(keys_and_values_are_trimmed);
-  RUN(what_is_no_line_is_refused_with_its_place);
-  RUN(who_takes_may_end_it);
-  RUN(lines_have_an_end);
-  RUN(a_comment_is_taken_off_a_value);
-  RUN(what_cannot_be_read_says_why);
-  unlink(path);
-  return tap_done();
+  bool good = folder_make();
+  snprintf(path, sizeof path, "%s", folder_path("keys"));
+  return good;
 }

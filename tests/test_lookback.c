@@ -491,29 +491,3 @@ TEST(threads_have_a_figure_too)
   CHECK(stats.lookbacks >= 3);
   cw_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(estimates_the_error_of_the_force);
-  RUN(changes_no_bit);
-  RUN(friction_on_the_pointer_is_part_of_it);
-  RUN(hulls_are_part_of_it);
-  RUN(round_things_are_felt_as_model_single_has_them);
-  RUN(soft_fingers_are_part_of_it);
-  RUN(a_window_may_begin_in_the_midst_of_a_grip);
-  RUN(what_adds_up_from_window_to_window_is_seen);
-  RUN(few_iterations_of_the_world_are_not_taken_for_an_error);
-  RUN(a_slow_loop_is_held_against_a_fast_one);
-  RUN(changes_no_bit_of_hulls_and_friction);
-  RUN(a_hull_may_touch_a_mesh_and_nothing_else);
-  RUN(a_pointer_of_metres_is_near_what_it_touches);
-  RUN(a_body_that_the_application_moves_spoils_the_window);
-  RUN(bodies_and_geoms_that_go_away_meanwhile);
-  RUN(a_change_of_model_ends_the_window);
-  RUN(refuses_other_shares);
-  RUN(threads_have_a_figure_too);
-  int failed = tap_done();
-  dCloseODE();
-  return failed;
-}

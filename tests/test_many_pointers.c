@@ -382,16 +382,3 @@ TEST(a_seventeenth_is_refused_and_says_why)
   c.hands[3].v = 0;
   stage_end(&c.s);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(sixteen_hold_a_bar_each_with_its_share);
-  RUN(one_that_leaves_changes_nothing_for_the_others);
-  RUN(sixteen_push_sixteen_cubes_as_one_pushes_one);
-  RUN(sixteen_push_sixteen_cubes_that_touch);
-  RUN(sixteen_pointers_have_the_same_bits_in_every_run);
-  RUN(a_seventeenth_is_refused_and_says_why);
-  dCloseODE();
-  return tap_done();
-}

@@ -351,20 +351,3 @@ TEST(bad_specs_say_why)
     }
   }
 }
-
-int main(void)
-{
-  RUN(device_alone_has_mass_and_damping);
-  RUN(hand_and_device_are_one_body);
-  RUN(rigid_hand_does_not_feel_the_mechanism);
-  RUN(info_says_what_the_mechanism_is);
-  RUN(friction_stops_a_mass_and_holds_it);
-  RUN(friction_sticks_and_slips_without_chatter);
-  RUN(delay_shifts_the_answer_exactly);
-  RUN(full_line_of_commands_loses_none_but_the_last);
-  RUN(zero_goes_through_the_delay);
-  RUN(quantum_rounds_what_is_measured);
-  RUN(kick_is_a_jump_of_the_velocity);
-  RUN(bad_specs_say_why);
-  return tap_done();
-}

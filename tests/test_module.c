@@ -5,6 +5,7 @@
  * and signals in it, and a session that lives with a device that does all wrong.
  * HAPODE_TABLES, HAPODE_BROKEN, HAPODE_SKELETON, HAPODE_SYMBOLLESS, HAPODE_UNRESOLVED: the modules. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <dlfcn.h>
@@ -20,17 +21,6 @@
 #include "device/emergency.h"
 #include "tests/failing_heap.h"
 #include "tests/stage.h"
-
-static char folder[] = "/tmp/hapode-module-XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-  static char paths[4][300];
-  static int next;
-  char *path = paths[next++ % 4];
-  snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-  return path;
-}
 
 static const char *spec_of(const char *path, const char *args)
 {
@@ -49,7 +39,7 @@ static const char *module_of(const char *variable)
 
 static void refused(const char *spec, hap_status status, const char *const said[3])
 {
-  hap_device *device = (hap_device *)folder; /* must be overwritten */
+  hap_device *device = (hap_device *)test_folder; /* must be overwritten */
   hap_detail detail = {"of before"};
   hap_status got = hap_device_open(spec, &device, &detail);
   bool good = got == status && device == NULL;
@@ -63,14 +53,6 @@ static void refused(const char *spec, hap_status status, const char *const said[
   CHECK(hap_device_open(spec, &device, NULL) == status && device == NULL);
 }
 
-static void write_file(const char *path, const void *bytes, size_t size)
-{
-  FILE *file = fopen(path, "w");
-  REQUIRE(file != NULL);
-  CHECK(fwrite(bytes, 1, size, file) == size);
-  fclose(file);
-}
-
 TEST(paths_are_whole_and_not_searched_for)
 {
   static const char *const specs[] = {"module",           "module:",       "module:,limit=1",
@@ -78,9 +60,9 @@ TEST(paths_are_whole_and_not_searched_for)
                                       "module:libc.so.6", "module: /a.so", "module:~/a.so"};
   const char *const said[3] = {"whole path", "module:/PATH/FILE.so", NULL};
   char here[512];
-  REQUIRE(getcwd(here, sizeof here) != NULL && chdir(folder) == 0);
-  write_file("a.so", "x", 1);
-  setenv("LD_LIBRARY_PATH", folder, 1);
+  REQUIRE(getcwd(here, sizeof here) != NULL && chdir(test_folder) == 0);
+  file_write_bytes("a.so", "x", 1);
+  setenv("LD_LIBRARY_PATH", test_folder, 1);
   for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
     refused(specs[i], HAP_ERROR_ARGUMENT, said);
   }
@@ -100,13 +82,13 @@ TEST(what_is_no_module_is_refused)
   const char *const unresolved[3] = {"cannot be loaded", "hapode_test_nobody_has_this", NULL};
   const char *const cut[3] = {"cut.so", "cut off", NULL};
   refused("module:/no/such/libfoo.so,limit=1", HAP_ERROR_NOT_FOUND, missing);
-  write_file(in_folder("empty.so"), "", 0);
-  refused(spec_of(in_folder("empty.so"), ""), HAP_ERROR_FORMAT, empty);
-  write_file(in_folder("text.so"), "INPUT(libfoo.so)\n", 17);
-  refused(spec_of(in_folder("text.so"), ""), HAP_ERROR_FORMAT, text);
-  refused(spec_of(folder, ""), HAP_ERROR_IO, kind);
-  REQUIRE(mkfifo(in_folder("pipe.so"), 0600) == 0);
-  refused(spec_of(in_folder("pipe.so"), ""), HAP_ERROR_IO, kind); /* and does not wait */
+  file_write_bytes(folder_path("empty.so"), "", 0);
+  refused(spec_of(folder_path("empty.so"), ""), HAP_ERROR_FORMAT, empty);
+  file_write_bytes(folder_path("text.so"), "INPUT(libfoo.so)\n", 17);
+  refused(spec_of(folder_path("text.so"), ""), HAP_ERROR_FORMAT, text);
+  refused(spec_of(test_folder, ""), HAP_ERROR_IO, kind);
+  REQUIRE(mkfifo(folder_path("pipe.so"), 0600) == 0);
+  refused(spec_of(folder_path("pipe.so"), ""), HAP_ERROR_IO, kind); /* and does not wait */
   refused("module:/dev/null", HAP_ERROR_IO, kind);
   refused(spec_of(module_of("HAPODE_SYMBOLLESS"), ""), HAP_ERROR_FORMAT, symbol);
   refused(spec_of(module_of("HAPODE_UNRESOLVED"), ""), HAP_ERROR_IO, unresolved);
@@ -114,10 +96,10 @@ TEST(what_is_no_module_is_refused)
   FILE *file = fopen(module_of("HAPODE_TABLES"), "r");
   REQUIRE(file != NULL && fread(bytes, 1, sizeof bytes, file) == sizeof bytes);
   fclose(file);
-  write_file(in_folder("cut.so"), bytes, sizeof bytes);
-  refused(spec_of(in_folder("cut.so"), ""), HAP_ERROR_FORMAT, cut);
-  CHECK(truncate(in_folder("cut.so"), 10) == 0);
-  refused(spec_of(in_folder("cut.so"), ""), HAP_ERROR_FORMAT, cut);
+  file_write_bytes(folder_path("cut.so"), bytes, sizeof bytes);
+  refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
+  CHECK(truncate(folder_path("cut.so"), 10) == 0);
+  refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
 }
 
 TEST(other_architectures_are_named)
@@ -137,22 +119,22 @@ TEST(other_architectures_are_named)
 #if defined(__x86_64__)
   bytes[at] = (char)EM_AARCH64;
   bytes[at + 1] = 0;
-  write_file(in_folder("arm.so"), bytes, size);
-  refused(spec_of(in_folder("arm.so"), ""), HAP_ERROR_UNSUPPORTED, machine);
+  file_write_bytes(folder_path("arm.so"), bytes, size);
+  refused(spec_of(folder_path("arm.so"), ""), HAP_ERROR_UNSUPPORTED, machine);
 #else
   (void)machine;
 #endif
   bytes[at] = bytes[at + 1] = 0x7f;
-  write_file(in_folder("odd.so"), bytes, size);
-  refused(spec_of(in_folder("odd.so"), ""), HAP_ERROR_UNSUPPORTED, unknown);
+  file_write_bytes(folder_path("odd.so"), bytes, size);
+  refused(spec_of(folder_path("odd.so"), ""), HAP_ERROR_UNSUPPORTED, unknown);
   memcpy(bytes + at, kept, sizeof kept);
   bytes[offsetof(Elf64_Ehdr, e_type)] = ET_REL;
-  write_file(in_folder("object.so"), bytes, size);
-  refused(spec_of(in_folder("object.so"), ""), HAP_ERROR_FORMAT, object);
+  file_write_bytes(folder_path("object.so"), bytes, size);
+  refused(spec_of(folder_path("object.so"), ""), HAP_ERROR_FORMAT, object);
   bytes[EI_CLASS] = bytes[EI_CLASS] == ELFCLASS64 ? ELFCLASS32 : ELFCLASS64;
   if (sizeof(void *) == 8) {
-    write_file(in_folder("small.so"), bytes, size);
-    refused(spec_of(in_folder("small.so"), ""), HAP_ERROR_UNSUPPORTED, bits);
+    file_write_bytes(folder_path("small.so"), bytes, size);
+    refused(spec_of(folder_path("small.so"), ""), HAP_ERROR_UNSUPPORTED, bits);
   }
 }
 
@@ -443,27 +425,8 @@ TEST(a_session_survives_what_a_device_does_wrong)
   }
 }
 
-int main(void)
+SET_UP
 {
-  if (mkdtemp(folder) == NULL || *module_of("HAPODE_TABLES") == '\0') {
-    printf("Bail out! no folder, or HAPODE_TABLES is not set\n");
-    return 1;
-  }
-  dInitODE2(0);
-  RUN(paths_are_whole_and_not_searched_for);
-  RUN(what_is_no_module_is_refused);
-  RUN(other_architectures_are_named);
-  RUN(wrong_tables_are_refused);
-  RUN(long_paths_and_arguments_end_in_a_text);
-  RUN(the_code_goes_with_the_last_device);
-  RUN(the_code_stays_while_a_session_has_the_device);
-  RUN(emergencies_do_not_meet_code_that_is_gone);
-  RUN(threads_may_load_at_the_same_time);
-  RUN(failed_allocations_leave_nothing_loaded);
-  RUN(a_session_survives_what_a_device_does_wrong);
-  dCloseODE();
-  char command[100];
-  snprintf(command, sizeof command, "rm -r %s", folder);
-  (void)!system(command);
-  return tap_done();
+  return *module_of("HAPODE_TABLES") != '\0' ? folder_make()
+                                             : tap_bail_out("HAPODE_TABLES is not set");
 }

@@ -468,25 +468,3 @@ TEST(a_nearer_newcomer_gets_a_place)
   printf("# places for contacts\n");
   check_newcomer(64, 4);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(all_geom_classes_are_found);
-  RUN(edges_of_convex_and_trimesh);
-  RUN(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass);
-  RUN(planes_are_found);
-  RUN(geom_offsets_and_several_geoms_of_a_body);
-  RUN(a_body_is_touched_at_two_geoms);
-  RUN(nested_spaces_are_searched);
-  RUN(pairs_in_nested_spaces_collide_once);
-  RUN(reach_grows_with_speed);
-  RUN(a_fast_body_is_known_before_it_arrives);
-  RUN(disabled_geoms_and_collide_bits);
-  RUN(the_nearest_have_room_first);
-  RUN(the_nearest_is_found_in_a_crowd);
-  RUN(a_nearer_newcomer_gets_a_place);
-  dCloseODE();
-  return tap_done();
-}

@@ -260,14 +260,3 @@ TEST(accelerance_far_from_the_origin)
   printf("# A: %.2g of %.3g\n", off / most, most);
   CHECK(most > 0.1 && off <= 1e-6 * most);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(the_tick_far_from_the_origin);
-  RUN(accelerance_far_from_the_origin);
-  RUN(scenes_far_from_the_origin);
-  dCloseODE();
-  return tap_done();
-}

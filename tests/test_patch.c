@@ -815,27 +815,3 @@ TEST(no_answer)
   box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 5.0);
   CHECK(find(&box, &plane, margin, &patch) && patch.count == 0);
 }
-
-int main(void)
-{
-  RUN(random_pairs_near_and_touching);
-  RUN(random_pairs_in_penetration);
-  RUN(swapping_mirrors_the_patch);
-  RUN(box_on_plane_keeps_four_corners);
-  RUN(thin_plate_on_plane_stands_on_its_lower_face);
-  RUN(stacked_boxes_touch_in_the_corners_of_their_overlap);
-  RUN(equal_boxes_do_not_flip);
-  RUN(random_overlaps_of_boxes);
-  RUN(random_overlaps_of_hulls);
-  RUN(margin_does_not_reach_sideways);
-  RUN(points_follow_small_motions);
-  RUN(lying_cylinder_rolls_exactly);
-  RUN(standing_cylinder_has_four_points_and_a_leaning_one_its_rim);
-  RUN(capsule_over_a_box_face_ends_at_the_face);
-  RUN(capsules_across_and_along_each_other);
-  RUN(cap_under_a_box_has_its_rim);
-  RUN(cap_on_cap_touches_in_the_overlap_of_the_discs);
-  RUN(triangle_carries_everything);
-  RUN(no_answer);
-  return tap_done();
-}

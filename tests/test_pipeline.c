@@ -348,20 +348,3 @@ TEST(a_lifting_hand_pushes_a_row)
 {
   push_with_recording(2);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(every_run_of_a_scene_has_the_same_hash);
-  RUN(a_change_in_the_last_digit_changes_the_hash);
-  RUN(fig5_single_and_accelerance_are_within_half_a_thousandth);
-  RUN(fig5_impulse_is_longer_and_larger);
-  RUN(a_pushed_cube_and_a_pushed_row_give_sane_forces);
-  RUN(a_slow_world_stays_together_whatever_the_seed);
-  RUN(an_index_finger_pushes_a_row);
-  RUN(a_tapping_hand_pushes_a_row);
-  RUN(a_lifting_hand_pushes_a_row);
-  dCloseODE();
-  return tap_done();
-}

@@ -729,30 +729,3 @@ TEST(rows_are_read_whole_or_not_at_all)
   CHECK(view.first == view.end);
   hapi_trail_finish(&trail);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(scenes_are_drawn_as_the_loop_had_them);
-  RUN(a_range_that_ends_within_a_row_does_not_show);
-  RUN(a_body_that_turns_fast_is_drawn_on_the_arc);
-  RUN(a_turn_may_be_anything);
-  RUN(a_body_that_falls_is_drawn_near_its_parabola);
-  RUN(a_body_that_falls_beside_the_hand_is_drawn_tick_by_tick_in_model_single);
-  RUN(bodies_come_into_the_local_world_and_leave_it_without_a_jump);
-  RUN(a_change_of_model_does_not_show);
-  RUN(bodies_are_made_and_destroyed);
-  RUN(a_body_made_where_another_one_was_in_memory_is_not_drawn_on_its_way);
-  RUN(bodies_that_sleep_or_are_driven_are_drawn_like_others);
-  RUN(growing_times_give_motion_that_neither_goes_back_nor_jumps);
-  RUN(times_that_are_not_known_are_clamped_and_said);
-  RUN(a_second_run_draws_nothing_of_the_first);
-  RUN(pointers_are_drawn_at_the_time_of_the_bodies);
-  RUN(a_proxy_and_its_device_are_drawn_apart);
-  RUN(now_is_the_newest_of_the_loop_and_what_the_world_would_come_to);
-  RUN(any_threads_may_draw_while_the_session_runs);
-  RUN(rows_are_read_whole_or_not_at_all);
-  dCloseODE();
-  return tap_done();
-}

@@ -871,26 +871,3 @@ TEST(points_and_plates)
   expect(&rod, &box, -0.3, 0);
   expect(&plate, &rod, -0.05, 2);
 }
-
-int main(void)
-{
-  RUN(random_pairs);
-  RUN(deep_pairs);
-  RUN(small_against_large);
-  RUN(ten_kilometres_away);
-  RUN(swapping_changes_roles_only);
-  RUN(alternating_projections_agree);
-  RUN(normal_leads_out);
-  RUN(distance_follows_the_approach);
-  RUN(millimetre_against_hundred_metres);
-  RUN(closed_forms_against_gjk);
-  RUN(box_and_hull_of_its_corners);
-  RUN(overlap_agrees_with_distance);
-  RUN(coincident_frames);
-  RUN(centre_of_sphere_on_surface_axis_and_centre);
-  RUN(parallel_boxes);
-  RUN(capsules_on_one_axis_and_crossed);
-  RUN(no_answer);
-  RUN(points_and_plates);
-  return tap_done();
-}

@@ -105,12 +105,3 @@ TEST(ticks_touch_no_new_memory_and_wait_for_nothing_else)
   ticks_are_quiet("row10", HAP_MODEL_IMPULSE);
   ticks_are_quiet("row10", HAP_MODEL_SINGLE);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(ticks_touch_no_new_memory_and_wait_for_nothing_else);
-  dCloseODE();
-  return tap_done();
-}

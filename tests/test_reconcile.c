@@ -562,28 +562,3 @@ TEST(models_are_switched_the_other_way)
   switch_models(order, 3, 100);
   switch_models(order, 3, 70);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(fig5_keeps_the_momentum);
-  RUN(a_pushed_row_keeps_the_momentum);
-  RUN(an_impact_reaches_the_loop);
-  RUN(what_the_application_moves_stays_there);
-  RUN(a_velocity_set_by_the_application_holds);
-  RUN(a_changed_mass_is_read_again);
-  RUN(a_body_added_near_the_pointer_is_felt);
-  RUN(a_neighbour_is_destroyed);
-  RUN(a_body_in_place_of_a_destroyed_one_is_a_new_body);
-  RUN(a_broken_body_is_not_stepped);
-  RUN(a_fault_comes_back_while_the_world_is_broken);
-  RUN(models_are_switched_while_pushing);
-  RUN(models_are_switched_the_other_way);
-  RUN(a_body_broken_in_before_step_is_not_stepped);
-  RUN(a_body_broken_in_after_step_is_not_probed);
-  RUN(a_neighbour_is_destroyed_in_before_step);
-  RUN(a_neighbour_is_destroyed_in_after_step);
-  dCloseODE();
-  return tap_done();
-}

@@ -861,32 +861,7 @@ TEST(a_replay_takes_nothing_else)
   hap_player_close(player);
 }
 
-int main(void)
+SET_UP
 {
-  recorded_init();
-  dInitODE2(0);
-  RUN(scenes_in_model_contact);
-  RUN(scenes_in_the_paper_s_models);
-  RUN(ways_of_testing);
-  RUN(a_loop_of_less_accuracy);
-  RUN(testing_simulations_that_are_not_made);
-  RUN(couplings_of_the_literature);
-  RUN(two_pointers_and_a_replayed_motion);
-  RUN(a_stall_of_physics);
-  RUN(a_step_that_takes_long);
-  RUN(sixteen_hands_and_bodies_that_callbacks_exchange);
-  RUN(edits_and_locks_are_counted_and_drawing_is_none);
-  RUN(changes_of_model);
-  RUN(a_device_with_troubles_and_pointers_that_come_and_go);
-  RUN(a_device_that_is_started_again);
-  RUN(a_frame_loop_with_pauses_and_hitches);
-  RUN(a_frame_loop);
-  RUN(at_its_limit_it_ends_and_the_session_goes_on);
-  RUN(a_disk_that_hangs_makes_a_gap_that_is_told);
-  RUN(a_full_disk_is_told_and_the_session_goes_on);
-  RUN(what_cannot_be_recorded_is_refused);
-  RUN(a_replay_takes_nothing_else);
-  dCloseODE();
-  unlink(recorded_path);
-  return tap_done();
+  return recorded_init();
 }

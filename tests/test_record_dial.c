@@ -63,13 +63,7 @@ TEST(a_dial_that_was_turned_before_the_start)
   check_alike(&again, &before);
 }
 
-int main(void)
+SET_UP
 {
-  recorded_init();
-  dInitODE2(0);
-  RUN(a_dial_that_is_turned);
-  RUN(a_dial_that_was_turned_before_the_start);
-  dCloseODE();
-  unlink(recorded_path);
-  return tap_done();
+  return recorded_init();
 }

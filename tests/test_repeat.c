@@ -264,12 +264,8 @@ TEST(what_is_replaced)
   }
 }
 
-int main(void)
+SET_UP
 {
   repeat_init();
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(what_is_replaced);
-  dCloseODE();
-  return tap_done();
+  return true;
 }

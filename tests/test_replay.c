@@ -3,6 +3,7 @@
 
 /* The replay device: what it reads, what it refuses, and the curve between the rows. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <dirent.h>
@@ -20,23 +21,7 @@
 #define PI 3.14159265358979323846
 #define T0 123456789LL /* ns; the device must not care where time begins */
 
-static char folder[64]; /* for the files of this run */
-static char file_path[128];
-
-static void write_bytes(const char *bytes, size_t size)
-{
-  FILE *file = fopen(file_path, "wb");
-  if (file == NULL || fwrite(bytes, 1, size, file) != size) {
-    printf("Bail out! cannot write %s\n", file_path);
-    exit(1);
-  }
-  fclose(file);
-}
-
-static void write_text(const char *text)
-{
-  write_bytes(text, strlen(text));
-}
+static char motion_path[160];
 
 typedef struct rig {
   hap_device *device;
@@ -95,13 +80,14 @@ static void rig_restart(rig *r)
 
 TEST(rows_are_met_exactly)
 {
-  write_text(
+  file_write(
+      motion_path,
       "t,x,y,z\n0,0.1,0.2,0.3\n0.01,0.11,-5e-1,.5\n0.015,+0.2,1,2\n0.1,0,0,0\n0.123456789,1,1,1\n");
   static const double t[] = {0.0, 0.01, 0.015, 0.1, 0.123456789};
   static const double p[][3] = {
       {0.1, 0.2, 0.3}, {0.11, -0.5, 0.5}, {0.2, 1.0, 2.0}, {0.0, 0.0, 0.0}, {1.0, 1.0, 1.0}};
   rig r;
-  REQUIRE(rig_good(&r, file_path, ""));
+  REQUIRE(rig_good(&r, motion_path, ""));
   CHECK(r.ops->pacing == HAP_PACING_VIRTUAL);
   for (int i = 0; i < 5; ++i) {
     rig_read(&r, llround(t[i] * 1e9));
@@ -116,13 +102,13 @@ TEST(rows_are_met_exactly)
 TEST(info_tells_what_the_file_has)
 {
   rig r;
-  write_text("t,x,y,z\n0,0,0,0\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  file_write(motion_path, "t,x,y,z\n0,0,0,0\n");
+  REQUIRE(rig_good(&r, motion_path, ""));
   const hap_device_info *info = hapi_device_info(r.device);
   CHECK(info->dof == 3 && info->max_force == 20.0 && strcmp(info->name, "replay") == 0);
   rig_close(&r);
-  write_text("t,x,y,z,qw,qx,qy,qz\n0,0,0,0,0,2,0,0\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  file_write(motion_path, "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,0,2,0,0\n");
+  REQUIRE(rig_good(&r, motion_path, ""));
   CHECK(hapi_device_info(r.device)->dof == 6);
   rig_read(&r, 0);
   CHECK_NEAR(r.pose.quat_wxyz[1], 1.0, 1e-15);
@@ -132,8 +118,8 @@ TEST(info_tells_what_the_file_has)
 TEST(ends_are_at_rest)
 {
   rig r;
-  write_text("t,x,y,z\n0.5,1,0,0\n1,2,0,0\n1.5,3,0,0\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  file_write(motion_path, "t,x,y,z\n0.5,1,0,0\n1,2,0,0\n1.5,3,0,0\n");
+  REQUIRE(rig_good(&r, motion_path, ""));
   rig_read(&r, 0);
   CHECK(r.pose.position[0] == 1.0 && r.twist.linear[0] == 0.0);
   rig_read(&r, 499999999);
@@ -155,8 +141,8 @@ TEST(ends_are_at_rest)
 TEST(one_row_is_a_constant)
 {
   rig r;
-  write_text("t,x,y,z\n3,1,2,3\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  file_write(motion_path, "t,x,y,z\n3,1,2,3\n");
+  REQUIRE(rig_good(&r, motion_path, ""));
   for (int i = 0; i < 5; ++i) {
     rig_read(&r, i * 1000000000LL);
     CHECK(r.pose.position[2] == 3.0 && hapi_v3_norm(r.twist.linear) == 0.0);
@@ -167,8 +153,8 @@ TEST(one_row_is_a_constant)
 TEST(two_rows_are_a_line)
 {
   rig r;
-  write_text("t,x,y,z\n0,0,0,0\n2,1,2,-4\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  file_write(motion_path, "t,x,y,z\n0,0,0,0\n2,1,2,-4\n");
+  REQUIRE(rig_good(&r, motion_path, ""));
   rig_read(&r, 0);
   CHECK_NEAR(r.twist.linear[2], -2.0, 1e-15);
   rig_read(&r, 500000000);
@@ -180,9 +166,10 @@ TEST(two_rows_are_a_line)
 TEST(arguments_map_the_motion)
 {
   rig r;
-  write_text("t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,1,2,3,1,0,0,0\n2,2,4,6,1,0,0,0\n");
+  file_write(motion_path,
+             "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,1,2,3,1,0,0,0\n2,2,4,6,1,0,0,0\n");
   /* a quarter turn about z: x -> y, y -> -x */
-  REQUIRE(rig_good(&r, file_path, ",scale=0.5,offset=10/20/30,rotate=1/0/0/1,start=0.5"));
+  REQUIRE(rig_good(&r, motion_path, ",scale=0.5,offset=10/20/30,rotate=1/0/0/1,start=0.5"));
   rig_read(&r, 0);
   rig_read(&r, 500000000);
   CHECK_NEAR(r.pose.position[0], 10.0 - 1.0, 1e-14);
@@ -193,8 +180,9 @@ TEST(arguments_map_the_motion)
   CHECK_NEAR(r.pose.quat_wxyz[0], sqrt(0.5), 1e-15);
   CHECK_NEAR(r.pose.quat_wxyz[3], sqrt(0.5), 1e-15);
   rig_close(&r);
-  write_text("t,x,y,z\n0,0,0,0\n"); /* without a quaternion the orientation is that of rotate */
-  REQUIRE(rig_good(&r, file_path, ",rotate=1/0/0/1"));
+  file_write(motion_path,
+             "t,x,y,z\n0,0,0,0\n"); /* without a quaternion the orientation is that of rotate */
+  REQUIRE(rig_good(&r, motion_path, ",rotate=1/0/0/1"));
   rig_read(&r, 0);
   CHECK_NEAR(r.pose.quat_wxyz[3], sqrt(0.5), 1e-15);
   rig_close(&r);
@@ -202,7 +190,7 @@ TEST(arguments_map_the_motion)
 
 TEST(start_far_into_the_recording)
 {
-  FILE *file = fopen(file_path, "w");
+  FILE *file = fopen(motion_path, "w");
   REQUIRE(file != NULL);
   fputs("t,x,y,z\n", file);
   for (int i = 0; i < 20000; ++i) {
@@ -210,7 +198,7 @@ TEST(start_far_into_the_recording)
   }
   fclose(file);
   rig r;
-  REQUIRE(rig_good(&r, file_path, ",start=150"));
+  REQUIRE(rig_good(&r, motion_path, ",start=150"));
   for (int i = 0; i < 100; ++i) {
     rig_read(&r, i * 37000000LL);
     CHECK_NEAR(r.pose.position[0], 15000.0 + i * 3.7, 1e-8);
@@ -221,7 +209,7 @@ TEST(start_far_into_the_recording)
 /* 100 Hz rows of a 2 Hz sine, read at 1 kHz. */
 static void write_sine(double hz, int rows)
 {
-  FILE *file = fopen(file_path, "w");
+  FILE *file = fopen(motion_path, "w");
   if (file == NULL) {
     return;
   }
@@ -240,7 +228,7 @@ TEST(sine_comes_back_smooth)
   const double w = 2.0 * PI * hz;
   write_sine(hz, 301);
   rig r;
-  REQUIRE(rig_good(&r, file_path, ""));
+  REQUIRE(rig_good(&r, motion_path, ""));
   /* bounds of the cubic spline away from its ends (Hall and Meyer 1976): 5/384 h^4 y'''' for the
    * value, 1/24 h^3 y'''' for the slope; the natural ends die out within a few rows */
   double value_bound = 5.0 / 384.0 * pow(0.01, 4) * 0.1 * pow(w, 4) * 1.05;
@@ -271,7 +259,7 @@ static double hash01(uint32_t *state)
 /* Uneven stamps, three wobbles and a turning quaternion whose sign is thrown at random. */
 static void write_turning(int rows, bool signs)
 {
-  FILE *file = fopen(file_path, "w");
+  FILE *file = fopen(motion_path, "w");
   if (file == NULL) {
     return;
   }
@@ -304,8 +292,8 @@ TEST(twist_is_the_derivative_of_the_pose)
   write_turning(200, true);
   rig r;
   rig near;
-  REQUIRE(rig_good(&r, file_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
-  REQUIRE(rig_good(&near, file_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
+  REQUIRE(rig_good(&r, motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
+  REQUIRE(rig_good(&near, motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
   rig_read(&r, 0);
   rig_read(&near, 0);
   for (int i = 1; i < 1500; ++i) {
@@ -335,7 +323,7 @@ TEST(rotation_has_the_speed_of_the_truth)
 {
   write_turning(200, true);
   rig r;
-  REQUIRE(rig_good(&r, file_path, ""));
+  REQUIRE(rig_good(&r, motion_path, ""));
   for (int i = 0; i < 1500; ++i) {
     double t = i * 1e-3;
     rig_read(&r, i * 1000000LL);
@@ -356,9 +344,9 @@ TEST(signs_of_quaternions_do_not_matter)
   rig a;
   rig b;
   write_turning(100, true);
-  REQUIRE(rig_good(&a, file_path, ""));
+  REQUIRE(rig_good(&a, motion_path, ""));
   write_turning(100, false);
-  REQUIRE(rig_good(&b, file_path, ""));
+  REQUIRE(rig_good(&b, motion_path, ""));
   for (int i = 0; i < 900; ++i) {
     rig_read(&a, i * 1000000LL);
     rig_read(&b, i * 1000000LL);
@@ -376,10 +364,11 @@ TEST(signs_of_quaternions_do_not_matter)
 TEST(half_turns_between_rows_stay_finite)
 {
   rig r;
-  write_text(
+  file_write(
+      motion_path,
       "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,0,1,0,0\n2,0,0,0,-1,0,0,0\n3,0,0,0,0,0,1,0\n"
       "4,0,0,0,1,0,0,0\n");
-  REQUIRE(rig_good(&r, file_path, ""));
+  REQUIRE(rig_good(&r, motion_path, ""));
   for (int i = 0; i < 4200; ++i) {
     rig_read(&r, i * 1000000LL);
     CHECK(hapi_finite(r.pose.quat_wxyz, 4) && hapi_finite(r.twist.angular, 3));
@@ -397,8 +386,8 @@ TEST(forms_of_text_are_accepted)
                                      "t,x,y,z\n-0,1,2,3\n1,2,3,4\n"};
   for (size_t i = 0; i < sizeof good / sizeof good[0]; ++i) {
     rig r;
-    write_text(good[i]);
-    REQUIRE(rig_good(&r, file_path, ""));
+    file_write(motion_path, good[i]);
+    REQUIRE(rig_good(&r, motion_path, ""));
     rig_read(&r, 0);
     CHECK(r.pose.position[0] == 1.0 && r.pose.position[2] == 3.0);
     rig_read(&r, 1000000000);
@@ -454,10 +443,10 @@ TEST(malformed_files_are_named_by_line)
 {
   for (size_t i = 0; i < sizeof bad_files / sizeof bad_files[0]; ++i) {
     rig r;
-    char place[160];
-    write_text(bad_files[i].text);
-    snprintf(place, sizeof place, "%s, line %d: ", file_path, bad_files[i].line);
-    CHECK(rig_open(&r, file_path, "") == HAP_ERROR_FORMAT);
+    char place[200];
+    file_write(motion_path, bad_files[i].text);
+    snprintf(place, sizeof place, "%s, line %d: ", motion_path, bad_files[i].line);
+    CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
     bool told =
         strstr(r.detail.text, place) != NULL && strstr(r.detail.text, bad_files[i].why) != NULL;
     CHECK(told);
@@ -471,8 +460,8 @@ TEST(binary_and_endless_lines_are_refused)
 {
   rig r;
   static const char zero_inside[] = "t,x,y,z\n0,1,2,3\n1,2\0,3,4\n";
-  write_bytes(zero_inside, sizeof zero_inside - 1);
-  CHECK(rig_open(&r, file_path, "") == HAP_ERROR_FORMAT);
+  file_write_bytes(motion_path, zero_inside, sizeof zero_inside - 1);
+  CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
   CHECK(strstr(r.detail.text, "line 3: a zero byte") != NULL);
   static char large[100000];
   memset(large, '1', sizeof large - 1);
@@ -480,20 +469,19 @@ TEST(binary_and_endless_lines_are_refused)
   for (int i = 0; i < 7; ++i) {
     large[i] = "t,x,y,z"[i];
   }
-  write_text(large);
-  CHECK(rig_open(&r, file_path, "") == HAP_ERROR_FORMAT);
+  file_write(motion_path, large);
+  CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
   CHECK(strstr(r.detail.text, "line 2: the line is longer") != NULL);
 }
 
 TEST(files_that_cannot_be_read)
 {
   rig r;
-  char path[160];
-  snprintf(path, sizeof path, "%s/none.csv", folder);
+  const char *path = folder_path("none.csv");
   CHECK(rig_open(&r, path, "") == HAP_ERROR_IO);
   CHECK(strstr(r.detail.text, path) != NULL && strstr(r.detail.text, "No such file") != NULL);
-  CHECK(rig_open(&r, folder, "") == HAP_ERROR_IO); /* a folder opens, but does not read */
-  CHECK(strstr(r.detail.text, folder) != NULL);
+  CHECK(rig_open(&r, test_folder, "") == HAP_ERROR_IO); /* a folder opens, but does not read */
+  CHECK(strstr(r.detail.text, test_folder) != NULL);
 }
 
 TEST(bad_specs_say_why)
@@ -509,10 +497,10 @@ TEST(bad_specs_say_why)
                                        {",", "last comma"},
                                        {",scale", "key=value"},
                                        {",scale=1,", "key=value"}};
-  write_text("t,x,y,z\n0,1,2,3\n");
+  file_write(motion_path, "t,x,y,z\n0,1,2,3\n");
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
     rig r;
-    CHECK(rig_open(&r, file_path, bad[i][0]) == HAP_ERROR_ARGUMENT);
+    CHECK(rig_open(&r, motion_path, bad[i][0]) == HAP_ERROR_ARGUMENT);
     CHECK(strstr(r.detail.text, bad[i][1]) != NULL);
   }
   rig r;
@@ -539,9 +527,9 @@ TEST(decimal_comma_of_the_locale_is_ignored)
   if (comma_locale() == NULL) {
     SKIP("no locale with a decimal comma is installed");
   }
-  write_text("t,x,y,z\n0,0.5,2.25,3\n0.5,1.5,2,3\n");
+  file_write(motion_path, "t,x,y,z\n0,0.5,2.25,3\n0.5,1.5,2,3\n");
   rig r;
-  hap_status status = rig_open(&r, file_path, ",scale=1.5,offset=0.5/0/0");
+  hap_status status = rig_open(&r, motion_path, ",scale=1.5,offset=0.5/0/0");
   CHECK(strtod("1.5", NULL) == 1.0); /* the locale is still the caller's */
   setlocale(LC_ALL, "C");
   REQUIRE(status == HAP_OK);
@@ -556,7 +544,7 @@ TEST(random_damage_never_crashes)
   static char damaged[4096];
   static const char likely[] = "0123456789.,-+eE\n\r \tnaiftxyzqw\xEF\xBB\xBF";
   write_turning(25, true);
-  FILE *file = fopen(file_path, "rb");
+  FILE *file = fopen(motion_path, "rb");
   REQUIRE(file != NULL);
   size_t size = fread(text, 1, sizeof text, file);
   fclose(file);
@@ -574,9 +562,10 @@ TEST(random_damage_never_crashes)
         memcpy(&damaged[at], &any, 1);
       }
     }
-    write_bytes(damaged, hash01(&state) < 0.1 ? (size_t)(hash01(&state) * (double)size) : size);
+    file_write_bytes(motion_path, damaged,
+                     hash01(&state) < 0.1 ? (size_t)(hash01(&state) * (double)size) : size);
     rig r;
-    hap_status status = rig_open(&r, file_path, "");
+    hap_status status = rig_open(&r, motion_path, "");
     CHECK(status == HAP_OK || status == HAP_ERROR_FORMAT);
     CHECK(status == HAP_OK || strstr(r.detail.text, ", line ") != NULL);
     if (status != HAP_OK) {
@@ -597,7 +586,7 @@ TEST(random_damage_never_crashes)
 TEST(half_a_million_rows_load)
 {
   const int rows = 500000;
-  FILE *file = fopen(file_path, "w");
+  FILE *file = fopen(motion_path, "w");
   REQUIRE(file != NULL);
   fputs("t,x,y,z\n", file);
   for (int i = 0; i < rows; ++i) {
@@ -605,7 +594,7 @@ TEST(half_a_million_rows_load)
   }
   fclose(file);
   rig r;
-  REQUIRE(rig_good(&r, file_path, ""));
+  REQUIRE(rig_good(&r, motion_path, ""));
   for (int i = 0; i < rows; i += 997) {
     rig_read(&r, i * 1000000LL);
     CHECK(r.pose.position[0] == (double)i);
@@ -717,41 +706,9 @@ TEST(real_recordings_replay)
   CHECK(files == 15);
 }
 
-static void run_all(void)
+SET_UP
 {
-  RUN(rows_are_met_exactly);
-  RUN(info_tells_what_the_file_has);
-  RUN(ends_are_at_rest);
-  RUN(one_row_is_a_constant);
-  RUN(two_rows_are_a_line);
-  RUN(arguments_map_the_motion);
-  RUN(start_far_into_the_recording);
-  RUN(sine_comes_back_smooth);
-  RUN(twist_is_the_derivative_of_the_pose);
-  RUN(rotation_has_the_speed_of_the_truth);
-  RUN(signs_of_quaternions_do_not_matter);
-  RUN(half_turns_between_rows_stay_finite);
-  RUN(forms_of_text_are_accepted);
-  RUN(malformed_files_are_named_by_line);
-  RUN(binary_and_endless_lines_are_refused);
-  RUN(files_that_cannot_be_read);
-  RUN(bad_specs_say_why);
-  RUN(decimal_comma_of_the_locale_is_ignored);
-  RUN(random_damage_never_crashes);
-  RUN(half_a_million_rows_load);
-  RUN(real_recordings_replay);
-}
-
-int main(void)
-{
-  snprintf(folder, sizeof folder, "/tmp/hapode-replay-XXXXXX");
-  if (mkdtemp(folder) == NULL) {
-    printf("Bail out! no temporary folder\n");
-    return 1;
-  }
-  snprintf(file_path, sizeof file_path, "%s/motion.csv", folder);
-  run_all();
-  remove(file_path);
-  remove(folder);
-  return tap_done();
+  bool good = folder_make();
+  snprintf(motion_path, sizeof motion_path, "%s", folder_path("motion.csv"));
+  return good;
 }

@@ -529,15 +529,3 @@ TEST(the_border_of_the_range_rests)
   cw_close(&w);
   cw_close(&reference);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(what_rests_is_measured_once);
-  RUN(what_creeps_is_measured_again);
-  RUN(as_in_the_paper_all_are_made);
-  RUN(what_is_changed_is_measured_in_the_next_step);
-  RUN(joints_are_held_against_what_they_were);
-  RUN(the_border_of_the_range_rests);
-  return tap_done();
-}

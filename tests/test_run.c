@@ -4,124 +4,16 @@
 /* The program hapode-run as its users meet it: exit codes, messages, summary, trace, picture.
  * HAPODE_RUN: path of the program. */
 
+#include "tests/program.h"
 #include "tests/scene_names.h"
 #include "tests/tap.h"
 
-#include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
-#include <stdarg.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "tools/plot.h"
-
-#define ARGUMENTS_MAX 24
-#define OUTPUT_MAX 60000
-
-extern char **environ;
-
-static char folder[256]; /* of this test alone */
-
-/* What a run came to. */
-static struct {
-  int code; /* -1: it did not end by itself */
-  char out[OUTPUT_MAX];
-  char err[OUTPUT_MAX];
-} ran;
-
-/* ---- files and the program ---- */
-
-static const char *file_in_folder(const char *name)
-{
-  static char paths[4][320];
-  static int next;
-  char *path = paths[next++ % 4];
-  snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-  return path;
-}
-
-static void read_file(const char *path, char *out, size_t size)
-{
-  FILE *file = fopen(path, "r");
-  size_t got = 0;
-  if (file != NULL) {
-    got = fread(out, 1, size - 1, file);
-    fclose(file);
-  }
-  out[got] = '\0';
-}
-
-static bool exists(const char *path)
-{
-  struct stat info;
-  return stat(path, &info) == 0;
-}
-
-static void write_text(const char *path, const char *text)
-{
-  FILE *file = fopen(path, "w");
-  if (file != NULL) {
-    fputs(text, file);
-    fclose(file);
-  }
-}
-
-/* Starts hapode-run with arguments that blanks part. */
-static pid_t start(const char *arguments, char **environment)
-{
-  static char words[2000];
-  char *argv[ARGUMENTS_MAX + 2] = {getenv("HAPODE_RUN")};
-  size_t count = 1;
-  posix_spawn_file_actions_t actions;
-  pid_t child = -1;
-  snprintf(words, sizeof words, "%s", arguments);
-  for (char *rest = NULL, *word = strtok_r(words, " ", &rest);
-       word != NULL && count <= ARGUMENTS_MAX; word = strtok_r(NULL, " ", &rest)) {
-    argv[count++] = word;
-  }
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, file_in_folder("out"),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, file_in_folder("err"),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  if (argv[0] == NULL || posix_spawn(&child, argv[0], &actions, NULL, argv, environment) != 0) {
-    child = -1;
-  }
-  posix_spawn_file_actions_destroy(&actions);
-  return child;
-}
-
-static int finish(pid_t child)
-{
-  int result = 0;
-  bool ended = child > 0 && waitpid(child, &result, 0) == child && WIFEXITED(result);
-  ran.code = ended ? WEXITSTATUS(result) : -1;
-  read_file(file_in_folder("out"), ran.out, sizeof ran.out);
-  read_file(file_in_folder("err"), ran.err, sizeof ran.err);
-  return ran.code;
-}
-
-static int run(const char *format, ...)
-{
-  char arguments[2000];
-  va_list list;
-  va_start(list, format);
-  vsnprintf(arguments, sizeof arguments, format, list);
-  va_end(list);
-  return finish(start(arguments, environ));
-}
-
-static bool says(const char *text)
-{
-  bool found = strstr(ran.err, text) != NULL;
-  if (!found) {
-    printf("# \"%s\" is not in: %.400s\n", text, ran.err);
-  }
-  return found;
-}
 
 /* The value of a key of the summary; NULL: it is not there. */
 static const char *value_of(const char *key)
@@ -276,22 +168,22 @@ TEST(ways_of_testing_can_be_chosen)
 
 TEST(a_malformed_recording_names_its_line)
 {
-  write_text(file_in_folder("bad.csv"), "t,x,y,z\n0,0,0,0\n0.1,0,zero,0\n0.2,0,0,0\n");
-  CHECK(run("--lockstep --device replay:%s", file_in_folder("bad.csv")) == 1);
+  file_write(folder_path("bad.csv"), "t,x,y,z\n0,0,0,0\n0.1,0,zero,0\n0.2,0,0,0\n");
+  CHECK(run("--lockstep --device replay:%s", folder_path("bad.csv")) == 1);
   CHECK(says("bad.csv") && says("line 3"));
-  CHECK(run("--lockstep --device replay:%s", file_in_folder("absent.csv")) == 1);
+  CHECK(run("--lockstep --device replay:%s", folder_path("absent.csv")) == 1);
   CHECK(says("absent.csv"));
 }
 
 TEST(files_that_cannot_be_written_are_found_before_the_run)
 {
-  CHECK(run("--lockstep --seconds 1 --trace %s", file_in_folder("no/such/trace.csv")) == 1);
+  CHECK(run("--lockstep --seconds 1 --trace %s", folder_path("no/such/trace.csv")) == 1);
   CHECK(says("--trace") && says("no/such/trace.csv"));
   CHECK(ran.out[0] == '\0');
-  CHECK(run("--lockstep --seconds 1 --plot %s", file_in_folder("no/such/plot.svg")) == 1);
+  CHECK(run("--lockstep --seconds 1 --plot %s", folder_path("no/such/plot.svg")) == 1);
   CHECK(says("--plot") && says("no/such/plot.svg"));
   CHECK(ran.out[0] == '\0');
-  CHECK(run("--lockstep --seconds 1 --trace %s", folder) == 1);
+  CHECK(run("--lockstep --seconds 1 --trace %s", test_folder) == 1);
   CHECK(says("--trace"));
 }
 
@@ -317,13 +209,13 @@ TEST(a_full_disk_after_a_fault_is_said_beside_the_fault)
   if (access("/dev/full", W_OK) != 0) {
     SKIP("no /dev/full");
   }
-  write_text(file_in_folder("off.csv"),
+  file_write(folder_path("off.csv"),
              "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,9e5,0,0.5\n0.3,9e5,0,0.5\n");
   CHECK(run("--lockstep --seconds 1 --black-box /dev/full --trace /dev/full "
             "--device replay:%s,scale=10",
-            file_in_folder("off.csv")) == 2); /* the same file twice */
+            folder_path("off.csv")) == 2); /* the same file twice */
   CHECK(run("--lockstep --seconds 1 --black-box /dev/full --device replay:%s,scale=10",
-            file_in_folder("off.csv")) == 1);
+            folder_path("off.csv")) == 1);
   CHECK(says("pose that is not finite") && says("--black-box /dev/full: cannot be written"));
 }
 
@@ -427,7 +319,7 @@ TEST(single_steps_the_world_at_the_haptic_rate)
 TEST(a_run_of_no_tick_has_a_summary)
 {
   CHECK(run("--lockstep --seconds 0.001 --haptic-hz 100 --trace %s --plot %s",
-            file_in_folder("trace.csv"), file_in_folder("same.svg")) == 0);
+            folder_path("trace.csv"), folder_path("same.svg")) == 0);
   CHECK(number_of("ticks") == 0.0);
 }
 
@@ -467,8 +359,8 @@ static void check_rows(FILE *file, size_t columns, size_t rows, double period)
 TEST(the_trace_has_its_columns_and_every_tick)
 {
   char head[8000] = "";
-  CHECK(run("--scene row10:2 --lockstep --seconds 3 --trace %s", file_in_folder("trace.csv")) == 0);
-  FILE *file = fopen(file_in_folder("trace.csv"), "r");
+  CHECK(run("--scene row10:2 --lockstep --seconds 3 --trace %s", folder_path("trace.csv")) == 0);
+  FILE *file = fopen(folder_path("trace.csv"), "r");
   REQUIRE(file != NULL);
   CHECK(fgets(head, sizeof head, file) != NULL);
   CHECK(strcmp(head,
@@ -481,11 +373,11 @@ TEST(the_trace_has_its_columns_and_every_tick)
 
 TEST(the_trace_of_threads_is_drained_while_they_run)
 {
-  char text[OUTPUT_MAX];
+  char text[PROGRAM_OUTPUT_MAX];
   CHECK(run("--scene fig6 --haptic-hz 4000 --seconds 1.5 --no-realtime --trace %s",
-            file_in_folder("threads.csv")) == 0);
+            folder_path("threads.csv")) == 0);
   double rows = -1.0;
-  FILE *file = fopen(file_in_folder("threads.csv"), "r");
+  FILE *file = fopen(folder_path("threads.csv"), "r");
   REQUIRE(file != NULL);
   while (fgets(text, sizeof text, file) != NULL) {
     rows += 1.0;
@@ -501,9 +393,9 @@ TEST(two_devices_are_two_pointers)
   char head[8000] = "";
   CHECK(run("--scene slide --lockstep --seconds 0.5 --device virtual "
             "--device virtual:path=0:0.1/0/0.025;0.5:0.05/0/0.025,hand=rigid --trace %s",
-            file_in_folder("two.csv")) == 0);
+            folder_path("two.csv")) == 0);
   CHECK(strncmp(value_of("device"), "virtual + virtual:path", 22) == 0);
-  FILE *file = fopen(file_in_folder("two.csv"), "r");
+  FILE *file = fopen(folder_path("two.csv"), "r");
   REQUIRE(file != NULL);
   CHECK(fgets(head, sizeof head, file) != NULL);
   CHECK(strstr(head, ",model_age_s,p1_x,p1_y,p1_z,p1_fx,p1_fy,p1_fz,p1_tx,p1_ty,p1_tz,b0_x,") !=
@@ -523,8 +415,8 @@ TEST(lockstep_is_the_same_every_time)
   CHECK(run("--scene row10 --lockstep --seconds 1.5") == 0);
   REQUIRE(value_of("trace_hash") != NULL);
   snprintf(first, sizeof first, "%s", value_of("trace_hash"));
-  CHECK(run("--scene row10 --lockstep --seconds 1.5 --trace %s --plot %s",
-            file_in_folder("same.csv"), file_in_folder("same.svg")) == 0);
+  CHECK(run("--scene row10 --lockstep --seconds 1.5 --trace %s --plot %s", folder_path("same.csv"),
+            folder_path("same.svg")) == 0);
   CHECK(strcmp(first, value_of("trace_hash")) == 0);
   CHECK(run("--scene row10 --lockstep --seconds 1.5 --model-age 0.01") == 0);
   CHECK(strcmp(first, value_of("trace_hash")) != 0);
@@ -532,11 +424,11 @@ TEST(lockstep_is_the_same_every_time)
 
 TEST(a_recording_runs_in_lockstep)
 {
-  write_text(file_in_folder("push.csv"),
+  file_write(folder_path("push.csv"),
              "t,x,y,z\n0,-0.03,0,0.025\n0.2,-0.02,0,0.025\n"
              "0.4,-0.01,0,0.025\n0.6,0,0,0.025\n0.8,0.01,0,0.025\n");
-  CHECK(run("--scene slide --lockstep --seconds 0.8 --device replay:%s",
-            file_in_folder("push.csv")) == 0);
+  CHECK(run("--scene slide --lockstep --seconds 0.8 --device replay:%s", folder_path("push.csv")) ==
+        0);
   CHECK(number_of("contact_ticks") > 50.0);
 }
 
@@ -561,14 +453,13 @@ TEST(every_scene_runs_in_every_model)
 
 TEST(a_device_fault_ends_the_run_with_1)
 {
-  write_text(file_in_folder("far.csv"),
+  file_write(folder_path("far.csv"),
              "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,9e5,0,0.5\n0.3,9e5,0,0.5\n");
-  CHECK(run("--lockstep --seconds 1 --device replay:%s,scale=10", file_in_folder("far.csv")) == 1);
+  CHECK(run("--lockstep --seconds 1 --device replay:%s,scale=10", folder_path("far.csv")) == 1);
   CHECK(says("fault") && says("pose"));
   CHECK(number_of("faults") == 1.0);
   CHECK(number_of("ticks") < 1000.0);
-  CHECK(run("--no-realtime --seconds 1 --device replay:%s,scale=10", file_in_folder("far.csv")) ==
-        1);
+  CHECK(run("--no-realtime --seconds 1 --device replay:%s,scale=10", folder_path("far.csv")) == 1);
   CHECK(number_of("faults") == 1.0);
 }
 
@@ -589,13 +480,13 @@ TEST(a_fault_leaves_its_last_ticks)
 {
   char last[2000] = "";
   /* A spline goes through them: it feels the leap a few samples before. */
-  write_text(file_in_folder("late.csv"),
+  file_write(folder_path("late.csv"),
              "t,x,y,z\n0,0,0,0.5\n0.1,0,0,0.5\n0.2,0,0,0.5\n0.3,0,0,0.5\n0.4,0,0,0.5\n"
              "0.5,0,0,0.5\n0.6,0,0,0.5\n0.7,0,0,0.5\n0.8,9e5,0,0.5\n0.9,9e5,0,0.5\n");
   char box[320];
-  snprintf(box, sizeof box, "%s", file_in_folder("box.csv"));
+  snprintf(box, sizeof box, "%s", folder_path("box.csv"));
   CHECK(run("--lockstep --seconds 1 --device replay:%s,scale=10 --black-box %s",
-            file_in_folder("late.csv"), box) == 1);
+            folder_path("late.csv"), box) == 1);
   CHECK(says("last 256 ticks before the fault") && says("pointer 1"));
   CHECK(lines_of(box, last, sizeof last) == 257);
   unsigned tick = 0;
@@ -615,7 +506,7 @@ TEST(a_deadly_signal_still_kills)
   static const int signals[] = {SIGABRT, SIGSEGV};
   for (int i = 0; i < 2; ++i) {
     int result = 0;
-    pid_t child = start("--seconds 10000 --no-realtime", environ);
+    pid_t child = program_start("--seconds 10000 --no-realtime", NULL);
     REQUIRE(child > 0);
     nanosleep(&pause, NULL);
     kill(child, signals[i]);
@@ -627,11 +518,11 @@ TEST(a_deadly_signal_still_kills)
 static void interrupt(int number, const char *arguments)
 {
   const struct timespec pause = {0, 300000000};
-  pid_t child = start(arguments, environ);
+  pid_t child = program_start(arguments, NULL);
   REQUIRE(child > 0);
   nanosleep(&pause, NULL);
   kill(child, number);
-  CHECK(finish(child) == 0);
+  CHECK(program_finish(child) == 0);
   CHECK(says("stopped early"));
   CHECK(number_of("ticks") > 0.0 && number_of("ticks") < 1e7);
   CHECK(number_of("faults") == 0.0);
@@ -648,25 +539,24 @@ TEST(a_device_is_identified_and_its_identity_used)
   static const char device[] =
       "virtual:hand=none,device_mass=0.3,device_damping=1,friction=0.1,delay=0.0015,quantum=3e-5";
   char file[320];
-  char text[800];
-  snprintf(file, sizeof file, "%s", file_in_folder("device.txt"));
+  snprintf(file, sizeof file, "%s", folder_path("device.txt"));
   CHECK(run("--identify %s --device %s", file, device) == 0);
   CHECK(says("LET GO"));
   CHECK_NEAR(number_of("mass_kg"), 0.3, 0.009);
   CHECK_NEAR(number_of("delay_ms"), 1.5, 0.2);
   CHECK_NEAR(number_of("quantum_um"), 30.0, 1e-6);
-  read_file(file, text, sizeof text);
+  const char *text = file_text(file);
   CHECK(strstr(text, "\ndevice = virtual\n") != NULL && strstr(text, "\nquantum = 3e-05 ") != NULL);
   CHECK(run("--lockstep --seconds 0.1 --device %s --identity %s", device, file) == 0);
   CHECK(run("--lockstep --seconds 0.1 --identity %s --device %s", file, device) == 2);
   CHECK(says("--identity: it belongs to a --device before it"));
   CHECK(run("--device %s --identity %s --identity %s", device, file, file) == 2);
   CHECK(says("has one already"));
-  write_text(file_in_folder("push.csv"), "t,x,y,z\n0,0,0,0.1\n1,0,0,0\n");
-  CHECK(run("--lockstep --seconds 0.1 --device replay:%s --identity %s", file_in_folder("push.csv"),
+  file_write(folder_path("push.csv"), "t,x,y,z\n0,0,0,0.1\n1,0,0,0\n");
+  CHECK(run("--lockstep --seconds 0.1 --device replay:%s --identity %s", folder_path("push.csv"),
             file) == 2);
   CHECK(says("identity is that of 'virtual'"));
-  write_text(file, "version = 1\nmas = 2\n");
+  file_write(file, "version = 1\nmas = 2\n");
   CHECK(run("--lockstep --seconds 0.1 --device %s --identity %s", device, file) == 1);
   CHECK(says("line 2: known are"));
 }
@@ -674,36 +564,32 @@ TEST(a_device_is_identified_and_its_identity_used)
 TEST(an_identification_that_fails_writes_nothing)
 {
   char file[320];
-  char text[20];
-  snprintf(file, sizeof file, "%s", file_in_folder("device.txt"));
+  snprintf(file, sizeof file, "%s", folder_path("device.txt"));
   unlink(file);
   CHECK(run("--identify %s --device virtual", file) == 1);
-  CHECK(says("does not move") && !exists(file));
+  CHECK(says("does not move") && !file_exists(file));
   CHECK(run("--identify %s", file) == 2);
   CHECK(says("exactly one --device"));
   CHECK(run("--identify %s --device virtuel", file) == 2);
   CHECK(run("--identify /nowhere/at/all --device virtual:hand=none,device_mass=1") == 1);
   CHECK(says("cannot be written"));
-  write_text(file, "kept");
+  file_write(file, "kept");
   CHECK(run("--identify %s --device virtual", file) == 1);
-  read_file(file, text, sizeof text);
-  CHECK(strcmp(text, "kept") == 0);
+  CHECK(strcmp(file_text(file), "kept") == 0);
 }
 
 TEST(the_picture_is_an_svg)
 {
-  char text[200];
   if (!plot_available()) {
     SKIP("needs gnuplot");
   }
   const char *const cases[] = {"--seconds 1", "--seconds 0.05 --model single",
                                "--seconds 0.5 --device virtual --device virtual:path=0:0/1/0"};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    unlink(file_in_folder("it's.svg"));
-    CHECK(run("--lockstep %s --plot %s", cases[i], file_in_folder("it's.svg")) == 0);
+    unlink(folder_path("it's.svg"));
+    CHECK(run("--lockstep %s --plot %s", cases[i], folder_path("it's.svg")) == 0);
     CHECK(ran.err[0] == '\0');
-    read_file(file_in_folder("it's.svg"), text, sizeof text);
-    CHECK(strstr(text, "<svg") != NULL);
+    CHECK(strstr(file_text(folder_path("it's.svg")), "<svg") != NULL);
   }
 }
 
@@ -712,11 +598,11 @@ TEST(without_gnuplot_one_line_says_so)
   char *bare[] = {(char[]){"PATH=/nonexistent"}, NULL};
   char arguments[600];
   snprintf(arguments, sizeof arguments, "--lockstep --seconds 0.1 --plot %s",
-           file_in_folder("none.svg"));
-  CHECK(finish(start(arguments, bare)) == 0);
+           folder_path("none.svg"));
+  CHECK(program_finish(program_start(arguments, bare)) == 0);
   CHECK(says("gnuplot") && strchr(ran.err, '\n') == ran.err + strlen(ran.err) - 1);
   CHECK(number_of("ticks") == 100.0);
-  CHECK(!exists(file_in_folder("none.svg")));
+  CHECK(!file_exists(folder_path("none.svg")));
 }
 
 /* ---- --record and --play ---- */
@@ -737,7 +623,7 @@ static int different_rows(const char *one, const char *other)
   char a[4000];
   char b[4000];
   int different = 0;
-  FILE *files[2] = {fopen(file_in_folder(one), "r"), fopen(file_in_folder(other), "r")};
+  FILE *files[2] = {fopen(folder_path(one), "r"), fopen(folder_path(other), "r")};
   bool more = files[0] != NULL && files[1] != NULL;
   while (more) {
     bool first = fgets(a, sizeof a, files[0]) != NULL;
@@ -765,46 +651,46 @@ static int different_rows(const char *one, const char *other)
 TEST(a_run_that_was_recorded_is_played_bit_for_bit)
 {
   CHECK(run("--seconds 1.2 --scene row10:6 --physics-hz 30 --record %s --trace %s",
-            file_in_folder("a.rec"), file_in_folder("trace.csv")) == 0);
+            folder_path("a.rec"), folder_path("trace.csv")) == 0);
   CHECK(has_value("record_end", "stopped"));
   CHECK(number_of("record_ticks") == number_of("ticks") && number_of("record_lost_ticks") == 0.0);
   double ticks = number_of("ticks");
   char impulse[40];
   snprintf(impulse, sizeof impulse, "%s", value_of("impulse_ns"));
   CHECK(strstr(ran.out, ",recording=on\n") != NULL);
-  CHECK(run("--play %s --trace %s", file_in_folder("a.rec"), file_in_folder("same.csv")) == 0);
+  CHECK(run("--play %s --trace %s", folder_path("a.rec"), folder_path("same.csv")) == 0);
   CHECK(has_value("replay", "identical") && number_of("ticks") == ticks);
   CHECK(has_value("scene", "row10:6") && number_of("physics_hz") == 30.0);
   CHECK(has_value("impulse_ns", impulse));
   CHECK(different_rows("trace.csv", "same.csv") == 0);
-  CHECK(run("--play %s --seconds 0.1 --trace %s", file_in_folder("a.rec"),
-            file_in_folder("same.csv")) == 0);
+  CHECK(run("--play %s --seconds 0.1 --trace %s", folder_path("a.rec"), folder_path("same.csv")) ==
+        0);
   CHECK(number_of("ticks") == 100.0 && different_rows("trace.csv", "same.csv") == -1);
 }
 
 TEST(a_recording_ends_at_its_limit_and_the_run_goes_on)
 {
-  CHECK(run("--seconds 1.5 --record %s --record-limit 0.2", file_in_folder("a.rec")) == 0);
+  CHECK(run("--seconds 1.5 --record %s --record-limit 0.2", folder_path("a.rec")) == 0);
   CHECK(says("ended before the run") && says("--record-limit is reached"));
   CHECK(has_value("record_end", "limit") && number_of("record_bytes") <= 209715.0);
   CHECK(number_of("ticks") > number_of("record_ticks"));
   double recorded = number_of("record_ticks");
   double bytes = number_of("record_bytes");
   REQUIRE(bytes > 1000.0);
-  CHECK(run("--play %s", file_in_folder("a.rec")) == 0);
+  CHECK(run("--play %s", folder_path("a.rec")) == 0);
   CHECK(has_value("record_end", "limit") && number_of("record_ticks") == recorded);
-  CHECK(truncate(file_in_folder("a.rec"), (off_t)bytes - 10) == 0);
-  CHECK(run("--play %s", file_in_folder("a.rec")) == 1);
+  CHECK(truncate(folder_path("a.rec"), (off_t)bytes - 10) == 0);
+  CHECK(run("--play %s", folder_path("a.rec")) == 1);
   CHECK(says("breaks off") && says("--play-incomplete"));
-  CHECK(run("--play %s --play-incomplete", file_in_folder("a.rec")) == 0);
+  CHECK(run("--play %s --play-incomplete", folder_path("a.rec")) == 0);
   CHECK(has_value("record_end", "broken_off"));
-  CHECK(truncate(file_in_folder("a.rec"), 100) == 0);
-  CHECK(run("--play %s --play-incomplete", file_in_folder("a.rec")) == 1);
+  CHECK(truncate(folder_path("a.rec"), 100) == 0);
+  CHECK(run("--play %s --play-incomplete", folder_path("a.rec")) == 1);
 }
 
 TEST(a_recording_that_cannot_be_is_said)
 {
-  CHECK(run("--seconds 1 --record %s", file_in_folder("no/such/a.rec")) == 1);
+  CHECK(run("--seconds 1 --record %s", folder_path("no/such/a.rec")) == 1);
   CHECK(says("--record: ") && says("cannot be written: No such file"));
   CHECK(ran.out[0] == '\0');
   if (access("/dev/full", W_OK) == 0) {
@@ -819,20 +705,9 @@ TEST(a_recording_that_cannot_be_is_said)
   CHECK(run("--record x --trace x") == 2 && says("the same file"));
   CHECK(run("--effects recording=on") == 2 && says("--record FILE"));
   CHECK(run("--effects recording=off --record x") == 2 && says("recording=off"));
-  CHECK(run("--play %s", file_in_folder("none.rec")) == 1 && says("cannot be opened"));
-  write_text(file_in_folder("a.rec"), "t,x,y,z\n0,0,0,0\n1,0,0,0\nand some more of it\n");
-  CHECK(run("--play %s", file_in_folder("a.rec")) == 1 && says("is no recording of a session"));
-}
-
-static void remove_folder(void)
-{
-  const char *const files[] = {"out",      "err",        "bad.csv",  "trace.csv", "threads.csv",
-                               "two.csv",  "same.csv",   "same.svg", "push.csv",  "far.csv",
-                               "it's.svg", "device.txt", "a.rec"};
-  for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
-    unlink(file_in_folder(files[i]));
-  }
-  rmdir(folder);
+  CHECK(run("--play %s", folder_path("none.rec")) == 1 && says("cannot be opened"));
+  file_write(folder_path("a.rec"), "t,x,y,z\n0,0,0,0\n1,0,0,0\nand some more of it\n");
+  CHECK(run("--play %s", folder_path("a.rec")) == 1 && says("is no recording of a session"));
 }
 
 /* One that starts again at the fourth time. */
@@ -854,47 +729,7 @@ TEST(a_lost_device_ends_the_run_unless_it_is_to_be_waited_for)
   CHECK(says("a device was lost") && says("could not be read"));
 }
 
-int main(void)
+SET_UP
 {
-  const char *base = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%.200s/hapode-run-XXXXXX", base != NULL ? base : "/tmp");
-  if (getenv("HAPODE_RUN") == NULL || mkdtemp(folder) == NULL) {
-    printf("1..0 # SKIP needs HAPODE_RUN, the path of the program, and a folder to write in\n");
-    return 0;
-  }
-  RUN(help_list_and_version_are_answered);
-  RUN(an_unknown_name_is_answered_with_those_that_exist);
-  RUN(a_wrong_value_is_answered_with_what_is_allowed);
-  RUN(what_a_model_cannot_do_is_said);
-  RUN(ways_of_testing_can_be_chosen);
-  RUN(a_malformed_recording_names_its_line);
-  RUN(files_that_cannot_be_written_are_found_before_the_run);
-  RUN(a_full_disk_is_a_failure_that_the_hand_does_not_feel);
-  RUN(a_full_disk_after_a_fault_is_said_beside_the_fault);
-  RUN(the_summary_has_its_keys_in_order);
-  RUN(the_summary_has_its_values);
-  RUN(the_coupling_can_be_chosen_and_is_reported);
-  RUN(a_device_is_held_to_its_own_figures);
-  RUN(single_steps_the_world_at_the_haptic_rate);
-  RUN(a_run_of_no_tick_has_a_summary);
-  RUN(the_trace_has_its_columns_and_every_tick);
-  RUN(the_trace_of_threads_is_drained_while_they_run);
-  RUN(two_devices_are_two_pointers);
-  RUN(lockstep_is_the_same_every_time);
-  RUN(a_recording_runs_in_lockstep);
-  RUN(every_scene_runs_in_every_model);
-  RUN(a_device_fault_ends_the_run_with_1);
-  RUN(a_fault_leaves_its_last_ticks);
-  RUN(a_deadly_signal_still_kills);
-  RUN(a_signal_ends_the_run_with_its_summary);
-  RUN(a_device_is_identified_and_its_identity_used);
-  RUN(an_identification_that_fails_writes_nothing);
-  RUN(a_run_that_was_recorded_is_played_bit_for_bit);
-  RUN(a_recording_ends_at_its_limit_and_the_run_goes_on);
-  RUN(a_recording_that_cannot_be_is_said);
-  RUN(the_picture_is_an_svg);
-  RUN(without_gnuplot_one_line_says_so);
-  RUN(a_lost_device_ends_the_run_unless_it_is_to_be_waited_for);
-  remove_folder();
-  return tap_done();
+  return program_use("HAPODE_RUN");
 }

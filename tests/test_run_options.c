@@ -139,15 +139,3 @@ TEST(the_summary_says_what_accuracy_comes_to)
                "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06,"
                "row_updates=300\n") == 0);
 }
-
-int main(void)
-{
-  RUN(a_wanted_error_needs_looking_back);
-  RUN(the_reference_has_no_error);
-  RUN(a_budget_needs_a_clock);
-  RUN(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out);
-  RUN(single_settings_stay_when_they_are_given);
-  RUN(the_help_is_indented);
-  RUN(the_summary_says_what_accuracy_comes_to);
-  return tap_done();
-}

@@ -166,16 +166,3 @@ TEST(destroy_accepts_null)
   scene_destroy(NULL);
   CHECK(scene_table_at(1000) == NULL);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(bad_specs_are_refused_with_a_list);
-  RUN(long_names_do_not_cut_the_list);
-  RUN(edited_parameters_are_used);
-  RUN(a_copied_row_may_have_an_n_of_its_own);
-  RUN(bad_parameters_are_refused);
-  RUN(destroy_accepts_null);
-  dCloseODE();
-  return tap_done();
-}

@@ -721,33 +721,3 @@ TEST(surface_leaves_out_jointed_pairs)
   CHECK(io.mu == 0.5 && io.mode == dContactApprox1);
   close_run(&r);
 }
-
-static void run_all(void)
-{
-  RUN(every_scene_builds);
-  RUN(n_is_the_number_of_bodies);
-  RUN(resting_scenes_stay_at_rest);
-  RUN(fig5_flies_at_its_speed);
-  RUN(fig5_rebounds_as_a_spring_does);
-  RUN(hands_are_felt);
-  RUN(tower_is_pushed_and_stands);
-  RUN(topple_falls_over);
-  RUN(edge_falls_to_the_floor);
-  RUN(hit_collides_at_a_metre_a_second);
-  RUN(round_bodies_roll_to_and_fro);
-  RUN(clump_touches_eight_at_once);
-  RUN(spheres_push_all_on);
-  RUN(hold_stays_under_the_hand);
-  RUN(paths_reach_the_first_body);
-  RUN(shift_moves_what_can_move);
-  RUN(infinite_friction_stays_finite);
-  RUN(surface_leaves_out_jointed_pairs);
-}
-
-int main(void)
-{
-  dInitODE2(0);
-  run_all();
-  dCloseODE();
-  return tap_done();
-}

@@ -491,27 +491,3 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
   CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
   stage_end(&s);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_session_that_never_starts);
-  RUN(start_and_stop_in_every_drive);
-  RUN(calls_of_another_drive_are_refused);
-  RUN(null_sessions_are_refused);
-  RUN(lockstep_steps_are_due_at_whole_ticks);
-  RUN(frame_drive_keeps_the_remainder_and_does_at_most_three_steps);
-  RUN(models_change_while_running);
-  RUN(threads_run_on_the_clock);
-  RUN(lock_belongs_to_a_thread);
-  RUN(callbacks_may_not_lock);
-  RUN(lock_waits_for_about_one_step_of_an_overloaded_physics_thread);
-  RUN(bodies_are_told_of_only_under_the_lock);
-  RUN(edits_run_in_order_before_the_next_step);
-  RUN(edits_left_over_run_at_stop_in_every_drive);
-  RUN(poses_for_drawing_are_interpolated_one_step_behind);
-  RUN(trace_keeps_the_oldest_rows_and_counts_the_rest);
-  dCloseODE();
-  return tap_done();
-}

@@ -338,19 +338,3 @@ TEST(a_body_that_goes_bad_is_kept_from_ode)
     stage_end(&s);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(unset_defs_are_refused);
-  RUN(missing_arguments_are_refused);
-  RUN(every_bad_field_is_named);
-  RUN(models_are_checked);
-  RUN(smaller_and_larger_defs_are_accepted);
-  RUN(statistics_of_a_smaller_struct);
-  RUN(a_body_that_cannot_be_simulated_is_refused_at_create_and_start);
-  RUN(a_body_that_goes_bad_is_kept_from_ode);
-  dCloseODE();
-  return tap_done();
-}

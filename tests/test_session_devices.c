@@ -729,28 +729,3 @@ TEST(bodies_come_and_go_under_the_lock_while_threads_run)
   CHECK(stats_of(&s).faults == 0);
   stage_end(&s);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_read_that_fails_latches_a_fault);
-  RUN(a_write_that_fails_latches_a_fault);
-  RUN(a_pose_that_is_not_finite_latches_a_fault);
-  RUN(one_bad_device_takes_the_force_of_all);
-  RUN(zero_is_the_last_thing_that_is_written);
-  RUN(a_device_that_does_not_start);
-  RUN(devices_with_a_clock_of_their_own_cannot_run_in_lockstep);
-  RUN(a_device_limits_the_force);
-  RUN(ids_of_removed_pointers_are_never_valid_again);
-  RUN(a_device_serves_one_pointer);
-  RUN(bad_pointer_defs_are_named);
-  RUN(a_pointer_without_device_goes_to_its_target_and_pushes);
-  RUN(bad_targets_change_nothing);
-  RUN(pointers_come_and_go_while_threads_run);
-  RUN(full_capacities_lose_nothing_but_are_counted);
-  RUN(a_body_may_go_while_it_is_pushed);
-  RUN(bodies_come_and_go_under_the_lock_while_threads_run);
-  dCloseODE();
-  return tap_done();
-}

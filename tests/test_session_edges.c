@@ -318,24 +318,3 @@ TEST(a_hand_that_never_came_in_has_a_pose)
   }
   stage_end(&s);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_new_hand_does_not_feel_what_the_old_one_touched);
-  RUN(a_hand_without_a_target_is_not_in_the_world);
-  RUN(no_impulse_is_lost_on_a_body_that_the_application_moves);
-  RUN(a_world_has_one_session_at_a_time);
-  RUN(a_session_that_could_not_be_created_has_no_claim_on_the_world);
-  RUN(a_lock_can_be_waited_for_as_long_as_there_is_time);
-  RUN(a_session_is_destroyed_by_the_thread_that_has_its_lock);
-  RUN(a_surface_that_is_no_number_does_not_reach_ode);
-  RUN(an_inertia_that_is_no_number_is_refused);
-  RUN(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed);
-  RUN(a_transmission_is_not_probed_and_that_is_said);
-  RUN(edits_of_a_session_that_never_ran_are_run);
-  RUN(a_falling_neighbour_falls_at_the_worlds_speed);
-  RUN(a_hand_that_never_came_in_has_a_pose);
-  dCloseODE();
-  return tap_done();
-}

@@ -550,22 +550,3 @@ TEST(a_pushed_sleeper_wakes_up)
   CHECK(!dBodyIsEnabled(cube));
   world_close(&w);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(probes_leave_every_bit);
-  RUN(probes_leave_joint_feedback);
-  RUN(callbacks_are_silent_in_probes);
-  RUN(next_step_is_the_same);
-  RUN(thousand_steps_are_the_same);
-  RUN(thousand_steps_are_those_of_ode);
-  RUN(bodies_fall_asleep_as_in_ode);
-  RUN(steps_beside_sleepers_are_the_same);
-  RUN(woken_bodies_fall_asleep_as_in_ode);
-  RUN(auto_disable_comes_back_at_stop);
-  RUN(a_pushed_sleeper_wakes_up);
-  dCloseODE();
-  return tap_done();
-}

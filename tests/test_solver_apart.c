@@ -61,9 +61,3 @@ TEST(rows_that_share_no_body_take_one_sweep)
     CHECK_NEAR(rows[i].impulse, wanted[i], 1e-14 * wanted[i]);
   }
 }
-
-int main(void)
-{
-  RUN(rows_that_share_no_body_take_one_sweep);
-  return tap_done();
-}

@@ -257,13 +257,3 @@ TEST(no_budget_is_too_small_to_add_no_energy)
   }
   spoil(BODIES, 2000); /* more than there are islands for */
 }
-
-int main(void)
-{
-  RUN(what_no_impulse_can_solve_adds_no_energy);
-  RUN(no_numbers_leave_the_bodies_alone);
-  RUN(a_direct_solve_does_not_lose_what_is_no_number);
-  RUN(a_solved_island_keeps_its_impulses_beside_an_impossible_one);
-  RUN(no_budget_is_too_small_to_add_no_energy);
-  return tap_done();
-}

@@ -70,13 +70,3 @@ TEST(what_is_solved_does_not)
   figures f = push_row(3);
   CHECK(f.rests == 0 && f.solved > 0);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(what_is_in_vain_rests);
-  RUN(what_is_solved_does_not);
-  int failed = tap_done();
-  dCloseODE();
-  return failed;
-}

@@ -554,29 +554,17 @@ TEST(a_run_goes_on_when_the_cable_is_in_again)
   emulated_stop(&other);
 }
 
-int main(void)
+static void machine_stop(void)
+{
+  emulated_stop(&machine);
+}
+
+SET_UP
 {
   static const char *const arguments[] = {"--hand", "hold", "--first-count", "32700", "--fifo",
                                           "40",     NULL};
   signal(SIGPIPE, SIG_IGN);
-  if (!emulated_start(&machine, arguments)) {
-    printf("1..0 # SKIP no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR\n");
-    return 0;
-  }
-  RUN(wrong_arguments_are_refused_before_a_port_is_touched);
-  RUN(the_port_is_found_and_is_for_one_alone);
-  RUN(boards_that_do_not_fit_are_named);
-  RUN(the_hand_feels_what_was_reached);
-  RUN(the_frame_has_z_up);
-  RUN(a_home_that_was_told_holds_until_the_boards_are_switched_off);
-  RUN(boards_that_are_silent_fail_and_come_back_by_themselves);
-  RUN(a_port_that_was_hung_up_fails_to_read_and_to_write);
-  RUN(a_cable_is_pulled_and_put_in_again);
-  RUN(a_process_that_is_killed_leaves_no_force);
-  RUN(a_loop_that_hangs_leaves_no_force);
-  RUN(a_tool_that_turns_a_lever_is_felt);
-  RUN(a_run_goes_on_when_the_cable_is_in_again);
-  RUN(a_row_of_cubes_is_felt);
-  emulated_stop(&machine);
-  return tap_done();
+  tap_at_end(machine_stop);
+  return emulated_start(&machine, arguments) ||
+         tap_skip_all("no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR");
 }

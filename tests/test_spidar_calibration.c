@@ -298,16 +298,3 @@ TEST(a_calibration_is_written_and_read)
   CHECK(frames_apart(&read, &found.model) < 1e-9);
   unlink(path);
 }
-
-int main(void)
-{
-  RUN(home_makes_the_lengths_those_of_home);
-  RUN(what_is_wrong_is_found);
-  RUN(too_little_motion_is_refused);
-  RUN(too_few_samples_are_refused);
-  RUN(samples_that_are_not_finite_are_refused);
-  RUN(a_slack_string_is_refused);
-  RUN(no_memory_is_said);
-  RUN(a_calibration_is_written_and_read);
-  return tap_done();
-}

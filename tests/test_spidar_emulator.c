@@ -819,33 +819,3 @@ TEST(a_wrong_emulator_is_refused)
   def.path = "0:0/0/0;1:1/1";
   CHECK(emulator_init(&s->emulator, &def, &detail) == HAP_ERROR_ARGUMENT);
 }
-
-int main(void)
-{
-  RUN(every_command_of_every_board_has_its_reply);
-  RUN(what_a_board_says_it_is);
-  RUN(a_reply_tells_what_was_before_its_command);
-  RUN(parameters_are_told_one_call_late);
-  RUN(a_reset_leaves_the_count_within_a_turn);
-  RUN(currents_are_clipped_and_other_modes_let_them_go);
-  RUN(there_is_one_buffer);
-  RUN(all_ids_and_models_are_found);
-  RUN(boards_are_found_among_garbage);
-  RUN(who_is_not_there_is_not_found);
-  RUN(cycles_are_answered_and_wrap);
-  RUN(short_padding_lets_replies_collide);
-  RUN(a_wrong_byte_in_the_replies_costs_one_cycle);
-  RUN(a_wrong_byte_in_the_replies_of_one_board_costs_one_cycle);
-  RUN(a_wrong_byte_in_the_commands_costs_one_cycle);
-  RUN(late_replies_are_taken_when_they_come);
-  RUN(silence_is_measured);
-  RUN(a_pulled_cable_is_noticed_by_the_next_tick);
-  RUN(a_command_that_was_cut_is_ended_by_zeros);
-  RUN(positions_that_jump_are_not_believed);
-  RUN(what_is_asked_for_is_felt);
-  RUN(nobody_holds_it_and_nobody_pulls);
-  RUN(commands_are_understood_or_refused);
-  RUN(a_script_is_followed);
-  RUN(a_wrong_emulator_is_refused);
-  return tap_done();
-}

@@ -447,24 +447,3 @@ TEST(positions_do_not_wrap)
   raw[0] = -32736 + 500;
   CHECK(hapi_spidar_counts_advance(&counts, raw, 500) && counts.counts[0] == 33300);
 }
-
-int main(void)
-{
-  RUN(lengths_are_those_of_the_firmware);
-  RUN(there_is_nothing_beside_the_table);
-  RUN(padding_keeps_replies_apart);
-  RUN(a_current_command_byte_by_byte);
-  RUN(a_reply_byte_by_byte);
-  RUN(every_frame_of_every_board_comes_back);
-  RUN(a_stream_is_cut_between_padding);
-  RUN(lengths_of_another_board_are_learned);
-  RUN(a_reply_that_cannot_be_is_padding);
-  RUN(a_cycle_is_commands_with_padding);
-  RUN(cycles_come_in_pieces);
-  RUN(of_several_cycles_the_newest_is_taken);
-  RUN(who_is_silent_is_told);
-  RUN(a_lost_or_additional_byte_costs_its_own_cycle_alone);
-  RUN(a_changed_byte_is_seen_where_it_can_be);
-  RUN(positions_do_not_wrap);
-  return tap_done();
-}

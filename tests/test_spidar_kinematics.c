@@ -410,20 +410,3 @@ TEST(rates_forget)
   hapi_spidar_rates_update(&rates, m, now - 5000000, counts, out);
   CHECK(out[0] == 0.0 && rates.count == 1);
 }
-
-int main(void)
-{
-  RUN(lengths_are_distances);
-  RUN(rows_are_derivatives_of_the_lengths);
-  RUN(one_call_a_tick_follows_fast_motion);
-  RUN(exact_lengths_give_the_pose);
-  RUN(a_jump_is_found_within_one_call);
-  RUN(the_workspace_ends_where_it_says);
-  RUN(nonsense_does_not_diverge);
-  RUN(lengths_that_are_not_finite_change_nothing);
-  RUN(a_wrong_string_is_noticed_and_named);
-  RUN(rates_of_the_lengths_give_the_twist);
-  RUN(rates_of_a_straight_line_are_its_slope);
-  RUN(rates_forget);
-  return tap_done();
-}

@@ -3,6 +3,7 @@
 
 /* Models of string devices, their check and their file. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <sys/stat.h>
@@ -14,7 +15,7 @@
 
 #define MODELS 7
 
-static char path[64]; /* of this test alone */
+static char path[160];
 
 static const hapi_spidar_model *model_of(const char *name)
 {
@@ -331,7 +332,7 @@ TEST(a_file_that_was_there_stays_when_writing_fails)
   const hapi_spidar_model *m = model_of("x4r");
   hapi_spidar_model back;
   hap_detail detail = {""};
-  char beside[80];
+  char beside[170];
   CHECK(hapi_spidar_model_write(path, m, &detail) == HAP_OK);
   snprintf(beside, sizeof beside, "%s.new", path);
   REQUIRE(mkdir(beside, 0700) == 0); /* the new file cannot be made */
@@ -503,17 +504,9 @@ TEST(what_is_no_text_is_refused)
   CHECK(strstr(detail.text, "cannot be read") != NULL);
 }
 
-int main(void)
+SET_UP
 {
-  snprintf(path, sizeof path, "/tmp/spidar-model-%ld.txt", (long)getpid());
-  RUN(built_in_models_are_sound);
-  RUN(built_in_models_have_the_published_figures);
-  RUN(what_is_wrong_is_refused);
-  RUN(what_a_file_does_not_say_has_sound_defaults);
-  RUN(models_are_read_as_they_were_written);
-  RUN(a_file_that_was_there_stays_when_writing_fails);
-  RUN(a_short_file_is_enough);
-  RUN(slips_are_said_with_their_line);
-  RUN(what_is_no_text_is_refused);
-  return tap_done();
+  bool good = folder_make();
+  snprintf(path, sizeof path, "%s", folder_path("model.txt"));
+  return good;
 }

@@ -4,6 +4,7 @@
 /* hapode-run --calibrate with the spidar-emulator, whose hand follows a script and whose motors are not quite where
  * the model has them. In real time; nothing asks how long it took. */
 
+#include "tests/files.h"
 #include "tests/tap.h"
 
 #include <stdint.h>
@@ -18,10 +19,9 @@
 
 static emulated machine;
 static hapi_spidar_model bent; /* what the emulator is */
-static char folder[] = "/tmp/test-spidar-sweep-XXXXXX";
-static char bent_path[128];
-static char found_path[128];
-static char said_path[128];
+static char bent_path[160];
+static char found_path[160];
+static char said_path[160];
 
 /* ---- the emulator and its hand ---- */
 
@@ -69,7 +69,7 @@ static bool start_machine(void)
 /* typed: what comes on its stdin. The exit status. */
 static int calibrate(const char *typed, const char *options)
 {
-  char command[1000];
+  char command[2000];
   snprintf(command, sizeof command,
            "printf '%s' | \"%s\" --calibrate %s %s --device spidar:%s,model=x4r,timeout=5,stall=10 "
            ">%s 2>&1",
@@ -221,27 +221,21 @@ TEST(nothing_is_written_when_nobody_is_there_or_the_cable_is_pulled)
   CHECK(waitpid(child, NULL, 0) == child);
 }
 
-int main(void)
+static void machine_stop(void)
+{
+  emulated_stop(&machine);
+}
+
+SET_UP
 {
   signal(SIGPIPE, SIG_IGN);
-  if (mkdtemp(folder) == NULL) {
-    printf("Bail out! no temporary folder\n");
-    return 1;
+  if (!folder_make()) {
+    return false;
   }
-  snprintf(bent_path, sizeof bent_path, "%s/bent.txt", folder);
-  snprintf(found_path, sizeof found_path, "%s/found.txt", folder);
-  snprintf(said_path, sizeof said_path, "%s/said", folder);
-  if (!bend() || !start_machine()) {
-    printf("1..0 # SKIP no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR\n");
-    return 0;
-  }
-  RUN(who_writes_home_is_content_with_it);
-  RUN(a_sweep_finds_where_the_motors_are);
-  RUN(a_sweep_that_says_too_little_leaves_no_file);
-  RUN(nothing_is_written_when_nobody_is_there_or_the_cable_is_pulled);
-  emulated_stop(&machine);
-  unlink(bent_path);
-  unlink(said_path);
-  rmdir(folder);
-  return tap_done();
+  snprintf(bent_path, sizeof bent_path, "%s", folder_path("bent.txt"));
+  snprintf(found_path, sizeof found_path, "%s", folder_path("found.txt"));
+  snprintf(said_path, sizeof said_path, "%s", folder_path("said"));
+  tap_at_end(machine_stop);
+  return (bend() && start_machine()) ||
+         tap_skip_all("no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR");
 }

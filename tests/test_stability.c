@@ -124,15 +124,3 @@ TEST(many_light_cubes_are_all_felt)
     CHECK_NEAR(felt, expected, 0.01 * expected);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(hard_points_make_no_energy);
-  RUN(without_proxy_they_are_unstable);
-  RUN(coupling_is_not_softer_than_the_device_allows);
-  RUN(many_light_cubes_are_all_felt);
-  dCloseODE();
-  return tap_done();
-}

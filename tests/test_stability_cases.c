@@ -29,7 +29,7 @@ static void run_row(bool all)
       (void)(all && case_holds(row, model, "not claimed: "));
     } else {
       (void)snprintf(name, sizeof name, "%s, %s", row->name, hap_model_name(model));
-      tap_run(row_holds, name);
+      tap_run(test_row_holds, name);
     }
   }
 }

@@ -123,16 +123,8 @@ TEST(sweep_of_many_cubes)
   sweep_many(true);
 }
 
-int main(int argc, char **argv)
+SET_UP
 {
-  seed = argc > 1 ? strtoull(argv[1], NULL, 10) : seed;
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(sweep_of_a_cube_pressed);
-  RUN(sweep_of_a_cube_pushed);
-  RUN(sweep_of_many_balls);
-  RUN(sweep_of_many_cubes);
-  RUN(ten_million_ticks_on_a_stack);
-  dCloseODE();
-  return tap_done();
+  seed = *tap_argument != '\0' ? strtoull(tap_argument, NULL, 10) : seed;
+  return true;
 }

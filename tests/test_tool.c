@@ -530,24 +530,3 @@ TEST(a_tools_proxy_holds_a_stiff_wall_still)
   CHECK(direct.late_force > 0.5); /* it buzzes */
   CHECK(automatic.late_force < 0.02 && automatic.late_torque < 1e-3);
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_flat_push_feels_the_stiffness);
-  RUN(the_torque_is_about_the_pointers_origin);
-  RUN(a_tilted_face_turns_back_as_a_bed_of_springs);
-  RUN(no_force_jumps_when_a_tool_tilts_through_flat);
-  RUN(every_shape_is_felt_with_the_stiffness);
-  RUN(seams_of_a_mesh_are_not_felt);
-  RUN(a_bad_hull_is_refused_with_a_reason);
-  RUN(the_callers_points_may_go);
-  RUN(a_device_of_three_degrees_does_not_turn_a_tool);
-  RUN(torque_is_scaled_by_force_over_motion);
-  RUN(a_tools_proxy_yields_along_and_turns);
-  RUN(a_tools_proxy_is_two_springs_in_a_row);
-  RUN(a_tools_proxy_turns_with_the_device);
-  RUN(a_tools_proxy_holds_a_stiff_wall_still);
-  dCloseODE();
-  return tap_done();
-}

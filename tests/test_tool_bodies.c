@@ -351,19 +351,3 @@ TEST(no_round_on_a_wall_gives_energy)
     CHECK(given < 0.01 * stored);
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_pushed_cube_feels_as_if_the_world_were_stepped_at_the_haptic_rate);
-  RUN(several_bodies_are_felt_at_once);
-  RUN(momentum_and_spin_go_to_a_free_body);
-  RUN(a_measured_body_answers_to_a_tool);
-  RUN(a_body_and_a_tool_may_go_while_they_touch);
-  RUN(a_tool_that_arrives_deep_comes_in_slowly);
-  RUN(no_round_on_a_wall_gives_energy);
-  RUN(a_stack_of_light_cubes_stays_calm_under_a_tool);
-  RUN(a_tool_wedged_between_walls_is_held_in_the_middle);
-  dCloseODE();
-  return tap_done();
-}

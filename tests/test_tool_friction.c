@@ -608,22 +608,3 @@ TEST(no_round_that_sticks_gives_energy)
     }
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  RUN(a_face_sticks_as_a_spring);
-  RUN(a_face_slides_as_coulomb_says);
-  RUN(a_face_holds_against_turning);
-  RUN(a_face_that_sticks_does_not_creep);
-  RUN(a_change_of_model_lets_nothing_go);
-  RUN(a_device_without_torque_feels_it_slide);
-  RUN(points_that_leap_hold_where_they_are);
-  RUN(a_mesh_holds_as_a_floor);
-  RUN(each_geom_has_its_friction);
-  RUN(no_round_gives_energy);
-  RUN(no_round_that_sticks_gives_energy);
-  RUN(turning_on_edges_gives_no_energy);
-  dCloseODE();
-  return tap_done();
-}

@@ -432,18 +432,3 @@ TEST(with_less_grip_than_it_needs_the_box_slides)
     CHECK(h.last < 0.5 * EDGE + 1e-3); /* it is on the floor */
   }
 }
-
-int main(void)
-{
-  dInitODE2(0);
-  dAllocateODEDataForThread(dAllocateMaskAll);
-  RUN(a_block_is_dragged_as_if_the_world_were_stepped_at_the_haptic_rate);
-  RUN(accelerance_turns_a_block_by_soft_fingers);
-  RUN(lockstep_repeats);
-  RUN(momentum_and_spin_go_to_a_free_body);
-  RUN(lever_and_peg_with_friction_feel_as_the_reference);
-  RUN(a_box_that_flat_fingers_hold_does_not_creep);
-  RUN(with_less_grip_than_it_needs_the_box_slides);
-  dCloseODE();
-  return tap_done();
-}

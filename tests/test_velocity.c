@@ -281,16 +281,3 @@ TEST(pointer_takes_the_velocity_it_should)
   CHECK(session_error(exact, HAP_VELOCITY_ESTIMATED) < 1e-9);
   CHECK(session_error(rounded, (hap_velocity)3) == 1e9);
 }
-
-int main(void)
-{
-  RUN(ramps_are_smooth_where_differences_jump);
-  RUN(sines_lag_less_the_faster_they_turn);
-  RUN(rest_is_zero);
-  RUN(stop_is_noticed_within_the_window);
-  RUN(missed_ticks_do_no_harm);
-  RUN(turning_has_its_angular_velocity);
-  RUN(bad_poses_and_times_begin_anew);
-  RUN(pointer_takes_the_velocity_it_should);
-  return tap_done();
-}

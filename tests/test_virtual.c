@@ -615,31 +615,3 @@ TEST(bad_specs_say_why)
     }
   }
 }
-
-int main(void)
-{
-  RUN(default_rests_at_the_origin);
-  RUN(info_follows_the_arguments);
-  RUN(smooth_path_is_minimum_jerk);
-  RUN(linear_path_has_constant_velocity);
-  RUN(loop_comes_round);
-  RUN(sine_is_a_sine);
-  RUN(motion_begins_anew_after_start);
-  RUN(time_must_not_go_back);
-  RUN(hand_answers_a_step_by_its_closed_form);
-  RUN(hand_yields_by_force_over_stiffness);
-  RUN(hand_rings_at_its_frequency);
-  RUN(free_mass_falls_by_half_a_t_squared);
-  RUN(hand_never_gains_energy);
-  RUN(hand_follows_the_script);
-  RUN(reads_are_reproducible);
-  RUN(force_is_limited);
-  RUN(a_rigid_hand_turns_by_its_script);
-  RUN(a_wrist_gives_way_to_a_torque);
-  RUN(turning_does_the_work_of_the_torque);
-  RUN(zero_works_in_a_signal_handler);
-  RUN(start_forgets_the_force);
-  RUN(long_pauses_are_bounded);
-  RUN(bad_specs_say_why);
-  return tap_done();
-}

@@ -76,9 +76,15 @@ static inline void set_up_world(void)
   world->solver.direct_rows = 64;
 }
 
+static inline void tick_world_finish(void)
+{
+  hapi_exchange_destroy(f.exchange);
+}
+
 static inline void set_up(void)
 {
   hapi_exchange_destroy(f.exchange);
+  tap_at_end(tick_world_finish);
   memset(&f, 0, sizeof f);
   f.tick.capacity = capacity;
   f.tick.period = T;

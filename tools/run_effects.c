@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-static hap_status item_refuse(const char *item, size_t length, hap_detail *detail)
+static hap_status refuse(const char *item, size_t length, hap_detail *detail)
 {
   int shown = length < 60 ? (int)length : 60;
   int used = snprintf(detail->text, sizeof detail->text,
@@ -58,7 +58,7 @@ hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *deta
   for (;;) {
     size_t length = strcspn(list, ",");
     if (!take_item(list, length, io)) {
-      return item_refuse(list, length, detail);
+      return refuse(list, length, detail);
     }
     if (list[length] == '\0') {
       return HAP_OK;

@@ -114,8 +114,7 @@ void emulator_finish(emulator *e)
 
 /* ---- motors and encoders ---- */
 
-static void counts_encode(const emulator *e, int first, int motors,
-                          int32_t counts[HAPI_SPIDAR_MOTORS])
+static void encode(const emulator *e, int first, int motors, int32_t counts[HAPI_SPIDAR_MOTORS])
 {
   for (int i = 0; i < motors; ++i) {
     double way = e->grip.wound[first + i] - e->home[first + i];
@@ -133,7 +132,7 @@ static void tick_boards(emulator *e, double time)
     if (time >= e->next_tick[i]) {
       int32_t counts[HAPI_SPIDAR_MOTORS] = {0};
       e->next_tick[i] += 1.0 / board_tick_hz(b);
-      counts_encode(e, first, motors, counts);
+      encode(e, first, motors, counts);
       board_tick(b, counts);
       for (int k = 0; k < motors; ++k) {
         double volts = CURRENT_VOLTS * b->output[k];
@@ -159,7 +158,7 @@ static void follow_motors(emulator *e)
 }
 
 /* How the grip is turned from the attitude of that rotation vector, world axes. */
-static void quat_unturn(const double quat[4], const double turn[3], double out[4])
+static void unturn(const double quat[4], const double turn[3], double out[4])
 {
   double angle = hapi_v3_norm(turn);
   double share = angle > 0.0 ? -sin(0.5 * angle) / angle : 0.0;
@@ -167,7 +166,7 @@ static void quat_unturn(const double quat[4], const double turn[3], double out[4
   hapi_quat_multiply(quat, back, out);
 }
 
-static void hand_hold(const emulator *e, hap_wrench *out)
+static void hold(const emulator *e, hap_wrench *out)
 {
   double place[3] = {0.0, 0.0, 0.0};
   double speed[3] = {0.0, 0.0, 0.0};
@@ -179,7 +178,7 @@ static void hand_hold(const emulator *e, hap_wrench *out)
     hapi_motion_at(&e->path, emulator_time(e) - e->drawn, place, speed);
     hapi_motion_at(&e->turn, emulator_time(e) - e->drawn, turn, rate);
   }
-  quat_unturn(g->pose.quat_wxyz, turn, off);
+  unturn(g->pose.quat_wxyz, turn, off);
   double side = off[0] < 0.0 ? -2.0 : 2.0;
   for (int k = 0; k < 3; ++k) {
     out->force[k] += HAND_STIFFNESS * (place[k] - g->pose.position[k]) +
@@ -189,11 +188,11 @@ static void hand_hold(const emulator *e, hap_wrench *out)
   }
 }
 
-static void emulator_step(emulator *e)
+static void step(emulator *e)
 {
   hap_wrench other = {{e->push[0], e->push[1], e->push[2]}, {0.0, 0.0, 0.0}};
   if (e->hand != EMULATOR_HAND_NONE) {
-    hand_hold(e, &other);
+    hold(e, &other);
   }
   tick_boards(e, emulator_time(e));
   follow_motors(e);
@@ -218,7 +217,7 @@ void emulator_advance(emulator *e, double time)
 {
   while (emulator_time(e) + 1.0 / EMULATOR_STEP_HZ <= time) {
     follow_plan(e);
-    emulator_step(e);
+    step(e);
   }
   follow_plan(e);
 }
@@ -256,7 +255,7 @@ static void throw_garbage(emulator *e, int count)
   }
 }
 
-static void board_silence(emulator *e, int id, bool silent)
+static void silence(emulator *e, int id, bool silent)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     if (id < 0 || e->wire.boards[i].id == id) {
@@ -265,7 +264,7 @@ static void board_silence(emulator *e, int id, bool silent)
   }
 }
 
-static void board_report(emulator *e, int id, int model)
+static void report(emulator *e, int id, int model)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     if (e->wire.boards[i].id == id) {
@@ -274,7 +273,7 @@ static void board_report(emulator *e, int id, int model)
   }
 }
 
-static void tension_saturate(emulator *e, int limit)
+static void saturate(emulator *e, int limit)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     e->wire.boards[i].current_limit = limit;
@@ -289,7 +288,7 @@ void emulator_do(emulator *e, const emulator_action *action)
       (void)wire_add_fault(&e->wire, &action->fault);
       break;
     case EMULATOR_SILENT:
-      board_silence(e, (int)n[0], n[1] != 0.0);
+      silence(e, (int)n[0], n[1] != 0.0);
       break;
     case EMULATOR_LATE:
       e->wire.late = n[0];
@@ -308,10 +307,10 @@ void emulator_do(emulator *e, const emulator_action *action)
       power_on(e);
       break;
     case EMULATOR_REPORT:
-      board_report(e, (int)n[0], (int)n[1]);
+      report(e, (int)n[0], (int)n[1]);
       break;
     case EMULATOR_SATURATE:
-      tension_saturate(e, (int)n[0]);
+      saturate(e, (int)n[0]);
       break;
     case EMULATOR_PUSH:
       hapi_v3_copy(n, e->push);

@@ -1,22 +1,25 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/bare.h"
+#include "bench/bench.h"
+#include "bench/cycles.h"
+#include "tools/rig.h"
+
+/* Columns of scaling.csv at its end. Scene: fig7 has cubes that lie apart, row10 cubes that touch.
+ * Range: bodies that the loop may move itself, owned: those that it moves. */
+#define SCALING_CONTACT_COLUMNS "scene,range,owned,range_ms,publish_ms,gap"
+
 /* hapode-bench scaling, model CONTACT: what the local model costs that physics hands to the loop and
  * to the contact thread. The walk goes from the neighbours of the pointers over what touches, until
  * the loop's capacity is used. Pointers rest 2 mm above cubes of a row. After each physics cycle
  * plain ODE finds the contacts of the same scene in the same state and makes one global step. */
 
-#include "bench/scaling_contact.h"
-
-#include <stdlib.h>
-#include <string.h>
-
-#include "bench/bare.h"
-#include "bench/cycles.h"
-#include "tools/rig.h"
-
-#define PHYSICS_HZ 20.0
-#define LARGE_WORLD 1000
+#define CONTACT_PHYSICS_HZ 20.0
+#define CONTACT_LARGE_WORLD 1000
 #define FAR_WORLD 4000 /* bodies, one or two of them near */
 #define FAR_GAP 0.5    /* m: nothing but the floor comes into the range of the near one */
 #define FAR_SHARE 0.05 /* of one global step: what the library does for all of them */
@@ -68,7 +71,8 @@ static hap_status open_bed(bench *b, const world_case *what, world_bed *w)
   rig_options options;
   memset(w, 0, sizeof *w);
   w->what = what;
-  w->cycles = what->bodies >= LARGE_WORLD ? (b->quick ? 6 : 20) : (b->quick ? 20 : CYCLES_MAX);
+  w->cycles =
+      what->bodies >= CONTACT_LARGE_WORLD ? (b->quick ? 6 : 20) : (b->quick ? 20 : CYCLES_MAX);
   rig_options_init(&options);
   scene_parameters *p = &w->parameters;
   *p = *cycles_scene(what->scene);
@@ -84,7 +88,7 @@ static hap_status open_bed(bench *b, const world_case *what, world_bed *w)
   options.device_count = (size_t)what->pointers;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.model = HAP_MODEL_CONTACT;
-  options.def.physics_hz = PHYSICS_HZ;
+  options.def.physics_hz = CONTACT_PHYSICS_HZ;
   options.def.max_bodies = what->range;
   hap_status status = rig_create(&options, &w->rig, &b->detail);
   if (status >= HAP_OK) {
@@ -102,7 +106,7 @@ static void close_bed(world_bed *w)
 static double bare_step(world_bed *w)
 {
   bare_follow(&w->bare, w->rig.scene);
-  return 1e3 * bare_global_step(&w->bare, 1.0 / PHYSICS_HZ);
+  return 1e3 * bare_global_step(&w->bare, 1.0 / CONTACT_PHYSICS_HZ);
 }
 
 /* Who goes first, the library or plain ODE, finds colder caches: they take turns. */
@@ -129,9 +133,9 @@ static hap_status measure_cycle(world_bed *w, size_t i, uint64_t ticks)
 
 /* Cycles begin at whole periods: the first tick of each period is its last here, so that plain ODE
  * comes next to the cycle. */
-static hap_status measure(bench *b, const world_case *what, world_bed *w)
+static hap_status contact_measure(bench *b, const world_case *what, world_bed *w)
 {
-  const uint64_t ticks = (uint64_t)(CYCLES_HAPTIC_HZ / PHYSICS_HZ);
+  const uint64_t ticks = (uint64_t)(CYCLES_HAPTIC_HZ / CONTACT_PHYSICS_HZ);
   hap_status status = open_bed(b, what, w);
   if (status >= HAP_OK) {
     status = hap_session_advance(w->rig.session, WARM_CYCLES * ticks + 1);
@@ -186,7 +190,7 @@ static void report_far(bench *b, const world_bed *w, double own, double step)
   }
 }
 
-static void report(bench *b, const world_bed *w)
+static void contact_report(bench *b, const world_bed *w)
 {
   const world_case *what = w->what;
   double build = build_ms(w);
@@ -209,7 +213,8 @@ static void report(bench *b, const world_bed *w)
   }
 }
 
-hap_status bench_scaling_contact(bench *b, FILE *csv)
+/* The rows of model CONTACT. */
+static hap_status bench_scaling_contact(bench *b, FILE *csv)
 {
   hap_status status = HAP_OK;
   world_bed *w = calloc(1, sizeof *w);
@@ -217,13 +222,141 @@ hap_status bench_scaling_contact(bench *b, FILE *csv)
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the cycles");
   }
   for (size_t i = 0; i < sizeof cases / sizeof cases[0] && status >= HAP_OK; ++i) {
-    status = measure(b, &cases[i], w);
+    status = contact_measure(b, &cases[i], w);
     if (status >= HAP_OK) {
       write_row(csv, w);
-      report(b, w);
+      contact_report(b, w);
     }
     close_bed(w);
   }
   free(w);
   return status;
+}
+
+/* hapode-bench scaling: what a near body costs in a world that grows. Cubes lie apart on a floor, a
+ * pointer rests 2 mm in front of the first one. Columns, medians over the physics cycles:
+ *
+ *   build_ms        the local model: neighbours, testing simulations, messages
+ *   step_ms         the global step
+ *   tick_us         a haptic tick
+ *   probes          testing simulations a cycle, probe_ms all of them together
+ *   island_step_ms  one step of the neighbour's island alone, by plain ODE calls
+ *   library_ms      what is neither collision nor a step of ODE
+ *
+ * Model CONTACT has its own rows, see scaling_contact.c. */
+
+#define PROBES_PHYSICS_HZ 20.0
+#define PROBES_LARGE_WORLD 1000
+
+static const int sizes[] = {1, 10, 100, PROBES_LARGE_WORLD};
+#define SIZE_COUNT (sizeof sizes / sizeof sizes[0])
+
+static const hap_model models[] = {HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE};
+#define MODEL_COUNT (sizeof models / sizeof models[0])
+
+typedef struct world {
+  double neighbours;
+  double build_ms;
+  double step_ms;
+  double tick_us;
+  double probes;
+  double probe_ms;
+  double island_step_ms;
+  double library_ms;
+  double probe_ratio;
+} world;
+
+static hap_status probes_measure(bench *b, int bodies, hap_model model, world *out)
+{
+  cycles c;
+  cycles_def def = {
+      .parameters = cycles_scene("fig7"),
+      .count = bodies,
+      .device = "virtual:path=0:-0.012/0/0.025,hand=rigid",
+      .model = model,
+      .physics_hz = PROBES_PHYSICS_HZ,
+      .seconds = b->quick ? 1.0 : 3.0,
+      .repeats = b->quick ? 3 : 5,
+  };
+  hap_status status = cycles_measure(b, &def, &c);
+  if (status < HAP_OK) {
+    return status;
+  }
+  double untested = cycles_median(&c, CYCLE_UNTESTED);
+  double collide = cycles_median(&c, CYCLE_COLLIDE);
+  out->neighbours = cycles_median(&c, CYCLE_NEIGHBOURS);
+  out->step_ms = cycles_median(&c, CYCLE_STEP);
+  out->tick_us = c.tick_us;
+  out->probes = cycles_median(&c, CYCLE_PROBES);
+  out->probe_ms = cycles_median(&c, CYCLE_TESTING);
+  out->island_step_ms = cycles_median(&c, CYCLE_ISLAND);
+  out->build_ms = untested - collide - out->step_ms + out->probe_ms;
+  out->library_ms = out->build_ms - out->probes * out->island_step_ms;
+  out->probe_ratio = cycles_probe_ratio(&c);
+  cycles_free(&c);
+  return HAP_OK;
+}
+
+static void probes_report(bench *b, int bodies, const world *w)
+{
+  bench_check(b, w->probe_ratio <= 1.1,
+              "%d bodies, %g neighbour: %g testing simulations %.4f ms, / (%g x island step "
+              "%.4f ms) = %.3f (bound 1.1)",
+              bodies, w->neighbours, w->probes, w->probe_ms, w->probes, w->island_step_ms,
+              w->probe_ratio);
+  double share = w->probe_ms / w->step_ms;
+  if (bodies == PROBES_LARGE_WORLD) {
+    bench_check(b, share <= 0.08,
+                "%d bodies, %g neighbour: testing simulations / global step = %.4f ms / %.4f ms = "
+                "%.2f %% (bound 8 %%)",
+                bodies, w->neighbours, w->probe_ms, w->step_ms, 100.0 * share);
+  }
+}
+
+static hap_status draw(bench *b, const world worlds[SIZE_COUNT])
+{
+  FILE *script = bench_picture_begin(b, "scaling", 800, 500);
+  if (script != NULL) {
+    fprintf(script, "$w << EOD\n");
+    for (size_t i = 0; i < SIZE_COUNT; ++i) {
+      fprintf(script, "%d %g %g %g %g\n", sizes[i], worlds[i].step_ms, worlds[i].probe_ms,
+              worlds[i].island_step_ms, 1e-3 * worlds[i].tick_us);
+    }
+    fprintf(script,
+            "EOD\nset title 'One neighbour among cubes that lie apart'\nset logscale xy\n"
+            "set format y '%%g'\nset xlabel 'bodies in the world'\nset ylabel 'time [ms]'\n"
+            "set key top left\n"
+            "plot $w using 1:2 with linespoints lt 1 pt 7 ps 0.6 title 'global step', "
+            "$w using 1:3 with linespoints lt 2 pt 7 ps 0.6 title 'all testing simulations', "
+            "$w using 1:4 with linespoints lt 3 pt 5 ps 0.6 title 'one island step', "
+            "$w using 1:5 with linespoints lt 4 pt 9 ps 0.6 title 'haptic tick'\n");
+  }
+  return bench_picture_end(b, "scaling", script);
+}
+
+hap_status bench_scaling(bench *b)
+{
+  world worlds[MODEL_COUNT][SIZE_COUNT];
+  FILE *csv = bench_csv_open(b, "scaling",
+                             "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,"
+                             "island_step_ms,library_ms," SCALING_CONTACT_COLUMNS);
+  hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
+  for (size_t i = 0; i < SIZE_COUNT && status >= HAP_OK; ++i) {
+    for (size_t m = 0; m < MODEL_COUNT && status >= HAP_OK; ++m) {
+      world *w = &worlds[m][i];
+      status = probes_measure(b, sizes[i], models[m], w);
+      if (status >= HAP_OK) {
+        fprintf(csv, "%d,%g,%s,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,fig7,0,0,,,\n", sizes[i],
+                w->neighbours, hap_model_name(models[m]), w->build_ms, w->step_ms, w->tick_us,
+                w->probes, w->probe_ms, w->island_step_ms, w->library_ms);
+      }
+    }
+    if (status >= HAP_OK) {
+      probes_report(b, sizes[i], &worlds[MODEL_COUNT - 1][i]);
+    }
+  }
+  status = status >= HAP_OK ? bench_scaling_contact(b, csv) : status;
+  hap_status closed = bench_csv_close(b, csv);
+  status = status >= HAP_OK ? closed : status;
+  return status >= HAP_OK ? draw(b, worlds[MODEL_COUNT - 1]) : status;
 }

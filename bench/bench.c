@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
@@ -9,6 +10,7 @@
 #include <sys/stat.h>
 
 #include "bench/bench.h"
+#include "tools/plot.h"
 
 hap_status bench_fail(bench *b, hap_status status, const char *format, ...)
 {
@@ -127,4 +129,23 @@ bool bench_find_coupling(const char *name, hap_coupling *out)
     }
   }
   return false;
+}
+
+FILE *bench_picture_begin(bench *b, const char *name, int width, int height)
+{
+  char path[PATH_MAX];
+  if (!plot_available() ||
+      snprintf(path, sizeof path, "%s/%s.svg", b->out, name) >= (int)sizeof path) {
+    return NULL;
+  }
+  return plot_begin(path, width, height, &b->detail);
+}
+
+hap_status bench_picture_end(bench *b, const char *name, FILE *script)
+{
+  if (!plot_available()) {
+    bench_say("no picture %s.svg: %s", name, PLOT_ABSENT_TEXT);
+    return HAP_OK;
+  }
+  return script != NULL ? plot_end(script, &b->detail) : HAP_ERROR_IO;
 }
