@@ -93,10 +93,10 @@ static void collide(hapi_physics *physics)
     bool awake =
         (body_a != NULL && dBodyIsEnabled(body_a)) || (body_b != NULL && dBodyIsEnabled(body_b));
     if (awake) {
-      const dGeomID geoms[2] = {pair->a, pair->b};
-      const dBodyID bodies[2] = {body_a, body_b};
+      const hapi_touching touching = {{pair->a, pair->b}, {body_a, body_b}};
       dSurfaceParameters surface = pair->surface;
-      hapi_world_make_contacts(physics, geoms, bodies, &surface, false);
+      physics->counts.own.stats.contacts_rejected += hapi_world_make_contacts(
+          &physics->world, &physics->cycle, &touching, &surface, HAPI_CONTACT_PLAIN);
     }
   }
 }
@@ -182,7 +182,8 @@ static bool go_over(hapi_physics *physics, uint32_t row)
     compare(physics, at.row);
     add_wrenches(physics);
     collide(physics);
-    hapi_world_quickstep(physics, period);
+    ++physics->counts.own.stats.quickstep_calls;
+    dWorldQuickStep(physics->world.ode.world, period);
     if (!sound(physics)) {
       return false;
     }
@@ -293,7 +294,8 @@ static bool go(hapi_physics *physics, double seconds)
   physics->config.haptic_hz = parts_of(w->haptic_hz) * w->haptic_hz;
   dWorldSetQuickStepNumIterations(physics->world.ode.world,
                                   iterations_of(w, physics->dial.own_iterations));
-  hapi_world_convert(physics);
+  hapi_meant meant;
+  hapi_world_convert(&physics->world, hapi_step_ratio(&physics->cycle), &meant);
   bool first = w->next == 0;
   if (first) {
     chain(physics);
@@ -309,7 +311,7 @@ static bool go(hapi_physics *physics, double seconds)
   w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_lookback_keep(physics);
   dJointGroupEmpty(physics->world.contact_group);
-  hapi_world_restore(physics);
+  hapi_world_restore(&physics->world, &meant);
   dWorldSetQuickStepNumIterations(physics->world.ode.world, iterations);
   physics->config.haptic_hz = w->haptic_hz;
   physics->cycle.model = model;

@@ -491,7 +491,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   for (int k = 0; k < 6; ++k) {
     link->box[k] = range->own_box[k] + (k % 2 == 0 ? -reach : reach);
   }
-  if (hapi_world_surface(physics, link)) {
+  if (hapi_world_surface(&physics->world, &physics->cycle, link)) {
     ++range->link_count;
   }
 }

@@ -4,17 +4,86 @@
 
 #include "physics/physics_internal.h"
 
-/* What the application says of its bodies. */
+/* The world's bodies: what changes in their table, and what the application says of them. Those who
+ * draw look bodies up in the table, so that it changes under the lock of the drawing. */
+
+static bool listener_grow(void *user, uint32_t capacity)
+{
+  hapi_physics *physics = user;
+  return hapi_poses_grow(&physics->drawing, capacity);
+}
+
+static void listener_body_begun(void *user, uint32_t index)
+{
+  hapi_physics *physics = user;
+  hapi_poses_begin(&physics->drawing, &physics->world.bodies.entries[index], index);
+}
+
+static void listener_body_gone(void *user, uint32_t index)
+{
+  hapi_physics *physics = user;
+  hapi_slots_drop_body(physics, index);
+  for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
+    if (physics->account.watch[i] == index) {
+      physics->account.watch[i] = HAPI_NONE;
+    }
+  }
+}
+
+static void listener_surface_asked(void *user, dGeomID a, dGeomID b,
+                                   const dSurfaceParameters *surface)
+{
+  hapi_lookback_ask(user, a, b, surface);
+}
+
+void hapi_physics_listen(hapi_physics *physics)
+{
+  physics->listener = (hapi_world_listener){.user = physics,
+                                            .grow = listener_grow,
+                                            .body_begun = listener_body_begun,
+                                            .body_gone = listener_body_gone,
+                                            .surface_asked = listener_surface_asked};
+}
+
+hap_status hapi_physics_scan(hapi_physics *physics)
+{
+  pthread_mutex_lock(&physics->drawing.lock);
+  hap_status status = hapi_bodies_scan(&physics->world, &physics->cycle);
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return status;
+}
+
+/* The local bodies once more: since the scan they may have been given what the loop made of them. */
+bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text)
+{
+  const hapi_slots *slots = &physics->near.slots;
+  if (hapi_world_is_unsound(&physics->world, out_text)) {
+    return true;
+  }
+  for (uint32_t i = 0; i < slots->body_high; ++i) {
+    uint32_t known = slots->bodies[i].known;
+    if (known != HAPI_NONE &&
+        hapi_body_is_unsound(&physics->world.bodies.entries[known], out_text)) {
+      return true;
+    }
+  }
+  return hapi_geoms_are_unsound(&physics->world, out_text);
+}
 
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
 {
-  uint32_t index;
-  return hapi_bodies_adopt(physics, body, &index);
+  pthread_mutex_lock(&physics->drawing.lock);
+  hap_status status = hapi_bodies_adopt(&physics->world.bodies, body);
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return status;
 }
 
 hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 {
-  return hapi_bodies_forget(physics, body);
+  pthread_mutex_lock(&physics->drawing.lock);
+  hap_status status = hapi_bodies_forget(&physics->world.bodies, body);
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return status;
 }
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
@@ -37,7 +106,11 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
                                            void (*callback)(struct dxBody *))
 {
-  return hapi_bodies_set_moved_callback(physics, body, callback);
+  pthread_mutex_lock(&physics->drawing.lock);
+  hap_status status =
+      hapi_bodies_set_moved_callback(&physics->world, &physics->cycle, body, callback);
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return status;
 }
 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
@@ -47,7 +120,7 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
   if (count > HAP_TRACE_BODIES_MAX) {
     return HAP_ERROR_CAPACITY;
   }
-  hap_status status = hapi_bodies_scan(physics); /* some may have been made since the last one */
+  hap_status status = hapi_physics_scan(physics); /* some may have been made since the last one */
   if (status < HAP_OK) {
     return status;
   }

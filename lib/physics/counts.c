@@ -8,12 +8,21 @@
 
 /* Physics' part of the statistics. */
 
+/* What the parts count themselves. */
+static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
+{
+  const hapi_world *world = &physics->world;
+  io_stats->bodies_known = world->bodies.used;
+  io_stats->bodies_lost = world->bodies.lost;
+  io_stats->quickstep_calls += world->counts.steps;
+  io_stats->contacts_rejected += world->counts.contacts_rejected;
+}
+
 void hapi_counts_show(hapi_physics *physics)
 {
-  physics->counts.own.stats.bodies_known = physics->world.bodies.used;
-  physics->counts.own.stats.bodies_lost = physics->world.bodies.lost;
   pthread_mutex_lock(&physics->counts.lock);
   physics->counts.shown = physics->counts.own;
+  counts_gather(physics, &physics->counts.shown.stats);
   pthread_mutex_unlock(&physics->counts.lock);
 }
 
@@ -97,5 +106,5 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   fill_lock(physics, out);
   fill_momentum(physics, out);
   pthread_mutex_unlock(&physics->counts.lock);
-  out->pose_delay_s = hapi_poses_delay(physics);
+  out->pose_delay_s = hapi_poses_delay(&physics->drawing);
 }

@@ -52,7 +52,7 @@ static void follow_model(hapi_physics *physics)
 static bool world_is_sound(hapi_physics *physics)
 {
   hap_detail what;
-  if (!hapi_world_is_unsound(physics, &what)) {
+  if (!hapi_physics_is_unsound(physics, &what)) {
     physics->world_faulty = false;
     return true;
   }
@@ -72,11 +72,13 @@ static void global_step(hapi_physics *physics)
   if (physics->cycle.step_s <= 0.0) {
     return;
   }
-  hapi_sleep_step(physics, physics->cycle.step_s);
+  bool single = physics->cycle.model == HAP_MODEL_SINGLE;
+  hapi_meant meant;
+  hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
   hapi_reconcile_hold(physics);
-  hapi_world_convert(physics);
-  hapi_world_quickstep(physics, physics->cycle.step_s);
-  hapi_world_restore(physics);
+  hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
+  hapi_world_step(&physics->world, physics->cycle.step_s);
+  hapi_world_restore(&physics->world, &meant);
   hapi_reconcile_let_go(physics);
 }
 
@@ -96,11 +98,11 @@ static void sync_in(hapi_physics *physics)
   hapi_dial_follow(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   call_step(physics, physics->world.ode.before_step);
-  if (hapi_bodies_scan(physics) < HAP_OK) {
+  if (hapi_physics_scan(physics) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   int64_t begin_ns = hapi_clock_now();
-  hapi_joints_scan(physics);
+  hapi_joints_scan(&physics->world);
   physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_reconcile_take(physics);
   hapi_reconcile_own(physics);
@@ -119,13 +121,15 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   }
   hapi_publish_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(physics);
-  hapi_joints_leave(physics);
+  hapi_joints_leave(&physics->world.joints);
   physics->cycle.last_cycle_ns = now_ns;
   /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
   int64_t lag_ns = physics->cycle.model == HAP_MODEL_IMPULSE ? next_ns - now_ns : 0;
-  hapi_poses_publish(physics,
-                     physics->cycle.model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
-                     physics->config.lockstep ? now_ns : hapi_clock_now());
+  const int64_t times_ns[2] = {
+      physics->cycle.model == HAP_MODEL_IMPULSE ? valid_ns + lag_ns : now_ns,
+      physics->config.lockstep ? now_ns : hapi_clock_now()};
+  hapi_poses_publish(&physics->drawing, &physics->world, &physics->near.slots, &physics->cycle,
+                     times_ns);
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)
@@ -170,7 +174,7 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   }
   hapi_reconcile_push(physics);
   seconds[4] += lap(&watch);
-  hapi_world_collide(physics);
+  hapi_world_collide(&physics->world, &physics->cycle, hapi_reuse_wanted(physics));
   seconds[0] += lap(&watch);
   hapi_neighbors_collect(physics);
   seconds[1] = lap(&watch);

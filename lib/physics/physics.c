@@ -16,7 +16,7 @@
 #define CANDIDATES_PER_CONTACT 8u
 #define LAST_ROUNDS 16 /* of edits, when the session stops: also of what edits post */
 
-static bool allocate(hapi_physics *physics)
+static bool allocate(hapi_physics *physics, const hap_ode_def *ode)
 {
   const hapi_capacity *c = &physics->config.capacity;
   hapi_neighbors *hood = &physics->near.neighbors;
@@ -34,16 +34,13 @@ static bool allocate(hapi_physics *physics)
   physics->probe.test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->probe.test.rounds);
   hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
   hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
-  physics->world.contact_scratch =
-      hapi_alloc_array((size_t)physics->world.ode.max_contacts_per_pair, sizeof(dContact));
   return physics->near.slots.bodies != NULL && physics->near.slots.contacts != NULL &&
          physics->research.crosses != NULL && hood->candidates != NULL && hood->hits != NULL &&
          hood->vertices != NULL && hood->hull != NULL && physics->probe.test.contacts != NULL &&
          physics->probe.test.rounds != NULL && physics->probe.test.bodies != NULL &&
          physics->probe.test.base != NULL && hapi_range_create(physics) &&
-         hapi_joints_create(physics) && hapi_cover_create(&hood->cover) &&
-         physics->world.contact_scratch != NULL &&
-         hapi_bodies_init(&physics->world.bodies) == HAP_OK;
+         hapi_cover_create(&hood->cover) &&
+         hapi_world_create(&physics->world, ode, c->joints, &physics->listener);
 }
 
 static bool init_locks(hapi_physics *physics)
@@ -57,12 +54,12 @@ static bool init_locks(hapi_physics *physics)
 /* The world as it is must be one that can be stepped. */
 static hap_status check_world(hapi_physics *physics, hap_detail *detail)
 {
-  if (hapi_bodies_scan(physics) < HAP_OK) {
+  if (hapi_physics_scan(physics) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the table of bodies");
   }
-  hapi_joints_scan(physics);
+  hapi_joints_scan(&physics->world);
   hap_detail text;
-  if (hapi_world_is_unsound(physics, &text)) {
+  if (hapi_physics_is_unsound(physics, &text)) {
     return hapi_fail(detail, HAP_ERROR_WORLD, "%s", text.text);
   }
   return HAP_OK;
@@ -92,7 +89,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   }
   physics->config = *config;
   physics->cycle.config = &physics->config;
-  physics->world.ode = *ode;
+  hapi_physics_listen(physics);
   physics->cycle.model = config->model;
   physics->wanted.latency_s = -1.0;
   atomic_init(&physics->wanted.model, (int)config->model);
@@ -102,14 +99,12 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
   atomic_init(&physics->dial.share[HAPI_DIAL_TICK], config->tick_share);
   atomic_init(&physics->dial.share[HAPI_DIAL_PHYSICS], config->physics_share);
-  if (!init_locks(physics) || !allocate(physics)) {
+  if (!init_locks(physics) || !allocate(physics, ode)) {
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
   physics->near.neighbors.probe_geom = dCreateSphere(NULL, 1.0);
   physics->near.neighbors.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
-  physics->world.contact_group = dJointGroupCreate(0);
-  physics->world.carried_group = dJointGroupCreate(0);
   hapi_slots_reset(physics);
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
@@ -130,14 +125,9 @@ void hapi_physics_destroy(hapi_physics *physics)
     dGeomDestroy(physics->near.neighbors.probe_geom);
     dGeomDestroy(physics->near.neighbors.plane_geom);
   }
-  if (physics->world.contact_group != NULL) {
-    dJointGroupDestroy(physics->world.contact_group);
-    dJointGroupDestroy(physics->world.carried_group);
-  }
-  hapi_bodies_finish(&physics->world.bodies);
-  hapi_free(physics->world.surfaces.entries);
+  hapi_world_finish(&physics->world);
+  hapi_poses_finish(&physics->drawing);
   hapi_range_finish(physics);
-  hapi_joints_finish(&physics->world.joints);
   hapi_meshes_finish(&physics->near.meshes);
   hapi_snapshot_finish(&physics->probe.snapshot);
   hapi_test_finish(&physics->probe.test);
@@ -152,7 +142,6 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_free(physics->near.tools.points);
   hapi_free(physics->near.neighbors.vertices);
   hapi_free(physics->near.neighbors.hull);
-  hapi_free(physics->world.contact_scratch);
   hapi_fair_lock_finish(&physics->lock.fair);
   pthread_mutex_destroy(&physics->edits.lock);
   pthread_mutex_destroy(&physics->drawing.lock);
@@ -166,20 +155,21 @@ static void give_world_back(hapi_physics *physics)
   dJointGroupEmpty(physics->world.contact_group);
   dJointGroupEmpty(physics->world.carried_group);
   /* What was destroyed since the last cycle must not be given anything back. */
-  (void)hapi_bodies_scan(physics); /* a body without memory for it was given nothing */
+  (void)hapi_physics_scan(physics); /* a body without memory for it was given nothing */
   release_bodies(physics);
-  hapi_islands_end(physics);
+  hapi_islands_end(&physics->world);
   if (physics->world.islands_threads != 0) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world,
                                                  physics->world.islands_threads);
     physics->world.islands_threads = 0;
   }
-  physics->begun = false;
+  physics->world.begun = false;
 }
 
 static void reset_figures(hapi_physics *physics)
 {
   memset(&physics->counts.own, 0, sizeof physics->counts.own);
+  memset(&physics->world.counts, 0, sizeof physics->world.counts);
   hapi_histogram_reset(&physics->counts.cycle_ns);
   hapi_lock_figures_reset(&physics->lock.figures);
   hapi_counts_show(physics);
@@ -194,7 +184,7 @@ static void build_first_model(hapi_physics *physics)
 {
   hapi_dial_enter(physics);
   hapi_reconcile_take(physics);
-  hapi_world_collide(physics);
+  hapi_world_collide(&physics->world, &physics->cycle, hapi_reuse_wanted(physics));
   hapi_neighbors_collect(physics);
   hapi_neighbors_find(physics);
   hapi_accelerance_measure(physics);
@@ -232,9 +222,10 @@ static void prepare(hapi_physics *physics)
 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
-  physics->begun = true;
-  hapi_slots_reset(physics);  /* of a session before: the scan leaves what is local to others */
-  hapi_joints_reset(physics); /* as for the meshes below; and walks are counted from 1 again */
+  physics->world.begun = true;
+  hapi_slots_reset(physics); /* of a session before: the scan leaves what is local to others */
+  hapi_joints_reset(
+      &physics->world.joints); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
   if (status >= HAP_OK) {
     status = hapi_tape_world(physics, detail);
@@ -243,7 +234,8 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
     give_world_back(physics);
     return status;
   }
-  if (!hapi_islands_begin(physics)) {
+  if (!hapi_islands_begin(&physics->world,
+                          physics->config.lockstep || physics->tape.tape != NULL)) {
     give_world_back(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for island_threads = %d",
                      physics->world.ode.island_threads);
@@ -255,8 +247,10 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   hapi_tape_start(physics, start_ns);
   physics->pace.start_ns = *start_ns;
   physics->cycle.last_cycle_ns = *start_ns;
-  hapi_poses_reset(physics);
-  hapi_poses_publish(physics, *start_ns, *start_ns);
+  hapi_poses_reset(&physics->drawing);
+  const int64_t times_ns[2] = {*start_ns, *start_ns};
+  hapi_poses_publish(&physics->drawing, &physics->world, &physics->near.slots, &physics->cycle,
+                     times_ns);
   hapi_publish_model(physics, *start_ns, *start_ns);
   hapi_tape_started(physics);
   hapi_reconcile_leave(physics);
@@ -267,7 +261,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
 
 void hapi_physics_end(hapi_physics *physics)
 {
-  if (!physics->begun) {
+  if (!physics->world.begun) {
     return;
   }
   hapi_physics_stop_thread(physics);

@@ -42,6 +42,7 @@ struct hapi_physics {
   hapi_physics_config config;
   hapi_cycle cycle;
   hapi_world world;
+  hapi_world_listener listener; /* of world */
   hapi_nearby near;
   hapi_probe probe;
   hapi_research research;
@@ -55,11 +56,16 @@ struct hapi_physics {
   hapi_edits edits;
   hapi_world_lock lock;
   hapi_pace pace;
-  bool begun;
   bool world_faulty; /* holds a state that ODE would abort on: not stepped */
 };
 
 /* physics.c: H, or T in model SINGLE */
 double hapi_period_of(const hapi_physics *physics, hap_model model);
+
+/* adopt.c */
+void hapi_physics_listen(hapi_physics *physics);     /* to the world, which is created after that */
+hap_status hapi_physics_scan(hapi_physics *physics); /* reads which bodies there are */
+/* ODE would abort on what the world holds. *out_text says what it is and what to do. After a scan. */
+bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text);
 
 #endif

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/alloc.h"
+#include "base/assert.h"
 #include "base/pose.h"
 #include "physics/physics_internal.h"
 
@@ -21,9 +23,9 @@
 #define FRAMES_APART 0.25      /* H: frames of model SINGLE are kept no closer */
 #define TIME_LIMIT (1LL << 61) /* ns */
 
-static double step_ns(const hapi_physics *physics)
+static double step_ns(const hapi_physics_config *config)
 {
-  return 1e9 / physics->config.physics_hz;
+  return 1e9 / config->physics_hz;
 }
 
 static double delay_at(const hapi_frames *frames, int64_t time_ns)
@@ -60,10 +62,10 @@ static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
  * change of model leads to. In model SINGLE, whose steps would soon use up the ring, a frame goes when the
  * next one comes unless it is some way behind the one before; elsewhere that would show, where a late
  * frame loop leaves two steps close together. */
-static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
+static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t stamp_ns,
+                           int64_t known_ns)
 {
-  hapi_frames *frames = &physics->drawing.frames;
-  double step = step_ns(physics);
+  double step = step_ns(cycle->config);
   if (frames->count == 0) {
     frames->delay_ns = frames->delay_wanted_ns = step;
     frames->delay_from_ns = known_ns;
@@ -74,7 +76,7 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
          frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
     --frames->count;
   }
-  if (physics->cycle.model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
+  if (cycle->model == HAP_MODEL_SINGLE && frames->count >= frames->oldest + 2) {
     int64_t newest = frames->stamps[(frames->count - 1) % HAPI_FRAMES];
     int64_t before = frames->stamps[(frames->count - 2) % HAPI_FRAMES];
     frames->count -= (double)(newest - before) < FRAMES_APART * step;
@@ -87,32 +89,21 @@ static uint64_t next_frame(hapi_physics *physics, int64_t stamp_ns, int64_t know
   return frame;
 }
 
-void hapi_pose_read(dBodyID body, hap_pose *out)
-{
-  hapi_v3_copy(dBodyGetPosition(body), out->position);
-  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
-}
-
-bool hapi_pose_is_sound(dBodyID body)
-{
-  return hapi_finite(dBodyGetPosition(body), 3) && hapi_finite(dBodyGetQuaternion(body), 4);
-}
-
 /* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it exactly. */
-static bool led_by_loop(const hapi_physics *physics, const hapi_known_body *known)
+static bool led_by_loop(const hapi_known_body *known, const hapi_cycle *cycle,
+                        const hapi_slots *slots)
 {
-  bool pushed =
-      physics->cycle.model == HAP_MODEL_ACCELERANCE || physics->cycle.model == HAP_MODEL_CONTACT;
-  pushed = pushed && known->slot != HAPI_NONE && physics->near.slots.bodies[known->slot].pushed;
+  bool pushed = cycle->model == HAP_MODEL_ACCELERANCE || cycle->model == HAP_MODEL_CONTACT;
+  pushed = pushed && known->slot != HAPI_NONE && slots->bodies[known->slot].pushed;
   return known->loop_owned || pushed;
 }
 
-static void note_slot(const hapi_physics *physics, const hapi_known_body *known, hapi_drawn *drawn)
+static void note_slot(const hapi_known_body *known, const hapi_slots *slots, hapi_drawn *drawn)
 {
   if (known->slot == HAPI_NONE) {
     return;
   }
-  uint32_t generation = physics->near.slots.bodies[known->slot].generation;
+  uint32_t generation = slots->bodies[known->slot].generation;
   if (drawn->slots[0] != known->slot || drawn->generations[0] != generation) {
     drawn->slots[1] = drawn->slots[0];
     drawn->generations[1] = drawn->generations[0];
@@ -121,75 +112,120 @@ static void note_slot(const hapi_physics *physics, const hapi_known_body *known,
   }
 }
 
-static hap_pose *pose_in(const hapi_body_table *table, const hapi_drawn *drawn, uint64_t frame)
+static hap_pose *pose_in(const hapi_drawing *drawing, const hapi_drawn *drawn, uint64_t frame)
 {
-  return &table->poses[(frame % HAPI_FRAMES) * table->capacity + (size_t)(drawn - table->drawn)];
+  HAPI_ASSERT_INDEX(drawn - drawing->drawn, drawing->capacity);
+  return &drawing
+              ->poses[(frame % HAPI_FRAMES) * drawing->capacity + (size_t)(drawn - drawing->drawn)];
 }
 
-static void add_pose(const hapi_physics *physics, uint32_t index, uint64_t frame)
+static void add_pose(const hapi_drawing *drawing, const hapi_known_body *known, uint32_t index,
+                     uint64_t frame)
 {
-  const hapi_known_body *known = &physics->world.bodies.entries[index];
-  hapi_drawn *drawn = &physics->world.bodies.drawn[index];
-  uint32_t bit = 1u << (frame % HAPI_FRAMES);
+  hapi_drawn *drawn = &drawing->drawn[index];
   if (hapi_pose_is_sound(known->body)) {
-    hapi_pose_read(known->body, pose_in(&physics->world.bodies, drawn, frame));
+    hapi_pose_read(known->body, pose_in(drawing, drawn, frame));
     drawn->first = drawn->first > frame ? frame : drawn->first;
   } else if (drawn->first < frame) {
-    *pose_in(&physics->world.bodies, drawn, frame) =
-        *pose_in(&physics->world.bodies, drawn, frame - 1);
+    *pose_in(drawing, drawn, frame) = *pose_in(drawing, drawn, frame - 1);
   }
-  drawn->led = led_by_loop(physics, known) ? drawn->led | bit : drawn->led & ~bit;
-  note_slot(physics, known, drawn);
 }
 
-void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns)
+static void note_leader(const hapi_drawing *drawing, const hapi_known_body *known,
+                        const hapi_cycle *cycle, const hapi_slots *slots, uint32_t index)
 {
-  pthread_mutex_lock(&physics->drawing.lock);
-  uint64_t frame = next_frame(physics, stamp_ns, known_ns);
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    if (physics->world.bodies.entries[i].body != NULL) {
-      add_pose(physics, i, frame);
-      if (physics->cycle.step_s > 0.0) { /* here, as each body is at hand */
-        hapi_sleep_note(&physics->world.bodies.entries[i]);
+  hapi_drawn *drawn = &drawing->drawn[index];
+  uint32_t bit = 1u << ((drawing->frames.count - 1) % HAPI_FRAMES);
+  drawn->led = led_by_loop(known, cycle, slots) ? drawn->led | bit : drawn->led & ~bit;
+  note_slot(known, slots, drawn);
+}
+
+void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const hapi_slots *slots,
+                        const hapi_cycle *cycle, const int64_t times_ns[2])
+{
+  pthread_mutex_lock(&drawing->lock);
+  uint64_t frame = next_frame(&drawing->frames, cycle, times_ns[0], times_ns[1]);
+  for (uint32_t i = 0; i < world->bodies.high; ++i) {
+    hapi_known_body *known = &world->bodies.entries[i];
+    if (known->body != NULL) {
+      add_pose(drawing, known, i, frame);
+      note_leader(drawing, known, cycle, slots, i);
+      if (cycle->step_s > 0.0) { /* here, as each body is at hand */
+        hapi_sleep_note(known);
       }
     }
   }
-  pthread_mutex_unlock(&physics->drawing.lock);
+  pthread_mutex_unlock(&drawing->lock);
 }
 
-void hapi_poses_begin(hapi_physics *physics, uint32_t index)
+bool hapi_poses_grow(hapi_drawing *drawing, uint32_t capacity)
 {
-  hapi_drawn *drawn = &physics->world.bodies.drawn[index];
-  uint64_t count = physics->drawing.frames.count;
+  if (capacity <= drawing->capacity) {
+    return true;
+  }
+  hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
+  hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
+  if (drawn == NULL || poses == NULL) {
+    hapi_free(drawn);
+    hapi_free(poses);
+    return false;
+  }
+  uint32_t old = drawing->capacity;
+  if (old > 0) {
+    memcpy(drawn, drawing->drawn, old * sizeof *drawn);
+    for (size_t i = 0; i < HAPI_FRAMES; ++i) {
+      memcpy(poses + i * capacity, drawing->poses + i * old, old * sizeof *poses);
+    }
+  }
+  hapi_poses_finish(drawing);
+  drawing->drawn = drawn;
+  drawing->poses = poses;
+  drawing->capacity = capacity;
+  return true;
+}
+
+void hapi_poses_finish(hapi_drawing *drawing)
+{
+  hapi_free(drawing->drawn);
+  hapi_free(drawing->poses);
+  drawing->drawn = NULL;
+  drawing->poses = NULL;
+  drawing->capacity = 0;
+}
+
+void hapi_poses_begin(hapi_drawing *drawing, const hapi_known_body *known, uint32_t index)
+{
+  hapi_drawn *drawn = &drawing->drawn[index];
+  uint64_t count = drawing->frames.count;
+  HAPI_ASSERT(known->slot == HAPI_NONE); /* new: the loop does not lead it */
   memset(drawn, 0, sizeof *drawn);
   drawn->first = count;
   if (count > 0) {
-    add_pose(physics, index, count - 1);
+    add_pose(drawing, known, index, count - 1);
   }
 }
 
-void hapi_poses_reset(hapi_physics *physics)
+void hapi_poses_reset(hapi_drawing *drawing)
 {
-  pthread_mutex_lock(&physics->drawing.lock);
-  memset(&physics->drawing.frames, 0, sizeof physics->drawing.frames);
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    memset(&physics->world.bodies.drawn[i], 0, sizeof physics->world.bodies.drawn[i]);
-  }
-  pthread_mutex_unlock(&physics->drawing.lock);
+  pthread_mutex_lock(&drawing->lock);
+  memset(&drawing->frames, 0, sizeof drawing->frames);
+  memset(drawing->drawn, 0, drawing->capacity * sizeof *drawing->drawn);
+  pthread_mutex_unlock(&drawing->lock);
 }
 
 /* ---- drawing ---- */
 
-typedef struct drawing {
-  const hapi_physics *physics;
+typedef struct scene {
+  const hapi_drawing *drawing;
   const hapi_frames *frames;
+  double step_ns;
   hapi_trail_view rows;
   int64_t time_ns;
   uint64_t row;         /* first one later than time_ns */
   uint64_t frame;       /* the same of the frames */
   uint64_t frame_first; /* that is kept */
   bool newest;          /* beyond the last frame bodies go on as they went */
-} drawing;
+} scene;
 
 typedef struct sample {
   int64_t time_ns;
@@ -197,7 +233,7 @@ typedef struct sample {
   hap_pose pose;
 } sample;
 
-static int64_t stamp_of(const drawing *d, uint64_t frame)
+static int64_t stamp_of(const scene *d, uint64_t frame)
 {
   return d->frames->stamps[frame % HAPI_FRAMES];
 }
@@ -207,14 +243,14 @@ static bool is_led(const hapi_drawn *drawn, uint64_t frame)
   return (drawn->led >> (frame % HAPI_FRAMES) & 1u) != 0;
 }
 
-static void sample_frame(const drawing *d, const hapi_drawn *drawn, uint64_t frame, sample *out)
+static void sample_frame(const scene *d, const hapi_drawn *drawn, uint64_t frame, sample *out)
 {
   out->time_ns = stamp_of(d, frame);
   out->frame = frame;
-  out->pose = *pose_in(&d->physics->world.bodies, drawn, frame);
+  out->pose = *pose_in(d->drawing, drawn, frame);
 }
 
-static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample *out)
+static bool sample_row(scene *d, const hapi_drawn *drawn, uint64_t row, sample *out)
 {
   for (int i = 0; i < 2; ++i) {
     if (drawn->generations[i] != 0 &&
@@ -230,7 +266,7 @@ static bool sample_row(drawing *d, const hapi_drawn *drawn, uint64_t row, sample
 /* The newest that is known of the body up to the time: in the trail, or in a frame where that is later. A
  * frame that only repeats the loop is no better than the trail; it stands in where that does not
  * reach. */
-static bool find_before(drawing *d, const hapi_drawn *drawn, sample *out)
+static bool find_before(scene *d, const hapi_drawn *drawn, sample *out)
 {
   uint64_t first = drawn->first > d->frame_first ? drawn->first : d->frame_first;
   uint64_t frame = d->frame;
@@ -252,7 +288,7 @@ static bool find_before(drawing *d, const hapi_drawn *drawn, sample *out)
 }
 
 /* The next that is known of it after the time, in the same way. */
-static bool find_after(drawing *d, const hapi_drawn *drawn, sample *out)
+static bool find_after(scene *d, const hapi_drawn *drawn, sample *out)
 {
   uint64_t next = d->frame > drawn->first ? d->frame : drawn->first;
   uint64_t frame = next;
@@ -273,7 +309,7 @@ static bool find_after(drawing *d, const hapi_drawn *drawn, sample *out)
 }
 
 /* From the last but one frame through the last one, for one step at most. */
-static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last, hap_pose *out)
+static void go_on(const scene *d, const hapi_drawn *drawn, const sample *last, hap_pose *out)
 {
   uint64_t before = last->frame - 1;
   bool known = d->newest && last->frame < d->frames->count && last->frame > d->frame_first &&
@@ -283,12 +319,11 @@ static void go_on(const drawing *d, const hapi_drawn *drawn, const sample *last,
     return;
   }
   double interval = (double)(last->time_ns - stamp_of(d, before));
-  double since = fmin((double)(d->time_ns - last->time_ns), step_ns(d->physics));
-  hapi_pose_slerp(pose_in(&d->physics->world.bodies, drawn, before), &last->pose,
-                  1.0 + since / interval, out);
+  double since = fmin((double)(d->time_ns - last->time_ns), d->step_ns);
+  hapi_pose_slerp(pose_in(d->drawing, drawn, before), &last->pose, 1.0 + since / interval, out);
 }
 
-static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
+static void draw(scene *d, const hapi_drawn *drawn, hap_pose *out)
 {
   sample before = {0};
   sample after = {0};
@@ -306,7 +341,7 @@ static void draw(drawing *d, const hapi_drawn *drawn, hap_pose *out)
   hapi_pose_slerp(&before.pose, &after.pose, fmin(fmax(share, 0.0), 1.0), out);
 }
 
-static void seek(drawing *d)
+static void seek(scene *d)
 {
   const hapi_frames *frames = d->frames;
   d->frame_first = frames->oldest;
@@ -317,7 +352,7 @@ static void seek(drawing *d)
   d->row = hapi_trail_after(&d->rows, d->time_ns, HAPI_TRAIL_BODIES);
 }
 
-static int64_t newest_time(drawing *d)
+static int64_t newest_time(scene *d)
 {
   return d->rows.end > d->rows.first ? hapi_trail_time(&d->rows, d->rows.end - 1, HAPI_TRAIL_BODIES)
                                      : stamp_of(d, d->frames->count - 1);
@@ -330,11 +365,11 @@ static int64_t drawn_time(const hapi_frames *frames, int64_t time_ns)
 }
 
 /* late_steps: from the last frame, that are in order. */
-static hap_status judge(const drawing *d, double late_steps)
+static hap_status judge(const scene *d, double late_steps)
 {
   const hapi_frames *frames = d->frames;
   double late = (double)(d->time_ns - stamp_of(d, frames->count - 1));
-  if (late > late_steps * step_ns(d->physics)) {
+  if (late > late_steps * d->step_ns) {
     return HAP_STALE;
   }
   int64_t oldest_ns = stamp_of(d, d->frame_first);
@@ -343,12 +378,12 @@ static hap_status judge(const drawing *d, double late_steps)
   return (double)(oldest_ns - d->time_ns) > slack ? HAP_CLAMPED : HAP_OK;
 }
 
-static bool all_known(const hapi_physics *physics, struct dxBody *const *bodies, size_t count)
+static bool all_known(const hapi_drawing *drawing, const hapi_body_table *table,
+                      struct dxBody *const *bodies, size_t count)
 {
   for (size_t i = 0; i < count; ++i) {
-    uint32_t index = hapi_bodies_find(&physics->world.bodies, bodies[i]);
-    if (index == HAPI_NONE ||
-        physics->world.bodies.drawn[index].first >= physics->drawing.frames.count) {
+    uint32_t index = hapi_bodies_find(table, bodies[i]);
+    if (index == HAPI_NONE || drawing->drawn[index].first >= drawing->frames.count) {
       return false;
     }
   }
@@ -356,21 +391,22 @@ static bool all_known(const hapi_physics *physics, struct dxBody *const *bodies,
 }
 
 /* False: the trail went on so far meanwhile that what was read of it may be torn. */
-static bool draw_all(drawing *d, struct dxBody *const *bodies, size_t count, hap_pose *out)
+static bool draw_all(scene *d, const hapi_body_table *table, struct dxBody *const *bodies,
+                     size_t count, hap_pose *out)
 {
   seek(d);
   for (size_t i = 0; i < count; ++i) {
-    draw(d, &d->physics->world.bodies.drawn[hapi_bodies_find(&d->physics->world.bodies, bodies[i])],
-         &out[i]);
+    draw(d, &d->drawing->drawn[hapi_bodies_find(table, bodies[i])], &out[i]);
   }
   return hapi_trail_is_whole(&d->rows);
 }
 
-static drawing begin(const hapi_physics *physics)
+static scene scene_begin(const hapi_physics *physics)
 {
-  return (drawing){.physics = physics,
-                   .frames = &physics->drawing.frames,
-                   .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
+  return (scene){.drawing = &physics->drawing,
+                 .frames = &physics->drawing.frames,
+                 .step_ns = step_ns(&physics->config),
+                 .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
 }
 
 hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
@@ -378,11 +414,11 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
 {
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->drawing.lock);
-  bool known = all_known(physics, bodies, count);
+  bool known = all_known(&physics->drawing, &physics->world.bodies, bodies, count);
   for (bool whole = !known || count == 0; !whole;) {
-    drawing d = begin(physics);
+    scene d = scene_begin(physics);
     d.time_ns = drawn_time(&physics->drawing.frames, time_ns);
-    whole = draw_all(&d, bodies, count, out);
+    whole = draw_all(&d, &physics->world.bodies, bodies, count, out);
     status = judge(&d, 1.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
@@ -394,12 +430,12 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
 {
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->drawing.lock);
-  bool known = all_known(physics, bodies, count);
+  bool known = all_known(&physics->drawing, &physics->world.bodies, bodies, count);
   for (bool whole = !known || count == 0; !whole;) {
-    drawing d = begin(physics);
+    scene d = scene_begin(physics);
     d.newest = true;
     d.time_ns = newest_time(&d);
-    whole = draw_all(&d, bodies, count, out);
+    whole = draw_all(&d, &physics->world.bodies, bodies, count, out);
     status = judge(&d, 2.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
@@ -414,10 +450,10 @@ int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)
   return time;
 }
 
-double hapi_poses_delay(hapi_physics *physics)
+double hapi_poses_delay(hapi_drawing *drawing)
 {
-  pthread_mutex_lock(&physics->drawing.lock);
-  double delay = 1e-9 * physics->drawing.frames.delay_ns;
-  pthread_mutex_unlock(&physics->drawing.lock);
+  pthread_mutex_lock(&drawing->lock);
+  double delay = 1e-9 * drawing->frames.delay_ns;
+  pthread_mutex_unlock(&drawing->lock);
   return delay;
 }

@@ -9,20 +9,19 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "world/bodies.h"
-
-typedef struct hapi_physics hapi_physics;
+#include "near/slots.h"
+#include "world/world.h"
 
 #define HAPI_FRAMES 8u /* of the world, that are kept */
 #define HAPI_WAITS 16u
 
 /* Of a known body. Frame number n has place n % HAPI_FRAMES. */
-struct hapi_drawn {
+typedef struct hapi_drawn {
   uint64_t first;          /* frame with a pose */
   uint32_t led;            /* bits: in this frame the pose is only the loop's */
   uint32_t slots[2];       /* in the trail: now, and before */
   uint32_t generations[2]; /* 0: none */
-};
+} hapi_drawn;
 
 typedef struct hapi_frames {
   int64_t stamps[HAPI_FRAMES]; /* rising; time for which the poses hold in what is felt */
@@ -36,19 +35,21 @@ typedef struct hapi_frames {
 } hapi_frames;
 
 typedef struct hapi_drawing {
+  pthread_mutex_t lock; /* physics and those who draw: all of this, and the table of bodies */
   hapi_frames frames;
-  pthread_mutex_t lock; /* physics and those who draw: frames, and the places of the body table */
+  hapi_drawn *drawn; /* by entry of the body table */
+  hap_pose *poses;   /* HAPI_FRAMES x capacity: a frame is written from end to end */
+  uint32_t capacity;
 } hapi_drawing;
 
-/* poses.c */
-void hapi_pose_read(dBodyID body, hap_pose *out);
-/* A step can leave a pose that is none, which is found out at the next cycle only. */
-bool hapi_pose_is_sound(dBodyID body);
-/* A frame of all bodies, for stamp_ns, at known_ns. */
-void hapi_poses_publish(hapi_physics *physics, int64_t stamp_ns, int64_t known_ns);
-/* A body that is new can be drawn at once, as it is now. The caller holds poses_lock. */
-void hapi_poses_begin(hapi_physics *physics, uint32_t index);
-void hapi_poses_reset(hapi_physics *physics);
-double hapi_poses_delay(hapi_physics *physics); /* s */
+/* A frame of all bodies, for times_ns[0], known at times_ns[1]. */
+void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const hapi_slots *slots,
+                        const hapi_cycle *cycle, const int64_t times_ns[2]);
+/* A body that is new can be drawn at once, as it is now. The caller holds the lock; of grow too. */
+void hapi_poses_begin(hapi_drawing *drawing, const hapi_known_body *known, uint32_t index);
+bool hapi_poses_grow(hapi_drawing *drawing, uint32_t capacity); /* false: no memory */
+void hapi_poses_finish(hapi_drawing *drawing);
+void hapi_poses_reset(hapi_drawing *drawing);
+double hapi_poses_delay(hapi_drawing *drawing); /* s */
 
 #endif

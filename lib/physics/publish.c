@@ -189,6 +189,18 @@ static void count_model(hapi_physics *physics, const hapi_model *model)
   }
 }
 
+static void publish_joints(hapi_physics *physics, hapi_model *out)
+{
+  const hapi_range *range = &physics->near.range;
+  const hapi_publishing p = {&physics->cycle, &physics->world, &physics->near.slots};
+  out->joint_count = 0;
+  if (physics->cycle.model == HAP_MODEL_CONTACT && range->number == physics->cycle.model_number) {
+    hapi_joints_take_slots(&physics->world.joints, range->number, range->joints,
+                           range->joint_count);
+    hapi_publish_joints(&p, range->joints, range->joint_count, out);
+  }
+}
+
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
 {
   hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
@@ -225,7 +237,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
     }
   }
   int64_t begin_ns = hapi_clock_now();
-  hapi_joints_publish(physics, out);
+  publish_joints(physics, out);
   physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   out->bounces = count_bounces(physics, out);
   fill_watch(physics, out);

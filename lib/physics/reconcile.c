@@ -242,7 +242,7 @@ void hapi_reconcile_hold(hapi_physics *physics)
       dBodyDisable(body);
     }
   }
-  hapi_joints_hold(physics);
+  hapi_hold_joints(physics);
 }
 
 void hapi_reconcile_let_go(hapi_physics *physics)
@@ -259,7 +259,7 @@ void hapi_reconcile_let_go(hapi_physics *physics)
     }
     slot->held = false;
   }
-  hapi_joints_let_go(physics);
+  hapi_hold_let_go_joints(physics);
 }
 
 /* What the pointers gave in the last interval acts over the global step. */

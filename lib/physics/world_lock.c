@@ -45,7 +45,8 @@ bool hapi_physics_may_edit(hapi_physics *physics)
   if (hapi_physics_in_callback(physics)) {
     return physics->lock.editable;
   }
-  return !physics->begun || physics->config.lockstep || hapi_fair_lock_is_mine(&physics->lock.fair);
+  return !physics->world.begun || physics->config.lockstep ||
+         hapi_fair_lock_is_mine(&physics->lock.fair);
 }
 
 /* ---- the application's side ---- */

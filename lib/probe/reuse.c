@@ -367,7 +367,6 @@ void hapi_reuse_reset(hapi_physics *physics)
   for (int i = 0; i < HAPI_REUSE_BOOKS; ++i) {
     physics->probe.reuse.books[i].round += 2; /* no place stands for anything */
   }
-  physics->probe.reuse.notes.count = 0;
 }
 
 void hapi_reuse_finish(hapi_physics *physics)
@@ -380,5 +379,4 @@ void hapi_reuse_finish(hapi_physics *physics)
     hapi_free(physics->probe.reuse.books[i].members);
     hapi_free(physics->probe.reuse.books[i].islands);
   }
-  hapi_free(physics->probe.reuse.notes.list);
 }

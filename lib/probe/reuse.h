@@ -90,23 +90,10 @@ typedef struct hapi_reuse_book {
   uint32_t island_capacity;
 } hapi_reuse_book;
 
-/* Contacts of the step, as they were given to ODE, which has no getter for them. */
-typedef struct hapi_contact_note {
-  dJointID joint; /* compared only */
-  dContact contact;
-} hapi_contact_note;
-
-typedef struct hapi_contact_notes {
-  hapi_contact_note *list;
-  uint32_t count;
-  uint32_t capacity;
-} hapi_contact_notes;
-
 #define HAPI_REUSE_BOOKS 2 /* accelerance.c, operating_point.c */
 
 typedef struct hapi_reuse {
   hapi_reuse_book books[HAPI_REUSE_BOOKS];
-  hapi_contact_notes notes;
 } hapi_reuse;
 
 /* reuse.c */
@@ -137,8 +124,6 @@ typedef struct hapi_printer {
 void hapi_print_value(hapi_printer *p, double value, double weight); /* weight as in an item */
 void hapi_print_vector(hapi_printer *p, const double *values, int count, double weight);
 bool hapi_print_island(hapi_physics *physics, hapi_reuse_book *book, uint32_t island, bool bodies);
-/* A contact joint that is made for the step. */
-void hapi_reuse_note(hapi_physics *physics, dJointID joint, const dContact *contact);
 
 /* reuse_joint.c: a joint of the application, of bodies whose far points are within arm. */
 void hapi_print_joint(hapi_printer *p, dJointID joint, double arm);

@@ -133,26 +133,6 @@ static void print_body(hapi_printer *p, uint32_t known, const dMass *mass, const
 
 /* ---- contacts and joints ---- */
 
-void hapi_reuse_note(hapi_physics *physics, dJointID joint, const dContact *contact)
-{
-  hapi_contact_notes *notes = &physics->probe.reuse.notes;
-  if (!hapi_reserve((void **)&notes->list, &notes->capacity, notes->count, 1,
-                    sizeof *notes->list)) {
-    return; /* its island is measured */
-  }
-  notes->list[notes->count++] = (hapi_contact_note){joint, *contact};
-  dJointSetData(joint, (void *)(uintptr_t)notes->count); /* the joint is ours */
-}
-
-/* NULL: it is the application's own. */
-static const dContact *noted(const hapi_physics *physics, dJointID joint)
-{
-  const hapi_contact_notes *notes = &physics->probe.reuse.notes;
-  uintptr_t number = (uintptr_t)dJointGetData(joint);
-  bool ours = number > 0 && number <= notes->count && notes->list[number - 1].joint == joint;
-  return ours ? &notes->list[number - 1].contact : NULL;
-}
-
 static uint64_t hash_of_surface(const dSurfaceParameters *s)
 {
   const double values[] = {s->mode,    s->mu,      s->mu2,        s->rho,      s->rho2,
@@ -181,7 +161,7 @@ static uint64_t birth_of(const hapi_physics *physics, dBodyID body)
 static void print_contact(hapi_printer *p, dJointID joint, double arm)
 {
   hapi_reuse_book *book = p->book;
-  const dContact *contact = noted(p->physics, joint);
+  const dContact *contact = hapi_world_contact_of(&p->physics->world, joint);
   p->good = p->good && contact != NULL &&
             hapi_reserve((void **)&book->touches, &book->touch_capacity, book->touch_count, 1,
                          sizeof *book->touches);

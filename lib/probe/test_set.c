@@ -323,7 +323,7 @@ hap_status hapi_test_enter(hapi_physics *physics)
   }
   test->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->world.ode.world);
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world, 1);
-  hapi_islands_rest(physics);
+  hapi_islands_rest(&physics->world);
   status = cut_joints(physics);
   if (status >= HAP_OK) {
     status = switch_off(physics);
@@ -410,7 +410,7 @@ void hapi_test_leave(hapi_physics *physics)
   test->cut_count = 0;
   test->disabled_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world, test->islands_threads);
-  hapi_islands_go_on(physics);
+  hapi_islands_go_on(&physics->world);
 }
 
 /* The application's forces of the last step act in a probe as well: it may add them at each step,
@@ -439,7 +439,8 @@ void hapi_test_rewind(hapi_physics *physics)
 void hapi_test_step(hapi_physics *physics)
 {
   ++physics->counts.own.stats.probe_steps;
-  hapi_world_quickstep(physics, physics->cycle.probe_step_s);
+  ++physics->counts.own.stats.quickstep_calls;
+  dWorldQuickStep(physics->world.ode.world, physics->cycle.probe_step_s);
 }
 
 const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known)

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "base/alloc.h"
-#include "base/log.h"
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* ODE cannot list a world's bodies, so they are found through the space's geoms and the joints, at
  * every cycle: what the application added or destroyed in between is seen at once, and no pointer
@@ -20,51 +20,42 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
 
 static hap_status grow(hapi_body_table *table, uint32_t capacity)
 {
-  if (!hapi_index_reserve(&table->by_address, capacity)) {
+  const hapi_world_listener *listener = table->listener;
+  if (!hapi_index_reserve(&table->by_address, capacity) ||
+      !listener->grow(listener->user, capacity)) {
     return HAP_ERROR_MEMORY;
   }
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
   hapi_known_rest *rests = hapi_alloc_array(capacity, sizeof *rests);
   dBodyID *handles = hapi_alloc_array(capacity, sizeof(dBodyID));
-  hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
-  hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
-  if (entries == NULL || rests == NULL || handles == NULL || drawn == NULL || poses == NULL) {
+  if (entries == NULL || rests == NULL || handles == NULL) {
     hapi_free(entries);
     hapi_free(rests);
     hapi_free(handles);
-    hapi_free(drawn);
-    hapi_free(poses);
     return HAP_ERROR_MEMORY;
   }
   if (table->entries != NULL) {
     memcpy(entries, table->entries, table->high * sizeof *entries);
     memcpy(rests, table->rests, table->high * sizeof *rests);
     memcpy(handles, table->handles, table->high * sizeof(dBodyID));
-    memcpy(drawn, table->drawn, table->high * sizeof *drawn);
-    for (size_t i = 0; i < HAPI_FRAMES; ++i) {
-      memcpy(poses + i * capacity, table->poses + i * table->capacity, table->high * sizeof *poses);
-    }
   }
   hapi_free(table->entries);
   hapi_free(table->rests);
   hapi_free(table->handles);
-  hapi_free(table->drawn);
-  hapi_free(table->poses);
   for (uint32_t i = 0; i < capacity; ++i) {
     entries[i].rest = &rests[i];
   }
   table->entries = entries;
   table->rests = rests;
   table->handles = handles;
-  table->drawn = drawn;
-  table->poses = poses;
   table->capacity = capacity;
   return HAP_OK;
 }
 
-hap_status hapi_bodies_init(hapi_body_table *table)
+hap_status hapi_bodies_init(hapi_body_table *table, const hapi_world_listener *listener)
 {
   memset(table, 0, sizeof *table);
+  table->listener = listener;
   return grow(table, FIRST_CAPACITY);
 }
 
@@ -76,8 +67,6 @@ void hapi_bodies_finish(hapi_body_table *table)
   hapi_free(table->entries);
   hapi_free(table->rests);
   hapi_free(table->handles);
-  hapi_free(table->drawn);
-  hapi_free(table->poses);
   hapi_index_finish(&table->by_address);
   memset(table, 0, sizeof *table);
 }
@@ -119,16 +108,11 @@ static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
   return HAP_OK;
 }
 
-/* What is known of the entry's body and points elsewhere. */
-static void drop_entry(hapi_physics *physics, uint32_t index)
+static void drop_entry(hapi_body_table *table, uint32_t index)
 {
-  hapi_known_body *known = &physics->world.bodies.entries[index];
-  hapi_slots_drop_body(physics, index);
-  for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
-    if (physics->account.watch[i] == index) {
-      physics->account.watch[i] = HAPI_NONE;
-    }
-  }
+  HAPI_ASSERT_INDEX(index, table->high);
+  hapi_known_body *known = &table->entries[index];
+  table->listener->body_gone(table->listener->user, index);
   hapi_free(known->rest->sleep.velocities);
   memset(known->rest, 0, sizeof *known->rest);
   *known = (hapi_known_body){.rest = known->rest};
@@ -136,24 +120,24 @@ static void drop_entry(hapi_physics *physics, uint32_t index)
 }
 
 /* Where another body has come to be at the address of a destroyed one, the entry begins anew. */
-static void follow_life(hapi_physics *physics, uint32_t index)
+static void follow_life(hapi_body_table *table, uint32_t index)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  HAPI_ASSERT_INDEX(index, table->high);
   hapi_known_body *known = &table->entries[index];
   if (hapi_mark_is_gone(known)) {
     dBodyID body = known->body;
-    drop_entry(physics, index);
+    drop_entry(table, index);
     begin_entry(table, known, body);
-    hapi_poses_begin(physics, index);
+    table->listener->body_begun(table->listener->user, index);
     ++table->replaced;
   }
 }
 
-static uint32_t find_living(hapi_physics *physics, dBodyID body)
+static uint32_t find_living(hapi_body_table *table, dBodyID body)
 {
-  uint32_t index = hapi_bodies_find(&physics->world.bodies, body);
+  uint32_t index = hapi_bodies_find(table, body);
   if (index != HAPI_NONE) {
-    follow_life(physics, index);
+    follow_life(table, index);
   }
   return index;
 }
@@ -191,9 +175,9 @@ static void follow_push(hapi_known_body *known)
 
 /* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
  * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
-static void look_at(hapi_physics *physics, hapi_known_body *known)
+static void look_at(hapi_world *world, hapi_known_body *known)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   dBodyID body = known->body;
   known->seen = table->scan;
   ++table->seen_count;
@@ -203,7 +187,7 @@ static void look_at(hapi_physics *physics, hapi_known_body *known)
     known->geoms_print = 0;
   }
   known->measured = hapi_extent_follow(known);
-  if (physics->begun) {
+  if (world->begun) {
     hapi_sleep_follow(known);
   }
   follow_push(known);
@@ -221,37 +205,37 @@ static void look_at(hapi_physics *physics, hapi_known_body *known)
 
 /* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
  * ones are gone; after the first one it asks for no more memory. */
-static bool see_body(hapi_physics *physics, dBodyID body)
+static bool see_body(hapi_world *world, dBodyID body)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   uint32_t index = find_next(table, body);
   if (index != HAPI_NONE && table->entries[index].seen != table->scan) {
-    follow_life(physics, index);
+    follow_life(table, index);
   }
   if (index == HAPI_NONE) {
     table->starved = table->starved || add(table, body, &index) < HAP_OK;
     if (table->starved) {
       return false;
     }
-    hapi_poses_begin(physics, index);
+    table->listener->body_begun(table->listener->user, index);
   }
   table->last_seen = index;
   hapi_known_body *known = &table->entries[index];
   known->found = true;
   if (known->seen != table->scan) { /* by another of its geoms */
-    look_at(physics, known);
+    look_at(world, known);
   }
   return true;
 }
 
 /* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is not is looked
  * at again in each scan. */
-static void see_geom(hapi_physics *physics, dGeomID geom)
+static void see_geom(hapi_world *world, dGeomID geom)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   dBodyID body = dGeomGetBody(geom);
   hapi_known_body *known =
-      body != NULL && see_body(physics, body) ? &table->entries[table->last_seen] : NULL;
+      body != NULL && see_body(world, body) ? &table->entries[table->last_seen] : NULL;
   bool same = known != NULL && known->sized && !known->measured;
   bool posed = same || body == NULL || hapi_pose_is_sound(body);
   if (same || (posed && hapi_geom_is_sound(geom))) {
@@ -263,23 +247,23 @@ static void see_geom(hapi_physics *physics, dGeomID geom)
   }
 }
 
-static void see_space(hapi_physics *physics, dSpaceID space)
+static void see_space(hapi_world *world, dSpaceID space)
 {
   int count = dSpaceGetNumGeoms(space);
   for (int i = 0; i < count; ++i) {
     dGeomID geom = dSpaceGetGeom(space, i);
     if (dGeomIsSpace(geom)) {
-      see_space(physics, (dSpaceID)geom);
+      see_space(world, (dSpaceID)geom);
     } else {
-      see_geom(physics, geom);
+      see_geom(world, geom);
     }
   }
 }
 
 /* The bodies that joints connect to this one; true when one of them was not seen in this scan. */
-static bool see_partners(hapi_physics *physics, dBodyID body)
+static bool see_partners(hapi_world *world, dBodyID body)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   bool found = false;
   int joints = dBodyGetNumJoints(body);
   for (int k = 0; k < 2 * joints; ++k) {
@@ -287,49 +271,46 @@ static bool see_partners(hapi_physics *physics, dBodyID body)
     uint32_t index = hapi_bodies_find(table, other);
     bool seen = index != HAPI_NONE && table->entries[index].seen == table->scan;
     if (other != NULL && !seen) {
-      found = see_body(physics, other) || found;
+      found = see_body(world, other) || found;
     }
   }
   return found;
 }
 
 /* Bodies without a geom are known by their joints to known ones: walks until nothing is new. */
-static void see_jointed(hapi_physics *physics)
+static void see_jointed(hapi_world *world)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   bool found = table->jointed_count > 0;
   while (found) {
     found = false;
     for (uint32_t i = 0; i < table->high; ++i) {
       const hapi_known_body *known = &table->entries[i];
       if (known->body != NULL && known->seen == table->scan && known->jointed) {
-        found = see_partners(physics, table->entries[i].body) || found;
+        found = see_partners(world, table->entries[i].body) || found;
       }
     }
   }
 }
 
-static void remove_entry(hapi_physics *physics, uint32_t index)
+static void remove_entry(hapi_body_table *table, uint32_t index)
 {
-  hapi_body_table *table = &physics->world.bodies;
   hapi_index_remove(&table->by_address, hapi_index_address(table->handles[index]));
-  drop_entry(physics, index);
+  drop_entry(table, index);
   table->handles[index] = NULL;
   --table->used;
 }
 
 /* Once a run: an application that does it does it often. The statistics count on. */
-static void say_lost(hapi_physics *physics, uint32_t count)
+static void say_lost(hapi_body_table *table, const hapi_cycle *cycle, uint32_t count)
 {
-  static const char *const text =
-      "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
-      "without "
-      "hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts them";
-  physics->world.bodies.lost += count;
-  if (count > 0 && !physics->world.bodies.said_lost) {
-    physics->world.bodies.said_lost = true;
-    hapi_log(HAP_LOG_WARNING, "%s", text);
-    physics->config.report(physics->config.user, HAP_FAULT_NONE, text);
+  table->lost += count;
+  if (count > 0) {
+    hapi_say_once(
+        cycle, &table->said_lost,
+        "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
+        "without hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts "
+        "them");
   }
 }
 
@@ -340,9 +321,9 @@ static bool lives_unseen(const hapi_known_body *known)
   return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
 }
 
-static void drop_unseen(hapi_physics *physics)
+static void drop_unseen(hapi_world *world, const hapi_cycle *cycle)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   uint32_t dropped = 0;
   bool all_seen = table->seen_count == table->used;
   for (uint32_t i = 0; i < table->high && !all_seen; ++i) {
@@ -351,19 +332,19 @@ static void drop_unseen(hapi_physics *physics)
       continue;
     }
     if (lives_unseen(known)) {
-      look_at(physics, known);
+      look_at(world, known);
       continue;
     }
-    remove_entry(physics, i);
+    remove_entry(table, i);
     ++dropped;
   }
-  say_lost(physics, dropped + table->replaced);
+  say_lost(table, cycle, dropped + table->replaced);
   table->replaced = 0;
 }
 
-static hap_status scan(hapi_physics *physics)
+hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle)
 {
-  hapi_body_table *table = &physics->world.bodies;
+  hapi_body_table *table = &world->bodies;
   ++table->scan;
   table->starved = false;
   table->seen_count = table->jointed_count = 0;
@@ -372,68 +353,53 @@ static hap_status scan(hapi_physics *physics)
   table->unsound_body = NULL;
   table->unsound_text = NULL;
   table->unsound_geom = NULL;
-  see_space(physics, physics->world.ode.space);
-  see_jointed(physics);
-  drop_unseen(physics);
+  see_space(world, world->ode.space);
+  see_jointed(world);
+  drop_unseen(world, cycle);
+  HAPI_ASSERT(table->used <= table->high && table->high <= table->capacity);
   table->geoms_forgotten = false;
   return table->starved ? HAP_ERROR_MEMORY : HAP_OK;
 }
 
-/* Those who draw look bodies up in the table. */
-hap_status hapi_bodies_scan(hapi_physics *physics)
+hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body)
 {
-  pthread_mutex_lock(&physics->drawing.lock);
-  hap_status status = scan(physics);
-  pthread_mutex_unlock(&physics->drawing.lock);
-  return status;
-}
-
-hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index)
-{
-  hap_status status = HAP_OK;
-  pthread_mutex_lock(&physics->drawing.lock);
-  *out_index = find_living(physics, body);
-  if (*out_index == HAPI_NONE) {
-    status = add(&physics->world.bodies, body, out_index);
-    if (status >= HAP_OK) {
-      hapi_poses_begin(physics, *out_index);
+  uint32_t index = find_living(table, body);
+  if (index == HAPI_NONE) {
+    if (add(table, body, &index) < HAP_OK) {
+      return HAP_ERROR_MEMORY;
     }
+    table->listener->body_begun(table->listener->user, index);
   }
-  pthread_mutex_unlock(&physics->drawing.lock);
-  if (status >= HAP_OK) {
-    physics->world.bodies.entries[*out_index].rest->adopted = true;
-    physics->world.bodies.entries[*out_index].found = false; /* its geoms may have gone since */
-    physics->world.bodies.entries[*out_index].seen = physics->world.bodies.scan;
-  }
-  return status;
+  table->entries[index].rest->adopted = true;
+  table->entries[index].found = false; /* its geoms may have gone since */
+  table->entries[index].seen = table->scan;
+  return HAP_OK;
 }
 
-hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body)
+hap_status hapi_bodies_forget(hapi_body_table *table, dBodyID body)
 {
-  pthread_mutex_lock(&physics->drawing.lock);
-  uint32_t index = find_living(physics, body);
-  if (index != HAPI_NONE) {
-    hapi_sleep_give_back(&physics->world.bodies.entries[index]);
-    remove_entry(physics, index);
+  uint32_t index = find_living(table, body);
+  if (index == HAPI_NONE) {
+    return HAP_ERROR_NOT_FOUND;
   }
-  pthread_mutex_unlock(&physics->drawing.lock);
-  return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;
+  hapi_sleep_give_back(&table->entries[index]);
+  remove_entry(table, index);
+  return HAP_OK;
 }
 
-hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *cycle, dBodyID body,
                                           void (*callback)(dBodyID))
 {
   hap_status status = HAP_OK;
-  pthread_mutex_lock(&physics->drawing.lock);
-  uint32_t index = find_living(physics, body);
+  uint32_t index = find_living(&world->bodies, body);
   if (index == HAPI_NONE) {
-    status = scan(physics); /* it may have been made since the last one */
-    index = hapi_bodies_find(&physics->world.bodies, body);
+    status = hapi_bodies_scan(world, cycle); /* it may have been made since the last one */
+    index = hapi_bodies_find(&world->bodies, body);
   }
-  if (index != HAPI_NONE) {
-    physics->world.bodies.entries[index].rest->moved_callback = callback;
-    dBodySetMovedCallback(body, callback);
+  if (index == HAPI_NONE) {
+    return status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
   }
-  pthread_mutex_unlock(&physics->drawing.lock);
-  return index != HAPI_NONE ? HAP_OK : status < HAP_OK ? status : HAP_ERROR_NOT_FOUND;
+  world->bodies.entries[index].rest->moved_callback = callback;
+  dBodySetMovedCallback(body, callback);
+  return HAP_OK;
 }

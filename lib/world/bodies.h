@@ -11,10 +11,11 @@
 #include <hapode/ode.h>
 
 #include "base/index.h"
+#include "world/cycle.h"
 
 #define HAPI_NONE HAPI_INDEX_NONE
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_world hapi_world;
 
 /* ODE's auto-disable, kept by the physics side: a testing simulation would reset ODE's own. */
 typedef struct hapi_sleep {
@@ -80,13 +81,21 @@ typedef struct hapi_known_body {
   bool awake;          /* after the last global step */
 } hapi_known_body;
 
-typedef struct hapi_drawn hapi_drawn;
+/* What other parts want to hear of the world. Called under the lock that the caller of the world's
+ * function has. */
+typedef struct hapi_world_listener {
+  void *user;
+  /* Before the table grows: arrays by entry. False: no memory. */
+  bool (*grow)(void *user, uint32_t capacity);
+  void (*body_begun)(void *user, uint32_t index);
+  void (*body_gone)(void *user, uint32_t index); /* its entry still holds it */
+  void (*surface_asked)(void *user, dGeomID a, dGeomID b, const dSurfaceParameters *surface);
+} hapi_world_listener;
 
 typedef struct hapi_body_table {
+  const hapi_world_listener *listener;
   hapi_known_body *entries;
   hapi_known_rest *rests; /* of each entry */
-  hapi_drawn *drawn;      /* of each entry */
-  hap_pose *poses;        /* HAPI_FRAMES x capacity: a frame is written from end to end */
   dBodyID *handles; /* body of each entry once more, close together: for walks over all bodies */
   uint32_t capacity;
   uint32_t high; /* entries in use are below */
@@ -109,14 +118,14 @@ typedef struct hapi_body_table {
 } hapi_body_table;
 
 /* bodies.c */
-hap_status hapi_bodies_init(hapi_body_table *table);
+hap_status hapi_bodies_init(hapi_body_table *table, const hapi_world_listener *listener);
 void hapi_bodies_finish(hapi_body_table *table);
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
-hap_status hapi_bodies_scan(hapi_physics *physics);
-hap_status hapi_bodies_adopt(hapi_physics *physics, dBodyID body, uint32_t *out_index);
-hap_status hapi_bodies_forget(hapi_physics *physics, dBodyID body);
-hap_status hapi_bodies_set_moved_callback(hapi_physics *physics, dBodyID body,
+hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle);
+hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body);
+hap_status hapi_bodies_forget(hapi_body_table *table, dBodyID body);
+hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *cycle, dBodyID body,
                                           void (*callback)(dBodyID));
 
 /* extent.c */
@@ -133,10 +142,13 @@ bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
 unsigned hapi_mark_follow(hapi_known_body *known);
 void hapi_mark_remove(hapi_known_body *known); /* idempotent */
 
+void hapi_pose_read(dBodyID body, hap_pose *out);
+bool hapi_pose_is_sound(dBodyID body); /* its numbers are finite */
+
 /* sleep.c */
-void hapi_sleep_follow(hapi_known_body *known);             /* takes over; and what is set later */
-void hapi_sleep_give_back(hapi_known_body *known);          /* idempotent */
-void hapi_sleep_step(hapi_physics *physics, double step_s); /* just before the global step */
+void hapi_sleep_follow(hapi_known_body *known);              /* takes over; and what is set later */
+void hapi_sleep_give_back(hapi_known_body *known);           /* idempotent */
+void hapi_sleep_step(hapi_body_table *table, double step_s); /* just before the global step */
 void hapi_sleep_note(hapi_known_body *known); /* after it, before anything wakes one */
 
 #endif

@@ -3,33 +3,11 @@
 #include <math.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
-/* The global step's parts that are plain ODE. */
-
-double hapi_body_mass(dBodyID body)
-{
-  dMass mass;
-  if (dBodyIsKinematic(body)) {
-    return 0.0;
-  }
-  dBodyGetMass(body, &mass);
-  return mass.mass;
-}
-
-bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double out[3])
-{
-  hapi_v3_set(out, 0.0, 0.0, 0.0);
-  bool given = physics->world.ode.friction_direction != NULL &&
-               physics->world.ode.friction_direction(physics->world.ode.user, a, b, out);
-  double length = given && hapi_finite(out, 3) ? hapi_v3_norm(out) : 0.0;
-  if (!(length > 1e-12)) {
-    return false;
-  }
-  hapi_v3_scale(1.0 / length, out, out);
-  return true;
-}
+/* The collision phase: contact joints for the next step. */
 
 /* ODE wants it at right angles to the normal. A pair whose normal it is has ODE's own direction. */
 static void set_direction(dContact *contact, const double direction[3])
@@ -46,95 +24,71 @@ static void set_direction(dContact *contact, const double direction[3])
 }
 
 /* A surface that is soft for the world's step, in a world that model SINGLE steps at another. */
-static void soften(const hapi_physics *physics, dSurfaceParameters *s)
+static void soften(const hapi_world *world, const hapi_cycle *cycle, dSurfaceParameters *s)
 {
-  if (physics->cycle.model != HAP_MODEL_SINGLE ||
-      (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
+  if (cycle->model != HAP_MODEL_SINGLE || (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
     return;
   }
-  double erp =
-      (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(physics->world.ode.world);
-  double cfm =
-      (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(physics->world.ode.world);
-  hapi_soften(physics->config.physics_hz / physics->config.haptic_hz, &erp, &cfm);
+  double erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world->ode.world);
+  double cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world->ode.world);
+  hapi_soften(hapi_step_ratio(cycle), &erp, &cfm);
   s->soft_erp = erp;
   s->soft_cfm = cfm;
   s->mode |= dContactSoftERP | dContactSoftCFM;
 }
 
-static void attach(hapi_physics *physics, const dContact *contact, const dBodyID bodies[2],
-                   bool carried)
+/* ODE has no getter for what a contact joint holds. Without memory for a note the island of the contact
+ * is measured again. */
+static void contact_note(hapi_contact_notes *notes, dJointID joint, const dContact *contact)
 {
-  dJointGroupID group = carried ? physics->world.carried_group : physics->world.contact_group;
-  dJointID joint = dJointCreateContact(physics->world.ode.world, group, contact);
-  dJointAttach(joint, bodies[0], bodies[1]);
-  if (!carried && hapi_reuse_wanted(physics)) {
-    hapi_reuse_note(physics, joint, contact);
+  if (hapi_reserve((void **)&notes->list, &notes->capacity, notes->count, 1, sizeof *notes->list)) {
+    notes->list[notes->count++] = (hapi_contact_note){joint, *contact};
+    dJointSetData(joint, (void *)(uintptr_t)notes->count); /* the joint is ours */
   }
 }
 
-void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
-                              const dBodyID bodies[2], dSurfaceParameters *surface, bool carried)
+const dContact *hapi_world_contact_of(const hapi_world *world, dJointID joint)
 {
-  dGeomID a = geoms[0];
-  dGeomID b = geoms[1];
-  dContact *contacts = physics->world.contact_scratch;
+  const hapi_contact_notes *notes = world->notes;
+  uintptr_t number = (uintptr_t)dJointGetData(joint);
+  bool ours = number > 0 && number <= notes->count && notes->list[number - 1].joint == joint;
+  return ours ? &notes->list[number - 1].contact : NULL;
+}
+
+uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
+                                  const hapi_touching *touching, dSurfaceParameters *surface,
+                                  hapi_contact_kind kind)
+{
+  dGeomID a = touching->geoms[0];
+  dGeomID b = touching->geoms[1];
+  dContact *contacts = world->contact_scratch;
+  dJointGroupID group = kind == HAPI_CONTACT_CARRIED ? world->carried_group : world->contact_group;
   double direction[3];
-  int count =
-      dCollide(a, b, physics->world.ode.max_contacts_per_pair, &contacts[0].geom, sizeof(dContact));
-  soften(physics, surface);
+  uint32_t rejected = 0;
+  int count = dCollide(a, b, world->ode.max_contacts_per_pair, &contacts[0].geom, sizeof(dContact));
+  HAPI_ASSERT(count <= world->ode.max_contacts_per_pair);
+  soften(world, cycle, surface);
   bool directed = count > 0 && (surface->mode & dContactFDir1) != 0 &&
-                  hapi_world_direction(physics, a, b, direction);
+                  hapi_world_direction(world, a, b, direction);
   if (!directed) {
     surface->mode &= ~dContactFDir1;
   }
   for (int i = 0; i < count; ++i) {
     if (!hapi_contact_is_sound(&contacts[i].geom)) {
-      ++physics->counts.own.stats.contacts_rejected;
+      ++rejected;
       continue;
     }
     contacts[i].surface = *surface;
     if (directed) {
       set_direction(&contacts[i], direction);
     }
-    attach(physics, &contacts[i], bodies, carried);
-  }
-}
-
-/* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process, and
- * so can a softness below 0, which divides by what is left of a row. */
-static bool sound_surface(const dSurfaceParameters *s)
-{
-  const double most = 1e12;
-  const struct {
-    int bit;
-    double value;
-    double low;
-    double high;
-  } parts[] = {
-      {0, s->mu, 0.0, HUGE_VAL}, /* ODE reads it whatever the mode is */
-      {dContactMu2, s->mu2, 0.0, HUGE_VAL},
-      {dContactRolling, s->rho, 0.0, HUGE_VAL},
-      {dContactRolling, s->rho2, 0.0, HUGE_VAL},
-      {dContactRolling, s->rhoN, 0.0, HUGE_VAL},
-      {dContactBounce, s->bounce, -most, most},
-      {dContactBounce, s->bounce_vel, -most, most},
-      {dContactSoftERP, s->soft_erp, -most, most},
-      {dContactSoftCFM, s->soft_cfm, 0.0, most},
-      {dContactMotion1, s->motion1, -most, most},
-      {dContactMotion2, s->motion2, -most, most},
-      {dContactMotionN, s->motionN, -most, most},
-      {dContactSlip1, s->slip1, 0.0, most},
-      {dContactSlip2, s->slip2, 0.0, most},
-  };
-  for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-    bool read = parts[i].bit == 0 || (s->mode & parts[i].bit) != 0;
-    bool good = parts[i].value >= parts[i].low && parts[i].value <= parts[i].high; /* not NaN */
-    if (read && !good) {
-      return false;
+    dJointID joint = dJointCreateContact(world->ode.world, group, &contacts[i]);
+    dJointAttach(joint, touching->bodies[0], touching->bodies[1]);
+    if (kind == HAPI_CONTACT_NOTED) {
+      contact_note(world->notes, joint, &contacts[i]);
     }
   }
-  return true;
+  return rejected;
 }
 
 static bool can_move(dBodyID body)
@@ -142,100 +96,23 @@ static bool can_move(dBodyID body)
   return body != NULL && !dBodyIsKinematic(body);
 }
 
-static bool ask_application(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out)
-{
-  *out = (dSurfaceParameters){.mode = dContactApprox1, .mu = dInfinity};
-  if (physics->world.ode.surface != NULL &&
-      !physics->world.ode.surface(physics->world.ode.user, a, b, out)) {
-    return false;
-  }
-  if (!sound_surface(out)) {
-    physics->config.report(physics->config.user, HAP_FAULT_WORLD,
-                           "the surface callback gave a number that is not finite, or a friction, "
-                           "softness or slip below 0: the pair has no contact");
-    return false;
-  }
-  hapi_lookback_ask(physics, a, b, out);
-  return true;
-}
-
-/* The application is asked once a step for each pair; model CONTACT asks for some of them twice, in
- * the collision phase and when it looks for what is near. */
-static hapi_surface_entry *cached(hapi_surface_cache *cache, dGeomID a, dGeomID b)
-{
-  uint64_t x = (uint64_t)(uintptr_t)a;
-  uint64_t y = (uint64_t)(uintptr_t)b;
-  uint64_t key = (x < y ? x : y) * 0x9e3779b97f4a7c15u ^ (x < y ? y : x);
-  uint32_t at = (uint32_t)((key * 0xff51afd7ed558ccdu) >> 40) & (cache->capacity - 1);
-  for (;; at = (at + 1) & (cache->capacity - 1)) {
-    hapi_surface_entry *entry = &cache->entries[at];
-    bool same = (entry->a == a && entry->b == b) || (entry->a == b && entry->b == a);
-    if (entry->step != cache->step || same) {
-      return entry;
-    }
-  }
-}
-
-/* Room for one more, at most half full; false without memory: the application is asked again. */
-static bool reserve(hapi_surface_cache *cache)
-{
-  if (cache->entries != NULL && 2 * cache->used < cache->capacity) {
-    return true;
-  }
-  hapi_surface_cache larger = {.capacity = cache->capacity > 0 ? 2 * cache->capacity : 256,
-                               .step = cache->step};
-  larger.entries = hapi_alloc_array(larger.capacity, sizeof *larger.entries);
-  if (larger.entries == NULL) {
-    return false;
-  }
-  const hapi_surface_entry *old = cache->entries;
-  for (uint32_t i = 0; old != NULL && i < cache->capacity; ++i) {
-    const hapi_surface_entry *entry = &old[i];
-    if (entry->step == cache->step) {
-      *cached(&larger, entry->a, entry->b) = *entry;
-      ++larger.used;
-    }
-  }
-  hapi_free(cache->entries);
-  *cache = larger;
-  return true;
-}
-
-bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
-                            bool *out_turned)
-{
-  *out_turned = false;
-  hapi_surface_cache *cache = &physics->world.surfaces;
-  if (physics->cycle.model != HAP_MODEL_CONTACT || !reserve(cache)) {
-    return ask_application(physics, a, b, out);
-  }
-  hapi_surface_entry *entry = cached(cache, a, b);
-  if (entry->step != cache->step) {
-    *entry = (hapi_surface_entry){.a = a, .b = b, .step = cache->step};
-    entry->collides = ask_application(physics, a, b, &entry->surface);
-    ++cache->used;
-  }
-  *out = entry->surface;
-  *out_turned = entry->a != a; /* directions of motion belong to the order that was asked for */
-  return entry->collides;
-}
-
 /* The loop carries the contacts of what it moves: ODE must not have them as well. */
-static bool carried_by_loop(const hapi_physics *physics, dBodyID body)
+static bool carried_by_loop(const hapi_body_table *table, dBodyID body)
 {
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  return known != HAPI_NONE && physics->world.bodies.entries[known].loop_owned;
+  uint32_t known = hapi_bodies_find(table, body);
+  return known != HAPI_NONE && table->entries[known].loop_owned;
 }
 
 typedef struct collision {
-  hapi_physics *physics;
-  bool carried; /* the pairs that the loop carries, else the others */
+  const hapi_world *world;
+  const hapi_cycle *cycle;
+  hapi_contact_kind kind; /* CARRIED: the pairs that the loop carries, else the others */
+  uint32_t rejected;
 } collision;
 
 static void near_callback(void *data, dGeomID a, dGeomID b)
 {
-  const collision *c = data;
-  hapi_physics *physics = c->physics;
+  collision *c = data;
   if (dGeomIsSpace(a) || dGeomIsSpace(b)) {
     dSpaceCollide2(a, b, data, near_callback); /* what is inside of one is met by itself */
     return;
@@ -247,13 +124,16 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   }
   dSurfaceParameters surface;
   bool turned;
-  bool carried = carried_by_loop(physics, body_a) || carried_by_loop(physics, body_b);
-  if (carried != c->carried || !hapi_world_ask_surface(physics, a, b, &surface, &turned)) {
+  bool carried =
+      carried_by_loop(&c->world->bodies, body_a) || carried_by_loop(&c->world->bodies, body_b);
+  if (carried != (c->kind == HAPI_CONTACT_CARRIED) ||
+      !hapi_world_ask_surface(c->world, c->cycle, a, b, &surface, &turned)) {
     return;
   }
-  const dGeomID geoms[2] = {turned ? b : a, turned ? a : b};
-  const dBodyID bodies[2] = {dGeomGetBody(geoms[0]), dGeomGetBody(geoms[1])};
-  hapi_world_make_contacts(physics, geoms, bodies, &surface, carried);
+  hapi_touching touching = {.geoms = {turned ? b : a, turned ? a : b}};
+  touching.bodies[0] = dGeomGetBody(touching.geoms[0]);
+  touching.bodies[1] = dGeomGetBody(touching.geoms[1]);
+  c->rejected += hapi_world_make_contacts(c->world, c->cycle, &touching, &surface, c->kind);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */
@@ -269,24 +149,19 @@ static void collide_inside(collision *c, dSpaceID space)
   }
 }
 
-void hapi_world_collide(hapi_physics *physics)
+void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
 {
-  collision c = {physics, false};
-  dJointGroupEmpty(physics->world.contact_group);
-  ++physics->world.surfaces.step; /* forgets what the surfaces were */
-  physics->world.surfaces.used = 0;
-  physics->probe.reuse.notes.count = 0;
-  collide_inside(&c, physics->world.ode.space);
+  collision c = {world, cycle, notes ? HAPI_CONTACT_NOTED : HAPI_CONTACT_PLAIN, 0};
+  dJointGroupEmpty(world->contact_group);
+  hapi_world_forget_surfaces(world);
+  world->notes->count = 0;
+  collide_inside(&c, world->ode.space);
+  world->counts.contacts_rejected += c.rejected;
 }
 
-void hapi_world_collide_carried(hapi_physics *physics)
+uint32_t hapi_world_collide_carried(const hapi_world *world, const hapi_cycle *cycle)
 {
-  collision c = {physics, true};
-  collide_inside(&c, physics->world.ode.space);
-}
-
-void hapi_world_quickstep(hapi_physics *physics, double step_s)
-{
-  ++physics->counts.own.stats.quickstep_calls;
-  dWorldQuickStep(physics->world.ode.world, step_s);
+  collision c = {world, cycle, HAPI_CONTACT_CARRIED, 0};
+  collide_inside(&c, world->ode.space);
+  return c.rejected;
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* How far a body reaches from its origin. Measured anew when its geoms have changed: the box around a
  * geom, which it is taken from, is another one in each orientation. */

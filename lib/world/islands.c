@@ -1,49 +1,48 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* Threads of ODE that step separate islands of the world at once, in the global step only. Testing
  * simulations are one or a few islands each: waking threads up would take longer than they do. */
 
-bool hapi_islands_begin(hapi_physics *physics)
+bool hapi_islands_begin(hapi_world *world, bool repeats)
 {
-  hapi_islands *islands = &physics->world.islands;
-  int32_t count = physics->world.ode.island_threads;
-  bool repeats = physics->config.lockstep || physics->tape.tape != NULL;
+  hapi_islands *islands = &world->islands;
+  int32_t count = world->ode.island_threads;
   if (count <= 1 || repeats) {
     return true;
   }
   islands->threading = dThreadingAllocateMultiThreadedImplementation();
   islands->pool = dThreadingAllocateThreadPool((unsigned)count, 0, dAllocateMaskAll, NULL);
   if (islands->threading == NULL || islands->pool == NULL) {
-    hapi_islands_end(physics);
+    hapi_islands_end(world);
     return false;
   }
   dThreadingThreadPoolServeMultiThreadedImplementation(islands->pool, islands->threading);
-  hapi_islands_go_on(physics);
+  hapi_islands_go_on(world);
   return true;
 }
 
-void hapi_islands_rest(hapi_physics *physics)
+void hapi_islands_rest(const hapi_world *world)
 {
-  if (physics->world.islands.threading != NULL) {
-    dWorldSetStepThreadingImplementation(physics->world.ode.world, NULL, NULL);
+  if (world->islands.threading != NULL) {
+    dWorldSetStepThreadingImplementation(world->ode.world, NULL, NULL);
   }
 }
 
-void hapi_islands_go_on(hapi_physics *physics)
+void hapi_islands_go_on(const hapi_world *world)
 {
-  dThreadingImplementationID threading = physics->world.islands.threading;
+  dThreadingImplementationID threading = world->islands.threading;
   if (threading != NULL) {
     dWorldSetStepThreadingImplementation(
-        physics->world.ode.world, dThreadingImplementationGetFunctions(threading), threading);
+        world->ode.world, dThreadingImplementationGetFunctions(threading), threading);
   }
 }
 
-void hapi_islands_end(hapi_physics *physics)
+void hapi_islands_end(hapi_world *world)
 {
-  hapi_islands *islands = &physics->world.islands;
-  hapi_islands_rest(physics);
+  hapi_islands *islands = &world->islands;
+  hapi_islands_rest(world);
   if (islands->threading != NULL) {
     dThreadingImplementationShutdownProcessing(islands->threading);
   }

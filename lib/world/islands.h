@@ -8,16 +8,17 @@
 #include <ode/ode.h>
 #include <stdbool.h>
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_world hapi_world;
 
 typedef struct hapi_islands {
   dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
   dThreadingThreadPoolID pool;
 } hapi_islands;
 
-bool hapi_islands_begin(hapi_physics *physics); /* false: not to be had */
-void hapi_islands_end(hapi_physics *physics);
-void hapi_islands_rest(hapi_physics *physics); /* for testing simulations */
-void hapi_islands_go_on(hapi_physics *physics);
+/* repeats: every run must come to the same, so that one thread steps all. False: no threads to be had. */
+bool hapi_islands_begin(hapi_world *world, bool repeats);
+void hapi_islands_end(hapi_world *world);
+void hapi_islands_rest(const hapi_world *world); /* for testing simulations */
+void hapi_islands_go_on(const hapi_world *world);
 
 #endif

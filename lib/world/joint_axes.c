@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* Motors and stops of joints that the loop has no rows of its own for. What holds the bodies is measured
  * without them (joint_probe.c): a measurement sees a motor either hold or give way, and a stop either

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* Where a joint is in its bodies' frames, and what its parameters are, by ODE's getters. Some of it has
  * none: how a slider or a fixed joint has its bodies turned to each other, where the axis of a hinge is

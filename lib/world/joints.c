@@ -4,20 +4,15 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
-/* The world's joints, and those of the range as the loop has them. All joints are known from the first
+/* The world's joints. All joints are known from the first
  * cycle on in which they are there: some of what they hold can be read at that time only. */
 
 #define FIRST_CAPACITY 16u
 #define UNKNOWN_BIRTH UINT64_MAX /* of a body that there was no memory for */
-
-/* A softness from which on a constraint is a spring, not a rigid one with rounding; as of contacts. */
-#define SOFT_CFM 1e-6
-
-/* ODE: a stop at pi and beyond is never met, as the angle goes on at -pi. */
-#define WHOLE_TURN (M_PI - 1e-9)
 
 /* ---- the table ---- */
 
@@ -148,25 +143,26 @@ void hapi_joints_finish(hapi_joint_table *table)
   memset(table, 0, sizeof *table);
 }
 
-bool hapi_joints_create(hapi_physics *physics)
+bool hapi_joints_create(hapi_joint_table *table, uint32_t slots)
 {
-  hapi_joint_table *table = &physics->world.joints;
-  table->slots = hapi_alloc_array(physics->config.capacity.joints, sizeof *table->slots);
+  table->slot_count = slots;
+  table->slots = hapi_alloc_array(slots, sizeof *table->slots);
   return table->slots != NULL;
 }
 
 /* ---- which there are ---- */
 
-static bool is_local(const hapi_physics *physics, uint32_t body)
+static bool is_local(const hapi_body_table *bodies, uint32_t body)
 {
-  return body != HAPI_NONE && physics->world.bodies.entries[body].slot != HAPI_NONE;
+  return body != HAPI_NONE && bodies->entries[body].slot != HAPI_NONE;
 }
 
 /* One that is far from the pointers is read when it is new, and again when it comes near. */
-static void look_at(hapi_physics *physics, hapi_known_joint *known, bool is_new)
+static void look_at(const hapi_world *world, hapi_known_joint *known, bool is_new)
 {
-  bool near = is_local(physics, known->index[0]) || is_local(physics, known->index[1]);
-  known->seen = physics->world.joints.scan;
+  bool near =
+      is_local(&world->bodies, known->index[0]) || is_local(&world->bodies, known->index[1]);
+  known->seen = world->joints.scan;
   known->carried = hapi_joint_kind_of(known->joint, &known->kind);
   if (known->carried && (is_new || near || known->left_is_known)) {
     hapi_joint_read(known, is_new);
@@ -174,18 +170,18 @@ static void look_at(hapi_physics *physics, hapi_known_joint *known, bool is_new)
 }
 
 /* ODE's own order: the world comes second. */
-static void read_bodies(const hapi_physics *physics, dJointID joint, hapi_known_joint *out)
+static void read_bodies(const hapi_world *world, dJointID joint, hapi_known_joint *out)
 {
   dBodyID a = dJointGetBody(joint, 0);
   dBodyID b = dJointGetBody(joint, 1);
   out->bodies[0] = a != NULL ? a : b;
   out->bodies[1] = a != NULL ? b : NULL;
   for (int i = 0; i < 2; ++i) {
-    uint32_t index = hapi_bodies_find(&physics->world.bodies, out->bodies[i]);
+    uint32_t index = hapi_bodies_find(&world->bodies, out->bodies[i]);
     out->index[i] = index;
     out->name.births[i] = out->bodies[i] == NULL ? 0
                           : index == HAPI_NONE   ? UNKNOWN_BIRTH
-                                                 : physics->world.bodies.entries[index].rest->birth;
+                                                 : world->bodies.entries[index].rest->birth;
   }
 }
 
@@ -206,15 +202,15 @@ static uint32_t find_entry(const hapi_joint_table *table, uint32_t at_address,
   }
 }
 
-static void see(hapi_physics *physics, dJointID joint)
+static void see(hapi_world *world, dJointID joint)
 {
-  hapi_joint_table *table = &physics->world.joints;
+  hapi_joint_table *table = &world->joints;
   hapi_known_joint found = {0};
   uint32_t index = hapi_joints_find(table, joint);
   if (index != HAPI_NONE && table->entries[index].seen == table->scan) {
     return; /* by its other body */
   }
-  read_bodies(physics, joint, &found);
+  read_bodies(world, joint, &found);
   found.name.type = dJointGetType(joint);
   index = find_entry(table, index, &found.name);
   bool is_new = index == HAPI_NONE;
@@ -224,271 +220,82 @@ static void see(hapi_physics *physics, dJointID joint)
     set_address(table, index, joint);
     memcpy(known->bodies, found.bodies, sizeof known->bodies);
     memcpy(known->index, found.index, sizeof known->index);
-    look_at(physics, known, is_new);
+    look_at(world, known, is_new);
   }
 }
 
 /* A body has its newest joint first. */
-void hapi_joints_scan(hapi_physics *physics)
+void hapi_joints_scan(hapi_world *world)
 {
-  ++physics->world.joints.scan;
-  physics->world.joints.starved = false;
-  uint32_t end = physics->world.bodies.jointed_count > 0 ? physics->world.bodies.high : 0;
+  ++world->joints.scan;
+  world->joints.starved = false;
+  uint32_t end = world->bodies.jointed_count > 0 ? world->bodies.high : 0;
   for (uint32_t i = 0; i < end; ++i) {
-    dBodyID body = physics->world.bodies.handles[i];
-    bool jointed = body != NULL && physics->world.bodies.entries[i].jointed;
+    dBodyID body = world->bodies.handles[i];
+    bool jointed = body != NULL && world->bodies.entries[i].jointed;
     for (int k = jointed ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
       dJointID joint = dBodyGetJoint(body, k - 1);
       if (dJointGetType(joint) != dJointTypeContact) {
-        see(physics, joint);
+        see(world, joint);
       }
     }
   }
-  drop_unseen(&physics->world.joints);
+  drop_unseen(&world->joints);
 }
 
-void hapi_joints_leave(hapi_physics *physics)
+void hapi_joints_leave(hapi_joint_table *table)
 {
-  for (uint32_t i = 0; i < physics->world.joints.count; ++i) {
-    hapi_joint_leave(&physics->world.joints.entries[i]);
+  for (uint32_t i = 0; i < table->count; ++i) {
+    hapi_joint_leave(&table->entries[i]);
   }
 }
 
-void hapi_joints_reset(hapi_physics *physics)
+void hapi_joints_reset(hapi_joint_table *table)
 {
-  hapi_joint_table *table = &physics->world.joints;
   forget_measurements(table);
   table->count = 0;
   index_all(table);
-  for (uint32_t i = 0; i < physics->config.capacity.joints; ++i) {
+  for (uint32_t i = 0; i < table->slot_count; ++i) {
     table->slots[i].taken = 0;
   }
 }
 
-/* ---- joints of bodies that the loop owns are not ODE's ---- */
+/* ---- numbers in the loop ---- */
 
-static bool is_owned(const hapi_physics *physics, uint32_t body)
-{
-  return body != HAPI_NONE && physics->world.bodies.entries[body].loop_owned;
-}
-
-static hapi_body_slot *slot_of(hapi_physics *physics, uint32_t body)
-{
-  return is_local(physics, body)
-             ? &physics->near.slots.bodies[physics->world.bodies.entries[body].slot]
-             : NULL;
-}
-
-/* A body that the application has just moved is no more the loop's, but what hangs on it is still: it
- * waits for the next model where it was put, or its joints would open. */
-static bool hold_partner(hapi_physics *physics, const hapi_known_joint *known, int which)
-{
-  hapi_body_slot *slot = slot_of(physics, known->index[which]);
-  const hapi_body_slot *other = slot_of(physics, known->index[1 - which]);
-  dBodyID body = known->bodies[which];
-  if (slot == NULL || other == NULL || slot->held || !other->held || dBodyIsKinematic(body) ||
-      !dBodyIsEnabled(body)) {
-    return false;
-  }
-  slot->held = true;
-  dBodyDisable(body);
-  return true;
-}
-
-/* ODE's search for islands goes through joints and wakes what it finds. */
-void hapi_joints_hold(hapi_physics *physics)
-{
-  hapi_joint_table *table = &physics->world.joints;
-  bool again = true;
-  for (uint32_t i = 0; i < table->count; ++i) {
-    hapi_known_joint *known = &table->entries[i];
-    known->held = dJointIsEnabled(known->joint) != 0 &&
-                  (is_owned(physics, known->index[0]) || is_owned(physics, known->index[1]));
-    if (known->held) {
-      dJointDisable(known->joint);
-    }
-  }
-  while (again) {
-    again = false;
-    for (uint32_t i = 0; i < table->count; ++i) {
-      const hapi_known_joint *known = &table->entries[i];
-      again =
-          (known->held && (hold_partner(physics, known, 0) || hold_partner(physics, known, 1))) ||
-          again;
-    }
-  }
-}
-
-void hapi_joints_let_go(hapi_physics *physics)
-{
-  for (uint32_t i = 0; i < physics->world.joints.count; ++i) {
-    hapi_known_joint *known = &physics->world.joints.entries[i];
-    dJointFeedback *feedback = known->held ? dJointGetFeedback(known->joint) : NULL;
-    if (feedback != NULL) {
-      memset(feedback, 0, sizeof *feedback);
-    }
-    if (known->held) {
-      dJointEnable(known->joint);
-    }
-    known->held = false;
-  }
-}
-
-/* ---- the message ---- */
-
-typedef dReal (*parameter_fn)(dJointID, int);
-
-static hapi_softness softness_of(const hapi_physics *physics, double erp, double cfm)
-{
-  hapi_softness out = {erp, cfm, cfm > SOFT_CFM};
-  hapi_soften(physics->config.physics_hz / physics->config.haptic_hz, &out.erp, &out.cfm);
-  return out;
-}
-
-static uint32_t stop_flag(double stop, bool turns, uint32_t flag)
-{
-  bool there = turns ? fabs(stop) < WHOLE_TURN : isfinite(stop);
-  return there ? flag : 0u;
-}
-
-static void fill_limit(const hapi_physics *physics, dJointID joint, parameter_fn get, int group,
-                       bool turns, hapi_model_limit *out)
-{
-  out->low = get(joint, dParamLoStop + group);
-  out->high = get(joint, dParamHiStop + group);
-  if (out->low <= out->high) { /* else ODE has none */
-    out->flags |= stop_flag(out->low, turns, HAPI_LIMIT_LOW);
-    out->flags |= stop_flag(out->high, turns, HAPI_LIMIT_HIGH);
-  }
-  if (out->flags == (HAPI_LIMIT_LOW | HAPI_LIMIT_HIGH) && out->low == out->high) {
-    out->flags = HAPI_LIMIT_LOCKED;
-  }
-  out->stop =
-      softness_of(physics, get(joint, dParamStopERP + group), get(joint, dParamStopCFM + group));
-  out->bounce = hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_RESTITUTION)
-                    ? 0.0
-                    : get(joint, dParamBounce + group);
-  out->speed = get(joint, dParamVel + group);
-  out->force = get(joint, dParamFMax + group);
-  out->motor_cfm = get(joint, dParamCFM + group);
-  out->fudge = get(joint, dParamFudgeFactor + group);
-  bool drives = out->force > 0.0 && (out->flags & HAPI_LIMIT_LOCKED) == 0;
-  out->flags |= drives ? HAPI_LIMIT_MOTOR : 0u;
-}
-
-static void fill_parameters(const hapi_physics *physics, const hapi_known_joint *known,
-                            hapi_model_joint *out)
-{
-  dJointID joint = known->joint;
-  dWorldID world = physics->world.ode.world;
-  out->linear = softness_of(physics, dWorldGetERP(world), dWorldGetCFM(world));
-  out->angular = out->along = out->linear;
-  switch (known->kind) {
-    case HAPI_JOINT_BALL:
-      out->linear = softness_of(physics, dJointGetBallParam(joint, dParamERP),
-                                dJointGetBallParam(joint, dParamCFM));
-      break;
-    case HAPI_JOINT_HINGE:
-      fill_limit(physics, joint, dJointGetHingeParam, 0, true, &out->limits[0]);
-      break;
-    case HAPI_JOINT_SLIDER:
-      fill_limit(physics, joint, dJointGetSliderParam, 0, false, &out->limits[0]);
-      break;
-    case HAPI_JOINT_UNIVERSAL:
-      fill_limit(physics, joint, dJointGetUniversalParam, 0, true, &out->limits[0]);
-      fill_limit(physics, joint, dJointGetUniversalParam, dParamGroup, true, &out->limits[1]);
-      break;
-    case HAPI_JOINT_HINGE2:
-      fill_limit(physics, joint, dJointGetHinge2Param, 0, true, &out->limits[0]);
-      fill_limit(physics, joint, dJointGetHinge2Param, dParamGroup, true, &out->limits[1]);
-      out->limits[1].flags &= HAPI_LIMIT_MOTOR; /* ODE never stops the second axis */
-      out->along = softness_of(physics, dJointGetHinge2Param(joint, dParamSuspensionERP),
-                               dJointGetHinge2Param(joint, dParamSuspensionCFM));
-      break;
-    case HAPI_JOINT_FIXED:
-      out->linear = softness_of(physics, dJointGetFixedParam(joint, dParamERP),
-                                dJointGetFixedParam(joint, dParamCFM));
-      break;
-    case HAPI_JOINT_MEASURED:
-      break;
-  }
-}
-
-static void fill_limits(const hapi_physics *physics, const hapi_known_joint *known,
-                        hapi_model_joint *out)
-{
-  hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
-  int count = hapi_joint_axes(known, axes);
-  for (int i = 0; i < count; ++i) {
-    fill_limit(physics, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
-  }
-}
-
-static void fill(hapi_physics *physics, const hapi_known_joint *known, hapi_model_joint *out)
-{
-  memset(out, 0, sizeof *out);
-  const hapi_joint_measurement *measured = known->carried ? NULL : known->measurement;
-  uint32_t first = measured != NULL ? measured->first : 0;
-  const hapi_body_slot *a = slot_of(physics, known->index[first]);
-  const hapi_body_slot *b = slot_of(physics, known->index[1 - first]);
-  out->slot = known->slot;
-  out->generation = physics->world.joints.slots[known->slot].generation;
-  out->kind = known->kind;
-  out->body_a = (uint32_t)(a - physics->near.slots.bodies);
-  out->generation_a = a->generation;
-  out->body_b = b != NULL ? (uint32_t)(b - physics->near.slots.bodies) : HAPI_SLOT_NONE;
-  out->generation_b = b != NULL ? b->generation : 0;
-  if (measured != NULL) {
-    out->kind = HAPI_JOINT_MEASURED;
-    out->place = measured->place;
-    out->measured = measured->found;
-    fill_limits(physics, known, out);
-    return;
-  }
-  out->place = known->place;
-  fill_parameters(physics, known, out);
-}
-
-/* A place among those that the loop keeps impulses for. The range takes no more joints than there are. */
+/* A place among those that the loop keeps impulses for. The range takes no more joints
+ * than there are. */
 static void take_slot(hapi_joint_table *table, uint32_t index)
 {
   uint32_t at = 0;
   while (table->slots[at].taken != 0) {
     ++at;
   }
+  HAPI_ASSERT_INDEX(at, table->slot_count);
   table->slots[at].taken = index + 1;
   table->slot_high = at >= table->slot_high ? at + 1 : table->slot_high;
   ++table->slots[at].generation;
   table->entries[index].slot = at;
 }
 
-static void free_slots(hapi_physics *physics)
+void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint32_t *joints,
+                            uint32_t count)
 {
-  hapi_joint_table *table = &physics->world.joints;
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t slot = table->entries[joints[i]].slot;
+    if (slot != HAPI_NONE) {
+      table->slots[slot].model = model;
+    }
+  }
   for (uint32_t i = 0; i < table->slot_high; ++i) {
     hapi_joint_slot *slot = &table->slots[i];
-    hapi_known_joint *known = slot->taken != 0 ? &table->entries[slot->taken - 1] : NULL;
-    if (known != NULL && known->ranged_in != physics->cycle.model_number) {
-      known->slot = HAPI_NONE;
+    if (slot->taken != 0 && slot->model != model) {
+      table->entries[slot->taken - 1].slot = HAPI_NONE;
       slot->taken = 0;
     }
   }
-}
-
-void hapi_joints_publish(hapi_physics *physics, hapi_model *out)
-{
-  hapi_range *range = &physics->near.range;
-  hapi_model_joint *joints = hapi_model_joints(out);
-  out->joint_count = 0;
-  if (physics->cycle.model != HAP_MODEL_CONTACT || range->number != physics->cycle.model_number) {
-    return;
-  }
-  free_slots(physics);
-  for (uint32_t i = 0; i < range->joint_count; ++i) {
-    const hapi_known_joint *known = &physics->world.joints.entries[range->joints[i]];
-    if (known->slot == HAPI_NONE) {
-      take_slot(&physics->world.joints, range->joints[i]);
+  for (uint32_t i = 0; i < count; ++i) {
+    if (table->entries[joints[i]].slot == HAPI_NONE) {
+      take_slot(table, joints[i]);
     }
-    fill(physics, known, &joints[out->joint_count++]);
   }
 }

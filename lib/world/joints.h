@@ -13,7 +13,7 @@
 #include "base/index.h"
 #include "sync/messages.h"
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_world hapi_world;
 
 /* Names a joint in every run alike. Its address cannot: the heap may give the address of a destroyed
  * joint again or not, and lockstep would depend on that. */
@@ -49,6 +49,7 @@ typedef struct hapi_known_joint {
 typedef struct hapi_joint_slot {
   uint32_t taken; /* by which entry, + 1; 0: free */
   uint32_t generation;
+  uint64_t model; /* newest one that its joint was in before */
 } hapi_joint_slot;
 
 typedef struct hapi_joint_table {
@@ -59,20 +60,21 @@ typedef struct hapi_joint_table {
   hapi_index by_name;
   uint64_t scan;
   bool starved;           /* the newest scan found no memory for a joint */
-  hapi_joint_slot *slots; /* capacity.joints */
-  uint32_t slot_high;     /* from here on none was ever taken */
+  hapi_joint_slot *slots; /* numbers of joints in the loop */
+  uint32_t slot_count;
+  uint32_t slot_high; /* from here on none was ever taken */
 } hapi_joint_table;
 
 /* joints.c */
-bool hapi_joints_create(hapi_physics *physics);
+bool hapi_joints_create(hapi_joint_table *table, uint32_t slots);
 void hapi_joints_finish(hapi_joint_table *table);
 uint32_t hapi_joints_find(const hapi_joint_table *table, dJointID joint); /* HAPI_NONE */
-void hapi_joints_scan(hapi_physics *physics);                             /* after the bodies' */
-void hapi_joints_leave(hapi_physics *physics);  /* last: what is left in ODE */
-void hapi_joints_reset(hapi_physics *physics);  /* forgets all */
-void hapi_joints_hold(hapi_physics *physics);   /* those of owned bodies: off for the step */
-void hapi_joints_let_go(hapi_physics *physics); /* after it; their feedback is zero */
-void hapi_joints_publish(hapi_physics *physics, hapi_model *out);
+void hapi_joints_scan(hapi_world *world);                                 /* after the bodies' */
+void hapi_joints_leave(hapi_joint_table *table); /* last: what is left in ODE */
+void hapi_joints_reset(hapi_joint_table *table); /* forgets all */
+/* Slots for the joints of a model: entries of the table. Those of no other joint stay taken. */
+void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint32_t *joints,
+                            uint32_t count);
 
 /* joint_place.c */
 bool hapi_joint_kind_of(dJointID joint, hapi_joint_kind *out); /* false: not one of the loop's */

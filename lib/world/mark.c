@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* The heap gives a new body the address of a destroyed one, often at once, and nothing that ODE keeps
  * of a body says which one it is. So a body that is known carries a mark in data that ODE does not use

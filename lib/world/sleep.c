@@ -4,7 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
-#include "physics/physics_internal.h"
+#include "world/bodies.h"
 
 /* Auto-disable. ODE keeps its countdown inside the body, without getter or setter: enabling a body
  * restarts it and a testing simulation advances it, so with probes no body would ever fall asleep,
@@ -198,10 +198,10 @@ static bool can_sleep(const hapi_known_body *known)
   return known->sleep_automatic && (sleep->samples == 1 || sleep->velocities != NULL);
 }
 
-void hapi_sleep_step(hapi_physics *physics, double step_s)
+void hapi_sleep_step(hapi_body_table *table, double step_s)
 {
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    hapi_known_body *known = &physics->world.bodies.entries[i];
+  for (uint32_t i = 0; i < table->high; ++i) {
+    hapi_known_body *known = &table->entries[i];
     if (known->body == NULL || !can_sleep(known)) {
       continue;
     }

@@ -4,19 +4,11 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* ODE's error reduction, constraint softness and damping are meant for the step of the world. What
  * is stepped at the haptic rate, the loop's contacts and the world itself in model SINGLE, needs
  * those of another step with the same effect. */
-
-/* A softness from which on a contact is a spring, not a rigid one with rounding. */
-#define SOFT_CFM 1e-6
-
-static double step_ratio(const hapi_physics *physics)
-{
-  return physics->config.physics_hz / physics->config.haptic_hz;
-}
 
 /* erp = h k / (h k + d), cfm = 1 / (h k + d) for a spring k and a damper d (ODE's manual). */
 void hapi_soften(double ratio, double *erp, double *cfm)
@@ -26,68 +18,6 @@ void hapi_soften(double ratio, double *erp, double *cfm)
     *erp = ratio * *erp / part;
     *cfm = *cfm / part;
   }
-}
-
-static uint32_t flags_of(const dSurfaceParameters *s, double cfm)
-{
-  const struct {
-    int mode;
-    uint32_t flag;
-  } bits[] = {
-      {dContactApprox1_1, HAPI_SURFACE_APPROX1_1}, {dContactApprox1_2, HAPI_SURFACE_APPROX1_2},
-      {dContactFDir1, HAPI_SURFACE_FDIR1},         {dContactBounce, HAPI_SURFACE_BOUNCE},
-      {dContactSlip1, HAPI_SURFACE_SLIP1},         {dContactSlip2, HAPI_SURFACE_SLIP2},
-  };
-  bool asked = (s->mode & (dContactSoftERP | dContactSoftCFM)) != 0;
-  uint32_t flags = (asked && cfm > 0.0) || cfm > SOFT_CFM ? HAPI_SURFACE_SOFT : 0u;
-  for (size_t i = 0; i < sizeof bits / sizeof bits[0]; ++i) {
-    flags |= (s->mode & bits[i].mode) != 0 ? bits[i].flag : 0u;
-  }
-  return flags;
-}
-
-static void fill_surface(const hapi_physics *physics, const dSurfaceParameters *s,
-                         hapi_surface *out)
-{
-  dWorldID world = physics->world.ode.world;
-  memset(out, 0, sizeof *out);
-  out->erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world);
-  out->cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world);
-  out->flags = flags_of(s, out->cfm);
-  hapi_soften(step_ratio(physics), &out->erp, &out->cfm);
-  out->mu = s->mu;
-  out->mu2 = (s->mode & dContactMu2) != 0 ? s->mu2 : s->mu;
-  out->bounce = s->bounce;
-  out->bounce_speed = s->bounce_vel;
-  out->layer = dWorldGetContactSurfaceLayer(world);
-  out->max_push = dWorldGetContactMaxCorrectingVel(world);
-  out->motion[0] = (s->mode & dContactMotion1) != 0 ? s->motion1 : 0.0;
-  out->motion[1] = (s->mode & dContactMotion2) != 0 ? s->motion2 : 0.0;
-  out->motion[2] = (s->mode & dContactMotionN) != 0 ? s->motionN : 0.0;
-  out->slip[0] = s->slip1;
-  out->slip[1] = s->slip2;
-}
-
-bool hapi_world_surface(hapi_physics *physics, hapi_link *link)
-{
-  hapi_surface *out = &link->surface;
-  dSurfaceParameters surface;
-  if (!hapi_world_ask_surface(physics, link->own, link->other, &surface, &link->turned)) {
-    return false;
-  }
-  dGeomID a = link->turned ? link->other : link->own;
-  dGeomID b = link->turned ? link->own : link->other;
-  fill_surface(physics, &surface, out);
-  double direction[3];
-  if ((surface.mode & dContactFDir1) != 0 && hapi_world_direction(physics, a, b, direction)) {
-    hapi_v3_copy(direction, out->direction);
-  } else {
-    out->flags &= ~(uint32_t)HAPI_SURFACE_FDIR1;
-  }
-  if (hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_RESTITUTION)) {
-    out->flags &= ~(uint32_t)HAPI_SURFACE_BOUNCE;
-  }
-  return true;
 }
 
 /* ---- model SINGLE ---- */
@@ -189,24 +119,27 @@ void hapi_joint_restore(const hapi_known_joint *known)
   }
 }
 
-void hapi_world_convert(hapi_physics *physics)
+double hapi_step_ratio(const hapi_cycle *cycle)
 {
-  double ratio = step_ratio(physics);
-  if (physics->cycle.model != HAP_MODEL_SINGLE || ratio == 1.0) {
+  return cycle->config->physics_hz / cycle->config->haptic_hz;
+}
+
+void hapi_world_convert(const hapi_world *world, double ratio, hapi_meant *out)
+{
+  *out = (hapi_meant){.converted = ratio != 1.0};
+  if (!out->converted) {
     return;
   }
-  dWorldID world = physics->world.ode.world;
-  double erp = physics->world.meant_erp = dWorldGetERP(world);
-  double cfm = physics->world.meant_cfm = dWorldGetCFM(world);
+  double erp = out->erp = dWorldGetERP(world->ode.world);
+  double cfm = out->cfm = dWorldGetCFM(world->ode.world);
   hapi_soften(ratio, &erp, &cfm);
-  dWorldSetERP(world, erp);
-  dWorldSetCFM(world, cfm);
-  physics->world.converted = true;
-  for (uint32_t i = 0; i < physics->world.joints.count; ++i) {
-    hapi_joint_soften(&physics->world.joints.entries[i], ratio);
+  dWorldSetERP(world->ode.world, erp);
+  dWorldSetCFM(world->ode.world, cfm);
+  for (uint32_t i = 0; i < world->joints.count; ++i) {
+    hapi_joint_soften(&world->joints.entries[i], ratio);
   }
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    hapi_known_body *known = &physics->world.bodies.entries[i];
+  for (uint32_t i = 0; i < world->bodies.high; ++i) {
+    hapi_known_body *known = &world->bodies.entries[i];
     if (known->body != NULL) {
       known->rest->damping[0] = dBodyGetLinearDamping(known->body);
       known->rest->damping[1] = dBodyGetAngularDamping(known->body);
@@ -218,19 +151,18 @@ void hapi_world_convert(hapi_physics *physics)
   }
 }
 
-void hapi_world_restore(hapi_physics *physics)
+void hapi_world_restore(const hapi_world *world, const hapi_meant *meant)
 {
-  if (!physics->world.converted) {
+  if (!meant->converted) {
     return;
   }
-  physics->world.converted = false;
-  dWorldSetERP(physics->world.ode.world, physics->world.meant_erp);
-  dWorldSetCFM(physics->world.ode.world, physics->world.meant_cfm);
-  for (uint32_t i = 0; i < physics->world.joints.count; ++i) {
-    hapi_joint_restore(&physics->world.joints.entries[i]);
+  dWorldSetERP(world->ode.world, meant->erp);
+  dWorldSetCFM(world->ode.world, meant->cfm);
+  for (uint32_t i = 0; i < world->joints.count; ++i) {
+    hapi_joint_restore(&world->joints.entries[i]);
   }
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    const hapi_known_body *known = &physics->world.bodies.entries[i];
+  for (uint32_t i = 0; i < world->bodies.high; ++i) {
+    const hapi_known_body *known = &world->bodies.entries[i];
     if (known->body != NULL && (known->rest->damping[0] != 0.0 || known->rest->damping[1] != 0.0)) {
       dBodySetLinearDamping(known->body, known->rest->damping[0]);
       dBodySetAngularDamping(known->body, known->rest->damping[1]);

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "world/world.h"
 
 /* The border between the application's world and ours: what ODE holds is looked at once a cycle,
  * before collision, step and testing simulations. ODE aborts the process on a quaternion that is
@@ -116,6 +116,17 @@ static bool is_plainly_sound(dBodyID body)
          is_short(dBodyGetAngularVel(body), SPIN_MOST) &&
          is_short(dBodyGetForce(body), WRENCH_MOST) &&
          is_short(dBodyGetTorque(body), WRENCH_MOST) && damping_unsoundness(body) == NULL;
+}
+
+void hapi_pose_read(dBodyID body, hap_pose *out)
+{
+  hapi_v3_copy(dBodyGetPosition(body), out->position);
+  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+}
+
+bool hapi_pose_is_sound(dBodyID body)
+{
+  return hapi_finite(dBodyGetPosition(body), 3) && hapi_finite(dBodyGetQuaternion(body), 4);
 }
 
 /* ---- joints ---- */
@@ -267,41 +278,36 @@ static void say(hap_detail *out, dBodyID body, const char *what)
            p[2], what, dBodyIsKinematic(body) ? "" : ", or make the body kinematic");
 }
 
-/* The local ones: since the scan they may have been given what the loop made of them. */
-static bool local_is_unsound(const hapi_physics *physics, hap_detail *out_text)
+bool hapi_world_is_unsound(const hapi_world *world, hap_detail *out_text)
 {
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    uint32_t index = physics->near.slots.bodies[i].known;
-    const hapi_known_body *known =
-        index != HAPI_NONE ? &physics->world.bodies.entries[index] : NULL;
-    const char *what = known != NULL ? hapi_body_unsoundness(known->body, known->jointed) : NULL;
-    if (what != NULL) {
-      say(out_text, known->body, what);
-      return true;
-    }
-  }
-  return false;
-}
-
-bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text)
-{
-  const hapi_body_table *table = &physics->world.bodies;
-  const char *what = world_unsoundness(physics->world.ode.world);
+  const hapi_body_table *table = &world->bodies;
+  const char *what = world_unsoundness(world->ode.world);
   if (what != NULL) {
     snprintf(out_text->text, sizeof out_text->text, "the world has %s: set it right", what);
     return true;
   }
   if (table->unsound_body != NULL) {
     say(out_text, table->unsound_body, table->unsound_text);
-    return true;
   }
-  if (local_is_unsound(physics, out_text)) {
-    return true;
+  return table->unsound_body != NULL;
+}
+
+bool hapi_body_is_unsound(const hapi_known_body *known, hap_detail *out_text)
+{
+  const char *what = hapi_body_unsoundness(known->body, known->jointed);
+  if (what != NULL) {
+    say(out_text, known->body, what);
   }
-  if (table->unsound_geom != NULL) {
+  return what != NULL;
+}
+
+bool hapi_geoms_are_unsound(const hapi_world *world, hap_detail *out_text)
+{
+  dGeomID geom = world->bodies.unsound_geom;
+  if (geom != NULL) {
     snprintf(out_text->text, sizeof out_text->text,
              "a geom of class %d has a pose or size that is not a number: set it right",
-             dGeomGetClass(table->unsound_geom));
+             dGeomGetClass(geom));
   }
-  return table->unsound_geom != NULL;
+  return geom != NULL;
 }

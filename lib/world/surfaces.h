@@ -11,8 +11,9 @@
 #include <ode/ode.h>
 
 #include "sync/messages.h"
+#include "world/cycle.h"
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_world hapi_world;
 
 typedef struct hapi_surface_entry {
   dGeomID a; /* compared only */
@@ -38,12 +39,14 @@ typedef struct hapi_link {
   bool turned; /* the surface is of (other, own) */
 } hapi_link;
 
-/* What the pair's surface is, from the application's callback; false: no contact. */
-bool hapi_world_ask_surface(hapi_physics *physics, dGeomID a, dGeomID b, dSurfaceParameters *out,
-                            bool *out_turned); /* it was asked for (b, a) */
+/* The application's answer for the pair, asked for once a step in model CONTACT; false: no contact.
+ * *out_turned: it was asked for (b, a). */
+bool hapi_world_ask_surface(const hapi_world *world, const hapi_cycle *cycle, dGeomID a, dGeomID b,
+                            dSurfaceParameters *out, bool *out_turned);
 /* The same for the loop: soft constraints converted from H to T. */
-bool hapi_world_surface(hapi_physics *physics, hapi_link *link);
+bool hapi_world_surface(const hapi_world *world, const hapi_cycle *cycle, hapi_link *link);
 /* First friction direction of a pair whose surface has dContactFDir1; false: none was given. */
-bool hapi_world_direction(hapi_physics *physics, dGeomID a, dGeomID b, double out[3]);
+bool hapi_world_direction(const hapi_world *world, dGeomID a, dGeomID b, double out[3]);
+void hapi_world_forget_surfaces(hapi_world *world); /* a new step */
 
 #endif

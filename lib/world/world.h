@@ -20,46 +20,97 @@
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
 #define HAPI_STANDARD_GRAVITY 9.81
 
-typedef struct hapi_world {
+/* Contacts of the step, as they were given to ODE, which has no getter for them. */
+typedef struct hapi_contact_note {
+  dJointID joint; /* compared only */
+  dContact contact;
+} hapi_contact_note;
+
+typedef struct hapi_contact_notes {
+  hapi_contact_note *list;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_contact_notes;
+
+typedef struct hapi_world_counts {
+  uint64_t steps;
+  uint64_t contacts_rejected;
+} hapi_world_counts;
+
+/* What is reached through a pointer may change in a const hapi_world: ODE's own objects, entries of the
+ * tables, the surface cache, and what contacts are made with. */
+struct hapi_world {
   hap_ode_def ode;
   hapi_claim claim;
+  bool begun; /* a session has taken the world over, and the bodies' sleep with it */
   hapi_body_table bodies;
   hapi_joint_table joints;
-  hapi_surface_cache surfaces;
+  hapi_surface_cache *surfaces;
+  hapi_contact_notes *notes;
   dJointGroupID contact_group;
   dJointGroupID carried_group; /* contacts of what the loop owns, see range_error.c */
   dContact *contact_scratch;
   hapi_islands islands;
   unsigned islands_threads; /* ODE's setting as it was found */
-  bool converted;           /* ODE holds parameters of another step, see soften.c */
-  double meant_erp;
-  double meant_cfm;
-} hapi_world;
+  hapi_world_counts counts;
+};
 
-double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
+/* world.c */
+/* *world is zeroed. joint_slots: of the loop. *listener stays where it is. False: no memory; finish is
+ * called in any case. */
+bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,
+                       const hapi_world_listener *listener);
+void hapi_world_finish(hapi_world *world);
+void hapi_world_step(hapi_world *world, double step_s); /* the global step */
+double hapi_body_mass(dBodyID body);                    /* 0 for a kinematic one */
 
-/* soundness.c: states that ODE would abort the process on, or make NaN of. *out_text says what was found
- * and what to do. */
-bool hapi_world_is_unsound(hapi_physics *physics, hap_detail *out_text); /* after a scan */
-const char *hapi_body_unsoundness(dBodyID body, bool jointed);           /* NULL: it is sound */
+/* soundness.c: states that ODE would abort the process on, or make NaN of. *out_text says what was
+ * found and what to do. After a scan. */
+bool hapi_world_is_unsound(const hapi_world *world, hap_detail *out_text); /* it, or its bodies */
+bool hapi_body_is_unsound(const hapi_known_body *known, hap_detail *out_text); /* since the scan */
+bool hapi_geoms_are_unsound(const hapi_world *world, hap_detail *out_text);
+const char *hapi_body_unsoundness(dBodyID body, bool jointed); /* NULL: it is sound */
 bool hapi_geom_is_sound(dGeomID geom);
 /* What a collider found is made of numbers. */
 bool hapi_contact_is_sound(const dContactGeom *contact);
 
 /* collide.c */
-void hapi_world_collide(hapi_physics *physics);
-void hapi_world_collide_carried(hapi_physics *physics); /* what the loop carries: carried_group */
-void hapi_world_quickstep(hapi_physics *physics, double step_s); /* counted */
-/* Contact joints of two geoms for the next step, between these bodies (NULL: the static world). */
-void hapi_world_make_contacts(hapi_physics *physics, const dGeomID geoms[2],
-                              const dBodyID bodies[2], dSurfaceParameters *surface, bool carried);
+typedef enum hapi_contact_kind {
+  HAPI_CONTACT_PLAIN = 0,
+  HAPI_CONTACT_NOTED,  /* with a note */
+  HAPI_CONTACT_CARRIED /* in carried_group */
+} hapi_contact_kind;
+
+typedef struct hapi_touching {
+  dGeomID geoms[2];
+  dBodyID bodies[2]; /* NULL: the static world */
+} hapi_touching;
+
+/* Contact joints for the next step. notes: each with a note. */
+void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes);
+/* Those of what the loop carries, into carried_group. Returns how many were rejected. */
+uint32_t hapi_world_collide_carried(const hapi_world *world, const hapi_cycle *cycle);
+/* Contact joints of two geoms. Returns how many were rejected. */
+uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
+                                  const hapi_touching *touching, dSurfaceParameters *surface,
+                                  hapi_contact_kind kind);
+/* NULL: there is no note, the joint is the application's own. */
+const dContact *hapi_world_contact_of(const hapi_world *world, dJointID joint);
 
 /* soften.c */
+/* Parameters of the world as the application means them, while ODE holds others. */
+typedef struct hapi_meant {
+  bool converted;
+  double erp;
+  double cfm;
+} hapi_meant;
+
+double hapi_step_ratio(const hapi_cycle *cycle); /* T / H */
 /* Constraint parameters of step H as those of step T: the same spring and damper. */
 void hapi_soften(double step_ratio, double *erp, double *cfm);
-/* Model SINGLE steps at T: ERP, CFM and damping of the world and its bodies as meant for H. Undone
- * by restore. */
-void hapi_world_convert(hapi_physics *physics);
-void hapi_world_restore(hapi_physics *physics);
+/* For a step at T: ERP, CFM and damping of the world and its bodies as meant for H. Undone by
+ * restore. */
+void hapi_world_convert(const hapi_world *world, double ratio, hapi_meant *out);
+void hapi_world_restore(const hapi_world *world, const hapi_meant *meant);
 
 #endif
