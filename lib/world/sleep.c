@@ -4,7 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
-#include "world/bodies.h"
+#include "world/world.h"
 
 /* Auto-disable. ODE keeps its countdown inside the body, without getter or setter: enabling a body
  * restarts it and a testing simulation advances it, so with probes no body would ever fall asleep,

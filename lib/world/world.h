@@ -55,7 +55,7 @@ struct hapi_world {
   hapi_world_counts counts;
 };
 
-/* world.c */
+/* life.c */
 /* *world is zeroed. joint_slots: of the loop. *listener stays where it is. False: no memory; finish is
  * called in any case. */
 bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,

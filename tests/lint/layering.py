@@ -29,7 +29,7 @@ LAYERS = {
     "lib/contact": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record"],
     "lib/haptic": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/device",
                    "lib/record"],
-    "lib/world": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
+    "lib/world": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/near": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/probe": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/research": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
