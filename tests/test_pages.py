@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: hapode contributors
+# SPDX-License-Identifier: MIT
+"""Links, code and commands of README and docs. Arguments: source root, hapode-run, hapode-bench, compiler."""
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+root, program, bench = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+compiler = sys.argv[4:]
+pages = sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md"))
+CODE = re.compile(r"^```(\w*)\n(.*?)^```$", re.S | re.M)
+# Words of a page that are a file or a folder of the tree.
+PATH = re.compile(r"`((?:docs|lib|include|tests|tools|bench|scenes|plugins|examples)/[\w./*-]+)`")
+# What a piece of code may use; a whole program has a main of its own.
+BEFORE = """#include <hapode/hapode.h>
+#include <hapode/ode.h>
+#include <stdio.h>
+hap_status piece(hap_session *session, hap_device *device, hap_pointer_id hand, hap_detail why);
+hap_status piece(hap_session *session, hap_device *device, hap_pointer_id hand, hap_detail why)
+{
+  hap_session_def session_def;
+  hap_ode_def ode_def;
+  hap_pointer_def hand_def;
+  hap_stats stats;
+  hap_status status = HAP_OK;
+  (void)session, (void)device, (void)hand, (void)why, (void)sizeof stats;
+  hap_session_def_init(&session_def, sizeof session_def);
+  hap_ode_def_init(&ode_def, sizeof ode_def);
+  hap_pointer_def_init(&hand_def, sizeof hand_def);
+"""
+AFTER = "  return status;\n}\n"
+points = []
+
+
+def point(problems, name):
+    points.append(not problems)
+    for problem in problems[:40]:
+        print("# " + str(problem).replace("\n", "\n# "))
+    print(f"{'not ok' if problems else 'ok'} {len(points)} - {name}", flush=True)
+
+
+def skip(name, reason):
+    points.append(True)
+    print(f"ok {len(points)} - {name} # SKIP {reason}")
+
+
+def slug(heading):
+    """The anchor of a heading, as code hosts make it."""
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
+    return re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+
+
+def anchors(path):
+    text = CODE.sub("", path.read_text(encoding="utf-8"))
+    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", text, re.M)}
+
+
+def links(path):
+    text = CODE.sub("", path.read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not re.match(r"[a-z]+:", target):
+            yield target
+
+
+def bad_links():
+    for page in pages:
+        for target in links(page):
+            name, _, anchor = target.partition("#")
+            path = (page.parent / name).resolve() if name else page
+            if not path.exists():
+                yield f"{page.relative_to(root)}: {target} is not there"
+            elif anchor and anchor not in anchors(path):
+                yield f"{page.relative_to(root)}: {target} has no such heading"
+
+
+def bad_paths():
+    for page in pages:
+        if page.name == "CHANGELOG.md":
+            continue
+        for name in PATH.findall(page.read_text(encoding="utf-8")):
+            if not list(root.glob(name.rstrip("/."))):
+                yield f"{page.relative_to(root)}: {name} is not there"
+
+
+def lost_pages():
+    """Pages that nobody comes to from the README."""
+    reached = set()
+    waiting = [root / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        if page in reached:
+            continue
+        reached.add(page)
+        waiting += [path for target in links(page)
+                    for path in [(page.parent / target.partition("#")[0]).resolve()]
+                    if path.suffix == ".md" and path.is_file()]
+    return [str(page.relative_to(root)) for page in pages
+            if page.resolve() not in reached and page.name != "CHANGELOG.md"]
+
+
+def pieces():
+    for page in pages:
+        for number, (language, text) in enumerate(CODE.findall(page.read_text(encoding="utf-8"))):
+            if language == "c":
+                yield f"{page.relative_to(root)}, block {number + 1}", text
+
+
+def bad_code(flags):
+    for where, text in pieces():
+        whole = "int main(" in text
+        source = text if whole else BEFORE + text + AFTER
+        command = [*compiler, "-std=c11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror",
+                   "-Wno-unused-variable", "-Wno-unused-but-set-variable", f"-I{root}/include", *flags,
+                   "-x", "c", "-"]
+        done = subprocess.run(command, input=source, capture_output=True, text=True, timeout=60)
+        if done.returncode != 0:
+            yield f"{where}:\n{done.stderr[:600]}"
+
+
+def commands(name):
+    """Lines of shell blocks that call a program, without prompt, comment and what follows a pipe."""
+    for page in pages:
+        for language, text in CODE.findall(page.read_text(encoding="utf-8")):
+            if language != "sh":
+                continue
+            for line in text.replace("\\\n", " ").split("\n"):
+                line = re.sub(r"\s#.*$", "", line).strip()
+                match = re.match(rf"(?:chrt -f \d+ )?(?:build/)?{name}\s+(.*)$", line)
+                if match:
+                    yield str(page.relative_to(root)), match.group(1).split()
+
+
+def bad_options(name, path):
+    text = subprocess.run([str(path), "--help"], capture_output=True, text=True, timeout=30).stdout
+    known = set(re.findall(r"--[a-z][a-z-]*", text)) | {"--help"}
+    found = 0
+    for page, words in commands(name):
+        found += 1
+        for word in words:
+            option = word.partition("=")[0]
+            if option.startswith("--") and option not in known:
+                yield f"{page}: {name} has no {option}"
+    if not found:
+        yield f"no page has a command of {name}"
+
+
+def bad_runs():
+    """Commands that need neither hardware, nor a file, nor a person, for a moment of virtual time."""
+    for page, words in commands("hapode-run"):
+        if "--scene" not in words or any(word.startswith(start) for word in words for start in (
+                "spidar", "module:", "replay:", "/", "--play", "--identity", "--record", "--tick-share",
+                "--physics-share", "--reconnect")):
+            continue
+        words = [word for i, word in enumerate(words) if word != "--seconds" and
+                 (i == 0 or words[i - 1] != "--seconds")]
+        with tempfile.TemporaryDirectory() as folder:
+            pathlib.Path(folder, "build").mkdir()
+            done = subprocess.run([str(program), *words, "--lockstep", "--seconds", "0.05"], cwd=folder,
+                                  capture_output=True, text=True, timeout=60)
+        if done.returncode != 0:
+            yield f"{page}: {' '.join(words)}: {done.stderr[:200]}"
+
+
+def ode_flags():
+    if not shutil.which("pkg-config"):
+        return None
+    done = subprocess.run(["pkg-config", "--cflags", "ode"], capture_output=True, text=True)
+    return done.stdout.split() if done.returncode == 0 else None
+
+
+point([] if len(pages) > 20 else [f"{len(pages)} found"], "there are pages")
+point(list(bad_links()), "links lead somewhere")
+point(list(bad_paths()), "files that are named are there")
+point(lost_pages(), "every page is reached from the README")
+ode = ode_flags()
+if ode is None:
+    skip("code compiles", "needs pkg-config and ode.pc")
+else:
+    point([] if len(list(pieces())) > 5 else ["no code found"], "there is code")
+    point(list(bad_code(ode)), "code compiles")
+point(list(bad_options("hapode-run", program)), "hapode-run has the options of the pages")
+point(list(bad_options("hapode-bench", bench)), "hapode-bench has the options of the pages")
+point(list(bad_runs()), "commands run")
+print(f"1..{len(points)}")
+sys.exit(0 if all(points) else 1)
