@@ -7,7 +7,7 @@
 /* 0.1 kg and 1 N s/m, as a desktop device has; a hand presses 10 mm into a wall. */
 #define DEVICE "virtual:path=0:0/0/0;0.5:0.01/0/0,hand=tense,device_mass=0.1,device_damping=1"
 
-static int press(dWorldID world, dSpaceID space, double stiffness)
+static int wall_press(dWorldID world, dSpaceID space, double stiffness)
 {
   hap_detail why = {""};
   hap_session_def session_def;
@@ -45,6 +45,6 @@ int main(void)
   dWorldID world = dWorldCreate();
   dSpaceID space = dHashSpaceCreate(NULL);
   dCreatePlane(space, -1.0, 0.0, 0.0, -0.01); /* a wall that the pointer just touches at x = 0 */
-  return press(world, space, 500) | press(world, space, 1000) | press(world, space, 3000) |
-         press(world, space, 10000);
+  return wall_press(world, space, 500) | wall_press(world, space, 1000) |
+         wall_press(world, space, 3000) | wall_press(world, space, 10000);
 }

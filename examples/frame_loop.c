@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A program that draws at 90 Hz and steps its world in the same loop; touch has a thread of its own. In
- * place of a renderer it prints every tenth frame: a box that slides on a table, and the hand behind
- * it. */
+/* A program that draws at 90 Hz and steps its world in the same loop; touch has a thread of its
+ * own. In place of a renderer it prints every tenth frame: a box that slides on a table, and the
+ * hand behind it. */
 #define _POSIX_C_SOURCE 200809L /* nanosleep */
 #include <hapode/hapode.h>
 #include <hapode/ode.h>

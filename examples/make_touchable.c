@@ -6,14 +6,15 @@
 #include <stdio.h>
 #include <time.h>
 
-static bool wood(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io) /* was: near_callback */
+static bool surface_of_wood(void *user, dGeomID a, dGeomID b,
+                            dSurfaceParameters *io) /* was: near_callback */
 {
   (void)user, (void)a, (void)b;
   io->mu = 0.5;
   return true; /* false: this pair does not collide */
 }
 
-static void add_box(dWorldID world, dSpaceID space, double z)
+static void box_add(dWorldID world, dSpaceID space, double z)
 {
   dMass mass;
   dBodyID box = dBodyCreate(world);
@@ -31,8 +32,8 @@ int main(void)
   dWorldSetGravity(world, 0.0, 0.0, -9.81);
   dWorldSetContactSurfaceLayer(world, 5e-4); /* new: contacts persist from step to step */
   dCreatePlane(space, 0.0, 0.0, 1.0, 0.0);
-  add_box(world, space, 0.0245);
-  add_box(world, space, 0.0735);
+  box_add(world, space, 0.0245);
+  box_add(world, space, 0.0735);
 
   hap_detail why = {""}; /* new: a session over the world, and a hand in it */
   hap_session_def session_def;
@@ -41,7 +42,7 @@ int main(void)
   hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
-  ode_def.world = world, ode_def.space = space, ode_def.surface = wood;
+  ode_def.world = world, ode_def.space = space, ode_def.surface = surface_of_wood;
   hand_def.friction = 0.5;
   hap_session *session;
   hap_pointer_id hand;

@@ -17,21 +17,21 @@ typedef struct lift {
   int entered;
 } lift;
 
-static bool collides(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool pair_collides(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user;
   io->mu = 0.8;
   return ((dGeomGetCategoryBits(a) | dGeomGetCategoryBits(b)) & TRIGGER) == 0;
 }
 
-static void move_platform(void *user, double step_s) /* before_step */
+static void platform_move(void *user, double step_s) /* before_step */
 {
   lift *l = user;
   l->t += step_s; /* a velocity, not a position: a box on the platform is carried */
   dBodySetLinearVel(l->platform, 0.0, 0.0, 0.05 * sin(3.0 * l->t));
 }
 
-static void look_into_zone(void *user, double step_s) /* after_step */
+static void zone_look(void *user, double step_s) /* after_step */
 {
   lift *l = user;
   dContactGeom contact;
@@ -39,7 +39,7 @@ static void look_into_zone(void *user, double step_s) /* after_step */
   l->entered += dCollide(l->zone, l->box_geom, 1, &contact, sizeof contact) > 0;
 }
 
-static void build(lift *l, dWorldID world, dSpaceID space)
+static void world_build(lift *l, dWorldID world, dSpaceID space)
 {
   dMass mass;
   l->platform = dBodyCreate(world);
@@ -67,7 +67,7 @@ int main(void)
   dSpaceID space = dHashSpaceCreate(NULL);
   dWorldSetGravity(world, 0.0, 0.0, -9.81);
   dWorldSetContactSurfaceLayer(world, 5e-4);
-  build(&l, world, space);
+  world_build(&l, world, space);
 
   hap_detail why = {""};
   hap_session_def session_def;
@@ -78,9 +78,9 @@ int main(void)
   hap_pointer_def_init(&hand_def, sizeof hand_def);
   session_def.drive = HAP_DRIVE_LOCKSTEP; /* no clock: the program ends at once */
   ode_def.world = world, ode_def.space = space, ode_def.user = &l;
-  ode_def.surface = collides;
-  ode_def.before_step = move_platform;
-  ode_def.after_step = look_into_zone;
+  ode_def.surface = pair_collides;
+  ode_def.before_step = platform_move;
+  ode_def.after_step = zone_look;
   hand_def.collide_bits = SOLID; /* the hand goes through the zone */
   hap_session *session;
   hap_pointer_id hand;

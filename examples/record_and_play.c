@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <time.h>
 
-static void build(hap_ode_def *ode) /* the same world for both runs */
+static void world_build(hap_ode_def *ode) /* the same world for both runs */
 {
   dMass mass;
   ode->world = dWorldCreate(), ode->space = dHashSpaceCreate(NULL);
@@ -16,7 +16,7 @@ static void build(hap_ode_def *ode) /* the same world for both runs */
   dGeomSetBody(dCreateBox(ode->space, 0.05, 0.05, 0.05), cube);
 }
 
-static hap_status record(const char *path, hap_detail *why)
+static hap_status push_record(const char *path, hap_detail *why)
 {
   hap_session_def def;
   hap_ode_def ode;
@@ -29,7 +29,7 @@ static hap_status record(const char *path, hap_detail *why)
   hap_pointer_def_init(&hand, sizeof hand);
   hap_record_def_init(&file, sizeof file);
   file.path = path;
-  build(&ode);
+  world_build(&ode);
   hap_status status = hap_session_create(&def, &ode, &session, why);
   if (status >= HAP_OK) {
     status = hap_device_open("virtual:path=0:-0.05/0/0;0.5:0.05/0/0", &hand.device, why);
@@ -45,7 +45,7 @@ static hap_status record(const char *path, hap_detail *why)
   return HAP_OK;
 }
 
-static hap_status play(const char *path, hap_detail *why)
+static hap_status push_play(const char *path, hap_detail *why)
 {
   hap_session_def def;
   hap_ode_def ode;
@@ -53,7 +53,7 @@ static hap_status play(const char *path, hap_detail *why)
   hap_session *session;
   hap_session_def_init(&def, sizeof def);
   hap_ode_def_init(&ode, sizeof ode);
-  build(&ode);
+  world_build(&ode);
   hap_status status = hap_player_open(path, 0, &player, why);
   if (status < HAP_OK || (status = hap_player_get_def(player, &def)) < HAP_OK ||
       (status = hap_session_create(&def, &ode, &session, why)) < HAP_OK ||
@@ -74,9 +74,9 @@ int main(int argc, char **argv)
   const char *path = argc > 1 ? argv[1] : "push.rec";
   hap_detail why = {""};
   dInitODE2(0);
-  hap_status status = record(path, &why);
+  hap_status status = push_record(path, &why);
   if (status >= HAP_OK) {
-    status = play(path, &why);
+    status = push_play(path, &why);
   }
   puts(status == HAP_END ? "the replay is the recording" : hap_status_text(status));
   return status == HAP_END ? 0 : (fprintf(stderr, "%s\n", why.text), 1);

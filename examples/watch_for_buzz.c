@@ -7,7 +7,7 @@
 /* 20 g and 0.2 N s/m: a light, slippery device. Nothing else holds it. */
 #define DEVICE "virtual:hand=none,device_mass=0.02,device_damping=0.2,delay=0.001,kick=0.1:0.05/0/0"
 
-static int buzzes(dWorldID world, dSpaceID space, hap_coupling coupling)
+static int buzz_count(dWorldID world, dSpaceID space, hap_coupling coupling)
 {
   hap_detail why = {""};
   hap_session_def session_def;
@@ -56,5 +56,6 @@ int main(void)
   dSpaceID space = dHashSpaceCreate(NULL);
   dCreatePlane(space, -1.0, 0.0, 0.0, -0.012); /* walls on both sides of the free pointer */
   dCreatePlane(space, 1.0, 0.0, 0.0, -0.012);
-  return buzzes(world, space, HAP_COUPLING_DIRECT) | buzzes(world, space, HAP_COUPLING_AUTO);
+  return buzz_count(world, space, HAP_COUPLING_DIRECT) |
+         buzz_count(world, space, HAP_COUPLING_AUTO);
 }

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""The programs of README and docs are the examples, and the examples do what the pages say. Arguments: source
-root, the programs. With --update and no programs: writes the examples into the pages."""
+"""The programs of README and docs are the examples, and the examples do what the pages say.
+Arguments: source root, the programs. With --update and no programs: writes the examples into the
+pages."""
 import pathlib
 import re
 import subprocess
@@ -60,10 +61,12 @@ def check_touch_a_cube(program):
 
 def check_frame_loop(program):
     out = run(program)
-    rows = rows_of(out, r"^frame +\d+: box at (-?[0-9.]+) m, hand at (-?[0-9.]+) m, gap (-?[0-9.]+) mm$")
+    rows = rows_of(out, r"^frame +\d+: box at (-?[0-9.]+) m, hand at (-?[0-9.]+) m, "
+                        r"gap (-?[0-9.]+) mm$")
     point(len(rows) == 12, "it prints every tenth frame", f"{len(rows)} lines")
     point(bool(rows) and float(rows[-1][0]) > 0.05, "the box slides")
-    point(bool(rows) and -2.0 < float(rows[-1][2]) <= 0.5, "the drawn hand touches the drawn box", out)
+    point(bool(rows) and -2.0 < float(rows[-1][2]) <= 0.5, "the drawn hand touches the drawn box",
+          out)
 
 
 def check_edit_while_running(program):
@@ -75,7 +78,8 @@ def check_edit_while_running(program):
 def check_make_touchable(program):
     out = run(program)
     said = re.match(r"the hand felt at most ([0-9.]+) N", out)
-    point(said is not None and 0.2 < float(said.group(1)) < 20, "the hand pushes the upper box", out)
+    point(said is not None and 0.2 < float(said.group(1)) < 20, "the hand pushes the upper box",
+          out)
 
 
 def check_moving_platform(program):
@@ -88,8 +92,8 @@ def check_moving_platform(program):
 def check_choose_stiffness(program):
     out = run(program)
     rows = rows_of(out, r"^ *(\d+) N/m: coupling (\w+) *, .* felt as (\d+) N/m$")
-    point([row[1] for row in rows] == ["direct", "direct", "proxy", "proxy"], "the device holds two of four",
-          out)
+    point([row[1] for row in rows] == ["direct", "direct", "proxy", "proxy"],
+          "the device holds two of four", out)
     point(len(rows) == 4 and all(int(row[2]) == int(row[0]) for row in rows[:2]) and
           int(rows[3][2]) < 1700, "a proxy is softer", out)
 
@@ -97,8 +101,10 @@ def check_choose_stiffness(program):
 def check_watch_for_buzz(program):
     out = run(program)
     rows = rows_of(out, r"^(\w+) *: +(\d+) turns, energy held back in +(\d+) ticks")
-    point(len(rows) == 2 and int(rows[0][1]) > 20 and int(rows[0][2]) > 100, "direct, it buzzes", out)
-    point(len(rows) == 2 and int(rows[1][1]) < 5 and int(rows[1][2]) == 0, "as by default, it does not", out)
+    point(len(rows) == 2 and int(rows[0][1]) > 20 and int(rows[0][2]) > 100, "direct, it buzzes",
+          out)
+    point(len(rows) == 2 and int(rows[1][1]) < 5 and int(rows[1][2]) == 0,
+          "as by default, it does not", out)
 
 
 def check_late_ticks(program):
@@ -131,8 +137,8 @@ def main(programs):
           str(sources ^ {program.stem for program in programs}))
     for name, page in PAGES.items():
         block = BLOCK.search(read(page))
-        point(block is not None and block.group(1).strip() == example_of(name), f"{page} shows {name}",
-              "tests/test_examples.py ROOT --update writes it")
+        point(block is not None and block.group(1).strip() == example_of(name),
+              f"{page} shows {name}", "tests/test_examples.py ROOT --update writes it")
     point(len(example_of("touch_a_cube").splitlines()) <= 45, "the README's example is short")
     point("examples/frame_loop.c" in read("README.md"), "the README speaks of the frame loop")
     for program in programs:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""Links, code and commands of README and docs. Arguments: source root, hapode-run, hapode-bench, compiler."""
+"""Links, code and commands of README and docs. Arguments: source root, hapode-run, hapode-bench,
+compiler."""
 import pathlib
 import re
 import shutil
@@ -13,7 +14,11 @@ compiler = sys.argv[4:]
 pages = sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md"))
 CODE = re.compile(r"^```(\w*)\n(.*?)^```$", re.S | re.M)
 # Words of a page that are a file or a folder of the tree.
-PATH = re.compile(r"`((?:docs|lib|include|tests|tools|bench|scenes|plugins|examples)/[\w./*-]+)`")
+PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plugins|examples)/"
+                  r"[\w./*-]+)`")
+# Words of a command that calls for hardware, for a file of another one, or for a clock.
+NEEDS_MORE = ("spidar", "module:", "replay:", "/", "--play", "--identity", "--record",
+              "--tick-share", "--physics-share", "--reconnect")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>
 #include <hapode/ode.h>
@@ -113,15 +118,15 @@ def bad_code(flags):
         whole = "int main(" in text
         source = text if whole else BEFORE + text + AFTER
         command = [*compiler, "-std=c11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror",
-                   "-Wno-unused-variable", "-Wno-unused-but-set-variable", f"-I{root}/include", *flags,
-                   "-x", "c", "-"]
+                   "-Wno-unused-variable", "-Wno-unused-but-set-variable",
+                   f"-I{root}/include", *flags, "-x", "c", "-"]
         done = subprocess.run(command, input=source, capture_output=True, text=True, timeout=60)
         if done.returncode != 0:
             yield f"{where}:\n{done.stderr[:600]}"
 
 
 def commands(name):
-    """Lines of shell blocks that call a program, without prompt, comment and what follows a pipe."""
+    """Lines of shell blocks that call a program: page and words, without the comment."""
     for page in pages:
         for language, text in CODE.findall(page.read_text(encoding="utf-8")):
             if language != "sh":
@@ -134,7 +139,8 @@ def commands(name):
 
 
 def bad_options(name, path):
-    text = subprocess.run([str(path), "--help"], capture_output=True, text=True, timeout=30).stdout
+    told = subprocess.run([str(path), "--help"], capture_output=True, text=True, timeout=30)
+    text = told.stdout + told.stderr
     known = set(re.findall(r"--[a-z][a-z-]*", text)) | {"--help"}
     found = 0
     for page, words in commands(name):
@@ -148,18 +154,16 @@ def bad_options(name, path):
 
 
 def bad_runs():
-    """Commands that need neither hardware, nor a file, nor a person, for a moment of virtual time."""
+    """Commands that need neither hardware, nor a file, nor a person, for a moment."""
     for page, words in commands("hapode-run"):
-        if "--scene" not in words or any(word.startswith(start) for word in words for start in (
-                "spidar", "module:", "replay:", "/", "--play", "--identity", "--record", "--tick-share",
-                "--physics-share", "--reconnect")):
+        if "--scene" not in words or any(word.startswith(NEEDS_MORE) for word in words):
             continue
         words = [word for i, word in enumerate(words) if word != "--seconds" and
                  (i == 0 or words[i - 1] != "--seconds")]
         with tempfile.TemporaryDirectory() as folder:
             pathlib.Path(folder, "build").mkdir()
-            done = subprocess.run([str(program), *words, "--lockstep", "--seconds", "0.05"], cwd=folder,
-                                  capture_output=True, text=True, timeout=60)
+            done = subprocess.run([str(program), *words, "--lockstep", "--seconds", "0.05"],
+                                  cwd=folder, capture_output=True, text=True, timeout=60)
         if done.returncode != 0:
             yield f"{page}: {' '.join(words)}: {done.stderr[:200]}"
 
