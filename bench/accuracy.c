@@ -663,8 +663,8 @@ typedef struct times {
 /* All in one thread: what it used of the processor is not stretched by what else runs there. */
 static void note_times(const accuracy_motion *m, size_t i, times *out)
 {
-  out->tick_us[i] = m->stats.tick_us_mean;
-  out->physics_ms[i] = m->stats.physics_ms_mean;
+  out->tick_us[i] = m->stats.loop.tick_us_mean;
+  out->physics_ms[i] = m->stats.physics.ms_mean;
   out->duty[i] = m->used_s * ACCURACY_HAPTIC_HZ / (double)m->count;
 }
 
@@ -748,7 +748,7 @@ static hap_status measure_estimate(sweep *s, const accuracy_point *point, accura
   if (status < HAP_OK) {
     return status;
   }
-  row->estimate = motion.stats.force_error;
+  row->estimate = motion.stats.error.force_error;
   accuracy_motion_free(&motion);
   return HAP_OK;
 }

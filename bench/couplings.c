@@ -199,7 +199,7 @@ static hap_status measure_coupling(bench *b, const scene_parameters *which, size
     status = bench_fail(b, HAP_ERROR_STATE, "%s: the hand touches nothing", which->name);
   }
   out->deepest = motion->deepest;
-  out->tick_us = motion->stats.tick_us_mean;
+  out->tick_us = motion->stats.loop.tick_us_mean;
   return status;
 }
 

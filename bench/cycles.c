@@ -86,17 +86,17 @@ static void measure_bare(watcher *w, double period_s, cycle *out)
 static void note_cycle(watcher *w, const hap_stats *stats, cycle *out)
 {
   double *v = out->v;
-  v[CYCLE_COLLIDE] = stats->last_collide_ms;
-  v[CYCLE_NEIGHBOUR] = stats->last_neighbour_ms;
-  v[CYCLE_TESTING] = stats->last_testing_ms;
-  v[CYCLE_STEP] = stats->last_step_ms;
-  v[CYCLE_PUBLISH] = stats->last_publish_ms;
+  v[CYCLE_COLLIDE] = stats->physics.last.collide_ms;
+  v[CYCLE_NEIGHBOUR] = stats->physics.last.neighbour_ms;
+  v[CYCLE_TESTING] = stats->physics.last.testing_ms;
+  v[CYCLE_STEP] = stats->physics.last.step_ms;
+  v[CYCLE_PUBLISH] = stats->physics.last.publish_ms;
   v[CYCLE_UNTESTED] = v[CYCLE_COLLIDE] + v[CYCLE_NEIGHBOUR] + v[CYCLE_STEP] + v[CYCLE_PUBLISH];
-  v[CYCLE_PROBES] = (double)(stats->probe_steps - w->probes);
-  v[CYCLE_NEIGHBOURS] = (double)stats->neighbours;
-  w->steps = stats->physics_steps;
-  w->probes = stats->probe_steps;
-  w->neighbours = stats->neighbours > 0 ? stats->neighbours : 1;
+  v[CYCLE_PROBES] = (double)(stats->probes.steps - w->probes);
+  v[CYCLE_NEIGHBOURS] = (double)stats->model.neighbours;
+  w->steps = stats->physics.steps;
+  w->probes = stats->probes.steps;
+  w->neighbours = stats->model.neighbours > 0 ? stats->model.neighbours : 1;
 }
 
 static double norm(const double v[3])
@@ -139,7 +139,7 @@ static hap_status watch_tick(watcher *w, size_t tick, double period_s, cycle *ou
   if (status >= HAP_OK) {
     status = hap_session_stats(w->rig.session, &stats, sizeof stats);
   }
-  *out_ran = status >= HAP_OK && stats.physics_steps != w->steps;
+  *out_ran = status >= HAP_OK && stats.physics.steps != w->steps;
   if (*out_ran) {
     note_cycle(w, &stats, out);
   }
@@ -154,8 +154,8 @@ static hap_status watch_run(watcher *w, double period_s, cycle *rows, size_t *ou
 {
   hap_stats stats;
   hap_status status = hap_session_stats(w->rig.session, &stats, sizeof stats);
-  w->steps = stats.physics_steps;
-  w->probes = stats.probe_steps;
+  w->steps = stats.physics.steps;
+  w->probes = stats.probes.steps;
   *out_count = 0;
   for (size_t tick = 0; tick < w->ticks && status >= HAP_OK; tick += w->period_ticks) {
     bool ran = false;
@@ -182,7 +182,7 @@ static hap_status one_run(bench *b, const cycles_def *def, size_t run, cycle *ro
   }
   if (status >= HAP_OK) {
     status = hap_session_stats(w.rig.session, &stats, sizeof stats);
-    out->tick_us = stats.tick_us_p50;
+    out->tick_us = stats.loop.tick_us_p50;
   } else if (w.rig.session != NULL) {
     (void)hap_session_detail(w.rig.session, &b->detail);
   }

@@ -7,6 +7,8 @@
 
 #include <math.h>
 
+#include <hapode/stats.h>
+
 #include "bench/bench.h"
 #include "bench/storm.h"
 
@@ -48,39 +50,42 @@ static void write_row(FILE *csv, const edits_case *what, const storm_def *def,
   fprintf(csv, "%s,%s,%g,%d,%d,%llu,%llu,%llu,%llu,%llu,%llu,%llu,%.4g,%llu,%.4g,%.4g,%.4g,%.4g,",
           what->drive_name, hap_model_name(what->model), def->seconds, def->hands, def->editors,
           (unsigned long long)r->edits, (unsigned long long)r->posts_run,
-          (unsigned long long)s->ticks, (unsigned long long)s->missed_ticks,
-          (unsigned long long)s->contact_ticks, (unsigned long long)s->physics_steps,
-          (unsigned long long)s->physics_missed, s->physics_ms_max, (unsigned long long)s->locks,
-          r->wait_ms_p50, r->wait_ms_p99, s->lock_wait_ms_max, s->lock_held_ms_max);
+          (unsigned long long)s->loop.ticks, (unsigned long long)s->loop.missed_ticks,
+          (unsigned long long)s->loop.contact_ticks, (unsigned long long)s->physics.steps,
+          (unsigned long long)s->physics.missed, s->physics.ms_max,
+          (unsigned long long)s->edits.locks, r->wait_ms_p50, r->wait_ms_p99, s->edits.wait_ms_max,
+          s->edits.held_ms_max);
   fprintf(csv, "%.4g,%.4g,%llu,%llu,%.6g,%.3g,%llu\n", r->peak, r->steepest,
-          (unsigned long long)r->lost, (unsigned long long)r->untold, s->impulse_abs_ns,
-          s->momentum_error_ns, (unsigned long long)r->faults);
+          (unsigned long long)r->lost, (unsigned long long)r->untold, s->hand.impulse_abs_ns,
+          s->hand.momentum_error_ns, (unsigned long long)r->faults);
 }
 
 static void report(bench *b, const edits_case *what, const storm_def *def, const storm_result *r)
 {
   const hap_stats *s = &r->stats;
   /* In drive FRAME physics is an ordinary thread, which others may keep from running. */
-  double step_ms = fmax(1e3 / def->physics_hz, s->physics_ms_max);
-  double missed = (double)s->missed_ticks / (double)(s->ticks + s->missed_ticks);
+  double step_ms = fmax(1e3 / def->physics_hz, s->physics.ms_max);
+  double missed = (double)s->loop.missed_ticks / (double)(s->loop.ticks + s->loop.missed_ticks);
   bench_say(
       "%s, %s, %d hands, %g s: %llu edits, %llu of them by %llu posts; %.0f %% of the ticks in "
       "contact",
       what->drive_name, hap_model_name(what->model), def->hands, def->seconds,
       (unsigned long long)r->edits, (unsigned long long)(2 * r->posts_run),
-      (unsigned long long)r->posts_run, 100.0 * (double)s->contact_ticks / (double)s->ticks);
+      (unsigned long long)r->posts_run,
+      100.0 * (double)s->loop.contact_ticks / (double)s->loop.ticks);
   bench_check(b, missed < MISSED_SHARE, "  %llu of %llu ticks missed: %.3f %% (bound %g)%s",
-              (unsigned long long)s->missed_ticks, (unsigned long long)(s->ticks + s->missed_ticks),
-              100.0 * missed, 100.0 * MISSED_SHARE, s->realtime != 0 ? "" : ", without real time");
-  bench_check(b, s->physics_missed == 0,
+              (unsigned long long)s->loop.missed_ticks,
+              (unsigned long long)(s->loop.ticks + s->loop.missed_ticks), 100.0 * missed,
+              100.0 * MISSED_SHARE, s->loop.realtime != 0 ? "" : ", without real time");
+  bench_check(b, s->physics.missed == 0,
               "  %llu of %llu physics steps missed, a cycle %.2f ms at most",
-              (unsigned long long)s->physics_missed,
-              (unsigned long long)(s->physics_steps + s->physics_missed), s->physics_ms_max);
-  bench_check(b, s->lock_wait_ms_max <= step_ms,
+              (unsigned long long)s->physics.missed,
+              (unsigned long long)(s->physics.steps + s->physics.missed), s->physics.ms_max);
+  bench_check(b, s->edits.wait_ms_max <= step_ms,
               "  %llu times locked: waits of %.3f ms (median), %.3f (99 %%), %.3f at most (bound "
               "%.1f, a step or the longest cycle); held %.3f at most",
-              (unsigned long long)s->locks, r->wait_ms_p50, r->wait_ms_p99, s->lock_wait_ms_max,
-              step_ms, s->lock_held_ms_max);
+              (unsigned long long)s->edits.locks, r->wait_ms_p50, r->wait_ms_p99,
+              s->edits.wait_ms_max, step_ms, s->edits.held_ms_max);
   bench_check(
       b, r->bad == 0 && r->unreleased == 0 && r->faults == 0 && r->unexpected == 0,
       "  %llu forces written: %.2f N at most, steps of %.2f N at most; %llu bad, %llu devices "
@@ -88,11 +93,11 @@ static void report(bench *b, const edits_case *what, const storm_def *def, const
       (unsigned long long)r->writes, r->peak, r->steepest, (unsigned long long)r->bad,
       (unsigned long long)r->unreleased, (unsigned long long)r->faults,
       (unsigned long long)r->unexpected);
-  bench_check(b, s->momentum_error_ns <= 1e-6 * s->impulse_abs_ns,
+  bench_check(b, s->hand.momentum_error_ns <= 1e-6 * s->hand.impulse_abs_ns,
               "  momentum: hands gave %.3f N s in all, the world's share is off by %.2g; %llu of "
               "%llu bodies that went without a word noticed "
               "(the others had come since the last step)",
-              s->impulse_abs_ns, s->momentum_error_ns, (unsigned long long)r->lost,
+              s->hand.impulse_abs_ns, s->hand.momentum_error_ns, (unsigned long long)r->lost,
               (unsigned long long)r->untold);
 }
 
@@ -104,7 +109,7 @@ static hap_status draw(bench *b, const storm_result results[CASES])
     for (size_t i = 0; i < CASES; ++i) {
       const storm_result *r = &results[i];
       fprintf(script, "\"%s, %s\" %g %g %g\n", cases[i].drive_name, hap_model_name(cases[i].model),
-              r->wait_ms_p50, r->wait_ms_p99, r->stats.lock_wait_ms_max);
+              r->wait_ms_p50, r->wait_ms_p99, r->stats.edits.wait_ms_max);
     }
     fprintf(
         script,

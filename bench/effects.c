@@ -259,11 +259,12 @@ static void look(rig *r, uint64_t *io_touched, effects_result *io)
 {
   hap_stats stats;
   (void)hap_session_stats(r->session, &stats, sizeof stats);
-  if (*io_touched == 0 || stats.contact_ticks > *io_touched) {
+  if (*io_touched == 0 || stats.loop.contact_ticks > *io_touched) {
     (void)hap_session_effects(r->session, io->effects, HAP_EFFECTS, sizeof io->effects[0]);
   }
-  *io_touched = stats.contact_ticks;
-  io->neighbours = stats.neighbours > io->neighbours ? stats.neighbours : io->neighbours;
+  *io_touched = stats.loop.contact_ticks;
+  io->neighbours =
+      stats.model.neighbours > io->neighbours ? stats.model.neighbours : io->neighbours;
 }
 
 static hap_status run_once(bench *b, const effects_run *run, size_t ticks, effects_variant *io,
@@ -286,9 +287,9 @@ static hap_status run_once(bench *b, const effects_run *run, size_t ticks, effec
   if (status >= HAP_OK) {
     (void)hap_session_stats(r.session, &stats, sizeof stats);
     out->total_ms[round] = 1e3 * used / ((double)ticks / HAPTIC_HZ);
-    out->tick_us[round] = stats.tick_us_mean;
-    out->physics_ms[round] = stats.physics_ms_mean;
-    out->contact_us[round] = stats.contact_us_mean;
+    out->tick_us[round] = stats.loop.tick_us_mean;
+    out->physics_ms[round] = stats.physics.ms_mean;
+    out->contact_us[round] = stats.contact.us_mean;
     io->result.count *= r.pointer_count;
   } else if (r.session != NULL) {
     (void)hap_session_detail(r.session, &b->detail);

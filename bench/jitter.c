@@ -42,16 +42,16 @@ static void wait_for(double seconds)
 
 static void take_figures(const hap_stats *stats, turn *out)
 {
-  out->ticks = stats->ticks;
-  out->missed = stats->missed_ticks;
-  out->realtime = stats->realtime != 0;
-  out->wake_us[0] = stats->wake_us_p50;
-  out->wake_us[1] = stats->wake_us_p99;
-  out->wake_us[2] = stats->wake_us_p999;
-  out->wake_us[3] = stats->wake_us_max;
-  out->tick_us[0] = stats->tick_us_p50;
-  out->tick_us[1] = stats->tick_us_p99;
-  out->tick_us[2] = stats->tick_us_max;
+  out->ticks = stats->loop.ticks;
+  out->missed = stats->loop.missed_ticks;
+  out->realtime = stats->loop.realtime != 0;
+  out->wake_us[0] = stats->loop.wake_us_p50;
+  out->wake_us[1] = stats->loop.wake_us_p99;
+  out->wake_us[2] = stats->loop.wake_us_p999;
+  out->wake_us[3] = stats->loop.wake_us_max;
+  out->tick_us[0] = stats->loop.tick_us_p50;
+  out->tick_us[1] = stats->loop.tick_us_p99;
+  out->tick_us[2] = stats->loop.tick_us_max;
 }
 
 static hap_status watch(bench *b, hap_session *session, double seconds, turn *out)
@@ -65,7 +65,7 @@ static hap_status watch(bench *b, hap_session *session, double seconds, turn *ou
   wait_for(seconds);
   counted = counted && thread_count(thread, &after);
   hap_status status = hap_session_stats(session, &stats, sizeof stats);
-  if (status < HAP_OK || stats.faults != 0) {
+  if (status < HAP_OK || stats.faults.count != 0) {
     return bench_fail(b, HAP_ERROR_STATE, "jitter: the session has a fault");
   }
   take_figures(&stats, out);

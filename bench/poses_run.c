@@ -121,8 +121,8 @@ static bool has_stepped(run *r)
 {
   hap_stats stats = {0};
   (void)hap_session_stats(r->rig.session, &stats, sizeof stats);
-  bool stepped = stats.physics_steps != r->steps;
-  r->steps = stats.physics_steps;
+  bool stepped = stats.physics.steps != r->steps;
+  r->steps = stats.physics.steps;
   return stepped;
 }
 
@@ -228,7 +228,7 @@ static hap_status draw_frame(run *r, int64_t now_ns, hap_detail *detail)
     return hapi_fail(detail, HAP_ERROR_STATE, "poses at %.4f s: %s", 1e-9 * (double)now_ns,
                      hap_status_name(status));
   }
-  int64_t time_ns = now_ns - (int64_t)llround(1e9 * stats.pose_delay_s);
+  int64_t time_ns = now_ns - (int64_t)llround(1e9 * stats.physics.pose_delay_s);
   if (time_ns < r->paths[0].times_ns[0] || time_ns < r->hand.times_ns[0]) {
     return HAP_OK; /* before the start */
   }

@@ -123,11 +123,11 @@ static hap_status measure_cycle(world_bed *w, size_t i, uint64_t ticks)
   if (status >= HAP_OK) {
     status = hap_session_stats(w->rig.session, &w->stats, sizeof w->stats);
   }
-  w->values[NEIGHBOUR][i] = w->stats.last_neighbour_ms;
-  w->values[RANGE][i] = w->stats.last_range_ms;
-  w->values[PUBLISH][i] = w->stats.last_publish_ms;
-  w->values[TESTING][i] = w->stats.last_testing_ms;
-  w->values[STEP][i] = w->stats.last_step_ms;
+  w->values[NEIGHBOUR][i] = w->stats.physics.last.neighbour_ms;
+  w->values[RANGE][i] = w->stats.physics.last.range_ms;
+  w->values[PUBLISH][i] = w->stats.physics.last.publish_ms;
+  w->values[TESTING][i] = w->stats.physics.last.testing_ms;
+  w->values[STEP][i] = w->stats.physics.last.step_ms;
   return status;
 }
 
@@ -143,11 +143,11 @@ static hap_status contact_measure(bench *b, const world_case *what, world_bed *w
   if (status >= HAP_OK) {
     status = hap_session_stats(w->rig.session, &w->stats, sizeof w->stats);
   }
-  uint64_t before = w->stats.probe_steps;
+  uint64_t before = w->stats.probes.steps;
   for (size_t i = 0; i < w->cycles && status >= HAP_OK; ++i) {
     status = measure_cycle(w, i, ticks);
   }
-  w->probes = w->stats.probe_steps - before;
+  w->probes = w->stats.probes.steps - before;
   for (int figure = 0; figure < FIGURES; ++figure) {
     (void)bench_median(w->values[figure], w->cycles); /* sorts */
   }
@@ -169,9 +169,10 @@ static void write_row(FILE *csv, const world_bed *w)
   double probes = (double)w->probes / (double)w->cycles;
   double library = build_ms(w) - middle(w, TESTING);
   fprintf(csv, "%d,%u,contact,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,%s,%d,%u,%.6g,%.6g,%g\n",
-          w->what->bodies, w->stats.neighbours, build_ms(w), middle(w, STEP), w->stats.tick_us_p50,
-          probes, middle(w, TESTING), middle(w, BARE_STEP), library, w->what->scene, w->what->range,
-          w->stats.range_bodies, middle(w, RANGE), middle(w, PUBLISH), w->parameters.gap);
+          w->what->bodies, w->stats.model.neighbours, build_ms(w), middle(w, STEP),
+          w->stats.loop.tick_us_p50, probes, middle(w, TESTING), middle(w, BARE_STEP), library,
+          w->what->scene, w->what->range, w->stats.model.range_bodies, middle(w, RANGE),
+          middle(w, PUBLISH), w->parameters.gap);
 }
 
 /* The bound is for bodies that are separate; where they are not, the range is as full as it can be. */
@@ -181,8 +182,8 @@ static void report_far(bench *b, const world_bed *w, double own, double step)
   snprintf(text.text, sizeof text.text,
            "contact, %d cubes %g m apart, %u near, %u in the loop: library / global step = %.4f ms "
            "/ %.4f ms = %.2f %%, %.0f ns a body",
-           w->what->bodies, w->parameters.gap, w->stats.neighbours, w->stats.range_bodies, own,
-           step, 100.0 * own / step, 1e6 * own / w->what->bodies);
+           w->what->bodies, w->parameters.gap, w->stats.model.neighbours,
+           w->stats.model.range_bodies, own, step, 100.0 * own / step, 1e6 * own / w->what->bodies);
   if (w->what->gap > 0.0) {
     bench_check(b, own <= FAR_SHARE * step, "%s (bound 5 %%)", text.text);
   } else {
@@ -199,9 +200,9 @@ static void contact_report(bench *b, const world_bed *w)
       "contact, %s:%d, gap %g m, %u neighbours, %u of at most %d bodies in the loop: local model "
       "%.4f ms (neighbours %.4f, of it range %.4f, publish %.4f, testing %.4f), global step %.4f "
       "ms",
-      what->scene, what->bodies, w->parameters.gap, w->stats.neighbours, w->stats.range_bodies,
-      what->range, build, middle(w, NEIGHBOUR), middle(w, RANGE), middle(w, PUBLISH),
-      middle(w, TESTING), step);
+      what->scene, what->bodies, w->parameters.gap, w->stats.model.neighbours,
+      w->stats.model.range_bodies, what->range, build, middle(w, NEIGHBOUR), middle(w, RANGE),
+      middle(w, PUBLISH), middle(w, TESTING), step);
   if (what->bodies == 10 && strcmp(what->scene, "row10") == 0) {
     bench_check(b, build <= BUILD_SHARE * step && w->probes == 0,
                 "contact, ten cubes that touch: local model / global step = %.4f ms / %.4f ms = "

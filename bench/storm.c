@@ -822,8 +822,8 @@ static void take_figures(storm *s)
 {
   storm_result *out = s->out;
   expect(s, hap_session_stats(s->session, &out->stats, sizeof out->stats) == HAP_OK);
-  out->faults += out->stats.faults;
-  if (out->stats.faults > 0) {
+  out->faults += out->stats.faults.count;
+  if (out->stats.faults.count > 0) {
     hap_detail detail = {""};
     (void)hap_session_detail(s->session, &detail);
     fprintf(stderr, "storm: %s\n", detail.text);
@@ -969,7 +969,7 @@ static void conclude(storm *s)
   out->posts_taken = atomic_load(&s->posts_taken);
   out->posts_refused = atomic_load(&s->posts_refused);
   out->tries_in_vain = atomic_load(&s->in_vain);
-  out->lost = out->stats.bodies_lost;
+  out->lost = out->stats.faults.bodies_lost;
   out->wait_ms_p50 = 1e-6 * hapi_histogram_quantile_ns(&s->waits, 0.5);
   out->wait_ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&s->waits, 0.99);
 }

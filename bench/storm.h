@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include <hapode/ode.h>
+#include <hapode/stats.h>
 
 #define STORM_EDITORS_MAX 4
 #define STORM_FORCE 10.0 /* N, of its devices */

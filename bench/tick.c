@@ -958,22 +958,23 @@ static hap_status rate_measure(bench *b, const rate_case *what, hap_stats *out)
 
 static void rate_report(bench *b, const rate_case *what, const hap_stats *s, FILE *csv)
 {
-  double duty = 1e-6 * s->tick_us_p50 * what->haptic_hz;
+  double duty = 1e-6 * s->loop.tick_us_p50 * what->haptic_hz;
   const char *name = hap_model_name(what->model);
   const char *layout = what->free ? "free" : "floor";
   const char *text =
       "%s, %d neighbours, %s, %g kHz: the loop takes %.2f us a cycle, %.2f %% of a "
       "core (mean %.2f %%)%s";
-  double mean = 100.0 * s->haptic_duty;
+  double mean = 100.0 * s->loop.duty;
   if (what->free && what->haptic_hz == FAST_HZ) {
     bench_check(b, duty <= DUTY_BOUND, text, name, CUBES, layout, 1e-3 * what->haptic_hz,
-                s->tick_us_p50, 100.0 * duty, mean, " (bound 5 %)");
+                s->loop.tick_us_p50, 100.0 * duty, mean, " (bound 5 %)");
   } else {
-    bench_say(text, name, CUBES, layout, 1e-3 * what->haptic_hz, s->tick_us_p50, 100.0 * duty, mean,
-              "");
+    bench_say(text, name, CUBES, layout, 1e-3 * what->haptic_hz, s->loop.tick_us_p50, 100.0 * duty,
+              mean, "");
   }
-  fprintf(csv, "%s,%d,,%.1f,%.2f,%.1f,field_%s,%gkHz,,,,\n", name, CUBES, 1e3 * s->tick_us_p50,
-          1e3 * s->tick_us_p50 / CUBES, 1e3 * s->tick_us_p99, layout, 1e-3 * what->haptic_hz);
+  fprintf(csv, "%s,%d,,%.1f,%.2f,%.1f,field_%s,%gkHz,,,,\n", name, CUBES, 1e3 * s->loop.tick_us_p50,
+          1e3 * s->loop.tick_us_p50 / CUBES, 1e3 * s->loop.tick_us_p99, layout,
+          1e-3 * what->haptic_hz);
 }
 
 /* Part of hapode-bench tick: the share of a core that a whole session's loop takes at 1, 4 and 10 kHz. */

@@ -77,6 +77,6 @@ int main(void)
   hap_session_destroy(session); /* runs what was posted and has not been run */
   hap_device_close(hand_def.device);
   printf("%d cubes made anew, %u lost; at most %.2f N, and %.1f ms until the lock was had\n", made,
-         (unsigned)stats.bodies_lost, most, stats.lock_wait_ms_max);
+         (unsigned)stats.faults.bodies_lost, most, stats.edits.wait_ms_max);
   return 0;
 }

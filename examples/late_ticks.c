@@ -37,8 +37,8 @@ int main(void)
   hap_session_stats(session, &stats, sizeof stats);
   printf(
       "%llu ticks, %llu missed; woken up late by %.0f us (99 %%), a tick takes %.0f us (99 %%)\n",
-      (unsigned long long)stats.ticks, (unsigned long long)stats.missed_ticks, stats.wake_us_p99,
-      stats.tick_us_p99);
+      (unsigned long long)stats.loop.ticks, (unsigned long long)stats.loop.missed_ticks,
+      stats.loop.wake_us_p99, stats.loop.tick_us_p99);
   hap_session_destroy(session);
   hap_device_close(hand_def.device);
   return 0;

@@ -258,8 +258,8 @@ static inline void cw_read(contact_world *w)
     w->impulse[k] -= period * w->force[k];
   }
   hap_stats stats = cw_stats(w);
-  w->range_min = stats.range_bodies < w->range_min ? stats.range_bodies : w->range_min;
-  w->range_max = stats.range_bodies > w->range_max ? stats.range_bodies : w->range_max;
+  w->range_min = stats.model.range_bodies < w->range_min ? stats.model.range_bodies : w->range_min;
+  w->range_max = stats.model.range_bodies > w->range_max ? stats.model.range_bodies : w->range_max;
 }
 
 /* One tick. */

@@ -138,10 +138,10 @@ static inline double turn_between(dBodyID a, dBodyID b)
 static inline void check_owned(const mechanism *m, uint32_t bodies)
 {
   hap_stats stats = cw_stats(&m->w);
-  CHECK(stats.range_bodies == bodies);
-  CHECK(stats.range_joints == (uint32_t)m->joint_count);
-  CHECK(stats.measured_bodies == 0 && stats.probe_steps == 0);
-  CHECK(stats.fault == 0 && stats.states_rejected == 0);
+  CHECK(stats.model.range_bodies == bodies);
+  CHECK(stats.model.range_joints == (uint32_t)m->joint_count);
+  CHECK(stats.model.measured_bodies == 0 && stats.probes.steps == 0);
+  CHECK(stats.faults.fault == 0 && stats.faults.states_rejected == 0);
 }
 
 #endif

@@ -97,7 +97,7 @@ static inline hap_stats recorded_run(const recorded_setup *s, rig *r)
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   CHECK(hap_session_start(r->session) >= HAP_OK);
-  for (int look = 0; look * 50 < s->ms || (stats.ticks < s->ticks && look < 400); ++look) {
+  for (int look = 0; look * 50 < s->ms || (stats.loop.ticks < s->ticks && look < 400); ++look) {
     sleep_ms(50);
     CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
     if (s->meanwhile != NULL) {
@@ -121,10 +121,11 @@ static inline hap_stats recorded_make(const recorded_setup *s)
   }
   stats = recorded_run(s, &r);
   CHECK(hap_session_record_state(r.session, &state, sizeof state, NULL) == HAP_OK);
-  CHECK(state.end == HAP_RECORD_STOPPED && state.ticks == stats.ticks && state.lost_ticks == 0);
+  CHECK(state.end == HAP_RECORD_STOPPED && state.ticks == stats.loop.ticks &&
+        state.lost_ticks == 0);
   printf("# %s %s: %llu ticks, %llu missed, %.0f bytes a tick\n", s->scene,
-         hap_model_name(s->model), (unsigned long long)stats.ticks,
-         (unsigned long long)stats.missed_ticks,
+         hap_model_name(s->model), (unsigned long long)stats.loop.ticks,
+         (unsigned long long)stats.loop.missed_ticks,
          (double)state.bytes / (double)(state.ticks > 0 ? state.ticks : 1));
   rig_destroy(&r);
   return stats;
@@ -147,10 +148,10 @@ static inline void replay_run(rig *r, replay *out)
     out->status = hap_session_advance(r->session, 100);
     CHECK(hap_session_stats(r->session, &out->stats, sizeof out->stats) == HAP_OK);
     if (out->status == HAP_DIVERGED && out->diverged_after == UINT64_MAX) {
-      out->diverged_after = out->stats.ticks;
+      out->diverged_after = out->stats.loop.ticks;
     }
-    more = out->status >= HAP_OK && out->status != HAP_END && out->stats.ticks > before;
-    before = out->stats.ticks;
+    more = out->status >= HAP_OK && out->status != HAP_END && out->stats.loop.ticks > before;
+    before = out->stats.loop.ticks;
   }
   CHECK(hap_session_stats(r->session, &out->stats, sizeof out->stats) == HAP_OK);
   if (out->status < HAP_OK) {
@@ -191,13 +192,13 @@ static inline void check_alike(const replay *again, const hap_stats *before)
   if (again->status < HAP_OK || again->difference.what != HAP_DIFFERENCE_NONE) {
     printf("# %s%s\n", again->detail.text, again->difference.text);
   }
-  CHECK(again->stats.ticks == before->ticks);
-  CHECK(again->stats.models_adopted == before->models_adopted);
-  CHECK(again->stats.contact_passes == before->contact_passes);
-  CHECK(again->stats.contact_ticks == before->contact_ticks);
-  CHECK(again->stats.faults == before->faults);
-  CHECK(memcmp(&again->stats.impulse_ns, &before->impulse_ns, sizeof(double)) == 0);
-  CHECK(memcmp(&again->stats.peak_force_n, &before->peak_force_n, sizeof(double)) == 0);
+  CHECK(again->stats.loop.ticks == before->loop.ticks);
+  CHECK(again->stats.loop.models_adopted == before->loop.models_adopted);
+  CHECK(again->stats.contact.passes == before->contact.passes);
+  CHECK(again->stats.loop.contact_ticks == before->loop.contact_ticks);
+  CHECK(again->stats.faults.count == before->faults.count);
+  CHECK(memcmp(&again->stats.hand.impulse_ns, &before->hand.impulse_ns, sizeof(double)) == 0);
+  CHECK(memcmp(&again->stats.hand.peak_force_n, &before->hand.peak_force_n, sizeof(double)) == 0);
 }
 
 #endif

@@ -200,7 +200,7 @@ static inline void repeat_note(repeat_log *log, hap_session *session)
     return;
   }
   log->rows[log->count++] =
-      (repeat_row){{stats.trace_hash, repeat_hash_bodies(&physics->world.bodies),
+      (repeat_row){{stats.loop.trace_hash, repeat_hash_bodies(&physics->world.bodies),
                     repeat_hash_joints(&physics->world.joints), repeat_hash_contacts(physics),
                     repeat_hash_extents(&physics->world.bodies)}};
 }

@@ -47,12 +47,12 @@ static bool start_at(test_world *w, hap_surface_fn surface, const double at[3])
 static uint64_t measure(test_world *w)
 {
   hapi_physics *physics = world_physics(w);
-  uint64_t before = physics->counts.own.stats.probe_steps;
-  uint64_t calls = physics->counts.own.stats.quickstep_calls;
+  uint64_t before = physics->counts.own.stats.probes.steps;
+  uint64_t calls = physics->counts.own.stats.physics.quickstep_calls;
   hapi_accelerance_measure(physics);
-  CHECK(physics->counts.own.stats.quickstep_calls - calls ==
-        physics->counts.own.stats.probe_steps - before);
-  return physics->counts.own.stats.probe_steps - before;
+  CHECK(physics->counts.own.stats.physics.quickstep_calls - calls ==
+        physics->counts.own.stats.probes.steps - before);
+  return physics->counts.own.stats.probes.steps - before;
 }
 
 /* Measures with a last force of this size along -z, as if the pointer had pushed with it. */
@@ -494,9 +494,9 @@ static uint64_t count_probes(void (*build)(test_world *w), hap_probe probe, int 
   hap_stats before = world_physics(&w)->counts.own.stats;
   CHECK(hap_session_advance(w.session, 51) == HAP_OK); /* to the first step, which is in it */
   hap_stats after = world_stats(&w);
-  CHECK(after.physics_steps == 1);
-  CHECK(after.probe_steps == before.probe_steps + probes);
-  CHECK(after.quickstep_calls == after.probe_steps + 1);
+  CHECK(after.physics.steps == 1);
+  CHECK(after.probes.steps == before.probes.steps + probes);
+  CHECK(after.physics.quickstep_calls == after.probes.steps + 1);
   world_close(&w);
   return probes;
 }

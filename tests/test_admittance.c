@@ -398,7 +398,7 @@ TEST(a_singular_probe_keeps_the_last_good_one)
     slot->mass = round == 1 ? 1.35e-16 * w.def.physics_hz / 0.0981 : 1.0;
     contact->speed = 0.0;
     hapi_accelerance_measure(physics);
-    CHECK(physics->counts.own.stats.probes_singular == (round > 0));
+    CHECK(physics->counts.own.stats.probes.singular == (round > 0));
     CHECK_NEAR(contact->measured[0][0], round == 1 ? 1.64 : 1.0, 0.05);
     CHECK_NEAR(contact->a[0][0], 1.0, 1e-9);
     CHECK(round != 1 || memcmp(good, contact->a, sizeof good) == 0);
@@ -503,10 +503,10 @@ TEST(an_overdetermined_body_stays_in_bounds)
     hap_stats stats = world_stats(&w);
     printf("# %s, %s, %d iterations: force up to %.2f N, %llu clipped, %llu singular\n",
            hap_model_name(w.def.model), i % 2 == 0 ? "walls" : "joints", iterations, most,
-           (unsigned long long)stats.probes_clipped, (unsigned long long)stats.probes_singular);
+           (unsigned long long)stats.probes.clipped, (unsigned long long)stats.probes.singular);
     /* 5 mm of 1000 N/m; ODE itself shakes the joints with so few iterations */
     CHECK(most > 1.0 && most < (iterations == 5 ? 15.0 : 6.5));
-    CHECK(hapi_v3_norm(dBodyGetLinearVel(w.bodies[0])) < 0.5 && stats.faults == 0);
+    CHECK(hapi_v3_norm(dBodyGetLinearVel(w.bodies[0])) < 0.5 && stats.faults.count == 0);
     world_close(&w);
     if (data != NULL) {
       dGeomTriMeshDataDestroy(data);

@@ -68,7 +68,7 @@ static bool run_all(hap_drive drive)
   }
   if (good && drive == HAP_DRIVE_LOCKSTEP) {
     CHECK(hap_session_advance(s.session, 150) == HAP_OK);
-    CHECK(stats_of(&s).fault == HAP_FAULT_NONE && stats_of(&s).ticks == 150);
+    CHECK(stats_of(&s).faults.fault == HAP_FAULT_NONE && stats_of(&s).loop.ticks == 150);
   } else if (good) {
     sleep_ms(30);
   }
@@ -142,8 +142,8 @@ TEST(without_memory_for_probes_the_force_is_still_felt)
     CHECK(hap_pointer_set_target(s.session, id, &pose, NULL) == HAP_OK);
     CHECK(hap_session_advance(s.session, 1) == HAP_OK);
   }
-  CHECK(stats_of(&s).contact_ticks > 0 && stats_of(&s).peak_force_n > 0.1);
-  CHECK(stats_of(&s).faults == 0);
+  CHECK(stats_of(&s).loop.contact_ticks > 0 && stats_of(&s).hand.peak_force_n > 0.1);
+  CHECK(stats_of(&s).faults.count == 0);
   fail_from_now(0, 0);
   stage_end(&s);
   CHECK(atomic_load(&heap.lives) == 0);

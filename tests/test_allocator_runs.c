@@ -118,7 +118,8 @@ static void use_all_the_same(rig *r)
   hap_stats stats = {0};
   CHECK(start_and_use(r));
   CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
-  CHECK(stats.fault == HAP_FAULT_NONE && (stats.ticks > 0 || now.drive != HAP_DRIVE_LOCKSTEP));
+  CHECK(stats.faults.fault == HAP_FAULT_NONE &&
+        (stats.loop.ticks > 0 || now.drive != HAP_DRIVE_LOCKSTEP));
   fail_from_now(fail_at, on);
   atomic_store(&heap.calls, calls);
 }
@@ -254,10 +255,10 @@ TEST(without_memory_a_destroyed_body_is_noticed)
   dGeomDestroy(geom);
   dBodyDestroy(gone);
   CHECK(hap_session_advance(s.session, 50) == HAP_BODY_LOST);
-  CHECK(stats_of(&s).bodies_lost == 1);
+  CHECK(stats_of(&s).faults.bodies_lost == 1);
   fail_from_now(0, 0);
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(stats_of(&s).bodies_known == 200);
+  CHECK(stats_of(&s).model.bodies_known == 200);
   stage_end(&s);
 }
 
@@ -359,7 +360,7 @@ static void check_stands(ground kind)
   fail_from_now(0, 0);
   CHECK(hap_session_advance(s.session, 500) == HAP_OK);
   CHECK_NEAR(dBodyGetPosition(s.cube)[2], 0.05, 2e-3);
-  CHECK(stats_of(&s).range_bodies > 0); /* the loop has it again */
+  CHECK(stats_of(&s).model.range_bodies > 0); /* the loop has it again */
   stage_end(&s);
   if (f.data != NULL) {
     dGeomTriMeshDataDestroy(f.data);

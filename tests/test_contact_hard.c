@@ -121,7 +121,8 @@ TEST(the_range_is_the_touched_island_when_it_fits)
   REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
   cw_run(&w, 200);
   hap_stats stats = cw_stats(&w);
-  CHECK(stats.range_bodies == 6 && stats.edge_bodies == 0 && stats.measured_bodies == 0);
+  CHECK(stats.model.range_bodies == 6 && stats.model.edge_bodies == 0 &&
+        stats.model.measured_bodies == 0);
   CHECK(w.range_min == 6 && w.range_max == 6);
   cw_close(&w);
 }
@@ -141,8 +142,8 @@ TEST(what_does_not_fit_is_left_out_from_the_far_end)
   REQUIRE(cw_start(&w, -0.036, 0.0, 0.0));
   cw_run(&w, 100);
   hap_stats stats = cw_stats(&w);
-  CHECK(stats.range_bodies == 3);
-  CHECK(stats.edge_bodies == 1);
+  CHECK(stats.model.range_bodies == 3);
+  CHECK(stats.model.edge_bodies == 1);
   cw_close(&w);
 }
 
@@ -182,14 +183,14 @@ static void fly_past(double hz, double gravity)
       worst_place = fmax(worst_place, distance(dBodyGetPosition(w.bodies[k]), wanted));
       worst_speed = fmax(worst_speed, distance(dBodyGetLinearVel(w.bodies[k]), speed) / 0.3);
     }
-    owned += cw_stats(&w).range_bodies;
+    owned += cw_stats(&w).model.range_bodies;
   }
   printf("# %g Hz gravity %g: place %.3g mm, speed %.3g, owned %u\n", hz, gravity,
          1e3 * worst_place, worst_speed, owned);
   CHECK(owned > 5);
   CHECK(worst_place < 1e-3);
   CHECK(worst_speed < 0.01);
-  CHECK(cw_stats(&w).contact_ticks == 0);
+  CHECK(cw_stats(&w).loop.contact_ticks == 0);
   cw_close(&w);
 }
 
@@ -269,7 +270,7 @@ TEST(a_body_destroyed_under_the_hand_is_gone)
   w.ode.before_step = NULL;
   cw_run(&w, 100);
   CHECK(cw_norm(w.force) == 0.0);
-  CHECK(cw_stats(&w).faults == 0 && cw_stats(&w).bodies_lost == 0);
+  CHECK(cw_stats(&w).faults.count == 0 && cw_stats(&w).faults.bodies_lost == 0);
   cw_close(&w);
 }
 
@@ -361,7 +362,7 @@ TEST(a_body_added_in_front_of_another_is_pushed_with_it)
   cw_add_cube(&w, 1.0, 0.06, 0.07, 0.0, 0.0);
   CHECK(hap_session_unlock(w.session) == HAP_OK);
   cw_run(&w, 561);
-  CHECK(cw_stats(&w).range_bodies == 2);
+  CHECK(cw_stats(&w).model.range_bodies == 2);
   CHECK(dBodyGetLinearVel(w.bodies[1])[0] > 0.03);
   CHECK(dBodyGetPosition(w.bodies[1])[0] - dBodyGetPosition(w.bodies[0])[0] > 0.0595);
   CHECK_NEAR(w.momentum[0] / w.synced_impulse[0], 1.0, 5e-3);
@@ -463,9 +464,9 @@ static slide push_over(bool triangles)
       "# triangles %d: %.4f N, %.4f .. %.4f, z %.5f .. %.5f, x %.3f, range %u, "
       "dropped %llu\n",
       triangles, s.mean, s.least, s.most, s.lowest, s.highest, w.position[0][0], w.range_min,
-      (unsigned long long)stats.capacity_dropped);
+      (unsigned long long)stats.model.capacity_dropped);
   CHECK(w.range_min == 1);
-  CHECK(stats.faults == 0);
+  CHECK(stats.faults.count == 0);
   cw_close(&w);
   if (triangles) {
     dGeomTriMeshDataDestroy(m.data);
@@ -556,7 +557,7 @@ TEST(a_ball_on_a_heightfield_is_measured_and_felt)
   REQUIRE(cw_start(&w, 0.02, 0.03, 0.112));
   cw_run(&w, 200);
   hap_stats stats = cw_stats(&w);
-  CHECK(stats.measured_bodies == 1 && stats.range_bodies == 0);
+  CHECK(stats.model.measured_bodies == 1 && stats.model.range_bodies == 0);
   cw_move_hand(&w, 0.0, 0.0, -0.02);
   cw_run(&w, 200);
   cw_move_hand(&w, 0.0, 0.0, 0.0);
@@ -761,9 +762,9 @@ TEST(other_models_take_over_without_a_jump)
   cw_move_hand(&w, -0.5, 0.0, 0.0);
   cw_run(&w, 301);
   printf("# momentum %.5f, impulse %.5f, stats %.5f\n", w.momentum[0], w.impulse[0],
-         cw_stats(&w).momentum_ratio);
+         cw_stats(&w).hand.momentum_ratio);
   CHECK_NEAR(w.momentum[0] / w.impulse[0], 1.0, 5e-3);
-  CHECK(cw_stats(&w).faults == 0);
+  CHECK(cw_stats(&w).faults.count == 0);
   cw_close(&w);
 }
 
@@ -788,8 +789,8 @@ static hap_stats push_stack(double physics_hz, double contact_hz, double haptic_
     cw_move_hand(&w, 0.08, 0.0, 0.0);
     cw_run(&w, (int)haptic_hz);
     stats = cw_stats(&w);
-    CHECK(stats.faults == 0);
-    CHECK(stats.contact_ticks > 100);
+    CHECK(stats.faults.count == 0);
+    CHECK(stats.loop.contact_ticks > 100);
     CHECK(w.position[0][0] > 0.02 && w.position[0][0] < 0.12);
     CHECK(w.position[0][2] > 0.0235 && w.position[0][2] < 0.03);
     CHECK(w.position[1][2] > 0.0225 && w.position[1][2] < 0.09);
@@ -809,8 +810,9 @@ TEST(every_run_has_the_same_hash)
     hap_stats a = push_stack(rates[i][0], rates[i][1], rates[i][2], HAP_LATENCY_DEFAULT);
     hap_stats b = push_stack(rates[i][0], rates[i][1], rates[i][2], HAP_LATENCY_DEFAULT);
     printf("# %g %g %g: %016llx, residual %.2g, momentum %.4f\n", rates[i][0], rates[i][1],
-           rates[i][2], (unsigned long long)a.trace_hash, a.solver_residual_max, a.momentum_ratio);
-    CHECK(a.trace_hash != 0 && a.trace_hash == b.trace_hash);
+           rates[i][2], (unsigned long long)a.loop.trace_hash, a.contact.residual_max,
+           a.hand.momentum_ratio);
+    CHECK(a.loop.trace_hash != 0 && a.loop.trace_hash == b.loop.trace_hash);
   }
 }
 
@@ -820,8 +822,8 @@ TEST(a_model_of_any_age_will_do)
   for (size_t i = 0; i < sizeof ages / sizeof ages[0]; ++i) {
     hap_stats a = push_stack(20.0, 200.0, 1000.0, ages[i]);
     hap_stats b = push_stack(20.0, 200.0, 1000.0, ages[i]);
-    CHECK(a.trace_hash != 0 && a.trace_hash == b.trace_hash);
-    CHECK_NEAR(a.momentum_ratio, 1.0, 5e-3);
+    CHECK(a.loop.trace_hash != 0 && a.loop.trace_hash == b.loop.trace_hash);
+    CHECK_NEAR(a.hand.momentum_ratio, 1.0, 5e-3);
   }
 }
 
@@ -847,16 +849,16 @@ static void run_threads(double contact_hz, double seconds)
   printf(
       "# %g Hz: %llu ticks, %llu passes, %llu contact ticks, residual %.2g, momentum %.4f, peak "
       "%.2f N, model age max %.4f\n",
-      contact_hz, (unsigned long long)stats.ticks, (unsigned long long)stats.contact_passes,
-      (unsigned long long)stats.contact_ticks, stats.solver_residual_max, stats.momentum_ratio,
-      stats.peak_force_n, stats.model_age_max_s);
-  CHECK(stats.faults == 0 && stats.states_rejected == 0);
-  CHECK(stats.ticks > 100 && stats.contact_ticks > 10);
-  CHECK((double)stats.contact_passes > 0.25 * contact_hz * seconds);
-  CHECK((double)stats.contact_passes < 1.5 * contact_hz * seconds + 25.0 * seconds);
-  CHECK(stats.solver_residual_max < 1e-2);
-  CHECK(stats.peak_force_n < 100.0);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, 0.02);
+      contact_hz, (unsigned long long)stats.loop.ticks, (unsigned long long)stats.contact.passes,
+      (unsigned long long)stats.loop.contact_ticks, stats.contact.residual_max,
+      stats.hand.momentum_ratio, stats.hand.peak_force_n, stats.loop.model_age_max_s);
+  CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
+  CHECK(stats.loop.ticks > 100 && stats.loop.contact_ticks > 10);
+  CHECK((double)stats.contact.passes > 0.25 * contact_hz * seconds);
+  CHECK((double)stats.contact.passes < 1.5 * contact_hz * seconds + 25.0 * seconds);
+  CHECK(stats.contact.residual_max < 1e-2);
+  CHECK(stats.hand.peak_force_n < 100.0);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 0.02);
   rig_destroy(&r);
 }
 

@@ -34,12 +34,12 @@ TEST(a_session_that_starts_again_owns_what_it_owned)
   REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
   for (int round = 0; round < 4; ++round) {
     CHECK(hap_session_advance(w.session, round == 1 ? 51 : 120) == HAP_OK);
-    CHECK(cw_stats(&w).range_bodies == 1);
+    CHECK(cw_stats(&w).model.range_bodies == 1);
     CHECK_NEAR(height(&w), 0.025, 3e-4);
     CHECK(hap_session_stop(w.session) == HAP_OK);
     CHECK(hap_session_start(w.session) >= HAP_OK);
     cw_put_hand(&w, 0.0, 0.0, 0.0);
-    CHECK(cw_stats(&w).faults == 0);
+    CHECK(cw_stats(&w).faults.count == 0);
   }
   cw_close(&w);
 }
@@ -64,7 +64,7 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
     cw_add(&w, dCreateConvex(w.space, planes, 6, points, 8, polygons), &mass, 0.0, 0.0, 0.0249);
     REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
     CHECK(hap_session_advance(w.session, 1000) == HAP_OK);
-    CHECK(cw_stats(&w).range_bodies == (room != 0 ? 1u : 0u));
+    CHECK(cw_stats(&w).model.range_bodies == (room != 0 ? 1u : 0u));
     CHECK_NEAR(height(&w), 0.025, 1e-3);
     cw_close(&w);
   }
@@ -89,7 +89,7 @@ TEST(where_contacts_find_no_room_those_that_touch_are_kept)
     }
   }
   CHECK(w.range_max == 4);
-  CHECK(cw_stats(&w).capacity_dropped > 0);
+  CHECK(cw_stats(&w).model.capacity_dropped > 0);
   cw_close(&w);
 }
 
@@ -104,7 +104,7 @@ TEST(a_box_falls_beside_a_wall_that_it_does_not_touch)
   dGeomSetPosition(wall, 0.0755, 0.0, 0.0); /* 0.5 mm away */
   REQUIRE(cw_start(&w, -0.037, 0.0, 0.0));
   CHECK(hap_session_advance(w.session, 101) == HAP_OK);
-  CHECK(cw_stats(&w).range_bodies == 1);
+  CHECK(cw_stats(&w).model.range_bodies == 1);
   CHECK_NEAR(dBodyGetLinearVel(w.bodies[0])[2], -CW_GRAVITY * 0.1, 0.02);
   cw_close(&w);
 }
@@ -187,7 +187,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
     cw_tick(&w);
     met += check_measured(&w);
   }
-  CHECK(cw_stats(&w).measured_bodies == 1 && cw_stats(&w).range_bodies == 1);
+  CHECK(cw_stats(&w).model.measured_bodies == 1 && cw_stats(&w).model.range_bodies == 1);
   CHECK(met > 100);
   CHECK(w.position[1][0] > 0.08); /* it was pushed on */
   cw_close(&w);
@@ -213,7 +213,7 @@ TEST(a_measured_body_answers_two_hands_alike)
     cw_tick(&w);
     met += check_measured(&w);
   }
-  CHECK(cw_stats(&w).measured_bodies == 1);
+  CHECK(cw_stats(&w).model.measured_bodies == 1);
   CHECK(met > 10);
   cw_close(&w);
   dGeomTriMeshDataDestroy(data);
@@ -236,7 +236,7 @@ TEST(the_range_ends_after_so_many_contacts)
     REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
     cw_run(&w, 200);
     CHECK(w.range_min == bodies[i] && w.range_max == bodies[i]);
-    CHECK(cw_stats(&w).edge_bodies == (bodies[i] < 6 ? 1u : 0u));
+    CHECK(cw_stats(&w).model.edge_bodies == (bodies[i] < 6 ? 1u : 0u));
     cw_close(&w);
   }
 }
@@ -284,8 +284,8 @@ TEST(sweeps_are_no_more_than_asked)
     cw_run(&w, 300);
     hap_stats stats = cw_stats(&w);
     CHECK(w.range_max == 6 && fabs(w.force[2]) > 1.0);
-    sweeps[i] = (double)stats.solver_sweeps / (double)stats.ticks;
-    undone[i] = stats.solver_residual_max;
+    sweeps[i] = (double)stats.contact.sweeps / (double)stats.loop.ticks;
+    undone[i] = stats.contact.residual_max;
     cw_close(&w);
   }
   printf("# sweeps a tick %.2f %.2f %.2f %.2f, undone %.2g %.2g %.2g %.2g m/s\n", sweeps[0],

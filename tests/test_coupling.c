@@ -195,10 +195,10 @@ TEST(a_measured_body_is_pushed_through_the_proxy)
   REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.001, 0.002));
   cw_move_hand(&w, 0.2, 0.0, 0.0);
   cw_run(&w, 400);
-  CHECK(cw_stats(&w).measured_bodies == 1);
-  CHECK(w.impulse[0] > 0.05 && cw_stats(&w).faults == 0);
+  CHECK(cw_stats(&w).model.measured_bodies == 1);
+  CHECK(w.impulse[0] > 0.05 && cw_stats(&w).faults.count == 0);
   CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 0.01 * w.impulse[0]);
-  CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 0.01);
+  CHECK_NEAR(cw_stats(&w).hand.momentum_ratio, 1.0, 0.01);
   cw_close(&w);
   dGeomTriMeshDataDestroy(data);
 }
@@ -255,7 +255,7 @@ TEST(a_proxy_passes_the_whole_impulse_on)
   cw_run(&w, 400);
   CHECK(w.impulse[0] > 0.05);
   CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 1e-6 * w.impulse[0]);
-  CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 1e-9);
+  CHECK_NEAR(cw_stats(&w).hand.momentum_ratio, 1.0, 1e-9);
   cw_close(&w);
 }
 
@@ -403,7 +403,7 @@ TEST(auto_without_a_force_stays_direct)
     hap_pointer_state state = state_of(&w);
     CHECK(state.contacts == 1 && state.coupling == HAP_COUPLING_DIRECT);
     CHECK(state.coupling_reason == (i == 0 ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_WITHIN));
-    CHECK(cw_stats(&w).faults == 0);
+    CHECK(cw_stats(&w).faults.count == 0);
     cw_close(&w);
   }
 }
@@ -537,7 +537,7 @@ TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
     given += port_energy(&w, 200);
     speed[i] = w.velocity[0][0];
     CHECK(given > 0.01);
-    CHECK(cw_stats(&w).energy_ticks == 0);
+    CHECK(cw_stats(&w).faults.energy_ticks == 0);
     cw_close(&w);
   }
   CHECK_NEAR(speed[1], speed[0], 1e-9);
@@ -584,10 +584,10 @@ TEST(a_change_of_the_coupling_is_no_source_of_energy)
 static void change_model(contact_world *w, hap_model model)
 {
   CHECK(hap_session_set_model(w->session, model) == HAP_OK);
-  for (int i = 0; i < 200 && cw_stats(w).model != (uint32_t)model; ++i) {
+  for (int i = 0; i < 200 && cw_stats(w).loop.model != (uint32_t)model; ++i) {
     cw_tick(w);
   }
-  CHECK(cw_stats(w).model == (uint32_t)model);
+  CHECK(cw_stats(w).loop.model == (uint32_t)model);
 }
 
 /* Pressed 2 mm into the floor, through a proxy while the model has one. */

@@ -127,7 +127,7 @@ TEST(a_fixed_pair_answers_as_one_body)
   check_block(cross, expected);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
   CHECK(world_physics(&w)->research.cross_count == 2);
-  CHECK(world_physics(&w)->counts.own.stats.probes_clipped == 0);
+  CHECK(world_physics(&w)->counts.own.stats.probes.clipped == 0);
   world_close(&w);
 }
 
@@ -183,9 +183,9 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
     }
     REQUIRE(start_above(&w, -0.02));
     const hap_stats *stats = &world_physics(&w)->counts.own.stats;
-    uint64_t before = stats->probe_steps;
+    uint64_t before = stats->probes.steps;
     measure(&w);
-    probes[joined] = stats->probe_steps - before;
+    probes[joined] = stats->probes.steps - before;
     CHECK(world_count_contacts(&w) == 2);
     CHECK(world_physics(&w)->research.cross_count == (joined != 0 ? 2u : 0u));
     world_close(&w);
@@ -213,12 +213,12 @@ TEST(with_too_few_places_the_largest_stay)
   CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w.def.max_bodies);
   measure(&w);
   REQUIRE(physics->research.cross_count == 6);
-  CHECK(physics->counts.own.stats.capacity_dropped == 0);
+  CHECK(physics->counts.own.stats.model.capacity_dropped == 0);
   memcpy(all, physics->research.crosses, sizeof all);
   physics->config.capacity.crosses = 4;
   measure(&w);
   REQUIRE(physics->research.cross_count == 4);
-  CHECK(physics->counts.own.stats.capacity_dropped == 2);
+  CHECK(physics->counts.own.stats.model.capacity_dropped == 2);
   for (int i = 0; i < 6; ++i) {
     int larger = 0;
     bool kept = false;
@@ -243,8 +243,8 @@ TEST(a_block_that_is_no_number_is_left_out)
   const hap_stats *stats = &world_physics(&w)->counts.own.stats;
   world_slot(&w, w.bodies[0])->mass = 0.0;
   measure(&w);
-  CHECK(stats->probes_singular == 2 &&
-        stats->probes_clipped == 0); /* A of the contact, and its block */
+  CHECK(stats->probes.singular == 2 &&
+        stats->probes.clipped == 0); /* A of the contact, and its block */
   CHECK(block(&w, w.bodies[0], w.bodies[1]) == NULL);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
   CHECK(world_contact(&w, w.bodies[0], 0)->a[0][0] > 0.1); /* the last good one */
@@ -317,9 +317,9 @@ TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
   for (int i = 0; i < 3; ++i) {
     momentum += 0.5 * dBodyGetLinearVel(w.bodies[i])[0];
   }
-  CHECK(stats.impulse_ns > 0.01);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
-  CHECK_NEAR(momentum / stats.impulse_ns, 1.0, 1e-6);
+  CHECK(stats.hand.impulse_ns > 0.01);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
+  CHECK_NEAR(momentum / stats.hand.impulse_ns, 1.0, 1e-6);
   world_close(&w);
 }
 
@@ -344,7 +344,7 @@ TEST(two_hands_on_a_pair_leave_no_residual)
     CHECK(slots[0]->pushed && slots[1]->pushed);
     missed[cross - HAP_EFFECT_OFF] = fmax(fabs(slots[0]->residual[2]), fabs(slots[1]->residual[2]));
     hap_stats stats = world_stats(&w);
-    CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
+    CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
     world_close(&w);
   }
   printf("# eq. 14: %g m/s without, %g m/s with cross accelerance\n", missed[0], missed[1]);
@@ -372,9 +372,9 @@ static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_effect_wish
   CHECK(hap_session_start(r.session) == HAP_OK);
   CHECK(hap_session_advance(r.session, 700) == HAP_OK);
   CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
-  CHECK(stats.contact_ticks > 0);
+  CHECK(stats.loop.contact_ticks > 0);
   rig_destroy(&r);
-  return stats.trace_hash;
+  return stats.loop.trace_hash;
 }
 
 TEST(a_body_alone_does_not_feel_the_switch)
@@ -556,9 +556,9 @@ TEST(operating_probes_are_as_many_as_shared_ones)
     join_fixed(&w);
     REQUIRE(start_above(&w, -0.02));
     const hap_stats *stats = &world_physics(&w)->counts.own.stats;
-    uint64_t before = stats->probe_steps;
+    uint64_t before = stats->probes.steps;
     measure(&w);
-    steps[k] = stats->probe_steps - before;
+    steps[k] = stats->probes.steps - before;
     world_close(&w);
   }
   CHECK(steps[0] == 7 && steps[1] == 7);

@@ -199,7 +199,7 @@ static double push_row(double accuracy, double force[TICKS])
       cw_tick(&w);
       force[i] = w.force[0];
     }
-    sweeps = (double)cw_stats(&w).solver_sweeps / TICKS;
+    sweeps = (double)cw_stats(&w).contact.sweeps / TICKS;
     double most =
         3.0 + accuracy_of(&w).row_updates / (double)ROW_ROWS; /* it ends beyond its bound */
     CHECK(2.0 * most >= sweeps); /* two solves a tick, where something is pushed out */
@@ -280,9 +280,9 @@ static double passes_in(double accuracy)
   double passes = 0.0;
   if (start_row(&w)) {
     cw_run(&w, 200);
-    double before = (double)cw_stats(&w).contact_passes;
+    double before = (double)cw_stats(&w).contact.passes;
     cw_run(&w, 1000);
-    passes = (double)cw_stats(&w).contact_passes - before;
+    passes = (double)cw_stats(&w).contact.passes - before;
   } else {
     CHECK(!"a session");
   }
@@ -402,7 +402,7 @@ static hap_accuracy_info look_for_error(double from, double wanted)
     stroke(&w, 6000);
     info = accuracy_of(&w);
     printf("# from %g, %g wanted: at %g, told %.3g\n", from, wanted, info.accuracy,
-           cw_stats(&w).force_error);
+           cw_stats(&w).error.force_error);
   } else {
     CHECK(!"a session");
   }

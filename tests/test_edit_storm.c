@@ -23,12 +23,12 @@ static void say(const storm_result *r)
   printf(
       "# ticks %llu, missed %llu, in contact %llu; steps %llu, missed %llu; lock waits %.3f ms at "
       "most, held %.3f; lost %llu of %llu untold\n",
-      (unsigned long long)s->ticks, (unsigned long long)s->missed_ticks,
-      (unsigned long long)s->contact_ticks, (unsigned long long)s->physics_steps,
-      (unsigned long long)s->physics_missed, s->lock_wait_ms_max, s->lock_held_ms_max,
+      (unsigned long long)s->loop.ticks, (unsigned long long)s->loop.missed_ticks,
+      (unsigned long long)s->loop.contact_ticks, (unsigned long long)s->physics.steps,
+      (unsigned long long)s->physics.missed, s->edits.wait_ms_max, s->edits.held_ms_max,
       (unsigned long long)r->lost, (unsigned long long)r->untold);
-  printf("# momentum %.9f, error %.3g N s of %.3g N s\n", s->momentum_ratio, s->momentum_error_ns,
-         s->impulse_abs_ns);
+  printf("# momentum %.9f, error %.3g N s of %.3g N s\n", s->hand.momentum_ratio,
+         s->hand.momentum_error_ns, s->hand.impulse_abs_ns);
 }
 
 static void check(const storm_def *def, storm_result *out)
@@ -44,10 +44,10 @@ static void check(const storm_def *def, storm_result *out)
   CHECK(out->peak <= STORM_FORCE * (1.0 + 1e-9) && out->steepest <= STORM_SLEW * (1.0 + 1e-9));
   CHECK(out->unexpected == 0 && out->faults == 0);
   CHECK(out->posts_run == out->posts_taken); /* nothing lost */
-  CHECK(out->edits > 0 && out->writes > 0 && out->stats.contact_ticks > 0);
-  CHECK(out->stats.states_rejected == 0);
+  CHECK(out->edits > 0 && out->writes > 0 && out->stats.loop.contact_ticks > 0);
+  CHECK(out->stats.faults.states_rejected == 0);
   CHECK(out->lost <= out->untold && (def->telling != STORM_TELLS || out->lost == 0));
-  CHECK(out->stats.momentum_error_ns <= 1e-6 * out->stats.impulse_abs_ns);
+  CHECK(out->stats.hand.momentum_error_ns <= 1e-6 * out->stats.hand.impulse_abs_ns);
 }
 
 static storm_def usual(hap_drive drive, hap_model model)
@@ -70,7 +70,7 @@ TEST(threads_in_model_contact)
   storm_result r;
   storm_def def = usual(HAP_DRIVE_THREADS, HAP_MODEL_CONTACT);
   check(&def, &r);
-  CHECK(r.tries_in_vain > 0 && r.stats.locks > 0);
+  CHECK(r.tries_in_vain > 0 && r.stats.edits.locks > 0);
 }
 
 TEST(threads_in_the_other_models)
@@ -104,7 +104,7 @@ static void run_told(repeat_log *log, const void *arg)
   def.ticked = note;
   def.ticked_arg = log;
   check(&def, &r);
-  CHECK(r.stats.ticks == log->count && r.stats.trace_hash != 0);
+  CHECK(r.stats.loop.ticks == log->count && r.stats.loop.trace_hash != 0);
 }
 
 /* Told of what goes, lockstep has the same bits in every run, whatever addresses the heap gives. */

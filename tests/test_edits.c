@@ -97,7 +97,7 @@ static void check_replacement(hap_model model, bool touched)
   dBodySetPosition(s.cube, 0.0, 3.0, 0.0);
   calls_of_old = 0;
   CHECK(hap_session_advance(s.session, 25) == HAP_BODY_LOST);
-  CHECK(stats_of(&s).bodies_lost == 1 && stats_of(&s).bodies_known == 1);
+  CHECK(stats_of(&s).faults.bodies_lost == 1 && stats_of(&s).model.bodies_known == 1);
   CHECK(has(detail_of(&s), "hap_session_forget_body"));
   CHECK(dBodyGetPosition(s.cube)[1] == 3.0 && hapi_v3_norm(dBodyGetLinearVel(s.cube)) == 0.0);
   CHECK(hap_session_poses(s.session, hap_session_now(s.session), &s.cube, 1, &pose) == HAP_OK);
@@ -106,8 +106,9 @@ static void check_replacement(hap_model model, bool touched)
   CHECK(calls_of_old == 0 && state_of(&s, hand).contacts == 0);
   CHECK(hapi_v3_norm(state_of(&s, hand).wrench.force) == 0.0);
   hap_stats stats = stats_of(&s);
-  CHECK(stats.bodies_lost == 1 && stats.faults == 0);
-  CHECK(!touched || fabs(stats.momentum_ratio - 1.0) < 1e-9); /* also what the old one took along */
+  CHECK(stats.faults.bodies_lost == 1 && stats.faults.count == 0);
+  CHECK(!touched ||
+        fabs(stats.hand.momentum_ratio - 1.0) < 1e-9); /* also what the old one took along */
   stage_end(&s);
 }
 
@@ -145,7 +146,7 @@ TEST(a_lost_body_is_said_once_a_run_and_counted_always)
     CHECK(lost_lines == run);
     CHECK(hap_session_stop(s.session) == HAP_OK && hap_session_start(s.session) == HAP_OK);
   }
-  CHECK(stats_of(&s).bodies_lost == 20);
+  CHECK(stats_of(&s).faults.bodies_lost == 20);
   stage_end(&s);
   REQUIRE(hap_hooks_set(NULL) == HAP_OK);
 }
@@ -204,7 +205,7 @@ TEST(a_body_is_taken_for_itself_whatever_is_set_on_it)
         break;
     }
   }
-  CHECK(stats_of(&s).bodies_lost == 0 && dBodyGetData(s.cube) == &s);
+  CHECK(stats_of(&s).faults.bodies_lost == 0 && dBodyGetData(s.cube) == &s);
   stage_end(&s);
 }
 
@@ -345,7 +346,7 @@ TEST(an_adopted_body_that_lost_its_geom_lives_when_it_is_adopted_again)
       CHECK(hap_session_adopt_body(s.session, s.cube) == HAP_OK);
     }
     CHECK(hap_session_advance(s.session, 50) == (again != 0 ? HAP_OK : HAP_BODY_LOST));
-    CHECK(stats_of(&s).bodies_known == (again != 0 ? 1u : 0u));
+    CHECK(stats_of(&s).model.bodies_known == (again != 0 ? 1u : 0u));
     stage_end(&s);
   }
 }
@@ -386,17 +387,17 @@ TEST(errors_of_the_lock_say_what_to_do)
   CHECK(hap_session_unlock(s.session) == HAP_OK);
   CHECK(hap_session_try_lock(s.session, INT64_MAX) == HAP_OK);
   CHECK(hap_session_unlock(s.session) == HAP_OK);
-  CHECK(stats_of(&s).locks == 2);
+  CHECK(stats_of(&s).edits.locks == 2);
   stage_end(&s);
 }
 
 static bool ticks_go_on(stage *s)
 {
-  uint64_t begin = stats_of(s).ticks;
-  for (int i = 0; i < 20000 && stats_of(s).ticks < begin + 200; ++i) {
+  uint64_t begin = stats_of(s).loop.ticks;
+  for (int i = 0; i < 20000 && stats_of(s).loop.ticks < begin + 200; ++i) {
     sleep_ms(1);
   }
-  return stats_of(s).ticks >= begin + 200;
+  return stats_of(s).loop.ticks >= begin + 200;
 }
 
 TEST(the_loop_does_not_wait_for_the_lock)
@@ -414,8 +415,8 @@ TEST(the_loop_does_not_wait_for_the_lock)
     CHECK(ticks_go_on(&s));
     CHECK(hap_session_unlock(s.session) == HAP_OK);
     hap_stats stats = stats_of(&s);
-    CHECK(stats.locks == 1 && stats.lock_held_ms_max > 0.0 && stats.stale_times > 0);
-    CHECK(stats.lock_wait_ms_max >= 0.0 && stats.lock_wait_ms_max < stats.lock_held_ms_max);
+    CHECK(stats.edits.locks == 1 && stats.edits.held_ms_max > 0.0 && stats.faults.stale_times > 0);
+    CHECK(stats.edits.wait_ms_max >= 0.0 && stats.edits.wait_ms_max < stats.edits.held_ms_max);
     stage_end(&s);
   }
 }
@@ -450,7 +451,7 @@ TEST(a_hundred_threads_may_wait_for_the_lock)
   for (int i = 0; i < CROWD; ++i) {
     pthread_join(threads[i], NULL);
   }
-  CHECK(s.seen[0] == 20 * CROWD && stats_of(&s).locks == 20 * CROWD + 1);
+  CHECK(s.seen[0] == 20 * CROWD && stats_of(&s).edits.locks == 20 * CROWD + 1);
   stage_end(&s);
 }
 
@@ -535,7 +536,7 @@ TEST(an_edit_that_stop_or_destroy_runs_is_a_callback_too)
   CHECK(hap_session_post(s.session, be_bad, &s) == HAP_OK);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   check_bad(&s, 2);
-  CHECK(stats_of(&s).edits_run == 2);
+  CHECK(stats_of(&s).edits.run == 2);
   CHECK(hap_session_post(s.session, be_bad, &s) == HAP_OK);
   stage_end(&s);
   check_bad(&s, 3);
@@ -682,7 +683,7 @@ TEST(a_sleeping_neighbour_may_lie_behind_geoms_that_rest)
     int count = list_order(&s, flier, before);
     REQUIRE(hap_session_start(s.session) == HAP_OK);
     CHECK(hap_session_advance(s.session, 500) == HAP_OK); /* ODE would end the process */
-    CHECK(stats_of(&s).probe_steps > 0 && !dBodyIsEnabled(s.cube));
+    CHECK(stats_of(&s).probes.steps > 0 && !dBodyIsEnabled(s.cube));
     CHECK(list_order(&s, flier, after) == count && count == 9);
     CHECK(memcmp(before, after, (size_t)count * sizeof before[0]) == 0);
     const hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
@@ -716,7 +717,7 @@ static double height_after(bool told)
   if (stage_create(&s) == HAP_OK) {
     (void)add_hand(&s, -0.07);
     CHECK(hap_session_start(s.session) == HAP_OK && hap_session_advance(s.session, 300) == HAP_OK);
-    CHECK(stats_of(&s).range_bodies == 1);
+    CHECK(stats_of(&s).model.range_bodies == 1);
     CHECK_NEAR(dBodyGetPosition(s.cube)[2], 0.05, 1e-3);
     for (int i = 0; i < 4; ++i) {
       corners[i][2] = -0.03;

@@ -91,8 +91,9 @@ TEST(a_free_body_alone_calls_for_nothing)
   CHECK(is_called(&w, HAP_EFFECT_OBSERVER));
   CHECK(is_off(&w, HAP_EFFECT_RECORDING, HAP_REASON_NOT_RECORDED));
   hap_stats stats = cw_stats(&w);
-  CHECK(stats.probe_steps == 0 && stats.contact_passes == 0 && stats.contact_us_max == 0.0);
-  CHECK(stats.contact_ticks > 0 && w.velocity[0][0] > 0.01); /* it is pushed, and does not wait */
+  CHECK(stats.probes.steps == 0 && stats.contact.passes == 0 && stats.contact.us_max == 0.0);
+  CHECK(stats.loop.contact_ticks > 0 &&
+        w.velocity[0][0] > 0.01); /* it is pushed, and does not wait */
   cw_close(&w);
 }
 
@@ -114,7 +115,7 @@ TEST(far_away_nothing_is_on)
   CHECK(is_off(&w, HAP_EFFECT_GYRO, HAP_REASON_FAR));
   CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_FAR));
   CHECK(is_off(&w, HAP_EFFECT_OBSERVER, HAP_REASON_FAR));
-  CHECK(cw_stats(&w).contact_passes == 0);
+  CHECK(cw_stats(&w).contact.passes == 0);
   cw_close(&w);
 }
 
@@ -128,7 +129,7 @@ TEST(a_row_on_a_floor_calls_for_contacts_passes_and_range)
   CHECK(is_called(&w, HAP_EFFECT_RANGE) && look(&w, HAP_EFFECT_RANGE).on == 2);
   CHECK(is_off(&w, HAP_EFFECT_RESTITUTION, HAP_REASON_NO_BOUNCE));
   CHECK(is_off(&w, HAP_EFFECT_OBSERVER, HAP_REASON_MEASURING));
-  CHECK(cw_stats(&w).contact_passes > 8);
+  CHECK(cw_stats(&w).contact.passes > 8);
   cw_close(&w);
 }
 
@@ -265,7 +266,7 @@ TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
   w.hand_def.radius = 0.001;
   REQUIRE(start_left(&w, 0.002));
   cw_run(&w, 60);
-  CHECK(cw_stats(&w).contact_ticks > 0);
+  CHECK(cw_stats(&w).loop.contact_ticks > 0);
   CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
   cw_close(&w);
 }
@@ -323,7 +324,7 @@ TEST(a_free_body_needs_no_testing_simulation_and_answers_alike)
     cw_run(&w, 80);
     CHECK(i == 0 ? is_off(&w, HAP_EFFECT_TESTING, HAP_REASON_FREE)
                  : is(&w, HAP_EFFECT_TESTING, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-    CHECK((cw_stats(&w).probe_steps == 0) == (i == 0));
+    CHECK((cw_stats(&w).probes.steps == 0) == (i == 0));
     memcpy(force[i], w.force, sizeof w.force);
     velocity[i] = w.velocity[0][0];
     cw_close(&w);
@@ -422,8 +423,8 @@ TEST(what_the_loop_does_not_simulate_is_measured_or_nothing_is_known_of_it)
     REQUIRE(start_at_door(&w));
     cw_run(&w, 60);
     hap_stats stats = cw_stats(&w);
-    CHECK(stats.range_bodies == 0 && stats.range_joints == 0);
-    CHECK((stats.measured_bodies == 1) == (i == 0) && (stats.probe_steps > 0) == (i == 0));
+    CHECK(stats.model.range_bodies == 0 && stats.model.range_joints == 0);
+    CHECK((stats.model.measured_bodies == 1) == (i == 0) && (stats.probes.steps > 0) == (i == 0));
     CHECK(is(&w, HAP_EFFECT_JOINTS, HAP_EFFECT_IS_OFF, HAP_REASON_ASKED));
     CHECK(i == 0 ? is_called(&w, HAP_EFFECT_TESTING)
                  : is_off(&w, HAP_EFFECT_TESTING, HAP_REASON_ASKED));
@@ -441,7 +442,7 @@ TEST(the_range_that_is_off_ends_at_the_neighbours)
     w.def.physics_hz = 50.0;
     REQUIRE(start_left(&w, 0.002));
     cw_run(&w, 60);
-    CHECK(cw_stats(&w).range_bodies == (i == 0 ? 1u : 5u));
+    CHECK(cw_stats(&w).model.range_bodies == (i == 0 ? 1u : 5u));
     CHECK(i == 0 ? is_off(&w, HAP_EFFECT_RANGE, HAP_REASON_ASKED)
                  : is(&w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
     cw_close(&w);
@@ -458,7 +459,7 @@ TEST(passes_that_are_off_come_with_the_syncs)
     wish(&w, HAP_EFFECT_PASSES, wishes[i]);
     REQUIRE(start_left(&w, 0.002));
     cw_run(&w, 500);
-    passes[i] = cw_stats(&w).contact_passes;
+    passes[i] = cw_stats(&w).contact.passes;
     CHECK(fabs(w.position[0][2] - EDGE / 2) < 1e-3); /* the floor holds all the same */
     cw_close(&w);
   }
@@ -474,7 +475,7 @@ TEST(passes_that_are_asked_for_come_without_need)
   cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
   REQUIRE(cw_start(&w, -EDGE, 0.0, 0.0));
   cw_run(&w, 200);
-  CHECK(cw_stats(&w).contact_passes >= 35);
+  CHECK(cw_stats(&w).contact.passes >= 35);
   cw_close(&w);
 }
 
@@ -554,7 +555,7 @@ static double tumbles(hap_effect_wish wished)
   dBodySetGyroscopicMode(plate, 1);
   if (cw_start(&w, 0.0, 0.0, 0.05 + HAND + 0.003)) {
     cw_run(&w, 301);
-    CHECK(look(&w, HAP_EFFECT_GYRO).of == 1 && cw_stats(&w).contact_ticks == 0);
+    CHECK(look(&w, HAP_EFFECT_GYRO).of == 1 && cw_stats(&w).loop.contact_ticks == 0);
     turned = dBodyGetAngularVel(plate)[2];
   }
   cw_close(&w);
@@ -637,7 +638,7 @@ TEST(wishes_can_change_from_sync_to_sync)
     CHECK((look(&w, HAP_EFFECT_CONTACTS).state == HAP_EFFECT_IS_OFF) == off);
     CHECK(wished == HAP_EFFECT_AUTO || /* which stays one as long as it is touched */
           (look(&w, HAP_EFFECT_PROXY).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK(isfinite(w.force[0]) && cw_stats(&w).fault == HAP_FAULT_NONE);
+    CHECK(isfinite(w.force[0]) && cw_stats(&w).faults.fault == HAP_FAULT_NONE);
   }
   cw_close(&w);
 }
@@ -753,7 +754,7 @@ TEST(times_are_of_what_is_on)
   hap_stats stats = cw_stats(&w);
   hap_effect_info contacts = look(&w, HAP_EFFECT_CONTACTS);
   CHECK(isnan(contacts.tick_us) ||
-        (contacts.tick_us > 0.0 && contacts.tick_us < stats.tick_us_max));
+        (contacts.tick_us > 0.0 && contacts.tick_us < stats.loop.tick_us_max));
   CHECK(contacts.contact_us > 0.0 && contacts.physics_ms > 0.0);
   CHECK(isnan(look(&w, HAP_EFFECT_GYRO).tick_us) || look(&w, HAP_EFFECT_GYRO).tick_us == 0.0);
   CHECK(isnan(look(&w, HAP_EFFECT_RANGE).tick_us));
@@ -782,8 +783,8 @@ static double error_of_range(int max_bodies)
       cw_tick(&w);
     }
     hap_stats stats = cw_stats(&w);
-    CHECK(stats.probe_steps > 20);
-    error = stats.range_error;
+    CHECK(stats.probes.steps > 20);
+    error = stats.error.range_error;
   }
   cw_close(&w);
   printf("# range of %d: error %.3f\n", max_bodies, error);
@@ -808,7 +809,7 @@ TEST(testing_that_is_asked_for_changes_no_force)
     REQUIRE(start_left(&w, 0.002));
     cw_run(&w, 400);
     force[i] = w.force[0];
-    CHECK((cw_stats(&w).probe_steps > 0) == (i == 1));
+    CHECK((cw_stats(&w).probes.steps > 0) == (i == 1));
     cw_close(&w);
   }
   CHECK(force[0] < -0.1);

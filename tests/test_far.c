@@ -205,16 +205,16 @@ TEST(the_fastest_of_all_bodies_sets_the_reach)
 
 static bool stands(test_world *w)
 {
-  uint64_t before = world_stats(w).physics_steps;
+  uint64_t before = world_stats(w).physics.steps;
   CHECK(hap_session_advance(w->session, 50) == HAP_FAULTED);
-  return world_stats(w).physics_steps == before && world_physics(w)->world_faulty;
+  return world_stats(w).physics.steps == before && world_physics(w)->world_faulty;
 }
 
 static void go_on(test_world *w)
 {
-  uint64_t before = world_stats(w).physics_steps;
+  uint64_t before = world_stats(w).physics.steps;
   (void)hap_session_advance(w->session, 50);
-  CHECK(world_stats(w).physics_steps > before);
+  CHECK(world_stats(w).physics.steps > before);
   CHECK(!world_physics(w)->world_faulty);
   CHECK(hap_session_reset_fault(w->session) == HAP_OK);
   CHECK(hap_session_advance(w->session, 50) == HAP_OK);
@@ -332,7 +332,7 @@ TEST(the_scan_follows_whatever_the_order_becomes)
     CHECK(hap_session_advance(w.session, 50) == HAP_BODY_LOST);
     check_table(&w, count);
   }
-  CHECK(world_stats(&w).bodies_lost == 12);
+  CHECK(world_stats(&w).faults.bodies_lost == 12);
   world_close(&w);
 }
 

@@ -97,7 +97,7 @@ static bool begin_pressing(void)
 static void check_normal_after(int ticks)
 {
   run_ticks(ticks);
-  CHECK(stats_of(&f.s).fault == HAP_FAULT_NONE);
+  CHECK(stats_of(&f.s).faults.fault == HAP_FAULT_NONE);
   CHECK((felt_guard(&f) & (HAP_GUARD_FAULT | HAP_GUARD_STALE | HAP_GUARD_RAMP_IN)) == 0);
   run_ticks(2000);
   CHECK_NEAR(felt_force(), 5.217, 0.01);
@@ -126,7 +126,7 @@ static void check_latched(hap_fault fault, int ticks)
     CHECK(felt_force() == 0.0);
   }
   hap_stats stats = stats_of(&f.s);
-  CHECK(stats.fault == (uint32_t)fault && stats.fault_pointer == f.hand.v);
+  CHECK(stats.faults.fault == (uint32_t)fault && stats.faults.pointer == f.hand.v);
   CHECK(felt_guard(&f) == HAP_GUARD_FAULT && f.state.wrench.force[0] == 0.0);
 }
 
@@ -143,7 +143,8 @@ TEST(physics_that_dies_fades_within_100_ms_and_comes_back_in_a_step)
   CHECK(felt_force() == 0.0 && felt_guard(&f) == HAP_GUARD_STALE);
   CHECK(felt.steepest < 0.2); /* N: it fades, and is not cut */
   run_alone(5000);
-  CHECK(felt_force() == 0.0 && stats_of(&f.s).faults == 0 && stats_of(&f.s).stale_times == 1);
+  CHECK(felt_force() == 0.0 && stats_of(&f.s).faults.count == 0 &&
+        stats_of(&f.s).faults.stale_times == 1);
   CHECK(felt.work_most < 1e-6); /* the hand sinks in, and is never pushed */
   look_for_a_burst();
   tick = (tick / STEP_TICKS + 1) * STEP_TICKS;
@@ -166,7 +167,7 @@ static taps taps_end(void)
   double stored = 0.5 * felt.peak * felt.peak / f.def.stiffness;
   taps t = {felt.work_most, felt.work_once, stored};
   felt.bad = f.s.def.guard == HAP_GUARD_MEASURE ? 0 : felt.bad; /* it has no slew limit */
-  CHECK(stats_of(&f.s).faults == 0);
+  CHECK(stats_of(&f.s).faults.count == 0);
   felt_end(&f);
   return t;
 }
@@ -268,7 +269,7 @@ TEST(a_loop_that_stood_still_while_the_hand_went_in_takes_the_surface_to_the_han
     CHECK_NEAR(felt_force(), 2.0, 1e-6);
     run_ticks(2500); /* out, and in again: the wall is where it was */
     CHECK_NEAR(felt_force(), 3.0, 1e-6);
-    CHECK(stats_of(&f.s).faults == 0 && felt.peak <= 3.0 + 1e-6);
+    CHECK(stats_of(&f.s).faults.count == 0 && felt.peak <= 3.0 + 1e-6);
     felt_end(&f);
   }
 }
@@ -301,7 +302,7 @@ static void unplug(atomic_int *how, hap_fault fault)
   check_latched(fault, 300);
   CHECK(hap_session_reset_fault(f.s.session) == HAP_OK); /* too early */
   check_latched(fault, 100);
-  CHECK(stats_of(&f.s).faults == 2);
+  CHECK(stats_of(&f.s).faults.count == 2);
   atomic_store(how, 0);
   check_latched(fault, 300); /* plugged again: nothing without a reset */
   CHECK(felt.work_most <= 1e-9);
@@ -384,7 +385,7 @@ TEST(a_restart_has_its_place)
   atomic_store(&felt.fail_start, 1);
   CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_DEVICE);
   run_ticks(10); /* out of the world, and no fault */
-  CHECK(stats_of(&f.s).fault == HAP_FAULT_NONE && felt_force() == 0.0);
+  CHECK(stats_of(&f.s).faults.fault == HAP_FAULT_NONE && felt_force() == 0.0);
   CHECK(hap_session_stop(f.s.session) == HAP_OK);
   CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_STATE);
   CHECK(has(detail_of(&f.s), "not started"));
@@ -488,7 +489,7 @@ TEST(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it)
     REQUIRE(begin_to_jump(false, couplings[i % 2], stiffness));
     jump(0.5);
     run_ticks(400);
-    CHECK(stats_of(&f.s).faults == 0 && felt.peak == 0.0);
+    CHECK(stats_of(&f.s).faults.count == 0 && felt.peak == 0.0);
     felt.jump += 1e-3; /* a hand that goes on feels it */
     run_ticks(100);
     CHECK(felt_force() > 0.4);
@@ -498,7 +499,7 @@ TEST(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it)
     felt.jump += 1e-3; /* and one that comes back, 1 mm farther out */
     run_ticks(100);
     CHECK(felt_force() > 0.4);
-    CHECK(stats_of(&f.s).faults == 0);
+    CHECK(stats_of(&f.s).faults.count == 0);
     felt_end(&f);
   }
 }
@@ -513,7 +514,7 @@ TEST(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away)
     jump(-0.5);
     run_ticks(1000);
     CHECK(fastest == 0.0 && felt.peak == 0.0);
-    CHECK(stats_of(&f.s).faults == 0);
+    CHECK(stats_of(&f.s).faults.count == 0);
     felt_end(&f);
   }
 }
@@ -531,7 +532,7 @@ TEST(a_body_put_over_the_hand_is_pushed_out_slowly)
            i % 2 == 0 ? "direct" : "proxy", stiffness, fastest, felt.peak, felt.steepest);
     /* 10 mm of spring, and what comes in at 0.2 m/s */
     CHECK(fastest > 0.05 && fastest <= 0.01 * sqrt(stiffness) + 0.4);
-    CHECK(stats_of(&f.s).faults == 0);
+    CHECK(stats_of(&f.s).faults.count == 0);
     felt_end(&f);
   }
 }
@@ -547,7 +548,7 @@ TEST(a_device_that_jumps_for_a_tick_and_back_is_felt_as_a_dip)
     run_ticks(2000);
     /* From nothing the hand swings over; after the wall it has it 5 mm deeper. */
     CHECK(felt.peak < 8.0 && fabs(felt_force() - 5.217) < 0.75);
-    CHECK(felt.work_most < 1e-3 && stats_of(&f.s).faults == 0);
+    CHECK(felt.work_most < 1e-3 && stats_of(&f.s).faults.count == 0);
     felt_end(&f);
   }
 }
@@ -583,7 +584,7 @@ TEST(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps)
   felt.work = felt.work_most = felt.work_once = 0.0;
   at_sync = post_replacement;
   run_ticks(4000);
-  CHECK(stats_of(&f.s).bodies_lost == 200 && stats_of(&f.s).faults == 0);
+  CHECK(stats_of(&f.s).faults.bodies_lost == 200 && stats_of(&f.s).faults.count == 0);
   printf("# gained %.3g J at most, %.3g in a tick, peak %.3g N\n", felt.work_most, felt.work_once,
          felt.peak);
   CHECK(felt.work_most <= 0.01 * 0.5 * felt.peak * felt.peak / 1000.0 + felt.work_once);
@@ -612,7 +613,7 @@ static int syncs_without_loss;
 
 static void note_loss(void)
 {
-  uint64_t dropped = stats_of(&f.s).capacity_dropped;
+  uint64_t dropped = stats_of(&f.s).model.capacity_dropped;
   syncs_without_loss += dropped == dropped_before;
   dropped_before = dropped;
 }
@@ -628,7 +629,7 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
             "sine=0/0.04/0.02,hz=0.7"));
   run_ticks(1000);
   CHECK(felt_force() > 1.0);
-  dropped_before = stats_of(&f.s).capacity_dropped;
+  dropped_before = stats_of(&f.s).model.capacity_dropped;
   syncs_without_loss = 0;
   at_sync = note_loss;
   double least = FELT_LIMIT;
@@ -638,9 +639,10 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
   }
   hap_stats stats = stats_of(&f.s);
   printf("# %.3g to %.3g N, steepest %.3g N a tick, %llu dropped, %d of 250 syncs without\n", least,
-         felt.peak, felt.steepest, (unsigned long long)stats.capacity_dropped, syncs_without_loss);
+         felt.peak, felt.steepest, (unsigned long long)stats.model.capacity_dropped,
+         syncs_without_loss);
   CHECK(syncs_without_loss <= 1); /* the first one compares with itself */
-  CHECK(stats.faults == 0 && stats.states_rejected == 0);
-  CHECK(stats.neighbours_max <= 2 && stats.pointer_contacts <= 2);
+  CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
+  CHECK(stats.model.neighbours_max <= 2 && stats.model.pointer_contacts <= 2);
   felt_end(&f);
 }

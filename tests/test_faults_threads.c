@@ -74,9 +74,9 @@ TEST(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back)
   atomic_store(&hangs, 1);
   REQUIRE(pthread_create(&stopper, NULL, stop, NULL) == 0);
   CHECK(wait_until(lets_go));
-  uint64_t ticks = stats_of(&f.s).ticks;
+  uint64_t ticks = stats_of(&f.s).loop.ticks;
   sleep_ms(20);
-  CHECK(stats_of(&f.s).ticks == ticks && lets_go()); /* the loop has ended, stop waits */
+  CHECK(stats_of(&f.s).loop.ticks == ticks && lets_go()); /* the loop has ended, stop waits */
   atomic_store(&hangs, 0);
   pthread_join(stopper, NULL);
   felt_end(&f);
@@ -86,7 +86,7 @@ TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
 {
   REQUIRE(begin_threads());
   CHECK(wait_until(presses));
-  uint64_t missed = stats_of(&f.s).missed_ticks;
+  uint64_t missed = stats_of(&f.s).loop.missed_ticks;
   for (int i = 0; i < 3; ++i) {
     atomic_store(&felt.block_ms, 300);
     while (atomic_load(&felt.block_ms) != 0) {
@@ -94,9 +94,10 @@ TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
     }
     sleep_ms(400);
   }
-  CHECK(stats_of(&f.s).missed_ticks >= missed + 3 * 290); /* they are passed over, not caught up */
+  CHECK(stats_of(&f.s).loop.missed_ticks >=
+        missed + 3 * 290); /* they are passed over, not caught up */
   CHECK(wait_until(presses));
-  CHECK(stats_of(&f.s).faults == 0);
+  CHECK(stats_of(&f.s).faults.count == 0);
   CHECK(hap_session_stop(f.s.session) == HAP_OK);
   CHECK(felt.peak < FELT_LIMIT);
   felt_end(&f);
@@ -152,7 +153,7 @@ TEST(a_device_that_blocks_and_then_fails_is_zeroed)
   sleep_ms(120); /* it may have been before that read */
   atomic_store(&felt.ever_holds, 0);
   sleep_ms(50);
-  CHECK(atomic_load(&felt.ever_holds) == 0 && stats_of(&f.s).fault == HAP_FAULT_DEVICE_READ);
+  CHECK(atomic_load(&felt.ever_holds) == 0 && stats_of(&f.s).faults.fault == HAP_FAULT_DEVICE_READ);
   atomic_store(&felt.fail_read, 0);
   sleep_ms(20);
   CHECK(lets_go());

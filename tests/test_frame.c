@@ -177,7 +177,7 @@ static hap_status view_frame(view *v, int64_t until_ns, double scale)
   double most = SPEED * 1e-9 * (double)(drawn - v->last + v->slack_now + before);
   v->back = fmax(v->back, -way);
   v->jump = fmax(v->jump, way - most);
-  double delay = stats_of(&v->f.s).pose_delay_s;
+  double delay = stats_of(&v->f.s).physics.pose_delay_s;
   double wanted = SPEED * (1e-9 * (double)(drawn - v->origin) - delay);
   v->off = fmax(v->off, fabs(pose.position[0] - wanted));
   v->given += frame_s;
@@ -209,11 +209,11 @@ static void check_world(view *v)
 {
   hap_stats stats = stats_of(&v->f.s);
   double h = 1.0 / v->f.s.def.physics_hz;
-  double world = h * (double)stats.physics_steps;
+  double world = h * (double)stats.physics.steps;
   CHECK_NEAR(dBodyGetPosition(v->cube)[0], SPEED * world, 1e-9);
-  double rest = v->given - world - h * (double)stats.frames_dropped;
+  double rest = v->given - world - h * (double)stats.physics.frames_dropped;
   CHECK(rest > -1e-6 && rest < h + 1e-6);
-  CHECK(stats.faults == 0 && stats.physics_missed == 0);
+  CHECK(stats.faults.count == 0 && stats.physics.missed == 0);
 }
 
 /* Jitter of 40 % of a frame; the delay needs a second to find how late frames come. Where the host kept
@@ -230,16 +230,16 @@ static void check_rate(double hz)
   printf(
       "# %g Hz: back %.2g, jump %.2g, off %.2g m; update took up to %.2f ms; delay %.1f ms; "
       "stale %llu times, force %.2f N\n",
-      hz, v.back, v.jump, v.off, 1e-6 * (double)v.slack, 1e3 * stats.pose_delay_s,
-      (unsigned long long)stats.stale_times, force_now(&v));
+      hz, v.back, v.jump, v.off, 1e-6 * (double)v.slack, 1e3 * stats.physics.pose_delay_s,
+      (unsigned long long)stats.faults.stale_times, force_now(&v));
   CHECK(v.back == 0.0);
-  CHECK(stats.pose_delay_s >= 0.02 && stats.pose_delay_s <= 0.12);
+  CHECK(stats.physics.pose_delay_s >= 0.02 && stats.physics.pose_delay_s <= 0.12);
   if (dropped == 0 && v.slack < 2 * MS && 1e-9 * (double)v.gap < 1.5 / hz) {
     CHECK(v.jump <= 0.3 * SPEED / hz);
     CHECK(v.off <= SPEED * 0.004);
   }
   check_world(&v);
-  CHECK(force_now(&v) <= 6.0 && (force_now(&v) > 0.0 || stats.stale_times > 0));
+  CHECK(force_now(&v) <= 6.0 && (force_now(&v) > 0.0 || stats.faults.stale_times > 0));
   CHECK(hap_session_stop(v.f.s.session) == HAP_OK);
   felt_end(&v.f);
 }
@@ -281,8 +281,8 @@ TEST(slow_frames_are_felt_in_full)
     longest = gap > longest ? gap : longest;
   }
   hap_stats after = stats_of(&v.f.s);
-  uint64_t stale = after.stale_times - before.stale_times;
-  uint64_t missed = after.missed_ticks - before.missed_ticks;
+  uint64_t stale = after.faults.stale_times - before.faults.stale_times;
+  uint64_t missed = after.loop.missed_ticks - before.loop.missed_ticks;
   printf("# frames of up to %.1f ms, %llu ticks missed, stale %llu times\n", 1e-6 * (double)longest,
          (unsigned long long)missed, (unsigned long long)stale);
   CHECK(stale == 0 || longest > 38 * MS || missed > 0);
@@ -359,15 +359,15 @@ TEST(a_hitch_fades_the_force_drops_time_and_is_over_within_two_syncs)
   (void)view_frames(&v, 90.0, 60, 0.0);
   frames_until_normal(&v);
   for (int i = 0; i < 5; ++i) {
-    uint64_t dropped = stats_of(&v.f.s).frames_dropped;
-    uint64_t steps = stats_of(&v.f.s).physics_steps;
+    uint64_t dropped = stats_of(&v.f.s).physics.frames_dropped;
+    uint64_t steps = stats_of(&v.f.s).physics.steps;
     hang(&v);
     CHECK(view_frame(&v, 0, 1.0) == HAP_DROPPED);
-    CHECK(stats_of(&v.f.s).physics_steps == steps + 3);
-    CHECK(stats_of(&v.f.s).frames_dropped >= dropped + 11); /* of 15 or more */
+    CHECK(stats_of(&v.f.s).physics.steps == steps + 3);
+    CHECK(stats_of(&v.f.s).physics.frames_dropped >= dropped + 11); /* of 15 or more */
     frames_until_normal(&v);
   }
-  CHECK(stats_of(&v.f.s).stale_times >= 5);
+  CHECK(stats_of(&v.f.s).faults.stale_times >= 5);
   CHECK(v.back == 0.0 && v.jump <= SPEED * 0.04);
   check_world(&v);
   check_return(&v);
@@ -410,11 +410,11 @@ TEST(a_pause_stands_still_and_goes_on_where_it_was)
     (void)view_frames(&v, 90.0, 60, 0.2);
     frames_until_normal(&v);
     for (int i = 0; i < 3; ++i) {
-      uint64_t dropped = stats_of(&v.f.s).frames_dropped;
+      uint64_t dropped = stats_of(&v.f.s).physics.frames_dropped;
       pause(&v, calls != 0);
       view_forget(&v);
       uint64_t frames_dropped = view_frames(&v, 90.0, 30, 0.2);
-      CHECK(frames_dropped > 0 || stats_of(&v.f.s).frames_dropped == dropped);
+      CHECK(frames_dropped > 0 || stats_of(&v.f.s).physics.frames_dropped == dropped);
       CHECK(v.back == 0.0);
       CHECK(v.jump <= SPEED * 0.04); /* two steps: the world goes on at once */
       frames_until_normal(&v);
@@ -445,9 +445,9 @@ TEST(slow_motion_is_drawn_evenly)
   }
   double mean = (v.x - from) / (1e-9 * (double)(v.last - begin));
   printf("# %.3f m/s, fastest frame %.3f m/s, delay %.1f ms, back %.2g m\n", mean, fastest,
-         1e3 * stats_of(&v.f.s).pose_delay_s, v.back);
+         1e3 * stats_of(&v.f.s).physics.pose_delay_s, v.back);
   CHECK(v.back == 0.0 && mean > 0.0);
-  if (stats_of(&v.f.s).frames_dropped == 0 && v.slack < 2 * MS && v.gap < 16 * MS) {
+  if (stats_of(&v.f.s).physics.frames_dropped == 0 && v.slack < 2 * MS && v.gap < 16 * MS) {
     CHECK_NEAR(mean, 0.5 * SPEED, 0.05 * SPEED);
     CHECK(fastest <= SPEED); /* and not in jumps of a step */
   }
@@ -485,11 +485,11 @@ TEST(wrong_calls_say_so_and_change_nothing)
   CHECK(hap_session_update(s.session, 0.1) == HAP_ERROR_THREAD);
   CHECK(has(detail_of(&s), "lock"));
   CHECK(hap_session_unlock(s.session) == HAP_OK);
-  CHECK(atomic_load(&s.steps) == 0 && stats_of(&s).frames_dropped == 0);
+  CHECK(atomic_load(&s.steps) == 0 && stats_of(&s).physics.frames_dropped == 0);
   CHECK(hap_session_update(s.session, 0.005) == HAP_OK); /* the remainder is still there */
   CHECK(atomic_load(&s.steps) == 1);
   CHECK(hap_session_update(s.session, 86400.0) == HAP_DROPPED); /* the machine slept */
-  CHECK(atomic_load(&s.steps) == 4 && stats_of(&s).frames_dropped == 4320000 - 3);
+  CHECK(atomic_load(&s.steps) == 4 && stats_of(&s).physics.frames_dropped == 4320000 - 3);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   CHECK(hap_session_update(s.session, 0.02) == HAP_ERROR_STATE);
   stage_end(&s);

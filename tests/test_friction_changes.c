@@ -131,10 +131,10 @@ TEST(a_friction_that_is_none_is_a_fault_with_a_text)
     w.ode.pointer_surface = pointer_surface;
     asked.says = 0.2;
     REQUIRE(pull(&w, 0.002));
-    CHECK(cw_stats(&w).fault == HAP_FAULT_NONE && w.force[0] < -0.5);
+    CHECK(cw_stats(&w).faults.fault == HAP_FAULT_NONE && w.force[0] < -0.5);
     asked.says = wrong[i];
     run_faulty(&w, 20);
-    CHECK(cw_stats(&w).fault == HAP_FAULT_WORLD);
+    CHECK(cw_stats(&w).faults.fault == HAP_FAULT_WORLD);
     CHECK(hap_session_detail(w.session, &detail) == HAP_OK);
     CHECK(strstr(detail.text, "pointer_surface") != NULL);
     run_faulty(&w, 200);
@@ -168,7 +168,7 @@ TEST(a_pointer_that_is_removed_lets_go)
     cw_run(&w, 100); /* it comes in where the other was, and pulls at nothing */
     CHECK_NEAR(w.force[0], 0.0, 1e-6);
     CHECK(w.force[2] > 3.9);
-    CHECK(cw_stats(&w).fault == HAP_FAULT_NONE);
+    CHECK(cw_stats(&w).faults.fault == HAP_FAULT_NONE);
     cw_close(&w);
   }
 }
@@ -189,7 +189,7 @@ TEST(a_body_that_is_destroyed_lets_go)
     hap_session_unlock(w.session);
     cw_run(&w, 60);
     CHECK(cw_norm(w.force) == 0.0);
-    CHECK(cw_stats(&w).fault == HAP_FAULT_NONE);
+    CHECK(cw_stats(&w).faults.fault == HAP_FAULT_NONE);
     cw_close(&w);
   }
 }

@@ -296,7 +296,7 @@ TEST(a_free_cube_is_accelerated_by_the_force)
     }
     CHECK(pushed > 5 && w.velocity[0][0] > 0.1);
     CHECK_NEAR(mass * w.velocity[0][0] + own * tool, w.impulse[0], 1e-6);
-    CHECK_NEAR(cw_stats(&w).momentum_ratio, 1.0, 1e-9);
+    CHECK_NEAR(cw_stats(&w).hand.momentum_ratio, 1.0, 1e-9);
     cw_close(&w);
   }
 }
@@ -576,7 +576,7 @@ TEST(a_spring_is_asked_for_as_for_a_proxy)
 static void change_model(contact_world *w, hap_model model)
 {
   CHECK(hap_session_set_model(w->session, model) == HAP_OK);
-  for (int i = 0; i < 200 && cw_stats(w).model != (uint32_t)model; ++i) {
+  for (int i = 0; i < 200 && cw_stats(w).loop.model != (uint32_t)model; ++i) {
     cw_tick(w);
   }
 }
@@ -639,7 +639,7 @@ TEST(a_device_that_leaps_begins_anew)
       peak = fmax(peak, hapi_v3_norm(state.wrench.force));
     }
     printf("# peak %.3f N\n", peak);
-    CHECK(peak < 2.0 * 0.002 * KV && cw_stats(&w).faults == 0);
+    CHECK(peak < 2.0 * 0.002 * KV && cw_stats(&w).faults.count == 0);
     hap_session_stop(w.session);
     hap_device *device = w.hand_def.device;
     cw_close(&w);
@@ -692,7 +692,7 @@ TEST(lockstep_repeats_them)
         cw_move_hand(&w, 0.1 * sin(0.02 * t) + 0.05, 0.02 * cos(0.05 * t), 0.0);
         cw_tick(&w);
       }
-      hashes[k] = cw_stats(&w).trace_hash;
+      hashes[k] = cw_stats(&w).loop.trace_hash;
       CHECK(hashes[k] != 0 && w.position[1][0] > 0.055);
       cw_close(&w);
     }

@@ -232,7 +232,7 @@ TEST(recorded_fingers_grip_a_box)
     CHECK(out.peak > 5.0 && out.peak < 20.0);
     hap_stats stats;
     CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
-    CHECK(stats.faults == 0 && stats.states_rejected == 0);
+    CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
     rig_destroy(&r);
   }
 }

@@ -169,7 +169,7 @@ static bool pushes(stage *s)
 
 static bool has_fault(stage *s)
 {
-  return stats_of(s).fault != HAP_FAULT_NONE;
+  return stats_of(s).faults.fault != HAP_FAULT_NONE;
 }
 
 static bool has_no_fault(stage *s)
@@ -195,10 +195,10 @@ TEST(a_device_that_fails_is_zeroed_at_once)
     CHECK(atomic_load(&device_book.zeros) >= 1 && !pushes(&s));
     CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
     CHECK(atomic_load(&device_book.forces) == forces); /* none since */
-    CHECK(stats_of(&s).fault_pointer == hand.v && has(detail_of(&s), "pointer 1: the device"));
+    CHECK(stats_of(&s).faults.pointer == hand.v && has(detail_of(&s), "pointer 1: the device"));
     CHECK(hap_pointer_remove(s.session, hand) == HAP_OK);
     CHECK(hap_session_advance(s.session, 1) == HAP_FAULTED);
-    CHECK(stats_of(&s).fault_pointer == hand.v); /* nobody else's, ever */
+    CHECK(stats_of(&s).faults.pointer == hand.v); /* nobody else's, ever */
     end(&s, device);
   }
 }
@@ -259,13 +259,13 @@ TEST(an_emergency_takes_all_force_until_the_reset)
     CHECK(atomic_load(&device_book.zeros) >= 1);
     REQUIRE(run_until(&s, has_fault));
     int forces = atomic_load(&device_book.forces);
-    uint64_t ticks = stats_of(&s).ticks;
-    while (stats_of(&s).ticks < ticks + 20) {
+    uint64_t ticks = stats_of(&s).loop.ticks;
+    while (stats_of(&s).loop.ticks < ticks + 20) {
       CHECK(!run_until(&s, has_fault) || s.def.drive != HAP_DRIVE_LOCKSTEP ||
             hap_session_advance(s.session, 1) == HAP_FAULTED);
     }
     CHECK(atomic_load(&device_book.forces) == forces && !pushes(&s));
-    CHECK(stats_of(&s).fault == HAP_FAULT_EMERGENCY && stats_of(&s).fault_pointer == 0);
+    CHECK(stats_of(&s).faults.fault == HAP_FAULT_EMERGENCY && stats_of(&s).faults.pointer == 0);
     CHECK(has(detail_of(&s), "hap_emergency_zero"));
     CHECK(hap_session_reset_fault(s.session) == HAP_OK);
     CHECK(run_until(&s, has_no_fault) && run_until(&s, pushes));
@@ -486,8 +486,8 @@ TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
   CHECK(run_until(&s, feels_nothing));
   atomic_store(&stall, 0);
   CHECK(run_until(&s, feels_all));
-  CHECK(stats_of(&s).stale_times >= 1 && stats_of(&s).stale_ticks >= 50);
-  CHECK(stats_of(&s).faults == 0 && atomic_load(&device_book.steep) == 0);
+  CHECK(stats_of(&s).faults.stale_times >= 1 && stats_of(&s).faults.stale_ticks >= 50);
+  CHECK(stats_of(&s).faults.count == 0 && atomic_load(&device_book.steep) == 0);
   end(&s, device);
 }
 
@@ -504,7 +504,7 @@ TEST(lockstep_knows_no_stall)
       s.def.physics_latency_ticks = latency;
       REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
       CHECK(hap_session_advance(s.session, 500) == HAP_OK);
-      CHECK(stats_of(&s).stale_times == 0);
+      CHECK(stats_of(&s).faults.stale_times == 0);
       stage_end(&s);
     }
   }
@@ -536,7 +536,7 @@ TEST(a_slew_limit_of_the_application)
   CHECK(hap_session_advance(s.session, 40) == HAP_OK);
   double force = felt(&s, &guard);
   CHECK(force > 1.0 && force <= 2.0 + 1e-9 && guard == HAP_GUARD_SLEW);
-  CHECK(stats_of(&s).slewed_ticks > 0);
+  CHECK(stats_of(&s).faults.slewed_ticks > 0);
   atomic_store(&device_book.bad_pose, 1);
   CHECK(hap_session_advance(s.session, 10) == HAP_FAULTED);
   CHECK_NEAR(felt(&s, &guard), force - 1.0,

@@ -844,7 +844,8 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   getrusage(RUSAGE_THREAD, &after);
   hap_stats stats;
   hapi_haptic_stats(haptic, &stats);
-  CHECK(stats.ticks == 11000 && stats.contact_ticks > 0 && stats.models_adopted == 1);
+  CHECK(stats.loop.ticks == 11000 && stats.loop.contact_ticks > 0 &&
+        stats.loop.models_adopted == 1);
 #if !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__) /* they touch memory of theirs */
   CHECK(after.ru_minflt == before.ru_minflt);

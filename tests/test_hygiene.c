@@ -43,8 +43,8 @@ static bool all_finite(const test_world *w)
     }
   }
   hap_stats stats = world_stats(w);
-  return good && isfinite(stats.impulse_ns) && isfinite(stats.peak_force_n) &&
-         isfinite(stats.momentum_error_ns);
+  return good && isfinite(stats.hand.impulse_ns) && isfinite(stats.hand.peak_force_n) &&
+         isfinite(stats.hand.momentum_error_ns);
 }
 
 /* A cube that is touched, on a hinge to another one, and a static box. The session is made, not
@@ -204,7 +204,7 @@ static void check_damage(const damage *d, double bad, hap_model model, bool runn
     CHECK(status == HAP_OK && hap_session_advance(t.w.session, 60) == HAP_OK);
     d->act(&t, bad); /* lockstep: between two calls the world is the application's */
     CHECK(hap_session_advance(t.w.session, 110) == HAP_FAULTED);
-    CHECK(world_stats(&t.w).fault == HAP_FAULT_WORLD);
+    CHECK(world_stats(&t.w).faults.fault == HAP_FAULT_WORLD);
     CHECK(all_finite(&t.w));
   } else {
     CHECK(status == HAP_ERROR_WORLD);
@@ -274,7 +274,7 @@ TEST(an_adopted_body_is_looked_at_too)
   CHECK(hap_session_advance(t.w.session, 60) == HAP_OK);
   dBodySetAngularVel(alone, 0.0, no_number, 0.0);
   CHECK(hap_session_advance(t.w.session, 60) == HAP_FAULTED);
-  CHECK(world_stats(&t.w).fault == HAP_FAULT_WORLD && all_finite(&t.w));
+  CHECK(world_stats(&t.w).faults.fault == HAP_FAULT_WORLD && all_finite(&t.w));
   dBodySetAngularVel(alone, 0.0, 0.0, 0.0);
   world_close(&t.w);
 }
@@ -291,7 +291,7 @@ TEST(a_world_that_was_set_right_goes_on)
   CHECK(hap_session_advance(t.w.session, 60) == HAP_FAULTED); /* until it is reset */
   CHECK(hap_session_reset_fault(t.w.session) == HAP_OK);
   CHECK(hap_session_advance(t.w.session, 200) == HAP_OK);
-  CHECK(all_finite(&t.w) && world_stats(&t.w).contact_ticks > 100);
+  CHECK(all_finite(&t.w) && world_stats(&t.w).loop.contact_ticks > 100);
   CHECK_NEAR(dBodyGetPosition(t.w.bodies[1])[2], EDGE / 2, 0.1 * EDGE);
   world_close(&t.w);
 }
@@ -411,7 +411,7 @@ TEST(a_contact_that_is_no_number_is_dropped_and_counted)
   dSpaceAdd(w.space, dCreateGeom(dCreateGeomClass(&class)));
   REQUIRE(world_start(&w, RADIUS, -0.3, 0.0, 0.05));
   CHECK(hap_session_advance(w.session, 500) >= HAP_OK); /* as if nothing were there */
-  CHECK(world_stats(&w).contacts_rejected >= 9);
+  CHECK(world_stats(&w).faults.contacts_rejected >= 9);
   CHECK(all_finite(&w) && dBodyGetPosition(w.bodies[0])[2] < -0.5);
   world_close(&w);
 }
@@ -436,7 +436,7 @@ TEST(a_contact_without_a_normal_is_dropped_and_counted)
     (void)world_add(&w, dCreateBox(w.space, 0.1, 0.1, 0.1), &mass, -0.1, 0.01, 0.075);
     REQUIRE(world_start(&w, RADIUS, 5.0, 0.0, 0.0));
     CHECK(hap_session_advance(w.session, 200) == HAP_OK);
-    CHECK(world_stats(&w).contacts_rejected > 0 && all_finite(&w));
+    CHECK(world_stats(&w).faults.contacts_rejected > 0 && all_finite(&w));
     world_close(&w);
   }
 }
@@ -484,7 +484,7 @@ TEST(a_pointer_out_of_the_world_stays_where_it_was)
   CHECK(hap_session_advance(w.session, 2) == HAP_OK);
   world_move_pointer(&w, 0, (const double[3]){1e5, 0.0, 0.0}, NULL);
   CHECK(hap_session_advance(w.session, 2) == HAP_FAULTED);
-  CHECK(world_stats(&w).fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(world_stats(&w).faults.fault == HAP_FAULT_DEVICE_POSE);
   hap_pointer_state state;
   CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
   CHECK_NEAR(state.proxy.position[0], 1.0, 1e-15);
@@ -506,7 +506,7 @@ TEST(long_frame_times_are_one_call_long_and_no_frame_times_are_refused)
   }
   CHECK(hap_session_update(w.session, DBL_TRUE_MIN) == HAP_OK);
   CHECK(hap_session_update(w.session, 0.051) == HAP_OK);
-  CHECK(world_stats(&w).physics_steps == 121);
+  CHECK(world_stats(&w).physics.steps == 121);
   CHECK(hap_session_stop(w.session) == HAP_OK);
   world_close(&w);
 }

@@ -101,7 +101,7 @@ static uint64_t hash_of(hap_model model, int threads)
   CHECK(hap_session_advance(r.session, 400) >= HAP_OK);
   CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
   rig_destroy(&r);
-  return stats.trace_hash;
+  return stats.loop.trace_hash;
 }
 
 TEST(lockstep_has_none)
@@ -124,7 +124,7 @@ TEST(testing_simulations_go_without)
         CHECK(hap_session_update(r.session, 0.02) >= HAP_OK);
       }
       CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
-      CHECK(stats.probe_steps > 0 && stats.faults == 0);
+      CHECK(stats.probes.steps > 0 && stats.faults.count == 0);
       hap_session_stop(r.session);
     }
     rig_destroy(&r);

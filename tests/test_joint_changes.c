@@ -96,7 +96,7 @@ TEST(disabled_joint_is_none)
   REQUIRE(begin(&m, build_hinge, 9.81));
   cw_run(&m.w, STEP_TICKS + 1);
   edit(&m, disable);
-  CHECK(cw_stats(&m.w).range_joints == 1 && cw_stats(&m.w).probe_steps == 0);
+  CHECK(cw_stats(&m.w).model.range_joints == 1 && cw_stats(&m.w).probes.steps == 0);
   CHECK(dJointIsEnabled(m.joints[0]) == 0 && dJointIsEnabled(m.joints[1]) != 0);
   cw_run(&m.w, 100);
   dVector3 a = {0.0, 0.0, 0.0, 0.0};
@@ -133,18 +133,21 @@ TEST(other_joints_are_taken_over_a_sync_later)
   CHECK(hap_session_post(m.w.session, add_motor_joint, &m) == HAP_OK);
   cw_run(&m.w, STEP_TICKS);
   hap_stats stats = cw_stats(&m.w);
-  CHECK(stats.range_joints == 0 && stats.range_bodies == 0 && stats.measured_bodies == 1);
+  CHECK(stats.model.range_joints == 0 && stats.model.range_bodies == 0 &&
+        stats.model.measured_bodies == 1);
   CHECK(openness(&m) < 5e-3);
   cw_run(&m.w, STEP_TICKS);
   stats = cw_stats(&m.w);
-  CHECK(stats.range_joints == 3 && stats.range_bodies == 2 && stats.measured_bodies == 0);
-  CHECK(stats.measured_joints == 1);
+  CHECK(stats.model.range_joints == 3 && stats.model.range_bodies == 2 &&
+        stats.model.measured_bodies == 0);
+  CHECK(stats.model.measured_joints == 1);
   edit(&m, remove_motor_joint);
   stats = cw_stats(&m.w);
-  CHECK(stats.range_joints == 2 && stats.range_bodies == 2 && stats.measured_bodies == 0);
+  CHECK(stats.model.range_joints == 2 && stats.model.range_bodies == 2 &&
+        stats.model.measured_bodies == 0);
   cw_run(&m.w, 100);
   CHECK(openness(&m) <= CLOSED);
-  CHECK(stats.fault == 0);
+  CHECK(stats.faults.fault == 0);
   cw_close(&m.w);
 }
 
@@ -316,7 +319,7 @@ TEST(second_start_reads_the_joints_anew)
   CHECK(hap_session_start(m.w.session) == HAP_OK);
   for (int i = 0; i < 10 * STEP_TICKS; ++i) {
     cw_tick(&m.w);
-    CHECK(i < STEP_TICKS || cw_stats(&m.w).range_joints == 1);
+    CHECK(i < STEP_TICKS || cw_stats(&m.w).model.range_joints == 1);
   }
   CHECK_NEAR(m.w.position[0][0], 0.15, 1e-5);
   CHECK_NEAR(m.w.position[0][2], 0.1, 1e-5);
@@ -354,8 +357,9 @@ static void check_left_to_ode(mechanism *m)
   REQUIRE(start_mechanism(m));
   cw_run(&m->w, 200);
   hap_stats stats = cw_stats(&m->w);
-  CHECK(stats.range_bodies == 0 && stats.range_joints == 0 && stats.measured_bodies == 1);
-  CHECK(stats.capacity_dropped > 0 && stats.fault == 0);
+  CHECK(stats.model.range_bodies == 0 && stats.model.range_joints == 0 &&
+        stats.model.measured_bodies == 1);
+  CHECK(stats.model.capacity_dropped > 0 && stats.faults.fault == 0);
   for (int k = 0; k < 3; ++k) {
     CHECK(isfinite(m->w.position[0][k]));
   }
@@ -418,6 +422,6 @@ TEST(pushed_body_wakes_what_hangs_on_it)
   CHECK(cw_norm(m.w.impulse) > 1e-3);
   CHECK(cw_norm(m.w.velocity[1]) > 1e-3);
   CHECK(openness(&m) <= CLOSED);
-  CHECK(cw_stats(&m.w).momentum_error_ns <= 1e-9 * cw_stats(&m.w).impulse_abs_ns + 1e-12);
+  CHECK(cw_stats(&m.w).hand.momentum_error_ns <= 1e-9 * cw_stats(&m.w).hand.impulse_abs_ns + 1e-12);
   cw_close(&m.w);
 }

@@ -272,7 +272,7 @@ static void check_kind(size_t k)
          kinds[k].name, 1e3 * worst.loop.way, 1e3 * worst.world.way, 1e3 * worst.loop.turn);
   CHECK(worst.loop.way <= CLOSED && worst.world.way <= CLOSED);
   CHECK(worst.loop.turn <= ALIGNED && worst.world.turn <= ALIGNED);
-  CHECK(cw_stats(&m.w).range_joints == 2);
+  CHECK(cw_stats(&m.w).model.range_joints == 2);
   cw_close(&m.w);
 }
 
@@ -313,7 +313,7 @@ TEST(what_ode_has_opened_is_closed_before_a_hand_touches)
     }
     cw_tick(&m.w);
     read_both(&m, &gauge, &worst);
-    bool held = cw_stats(&m.w).range_bodies > 0;
+    bool held = cw_stats(&m.w).model.range_bodies > 0;
     before = held ? before : fmax(before, worst.world.way);
     open_ticks += held && worst.loop.way > CLOSED;
   }

@@ -68,12 +68,12 @@ static void check_against_ode(build_fn build, double gravity, double way, double
   difference d = compare(&loop, &ode, 1.0);
   hap_stats stats = cw_stats(&loop.w);
   printf("# off by %.3g mm, %.3g mrad; equations by %.3g, %llu probes\n", 1e3 * d.way, 1e3 * d.turn,
-         stats.joint_error, (unsigned long long)stats.probe_steps);
+         stats.model.joint_error, (unsigned long long)stats.probes.steps);
   CHECK(d.way <= way);
   CHECK(d.turn <= turn);
-  CHECK(stats.range_bodies == moving && stats.measured_bodies == 0);
-  CHECK(stats.range_joints == (uint32_t)loop.joint_count);
-  CHECK(stats.fault == 0 && stats.probes_singular == 0);
+  CHECK(stats.model.range_bodies == moving && stats.model.measured_bodies == 0);
+  CHECK(stats.model.range_joints == (uint32_t)loop.joint_count);
+  CHECK(stats.faults.fault == 0 && stats.probes.singular == 0);
   cw_close(&loop.w);
   cw_close(&ode.w);
 }
@@ -130,8 +130,9 @@ TEST(joint_without_reaction_is_left_to_ode)
   REQUIRE(begin(&m, build_pu, 0.0));
   cw_run(&m.w, 200);
   hap_stats stats = cw_stats(&m.w);
-  CHECK(stats.range_joints == 0 && stats.measured_joints == 0 && stats.range_bodies == 0);
-  CHECK(stats.measured_bodies == 1 && stats.probes_singular > 0 && stats.fault == 0);
+  CHECK(stats.model.range_joints == 0 && stats.model.measured_joints == 0 &&
+        stats.model.range_bodies == 0);
+  CHECK(stats.model.measured_bodies == 1 && stats.probes.singular > 0 && stats.faults.fault == 0);
   cw_close(&m.w);
 }
 
@@ -256,7 +257,7 @@ TEST(piston_on_a_spring_swings)
   REQUIRE(begin(&m, build_sprung, 9.81));
   cw_run(&m.w, 3000);
   CHECK_NEAR(m.w.position[0][2], -0.5 * 9.81 / 300.0, 2e-4);
-  CHECK(cw_stats(&m.w).measured_bodies == 0 && cw_stats(&m.w).range_bodies == 1);
+  CHECK(cw_stats(&m.w).model.measured_bodies == 0 && cw_stats(&m.w).model.range_bodies == 1);
   cw_close(&m.w);
 }
 
@@ -292,7 +293,7 @@ TEST(lift_goes_up_to_its_stop)
   CHECK_NEAR(m.w.position[0][2] - z, (stop > 0.0 ? 1.0 : -1.0) * 0.02 * 0.05, 1e-6);
   cw_run(&m.w, 240);
   CHECK_NEAR(m.w.position[0][2], stop, 1e-5);
-  CHECK(cw_stats(&m.w).range_joints == 1 && cw_stats(&m.w).measured_joints == 1);
+  CHECK(cw_stats(&m.w).model.range_joints == 1 && cw_stats(&m.w).model.measured_joints == 1);
   cw_close(&m.w);
   cw_close(&ode.w);
 }
@@ -360,8 +361,9 @@ TEST(stops_of_a_limb_hold)
   printf("# swung to %.3f rad\n", widest);
   hap_stats stats = cw_stats(&m.w);
   CHECK(widest > 0.25 && widest < 0.45); /* of two stops at once, sqrt(2) 0.3 */
-  CHECK(stats.range_joints == 2 && stats.measured_joints == 1 && stats.range_bodies == 1);
-  CHECK(stats.fault == 0);
+  CHECK(stats.model.range_joints == 2 && stats.model.measured_joints == 1 &&
+        stats.model.range_bodies == 1);
+  CHECK(stats.faults.fault == 0);
   cw_close(&m.w);
 }
 
@@ -369,9 +371,9 @@ TEST(stops_of_a_limb_hold)
 
 static uint64_t probes_of_a_sync(mechanism *m)
 {
-  uint64_t before = cw_stats(&m->w).probe_steps;
+  uint64_t before = cw_stats(&m->w).probes.steps;
   cw_run(&m->w, STEP_TICKS);
-  return cw_stats(&m->w).probe_steps - before;
+  return cw_stats(&m->w).probes.steps - before;
 }
 
 /* 6m + 1 with two bodies at most. */
@@ -416,7 +418,7 @@ TEST(probes_leave_no_trace)
   double cfm = dWorldGetCFM(m.w.world);
   REQUIRE(start_mechanism(&m));
   cw_run(&m.w, 100);
-  CHECK(cw_stats(&m.w).measured_joints == 1);
+  CHECK(cw_stats(&m.w).model.measured_joints == 1);
   CHECK(dWorldGetERP(m.w.world) == erp && dWorldGetCFM(m.w.world) == cfm);
   CHECK(dBodyGetLinearDamping(m.w.bodies[0]) == 0.01);
   CHECK(dBodyGetAngularDamping(m.w.bodies[0]) == 0.02);
@@ -447,10 +449,10 @@ TEST(another_joint_is_measured_anew)
   mechanism m;
   REQUIRE(begin(&m, build_sprung, 0.0));
   cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
-  CHECK(cw_stats(&m.w).measured_joints == 1);
+  CHECK(cw_stats(&m.w).model.measured_joints == 1);
   REQUIRE(hap_session_post(m.w.session, swap_joint, &m) == HAP_OK);
   cw_run(&m.w, SETTLED_STEPS * STEP_TICKS);
-  CHECK(cw_stats(&m.w).measured_joints == 1);
+  CHECK(cw_stats(&m.w).model.measured_joints == 1);
   dBodyID body = m.w.bodies[0];
   double gone[3];
   memcpy(gone, m.w.position[0], sizeof gone);

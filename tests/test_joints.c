@@ -303,7 +303,7 @@ TEST(closed_loop_that_does_not_fit_is_stable)
     widest = fmax(widest, openness(&m));
   }
   printf("# energy %.4g of %.4g J, open by %.3g mm, residual %.2g m/s\n", most, before,
-         1e3 * widest, cw_stats(&m.w).solver_residual_max);
+         1e3 * widest, cw_stats(&m.w).contact.residual_max);
   CHECK(before > 1e-3 && most <= 1.001 * before);
   CHECK(widest <= CLOSED);
   check_owned(&m, 3);

@@ -104,13 +104,13 @@ TEST(estimates_the_error_of_the_force)
   static course reference;
   static course c;
   play(HAP_MODEL_SINGLE, 20.0, 0.1, &reference);
-  CHECK(reference.stats.lookbacks == 0); /* it is the reference itself */
+  CHECK(reference.stats.error.lookbacks == 0); /* it is the reference itself */
   for (size_t i = 0; i < CASES; ++i) {
     play(cases[i].model, cases[i].physics_hz, 0.1, &c);
     double error = error_of(&c, &reference);
-    double estimate = c.stats.force_error;
+    double estimate = c.stats.error.force_error;
     printf("# %s: error %.4f, estimate %.4f\n", cases[i].name, error, estimate);
-    CHECK(c.stats.lookbacks >= 4 && c.stats.lookbacks_spoilt == 0);
+    CHECK(c.stats.error.lookbacks >= 4 && c.stats.error.spoilt == 0);
     CHECK(estimate > 0.0 && isfinite(estimate));
     CHECK(estimate < 3.0 * error + A_TICK && error < 3.0 * estimate + A_TICK);
   }
@@ -123,8 +123,8 @@ TEST(changes_no_bit)
   for (size_t i = 0; i < CASES; ++i) {
     play(cases[i].model, cases[i].physics_hz, 0.0, &without);
     play(cases[i].model, cases[i].physics_hz, 0.1, &with);
-    CHECK(without.stats.lookbacks == 0 && with.stats.lookbacks > 0);
-    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+    CHECK(without.stats.error.lookbacks == 0 && with.stats.error.lookbacks > 0);
+    CHECK(without.stats.loop.trace_hash == with.stats.loop.trace_hash);
     CHECK(without.surface_calls == with.surface_calls); /* nor calls the application */
   }
 }
@@ -136,8 +136,8 @@ TEST(friction_on_the_pointer_is_part_of_it)
   begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
   w.hand_def.friction = 0.8;
   run(&w, 0.7 * EDGE, &c);
-  printf("# force error %.4f\n", c.stats.force_error);
-  CHECK(c.stats.force_error > 0.0 && c.stats.force_error < 0.05);
+  printf("# force error %.4f\n", c.stats.error.force_error);
+  CHECK(c.stats.error.force_error > 0.0 && c.stats.error.force_error < 0.05);
 }
 
 /* ---- whole scenes ---- */
@@ -249,11 +249,11 @@ static void check_scene(const play_def *def, double factor)
   with.lookback = 0.1;
   play_scene(&with, &c);
   double error = scene_error(&c, &reference);
-  double estimate = c.stats.force_error;
+  double estimate = c.stats.error.force_error;
   printf("# %s, %s at %g Hz, loop at %g Hz%s: error %.5f, estimate %.5f\n", def->scene,
          hap_model_name(def->model), def->physics_hz, def->haptic_hz,
          def->interrupted ? ", interrupted" : "", error, estimate);
-  CHECK(c.stats.lookbacks >= 3 && (c.stats.lookbacks_spoilt > 0) == def->interrupted);
+  CHECK(c.stats.error.lookbacks >= 3 && (c.stats.error.spoilt > 0) == def->interrupted);
   CHECK(estimate > 0.0 && estimate < factor * error);
   CHECK(def->interrupted || error < factor * estimate); /* else what went before is not seen */
 }
@@ -309,8 +309,8 @@ TEST(few_iterations_of_the_world_are_not_taken_for_an_error)
   static scene_course c;
   const play_def def = {"hold", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.1, 5};
   play_scene(&def, &c);
-  printf("# estimate %.5f\n", c.stats.force_error);
-  CHECK(c.stats.lookbacks >= 3 && c.stats.force_error < 0.005);
+  printf("# estimate %.5f\n", c.stats.error.force_error);
+  CHECK(c.stats.error.lookbacks >= 3 && c.stats.error.force_error < 0.005);
 }
 
 /* Each of its forces is held for two milliseconds. */
@@ -333,8 +333,8 @@ TEST(changes_no_bit_of_hulls_and_friction)
     looks.lookback = 0.1;
     play_scene(&defs[i], &without);
     play_scene(&looks, &with);
-    CHECK(without.stats.lookbacks == 0 && with.stats.lookbacks > 0);
-    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+    CHECK(without.stats.error.lookbacks == 0 && with.stats.error.lookbacks > 0);
+    CHECK(without.stats.loop.trace_hash == with.stats.loop.trace_hash);
   }
 }
 
@@ -376,10 +376,10 @@ TEST(a_hull_may_touch_a_mesh_and_nothing_else)
   for (size_t i = 0; i < sizeof models / sizeof models[0]; ++i) {
     play_mesh(models[i], 0.0, &without);
     play_mesh(models[i], 0.1, &with);
-    printf("# force error %.5f\n", with.stats.force_error);
-    CHECK(with.stats.lookbacks > 0 && with.stats.lookbacks_spoilt == 0);
-    CHECK(with.stats.force_error > 0.0 && with.stats.force_error < 0.01);
-    CHECK(without.stats.trace_hash == with.stats.trace_hash);
+    printf("# force error %.5f\n", with.stats.error.force_error);
+    CHECK(with.stats.error.lookbacks > 0 && with.stats.error.spoilt == 0);
+    CHECK(with.stats.error.force_error > 0.0 && with.stats.error.force_error < 0.01);
+    CHECK(without.stats.loop.trace_hash == with.stats.loop.trace_hash);
   }
 }
 
@@ -395,9 +395,9 @@ TEST(a_pointer_of_metres_is_near_what_it_touches)
   cw_run(&w, TICKS / 2);
   hap_stats stats = cw_stats(&w);
   cw_close(&w);
-  printf("# force error %.5f\n", stats.force_error);
-  CHECK(stats.lookbacks > 0 && stats.lookbacks_spoilt == 0);
-  CHECK(stats.force_error > 0.0 && stats.force_error < 0.02);
+  printf("# force error %.5f\n", stats.error.force_error);
+  CHECK(stats.error.lookbacks > 0 && stats.error.spoilt == 0);
+  CHECK(stats.error.force_error > 0.0 && stats.error.force_error < 0.02);
 }
 
 /* ---- windows that cannot be gone over ---- */
@@ -408,12 +408,12 @@ TEST(a_body_that_the_application_moves_spoils_the_window)
   begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
   start(&w, 0.5 * EDGE);
   cw_run(&w, 420);
-  uint64_t before = cw_stats(&w).lookbacks;
+  uint64_t before = cw_stats(&w).error.lookbacks;
   dBodySetLinearVel(w.bodies[0], 0.0, 0.3, 0.0);
   cw_run(&w, 300);
-  CHECK(cw_stats(&w).lookbacks_spoilt == 1);
+  CHECK(cw_stats(&w).error.spoilt == 1);
   cw_run(&w, 600);
-  CHECK(cw_stats(&w).lookbacks_spoilt == 1 && cw_stats(&w).lookbacks > before);
+  CHECK(cw_stats(&w).error.spoilt == 1 && cw_stats(&w).error.lookbacks > before);
   cw_close(&w);
 }
 
@@ -432,8 +432,8 @@ TEST(bodies_and_geoms_that_go_away_meanwhile)
     w.bodies[i] = NULL;
   }
   cw_run(&w, 300);
-  CHECK(cw_stats(&w).lookbacks_spoilt >= 2);
-  CHECK(cw_stats(&w).faults == 0);
+  CHECK(cw_stats(&w).error.spoilt >= 2);
+  CHECK(cw_stats(&w).faults.count == 0);
   cw_close(&w);
 }
 
@@ -445,11 +445,11 @@ TEST(a_change_of_model_ends_the_window)
   cw_run(&w, 450);
   CHECK(hap_session_set_model(w.session, HAP_MODEL_SINGLE) == HAP_OK);
   cw_run(&w, 300);
-  uint64_t seen = cw_stats(&w).lookbacks;
+  uint64_t seen = cw_stats(&w).error.lookbacks;
   CHECK(hap_session_set_model(w.session, HAP_MODEL_CONTACT) == HAP_OK);
   cw_run(&w, 900);
-  CHECK(cw_stats(&w).lookbacks > seen);
-  CHECK(cw_stats(&w).lookbacks_spoilt <= 2);
+  CHECK(cw_stats(&w).error.lookbacks > seen);
+  CHECK(cw_stats(&w).error.spoilt <= 2);
   cw_close(&w);
 }
 
@@ -480,7 +480,7 @@ TEST(threads_have_a_figure_too)
   w.def.trace_rows = 0;
   start(&w, 0.5 * EDGE);
   hap_stats stats = cw_stats(&w);
-  for (int i = 0; i < 1000 && stats.lookbacks < 3;
+  for (int i = 0; i < 1000 && stats.error.lookbacks < 3;
        ++i) { /* the hand stays where it is, in the cube */
     hap_pose pose = {{-0.5 * EDGE, 0.0, 0.5 * EDGE}, {1.0, 0.0, 0.0, 0.0}};
     hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -488,6 +488,6 @@ TEST(threads_have_a_figure_too)
     hapi_clock_sleep_until(hapi_clock_now() + 20000000);
     stats = cw_stats(&w);
   }
-  CHECK(stats.lookbacks >= 3);
+  CHECK(stats.error.lookbacks >= 3);
   cw_close(&w);
 }

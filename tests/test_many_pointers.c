@@ -107,8 +107,9 @@ static void force_of(crowd *c, int index, double out[3])
 static void check_audit(crowd *c, double tolerance)
 {
   hap_stats stats = stats_of(&c->s);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, tolerance);
-  CHECK(stats.faults == 0 && stats.capacity_dropped == 0 && stats.impulse_abs_ns > 0.0);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, tolerance);
+  CHECK(stats.faults.count == 0 && stats.model.capacity_dropped == 0 &&
+        stats.hand.impulse_abs_ns > 0.0);
 }
 
 /* ---- one body ---- */
@@ -247,7 +248,7 @@ static double push_apart(hap_model model, int count)
     CHECK(force[0] < 0.0);
   }
   forward(&c, 350);
-  sum = stats_of(&c.s).impulse_ns;
+  sum = stats_of(&c.s).hand.impulse_ns;
   check_audit(&c, 1e-9);
   stage_end(&c.s);
   return sum;
@@ -349,7 +350,7 @@ static uint64_t hash_of_run(hap_model model)
       c.hands[index] = add_hand(&c, index);
       forward(&c, 2);
     }
-    hash = stats_of(&c.s).trace_hash;
+    hash = stats_of(&c.s).loop.trace_hash;
   }
   stage_end(&c.s);
   return hash;

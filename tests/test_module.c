@@ -387,7 +387,7 @@ static hap_fault fault_after(const char *wrong, int ticks)
       CHECK(hapi_v3_norm(state.wrench.force) <= 20.0 * (1.0 + 1e-9));
       CHECK(hapi_finite(dBodyGetLinearVel(s.cube), 3));
     }
-    fault = (hap_fault)stats_of(&s).fault;
+    fault = (hap_fault)stats_of(&s).faults.fault;
   }
   stage_end(&s);
   hap_device_close(device);

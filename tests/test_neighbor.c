@@ -191,7 +191,7 @@ TEST(planes_are_found)
   double out = 0.25 + RADIUS + 0.003;
   REQUIRE(world_start(&w, RADIUS, n[0] * out, 7.0, n[2] * out));
   check_contact(&w, NULL, &e);
-  CHECK(world_stats(&w).neighbours == 0); /* static ones are contacts, not neighbours */
+  CHECK(world_stats(&w).model.neighbours == 0); /* static ones are contacts, not neighbours */
   world_close(&w);
 }
 
@@ -345,7 +345,7 @@ TEST(a_fast_body_is_known_before_it_arrives)
     double impulse = 0.0;
     for (int i = 0; i < 600 && impulse == 0.0; ++i) {
       CHECK(hap_session_advance(w.session, 1) == HAP_OK);
-      impulse = world_stats(&w).peak_force_n;
+      impulse = world_stats(&w).hand.peak_force_n;
     }
     CHECK(impulse > 0.0);
     CHECK(impulse < 10.0); /* the first touch, not one from deep inside: 3 mm a tick, 1 kN/m */
@@ -422,7 +422,7 @@ static void check_crowd(int bodies, int contacts, int expected)
     CHECK(count_nearest(&w, order != 0, expected) == expected);
     world_step(&w, 3);
     CHECK(count_nearest(&w, order != 0, expected) == expected);
-    CHECK(world_stats(&w).capacity_dropped > 0);
+    CHECK(world_stats(&w).model.capacity_dropped > 0);
     world_close(&w);
   }
 }

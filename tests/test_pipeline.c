@@ -146,13 +146,14 @@ TEST(every_run_of_a_scene_has_the_same_hash)
       for (int round = 0; round < 3; ++round) {
         rig_options options = options_of(scenes[i], models[m], 20.0);
         outcome out = run(&options, 1.0);
-        CHECK(out.good && out.finite && out.stats.ticks == 1000 && out.stats.faults == 0);
-        CHECK(out.stats.trace_hash != 0);
-        CHECK(round == 0 || out.stats.trace_hash == hashes[m]);
-        if (round != 0 && out.stats.trace_hash != hashes[m]) {
+        CHECK(out.good && out.finite && out.stats.loop.ticks == 1000 &&
+              out.stats.faults.count == 0);
+        CHECK(out.stats.loop.trace_hash != 0);
+        CHECK(round == 0 || out.stats.loop.trace_hash == hashes[m]);
+        if (round != 0 && out.stats.loop.trace_hash != hashes[m]) {
           printf("# %s %s, run %d\n", scenes[i], hap_model_name(models[m]), round);
         }
-        hashes[m] = out.stats.trace_hash;
+        hashes[m] = out.stats.loop.trace_hash;
       }
     }
     CHECK(hashes[0] != hashes[1] && hashes[1] != hashes[2] && hashes[0] != hashes[2]);
@@ -168,8 +169,8 @@ TEST(a_change_in_the_last_digit_changes_the_hash)
     parameters.gap += i == 0 ? 0.0 : 1e-15;
     options.parameters = &parameters;
     outcome out = run(&options, 0.3);
-    CHECK(out.good && out.stats.trace_hash != hash);
-    hash = out.stats.trace_hash;
+    CHECK(out.good && out.stats.loop.trace_hash != hash);
+    hash = out.stats.loop.trace_hash;
   }
 }
 
@@ -205,11 +206,11 @@ TEST(fig5_single_and_accelerance_are_within_half_a_thousandth)
       double k = stiffness[i];
       CHECK(out.good && out.finite);
       check_share(out.largest_force, speed * sqrt(k * p->mass), 5e-4, "peak");
-      check_share(out.stats.peak_force_n, out.largest_force, 1e-12, "peak of the statistics");
+      check_share(out.stats.hand.peak_force_n, out.largest_force, 1e-12, "peak of the statistics");
       check_share(fabs(out.impulse), 2.0 * p->mass * speed, 5e-4, "impulse");
-      check_share(out.stats.impulse_ns, fabs(out.impulse), 1e-9, "impulse of the statistics");
+      check_share(out.stats.hand.impulse_ns, fabs(out.impulse), 1e-9, "impulse of the statistics");
       check_share(out.left - out.entered, PI * sqrt(p->mass / k), 5e-4, "contact time");
-      check_share(out.stats.momentum_ratio, 1.0, 0.06, "momentum ratio");
+      check_share(out.stats.hand.momentum_ratio, 1.0, 0.06, "momentum ratio");
     }
   }
 }
@@ -244,15 +245,15 @@ TEST(a_pushed_cube_and_a_pushed_row_give_sane_forces)
     for (int m = 0; m < 3; ++m) {
       rig_options options = options_of(rows[i].scene, models[m], 50.0);
       outcome out = run(&options, 2.0);
-      CHECK(out.good && out.finite && out.stats.faults == 0);
-      CHECK(out.stats.contact_ticks > 100);
+      CHECK(out.good && out.finite && out.stats.faults.count == 0);
+      CHECK(out.stats.loop.contact_ticks > 100);
       CHECK(out.largest_force > 1.0 && out.largest_force <= 20.0 * (1.0 + 1e-12));
       CHECK(out.impulse < 0.0); /* the hand feels it against the push */
       CHECK(out.first_body_x > 0.025 + 0.01 && out.first_body_x < 0.3);
-      CHECK_NEAR(out.stats.momentum_ratio, 1.0, 0.1);
+      CHECK_NEAR(out.stats.hand.momentum_ratio, 1.0, 0.1);
       printf("# %s %s: peak %.2f N, late mean %.2f N, %llu contact ticks, x %.4f\n", rows[i].scene,
              hap_model_name(models[m]), out.largest_force, out.late_force_mean,
-             (unsigned long long)out.stats.contact_ticks, out.first_body_x);
+             (unsigned long long)out.stats.loop.contact_ticks, out.first_body_x);
       if (models[m] == HAP_MODEL_SINGLE) { /* sliding friction: mu m g */
         check_share(out.late_force_mean, 0.5 * rows[i].mass * 9.81, 0.25, "friction");
       }
@@ -269,9 +270,9 @@ TEST(a_slow_world_stays_together_whatever_the_seed)
     for (unsigned long seed = 0; seed < 6; ++seed) {
       rig_options options = options_of("row10", models[m], 20.0);
       outcome out = run_seeded(&options, 2.0, 77 * seed);
-      CHECK(out.good && out.finite && out.stats.faults == 0);
-      CHECK(out.stats.contact_ticks > 300);
-      CHECK(out.stats.saturated_ticks <= 20); /* 1 % of the ticks */
+      CHECK(out.good && out.finite && out.stats.faults.count == 0);
+      CHECK(out.stats.loop.contact_ticks > 300);
+      CHECK(out.stats.faults.saturated_ticks <= 20); /* 1 % of the ticks */
       CHECK(fabs(out.first_body_x) < 0.3);
     }
   }
@@ -324,13 +325,14 @@ static void push_with_recording(size_t index)
     options.device_count = 1;
     outcome out = run(&options, recordings[index].seconds);
     CHECK(out.good && out.finite);
-    CHECK(out.stats.faults == 0 && out.stats.states_rejected == 0);
-    CHECK(out.stats.contact_ticks >= 500);
+    CHECK(out.stats.faults.count == 0 && out.stats.faults.states_rejected == 0);
+    CHECK(out.stats.loop.contact_ticks >= 500);
     CHECK(out.largest_force > 0.5 && out.largest_force <= 20.0 * (1.0 + 1e-12));
     CHECK(out.first_body_x > 0.025 + 0.005); /* the first cube was moved */
     printf("# %s: %llu contact ticks, peak %.2f N, x %.4f, %llu saturated\n",
-           hap_model_name(models[m]), (unsigned long long)out.stats.contact_ticks,
-           out.largest_force, out.first_body_x, (unsigned long long)out.stats.saturated_ticks);
+           hap_model_name(models[m]), (unsigned long long)out.stats.loop.contact_ticks,
+           out.largest_force, out.first_body_x,
+           (unsigned long long)out.stats.faults.saturated_ticks);
   }
 }
 

@@ -219,8 +219,8 @@ static void check_comings_and_goings(hap_model model)
     move_hand(&s, hand, 0.5 * t, i / 35 % 2 == 0 ? 5.0 : 0.062);
     CHECK(hap_session_advance(s.session, 1) == HAP_OK);
     hap_stats stats = stats_of(&s);
-    least = i > 100 && stats.neighbours < least ? stats.neighbours : least;
-    most = stats.neighbours > most ? stats.neighbours : most;
+    least = i > 100 && stats.model.neighbours < least ? stats.model.neighbours : least;
+    most = stats.model.neighbours > most ? stats.model.neighbours : most;
     int64_t now = hap_session_now(s.session) - 300000; /* between ticks */
     double lag = 1e-3 * H_MS * (model == HAP_MODEL_IMPULSE ? 2.0 : 1.0);
     double wanted = 0.5 * (1e-9 * (double)now - lag);
@@ -229,7 +229,7 @@ static void check_comings_and_goings(hap_model model)
   }
   printf("# %s: %u .. %u neighbours, off by %.2g m\n", hap_model_name(model), least, most, worst);
   CHECK(least == 0 && most == 1);
-  CHECK(stats_of(&s).impulse_abs_ns == 0.0);
+  CHECK(stats_of(&s).hand.impulse_abs_ns == 0.0);
   CHECK(worst < 1e-6);
   stage_end(&s);
 }
@@ -640,9 +640,10 @@ static void check_threads(hap_drive drive)
     CHECK(drawers[i].frames > 10 && drawers[i].wrong == 0);
     CHECK(drawers[i].last > 0.02);
     /* A loop or a world that the host kept from running has no even path. */
-    CHECK(drawers[i].back == 0 || stats.missed_ticks > 0 || stats.physics_missed > 0);
+    CHECK(drawers[i].back == 0 || stats.loop.missed_ticks > 0 || stats.physics.missed > 0);
   }
-  CHECK(stats_of(&s).pose_delay_s >= 0.02 && stats_of(&s).pose_delay_s <= 6.0 * 0.02);
+  CHECK(stats_of(&s).physics.pose_delay_s >= 0.02 &&
+        stats_of(&s).physics.pose_delay_s <= 6.0 * 0.02);
   stage_end(&s);
 }
 

@@ -38,10 +38,10 @@ static hap_stats stats_now(void)
 static bool wait_for_ticks(uint64_t ticks)
 {
   const struct timespec pause = {0, 5000000};
-  for (int i = 0; i < 10000 && stats_now().ticks < ticks; ++i) {
+  for (int i = 0; i < 10000 && stats_now().loop.ticks < ticks; ++i) {
     nanosleep(&pause, NULL);
   }
-  return stats_now().ticks >= ticks;
+  return stats_now().loop.ticks >= ticks;
 }
 
 static bool begin(const char *scene_name, hap_model model)
@@ -73,22 +73,22 @@ static void ticks_are_quiet(const char *scene_name, hap_model model)
           wait_for_ticks(2000)); /* warm: libraries, stack, first models, first touch */
   REQUIRE(thread_count(thread, &before));
   hap_stats begin_stats = stats_now();
-  REQUIRE(wait_for_ticks(begin_stats.ticks + TICKS));
+  REQUIRE(wait_for_ticks(begin_stats.loop.ticks + TICKS));
   hap_stats end_stats = stats_now();
   REQUIRE(thread_count(thread, &after));
   thread_counts more = thread_counts_since(&after, &before);
-  uint64_t ticks = end_stats.ticks - begin_stats.ticks;
+  uint64_t ticks = end_stats.loop.ticks - begin_stats.loop.ticks;
   printf(
       "# %s, %s: %llu ticks, %llu in contact: faults %llu minor, %llu major; switches %llu own, "
       "%llu not\n",
       scene_name, hap_model_name(model), (unsigned long long)ticks,
-      (unsigned long long)(end_stats.contact_ticks - begin_stats.contact_ticks),
+      (unsigned long long)(end_stats.loop.contact_ticks - begin_stats.loop.contact_ticks),
       (unsigned long long)more.minor_faults, (unsigned long long)more.major_faults,
       (unsigned long long)more.voluntary, (unsigned long long)more.involuntary);
   CHECK(more.minor_faults == 0 && more.major_faults == 0);
   /* One wait a tick; those that the counting itself lasted are not in ticks. */
   CHECK(more.voluntary <= ticks + ticks / 100 + 10);
-  CHECK(end_stats.contact_ticks > begin_stats.contact_ticks);
+  CHECK(end_stats.loop.contact_ticks > begin_stats.loop.contact_ticks);
   rig_destroy(&r);
 }
 

@@ -18,7 +18,7 @@ static void forward(test_world *w, int ticks)
 
 static hap_fault fault_of(const test_world *w)
 {
-  return (hap_fault)world_stats(w).fault;
+  return (hap_fault)world_stats(w).faults.fault;
 }
 
 /* A cube of 1 kg on ice, the pointer 2 mm beside it. */
@@ -59,12 +59,12 @@ static void check_fig5(double stiffness)
   REQUIRE(hap_session_start(w.session) == HAP_OK);
   forward(&w, 2001);
   hap_stats stats = world_stats(&w);
-  printf("# k %g: impulse %.6f, ratio %.12f, peak %.4f\n", stiffness, stats.impulse_ns,
-         stats.momentum_ratio, stats.peak_force_n);
-  CHECK_NEAR(stats.impulse_ns, 2.04, 0.0005 * 2.04);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
-  CHECK_NEAR(stats.peak_force_n, 0.017 * sqrt(stiffness * 60.0), 0.0005 * 20.0);
-  CHECK_NEAR(dBodyGetLinearVel(cube)[0] * 60.0, stats.impulse_ns - 0.017 * 60.0, 1e-9);
+  printf("# k %g: impulse %.6f, ratio %.12f, peak %.4f\n", stiffness, stats.hand.impulse_ns,
+         stats.hand.momentum_ratio, stats.hand.peak_force_n);
+  CHECK_NEAR(stats.hand.impulse_ns, 2.04, 0.0005 * 2.04);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
+  CHECK_NEAR(stats.hand.peak_force_n, 0.017 * sqrt(stiffness * 60.0), 0.0005 * 20.0);
+  CHECK_NEAR(dBodyGetLinearVel(cube)[0] * 60.0, stats.hand.impulse_ns - 0.017 * 60.0, 1e-9);
   for (int i = 1; i < 3; ++i) {
     CHECK_NEAR(dBodyGetLinearVel(cube)[i], 0.0, 1e-12);
   }
@@ -96,9 +96,9 @@ TEST(a_pushed_row_keeps_the_momentum)
     momentum += 0.5 * dBodyGetLinearVel(w.bodies[i])[0];
   }
   hap_stats stats = world_stats(&w);
-  CHECK(stats.impulse_ns > 0.05);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
-  CHECK_NEAR(momentum / stats.impulse_ns, 1.0, 1e-6);
+  CHECK(stats.hand.impulse_ns > 0.05);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
+  CHECK_NEAR(momentum / stats.hand.impulse_ns, 1.0, 1e-6);
   world_close(&w);
 }
 
@@ -120,7 +120,7 @@ TEST(an_impact_reaches_the_loop)
   }
   printf("# farthest %.4f into the wall\n", farthest - wall);
   CHECK(farthest - wall < 0.25 * 0.05); /* 0.25 m/s, at most for one step */
-  CHECK(world_stats(&w).contact_ticks > 100);
+  CHECK(world_stats(&w).loop.contact_ticks > 100);
   CHECK(hapi_v3_norm(dBodyGetLinearVel(cube)) < 0.3);
   world_close(&w);
 }
@@ -145,7 +145,7 @@ static void check_moved(bool posted)
   dBodyID cube = open_cube(&w);
   move_edit edit = {cube, {0.4, 0.3, 0.2}};
   push_along(&w, &x, 0.1, 130); /* in contact, in the middle of a step */
-  CHECK(world_stats(&w).contact_ticks > 50);
+  CHECK(world_stats(&w).loop.contact_ticks > 50);
   double speed = dBodyGetLinearVel(cube)[0];
   if (posted) {
     CHECK(hap_session_post(w.session, move_body, &edit) == HAP_OK);
@@ -164,7 +164,7 @@ static void check_moved(bool posted)
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.3, 1e-3);
   CHECK(dBodyGetLinearVel(cube)[0] >= speed - 1e-9 && dBodyGetLinearVel(cube)[0] < 0.3);
   CHECK_NEAR(dBodyGetPosition(cube)[0], before + 0.1 * dBodyGetLinearVel(cube)[0], 1e-3);
-  CHECK_NEAR(world_stats(&w).momentum_ratio, 1.0, 1e-9); /* the push before the move counts */
+  CHECK_NEAR(world_stats(&w).hand.momentum_ratio, 1.0, 1e-9); /* the push before the move counts */
   world_close(&w);
 }
 
@@ -213,7 +213,7 @@ TEST(a_changed_mass_is_read_again)
   CHECK_NEAR(world_slot(&w, cube)->mass, 4.0, 0.0);
   push_along(&w, &x, 0.02, 200);
   check_bounded(&w, cube, 0.1);
-  CHECK_NEAR(world_stats(&w).momentum_ratio, 1.0, 1e-9);
+  CHECK_NEAR(world_stats(&w).hand.momentum_ratio, 1.0, 1e-9);
   world_close(&w);
 }
 
@@ -223,14 +223,14 @@ TEST(a_body_added_near_the_pointer_is_felt)
   world_open(&w, 0.0, 20);
   REQUIRE(world_start(&w, RADIUS, 0, 0, 0));
   forward(&w, 120);
-  CHECK(world_stats(&w).bodies_known == 0);
+  CHECK(world_stats(&w).model.bodies_known == 0);
   dBodyID cube = world_add_cube(&w, EDGE, 1.0, EDGE / 2 + RADIUS + 0.001, 0, 0);
   forward(&w, 31);
-  CHECK(world_stats(&w).bodies_known == 1);
+  CHECK(world_stats(&w).model.bodies_known == 1);
   CHECK(world_contact(&w, cube, 0) != NULL);
   double x = 0.0;
   push_along(&w, &x, 0.05, 100);
-  CHECK(world_stats(&w).contact_ticks > 20);
+  CHECK(world_stats(&w).loop.contact_ticks > 20);
   check_bounded(&w, cube, 0.2);
   world_close(&w);
 }
@@ -263,14 +263,14 @@ static void check_destroyed(bool forget)
   open_cube(&w);
   dBodyID other = world_add_cube(&w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
   push_along(&w, &x, 0.1, 130);
-  CHECK(world_stats(&w).contact_ticks > 50);
+  CHECK(world_stats(&w).loop.contact_ticks > 50);
   CHECK(hap_session_lock(w.session) == HAP_OK);
   destroy_first(&w, forget);
   CHECK(hap_session_unlock(w.session) == HAP_OK);
   forward(&w, 200);
   hap_stats stats = world_stats(&w);
-  CHECK(stats.bodies_lost == (forget ? 0u : 1u));
-  CHECK(stats.bodies_known == 1);
+  CHECK(stats.faults.bodies_lost == (forget ? 0u : 1u));
+  CHECK(stats.model.bodies_known == 1);
   CHECK(fault_of(&w) == HAP_FAULT_NONE);
   hap_pointer_state state;
   CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
@@ -318,8 +318,8 @@ static void check_destroyed_in_callback(bool after, bool forget)
   push_along(&w, &x, 0.1, 250);
   CHECK(callback_countdown < 0);
   hap_stats stats = world_stats(&w);
-  CHECK(stats.bodies_known == 1);
-  CHECK(stats.bodies_lost == (forget ? 0u : 1u));
+  CHECK(stats.model.bodies_known == 1);
+  CHECK(stats.faults.bodies_lost == (forget ? 0u : 1u));
   CHECK(fault_of(&w) == HAP_FAULT_NONE);
   world_close(&w);
 }
@@ -397,7 +397,7 @@ static void check_broken(hap_edit_fn edit)
   double stopped = dBodyGetPosition(witness)[0];
   forward(&w, 100);
   CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  CHECK(world_stats(&w).faults == 1);
+  CHECK(world_stats(&w).faults.count == 1);
   CHECK(dBodyGetPosition(witness)[0] == stopped); /* not stepped */
   CHECK(hapi_finite(dBodyGetLinearVel(cube), 3)); /* none of the three is in it yet */
   CHECK(hap_session_detail(w.session, &detail) == HAP_OK);
@@ -411,9 +411,9 @@ static void check_broken(hap_edit_fn edit)
   CHECK(hap_session_reset_fault(w.session) == HAP_OK);
   forward(&w, 51);
   CHECK(fault_of(&w) == HAP_FAULT_NONE);
-  uint64_t touched = world_stats(&w).contact_ticks;
+  uint64_t touched = world_stats(&w).loop.contact_ticks;
   push_along(&w, &x, 0.1, 130);
-  CHECK(world_stats(&w).contact_ticks > touched + 20);
+  CHECK(world_stats(&w).loop.contact_ticks > touched + 20);
   check_bounded(&w, cube, 0.5);
   world_close(&w);
 }
@@ -538,12 +538,13 @@ static void switch_models(const hap_model *order, int count, int gap_ticks)
   }
   push_along(&w, &x, -0.2, 200);
   hap_stats stats = world_stats(&w);
-  printf("# gap %d: impulse %.6f, ratio %.12f, peak %.3f, x %.4f\n", gap_ticks, stats.impulse_ns,
-         stats.momentum_ratio, stats.peak_force_n, dBodyGetPosition(cube)[0]);
-  CHECK(stats.impulse_ns > 0.1);
-  CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
-  CHECK(fault_of(&w) == HAP_FAULT_NONE && stats.states_rejected == 0);
-  CHECK(stats.peak_force_n < 15.0);
+  printf("# gap %d: impulse %.6f, ratio %.12f, peak %.3f, x %.4f\n", gap_ticks,
+         stats.hand.impulse_ns, stats.hand.momentum_ratio, stats.hand.peak_force_n,
+         dBodyGetPosition(cube)[0]);
+  CHECK(stats.hand.impulse_ns > 0.1);
+  CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
+  CHECK(fault_of(&w) == HAP_FAULT_NONE && stats.faults.states_rejected == 0);
+  CHECK(stats.hand.peak_force_n < 15.0);
   CHECK(dBodyGetPosition(cube)[0] > 0.03 * 1e-3 * 20 * gap_ticks - 0.03 + EDGE / 2);
   world_close(&w);
 }

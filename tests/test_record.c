@@ -224,7 +224,7 @@ TEST(two_pointers_and_a_replayed_motion)
   s.devices[1] = "virtual:path=0:0.2/-0.06/0.025;0.5:0.2/-0.02/0.025,hand=relaxed";
   replay again = check_setup(&s);
   CHECK(again.info.pointers == 2 && again.info.edits == 0);
-  CHECK(again.stats.contact_ticks > 10);
+  CHECK(again.stats.loop.contact_ticks > 10);
   unlink(csv);
 }
 
@@ -248,8 +248,8 @@ TEST(a_stall_of_physics)
     replay again = recorded_play("row10", 0);
     check_alike(&again, &before);
     CHECK(again.info.edits == 1); /* the lock is told, though nothing was done under it */
-    CHECK(again.stats.physics_missed == before.physics_missed && before.physics_missed > 2);
-    CHECK(again.stats.stale_ticks == before.stale_ticks);
+    CHECK(again.stats.physics.missed == before.physics.missed && before.physics.missed > 2);
+    CHECK(again.stats.faults.stale_ticks == before.faults.stale_ticks);
   }
 }
 
@@ -370,11 +370,12 @@ TEST(a_step_that_takes_long)
   start_recording(&w, 1);
   sleep_ms(LONG_MS + 700);
   hap_stats before = stop_recording(&w);
-  CHECK(before.stale_times == 1 && before.physics_missed > 100);
+  CHECK(before.faults.stale_times == 1 && before.physics.missed > 100);
   build_world(&w);
   replay again = play_in(&w);
   check_alike(&again, &before);
-  CHECK(again.stats.stale_ticks == before.stale_ticks && before.contact_ticks > 10);
+  CHECK(again.stats.faults.stale_ticks == before.faults.stale_ticks &&
+        before.loop.contact_ticks > 10);
 }
 
 /* ---- a world that changes ---- */
@@ -415,13 +416,13 @@ TEST(sixteen_hands_and_bodies_that_callbacks_exchange)
   start_recording(&w, 16);
   sleep_ms(900);
   hap_stats before = stop_recording(&w);
-  CHECK(before.bodies_lost >= 2 && before.contact_ticks > 10);
+  CHECK(before.faults.bodies_lost >= 2 && before.loop.contact_ticks > 10);
   build_world(&w);
   w.ode.before_step = exchange_balls;
   replay again = play_in(&w);
   check_alike(&again, &before);
   CHECK(again.info.pointers == 16 && again.info.edits == 0);
-  CHECK(again.stats.bodies_lost == before.bodies_lost);
+  CHECK(again.stats.faults.bodies_lost == before.faults.bodies_lost);
 }
 
 static void push_cube(void *arg)
@@ -445,7 +446,7 @@ TEST(edits_and_locks_are_counted_and_drawing_is_none)
   CHECK(hap_session_lock(w.session) == HAP_OK && hap_session_unlock(w.session) == HAP_OK);
   sleep_ms(300);
   hap_stats before = stop_recording(&w);
-  CHECK(before.edits_run == 2 && before.locks == 1);
+  CHECK(before.edits.run == 2 && before.edits.locks == 1);
   build_world(&w);
   replay again = play_in(&w);
   CHECK(again.status == HAP_END && again.info.edits == 3);
@@ -512,12 +513,14 @@ TEST(a_device_with_troubles_and_pointers_that_come_and_go)
   CHECK(hap_pointer_remove(r.session, id) == HAP_OK);
   rig_destroy(&r);
   hap_device_close(device);
-  CHECK(before.faults == 4 && before.missed_ticks >= 25 && before.contact_ticks > 10);
+  CHECK(before.faults.count == 4 && before.loop.missed_ticks >= 25 &&
+        before.loop.contact_ticks > 10);
   replay again = recorded_play("row10", 0);
   check_alike(&again, &before);
   CHECK(again.info.pointers == 3);
-  CHECK(again.stats.missed_ticks <= before.missed_ticks &&
-        again.stats.missed_ticks >= before.missed_ticks - 3); /* but for those before the first */
+  CHECK(again.stats.loop.missed_ticks <= before.loop.missed_ticks &&
+        again.stats.loop.missed_ticks >=
+            before.loop.missed_ticks - 3); /* but for those before the first */
 }
 
 static hap_pointer_id lost;
@@ -569,7 +572,7 @@ TEST(a_device_that_is_started_again)
   CHECK(hap_pointer_remove(r.session, lost) == HAP_OK);
   rig_destroy(&r);
   hap_device_close(device);
-  CHECK(before.faults == 1 && before.contact_ticks > 10);
+  CHECK(before.faults.count == 1 && before.loop.contact_ticks > 10);
   rig_options_init(&options);
   options.scene = "row10";
   REQUIRE(hap_player_open(recorded_path, 0, &options.player, &detail) == HAP_OK);
@@ -577,12 +580,14 @@ TEST(a_device_that_is_started_again)
   CHECK(hap_session_start(r.session) == HAP_OK);
   CHECK(hap_pointer_restart(r.session, lost) == HAP_ERROR_STATE);
   uint64_t paused = ticks_paused(r.session, lost, &status);
-  CHECK(status == HAP_END && paused > 20 && paused < before.ticks / 2);
+  CHECK(status == HAP_END && paused > 20 && paused < before.loop.ticks / 2);
   CHECK(hap_player_difference(options.player, &difference, sizeof difference) == HAP_OK);
   CHECK(difference.what == HAP_DIFFERENCE_NONE);
   CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
-  CHECK(stats.ticks == before.ticks && stats.contact_ticks == before.contact_ticks);
-  CHECK(stats.slewed_ticks == before.slewed_ticks && stats.faults == before.faults);
+  CHECK(stats.loop.ticks == before.loop.ticks &&
+        stats.loop.contact_ticks == before.loop.contact_ticks);
+  CHECK(stats.faults.slewed_ticks == before.faults.slewed_ticks &&
+        stats.faults.count == before.faults.count);
   rig_destroy(&r);
   hap_player_close(options.player);
 }
@@ -628,9 +633,12 @@ TEST(a_frame_loop_with_pauses_and_hitches)
     replay again = recorded_play("row10", 0);
     check_alike(&again, &before);
     CHECK(again.info.edits == 0);
-    CHECK(again.stats.stale_ticks == before.stale_ticks && before.stale_times > 10);
-    CHECK(again.stats.stale_times == before.stale_times && before.contact_ticks > 10);
-    CHECK(again.stats.frames_dropped == before.frames_dropped && before.frames_dropped > 10);
+    CHECK(again.stats.faults.stale_ticks == before.faults.stale_ticks &&
+          before.faults.stale_times > 10);
+    CHECK(again.stats.faults.stale_times == before.faults.stale_times &&
+          before.loop.contact_ticks > 10);
+    CHECK(again.stats.physics.frames_dropped == before.physics.frames_dropped &&
+          before.physics.frames_dropped > 10);
   }
 }
 
@@ -656,7 +664,7 @@ TEST(a_frame_loop)
   rig_destroy(&r);
   replay again = recorded_play("stack", 0);
   check_alike(&again, &before);
-  CHECK(before.physics_steps > 10);
+  CHECK(before.physics.steps > 10);
 }
 
 /* ---- its end ---- */
@@ -683,11 +691,11 @@ TEST(at_its_limit_it_ends_and_the_session_goes_on)
   hap_status status = HAP_OK;
   hap_stats before = run_limited(200000, &state, &status);
   CHECK(status == HAP_RECORD_ENDED && state.end == HAP_RECORD_LIMIT && state.bytes <= 200000);
-  CHECK(state.bytes > 100000 && before.ticks > state.ticks + 100 && before.faults == 0);
+  CHECK(state.bytes > 100000 && before.loop.ticks > state.ticks + 100 && before.faults.count == 0);
   replay again = recorded_play("row10", 0);
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
   CHECK(again.info.end == HAP_RECORD_LIMIT && again.info.ticks == state.ticks);
-  CHECK(again.stats.ticks <= state.ticks && again.stats.ticks + 300 > state.ticks);
+  CHECK(again.stats.loop.ticks <= state.ticks && again.stats.loop.ticks + 300 > state.ticks);
 }
 
 /* A pipe that nobody reads is a disk that hangs. */
@@ -711,7 +719,7 @@ TEST(a_disk_that_hangs_makes_a_gap_that_is_told)
   }
   CHECK(state.end == HAP_RECORD_OVERFLOW && state.lost_ticks >= 100);
   hap_stats stats;
-  CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK && stats.faults == 0);
+  CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK && stats.faults.count == 0);
   close(ends[1]);
   FILE *file = fopen(recorded_path, "wb"); /* the disk comes back */
   REQUIRE(file != NULL);
@@ -727,7 +735,7 @@ TEST(a_disk_that_hangs_makes_a_gap_that_is_told)
   replay again = recorded_play("row10", 0);
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
   CHECK(again.info.end == HAP_RECORD_OVERFLOW && again.info.ticks == state.ticks);
-  CHECK(again.stats.ticks <= state.ticks && again.stats.ticks + 100 > state.ticks);
+  CHECK(again.stats.loop.ticks <= state.ticks && again.stats.loop.ticks + 100 > state.ticks);
 }
 
 TEST(a_full_disk_is_told_and_the_session_goes_on)
@@ -749,13 +757,13 @@ TEST(a_full_disk_is_told_and_the_session_goes_on)
   REQUIRE(setrlimit(RLIMIT_FSIZE, &before) == 0);
   CHECK(hap_session_record_state(r.session, &state, sizeof state, &detail) == HAP_ERROR_IO);
   CHECK(strstr(detail.text, "File too large") != NULL && state.end == HAP_RECORD_FAILED);
-  CHECK(stats.faults == 0 && stats.ticks > state.ticks + 100);
+  CHECK(stats.faults.count == 0 && stats.loop.ticks > state.ticks + 100);
   rig_destroy(&r);
   replay cut = recorded_play("row10", 0);
   CHECK(cut.status == HAP_ERROR_FORMAT && strstr(cut.detail.text, "breaks off") != NULL);
   replay again = recorded_play("row10", HAP_PLAY_INCOMPLETE);
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
-  CHECK(again.info.end == HAP_RECORD_GOES_ON && again.stats.ticks > 50);
+  CHECK(again.info.end == HAP_RECORD_GOES_ON && again.stats.loop.ticks > 50);
 }
 
 /* ---- what is not allowed ---- */

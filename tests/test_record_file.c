@@ -302,7 +302,7 @@ static void check_contradiction(spoil_fn spoil, bool may_end)
   pack(&f);
   release(&f);
   replay again = recorded_play("stack", 0);
-  bool ended = may_end && again.status == HAP_END && again.stats.ticks < 100;
+  bool ended = may_end && again.status == HAP_END && again.stats.loop.ticks < 100;
   CHECK(again.status == HAP_ERROR_FORMAT || ended);
   CHECK(ended || strstr(again.detail.text, "the recording contradicts itself") != NULL);
   printf("# %s\n", again.detail.text);
@@ -350,7 +350,7 @@ TEST(cut_at_every_100th_byte)
   CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT);
   replay again = recorded_play("row10", HAP_PLAY_INCOMPLETE);
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
-  CHECK(again.stats.ticks > 250);
+  CHECK(again.stats.loop.ticks > 250);
   write_raw(raw_size);
   CHECK(try_open(0, &detail) == HAP_OK);
 }
@@ -523,7 +523,7 @@ TEST(another_scene_is_told)
   file f = fresh("row10", 200);
   release(&f);
   replay again = recorded_play("stack", 0);
-  CHECK(again.status == HAP_ERROR_WORLD && again.stats.ticks == 0);
+  CHECK(again.status == HAP_ERROR_WORLD && again.stats.loop.ticks == 0);
   CHECK(strstr(again.detail.text, "it had 10 bodies with 11 geoms") != NULL);
   again = recorded_play("row10:9", 0);
   CHECK(again.status == HAP_ERROR_WORLD);

@@ -237,8 +237,8 @@ static void run_case(repeat_log *log, const void *arg)
     repeat_note(log, s.w.session);
   }
   hap_stats stats = cw_stats(&s.w);
-  CHECK(status == HAP_OK && stats.contact_ticks > 100 && stats.faults == 0);
-  CHECK(stats.bodies_lost == 0 && stats.range_bodies == 2);
+  CHECK(status == HAP_OK && stats.loop.contact_ticks > 100 && stats.faults.count == 0);
+  CHECK(stats.faults.bodies_lost == 0 && stats.model.range_bodies == 2);
   cw_close(&s.w);
 }
 

@@ -69,9 +69,9 @@ static bool start(stack *s)
 /* Testing simulations of so many physics steps. */
 static uint64_t probes_of(contact_world *w, int steps)
 {
-  uint64_t before = cw_stats(w).probe_steps;
+  uint64_t before = cw_stats(w).probes.steps;
   cw_run(w, steps * STEP_TICKS);
-  return cw_stats(w).probe_steps - before;
+  return cw_stats(w).probes.steps - before;
 }
 
 /* ---- while all rests ---- */
@@ -90,8 +90,8 @@ static void check_rest(hap_probe probe)
     CHECK(probes_of(&reference.w, 1) == STEPS_OF_A);
     CHECK_NEAR(s.w.force[0], reference.w.force[0], 1e-3 * fabs(reference.w.force[0]));
   }
-  CHECK(cw_stats(&s.w).probes_reused >= 20);
-  CHECK(cw_stats(&reference.w).probes_reused == 0);
+  CHECK(cw_stats(&s.w).probes.reused >= 20);
+  CHECK(cw_stats(&reference.w).probes.reused == 0);
   cw_close(&s.w);
   cw_close(&reference.w);
 }
@@ -107,12 +107,12 @@ TEST(as_in_the_paper_all_are_made)
   stack s;
   begin(&s, 1e-6, HAP_PROBE_PAPER);
   REQUIRE(start(&s));
-  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes_reused == 0);
+  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
   begin(&s, 1e-6, HAP_PROBE_SHARED);
   s.w.def.effects[HAP_EFFECT_TESTING] = HAP_EFFECT_ON;
   REQUIRE(start(&s));
-  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes_reused == 0);
+  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
 }
 
@@ -122,12 +122,12 @@ TEST(what_creeps_is_measured_again)
   stack s;
   begin(&s, 1e-6, HAP_PROBE_SHARED);
   REQUIRE(start(&s));
-  uint64_t before = cw_stats(&s.w).probes_reused;
+  uint64_t before = cw_stats(&s.w).probes.reused;
   for (int step = 0; step < 12; ++step) {
     s.w.hand_at[2] += 3e-7;
     cw_run(&s.w, STEP_TICKS);
   }
-  uint64_t reused = cw_stats(&s.w).probes_reused - before;
+  uint64_t reused = cw_stats(&s.w).probes.reused - before;
   CHECK(reused >= 6 && reused <= 10);
   cw_close(&s.w);
 }

@@ -20,7 +20,7 @@ TEST(a_session_that_never_starts)
   REQUIRE(stage_create(&s) == HAP_OK);
   CHECK(hap_session_stop(s.session) == HAP_OK);
   CHECK(strcmp(detail_of(&s), "") == 0);
-  CHECK(stats_of(&s).ticks == 0);
+  CHECK(stats_of(&s).loop.ticks == 0);
   hap_session_destroy(NULL);
   stage_end(&s);
 }
@@ -39,10 +39,10 @@ TEST(start_and_stop_in_every_drive)
             (drives[d] == HAP_DRIVE_LOCKSTEP ? HAP_OK : HAP_ERROR_STATE));
       CHECK(hap_session_stop(s.session) == HAP_OK);
       CHECK(hap_session_stop(s.session) == HAP_OK);
-      uint64_t ticks = stats_of(&s).ticks;
+      uint64_t ticks = stats_of(&s).loop.ticks;
       CHECK(drives[d] != HAP_DRIVE_LOCKSTEP ? ticks > 0 : ticks == 30); /* counted from start */
       sleep_ms(3);
-      CHECK(stats_of(&s).ticks == ticks); /* nothing runs any more */
+      CHECK(stats_of(&s).loop.ticks == ticks); /* nothing runs any more */
       CHECK(hap_session_start(s.session) == HAP_OK);
     }
     stage_end(&s); /* destroyed while it runs */
@@ -141,14 +141,15 @@ TEST(lockstep_steps_are_due_at_whole_ticks)
       CHECK(atomic_load(&s.steps) == due);
     }
     hap_stats stats = stats_of(&s);
-    CHECK(stats.ticks == 1000 && stats.missed_ticks == 0);
-    CHECK(stats.physics_steps == (uint64_t)atomic_load(&s.steps));
-    CHECK(stats.bodies_known == 1 && stats.model == HAP_MODEL_CONTACT);
-    CHECK(stats.model_age_s <= 2.0 * per_step * 1e-3 && stats.models_adopted > 0);
-    CHECK(stats.tick_us_p50 <= stats.tick_us_p99 * 1.01 && stats.tick_us_p99 > 0.0);
-    CHECK(stats.physics_ms_mean > 0.0 && stats.physics_ms_max >= stats.physics_ms_mean);
-    CHECK(stats.haptic_duty > 0.0 && stats.physics_duty > 0.0 && stats.trace_hash != 0);
-    CHECK(stats.capacity_dropped == 0 && stats.states_rejected == 0 && stats.faults == 0);
+    CHECK(stats.loop.ticks == 1000 && stats.loop.missed_ticks == 0);
+    CHECK(stats.physics.steps == (uint64_t)atomic_load(&s.steps));
+    CHECK(stats.model.bodies_known == 1 && stats.loop.model == HAP_MODEL_CONTACT);
+    CHECK(stats.loop.model_age_s <= 2.0 * per_step * 1e-3 && stats.loop.models_adopted > 0);
+    CHECK(stats.loop.tick_us_p50 <= stats.loop.tick_us_p99 * 1.01 && stats.loop.tick_us_p99 > 0.0);
+    CHECK(stats.physics.ms_mean > 0.0 && stats.physics.ms_max >= stats.physics.ms_mean);
+    CHECK(stats.loop.duty > 0.0 && stats.physics.duty > 0.0 && stats.loop.trace_hash != 0);
+    CHECK(stats.model.capacity_dropped == 0 && stats.faults.states_rejected == 0 &&
+          stats.faults.count == 0);
     stage_end(&s);
   }
 }
@@ -163,16 +164,16 @@ TEST(frame_drive_keeps_the_remainder_and_does_at_most_three_steps)
   CHECK(atomic_load(&s.steps) == 1); /* 4 ms are left */
   CHECK(hap_session_update(s.session, 0.0) == HAP_OK);
   CHECK(hap_session_update(s.session, 0.056) == HAP_OK);
-  CHECK(atomic_load(&s.steps) == 4 && stats_of(&s).frames_dropped == 0);
+  CHECK(atomic_load(&s.steps) == 4 && stats_of(&s).physics.frames_dropped == 0);
   CHECK(hap_session_update(s.session, 0.215) == HAP_DROPPED);
-  CHECK(atomic_load(&s.steps) == 7 && stats_of(&s).frames_dropped == 7);
+  CHECK(atomic_load(&s.steps) == 7 && stats_of(&s).physics.frames_dropped == 7);
   CHECK(hap_session_update(s.session, 0.005) == HAP_OK); /* 15 ms were left */
   CHECK(atomic_load(&s.steps) == 8);
   for (int i = 0; i < 100; ++i) { /* fractions do not get lost */
     CHECK(hap_session_update(s.session, 0.02 / 3.0) == HAP_OK);
   }
   CHECK(atomic_load(&s.steps) == 8 + 33);
-  CHECK(stats_of(&s).frames_dropped == 7);
+  CHECK(stats_of(&s).physics.frames_dropped == 7);
   stage_end(&s);
 }
 
@@ -188,14 +189,14 @@ TEST(models_change_while_running)
     int before = atomic_load(&s.steps);
     CHECK(hap_session_set_model(s.session, models[i]) == HAP_OK);
     CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-    CHECK(stats_of(&s).model == models[i]);
+    CHECK(stats_of(&s).loop.model == models[i]);
     int steps = atomic_load(&s.steps) - before;
     CHECK(models[i] == HAP_MODEL_SINGLE ? steps > 170 && steps <= 201 : steps >= 9 && steps <= 30);
     /* Whatever the model: the world is where time says, to the step it is ahead or behind. */
     double lag = 1e-9 * (double)hap_session_now(s.session) * 0.1 - dBodyGetPosition(s.cube)[0];
     CHECK_NEAR(lag, 0.0, 0.1 * 0.0205);
   }
-  CHECK(stats_of(&s).faults == 0);
+  CHECK(stats_of(&s).faults.count == 0);
   stage_end(&s);
 }
 
@@ -224,14 +225,14 @@ TEST(threads_run_on_the_clock)
   double most = 1e-6 * (double)(hapi_clock_now() - begin);
   double least = 1e-6 * (double)(before_stop - started);
   hap_stats stats = stats_of(&s);
-  double windows = (double)(stats.ticks + stats.missed_ticks);
+  double windows = (double)(stats.loop.ticks + stats.loop.missed_ticks);
   printf("# %llu ticks, %llu missed in %.0f ms, %llu steps, p99 %.1f us\n",
-         (unsigned long long)stats.ticks, (unsigned long long)stats.missed_ticks, least,
-         (unsigned long long)stats.physics_steps, stats.tick_us_p99);
+         (unsigned long long)stats.loop.ticks, (unsigned long long)stats.loop.missed_ticks, least,
+         (unsigned long long)stats.physics.steps, stats.loop.tick_us_p99);
   CHECK(windows <= most + 2.0 && windows >= 0.95 * least - 100.0);
-  CHECK((double)(stats.physics_steps + stats.physics_missed) <= most / 20.0 + 2.0);
-  CHECK(stats.physics_steps > 0 && last > 0.0);
-  CHECK(stats.trace_hash == 0 && stats.realtime == 0 && stats.faults == 0);
+  CHECK((double)(stats.physics.steps + stats.physics.missed) <= most / 20.0 + 2.0);
+  CHECK(stats.physics.steps > 0 && last > 0.0);
+  CHECK(stats.loop.trace_hash == 0 && stats.loop.realtime == 0 && stats.faults.count == 0);
   stage_end(&s);
 }
 
@@ -331,7 +332,7 @@ TEST(lock_waits_for_about_one_step_of_an_overloaded_physics_thread)
   printf("# at most %d steps\n", worst);
   CHECK(worst <= 2); /* one may begin between the count and the queue */
   CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).physics_missed > 0); /* it was overloaded */
+  CHECK(stats_of(&s).physics.missed > 0); /* it was overloaded */
   stage_end(&s);
 }
 
@@ -433,7 +434,7 @@ TEST(poses_for_drawing_are_interpolated_one_step_behind)
   dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
   REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 201) == HAP_OK); /* stepped to 0.2 s */
-  CHECK(stats_of(&s).pose_delay_s == 0.02);
+  CHECK(stats_of(&s).physics.pose_delay_s == 0.02);
   for (int i = -120; i <= 30; ++i) { /* eight steps are kept */
     hap_pose pose;
     int64_t at = 200 * MS + i * MS;
@@ -472,7 +473,7 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
   CHECK(hap_session_advance(s.session, 150) == HAP_OK);
-  CHECK(stats_of(&s).trace_dropped == 50);
+  CHECK(stats_of(&s).loop.trace_dropped == 50);
   CHECK(hap_session_trace_read(s.session, rows, 30, &count) == HAP_OK && count == 30);
   CHECK(hap_session_trace_read(s.session, rows + 30, 170, &count) == HAP_OK && count == 70);
   CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
@@ -487,7 +488,7 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
   CHECK_NEAR(rows[0].t, 0.15, 1e-12);
   stage_end(&s);
   REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP)); /* without a trace */
-  CHECK(hap_session_advance(s.session, 10) == HAP_OK && stats_of(&s).trace_dropped == 0);
+  CHECK(hap_session_advance(s.session, 10) == HAP_OK && stats_of(&s).loop.trace_dropped == 0);
   CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
   stage_end(&s);
 }

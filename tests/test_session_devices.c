@@ -200,24 +200,24 @@ static void fault_and_reset(atomic_int *cause, hap_fault fault, const char *text
   hap_device *device;
   REQUIRE(run_with_fake(&s, HAP_DRIVE_LOCKSTEP, &device));
   CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(pushes(&fakes[0]) && stats_of(&s).fault == HAP_FAULT_NONE);
+  CHECK(pushes(&fakes[0]) && stats_of(&s).faults.fault == HAP_FAULT_NONE);
   atomic_store(cause, 1);
   CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
-  CHECK(stats_of(&s).faults == 1 || fault == HAP_FAULT_DEVICE_WRITE);
+  CHECK(stats_of(&s).faults.count == 1 || fault == HAP_FAULT_DEVICE_WRITE);
   CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
-  CHECK(stats_of(&s).fault == fault && stats_of(&s).faults == 1);
+  CHECK(stats_of(&s).faults.fault == fault && stats_of(&s).faults.count == 1);
   CHECK(!pushes(&fakes[0]) && atomic_load(&fakes[0].zeroed) == 1);
   CHECK(has(detail_of(&s), text));
   int writes = atomic_load(&fakes[0].writes);
   atomic_store(cause, 0);
   CHECK(hap_session_advance(s.session, 50) == HAP_FAULTED);
-  CHECK(stats_of(&s).fault == fault && !pushes(&fakes[0])); /* latched */
-  CHECK(atomic_load(&fakes[0].writes) == writes + 50);      /* zeros go on being written */
+  CHECK(stats_of(&s).faults.fault == fault && !pushes(&fakes[0])); /* latched */
+  CHECK(atomic_load(&fakes[0].writes) == writes + 50);             /* zeros go on being written */
   CHECK(hap_session_reset_fault(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 2) == HAP_OK);
-  CHECK(stats_of(&s).fault == HAP_FAULT_NONE && pushes(&fakes[0]));
+  CHECK(stats_of(&s).faults.fault == HAP_FAULT_NONE && pushes(&fakes[0]));
   CHECK(strcmp(detail_of(&s), "") == 0);
-  CHECK(stats_of(&s).faults == 1 && stats_of(&s).ticks == 123);
+  CHECK(stats_of(&s).faults.count == 1 && stats_of(&s).loop.ticks == 123);
   end_with_fake(&s, device);
 }
 
@@ -249,7 +249,7 @@ TEST(one_bad_device_takes_the_force_of_all)
   CHECK(pushes(&fakes[0]) && atomic_load(&fakes[1].writes) == 50);
   atomic_store(&fakes[1].bad_pose, 1);
   CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
-  CHECK(!pushes(&fakes[0]) && stats_of(&s).fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(!pushes(&fakes[0]) && stats_of(&s).faults.fault == HAP_FAULT_DEVICE_POSE);
   hap_pointer_state shown;
   CHECK(hap_pointer_get(s.session, id, &shown, sizeof shown) == HAP_OK);
   CHECK(hapi_finite(shown.device.position, 3) && hapi_finite(shown.proxy.position, 3));
@@ -367,8 +367,8 @@ TEST(a_device_limits_the_force)
   CHECK_NEAR(hapi_v3_norm(state.wrench.force), 12.0, 1e-9);
   CHECK(state.wrench.force[0] < 0.0 && state.buttons == 5 && state.contacts == 1);
   CHECK_NEAR(state.proxy.position[0], -0.03, 0.0);
-  CHECK(stats_of(&s).saturated_ticks > 0);
-  CHECK_NEAR(stats_of(&s).peak_force_n, 12.0, 1e-9);
+  CHECK(stats_of(&s).faults.saturated_ticks > 0);
+  CHECK_NEAR(stats_of(&s).hand.peak_force_n, 12.0, 1e-9);
   end_with_fake(&s, device); /* no write was beyond the limit */
 }
 
@@ -552,16 +552,16 @@ TEST(a_pointer_without_device_goes_to_its_target_and_pushes)
     }
     CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);
     CHECK_NEAR(state.proxy.position[0], -0.0601, 1e-12);
-    CHECK(stats_of(&s).contact_ticks == 0);
+    CHECK(stats_of(&s).loop.contact_ticks == 0);
     for (int i = 400; i < 900; ++i) {
       CHECK(move_to(&s, id, -0.1 + 1e-4 * i) == HAP_OK);
       CHECK(hap_session_advance(s.session, 1) == HAP_OK);
     }
-    CHECK(stats_of(&s).contact_ticks > 10 && stats_of(&s).peak_force_n > 0.5);
+    CHECK(stats_of(&s).loop.contact_ticks > 10 && stats_of(&s).hand.peak_force_n > 0.5);
     CHECK(dBodyGetLinearVel(s.cube)[0] > 0.05 && dBodyGetPosition(s.cube)[0] > 0.02);
     CHECK_NEAR(dBodyGetPosition(s.cube)[1], 0.0, 1e-3);
-    CHECK(stats_of(&s).impulse_ns > 0.05 && stats_of(&s).faults == 0);
-    CHECK_NEAR(stats_of(&s).momentum_ratio, 1.0, 0.1);
+    CHECK(stats_of(&s).hand.impulse_ns > 0.05 && stats_of(&s).faults.count == 0);
+    CHECK_NEAR(stats_of(&s).hand.momentum_ratio, 1.0, 0.1);
     stage_end(&s);
   }
 }
@@ -593,7 +593,7 @@ TEST(bad_targets_change_nothing)
   CHECK(hap_session_advance(s.session, 3) == HAP_OK);
   CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);
   CHECK_NEAR(state.proxy.position[0], 0.5, 0.0);
-  CHECK(stats_of(&s).faults == 0);
+  CHECK(stats_of(&s).faults.count == 0);
   stage_end(&s);
 }
 
@@ -637,7 +637,7 @@ TEST(pointers_come_and_go_while_threads_run)
   pthread_join(mover, NULL);
   CHECK(s.seen[0] == 0);
   CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).faults == 0 && stats_of(&s).ticks > 0);
+  CHECK(stats_of(&s).faults.count == 0 && stats_of(&s).loop.ticks > 0);
   stage_end(&s);
   hap_device_close(device);
 }
@@ -662,9 +662,9 @@ TEST(full_capacities_lose_nothing_but_are_counted)
   }
   CHECK(hap_session_advance(s.session, 500) == HAP_OK);
   hap_stats stats = stats_of(&s);
-  CHECK(stats.capacity_dropped > 0 && stats.contact_ticks > 0);
-  CHECK(stats.neighbours_max <= 2 && stats.pointer_contacts <= 3);
-  CHECK(stats.faults == 0 && stats.states_rejected == 0);
+  CHECK(stats.model.capacity_dropped > 0 && stats.loop.contact_ticks > 0);
+  CHECK(stats.model.neighbours_max <= 2 && stats.model.pointer_contacts <= 3);
+  CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
   stage_end(&s);
 }
 
@@ -686,7 +686,7 @@ TEST(a_body_may_go_while_it_is_pushed)
     CHECK(hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
     CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK && move_to(&s, id, -0.058) == HAP_OK);
     CHECK(hap_session_advance(s.session, 70) == HAP_OK);
-    CHECK(stats_of(&s).neighbours == 1);
+    CHECK(stats_of(&s).model.neighbours == 1);
     dBodyID was = s.cube;
     if (told != 0) {
       CHECK(hap_session_forget_geom(s.session, s.geom) == HAP_OK);
@@ -696,13 +696,13 @@ TEST(a_body_may_go_while_it_is_pushed)
     hap_status status = hap_session_advance(s.session, 30);
     CHECK(status == (told != 0 ? HAP_OK : HAP_BODY_LOST));
     CHECK(told != 0 || has(detail_of(&s), "hap_session_forget_body"));
-    CHECK(stats_of(&s).bodies_lost == (told != 0 ? 0u : 1u));
-    CHECK(stats_of(&s).neighbours == 0 && stats_of(&s).bodies_known == 0);
+    CHECK(stats_of(&s).faults.bodies_lost == (told != 0 ? 0u : 1u));
+    CHECK(stats_of(&s).model.neighbours == 0 && stats_of(&s).model.bodies_known == 0);
     hap_pose pose;
     CHECK(hap_session_poses(s.session, 0, &was, 1, &pose) == HAP_ERROR_NOT_FOUND);
     s.cube = add_cube(&s, 0.0, &s.geom); /* another one in its place, maybe at its address */
     CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-    CHECK(stats_of(&s).neighbours == 1 && stats_of(&s).faults == 0);
+    CHECK(stats_of(&s).model.neighbours == 1 && stats_of(&s).faults.count == 0);
     CHECK(dBodyGetPosition(s.cube)[0] >= 0.0);
     stage_end(&s);
   }
@@ -726,6 +726,6 @@ TEST(bodies_come_and_go_under_the_lock_while_threads_run)
     CHECK(hap_session_unlock(s.session) == HAP_OK);
   }
   CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).faults == 0);
+  CHECK(stats_of(&s).faults.count == 0);
   stage_end(&s);
 }

@@ -55,12 +55,12 @@ TEST(a_new_hand_does_not_feel_what_the_old_one_touched)
   CHECK(hap_pointer_remove(s.session, first) == HAP_OK);
   hap_pointer_id second = add_hand(&s, 0u); /* touches nothing at all */
   move_hand(&s, second, -0.045, 0.0);
-  double impulse = figures(&s).impulse_ns;
+  double impulse = figures(&s).hand.impulse_ns;
   for (int i = 0; i < 100; ++i) {
     CHECK(hap_session_advance(s.session, 1) == HAP_OK);
     CHECK(felt(&s, second) == 0.0);
   }
-  CHECK(figures(&s).impulse_ns == impulse);
+  CHECK(figures(&s).hand.impulse_ns == impulse);
   stage_end(&s);
 }
 
@@ -72,11 +72,11 @@ TEST(a_hand_without_a_target_is_not_in_the_world)
   hap_pointer_id hand = add_hand(&s, ~0u); /* the cube is at the origin */
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-  CHECK(figures(&s).pointer_contacts == 0 && figures(&s).impulse_abs_ns == 0.0);
+  CHECK(figures(&s).model.pointer_contacts == 0 && figures(&s).hand.impulse_abs_ns == 0.0);
   CHECK(dBodyGetPosition(s.cube)[0] == 0.0);
   move_hand(&s, hand, -0.055, 0.0);
   CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-  CHECK(figures(&s).impulse_abs_ns > 0.0);
+  CHECK(figures(&s).hand.impulse_abs_ns > 0.0);
   stage_end(&s);
 }
 
@@ -102,9 +102,9 @@ TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
       CHECK(hap_session_advance(s.session, 1) == HAP_OK);
     }
     hap_stats stats = figures(&s);
-    CHECK(stats.impulse_ns > 0.05);
-    CHECK_NEAR(stats.momentum_ratio, 1.0, 1e-9);
-    CHECK_NEAR(dBodyGetLinearVel(s.cube)[0], stats.impulse_ns, 1e-9); /* 1 kg */
+    CHECK(stats.hand.impulse_ns > 0.05);
+    CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
+    CHECK_NEAR(dBodyGetLinearVel(s.cube)[0], stats.hand.impulse_ns, 1e-9); /* 1 kg */
     stage_end(&s);
   }
 }
@@ -197,7 +197,7 @@ TEST(a_surface_that_is_no_number_does_not_reach_ode)
   (void)add_cube(&s, 0.0995, NULL);
   REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 100) == HAP_FAULTED); /* and no abort */
-  CHECK(figures(&s).fault == HAP_FAULT_WORLD);
+  CHECK(figures(&s).faults.fault == HAP_FAULT_WORLD);
   hap_detail detail;
   CHECK(hap_session_detail(s.session, &detail) == HAP_OK);
   CHECK(strstr(detail.text, "surface") != NULL);
@@ -228,7 +228,7 @@ TEST(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed)
   dGeomDestroy(s.geom);
   dBodyDestroy(s.cube);
   CHECK(hap_session_advance(s.session, 50) == HAP_BODY_LOST);
-  CHECK(figures(&s).bodies_lost == 1 && figures(&s).bodies_known == 0);
+  CHECK(figures(&s).faults.bodies_lost == 1 && figures(&s).model.bodies_known == 0);
   stage_end(&s);
 }
 
@@ -246,11 +246,11 @@ TEST(a_transmission_is_not_probed_and_that_is_said)
     move_hand(&s, hand, -0.055, 0.0);
     REQUIRE(hap_session_start(s.session) == HAP_OK);
     CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-    CHECK(figures(&s).probe_steps == 0 || with == 0);
-    CHECK(figures(&s).probe_steps > 0 || with != 0 || s.def.model == HAP_MODEL_CONTACT);
+    CHECK(figures(&s).probes.steps == 0 || with == 0);
+    CHECK(figures(&s).probes.steps > 0 || with != 0 || s.def.model == HAP_MODEL_CONTACT);
     CHECK((strstr(detail_of(&s), "transmission") != NULL) == (with != 0));
     CHECK(felt(&s, hand) < 0.0 || with == 0);
-    CHECK(figures(&s).impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
+    CHECK(figures(&s).hand.impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
     stage_end(&s);
   }
 }
@@ -309,7 +309,7 @@ TEST(a_hand_that_never_came_in_has_a_pose)
   move_hand(&s, id, 9e5, 0.0);
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   CHECK(hap_session_advance(s.session, 100) >= HAP_OK);
-  CHECK(figures(&s).fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(figures(&s).faults.fault == HAP_FAULT_DEVICE_POSE);
   const int64_t times[] = {0, hap_session_now(s.session), INT64_MAX};
   for (int i = 0; i < 6; ++i) {
     CHECK(hap_pointer_poses(s.session, id, times[i / 2], &poses[0], &poses[1]) >= HAP_OK);

@@ -207,7 +207,7 @@ static history record(const run_plan *plan, run_kind kind)
   if (kind == PLAIN) {
     dJointGroupDestroy(plain_group);
   } else {
-    h.probes = world_stats(&w).probe_steps;
+    h.probes = world_stats(&w).probes.steps;
   }
   world_close(&w);
   return h;
@@ -295,9 +295,9 @@ TEST(probes_leave_every_bit)
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &before[i]);
   }
-  uint64_t probes = world_physics(&w)->counts.own.stats.probe_steps;
+  uint64_t probes = world_physics(&w)->counts.own.stats.probes.steps;
   hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->counts.own.stats.probe_steps >= probes + 4);
+  CHECK(world_physics(&w)->counts.own.stats.probes.steps >= probes + 4);
   CHECK(dRandGetSeed() == 123456789);
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &after[i]);
@@ -351,9 +351,9 @@ TEST(callbacks_are_silent_in_probes)
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(moved_calls == w.body_count); /* once for each body that the step moved */
   int surfaces = w.surface_calls;
-  uint64_t probes = world_physics(&w)->counts.own.stats.probe_steps;
+  uint64_t probes = world_physics(&w)->counts.own.stats.probes.steps;
   hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->counts.own.stats.probe_steps >= probes + 4);
+  CHECK(world_physics(&w)->counts.own.stats.probes.steps >= probes + 4);
   CHECK(moved_calls == w.body_count);
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(w.surface_calls == surfaces);

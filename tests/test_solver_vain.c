@@ -40,8 +40,8 @@ static figures push_row(int count)
   uint64_t before = 0;
   for (int i = 0; i < SETTLES + TICKS; ++i) {
     cw_tick(&w);
-    double updates = (double)(cw_stats(&w).solver_sweeps - before) * solver->row_count;
-    before = cw_stats(&w).solver_sweeps;
+    double updates = (double)(cw_stats(&w).contact.sweeps - before) * solver->row_count;
+    before = cw_stats(&w).contact.sweeps;
     if (i >= SETTLES) {
       out.rests += solver->dear_runs > 0 && solver->dear_rows > 0;
       out.solved += solver->direct_solves > 0;

@@ -459,15 +459,16 @@ static hap_fault feel(rig *r, emulated *e, felt *seen)
     if (hap_session_stats(r->session, &stats, sizeof stats) < HAP_OK) {
       return HAP_FAULT_WORLD;
     }
-  } while (seen->samples < SAMPLES && stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
-  if (stats.fault != HAP_FAULT_NONE) {
+  } while (seen->samples < SAMPLES && stats.faults.fault == HAP_FAULT_NONE &&
+           emulated_clock() < end);
+  if (stats.faults.fault != HAP_FAULT_NONE) {
     (void)hap_session_detail(r->session, &detail);
     printf("# %s\n", detail.text);
   }
   printf("# %d samples, at most %.2f N and %.4f N m asked; given of it %.3f and %.3f\n",
          seen->samples, seen->most, seen->torque_most, middle(seen->force, seen->samples),
          middle(seen->torque, seen->samples));
-  return stats.fault;
+  return stats.faults.fault;
 }
 
 TEST(a_row_of_cubes_is_felt)
@@ -487,8 +488,9 @@ TEST(a_row_of_cubes_is_felt)
   do {
     emulated_sleep(5e-3);
     (void)hap_session_stats(r.session, &stats, sizeof stats);
-  } while (stats.fault == HAP_FAULT_NONE && emulated_clock() < end);
-  CHECK(stats.fault == HAP_FAULT_DEVICE_READ || stats.fault == HAP_FAULT_DEVICE_WRITE);
+  } while (stats.faults.fault == HAP_FAULT_NONE && emulated_clock() < end);
+  CHECK(stats.faults.fault == HAP_FAULT_DEVICE_READ ||
+        stats.faults.fault == HAP_FAULT_DEVICE_WRITE);
   CHECK(hap_session_detail(r.session, &detail) == HAP_OK && strstr(detail.text, "cable") != NULL);
   CHECK(hap_pointer_restart(r.session, r.pointers[0]) < HAP_OK);
   CHECK(hap_session_detail(r.session, &detail) == HAP_OK && strstr(detail.text, "open") != NULL);

@@ -187,7 +187,7 @@ TEST(a_measured_body_answers_to_a_tool)
     impulse -= 1e-3 * w.state.wrench.force[0];
   }
   CHECK(hap_session_stats(w.session, &stats, sizeof stats) == HAP_OK);
-  CHECK(stats.measured_bodies == 1);
+  CHECK(stats.model.measured_bodies == 1);
   tool_go(&w, -0.2, 0.0, 0.0, 0.0);
   tool_run(&w, 100);
   CHECK(hap_session_stop(w.session) == HAP_OK);

@@ -146,17 +146,17 @@ static void tell(const run_options *options, hap_status status, const hap_stats 
 {
   if (status == HAP_END) {
     fprintf(stderr, "hapode-run: stopped early, after %.3f s\n",
-            (double)stats->ticks / options->rig.def.haptic_hz);
+            (double)stats->loop.ticks / options->rig.def.haptic_hz);
   }
-  if (stats->physics_duty > 1.0 && options->rig.def.drive != HAP_DRIVE_LOCKSTEP) {
+  if (stats->physics.duty > 1.0 && options->rig.def.drive != HAP_DRIVE_LOCKSTEP) {
     fprintf(stderr,
             "hapode-run: physics took %.2g times the time it had: the world ran slowly; lower "
             "--physics-hz or take a smaller scene\n",
-            stats->physics_duty);
+            stats->physics.duty);
   }
-  if (stats->trace_dropped > 0) {
+  if (stats->loop.trace_dropped > 0) {
     fprintf(stderr, "hapode-run: %" PRIu64 " rows of the trace were dropped\n",
-            stats->trace_dropped);
+            stats->loop.trace_dropped);
   }
 }
 

@@ -138,7 +138,7 @@ static void show_progress(watch *w, double t, const hap_stats *stats)
     return;
   }
   run_progress_show(&w->loop->progress, w->loop->seconds - t, strongest_force(w->loop->rig),
-                    stats->missed_ticks);
+                    stats->loop.missed_ticks);
   w->next_progress = now + PROGRESS_S;
 }
 
@@ -146,8 +146,9 @@ static void show_progress(watch *w, double t, const hap_stats *stats)
 static bool reconnect(watch *w, double t, const hap_stats *stats)
 {
   hap_session *session = w->loop->rig->session;
-  const hap_pointer_id lost = {stats->fault_pointer};
-  bool device = stats->fault == HAP_FAULT_DEVICE_READ || stats->fault == HAP_FAULT_DEVICE_WRITE;
+  const hap_pointer_id lost = {stats->faults.pointer};
+  bool device =
+      stats->faults.fault == HAP_FAULT_DEVICE_READ || stats->faults.fault == HAP_FAULT_DEVICE_WRITE;
   if (!w->loop->options->reconnect || !device || lost.v == 0) {
     return false;
   }
@@ -180,7 +181,7 @@ static hap_status look(watch *w, double t)
   }
   show_progress(w, t, &stats);
   bool plays = loop->options->play_path != NULL;
-  if (stats.fault != HAP_FAULT_NONE && !plays && !reconnect(w, t, &stats)) {
+  if (stats.faults.fault != HAP_FAULT_NONE && !plays && !reconnect(w, t, &stats)) {
     (void)hap_session_detail(loop->rig->session, w->detail);
     return HAP_ERROR_DEVICE;
   }
@@ -254,7 +255,8 @@ hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
   (void)hap_session_stats(session, stats, sizeof *stats);
   drain(loop);
   bool plays = loop->options->play_path != NULL;
-  if (status == HAP_OK && stats->fault != HAP_FAULT_NONE && !plays) { /* waited for to the end */
+  if (status == HAP_OK && stats->faults.fault != HAP_FAULT_NONE &&
+      !plays) { /* waited for to the end */
     (void)hap_session_detail(session, detail);
     return HAP_ERROR_DEVICE;
   }

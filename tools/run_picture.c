@@ -129,14 +129,15 @@ void run_picture_add_row(run_picture *picture, const hap_trace_row *row)
 
 void run_picture_add_stats(run_picture *picture, double t, const hap_stats *stats, double period_s)
 {
-  if (picture->sample_count == SAMPLES_MAX || stats->physics_steps == 0) {
+  if (picture->sample_count == SAMPLES_MAX || stats->physics.steps == 0) {
     return;
   }
-  picture->tested |= stats->probe_steps > 0;
-  double total_ms = stats->last_collide_ms + stats->last_neighbour_ms + stats->last_testing_ms +
-                    stats->last_step_ms + stats->last_publish_ms;
+  picture->tested |= stats->probes.steps > 0;
+  double total_ms = stats->physics.last.collide_ms + stats->physics.last.neighbour_ms +
+                    stats->physics.last.testing_ms + stats->physics.last.step_ms +
+                    stats->physics.last.publish_ms;
   picture->samples[picture->sample_count++] =
-      (sample){t, 1e-3 * total_ms / period_s, 1e-3 * stats->last_testing_ms / period_s};
+      (sample){t, 1e-3 * total_ms / period_s, 1e-3 * stats->physics.last.testing_ms / period_s};
 }
 
 double run_picture_interval(const run_picture *picture)

@@ -66,48 +66,48 @@ static void print_setup(const run_options *options, FILE *out)
 
 static void print_more(const hap_stats *stats, FILE *out)
 {
-  fprintf(out, "fault: %s\n", fault_name((hap_fault)stats->fault));
-  fprintf(out, "realtime: %s\n", stats->realtime != 0 ? "yes" : "no");
-  count(out, "physics_steps", stats->physics_steps);
-  count(out, "physics_missed", stats->physics_missed);
-  count(out, "probe_steps", stats->probe_steps);
-  count(out, "probes_reused", stats->probes_reused);
-  number(out, "tick_us_max", stats->tick_us_max);
-  number(out, "model_age_s_max", stats->model_age_max_s);
-  count(out, "saturated_ticks", stats->saturated_ticks);
-  count(out, "capacity_dropped", stats->capacity_dropped);
-  count(out, "trace_dropped", stats->trace_dropped);
-  count(out, "stale_times", stats->stale_times);
-  count(out, "slewed_ticks", stats->slewed_ticks);
-  count(out, "energy_ticks", stats->energy_ticks);
+  fprintf(out, "fault: %s\n", fault_name((hap_fault)stats->faults.fault));
+  fprintf(out, "realtime: %s\n", stats->loop.realtime != 0 ? "yes" : "no");
+  count(out, "physics_steps", stats->physics.steps);
+  count(out, "physics_missed", stats->physics.missed);
+  count(out, "probe_steps", stats->probes.steps);
+  count(out, "probes_reused", stats->probes.reused);
+  number(out, "tick_us_max", stats->loop.tick_us_max);
+  number(out, "model_age_s_max", stats->loop.model_age_max_s);
+  count(out, "saturated_ticks", stats->faults.saturated_ticks);
+  count(out, "capacity_dropped", stats->model.capacity_dropped);
+  count(out, "trace_dropped", stats->loop.trace_dropped);
+  count(out, "stale_times", stats->faults.stale_times);
+  count(out, "slewed_ticks", stats->faults.slewed_ticks);
+  count(out, "energy_ticks", stats->faults.energy_ticks);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats,
                        const hap_effect_info effects[HAP_EFFECTS], FILE *out)
 {
   print_setup(options, out);
-  count(out, "ticks", stats->ticks);
-  count(out, "missed_ticks", stats->missed_ticks);
-  number(out, "tick_us_p50", stats->tick_us_p50);
-  number(out, "tick_us_p99", stats->tick_us_p99);
-  number(out, "physics_ms_mean", stats->physics_ms_mean);
-  number(out, "physics_duty", stats->physics_duty);
-  number(out, "haptic_duty", stats->haptic_duty);
-  number(out, "peak_force_n", stats->peak_force_n);
-  number(out, "impulse_ns", stats->impulse_ns);
-  count(out, "contact_ticks", stats->contact_ticks);
-  count(out, "neighbours_max", stats->neighbours_max);
-  number(out, "momentum_ratio", stats->momentum_ratio);
+  count(out, "ticks", stats->loop.ticks);
+  count(out, "missed_ticks", stats->loop.missed_ticks);
+  number(out, "tick_us_p50", stats->loop.tick_us_p50);
+  number(out, "tick_us_p99", stats->loop.tick_us_p99);
+  number(out, "physics_ms_mean", stats->physics.ms_mean);
+  number(out, "physics_duty", stats->physics.duty);
+  number(out, "haptic_duty", stats->loop.duty);
+  number(out, "peak_force_n", stats->hand.peak_force_n);
+  number(out, "impulse_ns", stats->hand.impulse_ns);
+  count(out, "contact_ticks", stats->loop.contact_ticks);
+  count(out, "neighbours_max", stats->model.neighbours_max);
+  number(out, "momentum_ratio", stats->hand.momentum_ratio);
   fputs("effects: ", out);
   run_effects_print(effects, out);
-  fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->trace_hash);
-  count(out, "faults", stats->faults);
+  fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->loop.trace_hash);
+  count(out, "faults", stats->faults.count);
   print_more(stats, out);
   if (options->rig.def.lookback > 0.0) {
-    number(out, "force_error", stats->force_error);
-    number(out, "force_error_n", stats->force_error_n);
-    count(out, "lookbacks", stats->lookbacks);
-    count(out, "lookbacks_spoilt", stats->lookbacks_spoilt);
+    number(out, "force_error", stats->error.force_error);
+    number(out, "force_error_n", stats->error.force_error_n);
+    count(out, "lookbacks", stats->error.lookbacks);
+    count(out, "lookbacks_spoilt", stats->error.spoilt);
   }
 }
 

@@ -21,7 +21,7 @@ HAP_BEGIN_DECLS
 #define HAP_ACCURACY_DEFAULT 0.5
 
 /* Why a dial stands where it does. UNTOLD: nothing was touched so far, or looking back comes to no end
- * (hap_stats.lookbacks_spoilt). Values are fixed. */
+ * (hap_stats.error.spoilt). Values are fixed. */
 typedef enum hap_accuracy_reason {
   HAP_ACCURACY_ASKED = 0,  /* at hap_session_def.accuracy */
   HAP_ACCURACY_ERROR = 1,  /* as force_error_wanted calls for */

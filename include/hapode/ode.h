@@ -111,7 +111,7 @@ HAP_API HAP_NODISCARD hap_status hap_session_adopt_body(hap_session *session, dB
 /* [locked] Before dBodyDestroy: the session drops what it knows of the body, and gives back what it had
  * set on it. HAP_ERROR_NOT_FOUND: it knew nothing, which is no harm. Without it a body that is gone is
  * noticed at the next step all the same, also when a new one has got its address: it is counted
- * (hap_stats.bodies_lost, HAP_BODY_LOST) and said once. A body that is forgotten and not destroyed comes in
+ * (hap_stats.faults.bodies_lost, HAP_BODY_LOST) and said once. A body that is forgotten and not destroyed comes in
  * again as a new one. */
 HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 
@@ -127,7 +127,7 @@ HAP_API HAP_NODISCARD hap_status hap_session_set_moved_callback(hap_session *ses
                                                                 void (*callback)(dBodyID));
 
 /* [any] Poses for drawing at time_ns (see hap_session_now), of all bodies at one time, which lies behind
- * time_ns by hap_stats.pose_delay_s: one physics step, and more where steps regularly come late. Bodies
+ * time_ns by hap_stats.physics.pose_delay_s: one physics step, and more where steps regularly come late. Bodies
  * that the loop moves are where it had them at that time; the others are interpolated between two
  * physics steps (slerp). So what touches is drawn touching, and with growing time_ns nothing goes back
  * or jumps: bodies that come into the loop or leave it, and a change of model, do not show. The hand

@@ -7,7 +7,6 @@
 #include <stdint.h>
 
 #include <hapode/attributes.h>
-#include <hapode/stats.h>
 #include <hapode/status.h>
 
 HAP_BEGIN_DECLS
@@ -107,7 +106,7 @@ typedef struct hap_session_def {
       max_sweeps; /* model CONTACT: sweeps over the rows of contacts and joints in each solve of a
                          tick, 2..10000; direct solves come between them, from the second one on, so that
                          2 means none. 0: until it is solved or the tick's budget is used.
-                         Fewer are cheaper; what is not solved is in hap_stats.solver_residual_max.
+                         Fewer are cheaper; what is not solved is in hap_stats.contact.residual_max.
                          HAP_BY_ACCURACY (default): 0 at HAP_ACCURACY_DEFAULT */
   int32_t
       range_hops; /* model CONTACT: how far the range goes from the neighbours, in contacts, 0..1024:
@@ -117,7 +116,7 @@ typedef struct hap_session_def {
                          HAP_ACCURACY_DEFAULT */
   double
       lookback; /* 0..0.5, default 0: share of the period of physics in which short times of the past
-                      are gone over as model SINGLE would have had them, for hap_stats.force_error; in
+                      are gone over as model SINGLE would have had them, for hap_stats.error.force_error; in
                       LOCKSTEP all of the time is, whatever the share. 0: never */
   uint8_t
       effects[HAP_EFFECT_PLACES]; /* hap_effect_wish by hap_effect (hapode/effects.h), default all
@@ -167,7 +166,7 @@ HAP_API hap_status hap_session_stop(hap_session *session);
 
 /* [control] FRAME: runs the whole physics steps that fit into frame_s, the time since the last call
  * [s, 0 .. 86400], plus the remainder of earlier calls, at most 3; the rest is dropped and counted
- * (HAP_DROPPED, hap_stats.frames_dropped). Less time than the clock's is slow motion, none or no call a
+ * (HAP_DROPPED, hap_stats.physics.frames_dropped). Less time than the clock's is slow motion, none or no call a
  * pause: the world stands, the loop goes on with what is near, and after two steps the force fades, to
  * come back by itself. Model SINGLE needs another drive: its steps are those of the haptic loop.
  * HAP_ERROR_ARGUMENT: frame_s is not such a time. HAP_ERROR_STATE: another drive,
@@ -182,7 +181,7 @@ HAP_API hap_status hap_session_advance(hap_session *session, uint64_t ticks);
 
 /* [app] Between lock and unlock this thread alone may touch the ODE world. Served in order of arrival: it
  * waits for at most one physics step, and for what application threads before it do under the lock. Not
- * recursive. Physics waits while it is held (hap_stats.lock_held_ms_max), the haptic loop does not. Legal
+ * recursive. Physics waits while it is held (hap_stats.edits.held_ms_max), the haptic loop does not. Legal
  * before start and after stop. HAP_ERROR_THREAD, with a text, from a callback or a posted edit, where
  * the world may be touched without it, or when this thread has the lock. */
 HAP_API HAP_NODISCARD hap_status hap_session_lock(hap_session *session);
@@ -217,11 +216,6 @@ HAP_API hap_status hap_session_reset_fault(hap_session *session);
 
 /* [any] Text of the last error or fault of this session; "" when there was none. */
 HAP_API hap_status hap_session_detail(const hap_session *session, hap_detail *out);
-
-/* [any] A consistent-enough copy for display: each counter is exact, the set may straddle a tick.
- * size_of_out: sizeof *out of the caller's build. */
-HAP_API hap_status hap_session_stats(const hap_session *session, hap_stats *out,
-                                     size_t size_of_out);
 
 /* [any] Time of the session [ns]: CLOCK_MONOTONIC, in lockstep the virtual clock. */
 HAP_API int64_t hap_session_now(const hap_session *session);

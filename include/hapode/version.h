@@ -9,10 +9,10 @@ HAP_BEGIN_DECLS
 
 /* Version of these headers; the library's own: hap_version. */
 #define HAP_VERSION_MAJOR 0
-#define HAP_VERSION_MINOR 1
+#define HAP_VERSION_MINOR 2
 #define HAP_VERSION_PATCH 0
 
-/* [any] Version of the library that runs, such as "0.1.0". */
+/* [any] Version of the library that runs, such as "0.2.0". */
 HAP_API const char *hap_version(void);
 
 HAP_END_DECLS

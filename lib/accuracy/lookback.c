@@ -477,17 +477,17 @@ static void end(hapi_physics *physics)
   w->phase = HAPI_LOOKBACK_IDLE;
   w->end_ns = 0;
   if (w->spoilt) {
-    ++s->lookbacks_spoilt;
+    ++s->error.spoilt;
     return;
   }
   link_up(physics);
   double keep = exp(-1e-9 * (double)(w->to_ns - w->from_ns) / MEMORY_S);
-  ++s->lookbacks;
+  ++s->error.lookbacks;
   if (w->touched > 0) {
     w->wrong2_sum = keep * w->wrong2_sum + w->wrong2;
     w->right2_sum = keep * w->right2_sum + w->right2;
-    s->force_error = w->right2_sum > 0.0 ? sqrt(w->wrong2_sum / w->right2_sum) : HUGE_VAL;
-    s->force_error_n = sqrt(w->wrong2 / w->touched);
+    s->error.force_error = w->right2_sum > 0.0 ? sqrt(w->wrong2_sum / w->right2_sum) : HUGE_VAL;
+    s->error.force_error_n = sqrt(w->wrong2 / w->touched);
     hapi_dial_note_error(physics, w->right2 > 0.0 ? sqrt(w->wrong2 / w->right2) : HUGE_VAL,
                          w->seconds);
   }

@@ -95,7 +95,7 @@ static void collide(hapi_physics *physics)
     if (awake) {
       const hapi_touching touching = {{pair->a, pair->b}, {body_a, body_b}};
       dSurfaceParameters surface = pair->surface;
-      physics->counts.own.stats.contacts_rejected += hapi_world_make_contacts(
+      physics->counts.own.stats.faults.contacts_rejected += hapi_world_make_contacts(
           &physics->world, &physics->cycle, &touching, &surface, HAPI_CONTACT_PLAIN);
     }
   }
@@ -182,7 +182,7 @@ static bool go_over(hapi_physics *physics, uint32_t row)
     compare(physics, at.row);
     add_wrenches(physics);
     collide(physics);
-    ++physics->counts.own.stats.quickstep_calls;
+    ++physics->counts.own.stats.physics.quickstep_calls;
     dWorldQuickStep(physics->world.ode.world, period);
     if (!sound(physics)) {
       return false;

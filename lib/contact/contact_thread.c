@@ -109,7 +109,7 @@ void hapi_contact_effects(const hapi_contact *contact, hap_effect_info *out)
 
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out)
 {
-  out->capacity_dropped += atomic_load_explicit(&contact->left_out, memory_order_relaxed);
-  out->contact_us_mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
-  out->contact_us_max = 1e-3 * (double)hapi_histogram_max_ns(&contact->pass_ns);
+  out->model.capacity_dropped += atomic_load_explicit(&contact->left_out, memory_order_relaxed);
+  out->contact.us_mean = 1e-3 * hapi_histogram_mean_ns(&contact->pass_ns);
+  out->contact.us_max = 1e-3 * (double)hapi_histogram_max_ns(&contact->pass_ns);
 }

@@ -381,17 +381,17 @@ bool hapi_haptic_has_fault(const hapi_haptic *haptic)
 static void fill_times(const hapi_haptic *haptic, hap_stats *out)
 {
   const hapi_histogram *h = &haptic->figures.tick_ns;
-  out->tick_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
-  out->tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
-  out->tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
-  out->tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
-  out->haptic_duty = 1e-6 * out->tick_us_mean * haptic->config.haptic_hz;
+  out->loop.tick_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
+  out->loop.tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
+  out->loop.tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
+  out->loop.tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
+  out->loop.duty = 1e-6 * out->loop.tick_us_mean * haptic->config.haptic_hz;
   h = &haptic->figures.wake_ns;
-  out->wake_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
-  out->wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
-  out->wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
-  out->wake_us_p999 = 1e-3 * hapi_histogram_quantile_ns(h, 0.999);
-  out->wake_us_max = 1e-3 * hapi_histogram_max_ns(h);
+  out->loop.wake_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
+  out->loop.wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
+  out->loop.wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
+  out->loop.wake_us_p999 = 1e-3 * hapi_histogram_quantile_ns(h, 0.999);
+  out->loop.wake_us_max = 1e-3 * hapi_histogram_max_ns(h);
 }
 
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
@@ -401,31 +401,31 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   for (int i = 0; i < 3; ++i) {
     impulse[i] = LOAD(hand_impulse[i]);
   }
-  out->model = (uint32_t)LOAD(model);
-  out->ticks = LOAD(ticks);
-  out->missed_ticks = LOAD(missed_ticks);
-  out->contact_ticks = LOAD(contact_ticks);
-  out->model_age_s = 1e-9 * (double)LOAD(age_ns);
-  out->model_age_max_s = 1e-9 * (double)LOAD(age_max_ns);
-  out->models_adopted = LOAD(models_adopted);
-  out->contact_passes = LOAD(contact_passes);
-  out->local_contacts = LOAD(local_contacts);
-  out->solver_sweeps = LOAD(solver_sweeps);
-  out->solver_residual_max = LOAD(solver_residual);
-  out->impulse_ns = hapi_v3_norm(impulse);
-  out->impulse_abs_ns = LOAD(hand_impulse_abs);
-  out->peak_force_n = LOAD(peak_force);
-  out->saturated_ticks = LOAD(saturated_ticks);
-  out->faults = LOAD(faults);
-  out->fault = (uint32_t)LOAD(fault);
-  out->fault_pointer = LOAD(fault_pointer);
-  out->stale_times = LOAD(stale_times);
-  out->stale_ticks = LOAD(stale_ticks);
-  out->slewed_ticks = LOAD(slewed_ticks);
-  out->energy_ticks = LOAD(energy_ticks);
-  out->realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
-  out->trace_dropped = LOAD(trace_dropped);
-  out->trace_hash = LOAD(hash);
+  out->loop.model = (uint32_t)LOAD(model);
+  out->loop.ticks = LOAD(ticks);
+  out->loop.missed_ticks = LOAD(missed_ticks);
+  out->loop.contact_ticks = LOAD(contact_ticks);
+  out->loop.model_age_s = 1e-9 * (double)LOAD(age_ns);
+  out->loop.model_age_max_s = 1e-9 * (double)LOAD(age_max_ns);
+  out->loop.models_adopted = LOAD(models_adopted);
+  out->contact.passes = LOAD(contact_passes);
+  out->contact.points = LOAD(local_contacts);
+  out->contact.sweeps = LOAD(solver_sweeps);
+  out->contact.residual_max = LOAD(solver_residual);
+  out->hand.impulse_ns = hapi_v3_norm(impulse);
+  out->hand.impulse_abs_ns = LOAD(hand_impulse_abs);
+  out->hand.peak_force_n = LOAD(peak_force);
+  out->faults.saturated_ticks = LOAD(saturated_ticks);
+  out->faults.count = LOAD(faults);
+  out->faults.fault = (uint32_t)LOAD(fault);
+  out->faults.pointer = LOAD(fault_pointer);
+  out->faults.stale_times = LOAD(stale_times);
+  out->faults.stale_ticks = LOAD(stale_ticks);
+  out->faults.slewed_ticks = LOAD(slewed_ticks);
+  out->faults.energy_ticks = LOAD(energy_ticks);
+  out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
+  out->loop.trace_dropped = LOAD(trace_dropped);
+  out->loop.trace_hash = LOAD(hash);
 }
 
 size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity)

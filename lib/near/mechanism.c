@@ -25,7 +25,7 @@ static bool add_member(hapi_physics *physics, uint32_t known)
   entry(physics, known)->rest->gathered_in = range->number;
   if (range->member_count == physics->config.capacity.bodies ||
       range->owned + range->moving + moves > physics->config.max_bodies) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return false;
   }
   uint32_t at = range->member_count++;
@@ -92,7 +92,7 @@ static bool add_joint(hapi_physics *physics, dJointID joint)
     return true;
   }
   if (range->joint_count == physics->config.capacity.joints) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return false;
   }
   known->gathered_in = range->number;

@@ -259,7 +259,7 @@ uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]
   double local[6];
   uint32_t found = 0;
   if (mesh == NULL) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return FOUND_MAX; /* ODE collides it: a body that the loop moved would fall through */
   }
   box_to_geom(geom, box, local);

@@ -72,7 +72,7 @@ static void collect_geom(void *data, dGeomID a, dGeomID b)
     return;
   }
   if (hood->candidate_count == hood->candidate_capacity && !grow(hood)) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return;
   }
   hapi_candidate *candidate = &hood->candidates[hood->candidate_count++];
@@ -275,7 +275,7 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
                 (!has_body || known != NULL) &&
                 (known == NULL || counted || bodies < physics->config.max_bodies);
     if (!room) {
-      ++physics->counts.own.stats.capacity_dropped;
+      ++physics->counts.own.stats.model.capacity_dropped;
       continue;
     }
     if (known != NULL && !counted) {
@@ -332,7 +332,8 @@ static void take_hit(hapi_physics *physics, hapi_hit *hit)
     contact = hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
   }
   if (contact == NULL) {
-    ++physics->counts.own.stats.capacity_dropped; /* until the loop has let go of an old slot */
+    ++physics->counts.own.stats.model
+          .capacity_dropped; /* until the loop has let go of an old slot */
     return;
   }
   contact->wanted = true;

@@ -49,7 +49,7 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
   }
   uint32_t slot = hapi_slots_body(physics, known);
   if (slot == HAPI_NONE || range->count == physics->config.capacity.bodies) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return false;
   }
   hapi_body_slot *local = &physics->near.slots.bodies[slot];
@@ -141,12 +141,12 @@ static uint32_t take_geom(hapi_physics *physics, dGeomID geom)
     }
   }
   if (range->near->geom_count == physics->config.capacity.geoms) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return HAPI_NONE;
   }
   uint32_t index = range->near->geom_count;
   if (!fill_geom(physics, geom, &hapi_near_geoms(range->near)[index])) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return HAPI_NONE;
   }
   range->geoms[index] = geom;
@@ -227,7 +227,7 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
   bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
       near->pair_count == physics->config.capacity.contacts) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return;
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
@@ -246,7 +246,7 @@ static uint32_t add_triangle(hapi_physics *physics, const hapi_near_triangle *tr
   hapi_near *near = range->near;
   if (near->geom_count == physics->config.capacity.geoms ||
       near->point_count + 3 > physics->config.capacity.hull_points) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return HAPI_NONE;
   }
   hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
@@ -305,7 +305,7 @@ static void add_tool_pair(hapi_physics *physics, const hapi_hit *hit, uint32_t g
 {
   hapi_near *near = physics->near.range.near;
   if (geom == HAPI_NONE || near->tool_pair_count == physics->config.capacity.contacts) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return;
   }
   hapi_near_tool_pair *pair = &hapi_near_tool_pairs(near)[near->tool_pair_count++];
@@ -481,7 +481,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   }
   if (!hapi_reserve((void **)&range->links, &range->link_capacity, range->link_count, 1,
                     sizeof *range->links)) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     range->links_missing = true;
     return;
   }
@@ -802,14 +802,14 @@ static void fill_body(hapi_physics *physics, uint32_t known, hapi_near_body *out
 static void count_roles(hapi_physics *physics)
 {
   hap_stats *stats = &physics->counts.own.stats;
-  stats->range_bodies = stats->edge_bodies = stats->measured_bodies = 0;
-  stats->range_joints = physics->near.range.joint_count;
+  stats->model.range_bodies = stats->model.edge_bodies = stats->model.measured_bodies = 0;
+  stats->model.range_joints = physics->near.range.joint_count;
   for (uint32_t i = 0; i < physics->near.range.count; ++i) {
     uint32_t flags =
         physics->near.slots.bodies[entry(physics, physics->near.range.queue[i])->slot].flags;
-    stats->range_bodies += (flags & HAPI_BODY_OWNED) != 0;
-    stats->measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
-    stats->edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+    stats->model.range_bodies += (flags & HAPI_BODY_OWNED) != 0;
+    stats->model.measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
+    stats->model.edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
   }
 }
 

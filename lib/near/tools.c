@@ -112,7 +112,7 @@ static void add_mesh(search *s, dGeomID geom)
         .shape = {.kind = HAPI_SHAPE_HULL, .hull = triangle->corners, .hull_count = 3}};
     add_shape(s, &other, triangle->corners, triangle->open_edges);
   }
-  s->physics->counts.own.stats.capacity_dropped += count == HAPI_NEAR_TRIANGLES;
+  s->physics->counts.own.stats.model.capacity_dropped += count == HAPI_NEAR_TRIANGLES;
 }
 
 bool hapi_tool_knows(dGeomID geom)
@@ -364,7 +364,7 @@ void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body)
                                   : hapi_slots_new_contact(physics, body, hit->geom, hit->pointer,
                                                            point->tool.pointer_generation);
     if (slot == NULL) {
-      ++physics->counts.own.stats.capacity_dropped;
+      ++physics->counts.own.stats.model.capacity_dropped;
       return;
     }
     place_slot(physics, slot, hit, point);

@@ -143,12 +143,12 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
   f->step_s += seconds[3];
   f->publish_s += seconds[4];
   ++f->cycles;
-  s->physics_steps += physics->cycle.step_s > 0.0;
-  s->last_collide_ms = 1e3 * seconds[0];
-  s->last_neighbour_ms = 1e3 * seconds[1];
-  s->last_testing_ms = 1e3 * seconds[2];
-  s->last_step_ms = 1e3 * seconds[3];
-  s->last_publish_ms = 1e3 * seconds[4];
+  s->physics.steps += physics->cycle.step_s > 0.0;
+  s->physics.last.collide_ms = 1e3 * seconds[0];
+  s->physics.last.neighbour_ms = 1e3 * seconds[1];
+  s->physics.last.testing_ms = 1e3 * seconds[2];
+  s->physics.last.step_ms = 1e3 * seconds[3];
+  s->physics.last.publish_ms = 1e3 * seconds[4];
   hapi_histogram_add(&physics->counts.cycle_ns, (int64_t)(1e9 * total));
   hapi_dial_note(physics, total, looked_s);
   hapi_counts_show(physics);

@@ -42,7 +42,7 @@ void hapi_edits_run(hapi_physics *physics)
   physics->lock.editable = true;
   for (uint32_t i = 0; i < count && take_edit(physics, &edit); ++i) {
     edit.run(edit.arg);
-    ++physics->counts.own.stats.edits_run;
+    ++physics->counts.own.stats.edits.run;
   }
   physics->lock.editable = false;
 }

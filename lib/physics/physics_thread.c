@@ -16,7 +16,7 @@ static int64_t nanoseconds(double seconds)
 
 static void count_missed(hapi_physics *physics, int64_t deadlines)
 {
-  physics->counts.own.stats.physics_missed += (uint64_t)deadlines; /* shown with the next cycle */
+  physics->counts.own.stats.physics.missed += (uint64_t)deadlines; /* shown with the next cycle */
   physics->tape.missed_unrecorded += (uint32_t)deadlines;
 }
 

@@ -108,7 +108,7 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   }
   bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
                hapi_finite(out->twist.angular, 3);
-  physics->counts.own.stats.states_rejected += !sound;
+  physics->counts.own.stats.faults.states_rejected += !sound;
   return sound;
 }
 
@@ -138,7 +138,7 @@ static bool fill_tool(hapi_physics *physics, const hapi_contact_slot *slot, hapi
     return true;
   }
   if (out->tool_count == physics->config.capacity.tool_points) {
-    ++physics->counts.own.stats.capacity_dropped;
+    ++physics->counts.own.stats.model.capacity_dropped;
     return false;
   }
   hapi_model_tools(out)[out->tool_count] = slot->tool;
@@ -178,14 +178,14 @@ static uint32_t count_bounces(const hapi_physics *physics, hapi_model *model)
 static void count_model(hapi_physics *physics, const hapi_model *model)
 {
   hap_stats *stats = &physics->counts.own.stats;
-  stats->neighbours = hapi_neighbors_bodies(physics);
-  stats->pointer_contacts = model->contact_count;
+  stats->model.neighbours = hapi_neighbors_bodies(physics);
+  stats->model.pointer_contacts = model->contact_count;
   if (physics->cycle.model == HAP_MODEL_CONTACT && physics->near.range.number == model->number) {
-    stats->pointer_contacts +=
+    stats->model.pointer_contacts +=
         physics->near.range.near->tool_pair_count; /* whose points are found later */
   }
-  if (stats->neighbours > stats->neighbours_max) {
-    stats->neighbours_max = stats->neighbours;
+  if (stats->model.neighbours > stats->model.neighbours_max) {
+    stats->model.neighbours_max = stats->model.neighbours;
   }
 }
 
@@ -242,7 +242,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->bounces = count_bounces(physics, out);
   fill_watch(physics, out);
   count_model(physics, out);
-  out->touches = physics->counts.own.stats.pointer_contacts;
+  out->touches = physics->counts.own.stats.model.pointer_contacts;
   hapi_effects_note(physics, out);
   hapi_tape_model(physics);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */

@@ -106,7 +106,7 @@ static void take_body(hapi_physics *physics, uint32_t index)
     return;
   }
   if (!sound(in)) {
-    ++physics->counts.own.stats.states_rejected;
+    ++physics->counts.own.stats.faults.states_rejected;
     hapi_slots_renew(slot);
     return;
   }

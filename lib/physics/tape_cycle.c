@@ -313,8 +313,8 @@ void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     physics->tape.read = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLE, 0);
     physics->tape.read_end = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLED, 0);
     dRandSetSeed((unsigned long)physics->tape.read->u[HAPI_CYCLE_SEED]);
-    physics->counts.own.stats.physics_missed += physics->tape.read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
-    physics->counts.own.stats.frames_dropped += physics->tape.read->u[HAPI_CYCLE_DROPPED];
+    physics->counts.own.stats.physics.missed += physics->tape.read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
+    physics->counts.own.stats.physics.frames_dropped += physics->tape.read->u[HAPI_CYCLE_DROPPED];
   }
   physics->tape.locks = 0;
   physics->tape.missed_unrecorded = 0;

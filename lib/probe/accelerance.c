@@ -217,8 +217,8 @@ static void keep(hapi_physics *physics, hapi_contact_slot *contact)
       keep_turn(contact, &free, normal);
     }
   }
-  stats->probes_singular += kind == HAPI_ADMITTANCE_SINGULAR;
-  stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  stats->probes.singular += kind == HAPI_ADMITTANCE_SINGULAR;
+  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
   if (kind != HAPI_ADMITTANCE_SINGULAR) {
     memcpy(contact->a, contact->measured, sizeof contact->a);
     contact->probed = true;

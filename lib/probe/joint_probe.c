@@ -214,7 +214,7 @@ static void begin_step(const pair *p)
 
 static void end_step(const pair *p, twists *out)
 {
-  ++p->physics->counts.own.stats.probe_steps;
+  ++p->physics->counts.own.stats.probes.steps;
   (void)dWorldStep(p->physics->world.ode.world, p->period);
   read_twists(p, out);
 }
@@ -585,9 +585,9 @@ static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *w
   hapi_admittance kind =
       hapi_admittance_rows((const double(*)[6])p->free, (const double(*)[6])held, rows, &count);
   bool whole = p->lost <= MOMENTUM_SLACK; /* false for NaN */
-  stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
   if (!whole || kind == HAPI_ADMITTANCE_SINGULAR) {
-    ++stats->probes_singular;
+    ++stats->probes.singular;
     say_not_held(p->physics, whole);
     return false;
   }
@@ -761,8 +761,8 @@ void hapi_joint_probes(hapi_physics *physics)
 {
   hapi_joint_table *table = &physics->world.joints;
   hap_stats *stats = &physics->counts.own.stats;
-  stats->measured_joints = 0;
-  stats->joint_error = 0.0;
+  stats->model.measured_joints = 0;
+  stats->model.joint_error = 0.0;
   if (physics->cycle.model != HAP_MODEL_CONTACT) {
     return;
   }
@@ -783,8 +783,8 @@ void hapi_joint_probes(hapi_physics *physics)
       measure(physics, known);
     }
     if (known->measurement != NULL && taken) {
-      ++stats->measured_joints;
-      stats->joint_error = fmax(stats->joint_error, known->measurement->error);
+      ++stats->model.measured_joints;
+      stats->model.joint_error = fmax(stats->model.joint_error, known->measurement->error);
     }
   }
 }

@@ -110,9 +110,9 @@ static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], co
   hapi_accelerance_free_body(tested->body, tested->rotation, &free);
   hapi_admittance kind =
       hapi_finite(base, 6) ? hapi_admittance_tidy_body(&free, a) : HAPI_ADMITTANCE_SINGULAR;
-  stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
   if (kind == HAPI_ADMITTANCE_SINGULAR) {
-    ++stats->probes_singular; /* the last good one stays, or the body is outside */
+    ++stats->probes.singular; /* the last good one stays, or the body is outside */
     slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
     slot->flags |= slot->measured ? (uint32_t)HAPI_BODY_WHOLE : 0u;
     hapi_reuse_spoil(physics, book_of(physics), slot->known);

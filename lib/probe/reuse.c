@@ -357,7 +357,7 @@ void hapi_reuse_keep(hapi_physics *physics, hapi_reuse_book *book)
     if (island->spoiled || !keep_island(physics, book, island)) {
       place_of(physics, book, island)->round = 0;
     }
-    physics->counts.own.stats.probes_reused +=
+    physics->counts.own.stats.probes.reused +=
         island->kind != HAPI_REUSE_NONE ? island->pushed_count : 0;
   }
 }

@@ -438,8 +438,8 @@ void hapi_test_rewind(hapi_physics *physics)
 
 void hapi_test_step(hapi_physics *physics)
 {
-  ++physics->counts.own.stats.probe_steps;
-  ++physics->counts.own.stats.quickstep_calls;
+  ++physics->counts.own.stats.probes.steps;
+  ++physics->counts.own.stats.physics.quickstep_calls;
   dWorldQuickStep(physics->world.ode.world, physics->cycle.probe_step_s);
 }
 

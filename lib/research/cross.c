@@ -81,7 +81,7 @@ static hapi_cross *place_for(hapi_physics *physics, double response)
   if (physics->research.cross_count < physics->config.capacity.crosses) {
     return &physics->research.crosses[physics->research.cross_count++];
   }
-  ++physics->counts.own.stats.capacity_dropped;
+  ++physics->counts.own.stats.model.capacity_dropped;
   hapi_cross *least = &physics->research.crosses[0];
   for (uint32_t i = 1; i < physics->research.cross_count; ++i) {
     if (physics->research.crosses[i].response < least->response) {
@@ -139,8 +139,8 @@ void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index)
     double share = 0.0;
     if (answers(physics, contact, i)) {
       hapi_admittance kind = tidy(physics, contact, i, &share);
-      stats->probes_singular += kind == HAPI_ADMITTANCE_SINGULAR;
-      stats->probes_clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+      stats->probes.singular += kind == HAPI_ADMITTANCE_SINGULAR;
+      stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
     }
     if (share > SHARE_LEAST) {
       keep_block(physics, contact_index, i);

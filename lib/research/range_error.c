@@ -155,7 +155,7 @@ void hapi_range_error_measure(hapi_physics *physics)
   }
   compare_all(physics);
   /* Not in the collision phase: who asks for a surface first says in which order a pair is looked at. */
-  physics->counts.own.stats.contacts_rejected +=
+  physics->counts.own.stats.faults.contacts_rejected +=
       hapi_world_collide_carried(&physics->world, &physics->cycle);
   hap_status status = hapi_test_gather_owned(physics);
   physics->probe.test.keeps_order = true;

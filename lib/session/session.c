@@ -452,12 +452,13 @@ const char *hap_fault_text(hap_fault fault)
 /* Says which pointer a fault came from, by the number of its place, and what its device says to it. */
 static void write_fault(hapi_haptic *haptic, const hap_stats *stats, hap_detail *out)
 {
-  const char *text = hap_fault_text((hap_fault)stats->fault);
-  unsigned place = (unsigned)(stats->fault_pointer & 0xffffffffu);
-  bool device = stats->fault == HAP_FAULT_DEVICE_READ || stats->fault == HAP_FAULT_DEVICE_WRITE;
+  const char *text = hap_fault_text((hap_fault)stats->faults.fault);
+  unsigned place = (unsigned)(stats->faults.pointer & 0xffffffffu);
+  bool device =
+      stats->faults.fault == HAP_FAULT_DEVICE_READ || stats->faults.fault == HAP_FAULT_DEVICE_WRITE;
   hap_detail why = {""};
   if (device && place != 0) {
-    const hap_pointer_id id = {stats->fault_pointer};
+    const hap_pointer_id id = {stats->faults.pointer};
     hapi_haptic_explain(haptic, id, &why);
   }
   if (place == 0) {
@@ -510,7 +511,7 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
   *out = s->detail;
   pthread_mutex_unlock(&s->detail_lock);
   hapi_haptic_stats(session->haptic, &stats);
-  if (stats.fault != HAP_FAULT_NONE && stats.fault != HAP_FAULT_WORLD) {
+  if (stats.faults.fault != HAP_FAULT_NONE && stats.faults.fault != HAP_FAULT_WORLD) {
     write_fault(session->haptic, &stats, out);
   }
   return HAP_OK;

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include <hapode/session.h>
+#include <hapode/stats.h>
 
 #include "sync/exchange.h"
 #include "world/settings.h"

@@ -362,10 +362,10 @@ static void look_at_momentum(bounds *b)
   }
   /* of one interval, and rounding */
   double allowed = now - before + 1e-9 * now + 1e-12;
-  b->residual = fmax(b->residual, stats.momentum_error_ns / allowed);
-  b->finite = b->finite && isfinite(stats.momentum_error_ns);
-  b->fault = stats.fault != 0 ? stats.fault : b->fault;
-  b->contact_ticks = stats.contact_ticks;
+  b->residual = fmax(b->residual, stats.hand.momentum_error_ns / allowed);
+  b->finite = b->finite && isfinite(stats.hand.momentum_error_ns);
+  b->fault = stats.faults.fault != 0 ? stats.faults.fault : b->fault;
+  b->contact_ticks = stats.loop.contact_ticks;
 }
 
 /* The shape alone, of a body with one geom in its middle. */
