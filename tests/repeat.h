@@ -122,9 +122,9 @@ static inline void repeat_set_layout(repeat_layout layout)
 
 /* ---- what a run is like, tick by tick ---- */
 
-#define REPEAT_STAGES 5
-static const char *const repeat_stages[REPEAT_STAGES] = {"the loop", "the world's bodies", "joints",
-                                                         "pointer contacts", "extents"};
+#define REPEAT_STAGES 6
+static const char *const repeat_stages[REPEAT_STAGES] = {
+    "the loop", "the world's bodies", "joints", "pointer contacts", "extents", "looking back"};
 
 typedef struct repeat_row {
   uint64_t hashes[REPEAT_STAGES];
@@ -177,6 +177,12 @@ static inline uint64_t repeat_hash_joints(const hapi_joint_table *table)
   return hash;
 }
 
+static inline uint64_t repeat_hash_lookbacks(const hap_stats *stats)
+{
+  uint64_t hash = hapi_hash_doubles(HAPI_HASH_BEGIN, &stats->error.force_error, 1);
+  return hapi_hash_word(hash, stats->error.lookbacks << 32 | stats->error.spoilt);
+}
+
 static inline uint64_t repeat_hash_contacts(const hapi_physics *physics)
 {
   uint64_t hash = HAPI_HASH_BEGIN;
@@ -202,7 +208,7 @@ static inline void repeat_note(repeat_log *log, hap_session *session)
   log->rows[log->count++] =
       (repeat_row){{stats.loop.trace_hash, repeat_hash_bodies(&physics->world.bodies),
                     repeat_hash_joints(&physics->world.joints), repeat_hash_contacts(physics),
-                    repeat_hash_extents(&physics->world.bodies)}};
+                    repeat_hash_extents(&physics->world.bodies), repeat_hash_lookbacks(&stats)}};
 }
 
 /* The same in all of it? Says where it begins to differ, stage by stage. */

@@ -9,10 +9,11 @@
 #include "tests/contact_world.h"
 #include "tests/repeat.h"
 
-#define EDGE 0.1    /* m, of the cubes */
-#define SLAB 0.2    /* m, their ground is so thick */
-#define TICKS 1000  /* of a run */
-#define EDIT_AT 130 /* an edit every so many ticks: physics steps every 50 */
+#define EDGE 0.1         /* m, of the cubes */
+#define SLAB 0.2         /* m, their ground is so thick */
+#define TICKS 1000       /* of a run */
+#define EDIT_AT 130      /* an edit every so many ticks: physics steps every 50 */
+#define RARE_EDIT_AT 400 /* windows of looking back pass between two edits */
 
 typedef struct scene {
   contact_world w;
@@ -27,6 +28,8 @@ typedef struct edit_case {
   const char *name;
   void (*begin)(scene *s); /* may be NULL */
   void (*edit)(scene *s);
+  bool tool;       /* the hand is a box */
+  double lookback; /* of the session's def */
 } edit_case;
 
 static void add_box_geom(scene *s, int i, double edge)
@@ -224,10 +227,19 @@ static void run_case(repeat_log *log, const void *arg)
   if (c->begin != NULL) {
     c->begin(&s);
   }
+  double corners[8][3];
+  for (int i = 0; i < 24; ++i) {
+    corners[i / 3][i % 3] = (i / 3 >> i % 3 & 1) != 0 ? 0.01 : -0.01;
+  }
+  s.w.hand_def.hull_xyz = c->tool ? corners[0] : NULL;
+  s.w.hand_def.hull_points = c->tool ? 8 : 0;
+  s.w.hand_def.friction = c->tool ? 0.5 : 0.0;
+  s.w.def.lookback = c->lookback;
   CHECK(cw_start(&s.w, -0.07, 0.01, 0.5 * EDGE));
   hap_status status = HAP_OK;
+  int every = c->lookback > 0.0 ? RARE_EDIT_AT : EDIT_AT;
   for (int i = 0; i < TICKS && status == HAP_OK; ++i) {
-    if (i % EDIT_AT == EDIT_AT - 1) {
+    if (i % every == every - 1) {
       c->edit(&s);
       ++s.edits;
     }
@@ -239,6 +251,7 @@ static void run_case(repeat_log *log, const void *arg)
   hap_stats stats = cw_stats(&s.w);
   CHECK(status == HAP_OK && stats.loop.contact_ticks > 100 && stats.faults.count == 0);
   CHECK(stats.faults.bodies_lost == 0 && stats.model.range_bodies == 2);
+  CHECK(c->lookback == 0.0 || (stats.error.lookbacks > 0 && stats.error.spoilt > 0));
   cw_close(&s.w);
 }
 
@@ -254,6 +267,10 @@ TEST(what_is_replaced)
       {"a fixed joint", fix, replace_fixed},
       {"a joint that is measured", slide, replace_slide},
       {"a body and its joint", begin_hinge, replace_body_on_hinge},
+      {"a geom at a tool", NULL, replace_geom, .tool = true},
+      {"a geom at a tool, by its like", NULL, replace_geom_by_its_like, .tool = true},
+      {"a geom, looking back", NULL, replace_geom, .lookback = 0.1},
+      {"a static geom, looking back", NULL, replace_slab, .lookback = 0.1},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     bool same = repeat_run(run_case, &cases[i]);

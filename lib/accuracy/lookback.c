@@ -100,6 +100,21 @@ void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
   w->pairs[at].surface.mode &= ~dContactFDir1; /* a direction is the application's, at each step */
 }
 
+/* A window in which the geom takes part is spoilt: a new one may have its address. */
+void hapi_lookback_forget_geom(hapi_lookback *w, dGeomID geom)
+{
+  for (uint32_t i = 0; i < w->pair_count && w->phase != HAPI_LOOKBACK_IDLE; ++i) {
+    w->spoilt = w->spoilt || w->pairs[i].a == geom || w->pairs[i].b == geom;
+  }
+  for (uint32_t i = 0; i < w->touch_count; ++i) {
+    if (w->touches[i].geom == geom) {
+      w->touches[i].geom = NULL;
+      w->touches[i].noted = false;
+      w->spoilt = true;
+    }
+  }
+}
+
 /* The pair's place; HAPI_NONE: none left. */
 static uint32_t place_of(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
 {

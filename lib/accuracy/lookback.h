@@ -142,6 +142,7 @@ void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the s
 void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
 void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
                        const dSurfaceParameters *surface);      /* a pair that collides */
+void hapi_lookback_forget_geom(hapi_lookback *w, dGeomID geom); /* before it is destroyed */
 void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
 void hapi_lookback_reset(hapi_physics *physics);
 void hapi_lookback_finish(hapi_lookback *w);

@@ -21,7 +21,6 @@
 
 #define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
 #define LINK_GRAVITY 9.81
-#define NAMES_PER_GEOM 4u /* of the message; 2 are needed */
 
 static uint32_t range_capacity(const hapi_physics *physics)
 {
@@ -162,54 +161,6 @@ static uint64_t key_of(uint64_t a, uint64_t b, uint32_t part)
   return hapi_index_mix(both) ^ hapi_index_mix(part + 1u);
 }
 
-static bool is_current(const hapi_range *range, const hapi_geom_name *name)
-{
-  return name->walk + 1 >= range->number;
-}
-
-static void drop_old_names(hapi_range *range)
-{
-  uint32_t kept = 0;
-  hapi_index_clear(&range->names_by_address);
-  for (uint32_t i = 0; i < range->name_count; ++i) {
-    if (is_current(range, &range->names[i])) {
-      range->names[kept] = range->names[i];
-      hapi_index_put(&range->names_by_address, hapi_index_address(range->names[i].geom), kept++);
-    }
-  }
-  range->name_count = kept;
-}
-
-/* A number that the geom has as long as it stays in the range. A new one may have the address of a geom
- * that was forgotten, or another one, as the heap likes: what goes on with the contact impulses of
- * the old one must not hang on it. */
-static uint64_t name_of(hapi_range *range, dGeomID geom)
-{
-  uint32_t at = hapi_index_get(&range->names_by_address, hapi_index_address(geom));
-  if (at == HAPI_INDEX_NONE && range->name_count == range->name_capacity) {
-    drop_old_names(range); /* of two walks, each with capacity.geoms at most: there is room */
-  }
-  if (at == HAPI_INDEX_NONE) {
-    at = range->name_count++;
-    range->names[at] = (hapi_geom_name){.geom = geom};
-    hapi_index_put(&range->names_by_address, hapi_index_address(geom), at);
-  }
-  hapi_geom_name *name = &range->names[at];
-  if (name->number == 0 || !is_current(range, name)) {
-    name->number = ++range->names_given;
-  }
-  name->walk = range->number;
-  return name->number;
-}
-
-void hapi_range_forget_geom(hapi_range *range, dGeomID geom)
-{
-  uint32_t at = hapi_index_get(&range->names_by_address, hapi_index_address(geom));
-  if (at != HAPI_INDEX_NONE) {
-    range->names[at].number = 0;
-  }
-}
-
 /* Where nobody said that a geom was destroyed: its body's slot has another generation, if the body has
  * gone, too. */
 static uint64_t holder_of(const hapi_near_geom *geom)
@@ -232,7 +183,8 @@ static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
   const hapi_near_geom *geoms = hapi_near_geoms(near);
-  pair->key = key_of(name_of(range, link->own), name_of(range, link->other), part) +
+  pair->key = key_of(hapi_geom_names_get(&range->names, link->own, range->number),
+                     hapi_geom_names_get(&range->names, link->other, range->number), part) +
               holder_of(&geoms[geom_a]) + holder_of(&geoms[geom_b]);
   pair->geom_a = turned ? geom_b : geom_a;
   pair->geom_b = turned ? geom_a : geom_b;
@@ -834,8 +786,8 @@ void hapi_range_reset(hapi_physics *physics)
   hapi_range *range = &physics->near.range;
   memset(range->pair_places, 0, range->pair_place_count * sizeof *range->pair_places);
   range->number = 0;
-  range->name_count = 0;
-  hapi_index_clear(&range->names_by_address);
+  hapi_geom_names_clear(&range->names);
+  hapi_geom_names_clear(&physics->near.tools.names);
   for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
     physics->world.bodies.entries[i].rest->ranged_in = 0;
     physics->world.bodies.entries[i].rest->gathered_in = 0;
@@ -857,13 +809,10 @@ bool hapi_range_create(hapi_physics *physics)
     range->pair_place_count *= 2;
   }
   range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
-  range->name_capacity = NAMES_PER_GEOM * c->geoms;
-  range->names = hapi_alloc_array(range->name_capacity, sizeof *range->names);
   range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
   return range->queue != NULL && range->geoms != NULL && range->members != NULL &&
-         range->joints != NULL && range->pair_places != NULL && range->names != NULL &&
-         hapi_index_reserve(&range->names_by_address, range->name_capacity) &&
-         range->box_geom != NULL && hapi_cover_create(&range->cover);
+         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL &&
+         hapi_cover_create(&range->cover);
 }
 
 void hapi_range_finish(hapi_physics *physics)
@@ -879,7 +828,6 @@ void hapi_range_finish(hapi_physics *physics)
   hapi_free(range->members);
   hapi_free(range->joints);
   hapi_free(range->pair_places);
-  hapi_free(range->names);
-  hapi_index_finish(&range->names_by_address);
+  hapi_geom_names_finish(&range->names);
   memset(range, 0, sizeof *range);
 }

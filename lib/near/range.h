@@ -13,6 +13,7 @@
 
 #include "base/index.h"
 #include "near/cover.h"
+#include "near/geom_names.h"
 #include "sync/messages.h"
 #include "world/surfaces.h"
 
@@ -22,12 +23,6 @@ typedef struct hapi_pair_place {
   uint64_t key;
   uint64_t walk; /* that noted it */
 } hapi_pair_place;
-
-typedef struct hapi_geom_name {
-  dGeomID geom;    /* compared only */
-  uint64_t number; /* from 1; 0: it was forgotten */
-  uint64_t walk;   /* newest one that met it */
-} hapi_geom_name;
 
 typedef struct hapi_range {
   hapi_near *near; /* message being written */
@@ -43,11 +38,7 @@ typedef struct hapi_range {
   uint32_t pair_place_count;
   uint32_t pairs_noted;
   bool refused; /* a body within the hops that the loop cannot own */
-  hapi_geom_name *names;
-  uint32_t name_count;
-  uint32_t name_capacity;
-  hapi_index names_by_address;
-  uint64_t names_given;
+  hapi_geom_names names;
   bool pair_found;  /* scratch */
   double own_speed; /* m/s, while ODE calls back */
   double fastest;   /* m/s, of the pointers */
@@ -71,7 +62,6 @@ typedef struct hapi_range {
 bool hapi_range_create(hapi_physics *physics);
 void hapi_range_finish(hapi_physics *physics);
 void hapi_range_reset(hapi_physics *physics);
-void hapi_range_forget_geom(hapi_range *range, dGeomID geom);
 void hapi_range_walk(hapi_physics *physics, uint32_t hit_count);
 void hapi_range_publish(hapi_physics *physics); /* with the model of the same number */
 

@@ -178,12 +178,14 @@ static void reduce(search *s)
 
 /* ---- hits ---- */
 
-uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t pointer)
+uint64_t hapi_tool_geom_key(hapi_physics *physics, dGeomID geom, uint32_t pointer)
 {
   uint32_t known = hapi_bodies_find(&physics->world.bodies, dGeomGetBody(geom));
   uint32_t slot = known != HAPI_NONE ? physics->world.bodies.entries[known].slot : HAPI_NONE;
   uint64_t holder = slot != HAPI_NONE ? physics->near.slots.bodies[slot].generation : 0;
-  uint64_t key = (uint64_t)(uintptr_t)geom + (holder << 48);
+  uint64_t name =
+      hapi_geom_names_get(&physics->near.tools.names, geom, physics->cycle.model_number + 1);
+  uint64_t key = name + (holder << 48);
   return hapi_tool_key(key, pointer, hapi_state_pointers(physics->cycle.state)[pointer].generation);
 }
 

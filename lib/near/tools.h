@@ -10,6 +10,7 @@
 
 #include <ode/ode.h>
 
+#include "near/geom_names.h"
 #include "near/neighbors.h"
 #include "sync/messages.h"
 #include "sync/touch_local.h"
@@ -37,6 +38,7 @@ typedef struct hapi_tool_search {
   hapi_found_point *points;
   uint32_t count;
   uint32_t capacity;
+  hapi_geom_names names; /* of the geoms near hulls */
   bool said_not_touched; /* of a heightfield by a hull, once a session */
 } hapi_tool_search;
 
@@ -45,7 +47,7 @@ bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi
 /* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
 uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
                           hapi_found_point out[HAPI_TOOL_SPOTS]);
-uint64_t hapi_tool_geom_key(const hapi_physics *physics, dGeomID geom, uint32_t pointer);
+uint64_t hapi_tool_geom_key(hapi_physics *physics, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
 void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
 

@@ -99,7 +99,9 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
     candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
   }
   physics->world.bodies.geoms_forgotten = true;
-  hapi_range_forget_geom(&physics->near.range, (dGeomID)(uintptr_t)geom);
+  hapi_geom_names_forget(&physics->near.range.names, (dGeomID)(uintptr_t)geom);
+  hapi_geom_names_forget(&physics->near.tools.names, (dGeomID)(uintptr_t)geom);
+  hapi_lookback_forget_geom(&physics->lookback, (dGeomID)(uintptr_t)geom);
   hapi_meshes_forget(&physics->near.meshes, (dGeomID)(uintptr_t)geom);
 }
 

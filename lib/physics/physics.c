@@ -140,6 +140,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_free(physics->near.neighbors.candidates);
   hapi_free(physics->near.neighbors.hits);
   hapi_free(physics->near.tools.points);
+  hapi_geom_names_finish(&physics->near.tools.names);
   hapi_free(physics->near.neighbors.vertices);
   hapi_free(physics->near.neighbors.hull);
   hapi_fair_lock_finish(&physics->lock.fair);
