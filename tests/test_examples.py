@@ -22,6 +22,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "edit_while_running": "docs/editing.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
+# After the blocks that show parts of a program; a page without it shows all of the program.
+PARTS = re.compile(r"^From `examples/(\w+)\.c`", re.M)
 points = []
 
 
@@ -124,10 +126,36 @@ def check_try_device(program):
           "it prints where the device is", out)
 
 
+def shown(page):
+    """The example that a page shows in parts or None, and its blocks."""
+    parts = PARTS.search(page)
+    blocks = BLOCK.findall(page[:parts.start()] if parts else page)
+    return parts.group(1) if parts else None, blocks if parts else blocks[:1]
+
+
+def shows(page, name):
+    parts_of, blocks = shown(page)
+    source = example_of(name)
+    if parts_of is None:
+        return bool(blocks) and blocks[0].strip() == source
+    return parts_of == name and bool(blocks) and all(block in source + "\n" for block in blocks)
+
+
 def update():
+    """Whole programs as they are, parts from their first to their last line."""
     for name, page in PAGES.items():
         text = read(page)
-        text = BLOCK.sub(lambda _: f"```c\n{example_of(name)}\n```", text, count=1)
+        parts_of, blocks = shown(text)
+        for block in blocks:
+            new = example_of(name) + "\n"
+            if parts_of is not None:
+                first, last = block.rstrip("\n").split("\n")[::len(block.split("\n")) - 2 or 1][:2]
+                if first + "\n" not in new or last + "\n" not in new:
+                    print(f"{page}: write this part by hand:\n{block}")
+                    continue
+                start = new.index(first + "\n")
+                new = new[start:new.index(last + "\n", start + len(first)) + len(last) + 1]
+            text = text.replace(f"```c\n{block}```", f"```c\n{new}```", 1)
         (root / page).write_text(text, encoding="utf-8")
 
 
@@ -136,9 +164,8 @@ def main(programs):
     point(sources == {program.stem for program in programs}, "every example is built",
           str(sources ^ {program.stem for program in programs}))
     for name, page in PAGES.items():
-        block = BLOCK.search(read(page))
-        point(block is not None and block.group(1).strip() == example_of(name),
-              f"{page} shows {name}", "tests/test_examples.py ROOT --update writes it")
+        point(shows(read(page), name), f"{page} shows {name}",
+              "tests/test_examples.py ROOT --update writes it")
     point(len(example_of("touch_a_cube").splitlines()) <= 45, "the README's example is short")
     point("examples/frame_loop.c" in read("README.md"), "the README speaks of the frame loop")
     for program in programs:

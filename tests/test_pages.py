@@ -114,7 +114,10 @@ def pieces():
 
 
 def bad_code(flags):
+    examples = [path.read_text(encoding="utf-8") for path in (root / "examples").glob("*.c")]
     for where, text in pieces():
+        if any(text in example for example in examples):
+            continue  # meson compiles it
         whole = "int main(" in text
         source = text if whole else BEFORE + text + AFTER
         command = [*compiler, "-std=c11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror",
