@@ -141,20 +141,26 @@ def shows(page, name):
     return parts_of == name and bool(blocks) and all(block in source + "\n" for block in blocks)
 
 
+def part(lines, old):
+    """The lines from the first to the last one of an old part; as many as it had where its last line
+    has changed."""
+    start = lines.index(old[0])
+    try:
+        end = lines.index(old[-1], start + 1) if len(old) > 1 else start
+    except ValueError:
+        end = start + len(old) - 1
+    return "\n".join(lines[start:end + 1]) + "\n"
+
+
 def update():
-    """Whole programs as they are, parts from their first to their last line."""
+    """Writes the examples into the pages."""
     for name, page in PAGES.items():
         text = read(page)
         parts_of, blocks = shown(text)
         for block in blocks:
             new = example_of(name) + "\n"
             if parts_of is not None:
-                first, last = block.rstrip("\n").split("\n")[::len(block.split("\n")) - 2 or 1][:2]
-                if first + "\n" not in new or last + "\n" not in new:
-                    print(f"{page}: write this part by hand:\n{block}")
-                    continue
-                start = new.index(first + "\n")
-                new = new[start:new.index(last + "\n", start + len(first)) + len(last) + 1]
+                new = part(new.split("\n"), block.rstrip("\n").split("\n"))
             text = text.replace(f"```c\n{block}```", f"```c\n{new}```", 1)
         (root / page).write_text(text, encoding="utf-8")
 
