@@ -450,7 +450,7 @@ static uint32_t local_bodies(const rig *r, size_t bodies)
   const hapi_tick *tick = &r->session->haptic->tick;
   uint32_t local = 0;
   for (size_t i = 0; i < bodies; ++i) {
-    local |= (uint32_t)(tick->watch_slot[i] != HAPI_SLOT_NONE) << i;
+    local |= (uint32_t)(tick->watch.slot[i] != HAPI_SLOT_NONE) << i;
   }
   return local;
 }
@@ -472,10 +472,10 @@ static void read_joints(const rig *r, const joint_gauge *gauge, accuracy_motion 
   hap_pose loop[HAP_TRACE_BODIES_MAX] = {{{0.0}, {0.0}}};
   hap_pose world[HAP_TRACE_BODIES_MAX];
   bool local[HAP_TRACE_BODIES_MAX] = {false};
-  for (size_t i = 0; i < tick->watch_count; ++i) {
-    local[i] = tick->watch_slot[i] != HAPI_SLOT_NONE;
+  for (size_t i = 0; i < tick->watch.count; ++i) {
+    local[i] = tick->watch.slot[i] != HAPI_SLOT_NONE;
     if (local[i]) {
-      loop[i] = tick->bodies[tick->watch_slot[i]].pose;
+      loop[i] = tick->bodies.of[tick->watch.slot[i]].pose;
     }
     world[i] = joint_gauge_pose(r->scene->bodies[i]);
   }
@@ -487,8 +487,8 @@ static double deepest_now(const rig *r)
 {
   const hapi_tick *tick = &r->session->haptic->tick;
   double deepest = 0.0;
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    deepest = fmax(deepest, tick->contacts[i].ramp.depth);
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    deepest = fmax(deepest, tick->touches.of[i].ramp.depth);
   }
   return deepest;
 }

@@ -109,12 +109,12 @@ static double path_length(const path *p, int64_t from_ns, int64_t to_ns)
  * since the last sync. What it makes do with of the others, until the next sync, is nobody's path. */
 static bool loop_has(const hapi_tick *tick, uint32_t slot)
 {
-  if (slot == HAPI_SLOT_NONE || tick->model == HAP_MODEL_IMPULSE) {
+  if (slot == HAPI_SLOT_NONE || tick->facts.model == HAP_MODEL_IMPULSE) {
     return false;
   }
-  const hapi_local_body *body = &tick->bodies[slot];
-  return tick->model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
-         distance(body->impulse, body->given.impulse_taken) > 0.0;
+  const hapi_local_body *body = &tick->bodies.of[slot];
+  return tick->facts.model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
+         distance(body->account.impulse, body->given.impulse_taken) > 0.0;
 }
 
 static bool has_stepped(run *r)
@@ -131,23 +131,24 @@ static bool has_stepped(run *r)
 static void note_tick(run *r)
 {
   const hapi_tick *tick = &r->rig.session->haptic->tick;
-  int64_t loop_ns = tick->now_ns + (tick->model == HAP_MODEL_SINGLE ? 0 : r->tick_ns);
-  int64_t ahead_ns = tick->model == HAP_MODEL_IMPULSE ? (int64_t)(2e9 / r->def->physics_hz) : 0;
+  int64_t loop_ns = tick->facts.now_ns + (tick->facts.model == HAP_MODEL_SINGLE ? 0 : r->tick_ns);
+  int64_t ahead_ns =
+      tick->facts.model == HAP_MODEL_IMPULSE ? (int64_t)(2e9 / r->def->physics_hz) : 0;
   int64_t step_ns = hapi_physics_last_cycle(r->rig.session->physics);
   bool stepped = has_stepped(r);
   for (size_t i = 0; i < r->bodies; ++i) {
-    uint32_t slot = i < tick->watch_count ? tick->watch_slot[i] : HAPI_SLOT_NONE;
+    uint32_t slot = i < tick->watch.count ? tick->watch.slot[i] : HAPI_SLOT_NONE;
     hap_pose pose;
     hapi_v3_copy(dBodyGetPosition(r->rig.scene->bodies[i]), pose.position);
     memcpy(pose.quat_wxyz, dBodyGetQuaternion(r->rig.scene->bodies[i]), sizeof pose.quat_wxyz);
     if (loop_has(tick, slot)) {
-      path_add(&r->paths[i], loop_ns, &tick->bodies[slot].pose);
+      path_add(&r->paths[i], loop_ns, &tick->bodies.of[slot].pose);
     } else if (stepped) {
       path_add(&r->paths[i], step_ns + ahead_ns, &pose);
     }
   }
-  const hapi_tick_pointer *pointer = &tick->pointers[0];
-  path_add(&r->hand, tick->now_ns + (pointer->proxied ? r->tick_ns : 0), &pointer->pose);
+  const hapi_pointer *pointer = &tick->pointers.of[0];
+  path_add(&r->hand, tick->facts.now_ns + (pointer->proxied ? r->tick_ns : 0), &pointer->pose);
 }
 
 static void worst(double *out_mm, double metres)

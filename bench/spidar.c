@@ -12,9 +12,9 @@
 #include "base/vec.h"
 #include "bench/bench.h"
 #include "bench/spidar_truth.h"
-#include "haptic/rt/velocity.h"
 #include "plugins/spidar/rates.h"
 #include "plugins/spidar/tensions.h"
+#include "pointer/velocity.h"
 
 #define SPEED 1.0      /* m/s */
 #define TURN_SPEED 5.0 /* rad/s */

@@ -199,9 +199,9 @@ static void look(stability_bed *s)
   const hapi_physics *physics = s->session->physics;
   bool local[STABILITY_CONTACTS_MAX] = {false};
   s->kinetic = 0.0;
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    uint32_t known = physics->near.slots.bodies[tick->live[i]].known;
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    uint32_t known = physics->near.slots.bodies[tick->bodies.live[i]].known;
     int index = known == HAPI_NONE ? -1 : index_of(s, physics->world.bodies.entries[known].body);
     if (index >= 0) {
       local[index] = true;
@@ -221,18 +221,18 @@ static void look(stability_bed *s)
 static double springs(const stability_bed *s)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
-  const hapi_tick_pointer *p = &tick->pointers[0];
+  const hapi_pointer *p = &tick->pointers.of[0];
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->contact_count && !p->rigid; ++i) {
-    const double *force = tick->contacts[i].force;
+  for (uint32_t i = 0; i < tick->touches.count && !p->rigid; ++i) {
+    const double *force = tick->touches.of[i].force;
     sum += 0.5 * hapi_v3_dot(force, force) / s->point->stiffness;
   }
   if (p->proxied) {
     double apart[3];
-    hapi_v3_sub(p->proxy_position, p->handle_position, apart);
-    hapi_v3_sub(apart, p->offset, apart);
-    sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
-    sum += 0.5 * p->proxy_mass * hapi_v3_dot(p->proxy_velocity, p->proxy_velocity);
+    hapi_v3_sub(p->proxy.position, p->handle.position, apart);
+    hapi_v3_sub(apart, p->proxy.offset, apart);
+    sum += 0.5 * p->coupling.stiffness * hapi_v3_dot(apart, apart);
+    sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
   }
   return sum;
 }
@@ -315,13 +315,14 @@ static void finish(stability_bed *s, double way, int touched, stability_result *
 {
   const hapi_tick *tick = &s->session->haptic->tick;
   out->energy_ratio = s->finite && s->stored > 0.0 ? 1.0 + s->made / s->stored : HUGE_VAL;
-  out->stable = s->finite && tick->fault == HAP_FAULT_NONE && out->energy_ratio <= STABILITY_RATIO;
-  out->held = tick->pointers[0].hold;
-  out->residual = tick->residual_max;
+  out->stable = s->finite && tick->guard.latch.fault == HAP_FAULT_NONE &&
+                out->energy_ratio <= STABILITY_RATIO;
+  out->held = tick->pointers.of[0].coupling.hold;
+  out->residual = tick->figures.residual_max;
   out->way = way;
   out->stored = s->stored;
   out->touched = touched;
-  out->proxied = tick->pointers[0].proxied;
+  out->proxied = tick->pointers.of[0].proxied;
 }
 
 hap_status stability_run(bench *b, const stability_point *point, double seconds,
@@ -340,7 +341,7 @@ hap_status stability_run(bench *b, const stability_point *point, double seconds,
     hapi_virtual_get_port(hapi_device_self(s.device), &port);
     for (uint64_t i = 0; i < ticks && s.finite; ++i) {
       tick_once(&s, i, &port, &way);
-      int pushing = (int)s.session->haptic->tick.pushing;
+      int pushing = (int)s.session->haptic->tick.touches.pushing;
       touched = pushing > touched ? pushing : touched;
     }
     finish(&s, way, touched, out);

@@ -14,12 +14,12 @@
 #include "bench/cycles.h"
 #include "contact/contact.h"
 #include "haptic/haptic_internal.h"
-#include "haptic/rt/black_box.h"
-#include "haptic/rt/rows.h"
-#include "haptic/rt/tick.h"
 #include "haptic/tick_memory.h"
+#include "local/rows.h"
 #include "session/session_internal.h"
 #include "sync/exchange.h"
+#include "tick/black_box.h"
+#include "tick/tick.h"
 #include "tools/rig.h"
 
 /* Columns of tick.csv behind those of every model; empty there. */
@@ -57,69 +57,90 @@ static void tick_copy_destroy(hapi_tick *copy)
   memset(copy, 0, sizeof *copy);
 }
 
-static void copy_world(hapi_local_world *copy, const hapi_local_world *own,
-                       const hapi_local_world *from)
+static void copy_pointers(hapi_pointers *copy, const hapi_pointers *from, uint32_t capacity)
 {
-  copy->memory = own->memory;
-  copy->old_memory = own->old_memory;
-  copy->buckets = own->buckets;
-  copy->joints = own->joints;
-  copy->joint_memory = own->joint_memory;
-  copy->sources = own->sources;
-  copy->solver.rows = own->solver.rows;
-  copy->solver.v = own->solver.v;
-  copy->solver.free = own->solver.free;
-  copy->solver.work = own->solver.work;
-  memcpy(copy->memory, from->memory, from->memory_count * sizeof *copy->memory);
-  memcpy(copy->joints, from->joints, from->joint_count * sizeof *copy->joints);
+  memcpy(copy->of, from->of, capacity * sizeof *copy->of);
+  copy->high = from->high; /* the hulls themselves stay where they are: nobody writes to them */
+  copy->proxies = from->proxies;
 }
 
-/* The hulls themselves stay where they are: nobody writes to them. */
-static void copy_tools(hapi_tool_world *copy, const hapi_tool_world *own,
-                       const hapi_tool_world *from)
+static void copy_bodies(hapi_bodies *copy, const hapi_bodies *from)
 {
-  copy->tools = own->tools;
-  copy->old_tools = own->old_tools;
-  copy->old_contacts = own->old_contacts;
-  copy->pairs = own->pairs;
-  copy->hulls = own->hulls;
+  hapi_bodies own = *copy;
+  *copy = *from;
+  copy->of = own.of;
+  copy->live = own.live;
+  memcpy(copy->of, from->of, from->high * sizeof *copy->of);
+  memcpy(copy->live, from->live, from->live_count * sizeof *copy->live);
+}
+
+static void copy_tools(hapi_tool_world *copy, const hapi_tool_world *from)
+{
+  copy->count = from->count;
+  copy->pair_count = from->pair_count;
   memcpy(copy->tools, from->tools, from->count * sizeof *copy->tools);
   memcpy(copy->pairs, from->pairs, from->pair_count * sizeof *copy->pairs);
 }
 
-/* As it is between two ticks. The set of patches stays the session's. */
-static void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
+static void copy_touches(hapi_touches *copy, const hapi_touches *from, uint32_t contacts)
 {
-  const hapi_capacity *c = &from->capacity;
-  hapi_tick own = *copy;
-  *copy = *from;
-  copy->bodies = own.bodies;
-  copy->live = own.live;
-  copy->contacts = own.contacts;
-  copy->ramps = own.ramps;
-  copy->ramp_generations = own.ramp_generations;
-  copy->frictions = own.frictions;
-  copy->pointers = own.pointers;
-  copy->crosses = own.crosses;
-  copy->hashing = false; /* only lockstep does */
-  memcpy(copy->bodies, from->bodies, from->body_high * sizeof *copy->bodies);
-  memcpy(copy->live, from->live, from->live_count * sizeof *copy->live);
-  memcpy(copy->contacts, from->contacts, from->contact_count * sizeof *copy->contacts);
-  memcpy(copy->ramps, from->ramps, c->contacts * sizeof *copy->ramps);
-  memcpy(copy->ramp_generations, from->ramp_generations,
-         c->contacts * sizeof *copy->ramp_generations);
-  for (uint32_t i = 0; i < from->contact_count; ++i) { /* not all there is room for: caches */
-    uint32_t slot = from->contacts[i].slot;
+  copy->count = from->count;
+  copy->pushing = from->pushing;
+  copy->rubs = from->rubs;
+  memcpy(copy->of, from->of, from->count * sizeof *copy->of);
+  memcpy(copy->ramps, from->ramps, contacts * sizeof *copy->ramps);
+  memcpy(copy->ramp_generations, from->ramp_generations, contacts * sizeof *copy->ramp_generations);
+  for (uint32_t i = 0; i < from->count; ++i) { /* not all there is room for: caches */
+    uint32_t slot = from->of[i].slot;
     if (slot != HAPI_SLOT_NONE) {
       copy->frictions[slot] = from->frictions[slot];
     }
   }
-  memcpy(copy->pointers, from->pointers, c->pointers * sizeof *copy->pointers);
-  memcpy(copy->crosses, from->crosses, from->cross_count * sizeof *copy->crosses);
-  copy_world(&copy->world, &own.world, &from->world);
-  copy_tools(&copy->tool, &own.tool, &from->tool);
-  memcpy(copy->world.joint_memory, from->world.joint_memory,
-         c->joints * sizeof *copy->world.joint_memory);
+  copy_tools(&copy->tool, &from->tool);
+}
+
+static void copy_contacts(hapi_body_contacts *copy, const hapi_body_contacts *from)
+{
+  copy->patches = from->patches;
+  copy->memory_count = from->memory_count;
+  copy->active = from->active;
+  memcpy(copy->memory, from->memory, from->memory_count * sizeof *copy->memory);
+}
+
+static void copy_joints(hapi_joints *copy, const hapi_joints *from, uint32_t capacity)
+{
+  copy->count = from->count;
+  memcpy(copy->of, from->of, from->count * sizeof *copy->of);
+  memcpy(copy->memory, from->memory, capacity * sizeof *copy->memory);
+}
+
+static void copy_rows(hapi_rows *copy, const hapi_rows *from)
+{
+  hapi_solver own = copy->solver;
+  copy->solver = from->solver;
+  copy->solver.rows = own.rows;
+  copy->solver.v = own.v;
+  copy->solver.free = own.free;
+  copy->solver.work = own.work;
+}
+
+static void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
+{
+  const hapi_capacity *c = &from->capacity;
+  copy->facts = from->facts;
+  copy->figures = from->figures;
+  copy->guard = from->guard;
+  copy->sample = from->sample;
+  copy->watch = from->watch;
+  copy->hashing = false; /* only lockstep does */
+  copy_pointers(&copy->pointers, &from->pointers, c->pointers);
+  copy_bodies(&copy->bodies, &from->bodies);
+  copy_touches(&copy->touches, &from->touches, c->contacts);
+  copy->crosses.count = from->crosses.count;
+  memcpy(copy->crosses.of, from->crosses.of, from->crosses.count * sizeof *copy->crosses.of);
+  copy_contacts(&copy->contacts, &from->contacts);
+  copy_joints(&copy->joints, &from->joints, c->joints);
+  copy_rows(&copy->rows, &from->rows);
 }
 
 static double since(int64_t begin_ns)
@@ -130,7 +151,7 @@ static double since(int64_t begin_ns)
 /* The next tick of the copy, timed [ns]. */
 static double tick_copy_run(hapi_tick *copy)
 {
-  int64_t now_ns = copy->now_ns + (int64_t)llround(1e9 * copy->period);
+  int64_t now_ns = copy->facts.now_ns + (int64_t)llround(1e9 * copy->facts.period);
   int64_t begin_ns = hapi_clock_now();
   hapi_tick_run(copy, now_ns);
   return since(begin_ns);
@@ -139,9 +160,9 @@ static double tick_copy_run(hapi_tick *copy)
 /* As hapi_local_world_step begins. */
 static void begin(hapi_tick *tick)
 {
-  tick->world.solver.row_count = 0;
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    hapi_local_body *body = &tick->bodies[tick->live[i]];
+  tick->rows.solver.row_count = 0;
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
     hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
     hapi_v3_copy(body->twist.linear, body->start_twist);
     hapi_v3_copy(body->twist.angular, body->start_twist + 3);
@@ -150,12 +171,12 @@ static void begin(hapi_tick *tick)
 
 static void set_free_velocities(hapi_tick *tick)
 {
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    double *v = tick->world.solver.v[body->row];
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    double *v = tick->rows.solver.v[body->row];
     memcpy(v, body->start_twist, sizeof body->start_twist);
     if (hapi_body_responds(body)) {
-      hapi_v3_madd(v, tick->period, body->given.gravity, v);
+      hapi_v3_madd(v, tick->facts.period, body->given.gravity, v);
     }
   }
 }
@@ -163,22 +184,22 @@ static void set_free_velocities(hapi_tick *tick)
 static double solve(hapi_tick *tick)
 {
   int64_t begin_ns = hapi_clock_now();
-  hapi_solver_run(&tick->world.solver);
+  hapi_solver_run(&tick->rows.solver);
   return since(begin_ns);
 }
 
 /* Whether anything is pushed out; then as the second solve wants the rows. */
 static bool stop_push_out(hapi_tick *tick)
 {
-  hapi_solver *solver = &tick->world.solver;
+  hapi_solver *solver = &tick->rows.solver;
   bool any = false;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row_source *source = &tick->world.sources[i];
+    const hapi_row_source *source = &tick->rows.sources[i];
     any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
-    if (tick->world.sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], tick->world.sources[i].stays);
+    if (tick->rows.sources[i].pushes_out) {
+      hapi_row_retarget(&solver->rows[i], tick->rows.sources[i].stays);
     }
   }
   return any;
@@ -187,7 +208,7 @@ static bool stop_push_out(hapi_tick *tick)
 /* Sweeps alone: with and without one lot more of them, so that what comes before falls out. */
 static double time_update(hapi_tick *tick)
 {
-  hapi_solver *solver = &tick->world.solver;
+  hapi_solver *solver = &tick->rows.solver;
   double spent[2];
   if (solver->row_count == 0) {
     return 0.0;
@@ -397,15 +418,15 @@ static hap_status contact_open_bed(bench *b, const tick_case *what, tick_bed *t)
 
 static void measure_copy(tick_bed *t, size_t i)
 {
-  const hapi_solver *solver = &t->copy.world.solver;
+  const hapi_solver *solver = &t->copy.rows.solver;
   tick_parts parts;
-  uint64_t sweeps = t->copy.sweeps;
+  uint64_t sweeps = t->copy.figures.sweeps;
   t->values[TICK_NS][i] = tick_copy_run(&t->copy);
-  t->values[SWEEPS][i] = (double)(t->copy.sweeps - sweeps);
+  t->values[SWEEPS][i] = (double)(t->copy.figures.sweeps - sweeps);
   t->values[ROWS][i] = solver->row_count;
   t->values[DIRECT_SOLVES][i] = solver->direct_solves;
   for (uint32_t row = 0; row < solver->row_count; ++row) {
-    t->values[CONTACTS][i] += t->copy.world.sources[row].part == 0;
+    t->values[CONTACTS][i] += t->copy.rows.sources[row].part == 0;
   }
   tick_copy_parts(&t->copy, &parts);
   t->values[PART_ROWS][i] = parts.rows;
@@ -417,7 +438,7 @@ static void measure_copy(tick_bed *t, size_t i)
 static double bare_tick(tick_bed *t)
 {
   bare_follow(&t->bare, t->rig.scene); /* as it was at the last sync */
-  return 1e9 * bare_cycle(&t->bare, t->rig.session->haptic->tick.period);
+  return 1e9 * bare_cycle(&t->bare, t->rig.session->haptic->tick.facts.period);
 }
 
 static void measure_tick(tick_bed *t, size_t i)
@@ -605,23 +626,23 @@ static bool guard_allocate(guard_bed *g, uint32_t count)
   g->box.pointers = 1;
   g->box.rows = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *g->box.rows);
   g->box.counts = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *g->box.counts);
-  g->tick.period = 1e-9 * TICK_NS;
+  g->tick.facts.period = 1e-9 * TICK_NS;
   return hapi_tick_memory_create(&g->tick, &capacity) && g->box.rows != NULL &&
          g->box.counts != NULL && hapi_exchange_create(&capacity, &g->exchange) >= HAP_OK;
 }
 
-static void guard_put_pointer(hapi_tick_pointer *p)
+static void guard_put_pointer(hapi_pointer *p)
 {
   memset(p, 0, sizeof *p);
   p->generation = 1;
-  p->radius = guard_radius;
-  p->stiffness = guard_stiffness;
-  p->damping = 5.0;
-  p->motion_scale = p->force_scale = 1.0;
-  p->max_force = p->max_torque = 20.0;
-  p->slew_force = p->slew_torque = 10000.0;
-  p->pose_world_device.quat_wxyz[0] = 1.0;
-  p->device_pose.quat_wxyz[0] = 1.0;
+  p->shape.radius = guard_radius;
+  p->surface.stiffness = guard_stiffness;
+  p->surface.damping = 5.0;
+  p->device.motion_scale = p->device.force_scale = 1.0;
+  p->device.limits.max_force = p->device.limits.max_torque = 20.0;
+  p->device.limits.slew_force = p->device.limits.slew_torque = 10000.0;
+  p->device.pose_world_device.quat_wxyz[0] = 1.0;
+  p->device.pose.quat_wxyz[0] = 1.0;
 }
 
 /* All cubes in one place, where they press the pointer towards +x: only their number counts. */
@@ -655,7 +676,7 @@ static bool guard_open_bed(guard_bed *g, uint32_t count)
   }
   hapi_tick_reset(&g->tick);
   hapi_black_box_reset(&g->box);
-  guard_put_pointer(&g->tick.pointers[0]);
+  guard_put_pointer(&g->tick.pointers.of[0]);
   hapi_model *message = hapi_exchange_model_back(g->exchange);
   hapi_patches *patches = hapi_exchange_patches_back(g->exchange);
   message->number = patches->model_number = 1;
@@ -675,12 +696,12 @@ static void guard_measure(guard_bed *g, int runs, uint32_t ticks, double *out_ns
 {
   double values[GUARD_RUNS];
   for (int warm = 0; warm < 2000; ++warm) {
-    hapi_tick_run(&g->tick, g->tick.now_ns + TICK_NS);
+    hapi_tick_run(&g->tick, g->tick.facts.now_ns + TICK_NS);
   }
   for (int i = 0; i < runs; ++i) {
     int64_t begin_ns = hapi_clock_now();
     for (uint32_t k = 0; k < ticks; ++k) {
-      hapi_guard(&g->tick);
+      hapi_guard_run(&g->tick);
       hapi_black_box_record(&g->box, &g->tick);
     }
     values[i] = (double)(hapi_clock_now() - begin_ns) / ticks;
@@ -699,8 +720,8 @@ static hap_status bench_tick_guard(bench *b, FILE *csv)
     if (opened) {
       guard_measure(&g, b->quick ? GUARD_RUNS_QUICK : GUARD_RUNS, 4000u / (sizes[i] + 4u), &ns);
     }
-    bool works = opened && g.tick.pushing == sizes[i] && g.tick.guard.energy_ticks == 0 &&
-                 g.tick.fault == HAP_FAULT_NONE && g.tick.guard.stored_max > 0.0;
+    bool works = opened && g.tick.touches.pushing == sizes[i] && g.tick.guard.energy_ticks == 0 &&
+                 g.tick.guard.latch.fault == HAP_FAULT_NONE && g.tick.guard.stored_max > 0.0;
     guard_close_bed(&g);
     if (!works) {
       return bench_fail(b, opened ? HAP_ERROR_STATE : HAP_ERROR_MEMORY,
@@ -786,16 +807,17 @@ static bool message_open_bed(message_bed *m)
 {
   const hapi_capacity capacity = {BODIES, CONTACTS, 1, 1, 1};
   memset(m, 0, sizeof *m);
-  m->tick.period = 1e-3;
+  m->tick.facts.period = 1e-3;
   if (!hapi_tick_memory_create(&m->tick, &capacity) ||
       hapi_exchange_create(&capacity, &m->exchange) < HAP_OK) {
     return false;
   }
   hapi_tick_reset(&m->tick);
-  hapi_tick_pointer *p = &m->tick.pointers[0];
+  hapi_pointer *p = &m->tick.pointers.of[0];
   p->generation = 1;
-  p->radius = 0.01;
-  p->pose.quat_wxyz[0] = p->pose_world_device.quat_wxyz[0] = p->device_pose.quat_wxyz[0] = 1.0;
+  p->shape.radius = 0.01;
+  p->pose.quat_wxyz[0] = p->device.pose_world_device.quat_wxyz[0] = p->device.pose.quat_wxyz[0] =
+      1.0;
   return true;
 }
 
@@ -823,15 +845,15 @@ static bool message_measure(message_bed *m, int repeats, int run, message_times 
     hapi_model *model = hapi_exchange_model_take(m->exchange);
     hapi_patches *patches = hapi_exchange_patches_take(m->exchange);
     int64_t taken_ns = hapi_clock_now();
-    hapi_tick_adopt(&m->tick, model, m->tick.now_ns);
+    hapi_tick_adopt(&m->tick, model, m->tick.facts.now_ns);
     int64_t bodies_ns = hapi_clock_now();
     hapi_tick_adopt_patches(&m->tick, patches);
     int64_t end_ns = hapi_clock_now();
     spent[0] += taken_ns - begin_ns;
     spent[1] += bodies_ns - taken_ns;
     spent[2] += end_ns - bodies_ns;
-    whole = whole && m->tick.live_count == BODIES && m->tick.contact_count == BODIES &&
-            m->tick.world.memory_count == CONTACTS;
+    whole = whole && m->tick.bodies.live_count == BODIES && m->tick.touches.count == BODIES &&
+            m->tick.contacts.memory_count == CONTACTS;
   }
   out->hand_over[run] = (double)spent[0] / repeats;
   out->bodies[run] = (double)spent[1] / repeats;
@@ -1036,7 +1058,7 @@ static void close_bed(bed *t)
 static bool allocate(hapi_tick *tick, uint32_t count)
 {
   const hapi_capacity capacity = {count, count, 1, 1, 1, 0, 0, 1};
-  tick->period = 1e-9 * PERIOD_NS;
+  tick->facts.period = 1e-9 * PERIOD_NS;
   return hapi_tick_memory_create(tick, &capacity);
 }
 
@@ -1091,19 +1113,19 @@ static void own_body(hapi_model_body *body)
   }
 }
 
-static void put_pointer(hapi_tick_pointer *p)
+static void put_pointer(hapi_pointer *p)
 {
   memset(p, 0, sizeof *p);
   p->generation = 1;
-  p->collide_bits = ~0u;
-  p->radius = radius;
-  p->stiffness = stiffness;
-  p->damping = damping;
-  p->motion_scale = p->force_scale = 1.0;
-  p->max_force = p->max_torque = 1e6;
-  p->slew_force = p->slew_torque = 5e8;
-  p->pose_world_device.quat_wxyz[0] = 1.0;
-  p->device_pose.quat_wxyz[0] = 1.0;
+  p->shape.collide_bits = ~0u;
+  p->shape.radius = radius;
+  p->surface.stiffness = stiffness;
+  p->surface.damping = damping;
+  p->device.motion_scale = p->device.force_scale = 1.0;
+  p->device.limits.max_force = p->device.limits.max_torque = 1e6;
+  p->device.limits.slew_force = p->device.limits.slew_torque = 5e8;
+  p->device.pose_world_device.quat_wxyz[0] = 1.0;
+  p->device.pose.quat_wxyz[0] = 1.0;
 }
 
 static hap_status open_bed(bench *b, hap_model model, uint32_t count, bed *out)
@@ -1115,7 +1137,7 @@ static hap_status open_bed(bench *b, hap_model model, uint32_t count, bed *out)
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %u neighbours", count);
   }
   hapi_tick_reset(&out->tick);
-  put_pointer(&out->tick.pointers[0]);
+  put_pointer(&out->tick.pointers.of[0]);
   hapi_model *message = hapi_exchange_model_back(out->exchange);
   message->number = 1;
   message->model = model;
@@ -1138,7 +1160,7 @@ static hap_status open_bed(bench *b, hap_model model, uint32_t count, bed *out)
 static void run_ticks(bed *t, uint32_t count)
 {
   for (uint32_t i = 0; i < count; ++i) {
-    hapi_tick_run(&t->tick, t->tick.now_ns + PERIOD_NS);
+    hapi_tick_run(&t->tick, t->tick.facts.now_ns + PERIOD_NS);
     hapi_tick_report(&t->tick, hapi_exchange_state_back(t->exchange));
     hapi_exchange_state_publish(t->exchange);
   }
@@ -1161,8 +1183,9 @@ static hap_status measure(bench *b, hap_model model, uint32_t count, double *out
     values[i] = (double)(hapi_clock_now() - begin_ns) / ticks;
   }
   *out_ns = bench_median(values, (size_t)runs);
-  if (t.tick.pushing != count || t.tick.fault != HAP_FAULT_NONE) {
-    status = bench_fail(b, HAP_ERROR_STATE, "only %u of %u neighbours push", t.tick.pushing, count);
+  if (t.tick.touches.pushing != count || t.tick.guard.latch.fault != HAP_FAULT_NONE) {
+    status = bench_fail(b, HAP_ERROR_STATE, "only %u of %u neighbours push", t.tick.touches.pushing,
+                        count);
   }
   close_bed(&t);
   return status;

@@ -6,7 +6,7 @@
 
 #include "base/pose.h"
 #include "base/vec.h"
-#include "haptic/rt/ball_nearest.h"
+#include "local/ball_nearest.h"
 
 /* The tick's own way to the nearest point of a ball, against that of all shapes. */
 

@@ -131,8 +131,8 @@ typedef struct row_side {
 
 static bool find_side(const hapi_tick *tick, uint32_t index, uint32_t slot, row_side *out)
 {
-  const hapi_row *row = &tick->world.solver.rows[index];
-  const hapi_row_source *source = &tick->world.sources[index];
+  const hapi_row *row = &tick->rows.solver.rows[index];
+  const hapi_row_source *source = &tick->rows.sources[index];
   bool is_a = source->body_a == slot;
   *out = is_a ? (row_side){row->ja, row->ba} : (row_side){row->jb, row->bb};
   return is_a || (!source->pointer && source->body_b == slot);
@@ -143,11 +143,11 @@ static bool find_side(const hapi_tick *tick, uint32_t index, uint32_t slot, row_
 static int check_body(const hapi_tick *tick, uint32_t slot)
 {
   int met = 0;
-  for (uint32_t i = 0; i < tick->world.solver.row_count; ++i) {
-    for (uint32_t k = i + 1; k < tick->world.solver.row_count; ++k) {
+  for (uint32_t i = 0; i < tick->rows.solver.row_count; ++i) {
+    for (uint32_t k = i + 1; k < tick->rows.solver.row_count; ++k) {
       row_side one;
       row_side other;
-      if (tick->world.sources[i].pointer && find_side(tick, i, slot, &one) &&
+      if (tick->rows.sources[i].pointer && find_side(tick, i, slot, &one) &&
           find_side(tick, k, slot, &other)) {
         double size = sqrt(hapi_dot6(one.j, one.b) * hapi_dot6(other.j, other.b));
         CHECK_NEAR(hapi_dot6(one.j, other.b), hapi_dot6(other.j, one.b), 1e-9 * size);
@@ -162,9 +162,9 @@ static int check_measured(const contact_world *w)
 {
   const hapi_tick *tick = &w->session->haptic->tick;
   int met = 0;
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    if ((tick->bodies[tick->live[i]].flags & HAPI_BODY_MEASURED) != 0) {
-      met += check_body(tick, tick->live[i]);
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    if ((tick->bodies.of[tick->bodies.live[i]].flags & HAPI_BODY_MEASURED) != 0) {
+      met += check_body(tick, tick->bodies.live[i]);
     }
   }
   return met;

@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#include "haptic/rt/contact_solver.h"
+#include "solver/contact_solver.h"
 
 #define ROWS 1024
 #define BODIES 64

@@ -256,7 +256,7 @@ TEST(a_block_that_is_no_number_is_left_out)
 static const hapi_local_body *local(const test_world *w, int body)
 {
   const hapi_body_slot *slot = world_slot(w, w->bodies[body]);
-  return &w->session->haptic->tick.bodies[slot - world_physics(w)->near.slots.bodies];
+  return &w->session->haptic->tick.bodies.of[slot - world_physics(w)->near.slots.bodies];
 }
 
 /* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so that the
@@ -309,7 +309,7 @@ TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
   CHECK(hap_session_advance(w.session, 60) == HAP_OK);
   CHECK((local(&w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
   CHECK((local(&w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
-  CHECK(local(&w, 1)->impulse[0] == 0.0);
+  CHECK(local(&w, 1)->account.impulse[0] == 0.0);
   world_move_pointer(&w, 0, (const double[3]){-0.1, 0, 0}, NULL);
   CHECK(hap_session_advance(w.session, 101) == HAP_OK);
   hap_stats stats = world_stats(&w);

@@ -25,8 +25,8 @@ static void set_up_crosses(void)
 
 static void press_both(void)
 {
-  f.pointers[0].device_pose.position[0] = -0.009;
-  f.pointers[1].device_pose.position[0] = -0.007;
+  f.pointers[0].device.pose.position[0] = -0.009;
+  f.pointers[1].device.pose.position[0] = -0.007;
 }
 
 TEST(a_force_moves_the_other_bodies_by_their_blocks)
@@ -43,11 +43,11 @@ TEST(a_force_moves_the_other_bodies_by_their_blocks)
   check_v3(f.bodies[3].twist.linear, 8.0 * T, 0.0, 0.0, 1e-15);
   CHECK((f.bodies[3].flags & HAPI_BODY_RESTING) == 0);
   for (int i = 2; i < 4; ++i) { /* the world passes it on by itself */
-    check_v3(f.bodies[i].impulse, 0.0, 0.0, 0.0, 0.0);
-    check_v3(f.bodies[i].angular_impulse, 0.0, 0.0, 0.0, 0.0);
+    check_v3(f.bodies[i].account.impulse, 0.0, 0.0, 0.0, 0.0);
+    check_v3(f.bodies[i].account.angular_impulse, 0.0, 0.0, 0.0, 0.0);
   }
-  check_v3(f.tick.hand_impulse, 4.0 * T, 0.0, 0.0, 1e-15);
-  f.pointers[0].device_pose.position[0] = f.pointers[1].device_pose.position[0] = -0.1;
+  check_v3(f.tick.figures.hand_impulse, 4.0 * T, 0.0, 0.0, 1e-15);
+  f.pointers[0].device.pose.position[0] = f.pointers[1].device.pose.position[0] = -0.1;
   run(5); /* no force, no acceleration */
   check_v3(f.bodies[2].twist.linear, 4.0 * T, 0.0, 0.0, 1e-15);
 }
@@ -80,7 +80,7 @@ TEST(blocks_go_with_their_contact_and_their_body)
   set_up_crosses();
   f.pointers[0].generation = 2; /* gone while the message was on its way */
   adopt();
-  CHECK(f.tick.cross_count == 2 && f.tick.contact_count == 1);
+  CHECK(f.tick.crosses.count == 2 && f.tick.touches.count == 1);
   run(1);
   press_both();
   run(1);
@@ -89,7 +89,7 @@ TEST(blocks_go_with_their_contact_and_their_body)
   set_up_crosses();
   --f.model->body_count; /* body 3 could not be sent */
   adopt();
-  CHECK(f.tick.cross_count == 2);
+  CHECK(f.tick.crosses.count == 2);
   run(1);
   press_both();
   run(1);

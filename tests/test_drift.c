@@ -79,7 +79,7 @@ static void check_model(hap_model model)
   printf("# %s: %.2g after %ld ticks, spin %.4g .. %.4g rad/s\n", hap_model_name(model), worst,
          ticks, slowest, fastest);
   CHECK(worst < 1e-12);
-  CHECK(f.tick.fault == HAP_FAULT_NONE);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
   CHECK(slowest > 5.0 && fastest < 20.0); /* they did turn */
   CHECK(fabs(f.bodies[0].pose.quat_wxyz[0]) < 1.0 - 1e-9);
 }
@@ -122,19 +122,19 @@ TEST(orientations_of_pointers_stay_unit)
 {
   set_up();
   f.tick.hashing = false;
-  hapi_tick_pointer *p = add_pointer(0, 0.0, 0.0, 0.0);
-  p->pose_world_device = (hap_pose){{1.0, 2.0, 3.0}, {0.5, -0.5, 0.5, 0.5}};
+  hapi_pointer *p = add_pointer(0, 0.0, 0.0, 0.0);
+  p->device.pose_world_device = (hap_pose){{1.0, 2.0, 3.0}, {0.5, -0.5, 0.5, 0.5}};
   worst = 0.0;
   for (long i = 0; i < ticks; ++i) {
     double angle = 0.005 * (double)i;
     double length = 1.0 + 1e-4 * sin((double)i);
-    p->device_pose.quat_wxyz[0] = length * cos(angle);
-    p->device_pose.quat_wxyz[1] = length * sin(angle);
+    p->device.pose.quat_wxyz[0] = length * cos(angle);
+    p->device.pose.quat_wxyz[1] = length * sin(angle);
     run(1);
     note_length(p->pose.quat_wxyz);
   }
   printf("# pointer: %.2g\n", worst);
-  CHECK(worst < 1e-12 && f.tick.fault == HAP_FAULT_NONE);
+  CHECK(worst < 1e-12 && f.tick.guard.latch.fault == HAP_FAULT_NONE);
 }
 
 /* ---- denormals ---- */
@@ -151,22 +151,22 @@ static int denormals(const double *values, int count)
 static int denormals_of(const hapi_tick *tick)
 {
   int found = 0;
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *b = &tick->bodies[tick->live[i]];
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *b = &tick->bodies.of[tick->bodies.live[i]];
     found += denormals(b->pose.position, 3) + denormals(b->pose.quat_wxyz, 4) +
              denormals(b->twist.linear, 3) + denormals(b->twist.angular, 3) +
-             denormals(b->residual, 6) + denormals(b->impulse, 3) +
-             denormals(b->angular_impulse, 3) + denormals(b->gain, 6) +
+             denormals(b->linear.residual, 6) + denormals(b->account.impulse, 3) +
+             denormals(b->account.angular_impulse, 3) + denormals(b->account.gain, 6) +
              denormals(b->start_twist, 6);
   }
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    found += denormals(tick->contacts[i].force, 3);
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    found += denormals(tick->touches.of[i].force, 3);
   }
-  for (uint32_t i = 0; i < tick->world.memory_count; ++i) {
-    found += denormals(tick->world.memory[i].impulse, 3);
+  for (uint32_t i = 0; i < tick->contacts.memory_count; ++i) {
+    found += denormals(tick->contacts.memory[i].impulse, 3);
   }
-  for (uint32_t i = 0; i < tick->world.solver.row_count; ++i) {
-    found += denormals(&tick->world.solver.rows[i].impulse, 1);
+  for (uint32_t i = 0; i < tick->rows.solver.row_count; ++i) {
+    found += denormals(&tick->rows.solver.rows[i].impulse, 1);
   }
   return found;
 }
@@ -206,8 +206,8 @@ static void check_decay(hap_model model, bool touched)
   REQUIRE(world_start(&w, 0.01, touched ? -0.008 : -0.012, 0.03, 0.02));
   CHECK(hap_session_advance(w.session, 20) == HAP_OK);
   const hapi_tick *tick = &w.session->haptic->tick;
-  REQUIRE(tick->live_count == 1);
-  const hapi_local_body *body = &tick->bodies[tick->live[0]];
+  REQUIRE(tick->bodies.live_count == 1);
+  const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[0]];
   CHECK((hapi_v3_norm(body->twist.linear) > 1e-3) == touched);
   CHECK((hapi_v3_norm(body->twist.angular) > 1e-3) == touched);
   world_move_pointer(&w, 0, (const double[3]){-0.012, 0.03, 0.02}, NULL);
@@ -216,7 +216,7 @@ static void check_decay(hap_model model, bool touched)
     CHECK(hap_session_advance(w.session, 1) == HAP_OK);
     found += denormals_of(tick);
   }
-  CHECK(found == 0 && tick->live_count == 1 && world_stats(&w).faults.count == 0);
+  CHECK(found == 0 && tick->bodies.live_count == 1 && world_stats(&w).faults.count == 0);
   CHECK(hapi_v3_norm(body->twist.linear) < 1e-150 && hapi_v3_norm(body->twist.angular) < 1e-150);
   CHECK(!flushes() && !flushed_in_step);
   world_close(&w);

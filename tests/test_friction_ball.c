@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#include "haptic/rt/contact_solver.h"
+#include "solver/contact_solver.h"
 
 #define BODIES 6 /* the ground, some free ones, and one that stands for a proxy */
 #define ROWS 64

@@ -6,7 +6,7 @@
 
 #include "tests/tap.h"
 
-#include "haptic/rt/contact_solver.h"
+#include "solver/contact_solver.h"
 #include "tests/tick_world.h"
 
 #define K 1000.0
@@ -14,13 +14,13 @@
 #define RADIUS 0.01
 
 /* A body at slot 0 that the test moves, its surface through the origin across x, and a pointer. */
-static hapi_tick_pointer *surface_and_pointer(hap_model model, double finger)
+static hapi_pointer *surface_and_pointer(hap_model model, double finger)
 {
   set_up();
   f.model->model = model;
-  hapi_tick_pointer *p = add_pointer(0, -RADIUS - 0.001, 0.0, 0.0);
-  p->turns = true;
-  p->finger_radius = finger;
+  hapi_pointer *p = add_pointer(0, -RADIUS - 0.001, 0.0, 0.0);
+  p->device.turns = true;
+  p->surface.finger_radius = finger;
   begin_model();
   add_body(0)->flags = HAPI_BODY_DRIVEN;
   add_contact(0, 0, 0)->mu = MU;
@@ -46,7 +46,7 @@ static void turn_body(double about_x, double about_y)
   double spin[4] = {cos(0.5 * about_x), sin(0.5 * about_x), 0.0, 0.0};
   double tilt[4] = {cos(0.5 * about_y), 0.0, sin(0.5 * about_y), 0.0};
   hapi_quat_multiply(tilt, spin, f.bodies[0].pose.quat_wxyz);
-  f.bodies[0].to = f.bodies[0].pose;
+  f.bodies[0].shown.to = f.bodies[0].pose;
 }
 
 static double rounded(double x, double quantum)
@@ -68,9 +68,9 @@ typedef struct shake {
   double spin; /* rad in all */
 } shake;
 
-static void put(hapi_tick_pointer *p, double x, double y, double z)
+static void put(hapi_pointer *p, double x, double y, double z)
 {
-  hapi_v3_set(p->device_pose.position, x, y, z);
+  hapi_v3_set(p->device.pose.position, x, y, z);
 }
 
 /* m, by which the point that sticks has crept after a million ticks. */
@@ -78,7 +78,7 @@ static double creep_of(const shake *how)
 {
   const int ticks = 1000000;
   uint64_t state = 7;
-  hapi_tick_pointer *p = surface_and_pointer(how->model, how->finger);
+  hapi_pointer *p = surface_and_pointer(how->model, how->finger);
   put(p, -RADIUS + 0.002, 0.0, 0.0);
   run(30);
   put(p, -RADIUS + 0.002, 2e-4, -1e-4);
@@ -125,7 +125,7 @@ TEST(what_rolls_does_not_slide)
 {
   static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
   for (int m = 0; m < 2; ++m) {
-    hapi_tick_pointer *p = surface_and_pointer(models[m], 0.0);
+    hapi_pointer *p = surface_and_pointer(models[m], 0.0);
     const double step[4] = {cos(5e-4), 0.0, sin(5e-4), 0.0};
     double normal[3] = {-1.0, 0.0, 0.0};
     put(p, -RADIUS + 0.002, 0.0, 0.0);
@@ -141,7 +141,7 @@ TEST(what_rolls_does_not_slide)
       hapi_quat_rotate(step, apart, apart);
       hapi_v3_add(foot, apart, pose->position);
       hapi_quat_multiply(step, pose->quat_wxyz, pose->quat_wxyz);
-      f.bodies[0].to = *pose;
+      f.bodies[0].shown.to = *pose;
       hapi_quat_rotate(pose->quat_wxyz, out, normal);
       run(1);
     }
@@ -157,9 +157,9 @@ TEST(all_rows_of_a_measured_body_answer_by_one_matrix)
 {
   set_up();
   f.model->model = HAP_MODEL_CONTACT;
-  hapi_tick_pointer *p = add_pointer(0, -RADIUS + 0.001, 0.0, 0.0);
-  p->turns = true;
-  p->finger_radius = 0.005;
+  hapi_pointer *p = add_pointer(0, -RADIUS + 0.001, 0.0, 0.0);
+  p->device.turns = true;
+  p->surface.finger_radius = 0.005;
   begin_model();
   hapi_model_body *body = add_body(0);
   body->flags = HAPI_BODY_MEASURED | HAPI_BODY_WHOLE;
@@ -177,7 +177,7 @@ TEST(all_rows_of_a_measured_body_answer_by_one_matrix)
     put(p, -RADIUS + 0.001, 1e-5 * i, -2e-5 * i);
     run(1);
   }
-  const hapi_solver *solver = &f.tick.world.solver;
+  const hapi_solver *solver = &f.tick.rows.solver;
   CHECK(solver->row_count == 4);
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     for (uint32_t k = 0; k < i; ++k) {

@@ -5,29 +5,29 @@
 
 #include "tests/tap.h"
 
-#include "haptic/rt/black_box.h"
 #include "tests/tick_world.h"
+#include "tick/black_box.h"
 
 #define LIMIT 20.0     /* N */
 #define STEP 10.0      /* N a tick: LIMIT in 2 ms */
 #define ROUNDING 1e-12 /* of the bounds */
 
-static hapi_tick_pointer *guarded_pointer(uint32_t index)
+static hapi_pointer *guarded_pointer(uint32_t index)
 {
-  hapi_tick_pointer *p = add_pointer(index, -0.1, 0.0, 0.0);
-  p->max_force = LIMIT;
-  p->max_torque = 1.0;
-  p->slew_force = STEP / T;
-  p->slew_torque = 0.5 / T;
+  hapi_pointer *p = add_pointer(index, -0.1, 0.0, 0.0);
+  p->device.limits.max_force = LIMIT;
+  p->device.limits.max_torque = 1.0;
+  p->device.limits.slew_force = STEP / T;
+  p->device.limits.slew_torque = 0.5 / T;
   return p;
 }
 
 /* One pointer before a wall at x = 0, guard on. */
-static hapi_tick_pointer *guarded_wall(void)
+static hapi_pointer *guarded_wall(void)
 {
   set_up();
   f.tick.guard.mode = HAP_GUARD_ON;
-  hapi_tick_pointer *p = guarded_pointer(0);
+  hapi_pointer *p = guarded_pointer(0);
   begin_model();
   f.model->period_s = 0.02;
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
@@ -37,14 +37,14 @@ static hapi_tick_pointer *guarded_wall(void)
 }
 
 /* The guard alone, with a wrench that the simulation is said to want. */
-static void guard_wrench(hapi_tick_pointer *p, double fx, double fy, double fz)
+static void guard_wrench(hapi_pointer *p, double fx, double fy, double fz)
 {
   hapi_v3_set(p->wrench.force, fx, fy, fz);
   hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
-  hapi_guard(&f.tick);
+  hapi_guard_run(&f.tick);
 }
 
-static hapi_tick_pointer *guarded_alone(void)
+static hapi_pointer *guarded_alone(void)
 {
   set_up();
   f.tick.guard.mode = HAP_GUARD_ON;
@@ -52,9 +52,9 @@ static hapi_tick_pointer *guarded_alone(void)
 }
 
 /* As a run of 20 ms without force leaves it. */
-static hapi_tick_pointer *guarded_and_warm(void)
+static hapi_pointer *guarded_and_warm(void)
 {
-  hapi_tick_pointer *p = guarded_alone();
+  hapi_pointer *p = guarded_alone();
   for (int i = 0; i < 25; ++i) {
     guard_wrench(p, 0.0, 0.0, 0.0);
   }
@@ -90,14 +90,14 @@ static double distance(const double a[3], const double b[3])
 
 TEST(a_million_random_wrenches_keep_limit_and_slew)
 {
-  hapi_tick_pointer *p = guarded_alone();
-  p->pose_world_device = (hap_pose){{1.0, 2.0, 3.0}, {0.5, 0.5, -0.5, 0.5}};
-  p->force_scale = 0.7;
+  hapi_pointer *p = guarded_alone();
+  p->device.pose_world_device = (hap_pose){{1.0, 2.0, 3.0}, {0.5, 0.5, -0.5, 0.5}};
+  p->device.force_scale = 0.7;
   uint64_t wrong = 0;
   double largest = 0.0;
   double fastest = 0.0;
   for (int i = 0; i < 1000000; ++i) {
-    hap_wrench before = p->device_wrench;
+    hap_wrench before = p->device.wrench;
     random_vector(p->wrench.force, 12);
     random_vector(p->wrench.torque, 12);
     if (i % 5000 == 4999) {
@@ -106,13 +106,13 @@ TEST(a_million_random_wrenches_keep_limit_and_slew)
       hapi_tick_reset_fault(&f.tick);
     }
     for (int k = 0; k < 3; ++k) {
-      p->device_pose.position[k] += 1e-3 * random_number();
+      p->device.pose.position[k] += 1e-3 * random_number();
     }
-    hapi_guard(&f.tick);
-    double force = hapi_v3_norm(p->device_wrench.force);
-    double change = distance(p->device_wrench.force, before.force);
-    double torque = hapi_v3_norm(p->device_wrench.torque);
-    double turn = distance(p->device_wrench.torque, before.torque);
+    hapi_guard_run(&f.tick);
+    double force = hapi_v3_norm(p->device.wrench.force);
+    double change = distance(p->device.wrench.force, before.force);
+    double torque = hapi_v3_norm(p->device.wrench.torque);
+    double turn = distance(p->device.wrench.torque, before.torque);
     wrong += !(force <= LIMIT * (1.0 + ROUNDING) && change <= STEP * (1.0 + ROUNDING) &&
                torque <= 1.0 + ROUNDING && turn <= 0.5 * (1.0 + ROUNDING));
     largest = fmax(largest, force);
@@ -121,20 +121,20 @@ TEST(a_million_random_wrenches_keep_limit_and_slew)
   CHECK(wrong == 0);
   CHECK_NEAR(largest, LIMIT, 1e-9); /* both bounds were reached */
   CHECK_NEAR(fastest, STEP, 1e-9);
-  CHECK(f.tick.faults == 200);
+  CHECK(f.tick.guard.latch.count == 200);
 }
 
 TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   for (int i = 0; i < 20; ++i) {
     guard_wrench(p, 0.0, 20.0, 0.0);
   }
-  check_v3(p->device_wrench.force, 0.0, 20.0, 0.0, 1e-12);
+  check_v3(p->device.wrench.force, 0.0, 20.0, 0.0, 1e-12);
   for (int i = 0; i < 80; ++i) { /* along the sphere: what is left falls to 2/3 a tick */
     guard_wrench(p, 3e11, 0.0, -4e11);
   }
-  check_v3(p->device_wrench.force, 12.0, 0.0, -16.0, 1e-9);
+  check_v3(p->device.wrench.force, 12.0, 0.0, -16.0, 1e-9);
   CHECK(p->guard.flags == HAP_GUARD_SATURATED ||
         p->guard.flags == (HAP_GUARD_SATURATED | HAP_GUARD_SLEW));
 }
@@ -143,55 +143,55 @@ TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
 
 TEST(the_ramp_comes_before_slew_and_slew_before_saturation)
 {
-  hapi_tick_pointer *p = guarded_alone();
+  hapi_pointer *p = guarded_alone();
   guard_wrench(p, 120.0, 0.0, 0.0); /* 1/20 of it; saturated first it would be 1 N */
-  check_v3(p->device_wrench.force, 6.0, 0.0, 0.0, 1e-12);
+  check_v3(p->device.wrench.force, 6.0, 0.0, 0.0, 1e-12);
   CHECK(p->guard.flags == HAP_GUARD_RAMP_IN);
   guard_wrench(p, 3000.0, 0.0, 0.0); /* 300 N, of which one step is made */
-  check_v3(p->device_wrench.force, 16.0, 0.0, 0.0, 1e-12);
+  check_v3(p->device.wrench.force, 16.0, 0.0, 0.0, 1e-12);
   CHECK(p->guard.flags == (HAP_GUARD_RAMP_IN | HAP_GUARD_SLEW));
   guard_wrench(p, 3000.0, 0.0, 0.0);
-  check_v3(p->device_wrench.force, 20.0, 0.0, 0.0, 1e-12);
+  check_v3(p->device.wrench.force, 20.0, 0.0, 0.0, 1e-12);
   CHECK(p->guard.flags == (HAP_GUARD_RAMP_IN | HAP_GUARD_SLEW | HAP_GUARD_SATURATED));
   check_v3(p->guard.wanted.force, 3000.0, 0.0, 0.0, 0.0);
 }
 
 TEST(what_the_observer_takes_goes_at_the_slew_bound)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   guard_wrench(p, 10.0, 0.0, 0.0);
   guard_wrench(p, 19.0, 0.0, 0.0);
   CHECK(p->guard.flags == 0); /* it stands still: nothing flows */
   for (int i = 0; i < 2; ++i) {
-    p->device_pose.position[0] += 1e-3; /* 19 N along 1 mm: 19 mJ of nothing */
+    p->device.pose.position[0] += 1e-3; /* 19 N along 1 mm: 19 mJ of nothing */
     guard_wrench(p, 19.0, 0.0, 0.0);
     CHECK((p->guard.flags & HAP_GUARD_ENERGY) != 0);
-    check_v3(p->device_wrench.force, i == 0 ? 9.0 : 0.0, 0.0, 0.0, 1e-9);
+    check_v3(p->device.wrench.force, i == 0 ? 9.0 : 0.0, 0.0, 0.0, 1e-9);
   }
-  p->device_pose.position[0] += 1e-3;
+  p->device.pose.position[0] += 1e-3;
   guard_wrench(p, 5.0, 7.0, 0.0); /* across the motion it may push */
-  check_v3(p->device_wrench.force, 0.0, 7.0, 0.0, 1e-9);
-  p->device_pose.position[0] -= 2e-3;
+  check_v3(p->device.wrench.force, 0.0, 7.0, 0.0, 1e-9);
+  p->device.pose.position[0] -= 2e-3;
   guard_wrench(p, 5.0, 7.0, 0.0); /* and against it */
-  check_v3(p->device_wrench.force, 5.0, 7.0, 0.0, 1e-9);
+  check_v3(p->device.wrench.force, 5.0, 7.0, 0.0, 1e-9);
   CHECK(p->guard.flags == 0 && f.tick.guard.energy_ticks == 3);
 }
 
 /* ---- ramp-in, faults, reset ---- */
 
-static void check_ramp_in(hapi_tick_pointer *p)
+static void check_ramp_in(hapi_pointer *p)
 {
   for (int i = 1; i <= 25; ++i) {
     guard_wrench(p, 0.0, 4.0, 0.0);
-    CHECK_NEAR(p->device_wrench.force[1], fmin(4.0 * i / 20.0, 4.0), 1e-12);
+    CHECK_NEAR(p->device.wrench.force[1], fmin(4.0 * i / 20.0, 4.0), 1e-12);
     CHECK(((p->guard.flags & HAP_GUARD_RAMP_IN) != 0) == (i < 20));
-    CHECK_NEAR(p->wrench.force[1], p->device_wrench.force[1], 1e-12); /* what is felt is reported */
+    CHECK_NEAR(p->wrench.force[1], p->device.wrench.force[1], 1e-12); /* what is felt is reported */
   }
 }
 
 TEST(a_pointer_comes_in_over_20_ms_and_so_after_a_reset)
 {
-  hapi_tick_pointer *p = guarded_alone();
+  hapi_pointer *p = guarded_alone();
   check_ramp_in(p);
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
   for (int i = 0; i < 50; ++i) {
@@ -199,102 +199,104 @@ TEST(a_pointer_comes_in_over_20_ms_and_so_after_a_reset)
   }
   hapi_tick_reset_fault(&f.tick);
   check_ramp_in(p);
-  CHECK(f.tick.faults == 1 && f.tick.guard.slewed_ticks == 0);
+  CHECK(f.tick.guard.latch.count == 1 && f.tick.guard.slewed_ticks == 0);
 }
 
 /* A slew limit that is meant for touch must not keep the motors on for minutes. */
 TEST(a_fault_takes_the_force_away_in_100_ms_whatever_the_slew_limit)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
-  p->slew_force = p->slew_torque = 1e-3;
+  hapi_pointer *p = guarded_and_warm();
+  p->device.limits.slew_force = p->device.limits.slew_torque = 1e-3;
   p->guard.written.force[1] = LIMIT;
   p->guard.written.torque[0] = 1.0;
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
   double before = LIMIT;
   for (int i = 0; i < 100; ++i) {
     guard_wrench(p, 0.0, LIMIT, 0.0);
-    CHECK(before - p->device_wrench.force[1] <= LIMIT / 100.0 + 1e-9);
-    before = p->device_wrench.force[1];
+    CHECK(before - p->device.wrench.force[1] <= LIMIT / 100.0 + 1e-9);
+    before = p->device.wrench.force[1];
   }
-  CHECK_NEAR(hapi_v3_norm(p->device_wrench.force), 0.0, 1e-9);
-  CHECK_NEAR(hapi_v3_norm(p->device_wrench.torque), 0.0, 1e-9);
+  CHECK_NEAR(hapi_v3_norm(p->device.wrench.force), 0.0, 1e-9);
+  CHECK_NEAR(hapi_v3_norm(p->device.wrench.torque), 0.0, 1e-9);
 }
 
 TEST(a_reset_of_no_fault_changes_nothing)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   hapi_tick_reset_fault(&f.tick);
   guard_wrench(p, 0.0, 4.0, 0.0);
-  check_v3(p->device_wrench.force, 0.0, 4.0, 0.0, 0.0);
+  check_v3(p->device.wrench.force, 0.0, 4.0, 0.0, 0.0);
 }
 
 TEST(a_force_that_is_not_finite_ramps_from_the_last_good_one_to_zero)
 {
   static const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, 1e200};
   for (int i = 0; i < 4; ++i) {
-    hapi_tick_pointer *p = guarded_and_warm();
-    hapi_tick_pointer *other = guarded_pointer(2);
+    hapi_pointer *p = guarded_and_warm();
+    hapi_pointer *other = guarded_pointer(2);
     other->guard.share = 1.0;
     hapi_v3_set(other->wrench.force, 0.0, 3.0, 0.0);
     guard_wrench(p, 10.0, 0.0, 0.0);
     guard_wrench(p, 16.0, 0.0, 0.0);
     guard_wrench(p, 16.0, bad[i], 0.0);
-    CHECK(f.tick.fault == HAP_FAULT_FORCE && f.tick.fault_pointer == 1 && f.tick.faults == 1);
-    check_v3(p->device_wrench.force, 6.0, 0.0, 0.0, 1e-12);
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE && f.tick.guard.latch.pointer == 1 &&
+          f.tick.guard.latch.count == 1);
+    check_v3(p->device.wrench.force, 6.0, 0.0, 0.0, 1e-12);
     check_v3(p->wrench.force, 6.0, 0.0, 0.0, 1e-12);
-    check_v3(other->device_wrench.force, 0.0, 0.0, 0.0, 0.0); /* 3 N are within one step */
+    check_v3(other->device.wrench.force, 0.0, 0.0, 0.0, 0.0); /* 3 N are within one step */
     guard_wrench(p, 16.0, 0.0, 0.0);                          /* the cause has gone */
-    check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+    check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
     guard_wrench(p, 16.0, 0.0, 0.0);
-    check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
-    CHECK(f.tick.fault == HAP_FAULT_FORCE && (p->guard.flags & HAP_GUARD_FAULT) != 0);
+    check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE && (p->guard.flags & HAP_GUARD_FAULT) != 0);
   }
 }
 
 TEST(a_torque_that_is_not_finite_is_a_fault_too)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   p->wrench.torque[2] = (double)NAN;
-  hapi_guard(&f.tick);
-  CHECK(f.tick.fault == HAP_FAULT_FORCE);
-  check_v3(p->device_wrench.torque, 0.0, 0.0, 0.0, 0.0);
+  hapi_guard_run(&f.tick);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE);
+  check_v3(p->device.wrench.torque, 0.0, 0.0, 0.0, 0.0);
 }
 
 TEST(the_first_fault_is_the_one_that_stays)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   (void)guarded_pointer(1);
   hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 2);
   guard_wrench(p, (double)NAN, 0.0, 0.0);
-  CHECK(f.tick.fault == HAP_FAULT_DEVICE_POSE && f.tick.fault_pointer == 2 && f.tick.faults == 1);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_DEVICE_POSE && f.tick.guard.latch.pointer == 2 &&
+        f.tick.guard.latch.count == 1);
 }
 
 TEST(a_device_that_failed_is_zeroed_at_once)
 {
-  hapi_tick_pointer *p = guarded_and_warm();
+  hapi_pointer *p = guarded_and_warm();
   guard_wrench(p, 10.0, 0.0, 0.0);
   guard_wrench(p, 20.0, 0.0, 0.0);
   hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_READ, 1);
   hapi_guard_cut(p);
   guard_wrench(p, 20.0, 0.0, 0.0);
-  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
+  check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
   hapi_tick_reset_fault(&f.tick);
   check_ramp_in(p);
 }
 
 TEST(a_measuring_guard_keeps_checks_and_limits_alone)
 {
-  hapi_tick_pointer *p = guarded_alone();
+  hapi_pointer *p = guarded_alone();
   f.tick.guard.mode = HAP_GUARD_MEASURE;
   guard_wrench(p, 19.0, 0.0, 0.0);
-  check_v3(p->device_wrench.force, 19.0, 0.0, 0.0, 0.0);
-  p->device_pose.position[0] += 0.01;
+  check_v3(p->device.wrench.force, 19.0, 0.0, 0.0, 0.0);
+  p->device.pose.position[0] += 0.01;
   guard_wrench(p, 0.0, -40.0, 0.0);
-  check_v3(p->device_wrench.force, 0.0, -20.0, 0.0, 1e-12);
+  check_v3(p->device.wrench.force, 0.0, -20.0, 0.0, 1e-12);
   CHECK(p->guard.flags == HAP_GUARD_SATURATED);
   guard_wrench(p, (double)NAN, 0.0, 0.0);
-  check_v3(p->device_wrench.force, 0.0, 0.0, 0.0, 0.0);
-  CHECK(f.tick.fault == HAP_FAULT_FORCE);
+  check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE);
 }
 
 /* ---- age ---- */
@@ -313,13 +315,13 @@ static void stalled_tick(int tick)
 
 TEST(a_stall_takes_the_force_down_and_the_next_model_brings_it_back)
 {
-  hapi_tick_pointer *p = guarded_wall();
+  hapi_pointer *p = guarded_wall();
   double before = 0.0;
   double fastest = 0.0;
-  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0); /* 5 mm deep, at rest: 5 N */
+  hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0); /* 5 mm deep, at rest: 5 N */
   for (int tick = 0; tick < 500; ++tick) {
     stalled_tick(tick);
-    double force = -p->device_wrench.force[0];
+    double force = -p->device.wrench.force[0];
     fastest = tick >= 50 ? fmax(fastest, fabs(force - before)) : 0.0;
     before = force;
     bool stale = (p->guard.flags & HAP_GUARD_STALE) != 0;
@@ -332,15 +334,15 @@ TEST(a_stall_takes_the_force_down_and_the_next_model_brings_it_back)
     }
   }
   CHECK(fastest <= 5.0 / 20.0 + 1e-9); /* down in 100 ms, up in one step of physics */
-  CHECK(f.tick.guard.stale_times == 1 && f.tick.fault == HAP_FAULT_NONE);
+  CHECK(f.tick.guard.stale_times == 1 && f.tick.guard.latch.fault == HAP_FAULT_NONE);
   CHECK(f.tick.guard.stale_ticks >= 170 && f.tick.guard.stale_ticks <= 180);
 }
 
 TEST(a_model_of_two_steps_is_not_too_old)
 {
-  hapi_tick_pointer *p = guarded_wall();
-  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0);
-  int64_t state_ns = f.tick.state_ns;
+  hapi_pointer *p = guarded_wall();
+  hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0);
+  int64_t state_ns = f.tick.facts.state_ns;
   while (f.now_ns <= state_ns + 41 * TICK_NS) { /* two steps and a tick */
     run(1);
     CHECK(!f.tick.guard.stale);
@@ -351,7 +353,7 @@ TEST(a_model_of_two_steps_is_not_too_old)
 
 TEST(without_a_model_and_in_model_single_nothing_grows_old)
 {
-  hapi_tick_pointer *p = guarded_alone();
+  hapi_pointer *p = guarded_alone();
   f.now_ns = 1000 * TICK_NS;
   run(50);
   CHECK(f.tick.guard.stale_times == 0);
@@ -360,7 +362,7 @@ TEST(without_a_model_and_in_model_single_nothing_grows_old)
   f.model->period_s = T;
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   adopt();
-  hapi_v3_set(p->device_pose.position, -0.005, 0.0, 0.0);
+  hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0);
   run(10); /* models late by a few ms are no reason */
   CHECK(f.tick.guard.stale_times == 0);
   run(10);
@@ -383,23 +385,23 @@ static energy tap_wall(hap_guard mode, double scale, double hz, double damping, 
 {
   const double depth = 0.01;
   energy e = {0.0, 0.0, 0.0, 0.0};
-  hapi_tick_pointer *p = guarded_wall();
+  hapi_pointer *p = guarded_wall();
   f.tick.guard.mode = mode;
-  p->motion_scale = scale;
-  p->force_scale = 1.0 / scale;
-  p->damping = damping;
-  f.tick.physics_period = 0.0; /* the wall does not grow old */
+  p->device.motion_scale = scale;
+  p->device.force_scale = 1.0 / scale;
+  p->surface.damping = damping;
+  f.tick.facts.physics_period = 0.0; /* the wall does not grow old */
   for (int i = 0; i < ticks; ++i) {
     double angle = 2.0 * 3.14159265358979 * hz * T * i;
     double x = -0.01 - depth * cos(angle);
-    double moved = x / scale - p->device_pose.position[0];
-    e.gained += i > 0 ? scale * scale * p->device_wrench.force[0] * moved : 0.0;
+    double moved = x / scale - p->device.pose.position[0];
+    e.gained += i > 0 ? scale * scale * p->device.wrench.force[0] * moved : 0.0;
     e.most = fmax(e.most, e.gained);
-    p->device_pose.position[0] = x / scale;
-    p->device_twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle) / scale;
+    p->device.pose.position[0] = x / scale;
+    p->device.twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle) / scale;
     run(1);
     double deep = fmax(x + 0.01, 0.0);
-    e.stored = fmax(e.stored, 0.5 * p->stiffness * deep * deep);
+    e.stored = fmax(e.stored, 0.5 * p->surface.stiffness * deep * deep);
     e.peak = fmax(e.peak, hapi_v3_norm(p->wrench.force));
   }
   return e;
@@ -445,9 +447,9 @@ static double impact(hap_guard mode, double hand_k, double *out_total)
 {
   set_up();
   f.tick.guard.mode = mode;
-  hapi_tick_pointer *p = guarded_pointer(0);
-  p->stiffness = 500.0;
-  hapi_v3_set(p->device_pose.position, 0.0, 0.0, 0.0);
+  hapi_pointer *p = guarded_pointer(0);
+  p->surface.stiffness = 500.0;
+  hapi_v3_set(p->device.pose.position, 0.0, 0.0, 0.0);
   f.model->model = HAP_MODEL_CONTACT;
   begin_model();
   hapi_model_body *body = add_body(0);
@@ -470,12 +472,12 @@ static double impact(hap_guard mode, double hand_k, double *out_total)
   *out_total = 0.0;
   for (int i = 0; i < 160; ++i) {
     run(1);
-    double force = p->device_wrench.force[0];
+    double force = p->device.wrench.force[0];
     peak = fmax(peak, fabs(force));
     if (hand_k > 0.0) {
-      speed += T * (force - hand_k * p->device_pose.position[0]) / 0.3;
-      p->device_pose.position[0] += T * speed;
-      p->device_twist.linear[0] = speed;
+      speed += T * (force - hand_k * p->device.pose.position[0]) / 0.3;
+      p->device.pose.position[0] += T * speed;
+      p->device.twist.linear[0] = speed;
       gained += force * T * speed;
     }
     double v = f.bodies[0].twist.linear[0];
@@ -505,7 +507,7 @@ static void yield_to(uint32_t flags, hap_model model)
 {
   set_up();
   f.tick.guard.mode = HAP_GUARD_ON;
-  hapi_tick_pointer *p = guarded_pointer(0);
+  hapi_pointer *p = guarded_pointer(0);
   f.model->model = model;
   begin_model();
   hapi_model_body *body = add_body(0);
@@ -531,10 +533,10 @@ static void yield_to(uint32_t flags, hap_model model)
   f.contacts[0].ramp.share = 1.0;
   p->guard.share = 1.0;
   for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
-    p->device_pose.position[0] = -0.05 * T * i;
-    p->device_twist.linear[0] = -0.05;
+    p->device.pose.position[0] = -0.05 * T * i;
+    p->device.twist.linear[0] = -0.05;
     run(1);
-    CHECK_NEAR(p->device_wrench.force[0], -2.0, 0.05);
+    CHECK_NEAR(p->device.wrench.force[0], -2.0, 0.05);
   }
   CHECK(f.tick.guard.energy_ticks == 0 && f.tick.guard.stored_max < 0.01);
 }
@@ -548,57 +550,56 @@ TEST(what_a_weight_or_a_drive_gives_is_felt)
 
 TEST(a_device_has_not_moved_when_it_is_first_seen)
 {
-  hapi_tick_pointer *p =
-      guarded_alone(); /* 0.1 m from its origin, on the side that it is pushed to */
+  hapi_pointer *p = guarded_alone(); /* 0.1 m from its origin, on the side that it is pushed to */
   for (int again = 0; again < 2; ++again) {
     p->guard.share = 1.0;
     guard_wrench(p, -4.0, 0.0, 0.0);
-    check_v3(p->device_wrench.force, -4.0, 0.0, 0.0, 0.0);
+    check_v3(p->device.wrench.force, -4.0, 0.0, 0.0, 0.0);
     hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 1);
-    p->device_pose.position[0] = (double)NAN;
+    p->device.pose.position[0] = (double)NAN;
     guard_wrench(p, 0.0, 0.0, 0.0);
-    p->device_pose.position[0] = -0.3; /* where it is put meanwhile */
+    p->device.pose.position[0] = -0.3; /* where it is put meanwhile */
     hapi_tick_reset_fault(&f.tick);
   }
   CHECK(f.tick.guard.energy_ticks == 0);
 }
 
 /* 5 mm deep in two walls, 5 N and 12.5 mJ each; pressed in within the ledger. */
-static hapi_tick_pointer *pressed_in_two(void)
+static hapi_pointer *pressed_in_two(void)
 {
-  hapi_tick_pointer *p = guarded_wall();
+  hapi_pointer *p = guarded_wall();
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   (void)add_contact(1, HAPI_SLOT_NONE, 0);
   adopt();
-  f.tick.physics_period = 0.0; /* the walls do not grow old */
+  f.tick.facts.physics_period = 0.0; /* the walls do not grow old */
   p->guard.share = 1.0;
   for (int i = -100; i <= 50; ++i) {
-    p->device_pose.position[0] = -0.01 + 1e-4 * i;
+    p->device.pose.position[0] = -0.01 + 1e-4 * i;
     run(1);
   }
-  CHECK_NEAR(p->device_wrench.force[0], -10.0, 1e-9);
+  CHECK_NEAR(p->device.wrench.force[0], -10.0, 1e-9);
   CHECK_NEAR(f.tick.guard.balance, 0.025, 1e-3);
   return p;
 }
 
 TEST(the_spring_of_a_contact_that_vanishes_is_lost)
 {
-  hapi_tick_pointer *p = pressed_in_two();
+  hapi_pointer *p = pressed_in_two();
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   adopt();
   run(1);
-  CHECK_NEAR(p->device_wrench.force[0], -5.0, 1e-9);
+  CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
   CHECK_NEAR(f.tick.guard.balance, 0.0125, 1e-3);
 }
 
 TEST(nobody_pays_for_a_jump_but_what_it_gives_is_given)
 {
   for (int out = 0; out < 2; ++out) {
-    hapi_tick_pointer *p = pressed_in_two();
-    p->speed_limit = 10.0;
-    p->device_pose.position[0] += out != 0 ? -0.1 : 0.1;
+    hapi_pointer *p = pressed_in_two();
+    p->device.speed_limit = 10.0;
+    p->device.pose.position[0] += out != 0 ? -0.1 : 0.1;
     run(1);
     /* Of 1 J no more than 10 N at 10 m/s give in a tick. */
     CHECK_NEAR(f.tick.guard.balance, out != 0 ? 0.025 - 0.1 : 0.0, 1e-3);
@@ -620,12 +621,12 @@ static void record(int ticks)
   }
 }
 
-static hapi_tick_pointer *open_box(void)
+static hapi_pointer *open_box(void)
 {
-  hapi_tick_pointer *p = guarded_wall();
+  hapi_pointer *p = guarded_wall();
   box = (hapi_black_box){.rows = box_rows, .counts = box_counts, .pointers = POINTERS};
   hapi_black_box_reset(&box);
-  f.tick.physics_period = 0.0; /* the wall does not grow old */
+  f.tick.facts.physics_period = 0.0; /* the wall does not grow old */
   return p;
 }
 
@@ -651,14 +652,14 @@ TEST(the_black_box_knows_no_age_before_the_first_model)
 
 TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
 {
-  hapi_tick_pointer *p = open_box();
+  hapi_pointer *p = open_box();
   record(1000);
   CHECK(read_box(1000) == 0); /* nothing has happened */
-  p->stiffness = (double)INFINITY;
-  p->device_pose.position[0] = -0.005;
+  p->surface.stiffness = (double)INFINITY;
+  p->device.pose.position[0] = -0.005;
   record(1);
-  p->stiffness = 1000.0;
-  uint64_t last = f.tick.tick - 1;
+  p->surface.stiffness = 1000.0;
+  uint64_t last = f.tick.facts.tick - 1;
   record(100);
   for (int again = 0; again < 2; ++again) {
     REQUIRE(read_box(1000) == 256);

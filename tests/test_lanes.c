@@ -11,8 +11,8 @@
 
 #include "base/lanes.h"
 #include "base/pose.h"
-#include "haptic/rt/contact_solver.h"
-#include "haptic/rt/gyro.h"
+#include "local/gyro.h"
+#include "solver/contact_solver.h"
 
 #define BODIES 24u
 #define CONTACTS 90u

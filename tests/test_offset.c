@@ -174,10 +174,10 @@ static void run_tick(hap_model model, double at, double stiffness, double *force
 {
   set_up();
   f.model->model = model;
-  hapi_tick_pointer *p = add_pointer(0, 0.0, 0.0, 0.0);
-  p->stiffness = stiffness;
-  hapi_v3_set(p->pose_world_device.position, at, at, at);
-  hapi_v3_set(p->device_pose.position, -0.0599, 0.02, 0.01);
+  hapi_pointer *p = add_pointer(0, 0.0, 0.0, 0.0);
+  p->surface.stiffness = stiffness;
+  hapi_v3_set(p->device.pose_world_device.position, at, at, at);
+  hapi_v3_set(p->device.pose.position, -0.0599, 0.02, 0.01);
   begin_model();
   hapi_model_body *body = add_body(0);
   body->flags = model == HAP_MODEL_CONTACT ? HAPI_BODY_OWNED : 0;
@@ -199,8 +199,8 @@ static void run_tick(hap_model model, double at, double stiffness, double *force
   patches->model_number = f.model->number;
   hapi_tick_adopt_patches(&f.tick, patches);
   for (int i = 0; i < TICKS; ++i) {
-    p->device_twist.linear[0] = i < TICKS / 2 ? 0.05 : -0.05;
-    p->device_pose.position[0] += T * p->device_twist.linear[0];
+    p->device.twist.linear[0] = i < TICKS / 2 ? 0.05 : -0.05;
+    p->device.pose.position[0] += T * p->device.twist.linear[0];
     run(1);
     forces[i] = p->wrench.force[0];
   }

@@ -260,7 +260,7 @@ static void cycles(void)
     __rtsan_realtime_enter();
     hapi_haptic_cycle(haptic, i * TICK_NS);
     __rtsan_realtime_exit();
-    const double *force = haptic->tick.pointers[2].wrench.force;
+    const double *force = haptic->tick.pointers.of[2].wrench.force;
     rubbed += hypot(force[0], force[1]) > 0.1 * force[2] && force[2] > 1.0;
   }
   hap_stats stats;

@@ -7,7 +7,7 @@
 
 #include <tests/tap.h>
 
-#include "haptic/rt/contact_solver.h"
+#include "solver/contact_solver.h"
 
 #define COUNT 20u
 

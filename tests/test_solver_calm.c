@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-#include "haptic/rt/island.h"
+#include "solver/island.h"
 
 #define ROWS 512
 #define BODIES 600

@@ -14,7 +14,7 @@
 
 #include "base/vec.h"
 #include "device/device.h"
-#include "haptic/rt/velocity.h"
+#include "pointer/velocity.h"
 
 #define PI 3.14159265358979323846
 #define QUANTUM 3e-5

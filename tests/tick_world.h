@@ -6,9 +6,9 @@
 /* The pure tick with memory of its own, and local models made by hand. */
 
 #include "base/vec.h"
-#include "haptic/rt/tick.h"
 #include "sync/exchange.h"
 #include "tests/tap.h"
+#include "tick/tick.h"
 
 #define T 1e-3
 #define TICK_NS 1000000LL
@@ -39,7 +39,7 @@ static struct {
   hapi_ramp ramps[CONTACTS];
   uint32_t ramp_generations[CONTACTS];
   hapi_friction frictions[CONTACTS];
-  hapi_tick_pointer pointers[POINTERS];
+  hapi_pointer pointers[POINTERS];
   hapi_model_cross crosses[CROSSES];
   hapi_contact_memory memory[2][CONTACTS];
   uint32_t buckets[BUCKETS];
@@ -55,25 +55,19 @@ static struct {
   int64_t now_ns;
 } f;
 
-static inline void set_up_world(void)
+static inline void set_up_rows(void)
 {
-  hapi_local_world *world = &f.tick.world;
-  world->memory = f.memory[0];
-  world->old_memory = f.memory[1];
-  world->buckets = f.buckets;
-  world->bucket_count = BUCKETS;
-  world->joints = f.joints;
-  world->joint_memory = f.joint_memory;
-  world->sources = f.sources;
-  world->row_capacity = ROWS;
-  world->solver.rows = f.rows;
-  world->solver.v = f.v;
-  world->solver.free = f.free_v;
-  world->solver.work = f.work;
-  world->solver.work_count = sizeof f.work / sizeof f.work[0];
-  world->solver.tolerance = 1e-9;
-  world->solver.update_budget = 100000;
-  world->solver.direct_rows = 64;
+  hapi_solver *solver = &f.tick.rows.solver;
+  f.tick.rows.sources = f.sources;
+  f.tick.rows.capacity = ROWS;
+  solver->rows = f.rows;
+  solver->v = f.v;
+  solver->free = f.free_v;
+  solver->work = f.work;
+  solver->work_count = sizeof f.work / sizeof f.work[0];
+  solver->tolerance = 1e-9;
+  solver->update_budget = 100000;
+  solver->direct_rows = 64;
 }
 
 static inline void tick_world_finish(void)
@@ -87,18 +81,24 @@ static inline void set_up(void)
   tap_at_end(tick_world_finish);
   memset(&f, 0, sizeof f);
   f.tick.capacity = capacity;
-  f.tick.period = T;
+  f.tick.facts.period = T;
   f.tick.hashing = true;
   f.tick.guard.mode = HAP_GUARD_MEASURE; /* the tests of the guard switch it on */
-  f.tick.bodies = f.bodies;
-  f.tick.live = f.live;
-  f.tick.contacts = f.contacts;
-  f.tick.ramps = f.ramps;
-  f.tick.ramp_generations = f.ramp_generations;
-  f.tick.frictions = f.frictions;
-  f.tick.pointers = f.pointers;
-  f.tick.crosses = f.crosses;
-  set_up_world();
+  f.tick.bodies.of = f.bodies;
+  f.tick.bodies.live = f.live;
+  f.tick.touches.of = f.contacts;
+  f.tick.touches.ramps = f.ramps;
+  f.tick.touches.ramp_generations = f.ramp_generations;
+  f.tick.touches.frictions = f.frictions;
+  f.tick.pointers.of = f.pointers;
+  f.tick.crosses.of = f.crosses;
+  f.tick.contacts.memory = f.memory[0];
+  f.tick.contacts.old_memory = f.memory[1];
+  f.tick.contacts.buckets = f.buckets;
+  f.tick.contacts.bucket_count = BUCKETS;
+  f.tick.joints.of = f.joints;
+  f.tick.joints.memory = f.joint_memory;
+  set_up_rows();
   hapi_tick_reset(&f.tick);
   if (hapi_exchange_create(&capacity, &f.exchange) != HAP_OK) {
     abort();
@@ -108,20 +108,20 @@ static inline void set_up(void)
 }
 
 /* Radius 10 mm, 1000 N/m, no limit to speak of, at (x, y, z). */
-static inline hapi_tick_pointer *add_pointer(uint32_t index, double x, double y, double z)
+static inline hapi_pointer *add_pointer(uint32_t index, double x, double y, double z)
 {
-  hapi_tick_pointer *p = &f.pointers[index];
+  hapi_pointer *p = &f.pointers[index];
   memset(p, 0, sizeof *p);
   p->generation = 1;
-  p->radius = 0.01;
-  p->stiffness = 1000.0;
-  p->motion_scale = 1.0;
-  p->force_scale = 1.0;
-  p->max_force = 1e6;
-  p->max_torque = 1.0;
-  p->pose_world_device.quat_wxyz[0] = 1.0;
-  p->device_pose.quat_wxyz[0] = 1.0;
-  hapi_v3_set(p->device_pose.position, x, y, z);
+  p->shape.radius = 0.01;
+  p->surface.stiffness = 1000.0;
+  p->device.motion_scale = 1.0;
+  p->device.force_scale = 1.0;
+  p->device.limits.max_force = 1e6;
+  p->device.limits.max_torque = 1.0;
+  p->device.pose_world_device.quat_wxyz[0] = 1.0;
+  p->device.pose.quat_wxyz[0] = 1.0;
+  hapi_v3_set(p->device.pose.position, x, y, z);
   return p;
 }
 
@@ -211,10 +211,10 @@ static inline void check_v3(const double v[3], double x, double y, double z, dou
 }
 
 /* One pointer at a contact that has been seen apart, so that there is no ramp. */
-static inline hapi_tick_pointer *pointer_before_wall(void)
+static inline hapi_pointer *pointer_before_wall(void)
 {
   set_up();
-  hapi_tick_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+  hapi_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   adopt();

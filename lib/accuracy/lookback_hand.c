@@ -6,9 +6,9 @@
 #include "base/alloc.h"
 #include "base/pose.h"
 #include "base/vec.h"
-#include "haptic/rt/pointer_friction.h"
-#include "haptic/rt/tick.h"
+#include "local/pointer_friction.h"
 #include "physics/physics_internal.h"
+#include "tick/tick.h"
 
 /* The hands of a window: a tick of the loop in model SINGLE that nobody feels. What of it is near comes as a
  * message of physics, as in a session of that model; so hulls, friction and soft fingers are the loop's own
@@ -30,18 +30,18 @@ static void list_parts(hapi_tick *t, part out[PARTS])
   const hapi_capacity *c = &t->capacity;
   size_t tools = (size_t)2 * c->tool_points;
   const part all[PARTS] = {
-      {(void **)&t->bodies, c->bodies, sizeof *t->bodies},
-      {(void **)&t->live, c->bodies, sizeof *t->live},
-      {(void **)&t->contacts, c->contacts + tools, sizeof *t->contacts},
-      {(void **)&t->ramps, c->contacts, sizeof *t->ramps},
-      {(void **)&t->ramp_generations, c->contacts, sizeof *t->ramp_generations},
-      {(void **)&t->frictions, c->contacts, sizeof *t->frictions},
-      {(void **)&t->pointers, c->pointers, sizeof *t->pointers},
-      {(void **)&t->tool.tools, tools, sizeof *t->tool.tools},
-      {(void **)&t->tool.old_tools, tools, sizeof *t->tool.old_tools},
-      {(void **)&t->tool.old_contacts, tools, sizeof *t->tool.old_contacts},
-      {(void **)&t->tool.pairs, HAPI_TOOL_PAIRS(c), sizeof *t->tool.pairs},
-      {(void **)&t->tool.hulls, c->pointers, sizeof *t->tool.hulls},
+      {(void **)&t->bodies.of, c->bodies, sizeof *t->bodies.of},
+      {(void **)&t->bodies.live, c->bodies, sizeof *t->bodies.live},
+      {(void **)&t->touches.of, c->contacts + tools, sizeof *t->touches.of},
+      {(void **)&t->touches.ramps, c->contacts, sizeof *t->touches.ramps},
+      {(void **)&t->touches.ramp_generations, c->contacts, sizeof *t->touches.ramp_generations},
+      {(void **)&t->touches.frictions, c->contacts, sizeof *t->touches.frictions},
+      {(void **)&t->pointers.of, c->pointers, sizeof *t->pointers.of},
+      {(void **)&t->touches.tool.tools, tools, sizeof *t->touches.tool.tools},
+      {(void **)&t->touches.tool.old_tools, tools, sizeof *t->touches.tool.old_tools},
+      {(void **)&t->touches.tool.old_contacts, tools, sizeof *t->touches.tool.old_contacts},
+      {(void **)&t->touches.tool.pairs, HAPI_TOOL_PAIRS(c), sizeof *t->touches.tool.pairs},
+      {(void **)&t->pointers.hulls, c->pointers, sizeof *t->pointers.hulls},
   };
   memcpy(out, all, sizeof all);
 }
@@ -56,7 +56,8 @@ static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
   }
   memset(hand->tick, 0, sizeof *hand->tick);
   hand->tick->capacity = *capacity;
-  hand->tick->pointer_high = capacity->pointers;
+  hand->tick->pointers.high = capacity->pointers;
+  hand->tick->touches.tool.capacity = capacity->tool_points;
   list_parts(hand->tick, parts);
   for (int i = 0; i < PARTS; ++i) {
     *parts[i].array = hapi_alloc_array(parts[i].count, parts[i].size);
@@ -130,9 +131,9 @@ void hapi_lookback_hand_begin(hapi_lookback_hand *hand)
   for (int i = 0; i < PARTS - 1; ++i) { /* the hulls stay */
     memset(*parts[i].array, 0, parts[i].count * parts[i].size);
   }
-  t->live_count = t->contact_count = t->body_high = 0;
-  t->tool.count = t->tool.pair_count = 0;
-  t->tick = 1;
+  t->bodies.live_count = t->touches.count = t->bodies.high = 0;
+  t->touches.tool.count = t->touches.tool.pair_count = 0;
+  t->facts.tick = 1;
   memset(hand->told, 0, t->capacity.pointers * sizeof *hand->told);
   hand->begun = false;
 }
@@ -142,7 +143,7 @@ bool hapi_lookback_hand_take_hull(hapi_physics *physics, uint32_t pointer, uint3
   hapi_lookback_hand *hand = &physics->lookback.hand;
   const hapi_state_pointer *in = &hapi_state_pointers(physics->cycle.state)[pointer];
   if (hand->hull_of[pointer] == 0 && in->generation == generation) {
-    hand->tick->tool.hulls[pointer] = hapi_state_hulls(physics->cycle.state)[pointer];
+    hand->tick->pointers.hulls[pointer] = hapi_state_hulls(physics->cycle.state)[pointer];
     hand->hull_of[pointer] = generation;
   }
   return hand->hull_of[pointer] == generation;
@@ -158,7 +159,7 @@ static void blend(const double a[3], const double b[3], double share, double out
 }
 
 /* Where the pointer was then: on the way from a row to the next one, or straight on from the last. */
-static void place_pointer(const hapi_lookback_moment *at, uint32_t index, hapi_tick_pointer *p)
+static void place_pointer(const hapi_lookback_moment *at, uint32_t index, hapi_pointer *p)
 {
   const hapi_path_pointer *in = &at->row[index];
   const hapi_path_pointer *next = at->next != NULL ? &at->next[index] : NULL;
@@ -186,19 +187,19 @@ static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
 {
   for (uint32_t i = 0; i < t->capacity.pointers; ++i) {
     const hapi_path_pointer *in = &at->row[i];
-    hapi_tick_pointer *p = &t->pointers[i];
+    hapi_pointer *p = &t->pointers.of[i];
     if (p->generation != in->generation) {
       memset(p, 0, sizeof *p);
       p->generation = in->generation;
-      p->hull = in->is_tool != 0 ? &t->tool.hulls[i] : NULL;
-      p->extent = p->hull != NULL ? extent_of(p->hull, in->radius) : in->radius;
+      p->shape.hull = in->is_tool != 0 ? &t->pointers.hulls[i] : NULL;
+      p->shape.extent = p->shape.hull != NULL ? extent_of(p->shape.hull, in->radius) : in->radius;
     }
-    p->radius = in->radius;
-    p->stiffness = in->stiffness;
-    p->damping = in->damping;
-    p->finger_radius = in->finger_radius;
-    p->turns = in->turns != 0;
-    p->three_dof = in->three_dof != 0;
+    p->shape.radius = in->radius;
+    p->surface.stiffness = in->stiffness;
+    p->surface.damping = in->damping;
+    p->surface.finger_radius = in->finger_radius;
+    p->device.turns = in->turns != 0;
+    p->device.three_dof = in->three_dof != 0;
     if (p->generation != 0) {
       place_pointer(at, i, p);
     }
@@ -210,22 +211,22 @@ static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
 static void tell(hapi_lookback_hand *hand)
 {
   for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
-    const hapi_tick_pointer *p = &hand->tick->pointers[i];
+    const hapi_pointer *p = &hand->tick->pointers.of[i];
     hand->told[i] = (hapi_state_pointer){.generation = p->generation,
-                                         .radius = p->radius,
-                                         .stiffness = p->stiffness,
-                                         .finger_radius = p->finger_radius,
+                                         .radius = p->shape.radius,
+                                         .stiffness = p->surface.stiffness,
+                                         .finger_radius = p->surface.finger_radius,
                                          .pose = p->pose,
                                          .twist = p->twist,
-                                         .is_tool = p->hull != NULL,
-                                         .extent = p->extent};
+                                         .is_tool = p->shape.hull != NULL,
+                                         .extent = p->shape.extent};
   }
 }
 
 static bool all_are_told(const hapi_lookback_hand *hand)
 {
   for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
-    if (hand->told[i].generation != hand->tick->pointers[i].generation) {
+    if (hand->told[i].generation != hand->tick->pointers.of[i].generation) {
       return false;
     }
   }
@@ -299,7 +300,7 @@ static bool add_tool(hapi_physics *physics, hapi_lookback_touch *t, uint32_t bod
   const hapi_tool_at at = {.geom = t->geom,
                            .index = t->pointer,
                            .pointer = p,
-                           .hull = &hand->tick->tool.hulls[t->pointer],
+                           .hull = &hand->tick->pointers.hulls[t->pointer],
                            .key = t->key,
                            .reach = hapi_neighbors_reach(speed, period),
                            .horizon = period};
@@ -326,7 +327,7 @@ static bool add_touches(hapi_physics *physics, double period)
   for (uint32_t i = 0; i < w->touch_count; ++i) {
     hapi_lookback_touch *t = &w->touches[i];
     uint32_t body;
-    const hapi_tick_pointer *of = &tick->pointers[t->pointer];
+    const hapi_pointer *of = &tick->pointers.of[t->pointer];
     if (!t->there || of->generation == 0 || t->generation != of->generation) {
       continue;
     }
@@ -334,7 +335,7 @@ static bool add_touches(hapi_physics *physics, double period)
       return false;
     }
     const hapi_state_pointer *p = &w->hand.told[t->pointer];
-    if (of->hull == NULL) {
+    if (of->shape.hull == NULL) {
       add_sphere(physics, t, body, p, period);
     } else if (!add_tool(physics, t, body, p, period)) {
       return false;
@@ -378,7 +379,7 @@ static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
   hapi_v3_copy(c->normal_now, normal);
   hapi_v3_copy(c->point_now, point);
   if (c->tool == 0) {
-    const hap_pose *pose = c->body != HAPI_SLOT_NONE ? &t->bodies[c->body].pose : NULL;
+    const hap_pose *pose = c->body != HAPI_SLOT_NONE ? &t->bodies.of[c->body].pose : NULL;
     hapi_v3_copy(c->normal_body, normal);
     hapi_v3_copy(c->point_body, point);
     if (pose != NULL) {
@@ -386,7 +387,7 @@ static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
       hapi_pose_point(pose->position, pose->quat_wxyz, c->point_body, point);
     }
   }
-  hapi_friction_foot(&t->pointers[c->pointer], normal, point, foot);
+  hapi_friction_foot(&t->pointers.of[c->pointer], normal, point, foot);
   hapi_friction_resume(t, c, normal, foot, spring->stretch_body, spring->turn);
 }
 
@@ -395,7 +396,7 @@ static bool is_of(const hapi_tick *t, const hapi_local_contact *c,
 {
   return c->tool == 0 ? c->slot == spring->touch
                       : spring->in.slot == HAPI_SLOT_NONE &&
-                            t->tool.tools[c->tool - 1].in.at.key == spring->in.key;
+                            t->touches.tool.tools[c->tool - 1].in.at.key == spring->in.key;
 }
 
 /* The one that the contact had: of a hull's points the nearest. */
@@ -411,10 +412,10 @@ static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_l
       continue;
     }
     if (c->tool != 0) {
-      hapi_v3_sub(w->springs[i].in.place, t->tool.tools[c->tool - 1].in.at.core_a, way);
+      hapi_v3_sub(w->springs[i].in.place, t->touches.tool.tools[c->tool - 1].in.at.core_a, way);
       far = hapi_v3_norm(way);
     }
-    if (far < least && (c->tool == 0 || far < t->tool.tools[c->tool - 1].in.same_within)) {
+    if (far < least && (c->tool == 0 || far < t->touches.tool.tools[c->tool - 1].in.same_within)) {
       least = far;
       found = &w->springs[i].in;
     }
@@ -427,15 +428,15 @@ static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_l
 static void resume(hapi_lookback *w)
 {
   hapi_tick *t = w->hand.tick;
-  for (uint32_t i = 0; i < t->tool.pair_count; ++i) {
-    resume_ramp(&t->tool.pairs[i].ramp, &t->tool.pairs[i].seen);
+  for (uint32_t i = 0; i < t->touches.tool.pair_count; ++i) {
+    resume_ramp(&t->touches.tool.pairs[i].ramp, &t->touches.tool.pairs[i].seen);
   }
   hapi_tool_place(t); /* says where the points of hulls are */
-  for (uint32_t i = 0; i < t->contact_count; ++i) {
-    hapi_local_contact *c = &t->contacts[i];
+  for (uint32_t i = 0; i < t->touches.count; ++i) {
+    hapi_local_contact *c = &t->touches.of[i];
     const hapi_state_spring *spring = c->rubs ? find_spring(w, c) : NULL;
     resume_ramp(&c->ramp, &c->seen);
-    if (spring != NULL && (c->tool == 0 || t->tool.tools[c->tool - 1].placed)) {
+    if (spring != NULL && (c->tool == 0 || t->touches.tool.tools[c->tool - 1].placed)) {
       resume_spring(t, c, spring);
     }
   }
@@ -447,10 +448,10 @@ static void push_bodies(hapi_physics *physics, double period)
 {
   const hapi_lookback *w = &physics->lookback;
   for (uint32_t i = 0; i < w->body_count; ++i) {
-    hapi_local_body *from = &w->hand.tick->bodies[i];
+    hapi_local_body *from = &w->hand.tick->bodies.of[i];
     dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
-    const double *f = from->impulse;
-    const double *m = from->angular_impulse;
+    const double *f = from->account.impulse;
+    const double *m = from->account.angular_impulse;
     if (from->pushed && !dBodyIsKinematic(body)) {
       dBodyEnable(body);
       dBodyAddForce(body, f[0] / period, f[1] / period, f[2] / period);
@@ -475,20 +476,20 @@ bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at)
   if (!add_touches(physics, at->period)) {
     return false;
   }
-  t->period = at->period;
-  hapi_tick_adopt(t, m, t->now_ns);
+  t->facts.period = at->period;
+  hapi_tick_adopt(t, m, t->facts.now_ns);
   hapi_local_place(t);
   for (uint32_t i = 0; i < w->body_count; ++i) {
-    hapi_v3_set(t->bodies[i].impulse, 0.0, 0.0, 0.0);
-    hapi_v3_set(t->bodies[i].angular_impulse, 0.0, 0.0, 0.0);
-    t->bodies[i].pushed = false;
+    hapi_v3_set(t->bodies.of[i].account.impulse, 0.0, 0.0, 0.0);
+    hapi_v3_set(t->bodies.of[i].account.angular_impulse, 0.0, 0.0, 0.0);
+    t->bodies.of[i].pushed = false;
   }
   if (!w->hand.begun) {
     resume(w);
     w->hand.begun = true;
   }
   hapi_render(t);
-  ++t->tick;
+  ++t->facts.tick;
   tell(&w->hand);
   push_bodies(physics, at->period);
   return true;
@@ -496,5 +497,5 @@ bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at)
 
 const double *hapi_lookback_felt(const hapi_lookback *w, uint32_t pointer)
 {
-  return w->hand.tick->pointers[pointer].wrench.force;
+  return w->hand.tick->pointers.of[pointer].wrench.force;
 }

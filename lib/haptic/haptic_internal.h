@@ -14,10 +14,10 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "haptic/haptic.h"
-#include "haptic/rt/black_box.h"
-#include "haptic/rt/tick.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
+#include "tick/black_box.h"
+#include "tick/tick.h"
 
 typedef enum hapi_pointer_phase {
   HAPI_POINTER_EMPTY = 0,

@@ -4,11 +4,11 @@
 
 #include "base/alloc.h"
 #include "base/clock.h"
+#include "base/effect_clock.h"
 #include "base/thread.h"
 #include "base/vec.h"
 #include "device/emergency.h"
 #include "haptic/haptic_internal.h"
-#include "haptic/rt/effect_clock.h"
 #include "haptic/tick_memory.h"
 
 #define STORE(field, value) \
@@ -52,7 +52,7 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;
   }
-  haptic->tick.period = 1.0 / config->haptic_hz;
+  haptic->tick.facts.period = 1.0 / config->haptic_hz;
   haptic->tick.hashing = config->lockstep;
   haptic->tick.guard.mode = config->guard;
   hapi_tick_reset(&haptic->tick);
@@ -127,9 +127,9 @@ static void report(hapi_haptic *haptic)
 hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *detail)
 {
   hapi_tick_reset(&haptic->tick);
-  memset(haptic->tick.pointers, 0,
-         haptic->config.capacity.pointers * sizeof *haptic->tick.pointers);
-  haptic->tick.pointer_high = 0;
+  memset(haptic->tick.pointers.of, 0,
+         haptic->config.capacity.pointers * sizeof *haptic->tick.pointers.of);
+  haptic->tick.pointers.high = 0;
   reset_figures(haptic);
   hapi_loop_effects_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);
@@ -152,7 +152,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_pointers_follow(haptic);
   hapi_pointers_read(haptic, start_ns);
   hapi_tape_begun(haptic);
-  haptic->tick.now_ns = start_ns;
+  haptic->tick.facts.now_ns = start_ns;
   hapi_coupling_read(&haptic->tick);
   report(haptic);
   return HAP_OK;
@@ -184,7 +184,7 @@ void hapi_haptic_end(hapi_haptic *haptic)
 
 static void publish_poses(hapi_haptic *haptic)
 {
-  if (haptic->tick.model == HAP_MODEL_CONTACT) {
+  if (haptic->tick.facts.model == HAP_MODEL_CONTACT) {
     hapi_tick_report_poses(&haptic->tick, hapi_exchange_poses_back(haptic->config.exchange));
     hapi_exchange_poses_publish(haptic->config.exchange);
   }
@@ -223,7 +223,7 @@ static void receive(hapi_haptic *haptic, int64_t now_ns)
 {
   take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
-    haptic->tick.now_ns = now_ns;
+    haptic->tick.facts.now_ns = now_ns;
     haptic->tick_budget_ns = haptic->pending->tick_budget_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
@@ -271,7 +271,7 @@ static void follow_faults(hapi_haptic *haptic)
   if (calls.emergency) {
     hapi_tick_fault(&haptic->tick, HAP_FAULT_EMERGENCY, 0);
     for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
-      hapi_guard_cut(&haptic->tick.pointers[i]);
+      hapi_guard_cut(&haptic->tick.pointers.of[i]);
     }
   }
 }
@@ -279,7 +279,7 @@ static void follow_faults(hapi_haptic *haptic)
 /* hap_pointer_id.v; 0: none. */
 static uint64_t fault_pointer(const hapi_tick *tick)
 {
-  return ((uint64_t)tick->fault_generation << 32) | tick->fault_pointer;
+  return ((uint64_t)tick->guard.latch.generation << 32) | tick->guard.latch.pointer;
 }
 
 static void note_load(hapi_haptic *haptic, int64_t spent_ns)
@@ -294,30 +294,30 @@ static void note_load(hapi_haptic *haptic, int64_t spent_ns)
 static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
 {
   const hapi_tick *tick = &haptic->tick;
-  int64_t age = tick->model_number != 0 ? tick->now_ns - tick->state_ns : 0;
-  STORE(ticks, tick->tick);
-  STORE(contact_ticks, tick->contact_ticks);
-  STORE(saturated_ticks, tick->saturated_ticks);
-  STORE(faults, tick->faults);
-  STORE(fault, (int)tick->fault);
+  int64_t age = tick->facts.model_number != 0 ? tick->facts.now_ns - tick->facts.state_ns : 0;
+  STORE(ticks, tick->facts.tick);
+  STORE(contact_ticks, tick->figures.contact_ticks);
+  STORE(saturated_ticks, tick->guard.saturated_ticks);
+  STORE(faults, tick->guard.latch.count);
+  STORE(fault, (int)tick->guard.latch.fault);
   STORE(fault_pointer, fault_pointer(tick));
   STORE(stale_times, tick->guard.stale_times);
   STORE(stale_ticks, tick->guard.stale_ticks);
   STORE(slewed_ticks, tick->guard.slewed_ticks);
   STORE(energy_ticks, tick->guard.energy_ticks);
-  STORE(model, (int)tick->model);
+  STORE(model, (int)tick->facts.model);
   STORE(hash, tick->hashing ? tick->hash : 0);
   STORE(age_ns, age);
   if (age > LOAD(age_max_ns)) {
     STORE(age_max_ns, age);
   }
-  STORE(peak_force, tick->peak_force);
-  STORE(solver_sweeps, tick->sweeps);
-  STORE(solver_residual, tick->residual_max);
-  STORE(local_contacts, tick->model == HAP_MODEL_CONTACT ? tick->world.active : 0);
-  STORE(hand_impulse_abs, tick->hand_impulse_abs);
+  STORE(peak_force, tick->guard.peak_force);
+  STORE(solver_sweeps, tick->figures.sweeps);
+  STORE(solver_residual, tick->figures.residual_max);
+  STORE(local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
+  STORE(hand_impulse_abs, tick->figures.hand_impulse_abs);
   for (int i = 0; i < 3; ++i) {
-    STORE(hand_impulse[i], tick->hand_impulse[i]);
+    STORE(hand_impulse[i], tick->figures.hand_impulse[i]);
   }
   int64_t spent = hapi_clock_now() - begin_ns;
   hapi_histogram_add(&haptic->figures.tick_ns, spent);
@@ -328,10 +328,10 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
 
 static void note_tick(hapi_haptic *haptic)
 {
-  uint64_t recording = hapi_effect_begin(&haptic->tick);
+  uint64_t recording = hapi_effect_begin(&haptic->tick.sample);
   hapi_tape_ticked(haptic);
   if (hapi_tape_records(haptic->tape)) {
-    hapi_effect_end(&haptic->tick, HAP_EFFECT_RECORDING, recording);
+    hapi_effect_end(&haptic->tick.sample, HAP_EFFECT_RECORDING, recording);
   }
 }
 

@@ -12,7 +12,7 @@ static bool device_paced(const hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     const hapi_pointer_slot *slot = &haptic->slots[i];
-    if (haptic->tick.pointers[i].generation != 0 && slot->ops != NULL &&
+    if (haptic->tick.pointers.of[i].generation != 0 && slot->ops != NULL &&
         slot->ops->pacing == HAP_PACING_DEVICE) {
       return true;
     }

@@ -25,7 +25,7 @@ void hapi_loop_effects_reset(hapi_haptic *haptic)
 void hapi_loop_sample_begin(hapi_haptic *haptic)
 {
   hapi_effect_sample *sample = &haptic->tick.sample;
-  sample->on = HAPI_HAS_CYCLES && haptic->tick.tick % SAMPLE_TICKS == 0;
+  sample->on = HAPI_HAS_CYCLES && haptic->tick.facts.tick % SAMPLE_TICKS == 0;
   if (sample->on) {
     memset(sample->spent, 0, sizeof sample->spent);
     haptic->effects.begin = hapi_cycles();
@@ -53,17 +53,17 @@ void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns)
 
 /* ---- states ---- */
 
-static void note_torque(const hapi_tick_pointer *p, hapi_effect_figures *io)
+static void note_torque(const hapi_pointer *p, hapi_effect_figures *io)
 {
-  hap_effect_reason why = p->three_dof ? HAP_REASON_NO_TORQUE : HAP_REASON_ROUND;
-  hapi_effect_note(io, p->feels_torque, why);
+  hap_effect_reason why = p->device.three_dof ? HAP_REASON_NO_TORQUE : HAP_REASON_ROUND;
+  hapi_effect_note(io, p->device.feels_torque, why);
 }
 
-static void note_proxy(const hapi_tick_pointer *p, hapi_effect_figures *io)
+static void note_proxy(const hapi_pointer *p, hapi_effect_figures *io)
 {
-  hap_effect_reason why = p->coupling != HAP_COUPLING_AUTO ? HAP_REASON_COUPLING
-                          : p->hold_known                  ? HAP_REASON_WITHIN
-                                                           : HAP_REASON_DEVICE_UNKNOWN;
+  hap_effect_reason why = p->coupling.kind != HAP_COUPLING_AUTO ? HAP_REASON_COUPLING
+                          : p->coupling.hold_known              ? HAP_REASON_WITHIN
+                                                                : HAP_REASON_DEVICE_UNKNOWN;
   hapi_effect_note(io, p->proxied, why);
 }
 
@@ -84,24 +84,24 @@ static hapi_effect_figures unpacked(uint64_t word)
 
 static void note_observer(const hapi_tick *tick, hapi_effect_figures *out)
 {
-  hapi_effect_note(out, tick->guard.observes && tick->guard.mode == HAP_GUARD_ON,
+  hapi_effect_note(out, tick->facts.observes && tick->guard.mode == HAP_GUARD_ON,
                    tick->guard.mode == HAP_GUARD_MEASURE ? HAP_REASON_MEASURING : HAP_REASON_FAR);
-  hapi_effect_sum_up(out, hapi_wish(tick->wishes, HAP_EFFECT_OBSERVER), HAP_REASON_NOT_YET);
+  hapi_effect_sum_up(out, hapi_wish(tick->facts.wishes, HAP_EFFECT_OBSERVER), HAP_REASON_NOT_YET);
 }
 
 void hapi_loop_note_effects(hapi_haptic *haptic)
 {
   const hapi_tick *tick = &haptic->tick;
   hapi_effect_figures f[HAPI_LOOP_NOTED] = {{0}};
-  for (uint32_t i = 0; i < tick->pointer_high; ++i) {
-    if (tick->pointers[i].generation != 0) {
-      note_torque(&tick->pointers[i], &f[HAPI_LOOP_TORQUE]);
-      note_proxy(&tick->pointers[i], &f[HAPI_LOOP_PROXY]);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    if (tick->pointers.of[i].generation != 0) {
+      note_torque(&tick->pointers.of[i], &f[HAPI_LOOP_TORQUE]);
+      note_proxy(&tick->pointers.of[i], &f[HAPI_LOOP_PROXY]);
     }
   }
-  hapi_effect_sum_up(&f[HAPI_LOOP_TORQUE], hapi_wish(tick->wishes, HAP_EFFECT_TORQUE),
+  hapi_effect_sum_up(&f[HAPI_LOOP_TORQUE], hapi_wish(tick->facts.wishes, HAP_EFFECT_TORQUE),
                      HAP_REASON_FAR);
-  hapi_effect_sum_up(&f[HAPI_LOOP_PROXY], hapi_wish(tick->wishes, HAP_EFFECT_PROXY),
+  hapi_effect_sum_up(&f[HAPI_LOOP_PROXY], hapi_wish(tick->facts.wishes, HAP_EFFECT_PROXY),
                      HAP_REASON_FAR);
   note_observer(tick, &f[HAPI_LOOP_OBSERVER]);
   for (int i = 0; i < HAPI_LOOP_NOTED; ++i) {

@@ -27,41 +27,40 @@ static double mass_of(const hap_pointer_def *def)
 }
 
 /* In the world, where a metre of the device is motion_scale metres and a newton its share. */
-static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
-                         hapi_tick_pointer *p)
+static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
 {
   const hap_pointer_def *def = &slot->def;
-  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.period);
+  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.facts.period);
   double scale = def->motion_scale * def->force_scale;
-  p->coupling = def->coupling;
-  p->integration = def->integration;
+  p->coupling.kind = def->coupling;
+  p->coupling.integration = def->integration;
   if (def->coupling == HAP_COUPLING_GOD_OBJECT || def->coupling == HAP_COUPLING_VIRTUAL) {
-    p->integration = HAP_INTEGRATION_IMPLICIT; /* there is no spring of a contact */
+    p->coupling.integration = HAP_INTEGRATION_IMPLICIT; /* there is no spring of a contact */
   }
-  p->hold_known = gains.known && scale > 0.0;
-  p->hold = p->hold_known ? gains.stiffness / scale : HUGE_VAL;
-  p->coupling_stiffness = p->hold_known ? p->hold : 0.0;
-  p->coupling_damping = p->hold_known ? gains.damping / scale : 0.0;
-  p->proxy_mass = mass_of(def);
-  p->coupling_reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
+  p->coupling.hold_known = gains.known && scale > 0.0;
+  p->coupling.hold = p->coupling.hold_known ? gains.stiffness / scale : HUGE_VAL;
+  p->coupling.stiffness = p->coupling.hold_known ? p->coupling.hold : 0.0;
+  p->coupling.damping = p->coupling.hold_known ? gains.damping / scale : 0.0;
+  p->coupling.mass = mass_of(def);
+  p->coupling.reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
 }
 
 static void set_hull(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_tool_hull *hull = &haptic->slots[index].hull;
-  hapi_tick_pointer *p = &haptic->tick.pointers[index];
+  hapi_pointer *p = &haptic->tick.pointers.of[index];
   double farthest = 0.0;
-  haptic->tick.tool.hulls[index] = *hull;
-  p->hull = &haptic->tick.tool.hulls[index];
+  haptic->tick.pointers.hulls[index] = *hull;
+  p->shape.hull = &haptic->tick.pointers.hulls[index];
   for (uint32_t i = 0; i < hull->count; ++i) {
     farthest = fmax(farthest, hapi_v3_norm(hull->points[i]));
   }
-  p->extent += farthest;
+  p->shape.extent += farthest;
 }
 
 /* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long tool's:
  * the device's grip is not as long. */
-static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *p)
+static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
 {
   const hapi_tool_hull *hull = &slot->hull;
   double sum = 0.0;
@@ -70,13 +69,13 @@ static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_tick_pointer *
   }
   double reach = sqrt(sum) + slot->def.radius;
   double arm = fmin(reach, GRIP_MOST * slot->def.motion_scale);
-  p->spin_stiffness = arm * arm * p->coupling_stiffness;
-  p->spin_damping = arm * arm * p->coupling_damping;
-  p->proxy_inertia = arm * arm * p->proxy_mass;
+  p->coupling.spin_stiffness = arm * arm * p->coupling.stiffness;
+  p->coupling.spin_damping = arm * arm * p->coupling.damping;
+  p->coupling.inertia = arm * arm * p->coupling.mass;
   if (slot->def.coupling == HAP_COUPLING_VIRTUAL) {
-    p->proxy_inertia = slot->def.virtual_inertia > 0.0
-                           ? slot->def.virtual_inertia
-                           : BALL_INERTIA * reach * reach * p->proxy_mass;
+    p->coupling.inertia = slot->def.virtual_inertia > 0.0
+                              ? slot->def.virtual_inertia
+                              : BALL_INERTIA * reach * reach * p->coupling.mass;
   }
 }
 
@@ -90,45 +89,48 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   const hapi_pointer_slot *slot = &haptic->slots[index];
   const hap_pointer_def *def = &slot->def;
   const hap_device_info *info = &slot->info;
-  hapi_tick_pointer *p = &haptic->tick.pointers[index];
+  hapi_pointer *p = &haptic->tick.pointers.of[index];
   memset(p, 0, sizeof *p);
-  haptic->tick.pointer_high =
-      index >= haptic->tick.pointer_high ? index + 1 : haptic->tick.pointer_high;
+  haptic->tick.pointers.high =
+      index >= haptic->tick.pointers.high ? index + 1 : haptic->tick.pointers.high;
   p->generation = slot->generation;
-  p->collide_bits = def->collide_bits;
-  p->radius = def->radius;
-  p->three_dof = slot->has_device && info->dof < 6;
-  p->extent = def->radius;
+  p->shape.collide_bits = def->collide_bits;
+  p->shape.radius = def->radius;
+  p->device.three_dof = slot->has_device && info->dof < 6;
+  p->shape.extent = def->radius;
   if (slot->hull.count > 0) {
     set_hull(haptic, index);
   }
-  p->stiffness = def->stiffness;
-  p->damping = def->damping;
-  p->friction = def->friction;
-  p->finger_radius = def->finger_radius;
-  p->turns = !slot->has_device || info->dof == 6;
-  hapi_tick_feel(p, hapi_wish(haptic->tick.wishes, HAP_EFFECT_TORQUE), false);
-  haptic->tick.proxies = true; /* until the next model says what is wished for */
-  p->motion_scale = def->motion_scale;
-  p->force_scale = def->force_scale;
-  p->pose_world_device = def->pose_world_device;
-  p->aligned = is_unturned(def->pose_world_device.quat_wxyz);
-  p->max_force =
+  p->surface.stiffness = def->stiffness;
+  p->surface.damping = def->damping;
+  p->surface.friction = def->friction;
+  p->surface.finger_radius = def->finger_radius;
+  p->device.turns = !slot->has_device || info->dof == 6;
+  hapi_tick_feel(p, hapi_wish(haptic->tick.facts.wishes, HAP_EFFECT_TORQUE), false);
+  haptic->tick.pointers.proxies = true; /* until the next model says what is wished for */
+  p->device.motion_scale = def->motion_scale;
+  p->device.force_scale = def->force_scale;
+  p->device.pose_world_device = def->pose_world_device;
+  p->device.aligned = is_unturned(def->pose_world_device.quat_wxyz);
+  p->device.limits.max_force =
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
-  p->max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque ? info->max_torque
-                                                                               : def->max_torque;
-  p->estimates =
+  p->device.limits.max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque
+                                    ? info->max_torque
+                                    : def->max_torque;
+  p->device.estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
-  p->speed_limit = slot->has_device ? SPEED_LIMIT : 0.0;
+  p->device.speed_limit = slot->has_device ? SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   set_spin_coupling(slot, p);
-  p->slew_force = def->max_slew > 0.0 ? def->max_slew : p->max_force / SLEW_S;
-  p->slew_torque = p->max_torque * (p->slew_force / p->max_force);
-  p->device_pose.quat_wxyz[0] = 1.0;
-  p->device_good.quat_wxyz[0] = 1.0;
-  p->handle_quat[0] = p->proxy_quat[0] = 1.0;
+  p->device.limits.slew_force =
+      def->max_slew > 0.0 ? def->max_slew : p->device.limits.max_force / SLEW_S;
+  p->device.limits.slew_torque =
+      p->device.limits.max_torque * (p->device.limits.slew_force / p->device.limits.max_force);
+  p->device.pose.quat_wxyz[0] = 1.0;
+  p->device.good.quat_wxyz[0] = 1.0;
+  p->handle.quat[0] = p->proxy.quat[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
 }
 
@@ -167,7 +169,7 @@ static void follow_tape(hapi_haptic *haptic)
     bool pauses = false;
     more = hapi_tape_next_leave(haptic, &index, &pauses);
     if (more) {
-      haptic->tick.pointers[index].generation = 0;
+      haptic->tick.pointers.of[index].generation = 0;
       atomic_store(&haptic->slots[index].phase, pauses ? HAPI_POINTER_PAUSED : HAPI_POINTER_EMPTY);
     } else if (hapi_tape_next_join(haptic, &index, &joined, &hull)) {
       take_in(haptic, index, &joined, &hull);
@@ -196,7 +198,7 @@ void hapi_pointers_follow(hapi_haptic *haptic)
       /* Fails when the application wants it back meanwhile: seen at the next tick. */
       (void)atomic_compare_exchange_strong(&slot->phase, &phase, HAPI_POINTER_ACTIVE);
     } else if (phase == HAPI_POINTER_LEAVING || phase == HAPI_POINTER_PAUSING) {
-      haptic->tick.pointers[i].generation = 0;
+      haptic->tick.pointers.of[i].generation = 0;
       if (slot->ops != NULL) {
         slot->ops->zero(slot->self);
       }
@@ -213,7 +215,7 @@ static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
   if (slot->ops != NULL) {
     slot->ops->zero(slot->self);
   }
-  hapi_guard_cut(&haptic->tick.pointers[index]);
+  hapi_guard_cut(&haptic->tick.pointers.of[index]);
   hapi_tick_fault(&haptic->tick, fault, index + 1);
 }
 
@@ -231,13 +233,13 @@ static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_inp
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
-  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
-    hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    hapi_pointer *p = &haptic->tick.pointers.of[i];
     if (p->generation == 0) {
       continue;
     }
-    hapi_pointer_input in = {.pose = p->device_pose};
+    hapi_pointer_input in = {.pose = p->device.pose};
     if (!hapi_tape_plays(haptic->tape)) {
       ask_device(slot, now_ns, &in);
     }
@@ -248,26 +250,26 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
       fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
     }
-    p->device_pose = in.pose;
-    p->device_twist = in.twist;
-    p->buttons = in.buttons;
-    if (slot->has_device && p->estimates) {
-      hapi_velocity_update(&p->velocity, now_ns, &p->device_pose, &p->device_twist);
+    p->device.pose = in.pose;
+    p->device.twist = in.twist;
+    p->device.buttons = in.buttons;
+    if (slot->has_device && p->device.estimates) {
+      hapi_velocity_update(&p->velocity, now_ns, &p->device.pose, &p->device.twist);
     }
   }
 }
 
 void hapi_pointers_write(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
-    hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    hapi_pointer *p = &haptic->tick.pointers.of[i];
     if (p->generation == 0) {
       continue;
     }
-    hapi_pointer_output out = {.reached = p->device_wrench};
+    hapi_pointer_output out = {.reached = p->device.wrench};
     if (slot->ops != NULL) {
-      out.failed = slot->ops->write(slot->self, &p->device_wrench, &out.reached) < HAP_OK;
+      out.failed = slot->ops->write(slot->self, &p->device.wrench, &out.reached) < HAP_OK;
     }
     if (haptic->tape != NULL) {
       hapi_tape_output(haptic, i, &out);
@@ -281,34 +283,34 @@ void hapi_pointers_write(hapi_haptic *haptic)
   }
 }
 
-static void publish_coupling(const hapi_tick_pointer *p, hap_pointer_state *out)
+static void publish_coupling(const hapi_pointer *p, hap_pointer_state *out)
 {
-  double scale = p->motion_scale * p->force_scale;
-  hap_coupling spring = p->rigid ? p->coupling : HAP_COUPLING_PROXY;
+  double scale = p->device.motion_scale * p->device.force_scale;
+  hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
   out->coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT;
-  out->coupling_reason = (uint32_t)p->coupling_reason;
-  out->coupling_stiffness = p->proxied ? scale * p->coupling_stiffness : 0.0;
-  out->coupling_damping = p->proxied ? scale * p->coupling_damping : 0.0;
-  out->contact_stiffness = scale * p->contact_stiffness;
+  out->coupling_reason = (uint32_t)p->coupling.reason;
+  out->coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0;
+  out->coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0;
+  out->contact_stiffness = scale * p->coupling.contact_stiffness;
 }
 
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
-  for (uint32_t i = 0; i < haptic->tick.pointer_high; ++i) {
+  for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
-    const hapi_tick_pointer *p = &haptic->tick.pointers[i];
+    const hapi_pointer *p = &haptic->tick.pointers.of[i];
     if (p->generation == 0) {
       continue;
     }
     hap_pointer_state *out = &slot->states[hapi_triple_back(&slot->state_buffer)];
     out->size = sizeof *out;
     out->contacts = p->contacts;
-    out->stamp_ns = haptic->tick.now_ns;
-    out->device = p->device_good;
+    out->stamp_ns = haptic->tick.facts.now_ns;
+    out->device = p->device.good;
     out->proxy = p->pose;
     out->twist = p->twist;
     out->wrench = p->wrench;
-    out->buttons = p->buttons;
+    out->buttons = p->device.buttons;
     publish_coupling(p, out);
     out->guard = p->guard.flags;
     hapi_triple_publish(&slot->state_buffer);
@@ -462,7 +464,7 @@ static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_s
   if (!hapi_coupling_has_spring(def->coupling)) {
     return HAP_OK;
   }
-  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.period);
+  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.facts.period);
   double scale = def->motion_scale * def->force_scale;
   if (gains.known && !(gains.stiffness <= scale * WORLD_STIFFNESS_MOST)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,

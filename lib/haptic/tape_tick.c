@@ -195,20 +195,20 @@ void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io
   }
 }
 
-static uint64_t hash_pointer(const hapi_tick_pointer *p)
+static uint64_t hash_pointer(const hapi_pointer *p)
 {
-  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, p->buttons);
-  hash = hapi_hash_doubles(hash, p->device_pose.position, 3);
-  hash = hapi_hash_doubles(hash, p->device_pose.quat_wxyz, 4);
-  hash = hapi_hash_doubles(hash, p->device_twist.linear, 3);
-  hash = hapi_hash_doubles(hash, p->device_twist.angular, 3);
+  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, p->device.buttons);
+  hash = hapi_hash_doubles(hash, p->device.pose.position, 3);
+  hash = hapi_hash_doubles(hash, p->device.pose.quat_wxyz, 4);
+  hash = hapi_hash_doubles(hash, p->device.twist.linear, 3);
+  hash = hapi_hash_doubles(hash, p->device.twist.angular, 3);
   hash = hapi_hash_doubles(hash, p->pose.position, 3);
   hash = hapi_hash_doubles(hash, p->pose.quat_wxyz, 4);
   hash = hapi_hash_doubles(hash, p->twist.linear, 3);
   hash = hapi_hash_doubles(hash, p->twist.angular, 3);
   hash = hapi_hash_doubles(hash, p->wrench.force, 3);
-  hash = hapi_hash_doubles(hash, p->device_wrench.force, 3);
-  return hapi_hash_doubles(hash, p->device_wrench.torque, 3);
+  hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
+  return hapi_hash_doubles(hash, p->device.wrench.torque, 3);
 }
 
 static void compare(hapi_haptic *haptic, hapi_difference *difference, const hapi_cell *cell,
@@ -224,16 +224,16 @@ static void compare(hapi_haptic *haptic, hapi_difference *difference, const hapi
 
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io)
 {
-  const hapi_tick_pointer *p = &haptic->tick.pointers[index];
+  const hapi_pointer *p = &haptic->tick.pointers.of[index];
   uint64_t hash =
       hapi_tape_records(haptic->tape) || hapi_tape_plays(haptic->tape) ? hash_pointer(p) : 0;
   if (hapi_tape_records(haptic->tape)) {
     hapi_cell *force = hapi_tape_put(haptic->tape, HAPI_CELL_FORCE, index);
     force->flags = io->failed ? HAPI_CELL_FAILED : 0;
-    memcpy(force->d, &p->device_wrench, sizeof p->device_wrench);
+    memcpy(force->d, &p->device.wrench, sizeof p->device.wrench);
     force->u[6] = hash;
     const void *reached = &io->reached; /* bit by bit: no padding in it */
-    if (memcmp(reached, &p->device_wrench, sizeof io->reached) != 0) {
+    if (memcmp(reached, &p->device.wrench, sizeof io->reached) != 0) {
       memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_REACHED, index)->d, &io->reached,
              sizeof io->reached);
     }
@@ -244,7 +244,7 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
       double wrench[6];
       hapi_difference difference = {.what = HAPI_DIFFERS_POINTER,
                                     .number = ((uint64_t)p->generation << 32) | (index + 1)};
-      memcpy(wrench, &p->device_wrench, sizeof wrench);
+      memcpy(wrench, &p->device.wrench, sizeof wrench);
       compare(haptic, &difference, force, wrench, 6);
     }
     if (hapi_tape_next_is(haptic->tape, HAPI_CELL_REACHED)) {
@@ -257,16 +257,16 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
 
 static uint64_t hash_tick(const hapi_tick *tick)
 {
-  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, tick->model_number);
-  hash = hapi_hash_word(hash, (uint64_t)tick->fault);
+  uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, tick->facts.model_number);
+  hash = hapi_hash_word(hash, (uint64_t)tick->guard.latch.fault);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
-    if (tick->pointers[i].generation != 0) {
-      hash = hapi_hash_word(hash, hash_pointer(&tick->pointers[i]));
+    if (tick->pointers.of[i].generation != 0) {
+      hash = hapi_hash_word(hash, hash_pointer(&tick->pointers.of[i]));
     }
   }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    hash = hapi_hash_word(hash, tick->live[i]);
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    hash = hapi_hash_word(hash, tick->bodies.live[i]);
     hash = hapi_hash_doubles(hash, body->pose.position, 3);
     hash = hapi_hash_doubles(hash, body->pose.quat_wxyz, 4);
     hash = hapi_hash_doubles(hash, body->twist.linear, 3);
@@ -278,7 +278,7 @@ static uint64_t hash_tick(const hapi_tick *tick)
 /* Of many bodies one part after the other. */
 static uint32_t first_body(hapi_haptic *haptic, uint32_t *out_end)
 {
-  uint32_t count = haptic->tick.live_count;
+  uint32_t count = haptic->tick.bodies.live_count;
   uint32_t parts = (count + HAPI_CELL_BODIES - 1) / HAPI_CELL_BODIES;
   uint32_t first = parts > 1 ? haptic->turn++ % parts * HAPI_CELL_BODIES : 0;
   *out_end = first + HAPI_CELL_BODIES < count ? first + HAPI_CELL_BODIES : count;
@@ -291,15 +291,15 @@ static void put_bodies(hapi_haptic *haptic)
   uint32_t end = 0;
   for (uint32_t i = first_body(haptic, &end); i < end; ++i) {
     hapi_cell *cell = hapi_tape_put(haptic->tape, HAPI_CELL_BODY, 0);
-    cell->word = tick->live[i];
-    memcpy(cell->d, &tick->bodies[tick->live[i]].pose, sizeof(hap_pose));
+    cell->word = tick->bodies.live[i];
+    memcpy(cell->d, &tick->bodies.of[tick->bodies.live[i]].pose, sizeof(hap_pose));
   }
 }
 
 static uint32_t trace_place(const hapi_tick *tick, uint32_t slot)
 {
-  for (uint32_t i = 0; i < tick->watch_count; ++i) {
-    if (tick->watch_slot[i] == slot) {
+  for (uint32_t i = 0; i < tick->watch.count; ++i) {
+    if (tick->watch.slot[i] == slot) {
       return i;
     }
   }
@@ -315,7 +315,7 @@ static void compare_bodies(hapi_haptic *haptic)
     if (cell->word < tick->capacity.bodies) {
       hapi_difference difference = {
           .what = HAPI_DIFFERS_BODY, .number = cell->word, .traced = trace_place(tick, cell->word)};
-      memcpy(pose, &tick->bodies[cell->word].pose, sizeof pose);
+      memcpy(pose, &tick->bodies.of[cell->word].pose, sizeof pose);
       compare(haptic, &difference, cell, pose, 7);
     }
   }
@@ -325,7 +325,7 @@ void hapi_tape_ticked(hapi_haptic *haptic)
 {
   if (hapi_tape_records(haptic->tape)) {
     haptic->note->u[HAPI_TICK_HASH] = hash_tick(&haptic->tick);
-    haptic->note->u[HAPI_TICK_BODIES] = haptic->tick.live_count;
+    haptic->note->u[HAPI_TICK_BODIES] = haptic->tick.bodies.live_count;
     put_bodies(haptic);
     close_packet(haptic);
   } else if (hapi_tape_plays(haptic->tape)) {

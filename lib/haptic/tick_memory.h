@@ -5,7 +5,7 @@
 
 /* The arrays of a tick, which must not allocate itself. */
 
-#include "haptic/rt/tick.h"
+#include "tick/tick.h"
 
 /* Into a zeroed tick; false without memory: destroy all the same. hapi_tick_reset comes next. */
 bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *capacity);

@@ -42,7 +42,7 @@ void hapi_trace_ring_write(hapi_haptic *haptic)
   }
   hap_trace_row *row = &ring->rows[written % ring->capacity];
   hapi_tick_trace(&haptic->tick, row);
-  row->t = 1e-9 * (double)(haptic->tick.now_ns - haptic->start_ns);
+  row->t = 1e-9 * (double)(haptic->tick.facts.now_ns - haptic->start_ns);
   row->tick_us = haptic->last_tick_us;
   atomic_store_explicit(&ring->written, written + 1, memory_order_release);
 }

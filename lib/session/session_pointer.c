@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "base/log.h"
+#include "base/plausible.h"
 #include "base/vec.h"
 #include "haptic/coupling_gains.h"
-#include "haptic/rt/tick.h"
 #include "session/session_internal.h"
 
 static bool unit_quaternion(const double q[4])

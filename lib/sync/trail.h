@@ -60,7 +60,7 @@ void hapi_trail_finish(hapi_trail *trail);
 /* No loop is running; others may read. Touches all of the memory. */
 void hapi_trail_reset(hapi_trail *trail);
 
-/* ---- the loop: hapi_tick_report_trail of haptic/rt ---- */
+/* ---- the loop: hapi_tick_report_trail ---- */
 
 static inline hapi_trail_body *hapi_trail_bodies(const hapi_trail *trail, uint64_t row)
 {

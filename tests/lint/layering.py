@@ -17,6 +17,9 @@ import lint
 # The physics side, in the order of the data flow.
 PHYSICS_SIDE = ["lib/world", "lib/near", "lib/probe", "lib/research", "lib/accuracy", "lib/physics"]
 
+# The tick likewise.
+TICK = ["lib/solver", "lib/pointer", "lib/local", "lib/paper", "lib/guard", "lib/tick"]
+
 # Folder: folders whose headers it may include besides its own and include/hapode. "*": any.
 LAYERS = {
     "include/hapode": [],
@@ -24,17 +27,20 @@ LAYERS = {
     "lib/sync": ["lib/base", "lib/proximity"],
     "lib/proximity": ["lib/base"],
     "lib/device": ["lib/base"],
-    "lib/haptic/rt": ["lib/base", "lib/sync", "lib/proximity"],
+    "lib/solver": ["lib/base"],
+    "lib/pointer": ["lib/base", "lib/sync", "lib/tick"],
+    "lib/local": ["lib/base", "lib/sync", "lib/proximity", "lib/solver", "lib/pointer", "lib/tick"],
+    "lib/paper": ["lib/base", "lib/sync", "lib/pointer", "lib/local", "lib/tick"],
+    "lib/guard": ["lib/base", "lib/sync", "lib/pointer", "lib/local", "lib/tick"],
+    "lib/tick": ["lib/base", "lib/sync", *TICK],
     "lib/record": ["lib/base"],
-    "lib/contact": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record"],
-    "lib/haptic": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/device",
-                   "lib/record"],
+    "lib/contact": ["lib/base", "lib/sync", "lib/proximity", "lib/record"],
+    "lib/haptic": ["lib/base", "lib/sync", *TICK, "lib/device", "lib/record"],
     "lib/world": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/near": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/probe": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/research": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
-    "lib/accuracy": ["lib/base", "lib/sync", "lib/proximity", "lib/haptic/rt", "lib/record",
-                     *PHYSICS_SIDE],
+    "lib/accuracy": ["lib/base", "lib/sync", "lib/proximity", *TICK, "lib/record", *PHYSICS_SIDE],
     "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/session": ["lib/*"],
     "plugins/skeleton": [],
@@ -62,7 +68,7 @@ QUITTERS = ("lib/base/assert.c",        # a mistake of this library, in builds w
 BACKWARD_MAX = {
     "physics": (["lib/physics", "lib/world", "lib/near", "lib/probe", "lib/research",
                  "lib/accuracy"], 15),
-    "tick": (["lib/haptic/rt", "lib/solver", "lib/guard"], None),
+    "tick": (TICK, None),
     "lib/contact": (["lib/contact"], 2),
     "lib/device": (["lib/device"], 5),
     "lib/haptic": (["lib/haptic", "lib/loop"], 1),

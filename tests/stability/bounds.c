@@ -10,7 +10,7 @@
 #include "base/vec.h"
 #include "device/device.h"
 #include "haptic/haptic_internal.h"
-#include "haptic/rt/pointer_friction.h"
+#include "local/pointer_friction.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 
@@ -72,9 +72,9 @@ static void see_bodies(const bounds *b, seen_body seen[WORLD_BODIES_MAX])
       seen[i].met_twist = seen[i].twist;
     }
   }
-  for (uint32_t i = 0; i < tick->live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies[tick->live[i]];
-    int index = index_of_slot(b, tick->live[i]);
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    int index = index_of_slot(b, tick->bodies.live[i]);
     if (index >= 0) {
       seen[index].met_pose = body->pose;
       seen[index].met_twist = body->twist;
@@ -136,11 +136,11 @@ static double length4(const double q[4])
  * that of the time after it. */
 static bool is_now(const hapi_tick *tick, const hapi_local_contact *c)
 {
-  const hapi_tick_pointer *p = &tick->pointers[c->pointer];
-  const hapi_row *row = &tick->world.solver.rows[c->row];
-  double k = p->rigid ? p->coupling_stiffness : c->ramp.share * p->stiffness;
-  double stiffness = tick->period * tick->period * k * hapi_dot6(row->ja, row->ba);
-  return stiffness <= (p->proxied ? 0.25 : 4.0); /* lib/haptic/rt/pointer_rows.c */
+  const hapi_pointer *p = &tick->pointers.of[c->pointer];
+  const hapi_row *row = &tick->rows.solver.rows[c->row];
+  double k = p->rigid ? p->coupling.stiffness : c->ramp.share * p->surface.stiffness;
+  double stiffness = tick->facts.period * tick->facts.period * k * hapi_dot6(row->ja, row->ba);
+  return stiffness <= (p->proxied ? 0.25 : 4.0); /* lib/local/pointer_spring.h */
 }
 
 /* J of which springs and bodies are ahead of the hands' work. */
@@ -148,25 +148,25 @@ static double contacts_ahead(const bounds *b)
 {
   const hapi_tick *tick = tick_of(b);
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->contact_count && b->model == HAP_MODEL_CONTACT; ++i) {
-    const hapi_local_contact *c = &tick->contacts[i];
+  for (uint32_t i = 0; i < tick->touches.count && b->model == HAP_MODEL_CONTACT; ++i) {
+    const hapi_local_contact *c = &tick->touches.of[i];
     if (c->row == HAPI_NO_ROW || c->body == HAPI_SLOT_NONE) {
       continue;
     }
-    const hapi_local_body *body = &tick->bodies[c->body];
-    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+    const hapi_local_body *body = &tick->bodies.of[c->body];
+    const hapi_pointer *p = &tick->pointers.of[c->pointer];
     double arm[3];
     double velocity[3];
     hapi_v3_sub(c->point_now, body->pose.position, arm);
     hapi_v3_cross(body->twist.angular, arm, velocity);
     hapi_v3_add(velocity, body->twist.linear, velocity);
-    if (p->rigid && p->proxy_mass > 0.0) {
+    if (p->rigid && p->coupling.mass > 0.0) {
       continue; /* a body that another one hits */
     }
     if (is_now(tick, c)) {
-      sum += 0.5 * tick->period * hapi_v3_dot(c->force, velocity);
+      sum += 0.5 * tick->facts.period * hapi_v3_dot(c->force, velocity);
     } else if (!p->proxied) {
-      sum += tick->period * hapi_v3_dot(c->force, p->twist.linear);
+      sum += tick->facts.period * hapi_v3_dot(c->force, p->twist.linear);
     }
   }
   return sum;
@@ -178,13 +178,14 @@ static double tools_ahead(const bounds *b)
   const hapi_tick *tick = tick_of(b);
   double sum = 0.0;
   for (int i = 0; i < b->w->hand_count; ++i) {
-    const hapi_tick_pointer *p = &tick->pointers[i];
-    if (p->rigid && p->proxy_mass > 0.0) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->rigid && p->coupling.mass > 0.0) {
       double apart[3];
-      hapi_v3_sub(p->proxy_position, p->handle_position, apart);
-      hapi_v3_sub(apart, p->offset, apart);
-      sum += 0.5 * tick->period * p->coupling_stiffness * hapi_v3_dot(apart, p->proxy_velocity);
-      sum += 0.5 * tick->period * hapi_v3_dot(p->wrench.torque, p->proxy_spin);
+      hapi_v3_sub(p->proxy.position, p->handle.position, apart);
+      hapi_v3_sub(apart, p->proxy.offset, apart);
+      sum +=
+          0.5 * tick->facts.period * p->coupling.stiffness * hapi_v3_dot(apart, p->proxy.velocity);
+      sum += 0.5 * tick->facts.period * hapi_v3_dot(p->wrench.torque, p->proxy.spin);
     }
   }
   return sum;
@@ -201,7 +202,7 @@ static double fall_ahead(const bounds *b, int index, const seen_body *s)
   }
   dBodyGetMass(b->w->bodies[index], &mass);
   dWorldGetGravity(b->w->world, gravity);
-  return -0.5 * tick_of(b)->period * mass.mass * hapi_v3_dot(gravity, s->twist.linear);
+  return -0.5 * tick_of(b)->facts.period * mass.mass * hapi_v3_dot(gravity, s->twist.linear);
 }
 
 /* ---- springs and hands ---- */
@@ -210,32 +211,32 @@ static double spring_energy(const bounds *b)
 {
   const hapi_tick *tick = tick_of(b);
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    const hapi_local_contact *c = &tick->contacts[i];
-    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    const hapi_local_contact *c = &tick->touches.of[i];
+    const hapi_pointer *p = &tick->pointers.of[c->pointer];
     if (p->rigid) {
       continue;
     }
     if (c->weight > 0.0) {
-      sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->stiffness);
+      sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->surface.stiffness);
     }
-    if (p->finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
+    if (p->surface.finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
       double turn = hapi_friction_of(tick, c)->stretch[3];
-      sum += 0.5 * c->weight * p->stiffness * turn * turn;
+      sum += 0.5 * c->weight * p->surface.stiffness * turn * turn;
     }
   }
   for (int i = 0; i < b->w->hand_count; ++i) {
-    const hapi_tick_pointer *p = &tick->pointers[i];
+    const hapi_pointer *p = &tick->pointers.of[i];
     double apart[3];
     if (p->proxied) {
-      hapi_v3_sub(p->proxy_position, p->handle_position, apart);
-      hapi_v3_sub(apart, p->offset, apart);
-      sum += 0.5 * p->coupling_stiffness * hapi_v3_dot(apart, apart);
-      sum += 0.5 * p->proxy_mass * hapi_v3_dot(p->proxy_velocity, p->proxy_velocity);
+      hapi_v3_sub(p->proxy.position, p->handle.position, apart);
+      hapi_v3_sub(apart, p->proxy.offset, apart);
+      sum += 0.5 * p->coupling.stiffness * hapi_v3_dot(apart, apart);
+      sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
     }
-    if (p->proxied && p->hull != NULL) {
-      sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->spin_stiffness;
-      sum += 0.5 * p->proxy_inertia * hapi_v3_dot(p->proxy_spin, p->proxy_spin);
+    if (p->proxied && p->shape.hull != NULL) {
+      sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->coupling.spin_stiffness;
+      sum += 0.5 * p->coupling.inertia * hapi_v3_dot(p->proxy.spin, p->proxy.spin);
     }
   }
   return sum;
@@ -244,7 +245,7 @@ static double spring_energy(const bounds *b)
 /* Takes the way of a hand since the last tick into the account. */
 static void look_at_hand(bounds *b, int index, double *work, double *kinetic)
 {
-  const hapi_tick_pointer *p = &tick_of(b)->pointers[index];
+  const hapi_pointer *p = &tick_of(b)->pointers.of[index];
   hapi_virtual_port was = b->ports[index];
   hapi_virtual_port *now = &b->ports[index];
   double period = 1.0 / b->w->def.haptic_hz;
@@ -270,7 +271,7 @@ static void look_at_hand(bounds *b, int index, double *work, double *kinetic)
   b->finite = b->finite && all_finite(now->position, 3) && all_finite(now->velocity, 3) &&
               isfinite(written) && isfinite(now->work) && all_finite(p->wrench.force, 3) &&
               all_finite(p->pose.position, 3) && all_finite(p->twist.linear, 3) &&
-              all_finite(p->proxy_position, 3);
+              all_finite(p->proxy.position, 3);
 }
 
 /* ---- the bounds ---- */
@@ -320,10 +321,10 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
 static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
 {
   const hapi_tick *tick = tick_of(b);
-  double step = b->model == HAP_MODEL_SINGLE ? tick->period : 1.0 / b->w->def.physics_hz;
-  for (uint32_t i = 0; i < tick->contact_count; ++i) {
-    const hapi_local_contact *c = &tick->contacts[i];
-    const hapi_tick_pointer *p = &tick->pointers[c->pointer];
+  double step = b->model == HAP_MODEL_SINGLE ? tick->facts.period : 1.0 / b->w->def.physics_hz;
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    const hapi_local_contact *c = &tick->touches.of[i];
+    const hapi_pointer *p = &tick->pointers.of[c->pointer];
     int index = index_of_slot(b, c->body);
     dContactGeom found;
     dQuaternion q;
@@ -342,7 +343,7 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       hapi_v3_sub(found.pos, at, arm);
       double speed = hapi_v3_norm(p->twist.linear) + hapi_v3_norm(s->met_twist.linear) +
                      hapi_v3_norm(s->met_twist.angular) * hapi_v3_norm(arm);
-      double yields = p->rigid ? 0.0 : hapi_v3_norm(c->force) / p->stiffness;
+      double yields = p->rigid ? 0.0 : hapi_v3_norm(c->force) / p->surface.stiffness;
       double allowed = yields + speed * step + b->row->depth;
       b->depth = fmax(b->depth, found.depth);
       b->deeper = fmax(b->deeper, found.depth / (allowed + LEAST_DEPTH));
@@ -353,7 +354,7 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
 static void look_at_momentum(bounds *b)
 {
   hap_stats stats;
-  double now = tick_of(b)->hand_impulse_abs;
+  double now = tick_of(b)->figures.hand_impulse_abs;
   double before = b->ticks >= b->interval ? b->impulse[b->ticks % b->interval] : 0.0;
   b->impulse[b->ticks % b->interval] = now;
   if (hap_session_stats(b->w->session, &stats, sizeof stats) != HAP_OK) {

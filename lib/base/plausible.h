@@ -1,0 +1,23 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_PLAUSIBLE_H
+#define HAPODE_BASE_PLAUSIBLE_H
+
+#include <math.h>
+#include <stdbool.h>
+
+/* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
+#define HAPI_STATE_LIMIT 1e6
+
+/* False for NaN. */
+static inline bool hapi_plausible(const double *values, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    if (!(fabs(values[i]) <= HAPI_STATE_LIMIT)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+#endif

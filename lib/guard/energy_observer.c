@@ -1,0 +1,428 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/vec.h"
+#include "local/pointer_friction.h"
+#include "local/rows.h"
+
+/* The ledger of what the hands may get back. It gains what a hand puts in, and what the world loses;
+ * it pays what a hand is given:
+ *
+ *   port     minus the force that was written, held over a tick, times the way that the device went:
+ *            exact, whatever the simulation thought. World units: a device's joule counts motion_scale
+ *            / force_scale.
+ *   bodies   that the loop owns: the fall of their kinetic energy within a tick, from mass and
+ *            inertia, plus the work of gravity and of the application's wrench, plus the work of
+ *            contacts with things that the loop does not own, moving surfaces and springs. What a sync
+ *            changed lies between two ticks and is thereby the world's.
+ *   others   (all bodies of the other models, and static, driven and measured ones): their motion is
+ *            given, and what they do on a pointer's spring is the world's work.
+ *
+ *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
+ *            a spring that is under load: the world's work, to either side. What is in the spring of a
+ *            contact that is no more is lost.
+ *   shares   that the points of a hull have of its stiffness are no entry: what their changes make is to be
+ *            paid by the hand, which made them by tilting the hull.
+ *
+ * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
+ * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
+ * motion of an owned body. Of the other models only the port and the springs are watched.
+ *
+ * Nothing is done before the ledger is overdrawn by nearly 1 % of the largest energy that was stored. Then
+ * the part of the force that goes with the hand is cut to what remains; what resists it stays. While
+ * nothing is touched the ledger stands still, and a surplus is forgotten: it must not pay for what a
+ * later touch makes of nothing.
+ *
+ * A torque is paid as a force is, for the turn that the device made; those of friction on a device that does
+ * not turn a hull are left out: they are small beside its forces' work. */
+
+#define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
+#define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
+#define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
+#define REST_S 0.3           /* a touch that lasts longer is no tapping */
+#define DEBT_S 0.3           /* time constant with which a debt is then forgiven */
+
+static double world_per_device(const hapi_pointer *p)
+{
+  return p->device.force_scale > 0.0 ? p->device.motion_scale / p->device.force_scale : 0.0;
+}
+
+static double spin_energy(const double inertia[9], const double w[3])
+{
+  double momentum[3];
+  hapi_m3_apply(inertia, w, momentum);
+  return 0.5 * hapi_v3_dot(w, momentum);
+}
+
+static bool spins(const double w[3])
+{
+  return hapi_v3_dot(w, w) > 0.0;
+}
+
+static double round_energy(const hapi_local_body *body, const double w[3])
+{
+  return 0.5 * body->given.inertia[0] * hapi_v3_dot(w, w);
+}
+
+static double spin_before(const hapi_local_body *body)
+{
+  double local[3];
+  if (body->round) {
+    return round_energy(body, body->start_twist + 3);
+  }
+  if (!spins(body->start_twist + 3)) {
+    return 0.0;
+  }
+  hapi_m3_apply_transposed(body->rotation, body->start_twist + 3, local);
+  return spin_energy(body->given.inertia, local);
+}
+
+static double spin_after(const hapi_local_body *body)
+{
+  double local[3];
+  if (body->round) {
+    return round_energy(body, body->twist.angular);
+  }
+  if (!spins(body->twist.angular)) {
+    return 0.0;
+  }
+  hapi_quat_unrotate(body->pose.quat_wxyz, body->twist.angular, local);
+  return spin_energy(body->given.inertia, local);
+}
+
+/* J that the body lost to contacts in this tick; its energy after it is added to *io_stored. With the
+ * mean velocity the work of a constant force is exactly what it adds to the kinetic energy. */
+static double body_loses(const hapi_local_body *body, double period, double *io_stored)
+{
+  const hapi_model_body *given = &body->given;
+  const double *before = body->start_twist;
+  const double *after = body->twist.linear;
+  double mean[3];
+  double turn[3];
+  double pull[3];
+  hapi_v3_add(before, after, mean);
+  hapi_v3_add(before + 3, body->twist.angular, turn);
+  hapi_v3_scale(given->mass, given->gravity, pull);
+  hapi_v3_add(pull, given->user_wrench, pull);
+  double work = hapi_v3_dot(pull, mean) + hapi_v3_dot(given->user_wrench + 3, turn);
+  work *= body->waiting ? 0.0 : 0.5 * period; /* one that waits feels its contacts alone */
+  double kinetic = 0.5 * given->mass * hapi_v3_dot(after, after) + spin_after(body);
+  *io_stored += kinetic;
+  return 0.5 * given->mass * hapi_v3_dot(before, before) + spin_before(body) - kinetic + work;
+}
+
+static bool is_owned(const hapi_tick *tick, const hapi_local_body *body)
+{
+  return tick->facts.model == HAP_MODEL_CONTACT && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+static double bodies_lose(const hapi_tick *tick, double *io_stored)
+{
+  double sum = 0.0;
+  if (tick->facts.model != HAP_MODEL_CONTACT) {
+    return 0.0;
+  }
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    if ((body->flags & HAPI_BODY_RESTING) == 0 && is_owned(tick, body)) {
+      sum += body_loses(body, tick->facts.period, io_stored);
+    }
+  }
+  return sum;
+}
+
+/* J that a contact does on a body in this tick: with the mean of its velocities. */
+static double work_on(const hapi_tick *tick, const hapi_local_body *body,
+                      const hapi_local_contact *c)
+{
+  const double *force = c->force;
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(c->point_now, body->pose.position, arm);
+  hapi_v3_cross(arm, force, moment);
+  hapi_v3_add(moment, c->couple, moment);
+  double after = hapi_v3_dot(force, body->twist.linear) + hapi_v3_dot(moment, body->twist.angular);
+  double before =
+      hapi_v3_dot(force, body->start_twist) + hapi_v3_dot(moment, body->start_twist + 3);
+  return 0.5 * tick->facts.period * (after + before);
+}
+
+static double half_compliance(const hapi_pointer *p)
+{
+  return p->surface.stiffness > 0.0 ? 0.5 / p->surface.stiffness : 0.0;
+}
+
+/* J in the spring of a contact of model CONTACT with that force. */
+static double contact_stores(const hapi_pointer *p, const hapi_local_contact *c, double force2)
+{
+  return p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
+}
+
+/* The same of the paper's models, as hapi_render has noted it: another walk over the contacts would
+ * cost as much as a tenth of the tick. */
+static double rendered_gives(const hapi_tick *tick, double *io_stored)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0 && p->guard.force2 > 0.0) {
+      *io_stored += half_compliance(p) * p->guard.force2;
+      sum += tick->facts.period * p->guard.power;
+    }
+  }
+  return sum;
+}
+
+/* J that bodies of given motion do on the pointers' springs in this tick. */
+static double surfaces_give(const hapi_tick *tick, double *io_stored)
+{
+  double sum = 0.0;
+  if (tick->facts.model != HAP_MODEL_CONTACT) {
+    return rendered_gives(tick, io_stored);
+  }
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    const hapi_local_contact *c = &tick->touches.of[i];
+    const hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies.of[c->body];
+    double force2 = hapi_v3_dot(c->force, c->force);
+    if (!(force2 > 0.0)) {
+      continue;
+    }
+    *io_stored += contact_stores(&tick->pointers.of[c->pointer], c, force2);
+    if (body != NULL && !is_owned(tick, body)) {
+      sum -= work_on(tick, body, c);
+    }
+  }
+  return sum;
+}
+
+/* J in the spring of a contact that goes no farther than to the limit of the force. */
+static double spring_energy(const hapi_pointer *p, double share, double depth)
+{
+  double k = share * p->surface.stiffness;
+  double force = k * depth;
+  if (!(depth > 0.0) || !(k > 0.0) || p->rigid) {
+    return 0.0;
+  }
+  return force <= p->guard.limit ? 0.5 * force * depth
+                                 : p->guard.limit * (depth - 0.5 * p->guard.limit / k);
+}
+
+static void note_limits(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      p->guard.limit =
+          p->device.force_scale > 0.0 ? p->device.limits.max_force / p->device.force_scale : 0.0;
+      p->guard.felt = p->guard.share * (1.0 - tick->guard.age_loss);
+    }
+  }
+}
+
+/* J that ramps and fading added to the springs in this tick. */
+static double ramps_give(hapi_tick *tick)
+{
+  hapi_guard *guard = &tick->guard;
+  double gone = guard->sprung;
+  double sum = 0.0;
+  guard->sprung = 0.0;
+  note_limits(tick);
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    hapi_local_contact *c = &tick->touches.of[i];
+    const hapi_pointer *p = &tick->pointers.of[c->pointer];
+    hapi_ramp *r = &c->ramp;
+    double share = r->share * p->guard.felt;
+    double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
+    double rubs = c->mu > 0.0 ? hapi_friction_energy(tick, c) : 0.0;
+    gone -= r->sprung;
+    if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
+      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - r->felt_excess);
+      sum +=
+          (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
+      r->felt_share = share;
+      r->felt_excess = r->excess;
+      r->felt = p->guard.felt;
+    }
+    r->sprung = energy + p->guard.felt * rubs;
+    guard->sprung += r->sprung;
+  }
+  return sum - gone;
+}
+
+/* J in the springs between devices and proxies, and in the motion of proxies with mass. */
+static double couplings_store(const hapi_tick *tick)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0 && p->proxied) {
+      sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling.stiffness;
+      sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
+      if (p->shape.hull != NULL) {
+        sum += 0.5 * p->coupling.inertia * hapi_v3_dot(p->proxy.spin, p->proxy.spin);
+        sum += 0.5 * hapi_v3_dot(p->wrench.torque, p->wrench.torque) / p->coupling.spin_stiffness;
+      }
+    }
+  }
+  return sum;
+}
+
+/* To the third order of the turn of a tick; of a sphere none. */
+static void note_turn(hapi_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  if (p->shape.hull == NULL) {
+    return;
+  }
+  double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
+  double q[4];
+  hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
+  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
+  memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
+}
+
+/* J that the written force gave to the hand in the seconds since the last tick. A way that no hand goes
+ * in that time is a jump: nobody put in what it would have cost, and nobody got more than at the
+ * fastest. */
+static double port_gave(hapi_pointer *p, double seconds)
+{
+  hapi_guard_pointer *g = &p->guard;
+  hapi_v3_sub(p->device.pose.position, g->position, g->moved);
+  hapi_v3_copy(p->device.pose.position, g->position);
+  note_turn(p);
+  if (!g->placed) {
+    hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
+    hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
+    g->placed = true;
+  }
+  double gave = world_per_device(p) * (hapi_v3_dot(g->written.force, g->moved) +
+                                       hapi_v3_dot(g->written.torque, g->turned));
+  double way = hapi_v3_norm(g->moved);
+  double farthest = p->device.speed_limit * seconds;
+  if (!p->device.jumped) {
+    return gave;
+  }
+  return way > farthest ? hapi_max(gave, 0.0) * farthest / way : hapi_max(gave, 0.0);
+}
+
+static bool any(const double v[3])
+{
+  return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
+}
+
+/* Pays and takes at the ports; whether anything is felt. */
+static bool settle_ports(hapi_tick *tick)
+{
+  bool felt = false;
+  double seconds = 1e-9 * (double)(tick->facts.now_ns - tick->guard.observed_ns);
+  tick->guard.observed_ns = tick->facts.now_ns;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      felt = felt || any(p->device.wrench.force) || any(p->guard.written.force) ||
+             any(p->guard.written.torque);
+      tick->guard.balance -= port_gave(p, seconds);
+    }
+  }
+  return felt;
+}
+
+/* J that a force on a way, or a torque on a turn, gives; world units. */
+static double would_give(const hapi_pointer *p, const double force[3], const double way[3])
+{
+  return hapi_v3_dot(way, way) < MOVED_LEAST ? 0.0 : world_per_device(p) * hapi_v3_dot(force, way);
+}
+
+/* Leaves a share of the force's part along the motion, where it gives. */
+static void hold_back(hapi_pointer *p, double force[3], const double way[3], double share)
+{
+  if (would_give(p, force, way) > 0.0) {
+    double along = hapi_v3_dot(force, way) / hapi_v3_dot(way, way);
+    hapi_v3_madd(force, -(1.0 - share) * along, way, force);
+    p->guard.flags |= HAP_GUARD_ENERGY;
+  }
+}
+
+static void pay_no_more_than(hapi_tick *tick, double budget)
+{
+  double out = 0.0;
+  double in = 0.0;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    double gives = would_give(p, p->device.wrench.force, p->guard.moved);
+    double turns = would_give(p, p->device.wrench.torque, p->guard.turned);
+    out += hapi_max(gives, 0.0) + hapi_max(turns, 0.0);
+    in += hapi_max(-gives, 0.0) + hapi_max(-turns, 0.0);
+  }
+  if (out - in <= hapi_max(budget, 0.0)) {
+    return;
+  }
+  double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    hold_back(p, p->device.wrench.force, p->guard.moved, share);
+    hold_back(p, p->device.wrench.torque, p->guard.turned, share);
+  }
+}
+
+/* A debt that comes all at once, after a time without the loop or when something vanished that had been
+ * pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So in a touch
+ * that lasts, the ledger comes back to what is in the springs. */
+static void settle_debt(hapi_guard *guard, double period)
+{
+  guard->touch_s += period;
+  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
+    guard->balance += (guard->sprung - guard->balance) * hapi_min(period / DEBT_S, 1.0);
+  }
+}
+
+/* After a fault nothing is known of where the devices were. */
+static void forget(hapi_tick *tick)
+{
+  tick->guard.balance = 0.0;
+  tick->guard.sprung = tick->guard.touch_s = 0.0;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    tick->pointers.of[i].guard.placed = false;
+  }
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    hapi_ramp *r = &tick->touches.of[i].ramp;
+    r->felt_share = r->felt = r->sprung = 0.0;
+  }
+}
+
+/* What the devices did meanwhile nobody watched; what is owed is owed still. */
+void hapi_energy_resume(hapi_tick *tick)
+{
+  tick->guard.observed_ns = tick->facts.now_ns;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    tick->pointers.of[i].guard.placed = false;
+  }
+}
+
+void hapi_energy_observe(hapi_tick *tick)
+{
+  hapi_guard *guard = &tick->guard;
+  double given = tick->figures.given;
+  if (tick->guard.latch.fault != HAP_FAULT_NONE) {
+    forget(tick);
+    return;
+  }
+  given += ramps_give(tick);
+  if (!settle_ports(tick)) {
+    guard->balance = hapi_min(guard->balance, 0.0);
+    guard->touch_s = 0.0;
+    return;
+  }
+  double stored = 0.0;
+  stored += couplings_store(tick);
+  guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
+  guard->stored_max = hapi_max(stored, guard->stored_max);
+  double overdraft = hapi_max(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
+  settle_debt(guard, tick->facts.period);
+  pay_no_more_than(tick, guard->balance + overdraft);
+}

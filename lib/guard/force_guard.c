@@ -1,0 +1,254 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "base/effect_clock.h"
+#include "base/vec.h"
+#include "tick/tick.h"
+
+/* The last thing between the simulation and the motors, in this order: finite, age of the local model,
+ * ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the bodies have
+ * had their share of the impulse before.
+ *
+ * Slew before saturation holds both bounds: the force before lies within its limit, and shortening is
+ * the projection onto a ball, which brings no two points farther apart. */
+
+#define RAMP_IN_S 0.02
+#define FADE_S 0.1     /* from full force to none with an old local model; longest after a fault */
+#define AGE_LEAST 0.01 /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
+#define WRENCH_LIMIT 1e12 /* N, N m: beyond it is an error, and its square could overflow */
+
+void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
+{
+  if (tick->guard.latch.fault == HAP_FAULT_NONE) {
+    tick->guard.latch.fault = fault;
+    tick->guard.latch.pointer = pointer;
+    tick->guard.latch.generation = pointer > 0 ? tick->pointers.of[pointer - 1].generation : 0;
+    ++tick->guard.latch.count;
+  }
+}
+
+void hapi_tick_reset_fault(hapi_tick *tick)
+{
+  if (tick->guard.latch.fault == HAP_FAULT_NONE) {
+    return;
+  }
+  tick->guard.latch.fault = HAP_FAULT_NONE;
+  tick->guard.latch.pointer = tick->guard.latch.generation = 0;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    tick->pointers.of[i].guard.share = 0.0;
+    tick->pointers.of[i].device.jump_s = 0.0; /* whoever resets knows where the device is */
+  }
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    tick->touches.of[i].seen = false; /* the hand may be anywhere by now */
+  }
+  for (uint32_t i = 0; i < tick->touches.tool.pair_count; ++i) {
+    tick->touches.tool.pairs[i].seen = false;
+  }
+}
+
+void hapi_guard_cut(hapi_pointer *pointer)
+{
+  memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
+}
+
+static bool usable_number(double x)
+{
+  return fabs(x) <= WRENCH_LIMIT; /* false for NaN */
+}
+
+static bool usable_vector(const double v[3])
+{
+  return usable_number(v[0]) && usable_number(v[1]) && usable_number(v[2]);
+}
+
+/* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
+static bool usable(const hap_wrench *w)
+{
+  return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
+             WRENCH_LIMIT * WRENCH_LIMIT ||
+         (usable_vector(w->force) && usable_vector(w->torque));
+}
+
+static void check_finite(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0 && !usable(&p->wrench)) {
+      hapi_tick_fault(tick, HAP_FAULT_FORCE, i + 1);
+    }
+  }
+}
+
+/* A world that does not answer is felt less and less: a state, which ends with the next model. One
+ * tick more than two steps is what an age comes to in good order. */
+static void follow_age(hapi_tick *tick)
+{
+  hapi_guard *guard = &tick->guard;
+  double step = tick->facts.physics_period;
+  int64_t newest =
+      tick->facts.sent_ns > tick->facts.state_ns ? tick->facts.sent_ns : tick->facts.state_ns;
+  double age = 1e-9 * (double)(tick->facts.now_ns - newest);
+  double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + tick->facts.period;
+  bool stale = tick->facts.model_number != 0 && step > 0.0 && age > limit;
+  guard->stale_times += stale && !guard->stale;
+  guard->stale_ticks += stale;
+  guard->stale = stale;
+  double change = stale        ? tick->facts.period / FADE_S
+                  : step > 0.0 ? -tick->facts.period / step
+                               : 0.0;
+  guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
+}
+
+/* What the device shall get before the limits. */
+static void want(hapi_tick *tick, hapi_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  hapi_coupling_write(p);
+  g->wanted = p->device.wrench;
+  g->flags = 0;
+  if (tick->guard.latch.fault != HAP_FAULT_NONE) {
+    g->flags = HAP_GUARD_FAULT;
+    memset(&p->device.wrench, 0, sizeof p->device.wrench);
+    return;
+  }
+  if (tick->guard.mode == HAP_GUARD_MEASURE) {
+    return;
+  }
+  g->share = hapi_min(g->share + tick->facts.period / RAMP_IN_S, 1.0);
+  double share = g->share * (1.0 - tick->guard.age_loss);
+  g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
+  g->flags |= tick->guard.age_loss > 0.0 ? HAP_GUARD_STALE : 0;
+  hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
+  hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
+}
+
+/* No farther from the vector before than step. */
+static bool slew(const double before[3], double step, double v[3])
+{
+  double change[3];
+  hapi_v3_sub(v, before, change);
+  double norm = hapi_v3_norm(change);
+  if (norm <= step) {
+    return false;
+  }
+  hapi_v3_madd(before, step / norm, change, v);
+  return true;
+}
+
+/* Shortens a vector to a norm; its direction stays. */
+static bool saturate(double v[3], double limit)
+{
+  double norm = hapi_v3_norm(v);
+  if (norm <= limit) {
+    return false;
+  }
+  hapi_v3_scale(limit / norm, v, v);
+  return true;
+}
+
+/* A slew limit that is meant for touch does not keep the force on after a fault. */
+static void limit_slew(const hapi_tick *tick, hapi_pointer *p)
+{
+  const hapi_guard_pointer *g = &p->guard;
+  bool fault = tick->guard.latch.fault != HAP_FAULT_NONE;
+  double force_rate =
+      fault ? hapi_max(p->device.limits.slew_force, p->device.limits.max_force / FADE_S)
+            : p->device.limits.slew_force;
+  double torque_rate =
+      fault ? hapi_max(p->device.limits.slew_torque, p->device.limits.max_torque / FADE_S)
+            : p->device.limits.slew_torque;
+  bool force = slew(g->written.force, tick->facts.period * force_rate, p->device.wrench.force);
+  bool torque = slew(g->written.torque, tick->facts.period * torque_rate, p->device.wrench.torque);
+  p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
+}
+
+static void limit_norm(hapi_pointer *p)
+{
+  bool force = saturate(p->device.wrench.force, p->device.limits.max_force);
+  bool torque = saturate(p->device.wrench.torque, p->device.limits.max_torque);
+  p->guard.flags |= force || torque ? HAP_GUARD_SATURATED : 0;
+}
+
+static void report_torque(hapi_pointer *p)
+{
+  double scale = hapi_coupling_torque_scale(p);
+  hapi_quat_rotate(p->device.pose_world_device.quat_wxyz, p->device.wrench.torque,
+                   p->wrench.torque);
+  hapi_v3_scale(scale > 0.0 ? 1.0 / scale : 0.0, p->wrench.torque, p->wrench.torque);
+}
+
+/* What is reported is what the hand feels. */
+static void report_written(hapi_pointer *p)
+{
+  const double *q = p->device.pose_world_device.quat_wxyz;
+  p->guard.written = p->device.wrench;
+  if (p->device.three_dof || !p->device.feels_torque) {
+    hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
+  }
+  if (p->guard.flags == 0) {
+    return;
+  }
+  if (p->device.force_scale > 0.0) {
+    hapi_quat_rotate(q, p->device.wrench.force, p->wrench.force);
+    hapi_v3_scale(1.0 / p->device.force_scale, p->wrench.force, p->wrench.force);
+    report_torque(p);
+  } else if ((p->guard.flags & HAP_GUARD_FAULT) != 0) {
+    memset(&p->wrench, 0, sizeof p->wrench); /* it may be not finite */
+  }
+}
+
+/* Whatever came in, and whatever went wrong here: what is no number does not get to the motors. */
+static void check_written(hapi_tick *tick, uint32_t index)
+{
+  hapi_pointer *p = &tick->pointers.of[index];
+  if (!usable(&p->device.wrench)) {
+    hapi_tick_fault(tick, HAP_FAULT_FORCE, index + 1);
+    p->guard.flags = HAP_GUARD_FAULT;
+    memset(&p->device.wrench, 0, sizeof p->device.wrench);
+  }
+}
+
+static void write_pointer(hapi_tick *tick, uint32_t index)
+{
+  hapi_pointer *p = &tick->pointers.of[index];
+  if (tick->guard.mode == HAP_GUARD_ON) {
+    limit_slew(tick, p);
+  }
+  limit_norm(p);
+  check_written(tick, index);
+  report_written(p);
+}
+
+static void count(hapi_tick *tick, uint32_t flags)
+{
+  tick->guard.saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
+  tick->guard.slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
+  tick->guard.energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
+}
+
+void hapi_guard_run(hapi_tick *tick)
+{
+  uint32_t flags = 0;
+  check_finite(tick);
+  follow_age(tick);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    if (tick->pointers.of[i].generation != 0) {
+      want(tick, &tick->pointers.of[i]);
+    }
+  }
+  if (tick->facts.observes && tick->guard.mode == HAP_GUARD_ON) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    hapi_energy_observe(tick);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_OBSERVER, begin);
+  }
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation == 0) {
+      continue;
+    }
+    write_pointer(tick, i);
+    flags |= p->guard.flags;
+    double force = hapi_v3_norm(p->wrench.force);
+    tick->guard.peak_force = force > tick->guard.peak_force ? force : tick->guard.peak_force;
+  }
+  count(tick, flags);
+}

@@ -1,0 +1,162 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_LOCAL_BODY_H
+#define HAPODE_LOCAL_BODY_H
+
+/* The bodies of the local world, and what is asked of one of them again and again. */
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "base/vec.h"
+#include "sync/messages.h"
+
+/* Totals that physics is told. */
+typedef struct hapi_body_account {
+  double impulse[3];
+  double angular_impulse[3];
+  double residual_taken[6]; /* of eq. 14, what has been added so far */
+  double gain[6];
+} hapi_body_account;
+
+/* Of a body that the loop moves by its accelerance. */
+typedef struct hapi_body_linear {
+  double residual[6];     /* of eq. 14, to be added in this tick */
+  double acceleration[6]; /* sum of A f in this tick; 0 between ticks, of a body that answers */
+  double b[6];
+} hapi_body_linear;
+
+/* Model IMPULSE: pose at adoption, and pose to reach. */
+typedef struct hapi_body_shown {
+  hap_pose from;
+  hap_pose to;
+} hapi_body_shown;
+
+/* Where the loop let go of a body that it owned. */
+typedef struct hapi_body_left {
+  hap_pose pose;
+  hap_twist twist;
+} hapi_body_left;
+
+/* Hundreds of them are more than a near cache holds: what every tick reads or tells stands together,
+ * first that of all models, then that of some; what a sync writes and few ask for comes last. */
+typedef struct hapi_local_body {
+  uint32_t generation;
+  uint32_t flags;
+  uint32_t epoch;
+  uint32_t row; /* place in the solver's velocities */
+  bool live;    /* in the model in use */
+  bool pushed;  /* since it was adopted */
+  bool
+      round; /* the same inertia about all axes, as cubes and balls have: it does not turn with them */
+  bool forced;  /* the application pushes it */
+  bool rowed;   /* scratch: it has a row in this tick */
+  bool waiting; /* for its first contacts: goes on with its twist until they are known */
+  hap_pose pose;
+  hap_twist twist;
+  hapi_body_account account;
+  int64_t owned_until_ns;
+
+  /* Model CONTACT. */
+  uint64_t entered_model;    /* with which the loop came to own the body */
+  double start_twist[6];     /* before this tick */
+  double rotation[9];        /* of pose */
+  double inverse_mass;       /* 0 where it is not used: driven and measured ones */
+  double inverse_inertia[9]; /* world */
+
+  hapi_body_linear linear;
+  hapi_model_body given; /* of the newest model */
+  hapi_body_shown shown;
+  hapi_body_left left;
+} hapi_local_body;
+
+typedef struct hapi_bodies {
+  hapi_local_body *of; /* by slot, capacity.bodies */
+  uint32_t *live;      /* slots in the model, live_count */
+  uint32_t live_count;
+  uint32_t high;    /* beyond the highest slot that was ever used */
+  uint32_t resting; /* at the tick's begin */
+  bool unsound;     /* a state was not finite in this tick */
+} hapi_bodies;
+
+/* NULL: the static world. */
+static inline hapi_local_body *hapi_bodies_at(const hapi_bodies *bodies, uint32_t slot)
+{
+  return slot == HAPI_SLOT_NONE ? NULL : &bodies->of[slot];
+}
+
+static inline void hapi_body_point(const hapi_local_body *body, const double local[3],
+                                   double out[3])
+{
+  if (body == NULL) {
+    hapi_v3_copy(local, out);
+    return;
+  }
+  hapi_m3_apply(body->rotation, local, out);
+  hapi_v3_add(out, body->pose.position, out);
+}
+
+static inline void hapi_body_vector(const hapi_local_body *body, const double local[3],
+                                    double out[3])
+{
+  if (body == NULL) {
+    hapi_v3_copy(local, out);
+    return;
+  }
+  hapi_m3_apply(body->rotation, local, out);
+}
+
+/* Whether impulses of the loop move it: not what is driven or asleep. A body outside of the range
+ * answers with its own mass until physics says what became of it: as a wall it would take the whole
+ * push of an interval and hand it on too late, which is unstable. */
+static inline bool hapi_body_responds(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
+}
+
+static inline bool hapi_body_rests(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_RESTING) != 0;
+}
+
+/* Of the loop: it moves and owns the body. */
+static inline bool hapi_body_is_owned(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+/* Of physics: the loop moves along with it, or pushes it on physics' account. */
+static inline bool hapi_body_is_given(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) == 0;
+}
+
+/* From the centre of mass to a point of the world. */
+static inline void hapi_body_arm(const hapi_local_body *body, const double point[3], double out[3])
+{
+  if (body != NULL) {
+    hapi_v3_sub(point, body->pose.position, out);
+  }
+}
+
+/* Of a torque, to the angular velocity of a body that answers by its mass. */
+static inline void hapi_body_spin_up(const hapi_local_body *body, const double torque[3],
+                                     double out[3])
+{
+  if (body->round) {
+    hapi_v3_scale(body->inverse_inertia[0], torque, out);
+  } else {
+    hapi_m3_apply(body->inverse_inertia, torque, out);
+  }
+}
+
+/* Eq. 6. Only of a contact that is the only thing to touch the body: rows of one body that answer by
+ * different matrices make energy, without bound where they are many. */
+static inline bool hapi_body_has_own_probes(const hapi_local_body *body)
+{
+  return body != NULL &&
+         (body->flags & (HAPI_BODY_MEASURED | HAPI_BODY_WHOLE)) == HAPI_BODY_MEASURED;
+}
+
+#endif

@@ -1,0 +1,354 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/effect_clock.h"
+#include "local/rows.h"
+#include "local/touch_place.h"
+#include "tick/tick.h"
+
+/* Contacts between bodies as rows of the solver. Every contact is placed anew from the poses of its
+ * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
+ * constraint), at the step of the tick. */
+
+/* 84 degrees of slope. More than that may push without bound along a contact that hardly touches: where
+ * a large island is not solved to the end within a tick, what lets go then gives energy. */
+#define MU_MOST 10.0
+#define PUSH_OUT_MAX 0.2    /* m/s */
+#define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
+#define PUSH_OUT_LEAST 1e-4 /* m/s: less may stay in the velocity, it is not worth a second solve */
+#define OPEN_FLOOR \
+  1e-3 /* m: a contact that is more open than this and than what the bodies'
+                               motion closes in a few ticks has no rows */
+#define OPEN_TICKS 3.0
+
+typedef struct placed_contact {
+  const hapi_patch_contact *in;
+  const hapi_surface *surface;
+  hapi_local_body *a;
+  hapi_local_body *b;
+  double normal[3]; /* from b to a */
+  double point[3];  /* between the surfaces */
+  double gap;
+  bool gives; /* see hapi_row_source */
+} placed_contact;
+
+static hapi_touch_frame frame_of(const hapi_local_body *body)
+{
+  return body != NULL ? (hapi_touch_frame){&body->pose, body->rotation}
+                      : (hapi_touch_frame){NULL, NULL};
+}
+
+static bool place(placed_contact *c)
+{
+  hapi_touch_spot spot;
+  hapi_touch_frame a = frame_of(c->a);
+  hapi_touch_frame b = frame_of(c->b);
+  if (!hapi_touch_place(c->in, &a, &b, &spot)) {
+    return false;
+  }
+  hapi_v3_copy(spot.normal, c->normal);
+  hapi_v3_copy(spot.point, c->point);
+  c->gap = spot.gap;
+  return true;
+}
+
+/* Two directions across the normal, as ODE takes them: its friction pyramid stands on them. */
+static void friction_directions(const hapi_surface *surface, const double n[3], double t1[3],
+                                double t2[3])
+{
+  if ((surface->flags & HAPI_SURFACE_FDIR1) != 0) {
+    hapi_v3_madd(surface->direction, -hapi_v3_dot(surface->direction, n), n, t1);
+    double length = hapi_v3_norm(t1);
+    if (length > 1e-6) {
+      hapi_v3_scale(1.0 / length, t1, t1);
+      hapi_v3_cross(n, t1, t2);
+      return;
+    }
+  }
+  if (fabs(n[2]) > 0.70710678118654752440) { /* dPlaneSpace: t1 in the y-z plane ... */
+    double k = 1.0 / sqrt(n[1] * n[1] + n[2] * n[2]);
+    hapi_v3_set(t1, 0.0, -n[2] * k, n[1] * k);
+  } else { /* ... or in the x-y plane */
+    double k = 1.0 / sqrt(n[0] * n[0] + n[1] * n[1]);
+    hapi_v3_set(t1, -n[1] * k, n[0] * k, 0.0);
+  }
+  hapi_v3_cross(n, t1, t2);
+}
+
+static bool is_given(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) == 0;
+}
+
+/* See hapi_row_source: what the energy observer has to count as the world's work. */
+static bool gives(const placed_contact *c)
+{
+  const hapi_surface *s = c->surface;
+  bool moves = s->motion[0] != 0.0 || s->motion[1] != 0.0 || s->motion[2] != 0.0;
+  return moves || (s->flags & HAPI_SURFACE_SOFT) != 0 || is_given(c->a) || is_given(c->b);
+}
+
+/* The columns of a body in the rows of a contact, `side` 0: ja and ba, 1: jb and bb. */
+static inline double *column_of(hapi_row *row, int side, int response)
+{
+  return side == 0 ? (response == 0 ? row->ja : row->ba) : (response == 0 ? row->jb : row->bb);
+}
+
+/* The same of a body that answers by its mass, which most do. */
+static inline void free_column(const hapi_local_body *body, const double j[6], double b[6])
+{
+  hapi_v3_scale(body->inverse_mass, j, b);
+  hapi_body_spin_up(body, j + 3, b + 3);
+}
+
+static inline void set_columns(const placed_contact *c, int side, double directions[3][3],
+                               hapi_row *rows, uint32_t count)
+{
+  const hapi_local_body *body = side == 0 ? c->a : c->b;
+  double arm[3];
+  if (body == NULL) {
+    for (uint32_t i = 0; i < count; ++i) {
+      memset(column_of(&rows[i], side, 0), 0, sizeof rows->ja);
+      memset(column_of(&rows[i], side, 1), 0, sizeof rows->ba);
+    }
+    return;
+  }
+  bool is_free = hapi_body_responds(body) && (body->flags & HAPI_BODY_MEASURED) == 0;
+  hapi_body_arm(body, c->point, arm);
+  for (uint32_t i = 0; i < count; ++i) {
+    double *j = column_of(&rows[i], side, 0);
+    double *b = column_of(&rows[i], side, 1);
+    hapi_v3_scale(side == 0 ? 1.0 : -1.0, directions[i], j);
+    hapi_v3_cross(arm, j, j + 3);
+    if (is_free) {
+      free_column(body, j, b);
+    } else {
+      hapi_row_response(body, j, b);
+    }
+  }
+}
+
+/* What the rows of a contact have in common; their parts, 0 normal, 1 and 2 friction. */
+static void begin_rows(hapi_tick *tick, const placed_contact *c, uint32_t index, uint32_t first,
+                       const uint8_t *parts, uint32_t count)
+{
+  const hapi_contact_memory *memory = &tick->contacts.memory[index];
+  const hapi_row_source source = {
+      .contact = index, .body_a = c->in->body_a, .body_b = c->in->body_b, .gives = c->gives};
+  uint32_t a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
+  uint32_t b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
+  for (uint32_t i = 0; i < count; ++i) {
+    hapi_row *row = &tick->rows.solver.rows[first + i];
+    row->ball = row->round = 0;
+    row->single = c->b == NULL;
+    row->a = a;
+    row->b = b;
+    row->mu = 0.0;
+    row->normal = -1;
+    row->impulse = memory->impulse[parts[i]];
+    tick->rows.sources[first + i] = source;
+    tick->rows.sources[first + i].part = parts[i];
+  }
+}
+
+/* m/s along the normal before the tick; negative: they come nearer. */
+static double closing(const placed_contact *c, const hapi_row *row)
+{
+  return hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
+}
+
+/* What comes in faster than the threshold goes back with its share. */
+static void bounce(const hapi_tick *tick, const placed_contact *c, hapi_row *row,
+                   hapi_row_source *source)
+{
+  const hapi_surface *s = c->surface;
+  double speed = closing(c, row);
+  bool hits = c->gap + tick->facts.period * speed < 0.0;
+  if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
+    row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
+    source->pushes_out = false;
+  }
+}
+
+/* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
+ * deeper than the surface layer. */
+static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row,
+                       hapi_row_source *source)
+{
+  const hapi_surface *s = c->surface;
+  double deep = -c->gap - s->layer - PUSH_OUT_SLOP;
+  bool soft = (s->flags & HAPI_SURFACE_SOFT) != 0;
+  row->lo = 0.0;
+  row->hi = HUGE_VAL;
+  row->softness = s->cfm / tick->facts.period;
+  row->target = c->gap > 0.0 ? -c->gap / tick->facts.period : s->motion[2];
+  if (deep > 0.0) {
+    double push = hapi_min(s->erp * deep / tick->facts.period, s->max_push);
+    push = soft ? push : hapi_min(push, PUSH_OUT_MAX);
+    row->target += push;
+    source->pushes_out = !soft && push > PUSH_OUT_LEAST;
+  }
+  if (tick->facts.bounces) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    bounce(tick, c, row, source);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_RESTITUTION, begin);
+  }
+}
+
+static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, int part,
+                         int32_t normal)
+{
+  double mu = part == 1 ? s->mu : s->mu2;
+  bool share = (s->flags & (part == 1 ? HAPI_SURFACE_APPROX1_1 : HAPI_SURFACE_APPROX1_2)) != 0;
+  bool slips = (s->flags & (part == 1 ? HAPI_SURFACE_SLIP1 : HAPI_SURFACE_SLIP2)) != 0;
+  row->target = s->motion[part - 1];
+  row->softness = (slips ? s->slip[part - 1] : s->cfm) / tick->facts.period;
+  row->normal = share ? normal : -1;
+  row->mu = share ? hapi_min(mu, MU_MOST) : 0.0;
+  row->hi = share ? 0.0 : mu * tick->facts.period; /* without Approx1 mu is a force */
+  row->lo = -row->hi;
+}
+
+/* The parts of a contact that have rows. With Approx1 friction is bounded by the normal impulse; a
+ * force mu is there from the touch on. */
+static uint32_t list_parts(const hapi_tick *tick, const placed_contact *c, uint32_t index,
+                           uint8_t parts[3])
+{
+  const hapi_surface *s = c->surface;
+  bool touches = tick->contacts.memory[index].impulse[0] > 0.0 || c->gap <= 0.0;
+  uint32_t count = 1;
+  parts[0] = 0;
+  if (s->mu > 0.0 && (touches || (s->flags & HAPI_SURFACE_APPROX1_1) != 0)) {
+    parts[count++] = 1;
+  }
+  if (s->mu2 > 0.0 && (touches || (s->flags & HAPI_SURFACE_APPROX1_2) != 0)) {
+    parts[count++] = 2;
+  }
+  return count;
+}
+
+static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
+{
+  hapi_solver *solver = &tick->rows.solver;
+  uint32_t first = solver->row_count;
+  hapi_row *rows = &solver->rows[first];
+  double directions[3][3];
+  uint8_t parts[3];
+  uint32_t count = list_parts(tick, c, index, parts);
+  c->gives = gives(c);
+  hapi_v3_copy(c->normal, directions[0]);
+  friction_directions(c->surface, c->normal, directions[1], directions[2]);
+  if (count == 2 && parts[1] == 2) {
+    hapi_v3_copy(directions[2], directions[1]);
+  }
+  begin_rows(tick, c, index, first, parts, count);
+  set_columns(c, 0, directions, rows, count);
+  set_columns(c, 1, directions, rows, count);
+  set_normal(tick, c, &rows[0], &tick->rows.sources[first]);
+  for (uint32_t i = 1; i < count; ++i) {
+    set_friction(tick, c->surface, &rows[i], parts[i], (int32_t)first);
+  }
+  solver->row_count += count;
+  hapi_contact_ready(solver, first, count);
+}
+
+/* A body that the contact was made for, and that is where the contact thread thought it was. */
+static bool find_body(hapi_tick *tick, uint32_t slot, uint32_t generation, hapi_local_body **out)
+{
+  *out = hapi_bodies_at(&tick->bodies, slot);
+  return *out == NULL || ((*out)->live && (*out)->generation == generation && !(*out)->waiting);
+}
+
+static bool is_owned(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
+}
+
+static double point_speed(const hapi_local_body *body, const double point[3])
+{
+  if (body == NULL) {
+    return 0.0;
+  }
+  double arm[3];
+  double velocity[3];
+  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_cross(body->start_twist + 3, arm, velocity);
+  hapi_v3_add(velocity, body->start_twist, velocity);
+  return hapi_v3_norm(velocity);
+}
+
+static bool is_near(const hapi_tick *tick, const placed_contact *c)
+{
+  if (c->gap <= OPEN_FLOOR) {
+    return true;
+  }
+  double speed = point_speed(c->a, c->point) + point_speed(c->b, c->point);
+  return c->gap <= OPEN_FLOOR + OPEN_TICKS * tick->facts.period * speed;
+}
+
+static bool rests(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & HAPI_BODY_RESTING) != 0;
+}
+
+/* m/s along the normal, before the tick; negative: they come nearer. */
+static double approach(const placed_contact *c)
+{
+  double speed = 0.0;
+  const hapi_local_body *bodies[2] = {c->a, c->b};
+  for (int i = 0; i < 2; ++i) {
+    if (bodies[i] != NULL) {
+      double j[6];
+      double b[6];
+      double arm[3];
+      hapi_body_arm(bodies[i], c->point, arm);
+      hapi_row_column(bodies[i], arm, c->normal, i == 0 ? 1.0 : -1.0, j, b);
+      speed += hapi_row_start_speed(bodies[i], j);
+    }
+  }
+  return speed;
+}
+
+/* The contact of that index; false: not one of this tick. */
+static bool find_contact(hapi_tick *tick, uint32_t index, placed_contact *out)
+{
+  hapi_patches *patches = tick->contacts.patches;
+  out->in = &hapi_patches_contacts(patches)[index];
+  out->surface = &hapi_patches_surfaces(patches)[out->in->surface];
+  return find_body(tick, out->in->body_a, out->in->generation_a, &out->a) &&
+         find_body(tick, out->in->body_b, out->in->generation_b, &out->b) &&
+         (hapi_body_responds(out->a) || hapi_body_responds(out->b)) &&
+         (is_owned(out->a) || is_owned(out->b)); /* others are ODE's affair */
+}
+
+/* What touches a body that moves is awake, as in ODE. Before any row: a body has all of its contacts,
+ * the floor's as well, from the tick on in which it wakes. */
+void hapi_contact_wake(hapi_tick *tick)
+{
+  const hapi_patches *patches = tick->contacts.patches;
+  for (uint32_t i = 0; patches != NULL && i < patches->contact_count; ++i) {
+    placed_contact c;
+    if (find_contact(tick, i, &c) && (rests(c.a) || rests(c.b)) && place(&c) &&
+        c.gap + tick->facts.period * approach(&c) <= 0.0) {
+      hapi_local_wake(tick, rests(c.a) ? c.a : c.b);
+    }
+  }
+}
+
+void hapi_contact_rows(hapi_tick *tick)
+{
+  if (tick->contacts.patches == NULL) {
+    return;
+  }
+  for (uint32_t i = 0; i < tick->contacts.patches->contact_count; ++i) {
+    placed_contact c;
+    bool room = tick->rows.solver.row_count + 3 <= tick->rows.capacity;
+    if (find_contact(tick, i, &c) && room && place(&c) && is_near(tick, &c)) {
+      add_contact(tick, &c, i);
+    } else {
+      memset(tick->contacts.memory[i].impulse, 0, sizeof tick->contacts.memory[i].impulse);
+    }
+  }
+}

@@ -1,0 +1,28 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_LOCAL_JOINT_ROWS_H
+#define HAPODE_LOCAL_JOINT_ROWS_H
+
+/* Joints of the local world, model CONTACT. */
+
+#include "local/facts.h"
+#include "local/rows.h"
+#include "sync/messages.h"
+
+#define HAPI_JOINT_PARTS 16 /* six that hold, one given, motor and stops of three axes */
+#define HAPI_JOINT_ROWS 10u /* at once */
+
+/* What is kept of a joint, by slot. */
+typedef struct hapi_joint_memory {
+  uint32_t generation;
+  uint32_t measurement;             /* whose rows the impulses are of */
+  double impulse[HAPI_JOINT_PARTS]; /* N s, N m s */
+} hapi_joint_memory;
+
+typedef struct hapi_joints {
+  hapi_model_joint *of; /* of the model in use; capacity.joints */
+  uint32_t count;
+  hapi_joint_memory *memory; /* by slot; capacity.joints */
+} hapi_joints;
+
+#endif

@@ -1,0 +1,384 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include "base/effect_clock.h"
+#include "local/ball_nearest.h"
+#include "local/contact_ramp.h"
+#include "local/pointer_forces.h"
+#include "local/pointer_spring.h"
+
+/* Pointer contacts as rows of the solver: pointer_spring.h says which. Those of friction are in
+ * pointer_friction_rows.c. */
+
+#define NEAR_FLOOR \
+  1e-3 /* m: contacts that are less open, or close in this time, count for the coupling */
+#define NEAR_S 5e-3
+#define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
+
+static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at)
+{
+  hapi_nearest nearest;
+  hapi_touch_frame frame = {NULL, NULL};
+  if (at->body != NULL) {
+    frame = (hapi_touch_frame){&at->body->pose, at->body->rotation};
+  }
+  if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->shape.radius, &c->shape,
+                         &c->shape_pose, &frame, &nearest)) {
+    return false;
+  }
+  hapi_v3_copy(nearest.normal, c->normal_now);
+  hapi_v3_copy(nearest.point_b, c->point_now);
+  at->depth = -nearest.distance;
+  return true;
+}
+
+static bool ask_shape(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *at)
+{
+  uint64_t begin = hapi_effect_begin(&tick->sample);
+  bool found = place_by_shape(c, at);
+  hapi_effect_end(&tick->sample, HAP_EFFECT_SHAPE, begin);
+  return found;
+}
+
+static void place_by_plane(hapi_local_contact *c, hapi_placed_pointer *at)
+{
+  double apart[3];
+  hapi_body_point(at->body, c->point_body, c->point_now);
+  hapi_body_vector(at->body, c->normal_body, c->normal_now);
+  hapi_v3_sub(at->pointer->pose.position, at->point, apart);
+  at->depth = at->pointer->shape.radius - hapi_v3_dot(at->normal, apart);
+}
+
+/* Where hapi_tool_place found it. */
+static bool place_tool(const hapi_tick *tick, const hapi_local_contact *c, hapi_placed_pointer *at)
+{
+  const hapi_local_tool *tool = &tick->touches.tool.tools[c->tool - 1];
+  hapi_v3_sub(at->point, at->pointer->pose.position, at->arm);
+  at->depth = tool->depth;
+  at->share = tool->felt;
+  return tool->placed;
+}
+
+static bool place(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *at)
+{
+  at->pointer = &tick->pointers.of[c->pointer];
+  at->body = hapi_bodies_at(&tick->bodies, c->body);
+  at->normal = c->normal_now;
+  at->point = c->point_now;
+  if (at->pointer->generation != c->pointer_generation) {
+    return false; /* another pointer has come to its place: its contacts come with the next model */
+  }
+  if (c->tool != 0) {
+    return place_tool(tick, c, at);
+  }
+  hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
+  if (!c->has_shape || !ask_shape(tick, c, at)) {
+    place_by_plane(c, at);
+  }
+  at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->facts.period);
+  return true;
+}
+
+/* Spring and damper where neither side answers: eq. 7 as it stands. */
+static void push_static(hapi_local_contact *c, const hapi_placed_pointer *at, double speed)
+{
+  const hapi_pointer *p = at->pointer;
+  double force = at->depth > 0.0
+                     ? at->share * (p->surface.stiffness * at->depth + p->surface.damping * speed)
+                     : 0.0;
+  hapi_v3_scale(force > 0.0 ? -force : 0.0, at->normal, c->force);
+}
+
+/* Eq. 7 as it stands: the row's impulse is given. */
+static bool fix(hapi_row *row, const hapi_pointer_spring *p, double period)
+{
+  double force = p->depth > 0.0 ? p->k * p->depth + p->d * (p->s - p->w) : 0.0;
+  row->lo = row->hi = force > 0.0 ? period * force : 0.0;
+  row->softness = 0.0;
+  row->target = 0.0;
+  return force > 0.0;
+}
+
+/* Of the pointer where it touches. */
+static void point_velocity(const hapi_placed_pointer *at, const double linear[3],
+                           const double angular[3], double out[3])
+{
+  hapi_v3_copy(linear, out);
+  if (at->pointer->shape.hull != NULL) {
+    double swing[3];
+    hapi_v3_cross(angular, at->arm, swing);
+    hapi_v3_add(out, swing, out);
+  }
+}
+
+/* Where the body gives way, and how fast. */
+static void set_way(hapi_placed_pointer *at)
+{
+  double arm[3];
+  hapi_v3_scale(-1.0, at->normal, at->j);
+  hapi_v3_set(at->j + 3, 0.0, 0.0, 0.0);
+  at->w = 0.0;
+  if (at->body != NULL) {
+    hapi_body_arm(at->body, at->point, arm);
+    hapi_v3_cross(arm, at->j, at->j + 3);
+    at->w = hapi_row_start_speed(at->body, at->j);
+  }
+}
+
+static void set_proxy_column(const hapi_placed_pointer *at, hapi_row *row, hapi_pointer_spring *out)
+{
+  const hapi_pointer *p = at->pointer;
+  memset(row->jb, 0, sizeof row->jb);
+  memset(row->bb, 0, sizeof row->bb);
+  hapi_v3_copy(at->normal, row->jb);
+  hapi_v3_scale(p->proxy.response, row->jb, row->bb);
+  row->b = p->proxy.row;
+  out->w += hapi_v3_dot(row->jb, p->proxy.velocity);
+  out->free += hapi_v3_dot(row->jb, p->proxy.free_velocity);
+  if (p->shape.hull != NULL) {
+    hapi_v3_cross(at->arm, at->normal, row->jb + 3);
+    hapi_v3_scale(p->proxy.spin_response, row->jb + 3, row->bb + 3);
+    out->w += hapi_v3_dot(row->jb + 3, p->proxy.spin);
+    out->free += hapi_v3_dot(row->jb + 3, p->proxy.free_spin);
+  }
+}
+
+/* The columns of the body and, of a proxy, of the pointer: w then is the body's speed less the
+ * proxy's, and s is 0. */
+static void set_columns(const hapi_local_contact *contact, const hapi_placed_pointer *at,
+                        hapi_row *row, hapi_pointer_spring *out)
+{
+  if (at->body != NULL) {
+    hapi_v3_copy(at->j, row->ja);
+    hapi_v3_copy(at->j + 3, row->ja + 3);
+  } else {
+    memset(row->ja, 0, sizeof row->ja);
+  }
+  hapi_row_response(at->body, row->ja, row->ba);
+  if (contact->tool == 0 && hapi_body_has_own_probes(at->body)) {
+    for (int i = 0; i < 6; ++i) {
+      row->ba[i] = hapi_v3_dot(contact->a[i], at->j);
+    }
+  }
+  row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;
+  row->b = HAPI_STATIC_ROW;
+  out->w = out->free = out->body_w = at->w;
+  out->a = out->body_a = hapi_dot6_fresh(row->ja, row->ba);
+  out->s = at->own;
+  if (at->pointer->proxied) {
+    set_proxy_column(at, row, out);
+    out->a += hapi_dot6_fresh(row->jb, row->bb);
+    out->s = 0.0;
+  }
+}
+
+/* Whether all rows so far have their bodies to themselves. */
+static void note_body(hapi_solver *solver, const hapi_placed_pointer *at)
+{
+  bool alone = !at->pointer->proxied && at->body != NULL && !at->body->rowed;
+  solver->apart = solver->apart && alone;
+  if (at->body != NULL) {
+    at->body->rowed = true;
+  }
+}
+
+static void add_row(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *at)
+{
+  hapi_local_contact *contact = &tick->touches.of[index];
+  uint32_t number = tick->rows.solver.row_count;
+  hapi_row *row = &tick->rows.solver.rows[number];
+  hapi_pointer_spring p = {.k = at->share * at->pointer->surface.stiffness,
+                           .d = at->depth > 0.0 ? at->share * at->pointer->surface.damping : 0.0,
+                           .depth = at->depth};
+  if (at->pointer->rigid) {
+    p.depth *= at->depth > 0.0 ? contact->ramp.share : 1.0;
+    ++at->pointer->rigid_move.near_rows;
+  }
+  set_columns(contact, at, row, &p);
+  bool pushes = at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT
+                    ? fix(row, &p, tick->facts.period)
+                    : hapi_spring_soften(row, at->pointer, &p, tick->facts.period);
+  if (!pushes) {
+    hapi_v3_set(contact->force, 0.0, 0.0, 0.0);
+    return;
+  }
+  row->mu = 0.0;
+  row->ball = row->round = 0;
+  row->single = !at->pointer->proxied;
+  row->normal = -1;
+  row->impulse = tick->facts.period * -hapi_v3_dot(contact->force, at->normal);
+  tick->rows.sources[number] = (hapi_row_source){
+      .contact = index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  if (at->pointer->rigid) {
+    hapi_spring_set_staying(tick, at, &p, fmin(p.depth, 0.0) / tick->facts.period,
+                            &tick->rows.sources[number]);
+  }
+  contact->row = number;
+  ++tick->rows.solver.row_count;
+  note_body(&tick->rows.solver, at);
+  if (row->single) {
+    hapi_single_ready(&tick->rows.solver, number, p.body_a);
+  } else {
+    hapi_row_ready(&tick->rows.solver, number);
+  }
+}
+
+static double size_of(const hapi_pointer *p)
+{
+  return p->shape.hull != NULL ? p->shape.extent : p->shape.radius;
+}
+
+/* Whether a rigid contact may close within the tick, wherever the others send the pointer. */
+static bool may_close(const hapi_tick *tick, const hapi_local_contact *c,
+                      const hapi_placed_pointer *at)
+{
+  double comes = fmax(-at->w, 0.0);
+  bool leaves = c->tool != 0 && tick->touches.tool.tools[c->tool - 1].leaving;
+  return !leaves &&
+         at->depth + at->pointer->rigid_move.reach + tick->facts.period * comes + RIGID_SLACK > 0.0;
+}
+
+/* Not in line, and with what friction asks for alone: where nothing rubs, what was placed stays in registers. */
+static __attribute__((noinline, cold)) void rub(hapi_tick *tick, uint32_t index,
+                                                hapi_pointer *pointer, hapi_local_body *body,
+                                                double depth)
+{
+  const hapi_local_contact *c = &tick->touches.of[index];
+  const hapi_placed_pointer at = {.pointer = pointer,
+                                  .body = body,
+                                  .normal = c->normal_now,
+                                  .point = c->point_now,
+                                  .depth = depth};
+  bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
+  if (pushes && (pointer->rigid || depth > 0.0)) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    hapi_pointer_friction_rows(tick, index, &at);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_FRICTION, begin);
+  }
+}
+
+static void take_contact(hapi_tick *tick, uint32_t index)
+{
+  hapi_local_contact *c = &tick->touches.of[index];
+  hapi_placed_pointer at;
+  bool placed = tick->guard.latch.fault == HAP_FAULT_NONE && place(tick, c, &at);
+  c->row = HAPI_NO_ROW;
+  if (!placed) {
+    hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+    return;
+  }
+  const hapi_pointer *p = at.pointer;
+  double velocity[3];
+  point_velocity(&at, p->proxied ? p->proxy.free_velocity : p->twist.linear,
+                 p->proxied ? p->proxy.free_spin : p->twist.angular, velocity);
+  set_way(&at);
+  at.own = hapi_v3_dot(at.j, velocity);
+  double speed = at.own - at.w;
+  double way = tick->facts.period * speed;
+  /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
+  double motion = speed;
+  if (p->proxied) {
+    point_velocity(&at, p->proxy.velocity, p->proxy.spin, velocity);
+    motion = hapi_v3_dot(at.j, velocity) - at.w;
+  }
+  if (!p->rigid && at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
+    at.pointer->coupling.near_stiffness += c->weight * at.pointer->surface.stiffness;
+  }
+  /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
+  bool comes =
+      at.depth > 0.0 || (at.depth + way > 0.0 && tick->facts.period * motion < 0.25 * size_of(p));
+  if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 &&
+      (at.depth > 0.0 || at.pointer->proxied)) {
+    hapi_local_wake(tick, at.body);
+  }
+  bool acts = p->rigid ? may_close(tick, c, &at) : comes && at.share > 0.0;
+  if (!acts) {
+    hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+  } else if (hapi_body_responds(at.body) || at.pointer->proxied) {
+    add_row(tick, index, &at);
+  } else {
+    push_static(c, &at, speed);
+  }
+  if (c->rubs) {
+    rub(tick, index, at.pointer, at.body, at.depth);
+  }
+}
+
+/* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels it. */
+static void add_brake(hapi_tick *tick, const hapi_pointer *p, const double way[3], int first,
+                      double most)
+{
+  uint32_t number = tick->rows.solver.row_count;
+  hapi_row *row = &tick->rows.solver.rows[number];
+  memset(row, 0, sizeof *row);
+  hapi_v3_scale(-1.0 / hapi_v3_norm(way), way, row->jb + first);
+  hapi_v3_scale(first == 0 ? p->proxy.response : p->proxy.spin_response, row->jb + first,
+                row->bb + first);
+  row->a = HAPI_STATIC_ROW;
+  row->b = p->proxy.row;
+  tick->rows.solver.apart = false;
+  row->hi = HUGE_VAL;
+  row->target = -most;
+  row->normal = -1;
+  tick->rows.sources[number] =
+      (hapi_row_source){.body_a = HAPI_SLOT_NONE, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  ++tick->rows.solver.row_count;
+  hapi_row_ready(&tick->rows.solver, number);
+}
+
+/* A god-object that has been let go would leap to the device. One that is held needs none. */
+void hapi_pointers_brake(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation == 0 || !p->rigid || p->contacts > 0) {
+      continue;
+    }
+    if (hapi_v3_norm(p->proxy.free_velocity) > p->rigid_move.speed_most) {
+      add_brake(tick, p, p->proxy.free_velocity, 0, p->rigid_move.speed_most);
+    }
+    if (p->shape.hull != NULL && hapi_v3_norm(p->proxy.free_spin) > p->rigid_move.spin_most) {
+      add_brake(tick, p, p->proxy.free_spin, 3, p->rigid_move.spin_most);
+    }
+  }
+}
+
+void hapi_pointers_direct(hapi_tick *tick)
+{
+  bool off = hapi_wish_is_off(tick->facts.wishes, HAP_EFFECT_PROXY);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    bool unknown = p->coupling.kind == HAP_COUPLING_AUTO && !p->coupling.hold_known && !off;
+    p->coupling.reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
+    p->coupling.contact_stiffness = p->coupling.near_stiffness;
+    p->coupling.near_stiffness = 0.0;
+    p->proxy.row = 0;
+  }
+}
+
+void hapi_pointer_rows(hapi_tick *tick)
+{
+  hapi_tool_place(tick);
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    take_contact(tick, i);
+  }
+}
+
+void hapi_pointer_forces(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    tick->pointers.of[i].contacts = 0;
+    tick->pointers.of[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  }
+  tick->touches.pushing = 0;
+  if (tick->touches.rubs) {
+    hapi_pointer_forces_with_friction(tick);
+    return;
+  }
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    hapi_pointer_press(tick, &tick->touches.of[i]);
+    hapi_pointer_give(tick, &tick->touches.of[i]);
+  }
+  tick->figures.contact_ticks += tick->touches.pushing != 0;
+}

@@ -1,0 +1,106 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_LOCAL_ROWS_H
+#define HAPODE_LOCAL_ROWS_H
+
+/* The rows of a tick, model CONTACT: what contact, joint and pointer rows share. */
+
+#include <math.h>
+
+#include "local/body.h"
+#include "solver/contact_solver.h"
+
+/* Place 0 of the solver's velocities never moves: the static world. */
+#define HAPI_STATIC_ROW 0u
+
+#define HAPI_NO_ROW 0xffffffffu
+
+/* Where a row of the solver comes from. */
+typedef struct hapi_row_source {
+  uint32_t contact; /* of the patches, or of the pointers */
+  uint32_t body_a;  /* slot; HAPI_SLOT_NONE: none */
+  uint32_t body_b;
+  uint8_t part; /* 0 normal, 1 and 2 friction; of a joint: see joint_rows.c */
+  bool pointer;
+  bool joint;      /* contact is the index of a joint */
+  bool pushes_out; /* its target lifts a body out of another one, or closes a joint: not to stay in
+                      the velocity */
+  bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
+                      surface that moves, a spring */
+  double stays;    /* m/s, of a row that pushes out: its target without that */
+} hapi_row_source;
+
+typedef struct hapi_rows {
+  hapi_solver solver;
+  hapi_row_source *sources; /* of the rows; capacity */
+  uint32_t capacity;
+} hapi_rows;
+
+/* What a unit impulse along j does to the body's velocity. */
+static inline void hapi_row_response(const hapi_local_body *body, const double j[6], double b[6])
+{
+  if (!hapi_body_responds(body)) {
+    memset(b, 0, 6 * sizeof *b);
+  } else if ((body->flags & HAPI_BODY_MEASURED) == 0) {
+    hapi_v3_scale(body->inverse_mass, j, b);
+    hapi_body_spin_up(body, j + 3, b + 3);
+  } else {
+    for (int i = 0; i < 6; ++i) {
+      b[i] =
+          hapi_v3_dot(body->given.response[i], j) + hapi_v3_dot(body->given.response[i] + 3, j + 3);
+    }
+  }
+}
+
+/* Jacobian and response of a unit impulse along direction, sign: -1 for the second body of a
+ * contact. */
+static inline void hapi_row_column(const hapi_local_body *body, const double arm[3],
+                                   const double direction[3], double sign, double j[6], double b[6])
+{
+  memset(j, 0, 6 * sizeof *j);
+  if (body != NULL) {
+    hapi_v3_scale(sign, direction, j);
+    hapi_v3_cross(arm, j, j + 3);
+  }
+  hapi_row_response(body, j, b);
+}
+
+/* The same of a turn about direction. */
+static inline void hapi_row_turn_column(const hapi_local_body *body, const double direction[3],
+                                        double sign, double j[6], double b[6])
+{
+  memset(j, 0, 6 * sizeof *j);
+  if (body != NULL) {
+    hapi_v3_scale(sign, direction, j + 3);
+  }
+  hapi_row_response(body, j, b);
+}
+
+/* The angle of a sine and a cosine, in -pi .. pi, to 1e-13: halved until the series is short. */
+static inline double hapi_row_angle(double sine, double cosine)
+{
+  double length = sqrt(sine * sine + cosine * cosine);
+  double down = fabs(cosine) + length;
+  if (!(down > 0.0)) {
+    return 0.0;
+  }
+  double t = sine / down; /* tan of the half, up to 1 */
+  for (int i = 0; i < 3; ++i) {
+    t = t / (1.0 + sqrt(1.0 + t * t));
+  }
+  double t2 = t * t;
+  double small =
+      t * (1.0 - t2 * (1.0 / 3 - t2 * (1.0 / 5 - t2 * (1.0 / 7 - t2 * (1.0 / 9 - t2 / 11)))));
+  double angle = 16.0 * small;
+  return cosine < 0.0 ? copysign(M_PI, sine) - angle : angle;
+}
+
+/* Velocity along j before this tick. */
+static inline double hapi_row_start_speed(const hapi_local_body *body, const double j[6])
+{
+  return body == NULL
+             ? 0.0
+             : hapi_v3_dot(j, body->start_twist) + hapi_v3_dot(j + 3, body->start_twist + 3);
+}
+
+#endif

@@ -1,0 +1,228 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/vec.h"
+#include "tick/tick.h"
+
+/* The points of a hull's patches are found anew again and again. One that is near to where one of the
+ * same pair was is that one, and keeps what it had. While a pair presses, others come in slowly, and
+ * those that are gone leave slowly: the force does not jump where a patch changes. */
+
+#define SAME_COSINE 0.7 /* of the normals */
+
+static hapi_local_contact *contacts_of(hapi_tick *tick)
+{
+  return &tick->touches.of[tick->touches.count - tick->touches.tool.count];
+}
+
+void hapi_tool_set_aside(hapi_tick *tick)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  if (w->count == 0) {
+    return;
+  }
+  memcpy(w->old_contacts, contacts_of(tick), w->count * sizeof *w->old_contacts);
+  memcpy(w->old_tools, w->tools, w->count * sizeof *w->old_tools);
+  tick->touches.count -= w->count;
+  /* w->count stays: how many are set aside, until they are taken or put back */
+}
+
+static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
+{
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    if (w->pairs[i].key == in->at.key && w->pairs[i].pointer == in->pointer) {
+      return i;
+    }
+  }
+  w->pairs[w->pair_count] = (hapi_tool_pair){
+      .key = in->at.key, .pointer = in->pointer, .first = HAPI_SLOT_NONE, .depth = -HUGE_VAL};
+  return w->pair_count++;
+}
+
+/* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. One that is taken has
+ * its member negative. */
+static uint32_t find_old(const hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in)
+{
+  double best = in->same_within;
+  uint32_t chosen = HAPI_SLOT_NONE;
+  for (uint32_t i = 0; i < old_count; ++i) {
+    const hapi_local_tool *old = &w->old_tools[i];
+    double apart[3];
+    if (old->member < 0.0 || old->in.at.key != in->at.key ||
+        old->in.pointer_generation != in->pointer_generation || old->in.pointer != in->pointer) {
+      continue;
+    }
+    hapi_v3_sub(old->in.at.core_a, in->at.core_a, apart);
+    double distance = hapi_v3_norm(apart);
+    bool turned = old->in.at.touch == in->at.touch &&
+                  hapi_v3_dot(old->in.at.normal, in->at.normal) < SAME_COSINE;
+    if (distance < best && !turned) {
+      best = distance;
+      chosen = i;
+    }
+  }
+  return chosen;
+}
+
+static void link_to_pair(hapi_tick *tick, uint32_t at)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_pair *pair = &w->pairs[w->tools[at].pair];
+  w->tools[at].next = pair->first;
+  pair->first = at;
+}
+
+/* old: with what of it goes on; NULL: a new one. */
+static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  uint32_t at = w->count;
+  hapi_local_contact *c = &tick->touches.of[tick->touches.count];
+  hapi_local_tool *tool = &w->tools[at];
+  uint32_t pair = pair_of(w, in);
+  memset(tool, 0, sizeof *tool);
+  if (old != HAPI_SLOT_NONE) {
+    *c = w->old_contacts[old];
+    tool->member = w->old_tools[old].member;
+    tool->friction = w->old_tools[old].friction;
+    w->old_tools[old].member = -1.0;
+  } else {
+    memset(c, 0, sizeof *c);
+    tool->member = w->pairs[pair].depth > 0.0 ? 0.0 : 1.0;
+  }
+  tool->in = *in;
+  tool->pair = pair;
+  c->slot = HAPI_SLOT_NONE;
+  c->body = in->at.body_b;
+  c->pointer = in->pointer;
+  c->pointer_generation = in->pointer_generation;
+  c->mu = in->mu;
+  c->rubs = (in->mu > 0.0 || hapi_wish_is_on(tick->facts.wishes, HAP_EFFECT_FRICTION));
+  tick->touches.rubs |= c->rubs;
+  c->tool = at + 1;
+  c->row = HAPI_NO_ROW;
+  ++w->count;
+  ++tick->touches.count;
+  link_to_pair(tick, at);
+}
+
+/* What was not found again. */
+static void keep_leaving(hapi_tick *tick, uint32_t old_count)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  for (uint32_t i = 0; i < old_count; ++i) {
+    const hapi_local_tool old = w->old_tools[i];
+    bool room = w->count < 2 * tick->capacity.tool_points;
+    if (old.member < 0.0 || !room || !(w->pairs[old.pair].depth > 0.0)) {
+      continue;
+    }
+    uint32_t at = w->count;
+    add(tick, &old.in, i);
+    w->tools[at].leaving = true;
+  }
+}
+
+/* The pairs that have no tools any more. */
+static void drop_pairs(hapi_tool_world *w)
+{
+  for (uint32_t i = 0; i < w->pair_count;) {
+    if (w->pairs[i].first != HAPI_SLOT_NONE) {
+      ++i;
+      continue;
+    }
+    w->pairs[i] = w->pairs[--w->pair_count];
+    for (uint32_t k = w->pairs[i].first; i < w->pair_count && k != HAPI_SLOT_NONE;
+         k = w->tools[k].next) {
+      w->tools[k].pair = i;
+    }
+  }
+}
+
+/* All that are set aside are forgotten but for what the new ones take over. */
+static uint32_t begin(hapi_tick *tick)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  uint32_t old_count = w->count;
+  w->count = 0;
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    w->pairs[i].first = HAPI_SLOT_NONE;
+  }
+  return old_count;
+}
+
+static void end(hapi_tick *tick, uint32_t old_count)
+{
+  keep_leaving(tick, old_count);
+  drop_pairs(&tick->touches.tool);
+}
+
+static bool is_there(const hapi_tick *tick, const hapi_tool_point *in)
+{
+  return tick->pointers.of[in->pointer].generation == in->pointer_generation &&
+         tick->touches.tool.count < tick->capacity.tool_points;
+}
+
+static void put_back(hapi_tick *tick)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  if (w->count == 0) {
+    return;
+  }
+  memcpy(&tick->touches.of[tick->touches.count], w->old_contacts,
+         w->count * sizeof *w->old_contacts);
+  tick->touches.count += w->count;
+  for (uint32_t i = 0; i < w->count; ++i) {
+    tick->touches.rubs |= w->old_contacts[i].rubs;
+  }
+}
+
+void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model)
+{
+  const hapi_model_contact *contacts = hapi_model_contacts(model);
+  const hapi_tool_point *tools = hapi_model_tools(model);
+  if (model->model == HAP_MODEL_CONTACT) {
+    put_back(tick);
+    return;
+  }
+  uint32_t old_count = begin(tick);
+  for (uint32_t i = 0; i < model->contact_count; ++i) {
+    const hapi_tool_point *in = &tools[contacts[i].tool - 1];
+    if (contacts[i].tool == 0 || !is_there(tick, in)) {
+      continue;
+    }
+    hapi_local_contact *c = &tick->touches.of[tick->touches.count]; /* where it comes to be */
+    add(tick, in, find_old(&tick->touches.tool, old_count, in));
+    c->slot = contacts[i].slot;
+    c->generation = contacts[i].generation;
+    memcpy(c->a, contacts[i].a, sizeof c->a);
+    memcpy(c->turn, contacts[i].turn, sizeof c->turn);
+  }
+  end(tick, old_count);
+}
+
+void hapi_tool_adopt_patches(hapi_tick *tick, hapi_patches *patches)
+{
+  const hapi_tool_point *tools = hapi_patches_tools(patches);
+  if (tick->facts.model != HAP_MODEL_CONTACT ||
+      (patches->tool_count == 0 && tick->touches.tool.count == 0)) {
+    return;
+  }
+  hapi_tool_set_aside(tick);
+  uint32_t old_count = begin(tick);
+  for (uint32_t i = 0; i < patches->tool_count; ++i) {
+    if (is_there(tick, &tools[i])) {
+      add(tick, &tools[i], find_old(&tick->touches.tool, old_count, &tools[i]));
+    }
+  }
+  end(tick, old_count);
+}
+
+void hapi_tool_forget(hapi_tick *tick, uint32_t pointer)
+{
+  for (uint32_t i = 0; i < tick->touches.tool.pair_count; ++i) {
+    if (tick->touches.tool.pairs[i].pointer == pointer) {
+      tick->touches.tool.pairs[i].seen = false;
+    }
+  }
+}

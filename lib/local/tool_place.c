@@ -1,0 +1,208 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+
+#include "local/contact_ramp.h"
+#include "local/rows.h"
+#include "local/touch_place.h"
+
+/* Where the contacts of hulls are, and what part of the pointer's stiffness k each has (docs/numerics.md):
+ * together, those of a pair that push the same way have k, as a bed of springs. So a flat push on a face
+ * is felt as k, and a tilt as the springs' moments about its middle. */
+
+#define COME_S 0.02 /* in which a point that is new in a pair that presses gets its share */
+
+/* Cosines of the angle between two normals: that far apart they push each for itself, or share. */
+#define APART_COSINE 0.6
+#define TOGETHER_COSINE 0.95
+
+/* Of a patch that is steeper than this, 4.6 degrees, only the deepest edge or corner has a share. Beyond 5
+ * degrees the patch has no other points. */
+#define SLOPE_MOST 0.08
+#define NEAR_SHARE 0.01 /* of the hull's extent: points that are nearer say nothing of a slope */
+
+static bool is_gone(const hapi_tick *tick, const hapi_local_tool *tool)
+{
+  const hapi_patch_contact *at = &tool->in.at;
+  const hapi_pointer *p = &tick->pointers.of[tool->in.pointer];
+  if (p->generation != tool->in.pointer_generation || (tool->leaving && tool->member <= 0.0)) {
+    return true;
+  }
+  if (at->body_b == HAPI_SLOT_NONE) {
+    return false;
+  }
+  const hapi_local_body *body = &tick->bodies.of[at->body_b];
+  return !body->live || body->generation != at->generation_b;
+}
+
+static void follow_members(hapi_tick *tick)
+{
+  double step = tick->facts.period / COME_S;
+  for (uint32_t i = 0; i < tick->touches.tool.count; ++i) {
+    hapi_local_tool *tool = &tick->touches.tool.tools[i];
+    bool presses =
+        tick->touches.tool.pairs[tool->pair].depth > 0.0; /* else there is no force to jump */
+    tool->member += (tool->leaving ? -1.0 : 1.0) * (presses ? step : 1.0);
+    tool->member = fmin(fmax(tool->member, 0.0), 1.0);
+  }
+}
+
+static void drop_gone(hapi_tick *tick)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  hapi_local_contact *contacts = &tick->touches.of[tick->touches.count - w->count];
+  uint32_t kept = 0;
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    w->pairs[i].first = HAPI_SLOT_NONE;
+  }
+  for (uint32_t i = 0; i < w->count; ++i) {
+    if (is_gone(tick, &w->tools[i])) {
+      continue;
+    }
+    if (kept < i) {
+      w->tools[kept] = w->tools[i];
+      contacts[kept] = contacts[i];
+    }
+    contacts[kept].tool = kept + 1;
+    w->tools[kept].next = w->pairs[w->tools[kept].pair].first;
+    w->pairs[w->tools[kept].pair].first = kept;
+    ++kept;
+  }
+  tick->touches.count -= w->count - kept;
+  w->count = kept;
+}
+
+static void place(hapi_tick *tick, hapi_local_tool *tool, hapi_local_contact *c)
+{
+  const hapi_pointer *p = &tick->pointers.of[c->pointer];
+  const hapi_local_body *body = hapi_bodies_at(&tick->bodies, c->body);
+  hapi_touch_spot spot;
+  double rotations[2][9];
+  hapi_touch_frame a = {&p->pose, rotations[0]};
+  hapi_touch_frame b = {NULL, NULL};
+  hapi_quat_to_matrix(p->pose.quat_wxyz, rotations[0]);
+  if (body != NULL) {
+    hapi_quat_to_matrix(body->pose.quat_wxyz, rotations[1]);
+    b = (hapi_touch_frame){&body->pose, rotations[1]};
+  }
+  tool->placed = hapi_touch_place(&tool->in.at, &a, &b, &spot);
+  tool->depth = -HUGE_VAL;
+  if (tool->placed) {
+    hapi_v3_copy(spot.normal, c->normal_now);
+    hapi_v3_copy(spot.point, c->point_now);
+    tool->depth = -spot.gap;
+  }
+}
+
+/* How much two points push the same way. */
+static double likeness(const hapi_local_contact *a, const hapi_local_contact *b)
+{
+  double cosine = hapi_v3_dot(a->normal_now, b->normal_now);
+  double u = (cosine - APART_COSINE) / (TOGETHER_COSINE - APART_COSINE);
+  u = fmin(fmax(u, 0.0), 1.0);
+  return u * u * (3.0 - 2.0 * u);
+}
+
+/* How much deeper than the point others of its pair are, by their distance: the largest of all. */
+static double slope_at(const hapi_tool_world *w, const hapi_local_contact *contacts, uint32_t index,
+                       double near)
+{
+  double steepest = 0.0;
+  const hapi_local_tool *tool = &w->tools[index];
+  for (uint32_t k = w->pairs[tool->pair].first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+    double deeper = w->tools[k].depth - tool->depth;
+    double apart[3];
+    if (!w->tools[k].placed || !(deeper > 0.0)) {
+      continue;
+    }
+    hapi_v3_sub(contacts[k].point_now, contacts[index].point_now, apart);
+    double slope = deeper / (hapi_v3_norm(apart) + near);
+    steepest =
+        fmax(steepest, w->tools[k].member * likeness(&contacts[k], &contacts[index]) * slope);
+  }
+  return steepest;
+}
+
+/* 1 on a level patch, 0 at the upper end of a steep one; flat at 0, so that a small tilt changes no
+ * share. */
+static double level(double slope)
+{
+  double x = fmin(slope / SLOPE_MOST, 1.0);
+  double y = 1.0 - x * x * x * x;
+  return y * y;
+}
+
+/* The point's part before it is shared. */
+static void set_claim(const hapi_tick *tick, const hapi_local_contact *contacts, uint32_t index)
+{
+  hapi_local_tool *tool = &tick->touches.tool.tools[index];
+  double near = NEAR_SHARE * tick->pointers.of[tool->in.pointer].shape.extent;
+  tool->claim = tool->placed
+                    ? tool->member * level(slope_at(&tick->touches.tool, contacts, index, near))
+                    : 0.0;
+}
+
+static void weigh(const hapi_tool_world *w, hapi_local_contact *contacts, uint32_t index)
+{
+  const hapi_local_tool *tool = &w->tools[index];
+  double sum = 0.0;
+  double members = 0.0;
+  for (uint32_t k = w->pairs[tool->pair].first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+    if (w->tools[k].placed) {
+      double like = k == index ? 1.0 : likeness(&contacts[k], &contacts[index]);
+      sum += w->tools[k].claim * like;
+      members += w->tools[k].member * like;
+    }
+  }
+  double all = fmin(members, 1.0); /* less: the last ones are leaving */
+  contacts[index].weight = sum > 0.0 ? all * tool->claim / sum : 0.0;
+}
+
+static void follow_pair(hapi_tick *tick, hapi_tool_pair *pair, hapi_local_contact *contacts)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  double depth = -HUGE_VAL;
+  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+    depth = fmax(depth, w->tools[k].depth);
+    set_claim(tick, contacts, k);
+  }
+  pair->depth = depth;
+  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+    weigh(w, contacts, k);
+  }
+  double share = hapi_ramp_follow(&pair->ramp, &pair->seen, &tick->pointers.of[pair->pointer],
+                                  &depth, tick->facts.period);
+  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+    hapi_local_tool *tool = &w->tools[k];
+    hapi_local_contact *c = &contacts[k];
+    if (!tool->placed) {
+      c->weight = tool->felt = 0.0;
+      c->ramp.depth = -HUGE_VAL;
+      continue;
+    }
+    tool->felt = share * c->weight;
+    c->ramp.share = share;
+    c->ramp.depth = tool->depth;
+    c->ramp.excess = pair->ramp.excess;
+    tool->depth -= pair->ramp.excess;
+  }
+}
+
+void hapi_tool_place(hapi_tick *tick)
+{
+  hapi_tool_world *w = &tick->touches.tool;
+  if (w->count == 0) {
+    return;
+  }
+  follow_members(tick);
+  drop_gone(tick);
+  hapi_local_contact *contacts = &tick->touches.of[tick->touches.count - w->count];
+  for (uint32_t i = 0; i < w->count; ++i) {
+    place(tick, &w->tools[i], &contacts[i]);
+  }
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    if (w->pairs[i].first != HAPI_SLOT_NONE) {
+      follow_pair(tick, &w->pairs[i], contacts);
+    }
+  }
+}

@@ -1,0 +1,143 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_LOCAL_TOUCH_H
+#define HAPODE_LOCAL_TOUCH_H
+
+/* Contacts of pointers: of spheres, and the points of hulls' patches. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sync/messages.h"
+
+/* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
+typedef struct hapi_ramp {
+  double depth;  /* m, at the last tick */
+  double share;  /* 0..1, of the force */
+  double excess; /* m, of the depth that does not count */
+  bool held;     /* the excess goes by drawing back alone */
+
+  /* Of the energy observer, at the last tick: */
+  double felt_share; /* with what the guard took */
+  double felt;       /* what the guard left of friction */
+  double felt_excess;
+  double sprung; /* J in the spring, as it was felt */
+} hapi_ramp;
+
+/* Where the anchors of a contact's friction are. */
+typedef struct hapi_friction_place {
+  double anchor_pointer[3]; /* m, in the pointer's frame */
+  double anchor_body[3];
+  double normal_pointer[3]; /* of the surface */
+  double normal_body[3];
+  double
+      mark_pointer[3]; /* unit, along the surface: one direction when they were set; soft finger */
+  double mark_body[3];
+  double stretch_body[3]; /* m, of the pointer ahead of the body, in the body's frame */
+  double turn;            /* rad, likewise, about the normal */
+} hapi_friction_place;
+
+/* Friction of a pointer contact, of a sphere's by its slot; see pointer_friction.h. Of four numbers: along
+ * the surface in world axes, and about the normal times the finger's radius. */
+typedef struct hapi_friction {
+  uint32_t generation; /* of the contact */
+  uint32_t epoch;      /* of the body */
+  uint64_t tick;       /* the last in which the contact was closed */
+  hapi_friction_place set;
+  hapi_friction_place now; /* the anchors if they were set in this tick */
+  double normal[3];
+  double at[3];      /* m, world: where the force acts */
+  double stretch[4]; /* m, of the pointer ahead of the body */
+  double speed[4];   /* m/s, at which it grows */
+  double stiffness;  /* N/m, in this tick */
+  double damping;    /* N s/m */
+  bool rigid;        /* the contact does not give, and what slides begins anew at the next tick: */
+  bool slid;         /* it did; the stiffness is the coupling's then */
+  double left;       /* 0..1, share of the stretch that sliding has left in this tick */
+  double pull;       /* N, of spring and damper where nothing slides */
+  double axes[3][4]; /* unit, at right angles; the first along the pull */
+  uint32_t axis_count; /* 2; 3 with torsion */
+} hapi_friction;
+
+typedef struct hapi_local_contact {
+  uint32_t slot;
+  uint32_t body;
+  uint32_t pointer;
+  uint32_t pointer_generation;
+  uint32_t generation;
+  uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
+  uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
+  bool seen;      /* rendered at least once */
+  bool rubs;      /* friction is worked out: there is some, or it was asked for */
+  bool has_shape; /* model CONTACT: asked at every tick */
+  double point_body[3];
+  double normal_body[3];
+  hapi_ramp ramp;
+  double mu;
+  double weight;        /* 0..1, share of the pointer's stiffness; of a sphere 1 */
+  double force[3];      /* on the body */
+  double couple[3];     /* N m, on the body about the contact point; friction */
+  double normal_now[3]; /* model CONTACT, and of hulls all: world, out of the body */
+  double point_now[3];
+  double a[6][3];
+  double turn[6]; /* acceleration by one N m about the normal; soft finger */
+  hapi_shape shape;
+  hap_pose shape_pose;
+} hapi_local_contact;
+
+/* A contact of a pointer that is a hull, beside its hapi_local_contact. */
+typedef struct hapi_local_tool {
+  hapi_tool_point in;
+  uint32_t pair; /* index */
+  uint32_t next; /* of the same pair; HAPI_SLOT_NONE: the last one */
+  double member; /* 0..1: one that is new, or no longer there, comes and goes slowly */
+  bool leaving;  /* no longer there */
+  bool placed;   /* in this tick */
+  double claim;  /* 0..1, in this tick: its part of the stiffness before it is shared */
+  double depth;  /* m, in this tick, less the pair's excess */
+  double felt;   /* 0..1, share of the stiffness in this tick */
+  hapi_friction friction;
+} hapi_local_tool;
+
+/* What the contacts of a hull with one geom have in common. */
+typedef struct hapi_tool_pair {
+  uint64_t key;
+  uint32_t pointer;
+  uint32_t first; /* of its tools, by their next */
+  bool seen;
+  hapi_ramp ramp; /* of the deepest of them */
+  double depth;   /* m, of the deepest, at the last tick */
+} hapi_tool_pair;
+
+/* Of those that are leaving, and of new ones before the old are dropped. */
+#define HAPI_TOOL_PAIRS(capacity) ((size_t)3 * (capacity)->tool_points)
+
+/* What belongs to the contacts of hulls, in the order of these. */
+typedef struct hapi_tool_world {
+  hapi_local_tool *tools;           /* 2 x capacity: new ones and those that are leaving */
+  hapi_local_tool *old_tools;       /* scratch of adopting */
+  hapi_local_contact *old_contacts; /* likewise */
+  hapi_tool_pair *pairs;            /* HAPI_TOOL_PAIRS */
+  uint32_t count;
+  uint32_t pair_count;
+  uint32_t capacity; /* hapi_capacity.tool_points */
+} hapi_tool_world;
+
+typedef struct hapi_touches {
+  hapi_local_contact *of; /* of spheres, then of hulls; count in all */
+  uint32_t count;
+  uint32_t pushing;           /* that push in this tick */
+  bool rubs;                  /* some contact rubs */
+  hapi_ramp *ramps;           /* by contact slot, of the model before: to go on with */
+  uint32_t *ramp_generations; /* by contact slot */
+  hapi_friction *frictions;   /* by contact slot; of spheres */
+  hapi_tool_world tool;
+} hapi_touches;
+
+/* The contacts of hulls. */
+static inline hapi_local_contact *hapi_touches_of_tools(const hapi_touches *touches)
+{
+  return &touches->of[touches->count - touches->tool.count];
+}
+
+#endif

@@ -1,0 +1,479 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "solver/contact_solver.h"
+
+#include <stdbool.h>
+
+#include "base/vec.h"
+
+/* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
+ * go in circles, sweeps lead out. */
+#define DIRECT_ROUNDS 8
+#define DEAR_RUNS 32u
+#define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
+
+/* After so many runs in vain direct solves rest. With 8000 row updates for sweeps meanwhile a row of 20 to 30
+ * cubes that is pushed costs half of what the vain ones do, and its force is as near; with 4000 it is
+ * up to twice as far off. */
+#define VAIN_RUNS 4u
+#define VAIN_REST 16u
+#define VAIN_ALONE 8000u
+
+/* ---- preparation ---- */
+
+static bool same_bodies(const hapi_row *row, const hapi_row *other)
+{
+  return row->a == other->a && row->b == other->b;
+}
+
+static bool valid(const hapi_solver *solver, const hapi_row *row, double d)
+{
+  return d > 1e-200 && d < 1e200 && hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
+         row->softness >= 0.0 && row->a < solver->body_count && row->b < solver->body_count;
+}
+
+static bool has_bounds(const hapi_solver *solver, uint32_t index)
+{
+  const hapi_row *row = &solver->rows[index];
+  if (row->normal < 0) {
+    return row->lo <= row->hi;
+  }
+  return row->mu >= 0.0 && (uint32_t)row->normal < index &&
+         same_bodies(row, &solver->rows[row->normal]);
+}
+
+/* A row left out keeps no impulse: its normal's frictions get none either. */
+static void prepare(hapi_solver *solver, uint32_t index)
+{
+  hapi_row *row = &solver->rows[index];
+  double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
+  double of_b = row->single ? 0.0 : hapi_dot6(row->jb, row->bb);
+  double d = of_a + of_b + row->softness;
+  row->inverse = 0.0;
+  row->triple = 0;
+  if (!valid(solver, row, d) || !has_bounds(solver, index)) {
+    row->impulse = 0.0;
+    return;
+  }
+  row->inverse = 1.0 / d;
+  row->response = d;
+  row->moves_a = of_a != 0.0;
+  row->paired = of_b != 0.0;
+  bool moved = !row->paired && !row->single; /* by a partner that does not respond */
+  row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
+}
+
+static double couple(const hapi_row *row, const hapi_row *other)
+{
+  double k = hapi_dot6(row->ja, other->ba);
+  return row->paired ? k + hapi_dot6(row->jb, other->bb) : k;
+}
+
+/* A normal and its two frictions: one update takes all three. `last` is the second friction. */
+static void join_triple(hapi_solver *solver, uint32_t last)
+{
+  int32_t normal = solver->rows[last].normal;
+  if (normal < 0 || (uint32_t)normal + 2 != last) {
+    return;
+  }
+  hapi_row *r = &solver->rows[normal];
+  r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal && r[1].ball == 0 &&
+              r[1].inverse != 0.0 && r[2].inverse != 0.0;
+  if (r->triple) {
+    r[1].coupling[0] = couple(&r[1], &r[0]);
+    r[2].coupling[0] = couple(&r[2], &r[0]);
+    r[2].coupling[1] = couple(&r[2], &r[1]);
+  }
+}
+
+static void warm_start(hapi_solver *solver, hapi_row *row)
+{
+  double lo;
+  double hi;
+  hapi_row_bounds(solver->rows, row, &lo, &hi);
+  row->impulse = hapi_clamp(row->impulse, lo, hi);
+  if (row->impulse == 0.0) {
+    return;
+  }
+  hapi_madd6(solver->v[row->a], row->impulse, row->ba);
+  if (row->paired) {
+    hapi_madd6(solver->v[row->b], row->impulse, row->bb);
+  }
+}
+
+void hapi_row_ready(hapi_solver *solver, uint32_t index)
+{
+  prepare(solver, index);
+  join_triple(solver, index);
+  if (solver->rows[index].inverse != 0.0) {
+    warm_start(solver, &solver->rows[index]);
+  }
+}
+
+void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
+{
+  hapi_row *row = &solver->rows[index];
+  double d = response + row->softness;
+  row->inverse = 0.0;
+  row->triple = row->paired = 0;
+  if (!valid(solver, row, d) || !(row->lo <= row->hi)) {
+    row->impulse = 0.0;
+    return;
+  }
+  row->inverse = 1.0 / d;
+  row->response = d;
+  row->moves_a = response != 0.0;
+  row->drive = row->target;
+  row->impulse = hapi_clamp(row->impulse, row->lo, row->hi);
+  if (row->impulse != 0.0) {
+    hapi_madd6(solver->v[row->a], row->impulse, row->ba);
+  }
+}
+
+void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
+{
+  hapi_row *r = &solver->rows[first];
+  bool may_join = count == 3 && r[1].normal == (int32_t)first && r[2].normal == (int32_t)first;
+  for (uint32_t i = 0; i < count; ++i) {
+    prepare(solver, first + i);
+  }
+  if (may_join) {
+    join_triple(solver, first + 2);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    if (r[i].inverse != 0.0) {
+      warm_start(solver, &r[i]);
+    }
+  }
+}
+
+/* ---- sweeps ---- */
+
+/* The correction of one row, m/s. The rows of a body wait for each other, so that the way from v to
+ * v counts: the change is cut by itself and not taken as the difference of two impulses. */
+static double update(hapi_solver *solver, hapi_row *row)
+{
+  if (row->inverse == 0.0) {
+    return 0.0;
+  }
+  double lo;
+  double hi;
+  hapi_row_bounds(solver->rows, row, &lo, &hi);
+  double old = row->impulse;
+  if (hi == 0.0 && lo == 0.0 && old == 0.0) {
+    return 0.0; /* friction of a contact that does not push */
+  }
+  double wanted = hapi_row_error(solver, row) * row->inverse;
+  double change = hapi_clamp(wanted, lo - old, hi - old);
+  hapi_row_push(solver, row, change);
+  row->impulse = hapi_clamp(old + wanted, lo, hi); /* exactly at its bound */
+  return fabs(change) * row->response;
+}
+
+/* The change of a row's impulse, cut at its bounds. */
+static double change(hapi_row *row, double error, double lo, double hi)
+{
+  double old = row->impulse;
+  double wanted = error * row->inverse;
+  row->impulse = hapi_clamp(old + wanted, lo, hi);
+  return hapi_clamp(wanted, lo - old, hi - old);
+}
+
+static double half_width(const hapi_row *friction, double p)
+{
+  return p > 0.0 ? friction->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+}
+
+static double change_friction(hapi_row *row, double error, double p)
+{
+  double hi = half_width(row, p);
+  return change(row, error, -hi, hi);
+}
+
+/* v += b0 d0 + b1 d1 + b2 d2 */
+static void push_triple(double v[6], const double d[3], const double b0[6], const double b1[6],
+                        const double b2[6])
+{
+  const hapi_two share[3] = {hapi_two_all(d[0]), hapi_two_all(d[1]), hapi_two_all(d[2])};
+  for (int k = 0; k < 6; k += 2) {
+    hapi_two sum = hapi_two_mul(share[0], hapi_two_load(b0 + k));
+    sum = hapi_two_madd(sum, share[1], hapi_two_load(b1 + k));
+    sum = hapi_two_madd(sum, share[2], hapi_two_load(b2 + k));
+    hapi_two_store(v + k, hapi_two_add(hapi_two_load(v + k), sum));
+  }
+}
+
+/* As three updates, but the velocities are read and written once: what the first changes do to the
+ * later rows comes from the couplings. So the three do not wait for each other's way through v. */
+static double update_triple(hapi_solver *solver, hapi_row *r)
+{
+  double e[3];
+  double d[3];
+  for (int i = 0; i < 3; ++i) {
+    e[i] = hapi_row_error(solver, &r[i]);
+  }
+  d[0] = change(&r[0], e[0], r[0].lo, r[0].hi);
+  if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
+    return 0.0; /* a contact that does not push */
+  }
+  d[1] = change_friction(&r[1], e[1] - r[1].coupling[0] * d[0], r[0].impulse);
+  d[2] = change_friction(&r[2], e[2] - r[2].coupling[0] * d[0] - r[2].coupling[1] * d[1],
+                         r[0].impulse);
+  push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
+  if (r->paired) {
+    push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
+  }
+  double largest = fabs(d[0]) * r[0].response;
+  for (int i = 1; i < 3; ++i) {
+    double correction = fabs(d[i]) * r[i].response;
+    largest = correction > largest ? correction : largest;
+  }
+  return largest;
+}
+
+double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
+                        bool *out_slides)
+{
+  double norm2 = 0.0;
+  double d = 0.0;
+  double largest = 0.0;
+  for (int i = 0; i < first->ball; ++i) {
+    out[i] = first[i].impulse + errors[i] * first[i].inverse;
+    norm2 += out[i] * out[i];
+    d = fmax(d, first[i].inverse != 0.0 ? first[i].response : 0.0);
+  }
+  *out_slides = norm2 > radius * radius;
+  if (*out_slides) { /* one step for all, or the direction would be that of the easiest row */
+    norm2 = 0.0;
+    for (int i = 0; i < first->ball; ++i) {
+      out[i] = first[i].inverse != 0.0 ? first[i].impulse + errors[i] / d : 0.0;
+      norm2 += out[i] * out[i];
+    }
+    double share = norm2 > radius * radius ? radius / sqrt(norm2) : 1.0;
+    for (int i = 0; i < first->ball; ++i) {
+      out[i] *= share;
+    }
+  }
+  for (int i = 0; i < first->ball; ++i) {
+    double response = *out_slides ? d : first[i].response;
+    largest = fmax(largest, fabs(out[i] - first[i].impulse) * response);
+  }
+  return largest;
+}
+
+static void set_ball(hapi_solver *solver, hapi_row *first, const double impulses[3])
+{
+  for (int i = 0; i < first->ball; ++i) {
+    if (impulses[i] != first[i].impulse) {
+      hapi_row_push(solver, &first[i], impulses[i] - first[i].impulse);
+      first[i].impulse = impulses[i];
+    }
+  }
+}
+
+/* First as if it stuck, row by row. */
+double hapi_ball_update(hapi_solver *solver, hapi_row *first)
+{
+  double radius = hapi_ball_radius(solver->rows, first);
+  double old[3] = {0.0};
+  double errors[3] = {0.0};
+  double wanted[3] = {0.0};
+  double norm2 = 0.0;
+  double largest = 0.0;
+  bool slides = false;
+  for (int i = 0; i < first->ball; ++i) {
+    hapi_row *row = &first[i];
+    old[i] = row->impulse;
+    errors[i] = row->inverse != 0.0 ? hapi_row_error(solver, row) : 0.0;
+  }
+  for (int i = 0; i < first->ball && radius > 0.0; ++i) {
+    hapi_row *row = &first[i];
+    double error = row->inverse != 0.0 ? hapi_row_error(solver, row) : 0.0;
+    hapi_row_push(solver, row, error * row->inverse);
+    norm2 += row->impulse * row->impulse;
+    largest = fmax(largest, fabs(error));
+  }
+  if (radius > 0.0 && norm2 <= radius * radius) {
+    return largest;
+  }
+  set_ball(solver, first, old);
+  largest = hapi_ball_wanted(first, radius, errors, wanted, &slides);
+  set_ball(solver, first, wanted);
+  return largest;
+}
+
+static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, double largest)
+{
+  for (uint32_t i = first; i < end; ++i) {
+    hapi_row *row = &solver->rows[i];
+    double correction = row->triple     ? update_triple(solver, row)
+                        : row->ball > 0 ? hapi_ball_update(solver, row)
+                                        : update(solver, row);
+    i += row->triple ? 2 : row->ball > 0 ? row->ball - 1u : 0;
+    largest = correction > largest ? correction : largest;
+  }
+  return largest;
+}
+
+/* Backwards contact by contact, but with each normal before its frictions: they then end inside the
+ * bounds that it sets. */
+static double sweep_back(hapi_solver *solver)
+{
+  double largest = 0.0;
+  uint32_t end = solver->row_count;
+  while (end > 0) {
+    uint32_t first = end - 1;
+    while (first > 0 && solver->rows[first].normal >= 0) {
+      --first;
+    }
+    largest = update_group(solver, first, end, largest);
+    end = first;
+  }
+  return largest;
+}
+
+static double sweep(hapi_solver *solver)
+{
+  ++solver->sweeps;
+  return solver->sweeps % 2 == 1 ? update_group(solver, 0, solver->row_count, 0.0)
+                                 : sweep_back(solver);
+}
+
+/* Non-finite velocities must not pass for a solution. */
+static void check_finite(hapi_solver *solver)
+{
+  const hapi_two zero = hapi_two_all(0.0);
+  hapi_two sum[3] = {zero, zero, zero}; /* of x - x, which is 0 for numbers only */
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      hapi_two x = hapi_two_load(solver->v[i] + 2 * k);
+      sum[k] = hapi_two_add(sum[k], hapi_two_sub(x, x));
+    }
+  }
+  double all = hapi_two_sum(hapi_two_add(hapi_two_add(sum[0], sum[1]), sum[2]));
+  if (!(all == 0.0)) {
+    solver->residual = HUGE_VAL;
+  }
+}
+
+/* What is left for sweeps where direct solves are left out: more of them gain little. */
+static uint64_t sweeps_alone(uint32_t rows, uint64_t left, uint32_t updates)
+{
+  uint64_t enough = 2 * (uint64_t)rows > updates ? 2 * (uint64_t)rows : updates;
+  return left < enough ? left : enough;
+}
+
+/* Too dear for the whole budget, not for what was left of it. */
+static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
+{
+  if (left + 3 * (uint64_t)rows >= solver->update_budget) {
+    solver->dear_rows = rows;
+    solver->dear_runs = 0;
+    solver->dear_updates = SWEEPS_ALONE;
+  }
+}
+
+/* Direct solves that led to nothing better, one of them as dear as all sweeps where they are too dear. */
+static void note_vain(hapi_solver *solver, uint32_t dearest)
+{
+  bool vain = dearest > SWEEPS_ALONE && solver->direct_solves == 0;
+  solver->vain_runs = vain ? solver->vain_runs + 1 : 0;
+  if (solver->vain_runs >= VAIN_RUNS && solver->dear_rows == 0) {
+    solver->dear_rows = solver->row_count;
+    solver->dear_runs = DEAR_RUNS - VAIN_REST;
+    solver->dear_updates = VAIN_ALONE;
+    solver->vain_runs = VAIN_RUNS - 1;
+  }
+}
+
+/* What was too dear or in vain in the last runs will be so in this one: finding out costs as much as
+ * two sweeps. */
+static bool stays_dear(hapi_solver *solver)
+{
+  bool alike =
+      solver->dear_rows > 0 && 10 * (uint64_t)solver->row_count >= 9 * (uint64_t)solver->dear_rows;
+  if (!alike || ++solver->dear_runs >= DEAR_RUNS) {
+    solver->dear_rows = 0;
+    return false;
+  }
+  return true;
+}
+
+void hapi_solver_sweep_on(hapi_solver *solver)
+{
+  for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
+    solver->residual = sweep(solver);
+  }
+  check_finite(solver);
+}
+
+/* Each row has its bodies to itself: what is due after its update is rounding. */
+static void run_apart(hapi_solver *solver)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    double old = row->impulse;
+    if (row->inverse == 0.0) {
+      continue;
+    }
+    double *v = solver->v[row->a];
+    double wanted = (row->drive - row->softness * old - hapi_dot6(row->ja, v)) * row->inverse;
+    hapi_madd6(v, hapi_clamp(wanted, row->lo - old, row->hi - old), row->ba);
+    row->impulse = hapi_clamp(old + wanted, row->lo, row->hi);
+  }
+  solver->sweeps = 1;
+  solver->residual = 0.0;
+  check_finite(solver);
+}
+
+void hapi_solver_run(hapi_solver *solver)
+{
+  uint32_t rows = solver->row_count;
+  uint64_t left = solver->update_budget;
+  solver->sweeps = 0;
+  solver->direct_solves = 0;
+  solver->residual = 0.0;
+  bool may = solver->direct_rows > 0;
+  bool dear = may && stays_dear(solver);
+  bool direct = may && !dear;
+  uint32_t dearest = 0;
+  left = dear ? sweeps_alone(rows, left, solver->dear_updates) : left;
+  for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
+    hapi_row_ready(solver, i);
+  }
+  if (solver->apart && rows > 0) {
+    run_apart(solver);
+    return;
+  }
+  for (uint32_t rounds = 0; rows > 0; ++rounds) {
+    do {
+      solver->residual = sweep(solver);
+      left -= left < rows ? left : rows;
+    } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
+    if (solver->residual < solver->tolerance || left < rows ||
+        solver->sweeps == solver->max_sweeps) {
+      break;
+    }
+    /* Direct solves may have one half of the budget: where they lead in circles between two sets of
+     * active rows, sweeps from the second half still come near, and the next tick starts from there. */
+    if (direct && 2 * left > solver->update_budget &&
+        (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+      uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
+      left -= spent;
+      dearest = spent > dearest ? spent : dearest;
+      direct = !solver->too_dear; /* now, and so in the next round */
+      if (direct && solver->direct_residual < solver->tolerance) {
+        solver->residual = solver->direct_residual;
+        break;
+      }
+      if (!direct) {
+        note_dear(solver, left, rows);
+        left = sweeps_alone(rows, left, SWEEPS_ALONE);
+      }
+    }
+  }
+  if (may && !dear) {
+    note_vain(solver, dearest);
+  }
+  check_finite(solver);
+}

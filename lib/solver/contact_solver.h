@@ -1,0 +1,223 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SOLVER_CONTACT_SOLVER_H
+#define HAPODE_SOLVER_CONTACT_SOLVER_H
+
+/* Impulses of contacts, by ODE's friction pyramid or within a ball: the box LCP on the level of velocities.
+ *
+ *   w = ja.v[a] + jb.v[b],   v = free velocity + sum over rows of (ba, bb) impulse
+ *   lo < impulse < hi:  w + softness impulse = target
+ *   impulse == lo:      w + softness impulse >= target
+ *   impulse == hi:      w + softness impulse <= target
+ *
+ * Sweeps of projected Gauss-Seidel, forward and backward by turns, find which rows push, stick and
+ * slide; a direct solve over the bodies of an island (direct_solver.c) then gives their impulses,
+ * and sweeps again check it. The same input gives the same bits. */
+
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/lanes.h"
+
+/* One scalar row, in the order in which a sweep reads it. Three rows of a contact stand together: normal, then its two frictions. Chains of
+ * bodies converge best in their order, beginning at the hand. A body that does not respond in one
+ * row must not respond in any. */
+typedef struct hapi_row {
+  double ja[6];    /* row of the Jacobian, linear and angular */
+  double ba[6];    /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
+  double impulse;  /* N s; in: warm start, out: result */
+  double drive;    /* inner: target without the part of a partner that does not respond */
+  double softness; /* (m/s)/(N s), >= 0 */
+  double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
+  double response; /* inner: 1 / inverse */
+  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
+  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
+                         ball that slides: [0] its part of the force's direction */
+  double lo;          /* N s; may be -HUGE_VAL */
+  double hi;          /* N s; may be HUGE_VAL */
+  uint32_t a;         /* index into v */
+  uint32_t b;         /* several static partners may share one index, whose v stays as it is */
+  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
+                      the bounds are lo .. hi */
+  uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
+                      vector, no longer than mu p: how many; 0: the pyramid */
+  uint8_t round;  /* of the others: how many of them come before */
+  uint8_t single; /* a static partner: jb and bb are 0 and are not looked at */
+  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
+  uint8_t moves_a; /* inner: a responds */
+  uint8_t paired;  /* inner: b responds */
+  uint8_t state;   /* inner, of direct_solver.c */
+  uint32_t next;   /* inner: of the same island */
+  double target;   /* m/s */
+  double jb[6]; /* 0 for a static partner; a sweep reads this and the next where b responds only */
+  double bb[6];
+} hapi_row;
+
+typedef struct hapi_solver {
+  hapi_row *rows;
+  double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
+  double (*free)[6]; /* in: the same again, stays; for hubs and hapi_solver_calm */
+  uint32_t row_count;
+  uint32_t body_count;
+  /* The last bodies of all, always b in their rows: each may touch many others, as light pointers do. An
+   * island about them is solved part by part. */
+  uint32_t hub_count;
+  double tolerance;       /* m/s: done when the largest correction of a sweep is below */
+  uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
+                             cost; two sweeps are made in any case */
+  uint32_t max_sweeps;    /* beyond two; 0: what update_budget allows */
+  uint32_t direct_rows;   /* islands of at most this many free rows are solved directly; 0: none */
+  double *work;           /* for direct solves; an island that does not fit is left to sweeps */
+  size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
+
+  bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
+                         its impulses in v, but for hapi_row_retarget */
+  bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
+  uint32_t dear_rows;    /* inner: direct solves were too dear for so many rows; 0: they were not */
+  uint32_t dear_runs;    /* inner: since then */
+  uint32_t dear_updates; /* inner: what sweeps have meanwhile */
+  uint32_t vain_runs;    /* inner: one after the other, in which no direct solve was any better */
+  bool too_dear;         /* inner: an island was too large or too dear for the budget */
+  double direct_residual; /* inner: the largest correction due after a direct run, m/s */
+  uint32_t sweeps;        /* out */
+  uint32_t direct_solves; /* out: that were accepted */
+  double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
+} hapi_solver;
+
+/* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
+ * of n bodies takes n. */
+#define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*6 + (size_t)(bodies)*600)
+
+/* [haptic] Works in rows, v and work only, with 56 kB of stack; bounded by update_budget whatever
+ * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
+void hapi_solver_run(hapi_solver *solver);
+
+/* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave more
+ * energy than none at all, and as warm start more again from tick to tick: such are shortened to where
+ * they leave least, and swept again. What then still leaves more is shortened again, to none where the
+ * impulses are no numbers: whatever the run has found, beyond what the rows' targets give it adds no
+ * energy. Costs two sweeps where nothing is to be done, and nothing where the run has ended well. */
+void hapi_solver_calm(hapi_solver *solver);
+
+/* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
+ * soon as one is filled in, while it is at hand: there are more of them than fit into a near cache.
+ * In their order; v, row_count and body_count are set before. */
+void hapi_row_ready(hapi_solver *solver, uint32_t index);
+
+/* The same of a single row without another one's bounds, of which ja.ba is known. */
+void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
+
+/* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its frictions. */
+void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
+
+/* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
+
+/* A few sweeps more, two at least. */
+void hapi_solver_sweep_on(hapi_solver *solver);
+
+/* The radius of a ball of frictions [N s]. */
+static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
+{
+  double p = rows[first->normal].impulse;
+  return p > 0.0 ? first->mu * p : 0.0;
+}
+
+/* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out of it,
+ * where the friction slides against the motion; returns the correction, m/s. */
+double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
+                        bool *out_slides);
+
+/* One update of the ball that begins with the row; returns the correction, m/s. */
+double hapi_ball_update(hapi_solver *solver, hapi_row *first);
+
+/* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
+ * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
+uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
+
+/* Two sums side by side, of the even and of the odd. */
+static inline double hapi_dot6(const double a[6], const double b[6])
+{
+  hapi_two sum = hapi_two_mul(hapi_two_load(a), hapi_two_load(b));
+  sum = hapi_two_madd(sum, hapi_two_load(a + 2), hapi_two_load(b + 2));
+  return hapi_two_sum(hapi_two_madd(sum, hapi_two_load(a + 4), hapi_two_load(b + 4)));
+}
+
+/* The same bits, of numbers that were written one by one just before: a pair of them would have to wait until
+ * both are in the cache. */
+static inline double hapi_dot6_fresh(const double a[6], const double b[6])
+{
+  double even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];
+  double odd = a[1] * b[1] + a[3] * b[3] + a[5] * b[5];
+  return even + odd;
+}
+
+/* v += s b */
+static inline void hapi_madd6(double v[6], double s, const double b[6])
+{
+  hapi_two share = hapi_two_all(s);
+  for (int i = 0; i < 6; i += 2) {
+    hapi_two_store(v + i, hapi_two_madd(hapi_two_load(v + i), share, hapi_two_load(b + i)));
+  }
+}
+
+static inline double hapi_clamp(double x, double lo, double hi)
+{
+  double y = x > lo ? x : lo;
+  return y < hi ? y : hi;
+}
+
+/* N s, what the frictions before it leave of the ball's radius */
+static inline double hapi_row_left(const hapi_row *row, double radius)
+{
+  double left = radius * radius;
+  for (int i = 1; i <= row->round; ++i) {
+    left -= row[-i].impulse * row[-i].impulse;
+  }
+  return left > 0.0 ? sqrt(left) : 0.0;
+}
+
+static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, double *out_lo,
+                                   double *out_hi)
+{
+  *out_lo = row->lo;
+  *out_hi = row->hi;
+  if (row->normal >= 0) {
+    double p = rows[row->normal].impulse;
+    *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+    if (row->round > 0) {
+      *out_hi = hapi_row_left(row, *out_hi);
+    }
+    *out_lo = -*out_hi;
+  }
+}
+
+/* m/s, what is missing to w + softness impulse = target */
+static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *row)
+{
+  double rest = row->drive - row->softness * row->impulse;
+  double w = hapi_dot6(row->ja, solver->v[row->a]);
+  if (row->paired) {
+    w += hapi_dot6(row->jb, solver->v[row->b]);
+  }
+  return rest - w;
+}
+
+/* Another target between two runs. */
+static inline void hapi_row_retarget(hapi_row *row, double target)
+{
+  row->drive += target - row->target;
+  row->target = target;
+}
+
+static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double change)
+{
+  row->impulse += change;
+  hapi_madd6(solver->v[row->a], change, row->ba);
+  if (row->paired) {
+    hapi_madd6(solver->v[row->b], change, row->bb);
+  }
+}
+
+#endif

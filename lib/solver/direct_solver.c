@@ -1,0 +1,381 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Direct solves of islands: rounds of active sets (island.c), of the whole or, about hubs, part by part. */
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "solver/island.h"
+
+#define INNER_ROUNDS 2 /* active sets tried from one state */
+#define WORSE 30.0     /* how much the largest correction may grow in a round */
+#define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
+#define HUB_ROUNDS 6   /* steps of the hubs */
+#define LEAF_ROUNDS 6  /* active sets of a leaf, of one step */
+
+/* Lists of rows: of each island, and in it, one after another, of each part that hangs together
+ * without hubs. By the lowest body. */
+typedef struct lists {
+  uint32_t head[HAPI_SOLVER_BODIES]; /* of an island */
+  uint32_t tail[HAPI_SOLVER_BODIES];
+  uint32_t leaf_head[HAPI_SOLVER_BODIES]; /* of a leaf */
+  uint32_t leaf_tail[HAPI_SOLVER_BODIES];
+  uint16_t first_leaf[HAPI_SOLVER_BODIES]; /* of an island */
+  uint16_t last_leaf[HAPI_SOLVER_BODIES];
+  uint16_t next_leaf[HAPI_SOLVER_BODIES];
+} lists;
+
+/* ---- islands ---- */
+
+static void chain_rows(hapi_solver *solver, uint16_t *leaf, lists *out)
+{
+  for (uint32_t i = solver->row_count; i-- > 0;) {
+    hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0) {
+      uint16_t r = hapi_root(leaf, (uint16_t)(row->moves_a ? row->a : row->b));
+      row->next = out->leaf_head[r];
+      out->leaf_tail[r] = out->leaf_head[r] == HAPI_NO_SOLVER_ROW ? i : out->leaf_tail[r];
+      out->leaf_head[r] = i;
+    }
+  }
+}
+
+static void chain_leaves(hapi_solver *solver, uint16_t *whole, lists *out)
+{
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    if (out->leaf_head[i] == HAPI_NO_SOLVER_ROW) {
+      continue;
+    }
+    uint16_t r = hapi_root(whole, (uint16_t)i);
+    if (out->head[r] == HAPI_NO_SOLVER_ROW) {
+      out->head[r] = out->leaf_head[i];
+      out->first_leaf[r] = (uint16_t)i;
+    } else {
+      solver->rows[out->tail[r]].next = out->leaf_head[i];
+      out->next_leaf[out->last_leaf[r]] = (uint16_t)i;
+    }
+    out->tail[r] = out->leaf_tail[i];
+    out->last_leaf[r] = (uint16_t)i;
+    out->next_leaf[i] = HAPI_NO_BODY;
+  }
+}
+
+static void split(hapi_solver *solver, lists *out)
+{
+  uint16_t leaf[HAPI_SOLVER_BODIES];
+  uint16_t whole[HAPI_SOLVER_BODIES];
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    leaf[i] = whole[i] = (uint16_t)i;
+    out->head[i] = out->leaf_head[i] = HAPI_NO_SOLVER_ROW;
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0 && row->paired && row->moves_a) {
+      hapi_unite(whole, row->a, row->b);
+      if (!hapi_is_hub(solver, row->b)) {
+        hapi_unite(leaf, row->a, row->b);
+      }
+    }
+  }
+  chain_rows(solver, leaf, out);
+  chain_leaves(solver, whole, out);
+}
+
+/* ---- rounds of the whole ---- */
+
+/* Whether the state after a round is to be kept. The largest correction due, of one row at a bound, is a
+ * poor measure of the whole: it may grow for a while where sweeps and further rounds follow. Where
+ * there is no room for them, the last one, the round must leave less energy as well, or its impulses
+ * blow up in the ticks to come. */
+static bool is_better(const hapi_island *is, double due, double best, bool last)
+{
+  return last ? due < best && hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0
+              : due < WORSE * best;
+}
+
+/* The best of some rounds is kept, each with the active set that the one before leads to. */
+static bool improve(hapi_island *is, double before, bool last, double *out_due)
+{
+  double best = before;
+  bool better = false;
+  *out_due = before;
+  hapi_island_save(is);
+  for (int round = 0; round < INNER_ROUNDS; ++round) {
+    hapi_island_solve(is);
+    double due = hapi_island_inspect(is, false);
+    if (last && !(due < is->solver->tolerance)) {
+      hapi_island_settle(is);
+      due = hapi_island_inspect(is, false);
+    }
+    if (due < is->solver->tolerance) {
+      *out_due = due;
+      return true; /* nothing to save, nothing to restore */
+    }
+    if (better ? due < best : is_better(is, due, best, last)) {
+      *out_due = best = due;
+      hapi_island_save(is);
+      better = true;
+    }
+  }
+  hapi_island_restore(is);
+  return better;
+}
+
+/* ---- islands about hubs ---- */
+
+/* Of many bodies that one hub touches, rounds of the whole island would have to find all active sets
+ * at once, each corrected for what all others do in the same round: they go on for ever. But with the
+ * velocities of the hubs given, the parts of the island (leaves) do not know of each other, and each
+ * finds its own set. A round of the whole with these sets then says what the leaves give to the hubs
+ * and how it changes with their velocities: Newton's method for the hubs alone, whose forces are
+ * functions of their velocities made of straight pieces. */
+
+typedef struct hub_state {
+  double v[HUBS_MAX][6]; /* as the leaves are told */
+  uint32_t left;         /* row updates */
+  uint32_t step;         /* the same, of one step of the hubs */
+} hub_state;
+
+static void hold(const hapi_island *is, const hub_state *hubs)
+{
+  const hapi_solver *solver = is->solver;
+  uint32_t first = solver->body_count - solver->hub_count;
+  memcpy(solver->v[first], hubs->v, solver->hub_count * sizeof hubs->v[0]);
+}
+
+static bool touches_hub(const hapi_solver *solver, const hapi_row *row)
+{
+  return row->paired && hapi_is_hub(solver, row->b);
+}
+
+/* The velocities of the hubs that the impulses make, and the errors with them. */
+static void release(hapi_island *is)
+{
+  const hapi_solver *solver = is->solver;
+  const hapi_row *rows = solver->rows;
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    if (touches_hub(solver, &rows[i])) {
+      memcpy(solver->v[rows[i].b], solver->free[rows[i].b], sizeof solver->v[0]);
+    }
+  }
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    if (touches_hub(solver, &rows[i])) {
+      hapi_madd6(solver->v[rows[i].b], rows[i].impulse, rows[i].bb);
+    }
+  }
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    if (touches_hub(solver, &rows[i])) {
+      is->error[i] = hapi_row_error(solver, &rows[i]);
+    }
+  }
+}
+
+static uint32_t take(hub_state *hubs, uint32_t cost)
+{
+  uint32_t taken = cost <= hubs->left ? cost : 0;
+  hubs->left -= taken;
+  return taken;
+}
+
+/* A leaf that there is no time for stays as it is: the step of the hubs would send it anywhere. */
+static void leave_out(hapi_island *is)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    is->used_rows -= rows[i].state != HAPI_ROW_FIXED;
+    rows[i].state = HAPI_ROW_FIXED;
+  }
+}
+
+/* The active set of a leaf, with the hubs as they are told. */
+static void solve_leaf(hapi_island *is, hub_state *hubs)
+{
+  double best = hapi_island_inspect(is, false);
+  if (best < is->solver->tolerance || !hapi_island_gather(is) || is->count == 0) {
+    return;
+  }
+  uint32_t cost = hapi_island_plan(is);
+  if (!hapi_island_place(is)) {
+    return;
+  }
+  hapi_island_save(is);
+  for (int round = 0; round < LEAF_ROUNDS && take(hubs, cost) > 0; ++round) {
+    hapi_island_solve(is);
+    hold(is, hubs);
+    double due = hapi_island_inspect(is, false);
+    if (due < is->solver->tolerance) {
+      return;
+    }
+    if (due < best) {
+      best = due;
+      hapi_island_save(is);
+    }
+  }
+  hapi_island_restore(is);
+  (void)hapi_island_inspect(is, false);
+  if (hubs->left < cost) {
+    leave_out(is);
+  }
+}
+
+static void solve_leaves(hapi_island *is, const lists *all, uint16_t first_leaf, hub_state *hubs)
+{
+  hapi_row *rows = is->solver->rows;
+  uint32_t first = is->first;
+  is->held = true;
+  for (uint16_t leaf = first_leaf; leaf != HAPI_NO_BODY; leaf = all->next_leaf[leaf]) {
+    uint32_t tail = all->leaf_tail[leaf];
+    uint32_t after = rows[tail].next;
+    rows[tail].next = HAPI_NO_SOLVER_ROW;
+    is->first = all->leaf_head[leaf];
+    solve_leaf(is, hubs);
+    rows[tail].next = after;
+  }
+  is->first = first;
+  is->held = false;
+}
+
+/* One step of the hubs, from the sets of the leaves. */
+static void step_hubs(hapi_island *is, hub_state *hubs)
+{
+  const hapi_solver *solver = is->solver;
+  uint32_t first = solver->body_count - solver->hub_count;
+  release(is);
+  hapi_island_save(is);
+  hapi_island_solve(is);
+  for (uint32_t i = 0; i < is->count; ++i) {
+    if (hapi_is_hub(solver, is->body[i])) {
+      double *v = hubs->v[is->body[i] - first];
+      memcpy(v, is->saved_v[i], sizeof is->saved_v[i]);
+      hapi_madd6(v, 1.0, is->dv[i]);
+    }
+  }
+}
+
+/* The state to go back to. */
+static void keep(hapi_island *is)
+{
+  const hapi_solver *solver = is->solver;
+  memcpy(is->kept_v, solver->v, solver->body_count * sizeof *solver->v);
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
+    is->kept_impulse[i] = solver->rows[i].impulse;
+    is->kept_error[i] = is->error[i];
+  }
+}
+
+static void go_back(hapi_island *is)
+{
+  const hapi_solver *solver = is->solver;
+  memcpy(solver->v, is->kept_v, solver->body_count * sizeof *solver->v);
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
+    solver->rows[i].impulse = is->kept_impulse[i];
+  }
+}
+
+/* As improve, where there is more than one leaf. */
+static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf, hub_state *hubs,
+                         double *io_due)
+{
+  const hapi_solver *solver = is->solver;
+  uint32_t first = solver->body_count - solver->hub_count;
+  bool better = false;
+  memcpy(hubs->v, solver->v[first], solver->hub_count * sizeof hubs->v[0]);
+  keep(is);
+  for (int round = 0; round < HUB_ROUNDS && take(hubs, hubs->step) > 0; ++round) {
+    solve_leaves(is, all, first_leaf, hubs);
+    if (!hapi_island_gather(is) || hapi_island_plan(is) == 0 || !hapi_island_place(is)) {
+      break;
+    }
+    step_hubs(is, hubs);
+    double due = hapi_island_inspect(is, false);
+    if (due < solver->tolerance) {
+      *io_due = due;
+      return true;
+    }
+    if (due < *io_due && hapi_island_rise(is, is->kept_impulse, is->kept_error) < 0.0) {
+      *io_due = due;
+      better = true;
+      keep(is);
+    }
+    hold(is, hubs);
+  }
+  go_back(is);
+  return better;
+}
+
+/* ---- all islands ---- */
+
+/* One island; the cost in row updates. */
+static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, uint32_t budget)
+{
+  hapi_solver *solver = is->solver;
+  /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
+   * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
+   * right, and again where neither leads to the end. */
+  bool sticking = solver->sweeps % 3 == 0;
+  double due = hapi_island_inspect(is, sticking);
+  uint32_t spent = 0;
+  if (due < solver->tolerance) {
+    solver->direct_residual = fmax(solver->direct_residual, due);
+    return 0;
+  }
+  if (!isfinite(due)) { /* nothing can begin from it */
+    solver->direct_residual = HUGE_VAL;
+    return 0;
+  }
+  if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {
+    solver->too_dear = solver->too_dear || is->free_rows > 0;
+    solver->direct_residual = HUGE_VAL;
+    return 0;
+  }
+  uint16_t leaf = all->first_leaf[index];
+  uint32_t step = hapi_island_plan(is);
+  uint32_t cost = INNER_ROUNDS * step;
+  hub_state hubs = {.left = budget, .step = step};
+  bool has_leaves = leaf != all->last_leaf[index] && solver->hub_count <= HUBS_MAX;
+  if (!hapi_island_place(is) || (has_leaves ? step : cost) > budget) {
+    solver->too_dear = true;
+  } else if (has_leaves) {
+    solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
+    spent = budget - hubs.left;
+  } else {
+    bool last = 2 * (uint64_t)(budget - cost) <= solver->update_budget;
+    solver->direct_solves += improve(is, due, last, &due);
+    spent = cost;
+  }
+  solver->direct_residual = fmax(solver->direct_residual, due);
+  return spent;
+}
+
+uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
+{
+  hapi_island is;
+  lists all;
+  uint32_t spent = 0;
+  solver->too_dear = false;
+  solver->direct_residual = HUGE_VAL;
+  if (solver->body_count > HAPI_SOLVER_BODIES ||
+      solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {
+    return 0;
+  }
+  split(solver, &all);
+  solver->direct_residual = 0.0;
+  is.solver = solver;
+  is.held = false;
+  is.gain = solver->work;
+  is.error = is.gain + solver->row_count;
+  is.saved_error = is.error + solver->row_count;
+  is.saved_impulse = is.saved_error + solver->row_count;
+  is.kept_error = is.saved_impulse + solver->row_count;
+  is.kept_impulse = is.kept_error + solver->row_count;
+  is.kept_v = (double(*)[6])(is.kept_impulse + solver->row_count);
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    is.first = all.head[i];
+    if (is.first != HAPI_NO_SOLVER_ROW) {
+      spent += solve_island(&is, &all, i, budget - spent);
+    }
+  }
+  return spent;
+}

@@ -1,0 +1,151 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* What an island that was not solved may do: no more than nothing at all. Along the ray from no impulses
+ * to those at hand,
+ *
+ *   J(s) = s^2 b / 2 - s a,   a = p (target - w free),   b = p (j A j^T + softness) p
+ *
+ * is the energy that the impulses add beyond what the targets ask for, and what the rows minimise when
+ * no friction slides. Where J(1) > 0, a share a / b of them leaves least. b < 0, or no number, is no
+ * energy of any body: then no impulse is right. */
+
+#include <math.h>
+#include <string.h>
+
+#include "base/vec.h"
+#include "solver/island.h"
+
+#define UNSOLVED \
+  3e-3 /* m/s: what is left undone and may add energy; below, asking costs too much */
+#define ROUNDING 1e-9 /* of the sum of all terms' sizes */
+
+typedef struct ray {
+  double a; /* J */
+  double b;
+  double size;  /* of the terms of both, which may cancel */
+  double share; /* to be kept */
+} ray;
+
+typedef struct rays {
+  uint16_t root[HAPI_SOLVER_BODIES]; /* body -> lowest body of its island */
+  ray of[HAPI_SOLVER_BODIES];
+} rays;
+
+/* The island of a row; all are one where there are too many bodies to tell. */
+static uint32_t island_of(const hapi_solver *solver, const rays *r, const hapi_row *row)
+{
+  bool told = solver->body_count <= HAPI_SOLVER_BODIES;
+  return told ? r->root[row->moves_a ? row->a : row->b] : 0;
+}
+
+static uint32_t island_of_body(const hapi_solver *solver, const rays *r, uint32_t body)
+{
+  return solver->body_count <= HAPI_SOLVER_BODIES ? r->root[body] : 0;
+}
+
+static void find_islands(const hapi_solver *solver, rays *out)
+{
+  if (solver->body_count > HAPI_SOLVER_BODIES) {
+    return;
+  }
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    out->root[i] = (uint16_t)i;
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0 && row->paired && row->moves_a) {
+      hapi_unite(out->root, row->a, row->b);
+    }
+  }
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    out->root[i] = hapi_root(out->root, (uint16_t)i);
+  }
+}
+
+/* The velocities that the impulses make: what was kept along is off by the rounding of the largest
+ * impulse that there ever was. */
+static void rebuild(hapi_solver *solver)
+{
+  memcpy(solver->v, solver->free, solver->body_count * sizeof *solver->v);
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0 && row->impulse != 0.0) {
+      double impulse = row->impulse;
+      row->impulse = 0.0;
+      hapi_row_push(solver, row, impulse);
+    }
+  }
+}
+
+static bool is_calm(const ray *r)
+{
+  double slack = ROUNDING * r->size;
+  return isfinite(r->size) && 0.5 * r->b <= r->a + slack && r->b >= -slack;
+}
+
+/* The shares of all islands; whether one is below 1. */
+static bool measure(hapi_solver *solver, rays *r)
+{
+  uint32_t count = solver->body_count <= HAPI_SOLVER_BODIES ? solver->body_count : 1;
+  bool all_calm = true;
+  rebuild(solver);
+  memset(r->of, 0, count * sizeof r->of[0]);
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->inverse != 0.0 && row->impulse != 0.0) {
+      ray *of = &r->of[island_of(solver, r, row)];
+      double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
+      without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
+      double a = row->impulse * without;
+      double b = a - row->impulse * hapi_row_error(solver, row);
+      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign): cleared above, for every island */
+      of->a += a;
+      of->b += b;
+      of->size += fabs(a) + fabs(b);
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    ray *of = &r->of[i];
+    bool calm = is_calm(of);
+    bool shorter = isfinite(of->size) && of->a > 0.0 && of->b > 0.0;
+    of->share = calm ? 1.0 : shorter ? of->a / of->b : 0.0;
+    all_calm = all_calm && calm;
+  }
+  return !all_calm;
+}
+
+/* Bounds hold for any share: a friction's goes with its normal's. */
+static void shorten(hapi_solver *solver, const rays *r)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    double share = row->inverse != 0.0 ? r->of[island_of(solver, r, row)].share : 0.0;
+    row->impulse = share > 0.0 ? share * row->impulse : 0.0;
+  }
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    double share = r->of[island_of_body(solver, r, i)].share;
+    for (int k = 0; k < 6; ++k) {
+      double change = share > 0.0 ? share * (solver->v[i][k] - solver->free[i][k]) : 0.0;
+      solver->v[i][k] = solver->free[i][k] + change; /* share 0: whatever v is */
+    }
+  }
+}
+
+/* Sweeps lower J where nothing slides. Where they do not, in what is left of the tick nothing is found. */
+void hapi_solver_calm(hapi_solver *solver)
+{
+  rays r;
+  if (solver->row_count == 0 || solver->residual < UNSOLVED) {
+    return;
+  }
+  find_islands(solver, &r);
+  if (!measure(solver, &r)) {
+    return;
+  }
+  shorten(solver, &r);
+  hapi_solver_sweep_on(solver);
+  if (measure(solver, &r)) {
+    shorten(solver, &r);
+  }
+}

@@ -1,0 +1,234 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <string.h>
+
+#include "base/vec.h"
+#include "local/pointer_friction.h"
+#include "tick/tick.h"
+
+static void report_bodies(const hapi_tick *tick, hapi_state *out)
+{
+  hapi_state_body *bodies = hapi_state_bodies(out);
+  for (uint32_t i = 0; i < tick->bodies.high; ++i) {
+    const hapi_local_body *in = &tick->bodies.of[i];
+    bodies[i].generation = in->generation;
+    bodies[i].flags = in->flags;
+    bodies[i].epoch = in->epoch;
+    bodies[i].pose = in->pose;
+    bodies[i].twist = in->twist;
+    hapi_v3_copy(in->account.impulse, bodies[i].impulse);
+    hapi_v3_copy(in->account.angular_impulse, bodies[i].angular_impulse);
+    memcpy(bodies[i].residual, in->account.residual_taken, sizeof bodies[i].residual);
+    memcpy(bodies[i].gain, in->account.gain, sizeof bodies[i].gain);
+    bodies[i].owned_until_ns = in->owned_until_ns;
+    if (in->owned_until_ns != 0) {
+      bodies[i].owned_pose = in->left.pose;
+      bodies[i].owned_twist = in->left.twist;
+    }
+  }
+  out->body_high = tick->bodies.high;
+}
+
+static void report_contacts(const hapi_tick *tick, hapi_state *out)
+{
+  hapi_state_contact *contacts = hapi_state_contacts(out);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < tick->touches.count; ++i) {
+    const hapi_local_contact *in = &tick->touches.of[i];
+    if (in->slot != HAPI_SLOT_NONE) { /* else physics does not know it */
+      contacts[count].slot = in->slot;
+      contacts[count].generation = in->generation;
+      hapi_v3_copy(in->force, contacts[count++].force);
+    }
+  }
+  out->contact_count = count;
+}
+
+static void report_springs(const hapi_tick *tick, hapi_state *out)
+{
+  out->spring_count = 0;
+  for (uint32_t i = 0; i < tick->touches.count && out->spring_count < out->spring_capacity; ++i) {
+    const hapi_local_contact *c = &tick->touches.of[i];
+    const hapi_friction *f = c->rubs ? hapi_friction_of(tick, c) : NULL;
+    if (f == NULL || f->tick + 1 != tick->facts.tick || f->rigid || !(f->stiffness > 0.0)) {
+      continue;
+    }
+    hapi_state_spring *to = &hapi_state_springs(out)[out->spring_count++];
+    to->slot = c->tool != 0 ? HAPI_SLOT_NONE : c->slot;
+    to->generation = c->generation;
+    if (c->tool != 0) {
+      const hapi_patch_contact *at = &tick->touches.tool.tools[c->tool - 1].in.at;
+      to->key = at->key;
+      hapi_v3_copy(at->core_a, to->place);
+    }
+    hapi_v3_scale(f->left, f->now.stretch_body, to->stretch_body);
+    to->turn = f->left * f->now.turn;
+  }
+}
+
+/* The places of those that have not come yet were cleared at start. */
+static void report_pointers(const hapi_tick *tick, hapi_state *out)
+{
+  hapi_state_pointer *pointers = hapi_state_pointers(out);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *in = &tick->pointers.of[i];
+    pointers[i].generation = in->generation;
+    if (in->generation == 0) {
+      continue;
+    }
+    pointers[i].collide_bits = in->shape.collide_bits;
+    pointers[i].radius = in->shape.radius;
+    pointers[i].stiffness = in->surface.stiffness;
+    pointers[i].friction = in->surface.friction;
+    pointers[i].finger_radius = in->surface.finger_radius;
+    pointers[i].pose = in->pose;
+    pointers[i].twist = in->twist;
+    pointers[i].is_tool = in->shape.hull != NULL;
+    pointers[i].extent = in->shape.extent;
+    if (in->shape.hull != NULL) {
+      hapi_state_hulls(out)[i] = *in->shape.hull;
+    }
+  }
+}
+
+void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
+{
+  hapi_v3_copy(tick->figures.hand_impulse, out->hand_impulse);
+  hapi_v3_copy(tick->figures.owned_impulse, out->owned_impulse);
+  out->now_ns = tick->facts.now_ns;
+  out->model_number = tick->facts.model_number;
+  out->model = tick->facts.model;
+  report_bodies(tick, out);
+  report_contacts(tick, out);
+  report_springs(tick, out);
+  report_pointers(tick, out);
+}
+
+/* The loop gave the body something that the world has not had yet. */
+static bool has_news(const hapi_local_body *body)
+{
+  return memcmp(body->account.impulse, body->given.impulse_taken, sizeof body->account.impulse) !=
+             0 ||
+         memcmp(body->account.angular_impulse, body->given.impulse_taken + 3,
+                sizeof body->account.angular_impulse) != 0;
+}
+
+/* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body that
+ * it does not own and gave nothing takes the world's state then. */
+static bool leads(const hapi_tick *tick, const hapi_local_body *body)
+{
+  if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 ||
+      tick->facts.model == HAP_MODEL_IMPULSE) {
+    return false;
+  }
+  return tick->facts.model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
+         has_news(body);
+}
+
+static void store_position(_Atomic double *to, const double from[3])
+{
+  atomic_store_explicit(&to[0], from[0], memory_order_release);
+  atomic_store_explicit(&to[1], from[1], memory_order_release);
+  atomic_store_explicit(&to[2], from[2], memory_order_release);
+}
+
+static void store_quat(_Atomic double *to, const double from[4])
+{
+  store_position(to, from);
+  atomic_store_explicit(&to[3], from[3], memory_order_release);
+}
+
+static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
+{
+  for (uint32_t i = 0; i < tick->bodies.high; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[i];
+    uint32_t generation = leads(tick, body) ? body->generation : 0;
+    if (generation != 0) {
+      store_position(places[i].pose, body->pose.position);
+      store_quat(places[i].pose + 3, body->pose.quat_wxyz);
+    }
+    atomic_store_explicit(&places[i].generation, generation, memory_order_release);
+  }
+}
+
+static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      store_position(places[i].proxy, p->pose.position);
+      store_position(places[i].device, p->handle.position);
+      store_quat(places[i].proxy_quat, p->pose.quat_wxyz);
+      store_quat(places[i].device_quat, p->handle.quat);
+    }
+    atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
+    atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
+  }
+}
+
+void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
+{
+  if (trail->rows == 0 || trail->wait > 0) {
+    trail->wait -= trail->wait > 0;
+    return;
+  }
+  trail->wait = trail->stride - 1;
+  uint64_t row = atomic_load_explicit(&trail->written, memory_order_relaxed);
+  hapi_trail_row *head = &trail->heads[row % trail->rows];
+  /* A step goes from the tick's time to the next one's; model SINGLE shows the world as it is. */
+  int64_t step_ns =
+      tick->facts.model == HAP_MODEL_SINGLE ? 0 : (int64_t)(1e9 * tick->facts.period + 0.5);
+  atomic_store_explicit(&head->time_ns, tick->facts.now_ns, memory_order_release);
+  atomic_store_explicit(&head->bodies_ns, tick->facts.now_ns + step_ns, memory_order_release);
+  atomic_store_explicit(&head->body_high, tick->bodies.high, memory_order_release);
+  trail_bodies(tick, hapi_trail_bodies(trail, row));
+  trail_pointers(tick, hapi_trail_pointers(trail, row));
+  atomic_store_explicit(&trail->written, row + 1, memory_order_release);
+}
+
+void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
+{
+  hapi_path_pointer *out = hapi_path_next(path);
+  if (out == NULL) {
+    return;
+  }
+  for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    out[i] = (hapi_path_pointer){.generation = p->generation,
+                                 .is_tool = p->shape.hull != NULL,
+                                 .turns = p->device.turns,
+                                 .three_dof = p->device.three_dof,
+                                 .rigid = p->rigid,
+                                 .radius = p->shape.radius,
+                                 .stiffness = p->surface.stiffness,
+                                 .damping = p->surface.damping,
+                                 .finger_radius = p->surface.finger_radius,
+                                 .pose = p->pose,
+                                 .twist = p->twist,
+                                 .wrench = p->wrench};
+  }
+  hapi_path_send(path, tick->facts.now_ns);
+}
+
+void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
+{
+  hapi_poses_body *bodies = hapi_poses_bodies(out);
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *in = &tick->bodies.of[tick->bodies.live[i]];
+    bodies[i].slot = tick->bodies.live[i];
+    bodies[i].generation = in->generation;
+    bodies[i].pose = in->pose;
+    bodies[i].twist = in->twist;
+  }
+  out->body_count = tick->bodies.live_count;
+  out->model_number = tick->facts.model_number;
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *in = &tick->pointers.of[i];
+    hapi_poses_pointer *to = &hapi_poses_pointers(out)[i];
+    to->generation = in->shape.hull != NULL ? in->generation : 0;
+    if (to->generation != 0) {
+      to->pose = in->pose;
+      to->twist = in->twist;
+    }
+  }
+}
