@@ -213,6 +213,28 @@ static inline hapi_body_slot *world_slot(const test_world *w, dBodyID body)
   return slot != HAPI_NONE ? &physics->near.slots.bodies[slot] : NULL;
 }
 
+/* What testing simulations found out. */
+static inline hapi_body_answer *world_answer(const test_world *w, const hapi_body_slot *slot)
+{
+  hapi_physics *physics = world_physics(w);
+  return &physics->probe.answers.bodies[slot - physics->near.slots.bodies];
+}
+
+static inline hapi_contact_answer *world_contact_answer(const test_world *w,
+                                                        const hapi_contact_slot *contact)
+{
+  hapi_physics *physics = world_physics(w);
+  return &physics->probe.answers.contacts[contact - physics->near.slots.contacts];
+}
+
+/* The testing simulations of the contacts once more. */
+static inline void world_measure(const test_world *w)
+{
+  hapi_physics *physics = world_physics(w);
+  hapi_accelerance_measure(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
+                           hapi_cross_watch(&physics->research.cross));
+}
+
 /* Everything about a body that a getter of ODE gives and a step can change. */
 typedef struct body_bits {
   dReal position[3];

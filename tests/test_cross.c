@@ -21,17 +21,17 @@
 
 static void measure(const test_world *w)
 {
-  hapi_accelerance_measure(world_physics(w));
+  world_measure(w);
 }
 
 /* The block of a pointer's contact with one body and of another body; NULL: none. */
-static const hapi_cross *block(const test_world *w, dBodyID pushed, dBodyID other)
+static const hapi_cross_block *block(const test_world *w, dBodyID pushed, dBodyID other)
 {
   const hapi_physics *physics = world_physics(w);
   const hapi_contact_slot *contact = world_contact(w, pushed, 0);
   const hapi_body_slot *body = world_slot(w, other);
-  for (uint32_t i = 0; i < physics->research.cross_count; ++i) {
-    const hapi_cross *cross = &physics->research.crosses[i];
+  for (uint32_t i = 0; i < physics->research.cross.block_count; ++i) {
+    const hapi_cross_block *cross = &physics->research.cross.blocks[i];
     if (&physics->near.slots.contacts[cross->contact] == contact &&
         &physics->near.slots.bodies[cross->body] == body) {
       return cross;
@@ -40,7 +40,7 @@ static const hapi_cross *block(const test_world *w, dBodyID pushed, dBodyID othe
   return NULL;
 }
 
-static void check_block(const hapi_cross *cross, double expected[6][3])
+static void check_block(const hapi_cross_block *cross, double expected[6][3])
 {
   double most = 0.0;
   for (int i = 0; i < 6; ++i) {
@@ -120,14 +120,15 @@ TEST(a_fixed_pair_answers_as_one_body)
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
   measure(&w);
-  const hapi_cross *cross = block(&w, w.bodies[0], w.bodies[1]);
+  const hapi_cross_block *cross = block(&w, w.bodies[0], w.bodies[1]);
   const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_rigid(mass, contact->point_world, expected);
   check_block(cross, expected);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_physics(&w)->research.cross_count == 2);
-  CHECK(world_physics(&w)->counts.own.stats.probes.clipped == 0);
+  CHECK(world_physics(&w)->research.cross.block_count == 2);
+  CHECK(world_physics(&w)->probe.counts.clipped == 0 &&
+        world_physics(&w)->research.cross.counts.clipped == 0);
   world_close(&w);
 }
 
@@ -164,7 +165,7 @@ TEST(a_hinged_pair_has_its_closed_form)
   join_hinge(&w);
   REQUIRE(start_above(&w, -0.02));
   measure(&w);
-  const hapi_cross *cross = block(&w, w.bodies[0], w.bodies[1]);
+  const hapi_cross_block *cross = block(&w, w.bodies[0], w.bodies[1]);
   const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_hinged(0.4, contact->point_world, expected);
@@ -182,12 +183,12 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
       join_fixed(&w);
     }
     REQUIRE(start_above(&w, -0.02));
-    const hap_stats *stats = &world_physics(&w)->counts.own.stats;
-    uint64_t before = stats->probes.steps;
+    const uint64_t *made = &world_physics(&w)->probe.test.steps;
+    uint64_t before = *made;
     measure(&w);
-    probes[joined] = stats->probes.steps - before;
+    probes[joined] = *made - before;
     CHECK(world_count_contacts(&w) == 2);
-    CHECK(world_physics(&w)->research.cross_count == (joined != 0 ? 2u : 0u));
+    CHECK(world_physics(&w)->research.cross.block_count == (joined != 0 ? 2u : 0u));
     world_close(&w);
   }
   CHECK(probes[0] == 1 + 3 && probes[1] == 1 + 6);
@@ -197,7 +198,7 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
 TEST(with_too_few_places_the_largest_stay)
 {
   test_world w;
-  hapi_cross all[6];
+  hapi_cross_block all[6];
   world_open(&w, 0.0, 200);
   w.def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
   for (int i = 0; i < 3; ++i) {
@@ -212,13 +213,13 @@ TEST(with_too_few_places_the_largest_stay)
   hapi_physics *physics = world_physics(&w);
   CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w.def.max_bodies);
   measure(&w);
-  REQUIRE(physics->research.cross_count == 6);
-  CHECK(physics->counts.own.stats.model.capacity_dropped == 0);
-  memcpy(all, physics->research.crosses, sizeof all);
+  REQUIRE(physics->research.cross.block_count == 6);
+  CHECK(physics->research.cross.counts.dropped == 0);
+  memcpy(all, physics->research.cross.blocks, sizeof all);
   physics->config.capacity.crosses = 4;
   measure(&w);
-  REQUIRE(physics->research.cross_count == 4);
-  CHECK(physics->counts.own.stats.model.capacity_dropped == 2);
+  REQUIRE(physics->research.cross.block_count == 4);
+  CHECK(physics->research.cross.counts.dropped == 2);
   for (int i = 0; i < 6; ++i) {
     int larger = 0;
     bool kept = false;
@@ -226,7 +227,7 @@ TEST(with_too_few_places_the_largest_stay)
       larger += all[k].response > all[i].response;
     }
     for (uint32_t k = 0; k < 4; ++k) {
-      kept = kept || memcmp(physics->research.crosses[k].a, all[i].a, sizeof all[i].a) == 0;
+      kept = kept || memcmp(physics->research.cross.blocks[k].a, all[i].a, sizeof all[i].a) == 0;
     }
     CHECK(kept == (larger < 4));
   }
@@ -240,14 +241,16 @@ TEST(a_block_that_is_no_number_is_left_out)
   open_pair(&w, HAP_EFFECT_ON, 0.5, 0.2);
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
-  const hap_stats *stats = &world_physics(&w)->counts.own.stats;
+  const hapi_probe_counts *counts = &world_physics(&w)->probe.counts;
+  const hapi_cross_counts *blocks = &world_physics(&w)->research.cross.counts;
   world_slot(&w, w.bodies[0])->mass = 0.0;
   measure(&w);
-  CHECK(stats->probes.singular == 2 &&
-        stats->probes.clipped == 0); /* A of the contact, and its block */
+  CHECK(counts->singular == 1 && counts->clipped == 0); /* A of the contact ... */
+  CHECK(blocks->singular == 1 && blocks->clipped == 0); /* ... and its block */
   CHECK(block(&w, w.bodies[0], w.bodies[1]) == NULL);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_contact(&w, w.bodies[0], 0)->a[0][0] > 0.1); /* the last good one */
+  CHECK(world_contact_answer(&w, world_contact(&w, w.bodies[0], 0))->a[0][0] >
+        0.1); /* the last good one */
   world_close(&w);
 }
 
@@ -429,7 +432,8 @@ static void measure_with(on_floor *f, double x, double z, double speed)
 /* b + A f: what the loop comes to with the force of the operating point. */
 static double with_force(const on_floor *f, int row)
 {
-  return f->slot->b[row] + hapi_v3_dot(f->contact->a[row], f->contact->last_force);
+  return world_answer(&f->w, f->slot)->b[row] +
+         hapi_v3_dot(world_contact_answer(&f->w, f->contact)->a[row], f->contact->last_force);
 }
 
 TEST(a_cube_that_friction_holds_gives_no_way)
@@ -447,13 +451,13 @@ TEST(a_cube_that_friction_holds_gives_no_way)
     on_floor f;
     REQUIRE(open_floor(&f, HAP_PROBE_OPERATING, 1.0));
     measure_with(&f, cases[i].x, cases[i].z, cases[i].speed);
-    CHECK_NEAR(f.contact->a[0][0], 0.0, 1e-6);
+    CHECK_NEAR(world_contact_answer(&f.w, f.contact)->a[0][0], 0.0, 1e-6);
     CHECK_NEAR(with_force(&f, 0), 0.0, 1e-6);
     world_close(&f.w);
     REQUIRE(open_floor(&f, HAP_PROBE_SHARED, 1.0));
     measure_with(&f, cases[i].x, cases[i].z, cases[i].speed);
     if (i > 0) {
-      CHECK(f.contact->a[0][0] > 0.5);
+      CHECK(world_contact_answer(&f.w, f.contact)->a[0][0] > 0.5);
     }
     world_close(&f.w);
   }
@@ -466,8 +470,8 @@ TEST(a_cube_that_slides_answers_with_its_mass)
     double force = side * 2.0 * LIMIT;
     REQUIRE(open_floor(&f, HAP_PROBE_OPERATING, side));
     measure_with(&f, force, 0.0, 0.0);
-    CHECK_NEAR(f.contact->a[0][0], 1.0 / MASS, 1e-3 / MASS);
-    CHECK_NEAR(f.slot->b[0], -side * MU * GRAVITY, 5e-3 * GRAVITY);
+    CHECK_NEAR(world_contact_answer(&f.w, f.contact)->a[0][0], 1.0 / MASS, 1e-3 / MASS);
+    CHECK_NEAR(world_answer(&f.w, f.slot)->b[0], -side * MU * GRAVITY, 5e-3 * GRAVITY);
     CHECK_NEAR(with_force(&f, 0), force / MASS - side * MU * GRAVITY, 1e-3 * GRAVITY);
     CHECK_NEAR(f.contact->last_force[0], force, 0.0);
     world_close(&f.w);
@@ -487,15 +491,17 @@ TEST(b_and_the_forces_make_the_base_again)
   REQUIRE(contact != NULL && block(&w, w.bodies[0], w.bodies[1]) != NULL);
   hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);
   measure(&w);
-  base[0] = world_slot(&w, w.bodies[0])->b[0] + 3.0 * contact->a[0][0];
-  base[1] = world_slot(&w, w.bodies[1])->b[0] + 3.0 * block(&w, w.bodies[0], w.bodies[1])->a[0][0];
+  base[0] = world_answer(&w, world_slot(&w, w.bodies[0]))->b[0] +
+            3.0 * world_contact_answer(&w, contact)->a[0][0];
+  base[1] = world_answer(&w, world_slot(&w, w.bodies[1]))->b[0] +
+            3.0 * block(&w, w.bodies[0], w.bodies[1])->a[0][0];
   CHECK_NEAR(base[0], wanted, 1e-6);
   CHECK_NEAR(base[1], wanted, 1e-6);
-  CHECK_NEAR(world_slot(&w, w.bodies[1])->b[0], 0.0, 1e-6);
+  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[1]))->b[0], 0.0, 1e-6);
   physics->config.capacity.crosses = 0; /* off: the force of the last tick is held in b */
   measure(&w);
-  CHECK_NEAR(world_slot(&w, w.bodies[0])->b[0], 0.0, 1e-6);
-  CHECK_NEAR(world_slot(&w, w.bodies[1])->b[0], wanted, 1e-6);
+  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[0]))->b[0], 0.0, 1e-6);
+  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[1]))->b[0], wanted, 1e-6);
   world_close(&w);
 }
 
@@ -521,7 +527,7 @@ TEST(what_does_not_answer_has_no_block)
     f.contact = world_contact(w, w->bodies[0], 0);
     REQUIRE(f.contact != NULL && world_slot(w, w->bodies[1]) != NULL);
     measure_with(&f, force, 0.0, 0.0);
-    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->research.cross_count);
+    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->research.cross.block_count);
     CHECK((block(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
     world_close(w);
   }
@@ -541,7 +547,7 @@ TEST(perturbations_go_into_the_body)
     REQUIRE(world_start(&w, RADIUS, side * (-RADIUS - GAP), 0, 0));
     const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
     REQUIRE(contact != NULL);
-    CHECK_NEAR(contact->a[0][0], 1.0, 1e-6);
+    CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 1.0, 1e-6);
     world_close(&w);
   }
 }
@@ -555,10 +561,10 @@ TEST(operating_probes_are_as_many_as_shared_ones)
     w.def.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
     join_fixed(&w);
     REQUIRE(start_above(&w, -0.02));
-    const hap_stats *stats = &world_physics(&w)->counts.own.stats;
-    uint64_t before = stats->probes.steps;
+    const uint64_t *made = &world_physics(&w)->probe.test.steps;
+    uint64_t before = *made;
     measure(&w);
-    steps[k] = stats->probes.steps - before;
+    steps[k] = *made - before;
     world_close(&w);
   }
   CHECK(steps[0] == 7 && steps[1] == 7);

@@ -126,7 +126,7 @@ static void check_shape(shape kind, bool turned)
   check_contact(&w, body, &e);
   CHECK(world_count_contacts(&w) == 1);
   const hapi_contact_slot *contact = world_contact(&w, body, 0);
-  CHECK(contact != NULL && contact->probed);
+  CHECK(contact != NULL && world_contact_answer(&w, contact)->probed);
   world_close(&w);
   dGeomTriMeshDataDestroy(mesh);
 }
@@ -173,9 +173,9 @@ TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
     const hapi_contact_slot *contact = world_contact(&w, body, 0);
     REQUIRE(contact != NULL);
     for (int i = 0; i < 3; ++i) {
-      CHECK_NEAR(contact->a[i][i], 1 / 0.3, 1e-9);
+      CHECK_NEAR(world_contact_answer(&w, contact)->a[i][i], 1 / 0.3, 1e-9);
     }
-    CHECK_NEAR(contact->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
+    CHECK_NEAR(world_contact_answer(&w, contact)->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
     world_close(&w);
     dGeomTriMeshDataDestroy(mesh);
   }
@@ -232,7 +232,7 @@ TEST(a_body_is_touched_at_two_geoms)
   double sum = 0.0;
   for (uint32_t i = 0; i < 2; ++i) {
     CHECK(physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE &&
-          physics->near.slots.contacts[i].probed);
+          physics->probe.answers.contacts[i].probed);
     sum += physics->near.slots.contacts[i].distance;
   }
   CHECK_NEAR(sum, 0.002 + 0.01, 1e-9);

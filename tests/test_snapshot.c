@@ -266,9 +266,9 @@ static void unsettle(test_world *w)
 
 static bool under_test(const test_world *w, dBodyID body)
 {
-  const hapi_body_table *table = &world_physics(w)->world.bodies;
-  uint32_t known = hapi_bodies_find(table, body);
-  return known != HAPI_NONE && table->entries[known].island != HAPI_NONE;
+  const hapi_physics *physics = world_physics(w);
+  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
+  return known != HAPI_NONE && hapi_test_has(&physics->probe.test, known);
 }
 
 static void leave_forces(test_world *w)
@@ -295,9 +295,9 @@ TEST(probes_leave_every_bit)
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &before[i]);
   }
-  uint64_t probes = world_physics(&w)->counts.own.stats.probes.steps;
-  hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->counts.own.stats.probes.steps >= probes + 4);
+  uint64_t probes = world_physics(&w)->probe.test.steps;
+  world_measure(&w);
+  CHECK(world_physics(&w)->probe.test.steps >= probes + 4);
   CHECK(dRandGetSeed() == 123456789);
   for (int i = 0; i < w.body_count; ++i) {
     body_read(w.bodies[i], &after[i]);
@@ -326,7 +326,7 @@ TEST(probes_leave_joint_feedback)
   memcpy(before, feedback, sizeof before);
   dBodyAddForce(w.bodies[0], 3.0, 2.0, 1.0); /* the probes' feedback would be another */
   dBodyAddForce(w.bodies[9], 3.0, 2.0, 1.0);
-  hapi_accelerance_measure(world_physics(&w));
+  world_measure(&w);
   CHECK(memcmp(before, feedback, sizeof before) == 0);
   CHECK(dJointGetFeedback(paddle) == &feedback[0] && dJointGetFeedback(pair) == &feedback[1]);
   CHECK(under_test(&w, w.bodies[0]) && under_test(&w, w.bodies[9]));
@@ -351,9 +351,9 @@ TEST(callbacks_are_silent_in_probes)
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(moved_calls == w.body_count); /* once for each body that the step moved */
   int surfaces = w.surface_calls;
-  uint64_t probes = world_physics(&w)->counts.own.stats.probes.steps;
-  hapi_accelerance_measure(world_physics(&w));
-  CHECK(world_physics(&w)->counts.own.stats.probes.steps >= probes + 4);
+  uint64_t probes = world_physics(&w)->probe.test.steps;
+  world_measure(&w);
+  CHECK(world_physics(&w)->probe.test.steps >= probes + 4);
   CHECK(moved_calls == w.body_count);
   CHECK(before_calls == 1 && after_calls == 1);
   CHECK(w.surface_calls == surfaces);

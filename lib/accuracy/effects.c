@@ -69,7 +69,7 @@ static void note_testing(hapi_physics *physics, const hapi_model_body *body)
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
   if (roles(body) != HAPI_BODY_DRIVEN) {
     hapi_effect_note(figures(physics, HAP_EFFECT_TESTING),
-                     measured || (owned && hapi_range_error_wanted(physics)),
+                     measured || (owned && hapi_range_error_wanted(&physics->cycle)),
                      owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
   }
 }
@@ -210,7 +210,7 @@ static void note_model_accelerance(hapi_physics *physics, hapi_model *model)
   const hapi_model_body *bodies = hapi_model_bodies(model);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     if ((bodies[i].flags & HAPI_BODY_DRIVEN) == 0) {
-      hapi_effect_note(testing, !physics->near.slots.bodies[bodies[i].slot].known_free,
+      hapi_effect_note(testing, !physics->probe.answers.bodies[bodies[i].slot].known_free,
                        HAP_REASON_FREE);
     }
   }

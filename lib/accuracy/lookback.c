@@ -48,6 +48,7 @@ void hapi_lookback_finish(hapi_lookback *w)
   hapi_free(w->ended);
   hapi_free(w->ends);
   hapi_lookback_hand_finish(&w->hand);
+  hapi_test_finish(&w->test);
   hapi_free(w->times_ns);
   hapi_free(w->path);
   hapi_index_finish(&w->pair_of);

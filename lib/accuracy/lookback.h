@@ -15,7 +15,7 @@
 #include <hapode/ode.h>
 
 #include "base/index.h"
-#include "probe/snapshot.h"
+#include "probe/test_set.h"
 #include "sync/messages.h"
 #include "sync/path.h"
 
@@ -87,8 +87,9 @@ typedef enum hapi_lookback_phase {
 
 typedef struct hapi_lookback {
   hapi_lookback_phase phase;
-  bool lean;       /* the time is short: fewer iterations */
-  bool spoilt;     /* something happened that cannot be gone over */
+  bool lean;   /* the time is short: fewer iterations */
+  bool spoilt; /* something happened that cannot be gone over */
+  hapi_test_set test;
   int64_t from_ns; /* rows before are not of it */
   int64_t to_ns;
   double seconds; /* that it is open */

@@ -238,8 +238,9 @@ static bool body_of(const hapi_physics *physics, dGeomID geom, uint32_t *out)
 {
   dBodyID body = dGeomGetBody(geom);
   uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  bool found = known != HAPI_NONE && physics->world.bodies.entries[known].island != HAPI_NONE;
-  *out = found ? physics->world.bodies.entries[known].rest->member : HAPI_SLOT_NONE;
+  const hapi_test_set *test = &physics->lookback.test;
+  bool found = known != HAPI_NONE && hapi_test_has(test, known);
+  *out = found ? test->places[known].member : HAPI_SLOT_NONE;
   return found || body == NULL;
 }
 

@@ -62,7 +62,7 @@ static bool find_geoms(hapi_physics *physics)
 static bool under_test(const hapi_physics *physics, dBodyID body)
 {
   uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  return known != HAPI_NONE && physics->world.bodies.entries[known].island != HAPI_NONE;
+  return known != HAPI_NONE && hapi_test_has(&physics->lookback.test, known);
 }
 
 static bool boxes_meet(dGeomID a, dGeomID b)
@@ -318,6 +318,15 @@ static bool go(hapi_physics *physics, double seconds)
   return good;
 }
 
+static hap_status enter(hapi_lookback *w, const hapi_world *world, double step_s)
+{
+  hap_status status = hapi_test_begin(&w->test, world, step_s);
+  for (uint32_t i = 0; i < w->body_count && status >= HAP_OK; ++i) {
+    status = hapi_test_add_body(&w->test, w->bodies[i].known);
+  }
+  return status >= HAP_OK ? hapi_test_enter(&w->test) : status;
+}
+
 hap_status hapi_lookback_run(hapi_physics *physics, double seconds)
 {
   hapi_lookback *w = &physics->lookback;
@@ -325,10 +334,10 @@ hap_status hapi_lookback_run(hapi_physics *physics, double seconds)
   if (!find_geoms(physics)) {
     return HAP_ERROR_MEMORY;
   }
-  hap_status status = hapi_test_enter_bodies(physics, w->bodies, w->body_count);
+  hap_status status = enter(w, &physics->world, physics->cycle.probe_step_s);
   if (status >= HAP_OK) {
     status = w->row_count == 0 || go(physics, seconds) ? status : HAP_ERROR_STATE;
-    hapi_test_leave(physics);
+    hapi_test_leave(&w->test);
   }
   physics->near.range.number = searched; /* of the meshes that were asked */
   return status;

@@ -207,6 +207,14 @@ static inline bool hapi_m3_is_scalar(const double m[9])
   return !off && m[0] == m[4] && m[4] == m[8];
 }
 
+/* An inertia that is the same about every axis, as of a ball or a cube, to 1e-9. */
+static inline bool hapi_turns_alike(const double inertia[9])
+{
+  double off = fabs(inertia[1]) + fabs(inertia[2]) + fabs(inertia[5]);
+  double spread = fabs(inertia[0] - inertia[4]) + fabs(inertia[0] - inertia[8]);
+  return off + spread <= 1e-9 * inertia[0];
+}
+
 /* By the adjugate; a singular one becomes 0. out is not m */
 static inline void hapi_m3_invert(const double m[9], double out[9])
 {

@@ -56,7 +56,6 @@ static bool enqueue(hapi_physics *physics, uint32_t known)
   body->rest->hops = range->hops;
   local->wanted = true;
   local->linked = false;
-  local->edge = false;
   local->mass = hapi_body_mass(body->body);
   local->flags = dBodyIsKinematic(body->body)  ? HAPI_BODY_DRIVEN
                  : !dBodyIsEnabled(body->body) ? HAPI_BODY_RESTING

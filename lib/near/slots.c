@@ -102,8 +102,10 @@ hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, 
     return NULL;
   }
   uint32_t generation = slot->generation;
+  uint32_t life = slot->life;
   memset(slot, 0, sizeof *slot);
   slot->generation = generation + 1;
+  slot->life = life + 1;
   slot->phase = HAPI_SLOT_LIVE;
   slot->body = body;
   slot->geom = geom;
@@ -179,6 +181,11 @@ void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
   }
 }
 
+void hapi_slots_set_flags(hapi_slots *slots, uint32_t body, uint32_t flags)
+{
+  slots->bodies[body].flags = flags;
+}
+
 void hapi_slots_reset(hapi_physics *physics)
 {
   physics->near.slots.body_high = 0;
@@ -191,8 +198,10 @@ void hapi_slots_reset(hapi_physics *physics)
   }
   for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
     uint32_t generation = physics->near.slots.contacts[i].generation;
+    uint32_t life = physics->near.slots.contacts[i].life;
     memset(&physics->near.slots.contacts[i], 0, sizeof physics->near.slots.contacts[i]);
     physics->near.slots.contacts[i].generation = generation;
+    physics->near.slots.contacts[i].life = life;
   }
   for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
     physics->world.bodies.entries[i].slot = HAPI_NONE;

@@ -11,7 +11,6 @@
 #include <hapode/effects.h>
 #include <ode/ode.h>
 
-#include "probe/reuse.h"
 #include "proximity/proximity.h"
 #include "sync/messages.h"
 
@@ -42,48 +41,29 @@ typedef struct hapi_body_slot {
   double left_position[3];
   double left_quat[4];
   double left_velocity[6];
-  double b[6];
-  bool b_is_good;        /* scratch: of this cycle's probes */
   double new_impulse[3]; /* of the last interval, to be given to the world */
   double new_angular_impulse[3];
   double residual[6]; /* eq. 14, running total */
 
   /* Model CONTACT. */
   bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
-  bool edge;              /* scratch: measured only because it borders the range */
   bool linked;            /* scratch: a body of the range may touch it */
   bool held;              /* scratch: switched off for the global step */
   int64_t owned_until_ns; /* that the loop's last state was taken for */
   double gain_taken[6];
-  double falls[3];       /* m/s^2, by gravity and the application's force */
-  double exchanged[6];   /* N, N m: mean wrench from the loop in the last interval */
-  double response[6][6]; /* measured */
-  bool measured;         /* response and b hold a measurement */
-  bool known_free;       /* model ACCELERANCE: nothing holds it, so nothing was measured */
-
-  bool foretold; /* range_error.c: what the world was going to do with an owned body */
-  double foretold_a[6][3];
-  double foretold_b[6];
-  double foretold_twist[6]; /* then */
-  double foretold_gain[3];  /* N s, likewise */
-
-  double cross[6][3]; /* scratch: the answer to the contact of its island in this round */
-
-  hapi_print_place prints[HAPI_REUSE_BOOKS]; /* reuse.h, of the island that begins with it */
-  uint32_t next_pushed;                      /* scratch */
+  double falls[3];     /* m/s^2, by gravity and the application's force */
+  double exchanged[6]; /* N, N m: mean wrench from the loop in the last interval */
 } hapi_body_slot;
 
 typedef struct hapi_contact_slot {
   hapi_slot_phase phase;
-  uint32_t generation;
-  uint32_t body; /* slot, HAPI_SLOT_NONE: static world */
+  uint32_t generation; /* grows also where the same contact turned far */
+  uint32_t life;       /* grows with each new contact in this place */
+  uint32_t body;       /* slot, HAPI_SLOT_NONE: static world */
   uint32_t pointer;
   uint32_t pointer_generation;
   dGeomID geom; /* compared only, never used */
   bool wanted;
-  bool probed;          /* a holds a measured accelerance */
-  uint32_t round;       /* scratch: order among the contacts of its island */
-  uint32_t next_pushed; /* scratch of reuse.c */
   double point_body[3];
   double normal_body[3];
   bool has_shape;                 /* one with a closed form, and it is wished for */
@@ -98,11 +78,7 @@ typedef struct hapi_contact_slot {
   double mu;             /* of the pair, as the application says */
   double finger_radius;  /* m, the pointer's; 0: no torsion */
   double last_force[3];  /* on the body, newest message */
-  double a[6][3];
-  double turn[6];        /* the same of a torque about the normal */
-  double measured[6][3]; /* scratch: a of this cycle's probes, before it is known to be good */
-  double measured_turn[6];
-  bool is_tool; /* a point of a hull's patch */
+  bool is_tool;          /* a point of a hull's patch */
   hapi_tool_point tool;
 } hapi_contact_slot;
 
@@ -129,6 +105,8 @@ void hapi_slots_release(hapi_physics *physics);     /* retired ones the loop is 
 void hapi_slots_drop_body(hapi_physics *physics, uint32_t known); /* the body is gone */
 void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE's state */
 void hapi_slots_renew(hapi_body_slot *slot);   /* and forgets what it summed up, too */
+/* Roles of the bodies in the model to come, as testing simulations have changed them. */
+void hapi_slots_set_flags(hapi_slots *slots, uint32_t body, uint32_t flags);
 void hapi_slots_reset(hapi_physics *physics);
 
 #endif

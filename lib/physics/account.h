@@ -49,7 +49,4 @@ void hapi_publish_joints(const hapi_publishing *p, const uint32_t *joints, uint3
 /* publish.c */
 void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
 
-/* publish.c: the same inertia about every axis, as of a ball or a cube */
-bool hapi_turns_alike(const double inertia[9]);
-
 #endif

@@ -12,10 +12,20 @@
 static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
 {
   const hapi_world *world = &physics->world;
+  const hapi_probe *probe = &physics->probe;
+  const hapi_cross_counts *cross = &physics->research.cross.counts;
+  uint64_t steps = probe->test.steps + physics->research.range.test.steps;
   io_stats->model.bodies_known = world->bodies.used;
   io_stats->faults.bodies_lost = world->bodies.lost;
-  io_stats->physics.quickstep_calls += world->counts.steps;
+  io_stats->physics.quickstep_calls += world->counts.steps + steps;
   io_stats->faults.contacts_rejected += world->counts.contacts_rejected;
+  io_stats->probes.steps = steps + probe->counts.joint_steps;
+  io_stats->probes.clipped = probe->counts.clipped + cross->clipped;
+  io_stats->probes.singular = probe->counts.singular + cross->singular;
+  io_stats->probes.reused = probe->counts.reused;
+  io_stats->model.measured_joints = probe->counts.joints;
+  io_stats->model.joint_error = probe->counts.joint_error;
+  io_stats->model.capacity_dropped += cross->dropped;
 }
 
 void hapi_counts_show(hapi_physics *physics)
@@ -23,6 +33,9 @@ void hapi_counts_show(hapi_physics *physics)
   pthread_mutex_lock(&physics->counts.lock);
   physics->counts.shown = physics->counts.own;
   counts_gather(physics, &physics->counts.shown.stats);
+  physics->counts.shown.cross_s = physics->research.cross.counts.seconds;
+  physics->counts.shown.foretold2 = physics->research.range.foretold2;
+  physics->counts.shown.range_error2 = physics->research.range.error2;
   pthread_mutex_unlock(&physics->counts.lock);
 }
 

@@ -24,21 +24,16 @@ static bool allocate(hapi_physics *physics, const hap_ode_def *ode)
   physics->near.slots.bodies = hapi_alloc_array(c->bodies, sizeof *physics->near.slots.bodies);
   physics->near.slots.contacts =
       hapi_alloc_array(c->contacts, sizeof *physics->near.slots.contacts);
-  physics->research.crosses = hapi_alloc_array(c->crosses, sizeof *physics->research.crosses);
   hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
   hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
-  physics->probe.test.contacts =
-      hapi_alloc_array(c->contacts, sizeof *physics->probe.test.contacts);
-  physics->probe.test.bodies = hapi_alloc_array(c->bodies, sizeof *physics->probe.test.bodies);
-  physics->probe.test.base = hapi_alloc_array(c->bodies, sizeof *physics->probe.test.base);
-  physics->probe.test.rounds = hapi_alloc_array(c->contacts, sizeof *physics->probe.test.rounds);
   hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
   hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
   return physics->near.slots.bodies != NULL && physics->near.slots.contacts != NULL &&
-         physics->research.crosses != NULL && hood->candidates != NULL && hood->hits != NULL &&
-         hood->vertices != NULL && hood->hull != NULL && physics->probe.test.contacts != NULL &&
-         physics->probe.test.rounds != NULL && physics->probe.test.bodies != NULL &&
-         physics->probe.test.base != NULL && hapi_range_create(physics) &&
+         hood->candidates != NULL && hood->hits != NULL && hood->vertices != NULL &&
+         hood->hull != NULL && hapi_probe_create(&physics->probe, c) &&
+         hapi_cross_create(&physics->research.cross, &physics->cycle, &physics->near.slots,
+                           &physics->probe) &&
+         hapi_range_error_create(&physics->research.range, c) && hapi_range_create(physics) &&
          hapi_cover_create(&hood->cover) &&
          hapi_world_create(&physics->world, ode, c->joints, &physics->listener);
 }
@@ -129,13 +124,12 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_poses_finish(&physics->drawing);
   hapi_range_finish(physics);
   hapi_meshes_finish(&physics->near.meshes);
-  hapi_snapshot_finish(&physics->probe.snapshot);
-  hapi_test_finish(&physics->probe.test);
-  hapi_reuse_finish(physics);
+  hapi_probe_finish(&physics->probe);
+  hapi_cross_finish(&physics->research.cross);
+  hapi_range_error_finish(&physics->research.range);
   hapi_lookback_finish(&physics->lookback);
   hapi_free(physics->near.slots.bodies);
   hapi_free(physics->near.slots.contacts);
-  hapi_free(physics->research.crosses);
   hapi_cover_finish(&physics->near.neighbors.cover);
   hapi_free(physics->near.neighbors.candidates);
   hapi_free(physics->near.neighbors.hits);
@@ -185,12 +179,11 @@ static void build_first_model(hapi_physics *physics)
 {
   hapi_dial_enter(physics);
   hapi_reconcile_take(physics);
-  hapi_world_collide(&physics->world, &physics->cycle, hapi_reuse_wanted(physics));
+  hapi_physics_collide(physics);
   hapi_neighbors_collect(physics);
   hapi_neighbors_find(physics);
-  hapi_accelerance_measure(physics);
-  hapi_operating_point_measure(physics);
-  hapi_range_error_measure(physics);
+  hapi_physics_test(physics);
+  hapi_physics_test_range(physics);
   hapi_dial_leave(physics);
 }
 
@@ -200,7 +193,9 @@ static void prepare(hapi_physics *physics)
   hapi_range_reset(physics);
   hapi_lookback_reset(physics);
   hapi_dial_reset(physics);
-  hapi_reuse_reset(physics);
+  hapi_probe_reset(&physics->probe);
+  hapi_cross_reset(&physics->research.cross);
+  hapi_range_error_reset(&physics->research.range);
   hapi_meshes_finish(&physics->near.meshes); /* the application may have changed them */
   physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
   physics->cycle.wishes = atomic_load(&physics->wanted.effects);
@@ -208,7 +203,6 @@ static void prepare(hapi_physics *physics)
   physics->cycle.state = NULL;
   physics->cycle.step_s = 0.0;
   physics->cycle.model_number = 0;
-  physics->research.cross_count = 0;
   physics->world_faulty = false;
   physics->world.bodies.said_lost = false;
   physics->world.islands_threads =

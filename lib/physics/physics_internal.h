@@ -59,6 +59,10 @@ struct hapi_physics {
   bool world_faulty; /* holds a state that ODE would abort on: not stepped */
 };
 
+/* cycle.c: the collision phase, and testing simulations */
+void hapi_physics_collide(hapi_physics *physics);
+void hapi_physics_test_range(hapi_physics *physics);
+void hapi_physics_test(hapi_physics *physics);
 /* physics.c: H, or T in model SINGLE */
 double hapi_period_of(const hapi_physics *physics, hap_model model);
 

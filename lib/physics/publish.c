@@ -15,13 +15,6 @@ static void read_matrix(const dReal in[12], double out[9])
   }
 }
 
-bool hapi_turns_alike(const double inertia[9])
-{
-  double off = fabs(inertia[1]) + fabs(inertia[2]) + fabs(inertia[5]);
-  double spread = fabs(inertia[0] - inertia[4]) + fabs(inertia[0] - inertia[8]);
-  return off + spread <= 1e-9 * inertia[0];
-}
-
 static double keep_per_tick(const hapi_physics *physics, double damping)
 {
   double share = damping < 0.0 ? 0.0 : damping > 1.0 ? 1.0 : damping; /* lost in a step of H */
@@ -54,7 +47,8 @@ static void fill_mass(const hapi_physics *physics, dBodyID body, hapi_model_body
 }
 
 /* What the loop needs to move the body itself. */
-static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_model_body *out)
+static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot,
+                          const hapi_body_answer *answer, hapi_model_body *out)
 {
   const hapi_known_body *known = &physics->world.bodies.entries[slot->known];
   dBodyID body = known->body;
@@ -78,12 +72,13 @@ static void fill_dynamics(hapi_physics *physics, hapi_body_slot *slot, hapi_mode
   out->angular_threshold2 = angular * angular;
   out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
   memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
-  memcpy(out->response, slot->response, sizeof out->response);
+  memcpy(out->response, answer->response, sizeof out->response);
 }
 
 static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *out)
 {
   hapi_body_slot *slot = &physics->near.slots.bodies[index];
+  const hapi_body_answer *answer = &physics->probe.answers.bodies[index];
   dBodyID body = physics->world.bodies.entries[slot->known].body;
   memset(out, 0, sizeof *out);
   out->slot = index;
@@ -93,12 +88,12 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   hapi_pose_read(body, &out->pose);
   hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
-  memcpy(out->b, slot->b, sizeof out->b);
+  memcpy(out->b, answer->b, sizeof out->b);
   memcpy(out->residual, slot->residual, sizeof out->residual);
   hapi_v3_copy(slot->impulse_taken, out->impulse_taken);
   hapi_v3_copy(slot->angular_impulse_taken, out->impulse_taken + 3);
   if (physics->cycle.model == HAP_MODEL_CONTACT) {
-    fill_dynamics(physics, slot, out);
+    fill_dynamics(physics, slot, answer, out);
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
       memset(out->b, 0, sizeof out->b); /* the loop knows it better, or nobody measured it */
     }
@@ -112,7 +107,8 @@ static bool fill_body(hapi_physics *physics, uint32_t index, hapi_model_body *ou
   return sound;
 }
 
-static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_model_contact *out)
+static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answer *answer,
+                         uint32_t index, hapi_model_contact *out)
 {
   memset(out, 0, sizeof *out);
   out->slot = index;
@@ -122,8 +118,8 @@ static void fill_contact(const hapi_contact_slot *slot, uint32_t index, hapi_mod
   out->pointer_generation = slot->pointer_generation;
   hapi_v3_copy(slot->point_body, out->point_body);
   hapi_v3_copy(slot->normal_body, out->normal_body);
-  memcpy(out->a, slot->a, sizeof out->a);
-  memcpy(out->turn, slot->turn, sizeof out->turn);
+  memcpy(out->a, answer->a, sizeof out->a);
+  memcpy(out->turn, answer->turn, sizeof out->turn);
   out->mu = slot->mu;
   out->has_shape = slot->has_shape;
   out->shape = slot->shape;
@@ -231,8 +227,9 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
     if (physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE) {
       hapi_model_contact *contact = &contacts[out->contact_count];
-      hapi_cross_publish(physics, i, out->contact_count, out);
-      fill_contact(&physics->near.slots.contacts[i], i, contact);
+      hapi_cross_publish(&physics->research.cross, i, out->contact_count, out);
+      fill_contact(&physics->near.slots.contacts[i], &physics->probe.answers.contacts[i], i,
+                   contact);
       out->contact_count += fill_tool(physics, &physics->near.slots.contacts[i], out, contact);
     }
   }

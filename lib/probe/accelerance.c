@@ -1,35 +1,107 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/accelerance.h"
+
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "probe/probe.h"
 
 /* Accelerance of the neighbours (paper sections 4.2 and 4.3, eq. 3-6). Each pointer contact has its
  * own A: acceleration of the body by a force at the contact point. The zero probe is shared, and
  * the contacts of different islands are probed in the same step, as islands do not feel each
  * other: a round perturbs one contact of each island. */
 
-static hapi_body_slot *body_of(hapi_physics *physics, const hapi_contact_slot *contact)
+#define TORSION 3 /* the axis after x, y and z: a torque about the normal, for soft fingers */
+
+static uint32_t contact_known(const hapi_slots *slots, const hapi_contact_slot *contact)
 {
-  return &physics->near.slots.bodies[contact->body];
+  HAPI_ASSERT_INDEX(contact->body, slots->body_high);
+  return slots->bodies[contact->body].known;
 }
 
 /* Probes about the forces that the pointers give: friction and contacts are then as they are under
  * the hand, where eq. 4 asks what another force than the hand's would do to a world without it. */
-static bool at_operating_point(const hapi_physics *physics)
+static bool at_operating_point(const hapi_cycle *cycle)
 {
-  return physics->cycle.settings.probe == HAP_PROBE_OPERATING &&
-         physics->cycle.model == HAP_MODEL_ACCELERANCE;
+  return cycle->settings.probe == HAP_PROBE_OPERATING && cycle->model == HAP_MODEL_ACCELERANCE;
 }
 
-static void add_force(const hapi_physics *physics, const hapi_contact_slot *contact,
-                      const double force[3])
+static hapi_reuse_book *contact_book(hapi_probe *probe)
 {
-  dBodyID body =
-      physics->world.bodies.entries[physics->near.slots.bodies[contact->body].known].body;
+  return &probe->reuse.books[HAPI_REUSE_CONTACTS];
+}
+
+/* ---- which contacts ---- */
+
+static bool contact_moves_a_body(const hapi_probe *probe, const hapi_cycle *cycle,
+                                 const hapi_slots *slots, const hapi_contact_slot *contact)
+{
+  if (contact->phase != HAPI_SLOT_LIVE || contact->body == HAPI_SLOT_NONE) {
+    return false;
+  }
+  const hapi_body_answer *body = &probe->answers.bodies[contact->body];
+  bool needs = cycle->model == HAP_MODEL_ACCELERANCE || ((body->flags & HAPI_BODY_MEASURED) != 0 &&
+                                                         !hapi_body_is_whole(slots, contact->body));
+  return needs && (body->flags & HAPI_BODY_DRIVEN) == 0 && !body->known_free;
+}
+
+/* Which bodies the contacts can move: their islands. */
+static hap_status contacts_gather(hapi_probe *probe, const hapi_cycle *cycle,
+                                  const hapi_world *world, const hapi_slots *slots)
+{
+  hapi_pushed *pushed = &probe->contacts.pushed;
+  pushed->count = 0;
+  hap_status status = hapi_test_begin(&probe->test, world, cycle->probe_step_s);
+  for (uint32_t i = 0; i < slots->contact_high && status >= HAP_OK; ++i) {
+    const hapi_contact_slot *contact = &slots->contacts[i];
+    if (contact_moves_a_body(probe, cycle, slots, contact)) {
+      bool testable = false;
+      status = hapi_probe_add_body(probe, cycle, slots, contact->body, &testable);
+      if (status >= HAP_OK && testable) {
+        HAPI_ASSERT_INDEX(pushed->count, pushed->capacity);
+        pushed->slots[pushed->count++] = i;
+      }
+    }
+  }
+  return status;
+}
+
+/* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. Before the
+ * first touch that is zero and cannot be used: then the peak of the force that the touch will give,
+ * v sqrt(k m). At least a small share of the weight. */
+static double contact_push(const hapi_cycle *cycle, const hapi_contact_slot *contact, double mass)
+{
+  double least = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * mass;
+  if (at_operating_point(cycle)) {
+    return least;
+  }
+  double last = hapi_v3_norm(contact->last_force);
+  double touch = contact->speed * sqrt(contact->stiffness * mass);
+  double wanted = last > 0.0 ? last : touch;
+  return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
+}
+
+static void contacts_choose_push(hapi_probe *probe, const hapi_cycle *cycle,
+                                 const hapi_slots *slots)
+{
+  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+    uint32_t index = probe->contacts.pushed.slots[i];
+    const hapi_contact_slot *contact = &slots->contacts[index];
+    probe->answers.contacts[index].push =
+        contact_push(cycle, contact, slots->bodies[contact->body].mass);
+  }
+}
+
+/* ---- a testing simulation ---- */
+
+static void contact_add_force(const hapi_test_set *test, const hapi_slots *slots,
+                              const hapi_contact_slot *contact, const double force[3])
+{
+  dBodyID body = hapi_test_state(test, contact_known(slots, contact))->body;
   double arm[3];
   double moment[3];
   hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
@@ -38,131 +110,121 @@ static void add_force(const hapi_physics *physics, const hapi_contact_slot *cont
   dBodyAddTorque(body, moment[0], moment[1], moment[2]);
 }
 
-static void begin_probe(hapi_physics *physics)
+static void contacts_begin_step(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots)
 {
-  const hapi_test_set *test = &physics->probe.test;
-  hapi_test_rewind(physics);
-  for (uint32_t i = 0; i < test->contact_count && at_operating_point(physics); ++i) {
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    add_force(physics, contact, contact->last_force);
+  const hapi_pushed *pushed = &probe->contacts.pushed;
+  hapi_test_rewind(&probe->test);
+  for (uint32_t i = 0; i < pushed->count && at_operating_point(cycle); ++i) {
+    const hapi_contact_slot *contact = &slots->contacts[pushed->slots[i]];
+    contact_add_force(&probe->test, slots, contact, contact->last_force);
   }
 }
 
-static hapi_reuse_book *book_of(hapi_physics *physics)
-{
-  return &physics->probe.reuse.books[0];
-}
-
 /* Of a body of model CONTACT that answers as a whole b is found with that answer, operating_point.c. */
-static bool takes_b(const hapi_physics *physics, uint32_t index)
+static bool body_takes_b(const hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                         uint32_t index)
 {
-  const hapi_body_slot *slot = &physics->near.slots.bodies[index];
-  bool tested = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
-                physics->world.bodies.entries[slot->known].island != HAPI_NONE;
-  bool whole = physics->cycle.model == HAP_MODEL_CONTACT &&
-               (slot->flags & HAPI_BODY_MEASURED) != 0 && hapi_test_is_whole(physics, index);
+  const hapi_body_slot *slot = &slots->bodies[index];
+  uint32_t flags = probe->answers.bodies[index].flags;
+  bool tested = slot->phase == HAPI_SLOT_LIVE && (flags & HAPI_BODY_DRIVEN) == 0 &&
+                hapi_test_has(&probe->test, slot->known);
+  bool whole = cycle->model == HAP_MODEL_CONTACT && (flags & HAPI_BODY_MEASURED) != 0 &&
+               hapi_body_is_whole(slots, index);
   return tested && !whole;
 }
 
 /* Eq. 3 with no force, or those of the operating point: b, from which those are taken out later. */
-static void measure_b(hapi_physics *physics)
+static void bodies_measure_b(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots)
 {
-  begin_probe(physics);
-  hapi_test_step(physics);
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    if (!takes_b(physics, i)) {
+  contacts_begin_step(probe, cycle, slots);
+  hapi_test_step(&probe->test);
+  for (uint32_t i = 0; i < slots->body_high; ++i) {
+    hapi_body_answer *answer = &probe->answers.bodies[i];
+    if (!body_takes_b(probe, cycle, slots, i)) {
       continue;
     }
     double b[6];
-    hapi_test_acceleration(physics, slot->known, b);
-    slot->b_is_good = hapi_finite(b, 6);
-    if (!slot->b_is_good) {
-      hapi_reuse_spoil(physics, book_of(physics), slot->known);
-    }
-    if (slot->b_is_good) {
-      memcpy(slot->b, b, sizeof b);
+    hapi_test_acceleration(&probe->test, slots->bodies[i].known, b);
+    answer->b_is_good = hapi_finite(b, 6);
+    if (answer->b_is_good) {
+      memcpy(answer->b, b, sizeof b);
+    } else {
+      hapi_reuse_spoil(contact_book(probe), &probe->test, slots->bodies[i].known);
     }
   }
 }
 
-/* Eq. 4: as large as the pointer's last force, so that A fits what the hand is doing. Before the
- * first touch that is zero and cannot be used: then the peak of the force that the touch will give,
- * v sqrt(k m). At least a small share of the weight. */
-static double size_of_eq4(hapi_physics *physics, const hapi_contact_slot *contact)
+static bool contact_has_axis(const hapi_cycle *cycle, const hapi_contact_slot *contact, int axis)
 {
-  double last = hapi_v3_norm(contact->last_force);
-  double mass = body_of(physics, contact)->mass;
-  double touch = contact->speed * sqrt(contact->stiffness * mass);
-  double least = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * mass;
-  double wanted = last > 0.0 ? last : touch;
-  return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
-}
-
-double hapi_accelerance_push(hapi_physics *physics, const hapi_contact_slot *contact)
-{
-  return at_operating_point(physics)
-             ? HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * body_of(physics, contact)->mass
-             : size_of_eq4(physics, contact);
-}
-
-#define TORSION 3 /* the axis after x, y and z: a torque about the normal, for soft fingers */
-
-static bool has_axis(const hapi_physics *physics, const hapi_contact_slot *contact, int axis)
-{
-  return axis != TORSION || (physics->cycle.model == HAP_MODEL_ACCELERANCE && contact->mu > 0.0 &&
+  return axis != TORSION || (cycle->model == HAP_MODEL_ACCELERANCE && contact->mu > 0.0 &&
                              contact->finger_radius > 0.0);
 }
 
 /* About the operating point it is small, and goes into the body: a pull at a body that does not feel
  * the pointer yet would take it off what stands behind it. */
-static double perturbation(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
+static double contact_perturbation(const hapi_probe *probe, const hapi_cycle *cycle,
+                                   const hapi_slots *slots, uint32_t index, int axis)
 {
-  const hapi_body_slot *body = body_of(physics, contact);
+  const hapi_contact_slot *contact = &slots->contacts[index];
   double normal[3];
-  double size = hapi_accelerance_push(physics, contact);
-  if (!at_operating_point(physics)) {
+  double size = probe->answers.contacts[index].push;
+  if (!at_operating_point(cycle)) {
     return size;
   }
-  hapi_quat_rotate(hapi_test_state(physics, body->known)->quat, contact->normal_body, normal);
+  const hapi_body_state *tested = hapi_test_state(&probe->test, contact_known(slots, contact));
+  hapi_quat_rotate(tested->quat, contact->normal_body, normal);
   return axis != TORSION && normal[axis] > 0.0 ? -size : size;
 }
 
-/* One column of eq. 5 and 6 for each contact of the round. */
-static void measure_column(hapi_physics *physics, hapi_contact_slot *contact, int axis)
-{
-  const hapi_body_slot *body = body_of(physics, contact);
-  double force = perturbation(physics, contact, axis);
-  double acceleration[6];
-  hapi_test_acceleration(physics, body->known, acceleration);
-  for (int i = 0; i < 6; ++i) {
-    double change = acceleration[i] - body->b[i];
-    if (axis == TORSION) {
-      contact->measured_turn[i] = change / (force * contact->finger_radius);
-    } else {
-      contact->measured[i][axis] = change / force;
-    }
-  }
-  if (axis != TORSION) {
-    hapi_cross_column(physics, contact, axis, force);
-  }
-}
-
 /* As large as the force at the finger's radius. */
-static void twist(hapi_physics *physics, const hapi_contact_slot *contact)
+static void contact_twist(const hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                          uint32_t index)
 {
-  dBodyID body = physics->world.bodies.entries[body_of(physics, contact)->known].body;
+  const hapi_contact_slot *contact = &slots->contacts[index];
+  dBodyID body = hapi_test_state(&probe->test, contact_known(slots, contact))->body;
+  double size = contact_perturbation(probe, cycle, slots, index, TORSION);
   double torque[3];
   hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, torque);
-  hapi_v3_scale(perturbation(physics, contact, TORSION) * contact->finger_radius, torque, torque);
+  hapi_v3_scale(size * contact->finger_radius, torque, torque);
   dBodyAddTorque(body, torque[0], torque[1], torque[2]);
 }
 
-static void push(hapi_physics *physics, const hapi_contact_slot *contact, int axis)
+static void contact_perturb(const hapi_probe *probe, const hapi_cycle *cycle,
+                            const hapi_slots *slots, uint32_t index, int axis)
 {
+  if (axis == TORSION) {
+    contact_twist(probe, cycle, slots, index);
+    return;
+  }
   double force[3] = {0.0, 0.0, 0.0};
-  force[axis] = perturbation(physics, contact, axis);
-  add_force(physics, contact, force);
+  force[axis] = contact_perturbation(probe, cycle, slots, index, axis);
+  contact_add_force(&probe->test, slots, &slots->contacts[index], force);
+}
+
+/* ---- what comes out ---- */
+
+/* One column of eq. 5 and 6 for a contact of the round. */
+static void contact_measure_column(hapi_probe *probe, const hapi_cycle *cycle,
+                                   const hapi_slots *slots, uint32_t index, int axis,
+                                   const hapi_contact_watch *watch)
+{
+  const hapi_contact_slot *contact = &slots->contacts[index];
+  const hapi_body_answer *body = &probe->answers.bodies[contact->body];
+  hapi_contact_trial *trial = &probe->contacts.list[index];
+  double force = contact_perturbation(probe, cycle, slots, index, axis);
+  double acceleration[6];
+  hapi_test_acceleration(&probe->test, contact_known(slots, contact), acceleration);
+  for (int i = 0; i < 6; ++i) {
+    double change = acceleration[i] - body->b[i];
+    if (axis == TORSION) {
+      trial->measured_turn[i] = change / (force * contact->finger_radius);
+    } else {
+      trial->measured[i][axis] = change / force;
+    }
+  }
+  if (axis != TORSION && watch != NULL) {
+    watch->column(watch->user, index, axis, force);
+  }
 }
 
 void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out)
@@ -172,6 +234,7 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
   double inverse[9];
   double r[9];
   dBodyGetMass(body, &mass);
+  HAPI_ASSERT(mass.mass > 0.0);
   for (int i = 0; i < 9; ++i) {
     inertia[i] = mass.I[4 * (i / 3) + i % 3];
     r[i] = rotation[4 * (i / 3) + i % 3];
@@ -183,55 +246,59 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
 
 /* Within 0 and what it is of the free body: about the normal, the direction that is used. What only a
  * contact makes of a torque is left as it is measured. */
-static void keep_turn(hapi_contact_slot *contact, const hapi_free_body *free,
-                      const double normal[3])
+static void contact_keep_turn(const hapi_contact_trial *trial, const hapi_free_body *free,
+                              const double normal[3], double out_turn[6])
 {
   double of_free[3];
   hapi_m3_apply(free->inverse_inertia, normal, of_free);
   double most = hapi_v3_dot(normal, of_free);
-  double turn = hapi_v3_dot(normal, contact->measured_turn + 3);
+  double turn = hapi_v3_dot(normal, trial->measured_turn + 3);
   double kept = fmin(fmax(turn, 0.0), most);
-  if (hapi_finite(contact->measured_turn, 6)) {
-    memcpy(contact->turn, contact->measured_turn, sizeof contact->turn);
-    hapi_v3_madd(contact->turn + 3, kept - turn, normal, contact->turn + 3);
+  if (hapi_finite(trial->measured_turn, 6)) {
+    memcpy(out_turn, trial->measured_turn, sizeof trial->measured_turn);
+    hapi_v3_madd(out_turn + 3, kept - turn, normal, out_turn + 3);
   }
 }
 
 /* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that does
  * not give way. */
-static void keep(hapi_physics *physics, hapi_contact_slot *contact)
+static void contact_keep(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                         uint32_t index)
 {
-  hap_stats *stats = &physics->counts.own.stats;
-  const hapi_body_slot *slot = body_of(physics, contact);
-  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
+  const hapi_contact_slot *contact = &slots->contacts[index];
+  uint32_t known = contact_known(slots, contact);
+  const hapi_body_state *tested = hapi_test_state(&probe->test, known);
+  hapi_contact_trial *trial = &probe->contacts.list[index];
+  hapi_contact_answer *answer = &probe->answers.contacts[index];
   hapi_admittance kind = HAPI_ADMITTANCE_SINGULAR;
-  if (slot->b_is_good) {
+  if (probe->answers.bodies[contact->body].b_is_good) {
     hapi_free_body free;
     double arm[3];
     double normal[3];
     hapi_accelerance_free_body(tested->body, tested->rotation, &free);
     hapi_quat_rotate(tested->quat, contact->point_body, arm);
     hapi_quat_rotate(tested->quat, contact->normal_body, normal);
-    kind = hapi_admittance_tidy_point(&free, arm, normal, contact->measured);
-    if (has_axis(physics, contact, TORSION)) {
-      keep_turn(contact, &free, normal);
+    kind = hapi_admittance_tidy_point(&free, arm, normal, trial->measured);
+    if (contact_has_axis(cycle, contact, TORSION)) {
+      contact_keep_turn(trial, &free, normal, answer->turn);
     }
   }
-  stats->probes.singular += kind == HAPI_ADMITTANCE_SINGULAR;
-  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  hapi_probe_count(probe, kind);
   if (kind != HAPI_ADMITTANCE_SINGULAR) {
-    memcpy(contact->a, contact->measured, sizeof contact->a);
-    contact->probed = true;
+    HAPI_ASSERT_FINITE(trial->measured[0], 18);
+    memcpy(answer->a, trial->measured, sizeof answer->a);
+    answer->probed = true;
   } else {
-    hapi_reuse_spoil(physics, book_of(physics), slot->known);
+    hapi_reuse_spoil(contact_book(probe), &probe->test, known);
   }
 }
 
 /* ---- bodies that nothing holds ---- */
 
-/* What a step makes of such a body is known without one. Damping and the limit of its turning are ODE's own
- * affair, and so is an inertia that turns with it; and what sleeps has no contacts to be seen. */
-static bool is_free(dBodyID body)
+/* What a step makes of such a body is known without one. Damping and the limit of its turning are
+ * ODE's own affair, and so is an inertia that turns with it; and what sleeps has no contacts to be
+ * seen. */
+static bool body_is_free(dBodyID body)
 {
   dMass mass;
   double inertia[9];
@@ -245,22 +312,22 @@ static bool is_free(dBodyID body)
          (dBodyGetGyroscopicMode(body) == 0 || hapi_turns_alike(inertia));
 }
 
-static void fill_free(const hapi_physics *physics, hapi_body_slot *slot, dBodyID body)
+static void body_fill_free(const hapi_world *world, const hapi_known_body *known, double out_b[6])
 {
   hapi_free_body free;
   dVector3 gravity = {0.0, 0.0, 0.0};
-  hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);
-  if (dBodyGetGravityMode(body) != 0) {
-    dWorldGetGravity(physics->world.ode.world, gravity);
+  hapi_accelerance_free_body(known->body, dBodyGetRotation(known->body), &free);
+  if (dBodyGetGravityMode(known->body) != 0) {
+    dWorldGetGravity(world->ode.world, gravity);
   }
-  const hapi_known_rest *rest =
-      physics->world.bodies.entries[slot->known].rest; /* as a probe has them */
-  hapi_v3_madd(gravity, free.inverse_mass, rest->user_force, slot->b);
-  hapi_m3_apply(free.inverse_inertia, rest->user_torque, slot->b + 3);
+  const hapi_known_rest *rest = known->rest; /* as a probe has them */
+  hapi_v3_madd(gravity, free.inverse_mass, rest->user_force, out_b);
+  hapi_m3_apply(free.inverse_inertia, rest->user_torque, out_b + 3);
 }
 
 /* Of a force at the contact point: 1/m, and I^-1 times the arm crossed with it. */
-static void fill_free_contact(dBodyID body, hapi_contact_slot *contact)
+static void contact_fill_free(dBodyID body, const hapi_contact_slot *contact,
+                              hapi_contact_answer *out)
 {
   hapi_free_body free;
   double arm[3];
@@ -275,190 +342,221 @@ static void fill_free_contact(dBodyID body, hapi_contact_slot *contact)
     hapi_v3_cross(arm, unit, moment);
     hapi_m3_apply(free.inverse_inertia, moment, turn);
     for (int i = 0; i < 3; ++i) {
-      contact->a[i][axis] = i == axis ? free.inverse_mass : 0.0;
-      contact->a[3 + i][axis] = turn[i];
+      out->a[i][axis] = i == axis ? free.inverse_mass : 0.0;
+      out->a[3 + i][axis] = turn[i];
     }
   }
-  memset(contact->turn, 0, sizeof contact->turn);
-  hapi_m3_apply(free.inverse_inertia, normal, contact->turn + 3);
-  contact->probed = true;
+  memset(out->turn, 0, sizeof out->turn);
+  hapi_m3_apply(free.inverse_inertia, normal, out->turn + 3);
+  out->probed = true;
 }
 
 /* The effect testing=auto: before the islands are gathered. */
-static void take_free(hapi_physics *physics)
+static void answers_take_free(hapi_answers *answers, const hapi_cycle *cycle,
+                              const hapi_world *world, const hapi_slots *slots)
 {
-  bool looks = physics->cycle.model == HAP_MODEL_ACCELERANCE &&
-               hapi_wish(physics->cycle.wishes, HAP_EFFECT_TESTING) == HAP_EFFECT_AUTO &&
-               physics->cycle.settings.probe != HAP_PROBE_PAPER;
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    bool live = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0;
-    dBodyID body = live ? physics->world.bodies.entries[slot->known].body : NULL;
-    slot->known_free = looks && body != NULL && is_free(body);
-    if (slot->known_free) {
-      fill_free(physics, slot, body);
+  bool looks = cycle->model == HAP_MODEL_ACCELERANCE &&
+               hapi_wish(cycle->wishes, HAP_EFFECT_TESTING) == HAP_EFFECT_AUTO &&
+               cycle->settings.probe != HAP_PROBE_PAPER;
+  for (uint32_t i = 0; i < slots->body_high; ++i) {
+    const hapi_body_slot *slot = &slots->bodies[i];
+    hapi_body_answer *answer = &answers->bodies[i];
+    bool live = slot->phase == HAPI_SLOT_LIVE && (answer->flags & HAPI_BODY_DRIVEN) == 0;
+    const hapi_known_body *known = live ? &world->bodies.entries[slot->known] : NULL;
+    answer->known_free = looks && known != NULL && known->body != NULL && body_is_free(known->body);
+    if (answer->known_free) {
+      body_fill_free(world, known, answer->b);
     }
   }
-  for (uint32_t i = 0; looks && i < physics->near.slots.contact_high; ++i) {
-    hapi_contact_slot *contact = &physics->near.slots.contacts[i];
+  for (uint32_t i = 0; looks && i < slots->contact_high; ++i) {
+    const hapi_contact_slot *contact = &slots->contacts[i];
     if (contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-        physics->near.slots.bodies[contact->body].known_free) {
-      fill_free_contact(
-          physics->world.bodies.entries[physics->near.slots.bodies[contact->body].known].body,
-          contact);
+        answers->bodies[contact->body].known_free) {
+      uint32_t known = contact_known(slots, contact);
+      contact_fill_free(world->bodies.entries[known].body, contact, &answers->contacts[i]);
     }
   }
 }
 
-static bool any_has_axis(const hapi_physics *physics, uint32_t round, int axis)
+/* ---- rounds ---- */
+
+/* The contact i of those under test, if it is perturbed along the axis in a round; HAPI_NONE: it is
+ * not. */
+static uint32_t round_contact(const hapi_probe *probe, const hapi_cycle *cycle,
+                              const hapi_slots *slots, uint32_t i, uint32_t round, int axis)
 {
-  const hapi_test_set *test = &physics->probe.test;
+  uint32_t index = probe->contacts.pushed.slots[i];
+  bool has = probe->contacts.list[index].round == round &&
+             contact_has_axis(cycle, &slots->contacts[index], axis);
+  return has ? index : HAPI_NONE;
+}
+
+static bool round_has_axis(const hapi_probe *probe, const hapi_cycle *cycle,
+                           const hapi_slots *slots, uint32_t round, int axis)
+{
   bool any = false;
-  for (uint32_t i = 0; i < test->contact_count; ++i) {
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    any = any || (contact->round == round && has_axis(physics, contact, axis));
+  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+    any = any || round_contact(probe, cycle, slots, i, round, axis) != HAPI_NONE;
   }
   return any;
 }
 
-static void perturb(hapi_physics *physics, uint32_t round, int axis)
+static void round_perturb(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                          uint32_t round, int axis)
 {
-  const hapi_test_set *test = &physics->probe.test;
-  begin_probe(physics);
-  for (uint32_t i = 0; i < test->contact_count; ++i) {
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    if (contact->round == round && has_axis(physics, contact, axis)) {
-      if (axis == TORSION) {
-        twist(physics, contact);
-      } else {
-        push(physics, contact, axis);
-      }
+  contacts_begin_step(probe, cycle, slots);
+  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+    uint32_t index = round_contact(probe, cycle, slots, i, round, axis);
+    if (index != HAPI_NONE) {
+      contact_perturb(probe, cycle, slots, index, axis);
     }
   }
 }
 
 /* Three probes for the contacts of one round, and a fourth one for soft fingers. */
-static void measure_round(hapi_physics *physics, uint32_t round)
+static void round_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                          uint32_t round, const hapi_contact_watch *watch)
 {
-  const hapi_test_set *test = &physics->probe.test;
+  const hapi_pushed *pushed = &probe->contacts.pushed;
   for (int axis = 0; axis <= TORSION; ++axis) {
-    if (!any_has_axis(physics, round, axis)) {
+    if (!round_has_axis(probe, cycle, slots, round, axis)) {
       continue;
     }
-    perturb(physics, round, axis);
-    hapi_test_step(physics);
-    for (uint32_t i = 0; i < test->contact_count; ++i) {
-      hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-      if (contact->round == round && has_axis(physics, contact, axis)) {
-        measure_column(physics, contact, axis);
+    round_perturb(probe, cycle, slots, round, axis);
+    hapi_test_step(&probe->test);
+    for (uint32_t i = 0; i < pushed->count; ++i) {
+      uint32_t index = round_contact(probe, cycle, slots, i, round, axis);
+      if (index != HAPI_NONE) {
+        contact_measure_column(probe, cycle, slots, index, axis, watch);
       }
     }
   }
-  for (uint32_t i = 0; i < test->contact_count; ++i) {
-    hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    if (contact->round == round) {
-      keep(physics, contact);
-      hapi_cross_keep(physics, test->contacts[i]);
+  for (uint32_t i = 0; i < pushed->count; ++i) {
+    uint32_t index = pushed->slots[i];
+    if (probe->contacts.list[index].round == round) {
+      contact_keep(probe, cycle, slots, index);
+      if (watch != NULL) {
+        watch->keep(watch->user, index);
+      }
     }
   }
 }
 
 /* The loop adds A f itself, with the A that it is given: b + A f is what was measured with f, whatever
  * became of A. */
-static void take_forces_out(hapi_physics *physics)
+static void forces_take_out(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                            const hapi_contact_watch *watch)
 {
-  const hapi_test_set *test = &physics->probe.test;
-  if (!at_operating_point(physics)) {
+  if (!at_operating_point(cycle)) {
     return;
   }
-  for (uint32_t i = 0; i < test->contact_count; ++i) {
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    hapi_body_slot *body = body_of(physics, contact);
+  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+    uint32_t index = probe->contacts.pushed.slots[i];
+    const hapi_contact_slot *contact = &slots->contacts[index];
+    const hapi_contact_answer *answer = &probe->answers.contacts[index];
+    hapi_body_answer *body = &probe->answers.bodies[contact->body];
     for (int k = 0; k < 6 && body->b_is_good; ++k) {
-      body->b[k] -= hapi_v3_dot(contact->a[k], contact->last_force);
+      body->b[k] -= hapi_v3_dot(answer->a[k], contact->last_force);
     }
   }
-  hapi_cross_take_out(physics);
+  for (uint32_t i = 0; watch != NULL && i < slots->body_high; ++i) {
+    const hapi_body_slot *slot = &slots->bodies[i];
+    if (slot->phase == HAPI_SLOT_LIVE && hapi_test_has(&probe->test, slot->known)) {
+      watch->take_out(watch->user, i, probe->answers.bodies[i].b);
+    }
+  }
 }
 
 /* Numbers the contacts of each island from 0; how many rounds that makes. With probe=paper each
  * contact has a round of its own. */
-static uint32_t plan_rounds(hapi_physics *physics)
+static uint32_t rounds_plan(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots)
 {
-  const hapi_test_set *test = &physics->probe.test;
+  hapi_contact_trials *trials = &probe->contacts;
   uint32_t most = 0;
-  memset(test->rounds, 0, test->island_count * sizeof *test->rounds);
-  for (uint32_t i = 0; i < test->contact_count; ++i) {
-    hapi_contact_slot *contact = &physics->near.slots.contacts[test->contacts[i]];
-    uint32_t known = body_of(physics, contact)->known;
-    uint32_t *count = &test->rounds[physics->world.bodies.entries[known].island];
-    contact->round = physics->cycle.settings.probe == HAP_PROBE_PAPER ? i : *count;
+  memset(trials->rounds, 0, probe->test.island_count * sizeof *trials->rounds);
+  for (uint32_t i = 0; i < trials->pushed.count; ++i) {
+    uint32_t index = trials->pushed.slots[i];
+    uint32_t known = contact_known(slots, &slots->contacts[index]);
+    uint32_t *count = &trials->rounds[hapi_test_island(&probe->test, known)];
+    trials->list[index].round = cycle->settings.probe == HAP_PROBE_PAPER ? i : *count;
     ++*count;
     most = *count > most ? *count : most;
   }
-  return physics->cycle.settings.probe == HAP_PROBE_PAPER ? test->contact_count : most;
+  return cycle->settings.probe == HAP_PROBE_PAPER ? trials->pushed.count : most;
 }
 
-static void measure_rounds(hapi_physics *physics)
+static void rounds_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                           const hapi_contact_watch *watch)
 {
-  uint32_t rounds = plan_rounds(physics);
+  uint32_t rounds = rounds_plan(probe, cycle, slots);
   for (uint32_t round = 0; round < rounds; ++round) {
-    if (round == 0 || physics->cycle.settings.probe == HAP_PROBE_PAPER) {
-      measure_b(physics);
+    if (round == 0 || cycle->settings.probe == HAP_PROBE_PAPER) {
+      bodies_measure_b(probe, cycle, slots);
     }
-    measure_round(physics, round);
+    round_measure(probe, cycle, slots, round, watch);
   }
-  take_forces_out(physics);
+  forces_take_out(probe, cycle, slots, watch);
 }
 
 /* Islands whose A holds still. All are gathered again then. */
-static hap_status measure_b_alone(hapi_physics *physics)
+static hap_status islands_measure_b_alone(hapi_probe *probe, const hapi_cycle *cycle,
+                                          const hapi_world *world, const hapi_slots *slots,
+                                          const hapi_contact_watch *watch)
 {
-  if (!hapi_reuse_has(book_of(physics), HAPI_REUSE_A)) {
+  const hapi_reuse_book *book = contact_book(probe);
+  if (!hapi_reuse_has(book, HAPI_REUSE_A)) {
     return HAP_OK;
   }
-  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_A);
-  hap_status status = hapi_test_enter(physics);
+  hapi_reuse_select(book, HAPI_REUSE_A, slots, &probe->test, &probe->contacts.pushed);
+  hap_status status = hapi_test_enter(&probe->test);
   if (status >= HAP_OK) {
-    measure_b(physics);
-    take_forces_out(physics);
-    hapi_test_leave(physics);
-    status = hapi_test_gather(physics);
+    bodies_measure_b(probe, cycle, slots);
+    forces_take_out(probe, cycle, slots, watch);
+    hapi_test_leave(&probe->test);
+    status = contacts_gather(probe, cycle, world, slots);
   }
   return status;
 }
 
-static hap_status measure(hapi_physics *physics)
+static hap_status contacts_measure(hapi_probe *probe, const hapi_cycle *cycle,
+                                   const hapi_world *world, const hapi_slots *slots,
+                                   const hapi_contact_watch *watch)
 {
-  hap_status status = hapi_test_gather(physics);
+  hapi_reuse_book *book = contact_book(probe);
+  hap_status status = contacts_gather(probe, cycle, world, slots);
   if (status >= HAP_OK) {
-    hapi_reuse_look(physics, book_of(physics), false);
-    status = measure_b_alone(physics);
+    const hapi_reuse_input input = {cycle, slots, &probe->answers, &probe->test};
+    contacts_choose_push(probe, cycle, slots);
+    hapi_reuse_look(&probe->reuse, book, &input, &probe->contacts.pushed);
+    status = islands_measure_b_alone(probe, cycle, world, slots, watch);
   }
   if (status < HAP_OK) {
     return status;
   }
-  hapi_cross_begin(physics, book_of(physics));
-  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_NONE);
-  if (physics->probe.test.contact_count > 0) {
-    status = hapi_test_enter(physics);
+  if (watch != NULL) {
+    watch->begin(watch->user, book);
+  }
+  hapi_reuse_select(book, HAPI_REUSE_NONE, slots, &probe->test, &probe->contacts.pushed);
+  if (probe->contacts.pushed.count > 0) {
+    status = hapi_test_enter(&probe->test);
     if (status < HAP_OK) {
       return status;
     }
-    measure_rounds(physics);
-    hapi_test_leave(physics);
+    rounds_measure(probe, cycle, slots, watch);
+    hapi_test_leave(&probe->test);
   }
-  hapi_reuse_keep(physics, book_of(physics));
+  probe->counts.reused += hapi_reuse_keep(book);
   return HAP_OK;
 }
 
-void hapi_accelerance_measure(hapi_physics *physics)
+void hapi_accelerance_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                              const hapi_slots *slots, const hapi_contact_watch *watch)
 {
-  if (physics->cycle.model != HAP_MODEL_ACCELERANCE && physics->cycle.model != HAP_MODEL_CONTACT) {
+  if (cycle->model != HAP_MODEL_ACCELERANCE && cycle->model != HAP_MODEL_CONTACT) {
     return;
   }
-  take_free(physics);
-  if (measure(physics) < HAP_OK) {
+  answers_take_free(&probe->answers, cycle, world, slots);
+  if (contacts_measure(probe, cycle, world, slots, watch) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last A and b stay");
   }
 }

@@ -3,27 +3,51 @@
 #ifndef HAPODE_PROBE_ACCELERANCE_H
 #define HAPODE_PROBE_ACCELERANCE_H
 
-/* A and b by testing simulations: of contacts (eq. 3-6), and of whole bodies in model CONTACT. */
+/* A and b of contacts by testing simulations (eq. 3-6). */
 
 #include <ode/ode.h>
 
 #include "near/slots.h"
 #include "probe/admittance.h"
-
-typedef struct hapi_physics hapi_physics;
+#include "probe/reuse.h"
+#include "world/cycle.h"
+#include "world/world.h"
 
 /* Share of the weight that a probe uses at least where the pointer gave no force yet (eq. 4 would
  * divide by zero). */
 #define HAPI_PROBE_FLOOR 0.01
 
-/* accelerance.c */
+typedef struct hapi_probe hapi_probe;
+
+/* A contact in the testing simulations of this cycle. */
+typedef struct hapi_contact_trial {
+  uint32_t round;        /* order among the contacts of its island */
+  double measured[6][3]; /* A, before it is known to be good */
+  double measured_turn[6];
+} hapi_contact_trial;
+
+typedef struct hapi_contact_trials {
+  hapi_pushed pushed;       /* slots of the contacts under test */
+  hapi_contact_trial *list; /* by slot */
+  uint32_t *rounds;         /* by island: contacts so far */
+} hapi_contact_trials;
+
+/* Who looks on while contacts are tested. */
+typedef struct hapi_contact_watch {
+  void *user;
+  /* Before the islands that are measured are: of which others A is used again. */
+  void (*begin)(void *user, const hapi_reuse_book *book);
+  /* After a testing simulation with a force [N] at a contact. */
+  void (*column)(void *user, uint32_t contact, int axis, double force);
+  void (*keep)(void *user, uint32_t contact); /* after three of them */
+  /* About the operating point: out of the b of a body under test what the loop adds by itself. */
+  void (*take_out)(void *user, uint32_t body, double io_b[6]);
+} hapi_contact_watch;
+
 /* Of a dynamic body at a rotation of ODE's. */
 void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out);
-void hapi_accelerance_measure(hapi_physics *physics);
-/* N, of the next testing simulations; their directions are of the contact. */
-double hapi_accelerance_push(hapi_physics *physics, const hapi_contact_slot *contact);
-
-/* operating_point.c */
-void hapi_operating_point_measure(hapi_physics *physics);
+/* watch: NULL for none. */
+void hapi_accelerance_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                              const hapi_slots *slots, const hapi_contact_watch *watch);
 
 #endif

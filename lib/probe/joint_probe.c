@@ -1,13 +1,16 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/joint_probe.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/pose.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "probe/probe.h"
 
 /* Joints that the loop has no rows of its own for. What holds two bodies together is found by pushing one of
  * them, W, six times, in a world that has nothing but the two and the joint: the joint's impulse is linear in
@@ -35,8 +38,17 @@
 #define TURNED_LEAST 1e-4 /* rad, from which on it can be seen with which body rows turn */
 #define BETTER 0.5        /* of the other carrier's error */
 
+/* Why a measurement is not to be used. */
+typedef enum refusal {
+  REFUSED_NOT = 0,
+  REFUSED_NUMBERS,
+  REFUSED_REACTION /* the joint does not give one body back what it takes from the other */
+} refusal;
+
 typedef struct pair {
-  hapi_physics *physics;
+  hapi_probe *probe;
+  const hapi_slots *slots;
+  dWorldID world;
   hapi_known_joint *known;
   hapi_joint_measurement *m;
   dBodyID bodies[2]; /* the one that is pushed and the other; NULL: static world */
@@ -49,11 +61,13 @@ typedef struct pair {
   double free[6][6];     /* see hapi_admittance_rows */
   double reaction[6][6]; /* of the other: velocity by the reaction to an impulse */
   double period;         /* s, of the tick */
+  double ahead_s;        /* half of the next interval */
   double ratio;          /* of the tick to the world's step */
   double damping[2][3];  /* as the application has set it */
   int gyroscopic[2];
   hapi_measured_axis axes[HAPI_JOINT_LIMITS]; /* in the middle of the next interval */
   double lost; /* share of the joint's impulses that had no reaction */
+  refusal refused;
 } pair;
 
 typedef struct twists {
@@ -138,18 +152,23 @@ static void find_pose(pair *p, int which)
     memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
     hapi_v3_copy(dBodyGetLinearVel(body), twist.linear);
     hapi_v3_copy(dBodyGetAngularVel(body), twist.angular);
-    hapi_pose_move(out, &twist, 0.5 * p->physics->cycle.probe_step_s);
+    hapi_pose_move(out, &twist, p->ahead_s);
   }
 }
 
-static bool begin_pair(hapi_physics *physics, hapi_known_joint *known, pair *p)
+static bool pair_begin(pair *p, hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                       const hapi_slots *slots, hapi_known_joint *known)
 {
+  const hapi_physics_config *config = cycle->config;
   memset(p, 0, sizeof *p);
-  p->physics = physics;
+  p->probe = probe;
+  p->slots = slots;
+  p->world = world->ode.world;
   p->known = known;
   p->m = known->measurement;
-  p->period = 1.0 / physics->config.haptic_hz;
-  p->ratio = physics->config.physics_hz / physics->config.haptic_hz;
+  p->period = 1.0 / config->haptic_hz;
+  p->ahead_s = 0.5 * cycle->probe_step_s;
+  p->ratio = config->physics_hz / config->haptic_hz;
   bool second = known->bodies[0] == NULL || dBodyIsKinematic(known->bodies[0]);
   uint32_t first = second ? 1 : 0;
   p->m->good = p->m->good && p->m->first == first;
@@ -174,11 +193,11 @@ static bool begin_pair(hapi_physics *physics, hapi_known_joint *known, pair *p)
  * measured. */
 static void push_as_pointers(const pair *p, int which)
 {
-  const hapi_physics *physics = p->physics;
+  const hapi_test_set *test = &p->probe->test;
   uint32_t index = p->index[which];
-  uint32_t slot = index == HAPI_NONE ? HAPI_NONE : physics->world.bodies.entries[index].slot;
-  for (uint32_t i = 0; i < physics->near.slots.contact_high && slot != HAPI_NONE; ++i) {
-    const hapi_contact_slot *c = &physics->near.slots.contacts[i];
+  uint32_t slot = index == HAPI_NONE ? HAPI_NONE : test->world->bodies.entries[index].slot;
+  for (uint32_t i = 0; i < p->slots->contact_high && slot != HAPI_NONE; ++i) {
+    const hapi_contact_slot *c = &p->slots->contacts[i];
     if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_force, 3)) {
       double at[3];
       hapi_pose_point(p->pose[which].position, p->pose[which].quat_wxyz, c->point_body, at);
@@ -201,7 +220,7 @@ static void read_twists(const pair *p, twists *out)
 
 static void begin_step(const pair *p)
 {
-  hapi_test_rewind(p->physics);
+  hapi_test_rewind(&p->probe->test);
   for (int i = 0; i < 2; ++i) {
     const hap_pose *to = &p->pose[i];
     if (p->bodies[i] != NULL) {
@@ -214,8 +233,8 @@ static void begin_step(const pair *p)
 
 static void end_step(const pair *p, twists *out)
 {
-  ++p->physics->counts.own.stats.probes.steps;
-  (void)dWorldStep(p->physics->world.ode.world, p->period);
+  ++p->probe->counts.joint_steps;
+  (void)dWorldStep(p->world, p->period);
   read_twists(p, out);
 }
 
@@ -417,17 +436,16 @@ static bool is_spring(const hapi_constraint_row *row, const pair *p)
 static void find_errors(pair *p, const hapi_constraint_row rows[6], int count, const answer *base,
                         const twists *without)
 {
-  dWorldID world = p->physics->world.ode.world;
-  double world_erp = dWorldGetERP(world);
+  double world_erp = dWorldGetERP(p->world);
   double erp = fmax(world_erp, hapi_joint_erp(p->known));
   answer none = *base;
   if (erp > 0.0) {
     twists with;
-    dWorldSetERP(world, 0.0);
+    dWorldSetERP(p->world, 0.0);
     hapi_joint_leave_open(p->known, true, p->ratio);
     step(p, &with);
     hapi_joint_leave_open(p->known, false, p->ratio);
-    dWorldSetERP(world, world_erp);
+    dWorldSetERP(p->world, world_erp);
     ask(p, rows, count, &with, without, &none);
   }
   for (int r = 0; r < count; ++r) {
@@ -555,23 +573,14 @@ static void write_rows(pair *p, const hapi_constraint_row rows[6], int count, co
   ++out->number;
 }
 
-static void say_not_held(hapi_physics *physics, bool whole)
-{
-  const char *text =
-      whole ? "a joint answers pushes with numbers that no joint can have; its bodies are "
-              "left to ODE between syncs"
-            : "a joint does not give one body back what it takes from the other (ODE's PU "
-              "joint does not); its bodies are left to ODE between syncs";
-  hapi_say_once(&physics->cycle, &physics->probe.said_not_held, text);
-}
-
 static void keep_place(pair *p, const hapi_joint_place *place)
 {
   p->m->place = *place;
-  p->m->found.ahead_s = 0.5 * p->physics->cycle.probe_step_s;
+  p->m->found.ahead_s = p->ahead_s;
   memcpy(p->m->found.axes, p->axes, sizeof p->axes);
 }
 
+/* False: not to be used; *p says why. */
 static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *with,
                          const twists *without)
 {
@@ -580,15 +589,14 @@ static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *w
   hapi_constraint_row rows[6];
   int count = 0;
   answer base;
-  hap_stats *stats = &p->physics->counts.own.stats;
   find_held(p, with, held);
   hapi_admittance kind =
       hapi_admittance_rows((const double(*)[6])p->free, (const double(*)[6])held, rows, &count);
   bool whole = p->lost <= MOMENTUM_SLACK; /* false for NaN */
-  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  hapi_probe_count(p->probe, kind);
   if (!whole || kind == HAPI_ADMITTANCE_SINGULAR) {
-    ++stats->probes.singular;
-    say_not_held(p->physics, whole);
+    p->probe->counts.singular += kind != HAPI_ADMITTANCE_SINGULAR;
+    p->refused = whole ? REFUSED_NUMBERS : REFUSED_REACTION;
     return false;
   }
   memcpy(turn[0], p->pose[0].quat_wxyz, sizeof turn[0]);
@@ -719,12 +727,45 @@ static void measure_pair(pair *p, const hapi_joint_place *place, bool same)
   }
 }
 
-static void measure(hapi_physics *physics, hapi_known_joint *known)
+static void say_refused(hapi_probe *probe, const hapi_cycle *cycle, refusal why)
+{
+  const char *text =
+      why == REFUSED_NUMBERS
+          ? "a joint answers pushes with numbers that no joint can have; its bodies are "
+            "left to ODE between syncs"
+          : "a joint does not give one body back what it takes from the other (ODE's PU "
+            "joint does not); its bodies are left to ODE between syncs";
+  hapi_say_once(cycle, &probe->said_not_held, text);
+}
+
+/* With the world's and the joint's parameters as those of the tick, and no motors, stops and damping. */
+static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
+{
+  hapi_joint_limits limits;
+  double erp = dWorldGetERP(p->world);
+  double cfm = dWorldGetCFM(p->world);
+  double tick_erp = erp;
+  double tick_cfm = cfm;
+  hapi_soften(p->ratio, &tick_erp, &tick_cfm);
+  dWorldSetERP(p->world, tick_erp);
+  dWorldSetCFM(p->world, tick_cfm);
+  hapi_joint_soften(p->known, p->ratio);
+  hapi_joint_take_limits(p->known, &limits);
+  switch_damping(p, false);
+  measure_pair(p, place, same);
+  switch_damping(p, true);
+  hapi_joint_give_limits(p->known, &limits);
+  hapi_joint_restore(p->known);
+  dWorldSetERP(p->world, erp);
+  dWorldSetCFM(p->world, cfm);
+}
+
+static void joint_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                          const hapi_slots *slots, hapi_known_joint *known)
 {
   pair p;
   hapi_joint_place place;
-  hapi_joint_limits limits;
-  if (!begin_pair(physics, known, &p)) {
+  if (!pair_begin(&p, probe, cycle, world, slots, known)) {
     return;
   }
   find_place(&p, &place);
@@ -732,59 +773,53 @@ static void measure(hapi_physics *physics, hapi_known_joint *known)
   if (same && all_rest(&p)) {
     return;
   }
-  if (hapi_test_enter_pair(physics, known->joint, p.index) < HAP_OK) {
+  if (hapi_test_begin(&probe->test, world, cycle->probe_step_s) < HAP_OK ||
+      hapi_test_enter_pair(&probe->test, known->joint, p.index) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
     return;
   }
-  dWorldID world = physics->world.ode.world;
-  double erp = dWorldGetERP(world);
-  double cfm = dWorldGetCFM(world);
-  double tick_erp = erp;
-  double tick_cfm = cfm;
-  hapi_soften(p.ratio, &tick_erp, &tick_cfm);
-  dWorldSetERP(world, tick_erp);
-  dWorldSetCFM(world, tick_cfm);
-  hapi_joint_soften(known, p.ratio);
-  hapi_joint_take_limits(known, &limits);
-  switch_damping(&p, false);
-  measure_pair(&p, &place, same);
-  switch_damping(&p, true);
-  hapi_joint_give_limits(known, &limits);
-  hapi_joint_restore(known);
-  dWorldSetERP(world, erp);
-  dWorldSetCFM(world, cfm);
-  hapi_test_leave(physics);
+  pair_measure_bare(&p, &place, same);
+  hapi_test_leave(&probe->test);
+  if (p.refused != REFUSED_NOT) {
+    say_refused(probe, cycle, p.refused);
+  }
 }
 
-/* Of those that the walk has taken, and of those that kept it from taking a mechanism. */
-void hapi_joint_probes(hapi_physics *physics)
+static hapi_joint_measurement *joint_measurement(hapi_known_joint *known)
 {
-  hapi_joint_table *table = &physics->world.joints;
-  hap_stats *stats = &physics->counts.own.stats;
-  stats->model.measured_joints = 0;
-  stats->model.joint_error = 0.0;
-  if (physics->cycle.model != HAP_MODEL_CONTACT) {
+  if (known->measurement == NULL) {
+    known->measurement = hapi_alloc(sizeof *known->measurement);
+    if (known->measurement == NULL) {
+      hapi_log(HAP_LOG_ERROR, "no memory for what a joint is; its bodies are left to ODE");
+    }
+  }
+  return known->measurement;
+}
+
+void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                       const hapi_slots *slots, uint64_t walk)
+{
+  const hapi_joint_table *table = &world->joints;
+  hapi_probe_counts *counts = &probe->counts;
+  counts->joints = 0;
+  counts->joint_error = 0.0;
+  if (cycle->model != HAP_MODEL_CONTACT) {
     return;
   }
   for (uint32_t i = 0; i < table->count; ++i) {
     hapi_known_joint *known = &table->entries[i];
-    bool taken = known->ranged_in == physics->near.range.number;
-    bool asked = known->wanted_in == physics->near.range.number;
+    bool taken = known->ranged_in == walk;
+    bool asked = known->wanted_in == walk;
     if (known->carried || !asked || dJointGetType(known->joint) == dJointTypeTransmission) {
       continue;
     }
-    if (known->measurement == NULL) {
-      known->measurement = hapi_alloc(sizeof *known->measurement);
-      if (known->measurement == NULL) {
-        hapi_log(HAP_LOG_ERROR, "no memory for what a joint is; its bodies are left to ODE");
-      }
+    const hapi_joint_measurement *found = joint_measurement(known);
+    if (found != NULL && (taken || !found->good)) {
+      joint_measure(probe, cycle, world, slots, known);
     }
-    if (known->measurement != NULL && (taken || !known->measurement->good)) {
-      measure(physics, known);
-    }
-    if (known->measurement != NULL && taken) {
-      ++stats->model.measured_joints;
-      stats->model.joint_error = fmax(stats->model.joint_error, known->measurement->error);
+    if (found != NULL && taken) {
+      ++counts->joints;
+      counts->joint_error = fmax(counts->joint_error, found->error);
     }
   }
 }

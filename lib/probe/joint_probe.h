@@ -10,9 +10,12 @@
 
 #include <ode/ode.h>
 
+#include "near/slots.h"
 #include "sync/messages.h"
+#include "world/cycle.h"
+#include "world/world.h"
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_probe hapi_probe;
 
 typedef struct hapi_joint_measurement {
   bool good;      /* what follows holds */
@@ -24,6 +27,9 @@ typedef struct hapi_joint_measurement {
   double error;      /* 0.., what turning the measurement before this one on would have missed */
 } hapi_joint_measurement;
 
-void hapi_joint_probes(hapi_physics *physics); /* of the joints that the walk asks for */
+/* Of the joints that the range's walk of this number has taken, and of those that kept it from taking
+ * a mechanism. Their measurements belong to the joints. */
+void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                       const hapi_slots *slots, uint64_t walk);
 
 #endif

@@ -1,11 +1,14 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/operating_point.h"
+
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "probe/probe.h"
 
 /* Testing simulations for bodies that the loop of model CONTACT meets but does not own: jointed
  * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of each
@@ -16,214 +19,255 @@
 /* Of the weight: within the plateau between rounding and another set of active contacts. */
 #define PROBE_SHARE 0.01
 
-static double force_of(const hapi_body_slot *slot)
+/* Bodies: what lies behind the border of the range is not worth seven steps of a larger island. */
+#define EDGE_ISLAND_MAX 64u
+
+static hapi_reuse_book *body_book(hapi_probe *probe)
+{
+  return &probe->reuse.books[HAPI_REUSE_BODIES];
+}
+
+/* ---- which bodies ---- */
+
+static double slot_exchanged_norm(const hapi_body_slot *slot)
+{
+  return hapi_v3_norm(slot->exchanged);
+}
+
+/* Those outside of the range that took most of the loop's impulse first. */
+static void edges_choose(hapi_answers *answers, const hapi_slots *slots, uint32_t most)
+{
+  const uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
+  for (uint32_t n = 0; n < most; ++n) {
+    uint32_t best = HAPI_NONE;
+    double best_norm = 0.0;
+    for (uint32_t i = 0; i < slots->body_high; ++i) {
+      const hapi_body_slot *slot = &slots->bodies[i];
+      bool outside =
+          slot->phase == HAPI_SLOT_LIVE && slot->wanted && (answers->bodies[i].flags & role) == 0;
+      if (outside && slot_exchanged_norm(slot) > best_norm) {
+        best = i;
+        best_norm = slot_exchanged_norm(slot);
+      }
+    }
+    if (best == HAPI_NONE) {
+      return;
+    }
+    hapi_body_answer *answer = &answers->bodies[best];
+    answer->edge = true;
+    answer->flags = (answer->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
+  }
+}
+
+/* The islands of the measured bodies. */
+static hap_status bodies_gather(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                                const hapi_slots *slots)
+{
+  hapi_test_set *test = &probe->test;
+  hapi_pushed *pushed = &probe->bodies.pushed;
+  pushed->count = 0;
+  hap_status status = hapi_test_begin(test, world, cycle->probe_step_s);
+  for (uint32_t i = 0; i < slots->body_high && status >= HAP_OK; ++i) {
+    hapi_body_answer *answer = &probe->answers.bodies[i];
+    if (slots->bodies[i].phase != HAPI_SLOT_LIVE || (answer->flags & HAPI_BODY_MEASURED) == 0 ||
+        !hapi_body_is_whole(slots, i)) {
+      continue;
+    }
+    bool testable = false;
+    uint32_t first = test->member_count;
+    status = hapi_probe_add_body(probe, cycle, slots, i, &testable);
+    if (status >= HAP_OK && testable && answer->edge &&
+        test->member_count - first > EDGE_ISLAND_MAX) {
+      hapi_test_drop_island(test, first);
+      answer->flags &= ~(uint32_t)HAPI_BODY_MEASURED;
+      testable = false;
+    }
+    if (status >= HAP_OK && testable) {
+      HAPI_ASSERT_INDEX(pushed->count, pushed->capacity);
+      pushed->slots[pushed->count++] = i;
+    }
+  }
+  return status;
+}
+
+/* ---- a testing simulation ---- */
+
+static double body_push_force(const hapi_body_slot *slot)
 {
   double least = PROBE_SHARE * HAPI_STANDARD_GRAVITY * slot->mass;
   return fmax(least, hapi_v3_norm(slot->exchanged));
 }
 
-static double torque_of(const hapi_physics *physics, const hapi_body_slot *slot)
+static double body_push_torque(const hapi_body_slot *slot, double extent)
 {
-  double arm = physics->world.bodies.entries[slot->known].extent;
-  return force_of(slot) * (arm > 0.0 ? arm : 1.0);
+  return body_push_force(slot) * (extent > 0.0 ? extent : 1.0);
 }
 
-static double exchanged_norm(const hapi_body_slot *slot)
-{
-  return hapi_v3_norm(slot->exchanged);
-}
-
-/* Those that took most of the loop's impulse first. */
-static void choose(hapi_physics *physics)
-{
-  for (uint32_t n = 0; n < physics->cycle.settings.edge_probes; ++n) {
-    hapi_body_slot *best = NULL;
-    for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-      hapi_body_slot *slot = &physics->near.slots.bodies[i];
-      uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
-      bool outside = slot->phase == HAPI_SLOT_LIVE && slot->wanted && (slot->flags & role) == 0;
-      if (outside && exchanged_norm(slot) > (best != NULL ? exchanged_norm(best) : 0.0)) {
-        best = slot;
-      }
-    }
-    if (best == NULL) {
-      return;
-    }
-    best->edge = true;
-    best->flags = (best->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
-  }
-}
-
-static void add_wrench(dBodyID body, const double wrench[6])
+static void body_add_wrench(dBodyID body, const double wrench[6])
 {
   dBodyAddForce(body, wrench[0], wrench[1], wrench[2]);
   dBodyAddTorque(body, wrench[3], wrench[4], wrench[5]);
 }
 
-static dBodyID body_of(const hapi_physics *physics, const hapi_body_slot *slot)
+static void bodies_begin_step(hapi_probe *probe, const hapi_slots *slots)
 {
-  return physics->world.bodies.entries[slot->known].body;
-}
-
-static void begin_probe(hapi_physics *physics)
-{
-  hapi_test_rewind(physics);
-  for (uint32_t i = 0; i < physics->probe.test.body_count; ++i) {
-    const hapi_body_slot *slot = &physics->near.slots.bodies[physics->probe.test.bodies[i]];
-    add_wrench(body_of(physics, slot), slot->exchanged);
+  hapi_test_rewind(&probe->test);
+  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
+    const hapi_body_slot *slot = &slots->bodies[probe->bodies.pushed.slots[i]];
+    body_add_wrench(hapi_test_state(&probe->test, slot->known)->body, slot->exchanged);
   }
-}
-
-static void acceleration(const hapi_physics *physics, const hapi_body_slot *slot, double out[6])
-{
-  const hapi_body_state *before = hapi_test_state(physics, slot->known);
-  const dReal *linear = dBodyGetLinearVel(before->body);
-  const dReal *angular = dBodyGetAngularVel(before->body);
-  for (int i = 0; i < 3; ++i) {
-    out[i] = (linear[i] - before->linear[i]) / physics->cycle.probe_step_s;
-    out[3 + i] = (angular[i] - before->angular[i]) / physics->cycle.probe_step_s;
-  }
-}
-
-static hapi_reuse_book *book_of(hapi_physics *physics)
-{
-  return &physics->probe.reuse.books[1];
 }
 
 /* Without the wrench of the operating point, which the loop's rows give anew. */
-static void keep_b(hapi_body_slot *slot, const double base[6])
+static void answer_keep_b(hapi_body_answer *answer, const double exchanged[6], const double base[6])
 {
   for (int i = 0; i < 6; ++i) {
-    slot->b[i] = base[i];
+    answer->b[i] = base[i];
     for (int k = 0; k < 6; ++k) {
-      slot->b[i] -= slot->response[i][k] * slot->exchanged[k];
+      answer->b[i] -= answer->response[i][k] * exchanged[k];
     }
   }
-  slot->flags |= HAPI_BODY_WHOLE;
+  answer->flags |= HAPI_BODY_WHOLE;
 }
 
-static void keep(hapi_physics *physics, hapi_body_slot *slot, double a[6][6], const double base[6])
+/* Where it cannot be one the last good one stays, or the body is outside. */
+static void body_keep(hapi_probe *probe, const hapi_slots *slots, uint32_t index, double a[6][6],
+                      const double base[6])
 {
-  hap_stats *stats = &physics->counts.own.stats;
+  const hapi_body_slot *slot = &slots->bodies[index];
+  hapi_body_answer *answer = &probe->answers.bodies[index];
+  const hapi_body_state *tested = hapi_test_state(&probe->test, slot->known);
   hapi_free_body free;
-  const hapi_body_state *tested = hapi_test_state(physics, slot->known);
   hapi_accelerance_free_body(tested->body, tested->rotation, &free);
   hapi_admittance kind =
       hapi_finite(base, 6) ? hapi_admittance_tidy_body(&free, a) : HAPI_ADMITTANCE_SINGULAR;
-  stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+  hapi_probe_count(probe, kind);
   if (kind == HAPI_ADMITTANCE_SINGULAR) {
-    ++stats->probes.singular; /* the last good one stays, or the body is outside */
-    slot->flags &= slot->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
-    slot->flags |= slot->measured ? (uint32_t)HAPI_BODY_WHOLE : 0u;
-    hapi_reuse_spoil(physics, book_of(physics), slot->known);
+    answer->flags &= answer->measured ? ~0u : ~(uint32_t)HAPI_BODY_MEASURED;
+    answer->flags |= answer->measured ? (uint32_t)HAPI_BODY_WHOLE : 0u;
+    hapi_reuse_spoil(body_book(probe), &probe->test, slot->known);
     return;
   }
-  memcpy(slot->response, a, sizeof slot->response);
-  keep_b(slot, base);
-  slot->measured = true;
+  memcpy(answer->response, a, sizeof answer->response);
+  answer_keep_b(answer, slot->exchanged, base);
+  answer->measured = true;
 }
 
-static void measure_body(hapi_physics *physics, hapi_body_slot *slot, const double base[6])
+static void body_measure(hapi_probe *probe, const hapi_slots *slots, uint32_t index,
+                         const double base[6])
 {
+  const hapi_body_slot *slot = &slots->bodies[index];
+  double extent = probe->test.world->bodies.entries[slot->known].extent;
+  dBodyID body = hapi_test_state(&probe->test, slot->known)->body;
   double a[6][6];
   for (int axis = 0; axis < 6; ++axis) {
     double wrench[6] = {0.0};
     double column[6];
-    wrench[axis] = axis < 3 ? force_of(slot) : torque_of(physics, slot);
-    begin_probe(physics);
-    add_wrench(body_of(physics, slot), wrench);
-    hapi_test_step(physics);
-    acceleration(physics, slot, column);
+    wrench[axis] = axis < 3 ? body_push_force(slot) : body_push_torque(slot, extent);
+    bodies_begin_step(probe, slots);
+    body_add_wrench(body, wrench);
+    hapi_test_step(&probe->test);
+    hapi_test_acceleration(&probe->test, slot->known, column);
     for (int i = 0; i < 6; ++i) {
       a[i][axis] = (column[i] - base[i]) / wrench[axis];
     }
   }
-  keep(physics, slot, a, base);
+  body_keep(probe, slots, index, a, base);
 }
 
 /* The step that all differences are taken from. */
-static void measure_base(hapi_physics *physics)
+static void bodies_measure_base(hapi_probe *probe, const hapi_slots *slots)
 {
-  const hapi_test_set *test = &physics->probe.test;
-  begin_probe(physics);
-  hapi_test_step(physics);
-  for (uint32_t i = 0; i < test->body_count; ++i) {
-    acceleration(physics, &physics->near.slots.bodies[test->bodies[i]], test->base[i]);
+  bodies_begin_step(probe, slots);
+  hapi_test_step(&probe->test);
+  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
+    uint32_t known = slots->bodies[probe->bodies.pushed.slots[i]].known;
+    hapi_test_acceleration(&probe->test, known, probe->bodies.base[i]);
   }
 }
 
+/* ---- all of them ---- */
+
 /* Islands whose response holds still. All are gathered again then. */
-static hap_status measure_b_alone(hapi_physics *physics)
+static hap_status islands_measure_b_alone(hapi_probe *probe, const hapi_cycle *cycle,
+                                          const hapi_world *world, const hapi_slots *slots)
 {
-  if (!hapi_reuse_has(book_of(physics), HAPI_REUSE_A)) {
+  hapi_reuse_book *book = body_book(probe);
+  if (!hapi_reuse_has(book, HAPI_REUSE_A)) {
     return HAP_OK;
   }
-  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_A);
-  hap_status status = hapi_test_enter(physics);
+  hapi_reuse_select(book, HAPI_REUSE_A, slots, &probe->test, &probe->bodies.pushed);
+  hap_status status = hapi_test_enter(&probe->test);
   if (status < HAP_OK) {
     return status;
   }
-  measure_base(physics);
-  for (uint32_t i = 0; i < physics->probe.test.body_count; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[physics->probe.test.bodies[i]];
-    if (hapi_finite(physics->probe.test.base[i], 6)) {
-      keep_b(slot, physics->probe.test.base[i]);
+  bodies_measure_base(probe, slots);
+  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
+    uint32_t index = probe->bodies.pushed.slots[i];
+    const hapi_body_slot *slot = &slots->bodies[index];
+    if (hapi_finite(probe->bodies.base[i], 6)) {
+      answer_keep_b(&probe->answers.bodies[index], slot->exchanged, probe->bodies.base[i]);
     } else {
-      hapi_reuse_spoil(physics, book_of(physics), slot->known);
+      hapi_reuse_spoil(book, &probe->test, slot->known);
     }
   }
-  hapi_test_leave(physics);
-  return hapi_test_gather_bodies(physics);
+  hapi_test_leave(&probe->test);
+  return bodies_gather(probe, cycle, world, slots);
 }
 
 /* The flags are of this cycle, the response of another. */
-static void take_again(hapi_physics *physics)
+static void bodies_take_again(hapi_probe *probe, const hapi_slots *slots)
 {
-  for (uint32_t i = 0; i < physics->probe.test.body_count; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[physics->probe.test.bodies[i]];
-    if (hapi_reuse_kind_of(physics, book_of(physics), slot->known) != HAPI_REUSE_NONE) {
-      slot->flags |= HAPI_BODY_WHOLE;
+  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
+    uint32_t index = probe->bodies.pushed.slots[i];
+    uint32_t known = slots->bodies[index].known;
+    if (hapi_reuse_kind_of(body_book(probe), &probe->test, known) != HAPI_REUSE_NONE) {
+      probe->answers.bodies[index].flags |= HAPI_BODY_WHOLE;
     }
   }
 }
 
-static hap_status measure(hapi_physics *physics)
+static hap_status bodies_measure(hapi_probe *probe, const hapi_cycle *cycle,
+                                 const hapi_world *world, const hapi_slots *slots)
 {
-  hapi_test_set *test = &physics->probe.test;
-  hap_status status = hapi_test_gather_bodies(physics);
+  hapi_pushed *pushed = &probe->bodies.pushed;
+  hapi_reuse_book *book = body_book(probe);
+  hap_status status = bodies_gather(probe, cycle, world, slots);
   if (status >= HAP_OK) {
-    hapi_reuse_look(physics, book_of(physics), true);
-    status = measure_b_alone(physics);
+    const hapi_reuse_input input = {cycle, slots, &probe->answers, &probe->test};
+    hapi_reuse_look(&probe->reuse, book, &input, pushed);
+    status = islands_measure_b_alone(probe, cycle, world, slots);
   }
   if (status < HAP_OK) {
     return status;
   }
-  take_again(physics);
-  hapi_reuse_select(physics, book_of(physics), HAPI_REUSE_NONE);
-  if (test->body_count > 0) {
-    status = hapi_test_enter(physics);
+  bodies_take_again(probe, slots);
+  hapi_reuse_select(book, HAPI_REUSE_NONE, slots, &probe->test, pushed);
+  if (pushed->count > 0) {
+    status = hapi_test_enter(&probe->test);
     if (status < HAP_OK) {
       return status;
     }
-    measure_base(physics);
-    for (uint32_t i = 0; i < test->body_count; ++i) {
-      measure_body(physics, &physics->near.slots.bodies[test->bodies[i]], test->base[i]);
+    bodies_measure_base(probe, slots);
+    for (uint32_t i = 0; i < pushed->count; ++i) {
+      body_measure(probe, slots, pushed->slots[i], probe->bodies.base[i]);
     }
-    hapi_test_leave(physics);
+    hapi_test_leave(&probe->test);
   }
-  hapi_reuse_keep(physics, book_of(physics));
+  probe->counts.reused += hapi_reuse_keep(book);
   return HAP_OK;
 }
 
-void hapi_operating_point_measure(hapi_physics *physics)
+void hapi_operating_point_measure(hapi_probe *probe, const hapi_cycle *cycle,
+                                  const hapi_world *world, const hapi_slots *slots)
 {
-  if (physics->cycle.model != HAP_MODEL_CONTACT) {
+  if (cycle->model != HAP_MODEL_CONTACT) {
     return;
   }
-  if (!hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_TESTING)) {
-    choose(physics);
+  if (!hapi_wish_is_off(cycle->wishes, HAP_EFFECT_TESTING)) {
+    edges_choose(&probe->answers, slots, cycle->settings.edge_probes);
   }
-  if (measure(physics) < HAP_OK) {
+  if (bodies_measure(probe, cycle, world, slots) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last response stays");
   }
 }

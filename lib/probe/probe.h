@@ -8,17 +8,41 @@
 #include <stdbool.h>
 
 #include "probe/accelerance.h"
+#include "probe/answers.h"
 #include "probe/joint_probe.h"
+#include "probe/operating_point.h"
 #include "probe/reuse.h"
-#include "probe/snapshot.h"
 #include "probe/test_set.h"
 
+typedef struct hapi_probe_counts {
+  uint64_t joint_steps; /* of joint_probe.c; those of a test set are in it */
+  uint64_t clipped;
+  uint64_t singular;
+  uint64_t reused;
+  uint32_t joints;    /* measured, in the newest model */
+  double joint_error; /* the largest of theirs */
+} hapi_probe_counts;
+
 typedef struct hapi_probe {
-  hapi_snapshot snapshot;
   hapi_test_set test;
+  hapi_answers answers;
+  hapi_contact_trials contacts;
+  hapi_body_trials bodies;
   hapi_reuse reuse;
+  hapi_probe_counts counts;
   bool said_not_probed; /* of a transmission, once a session */
   bool said_not_held;   /* of a joint that cannot be measured, likewise */
 } hapi_probe;
+
+bool hapi_probe_create(hapi_probe *probe, const hapi_capacity *capacity); /* false: no memory */
+void hapi_probe_finish(hapi_probe *probe);
+/* A session begins: nothing was found out. */
+void hapi_probe_reset(hapi_probe *probe);
+/* Kind of an answer that was measured. */
+void hapi_probe_count(hapi_probe *probe, hapi_admittance kind);
+/* The island of a body in a slot joins the test set. *out_testable: it can be undone, else the body is
+ * driven from now on. HAP_ERROR_MEMORY. */
+hap_status hapi_probe_add_body(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
+                               uint32_t body, bool *out_testable);
 
 #endif

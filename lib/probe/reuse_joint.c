@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <hapode/ode.h>
+#include <ode/ode.h>
 
-#include "physics/physics_internal.h"
+#include "probe/reuse.h"
 
 /* What ODE's getters say of a joint. Some of it has none: how a fixed joint or a slider has its bodies
  * turned. That shows as an error of the joint, which is in b; so b of an island with joints is always
@@ -96,7 +96,7 @@ static const joint_reader readers[] = {
      {NULL}},
 };
 
-static const joint_reader *reader_of(dJointType type)
+static const joint_reader *joint_reader_of(dJointType type)
 {
   for (size_t i = 0; i < sizeof readers / sizeof readers[0]; ++i) {
     if (readers[i].type == type) {
@@ -158,7 +158,7 @@ static void print_motor(hapi_printer *p, dJointID joint, double arm)
 
 void hapi_print_joint(hapi_printer *p, dJointID joint, double arm)
 {
-  const joint_reader *reader = reader_of(dJointGetType(joint));
+  const joint_reader *reader = joint_reader_of(dJointGetType(joint));
   if (reader == NULL) {
     p->good = false;
     return;

@@ -1,12 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/reuse.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
 
 /* All that decides what a testing simulation finds. Lengths are compared as they are, turns at the far
  * point of a body, velocities by the way of a step, forces by the way that they would push the body in
@@ -17,14 +18,15 @@
 
 void hapi_print_value(hapi_printer *p, double value, double weight)
 {
-  hapi_reuse_book *book = p->book;
-  bool room = book->count < book->capacity || hapi_reserve((void **)&book->items, &book->capacity,
-                                                           book->count, 1, sizeof *book->items);
+  hapi_print_sheet *sheet = &p->book->now;
+  bool room =
+      sheet->count < sheet->capacity ||
+      hapi_reserve((void **)&sheet->items, &sheet->capacity, sheet->count, 1, sizeof *sheet->items);
   if (!room || (weight >= 0.0 && !isfinite(value))) {
     p->good = false;
     return;
   }
-  book->items[book->count++] = (hapi_print_item){value, value, weight};
+  sheet->items[sheet->count++] = (hapi_print_item){value, value, weight};
 }
 
 void hapi_print_vector(hapi_printer *p, const double *values, int count, double weight)
@@ -42,8 +44,8 @@ static void print_hash(hapi_printer *p, uint64_t hash)
 
 static void print_world(hapi_printer *p)
 {
-  const hapi_physics *physics = p->physics;
-  dWorldID world = physics->world.ode.world;
+  const hapi_cycle *cycle = p->input->cycle;
+  dWorldID world = p->input->test->world->ode.world;
   dVector3 gravity = {0.0, 0.0, 0.0, 0.0};
   dWorldGetGravity(world, gravity);
   hapi_print_vector(p, gravity, 3, SAME);
@@ -53,9 +55,9 @@ static void print_world(hapi_printer *p)
   hapi_print_value(p, dWorldGetQuickStepW(world), SAME);
   hapi_print_value(p, dWorldGetContactMaxCorrectingVel(world), SAME);
   hapi_print_value(p, dWorldGetContactSurfaceLayer(world), SAME);
-  hapi_print_value(p, physics->cycle.probe_step_s, SAME);
-  hapi_print_value(p, physics->cycle.model, SAME);
-  hapi_print_value(p, hapi_wish(physics->cycle.wishes, HAP_EFFECT_CROSS), SAME);
+  hapi_print_value(p, cycle->probe_step_s, SAME);
+  hapi_print_value(p, cycle->model, SAME);
+  hapi_print_value(p, hapi_wish(cycle->wishes, HAP_EFFECT_CROSS), SAME);
 }
 
 /* ---- bodies ---- */
@@ -68,10 +70,15 @@ typedef struct measures {
   double torque;   /* m per N m, at the far point */
 } measures;
 
-static void measure(const hapi_physics *physics, uint32_t known, const dMass *mass, measures *out)
+static const hapi_known_body *known_body(const hapi_printer *p, uint32_t known)
 {
-  double step = physics->cycle.probe_step_s;
-  double extent = physics->world.bodies.entries[known].extent;
+  return &p->input->test->world->bodies.entries[known];
+}
+
+static void body_measures(const hapi_printer *p, uint32_t known, const dMass *mass, measures *out)
+{
+  double step = p->input->cycle->probe_step_s;
+  double extent = known_body(p, known)->extent;
   double inertia[9];
   double inverse[9];
   for (int i = 0; i < 9; ++i) {
@@ -110,15 +117,15 @@ static void print_mass(hapi_printer *p, dBodyID body, const dMass *mass)
 /* The loop's slot: what is found is kept there. */
 static void print_slot(hapi_printer *p, uint32_t index)
 {
-  const hapi_body_slot *slot = index != HAPI_NONE ? &p->physics->near.slots.bodies[index] : NULL;
+  bool local = index != HAPI_NONE;
   hapi_print_value(p, index, SAME);
-  hapi_print_value(p, slot != NULL ? slot->generation : 0, SAME);
-  hapi_print_value(p, slot != NULL ? slot->flags & HAPI_BODY_DRIVEN : 0, SAME);
+  hapi_print_value(p, local ? p->input->slots->bodies[index].generation : 0, SAME);
+  hapi_print_value(p, local ? p->input->answers->bodies[index].flags & HAPI_BODY_DRIVEN : 0, SAME);
 }
 
 static void print_body(hapi_printer *p, uint32_t known, const dMass *mass, const measures *m)
 {
-  const hapi_known_body *entry = &p->physics->world.bodies.entries[known];
+  const hapi_known_body *entry = known_body(p, known);
   dBodyID body = entry->body;
   print_hash(p, entry->rest->birth);
   print_slot(p, entry->slot);
@@ -133,7 +140,7 @@ static void print_body(hapi_printer *p, uint32_t known, const dMass *mass, const
 
 /* ---- contacts and joints ---- */
 
-static uint64_t hash_of_surface(const dSurfaceParameters *s)
+static uint64_t surface_hash(const dSurfaceParameters *s)
 {
   const double values[] = {s->mode,    s->mu,      s->mu2,        s->rho,      s->rho2,
                            s->rhoN,    s->bounce,  s->bounce_vel, s->soft_erp, s->soft_cfm,
@@ -148,10 +155,10 @@ static uint64_t hash_of_surface(const dSurfaceParameters *s)
   return hash;
 }
 
-static uint64_t birth_of(const hapi_physics *physics, dBodyID body)
+static uint64_t body_birth(const hapi_printer *p, dBodyID body)
 {
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  return known != HAPI_NONE ? physics->world.bodies.entries[known].rest->birth : 0;
+  uint32_t known = hapi_bodies_find(&p->input->test->world->bodies, body);
+  return known != HAPI_NONE ? known_body(p, known)->rest->birth : 0;
 }
 
 /* Directions that are those of one of the bodies. */
@@ -160,22 +167,22 @@ static uint64_t birth_of(const hapi_physics *physics, dBodyID body)
 /* A space gives a pair in any order. */
 static void print_contact(hapi_printer *p, dJointID joint, double arm)
 {
-  hapi_reuse_book *book = p->book;
-  const dContact *contact = hapi_world_contact_of(&p->physics->world, joint);
+  hapi_print_sheet *sheet = &p->book->now;
+  const dContact *contact = hapi_world_contact_of(p->input->test->world, joint);
   p->good = p->good && contact != NULL &&
-            hapi_reserve((void **)&book->touches, &book->touch_capacity, book->touch_count, 1,
-                         sizeof *book->touches);
+            hapi_reserve((void **)&sheet->touches, &sheet->touch_capacity, sheet->touch_count, 1,
+                         sizeof *sheet->touches);
   if (!p->good) {
     return;
   }
-  hapi_touch_print *out = &book->touches[book->touch_count++];
+  hapi_touch_print *out = &sheet->touches[sheet->touch_count++];
   memset(out, 0, sizeof *out);
-  uint64_t first = birth_of(p->physics, dJointGetBody(joint, 0));
-  uint64_t second = birth_of(p->physics, dJointGetBody(joint, 1));
+  uint64_t first = body_birth(p, dJointGetBody(joint, 0));
+  uint64_t second = body_birth(p, dJointGetBody(joint, 1));
   bool turned = first > second && (contact->surface.mode & MOTIONS) == 0;
   out->births[0] = turned ? second : first;
   out->births[1] = turned ? first : second;
-  out->surface = hash_of_surface(&contact->surface);
+  out->surface = surface_hash(&contact->surface);
   out->arm = arm;
   hapi_v3_copy(contact->geom.pos, out->position);
   hapi_v3_scale(turned ? -1.0 : 1.0, contact->geom.normal, out->normal);
@@ -194,13 +201,13 @@ static void print_held(hapi_printer *p, dJointID joint, double arm)
   p->island->has_joints = true;
   hapi_print_value(p, dJointGetType(joint), SAME);
   for (int i = 0; i < 2; ++i) {
-    print_hash(p, birth_of(p->physics, dJointGetBody(joint, i)));
+    print_hash(p, body_birth(p, dJointGetBody(joint, i)));
   }
   hapi_print_joint(p, joint, arm);
 }
 
 /* A joint of two moving bodies is met at the first of them. */
-static bool is_met_here(dBodyID body, dJointID joint)
+static bool joint_is_met_at(dBodyID body, dJointID joint)
 {
   dBodyID first = dJointGetBody(joint, 0);
   return first == NULL || first == body || dBodyIsKinematic(first);
@@ -208,16 +215,16 @@ static bool is_met_here(dBodyID body, dJointID joint)
 
 static void print_member(hapi_printer *p, uint32_t known)
 {
-  dBodyID body = p->physics->world.bodies.entries[known].body;
+  dBodyID body = known_body(p, known)->body;
   dMass mass;
   measures m;
   dBodyGetMass(body, &mass);
-  measure(p->physics, known, &mass, &m);
+  body_measures(p, known, &mass, &m);
   print_body(p, known, &mass, &m);
   int joints = dBodyIsKinematic(body) ? 0 : dBodyGetNumJoints(body);
   for (int i = 0; i < joints && p->good; ++i) {
     dJointID joint = dBodyGetJoint(body, i);
-    if (dJointIsEnabled(joint) && is_met_here(body, joint)) {
+    if (dJointIsEnabled(joint) && joint_is_met_at(body, joint)) {
       print_held(p, joint, m.arm);
     }
   }
@@ -227,39 +234,40 @@ static void print_member(hapi_printer *p, uint32_t known)
 
 static void print_pushed_contact(hapi_printer *p, uint32_t index)
 {
-  const hapi_contact_slot *contact = &p->physics->near.slots.contacts[index];
-  uint32_t known = p->physics->near.slots.bodies[contact->body].known;
+  const hapi_contact_slot *contact = &p->input->slots->contacts[index];
+  const hapi_contact_answer *answer = &p->input->answers->contacts[index];
+  uint32_t known = p->input->slots->bodies[contact->body].known;
   dMass mass;
   measures m;
-  dBodyGetMass(p->physics->world.bodies.entries[known].body, &mass);
-  measure(p->physics, known, &mass, &m);
+  dBodyGetMass(known_body(p, known)->body, &mass);
+  body_measures(p, known, &mass, &m);
   hapi_print_value(p, index, SAME);
   hapi_print_value(p, contact->generation, SAME);
   hapi_print_value(p, contact->body, SAME);
-  hapi_print_value(p, contact->probed, SAME);
+  hapi_print_value(p, answer->probed, SAME);
   hapi_print_value(p, contact->mu > 0.0, SAME);
   hapi_print_value(p, contact->finger_radius, SAME);
   hapi_print_vector(p, contact->point_body, 3, 1.0);
   hapi_print_vector(p, contact->normal_body, 3, m.arm);
   hapi_print_vector(p, contact->last_force, 3, m.force);
-  hapi_print_value(p, hapi_accelerance_push(p->physics, contact), m.force);
+  hapi_print_value(p, answer->push, m.force);
 }
 
 static void print_pushed_body(hapi_printer *p, uint32_t index)
 {
-  const hapi_body_slot *slot = &p->physics->near.slots.bodies[index];
+  const hapi_body_slot *slot = &p->input->slots->bodies[index];
   dMass mass;
   measures m;
-  dBodyGetMass(p->physics->world.bodies.entries[slot->known].body, &mass);
-  measure(p->physics, slot->known, &mass, &m);
+  dBodyGetMass(known_body(p, slot->known)->body, &mass);
+  body_measures(p, slot->known, &mass, &m);
   hapi_print_value(p, index, SAME);
   hapi_print_value(p, slot->generation, SAME);
-  hapi_print_value(p, slot->measured, SAME);
+  hapi_print_value(p, p->input->answers->bodies[index].measured, SAME);
   hapi_print_value(p, m.arm, SAME);
   print_wrench(p, slot->exchanged, slot->exchanged + 3, &m);
 }
 
-static int compare_pairs(const void *a, const void *b)
+static int touches_compare(const void *a, const void *b)
 {
   const hapi_touch_print *x = a;
   const hapi_touch_print *y = b;
@@ -268,14 +276,14 @@ static int compare_pairs(const void *a, const void *b)
   return first != 0 ? first : second;
 }
 
-static void sort_touches(hapi_touch_print *touches, uint32_t count)
+static void touches_sort(hapi_touch_print *touches, uint32_t count)
 {
   if (count > 0) {
-    qsort(touches, count, sizeof *touches, compare_pairs);
+    qsort(touches, count, sizeof *touches, touches_compare);
   }
 }
 
-static int compare_births(const void *a, const void *b)
+static int births_compare(const void *a, const void *b)
 {
   const hapi_member_birth *x = a;
   const hapi_member_birth *y = b;
@@ -283,32 +291,32 @@ static int compare_births(const void *a, const void *b)
 }
 
 /* Members are gathered along their contacts, which come in any order. */
-static bool sort_members(hapi_printer *p)
+static bool members_sort(hapi_printer *p)
 {
   hapi_reuse_book *book = p->book;
   const hapi_reuse_island *island = p->island;
-  if (!hapi_reserve((void **)&book->members, &book->member_capacity, 0, island->member_count,
-                    sizeof *book->members)) {
+  if (!hapi_reserve((void **)&book->births, &book->birth_capacity, 0, island->member_count,
+                    sizeof *book->births)) {
     return false;
   }
   for (uint32_t i = 0; i < island->member_count; ++i) {
-    uint32_t known = p->physics->probe.test.members[island->first_member + i];
-    book->members[i].known = known;
-    book->members[i].birth = p->physics->world.bodies.entries[known].rest->birth;
+    uint32_t known = p->input->test->members[island->first_member + i];
+    book->births[i].known = known;
+    book->births[i].birth = known_body(p, known)->rest->birth;
   }
-  qsort(book->members, island->member_count, sizeof *book->members, compare_births);
+  qsort(book->births, island->member_count, sizeof *book->births, births_compare);
   return true;
 }
 
 /* A body that goes farther than that within a step will be elsewhere, or will have another velocity: what is
  * found now cannot be used again. Most islands that a hand pushes are left out here. */
-static bool moves_on(const hapi_printer *p)
+static bool island_moves_on(const hapi_printer *p)
 {
-  const hapi_physics *physics = p->physics;
-  double most = physics->cycle.settings.reuse / physics->cycle.probe_step_s;
+  const hapi_cycle *cycle = p->input->cycle;
+  double most = cycle->settings.reuse / cycle->probe_step_s;
   for (uint32_t i = 0; i < p->island->member_count; ++i) {
-    uint32_t known = physics->probe.test.members[p->island->first_member + i];
-    const hapi_known_body *entry = &physics->world.bodies.entries[known];
+    uint32_t known = p->input->test->members[p->island->first_member + i];
+    const hapi_known_body *entry = known_body(p, known);
     double arm = entry->extent > 0.0 ? entry->extent : 1.0;
     if (hapi_v3_norm(dBodyGetLinearVel(entry->body)) > most ||
         arm * hapi_v3_norm(dBodyGetAngularVel(entry->body)) > most) {
@@ -318,33 +326,31 @@ static bool moves_on(const hapi_printer *p)
   return false;
 }
 
-bool hapi_print_island(hapi_physics *physics, hapi_reuse_book *book, uint32_t island, bool bodies)
+bool hapi_print_island(hapi_printer *p)
 {
-  hapi_reuse_island *of = &book->islands[island];
-  hapi_printer p = {physics, book, of, true};
-  of->first = book->count;
-  of->first_touch = book->touch_count;
-  p.good = !moves_on(&p) && sort_members(&p);
-  if (!p.good) {
+  hapi_reuse_book *book = p->book;
+  hapi_reuse_island *of = p->island;
+  of->first = book->now.count;
+  of->first_touch = book->now.touch_count;
+  p->good = !island_moves_on(p) && members_sort(p);
+  if (!p->good) {
     return false;
   }
-  print_world(&p);
-  for (uint32_t i = 0; i < of->member_count && p.good; ++i) {
-    print_member(&p, book->members[i].known);
+  print_world(p);
+  for (uint32_t i = 0; i < of->member_count && p->good; ++i) {
+    print_member(p, book->births[i].known);
   }
-  for (uint32_t i = of->pushed; i != HAPI_NONE && p.good;) {
-    if (bodies) {
-      print_pushed_body(&p, i);
-      i = physics->near.slots.bodies[i].next_pushed;
+  for (uint32_t i = of->pushed; i != HAPI_NONE && p->good; i = book->next_pushed[i]) {
+    if (book->bodies) {
+      print_pushed_body(p, i);
     } else {
-      print_pushed_contact(&p, i);
-      i = physics->near.slots.contacts[i].next_pushed;
+      print_pushed_contact(p, i);
     }
   }
-  of->count = book->count - of->first;
-  of->touch_count = book->touch_count - of->first_touch;
+  of->count = book->now.count - of->first;
+  of->touch_count = book->now.touch_count - of->first_touch;
   if (of->touch_count > 0) { /* else there may be none at all yet, nor a place for them */
-    sort_touches(book->touches + of->first_touch, of->touch_count);
+    touches_sort(book->now.touches + of->first_touch, of->touch_count);
   }
-  return p.good;
+  return p->good;
 }

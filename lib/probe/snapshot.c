@@ -1,9 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/snapshot.h"
+
 #include <string.h>
 
 #include "base/alloc.h"
-#include "physics/physics_internal.h"
+#include "base/assert.h"
 
 /* Everything a step touches. Poses go back bit by bit through the getters' pointers:
  * dBodySetQuaternion would normalise again. The geoms need no word of it: the step that is undone
@@ -49,6 +51,7 @@ void hapi_snapshot_clear(hapi_snapshot *snapshot)
 
 void hapi_snapshot_add_body(hapi_snapshot *snapshot, dBodyID body, void (*moved_callback)(dBodyID))
 {
+  HAPI_ASSERT_INDEX(snapshot->body_count, snapshot->body_capacity);
   hapi_body_state *state = &snapshot->bodies[snapshot->body_count++];
   state->body = body;
   memcpy(state->position, dBodyGetPosition(body), sizeof state->position);
@@ -64,13 +67,14 @@ void hapi_snapshot_add_body(hapi_snapshot *snapshot, dBodyID body, void (*moved_
 
 void hapi_snapshot_add_feedback(hapi_snapshot *snapshot, dJointFeedback *feedback)
 {
+  HAPI_ASSERT_INDEX(snapshot->feedback_count, snapshot->feedback_capacity);
   hapi_feedback_state *state = &snapshot->feedbacks[snapshot->feedback_count++];
   state->feedback = feedback;
   state->saved = *feedback;
 }
 
 /* The getters give const pointers to the body's own storage. */
-static void write_back(const dReal *storage, const dReal *values, size_t size)
+static void storage_write(const dReal *storage, const dReal *values, size_t size)
 {
   memcpy((dReal *)(uintptr_t)storage, values, size);
 }
@@ -80,13 +84,13 @@ void hapi_snapshot_rewind(const hapi_snapshot *snapshot)
   for (uint32_t i = 0; i < snapshot->body_count; ++i) {
     const hapi_body_state *state = &snapshot->bodies[i];
     dBodyID body = state->body;
-    write_back(dBodyGetPosition(body), state->position, sizeof state->position);
-    write_back(dBodyGetQuaternion(body), state->quat, sizeof state->quat);
-    write_back(dBodyGetRotation(body), state->rotation, sizeof state->rotation);
-    write_back(dBodyGetLinearVel(body), state->linear, sizeof state->linear);
-    write_back(dBodyGetAngularVel(body), state->angular, sizeof state->angular);
-    write_back(dBodyGetForce(body), state->force, sizeof state->force);
-    write_back(dBodyGetTorque(body), state->torque, sizeof state->torque);
+    storage_write(dBodyGetPosition(body), state->position, sizeof state->position);
+    storage_write(dBodyGetQuaternion(body), state->quat, sizeof state->quat);
+    storage_write(dBodyGetRotation(body), state->rotation, sizeof state->rotation);
+    storage_write(dBodyGetLinearVel(body), state->linear, sizeof state->linear);
+    storage_write(dBodyGetAngularVel(body), state->angular, sizeof state->angular);
+    storage_write(dBodyGetForce(body), state->force, sizeof state->force);
+    storage_write(dBodyGetTorque(body), state->torque, sizeof state->torque);
   }
   dRandSetSeed(snapshot->seed);
 }

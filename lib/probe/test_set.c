@@ -1,38 +1,75 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "probe/test_set.h"
+
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
 
 /* The testing simulation: a step of the global world that is undone afterwards. Only the islands
  * under test are stepped. All probes whose difference is taken step the same islands from the same
  * seed: QuickStep shuffles its rows, and another order gives another error. */
 
-/* Bodies: what lies behind the border of the range is not worth seven steps of a larger island. */
-#define EDGE_ISLAND_MAX 64u
-
-static bool dynamic(dBodyID body)
+static bool body_is_dynamic(dBodyID body)
 {
   return body != NULL && !dBodyIsKinematic(body);
 }
 
-static bool add_member(hapi_physics *physics, uint32_t index, uint32_t island)
+static dBodyID member_body(const hapi_test_set *test, uint32_t member)
 {
-  hapi_test_set *test = &physics->probe.test;
+  HAPI_ASSERT_INDEX(member, test->member_count);
+  return test->world->bodies.handles[test->members[member]];
+}
+
+/* ---- who is under test ---- */
+
+static hap_status places_reserve(hapi_test_set *test, uint32_t count)
+{
+  if (count <= test->place_count) {
+    return HAP_OK;
+  }
+  hapi_test_place *places = hapi_alloc_array(count, sizeof *places);
+  if (places == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    places[i].island = HAPI_NONE;
+  }
+  hapi_free(test->places);
+  test->places = places;
+  test->place_count = count;
+  return HAP_OK;
+}
+
+hap_status hapi_test_begin(hapi_test_set *test, const hapi_world *world, double step_s)
+{
+  HAPI_ASSERT(!test->entered);
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    test->places[test->members[i]].island = HAPI_NONE;
+  }
+  test->world = world;
+  test->step_s = step_s;
+  test->member_count = 0;
+  test->island_count = 0;
+  test->mechanisms = false;
+  return places_reserve(test, world->bodies.capacity);
+}
+
+static bool member_add(hapi_test_set *test, uint32_t known, uint32_t island)
+{
+  HAPI_ASSERT_INDEX(known, test->place_count);
   if (!hapi_reserve((void **)&test->members, &test->member_capacity, test->member_count, 1,
                     sizeof *test->members)) {
     return false;
   }
-  physics->world.bodies.entries[index].island = island;
-  physics->world.bodies.entries[index].rest->member = test->member_count;
-  test->members[test->member_count++] = index;
+  test->places[known] = (hapi_test_place){island, test->member_count};
+  test->members[test->member_count++] = known;
   return true;
 }
 
 /* Partner of a body in a joint that is switched on; NULL: the static world. */
-static dBodyID partner(dBodyID body, dJointID joint)
+static dBodyID joint_partner(dBodyID body, dJointID joint)
 {
   if (!dJointIsEnabled(joint)) {
     return NULL;
@@ -42,24 +79,23 @@ static dBodyID partner(dBodyID body, dJointID joint)
 }
 
 /* A kinematic body moves with the island, but nothing passes through it. */
-static bool add_partners(hapi_physics *physics, dBodyID body, uint32_t island)
+static bool island_add_partners(hapi_test_set *test, dBodyID body, uint32_t island)
 {
   int joints = dBodyGetNumJoints(body);
   for (int i = 0; i < joints; ++i) {
     dJointID joint = dBodyGetJoint(body, i);
     if (dJointGetType(joint) != dJointTypeContact) {
-      physics->probe.test.mechanisms = true;
+      test->mechanisms = true;
     }
-    uint32_t other = hapi_bodies_find(&physics->world.bodies, partner(body, joint));
-    if (other != HAPI_NONE && physics->world.bodies.entries[other].island == HAPI_NONE &&
-        !add_member(physics, other, island)) {
+    uint32_t other = hapi_bodies_find(&test->world->bodies, joint_partner(body, joint));
+    if (other != HAPI_NONE && !hapi_test_has(test, other) && !member_add(test, other, island)) {
       return false;
     }
   }
   return true;
 }
 
-static bool has_transmission(dBodyID body)
+static bool body_has_transmission(dBodyID body)
 {
   int joints = dBodyGetNumJoints(body);
   for (int i = 0; i < joints; ++i) {
@@ -71,351 +107,257 @@ static bool has_transmission(dBodyID body)
 }
 
 /* A transmission keeps its phase where nobody can put it back: its island is not probed. */
-static bool can_be_undone(const hapi_physics *physics, uint32_t first)
+static bool island_can_be_undone(const hapi_test_set *test, uint32_t first)
 {
-  const hapi_test_set *test = &physics->probe.test;
   for (uint32_t i = first; test->mechanisms && i < test->member_count; ++i) {
-    if (has_transmission(physics->world.bodies.handles[test->members[i]])) {
+    if (body_has_transmission(member_body(test, i))) {
       return false;
     }
   }
   return true;
 }
 
-static void drop_island(hapi_physics *physics, uint32_t first)
+void hapi_test_drop_island(hapi_test_set *test, uint32_t first)
 {
-  hapi_test_set *test = &physics->probe.test;
+  HAPI_ASSERT(test->island_count > 0 && first <= test->member_count);
   for (uint32_t i = first; i < test->member_count; ++i) {
-    physics->world.bodies.entries[test->members[i]].island = HAPI_NONE;
+    test->places[test->members[i]].island = HAPI_NONE;
   }
   test->member_count = first;
   --test->island_count;
 }
 
-static void say_not_probed(hapi_physics *physics)
+static bool island_gather(hapi_test_set *test, uint32_t start)
 {
-  const char *text =
-      "bodies with a transmission joint are not probed: a pointer feels them as "
-      "moved by the application";
-  hapi_say_once(&physics->cycle, &physics->probe.said_not_probed, text);
-}
-
-static bool gather_island(hapi_physics *physics, uint32_t start)
-{
-  hapi_test_set *test = &physics->probe.test;
   uint32_t island = test->island_count++;
   uint32_t next = test->member_count;
-  bool good = add_member(physics, start, island);
+  bool good = member_add(test, start, island);
   for (; good && next < test->member_count; ++next) {
-    dBodyID body = physics->world.bodies.entries[test->members[next]].body;
-    bool passes = dynamic(body);
+    dBodyID body = member_body(test, next);
+    bool passes = body_is_dynamic(body);
     test->mechanisms = test->mechanisms || !passes; /* its own joints are not walked */
-    good = !passes || add_partners(physics, body, island);
+    good = !passes || island_add_partners(test, body, island);
   }
   return good;
 }
 
-/* More than one pointer contact acts on the body, or another body may. */
-bool hapi_test_is_whole(const hapi_physics *physics, uint32_t body)
+hap_status hapi_test_add_island(hapi_test_set *test, uint32_t known, bool *out_testable)
 {
-  uint32_t contacts = 0;
-  for (uint32_t i = 0; i < physics->near.slots.contact_high && contacts < 2; ++i) {
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[i];
-    contacts += contact->phase == HAPI_SLOT_LIVE && contact->body == body;
+  uint32_t first = test->member_count;
+  *out_testable = true;
+  if (hapi_test_has(test, known)) {
+    return HAP_OK;
   }
-  return physics->near.slots.bodies[body].linked || contacts > 1;
-}
-
-static bool contact_moves_a_body(const hapi_physics *physics, const hapi_contact_slot *contact)
-{
-  if (contact->phase != HAPI_SLOT_LIVE || contact->body == HAPI_SLOT_NONE) {
-    return false;
-  }
-  uint32_t flags = physics->near.slots.bodies[contact->body].flags;
-  bool needs = physics->cycle.model == HAP_MODEL_ACCELERANCE ||
-               ((flags & HAPI_BODY_MEASURED) != 0 && !hapi_test_is_whole(physics, contact->body));
-  return needs && (flags & HAPI_BODY_DRIVEN) == 0 &&
-         !physics->near.slots.bodies[contact->body].known_free;
-}
-
-static void begin_gathering(hapi_physics *physics)
-{
-  hapi_test_set *test = &physics->probe.test;
-  for (uint32_t i = 0; i < test->member_count; ++i) {
-    physics->world.bodies.entries[test->members[i]].island = HAPI_NONE;
-  }
-  test->member_count = 0;
-  test->island_count = 0;
-  test->contact_count = 0;
-  test->body_count = 0;
-  test->mechanisms = false;
-}
-
-/* The island of a body joins the test set. *testable: it can be undone; else the body is driven. */
-static hap_status gather_body(hapi_physics *physics, hapi_body_slot *body, bool *testable)
-{
-  uint32_t first = physics->probe.test.member_count;
-  *testable = true;
-  if (physics->world.bodies.entries[body->known].island == HAPI_NONE &&
-      !gather_island(physics, body->known)) {
+  if (!island_gather(test, known)) {
     return HAP_ERROR_MEMORY;
   }
-  if (!can_be_undone(physics, first)) {
-    drop_island(physics, first);
-    say_not_probed(physics);
-    body->flags = HAPI_BODY_DRIVEN;
-    *testable = false;
+  if (!island_can_be_undone(test, first)) {
+    hapi_test_drop_island(test, first);
+    *out_testable = false;
   }
   return HAP_OK;
 }
 
-hap_status hapi_test_gather(hapi_physics *physics)
+hap_status hapi_test_add_body(hapi_test_set *test, uint32_t known)
 {
-  hapi_test_set *test = &physics->probe.test;
-  hap_status status = HAP_OK;
-  begin_gathering(physics);
-  for (uint32_t i = 0; i < physics->near.slots.contact_high && status >= HAP_OK; ++i) {
-    if (contact_moves_a_body(physics, &physics->near.slots.contacts[i])) {
-      bool testable = false;
-      status = gather_body(
-          physics, &physics->near.slots.bodies[physics->near.slots.contacts[i].body], &testable);
-      if (status >= HAP_OK && testable) {
-        test->contacts[test->contact_count++] = i;
-      }
-    }
-  }
-  return status;
+  test->mechanisms = true;
+  test->island_count = 1;
+  return member_add(test, known, 0) ? HAP_OK : HAP_ERROR_MEMORY;
 }
 
-hap_status hapi_test_gather_bodies(hapi_physics *physics)
-{
-  hapi_test_set *test = &physics->probe.test;
-  hap_status status = HAP_OK;
-  begin_gathering(physics);
-  for (uint32_t i = 0; i < physics->near.slots.body_high && status >= HAP_OK; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    if (slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_MEASURED) != 0 &&
-        hapi_test_is_whole(physics, i)) {
-      bool testable = false;
-      uint32_t first = test->member_count;
-      status = gather_body(physics, slot, &testable);
-      if (status >= HAP_OK && testable && slot->edge &&
-          test->member_count - first > EDGE_ISLAND_MAX) {
-        drop_island(physics, first);
-        slot->flags &= ~(uint32_t)HAPI_BODY_MEASURED;
-        testable = false;
-      }
-      if (status >= HAP_OK && testable) {
-        test->bodies[test->body_count++] = i;
-      }
-    }
-  }
-  return status;
-}
+/* ---- enter and leave ---- */
 
-hap_status hapi_test_gather_owned(hapi_physics *physics)
+static bool joint_list_reserve(hapi_test_off *off, int more)
 {
-  hapi_test_set *test = &physics->probe.test;
-  begin_gathering(physics);
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    const hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    bool owned = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_OWNED) != 0;
-    if (!owned || (slot->flags & HAPI_BODY_RESTING) != 0 ||
-        physics->world.bodies.entries[slot->known].rest->chosen_in !=
-            physics->cycle.model_number + 1) {
-      continue;
-    }
-    uint32_t first = test->member_count;
-    bool known = physics->world.bodies.entries[slot->known].island != HAPI_NONE;
-    if (!known && !gather_island(physics, slot->known)) {
-      return HAP_ERROR_MEMORY;
-    }
-    if (!known && !can_be_undone(physics, first)) {
-      drop_island(physics, first);
-    } else {
-      test->bodies[test->body_count++] = i;
-    }
-  }
-  return HAP_OK;
+  return hapi_reserve((void **)&off->joints, &off->joint_capacity, off->joint_count, (uint32_t)more,
+                      sizeof(dJointID));
 }
 
 /* ODE's island search goes through kinematic bodies: their joints to the outside are cut. */
-static hap_status cut_joints(hapi_physics *physics)
+static hap_status joints_cut_outside(hapi_test_set *test)
 {
-  hapi_test_set *test = &physics->probe.test;
-  test->cut_count = 0;
+  hapi_test_off *off = &test->off;
+  off->joint_count = 0;
   for (uint32_t i = 0; i < test->member_count; ++i) {
-    dBodyID body = physics->world.bodies.entries[test->members[i]].body;
-    int joints = dynamic(body) ? 0 : dBodyGetNumJoints(body);
-    if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
-                      sizeof(dJointID))) {
+    dBodyID body = member_body(test, i);
+    int joints = body_is_dynamic(body) ? 0 : dBodyGetNumJoints(body);
+    if (!joint_list_reserve(off, joints)) {
       return HAP_ERROR_MEMORY;
     }
     for (int k = 0; k < joints; ++k) {
       dJointID joint = dBodyGetJoint(body, k);
-      uint32_t other = hapi_bodies_find(&physics->world.bodies, partner(body, joint));
-      if (other != HAPI_NONE && physics->world.bodies.entries[other].island == HAPI_NONE) {
+      uint32_t other = hapi_bodies_find(&test->world->bodies, joint_partner(body, joint));
+      if (other != HAPI_NONE && !hapi_test_has(test, other)) {
         dJointDisable(joint);
-        test->cut[test->cut_count++] = joint;
+        off->joints[off->joint_count++] = joint;
       }
     }
   }
   return HAP_OK;
 }
 
-static hap_status save_members(hapi_physics *physics)
+static hap_status joints_cut_others(hapi_test_set *test, dJointID kept)
 {
-  hapi_test_set *test = &physics->probe.test;
-  uint32_t joints = 0;
-  for (uint32_t i = 0; test->mechanisms && i < test->member_count; ++i) {
-    joints += (uint32_t)dBodyGetNumJoints(physics->world.bodies.entries[test->members[i]].body);
-  }
-  hap_status status = hapi_snapshot_reserve(&physics->probe.snapshot, test->member_count, joints);
-  if (status < HAP_OK) {
-    return status;
-  }
-  hapi_snapshot_clear(&physics->probe.snapshot);
+  hapi_test_off *off = &test->off;
   for (uint32_t i = 0; i < test->member_count; ++i) {
-    const hapi_known_body *known = &physics->world.bodies.entries[test->members[i]];
-    hapi_snapshot_add_body(&physics->probe.snapshot, known->body, known->rest->moved_callback);
-    int count = test->mechanisms ? dBodyGetNumJoints(known->body) : 0; /* ours have no feedback */
-    for (int k = 0; k < count; ++k) {
-      dJointFeedback *feedback = dJointGetFeedback(dBodyGetJoint(known->body, k));
-      if (feedback != NULL) {
-        hapi_snapshot_add_feedback(&physics->probe.snapshot, feedback); /* twice does no harm */
-      }
-    }
-  }
-  return HAP_OK;
-}
-
-/* All that are awake; the members are switched on again after it. */
-static hap_status switch_off(hapi_physics *physics)
-{
-  hapi_test_set *test = &physics->probe.test;
-  test->disabled_count = 0;
-  if (!hapi_reserve((void **)&test->disabled, &test->disabled_capacity, 0,
-                    physics->world.bodies.high, sizeof(dBodyID))) {
-    return HAP_ERROR_MEMORY;
-  }
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    dBodyID body = physics->world.bodies.handles[i];
-    if (body != NULL && dBodyIsEnabled(body)) {
-      dBodyDisable(body);
-      test->disabled[test->disabled_count++] = body;
-    }
-  }
-  return HAP_OK;
-}
-
-hap_status hapi_test_enter(hapi_physics *physics)
-{
-  hapi_test_set *test = &physics->probe.test;
-  if (physics->world.bodies.starved) {
-    return HAP_ERROR_MEMORY; /* a body that is not known would move, and stay so */
-  }
-  hap_status status = save_members(physics);
-  if (status >= HAP_OK) {
-    status = hapi_space_order_save(physics);
-  }
-  if (status < HAP_OK) {
-    return status;
-  }
-  test->islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(physics->world.ode.world);
-  dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world, 1);
-  hapi_islands_rest(&physics->world);
-  status = cut_joints(physics);
-  if (status >= HAP_OK) {
-    status = switch_off(physics);
-  }
-  for (uint32_t i = 0; i < test->member_count; ++i) {
-    const hapi_known_body *known = &physics->world.bodies.entries[test->members[i]];
-    dBodyEnable(known->body); /* a sleeping body would answer A = 0 */
-    if (known->rest->moved_callback != NULL) {
-      dBodySetMovedCallback(known->body, NULL);
-    }
-  }
-  if (status < HAP_OK) {
-    hapi_test_leave(physics);
-  }
-  return status;
-}
-
-static hap_status cut_others(hapi_physics *physics, dJointID kept)
-{
-  hapi_test_set *test = &physics->probe.test;
-  for (uint32_t i = 0; i < test->member_count; ++i) {
-    dBodyID body = physics->world.bodies.entries[test->members[i]].body;
+    dBodyID body = member_body(test, i);
     int joints = dBodyGetNumJoints(body);
-    if (!hapi_reserve((void **)&test->cut, &test->cut_capacity, test->cut_count, (uint32_t)joints,
-                      sizeof(dJointID))) {
+    if (!joint_list_reserve(off, joints)) {
       return HAP_ERROR_MEMORY;
     }
     for (int k = 0; k < joints; ++k) {
       dJointID joint = dBodyGetJoint(body, k);
       if (joint != kept && dJointIsEnabled(joint)) {
         dJointDisable(joint);
-        test->cut[test->cut_count++] = joint;
+        off->joints[off->joint_count++] = joint;
       }
     }
   }
   return HAP_OK;
 }
 
-hap_status hapi_test_enter_bodies(hapi_physics *physics, const hapi_lookback_body *bodies,
-                                  uint32_t count)
+static hap_status members_save(hapi_test_set *test)
 {
-  begin_gathering(physics);
-  physics->probe.test.mechanisms = true;
-  physics->probe.test.island_count = 1;
-  for (uint32_t i = 0; i < count; ++i) {
-    if (!add_member(physics, bodies[i].known, 0)) {
-      return HAP_ERROR_MEMORY;
+  uint32_t joints = 0;
+  for (uint32_t i = 0; test->mechanisms && i < test->member_count; ++i) {
+    joints += (uint32_t)dBodyGetNumJoints(member_body(test, i));
+  }
+  hap_status status = hapi_snapshot_reserve(&test->snapshot, test->member_count, joints);
+  if (status < HAP_OK) {
+    return status;
+  }
+  hapi_snapshot_clear(&test->snapshot);
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    const hapi_known_body *known = &test->world->bodies.entries[test->members[i]];
+    hapi_snapshot_add_body(&test->snapshot, known->body, known->rest->moved_callback);
+    int count = test->mechanisms ? dBodyGetNumJoints(known->body) : 0; /* ours have no feedback */
+    for (int k = 0; k < count; ++k) {
+      dJointFeedback *feedback = dJointGetFeedback(dBodyGetJoint(known->body, k));
+      if (feedback != NULL) {
+        hapi_snapshot_add_feedback(&test->snapshot, feedback); /* twice does no harm */
+      }
     }
   }
-  return hapi_test_enter(physics);
+  HAPI_ASSERT(test->snapshot.body_count == test->member_count);
+  return HAP_OK;
 }
 
-hap_status hapi_test_enter_pair(hapi_physics *physics, dJointID joint, const uint32_t index[2])
+static hap_status members_save_order(hapi_test_set *test)
 {
-  begin_gathering(physics);
-  physics->probe.test.mechanisms = true;
-  physics->probe.test.island_count = 1;
-  for (int i = 0; i < 2; ++i) {
-    if (index[i] != HAPI_NONE && !add_member(physics, index[i], 0)) {
-      return HAP_ERROR_MEMORY;
-    }
-  }
-  hap_status status = hapi_test_enter(physics);
-  if (status >= HAP_OK) {
-    status = cut_others(physics, joint);
-    if (status < HAP_OK) {
-      hapi_test_leave(physics);
+  hap_status status = HAP_OK;
+  hapi_space_order_begin(&test->order);
+  for (uint32_t i = 0; i < test->member_count && status >= HAP_OK; ++i) {
+    dBodyID body = member_body(test, i);
+    if (test->keeps_order || !dBodyIsEnabled(body)) {
+      status = hapi_space_order_add(&test->order, body);
     }
   }
   return status;
 }
 
-void hapi_test_leave(hapi_physics *physics)
+/* All that are awake; the members are switched on again after it. */
+static hap_status bodies_switch_off(hapi_test_set *test)
 {
-  hapi_test_set *test = &physics->probe.test;
-  for (uint32_t i = 0; i < test->cut_count; ++i) {
-    dJointEnable(test->cut[i]);
+  const hapi_body_table *table = &test->world->bodies;
+  hapi_test_off *off = &test->off;
+  off->body_count = 0;
+  if (!hapi_reserve((void **)&off->bodies, &off->body_capacity, 0, table->high, sizeof(dBodyID))) {
+    return HAP_ERROR_MEMORY;
   }
-  for (uint32_t i = 0; i < test->disabled_count; ++i) {
-    dBodyEnable(test->disabled[i]);
+  for (uint32_t i = 0; i < table->high; ++i) {
+    dBodyID body = table->handles[i];
+    if (body != NULL && dBodyIsEnabled(body)) {
+      dBodyDisable(body);
+      off->bodies[off->body_count++] = body;
+    }
   }
-  hapi_snapshot_restore(&physics->probe.snapshot); /* also switches sleeping members off again */
-  hapi_space_order_restore(physics); /* it asks where the geoms are: after the poses */
-  test->cut_count = 0;
-  test->disabled_count = 0;
-  dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world, test->islands_threads);
-  hapi_islands_go_on(&physics->world);
+  return HAP_OK;
 }
+
+hap_status hapi_test_enter(hapi_test_set *test)
+{
+  HAPI_ASSERT(!test->entered);
+  if (test->world->bodies.starved) {
+    return HAP_ERROR_MEMORY; /* a body that is not known would move, and stay so */
+  }
+  hap_status status = members_save(test);
+  if (status >= HAP_OK) {
+    status = members_save_order(test);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  dWorldID world = test->world->ode.world;
+  test->entered = true;
+  test->off.islands_threads = dWorldGetStepIslandsProcessingMaxThreadCount(world);
+  dWorldSetStepIslandsProcessingMaxThreadCount(world, 1);
+  hapi_islands_rest(test->world);
+  status = joints_cut_outside(test);
+  if (status >= HAP_OK) {
+    status = bodies_switch_off(test);
+  }
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    const hapi_known_body *known = &test->world->bodies.entries[test->members[i]];
+    dBodyEnable(known->body); /* a sleeping body would answer A = 0 */
+    if (known->rest->moved_callback != NULL) {
+      dBodySetMovedCallback(known->body, NULL);
+    }
+  }
+  if (status < HAP_OK) {
+    hapi_test_leave(test);
+  }
+  return status;
+}
+
+hap_status hapi_test_enter_pair(hapi_test_set *test, dJointID joint, const uint32_t index[2])
+{
+  hap_status status = HAP_OK;
+  for (int i = 0; i < 2 && status >= HAP_OK; ++i) {
+    if (index[i] != HAPI_NONE) {
+      status = hapi_test_add_body(test, index[i]);
+    }
+  }
+  if (status >= HAP_OK) {
+    status = hapi_test_enter(test);
+  }
+  if (status < HAP_OK) {
+    return status;
+  }
+  status = joints_cut_others(test, joint);
+  if (status < HAP_OK) {
+    hapi_test_leave(test);
+  }
+  return status;
+}
+
+void hapi_test_leave(hapi_test_set *test)
+{
+  hapi_test_off *off = &test->off;
+  HAPI_ASSERT(test->entered && test->snapshot.body_count == test->member_count);
+  for (uint32_t i = 0; i < off->joint_count; ++i) {
+    dJointEnable(off->joints[i]);
+  }
+  for (uint32_t i = 0; i < off->body_count; ++i) {
+    dBodyEnable(off->bodies[i]);
+  }
+  hapi_snapshot_restore(&test->snapshot); /* also switches sleeping members off again */
+  bool clean = test->keeps_order && test->order.count > 0;
+  hapi_space_order_restore(&test->order);
+  if (clean) { /* as they were: what is dirty does not go to the front */
+    dSpaceClean(test->world->ode.space);
+  }
+  off->joint_count = 0;
+  off->body_count = 0;
+  dWorldSetStepIslandsProcessingMaxThreadCount(test->world->ode.world, off->islands_threads);
+  hapi_islands_go_on(test->world);
+  test->entered = false;
+}
+
+/* ---- a testing simulation ---- */
 
 /* The application's forces of the last step act in a probe as well: it may add them at each step,
  * in a callback that probes must not call. What waits in the accumulators already goes first. */
-static void add_user_wrench(const hapi_known_body *known)
+static void member_add_user_wrench(const hapi_known_body *known)
 {
   const dReal *f = dBodyGetForce(known->body);
   const dReal *t = dBodyGetTorque(known->body);
@@ -428,46 +370,47 @@ static void add_user_wrench(const hapi_known_body *known)
                  known->rest->user_torque[2]);
 }
 
-void hapi_test_rewind(hapi_physics *physics)
+void hapi_test_rewind(hapi_test_set *test)
 {
-  hapi_snapshot_rewind(&physics->probe.snapshot);
-  for (uint32_t i = 0; i < physics->probe.test.member_count; ++i) {
-    add_user_wrench(&physics->world.bodies.entries[physics->probe.test.members[i]]);
+  HAPI_ASSERT(test->entered);
+  hapi_snapshot_rewind(&test->snapshot);
+  for (uint32_t i = 0; i < test->member_count; ++i) {
+    member_add_user_wrench(&test->world->bodies.entries[test->members[i]]);
   }
 }
 
-void hapi_test_step(hapi_physics *physics)
+void hapi_test_step(hapi_test_set *test)
 {
-  ++physics->counts.own.stats.probes.steps;
-  ++physics->counts.own.stats.physics.quickstep_calls;
-  dWorldQuickStep(physics->world.ode.world, physics->cycle.probe_step_s);
+  HAPI_ASSERT(test->entered && test->step_s > 0.0);
+  ++test->steps;
+  dWorldQuickStep(test->world->ode.world, test->step_s);
 }
 
-const hapi_body_state *hapi_test_state(const hapi_physics *physics, uint32_t known)
+const hapi_body_state *hapi_test_state(const hapi_test_set *test, uint32_t known)
 {
-  return &physics->probe.snapshot.bodies[physics->world.bodies.entries[known].rest->member];
+  HAPI_ASSERT(hapi_test_has(test, known));
+  HAPI_ASSERT_INDEX(test->places[known].member, test->snapshot.body_count);
+  return &test->snapshot.bodies[test->places[known].member];
 }
 
-void hapi_test_acceleration(const hapi_physics *physics, uint32_t known, double out[6])
+void hapi_test_acceleration(const hapi_test_set *test, uint32_t known, double out[6])
 {
-  const hapi_body_state *before = hapi_test_state(physics, known);
+  const hapi_body_state *before = hapi_test_state(test, known);
   const dReal *linear = dBodyGetLinearVel(before->body);
   const dReal *angular = dBodyGetAngularVel(before->body);
   for (int i = 0; i < 3; ++i) {
-    out[i] = (linear[i] - before->linear[i]) / physics->cycle.probe_step_s;
-    out[3 + i] = (angular[i] - before->angular[i]) / physics->cycle.probe_step_s;
+    out[i] = (linear[i] - before->linear[i]) / test->step_s;
+    out[3 + i] = (angular[i] - before->angular[i]) / test->step_s;
   }
 }
 
 void hapi_test_finish(hapi_test_set *test)
 {
-  hapi_free(test->contacts);
-  hapi_free(test->bodies);
-  hapi_free(test->base);
-  hapi_free(test->rounds);
   hapi_free(test->members);
-  hapi_free(test->order);
-  hapi_free(test->cut);
-  hapi_free(test->disabled);
+  hapi_free(test->places);
+  hapi_free(test->off.joints);
+  hapi_free(test->off.bodies);
+  hapi_snapshot_finish(&test->snapshot);
+  hapi_space_order_finish(&test->order);
   memset(test, 0, sizeof *test);
 }

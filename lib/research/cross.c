@@ -1,220 +1,260 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "research/cross.h"
+
 #include <math.h>
 #include <string.h>
 
+#include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
 
-/* Cross accelerance: what a force at a pointer contact does to the other local bodies of its island.
- * The testing simulations of the contact have it already; it only has to be read. */
+/* The testing simulations of a contact have the answers of the other bodies already; they only have to
+ * be read. */
 
 /* Of what a free body would do: below it there is nothing but the solver's rounding. */
 #define SHARE_LEAST 1e-6
 
-static bool is_on(const hapi_physics *physics)
+static bool cross_is_on(const hapi_cross *cross)
 {
-  return physics->config.capacity.crosses > 0 && physics->cycle.model == HAP_MODEL_ACCELERANCE &&
-         hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_CROSS);
+  return cross->cycle->config->capacity.crosses > 0 &&
+         cross->cycle->model == HAP_MODEL_ACCELERANCE &&
+         hapi_wish_is_on(cross->cycle->wishes, HAP_EFFECT_CROSS);
 }
 
-/* The time that the effect takes: 0 is handed on where it is off. */
-static int64_t begin_time(const hapi_physics *physics)
+static void cross_count_time(hapi_cross *cross, int64_t begin_ns)
 {
-  return is_on(physics) ? hapi_clock_now() : 0;
+  cross->counts.seconds += 1e-9 * (double)(hapi_clock_now() - begin_ns);
 }
 
-static void end_time(hapi_physics *physics, int64_t begin_ns)
+static uint32_t known_of_contact(const hapi_cross *cross, uint32_t contact)
 {
-  if (begin_ns != 0) {
-    physics->counts.own.cross_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  }
+  return cross->slots->bodies[cross->slots->contacts[contact].body].known;
 }
+
+/* ---- a column ---- */
 
 /* A body that the loop moves, which is under test with the contact and is not the one it pushes. */
-static bool answers(const hapi_physics *physics, const hapi_contact_slot *contact, uint32_t body)
+static bool body_answers(const hapi_cross *cross, uint32_t contact, uint32_t body)
 {
-  const hapi_body_slot *slot = &physics->near.slots.bodies[body];
-  if (slot->phase != HAPI_SLOT_LIVE || (slot->flags & HAPI_BODY_DRIVEN) != 0 ||
-      body == contact->body) {
+  const hapi_body_slot *slot = &cross->slots->bodies[body];
+  if (slot->phase != HAPI_SLOT_LIVE ||
+      (cross->probe->answers.bodies[body].flags & HAPI_BODY_DRIVEN) != 0 ||
+      body == cross->slots->contacts[contact].body) {
     return false;
   }
-  uint32_t pushed = physics->near.slots.bodies[contact->body].known;
-  return physics->world.bodies.entries[slot->known].island ==
-         physics->world.bodies.entries[pushed].island;
+  const hapi_test_set *test = &cross->probe->test;
+  return hapi_test_island(test, slot->known) ==
+         hapi_test_island(test, known_of_contact(cross, contact));
 }
 
-void hapi_cross_column(hapi_physics *physics, const hapi_contact_slot *contact, int axis,
-                       double force)
+static void cross_read_column(void *user, uint32_t contact, int axis, double force)
 {
-  int64_t begin_ns = begin_time(physics);
-  uint32_t bodies = is_on(physics) ? physics->near.slots.body_high : 0;
-  for (uint32_t i = 0; i < bodies; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    if (answers(physics, contact, i)) {
+  hapi_cross *cross = user;
+  int64_t begin_ns = hapi_clock_now();
+  for (uint32_t i = 0; i < cross->slots->body_high; ++i) {
+    if (body_answers(cross, contact, i)) {
+      const double *b = cross->probe->answers.bodies[i].b;
       double acceleration[6];
-      hapi_test_acceleration(physics, slot->known, acceleration);
+      hapi_test_acceleration(&cross->probe->test, cross->slots->bodies[i].known, acceleration);
       for (int k = 0; k < 6; ++k) {
-        slot->cross[k][axis] = (acceleration[k] - slot->b[k]) / force;
+        cross->columns[i][k][axis] = (acceleration[k] - b[k]) / force;
       }
     }
   }
-  end_time(physics, begin_ns);
+  cross_count_time(cross, begin_ns);
 }
 
+/* ---- blocks ---- */
+
 /* (m/s^2)/N, of the body's surface. */
-static double response_of(const hapi_physics *physics, const hapi_body_slot *slot)
+static double body_response(const hapi_cross *cross, uint32_t body)
 {
+  const double(*column)[3] = (const double(*)[3])cross->columns[body];
+  uint32_t known = cross->slots->bodies[body].known;
   double linear = 0.0;
   double angular = 0.0;
   for (int i = 0; i < 3; ++i) {
-    linear += hapi_v3_dot(slot->cross[i], slot->cross[i]);
-    angular += hapi_v3_dot(slot->cross[3 + i], slot->cross[3 + i]);
+    linear += hapi_v3_dot(column[i], column[i]);
+    angular += hapi_v3_dot(column[3 + i], column[3 + i]);
   }
-  return sqrt(linear) + physics->world.bodies.entries[slot->known].extent * sqrt(angular);
+  return sqrt(linear) + cross->probe->test.world->bodies.entries[known].extent * sqrt(angular);
 }
 
 /* A free place, or that of the one that answers least, if that is less; NULL: there is none. */
-static hapi_cross *place_for(hapi_physics *physics, double response)
+static hapi_cross_block *block_place(hapi_cross *cross, double response)
 {
-  if (physics->research.cross_count < physics->config.capacity.crosses) {
-    return &physics->research.crosses[physics->research.cross_count++];
+  if (cross->block_count < cross->cycle->config->capacity.crosses) {
+    return &cross->blocks[cross->block_count++];
   }
-  ++physics->counts.own.stats.model.capacity_dropped;
-  hapi_cross *least = &physics->research.crosses[0];
-  for (uint32_t i = 1; i < physics->research.cross_count; ++i) {
-    if (physics->research.crosses[i].response < least->response) {
-      least = &physics->research.crosses[i];
+  ++cross->counts.dropped;
+  hapi_cross_block *least = &cross->blocks[0];
+  for (uint32_t i = 1; i < cross->block_count; ++i) {
+    if (cross->blocks[i].response < least->response) {
+      least = &cross->blocks[i];
     }
   }
   return least->response < response ? least : NULL;
 }
 
-static void keep_block(hapi_physics *physics, uint32_t contact_index, uint32_t body)
+static void block_keep(hapi_cross *cross, uint32_t contact, uint32_t body)
 {
-  const hapi_contact_slot *contact = &physics->near.slots.contacts[contact_index];
-  hapi_body_slot *slot = &physics->near.slots.bodies[body];
-  double response = response_of(physics, slot);
-  hapi_cross *place = place_for(physics, response);
+  double response = body_response(cross, body);
+  hapi_cross_block *place = block_place(cross, response);
   if (place != NULL) {
-    place->contact = contact_index;
-    place->contact_generation = contact->generation;
+    place->contact = contact;
+    place->contact_generation = cross->slots->contacts[contact].generation;
     place->body = body;
-    place->body_generation = slot->generation;
+    place->body_generation = cross->slots->bodies[body].generation;
     place->response = response;
-    memcpy(place->a, slot->cross, sizeof place->a);
+    memcpy(place->a, cross->columns[body], sizeof place->a);
   }
 }
 
 /* The bodies as they are free: what is pushed at the contact, and what answers. */
-static hapi_admittance tidy(hapi_physics *physics, const hapi_contact_slot *contact, uint32_t body,
-                            double *out_share)
+static hapi_admittance columns_tidy(hapi_cross *cross, uint32_t contact, uint32_t body,
+                                    double *out_share)
 {
-  hapi_body_slot *slot = &physics->near.slots.bodies[body];
-  const hapi_body_slot *pushed = &physics->near.slots.bodies[contact->body];
-  const hapi_body_state *from = hapi_test_state(physics, pushed->known);
-  const hapi_body_state *to = hapi_test_state(physics, slot->known);
+  const hapi_contact_slot *slot = &cross->slots->contacts[contact];
+  const hapi_body_answer *answers = cross->probe->answers.bodies;
+  const hapi_test_set *test = &cross->probe->test;
+  *out_share = 0.0;
+  if (!answers[slot->body].b_is_good || !answers[body].b_is_good) {
+    return HAPI_ADMITTANCE_SINGULAR;
+  }
+  const hapi_body_state *from = hapi_test_state(test, known_of_contact(cross, contact));
+  const hapi_body_state *to = hapi_test_state(test, cross->slots->bodies[body].known);
   hapi_free_body free_from;
   hapi_free_body free_to;
   double arm[3];
-  *out_share = 0.0;
-  if (!pushed->b_is_good || !slot->b_is_good) {
-    return HAPI_ADMITTANCE_SINGULAR;
-  }
   hapi_accelerance_free_body(from->body, from->rotation, &free_from);
   hapi_accelerance_free_body(to->body, to->rotation, &free_to);
-  hapi_quat_rotate(from->quat, contact->point_body, arm);
-  return hapi_admittance_tidy_cross(&free_from, arm, &free_to, slot->cross, out_share);
+  hapi_quat_rotate(from->quat, slot->point_body, arm);
+  return hapi_admittance_tidy_cross(&free_from, arm, &free_to, cross->columns[body], out_share);
 }
 
 /* What is refused is left out: the body then has the world's state at the sync, and no more. */
-void hapi_cross_keep(hapi_physics *physics, uint32_t contact_index)
+static void cross_keep(void *user, uint32_t contact)
 {
-  const hapi_contact_slot *contact = &physics->near.slots.contacts[contact_index];
-  hap_stats *stats = &physics->counts.own.stats;
-  int64_t begin_ns = begin_time(physics);
-  uint32_t bodies = is_on(physics) ? physics->near.slots.body_high : 0;
-  for (uint32_t i = 0; i < bodies; ++i) {
+  hapi_cross *cross = user;
+  int64_t begin_ns = hapi_clock_now();
+  for (uint32_t i = 0; i < cross->slots->body_high; ++i) {
     double share = 0.0;
-    if (answers(physics, contact, i)) {
-      hapi_admittance kind = tidy(physics, contact, i, &share);
-      stats->probes.singular += kind == HAPI_ADMITTANCE_SINGULAR;
-      stats->probes.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
+    if (body_answers(cross, contact, i)) {
+      hapi_admittance kind = columns_tidy(cross, contact, i, &share);
+      cross->counts.singular += kind == HAPI_ADMITTANCE_SINGULAR;
+      cross->counts.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
     }
     if (share > SHARE_LEAST) {
-      keep_block(physics, contact_index, i);
+      block_keep(cross, contact, i);
     }
   }
-  end_time(physics, begin_ns);
+  cross_count_time(cross, begin_ns);
 }
 
-static bool holds(const hapi_physics *physics, const hapi_cross *cross, uint32_t contact)
+static bool block_holds(const hapi_cross *cross, const hapi_cross_block *block)
 {
-  const hapi_body_slot *body = &physics->near.slots.bodies[cross->body];
-  return cross->contact == contact &&
-         cross->contact_generation == physics->near.slots.contacts[contact].generation &&
-         body->phase == HAPI_SLOT_LIVE && cross->body_generation == body->generation;
+  const hapi_body_slot *body = &cross->slots->bodies[block->body];
+  return block->contact_generation == cross->slots->contacts[block->contact].generation &&
+         body->phase == HAPI_SLOT_LIVE && block->body_generation == body->generation;
 }
 
-bool hapi_cross_is_full(const hapi_physics *physics)
+static bool block_stays(const hapi_cross *cross, const hapi_cross_block *block,
+                        const hapi_reuse_book *book)
 {
-  return is_on(physics) && physics->research.cross_count == physics->config.capacity.crosses;
+  const hapi_contact_slot *contact = &cross->slots->contacts[block->contact];
+  return contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
+         block_holds(cross, block) &&
+         hapi_reuse_kind_of(book, &cross->probe->test, known_of_contact(cross, block->contact)) !=
+             HAPI_REUSE_NONE;
 }
 
-void hapi_cross_begin(hapi_physics *physics, const hapi_reuse_book *book)
+static void cross_begin(void *user, const hapi_reuse_book *book)
 {
-  uint32_t count = is_on(physics) ? physics->research.cross_count : 0;
-  physics->research.cross_count = 0;
+  hapi_cross *cross = user;
+  uint32_t count = cross->block_count;
+  cross->block_count = 0;
   for (uint32_t i = 0; i < count; ++i) {
-    const hapi_cross *cross = &physics->research.crosses[i];
-    const hapi_contact_slot *contact = &physics->near.slots.contacts[cross->contact];
-    bool stays =
-        contact->phase == HAPI_SLOT_LIVE && contact->body != HAPI_SLOT_NONE &&
-        holds(physics, cross, cross->contact) &&
-        hapi_reuse_kind_of(physics, book, physics->near.slots.bodies[contact->body].known) !=
-            HAPI_REUSE_NONE;
-    if (stays) {
-      physics->research.crosses[physics->research.cross_count++] = *cross;
+    if (block_stays(cross, &cross->blocks[i], book)) {
+      cross->blocks[cross->block_count++] = cross->blocks[i];
     }
   }
 }
 
-/* Not one whose b was used again, with nothing in it of what the block adds. */
-static bool is_tested(const hapi_physics *physics, const hapi_cross *cross)
+/* What last_force does to the body by the blocks. Of a body that is not under test b was used again,
+ * with nothing in it of what the block adds. */
+static void cross_take_out(void *user, uint32_t body, double io_b[6])
 {
-  const hapi_body_slot *body = &physics->near.slots.bodies[cross->body];
-  return holds(physics, cross, cross->contact) &&
-         physics->world.bodies.entries[body->known].island != HAPI_NONE;
-}
-
-/* b without what the loop is going to add by the blocks that it is given. */
-void hapi_cross_take_out(hapi_physics *physics)
-{
-  int64_t begin_ns = begin_time(physics);
-  uint32_t count = is_on(physics) ? physics->research.cross_count : 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    const hapi_cross *cross = &physics->research.crosses[i];
-    double *b = physics->near.slots.bodies[cross->body].b;
-    for (int k = 0; k < 6 && is_tested(physics, cross); ++k) {
-      b[k] -= hapi_v3_dot(cross->a[k], physics->near.slots.contacts[cross->contact].last_force);
+  hapi_cross *cross = user;
+  int64_t begin_ns = hapi_clock_now();
+  for (uint32_t i = 0; i < cross->block_count; ++i) {
+    const hapi_cross_block *block = &cross->blocks[i];
+    const double *force = cross->slots->contacts[block->contact].last_force;
+    for (int k = 0; k < 6 && block->body == body && block_holds(cross, block); ++k) {
+      io_b[k] -= hapi_v3_dot(block->a[k], force);
     }
   }
-  end_time(physics, begin_ns);
+  cross_count_time(cross, begin_ns);
 }
 
-void hapi_cross_publish(hapi_physics *physics, uint32_t contact, uint32_t number, hapi_model *out)
+/* ---- for others ---- */
+
+bool hapi_cross_create(hapi_cross *cross, const hapi_cycle *cycle, const hapi_slots *slots,
+                       const hapi_probe *probe)
 {
-  int64_t begin_ns = begin_time(physics);
-  uint32_t count = is_on(physics) ? physics->research.cross_count : 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    const hapi_cross *cross = &physics->research.crosses[i];
-    if (holds(physics, cross, contact)) {
+  const hapi_capacity *capacity = &cycle->config->capacity;
+  *cross = (hapi_cross){.cycle = cycle, .slots = slots, .probe = probe};
+  cross->watch =
+      (hapi_contact_watch){cross, cross_begin, cross_read_column, cross_keep, cross_take_out};
+  cross->blocks = hapi_alloc_array(capacity->crosses, sizeof *cross->blocks);
+  cross->columns = hapi_alloc_array(capacity->bodies, sizeof *cross->columns);
+  return cross->blocks != NULL && cross->columns != NULL;
+}
+
+void hapi_cross_finish(hapi_cross *cross)
+{
+  hapi_free(cross->blocks);
+  hapi_free(cross->columns);
+  memset(cross, 0, sizeof *cross);
+}
+
+void hapi_cross_reset(hapi_cross *cross)
+{
+  cross->block_count = 0;
+  cross->counts = (hapi_cross_counts){0};
+}
+
+bool hapi_cross_is_full(const hapi_cross *cross)
+{
+  return cross_is_on(cross) && cross->block_count == cross->cycle->config->capacity.crosses;
+}
+
+const hapi_contact_watch *hapi_cross_watch(hapi_cross *cross)
+{
+  if (cross_is_on(cross)) {
+    return &cross->watch;
+  }
+  bool tests =
+      cross->cycle->model == HAP_MODEL_ACCELERANCE || cross->cycle->model == HAP_MODEL_CONTACT;
+  cross->block_count = tests ? 0 : cross->block_count; /* they are of older simulations then */
+  return NULL;
+}
+
+void hapi_cross_publish(hapi_cross *cross, uint32_t contact, uint32_t number, hapi_model *out)
+{
+  if (!cross_is_on(cross)) {
+    return;
+  }
+  int64_t begin_ns = hapi_clock_now();
+  for (uint32_t i = 0; i < cross->block_count; ++i) {
+    const hapi_cross_block *block = &cross->blocks[i];
+    if (block->contact == contact && block_holds(cross, block)) {
       hapi_model_cross *place = &hapi_model_crosses(out)[out->cross_count++];
       place->contact = number;
-      place->body = cross->body;
-      memcpy(place->a, cross->a, sizeof place->a);
+      place->body = block->body;
+      memcpy(place->a, block->a, sizeof place->a);
     }
   }
-  end_time(physics, begin_ns);
+  cross_count_time(cross, begin_ns);
 }

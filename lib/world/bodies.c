@@ -90,7 +90,6 @@ static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID 
   *known = (hapi_known_body){.body = body, .rest = rest};
   rest->birth = ++table->births;
   known->slot = HAPI_NONE;
-  known->island = HAPI_NONE;
 }
 
 static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)

@@ -45,7 +45,6 @@ typedef struct hapi_known_rest {
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint32_t member;    /* scratch: place in the test set and its snapshot */
   uint64_t chosen_in; /* scratch: model that it was chosen for */
   uint64_t ranged_in; /* scratch: walk that met it */
   int32_t hops; /* scratch: of that walk, from the neighbours; of a mechanism they are those of
@@ -65,7 +64,6 @@ typedef struct hapi_known_body {
   double extent;         /* m, from the body's origin to the far corner of its geoms */
   uint64_t
       geoms_print; /* of the geoms that it was measured of; 0: not yet, or they are not sound */
-  uint32_t island; /* scratch: number of the island under test, HAPI_NONE outside */
   bool found;      /* at least once, by a geom or a joint: it is gone when it is found no more */
   bool sized;      /* all of its geoms are of classes whose sizes are in geoms_print */
   bool measured;   /* the last scan found its geoms changed */
