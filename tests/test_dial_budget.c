@@ -31,6 +31,13 @@ static void set_shares(hapi_physics *physics, double tick, double cycle)
   atomic_store(&physics->dial.share[HAPI_DIAL_PHYSICS], cycle);
 }
 
+/* What a cycle does with the dials. */
+static void follow(hapi_physics *physics)
+{
+  hapi_dial_follow(&physics->dial, &physics->cycle);
+  hapi_physics_fill_settings(physics);
+}
+
 /* So many ticks of a share of their period, of which some are over the budget; a cycle looks at them. */
 static int tell_ticks(hapi_physics *physics, uint64_t ticks, double share, uint64_t over)
 {
@@ -38,15 +45,15 @@ static int tell_ticks(hapi_physics *physics, uint64_t ticks, double share, uint6
   told.over += over;
   told.spent_ns += (double)ticks * share * PERIOD_NS;
   physics->cycle.state->load = told;
-  hapi_dial_follow(physics);
+  follow(physics);
   return physics->dial.sides[HAPI_DIAL_TICK].percent;
 }
 
 static int tell_cycles(hapi_physics *physics, int cycles, double seconds)
 {
   for (int i = 0; i < cycles; ++i) {
-    hapi_dial_note(physics, seconds, 0.0);
-    hapi_dial_follow(physics);
+    hapi_dial_note(&physics->dial, seconds, 0.0);
+    follow(physics);
   }
   return physics->dial.sides[HAPI_DIAL_PHYSICS].percent;
 }
@@ -170,16 +177,16 @@ TEST(looking_back_has_what_is_left)
   test_world w;
   hapi_physics *physics = begin(&w);
   REQUIRE(physics != NULL);
-  CHECK(hapi_dial_spare(physics) == HUGE_VAL);
+  CHECK(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s) == HUGE_VAL);
   set_shares(physics, 0.0, SHARE);
   for (int i = 0; i < 40; ++i) {
-    hapi_dial_note(physics, 9.0 * MS, 7.0 * MS);
-    hapi_dial_follow(physics);
+    hapi_dial_note(&physics->dial, 9.0 * MS, 7.0 * MS);
+    follow(physics);
   }
   CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 50); /* it does not count */
-  CHECK_NEAR(hapi_dial_spare(physics), 3.0 * MS, 1e-6);
-  hapi_dial_note(physics, 6.0 * MS, 0.0);
-  CHECK(hapi_dial_spare(physics) == 0.0);
+  CHECK_NEAR(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s), 3.0 * MS, 1e-6);
+  hapi_dial_note(&physics->dial, 6.0 * MS, 0.0);
+  CHECK(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s) == 0.0);
   world_close(&w);
 }
 
@@ -192,9 +199,9 @@ TEST(looking_back_has_what_is_left)
 static int tell_error(hapi_physics *physics, int windows, double error)
 {
   for (int i = 0; i < windows; ++i) {
-    hapi_dial_note_error(physics, error, WINDOW);
+    (void)hapi_dial_note_error(&physics->dial, error, WINDOW, true);
   }
-  hapi_dial_follow(physics);
+  follow(physics);
   return physics->dial.sides[HAPI_DIAL_TICK].percent;
 }
 

@@ -4,8 +4,8 @@
 
 #include <math.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
 
 #define STEP 10 /* percent, of a turn */
 #define LOOK_TICKS 100u
@@ -18,7 +18,7 @@
 
 /* ---- what a side has to do for its budget ---- */
 
-static void turn(hapi_dial_side *side, int aim, double load, double seconds)
+static void side_turn(hapi_dial_side *side, int aim, double load, double seconds)
 {
   int before = side->percent;
   int steps = hapi_turn_by(&side->turn, load, seconds);
@@ -29,10 +29,9 @@ static void turn(hapi_dial_side *side, int aim, double load, double seconds)
 }
 
 /* Of the ticks that the loop has told of: their mean, and how many were above the budget. */
-static void look_at_ticks(hapi_physics *physics, double budget_s)
+static void dial_look_at_ticks(hapi_dial *dial, const hapi_cycle *cycle, double budget_s)
 {
-  hapi_dial *dial = &physics->dial;
-  const hapi_tick_load *told = &physics->cycle.state->load;
+  const hapi_tick_load *told = &cycle->state->load;
   uint64_t ticks = told->ticks - dial->ticks_seen;
   uint64_t over = told->over - dial->over_seen;
   if (ticks < LOOK_TICKS && (2 * over < ticks || ticks < LOOK_CYCLES)) {
@@ -40,15 +39,15 @@ static void look_at_ticks(hapi_physics *physics, double budget_s)
   }
   double mean_s = 1e-9 * (told->spent_ns - dial->ns_seen) / (double)ticks;
   double load = fmax(mean_s / budget_s, (double)over / (OVER_SHARE * (double)ticks));
-  turn(&dial->sides[HAPI_DIAL_TICK], dial->aim, load, (double)ticks / physics->config.haptic_hz);
+  side_turn(&dial->sides[HAPI_DIAL_TICK], dial->aim, load,
+            (double)ticks / cycle->config->haptic_hz);
   dial->ticks_seen = told->ticks;
   dial->over_seen = told->over;
   dial->ns_seen = told->spent_ns;
 }
 
-static void look_at_cycles(hapi_physics *physics, double budget_s)
+static void dial_look_at_cycles(hapi_dial *dial, double period_s, double budget_s)
 {
-  hapi_dial *dial = &physics->dial;
   hapi_dial_side *side = &dial->sides[HAPI_DIAL_PHYSICS];
   bool burst = side->longest > BURST * budget_s;
   if (side->count == 0 || (side->count < LOOK_CYCLES && !burst)) {
@@ -56,22 +55,21 @@ static void look_at_cycles(hapi_physics *physics, double budget_s)
   }
   double mean_s = side->seconds / (double)side->count;
   double load = fmax(mean_s, side->longest / BURST) / budget_s;
-  turn(side, dial->aim, load, (double)side->count * hapi_physics_period(physics));
+  side_turn(side, dial->aim, load, (double)side->count * period_s);
   side->seconds = side->longest = 0.0;
   side->count = 0;
 }
 
 /* A loop that does not count yet, as it has not had a model with the budget, tells of no ticks. */
-static void follow_budgets(hapi_physics *physics)
+static void dial_follow_budgets(hapi_dial *dial, const hapi_cycle *cycle)
 {
-  hapi_dial *dial = &physics->dial;
-  double tick_s = atomic_load(&dial->share[HAPI_DIAL_TICK]) / physics->config.haptic_hz;
-  double cycle_s = atomic_load(&dial->share[HAPI_DIAL_PHYSICS]) * hapi_physics_period(physics);
-  if (tick_s > 0.0 && physics->cycle.state != NULL) {
-    look_at_ticks(physics, tick_s);
+  double tick_s = atomic_load(&dial->share[HAPI_DIAL_TICK]) / cycle->config->haptic_hz;
+  double cycle_s = atomic_load(&dial->share[HAPI_DIAL_PHYSICS]) * cycle->probe_step_s;
+  if (tick_s > 0.0 && cycle->state != NULL) {
+    dial_look_at_ticks(dial, cycle, tick_s);
   }
   if (cycle_s > 0.0) {
-    look_at_cycles(physics, cycle_s);
+    dial_look_at_cycles(dial, cycle->probe_step_s, cycle_s);
   }
   for (int i = 0; i < HAPI_DIALS; ++i) {
     hapi_dial_side *side = &dial->sides[i];
@@ -83,9 +81,8 @@ static void follow_budgets(hapi_physics *physics)
 
 /* ---- where both are to be ---- */
 
-static void follow_wishes(hapi_physics *physics)
+static void dial_follow_wishes(hapi_dial *dial)
 {
-  hapi_dial *dial = &physics->dial;
   int asked = hapi_dial_percent(atomic_load(&dial->wanted));
   double error = atomic_load(&dial->force_error);
   if (asked == dial->asked && (error > 0.0 || dial->error_in_force == 0.0)) {
@@ -102,18 +99,16 @@ static void follow_wishes(hapi_physics *physics)
 
 /* One step at a time, and the window after a turn is left out: in it things come to where they are under the new
  * settings. Those that come then begin where the session is, not with what the old settings have added up. */
-void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
+bool hapi_dial_note_error(hapi_dial *dial, double error, double seconds, bool turns)
 {
-  hapi_dial *dial = &physics->dial;
   double wanted = atomic_load(&dial->force_error);
   dial->told = wanted > 0.0;
-  if (!dial->told || hapi_tape_plays(physics->tape.tape)) {
-    return;
+  if (!dial->told || !turns) {
+    return false;
   }
   if (dial->settles) {
     dial->settles = false;
-    physics->lookback.end_ns = 0;
-    return;
+    return true;
   }
   double load = error / wanted;
   load = load > 1.0 ? load : fmin(ERROR_SPAN * load, 1.0); /* what is as wanted is not too much */
@@ -124,18 +119,16 @@ void hapi_dial_note_error(hapi_physics *physics, double error, double seconds)
     hapi_dial_side *side = &dial->sides[i];
     side->percent = side->percent >= dial->aim || side->percent > aim ? aim : side->percent;
   }
-  if (aim != dial->aim) {
-    dial->settles = true;
-    physics->lookback.end_ns = 0;
-  }
+  dial->settles = aim != dial->aim;
   dial->aim = aim;
+  HAPI_ASSERT(aim >= 0 && aim <= HAPI_DIAL_MOST);
+  return dial->settles;
 }
 
 /* ---- what is told ---- */
 
-static uint32_t reason_of(const hapi_physics *physics, const hapi_dial_side *side)
+static uint32_t side_reason(const hapi_dial *dial, const hapi_dial_side *side)
 {
-  const hapi_dial *dial = &physics->dial;
   if (side->percent == 0 && side->load > 1.0) {
     return HAP_ACCURACY_LEAST;
   }
@@ -147,18 +140,15 @@ static uint32_t reason_of(const hapi_physics *physics, const hapi_dial_side *sid
                                      : HAP_ACCURACY_UNTOLD;
 }
 
-static void tell(hapi_physics *physics)
+void hapi_dial_tell(const hapi_dial *dial, const hapi_settings *s, hap_accuracy_info *out)
 {
-  const hapi_dial *dial = &physics->dial;
-  const hapi_settings *s = &physics->cycle.settings;
-  hap_accuracy_info *out = &physics->counts.own.accuracy;
   hap_accuracy_side *sides[HAPI_DIALS] = {&out->tick, &out->physics};
   for (int i = 0; i < HAPI_DIALS; ++i) {
     *sides[i] = (hap_accuracy_side){.accuracy = 0.01 * dial->sides[i].percent,
                                     .share = atomic_load(&dial->share[i]),
                                     .load = dial->sides[i].load,
                                     .turns = dial->sides[i].turns,
-                                    .reason = reason_of(physics, &dial->sides[i])};
+                                    .reason = side_reason(dial, &dial->sides[i])};
   }
   for (int i = 0; i < HAPI_DIALS; ++i) {
     sides[i]->load *= sides[i]->share;
@@ -175,72 +165,71 @@ static void tell(hapi_physics *physics)
   out->reuse = s->reuse;
 }
 
-void hapi_dial_reset(hapi_physics *physics)
+void hapi_dial_reset(hapi_dial *dial, int percent)
 {
-  hapi_dial *dial = &physics->dial;
-  int percent = hapi_tape_dial_at_start(physics, hapi_dial_percent(atomic_load(&dial->wanted)));
   dial->asked = dial->aim = percent;
   dial->error_turn = (hapi_turn){0.0};
   dial->error_in_force = atomic_load(&dial->force_error);
   dial->settles = dial->told = false;
   dial->ticks_seen = dial->over_seen = 0;
-  dial->ns_seen = dial->looked_s = dial->rest_s = 0.0;
+  dial->ns_seen = dial->rest_s = 0.0;
   for (int i = 0; i < HAPI_DIALS; ++i) {
     dial->sides[i] = (hapi_dial_side){.percent = percent};
   }
-  hapi_dial_settings(&dial->knobs, percent, percent, 1.0 / physics->config.haptic_hz,
-                     &physics->cycle.settings);
-  tell(physics);
 }
 
-void hapi_dial_follow(hapi_physics *physics)
+void hapi_dial_follow(hapi_dial *dial, const hapi_cycle *cycle)
 {
-  hapi_dial *dial = &physics->dial;
-  if (!hapi_tape_plays(physics->tape.tape)) {
-    follow_wishes(physics);
-    follow_budgets(physics);
+  dial_follow_wishes(dial);
+  dial_follow_budgets(dial, cycle);
+}
+
+void hapi_dial_positions(const hapi_dial *dial, int out_percent[HAPI_DIALS])
+{
+  for (int i = 0; i < HAPI_DIALS; ++i) {
+    out_percent[i] = dial->sides[i].percent;
   }
-  int percent[HAPI_DIALS] = {dial->sides[0].percent, dial->sides[1].percent};
-  hapi_tape_dials(physics, percent);
-  dial->sides[0].percent = percent[0];
-  dial->sides[1].percent = percent[1];
-  hapi_dial_settings(&dial->knobs, percent[HAPI_DIAL_TICK], percent[HAPI_DIAL_PHYSICS],
-                     1.0 / physics->config.haptic_hz, &physics->cycle.settings);
-  tell(physics);
 }
 
-int64_t hapi_dial_tick_budget(hapi_physics *physics)
+void hapi_dial_place(hapi_dial *dial, const int percent[HAPI_DIALS])
 {
-  double share = atomic_load(&physics->dial.share[HAPI_DIAL_TICK]);
-  return (int64_t)(1e9 * share / physics->config.haptic_hz);
+  for (int i = 0; i < HAPI_DIALS; ++i) {
+    dial->sides[i].percent = percent[i];
+  }
+}
+
+void hapi_dial_fill(const hapi_dial *dial, double haptic_hz, hapi_settings *out)
+{
+  hapi_dial_settings(&dial->knobs, dial->sides[HAPI_DIAL_TICK].percent,
+                     dial->sides[HAPI_DIAL_PHYSICS].percent, 1.0 / haptic_hz, out);
+}
+
+int64_t hapi_dial_tick_budget(const hapi_dial *dial, double haptic_hz)
+{
+  return (int64_t)(1e9 * atomic_load(&dial->share[HAPI_DIAL_TICK]) / haptic_hz);
 }
 
 /* ---- around the steps ---- */
 
 /* The number is the application's: it finds it in its callbacks as it set it. */
-void hapi_dial_enter(hapi_physics *physics)
+void hapi_dial_enter(hapi_dial *dial, const hapi_settings *s, dWorldID world)
 {
-  hapi_dial *dial = &physics->dial;
-  const hapi_settings *s = &physics->cycle.settings;
-  dial->own_iterations = dWorldGetQuickStepNumIterations(physics->world.ode.world);
+  dial->own_iterations = dWorldGetQuickStepNumIterations(world);
   double scaled = round(s->iterations * (double)dial->own_iterations);
   scaled = fmin(fmax(scaled, 1.0), fmax(ITERATIONS_MOST, (double)dial->own_iterations));
   dial->iterations = s->fixed_iterations > 0 ? s->fixed_iterations : (int)scaled;
-  dWorldSetQuickStepNumIterations(physics->world.ode.world, dial->iterations);
-  physics->counts.own.accuracy.iterations = dial->iterations;
+  dWorldSetQuickStepNumIterations(world, dial->iterations);
 }
 
-void hapi_dial_leave(hapi_physics *physics)
+void hapi_dial_leave(const hapi_dial *dial, dWorldID world)
 {
-  const hapi_dial *dial = &physics->dial;
-  if (dWorldGetQuickStepNumIterations(physics->world.ode.world) == dial->iterations) {
-    dWorldSetQuickStepNumIterations(physics->world.ode.world, dial->own_iterations);
+  if (dWorldGetQuickStepNumIterations(world) == dial->iterations) {
+    dWorldSetQuickStepNumIterations(world, dial->own_iterations);
   }
 }
 
-void hapi_dial_note(hapi_physics *physics, double seconds, double looked_s)
+void hapi_dial_note(hapi_dial *dial, double seconds, double looked_s)
 {
-  hapi_dial *dial = &physics->dial;
   hapi_dial_side *side = &dial->sides[HAPI_DIAL_PHYSICS];
   double rest_s = seconds - looked_s;
   side->seconds += rest_s;
@@ -249,9 +238,8 @@ void hapi_dial_note(hapi_physics *physics, double seconds, double looked_s)
   dial->rest_s = fmax(rest_s, REST_KEEP * dial->rest_s + (1.0 - REST_KEEP) * rest_s);
 }
 
-double hapi_dial_spare(const hapi_physics *physics)
+double hapi_dial_spare(const hapi_dial *dial, double period_s)
 {
-  double share = atomic_load(&physics->dial.share[HAPI_DIAL_PHYSICS]);
-  double left = share * hapi_physics_period(physics) - physics->dial.rest_s;
-  return share > 0.0 ? fmax(left, 0.0) : HUGE_VAL;
+  double share = atomic_load(&dial->share[HAPI_DIAL_PHYSICS]);
+  return share > 0.0 ? fmax(share * period_s - dial->rest_s, 0.0) : HUGE_VAL;
 }

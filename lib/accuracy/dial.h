@@ -8,11 +8,11 @@
 #include <stdatomic.h>
 
 #include <hapode/accuracy.h>
+#include <ode/ode.h>
 
 #include "accuracy/dial_settings.h"
 #include "accuracy/dial_turn.h"
-
-typedef struct hapi_physics hapi_physics;
+#include "world/cycle.h"
 
 enum {
   HAPI_DIAL_TICK = 0,
@@ -47,25 +47,31 @@ typedef struct hapi_dial {
   uint64_t ticks_seen; /* of the loop's figures */
   uint64_t over_seen;
   double ns_seen;
-  double looked_s; /* of this cycle, for the error estimate, which has only what the rest leaves */
-  double rest_s;   /* of a cycle, without it: of late */
+  double rest_s;      /* of a cycle, without looking back: of late */
   int own_iterations; /* of the world, outside of a cycle's steps */
   int iterations;
 } hapi_dial;
 
-/* [control] At the begin of a session. */
-void hapi_dial_reset(hapi_physics *physics);
-/* What this cycle goes by. */
-void hapi_dial_follow(hapi_physics *physics);
-/* Around all steps of a cycle. */
-void hapi_dial_enter(hapi_physics *physics);
-void hapi_dial_leave(hapi_physics *physics);
+/* [control] At the begin of a session. percent: of both. */
+void hapi_dial_reset(hapi_dial *dial, int percent);
+/* At the begin of a cycle: by what is wished and by the budgets. Not in a replay. */
+void hapi_dial_follow(hapi_dial *dial, const hapi_cycle *cycle);
+/* Positions of both, to and from a recording. */
+void hapi_dial_positions(const hapi_dial *dial, int out_percent[HAPI_DIALS]);
+void hapi_dial_place(hapi_dial *dial, const int percent[HAPI_DIALS]);
+/* What they come to. */
+void hapi_dial_fill(const hapi_dial *dial, double haptic_hz, hapi_settings *out);
+void hapi_dial_tell(const hapi_dial *dial, const hapi_settings *settings, hap_accuracy_info *out);
+/* Around all steps of a cycle: the world's iterations. */
+void hapi_dial_enter(hapi_dial *dial, const hapi_settings *settings, dWorldID world);
+void hapi_dial_leave(const hapi_dial *dial, dWorldID world);
 /* A cycle has taken so long, with the share of it that went into looking back. */
-void hapi_dial_note(hapi_physics *physics, double seconds, double looked_s);
-/* Looking back says that over so long the force was wrong by this share. */
-void hapi_dial_note_error(hapi_physics *physics, double error, double seconds);
-/* s, that the budget leaves for looking back in a cycle. */
-double hapi_dial_spare(const hapi_physics *physics);
-int64_t hapi_dial_tick_budget(hapi_physics *physics); /* ns; 0: none */
+void hapi_dial_note(hapi_dial *dial, double seconds, double looked_s);
+/* Looking back says that over so long the force was wrong by this share. turns: false in a replay. True:
+ * what comes now must not be compared with what was before. */
+bool hapi_dial_note_error(hapi_dial *dial, double error, double seconds, bool turns);
+/* s, that the budget leaves for looking back in a cycle of this period. */
+double hapi_dial_spare(const hapi_dial *dial, double period_s);
+int64_t hapi_dial_tick_budget(const hapi_dial *dial, double haptic_hz); /* ns; 0: none */
 
 #endif

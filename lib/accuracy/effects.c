@@ -1,17 +1,28 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <math.h>
+#include "accuracy/effects.h"
+
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "research/range_error.h"
 
 /* What the effects of the newest model came to, and why: counted from the model itself, as it goes to the
  * loop. */
 
-static hapi_effect_figures *figures(hapi_physics *physics, hap_effect effect)
+/* A look at a model. */
+typedef struct sight {
+  hapi_effect_figures *figures; /* HAP_EFFECTS */
+  const hapi_cycle *cycle;
+  const hapi_body_table *bodies;
+  const hapi_nearby *near;
+  const hapi_answers *answers;
+} sight;
+
+static hapi_effect_figures *figures(const sight *s, hap_effect effect)
 {
-  return &physics->counts.own.effects[effect];
+  return &s->figures[effect];
 }
 
 static bool far(const hapi_model *model)
@@ -19,9 +30,9 @@ static bool far(const hapi_model *model)
   return model->body_count == 0 && model->touches == 0;
 }
 
-static void sum_up(hapi_physics *physics, hap_effect effect, hap_effect_reason none)
+static void sum_up(const sight *s, hap_effect effect, hap_effect_reason none)
 {
-  hapi_effect_sum_up(figures(physics, effect), hapi_wish(physics->cycle.wishes, effect), none);
+  hapi_effect_sum_up(figures(s, effect), hapi_wish(s->cycle->wishes, effect), none);
 }
 
 static uint32_t roles(const hapi_model_body *body)
@@ -37,13 +48,13 @@ static bool asleep(const hapi_model_body *body)
 /* ---- of bodies ---- */
 
 /* Why a body that could turn gyroscopically does not; CALLED: it does. */
-static hap_effect_reason gyro_of(const hapi_physics *physics, const hapi_model_body *in)
+static hap_effect_reason gyro_of(const sight *s, const hapi_model_body *in)
 {
-  dBodyID body = physics->world.bodies.entries[physics->near.slots.bodies[in->slot].known].body;
+  dBodyID body = s->bodies->entries[s->near->slots.bodies[in->slot].known].body;
   if (dBodyGetGyroscopicMode(body) == 0) {
     return HAP_REASON_NOT_IN_WORLD;
   }
-  if (hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_GYRO)) {
+  if (hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_GYRO)) {
     return HAP_REASON_CALLED;
   }
   return in->max_angular_speed == 0.0                         ? HAP_REASON_LOCKED
@@ -53,94 +64,93 @@ static hap_effect_reason gyro_of(const hapi_physics *physics, const hapi_model_b
                                                               : HAP_REASON_CALLED;
 }
 
-static void note_gyro(hapi_physics *physics, const hapi_model_body *body)
+static void note_gyro(const sight *s, const hapi_model_body *body)
 {
-  hap_effect_reason why = gyro_of(physics, body);
-  bool off = hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_GYRO);
+  hap_effect_reason why = gyro_of(s, body);
+  bool off = hapi_wish_is_off(s->cycle->wishes, HAP_EFFECT_GYRO);
   if ((body->flags & HAPI_BODY_OWNED) != 0) {
-    hapi_effect_note(figures(physics, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !off, why);
+    hapi_effect_note(figures(s, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !off, why);
   }
 }
 
 /* Bodies that the loop moves without owning them are what testing simulations are for. */
-static void note_testing(hapi_physics *physics, const hapi_model_body *body)
+static void note_testing(const sight *s, const hapi_model_body *body)
 {
   bool measured = (body->flags & HAPI_BODY_MEASURED) != 0;
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
   if (roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(figures(physics, HAP_EFFECT_TESTING),
-                     measured || (owned && hapi_range_error_wanted(&physics->cycle)),
+    hapi_effect_note(figures(s, HAP_EFFECT_TESTING),
+                     measured || (owned && hapi_range_error_wanted(s->cycle)),
                      owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
   }
 }
 
-static void note_range(hapi_physics *physics, const hapi_model_body *body)
+static void note_range(const sight *s, const hapi_model_body *body)
 {
-  const hapi_known_body *known =
-      &physics->world.bodies.entries[physics->near.slots.bodies[body->slot].known];
-  bool seed = known->rest->chosen_in == physics->cycle.model_number;
+  const hapi_known_body *known = &s->bodies->entries[s->near->slots.bodies[body->slot].known];
+  bool seed = known->rest->chosen_in == s->cycle->model_number;
   if (!seed && roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(figures(physics, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
+    hapi_effect_note(figures(s, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
                      HAP_REASON_OUTSIDE);
   }
 }
 
 /* Of contacts, whether there is anything for a body to touch; of passes, whether it may move. */
-static void note_contacts(hapi_physics *physics, const hapi_model_body *body)
+static void note_contacts(const sight *s, const hapi_model_body *body)
 {
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
   bool linked = owned && (body->flags & HAPI_BODY_ALONE) == 0;
   if (roles(body) != HAPI_BODY_DRIVEN) {
     hap_effect_reason why = owned ? HAP_REASON_ALONE : HAP_REASON_OUTSIDE;
-    hapi_effect_note(figures(physics, HAP_EFFECT_CONTACTS), linked, why);
+    hapi_effect_note(figures(s, HAP_EFFECT_CONTACTS), linked, why);
   }
 }
 
-static void note_bodies(hapi_physics *physics, hapi_model *model)
+static void note_bodies(const sight *s, hapi_model *model)
 {
   const hapi_model_body *bodies = hapi_model_bodies(model);
   for (uint32_t i = 0; i < model->body_count; ++i) {
-    note_gyro(physics, &bodies[i]);
-    note_testing(physics, &bodies[i]);
-    note_range(physics, &bodies[i]);
-    note_contacts(physics, &bodies[i]);
+    note_gyro(s, &bodies[i]);
+    note_testing(s, &bodies[i]);
+    note_range(s, &bodies[i]);
+    note_contacts(s, &bodies[i]);
   }
 }
 
 /* ---- of contacts and joints ---- */
 
-static void note_touches(hapi_physics *physics, hapi_model *model)
+static void note_touches(const sight *s, hapi_model *model)
 {
   const hapi_model_contact *contacts = hapi_model_contacts(model);
-  bool asked = hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_FRICTION);
+  bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
   for (uint32_t i = 0; i < model->contact_count; ++i) {
-    const hapi_contact_slot *slot = &physics->near.slots.contacts[contacts[i].slot];
-    hapi_effect_note(figures(physics, HAP_EFFECT_FRICTION), contacts[i].mu > 0.0 || asked,
+    const hapi_contact_slot *slot = &s->near->slots.contacts[contacts[i].slot];
+    hapi_effect_note(figures(s, HAP_EFFECT_FRICTION), contacts[i].mu > 0.0 || asked,
                      HAP_REASON_NO_FRICTION);
     if (model->model == HAP_MODEL_CONTACT && contacts[i].tool == 0) {
-      hapi_effect_note(figures(physics, HAP_EFFECT_SHAPE), contacts[i].has_shape != 0,
+      hapi_effect_note(figures(s, HAP_EFFECT_SHAPE), contacts[i].has_shape != 0,
                        slot->shape_reason);
     }
   }
 }
 
-static void note_tool_pairs(hapi_physics *physics)
+static void note_tool_pairs(const sight *s)
 {
-  const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(physics->near.range.near);
-  bool asked = hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_FRICTION);
-  for (uint32_t i = 0; i < physics->near.range.near->tool_pair_count; ++i) {
-    hapi_effect_note(figures(physics, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
+  const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(s->near->range.near);
+  bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
+  for (uint32_t i = 0; i < s->near->range.near->tool_pair_count; ++i) {
+    hapi_effect_note(figures(s, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
                      HAP_REASON_NO_FRICTION);
   }
 }
 
 /* The pairs whose bodies all sleep are looked at once, as nothing moves. */
-static void note_passes(hapi_physics *physics, const hapi_model *model)
+static void note_passes(const sight *s, const hapi_model *model)
 {
-  hapi_effect_figures *f = figures(physics, HAP_EFFECT_PASSES);
-  const hapi_near *near = physics->near.range.near;
+  hapi_effect_figures *f = figures(s, HAP_EFFECT_PASSES);
+  const hapi_near *near = s->near->range.near;
   uint32_t pairs = near->pair_count + near->tool_pair_count;
-  hap_effect_wish wish = hapi_wish(physics->cycle.wishes, HAP_EFFECT_PASSES);
+  hap_effect_wish wish = hapi_wish(s->cycle->wishes, HAP_EFFECT_PASSES);
   bool on = wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && pairs > 0);
   f->on = on ? pairs : 0;
   f->of = pairs;
@@ -148,28 +158,27 @@ static void note_passes(hapi_physics *physics, const hapi_model *model)
   hapi_effect_sum_up(f, wish, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
 }
 
-static void note_joints(hapi_physics *physics, hapi_model *model)
+static void note_joints(const sight *s, hapi_model *model)
 {
-  hapi_effect_figures *f = figures(physics, HAP_EFFECT_JOINTS);
+  hapi_effect_figures *f = figures(s, HAP_EFFECT_JOINTS);
   const hapi_model_body *bodies = hapi_model_bodies(model);
   f->on = f->of = model->joint_count;
   for (uint32_t i = 0; i < model->body_count; ++i) {
-    const hapi_known_body *known =
-        &physics->world.bodies.entries[physics->near.slots.bodies[bodies[i].slot].known];
+    const hapi_known_body *known = &s->bodies->entries[s->near->slots.bodies[bodies[i].slot].known];
     if (known->jointed && (bodies[i].flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
       ++f->of; /* tied by joints that the loop does not hold */
       f->reason = HAP_REASON_OUTSIDE;
     }
   }
-  sum_up(physics, HAP_EFFECT_JOINTS, far(model) ? HAP_REASON_FAR : HAP_REASON_FREE);
+  sum_up(s, HAP_EFFECT_JOINTS, far(model) ? HAP_REASON_FAR : HAP_REASON_FREE);
 }
 
-static void note_restitution(hapi_physics *physics, const hapi_model *model)
+static void note_restitution(const sight *s, const hapi_model *model)
 {
-  hapi_effect_figures *f = figures(physics, HAP_EFFECT_RESTITUTION);
+  hapi_effect_figures *f = figures(s, HAP_EFFECT_RESTITUTION);
   f->on = f->of = model->bounces;
-  bool nothing = physics->near.range.near->pair_count + model->joint_count == 0;
-  sum_up(physics, HAP_EFFECT_RESTITUTION,
+  bool nothing = s->near->range.near->pair_count + model->joint_count == 0;
+  sum_up(s, HAP_EFFECT_RESTITUTION,
          far(model) ? HAP_REASON_FAR
          : nothing  ? HAP_REASON_ALONE
                     : HAP_REASON_NO_BOUNCE);
@@ -177,101 +186,79 @@ static void note_restitution(hapi_physics *physics, const hapi_model *model)
 
 /* ---- the models ---- */
 
-static void set(hapi_physics *physics, hap_effect effect, hap_effect_state state,
-                hap_effect_reason reason)
+static void set(const sight *s, hap_effect effect, hap_effect_state state, hap_effect_reason reason)
 {
-  hapi_effect_figures *f = figures(physics, effect);
+  hapi_effect_figures *f = figures(s, effect);
   f->on = f->of = 0;
   f->state = (uint32_t)state;
   f->reason = (uint32_t)reason;
 }
 
-static void note_model_contact(hapi_physics *physics, hapi_model *model)
+static void note_model_contact(const sight *s, hapi_model *model)
 {
   hap_effect_reason alone = far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE;
   hap_effect_reason none = far(model) ? HAP_REASON_FAR : HAP_REASON_OWNED;
-  bool tools = physics->near.range.near->tool_pair_count > 0; /* hulls, which have points instead */
-  note_bodies(physics, model);
-  note_tool_pairs(physics);
-  note_passes(physics, model);
-  note_joints(physics, model);
-  note_restitution(physics, model);
-  sum_up(physics, HAP_EFFECT_TESTING, none);
-  sum_up(physics, HAP_EFFECT_CONTACTS, alone);
-  sum_up(physics, HAP_EFFECT_RANGE, alone);
-  sum_up(physics, HAP_EFFECT_GYRO, alone);
-  sum_up(physics, HAP_EFFECT_SHAPE, tools ? HAP_REASON_NO_CLOSED_FORM : HAP_REASON_FAR);
+  bool tools = s->near->range.near->tool_pair_count > 0; /* hulls, which have points instead */
+  note_bodies(s, model);
+  note_tool_pairs(s);
+  note_passes(s, model);
+  note_joints(s, model);
+  note_restitution(s, model);
+  sum_up(s, HAP_EFFECT_TESTING, none);
+  sum_up(s, HAP_EFFECT_CONTACTS, alone);
+  sum_up(s, HAP_EFFECT_RANGE, alone);
+  sum_up(s, HAP_EFFECT_GYRO, alone);
+  sum_up(s, HAP_EFFECT_SHAPE, tools ? HAP_REASON_NO_CLOSED_FORM : HAP_REASON_FAR);
 }
 
-static void note_model_accelerance(hapi_physics *physics, hapi_model *model)
+static void note_model_accelerance(const sight *s, hapi_model *model)
 {
-  hapi_effect_figures *testing = figures(physics, HAP_EFFECT_TESTING);
-  hapi_effect_figures *cross = figures(physics, HAP_EFFECT_CROSS);
+  hapi_effect_figures *testing = figures(s, HAP_EFFECT_TESTING);
+  hapi_effect_figures *cross = figures(s, HAP_EFFECT_CROSS);
   const hapi_model_body *bodies = hapi_model_bodies(model);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     if ((bodies[i].flags & HAPI_BODY_DRIVEN) == 0) {
-      hapi_effect_note(testing, !physics->probe.answers.bodies[bodies[i].slot].known_free,
-                       HAP_REASON_FREE);
+      hapi_effect_note(testing, !s->answers->bodies[bodies[i].slot].known_free, HAP_REASON_FREE);
     }
   }
   cross->on = cross->of = model->cross_count;
-  sum_up(physics, HAP_EFFECT_TESTING, HAP_REASON_FAR);
-  if (hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_CROSS)) {
-    sum_up(physics, HAP_EFFECT_CROSS, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
+  sum_up(s, HAP_EFFECT_TESTING, HAP_REASON_FAR);
+  if (hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_CROSS)) {
+    sum_up(s, HAP_EFFECT_CROSS, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
   } else {
-    set(physics, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_PAPERS);
+    set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_PAPERS);
   }
 }
 
-static void note_others(hapi_physics *physics)
+static void note_others(const sight *s)
 {
   static const hap_effect loops[] = {HAP_EFFECT_CONTACTS,    HAP_EFFECT_PASSES, HAP_EFFECT_JOINTS,
                                      HAP_EFFECT_RANGE,       HAP_EFFECT_GYRO,   HAP_EFFECT_SHAPE,
                                      HAP_EFFECT_RESTITUTION, HAP_EFFECT_PROXY};
-  for (size_t i = 0;
-       physics->cycle.model != HAP_MODEL_CONTACT && i < sizeof loops / sizeof loops[0]; ++i) {
-    set(physics, loops[i], HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+  for (size_t i = 0; s->cycle->model != HAP_MODEL_CONTACT && i < sizeof loops / sizeof loops[0];
+       ++i) {
+    set(s, loops[i], HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
-  if (physics->cycle.model != HAP_MODEL_ACCELERANCE) {
-    set(physics, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+  if (s->cycle->model != HAP_MODEL_ACCELERANCE) {
+    set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
-  if (physics->cycle.model == HAP_MODEL_SINGLE || physics->cycle.model == HAP_MODEL_IMPULSE) {
-    set(physics, HAP_EFFECT_TESTING, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+  if (s->cycle->model == HAP_MODEL_SINGLE || s->cycle->model == HAP_MODEL_IMPULSE) {
+    set(s, HAP_EFFECT_TESTING, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
 }
 
-void hapi_effects_note(hapi_physics *physics, hapi_model *model)
+void hapi_effects_note(hapi_effect_figures out[HAP_EFFECTS], const hapi_cycle *cycle,
+                       const hapi_world *world, const hapi_nearby *near,
+                       const hapi_answers *answers, hapi_model *model)
 {
-  memset(physics->counts.own.effects, 0, sizeof physics->counts.own.effects);
-  note_touches(physics, model);
-  if (physics->cycle.model == HAP_MODEL_CONTACT && physics->near.range.number == model->number) {
-    note_model_contact(physics, model);
-  } else if (physics->cycle.model == HAP_MODEL_ACCELERANCE) {
-    note_model_accelerance(physics, model);
+  const sight s = {out, cycle, &world->bodies, near, answers};
+  memset(out, 0, HAP_EFFECTS * sizeof *out);
+  note_touches(&s, model);
+  if (cycle->model == HAP_MODEL_CONTACT && near->range.number == model->number) {
+    note_model_contact(&s, model);
+  } else if (cycle->model == HAP_MODEL_ACCELERANCE) {
+    note_model_accelerance(&s, model);
   }
-  sum_up(physics, HAP_EFFECT_FRICTION, HAP_REASON_FAR);
-  note_others(physics);
-}
-
-/* ---- for readers ---- */
-
-void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out)
-{
-  uint32_t wishes = hapi_physics_wanted_effects(physics);
-  pthread_mutex_lock(&physics->counts.lock);
-  const hapi_physics_counts *shown = &physics->counts.shown;
-  double per_step = shown->cycles > 0 ? 1e3 / (double)shown->cycles : (double)NAN;
-  for (int i = 0; i < HAP_EFFECTS; ++i) {
-    out[i].wish = (uint32_t)hapi_wish(wishes, (hap_effect)i);
-    out[i].state = shown->effects[i].state;
-    out[i].reason = shown->effects[i].reason;
-    out[i].on = shown->effects[i].on;
-    out[i].of = shown->effects[i].of;
-  }
-  out[HAP_EFFECT_TESTING].physics_ms = per_step * shown->testing_s;
-  out[HAP_EFFECT_CROSS].physics_ms = per_step * shown->cross_s;
-  out[HAP_EFFECT_CONTACTS].physics_ms = per_step * shown->range_s;
-  out[HAP_EFFECT_RANGE].physics_ms = per_step * shown->beyond_s;
-  out[HAP_EFFECT_JOINTS].physics_ms = per_step * shown->joints_s;
-  pthread_mutex_unlock(&physics->counts.lock);
+  sum_up(&s, HAP_EFFECT_FRICTION, HAP_REASON_FAR);
+  note_others(&s);
 }

@@ -5,11 +5,18 @@
 
 /* Which effects the model that goes out has, and why not the others. */
 
-#include "sync/messages.h"
+#include <hapode/effects.h>
 
-typedef struct hapi_physics hapi_physics;
+#include "base/effect_figures.h"
+#include "near/near.h"
+#include "probe/answers.h"
+#include "sync/messages.h"
+#include "world/cycle.h"
+#include "world/world.h"
 
 /* Figures of the model that goes out. */
-void hapi_effects_note(hapi_physics *physics, hapi_model *model);
+void hapi_effects_note(hapi_effect_figures out[HAP_EFFECTS], const hapi_cycle *cycle,
+                       const hapi_world *world, const hapi_nearby *near,
+                       const hapi_answers *answers, hapi_model *model);
 
 #endif

@@ -15,11 +15,13 @@
 #include <hapode/ode.h>
 
 #include "base/index.h"
+#include "near/neighbors.h"
+#include "near/slots.h"
+#include "near/tools.h"
 #include "probe/test_set.h"
 #include "sync/messages.h"
 #include "sync/path.h"
-
-typedef struct hapi_physics hapi_physics;
+#include "world/cycle.h"
 
 typedef struct hapi_lookback_body {
   uint32_t known;   /* entry of the body table */
@@ -85,80 +87,147 @@ typedef enum hapi_lookback_phase {
   HAPI_LOOKBACK_GOING /* over it again */
 } hapi_lookback_phase;
 
-typedef struct hapi_lookback {
-  hapi_lookback_phase phase;
-  bool lean;   /* the time is short: fewer iterations */
-  bool spoilt; /* something happened that cannot be gone over */
-  hapi_test_set test;
-  int64_t from_ns; /* rows before are not of it */
-  int64_t to_ns;
-  double seconds; /* that it is open */
-
-  hapi_lookback_body *bodies;
-  uint32_t body_count;
-  uint32_t body_capacity;
-  hapi_body_state *states; /* of them, at the step that comes */
+/* Bodies of a window, and their states at the step that comes. */
+typedef struct hapi_lookback_bodies {
+  hapi_lookback_body *list;
+  uint32_t count;
+  uint32_t capacity;
+  hapi_body_state *states;
   uint32_t state_capacity;
   unsigned long seed;
-  hapi_lookback_body *ended; /* of the window before */
-  uint32_t ended_count;
-  uint32_t ended_capacity;
-  hapi_body_state *ends; /* where its reference left them */
-  uint32_t ends_capacity;
-  int64_t end_ns;   /* when; 0: it does not count any more */
-  bool chained;     /* this one goes on from there */
-  double chain_s;   /* since a reference began where the session was */
-  double haptic_hz; /* scratch: of the loop, while the reference's own rate is in force */
+} hapi_lookback_bodies;
 
-  hapi_lookback_pair *pairs;
-  uint32_t pair_count;
-  uint32_t pair_capacity;
-  hapi_index pair_of; /* by both addresses */
-  hapi_lookback_touch *touches;
-  uint32_t touch_count;
-  uint32_t touch_capacity;
-  hapi_lookback_spring *springs;
-  uint32_t spring_count;
-  uint32_t spring_capacity;
-  hapi_lookback_hand hand;
-  hapi_index geoms; /* scratch: that there are */
+typedef struct hapi_lookback_pairs {
+  hapi_lookback_pair *list;
+  uint32_t count;
+  uint32_t capacity;
+  hapi_index index; /* by both addresses */
+} hapi_lookback_pairs;
 
-  int64_t *times_ns; /* of the rows */
+typedef struct hapi_lookback_touches {
+  hapi_lookback_touch *list;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_lookback_touches;
+
+typedef struct hapi_lookback_springs {
+  hapi_lookback_spring *list;
+  uint32_t count;
+  uint32_t capacity;
+} hapi_lookback_springs;
+
+/* What the loop told while the window was open. */
+typedef struct hapi_lookback_rows {
+  int64_t *times_ns;
   uint32_t time_capacity;
   hapi_path_pointer *path; /* rows x pointers */
   uint32_t path_capacity;
-  uint32_t row_count;
-  uint32_t next;  /* row to go over */
-  double spent_s; /* on those before */
+  uint32_t pointers; /* in a row */
+  uint32_t count;
+  uint32_t next; /* to go over */
+} hapi_lookback_rows;
 
-  double wrong2; /* N^2, of this window: sums over the rows in which either touches */
+/* N^2, over the rows in which either touches. */
+typedef struct hapi_lookback_sums {
+  double wrong2; /* of this window */
   double right2;
   uint32_t touched;
-  double wrong2_sum; /* of all windows, the older the less */
-  double right2_sum;
+  double wrong2_all; /* of all windows, the older the less */
+  double right2_all;
+} hapi_lookback_sums;
+
+/* Since the session began. */
+typedef struct hapi_lookback_counts {
+  uint64_t windows;
+  uint64_t spoilt;
+  uint64_t steps;
+  uint64_t contacts_rejected;
+  double force_error; /* share */
+  double force_error_n;
+} hapi_lookback_counts;
+
+/* Who knows where pointers touch geoms. */
+typedef struct hapi_lookback_asker {
+  void *user;
+  bool (*nearest)(void *user, dGeomID geom, const double center[3], double radius, double reach,
+                  hapi_nearest *out);
+  uint32_t (*points)(void *user, const hapi_tool_at *at, hapi_found_point out[HAPI_TOOL_SPOTS]);
+  uint64_t (*key)(void *user, dGeomID geom, uint32_t pointer); /* of a hull and a geom */
+} hapi_lookback_asker;
+
+typedef struct hapi_lookback {
+  hapi_lookback_asker asker; /* constant */
+  hapi_lookback_phase phase;
+  bool lean;       /* the time is short: fewer iterations */
+  bool spoilt;     /* something happened that cannot be gone over */
+  int64_t from_ns; /* rows before are not of it */
+  int64_t to_ns;
+  double seconds; /* that it is open */
+  double spent_s; /* on the rows so far */
+  int64_t end_ns; /* of the reference of the window before; 0: it does not count any more */
+  bool chained;   /* this one goes on from there */
+  double chain_s; /* since a reference began where the session was */
+  hapi_test_set test;
+  hapi_lookback_bodies bodies;
+  hapi_lookback_bodies ended; /* of the window before, where its reference left them */
+  hapi_lookback_pairs pairs;
+  hapi_lookback_touches touches;
+  hapi_lookback_springs springs;
+  hapi_lookback_hand hand;
+  hapi_index geoms; /* that there are, as a run begins */
+  hapi_lookback_rows rows;
+  hapi_lookback_sums sums;
+  hapi_lookback_counts counts;
 } hapi_lookback;
 
+/* What a window that has ended says of the force. */
+typedef struct hapi_lookback_verdict {
+  double error;   /* share of the force that was wrong */
+  double seconds; /* over so long */
+} hapi_lookback_verdict;
+
+/* The time that there is for a cycle's share. */
+typedef struct hapi_lookback_time {
+  int64_t now_ns;
+  double spare_s;     /* that the dial leaves for it */
+  int own_iterations; /* of the world, outside of a cycle's steps */
+} hapi_lookback_time;
+
 /* lookback.c: nothing where it is not asked for */
-void hapi_lookback_follow(hapi_physics *physics, int64_t now_ns); /* after the scans of a cycle */
-void hapi_lookback_note(hapi_physics *physics);                   /* who may be touched */
-void hapi_lookback_ask(hapi_physics *physics, dGeomID a, dGeomID b,
-                       const dSurfaceParameters *surface);      /* a pair that collides */
-void hapi_lookback_forget_geom(hapi_lookback *w, dGeomID geom); /* before it is destroyed */
-void hapi_lookback_open(hapi_physics *physics, int64_t now_ns); /* the world is as at now_ns */
-void hapi_lookback_reset(hapi_physics *physics);
+/* After the scans of a cycle. True: a window has ended, and *out is what it says. */
+bool hapi_lookback_follow(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
+                          const hapi_slots *slots, const hapi_lookback_time *time,
+                          hapi_lookback_verdict *out);
+/* Who may be touched. */
+void hapi_lookback_note(hapi_lookback *w, const hapi_cycle *cycle, const hapi_slots *slots,
+                        const hapi_neighbors *neighbors);
+/* A pair that collides. */
+void hapi_lookback_ask(hapi_lookback *w, const hapi_body_table *bodies, dGeomID a, dGeomID b,
+                       const dSurfaceParameters *surface);
+void hapi_lookback_forget_geom(hapi_lookback *w, dGeomID geom); /* it is about to be destroyed */
+/* The world is as at now_ns. */
+void hapi_lookback_open(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
+                        const hapi_slots *slots, const hapi_neighbors *neighbors, int64_t now_ns);
+/* The next window begins where the session is. */
+void hapi_lookback_unchain(hapi_lookback *w);
+void hapi_lookback_reset(hapi_lookback *w);
 void hapi_lookback_finish(hapi_lookback *w);
 /* lookback_step.c */
-void hapi_lookback_keep(hapi_physics *physics); /* the states that its bodies have now */
+/* The states that its bodies have now. */
+void hapi_lookback_keep(hapi_lookback *w, const hapi_body_table *bodies);
 /* Goes over rows until they are done or seconds have passed; negative: all. */
-hap_status hapi_lookback_run(hapi_physics *physics, double seconds);
+hap_status hapi_lookback_run(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
+                             int own_iterations, double seconds);
 /* lookback_hand.c */
-bool hapi_lookback_hand_ready(hapi_physics *physics);    /* false: no memory */
+/* False: no memory. */
+bool hapi_lookback_hand_ready(hapi_lookback_hand *hand, const hapi_capacity *capacity);
 void hapi_lookback_hand_begin(hapi_lookback_hand *hand); /* nothing is touched */
 void hapi_lookback_hand_finish(hapi_lookback_hand *hand);
 /* Keeps the pointer's hull; false: it is no more, or another one than before in this window. */
-bool hapi_lookback_hand_take_hull(hapi_physics *physics, uint32_t pointer, uint32_t generation);
+bool hapi_lookback_hand_take_hull(hapi_lookback_hand *hand, const hapi_cycle *cycle,
+                                  uint32_t pointer, uint32_t generation);
 /* A tick: pushes the bodies. False: something is touched that the window does not know. */
-bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at);
+bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_moment *at);
 const double *hapi_lookback_felt(const hapi_lookback *w,
                                  uint32_t pointer); /* N on the hand, in it */
 

@@ -1,14 +1,17 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "accuracy/lookback.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/pointer_friction.h"
-#include "physics/physics_internal.h"
 #include "tick/tick.h"
+#include "world/world.h"
 
 /* The hands of a window: a tick of the loop in model SINGLE that nobody feels. What of it is near comes as a
  * message of physics, as in a session of that model; so hulls, friction and soft fingers are the loop's own
@@ -100,10 +103,8 @@ void hapi_lookback_hand_finish(hapi_lookback_hand *hand)
   memset(hand, 0, sizeof *hand);
 }
 
-bool hapi_lookback_hand_ready(hapi_physics *physics)
+bool hapi_lookback_hand_ready(hapi_lookback_hand *hand, const hapi_capacity *all)
 {
-  hapi_lookback_hand *hand = &physics->lookback.hand;
-  const hapi_capacity *all = &physics->config.capacity;
   const hapi_capacity capacity = {.bodies = HAPI_LOOKBACK_BODIES,
                                   .contacts = all->contacts,
                                   .pointers = all->pointers,
@@ -138,12 +139,13 @@ void hapi_lookback_hand_begin(hapi_lookback_hand *hand)
   hand->begun = false;
 }
 
-bool hapi_lookback_hand_take_hull(hapi_physics *physics, uint32_t pointer, uint32_t generation)
+bool hapi_lookback_hand_take_hull(hapi_lookback_hand *hand, const hapi_cycle *cycle,
+                                  uint32_t pointer, uint32_t generation)
 {
-  hapi_lookback_hand *hand = &physics->lookback.hand;
-  const hapi_state_pointer *in = &hapi_state_pointers(physics->cycle.state)[pointer];
+  HAPI_ASSERT_INDEX(pointer, hand->tick->capacity.pointers);
+  const hapi_state_pointer *in = &hapi_state_pointers(cycle->state)[pointer];
   if (hand->hull_of[pointer] == 0 && in->generation == generation) {
-    hand->tick->pointers.hulls[pointer] = hapi_state_hulls(physics->cycle.state)[pointer];
+    hand->tick->pointers.hulls[pointer] = hapi_state_hulls(cycle->state)[pointer];
     hand->hull_of[pointer] = generation;
   }
   return hand->hull_of[pointer] == generation;
@@ -234,24 +236,22 @@ static bool all_are_told(const hapi_lookback_hand *hand)
 }
 
 /* Its place among the window's bodies; HAPI_SLOT_NONE: the static world. False: one that is not among them. */
-static bool body_of(const hapi_physics *physics, dGeomID geom, uint32_t *out)
+static bool geom_body(const hapi_test_set *test, dGeomID geom, uint32_t *out)
 {
   dBodyID body = dGeomGetBody(geom);
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  const hapi_test_set *test = &physics->lookback.test;
+  uint32_t known = hapi_bodies_find(&test->world->bodies, body);
   bool found = known != HAPI_NONE && hapi_test_has(test, known);
   *out = found ? test->places[known].member : HAPI_SLOT_NONE;
   return found || body == NULL;
 }
 
-static hapi_model_contact *add_contact(hapi_physics *physics, const hapi_lookback_touch *t,
+static hapi_model_contact *add_contact(hapi_lookback *w, const hapi_lookback_touch *t,
                                        uint32_t body)
 {
-  hapi_lookback *w = &physics->lookback;
   hapi_model *m = w->hand.model;
   hapi_model_contact *out = &hapi_model_contacts(m)[m->contact_count++];
   memset(out, 0, sizeof *out);
-  out->slot = (uint32_t)(t - w->touches);
+  out->slot = (uint32_t)(t - w->touches.list);
   out->generation = t->contact_generation;
   out->body = body;
   out->pointer = t->pointer;
@@ -260,14 +260,14 @@ static hapi_model_contact *add_contact(hapi_physics *physics, const hapi_lookbac
   return out;
 }
 
-static void add_sphere(hapi_physics *physics, hapi_lookback_touch *t, uint32_t body,
+static void add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
                        const hapi_state_pointer *p, double period)
 {
   hapi_nearest at;
   double normal[3];
   const double *center = p->pose.position;
   double reach = hapi_neighbors_reach(hapi_neighbors_speed(t->geom, p, center), period);
-  if (!hapi_geom_nearest(physics, t->geom, center, p->radius, reach, &at)) {
+  if (!w->asker.nearest(w->asker.user, t->geom, center, p->radius, reach, &at)) {
     t->placed = false;
     ++t->contact_generation;
     return;
@@ -280,7 +280,7 @@ static void add_sphere(hapi_physics *physics, hapi_lookback_touch *t, uint32_t b
       t->placed && hapi_v3_dot(normal, t->normal_body) < SAME_PLANE_COSINE; /* another face */
   t->placed = true;
   hapi_v3_copy(normal, t->normal_body);
-  hapi_model_contact *out = add_contact(physics, t, body);
+  hapi_model_contact *out = add_contact(w, t, body);
   hapi_v3_copy(normal, out->normal_body);
   hapi_v3_copy(at.point_b, out->point_body);
   if (body != HAPI_SLOT_NONE) {
@@ -290,10 +290,10 @@ static void add_sphere(hapi_physics *physics, hapi_lookback_touch *t, uint32_t b
 }
 
 /* False: there are more points than the loop has room for. */
-static bool add_tool(hapi_physics *physics, hapi_lookback_touch *t, uint32_t body,
+static bool add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
                      const hapi_state_pointer *p, double period)
 {
-  hapi_lookback_hand *hand = &physics->lookback.hand;
+  hapi_lookback_hand *hand = &w->hand;
   hapi_model *m = hand->model;
   double spin = p->extent * hapi_v3_norm(p->twist.angular);
   double speed = hapi_neighbors_speed(t->geom, p, p->pose.position) + spin +
@@ -305,7 +305,7 @@ static bool add_tool(hapi_physics *physics, hapi_lookback_touch *t, uint32_t bod
                            .key = t->key,
                            .reach = hapi_neighbors_reach(speed, period),
                            .horizon = period};
-  uint32_t count = hapi_tool_points(physics, &at, hand->found);
+  uint32_t count = w->asker.points(w->asker.user, &at, hand->found);
   if (m->tool_count + count > hand->tick->capacity.tool_points) {
     return false;
   }
@@ -315,42 +315,40 @@ static bool add_tool(hapi_physics *physics, hapi_lookback_touch *t, uint32_t bod
     to->mu = t->mu;
     to->at.body_b = body;
     to->at.generation_b = body != HAPI_SLOT_NONE ? 1 : 0;
-    add_contact(physics, t, body)->tool = ++m->tool_count;
+    add_contact(w, t, body)->tool = ++m->tool_count;
   }
   return true;
 }
 
 /* False: something is touched that the window does not know. */
-static bool add_touches(hapi_physics *physics, double period)
+static bool add_touches(hapi_lookback *w, double period)
 {
-  hapi_lookback *w = &physics->lookback;
   const hapi_tick *tick = w->hand.tick;
-  for (uint32_t i = 0; i < w->touch_count; ++i) {
-    hapi_lookback_touch *t = &w->touches[i];
+  for (uint32_t i = 0; i < w->touches.count; ++i) {
+    hapi_lookback_touch *t = &w->touches.list[i];
     uint32_t body;
     const hapi_pointer *of = &tick->pointers.of[t->pointer];
     if (!t->there || of->generation == 0 || t->generation != of->generation) {
       continue;
     }
-    if (!body_of(physics, t->geom, &body)) {
+    if (!geom_body(&w->test, t->geom, &body)) {
       return false;
     }
     const hapi_state_pointer *p = &w->hand.told[t->pointer];
     if (of->shape.hull == NULL) {
-      add_sphere(physics, t, body, p, period);
-    } else if (!add_tool(physics, t, body, p, period)) {
+      add_sphere(w, t, body, p, period);
+    } else if (!add_tool(w, t, body, p, period)) {
       return false;
     }
   }
   return true;
 }
 
-static void add_bodies(hapi_physics *physics)
+static void add_bodies(hapi_lookback *w)
 {
-  const hapi_lookback *w = &physics->lookback;
   hapi_model *m = w->hand.model;
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
     hapi_model_body *out = &hapi_model_bodies(m)[m->body_count++];
     memset(out, 0, sizeof *out);
     out->slot = i;
@@ -406,19 +404,20 @@ static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_l
   const hapi_tick *t = w->hand.tick;
   const hapi_state_spring *found = NULL;
   double least = HUGE_VAL;
-  for (uint32_t i = 0; i < w->spring_count; ++i) {
+  for (uint32_t i = 0; i < w->springs.count; ++i) {
     double way[3];
     double far = 0.0;
-    if (!is_of(t, c, &w->springs[i])) {
+    if (!is_of(t, c, &w->springs.list[i])) {
       continue;
     }
     if (c->tool != 0) {
-      hapi_v3_sub(w->springs[i].in.place, t->touches.tool.tools[c->tool - 1].in.at.core_a, way);
+      hapi_v3_sub(w->springs.list[i].in.place, t->touches.tool.tools[c->tool - 1].in.at.core_a,
+                  way);
       far = hapi_v3_norm(way);
     }
     if (far < least && (c->tool == 0 || far < t->touches.tool.tools[c->tool - 1].in.same_within)) {
       least = far;
-      found = &w->springs[i].in;
+      found = &w->springs.list[i].in;
     }
   }
   return found;
@@ -445,12 +444,11 @@ static void resume(hapi_lookback *w)
 
 /* ---- the tick ---- */
 
-static void push_bodies(hapi_physics *physics, double period)
+static void push_bodies(const hapi_lookback *w, double period)
 {
-  const hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < w->body_count; ++i) {
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
     hapi_local_body *from = &w->hand.tick->bodies.of[i];
-    dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
     const double *f = from->account.impulse;
     const double *m = from->account.angular_impulse;
     if (from->pushed && !dBodyIsKinematic(body)) {
@@ -461,26 +459,25 @@ static void push_bodies(hapi_physics *physics, double period)
   }
 }
 
-bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at)
+bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_moment *at)
 {
-  hapi_lookback *w = &physics->lookback;
   hapi_tick *t = w->hand.tick;
   hapi_model *m = w->hand.model;
   m->body_count = m->contact_count = m->tool_count = 0;
-  m->wishes = hapi_wish_set(physics->cycle.wishes, HAP_EFFECT_OBSERVER, HAP_EFFECT_OFF);
+  m->wishes = hapi_wish_set(wishes, HAP_EFFECT_OBSERVER, HAP_EFFECT_OFF);
   ++m->number;
   take_pointers(t, at);
   if (!all_are_told(&w->hand)) {
     tell(&w->hand);
   }
-  add_bodies(physics);
-  if (!add_touches(physics, at->period)) {
+  add_bodies(w);
+  if (!add_touches(w, at->period)) {
     return false;
   }
   t->facts.period = at->period;
   hapi_tick_adopt(t, m, t->facts.now_ns);
   hapi_local_place(t);
-  for (uint32_t i = 0; i < w->body_count; ++i) {
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
     hapi_v3_set(t->bodies.of[i].account.impulse, 0.0, 0.0, 0.0);
     hapi_v3_set(t->bodies.of[i].account.angular_impulse, 0.0, 0.0, 0.0);
     t->bodies.of[i].pushed = false;
@@ -492,7 +489,7 @@ bool hapi_lookback_feel(hapi_physics *physics, const hapi_lookback_moment *at)
   hapi_render(t);
   ++t->facts.tick;
   tell(&w->hand);
-  push_bodies(physics, at->period);
+  push_bodies(w, at->period);
   return true;
 }
 

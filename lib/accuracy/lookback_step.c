@@ -1,12 +1,14 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "accuracy/lookback.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
 
 /* Going over a window: the reference of a tick is what ODE and the loop's tick of model SINGLE make of it, with
  * the bodies where they are by that reckoning. */
@@ -40,29 +42,28 @@ static bool there(const hapi_lookback *w, dGeomID geom)
   return hapi_index_get(&w->geoms, hapi_index_address(geom)) != HAPI_INDEX_NONE;
 }
 
-static bool find_geoms(hapi_physics *physics)
+static bool find_geoms(hapi_lookback *w, dSpaceID space)
 {
-  hapi_lookback *w = &physics->lookback;
   uint32_t count = 0;
   hapi_index_clear(&w->geoms);
-  if (!see_geoms(w, physics->world.ode.space, &count)) {
+  if (!see_geoms(w, space, &count)) {
     return false;
   }
-  for (uint32_t i = 0; i < w->pair_count; ++i) {
-    w->pairs[i].there = there(w, w->pairs[i].a) && there(w, w->pairs[i].b);
+  for (uint32_t i = 0; i < w->pairs.count; ++i) {
+    w->pairs.list[i].there = there(w, w->pairs.list[i].a) && there(w, w->pairs.list[i].b);
   }
-  for (uint32_t i = 0; i < w->touch_count; ++i) {
-    w->touches[i].there = w->touches[i].geom != NULL && there(w, w->touches[i].geom);
+  for (uint32_t i = 0; i < w->touches.count; ++i) {
+    w->touches.list[i].there = w->touches.list[i].geom != NULL && there(w, w->touches.list[i].geom);
   }
   return true;
 }
 
 /* ---- contacts between bodies ---- */
 
-static bool under_test(const hapi_physics *physics, dBodyID body)
+static bool under_test(const hapi_test_set *test, dBodyID body)
 {
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-  return known != HAPI_NONE && hapi_test_has(&physics->lookback.test, known);
+  uint32_t known = hapi_bodies_find(&test->world->bodies, body);
+  return known != HAPI_NONE && hapi_test_has(test, known);
 }
 
 static bool boxes_meet(dGeomID a, dGeomID b)
@@ -76,27 +77,26 @@ static bool boxes_meet(dGeomID a, dGeomID b)
 }
 
 /* What is not under test stands still. */
-static void collide(hapi_physics *physics)
+static void collide(hapi_lookback *w, const hapi_cycle *cycle)
 {
-  hapi_lookback *w = &physics->lookback;
-  dJointGroupEmpty(physics->world.contact_group);
-  for (uint32_t i = 0; i < w->pair_count; ++i) {
-    const hapi_lookback_pair *pair = &w->pairs[i];
+  dJointGroupEmpty(w->test.world->contact_group);
+  for (uint32_t i = 0; i < w->pairs.count; ++i) {
+    const hapi_lookback_pair *pair = &w->pairs.list[i];
     if (!pair->there || !dGeomIsEnabled(pair->a) || !dGeomIsEnabled(pair->b) ||
         !boxes_meet(pair->a, pair->b)) {
       continue;
     }
     dBodyID body_a = dGeomGetBody(pair->a);
     dBodyID body_b = dGeomGetBody(pair->b);
-    body_a = under_test(physics, body_a) ? body_a : NULL;
-    body_b = under_test(physics, body_b) ? body_b : NULL;
+    body_a = under_test(&w->test, body_a) ? body_a : NULL;
+    body_b = under_test(&w->test, body_b) ? body_b : NULL;
     bool awake =
         (body_a != NULL && dBodyIsEnabled(body_a)) || (body_b != NULL && dBodyIsEnabled(body_b));
     if (awake) {
       const hapi_touching touching = {{pair->a, pair->b}, {body_a, body_b}};
       dSurfaceParameters surface = pair->surface;
-      physics->counts.own.stats.faults.contacts_rejected += hapi_world_make_contacts(
-          &physics->world, &physics->cycle, &touching, &surface, HAPI_CONTACT_PLAIN);
+      w->counts.contacts_rejected +=
+          hapi_world_make_contacts(w->test.world, cycle, &touching, &surface, HAPI_CONTACT_PLAIN);
     }
   }
 }
@@ -104,10 +104,9 @@ static void collide(hapi_physics *physics)
 /* ---- what comes out ---- */
 
 /* What is felt is held until the next row. */
-static void compare(hapi_physics *physics, const hapi_path_pointer *row)
+static void compare(hapi_lookback *w, const hapi_path_pointer *row)
 {
-  hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < physics->config.capacity.pointers; ++i) {
+  for (uint32_t i = 0; i < w->rows.pointers; ++i) {
     double wrong[3];
     const double *felt = row[i].wrench.force;
     const double *right = hapi_lookback_felt(w, i);
@@ -116,21 +115,20 @@ static void compare(hapi_physics *physics, const hapi_path_pointer *row)
     }
     hapi_v3_sub(felt, right, wrong);
     if (hapi_v3_dot(right, right) > 0.0 || hapi_v3_dot(felt, felt) > 0.0) {
-      w->wrong2 += hapi_v3_dot(wrong, wrong);
-      w->right2 += hapi_v3_dot(right, right);
-      ++w->touched;
+      w->sums.wrong2 += hapi_v3_dot(wrong, wrong);
+      w->sums.right2 += hapi_v3_dot(right, right);
+      ++w->sums.touched;
     }
   }
 }
 
 /* ---- steps ---- */
 
-static void add_wrenches(hapi_physics *physics)
+static void add_wrenches(const hapi_lookback *w)
 {
-  const hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    dBodyID body = physics->world.bodies.entries[w->bodies[i].known].body;
-    const double *f = w->bodies[i].wrench;
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
+    const double *f = w->bodies.list[i].wrench;
     if (dBodyIsEnabled(body)) {
       dBodyAddForce(body, f[0], f[1], f[2]);
       dBodyAddTorque(body, f[3], f[4], f[5]);
@@ -139,22 +137,21 @@ static void add_wrenches(hapi_physics *physics)
 }
 
 /* One that is no more is not to be stepped: ODE would abort the process. */
-static bool sound(const hapi_physics *physics)
+static bool sound(const hapi_lookback *w)
 {
-  const hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    if (!hapi_pose_is_sound(physics->world.bodies.entries[w->bodies[i].known].body)) {
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    if (!hapi_pose_is_sound(w->test.world->bodies.entries[w->bodies.list[i].known].body)) {
       return false;
     }
   }
   return true;
 }
 
-static double period_of(const hapi_physics *physics, uint32_t row)
+static double period_of(const hapi_lookback *w, double haptic_hz, uint32_t row)
 {
-  const hapi_lookback *w = &physics->lookback;
-  return row + 1 < w->row_count ? 1e-9 * (double)(w->times_ns[row + 1] - w->times_ns[row])
-                                : 1.0 / w->haptic_hz;
+  return row + 1 < w->rows.count
+             ? 1e-9 * (double)(w->rows.times_ns[row + 1] - w->rows.times_ns[row])
+             : 1.0 / haptic_hz;
 }
 
 /* Steps from a row to the next one. */
@@ -163,79 +160,78 @@ static int parts_of(double haptic_hz)
   return haptic_hz < RATE_HZ ? (int)ceil(RATE_HZ / haptic_hz - 1e-6) : 1;
 }
 
-static bool go_over(hapi_physics *physics, uint32_t row)
+/* as_single: the cycle as that of a session of model SINGLE at the reference's own rate. */
+static bool go_over(hapi_lookback *w, const hapi_cycle *as_single, double haptic_hz, uint32_t row)
 {
-  hapi_lookback *w = &physics->lookback;
-  uint32_t count = physics->config.capacity.pointers;
-  int parts = parts_of(w->haptic_hz);
-  double period = period_of(physics, row) / parts;
+  HAPI_ASSERT_INDEX(row, w->rows.count);
+  uint32_t count = w->rows.pointers;
+  int parts = parts_of(haptic_hz);
+  double period = period_of(w, haptic_hz, row) / parts;
   for (int i = 0; i < parts; ++i) {
     const hapi_lookback_moment at = {
-        .row = &w->path[row * count],
-        .next = row + 1 < w->row_count ? &w->path[(row + 1) * count] : NULL,
+        .row = &w->rows.path[row * count],
+        .next = row + 1 < w->rows.count ? &w->rows.path[(row + 1) * count] : NULL,
         .share = (double)i / parts,
         .later_s = i * period,
         .period = period};
-    if (!hapi_lookback_feel(physics, &at)) {
+    if (!hapi_lookback_feel(w, as_single->wishes, &at)) {
       return false;
     }
-    compare(physics, at.row);
-    add_wrenches(physics);
-    collide(physics);
-    ++physics->counts.own.stats.physics.quickstep_calls;
-    dWorldQuickStep(physics->world.ode.world, period);
-    if (!sound(physics)) {
+    compare(w, at.row);
+    add_wrenches(w);
+    collide(w, as_single);
+    ++w->counts.steps;
+    dWorldQuickStep(w->test.world->ode.world, period);
+    if (!sound(w)) {
       return false;
     }
   }
   return true;
 }
 
-static void put_states(hapi_physics *physics)
+static void put_states(hapi_lookback *w)
 {
-  hapi_lookback *w = &physics->lookback;
-  hapi_snapshot states = {.bodies = w->states, .body_count = w->body_count, .seed = w->seed};
+  hapi_snapshot states = {
+      .bodies = w->bodies.states, .body_count = w->bodies.count, .seed = w->bodies.seed};
   hapi_snapshot_rewind(&states);
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    dBodySetForce(w->states[i].body, 0.0, 0.0, 0.0);
-    dBodySetTorque(w->states[i].body, 0.0, 0.0, 0.0);
-    if (w->states[i].enabled) {
-      dBodyEnable(w->states[i].body);
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodySetForce(w->bodies.states[i].body, 0.0, 0.0, 0.0);
+    dBodySetTorque(w->bodies.states[i].body, 0.0, 0.0, 0.0);
+    if (w->bodies.states[i].enabled) {
+      dBodyEnable(w->bodies.states[i].body);
     } else {
-      dBodyDisable(w->states[i].body);
+      dBodyDisable(w->bodies.states[i].body);
     }
   }
 }
 
 /* Where the bodies were at the first row, of which some were kept a part of a tick before or after. */
-static void even_out(hapi_physics *physics)
+static void even_out(const hapi_lookback *w)
 {
-  const hapi_lookback *w = &physics->lookback;
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    dBodyID body = w->states[i].body;
-    double lag = 1e-9 * (double)w->bodies[i].lag_ns;
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->bodies.states[i].body;
+    double lag = 1e-9 * (double)w->bodies.list[i].lag_ns;
     const dReal *p = dBodyGetPosition(body);
     const dReal *v = dBodyGetLinearVel(body);
     dBodySetPosition(body, p[0] + lag * v[0], p[1] + lag * v[1], p[2] + lag * v[2]);
   }
 }
 
-void hapi_lookback_keep(hapi_physics *physics)
+void hapi_lookback_keep(hapi_lookback *w, const hapi_body_table *bodies)
 {
-  hapi_lookback *w = &physics->lookback;
-  hapi_snapshot states = {.bodies = w->states, .body_capacity = w->state_capacity};
+  hapi_snapshot states = {.bodies = w->bodies.states, .body_capacity = w->bodies.state_capacity};
   hapi_snapshot_clear(&states);
-  for (uint32_t i = 0; i < w->body_count; ++i) {
-    hapi_snapshot_add_body(&states, physics->world.bodies.entries[w->bodies[i].known].body, NULL);
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    hapi_snapshot_add_body(&states, bodies->entries[w->bodies.list[i].known].body, NULL);
   }
-  w->seed = states.seed;
+  w->bodies.seed = states.seed;
 }
 
 static const hapi_body_state *end_of(const hapi_lookback *w, const hapi_lookback_body *body)
 {
-  for (uint32_t i = 0; i < w->ended_count; ++i) {
-    if (w->ended[i].known == body->known && w->ended[i].birth == body->birth) {
-      return &w->ends[i];
+  for (uint32_t i = 0; i < w->ended.count; ++i) {
+    if (w->ended.list[i].known == body->known && w->ended.list[i].birth == body->birth) {
+      return &w->ended.states[i];
     }
   }
   return NULL;
@@ -243,15 +239,15 @@ static const hapi_body_state *end_of(const hapi_lookback *w, const hapi_lookback
 
 /* Whether the reference of the window before ended when this one begins, and not too far from where the
  * session is. */
-static bool can_chain(const hapi_lookback *w)
+static bool can_chain(const hapi_lookback *w, double haptic_hz)
 {
-  double apart_s = 1e-9 * fabs((double)(w->times_ns[0] - w->end_ns));
-  bool good = w->end_ns != 0 && apart_s < 0.5 / w->haptic_hz;
-  for (uint32_t i = 0; i < w->body_count && good; ++i) {
-    const hapi_body_state *end = end_of(w, &w->bodies[i]);
+  double apart_s = 1e-9 * fabs((double)(w->rows.times_ns[0] - w->end_ns));
+  bool good = w->end_ns != 0 && apart_s < 0.5 / haptic_hz;
+  for (uint32_t i = 0; i < w->bodies.count && good; ++i) {
+    const hapi_body_state *end = end_of(w, &w->bodies.list[i]);
     double apart[3] = {0.0};
     if (end != NULL) {
-      hapi_v3_sub(end->position, w->states[i].position, apart);
+      hapi_v3_sub(end->position, w->bodies.states[i].position, apart);
     }
     good = hapi_v3_norm(apart) < APART_M;
   }
@@ -259,19 +255,18 @@ static bool can_chain(const hapi_lookback *w)
 }
 
 /* Goes on from there; a body that was not part of it comes in as the session has it. */
-static void chain(hapi_physics *physics)
+static void chain(hapi_lookback *w, double haptic_hz)
 {
-  hapi_lookback *w = &physics->lookback;
-  w->chained = can_chain(w);
+  w->chained = can_chain(w, haptic_hz);
   w->chain_s = w->chained ? w->chain_s : 0.0;
   if (!w->chained) {
     hapi_lookback_hand_begin(&w->hand);
   }
-  for (uint32_t i = 0; i < w->body_count && w->chained; ++i) {
-    const hapi_body_state *end = end_of(w, &w->bodies[i]);
+  for (uint32_t i = 0; i < w->bodies.count && w->chained; ++i) {
+    const hapi_body_state *end = end_of(w, &w->bodies.list[i]);
     if (end != NULL) {
-      w->states[i] = *end;
-      w->bodies[i].lag_ns = 0;
+      w->bodies.states[i] = *end;
+      w->bodies.list[i].lag_ns = 0;
     }
   }
 }
@@ -282,63 +277,61 @@ static int iterations_of(const hapi_lookback *w, int world)
   return !w->lean && more < ITERATIONS_LEAST ? ITERATIONS_LEAST : more;
 }
 
-static bool go(hapi_physics *physics, double seconds)
+static bool go(hapi_lookback *w, const hapi_cycle *cycle, int own_iterations, double seconds)
 {
-  hapi_lookback *w = &physics->lookback;
+  const hapi_world *world = w->test.world;
   int64_t begin_ns = hapi_clock_now();
-  int iterations = dWorldGetQuickStepNumIterations(physics->world.ode.world);
-  hap_model model = physics->cycle.model;
+  int iterations = dWorldGetQuickStepNumIterations(world->ode.world);
+  double haptic_hz = cycle->config->haptic_hz;
   bool good = true;
-  physics->cycle.model = HAP_MODEL_SINGLE; /* whose step this is */
-  w->haptic_hz = physics->config.haptic_hz;
-  physics->config.haptic_hz = parts_of(w->haptic_hz) * w->haptic_hz;
-  dWorldSetQuickStepNumIterations(physics->world.ode.world,
-                                  iterations_of(w, physics->dial.own_iterations));
+  hapi_physics_config config = *cycle->config;
+  hapi_cycle as_single = *cycle;
   hapi_meant meant;
-  hapi_world_convert(&physics->world, hapi_step_ratio(&physics->cycle), &meant);
-  bool first = w->next == 0;
+  config.haptic_hz = parts_of(haptic_hz) * haptic_hz;
+  as_single.config = &config;
+  as_single.model = HAP_MODEL_SINGLE; /* whose step this is */
+  dWorldSetQuickStepNumIterations(world->ode.world, iterations_of(w, own_iterations));
+  hapi_world_convert(world, hapi_step_ratio(&as_single), &meant);
+  bool first = w->rows.next == 0;
   if (first) {
-    chain(physics);
+    chain(w, haptic_hz);
   }
-  put_states(physics);
+  put_states(w);
   if (first) {
-    even_out(physics);
+    even_out(w);
   }
-  while (good && w->next < w->row_count &&
+  while (good && w->rows.next < w->rows.count &&
          (seconds < 0.0 || 1e-9 * (double)(hapi_clock_now() - begin_ns) < seconds)) {
-    good = go_over(physics, w->next++);
+    good = go_over(w, &as_single, haptic_hz, w->rows.next++);
   }
   w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  hapi_lookback_keep(physics);
-  dJointGroupEmpty(physics->world.contact_group);
-  hapi_world_restore(&physics->world, &meant);
-  dWorldSetQuickStepNumIterations(physics->world.ode.world, iterations);
-  physics->config.haptic_hz = w->haptic_hz;
-  physics->cycle.model = model;
+  hapi_lookback_keep(w, &world->bodies);
+  dJointGroupEmpty(world->contact_group);
+  hapi_world_restore(world, &meant);
+  dWorldSetQuickStepNumIterations(world->ode.world, iterations);
   return good;
 }
 
 static hap_status enter(hapi_lookback *w, const hapi_world *world, double step_s)
 {
   hap_status status = hapi_test_begin(&w->test, world, step_s);
-  for (uint32_t i = 0; i < w->body_count && status >= HAP_OK; ++i) {
-    status = hapi_test_add_body(&w->test, w->bodies[i].known);
+  for (uint32_t i = 0; i < w->bodies.count && status >= HAP_OK; ++i) {
+    status = hapi_test_add_body(&w->test, w->bodies.list[i].known);
   }
   return status >= HAP_OK ? hapi_test_enter(&w->test) : status;
 }
 
-hap_status hapi_lookback_run(hapi_physics *physics, double seconds)
+hap_status hapi_lookback_run(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
+                             int own_iterations, double seconds)
 {
-  hapi_lookback *w = &physics->lookback;
-  uint64_t searched = physics->near.range.number;
-  if (!find_geoms(physics)) {
+  if (!find_geoms(w, world->ode.space)) {
     return HAP_ERROR_MEMORY;
   }
-  hap_status status = enter(w, &physics->world, physics->cycle.probe_step_s);
+  hap_status status = enter(w, world, cycle->probe_step_s);
   if (status >= HAP_OK) {
-    status = w->row_count == 0 || go(physics, seconds) ? status : HAP_ERROR_STATE;
+    bool good = w->rows.count == 0 || go(w, cycle, own_iterations, seconds);
+    status = good ? status : HAP_ERROR_STATE;
     hapi_test_leave(&w->test);
   }
-  physics->near.range.number = searched; /* of the meshes that were asked */
   return status;
 }

@@ -33,7 +33,8 @@ static void listener_body_gone(void *user, uint32_t index)
 static void listener_surface_asked(void *user, dGeomID a, dGeomID b,
                                    const dSurfaceParameters *surface)
 {
-  hapi_lookback_ask(user, a, b, surface);
+  hapi_physics *physics = user;
+  hapi_lookback_ask(&physics->lookback, &physics->world.bodies, a, b, surface);
 }
 
 void hapi_physics_listen(hapi_physics *physics)

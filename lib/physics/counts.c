@@ -26,6 +26,12 @@ static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
   io_stats->model.measured_joints = probe->counts.joints;
   io_stats->model.joint_error = probe->counts.joint_error;
   io_stats->model.capacity_dropped += cross->dropped;
+  io_stats->physics.quickstep_calls += physics->lookback.counts.steps;
+  io_stats->faults.contacts_rejected += physics->lookback.counts.contacts_rejected;
+  io_stats->error.lookbacks = physics->lookback.counts.windows;
+  io_stats->error.spoilt = physics->lookback.counts.spoilt;
+  io_stats->error.force_error = physics->lookback.counts.force_error;
+  io_stats->error.force_error_n = physics->lookback.counts.force_error_n;
 }
 
 void hapi_counts_show(hapi_physics *physics)
@@ -121,4 +127,25 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   fill_momentum(physics, out);
   pthread_mutex_unlock(&physics->counts.lock);
   out->physics.pose_delay_s = hapi_poses_delay(&physics->drawing);
+}
+
+void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out)
+{
+  uint32_t wishes = hapi_physics_wanted_effects(physics);
+  pthread_mutex_lock(&physics->counts.lock);
+  const hapi_physics_counts *shown = &physics->counts.shown;
+  double per_step = shown->cycles > 0 ? 1e3 / (double)shown->cycles : (double)NAN;
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    out[i].wish = (uint32_t)hapi_wish(wishes, (hap_effect)i);
+    out[i].state = shown->effects[i].state;
+    out[i].reason = shown->effects[i].reason;
+    out[i].on = shown->effects[i].on;
+    out[i].of = shown->effects[i].of;
+  }
+  out[HAP_EFFECT_TESTING].physics_ms = per_step * shown->testing_s;
+  out[HAP_EFFECT_CROSS].physics_ms = per_step * shown->cross_s;
+  out[HAP_EFFECT_CONTACTS].physics_ms = per_step * shown->range_s;
+  out[HAP_EFFECT_RANGE].physics_ms = per_step * shown->beyond_s;
+  out[HAP_EFFECT_JOINTS].physics_ms = per_step * shown->joints_s;
+  pthread_mutex_unlock(&physics->counts.lock);
 }

@@ -91,11 +91,36 @@ static void call_step(hapi_physics *physics, hap_step_fn callback)
   }
 }
 
+void hapi_physics_fill_settings(hapi_physics *physics)
+{
+  hapi_settings *settings = &physics->cycle.settings;
+  hapi_dial_fill(&physics->dial, physics->config.haptic_hz, settings);
+  hapi_dial_tell(&physics->dial, settings, &physics->counts.own.accuracy);
+}
+
+static void turn_dials(hapi_physics *physics)
+{
+  int percent[HAPI_DIALS];
+  if (!hapi_tape_plays(physics->tape.tape)) {
+    hapi_dial_follow(&physics->dial, &physics->cycle);
+  }
+  hapi_dial_positions(&physics->dial, percent);
+  hapi_tape_dials(physics, percent);
+  hapi_dial_place(&physics->dial, percent);
+  hapi_physics_fill_settings(physics);
+}
+
+void hapi_physics_enter_dial(hapi_physics *physics)
+{
+  hapi_dial_enter(&physics->dial, &physics->cycle.settings, physics->world.ode.world);
+  physics->counts.own.accuracy.iterations = physics->dial.iterations;
+}
+
 static void sync_in(hapi_physics *physics)
 {
   hapi_edits_run(physics);
   follow_model(physics);
-  hapi_dial_follow(physics);
+  turn_dials(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   call_step(physics, physics->world.ode.before_step);
   if (hapi_physics_scan(physics) < HAP_OK) {
@@ -167,6 +192,23 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
+/* The reference asks for what is near, by numbers of walks that are not of this cycle. */
+static void look_back(hapi_physics *physics, int64_t now_ns)
+{
+  const hapi_lookback_time time = {now_ns,
+                                   hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s),
+                                   physics->dial.own_iterations};
+  uint64_t walk = physics->near.range.number;
+  hapi_lookback_verdict verdict;
+  bool told = hapi_lookback_follow(&physics->lookback, &physics->cycle, &physics->world,
+                                   &physics->near.slots, &time, &verdict);
+  physics->near.range.number = walk;
+  if (told && hapi_dial_note_error(&physics->dial, verdict.error, verdict.seconds,
+                                   !hapi_tape_plays(physics->tape.tape))) {
+    hapi_lookback_unchain(&physics->lookback);
+  }
+}
+
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)
 {
   hapi_physics_counts *f = &physics->counts.own;
@@ -185,7 +227,7 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
   s->physics.last.step_ms = 1e3 * seconds[3];
   s->physics.last.publish_ms = 1e3 * seconds[4];
   hapi_histogram_add(&physics->counts.cycle_ns, (int64_t)(1e9 * total));
-  hapi_dial_note(physics, total, looked_s);
+  hapi_dial_note(&physics->dial, total, looked_s);
   hapi_counts_show(physics);
 }
 
@@ -200,12 +242,13 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   if (!world_is_sound(physics)) {
     return;
   }
-  hapi_dial_enter(physics);
+  hapi_physics_enter_dial(physics);
   seconds[4] = lap(&watch);
-  hapi_lookback_follow(physics, now_ns);
+  look_back(physics, now_ns);
   double looked_s = seconds[2] = lap(&watch);
   if (physics->cycle.model == HAP_MODEL_IMPULSE) {
-    hapi_lookback_open(physics, now_ns);
+    hapi_lookback_open(&physics->lookback, &physics->cycle, &physics->world, &physics->near.slots,
+                       &physics->near.neighbors, now_ns);
   }
   hapi_reconcile_push(physics);
   seconds[4] += lap(&watch);
@@ -225,12 +268,14 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_joint_probes(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
                     physics->near.range.number);
   seconds[2] += lap(&watch);
-  hapi_lookback_note(physics);
+  hapi_lookback_note(&physics->lookback, &physics->cycle, &physics->near.slots,
+                     &physics->near.neighbors);
   sync_out(physics, now_ns, next_ns);
   if (physics->cycle.model != HAP_MODEL_IMPULSE) {
-    hapi_lookback_open(physics, now_ns);
+    hapi_lookback_open(&physics->lookback, &physics->cycle, &physics->world, &physics->near.slots,
+                       &physics->near.neighbors, now_ns);
   }
-  hapi_dial_leave(physics);
+  hapi_dial_leave(&physics->dial, physics->world.ode.world);
   seconds[4] += lap(&watch);
   note_times(physics, seconds, looked_s);
   call_step(physics, physics->world.ode.after_step);

@@ -69,6 +69,25 @@ static void release_bodies(hapi_physics *physics)
   }
 }
 
+/* ---- what looking back asks for ---- */
+
+static bool ask_nearest(void *user, dGeomID geom, const double center[3], double radius,
+                        double reach, hapi_nearest *out)
+{
+  return hapi_geom_nearest(user, geom, center, radius, reach, out);
+}
+
+static uint32_t ask_tool_points(void *user, const hapi_tool_at *at,
+                                hapi_found_point out[HAPI_TOOL_SPOTS])
+{
+  return hapi_tool_points(user, at, out);
+}
+
+static uint64_t ask_tool_key(void *user, dGeomID geom, uint32_t pointer)
+{
+  return hapi_tool_geom_key(user, geom, pointer);
+}
+
 hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
                                hapi_physics **out, hap_detail *detail)
 {
@@ -89,6 +108,8 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->wanted.latency_s = -1.0;
   atomic_init(&physics->wanted.model, (int)config->model);
   atomic_init(&physics->wanted.effects, config->effects);
+  physics->lookback.asker =
+      (hapi_lookback_asker){physics, ask_nearest, ask_tool_points, ask_tool_key};
   physics->dial.knobs = config->knobs;
   atomic_init(&physics->dial.wanted, config->accuracy);
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
@@ -177,22 +198,25 @@ double hapi_period_of(const hapi_physics *physics, hap_model model)
 
 static void build_first_model(hapi_physics *physics)
 {
-  hapi_dial_enter(physics);
+  hapi_physics_enter_dial(physics);
   hapi_reconcile_take(physics);
   hapi_physics_collide(physics);
   hapi_neighbors_collect(physics);
   hapi_neighbors_find(physics);
   hapi_physics_test(physics);
   hapi_physics_test_range(physics);
-  hapi_dial_leave(physics);
+  hapi_dial_leave(&physics->dial, physics->world.ode.world);
 }
 
 static void prepare(hapi_physics *physics)
 {
   reset_figures(physics);
   hapi_range_reset(physics);
-  hapi_lookback_reset(physics);
-  hapi_dial_reset(physics);
+  hapi_lookback_reset(&physics->lookback);
+  hapi_dial_reset(
+      &physics->dial,
+      hapi_tape_dial_at_start(physics, hapi_dial_percent(atomic_load(&physics->dial.wanted))));
+  hapi_physics_fill_settings(physics);
   hapi_probe_reset(&physics->probe);
   hapi_cross_reset(&physics->research.cross);
   hapi_range_error_reset(&physics->research.range);

@@ -63,6 +63,9 @@ struct hapi_physics {
 void hapi_physics_collide(hapi_physics *physics);
 void hapi_physics_test_range(hapi_physics *physics);
 void hapi_physics_test(hapi_physics *physics);
+/* cycle.c: what the dials come to */
+void hapi_physics_fill_settings(hapi_physics *physics);
+void hapi_physics_enter_dial(hapi_physics *physics);
 /* physics.c: H, or T in model SINGLE */
 double hapi_period_of(const hapi_physics *physics, hap_model model);
 

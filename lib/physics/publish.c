@@ -213,7 +213,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   out->wishes = physics->cycle.wishes;
   out->max_sweeps = physics->cycle.settings.max_sweeps;
   out->row_updates = physics->cycle.settings.row_updates;
-  out->tick_budget_ns = hapi_dial_tick_budget(physics);
+  out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
   out->body_count = 0;
   out->contact_count = 0;
   out->tool_count = 0;
@@ -240,7 +240,8 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   fill_watch(physics, out);
   count_model(physics, out);
   out->touches = physics->counts.own.stats.model.pointer_contacts;
-  hapi_effects_note(physics, out);
+  hapi_effects_note(physics->counts.own.effects, &physics->cycle, &physics->world, &physics->near,
+                    &physics->probe.answers, out);
   hapi_tape_model(physics);
   hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);
