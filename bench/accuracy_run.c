@@ -367,22 +367,24 @@ double accuracy_rest_share(const accuracy_motion *m)
 void accuracy_run_def_init(accuracy_run_def *def)
 {
   hap_session_def library;
-  hap_session_def_init(&library, sizeof library);
+  hap_expert_def expert;
+  hap_research_def research;
+  session_defs_init(&library, &expert, &research);
   memset(def, 0, sizeof *def);
   def->model = library.model;
   def->physics_hz = library.physics_hz;
   def->haptic_hz = library.haptic_hz;
-  def->contact_hz = library.contact_hz;
-  def->latency_ticks = library.physics_latency_ticks;
-  def->probe = library.probe;
-  def->cross = (hap_effect_wish)library.effects[HAP_EFFECT_CROSS];
+  def->contact_hz = expert.contact_hz;
+  def->latency_ticks = research.physics_latency_ticks;
+  def->probe = research.probe;
+  def->cross = HAP_EFFECT_AUTO;
   def->coupling = HAP_COUPLING_DIRECT;
-  def->max_sweeps = library.max_sweeps;
-  def->range_hops = library.range_hops;
-  def->max_edge_probes = library.max_edge_probes;
+  def->max_sweeps = expert.max_sweeps;
+  def->range_hops = expert.range_hops;
+  def->max_edge_probes = expert.max_edge_probes;
   def->accuracy = library.accuracy;
-  def->reuse = library.reuse;
-  def->shape = (hap_effect_wish)library.effects[HAP_EFFECT_SHAPE];
+  def->reuse = expert.reuse;
+  def->shape = HAP_EFFECT_AUTO;
   def->integration = HAP_INTEGRATION_AUTO;
 }
 
@@ -417,26 +419,26 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);
   options.def.drive = HAP_DRIVE_LOCKSTEP;
-  options.def.guard = HAP_GUARD_MEASURE;
+  options.research.guard = HAP_GUARD_MEASURE;
   options.def.model = def->model;
   options.def.physics_hz = def->physics_hz;
   options.def.haptic_hz = def->haptic_hz;
-  options.def.contact_hz = def->contact_hz;
-  options.def.physics_latency_ticks = def->latency_ticks;
-  options.def.probe = def->probe;
-  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)def->cross;
-  options.def.max_sweeps = def->max_sweeps;
-  options.def.range_hops = def->range_hops;
-  options.def.max_edge_probes = def->max_edge_probes;
+  options.expert.contact_hz = def->contact_hz;
+  options.research.physics_latency_ticks = def->latency_ticks;
+  options.research.probe = def->probe;
+  expert_wish(&options.expert, HAP_EFFECT_CROSS, def->cross);
+  options.expert.max_sweeps = def->max_sweeps;
+  options.expert.range_hops = def->range_hops;
+  options.expert.max_edge_probes = def->max_edge_probes;
   options.def.accuracy = def->accuracy;
-  options.def.effects[HAP_EFFECT_SHAPE] = (uint8_t)def->shape;
+  expert_wish(&options.expert, HAP_EFFECT_SHAPE, def->shape);
   options.integration = def->integration;
   options.coupling = def->coupling;
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
-  options.def.trace_rows = 8; /* read after each tick */
-  options.def.lookback = def->lookback;
-  options.def.reuse = def->reuse;
+  options.expert.trace_rows = 8; /* read after each tick */
+  options.expert.lookback = def->lookback;
+  options.expert.reuse = def->reuse;
   hap_status status = rig_create(&options, r, &b->detail);
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);

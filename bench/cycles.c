@@ -46,7 +46,7 @@ static hap_status open_watcher(bench *b, const cycles_def *def, watcher *w)
   options.devices[0] = def->device;
   options.device_count = def->device != NULL ? 1 : 0;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
-  options.def.guard = HAP_GUARD_MEASURE;
+  options.research.guard = HAP_GUARD_MEASURE;
   options.def.model = def->model;
   options.def.haptic_hz = CYCLES_HAPTIC_HZ;
   if (def->max_bodies > 0) {

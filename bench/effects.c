@@ -230,11 +230,11 @@ static hap_status open_rig(bench *b, const effects_run *run, const effects_varia
   options.def.model = run->model;
   options.def.physics_hz = run->physics_hz;
   options.def.haptic_hz = HAPTIC_HZ;
-  options.def.trace_rows = 2 * BLOCK;
+  options.expert.trace_rows = 2 * BLOCK;
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     hap_effect_wish wish = variant->wishes[i];
     bool can = hap_effect_check((hap_effect)i, wish, run->model, NULL) >= HAP_OK;
-    options.def.effects[i] = (uint8_t)(can ? wish : HAP_EFFECT_AUTO);
+    expert_wish(&options.expert, i, (can ? wish : HAP_EFFECT_AUTO));
   }
   hap_status status = rig_create(&options, out, &b->detail);
   return status >= HAP_OK ? hap_session_start(out->session) : status;

@@ -18,7 +18,7 @@ int main(int argc, char **argv)
   memset(&effects, 0, sizeof effects);
   memset(&r, 0, sizeof r);
   if (argc != 4 || run_effects_parse(argv[2], &effects, &detail) < HAP_OK ||
-      run_effects_apply(&effects, &options.def, &detail) < HAP_OK) {
+      run_effects_apply(&effects, options.def.model, &options.expert, &detail) < HAP_OK) {
     fprintf(stderr, "usage: effects-tick SCENE LIST TICKS: %s\n", detail.text);
     return 2;
   }

@@ -85,9 +85,9 @@ static hap_status run_variant(bench *b, const variant *v, const scene_parameters
   options.device_count = 1;
   options.max_force = strtod(FORCE_MAX, NULL);
   options.def.drive = HAP_DRIVE_LOCKSTEP;
-  options.def.guard = HAP_GUARD_MEASURE;
+  options.research.guard = HAP_GUARD_MEASURE;
   options.def.model = v->model;
-  options.def.impulse_pose = v->pose;
+  options.research.impulse_pose = v->pose;
   options.def.physics_hz = v->model == HAP_MODEL_SINGLE ? 20.0 : v->physics_hz;
   options.def.haptic_hz = 1.0 / TICK_S;
   hap_status status = rig_create(&options, &r, &b->detail);

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "tools/session_defs.h"
+
 static const double friction = 0.5;
 static const double surface_layer = 1e-3; /* m */
 
@@ -118,13 +120,15 @@ static hap_status create_session(bench *b, port *p, const port_def *def)
 {
   hap_ode_def ode;
   hap_session_def session;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def_init(&ode, sizeof ode);
-  hap_session_def_init(&session, sizeof session);
+  session_defs_init(&session, &expert, &research);
   ode.world = p->world;
   ode.space = p->space;
   ode.surface = surface;
   session.drive = HAP_DRIVE_LOCKSTEP;
-  session.guard = HAP_GUARD_MEASURE;
+  research.guard = HAP_GUARD_MEASURE;
   session.model = def->model;
   session.physics_hz = PORT_PHYSICS_HZ;
   session.haptic_hz = PORT_HAPTIC_HZ;
@@ -137,7 +141,9 @@ static hap_status create_session(bench *b, port *p, const port_def *def)
 static hap_status add_pointer(bench *b, port *p, const port_def *def)
 {
   hap_pointer_def pointer;
-  hap_pointer_def_init(&pointer, sizeof pointer);
+  hap_pointer_expert_def pointer_expert;
+  hap_pointer_research_def pointer_research;
+  pointer_defs_init(&pointer, &pointer_expert, &pointer_research);
   hap_status status = hap_device_open(def->device, &p->device, &b->detail);
   if (status < HAP_OK) {
     return status;
@@ -146,10 +152,11 @@ static hap_status add_pointer(bench *b, port *p, const port_def *def)
   pointer.radius = PORT_RADIUS;
   pointer.stiffness = def->stiffness;
   pointer.damping = def->damping;
-  pointer.coupling = def->coupling;
-  pointer.coupling_stiffness = def->coupling_stiffness;
-  pointer.coupling_damping = def->coupling_damping;
-  pointer.virtual_mass = def->virtual_mass > 0.0 ? def->virtual_mass : pointer.virtual_mass;
+  pointer_expert.coupling = def->coupling;
+  pointer_expert.coupling_stiffness = def->coupling_stiffness;
+  pointer_expert.coupling_damping = def->coupling_damping;
+  pointer_research.virtual_mass =
+      def->virtual_mass > 0.0 ? def->virtual_mass : pointer_research.virtual_mass;
   pointer.max_force = 1e6;
   status = hap_pointer_add(p->session, &pointer, &p->pointer);
   if (status >= HAP_OK) {

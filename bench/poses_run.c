@@ -269,7 +269,7 @@ static hap_status open_run(run *r, hap_detail *detail)
   rig_options_init(&options);
   options.scene = r->def->scene;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
-  options.def.guard = HAP_GUARD_MEASURE;
+  options.research.guard = HAP_GUARD_MEASURE;
   options.def.model = r->def->model;
   options.def.physics_hz = r->def->physics_hz;
   options.def.max_bodies = r->def->max_bodies > 0 ? r->def->max_bodies : options.def.max_bodies;

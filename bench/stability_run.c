@@ -15,6 +15,7 @@
 #include "physics/physics_internal.h"
 #include "plugins/virtual/virtual.h"
 #include "session/session_internal.h"
+#include "tools/session_defs.h"
 
 #define POINTER_RADIUS 10.0 /* m: so large that all normals are nearly those of the push */
 #define HALF 0.005          /* m, of a ball or cube */
@@ -116,21 +117,25 @@ static void write_spec(const stability_point *p, const char *hand, char out[256]
 static hap_status open_session(bench *b, stability_bed *s, const char *spec)
 {
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_pointer_def pointer;
-  hap_session_def_init(&def, sizeof def);
+  hap_pointer_expert_def pointer_expert;
+  hap_pointer_research_def pointer_research;
+  session_defs_init(&def, &expert, &research);
   hap_ode_def_init(&ode, sizeof ode);
-  hap_pointer_def_init(&pointer, sizeof pointer);
+  pointer_defs_init(&pointer, &pointer_expert, &pointer_research);
   def.drive = HAP_DRIVE_LOCKSTEP;
-  def.guard = HAP_GUARD_MEASURE;
+  research.guard = HAP_GUARD_MEASURE;
   def.haptic_hz = STABILITY_HAPTIC_HZ;
   ode.world = s->world;
   ode.space = s->space;
   pointer.radius = POINTER_RADIUS;
   pointer.stiffness = s->point->stiffness;
   pointer.max_force = NO_LIMIT;
-  pointer.coupling = s->point->coupling;
-  pointer.integration = s->point->integration;
+  pointer_expert.coupling = s->point->coupling;
+  pointer_research.integration = s->point->integration;
   hap_status status = hap_device_open(spec, &s->device, &b->detail);
   pointer.device = s->device;
   if (status >= HAP_OK) {

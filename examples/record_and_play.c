@@ -48,14 +48,18 @@ static hap_status push_record(const char *path, hap_detail *why)
 static hap_status push_play(const char *path, hap_detail *why)
 {
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_player *player;
   hap_session *session;
   hap_session_def_init(&def, sizeof def);
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
   hap_ode_def_init(&ode, sizeof ode);
   world_build(&ode);
-  hap_status status = hap_player_open(path, 0, &player, why);
-  if (status < HAP_OK || (status = hap_player_get_def(player, &def)) < HAP_OK ||
+  hap_status status = hap_player_open(path, HAP_PLAY_WHOLE, &player, why);
+  if (status < HAP_OK || (status = hap_player_get_def(player, &def, &expert, &research)) < HAP_OK ||
       (status = hap_session_create(&def, &ode, &session, why)) < HAP_OK ||
       (status = hap_session_play(session, player, why)) < HAP_OK ||
       (status = hap_session_start(session)) < HAP_OK) {

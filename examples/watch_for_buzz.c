@@ -13,13 +13,16 @@ static int buzz_count(dWorldID world, dSpaceID space, hap_coupling coupling)
   hap_session_def session_def;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
+  hap_pointer_expert_def expert;
   hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
+  hap_pointer_expert_def_init(&expert, sizeof expert);
   session_def.drive = HAP_DRIVE_LOCKSTEP; /* no clock: the program ends at once */
   ode_def.world = world, ode_def.space = space;
   hand_def.stiffness = 5000;
-  hand_def.coupling = coupling;
+  hand_def.expert = &expert;
+  expert.coupling = coupling;
   hap_session *session;
   hap_pointer_id hand;
   if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||

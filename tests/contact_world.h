@@ -10,6 +10,8 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
+#include "tools/session_defs.h"
+
 #define CW_BODIES_MAX 128
 #define CW_TRACED_MAX HAP_TRACE_BODIES_MAX
 #define CW_GRAVITY 9.81
@@ -23,8 +25,12 @@ typedef struct contact_world {
   double direction[3];        /* first friction direction, with dContactFDir1 */
 
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_pointer_def hand_def;
+  hap_pointer_expert_def hand_expert;
+  hap_pointer_research_def hand_research;
   hap_session *session;
   hap_pointer_id hand;
 
@@ -113,18 +119,18 @@ static inline void cw_open(contact_world *w, double gravity)
   dWorldSetContactSurfaceLayer(w->world, 1e-4);
   dWorldSetQuickStepNumIterations(w->world, 100);
   w->surface = (dSurfaceParameters){.mode = dContactApprox1, .mu = 0.5};
-  hap_session_def_init(&w->def, sizeof w->def);
+  session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
-  w->def.guard = HAP_GUARD_MEASURE; /* what the hand feels is what the bodies get */
+  w->research.guard = HAP_GUARD_MEASURE; /* what the hand feels is what the bodies get */
   w->def.model = HAP_MODEL_CONTACT;
   w->def.physics_hz = 20.0;
-  w->def.trace_rows = 16;
+  w->expert.trace_rows = 16;
   hap_ode_def_init(&w->ode, sizeof w->ode);
   w->ode.surface = cw_surface;
   w->ode.friction_direction = cw_direction;
   w->ode.before_step = cw_before_step;
   w->ode.after_step = cw_after_step;
-  hap_pointer_def_init(&w->hand_def, sizeof w->hand_def);
+  pointer_defs_init(&w->hand_def, &w->hand_expert, &w->hand_research);
   w->hand_def.stiffness = 2000.0;
   w->hand_def.damping = 20.0;
   w->hand_def.max_force = 1e6;

@@ -182,6 +182,8 @@ typedef struct felt_stage {
   stage s;
   hap_device *device;
   hap_pointer_def def;
+  hap_pointer_expert_def pointer_expert;
+  hap_pointer_research_def pointer_research;
   hap_pointer_id hand;
   hap_pointer_state state; /* of the last look */
 } felt_stage;
@@ -207,8 +209,8 @@ static inline void felt_init(felt_stage *f, hap_drive drive, bool body)
   memset(&felt, 0, sizeof felt);
   stage_init(&f->s, drive);
   felt_set_box(f, body);
-  hap_pointer_def_init(&f->def, sizeof f->def);
-  f->def.coupling = HAP_COUPLING_DIRECT;
+  pointer_defs_init(&f->def, &f->pointer_expert, &f->pointer_research);
+  f->pointer_expert.coupling = HAP_COUPLING_DIRECT;
 }
 
 /* args: of the device "virtual". */

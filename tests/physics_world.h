@@ -12,6 +12,7 @@
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
+#include "tools/session_defs.h"
 
 #define WORLD_BODIES_MAX 64
 #define WORLD_POINTERS_MAX 4
@@ -26,6 +27,8 @@ typedef struct test_world {
   hap_pointer_id pointers[WORLD_POINTERS_MAX];
   int pointer_count;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_step_fn before_step;
   hap_step_fn after_step;
   int surface_calls;
@@ -43,7 +46,7 @@ static inline void world_open(test_world *w, double gravity, int iterations)
   dWorldSetERP(w->world, 0.2);
   dWorldSetContactSurfaceLayer(w->world, 1e-4);
   dWorldSetQuickStepNumIterations(w->world, iterations);
-  hap_session_def_init(&w->def, sizeof w->def);
+  session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
   w->def.model = HAP_MODEL_ACCELERANCE;
   w->def.physics_hz = 20.0;
@@ -108,7 +111,7 @@ static inline hap_status world_create_session(test_world *w, hap_surface_fn surf
   hap_detail detail = {""};
   hap_ode_def ode;
   if (w->def.model == HAP_MODEL_ACCELERANCE) { /* also of free bodies: it is what is looked at */
-    w->def.effects[HAP_EFFECT_TESTING] = HAP_EFFECT_ON;
+    expert_wish(&w->expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
   }
   hap_ode_def_init(&ode, sizeof ode);
   ode.world = w->world;

@@ -69,12 +69,12 @@ static inline bool recorded_create(const recorded_setup *s, rig *r)
   rig_options_init(&options);
   options.scene = s->scene;
   options.def.model = s->model;
-  options.def.probe = s->probe;
-  options.def.max_sweeps = s->max_sweeps;
-  options.def.range_hops = s->range_hops;
+  options.research.probe = s->probe;
+  options.expert.max_sweeps = s->max_sweeps;
+  options.expert.range_hops = s->range_hops;
   options.def.accuracy = s->accuracy;
-  options.def.reuse = s->reuse;
-  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)s->cross;
+  options.expert.reuse = s->reuse;
+  expert_wish(&options.expert, HAP_EFFECT_CROSS, s->cross);
   options.record = &s->record;
   if (s->coupling_stiffness > 0.0) {
     options.coupling = s->coupling;

@@ -12,6 +12,7 @@
 
 #include "base/clock.h"
 #include "tests/tap.h"
+#include "tools/session_defs.h"
 
 #define MS 1000000LL
 
@@ -23,6 +24,8 @@ typedef struct stage {
   dBodyID cube;
   dGeomID geom;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_session *session;
   hap_detail detail;
@@ -62,7 +65,7 @@ static inline void stage_init(stage *s, hap_drive drive)
   s->world = dWorldCreate();
   s->space = dHashSpaceCreate(NULL);
   s->cube = add_cube(s, 0.0, &s->geom);
-  hap_session_def_init(&s->def, sizeof s->def);
+  session_defs_init(&s->def, &s->expert, &s->research);
   s->def.drive = drive;
   s->def.physics_hz = 50.0;
   s->def.rt_priority = 0;

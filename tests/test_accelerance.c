@@ -453,7 +453,7 @@ TEST(b_holds_the_forces_of_before_step)
 static void open_count(test_world *w, hap_probe probe)
 {
   world_open(w, 0.0, 20);
-  w->def.probe = probe;
+  w->research.probe = probe;
   far_moves = 0;
 }
 

@@ -26,7 +26,7 @@ static bool work_create(void)
 {
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.trace_rows = 10;
+  s.expert.trace_rows = 10;
   for (int i = 1; i < 100; ++i) { /* the table of bodies has to grow */
     (void)add_cube(&s, 0.2 * i, NULL);
   }
@@ -214,7 +214,7 @@ static bool run_recording(hap_drive drive, hap_player *player)
   hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   stage_init(&s, drive);
   if (player != NULL) {
-    CHECK(hap_player_get_def(player, &s.def) == HAP_OK);
+    CHECK(hap_player_get_def(player, &s.def, &s.expert, &s.research) == HAP_OK);
   }
   hap_pointer_def_init(&hand, sizeof hand);
   hap_record_def_init(&def, sizeof def);

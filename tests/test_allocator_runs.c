@@ -51,7 +51,7 @@ static void options_of(const scenario *s, rig_options *out)
   out->def.rt_priority = 0;
   out->def.max_bodies = 16; /* less to clear: more rounds a second */
   out->def.max_contacts = 128;
-  out->def.trace_rows = 64;
+  out->expert.trace_rows = 64;
   out->friction = 0.5;
   for (size_t i = 0; i < 2 && s->devices[i] != NULL; ++i) {
     out->devices[out->device_count++] = s->devices[i];

@@ -135,7 +135,7 @@ TEST(what_does_not_fit_is_left_out_from_the_far_end)
   w.surface.mu = 0.0;
   w.def.physics_hz = 100.0;
   w.def.max_bodies = 3;
-  w.def.max_edge_probes = 0;
+  w.expert.max_edge_probes = 0;
   for (int i = 0; i < 8; ++i) {
     cw_add_cube(&w, 1.0, 0.05, 0.05 * (7 - i), 0.0, 0.0); /* the far one first */
   }
@@ -437,7 +437,7 @@ static slide push_over(bool triangles)
   contact_world w;
   slide s = {0.0, 1e9, 0.0, 1e9, -1e9};
   cw_open(&w, G);
-  w.def.max_hull_points = 100000;
+  w.expert.max_hull_points = 100000;
   if (triangles) {
     add_mesh(&w, &m, 0.031, flat);
   } else {
@@ -491,7 +491,7 @@ TEST(a_ball_rolls_over_triangles_as_over_a_plane)
   double lowest = 1.0;
   double highest = 0.0;
   cw_open(&w, G);
-  w.def.max_hull_points = 100000;
+  w.expert.max_hull_points = 100000;
   add_mesh(&w, &m, 0.031, flat);
   cw_add_ball(&w, 1.0, 0.03, -0.1, 0.013, 0.0299);
   dBodySetLinearVel(w.bodies[0], 0.2, 0.013, 0.0);
@@ -517,7 +517,7 @@ TEST(ridges_carry_a_box)
   static mesh m;
   contact_world w;
   cw_open(&w, G);
-  w.def.max_hull_points = 100000;
+  w.expert.max_hull_points = 100000;
   add_mesh(&w, &m, 0.05, ridges);
   cw_add_box(&w, 1.0, (const double[3]){0.24, 0.1, 0.04}, 0.01, 0.013, 0.0199);
   REQUIRE(cw_start(&w, 0.01, 0.013, 0.055));
@@ -704,7 +704,7 @@ static void ask_in_pile(int range, int probes)
   w.ode.surface = ask;
   w.ode.before_step = forget_asked;
   w.def.max_bodies = range;
-  w.def.max_edge_probes = probes;
+  w.expert.max_edge_probes = probes;
   cw_add_floor(&w);
   for (int i = 0; i < 8; ++i) {
     cw_add_cube(&w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
@@ -777,9 +777,9 @@ static hap_stats push_stack(double physics_hz, double contact_hz, double haptic_
   memset(&stats, 0, sizeof stats);
   cw_open(&w, G);
   w.def.physics_hz = physics_hz;
-  w.def.contact_hz = contact_hz;
+  w.expert.contact_hz = contact_hz;
   w.def.haptic_hz = haptic_hz;
-  w.def.physics_latency_ticks = latency;
+  w.research.physics_latency_ticks = latency;
   cw_add_floor(&w);
   cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0249);
   cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0748);
@@ -839,7 +839,7 @@ static void run_threads(double contact_hz, double seconds)
   options.def.model = HAP_MODEL_CONTACT;
   options.def.rt_priority = 0;
   options.def.physics_hz = 20.0;
-  options.def.contact_hz = contact_hz;
+  options.expert.contact_hz = contact_hz;
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   CHECK(hap_session_start(r.session) >= HAP_OK);
   hapi_clock_sleep_until(hapi_clock_now() + (int64_t)(1e9 * seconds));

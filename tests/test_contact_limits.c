@@ -60,7 +60,7 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
     cw_open(&w, CW_GRAVITY);
     cw_add_floor(&w);
     dMassSetBoxTotal(&mass, 0.5, 0.05, 0.05, 0.05);
-    w.def.max_hull_points = room != 0 ? 64 : 0;
+    w.expert.max_hull_points = room != 0 ? 64 : 0;
     cw_add(&w, dCreateConvex(w.space, planes, 6, points, 8, polygons), &mass, 0.0, 0.0, 0.0249);
     REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
     CHECK(hap_session_advance(w.session, 1000) == HAP_OK);
@@ -228,7 +228,7 @@ TEST(the_range_ends_after_so_many_contacts)
     contact_world w;
     cw_open(&w, CW_GRAVITY);
     w.def.physics_hz = 100.0;
-    w.def.range_hops = hops[i];
+    w.expert.range_hops = hops[i];
     cw_add_floor(&w);
     for (int k = 0; k < 6; ++k) {
       cw_add_cube(&w, 1.0, 0.05, 0.05 * k, 0.0, 0.0249);
@@ -248,7 +248,7 @@ TEST(what_hangs_together_is_one_hop)
     contact_world w;
     cw_open(&w, 0.0);
     w.def.physics_hz = 100.0;
-    w.def.range_hops = hops;
+    w.expert.range_hops = hops;
     for (int k = 0; k < 4; ++k) {
       cw_add_cube(&w, 1.0, 0.05, 0.051 * k, 0.0, 0.0);
     }
@@ -275,7 +275,7 @@ TEST(sweeps_are_no_more_than_asked)
   for (int i = 0; i < 4; ++i) {
     contact_world w;
     cw_open(&w, CW_GRAVITY);
-    w.def.max_sweeps = most[i];
+    w.expert.max_sweeps = most[i];
     cw_add_floor(&w);
     for (int k = 0; k < 6; ++k) {
       cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0249 + 0.0499 * k);

@@ -114,7 +114,7 @@ TEST(fig5_has_the_closed_forms_peak_and_impulse)
     options.def.model = HAP_MODEL_CONTACT;
     options.def.physics_hz = rates[i / 3];
     options.def.drive = HAP_DRIVE_LOCKSTEP;
-    options.def.trace_rows = 1200;
+    options.expert.trace_rows = 1200;
     REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
     CHECK(hap_session_start(r.session) == HAP_OK && hap_session_advance(r.session, 1200) == HAP_OK);
     size_t count = 0;
@@ -184,7 +184,7 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
   options.def.model = HAP_MODEL_CONTACT;
   options.def.physics_hz = 20.0;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
-  options.def.trace_rows = 2000;
+  options.expert.trace_rows = 2000;
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   CHECK(hap_session_start(r.session) == HAP_OK && hap_session_advance(r.session, 2000) == HAP_OK);
   size_t count = 0;
@@ -219,7 +219,7 @@ static void push_row(int count, int range, int probes)
   dWorldSetQuickStepNumIterations(w.world, 200);
   w.surface.mu = 0.0;
   w.def.max_bodies = range;
-  w.def.max_edge_probes = probes;
+  w.expert.max_edge_probes = probes;
   for (int i = 0; i < count; ++i) {
     cw_add_cube(&w, 1.0, 0.05, 0.025 + 0.0501 * i, 0.0, 0.0);
   }

@@ -20,9 +20,8 @@
 
 static hapi_coupling_gains gains_of(const hap_device_info *device)
 {
-  hap_pointer_def def;
-  hap_pointer_def_init(&def, sizeof def);
-  return hapi_coupling_gains_of(device, &def, T);
+  const hapi_pointer_setup setup = {.size = sizeof setup};
+  return hapi_coupling_gains_of(device, &setup, T);
 }
 
 TEST(gains_follow_the_device)
@@ -47,16 +46,15 @@ TEST(gains_follow_the_device)
 TEST(gains_are_not_invented)
 {
   hap_device_info device = {.quantum = 3e-5, .delay = 1e-3, .max_force = 10.0};
-  hap_pointer_def def;
-  hap_pointer_def_init(&def, sizeof def);
-  CHECK(!hapi_coupling_gains_of(&device, &def, T).known);
-  def.hand_damping = 1.0; /* the hand may let go of a device that says nothing */
-  CHECK(!hapi_coupling_gains_of(&device, &def, T).known);
+  hapi_pointer_setup setup = {.size = sizeof setup};
+  CHECK(!hapi_coupling_gains_of(&device, &setup, T).known);
+  setup.hand_damping = 1.0; /* the hand may let go of a device that says nothing */
+  CHECK(!hapi_coupling_gains_of(&device, &setup, T).known);
   device.damping = 0.2;
-  CHECK_NEAR(hapi_coupling_gains_of(&device, &def, T).stiffness, 0.8 * 1.2 / (1.5 * T), 1e-9);
-  def.coupling_stiffness = 700.0;
-  def.coupling_damping = 0.3;
-  hapi_coupling_gains g = hapi_coupling_gains_of(&device, &def, T);
+  CHECK_NEAR(hapi_coupling_gains_of(&device, &setup, T).stiffness, 0.8 * 1.2 / (1.5 * T), 1e-9);
+  setup.coupling_stiffness = 700.0;
+  setup.coupling_damping = 0.3;
+  hapi_coupling_gains g = hapi_coupling_gains_of(&device, &setup, T);
   CHECK(g.known && g.stiffness == 700.0 && g.damping == 0.3);
 }
 
@@ -72,8 +70,8 @@ static hap_pointer_state state_of(const contact_world *w)
 
 static void use_proxy(contact_world *w, double stiffness)
 {
-  w->hand_def.coupling = HAP_COUPLING_PROXY;
-  w->hand_def.coupling_stiffness = stiffness;
+  w->hand_expert.coupling = HAP_COUPLING_PROXY;
+  w->hand_expert.coupling_stiffness = stiffness;
 }
 
 /* On the static floor, pressed 2 mm in. */
@@ -218,7 +216,9 @@ TEST(pointers_of_one_body_have_each_their_own_coupling)
   use_proxy(&w, k_v);
   REQUIRE(cw_start(&w, -HAND_RADIUS + 0.002, 0.0, 0.0));
   hap_pointer_def def = w.hand_def;
-  def.coupling = HAP_COUPLING_DIRECT;
+  hap_pointer_expert_def expert = w.hand_expert;
+  def.expert = &expert;
+  expert.coupling = HAP_COUPLING_DIRECT;
   CHECK(hap_pointer_add(w.session, &def, &other) == HAP_OK);
   CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
   cw_run(&w, 3000); /* until it has come to rest between them */
@@ -233,7 +233,7 @@ TEST(pointers_of_one_body_have_each_their_own_coupling)
   CHECK(hap_session_advance(w.session, 200) == HAP_OK);
   CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
   CHECK(state.wrench.force[0] == 0.0);
-  w.hand_def.coupling_stiffness = 1000.0;
+  w.hand_expert.coupling_stiffness = 1000.0;
   CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
   cw_put_hand(&w, 0.0, 0.0, 0.0);
   CHECK(hap_session_advance(w.session, 3) == HAP_OK);
@@ -306,8 +306,8 @@ static bool open_many(contact_world *w, int count, double hold)
 {
   cw_open(w, 0.0);
   add_ring(w, count);
-  w->hand_def.coupling = HAP_COUPLING_AUTO;
-  w->hand_def.coupling_stiffness = hold;
+  w->hand_expert.coupling = HAP_COUPLING_AUTO;
+  w->hand_expert.coupling_stiffness = hold;
   w->hand_def.stiffness = 300.0;
   return cw_start(w, 0.0, 0.0, 0.03);
 }
@@ -357,8 +357,8 @@ TEST(the_change_while_pressing_has_no_jump)
   cw_add_floor(&w);
   cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
   cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
-  w.hand_def.coupling = HAP_COUPLING_AUTO;
-  w.hand_def.coupling_stiffness = 1500.0; /* one contact of 1 kN/m, not two */
+  w.hand_expert.coupling = HAP_COUPLING_AUTO;
+  w.hand_expert.coupling_stiffness = 1500.0; /* one contact of 1 kN/m, not two */
   w.hand_def.stiffness = 1000.0;
   w.hand_def.damping = 0.0;
   REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
@@ -394,8 +394,8 @@ TEST(auto_without_a_force_stays_direct)
     cw_open(&w, 0.0);
     cw_add_floor(&w);
     cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
-    w.hand_def.coupling = HAP_COUPLING_AUTO;
-    w.hand_def.coupling_stiffness = 100.0;
+    w.hand_expert.coupling = HAP_COUPLING_AUTO;
+    w.hand_expert.coupling_stiffness = 100.0;
     w.hand_def.force_scale = scale[i];
     REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
     cw_move_hand(&w, 0.0, 0.0, -0.03);
@@ -444,11 +444,11 @@ TEST(a_heavy_proxy_is_let_go_of_at_the_device)
   contact_world w;
   cw_open(&w, 0.0);
   add_ring(&w, 4);
-  w.hand_def.coupling = HAP_COUPLING_AUTO;
-  w.hand_def.coupling_stiffness = 1000.0;
-  w.hand_def.coupling_damping = 2.0;
+  w.hand_expert.coupling = HAP_COUPLING_AUTO;
+  w.hand_expert.coupling_stiffness = 1000.0;
+  w.hand_expert.coupling_damping = 2.0;
   w.hand_def.stiffness = 300.0;
-  w.hand_def.mass = 0.5;
+  w.hand_expert.proxy_mass = 0.5;
   REQUIRE(cw_start(&w, 0.0, 0.0, 0.03));
   cw_move_hand(&w, 0.0, 0.0, -0.05);
   while (state_of(&w).contacts < 4 && w.ticks < 1000) {
@@ -478,9 +478,11 @@ TEST(a_proxy_is_refused_where_it_cannot_be)
   cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
   REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
   hap_pointer_def def = w.hand_def;
-  def.coupling = HAP_COUPLING_PROXY;
+  hap_pointer_expert_def expert = w.hand_expert;
+  def.expert = &expert;
+  expert.coupling = HAP_COUPLING_PROXY;
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
-  def.coupling_stiffness = 100.0;
+  expert.coupling_stiffness = 100.0;
   def.force_scale = 0.0; /* a spring without a force at its other end */
   CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   def.force_scale = 1e-300; /* no number for the spring in the world */
@@ -526,7 +528,7 @@ TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
     cw_open(&w, 0.0);
     dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025 + 0.05, 0.0, 0.0);
     dBodySetLinearVel(cube, -1.0, 0.0, 0.0);
-    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
     w.hand_def.stiffness = 1e5;
     w.hand_def.damping = 0.0;
     use_proxy(&w, 800.0);
@@ -553,9 +555,9 @@ TEST(a_change_of_the_coupling_is_no_source_of_energy)
     cw_add_floor(&w);
     cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
     cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
-    w.def.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
-    w.hand_def.coupling = HAP_COUPLING_AUTO;
-    w.hand_def.coupling_stiffness = 4500.0;
+    w.research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w.hand_expert.coupling = HAP_COUPLING_AUTO;
+    w.hand_expert.coupling_stiffness = 4500.0;
     w.hand_def.stiffness = 4000.0;
     w.hand_def.damping = 0.0;
     w.hand_def.max_force = 20.0;
@@ -644,7 +646,7 @@ static double shaking(hap_coupling coupling, int count, double stiffness)
   add_ring(&w, count);
   w.hand_def.stiffness = stiffness;
   w.hand_def.damping = 0.0;
-  w.hand_def.coupling = coupling;
+  w.hand_expert.coupling = coupling;
   w.ode.world = w.world;
   w.ode.space = w.space;
   w.ode.user = &w;

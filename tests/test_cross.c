@@ -66,7 +66,7 @@ static bool start_above(test_world *w, double x)
 static void open_pair(test_world *w, hap_effect_wish cross, double mass_a, double mass_b)
 {
   world_open(w, 0.0, 1000);
-  w->def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
+  expert_wish(&w->expert, HAP_EFFECT_CROSS, cross);
   world_add_cube(w, EDGE, mass_a, -APART, 0, 0);
   world_add_cube(w, EDGE, mass_b, APART, 0, 0);
 }
@@ -200,7 +200,7 @@ TEST(with_too_few_places_the_largest_stay)
   test_world w;
   hapi_cross_block all[6];
   world_open(&w, 0.0, 200);
-  w.def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
+  expert_wish(&w.expert, HAP_EFFECT_CROSS, HAP_EFFECT_ON);
   for (int i = 0; i < 3; ++i) {
     world_add_cube(&w, EDGE, 0.2 + 0.3 * i, 2 * APART * i, 0, 0);
   }
@@ -268,8 +268,8 @@ static bool open_row(test_world *w, hap_effect_wish cross)
 {
   world_open(w, 0.0, 1000);
   w->mu = 0.0;
-  w->def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
-  w->def.guard = HAP_GUARD_MEASURE;
+  expert_wish(&w->expert, HAP_EFFECT_CROSS, cross);
+  w->research.guard = HAP_GUARD_MEASURE;
   for (int i = 0; i < 3; ++i) {
     world_add_cube(w, EDGE, 0.5, EDGE / 2 + i * (EDGE - OVERLAP), 0, 0);
   }
@@ -333,7 +333,7 @@ TEST(two_hands_on_a_pair_leave_no_residual)
   for (int cross = HAP_EFFECT_OFF; cross <= HAP_EFFECT_ON; ++cross) {
     test_world w;
     open_pair(&w, (hap_effect_wish)cross, 0.5, 0.3);
-    w.def.guard = HAP_GUARD_MEASURE;
+    w.research.guard = HAP_GUARD_MEASURE;
     join_fixed(&w);
     REQUIRE(world_create_session(&w, NULL) == HAP_OK);
     world_add_pointer(&w, RADIUS, -APART, 0, EDGE / 2 + RADIUS + GAP);
@@ -366,8 +366,8 @@ static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_effect_wish
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.physics_hz = 20.0;
   options.def.model = HAP_MODEL_ACCELERANCE;
-  options.def.probe = probe;
-  options.def.effects[HAP_EFFECT_CROSS] = (uint8_t)cross;
+  options.research.probe = probe;
+  expert_wish(&options.expert, HAP_EFFECT_CROSS, cross);
   if (rig_create(&options, &r, &detail) < HAP_OK) {
     CHECK(!"a scene");
     return 0;
@@ -408,8 +408,8 @@ static bool open_floor(on_floor *f, hap_probe probe, double side)
   test_world *w = &f->w;
   world_open(w, GRAVITY, 1000);
   w->mu = MU;
-  w->def.probe = probe;
-  w->def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
+  w->research.probe = probe;
+  expert_wish(&w->expert, HAP_EFFECT_CROSS, HAP_EFFECT_ON);
   dCreatePlane(w->space, 0, 0, 1, 0);
   dBodyID cube = world_add_cube(w, EDGE, MASS, 0, 0, EDGE / 2 - OVERLAP);
   if (world_create_session(w, NULL) < HAP_OK) {
@@ -514,8 +514,8 @@ TEST(what_does_not_answer_has_no_block)
     double force = pushed != 0 ? 4.0 * LIMIT : 0.0;
     world_open(w, GRAVITY, 1000);
     w->mu = MU;
-    w->def.probe = HAP_PROBE_OPERATING;
-    w->def.effects[HAP_EFFECT_CROSS] = HAP_EFFECT_ON;
+    w->research.probe = HAP_PROBE_OPERATING;
+    expert_wish(&w->expert, HAP_EFFECT_CROSS, HAP_EFFECT_ON);
     dCreatePlane(w->space, 0, 0, 1, 0);
     for (int i = 0; i < 2; ++i) {
       world_add_cube(w, EDGE, MASS, i * (EDGE - OVERLAP), 0, EDGE / 2 - OVERLAP);
@@ -540,7 +540,7 @@ TEST(perturbations_go_into_the_body)
     test_world w;
     world_open(&w, 0.0, 1000);
     w.mu = 0.0;
-    w.def.probe = HAP_PROBE_OPERATING;
+    w.research.probe = HAP_PROBE_OPERATING;
     for (int i = 0; i < 2; ++i) {
       world_add_cube(&w, EDGE, 0.5, side * (EDGE / 2 + i * (EDGE - OVERLAP)), 0, 0);
     }
@@ -558,7 +558,7 @@ TEST(operating_probes_are_as_many_as_shared_ones)
   for (int k = 0; k < 2; ++k) {
     test_world w;
     open_pair(&w, HAP_EFFECT_OFF, 0.4, 0.4);
-    w.def.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
+    w.research.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
     join_fixed(&w);
     REQUIRE(start_above(&w, -0.02));
     const uint64_t *made = &world_physics(&w)->probe.test.steps;

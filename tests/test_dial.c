@@ -243,7 +243,7 @@ TEST(the_session_tells_where_it_stands)
   contact_world w;
   open_row(&w, 2);
   w.def.accuracy = 0.1;
-  w.def.max_sweeps = 7;
+  w.expert.max_sweeps = 7;
   REQUIRE(start_row(&w));
   cw_run(&w, 120);
   hap_accuracy_info info = accuracy_of(&w);
@@ -262,8 +262,8 @@ TEST(it_tells_so_from_the_start)
   contact_world w;
   open_row(&w, 2);
   w.def.accuracy = 0.1;
-  w.def.lookback = 0.1;
-  w.def.force_error_wanted = 0.3;
+  w.expert.lookback = 0.1;
+  w.expert.force_error_wanted = 0.3;
   REQUIRE(start_row(&w));
   hap_accuracy_info info = accuracy_of(&w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
@@ -368,7 +368,7 @@ TEST(a_shape_that_is_asked_for_stays)
     cw_add_cube(&w, 0.3, EDGE, 0.0, 0.0, 0.5 * EDGE);
     w.hand_def.radius = RADIUS;
     w.def.accuracy = 0.0;
-    w.def.effects[HAP_EFFECT_SHAPE] = i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON;
+    expert_wish(&w.expert, HAP_EFFECT_SHAPE, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
     REQUIRE(start_row(&w));
     cw_run(&w, 120);
     hap_effect_info shape = shape_of(&w);
@@ -395,8 +395,8 @@ static hap_accuracy_info look_for_error(double from, double wanted)
   hap_accuracy_info info;
   open_row(&w, 4);
   w.def.accuracy = from;
-  w.def.force_error_wanted = wanted;
-  w.def.lookback = 0.1;
+  w.expert.force_error_wanted = wanted;
+  w.expert.lookback = 0.1;
   memset(&info, 0, sizeof info);
   if (start_row(&w)) {
     stroke(&w, 6000);
@@ -415,8 +415,8 @@ TEST(it_says_when_no_error_has_been_told)
 {
   contact_world w;
   open_row(&w, 2);
-  w.def.lookback = 0.1;
-  w.def.force_error_wanted = 0.02;
+  w.expert.lookback = 0.1;
+  w.expert.force_error_wanted = 0.02;
   REQUIRE(start_row(&w));
   for (int i = 0; i < 1000; ++i) { /* away, and back as far */
     cw_move_hand(&w, i < 500 ? -0.1 : 0.1, 0.0, 0.0);
@@ -447,8 +447,8 @@ TEST(without_a_wanted_error_it_goes_back)
   contact_world w;
   open_row(&w, 4);
   w.def.accuracy = 0.0;
-  w.def.force_error_wanted = 0.02;
-  w.def.lookback = 0.1;
+  w.expert.force_error_wanted = 0.02;
+  w.expert.lookback = 0.1;
   REQUIRE(start_row(&w));
   stroke(&w, 3000);
   CHECK(accuracy_of(&w).accuracy > 0.0);
@@ -470,7 +470,7 @@ static hap_accuracy_info run_threads(contact_world *w, done_fn done)
   memset(&info, 0, sizeof info);
   w->def.drive = HAP_DRIVE_THREADS;
   w->def.rt_priority = 0;
-  w->def.trace_rows = 0;
+  w->expert.trace_rows = 0;
   hap_detail detail = {""};
   w->ode.world = w->world;
   w->ode.space = w->space;
@@ -504,7 +504,7 @@ TEST(a_budget_turns_the_tick_back)
   contact_world w;
   open_row(&w, 6);
   w.def.haptic_hz = 20000.0;
-  w.def.tick_share = 0.01;
+  w.expert.tick_share = 0.01;
   hap_accuracy_info info = run_threads(&w, tick_at_least);
   CHECK(tick_at_least(&info) && info.tick.accuracy == 0.0 && info.tick.turns >= 2);
   CHECK(info.tick.share == 0.01 && info.tick.load > 0.19); /* all of them are over */
@@ -523,7 +523,7 @@ TEST(a_budget_turns_physics_back)
   open_row(&w, 6);
   w.def.model = HAP_MODEL_ACCELERANCE;
   w.def.physics_hz = 1000.0;
-  w.def.physics_share = 0.01;
+  w.expert.physics_share = 0.01;
   hap_accuracy_info info = run_threads(&w, physics_at_least);
   CHECK(physics_at_least(&info) && info.physics.accuracy == 0.0);
   CHECK(info.iterations == 50 && info.edge_probes == 0);
@@ -542,8 +542,8 @@ TEST(a_budget_that_is_wide_leaves_all_as_it_is)
   contact_world w;
   open_row(&w, 1);
   w.def.haptic_hz = 100.0; /* 10 ms for a cube */
-  w.def.tick_share = 1.0;
-  w.def.physics_share = 1.0;
+  w.expert.tick_share = 1.0;
+  w.expert.physics_share = 1.0;
   w.def.accuracy = 0.6;
   hap_accuracy_info info = run_threads(&w, some_seconds);
   CHECK(info.tick.accuracy == 0.6 && info.physics.accuracy == 0.6);

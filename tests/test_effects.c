@@ -45,7 +45,7 @@ static bool is_called(const contact_world *w, hap_effect effect)
 
 static void wish(contact_world *w, hap_effect effect, hap_effect_wish wished)
 {
-  w->def.effects[effect] = (uint8_t)wished;
+  expert_wish(&w->expert, effect, wished);
 }
 
 /* A cube on a floor, and a hand that comes from its left. */
@@ -71,7 +71,7 @@ TEST(a_free_body_alone_calls_for_nothing)
 {
   contact_world w;
   cw_open(&w, 0.0);
-  w.def.guard = HAP_GUARD_ON;
+  w.research.guard = HAP_GUARD_ON;
   cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
   REQUIRE(cw_start(&w, -EDGE / 2 - HAND - 0.002, 0.0, 0.0));
   cw_move_hand(&w, 0.1, 0.0, 0.0);
@@ -101,7 +101,7 @@ TEST(far_away_nothing_is_on)
 {
   contact_world w;
   REQUIRE(open_on_floor(&w, 2));
-  w.def.guard = HAP_GUARD_ON;
+  w.research.guard = HAP_GUARD_ON;
   REQUIRE(cw_start(&w, 0.0, 0.0, 5.0));
   cw_run(&w, 60);
   for (int i = HAP_EFFECT_TESTING; i <= HAP_EFFECT_PASSES; ++i) {
@@ -286,7 +286,7 @@ TEST(a_coupling_of_its_own_is_a_reason)
 {
   contact_world w;
   REQUIRE(open_on_floor(&w, 1));
-  w.hand_def.coupling = HAP_COUPLING_DIRECT;
+  w.hand_expert.coupling = HAP_COUPLING_DIRECT;
   REQUIRE(start_left(&w, 0.002));
   cw_run(&w, 60);
   CHECK(is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_COUPLING));
@@ -298,7 +298,7 @@ TEST(what_the_device_can_hold_decides_on_the_proxy)
   for (int i = 0; i < 2; ++i) {
     contact_world w;
     REQUIRE(open_on_floor(&w, 1));
-    w.hand_def.coupling_stiffness = i == 0 ? 5000.0 : 500.0;
+    w.hand_expert.coupling_stiffness = i == 0 ? 5000.0 : 500.0;
     REQUIRE(start_left(&w, 0.0));
     cw_run(&w, 101);
     CHECK(i == 0 ? is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_WITHIN)
@@ -355,7 +355,7 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
     contact_world w;
     cw_open(&w, 0.0);
     w.def.model = HAP_MODEL_ACCELERANCE;
-    w.def.effects[HAP_EFFECT_CROSS] = i < 2 ? HAP_EFFECT_ON : HAP_EFFECT_AUTO;
+    expert_wish(&w.expert, HAP_EFFECT_CROSS, i < 2 ? HAP_EFFECT_ON : HAP_EFFECT_AUTO);
     dBodyID a = cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
     dBodyID b = cw_add_cube(&w, 0.2, EDGE, EDGE + 0.002, 0.0, 0.0);
     if (i != 1) {
@@ -601,7 +601,7 @@ TEST(the_proxy_can_be_had_and_left_out)
     contact_world w;
     hap_pointer_state state;
     REQUIRE(open_on_floor(&w, 1));
-    w.hand_def.coupling_stiffness = i == 0 ? 500.0 : 5000.0; /* auto would do the other */
+    w.hand_expert.coupling_stiffness = i == 0 ? 500.0 : 5000.0; /* auto would do the other */
     wish(&w, HAP_EFFECT_PROXY, wishes[i]);
     REQUIRE(start_left(&w, 0.0));
     cw_run(&w, 101);
@@ -620,8 +620,8 @@ TEST(wishes_can_change_from_sync_to_sync)
   contact_world w;
   REQUIRE(open_on_floor(&w, 2));
   w.hand_def.friction = 0.3;
-  w.hand_def.coupling_stiffness = 5000.0;
-  w.def.guard = HAP_GUARD_ON;
+  w.hand_expert.coupling_stiffness = 5000.0;
+  w.research.guard = HAP_GUARD_ON;
   REQUIRE(start_left(&w, 0.0));
   for (int round = 0; round < 3; ++round) {
     hap_effect_wish wished = (hap_effect_wish)(round == 2 ? HAP_EFFECT_AUTO : round + 1);
@@ -719,13 +719,12 @@ TEST(bad_arguments_change_nothing)
   }
   hap_session_destroy(w.session);
   w.session = NULL;
-  w.def.effects[HAP_EFFECTS] = 1;
+  w.expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECTS);
   CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(says(&detail, "effects[14]"));
-  w.def.effects[HAP_EFFECTS] = 0;
-  w.def.effects[HAP_EFFECT_GYRO] = 7;
+  CHECK(says(&detail, "effects_off"));
+  w.expert.effects_off = w.expert.effects_on = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
   CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(says(&detail, "effects[9] is 7"));
+  CHECK(says(&detail, "gyro is in effects_on and in effects_off"));
   cw_close(&w);
 }
 
@@ -770,7 +769,7 @@ static double error_of_range(int max_bodies)
   cw_open(&w, 0.0);
   w.surface.mu = 0.0;
   w.def.max_bodies = max_bodies;
-  w.def.max_edge_probes = 0;
+  w.expert.max_edge_probes = 0;
   dWorldSetQuickStepNumIterations(w.world, 2000);
   wish(&w, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
   for (int i = 0; i < 8; ++i) {

@@ -56,8 +56,10 @@ static bool open_rig(const scene_run *of, hap_model model, const uint8_t effects
   options.scene = of->scene;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.model = model;
-  options.def.trace_rows = 4;
-  memcpy(options.def.effects, effects, HAP_EFFECTS);
+  options.expert.trace_rows = 4;
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    expert_wish(&options.expert, (hap_effect)i, (hap_effect_wish)effects[i]);
+  }
   bool good =
       rig_create(&options, out, &detail) >= HAP_OK && hap_session_start(out->session) >= HAP_OK;
   if (!good) {

@@ -166,7 +166,7 @@ static taps taps_end(void)
 {
   double stored = 0.5 * felt.peak * felt.peak / f.def.stiffness;
   taps t = {felt.work_most, felt.work_once, stored};
-  felt.bad = f.s.def.guard == HAP_GUARD_MEASURE ? 0 : felt.bad; /* it has no slew limit */
+  felt.bad = f.s.research.guard == HAP_GUARD_MEASURE ? 0 : felt.bad; /* it has no slew limit */
   CHECK(stats_of(&f.s).faults.count == 0);
   felt_end(&f);
   return t;
@@ -176,7 +176,7 @@ static bool begin_tapping(hap_guard guard, const char *hand)
 {
   char spec[200];
   felt_init(&f, HAP_DRIVE_LOCKSTEP, false);
-  f.s.def.guard = guard;
+  f.s.research.guard = guard;
   snprintf(spec, sizeof spec, "hand=%s," TAPPING, hand);
   return begin(spec);
 }
@@ -430,13 +430,13 @@ static void note_speed(void)
 static bool begin_to_jump(bool body, hap_coupling coupling, double stiffness)
 {
   felt_init(&f, HAP_DRIVE_LOCKSTEP, body);
-  f.def.coupling = coupling;
+  f.pointer_expert.coupling = coupling;
   f.def.stiffness = stiffness;
   f.def.damping = 2.0;
   if (coupling == HAP_COUPLING_PROXY) {
-    f.def.coupling_stiffness = 1000.0;
-    f.def.coupling_damping = 1.0;
-    f.def.mass = 0.01;
+    f.pointer_expert.coupling_stiffness = 1000.0;
+    f.pointer_expert.coupling_damping = 1.0;
+    f.pointer_expert.proxy_mass = 0.01;
   }
   fastest = 0.0;
   bool good = begin("path=0:-0.07/0/0");

@@ -149,7 +149,7 @@ static bool view_begin(view *v, const char *hand)
 {
   memset(v, 0, sizeof *v);
   felt_init(&v->f, HAP_DRIVE_FRAME, false);
-  v->f.s.def.trace_rows = TRACE_ROWS;
+  v->f.s.expert.trace_rows = TRACE_ROWS;
   v->cube = add_cube(&v->f.s, 0.0, NULL);
   dBodySetPosition(v->cube, 0.0, 5.0, 0.0);
   dBodySetLinearVel(v->cube, SPEED, 0.0, 0.0);

@@ -108,9 +108,9 @@ static const way ways[] = {
 
 static void take_way(contact_world *w, const way *how)
 {
-  w->hand_def.coupling = how->coupling;
-  w->hand_def.integration = how->integration;
-  w->hand_def.coupling_stiffness = how->coupling == HAP_COUPLING_PROXY ? 1e6 : 0.0;
+  w->hand_expert.coupling = how->coupling;
+  w->hand_research.integration = how->integration;
+  w->hand_expert.coupling_stiffness = how->coupling == HAP_COUPLING_PROXY ? 1e6 : 0.0;
 }
 
 /* Onto the middle of a cube that stands on the floor, which has a friction of its own. */

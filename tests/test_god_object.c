@@ -28,9 +28,9 @@ static void open_world(contact_world *w, hap_coupling coupling, double damping)
 {
   cw_open(w, 0.0);
   w->hand_def.radius = RADIUS;
-  w->hand_def.coupling = coupling;
-  w->hand_def.coupling_stiffness = KV;
-  w->hand_def.coupling_damping = damping;
+  w->hand_expert.coupling = coupling;
+  w->hand_expert.coupling_stiffness = KV;
+  w->hand_expert.coupling_damping = damping;
 }
 
 /* Far from all that is tried: a session needs a body. */
@@ -441,7 +441,7 @@ TEST(in_the_air_the_virtual_tool_is_felt_as_its_mass)
   for (size_t i = 0; i < 3; ++i) {
     contact_world w;
     open_world(&w, HAP_COUPLING_VIRTUAL, 2.0 * sqrt(masses[i] * KV));
-    w.hand_def.virtual_mass = masses[i];
+    w.hand_research.virtual_mass = masses[i];
     REQUIRE(start(&w, 0.0, 0.0, 0.0));
     for (int t = 0; t < 600; ++t) {
       cw_move_hand(&w, 0.5 * T * t, 0.0, 0.0);
@@ -460,7 +460,7 @@ TEST(the_virtual_tool_swings_at_its_resonance)
   for (size_t i = 0; i < 2; ++i) {
     contact_world w;
     open_world(&w, HAP_COUPLING_VIRTUAL, 0.0);
-    w.hand_def.virtual_mass = masses[i];
+    w.hand_research.virtual_mass = masses[i];
     REQUIRE(start(&w, 0.0, 0.0, 0.0));
     go_to(&w, (const double[3]){0.01, 0.0, 0.0}, 10);
     double first = 0.0;
@@ -495,8 +495,8 @@ TEST(a_virtual_tool_hits_as_a_body_without_rebound)
   const double mass = 0.2;
   contact_world w;
   open_world(&w, HAP_COUPLING_VIRTUAL, 0.0);
-  w.hand_def.virtual_mass = tool;
-  w.hand_def.coupling_stiffness = 1.0;
+  w.hand_research.virtual_mass = tool;
+  w.hand_expert.coupling_stiffness = 1.0;
   cw_add_cube(&w, mass, 0.05, 0.025 + 0.02, 0.0, 0.0);
   REQUIRE(cw_start(&w, -RADIUS, 0.0, 0.0));
   cw_move_hand(&w, 0.5, 0.0, 0.0);
@@ -533,8 +533,10 @@ TEST(what_cannot_be_is_refused)
     open_world(&w, HAP_COUPLING_VIRTUAL, 0.0);
     REQUIRE(start(&w, 0.0, 0.0, 0.0));
     hap_pointer_def def = w.hand_def;
-    def.virtual_mass = values[i].mass;
-    def.virtual_inertia = values[i].inertia;
+    hap_pointer_research_def research = w.hand_research;
+    def.research = &research;
+    research.virtual_mass = values[i].mass;
+    research.virtual_inertia = values[i].inertia;
     hap_status status = hap_pointer_add(w.session, &def, &id);
     CHECK(status == (values[i].good ? HAP_OK : HAP_ERROR_ARGUMENT));
     cw_close(&w);
@@ -552,22 +554,28 @@ TEST(a_spring_is_asked_for_as_for_a_proxy)
     open_world(&w, rigid_couplings[i], 0.0);
     REQUIRE(start(&w, 0.0, 0.0, 0.0));
     hap_pointer_def def = w.hand_def;
-    def.coupling_stiffness = 0.0; /* and no device that says what it holds */
+    hap_pointer_expert_def expert = w.hand_expert;
+    def.expert = &expert;
+    expert.coupling_stiffness = 0.0; /* and no device that says what it holds */
     CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
     def = w.hand_def;
     def.force_scale = 0.0;
     CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
     def = w.hand_def;
-    def.coupling = (hap_coupling)5;
+    expert = w.hand_expert;
+    def.expert = &expert;
+    expert.coupling = (hap_coupling)5;
     CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT);
     cw_close(&w);
     open_world(&w, HAP_COUPLING_DIRECT, 0.0);
-    w.hand_def.coupling_damping = w.hand_def.coupling_stiffness = 0.0;
+    w.hand_expert.coupling_damping = w.hand_expert.coupling_stiffness = 0.0;
     w.def.model = HAP_MODEL_ACCELERANCE;
     REQUIRE(start(&w, 0.0, 0.0, 0.0));
     def = w.hand_def;
-    def.coupling = rigid_couplings[i];
-    def.coupling_stiffness = KV;
+    expert = w.hand_expert;
+    def.expert = &expert;
+    expert.coupling = rigid_couplings[i];
+    expert.coupling_stiffness = KV;
     CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
     cw_close(&w);
   }

@@ -16,9 +16,9 @@ static const hap_coupling rigid_couplings[] = {HAP_COUPLING_GOD_OBJECT, HAP_COUP
 static void begin(tool_world *w, hap_coupling coupling)
 {
   tool_begin(w, HAP_MODEL_CONTACT);
-  w->tool_def.coupling = coupling;
-  w->tool_def.coupling_stiffness = KV;
-  w->tool_def.coupling_damping = coupling == HAP_COUPLING_VIRTUAL ? 10.0 : 0.0;
+  w->tool_expert.coupling = coupling;
+  w->tool_expert.coupling_stiffness = KV;
+  w->tool_expert.coupling_damping = coupling == HAP_COUPLING_VIRTUAL ? 10.0 : 0.0;
 }
 
 /* Of the cube's corners: mean square of their distances from the origin. */
@@ -225,7 +225,7 @@ TEST(a_tool_pushes_a_cube)
     tool_world w;
     dMass mass;
     begin(&w, rigid_couplings[i]);
-    w.tool_def.coupling_damping = 10.0; /* else it swings against the friction */
+    w.tool_expert.coupling_damping = 10.0; /* else it swings against the friction */
     tool_add_floor(&w);
     dBodyID body = dBodyCreate(w.world);
     dMassSetBoxTotal(&mass, 0.5, 0.05, 0.05, 0.05);
@@ -251,9 +251,9 @@ TEST(the_virtual_tool_is_felt_as_its_inertia)
     tool_world w;
     const double inertia = i == 0 ? 0.4 * 0.2 * 3.0 * HALF * HALF : given[i];
     begin(&w, HAP_COUPLING_VIRTUAL);
-    w.tool_def.virtual_mass = 0.2;
-    w.tool_def.virtual_inertia = given[i];
-    w.tool_def.coupling_damping = 30.0;
+    w.tool_research.virtual_mass = 0.2;
+    w.tool_research.virtual_inertia = given[i];
+    w.tool_expert.coupling_damping = 30.0;
     CHECK(tool_start(&w));
     tool_go(&w, 0.0, 0.0, 0.5, 0.0);
     tool_run(&w, 60);

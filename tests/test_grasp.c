@@ -84,7 +84,7 @@ static held hold_box(const hold *h, double seconds)
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.model = h->model;
   options.def.physics_hz = h->physics_hz;
-  options.def.trace_rows = 4;
+  options.expert.trace_rows = 4;
   options.coupling = h->coupling;
   options.coupling_stiffness = h->coupling == HAP_COUPLING_PROXY ? 5000.0 : 0.0;
   if (rig_create(&options, &r, &detail) < HAP_OK || hap_session_start(r.session) < HAP_OK) {
@@ -217,7 +217,7 @@ TEST(recorded_fingers_grip_a_box)
     options.device_count = 2;
     options.def.drive = HAP_DRIVE_LOCKSTEP;
     options.def.model = models[m];
-    options.def.trace_rows = 4;
+    options.expert.trace_rows = 4;
     REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
     REQUIRE(hap_session_start(r.session) == HAP_OK);
     for (int i = 0; i < 50000; ++i) {

@@ -501,7 +501,7 @@ TEST(lockstep_knows_no_stall)
       stage_init(&s, HAP_DRIVE_LOCKSTEP);
       s.def.model = models[m];
       s.def.physics_hz = 49.0; /* no whole number of ticks */
-      s.def.physics_latency_ticks = latency;
+      s.research.physics_latency_ticks = latency;
       REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
       CHECK(hap_session_advance(s.session, 500) == HAP_OK);
       CHECK(stats_of(&s).faults.stale_times == 0);
@@ -516,20 +516,22 @@ TEST(a_slew_limit_of_the_application)
 {
   stage s;
   hap_pointer_def def;
+  hap_pointer_expert_def expert;
+  hap_pointer_research_def research;
   hap_pointer_id id;
   hap_device *device = NULL;
   hap_detail detail;
   memset(&device_book, 0, sizeof device_book);
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
   dBodySetKinematic(s.cube);
-  hap_pointer_def_init(&def, sizeof def);
+  pointer_defs_init(&def, &expert, &research);
   REQUIRE(hapi_device_open_ops(&booked_ops, "", &device, &detail) == HAP_OK);
   REQUIRE(stage_create(&s) == HAP_OK);
   def.device = device;
-  def.max_slew = -1.0;
+  expert.max_slew = -1.0;
   CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
   CHECK(has(detail_of(&s), "max_slew"));
-  def.max_slew = 50.0; /* 0.05 N a tick */
+  expert.max_slew = 50.0; /* 0.05 N a tick */
   REQUIRE(hap_pointer_add(s.session, &def, &hand) == HAP_OK);
   REQUIRE(hap_session_start(s.session) == HAP_OK);
   uint32_t guard;

@@ -11,6 +11,7 @@
 
 #include "haptic/haptic.h"
 #include "local/contact_ramp.h"
+#include "session/session_internal.h"
 #include "tests/tick_world.h"
 
 /* ---- eq. 7 ---- */
@@ -833,7 +834,9 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   REQUIRE(hap_device_open("virtual:sine=0.02/0/0,hz=2,hand=tense", &device, &detail) == HAP_OK);
   hap_pointer_def_init(&def, sizeof def);
   def.device = device;
-  REQUIRE(hapi_haptic_add_pointer(haptic, &def, &id, &detail) == HAP_OK);
+  hapi_pointer_setup setup;
+  REQUIRE(hapi_session_read_pointer(&def, &setup, &detail) == HAP_OK);
+  REQUIRE(hapi_haptic_add_pointer(haptic, &setup, &id, &detail) == HAP_OK);
   REQUIRE(hapi_haptic_begin(haptic, 0, &detail) == HAP_OK);
   begin_model();
   (void)add_body(0);

@@ -59,7 +59,7 @@ static bool open_things(things *t, hap_model model)
 {
   world_open(&t->w, 9.81, 20);
   t->w.def.model = model;
-  t->w.def.trace_rows = 4096;
+  t->w.expert.trace_rows = 4096;
   (void)world_add_cube(&t->w, EDGE, 1.0, EDGE / 2, 0.0, EDGE / 2);
   (void)world_add_cube(&t->w, EDGE, 1.0, 2.0, 0.0, EDGE / 2);
   (void)world_add_cube(&t->w, EDGE, 1.0, 2.0 + 1.5 * EDGE, 0.0, EDGE / 2);

@@ -211,7 +211,7 @@ TEST(body_that_is_moved_alone_waits_for_the_others)
 {
   mechanism m;
   open_mechanism(&m, build_parallel, 9.81);
-  m.w.def.physics_latency_ticks = STEP_TICKS;
+  m.w.research.physics_latency_ticks = STEP_TICKS;
   REQUIRE(start_mechanism(&m));
   cw_run(&m.w, 8 * STEP_TICKS + 1);
   CHECK(hap_session_post(m.w.session, fold, &m) == HAP_OK);

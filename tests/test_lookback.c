@@ -25,7 +25,7 @@ static void begin(contact_world *w, hap_model model, double physics_hz, double l
   cw_open(w, CW_GRAVITY);
   w->def.model = model;
   w->def.physics_hz = physics_hz;
-  w->def.lookback = lookback;
+  w->expert.lookback = lookback;
   cw_add_floor(w);
   for (int i = 0; i < 3; ++i) {
     cw_add_cube(w, 0.3, EDGE, 1.02 * EDGE * i, 0.0, 0.5 * EDGE);
@@ -170,12 +170,12 @@ static void set_up(const play_def *def, rig_options *options)
   options->max_force = 1000.0;
   options->friction = def->friction;
   options->def.drive = HAP_DRIVE_LOCKSTEP;
-  options->def.guard = HAP_GUARD_MEASURE;
+  options->research.guard = HAP_GUARD_MEASURE;
   options->def.model = def->model;
   options->def.physics_hz = def->physics_hz;
   options->def.haptic_hz = def->haptic_hz;
-  options->def.trace_rows = 4;
-  options->def.lookback = def->lookback;
+  options->expert.trace_rows = 4;
+  options->expert.lookback = def->lookback;
 }
 
 /* Changes nothing that anybody could feel. */
@@ -354,7 +354,7 @@ static void play_mesh(hap_model model, double lookback, course *out)
     hull[i] = (i / 3 >> i % 3 & 1) != 0 ? RADIUS : -RADIUS;
   }
   w.def.model = model;
-  w.def.lookback = lookback;
+  w.expert.lookback = lookback;
   w.hand_def.hull_xyz = hull;
   w.hand_def.hull_points = 8;
   w.hand_def.radius = 0.0;
@@ -462,7 +462,7 @@ TEST(refuses_other_shares)
   cw_open(&w, 0.0);
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
     hap_detail detail = {""};
-    w.def.lookback = wrong[i];
+    w.expert.lookback = wrong[i];
     w.ode.world = w.world;
     w.ode.space = w.space;
     CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
@@ -477,7 +477,7 @@ TEST(threads_have_a_figure_too)
   begin(&w, HAP_MODEL_ACCELERANCE, 60.0, 0.4);
   w.def.drive = HAP_DRIVE_THREADS;
   w.def.rt_priority = 0;
-  w.def.trace_rows = 0;
+  w.expert.trace_rows = 0;
   start(&w, 0.5 * EDGE);
   hap_stats stats = cw_stats(&w);
   for (int i = 0; i < 1000 && stats.error.lookbacks < 3;

@@ -51,15 +51,17 @@ static hap_session *start_scene(scene *s, hap_model model, hap_device **device, 
 {
   hap_session *session = NULL;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_pointer_def hand;
   hap_pointer_id id;
-  hap_session_def_init(&def, sizeof def);
+  session_defs_init(&def, &expert, &research);
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.model = model;
-  def.guard = HAP_GUARD_MEASURE; /* what it decides hangs on the last bit */
+  research.guard = HAP_GUARD_MEASURE; /* what it decides hangs on the last bit */
   def.physics_hz = 60.0;
-  def.trace_rows = 8;
+  expert.trace_rows = 8;
   hap_ode_def_init(&ode, sizeof ode);
   ode.world = s->world;
   ode.space = s->space;

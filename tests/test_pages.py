@@ -27,6 +27,7 @@ hap_status piece(hap_session *session, hap_device *device, hap_pointer_id hand, 
 hap_status piece(hap_session *session, hap_device *device, hap_pointer_id hand, hap_detail why)
 {
   hap_session_def session_def;
+  hap_expert_def expert;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
   hap_stats stats;

@@ -98,7 +98,7 @@ static outcome run_seeded(rig_options *options, double seconds, unsigned long se
   hap_detail detail = {""};
   rig r;
   options->def.drive = HAP_DRIVE_LOCKSTEP;
-  options->def.trace_rows = CHUNK;
+  options->expert.trace_rows = CHUNK;
   if (rig_create(options, &r, &detail) < HAP_OK || hap_session_start(r.session) < HAP_OK) {
     printf("# %s\n", detail.text);
     return out;

@@ -500,13 +500,15 @@ TEST(a_proxy_and_its_device_are_drawn_apart)
   hap_pose proxy;
   hap_pose device;
   hap_pointer_def def;
+  hap_pointer_expert_def expert;
+  hap_pointer_research_def research;
   hap_pointer_id id;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
   dGeomID wall = dCreatePlane(s.space, 0.0, 1.0, 0.0, -1.0);
   REQUIRE(wall != NULL && stage_create(&s) == HAP_OK);
-  hap_pointer_def_init(&def, sizeof def);
-  def.coupling = HAP_COUPLING_PROXY;
-  def.coupling_stiffness = 500.0;
+  pointer_defs_init(&def, &expert, &research);
+  expert.coupling = HAP_COUPLING_PROXY;
+  expert.coupling_stiffness = 500.0;
   def.stiffness = 1e5;
   REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
   move_hand(&s, id, 0.0, -0.9);

@@ -158,10 +158,13 @@ TEST(ways_of_testing)
     (void)check_setup(&s);
     hap_player *player = NULL;
     hap_session_def def;
-    hap_session_def_init(&def, sizeof def);
-    REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
-    CHECK(hap_player_get_def(player, &def) == HAP_OK);
-    CHECK(def.probe == HAP_PROBE_OPERATING && def.effects[HAP_EFFECT_CROSS] == HAP_EFFECT_ON);
+    hap_expert_def expert;
+    hap_research_def research;
+    session_defs_init(&def, &expert, &research);
+    REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, NULL) == HAP_OK);
+    CHECK(hap_player_get_def(player, &def, &expert, &research) == HAP_OK);
+    CHECK(research.probe == HAP_PROBE_OPERATING &&
+          expert.effects_on == HAP_EFFECT_BIT(HAP_EFFECT_CROSS));
     hap_player_close(player);
   }
 }
@@ -175,10 +178,12 @@ TEST(a_loop_of_less_accuracy)
   (void)check_setup(&s);
   hap_player *player = NULL;
   hap_session_def def;
-  hap_session_def_init(&def, sizeof def);
-  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
-  CHECK(hap_player_get_def(player, &def) == HAP_OK);
-  CHECK(def.max_sweeps == 2 && def.range_hops == 3);
+  hap_expert_def expert;
+  hap_research_def research;
+  session_defs_init(&def, &expert, &research);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def, &expert, &research) == HAP_OK);
+  CHECK(expert.max_sweeps == 2 && expert.range_hops == 3);
   hap_player_close(player);
 }
 
@@ -190,9 +195,11 @@ TEST(testing_simulations_that_are_not_made)
   (void)check_setup(&s);
   hap_player *player = NULL;
   hap_session_def def;
-  hap_session_def_init(&def, sizeof def);
-  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
-  CHECK(hap_player_get_def(player, &def) == HAP_OK && def.reuse == 1e-4);
+  hap_expert_def expert;
+  hap_research_def research;
+  session_defs_init(&def, &expert, &research);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def, &expert, &research) == HAP_OK && expert.reuse == 1e-4);
   hap_player_close(player);
 }
 
@@ -261,6 +268,8 @@ typedef struct small_world {
   dWorldID world;
   dSpaceID space;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_session *session;
   hap_pointer_id hands[16];
@@ -299,7 +308,7 @@ static void build_world(small_world *w)
   dBodySetPosition(cube, 0.0, 0.0, 0.05);
   dBodySetLinearVel(cube, 0.5, 0.0, 0.0);
   dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
-  hap_session_def_init(&w->def, sizeof w->def);
+  session_defs_init(&w->def, &w->expert, &w->research);
   hap_ode_def_init(&w->ode, sizeof w->ode);
   w->ode.world = w->world;
   w->ode.space = w->space;
@@ -347,8 +356,8 @@ static replay play_in(small_world *w)
   replay out;
   hap_player *player = NULL;
   memset(&out, 0, sizeof out);
-  CHECK(hap_player_open(recorded_path, 0, &player, &out.detail) == HAP_OK);
-  CHECK(hap_player_get_def(player, &w->def) == HAP_OK);
+  CHECK(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, &out.detail) == HAP_OK);
+  CHECK(hap_player_get_def(player, &w->def, &w->expert, &w->research) == HAP_OK);
   CHECK(hap_player_get_info(player, &out.info, sizeof out.info) == HAP_OK);
   CHECK(hap_session_create(&w->def, &w->ode, &w->session, &out.detail) == HAP_OK);
   CHECK(hap_session_play(w->session, player, &out.detail) == HAP_OK);
@@ -575,7 +584,7 @@ TEST(a_device_that_is_started_again)
   CHECK(before.faults.count == 1 && before.loop.contact_ticks > 10);
   rig_options_init(&options);
   options.scene = "row10";
-  REQUIRE(hap_player_open(recorded_path, 0, &options.player, &detail) == HAP_OK);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &options.player, &detail) == HAP_OK);
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   CHECK(hap_session_start(r.session) == HAP_OK);
   CHECK(hap_pointer_restart(r.session, lost) == HAP_ERROR_STATE);
@@ -835,7 +844,7 @@ TEST(a_replay_takes_nothing_else)
   (void)recorded_make(&s);
   rig_options_init(&options);
   options.scene = "fig5";
-  REQUIRE(hap_player_open(recorded_path, 0, &options.player, &detail) == HAP_OK);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &options.player, &detail) == HAP_OK);
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   hap_pointer_def_init(&def, sizeof def);
   CHECK(hap_pointer_add(r.session, &def, &id) == HAP_ERROR_STATE);
@@ -857,7 +866,7 @@ TEST(a_replay_takes_nothing_else)
   options.scene = "fig5";
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   hap_player *player = NULL;
-  REQUIRE(hap_player_open(recorded_path, 0, &player, &detail) == HAP_OK);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, &detail) == HAP_OK);
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   CHECK(hap_session_play(r.session, player, &detail) == HAP_ERROR_STATE);
   CHECK(strstr(detail.text, "pointers of its own") != NULL);

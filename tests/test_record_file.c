@@ -507,11 +507,13 @@ TEST(a_file_of_before_plays)
   replay again = recorded_play("row10", 0);
   hap_player *player = NULL;
   hap_session_def def;
-  hap_session_def_init(&def, sizeof def);
+  hap_expert_def expert;
+  hap_research_def research;
+  session_defs_init(&def, &expert, &research);
   CHECK(again.status == HAP_END && again.difference.what == HAP_DIFFERENCE_NONE);
-  REQUIRE(hap_player_open(recorded_path, 0, &player, NULL) == HAP_OK);
-  CHECK(hap_player_get_def(player, &def) == HAP_OK);
-  CHECK(def.max_sweeps == 0 && def.range_hops == HAP_RANGE_ALL && def.reuse == 0.0);
+  REQUIRE(hap_player_open(recorded_path, HAP_PLAY_WHOLE, &player, NULL) == HAP_OK);
+  CHECK(hap_player_get_def(player, &def, &expert, &research) == HAP_OK);
+  CHECK(expert.max_sweeps == 0 && expert.range_hops == HAP_RANGE_ALL && expert.reuse == 0.0);
   hap_player_close(player);
   b->head.size = HAPI_FILE_INFO_LEAST - 4;
   CHECK(open_changed(&f, "what was recorded") == HAP_ERROR_FORMAT);
@@ -543,7 +545,7 @@ TEST(no_file_and_no_recording)
   CHECK(try_open(0, &detail) == HAP_ERROR_IO && strstr(detail.text, "cannot be opened") != NULL);
   hap_player *player = NULL;
   CHECK(hap_player_open(recorded_path, 2, &player, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_player_open("/", 0, &player, &detail) == HAP_ERROR_IO);
+  CHECK(hap_player_open("/", HAP_PLAY_WHOLE, &player, &detail) == HAP_ERROR_IO);
 }
 
 SET_UP

@@ -45,8 +45,8 @@ static bool begin(stack *s, double reuse, hap_probe probe)
   dWorldSetContactSurfaceLayer(s->w.world, LAYER);
   s->w.def.physics_hz = 50.0;
   s->w.def.model = HAP_MODEL_ACCELERANCE;
-  s->w.def.reuse = reuse;
-  s->w.def.probe = probe;
+  s->w.expert.reuse = reuse;
+  s->w.research.probe = probe;
   s->w.ode.surface = stack_surface;
   s->floor = cw_add_floor(&s->w);
   (void)cw_add_cube(&s->w, 1.0, EDGE, 0.0, 0.0, 0.5 * EDGE - OVERLAP);
@@ -110,7 +110,7 @@ TEST(as_in_the_paper_all_are_made)
   CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
   begin(&s, 1e-6, HAP_PROBE_SHARED);
-  s.w.def.effects[HAP_EFFECT_TESTING] = HAP_EFFECT_ON;
+  expert_wish(&s.w.expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
   REQUIRE(start(&s));
   CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
@@ -482,8 +482,8 @@ static bool begin_row(contact_world *w, double reuse)
   cw_open(w, CW_GRAVITY);
   dWorldSetContactSurfaceLayer(w->world, LAYER);
   w->def.physics_hz = 50.0;
-  w->def.reuse = reuse;
-  w->def.range_hops = 0;
+  w->expert.reuse = reuse;
+  w->expert.range_hops = 0;
   (void)cw_add_floor(w);
   (void)dCreatePlane(w->space, -1.0, 0.0, 0.0, -(3.5 * EDGE - 4.0 * OVERLAP));
   for (int i = 0; i < 4; ++i) {

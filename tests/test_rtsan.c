@@ -31,6 +31,7 @@ int main(void)
 #include "base/vec.h"
 #include "haptic/haptic.h"
 #include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
 #include "sync/exchange.h"
 
 #define TICKS 10000
@@ -244,7 +245,9 @@ static bool set_up(void)
       def.radius = 0.0;
       def.finger_radius = 0.005;
     }
-    good = good && hapi_haptic_add_pointer(haptic, &def, &id, &detail) == HAP_OK;
+    hapi_pointer_setup setup;
+    good = good && hapi_session_read_pointer(&def, &setup, &detail) == HAP_OK &&
+           hapi_haptic_add_pointer(haptic, &setup, &id, &detail) == HAP_OK;
   }
   return good && hapi_haptic_begin(haptic, 0, &detail) == HAP_OK;
 }

@@ -40,10 +40,10 @@ static bool refused(const char *arguments, const char *option, const char *text)
 
 TEST(a_wanted_error_needs_looking_back)
 {
-  CHECK(parse("--seconds 1") == HAP_OK && options.rig.def.lookback == 0.0);
-  CHECK(parse("--lookback 0.3") == HAP_OK && options.rig.def.lookback == 0.3);
-  CHECK(parse("--force-error 0.05") == HAP_OK && options.rig.def.lookback == 0.1);
-  CHECK(parse("--force-error 0.05 --lookback 0.3") == HAP_OK && options.rig.def.lookback == 0.3);
+  CHECK(parse("--seconds 1") == HAP_OK && options.rig.expert.lookback == 0.0);
+  CHECK(parse("--lookback 0.3") == HAP_OK && options.rig.expert.lookback == 0.3);
+  CHECK(parse("--force-error 0.05") == HAP_OK && options.rig.expert.lookback == 0.1);
+  CHECK(parse("--force-error 0.05 --lookback 0.3") == HAP_OK && options.rig.expert.lookback == 0.3);
   CHECK(refused("--force-error 0.05 --lookback 0", "--force-error", "--lookback 0"));
 }
 
@@ -60,7 +60,7 @@ TEST(a_budget_needs_a_clock)
   CHECK(refused("--lockstep --tick-share 0.1", "--tick-share", "--accuracy"));
   CHECK(refused("--physics-share 0.1 --lockstep", "--physics-share", "--accuracy"));
   CHECK(parse("--tick-share 0.1 --physics-share 0.2") == HAP_OK);
-  CHECK(options.rig.def.tick_share == 0.1 && options.rig.def.physics_share == 0.2);
+  CHECK(options.rig.expert.tick_share == 0.1 && options.rig.expert.physics_share == 0.2);
 }
 
 TEST(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out)
@@ -72,15 +72,16 @@ TEST(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out)
 
 TEST(single_settings_stay_when_they_are_given)
 {
-  const hap_session_def *def = &options.rig.def;
-  CHECK(parse("--seconds 1") == HAP_OK && def->iterations == HAP_BY_ACCURACY);
-  CHECK(def->max_sweeps == HAP_BY_ACCURACY && def->range_hops == HAP_BY_ACCURACY);
-  CHECK(def->max_edge_probes == HAP_BY_ACCURACY);
+  const hap_expert_def *expert = &options.rig.expert;
+  CHECK(parse("--seconds 1") == HAP_OK && expert->iterations == HAP_BY_ACCURACY);
+  CHECK(expert->max_sweeps == HAP_BY_ACCURACY && expert->range_hops == HAP_BY_ACCURACY);
+  CHECK(expert->max_edge_probes == HAP_BY_ACCURACY);
   CHECK(parse("--iterations 500 --sweeps 4 --range 0 --edge-probes 7") == HAP_OK);
-  CHECK(def->iterations == 500 && def->max_sweeps == 4);
-  CHECK(def->range_hops == 0 && def->max_edge_probes == 7);
+  CHECK(expert->iterations == 500 && expert->max_sweeps == 4);
+  CHECK(expert->range_hops == 0 && expert->max_edge_probes == 7);
   CHECK(parse("--iterations world --range all --edge-probes 0") == HAP_OK);
-  CHECK(def->iterations == 0 && def->range_hops == HAP_RANGE_ALL && def->max_edge_probes == 0);
+  CHECK(expert->iterations == 0 && expert->range_hops == HAP_RANGE_ALL &&
+        expert->max_edge_probes == 0);
   CHECK(refused("--iterations 0", "--iterations", "1 to 10000"));
   CHECK(refused("--iterations worlds", "--iterations", "1 to 10000"));
   CHECK(refused("--sweeps 1", "--sweeps", "2 to 10000"));

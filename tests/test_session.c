@@ -467,7 +467,7 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
   size_t count = 7;
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.trace_rows = 100;
+  s.expert.trace_rows = 100;
   dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
   REQUIRE(stage_create(&s) == HAP_OK && hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
   REQUIRE(hap_session_start(s.session) == HAP_OK);

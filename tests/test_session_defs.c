@@ -38,6 +38,14 @@ TEST(unset_defs_are_refused)
     memset(&s.def, garbage[i], sizeof s.def);
     CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
     s.def = good;
+    hap_expert_def good_expert = s.expert;
+    memset(&s.expert, garbage[i], sizeof s.expert);
+    CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_expert_def_init"));
+    s.expert = good_expert;
+    hap_research_def good_research = s.research;
+    memset(&s.research, garbage[i], sizeof s.research);
+    CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_research_def_init"));
+    s.research = good_research;
     hap_ode_def good_ode = s.ode;
     memset(&s.ode, garbage[i], sizeof s.ode);
     CHECK(refused(&s, HAP_ERROR_UNINITIALISED, "hap_ode_def_init"));
@@ -82,13 +90,14 @@ TEST(missing_arguments_are_refused)
   stage_end(&s);
 }
 
-#define REAL_FIELD(name, value)                         \
-  {                                                     \
-#name, offsetof(hap_session_def, name), true, value \
+/* Fields by their place in a stage. */
+#define REAL_FIELD(part, name, value)              \
+  {                                                \
+#name, offsetof(stage, part.name), true, value \
   }
-#define WHOLE_FIELD(name, value)                         \
-  {                                                      \
-#name, offsetof(hap_session_def, name), false, value \
+#define WHOLE_FIELD(part, name, value)              \
+  {                                                 \
+#name, offsetof(stage, part.name), false, value \
   }
 
 static const struct {
@@ -97,72 +106,75 @@ static const struct {
   bool real;
   double value;
 } bad_fields[] = {
-    REAL_FIELD(physics_hz, 0.0),
-    REAL_FIELD(physics_hz, -1.0),
-    REAL_FIELD(physics_hz, 0.99),
-    REAL_FIELD(physics_hz, 1001.0),
-    REAL_FIELD(physics_hz, (double)NAN),
-    REAL_FIELD(physics_hz, (double)INFINITY),
-    REAL_FIELD(haptic_hz, 99.0),
-    REAL_FIELD(haptic_hz, 20001.0),
-    REAL_FIELD(haptic_hz, (double)NAN),
-    REAL_FIELD(haptic_hz, 0.0),
-    REAL_FIELD(haptic_hz, -1000.0),
-    REAL_FIELD(haptic_hz, (double)INFINITY),
-    REAL_FIELD(contact_hz, 19.0),
-    REAL_FIELD(contact_hz, 1001.0),
-    REAL_FIELD(contact_hz, (double)NAN),
-    REAL_FIELD(contact_hz, -1.0),
-    REAL_FIELD(accuracy, -0.01),
-    REAL_FIELD(accuracy, 1.01),
-    REAL_FIELD(accuracy, (double)NAN),
-    REAL_FIELD(force_error_wanted, -0.1),
-    REAL_FIELD(force_error_wanted, 0.0009),
-    REAL_FIELD(force_error_wanted, 1.1),
-    REAL_FIELD(force_error_wanted, (double)NAN),
-    REAL_FIELD(tick_share, 0.009),
-    REAL_FIELD(tick_share, 1.1),
-    REAL_FIELD(tick_share, (double)NAN),
-    REAL_FIELD(physics_share, -1.0),
-    REAL_FIELD(physics_share, (double)INFINITY),
-    WHOLE_FIELD(max_edge_probes, -1),
-    WHOLE_FIELD(max_edge_probes, 1025),
-    WHOLE_FIELD(iterations, -1),
-    WHOLE_FIELD(iterations, 10001),
-    WHOLE_FIELD(reserved, 1),
-    WHOLE_FIELD(max_bodies, 0),
-    WHOLE_FIELD(max_bodies, -1),
-    WHOLE_FIELD(max_bodies, 1025),
-    WHOLE_FIELD(max_contacts, 0),
-    WHOLE_FIELD(max_contacts, 4097),
-    WHOLE_FIELD(max_contacts, -2147483648.0),
-    WHOLE_FIELD(max_pointers, 0),
-    WHOLE_FIELD(max_pointers, 17),
-    WHOLE_FIELD(rt_priority, -1),
-    WHOLE_FIELD(rt_priority, 100),
-    WHOLE_FIELD(trace_rows, -1),
-    WHOLE_FIELD(trace_rows, 1048577),
-    WHOLE_FIELD(drive, 3),
-    WHOLE_FIELD(drive, -1),
-    WHOLE_FIELD(model, 4),
-    WHOLE_FIELD(model, -1),
-    WHOLE_FIELD(impulse_pose, 2),
-    WHOLE_FIELD(probe, 4),
-    WHOLE_FIELD(probe, -1),
-    WHOLE_FIELD(max_sweeps, -1),
-    WHOLE_FIELD(max_sweeps, 1),
-    WHOLE_FIELD(max_sweeps, 10001),
-    WHOLE_FIELD(range_hops, -3),
-    WHOLE_FIELD(range_hops, 1025),
-    REAL_FIELD(reuse, -1e-9),
-    REAL_FIELD(reuse, 0.0101),
-    REAL_FIELD(reuse, (double)NAN),
-    WHOLE_FIELD(guard, 2),
-    WHOLE_FIELD(guard, -1),
-    WHOLE_FIELD(flags, 1),
-    WHOLE_FIELD(flags, -2147483648.0),
-    WHOLE_FIELD(physics_latency_ticks, -2),
-    WHOLE_FIELD(physics_latency_ticks, 20001),
+    REAL_FIELD(def, physics_hz, 0.0),
+    REAL_FIELD(def, physics_hz, -1.0),
+    REAL_FIELD(def, physics_hz, 0.99),
+    REAL_FIELD(def, physics_hz, 1001.0),
+    REAL_FIELD(def, physics_hz, (double)NAN),
+    REAL_FIELD(def, physics_hz, (double)INFINITY),
+    REAL_FIELD(def, haptic_hz, 99.0),
+    REAL_FIELD(def, haptic_hz, 20001.0),
+    REAL_FIELD(def, haptic_hz, (double)NAN),
+    REAL_FIELD(def, haptic_hz, 0.0),
+    REAL_FIELD(def, haptic_hz, -1000.0),
+    REAL_FIELD(def, haptic_hz, (double)INFINITY),
+    REAL_FIELD(expert, contact_hz, 19.0),
+    REAL_FIELD(expert, contact_hz, 1001.0),
+    REAL_FIELD(expert, contact_hz, (double)NAN),
+    REAL_FIELD(expert, contact_hz, -1.0),
+    REAL_FIELD(def, accuracy, -0.01),
+    REAL_FIELD(def, accuracy, 1.01),
+    REAL_FIELD(def, accuracy, (double)NAN),
+    REAL_FIELD(expert, force_error_wanted, -0.1),
+    REAL_FIELD(expert, force_error_wanted, 0.0009),
+    REAL_FIELD(expert, force_error_wanted, 1.1),
+    REAL_FIELD(expert, force_error_wanted, (double)NAN),
+    REAL_FIELD(expert, tick_share, 0.009),
+    REAL_FIELD(expert, tick_share, 1.1),
+    REAL_FIELD(expert, tick_share, (double)NAN),
+    REAL_FIELD(expert, physics_share, -1.0),
+    REAL_FIELD(expert, physics_share, (double)INFINITY),
+    WHOLE_FIELD(expert, max_edge_probes, -1),
+    WHOLE_FIELD(expert, max_edge_probes, 1025),
+    WHOLE_FIELD(expert, iterations, -1),
+    WHOLE_FIELD(expert, iterations, 10001),
+    WHOLE_FIELD(def, max_bodies, 0),
+    WHOLE_FIELD(def, max_bodies, -1),
+    WHOLE_FIELD(def, max_bodies, 1025),
+    WHOLE_FIELD(def, max_contacts, 0),
+    WHOLE_FIELD(def, max_contacts, 4097),
+    WHOLE_FIELD(def, max_contacts, -2147483648.0),
+    WHOLE_FIELD(def, max_pointers, 0),
+    WHOLE_FIELD(def, max_pointers, 17),
+    WHOLE_FIELD(def, rt_priority, -1),
+    WHOLE_FIELD(def, rt_priority, 100),
+    WHOLE_FIELD(expert, trace_rows, -1),
+    WHOLE_FIELD(expert, trace_rows, 1048577),
+    WHOLE_FIELD(def, drive, 3),
+    WHOLE_FIELD(def, drive, -1),
+    WHOLE_FIELD(def, model, 4),
+    WHOLE_FIELD(def, model, -1),
+    WHOLE_FIELD(research, impulse_pose, 2),
+    WHOLE_FIELD(research, probe, 4),
+    WHOLE_FIELD(research, probe, -1),
+    WHOLE_FIELD(expert, max_sweeps, -1),
+    WHOLE_FIELD(expert, max_sweeps, 1),
+    WHOLE_FIELD(expert, max_sweeps, 10001),
+    WHOLE_FIELD(expert, range_hops, -3),
+    WHOLE_FIELD(expert, range_hops, 1025),
+    REAL_FIELD(expert, reuse, -1e-9),
+    REAL_FIELD(expert, reuse, 0.0101),
+    REAL_FIELD(expert, reuse, (double)NAN),
+    WHOLE_FIELD(research, guard, 2),
+    WHOLE_FIELD(research, guard, -1),
+    WHOLE_FIELD(expert, effects_on, 1 << HAP_EFFECTS),
+    WHOLE_FIELD(expert, effects_off, -2147483648.0),
+    REAL_FIELD(def, budget, 0.009),
+    REAL_FIELD(def, budget, 1.1),
+    REAL_FIELD(def, budget, -0.1),
+    REAL_FIELD(def, budget, (double)NAN),
+    WHOLE_FIELD(research, physics_latency_ticks, -2),
+    WHOLE_FIELD(research, physics_latency_ticks, 20001),
 };
 
 TEST(every_bad_field_is_named)
@@ -170,8 +182,9 @@ TEST(every_bad_field_is_named)
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
   for (size_t i = 0; i < sizeof bad_fields / sizeof bad_fields[0]; ++i) {
-    hap_session_def good = s.def;
-    char *at = (char *)&s.def + bad_fields[i].offset;
+    char good[sizeof(double)];
+    char *at = (char *)&s + bad_fields[i].offset;
+    memcpy(good, at, sizeof good);
     int32_t whole = bad_fields[i].real ? 0 : (int32_t)bad_fields[i].value;
     if (bad_fields[i].real) {
       memcpy(at, &bad_fields[i].value, sizeof(double));
@@ -179,13 +192,39 @@ TEST(every_bad_field_is_named)
       memcpy(at, &whole, sizeof whole);
     }
     CHECK(refused(&s, HAP_ERROR_ARGUMENT, bad_fields[i].name));
-    s.def = good;
+    memcpy(at, good, bad_fields[i].real ? sizeof(double) : sizeof whole);
   }
   s.def.physics_hz = 500.0;
   s.def.haptic_hz = 499.0; /* H / T below 1 */
   CHECK(refused(&s, HAP_ERROR_ARGUMENT, "at least one tick"));
   s.def.haptic_hz = 500.0;
   CHECK(stage_create(&s) == HAP_OK); /* H = T */
+  stage_end(&s);
+}
+
+TEST(an_effect_is_on_or_off_and_not_both)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.expert.effects_on = s.expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "gyro"));
+  s.expert.effects_on = 0;
+  CHECK(stage_create(&s) == HAP_OK);
+  stage_end(&s);
+}
+
+TEST(a_budget_is_for_real_time)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.def.budget = 0.5;
+  CHECK(refused(&s, HAP_ERROR_UNSUPPORTED, "LOCKSTEP"));
+  s.def.drive = HAP_DRIVE_THREADS;
+  s.expert.physics_share = 0.25; /* and the tick has the budget */
+  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) >= HAP_OK);
+  hap_accuracy_info info;
+  CHECK(hap_session_accuracy(s.session, &info, sizeof info) == HAP_OK);
+  CHECK(info.tick.share == 0.5 && info.physics.share == 0.25);
   stage_end(&s);
 }
 
@@ -210,7 +249,7 @@ TEST(smaller_and_larger_defs_are_accepted)
     unsigned char bytes[sizeof(hap_session_def) + 64];
   } block;
   static const size_t sizes[] = {8, offsetof(hap_session_def, haptic_hz),
-                                 offsetof(hap_session_def, trace_rows), sizeof(hap_session_def),
+                                 offsetof(hap_session_def, expert), sizeof(hap_session_def),
                                  sizeof(hap_session_def) + 64};
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
@@ -228,6 +267,45 @@ TEST(smaller_and_larger_defs_are_accepted)
     hap_session_destroy(s.session);
     s.session = NULL;
   }
+  stage_end(&s);
+}
+
+/* What a newer program sets and this library does not know must not be passed over. */
+TEST(unknown_bytes_of_a_larger_def_are_refused)
+{
+  union {
+    hap_session_def def;
+    hap_expert_def expert;
+    hap_research_def research;
+    hap_ode_def ode;
+    unsigned char bytes[1024];
+  } block;
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  hap_session *session = NULL;
+  hap_session_def_init(&block.def, sizeof block);
+  block.bytes[sizeof(hap_session_def) + 11] = 1;
+  CHECK(hap_session_create(&block.def, &s.ode, &session, &s.detail) == HAP_ERROR_ARGUMENT);
+  CHECK(session == NULL && has(s.detail.text, "hap_session_def: byte"));
+  hap_expert_def_init(&block.expert, sizeof block);
+  s.def.expert = &block.expert;
+  CHECK(stage_create(&s) == HAP_OK); /* all of them 0 */
+  hap_session_destroy(s.session);
+  block.bytes[sizeof block - 1] = 0x80;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "hap_expert_def: byte 1023"));
+  s.def.expert = NULL;
+  hap_research_def_init(&block.research, sizeof block);
+  s.def.research = &block.research;
+  block.bytes[sizeof(hap_research_def)] = 1;
+  CHECK(refused(&s, HAP_ERROR_ARGUMENT, "hap_research_def: byte"));
+  s.def.research = NULL;
+  hap_ode_def_init(&block.ode, sizeof block);
+  block.ode.world = s.world;
+  block.ode.space = s.space;
+  block.bytes[sizeof(hap_ode_def)] = 1;
+  CHECK(hap_session_create(&s.def, &block.ode, &session, &s.detail) == HAP_ERROR_ARGUMENT);
+  CHECK(has(s.detail.text, "hap_ode_def: byte"));
+  CHECK(stage_create(&s) == HAP_OK); /* both NULL */
   stage_end(&s);
 }
 

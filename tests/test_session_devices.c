@@ -441,9 +441,15 @@ TEST(a_device_serves_one_pointer)
   hap_device_close(device);
 }
 
-#define FIELD(name, value, status)                        \
-  {                                                       \
-#name, offsetof(hap_pointer_def, name), value, status \
+typedef struct pointer_defs {
+  hap_pointer_def def;
+  hap_pointer_expert_def expert;
+  hap_pointer_research_def research;
+} pointer_defs;
+
+#define FIELD(part, name, value, status)                    \
+  {                                                         \
+#name, offsetof(pointer_defs, part.name), value, status \
   }
 
 static const struct {
@@ -452,40 +458,42 @@ static const struct {
   double value;
   hap_status status;
 } bad_fields[] = {
-    FIELD(radius, 0.0, HAP_ERROR_ARGUMENT),
-    FIELD(radius, -0.01, HAP_ERROR_ARGUMENT),
-    FIELD(radius, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(radius, (double)INFINITY, HAP_ERROR_ARGUMENT),
-    FIELD(mass, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(mass, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(stiffness, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(stiffness, (double)INFINITY, HAP_ERROR_ARGUMENT),
-    FIELD(damping, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(damping, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(motion_scale, 0.0, HAP_ERROR_ARGUMENT),
-    FIELD(motion_scale, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(force_scale, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(force_scale, (double)INFINITY, HAP_ERROR_ARGUMENT),
-    FIELD(max_force, 0.0, HAP_ERROR_ARGUMENT),
-    FIELD(max_force, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(max_torque, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(max_slew, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(max_slew, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(pose_world_device.position, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(pose_world_device.position, 1e300, HAP_ERROR_ARGUMENT),
-    FIELD(pose_world_device.quat_wxyz, 0.0, HAP_ERROR_ARGUMENT),
-    FIELD(pose_world_device.quat_wxyz, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(friction, -0.1, HAP_ERROR_ARGUMENT),
-    FIELD(friction, 10.1, HAP_ERROR_ARGUMENT),
-    FIELD(friction, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(finger_radius, -1e-3, HAP_ERROR_ARGUMENT),
-    FIELD(finger_radius, (double)INFINITY, HAP_ERROR_ARGUMENT),
-    FIELD(coupling_stiffness, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(coupling_stiffness, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(coupling_damping, 1.0, HAP_ERROR_ARGUMENT),
-    FIELD(coupling_damping, (double)NAN, HAP_ERROR_ARGUMENT),
-    FIELD(hand_damping, -1.0, HAP_ERROR_ARGUMENT),
-    FIELD(hand_damping, (double)INFINITY, HAP_ERROR_ARGUMENT),
+    FIELD(def, radius, 0.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, radius, -0.01, HAP_ERROR_ARGUMENT),
+    FIELD(def, radius, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, radius, (double)INFINITY, HAP_ERROR_ARGUMENT),
+    FIELD(expert, proxy_mass, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, proxy_mass, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, stiffness, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, stiffness, (double)INFINITY, HAP_ERROR_ARGUMENT),
+    FIELD(def, damping, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, damping, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, motion_scale, 0.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, motion_scale, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, force_scale, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, force_scale, (double)INFINITY, HAP_ERROR_ARGUMENT),
+    FIELD(def, max_force, 0.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, max_force, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, max_torque, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, max_slew, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, max_slew, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, pose_world_device.position, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, pose_world_device.position, 1e300, HAP_ERROR_ARGUMENT),
+    FIELD(def, pose_world_device.quat_wxyz, 0.0, HAP_ERROR_ARGUMENT),
+    FIELD(def, pose_world_device.quat_wxyz, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, friction, -0.1, HAP_ERROR_ARGUMENT),
+    FIELD(def, friction, 10.1, HAP_ERROR_ARGUMENT),
+    FIELD(def, friction, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(def, finger_radius, -1e-3, HAP_ERROR_ARGUMENT),
+    FIELD(def, finger_radius, (double)INFINITY, HAP_ERROR_ARGUMENT),
+    FIELD(expert, coupling_stiffness, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, coupling_stiffness, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(expert, coupling_damping, 1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, coupling_damping, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(expert, hand_damping, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(research, virtual_mass, 0.0, HAP_ERROR_ARGUMENT),
+    FIELD(research, virtual_inertia, -1.0, HAP_ERROR_ARGUMENT),
+    FIELD(expert, hand_damping, (double)INFINITY, HAP_ERROR_ARGUMENT),
 };
 
 TEST(bad_pointer_defs_are_named)
@@ -495,9 +503,10 @@ TEST(bad_pointer_defs_are_named)
   hap_pointer_id id = {7};
   REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
   for (size_t i = 0; i < sizeof bad_fields / sizeof bad_fields[0]; ++i) {
-    hap_pointer_def def = pointer_def(NULL);
-    memcpy((char *)&def + bad_fields[i].offset, &bad_fields[i].value, sizeof(double));
-    CHECK(hap_pointer_add(s.session, &def, &id) == bad_fields[i].status);
+    pointer_defs defs;
+    pointer_defs_init(&defs.def, &defs.expert, &defs.research);
+    memcpy((char *)&defs + bad_fields[i].offset, &bad_fields[i].value, sizeof(double));
+    CHECK(hap_pointer_add(s.session, &defs.def, &id) == bad_fields[i].status);
     const char *dot = strchr(bad_fields[i].name, '.');
     char name[64];
     snprintf(name, sizeof name, "%.*s",
@@ -511,13 +520,25 @@ TEST(bad_pointer_defs_are_named)
     memset(&def, garbage[i], sizeof def);
     CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNINITIALISED);
     CHECK(has(detail_of(&s), "hap_pointer_def_init"));
+    pointer_defs defs;
+    pointer_defs_init(&defs.def, &defs.expert, &defs.research);
+    memset(&defs.expert, garbage[i], sizeof defs.expert);
+    CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
+    CHECK(has(detail_of(&s), "hap_pointer_expert_def_init"));
+    defs.def.expert = NULL;
+    memset(&defs.research, garbage[i], sizeof defs.research);
+    CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
+    CHECK(has(detail_of(&s), "hap_pointer_research_def_init"));
   }
   hap_pointer_def def = pointer_def(NULL);
   def.hull_points = 4;
   CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
   CHECK(has(detail_of(&s), "hull_xyz is NULL"));
   def = pointer_def(NULL);
-  def.coupling = HAP_COUPLING_PROXY; /* without a device that says what it can hold */
+  hap_pointer_expert_def expert;
+  hap_pointer_expert_def_init(&expert, sizeof expert);
+  def.expert = &expert;
+  expert.coupling = HAP_COUPLING_PROXY; /* without a device that says what it can hold */
   CHECK(hap_pointer_add(s.session, &def, &id) < HAP_OK && id.v == 0);
   CHECK(hap_pointer_add(s.session, NULL, &id) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_add(s.session, &def, NULL) == HAP_ERROR_ARGUMENT);

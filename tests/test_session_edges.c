@@ -276,8 +276,8 @@ TEST(a_falling_neighbour_falls_at_the_worlds_speed)
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
   dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
-  s.def.physics_latency_ticks = 20; /* one step */
-  s.def.trace_rows = 4096;
+  s.research.physics_latency_ticks = 20; /* one step */
+  s.expert.trace_rows = 4096;
   REQUIRE(stage_create(&s) == HAP_OK);
   hap_pointer_id hand = add_hand(&s, ~0u);
   move_hand(&s, hand, -0.061, 0.0); /* beside the cube */

@@ -412,9 +412,9 @@ TEST(a_tools_proxy_yields_along_and_turns)
   tool_world w;
   tool_begin(&w, HAP_MODEL_CONTACT);
   tool_set_box(&w, half, middle);
-  w.tool_def.coupling = HAP_COUPLING_PROXY;
-  w.tool_def.coupling_stiffness = KV;
-  w.tool_def.coupling_damping = 5.0;
+  w.tool_expert.coupling = HAP_COUPLING_PROXY;
+  w.tool_expert.coupling_stiffness = KV;
+  w.tool_expert.coupling_damping = 5.0;
   tool_add_floor(&w);
   CHECK(tool_start(&w));
   press(&w, 0.0003, 0.0);
@@ -444,9 +444,9 @@ TEST(a_tools_proxy_is_two_springs_in_a_row)
 {
   tool_world w;
   tool_begin(&w, HAP_MODEL_CONTACT);
-  w.tool_def.coupling = HAP_COUPLING_PROXY;
-  w.tool_def.coupling_stiffness = KV;
-  w.tool_def.coupling_damping = 5.0;
+  w.tool_expert.coupling = HAP_COUPLING_PROXY;
+  w.tool_expert.coupling_stiffness = KV;
+  w.tool_expert.coupling_damping = 5.0;
   tool_add_floor(&w);
   CHECK(tool_start(&w));
   press(&w, 0.003, 0.0);
@@ -461,9 +461,9 @@ TEST(a_tools_proxy_turns_with_the_device)
 {
   tool_world w;
   tool_begin(&w, HAP_MODEL_CONTACT);
-  w.tool_def.coupling = HAP_COUPLING_PROXY;
-  w.tool_def.coupling_stiffness = KV;
-  w.tool_def.coupling_damping = 5.0;
+  w.tool_expert.coupling = HAP_COUPLING_PROXY;
+  w.tool_expert.coupling_stiffness = KV;
+  w.tool_expert.coupling_damping = 5.0;
   CHECK(tool_start(&w));
   tool_go(&w, 0.0, 0.0, 0.5, 0.0);
   tool_run(&w, 50);
@@ -490,14 +490,14 @@ static swing strike_wall(hap_coupling coupling)
   tool_world w;
   swing out = {0.0, 0.0};
   tool_begin(&w, HAP_MODEL_CONTACT);
-  w.def.guard = HAP_GUARD_ON;
+  w.research.guard = HAP_GUARD_ON;
   CHECK(hap_device_open(
             "virtual:dof=6,hand=relaxed,device_mass=0.1,device_damping=1,device_inertia=1e-4,"
             "device_turn_damping=1e-4,max_force=20,max_torque=1,"
             "path=0:0/0/0.03;0.3:0/0/0;3:0/0/0,turn=0:0/0/0;0.3:0/0.1/0;3:0.1/-0.1/0",
             &w.tool_def.device, &w.detail) == HAP_OK);
   w.tool_def.stiffness = 20000.0;
-  w.tool_def.coupling = coupling;
+  w.tool_expert.coupling = coupling;
   tool_add_floor(&w);
   CHECK(tool_start(&w));
   for (int i = 0; i < 3000; ++i) {

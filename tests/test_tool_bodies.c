@@ -320,7 +320,7 @@ static double go_rounds(hap_model model, hap_guard guard, double *out_stored)
 {
   tool_world w;
   tool_begin(&w, model);
-  w.def.guard = guard;
+  w.research.guard = guard;
   tool_add_floor(&w);
   CHECK(tool_start(&w));
   tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);

@@ -44,8 +44,8 @@ static bool press(tool_world *w, const ground *g)
   w->tool_def.friction = MU;
   w->tool_def.finger_radius = g->finger;
   if (g->proxied) {
-    w->tool_def.coupling = HAP_COUPLING_PROXY;
-    w->tool_def.coupling_stiffness = 1e6;
+    w->tool_expert.coupling = HAP_COUPLING_PROXY;
+    w->tool_expert.coupling_stiffness = 1e6;
   }
   if (g->box) {
     dGeomSetPosition(dCreateBox(w->space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
@@ -222,9 +222,9 @@ static crept creep(const rest *r, int ticks)
     make_round(&w);
   }
   if (r->proxied) {
-    w.tool_def.coupling = HAP_COUPLING_PROXY;
-    w.tool_def.coupling_stiffness = 5e3;
-    w.tool_def.coupling_damping = 5.0;
+    w.tool_expert.coupling = HAP_COUPLING_PROXY;
+    w.tool_expert.coupling_stiffness = 5e3;
+    w.tool_expert.coupling_damping = 5.0;
   }
   double edge = r->narrow ? 0.025 : 0.2;
   dGeomSetPosition(dCreateBox(w.space, edge, edge, 0.1), r->narrow ? 0.007 : 0.0, 0.0, -0.05);
@@ -457,12 +457,12 @@ static round_trip go_round(const ground *g, hap_guard guard, double tilt)
   tool_world w;
   round_trip out = {0.0, 0.0};
   tool_begin(&w, g->model);
-  w.def.guard = guard;
+  w.research.guard = guard;
   w.tool_def.friction = MU;
   w.tool_def.finger_radius = g->finger;
   if (g->proxied) {
-    w.tool_def.coupling = HAP_COUPLING_PROXY;
-    w.tool_def.coupling_stiffness = 1e4;
+    w.tool_expert.coupling = HAP_COUPLING_PROXY;
+    w.tool_expert.coupling_stiffness = 1e4;
   }
   dGeomSetPosition(dCreateBox(w.space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
   CHECK(tool_start(&w));
@@ -543,7 +543,7 @@ static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored
   const ground g = {model, true, false, 0.0};
   tool_world w;
   tool_begin(&w, g.model);
-  w.def.guard = guard;
+  w.research.guard = guard;
   w.tool_def.friction = 10.0;
   dGeomSetPosition(dCreateBox(w.space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
   CHECK(tool_start(&w));

@@ -64,8 +64,8 @@ static void drag_block(const drag *d, hap_model model, double physics_hz, motion
   w.tool_def.friction = d->mu;
   w.tool_def.finger_radius = d->finger;
   if (d->proxied && model == HAP_MODEL_CONTACT) {
-    w.tool_def.coupling = HAP_COUPLING_PROXY;
-    w.tool_def.coupling_stiffness = 1e6;
+    w.tool_expert.coupling = HAP_COUPLING_PROXY;
+    w.tool_expert.coupling_stiffness = 1e6;
   }
   tool_add_floor(&w);
   dBodyID body = dBodyCreate(w.world);
@@ -278,8 +278,8 @@ static bool open_scene(const scene_parameters *parameters, hap_model model, doub
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.def.model = model;
   options.def.physics_hz = physics_hz;
-  options.def.guard = HAP_GUARD_MEASURE;
-  options.def.trace_rows = 4;
+  options.research.guard = HAP_GUARD_MEASURE;
+  options.expert.trace_rows = 4;
   options.coupling = HAP_COUPLING_DIRECT;
   if (rig_create(&options, out, &detail) < HAP_OK || hap_session_start(out->session) < HAP_OK) {
     printf("# %s\n", detail.text);

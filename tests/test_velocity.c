@@ -15,6 +15,7 @@
 #include "base/vec.h"
 #include "device/device.h"
 #include "pointer/velocity.h"
+#include "tools/session_defs.h"
 
 #define PI 3.14159265358979323846
 #define QUANTUM 3e-5
@@ -240,16 +241,18 @@ static double session_error(const char *spec, hap_velocity velocity)
   hap_ode_def ode;
   hap_session *session = NULL;
   hap_pointer_def pointer;
+  hap_pointer_expert_def expert;
+  hap_pointer_research_def research;
   hap_pointer_id id;
   hap_pointer_state state;
   double worst = 1e9;
   hap_session_def_init(&def, sizeof def);
   hap_ode_def_init(&ode, sizeof ode);
-  hap_pointer_def_init(&pointer, sizeof pointer);
+  pointer_defs_init(&pointer, &expert, &research);
   def.drive = HAP_DRIVE_LOCKSTEP;
   ode.world = world;
   ode.space = space;
-  pointer.velocity = velocity;
+  expert.velocity = velocity;
   CHECK(hap_device_open(spec, &pointer.device, NULL) == HAP_OK);
   if (hap_session_create(&def, &ode, &session, NULL) == HAP_OK &&
       hap_pointer_add(session, &pointer, &id) == HAP_OK && hap_session_start(session) == HAP_OK) {

@@ -12,12 +12,18 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
+#include "tools/session_defs.h"
+
 typedef struct tool_world {
   dWorldID world;
   dSpaceID space;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_ode_def ode;
   hap_pointer_def tool_def;
+  hap_pointer_expert_def tool_expert;
+  hap_pointer_research_def tool_research;
   hap_session *session;
   hap_pointer_id tool;
   double hull[64 * 3];
@@ -61,16 +67,16 @@ static inline void tool_begin(tool_world *w, hap_model model)
   w->world = dWorldCreate();
   w->space = dHashSpaceCreate(NULL);
   dWorldSetGravity(w->world, 0.0, 0.0, -9.81);
-  hap_session_def_init(&w->def, sizeof w->def);
+  session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
   w->def.model = model;
-  w->def.guard = HAP_GUARD_MEASURE;
+  w->research.guard = HAP_GUARD_MEASURE;
   hap_ode_def_init(&w->ode, sizeof w->ode);
   w->ode.world = w->world;
   w->ode.space = w->space;
   w->ode.surface = tool_surface;
-  hap_pointer_def_init(&w->tool_def, sizeof w->tool_def);
-  w->tool_def.coupling = HAP_COUPLING_DIRECT;
+  pointer_defs_init(&w->tool_def, &w->tool_expert, &w->tool_research);
+  w->tool_expert.coupling = HAP_COUPLING_DIRECT;
   w->tool_def.radius = 0.0;
   w->tool_def.max_force = 1e4;
   w->tool_def.max_torque = 1e4;

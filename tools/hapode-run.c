@@ -306,7 +306,7 @@ static int run_session(run_options *options)
                  ? complain(EXIT_FAILED, detail.text)
                  : EXIT_GOOD;
   if (code == EXIT_GOOD) {
-    options->rig.def.trace_rows = run_loop_trace_rows(options);
+    options->rig.expert.trace_rows = run_loop_trace_rows(options);
     code = run_world(options, &recording);
   }
   run_recording_close(&recording);

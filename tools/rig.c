@@ -13,7 +13,7 @@ void rig_options_init(rig_options *options)
   options->scene = "row10";
   options->coupling = HAP_COUPLING_AUTO;
   options->friction = options->finger_radius = -1.0;
-  hap_session_def_init(&options->def, sizeof options->def);
+  session_defs_init(&options->def, &options->expert, &options->research);
 }
 
 hap_status rig_find_model(const char *name, hap_model *out, hap_detail *detail)
@@ -87,7 +87,9 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
 {
   const scene_parameters *p = &r->scene->parameters;
   hap_pointer_def def;
-  hap_pointer_def_init(&def, sizeof def);
+  hap_pointer_expert_def expert;
+  hap_pointer_research_def research;
+  pointer_defs_init(&def, &expert, &research);
   const char *spec = device_spec(options, r->scene, index);
   if (strcmp(spec, "virtual") == 0) {
     snprintf(detail->text, sizeof detail->text,
@@ -120,11 +122,12 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   if (options->max_force > 0.0) { /* and torque as on an arm of a metre */
     def.max_force = def.max_torque = options->max_force;
   }
-  def.coupling = options->coupling;
-  def.coupling_stiffness = options->coupling_stiffness;
-  def.coupling_damping = options->coupling_damping;
-  def.integration = options->integration;
-  def.virtual_mass = options->virtual_mass > 0.0 ? options->virtual_mass : def.virtual_mass;
+  expert.coupling = options->coupling;
+  expert.coupling_stiffness = options->coupling_stiffness;
+  expert.coupling_damping = options->coupling_damping;
+  research.integration = options->integration;
+  research.virtual_mass =
+      options->virtual_mass > 0.0 ? options->virtual_mass : research.virtual_mass;
   status = hap_pointer_add(r->session, &def, &r->pointers[index]);
   if (status < HAP_OK) {
     (void)hap_session_detail(r->session, detail);
@@ -142,8 +145,12 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   ode.user = r->scene;
   ode.island_threads = options->island_threads != 0 ? options->island_threads : ode.island_threads;
   hap_session_def def = options->def;
+  hap_expert_def expert = options->expert;
+  hap_research_def research = options->research;
+  def.expert = &expert;
+  def.research = &research;
   if (options->player != NULL) {
-    (void)hap_player_get_def(options->player, &def);
+    (void)hap_player_get_def(options->player, &def, &expert, &research);
   }
   if (def.max_pointers < (int32_t)r->pointer_count) {
     def.max_pointers = (int32_t)r->pointer_count;

@@ -10,6 +10,7 @@
 #include <hapode/ode.h>
 
 #include "scenes/scenes.h"
+#include "tools/session_defs.h"
 
 #define RIG_POINTERS_MAX 16
 
@@ -32,6 +33,8 @@ typedef struct rig_options {
   double virtual_mass;       /* kg, likewise; 0: the default */
   int island_threads;        /* of hap_ode_def; 0: the default */
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   const hap_record_def *record; /* not NULL: the session is recorded */
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */
   hap_integration integration; /* of the pointers */
@@ -53,7 +56,7 @@ typedef struct rig {
   rig_part failed; /* what it was after a rig_create that failed */
 } rig;
 
-/* Defaults: row10, coupling auto, and those of hap_session_def_init. */
+/* Defaults: row10, coupling auto, and those of the structs of a session. */
 void rig_options_init(rig_options *options);
 
 /* dInitODE2 was called. On failure nothing is left behind, detail says why and out->failed where. */

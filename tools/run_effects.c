@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "tools/session_defs.h"
+
 static hap_status refuse(const char *item, size_t length, hap_detail *detail)
 {
   int shown = length < 60 ? (int)length : 60;
@@ -67,14 +69,15 @@ hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *deta
   }
 }
 
-hap_status run_effects_apply(const run_effects *wanted, hap_session_def *io, hap_detail *detail)
+hap_status run_effects_apply(const run_effects *wanted, hap_model model, hap_expert_def *io,
+                             hap_detail *detail)
 {
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    hap_status status = hap_effect_check((hap_effect)i, wanted->wish[i], io->model, detail);
+    hap_status status = hap_effect_check((hap_effect)i, wanted->wish[i], model, detail);
     if (status < HAP_OK && !wanted->of_all[i]) {
       return status;
     }
-    io->effects[i] = (uint8_t)(status < HAP_OK ? HAP_EFFECT_AUTO : wanted->wish[i]);
+    expert_wish(io, (hap_effect)i, status < HAP_OK ? HAP_EFFECT_AUTO : wanted->wish[i]);
   }
   return HAP_OK;
 }

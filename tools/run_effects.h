@@ -20,7 +20,8 @@ typedef struct run_effects {
 hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail);
 
 /* Into the def, whose model is known by now. HAP_ERROR_UNSUPPORTED for a wish that it cannot fulfil. */
-hap_status run_effects_apply(const run_effects *wanted, hap_session_def *io, hap_detail *detail);
+hap_status run_effects_apply(const run_effects *wanted, hap_model model, hap_expert_def *io,
+                             hap_detail *detail);
 
 /* "testing=on,cross=off,...": on, off or partly. */
 void run_effects_print(const hap_effect_info effects[HAP_EFFECTS], FILE *out);

@@ -64,14 +64,14 @@ static hap_status take_count(run_options *options, const option *self, const cha
 static hap_status take_iterations(run_options *options, const option *self, const char *value,
                                   hap_detail *detail)
 {
-  options->rig.def.iterations = 0; /* as many as the world has */
+  options->rig.expert.iterations = 0; /* as many as the world has */
   return strcmp(value, "world") == 0 ? HAP_OK : take_count(options, self, value, detail);
 }
 
 static hap_status take_range(run_options *options, const option *self, const char *value,
                              hap_detail *detail)
 {
-  options->rig.def.range_hops = HAP_RANGE_ALL;
+  options->rig.expert.range_hops = HAP_RANGE_ALL;
   return strcmp(value, "all") == 0 ? HAP_OK : take_count(options, self, value, detail);
 }
 
@@ -157,7 +157,7 @@ static hap_status take_pose(run_options *options, const option *self, const char
   if (!held && strcmp(value, "interpolated") != 0) {
     return fail(detail, "\"%.60s\" is neither held nor interpolated", value);
   }
-  options->rig.def.impulse_pose = held ? HAP_IMPULSE_HELD : HAP_IMPULSE_INTERPOLATED;
+  options->rig.research.impulse_pose = held ? HAP_IMPULSE_HELD : HAP_IMPULSE_INTERPOLATED;
   return HAP_OK;
 }
 
@@ -170,7 +170,7 @@ static hap_status take_probe(run_options *options, const option *self, const cha
   (void)self;
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     if (strcmp(value, names[i]) == 0) {
-      options->rig.def.probe = (hap_probe)i;
+      options->rig.research.probe = (hap_probe)i;
       return HAP_OK;
     }
   }
@@ -304,23 +304,23 @@ static const option table[] = {
     {"--contact-hz", "F",
      "model contact: contact passes a second, 20 to 1000 (default: as --accuracy says,\n"
      "200 at 0.5)",
-     take_number, offsetof(run_options, rig.def.contact_hz), 20, 1000},
+     take_number, offsetof(run_options, rig.expert.contact_hz), 20, 1000},
     {"--iterations", "N|world",
      "of QuickStep, 1 to 10000, or as many as the scene has whatever --accuracy says\n"
      "(default: these at 0.5)",
-     take_iterations, offsetof(run_options, rig.def.iterations), 1, 10000},
+     take_iterations, offsetof(run_options, rig.expert.iterations), 1, 10000},
     {"--sweeps", "N",
      "model contact: over all rows, in each solve of a tick, 2 to 10000; 2: no direct\n"
      "solve (default: until it is solved, or the tick has no more time)",
-     take_count, offsetof(run_options, rig.def.max_sweeps), 2, 10000},
+     take_count, offsetof(run_options, rig.expert.max_sweeps), 2, 10000},
     {"--range", "N|all",
      "model contact: bodies of the loop, so many contacts from the neighbours, 0 to\n"
      "1024, or all that hang together (default: all, from --accuracy 0.2 on)",
-     take_range, offsetof(run_options, rig.def.range_hops), 0, 1024},
+     take_range, offsetof(run_options, rig.expert.range_hops), 0, 1024},
     {"--edge-probes", "N",
      "model contact: bodies at the border of that range that are probed in a step of\n"
      "physics, 0 to 1024 (default: as --accuracy says, 4 at 0.5)",
-     take_count, offsetof(run_options, rig.def.max_edge_probes), 0, 1024},
+     take_count, offsetof(run_options, rig.expert.max_edge_probes), 0, 1024},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
     {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_lockstep, 0, 0, 0},
@@ -336,7 +336,7 @@ static const option table[] = {
      "what testing simulations found is used again while nothing has moved by more, in\n"
      "metres, 0 to 0.01 (default: as --accuracy says, 1e-7 at 0.5); 0: each step\n"
      "measures anew",
-     take_number, offsetof(run_options, rig.def.reuse), 0, 0.01},
+     take_number, offsetof(run_options, rig.expert.reuse), 0, 0.01},
     {"--lookback", "SHARE",
      "of physics' time, 0 to 0.5 (default 0), in which the last moments are gone over as\n"
      "model single has them: the error of the felt force, as force_error",
@@ -346,12 +346,12 @@ static const option table[] = {
     {"--force-error", "SHARE",
      "of the force, 0.001 to 1: the dial goes to the least accuracy with which looking back\n"
      "tells no more (--lookback 0.1 where that is not given)",
-     take_number, offsetof(run_options, rig.def.force_error_wanted), 0.001, 1},
+     take_number, offsetof(run_options, rig.expert.force_error_wanted), 0.001, 1},
     {"--tick-share", "SHARE",
      "of a tick's period, 0.01 to 1: the dial of the tick is turned back to fit into it",
-     take_number, offsetof(run_options, rig.def.tick_share), 0.01, 1},
+     take_number, offsetof(run_options, rig.expert.tick_share), 0.01, 1},
     {"--physics-share", "SHARE", "of a period of physics, likewise", take_number,
-     offsetof(run_options, rig.def.physics_share), 0.01, 1},
+     offsetof(run_options, rig.expert.physics_share), 0.01, 1},
     {"--max-force", "N", "limit of the force on a hand (default 20)", take_number,
      offsetof(run_options, rig.max_force), 1e-6, 1e6},
     {"--stiffness", "F", "of the pointers' contacts, N/m (default: the scene's)", take_number,
@@ -554,18 +554,18 @@ static hap_status check_calibrate(const run_options *o, hap_detail *detail)
 
 static hap_status check_error(run_options *o, hap_detail *detail)
 {
-  hap_session_def *def = &o->rig.def;
-  bool wanted = def->force_error_wanted > 0.0;
+  hap_expert_def *expert = &o->rig.expert;
+  bool wanted = expert->force_error_wanted > 0.0;
   if (wanted && o->lookback == 0.0) {
     return fail(detail,
                 "--force-error: --lookback 0 leaves nothing that tells the error; give it 0.1, "
                 "say, or leave it out");
   }
-  def->lookback = wanted ? LOOKBACK_SHARE : 0.0;
+  expert->lookback = wanted ? LOOKBACK_SHARE : 0.0;
   if (o->lookback >= 0.0) {
-    def->lookback = o->lookback;
+    expert->lookback = o->lookback;
   }
-  return def->lookback > 0.0 && def->model == HAP_MODEL_SINGLE
+  return expert->lookback > 0.0 && o->rig.def.model == HAP_MODEL_SINGLE
              ? fail(detail,
                     "%s: --model single is what the force is held against, so that it has no "
                     "error; take another one",
@@ -576,15 +576,16 @@ static hap_status check_error(run_options *o, hap_detail *detail)
 static hap_status check_budget(const run_options *o, hap_detail *detail)
 {
   const hap_session_def *def = &o->rig.def;
-  const char *name = def->tick_share > 0.0 ? "--tick-share" : "--physics-share";
-  bool budget = def->tick_share > 0.0 || def->physics_share > 0.0;
+  const hap_expert_def *expert = &o->rig.expert;
+  const char *name = expert->tick_share > 0.0 ? "--tick-share" : "--physics-share";
+  bool budget = expert->tick_share > 0.0 || expert->physics_share > 0.0;
   if (budget && def->drive == HAP_DRIVE_LOCKSTEP) {
     return fail(detail,
                 "%s: not with --lockstep, which does the same on every run, however long it "
                 "takes; give --accuracy instead",
                 name);
   }
-  return def->tick_share > 0.0 && def->model != HAP_MODEL_CONTACT
+  return expert->tick_share > 0.0 && def->model != HAP_MODEL_CONTACT
              ? fail(detail,
                     "--tick-share: a tick of --model %s has nothing that could be left out; take "
                     "--model contact, or leave it away",
@@ -610,7 +611,7 @@ static hap_status check(run_options *o, hap_detail *detail)
       return fail(detail, "--model-age: %g s are over %g ticks of the haptic loop; at most %g s",
                   o->model_age_s, LATENCY_TICKS_MAX, LATENCY_TICKS_MAX / def->haptic_hz);
     }
-    def->physics_latency_ticks = (int32_t)ticks;
+    o->rig.research.physics_latency_ticks = (int32_t)ticks;
   }
   if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
     return fail(detail, "--plot: the same file as --trace");
@@ -633,7 +634,7 @@ static hap_status check(run_options *o, hap_detail *detail)
       join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
-  return run_effects_apply(&o->effects, def, &why) < HAP_OK
+  return run_effects_apply(&o->effects, def->model, &o->rig.expert, &why) < HAP_OK
              ? fail(detail, "--effects: %.480s", why.text)
              : HAP_OK;
 }

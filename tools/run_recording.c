@@ -38,8 +38,8 @@ static hap_status read_note(run_recording *r, const char *path, hap_detail *deta
 static hap_status open_player(run_options *options, run_recording *out, hap_detail *detail)
 {
   hap_detail why = {""};
-  uint32_t flags = options->play_incomplete ? HAP_PLAY_INCOMPLETE : 0;
-  hap_status status = hap_player_open(options->play_path, flags, &out->player, &why);
+  hap_play_extent extent = options->play_incomplete ? HAP_PLAY_INCOMPLETE : HAP_PLAY_WHOLE;
+  hap_status status = hap_player_open(options->play_path, extent, &out->player, &why);
   if (status < HAP_OK) {
     snprintf(detail->text, sizeof detail->text, "--play %.490s", why.text);
     return status;
@@ -53,7 +53,8 @@ static hap_status open_player(run_options *options, run_recording *out, hap_deta
   options->rig.player = out->player;
   options->rig.devices[0] = "recording";
   options->rig.device_count = 1;
-  return hap_player_get_def(out->player, &options->rig.def);
+  return hap_player_get_def(out->player, &options->rig.def, &options->rig.expert,
+                            &options->rig.research);
 }
 
 hap_status run_recording_open(run_options *options, run_recording *out, hap_detail *detail)

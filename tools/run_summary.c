@@ -103,7 +103,7 @@ void run_summary_print(const run_options *options, const hap_stats *stats,
   fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->loop.trace_hash);
   count(out, "faults", stats->faults.count);
   print_more(stats, out);
-  if (options->rig.def.lookback > 0.0) {
+  if (options->rig.expert.lookback > 0.0) {
     number(out, "force_error", stats->error.force_error);
     number(out, "force_error_n", stats->error.force_error_n);
     count(out, "lookbacks", stats->error.lookbacks);

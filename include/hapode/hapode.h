@@ -10,9 +10,11 @@
 #include <hapode/attributes.h>
 #include <hapode/device.h>
 #include <hapode/effects.h>
+#include <hapode/expert.h>
 #include <hapode/hooks.h>
 #include <hapode/pointer.h>
 #include <hapode/record.h>
+#include <hapode/research.h>
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/stats.h>

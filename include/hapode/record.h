@@ -7,7 +7,9 @@
 #include <stdint.h>
 
 #include <hapode/attributes.h>
+#include <hapode/expert.h>
 #include <hapode/pointer.h>
+#include <hapode/research.h>
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/status.h>
@@ -134,16 +136,17 @@ HAP_API hap_status hap_session_record_state(const hap_session *session, hap_reco
 /* A recording that is open, and how far its replay has come. */
 typedef struct hap_player hap_player;
 
-/* Flags of hap_player_open. */
-typedef enum hap_play_flag {
+/* How much of a file hap_player_open takes. Values are never renumbered. */
+typedef enum hap_play_extent {
+  HAP_PLAY_WHOLE = 0,     /* a file that breaks off is refused */
   HAP_PLAY_INCOMPLETE = 1 /* a file that breaks off is played up to there */
-} hap_play_flag;
+} hap_play_extent;
 
 /* [control] Opens a recording and looks at all of it. On failure *out is NULL and detail (may be NULL)
  * says what is wrong and where: HAP_ERROR_IO, HAP_ERROR_FORMAT (damaged, or broken off),
  * HAP_ERROR_UNSUPPORTED (another machine, byte order, version of file or library). */
-HAP_API HAP_NODISCARD hap_status hap_player_open(const char *path, uint32_t flags, hap_player **out,
-                                                 hap_detail *detail);
+HAP_API HAP_NODISCARD hap_status hap_player_open(const char *path, hap_play_extent extent,
+                                                 hap_player **out, hap_detail *detail);
 
 /* [control] NULL is allowed. After its session was stopped. */
 HAP_API void hap_player_close(hap_player *player);
@@ -166,9 +169,12 @@ typedef struct hap_player_info {
 HAP_API hap_status hap_player_get_info(const hap_player *player, hap_player_info *out,
                                        size_t size_of_out);
 
-/* [control] Fills the initialised *def with what the session was that was recorded, in drive
- * LOCKSTEP. What does not matter to a replay (trace_rows, rt_priority) stays. */
-HAP_API hap_status hap_player_get_def(const hap_player *player, hap_session_def *def);
+/* [control] Fills the three initialised structs with what the recorded session was, in drive
+ * LOCKSTEP, and sets def->expert and def->research to the other two. What does not matter to a
+ * replay (trace_rows, rt_priority) stays. HAP_ERROR_ARGUMENT: one of them is NULL or not
+ * initialised. */
+HAP_API hap_status hap_player_get_def(const hap_player *player, hap_session_def *def,
+                                      hap_expert_def *expert, hap_research_def *research);
 
 /* [control] The session, made with the player's def over a world that is built as the recorded one
  * was, plays: hap_session_start looks whether the world is the one (HAP_ERROR_WORLD), hap_session_advance

@@ -67,11 +67,12 @@ typedef struct hap_loop_stats {
  * of the devices, with what the world received. A destroyed body takes along what it was given
  * since the last sync. */
 typedef struct hap_hand_stats {
-  double peak_force_n;      /* N, largest on a hand, before force_scale */
-  double impulse_ns;        /* N s, norm of the net impulse on the bodies */
-  double impulse_abs_ns;    /* N s, sum over ticks of the norms */
-  double momentum_ratio;    /* world / hands along the net impulse; NaN while the net impulse is
-                               below 5 % of the sum of norms */
+  double peak_force_n;   /* N, largest on a hand, before force_scale */
+  double impulse_ns;     /* N s, norm of the net impulse on the bodies */
+  double impulse_abs_ns; /* N s, sum over ticks of the norms */
+  /* world / hands along the net impulse; NaN while the net impulse is below 5 % of the sum of
+   * norms */
+  double momentum_ratio;
   double momentum_error_ns; /* N s, norm of the difference */
 } hap_hand_stats;
 
@@ -114,17 +115,19 @@ typedef struct hap_model_stats {
   uint32_t measured_bodies; /* bodies that answer as testing simulations say */
   uint32_t range_joints;    /* joints that the loop holds itself */
   uint32_t measured_joints; /* those of them whose equations come from testing simulations */
-  double joint_error;       /* 0.., largest share by which such equations were off at the end of the
-                               last interval: they turn with a body until the next sync */
+  /* 0.., largest share by which such equations were off at the end of the last interval: they
+   * turn with a body until the next sync */
+  double joint_error;
 } hap_model_stats;
 
 /* Testing simulations. */
 typedef struct hap_probe_stats {
-  uint64_t steps;    /* steps of the world that were undone */
-  uint64_t singular; /* probes whose A was not usable. The last good one was kept; of cross
-                        accelerances none was kept */
-  uint64_t clipped;  /* accelerances outside of 0 .. M^-1 that were brought back */
-  uint64_t reused;   /* contacts and bodies whose A was used again (hap_expert_def.reuse) */
+  uint64_t steps; /* steps of the world that were undone */
+  /* probes whose A was not usable. The last good one was kept; of cross accelerances none was
+   * kept */
+  uint64_t singular;
+  uint64_t clipped; /* accelerances outside of 0 .. M^-1 that were brought back */
+  uint64_t reused;  /* contacts and bodies whose A was used again (hap_expert_def.reuse) */
 } hap_probe_stats;
 
 /* Model CONTACT: contacts between bodies, and the solver of the loop. */
@@ -166,18 +169,20 @@ typedef struct hap_edit_stats {
  * window begins from the state of the session. A window that follows directly, as in LOCKSTEP,
  * begins where model SINGLE would be, for at most ten seconds in a row. */
 typedef struct hap_error_stats {
-  double force_error;   /* RMS of the difference / RMS of the force, over the last windows with
-                           contact; 0 before the first */
+  /* RMS of the difference / RMS of the force, over the last windows with contact; 0 before the
+   * first */
+  double force_error;
   double force_error_n; /* N, RMS of the difference in the newest window */
   uint64_t lookbacks;   /* windows that were examined */
-  uint64_t spoilt;      /* windows that could not be: something was moved, added or removed
-                           meanwhile, or there was too much for lookback's share */
-  double range_error;   /* model CONTACT with effect TESTING on: how differently the loop moved
-                           neighbours than testing simulations of the whole world foretold, made at the
-                           beginning of the interval with the pointers' forces. Root of the sums of
-                           squares, over the root of what was foretold; 0 without the effect. The
-                           forecast is linear in the pointer's impulse: it leaves out what begins or
-                           ends to touch or slide */
+  /* windows that could not be: something was moved, added or removed meanwhile, or there was too
+   * much for lookback's share */
+  uint64_t spoilt;
+  /* model CONTACT with effect TESTING on: how differently the loop moved neighbours than testing
+   * simulations of the whole world foretold, made at the beginning of the interval with the
+   * pointers' forces. Root of the sums of squares, over the root of what was foretold; 0 without
+   * the effect. The forecast is linear in the pointer's impulse: it leaves out what begins or
+   * ends to touch or slide */
+  double range_error;
 } hap_error_stats;
 
 /* All of it. */

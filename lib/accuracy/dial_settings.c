@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "accuracy/dial_settings.h"
 
+#include <hapode/expert.h>
+
 /* The order in which accuracy is given up, and in which it is bought. Measured by hapode-bench accuracy over
  * all scenes (docs/accuracy.md): first goes what costs most for what it adds to the force, last what the
  * force cannot do without. */

@@ -5,6 +5,7 @@
 
 /* What physics and loop each note of an effect: for how many it is on, and why not for the others. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <hapode/effects.h>

@@ -6,6 +6,7 @@
 /* The wishes of all effects in one word, two bits each: it is handed between threads and recorded as a
  * whole. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <hapode/effects.h>

@@ -73,13 +73,10 @@ static hap_status take(const hap_device_identity *given, hap_device_identity *ou
 hap_status hapi_device_identity_give(const hap_device_identity *identity, hap_device_identity *out,
                                      hap_detail *detail)
 {
-  hap_device_identity known;
-  hap_status status = hapi_def_read(&known, sizeof known.size + sizeof known.cookie, out, COOKIE,
-                                    "hap_device_identity_init", detail);
+  uint32_t size = 0;
+  hap_status status = hapi_def_check(out, COOKIE, "hap_device_identity_init", &size, detail);
   if (status >= 0) {
-    uint32_t size = known.size;
-    memcpy(out, identity, size < sizeof *identity ? size : sizeof *identity);
-    out->size = size;
+    hapi_def_write(out, identity, sizeof *identity);
   }
   return status;
 }

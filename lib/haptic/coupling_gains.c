@@ -25,7 +25,7 @@ const char *hap_coupling_name(hap_coupling coupling)
 }
 
 hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
-                                           const hap_pointer_def *pointer, double period)
+                                           const hapi_pointer_setup *pointer, double period)
 {
   if (pointer->coupling_stiffness > 0.0) {
     return (hapi_coupling_gains){true, pointer->coupling_stiffness, pointer->coupling_damping};

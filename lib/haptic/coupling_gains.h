@@ -8,7 +8,8 @@
 #include <stdbool.h>
 
 #include <hapode/device.h>
-#include <hapode/pointer.h>
+
+#include "base/pointer_setup.h"
 
 typedef struct hapi_coupling_gains {
   bool known;
@@ -24,6 +25,6 @@ static inline bool hapi_coupling_has_spring(hap_coupling coupling)
 
 /* period in s, of the haptic loop. */
 hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
-                                           const hap_pointer_def *pointer, double period);
+                                           const hapi_pointer_setup *pointer, double period);
 
 #endif

@@ -14,6 +14,7 @@
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
+#include "base/pointer_setup.h"
 #include "record/tape.h"
 #include "sync/exchange.h"
 
@@ -54,7 +55,7 @@ void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns);
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns);
 
 /* pointer.h */
-hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
+hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup *def,
                                    hap_pointer_id *out, hap_detail *detail);
 hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
 hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail);

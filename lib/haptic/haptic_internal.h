@@ -37,7 +37,7 @@ typedef struct hapi_pointer_target {
 typedef struct hapi_pointer_slot {
   _Atomic int phase;
   _Atomic uint32_t generation; /* written while EMPTY */
-  hap_pointer_def def;         /* hull_xyz NULL: the vertices are copied */
+  hapi_pointer_setup def;      /* hull_xyz NULL: the vertices are copied */
   hapi_tool_hull hull;
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;

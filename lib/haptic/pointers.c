@@ -19,17 +19,17 @@
 
 /* ---- the loop's side ---- */
 
-static double mass_of(const hap_pointer_def *def)
+static double mass_of(const hapi_pointer_setup *def)
 {
   return def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
          : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
-                                                  : def->mass;
+                                                  : def->proxy_mass;
 }
 
 /* In the world, where a metre of the device is motion_scale metres and a newton its share. */
 static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
 {
-  const hap_pointer_def *def = &slot->def;
+  const hapi_pointer_setup *def = &slot->def;
   hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.facts.period);
   double scale = def->motion_scale * def->force_scale;
   p->coupling.kind = def->coupling;
@@ -87,7 +87,7 @@ static bool is_unturned(const double q[4])
 static void activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
-  const hap_pointer_def *def = &slot->def;
+  const hapi_pointer_setup *def = &slot->def;
   const hap_device_info *info = &slot->info;
   hapi_pointer *p = &haptic->tick.pointers.of[index];
   memset(p, 0, sizeof *p);
@@ -437,7 +437,7 @@ static void prepare_slot(hapi_pointer_slot *slot)
   pthread_mutex_unlock(&slot->target_lock);
 }
 
-static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
+static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
 {
   slot->def = *def;
   slot->def.hull_xyz = NULL;
@@ -459,7 +459,7 @@ static void fill_slot(hapi_pointer_slot *slot, const hap_pointer_def *def)
 static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
                                  hap_detail *detail)
 {
-  const hap_pointer_def *def = &slot->def;
+  const hapi_pointer_setup *def = &slot->def;
   const char *name = hap_coupling_name(def->coupling);
   if (!hapi_coupling_has_spring(def->coupling)) {
     return HAP_OK;
@@ -481,7 +481,7 @@ static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_s
   return HAP_OK;
 }
 
-hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hap_pointer_def *def,
+hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup *def,
                                    hap_pointer_id *out, hap_detail *detail)
 {
   uint32_t index = free_slot(haptic);

@@ -3,7 +3,7 @@
 #ifndef HAPODE_PROBE_REUSE_H
 #define HAPODE_PROBE_REUSE_H
 
-/* Testing simulations that need not be made again (hap_session_def.reuse). All that decides what they
+/* Testing simulations that need not be made again (hap_expert_def.reuse). All that decides what they
  * find is written down when they are made: of the world, of each body of the island, of its contacts,
  * joints and pushes. At the next step it is written down anew and compared value by value. No flag
  * says that something has changed, as the application may change anything. */

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include <hapode/pointer.h>
+#include "base/pointer_setup.h"
 
 typedef enum hapi_stream {
   HAPI_STREAM_HAPTIC = 0,
@@ -125,7 +125,7 @@ static_assert(sizeof(hapi_cell) == 64, "the file's");
 
 /* A pointer as the loop takes it in. */
 typedef struct hapi_joined {
-  hap_pointer_def def; /* device and hull_xyz NULL */
+  hapi_pointer_setup def; /* device and hull_xyz NULL */
   hap_device_info info;
   uint32_t generation;
   uint32_t has_device;

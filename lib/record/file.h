@@ -70,7 +70,7 @@ typedef struct hapi_file_info {
   uint32_t note_size;
   uint32_t effects;     /* wishes at the start, as in base/wishes.h */
   int32_t max_sweeps;   /* files of before end before it; what a file lacks is 0 */
-  int32_t range_hops_1; /* hap_session_def.range_hops + 1 */
+  int32_t range_hops_1; /* hap_expert_def.range_hops + 1 */
   double accuracy;
   int32_t iterations;
   int32_t reserved; /* 0 */

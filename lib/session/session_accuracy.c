@@ -44,7 +44,7 @@ static hap_status check_accuracy(double accuracy, hap_detail *detail)
 static hap_status check_error(const hap_session_def *def, double wanted, hap_detail *detail)
 {
   hap_status status = check_wish(wanted, ERROR_LEAST, "force_error_wanted", detail);
-  if (status >= HAP_OK && wanted > 0.0 && def->lookback == 0.0) {
+  if (status >= HAP_OK && wanted > 0.0 && def->expert->lookback == 0.0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                      "force_error_wanted is %g, and nothing tells the error: set lookback, to 0.1 "
                      "say",
@@ -63,19 +63,30 @@ static hap_status check_budget(const hap_session_def *def, double tick_share, do
   bool budget = tick_share > 0.0 || physics_share > 0.0;
   if (status >= HAP_OK && budget && def->drive == HAP_DRIVE_LOCKSTEP) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                     "tick_share or physics_share in drive LOCKSTEP, which does the same on every "
-                     "run, however long it takes: set accuracy instead");
+                     "budget, tick_share or physics_share in drive LOCKSTEP, which does the same "
+                     "on every run, however long it takes: set accuracy instead");
   }
   return status;
+}
+
+double hapi_session_share(const hap_session_def *def, double own)
+{
+  return own == 0.0 ? def->budget : own;
 }
 
 hap_status hapi_session_check_dial(const hap_session_def *def, hap_detail *detail)
 {
   hap_status status = check_accuracy(def->accuracy, detail);
   if (status >= HAP_OK) {
-    status = check_error(def, def->force_error_wanted, detail);
+    status = check_error(def, def->expert->force_error_wanted, detail);
   }
-  return status >= HAP_OK ? check_budget(def, def->tick_share, def->physics_share, detail) : status;
+  if (status >= HAP_OK) {
+    status = check_wish(def->budget, SHARE_LEAST, "budget", detail);
+  }
+  return status >= HAP_OK
+             ? check_budget(def, hapi_session_share(def, def->expert->tick_share),
+                            hapi_session_share(def, def->expert->physics_share), detail)
+             : status;
 }
 
 static hap_status check_free(const hap_session *session, hap_detail *detail)

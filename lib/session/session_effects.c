@@ -140,46 +140,72 @@ hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap_model m
 static hap_status check_guard(const hap_session_def *def, hap_effect effect, hap_effect_wish wish,
                               hap_detail *detail)
 {
-  return effect == HAP_EFFECT_OBSERVER && wish == HAP_EFFECT_ON && def->guard == HAP_GUARD_MEASURE
+  return effect == HAP_EFFECT_OBSERVER && wish == HAP_EFFECT_ON &&
+                 def->research->guard == HAP_GUARD_MEASURE
              ? hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                          "observer=on is not supported with HAP_GUARD_MEASURE, which leaves the "
                          "force as it is; use HAP_GUARD_ON")
              : HAP_OK;
 }
 
+#define KNOWN (HAP_EFFECT_BIT(HAP_EFFECTS) - 1u)
+
+static hap_effect_wish wish_of(const hap_expert_def *expert, int effect)
+{
+  uint32_t bit = HAP_EFFECT_BIT(effect);
+  return (expert->effects_on & bit) != 0    ? HAP_EFFECT_ON
+         : (expert->effects_off & bit) != 0 ? HAP_EFFECT_OFF
+                                            : HAP_EFFECT_AUTO;
+}
+
+static hap_status check_bits(const hap_expert_def *expert, hap_detail *detail)
+{
+  if ((expert->effects_on & ~KNOWN) != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects_on has unknown bits 0x%x",
+                     expert->effects_on & ~KNOWN);
+  }
+  if ((expert->effects_off & ~KNOWN) != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects_off has unknown bits 0x%x",
+                     expert->effects_off & ~KNOWN);
+  }
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    if ((expert->effects_on & expert->effects_off & HAP_EFFECT_BIT(i)) != 0) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is in effects_on and in effects_off",
+                       effects[i].name);
+    }
+  }
+  return HAP_OK;
+}
+
 hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail)
 {
-  hap_status status = HAP_OK;
-  for (int i = 0; i < HAP_EFFECT_PLACES && status >= HAP_OK; ++i) {
-    int wish = def->effects[i];
-    if (i >= HAP_EFFECTS ? wish != 0 : !is_wish((hap_effect_wish)wish)) {
-      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects[%d] is %d, not %s", i, wish,
-                       i >= HAP_EFFECTS ? "0: there is no such effect" : "a hap_effect_wish");
-    }
-    if (i < HAP_EFFECTS) {
-      status = hap_effect_check((hap_effect)i, (hap_effect_wish)wish, def->model, detail);
-    }
+  hap_status status = check_bits(def->expert, detail);
+  for (int i = 0; i < HAP_EFFECTS && status >= HAP_OK; ++i) {
+    hap_effect_wish wish = wish_of(def->expert, i);
+    status = hap_effect_check((hap_effect)i, wish, def->model, detail);
     if (status >= HAP_OK) {
-      status = check_guard(def, (hap_effect)i, (hap_effect_wish)wish, detail);
+      status = check_guard(def, (hap_effect)i, wish, detail);
     }
   }
   return status;
 }
 
-uint32_t hapi_session_pack_effects(const hap_session_def *def)
+uint32_t hapi_session_pack_effects(const hap_expert_def *expert)
 {
   uint32_t packed = 0;
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    packed = hapi_wish_set(packed, (hap_effect)i, (hap_effect_wish)def->effects[i]);
+    packed = hapi_wish_set(packed, (hap_effect)i, wish_of(expert, i));
   }
   return packed;
 }
 
-void hapi_session_unpack_effects(uint32_t packed, hap_session_def *io)
+void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io)
 {
-  memset(io->effects, 0, sizeof io->effects);
+  io->effects_on = io->effects_off = 0;
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    io->effects[i] = (uint8_t)hapi_wish(packed, (hap_effect)i);
+    hap_effect_wish wish = hapi_wish(packed, (hap_effect)i);
+    io->effects_on |= wish == HAP_EFFECT_ON ? HAP_EFFECT_BIT(i) : 0;
+    io->effects_off |= wish == HAP_EFFECT_OFF ? HAP_EFFECT_BIT(i) : 0;
   }
 }
 

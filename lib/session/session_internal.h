@@ -7,7 +7,9 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
+#include <hapode/expert.h>
 #include <hapode/record.h>
+#include <hapode/research.h>
 #include <hapode/session.h>
 
 #include "base/def.h"
@@ -18,12 +20,18 @@
 #include "sync/exchange.h"
 
 #define HAPI_SESSION_COOKIE 0x48534531u
+#define HAPI_EXPERT_COOKIE 0x48455831u
+#define HAPI_RESEARCH_COOKIE 0x48525331u
 #define HAPI_POINTER_COOKIE 0x48505431u
+#define HAPI_POINTER_EXPERT_COOKIE 0x48505831u
+#define HAPI_POINTER_RESEARCH_COOKIE 0x48505331u
 #define HAPI_ODE_COOKIE 0x484f4431u
 #define HAPI_RECORD_COOKIE 0x48524331u
 
 struct hap_session {
-  hap_session_def def;
+  hap_session_def def; /* its expert and research are the next two */
+  hap_expert_def expert;
+  hap_research_def research;
   hapi_exchange *exchange;
   hapi_haptic *haptic;
   hapi_physics *physics;
@@ -66,17 +74,24 @@ hap_status hapi_play_advance(hap_session *session, uint64_t ticks);
 int64_t hapi_play_now(const hap_session *session);
 
 /* session_pointer.c; detail may be NULL */
-hap_status hapi_session_check_pointer(const hap_pointer_def *def, hap_detail *detail);
-hap_status hapi_session_check_hull(const hap_pointer_def *def, hap_detail *detail);
+/* The structs of the API in one, checked. */
+hap_status hapi_session_read_pointer(const hap_pointer_def *given, hapi_pointer_setup *out,
+                                     hap_detail *detail);
+hap_status hapi_session_check_pointer(const hapi_pointer_setup *def, hap_detail *detail);
+hap_status hapi_session_check_hull(const hapi_pointer_setup *def, hap_detail *detail);
 
 /* session_accuracy.c: what turns the dial */
 hap_status hapi_session_check_dial(const hap_session_def *def, hap_detail *detail);
+double hapi_session_share(const hap_session_def *def, double own); /* own, or the budget */
 
-/* session_effects.c: hap_session_def.effects, and as one word (base/wishes.h) */
+/* session_effects.c: the wishes, and as one word (base/wishes.h) */
 hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail);
-uint32_t hapi_session_pack_effects(const hap_session_def *def);
-void hapi_session_unpack_effects(uint32_t packed, hap_session_def *io);
+uint32_t hapi_session_pack_effects(const hap_expert_def *expert);
+void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io);
 
-hap_status hapi_session_check_def(const hap_session_def *def, hap_detail *detail);
+/* defs.c: fills in def, expert and research of *out, and checks them. def.expert and def.research are
+ * never NULL then. */
+hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,
+                                 hap_detail *detail);
 
 #endif

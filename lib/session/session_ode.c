@@ -23,16 +23,11 @@
 void hap_ode_def_init(hap_ode_def *def, size_t size_of_def)
 {
   hap_ode_def d;
-  if (def == NULL || size_of_def < 2 * sizeof(uint32_t)) {
-    return;
-  }
   memset(&d, 0, sizeof d);
   d.cookie = HAPI_ODE_COOKIE;
   d.max_contacts_per_pair = 8;
   d.island_threads = 1;
-  memset(def, 0, size_of_def);
-  d.size = (uint32_t)size_of_def;
-  memcpy(def, &d, size_of_def < sizeof d ? size_of_def : sizeof d);
+  hapi_def_init(def, size_of_def, &d, sizeof d);
 }
 
 static hap_status check_ode(const hap_ode_def *def, hap_detail *detail)
@@ -72,21 +67,21 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .capacity = *capacity,
       .max_bodies = (uint32_t)def->max_bodies,
       .model = def->model,
-      .impulse_pose = def->impulse_pose,
-      .knobs = {.contact_hz = def->contact_hz,
-                .probe = def->probe,
-                .max_sweeps = def->max_sweeps,
-                .range_hops = def->range_hops,
-                .edge_probes = def->max_edge_probes,
-                .iterations = def->iterations,
-                .reuse = def->reuse},
+      .impulse_pose = def->research->impulse_pose,
+      .knobs = {.contact_hz = def->expert->contact_hz,
+                .probe = def->research->probe,
+                .max_sweeps = def->expert->max_sweeps,
+                .range_hops = def->expert->range_hops,
+                .edge_probes = def->expert->max_edge_probes,
+                .iterations = def->expert->iterations,
+                .reuse = def->expert->reuse},
       .accuracy = def->accuracy,
-      .force_error_wanted = def->force_error_wanted,
-      .tick_share = def->tick_share,
-      .physics_share = def->physics_share,
-      .effects = hapi_session_pack_effects(def),
+      .force_error_wanted = def->expert->force_error_wanted,
+      .tick_share = hapi_session_share(def, def->expert->tick_share),
+      .physics_share = hapi_session_share(def, def->expert->physics_share),
+      .effects = hapi_session_pack_effects(def->expert),
       .physics_hz = def->physics_hz,
-      .lookback_share = def->lookback,
+      .lookback_share = def->expert->lookback,
       .haptic_hz = def->haptic_hz,
       .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
       .frame = def->drive == HAP_DRIVE_FRAME,
@@ -96,8 +91,10 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .user = session,
   };
   hap_status status = hapi_physics_create(&config, ode, &session->physics, detail);
-  if (status >= HAP_OK && def->drive == HAP_DRIVE_LOCKSTEP && def->physics_latency_ticks >= 0) {
-    hapi_physics_set_latency(session->physics, (double)def->physics_latency_ticks / def->haptic_hz);
+  if (status >= HAP_OK && def->drive == HAP_DRIVE_LOCKSTEP &&
+      def->research->physics_latency_ticks >= 0) {
+    hapi_physics_set_latency(session->physics,
+                             (double)def->research->physics_latency_ticks / def->haptic_hz);
   }
   return status;
 }
@@ -124,12 +121,12 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .contacts = (uint32_t)def->max_contacts,
       .pointers = (uint32_t)def->max_pointers,
       .geoms = 8 * (uint32_t)def->max_bodies + 1024,
-      .hull_points = (uint32_t)def->max_hull_points,
+      .hull_points = (uint32_t)def->expert->max_hull_points,
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
       .path_rows =
-          def->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
+          def->expert->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
       .crosses = 8 * (uint32_t)def->max_bodies,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
@@ -152,8 +149,8 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .haptic_hz = def->haptic_hz,
         .lockstep = def->drive == HAP_DRIVE_LOCKSTEP,
         .rt_priority = def->rt_priority,
-        .trace_rows = (uint32_t)def->trace_rows,
-        .guard = def->guard,
+        .trace_rows = (uint32_t)def->expert->trace_rows,
+        .guard = def->research->guard,
         .exchange = session->exchange,
     };
     status = hapi_haptic_create(&config, &session->haptic);
@@ -168,16 +165,11 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
   return create_physics(session, ode, &capacity, detail);
 }
 
-static hap_status read_defs(const hap_session_def *def, const hap_ode_def *ode,
-                            hap_session_def *out_def, hap_ode_def *out_ode, hap_detail *detail)
+static hap_status read_defs(const hap_session_def *def, const hap_ode_def *ode, hap_session *out,
+                            hap_ode_def *out_ode, hap_detail *detail)
 {
-  hap_session_def_init(out_def, sizeof *out_def);
   hap_ode_def_init(out_ode, sizeof *out_ode);
-  hap_status status = hapi_def_read(out_def, sizeof *out_def, def, HAPI_SESSION_COOKIE,
-                                    "hap_session_def_init", detail);
-  if (status >= HAP_OK) {
-    status = hapi_session_check_def(out_def, detail);
-  }
+  hap_status status = hapi_session_read_def(def, out, detail);
   if (status >= HAP_OK) {
     status =
         hapi_def_read(out_ode, sizeof *out_ode, ode, HAPI_ODE_COOKIE, "hap_ode_def_init", detail);
@@ -188,21 +180,20 @@ static hap_status read_defs(const hap_session_def *def, const hap_ode_def *ode,
 hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode, hap_session **out,
                               hap_detail *detail)
 {
-  hap_session_def checked_def;
   hap_ode_def checked_ode;
   if (out == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "out is NULL");
   }
   *out = NULL;
-  hap_status status = read_defs(def, ode, &checked_def, &checked_ode, detail);
-  if (status < HAP_OK) {
-    return status;
-  }
   hap_session *session = hapi_alloc(sizeof *session);
   if (session == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a session");
   }
-  session->def = checked_def;
+  hap_status status = read_defs(def, ode, session, &checked_ode, detail);
+  if (status < HAP_OK) {
+    hapi_free(session);
+    return status;
+  }
   pthread_mutex_init(&session->detail_lock, NULL);
   status = create_parts(session, &checked_ode, detail);
   if (status < HAP_OK) {

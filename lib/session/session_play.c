@@ -467,19 +467,22 @@ hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *d
 
 /* ---- the public side ---- */
 
-hap_status hap_player_open(const char *path, uint32_t flags, hap_player **out, hap_detail *detail)
+hap_status hap_player_open(const char *path, hap_play_extent extent, hap_player **out,
+                           hap_detail *detail)
 {
-  if (path == NULL || out == NULL || (flags & ~(uint32_t)HAP_PLAY_INCOMPLETE) != 0) {
-    return hapi_fail(
-        detail, HAP_ERROR_ARGUMENT, "%s",
-        path == NULL || out == NULL ? "path or out is NULL" : "flags has unknown bits");
+  if (path == NULL || out == NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "path or out is NULL");
+  }
+  if (extent != HAP_PLAY_WHOLE && extent != HAP_PLAY_INCOMPLETE) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "extent is %d, not one of hap_play_extent",
+                     (int)extent);
   }
   *out = NULL;
   hap_player *player = hapi_alloc(sizeof *player);
   if (player == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a player");
   }
-  hap_status status = hapi_reader_open(path, (flags & HAP_PLAY_INCOMPLETE) != 0,
+  hap_status status = hapi_reader_open(path, extent == HAP_PLAY_INCOMPLETE,
                                        hapi_physics_ode_configuration(), &player->reader, detail);
   if (status < HAP_OK) {
     hapi_free(player);
@@ -522,53 +525,85 @@ hap_status hap_player_get_info(const hap_player *player, hap_player_info *out, s
   return HAP_OK;
 }
 
-hap_status hap_player_get_def(const hap_player *player, hap_session_def *def)
+/* What the recorded session was, over what is there. */
+static void fill_defs(const hapi_file_info *info, hap_session_def *def, hap_expert_def *expert,
+                      hap_research_def *research)
+{
+  def->drive = HAP_DRIVE_LOCKSTEP;
+  def->model = (hap_model)info->model;
+  def->physics_hz = info->physics_hz;
+  def->haptic_hz = info->haptic_hz;
+  def->max_bodies = info->max_bodies;
+  def->max_contacts = info->max_contacts;
+  def->max_pointers = info->max_pointers;
+  def->accuracy = info->accuracy;
+  expert->contact_hz = info->contact_hz;
+  expert->max_sweeps = info->max_sweeps;
+  expert->range_hops = info->range_hops_1 - 1;
+  expert->max_edge_probes = info->max_edge_probes;
+  expert->iterations = info->iterations;
+  expert->reuse = info->reuse;
+  expert->max_hull_points = info->max_hull_points;
+  hapi_session_unpack_effects(info->effects, expert);
+  research->probe = (hap_probe)info->probe;
+  research->impulse_pose = (hap_impulse_pose)info->impulse_pose;
+  research->physics_latency_ticks = HAP_LATENCY_DEFAULT;
+  research->guard = (hap_guard)info->guard;
+}
+
+hap_status hap_player_get_def(const hap_player *player, hap_session_def *def,
+                              hap_expert_def *expert, hap_research_def *research)
 {
   hap_session_def d;
+  hap_expert_def e;
+  hap_research_def r;
   hap_session_def_init(&d, sizeof d);
-  if (player == NULL || hapi_def_read(&d, sizeof d, def, HAPI_SESSION_COOKIE,
-                                      "hap_session_def_init", NULL) < HAP_OK) {
+  hap_expert_def_init(&e, sizeof e);
+  hap_research_def_init(&r, sizeof r);
+  if (player == NULL ||
+      hapi_def_read(&d, sizeof d, def, HAPI_SESSION_COOKIE, "hap_session_def_init", NULL) <
+          HAP_OK ||
+      hapi_def_read(&e, sizeof e, expert, HAPI_EXPERT_COOKIE, "hap_expert_def_init", NULL) <
+          HAP_OK ||
+      hapi_def_read(&r, sizeof r, research, HAPI_RESEARCH_COOKIE, "hap_research_def_init", NULL) <
+          HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
-  const hapi_file_info *info = hapi_reader_info(player->reader);
-  uint32_t size = d.size = def->size;
-  d.drive = HAP_DRIVE_LOCKSTEP;
-  d.model = (hap_model)info->model;
-  d.physics_hz = info->physics_hz;
-  d.contact_hz = info->contact_hz;
-  d.haptic_hz = info->haptic_hz;
-  d.max_bodies = info->max_bodies;
-  d.max_contacts = info->max_contacts;
-  d.max_pointers = info->max_pointers;
-  d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
-  d.impulse_pose = (hap_impulse_pose)info->impulse_pose;
-  d.probe = (hap_probe)info->probe;
-  d.max_edge_probes = info->max_edge_probes;
-  d.max_hull_points = info->max_hull_points;
-  d.guard = (hap_guard)info->guard;
-  d.max_sweeps = info->max_sweeps;
-  d.range_hops = info->range_hops_1 - 1;
-  d.iterations = info->iterations;
-  d.accuracy = info->accuracy;
-  d.reuse = info->reuse;
-  hapi_session_unpack_effects(info->effects, &d);
-  memcpy(def, &d, size < sizeof d ? size : sizeof d);
+  fill_defs(hapi_reader_info(player->reader), &d, &e, &r);
+  d.expert = expert;
+  d.research = research;
+  hapi_def_write(def, &d, sizeof d);
+  hapi_def_write(expert, &e, sizeof e);
+  hapi_def_write(research, &r, sizeof r);
   return HAP_OK;
+}
+
+/* Whether the session is what was recorded. Copies are compared, down to the bytes between members. */
+static bool has_recorded_defs(const hap_session *session, const hap_player *player)
+{
+  hap_session_def def = session->def;
+  hap_expert_def expert = session->expert;
+  hap_research_def research = session->research;
+  const void *const here[] = {&session->def, &session->expert, &session->research};
+  const void *const there[] = {&def, &expert, &research};
+  const size_t sizes[] = {sizeof def, sizeof expert, sizeof research};
+  bool same = true;
+  fill_defs(hapi_reader_info(player->reader), &def, &expert, &research);
+  for (int i = 0; i < 3; ++i) {
+    same = same && memcmp(here[i], there[i], sizes[i]) == 0;
+  }
+  return same;
 }
 
 static hap_status check_session(const hap_session *session, const hap_player *player,
                                 hap_detail *detail)
 {
-  hap_session_def wanted = session->def;
-  const void *there = &wanted; /* a copy, down to the bytes between members */
-  const void *here = &session->def;
-  (void)hap_player_get_def(player, &wanted);
   if (session->ran || session->player != NULL || session->recorder != NULL ||
       player->session != NULL) {
     return hapi_fail(detail, HAP_ERROR_STATE,
                      "session or player are in use or have been: a replay takes a new one of each");
   }
-  if (memcmp(there, here, sizeof wanted) != 0) {
+  if (!has_recorded_defs(session, player)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "the session has another def than the recorded one: create it with that of "
                      "hap_player_get_def");

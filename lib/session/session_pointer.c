@@ -37,7 +37,7 @@ static bool between(double value, double low, double high)
   return value >= low && value <= high;
 }
 
-static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
+static hap_status check_numbers(const hapi_pointer_setup *d, hap_detail *detail)
 {
   const struct {
     bool good;
@@ -45,7 +45,7 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
   } rules[] = {
       {between(d->radius, d->hull_points > 0 ? 0.0 : 1e-6, 100.0),
        "radius is not in 1e-6 .. 100 m (of a hull 0 .. 100 m)"},
-      {between(d->mass, 0.0, 1e6), "mass is not in 0 .. 1e6 kg"},
+      {between(d->proxy_mass, 0.0, 1e6), "proxy_mass is not in 0 .. 1e6 kg"},
       {between(d->stiffness, 0.0, 1e9), "stiffness is not in 0 .. 1e9 N/m"},
       {between(d->damping, 0.0, 1e6), "damping is not in 0 .. 1e6 N s/m"},
       {between(d->friction, 0.0, 10.0), "friction is not in 0 .. 10"},
@@ -80,7 +80,7 @@ static hap_status check_numbers(const hap_pointer_def *d, hap_detail *detail)
   return status;
 }
 
-hap_status hapi_session_check_pointer(const hap_pointer_def *d, hap_detail *detail)
+hap_status hapi_session_check_pointer(const hapi_pointer_setup *d, hap_detail *detail)
 {
   hap_status status = check_numbers(d, detail);
   return status >= HAP_OK ? hapi_session_check_hull(d, detail) : status;
@@ -93,6 +93,63 @@ static hap_status refuse_in_replay(const hap_session *session)
                            "the session plays a recording, which has the pointers in it");
 }
 
+static hapi_pointer_setup setup_of(const hap_pointer_def *d, const hap_pointer_expert_def *e,
+                                   const hap_pointer_research_def *r)
+{
+  hapi_pointer_setup setup;
+  memset(&setup, 0, sizeof setup);
+  setup.size = sizeof setup;
+  setup.cookie = HAPI_POINTER_COOKIE;
+  setup.device = d->device;
+  setup.pose_world_device = d->pose_world_device;
+  setup.motion_scale = d->motion_scale;
+  setup.force_scale = d->force_scale;
+  setup.radius = d->radius;
+  setup.hull_xyz = d->hull_xyz;
+  setup.hull_points = d->hull_points;
+  setup.stiffness = d->stiffness;
+  setup.damping = d->damping;
+  setup.friction = d->friction;
+  setup.finger_radius = d->finger_radius;
+  setup.max_force = d->max_force;
+  setup.max_torque = d->max_torque;
+  setup.collide_bits = d->collide_bits;
+  setup.coupling = e->coupling;
+  setup.proxy_mass = e->proxy_mass;
+  setup.coupling_stiffness = e->coupling_stiffness;
+  setup.coupling_damping = e->coupling_damping;
+  setup.hand_damping = e->hand_damping;
+  setup.max_slew = e->max_slew;
+  setup.velocity = e->velocity;
+  setup.integration = r->integration;
+  setup.virtual_mass = r->virtual_mass;
+  setup.virtual_inertia = r->virtual_inertia;
+  return setup;
+}
+
+hap_status hapi_session_read_pointer(const hap_pointer_def *given, hapi_pointer_setup *out,
+                                     hap_detail *detail)
+{
+  hap_pointer_def d;
+  hap_pointer_expert_def e;
+  hap_pointer_research_def r;
+  hap_pointer_def_init(&d, sizeof d);
+  hap_pointer_expert_def_init(&e, sizeof e);
+  hap_pointer_research_def_init(&r, sizeof r);
+  hap_status status =
+      hapi_def_read(&d, sizeof d, given, HAPI_POINTER_COOKIE, "hap_pointer_def_init", detail);
+  if (status >= HAP_OK && d.expert != NULL) {
+    status = hapi_def_read(&e, sizeof e, d.expert, HAPI_POINTER_EXPERT_COOKIE,
+                           "hap_pointer_expert_def_init", detail);
+  }
+  if (status >= HAP_OK && d.research != NULL) {
+    status = hapi_def_read(&r, sizeof r, d.research, HAPI_POINTER_RESEARCH_COOKIE,
+                           "hap_pointer_research_def_init", detail);
+  }
+  *out = setup_of(&d, &e, &r);
+  return status >= HAP_OK ? hapi_session_check_pointer(out, detail) : status;
+}
+
 hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
 {
   if (session == NULL || out == NULL) {
@@ -102,23 +159,18 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
     return refuse_in_replay(session);
   }
   hap_detail detail = {""};
-  hap_pointer_def d;
-  hap_pointer_def_init(&d, sizeof d);
+  hapi_pointer_setup setup;
   out->v = 0;
-  hap_status status =
-      hapi_def_read(&d, sizeof d, def, HAPI_POINTER_COOKIE, "hap_pointer_def_init", &detail);
-  if (status >= HAP_OK) {
-    status = hapi_session_check_pointer(&d, &detail);
-  }
-  if (status >= HAP_OK && hapi_coupling_has_spring(d.coupling) &&
+  hap_status status = hapi_session_read_pointer(def, &setup, &detail);
+  if (status >= HAP_OK && hapi_coupling_has_spring(setup.coupling) &&
       session->def.model != HAP_MODEL_CONTACT) {
     status = hapi_fail(&detail, HAP_ERROR_UNSUPPORTED,
                        "coupling %s needs model contact; the session has model %s",
-                       hap_coupling_name(d.coupling), hap_model_name(session->def.model));
+                       hap_coupling_name(setup.coupling), hap_model_name(session->def.model));
   }
   if (status >= HAP_OK) {
-    hapi_quat_normalize(d.pose_world_device.quat_wxyz);
-    status = hapi_haptic_add_pointer(session->haptic, &d, out, &detail);
+    hapi_quat_normalize(setup.pose_world_device.quat_wxyz);
+    status = hapi_haptic_add_pointer(session->haptic, &setup, out, &detail);
   }
   return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail.text) : status;
 }

@@ -69,23 +69,23 @@ static void describe(const hap_session_def *def, hapi_file_info *out)
   hapi_file_describe(out);
   snprintf(out->ode, sizeof out->ode, "%s", hapi_physics_ode_configuration());
   out->physics_hz = def->physics_hz;
-  out->contact_hz = def->contact_hz;
+  out->contact_hz = def->expert->contact_hz;
   out->haptic_hz = def->haptic_hz;
   out->drive = (int32_t)def->drive;
   out->model = (int32_t)def->model;
   out->max_bodies = def->max_bodies;
   out->max_contacts = def->max_contacts;
   out->max_pointers = def->max_pointers;
-  out->impulse_pose = (int32_t)def->impulse_pose;
-  out->probe = (int32_t)def->probe;
-  out->max_edge_probes = def->max_edge_probes;
-  out->max_hull_points = def->max_hull_points;
-  out->guard = (int32_t)def->guard;
-  out->max_sweeps = def->max_sweeps;
-  out->range_hops_1 = def->range_hops + 1;
-  out->reuse = def->reuse;
-  out->effects = hapi_session_pack_effects(def);
-  out->iterations = def->iterations;
+  out->impulse_pose = (int32_t)def->research->impulse_pose;
+  out->probe = (int32_t)def->research->probe;
+  out->max_edge_probes = def->expert->max_edge_probes;
+  out->max_hull_points = def->expert->max_hull_points;
+  out->guard = (int32_t)def->research->guard;
+  out->max_sweeps = def->expert->max_sweeps;
+  out->range_hops_1 = def->expert->range_hops + 1;
+  out->reuse = def->expert->reuse;
+  out->effects = hapi_session_pack_effects(def->expert);
+  out->iterations = def->expert->iterations;
   out->accuracy = def->accuracy;
 }
 

@@ -73,7 +73,7 @@ static hap_status check_span(const double *points, size_t count, hap_detail *det
   return HAP_OK;
 }
 
-hap_status hapi_session_check_hull(const hap_pointer_def *def, hap_detail *detail)
+hap_status hapi_session_check_hull(const hapi_pointer_setup *def, hap_detail *detail)
 {
   if (def->hull_xyz == NULL && def->hull_points == 0) {
     return HAP_OK;

@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/research.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
 
@@ -20,7 +21,7 @@ typedef struct hapi_physics_config {
   hap_model model;
   hap_impulse_pose impulse_pose;
   hapi_knobs knobs;
-  double accuracy; /* as in hap_session_def, also the next three */
+  double accuracy; /* as in hap_session_def and hap_expert_def, also the next three */
   double force_error_wanted;
   double tick_share;
   double physics_share;

@@ -8,9 +8,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include <hapode/session.h>
+#include <hapode/research.h>
 
-/* As in hap_session_def: HAP_BY_ACCURACY, or the fixed value. */
+/* As in hap_expert_def: HAP_BY_ACCURACY, or the fixed value. */
 typedef struct hapi_knobs {
   double contact_hz;
   hap_probe probe;

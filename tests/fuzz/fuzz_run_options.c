@@ -32,26 +32,32 @@ static void check_between(double value, double low, double high)
   FUZZ_CHECK(value >= low && value <= high);
 }
 
-static void check_def(const hap_session_def *def)
+static void check_def(const rig_options *of)
 {
+  const hap_session_def *def = &of->def;
+  const hap_expert_def *expert = &of->expert;
+  const hap_research_def *research = &of->research;
   FUZZ_CHECK(hap_model_name(def->model) != NULL);
   check_between(def->haptic_hz, 100.0, 20000.0);
   check_between(def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz));
-  FUZZ_CHECK(def->contact_hz == HAP_BY_ACCURACY ||
-             (def->contact_hz >= 20.0 && def->contact_hz <= 1000.0));
+  FUZZ_CHECK(expert->contact_hz == HAP_BY_ACCURACY ||
+             (expert->contact_hz >= 20.0 && expert->contact_hz <= 1000.0));
   check_between(def->accuracy, 0.0, 1.0);
-  check_between(def->force_error_wanted, 0.0, 1.0);
-  FUZZ_CHECK(def->force_error_wanted == 0.0 || def->lookback > 0.0);
-  check_between(def->tick_share, 0.0, 1.0);
-  check_between(def->physics_share, 0.0, 1.0);
+  check_between(expert->force_error_wanted, 0.0, 1.0);
+  FUZZ_CHECK(expert->force_error_wanted == 0.0 || expert->lookback > 0.0);
+  check_between(expert->tick_share, 0.0, 1.0);
+  check_between(expert->physics_share, 0.0, 1.0);
   check_between(def->rt_priority, 0, 99);
-  check_between(def->physics_latency_ticks, -1, 20000);
+  check_between(research->physics_latency_ticks, -1, 20000);
   check_between(def->drive, HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP);
-  check_between(def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);
-  check_between(def->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY);
+  check_between(research->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);
+  check_between(research->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY);
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    FUZZ_CHECK(hap_effect_check((hap_effect)i, (hap_effect_wish)def->effects[i], def->model,
-                                NULL) == HAP_OK);
+    bool on = (expert->effects_on & HAP_EFFECT_BIT(i)) != 0;
+    bool off = (expert->effects_off & HAP_EFFECT_BIT(i)) != 0;
+    hap_effect_wish wish = on ? HAP_EFFECT_ON : off ? HAP_EFFECT_OFF : HAP_EFFECT_AUTO;
+    FUZZ_CHECK(!(on && off));
+    FUZZ_CHECK(hap_effect_check((hap_effect)i, wish, def->model, NULL) == HAP_OK);
   }
 }
 
@@ -60,7 +66,7 @@ static void check_options(const run_options *options)
   check_between(options->check.force, 0.0, CONFORM_FORCE_MAX);
   check_between(options->check.wait_s, 0.0, 3600.0);
   FUZZ_CHECK(options->check.spec == NULL || options->rig.device_count == 0);
-  check_def(&options->rig.def);
+  check_def(&options->rig);
   FUZZ_CHECK(options->seconds == 0.0 || options->seconds >= 0.001);
   check_between(options->seconds, 0.0, 86400.0);
   FUZZ_CHECK(options->rig.max_force == 0.0 || options->rig.max_force >= 1e-6);

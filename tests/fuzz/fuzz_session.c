@@ -11,6 +11,7 @@
 
 #include "base/vec.h"
 #include "tests/fuzz/fuzz.h"
+#include "tools/session_defs.h"
 
 #define EDITS_MAX 8
 #define MOVES_MAX 12
@@ -65,13 +66,26 @@ static int32_t take_int(source *s)
   return fabs(value) < 2147483647.0 ? (int32_t)value : INT32_MIN; /* false for NaN */
 }
 
-static void edit_session(source *s, hap_session_def *def)
+typedef struct session_defs {
+  hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
+} session_defs;
+
+static void edit_session(source *s, session_defs *defs)
 {
-  double *const doubles[] = {&def->physics_hz, &def->contact_hz, &def->haptic_hz};
-  int32_t *const integers[] = {
-      &def->max_bodies,      &def->max_contacts,          &def->max_pointers,
-      &def->rt_priority,     &def->physics_latency_ticks, &def->trace_rows,
-      &def->max_edge_probes, &def->max_hull_points};
+  hap_session_def *def = &defs->def;
+  hap_expert_def *expert = &defs->expert;
+  hap_research_def *research = &defs->research;
+  double *const doubles[] = {&def->physics_hz, &expert->contact_hz, &def->haptic_hz};
+  int32_t *const integers[] = {&def->max_bodies,
+                               &def->max_contacts,
+                               &def->max_pointers,
+                               &def->rt_priority,
+                               &research->physics_latency_ticks,
+                               &expert->trace_rows,
+                               &expert->max_edge_probes,
+                               &expert->max_hull_points};
   uint8_t field = take_byte(s) % 16;
   if (field < 3) {
     *doubles[field] = take_double(s);
@@ -80,36 +94,33 @@ static void edit_session(source *s, hap_session_def *def)
   } else if (field == 11) {
     def->model = (hap_model)(take_byte(s) % 5);
   } else if (field == 12) {
-    def->impulse_pose = (hap_impulse_pose)(take_byte(s) % 3);
+    research->impulse_pose = (hap_impulse_pose)(take_byte(s) % 3);
   } else if (field == 13) {
     unsigned byte = take_byte(s);
-    def->probe = (hap_probe)(byte % 5);
-    def->effects[HAP_EFFECT_CROSS] = (uint8_t)(byte / 5 % 3);
+    research->probe = (hap_probe)(byte % 5);
+    expert_wish(expert, HAP_EFFECT_CROSS, (hap_effect_wish)(byte / 5 % 3));
   } else if (field == 14) {
     unsigned byte = take_byte(s);
-    def->effects[byte % HAP_EFFECT_PLACES] = (uint8_t)(byte / HAP_EFFECT_PLACES % 4);
+    uint32_t *mask = (byte & 32u) != 0 ? &expert->effects_on : &expert->effects_off;
+    *mask ^= UINT32_C(1) << byte % 32u;
   } else {
     unsigned byte = take_byte(s);
-    double *const dials[] = {&def->accuracy, &def->force_error_wanted, &def->tick_share,
-                             &def->physics_share};
-    if (byte < 128) {
-      def->flags = byte;
-    } else {
-      *dials[byte % 4] = take_double(s);
-    }
+    double *const dials[] = {&def->accuracy, &expert->force_error_wanted, &expert->tick_share,
+                             &expert->physics_share, &def->budget};
+    *dials[byte % 5] = take_double(s);
   }
 }
 
 /* What is allowed and only costs time and memory is made smaller. */
-static void keep_small(hap_session_def *def)
+static void keep_small(hap_session_def *def, hap_expert_def *expert)
 {
   const struct {
     int32_t *value;
     int32_t limit;
   } sizes[] = {{&def->max_bodies, 1024},
                {&def->max_contacts, 4096},
-               {&def->trace_rows, 1048576},
-               {&def->max_hull_points, 1048576}};
+               {&expert->trace_rows, 1048576},
+               {&expert->max_hull_points, 1048576}};
   for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
     if (*sizes[i].value > 40 && *sizes[i].value <= sizes[i].limit) {
       *sizes[i].value = 40;
@@ -120,7 +131,7 @@ static void keep_small(hap_session_def *def)
 static void edit_pointer(source *s, hap_pointer_def *def)
 {
   double *const doubles[] = {&def->radius,
-                             &def->mass,
+                             &def->finger_radius,
                              &def->stiffness,
                              &def->damping,
                              &def->friction,
@@ -156,54 +167,56 @@ static void build(place *p)
 /* What the header promises of a def that was taken. */
 static void check_def(const hap_session_def *def)
 {
+  const hap_expert_def *expert = def->expert;
+  const hap_research_def *research = def->research;
   const double ranges[][3] = {
       {def->physics_hz, 1.0, fmin(1000.0, def->haptic_hz)},
-      {def->contact_hz, def->contact_hz == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 20.0, 1000.0},
+      {expert->contact_hz, expert->contact_hz == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 20.0, 1000.0},
       {def->accuracy, 0.0, 1.0},
       {def->haptic_hz, 100.0, 20000.0},
       {def->max_bodies, 1, 1024},
       {def->max_contacts, 1, 4096},
       {def->max_pointers, 1, 16},
       {def->rt_priority, 0, 99},
-      {def->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
-      {def->trace_rows, 0, 1048576},
-      {def->max_edge_probes, def->max_edge_probes == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 0, 1024},
-      {def->max_hull_points, 0, 1048576},
+      {research->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
+      {expert->trace_rows, 0, 1048576},
+      {expert->max_edge_probes, expert->max_edge_probes == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 0,
+       1024},
+      {expert->max_hull_points, 0, 1048576},
       {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
-      {def->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
-      {def->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY},
-      {def->flags, 0, 0},
+      {research->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
+      {research->probe, HAP_PROBE_SHARED, HAP_PROBE_BY_ACCURACY},
+      {def->budget, 0.0, 1.0},
   };
   for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; ++i) {
     FUZZ_CHECK(ranges[i][0] >= ranges[i][1] && ranges[i][0] <= ranges[i][2]);
   }
-  for (int i = 0; i < HAP_EFFECT_PLACES; ++i) {
-    FUZZ_CHECK(def->effects[i] <= (i < HAP_EFFECTS ? HAP_EFFECT_ON : HAP_EFFECT_AUTO));
-  }
+  FUZZ_CHECK((expert->effects_on & expert->effects_off) == 0);
+  FUZZ_CHECK(((expert->effects_on | expert->effects_off) >> HAP_EFFECTS) == 0);
 }
 
 static bool create(source *s, place *p)
 {
-  hap_session_def def;
+  session_defs defs;
   hap_ode_def ode;
   hap_detail detail;
-  hap_session_def_init(&def, sizeof def);
+  session_defs_init(&defs.def, &defs.expert, &defs.research);
   hap_ode_def_init(&ode, sizeof ode);
-  def.drive = HAP_DRIVE_LOCKSTEP;
-  def.max_bodies = 8; /* less memory to clear: more inputs a second */
-  def.max_contacts = 32;
-  def.max_hull_points = 32;
+  defs.def.drive = HAP_DRIVE_LOCKSTEP;
+  defs.def.max_bodies = 8; /* less memory to clear: more inputs a second */
+  defs.def.max_contacts = 32;
+  defs.expert.max_hull_points = 32;
   ode.world = p->world;
   ode.space = p->space;
   for (int edits = take_byte(s) % EDITS_MAX; edits > 0; --edits) {
-    edit_session(s, &def);
+    edit_session(s, &defs);
   }
-  keep_small(&def);
+  keep_small(&defs.def, &defs.expert);
   fuzz_detail_spoil(&detail);
-  hap_status status = hap_session_create(&def, &ode, &p->session, &detail);
+  hap_status status = hap_session_create(&defs.def, &ode, &p->session, &detail);
   fuzz_check_answer(status, p->session, &detail);
   if (status >= HAP_OK) {
-    check_def(&def);
+    check_def(&defs.def);
   }
   return status >= HAP_OK;
 }

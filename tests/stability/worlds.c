@@ -110,10 +110,10 @@ void world_open(world *w)
   dWorldSetERP(w->world, 0.2);
   dWorldSetContactSurfaceLayer(w->world, WORLD_LAYER);
   dWorldSetQuickStepNumIterations(w->world, 50);
-  hap_session_def_init(&w->def, sizeof w->def);
-  hap_pointer_def_init(&w->pointer, sizeof w->pointer);
+  session_defs_init(&w->def, &w->expert, &w->research);
+  pointer_defs_init(&w->pointer, &w->pointer_expert, &w->pointer_research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
-  w->def.guard = HAP_GUARD_MEASURE; /* it would hide what is looked for */
+  w->research.guard = HAP_GUARD_MEASURE; /* it would hide what is looked for */
   w->def.max_pointers = WORLD_HANDS_MAX;
   w->def.physics_hz = 60.0;
 }
@@ -159,8 +159,9 @@ static void take_parameters(world *w, const case_row *row, hap_model model)
   w->pointer.max_force = 1e6; /* the device's limit is the one that counts */
   dWorldSetCFM(w->world, row->cfm < 0.0 ? 0.0 : row->cfm > 0.0 ? row->cfm : 1e-12);
   if (row->coupling_stiffness > 0.0 && model == HAP_MODEL_CONTACT) {
-    w->pointer.coupling = row->coupling != HAP_COUPLING_DIRECT ? row->coupling : HAP_COUPLING_PROXY;
-    w->pointer.coupling_stiffness = row->coupling_stiffness;
+    w->pointer_expert.coupling =
+        row->coupling != HAP_COUPLING_DIRECT ? row->coupling : HAP_COUPLING_PROXY;
+    w->pointer_expert.coupling_stiffness = row->coupling_stiffness;
   }
 }
 

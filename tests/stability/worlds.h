@@ -10,6 +10,7 @@
 #include <hapode/ode.h>
 
 #include "scenes/scenes.h"
+#include "tools/session_defs.h"
 
 #define WORLD_BODIES_MAX 128
 #define WORLD_HANDS_MAX 8
@@ -35,7 +36,11 @@ typedef struct world {
   double origin[3]; /* m, of all that a builder places */
   dSurfaceParameters surface;
   hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_pointer_def pointer;
+  hap_pointer_expert_def pointer_expert;
+  hap_pointer_research_def pointer_research;
   char motions[WORLD_HANDS_MAX][320]; /* arguments of the virtual device */
   int hand_count;
   double device_damping; /* N s/m */

@@ -1,0 +1,41 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_POINTER_SETUP_H
+#define HAPODE_BASE_POINTER_SETUP_H
+
+#include <hapode/expert.h>
+#include <hapode/pointer.h>
+#include <hapode/research.h>
+
+/* A pointer's three structs of the API in one, as checked by lib/session. Recordings hold it: a member
+ * that moves needs another version of the file. Units and ranges are those of the API. */
+typedef struct hapi_pointer_setup {
+  uint32_t size;   /* of this struct */
+  uint32_t cookie; /* that of hap_pointer_def: a mark in recordings */
+  hap_device *device;
+  double radius;
+  double proxy_mass;
+  double stiffness;
+  double damping;
+  double friction;
+  const double *hull_xyz;
+  size_t hull_points;
+  hap_pose pose_world_device;
+  double motion_scale;
+  double force_scale;
+  double max_force;
+  double max_torque;
+  hap_coupling coupling;
+  uint32_t collide_bits;
+  hap_velocity velocity;
+  hap_integration integration;
+  double coupling_stiffness;
+  double coupling_damping;
+  double hand_damping;
+  double max_slew;
+  double finger_radius;
+  double virtual_mass;
+  double virtual_inertia;
+} hapi_pointer_setup;
+
+#endif
