@@ -227,7 +227,7 @@ TEST(a_body_is_touched_at_two_geoms)
   dGeomSetOffsetPosition(ball, 0.04, 0, 0.01 + RADIUS + 0.002);
   REQUIRE(world_start(&w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002));
   CHECK(world_count_contacts(&w) == 2);
-  CHECK(hapi_neighbors_bodies(world_physics(&w)) == 1);
+  CHECK(hapi_neighbors_bodies(&world_physics(&w)->near) == 1);
   hapi_physics *physics = world_physics(&w);
   double sum = 0.0;
   for (uint32_t i = 0; i < 2; ++i) {

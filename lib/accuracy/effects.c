@@ -87,8 +87,8 @@ static void note_testing(const sight *s, const hapi_model_body *body)
 
 static void note_range(const sight *s, const hapi_model_body *body)
 {
-  const hapi_known_body *known = &s->bodies->entries[s->near->slots.bodies[body->slot].known];
-  bool seed = known->rest->chosen_in == s->cycle->model_number;
+  uint32_t known = s->near->slots.bodies[body->slot].known;
+  bool seed = hapi_nearby_chose(s->near, known, s->cycle->model_number);
   if (!seed && roles(body) != HAPI_BODY_DRIVEN) {
     hapi_effect_note(figures(s, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
                      HAP_REASON_OUTSIDE);

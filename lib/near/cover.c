@@ -4,7 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/clock.h"
-#include "physics/physics_internal.h"
+#include "near/cover.h"
 
 /* Many small questions to a space, answered from one. ODE's hash space looks at each of its geoms to find
  * those near one, so a walk over dozens of bodies would cost dozens of passes over the world. Here
@@ -14,19 +14,19 @@
 
 #define GROWTH 0.5 /* of its length on each side: a walk that leaves the box asks few times more */
 
-static bool holds(const dReal outer[6], const dReal inner[6])
+static bool box_holds(const dReal outer[6], const dReal inner[6])
 {
   return outer[0] <= inner[0] && inner[1] <= outer[1] && outer[2] <= inner[2] &&
          inner[3] <= outer[3] && outer[4] <= inner[4] && inner[5] <= outer[5];
 }
 
-static bool meet(const dReal a[6], const dReal b[6])
+static bool boxes_meet(const dReal a[6], const dReal b[6])
 {
   return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
          b[4] <= a[5];
 }
 
-static void unite(dReal box[6], bool *has, const dReal other[6])
+static void box_unite(dReal box[6], bool *has, const dReal other[6])
 {
   for (int k = 0; k < 6; k += 2) {
     box[k] = !*has || other[k] < box[k] ? other[k] : box[k];
@@ -77,11 +77,11 @@ static void note_geom(void *data, dGeomID a, dGeomID b)
 }
 
 /* Asks for what was covered before and the new box, with room around it. */
-static void fill(hapi_cover *cover, dSpaceID space, const dReal box[6])
+static void cover_fill(hapi_cover *cover, dSpaceID space, const dReal box[6])
 {
   dReal length[3];
   dReal middle[3];
-  unite(cover->box, &cover->has_box, box);
+  box_unite(cover->box, &cover->has_box, box);
   for (int k = 0; k < 3; ++k) {
     length[k] = (1.0 + 2.0 * GROWTH) * (cover->box[2 * k + 1] - cover->box[2 * k]);
     middle[k] = 0.5 * (cover->box[2 * k] + cover->box[2 * k + 1]);
@@ -103,17 +103,17 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
 {
   dReal box[6];
   dGeomGetAABB(geom, box);
-  unite(cover->asked, &cover->has_asked, box);
-  if (!cover->filled || !holds(cover->box, box)) {
-    fill(cover, space, box);
+  box_unite(cover->asked, &cover->has_asked, box);
+  if (!cover->filled || !box_holds(cover->box, box)) {
+    cover_fill(cover, space, box);
   }
   if (!cover->filled ||
-      !holds(cover->box, box)) { /* no memory, or so far out that it is rounded off */
+      !box_holds(cover->box, box)) { /* no memory, or so far out that it is rounded off */
     dSpaceCollide2(geom, (dGeomID)space, data, callback);
     return;
   }
   for (uint32_t i = 0; i < cover->count; ++i) {
-    if (meet(cover->found[i].box, box)) {
+    if (boxes_meet(cover->found[i].box, box)) {
       callback(data, geom, cover->found[i].geom);
     }
   }

@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "near/near.h"
 
 /* Triangles of static meshes near a box. ODE's own search keeps a cache that the whole process
  * shares, and gives contacts, not triangles; so the triangles are read once, in the order of the
@@ -155,7 +156,7 @@ static void box_to_geom(dGeomID geom, const double box[6], double out[6])
 
 /* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
 
-static const double *corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
+static const double *edge_corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
 {
   return meshes->found[edge / 3].corners + (size_t)3 * ((edge % 3 + which) % 3);
 }
@@ -167,10 +168,10 @@ static bool same_point(const double *a, const double *b)
 
 static bool same_edge(const hapi_meshes *meshes, uint32_t a, uint32_t b)
 {
-  const double *p = corner(meshes, a, 0);
-  const double *q = corner(meshes, a, 1);
-  const double *r = corner(meshes, b, 0);
-  const double *s = corner(meshes, b, 1);
+  const double *p = edge_corner(meshes, a, 0);
+  const double *q = edge_corner(meshes, a, 1);
+  const double *r = edge_corner(meshes, b, 0);
+  const double *s = edge_corner(meshes, b, 1);
   return (same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s));
 }
 
@@ -182,7 +183,7 @@ static uint32_t edge_hash(const hapi_meshes *meshes, uint32_t edge)
     uint64_t mixed = 0;
     for (int k = 0; k < 3; ++k) {
       uint64_t bits;
-      memcpy(&bits, &corner(meshes, edge, end)[k], sizeof bits);
+      memcpy(&bits, &edge_corner(meshes, edge, end)[k], sizeof bits);
       mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
       mixed ^= mixed >> 32;
     }
@@ -192,7 +193,7 @@ static uint32_t edge_hash(const hapi_meshes *meshes, uint32_t edge)
 }
 
 /* Whether the triangle of edge `other` lies level with that of `edge` or above it. */
-static bool closes(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
+static bool edge_is_closed_by(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
 {
   const double *triangle = meshes->found[edge / 3].corners;
   double sides[2][3];
@@ -201,21 +202,22 @@ static bool closes(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
   hapi_v3_sub(triangle + 3, triangle, sides[0]);
   hapi_v3_sub(triangle + 6, triangle, sides[1]);
   hapi_v3_cross(sides[0], sides[1], normal);
-  hapi_v3_sub(corner(meshes, other, 2), corner(meshes, edge, 0), rise);
+  hapi_v3_sub(edge_corner(meshes, other, 2), edge_corner(meshes, edge, 0), rise);
   return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
 }
 
 static void meet_edge(hapi_meshes *meshes, uint32_t edge)
 {
+  HAPI_ASSERT_INDEX(edge, 3 * HAPI_NEAR_TRIANGLES); /* less than half of the places */
   uint32_t mask = HAPI_EDGE_PLACES - 1;
   uint32_t at = edge_hash(meshes, edge) & mask;
   for (; meshes->places[at] != 0; at = (at + 1) & mask) {
     uint32_t other = meshes->places[at] - 1;
     if (same_edge(meshes, edge, other)) {
-      if (closes(meshes, edge, other)) {
+      if (edge_is_closed_by(meshes, edge, other)) {
         meshes->found[edge / 3].open_edges &= ~(1u << (edge % 3));
       }
-      if (closes(meshes, other, edge)) {
+      if (edge_is_closed_by(meshes, other, edge)) {
         meshes->found[other / 3].open_edges &= ~(1u << (other % 3));
       }
     }
@@ -237,6 +239,7 @@ static void find_open_edges(hapi_meshes *meshes, uint32_t count)
 static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
                              hapi_meshes *meshes, uint32_t found)
 {
+  HAPI_ASSERT(chunk * CHUNK < mesh->count && found <= FOUND_MAX);
   uint32_t end = (chunk + 1) * CHUNK < mesh->count ? (chunk + 1) * CHUNK : mesh->count;
   for (uint32_t i = chunk * CHUNK; i < end && found < FOUND_MAX; ++i) {
     const double *corners = mesh->corners + (size_t)9 * i;
@@ -252,14 +255,14 @@ static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double
   return found;
 }
 
-uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6])
+uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6])
 {
-  hapi_meshes *meshes = &physics->near.meshes;
-  const hapi_mesh *mesh = find_mesh(meshes, geom, physics->near.range.number);
+  hapi_meshes *meshes = &nearby->meshes;
+  const hapi_mesh *mesh = find_mesh(meshes, geom, nearby->range.number);
   double local[6];
   uint32_t found = 0;
   if (mesh == NULL) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+    ++nearby->counts.dropped;
     return FOUND_MAX; /* ODE collides it: a body that the loop moved would fall through */
   }
   box_to_geom(geom, box, local);

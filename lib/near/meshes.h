@@ -9,7 +9,7 @@
 
 #include <ode/ode.h>
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_nearby hapi_nearby;
 
 #define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
 #define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
@@ -40,7 +40,7 @@ typedef struct hapi_meshes {
 /* Triangles of a static mesh that meet a box of the world, into near.meshes.found;
  * HAPI_NEAR_TRIANGLES: there may be more, or there is no memory for them, and they are not to be
  * used. */
-uint32_t hapi_mesh_near(hapi_physics *physics, dGeomID geom, const double box[6]);
+uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6]);
 void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
 void hapi_meshes_finish(hapi_meshes *meshes);
 

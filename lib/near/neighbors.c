@@ -6,10 +6,11 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "near/near.h"
 
 /* Neighbours: the bodies that a pointer may touch before the next sync (paper section 4.1). In two
  * passes. Before the global step the space is asked for what is near; its geoms are clean then, and
@@ -23,21 +24,20 @@ double hapi_neighbors_reach(double relative_speed, double horizon_s)
   return REACH_FLOOR + relative_speed * horizon_s + REACH_ACCELERATION * horizon_s * horizon_s;
 }
 
-static double fastest_body(const hapi_physics *physics)
+static double fastest_body(const hapi_nearby *nearby)
 {
-  double fastest = physics->world.bodies.fastest;
-  for (uint32_t i = 0; i < physics->near.slots.body_high;
-       ++i) { /* what the loop moved since the scan */
-    uint32_t known = physics->near.slots.bodies[i].known;
+  double fastest = nearby->world->bodies.fastest;
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) { /* what the loop moved since the scan */
+    uint32_t known = nearby->slots.bodies[i].known;
     double speed =
-        known != HAPI_NONE ? hapi_extent_speed(&physics->world.bodies.entries[known]) : 0.0;
+        known != HAPI_NONE ? hapi_extent_speed(&nearby->world->bodies.entries[known]) : 0.0;
     fastest = speed > fastest ? speed : fastest;
   }
   return fastest;
 }
 
 /* How many geoms are near is the world's affair: the lists grow as they must. */
-static bool grow(hapi_neighbors *hood)
+static bool grow_lists(hapi_neighbors *hood)
 {
   uint32_t capacity = 2 * hood->candidate_capacity;
   hapi_candidate *candidates = hapi_alloc_array(capacity, sizeof *candidates);
@@ -58,41 +58,42 @@ static bool grow(hapi_neighbors *hood)
 
 static void collect_geom(void *data, dGeomID a, dGeomID b)
 {
-  hapi_physics *physics = data;
-  hapi_neighbors *hood = &physics->near.neighbors;
+  hapi_nearby *nearby = data;
+  hapi_neighbors *hood = &nearby->neighbors;
   dGeomID geom = a == hood->probe_geom ? b : a;
   if (dGeomIsSpace(geom)) {
     dSpaceCollide2(hood->probe_geom, geom, data, collect_geom);
     return;
   }
   const hapi_state_pointer *pointer =
-      &hapi_state_pointers(physics->cycle.state)[hood->current_pointer];
+      &hapi_state_pointers(nearby->cycle->state)[hood->current_pointer];
   if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass ||
       (dGeomGetCategoryBits(geom) & pointer->collide_bits) == 0) {
     return;
   }
-  if (hood->candidate_count == hood->candidate_capacity && !grow(hood)) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  if (hood->candidate_count == hood->candidate_capacity && !grow_lists(hood)) {
+    ++nearby->counts.dropped;
     return;
   }
+  HAPI_ASSERT(hood->candidate_count < hood->candidate_capacity);
   hapi_candidate *candidate = &hood->candidates[hood->candidate_count++];
   candidate->geom = geom;
   candidate->pointer = hood->current_pointer;
   candidate->reach = hood->current_reach;
 }
 
-void hapi_neighbors_collect(hapi_physics *physics)
+void hapi_neighbors_collect(hapi_nearby *nearby)
 {
-  hapi_neighbors *hood = &physics->near.neighbors;
+  hapi_neighbors *hood = &nearby->neighbors;
   hood->candidate_count = 0;
-  if (physics->cycle.state == NULL) {
+  if (nearby->cycle->state == NULL) {
     return;
   }
-  const hapi_state_pointer *pointers = hapi_state_pointers(physics->cycle.state);
-  double fastest = fastest_body(physics);
+  const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
+  double fastest = fastest_body(nearby);
   hood->fastest = fastest;
   hapi_cover_begin(&hood->cover);
-  for (uint32_t i = 0; i < physics->cycle.state->pointer_count; ++i) {
+  for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
     if (pointers[i].generation == 0) {
       continue;
     }
@@ -101,14 +102,14 @@ void hapi_neighbors_collect(hapi_physics *physics)
     double size = is_tool ? pointers[i].extent : pointers[i].radius;
     double speed = fastest + hapi_v3_norm(pointers[i].twist.linear);
     speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
-    double reach = hapi_neighbors_reach(speed, 2.0 * physics->cycle.probe_step_s);
+    double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s);
     hood->current_pointer = i;
     hood->current_reach = reach;
     dGeomSphereSetRadius(hood->probe_geom, size + reach);
     dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
     dGeomSetCollideBits(hood->probe_geom, ~0ul);
     dGeomSetCategoryBits(hood->probe_geom, ~0ul);
-    hapi_cover_ask(&hood->cover, physics->world.ode.space, hood->probe_geom, physics, collect_geom);
+    hapi_cover_ask(&hood->cover, nearby->world->ode.space, hood->probe_geom, nearby, collect_geom);
   }
 }
 
@@ -133,18 +134,18 @@ double hapi_neighbors_spin(dGeomID geom, double distance)
 /* Nearest points for where the pointer will be at the time of the model, which is later than now in
  * model IMPULSE; where that would put its centre inside the body, for where it is now: the far face
  * must not be taken for the near one. */
-static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate, hapi_nearest *out)
+static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_nearest *out)
 {
   const hapi_state_pointer *pointer =
-      &hapi_state_pointers(physics->cycle.state)[candidate->pointer];
-  double horizon = physics->cycle.probe_step_s;
-  double ahead = hapi_physics_steps_to_now(physics) ? 0.0 : horizon;
+      &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
+  double horizon = nearby->cycle->probe_step_s;
+  double ahead = hapi_cycle_steps_to_now(nearby->cycle) ? 0.0 : horizon;
   double there[3];
   hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
   bool found =
-      hapi_geom_nearest(physics, candidate->geom, there, pointer->radius, candidate->reach, out);
+      hapi_geom_nearest(nearby, candidate->geom, there, pointer->radius, candidate->reach, out);
   if (!found || out->distance < -pointer->radius) {
-    found = hapi_geom_nearest(physics, candidate->geom, pointer->pose.position, pointer->radius,
+    found = hapi_geom_nearest(nearby, candidate->geom, pointer->pose.position, pointer->radius,
                               candidate->reach, out);
   }
   return found && out->distance <=
@@ -152,15 +153,15 @@ static bool find_nearest(hapi_physics *physics, const hapi_candidate *candidate,
                           hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
 }
 
-static bool find_hit(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out)
+static bool find_hit(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out)
 {
   out->tool_count = 0;
-  return hapi_state_pointers(physics->cycle.state)[candidate->pointer].is_tool != 0
-             ? hapi_tool_find(physics, candidate, out)
-             : find_nearest(physics, candidate, &out->nearest);
+  return hapi_state_pointers(nearby->cycle->state)[candidate->pointer].is_tool != 0
+             ? hapi_tool_find(nearby, candidate, out)
+             : find_nearest(nearby, candidate, &out->nearest);
 }
 
-static int by_distance(const void *a, const void *b)
+static int hit_by_distance(const void *a, const void *b)
 {
   double x = ((const hapi_hit *)a)->nearest.distance;
   double y = ((const hapi_hit *)b)->nearest.distance;
@@ -171,17 +172,17 @@ static int by_distance(const void *a, const void *b)
 #define SAME_PLANE_COSINE 0.7
 
 /* The shape itself, in the body's frame, for the loop to ask. */
-static void place_shape(const hapi_physics *physics, dGeomID geom, hapi_contact_slot *slot)
+static void place_shape(const hapi_nearby *nearby, dGeomID geom, hapi_contact_slot *slot)
 {
   dBodyID body = dGeomGetBody(geom);
   hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  hap_effect_wish wish = hapi_wish(physics->cycle.wishes, HAP_EFFECT_SHAPE);
+  hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
   slot->has_shape = hapi_shape_of_geom(geom, &slot->shape, &world);
   slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
                        : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
                                                               : HAP_REASON_CALLED;
   if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
-      !physics->cycle.settings.shapes) {
+      !nearby->cycle->settings.shapes) {
     slot->shape_reason = HAP_REASON_ACCURACY;
   }
   if (wish == HAP_EFFECT_OFF ||
@@ -200,33 +201,35 @@ static void place_shape(const hapi_physics *physics, dGeomID geom, hapi_contact_
 #define FRICTION_MOST 10.0 /* as between bodies */
 
 /* What the application says of the pair. */
-static double friction_of(hapi_physics *physics, const hapi_hit *hit,
-                          const hapi_state_pointer *pointer)
+static double hit_friction(hapi_nearby *nearby, const hapi_hit *hit,
+                           const hapi_state_pointer *pointer)
 {
   double mu = pointer->friction;
-  if (hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_FRICTION)) {
+  if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_FRICTION)) {
     return 0.0;
   }
-  if (physics->world.ode.pointer_surface == NULL) {
+  if (nearby->world->ode.pointer_surface == NULL) {
     return mu;
   }
   hap_pointer_id id = {((uint64_t)pointer->generation << 32) | (hit->pointer + 1)};
-  physics->world.ode.pointer_surface(physics->world.ode.user, id, hit->geom, &mu);
+  nearby->world->ode.pointer_surface(nearby->world->ode.user, id, hit->geom, &mu);
   if (!(mu >= 0.0 && mu <= DBL_MAX)) { /* NaN too */
-    physics->config.report(physics->config.user, HAP_FAULT_WORLD,
-                           "the pointer_surface callback gave a friction that is not finite or "
-                           "below 0: the pointer slides on the geom without any");
+    nearby->cycle->config->report(
+        nearby->cycle->config->user, HAP_FAULT_WORLD,
+        "the pointer_surface callback gave a friction that is not finite or "
+        "below 0: the pointer slides on the geom without any");
     return 0.0;
   }
   return fmin(mu, FRICTION_MOST);
 }
 
-static void place_contact(const hapi_physics *physics, hapi_contact_slot *slot, const hapi_hit *hit,
+static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
   dBodyID body = dGeomGetBody(hit->geom);
   double normal[3];
   hapi_v3_copy(hit->nearest.point_b, slot->point_body);
+  HAPI_ASSERT_UNIT(hit->nearest.normal);
   hapi_v3_copy(hit->nearest.normal, normal);
   if (body != NULL) {
     const dReal *q = dBodyGetQuaternion(body);
@@ -237,7 +240,7 @@ static void place_contact(const hapi_physics *physics, hapi_contact_slot *slot, 
     ++slot->generation;
     memset(slot->last_force, 0, sizeof slot->last_force);
   }
-  place_shape(physics, hit->geom, slot);
+  place_shape(nearby, hit->geom, slot);
   hapi_v3_copy(normal, slot->normal_body);
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
@@ -247,39 +250,39 @@ static void place_contact(const hapi_physics *physics, hapi_contact_slot *slot, 
   slot->finger_radius = pointer->finger_radius;
 }
 
-static uint32_t known_of(const hapi_physics *physics, const hapi_hit *hit)
+static uint32_t body_of_hit(const hapi_nearby *nearby, const hapi_hit *hit)
 {
-  return hapi_bodies_find(&physics->world.bodies, dGeomGetBody(hit->geom));
+  return hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(hit->geom));
 }
 
-static uint32_t contacts_of(const hapi_hit *hit)
+static uint32_t hit_contacts(const hapi_hit *hit)
 {
   return hit->tool_count > 0 ? hit->tool_count : 1;
 }
 
 /* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
  * those lose them then. */
-static uint32_t choose(hapi_physics *physics, uint32_t count)
+static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
 {
-  hapi_hit *hits = physics->near.neighbors.hits;
+  hapi_hit *hits = nearby->neighbors.hits;
   uint32_t bodies = 0;
   uint32_t chosen = 0;
   uint32_t contacts = 0;
   for (uint32_t i = 0; i < count; ++i) {
     bool has_body = dGeomGetBody(hits[i].geom) != NULL;
-    uint32_t index = known_of(physics, &hits[i]);
-    hapi_known_body *known = index != HAPI_NONE ? &physics->world.bodies.entries[index] : NULL;
-    bool counted = known != NULL && known->rest->chosen_in == physics->cycle.model_number + 1;
-    uint32_t more = contacts_of(&hits[i]);
-    bool room = contacts + more <= physics->config.capacity.contacts &&
-                (!has_body || known != NULL) &&
-                (known == NULL || counted || bodies < physics->config.max_bodies);
+    uint32_t index = body_of_hit(nearby, &hits[i]);
+    bool known = index != HAPI_NONE;
+    bool counted = known && hapi_nearby_chose(nearby, index, nearby->cycle->model_number + 1);
+    uint32_t more = hit_contacts(&hits[i]);
+    bool room = contacts + more <= nearby->cycle->config->capacity.contacts &&
+                (!has_body || known) &&
+                (!known || counted || bodies < nearby->cycle->config->max_bodies);
     if (!room) {
-      ++physics->counts.own.stats.model.capacity_dropped;
+      ++nearby->counts.dropped;
       continue;
     }
-    if (known != NULL && !counted) {
-      known->rest->chosen_in = physics->cycle.model_number + 1;
+    if (known && !counted) {
+      nearby->visits[index].chosen_in = nearby->cycle->model_number + 1;
       ++bodies;
     }
     contacts += more;
@@ -289,17 +292,17 @@ static uint32_t choose(hapi_physics *physics, uint32_t count)
 }
 
 /* What the chosen hits have already is kept from those that need a new place. */
-static void keep_places(hapi_physics *physics, const hapi_hit *hit)
+static void keep_places(hapi_nearby *nearby, const hapi_hit *hit)
 {
-  uint32_t index = known_of(physics, hit);
-  uint32_t slot = index != HAPI_NONE ? physics->world.bodies.entries[index].slot : HAPI_SLOT_NONE;
-  uint32_t generation = hapi_state_pointers(physics->cycle.state)[hit->pointer].generation;
+  uint32_t index = body_of_hit(nearby, hit);
+  uint32_t slot = index != HAPI_NONE ? nearby->world->bodies.entries[index].slot : HAPI_SLOT_NONE;
+  uint32_t generation = hapi_state_pointers(nearby->cycle->state)[hit->pointer].generation;
   if (hit->tool_count > 0) {
-    hapi_tool_keep_places(physics, hit, slot);
+    hapi_tool_keep_places(nearby, hit, slot);
     return;
   }
   hapi_contact_slot *contact =
-      hapi_slots_find_contact(physics, slot, hit->geom, hit->pointer, generation);
+      hapi_slots_find_contact(nearby, slot, hit->geom, hit->pointer, generation);
   if (contact != NULL) {
     contact->wanted = true;
   }
@@ -314,73 +317,76 @@ static void take_body(hapi_body_slot *local, dBodyID body)
                                          : 0;
 }
 
-static void take_hit(hapi_physics *physics, hapi_hit *hit)
+static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
 {
   dBodyID body = dGeomGetBody(hit->geom);
-  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->cycle.state)[hit->pointer];
-  uint32_t slot = body != NULL ? hapi_slots_body(physics, known_of(physics, hit)) : HAPI_SLOT_NONE;
+  const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
+  uint32_t slot = body != NULL ? hapi_slots_body(nearby, body_of_hit(nearby, hit)) : HAPI_SLOT_NONE;
   hapi_contact_slot *contact = NULL;
   if (hit->tool_count > 0 && (body == NULL || slot != HAPI_NONE)) {
-    hit->mu = friction_of(physics, hit, pointer);
-    hapi_tool_take(physics, hit, slot);
+    hit->mu = hit_friction(nearby, hit, pointer);
+    hapi_tool_take(nearby, hit, slot);
     if (body != NULL) {
-      take_body(&physics->near.slots.bodies[slot], body);
+      take_body(&nearby->slots.bodies[slot], body);
     }
     return;
   }
   if (body == NULL || slot != HAPI_NONE) {
-    contact = hapi_slots_contact(physics, slot, hit->geom, hit->pointer, pointer->generation);
+    contact = hapi_slots_contact(nearby, slot, hit->geom, hit->pointer, pointer->generation);
   }
   if (contact == NULL) {
-    ++physics->counts.own.stats.model
-          .capacity_dropped; /* until the loop has let go of an old slot */
+    ++nearby->counts.dropped; /* until the loop has let go of an old slot */
     return;
   }
   contact->wanted = true;
-  place_contact(physics, contact, hit, pointer);
-  contact->mu = friction_of(physics, hit, pointer);
+  place_contact(nearby, contact, hit, pointer);
+  contact->mu = hit_friction(nearby, hit, pointer);
   if (body != NULL) {
-    take_body(&physics->near.slots.bodies[slot], body);
+    take_body(&nearby->slots.bodies[slot], body);
   }
 }
 
-void hapi_neighbors_find(hapi_physics *physics)
+void hapi_neighbors_find(hapi_nearby *nearby)
 {
-  hapi_neighbors *hood = &physics->near.neighbors;
+  hapi_neighbors *hood = &nearby->neighbors;
   uint32_t count = 0;
-  physics->near.tools.count = 0;
-  hapi_slots_begin_model(physics);
+  nearby->tools.count = 0;
+  hapi_slots_begin_model(nearby);
+  if (!hapi_nearby_reserve_visits(nearby)) {
+    hood->candidate_count = 0; /* what cannot be noted is not near */
+  }
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
-    if (hood->candidates[i].geom != NULL && find_hit(physics, &hood->candidates[i], hit)) {
+    if (hood->candidates[i].geom != NULL && find_hit(nearby, &hood->candidates[i], hit)) {
       hit->geom = hood->candidates[i].geom;
       hit->pointer = hood->candidates[i].pointer;
       ++count;
     }
   }
-  qsort(hood->hits, count, sizeof *hood->hits, by_distance); /* nearest first, for capacity */
-  count = hood->hit_count = choose(physics, count);
+  qsort(hood->hits, count, sizeof *hood->hits, hit_by_distance); /* nearest first, for capacity */
+  HAPI_ASSERT(count <= hood->candidate_count);
+  count = hood->hit_count = choose_hits(nearby, count);
   for (uint32_t i = 0; i < count; ++i) {
-    keep_places(physics, &hood->hits[i]);
+    keep_places(nearby, &hood->hits[i]);
   }
   for (uint32_t i = 0; i < count; ++i) {
-    take_hit(physics, &hood->hits[i]);
+    take_hit(nearby, &hood->hits[i]);
   }
   int64_t begin_ns = hapi_clock_now();
-  hapi_range_walk(physics, count);
-  hapi_counts_range(
-      physics, 1e-9 * (double)(hapi_clock_now() - begin_ns) - physics->near.range.cover.boxes_s);
-  hapi_slots_end_model(physics);
+  hapi_range_walk(nearby, count);
+  nearby->counts.last_range_s =
+      1e-9 * (double)(hapi_clock_now() - begin_ns) - nearby->range.links.cover.boxes_s;
+  nearby->counts.range_s += nearby->counts.last_range_s;
+  hapi_slots_end_model(nearby);
 }
 
-uint32_t hapi_neighbors_bodies(const hapi_physics *physics)
+uint32_t hapi_neighbors_bodies(const hapi_nearby *nearby)
 {
   uint32_t count = 0;
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    const hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    count +=
-        slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
-        physics->world.bodies.entries[slot->known].rest->chosen_in == physics->cycle.model_number;
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    const hapi_body_slot *slot = &nearby->slots.bodies[i];
+    count += slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_DRIVEN) == 0 &&
+             hapi_nearby_chose(nearby, slot->known, nearby->cycle->model_number);
   }
   return count;
 }

@@ -13,7 +13,7 @@
 #include "proximity/proximity.h"
 #include "sync/messages.h"
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_nearby hapi_nearby;
 
 typedef struct hapi_candidate {
   dGeomID geom;
@@ -46,14 +46,14 @@ typedef struct hapi_neighbors {
   double current_reach;
 } hapi_neighbors;
 
-void hapi_neighbors_collect(hapi_physics *physics); /* before the global step */
-void hapi_neighbors_find(hapi_physics *physics);    /* after it: bodies and contacts of the model */
+void hapi_neighbors_collect(hapi_nearby *nearby); /* before the global step */
+void hapi_neighbors_find(hapi_nearby *nearby);    /* after it: bodies and contacts of the model */
 double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
                             const double point[3]);                   /* m/s, relative */
 double hapi_neighbors_reach(double relative_speed, double horizon_s); /* m */
 /* m/s, at a distance from the centre of the geom's body, by its turning */
 double hapi_neighbors_spin(dGeomID geom, double distance);
 /* Dynamic bodies that a pointer may touch, of the newest model. */
-uint32_t hapi_neighbors_bodies(const hapi_physics *physics);
+uint32_t hapi_neighbors_bodies(const hapi_nearby *nearby);
 
 #endif

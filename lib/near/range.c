@@ -4,9 +4,10 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "near/near.h"
 
 /* The range of model CONTACT: a walk from the neighbours over what they may touch before the next
  * sync, nearest first, until the loop's capacity is used. Each body gets one of four roles:
@@ -22,44 +23,47 @@
 #define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
 #define LINK_GRAVITY 9.81
 
-static uint32_t range_capacity(const hapi_physics *physics)
+static uint32_t range_capacity(const hapi_nearby *nearby)
 {
-  return physics->config.max_bodies;
+  return nearby->cycle->config->max_bodies;
 }
 
-static hapi_known_body *entry(hapi_physics *physics, uint32_t known)
+static const hapi_known_body *known_body(const hapi_nearby *nearby, uint32_t known)
 {
-  return &physics->world.bodies.entries[known];
+  return &nearby->world->bodies.entries[known];
 }
 
-static bool dynamic(dBodyID body)
+static bool is_dynamic(dBodyID body)
 {
   return body != NULL && !dBodyIsKinematic(body);
 }
 
 /* ---- the queue of the walk ---- */
 
-static bool enqueue(hapi_physics *physics, uint32_t known)
+static bool range_enqueue(hapi_nearby *nearby, uint32_t known)
 {
-  hapi_range *range = &physics->near.range;
-  hapi_known_body *body = entry(physics, known);
-  if (body->rest->ranged_in == range->number) {
+  hapi_range *range = &nearby->range;
+  const hapi_known_body *body = known_body(nearby, known);
+  HAPI_ASSERT_INDEX(known, nearby->visit_capacity);
+  hapi_visit *visit = &nearby->visits[known];
+  if (visit->ranged_in == range->number) {
     return true;
   }
-  uint32_t slot = hapi_slots_body(physics, known);
-  if (slot == HAPI_NONE || range->count == physics->config.capacity.bodies) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  uint32_t slot = hapi_slots_body(nearby, known);
+  if (slot == HAPI_NONE || range->count == nearby->cycle->config->capacity.bodies) {
+    ++nearby->counts.dropped;
     return false;
   }
-  hapi_body_slot *local = &physics->near.slots.bodies[slot];
-  body->rest->ranged_in = range->number;
-  body->rest->hops = range->hops;
+  hapi_body_slot *local = &nearby->slots.bodies[slot];
+  visit->ranged_in = range->number;
+  visit->hops = range->hops;
   local->wanted = true;
   local->linked = false;
   local->mass = hapi_body_mass(body->body);
   local->flags = dBodyIsKinematic(body->body)  ? HAPI_BODY_DRIVEN
                  : !dBodyIsEnabled(body->body) ? HAPI_BODY_RESTING
                                                : 0;
+  HAPI_ASSERT(range->count < nearby->cycle->config->capacity.bodies);
   range->queue[range->count++] = known;
   return true;
 }
@@ -72,13 +76,13 @@ static void fill_static(hapi_near_geom *out)
   out->generation = 0;
 }
 
-static bool fill_hull(hapi_physics *physics, dGeomID geom, hapi_near *near, hapi_near_geom *out)
+static bool fill_hull(hapi_nearby *nearby, dGeomID geom, hapi_near *near, hapi_near_geom *out)
 {
-  const double *points = physics->near.neighbors.hull;
+  const double *points = nearby->neighbors.hull;
   hapi_shape hull;
   hap_pose pose;
-  if (!hapi_hull_of_convex(physics, geom, &hull, &pose) ||
-      near->point_count + hull.hull_count > physics->config.capacity.hull_points) {
+  if (!hapi_hull_of_convex(nearby, geom, &hull, &pose) ||
+      near->point_count + hull.hull_count > nearby->cycle->config->capacity.hull_points) {
     return false;
   }
   dBodyID body = dGeomGetBody(geom);
@@ -98,14 +102,14 @@ static bool fill_hull(hapi_physics *physics, dGeomID geom, hapi_near *near, hapi
   return true;
 }
 
-static bool fill_geom(hapi_physics *physics, dGeomID geom, hapi_near_geom *out)
+static bool fill_geom(hapi_nearby *nearby, dGeomID geom, hapi_near_geom *out)
 {
-  hapi_near *near = physics->near.range.near;
+  hapi_near *near = nearby->range.near;
   dBodyID body = dGeomGetBody(geom);
   memset(out, 0, sizeof *out);
   fill_static(out);
   if (dGeomGetClass(geom) == dConvexClass) {
-    if (!fill_hull(physics, geom, near, out)) {
+    if (!fill_hull(nearby, geom, near, out)) {
       return false;
     }
   } else {
@@ -122,29 +126,29 @@ static bool fill_geom(hapi_physics *physics, dGeomID geom, hapi_near_geom *out)
     }
   }
   if (body != NULL) {
-    uint32_t slot = entry(physics, hapi_bodies_find(&physics->world.bodies, body))->slot;
+    uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
     out->body = slot;
-    out->generation = physics->near.slots.bodies[slot].generation;
+    out->generation = nearby->slots.bodies[slot].generation;
   }
   return true;
 }
 
 /* Index of a geom in the message; HAPI_NONE: no room, or no shape. */
-static uint32_t take_geom(hapi_physics *physics, dGeomID geom)
+static uint32_t take_geom(hapi_nearby *nearby, dGeomID geom)
 {
-  hapi_range *range = &physics->near.range;
+  hapi_range *range = &nearby->range;
   for (uint32_t i = 0; i < range->near->geom_count; ++i) {
     if (range->geoms[i] == geom) {
       return i;
     }
   }
-  if (range->near->geom_count == physics->config.capacity.geoms) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  if (range->near->geom_count == nearby->cycle->config->capacity.geoms) {
+    ++nearby->counts.dropped;
     return HAPI_NONE;
   }
   uint32_t index = range->near->geom_count;
-  if (!fill_geom(physics, geom, &hapi_near_geoms(range->near)[index])) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  if (!fill_geom(nearby, geom, &hapi_near_geoms(range->near)[index])) {
+    ++nearby->counts.dropped;
     return HAPI_NONE;
   }
   range->geoms[index] = geom;
@@ -154,7 +158,7 @@ static uint32_t take_geom(hapi_physics *physics, dGeomID geom)
 
 /* ---- pairs ---- */
 
-static uint64_t key_of(uint64_t a, uint64_t b, uint32_t part)
+static uint64_t pair_key(uint64_t a, uint64_t b, uint32_t part)
 {
   uint64_t both = hapi_index_mix(a) + hapi_index_mix(b); /* whichever of the two was met first */
   return hapi_index_mix(both) ^ hapi_index_mix(part + 1u);
@@ -162,42 +166,42 @@ static uint64_t key_of(uint64_t a, uint64_t b, uint32_t part)
 
 /* Where nobody said that a geom was destroyed: its body's slot has another generation, if the body has
  * gone, too. */
-static uint64_t holder_of(const hapi_near_geom *geom)
+static uint64_t geom_holder(const hapi_near_geom *geom)
 {
   return geom->body == HAPI_SLOT_NONE
              ? 0
              : hapi_index_mix(((uint64_t)geom->body << 32) | geom->generation);
 }
 
-static void add_pair(hapi_physics *physics, const hapi_link *link, uint32_t geom_b, uint32_t part)
+static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_b, uint32_t part)
 {
-  hapi_range *range = &physics->near.range;
+  hapi_range *range = &nearby->range;
   hapi_near *near = range->near;
-  uint32_t geom_a = take_geom(physics, link->own);
+  uint32_t geom_a = take_geom(nearby, link->own);
   bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
-      near->pair_count == physics->config.capacity.contacts) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+      near->pair_count == nearby->cycle->config->capacity.contacts) {
+    ++nearby->counts.dropped;
     return;
   }
   hapi_near_pair *pair = &hapi_near_pairs(near)[near->pair_count++];
   const hapi_near_geom *geoms = hapi_near_geoms(near);
-  pair->key = key_of(hapi_geom_names_get(&range->names, link->own, range->number),
-                     hapi_geom_names_get(&range->names, link->other, range->number), part) +
-              holder_of(&geoms[geom_a]) + holder_of(&geoms[geom_b]);
+  pair->key = pair_key(hapi_geom_names_get(&range->names, link->own, range->number),
+                       hapi_geom_names_get(&range->names, link->other, range->number), part) +
+              geom_holder(&geoms[geom_a]) + geom_holder(&geoms[geom_b]);
   pair->geom_a = turned ? geom_b : geom_a;
   pair->geom_b = turned ? geom_a : geom_b;
   pair->surface = link->surface;
 }
 
 /* Index of the triangle's geom in the message, in the static world; HAPI_NONE: no room. */
-static uint32_t add_triangle(hapi_physics *physics, const hapi_near_triangle *triangle)
+static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *triangle)
 {
-  hapi_range *range = &physics->near.range;
+  hapi_range *range = &nearby->range;
   hapi_near *near = range->near;
-  if (near->geom_count == physics->config.capacity.geoms ||
-      near->point_count + 3 > physics->config.capacity.hull_points) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  if (near->geom_count == nearby->cycle->config->capacity.geoms ||
+      near->point_count + 3 > nearby->cycle->config->capacity.hull_points) {
+    ++nearby->counts.dropped;
     return HAPI_NONE;
   }
   hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
@@ -216,31 +220,32 @@ static uint32_t add_triangle(hapi_physics *physics, const hapi_near_triangle *tr
 }
 
 /* The triangles of static ground near a geom, each as a geom of its own. */
-static void add_mesh(hapi_physics *physics, const hapi_link *link)
+static void add_mesh(hapi_nearby *nearby, const hapi_link *link)
 {
-  uint32_t count = hapi_mesh_near(physics, link->other, link->box);
+  uint32_t count = hapi_mesh_near(nearby, link->other, link->box);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    const hapi_near_triangle *triangle = &physics->near.meshes.found[i];
-    uint32_t geom = add_triangle(physics, triangle);
+    const hapi_near_triangle *triangle = &nearby->meshes.found[i];
+    uint32_t geom = add_triangle(nearby, triangle);
     if (geom == HAPI_NONE) {
       return;
     }
-    add_pair(physics, link, geom, triangle->index + 1);
+    add_pair(nearby, link, geom, triangle->index + 1);
   }
 }
 
 /* ---- pointers that are hulls ---- */
 
 /* Index of the pointer in the message. */
-static uint32_t take_tool(hapi_physics *physics, uint32_t pointer)
+static uint32_t take_tool(hapi_nearby *nearby, uint32_t pointer)
 {
-  hapi_near *near = physics->near.range.near;
-  const hapi_state_pointer *in = &hapi_state_pointers(physics->cycle.state)[pointer];
+  hapi_near *near = nearby->range.near;
+  const hapi_state_pointer *in = &hapi_state_pointers(nearby->cycle->state)[pointer];
   for (uint32_t i = 0; i < near->tool_count; ++i) {
     if (hapi_near_tools(near)[i].pointer == pointer) {
       return i;
     }
   }
+  HAPI_ASSERT(near->tool_count < nearby->cycle->config->capacity.pointers);
   hapi_near_tool *out = &hapi_near_tools(near)[near->tool_count];
   out->pointer = pointer;
   out->generation = in->generation;
@@ -248,31 +253,31 @@ static uint32_t take_tool(hapi_physics *physics, uint32_t pointer)
   out->extent = in->extent;
   out->pose = in->pose;
   out->twist = in->twist;
-  out->hull = hapi_state_hulls(physics->cycle.state)[pointer];
+  out->hull = hapi_state_hulls(nearby->cycle->state)[pointer];
   return near->tool_count++;
 }
 
-static void add_tool_pair(hapi_physics *physics, const hapi_hit *hit, uint32_t geom)
+static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geom)
 {
-  hapi_near *near = physics->near.range.near;
-  if (geom == HAPI_NONE || near->tool_pair_count == physics->config.capacity.contacts) {
-    ++physics->counts.own.stats.model.capacity_dropped;
+  hapi_near *near = nearby->range.near;
+  if (geom == HAPI_NONE || near->tool_pair_count == nearby->cycle->config->capacity.contacts) {
+    ++nearby->counts.dropped;
     return;
   }
   hapi_near_tool_pair *pair = &hapi_near_tool_pairs(near)[near->tool_pair_count++];
-  pair->key = hapi_tool_geom_key(physics, hit->geom, hit->pointer);
-  pair->tool = take_tool(physics, hit->pointer);
+  pair->key = hapi_tool_geom_key(nearby, hit->geom, hit->pointer);
+  pair->tool = take_tool(nearby, hit->pointer);
   pair->geom = geom;
   pair->mu = hit->mu;
 }
 
 /* The corners of a mesh that a body carries, in the body's frame. */
-static void hold_triangle(hapi_physics *physics, dBodyID body, hapi_near_geom *out)
+static void hold_triangle(hapi_nearby *nearby, dBodyID body, hapi_near_geom *out)
 {
-  double *corners = hapi_near_points(physics->near.range.near) + (size_t)3 * out->hull_first;
-  uint32_t slot = entry(physics, hapi_bodies_find(&physics->world.bodies, body))->slot;
+  double *corners = hapi_near_points(nearby->range.near) + (size_t)3 * out->hull_first;
+  uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
   out->body = slot;
-  out->generation = physics->near.slots.bodies[slot].generation;
+  out->generation = nearby->slots.bodies[slot].generation;
   for (int k = 0; k < 3; ++k) {
     double *corner = corners + (size_t)3 * k;
     hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
@@ -280,47 +285,47 @@ static void hold_triangle(hapi_physics *physics, dBodyID body, hapi_near_geom *o
   }
 }
 
-static void add_tool_mesh(hapi_physics *physics, const hapi_hit *hit)
+static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
 {
-  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->cycle.state)[hit->pointer];
+  const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
   dBodyID body = dGeomGetBody(hit->geom);
   double box[6];
   double far = pointer->extent +
                hapi_neighbors_reach(hapi_v3_norm(pointer->twist.linear) +
                                         pointer->extent * hapi_v3_norm(pointer->twist.angular),
-                                    2.0 * physics->cycle.probe_step_s);
+                                    2.0 * nearby->cycle->probe_step_s);
   for (int k = 0; k < 6; ++k) {
     box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
   }
-  uint32_t count = hapi_mesh_near(physics, hit->geom, box);
+  uint32_t count = hapi_mesh_near(nearby, hit->geom, box);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    uint32_t geom = add_triangle(physics, &physics->near.meshes.found[i]);
+    uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
     if (geom != HAPI_NONE && body != NULL) {
-      hold_triangle(physics, body, &hapi_near_geoms(physics->near.range.near)[geom]);
+      hold_triangle(nearby, body, &hapi_near_geoms(nearby->range.near)[geom]);
     }
-    add_tool_pair(physics, hit, geom);
+    add_tool_pair(nearby, hit, geom);
   }
 }
 
 /* What the hulls may touch, for the contact thread. A body that they touch and that the loop does not own is
  * measured as a whole: its contacts are not known before. */
-static void take_tools(hapi_physics *physics, uint32_t hit_count)
+static void take_tools(hapi_nearby *nearby, uint32_t hit_count)
 {
   for (uint32_t i = 0; i < hit_count; ++i) {
-    const hapi_hit *hit = &physics->near.neighbors.hits[i];
+    const hapi_hit *hit = &nearby->neighbors.hits[i];
     dBodyID body = dGeomGetBody(hit->geom);
-    uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
+    uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
     if (hit->tool_count == 0 ||
-        (body != NULL && (known == HAPI_NONE || entry(physics, known)->slot == HAPI_NONE))) {
+        (body != NULL && (known == HAPI_NONE || known_body(nearby, known)->slot == HAPI_NONE))) {
       continue;
     }
     if (body != NULL) {
-      physics->near.slots.bodies[entry(physics, known)->slot].linked = true;
+      nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
     }
     if (dGeomGetClass(hit->geom) == dTriMeshClass) {
-      add_tool_mesh(physics, hit);
+      add_tool_mesh(nearby, hit);
     } else {
-      add_tool_pair(physics, hit, take_geom(physics, hit->geom));
+      add_tool_pair(nearby, hit, take_geom(nearby, hit->geom));
     }
   }
 }
@@ -351,54 +356,59 @@ static bool bits_meet(dGeomID a, dGeomID b)
 }
 
 /* A pair is met from both of its bodies. */
-static hapi_pair_place *pair_place(hapi_range *range, uint64_t key)
+static hapi_pair_place *pair_place(const hapi_range *range, uint64_t key, bool *out_found)
 {
-  uint32_t mask = range->pair_place_count - 1;
+  HAPI_ASSERT(2 * range->links.pairs_noted <=
+              range->links.pair_place_count); /* there is a free one */
+  uint32_t mask = range->links.pair_place_count - 1;
   uint32_t at = (uint32_t)(key >> 32) & mask;
-  while (range->pair_places[at].walk == range->number && range->pair_places[at].key != key) {
+  while (range->links.pair_places[at].walk == range->number &&
+         range->links.pair_places[at].key != key) {
     at = (at + 1) & mask;
   }
-  range->pair_found = range->pair_places[at].walk == range->number;
-  return &range->pair_places[at];
+  *out_found = range->links.pair_places[at].walk == range->number;
+  return &range->links.pair_places[at];
 }
 
-static uint64_t meeting_of(dGeomID own, dGeomID other)
+static uint64_t meeting_key(dGeomID own, dGeomID other)
 {
-  return key_of(hapi_index_address(own), hapi_index_address(other), 0);
+  return pair_key(hapi_index_address(own), hapi_index_address(other), 0);
 }
 
-static bool met_before(hapi_range *range, dGeomID own, dGeomID other)
+static bool met_before(const hapi_range *range, dGeomID own, dGeomID other)
 {
-  (void)pair_place(range, meeting_of(own, other));
-  return range->pair_found;
+  bool found = false;
+  (void)pair_place(range, meeting_key(own, other), &found);
+  return found;
 }
 
-static void note_pair(hapi_physics *physics, const hapi_link *link)
+static void note_pair(hapi_nearby *nearby, const hapi_link *link)
 {
-  hapi_range *range = &physics->near.range;
-  uint64_t key = meeting_of(link->own, link->other);
-  hapi_pair_place *place = pair_place(range, key);
-  if (!range->pair_found && 2 * range->pairs_noted < range->pair_place_count) {
+  hapi_range *range = &nearby->range;
+  uint64_t key = meeting_key(link->own, link->other);
+  bool found = false;
+  hapi_pair_place *place = pair_place(range, key, &found);
+  if (!found && 2 * range->links.pairs_noted < range->links.pair_place_count) {
     place->key = key;
     place->walk = range->number;
-    ++range->pairs_noted;
+    ++range->links.pairs_noted;
   }
 }
 
-static double speed_of(const hapi_physics *physics, dBodyID body)
+static double surface_speed(const hapi_nearby *nearby, dBodyID body)
 {
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
   if (known == HAPI_NONE) {
     return 0.0;
   }
   return hapi_v3_norm(dBodyGetLinearVel(body)) +
-         physics->world.bodies.entries[known].extent * hapi_v3_norm(dBodyGetAngularVel(body));
+         nearby->world->bodies.entries[known].extent * hapi_v3_norm(dBodyGetAngularVel(body));
 }
 
 /* How far two surfaces may come nearer until the model after the next. */
-static double reach_of(const hapi_physics *physics, double speed)
+static double link_reach(const hapi_nearby *nearby, double speed)
 {
-  double seconds = 2.0 * physics->cycle.probe_step_s;
+  double seconds = 2.0 * nearby->cycle->probe_step_s;
   return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
 }
 
@@ -416,107 +426,110 @@ static bool boxes_come_near(const dReal a[6], dGeomID other, double reach)
 
 static void link_geom(void *data, dGeomID a, dGeomID b)
 {
-  hapi_physics *physics = data;
-  hapi_range *range = &physics->near.range;
-  dGeomID geom = a == range->box_geom ? b : a;
+  hapi_nearby *nearby = data;
+  hapi_range *range = &nearby->range;
+  dGeomID geom = a == range->links.box_geom ? b : a;
   if (dGeomIsSpace(geom)) {
-    dSpaceCollide2(range->box_geom, geom, data, link_geom);
+    dSpaceCollide2(range->links.box_geom, geom, data, link_geom);
     return;
   }
   dBodyID body = dGeomGetBody(geom);
-  double reach = reach_of(physics, range->own_speed + speed_of(physics, body));
-  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->own_body ||
-      !bits_meet(range->own_geom, geom) || !boxes_come_near(range->own_box, geom, reach) ||
-      met_before(range, range->own_geom, geom)) {
+  double reach = link_reach(nearby, range->links.own_speed + surface_speed(nearby, body));
+  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->links.own_body ||
+      !bits_meet(range->links.own_geom, geom) ||
+      !boxes_come_near(range->links.own_box, geom, reach) ||
+      met_before(range, range->links.own_geom, geom)) {
     return;
   }
-  if (!hapi_reserve((void **)&range->links, &range->link_capacity, range->link_count, 1,
-                    sizeof *range->links)) {
-    ++physics->counts.own.stats.model.capacity_dropped;
-    range->links_missing = true;
+  if (!hapi_reserve((void **)&range->links.list, &range->links.capacity, range->links.count, 1,
+                    sizeof *range->links.list)) {
+    ++nearby->counts.dropped;
+    range->links.missing = true;
     return;
   }
-  hapi_link *link = &range->links[range->link_count];
-  link->own = range->own_geom;
+  hapi_link *link = &range->links.list[range->links.count];
+  link->own = range->links.own_geom;
   link->other = geom;
   for (int k = 0; k < 6; ++k) {
-    link->box[k] = range->own_box[k] + (k % 2 == 0 ? -reach : reach);
+    link->box[k] = range->links.own_box[k] + (k % 2 == 0 ? -reach : reach);
   }
-  if (hapi_world_surface(&physics->world, &physics->cycle, link)) {
-    ++range->link_count;
+  if (hapi_world_surface(nearby->world, nearby->cycle, link)) {
+    ++range->links.count;
   }
 }
 
 /* The space is asked with room for the fastest body of all; each pair then has its own reach. */
-static void find_links(hapi_physics *physics, const hapi_known_body *known)
+static void find_links(hapi_nearby *nearby, const hapi_known_body *known)
 {
-  hapi_range *range = &physics->near.range;
-  double own = speed_of(physics, known->body);
-  range->own_speed = own > range->fastest ? own : range->fastest;
-  double reach = reach_of(physics, range->own_speed + physics->near.neighbors.fastest);
-  range->link_count = 0;
-  range->links_missing = false;
-  range->own_body = known->body;
+  hapi_range *range = &nearby->range;
+  double own = surface_speed(nearby, known->body);
+  range->links.own_speed = own > range->fastest ? own : range->fastest;
+  double reach = link_reach(nearby, range->links.own_speed + nearby->neighbors.fastest);
+  range->links.count = 0;
+  range->links.missing = false;
+  range->links.own_body = known->body;
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    const dReal *box = range->own_box;
+    const dReal *box = range->links.own_box;
     if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass) {
       continue;
     }
-    dGeomGetAABB(geom, range->own_box);
-    range->own_geom = geom;
-    dGeomBoxSetLengths(range->box_geom, box[1] - box[0] + 2.0 * reach,
+    dGeomGetAABB(geom, range->links.own_box);
+    range->links.own_geom = geom;
+    dGeomBoxSetLengths(range->links.box_geom, box[1] - box[0] + 2.0 * reach,
                        box[3] - box[2] + 2.0 * reach, box[5] - box[4] + 2.0 * reach);
-    dGeomSetPosition(range->box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
+    dGeomSetPosition(range->links.box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
                      0.5 * (box[4] + box[5]));
-    hapi_cover_ask(&range->cover, physics->world.ode.space, range->box_geom, physics, link_geom);
+    hapi_cover_ask(&range->links.cover, nearby->world->ode.space, range->links.box_geom, nearby,
+                   link_geom);
   }
 }
 
 /* ---- roles ---- */
 
 /* What the pairs of a body would add to the message. */
-typedef struct need {
+typedef struct range_need {
   uint32_t geoms;
   uint32_t points;
   uint32_t pairs;
-} need;
+} range_need;
 
-static void need_geom(hapi_physics *physics, dGeomID geom, need *io)
+static void need_geom(hapi_nearby *nearby, dGeomID geom, range_need *io)
 {
   hapi_shape hull;
   hap_pose pose;
   ++io->geoms;
   if (dGeomGetClass(geom) == dConvexClass) {
-    bool good = hapi_hull_of_convex(physics, geom, &hull, &pose);
-    io->points += good ? (uint32_t)hull.hull_count : physics->config.capacity.hull_points + 1;
+    bool good = hapi_hull_of_convex(nearby, geom, &hull, &pose);
+    io->points +=
+        good ? (uint32_t)hull.hull_count : nearby->cycle->config->capacity.hull_points + 1;
   }
 }
 
-static void need_link(hapi_physics *physics, const hapi_link *link, need *io)
+static void need_link(hapi_nearby *nearby, const hapi_link *link, range_need *io)
 {
   if (dGeomGetClass(link->other) != dTriMeshClass) {
-    need_geom(physics, link->other, io);
+    need_geom(nearby, link->other, io);
     ++io->pairs;
     return;
   }
-  uint32_t count = hapi_mesh_near(physics, link->other, link->box);
+  uint32_t count = hapi_mesh_near(nearby, link->other, link->box);
   bool all = count < HAPI_NEAR_TRIANGLES;
   io->geoms += count;
   io->points += 3 * count;
-  io->pairs += all ? count : physics->config.capacity.contacts + 1;
+  io->pairs += all ? count : nearby->cycle->config->capacity.contacts + 1;
 }
 
 /* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of its
  * mechanism that were looked at before. */
-static bool has_room(hapi_physics *physics, const hapi_known_body *known, need *io)
+static bool has_room(hapi_nearby *nearby, const hapi_known_body *known, range_need *io)
 {
-  const hapi_range *range = &physics->near.range;
-  const hapi_capacity *c = &physics->config.capacity;
+  const hapi_range *range = &nearby->range;
+  const hapi_capacity *c = &nearby->cycle->config->capacity;
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    need_geom(physics, geom, io);
+    need_geom(nearby, geom, io);
   }
-  for (uint32_t i = 0; i < range->link_count; ++i) {
-    need_link(physics, &range->links[i], io);
+  for (uint32_t i = 0; i < range->links.count; ++i) {
+    need_link(nearby, &range->links.list[i], io);
   }
   return range->near->geom_count + io->geoms <= c->geoms &&
          range->near->point_count + io->points <= c->hull_points &&
@@ -524,16 +537,16 @@ static bool has_room(hapi_physics *physics, const hapi_known_body *known, need *
 }
 
 /* One that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
-static bool body_is_known(const hapi_physics *physics, dBodyID body)
+static bool body_is_known(const hapi_nearby *nearby, dBodyID body)
 {
-  return body == NULL || hapi_bodies_find(&physics->world.bodies, body) != HAPI_NONE;
+  return body == NULL || hapi_bodies_find(&nearby->world->bodies, body) != HAPI_NONE;
 }
 
-static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known, need *io)
+static bool can_be_owned(hapi_nearby *nearby, const hapi_known_body *known, range_need *io)
 {
-  const hapi_range *range = &physics->near.range;
-  if (range->links_missing ||
-      (range->link_count > 0 && hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_CONTACTS))) {
+  const hapi_range *range = &nearby->range;
+  if (range->links.missing ||
+      (range->links.count > 0 && hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_CONTACTS))) {
     return false;
   }
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
@@ -541,292 +554,290 @@ static bool can_be_owned(hapi_physics *physics, const hapi_known_body *known, ne
       return false;
     }
   }
-  for (uint32_t i = 0; i < range->link_count; ++i) {
-    dGeomID other = range->links[i].other;
-    if (!geom_is_known(other) || !body_is_known(physics, dGeomGetBody(other))) {
+  for (uint32_t i = 0; i < range->links.count; ++i) {
+    dGeomID other = range->links.list[i].other;
+    if (!geom_is_known(other) || !body_is_known(nearby, dGeomGetBody(other))) {
       return false;
     }
   }
-  return has_room(physics, known, io);
+  return has_room(nearby, known, io);
 }
 
-static void take_links(hapi_physics *physics)
+static void take_links(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  for (uint32_t i = 0; i < range->link_count; ++i) {
-    const hapi_link *link = &range->links[i];
+  hapi_range *range = &nearby->range;
+  for (uint32_t i = 0; i < range->links.count; ++i) {
+    const hapi_link *link = &range->links.list[i];
     dBodyID body = dGeomGetBody(link->other);
-    note_pair(physics, link);
+    note_pair(nearby, link);
     range->bounces +=
         (link->surface.flags & HAPI_SURFACE_BOUNCE) != 0 && link->surface.bounce > 0.0;
-    uint32_t known = hapi_bodies_find(&physics->world.bodies, body);
-    if (body != NULL && (known == HAPI_NONE || !enqueue(physics, known))) {
+    uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
+    if (body != NULL && (known == HAPI_NONE || !range_enqueue(nearby, known))) {
       continue;
     }
     if (body != NULL) {
-      physics->near.slots.bodies[entry(physics, known)->slot].linked = true;
+      nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
     }
     if (dGeomGetClass(link->other) == dTriMeshClass) {
-      add_mesh(physics, link);
+      add_mesh(nearby, link);
     } else {
-      add_pair(physics, link, take_geom(physics, link->other), 0);
+      add_pair(nearby, link, take_geom(nearby, link->other), 0);
     }
   }
 }
 
 /* Without the range beyond them the loop owns neighbours only. */
-static bool may_own(const hapi_physics *physics, const hapi_known_body *known)
+static bool may_own(const hapi_nearby *nearby, uint32_t known)
 {
-  return !hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_RANGE) ||
-         known->rest->chosen_in == physics->cycle.model_number + 1;
+  return !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_RANGE) ||
+         hapi_nearby_chose(nearby, known, nearby->cycle->model_number + 1);
 }
 
 /* A mechanism is owned as a whole: a joint between what the loop moves and what ODE moves would be in
  * neither. Room for its bodies is taken first, then their contacts. */
-static bool mechanism_can_be_owned(hapi_physics *physics)
+static bool mechanism_can_be_owned(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  need n = {0, 0, 0};
-  if (range->owned + range->moving > range_capacity(physics)) {
+  hapi_range *range = &nearby->range;
+  range_need n = {0, 0, 0};
+  if (range->owned + range->mechanism.moving > range_capacity(nearby)) {
     return false;
   }
-  for (uint32_t i = 0; i < range->moving; ++i) {
-    const hapi_known_body *known = entry(physics, range->members[i]);
-    if (!may_own(physics, known)) {
+  for (uint32_t i = 0; i < range->mechanism.moving; ++i) {
+    const hapi_known_body *known = known_body(nearby, range->mechanism.members[i]);
+    if (!may_own(nearby, range->mechanism.members[i])) {
       return false;
     }
-    find_links(physics, known);
-    if (!can_be_owned(physics, known, &n)) {
+    find_links(nearby, known);
+    if (!can_be_owned(nearby, known, &n)) {
       return false;
     }
   }
-  for (uint32_t i = 0; i < range->member_count; ++i) {
-    if (!enqueue(physics, range->members[i])) {
+  for (uint32_t i = 0; i < range->mechanism.count; ++i) {
+    if (!range_enqueue(nearby, range->mechanism.members[i])) {
       return false;
     }
   }
   return true;
 }
 
-static void own_mechanism(hapi_physics *physics)
+static void own_mechanism(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
+  hapi_range *range = &nearby->range;
   ++range->hops;
-  for (uint32_t i = 0; i < range->moving; ++i) {
-    const hapi_known_body *known = entry(physics, range->members[i]);
-    if (range->moving > 1) { /* else they were found last */
-      find_links(physics, known);
+  for (uint32_t i = 0; i < range->mechanism.moving; ++i) {
+    const hapi_known_body *known = known_body(nearby, range->mechanism.members[i]);
+    if (range->mechanism.moving > 1) { /* else they were found last */
+      find_links(nearby, known);
     }
-    physics->near.slots.bodies[known->slot].flags |=
-        range->link_count > 0 ? HAPI_BODY_OWNED : HAPI_BODY_OWNED | HAPI_BODY_ALONE;
+    nearby->slots.bodies[known->slot].flags |=
+        range->links.count > 0 ? HAPI_BODY_OWNED : HAPI_BODY_OWNED | HAPI_BODY_ALONE;
     ++range->owned;
-    take_links(physics);
+    take_links(nearby);
   }
-  hapi_mechanism_take(physics);
+  hapi_mechanism_take(nearby);
 }
 
-static bool within_hops(const hapi_physics *physics, const hapi_known_body *known)
+static bool within_hops(const hapi_nearby *nearby, int32_t hops)
 {
-  int32_t most = physics->cycle.settings.range_hops;
-  return most == HAP_RANGE_ALL || known->rest->hops <= most;
+  int32_t most = nearby->cycle->settings.range_hops;
+  return most == HAP_RANGE_ALL || hops <= most;
 }
 
 /* Seeds are what the pointers may touch. What is owned is walked on from. */
-static void expand(hapi_physics *physics, uint32_t index, bool seed)
+static void range_expand(hapi_nearby *nearby, uint32_t index, bool seed)
 {
-  hapi_range *range = &physics->near.range;
-  hapi_known_body *known = entry(physics, index);
-  hapi_body_slot *slot = &physics->near.slots.bodies[known->slot];
-  if (!dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
+  hapi_range *range = &nearby->range;
+  const hapi_known_body *known = known_body(nearby, index);
+  const hapi_visit *visit = &nearby->visits[index];
+  int32_t hops = visit->hops;
+  HAPI_ASSERT_INDEX(known->slot, nearby->slots.body_high);
+  hapi_body_slot *slot = &nearby->slots.bodies[known->slot];
+  if (!is_dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
     return;
   }
-  bool refused = known->rest->gathered_in == range->number; /* with another body of its mechanism */
-  range->hops = known->rest->hops;
-  if (!refused && within_hops(physics, known) && range->owned < range_capacity(physics) &&
-      hapi_mechanism_gather(physics, index) && mechanism_can_be_owned(physics)) {
-    own_mechanism(physics);
+  bool refused = visit->gathered_in == range->number; /* with another body of its mechanism */
+  range->hops = hops;
+  if (!refused && within_hops(nearby, hops) && range->owned < range_capacity(nearby) &&
+      hapi_mechanism_gather(nearby, index) && mechanism_can_be_owned(nearby)) {
+    own_mechanism(nearby);
     return;
   }
-  range->refused = range->refused || within_hops(physics, known);
-  hapi_mechanism_drop(physics);
-  bool tests = !hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_TESTING);
+  range->refused = range->refused || within_hops(nearby, hops);
+  hapi_mechanism_drop(nearby);
+  bool tests = !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_TESTING);
   slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
 }
 
 /* The effect range=on: also what no chain of contacts leads to, as long as there is room: once
  * all is in that chains lead to, and where there are neighbours, as a range begins at them. */
-static void expand_further(hapi_physics *physics)
+static void range_expand_further(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  for (uint32_t i = 0; i < physics->world.bodies.high && range->owned < range_capacity(physics);
+  hapi_range *range = &nearby->range;
+  for (uint32_t i = 0; i < nearby->world->bodies.high && range->owned < range_capacity(nearby);
        ++i) {
-    const hapi_known_body *known = entry(physics, i);
-    if (known->body == NULL || !dynamic(known->body) || known->rest->ranged_in == range->number) {
+    const hapi_known_body *known = known_body(nearby, i);
+    if (known->body == NULL || !is_dynamic(known->body) ||
+        nearby->visits[i].ranged_in == range->number) {
       continue;
     }
     uint32_t next = range->count;
-    if (!enqueue(physics, i)) {
+    if (!range_enqueue(nearby, i)) {
       return;
     }
     for (; next < range->count; ++next) {
-      expand(physics, range->queue[next], false);
+      range_expand(nearby, range->queue[next], false);
     }
   }
 }
 
-static double fastest_pointer(const hapi_physics *physics)
+static double fastest_pointer(const hapi_nearby *nearby)
 {
   double fastest = 0.0;
-  const hapi_state_pointer *pointers = hapi_state_pointers(physics->cycle.state);
-  for (uint32_t i = 0; i < physics->cycle.state->pointer_count; ++i) {
+  const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
+  for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
     double speed = pointers[i].generation != 0 ? hapi_v3_norm(pointers[i].twist.linear) : 0.0;
     fastest = speed > fastest ? speed : fastest;
   }
   return fastest;
 }
 
-static void begin_walk(hapi_physics *physics)
+static void range_begin(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  range->near = hapi_exchange_near_back(physics->config.exchange);
+  hapi_range *range = &nearby->range;
+  range->near = hapi_exchange_near_back(nearby->cycle->config->exchange);
   range->near->body_count = 0;
   range->near->geom_count = 0;
   range->near->pair_count = 0;
   range->near->point_count = 0;
   range->near->tool_count = range->near->tool_pair_count = 0;
-  range->number = physics->cycle.model_number + 1;
+  range->number = nearby->cycle->model_number + 1;
   range->count = range->owned = range->seeds = range->bounces = 0;
-  range->near->between = !hapi_wish_is_off(physics->cycle.wishes, HAP_EFFECT_PASSES);
-  range->near->contact_hz = physics->cycle.settings.contact_hz;
-  range->near->always = hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_PASSES);
-  range->pairs_noted = 0;
+  range->near->between = !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_PASSES);
+  range->near->contact_hz = nearby->cycle->settings.contact_hz;
+  range->near->always = hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_PASSES);
+  range->links.pairs_noted = 0;
   range->refused = false;
   range->hops = 0;
-  range->joint_count = range->member_count = range->moving = 0;
-  range->fastest = fastest_pointer(physics);
-  hapi_cover_begin(&range->cover);
+  range->mechanism.joint_count = range->mechanism.count = range->mechanism.moving = 0;
+  range->fastest = fastest_pointer(nearby);
+  hapi_cover_begin(&range->links.cover);
 }
 
-void hapi_range_walk(hapi_physics *physics, uint32_t hit_count)
+void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
 {
-  if (physics->cycle.model != HAP_MODEL_CONTACT || physics->cycle.state == NULL) {
+  if (nearby->cycle->model != HAP_MODEL_CONTACT || nearby->cycle->state == NULL) {
     return;
   }
-  hapi_range *range = &physics->near.range;
-  begin_walk(physics);
+  hapi_range *range = &nearby->range;
+  range_begin(nearby);
   for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */
-    uint32_t known = hapi_bodies_find(&physics->world.bodies,
-                                      dGeomGetBody(physics->near.neighbors.hits[i].geom));
-    if (known != HAPI_NONE && entry(physics, known)->slot != HAPI_NONE) {
-      enqueue(physics, known);
+    uint32_t known =
+        hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(nearby->neighbors.hits[i].geom));
+    if (known != HAPI_NONE && known_body(nearby, known)->slot != HAPI_NONE) {
+      range_enqueue(nearby, known);
     }
   }
   range->seeds = range->count;
   for (uint32_t next = 0; next < range->seeds; ++next) {
-    expand(physics, range->queue[next], true);
+    range_expand(nearby, range->queue[next], true);
   }
   int64_t begin_ns = hapi_clock_now();
   for (uint32_t next = range->seeds; next < range->count; ++next) {
-    expand(physics, range->queue[next], false);
+    range_expand(nearby, range->queue[next], false);
   }
   if (range->seeds > 0 && !range->refused &&
-      hapi_wish_is_on(physics->cycle.wishes, HAP_EFFECT_RANGE)) {
-    expand_further(physics);
+      hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_RANGE)) {
+    range_expand_further(nearby);
   }
-  physics->counts.own.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  take_tools(physics, hit_count);
+  nearby->counts.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  take_tools(nearby, hit_count);
 }
 
 /* ---- the message to the contact thread ---- */
 
-static void fill_body(hapi_physics *physics, uint32_t known, hapi_near_body *out)
+static void fill_body(hapi_nearby *nearby, uint32_t known, hapi_near_body *out)
 {
-  dBodyID body = entry(physics, known)->body;
-  out->slot = entry(physics, known)->slot;
-  out->generation = physics->near.slots.bodies[out->slot].generation;
+  dBodyID body = known_body(nearby, known)->body;
+  out->slot = known_body(nearby, known)->slot;
+  out->generation = nearby->slots.bodies[out->slot].generation;
   hapi_v3_copy(dBodyGetPosition(body), out->pose.position);
   memcpy(out->pose.quat_wxyz, dBodyGetQuaternion(body), sizeof out->pose.quat_wxyz);
   hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
   hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
 }
 
-static void count_roles(hapi_physics *physics)
+static void count_roles(hapi_nearby *nearby)
 {
-  hap_stats *stats = &physics->counts.own.stats;
-  stats->model.range_bodies = stats->model.edge_bodies = stats->model.measured_bodies = 0;
-  stats->model.range_joints = physics->near.range.joint_count;
-  for (uint32_t i = 0; i < physics->near.range.count; ++i) {
-    uint32_t flags =
-        physics->near.slots.bodies[entry(physics, physics->near.range.queue[i])->slot].flags;
-    stats->model.range_bodies += (flags & HAPI_BODY_OWNED) != 0;
-    stats->model.measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
-    stats->model.edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+  hapi_near_counts *counts = &nearby->counts;
+  counts->range_bodies = counts->edge_bodies = counts->measured_bodies = 0;
+  counts->range_joints = nearby->range.mechanism.joint_count;
+  for (uint32_t i = 0; i < nearby->range.count; ++i) {
+    uint32_t flags = nearby->slots.bodies[known_body(nearby, nearby->range.queue[i])->slot].flags;
+    counts->range_bodies += (flags & HAPI_BODY_OWNED) != 0;
+    counts->measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
+    counts->edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
   }
 }
 
-void hapi_range_publish(hapi_physics *physics)
+void hapi_range_publish(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  if (physics->cycle.model != HAP_MODEL_CONTACT || range->number != physics->cycle.model_number) {
+  hapi_range *range = &nearby->range;
+  if (nearby->cycle->model != HAP_MODEL_CONTACT || range->number != nearby->cycle->model_number) {
     return;
   }
   hapi_near_body *bodies = hapi_near_bodies(range->near);
   for (uint32_t i = 0; i < range->count; ++i) {
-    fill_body(physics, range->queue[i], &bodies[range->near->body_count++]);
+    fill_body(nearby, range->queue[i], &bodies[range->near->body_count++]);
   }
-  range->near->model_number = physics->cycle.model_number;
-  count_roles(physics);
-  hapi_exchange_near_publish(physics->config.exchange);
+  range->near->model_number = nearby->cycle->model_number;
+  count_roles(nearby);
+  hapi_exchange_near_publish(nearby->cycle->config->exchange);
 }
 
 /* A session that is started again counts its models, and so its walks, from 1 again. */
-void hapi_range_reset(hapi_physics *physics)
+void hapi_range_reset(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  memset(range->pair_places, 0, range->pair_place_count * sizeof *range->pair_places);
+  hapi_range *range = &nearby->range;
+  memset(range->links.pair_places, 0,
+         range->links.pair_place_count * sizeof *range->links.pair_places);
   range->number = 0;
   hapi_geom_names_clear(&range->names);
-  hapi_geom_names_clear(&physics->near.tools.names);
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    physics->world.bodies.entries[i].rest->ranged_in = 0;
-    physics->world.bodies.entries[i].rest->gathered_in = 0;
-    physics->world.bodies.entries[i].rest->chosen_in = 0;
-    physics->world.bodies.entries[i].loop_owned = false;
-  }
 }
 
-bool hapi_range_create(hapi_physics *physics)
+bool hapi_range_create(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  const hapi_capacity *c = &physics->config.capacity;
+  hapi_range *range = &nearby->range;
+  const hapi_capacity *c = &nearby->cycle->config->capacity;
   range->queue = hapi_alloc_array(c->bodies, sizeof *range->queue);
   range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
-  range->members = hapi_alloc_array(c->bodies, sizeof *range->members);
-  range->joints = hapi_alloc_array(c->joints, sizeof *range->joints);
-  range->pair_place_count = 4;
-  while (range->pair_place_count < 4 * c->contacts) {
-    range->pair_place_count *= 2;
+  range->mechanism.members = hapi_alloc_array(c->bodies, sizeof *range->mechanism.members);
+  range->mechanism.joints = hapi_alloc_array(c->joints, sizeof *range->mechanism.joints);
+  range->links.pair_place_count = 4;
+  while (range->links.pair_place_count < 4 * c->contacts) {
+    range->links.pair_place_count *= 2;
   }
-  range->pair_places = hapi_alloc_array(range->pair_place_count, sizeof *range->pair_places);
-  range->box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
-  return range->queue != NULL && range->geoms != NULL && range->members != NULL &&
-         range->joints != NULL && range->pair_places != NULL && range->box_geom != NULL &&
-         hapi_cover_create(&range->cover);
+  range->links.pair_places =
+      hapi_alloc_array(range->links.pair_place_count, sizeof *range->links.pair_places);
+  range->links.box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
+  return range->queue != NULL && range->geoms != NULL && range->mechanism.members != NULL &&
+         range->mechanism.joints != NULL && range->links.pair_places != NULL &&
+         range->links.box_geom != NULL && hapi_cover_create(&range->links.cover);
 }
 
-void hapi_range_finish(hapi_physics *physics)
+void hapi_range_finish(hapi_nearby *nearby)
 {
-  hapi_range *range = &physics->near.range;
-  if (range->box_geom != NULL) {
-    dGeomDestroy(range->box_geom);
+  hapi_range *range = &nearby->range;
+  if (range->links.box_geom != NULL) {
+    dGeomDestroy(range->links.box_geom);
   }
-  hapi_cover_finish(&range->cover);
+  hapi_cover_finish(&range->links.cover);
   hapi_free(range->queue);
   hapi_free(range->geoms);
-  hapi_free(range->links);
-  hapi_free(range->members);
-  hapi_free(range->joints);
-  hapi_free(range->pair_places);
+  hapi_free(range->links.list);
+  hapi_free(range->mechanism.members);
+  hapi_free(range->mechanism.joints);
+  hapi_free(range->links.pair_places);
   hapi_geom_names_finish(&range->names);
   memset(range, 0, sizeof *range);
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/vec.h"
-#include "physics/physics_internal.h"
+#include "near/near.h"
 
 /* Geoms as shapes for proximity. ODE has no getters for the points of a convex geom: its collider
  * with a plane lists the vertices below the plane, so two planes back to back give all of them. For
@@ -79,11 +79,11 @@ bool hapi_shape_of_geom(dGeomID geom, hapi_shape *out_shape, hap_pose *out_pose)
 
 /* Nearest of the points where a large sphere meets the surface. The depth that ODE gives is along
  * the triangle's normal and says nothing beside an edge; the points are on the surface. */
-static bool nearest_by_collider(hapi_physics *physics, dGeomID geom, const double center[3],
+static bool nearest_by_collider(hapi_nearby *nearby, dGeomID geom, const double center[3],
                                 double radius, double reach, hapi_nearest *out)
 {
   dContactGeom contacts[FALLBACK_CONTACTS];
-  dGeomID sphere = physics->near.neighbors.probe_geom;
+  dGeomID sphere = nearby->neighbors.probe_geom;
   double best = HUGE_VAL;
   const dContactGeom *nearest = NULL;
   dGeomSphereSetRadius(sphere, radius + reach);
@@ -112,10 +112,10 @@ static bool nearest_by_collider(hapi_physics *physics, dGeomID geom, const doubl
 }
 
 /* Appends the vertices of a convex geom on the lower side of the plane normal . x = offset. */
-static uint32_t vertices_below(hapi_physics *physics, dGeomID geom, const double normal[3],
+static uint32_t vertices_below(hapi_nearby *nearby, dGeomID geom, const double normal[3],
                                double offset, uint32_t count)
 {
-  hapi_neighbors *hood = &physics->near.neighbors;
+  hapi_neighbors *hood = &nearby->neighbors;
   dGeomPlaneSetParams(hood->plane_geom, normal[0], normal[1], normal[2], offset);
   int found =
       dCollide(geom, hood->plane_geom, HAPI_HULL_POINTS, hood->vertices, sizeof hood->vertices[0]);
@@ -127,24 +127,24 @@ static uint32_t vertices_below(hapi_physics *physics, dGeomID geom, const double
   return count;
 }
 
-bool hapi_hull_of_convex(hapi_physics *physics, dGeomID geom, hapi_shape *shape, hap_pose *pose)
+bool hapi_hull_of_convex(hapi_nearby *nearby, dGeomID geom, hapi_shape *shape, hap_pose *pose)
 {
   const double up[3] = {0.0, 0.0, 1.0};
   const double down[3] = {0.0, 0.0, -1.0};
   dReal box[6];
   dGeomGetAABB(geom, box);
   double middle = 0.5 * (box[4] + box[5]);
-  uint32_t count = vertices_below(physics, geom, up, middle, 0);
-  count = vertices_below(physics, geom, down, -middle, count);
+  uint32_t count = vertices_below(nearby, geom, up, middle, 0);
+  count = vertices_below(nearby, geom, down, -middle, count);
   memset(shape, 0, sizeof *shape);
   shape->kind = HAPI_SHAPE_HULL;
-  shape->hull = physics->near.neighbors.hull;
+  shape->hull = nearby->neighbors.hull;
   shape->hull_count = count;
   *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   return count > 0;
 }
 
-bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[3], double radius,
+bool hapi_geom_nearest(hapi_nearby *nearby, dGeomID geom, const double center[3], double radius,
                        double reach, hapi_nearest *out)
 {
   hapi_shape shape;
@@ -153,9 +153,9 @@ bool hapi_geom_nearest(hapi_physics *physics, dGeomID geom, const double center[
   hap_pose at = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
   hapi_v3_copy(center, at.position);
   bool convex =
-      dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(physics, geom, &shape, &pose);
+      dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(nearby, geom, &shape, &pose);
   if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
-    return nearest_by_collider(physics, geom, center, radius, reach, out);
+    return nearest_by_collider(nearby, geom, center, radius, reach, out);
   }
   /* A hull is worth asking first whether it is near at all (libccd): its box says little. */
   if (convex && !hapi_overlap(&pointer, &at, &shape, &pose, reach)) {

@@ -2,14 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "physics/physics_internal.h"
+#include "base/assert.h"
+#include "near/near.h"
 
 /* Small numbers for what the loop carries. A body's slot is used again only after the loop has
  * said that it uses a model without the body: until then its running totals are still read. */
 
 /* A new user of the slot: the loop forgets all it had there. */
-static void renew(hapi_body_slot *slot, uint32_t known)
+static void slot_renew(hapi_body_slot *slot, uint32_t known)
 {
+  HAPI_ASSERT(slot->phase != HAPI_SLOT_RETIRING); /* the loop may still read its totals */
   uint32_t generation = slot->generation;
   bool wanted = slot->wanted;
   memset(slot, 0, sizeof *slot);
@@ -27,55 +29,56 @@ void hapi_slots_restart(hapi_body_slot *slot)
 
 void hapi_slots_renew(hapi_body_slot *slot)
 {
-  renew(slot, slot->known);
+  slot_renew(slot, slot->known);
 }
 
-uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known_index)
+uint32_t hapi_slots_body(hapi_nearby *nearby, uint32_t known_index)
 {
-  hapi_known_body *known = &physics->world.bodies.entries[known_index];
+  HAPI_ASSERT_INDEX(known_index, nearby->world->bodies.high);
+  hapi_known_body *known = &nearby->world->bodies.entries[known_index];
+  HAPI_ASSERT(known->body != NULL);
   if (known->slot != HAPI_NONE) {
     return known->slot;
   }
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
+  for (uint32_t i = 0; i < nearby->cycle->config->capacity.bodies; ++i) {
+    hapi_body_slot *slot = &nearby->slots.bodies[i];
     if (slot->phase == HAPI_SLOT_FREE) {
-      renew(slot, known_index);
+      slot_renew(slot, known_index);
       known->slot = i;
-      physics->near.slots.body_high =
-          i >= physics->near.slots.body_high ? i + 1 : physics->near.slots.body_high;
+      nearby->slots.body_high = i >= nearby->slots.body_high ? i + 1 : nearby->slots.body_high;
       return i;
     }
   }
   return HAPI_NONE;
 }
 
-static bool same_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID geom,
-                         uint32_t pointer, uint32_t pointer_generation)
+static bool slot_is_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID geom,
+                            uint32_t pointer, uint32_t pointer_generation)
 {
   return slot->phase == HAPI_SLOT_LIVE && slot->body == body && slot->geom == geom &&
          slot->pointer == pointer && slot->pointer_generation == pointer_generation;
 }
 
-hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_find_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                            uint32_t pointer, uint32_t pointer_generation)
 {
-  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
-    hapi_contact_slot *slot = &physics->near.slots.contacts[i];
-    if (same_contact(slot, body, geom, pointer, pointer_generation)) {
+  for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
+    hapi_contact_slot *slot = &nearby->slots.contacts[i];
+    if (slot_is_contact(slot, body, geom, pointer, pointer_generation)) {
       return slot;
     }
   }
   return NULL;
 }
 
-static hapi_contact_slot *contact_place(hapi_physics *physics)
+static hapi_contact_slot *slot_for_contact(hapi_nearby *nearby)
 {
   hapi_contact_slot *unwanted = NULL;
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    hapi_contact_slot *slot = &physics->near.slots.contacts[i];
+  for (uint32_t i = 0; i < nearby->cycle->config->capacity.contacts; ++i) {
+    hapi_contact_slot *slot = &nearby->slots.contacts[i];
     if (slot->phase == HAPI_SLOT_FREE) {
-      physics->near.slots.contact_high =
-          i >= physics->near.slots.contact_high ? i + 1 : physics->near.slots.contact_high;
+      nearby->slots.contact_high =
+          i >= nearby->slots.contact_high ? i + 1 : nearby->slots.contact_high;
       return slot;
     }
     if (!slot->wanted) {
@@ -85,19 +88,21 @@ static hapi_contact_slot *contact_place(hapi_physics *physics)
   return unwanted;
 }
 
-hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                       uint32_t pointer, uint32_t pointer_generation)
 {
   hapi_contact_slot *slot =
-      hapi_slots_find_contact(physics, body, geom, pointer, pointer_generation);
+      hapi_slots_find_contact(nearby, body, geom, pointer, pointer_generation);
   return slot != NULL ? slot
-                      : hapi_slots_new_contact(physics, body, geom, pointer, pointer_generation);
+                      : hapi_slots_new_contact(nearby, body, geom, pointer, pointer_generation);
 }
 
-hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_new_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                           uint32_t pointer, uint32_t pointer_generation)
 {
-  hapi_contact_slot *slot = contact_place(physics);
+  HAPI_ASSERT(body == HAPI_SLOT_NONE || body < nearby->slots.body_high);
+  HAPI_ASSERT(pointer_generation != 0);
+  hapi_contact_slot *slot = slot_for_contact(nearby);
   if (slot == NULL) {
     return NULL;
   }
@@ -114,68 +119,69 @@ hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, 
   return slot;
 }
 
-void hapi_slots_begin_model(hapi_physics *physics)
+void hapi_slots_begin_model(hapi_nearby *nearby)
 {
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    physics->near.slots.bodies[i].wanted = false;
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    nearby->slots.bodies[i].wanted = false;
   }
-  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
-    physics->near.slots.contacts[i].wanted = false;
+  for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
+    nearby->slots.contacts[i].wanted = false;
   }
 }
 
-static void retire(hapi_physics *physics, hapi_body_slot *slot)
+static void slot_retire(hapi_nearby *nearby, hapi_body_slot *slot)
 {
+  HAPI_ASSERT(slot->phase == HAPI_SLOT_LIVE);
   slot->phase = HAPI_SLOT_RETIRING;
-  slot->retired_at = physics->cycle.model_number + 1;
+  slot->retired_at = nearby->cycle->model_number + 1;
   if (slot->known != HAPI_NONE) {
-    physics->world.bodies.entries[slot->known].slot = HAPI_NONE;
+    nearby->world->bodies.entries[slot->known].slot = HAPI_NONE;
   }
 }
 
-void hapi_slots_end_model(hapi_physics *physics)
+void hapi_slots_end_model(hapi_nearby *nearby)
 {
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    hapi_body_slot *slot = &nearby->slots.bodies[i];
     if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
-      retire(physics, slot);
+      slot_retire(nearby, slot);
     }
   }
-  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
-    hapi_contact_slot *slot = &physics->near.slots.contacts[i];
+  for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
+    hapi_contact_slot *slot = &nearby->slots.contacts[i];
     if (slot->phase == HAPI_SLOT_LIVE && !slot->wanted) {
       slot->phase = HAPI_SLOT_FREE;
     }
   }
 }
 
-void hapi_slots_release(hapi_physics *physics)
+void hapi_slots_release(hapi_nearby *nearby)
 {
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
-    if (slot->phase == HAPI_SLOT_RETIRING && physics->cycle.state != NULL &&
-        physics->cycle.state->model_number >= slot->retired_at) {
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    hapi_body_slot *slot = &nearby->slots.bodies[i];
+    if (slot->phase == HAPI_SLOT_RETIRING && nearby->cycle->state != NULL &&
+        nearby->cycle->state->model_number >= slot->retired_at) {
       slot->phase = HAPI_SLOT_FREE;
       slot->known = HAPI_NONE;
     }
   }
 }
 
-void hapi_slots_drop_body(hapi_physics *physics, uint32_t known)
+void hapi_slots_drop_body(hapi_nearby *nearby, uint32_t known)
 {
-  for (uint32_t i = 0; i < physics->near.slots.body_high; ++i) {
-    hapi_body_slot *slot = &physics->near.slots.bodies[i];
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    hapi_body_slot *slot = &nearby->slots.bodies[i];
     if (slot->phase == HAPI_SLOT_FREE || slot->known != known) {
       continue;
     }
     if (slot->phase == HAPI_SLOT_LIVE) {
-      retire(physics, slot);
+      slot_retire(nearby, slot);
     }
     slot->known = HAPI_NONE;
-    for (uint32_t k = 0; k < physics->near.slots.contact_high; ++k) {
-      if (physics->near.slots.contacts[k].phase == HAPI_SLOT_LIVE &&
-          physics->near.slots.contacts[k].body == i) {
-        physics->near.slots.contacts[k].phase = HAPI_SLOT_FREE;
+    for (uint32_t k = 0; k < nearby->slots.contact_high; ++k) {
+      if (nearby->slots.contacts[k].phase == HAPI_SLOT_LIVE &&
+          nearby->slots.contacts[k].body == i) {
+        nearby->slots.contacts[k].phase = HAPI_SLOT_FREE;
       }
     }
   }
@@ -186,24 +192,24 @@ void hapi_slots_set_flags(hapi_slots *slots, uint32_t body, uint32_t flags)
   slots->bodies[body].flags = flags;
 }
 
-void hapi_slots_reset(hapi_physics *physics)
+void hapi_slots_reset(hapi_nearby *nearby)
 {
-  physics->near.slots.body_high = 0;
-  physics->near.slots.contact_high = 0;
-  for (uint32_t i = 0; i < physics->config.capacity.bodies; ++i) {
-    uint32_t generation = physics->near.slots.bodies[i].generation;
-    memset(&physics->near.slots.bodies[i], 0, sizeof physics->near.slots.bodies[i]);
-    physics->near.slots.bodies[i].generation = generation;
-    physics->near.slots.bodies[i].known = HAPI_NONE;
+  nearby->slots.body_high = 0;
+  nearby->slots.contact_high = 0;
+  for (uint32_t i = 0; i < nearby->cycle->config->capacity.bodies; ++i) {
+    uint32_t generation = nearby->slots.bodies[i].generation;
+    memset(&nearby->slots.bodies[i], 0, sizeof nearby->slots.bodies[i]);
+    nearby->slots.bodies[i].generation = generation;
+    nearby->slots.bodies[i].known = HAPI_NONE;
   }
-  for (uint32_t i = 0; i < physics->config.capacity.contacts; ++i) {
-    uint32_t generation = physics->near.slots.contacts[i].generation;
-    uint32_t life = physics->near.slots.contacts[i].life;
-    memset(&physics->near.slots.contacts[i], 0, sizeof physics->near.slots.contacts[i]);
-    physics->near.slots.contacts[i].generation = generation;
-    physics->near.slots.contacts[i].life = life;
+  for (uint32_t i = 0; i < nearby->cycle->config->capacity.contacts; ++i) {
+    uint32_t generation = nearby->slots.contacts[i].generation;
+    uint32_t life = nearby->slots.contacts[i].life;
+    memset(&nearby->slots.contacts[i], 0, sizeof nearby->slots.contacts[i]);
+    nearby->slots.contacts[i].generation = generation;
+    nearby->slots.contacts[i].life = life;
   }
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    physics->world.bodies.entries[i].slot = HAPI_NONE;
+  for (uint32_t i = 0; i < nearby->world->bodies.high; ++i) {
+    nearby->world->bodies.entries[i].slot = HAPI_NONE;
   }
 }

@@ -14,7 +14,7 @@
 #include "proximity/proximity.h"
 #include "sync/messages.h"
 
-typedef struct hapi_physics hapi_physics;
+typedef struct hapi_nearby hapi_nearby;
 
 typedef enum hapi_slot_phase {
   HAPI_SLOT_FREE = 0,
@@ -89,24 +89,24 @@ typedef struct hapi_slots {
   uint32_t contact_high;
 } hapi_slots;
 
-uint32_t hapi_slots_body(hapi_physics *physics, uint32_t known); /* live slot; HAPI_NONE: full */
+uint32_t hapi_slots_body(hapi_nearby *nearby, uint32_t known); /* live slot; HAPI_NONE: full */
 /* NULL: there is none. */
-hapi_contact_slot *hapi_slots_find_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_find_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                            uint32_t pointer, uint32_t pointer_generation);
 /* The one there is, or a new one in a place that is free or not wanted; NULL: full. */
-hapi_contact_slot *hapi_slots_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                       uint32_t pointer, uint32_t pointer_generation);
 /* In a place that is free or not wanted; NULL: full. */
-hapi_contact_slot *hapi_slots_new_contact(hapi_physics *physics, uint32_t body, dGeomID geom,
+hapi_contact_slot *hapi_slots_new_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                           uint32_t pointer, uint32_t pointer_generation);
-void hapi_slots_begin_model(hapi_physics *physics); /* nothing wanted yet */
-void hapi_slots_end_model(hapi_physics *physics);   /* what is not wanted retires */
-void hapi_slots_release(hapi_physics *physics);     /* retired ones the loop is done with */
-void hapi_slots_drop_body(hapi_physics *physics, uint32_t known); /* the body is gone */
+void hapi_slots_begin_model(hapi_nearby *nearby); /* nothing wanted yet */
+void hapi_slots_end_model(hapi_nearby *nearby);   /* what is not wanted retires */
+void hapi_slots_release(hapi_nearby *nearby);     /* retired ones the loop is done with */
+void hapi_slots_drop_body(hapi_nearby *nearby, uint32_t known); /* the body is gone */
 void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE's state */
 void hapi_slots_renew(hapi_body_slot *slot);   /* and forgets what it summed up, too */
 /* Roles of the bodies in the model to come, as testing simulations have changed them. */
 void hapi_slots_set_flags(hapi_slots *slots, uint32_t body, uint32_t flags);
-void hapi_slots_reset(hapi_physics *physics);
+void hapi_slots_reset(hapi_nearby *nearby);
 
 #endif

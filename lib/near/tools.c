@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/pose.h"
-#include "physics/physics_internal.h"
+#include "near/near.h"
 #include "sync/mesh_filter.h"
 
 /* Pointers that are hulls: the patches between them and the geoms near them. Models SINGLE, IMPULSE and
@@ -26,7 +27,7 @@ static hapi_touch_side side_of_pointer(const hapi_tool_at *at, const hap_pose *p
                            .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
 }
 
-static void in_body(const hapi_touch_side *side, hap_pose *out)
+static void shape_in_body(const hapi_touch_side *side, hap_pose *out)
 {
   *out = side->pose;
   if (side->body != NULL) {
@@ -39,8 +40,8 @@ static void in_body(const hapi_touch_side *side, hap_pose *out)
 
 /* ---- what is found ---- */
 
-typedef struct search {
-  hapi_physics *physics;
+typedef struct tool_search {
+  hapi_nearby *nearby;
   const hapi_state_pointer *pointer;
   uint32_t index; /* of the pointer */
   hapi_touch_side tool;
@@ -51,10 +52,12 @@ typedef struct search {
   hapi_found_point found[HAPI_TOOL_SPOTS];
   uint32_t count;
   uint32_t patches;
-} search;
+} tool_search;
 
-static void add_point(search *s, const hapi_touch_side *other, const hapi_patch_point *in)
+static void add_point(tool_search *s, const hapi_touch_side *other, const hapi_patch_point *in)
 {
+  HAPI_ASSERT(s->count < HAPI_TOOL_SPOTS);
+  HAPI_ASSERT_UNIT(in->normal);
   hapi_found_point *out = &s->found[s->count++];
   memset(out, 0, sizeof *out);
   out->slot = HAPI_NONE;
@@ -69,11 +72,12 @@ static void add_point(search *s, const hapi_touch_side *other, const hapi_patch_
 }
 
 /* Against one shape; corners: of a triangle of a mesh, NULL else. */
-static void add_shape(search *s, hapi_touch_side *other, const double *corners, uint32_t open_edges)
+static void add_shape(tool_search *s, hapi_touch_side *other, const double *corners,
+                      uint32_t open_edges)
 {
   hapi_patch patch;
   other->body = s->has_body ? &s->body_pose : NULL;
-  in_body(other, &other->shape_pose);
+  shape_in_body(other, &other->shape_pose);
   if (!hapi_tool_patch(&s->tool, other, s->margin, s->pointer->extent, &patch)) {
     return;
   }
@@ -89,7 +93,7 @@ static void add_shape(search *s, hapi_touch_side *other, const double *corners, 
   ++s->patches;
 }
 
-static void box_about(const search *s, double box[6])
+static void search_box(const tool_search *s, double box[6])
 {
   double far = s->pointer->extent + s->margin;
   for (int k = 0; k < 3; ++k) {
@@ -98,21 +102,21 @@ static void box_about(const search *s, double box[6])
   }
 }
 
-static void add_mesh(search *s, dGeomID geom)
+static void add_mesh(tool_search *s, dGeomID geom)
 {
   double box[6];
-  box_about(s, box);
-  s->physics->near.range.number =
-      s->physics->cycle.model_number + 1; /* as its walk will: of this cycle */
-  uint32_t count = hapi_mesh_near(s->physics, geom, box);
+  search_box(s, box);
+  s->nearby->range.number =
+      s->nearby->cycle->model_number + 1; /* as its walk will: of this cycle */
+  uint32_t count = hapi_mesh_near(s->nearby, geom, box);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    const hapi_near_triangle *triangle = &s->physics->near.meshes.found[i];
+    const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
     hapi_touch_side other = {
         .pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}},
         .shape = {.kind = HAPI_SHAPE_HULL, .hull = triangle->corners, .hull_count = 3}};
     add_shape(s, &other, triangle->corners, triangle->open_edges);
   }
-  s->physics->counts.own.stats.model.capacity_dropped += count == HAPI_NEAR_TRIANGLES;
+  s->nearby->counts.dropped += count == HAPI_NEAR_TRIANGLES;
 }
 
 bool hapi_tool_knows(dGeomID geom)
@@ -131,29 +135,29 @@ bool hapi_tool_knows(dGeomID geom)
   }
 }
 
-static void say_not_touched(hapi_physics *physics)
+static void say_not_touched(hapi_nearby *nearby)
 {
   const char *text =
       "a pointer that is a hull does not touch heightfields and geoms of user-made "
       "classes; take a trimesh there";
-  hapi_say_once(&physics->cycle, &physics->near.tools.said_not_touched, text);
+  hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched, text);
 }
 
-static void add_geom(search *s, dGeomID geom)
+static void add_geom(tool_search *s, dGeomID geom)
 {
   hapi_touch_side other;
   if (!hapi_tool_knows(geom)) {
-    say_not_touched(s->physics);
+    say_not_touched(s->nearby);
   } else if (dGeomGetClass(geom) == dTriMeshClass) {
     add_mesh(s, geom);
   } else if (dGeomGetClass(geom) == dConvexClass
-                 ? hapi_hull_of_convex(s->physics, geom, &other.shape, &other.pose)
+                 ? hapi_hull_of_convex(s->nearby, geom, &other.shape, &other.pose)
                  : hapi_shape_of_geom(geom, &other.shape, &other.pose)) {
     add_shape(s, &other, NULL, 0);
   }
 }
 
-static void reduce(search *s)
+static void search_reduce(tool_search *s)
 {
   hapi_tool_spots spots;
   uint32_t kept[HAPI_TOOL_PAIR_POINTS];
@@ -178,21 +182,21 @@ static void reduce(search *s)
 
 /* ---- hits ---- */
 
-uint64_t hapi_tool_geom_key(hapi_physics *physics, dGeomID geom, uint32_t pointer)
+uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
 {
-  uint32_t known = hapi_bodies_find(&physics->world.bodies, dGeomGetBody(geom));
-  uint32_t slot = known != HAPI_NONE ? physics->world.bodies.entries[known].slot : HAPI_NONE;
-  uint64_t holder = slot != HAPI_NONE ? physics->near.slots.bodies[slot].generation : 0;
-  uint64_t name =
-      hapi_geom_names_get(&physics->near.tools.names, geom, physics->cycle.model_number + 1);
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(geom));
+  uint32_t slot = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_NONE;
+  uint64_t holder = slot != HAPI_NONE ? nearby->slots.bodies[slot].generation : 0;
+  uint64_t name = hapi_geom_names_get(&nearby->tools.names, geom, nearby->cycle->model_number + 1);
   uint64_t key = name + (holder << 48);
-  return hapi_tool_key(key, pointer, hapi_state_pointers(physics->cycle.state)[pointer].generation);
+  return hapi_tool_key(key, pointer, hapi_state_pointers(nearby->cycle->state)[pointer].generation);
 }
 
-static void begin(search *s, hapi_physics *physics, const hapi_tool_at *at, const hap_pose *pose)
+static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
+                         const hap_pose *pose)
 {
   dBodyID body = dGeomGetBody(at->geom);
-  s->physics = physics;
+  s->nearby = nearby;
   s->index = at->index;
   s->pointer = at->pointer;
   s->tool = side_of_pointer(at, pose);
@@ -205,7 +209,7 @@ static void begin(search *s, hapi_physics *physics, const hapi_tool_at *at, cons
 }
 
 /* How fast a point of the pointer may come nearer to the geom. */
-static double speed_of(const hapi_tool_at *at)
+static double approach_speed(const hapi_tool_at *at)
 {
   const hapi_state_pointer *pointer = at->pointer;
   return hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
@@ -214,26 +218,27 @@ static double speed_of(const hapi_tool_at *at)
 }
 
 /* The points of the pointer where that pose puts it. */
-static void find(search *s, hapi_physics *physics, const hapi_tool_at *at, const hap_pose *pose)
+static void search_find(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
+                        const hap_pose *pose)
 {
-  begin(s, physics, at, pose);
-  s->margin = fmin(at->reach, hapi_neighbors_reach(speed_of(at), at->horizon));
+  search_begin(s, nearby, at, pose);
+  s->margin = fmin(at->reach, hapi_neighbors_reach(approach_speed(at), at->horizon));
   add_geom(s, at->geom);
 }
 
-uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
+uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
                           hapi_found_point out[HAPI_TOOL_SPOTS])
 {
-  search s;
-  find(&s, physics, at, &at->pointer->pose);
-  reduce(&s);
+  tool_search s;
+  search_find(&s, nearby, at, &at->pointer->pose);
+  search_reduce(&s);
   memcpy(out, s.found, s.count * sizeof *out);
   return s.count;
 }
 
-static void fill_hit(hapi_physics *physics, const search *s, hapi_hit *out)
+static void fill_hit(hapi_nearby *nearby, const tool_search *s, hapi_hit *out)
 {
-  hapi_tool_search *tools = &physics->near.tools;
+  hapi_tool_search *tools = &nearby->tools;
   uint32_t deepest = 0;
   for (uint32_t i = 1; i < s->count; ++i) {
     deepest = s->found[i].gap < s->found[deepest].gap ? i : deepest;
@@ -244,89 +249,90 @@ static void fill_hit(hapi_physics *physics, const search *s, hapi_hit *out)
   hapi_pose_point(s->tool.pose.position, s->tool.pose.quat_wxyz, best->tool.at.core_a,
                   out->nearest.point_a);
   hapi_v3_copy(out->nearest.point_a, out->nearest.point_b);
+  HAPI_ASSERT(s->count > 0 && tools->count + s->count <= tools->capacity);
   out->tool_first = tools->count;
   out->tool_count = s->count;
   memcpy(&tools->points[tools->count], s->found, s->count * sizeof s->found[0]);
   tools->count += s->count;
 }
 
-bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out)
+bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out)
 {
-  search s;
+  tool_search s;
   const hapi_state_pointer *pointer =
-      &hapi_state_pointers(physics->cycle.state)[candidate->pointer];
+      &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
   const hapi_tool_at at = {.geom = candidate->geom,
                            .index = candidate->pointer,
                            .pointer = pointer,
-                           .hull = &hapi_state_hulls(physics->cycle.state)[candidate->pointer],
-                           .key = hapi_tool_geom_key(physics, candidate->geom, candidate->pointer),
+                           .hull = &hapi_state_hulls(nearby->cycle->state)[candidate->pointer],
+                           .key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer),
                            .reach = candidate->reach,
-                           .horizon = physics->cycle.probe_step_s};
+                           .horizon = nearby->cycle->probe_step_s};
   hap_pose pose = pointer->pose;
-  if (!hapi_physics_steps_to_now(physics)) {
+  if (!hapi_cycle_steps_to_now(nearby->cycle)) {
     hapi_pose_move(&pose, &pointer->twist, at.horizon);
   }
   for (int attempt = 0; attempt < 2; ++attempt) {
-    find(&s, physics, &at, &pose);
+    search_find(&s, nearby, &at, &pose);
     bool buried = s.count == 0 || s.found[0].gap < -0.25 * pointer->extent;
-    if (!buried || hapi_physics_steps_to_now(physics)) {
+    if (!buried || hapi_cycle_steps_to_now(nearby->cycle)) {
       break;
     }
     pose = pointer->pose; /* the far face must not be taken for the near one */
   }
-  reduce(&s);
-  if (s.count == 0 ||
-      !hapi_reserve((void **)&physics->near.tools.points, &physics->near.tools.capacity,
-                    physics->near.tools.count, s.count, sizeof s.found[0])) {
+  search_reduce(&s);
+  if (s.count == 0 || !hapi_reserve((void **)&nearby->tools.points, &nearby->tools.capacity,
+                                    nearby->tools.count, s.count, sizeof s.found[0])) {
     return false;
   }
-  fill_hit(physics, &s, out);
+  fill_hit(nearby, &s, out);
   return true;
 }
 
 /* ---- contacts ---- */
 
-static double apart(const hapi_contact_slot *slot, const hapi_found_point *point)
+static double point_apart(const hapi_contact_slot *slot, const hapi_found_point *point)
 {
   double way[3];
   hapi_v3_sub(slot->tool.at.core_a, point->tool.at.core_a, way);
   return hapi_v3_norm(way);
 }
 
-static uint32_t find_slot(hapi_physics *physics, uint32_t body, const hapi_hit *hit,
-                          const hapi_found_point *point)
+static uint32_t slot_of_point(hapi_nearby *nearby, uint32_t body, const hapi_hit *hit,
+                              const hapi_found_point *point)
 {
   double best = point->tool.same_within;
   uint32_t chosen = HAPI_NONE;
-  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
-    const hapi_contact_slot *slot = &physics->near.slots.contacts[i];
+  for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
+    const hapi_contact_slot *slot = &nearby->slots.contacts[i];
     if (slot->phase == HAPI_SLOT_LIVE && slot->is_tool && !slot->wanted && slot->body == body &&
         slot->geom == hit->geom && slot->pointer == hit->pointer &&
-        slot->pointer_generation == point->tool.pointer_generation && apart(slot, point) < best) {
-      best = apart(slot, point);
+        slot->pointer_generation == point->tool.pointer_generation &&
+        point_apart(slot, point) < best) {
+      best = point_apart(slot, point);
       chosen = i;
     }
   }
   return chosen;
 }
 
-void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body)
+void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body)
 {
   for (uint32_t i = 0; i < hit->tool_count; ++i) {
-    hapi_found_point *point = &physics->near.tools.points[hit->tool_first + i];
-    point->slot = find_slot(physics, body, hit, point);
+    hapi_found_point *point = &nearby->tools.points[hit->tool_first + i];
+    point->slot = slot_of_point(nearby, body, hit, point);
     if (point->slot != HAPI_NONE) {
-      physics->near.slots.contacts[point->slot].wanted = true;
+      nearby->slots.contacts[point->slot].wanted = true;
     }
   }
 }
 
 #define SAME_COSINE 0.7 /* of the normals: else it does not go on with the old one's force */
 
-static void place_slot(hapi_physics *physics, hapi_contact_slot *slot, const hapi_hit *hit,
+static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                        const hapi_found_point *point)
 {
-  const hapi_state_pointer *pointer = &hapi_state_pointers(physics->cycle.state)[hit->pointer];
+  const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
   dBodyID body = dGeomGetBody(hit->geom);
   double normal[3];
   hapi_pose_point(pointer->pose.position, pointer->pose.quat_wxyz, point->tool.at.core_a,
@@ -354,21 +360,21 @@ static void place_slot(hapi_physics *physics, hapi_contact_slot *slot, const hap
   slot->tool.mu = hit->mu;
   slot->tool.at.body_b = slot->body;
   slot->tool.at.generation_b =
-      slot->body != HAPI_SLOT_NONE ? physics->near.slots.bodies[slot->body].generation : 0;
+      slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].generation : 0;
 }
 
-void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body)
+void hapi_tool_take(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body)
 {
-  for (uint32_t i = 0; i < hit->tool_count && physics->cycle.model != HAP_MODEL_CONTACT; ++i) {
-    const hapi_found_point *point = &physics->near.tools.points[hit->tool_first + i];
+  for (uint32_t i = 0; i < hit->tool_count && nearby->cycle->model != HAP_MODEL_CONTACT; ++i) {
+    const hapi_found_point *point = &nearby->tools.points[hit->tool_first + i];
     hapi_contact_slot *slot = point->slot != HAPI_NONE
-                                  ? &physics->near.slots.contacts[point->slot]
-                                  : hapi_slots_new_contact(physics, body, hit->geom, hit->pointer,
+                                  ? &nearby->slots.contacts[point->slot]
+                                  : hapi_slots_new_contact(nearby, body, hit->geom, hit->pointer,
                                                            point->tool.pointer_generation);
     if (slot == NULL) {
-      ++physics->counts.own.stats.model.capacity_dropped;
+      ++nearby->counts.dropped;
       return;
     }
-    place_slot(physics, slot, hit, point);
+    slot_place(nearby, slot, hit, point);
   }
 }

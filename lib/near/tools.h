@@ -38,17 +38,17 @@ typedef struct hapi_tool_search {
   hapi_found_point *points;
   uint32_t count;
   uint32_t capacity;
-  hapi_geom_names names; /* of the geoms near hulls */
+  hapi_geom_names names;
   bool said_not_touched; /* of a heightfield by a hull, once a session */
 } hapi_tool_search;
 
 bool hapi_tool_knows(dGeomID geom); /* whether they can touch it */
-bool hapi_tool_find(hapi_physics *physics, const hapi_candidate *candidate, hapi_hit *out);
+bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out);
 /* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
-uint32_t hapi_tool_points(hapi_physics *physics, const hapi_tool_at *at,
+uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
                           hapi_found_point out[HAPI_TOOL_SPOTS]);
-uint64_t hapi_tool_geom_key(hapi_physics *physics, dGeomID geom, uint32_t pointer);
-void hapi_tool_keep_places(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
-void hapi_tool_take(hapi_physics *physics, const hapi_hit *hit, uint32_t body);
+uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
+void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
+void hapi_tool_take(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
 
 #endif

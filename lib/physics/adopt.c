@@ -22,7 +22,7 @@ static void listener_body_begun(void *user, uint32_t index)
 static void listener_body_gone(void *user, uint32_t index)
 {
   hapi_physics *physics = user;
-  hapi_slots_drop_body(physics, index);
+  hapi_slots_drop_body(&physics->near, index);
   for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
     if (physics->account.watch[i] == index) {
       physics->account.watch[i] = HAPI_NONE;
@@ -89,21 +89,9 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 {
-  for (uint32_t i = 0; i < physics->near.slots.contact_high; ++i) {
-    if (physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE &&
-        physics->near.slots.contacts[i].geom == geom) {
-      physics->near.slots.contacts[i].phase = HAPI_SLOT_FREE;
-    }
-  }
-  for (uint32_t i = 0; i < physics->near.neighbors.candidate_count; ++i) {
-    hapi_candidate *candidate = &physics->near.neighbors.candidates[i];
-    candidate->geom = candidate->geom == geom ? NULL : candidate->geom;
-  }
   physics->world.bodies.geoms_forgotten = true;
-  hapi_geom_names_forget(&physics->near.range.names, (dGeomID)(uintptr_t)geom);
-  hapi_geom_names_forget(&physics->near.tools.names, (dGeomID)(uintptr_t)geom);
+  hapi_nearby_forget_geom(&physics->near, (dGeomID)(uintptr_t)geom);
   hapi_lookback_forget_geom(&physics->lookback, (dGeomID)(uintptr_t)geom);
-  hapi_meshes_forget(&physics->near.meshes, (dGeomID)(uintptr_t)geom);
 }
 
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,

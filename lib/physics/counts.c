@@ -32,23 +32,26 @@ static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
   io_stats->error.spoilt = physics->lookback.counts.spoilt;
   io_stats->error.force_error = physics->lookback.counts.force_error;
   io_stats->error.force_error_n = physics->lookback.counts.force_error_n;
+  const hapi_near_counts *near = &physics->near.counts;
+  io_stats->model.capacity_dropped += near->dropped;
+  io_stats->model.range_bodies = near->range_bodies;
+  io_stats->model.edge_bodies = near->edge_bodies;
+  io_stats->model.measured_bodies = near->measured_bodies;
+  io_stats->model.range_joints = near->range_joints;
+  io_stats->physics.last.range_ms = 1e3 * near->last_range_s;
 }
 
 void hapi_counts_show(hapi_physics *physics)
 {
   pthread_mutex_lock(&physics->counts.lock);
   physics->counts.shown = physics->counts.own;
+  physics->counts.shown.range_s = physics->near.counts.range_s;
+  physics->counts.shown.beyond_s = physics->near.counts.beyond_s;
   counts_gather(physics, &physics->counts.shown.stats);
   physics->counts.shown.cross_s = physics->research.cross.counts.seconds;
   physics->counts.shown.foretold2 = physics->research.range.foretold2;
   physics->counts.shown.range_error2 = physics->research.range.error2;
   pthread_mutex_unlock(&physics->counts.lock);
-}
-
-void hapi_counts_range(hapi_physics *physics, double seconds)
-{
-  physics->counts.own.range_s += seconds;
-  physics->counts.own.stats.physics.last.range_ms = 1e3 * seconds;
 }
 
 void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)

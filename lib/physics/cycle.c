@@ -174,7 +174,7 @@ void hapi_physics_test_range(hapi_physics *physics)
   /* Not in the collision phase: who asks for a surface first says in which order a pair is looked at. */
   physics->world.counts.contacts_rejected +=
       hapi_world_collide_carried(&physics->world, &physics->cycle);
-  hapi_range_error_measure(range, &physics->cycle, &physics->world, &physics->near.slots);
+  hapi_range_error_measure(range, &physics->cycle, &physics->world, &physics->near);
   dJointGroupEmpty(physics->world.carried_group);
 }
 
@@ -254,15 +254,16 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[4] += lap(&watch);
   hapi_physics_collide(physics);
   seconds[0] += lap(&watch);
-  hapi_neighbors_collect(physics);
+  hapi_neighbors_collect(&physics->near);
   seconds[1] = lap(&watch);
   global_step(physics);
   seconds[3] = lap(&watch);
   hapi_reconcile_residual(physics);
   hapi_reconcile_overwrite(physics);
-  hapi_neighbors_find(physics);
-  seconds[1] += lap(&watch) - physics->near.range.cover.boxes_s;
-  seconds[0] += physics->near.range.cover.boxes_s; /* which the next collision phase finds done */
+  hapi_neighbors_find(&physics->near);
+  seconds[1] += lap(&watch) - physics->near.range.links.cover.boxes_s;
+  seconds[0] +=
+      physics->near.range.links.cover.boxes_s; /* which the next collision phase finds done */
   hapi_physics_test_range(physics); /* first: it leaves the space as it finds it, which is clean */
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,

@@ -13,28 +13,16 @@
 
 /* Life of the physics side: create, begin, end, destroy; what the session asks it for. */
 
-#define CANDIDATES_PER_CONTACT 8u
 #define LAST_ROUNDS 16 /* of edits, when the session stops: also of what edits post */
 
 static bool allocate(hapi_physics *physics, const hap_ode_def *ode)
 {
   const hapi_capacity *c = &physics->config.capacity;
-  hapi_neighbors *hood = &physics->near.neighbors;
-  hood->candidate_capacity = CANDIDATES_PER_CONTACT * c->contacts; /* grows when needed */
-  physics->near.slots.bodies = hapi_alloc_array(c->bodies, sizeof *physics->near.slots.bodies);
-  physics->near.slots.contacts =
-      hapi_alloc_array(c->contacts, sizeof *physics->near.slots.contacts);
-  hood->candidates = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->candidates);
-  hood->hits = hapi_alloc_array(hood->candidate_capacity, sizeof *hood->hits);
-  hood->vertices = hapi_alloc_array(HAPI_HULL_POINTS, sizeof *hood->vertices);
-  hood->hull = hapi_alloc_array(HAPI_HULL_POINTS, 3 * sizeof *hood->hull);
-  return physics->near.slots.bodies != NULL && physics->near.slots.contacts != NULL &&
-         hood->candidates != NULL && hood->hits != NULL && hood->vertices != NULL &&
-         hood->hull != NULL && hapi_probe_create(&physics->probe, c) &&
+  return hapi_probe_create(&physics->probe, c) &&
          hapi_cross_create(&physics->research.cross, &physics->cycle, &physics->near.slots,
                            &physics->probe) &&
-         hapi_range_error_create(&physics->research.range, c) && hapi_range_create(physics) &&
-         hapi_cover_create(&hood->cover) &&
+         hapi_range_error_create(&physics->research.range, c) &&
+         hapi_nearby_create(&physics->near, &physics->world, &physics->cycle) &&
          hapi_world_create(&physics->world, ode, c->joints, &physics->listener);
 }
 
@@ -109,7 +97,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   atomic_init(&physics->wanted.model, (int)config->model);
   atomic_init(&physics->wanted.effects, config->effects);
   physics->lookback.asker =
-      (hapi_lookback_asker){physics, ask_nearest, ask_tool_points, ask_tool_key};
+      (hapi_lookback_asker){&physics->near, ask_nearest, ask_tool_points, ask_tool_key};
   physics->dial.knobs = config->knobs;
   atomic_init(&physics->dial.wanted, config->accuracy);
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
@@ -119,9 +107,6 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
-  physics->near.neighbors.probe_geom = dCreateSphere(NULL, 1.0);
-  physics->near.neighbors.plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
-  hapi_slots_reset(physics);
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
     hapi_physics_destroy(physics);
@@ -137,27 +122,13 @@ void hapi_physics_destroy(hapi_physics *physics)
     return;
   }
   hapi_physics_end(physics);
-  if (physics->near.neighbors.probe_geom != NULL) {
-    dGeomDestroy(physics->near.neighbors.probe_geom);
-    dGeomDestroy(physics->near.neighbors.plane_geom);
-  }
+  hapi_nearby_finish(&physics->near);
   hapi_world_finish(&physics->world);
   hapi_poses_finish(&physics->drawing);
-  hapi_range_finish(physics);
-  hapi_meshes_finish(&physics->near.meshes);
   hapi_probe_finish(&physics->probe);
   hapi_cross_finish(&physics->research.cross);
   hapi_range_error_finish(&physics->research.range);
   hapi_lookback_finish(&physics->lookback);
-  hapi_free(physics->near.slots.bodies);
-  hapi_free(physics->near.slots.contacts);
-  hapi_cover_finish(&physics->near.neighbors.cover);
-  hapi_free(physics->near.neighbors.candidates);
-  hapi_free(physics->near.neighbors.hits);
-  hapi_free(physics->near.tools.points);
-  hapi_geom_names_finish(&physics->near.tools.names);
-  hapi_free(physics->near.neighbors.vertices);
-  hapi_free(physics->near.neighbors.hull);
   hapi_fair_lock_finish(&physics->lock.fair);
   pthread_mutex_destroy(&physics->edits.lock);
   pthread_mutex_destroy(&physics->drawing.lock);
@@ -201,8 +172,8 @@ static void build_first_model(hapi_physics *physics)
   hapi_physics_enter_dial(physics);
   hapi_reconcile_take(physics);
   hapi_physics_collide(physics);
-  hapi_neighbors_collect(physics);
-  hapi_neighbors_find(physics);
+  hapi_neighbors_collect(&physics->near);
+  hapi_neighbors_find(&physics->near);
   hapi_physics_test(physics);
   hapi_physics_test_range(physics);
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
@@ -211,7 +182,10 @@ static void build_first_model(hapi_physics *physics)
 static void prepare(hapi_physics *physics)
 {
   reset_figures(physics);
-  hapi_range_reset(physics);
+  hapi_nearby_reset(&physics->near);
+  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
+    physics->world.bodies.entries[i].loop_owned = false;
+  }
   hapi_lookback_reset(&physics->lookback);
   hapi_dial_reset(
       &physics->dial,
@@ -220,7 +194,6 @@ static void prepare(hapi_physics *physics)
   hapi_probe_reset(&physics->probe);
   hapi_cross_reset(&physics->research.cross);
   hapi_range_error_reset(&physics->research.range);
-  hapi_meshes_finish(&physics->near.meshes); /* the application may have changed them */
   physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
   physics->cycle.wishes = atomic_load(&physics->wanted.effects);
   physics->cycle.probe_step_s = hapi_period_of(physics, physics->cycle.model);
@@ -242,7 +215,8 @@ static void prepare(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->world.begun = true;
-  hapi_slots_reset(physics); /* of a session before: the scan leaves what is local to others */
+  hapi_slots_reset(
+      &physics->near); /* of a session before: the scan leaves what is local to others */
   hapi_joints_reset(
       &physics->world.joints); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
@@ -360,5 +334,5 @@ void hapi_physics_set_budget(hapi_physics *physics, double tick_share, double ph
 
 bool hapi_physics_steps_to_now(const hapi_physics *physics)
 {
-  return physics->cycle.model != HAP_MODEL_IMPULSE;
+  return hapi_cycle_steps_to_now(&physics->cycle);
 }

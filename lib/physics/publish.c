@@ -174,7 +174,7 @@ static uint32_t count_bounces(const hapi_physics *physics, hapi_model *model)
 static void count_model(hapi_physics *physics, const hapi_model *model)
 {
   hap_stats *stats = &physics->counts.own.stats;
-  stats->model.neighbours = hapi_neighbors_bodies(physics);
+  stats->model.neighbours = hapi_neighbors_bodies(&physics->near);
   stats->model.pointer_contacts = model->contact_count;
   if (physics->cycle.model == HAP_MODEL_CONTACT && physics->near.range.number == model->number) {
     stats->model.pointer_contacts +=
@@ -191,9 +191,9 @@ static void publish_joints(hapi_physics *physics, hapi_model *out)
   const hapi_publishing p = {&physics->cycle, &physics->world, &physics->near.slots};
   out->joint_count = 0;
   if (physics->cycle.model == HAP_MODEL_CONTACT && range->number == physics->cycle.model_number) {
-    hapi_joints_take_slots(&physics->world.joints, range->number, range->joints,
-                           range->joint_count);
-    hapi_publish_joints(&p, range->joints, range->joint_count, out);
+    hapi_joints_take_slots(&physics->world.joints, range->number, range->mechanism.joints,
+                           range->mechanism.joint_count);
+    hapi_publish_joints(&p, range->mechanism.joints, range->mechanism.joint_count, out);
   }
 }
 
@@ -243,6 +243,7 @@ void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_f
   hapi_effects_note(physics->counts.own.effects, &physics->cycle, &physics->world, &physics->near,
                     &physics->probe.answers, out);
   hapi_tape_model(physics);
-  hapi_range_publish(physics); /* first: the contact thread waits for the loop to use the model */
+  hapi_range_publish(
+      &physics->near); /* first: the contact thread waits for the loop to use the model */
   hapi_exchange_model_publish(physics->config.exchange);
 }

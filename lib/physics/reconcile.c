@@ -370,5 +370,5 @@ void hapi_reconcile_leave(hapi_physics *physics)
       read_velocity(body, slot->left_velocity);
     }
   }
-  hapi_slots_release(physics);
+  hapi_slots_release(&physics->near);
 }

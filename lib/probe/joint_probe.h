@@ -17,16 +17,6 @@
 
 typedef struct hapi_probe hapi_probe;
 
-typedef struct hapi_joint_measurement {
-  bool good;      /* what follows holds */
-  uint32_t first; /* of the joint's bodies, the one that was pushed */
-  hapi_measured_joint found;
-  hapi_joint_place place;
-  double turn[2][4]; /* orientations of the pushed body and the other one, world */
-  double held[6][6]; /* see hapi_admittance_rows, world axes */
-  double error;      /* 0.., what turning the measurement before this one on would have missed */
-} hapi_joint_measurement;
-
 /* Of the joints that the range's walk of this number has taken, and of those that kept it from taking
  * a mechanism. Their measurements belong to the joints. */
 void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,

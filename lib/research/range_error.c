@@ -93,15 +93,16 @@ void hapi_range_error_compare(hapi_range_error *range, const hapi_cycle *cycle,
 
 /* The islands of the neighbours that the loop owns, as far as they can be undone. */
 static hap_status owned_gather(hapi_range_error *range, const hapi_cycle *cycle,
-                               const hapi_world *world, const hapi_slots *slots)
+                               const hapi_world *world, const hapi_nearby *near)
 {
+  const hapi_slots *slots = &near->slots;
   range->body_count = 0;
   hap_status status = hapi_test_begin(&range->test, world, cycle->probe_step_s);
   for (uint32_t i = 0; i < slots->body_high && status >= HAP_OK; ++i) {
     const hapi_body_slot *slot = &slots->bodies[i];
     bool owned = slot->phase == HAPI_SLOT_LIVE && (slot->flags & HAPI_BODY_OWNED) != 0;
     if (!owned || (slot->flags & HAPI_BODY_RESTING) != 0 ||
-        world->bodies.entries[slot->known].rest->chosen_in != cycle->model_number + 1) {
+        !hapi_nearby_chose(near, slot->known, cycle->model_number + 1)) {
       continue;
     }
     bool testable = false;
@@ -195,16 +196,16 @@ static void bodies_foretell(hapi_range_error *range, const hapi_slots *slots)
 }
 
 void hapi_range_error_measure(hapi_range_error *range, const hapi_cycle *cycle,
-                              const hapi_world *world, const hapi_slots *slots)
+                              const hapi_world *world, const hapi_nearby *near)
 {
-  hap_status status = owned_gather(range, cycle, world, slots);
+  hap_status status = owned_gather(range, cycle, world, near);
   if (status >= HAP_OK && range->body_count > 0) {
     status = hapi_test_enter(&range->test);
   }
   if (status < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; no error of the range is told");
   } else if (range->body_count > 0) {
-    bodies_foretell(range, slots);
+    bodies_foretell(range, &near->slots);
     hapi_test_leave(&range->test);
   }
 }

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "near/near.h"
 #include "probe/probe.h"
 
 /* What the world was going to do with an owned body. */
@@ -41,6 +42,6 @@ void hapi_range_error_compare(hapi_range_error *range, const hapi_cycle *cycle,
                               const hapi_world *world, const hapi_slots *slots);
 /* The next one. The contacts of what the loop carries are in ODE meanwhile. */
 void hapi_range_error_measure(hapi_range_error *range, const hapi_cycle *cycle,
-                              const hapi_world *world, const hapi_slots *slots);
+                              const hapi_world *world, const hapi_nearby *near);
 
 #endif

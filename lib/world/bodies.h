@@ -45,12 +45,7 @@ typedef struct hapi_known_rest {
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  uint64_t chosen_in; /* scratch: model that it was chosen for */
-  uint64_t ranged_in; /* scratch: walk that met it */
-  int32_t hops; /* scratch: of that walk, from the neighbours; of a mechanism they are those of
-                           the body that it was met by */
-  uint64_t gathered_in; /* scratch: walk that asked whether its mechanism can be owned */
-  double damping[2];    /* scratch of soften.c */
+  double damping[2]; /* scratch of soften.c */
   void (*moved_callback)(dBodyID);
 } hapi_known_rest;
 

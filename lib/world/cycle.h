@@ -28,6 +28,12 @@ typedef struct hapi_cycle {
   bool has_new_state;    /* state came in this cycle */
 } hapi_cycle;
 
+/* The step ends at now: the world is never ahead of the loop. */
+static inline bool hapi_cycle_steps_to_now(const hapi_cycle *cycle)
+{
+  return cycle->model != HAP_MODEL_IMPULSE;
+}
+
 /* To the log and the application, unless *io_said. */
 void hapi_say_once(const hapi_cycle *cycle, bool *io_said, const char *text);
 

@@ -23,7 +23,17 @@ typedef struct hapi_joint_name {
   uint32_t rank; /* among those of the same bodies and type, the oldest first */
 } hapi_joint_name;
 
-typedef struct hapi_joint_measurement hapi_joint_measurement;
+/* The equations of a joint of another kind than the loop has, found by testing simulations
+ * (probe/joint_probe.h). */
+typedef struct hapi_joint_measurement {
+  bool good;      /* what follows holds */
+  uint32_t first; /* of the joint's bodies, the one that was pushed */
+  hapi_measured_joint found;
+  hapi_joint_place place;
+  double turn[2][4]; /* orientations of the pushed body and the other one, world */
+  double held[6][6]; /* see hapi_admittance_rows, world axes */
+  double error;      /* 0.., what turning the measurement before this one on would have missed */
+} hapi_joint_measurement;
 
 typedef struct hapi_known_joint {
   dJointID joint;
