@@ -323,7 +323,7 @@ static void finish(stability_bed *s, double way, int touched, stability_result *
   out->stable = s->finite && tick->guard.latch.fault == HAP_FAULT_NONE &&
                 out->energy_ratio <= STABILITY_RATIO;
   out->held = tick->pointers.of[0].coupling.hold;
-  out->residual = tick->figures.residual_max;
+  out->residual = tick->rows.residual_max;
   out->way = way;
   out->stored = s->stored;
   out->touched = touched;

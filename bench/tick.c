@@ -15,10 +15,13 @@
 #include "contact/contact.h"
 #include "haptic/haptic_internal.h"
 #include "haptic/tick_memory.h"
-#include "local/rows.h"
+#include "local/contact_rows.h"
+#include "local/pointer_rows.h"
+#include "local/tool_place.h"
 #include "session/session_internal.h"
 #include "sync/exchange.h"
 #include "tick/black_box.h"
+#include "tick/report.h"
 #include "tick/tick.h"
 #include "tools/rig.h"
 
@@ -86,6 +89,9 @@ static void copy_touches(hapi_touches *copy, const hapi_touches *from, uint32_t 
 {
   copy->count = from->count;
   copy->pushing = from->pushing;
+  copy->contact_ticks = from->contact_ticks;
+  copy->hand_impulse_abs = from->hand_impulse_abs;
+  memcpy(copy->hand_impulse, from->hand_impulse, sizeof copy->hand_impulse);
   copy->rubs = from->rubs;
   memcpy(copy->of, from->of, from->count * sizeof *copy->of);
   memcpy(copy->ramps, from->ramps, contacts * sizeof *copy->ramps);
@@ -117,6 +123,8 @@ static void copy_joints(hapi_joints *copy, const hapi_joints *from, uint32_t cap
 static void copy_rows(hapi_rows *copy, const hapi_rows *from)
 {
   hapi_solver own = copy->solver;
+  copy->residual_max = from->residual_max;
+  copy->sweeps = from->sweeps;
   copy->solver = from->solver;
   copy->solver.rows = own.rows;
   copy->solver.v = own.v;
@@ -128,7 +136,6 @@ static void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
 {
   const hapi_capacity *c = &from->capacity;
   copy->facts = from->facts;
-  copy->figures = from->figures;
   copy->guard = from->guard;
   copy->sample = from->sample;
   copy->watch = from->watch;
@@ -136,8 +143,9 @@ static void tick_copy_take(hapi_tick *copy, const hapi_tick *from)
   copy_pointers(&copy->pointers, &from->pointers, c->pointers);
   copy_bodies(&copy->bodies, &from->bodies);
   copy_touches(&copy->touches, &from->touches, c->contacts);
-  copy->crosses.count = from->crosses.count;
-  memcpy(copy->crosses.of, from->crosses.of, from->crosses.count * sizeof *copy->crosses.of);
+  copy->touches.crosses.count = from->touches.crosses.count;
+  memcpy(copy->touches.crosses.of, from->touches.crosses.of,
+         from->touches.crosses.count * sizeof *copy->touches.crosses.of);
   copy_contacts(&copy->contacts, &from->contacts);
   copy_joints(&copy->joints, &from->joints, c->joints);
   copy_rows(&copy->rows, &from->rows);
@@ -157,7 +165,7 @@ static double tick_copy_run(hapi_tick *copy)
   return since(begin_ns);
 }
 
-/* As hapi_local_world_step begins. */
+/* As hapi_bodies_begin. */
 static void begin(hapi_tick *tick)
 {
   tick->rows.solver.row_count = 0;
@@ -230,9 +238,11 @@ static void tick_copy_parts(hapi_tick *copy, tick_parts *out)
   begin(copy);
   set_free_velocities(copy);
   int64_t begin_ns = hapi_clock_now();
-  hapi_pointer_rows(copy);
-  hapi_joint_rows(copy);
-  hapi_contact_rows(copy);
+  hapi_tool_place(&copy->touches, &copy->pointers, &copy->bodies, copy->facts.period);
+  hapi_pointer_rows(&copy->facts, &copy->pointers, &copy->bodies, &copy->touches, &copy->rows,
+                    &copy->sample);
+  hapi_joint_rows(&copy->joints, &copy->bodies, &copy->rows, &copy->facts);
+  hapi_contact_rows(&copy->contacts, &copy->bodies, &copy->rows, &copy->facts, &copy->sample);
   out->rows = since(begin_ns);
   out->solve = solve(copy);
   out->again = stop_push_out(copy) ? solve(copy) : 0.0;
@@ -420,9 +430,9 @@ static void measure_copy(tick_bed *t, size_t i)
 {
   const hapi_solver *solver = &t->copy.rows.solver;
   tick_parts parts;
-  uint64_t sweeps = t->copy.figures.sweeps;
+  uint64_t sweeps = t->copy.rows.sweeps;
   t->values[TICK_NS][i] = tick_copy_run(&t->copy);
-  t->values[SWEEPS][i] = (double)(t->copy.figures.sweeps - sweeps);
+  t->values[SWEEPS][i] = (double)(t->copy.rows.sweeps - sweeps);
   t->values[ROWS][i] = solver->row_count;
   t->values[DIRECT_SOLVES][i] = solver->direct_solves;
   for (uint32_t row = 0; row < solver->row_count; ++row) {
@@ -701,7 +711,7 @@ static void guard_measure(guard_bed *g, int runs, uint32_t ticks, double *out_ns
   for (int i = 0; i < runs; ++i) {
     int64_t begin_ns = hapi_clock_now();
     for (uint32_t k = 0; k < ticks; ++k) {
-      hapi_guard_run(&g->tick);
+      hapi_tick_guard(&g->tick);
       hapi_black_box_record(&g->box, &g->tick);
     }
     values[i] = (double)(hapi_clock_now() - begin_ns) / ticks;

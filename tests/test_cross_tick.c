@@ -46,7 +46,7 @@ TEST(a_force_moves_the_other_bodies_by_their_blocks)
     check_v3(f.bodies[i].account.impulse, 0.0, 0.0, 0.0, 0.0);
     check_v3(f.bodies[i].account.angular_impulse, 0.0, 0.0, 0.0, 0.0);
   }
-  check_v3(f.tick.figures.hand_impulse, 4.0 * T, 0.0, 0.0, 1e-15);
+  check_v3(f.tick.touches.hand_impulse, 4.0 * T, 0.0, 0.0, 1e-15);
   f.pointers[0].device.pose.position[0] = f.pointers[1].device.pose.position[0] = -0.1;
   run(5); /* no force, no acceleration */
   check_v3(f.bodies[2].twist.linear, 4.0 * T, 0.0, 0.0, 1e-15);
@@ -80,7 +80,7 @@ TEST(blocks_go_with_their_contact_and_their_body)
   set_up_crosses();
   f.pointers[0].generation = 2; /* gone while the message was on its way */
   adopt();
-  CHECK(f.tick.crosses.count == 2 && f.tick.touches.count == 1);
+  CHECK(f.tick.touches.crosses.count == 2 && f.tick.touches.count == 1);
   run(1);
   press_both();
   run(1);
@@ -89,7 +89,7 @@ TEST(blocks_go_with_their_contact_and_their_body)
   set_up_crosses();
   --f.model->body_count; /* body 3 could not be sent */
   adopt();
-  CHECK(f.tick.crosses.count == 2);
+  CHECK(f.tick.touches.crosses.count == 2);
   run(1);
   press_both();
   run(1);

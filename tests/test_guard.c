@@ -5,6 +5,7 @@
 
 #include "tests/tap.h"
 
+#include "guard/force_guard.h"
 #include "tests/tick_world.h"
 #include "tick/black_box.h"
 
@@ -41,7 +42,7 @@ static void guard_wrench(hapi_pointer *p, double fx, double fy, double fz)
 {
   hapi_v3_set(p->wrench.force, fx, fy, fz);
   hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
-  hapi_guard_run(&f.tick);
+  hapi_tick_guard(&f.tick);
 }
 
 static hapi_pointer *guarded_alone(void)
@@ -108,7 +109,7 @@ TEST(a_million_random_wrenches_keep_limit_and_slew)
     for (int k = 0; k < 3; ++k) {
       p->device.pose.position[k] += 1e-3 * random_number();
     }
-    hapi_guard_run(&f.tick);
+    hapi_tick_guard(&f.tick);
     double force = hapi_v3_norm(p->device.wrench.force);
     double change = distance(p->device.wrench.force, before.force);
     double torque = hapi_v3_norm(p->device.wrench.torque);
@@ -256,7 +257,7 @@ TEST(a_torque_that_is_not_finite_is_a_fault_too)
 {
   hapi_pointer *p = guarded_and_warm();
   p->wrench.torque[2] = (double)NAN;
-  hapi_guard_run(&f.tick);
+  hapi_tick_guard(&f.tick);
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE);
   check_v3(p->device.wrench.torque, 0.0, 0.0, 0.0, 0.0);
 }

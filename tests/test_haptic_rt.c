@@ -79,8 +79,8 @@ TEST(a_static_contact_takes_no_impulse)
   p->device.pose.position[0] = 0.0;
   run(100);
   check_v3(p->device.wrench.force, -10.0, 0.0, 0.0, 1e-11);
-  CHECK(f.tick.figures.contact_ticks == 100);
-  CHECK_NEAR(f.tick.figures.hand_impulse_abs, 0.0, 0.0); /* the audit is about dynamic bodies */
+  CHECK(f.tick.touches.contact_ticks == 100);
+  CHECK_NEAR(f.tick.touches.hand_impulse_abs, 0.0, 0.0); /* the audit is about dynamic bodies */
   CHECK_NEAR(f.tick.guard.peak_force, 10.0, 1e-11);
   hapi_state *state = report();
   check_v3(hapi_state_contacts(state)[0].force, 10.0, 0.0, 0.0, 1e-11);
@@ -217,9 +217,9 @@ TEST(several_pointers_on_one_body_add_up)
   check_v3(f.bodies[1].twist.angular, 0.0, 0.0, -0.16 / 0.01 * T, 1e-14);
   check_v3(f.bodies[1].account.impulse, 6.0 * T, 0.0, 0.0, 1e-15);
   check_v3(f.bodies[1].account.angular_impulse, 0.0, 0.0, -0.16 * T, 1e-15);
-  check_v3(f.tick.figures.hand_impulse, 6.0 * T, 0.0, 0.0, 1e-15);
-  CHECK_NEAR(f.tick.figures.hand_impulse_abs, 6.0 * T, 1e-15);
-  CHECK(f.tick.figures.contact_ticks == 1 && f.tick.touches.pushing == 3);
+  check_v3(f.tick.touches.hand_impulse, 6.0 * T, 0.0, 0.0, 1e-15);
+  CHECK_NEAR(f.tick.touches.hand_impulse_abs, 6.0 * T, 1e-15);
+  CHECK(f.tick.touches.contact_ticks == 1 && f.tick.touches.pushing == 3);
 }
 
 TEST(one_pointer_between_several_bodies)
@@ -272,7 +272,7 @@ TEST(a_driven_body_pushes_and_is_not_pushed)
            1e-9); /* places of the tick before */
   check_v3(f.bodies[0].twist.linear, -0.5, 0.0, 0.0, 0.0);
   check_v3(f.bodies[0].account.impulse, 0.0, 0.0, 0.0, 0.0);
-  CHECK_NEAR(f.tick.figures.hand_impulse_abs, 0.0, 0.0);
+  CHECK_NEAR(f.tick.touches.hand_impulse_abs, 0.0, 0.0);
 }
 
 /* ---- sleep, FOLLOWS, residual ---- */
@@ -429,13 +429,13 @@ TEST(contacts_of_a_pointer_that_has_gone_are_not_used)
   add_contact(0, HAPI_SLOT_NONE, 0)->pointer_generation = 7;
   adopt();
   run(40);
-  CHECK(f.tick.touches.count == 0 && f.tick.figures.contact_ticks == 0);
+  CHECK(f.tick.touches.count == 0 && f.tick.touches.contact_ticks == 0);
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   adopt();
   f.pointers[0].generation = 0;
   run(40);
-  CHECK(f.tick.figures.contact_ticks == 0);
+  CHECK(f.tick.touches.contact_ticks == 0);
 }
 
 /* ---- guard ---- */
@@ -596,7 +596,7 @@ TEST(a_force_that_overflows_is_not_written)
     CHECK(f.tick.guard.latch.fault ==
           (k == 0 ? HAP_FAULT_LOCAL_STATE : HAP_FAULT_FORCE)); /* the first one */
     CHECK(force_is_zero(&f.pointers[0]));
-    CHECK(isfinite(f.tick.guard.peak_force) && hapi_finite(f.tick.figures.hand_impulse, 3));
+    CHECK(isfinite(f.tick.guard.peak_force) && hapi_finite(f.tick.touches.hand_impulse, 3));
   }
 }
 
@@ -791,15 +791,15 @@ TEST(totals_run_on_over_models_and_begin_anew_with_a_generation)
   }
   CHECK_NEAR(expected, 10 * 20 * 5.0 * T, 1e-12); /* every second of 20 intervals */
   CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], expected, 1e-12);
-  CHECK_NEAR(f.tick.figures.hand_impulse[0], expected, 1e-12);
-  CHECK_NEAR(f.tick.figures.hand_impulse_abs, expected, 1e-12);
+  CHECK_NEAR(f.tick.touches.hand_impulse[0], expected, 1e-12);
+  CHECK_NEAR(f.tick.touches.hand_impulse_abs, expected, 1e-12);
   begin_model();
   add_body(0)->generation = 2;
   adopt();
   run(1);
   CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], 0.0, 0.0);
   CHECK(hapi_state_bodies(report())[0].generation == 2);
-  CHECK_NEAR(f.tick.figures.hand_impulse[0], expected, 1e-12);
+  CHECK_NEAR(f.tick.touches.hand_impulse[0], expected, 1e-12);
 }
 
 TEST(the_hash_tells_any_change)

@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "sync/exchange.h"
 #include "tests/tap.h"
+#include "tick/report.h"
 #include "tick/tick.h"
 
 #define T 1e-3
@@ -91,7 +92,7 @@ static inline void set_up(void)
   f.tick.touches.ramp_generations = f.ramp_generations;
   f.tick.touches.frictions = f.frictions;
   f.tick.pointers.of = f.pointers;
-  f.tick.crosses.of = f.crosses;
+  f.tick.touches.crosses.of = f.crosses;
   f.tick.contacts.memory = f.memory[0];
   f.tick.contacts.old_memory = f.memory[1];
   f.tick.contacts.buckets = f.buckets;

@@ -10,6 +10,9 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/pointer_friction.h"
+#include "local/tool_place.h"
+#include "paper/local_dynamics.h"
+#include "paper/render.h"
 #include "tick/tick.h"
 #include "world/world.h"
 
@@ -386,8 +389,11 @@ static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
       hapi_pose_point(pose->position, pose->quat_wxyz, c->point_body, point);
     }
   }
-  hapi_friction_foot(&t->pointers.of[c->pointer], normal, point, foot);
-  hapi_friction_resume(t, c, normal, foot, spring->stretch_body, spring->turn);
+  const hapi_rub_place place = {&t->pointers.of[c->pointer], hapi_bodies_at(&t->bodies, c->body),
+                                normal, foot};
+  hapi_friction_foot(place.pointer, normal, point, foot);
+  hapi_friction_resume(hapi_friction_of(&t->touches, c), t->facts.tick, c, &place,
+                       spring->stretch_body, spring->turn);
 }
 
 static bool is_of(const hapi_tick *t, const hapi_local_contact *c,
@@ -431,7 +437,8 @@ static void resume(hapi_lookback *w)
   for (uint32_t i = 0; i < t->touches.tool.pair_count; ++i) {
     resume_ramp(&t->touches.tool.pairs[i].ramp, &t->touches.tool.pairs[i].seen);
   }
-  hapi_tool_place(t); /* says where the points of hulls are */
+  hapi_tool_place(&t->touches, &t->pointers, &t->bodies,
+                  t->facts.period); /* says where the points of hulls are */
   for (uint32_t i = 0; i < t->touches.count; ++i) {
     hapi_local_contact *c = &t->touches.of[i];
     const hapi_state_spring *spring = c->rubs ? find_spring(w, c) : NULL;
@@ -476,7 +483,7 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
   }
   t->facts.period = at->period;
   hapi_tick_adopt(t, m, t->facts.now_ns);
-  hapi_local_place(t);
+  hapi_local_place(&t->bodies, &t->facts);
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     hapi_v3_set(t->bodies.of[i].account.impulse, 0.0, 0.0, 0.0);
     hapi_v3_set(t->bodies.of[i].account.angular_impulse, 0.0, 0.0, 0.0);
@@ -486,7 +493,7 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
     resume(w);
     w->hand.begun = true;
   }
-  hapi_render(t);
+  hapi_render(&t->facts, &t->pointers, &t->bodies, &t->touches, &t->sample);
   ++t->facts.tick;
   tell(&w->hand);
   push_bodies(w, at->period);

@@ -1,8 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "guard/energy_observer.h"
+
+#include <string.h>
+
 #include "base/vec.h"
 #include "local/pointer_friction.h"
-#include "local/rows.h"
 
 /* The ledger of what the hands may get back. It gains what a hand puts in, and what the world loses;
  * it pays what a hand is given:
@@ -53,7 +56,7 @@ static double spin_energy(const double inertia[9], const double w[3])
   return 0.5 * hapi_v3_dot(w, momentum);
 }
 
-static bool spins(const double w[3])
+static bool body_spins(const double w[3])
 {
   return hapi_v3_dot(w, w) > 0.0;
 }
@@ -69,7 +72,7 @@ static double spin_before(const hapi_local_body *body)
   if (body->round) {
     return round_energy(body, body->start_twist + 3);
   }
-  if (!spins(body->start_twist + 3)) {
+  if (!body_spins(body->start_twist + 3)) {
     return 0.0;
   }
   hapi_m3_apply_transposed(body->rotation, body->start_twist + 3, local);
@@ -82,7 +85,7 @@ static double spin_after(const hapi_local_body *body)
   if (body->round) {
     return round_energy(body, body->twist.angular);
   }
-  if (!spins(body->twist.angular)) {
+  if (!body_spins(body->twist.angular)) {
     return 0.0;
   }
   hapi_quat_unrotate(body->pose.quat_wxyz, body->twist.angular, local);
@@ -110,29 +113,29 @@ static double body_loses(const hapi_local_body *body, double period, double *io_
   return 0.5 * given->mass * hapi_v3_dot(before, before) + spin_before(body) - kinetic + work;
 }
 
-static bool is_owned(const hapi_tick *tick, const hapi_local_body *body)
+static bool moves_owned(const hapi_tick_facts *facts, const hapi_local_body *body)
 {
-  return tick->facts.model == HAP_MODEL_CONTACT && (body->flags & HAPI_BODY_OWNED) != 0;
+  return facts->model == HAP_MODEL_CONTACT && (body->flags & HAPI_BODY_OWNED) != 0;
 }
 
-static double bodies_lose(const hapi_tick *tick, double *io_stored)
+static double bodies_lose(const hapi_tick_facts *facts, const hapi_bodies *bodies,
+                          double *io_stored)
 {
   double sum = 0.0;
-  if (tick->facts.model != HAP_MODEL_CONTACT) {
+  if (facts->model != HAP_MODEL_CONTACT) {
     return 0.0;
   }
-  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
-    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
-    if ((body->flags & HAPI_BODY_RESTING) == 0 && is_owned(tick, body)) {
-      sum += body_loses(body, tick->facts.period, io_stored);
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    const hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if ((body->flags & HAPI_BODY_RESTING) == 0 && moves_owned(facts, body)) {
+      sum += body_loses(body, facts->period, io_stored);
     }
   }
   return sum;
 }
 
 /* J that a contact does on a body in this tick: with the mean of its velocities. */
-static double work_on(const hapi_tick *tick, const hapi_local_body *body,
-                      const hapi_local_contact *c)
+static double work_on(double period, const hapi_local_body *body, const hapi_local_contact *c)
 {
   const double *force = c->force;
   double arm[3];
@@ -143,7 +146,7 @@ static double work_on(const hapi_tick *tick, const hapi_local_body *body,
   double after = hapi_v3_dot(force, body->twist.linear) + hapi_v3_dot(moment, body->twist.angular);
   double before =
       hapi_v3_dot(force, body->start_twist) + hapi_v3_dot(moment, body->start_twist + 3);
-  return 0.5 * tick->facts.period * (after + before);
+  return 0.5 * period * (after + before);
 }
 
 static double half_compliance(const hapi_pointer *p)
@@ -159,36 +162,38 @@ static double contact_stores(const hapi_pointer *p, const hapi_local_contact *c,
 
 /* The same of the paper's models, as hapi_render has noted it: another walk over the contacts would
  * cost as much as a tenth of the tick. */
-static double rendered_gives(const hapi_tick *tick, double *io_stored)
+static double rendered_gives(double period, const hapi_pointers *pointers, double *io_stored)
 {
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0 && p->guard.force2 > 0.0) {
       *io_stored += half_compliance(p) * p->guard.force2;
-      sum += tick->facts.period * p->guard.power;
+      sum += period * p->guard.power;
     }
   }
   return sum;
 }
 
 /* J that bodies of given motion do on the pointers' springs in this tick. */
-static double surfaces_give(const hapi_tick *tick, double *io_stored)
+static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *pointers,
+                            const hapi_bodies *bodies, const hapi_touches *touches,
+                            double *io_stored)
 {
   double sum = 0.0;
-  if (tick->facts.model != HAP_MODEL_CONTACT) {
-    return rendered_gives(tick, io_stored);
+  if (facts->model != HAP_MODEL_CONTACT) {
+    return rendered_gives(facts->period, pointers, io_stored);
   }
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    const hapi_local_contact *c = &tick->touches.of[i];
-    const hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies.of[c->body];
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    const hapi_local_contact *c = &touches->of[i];
+    const hapi_local_body *body = hapi_bodies_at(bodies, c->body);
     double force2 = hapi_v3_dot(c->force, c->force);
     if (!(force2 > 0.0)) {
       continue;
     }
-    *io_stored += contact_stores(&tick->pointers.of[c->pointer], c, force2);
-    if (body != NULL && !is_owned(tick, body)) {
-      sum -= work_on(tick, body, c);
+    *io_stored += contact_stores(&pointers->of[c->pointer], c, force2);
+    if (body != NULL && !moves_owned(facts, body)) {
+      sum -= work_on(facts->period, body, c);
     }
   }
   return sum;
@@ -206,33 +211,33 @@ static double spring_energy(const hapi_pointer *p, double share, double depth)
                                  : p->guard.limit * (depth - 0.5 * p->guard.limit / k);
 }
 
-static void note_limits(hapi_tick *tick)
+static void note_limits(const hapi_guard *guard, const hapi_pointers *pointers)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0) {
       p->guard.limit =
           p->device.force_scale > 0.0 ? p->device.limits.max_force / p->device.force_scale : 0.0;
-      p->guard.felt = p->guard.share * (1.0 - tick->guard.age_loss);
+      p->guard.felt = p->guard.share * (1.0 - guard->age_loss);
     }
   }
 }
 
 /* J that ramps and fading added to the springs in this tick. */
-static double ramps_give(hapi_tick *tick)
+static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
+                         const hapi_touches *touches, uint64_t tick)
 {
-  hapi_guard *guard = &tick->guard;
   double gone = guard->sprung;
   double sum = 0.0;
   guard->sprung = 0.0;
-  note_limits(tick);
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    hapi_local_contact *c = &tick->touches.of[i];
-    const hapi_pointer *p = &tick->pointers.of[c->pointer];
+  note_limits(guard, pointers);
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    hapi_local_contact *c = &touches->of[i];
+    const hapi_pointer *p = &pointers->of[c->pointer];
     hapi_ramp *r = &c->ramp;
     double share = r->share * p->guard.felt;
     double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
-    double rubs = c->mu > 0.0 ? hapi_friction_energy(tick, c) : 0.0;
+    double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
       sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - r->felt_excess);
@@ -249,11 +254,11 @@ static double ramps_give(hapi_tick *tick)
 }
 
 /* J in the springs between devices and proxies, and in the motion of proxies with mass. */
-static double couplings_store(const hapi_tick *tick)
+static double couplings_store(const hapi_pointers *pointers)
 {
   double sum = 0.0;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0 && p->proxied) {
       sum += 0.5 * hapi_v3_dot(p->wrench.force, p->wrench.force) / p->coupling.stiffness;
       sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
@@ -304,23 +309,23 @@ static double port_gave(hapi_pointer *p, double seconds)
   return way > farthest ? hapi_max(gave, 0.0) * farthest / way : hapi_max(gave, 0.0);
 }
 
-static bool any(const double v[3])
+static bool is_any(const double v[3])
 {
   return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
 }
 
 /* Pays and takes at the ports; whether anything is felt. */
-static bool settle_ports(hapi_tick *tick)
+static bool settle_ports(hapi_guard *guard, const hapi_pointers *pointers, int64_t now_ns)
 {
   bool felt = false;
-  double seconds = 1e-9 * (double)(tick->facts.now_ns - tick->guard.observed_ns);
-  tick->guard.observed_ns = tick->facts.now_ns;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
+  double seconds = 1e-9 * (double)(now_ns - guard->observed_ns);
+  guard->observed_ns = now_ns;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0) {
-      felt = felt || any(p->device.wrench.force) || any(p->guard.written.force) ||
-             any(p->guard.written.torque);
-      tick->guard.balance -= port_gave(p, seconds);
+      felt = felt || is_any(p->device.wrench.force) || is_any(p->guard.written.force) ||
+             is_any(p->guard.written.torque);
+      guard->balance -= port_gave(p, seconds);
     }
   }
   return felt;
@@ -342,12 +347,12 @@ static void hold_back(hapi_pointer *p, double force[3], const double way[3], dou
   }
 }
 
-static void pay_no_more_than(hapi_tick *tick, double budget)
+static void pay_no_more_than(const hapi_pointers *pointers, double budget)
 {
   double out = 0.0;
   double in = 0.0;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
     }
@@ -360,8 +365,8 @@ static void pay_no_more_than(hapi_tick *tick, double budget)
     return;
   }
   double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
     }
@@ -382,47 +387,49 @@ static void settle_debt(hapi_guard *guard, double period)
 }
 
 /* After a fault nothing is known of where the devices were. */
-static void forget(hapi_tick *tick)
+static void ledger_forget(hapi_guard *guard, const hapi_pointers *pointers,
+                          const hapi_touches *touches)
 {
-  tick->guard.balance = 0.0;
-  tick->guard.sprung = tick->guard.touch_s = 0.0;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    tick->pointers.of[i].guard.placed = false;
+  guard->balance = 0.0;
+  guard->sprung = guard->touch_s = 0.0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].guard.placed = false;
   }
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    hapi_ramp *r = &tick->touches.of[i].ramp;
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    hapi_ramp *r = &touches->of[i].ramp;
     r->felt_share = r->felt = r->sprung = 0.0;
   }
 }
 
 /* What the devices did meanwhile nobody watched; what is owed is owed still. */
-void hapi_energy_resume(hapi_tick *tick)
+void hapi_energy_resume(hapi_guard *guard, const hapi_pointers *pointers, int64_t now_ns)
 {
-  tick->guard.observed_ns = tick->facts.now_ns;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    tick->pointers.of[i].guard.placed = false;
+  guard->observed_ns = now_ns;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].guard.placed = false;
   }
 }
 
-void hapi_energy_observe(hapi_tick *tick)
+void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
+                         const hapi_pointers *pointers, const hapi_bodies *bodies,
+                         const hapi_touches *touches)
 {
-  hapi_guard *guard = &tick->guard;
-  double given = tick->figures.given;
-  if (tick->guard.latch.fault != HAP_FAULT_NONE) {
-    forget(tick);
+  if (guard->latch.fault != HAP_FAULT_NONE) {
+    ledger_forget(guard, pointers, touches);
     return;
   }
-  given += ramps_give(tick);
-  if (!settle_ports(tick)) {
+  double given = bodies->given + ramps_give(guard, pointers, touches, facts->tick);
+  if (!settle_ports(guard, pointers, facts->now_ns)) {
     guard->balance = hapi_min(guard->balance, 0.0);
     guard->touch_s = 0.0;
     return;
   }
   double stored = 0.0;
-  stored += couplings_store(tick);
-  guard->balance += given + bodies_lose(tick, &stored) + surfaces_give(tick, &stored);
+  stored += couplings_store(pointers);
+  guard->balance += given + bodies_lose(facts, bodies, &stored) +
+                    surfaces_give(facts, pointers, bodies, touches, &stored);
   guard->stored_max = hapi_max(stored, guard->stored_max);
   double overdraft = hapi_max(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
-  settle_debt(guard, tick->facts.period);
-  pay_no_more_than(tick, guard->balance + overdraft);
+  settle_debt(guard, facts->period);
+  pay_no_more_than(pointers, guard->balance + overdraft);
 }

@@ -1,8 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "base/effect_clock.h"
+#include "guard/force_guard.h"
+
+#include <string.h>
+
 #include "base/vec.h"
-#include "tick/tick.h"
+#include "pointer/coupling.h"
 
 /* The last thing between the simulation and the motors, in this order: finite, age of the local model,
  * ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the bodies have
@@ -16,33 +19,29 @@
 #define AGE_LEAST 0.01 /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
 #define WRENCH_LIMIT 1e12 /* N, N m: beyond it is an error, and its square could overflow */
 
-void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
+void hapi_fault_set(hapi_fault_latch *latch, hap_fault fault, uint32_t pointer, uint32_t generation)
 {
-  if (tick->guard.latch.fault == HAP_FAULT_NONE) {
-    tick->guard.latch.fault = fault;
-    tick->guard.latch.pointer = pointer;
-    tick->guard.latch.generation = pointer > 0 ? tick->pointers.of[pointer - 1].generation : 0;
-    ++tick->guard.latch.count;
+  if (latch->fault == HAP_FAULT_NONE) {
+    latch->fault = fault;
+    latch->pointer = pointer;
+    latch->generation = pointer > 0 ? generation : 0;
+    ++latch->count;
   }
 }
 
-void hapi_tick_reset_fault(hapi_tick *tick)
+void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
+                            const hapi_touches *touches)
 {
-  if (tick->guard.latch.fault == HAP_FAULT_NONE) {
+  if (guard->latch.fault == HAP_FAULT_NONE) {
     return;
   }
-  tick->guard.latch.fault = HAP_FAULT_NONE;
-  tick->guard.latch.pointer = tick->guard.latch.generation = 0;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    tick->pointers.of[i].guard.share = 0.0;
-    tick->pointers.of[i].device.jump_s = 0.0; /* whoever resets knows where the device is */
+  guard->latch.fault = HAP_FAULT_NONE;
+  guard->latch.pointer = guard->latch.generation = 0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].guard.share = 0.0;
+    pointers->of[i].device.jump_s = 0.0; /* whoever resets knows where the device is */
   }
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    tick->touches.of[i].seen = false; /* the hand may be anywhere by now */
-  }
-  for (uint32_t i = 0; i < tick->touches.tool.pair_count; ++i) {
-    tick->touches.tool.pairs[i].seen = false;
-  }
+  hapi_touches_forget(touches, HAPI_SLOT_NONE); /* the hand may be anywhere by now */
 }
 
 void hapi_guard_cut(hapi_pointer *pointer)
@@ -61,68 +60,64 @@ static bool usable_vector(const double v[3])
 }
 
 /* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
-static bool usable(const hap_wrench *w)
+static inline bool wrench_is_usable(const hap_wrench *w)
 {
   return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
              WRENCH_LIMIT * WRENCH_LIMIT ||
          (usable_vector(w->force) && usable_vector(w->torque));
 }
 
-static void check_finite(hapi_tick *tick)
+static void check_finite(hapi_guard *guard, const hapi_pointers *pointers)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation != 0 && !usable(&p->wrench)) {
-      hapi_tick_fault(tick, HAP_FAULT_FORCE, i + 1);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
+    if (p->generation != 0 && !wrench_is_usable(&p->wrench)) {
+      hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
     }
   }
 }
 
 /* A world that does not answer is felt less and less: a state, which ends with the next model. One
  * tick more than two steps is what an age comes to in good order. */
-static void follow_age(hapi_tick *tick)
+static void follow_age(hapi_guard *guard, const hapi_tick_facts *facts)
 {
-  hapi_guard *guard = &tick->guard;
-  double step = tick->facts.physics_period;
-  int64_t newest =
-      tick->facts.sent_ns > tick->facts.state_ns ? tick->facts.sent_ns : tick->facts.state_ns;
-  double age = 1e-9 * (double)(tick->facts.now_ns - newest);
-  double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + tick->facts.period;
-  bool stale = tick->facts.model_number != 0 && step > 0.0 && age > limit;
+  double step = facts->physics_period;
+  int64_t newest = facts->sent_ns > facts->state_ns ? facts->sent_ns : facts->state_ns;
+  double age = 1e-9 * (double)(facts->now_ns - newest);
+  double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + facts->period;
+  bool stale = facts->model_number != 0 && step > 0.0 && age > limit;
   guard->stale_times += stale && !guard->stale;
   guard->stale_ticks += stale;
   guard->stale = stale;
-  double change = stale        ? tick->facts.period / FADE_S
-                  : step > 0.0 ? -tick->facts.period / step
-                               : 0.0;
+  double change = stale ? facts->period / FADE_S : step > 0.0 ? -facts->period / step : 0.0;
   guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
 }
 
 /* What the device shall get before the limits. */
-static void want(hapi_tick *tick, hapi_pointer *p)
+static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
   hapi_coupling_write(p);
   g->wanted = p->device.wrench;
   g->flags = 0;
-  if (tick->guard.latch.fault != HAP_FAULT_NONE) {
+  if (guard->latch.fault != HAP_FAULT_NONE) {
     g->flags = HAP_GUARD_FAULT;
     memset(&p->device.wrench, 0, sizeof p->device.wrench);
     return;
   }
-  if (tick->guard.mode == HAP_GUARD_MEASURE) {
+  if (guard->mode == HAP_GUARD_MEASURE) {
     return;
   }
-  g->share = hapi_min(g->share + tick->facts.period / RAMP_IN_S, 1.0);
-  double share = g->share * (1.0 - tick->guard.age_loss);
+  g->share = hapi_min(g->share + period / RAMP_IN_S, 1.0);
+  double share = g->share * (1.0 - guard->age_loss);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
-  g->flags |= tick->guard.age_loss > 0.0 ? HAP_GUARD_STALE : 0;
+  g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
   hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
   hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
 }
 
 /* No farther from the vector before than step. */
-static bool slew(const double before[3], double step, double v[3])
+static bool vector_slew(const double before[3], double step, double v[3])
 {
   double change[3];
   hapi_v3_sub(v, before, change);
@@ -135,7 +130,7 @@ static bool slew(const double before[3], double step, double v[3])
 }
 
 /* Shortens a vector to a norm; its direction stays. */
-static bool saturate(double v[3], double limit)
+static bool vector_saturate(double v[3], double limit)
 {
   double norm = hapi_v3_norm(v);
   if (norm <= limit) {
@@ -146,25 +141,25 @@ static bool saturate(double v[3], double limit)
 }
 
 /* A slew limit that is meant for touch does not keep the force on after a fault. */
-static void limit_slew(const hapi_tick *tick, hapi_pointer *p)
+static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
 {
   const hapi_guard_pointer *g = &p->guard;
-  bool fault = tick->guard.latch.fault != HAP_FAULT_NONE;
+  bool fault = guard->latch.fault != HAP_FAULT_NONE;
   double force_rate =
       fault ? hapi_max(p->device.limits.slew_force, p->device.limits.max_force / FADE_S)
             : p->device.limits.slew_force;
   double torque_rate =
       fault ? hapi_max(p->device.limits.slew_torque, p->device.limits.max_torque / FADE_S)
             : p->device.limits.slew_torque;
-  bool force = slew(g->written.force, tick->facts.period * force_rate, p->device.wrench.force);
-  bool torque = slew(g->written.torque, tick->facts.period * torque_rate, p->device.wrench.torque);
+  bool force = vector_slew(g->written.force, period * force_rate, p->device.wrench.force);
+  bool torque = vector_slew(g->written.torque, period * torque_rate, p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
 }
 
 static void limit_norm(hapi_pointer *p)
 {
-  bool force = saturate(p->device.wrench.force, p->device.limits.max_force);
-  bool torque = saturate(p->device.wrench.torque, p->device.limits.max_torque);
+  bool force = vector_saturate(p->device.wrench.force, p->device.limits.max_force);
+  bool torque = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SATURATED : 0;
 }
 
@@ -196,59 +191,54 @@ static void report_written(hapi_pointer *p)
   }
 }
 
-/* Whatever came in, and whatever went wrong here: what is no number does not get to the motors. */
-static void check_written(hapi_tick *tick, uint32_t index)
+/* Whatever came in, and whatever went wrong here: NaN does not get to the motors. */
+static void check_written(hapi_guard *guard, hapi_pointer *p, uint32_t index)
 {
-  hapi_pointer *p = &tick->pointers.of[index];
-  if (!usable(&p->device.wrench)) {
-    hapi_tick_fault(tick, HAP_FAULT_FORCE, index + 1);
+  if (!wrench_is_usable(&p->device.wrench)) {
+    hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, index + 1, p->generation);
     p->guard.flags = HAP_GUARD_FAULT;
     memset(&p->device.wrench, 0, sizeof p->device.wrench);
   }
 }
 
-static void write_pointer(hapi_tick *tick, uint32_t index)
+static void count_flags(hapi_guard *guard, uint32_t flags)
 {
-  hapi_pointer *p = &tick->pointers.of[index];
-  if (tick->guard.mode == HAP_GUARD_ON) {
-    limit_slew(tick, p);
-  }
-  limit_norm(p);
-  check_written(tick, index);
-  report_written(p);
+  guard->saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
+  guard->slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
+  guard->energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
 }
 
-static void count(hapi_tick *tick, uint32_t flags)
+void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
+                      const hapi_pointers *pointers)
 {
-  tick->guard.saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
-  tick->guard.slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
-  tick->guard.energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
-}
-
-void hapi_guard_run(hapi_tick *tick)
-{
-  uint32_t flags = 0;
-  check_finite(tick);
-  follow_age(tick);
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    if (tick->pointers.of[i].generation != 0) {
-      want(tick, &tick->pointers.of[i]);
+  check_finite(guard, pointers);
+  follow_age(guard, facts);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    if (pointers->of[i].generation != 0) {
+      pointer_want(guard, facts->period, &pointers->of[i]);
     }
   }
-  if (tick->facts.observes && tick->guard.mode == HAP_GUARD_ON) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
-    hapi_energy_observe(tick);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_OBSERVER, begin);
-  }
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
+}
+
+void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *pointers)
+{
+  uint32_t flags = 0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
     }
-    write_pointer(tick, i);
+    if (guard->mode == HAP_GUARD_ON) {
+      limit_slew(guard, period, p);
+    }
+    limit_norm(p);
+    check_written(guard, p, i);
+    report_written(p);
     flags |= p->guard.flags;
     double force = hapi_v3_norm(p->wrench.force);
-    tick->guard.peak_force = force > tick->guard.peak_force ? force : tick->guard.peak_force;
+    guard->peak_force = force > guard->peak_force ? force : guard->peak_force;
   }
-  count(tick, flags);
+  if (flags != 0) {
+    count_flags(guard, flags);
+  }
 }

@@ -8,8 +8,10 @@
 #include "base/thread.h"
 #include "base/vec.h"
 #include "device/emergency.h"
+#include "guard/force_guard.h"
 #include "haptic/haptic_internal.h"
 #include "haptic/tick_memory.h"
+#include "tick/report.h"
 
 #define STORE(field, value) \
   atomic_store_explicit(&haptic->figures.field, (value), memory_order_relaxed)
@@ -152,8 +154,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_pointers_follow(haptic);
   hapi_pointers_read(haptic, start_ns);
   hapi_tape_begun(haptic);
-  haptic->tick.facts.now_ns = start_ns;
-  hapi_coupling_read(&haptic->tick);
+  hapi_tick_read(&haptic->tick, start_ns);
   report(haptic);
   return HAP_OK;
 }
@@ -296,7 +297,7 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
   const hapi_tick *tick = &haptic->tick;
   int64_t age = tick->facts.model_number != 0 ? tick->facts.now_ns - tick->facts.state_ns : 0;
   STORE(ticks, tick->facts.tick);
-  STORE(contact_ticks, tick->figures.contact_ticks);
+  STORE(contact_ticks, tick->touches.contact_ticks);
   STORE(saturated_ticks, tick->guard.saturated_ticks);
   STORE(faults, tick->guard.latch.count);
   STORE(fault, (int)tick->guard.latch.fault);
@@ -312,12 +313,12 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
     STORE(age_max_ns, age);
   }
   STORE(peak_force, tick->guard.peak_force);
-  STORE(solver_sweeps, tick->figures.sweeps);
-  STORE(solver_residual, tick->figures.residual_max);
+  STORE(solver_sweeps, tick->rows.sweeps);
+  STORE(solver_residual, tick->rows.residual_max);
   STORE(local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
-  STORE(hand_impulse_abs, tick->figures.hand_impulse_abs);
+  STORE(hand_impulse_abs, tick->touches.hand_impulse_abs);
   for (int i = 0; i < 3; ++i) {
-    STORE(hand_impulse[i], tick->figures.hand_impulse[i]);
+    STORE(hand_impulse[i], tick->touches.hand_impulse[i]);
   }
   int64_t spent = hapi_clock_now() - begin_ns;
   hapi_histogram_add(&haptic->figures.tick_ns, spent);

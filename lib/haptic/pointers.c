@@ -8,8 +8,10 @@
 #include "base/vec.h"
 #include "device/device.h"
 #include "device/emergency.h"
+#include "guard/force_guard.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
+#include "pointer/coupling.h"
 
 #define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
 #define GRIP_MOST 0.05   /* m, at the device: arm that a handle has against turning */
@@ -106,7 +108,7 @@ static void activate(hapi_haptic *haptic, uint32_t index)
   p->surface.friction = def->friction;
   p->surface.finger_radius = def->finger_radius;
   p->device.turns = !slot->has_device || info->dof == 6;
-  hapi_tick_feel(p, hapi_wish(haptic->tick.facts.wishes, HAP_EFFECT_TORQUE), false);
+  hapi_pointer_feel(p, hapi_wish(haptic->tick.facts.wishes, HAP_EFFECT_TORQUE), false);
   haptic->tick.pointers.proxies = true; /* until the next model says what is wished for */
   p->device.motion_scale = def->motion_scale;
   p->device.force_scale = def->force_scale;

@@ -77,9 +77,9 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   tick->bodies.live = hapi_alloc_array(c->bodies, sizeof *tick->bodies.live);
   tick->pointers.of = hapi_alloc_array(c->pointers, sizeof *tick->pointers.of);
   tick->pointers.hulls = hapi_alloc_array(c->pointers, sizeof *tick->pointers.hulls);
-  tick->crosses.of = hapi_alloc_array(c->crosses, sizeof *tick->crosses.of);
+  tick->touches.crosses.of = hapi_alloc_array(c->crosses, sizeof *tick->touches.crosses.of);
   return tick->bodies.of != NULL && tick->bodies.live != NULL && tick->pointers.of != NULL &&
-         tick->pointers.hulls != NULL && tick->crosses.of != NULL &&
+         tick->pointers.hulls != NULL && tick->touches.crosses.of != NULL &&
          allocate_touches(&tick->touches, c) && allocate_contacts(&tick->contacts, c) &&
          allocate_joints(&tick->joints, c) && allocate_rows(&tick->rows, c);
 }
@@ -91,7 +91,7 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
       tick->bodies.live,
       tick->pointers.of,
       tick->pointers.hulls,
-      tick->crosses.of,
+      tick->touches.crosses.of,
       tick->touches.of,
       tick->touches.ramps,
       tick->touches.ramp_generations,

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "haptic/haptic_internal.h"
+#include "tick/report.h"
 
 hap_status hapi_trace_ring_create(hapi_trace_ring *ring, uint32_t capacity)
 {

@@ -75,9 +75,11 @@ typedef struct hapi_bodies {
   hapi_local_body *of; /* by slot, capacity.bodies */
   uint32_t *live;      /* slots in the model, live_count */
   uint32_t live_count;
-  uint32_t high;    /* beyond the highest slot that was ever used */
-  uint32_t resting; /* at the tick's begin */
-  bool unsound;     /* a state was not finite in this tick */
+  uint32_t high;           /* beyond the highest slot that was ever used */
+  uint32_t resting;        /* at the tick's begin */
+  bool unsound;            /* a state was not finite in this tick */
+  double given;            /* J, of this tick: what things of given motion did on owned bodies */
+  double owned_impulse[3]; /* since start, see hapi_state */
 } hapi_bodies;
 
 /* NULL: the static world. */

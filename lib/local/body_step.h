@@ -3,11 +3,48 @@
 #ifndef HAPODE_LOCAL_BODY_STEP_H
 #define HAPODE_LOCAL_BODY_STEP_H
 
-/* The step of a body that does not wait for how it turns: what models ACCELERANCE and CONTACT share of it. */
+/* A step of a body, as far as models ACCELERANCE and CONTACT share it, and its velocity with nothing in
+ * touch. */
+
+#include <string.h>
 
 #include "base/plausible.h"
 #include "base/vec.h"
-#include "tick/tick.h"
+#include "local/body.h"
+#include "local/rows.h"
+
+/* Velocity after the tick if nothing touched the body. */
+static inline void hapi_body_free_velocity(const hapi_local_body *body, double period, double v[6])
+{
+  const hapi_model_body *given = &body->given;
+  double turn[3];
+  memcpy(v, body->start_twist, 6 * sizeof *v);
+  if (!hapi_body_responds(body) || body->waiting) {
+    return;
+  }
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    for (int i = 0; i < 6; ++i) {
+      v[i] += period * given->b[i] + body->linear.residual[i]; /* eq. 14, in the first tick */
+    }
+    return;
+  }
+  hapi_v3_madd(v, period, given->gravity, v);
+  if (body->forced) {
+    hapi_v3_madd(v, period * body->inverse_mass, given->user_wrench, v);
+    hapi_m3_apply(body->inverse_inertia, given->user_wrench + 3, turn);
+    hapi_v3_madd(v + 3, period, turn, v + 3);
+  }
+}
+
+/* A resting one, before its rows. */
+static inline void hapi_body_wake(hapi_local_body *body, hapi_rows *rows, double period)
+{
+  hapi_solver *solver = &rows->solver;
+  body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+  body->pushed = true;
+  hapi_body_free_velocity(body, period, solver->v[body->row]);
+  memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
+}
 
 #define HAPI_TURNING \
   8u /* bodies that turn together: their chains of operations wait side by side */
@@ -22,19 +59,19 @@ static inline bool hapi_body_sound(const hap_twist *twist, const double position
 }
 
 /* A state that is not finite stays here: the body stops where it last was and the guard latches. */
-static inline void hapi_body_stop(hapi_tick *tick, hapi_local_body *body)
+static inline void hapi_body_stop(hapi_bodies *bodies, hapi_local_body *body)
 {
   memset(&body->twist, 0, sizeof body->twist);
-  hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
+  bodies->unsound = true;
 }
 
 /* Where the body goes, without its turn; false: it does not go at all. */
-static inline bool hapi_body_shift(hapi_tick *tick, hapi_local_body *body)
+static inline bool hapi_body_shift(hapi_bodies *bodies, hapi_local_body *body, double period)
 {
   double position[3];
-  hapi_v3_madd(body->pose.position, tick->facts.period, body->twist.linear, position);
+  hapi_v3_madd(body->pose.position, period, body->twist.linear, position);
   if (!hapi_body_sound(&body->twist, position)) {
-    hapi_body_stop(tick, body);
+    hapi_body_stop(bodies, body);
     return false;
   }
   hapi_v3_copy(position, body->pose.position);

@@ -53,7 +53,7 @@ static uint32_t first_of(const hapi_body_contacts *contacts, uint64_t key, uint3
 }
 
 /* An old contact gives its impulse to one new one only. */
-static void match(hapi_body_contacts *contacts, hapi_contact_memory *memory, uint32_t count)
+static void memory_match(hapi_body_contacts *contacts, hapi_contact_memory *memory, uint32_t count)
 {
   double best = MATCH_DISTANCE2;
   uint32_t chosen = count;
@@ -88,6 +88,6 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
     memset(memory, 0, sizeof *memory);
     memory->key = in[i].key;
     hapi_v3_copy(in[i].core_a, memory->core_a);
-    match(contacts, memory, old_count);
+    memory_match(contacts, memory, old_count);
   }
 }

@@ -4,7 +4,8 @@
 #define HAPODE_LOCAL_CONTACT_RAMP_H
 
 #include "base/vec.h"
-#include "tick/tick.h"
+#include "local/touch.h"
+#include "pointer/pointer.h"
 
 /* A contact that is already deep when it arrives gets its full force after this time. */
 #define HAPI_RAMP_S 0.02

@@ -1,12 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/contact_rows.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "base/effect_clock.h"
-#include "local/rows.h"
+#include "base/assert.h"
+#include "local/body_step.h"
 #include "local/touch_place.h"
-#include "tick/tick.h"
 
 /* Contacts between bodies as rows of the solver. Every contact is placed anew from the poses of its
  * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
@@ -24,6 +25,7 @@
 #define OPEN_TICKS 3.0
 
 typedef struct placed_contact {
+  uint32_t index;
   const hapi_patch_contact *in;
   const hapi_surface *surface;
   hapi_local_body *a;
@@ -40,7 +42,7 @@ static hapi_touch_frame frame_of(const hapi_local_body *body)
                       : (hapi_touch_frame){NULL, NULL};
 }
 
-static bool place(placed_contact *c)
+static bool contact_place(placed_contact *c)
 {
   hapi_touch_spot spot;
   hapi_touch_frame a = frame_of(c->a);
@@ -77,17 +79,13 @@ static void friction_directions(const hapi_surface *surface, const double n[3], 
   hapi_v3_cross(n, t1, t2);
 }
 
-static bool is_given(const hapi_local_body *body)
-{
-  return body != NULL && (body->flags & HAPI_BODY_OWNED) == 0;
-}
-
 /* See hapi_row_source: what the energy observer has to count as the world's work. */
-static bool gives(const placed_contact *c)
+static bool contact_gives(const placed_contact *c)
 {
   const hapi_surface *s = c->surface;
   bool moves = s->motion[0] != 0.0 || s->motion[1] != 0.0 || s->motion[2] != 0.0;
-  return moves || (s->flags & HAPI_SURFACE_SOFT) != 0 || is_given(c->a) || is_given(c->b);
+  return moves || (s->flags & HAPI_SURFACE_SOFT) != 0 || hapi_body_is_given(c->a) ||
+         hapi_body_is_given(c->b);
 }
 
 /* The columns of a body in the rows of a contact, `side` 0: ja and ba, 1: jb and bb. */
@@ -131,16 +129,16 @@ static inline void set_columns(const placed_contact *c, int side, double directi
 }
 
 /* What the rows of a contact have in common; their parts, 0 normal, 1 and 2 friction. */
-static void begin_rows(hapi_tick *tick, const placed_contact *c, uint32_t index, uint32_t first,
+static void begin_rows(hapi_rows *rows, const placed_contact *c, const hapi_contact_memory *memory,
                        const uint8_t *parts, uint32_t count)
 {
-  const hapi_contact_memory *memory = &tick->contacts.memory[index];
   const hapi_row_source source = {
-      .contact = index, .body_a = c->in->body_a, .body_b = c->in->body_b, .gives = c->gives};
+      .contact = c->index, .body_a = c->in->body_a, .body_b = c->in->body_b, .gives = c->gives};
+  uint32_t first = rows->solver.row_count;
   uint32_t a = c->a != NULL ? c->a->row : HAPI_STATIC_ROW;
   uint32_t b = c->b != NULL ? c->b->row : HAPI_STATIC_ROW;
   for (uint32_t i = 0; i < count; ++i) {
-    hapi_row *row = &tick->rows.solver.rows[first + i];
+    hapi_row *row = &rows->solver.rows[first + i];
     row->ball = row->round = 0;
     row->single = c->b == NULL;
     row->a = a;
@@ -148,24 +146,24 @@ static void begin_rows(hapi_tick *tick, const placed_contact *c, uint32_t index,
     row->mu = 0.0;
     row->normal = -1;
     row->impulse = memory->impulse[parts[i]];
-    tick->rows.sources[first + i] = source;
-    tick->rows.sources[first + i].part = parts[i];
+    rows->sources[first + i] = source;
+    rows->sources[first + i].part = parts[i];
   }
 }
 
 /* m/s along the normal before the tick; negative: they come nearer. */
-static double closing(const placed_contact *c, const hapi_row *row)
+static double contact_closing(const placed_contact *c, const hapi_row *row)
 {
   return hapi_row_start_speed(c->a, row->ja) + hapi_row_start_speed(c->b, row->jb);
 }
 
 /* What comes in faster than the threshold goes back with its share. */
-static void bounce(const hapi_tick *tick, const placed_contact *c, hapi_row *row,
-                   hapi_row_source *source)
+static void contact_bounce(const placed_contact *c, double period, hapi_row *row,
+                           hapi_row_source *source)
 {
   const hapi_surface *s = c->surface;
-  double speed = closing(c, row);
-  bool hits = c->gap + tick->facts.period * speed < 0.0;
+  double speed = contact_closing(c, row);
+  bool hits = c->gap + period * speed < 0.0;
   if ((s->flags & HAPI_SURFACE_BOUNCE) != 0 && hits && -speed > s->bounce_speed) {
     row->target = hapi_max(-s->bounce * speed + s->motion[2], row->target);
     source->pushes_out = false;
@@ -174,50 +172,50 @@ static void bounce(const hapi_tick *tick, const placed_contact *c, hapi_row *row
 
 /* Open: the gap may close within the tick, not more. Touching: apart, with the push-out of what is
  * deeper than the surface layer. */
-static void set_normal(hapi_tick *tick, const placed_contact *c, hapi_row *row,
-                       hapi_row_source *source)
+static void set_normal(const hapi_tick_facts *facts, const placed_contact *c, hapi_row *row,
+                       hapi_row_source *source, hapi_effect_sample *sample)
 {
   const hapi_surface *s = c->surface;
   double deep = -c->gap - s->layer - PUSH_OUT_SLOP;
   bool soft = (s->flags & HAPI_SURFACE_SOFT) != 0;
   row->lo = 0.0;
   row->hi = HUGE_VAL;
-  row->softness = s->cfm / tick->facts.period;
-  row->target = c->gap > 0.0 ? -c->gap / tick->facts.period : s->motion[2];
+  row->softness = s->cfm / facts->period;
+  row->target = c->gap > 0.0 ? -c->gap / facts->period : s->motion[2];
   if (deep > 0.0) {
-    double push = hapi_min(s->erp * deep / tick->facts.period, s->max_push);
+    double push = hapi_min(s->erp * deep / facts->period, s->max_push);
     push = soft ? push : hapi_min(push, PUSH_OUT_MAX);
     row->target += push;
     source->pushes_out = !soft && push > PUSH_OUT_LEAST;
   }
-  if (tick->facts.bounces) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
-    bounce(tick, c, row, source);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_RESTITUTION, begin);
+  if (facts->bounces) {
+    uint64_t begin = hapi_effect_begin(sample);
+    contact_bounce(c, facts->period, row, source);
+    hapi_effect_end(sample, HAP_EFFECT_RESTITUTION, begin);
   }
 }
 
-static void set_friction(hapi_tick *tick, const hapi_surface *s, hapi_row *row, int part,
+static void set_friction(double period, const hapi_surface *s, hapi_row *row, int part,
                          int32_t normal)
 {
   double mu = part == 1 ? s->mu : s->mu2;
   bool share = (s->flags & (part == 1 ? HAPI_SURFACE_APPROX1_1 : HAPI_SURFACE_APPROX1_2)) != 0;
   bool slips = (s->flags & (part == 1 ? HAPI_SURFACE_SLIP1 : HAPI_SURFACE_SLIP2)) != 0;
   row->target = s->motion[part - 1];
-  row->softness = (slips ? s->slip[part - 1] : s->cfm) / tick->facts.period;
+  row->softness = (slips ? s->slip[part - 1] : s->cfm) / period;
   row->normal = share ? normal : -1;
   row->mu = share ? hapi_min(mu, MU_MOST) : 0.0;
-  row->hi = share ? 0.0 : mu * tick->facts.period; /* without Approx1 mu is a force */
+  row->hi = share ? 0.0 : mu * period; /* without Approx1 mu is a force */
   row->lo = -row->hi;
 }
 
 /* The parts of a contact that have rows. With Approx1 friction is bounded by the normal impulse; a
  * force mu is there from the touch on. */
-static uint32_t list_parts(const hapi_tick *tick, const placed_contact *c, uint32_t index,
+static uint32_t list_parts(const placed_contact *c, const hapi_contact_memory *memory,
                            uint8_t parts[3])
 {
   const hapi_surface *s = c->surface;
-  bool touches = tick->contacts.memory[index].impulse[0] > 0.0 || c->gap <= 0.0;
+  bool touches = memory->impulse[0] > 0.0 || c->gap <= 0.0;
   uint32_t count = 1;
   parts[0] = 0;
   if (s->mu > 0.0 && (touches || (s->flags & HAPI_SURFACE_APPROX1_1) != 0)) {
@@ -229,41 +227,40 @@ static uint32_t list_parts(const hapi_tick *tick, const placed_contact *c, uint3
   return count;
 }
 
-static void add_contact(hapi_tick *tick, placed_contact *c, uint32_t index)
+static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_memory *memory,
+                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
-  hapi_solver *solver = &tick->rows.solver;
+  hapi_solver *solver = &rows->solver;
   uint32_t first = solver->row_count;
-  hapi_row *rows = &solver->rows[first];
+  hapi_row *own = &solver->rows[first];
   double directions[3][3];
   uint8_t parts[3];
-  uint32_t count = list_parts(tick, c, index, parts);
-  c->gives = gives(c);
+  uint32_t count = list_parts(c, memory, parts);
+  HAPI_ASSERT_UNIT(c->normal);
+  HAPI_ASSERT(first + count <= rows->capacity);
+  c->gives = contact_gives(c);
   hapi_v3_copy(c->normal, directions[0]);
   friction_directions(c->surface, c->normal, directions[1], directions[2]);
   if (count == 2 && parts[1] == 2) {
     hapi_v3_copy(directions[2], directions[1]);
   }
-  begin_rows(tick, c, index, first, parts, count);
-  set_columns(c, 0, directions, rows, count);
-  set_columns(c, 1, directions, rows, count);
-  set_normal(tick, c, &rows[0], &tick->rows.sources[first]);
+  begin_rows(rows, c, memory, parts, count);
+  set_columns(c, 0, directions, own, count);
+  set_columns(c, 1, directions, own, count);
+  set_normal(facts, c, &own[0], &rows->sources[first], sample);
   for (uint32_t i = 1; i < count; ++i) {
-    set_friction(tick, c->surface, &rows[i], parts[i], (int32_t)first);
+    set_friction(facts->period, c->surface, &own[i], parts[i], (int32_t)first);
   }
   solver->row_count += count;
   hapi_contact_ready(solver, first, count);
 }
 
 /* A body that the contact was made for, and that is where the contact thread thought it was. */
-static bool find_body(hapi_tick *tick, uint32_t slot, uint32_t generation, hapi_local_body **out)
+static bool find_body(const hapi_bodies *bodies, uint32_t slot, uint32_t generation,
+                      hapi_local_body **out)
 {
-  *out = hapi_bodies_at(&tick->bodies, slot);
+  *out = hapi_bodies_at(bodies, slot);
   return *out == NULL || ((*out)->live && (*out)->generation == generation && !(*out)->waiting);
-}
-
-static bool is_owned(const hapi_local_body *body)
-{
-  return body != NULL && (body->flags & HAPI_BODY_OWNED) != 0;
 }
 
 static double point_speed(const hapi_local_body *body, const double point[3])
@@ -279,22 +276,17 @@ static double point_speed(const hapi_local_body *body, const double point[3])
   return hapi_v3_norm(velocity);
 }
 
-static bool is_near(const hapi_tick *tick, const placed_contact *c)
+static bool is_near(const placed_contact *c, double period)
 {
   if (c->gap <= OPEN_FLOOR) {
     return true;
   }
   double speed = point_speed(c->a, c->point) + point_speed(c->b, c->point);
-  return c->gap <= OPEN_FLOOR + OPEN_TICKS * tick->facts.period * speed;
-}
-
-static bool rests(const hapi_local_body *body)
-{
-  return body != NULL && (body->flags & HAPI_BODY_RESTING) != 0;
+  return c->gap <= OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
 /* m/s along the normal, before the tick; negative: they come nearer. */
-static double approach(const placed_contact *c)
+static double contact_approach(const placed_contact *c)
 {
   double speed = 0.0;
   const hapi_local_body *bodies[2] = {c->a, c->b};
@@ -312,43 +304,48 @@ static double approach(const placed_contact *c)
 }
 
 /* The contact of that index; false: not one of this tick. */
-static bool find_contact(hapi_tick *tick, uint32_t index, placed_contact *out)
+static bool find_contact(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                         uint32_t index, placed_contact *out)
 {
-  hapi_patches *patches = tick->contacts.patches;
+  hapi_patches *patches = contacts->patches;
+  out->index = index;
   out->in = &hapi_patches_contacts(patches)[index];
   out->surface = &hapi_patches_surfaces(patches)[out->in->surface];
-  return find_body(tick, out->in->body_a, out->in->generation_a, &out->a) &&
-         find_body(tick, out->in->body_b, out->in->generation_b, &out->b) &&
+  return find_body(bodies, out->in->body_a, out->in->generation_a, &out->a) &&
+         find_body(bodies, out->in->body_b, out->in->generation_b, &out->b) &&
          (hapi_body_responds(out->a) || hapi_body_responds(out->b)) &&
-         (is_owned(out->a) || is_owned(out->b)); /* others are ODE's affair */
+         (hapi_body_is_owned(out->a) || hapi_body_is_owned(out->b)); /* others are ODE's affair */
 }
 
-/* What touches a body that moves is awake, as in ODE. Before any row: a body has all of its contacts,
- * the floor's as well, from the tick on in which it wakes. */
-void hapi_contact_wake(hapi_tick *tick)
+/* As in ODE. Before any row: a body has all of its contacts, the floor's as well, from the tick on in
+ * which it wakes. */
+void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                       hapi_rows *rows, double period)
 {
-  const hapi_patches *patches = tick->contacts.patches;
+  const hapi_patches *patches = contacts->patches;
   for (uint32_t i = 0; patches != NULL && i < patches->contact_count; ++i) {
     placed_contact c;
-    if (find_contact(tick, i, &c) && (rests(c.a) || rests(c.b)) && place(&c) &&
-        c.gap + tick->facts.period * approach(&c) <= 0.0) {
-      hapi_local_wake(tick, rests(c.a) ? c.a : c.b);
+    if (find_contact(contacts, bodies, i, &c) && (hapi_body_rests(c.a) || hapi_body_rests(c.b)) &&
+        contact_place(&c) && c.gap + period * contact_approach(&c) <= 0.0) {
+      hapi_body_wake(hapi_body_rests(c.a) ? c.a : c.b, rows, period);
     }
   }
 }
 
-void hapi_contact_rows(hapi_tick *tick)
+void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, hapi_rows *rows,
+                       const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
-  if (tick->contacts.patches == NULL) {
+  if (contacts->patches == NULL) {
     return;
   }
-  for (uint32_t i = 0; i < tick->contacts.patches->contact_count; ++i) {
+  for (uint32_t i = 0; i < contacts->patches->contact_count; ++i) {
     placed_contact c;
-    bool room = tick->rows.solver.row_count + 3 <= tick->rows.capacity;
-    if (find_contact(tick, i, &c) && room && place(&c) && is_near(tick, &c)) {
-      add_contact(tick, &c, i);
+    bool room = rows->solver.row_count + 3 <= rows->capacity;
+    if (find_contact(contacts, bodies, i, &c) && room && contact_place(&c) &&
+        is_near(&c, facts->period)) {
+      add_contact(rows, &c, &contacts->memory[i], facts, sample);
     } else {
-      memset(tick->contacts.memory[i].impulse, 0, sizeof tick->contacts.memory[i].impulse);
+      memset(contacts->memory[i].impulse, 0, sizeof contacts->memory[i].impulse);
     }
   }
 }

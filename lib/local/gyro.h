@@ -7,7 +7,7 @@
  * none the slower for it. */
 
 #include "base/two_turns.h"
-#include "tick/tick.h"
+#include "local/body.h"
 
 /* The turn that a constant angular velocity makes, by the exponential map. Small angles: the sine
  * and cosine by their series, good to 1e-12 for the half of TURN_MAX. */

@@ -1,10 +1,12 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/joint_rows.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "local/rows.h"
-#include "tick/tick.h"
+#include "base/assert.h"
+#include "local/body_step.h"
 
 /* Joints as rows of the solver, placed anew from the poses of their bodies. A row asks for what ODE's joint
  * asks for at the step of the tick, with these differences: what a rigid joint is open goes out of the
@@ -53,7 +55,7 @@ typedef struct placed_joint {
 
 /* ---- what turns ---- */
 
-static bool turns(const hapi_local_body *body)
+static bool body_turns(const hapi_local_body *body)
 {
   return body != NULL && (body->flags & HAPI_BODY_RESTING) == 0;
 }
@@ -61,7 +63,7 @@ static bool turns(const hapi_local_body *body)
 /* w x v */
 static void rate_of(const hapi_local_body *body, const double v[3], double out[3])
 {
-  if (turns(body)) {
+  if (body_turns(body)) {
     hapi_v3_cross(body->start_twist + 3, v, out);
   } else {
     hapi_v3_set(out, 0.0, 0.0, 0.0);
@@ -78,14 +80,15 @@ static void bend_of(const hapi_local_body *body, const double v[3], double out[3
 /* ---- rows ---- */
 
 /* NULL: no room. */
-static hapi_row *next_row(hapi_tick *tick, const placed_joint *j, int part)
+static hapi_row *next_row(hapi_rows *rows, const placed_joint *j, int part)
 {
-  uint32_t at = tick->rows.solver.row_count;
-  if (at == tick->rows.capacity) {
+  uint32_t at = rows->solver.row_count;
+  if (at == rows->capacity) {
     return NULL;
   }
-  ++tick->rows.solver.row_count;
-  hapi_row *row = &tick->rows.solver.rows[at];
+  HAPI_ASSERT_INDEX(part, HAPI_JOINT_PARTS);
+  ++rows->solver.row_count;
+  hapi_row *row = &rows->solver.rows[at];
   row->a = j->a->row;
   row->b = j->b != NULL ? j->b->row : HAPI_STATIC_ROW;
   row->mu = 0.0;
@@ -96,7 +99,7 @@ static hapi_row *next_row(hapi_tick *tick, const placed_joint *j, int part)
   row->hi = HUGE_VAL;
   row->target = 0.0;
   row->impulse = j->was[part];
-  tick->rows.sources[at] = (hapi_row_source){
+  rows->sources[at] = (hapi_row_source){
       .contact = j->index,
       .body_a = j->in->body_a,
       .body_b = j->in->body_b,
@@ -107,10 +110,10 @@ static hapi_row *next_row(hapi_tick *tick, const placed_joint *j, int part)
   return row;
 }
 
-static hapi_row *anchor_row(hapi_tick *tick, const placed_joint *j, int part,
+static hapi_row *anchor_row(hapi_rows *rows, const placed_joint *j, int part,
                             const double direction[3])
 {
-  hapi_row *row = next_row(tick, j, part);
+  hapi_row *row = next_row(rows, j, part);
   if (row != NULL) {
     hapi_row_column(j->a, j->arm_a, direction, 1.0, row->ja, row->ba);
     hapi_row_column(j->b, j->arm_b, direction, -1.0, row->jb, row->bb);
@@ -118,10 +121,10 @@ static hapi_row *anchor_row(hapi_tick *tick, const placed_joint *j, int part,
   return row;
 }
 
-static hapi_row *turn_row(hapi_tick *tick, const placed_joint *j, int part,
+static hapi_row *turn_row(hapi_rows *rows, const placed_joint *j, int part,
                           const double direction[3])
 {
-  hapi_row *row = next_row(tick, j, part);
+  hapi_row *row = next_row(rows, j, part);
   if (row != NULL) {
     hapi_row_turn_column(j->a, direction, 1.0, row->ja, row->ba);
     hapi_row_turn_column(j->b, direction, -1.0, row->jb, row->bb);
@@ -129,28 +132,33 @@ static hapi_row *turn_row(hapi_tick *tick, const placed_joint *j, int part,
   return row;
 }
 
-/* The newest row is complete. */
-static void finish_row(hapi_tick *tick, double cfm)
+static hapi_row_source *newest_source(hapi_rows *rows)
 {
-  hapi_solver *solver = &tick->rows.solver;
+  return &rows->sources[rows->solver.row_count - 1];
+}
+
+/* The newest row is complete. */
+static void finish_row(hapi_rows *rows, double period, double cfm)
+{
+  hapi_solver *solver = &rows->solver;
   hapi_row *row = &solver->rows[solver->row_count - 1];
   double response = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
-  row->softness = fmax(cfm / tick->facts.period, REGULAR * response);
+  row->softness = fmax(cfm / period, REGULAR * response);
   hapi_row_ready(solver, solver->row_count - 1);
 }
 
 /* The velocity that takes an error back. */
-static double correction(const hapi_tick *tick, const hapi_softness *s, double error)
+static double error_correction(const hapi_softness *s, double period, double error)
 {
   if (s->soft) {
-    return s->erp * error / tick->facts.period;
+    return s->erp * error / period;
   }
   if (!(s->erp > 0.0) || fabs(error) <= OPEN_SLOP) {
     return 0.0;
   }
   double rest = error - copysign(OPEN_SLOP, error);
-  double slow = s->erp * rest / tick->facts.period;
-  double fast = hapi_clamp(OPEN_SHARE * rest / tick->facts.period, -OPEN_SPEED, OPEN_SPEED);
+  double slow = s->erp * rest / period;
+  double fast = hapi_clamp(OPEN_SHARE * rest / period, -OPEN_SPEED, OPEN_SPEED);
   return fabs(slow) > fabs(fast) ? slow : fast;
 }
 
@@ -162,34 +170,35 @@ typedef struct error_of {
   double bend; /* m/s^2, rad/s^2 */
 } error_of;
 
-static void correct(hapi_tick *tick, const hapi_softness *s, error_of error, hapi_row *row)
+static void row_correct(hapi_rows *rows, double period, const hapi_softness *s, error_of error,
+                        hapi_row *row)
 {
-  hapi_row_source *source = &tick->rows.sources[tick->rows.solver.row_count - 1];
-  double back = correction(tick, s, error.now);
-  source->stays = 0.5 * tick->facts.period * error.bend;
+  hapi_row_source *source = newest_source(rows);
+  double back = error_correction(s, period, error.now);
+  source->stays = 0.5 * period * error.bend;
   row->target = source->stays + back;
   source->pushes_out = !s->soft && fabs(back) > OPEN_LEAST;
   source->gives = source->gives || s->soft;
 }
 
-static void hold_anchor(hapi_tick *tick, const placed_joint *j, int part, const double direction[3],
-                        const hapi_softness *s)
+static void hold_anchor(hapi_rows *rows, double period, const placed_joint *j, int part,
+                        const double direction[3], const hapi_softness *s)
 {
-  hapi_row *row = anchor_row(tick, j, part, direction);
+  hapi_row *row = anchor_row(rows, j, part, direction);
   if (row != NULL) {
     error_of error = {hapi_v3_dot(j->open, direction), hapi_v3_dot(j->bend, direction)};
-    correct(tick, s, error, row);
-    finish_row(tick, s->cfm);
+    row_correct(rows, period, s, error, row);
+    finish_row(rows, period, s->cfm);
   }
 }
 
-static void hold_turn(hapi_tick *tick, const placed_joint *j, int part, const double direction[3],
-                      error_of error)
+static void hold_turn(hapi_rows *rows, double period, const placed_joint *j, int part,
+                      const double direction[3], error_of error)
 {
-  hapi_row *row = turn_row(tick, j, part, direction);
+  hapi_row *row = turn_row(rows, j, part, direction);
   if (row != NULL) {
-    correct(tick, &j->in->angular, error, row);
-    finish_row(tick, j->in->angular.cfm);
+    row_correct(rows, period, &j->in->angular, error, row);
+    finish_row(rows, period, j->in->angular.cfm);
   }
 }
 
@@ -197,42 +206,43 @@ static void hold_turn(hapi_tick *tick, const placed_joint *j, int part, const do
 
 static const double world_axes[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
 
-static void hold_point(hapi_tick *tick, const placed_joint *j)
+static void hold_point(hapi_rows *rows, double period, const placed_joint *j)
 {
   for (int i = 0; i < 3; ++i) {
-    hold_anchor(tick, j, PART_ANCHOR + i, world_axes[i], &j->in->linear);
+    hold_anchor(rows, period, j, PART_ANCHOR + i, world_axes[i], &j->in->linear);
   }
 }
 
 /* The suspension of a hinge-2 gives along its first axis. */
-static void hold_sprung_point(hapi_tick *tick, const placed_joint *j)
+static void hold_sprung_point(hapi_rows *rows, double period, const placed_joint *j)
 {
-  hold_anchor(tick, j, PART_ANCHOR, j->axes[0], &j->in->along);
-  hold_anchor(tick, j, PART_ANCHOR + 1, j->across[0], &j->in->linear);
-  hold_anchor(tick, j, PART_ANCHOR + 2, j->across[1], &j->in->linear);
+  hold_anchor(rows, period, j, PART_ANCHOR, j->axes[0], &j->in->along);
+  hold_anchor(rows, period, j, PART_ANCHOR + 1, j->across[0], &j->in->linear);
+  hold_anchor(rows, period, j, PART_ANCHOR + 2, j->across[1], &j->in->linear);
 }
 
 /* The directions across a slider turn with its first body. */
-static void hold_line(hapi_tick *tick, const placed_joint *j)
+static void hold_line(hapi_rows *rows, double period, const placed_joint *j)
 {
   for (int i = 0; i < 2; ++i) {
     double turning[3];
     double bending[3];
-    hapi_row *row = anchor_row(tick, j, PART_ANCHOR + i, j->across[i]);
+    hapi_row *row = anchor_row(rows, j, PART_ANCHOR + i, j->across[i]);
     if (row != NULL) {
       rate_of(j->a, j->across[i], turning);
       bend_of(j->a, j->across[i], bending);
       double bend = hapi_v3_dot(j->across[i], j->bend) + 2.0 * hapi_v3_dot(turning, j->opening) +
                     hapi_v3_dot(bending, j->open);
-      correct(tick, &j->in->linear, (error_of){hapi_v3_dot(j->open, j->across[i]), bend}, row);
-      finish_row(tick, j->in->linear.cfm);
+      row_correct(rows, period, &j->in->linear,
+                  (error_of){hapi_v3_dot(j->open, j->across[i]), bend}, row);
+      finish_row(rows, period, j->in->linear.cfm);
     }
   }
 }
 
 /* ---- orientations ---- */
 
-static void hold_axis(hapi_tick *tick, const placed_joint *j)
+static void hold_axis(hapi_rows *rows, double period, const placed_joint *j)
 {
   double error[3];
   double bends[2][3];
@@ -246,7 +256,7 @@ static void hold_axis(hapi_tick *tick, const placed_joint *j)
   hapi_v3_add(first, second, first);
   for (int i = 0; i < 2; ++i) {
     error_of e = {hapi_v3_dot(error, j->across[i]), hapi_v3_dot(first, j->across[i])};
-    hold_turn(tick, j, PART_TURN + i, j->across[i], e);
+    hold_turn(rows, period, j, PART_TURN + i, j->across[i], e);
   }
 }
 
@@ -264,7 +274,7 @@ static double bend_of_cosine(const placed_joint *j)
 }
 
 /* The angle between the two axes. */
-static void hold_cross(hapi_tick *tick, const placed_joint *j)
+static void hold_cross(hapi_rows *rows, double period, const placed_joint *j)
 {
   double normal[3];
   hapi_v3_cross(j->axes[0], j->axes[1], normal);
@@ -274,14 +284,14 @@ static void hold_cross(hapi_tick *tick, const placed_joint *j)
     hapi_v3_scale(1.0 / sine, normal, normal);
     error_of error = {j->in->place.cos_axes * sine - j->in->place.sin_axes * cosine,
                       -bend_of_cosine(j) / sine};
-    hold_turn(tick, j, PART_TURN, normal, error);
+    hold_turn(rows, period, j, PART_TURN, normal, error);
   }
 }
 
-static void hold_orientation(hapi_tick *tick, const placed_joint *j)
+static void hold_orientation(hapi_rows *rows, double period, const placed_joint *j)
 {
   for (int i = 0; i < 3; ++i) {
-    hold_turn(tick, j, PART_TURN + i, world_axes[i], (error_of){j->turned[i], 0.0});
+    hold_turn(rows, period, j, PART_TURN + i, world_axes[i], (error_of){j->turned[i], 0.0});
   }
 }
 
@@ -324,39 +334,40 @@ static double bend_of_row(const placed_joint *j, const double force[3], const do
   double bend = hapi_v3_dot(force, j->bend) + 2.0 * hapi_v3_dot(turning, j->opening) +
                 hapi_v3_dot(bending, j->open);
   rate_of(carrier, torque, turning);
-  if (turns(j->b)) {
+  if (body_turns(j->b)) {
     hapi_v3_copy(j->b->start_twist + 3, spin);
   }
-  if (turns(j->a)) {
+  if (body_turns(j->a)) {
     hapi_v3_sub(spin, j->a->start_twist + 3, spin);
   }
   return bend + hapi_v3_dot(turning, spin);
 }
 
-static void hold_measured_row(hapi_tick *tick, const placed_joint *j, int part)
+static void hold_measured_row(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j,
+                              int part)
 {
   const hapi_measured_row *in = &j->in->measured.rows[part];
   double force[3];
   double torque[3];
-  hapi_row *row = next_row(tick, j, part);
+  hapi_row *row = next_row(rows, j, part);
   if (row == NULL) {
     return;
   }
   hapi_body_vector(carrier_of(j), in->force, force);
   hapi_body_vector(carrier_of(j), in->torque, torque);
   wrench_columns(j, force, torque, row);
-  double age = 1e-9 * (double)(tick->facts.now_ns - tick->facts.state_ns) - j->in->measured.ahead_s;
+  double age = 1e-9 * (double)(facts->now_ns - facts->state_ns) - j->in->measured.ahead_s;
   double way = hapi_v3_dot(force, j->open) + hapi_v3_dot(torque, j->turned) + in->speed * age;
   error_of error = {in->error + way, bend_of_row(j, force, torque)};
-  correct(tick, &in->softness, error, row);
+  row_correct(rows, facts->period, &in->softness, error, row);
   row->target += in->speed;
-  tick->rows.sources[tick->rows.solver.row_count - 1].stays += in->speed;
-  tick->rows.sources[tick->rows.solver.row_count - 1].gives |= in->speed != 0.0;
-  finish_row(tick, in->softness.cfm);
+  newest_source(rows)->stays += in->speed;
+  newest_source(rows)->gives |= in->speed != 0.0;
+  finish_row(rows, facts->period, in->softness.cfm);
 }
 
 /* What a motor at its limit gives. */
-static void give_measured(hapi_tick *tick, const placed_joint *j)
+static void give_measured(hapi_rows *rows, double period, const placed_joint *j)
 {
   double force[3];
   double torque[3];
@@ -364,23 +375,23 @@ static void give_measured(hapi_tick *tick, const placed_joint *j)
   if (hapi_dot6(given, given) == 0.0) {
     return;
   }
-  hapi_row *row = next_row(tick, j, PART_GIVEN);
+  hapi_row *row = next_row(rows, j, PART_GIVEN);
   if (row != NULL) {
     hapi_body_vector(carrier_of(j), given, force);
     hapi_body_vector(carrier_of(j), given + 3, torque);
     wrench_columns(j, force, torque, row);
-    row->lo = row->hi = tick->facts.period;
-    tick->rows.sources[tick->rows.solver.row_count - 1].gives = true;
-    finish_row(tick, 0.0);
+    row->lo = row->hi = period;
+    newest_source(rows)->gives = true;
+    finish_row(rows, period, 0.0);
   }
 }
 
-static void hold_measured(hapi_tick *tick, const placed_joint *j)
+static void hold_measured(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j)
 {
   for (uint32_t i = 0; i < j->in->measured.row_count; ++i) {
-    hold_measured_row(tick, j, (int)i);
+    hold_measured_row(rows, facts, j, (int)i);
   }
-  give_measured(tick, j);
+  give_measured(rows, facts->period, j);
 }
 
 /* ---- stops and motors ---- */
@@ -414,12 +425,12 @@ static double position_of(const placed_joint *j, int which)
 }
 
 /* As of a slider: halfway between the centres. */
-static hapi_row *measured_slide(hapi_tick *tick, const placed_joint *j, int part,
+static hapi_row *measured_slide(hapi_rows *rows, const placed_joint *j, int part,
                                 const double direction[3])
 {
   double middle[3] = {0.0, 0.0, 0.0};
   double moment[3];
-  hapi_row *row = next_row(tick, j, part);
+  hapi_row *row = next_row(rows, j, part);
   if (row != NULL) {
     if (j->b != NULL) {
       hapi_v3_sub(j->b->pose.position, j->a->pose.position, middle);
@@ -431,22 +442,23 @@ static hapi_row *measured_slide(hapi_tick *tick, const placed_joint *j, int part
   return row;
 }
 
-static hapi_row *axis_row(hapi_tick *tick, const placed_joint *j, int which, int part, double sign)
+static hapi_row *axis_row(hapi_rows *rows, const placed_joint *j, int which, int part, double sign)
 {
   double direction[3];
   hapi_v3_scale(sign, j->axes[which], direction);
   part += PART_AXIS + 3 * which;
   if (j->in->kind == HAPI_JOINT_MEASURED && j->in->measured.axes[which].slides) {
-    return measured_slide(tick, j, part, direction);
+    return measured_slide(rows, j, part, direction);
   }
-  return j->in->kind == HAPI_JOINT_SLIDER ? anchor_row(tick, j, part, direction)
-                                          : turn_row(tick, j, part, direction);
+  return j->in->kind == HAPI_JOINT_SLIDER ? anchor_row(rows, j, part, direction)
+                                          : turn_row(rows, j, part, direction);
 }
 
-static void add_motor(hapi_tick *tick, const placed_joint *j, int which, double position)
+static void add_motor(hapi_rows *rows, double period, const placed_joint *j, int which,
+                      double position)
 {
   const hapi_model_limit *limit = &j->in->limits[which];
-  hapi_row *row = axis_row(tick, j, which, 0, 1.0);
+  hapi_row *row = axis_row(rows, j, which, 0, 1.0);
   if (row == NULL) {
     return;
   }
@@ -454,19 +466,20 @@ static void add_motor(hapi_tick *tick, const placed_joint *j, int which, double 
   bool off_high = (limit->flags & HAPI_LIMIT_HIGH) != 0 && position >= limit->high;
   bool leaves = (off_low && limit->speed > 0.0) || (off_high && limit->speed < 0.0);
   row->target = limit->speed;
-  row->hi = limit->force * tick->facts.period * (leaves ? limit->fudge : 1.0);
+  row->hi = limit->force * period * (leaves ? limit->fudge : 1.0);
   row->lo = -row->hi;
-  tick->rows.sources[tick->rows.solver.row_count - 1].gives = true;
-  finish_row(tick, limit->motor_cfm);
+  newest_source(rows)->gives = true;
+  finish_row(rows, period, limit->motor_cfm);
 }
 
-static void add_locked(hapi_tick *tick, const placed_joint *j, int which, double position)
+static void add_locked(hapi_rows *rows, double period, const placed_joint *j, int which,
+                       double position)
 {
   const hapi_model_limit *limit = &j->in->limits[which];
-  hapi_row *row = axis_row(tick, j, which, 1, 1.0);
+  hapi_row *row = axis_row(rows, j, which, 1, 1.0);
   if (row != NULL) {
-    correct(tick, &limit->stop, (error_of){limit->low - position, 0.0}, row);
-    finish_row(tick, limit->stop.cfm);
+    row_correct(rows, period, &limit->stop, (error_of){limit->low - position, 0.0}, row);
+    finish_row(rows, period, limit->stop.cfm);
   }
 }
 
@@ -477,54 +490,54 @@ static double speed_of(const placed_joint *j, const hapi_row *row)
 
 /* Speed after the tick if the stop were not there, with the impulses of the last tick: what presses a body
  * against a stop goes on while the stop throws it back. Without that, a pressed one hops on the stop. */
-static double pressed(const hapi_tick *tick, const hapi_row *row)
+static double pressed_speed(const hapi_solver *solver, const hapi_row *row)
 {
-  const hapi_solver *solver = &tick->rows.solver;
   return hapi_dot6(row->ja, solver->v[row->a]) + hapi_dot6(row->jb, solver->v[row->b]);
 }
 
 /* A rigid stop may be reached within the tick, not passed; a soft one begins to push where ODE's does. */
-static void set_stop(hapi_tick *tick, const placed_joint *j, const hapi_model_limit *limit,
-                     double gap, hapi_row *row)
+static void set_stop(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j,
+                     const hapi_model_limit *limit, double gap, hapi_row *row)
 {
   double speed = speed_of(j, row);
-  bool hits = limit->stop.soft ? gap <= 0.0 : gap + tick->facts.period * speed < 0.0;
+  bool hits = limit->stop.soft ? gap <= 0.0 : gap + facts->period * speed < 0.0;
   row->lo = 0.0;
   if (gap > 0.0) {
-    row->target = -gap / tick->facts.period;
+    row->target = -gap / facts->period;
   } else {
-    correct(tick, &limit->stop, (error_of){-gap, 0.0}, row);
+    row_correct(rows, facts->period, &limit->stop, (error_of){-gap, 0.0}, row);
   }
-  if (!tick->facts.bounces || !hits || !(limit->bounce > 0.0)) {
+  if (!facts->bounces || !hits || !(limit->bounce > 0.0)) {
     return;
   }
-  double back = -limit->bounce * speed + fmin(pressed(tick, row) - speed, 0.0);
+  double back = -limit->bounce * speed + fmin(pressed_speed(&rows->solver, row) - speed, 0.0);
   if (speed < 0.0 && back > row->target) {
     row->target = back;
-    tick->rows.sources[tick->rows.solver.row_count - 1].pushes_out = false;
+    newest_source(rows)->pushes_out = false;
   }
 }
 
 /* sign: 1 for the low stop, -1 for the high one. */
-static void add_stop(hapi_tick *tick, const placed_joint *j, int which, double gap, double sign)
+static void add_stop(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j,
+                     int which, double gap, double sign)
 {
   const hapi_model_limit *limit = &j->in->limits[which];
   if (limit->stop.soft && gap > 0.0) {
     return;
   }
-  hapi_row *row = axis_row(tick, j, which, sign > 0.0 ? 1 : 2, sign);
+  hapi_row *row = axis_row(rows, j, which, sign > 0.0 ? 1 : 2, sign);
   if (row == NULL) {
     return;
   }
-  if (gap > STOP_FLOOR + STOP_TICKS * tick->facts.period * fabs(speed_of(j, row))) {
-    --tick->rows.solver.row_count;
+  if (gap > STOP_FLOOR + STOP_TICKS * facts->period * fabs(speed_of(j, row))) {
+    --rows->solver.row_count;
     return;
   }
-  set_stop(tick, j, limit, gap, row);
-  finish_row(tick, limit->stop.cfm);
+  set_stop(rows, facts, j, limit, gap, row);
+  finish_row(rows, facts->period, limit->stop.cfm);
 }
 
-static void add_limits(hapi_tick *tick, const placed_joint *j)
+static void add_limits(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j)
 {
   for (int which = 0; which < HAPI_JOINT_LIMITS; ++which) {
     const hapi_model_limit *limit = &j->in->limits[which];
@@ -533,39 +546,36 @@ static void add_limits(hapi_tick *tick, const placed_joint *j)
     }
     double position = position_of(j, which);
     if ((limit->flags & HAPI_LIMIT_LOCKED) != 0) {
-      add_locked(tick, j, which, position);
+      add_locked(rows, facts->period, j, which, position);
     }
     if ((limit->flags & HAPI_LIMIT_MOTOR) != 0) {
-      add_motor(tick, j, which, position);
+      add_motor(rows, facts->period, j, which, position);
     }
     if ((limit->flags & HAPI_LIMIT_LOW) != 0) {
-      add_stop(tick, j, which, position - limit->low, 1.0);
+      add_stop(rows, facts, j, which, position - limit->low, 1.0);
     }
     if ((limit->flags & HAPI_LIMIT_HIGH) != 0) {
-      add_stop(tick, j, which, limit->high - position, -1.0);
+      add_stop(rows, facts, j, which, limit->high - position, -1.0);
     }
   }
 }
 
 /* ---- joints ---- */
 
-static bool find_body(hapi_tick *tick, uint32_t slot, uint32_t generation, hapi_local_body **out)
+static bool find_body(const hapi_bodies *bodies, uint32_t slot, uint32_t generation,
+                      hapi_local_body **out)
 {
-  *out = hapi_bodies_at(&tick->bodies, slot);
+  *out = hapi_bodies_at(bodies, slot);
   return *out == NULL || ((*out)->live && (*out)->generation == generation);
 }
 
-static bool find_joint(hapi_tick *tick, uint32_t index, placed_joint *out)
+static bool find_joint(const hapi_joints *joints, const hapi_bodies *bodies, uint32_t index,
+                       placed_joint *out)
 {
-  out->in = &tick->joints.of[index];
+  out->in = &joints->of[index];
   out->index = index;
-  return find_body(tick, out->in->body_a, out->in->generation_a, &out->a) &&
-         find_body(tick, out->in->body_b, out->in->generation_b, &out->b) && out->a != NULL;
-}
-
-static bool is_given(const hapi_local_body *body)
-{
-  return body != NULL && (body->flags & HAPI_BODY_OWNED) == 0;
+  return find_body(bodies, out->in->body_a, out->in->generation_a, &out->a) &&
+         find_body(bodies, out->in->body_b, out->in->generation_b, &out->b) && out->a != NULL;
 }
 
 /* ODE pushes along a slider halfway between the centres, so that no torque is left over. */
@@ -593,7 +603,7 @@ static void place_motion(placed_joint *j, const double anchor_a[3], const double
   for (int i = 0; i < 2; ++i) {
     double arm[3];
     double rate[3];
-    if (turns(bodies[i])) {
+    if (body_turns(bodies[i])) {
       double sign = i == 0 ? -1.0 : 1.0;
       hapi_body_arm(bodies[i], anchors[i], arm);
       rate_of(bodies[i], arm, rate);
@@ -628,7 +638,7 @@ static void place_measured_axes(placed_joint *j)
   }
 }
 
-static void place(placed_joint *j)
+static void joint_place(placed_joint *j)
 {
   const hapi_joint_place *in = &j->in->place;
   double anchor_a[3];
@@ -648,81 +658,79 @@ static void place(placed_joint *j)
   place_arms(j, anchor_a, anchor_b);
   place_motion(j, anchor_a, anchor_b);
   find_turned(j, j->turned);
-  j->driven = is_given(j->a) || is_given(j->b);
+  j->driven = hapi_body_is_given(j->a) || hapi_body_is_given(j->b);
 }
 
-static void add_joint(hapi_tick *tick, const placed_joint *j)
+static void add_joint(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j)
 {
   switch (j->in->kind) {
     case HAPI_JOINT_BALL:
-      hold_point(tick, j);
+      hold_point(rows, facts->period, j);
       break;
     case HAPI_JOINT_HINGE:
-      hold_point(tick, j);
-      hold_axis(tick, j);
+      hold_point(rows, facts->period, j);
+      hold_axis(rows, facts->period, j);
       break;
     case HAPI_JOINT_SLIDER:
-      hold_line(tick, j);
-      hold_orientation(tick, j);
+      hold_line(rows, facts->period, j);
+      hold_orientation(rows, facts->period, j);
       break;
     case HAPI_JOINT_UNIVERSAL:
-      hold_point(tick, j);
-      hold_cross(tick, j);
+      hold_point(rows, facts->period, j);
+      hold_cross(rows, facts->period, j);
       break;
     case HAPI_JOINT_HINGE2:
-      hold_sprung_point(tick, j);
-      hold_cross(tick, j);
+      hold_sprung_point(rows, facts->period, j);
+      hold_cross(rows, facts->period, j);
       break;
     case HAPI_JOINT_FIXED:
-      hold_point(tick, j);
-      hold_orientation(tick, j);
+      hold_point(rows, facts->period, j);
+      hold_orientation(rows, facts->period, j);
       break;
     case HAPI_JOINT_MEASURED:
-      hold_measured(tick, j);
+      hold_measured(rows, facts, j);
       break;
   }
-  add_limits(tick, j);
+  add_limits(rows, facts, j);
 }
 
-void hapi_joint_rows(hapi_tick *tick)
+void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
+                     const hapi_tick_facts *facts)
 {
-  for (uint32_t i = 0; i < tick->joints.count; ++i) {
+  for (uint32_t i = 0; i < joints->count; ++i) {
     placed_joint j;
-    if (find_joint(tick, i, &j) && (hapi_body_responds(j.a) || hapi_body_responds(j.b))) {
-      double *impulse = tick->joints.memory[j.in->slot].impulse;
+    if (find_joint(joints, bodies, i, &j) && (hapi_body_responds(j.a) || hapi_body_responds(j.b))) {
+      double *impulse = joints->memory[j.in->slot].impulse;
       memcpy(j.was, impulse, sizeof j.was);
       memset(impulse, 0, sizeof j.was); /* what has a row now is written when it is solved */
-      place(&j);
-      add_joint(tick, &j);
+      joint_place(&j);
+      add_joint(rows, facts, &j);
     }
   }
 }
 
 /* ---- wake and adopt ---- */
 
-static bool rests(const hapi_local_body *body)
+static bool body_moves(const hapi_local_body *body)
 {
-  return body != NULL && (body->flags & HAPI_BODY_RESTING) != 0;
-}
-
-static bool moves(const hapi_local_body *body)
-{
-  if (body == NULL || rests(body)) {
+  if (body == NULL || hapi_body_rests(body)) {
     return false;
   }
   const double *v = body->start_twist;
   return (body->flags & HAPI_BODY_DRIVEN) == 0 || hapi_dot6(v, v) > 0.0;
 }
 
-void hapi_joint_wake(hapi_tick *tick)
+void hapi_joint_wake(const hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
+                     double period)
 {
   bool again = true;
   while (again) { /* at most once for each body */
     again = false;
-    for (uint32_t i = 0; i < tick->joints.count; ++i) {
+    for (uint32_t i = 0; i < joints->count; ++i) {
       placed_joint j;
-      if (find_joint(tick, i, &j) && ((rests(j.a) && moves(j.b)) || (rests(j.b) && moves(j.a)))) {
-        hapi_local_wake(tick, rests(j.a) ? j.a : j.b);
+      if (find_joint(joints, bodies, i, &j) && ((hapi_body_rests(j.a) && body_moves(j.b)) ||
+                                                (hapi_body_rests(j.b) && body_moves(j.a)))) {
+        hapi_body_wake(hapi_body_rests(j.a) ? j.a : j.b, rows, period);
         again = true;
       }
     }
@@ -738,13 +746,13 @@ static void adopt_measurement(const hapi_measured_joint *in, hapi_joint_memory *
   }
 }
 
-void hapi_joint_adopt(hapi_tick *tick, hapi_model *model)
+void hapi_joints_adopt(hapi_joints *joints, hapi_model *model)
 {
   const hapi_model_joint *in = hapi_model_joints(model);
-  tick->joints.count = model->joint_count;
+  joints->count = model->joint_count;
   for (uint32_t i = 0; i < model->joint_count; ++i) {
-    hapi_joint_memory *memory = &tick->joints.memory[in[i].slot];
-    tick->joints.of[i] = in[i];
+    hapi_joint_memory *memory = &joints->memory[in[i].slot];
+    joints->of[i] = in[i];
     if (memory->generation != in[i].generation) {
       memset(memory, 0, sizeof *memory);
       memory->generation = in[i].generation;

@@ -25,4 +25,13 @@ typedef struct hapi_joints {
   hapi_joint_memory *memory; /* by slot; capacity.joints */
 } hapi_joints;
 
+void hapi_joints_adopt(hapi_joints *joints, hapi_model *model);
+
+/* Wakes what hangs on a body that moves. */
+void hapi_joint_wake(const hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
+                     double period);
+
+void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
+                     const hapi_tick_facts *facts);
+
 #endif

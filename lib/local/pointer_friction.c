@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
-#include "local/rows.h"
 
 /* The anchors stay where they are as long as nothing slides: displacements are taken from them as they
  * are placed now, and not summed up from velocities, so that no noise and no motion that comes back makes
@@ -63,7 +63,7 @@ static void point_from_body(const hapi_local_body *body, const double local[3], 
   }
 }
 
-static void across(const double normal[3], double io[3])
+static void flatten(const double normal[3], double io[3])
 {
   hapi_v3_madd(io, -hapi_v3_dot(normal, io), normal, io);
 }
@@ -72,13 +72,13 @@ static void across(const double normal[3], double io[3])
 static void set_tangent(const double normal[3], const double near[3], double out[3])
 {
   hapi_v3_copy(near, out);
-  across(normal, out);
+  flatten(normal, out);
   double norm = hapi_v3_norm(out);
   if (!(norm > 1e-12)) {
     int least = fabs(normal[0]) < 0.6 ? 0 : 1;
     hapi_v3_set(out, 0.0, 0.0, 0.0);
     out[least] = 1.0;
-    across(normal, out);
+    flatten(normal, out);
     norm = hapi_v3_norm(out);
   }
   hapi_v3_scale(1.0 / norm, out, out);
@@ -97,7 +97,7 @@ static double norm4(const double a[4])
 /* ---- anchors ---- */
 
 /* A vector across `from`, turned with it on the shortest way to `to`, less than a right angle away. */
-static void carry(const double from[3], const double to[3], double io[3])
+static void direction_carry(const double from[3], const double to[3], double io[3])
 {
   double sum[3];
   hapi_v3_add(from, to, sum);
@@ -106,8 +106,8 @@ static void carry(const double from[3], const double to[3], double io[3])
 }
 
 /* The anchors as they would be set now. The marks are one direction of the surface, in both frames. */
-static void see(hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
-                const double normal[3], const double point[3])
+static void place_see(hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
+                      const double normal[3], const double point[3])
 {
   static const double any[3] = {0.0, 0.0, 0.0};
   double apart[3];
@@ -136,8 +136,8 @@ static void set_normal(hapi_friction *f, const double of_pointer[3], const doubl
 
 /* How far the pointer is ahead of the body along the surface. The force acts half-way between the
  * anchors: so the spring keeps its energy while the surface tilts. */
-static void slide(hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
-                  const double normal_of_body[3])
+static void stretch_slide(hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
+                          const double normal_of_body[3])
 {
   double apart[3];
   double of_body[3];
@@ -148,9 +148,9 @@ static void slide(hapi_friction *f, const hapi_pointer *p, const hapi_local_body
   double height = hapi_v3_dot(f->normal, apart);
   hapi_v3_madd(f->at, -0.5 * height, f->normal, f->at);
   from_body(body, f->set.stretch_body, f->stretch);
-  carry(normal_of_body, f->normal, f->stretch);
+  direction_carry(normal_of_body, f->normal, f->stretch);
   hapi_v3_add(f->stretch, apart, f->stretch);
-  across(f->normal, f->stretch);
+  flatten(f->normal, f->stretch);
 }
 
 /* How far the pointer has turned against the body about the normal since the anchors were set: rad. */
@@ -162,8 +162,8 @@ static double turn_since(const hapi_friction *f, const hapi_pointer *p, const ha
   double cross[3];
   hapi_quat_rotate(pointer_turn(p), f->set.mark_pointer, a);
   from_body(body, f->set.mark_body, b);
-  carry(of_pointer, f->normal, a);
-  carry(of_body, f->normal, b);
+  direction_carry(of_pointer, f->normal, a);
+  direction_carry(of_body, f->normal, b);
   hapi_v3_cross(b, a, cross);
   return hapi_row_angle(hapi_v3_dot(cross, f->normal), hapi_v3_dot(a, b));
 }
@@ -174,7 +174,7 @@ static void see_stretch(hapi_friction *f, const hapi_local_body *body, const dou
 {
   double flat[3];
   hapi_v3_copy(f->stretch, flat);
-  carry(f->normal, normal, flat);
+  direction_carry(f->normal, normal, flat);
   to_body(body, flat, f->now.stretch_body);
   f->now.turn = turn;
 }
@@ -196,7 +196,7 @@ static void measure_stretch(hapi_friction *f, const hapi_pointer *p, const hapi_
   hapi_quat_rotate(pointer_turn(p), f->set.normal_pointer, of_pointer);
   from_body(body, f->set.normal_body, of_body);
   set_normal(f, of_pointer, of_body);
-  slide(f, p, body, of_body);
+  stretch_slide(f, p, body, of_body);
   if (p->surface.finger_radius > 0.0) {
     turn = turn_since(f, p, body, of_pointer, of_body);
   }
@@ -209,38 +209,37 @@ static void measure_stretch(hapi_friction *f, const hapi_pointer *p, const hapi_
 }
 
 /* A new patch may have the point of a hull elsewhere, all at once: more than what it has been pulled by. */
-static bool leaps(const hapi_friction *f, const hapi_tick *tick, const hapi_local_contact *contact,
-                  const double normal[3], const double point[3])
+static bool anchor_leaps(const hapi_friction *f, const hapi_touches *touches,
+                         const hapi_local_contact *contact, const hapi_rub_place *at)
 {
-  const hapi_pointer *p = &tick->pointers.of[contact->pointer];
+  const hapi_pointer *p = at->pointer;
   double way[3];
   if (contact->tool == 0) {
     return false;
   }
   hapi_quat_rotate(pointer_turn(p), f->set.anchor_pointer, way);
   hapi_v3_add(way, p->pose.position, way);
-  hapi_v3_sub(point, way, way);
-  across(normal, way);
-  double most = LEAP_SHARE * tick->touches.tool.tools[contact->tool - 1].in.same_within;
+  hapi_v3_sub(at->foot, way, way);
+  flatten(at->normal, way);
+  double most = LEAP_SHARE * touches->tool.tools[contact->tool - 1].in.same_within;
   return hapi_v3_norm(way) > most + hapi_v3_norm(f->stretch);
 }
 
 /* Whether anchors of the tick before hold: not after a jump, nor for another face. */
-static bool goes_on(const hapi_friction *f, const hapi_tick *tick,
-                    const hapi_local_contact *contact, const hapi_local_body *body,
-                    const double normal[3])
+static bool friction_goes_on(const hapi_friction *f, uint64_t tick,
+                             const hapi_local_contact *contact, const hapi_rub_place *at)
 {
-  const hapi_pointer *p = &tick->pointers.of[contact->pointer];
+  const hapi_pointer *p = at->pointer;
   double of_pointer[3];
   double of_body[3];
   bool same = contact->tool != 0 || f->generation == contact->generation;
-  if (!same || f->slid || f->tick + 1 != tick->facts.tick || p->device.jumped) {
+  if (!same || f->slid || f->tick + 1 != tick || p->device.jumped) {
     return false;
   }
   hapi_quat_rotate(pointer_turn(p), f->set.normal_pointer, of_pointer);
-  from_body(body, f->set.normal_body, of_body);
-  return hapi_v3_dot(of_pointer, normal) > OTHER_FACE_COSINE &&
-         hapi_v3_dot(of_body, normal) > OTHER_FACE_COSINE;
+  from_body(at->body, f->set.normal_body, of_body);
+  return hapi_v3_dot(of_pointer, at->normal) > OTHER_FACE_COSINE &&
+         hapi_v3_dot(of_body, at->normal) > OTHER_FACE_COSINE;
 }
 
 /* ---- one tick ---- */
@@ -265,7 +264,7 @@ static void set_speed(hapi_friction *f, const hapi_pointer *p, const hapi_local_
     hapi_v3_sub(f->speed, body->twist.linear, f->speed);
     hapi_v3_sub(spin, body->twist.angular, spin);
   }
-  across(f->normal, f->speed);
+  flatten(f->normal, f->speed);
   f->speed[3] = p->surface.finger_radius * hapi_v3_dot(f->normal, spin);
 }
 
@@ -278,7 +277,7 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
   memcpy(ahead, f->speed, sizeof ahead);
   if (gain != NULL) {
     hapi_v3_add(ahead, gain, ahead);
-    across(f->normal, ahead);
+    flatten(f->normal, ahead);
   }
   for (int i = 0; i < 4; ++i) {
     pull[i] = f->stiffness * (f->stretch[i] + lead * ahead[i]) + f->damping * ahead[i];
@@ -299,63 +298,58 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
 /* Anchors that are set now, where the spring is as long as in `stretch`. */
 static void set_anew(hapi_friction *f, const hapi_local_body *body, const double normal[3])
 {
-  across(normal, f->stretch);
+  flatten(normal, f->stretch);
   hapi_v3_copy(normal, f->normal);
   see_stretch(f, body, normal, f->now.turn);
   set_anchors(f, 1.0);
 }
 
-void hapi_friction_resume(hapi_tick *tick, const hapi_local_contact *contact,
-                          const double normal[3], const double point[3],
-                          const double stretch_body[3], double turn)
+void hapi_friction_resume(hapi_friction *f, uint64_t tick, const hapi_local_contact *contact,
+                          const hapi_rub_place *at, const double stretch_body[3], double turn)
 {
-  const hapi_pointer *p = &tick->pointers.of[contact->pointer];
-  const hapi_local_body *body =
-      contact->body == HAPI_SLOT_NONE ? NULL : &tick->bodies.of[contact->body];
-  hapi_friction *f = hapi_friction_of(tick, contact);
   memset(f, 0, sizeof *f);
-  from_body(body, stretch_body, f->stretch);
+  from_body(at->body, stretch_body, f->stretch);
   f->now.turn = turn;
-  see(f, p, body, normal, point);
-  set_anew(f, body, normal);
+  place_see(f, at->pointer, at->body, at->normal, at->foot);
+  set_anew(f, at->body, at->normal);
   f->generation = contact->generation;
-  f->tick = tick->facts.tick - 1;
-  f->epoch = body != NULL ? body->epoch : 0;
+  f->tick = tick - 1;
+  f->epoch = at->body != NULL ? at->body->epoch : 0;
 }
 
-hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
-                                   const double normal[3], const double point[3])
+hapi_friction *hapi_friction_begin(const hapi_touches *touches, const hapi_bodies *bodies,
+                                   uint64_t tick, const hapi_local_contact *contact,
+                                   const hapi_rub_place *at)
 {
   if (!contact->rubs) {
     return NULL;
   }
-  const hapi_pointer *p = &tick->pointers.of[contact->pointer];
-  const hapi_local_body *body =
-      contact->body == HAPI_SLOT_NONE ? NULL : &tick->bodies.of[contact->body];
-  uint32_t epoch = body != NULL ? body->epoch : 0;
-  hapi_friction *f = hapi_friction_of(tick, contact);
-  bool same = goes_on(f, tick, contact, body, normal) && !leaps(f, tick, contact, normal, point);
+  const hapi_pointer *p = at->pointer;
+  uint32_t epoch = at->body != NULL ? at->body->epoch : 0;
+  hapi_friction *f = hapi_friction_of(touches, contact);
+  bool same = friction_goes_on(f, tick, contact, at) && !anchor_leaps(f, touches, contact, at);
+  HAPI_ASSERT_UNIT(at->normal);
   if (!same) {
     double stretch[4];
-    hapi_tool_friction_begin(tick, contact, normal, point, stretch);
+    hapi_tool_friction_begin(touches, bodies, tick, contact, at, stretch);
     memset(f, 0, sizeof *f);
     hapi_v3_copy(stretch, f->stretch);
     f->now.turn = stretch[3];
   }
-  see(f, p, body, normal, point);
+  place_see(f, p, at->body, at->normal, at->foot);
   if (!same || f->epoch != epoch) { /* that a body was put somewhere else is no motion */
-    set_anew(f, body, normal);
+    set_anew(f, at->body, at->normal);
   }
   f->generation = contact->generation;
-  f->tick = tick->facts.tick;
+  f->tick = tick;
   f->epoch = epoch;
   f->rigid = p->rigid;
   f->stiffness = p->rigid ? p->coupling.stiffness : contact->weight * p->surface.stiffness;
   f->damping = p->rigid ? p->surface.damping : contact->weight * p->surface.damping;
   f->left = 1.0;
   f->axis_count = p->surface.finger_radius > 0.0 ? 3 : 2;
-  measure_stretch(f, p, body, normal);
-  set_speed(f, p, body);
+  measure_stretch(f, p, at->body, at->normal);
+  set_speed(f, p, at->body);
   return f;
 }
 
@@ -390,15 +384,16 @@ void hapi_friction_end(hapi_friction *f, const double push[4], double limit)
   }
 }
 
-double hapi_friction_energy(const hapi_tick *tick, const hapi_local_contact *contact)
+double hapi_friction_energy(const hapi_touches *touches, uint64_t tick,
+                            const hapi_local_contact *contact)
 {
-  const hapi_friction *f = hapi_friction_now(tick, contact);
+  const hapi_friction *f = hapi_friction_now(touches, tick, contact);
   return f == NULL || f->rigid ? 0.0 : 0.5 * f->stiffness * dot4(f->stretch, f->stretch);
 }
 
 /* Of rows, or by eq. 7 as it stands: then nothing answers. */
-static void friction_force(const hapi_tick *tick, const hapi_local_contact *c,
-                           const hapi_friction *f, double limit, double out[4])
+static void friction_force(const hapi_rows *rows, const hapi_local_contact *c,
+                           const hapi_friction *f, double period, double limit, double out[4])
 {
   if (c->row == HAPI_NO_ROW) {
     hapi_friction_push(f, limit, out);
@@ -406,17 +401,17 @@ static void friction_force(const hapi_tick *tick, const hapi_local_contact *c,
   }
   memset(out, 0, 4 * sizeof *out);
   for (uint32_t i = 0; i < f->axis_count; ++i) {
-    double force = tick->rows.solver.rows[c->row + 1 + i].impulse / tick->facts.period;
+    double force = rows->solver.rows[c->row + 1 + i].impulse / period;
     for (int k = 0; k < 4; ++k) {
       out[k] += force * f->axes[i][k];
     }
   }
 }
 
-void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c)
+void hapi_friction_rub(const hapi_touches *touches, const hapi_rows *rows,
+                       const hapi_tick_facts *facts, hapi_local_contact *c, hapi_pointer *p)
 {
-  hapi_pointer *p = &tick->pointers.of[c->pointer];
-  hapi_friction *f = hapi_friction_now(tick, c);
+  hapi_friction *f = hapi_friction_now(touches, facts->tick, c);
   double push[4];
   hap_wrench wrench;
   hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
@@ -424,7 +419,7 @@ void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c)
     return;
   }
   double limit = c->mu * hapi_v3_norm(c->force);
-  friction_force(tick, c, f, limit, push);
+  friction_force(rows, c, f, facts->period, limit, push);
   hapi_friction_wrench(f, p, push, c->point_now, &wrench);
   hapi_v3_add(c->force, wrench.force, c->force);
   hapi_v3_copy(wrench.torque, c->couple);

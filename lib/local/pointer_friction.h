@@ -12,7 +12,11 @@
 #include <stdbool.h>
 
 #include "base/vec.h"
-#include "tick/tick.h"
+#include "local/facts.h"
+#include "local/rows.h"
+#include "local/tool_friction.h"
+#include "local/touch.h"
+#include "pointer/pointer.h"
 
 /* Of a ball: the point of the surface below it, whatever point of the plane was given. Of a hull: the point. */
 static inline void hapi_friction_foot(const hapi_pointer *p, const double normal[3],
@@ -27,17 +31,18 @@ static inline void hapi_friction_foot(const hapi_pointer *p, const double normal
   hapi_v3_madd(p->pose.position, -hapi_v3_dot(normal, apart), normal, out);
 }
 
-/* Where the contact's friction stands in this tick, but for the axes; NULL: it has none. normal: out of the body; point: of
- * the surface, below the pointer. Once in each tick in which the contact is closed: after one without,
- * it begins anew; a point of a hull with what the others of its pair hold. */
-hapi_friction *hapi_friction_begin(hapi_tick *tick, const hapi_local_contact *contact,
-                                   const double normal[3], const double point[3]);
+/* Where the contact's friction stands in this tick, but for the axes; NULL: it has none. Once in each
+ * tick in which the contact is closed: after one without, it begins anew; a point of a hull with what the
+ * others of its pair hold. bodies: of those. */
+hapi_friction *hapi_friction_begin(const hapi_touches *touches, const hapi_bodies *bodies,
+                                   uint64_t tick, const hapi_local_contact *contact,
+                                   const hapi_rub_place *at);
 
-/* As if the contact had been closed in the tick before, with its spring that long: for a tick that is begun in the midst
- * of something. stretch_body: m, of the pointer ahead of the body, in the body's frame; turn: rad. */
-void hapi_friction_resume(hapi_tick *tick, const hapi_local_contact *contact,
-                          const double normal[3], const double point[3],
-                          const double stretch_body[3], double turn);
+/* As if the contact had been closed in the tick before, with its spring that long: for a tick that is
+ * begun in the midst of something. stretch_body: m, of the pointer ahead of the body, in the body's
+ * frame; turn: rad. */
+void hapi_friction_resume(hapi_friction *f, uint64_t tick, const hapi_local_contact *contact,
+                          const hapi_rub_place *at, const double stretch_body[3], double turn);
 
 /* Sets the axes along the force that there is when all sticks. lead: how far the spring's is foreseen, with
  * the speed and what the pointer gets of it besides (m/s; NULL: nothing): where pointer or body follow
@@ -55,30 +60,11 @@ void hapi_friction_wrench(const hapi_friction *f, const hapi_pointer *p, const d
 void hapi_friction_end(hapi_friction *f, const double push[4], double limit);
 
 /* Once the rows are solved: adds friction to the normal force on the body, and its torque on the hand. */
-void hapi_friction_rub(hapi_tick *tick, hapi_local_contact *c);
-
-/* What is kept of the contact. */
-static inline hapi_friction *hapi_friction_of(const hapi_tick *tick,
-                                              const hapi_local_contact *contact)
-{
-  return contact->tool != 0 ? &tick->touches.tool.tools[contact->tool - 1].friction
-                            : &tick->touches.frictions[contact->slot];
-}
-
-/* What was begun in this tick; NULL: nothing. */
-static inline hapi_friction *hapi_friction_now(const hapi_tick *tick,
-                                               const hapi_local_contact *contact)
-{
-  hapi_friction *f = hapi_friction_of(tick, contact);
-  bool acts = contact->rubs && f->generation == contact->generation && f->tick == tick->facts.tick;
-  return acts ? f : NULL;
-}
-
-/* tool_friction.c: stretch [m; rad] with which a point of a hull begins; of a sphere none. point: as above. */
-void hapi_tool_friction_begin(const hapi_tick *tick, const hapi_local_contact *contact,
-                              const double normal[3], const double point[3], double out[4]);
+void hapi_friction_rub(const hapi_touches *touches, const hapi_rows *rows,
+                       const hapi_tick_facts *facts, hapi_local_contact *c, hapi_pointer *pointer);
 
 /* J in the contact's spring. */
-double hapi_friction_energy(const hapi_tick *tick, const hapi_local_contact *contact);
+double hapi_friction_energy(const hapi_touches *touches, uint64_t tick,
+                            const hapi_local_contact *contact);
 
 #endif

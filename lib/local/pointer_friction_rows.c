@@ -3,8 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "local/pointer_forces.h"
+#include "base/assert.h"
 #include "local/pointer_friction.h"
+#include "local/pointer_rows.h"
 #include "local/pointer_spring.h"
 
 /* Friction's spring (pointer_friction.h) as rows beside that of the contact's normal. Apart from those, which
@@ -73,48 +74,49 @@ static void fill_friction_spring(const hapi_placed_pointer *at, const hapi_frict
 }
 
 /* Eq. 7 as it stands gives the first axis its impulse; else each is a soft row in the ball. */
-static bool add_friction_row(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *at,
-                             const hapi_friction *f, uint32_t axis)
+static bool add_friction_row(double period, const hapi_local_contact *contact,
+                             const hapi_placed_pointer *at, const hapi_friction *f, uint32_t axis,
+                             hapi_rows *rows)
 {
-  const hapi_local_contact *contact = &tick->touches.of[index];
-  const hapi_row *normal = &tick->rows.solver.rows[contact->row];
-  uint32_t number = tick->rows.solver.row_count;
-  hapi_row *row = &tick->rows.solver.rows[number];
+  hapi_solver *solver = &rows->solver;
+  const hapi_row *normal = &solver->rows[contact->row];
+  uint32_t number = solver->row_count;
+  hapi_row *row = &solver->rows[number];
   hapi_pointer_spring p;
+  HAPI_ASSERT_INDEX(number, rows->capacity);
   set_friction_columns(contact, at, f, f->axes[axis], row);
   fill_friction_spring(at, f, f->axes[axis], row, &p);
   row->mu = contact->mu;
   row->single = !at->pointer->proxied;
-  tick->rows.solver.apart = false;
+  solver->apart = false;
   row->ball = axis == 0 ? (uint8_t)f->axis_count : 0;
   row->round = (uint8_t)axis;
   row->normal = (int32_t)contact->row;
-  row->impulse = axis == 0 ? tick->facts.period * f->pull : 0.0;
+  row->impulse = axis == 0 ? period * f->pull : 0.0;
   if (at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT) {
     row->normal = -1;
     row->ball = 0;
     row->lo = row->hi = fmin(row->impulse, contact->mu * normal->hi);
     row->softness = row->target = 0.0;
-  } else if (!hapi_spring_soften(row, at->pointer, &p, tick->facts.period)) {
+  } else if (!hapi_spring_soften(row, at->pointer, &p, period)) {
     return false;
   }
-  tick->rows.sources[number] = (hapi_row_source){.contact = index,
-                                                 .body_a = contact->body,
-                                                 .body_b = HAPI_SLOT_NONE,
-                                                 .part = (uint8_t)(1 + axis),
-                                                 .pointer = true};
+  rows->sources[number] = (hapi_row_source){.contact = at->index,
+                                            .body_a = contact->body,
+                                            .body_b = HAPI_SLOT_NONE,
+                                            .part = (uint8_t)(1 + axis),
+                                            .pointer = true};
   if (at->pointer->rigid) {
-    hapi_spring_set_staying(tick, at, &p, p.depth / tick->facts.period,
-                            &tick->rows.sources[number]);
+    hapi_spring_set_staying(period, at, &p, p.depth / period, &rows->sources[number]);
   }
-  ++tick->rows.solver.row_count;
-  hapi_row_ready(&tick->rows.solver, number);
+  ++solver->row_count;
+  hapi_row_ready(solver, number);
   return true;
 }
 
 /* A proxy goes, and a light body is taken, to where the force leaves them at the tick's end. */
-static void aim(const hapi_tick *tick, const hapi_local_contact *contact,
-                const hapi_placed_pointer *at, hapi_friction *f)
+static void friction_aim(const hapi_rows *rows, double period, const hapi_local_contact *contact,
+                         const hapi_placed_pointer *at, hapi_friction *f)
 {
   const hapi_pointer *p = at->pointer;
   double gain[3] = {0.0, 0.0, 0.0};
@@ -131,50 +133,36 @@ static void aim(const hapi_tick *tick, const hapi_local_contact *contact,
     hapi_v3_add(gain, spin, gain);
   }
   if (contact->row != HAPI_NO_ROW && p->coupling.integration != HAP_INTEGRATION_EXPLICIT) {
-    const hapi_row *normal = &tick->rows.solver.rows[contact->row];
+    const hapi_row *normal = &rows->solver.rows[contact->row];
     double a = hapi_dot6(normal->ja, normal->ba);
     a += p->proxied ? hapi_dot6(normal->jb, normal->bb) : 0.0;
-    lead = hapi_spring_by_midpoint(p, tick->facts.period * tick->facts.period * a * f->stiffness)
-               ? 0.0
-               : tick->facts.period;
+    lead = hapi_spring_by_midpoint(p, period * period * a * f->stiffness) ? 0.0 : period;
   }
   hapi_friction_aim(f, lead, gain);
 }
 
 /* After the normal's row. */
-void hapi_pointer_friction_rows(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *at)
+void hapi_pointer_friction_rows(const hapi_tick_facts *facts, const hapi_bodies *bodies,
+                                const hapi_touches *touches, hapi_rows *rows,
+                                const hapi_placed_pointer *at)
 {
-  const hapi_local_contact *contact = &tick->touches.of[index];
+  const hapi_local_contact *contact = &touches->of[at->index];
   double foot[3];
   hapi_friction_foot(at->pointer, at->normal, at->point, foot);
-  hapi_friction *f = hapi_friction_begin(tick, contact, at->normal, foot);
+  const hapi_rub_place place = {at->pointer, at->body, at->normal, foot};
+  hapi_friction *f = hapi_friction_begin(touches, bodies, facts->tick, contact, &place);
   if (f == NULL) {
     return;
   }
-  aim(tick, contact, at, f);
+  friction_aim(rows, facts->period, contact, at, f);
   if (contact->row == HAPI_NO_ROW) {
     return;
   }
   uint32_t wanted =
       at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT ? 1 : f->axis_count;
   uint32_t added = 0;
-  while (added < wanted && add_friction_row(tick, index, at, f, added)) {
+  while (added < wanted && add_friction_row(facts->period, contact, at, f, added, rows)) {
     ++added;
   }
   f->axis_count = added;
-}
-
-void hapi_pointer_forces_with_friction(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    hapi_local_contact *c = &tick->touches.of[i];
-    hapi_pointer_press(tick, c);
-    if (c->rubs) {
-      uint64_t begin = hapi_effect_begin(&tick->sample);
-      hapi_friction_rub(tick, c);
-      hapi_effect_end(&tick->sample, HAP_EFFECT_FRICTION, begin);
-    }
-    hapi_pointer_give(tick, c);
-  }
-  tick->figures.contact_ticks += tick->touches.pushing != 0;
 }

@@ -1,11 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/pointer_rows.h"
+
 #include <math.h>
 
-#include "base/effect_clock.h"
+#include "base/assert.h"
 #include "local/ball_nearest.h"
+#include "local/body_step.h"
 #include "local/contact_ramp.h"
-#include "local/pointer_forces.h"
 #include "local/pointer_spring.h"
 
 /* Pointer contacts as rows of the solver: pointer_spring.h says which. Those of friction are in
@@ -33,11 +35,11 @@ static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at)
   return true;
 }
 
-static bool ask_shape(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *at)
+static bool ask_shape(hapi_local_contact *c, hapi_placed_pointer *at, hapi_effect_sample *sample)
 {
-  uint64_t begin = hapi_effect_begin(&tick->sample);
+  uint64_t begin = hapi_effect_begin(sample);
   bool found = place_by_shape(c, at);
-  hapi_effect_end(&tick->sample, HAP_EFFECT_SHAPE, begin);
+  hapi_effect_end(sample, HAP_EFFECT_SHAPE, begin);
   return found;
 }
 
@@ -51,32 +53,30 @@ static void place_by_plane(hapi_local_contact *c, hapi_placed_pointer *at)
 }
 
 /* Where hapi_tool_place found it. */
-static bool place_tool(const hapi_tick *tick, const hapi_local_contact *c, hapi_placed_pointer *at)
+static bool place_tool(const hapi_local_tool *tool, hapi_placed_pointer *at)
 {
-  const hapi_local_tool *tool = &tick->touches.tool.tools[c->tool - 1];
   hapi_v3_sub(at->point, at->pointer->pose.position, at->arm);
   at->depth = tool->depth;
   at->share = tool->felt;
   return tool->placed;
 }
 
-static bool place(hapi_tick *tick, hapi_local_contact *c, hapi_placed_pointer *at)
+static bool pointer_place(const hapi_tool_world *tools, hapi_local_contact *c, double period,
+                          hapi_placed_pointer *at, hapi_effect_sample *sample)
 {
-  at->pointer = &tick->pointers.of[c->pointer];
-  at->body = hapi_bodies_at(&tick->bodies, c->body);
   at->normal = c->normal_now;
   at->point = c->point_now;
   if (at->pointer->generation != c->pointer_generation) {
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
   if (c->tool != 0) {
-    return place_tool(tick, c, at);
+    return place_tool(&tools->tools[c->tool - 1], at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  if (!c->has_shape || !ask_shape(tick, c, at)) {
+  if (!c->has_shape || !ask_shape(c, at, sample)) {
     place_by_plane(c, at);
   }
-  at->share = hapi_contact_ramp(c, at->pointer, &at->depth, tick->facts.period);
+  at->share = hapi_contact_ramp(c, at->pointer, &at->depth, period);
   return true;
 }
 
@@ -91,7 +91,7 @@ static void push_static(hapi_local_contact *c, const hapi_placed_pointer *at, do
 }
 
 /* Eq. 7 as it stands: the row's impulse is given. */
-static bool fix(hapi_row *row, const hapi_pointer_spring *p, double period)
+static bool row_fix(hapi_row *row, const hapi_pointer_spring *p, double period)
 {
   double force = p->depth > 0.0 ? p->k * p->depth + p->d * (p->s - p->w) : 0.0;
   row->lo = row->hi = force > 0.0 ? period * force : 0.0;
@@ -183,22 +183,24 @@ static void note_body(hapi_solver *solver, const hapi_placed_pointer *at)
   }
 }
 
-static void add_row(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *at)
+static void add_row(double period, hapi_local_contact *contact, const hapi_placed_pointer *at,
+                    hapi_rows *rows)
 {
-  hapi_local_contact *contact = &tick->touches.of[index];
-  uint32_t number = tick->rows.solver.row_count;
-  hapi_row *row = &tick->rows.solver.rows[number];
+  hapi_solver *solver = &rows->solver;
+  uint32_t number = solver->row_count;
+  hapi_row *row = &solver->rows[number];
   hapi_pointer_spring p = {.k = at->share * at->pointer->surface.stiffness,
                            .d = at->depth > 0.0 ? at->share * at->pointer->surface.damping : 0.0,
                            .depth = at->depth};
+  HAPI_ASSERT_INDEX(number, rows->capacity);
   if (at->pointer->rigid) {
     p.depth *= at->depth > 0.0 ? contact->ramp.share : 1.0;
     ++at->pointer->rigid_move.near_rows;
   }
   set_columns(contact, at, row, &p);
   bool pushes = at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT
-                    ? fix(row, &p, tick->facts.period)
-                    : hapi_spring_soften(row, at->pointer, &p, tick->facts.period);
+                    ? row_fix(row, &p, period)
+                    : hapi_spring_soften(row, at->pointer, &p, period);
   if (!pushes) {
     hapi_v3_set(contact->force, 0.0, 0.0, 0.0);
     return;
@@ -207,20 +209,19 @@ static void add_row(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *
   row->ball = row->round = 0;
   row->single = !at->pointer->proxied;
   row->normal = -1;
-  row->impulse = tick->facts.period * -hapi_v3_dot(contact->force, at->normal);
-  tick->rows.sources[number] = (hapi_row_source){
-      .contact = index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
+  row->impulse = period * -hapi_v3_dot(contact->force, at->normal);
+  rows->sources[number] = (hapi_row_source){
+      .contact = at->index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   if (at->pointer->rigid) {
-    hapi_spring_set_staying(tick, at, &p, fmin(p.depth, 0.0) / tick->facts.period,
-                            &tick->rows.sources[number]);
+    hapi_spring_set_staying(period, at, &p, fmin(p.depth, 0.0) / period, &rows->sources[number]);
   }
   contact->row = number;
-  ++tick->rows.solver.row_count;
-  note_body(&tick->rows.solver, at);
+  ++solver->row_count;
+  note_body(solver, at);
   if (row->single) {
-    hapi_single_ready(&tick->rows.solver, number, p.body_a);
+    hapi_single_ready(solver, number, p.body_a);
   } else {
-    hapi_row_ready(&tick->rows.solver, number);
+    hapi_row_ready(solver, number);
   }
 }
 
@@ -230,155 +231,136 @@ static double size_of(const hapi_pointer *p)
 }
 
 /* Whether a rigid contact may close within the tick, wherever the others send the pointer. */
-static bool may_close(const hapi_tick *tick, const hapi_local_contact *c,
+static bool may_close(const hapi_tool_world *tools, double period, const hapi_local_contact *c,
                       const hapi_placed_pointer *at)
 {
   double comes = fmax(-at->w, 0.0);
-  bool leaves = c->tool != 0 && tick->touches.tool.tools[c->tool - 1].leaving;
-  return !leaves &&
-         at->depth + at->pointer->rigid_move.reach + tick->facts.period * comes + RIGID_SLACK > 0.0;
+  bool leaves = c->tool != 0 && tools->tools[c->tool - 1].leaving;
+  return !leaves && at->depth + at->pointer->rigid_move.reach + period * comes + RIGID_SLACK > 0.0;
 }
 
-/* Not in line, and with what friction asks for alone: where nothing rubs, what was placed stays in registers. */
-static __attribute__((noinline, cold)) void rub(hapi_tick *tick, uint32_t index,
-                                                hapi_pointer *pointer, hapi_local_body *body,
-                                                double depth)
+/* Not in line, and with what friction asks for alone: where nothing rubs, what was placed stays in
+ * registers. */
+static __attribute__((noinline, cold)) void contact_rub(const hapi_tick_facts *facts,
+                                                        const hapi_bodies *bodies,
+                                                        const hapi_touches *touches,
+                                                        hapi_rows *rows, hapi_effect_sample *sample,
+                                                        const hapi_placed_pointer *from)
 {
-  const hapi_local_contact *c = &tick->touches.of[index];
-  const hapi_placed_pointer at = {.pointer = pointer,
-                                  .body = body,
+  const hapi_local_contact *c = &touches->of[from->index];
+  const hapi_placed_pointer at = {.index = from->index,
+                                  .pointer = from->pointer,
+                                  .body = from->body,
                                   .normal = c->normal_now,
                                   .point = c->point_now,
-                                  .depth = depth};
+                                  .depth = from->depth};
   bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
-  if (pushes && (pointer->rigid || depth > 0.0)) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
-    hapi_pointer_friction_rows(tick, index, &at);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_FRICTION, begin);
+  if (pushes && (at.pointer->rigid || at.depth > 0.0)) {
+    uint64_t begin = hapi_effect_begin(sample);
+    hapi_pointer_friction_rows(facts, bodies, touches, rows, &at);
+    hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);
   }
 }
 
-static void take_contact(hapi_tick *tick, uint32_t index)
+static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_world *tools,
+                                hapi_local_contact *c, hapi_placed_pointer *at, hapi_rows *rows)
 {
-  hapi_local_contact *c = &tick->touches.of[index];
-  hapi_placed_pointer at;
-  bool placed = tick->guard.latch.fault == HAP_FAULT_NONE && place(tick, c, &at);
-  c->row = HAPI_NO_ROW;
-  if (!placed) {
-    hapi_v3_set(c->force, 0.0, 0.0, 0.0);
-    return;
-  }
-  const hapi_pointer *p = at.pointer;
+  const hapi_pointer *p = at->pointer;
+  double period = facts->period;
   double velocity[3];
-  point_velocity(&at, p->proxied ? p->proxy.free_velocity : p->twist.linear,
+  point_velocity(at, p->proxied ? p->proxy.free_velocity : p->twist.linear,
                  p->proxied ? p->proxy.free_spin : p->twist.angular, velocity);
-  set_way(&at);
-  at.own = hapi_v3_dot(at.j, velocity);
-  double speed = at.own - at.w;
-  double way = tick->facts.period * speed;
+  set_way(at);
+  at->own = hapi_v3_dot(at->j, velocity);
+  double speed = at->own - at->w;
+  double way = period * speed;
   /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
   double motion = speed;
   if (p->proxied) {
-    point_velocity(&at, p->proxy.velocity, p->proxy.spin, velocity);
-    motion = hapi_v3_dot(at.j, velocity) - at.w;
+    point_velocity(at, p->proxy.velocity, p->proxy.spin, velocity);
+    motion = hapi_v3_dot(at->j, velocity) - at->w;
   }
-  if (!p->rigid && at.depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
-    at.pointer->coupling.near_stiffness += c->weight * at.pointer->surface.stiffness;
+  if (!p->rigid && at->depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
+    at->pointer->coupling.near_stiffness += c->weight * at->pointer->surface.stiffness;
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
-  bool comes =
-      at.depth > 0.0 || (at.depth + way > 0.0 && tick->facts.period * motion < 0.25 * size_of(p));
-  if (comes && at.body != NULL && (at.body->flags & HAPI_BODY_RESTING) != 0 &&
-      (at.depth > 0.0 || at.pointer->proxied)) {
-    hapi_local_wake(tick, at.body);
+  bool comes = at->depth > 0.0 || (at->depth + way > 0.0 && period * motion < 0.25 * size_of(p));
+  if (comes && at->body != NULL && (at->body->flags & HAPI_BODY_RESTING) != 0 &&
+      (at->depth > 0.0 || at->pointer->proxied)) {
+    hapi_body_wake(at->body, rows, period);
   }
-  bool acts = p->rigid ? may_close(tick, c, &at) : comes && at.share > 0.0;
+  bool acts = p->rigid ? may_close(tools, period, c, at) : comes && at->share > 0.0;
   if (!acts) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
-  } else if (hapi_body_responds(at.body) || at.pointer->proxied) {
-    add_row(tick, index, &at);
+  } else if (hapi_body_responds(at->body) || at->pointer->proxied) {
+    add_row(period, c, at, rows);
   } else {
-    push_static(c, &at, speed);
+    push_static(c, at, speed);
   }
-  if (c->rubs) {
-    rub(tick, index, at.pointer, at.body, at.depth);
+}
+
+void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointers,
+                       const hapi_bodies *bodies, const hapi_touches *touches, hapi_rows *rows,
+                       hapi_effect_sample *sample)
+{
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    hapi_local_contact *c = &touches->of[i];
+    hapi_placed_pointer at;
+    at.index = i;
+    at.pointer = &pointers->of[c->pointer];
+    at.body = hapi_bodies_at(bodies, c->body);
+    bool placed = !facts->faulted && pointer_place(&touches->tool, c, facts->period, &at, sample);
+    c->row = HAPI_NO_ROW;
+    if (!placed) {
+      hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+      continue;
+    }
+    contact_take(facts, &touches->tool, c, &at, rows);
+    if (c->rubs) {
+      const hapi_placed_pointer rubs = {
+          .index = i, .pointer = at.pointer, .body = at.body, .depth = at.depth};
+      contact_rub(facts, bodies, touches, rows, sample, &rubs); /* so that at stays in registers */
+    }
   }
 }
 
 /* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels it. */
-static void add_brake(hapi_tick *tick, const hapi_pointer *p, const double way[3], int first,
+static void add_brake(hapi_rows *rows, const hapi_pointer *p, const double way[3], int first,
                       double most)
 {
-  uint32_t number = tick->rows.solver.row_count;
-  hapi_row *row = &tick->rows.solver.rows[number];
+  hapi_solver *solver = &rows->solver;
+  uint32_t number = solver->row_count;
+  hapi_row *row = &solver->rows[number];
+  HAPI_ASSERT_INDEX(number, rows->capacity);
   memset(row, 0, sizeof *row);
   hapi_v3_scale(-1.0 / hapi_v3_norm(way), way, row->jb + first);
   hapi_v3_scale(first == 0 ? p->proxy.response : p->proxy.spin_response, row->jb + first,
                 row->bb + first);
   row->a = HAPI_STATIC_ROW;
   row->b = p->proxy.row;
-  tick->rows.solver.apart = false;
+  solver->apart = false;
   row->hi = HUGE_VAL;
   row->target = -most;
   row->normal = -1;
-  tick->rows.sources[number] =
+  rows->sources[number] =
       (hapi_row_source){.body_a = HAPI_SLOT_NONE, .body_b = HAPI_SLOT_NONE, .pointer = true};
-  ++tick->rows.solver.row_count;
-  hapi_row_ready(&tick->rows.solver, number);
+  ++solver->row_count;
+  hapi_row_ready(solver, number);
 }
 
 /* A god-object that has been let go would leap to the device. One that is held needs none. */
-void hapi_pointers_brake(hapi_tick *tick)
+void hapi_pointers_brake(const hapi_pointers *pointers, hapi_rows *rows)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0 || !p->rigid || p->contacts > 0) {
       continue;
     }
     if (hapi_v3_norm(p->proxy.free_velocity) > p->rigid_move.speed_most) {
-      add_brake(tick, p, p->proxy.free_velocity, 0, p->rigid_move.speed_most);
+      add_brake(rows, p, p->proxy.free_velocity, 0, p->rigid_move.speed_most);
     }
     if (p->shape.hull != NULL && hapi_v3_norm(p->proxy.free_spin) > p->rigid_move.spin_most) {
-      add_brake(tick, p, p->proxy.free_spin, 3, p->rigid_move.spin_most);
+      add_brake(rows, p, p->proxy.free_spin, 3, p->rigid_move.spin_most);
     }
   }
-}
-
-void hapi_pointers_direct(hapi_tick *tick)
-{
-  bool off = hapi_wish_is_off(tick->facts.wishes, HAP_EFFECT_PROXY);
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    bool unknown = p->coupling.kind == HAP_COUPLING_AUTO && !p->coupling.hold_known && !off;
-    p->coupling.reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
-    p->coupling.contact_stiffness = p->coupling.near_stiffness;
-    p->coupling.near_stiffness = 0.0;
-    p->proxy.row = 0;
-  }
-}
-
-void hapi_pointer_rows(hapi_tick *tick)
-{
-  hapi_tool_place(tick);
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    take_contact(tick, i);
-  }
-}
-
-void hapi_pointer_forces(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    tick->pointers.of[i].contacts = 0;
-    tick->pointers.of[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  }
-  tick->touches.pushing = 0;
-  if (tick->touches.rubs) {
-    hapi_pointer_forces_with_friction(tick);
-    return;
-  }
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    hapi_pointer_press(tick, &tick->touches.of[i]);
-    hapi_pointer_give(tick, &tick->touches.of[i]);
-  }
-  tick->figures.contact_ticks += tick->touches.pushing != 0;
 }

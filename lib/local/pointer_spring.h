@@ -5,7 +5,9 @@
 
 #include <math.h>
 
+#include "local/pointer_rows.h"
 #include "local/rows.h"
+#include "pointer/pointer.h"
 
 /* A pointer contact as a row of the solver: the spring and damper of eq. 7, integrated so that no
  * stiffness is too large for the body. With n out of the body, w the speed at which the body gives
@@ -34,20 +36,6 @@
 #define HAPI_DAMPER_LIMIT 0.25     /* of T a d: explicit damping is stable up to 2 */
 #define HAPI_DAMPER_IMPLICIT 1.0   /* of T a d: above it the mean of old and new velocity rings */
 #define HAPI_PUSHED_OUT_LEAST 1e-9 /* m, of a rigid contact: what is deeper is no rounding */
-
-typedef struct hapi_placed_pointer {
-  hapi_pointer *pointer;
-  hapi_local_body *body; /* NULL: static world */
-  const double *normal;  /* out of the body: normal_now and point_now of the contact */
-  const double *point;
-  double depth;
-  double share; /* of the stiffness, that is felt */
-  double j[6];  /* of the body, of a force into it at the point; NULL: the force alone */
-  double w;     /* m/s, along it before the tick */
-  double own;   /* m/s, likewise of the pointer, with nothing in touch */
-  double arm
-      [3]; /* from the pointer's origin to the point; of a sphere 0: it pushes through its centre */
-} hapi_placed_pointer;
 
 /* Spring force between the middles h and g of two ticks (depth, m): the change of its energy over the
  * change of depth. So a contact that begins or ends within the tick gains nothing by it. With both
@@ -179,22 +167,18 @@ static inline bool hapi_spring_soften(hapi_row *row, const hapi_pointer *pointer
   return c > 0.0;
 }
 
-static inline void hapi_spring_set_staying(const hapi_tick *tick, const hapi_placed_pointer *at,
+static inline void hapi_spring_set_staying(double period, const hapi_placed_pointer *at,
                                            const hapi_pointer_spring *p, double staying,
                                            hapi_row_source *source)
 {
   const hapi_pointer *pointer = at->pointer;
-  double a = tick->facts.period * p->body_a;
+  double a = period * p->body_a;
   bool takes = pointer->coupling.kind == HAP_COUPLING_GOD_OBJECT && hapi_body_responds(at->body) &&
-               tick->facts.period * a * pointer->coupling.stiffness <= HAPI_PROXY_LIMIT &&
+               period * a * pointer->coupling.stiffness <= HAPI_PROXY_LIMIT &&
                a * pointer->coupling.damping <= HAPI_DAMPER_LIMIT;
-  double lift = p->depth / tick->facts.period - staying;
+  double lift = p->depth / period - staying;
   source->stays = staying + (takes ? p->body_w : 0.0);
-  source->pushes_out =
-      lift > HAPI_PUSHED_OUT_LEAST / tick->facts.period || (takes && p->body_w != 0.0);
+  source->pushes_out = lift > HAPI_PUSHED_OUT_LEAST / period || (takes && p->body_w != 0.0);
 }
-
-/* pointer_friction_rows.c: the rows of a contact's friction, after that of its normal. */
-void hapi_pointer_friction_rows(hapi_tick *tick, uint32_t index, const hapi_placed_pointer *at);
 
 #endif

@@ -13,8 +13,6 @@
 /* Place 0 of the solver's velocities never moves: the static world. */
 #define HAPI_STATIC_ROW 0u
 
-#define HAPI_NO_ROW 0xffffffffu
-
 /* Where a row of the solver comes from. */
 typedef struct hapi_row_source {
   uint32_t contact; /* of the patches, or of the pointers */
@@ -34,6 +32,8 @@ typedef struct hapi_rows {
   hapi_solver solver;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
+  double residual_max; /* m/s; this and the next since start */
+  uint64_t sweeps;
 } hapi_rows;
 
 /* What a unit impulse along j does to the body's velocity. */

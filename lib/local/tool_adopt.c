@@ -1,9 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/tool_adopt.h"
+
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
-#include "tick/tick.h"
 
 /* The points of a hull's patches are found anew again and again. One that is near to where one of the
  * same pair was is that one, and keeps what it had. While a pair presses, others come in slowly, and
@@ -11,20 +13,15 @@
 
 #define SAME_COSINE 0.7 /* of the normals */
 
-static hapi_local_contact *contacts_of(hapi_tick *tick)
+void hapi_tool_set_aside(hapi_touches *touches)
 {
-  return &tick->touches.of[tick->touches.count - tick->touches.tool.count];
-}
-
-void hapi_tool_set_aside(hapi_tick *tick)
-{
-  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_world *w = &touches->tool;
   if (w->count == 0) {
     return;
   }
-  memcpy(w->old_contacts, contacts_of(tick), w->count * sizeof *w->old_contacts);
+  memcpy(w->old_contacts, hapi_touches_of_tools(touches), w->count * sizeof *w->old_contacts);
   memcpy(w->old_tools, w->tools, w->count * sizeof *w->old_tools);
-  tick->touches.count -= w->count;
+  touches->count -= w->count;
   /* w->count stays: how many are set aside, until they are taken or put back */
 }
 
@@ -35,6 +32,7 @@ static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
       return i;
     }
   }
+  HAPI_ASSERT_INDEX(w->pair_count, 3 * w->capacity);
   w->pairs[w->pair_count] = (hapi_tool_pair){
       .key = in->at.key, .pointer = in->pointer, .first = HAPI_SLOT_NONE, .depth = -HUGE_VAL};
   return w->pair_count++;
@@ -65,22 +63,23 @@ static uint32_t find_old(const hapi_tool_world *w, uint32_t old_count, const hap
   return chosen;
 }
 
-static void link_to_pair(hapi_tick *tick, uint32_t at)
+static void link_to_pair(hapi_tool_world *w, uint32_t at)
 {
-  hapi_tool_world *w = &tick->touches.tool;
   hapi_tool_pair *pair = &w->pairs[w->tools[at].pair];
   w->tools[at].next = pair->first;
   pair->first = at;
 }
 
-/* old: with what of it goes on; NULL: a new one. */
-static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
+/* old: with what of it goes on; HAPI_SLOT_NONE: a new one. */
+static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t old,
+                     uint32_t wishes)
 {
-  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_world *w = &touches->tool;
   uint32_t at = w->count;
-  hapi_local_contact *c = &tick->touches.of[tick->touches.count];
+  hapi_local_contact *c = &touches->of[touches->count];
   hapi_local_tool *tool = &w->tools[at];
   uint32_t pair = pair_of(w, in);
+  HAPI_ASSERT_INDEX(at, 2 * w->capacity);
   memset(tool, 0, sizeof *tool);
   if (old != HAPI_SLOT_NONE) {
     *c = w->old_contacts[old];
@@ -98,27 +97,27 @@ static void add(hapi_tick *tick, const hapi_tool_point *in, uint32_t old)
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
   c->mu = in->mu;
-  c->rubs = (in->mu > 0.0 || hapi_wish_is_on(tick->facts.wishes, HAP_EFFECT_FRICTION));
-  tick->touches.rubs |= c->rubs;
+  c->rubs = hapi_touch_rubs(in->mu, wishes);
+  touches->rubs |= c->rubs;
   c->tool = at + 1;
   c->row = HAPI_NO_ROW;
   ++w->count;
-  ++tick->touches.count;
-  link_to_pair(tick, at);
+  ++touches->count;
+  link_to_pair(w, at);
 }
 
 /* What was not found again. */
-static void keep_leaving(hapi_tick *tick, uint32_t old_count)
+static void tools_keep_leaving(hapi_touches *touches, uint32_t old_count, uint32_t wishes)
 {
-  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_world *w = &touches->tool;
   for (uint32_t i = 0; i < old_count; ++i) {
     const hapi_local_tool old = w->old_tools[i];
-    bool room = w->count < 2 * tick->capacity.tool_points;
+    bool room = w->count < 2 * w->capacity;
     if (old.member < 0.0 || !room || !(w->pairs[old.pair].depth > 0.0)) {
       continue;
     }
     uint32_t at = w->count;
-    add(tick, &old.in, i);
+    tool_add(touches, &old.in, i, wishes);
     w->tools[at].leaving = true;
   }
 }
@@ -140,9 +139,8 @@ static void drop_pairs(hapi_tool_world *w)
 }
 
 /* All that are set aside are forgotten but for what the new ones take over. */
-static uint32_t begin(hapi_tick *tick)
+static uint32_t tools_begin(hapi_tool_world *w)
 {
-  hapi_tool_world *w = &tick->touches.tool;
   uint32_t old_count = w->count;
   w->count = 0;
   for (uint32_t i = 0; i < w->pair_count; ++i) {
@@ -151,78 +149,68 @@ static uint32_t begin(hapi_tick *tick)
   return old_count;
 }
 
-static void end(hapi_tick *tick, uint32_t old_count)
+static void tools_end(hapi_touches *touches, uint32_t old_count, uint32_t wishes)
 {
-  keep_leaving(tick, old_count);
-  drop_pairs(&tick->touches.tool);
+  tools_keep_leaving(touches, old_count, wishes);
+  drop_pairs(&touches->tool);
 }
 
-static bool is_there(const hapi_tick *tick, const hapi_tool_point *in)
+static bool is_there(const hapi_tool_world *w, const hapi_pointers *pointers,
+                     const hapi_tool_point *in)
 {
-  return tick->pointers.of[in->pointer].generation == in->pointer_generation &&
-         tick->touches.tool.count < tick->capacity.tool_points;
+  return pointers->of[in->pointer].generation == in->pointer_generation && w->count < w->capacity;
 }
 
-static void put_back(hapi_tick *tick)
+static void tools_put_back(hapi_touches *touches)
 {
-  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_world *w = &touches->tool;
   if (w->count == 0) {
     return;
   }
-  memcpy(&tick->touches.of[tick->touches.count], w->old_contacts,
-         w->count * sizeof *w->old_contacts);
-  tick->touches.count += w->count;
+  memcpy(&touches->of[touches->count], w->old_contacts, w->count * sizeof *w->old_contacts);
+  touches->count += w->count;
   for (uint32_t i = 0; i < w->count; ++i) {
-    tick->touches.rubs |= w->old_contacts[i].rubs;
+    touches->rubs |= w->old_contacts[i].rubs;
   }
 }
 
-void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model)
+void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers, hapi_model *model)
 {
   const hapi_model_contact *contacts = hapi_model_contacts(model);
   const hapi_tool_point *tools = hapi_model_tools(model);
   if (model->model == HAP_MODEL_CONTACT) {
-    put_back(tick);
+    tools_put_back(touches);
     return;
   }
-  uint32_t old_count = begin(tick);
+  uint32_t old_count = tools_begin(&touches->tool);
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     const hapi_tool_point *in = &tools[contacts[i].tool - 1];
-    if (contacts[i].tool == 0 || !is_there(tick, in)) {
+    if (contacts[i].tool == 0 || !is_there(&touches->tool, pointers, in)) {
       continue;
     }
-    hapi_local_contact *c = &tick->touches.of[tick->touches.count]; /* where it comes to be */
-    add(tick, in, find_old(&tick->touches.tool, old_count, in));
+    hapi_local_contact *c = &touches->of[touches->count]; /* where it comes to be */
+    tool_add(touches, in, find_old(&touches->tool, old_count, in), model->wishes);
     c->slot = contacts[i].slot;
     c->generation = contacts[i].generation;
     memcpy(c->a, contacts[i].a, sizeof c->a);
     memcpy(c->turn, contacts[i].turn, sizeof c->turn);
   }
-  end(tick, old_count);
+  tools_end(touches, old_count, model->wishes);
 }
 
-void hapi_tool_adopt_patches(hapi_tick *tick, hapi_patches *patches)
+void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointers,
+                             hapi_patches *patches, uint32_t wishes)
 {
   const hapi_tool_point *tools = hapi_patches_tools(patches);
-  if (tick->facts.model != HAP_MODEL_CONTACT ||
-      (patches->tool_count == 0 && tick->touches.tool.count == 0)) {
+  if (patches->tool_count == 0 && touches->tool.count == 0) {
     return;
   }
-  hapi_tool_set_aside(tick);
-  uint32_t old_count = begin(tick);
+  hapi_tool_set_aside(touches);
+  uint32_t old_count = tools_begin(&touches->tool);
   for (uint32_t i = 0; i < patches->tool_count; ++i) {
-    if (is_there(tick, &tools[i])) {
-      add(tick, &tools[i], find_old(&tick->touches.tool, old_count, &tools[i]));
+    if (is_there(&touches->tool, pointers, &tools[i])) {
+      tool_add(touches, &tools[i], find_old(&touches->tool, old_count, &tools[i]), wishes);
     }
   }
-  end(tick, old_count);
-}
-
-void hapi_tool_forget(hapi_tick *tick, uint32_t pointer)
-{
-  for (uint32_t i = 0; i < tick->touches.tool.pair_count; ++i) {
-    if (tick->touches.tool.pairs[i].pointer == pointer) {
-      tick->touches.tool.pairs[i].seen = false;
-    }
-  }
+  tools_end(touches, old_count, wishes);
 }

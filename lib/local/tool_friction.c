@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/tool_friction.h"
+
 #include <math.h>
 #include <string.h>
-
-#include "local/pointer_friction.h"
 
 /* Each point of a hull has an anchor of its own. A patch that is found anew may have other points, in other
  * places, while hull and body stick as before: a point that began there with nothing would leave the
@@ -19,41 +19,40 @@
 #define MORE_MOST 1.5     /* of the largest stretch */
 #define SPREAD_LEAST 1e-5 /* m, of points from their middle: nearer ones say nothing of a turn */
 
-typedef struct fit {
+typedef struct surface_fit {
   double weight;
   double middle[3];
   double stretch[4]; /* m; rad */
   double turn;       /* rad, of the points about their middle */
   double most;       /* m, the largest stretch */
-} fit;
+} surface_fit;
 
 /* A point of the pair that holds now, or did so at the last tick. */
-static bool holds(const hapi_tick *tick, const hapi_local_contact *c, const double normal[3])
+static bool point_holds(const hapi_touches *touches, uint64_t tick, const hapi_local_contact *c,
+                        const double normal[3])
 {
-  const hapi_friction *f = hapi_friction_of(tick, c);
-  bool closed = f->stiffness > 0.0 && f->tick + 1 >= tick->facts.tick;
-  return closed && c->mu > 0.0 && tick->touches.tool.tools[c->tool - 1].placed &&
+  const hapi_friction *f = hapi_friction_of(touches, c);
+  bool closed = f->stiffness > 0.0 && f->tick + 1 >= tick;
+  return closed && c->mu > 0.0 && touches->tool.tools[c->tool - 1].placed &&
          hapi_v3_dot(f->normal, normal) > ALIKE_COSINE;
 }
 
-static void stretch_of(const hapi_tick *tick, const hapi_local_contact *c, double out[4])
+static void stretch_of(const hapi_friction *f, const hapi_local_body *body, double out[4])
 {
-  const hapi_friction *f = hapi_friction_of(tick, c);
-  if (c->body == HAPI_SLOT_NONE) {
+  if (body == NULL) {
     hapi_v3_copy(f->now.stretch_body, out);
   } else {
-    hapi_quat_rotate(tick->bodies.of[c->body].pose.quat_wxyz, f->now.stretch_body, out);
+    hapi_quat_rotate(body->pose.quat_wxyz, f->now.stretch_body, out);
   }
   hapi_v3_scale(f->left, out, out);
   out[3] = f->left * f->now.turn;
 }
 
-static void add_mean(const hapi_tick *tick, const hapi_local_contact *c, fit *io)
+static void add_mean(const hapi_friction *f, const hapi_local_body *body, surface_fit *io)
 {
   double stretch[4];
-  const hapi_friction *f = hapi_friction_of(tick, c);
   double weight = f->stiffness;
-  stretch_of(tick, c, stretch);
+  stretch_of(f, body, stretch);
   io->weight += weight;
   hapi_v3_madd(io->middle, weight, f->at, io->middle); /* the point may have leapt since */
   hapi_v3_madd(io->stretch, weight, stretch, io->stretch);
@@ -62,32 +61,32 @@ static void add_mean(const hapi_tick *tick, const hapi_local_contact *c, fit *io
 }
 
 /* The turn is the moment of the stretches over that of the places. */
-static void add_moment(const hapi_tick *tick, const hapi_local_contact *c, const fit *in,
+static void add_moment(const hapi_friction *f, const hapi_local_body *body, const surface_fit *in,
                        const double normal[3], double io[2])
 {
   double stretch[4];
   double arm[3];
   double across[3];
-  const hapi_friction *f = hapi_friction_of(tick, c);
   double weight = f->stiffness;
-  stretch_of(tick, c, stretch);
+  stretch_of(f, body, stretch);
   hapi_v3_sub(f->at, in->middle, arm);
   hapi_v3_cross(normal, arm, across);
   io[0] += weight * hapi_v3_dot(across, stretch); /* of the mean nothing is left in the sum */
   io[1] += weight * hapi_v3_dot(across, across);
 }
 
-static bool find(const hapi_tick *tick, const hapi_local_contact *contact, const double normal[3],
-                 fit *out)
+static bool surface_find(const hapi_touches *touches, const hapi_bodies *bodies, uint64_t tick,
+                         const hapi_local_contact *contact, const double normal[3],
+                         surface_fit *out)
 {
-  const hapi_tool_world *w = &tick->touches.tool;
-  const hapi_local_contact *contacts = &tick->touches.of[tick->touches.count - w->count];
+  const hapi_tool_world *w = &touches->tool;
+  const hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   uint32_t first = w->pairs[w->tools[contact->tool - 1].pair].first;
   double moment[2] = {0.0, 0.0};
   memset(out, 0, sizeof *out);
   for (uint32_t k = first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    if (holds(tick, &contacts[k], normal)) {
-      add_mean(tick, &contacts[k], out);
+    if (point_holds(touches, tick, &contacts[k], normal)) {
+      add_mean(&w->tools[k].friction, hapi_bodies_at(bodies, contacts[k].body), out);
     }
   }
   if (!(out->weight > 0.0)) {
@@ -97,8 +96,9 @@ static bool find(const hapi_tick *tick, const hapi_local_contact *contact, const
   hapi_v3_scale(1.0 / out->weight, out->stretch, out->stretch);
   out->stretch[3] /= out->weight;
   for (uint32_t k = first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    if (holds(tick, &contacts[k], normal)) {
-      add_moment(tick, &contacts[k], out, normal, moment);
+    if (point_holds(touches, tick, &contacts[k], normal)) {
+      add_moment(&w->tools[k].friction, hapi_bodies_at(bodies, contacts[k].body), out, normal,
+                 moment);
     }
   }
   bool wide = moment[1] > SPREAD_LEAST * SPREAD_LEAST * out->weight;
@@ -106,19 +106,21 @@ static bool find(const hapi_tick *tick, const hapi_local_contact *contact, const
   return true;
 }
 
-void hapi_tool_friction_begin(const hapi_tick *tick, const hapi_local_contact *contact,
-                              const double normal[3], const double point[3], double out[4])
+void hapi_tool_friction_begin(const hapi_touches *touches, const hapi_bodies *bodies, uint64_t tick,
+                              const hapi_local_contact *contact, const hapi_rub_place *at,
+                              double out[4])
 {
-  fit found;
+  surface_fit found;
   double arm[3];
   double swing[3];
   memset(out, 0, 4 * sizeof *out);
-  const hapi_pointer *p = &tick->pointers.of[contact->pointer];
-  if (contact->tool == 0 || p->device.jumped || p->rigid || !find(tick, contact, normal, &found)) {
+  const hapi_pointer *p = at->pointer;
+  if (contact->tool == 0 || p->device.jumped || p->rigid ||
+      !surface_find(touches, bodies, tick, contact, at->normal, &found)) {
     return;
   }
-  hapi_v3_sub(point, found.middle, arm);
-  hapi_v3_cross(normal, arm, swing);
+  hapi_v3_sub(at->foot, found.middle, arm);
+  hapi_v3_cross(at->normal, arm, swing);
   hapi_v3_madd(found.stretch, found.turn, swing, out);
   double length = hapi_v3_norm(out);
   double most = MORE_MOST * found.most;

@@ -1,9 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "local/tool_place.h"
+
 #include <math.h>
 
+#include "base/assert.h"
 #include "local/contact_ramp.h"
-#include "local/rows.h"
 #include "local/touch_place.h"
 
 /* Where the contacts of hulls are, and what part of the pointer's stiffness k each has (docs/numerics.md):
@@ -21,42 +23,43 @@
 #define SLOPE_MOST 0.08
 #define NEAR_SHARE 0.01 /* of the hull's extent: points that are nearer say nothing of a slope */
 
-static bool is_gone(const hapi_tick *tick, const hapi_local_tool *tool)
+static bool is_gone(const hapi_local_tool *tool, const hapi_pointers *pointers,
+                    const hapi_bodies *bodies)
 {
   const hapi_patch_contact *at = &tool->in.at;
-  const hapi_pointer *p = &tick->pointers.of[tool->in.pointer];
+  const hapi_pointer *p = &pointers->of[tool->in.pointer];
   if (p->generation != tool->in.pointer_generation || (tool->leaving && tool->member <= 0.0)) {
     return true;
   }
   if (at->body_b == HAPI_SLOT_NONE) {
     return false;
   }
-  const hapi_local_body *body = &tick->bodies.of[at->body_b];
+  const hapi_local_body *body = &bodies->of[at->body_b];
   return !body->live || body->generation != at->generation_b;
 }
 
-static void follow_members(hapi_tick *tick)
+static void follow_members(hapi_tool_world *w, double period)
 {
-  double step = tick->facts.period / COME_S;
-  for (uint32_t i = 0; i < tick->touches.tool.count; ++i) {
-    hapi_local_tool *tool = &tick->touches.tool.tools[i];
-    bool presses =
-        tick->touches.tool.pairs[tool->pair].depth > 0.0; /* else there is no force to jump */
+  double step = period / COME_S;
+  for (uint32_t i = 0; i < w->count; ++i) {
+    hapi_local_tool *tool = &w->tools[i];
+    bool presses = w->pairs[tool->pair].depth > 0.0; /* else there is no force to jump */
     tool->member += (tool->leaving ? -1.0 : 1.0) * (presses ? step : 1.0);
     tool->member = fmin(fmax(tool->member, 0.0), 1.0);
   }
 }
 
-static void drop_gone(hapi_tick *tick)
+static void drop_gone(hapi_touches *touches, const hapi_pointers *pointers,
+                      const hapi_bodies *bodies)
 {
-  hapi_tool_world *w = &tick->touches.tool;
-  hapi_local_contact *contacts = &tick->touches.of[tick->touches.count - w->count];
+  hapi_tool_world *w = &touches->tool;
+  hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   uint32_t kept = 0;
   for (uint32_t i = 0; i < w->pair_count; ++i) {
     w->pairs[i].first = HAPI_SLOT_NONE;
   }
   for (uint32_t i = 0; i < w->count; ++i) {
-    if (is_gone(tick, &w->tools[i])) {
+    if (is_gone(&w->tools[i], pointers, bodies)) {
       continue;
     }
     if (kept < i) {
@@ -68,14 +71,13 @@ static void drop_gone(hapi_tick *tick)
     w->pairs[w->tools[kept].pair].first = kept;
     ++kept;
   }
-  tick->touches.count -= w->count - kept;
+  touches->count -= w->count - kept;
   w->count = kept;
 }
 
-static void place(hapi_tick *tick, hapi_local_tool *tool, hapi_local_contact *c)
+static void tool_place(hapi_local_tool *tool, hapi_local_contact *c, const hapi_pointer *p,
+                       const hapi_local_body *body)
 {
-  const hapi_pointer *p = &tick->pointers.of[c->pointer];
-  const hapi_local_body *body = hapi_bodies_at(&tick->bodies, c->body);
   hapi_touch_spot spot;
   double rotations[2][9];
   hapi_touch_frame a = {&p->pose, rotations[0]};
@@ -95,7 +97,7 @@ static void place(hapi_tick *tick, hapi_local_tool *tool, hapi_local_contact *c)
 }
 
 /* How much two points push the same way. */
-static double likeness(const hapi_local_contact *a, const hapi_local_contact *b)
+static double normal_likeness(const hapi_local_contact *a, const hapi_local_contact *b)
 {
   double cosine = hapi_v3_dot(a->normal_now, b->normal_now);
   double u = (cosine - APART_COSINE) / (TOGETHER_COSINE - APART_COSINE);
@@ -117,39 +119,38 @@ static double slope_at(const hapi_tool_world *w, const hapi_local_contact *conta
     }
     hapi_v3_sub(contacts[k].point_now, contacts[index].point_now, apart);
     double slope = deeper / (hapi_v3_norm(apart) + near);
-    steepest =
-        fmax(steepest, w->tools[k].member * likeness(&contacts[k], &contacts[index]) * slope);
+    steepest = fmax(steepest,
+                    w->tools[k].member * normal_likeness(&contacts[k], &contacts[index]) * slope);
   }
   return steepest;
 }
 
 /* 1 on a level patch, 0 at the upper end of a steep one; flat at 0, so that a small tilt changes no
  * share. */
-static double level(double slope)
+static double share_at(double slope)
 {
   double x = fmin(slope / SLOPE_MOST, 1.0);
   double y = 1.0 - x * x * x * x;
   return y * y;
 }
 
-/* The point's part before it is shared. */
-static void set_claim(const hapi_tick *tick, const hapi_local_contact *contacts, uint32_t index)
+/* The point's part before it is shared. extent: of the hull. */
+static void set_claim(hapi_tool_world *w, const hapi_local_contact *contacts, uint32_t index,
+                      double extent)
 {
-  hapi_local_tool *tool = &tick->touches.tool.tools[index];
-  double near = NEAR_SHARE * tick->pointers.of[tool->in.pointer].shape.extent;
-  tool->claim = tool->placed
-                    ? tool->member * level(slope_at(&tick->touches.tool, contacts, index, near))
-                    : 0.0;
+  hapi_local_tool *tool = &w->tools[index];
+  double near = NEAR_SHARE * extent;
+  tool->claim = tool->placed ? tool->member * share_at(slope_at(w, contacts, index, near)) : 0.0;
 }
 
-static void weigh(const hapi_tool_world *w, hapi_local_contact *contacts, uint32_t index)
+static void tool_weigh(const hapi_tool_world *w, hapi_local_contact *contacts, uint32_t index)
 {
   const hapi_local_tool *tool = &w->tools[index];
   double sum = 0.0;
   double members = 0.0;
   for (uint32_t k = w->pairs[tool->pair].first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
     if (w->tools[k].placed) {
-      double like = k == index ? 1.0 : likeness(&contacts[k], &contacts[index]);
+      double like = k == index ? 1.0 : normal_likeness(&contacts[k], &contacts[index]);
       sum += w->tools[k].claim * like;
       members += w->tools[k].member * like;
     }
@@ -158,20 +159,19 @@ static void weigh(const hapi_tool_world *w, hapi_local_contact *contacts, uint32
   contacts[index].weight = sum > 0.0 ? all * tool->claim / sum : 0.0;
 }
 
-static void follow_pair(hapi_tick *tick, hapi_tool_pair *pair, hapi_local_contact *contacts)
+static void follow_pair(hapi_tool_world *w, hapi_tool_pair *pair, hapi_local_contact *contacts,
+                        const hapi_pointer *p, double period)
 {
-  hapi_tool_world *w = &tick->touches.tool;
   double depth = -HUGE_VAL;
   for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
     depth = fmax(depth, w->tools[k].depth);
-    set_claim(tick, contacts, k);
+    set_claim(w, contacts, k, p->shape.extent);
   }
   pair->depth = depth;
   for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    weigh(w, contacts, k);
+    tool_weigh(w, contacts, k);
   }
-  double share = hapi_ramp_follow(&pair->ramp, &pair->seen, &tick->pointers.of[pair->pointer],
-                                  &depth, tick->facts.period);
+  double share = hapi_ramp_follow(&pair->ramp, &pair->seen, p, &depth, period);
   for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
     hapi_local_tool *tool = &w->tools[k];
     hapi_local_contact *c = &contacts[k];
@@ -188,21 +188,25 @@ static void follow_pair(hapi_tick *tick, hapi_tool_pair *pair, hapi_local_contac
   }
 }
 
-void hapi_tool_place(hapi_tick *tick)
+void hapi_tool_place(hapi_touches *touches, const hapi_pointers *pointers,
+                     const hapi_bodies *bodies, double period)
 {
-  hapi_tool_world *w = &tick->touches.tool;
+  hapi_tool_world *w = &touches->tool;
   if (w->count == 0) {
     return;
   }
-  follow_members(tick);
-  drop_gone(tick);
-  hapi_local_contact *contacts = &tick->touches.of[tick->touches.count - w->count];
+  HAPI_ASSERT(touches->count >= w->count);
+  follow_members(w, period);
+  drop_gone(touches, pointers, bodies);
+  hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   for (uint32_t i = 0; i < w->count; ++i) {
-    place(tick, &w->tools[i], &contacts[i]);
+    hapi_local_contact *c = &contacts[i];
+    tool_place(&w->tools[i], c, &pointers->of[c->pointer], hapi_bodies_at(bodies, c->body));
   }
   for (uint32_t i = 0; i < w->pair_count; ++i) {
-    if (w->pairs[i].first != HAPI_SLOT_NONE) {
-      follow_pair(tick, &w->pairs[i], contacts);
+    hapi_tool_pair *pair = &w->pairs[i];
+    if (pair->first != HAPI_SLOT_NONE) {
+      follow_pair(w, pair, contacts, &pointers->of[pair->pointer], period);
     }
   }
 }

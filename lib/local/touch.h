@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/wishes.h"
 #include "sync/messages.h"
 
 /* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
@@ -58,6 +59,8 @@ typedef struct hapi_friction {
   double axes[3][4]; /* unit, at right angles; the first along the pull */
   uint32_t axis_count; /* 2; 3 with torsion */
 } hapi_friction;
+
+#define HAPI_NO_ROW 0xffffffffu
 
 typedef struct hapi_local_contact {
   uint32_t slot;
@@ -123,6 +126,12 @@ typedef struct hapi_tool_world {
   uint32_t capacity; /* hapi_capacity.tool_points */
 } hapi_tool_world;
 
+/* Cross accelerances of the model in use; contact: an index into the touches. */
+typedef struct hapi_crosses {
+  hapi_model_cross *of; /* capacity.crosses */
+  uint32_t count;
+} hapi_crosses;
+
 typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
@@ -132,7 +141,49 @@ typedef struct hapi_touches {
   uint32_t *ramp_generations; /* by contact slot */
   hapi_friction *frictions;   /* by contact slot; of spheres */
   hapi_tool_world tool;
+  hapi_crosses crosses;
+  uint64_t contact_ticks; /* in which something pushed; this and the next since start */
+  double hand_impulse[3]; /* N s on dynamic bodies, all pointers */
+  double hand_impulse_abs;
 } hapi_touches;
+
+/* Whether friction is worked out. */
+static inline bool hapi_touch_rubs(double mu, uint32_t wishes)
+{
+  return mu > 0.0 || hapi_wish_is_on(wishes, HAP_EFFECT_FRICTION);
+}
+
+/* What is kept of the contact. */
+static inline hapi_friction *hapi_friction_of(const hapi_touches *touches,
+                                              const hapi_local_contact *contact)
+{
+  return contact->tool != 0 ? &touches->tool.tools[contact->tool - 1].friction
+                            : &touches->frictions[contact->slot];
+}
+
+/* What was begun in this tick; NULL: nothing. */
+static inline hapi_friction *hapi_friction_now(const hapi_touches *touches, uint64_t tick,
+                                               const hapi_local_contact *contact)
+{
+  hapi_friction *f = hapi_friction_of(touches, contact);
+  bool acts = contact->rubs && f->generation == contact->generation && f->tick == tick;
+  return acts ? f : NULL;
+}
+
+/* Contacts of the pointer begin as those do that arrive deep. HAPI_SLOT_NONE: of all pointers. */
+static inline void hapi_touches_forget(const hapi_touches *touches, uint32_t pointer)
+{
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    if (pointer == HAPI_SLOT_NONE || touches->of[i].pointer == pointer) {
+      touches->of[i].seen = false;
+    }
+  }
+  for (uint32_t i = 0; i < touches->tool.pair_count; ++i) {
+    if (pointer == HAPI_SLOT_NONE || touches->tool.pairs[i].pointer == pointer) {
+      touches->tool.pairs[i].seen = false;
+    }
+  }
+}
 
 /* The contacts of hulls. */
 static inline hapi_local_contact *hapi_touches_of_tools(const hapi_touches *touches)

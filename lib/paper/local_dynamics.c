@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "base/effect_clock.h"
+#include "paper/local_dynamics.h"
+
 #include "base/pose.h"
 #include "base/two_turns.h"
 #include "local/body_step.h"
@@ -8,7 +9,7 @@
 /* Local dynamics simulation (paper section 5.2). */
 
 /* Eq. 9, and 14 in the first tick of a model. */
-static void accelerate(hapi_local_body *body, double period)
+static void body_accelerate(hapi_local_body *body, double period)
 {
   const hapi_two t = hapi_two_all(period);
   const hapi_two zero = hapi_two_all(0.0);
@@ -37,40 +38,40 @@ static void turn_bodies(hapi_local_body *const bodies[], uint32_t count, double 
   }
 }
 
-static void step_bodies(hapi_tick *tick)
+static void step_bodies(hapi_bodies *bodies, double period)
 {
   hapi_local_body *turning[HAPI_TURNING];
   uint32_t count = 0;
-  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
-    hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
     if ((body->flags & HAPI_BODY_DRIVEN) != 0) {
-      hapi_pose_move(&body->pose, &body->twist, tick->facts.period);
+      hapi_pose_move(&body->pose, &body->twist, period);
       continue;
     }
     if ((body->flags & HAPI_BODY_RESTING) != 0) {
       continue;
     }
-    accelerate(body, tick->facts.period);
-    if (hapi_body_shift(tick, body)) {
+    body_accelerate(body, period);
+    if (hapi_body_shift(bodies, body, period)) {
       turning[count++] = body;
     }
     if (count == HAPI_TURNING) {
-      turn_bodies(turning, count, tick->facts.period);
+      turn_bodies(turning, count, period);
       count = 0;
     }
   }
-  turn_bodies(turning, count, tick->facts.period);
+  turn_bodies(turning, count, period);
 }
 
 /* What the forces of this tick do to other bodies than those they act on. The impulse is the pushed
  * body's alone: to the world it is given once, and the world passes it on by itself. So a body that is
  * moved by this only is not pushed, and has the world's state again at the sync. */
-static void accelerate_others(hapi_tick *tick)
+static void accelerate_others(const hapi_bodies *bodies, const hapi_touches *touches)
 {
-  for (uint32_t i = 0; i < tick->crosses.count; ++i) {
-    const hapi_model_cross *cross = &tick->crosses.of[i];
-    const double *force = tick->touches.of[cross->contact].force;
-    hapi_local_body *body = &tick->bodies.of[cross->body];
+  for (uint32_t i = 0; i < touches->crosses.count; ++i) {
+    const hapi_model_cross *cross = &touches->crosses.of[i];
+    const double *force = touches->of[cross->contact].force;
+    hapi_local_body *body = &bodies->of[cross->body];
     if (force[0] == 0.0 && force[1] == 0.0 && force[2] == 0.0) {
       continue;
     }
@@ -81,35 +82,34 @@ static void accelerate_others(hapi_tick *tick)
   }
 }
 
-void hapi_local_step(hapi_tick *tick)
+void hapi_local_step(hapi_bodies *bodies, const hapi_touches *touches, const hapi_tick_facts *facts,
+                     hapi_effect_sample *sample)
 {
-  if (tick->facts.model != HAP_MODEL_ACCELERANCE) {
+  if (facts->model != HAP_MODEL_ACCELERANCE) {
     return;
   }
-  if (tick->crosses.count > 0) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
-    accelerate_others(tick);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_CROSS, begin);
+  if (touches->crosses.count > 0) {
+    uint64_t begin = hapi_effect_begin(sample);
+    accelerate_others(bodies, touches);
+    hapi_effect_end(sample, HAP_EFFECT_CROSS, begin);
   }
-  step_bodies(tick);
+  step_bodies(bodies, facts->period);
 }
 
-/* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the
- * way from the last but one to the last. */
-void hapi_local_place(hapi_tick *tick)
+void hapi_local_place(const hapi_bodies *bodies, const hapi_tick_facts *facts)
 {
-  if (tick->facts.model == HAP_MODEL_ACCELERANCE) {
+  if (facts->model == HAP_MODEL_ACCELERANCE) {
     return;
   }
-  bool moving = tick->facts.model == HAP_MODEL_IMPULSE && tick->facts.blend_s > 0.0 &&
-                tick->facts.impulse_pose == HAP_IMPULSE_INTERPOLATED;
+  bool moving = facts->model == HAP_MODEL_IMPULSE && facts->blend_s > 0.0 &&
+                facts->impulse_pose == HAP_IMPULSE_INTERPOLATED;
   double share = 1.0;
   if (moving) {
-    share = 1e-9 * (double)(tick->facts.now_ns - tick->facts.adopted_ns) / tick->facts.blend_s;
+    share = 1e-9 * (double)(facts->now_ns - facts->adopted_ns) / facts->blend_s;
     share = share > 1.0 ? 1.0 : share;
   }
-  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
-    hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (!moving) {
       body->pose = body->shown.to;
       continue;
@@ -117,7 +117,7 @@ void hapi_local_place(hapi_tick *tick)
     hapi_pose_blend(&body->shown.from, &body->shown.to, share, &body->pose);
     for (int k = 0; k < 3; ++k) {
       double way = share < 1.0 ? body->shown.to.position[k] - body->shown.from.position[k] : 0.0;
-      body->twist.linear[k] = way / tick->facts.blend_s;
+      body->twist.linear[k] = way / facts->blend_s;
     }
   }
 }

@@ -1,23 +1,28 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "paper/render.h"
+
 #include <math.h>
 
-#include "base/effect_clock.h"
 #include "base/lanes.h"
 #include "base/vec.h"
 #include "local/contact_ramp.h"
 #include "local/pointer_friction.h"
+#include "local/tool_place.h"
 
 /* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
 
 typedef struct plane {
-  double point[3];  /* contact point x_o, world */
-  double normal[3]; /* out of the body, world */
-  double arm[3];    /* x_o - centre of mass */
+  hapi_local_body *body; /* NULL: static world */
+  double point[3];       /* contact point x_o, world */
+  double normal[3];      /* out of the body, world */
+  double arm[3];         /* x_o - centre of mass */
+  double force;          /* N, along the normal */
 } plane;
 
-static void place_plane(const hapi_local_contact *c, const hapi_local_body *body, plane *out)
+static void place_plane(const hapi_local_contact *c, plane *out)
 {
+  const hapi_local_body *body = out->body;
   if (body == NULL) {
     hapi_v3_copy(c->point_body, out->point);
     hapi_v3_copy(c->normal_body, out->normal);
@@ -30,8 +35,9 @@ static void place_plane(const hapi_local_contact *c, const hapi_local_body *body
 }
 
 /* Where hapi_tool_place found it. */
-static void place_tool(const hapi_local_contact *c, const hapi_local_body *body, plane *out)
+static void place_tool(const hapi_local_contact *c, plane *out)
 {
+  const hapi_local_body *body = out->body;
   hapi_v3_copy(c->point_now, out->point);
   hapi_v3_copy(c->normal_now, out->normal);
   hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
@@ -54,9 +60,9 @@ static void pointer_velocity(const hapi_pointer *p, const plane *at, double out[
 }
 
 /* Rate at which the pointer goes into the plane [m/s]. *out_own: how much of it its own motion makes. */
-static double closing_rate(const hapi_pointer *p, const hapi_local_body *body, const plane *at,
-                           double *out_own)
+static double closing_rate(const hapi_pointer *p, const plane *at, double *out_own)
 {
+  const hapi_local_body *body = at->body;
   double relative[3];
   pointer_velocity(p, at, relative);
   *out_own = -hapi_v3_dot(at->normal, relative);
@@ -70,36 +76,32 @@ static double closing_rate(const hapi_pointer *p, const hapi_local_body *body, c
 }
 
 /* Depth, and the share of the stiffness, of a sphere or of one point of a hull. */
-static double depth_of(const hapi_tick *tick, hapi_local_contact *c, const plane *at,
-                       double *out_depth)
+static double depth_of(const hapi_tool_world *tools, hapi_local_contact *c, const hapi_pointer *p,
+                       const plane *at, double period, double *out_depth)
 {
-  const hapi_pointer *p = &tick->pointers.of[c->pointer];
   if (c->tool != 0) {
-    *out_depth = tick->touches.tool.tools[c->tool - 1].depth;
-    return tick->touches.tool.tools[c->tool - 1].felt;
+    *out_depth = tools->tools[c->tool - 1].depth;
+    return tools->tools[c->tool - 1].felt;
   }
   double apart[3];
   hapi_v3_sub(p->pose.position, at->point, apart);
   *out_depth = p->shape.radius - hapi_v3_dot(at->normal, apart);
-  return hapi_contact_ramp(c, p, out_depth, tick->facts.period);
+  return hapi_contact_ramp(c, p, out_depth, period);
 }
 
 /* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for the
  * energy observer how fast the body's motion, which is given, loads the spring, and its energy. */
-static double normal_force(hapi_tick *tick, hapi_local_contact *c, const hapi_local_body *body,
-                           const plane *at)
+static double normal_force(const hapi_tick_facts *facts, hapi_local_contact *c, hapi_pointer *p,
+                           const plane *at, double share, double depth)
 {
-  hapi_pointer *p = &tick->pointers.of[c->pointer];
-  double depth = 0.0;
   double own = 0.0;
-  double share = depth_of(tick, c, at, &depth);
   if (!(depth > 0.0)) {
     return 0.0;
   }
-  double closing = closing_rate(p, body, at, &own);
+  double closing = closing_rate(p, at, &own);
   double force = p->surface.stiffness * depth + p->surface.damping * closing;
   force = force > 0.0 ? share * force : 0.0;
-  if (tick->facts.observes) {
+  if (facts->observes) {
     p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
     p->guard.power += force * (closing - own);
   }
@@ -107,7 +109,7 @@ static double normal_force(hapi_tick *tick, hapi_local_contact *c, const hapi_lo
 }
 
 /* J/s that the body's motion, which is given, does on the spring of its friction. */
-static double loads(const hapi_local_body *body, const plane *at, const hap_wrench *push)
+static double friction_loads(const hapi_local_body *body, const plane *at, const hap_wrench *push)
 {
   double arm[3];
   double moment[3];
@@ -121,20 +123,22 @@ static double loads(const hapi_local_body *body, const plane *at, const hap_wren
 }
 
 /* Adds to the contact's force on the body what friction makes of the normal force. */
-static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, const plane *at,
-                double normal_force)
+static void contact_rub(const hapi_tick_facts *facts, const hapi_bodies *bodies,
+                        const hapi_touches *touches, hapi_local_contact *c, hapi_pointer *p,
+                        const plane *at)
 {
-  hapi_pointer *p = &tick->pointers.of[c->pointer];
+  hapi_local_body *body = at->body;
   double foot[3];
   double push[4];
   hap_wrench on_body;
   hap_wrench on_hand;
+  double limit = c->mu * at->force;
   hapi_friction_foot(p, at->normal, at->point, foot);
-  hapi_friction *f = hapi_friction_begin(tick, c, at->normal, foot);
+  const hapi_rub_place place = {p, body, at->normal, foot};
+  hapi_friction *f = hapi_friction_begin(touches, bodies, facts->tick, c, &place);
   if (f == NULL) {
     return;
   }
-  double limit = c->mu * normal_force;
   hapi_friction_aim(f, 0.0, NULL);
   hapi_friction_push(f, limit, push);
   hapi_friction_wrench(f, p, push, at->point, &on_body);
@@ -146,7 +150,7 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
     hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
   }
   p->guard.force2 += (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
-  p->guard.power += loads(body, at, &on_body);
+  p->guard.power += friction_loads(body, at, &on_body);
   if (body != NULL) {
     double turning = p->surface.finger_radius * push[3];
     for (int i = 0; i < 6; ++i) {
@@ -156,8 +160,9 @@ static void rub(hapi_tick *tick, hapi_local_contact *c, hapi_local_body *body, c
 }
 
 /* f_o = -f_d goes to the body: as impulse to physics, and through A into its acceleration. */
-static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane *at, double period)
+static void push_body(const hapi_local_contact *c, const plane *at, double period)
 {
+  hapi_local_body *body = at->body;
   double moment[3];
   hapi_v3_cross(at->arm, c->force, moment);
   hapi_v3_add(moment, c->couple, moment);
@@ -171,13 +176,13 @@ static void push_body(hapi_local_body *body, hapi_local_contact *c, const plane 
 }
 
 /* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
-static void audit(hapi_tick *tick, const double vector[3], double norm)
+static void force_audit(hapi_touches *touches, double period, const double vector[3], double norm)
 {
   if (!isfinite(norm)) {
     return;
   }
-  hapi_v3_madd(tick->figures.hand_impulse, tick->facts.period, vector, tick->figures.hand_impulse);
-  tick->figures.hand_impulse_abs += tick->facts.period * norm;
+  hapi_v3_madd(touches->hand_impulse, period, vector, touches->hand_impulse);
+  touches->hand_impulse_abs += period * norm;
 }
 
 /* Torque about the pointer's origin. */
@@ -190,62 +195,77 @@ static void turn_pointer(hapi_pointer *p, const plane *at, double force)
   hapi_v3_madd(p->wrench.torque, force, moment, p->wrench.torque);
 }
 
-static void render_contact(hapi_tick *tick, hapi_local_contact *c)
+/* Where the contact is; false: it is nowhere. */
+static bool contact_place(const hapi_touches *touches, const hapi_pointer *p,
+                          const hapi_local_contact *c, plane *out)
 {
-  hapi_pointer *p = &tick->pointers.of[c->pointer];
-  hapi_local_body *body = c->body == HAPI_SLOT_NONE ? NULL : &tick->bodies.of[c->body];
+  if (p->generation != c->pointer_generation) {
+    return false; /* another pointer has come to its place: its contacts come with the next model */
+  }
+  if (c->tool == 0) {
+    place_plane(c, out);
+  } else if (touches->tool.tools[c->tool - 1].placed) {
+    place_tool(c, out);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const hapi_bodies *bodies,
+                           hapi_touches *touches, hapi_local_contact *c, hapi_effect_sample *sample)
+{
   plane at;
+  double depth = 0.0;
+  at.body = hapi_bodies_at(bodies, c->body);
   hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
-  if (p->generation != c->pointer_generation) {
-    return; /* another pointer has come to its place: its contacts come with the next model */
-  }
-  if (c->tool != 0 && !tick->touches.tool.tools[c->tool - 1].placed) {
+  if (!contact_place(touches, p, c, &at)) {
     return;
   }
-  if (c->tool != 0) {
-    place_tool(c, body, &at);
-  } else {
-    place_plane(c, body, &at);
-  }
-  double force = normal_force(tick, c, body, &at);
-  if (force == 0.0 || tick->guard.latch.fault != HAP_FAULT_NONE) {
+  double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
+  double force = normal_force(facts, c, p, &at, share, depth);
+  if (force == 0.0 || facts->faulted) {
     return;
   }
+  at.force = force;
   hapi_v3_scale(-force, at.normal, c->force);
   if (c->tool != 0 && p->device.feels_torque) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
+    uint64_t begin = hapi_effect_begin(sample);
     turn_pointer(p, &at, force);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_TORQUE, begin);
+    hapi_effect_end(sample, HAP_EFFECT_TORQUE, begin);
   }
   if (c->rubs) {
-    uint64_t begin = hapi_effect_begin(&tick->sample);
-    rub(tick, c, body, &at, force);
-    hapi_effect_end(&tick->sample, HAP_EFFECT_FRICTION, begin);
+    uint64_t begin = hapi_effect_begin(sample);
+    contact_rub(facts, bodies, touches, c, p, &at);
+    hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);
     force = hapi_v3_norm(c->force);
   }
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
   ++p->contacts;
-  ++tick->touches.pushing;
-  if (body != NULL && (body->flags & HAPI_BODY_DRIVEN) == 0) {
-    body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
-    body->pushed = true;
-    push_body(body, c, &at, tick->facts.period);
-    audit(tick, c->force, force);
+  ++touches->pushing;
+  if (at.body != NULL && (at.body->flags & HAPI_BODY_DRIVEN) == 0) {
+    at.body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+    at.body->pushed = true;
+    push_body(c, &at, facts->period);
+    force_audit(touches, facts->period, c->force, force);
   }
 }
 
-void hapi_render(hapi_tick *tick)
+void hapi_render(const hapi_tick_facts *facts, const hapi_pointers *pointers,
+                 const hapi_bodies *bodies, hapi_touches *touches, hapi_effect_sample *sample)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    tick->pointers.of[i].contacts = 0;
-    tick->pointers.of[i].guard.force2 = tick->pointers.of[i].guard.power = 0.0;
-    tick->pointers.of[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
+    p->contacts = 0;
+    p->guard.force2 = p->guard.power = 0.0;
+    p->wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }
-  tick->touches.pushing = 0;
-  hapi_tool_place(tick);
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    render_contact(tick, &tick->touches.of[i]);
+  touches->pushing = 0;
+  hapi_tool_place(touches, pointers, bodies, facts->period);
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    hapi_local_contact *c = &touches->of[i];
+    render_contact(facts, &pointers->of[c->pointer], bodies, touches, c, sample);
   }
-  tick->figures.contact_ticks += tick->touches.pushing != 0;
+  touches->contact_ticks += touches->pushing != 0;
 }

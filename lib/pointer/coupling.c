@@ -1,8 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "pointer/coupling.h"
+
 #include "base/plausible.h"
 #include "base/vec.h"
-#include "tick/tick.h"
+#include "pointer/proxy.h"
 
 /* Between device and world. The pointer is where the device is (paper section 3), unless it is a
  * proxy (proxy.c), which then takes its place.
@@ -15,7 +17,7 @@
 #define JUMP_S 0.01     /* and two steps of physics: a model for the new place has come */
 
 /* A sphere has torque of friction alone, and only on a device that turns it. */
-void hapi_tick_feel(hapi_pointer *p, hap_effect_wish wish, bool rubs)
+void hapi_pointer_feel(hapi_pointer *p, hap_effect_wish wish, bool rubs)
 {
   bool called = !p->device.three_dof && (p->shape.hull != NULL || (p->device.turns && rubs));
   p->device.feels_torque = (wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && called));
@@ -41,7 +43,7 @@ static void to_device(const hapi_pointer *p, const double world[3], double devic
 
 /* A hull on a device that gives no torque cannot be turned by it either: the hand could not feel what
  * it does by turning. */
-static void place_turn(hapi_pointer *p)
+static void pointer_place_turn(hapi_pointer *p)
 {
   const double *frame = p->device.pose_world_device.quat_wxyz;
   if (p->shape.hull != NULL && p->device.three_dof) {
@@ -61,7 +63,7 @@ static void place_turn(hapi_pointer *p)
 }
 
 /* False: the frame and the scale take it out of the world. */
-static bool place_pointer(hapi_pointer *p)
+static bool pointer_place(hapi_pointer *p)
 {
   double scaled[3];
   double at[3];
@@ -72,7 +74,7 @@ static bool place_pointer(hapi_pointer *p)
     return false;
   }
   hapi_v3_copy(at, p->pose.position);
-  place_turn(p);
+  pointer_place_turn(p);
   hapi_v3_scale(p->device.motion_scale, p->device.twist.linear, scaled);
   to_world(p, scaled, p->twist.linear);
   hapi_v3_copy(p->pose.position, p->handle.position);
@@ -90,7 +92,7 @@ static double turn_between(const double a[4], const double b[4])
 }
 
 /* Whatever time has passed: what counts is how deep it may be at once. */
-static bool jumps(const hapi_pointer *p, double period)
+static bool pointer_jumps(const hapi_pointer *p, double period)
 {
   double way[3];
   if (!p->device.placed || !(p->device.speed_limit > 0.0)) {
@@ -103,7 +105,7 @@ static bool jumps(const hapi_pointer *p, double period)
 }
 
 /* A velocity that is a difference of such positions would be felt through every damper. */
-static void check_speed(hapi_pointer *p)
+static void pointer_check_speed(hapi_pointer *p)
 {
   double *v = p->device.twist.linear;
   double *w = p->device.twist.angular;
@@ -131,24 +133,25 @@ static bool input_is_plausible(const hapi_pointer *p)
           hapi_plausible(w, 3));
 }
 
-void hapi_coupling_read(hapi_tick *tick)
+uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double physics_period)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
+  uint32_t unusable = 0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
     }
     bool good = input_is_plausible(p);
-    p->device.jumped = good && jumps(p, tick->facts.period);
-    p->device.jump_s = p->device.jumped ? JUMP_S + 2.0 * tick->facts.physics_period
-                                        : p->device.jump_s - tick->facts.period;
-    check_speed(p);
-    if (!good || !place_pointer(p)) {
-      hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, i + 1); /* and the pointer stays where it was */
+    p->device.jumped = good && pointer_jumps(p, period);
+    p->device.jump_s = p->device.jumped ? JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
+    pointer_check_speed(p);
+    if (!good || !pointer_place(p)) {
+      unusable = unusable == 0 ? i + 1 : unusable;
     } else if (p->device.jumped) {
       hapi_proxy_begin_anew(p);
     }
   }
+  return unusable;
 }
 
 /* A newton metre is a newton on an arm, and the arm is shorter at the device by the motion's scale. */

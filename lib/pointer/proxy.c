@@ -1,7 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "pointer/proxy.h"
+
+#include <math.h>
+#include <string.h>
+
 #include "base/pose.h"
-#include "tick/tick.h"
+#include "base/vec.h"
+#include "pointer/rigid_proxy.h"
 
 /* Coupling "proxy" (docs/numerics.md): the pointer is a light body of mass m behind one spring k and
  * damper d to the device, h and u the device's position and velocity, integrated implicitly:
@@ -15,9 +21,7 @@
  * It is one body more in the solver, so that contacts of one pointer know of each other. However many
  * push, the device feels k at most.
  *
- * Two couplings of the literature are the same body with contacts that do not give (pointer_rows.c): the
- * "god-object", of no mass, which is where the spring is shortest among all places out of the bodies, and
- * the "virtual" tool of virtual coupling, whose mass is its own. */
+ * Two couplings of the literature are the same body with contacts that do not give: rigid_proxy.h. */
 
 #define KEEP_SHARE 0.9 /* of what the device holds: below it the coupling may be direct again */
 #define OFFSET_DECAY_S 0.02 /* time constant */
@@ -26,9 +30,6 @@
  * for so long, s: what hops on a stiff spring comes back within it. */
 #define LEAP_MOST 1e-4
 #define REST_S 0.05
-/* How much faster than the device a god-object comes after it, m/s, where something has let it go: what is
- * farther away than that in a step of physics, the loop does not know. */
-#define CATCH_UP 0.5
 #define SWING_LIMIT 0.25 /* of T^2 k over the mass: it swings at 80 Hz and less, at 1 kHz */
 
 void hapi_proxy_begin_anew(hapi_pointer *p)
@@ -49,7 +50,7 @@ static bool is_above(const hapi_pointer *p)
 
 /* The proxy begins where the pointer is, and the spring's far end where the force stays as it is;
  * from there it goes to the device. So neither contact nor hand feels a jump. */
-static void begin_proxy(hapi_pointer *p)
+static void proxy_begin(hapi_pointer *p)
 {
   p->proxied = true;
   hapi_v3_copy(p->pose.position, p->proxy.position);
@@ -63,8 +64,7 @@ static void begin_proxy(hapi_pointer *p)
   }
 }
 
-/* 2 sin(angle / 2) along the axis of the turn that brings one to the other. */
-static void rotation_between(const double from[4], const double to[4], double out[3])
+void hapi_proxy_turn_between(const double from[4], const double to[4], double out[3])
 {
   double back[4] = {from[0], -from[1], -from[2], -from[3]};
   double q[4];
@@ -79,103 +79,85 @@ static bool is_idle(const hapi_pointer *p, double period)
   hapi_v3_sub(p->handle.position, p->proxy.position, leap);
   hapi_v3_madd(leap, -period, p->proxy.velocity, leap);
   double turn[3];
-  rotation_between(p->proxy.quat, p->handle.quat, turn);
+  hapi_proxy_turn_between(p->proxy.quat, p->handle.quat, turn);
   return p->contacts == 0 && hapi_v3_norm(p->proxy.offset) < OFFSET_LEAST &&
          hapi_v3_norm(leap) < LEAP_MOST &&
          (p->shape.hull == NULL || p->shape.extent * hapi_v3_norm(turn) < LEAP_MOST);
 }
 
-/* Their contacts begin as those do that arrive deep. */
-static void forget_contacts(hapi_tick *tick, uint32_t index)
+/* Coupling AUTO, left to the library. */
+static bool proxy_is_wanted(hapi_pointer *p, double period)
 {
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    if (tick->touches.of[i].pointer == index) {
-      tick->touches.of[i].seen = false;
-    }
+  bool wanted = is_above(p);
+  p->coupling.reason = !p->coupling.hold_known ? HAP_COUPLING_UNKNOWN
+                       : wanted                ? HAP_COUPLING_ABOVE
+                                               : HAP_COUPLING_WITHIN;
+  p->coupling.idle_s =
+      p->proxied && !wanted && p->contacts == 0 ? p->coupling.idle_s + period : 0.0;
+  if (p->proxied && !wanted && (p->coupling.idle_s < REST_S || !is_idle(p, period))) {
+    wanted = true; /* back after the touch, when there is no force to jump */
+    p->coupling.reason = HAP_COUPLING_ABOVE;
   }
-  hapi_tool_forget(tick, index);
+  return wanted;
 }
 
-static void choose(hapi_tick *tick, uint32_t index)
+bool hapi_proxy_choose(hapi_pointer *p, hap_effect_wish wish, double period)
 {
-  hapi_pointer *p = &tick->pointers.of[index];
-  double period = tick->facts.period;
-  bool rigid =
-      p->coupling.kind == HAP_COUPLING_GOD_OBJECT || p->coupling.kind == HAP_COUPLING_VIRTUAL;
+  bool rigid = hapi_rigid_is_asked(p->coupling.kind);
   bool wanted = rigid || p->coupling.kind == HAP_COUPLING_PROXY;
-  hap_effect_wish wish = hapi_wish(tick->facts.wishes, HAP_EFFECT_PROXY);
+  bool anew = false;
   p->coupling.reason = HAP_COUPLING_ASKED;
   if (p->coupling.kind == HAP_COUPLING_AUTO && wish != HAP_EFFECT_AUTO) {
     wanted = wish == HAP_EFFECT_ON && p->coupling.hold_known;
     p->coupling.reason =
         wish == HAP_EFFECT_ON && !wanted ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
-    if (p->proxied && !wanted) {
-      forget_contacts(tick, index); /* in the middle of a touch: as end_proxy does */
-    }
+    anew = p->proxied && !wanted; /* in the middle of a touch: as hapi_proxy_end does */
   } else if (p->coupling.kind == HAP_COUPLING_AUTO) {
-    wanted = is_above(p);
-    p->coupling.reason = !p->coupling.hold_known ? HAP_COUPLING_UNKNOWN
-                         : wanted                ? HAP_COUPLING_ABOVE
-                                                 : HAP_COUPLING_WITHIN;
-    p->coupling.idle_s =
-        p->proxied && !wanted && p->contacts == 0 ? p->coupling.idle_s + period : 0.0;
-    if (p->proxied && !wanted && (p->coupling.idle_s < REST_S || !is_idle(p, period))) {
-      wanted = true; /* back after the touch, when there is no force to jump */
-      p->coupling.reason = HAP_COUPLING_ABOVE;
-    }
+    wanted = proxy_is_wanted(p, period);
   }
   if (wanted && !p->proxied) {
-    begin_proxy(p);
+    proxy_begin(p);
     p->rigid = rigid;
-    if (rigid) {
-      forget_contacts(tick, index);
-    }
+    anew = anew || rigid;
   }
   p->proxied = wanted;
+  return anew;
 }
 
 /* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones do. */
-static void end_proxy(hapi_tick *tick, uint32_t index)
+bool hapi_proxy_end(hapi_pointer *p)
 {
-  tick->pointers.of[index].proxied = tick->pointers.of[index].rigid = false;
-  tick->pointers.of[index].proxy.row = 0;
-  forget_contacts(tick, index);
-}
-
-void hapi_proxy_none(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation == 0) {
-      continue;
-    }
-    p->coupling.reason =
-        p->coupling.kind == HAP_COUPLING_DIRECT ? HAP_COUPLING_ASKED : HAP_COUPLING_MODEL;
-    p->coupling.near_stiffness = p->coupling.contact_stiffness = 0.0;
-    if (p->proxied) {
-      end_proxy(tick, i);
-    }
+  bool anew = p->proxied;
+  p->coupling.reason =
+      p->coupling.kind == HAP_COUPLING_DIRECT ? HAP_COUPLING_ASKED : HAP_COUPLING_MODEL;
+  p->coupling.near_stiffness = p->coupling.contact_stiffness = 0.0;
+  if (p->proxied) {
+    p->proxied = p->rigid = false;
+    p->proxy.row = 0;
   }
+  return anew;
 }
 
 /* A virtual tool that is not light for its spring takes it as it is at the tick: implicit Euler would damp
  * its swings. */
-static bool swings(const hapi_tick *tick, const hapi_pointer *p, double k, double inertia)
+static bool proxy_swings(const hapi_pointer *p, double k, double inertia, double period)
 {
-  return p->rigid && tick->facts.period * tick->facts.period * k <= SWING_LIMIT * inertia;
+  return p->rigid && period * period * k <= SWING_LIMIT * inertia;
 }
 
-static double response(const hapi_tick *tick, const hapi_pointer *p)
+static double proxy_response(const hapi_pointer *p, double period)
 {
-  double t = tick->facts.period;
-  double k = swings(tick, p, p->coupling.stiffness, p->coupling.mass) ? 0.0 : p->coupling.stiffness;
+  double t = period;
+  double k = proxy_swings(p, p->coupling.stiffness, p->coupling.mass, period)
+                 ? 0.0
+                 : p->coupling.stiffness;
   return 1.0 / (p->coupling.mass + t * p->coupling.damping + t * t * k);
 }
 
-static double spin_response(const hapi_tick *tick, const hapi_pointer *p)
+static double proxy_spin_response(const hapi_pointer *p, double period)
 {
-  double t = tick->facts.period;
-  double k = swings(tick, p, p->coupling.spin_stiffness, p->coupling.inertia)
+  double t = period;
+  double k = proxy_swings(p, p->coupling.spin_stiffness, p->coupling.inertia, period)
                  ? 0.0
                  : p->coupling.spin_stiffness;
   double resists = p->coupling.inertia + t * p->coupling.spin_damping + t * t * k;
@@ -207,66 +189,27 @@ static void show_turn(hapi_pointer *p)
   hapi_v3_copy(p->proxy.spin, p->twist.angular);
 }
 
-static bool is_god_object(const hapi_pointer *p)
+void hapi_proxy_place(hapi_pointer *p, double period)
 {
-  return p->rigid && p->coupling.kind == HAP_COUPLING_GOD_OBJECT;
-}
-
-/* What is left of the offsets would keep a god-object from being where the device is. */
-static void end_offsets(hapi_pointer *p)
-{
-  if (hapi_v3_norm(p->proxy.offset) < OFFSET_LEAST &&
-      p->shape.extent * hapi_v3_norm(p->proxy.offset_turn) < OFFSET_LEAST) {
-    hapi_v3_set(p->proxy.offset, 0.0, 0.0, 0.0);
-    hapi_v3_set(p->proxy.offset_turn, 0.0, 0.0, 0.0);
-  }
-}
-
-static void place(const hapi_tick *tick, hapi_pointer *p)
-{
-  hapi_v3_scale(1.0 - fmin(1.0, tick->facts.period / OFFSET_DECAY_S), p->proxy.offset,
-                p->proxy.offset);
+  hapi_v3_scale(1.0 - fmin(1.0, period / OFFSET_DECAY_S), p->proxy.offset, p->proxy.offset);
   hapi_v3_copy(p->proxy.position, p->pose.position);
   hapi_v3_copy(p->proxy.velocity, p->twist.linear);
   if (p->shape.hull != NULL) {
-    hapi_v3_scale(1.0 - fmin(1.0, tick->facts.period / OFFSET_DECAY_S), p->proxy.offset_turn,
+    hapi_v3_scale(1.0 - fmin(1.0, period / OFFSET_DECAY_S), p->proxy.offset_turn,
                   p->proxy.offset_turn);
     show_turn(p);
-    p->proxy.spin_response = spin_response(tick, p);
+    p->proxy.spin_response = proxy_spin_response(p, period);
   }
-  if (is_god_object(p)) {
-    end_offsets(p);
-  }
-  p->rigid_move.pushed_out = false;
-  p->rigid_move.near_rows = 0;
+  hapi_rigid_place(p);
+  p->proxy.response = proxy_response(p, period);
 }
 
-void hapi_proxy_begin(hapi_tick *tick)
+static void set_free_spin(hapi_pointer *p, double t, double w[3])
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    p->proxy.row = 0;
-    if (p->generation == 0) {
-      continue;
-    }
-    choose(tick, i);
-    p->coupling.contact_stiffness = p->coupling.near_stiffness;
-    p->coupling.near_stiffness = 0.0;
-    if (p->proxied) {
-      place(tick, p);
-      p->proxy.row = tick->rows.solver.body_count++;
-      p->proxy.response = response(tick, p);
-    }
-  }
-}
-
-static void set_free_spin(const hapi_tick *tick, hapi_pointer *p, double w[3])
-{
-  double t = tick->facts.period;
   double end[4];
   double way[3];
   far_turn(p, end);
-  rotation_between(p->proxy.quat, end, way);
+  hapi_proxy_turn_between(p->proxy.quat, end, way);
   for (int k = 0; k < 3; ++k) {
     w[k] = p->proxy.spin_response *
            (p->coupling.inertia * p->proxy.spin[k] + t * p->coupling.spin_stiffness * way[k] +
@@ -275,79 +218,27 @@ static void set_free_spin(const hapi_tick *tick, hapi_pointer *p, double w[3])
   hapi_v3_copy(w, p->proxy.free_spin);
 }
 
-/* The most that a rigid pointer may come towards anything: without a damper a god-object goes all the way
- * to the device. */
-static void set_reach(const hapi_tick *tick, hapi_pointer *p, const double way[3])
+void hapi_proxy_free(hapi_pointer *p, double t, double v[6])
 {
-  double going = tick->facts.period * hapi_v3_norm(p->proxy.free_velocity);
-  p->rigid_move.reach = is_god_object(p) ? fmax(going, hapi_v3_norm(way)) : going;
+  double way[3];
+  far_end(p, way);
+  hapi_v3_sub(way, p->proxy.position, way);
+  for (int k = 0; k < 3; ++k) {
+    v[k] = p->proxy.response *
+           (p->coupling.mass * p->proxy.velocity[k] + t * p->coupling.stiffness * way[k] +
+            t * p->coupling.damping * p->handle.velocity[k]);
+    v[k + 3] = 0.0;
+  }
+  hapi_v3_copy(v, p->proxy.free_velocity);
   if (p->shape.hull != NULL) {
-    p->rigid_move.reach += tick->facts.period * p->shape.extent * hapi_v3_norm(p->proxy.free_spin);
+    set_free_spin(p, t, v + 3);
   }
-  p->rigid_move.speed_most =
-      is_god_object(p) ? hapi_v3_norm(p->handle.velocity) + CATCH_UP : HUGE_VAL;
-  p->rigid_move.spin_most = is_god_object(p) && p->shape.hull != NULL
-                                ? hapi_v3_norm(p->handle.spin) + CATCH_UP / p->shape.extent
-                                : HUGE_VAL;
-}
-
-/* Velocities that the proxies would have with nothing in touch. */
-void hapi_proxy_free(hapi_tick *tick)
-{
-  double t = tick->facts.period;
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation == 0 || !p->proxied) {
-      continue;
-    }
-    double *v = tick->rows.solver.v[p->proxy.row];
-    double way[3];
-    far_end(p, way);
-    hapi_v3_sub(way, p->proxy.position, way);
-    for (int k = 0; k < 3; ++k) {
-      v[k] = p->proxy.response *
-             (p->coupling.mass * p->proxy.velocity[k] + t * p->coupling.stiffness * way[k] +
-              t * p->coupling.damping * p->handle.velocity[k]);
-      v[k + 3] = 0.0;
-    }
-    hapi_v3_copy(v, p->proxy.free_velocity);
-    if (p->shape.hull != NULL) {
-      set_free_spin(tick, p, v + 3);
-    }
-    if (p->rigid) {
-      set_reach(tick, p, way);
-    }
+  if (p->rigid) {
+    hapi_rigid_set_reach(p, t, way);
   }
 }
 
-/* The damper's part of the motion that the rows now leave out (pointer_rows.c), as it was at the last tick. */
-static void leave_out_carried(const hapi_tick *tick, const hapi_pointer *p)
-{
-  const hapi_solver *solver = &tick->rows.solver;
-  double change[6];
-  hapi_v3_scale(-tick->facts.period * p->coupling.damping * p->proxy.response,
-                p->rigid_move.carried, change);
-  hapi_v3_scale(-tick->facts.period * p->coupling.spin_damping * p->proxy.spin_response,
-                p->rigid_move.carried + 3, change + 3);
-  hapi_madd6(solver->v[p->proxy.row], 1.0, change);
-  hapi_madd6(solver->free[p->proxy.row], 1.0, change);
-}
-
-/* What lifts them out of bodies is not to stay in their velocities, as with the bodies. */
-void hapi_proxy_push_out(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation != 0 && p->rigid) {
-      memcpy(p->rigid_move.velocity, tick->rows.solver.v[p->proxy.row],
-             sizeof p->rigid_move.velocity);
-      p->rigid_move.pushed_out = true;
-      leave_out_carried(tick, p);
-    }
-  }
-}
-
-static void turn_by(double quat[4], const double spin[3], double seconds)
+void hapi_proxy_turn_by(double quat[4], const double spin[3], double seconds)
 {
   hap_pose pose = {.position = {0.0, 0.0, 0.0}};
   hap_twist twist = {.linear = {0.0, 0.0, 0.0}};
@@ -357,16 +248,16 @@ static void turn_by(double quat[4], const double spin[3], double seconds)
   memcpy(quat, pose.quat_wxyz, sizeof pose.quat_wxyz);
 }
 
-static void turn_proxy(const hapi_tick *tick, hapi_pointer *p, const double spin[3])
+static void proxy_turn(hapi_pointer *p, double period, const double spin[3])
 {
   double end[4];
   double away[3];
   far_turn(p, end);
-  rotation_between(end, p->proxy.quat, away);
-  turn_by(p->proxy.quat, spin, tick->facts.period);
+  hapi_proxy_turn_between(end, p->proxy.quat, away);
+  hapi_proxy_turn_by(p->proxy.quat, spin, period);
   hapi_v3_copy(spin, p->proxy.spin);
-  if (!swings(tick, p, p->coupling.spin_stiffness, p->coupling.inertia)) {
-    rotation_between(end, p->proxy.quat, away);
+  if (!proxy_swings(p, p->coupling.spin_stiffness, p->coupling.inertia, period)) {
+    hapi_proxy_turn_between(end, p->proxy.quat, away);
   }
   for (int k = 0; k < 3; ++k) {
     p->wrench.torque[k] = p->coupling.spin_stiffness * away[k] +
@@ -374,101 +265,46 @@ static void turn_proxy(const hapi_tick *tick, hapi_pointer *p, const double spin
   }
 }
 
-/* s, that a god-object moves: in the tick in which something lets it go, before it is braked, less. */
-static double moving_time(const hapi_tick *tick, const hapi_pointer *p, const double v[6])
+static void proxy_move(hapi_pointer *p, double period, const double v[6])
 {
-  double speed = hapi_v3_norm(v) / p->rigid_move.speed_most;
-  double spin = p->shape.hull != NULL ? hapi_v3_norm(v + 3) / p->rigid_move.spin_most : 0.0;
-  return is_god_object(p) && p->contacts == 0 ? tick->facts.period / fmax(1.0, fmax(speed, spin))
-                                              : tick->facts.period;
-}
-
-/* From where it was; velocity and force are those of the last solve. */
-static void move_rigid(const hapi_tick *tick, hapi_pointer *p, const double at[3],
-                       const double quat[4])
-{
-  const double *solved = tick->rows.solver.v[p->proxy.row];
-  const double *v = p->rigid_move.pushed_out ? p->rigid_move.velocity : solved;
-  double seconds = moving_time(tick, p, v);
-  hapi_v3_madd(at, seconds, v, p->proxy.position);
-  memcpy(p->proxy.quat, quat, sizeof p->proxy.quat);
-  if (p->shape.hull != NULL) {
-    turn_by(p->proxy.quat, v + 3, seconds);
-  }
-  if (is_god_object(p)) { /* which has no momentum to keep: as it moves */
-    for (int i = 0; i < 6; ++i) {
-      p->rigid_move.carried[i] = v[i] - solved[i];
-    }
-    hapi_v3_scale(seconds / tick->facts.period, v, p->proxy.velocity);
-    hapi_v3_scale(seconds / tick->facts.period, v + 3, p->proxy.spin);
-  }
-}
-
-/* With nothing in touch a god-object is the device. */
-static void release(const hapi_tick *tick, hapi_pointer *p)
-{
-  double way[3];
-  double turn[3];
-  hapi_v3_sub(p->handle.position, p->proxy.position, way);
-  rotation_between(p->proxy.quat, p->handle.quat, turn);
-  bool there = hapi_v3_norm(way) <= tick->facts.period * CATCH_UP &&
-               (p->shape.hull == NULL ||
-                p->shape.extent * hapi_v3_norm(turn) <= tick->facts.period * CATCH_UP);
-  bool free = p->rigid_move.near_rows == 0 || p->coupling.damping == 0.0;
-  if (there && free && hapi_v3_norm(p->proxy.offset) == 0.0) {
-    hapi_proxy_begin_anew(p);
-  }
-}
-
-static void move(hapi_tick *tick, uint32_t index)
-{
-  hapi_pointer *p = &tick->pointers.of[index];
-  const double *v = tick->rows.solver.v[p->proxy.row];
   double end[3];
-  double at[3];
-  double quat[4];
+  hap_pose before;
   const hap_wrench contacts = p->wrench;
-  if (!hapi_finite(v, 6) || (p->rigid_move.pushed_out && !hapi_finite(p->rigid_move.velocity, 6))) {
-    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, index + 1);
-    hapi_proxy_begin_anew(p);
-    return;
-  }
-  hapi_v3_copy(p->proxy.position, at);
-  memcpy(quat, p->proxy.quat, sizeof quat);
+  hapi_v3_copy(p->proxy.position, before.position);
+  memcpy(before.quat_wxyz, p->proxy.quat, sizeof before.quat_wxyz);
   hapi_v3_copy(v, p->proxy.velocity);
-  hapi_v3_madd(p->proxy.position, tick->facts.period, v, p->proxy.position);
+  hapi_v3_madd(p->proxy.position, period, v, p->proxy.position);
   far_end(p, end);
-  const double *from =
-      swings(tick, p, p->coupling.stiffness, p->coupling.mass) ? at : p->proxy.position;
+  bool swings = proxy_swings(p, p->coupling.stiffness, p->coupling.mass, period);
+  const double *from = swings ? before.position : p->proxy.position;
   for (int k = 0; k < 3; ++k) {
     p->wrench.force[k] = p->coupling.stiffness * (from[k] - end[k]) +
                          p->coupling.damping * (v[k] - p->handle.velocity[k]);
   }
   if (p->shape.hull != NULL) {
-    turn_proxy(tick, p, v + 3);
+    proxy_turn(p, period, v + 3);
+  }
+  if (hapi_rigid_is_god_object(p)) {
+    p->wrench = contacts; /* which is the spring's, but for what brakes it (hapi_pointers_brake) */
   }
   if (p->rigid) {
-    move_rigid(tick, p, at, quat);
-  }
-  if (is_god_object(p)) {
-    p->wrench = contacts; /* which is the spring's, but for what brakes it (pointer_rows.c) */
-  }
-  if (is_god_object(p) && p->contacts == 0) {
-    release(tick, p);
+    hapi_rigid_proxy_move(p, period, v, &before);
   }
 }
 
-void hapi_proxy_move(hapi_tick *tick)
+bool hapi_proxy_move(hapi_pointer *p, double period, const double v[6])
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation != 0 && p->proxied) {
-      move(tick, i);
-      hapi_v3_copy(p->proxy.position, p->pose.position);
-      hapi_v3_copy(p->proxy.velocity, p->twist.linear);
-      if (p->shape.hull != NULL) {
-        show_turn(p);
-      }
-    }
+  bool sound =
+      hapi_finite(v, 6) && (!p->rigid_move.pushed_out || hapi_finite(p->rigid_move.velocity, 6));
+  if (sound) {
+    proxy_move(p, period, v);
+  } else {
+    hapi_proxy_begin_anew(p);
   }
+  hapi_v3_copy(p->proxy.position, p->pose.position);
+  hapi_v3_copy(p->proxy.velocity, p->twist.linear);
+  if (p->shape.hull != NULL) {
+    show_turn(p);
+  }
+  return sound;
 }

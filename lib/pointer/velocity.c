@@ -59,7 +59,7 @@ static uint32_t find_window(const hapi_velocity *velocity, int axis)
 }
 
 /* Slope of the line of least squares. */
-static double fit(const hapi_velocity *velocity, int axis, uint32_t window)
+static double slope_fit(const hapi_velocity *velocity, int axis, uint32_t window)
 {
   double x = sample_at(velocity, 0)->pose.position[axis];
   double mean_age = 0.0;
@@ -81,7 +81,7 @@ static double fit(const hapi_velocity *velocity, int axis, uint32_t window)
 }
 
 /* Rotation vector of the turn over the window, to the third order in its half angle. */
-static void turn(const hapi_velocity *velocity, double out[3])
+static void turn_measure(const hapi_velocity *velocity, double out[3])
 {
   uint32_t age = velocity->count - 1;
   age = age < HAPI_VELOCITY_TURN ? age : HAPI_VELOCITY_TURN;
@@ -107,7 +107,7 @@ void hapi_velocity_update(hapi_velocity *velocity, int64_t time_ns, const hap_po
     return;
   }
   for (int axis = 0; axis < 3; ++axis) {
-    out->linear[axis] = fit(velocity, axis, find_window(velocity, axis));
+    out->linear[axis] = slope_fit(velocity, axis, find_window(velocity, axis));
   }
-  turn(velocity, out->angular);
+  turn_measure(velocity, out->angular);
 }

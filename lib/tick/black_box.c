@@ -13,7 +13,7 @@ void hapi_black_box_reset(hapi_black_box *box)
   atomic_store(&box->state, HAPI_BOX_FILLING);
 }
 
-static void fill(const hapi_tick *tick, uint32_t index, hap_black_box_row *out)
+static void row_fill(const hapi_tick *tick, uint32_t index, hap_black_box_row *out)
 {
   const hapi_pointer *p = &tick->pointers.of[index];
   out->tick = tick->facts.tick - 1; /* the one that has just been run */
@@ -37,7 +37,7 @@ static void fill_tick(hapi_black_box *box, const hapi_tick *tick)
   hap_black_box_row *rows = box->rows + (size_t)box->newest * box->pointers;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     if (tick->pointers.of[i].generation != 0) {
-      fill(tick, i, &rows[count++]);
+      row_fill(tick, i, &rows[count++]);
     }
   }
   box->counts[box->newest] = count;
@@ -69,7 +69,7 @@ void hapi_black_box_record(hapi_black_box *box, const hapi_tick *tick)
   }
 }
 
-static size_t copy(const hapi_black_box *box, hap_black_box_row *rows, size_t capacity)
+static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size_t capacity)
 {
   size_t total = 0;
   size_t taken = 0;
@@ -97,7 +97,7 @@ size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t 
                                                memory_order_acquire, memory_order_relaxed)) {
     return 0;
   }
-  size_t count = copy(box, rows, capacity);
+  size_t count = rows_copy(box, rows, capacity);
   atomic_store_explicit(&box->state, HAPI_BOX_FROZEN, memory_order_release);
   return count;
 }

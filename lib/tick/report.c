@@ -1,16 +1,16 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "tick/report.h"
+
 #include <string.h>
 
 #include "base/vec.h"
-#include "local/pointer_friction.h"
-#include "tick/tick.h"
 
-static void report_bodies(const hapi_tick *tick, hapi_state *out)
+static void report_bodies(const hapi_bodies *from, hapi_state *out)
 {
   hapi_state_body *bodies = hapi_state_bodies(out);
-  for (uint32_t i = 0; i < tick->bodies.high; ++i) {
-    const hapi_local_body *in = &tick->bodies.of[i];
+  for (uint32_t i = 0; i < from->high; ++i) {
+    const hapi_local_body *in = &from->of[i];
     bodies[i].generation = in->generation;
     bodies[i].flags = in->flags;
     bodies[i].epoch = in->epoch;
@@ -26,15 +26,15 @@ static void report_bodies(const hapi_tick *tick, hapi_state *out)
       bodies[i].owned_twist = in->left.twist;
     }
   }
-  out->body_high = tick->bodies.high;
+  out->body_high = from->high;
 }
 
-static void report_contacts(const hapi_tick *tick, hapi_state *out)
+static void report_contacts(const hapi_touches *touches, hapi_state *out)
 {
   hapi_state_contact *contacts = hapi_state_contacts(out);
   uint32_t count = 0;
-  for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    const hapi_local_contact *in = &tick->touches.of[i];
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    const hapi_local_contact *in = &touches->of[i];
     if (in->slot != HAPI_SLOT_NONE) { /* else physics does not know it */
       contacts[count].slot = in->slot;
       contacts[count].generation = in->generation;
@@ -44,20 +44,20 @@ static void report_contacts(const hapi_tick *tick, hapi_state *out)
   out->contact_count = count;
 }
 
-static void report_springs(const hapi_tick *tick, hapi_state *out)
+static void report_springs(const hapi_touches *touches, uint64_t tick, hapi_state *out)
 {
   out->spring_count = 0;
-  for (uint32_t i = 0; i < tick->touches.count && out->spring_count < out->spring_capacity; ++i) {
-    const hapi_local_contact *c = &tick->touches.of[i];
-    const hapi_friction *f = c->rubs ? hapi_friction_of(tick, c) : NULL;
-    if (f == NULL || f->tick + 1 != tick->facts.tick || f->rigid || !(f->stiffness > 0.0)) {
+  for (uint32_t i = 0; i < touches->count && out->spring_count < out->spring_capacity; ++i) {
+    const hapi_local_contact *c = &touches->of[i];
+    const hapi_friction *f = c->rubs ? hapi_friction_of(touches, c) : NULL;
+    if (f == NULL || f->tick + 1 != tick || f->rigid || !(f->stiffness > 0.0)) {
       continue;
     }
     hapi_state_spring *to = &hapi_state_springs(out)[out->spring_count++];
     to->slot = c->tool != 0 ? HAPI_SLOT_NONE : c->slot;
     to->generation = c->generation;
     if (c->tool != 0) {
-      const hapi_patch_contact *at = &tick->touches.tool.tools[c->tool - 1].in.at;
+      const hapi_patch_contact *at = &touches->tool.tools[c->tool - 1].in.at;
       to->key = at->key;
       hapi_v3_copy(at->core_a, to->place);
     }
@@ -67,11 +67,11 @@ static void report_springs(const hapi_tick *tick, hapi_state *out)
 }
 
 /* The places of those that have not come yet were cleared at start. */
-static void report_pointers(const hapi_tick *tick, hapi_state *out)
+static void report_pointers(const hapi_pointers *from, hapi_state *out)
 {
   hapi_state_pointer *pointers = hapi_state_pointers(out);
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *in = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < from->high; ++i) {
+    const hapi_pointer *in = &from->of[i];
     pointers[i].generation = in->generation;
     if (in->generation == 0) {
       continue;
@@ -93,15 +93,15 @@ static void report_pointers(const hapi_tick *tick, hapi_state *out)
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
 {
-  hapi_v3_copy(tick->figures.hand_impulse, out->hand_impulse);
-  hapi_v3_copy(tick->figures.owned_impulse, out->owned_impulse);
+  hapi_v3_copy(tick->touches.hand_impulse, out->hand_impulse);
+  hapi_v3_copy(tick->bodies.owned_impulse, out->owned_impulse);
   out->now_ns = tick->facts.now_ns;
   out->model_number = tick->facts.model_number;
   out->model = tick->facts.model;
-  report_bodies(tick, out);
-  report_contacts(tick, out);
-  report_springs(tick, out);
-  report_pointers(tick, out);
+  report_bodies(&tick->bodies, out);
+  report_contacts(&tick->touches, out);
+  report_springs(&tick->touches, tick->facts.tick, out);
+  report_pointers(&tick->pointers, out);
 }
 
 /* The loop gave the body something that the world has not had yet. */
@@ -115,14 +115,12 @@ static bool has_news(const hapi_local_body *body)
 
 /* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body that
  * it does not own and gave nothing takes the world's state then. */
-static bool leads(const hapi_tick *tick, const hapi_local_body *body)
+static bool loop_leads(hap_model model, const hapi_local_body *body)
 {
-  if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 ||
-      tick->facts.model == HAP_MODEL_IMPULSE) {
+  if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 || model == HAP_MODEL_IMPULSE) {
     return false;
   }
-  return tick->facts.model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
-         has_news(body);
+  return model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || has_news(body);
 }
 
 static void store_position(_Atomic double *to, const double from[3])
@@ -138,11 +136,11 @@ static void store_quat(_Atomic double *to, const double from[4])
   atomic_store_explicit(&to[3], from[3], memory_order_release);
 }
 
-static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
+static void trail_bodies(const hapi_bodies *bodies, hap_model model, hapi_trail_body *places)
 {
-  for (uint32_t i = 0; i < tick->bodies.high; ++i) {
-    const hapi_local_body *body = &tick->bodies.of[i];
-    uint32_t generation = leads(tick, body) ? body->generation : 0;
+  for (uint32_t i = 0; i < bodies->high; ++i) {
+    const hapi_local_body *body = &bodies->of[i];
+    uint32_t generation = loop_leads(model, body) ? body->generation : 0;
     if (generation != 0) {
       store_position(places[i].pose, body->pose.position);
       store_quat(places[i].pose + 3, body->pose.quat_wxyz);
@@ -151,10 +149,10 @@ static void trail_bodies(const hapi_tick *tick, hapi_trail_body *places)
   }
 }
 
-static void trail_pointers(const hapi_tick *tick, hapi_trail_pointer *places)
+static void trail_pointers(const hapi_pointers *pointers, hapi_trail_pointer *places)
 {
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    const hapi_pointer *p = &tick->pointers.of[i];
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0) {
       store_position(places[i].proxy, p->pose.position);
       store_position(places[i].device, p->handle.position);
@@ -181,8 +179,8 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
   atomic_store_explicit(&head->time_ns, tick->facts.now_ns, memory_order_release);
   atomic_store_explicit(&head->bodies_ns, tick->facts.now_ns + step_ns, memory_order_release);
   atomic_store_explicit(&head->body_high, tick->bodies.high, memory_order_release);
-  trail_bodies(tick, hapi_trail_bodies(trail, row));
-  trail_pointers(tick, hapi_trail_pointers(trail, row));
+  trail_bodies(&tick->bodies, tick->facts.model, hapi_trail_bodies(trail, row));
+  trail_pointers(&tick->pointers, hapi_trail_pointers(trail, row));
   atomic_store_explicit(&trail->written, row + 1, memory_order_release);
 }
 

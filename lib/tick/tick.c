@@ -4,7 +4,12 @@
 
 #include <string.h>
 
-#include "base/vec.h"
+#include "guard/energy_observer.h"
+#include "guard/force_guard.h"
+#include "paper/local_dynamics.h"
+#include "paper/render.h"
+#include "pointer/coupling.h"
+#include "pointer/proxy.h"
 
 /* ---- reset: arrays stay, and every page of theirs is touched once, so that no tick is the first ---- */
 
@@ -28,23 +33,27 @@ static void tools_reset(hapi_tool_world *w, const hapi_capacity *c)
   }
 }
 
-static void touches_reset(hapi_touches *touches, const hapi_capacity *c)
-{
-  touches->count = touches->pushing = 0;
-  touches->rubs = false;
-  memset(touches->of, 0, (c->contacts + (size_t)2 * c->tool_points) * sizeof *touches->of);
-  memset(touches->ramps, 0, c->contacts * sizeof *touches->ramps);
-  memset(touches->ramp_generations, 0, c->contacts * sizeof *touches->ramp_generations);
-  memset(touches->frictions, 0, c->contacts * sizeof *touches->frictions);
-  tools_reset(&touches->tool, c);
-}
-
 static void crosses_reset(hapi_crosses *crosses, const hapi_capacity *c)
 {
   crosses->count = 0;
   if (c->crosses > 0) {
     memset(crosses->of, 0, c->crosses * sizeof *crosses->of);
   }
+}
+
+static void touches_reset(hapi_touches *touches, const hapi_capacity *c)
+{
+  touches->count = touches->pushing = 0;
+  touches->rubs = false;
+  touches->contact_ticks = 0;
+  memset(touches->hand_impulse, 0, sizeof touches->hand_impulse);
+  touches->hand_impulse_abs = 0.0;
+  memset(touches->of, 0, (c->contacts + (size_t)2 * c->tool_points) * sizeof *touches->of);
+  memset(touches->ramps, 0, c->contacts * sizeof *touches->ramps);
+  memset(touches->ramp_generations, 0, c->contacts * sizeof *touches->ramp_generations);
+  memset(touches->frictions, 0, c->contacts * sizeof *touches->frictions);
+  tools_reset(&touches->tool, c);
+  crosses_reset(&touches->crosses, c);
 }
 
 static void contacts_reset(hapi_body_contacts *contacts, const hapi_capacity *c)
@@ -67,9 +76,11 @@ static void rows_reset(hapi_rows *rows, const hapi_capacity *c)
 {
   hapi_solver *solver = &rows->solver;
   size_t places = (size_t)c->bodies + c->pointers + 1;
+  rows->residual_max = 0.0;
+  rows->sweeps = 0;
   solver->row_count = solver->body_count = 0;
   solver->dear_rows = solver->dear_runs = solver->vain_runs = 0;
-  solver->ready = true; /* as hapi_local_world_step makes them */
+  solver->ready = true; /* as the rows are made */
   memset(rows->sources, 0, rows->capacity * sizeof *rows->sources);
   memset(solver->rows, 0, rows->capacity * sizeof *solver->rows);
   memset(solver->v, 0, places * sizeof *solver->v);
@@ -85,33 +96,78 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->pointers.proxies = false;
   bodies_reset(&tick->bodies, c);
   touches_reset(&tick->touches, c);
-  crosses_reset(&tick->crosses, c);
   contacts_reset(&tick->contacts, c);
   joints_reset(&tick->joints, c);
   rows_reset(&tick->rows, c);
-  memset(&tick->figures, 0, sizeof tick->figures);
   tick->guard = (hapi_guard){.mode = tick->guard.mode};
   memset(&tick->sample, 0, sizeof tick->sample);
   memset(&tick->watch, 0, sizeof tick->watch);
   tick->hash = 0xcbf29ce484222325u;
 }
 
-void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
+void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)
+{
+  uint32_t generation = pointer > 0 ? tick->pointers.of[pointer - 1].generation : 0;
+  hapi_fault_set(&tick->guard.latch, fault, pointer, generation);
+}
+
+void hapi_tick_reset_fault(hapi_tick *tick)
+{
+  hapi_guard_reset_fault(&tick->guard, &tick->pointers, &tick->touches);
+}
+
+void hapi_tick_read(hapi_tick *tick, int64_t now_ns)
 {
   tick->facts.now_ns = now_ns;
-  tick->figures.given = 0.0;
-  hapi_coupling_read(tick);
-  if (tick->facts.model == HAP_MODEL_CONTACT) {
-    hapi_local_world_step(tick);
-  } else {
-    hapi_proxy_none(tick);
-    hapi_local_place(tick);
-    hapi_render(tick);
-    hapi_local_step(tick);
+  uint32_t unusable =
+      hapi_coupling_read(&tick->pointers, tick->facts.period, tick->facts.physics_period);
+  if (unusable > 0) {
+    hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, unusable);
   }
-  hapi_guard_run(tick);
+}
+
+/* Models other than CONTACT. */
+static __attribute__((noinline)) void paper_step(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0 && hapi_proxy_end(p)) {
+      hapi_touches_forget(&tick->touches, i);
+    }
+  }
+  hapi_local_place(&tick->bodies, &tick->facts);
+  hapi_render(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->sample);
+  hapi_local_step(&tick->bodies, &tick->touches, &tick->facts, &tick->sample);
+  if (tick->bodies.unsound) {
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
+  }
+}
+
+void hapi_tick_guard(hapi_tick *tick)
+{
+  hapi_guard_begin(&tick->guard, &tick->facts, &tick->pointers);
+  if (tick->facts.observes && tick->guard.mode == HAP_GUARD_ON) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    hapi_energy_observe(&tick->guard, &tick->facts, &tick->pointers, &tick->bodies, &tick->touches);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_OBSERVER, begin);
+  }
+  hapi_guard_write(&tick->guard, tick->facts.period, &tick->pointers);
+}
+
+void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
+{
+  hapi_tick_read(tick, now_ns);
+  tick->facts.faulted = tick->guard.latch.fault != HAP_FAULT_NONE;
+  tick->bodies.unsound = false;
+  tick->bodies.given = 0.0;
+  if (tick->facts.model == HAP_MODEL_CONTACT) {
+    hapi_contact_step(tick);
+  } else {
+    paper_step(tick);
+  }
+  hapi_tick_guard(tick);
   if (tick->hashing) {
-    hapi_trace_hash(tick);
+    tick->hash = hapi_tick_hash(tick, tick->hash);
   }
   ++tick->facts.tick;
 }

@@ -30,25 +30,6 @@
 #include "local/touch.h"
 #include "pointer/pointer.h"
 #include "sync/messages.h"
-#include "sync/path.h"
-#include "sync/trail.h"
-
-/* Cross accelerances of the model in use; contact: an index into the touches. */
-typedef struct hapi_crosses {
-  hapi_model_cross *of; /* capacity.crosses */
-  uint32_t count;
-} hapi_crosses;
-
-/* Of the local world, since start. */
-typedef struct hapi_local_figures {
-  uint64_t contact_ticks;
-  double hand_impulse[3]; /* N s on dynamic bodies, all pointers */
-  double hand_impulse_abs;
-  double owned_impulse[3]; /* see hapi_state */
-  double given;            /* J, of this tick: what things of given motion did on owned bodies */
-  double residual_max;     /* m/s, of the solver */
-  uint64_t sweeps;
-} hapi_local_figures;
 
 /* What the trace shows besides the pointers. */
 typedef struct hapi_tick_watch {
@@ -63,11 +44,9 @@ typedef struct hapi_tick {
   hapi_pointers pointers;
   hapi_bodies bodies;
   hapi_touches touches;
-  hapi_crosses crosses;
   hapi_body_contacts contacts;
   hapi_joints joints;
   hapi_rows rows;
-  hapi_local_figures figures;
   hapi_guard guard;
   hapi_effect_sample sample;
   hapi_tick_watch watch;
@@ -84,57 +63,20 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns);
 /* The set stays in use, and must stay as it is, until the next call. */
 void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches);
 
-/* One tick at now_ns from the pointers' device_pose and device_twist to their device_wrench. */
+/* One tick at now_ns, from the pose and twist of the pointers' devices to their wrench. */
 void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
 
 /* Latches the first one. pointer: index + 1 of the one that it came from; 0: none of them. */
 void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer);
 void hapi_tick_reset_fault(hapi_tick *tick);
 
-/* The device has zero force at once, whatever the slew limit says. With a fault it stays so. */
-void hapi_guard_cut(hapi_pointer *pointer);
+/* ---- parts of hapi_tick_run ---- */
 
-void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
-void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
-void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
-void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);
-void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
+void hapi_tick_read(hapi_tick *tick, int64_t now_ns); /* devices -> pointers */
+void hapi_contact_step(hapi_tick *tick);              /* model CONTACT */
+void hapi_tick_guard(hapi_tick *tick);                /* world wrenches -> device wrenches */
 
-/* ---- the steps of hapi_tick_run, one file each ---- */
-
-void hapi_coupling_read(hapi_tick *tick);    /* device -> world */
-void hapi_local_place(hapi_tick *tick);      /* models SINGLE and IMPULSE: poses now */
-void hapi_render(hapi_tick *tick);           /* eq. 7 */
-void hapi_local_step(hapi_tick *tick);       /* eq. 8-11, 14 */
-void hapi_local_world_step(hapi_tick *tick); /* model CONTACT: b and c in one */
-void hapi_local_wake(hapi_tick *tick, hapi_local_body *body); /* a resting one, before its rows */
-void hapi_proxy_begin(hapi_tick *tick);                       /* direct or proxy, and why */
-void hapi_proxy_begin_anew(hapi_pointer *pointer);            /* where the device is */
-void hapi_proxy_none(hapi_tick *tick);                        /* other models: all are direct */
-void hapi_proxy_free(hapi_tick *tick);                        /* velocities without contacts */
-void hapi_proxy_push_out(hapi_tick *tick); /* rigid ones: moved by the velocities as they are now */
-void hapi_proxy_move(hapi_tick *tick);     /* poses and forces on the hands */
-void hapi_pointers_brake(hapi_tick *tick); /* rows of god-objects that have been let go */
-void hapi_pointers_direct(hapi_tick *tick); /* instead of proxy_begin where there can be none */
-void hapi_pointer_rows(hapi_tick *tick);    /* pointer contacts -> rows */
-void hapi_pointer_forces(hapi_tick *tick);  /* rows -> wrenches */
-void hapi_pointer_forces_with_friction(hapi_tick *tick); /* its part where some contact rubs */
-void hapi_contact_wake(hapi_tick *tick);                 /* what is touched by what moves */
-void hapi_contact_rows(hapi_tick *tick);                 /* contacts between bodies -> rows */
-void hapi_joint_adopt(hapi_tick *tick, hapi_model *model);
-void hapi_joint_wake(hapi_tick *tick);     /* what hangs on what moves */
-void hapi_joint_rows(hapi_tick *tick);     /* joints -> rows */
-void hapi_tool_set_aside(hapi_tick *tick); /* before a model's spheres are taken: their places */
-void hapi_tool_adopt_model(hapi_tick *tick, hapi_model *model); /* ... and after them */
-void hapi_tool_adopt_patches(hapi_tick *tick, hapi_patches *patches);
-void hapi_tool_place(hapi_tick *tick);                    /* all contacts of hulls, once a tick */
-void hapi_tool_forget(hapi_tick *tick, uint32_t pointer); /* its contacts begin as deep ones do */
-void hapi_guard_run(hapi_tick *tick);
-void hapi_energy_observe(hapi_tick *tick); /* part of the guard, on device wrenches */
-void hapi_energy_resume(hapi_tick *tick);  /* after ticks that were not observed */
-void hapi_tick_feel(hapi_pointer *pointer, hap_effect_wish wish, bool rubs); /* feels_torque */
-void hapi_coupling_write(hapi_pointer *pointer);                /* world wrench -> device wrench */
-double hapi_coupling_torque_scale(const hapi_pointer *pointer); /* device / world */
-void hapi_trace_hash(hapi_tick *tick);
+/* trace.c: of what a tick has come to, on top of a hash before. */
+uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash);
 
 #endif

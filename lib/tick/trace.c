@@ -1,17 +1,18 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "tick/report.h"
+
 #include <string.h>
 
 #include "base/vec.h"
-#include "tick/tick.h"
 
-static void trace_bodies(const hapi_tick *tick, hap_trace_row *out)
+static void trace_bodies(const hapi_tick_watch *watch, const hapi_bodies *bodies,
+                         hap_trace_row *out)
 {
-  out->body_count = tick->watch.count;
-  for (uint32_t i = 0; i < tick->watch.count; ++i) {
-    uint32_t slot = tick->watch.slot[i];
-    const double *at =
-        slot == HAPI_SLOT_NONE ? tick->watch.position[i] : tick->bodies.of[slot].pose.position;
+  out->body_count = watch->count;
+  for (uint32_t i = 0; i < watch->count; ++i) {
+    uint32_t slot = watch->slot[i];
+    const double *at = slot == HAPI_SLOT_NONE ? watch->position[i] : bodies->of[slot].pose.position;
     hapi_v3_copy(at, out->body_position[i]);
   }
 }
@@ -30,7 +31,7 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
     hapi_v3_copy(p->wrench.force, out->pointers[i].force);
     hapi_v3_copy(p->wrench.torque, out->pointers[i].torque);
   }
-  trace_bodies(tick, out);
+  trace_bodies(&tick->watch, &tick->bodies, out);
 }
 
 /* FNV-1a over 64-bit words: cheap, and any changed bit changes it. */
@@ -45,9 +46,8 @@ static uint64_t hash_doubles(uint64_t hash, const double *values, int count)
   return hash;
 }
 
-void hapi_trace_hash(hapi_tick *tick)
+uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
 {
-  uint64_t hash = tick->hash;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     const hapi_pointer *p = &tick->pointers.of[i];
     if (p->generation != 0) {
@@ -63,5 +63,5 @@ void hapi_trace_hash(hapi_tick *tick)
     hash = hash_doubles(hash, body->twist.linear, 3);
     hash = hash_doubles(hash, body->twist.angular, 3);
   }
-  tick->hash = hash;
+  return hash;
 }

@@ -221,7 +221,7 @@ static double spring_energy(const bounds *b)
       sum += 0.5 * hapi_v3_dot(c->force, c->force) / (c->weight * p->surface.stiffness);
     }
     if (p->surface.finger_radius > 0.0 && hapi_v3_norm(c->force) > 0.0) {
-      double turn = hapi_friction_of(tick, c)->stretch[3];
+      double turn = hapi_friction_of(&tick->touches, c)->stretch[3];
       sum += 0.5 * c->weight * p->surface.stiffness * turn * turn;
     }
   }
@@ -354,7 +354,7 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
 static void look_at_momentum(bounds *b)
 {
   hap_stats stats;
-  double now = tick_of(b)->figures.hand_impulse_abs;
+  double now = tick_of(b)->touches.hand_impulse_abs;
   double before = b->ticks >= b->interval ? b->impulse[b->ticks % b->interval] : 0.0;
   b->impulse[b->ticks % b->interval] = now;
   if (hap_session_stats(b->w->session, &stats, sizeof stats) != HAP_OK) {

@@ -1,0 +1,196 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "local/body_adopt.h"
+
+#include <string.h>
+
+#include "base/pose.h"
+#include "base/vec.h"
+
+/* A body that comes in has the world's state, advanced by the age of the model. */
+static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
+{
+  bool falls = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
+  body->pose = in->pose;
+  body->twist = in->twist;
+  for (int i = 0; falls && i < 3; ++i) {
+    body->twist.linear[i] += age_s * in->b[i];
+    body->twist.angular[i] += age_s * in->b[3 + i];
+  }
+  hapi_pose_move(&body->pose, &body->twist, age_s);
+  memset(body->linear.residual, 0, sizeof body->linear.residual);
+  memcpy(body->account.residual_taken, in->residual, sizeof body->account.residual_taken);
+}
+
+/* What the loop gave to the body since the state of the message: the totals have gone on. */
+static void add_new_impulse(hapi_local_body *body, const hapi_model_body *in)
+{
+  double totals[6];
+  double turned[3];
+  double angular[3];
+  for (int i = 0; i < 3; ++i) {
+    totals[i] =
+        body->account.impulse[i] - in->impulse_taken[i] + body->account.gain[i] - in->gain_taken[i];
+    totals[3 + i] = body->account.angular_impulse[i] - in->impulse_taken[3 + i] +
+                    body->account.gain[3 + i] - in->gain_taken[3 + i];
+  }
+  if ((in->flags & HAPI_BODY_MEASURED) != 0) {
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 6; ++k) {
+        body->twist.linear[i] += in->response[i][k] * totals[k];
+        body->twist.angular[i] += in->response[3 + i][k] * totals[k];
+      }
+    }
+  } else if ((in->flags & HAPI_BODY_DRIVEN) == 0 && in->mass > 0.0) {
+    hapi_v3_madd(body->twist.linear, 1.0 / in->mass, totals, body->twist.linear);
+    hapi_quat_unrotate(body->pose.quat_wxyz, totals + 3, turned);
+    hapi_m3_apply(in->inverse_inertia, turned, angular);
+    hapi_quat_rotate(body->pose.quat_wxyz, angular, angular);
+    hapi_v3_add(body->twist.angular, angular, body->twist.angular);
+  }
+}
+
+/* The loop lets go of the body: physics goes on from here. */
+static void body_disown(hapi_local_body *body, int64_t now_ns)
+{
+  if ((body->flags & HAPI_BODY_OWNED) != 0) {
+    body->left.pose = body->pose;
+    body->left.twist = body->twist;
+    body->owned_until_ns = now_ns;
+    body->flags &= ~(uint32_t)HAPI_BODY_OWNED;
+  }
+}
+
+static void take_given(hapi_local_body *body, const hapi_model_body *in)
+{
+  body->given = *in;
+  body->round = hapi_m3_is_scalar(in->inertia) && hapi_m3_is_scalar(in->inverse_inertia);
+  body->forced = false;
+  for (int i = 0; i < 6; ++i) {
+    body->forced = body->forced || in->user_wrench[i] != 0.0;
+  }
+  bool by_mass = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0;
+  body->inverse_mass = by_mass ? 1.0 / in->mass : 0.0;
+  if (body->round) {
+    memcpy(body->inverse_inertia, in->inverse_inertia, sizeof body->inverse_inertia);
+  }
+}
+
+/* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is
+ * known of it. One that has been let go keeps its pose until physics has had it. */
+static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in, double age_s,
+                               int64_t now_ns, uint64_t number)
+{
+  bool same = body->generation == in->generation && body->epoch == in->epoch;
+  bool owned = same && (body->flags & HAPI_BODY_OWNED) != 0;
+  bool owns = (in->flags & HAPI_BODY_OWNED) != 0;
+  uint32_t flags = in->flags;
+  if (owned && !owns) {
+    body_disown(body, now_ns);
+  } else if (!owned) {
+    body_enter(body, in, age_s);
+    add_new_impulse(body, in);
+    body->entered_model = number;
+  }
+  if ((in->flags & HAPI_BODY_ALONE) != 0) {
+    body->entered_model = 0;
+  }
+  if (owned && owns && (body->pushed || (body->flags & HAPI_BODY_RESTING) == 0)) {
+    /* Physics puts a body to sleep that moved too little, unless it was pushed meanwhile. */
+    if (body->pushed || (flags & HAPI_BODY_RESTING) == 0) {
+      flags &= ~(uint32_t)HAPI_BODY_RESTING;
+    } else {
+      memset(&body->twist, 0, sizeof body->twist);
+    }
+  }
+  body->flags = flags;
+  body->epoch = in->epoch;
+  take_given(body, in);
+  memcpy(body->account.residual_taken, in->residual, sizeof body->account.residual_taken);
+  memset(body->linear.residual, 0, sizeof body->linear.residual);
+}
+
+/* Whether the loop moves the body by an accelerance: physics then says what that missed (eq. 14). In
+ * model CONTACT all that it meets and does not own; what was not measured has its mass alone. */
+static bool is_linear(hap_model model, uint32_t flags)
+{
+  return model == HAP_MODEL_ACCELERANCE ||
+         (model == HAP_MODEL_CONTACT && (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0);
+}
+
+static void adopt_body(hapi_local_body *body, const hapi_model *model, const hapi_model_body *in,
+                       double age_s, const hapi_tick_facts *before)
+{
+  int64_t now_ns = before->now_ns;
+  bool is_new = body->generation != in->generation;
+  if (is_new) {
+    memset(body, 0, sizeof *body);
+    body->generation = in->generation;
+    body->shown.from = in->pose;
+  } else {
+    body->shown.from = body->pose;
+  }
+  body->shown.to = in->pose;
+  body->live = true;
+  memset(body->linear.acceleration, 0, sizeof body->linear.acceleration);
+  bool was_linear = is_linear(before->model, body->flags);
+  bool stays_linear = is_linear(model->model, in->flags);
+  if (model->model == HAP_MODEL_CONTACT && !stays_linear) {
+    adopt_contact_body(body, in, age_s, now_ns, model->number);
+    body->pushed = false;
+    return;
+  }
+  body_disown(body, now_ns);
+  take_given(body, in);
+  /* What a pointer pushed keeps the loop's state: a new model replaces what is known of the body,
+   * never where the body is. */
+  bool keeps = !is_new && body->epoch == in->epoch && stays_linear && was_linear &&
+               (in->flags & HAPI_BODY_DRIVEN) == 0 &&
+               ((in->flags & HAPI_BODY_FOLLOWS) == 0 || body->pushed);
+  body->epoch = in->epoch;
+  if (!keeps) {
+    body_enter(body, in, age_s);
+    add_new_impulse(body, in);
+  }
+  bool awake = keeps && (body->flags & HAPI_BODY_RESTING) == 0;
+  body->flags = awake ? in->flags & ~(uint32_t)HAPI_BODY_RESTING : in->flags;
+  body->pushed = false;
+  memcpy(body->linear.b, in->b, sizeof body->linear.b);
+  for (int i = 0; i < 6; ++i) { /* eq. 14, in the first tick of the model */
+    body->linear.residual[i] += in->residual[i] - body->account.residual_taken[i];
+    body->account.residual_taken[i] = in->residual[i];
+  }
+}
+
+/* Bodies that are not in the new model. */
+static void bodies_leave(const hapi_bodies *bodies, hapi_model *model, int64_t now_ns)
+{
+  const hapi_model_body *in = hapi_model_bodies(model);
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    bodies->of[bodies->live[i]].live = false;
+  }
+  for (uint32_t i = 0; i < model->body_count; ++i) {
+    bodies->of[in[i].slot].live = true;
+  }
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if (!body->live) {
+      body_disown(body, now_ns);
+    }
+  }
+}
+
+void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, double age_s,
+                             const hapi_tick_facts *before)
+{
+  const hapi_model_body *in = hapi_model_bodies(model);
+  bodies_leave(bodies, model, before->now_ns);
+  for (uint32_t i = 0; i < model->body_count; ++i) {
+    adopt_body(&bodies->of[in[i].slot], model, &in[i], age_s, before);
+    bodies->live[i] = in[i].slot;
+    if (in[i].slot >= bodies->high) {
+      bodies->high = in[i].slot + 1;
+    }
+  }
+  bodies->live_count = model->body_count;
+}

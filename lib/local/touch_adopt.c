@@ -1,0 +1,81 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "local/touch_adopt.h"
+
+#include <string.h>
+
+#include "base/assert.h"
+#include "local/tool_adopt.h"
+
+static void remember_ramps(const hapi_touches *touches)
+{
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    const hapi_local_contact *c = &touches->of[i];
+    HAPI_ASSERT(c->tool == 0);
+    touches->ramps[c->slot] = c->ramp;
+    touches->ramp_generations[c->slot] = c->seen ? c->generation : 0;
+  }
+}
+
+static void contact_adopt(hapi_touches *touches, const hapi_model_contact *in, uint32_t wishes,
+                          hapi_local_contact *out)
+{
+  memset(out, 0, sizeof *out);
+  out->slot = in->slot;
+  out->generation = in->generation;
+  out->body = in->body;
+  out->pointer = in->pointer;
+  out->pointer_generation = in->pointer_generation;
+  memcpy(out->point_body, in->point_body, sizeof out->point_body);
+  memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
+  memcpy(out->a, in->a, sizeof out->a);
+  memcpy(out->turn, in->turn, sizeof out->turn);
+  out->mu = in->mu;
+  out->rubs = hapi_touch_rubs(in->mu, wishes);
+  touches->rubs |= out->rubs;
+  out->weight = 1.0;
+  out->has_shape = in->has_shape != 0;
+  out->shape = in->shape;
+  out->shape_pose = in->shape_pose;
+  if (touches->ramp_generations[in->slot] == in->generation) {
+    out->seen = true;
+    out->ramp = touches->ramps[in->slot];
+  }
+}
+
+/* Those of contact number from of the message, which is number to here; *at: the first of them. */
+static void crosses_adopt(hapi_crosses *crosses, const hapi_bodies *bodies, hapi_model *model,
+                          uint32_t from, uint32_t to, uint32_t *at)
+{
+  const hapi_model_cross *in = hapi_model_crosses(model);
+  while (*at < model->cross_count && in[*at].contact < from) {
+    ++*at; /* of a contact that was left out */
+  }
+  for (; *at < model->cross_count && in[*at].contact == from; ++*at) {
+    if (bodies->of[in[*at].body].live) {
+      crosses->of[crosses->count] = in[*at];
+      crosses->of[crosses->count++].contact = to;
+    }
+  }
+}
+
+void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
+                        const hapi_bodies *bodies, hapi_model *model)
+{
+  const hapi_model_contact *in = hapi_model_contacts(model);
+  hapi_tool_set_aside(touches);
+  uint32_t cross = 0;
+  remember_ramps(touches);
+  touches->count = 0;
+  touches->crosses.count = 0;
+  touches->rubs = false;
+  for (uint32_t i = 0; i < model->contact_count; ++i) {
+    uint32_t pointer = in[i].pointer;
+    /* The pointer may have gone while the message was on its way. */
+    if (in[i].tool == 0 && pointers->of[pointer].generation == in[i].pointer_generation) {
+      crosses_adopt(&touches->crosses, bodies, model, i, touches->count, &cross);
+      contact_adopt(touches, &in[i], model->wishes, &touches->of[touches->count++]);
+    }
+  }
+  hapi_tool_adopt_model(touches, pointers, model);
+}

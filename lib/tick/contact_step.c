@@ -1,0 +1,513 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/assert.h"
+#include "base/pose.h"
+#include "local/body_step.h"
+#include "local/contact_rows.h"
+#include "local/gyro.h"
+#include "local/pointer_forces.h"
+#include "local/pointer_rows.h"
+#include "local/tool_place.h"
+#include "pointer/proxy.h"
+#include "pointer/rigid_proxy.h"
+#include "tick/tick.h"
+
+/* A tick of model CONTACT: free velocities, rows, one solve for forces and motion, poses, books. Bodies
+ * near the pointers are stepped as the global world would be stepped at the same rate (semi-implicit
+ * Euler, contacts on the level of velocities). What the loop does not own stands around them and moves
+ * as it was last seen. All of it is one file, as calls between files would be felt in a tick. */
+
+#define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
+#define TURN_SUBSTEPS 100 /* at most, a tick */
+
+/* ---- bodies ---- */
+
+/* A body that came into the range moves on with its twist until the contact thread has seen it:
+ * without its contacts it would fall through the floor. */
+static bool body_waits(const hapi_local_body *body, const hapi_patches *patches)
+{
+  return (body->flags & HAPI_BODY_OWNED) != 0 && body->entered_model != 0 &&
+         (patches == NULL || patches->model_number < body->entered_model);
+}
+
+static void body_begin(hapi_local_body *body, const hapi_patches *patches)
+{
+  HAPI_ASSERT_UNIT_QUAT(body->pose.quat_wxyz);
+  hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
+  memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
+  body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
+  body->waiting = body_waits(body, patches);
+  body->rowed = false;
+  if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
+    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+  }
+}
+
+static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_rows *rows,
+                         double period)
+{
+  hapi_solver *solver = &rows->solver;
+  memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
+  memset(solver->free[HAPI_STATIC_ROW], 0, sizeof solver->free[0]);
+  solver->body_count = 1;
+  solver->row_count = 0;
+  solver->apart = true;
+  bodies->resting = 0;
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
+    HAPI_ASSERT_INDEX(bodies->live[i], bodies->high);
+    body_begin(body, patches);
+    body->row = solver->body_count++;
+    hapi_body_free_velocity(body, period, solver->v[body->row]);
+    memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
+    bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
+  }
+}
+
+/* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what
+ * hardly spins goes on as it is. */
+static bool body_wobbles(const hapi_local_body *body, uint32_t wishes)
+{
+  const uint32_t both = HAPI_BODY_GYROSCOPIC | HAPI_BODY_OWNED;
+  const double *w = body->twist.angular;
+  return (body->flags & both) == both && !body->round &&
+         (hapi_v3_dot(w, w) > HAPI_SPIN_LEAST * HAPI_SPIN_LEAST ||
+          hapi_wish_is_on(wishes, HAP_EFFECT_GYRO));
+}
+
+static void body_move(hapi_local_body *body, const hapi_tick_facts *facts,
+                      hapi_effect_sample *sample)
+{
+  double seconds = facts->period;
+  const double *w = body->twist.angular;
+  uint32_t substeps = 1;
+  if (!(seconds * seconds * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX)) {
+    double wanted = seconds * hapi_v3_norm(w) / TURN_MAX;
+    substeps = wanted < TURN_SUBSTEPS ? (uint32_t)wanted + 1 : TURN_SUBSTEPS;
+  }
+  hapi_v3_madd(body->pose.position, seconds, body->twist.linear, body->pose.position);
+  if (body_wobbles(body, facts->wishes)) {
+    uint64_t begin = hapi_effect_begin(sample);
+    hapi_gyro_turn(body, seconds, substeps);
+    hapi_effect_end(sample, HAP_EFFECT_GYRO, begin);
+    return;
+  }
+  double step = substeps == 1 ? seconds : seconds / (double)substeps;
+  for (uint32_t i = 0; i < substeps; ++i) {
+    hapi_turn(body->pose.quat_wxyz, body->twist.angular, step);
+  }
+}
+
+/* ODE's damping and limit, after the pose as there. */
+static void body_damp(hapi_local_body *body)
+{
+  const hapi_model_body *given = &body->given;
+  double *v = body->twist.linear;
+  double *w = body->twist.angular;
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    return;
+  }
+  if (hapi_v3_dot(v, v) > given->linear_threshold2) {
+    hapi_v3_scale(given->linear_keep, v, v);
+  }
+  if (hapi_v3_dot(w, w) > given->angular_threshold2) {
+    hapi_v3_scale(given->angular_keep, w, w);
+  }
+}
+
+static void limit_spin(hapi_local_body *body)
+{
+  double *w = body->twist.angular;
+  double most = body->given.max_angular_speed;
+  if (hapi_v3_dot(w, w) > most * most) {
+    hapi_v3_scale(most / hapi_v3_norm(w), w, w);
+  }
+}
+
+static void take_velocity(hapi_local_body *body, const double v[6])
+{
+  memcpy(&body->twist, v, sizeof body->twist);
+}
+
+static void step_body(hapi_bodies *bodies, hapi_local_body *body, const hapi_tick_facts *facts,
+                      hapi_effect_sample *sample)
+{
+  hap_pose before = body->pose;
+  body_move(body, facts, sample);
+  body_damp(body);
+  if (!hapi_body_sound(&body->twist, body->pose.position)) {
+    body->pose = before;
+    hapi_body_stop(bodies, body);
+  }
+}
+
+/* Whether one turn is all of its turning. */
+static bool turns_once(const hapi_local_body *body, const hapi_tick_facts *facts)
+{
+  const double *w = body->twist.angular;
+  return facts->period * facts->period * hapi_v3_dot(w, w) < TURN_MAX * TURN_MAX &&
+         !body_wobbles(body, facts->wishes);
+}
+
+/* The rest of their step, of bodies that turn once. */
+static void turn_bodies(hapi_local_body *const bodies[], uint32_t count, double seconds)
+{
+  for (uint32_t i = 0; i + 1 < count; i += 2) {
+    hapi_turn_two(bodies[i]->pose.quat_wxyz, bodies[i]->twist.angular,
+                  bodies[i + 1]->pose.quat_wxyz, bodies[i + 1]->twist.angular, seconds);
+  }
+  if (count % 2 != 0) {
+    hapi_turn(bodies[count - 1]->pose.quat_wxyz, bodies[count - 1]->twist.angular, seconds);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    body_damp(bodies[i]);
+  }
+}
+
+static void bodies_step(hapi_bodies *bodies, const hapi_rows *rows, const hapi_tick_facts *facts,
+                        hapi_effect_sample *sample)
+{
+  hapi_local_body *turning[HAPI_TURNING];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if ((body->flags & HAPI_BODY_OWNED) == 0) { /* others have none */
+      memset(body->linear.residual, 0, sizeof body->linear.residual);
+    }
+    if (hapi_body_responds(body)) {
+      take_velocity(body, rows->solver.v[body->row]);
+      limit_spin(body);
+    } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
+      continue;
+    }
+    if (!turns_once(body, facts)) {
+      step_body(bodies, body, facts, sample);
+    } else if (hapi_body_shift(bodies, body, facts->period)) {
+      turning[count++] = body;
+    }
+    if (count == HAPI_TURNING) {
+      turn_bodies(turning, count, facts->period);
+      count = 0;
+    }
+  }
+  turn_bodies(turning, count, facts->period);
+}
+
+static void bodies_take_velocities(const hapi_bodies *bodies, const hapi_rows *rows,
+                                   uint32_t wishes)
+{
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if (hapi_body_responds(body)) {
+      take_velocity(body, rows->solver.v[body->row]);
+      limit_spin(body);
+      if (body_wobbles(body, wishes)) {
+        hapi_gyro_follow(body);
+      }
+      body_damp(body);
+    }
+  }
+}
+
+/* ---- rows ---- */
+
+/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
+static void give_outside(hapi_local_body *body, const double j[6], double impulse)
+{
+  if (body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
+    body->pushed = true;
+    hapi_v3_madd(body->account.impulse, impulse, j, body->account.impulse);
+    hapi_v3_madd(body->account.angular_impulse, impulse, j + 3, body->account.angular_impulse);
+  }
+}
+
+/* Of physics, and it can be pushed. */
+static bool is_outside(const hapi_local_body *body)
+{
+  return body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+}
+
+static void body_touch(hapi_local_body *body)
+{
+  if (body != NULL) {
+    body->flags |= HAPI_BODY_TOUCHED;
+  }
+}
+
+/* J that an impulse along j did on a body that the loop owns: with the mean of its velocities, as the
+ * change of a kinetic energy is. */
+static double work_on(const hapi_local_body *body, const hapi_solver *solver, const double j[6],
+                      double impulse)
+{
+  double mean[6];
+  if (!hapi_body_is_owned(body)) {
+    return 0.0;
+  }
+  memcpy(mean, body->start_twist, sizeof mean);
+  hapi_madd6(mean, 1.0, solver->v[body->row]);
+  return 0.5 * impulse * hapi_dot6(j, mean);
+}
+
+/* Of a row with a pointer. */
+static void account_pointer(hapi_bodies *bodies, const hapi_row *row, hapi_local_body *body)
+{
+  body->flags |= HAPI_BODY_TOUCHED;
+  if ((body->flags & HAPI_BODY_OWNED) == 0) {
+    give_outside(body, row->ja, row->impulse);
+    return;
+  }
+  hapi_madd6(body->account.gain, row->impulse, row->ja);
+  hapi_v3_madd(bodies->owned_impulse, row->impulse, row->ja, bodies->owned_impulse);
+}
+
+/* Of a row with something that the loop does not own. observes: its work is asked for. */
+static void account_row(hapi_bodies *bodies, const hapi_solver *solver, const hapi_row *row,
+                        const hapi_row_source *source, bool observes)
+{
+  hapi_local_body *a = hapi_bodies_at(bodies, source->body_a);
+  hapi_local_body *b = hapi_bodies_at(bodies, source->body_b);
+  if (observes) {
+    bodies->given +=
+        work_on(a, solver, row->ja, row->impulse) + work_on(b, solver, row->jb, row->impulse);
+  }
+  give_outside(a, row->ja, row->impulse);
+  give_outside(b, row->jb, row->impulse);
+  if (hapi_body_is_owned(a) && is_outside(b)) {
+    hapi_v3_madd(bodies->owned_impulse, row->impulse, row->ja, bodies->owned_impulse);
+  }
+  if (hapi_body_is_owned(b) && is_outside(a)) {
+    hapi_v3_madd(bodies->owned_impulse, row->impulse, row->jb, bodies->owned_impulse);
+  }
+}
+
+/* Keeps the impulses for the next tick, and says who got them. observes: bodies->given is asked for. */
+static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_contacts *contacts,
+                         const hapi_joints *joints, bool observes)
+{
+  const hapi_solver *solver = &rows->solver;
+  contacts->active = 0;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    const hapi_row_source *source = &rows->sources[i];
+    if (source->pointer) {
+      if (row->impulse != 0.0 && source->body_a != HAPI_SLOT_NONE) {
+        account_pointer(bodies, row, &bodies->of[source->body_a]);
+      }
+      continue;
+    }
+    if (source->joint) {
+      joints->memory[joints->of[source->contact].slot].impulse[source->part] = row->impulse;
+    } else {
+      contacts->memory[source->contact].impulse[source->part] = row->impulse;
+      contacts->active += source->part == 0 && row->impulse > 0.0;
+    }
+    if (row->impulse == 0.0) {
+      continue;
+    }
+    body_touch(hapi_bodies_at(bodies, source->body_a));
+    body_touch(hapi_bodies_at(bodies, source->body_b));
+    if (source->gives) {
+      account_row(bodies, solver, row, source, observes);
+    }
+  }
+}
+
+/* Push-out and the closing of joints move the bodies, and are not to stay in their velocities: poses
+ * first, then a second solve without them. True: it has to be made. */
+static bool rows_stop_push_out(hapi_rows *rows)
+{
+  hapi_solver *solver = &rows->solver;
+  bool any = false;
+  if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
+    return false;
+  }
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row_source *source = &rows->sources[i];
+    any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
+  }
+  for (uint32_t i = 0; any && i < solver->row_count; ++i) {
+    if (rows->sources[i].pushes_out) {
+      hapi_row_retarget(&solver->rows[i], rows->sources[i].stays);
+    }
+  }
+  return any;
+}
+
+/* The solver's time by the rows that each effect has in it. */
+static __attribute__((noinline, cold)) void share_out(const hapi_rows *rows, uint64_t cycles,
+                                                      hapi_effect_sample *sample)
+{
+  uint32_t count = rows->solver.row_count;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_row_source *source = &rows->sources[i];
+    if (!source->pointer || source->part > 0) {
+      hap_effect effect = source->pointer ? HAP_EFFECT_FRICTION
+                          : source->joint ? HAP_EFFECT_JOINTS
+                                          : HAP_EFFECT_CONTACTS;
+      sample->spent[effect] += cycles / count;
+    }
+  }
+}
+
+static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
+{
+  hapi_solver *solver = &rows->solver;
+  uint64_t begin = hapi_effect_begin(sample);
+  hapi_solver_run(solver);
+  hapi_solver_calm(solver);
+  rows->residual_max =
+      solver->residual > rows->residual_max ? solver->residual : rows->residual_max;
+  rows->sweeps += solver->sweeps;
+  if (sample->on) {
+    share_out(rows, hapi_cycles() - begin, sample);
+  }
+}
+
+/* ---- pointers ---- */
+
+/* All are direct. */
+static void pointers_direct(const hapi_pointers *pointers, uint32_t wishes)
+{
+  bool off = hapi_wish_is_off(wishes, HAP_EFFECT_PROXY);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
+    bool unknown = p->coupling.kind == HAP_COUPLING_AUTO && !p->coupling.hold_known && !off;
+    p->coupling.reason = unknown ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_ASKED;
+    p->coupling.contact_stiffness = p->coupling.near_stiffness;
+    p->coupling.near_stiffness = 0.0;
+    p->proxy.row = 0;
+  }
+}
+
+/* A place in the solver for each, and the velocity with nothing in touch. */
+static __attribute__((noinline, cold)) void proxies_begin(const hapi_pointers *pointers,
+                                                          const hapi_touches *touches,
+                                                          hapi_solver *solver,
+                                                          const hapi_tick_facts *facts)
+{
+  hap_effect_wish wish = hapi_wish(facts->wishes, HAP_EFFECT_PROXY);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
+    p->proxy.row = 0;
+    if (p->generation == 0) {
+      continue;
+    }
+    if (hapi_proxy_choose(p, wish, facts->period)) {
+      hapi_touches_forget(touches, i);
+    }
+    p->coupling.contact_stiffness = p->coupling.near_stiffness;
+    p->coupling.near_stiffness = 0.0;
+    if (p->proxied) {
+      p->proxy.row = solver->body_count++;
+      hapi_proxy_place(p, facts->period);
+      hapi_proxy_free(p, facts->period, solver->v[p->proxy.row]);
+    }
+  }
+}
+
+/* ---- the step ---- */
+
+static void step_begin(hapi_tick *tick)
+{
+  hapi_solver *solver = &tick->rows.solver;
+  bodies_begin(&tick->bodies, tick->contacts.patches, &tick->rows, tick->facts.period);
+  uint32_t first_hub = solver->body_count;
+  if (tick->pointers.proxies) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    proxies_begin(&tick->pointers, &tick->touches, solver, &tick->facts);
+    hapi_pointers_brake(&tick->pointers, &tick->rows);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
+  } else {
+    pointers_direct(&tick->pointers, tick->facts.wishes);
+  }
+  solver->hub_count = solver->body_count - first_hub;
+  for (uint32_t i = first_hub; i < solver->body_count; ++i) {
+    memcpy(solver->free[i], solver->v[i], sizeof solver->free[0]);
+  }
+}
+
+/* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
+static void bodies_wake(hapi_tick *tick)
+{
+  double period = tick->facts.period;
+  if (tick->bodies.resting > 0) {
+    hapi_joint_wake(&tick->joints, &tick->bodies, &tick->rows, period);
+    hapi_contact_wake(&tick->contacts, &tick->bodies, &tick->rows, period);
+    hapi_joint_wake(&tick->joints, &tick->bodies, &tick->rows, period);
+  }
+}
+
+static void rows_make(hapi_tick *tick)
+{
+  hapi_rows *rows = &tick->rows;
+  hapi_effect_sample *sample = &tick->sample;
+  const hapi_patches *patches = tick->contacts.patches;
+  if (tick->touches.tool.count > 0) {
+    hapi_tool_place(&tick->touches, &tick->pointers, &tick->bodies, tick->facts.period);
+  }
+  hapi_pointer_rows(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, rows, sample);
+  uint32_t of_pointers = rows->solver.row_count;
+  bodies_wake(tick);
+  if (tick->joints.count > 0) {
+    uint64_t begin = hapi_effect_begin(sample);
+    hapi_joint_rows(&tick->joints, &tick->bodies, rows, &tick->facts);
+    hapi_effect_end(sample, HAP_EFFECT_JOINTS, begin);
+  }
+  if (patches != NULL && patches->contact_count > 0) {
+    uint64_t begin = hapi_effect_begin(sample);
+    hapi_contact_rows(&tick->contacts, &tick->bodies, rows, &tick->facts, sample);
+    hapi_effect_end(sample, HAP_EFFECT_CONTACTS, begin);
+  }
+  rows->solver.apart &= rows->solver.row_count == of_pointers;
+}
+
+static void proxies_push_out(const hapi_pointers *pointers, hapi_solver *solver, double period)
+{
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
+    if (p->generation != 0 && p->rigid) {
+      hapi_rigid_push_out(p, period, solver->v[p->proxy.row], solver->free[p->proxy.row]);
+    }
+  }
+}
+
+static void proxies_move(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0 && p->proxied &&
+        !hapi_proxy_move(p, tick->facts.period, tick->rows.solver.v[p->proxy.row])) {
+      hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, i + 1);
+    }
+  }
+}
+
+void hapi_contact_step(hapi_tick *tick)
+{
+  step_begin(tick);
+  rows_make(tick);
+  rows_solve(&tick->rows, &tick->sample);
+  bool again = rows_stop_push_out(&tick->rows);
+  bodies_step(&tick->bodies, &tick->rows, &tick->facts, &tick->sample);
+  if (tick->bodies.unsound) {
+    hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
+  }
+  if (again) {
+    if (tick->pointers.proxies) {
+      proxies_push_out(&tick->pointers, &tick->rows.solver, tick->facts.period);
+    }
+    rows_solve(&tick->rows, &tick->sample);
+    bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
+  }
+  hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
+                      &tick->sample);
+  if (tick->pointers.proxies) {
+    uint64_t begin = hapi_effect_begin(&tick->sample);
+    proxies_move(tick);
+    hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
+  }
+  rows_account(&tick->rows, &tick->bodies, &tick->contacts, &tick->joints, tick->facts.observes);
+}

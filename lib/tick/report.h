@@ -1,0 +1,18 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TICK_REPORT_H
+#define HAPODE_TICK_REPORT_H
+
+/* What a tick tells: to physics, to whoever draws, to the trace. */
+
+#include "sync/path.h"
+#include "sync/trail.h"
+#include "tick/tick.h"
+
+void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
+void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
+void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
+void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);
+void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
+
+#endif
