@@ -3,8 +3,8 @@
 #ifndef HAPODE_BASE_EFFECT_CLOCK_H
 #define HAPODE_BASE_EFFECT_CLOCK_H
 
-/* How much of a tick an effect takes. Only one tick of many is looked at: the others pay a branch at each
- * border. */
+/* How much of a tick an effect takes. Only one tick of many is looked at: the others pay a branch
+ * at each border. */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -15,8 +15,8 @@ static inline double hapi_dot6(const double a[6], const double b[6])
   return hapi_two_sum(hapi_two_madd(sum, hapi_two_load(a + 4), hapi_two_load(b + 4)));
 }
 
-/* The same bits, of numbers that were written one by one just before: a pair of them would have to wait until
- * both are in the cache. */
+/* The same bits, of numbers that were written one by one just before: a pair of them would have to
+ * wait until both are in the cache. */
 static inline double hapi_dot6_fresh(const double a[6], const double b[6])
 {
   double even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];

@@ -59,8 +59,8 @@ typedef struct hapi_placed_geom {
 bool hapi_pass_place_geom(const hapi_contact *contact, uint32_t index, hapi_placed_geom *out);
 hapi_touch_side hapi_pass_side_of(const hapi_placed_geom *geom);
 double hapi_pass_extent(const hapi_placed_geom *geom); /* m, about the origin of its body */
-/* m, how far surfaces may come nearer until the contacts are found anew; speed: m/s, of the one against
- * the other. */
+/* m, how far surfaces may come nearer until the contacts are found anew; speed: m/s, of the one
+ * against the other. */
 double hapi_pass_margin(const hapi_contact *contact, double speed);
 
 #endif

@@ -140,8 +140,8 @@ static void fill_contact(const hapi_placed_geom *a, const hapi_placed_geom *b,
 }
 
 /* A triangle's neighbours in the mesh hide its edges. */
-static bool allowed(const hapi_placed_geom *a, const hapi_placed_geom *b,
-                    const hapi_patch_point *point)
+static bool point_is_allowed(const hapi_placed_geom *a, const hapi_placed_geom *b,
+                             const hapi_patch_point *point)
 {
   double into[3];
   hapi_v3_scale(-1.0, point->normal, into);
@@ -167,7 +167,7 @@ static bool find_pair(const hapi_contact *contact, uint32_t index, placed_pair *
     return false;
   }
   for (int i = 0; i < patch->count; ++i) {
-    if (!allowed(&out->a, &out->b, &patch->points[i])) {
+    if (!point_is_allowed(&out->a, &out->b, &patch->points[i])) {
       continue;
     }
     if (count < i) {
@@ -242,8 +242,8 @@ static void find_limit(const hapi_contact *contact, double *out_below, double *o
   }
 }
 
-/* Whoever comes last in the list must not lose the ground under it to pairs that do not touch: first
- * those go that would need to come nearest in order to. */
+/* Whoever comes last in the list must not lose the ground under it to pairs that do not touch:
+ * first those go that would need to come nearest in order to. */
 static void leave_out_farthest(hapi_contact *contact)
 {
   double below;
@@ -305,7 +305,7 @@ static void follow_tape(hapi_contact *contact, hapi_patches *out)
   }
 }
 
-static void pass(hapi_contact *contact, int64_t valid_from_ns)
+static void pass_make(hapi_contact *contact, int64_t valid_from_ns)
 {
   place_bodies(contact);
   hapi_patches *out = hapi_exchange_patches_back(contact->config.exchange);
@@ -344,7 +344,7 @@ void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
     return;
   }
   unsigned before = hapi_denormals_flush();
-  pass(contact, valid_from_ns);
+  pass_make(contact, valid_from_ns);
   hapi_denormals_restore(before);
   hapi_histogram_add(&contact->pass_ns, hapi_clock_now() - begin_ns);
 }

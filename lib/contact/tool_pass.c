@@ -64,7 +64,7 @@ static void corners_of(const hapi_placed_geom *geom, double out[9])
   }
 }
 
-static bool counts(const hapi_placed_geom *geom, hapi_patch_point *io)
+static bool point_counts(const hapi_placed_geom *geom, hapi_patch_point *io)
 {
   double corners[9];
   if (geom->in->open_edges == 0) {
@@ -92,7 +92,7 @@ static void add_pair(const hapi_contact *contact, const placed_tool *tool,
     return;
   }
   for (int i = 0; i < patch.count && io->spots.count < HAPI_TOOL_SPOTS; ++i) {
-    if (!counts(&geom, &patch.points[i])) {
+    if (!point_counts(&geom, &patch.points[i])) {
       continue;
     }
     uint32_t at = io->spots.count++;

@@ -7,36 +7,37 @@
 #include "base/vec.h"
 #include "local/pointer_friction.h"
 
-/* The ledger of what the hands may get back. It gains what a hand puts in, and what the world loses;
- * it pays what a hand is given:
+/* The ledger of what the hands may get back. It gains what a hand puts in, and what the world
+ * loses; it pays what a hand is given:
  *
- *   port     minus the force that was written, held over a tick, times the way that the device went:
- *            exact, whatever the simulation thought. World units: a device's joule counts motion_scale
- *            / force_scale.
- *   bodies   that the loop owns: the fall of their kinetic energy within a tick, from mass and
- *            inertia, plus the work of gravity and of the application's wrench, plus the work of
- *            contacts with things that the loop does not own, moving surfaces and springs. What a sync
- *            changed lies between two ticks and is thereby the world's.
- *   others   (all bodies of the other models, and static, driven and measured ones): their motion is
- *            given, and what they do on a pointer's spring is the world's work.
+ *   port     minus the force that was written, held over a tick, times the way that the device
+ *            went: exact, whatever the simulation thought. World units: a device's joule counts
+ *            motion_scale / force_scale.
+ *   bodies   of the loop: the fall of their kinetic energy within a tick, from mass and inertia,
+ *            plus the work of gravity and of the application's wrench, plus the work of contacts
+ *            with things that the loop does not own, moving surfaces and springs. A sync changes
+ *            bodies between two ticks: that is the world's.
+ *   others   all bodies of the other models, and static, driven and measured ones: their motion is
+ *            given, and their work on a pointer's spring is the world's.
  *
- *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the stiffness of
- *            a spring that is under load: the world's work, to either side. What is in the spring of a
- *            contact that is no more is lost.
- *   shares   that the points of a hull have of its stiffness are no entry: what their changes make is to be
- *            paid by the hand, which made them by tilting the hull.
+ *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the
+ *            stiffness of a spring under load: the world's work, to either side. The energy in the
+ *            spring of a contact that is no more is lost.
+ *   shares   of a hull's points in its stiffness are no entry: the hand pays for their changes,
+ *            which it made by tilting the hull.
  *
- * The springs of the pointer contacts and of the couplings are no entry: what is in them has been put in and not yet been
- * got back. An energy that an integrator makes shows when it reaches the hand, or before that in the
- * motion of an owned body. Of the other models only the port and the springs are watched.
+ * The springs of the pointer contacts and of the couplings are no entry: what is in them has been
+ * put in and not yet been got back. An energy that an integrator makes shows when it reaches the
+ * hand, or before that in the motion of an owned body. Of the other models only the port and the
+ * springs are watched.
  *
- * Nothing is done before the ledger is overdrawn by nearly 1 % of the largest energy that was stored. Then
- * the part of the force that goes with the hand is cut to what remains; what resists it stays. While
- * nothing is touched the ledger stands still, and a surplus is forgotten: it must not pay for what a
- * later touch makes of nothing.
+ * Nothing is done before the ledger is overdrawn by nearly 1 % of the largest energy that was
+ * stored. Then the part of the force that goes with the hand is cut to what remains; what resists
+ * it stays. While nothing is touched the ledger stands still, and a surplus is forgotten: it must
+ * not pay for what a later touch makes of nothing.
  *
- * A torque is paid as a force is, for the turn that the device made; those of friction on a device that does
- * not turn a hull are left out: they are small beside its forces' work. */
+ * A torque is paid as a force is, for the turn that the device made; those of friction on a device
+ * that does not turn a hull are left out: they are small beside its forces' work. */
 
 #define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
 #define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
@@ -92,8 +93,8 @@ static double spin_after(const hapi_local_body *body)
   return spin_energy(body->given.inertia, local);
 }
 
-/* J that the body lost to contacts in this tick; its energy after it is added to *io_stored. With the
- * mean velocity the work of a constant force is exactly what it adds to the kinetic energy. */
+/* J that the body lost to contacts in this tick; its energy after it is added to *io_stored. With
+ * the mean velocity the work of a constant force is exactly what it adds to the kinetic energy. */
 static double body_loses(const hapi_local_body *body, double period, double *io_stored)
 {
   const hapi_model_body *given = &body->given;
@@ -285,9 +286,9 @@ static void note_turn(hapi_pointer *p)
   memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
 }
 
-/* J that the written force gave to the hand in the seconds since the last tick. A way that no hand goes
- * in that time is a jump: nobody put in what it would have cost, and nobody got more than at the
- * fastest. */
+/* J that the written force gave to the hand in the seconds since the last tick. A way that no hand
+ * goes in that time is a jump: nobody put in what it would have cost, and nobody got more than at
+ * the fastest. */
 static double port_gave(hapi_pointer *p, double seconds)
 {
   hapi_guard_pointer *g = &p->guard;
@@ -375,9 +376,9 @@ static void pay_no_more_than(const hapi_pointers *pointers, double budget)
   }
 }
 
-/* A debt that comes all at once, after a time without the loop or when something vanished that had been
- * pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So in a touch
- * that lasts, the ledger comes back to what is in the springs. */
+/* A debt that comes all at once, after a time without the loop or when something vanished that had
+ * been pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So
+ * in a touch that lasts, the ledger comes back to what is in the springs. */
 static void settle_debt(hapi_guard *guard, double period)
 {
   guard->touch_s += period;

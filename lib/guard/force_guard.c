@@ -4,15 +4,16 @@
 
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
 
-/* The last thing between the simulation and the motors, in this order: finite, age of the local model,
- * ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the bodies have
- * had their share of the impulse before.
+/* The last thing between the simulation and the motors, in this order: finite, age of the local
+ * model, ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the
+ * bodies have had their share of the impulse before.
  *
- * Slew before saturation holds both bounds: the force before lies within its limit, and shortening is
- * the projection onto a ball, which brings no two points farther apart. */
+ * Slew before saturation holds both bounds: the force before lies within its limit, and shortening
+ * is the projection onto a ball, which brings no two points farther apart. */
 
 #define RAMP_IN_S 0.02
 #define FADE_S 0.1     /* from full force to none with an old local model; longest after a fault */
@@ -59,7 +60,8 @@ static bool usable_vector(const double v[3])
   return usable_number(v[0]) && usable_number(v[1]) && usable_number(v[2]);
 }
 
-/* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
+/* A sum of squares within the limit says so of each; only what is far out is looked at one by
+ * one. */
 static inline bool wrench_is_usable(const hap_wrench *w)
 {
   return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
@@ -234,6 +236,8 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     limit_norm(p);
     check_written(guard, p, i);
     report_written(p);
+    HAPI_ASSERT_FINITE(p->device.wrench.force, 3);
+    HAPI_ASSERT_FINITE(p->device.wrench.torque, 3);
     flags |= p->guard.flags;
     double force = hapi_v3_norm(p->wrench.force);
     guard->peak_force = force > guard->peak_force ? force : guard->peak_force;

@@ -5,7 +5,8 @@
 
 #include "guard/guard.h"
 
-/* Latches the first one. pointer: index + 1 of the one that it came from, with its generation; 0: none. */
+/* Latches the first one. pointer: index + 1 of the one that it came from, with its generation; 0:
+ * none. */
 void hapi_fault_set(hapi_fault_latch *latch, hap_fault fault, uint32_t pointer,
                     uint32_t generation);
 
@@ -15,7 +16,8 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
 /* The device has zero force at once, whatever the slew limit says. With a fault it stays so. */
 void hapi_guard_cut(hapi_pointer *pointer);
 
-/* World wrench -> what the device shall get before the limits: finite, age of the local model, ramp-in. */
+/* World wrench -> what the device shall get before the limits: finite, age of the local model,
+ * ramp-in. */
 void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
                       const hapi_pointers *pointers);
 

@@ -3,7 +3,7 @@
 #ifndef HAPODE_HAPTIC_COUPLING_GAINS_H
 #define HAPODE_HAPTIC_COUPLING_GAINS_H
 
-/* What a device can hold, from its figures (docs/numerics.md, "Coupling"). */
+/* What a device can hold, from its figures (docs/decisions/proxy.md). */
 
 #include <stdbool.h>
 

@@ -38,8 +38,8 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
 void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns); /* time of tick 0 */
 void hapi_haptic_end(hapi_haptic *haptic); /* zero force, devices stopped; idempotent */
 
-/* [control] Before begin: from then on what comes from outside goes to the tape or comes from it, until
- * the tape is taken away after end. NULL: none. */
+/* [control] Before begin: from then on what comes from outside goes to the tape or comes from it,
+ * until the tape is taken away after end. NULL: none. */
 void hapi_haptic_set_tape(hapi_haptic *haptic, hapi_tape *tape);
 /* Replay: deadlines that no tick was begun for. */
 void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks);
@@ -65,8 +65,8 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
                                   const hap_twist *twist);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
 bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
-/* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more than
- * grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
+/* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more
+ * than grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
 hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int64_t time_ns,
                                      int64_t grace_ns, hap_pose out_proxy_device[2]);
 

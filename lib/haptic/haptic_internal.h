@@ -53,33 +53,49 @@ typedef struct hapi_pointer_slot {
 } hapi_pointer_slot;
 
 /* Published for the statistics; each written by the haptic thread alone. */
-typedef struct hapi_haptic_figures {
+typedef struct hapi_loop_figures {
   hapi_histogram tick_ns;
   hapi_histogram wake_ns; /* from a deadline to the loop's waking up for it */
   _Atomic uint64_t ticks;
   _Atomic uint64_t missed_ticks;
-  _Atomic uint64_t contact_ticks;
-  _Atomic uint64_t saturated_ticks;
   _Atomic uint64_t models_adopted;
   _Atomic uint64_t contact_passes;
-  _Atomic uint64_t solver_sweeps;
-  _Atomic double solver_residual;
-  _Atomic uint32_t local_contacts;
-  _Atomic uint64_t faults;
   _Atomic uint64_t trace_dropped;
   _Atomic uint64_t hash;
+  _Atomic int model;
+  _Atomic int64_t age_ns; /* of the model */
+  _Atomic int64_t age_max_ns;
+} hapi_loop_figures;
+
+typedef struct hapi_solver_figures {
+  _Atomic uint64_t sweeps;
+  _Atomic double residual;
+  _Atomic uint32_t local_contacts;
+} hapi_solver_figures;
+
+typedef struct hapi_fault_figures {
+  _Atomic uint64_t count;
   _Atomic int fault;
   _Atomic uint64_t fault_pointer;
   _Atomic uint64_t stale_times;
   _Atomic uint64_t stale_ticks;
+} hapi_fault_figures;
+
+typedef struct hapi_hand_figures {
+  _Atomic uint64_t contact_ticks;
+  _Atomic uint64_t saturated_ticks;
   _Atomic uint64_t slewed_ticks;
   _Atomic uint64_t energy_ticks;
-  _Atomic int model;
-  _Atomic int64_t age_ns;
-  _Atomic int64_t age_max_ns;
   _Atomic double peak_force;
-  _Atomic double hand_impulse[3];
-  _Atomic double hand_impulse_abs;
+  _Atomic double impulse[3];
+  _Atomic double impulse_abs;
+} hapi_hand_figures;
+
+typedef struct hapi_haptic_figures {
+  hapi_loop_figures loop;
+  hapi_solver_figures solver;
+  hapi_fault_figures faults;
+  hapi_hand_figures hand;
 } hapi_haptic_figures;
 
 /* States that the loop tells: of what pointers have. */
@@ -152,7 +168,8 @@ typedef struct hapi_pointer_output {
   bool failed;
 } hapi_pointer_output;
 
-/* tape_tick.c: nothing without a tape. Of an io a recording notes what is in it, a replay fills it in. */
+/* tape_tick.c: nothing without a tape. Of an io a recording notes what is in it, a replay fills it
+ * in. */
 void hapi_tape_begin(hapi_haptic *haptic, int64_t start_ns);
 void hapi_tape_begun(hapi_haptic *haptic);
 void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns);

@@ -85,40 +85,40 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
 
 static void reset_figures(hapi_haptic *haptic)
 {
-  hapi_histogram_reset(&haptic->figures.tick_ns);
-  hapi_histogram_reset(&haptic->figures.wake_ns);
-  STORE(ticks, 0);
-  STORE(missed_ticks, 0);
-  STORE(models_adopted, 0);
-  STORE(contact_passes, 0);
-  STORE(solver_sweeps, 0);
-  STORE(solver_residual, 0.0);
-  STORE(local_contacts, 0);
-  STORE(trace_dropped, 0);
-  STORE(contact_ticks, 0);
-  STORE(saturated_ticks, 0);
-  STORE(faults, 0);
-  STORE(fault, HAP_FAULT_NONE);
-  STORE(fault_pointer, 0);
-  STORE(stale_times, 0);
-  STORE(stale_ticks, 0);
-  STORE(slewed_ticks, 0);
-  STORE(energy_ticks, 0);
-  STORE(hash, 0);
-  STORE(peak_force, 0.0);
-  STORE(hand_impulse_abs, 0.0);
+  hapi_histogram_reset(&haptic->figures.loop.tick_ns);
+  hapi_histogram_reset(&haptic->figures.loop.wake_ns);
+  STORE(loop.ticks, 0);
+  STORE(loop.missed_ticks, 0);
+  STORE(loop.models_adopted, 0);
+  STORE(loop.contact_passes, 0);
+  STORE(solver.sweeps, 0);
+  STORE(solver.residual, 0.0);
+  STORE(solver.local_contacts, 0);
+  STORE(loop.trace_dropped, 0);
+  STORE(hand.contact_ticks, 0);
+  STORE(hand.saturated_ticks, 0);
+  STORE(faults.count, 0);
+  STORE(faults.fault, HAP_FAULT_NONE);
+  STORE(faults.fault_pointer, 0);
+  STORE(faults.stale_times, 0);
+  STORE(faults.stale_ticks, 0);
+  STORE(hand.slewed_ticks, 0);
+  STORE(hand.energy_ticks, 0);
+  STORE(loop.hash, 0);
+  STORE(hand.peak_force, 0.0);
+  STORE(hand.impulse_abs, 0.0);
   for (int i = 0; i < 3; ++i) {
-    STORE(hand_impulse[i], 0.0);
+    STORE(hand.impulse[i], 0.0);
   }
-  STORE(age_ns, 0);
-  STORE(age_max_ns, 0);
+  STORE(loop.age_ns, 0);
+  STORE(loop.age_max_ns, 0);
   atomic_store(&haptic->ring.read, 0);
   atomic_store(&haptic->ring.written, 0);
   atomic_store(&haptic->reset_fault, 0);
   atomic_store(&haptic->outside_fault, HAP_FAULT_NONE);
 }
 
-static void report(hapi_haptic *haptic)
+static void state_report(hapi_haptic *haptic)
 {
   hapi_state *state = hapi_exchange_state_back(haptic->config.exchange);
   hapi_tick_report(&haptic->tick, state);
@@ -155,7 +155,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_pointers_read(haptic, start_ns);
   hapi_tape_begun(haptic);
   hapi_tick_read(&haptic->tick, start_ns);
-  report(haptic);
+  state_report(haptic);
   return HAP_OK;
 }
 
@@ -171,7 +171,7 @@ void hapi_haptic_set_tape(hapi_haptic *haptic, hapi_tape *tape)
 
 void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks)
 {
-  STORE(missed_ticks, LOAD(missed_ticks) + ticks);
+  STORE(loop.missed_ticks, LOAD(loop.missed_ticks) + ticks);
 }
 
 void hapi_haptic_end(hapi_haptic *haptic)
@@ -192,8 +192,8 @@ static void publish_poses(hapi_haptic *haptic)
 }
 
 /* All is taken before anything is told: what a tick has from the other threads then never comes of
- * what it has told them itself, and a replay can run them one after the other. A set of patches that was
- * taken and is not due leaves the one in use to its writer, who fills in another one
+ * what it has told them itself, and a replay can run them one after the other. A set of patches
+ * that was taken and is not due leaves the one in use to its writer, who fills in another one
  * first: that happens in lockstep alone, where a tick comes between any two passes. */
 static void take_messages(hapi_haptic *haptic)
 {
@@ -216,11 +216,11 @@ static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
   if (haptic->pending_patches != NULL && now_ns >= haptic->pending_patches->valid_from_ns) {
     hapi_tick_adopt_patches(&haptic->tick, haptic->pending_patches);
     haptic->pending_patches = NULL;
-    STORE(contact_passes, LOAD(contact_passes) + 1);
+    STORE(loop.contact_passes, LOAD(loop.contact_passes) + 1);
   }
 }
 
-static void receive(hapi_haptic *haptic, int64_t now_ns)
+static void messages_receive(hapi_haptic *haptic, int64_t now_ns)
 {
   take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
@@ -228,7 +228,7 @@ static void receive(hapi_haptic *haptic, int64_t now_ns)
     haptic->tick_budget_ns = haptic->pending->tick_budget_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
-    STORE(models_adopted, LOAD(models_adopted) + 1);
+    STORE(loop.models_adopted, LOAD(loop.models_adopted) + 1);
     hapi_loop_note_effects(haptic);
     publish_poses(haptic); /* the contact thread looks for new bodies */
   }
@@ -238,7 +238,7 @@ static void receive(hapi_haptic *haptic, int64_t now_ns)
 void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
 {
   unsigned before = hapi_denormals_flush();
-  receive(haptic, now_ns);
+  messages_receive(haptic, now_ns);
   hapi_denormals_restore(before);
 }
 
@@ -296,32 +296,32 @@ static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
 {
   const hapi_tick *tick = &haptic->tick;
   int64_t age = tick->facts.model_number != 0 ? tick->facts.now_ns - tick->facts.state_ns : 0;
-  STORE(ticks, tick->facts.tick);
-  STORE(contact_ticks, tick->touches.contact_ticks);
-  STORE(saturated_ticks, tick->guard.saturated_ticks);
-  STORE(faults, tick->guard.latch.count);
-  STORE(fault, (int)tick->guard.latch.fault);
-  STORE(fault_pointer, fault_pointer(tick));
-  STORE(stale_times, tick->guard.stale_times);
-  STORE(stale_ticks, tick->guard.stale_ticks);
-  STORE(slewed_ticks, tick->guard.slewed_ticks);
-  STORE(energy_ticks, tick->guard.energy_ticks);
-  STORE(model, (int)tick->facts.model);
-  STORE(hash, tick->hashing ? tick->hash : 0);
-  STORE(age_ns, age);
-  if (age > LOAD(age_max_ns)) {
-    STORE(age_max_ns, age);
+  STORE(loop.ticks, tick->facts.tick);
+  STORE(hand.contact_ticks, tick->touches.contact_ticks);
+  STORE(hand.saturated_ticks, tick->guard.saturated_ticks);
+  STORE(faults.count, tick->guard.latch.count);
+  STORE(faults.fault, (int)tick->guard.latch.fault);
+  STORE(faults.fault_pointer, fault_pointer(tick));
+  STORE(faults.stale_times, tick->guard.stale_times);
+  STORE(faults.stale_ticks, tick->guard.stale_ticks);
+  STORE(hand.slewed_ticks, tick->guard.slewed_ticks);
+  STORE(hand.energy_ticks, tick->guard.energy_ticks);
+  STORE(loop.model, (int)tick->facts.model);
+  STORE(loop.hash, tick->hashing ? tick->hash : 0);
+  STORE(loop.age_ns, age);
+  if (age > LOAD(loop.age_max_ns)) {
+    STORE(loop.age_max_ns, age);
   }
-  STORE(peak_force, tick->guard.peak_force);
-  STORE(solver_sweeps, tick->rows.sweeps);
-  STORE(solver_residual, tick->rows.residual_max);
-  STORE(local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
-  STORE(hand_impulse_abs, tick->touches.hand_impulse_abs);
+  STORE(hand.peak_force, tick->guard.peak_force);
+  STORE(solver.sweeps, tick->rows.sweeps);
+  STORE(solver.residual, tick->rows.residual_max);
+  STORE(solver.local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
+  STORE(hand.impulse_abs, tick->touches.hand_impulse_abs);
   for (int i = 0; i < 3; ++i) {
-    STORE(hand_impulse[i], tick->touches.hand_impulse[i]);
+    STORE(hand.impulse[i], tick->touches.hand_impulse[i]);
   }
   int64_t spent = hapi_clock_now() - begin_ns;
-  hapi_histogram_add(&haptic->figures.tick_ns, spent);
+  hapi_histogram_add(&haptic->figures.loop.tick_ns, spent);
   hapi_loop_sample_end(haptic, spent);
   haptic->last_tick_us = 1e-3 * (double)spent;
   note_load(haptic, spent);
@@ -346,7 +346,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   }
   hapi_pointers_follow(haptic);
   follow_faults(haptic);
-  receive(haptic, now_ns);
+  messages_receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
@@ -354,7 +354,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
     note_tick(haptic);
   }
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
-  report(haptic);
+  state_report(haptic);
   publish_poses(haptic);
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
@@ -376,18 +376,18 @@ void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault)
 
 bool hapi_haptic_has_fault(const hapi_haptic *haptic)
 {
-  return LOAD(fault) != HAP_FAULT_NONE;
+  return LOAD(faults.fault) != HAP_FAULT_NONE;
 }
 
 static void fill_times(const hapi_haptic *haptic, hap_stats *out)
 {
-  const hapi_histogram *h = &haptic->figures.tick_ns;
+  const hapi_histogram *h = &haptic->figures.loop.tick_ns;
   out->loop.tick_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
   out->loop.tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
   out->loop.tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
   out->loop.tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
   out->loop.duty = 1e-6 * out->loop.tick_us_mean * haptic->config.haptic_hz;
-  h = &haptic->figures.wake_ns;
+  h = &haptic->figures.loop.wake_ns;
   out->loop.wake_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
   out->loop.wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
   out->loop.wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
@@ -400,33 +400,33 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   double impulse[3];
   fill_times(haptic, out);
   for (int i = 0; i < 3; ++i) {
-    impulse[i] = LOAD(hand_impulse[i]);
+    impulse[i] = LOAD(hand.impulse[i]);
   }
-  out->loop.model = (uint32_t)LOAD(model);
-  out->loop.ticks = LOAD(ticks);
-  out->loop.missed_ticks = LOAD(missed_ticks);
-  out->loop.contact_ticks = LOAD(contact_ticks);
-  out->loop.model_age_s = 1e-9 * (double)LOAD(age_ns);
-  out->loop.model_age_max_s = 1e-9 * (double)LOAD(age_max_ns);
-  out->loop.models_adopted = LOAD(models_adopted);
-  out->contact.passes = LOAD(contact_passes);
-  out->contact.points = LOAD(local_contacts);
-  out->contact.sweeps = LOAD(solver_sweeps);
-  out->contact.residual_max = LOAD(solver_residual);
+  out->loop.model = (uint32_t)LOAD(loop.model);
+  out->loop.ticks = LOAD(loop.ticks);
+  out->loop.missed_ticks = LOAD(loop.missed_ticks);
+  out->loop.contact_ticks = LOAD(hand.contact_ticks);
+  out->loop.model_age_s = 1e-9 * (double)LOAD(loop.age_ns);
+  out->loop.model_age_max_s = 1e-9 * (double)LOAD(loop.age_max_ns);
+  out->loop.models_adopted = LOAD(loop.models_adopted);
+  out->contact.passes = LOAD(loop.contact_passes);
+  out->contact.points = LOAD(solver.local_contacts);
+  out->contact.sweeps = LOAD(solver.sweeps);
+  out->contact.residual_max = LOAD(solver.residual);
   out->hand.impulse_ns = hapi_v3_norm(impulse);
-  out->hand.impulse_abs_ns = LOAD(hand_impulse_abs);
-  out->hand.peak_force_n = LOAD(peak_force);
-  out->faults.saturated_ticks = LOAD(saturated_ticks);
-  out->faults.count = LOAD(faults);
-  out->faults.fault = (uint32_t)LOAD(fault);
-  out->faults.pointer = LOAD(fault_pointer);
-  out->faults.stale_times = LOAD(stale_times);
-  out->faults.stale_ticks = LOAD(stale_ticks);
-  out->faults.slewed_ticks = LOAD(slewed_ticks);
-  out->faults.energy_ticks = LOAD(energy_ticks);
+  out->hand.impulse_abs_ns = LOAD(hand.impulse_abs);
+  out->hand.peak_force_n = LOAD(hand.peak_force);
+  out->faults.saturated_ticks = LOAD(hand.saturated_ticks);
+  out->faults.count = LOAD(faults.count);
+  out->faults.fault = (uint32_t)LOAD(faults.fault);
+  out->faults.pointer = LOAD(faults.fault_pointer);
+  out->faults.stale_times = LOAD(faults.stale_times);
+  out->faults.stale_ticks = LOAD(faults.stale_ticks);
+  out->faults.slewed_ticks = LOAD(hand.slewed_ticks);
+  out->faults.energy_ticks = LOAD(hand.energy_ticks);
   out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
-  out->loop.trace_dropped = LOAD(trace_dropped);
-  out->loop.trace_hash = LOAD(hash);
+  out->loop.trace_dropped = LOAD(loop.trace_dropped);
+  out->loop.trace_hash = LOAD(loop.hash);
 }
 
 size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity)

@@ -36,15 +36,15 @@ static uint64_t wait_for(hapi_haptic *haptic, uint64_t next)
   }
   int64_t now_ns = hapi_clock_now();
   if (sleeps) {
-    hapi_histogram_add(&haptic->figures.wake_ns, now_ns - deadline);
+    hapi_histogram_add(&haptic->figures.loop.wake_ns, now_ns - deadline);
   }
   uint64_t window = window_of(haptic, now_ns);
   if (window <= next) {
     return next;
   }
-  uint64_t missed =
-      atomic_load_explicit(&haptic->figures.missed_ticks, memory_order_relaxed) + window - next;
-  atomic_store_explicit(&haptic->figures.missed_ticks, missed, memory_order_relaxed);
+  uint64_t missed = atomic_load_explicit(&haptic->figures.loop.missed_ticks, memory_order_relaxed) +
+                    window - next;
+  atomic_store_explicit(&haptic->figures.loop.missed_ticks, missed, memory_order_relaxed);
   return window;
 }
 

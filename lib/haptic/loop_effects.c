@@ -6,7 +6,8 @@
 #include "base/cycles.h"
 #include "haptic/haptic_internal.h"
 
-/* The loop's part of what is told of the effects: their time, and the state of those that pointers have. */
+/* The loop's part of what is told of the effects: their time, and the state of those that pointers
+ * have. */
 
 #define SAMPLE_TICKS 64u
 
@@ -68,13 +69,13 @@ static void note_proxy(const hapi_pointer *p, hapi_effect_figures *io)
 }
 
 /* In one word each: a reader never sees half of it. */
-static uint64_t packed(const hapi_effect_figures *f)
+static uint64_t figures_packed(const hapi_effect_figures *f)
 {
   return (uint64_t)f->on | (uint64_t)f->of << 16 | (uint64_t)f->reason << 32 |
          (uint64_t)f->state << 48;
 }
 
-static hapi_effect_figures unpacked(uint64_t word)
+static hapi_effect_figures figures_unpacked(uint64_t word)
 {
   return (hapi_effect_figures){.on = (uint32_t)(word & 0xffffu),
                                .of = (uint32_t)(word >> 16 & 0xffffu),
@@ -105,14 +106,14 @@ void hapi_loop_note_effects(hapi_haptic *haptic)
                      HAP_REASON_FAR);
   note_observer(tick, &f[HAPI_LOOP_OBSERVER]);
   for (int i = 0; i < HAPI_LOOP_NOTED; ++i) {
-    atomic_store_explicit(&haptic->effects.shown[i], packed(&f[i]), memory_order_relaxed);
+    atomic_store_explicit(&haptic->effects.shown[i], figures_packed(&f[i]), memory_order_relaxed);
   }
 }
 
 static void fill_state(const hapi_haptic *haptic, int noted, hap_effect_info *out)
 {
   hapi_effect_figures f =
-      unpacked(atomic_load_explicit(&haptic->effects.shown[noted], memory_order_relaxed));
+      figures_unpacked(atomic_load_explicit(&haptic->effects.shown[noted], memory_order_relaxed));
   out->state = f.state;
   out->reason = f.reason;
   out->on = f.on;

@@ -40,7 +40,7 @@ static uint64_t row_after(place *p, int64_t time_ns)
 }
 
 /* Between the rows around the time; a pointer that has come since is where it came. */
-static bool find(place *p, int64_t time_ns, hap_pose *out)
+static bool place_find(place *p, int64_t time_ns, hap_pose *out)
 {
   hap_pose before;
   hap_pose after;
@@ -61,7 +61,7 @@ static bool find(place *p, int64_t time_ns, hap_pose *out)
   return has_before;
 }
 
-static hap_status judge(place *p, int64_t time_ns, int64_t grace_ns)
+static hap_status place_judge(place *p, int64_t time_ns, int64_t grace_ns)
 {
   bool begun = p->rows.first == atomic_load(&p->rows.trail->first);
   if (time_ns - grace_ns > time_of(p, p->rows.end - 1)) {
@@ -79,9 +79,9 @@ hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int
     bool found = true;
     p.rows = hapi_trail_look(hapi_exchange_trail(haptic->config.exchange));
     for (p.part = 0; p.part < 2 && found; ++p.part) {
-      found = find(&p, time_ns, &out_proxy_device[p.part]);
+      found = place_find(&p, time_ns, &out_proxy_device[p.part]);
     }
-    status = found ? judge(&p, time_ns, grace_ns) : HAP_ERROR_NOT_FOUND;
+    status = found ? place_judge(&p, time_ns, grace_ns) : HAP_ERROR_NOT_FOUND;
     whole = hapi_trail_is_whole(&p.rows);
   }
   return status;

@@ -60,8 +60,8 @@ static void set_hull(hapi_haptic *haptic, uint32_t index)
   p->shape.extent += farthest;
 }
 
-/* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long tool's:
- * the device's grip is not as long. */
+/* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long
+ * tool's: the device's grip is not as long. */
 static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
 {
   const hapi_tool_hull *hull = &slot->hull;
@@ -86,7 +86,7 @@ static bool is_unturned(const double q[4])
   return q[0] == 1.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0;
 }
 
-static void activate(hapi_haptic *haptic, uint32_t index)
+static void pointer_activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
   const hapi_pointer_setup *def = &slot->def;
@@ -157,7 +157,7 @@ static void take_in(hapi_haptic *haptic, uint32_t index, const hapi_joined *join
     prepare_slot(slot);
     atomic_store(&slot->generation, joined->generation);
   }
-  activate(haptic, index);
+  pointer_activate(haptic, index);
   atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
 }
 
@@ -195,7 +195,7 @@ void hapi_pointers_follow(hapi_haptic *haptic)
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
     if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
-      activate(haptic, i);
+      pointer_activate(haptic, i);
       hapi_tape_join(haptic, i);
       /* Fails when the application wants it back meanwhile: seen at the next tick. */
       (void)atomic_compare_exchange_strong(&slot->phase, &phase, HAPI_POINTER_ACTIVE);

@@ -6,8 +6,8 @@
 #include "base/vec.h"
 #include "haptic/haptic_internal.h"
 
-/* The loop's part of a recording: all that a tick has from outside is put on the tape, or in a replay
- * taken from it, and what came of it is hashed. */
+/* The loop's part of a recording: all that a tick has from outside is put on the tape, or in a
+ * replay taken from it, and what came of it is hashed. */
 
 static const hapi_cell no_cell;
 
@@ -211,8 +211,8 @@ static uint64_t hash_pointer(const hapi_pointer *p)
   return hapi_hash_doubles(hash, p->device.wrench.torque, 3);
 }
 
-static void compare(hapi_haptic *haptic, hapi_difference *difference, const hapi_cell *cell,
-                    const double *values, int count)
+static void cell_compare(hapi_haptic *haptic, hapi_difference *difference, const hapi_cell *cell,
+                         const double *values, int count)
 {
   memcpy(difference->recorded, cell->d, (size_t)count * sizeof cell->d[0]);
   memcpy(difference->replayed, values, (size_t)count * sizeof values[0]);
@@ -245,7 +245,7 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
       hapi_difference difference = {.what = HAPI_DIFFERS_POINTER,
                                     .number = ((uint64_t)p->generation << 32) | (index + 1)};
       memcpy(wrench, &p->device.wrench, sizeof wrench);
-      compare(haptic, &difference, force, wrench, 6);
+      cell_compare(haptic, &difference, force, wrench, 6);
     }
     if (hapi_tape_next_is(haptic->tape, HAPI_CELL_REACHED)) {
       (void)hapi_tape_get(haptic->tape, HAPI_CELL_REACHED, index);
@@ -316,7 +316,7 @@ static void compare_bodies(hapi_haptic *haptic)
       hapi_difference difference = {
           .what = HAPI_DIFFERS_BODY, .number = cell->word, .traced = trace_place(tick, cell->word)};
       memcpy(pose, &tick->bodies.of[cell->word].pose, sizeof pose);
-      compare(haptic, &difference, cell, pose, 7);
+      cell_compare(haptic, &difference, cell, pose, 7);
     }
   }
 }

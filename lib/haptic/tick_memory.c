@@ -3,6 +3,7 @@
 #include "haptic/tick_memory.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 #define ROWS_PER_CONTACT 3u
 #define ROWS_PER_POINTER_CONTACT 4u /* with friction of a soft finger */
@@ -40,6 +41,7 @@ static bool allocate_rows(hapi_rows *rows, const hapi_capacity *c)
   solver->update_budget = SOLVER_UPDATES;
   solver->direct_rows = DIRECT_ROWS;
   solver->work_count = HAPI_SOLVER_WORK(rows->capacity, places);
+  HAPI_ASSERT(rows->capacity > 0 && solver->work_count > 0);
   rows->sources = hapi_alloc_array(rows->capacity, sizeof *rows->sources);
   solver->rows = hapi_alloc_array(rows->capacity, sizeof *solver->rows);
   solver->v = hapi_alloc_array(places, sizeof *solver->v);

@@ -37,8 +37,9 @@ void hapi_trace_ring_write(hapi_haptic *haptic)
   uint64_t written = atomic_load_explicit(&ring->written, memory_order_relaxed);
   uint64_t read = atomic_load_explicit(&ring->read, memory_order_acquire);
   if (written - read >= ring->capacity) {
-    uint64_t dropped = atomic_load_explicit(&haptic->figures.trace_dropped, memory_order_relaxed);
-    atomic_store_explicit(&haptic->figures.trace_dropped, dropped + 1, memory_order_relaxed);
+    uint64_t dropped =
+        atomic_load_explicit(&haptic->figures.loop.trace_dropped, memory_order_relaxed);
+    atomic_store_explicit(&haptic->figures.loop.trace_dropped, dropped + 1, memory_order_relaxed);
     return;
   }
   hap_trace_row *row = &ring->rows[written % ring->capacity];

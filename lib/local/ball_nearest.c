@@ -5,9 +5,10 @@
 #include "base/vec.h"
 #include "proximity/closed_forms.h"
 
-/* The shape about the ball's centre, as a closed form wants it. Most geoms stand in their body as they are. */
-static void place(const double center[3], const hapi_shape *shape, const hap_pose *pose_local,
-                  const hapi_touch_frame *frame, hapi_solid *out)
+/* The shape about the ball's centre, as a closed form wants it. Most geoms stand in their body as
+ * they are. */
+static void solid_place(const double center[3], const hapi_shape *shape, const hap_pose *pose_local,
+                        const hapi_touch_frame *frame, hapi_solid *out)
 {
   const double *q = pose_local->quat_wxyz;
   bool turned = q[1] != 0.0 || q[2] != 0.0 || q[3] != 0.0;
@@ -37,7 +38,7 @@ bool hapi_ball_nearest(const double center[3], double radius, const hapi_shape *
   if (shape->kind == HAPI_SHAPE_HULL) {
     return false;
   }
-  place(center, shape, pose_local, frame, &solid);
+  solid_place(center, shape, pose_local, frame, &solid);
   if (!hapi_closed_form_ball(radius, &solid, out)) {
     return false;
   }

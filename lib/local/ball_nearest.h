@@ -6,8 +6,9 @@
 #include "local/touch_place.h"
 #include "proximity/proximity.h"
 
-/* Nearest points of a ball (a) and a shape (b) at pose_local in a frame, by closed form: no iteration, no
- * allocation. False: the shape has no closed form, or what came of it is no number. */
+/* Nearest points of a ball (a) and a shape (b) at pose_local in a frame, by closed form: no
+ * iteration, no allocation. False: the shape has no closed form, or what came of it is no
+ * number. */
 bool hapi_ball_nearest(const double center[3], double radius, const hapi_shape *shape,
                        const hap_pose *pose_local, const hapi_touch_frame *frame,
                        hapi_nearest *out);

@@ -39,8 +39,9 @@ typedef struct hapi_body_left {
   hap_twist twist;
 } hapi_body_left;
 
-/* Hundreds of them are more than a near cache holds: what every tick reads or tells stands together,
- * first that of all models, then that of some; what a sync writes and few ask for comes last. */
+/* Hundreds of them are more than a near cache holds: what every tick reads or tells stands
+ * together, first that of all models, then that of some; what a sync writes and few ask for comes
+ * last. */
 typedef struct hapi_local_body {
   uint32_t generation;
   uint32_t flags;
@@ -48,8 +49,7 @@ typedef struct hapi_local_body {
   uint32_t row; /* place in the solver's velocities */
   bool live;    /* in the model in use */
   bool pushed;  /* since it was adopted */
-  bool
-      round; /* the same inertia about all axes, as cubes and balls have: it does not turn with them */
+  bool round;   /* the same inertia about all axes: it does not turn with them */
   bool forced;  /* the application pushes it */
   bool rowed;   /* scratch: it has a row in this tick */
   bool waiting; /* for its first contacts: goes on with its twist until they are known */
@@ -153,8 +153,8 @@ static inline void hapi_body_spin_up(const hapi_local_body *body, const double t
   }
 }
 
-/* Eq. 6. Only of a contact that is the only thing to touch the body: rows of one body that answer by
- * different matrices make energy, without bound where they are many. */
+/* Eq. 6. Only of a contact that is the only thing to touch the body: rows of one body that answer
+ * by different matrices make energy, without bound where they are many. */
 static inline bool hapi_body_has_own_probes(const hapi_local_body *body)
 {
   return body != NULL &&

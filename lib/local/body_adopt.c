@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/pose.h"
 #include "base/vec.h"
 
@@ -110,8 +111,8 @@ static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in,
   memset(body->linear.residual, 0, sizeof body->linear.residual);
 }
 
-/* Whether the loop moves the body by an accelerance: physics then says what that missed (eq. 14). In
- * model CONTACT all that it meets and does not own; what was not measured has its mass alone. */
+/* Whether the loop moves the body by an accelerance: physics then says what that missed (eq. 14).
+ * In model CONTACT all that it meets and does not own; what was not measured has its mass alone. */
 static bool is_linear(hap_model model, uint32_t flags)
 {
   return model == HAP_MODEL_ACCELERANCE ||
@@ -186,6 +187,7 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, double age_
   const hapi_model_body *in = hapi_model_bodies(model);
   bodies_leave(bodies, model, before->now_ns);
   for (uint32_t i = 0; i < model->body_count; ++i) {
+    HAPI_ASSERT_UNIT_QUAT(in[i].pose.quat_wxyz);
     adopt_body(&bodies->of[in[i].slot], model, &in[i], age_s, before);
     bodies->live[i] = in[i].slot;
     if (in[i].slot >= bodies->high) {

@@ -3,8 +3,8 @@
 #ifndef HAPODE_LOCAL_BODY_STEP_H
 #define HAPODE_LOCAL_BODY_STEP_H
 
-/* A step of a body, as far as models ACCELERANCE and CONTACT share it, and its velocity with nothing in
- * touch. */
+/* A step of a body, as far as models ACCELERANCE and CONTACT share it, and its velocity with
+ * nothing in touch. */
 
 #include <string.h>
 

@@ -4,11 +4,12 @@
 
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 /* New contacts between bodies take over the impulses of the old ones: the solver starts from them,
- * and a stack whose contacts were found anew does not sag. Old and new contacts belong together when
- * they are of the same pair of geoms and near each other on the first body. */
+ * and a stack whose contacts were found anew does not sag. Old and new contacts belong together
+ * when they are of the same pair of geoms and near each other on the first body. */
 
 #define MATCH_DISTANCE2 (0.02 * 0.02) /* m^2: farther ones are other contacts */
 #define NO_ENTRY 0u
@@ -19,11 +20,14 @@ static uint32_t bucket_of(const hapi_body_contacts *contacts, uint64_t key)
   return (uint32_t)(x >> 32) & (contacts->buckets_used - 1);
 }
 
-/* First old contact of each pair, by key. There are more buckets than contacts: it ends. No more of them are
- * used than these contacts call for: all there are would take longer to clear than the rest takes. */
+/* First old contact of each pair, by key. There are more buckets than contacts: it ends. No more of
+ * them are used than these contacts call for: all there are would take longer to clear than the
+ * rest takes. */
 static void index_old(hapi_body_contacts *contacts, uint32_t count)
 {
   contacts->buckets_used = 1;
+  HAPI_ASSERT((contacts->bucket_count & (contacts->bucket_count - 1)) == 0);
+  HAPI_ASSERT(contacts->bucket_count > count);
   while (contacts->buckets_used < contacts->bucket_count && contacts->buckets_used < 2 * count) {
     contacts->buckets_used *= 2;
   }

@@ -3,8 +3,8 @@
 #ifndef HAPODE_LOCAL_CONTACT_MEMORY_H
 #define HAPODE_LOCAL_CONTACT_MEMORY_H
 
-/* Contacts between bodies, model CONTACT: the contact thread's newest set, with the impulses of the one
- * before. */
+/* Contacts between bodies, model CONTACT: the contact thread's newest set, with the impulses of the
+ * one before. */
 
 #include "sync/messages.h"
 

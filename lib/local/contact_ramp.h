@@ -29,8 +29,8 @@ static inline void hapi_contact_ramp_begin(hapi_ramp *r, double depth, bool jump
 }
 
 /* Share of its force that a contact of the pointer has, and the part of its depth that counts in
- * *io_depth. One that arrives with depth starts at zero; one that closes later has all of it. A pointer
- * that draws back out of an excess depth has it off for good. Once a tick. */
+ * *io_depth. One that arrives with depth starts at zero; one that closes later has all of it. A
+ * pointer that draws back out of an excess depth has it off for good. Once a tick. */
 static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_pointer *p,
                                       double *io_depth, double period)
 {

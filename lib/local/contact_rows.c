@@ -13,8 +13,8 @@
  * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
  * constraint), at the step of the tick. */
 
-/* 84 degrees of slope. More than that may push without bound along a contact that hardly touches: where
- * a large island is not solved to the end within a tick, what lets go then gives energy. */
+/* 84 degrees of slope. More than that may push without bound along a contact that hardly touches:
+ * where a large island is not solved to the end within a tick, what lets go then gives energy. */
 #define MU_MOST 10.0
 #define PUSH_OUT_MAX 0.2    /* m/s */
 #define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
@@ -309,6 +309,7 @@ static bool find_contact(const hapi_body_contacts *contacts, const hapi_bodies *
 {
   hapi_patches *patches = contacts->patches;
   out->index = index;
+  HAPI_ASSERT_INDEX(index, patches->contact_count);
   out->in = &hapi_patches_contacts(patches)[index];
   out->surface = &hapi_patches_surfaces(patches)[out->in->surface];
   return find_body(bodies, out->in->body_a, out->in->generation_a, &out->a) &&
@@ -317,8 +318,8 @@ static bool find_contact(const hapi_body_contacts *contacts, const hapi_bodies *
          (hapi_body_is_owned(out->a) || hapi_body_is_owned(out->b)); /* others are ODE's affair */
 }
 
-/* As in ODE. Before any row: a body has all of its contacts, the floor's as well, from the tick on in
- * which it wakes. */
+/* As in ODE. Before any row: a body has all of its contacts, the floor's as well, from the tick on
+ * in which it wakes. */
 void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
                        hapi_rows *rows, double period)
 {

@@ -3,7 +3,8 @@
 #ifndef HAPODE_LOCAL_FACTS_H
 #define HAPODE_LOCAL_FACTS_H
 
-/* What is in force in a tick: the clock, and what the model in use says. Only lib/tick writes it. */
+/* What is in force in a tick: the clock, and what the model in use says. Only lib/tick writes
+ * it. */
 
 #include <stdbool.h>
 #include <stdint.h>

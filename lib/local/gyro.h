@@ -3,8 +3,8 @@
 #ifndef HAPODE_LOCAL_GYRO_H
 #define HAPODE_LOCAL_GYRO_H
 
-/* How bodies of the local world turn. The gyroscopic part is apart from the step, which without it is to be
- * none the slower for it. */
+/* How bodies of the local world turn. The gyroscopic part is apart from the step, which without it
+ * is to be none the slower for it. */
 
 #include "base/two_turns.h"
 #include "local/body.h"

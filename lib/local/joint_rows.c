@@ -8,10 +8,11 @@
 #include "base/assert.h"
 #include "local/body_step.h"
 
-/* Joints as rows of the solver, placed anew from the poses of their bodies. A row asks for what ODE's joint
- * asks for at the step of the tick, with these differences: what a rigid joint is open goes out of the
- * poses and not through the velocities; a stop is met within the tick, not after it; and a motor that
- * works against a stop is a row beside it, where ODE takes the one for the other. */
+/* Joints as rows of the solver, placed anew from the poses of their bodies. A row asks for what
+ * ODE's joint asks for at the step of the tick, with these differences: what a rigid joint is open
+ * goes out of the poses and not through the velocities; a stop is met within the tick, not after
+ * it; and a motor that works against a stop is a row beside it, where ODE takes the one for the
+ * other. */
 
 #define OPEN_SLOP 1e-7 /* m, rad: an error that is left alone */
 #define OPEN_SHARE 0.5 /* of the rest, that goes within a tick ... */
@@ -19,9 +20,9 @@
 #define OPEN_LEAST \
   1e-4 /* m/s, rad/s: less may stay in the velocity, it is not worth a second solve */
 
-/* Of a row's own response, as softness: where joints hold a thing more than once, their rows cannot all
- * be met when the joints do not fit to the last micrometre, and would push against each other without
- * bound. 10 N on 0.1 kg make 1e-7 m/s of it. */
+/* Of a row's own response, as softness: where joints hold a thing more than once, their rows cannot
+ * all be met when the joints do not fit to the last micrometre, and would push against each other
+ * without bound. 10 N on 0.1 kg make 1e-7 m/s of it. */
 #define REGULAR 1e-6
 
 #define STOP_FLOOR \
@@ -163,8 +164,8 @@ static double error_correction(const hapi_softness *s, double period, double err
 }
 
 /* An error, and what the turning of the bodies makes of it while the velocities that a row sees are
- * constant: its second derivative. Along the chord of its circle a body keeps its speed and its distance from
- * the joint; along the tangent it would lose one and gain the other. */
+ * constant: its second derivative. Along the chord of its circle a body keeps its speed and its
+ * distance from the joint; along the tangent it would lose one and gain the other. */
 typedef struct error_of {
   double now;  /* m, rad */
   double bend; /* m/s^2, rad/s^2 */
@@ -488,14 +489,16 @@ static double speed_of(const placed_joint *j, const hapi_row *row)
   return hapi_row_start_speed(j->a, row->ja) + hapi_row_start_speed(j->b, row->jb);
 }
 
-/* Speed after the tick if the stop were not there, with the impulses of the last tick: what presses a body
- * against a stop goes on while the stop throws it back. Without that, a pressed one hops on the stop. */
+/* Speed after the tick if the stop were not there, with the impulses of the last tick: what presses
+ * a body against a stop goes on while the stop throws it back. Without that, a pressed one hops on
+ * the stop. */
 static double pressed_speed(const hapi_solver *solver, const hapi_row *row)
 {
   return hapi_dot6(row->ja, solver->v[row->a]) + hapi_dot6(row->jb, solver->v[row->b]);
 }
 
-/* A rigid stop may be reached within the tick, not passed; a soft one begins to push where ODE's does. */
+/* A rigid stop may be reached within the tick, not passed; a soft one begins to push where ODE's
+ * does. */
 static void set_stop(hapi_rows *rows, const hapi_tick_facts *facts, const placed_joint *j,
                      const hapi_model_limit *limit, double gap, hapi_row *row)
 {
@@ -572,6 +575,7 @@ static bool find_body(const hapi_bodies *bodies, uint32_t slot, uint32_t generat
 static bool find_joint(const hapi_joints *joints, const hapi_bodies *bodies, uint32_t index,
                        placed_joint *out)
 {
+  HAPI_ASSERT_INDEX(index, joints->count);
   out->in = &joints->of[index];
   out->index = index;
   return find_body(bodies, out->in->body_a, out->in->generation_a, &out->a) &&

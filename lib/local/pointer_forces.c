@@ -5,7 +5,8 @@
 #include "base/vec.h"
 #include "local/pointer_friction.h"
 
-/* A sum that is kept: a force that is not finite, which the guard stops, would stay in it for ever. */
+/* A sum that is kept: a force that is not finite, which the guard stops, would stay in it for
+ * ever. */
 static inline void force_audit(hapi_touches *touches, double period, const double force[3])
 {
   double norm = hapi_v3_norm(force);

@@ -8,10 +8,10 @@
 #include "base/assert.h"
 #include "base/vec.h"
 
-/* The anchors stay where they are as long as nothing slides: displacements are taken from them as they
- * are placed now, and not summed up from velocities, so that no noise and no motion that comes back makes
- * the contact creep. Only a contact that has rolled on has them set anew, below where it is now, with the
- * spring as long as it was. */
+/* The anchors stay where they are as long as nothing slides: displacements are taken from them as
+ * they are placed now, and not summed up from velocities, so that no noise and no motion that comes
+ * back makes the contact creep. Only a contact that has rolled on has them set anew, below where it
+ * is now, with the spring as long as it was. */
 
 #define ROLLED_COSINE 0.99875 /* 0.05 rad: of 10 mm, the arc is 0.2 um longer than the tangent */
 #define OTHER_FACE_COSINE 0.5
@@ -63,7 +63,7 @@ static void point_from_body(const hapi_local_body *body, const double local[3], 
   }
 }
 
-static void flatten(const double normal[3], double io[3])
+static void vector_flatten(const double normal[3], double io[3])
 {
   hapi_v3_madd(io, -hapi_v3_dot(normal, io), normal, io);
 }
@@ -72,31 +72,32 @@ static void flatten(const double normal[3], double io[3])
 static void set_tangent(const double normal[3], const double near[3], double out[3])
 {
   hapi_v3_copy(near, out);
-  flatten(normal, out);
+  vector_flatten(normal, out);
   double norm = hapi_v3_norm(out);
   if (!(norm > 1e-12)) {
     int least = fabs(normal[0]) < 0.6 ? 0 : 1;
     hapi_v3_set(out, 0.0, 0.0, 0.0);
     out[least] = 1.0;
-    flatten(normal, out);
+    vector_flatten(normal, out);
     norm = hapi_v3_norm(out);
   }
   hapi_v3_scale(1.0 / norm, out, out);
 }
 
-static double dot4(const double a[4], const double b[4])
+static double stretch_dot(const double a[4], const double b[4])
 {
   return hapi_v3_dot(a, b) + a[3] * b[3];
 }
 
-static double norm4(const double a[4])
+static double stretch_norm(const double a[4])
 {
-  return sqrt(dot4(a, a));
+  return sqrt(stretch_dot(a, a));
 }
 
 /* ---- anchors ---- */
 
-/* A vector across `from`, turned with it on the shortest way to `to`, less than a right angle away. */
+/* A vector across `from`, turned with it on the shortest way to `to`, less than a right angle
+ * away. */
 static void direction_carry(const double from[3], const double to[3], double io[3])
 {
   double sum[3];
@@ -105,7 +106,8 @@ static void direction_carry(const double from[3], const double to[3], double io[
   hapi_v3_madd(io, -along, sum, io);
 }
 
-/* The anchors as they would be set now. The marks are one direction of the surface, in both frames. */
+/* The anchors as they would be set now. The marks are one direction of the surface, in both
+ * frames. */
 static void place_see(hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
                       const double normal[3], const double point[3])
 {
@@ -125,9 +127,9 @@ static void place_see(hapi_friction *f, const hapi_pointer *p, const hapi_local_
   }
 }
 
-/* The directions of the surface in which the anchors see each other: the mean of the two surfaces' that
- * were one when they were set. So a way and the way back are the same, and what rolls to and fro, or tilts
- * about something else than the contact, comes back to where it was. */
+/* The directions of the surface in which the anchors see each other: the mean of the two surfaces'
+ * that were one when they were set. So a way and the way back are the same, and what rolls to and
+ * fro, or tilts about something else than the contact, comes back to where it was. */
 static void set_normal(hapi_friction *f, const double of_pointer[3], const double of_body[3])
 {
   hapi_v3_add(of_pointer, of_body, f->normal);
@@ -150,10 +152,11 @@ static void stretch_slide(hapi_friction *f, const hapi_pointer *p, const hapi_lo
   from_body(body, f->set.stretch_body, f->stretch);
   direction_carry(normal_of_body, f->normal, f->stretch);
   hapi_v3_add(f->stretch, apart, f->stretch);
-  flatten(f->normal, f->stretch);
+  vector_flatten(f->normal, f->stretch);
 }
 
-/* How far the pointer has turned against the body about the normal since the anchors were set: rad. */
+/* How far the pointer has turned against the body about the normal since the anchors were set:
+ * rad. */
 static double turn_since(const hapi_friction *f, const hapi_pointer *p, const hapi_local_body *body,
                          const double of_pointer[3], const double of_body[3])
 {
@@ -208,7 +211,8 @@ static void measure_stretch(hapi_friction *f, const hapi_pointer *p, const hapi_
   }
 }
 
-/* A new patch may have the point of a hull elsewhere, all at once: more than what it has been pulled by. */
+/* A new patch may have the point of a hull elsewhere, all at once: more than what it has been
+ * pulled by. */
 static bool anchor_leaps(const hapi_friction *f, const hapi_touches *touches,
                          const hapi_local_contact *contact, const hapi_rub_place *at)
 {
@@ -220,7 +224,7 @@ static bool anchor_leaps(const hapi_friction *f, const hapi_touches *touches,
   hapi_quat_rotate(pointer_turn(p), f->set.anchor_pointer, way);
   hapi_v3_add(way, p->pose.position, way);
   hapi_v3_sub(at->foot, way, way);
-  flatten(at->normal, way);
+  vector_flatten(at->normal, way);
   double most = LEAP_SHARE * touches->tool.tools[contact->tool - 1].in.same_within;
   return hapi_v3_norm(way) > most + hapi_v3_norm(f->stretch);
 }
@@ -264,12 +268,12 @@ static void set_speed(hapi_friction *f, const hapi_pointer *p, const hapi_local_
     hapi_v3_sub(f->speed, body->twist.linear, f->speed);
     hapi_v3_sub(spin, body->twist.angular, spin);
   }
-  flatten(f->normal, f->speed);
+  vector_flatten(f->normal, f->speed);
   f->speed[3] = p->surface.finger_radius * hapi_v3_dot(f->normal, spin);
 }
 
-/* Directions at right angles, the first along the force that there is when all sticks: a force that is
- * too large for the ball then is one number, and the ball's surface no affair of the others. */
+/* Directions at right angles, the first along the force that there is when all sticks: a force that
+ * is too large for the ball then is one number, and the ball's surface no affair of the others. */
 void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
 {
   double ahead[4];
@@ -277,14 +281,14 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
   memcpy(ahead, f->speed, sizeof ahead);
   if (gain != NULL) {
     hapi_v3_add(ahead, gain, ahead);
-    flatten(f->normal, ahead);
+    vector_flatten(f->normal, ahead);
   }
   for (int i = 0; i < 4; ++i) {
     pull[i] = f->stiffness * (f->stretch[i] + lead * ahead[i]) + f->damping * ahead[i];
   }
   double along[3];
   set_tangent(f->normal, pull, along);
-  f->pull = norm4(pull);
+  f->pull = stretch_norm(pull);
   double sliding = f->pull > 0.0 ? hapi_v3_dot(pull, along) / f->pull : 1.0;
   double turning = f->pull > 0.0 ? pull[3] / f->pull : 0.0;
   hapi_v3_scale(sliding, along, f->axes[0]);
@@ -298,7 +302,7 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
 /* Anchors that are set now, where the spring is as long as in `stretch`. */
 static void set_anew(hapi_friction *f, const hapi_local_body *body, const double normal[3])
 {
-  flatten(normal, f->stretch);
+  vector_flatten(normal, f->stretch);
   hapi_v3_copy(normal, f->normal);
   see_stretch(f, body, normal, f->now.turn);
   set_anchors(f, 1.0);
@@ -374,11 +378,11 @@ void hapi_friction_wrench(const hapi_friction *f, const hapi_pointer *p, const d
 void hapi_friction_end(hapi_friction *f, const double push[4], double limit)
 {
   if (f->rigid) {
-    f->slid = norm4(push) >= limit * (1.0 - AT_LIMIT);
+    f->slid = stretch_norm(push) >= limit * (1.0 - AT_LIMIT);
     return;
   }
-  double spring = f->stiffness * norm4(f->stretch);
-  if (spring > limit && norm4(push) >= limit * (1.0 - AT_LIMIT)) {
+  double spring = f->stiffness * stretch_norm(f->stretch);
+  if (spring > limit && stretch_norm(push) >= limit * (1.0 - AT_LIMIT)) {
     f->left = limit / spring;
     set_anchors(f, f->left);
   }
@@ -388,7 +392,7 @@ double hapi_friction_energy(const hapi_touches *touches, uint64_t tick,
                             const hapi_local_contact *contact)
 {
   const hapi_friction *f = hapi_friction_now(touches, tick, contact);
-  return f == NULL || f->rigid ? 0.0 : 0.5 * f->stiffness * dot4(f->stretch, f->stretch);
+  return f == NULL || f->rigid ? 0.0 : 0.5 * f->stiffness * stretch_dot(f->stretch, f->stretch);
 }
 
 /* Of rows, or by eq. 7 as it stands: then nothing answers. */

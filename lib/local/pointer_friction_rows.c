@@ -8,11 +8,11 @@
 #include "local/pointer_rows.h"
 #include "local/pointer_spring.h"
 
-/* Friction's spring (pointer_friction.h) as rows beside that of the contact's normal. Apart from those, which
- * without friction are to be none the slower for it. */
+/* Friction's spring (pointer_friction.h) as rows beside that of the contact's normal. Apart from
+ * those, which without friction are to be none the slower for it. */
 
-/* The columns of an axis of friction, at the place where it acts: body and, of a proxy, pointer, as those of the
- * normal in pointer_rows.c. */
+/* The columns of an axis of friction, at the place where it acts: body and, of a proxy, pointer, as
+ * those of the normal in pointer_rows.c. */
 static void set_friction_columns(const hapi_local_contact *contact, const hapi_placed_pointer *at,
                                  const hapi_friction *f, const double axis[4], hapi_row *row)
 {
@@ -51,7 +51,7 @@ static void set_friction_columns(const hapi_local_contact *contact, const hapi_p
   }
 }
 
-static double along(const double axis[4], const double v[4])
+static double axis_part(const double axis[4], const double v[4])
 {
   return hapi_v3_dot(axis, v) + axis[3] * v[3];
 }
@@ -62,13 +62,13 @@ static void fill_friction_spring(const hapi_placed_pointer *at, const hapi_frict
 {
   const hapi_pointer *p = at->pointer;
   *out = (hapi_pointer_spring){.k = f->stiffness, .d = f->damping, .pulls = true};
-  out->depth = along(axis, f->stretch);
+  out->depth = axis_part(axis, f->stretch);
   out->body_w = hapi_row_start_speed(at->body, row->ja);
   out->w = out->body_w;
   if (p->proxied) {
     out->w += hapi_v3_dot(row->jb, p->proxy.velocity) + hapi_v3_dot(row->jb + 3, p->proxy.spin);
   }
-  out->s = along(axis, f->speed) + out->w;
+  out->s = axis_part(axis, f->speed) + out->w;
   out->body_a = hapi_dot6(row->ja, row->ba);
   out->a = out->body_a + hapi_dot6(row->jb, row->bb);
 }

@@ -274,7 +274,8 @@ static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_wo
   at->own = hapi_v3_dot(at->j, velocity);
   double speed = at->own - at->w;
   double way = period * speed;
-  /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no motion. */
+  /* The pull of a proxy's spring, all of which a light proxy would follow in one tick, is no
+   * motion. */
   double motion = speed;
   if (p->proxied) {
     point_velocity(at, p->proxy.velocity, p->proxy.spin, velocity);
@@ -324,7 +325,8 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
   }
 }
 
-/* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels it. */
+/* -way.v' >= -most for the six of a proxy's velocity along the way that it would go; nothing feels
+ * it. */
 static void add_brake(hapi_rows *rows, const hapi_pointer *p, const double way[3], int first,
                       double most)
 {

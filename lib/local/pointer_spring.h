@@ -13,22 +13,23 @@
  * stiffness is too large for the body. With n out of the body, w the speed at which the body gives
  * way along -n, s that of the pointer into it, g the depth, a what an N s makes of w - s:
  *
- *   up to T^2 a k = 4  f = k (g' + 2 g + g")/4 + d (s - (w + w')/2)   g", g': one tick before, after
+ *   up to T^2 a k = 4  f = k (g' + 2 g + g")/4 + d (s - (w + w')/2)   g", g': a tick before, after
  *   above it           f = k g' + d (s - w')
  *
  * The first is the midpoint rule written for poses that move with the new velocity: it keeps the
- * energy, also when a contact begins or ends within a tick (secant), and f belongs to the tick's own
- * time. The second is implicit Euler. Both are w' + f / c = F / c, a soft row. A damper that changes
- * the velocity by little in a tick takes it as it is, d (s - w), as eq. 7 says and as the world does
- * when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown as w is: the
- * row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it follows the contact's
- * force at once: with the mean over three ticks that force would be a tick late in the hand, which is a
- * negative damper of T k. So a proxy's contacts take the second form, for the proxy: a body that is
- * not light stays where it is at the tick in it, as it would be damped by T k: with v the proxy's speed
- * into it and u the body's along -n, f = k (g + T (v' - u' + u)) + d (v' - u').
+ * energy, also when a contact begins or ends within a tick (secant), and f belongs to the tick's
+ * own time. The second is implicit Euler. Both are w' + f / c = F / c, a soft row. A damper that
+ * changes the velocity by little in a tick takes it as it is, d (s - w), as eq. 7 says and as the
+ * world does when it is stepped at this rate itself. Where the pointer is a proxy, s is an unknown
+ * as w is: the row has two bodies, w stands for w - s, and s is 0. A proxy is so light that it
+ * follows the contact's force at once: with the mean over three ticks that force would be a tick
+ * late in the hand, which is a negative damper of T k. So a proxy's contacts take the second form,
+ * for the proxy: a body that is not light stays where it is at the tick in it, as it would be
+ * damped by T k: with v the proxy's speed into it and u the body's along -n, f = k (g + T (v' - u'
+ * + u)) + d (v' - u').
  *
- * Friction's spring (pointer_friction.h) pulls to both sides: two rows or three more of the same kind,
- * with the stretch for g, the body's speed along the axis for w and the pointer's for s. */
+ * Friction's spring (pointer_friction.h) pulls to both sides: two rows or three more of the same
+ * kind, with the stretch for g, the body's speed along the axis for w and the pointer's for s. */
 
 #define HAPI_MIDPOINT_LIMIT 4.0
 #define HAPI_PROXY_LIMIT \
@@ -37,9 +38,9 @@
 #define HAPI_DAMPER_IMPLICIT 1.0   /* of T a d: above it the mean of old and new velocity rings */
 #define HAPI_PUSHED_OUT_LEAST 1e-9 /* m, of a rigid contact: what is deeper is no rounding */
 
-/* Spring force between the middles h and g of two ticks (depth, m): the change of its energy over the
- * change of depth. So a contact that begins or ends within the tick gains nothing by it. With both
- * in touch it is the mean, k (h + g) / 2. */
+/* Spring force between the middles h and g of two ticks (depth, m): the change of its energy over
+ * the change of depth. So a contact that begins or ends within the tick gains nothing by it. With
+ * both in touch it is the mean, k (h + g) / 2. */
 static inline double hapi_spring_secant(double k, double h, double g, double *out_slope)
 {
   *out_slope = 0.0;
@@ -74,8 +75,8 @@ typedef struct hapi_pointer_spring {
 
 #define HAPI_NEWTON_STEPS 6 /* exact after one but where the contact begins or ends */
 
-/* Whether the middle of the next tick is in touch as `before`, that of the last one, is: then the secant
- * is one line. */
+/* Whether the middle of the next tick is in touch as `before`, that of the last one, is: then the
+ * secant is one line. */
 static inline bool hapi_spring_stays_closed(const hapi_pointer_spring *p, double before,
                                             double period)
 {
@@ -128,10 +129,11 @@ static inline double hapi_spring_lateness(double t)
   return t <= HAPI_DAMPER_LIMIT ? 0.0 : t <= HAPI_DAMPER_IMPLICIT ? 0.5 : 1.0;
 }
 
-/* A contact of a god-object or virtual tool does not give: w' >= g / T, so that the depth g is 0 at the
- * tick's end. Friction likewise brings the stretch back to 0. That is for the poses; what lifts out of a body
- * does not stay in velocities and forces, and the body that a god-object pushes is taken where it is at the
- * tick, as a proxy's is: w' >= u, u the body's along -n (hapi_spring_set_staying). */
+/* A contact of a god-object or virtual tool does not give: w' >= g / T, so that the depth g is 0 at
+ * the tick's end. Friction likewise brings the stretch back to 0. That is for the poses; what lifts
+ * out of a body does not stay in velocities and forces, and the body that a god-object pushes is
+ * taken where it is at the tick, as a proxy's is: w' >= u, u the body's along -n
+ * (hapi_spring_set_staying). */
 static inline bool hapi_spring_stiffen(hapi_row *row, const hapi_pointer_spring *p, double period)
 {
   row->lo = 0.0;

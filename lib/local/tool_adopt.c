@@ -7,9 +7,9 @@
 #include "base/assert.h"
 #include "base/vec.h"
 
-/* The points of a hull's patches are found anew again and again. One that is near to where one of the
- * same pair was is that one, and keeps what it had. While a pair presses, others come in slowly, and
- * those that are gone leave slowly: the force does not jump where a patch changes. */
+/* The points of a hull's patches are found anew again and again. One that is near to where one of
+ * the same pair was is that one, and keeps what it had. While a pair presses, others come in
+ * slowly, and those that are gone leave slowly: the force does not jump where a patch changes. */
 
 #define SAME_COSINE 0.7 /* of the normals */
 
@@ -38,8 +38,8 @@ static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
   return w->pair_count++;
 }
 
-/* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. One that is taken has
- * its member negative. */
+/* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. One that is
+ * taken has its member negative. */
 static uint32_t find_old(const hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in)
 {
   double best = in->same_within;

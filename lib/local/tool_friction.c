@@ -5,15 +5,16 @@
 #include <math.h>
 #include <string.h>
 
-/* Each point of a hull has an anchor of its own. A patch that is found anew may have other points, in other
- * places, while hull and body stick as before: a point that began there with nothing would leave the
- * others less and less to hold on to, and the hull would creep under a force that is far from the limit. So
- * one that comes to others that push the same way begins with what they have: the motion of a rigid surface,
- * a way and a turn about the normal, that is nearest to their stretches (least squares, weighted with
- * their stiffness). That has no more energy than they have. How much more than the largest of theirs it may
- * have is bounded: a hull that has turned about the one corner that held it does not find the next one
- * pulled far. By nothing more is too little: those that are left need not have the largest of a turn and a
- * way together, and would lose of it each time. */
+/* Each point of a hull has an anchor of its own. A patch that is found anew may have other points,
+ * in other places, while hull and body stick as before: a point that began there with nothing would
+ * leave the others less and less to hold on to, and the hull would creep under a force that is far
+ * from the limit. So one that comes to others that push the same way begins with what they have:
+ * the motion of a rigid surface, a way and a turn about the normal, that is nearest to their
+ * stretches (least squares, weighted with their stiffness). That has no more energy than they have.
+ * How much more than the largest of theirs it may have is bounded: a hull that has turned about the
+ * one corner that held it does not find the next one pulled far. By nothing more is too little:
+ * those that are left need not have the largest of a turn and a way together, and would lose of it
+ * each time. */
 
 #define ALIKE_COSINE 0.95 /* of the normals */
 #define MORE_MOST 1.5     /* of the largest stretch */

@@ -8,9 +8,9 @@
 #include "local/contact_ramp.h"
 #include "local/touch_place.h"
 
-/* Where the contacts of hulls are, and what part of the pointer's stiffness k each has (docs/numerics.md):
- * together, those of a pair that push the same way have k, as a bed of springs. So a flat push on a face
- * is felt as k, and a tilt as the springs' moments about its middle. */
+/* Where the contacts of hulls are, and what part of the pointer's stiffness k each has
+ * (docs/decisions/tools.md): together, those of a pair that push the same way have k, as a bed of springs.
+ * So a flat push on a face is felt as k, and a tilt as the springs' moments about its middle. */
 
 #define COME_S 0.02 /* in which a point that is new in a pair that presses gets its share */
 
@@ -18,8 +18,8 @@
 #define APART_COSINE 0.6
 #define TOGETHER_COSINE 0.95
 
-/* Of a patch that is steeper than this, 4.6 degrees, only the deepest edge or corner has a share. Beyond 5
- * degrees the patch has no other points. */
+/* Of a patch that is steeper than this, 4.6 degrees, only the deepest edge or corner has a share.
+ * Beyond 5 degrees the patch has no other points. */
 #define SLOPE_MOST 0.08
 #define NEAR_SHARE 0.01 /* of the hull's extent: points that are nearer say nothing of a slope */
 

@@ -38,8 +38,8 @@ typedef struct hapi_friction_place {
   double turn;            /* rad, likewise, about the normal */
 } hapi_friction_place;
 
-/* Friction of a pointer contact, of a sphere's by its slot; see pointer_friction.h. Of four numbers: along
- * the surface in world axes, and about the normal times the finger's radius. */
+/* Friction of a pointer contact, of a sphere's by its slot; see pointer_friction.h. Of four
+ * numbers: along the surface in world axes, and about the normal times the finger's radius. */
 typedef struct hapi_friction {
   uint32_t generation; /* of the contact */
   uint32_t epoch;      /* of the body */

@@ -71,6 +71,7 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
   touches->rubs = false;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
+    HAPI_ASSERT_INDEX(pointer, pointers->high);
     /* The pointer may have gone while the message was on its way. */
     if (in[i].tool == 0 && pointers->of[pointer].generation == in[i].pointer_generation) {
       crosses_adopt(&touches->crosses, bodies, model, i, touches->count, &cross);

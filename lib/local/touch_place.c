@@ -64,7 +64,7 @@ static inline void surface_point(const side *s, const double direction[3], doubl
 #define SLIDE_MAX 0.1 /* m between two passes */
 
 /* The point of the pushed body goes on to where the border of the face is now. */
-static void slide(const touch *c, double a[3], double b[3])
+static void point_slide(const touch *c, double a[3], double b[3])
 {
   bool face_is_a = c->in->touch == HAPI_TOUCH_FACE_A;
   double *fixed = face_is_a ? a : b;
@@ -101,7 +101,7 @@ static void place_surfaces(const touch *c)
   hapi_v3_scale(-1.0, c->out->normal, back);
   surface_point(&side_a, back, a);
   surface_point(&side_b, c->out->normal, b);
-  slide(c, a, b);
+  point_slide(c, a, b);
   hapi_v3_sub(a, b, apart);
   c->out->gap = hapi_v3_dot(c->out->normal, apart);
   hapi_v3_madd(a, -0.5 * c->out->gap, c->out->normal, c->out->point);

@@ -64,8 +64,8 @@ static void step_bodies(hapi_bodies *bodies, double period)
 }
 
 /* What the forces of this tick do to other bodies than those they act on. The impulse is the pushed
- * body's alone: to the world it is given once, and the world passes it on by itself. So a body that is
- * moved by this only is not pushed, and has the world's state again at the sync. */
+ * body's alone: to the world it is given once, and the world passes it on by itself. So a body that
+ * is moved by this only is not pushed, and has the world's state again at the sync. */
 static void accelerate_others(const hapi_bodies *bodies, const hapi_touches *touches)
 {
   for (uint32_t i = 0; i < touches->crosses.count; ++i) {

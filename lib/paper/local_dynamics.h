@@ -10,8 +10,8 @@
 #include "local/facts.h"
 #include "local/touch.h"
 
-/* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the way
- * from the last but one to the last. */
+/* Models SINGLE and IMPULSE do not move bodies: they show the world's poses, as they are or on the
+ * way from the last but one to the last. */
 void hapi_local_place(const hapi_bodies *bodies, const hapi_tick_facts *facts);
 
 /* Model ACCELERANCE: eq. 8-11 and 14. */

@@ -59,7 +59,8 @@ static void pointer_velocity(const hapi_pointer *p, const plane *at, double out[
   }
 }
 
-/* Rate at which the pointer goes into the plane [m/s]. *out_own: how much of it its own motion makes. */
+/* Rate at which the pointer goes into the plane [m/s]. *out_own: how much of it its own motion
+ * makes. */
 static double closing_rate(const hapi_pointer *p, const plane *at, double *out_own)
 {
   const hapi_local_body *body = at->body;
@@ -89,8 +90,9 @@ static double depth_of(const hapi_tool_world *tools, hapi_local_contact *c, cons
   return hapi_contact_ramp(c, p, out_depth, period);
 }
 
-/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for the
- * energy observer how fast the body's motion, which is given, loads the spring, and its energy. */
+/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for
+ * the energy observer how fast the body's motion, which is given, loads the spring, and its
+ * energy. */
 static double normal_force(const hapi_tick_facts *facts, hapi_local_contact *c, hapi_pointer *p,
                            const plane *at, double share, double depth)
 {
@@ -175,7 +177,8 @@ static void push_body(const hapi_local_contact *c, const plane *at, double perio
   }
 }
 
-/* A sum that is kept: a force that is no number, which the guard stops, would stay in it for ever. */
+/* A sum that is kept: a force that is no number, which the guard stops, would stay in it for
+ * ever. */
 static void force_audit(hapi_touches *touches, double period, const double vector[3], double norm)
 {
   if (!isfinite(norm)) {

@@ -10,8 +10,8 @@
  * proxy (proxy.c), which then takes its place.
  *
  * A device that is farther from where it was at the last tick than a hand can move it in a tick has
- * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by it
- * begin anew (contact_ramp.h), also those that come with the next models. */
+ * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by
+ * it begin anew (contact_ramp.h), also those that come with the next models. */
 
 #define SPIN_MOST 100.0 /* rad/s, of a hand: about three times what a wrist makes */
 #define JUMP_S 0.01     /* and two steps of physics: a model for the new place has come */
@@ -41,8 +41,8 @@ static void to_device(const hapi_pointer *p, const double world[3], double devic
   }
 }
 
-/* A hull on a device that gives no torque cannot be turned by it either: the hand could not feel what
- * it does by turning. */
+/* A hull on a device that gives no torque cannot be turned by it either: the hand could not feel
+ * what it does by turning. */
 static void pointer_place_turn(hapi_pointer *p)
 {
   const double *frame = p->device.pose_world_device.quat_wxyz;
@@ -119,7 +119,8 @@ static void pointer_check_speed(hapi_pointer *p)
   }
 }
 
-/* A sum of squares within the limit says so of each; only what is far out is looked at one by one. */
+/* A sum of squares within the limit says so of each; only what is far out is looked at one by
+ * one. */
 static bool input_is_plausible(const hapi_pointer *p)
 {
   const double *at = p->device.pose.position;
@@ -154,7 +155,8 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
   return unusable;
 }
 
-/* A newton metre is a newton on an arm, and the arm is shorter at the device by the motion's scale. */
+/* A newton metre is a newton on an arm, and the arm is shorter at the device by the motion's
+ * scale. */
 double hapi_coupling_torque_scale(const hapi_pointer *p)
 {
   return p->device.three_dof || !p->device.feels_torque

@@ -3,9 +3,9 @@
 #ifndef HAPODE_POINTER_POINTER_H
 #define HAPODE_POINTER_POINTER_H
 
-/* A pointer as the tick knows it: its shape and surface, the device in and out, the coupling between
- * device and pointer, and the body behind a spring that it may be (a proxy). World frame and SI units
- * where nothing else is said. Zeroed: no pointer. */
+/* A pointer as the tick knows it: its shape and surface, the device in and out, the coupling
+ * between device and pointer, and the body behind a spring that it may be (a proxy). World frame
+ * and SI units where nothing else is said. Zeroed: no pointer. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -60,8 +60,8 @@ typedef struct hapi_pointer_device {
   hapi_device_limits limits;
 } hapi_pointer_device;
 
-/* Stiffnesses as felt in the world: the device's / (motion_scale force_scale). The turning is of a hull
- * only. */
+/* Stiffnesses as felt in the world: the device's / (motion_scale force_scale). The turning is of a
+ * hull only. */
 typedef struct hapi_pointer_coupling {
   hap_coupling kind;           /* asked for */
   hap_integration integration; /* model CONTACT */

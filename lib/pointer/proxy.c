@@ -5,29 +5,32 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/pose.h"
 #include "base/vec.h"
 #include "pointer/rigid_proxy.h"
 
-/* Coupling "proxy" (docs/numerics.md): the pointer is a light body of mass m behind one spring k and
- * damper d to the device, h and u the device's position and velocity, integrated implicitly:
+/* Coupling "proxy" (docs/decisions/proxy.md): the pointer is a light body of mass m behind one spring k
+ * and damper d to the device, h and u the device's position and velocity, integrated implicitly:
  *
  *   (m + T d + T^2 k) v' = m v + T k (h - x) + T d u + impulses of the contacts
  *   force on the hand = k (x' - h) + d (v' - u),   x' = x + T v'
  *
- * A hull's turning likewise, of the inertia I, with w for v and for the way the vector 2 sin(angle / 2)
- * along the axis, which is the moment of a potential at any angle and the angle for small ones.
+ * A hull's turning likewise, of the inertia I, with w for v and for the way the vector 2 sin(angle
+ * / 2) along the axis, which is the moment of a potential at any angle and the angle for small
+ * ones.
  *
- * It is one body more in the solver, so that contacts of one pointer know of each other. However many
- * push, the device feels k at most.
+ * It is one body more in the solver, so that contacts of one pointer know of each other. However
+ * many push, the device feels k at most.
  *
- * Two couplings of the literature are the same body with contacts that do not give: rigid_proxy.h. */
+ * Two couplings of the literature are the same body with contacts that do not give:
+ * rigid_proxy.h. */
 
 #define KEEP_SHARE 0.9 /* of what the device holds: below it the coupling may be direct again */
 #define OFFSET_DECAY_S 0.02 /* time constant */
 #define OFFSET_LEAST 1e-9   /* m */
-/* An AUTO proxy goes back to direct where the pointer leaps by less than this, m, and when nothing has touched
- * for so long, s: what hops on a stiff spring comes back within it. */
+/* An AUTO proxy goes back to direct where the pointer leaps by less than this, m, and when nothing
+ * has touched for so long, s: what hops on a stiff spring comes back within it. */
 #define LEAP_MOST 1e-4
 #define REST_S 0.05
 #define SWING_LIMIT 0.25 /* of T^2 k over the mass: it swings at 80 Hz and less, at 1 kHz */
@@ -72,7 +75,8 @@ void hapi_proxy_turn_between(const double from[4], const double to[4], double ou
   hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, out); /* q and -q are the same turn */
 }
 
-/* Nothing touches, and the pointer would not leap to the device: a proxy with mass swings about it. */
+/* Nothing touches, and the pointer would not leap to the device: a proxy with mass swings about
+ * it. */
 static bool is_idle(const hapi_pointer *p, double period)
 {
   double leap[3];
@@ -124,7 +128,8 @@ bool hapi_proxy_choose(hapi_pointer *p, hap_effect_wish wish, double period)
   return anew;
 }
 
-/* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones do. */
+/* What pushed a proxy at the surface is deep at the device: its contacts come in as deep ones
+ * do. */
 bool hapi_proxy_end(hapi_pointer *p)
 {
   bool anew = p->proxied;
@@ -138,8 +143,8 @@ bool hapi_proxy_end(hapi_pointer *p)
   return anew;
 }
 
-/* A virtual tool that is not light for its spring takes it as it is at the tick: implicit Euler would damp
- * its swings. */
+/* A virtual tool that is not light for its spring takes it as it is at the tick: implicit Euler
+ * would damp its swings. */
 static bool proxy_swings(const hapi_pointer *p, double k, double inertia, double period)
 {
   return p->rigid && period * period * k <= SWING_LIMIT * inertia;
@@ -192,6 +197,8 @@ static void show_turn(hapi_pointer *p)
 void hapi_proxy_place(hapi_pointer *p, double period)
 {
   hapi_v3_scale(1.0 - fmin(1.0, period / OFFSET_DECAY_S), p->proxy.offset, p->proxy.offset);
+  HAPI_ASSERT(p->coupling.stiffness > 0.0);
+  HAPI_ASSERT_UNIT_QUAT(p->proxy.quat);
   hapi_v3_copy(p->proxy.position, p->pose.position);
   hapi_v3_copy(p->proxy.velocity, p->twist.linear);
   if (p->shape.hull != NULL) {

@@ -3,8 +3,8 @@
 #ifndef HAPODE_POINTER_PROXY_H
 #define HAPODE_POINTER_PROXY_H
 
-/* The body behind a spring that a pointer may be, model CONTACT. v and free: its six of the solver's
- * velocities, with and without impulses; period in s. */
+/* The body behind a spring that a pointer may be, model CONTACT. v and free: its six of the
+ * solver's velocities, with and without impulses; period in s. */
 
 #include <hapode/effects.h>
 
@@ -22,8 +22,8 @@ void hapi_proxy_place(hapi_pointer *pointer, double period);
 /* The velocity that a proxy would have with nothing in touch. */
 void hapi_proxy_free(hapi_pointer *pointer, double period, double v[6]);
 
-/* Where a proxy goes, and the force on the hand. False: its state is not finite; it is where the device
- * is. */
+/* Where a proxy goes, and the force on the hand. False: its state is not finite; it is where the
+ * device is. */
 bool hapi_proxy_move(hapi_pointer *pointer, double period, const double v[6]);
 
 /* It begins anew where the device is. */

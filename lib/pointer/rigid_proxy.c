@@ -11,8 +11,8 @@
 
 #define OFFSET_LEAST 1e-9 /* m */
 
-/* How much faster than the device a god-object comes after it, m/s, where something has let it go: what is
- * farther away than that in a step of physics, the loop does not know. */
+/* How much faster than the device a god-object comes after it, m/s, where something has let it go:
+ * what is farther away than that in a step of physics, the loop does not know. */
 #define CATCH_UP 0.5
 
 /* What is left of the offsets would keep a god-object from being where the device is. */
@@ -54,7 +54,8 @@ void hapi_rigid_push_out(hapi_pointer *p, double period, double v[6], double fre
   double change[6];
   memcpy(p->rigid_move.velocity, v, sizeof p->rigid_move.velocity);
   p->rigid_move.pushed_out = true;
-  /* The damper's part of the motion that the rows now leave out (hapi_pointers_brake), as it was at the last tick. */
+  /* The damper's part of the motion that the rows now leave out (hapi_pointers_brake), as it was at
+   * the last tick. */
   hapi_v3_scale(-period * p->coupling.damping * p->proxy.response, p->rigid_move.carried, change);
   hapi_v3_scale(-period * p->coupling.spin_damping * p->proxy.spin_response,
                 p->rigid_move.carried + 3, change + 3);
@@ -62,7 +63,8 @@ void hapi_rigid_push_out(hapi_pointer *p, double period, double v[6], double fre
   hapi_madd6(free, 1.0, change);
 }
 
-/* s, that a god-object moves: in the tick in which something lets it go, before it is braked, less. */
+/* s, that a god-object moves: in the tick in which something lets it go, before it is braked,
+ * less. */
 static double moving_time(const hapi_pointer *p, double period, const double v[6])
 {
   double speed = hapi_v3_norm(v) / p->rigid_move.speed_most;

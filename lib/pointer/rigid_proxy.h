@@ -3,9 +3,9 @@
 #ifndef HAPODE_POINTER_RIGID_PROXY_H
 #define HAPODE_POINTER_RIGID_PROXY_H
 
-/* Two couplings of the literature, to compare with: proxies whose contacts do not give. The god-object
- * has no mass and is where the spring is shortest among all places out of the bodies; the virtual tool
- * has a mass of its own. v: as in proxy.h. */
+/* Two couplings of the literature, to compare with: proxies whose contacts do not give. The
+ * god-object has no mass and is where the spring is shortest among all places out of the bodies;
+ * the virtual tool has a mass of its own. v: as in proxy.h. */
 
 #include "pointer/pointer.h"
 

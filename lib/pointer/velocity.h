@@ -17,7 +17,8 @@
 
 #define HAPI_VELOCITY_SAMPLES 32
 
-/* The angular velocity, whose quantum no device tells, is a mean over at most this many intervals.*/
+/* The angular velocity, whose quantum no device tells, is a mean over at most this many
+ * intervals.*/
 #define HAPI_VELOCITY_TURN 7
 
 typedef struct hapi_velocity_sample {

@@ -12,6 +12,8 @@
 
 #include "base/pointer_setup.h"
 
+#include "base/hash.h"
+
 typedef enum hapi_stream {
   HAPI_STREAM_HAPTIC = 0,
   HAPI_STREAM_PHYSICS = 1,
@@ -142,24 +144,5 @@ static_assert(sizeof(hapi_joined) <= HAPI_JOIN_CELLS * HAPI_CELL_BYTES, "room in
 /* Of a tick with everything in it; 64 vertices are the most. */
 #define HAPI_PACKET_MAX \
   (1u + 16u * (1u + HAPI_JOIN_CELLS + HAPI_HULL_CELLS(64u) + 4u) + HAPI_CELL_BODIES)
-
-#define HAPI_HASH_BEGIN 0xcbf29ce484222325u
-
-/* FNV-1a over 64-bit words: cheap, and any changed bit changes it. */
-static inline uint64_t hapi_hash_word(uint64_t hash, uint64_t word)
-{
-  hash = (hash ^ word) * 0x100000001b3u;
-  return hash ^ (hash >> 29);
-}
-
-static inline uint64_t hapi_hash_doubles(uint64_t hash, const double *values, int count)
-{
-  for (int i = 0; i < count; ++i) {
-    uint64_t word;
-    memcpy(&word, &values[i], sizeof word);
-    hash = hapi_hash_word(hash, word);
-  }
-  return hash;
-}
 
 #endif

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 /* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
@@ -12,9 +13,9 @@
 #define DEAR_RUNS 32u
 #define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
 
-/* After so many runs in vain direct solves rest. With 8000 row updates for sweeps meanwhile a row of 20 to 30
- * cubes that is pushed costs half of what the vain ones do, and its force is as near; with 4000 it is
- * up to twice as far off. */
+/* After so many runs in vain direct solves rest. With 8000 row updates for sweeps meanwhile a row
+ * of 20 to 30 cubes that is pushed costs half of what the vain ones do, and its force is as near;
+ * with 4000 it is up to twice as far off. */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
 #define VAIN_ALONE 8000u
@@ -26,7 +27,7 @@ static bool same_bodies(const hapi_row *row, const hapi_row *other)
   return row->a == other->a && row->b == other->b;
 }
 
-static bool valid(const hapi_solver *solver, const hapi_row *row, double d)
+static bool row_is_valid(const hapi_solver *solver, const hapi_row *row, double d)
 {
   return d > 1e-200 && d < 1e200 && hapi_finite(&row->target, 1) && hapi_finite(&row->impulse, 1) &&
          row->softness >= 0.0 && row->a < solver->body_count && row->b < solver->body_count;
@@ -43,7 +44,7 @@ static bool has_bounds(const hapi_solver *solver, uint32_t index)
 }
 
 /* A row left out keeps no impulse: its normal's frictions get none either. */
-static void prepare(hapi_solver *solver, uint32_t index)
+static void row_prepare(hapi_solver *solver, uint32_t index)
 {
   hapi_row *row = &solver->rows[index];
   double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
@@ -51,7 +52,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
   double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
-  if (!valid(solver, row, d) || !has_bounds(solver, index)) {
+  if (!row_is_valid(solver, row, d) || !has_bounds(solver, index)) {
     row->impulse = 0.0;
     return;
   }
@@ -63,7 +64,7 @@ static void prepare(hapi_solver *solver, uint32_t index)
   row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
 }
 
-static double couple(const hapi_row *row, const hapi_row *other)
+static double rows_couple(const hapi_row *row, const hapi_row *other)
 {
   double k = hapi_dot6(row->ja, other->ba);
   return row->paired ? k + hapi_dot6(row->jb, other->bb) : k;
@@ -80,9 +81,9 @@ static void join_triple(hapi_solver *solver, uint32_t last)
   r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal && r[1].ball == 0 &&
               r[1].inverse != 0.0 && r[2].inverse != 0.0;
   if (r->triple) {
-    r[1].coupling[0] = couple(&r[1], &r[0]);
-    r[2].coupling[0] = couple(&r[2], &r[0]);
-    r[2].coupling[1] = couple(&r[2], &r[1]);
+    r[1].coupling[0] = rows_couple(&r[1], &r[0]);
+    r[2].coupling[0] = rows_couple(&r[2], &r[0]);
+    r[2].coupling[1] = rows_couple(&r[2], &r[1]);
   }
 }
 
@@ -103,7 +104,7 @@ static void warm_start(hapi_solver *solver, hapi_row *row)
 
 void hapi_row_ready(hapi_solver *solver, uint32_t index)
 {
-  prepare(solver, index);
+  row_prepare(solver, index);
   join_triple(solver, index);
   if (solver->rows[index].inverse != 0.0) {
     warm_start(solver, &solver->rows[index]);
@@ -116,7 +117,7 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
   double d = response + row->softness;
   row->inverse = 0.0;
   row->triple = row->paired = 0;
-  if (!valid(solver, row, d) || !(row->lo <= row->hi)) {
+  if (!row_is_valid(solver, row, d) || !(row->lo <= row->hi)) {
     row->impulse = 0.0;
     return;
   }
@@ -135,7 +136,7 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
   hapi_row *r = &solver->rows[first];
   bool may_join = count == 3 && r[1].normal == (int32_t)first && r[2].normal == (int32_t)first;
   for (uint32_t i = 0; i < count; ++i) {
-    prepare(solver, first + i);
+    row_prepare(solver, first + i);
   }
   if (may_join) {
     join_triple(solver, first + 2);
@@ -151,7 +152,7 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
 
 /* The correction of one row, m/s. The rows of a body wait for each other, so that the way from v to
  * v counts: the change is cut by itself and not taken as the difference of two impulses. */
-static double update(hapi_solver *solver, hapi_row *row)
+static double row_update(hapi_solver *solver, hapi_row *row)
 {
   if (row->inverse == 0.0) {
     return 0.0;
@@ -171,7 +172,7 @@ static double update(hapi_solver *solver, hapi_row *row)
 }
 
 /* The change of a row's impulse, cut at its bounds. */
-static double change(hapi_row *row, double error, double lo, double hi)
+static double row_change(hapi_row *row, double error, double lo, double hi)
 {
   double old = row->impulse;
   double wanted = error * row->inverse;
@@ -187,7 +188,7 @@ static double half_width(const hapi_row *friction, double p)
 static double change_friction(hapi_row *row, double error, double p)
 {
   double hi = half_width(row, p);
-  return change(row, error, -hi, hi);
+  return row_change(row, error, -hi, hi);
 }
 
 /* v += b0 d0 + b1 d1 + b2 d2 */
@@ -212,7 +213,7 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
   for (int i = 0; i < 3; ++i) {
     e[i] = hapi_row_error(solver, &r[i]);
   }
-  d[0] = change(&r[0], e[0], r[0].lo, r[0].hi);
+  d[0] = row_change(&r[0], e[0], r[0].lo, r[0].hi);
   if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
     return 0.0; /* a contact that does not push */
   }
@@ -308,7 +309,7 @@ static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, do
     hapi_row *row = &solver->rows[i];
     double correction = row->triple     ? update_triple(solver, row)
                         : row->ball > 0 ? hapi_ball_update(solver, row)
-                                        : update(solver, row);
+                                        : row_update(solver, row);
     i += row->triple ? 2 : row->ball > 0 ? row->ball - 1u : 0;
     largest = correction > largest ? correction : largest;
   }
@@ -332,7 +333,7 @@ static double sweep_back(hapi_solver *solver)
   return largest;
 }
 
-static double sweep(hapi_solver *solver)
+static double rows_sweep(hapi_solver *solver)
 {
   ++solver->sweeps;
   return solver->sweeps % 2 == 1 ? update_group(solver, 0, solver->row_count, 0.0)
@@ -373,7 +374,8 @@ static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
   }
 }
 
-/* Direct solves that led to nothing better, one of them as dear as all sweeps where they are too dear. */
+/* Direct solves that led to nothing better, one of them as dear as all sweeps where they are too
+ * dear. */
 static void note_vain(hapi_solver *solver, uint32_t dearest)
 {
   bool vain = dearest > SWEEPS_ALONE && solver->direct_solves == 0;
@@ -386,8 +388,8 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
   }
 }
 
-/* What was too dear or in vain in the last runs will be so in this one: finding out costs as much as
- * two sweeps. */
+/* What was too dear or in vain in the last runs will be so in this one: finding out costs as much
+ * as two sweeps. */
 static bool stays_dear(hapi_solver *solver)
 {
   bool alike =
@@ -402,7 +404,7 @@ static bool stays_dear(hapi_solver *solver)
 void hapi_solver_sweep_on(hapi_solver *solver)
 {
   for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
-    solver->residual = sweep(solver);
+    solver->residual = rows_sweep(solver);
   }
   check_finite(solver);
 }
@@ -428,6 +430,8 @@ static void run_apart(hapi_solver *solver)
 
 void hapi_solver_run(hapi_solver *solver)
 {
+  HAPI_ASSERT(solver->hub_count <= solver->body_count);
+  HAPI_ASSERT(solver->tolerance >= 0.0 && solver->update_budget > 0);
   uint32_t rows = solver->row_count;
   uint64_t left = solver->update_budget;
   solver->sweeps = 0;
@@ -447,7 +451,7 @@ void hapi_solver_run(hapi_solver *solver)
   }
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
-      solver->residual = sweep(solver);
+      solver->residual = rows_sweep(solver);
       left -= left < rows ? left : rows;
     } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
     if (solver->residual < solver->tolerance || left < rows ||
@@ -455,7 +459,8 @@ void hapi_solver_run(hapi_solver *solver)
       break;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
-     * active rows, sweeps from the second half still come near, and the next tick starts from there. */
+     * active rows, sweeps from the second half still come near, and the next tick starts from
+     * there. */
     if (direct && 2 * left > solver->update_budget &&
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);

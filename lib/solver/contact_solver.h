@@ -3,7 +3,8 @@
 #ifndef HAPODE_SOLVER_CONTACT_SOLVER_H
 #define HAPODE_SOLVER_CONTACT_SOLVER_H
 
-/* Impulses of contacts, by ODE's friction pyramid or within a ball: the box LCP on the level of velocities.
+/* Impulses of contacts, by ODE's friction pyramid or within a ball: the box LCP on the level of
+ * velocities.
  *
  *   w = ja.v[a] + jb.v[b],   v = free velocity + sum over rows of (ba, bb) impulse
  *   lo < impulse < hi:  w + softness impulse = target
@@ -20,40 +21,7 @@
 #include <stdint.h>
 
 #include "base/six.h"
-
-/* One scalar row, in the order in which a sweep reads it. Three rows of a contact stand together: normal, then its two frictions. Chains of
- * bodies converge best in their order, beginning at the hand. A body that does not respond in one
- * row must not respond in any. */
-typedef struct hapi_row {
-  double ja[6];    /* row of the Jacobian, linear and angular */
-  double ba[6];    /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
-  double impulse;  /* N s; in: warm start, out: result */
-  double drive;    /* inner: target without the part of a partner that does not respond */
-  double softness; /* (m/s)/(N s), >= 0 */
-  double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
-  double response; /* inner: 1 / inverse */
-  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
-  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
-                         ball that slides: [0] its part of the force's direction */
-  double lo;          /* N s; may be -HUGE_VAL */
-  double hi;          /* N s; may be HUGE_VAL */
-  uint32_t a;         /* index into v */
-  uint32_t b;         /* several static partners may share one index, whose v stays as it is */
-  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
-                      the bounds are lo .. hi */
-  uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
-                      vector, no longer than mu p: how many; 0: the pyramid */
-  uint8_t round;  /* of the others: how many of them come before */
-  uint8_t single; /* a static partner: jb and bb are 0 and are not looked at */
-  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
-  uint8_t moves_a; /* inner: a responds */
-  uint8_t paired;  /* inner: b responds */
-  uint8_t state;   /* inner, of direct_solver.c */
-  uint32_t next;   /* inner: of the same island */
-  double target;   /* m/s */
-  double jb[6]; /* 0 for a static partner; a sweep reads this and the next where b responds only */
-  double bb[6];
-} hapi_row;
+#include "solver/row.h"
 
 typedef struct hapi_solver {
   hapi_row *rows;
@@ -61,8 +29,8 @@ typedef struct hapi_solver {
   double (*free)[6]; /* in: the same again, stays; for hubs and hapi_solver_calm */
   uint32_t row_count;
   uint32_t body_count;
-  /* The last bodies of all, always b in their rows: each may touch many others, as light pointers do. An
-   * island about them is solved part by part. */
+  /* The last bodies of all, always b in their rows: each may touch many others, as light pointers
+   * do. An island about them is solved part by part. */
   uint32_t hub_count;
   double tolerance;       /* m/s: done when the largest correction of a sweep is below */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
@@ -94,11 +62,12 @@ typedef struct hapi_solver {
  * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
 void hapi_solver_run(hapi_solver *solver);
 
-/* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave more
- * energy than none at all, and as warm start more again from tick to tick: such are shortened to where
- * they leave least, and swept again. What then still leaves more is shortened again, to none where the
- * impulses are no numbers: whatever the run has found, beyond what the rows' targets give it adds no
- * energy. Costs two sweeps where nothing is to be done, and nothing where the run has ended well. */
+/* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave
+ * more energy than none at all, and as warm start more again from tick to tick: such are shortened
+ * to where they leave least, and swept again. What then still leaves more is shortened again, to
+ * none where the impulses are no numbers: whatever the run has found, beyond what the rows' targets
+ * give it adds no energy. Costs two sweeps where nothing is to be done, and nothing where the run
+ * has ended well. */
 void hapi_solver_calm(hapi_solver *solver);
 
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
@@ -109,7 +78,8 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index);
 /* The same of a single row without another one's bounds, of which ja.ba is known. */
 void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
 
-/* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its frictions. */
+/* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its
+ * frictions. */
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
@@ -124,8 +94,8 @@ static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *firs
   return p > 0.0 ? first->mu * p : 0.0;
 }
 
-/* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out of it,
- * where the friction slides against the motion; returns the correction, m/s. */
+/* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out
+ * of it, where the friction slides against the motion; returns the correction, m/s. */
 double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
                         bool *out_slides);
 

@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Direct solves of islands: rounds of active sets (island.c), of the whole or, about hubs, part by part. */
+/* Direct solves of islands: rounds of active sets (island.c), of the whole or, about hubs, part by
+ * part. */
 
 #include <math.h>
 #include <stdbool.h>
@@ -62,7 +63,7 @@ static void chain_leaves(hapi_solver *solver, uint16_t *whole, lists *out)
   }
 }
 
-static void split(hapi_solver *solver, lists *out)
+static void islands_split(hapi_solver *solver, lists *out)
 {
   uint16_t leaf[HAPI_SOLVER_BODIES];
   uint16_t whole[HAPI_SOLVER_BODIES];
@@ -85,10 +86,10 @@ static void split(hapi_solver *solver, lists *out)
 
 /* ---- rounds of the whole ---- */
 
-/* Whether the state after a round is to be kept. The largest correction due, of one row at a bound, is a
- * poor measure of the whole: it may grow for a while where sweeps and further rounds follow. Where
- * there is no room for them, the last one, the round must leave less energy as well, or its impulses
- * blow up in the ticks to come. */
+/* Whether the state after a round is to be kept. The largest correction due, of one row at a bound,
+ * is a poor measure of the whole: it may grow for a while where sweeps and further rounds follow.
+ * Where there is no room for them, the last one, the round must leave less energy as well, or its
+ * impulses blow up in the ticks to come. */
 static bool is_better(const hapi_island *is, double due, double best, bool last)
 {
   return last ? due < best && hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0
@@ -96,7 +97,7 @@ static bool is_better(const hapi_island *is, double due, double best, bool last)
 }
 
 /* The best of some rounds is kept, each with the active set that the one before leads to. */
-static bool improve(hapi_island *is, double before, bool last, double *out_due)
+static bool island_improve(hapi_island *is, double before, bool last, double *out_due)
 {
   double best = before;
   bool better = false;
@@ -125,12 +126,12 @@ static bool improve(hapi_island *is, double before, bool last, double *out_due)
 
 /* ---- islands about hubs ---- */
 
-/* Of many bodies that one hub touches, rounds of the whole island would have to find all active sets
- * at once, each corrected for what all others do in the same round: they go on for ever. But with the
- * velocities of the hubs given, the parts of the island (leaves) do not know of each other, and each
- * finds its own set. A round of the whole with these sets then says what the leaves give to the hubs
- * and how it changes with their velocities: Newton's method for the hubs alone, whose forces are
- * functions of their velocities made of straight pieces. */
+/* Of many bodies that one hub touches, rounds of the whole island would have to find all active
+ * sets at once, each corrected for what all others do in the same round: they go on for ever. But
+ * with the velocities of the hubs given, the parts of the island (leaves) do not know of each
+ * other, and each finds its own set. A round of the whole with these sets then says what the leaves
+ * give to the hubs and how it changes with their velocities: Newton's method for the hubs alone,
+ * whose forces are functions of their velocities made of straight pieces. */
 
 typedef struct hub_state {
   double v[HUBS_MAX][6]; /* as the leaves are told */
@@ -138,7 +139,7 @@ typedef struct hub_state {
   uint32_t step;         /* the same, of one step of the hubs */
 } hub_state;
 
-static void hold(const hapi_island *is, const hub_state *hubs)
+static void hubs_hold(const hapi_island *is, const hub_state *hubs)
 {
   const hapi_solver *solver = is->solver;
   uint32_t first = solver->body_count - solver->hub_count;
@@ -151,7 +152,7 @@ static bool touches_hub(const hapi_solver *solver, const hapi_row *row)
 }
 
 /* The velocities of the hubs that the impulses make, and the errors with them. */
-static void release(hapi_island *is)
+static void hubs_release(hapi_island *is)
 {
   const hapi_solver *solver = is->solver;
   const hapi_row *rows = solver->rows;
@@ -172,7 +173,7 @@ static void release(hapi_island *is)
   }
 }
 
-static uint32_t take(hub_state *hubs, uint32_t cost)
+static uint32_t updates_take(hub_state *hubs, uint32_t cost)
 {
   uint32_t taken = cost <= hubs->left ? cost : 0;
   hubs->left -= taken;
@@ -201,9 +202,9 @@ static void solve_leaf(hapi_island *is, hub_state *hubs)
     return;
   }
   hapi_island_save(is);
-  for (int round = 0; round < LEAF_ROUNDS && take(hubs, cost) > 0; ++round) {
+  for (int round = 0; round < LEAF_ROUNDS && updates_take(hubs, cost) > 0; ++round) {
     hapi_island_solve(is);
-    hold(is, hubs);
+    hubs_hold(is, hubs);
     double due = hapi_island_inspect(is, false);
     if (due < is->solver->tolerance) {
       return;
@@ -242,7 +243,7 @@ static void step_hubs(hapi_island *is, hub_state *hubs)
 {
   const hapi_solver *solver = is->solver;
   uint32_t first = solver->body_count - solver->hub_count;
-  release(is);
+  hubs_release(is);
   hapi_island_save(is);
   hapi_island_solve(is);
   for (uint32_t i = 0; i < is->count; ++i) {
@@ -255,7 +256,7 @@ static void step_hubs(hapi_island *is, hub_state *hubs)
 }
 
 /* The state to go back to. */
-static void keep(hapi_island *is)
+static void state_keep(hapi_island *is)
 {
   const hapi_solver *solver = is->solver;
   memcpy(is->kept_v, solver->v, solver->body_count * sizeof *solver->v);
@@ -282,8 +283,8 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
   uint32_t first = solver->body_count - solver->hub_count;
   bool better = false;
   memcpy(hubs->v, solver->v[first], solver->hub_count * sizeof hubs->v[0]);
-  keep(is);
-  for (int round = 0; round < HUB_ROUNDS && take(hubs, hubs->step) > 0; ++round) {
+  state_keep(is);
+  for (int round = 0; round < HUB_ROUNDS && updates_take(hubs, hubs->step) > 0; ++round) {
     solve_leaves(is, all, first_leaf, hubs);
     if (!hapi_island_gather(is) || hapi_island_plan(is) == 0 || !hapi_island_place(is)) {
       break;
@@ -297,9 +298,9 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
     if (due < *io_due && hapi_island_rise(is, is->kept_impulse, is->kept_error) < 0.0) {
       *io_due = due;
       better = true;
-      keep(is);
+      state_keep(is);
     }
-    hold(is, hubs);
+    hubs_hold(is, hubs);
   }
   go_back(is);
   return better;
@@ -342,7 +343,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     spent = budget - hubs.left;
   } else {
     bool last = 2 * (uint64_t)(budget - cost) <= solver->update_budget;
-    solver->direct_solves += improve(is, due, last, &due);
+    solver->direct_solves += island_improve(is, due, last, &due);
     spent = cost;
   }
   solver->direct_residual = fmax(solver->direct_residual, due);
@@ -360,7 +361,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
       solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {
     return 0;
   }
-  split(solver, &all);
+  islands_split(solver, &all);
   solver->direct_residual = 0.0;
   is.solver = solver;
   is.held = false;

@@ -17,28 +17,31 @@
 
 #include <string.h>
 
+#include "base/assert.h"
+
 #define SOFTENING 1e-8   /* R, relative to the row's own response */
 #define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
 #define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
 
 /* ---- sets of bodies ---- */
 
-static bool has(const hapi_body_set *set, uint32_t i)
+static bool set_has(const hapi_body_set *set, uint32_t i)
 {
   return (set->bits[i / 64] >> i % 64 & 1) != 0;
 }
 
-static void add(hapi_body_set *set, uint32_t i)
+static void set_add(hapi_body_set *set, uint32_t i)
 {
+  HAPI_ASSERT_INDEX(i, HAPI_ISLAND_BODIES);
   set->bits[i / 64] |= (uint64_t)1 << i % 64;
 }
 
-static void drop(hapi_body_set *set, uint32_t i)
+static void set_drop(hapi_body_set *set, uint32_t i)
 {
   set->bits[i / 64] &= ~((uint64_t)1 << i % 64);
 }
 
-static hapi_body_set both(const hapi_body_set *a, const hapi_body_set *b)
+static hapi_body_set set_both(const hapi_body_set *a, const hapi_body_set *b)
 {
   return (hapi_body_set){{a->bits[0] & b->bits[0], a->bits[1] & b->bits[1]}};
 }
@@ -75,8 +78,9 @@ static uint32_t count_of(const hapi_body_set *set)
 
 /* ---- rows ---- */
 
-/* `sticking` takes the friction of all contacts that push for free. `at_bound`: it wants to stay. */
-static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool sticking)
+/* `sticking` takes the friction of all contacts that push for free. `at_bound`: it wants to
+ * stay. */
+static void row_classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool sticking)
 {
   hapi_row *rows = is->solver->rows;
   hapi_row *row = &rows[i];
@@ -92,8 +96,8 @@ static void classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool
   is->used_rows += row->state != HAPI_ROW_FIXED;
 }
 
-/* What a row of a ball that slides has more of softness: across the force F it goes with the slip e, as
- * the two are parallel, e_t = (|e| / F) F_t. */
+/* What a row of a ball that slides has more of softness: across the force F it goes with the slip
+ * e, as the two are parallel, e_t = (|e| / F) F_t. */
 static double slip_softness(const hapi_island *is, const hapi_row *row, uint32_t index)
 {
   return 1.0 / is->gain[index] - row->softness - SOFTENING * row->response;
@@ -114,8 +118,8 @@ static void slide_ball(hapi_island *is, uint32_t first, double radius, const dou
   }
 }
 
-/* The states of frictions that are one vector: free, or along the force and as large as the normal lets
- * it, while they turn with the slip. */
+/* The states of frictions that are one vector: free, or along the force and as large as the normal
+ * lets it, while they turn with the slip. */
 static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
 {
   hapi_row *row = &is->solver->rows[first];
@@ -166,13 +170,13 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     double due = fabs(hapi_clamp(wanted, lo, hi) - p) * row->response;
     largest = due > largest ? due : largest;
     sum += due + is->error[i];
-    classify(is, i, !inside, hi, sticking);
+    row_classify(is, i, !inside, hi, sticking);
   }
   return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
 /* The row whose error drives this row's impulse. */
-static const hapi_row *source(const hapi_island *is, const hapi_row *row)
+static const hapi_row *drive_source(const hapi_island *is, const hapi_row *row)
 {
   return row->state == HAPI_ROW_TIED ? &is->solver->rows[row->normal] : row;
 }
@@ -184,16 +188,18 @@ typedef struct drive {
   double error;
 } drive;
 
-/* The one drive of a row that is free or tied: nearly all are, and this is in the innermost loops. */
+/* The one drive of a row that is free or tied: nearly all are, and this is in the innermost
+ * loops. */
 static inline drive drive_of(const hapi_island *is, const hapi_row *row, uint32_t index)
 {
-  const hapi_row *from = source(is, row);
+  const hapi_row *from = drive_source(is, row);
   return (drive){from, is->gain[index], is->error[from - is->solver->rows]};
 }
 
 #define SLIDING_DRIVES 4
 
-/* Of a row of a ball that slides: its normal, and the ball's rows across the force; returns how many. */
+/* Of a row of a ball that slides: its normal, and the ball's rows across the force; returns how
+ * many. */
 static int sliding_drives(const hapi_island *is, uint32_t index, drive out[SLIDING_DRIVES])
 {
   const hapi_row *rows = is->solver->rows;
@@ -222,6 +228,7 @@ static int sliding_drives(const hapi_island *is, uint32_t index, drive out[SLIDI
 
 static bool add_body(hapi_island *is, uint32_t body)
 {
+  HAPI_ASSERT_INDEX(body, is->solver->body_count);
   if (is->local[body] != HAPI_NO_BODY) {
     return true;
   }
@@ -229,7 +236,7 @@ static bool add_body(hapi_island *is, uint32_t body)
     return false;
   }
   is->link[is->count] = (hapi_body_set){{0, 0}};
-  add(&is->link[is->count], is->count);
+  set_add(&is->link[is->count], is->count);
   is->body[is->count] = (uint16_t)body;
   is->local[body] = (uint16_t)is->count++;
   return true;
@@ -252,8 +259,8 @@ bool hapi_island_gather(hapi_island *is)
     uint16_t b = is->local[rows[i].b];
     if (a != HAPI_NO_BODY &&
         b != HAPI_NO_BODY) { /* a body on rails may answer to some of its rows only */
-      add(&is->link[a], b);
-      add(&is->link[b], a);
+      set_add(&is->link[a], b);
+      set_add(&is->link[b], a);
     }
   }
   return true;
@@ -265,8 +272,8 @@ static uint32_t least_linked(const hapi_island *is, const hapi_body_set *left)
   uint32_t best = 0;
   uint32_t best_degree = UINT32_MAX;
   for (uint32_t i = 0; i < is->count; ++i) {
-    hapi_body_set links = both(&is->link[i], left);
-    uint32_t degree = has(left, i) ? count_of(&links) : UINT32_MAX;
+    hapi_body_set links = set_both(&is->link[i], left);
+    uint32_t degree = set_has(left, i) ? count_of(&links) : UINT32_MAX;
     if (degree < best_degree) {
       best_degree = degree;
       best = i;
@@ -284,13 +291,13 @@ uint32_t hapi_island_plan(hapi_island *is)
   hapi_body_set left = {{0, 0}};
   uint32_t madds = is->used_rows * ROW_MADDS;
   for (uint32_t i = 0; i < is->count; ++i) {
-    add(&left, i);
+    set_add(&left, i);
   }
   for (uint32_t k = 0; k < is->count; ++k) {
     uint32_t p = least_linked(is, &left);
-    drop(&left, p);
+    set_drop(&left, p);
     is->pivot[k] = (uint16_t)p;
-    is->rest[p] = both(&is->link[p], &left);
+    is->rest[p] = set_both(&is->link[p], &left);
     uint32_t degree = count_of(&is->rest[p]);
     madds += 216 * (1 + degree + degree * degree);
     for (uint32_t i = next_in(&is->rest[p], 0); i < HAPI_ISLAND_BODIES;
@@ -358,7 +365,7 @@ static void add_sliding(hapi_island *is, uint32_t index)
 
 /* Matrix and right side, dv = sum of gain b e, with the errors of the last look. One walk for
  * both: the rows are more than fits into a near cache. */
-static void assemble(hapi_island *is)
+static void matrix_assemble(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
   memset(is->blocks, 0, is->block_count * sizeof *is->blocks);
@@ -380,7 +387,7 @@ static void assemble(hapi_island *is)
 
 /* One step of Gauss and Jordan: row k by the pivot, the others freed of column k, in which the
  * inverse grows. */
-static void eliminate(double m[36], int k)
+static void block_eliminate(double m[36], int k)
 {
   double pivot = 1.0 / m[7 * k];
   m[7 * k] = 1.0;
@@ -398,10 +405,10 @@ static void eliminate(double m[36], int k)
 
 /* m = m^-1. No pivoting: such a block is 1 plus a product of positive definite matrices as long as
  * nothing slides, and what sliding spoils is not accepted. */
-static void invert(double m[36])
+static void block_invert(double m[36])
 {
   for (int k = 0; k < 6; ++k) {
-    eliminate(m, k);
+    block_eliminate(m, k);
   }
 }
 
@@ -432,13 +439,13 @@ static void apply_sub(const double m[36], const double x[6], double y[6])
 }
 
 /* Block LU: diagonal blocks become their inverses, blocks below factors. */
-static void factor(hapi_island *is)
+static void matrix_factor(hapi_island *is)
 {
   for (uint32_t k = 0; k < is->count; ++k) {
     uint16_t p = is->pivot[k];
     const hapi_body_set *rest = &is->rest[p];
     double *diagonal = is->blocks[is->block[p][p]];
-    invert(diagonal);
+    block_invert(diagonal);
     for (uint32_t i = next_in(rest, 0); i < HAPI_ISLAND_BODIES; i = next_in(rest, i + 1)) {
       double *below = is->blocks[is->block[i][p]];
       double l[36] = {0.0};
@@ -454,7 +461,7 @@ static void factor(hapi_island *is)
 }
 
 /* dv: in right side, out solution */
-static void substitute(hapi_island *is)
+static void matrix_substitute(hapi_island *is)
 {
   for (uint32_t k = 0; k < is->count; ++k) {
     uint16_t p = is->pivot[k];
@@ -480,7 +487,7 @@ static void substitute(hapi_island *is)
 
 /* ---- one round ---- */
 
-static double moved(const hapi_island *is, uint16_t local, const double j[6])
+static double row_moved(const hapi_island *is, uint16_t local, const double j[6])
 {
   return local == HAPI_NO_BODY ? 0.0 : hapi_dot6(j, is->dv[local]);
 }
@@ -492,11 +499,11 @@ static void restore_velocities(hapi_island *is)
   }
 }
 
-static inline double answer(const hapi_island *is, drive d)
+static inline double drive_answer(const hapi_island *is, drive d)
 {
-  double w = moved(is, is->local[d.from->a], d.from->ja);
+  double w = row_moved(is, is->local[d.from->a], d.from->ja);
   if (d.from->paired) {
-    w += moved(is, is->local[d.from->b], d.from->jb);
+    w += row_moved(is, is->local[d.from->b], d.from->jb);
   }
   return d.gain * (d.error - w);
 }
@@ -507,20 +514,20 @@ static double sliding_asked(const hapi_island *is, uint32_t index)
   double p = is->solver->rows[index].impulse;
   int count = sliding_drives(is, index, drives);
   for (int k = 0; k < count; ++k) {
-    p += answer(is, drives[k]);
+    p += drive_answer(is, drives[k]);
   }
   return p;
 }
 
 /* Impulse that dv asks for. */
-static inline double asked(const hapi_island *is, uint32_t index)
+static inline double row_asked(const hapi_island *is, uint32_t index)
 {
   const hapi_row *row = &is->solver->rows[index];
   if (row->state == HAPI_ROW_SLIDING) {
     return sliding_asked(is, index);
   }
   return row->state == HAPI_ROW_FIXED ? row->impulse
-                                      : row->impulse + answer(is, drive_of(is, row, index));
+                                      : row->impulse + drive_answer(is, drive_of(is, row, index));
 }
 
 static void push_to(hapi_island *is, uint32_t index, double p)
@@ -536,7 +543,7 @@ static void push_ball(hapi_island *is, uint32_t first)
   double radius = hapi_ball_radius(is->solver->rows, row);
   double p[3] = {0.0};
   for (uint32_t i = 0; i < row->ball; ++i) {
-    p[i] = asked(is, first + i);
+    p[i] = row_asked(is, first + i);
   }
   double norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
   double share = norm > radius ? radius / norm : 1.0;
@@ -546,8 +553,9 @@ static void push_ball(hapi_island *is, uint32_t first)
 }
 
 /* What the rows of dv ask for, cut at the bounds: a normal comes before its frictions. The
- * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a set
- * of active rows that cannot be gives impulses so large that nothing of the velocities would be left. */
+ * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a
+ * set of active rows that cannot be gives impulses so large that nothing of the velocities would be
+ * left. */
 static void push_rows(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
@@ -559,7 +567,7 @@ static void push_rows(hapi_island *is)
       push_ball(is, i);
     } else if (rows[i].round == 0) {
       hapi_row_bounds(rows, &rows[i], &lo, &hi);
-      push_to(is, i, hapi_clamp(asked(is, i), lo, hi));
+      push_to(is, i, hapi_clamp(row_asked(is, i), lo, hi));
     }
   }
 }
@@ -599,9 +607,9 @@ bool hapi_island_place(hapi_island *is)
 /* Impulses of the rows that are free or tied now, cut at their bounds. */
 void hapi_island_solve(hapi_island *is)
 {
-  assemble(is);
-  factor(is);
-  substitute(is);
+  matrix_assemble(is);
+  matrix_factor(is);
+  matrix_substitute(is);
   push_rows(is);
 }
 

@@ -77,8 +77,8 @@ static inline void hapi_unite(uint16_t *parent, uint32_t i, uint32_t j)
   parent[a > b ? a : b] = a > b ? b : a;
 }
 
-/* The states of the rows, for the next round; returns the largest correction due, m/s; NaN if one is no
- * number. `sticking` takes the friction of all contacts that push for free. */
+/* The states of the rows, for the next round; returns the largest correction due, m/s; NaN if one
+ * is no number. `sticking` takes the friction of all contacts that push for free. */
 double hapi_island_inspect(hapi_island *is, bool sticking);
 
 /* The bodies, but for hubs that are held; false: too many. */

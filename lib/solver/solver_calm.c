@@ -1,14 +1,14 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* What an island that was not solved may do: no more than nothing at all. Along the ray from no impulses
- * to those at hand,
+/* What an island that was not solved may do: no more than nothing at all. Along the ray from no
+ * impulses to those at hand,
  *
  *   J(s) = s^2 b / 2 - s a,   a = p (target - w free),   b = p (j A j^T + softness) p
  *
- * is the energy that the impulses add beyond what the targets ask for, and what the rows minimise when
- * no friction slides. Where J(1) > 0, a share a / b of them leaves least. b < 0, or no number, is no
- * energy of any body: then no impulse is right. */
+ * is the energy that the impulses add beyond what the targets ask for, and what the rows minimise
+ * when no friction slides. Where J(1) > 0, a share a / b of them leaves least. b < 0, or no number,
+ * is no energy of any body: then no impulse is right. */
 
 #include <math.h>
 #include <string.h>
@@ -65,7 +65,7 @@ static void find_islands(const hapi_solver *solver, rays *out)
 
 /* The velocities that the impulses make: what was kept along is off by the rounding of the largest
  * impulse that there ever was. */
-static void rebuild(hapi_solver *solver)
+static void velocities_rebuild(hapi_solver *solver)
 {
   memcpy(solver->v, solver->free, solver->body_count * sizeof *solver->v);
   for (uint32_t i = 0; i < solver->row_count; ++i) {
@@ -85,11 +85,11 @@ static bool is_calm(const ray *r)
 }
 
 /* The shares of all islands; whether one is below 1. */
-static bool measure(hapi_solver *solver, rays *r)
+static bool rays_measure(hapi_solver *solver, rays *r)
 {
   uint32_t count = solver->body_count <= HAPI_SOLVER_BODIES ? solver->body_count : 1;
   bool all_calm = true;
-  rebuild(solver);
+  velocities_rebuild(solver);
   memset(r->of, 0, count * sizeof r->of[0]);
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
@@ -99,7 +99,8 @@ static bool measure(hapi_solver *solver, rays *r)
       without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
       double a = row->impulse * without;
       double b = a - row->impulse * hapi_row_error(solver, row);
-      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign): cleared above, for every island */
+      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign): cleared above, for every
+       * island */
       of->a += a;
       of->b += b;
       of->size += fabs(a) + fabs(b);
@@ -116,7 +117,7 @@ static bool measure(hapi_solver *solver, rays *r)
 }
 
 /* Bounds hold for any share: a friction's goes with its normal's. */
-static void shorten(hapi_solver *solver, const rays *r)
+static void impulses_shorten(hapi_solver *solver, const rays *r)
 {
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     hapi_row *row = &solver->rows[i];
@@ -132,7 +133,8 @@ static void shorten(hapi_solver *solver, const rays *r)
   }
 }
 
-/* Sweeps lower J where nothing slides. Where they do not, in what is left of the tick nothing is found. */
+/* Sweeps lower J where nothing slides. Where they do not, in what is left of the tick nothing is
+ * found. */
 void hapi_solver_calm(hapi_solver *solver)
 {
   rays r;
@@ -140,12 +142,12 @@ void hapi_solver_calm(hapi_solver *solver)
     return;
   }
   find_islands(solver, &r);
-  if (!measure(solver, &r)) {
+  if (!rays_measure(solver, &r)) {
     return;
   }
-  shorten(solver, &r);
+  impulses_shorten(solver, &r);
   hapi_solver_sweep_on(solver);
-  if (measure(solver, &r)) {
-    shorten(solver, &r);
+  if (rays_measure(solver, &r)) {
+    impulses_shorten(solver, &r);
   }
 }

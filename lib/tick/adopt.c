@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "local/body_adopt.h"
@@ -84,6 +85,10 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
 {
   double age_s = 1e-9 * (double)(now_ns - model->state_ns);
   age_s = age_s > 0.1 ? 0.1 : age_s < -0.1 ? -0.1 : age_s;
+  HAPI_ASSERT(model->body_count <= tick->capacity.bodies);
+  HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
+  HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
+  HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
   hapi_local_bodies_adopt(&tick->bodies, model, age_s, &tick->facts);
   solver_adopt(&tick->rows.solver, model);
   bool observes = model_observes(&tick->pointers, model);
@@ -99,6 +104,8 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
 
 void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches)
 {
+  HAPI_ASSERT(patches->contact_count <= tick->capacity.contacts);
+  HAPI_ASSERT(patches->tool_count <= tick->capacity.tool_points);
   hapi_body_contacts_adopt(&tick->contacts, patches);
   if (tick->facts.model == HAP_MODEL_CONTACT) {
     hapi_tool_adopt_patches(&tick->touches, &tick->pointers, patches, tick->facts.wishes);

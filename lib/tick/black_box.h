@@ -5,9 +5,9 @@
 
 /* The last ticks, kept until somebody has asked what led to a fault.
  *
- * Who may touch the rows is in one atomic word. FILLING: the loop. FROZEN: nobody; either side takes it
- * from there by an exchange. READING: one reader, who puts FROZEN back. A loop that would go on while
- * it is READING keeps no rows until the reader is done: it never waits. */
+ * Who may touch the rows is in one atomic word. FILLING: the loop. FROZEN: nobody; either side
+ * takes it from there by an exchange. READING: one reader, who puts FROZEN back. A loop that would
+ * go on while it is READING keeps no rows until the reader is done: it never waits. */
 
 #include <stdatomic.h>
 
@@ -33,8 +33,8 @@ typedef struct hapi_black_box {
 /* Empties it; rows, counts and pointers are set. Touches all of its memory. */
 void hapi_black_box_reset(hapi_black_box *box);
 
-/* [haptic] After the devices were written. Freezes the box with the first tick of a fault, and begins
- * anew after its reset, or with the next fault. */
+/* [haptic] After the devices were written. Freezes the box with the first tick of a fault, and
+ * begins anew after its reset, or with the next fault. */
 void hapi_black_box_record(hapi_black_box *box, const hapi_tick *tick);
 
 /* One reader at a time, any thread. Rows copied: the newest capacity of them, oldest first; 0: no

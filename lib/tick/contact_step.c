@@ -15,10 +15,11 @@
 #include "pointer/rigid_proxy.h"
 #include "tick/tick.h"
 
-/* A tick of model CONTACT: free velocities, rows, one solve for forces and motion, poses, books. Bodies
- * near the pointers are stepped as the global world would be stepped at the same rate (semi-implicit
- * Euler, contacts on the level of velocities). What the loop does not own stands around them and moves
- * as it was last seen. All of it is one file, as calls between files would be felt in a tick. */
+/* A tick of model CONTACT: free velocities, rows, one solve for forces and motion, poses, books.
+ * Bodies near the pointers are stepped as the global world would be stepped at the same rate
+ * (semi-implicit Euler, contacts on the level of velocities). What the loop does not own stands
+ * around them and moves as it was last seen. All of it is one file, as calls between files would be
+ * felt in a tick. */
 
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
@@ -59,6 +60,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     HAPI_ASSERT_INDEX(bodies->live[i], bodies->high);
+    HAPI_ASSERT(body->live);
     body_begin(body, patches);
     body->row = solver->body_count++;
     hapi_body_free_velocity(body, period, solver->v[body->row]);
@@ -237,8 +239,8 @@ static void body_touch(hapi_local_body *body)
   }
 }
 
-/* J that an impulse along j did on a body that the loop owns: with the mean of its velocities, as the
- * change of a kinetic energy is. */
+/* J that an impulse along j did on a body that the loop owns: with the mean of its velocities, as
+ * the change of a kinetic energy is. */
 static double work_on(const hapi_local_body *body, const hapi_solver *solver, const double j[6],
                       double impulse)
 {
@@ -283,12 +285,14 @@ static void account_row(hapi_bodies *bodies, const hapi_solver *solver, const ha
   }
 }
 
-/* Keeps the impulses for the next tick, and says who got them. observes: bodies->given is asked for. */
+/* Keeps the impulses for the next tick, and says who got them. observes: bodies->given is asked
+ * for. */
 static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_contacts *contacts,
                          const hapi_joints *joints, bool observes)
 {
   const hapi_solver *solver = &rows->solver;
   contacts->active = 0;
+  HAPI_ASSERT(solver->row_count <= rows->capacity);
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
     const hapi_row_source *source = &rows->sources[i];
@@ -299,8 +303,12 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
       continue;
     }
     if (source->joint) {
+      HAPI_ASSERT_INDEX(source->contact, joints->count);
+      HAPI_ASSERT_INDEX(source->part, HAPI_JOINT_PARTS);
       joints->memory[joints->of[source->contact].slot].impulse[source->part] = row->impulse;
     } else {
+      HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
+      HAPI_ASSERT_INDEX(source->part, 3);
       contacts->memory[source->contact].impulse[source->part] = row->impulse;
       contacts->active += source->part == 0 && row->impulse > 0.0;
     }
@@ -315,8 +323,8 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
   }
 }
 
-/* Push-out and the closing of joints move the bodies, and are not to stay in their velocities: poses
- * first, then a second solve without them. True: it has to be made. */
+/* Push-out and the closing of joints move the bodies, and are not to stay in their velocities:
+ * poses first, then a second solve without them. True: it has to be made. */
 static bool rows_stop_push_out(hapi_rows *rows)
 {
   hapi_solver *solver = &rows->solver;

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/hash.h"
 #include "base/vec.h"
 
 static void report_bodies(const hapi_bodies *from, hapi_state *out)
@@ -113,8 +114,8 @@ static bool has_news(const hapi_local_body *body)
                 sizeof body->account.angular_impulse) != 0;
 }
 
-/* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body that
- * it does not own and gave nothing takes the world's state then. */
+/* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body
+ * that it does not own and gave nothing takes the world's state then. */
 static bool loop_leads(hap_model model, const hapi_local_body *body)
 {
   if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 || model == HAP_MODEL_IMPULSE) {
@@ -229,4 +230,54 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
       to->twist = in->twist;
     }
   }
+}
+
+/* ---- the trace ---- */
+
+static void trace_bodies(const hapi_tick_watch *watch, const hapi_bodies *bodies,
+                         hap_trace_row *out)
+{
+  out->body_count = watch->count;
+  for (uint32_t i = 0; i < watch->count; ++i) {
+    uint32_t slot = watch->slot[i];
+    const double *at = slot == HAPI_SLOT_NONE ? watch->position[i] : bodies->of[slot].pose.position;
+    hapi_v3_copy(at, out->body_position[i]);
+  }
+}
+
+void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
+{
+  out->tick = tick->facts.tick - 1; /* the one that has just been run */
+  out->model_age_s = 1e-9 * (double)(tick->facts.now_ns - tick->facts.state_ns);
+  out->bodies = tick->bodies.live_count;
+  out->contacts = tick->touches.pushing;
+  out->pointer_count = 0;
+  for (uint32_t i = 0; i < tick->capacity.pointers && i < HAP_TRACE_POINTERS_MAX; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    out->pointer_count = p->generation != 0 ? i + 1 : out->pointer_count;
+    hapi_v3_copy(p->pose.position, out->pointers[i].position);
+    hapi_v3_copy(p->wrench.force, out->pointers[i].force);
+    hapi_v3_copy(p->wrench.torque, out->pointers[i].torque);
+  }
+  trace_bodies(&tick->watch, &tick->bodies, out);
+}
+
+uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      hash = hapi_hash_doubles(hash, p->pose.position, 3);
+      hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
+      hash = hapi_hash_doubles(hash, p->device.wrench.torque, 3);
+    }
+  }
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
+    hash = hapi_hash_doubles(hash, body->pose.position, 3);
+    hash = hapi_hash_doubles(hash, body->pose.quat_wxyz, 4);
+    hash = hapi_hash_doubles(hash, body->twist.linear, 3);
+    hash = hapi_hash_doubles(hash, body->twist.angular, 3);
+  }
+  return hash;
 }

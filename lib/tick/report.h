@@ -15,4 +15,7 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
 void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
+/* Of what the tick has come to, on top of a hash before. */
+uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash);
+
 #endif

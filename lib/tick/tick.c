@@ -4,14 +4,17 @@
 
 #include <string.h>
 
+#include "base/hash.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
 #include "paper/local_dynamics.h"
 #include "paper/render.h"
 #include "pointer/coupling.h"
 #include "pointer/proxy.h"
+#include "tick/report.h"
 
-/* ---- reset: arrays stay, and every page of theirs is touched once, so that no tick is the first ---- */
+/* ---- reset: arrays stay, and every page of theirs is touched once, so that no tick is the first
+ * ---- */
 
 static void bodies_reset(hapi_bodies *bodies, const hapi_capacity *c)
 {
@@ -102,7 +105,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->guard = (hapi_guard){.mode = tick->guard.mode};
   memset(&tick->sample, 0, sizeof tick->sample);
   memset(&tick->watch, 0, sizeof tick->watch);
-  tick->hash = 0xcbf29ce484222325u;
+  tick->hash = HAPI_HASH_BEGIN;
 }
 
 void hapi_tick_fault(hapi_tick *tick, hap_fault fault, uint32_t pointer)

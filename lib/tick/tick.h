@@ -8,7 +8,7 @@
  * it. All memory is handed over by hapi_tick_reset's caller.
  *
  *   pointer   device pose -> pointer                               (paper step a)
- *   paper     pointer and planes -> forces -> motion of the neighbours, eq. 7-11: the paper's models
+ *   paper     pointer and planes -> forces -> motion of the neighbours: eq. 7-11
  *   local     model CONTACT: the same in one solve, of rows that the solver knows
  *   guard     checks, shares, limits -> device wrench
  *   report    state for physics; trace row; hash; black box
@@ -75,8 +75,5 @@ void hapi_tick_reset_fault(hapi_tick *tick);
 void hapi_tick_read(hapi_tick *tick, int64_t now_ns); /* devices -> pointers */
 void hapi_contact_step(hapi_tick *tick);              /* model CONTACT */
 void hapi_tick_guard(hapi_tick *tick);                /* world wrenches -> device wrenches */
-
-/* trace.c: of what a tick has come to, on top of a hash before. */
-uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash);
 
 #endif

@@ -162,7 +162,7 @@ const case_row stability_cases[] = {
      .mu = 0.8, .finger = 6e-3},
   {"pinched softly through proxies",   build_pinch,           1, 0.05,  0,    1e4, TENSE,   2.0, CONTACT, 0.5,
      .coupling_stiffness = 1e3, .mu = 0.8, .finger = 6e-3},
-  /* gain: what the shares of the tool's points make when it tilts under load (docs/numerics.md); the energy
+  /* gain: what the shares of the tool's points make when it tilts under load (docs/decisions/tools.md); the energy
    * observer, which is off here, gives none of it to the hand: tests/test_tool_bodies.c. */
   {"tool on a wall, 2 kN/m",           build_tool_press,      0, 0,     0,    2e3, RELAXED, 1.4, TWO,     0.01,
      .gain = 0.05},

@@ -1,0 +1,42 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SOLVER_ROW_H
+#define HAPODE_SOLVER_ROW_H
+
+#include <stdint.h>
+
+/* One scalar row, in the order in which a sweep reads it. Three rows of a contact stand together:
+ * normal, then its two frictions. Chains of bodies converge best in their order, beginning at the
+ * hand. A body that does not respond in one row must not respond in any. */
+typedef struct hapi_row {
+  double ja[6];    /* row of the Jacobian, linear and angular */
+  double ba[6];    /* A J^T, usually M^-1 J^T: change of v[a] by one N s; 0: a does not respond */
+  double impulse;  /* N s; in: warm start, out: result */
+  double drive;    /* inner: target without the part of a partner that does not respond */
+  double softness; /* (m/s)/(N s), >= 0 */
+  double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
+  double response; /* inner: 1 / inverse */
+  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
+  double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
+                         ball that slides: [0] its part of the force's direction */
+  double lo;          /* N s; may be -HUGE_VAL */
+  double hi;          /* N s; may be HUGE_VAL */
+  uint32_t a;         /* index into v */
+  uint32_t b;         /* several static partners may share one index, whose v stays as it is */
+  int32_t normal;     /* index of the normal row, before this one and of the same a and b; -1: none,
+                      the bounds are lo .. hi */
+  uint8_t ball;   /* of the first of 2 or 3 frictions that stand together and whose impulses are one
+                      vector, no longer than mu p: how many; 0: the pyramid */
+  uint8_t round;  /* of the others: how many of them come before */
+  uint8_t single; /* a static partner: jb and bb are 0 and are not looked at */
+  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
+  uint8_t moves_a; /* inner: a responds */
+  uint8_t paired;  /* inner: b responds */
+  uint8_t state;   /* inner, of direct_solver.c */
+  uint32_t next;   /* inner: of the same island */
+  double target;   /* m/s */
+  double jb[6]; /* 0 for a static partner; a sweep reads this and the next where b responds only */
+  double bb[6];
+} hapi_row;
+
+#endif
