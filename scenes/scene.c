@@ -14,10 +14,10 @@
 
 static const double push_out_speed = 0.5; /* m/s, of bodies that penetrate */
 
-static hap_status fail(hap_detail *detail, hap_status status, const char *format, ...)
+static hap_status spec_fail(hap_detail *detail, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
 
-static hap_status fail(hap_detail *detail, hap_status status, const char *format, ...)
+static hap_status spec_fail(hap_detail *detail, hap_status status, const char *format, ...)
 {
   if (detail != NULL) {
     va_list arguments;
@@ -172,8 +172,8 @@ static void shift_bodies(scene *s)
 }
 
 /* parameters were checked, count is in range */
-static hap_status build(const scene_row *row, const scene_parameters *parameters, int count,
-                        scene **out, hap_detail *detail)
+static hap_status scene_build(const scene_row *row, const scene_parameters *parameters, int count,
+                              scene **out, hap_detail *detail)
 {
   const size_t bodies = (size_t)(count > 0 ? count : row->bodies);
   scene *s = calloc(1, sizeof *s);
@@ -181,8 +181,8 @@ static hap_status build(const scene_row *row, const scene_parameters *parameters
   if (s == NULL || list == NULL) {
     free(s);
     free(list);
-    return fail(detail, HAP_ERROR_MEMORY, "no memory for scene '%s' of %zu bodies",
-                row->parameters.name, bodies);
+    return spec_fail(detail, HAP_ERROR_MEMORY, "no memory for scene '%s' of %zu bodies",
+                     row->parameters.name, bodies);
   }
   s->parameters = *parameters;
   s->parameters.name = row->parameters.name;
@@ -201,59 +201,59 @@ hap_status scene_create_from(const scene_parameters *parameters, int count, scen
 {
   char all[256];
   if (out == NULL) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
+    return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
   }
   *out = NULL;
   if (parameters == NULL || parameters->name == NULL) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene: no name; there are: %s",
-                list_scenes(all, sizeof all));
+    return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene: no name; there are: %s",
+                     list_scenes(all, sizeof all));
   }
   const scene_row *row = find_row(parameters->name, strlen(parameters->name));
   if (row == NULL) {
-    return fail(detail, HAP_ERROR_NOT_FOUND, "no scene '%.40s'; there are: %s", parameters->name,
-                list_scenes(all, sizeof all));
+    return spec_fail(detail, HAP_ERROR_NOT_FOUND, "no scene '%.40s'; there are: %s",
+                     parameters->name, list_scenes(all, sizeof all));
   }
   const char *bad = bad_parameter(parameters);
   if (bad != NULL) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' cannot be built with this %s",
-                parameters->name, bad);
+    return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' cannot be built with this %s",
+                     parameters->name, bad);
   }
   const int count_max = row->parameters.count_default > 0 ? SCENE_COUNT_MAX : 0;
   const int count_min = count_max > 0 ? 1 : 0;
   const int wanted = count != 0 ? count : parameters->count_default;
   if (wanted < count_min || wanted > count_max) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s': N is %d .. %d, not %d; there are: %s",
-                parameters->name, count_min, count_max, wanted, list_scenes(all, sizeof all));
+    return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene '%s': N is %d .. %d, not %d; there are: %s",
+                     parameters->name, count_min, count_max, wanted, list_scenes(all, sizeof all));
   }
-  return build(row, parameters, wanted, out, detail);
+  return scene_build(row, parameters, wanted, out, detail);
 }
 
 hap_status scene_create(const char *spec, scene **out, hap_detail *detail)
 {
   char all[256];
   if (out == NULL) {
-    return fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
+    return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene: out is NULL");
   }
   *out = NULL;
   const char *name = spec != NULL ? spec : "";
   const size_t length = strcspn(name, ":");
   const scene_row *row = find_row(name, length);
   if (row == NULL) {
-    return fail(detail, spec != NULL ? HAP_ERROR_NOT_FOUND : HAP_ERROR_ARGUMENT,
-                "no scene '%.40s'; there are: %s", name, list_scenes(all, sizeof all));
+    return spec_fail(detail, spec != NULL ? HAP_ERROR_NOT_FOUND : HAP_ERROR_ARGUMENT,
+                     "no scene '%.40s'; there are: %s", name, list_scenes(all, sizeof all));
   }
   int count = 0;
   if (name[length] == ':') {
     if (row->parameters.count_default == 0) {
-      return fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' takes no N; there are: %s",
-                  row->parameters.name, list_scenes(all, sizeof all));
+      return spec_fail(detail, HAP_ERROR_ARGUMENT, "scene '%s' takes no N; there are: %s",
+                       row->parameters.name, list_scenes(all, sizeof all));
     }
     count = parse_count(name + length + 1);
     if (count == 0) {
-      return fail(detail, HAP_ERROR_ARGUMENT,
-                  "scene '%s': N is a number from 1 to %d, not '%.40s'; there are: %s",
-                  row->parameters.name, SCENE_COUNT_MAX, name + length + 1,
-                  list_scenes(all, sizeof all));
+      return spec_fail(detail, HAP_ERROR_ARGUMENT,
+                       "scene '%s': N is a number from 1 to %d, not '%.40s'; there are: %s",
+                       row->parameters.name, SCENE_COUNT_MAX, name + length + 1,
+                       list_scenes(all, sizeof all));
     }
   }
   return scene_create_from(&row->parameters, count, out, detail);

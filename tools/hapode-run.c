@@ -26,7 +26,7 @@ enum exit_code {
   EXIT_USAGE = 2
 };
 
-static int complain(int code, const char *text)
+static int usage_complain(int code, const char *text)
 {
   fprintf(stderr, "hapode-run: %s\n", text);
   if (code == EXIT_USAGE) {
@@ -127,7 +127,7 @@ static bool close_trace(run_loop *loop, hap_detail *detail)
   return false;
 }
 
-static hap_status draw(const run_loop *loop, hap_detail *detail)
+static hap_status picture_draw(const run_loop *loop, hap_detail *detail)
 {
   const run_options *o = loop->options;
   char devices[80];
@@ -142,7 +142,7 @@ static hap_status draw(const run_loop *loop, hap_detail *detail)
   return run_picture_draw(loop->picture, o->plot_path, title, detail);
 }
 
-static void tell(const run_options *options, hap_status status, const hap_stats *stats)
+static void status_tell(const run_options *options, hap_status status, const hap_stats *stats)
 {
   if (status == HAP_END) {
     fprintf(stderr, "hapode-run: stopped early, after %.3f s\n",
@@ -168,19 +168,20 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
   hap_status status = run_loop_run(loop, &stats, &detail);
   int code = EXIT_GOOD;
   if (status < HAP_OK) {
-    code = complain(EXIT_FAILED, detail.text[0] != '\0' ? detail.text : hap_status_text(status));
+    code =
+        usage_complain(EXIT_FAILED, detail.text[0] != '\0' ? detail.text : hap_status_text(status));
   }
   if (!close_trace(loop, &detail)) {
-    code = complain(EXIT_FAILED, detail.text);
+    code = usage_complain(EXIT_FAILED, detail.text);
   }
   if (!close_black_box(loop, &detail)) {
-    code = complain(EXIT_FAILED, detail.text);
+    code = usage_complain(EXIT_FAILED, detail.text);
   }
-  if (draw(loop, &detail) < HAP_OK) {
-    code = complain(EXIT_FAILED, detail.text);
+  if (picture_draw(loop, &detail) < HAP_OK) {
+    code = usage_complain(EXIT_FAILED, detail.text);
   }
   if (stats.size > 0) { /* it was started */
-    tell(loop->options, status, &stats);
+    status_tell(loop->options, status, &stats);
     hap_effect_info effects[HAP_EFFECTS];
     (void)hap_session_effects(loop->rig->session, effects, HAP_EFFECTS, sizeof effects[0]);
     run_summary_print(loop->options, &stats, effects, stdout);
@@ -195,11 +196,11 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
       run_effects_table(effects, stdout);
     }
     if (!run_recording_print(recording, loop->options, loop->rig->session, stdout, &detail)) {
-      code = complain(EXIT_FAILED, detail.text);
+      code = usage_complain(EXIT_FAILED, detail.text);
     }
   }
   if (fflush(stdout) != 0 || ferror(stdout) != 0) {
-    code = complain(EXIT_FAILED, "the summary cannot be written to stdout");
+    code = usage_complain(EXIT_FAILED, "the summary cannot be written to stdout");
   }
   return code;
 }
@@ -238,7 +239,7 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
       open_picture(options, &loop, &detail)) {
     code = run_and_report(&loop, recording);
   } else {
-    complain(EXIT_FAILED, detail.text);
+    usage_complain(EXIT_FAILED, detail.text);
     (void)close_trace(&loop, &detail);
     (void)close_black_box(&loop, &detail);
   }
@@ -247,7 +248,7 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
 }
 
 /* A name or argument that cannot be is wrong usage, all else a failure. */
-static int refuse(const rig *r, hap_status status, const hap_detail *detail)
+static int run_refuse(const rig *r, hap_status status, const hap_detail *detail)
 {
   static const char *const parts[] = {[RIG_SCENE] = "--scene: ",
                                       [RIG_SESSION] = "",
@@ -257,7 +258,7 @@ static int refuse(const rig *r, hap_status status, const hap_detail *detail)
   snprintf(whole.text, sizeof whole.text, "%s%.490s", parts[r->failed],
            detail->text[0] != '\0' ? detail->text : hap_status_text(status));
   bool usage = status == HAP_ERROR_NOT_FOUND || status == HAP_ERROR_ARGUMENT;
-  return complain(usage ? EXIT_USAGE : EXIT_FAILED, whole.text);
+  return usage_complain(usage ? EXIT_USAGE : EXIT_FAILED, whole.text);
 }
 
 /* A device that cannot be opened as asked for is wrong usage. */
@@ -271,8 +272,8 @@ static int run_alone(const run_options *options,
     return EXIT_GOOD;
   }
   bool usage = status == HAP_ERROR_NOT_FOUND || status == HAP_ERROR_ARGUMENT;
-  return complain(usage ? EXIT_USAGE : EXIT_FAILED,
-                  detail.text[0] != '\0' ? detail.text : hap_status_text(status));
+  return usage_complain(usage ? EXIT_USAGE : EXIT_FAILED,
+                        detail.text[0] != '\0' ? detail.text : hap_status_text(status));
 }
 
 static int check_device(run_options *options)
@@ -289,7 +290,7 @@ static int run_world(run_options *options, const run_recording *recording)
   hap_detail detail = {""};
   dInitODE2(0);
   hap_status status = rig_create(&options->rig, &r, &detail);
-  int code = status < HAP_OK ? refuse(&r, status, &detail) : run_in(options, &r, recording);
+  int code = status < HAP_OK ? run_refuse(&r, status, &detail) : run_in(options, &r, recording);
   if (status >= HAP_OK) {
     rig_destroy(&r);
   }
@@ -303,7 +304,7 @@ static int run_session(run_options *options)
   run_recording recording;
   run_loop_catch_signals();
   int code = run_recording_open(options, &recording, &detail) < HAP_OK
-                 ? complain(EXIT_FAILED, detail.text)
+                 ? usage_complain(EXIT_FAILED, detail.text)
                  : EXIT_GOOD;
   if (code == EXIT_GOOD) {
     options->rig.expert.trace_rows = run_loop_trace_rows(options);
@@ -318,7 +319,7 @@ int main(int argc, char **argv)
   run_options options;
   hap_detail detail = {""};
   if (run_options_parse(argc, argv, &options, &detail) < HAP_OK) {
-    return complain(EXIT_USAGE, detail.text);
+    return usage_complain(EXIT_USAGE, detail.text);
   }
   switch (options.action) {
     case RUN_LIST:

@@ -71,7 +71,7 @@ FILE *plot_begin(const char *svg_path, int width, int height, hap_detail *detail
 }
 
 /* Starts gnuplot with the script as its input and its words into errors. */
-static int start(FILE *script, FILE *errors, pid_t *out)
+static int gnuplot_start(FILE *script, FILE *errors, pid_t *out)
 {
   char program[] = "gnuplot";
   char from_input[] = "-";
@@ -115,7 +115,7 @@ static hap_status wait_for(pid_t child, FILE *errors, hap_detail *detail)
 }
 
 /* The offset of script's descriptor is where gnuplot begins to read. */
-static hap_status run(FILE *script, hap_detail *detail)
+static hap_status gnuplot_run(FILE *script, hap_detail *detail)
 {
   if (ferror(script) != 0 || fflush(script) != 0 || lseek(fileno(script), 0, SEEK_SET) != 0) {
     snprintf(detail->text, sizeof detail->text, "gnuplot's script could not be written: %s",
@@ -129,7 +129,7 @@ static hap_status run(FILE *script, hap_detail *detail)
   }
   pid_t child = 0;
   hap_status status = HAP_ERROR_SYSTEM;
-  int error = start(script, errors, &child);
+  int error = gnuplot_start(script, errors, &child);
   if (error != 0) {
     snprintf(detail->text, sizeof detail->text, "gnuplot cannot be started: %s", strerror(error));
   } else {
@@ -146,7 +146,7 @@ hap_status plot_end(FILE *script, hap_detail *detail)
   }
   hap_status status = HAP_ERROR_UNSUPPORTED;
   if (plot_available()) {
-    status = run(script, detail);
+    status = gnuplot_run(script, detail);
   } else {
     snprintf(detail->text, sizeof detail->text, PLOT_ABSENT_TEXT);
   }

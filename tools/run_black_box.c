@@ -9,7 +9,7 @@
 
 #define ROWS (HAP_BLACK_BOX_TICKS * RIG_POINTERS_MAX)
 
-static void values(FILE *file, const double *v, int count)
+static void values_write(FILE *file, const double *v, int count)
 {
   for (int i = 0; i < count; ++i) {
     fprintf(file, ",%.9g", v[i]);
@@ -20,14 +20,14 @@ static void write_row(FILE *file, const hap_black_box_row *row)
 {
   fprintf(file, "%" PRIu64 ",%.9g,%u,%u,%u", row->tick, 1e-9 * (double)row->time_ns,
           (unsigned)(row->pointer.v & 0xffffffffu), row->fault, row->guard);
-  values(file, row->pose.position, 3);
-  values(file, row->pose.quat_wxyz, 4);
-  values(file, row->twist.linear, 3);
-  values(file, row->twist.angular, 3);
-  values(file, row->wanted.force, 3);
-  values(file, row->wanted.torque, 3);
-  values(file, row->written.force, 3);
-  values(file, row->written.torque, 3);
+  values_write(file, row->pose.position, 3);
+  values_write(file, row->pose.quat_wxyz, 4);
+  values_write(file, row->twist.linear, 3);
+  values_write(file, row->twist.angular, 3);
+  values_write(file, row->wanted.force, 3);
+  values_write(file, row->wanted.torque, 3);
+  values_write(file, row->written.force, 3);
+  values_write(file, row->written.torque, 3);
   fprintf(file, ",%.9g\n", row->model_age_s);
 }
 

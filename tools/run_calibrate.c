@@ -58,7 +58,7 @@ static word word_of(session *s)
 }
 
 /* Without waiting longer than that. Byte by byte: what comes behind a line is for the next question. */
-static word listen(session *s, int wait_ms)
+static word person_listen(session *s, int wait_ms)
 {
   struct pollfd input = {STDIN_FILENO, POLLIN, 0};
   char byte = '\0';
@@ -85,7 +85,7 @@ static hap_status ask_for_home(session *s)
       "hapode-run: press Enter, and hold it still until the next line\n",
       stderr);
   while (said == WORD_NONE && !run_loop_stop_wanted()) {
-    said = listen(s, 100);
+    said = person_listen(s, 100);
   }
   return said == WORD_ENTER || said == WORD_HOME ? HAP_OK : HAP_END;
 }
@@ -136,7 +136,7 @@ static hap_status ask_for_sweep(session *s, bool *out_sweep)
     if (!hold_taut(s)) {
       return fail_device(s);
     }
-    said = listen(s, 0);
+    said = person_listen(s, 0);
   }
   *out_sweep = said == WORD_ENTER;
   return run_loop_stop_wanted() ? HAP_END : HAP_OK;
@@ -144,7 +144,7 @@ static hap_status ask_for_sweep(session *s, bool *out_sweep)
 
 /* ---- the sweep ---- */
 
-static void widen(session *s)
+static void range_widen(session *s)
 {
   const hap_pose *pose = &s->spidar->solver.pose;
   for (int k = 0; k < 3; ++k) {
@@ -154,14 +154,14 @@ static void widen(session *s)
   s->turned = fmax(s->turned, 2.0 * acos(fmin(fabs(pose->quat_wxyz[0]), 1.0)));
 }
 
-static void record(session *s)
+static void sample_record(session *s)
 {
   hapi_spidar_sample *sample = &s->samples[s->count++];
   memset(sample, 0, sizeof *sample);
   for (int i = 0; i < s->spidar->model.strings; ++i) {
     sample->counts[i] = s->spidar->line.counts.counts[i];
   }
-  widen(s);
+  range_widen(s);
 }
 
 static void say_range(const session *s, double left)
@@ -188,13 +188,13 @@ static hap_status sweep_for(session *s, double seconds)
     now = 1e-9 * (double)hapi_clock_now();
     if (s->spidar->line.taken > taken && now >= begin + SAMPLE_S * (double)s->count) {
       taken = s->spidar->line.taken;
-      record(s);
+      sample_record(s);
     }
     if (now > said + SAY_S) {
       said = now;
       say_range(s, begin + seconds - now);
     }
-    word heard = more ? listen(s, 0) : WORD_NONE;
+    word heard = more ? person_listen(s, 0) : WORD_NONE;
     more = heard != WORD_END;
     if (heard == WORD_ENTER || heard == WORD_HOME) {
       break;
@@ -221,7 +221,7 @@ static void print_found(const session *s, const hapi_spidar_calibration *found, 
 }
 
 /* Motor points are found where the samples tell them and they explain what offsets alone do not. */
-static hap_status fit(session *s)
+static hap_status session_fit(session *s)
 {
   hapi_spidar_calibration simple;
   hapi_spidar_calibration full;
@@ -244,7 +244,7 @@ static hap_status fit(session *s)
   return HAP_OK;
 }
 
-static hap_status sweep(session *s)
+static hap_status session_sweep(session *s)
 {
   double seconds = s->options->seconds > 0.0 ? s->options->seconds : SWEEP_S;
   double room = seconds / SAMPLE_S + 1.0;
@@ -262,13 +262,13 @@ static hap_status sweep(session *s)
   s->spidar->model.max_tension = most;
   if (status == HAP_OK) {
     say_range(s, 0.0);
-    status = fit(s);
+    status = session_fit(s);
   }
   hapi_free(s->samples);
   return status;
 }
 
-static void print(const session *s)
+static void result_print(const session *s)
 {
   const hapi_spidar_model *model = &s->spidar->model;
   fprintf(s->out, "model: %s\noffsets_m:", model->name);
@@ -279,7 +279,7 @@ static void print(const session *s)
           s->options->calibrate_path);
 }
 
-static hap_status calibrate(session *s)
+static hap_status session_calibrate(session *s)
 {
   bool more = false;
   hap_status status = ask_for_home(s);
@@ -293,14 +293,14 @@ static hap_status calibrate(session *s)
   }
   status = ask_for_sweep(s, &more);
   if (status == HAP_OK && more) {
-    status = sweep(s);
+    status = session_sweep(s);
   }
   s->ops->stop(s->spidar);
   if (status == HAP_OK) {
     status = hapi_spidar_model_write(s->options->calibrate_path, &s->spidar->model, s->detail);
   }
   if (status == HAP_OK) {
-    print(s);
+    result_print(s);
   }
   return status;
 }
@@ -315,7 +315,7 @@ hap_status run_calibrate(const run_options *options, FILE *out, hap_detail *deta
   s.ops = hapi_device_ops(s.device);
   if (s.ops == &hapi_spidar_ops) {
     s.spidar = hapi_device_self(s.device);
-    status = calibrate(&s);
+    status = session_calibrate(&s);
   } else {
     (void)snprintf(detail->text, sizeof detail->text,
                    "--calibrate: the device %.60s has no home to be told; spidar has", s.ops->name);

@@ -7,7 +7,7 @@
 
 #include "tools/session_defs.h"
 
-static hap_status refuse(const char *item, size_t length, hap_detail *detail)
+static hap_status item_refuse(const char *item, size_t length, hap_detail *detail)
 {
   int shown = length < 60 ? (int)length : 60;
   int used = snprintf(detail->text, sizeof detail->text,
@@ -60,7 +60,7 @@ hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *deta
   for (;;) {
     size_t length = strcspn(list, ",");
     if (!take_item(list, length, io)) {
-      return refuse(list, length, detail);
+      return item_refuse(list, length, detail);
     }
     if (list[length] == '\0') {
       return HAP_OK;

@@ -32,7 +32,7 @@ static hap_status check_writable(const char *path, hap_detail *detail)
 }
 
 /* A simulated device has nobody who could be hurt or who could hold it. */
-static hap_status warn(const hap_device *device)
+static hap_status person_warn(const hap_device *device)
 {
   fputs(
       "hapode-run: the device is going to move by itself, along each axis, by up to 50 mm\n"
@@ -48,7 +48,7 @@ static hap_status warn(const hap_device *device)
   return run_loop_stop_wanted() ? HAP_END : HAP_OK;
 }
 
-static int watch(void *user, double done)
+static int progress_watch(void *user, double done)
 {
   const bool *terminal = user;
   if (*terminal) {
@@ -57,7 +57,7 @@ static int watch(void *user, double done)
   return run_loop_stop_wanted();
 }
 
-static void print(const hap_device_identity *identity, FILE *out)
+static void identity_print(const hap_device_identity *identity, FILE *out)
 {
   fprintf(out, "device: %s\n", identity->device);
   fprintf(out, "mass_kg: %.4g\n", identity->mass);
@@ -68,16 +68,16 @@ static void print(const hap_device_identity *identity, FILE *out)
   fprintf(out, "residual: %.3g\n", identity->residual);
 }
 
-static hap_status identify(const run_options *options, hap_device *device,
-                           hap_device_identity *found, hap_detail *detail)
+static hap_status device_identify(const run_options *options, hap_device *device,
+                                  hap_device_identity *found, hap_detail *detail)
 {
   hap_identify_def def;
   bool terminal = isatty(STDERR_FILENO) != 0;
   hap_identify_def_init(&def, sizeof def);
   def.rate_hz = options->rig.def.haptic_hz;
-  def.watch = watch;
+  def.watch = progress_watch;
   def.user = &terminal;
-  hap_status status = warn(device);
+  hap_status status = person_warn(device);
   if (status == HAP_OK) {
     status = hap_device_identify(device, &def, found, detail);
   }
@@ -96,14 +96,14 @@ hap_status run_identify(const run_options *options, FILE *out, hap_detail *detai
   }
   status = check_writable(options->identify_path, detail);
   if (status == HAP_OK) {
-    status = identify(options, device, &found, detail);
+    status = device_identify(options, device, &found, detail);
   }
   hap_device_close(device);
   if (status == HAP_OK) {
     status = hap_device_identity_write(options->identify_path, &found, detail);
   }
   if (status == HAP_OK) {
-    print(&found, out);
+    identity_print(&found, out);
   } else if (status == HAP_END) {
     snprintf(detail->text, sizeof detail->text, "stopped: nothing was written");
   }

@@ -103,7 +103,7 @@ static void write_rows(run_loop *loop, const hap_trace_row *rows, size_t count)
 }
 
 /* Takes all rows that are there. */
-static void drain(run_loop *loop)
+static void trace_drain(run_loop *loop)
 {
   hap_trace_row rows[ROWS_AT_ONCE];
   size_t count = 0;
@@ -143,7 +143,7 @@ static void show_progress(watch *w, double t, const hap_stats *stats)
 }
 
 /* True: the fault is that of a lost device, which is being waited for. */
-static bool reconnect(watch *w, double t, const hap_stats *stats)
+static bool device_reconnect(watch *w, double t, const hap_stats *stats)
 {
   hap_session *session = w->loop->rig->session;
   const hap_pointer_id lost = {stats->faults.pointer};
@@ -168,11 +168,11 @@ static bool reconnect(watch *w, double t, const hap_stats *stats)
 }
 
 /* What is to be done between two stretches of the run, at time t of it. */
-static hap_status look(watch *w, double t)
+static hap_status watch_look(watch *w, double t)
 {
   run_loop *loop = w->loop;
   hap_stats stats;
-  drain(loop);
+  trace_drain(loop);
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
   run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
@@ -181,7 +181,7 @@ static hap_status look(watch *w, double t)
   }
   show_progress(w, t, &stats);
   bool plays = loop->options->play_path != NULL;
-  if (stats.faults.fault != HAP_FAULT_NONE && !plays && !reconnect(w, t, &stats)) {
+  if (stats.faults.fault != HAP_FAULT_NONE && !plays && !device_reconnect(w, t, &stats)) {
     (void)hap_session_detail(loop->rig->session, w->detail);
     return HAP_ERROR_DEVICE;
   }
@@ -202,7 +202,7 @@ static hap_status run_threads(watch *w)
     struct timespec last = {0, (long)(1e9 * fmin(left, PAUSE_S))};
     (void)nanosleep(left < PAUSE_S ? &last : &pause, NULL);
     t = wall_clock() - start;
-    status = look(w, t);
+    status = watch_look(w, t);
   }
   return status;
 }
@@ -223,14 +223,14 @@ static hap_status run_lockstep(watch *w)
     status = hap_session_advance(session, next);
     done += next;
     if (plays && status == HAP_END) {
-      (void)look(w, (double)done / hz);
+      (void)watch_look(w, (double)done / hz);
       return HAP_OK;
     }
     if (status < HAP_OK) {
       (void)hap_session_detail(session, w->detail);
       return status;
     }
-    status = look(w, (double)done / hz);
+    status = watch_look(w, (double)done / hz);
   }
   return status;
 }
@@ -253,7 +253,7 @@ hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
   hap_session_stop(session);
   run_progress_clear(&loop->progress);
   (void)hap_session_stats(session, stats, sizeof *stats);
-  drain(loop);
+  trace_drain(loop);
   bool plays = loop->options->play_path != NULL;
   if (status == HAP_OK && stats->faults.fault != HAP_FAULT_NONE &&
       !plays) { /* waited for to the end */

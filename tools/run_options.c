@@ -26,7 +26,7 @@ struct option {
   double high;
 };
 
-static hap_status fail(hap_detail *detail, const char *format, ...)
+static hap_status options_fail(hap_detail *detail, const char *format, ...)
 {
   va_list arguments;
   va_start(arguments, format);
@@ -41,7 +41,8 @@ static hap_status take_number(run_options *options, const option *self, const ch
   char *end = NULL;
   double number = strtod(value, &end);
   if (end == value || *end != '\0' || !(number >= self->low && number <= self->high)) {
-    return fail(detail, "\"%.60s\" is not a number from %g to %g", value, self->low, self->high);
+    return options_fail(detail, "\"%.60s\" is not a number from %g to %g", value, self->low,
+                        self->high);
   }
   *(double *)((void *)((char *)options + self->offset)) = number;
   return HAP_OK;
@@ -54,8 +55,8 @@ static hap_status take_count(run_options *options, const option *self, const cha
   double number = strtod(value, &end);
   if (end == value || *end != '\0' || !(number >= self->low && number <= self->high) ||
       number != floor(number)) {
-    return fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
-                self->high);
+    return options_fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
+                        self->high);
   }
   *(int32_t *)((void *)((char *)options + self->offset)) = (int32_t)number;
   return HAP_OK;
@@ -79,7 +80,7 @@ static hap_status take_text(run_options *options, const option *self, const char
                             hap_detail *detail)
 {
   if (*value == '\0') {
-    return fail(detail, "an empty %s", self->value);
+    return options_fail(detail, "an empty %s", self->value);
   }
   *(const char **)((char *)options + self->offset) = value;
   return HAP_OK;
@@ -97,7 +98,7 @@ static hap_status take_device(run_options *options, const option *self, const ch
 {
   (void)self;
   if (options->rig.device_count == RIG_POINTERS_MAX) {
-    return fail(detail, "more than %d devices", RIG_POINTERS_MAX);
+    return options_fail(detail, "more than %d devices", RIG_POINTERS_MAX);
   }
   options->rig.devices[options->rig.device_count++] = value;
   return HAP_OK;
@@ -108,10 +109,11 @@ static hap_status take_identity(run_options *options, const option *self, const 
 {
   size_t devices = options->rig.device_count;
   if (devices == 0) {
-    return fail(detail, "it belongs to a --device before it");
+    return options_fail(detail, "it belongs to a --device before it");
   }
   if (options->rig.identities[devices - 1] != NULL) {
-    return fail(detail, "the device \"%.60s\" has one already", options->rig.devices[devices - 1]);
+    return options_fail(detail, "the device \"%.60s\" has one already",
+                        options->rig.devices[devices - 1]);
   }
   (void)self;
   options->rig.identities[devices - 1] = value;
@@ -142,7 +144,7 @@ static hap_status take_coupling(run_options *options, const option *self, const 
     options->coupling_given = true;
     return bare ? HAP_OK : take_number(options, self, value + length + 1, detail);
   }
-  return fail(
+  return options_fail(
       detail,
       "\"%.60s\" is not direct, proxy:K, auto:K, god-object:K or virtual:K; K in N/m, and may "
       "be left out",
@@ -155,7 +157,7 @@ static hap_status take_pose(run_options *options, const option *self, const char
   (void)self;
   bool held = strcmp(value, "held") == 0;
   if (!held && strcmp(value, "interpolated") != 0) {
-    return fail(detail, "\"%.60s\" is neither held nor interpolated", value);
+    return options_fail(detail, "\"%.60s\" is neither held nor interpolated", value);
   }
   options->rig.research.impulse_pose = held ? HAP_IMPULSE_HELD : HAP_IMPULSE_INTERPOLATED;
   return HAP_OK;
@@ -174,7 +176,7 @@ static hap_status take_probe(run_options *options, const option *self, const cha
       return HAP_OK;
     }
   }
-  return fail(detail, "\"%.60s\" is not shared, paper or operating", value);
+  return options_fail(detail, "\"%.60s\" is not shared, paper or operating", value);
 }
 
 static hap_status take_priority(run_options *options, const option *self, const char *value,
@@ -183,8 +185,8 @@ static hap_status take_priority(run_options *options, const option *self, const 
   char *end = NULL;
   long number = strtol(value, &end, 10);
   if (end == value || *end != '\0' || number < (long)self->low || number > (long)self->high) {
-    return fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
-                self->high);
+    return options_fail(detail, "\"%.60s\" is not a whole number from %g to %g", value, self->low,
+                        self->high);
   }
   options->rig.def.rt_priority = (int32_t)number;
   return HAP_OK;
@@ -400,7 +402,7 @@ static const option table[] = {
 
 #define OPTIONS (sizeof table / sizeof table[0])
 
-static const option *find(const char *argument, size_t length)
+static const option *option_find(const char *argument, size_t length)
 {
   for (size_t i = 0; i < OPTIONS; ++i) {
     if (strlen(table[i].name) == length && memcmp(argument, table[i].name, length) == 0) {
@@ -438,26 +440,26 @@ static hap_status take_option(char **argv, int *at, run_options *out, hap_detail
 {
   const char *argument = argv[*at];
   size_t length = strcspn(argument, "=");
-  const option *found = find(argument, length);
+  const option *found = option_find(argument, length);
   if (found == NULL) {
     return fail_unknown(argument, detail);
   }
   const char *value = argument[length] == '=' ? argument + length + 1 : NULL;
   if (found->value == NULL && value != NULL) {
-    return fail(detail, "%s takes no value", found->name);
+    return options_fail(detail, "%s takes no value", found->name);
   }
   if (found->value != NULL && value == NULL) {
     value = argv[++*at];
   }
   if (found->value != NULL && value == NULL) {
-    return fail(detail, "%s needs a value: %s %s", found->name, found->name, found->value);
+    return options_fail(detail, "%s needs a value: %s %s", found->name, found->name, found->value);
   }
   if (out->not_beside_play == NULL && !beside_play(found)) {
     out->not_beside_play = found->name;
   }
   hap_detail why = {""};
   hap_status status = found->take(out, found, value, &why);
-  return status < HAP_OK ? fail(detail, "%s: %.480s", found->name, why.text) : HAP_OK;
+  return status < HAP_OK ? options_fail(detail, "%s: %.480s", found->name, why.text) : HAP_OK;
 }
 
 /* --coupling says it of the pointers, the effect "proxy" of those that leave it to the library. */
@@ -468,14 +470,15 @@ static hap_status join_coupling(run_options *o, hap_detail *detail)
       o->effects.of_all[HAP_EFFECT_PROXY] ? HAP_EFFECT_AUTO : o->effects.wish[HAP_EFFECT_PROXY];
   bool spring = coupling != HAP_COUPLING_DIRECT && coupling != HAP_COUPLING_AUTO;
   if (spring && o->rig.def.model != HAP_MODEL_CONTACT) {
-    return fail(detail, "--coupling: %s needs --model contact", hap_coupling_name(coupling));
+    return options_fail(detail, "--coupling: %s needs --model contact",
+                        hap_coupling_name(coupling));
   }
   if (o->coupling_given && coupling != HAP_COUPLING_AUTO && proxy != HAP_EFFECT_AUTO &&
       spring != (proxy == HAP_EFFECT_ON)) {
-    return fail(detail, "--coupling: --effects asks for something else by proxy=");
+    return options_fail(detail, "--coupling: --effects asks for something else by proxy=");
   }
   if (o->rig.virtual_mass > 0.0 && coupling != HAP_COUPLING_VIRTUAL) {
-    return fail(detail, "--virtual-mass: it belongs to --coupling virtual");
+    return options_fail(detail, "--virtual-mass: it belongs to --coupling virtual");
   }
   return HAP_OK;
 }
@@ -483,11 +486,11 @@ static hap_status join_coupling(run_options *o, hap_detail *detail)
 static hap_status join_friction(const run_options *o, hap_detail *detail)
 {
   return o->effects.wish[HAP_EFFECT_FRICTION] == HAP_EFFECT_OFF && o->rig.friction > 0.0
-             ? fail(detail, "--friction: --effects asks for something else by friction=off")
+             ? options_fail(detail, "--friction: --effects asks for something else by friction=off")
              : HAP_OK;
 }
 
-static bool same(const char *a, const char *b)
+static bool texts_same(const char *a, const char *b)
 {
   return a != NULL && b != NULL && strcmp(a, b) == 0;
 }
@@ -498,10 +501,10 @@ static hap_status join_recording(run_options *o, hap_detail *detail)
   hap_effect_wish *wish = &o->effects.wish[HAP_EFFECT_RECORDING];
   bool named = !o->effects.of_all[HAP_EFFECT_RECORDING];
   if (*wish == HAP_EFFECT_ON && named && o->record_path == NULL) {
-    return fail(detail, "--effects: recording=on needs a file: --record FILE");
+    return options_fail(detail, "--effects: recording=on needs a file: --record FILE");
   }
   if (*wish == HAP_EFFECT_OFF && o->record_path != NULL) {
-    return fail(detail, "--record: --effects asks for something else by recording=off");
+    return options_fail(detail, "--record: --effects asks for something else by recording=off");
   }
   *wish = *wish == HAP_EFFECT_ON ? HAP_EFFECT_AUTO : *wish; /* the file says it */
   return HAP_OK;
@@ -512,26 +515,28 @@ static hap_status check_recording(const run_options *o, hap_detail *detail)
   const char *file = o->play_path != NULL ? o->play_path : o->record_path;
   const char *name = o->play_path != NULL ? "--play" : "--record";
   if (o->play_path != NULL && o->not_beside_play != NULL) {
-    return fail(detail, "--play: the file says what to run; leave out %s", o->not_beside_play);
+    return options_fail(detail, "--play: the file says what to run; leave out %s",
+                        o->not_beside_play);
   }
   if (o->play_incomplete && o->play_path == NULL) {
-    return fail(detail, "--play-incomplete: only with --play");
+    return options_fail(detail, "--play-incomplete: only with --play");
   }
   if (o->record_limit_mib > 0.0 && o->record_path == NULL) {
-    return fail(detail, "--record-limit: only with --record");
+    return options_fail(detail, "--record-limit: only with --record");
   }
   if (o->record_path != NULL && o->rig.def.drive == HAP_DRIVE_LOCKSTEP) {
-    return fail(detail,
-                "--record: not with --lockstep, which does the same on every run by itself");
+    return options_fail(
+        detail, "--record: not with --lockstep, which does the same on every run by itself");
   }
   if (o->record_path != NULL && o->identify_path != NULL) {
-    return fail(detail, "--record: --identify runs no session");
+    return options_fail(detail, "--record: --identify runs no session");
   }
   if (o->record_path != NULL && o->check.spec != NULL) {
-    return fail(detail, "--record: --check-device runs no session");
+    return options_fail(detail, "--record: --check-device runs no session");
   }
-  if (same(file, o->trace_path) || same(file, o->plot_path) || same(file, o->black_box_path)) {
-    return fail(detail, "%s: the same file as --trace, --plot or --black-box", name);
+  if (texts_same(file, o->trace_path) || texts_same(file, o->plot_path) ||
+      texts_same(file, o->black_box_path)) {
+    return options_fail(detail, "%s: the same file as --trace, --plot or --black-box", name);
   }
   return HAP_OK;
 }
@@ -543,11 +548,12 @@ static hap_status check_calibrate(const run_options *o, hap_detail *detail)
   }
   if (o->identify_path != NULL || o->check.spec != NULL || o->record_path != NULL ||
       o->play_path != NULL) {
-    return fail(detail, "--calibrate: not with --identify, --check-device, --record or --play");
+    return options_fail(detail,
+                        "--calibrate: not with --identify, --check-device, --record or --play");
   }
   if (o->rig.device_count != 1) {
-    return fail(detail, "--calibrate: takes exactly one --device, there are %zu",
-                o->rig.device_count);
+    return options_fail(detail, "--calibrate: takes exactly one --device, there are %zu",
+                        o->rig.device_count);
   }
   return HAP_OK;
 }
@@ -557,19 +563,21 @@ static hap_status check_error(run_options *o, hap_detail *detail)
   hap_expert_def *expert = &o->rig.expert;
   bool wanted = expert->force_error_wanted > 0.0;
   if (wanted && o->lookback == 0.0) {
-    return fail(detail,
-                "--force-error: --lookback 0 leaves nothing that tells the error; give it 0.1, "
-                "say, or leave it out");
+    return options_fail(
+        detail,
+        "--force-error: --lookback 0 leaves nothing that tells the error; give it 0.1, "
+        "say, or leave it out");
   }
   expert->lookback = wanted ? LOOKBACK_SHARE : 0.0;
   if (o->lookback >= 0.0) {
     expert->lookback = o->lookback;
   }
   return expert->lookback > 0.0 && o->rig.def.model == HAP_MODEL_SINGLE
-             ? fail(detail,
-                    "%s: --model single is what the force is held against, so that it has no "
-                    "error; take another one",
-                    wanted ? "--force-error" : "--lookback")
+             ? options_fail(
+                   detail,
+                   "%s: --model single is what the force is held against, so that it has no "
+                   "error; take another one",
+                   wanted ? "--force-error" : "--lookback")
              : HAP_OK;
 }
 
@@ -580,53 +588,57 @@ static hap_status check_budget(const run_options *o, hap_detail *detail)
   const char *name = expert->tick_share > 0.0 ? "--tick-share" : "--physics-share";
   bool budget = expert->tick_share > 0.0 || expert->physics_share > 0.0;
   if (budget && def->drive == HAP_DRIVE_LOCKSTEP) {
-    return fail(detail,
-                "%s: not with --lockstep, which does the same on every run, however long it "
-                "takes; give --accuracy instead",
-                name);
+    return options_fail(
+        detail,
+        "%s: not with --lockstep, which does the same on every run, however long it "
+        "takes; give --accuracy instead",
+        name);
   }
   return expert->tick_share > 0.0 && def->model != HAP_MODEL_CONTACT
-             ? fail(detail,
-                    "--tick-share: a tick of --model %s has nothing that could be left out; take "
-                    "--model contact, or leave it away",
-                    hap_model_name(def->model))
+             ? options_fail(
+                   detail,
+                   "--tick-share: a tick of --model %s has nothing that could be left out; take "
+                   "--model contact, or leave it away",
+                   hap_model_name(def->model))
              : HAP_OK;
 }
 
 /* What only several options together can get wrong. */
-static hap_status check(run_options *o, hap_detail *detail)
+static hap_status options_check(run_options *o, hap_detail *detail)
 {
   hap_detail why = {""};
   hap_session_def *def = &o->rig.def;
   if (def->physics_hz > def->haptic_hz) {
-    return fail(detail, "--physics-hz: %g is more than --haptic-hz, which is %g", def->physics_hz,
-                def->haptic_hz);
+    return options_fail(detail, "--physics-hz: %g is more than --haptic-hz, which is %g",
+                        def->physics_hz, def->haptic_hz);
   }
   if (o->model_age_s >= 0.0) {
     double ticks = round(o->model_age_s * def->haptic_hz);
     if (def->drive != HAP_DRIVE_LOCKSTEP) {
-      return fail(detail, "--model-age: only with --lockstep; in real time the age is what it is");
+      return options_fail(detail,
+                          "--model-age: only with --lockstep; in real time the age is what it is");
     }
     if (ticks > LATENCY_TICKS_MAX) {
-      return fail(detail, "--model-age: %g s are over %g ticks of the haptic loop; at most %g s",
-                  o->model_age_s, LATENCY_TICKS_MAX, LATENCY_TICKS_MAX / def->haptic_hz);
+      return options_fail(detail,
+                          "--model-age: %g s are over %g ticks of the haptic loop; at most %g s",
+                          o->model_age_s, LATENCY_TICKS_MAX, LATENCY_TICKS_MAX / def->haptic_hz);
     }
     o->rig.research.physics_latency_ticks = (int32_t)ticks;
   }
   if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
-    return fail(detail, "--plot: the same file as --trace");
+    return options_fail(detail, "--plot: the same file as --trace");
   }
   if (o->black_box_path != NULL &&
       ((o->trace_path != NULL && strcmp(o->black_box_path, o->trace_path) == 0) ||
        (o->plot_path != NULL && strcmp(o->black_box_path, o->plot_path) == 0))) {
-    return fail(detail, "--black-box: the same file as --trace or --plot");
+    return options_fail(detail, "--black-box: the same file as --trace or --plot");
   }
   if (o->check.spec != NULL && (o->identify_path != NULL || o->rig.device_count > 0)) {
-    return fail(detail, "--check-device: takes neither --device nor --identify");
+    return options_fail(detail, "--check-device: takes neither --device nor --identify");
   }
   if (o->identify_path != NULL && o->rig.device_count != 1) {
-    return fail(detail, "--identify: takes exactly one --device, there are %zu",
-                o->rig.device_count);
+    return options_fail(detail, "--identify: takes exactly one --device, there are %zu",
+                        o->rig.device_count);
   }
   if (check_calibrate(o, detail) < HAP_OK || check_error(o, detail) < HAP_OK ||
       check_budget(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
@@ -635,7 +647,7 @@ static hap_status check(run_options *o, hap_detail *detail)
     return HAP_ERROR_ARGUMENT;
   }
   return run_effects_apply(&o->effects, def->model, &o->rig.expert, &why) < HAP_OK
-             ? fail(detail, "--effects: %.480s", why.text)
+             ? options_fail(detail, "--effects: %.480s", why.text)
              : HAP_OK;
 }
 
@@ -651,7 +663,7 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {
     status = take_option(argv, &at, out, detail);
   }
-  return status < HAP_OK || out->action != RUN_SESSION ? status : check(out, detail);
+  return status < HAP_OK || out->action != RUN_SESSION ? status : options_check(out, detail);
 }
 
 void run_options_help(FILE *out)

@@ -77,7 +77,7 @@ void run_picture_destroy(run_picture *picture)
 
 /* ---- collecting ---- */
 
-static double norm(const double v[3])
+static double vector_norm(const double v[3])
 {
   return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
@@ -87,7 +87,7 @@ static instant instant_of(const run_picture *picture, const hap_trace_row *row)
   instant now = {.t = row->t};
   for (size_t i = 0; i < picture->pointers; ++i) {
     now.pointers[i] = row->pointers[i];
-    now.strength = hypot(now.strength, norm(row->pointers[i].force));
+    now.strength = hypot(now.strength, vector_norm(row->pointers[i].force));
   }
   for (int i = 0; i < 3 && row->body_count > 0; ++i) {
     now.body[i] = row->body_position[0][i];
@@ -157,7 +157,7 @@ static void write_instant(const run_picture *picture, const instant *now, FILE *
     const double *from = picture->start[i];
     double way[3] = {p->position[0] - from[0], p->position[1] - from[1], p->position[2] - from[2]};
     fprintf(script, " %.5g %.5g %.5g %.5g %.5g", p->force[0], p->force[1], p->force[2],
-            norm(p->force), 1e3 * norm(way));
+            vector_norm(p->force), 1e3 * vector_norm(way));
   }
   const double *at = now->pointers[0].position;
   fprintf(script, " %.6g %.6g %.6g", 1e3 * at[0], 1e3 * at[1], 1e3 * at[2]);

@@ -20,12 +20,12 @@ double run_summary_physics_hz(const run_options *options)
   return def->model == HAP_MODEL_SINGLE ? def->haptic_hz : def->physics_hz;
 }
 
-static void count(FILE *out, const char *key, uint64_t value)
+static void count_print(FILE *out, const char *key, uint64_t value)
 {
   fprintf(out, "%s: %" PRIu64 "\n", key, value);
 }
 
-static void number(FILE *out, const char *key, double value)
+static void number_print(FILE *out, const char *key, double value)
 {
   fprintf(out, "%s: %.6g\n", key, value);
 }
@@ -60,54 +60,54 @@ static void print_setup(const run_options *options, FILE *out)
   fprintf(out, "scene: %s\n", options->rig.scene);
   fprintf(out, "model: %s\n", hap_model_name(options->rig.def.model));
   fprintf(out, "device: %s\n", devices);
-  number(out, "physics_hz", run_summary_physics_hz(options));
-  number(out, "haptic_hz", options->rig.def.haptic_hz);
+  number_print(out, "physics_hz", run_summary_physics_hz(options));
+  number_print(out, "haptic_hz", options->rig.def.haptic_hz);
 }
 
 static void print_more(const hap_stats *stats, FILE *out)
 {
   fprintf(out, "fault: %s\n", fault_name((hap_fault)stats->faults.fault));
   fprintf(out, "realtime: %s\n", stats->loop.realtime != 0 ? "yes" : "no");
-  count(out, "physics_steps", stats->physics.steps);
-  count(out, "physics_missed", stats->physics.missed);
-  count(out, "probe_steps", stats->probes.steps);
-  count(out, "probes_reused", stats->probes.reused);
-  number(out, "tick_us_max", stats->loop.tick_us_max);
-  number(out, "model_age_s_max", stats->loop.model_age_max_s);
-  count(out, "saturated_ticks", stats->faults.saturated_ticks);
-  count(out, "capacity_dropped", stats->model.capacity_dropped);
-  count(out, "trace_dropped", stats->loop.trace_dropped);
-  count(out, "stale_times", stats->faults.stale_times);
-  count(out, "slewed_ticks", stats->faults.slewed_ticks);
-  count(out, "energy_ticks", stats->faults.energy_ticks);
+  count_print(out, "physics_steps", stats->physics.steps);
+  count_print(out, "physics_missed", stats->physics.missed);
+  count_print(out, "probe_steps", stats->probes.steps);
+  count_print(out, "probes_reused", stats->probes.reused);
+  number_print(out, "tick_us_max", stats->loop.tick_us_max);
+  number_print(out, "model_age_s_max", stats->loop.model_age_max_s);
+  count_print(out, "saturated_ticks", stats->faults.saturated_ticks);
+  count_print(out, "capacity_dropped", stats->model.capacity_dropped);
+  count_print(out, "trace_dropped", stats->loop.trace_dropped);
+  count_print(out, "stale_times", stats->faults.stale_times);
+  count_print(out, "slewed_ticks", stats->faults.slewed_ticks);
+  count_print(out, "energy_ticks", stats->faults.energy_ticks);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats,
                        const hap_effect_info effects[HAP_EFFECTS], FILE *out)
 {
   print_setup(options, out);
-  count(out, "ticks", stats->loop.ticks);
-  count(out, "missed_ticks", stats->loop.missed_ticks);
-  number(out, "tick_us_p50", stats->loop.tick_us_p50);
-  number(out, "tick_us_p99", stats->loop.tick_us_p99);
-  number(out, "physics_ms_mean", stats->physics.ms_mean);
-  number(out, "physics_duty", stats->physics.duty);
-  number(out, "haptic_duty", stats->loop.duty);
-  number(out, "peak_force_n", stats->hand.peak_force_n);
-  number(out, "impulse_ns", stats->hand.impulse_ns);
-  count(out, "contact_ticks", stats->loop.contact_ticks);
-  count(out, "neighbours_max", stats->model.neighbours_max);
-  number(out, "momentum_ratio", stats->hand.momentum_ratio);
+  count_print(out, "ticks", stats->loop.ticks);
+  count_print(out, "missed_ticks", stats->loop.missed_ticks);
+  number_print(out, "tick_us_p50", stats->loop.tick_us_p50);
+  number_print(out, "tick_us_p99", stats->loop.tick_us_p99);
+  number_print(out, "physics_ms_mean", stats->physics.ms_mean);
+  number_print(out, "physics_duty", stats->physics.duty);
+  number_print(out, "haptic_duty", stats->loop.duty);
+  number_print(out, "peak_force_n", stats->hand.peak_force_n);
+  number_print(out, "impulse_ns", stats->hand.impulse_ns);
+  count_print(out, "contact_ticks", stats->loop.contact_ticks);
+  count_print(out, "neighbours_max", stats->model.neighbours_max);
+  number_print(out, "momentum_ratio", stats->hand.momentum_ratio);
   fputs("effects: ", out);
   run_effects_print(effects, out);
   fprintf(out, "\ntrace_hash: %016" PRIx64 "\n", stats->loop.trace_hash);
-  count(out, "faults", stats->faults.count);
+  count_print(out, "faults", stats->faults.count);
   print_more(stats, out);
   if (options->rig.expert.lookback > 0.0) {
-    number(out, "force_error", stats->error.force_error);
-    number(out, "force_error_n", stats->error.force_error_n);
-    count(out, "lookbacks", stats->error.lookbacks);
-    count(out, "lookbacks_spoilt", stats->error.spoilt);
+    number_print(out, "force_error", stats->error.force_error);
+    number_print(out, "force_error_n", stats->error.force_error_n);
+    count_print(out, "lookbacks", stats->error.lookbacks);
+    count_print(out, "lookbacks_spoilt", stats->error.spoilt);
   }
 }
 

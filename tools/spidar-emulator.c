@@ -58,7 +58,7 @@ static double clock_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static int complain(const char *text)
+static int usage_complain(const char *text)
 {
   fprintf(stderr, "spidar-emulator: %s\n", text);
   return 2;
@@ -121,7 +121,7 @@ static bool may_read(const program *p, double now)
   return p->master >= 0 && p->emulator.wire.free < now + AHEAD_S;
 }
 
-static void exchange(program *p, double now)
+static void bytes_exchange(program *p, double now)
 {
   uint8_t bytes[4096];
   if (p->master < 0) {
@@ -140,7 +140,7 @@ static void exchange(program *p, double now)
 
 /* ---- commands ---- */
 
-static void obey(program *p, const char *line)
+static void command_obey(program *p, const char *line)
 {
   emulator_action action;
   hap_detail detail = {""};
@@ -172,7 +172,7 @@ static void read_commands(program *p)
   for (char *end; (end = strchr(at, '\n')) != NULL; at = end + 1) {
     *end = '\0';
     if (at[strspn(at, " \t\r")] != '\0') {
-      obey(p, at);
+      command_obey(p, at);
     }
   }
   p->line_used = strlen(at);
@@ -212,7 +212,7 @@ static bool load_script(program *p)
 
 /* ---- the loop ---- */
 
-static void await(program *p, double now)
+static void bytes_await(program *p, double now)
 {
   double next = wire_packet(&p->emulator.wire, p->packet);
   double wait = next >= 0.0 && next - now < WAKE_MOST_S ? next - now : WAKE_MOST_S;
@@ -225,7 +225,7 @@ static void await(program *p, double now)
   }
 }
 
-static int run(program *p)
+static int program_run(program *p)
 {
   p->start = clock_now();
   while (stop_wanted == 0) {
@@ -237,10 +237,10 @@ static int run(program *p)
     }
     emulator_advance(&p->emulator, now);
     if (!follow_plug(p)) {
-      return complain("no pseudo-terminal could be opened");
+      return usage_complain("no pseudo-terminal could be opened");
     }
-    exchange(p, now);
-    await(p, now);
+    bytes_exchange(p, now);
+    bytes_await(p, now);
   }
   pull_out(p);
   return 0;
@@ -280,7 +280,7 @@ static bool read_model(const char *name, hapi_spidar_model *out)
     return true;
   }
   if (hapi_spidar_model_read(name, out, &detail) < HAP_OK) {
-    complain(detail.text);
+    usage_complain(detail.text);
     return false;
   }
   return true;
@@ -408,11 +408,11 @@ static int read_options(int argc, char **argv, program *p, emulator_def *def)
       return 1;
     }
     if (!take_option(option, p, def, &chosen)) {
-      return 1 + complain("an option is wrong; see --help");
+      return 1 + usage_complain("an option is wrong; see --help");
     }
   }
   if (optind < argc) {
-    return 1 + complain("it takes no arguments, only options; see --help");
+    return 1 + usage_complain("it takes no arguments, only options; see --help");
   }
   if (!read_model(chosen.model, &p->model)) {
     return 3;
@@ -420,7 +420,7 @@ static int read_options(int argc, char **argv, program *p, emulator_def *def)
   bool b5m = strncmp(p->model.name, "x5", 2) == 0;
   const char *boards = chosen.boards != NULL ? chosen.boards : b5m ? "B5M:0" : "B3M:0,B3M:1";
   if (!read_boards(boards, def)) {
-    return 1 + complain("--boards is not like B3M:0,B3M:1");
+    return 1 + usage_complain("--boards is not like B3M:0,B3M:1");
   }
   return 0;
 }
@@ -436,12 +436,12 @@ int main(int argc, char **argv)
     return code - 1;
   }
   if (emulator_init(&p.emulator, &def, &detail) < HAP_OK) {
-    return complain(detail.text);
+    return usage_complain(detail.text);
   }
   sigaction(SIGINT, &stop, NULL);
   sigaction(SIGTERM, &stop, NULL);
   signal(SIGPIPE, SIG_IGN);
-  code = load_script(&p) ? run(&p) : 2;
+  code = load_script(&p) ? program_run(&p) : 2;
   emulator_finish(&p.emulator);
   return code;
 }

@@ -17,29 +17,29 @@ void trace_csv_header(const trace_csv *csv)
   fputc('\n', file);
 }
 
-static void vector(FILE *file, const double v[3])
+static void vector_write(FILE *file, const double v[3])
 {
   fprintf(file, ",%.9g,%.9g,%.9g", v[0], v[1], v[2]);
 }
 
-static void pointer(FILE *file, const hap_trace_pointer *p)
+static void pointer_write(FILE *file, const hap_trace_pointer *p)
 {
-  vector(file, p->position);
-  vector(file, p->force);
-  vector(file, p->torque);
+  vector_write(file, p->position);
+  vector_write(file, p->force);
+  vector_write(file, p->torque);
 }
 
 void trace_csv_row(const trace_csv *csv, const hap_trace_row *row)
 {
   FILE *file = csv->file;
   fprintf(file, "%.9g", row->t);
-  pointer(file, &row->pointers[0]);
+  pointer_write(file, &row->pointers[0]);
   fprintf(file, ",%u,%u,%.4g,%.9g", row->bodies, row->contacts, row->tick_us, row->model_age_s);
   for (size_t i = 1; i < csv->pointers; ++i) {
-    pointer(file, &row->pointers[i]);
+    pointer_write(file, &row->pointers[i]);
   }
   for (size_t k = 0; k < csv->bodies; ++k) {
-    vector(file, row->body_position[k]);
+    vector_write(file, row->body_position[k]);
   }
   fputc('\n', file);
 }

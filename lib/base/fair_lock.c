@@ -40,7 +40,7 @@ void hapi_fair_lock_finish(hapi_fair_lock *lock)
   pthread_mutex_destroy(&lock->mutex);
 }
 
-static void enqueue(hapi_fair_lock *lock, hapi_fair_waiter *waiter)
+static void waiter_enqueue(hapi_fair_lock *lock, hapi_fair_waiter *waiter)
 {
   if (lock->last != NULL) {
     lock->last->next = waiter;
@@ -84,7 +84,7 @@ static bool queue_up(hapi_fair_lock *lock, int64_t deadline_ns)
   if (pthread_cond_init(&waiter.served, &lock->monotonic) != 0) {
     return false;
   }
-  enqueue(lock, &waiter);
+  waiter_enqueue(lock, &waiter);
   bool in_time = true;
   while (!waiter.has_it && in_time) {
     in_time = wait_for_word(lock, &waiter, deadline_ns);

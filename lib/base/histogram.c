@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* A single writer needs no read-modify-write. */
-static void increase(_Atomic uint64_t *value, uint64_t by)
+static void count_increase(_Atomic uint64_t *value, uint64_t by)
 {
   uint64_t old = atomic_load_explicit(value, memory_order_relaxed);
   atomic_store_explicit(value, old + by, memory_order_relaxed);
@@ -49,9 +49,9 @@ void hapi_histogram_reset(hapi_histogram *h)
 void hapi_histogram_add(hapi_histogram *h, int64_t ns)
 {
   uint64_t value = ns > 0 ? (uint64_t)ns : 0;
-  increase(&h->buckets[bucket_of(value)], 1);
-  increase(&h->count, 1);
-  increase(&h->sum_ns, value);
+  count_increase(&h->buckets[bucket_of(value)], 1);
+  count_increase(&h->count, 1);
+  count_increase(&h->sum_ns, value);
   if (value > atomic_load_explicit(&h->max_ns, memory_order_relaxed)) {
     atomic_store_explicit(&h->max_ns, value, memory_order_relaxed);
   }

@@ -23,7 +23,7 @@ static void trim_end(char *text)
 
 /* At the first '='. An empty key: there is nothing but a comment. False: there is no '=', or no key; the key is
  * then all of the line. */
-static bool cut(char *text, char **key, char **value)
+static bool line_split(char *text, char **key, char **value)
 {
   *key = text + strspn(text, blanks);
   trim_end(*key);
@@ -46,7 +46,7 @@ static hap_status take_line(const hapi_key_file *file, char *text, hapi_key_take
 {
   char *key = NULL;
   char *value = NULL;
-  if (!cut(text, &key, &value)) {
+  if (!line_split(text, &key, &value)) {
     return hapi_key_file_fail(file, "expected key = value, not ", key);
   }
   return *key == '\0' ? HAP_OK : take(self, file, key, value);

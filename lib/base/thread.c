@@ -14,7 +14,7 @@
 
 #define STACK_TOUCHED 65536
 
-static int create(hapi_thread *thread, void *(*entry)(void *), void *arg, int priority)
+static int thread_create(hapi_thread *thread, void *(*entry)(void *), void *arg, int priority)
 {
   pthread_attr_t attributes;
   int failed = pthread_attr_init(&attributes);
@@ -37,9 +37,9 @@ static int create(hapi_thread *thread, void *(*entry)(void *), void *arg, int pr
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority)
 {
-  bool realtime = priority > 0 && create(thread, main, arg, priority) == 0;
+  bool realtime = priority > 0 && thread_create(thread, main, arg, priority) == 0;
   atomic_store(&thread->realtime, realtime);
-  if (!realtime && create(thread, main, arg, 0) != 0) {
+  if (!realtime && thread_create(thread, main, arg, 0) != 0) {
     return HAP_ERROR_SYSTEM;
   }
   thread->running = true;

@@ -100,7 +100,7 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
   return HAP_OK;
 }
 
-static hap_status describe(hap_device *device, hap_detail *detail)
+static hap_status device_describe(hap_device *device, hap_detail *detail)
 {
   hap_device_info *info = &device->info;
   device->ops->describe(device->self, info);
@@ -165,7 +165,7 @@ hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap
     hapi_free(device);
     return status;
   }
-  status = describe(device, detail);
+  status = device_describe(device, detail);
   if (status < 0) {
     device_free(device);
     return status;

@@ -84,7 +84,7 @@ static hap_status check_def(const hap_identify_def *def, double limit, hap_detai
 
 /* ---- one tick ---- */
 
-static hap_status fail(const run *r, const char *what)
+static hap_status run_fail(const run *r, const char *what)
 {
   return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s', axis %c: %s", r->device->info.name,
                    "xyz"[r->axis], what);
@@ -118,10 +118,10 @@ static hap_status read_device(run *r)
   int64_t now_ns = await_tick(r);
   memset(&pose, 0, sizeof pose);
   if (ops->read(r->device->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
-    return fail(r, "it cannot be read");
+    return run_fail(r, "it cannot be read");
   }
   if (!hapi_finite(pose.position, 3)) {
-    return fail(r, "its position is not finite");
+    return run_fail(r, "its position is not finite");
   }
   if (ops->pacing == HAP_PACING_DEVICE) {
     now_ns = hapi_clock_now(); /* the read has waited */
@@ -131,11 +131,11 @@ static hap_status read_device(run *r)
   return HAP_OK;
 }
 
-static hap_status record(run *r)
+static hap_status sample_record(run *r)
 {
   hapi_identify_record *record = &r->records[r->axis];
   if (record->count == record->capacity) {
-    return fail(r, "it gives more than rate_hz positions a second; raise rate_hz");
+    return run_fail(r, "it gives more than rate_hz positions a second; raise rate_hz");
   }
   record->samples[record->count++] = (hapi_identify_sample){r->time, r->position[r->axis], 0.0};
   return HAP_OK;
@@ -160,17 +160,17 @@ static hap_status check_limits(const run *r)
     snprintf(text, sizeof text,
              "it has moved %.0f mm from where it began, more than %.0f mm: its force was taken off",
              1e3 * hapi_v3_norm(way), 1e3 * r->def->max_travel);
-    return fail(r, text);
+    return run_fail(r, text);
   }
   if (fabs(speed_now(r)) > r->def->max_speed) {
     snprintf(text, sizeof text, "it moves at %.2f m/s, more than %.2f m/s: its force was taken off",
              fabs(speed_now(r)), r->def->max_speed);
-    return fail(r, text);
+    return run_fail(r, text);
   }
   return HAP_OK;
 }
 
-static hap_status tell(run *r)
+static hap_status progress_tell(run *r)
 {
   if (r->def->watch == NULL || r->time < r->watched + WATCH_S) {
     return HAP_OK;
@@ -181,51 +181,51 @@ static hap_status tell(run *r)
 }
 
 /* No force after hap_emergency_zero; one that was on its way meanwhile is taken off by the end. */
-static hap_status give(const run *r, double force)
+static hap_status force_write(const run *r, double force)
 {
   hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench reached;
   wanted.force[r->axis] = force;
   if (hapi_emergencies() == r->emergencies &&
       r->device->ops->write(r->device->self, &wanted, &reached) < HAP_OK) {
-    return fail(r, "it takes no force");
+    return run_fail(r, "it takes no force");
   }
   return hapi_emergencies() == r->emergencies
              ? HAP_OK
-             : fail(r, "hap_emergency_zero was called: its force was taken off");
+             : run_fail(r, "hap_emergency_zero was called: its force was taken off");
 }
 
 /* Gives the force, waits for the next tick and reads. Anything but HAP_OK ends the identification. */
-static hap_status step(run *r, double force)
+static hap_status tick_step(run *r, double force)
 {
   hapi_identify_record *axis = &r->records[r->axis];
   axis->samples[axis->count - 1].force = force;
-  hap_status status = give(r, force);
+  hap_status status = force_write(r, force);
   if (status == HAP_OK) {
     status = read_device(r);
   }
   if (status == HAP_OK) {
-    status = record(r);
+    status = sample_record(r);
   }
   if (status == HAP_OK) {
     status = check_limits(r);
   }
-  return status == HAP_OK ? tell(r) : status;
+  return status == HAP_OK ? progress_tell(r) : status;
 }
 
 /* ---- the phases of an axis ---- */
 
-static hap_status rest(run *r)
+static hap_status axis_rest(run *r)
 {
   hap_status status = HAP_OK;
   for (double end = r->time + REST_S; r->time < end && status == HAP_OK;) {
-    status = step(r, 0.0);
+    status = tick_step(r, 0.0);
   }
   return status;
 }
 
 /* More and more force until it moves; *level is then that force. */
-static hap_status search(run *r, double home, double *level)
+static hap_status friction_search(run *r, double home, double *level)
 {
   double begin = r->time;
   char text[160];
@@ -234,10 +234,10 @@ static hap_status search(run *r, double home, double *level)
     if (*level >= r->limit) {
       snprintf(text, sizeof text,
                "it does not move under %.2g N: is it held, at a stop, or switched off?", r->limit);
-      return fail(r, text);
+      return run_fail(r, text);
     }
     *level = fmin((r->time - begin) / RISE_S, 1.0) * r->limit;
-    hap_status status = step(r, *level);
+    hap_status status = tick_step(r, *level);
     if (status != HAP_OK) {
       return status;
     }
@@ -314,7 +314,7 @@ static hap_status swing_about(run *r, double home, double *level)
       s.level = fmin(1.25 * s.level, r->limit);
       s.turned = r->time;
     }
-    hap_status status = step(r, s.direction * s.share * s.level);
+    hap_status status = tick_step(r, s.direction * s.share * s.level);
     if (status != HAP_OK) {
       return status;
     }
@@ -323,30 +323,30 @@ static hap_status swing_about(run *r, double home, double *level)
   return HAP_OK;
 }
 
-static hap_status brake(run *r, double level)
+static hap_status axis_brake(run *r, double level)
 {
   hap_status status = HAP_OK;
   for (double end = r->time + BRAKE_S; r->time < end && status == HAP_OK;) {
-    status = step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0));
+    status = tick_step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0));
   }
   return status;
 }
 
 static hap_status move_axis(run *r)
 {
-  hap_status status = record(r); /* of where the last axis ended */
+  hap_status status = sample_record(r); /* of where the last axis ended */
   double level = 0.0;
   if (status == HAP_OK) {
-    status = rest(r);
+    status = axis_rest(r);
   }
   double home = r->position[r->axis];
   if (status == HAP_OK) {
-    status = search(r, home, &level);
+    status = friction_search(r, home, &level);
   }
   if (status == HAP_OK) {
     status = swing_about(r, home, &level);
   }
-  return status == HAP_OK ? brake(r, level) : status;
+  return status == HAP_OK ? axis_brake(r, level) : status;
 }
 
 static hap_status move_all(run *r)
@@ -371,19 +371,19 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   at.axis = axis;
   hap_status status = hapi_identify_fit_record(&r->records[axis], &fit, &why);
   if (status < HAP_OK) {
-    return fail(&at, why.text);
+    return run_fail(&at, why.text);
   }
   if (fit.residual > RESIDUAL_MOST || fit.delay > HAPI_IDENTIFY_DELAY_MAX) {
     snprintf(text, sizeof text,
              "mass, damping, friction and a delay of at most %.0f ms do not explain %.0f %% of the "
              "force",
              1e3 * HAPI_IDENTIFY_DELAY_MAX, 100.0 * fit.residual);
-    return fail(&at, text);
+    return run_fail(&at, text);
   }
   if (fit.stiffness > STIFFNESS_MOST) {
     snprintf(text, sizeof text, "a spring of %.0f N/m pulls it back: does a hand hold it?",
              fit.stiffness);
-    return fail(&at, text);
+    return run_fail(&at, text);
   }
   io->mass = axis == 0 ? fit.mass : fmin(io->mass, fit.mass);
   io->damping = axis == 0 ? fit.damping : fmin(io->damping, fit.damping);
@@ -395,7 +395,7 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   return HAP_OK;
 }
 
-static hap_status conclude(const run *r, hap_device_identity *out)
+static hap_status identity_conclude(const run *r, hap_device_identity *out)
 {
   hap_status status = HAP_OK;
   hap_device_identity_init(out, sizeof *out);
@@ -422,7 +422,7 @@ static hap_status run_device(run *r, hap_device_identity *out)
   ops->zero(r->device->self);
   hapi_emergency_remove(ops, r->device->self);
   ops->stop(r->device->self);
-  return status == HAP_OK ? conclude(r, out) : status;
+  return status == HAP_OK ? identity_conclude(r, out) : status;
 }
 
 static hap_status run_with_records(run *r, hap_device_identity *out)

@@ -64,7 +64,7 @@ double hapi_identify_velocity(const hapi_identify_record *record, uint32_t i)
 
 /* ---- shapes ---- */
 
-static void integrate(const double a[TERMS], double out[TERMS])
+static void polynomial_integrate(const double a[TERMS], double out[TERMS])
 {
   out[0] = 0.0;
   for (int i = 1; i < TERMS; ++i) {
@@ -87,13 +87,13 @@ static void make_shapes(shape shapes[SHAPES])
     }
     memcpy(last, now, sizeof last);
     memcpy(now, next, sizeof now);
-    integrate(s->curve, s->slope);
-    integrate(s->slope, s->value);
-    integrate(s->value, s->integral);
+    polynomial_integrate(s->curve, s->slope);
+    polynomial_integrate(s->slope, s->value);
+    polynomial_integrate(s->value, s->integral);
   }
 }
 
-static double evaluate(const double a[TERMS], double s)
+static double polynomial_evaluate(const double a[TERMS], double s)
 {
   double sum = 0.0;
   for (int i = TERMS - 1; i >= 0; --i) {
@@ -155,7 +155,7 @@ static void make_row(const fitting *f, const window *w, const shape *factor, dou
   double length = length_of(f, w);
   double weight = weight_of(length);
   double middle = samples[(w->first + w->last) / 2].position; /* its integral is zero */
-  double area = weight * length * evaluate(factor->integral, 1.0);
+  double area = weight * length * polynomial_evaluate(factor->integral, 1.0);
   row[0] = 0.0;
   row[1] = 0.0;
   row[2] = w->sign * area;
@@ -164,14 +164,14 @@ static void make_row(const fitting *f, const window *w, const shape *factor, dou
   for (uint32_t i = w->first; i <= w->last; ++i) {
     double s = (samples[i].time - samples[w->first].time) / length;
     double x = weight * (samples[i].position - middle) * share_of(samples, w, i);
-    row[0] += x * evaluate(factor->curve, s) / (length * length);
-    row[1] -= x * evaluate(factor->slope, s) / length;
+    row[0] += x * polynomial_evaluate(factor->curve, s) / (length * length);
+    row[1] -= x * polynomial_evaluate(factor->slope, s) / length;
     row[4] += weight * (samples[i].position - samples[0].position) * share_of(samples, w, i) *
-              evaluate(factor->value, s);
+              polynomial_evaluate(factor->value, s);
   }
 }
 
-static double within(double s)
+static double clamp_to_unit(double s)
 {
   return fmin(fmax(s, 0.0), 1.0);
 }
@@ -183,18 +183,18 @@ static double push_on(const fitting *f, const window *w, const shape *factor, do
   double length = length_of(f, w);
   double start = samples[w->first].time - delay;
   double sum = 0.0;
-  double upper = evaluate(factor->integral, 1.0);
+  double upper = polynomial_evaluate(factor->integral, 1.0);
   double s = 1.0;
   for (uint32_t i = w->last; i-- > 0 && s > 0.0;) {
-    s = within((samples[i].time - start) / length);
-    double lower = evaluate(factor->integral, s);
+    s = clamp_to_unit((samples[i].time - start) / length);
+    double lower = polynomial_evaluate(factor->integral, s);
     sum += samples[i].force * (upper - lower);
     upper = lower;
   }
   return sum * length * weight_of(length);
 }
 
-static bool allocate(fitting *f)
+static bool fitting_allocate(fitting *f)
 {
   uint32_t most = f->record->count / WINDOW_LEAST + 1;
   f->windows = hapi_alloc_array(most, sizeof *f->windows);
@@ -219,7 +219,7 @@ static void make_rows(fitting *f)
 /* ---- least squares ---- */
 
 /* Elimination with the largest pivot; false when the rows do not tell the unknowns apart. */
-static bool solve(double a[UNKNOWNS][UNKNOWNS + 1], double out[UNKNOWNS])
+static bool equations_solve(double a[UNKNOWNS][UNKNOWNS + 1], double out[UNKNOWNS])
 {
   double whole[UNKNOWNS];
   for (int k = 0; k < UNKNOWNS; ++k) {
@@ -274,7 +274,7 @@ static double fit_at(fitting *f, double delay, double out[UNKNOWNS])
       a[i][UNKNOWNS] += f->rows[r][i] * f->force[r];
     }
   }
-  if (!solve(a, out) || !(all > 0.0)) {
+  if (!equations_solve(a, out) || !(all > 0.0)) {
     return 2.0;
   }
   for (uint32_t r = 0; r < rows; ++r) {
@@ -316,7 +316,7 @@ static double find_delay(fitting *f)
   return low < 1e-7 ? 0.0 : 0.5 * (low + high);
 }
 
-static hap_status fit(fitting *f, hapi_identify_fit *out, hap_detail *detail)
+static hap_status fitting_run(fitting *f, hapi_identify_fit *out, hap_detail *detail)
 {
   double unknowns[UNKNOWNS];
   make_shapes(f->shapes);
@@ -342,8 +342,8 @@ hap_status hapi_identify_fit_record(const hapi_identify_record *record, hapi_ide
                                     hap_detail *detail)
 {
   fitting f = {.record = record};
-  hap_status status = allocate(&f)
-                          ? fit(&f, out, detail)
+  hap_status status = fitting_allocate(&f)
+                          ? fitting_run(&f, out, detail)
                           : hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the identification");
   hapi_free(f.windows);
   hapi_free(f.rows);

@@ -32,7 +32,7 @@ static double smallest_step(const hapi_identify_record *record)
 
 /* The quantum near q of which all small steps are multiples, 0: there is none. Steps of many quanta
  * make it precise. */
-static double refine(const hapi_identify_record *record, double q)
+static double quantum_refine(const hapi_identify_record *record, double q)
 {
   uint32_t count = 0;
   uint32_t fits = 0;
@@ -51,7 +51,7 @@ static double refine(const hapi_identify_record *record, double q)
   return count >= COUNT_LEAST && fits >= count - count / 50 ? way / quanta : 0.0;
 }
 
-static int ascending(const void *a, const void *b)
+static int compare_doubles(const void *a, const void *b)
 {
   double x = *(const double *)a;
   double y = *(const double *)b;
@@ -74,7 +74,7 @@ static double step_beside_repeats(const hapi_identify_record *record)
       steps[count++] = step;
     }
   }
-  qsort(steps, count, sizeof *steps, ascending);
+  qsort(steps, count, sizeof *steps, compare_doubles);
   double median = count >= COUNT_LEAST ? steps[count / 2] : 0.0;
   hapi_free(steps);
   return median;
@@ -84,7 +84,7 @@ double hapi_identify_quantum(const hapi_identify_record *record)
 {
   double smallest = smallest_step(record);
   for (int part = 1; part <= PARTS && smallest < INFINITY; ++part) {
-    double quantum = refine(record, smallest / part);
+    double quantum = quantum_refine(record, smallest / part);
     if (quantum > 0.0) {
       return quantum;
     }

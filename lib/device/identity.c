@@ -50,8 +50,8 @@ void hap_device_identity_init(hap_device_identity *identity, size_t size_of_iden
 }
 
 /* The caller's identity as this build's, its values checked. */
-static hap_status take(const hap_device_identity *given, hap_device_identity *out,
-                       hap_detail *detail)
+static hap_status identity_read(const hap_device_identity *given, hap_device_identity *out,
+                                hap_detail *detail)
 {
   hap_device_identity_init(out, sizeof *out);
   hap_status status =
@@ -216,7 +216,7 @@ hap_status hap_device_identity_write(const char *path, const hap_device_identity
                                      hap_detail *detail)
 {
   hap_device_identity known;
-  hap_status status = take(identity, &known, detail);
+  hap_status status = identity_read(identity, &known, detail);
   if (status < 0) {
     return status;
   }
@@ -245,7 +245,7 @@ hap_status hap_device_set_identity(hap_device *device, const hap_device_identity
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_set_identity: device is NULL");
   }
-  hap_status status = take(identity, &known, detail);
+  hap_status status = identity_read(identity, &known, detail);
   if (status < 0) {
     return status;
   }

@@ -37,7 +37,7 @@ typedef struct module {
   hap_detail *detail;
 } module;
 
-static hap_status fail(const module *m, hap_status status, const char *what, const char *why)
+static hap_status module_fail(const module *m, hap_status status, const char *what, const char *why)
 {
   return hapi_fail(m->detail, status, "module %.*s: %s%.200s", PATH_SHOWN, m->path, what, why);
 }
@@ -86,10 +86,11 @@ static hap_status check_header(const module *m, const elf_header *header, uint64
 {
   const elf_header *own = own_header();
   if (memcmp(header->e_ident, ELFMAG, SELFMAG) != 0) {
-    return fail(m, HAP_ERROR_FORMAT, "not a shared object: it is no ELF file", "");
+    return module_fail(m, HAP_ERROR_FORMAT, "not a shared object: it is no ELF file", "");
   }
   if (is_cut_off(header, file_size)) {
-    return fail(m, HAP_ERROR_FORMAT, "cut off: the end of the file is missing; copy it anew", "");
+    return module_fail(m, HAP_ERROR_FORMAT, "cut off: the end of the file is missing; copy it anew",
+                       "");
   }
   if (own == NULL) {
     return HAP_OK;
@@ -105,7 +106,8 @@ static hap_status check_header(const module *m, const elf_header *header, uint64
                      own->e_ident[EI_CLASS] == ELFCLASS64 ? "64" : "32");
   }
   if (header->e_type != ET_DYN) {
-    return fail(m, HAP_ERROR_FORMAT, "an ELF file, but no shared object: link it with -shared", "");
+    return module_fail(m, HAP_ERROR_FORMAT,
+                       "an ELF file, but no shared object: link it with -shared", "");
   }
   return HAP_OK;
 }
@@ -117,8 +119,8 @@ static hap_status check_file(const module *m)
   elf_header header;
   int file = open(m->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {
-    return fail(m, errno == ENOENT ? HAP_ERROR_NOT_FOUND : HAP_ERROR_IO,
-                "cannot be opened: ", strerror(errno));
+    return module_fail(m, errno == ENOENT ? HAP_ERROR_NOT_FOUND : HAP_ERROR_IO,
+                       "cannot be opened: ", strerror(errno));
   }
   bool regular = fstat(file, &about) == 0 && S_ISREG(about.st_mode);
   memset(&header, 0, sizeof header);
@@ -126,22 +128,23 @@ static hap_status check_file(const module *m)
   int cause = errno;
   close(file);
   if (!regular) {
-    return fail(m, HAP_ERROR_IO, "not a file but a folder, a pipe or a device", "");
+    return module_fail(m, HAP_ERROR_IO, "not a file but a folder, a pipe or a device", "");
   }
   if (got < 0) {
-    return fail(m, HAP_ERROR_IO, "cannot be read: ", strerror(cause));
+    return module_fail(m, HAP_ERROR_IO, "cannot be read: ", strerror(cause));
   }
   return check_header(m, &header, (uint64_t)about.st_size);
 }
 
 /* ---- loading ---- */
 
-static hap_status load(module *m)
+static hap_status module_load(module *m)
 {
   m->library = dlopen(m->path, RTLD_NOW | RTLD_LOCAL);
   if (m->library == NULL) {
     const char *why = dlerror();
-    return fail(m, HAP_ERROR_IO, "cannot be loaded: ", why != NULL ? why : "no reason given");
+    return module_fail(m, HAP_ERROR_IO,
+                       "cannot be loaded: ", why != NULL ? why : "no reason given");
   }
   return HAP_OK;
 }
@@ -152,8 +155,9 @@ static hap_status find_table(const module *m, const hap_device_ops **out)
   module_fn table;
   _Static_assert(sizeof table == sizeof symbol, "POSIX: dlsym gives functions as well");
   if (symbol == NULL) {
-    return fail(m, HAP_ERROR_FORMAT, "no device module of hapode: ",
-                "it has no function " SYMBOL " (hidden? declare it as hapode/device_impl.h does)");
+    return module_fail(m, HAP_ERROR_FORMAT, "no device module of hapode: ",
+                       "it has no function " SYMBOL
+                       " (hidden? declare it as hapode/device_impl.h does)");
   }
   memcpy(&table, &symbol, sizeof table);
   *out = table(HAP_DEVICE_ABI);
@@ -184,7 +188,7 @@ static hap_status open_module(module *m, const char *args, hap_device **out)
 {
   hap_status status = check_file(m);
   if (status >= 0) {
-    status = load(m);
+    status = module_load(m);
   }
   if (status < 0) {
     return status;

@@ -163,7 +163,7 @@ static bool descent_step(search *s, hapi_gjk *out)
 
 /* The turns shrink by a constant ratio on curved parts; their sum to the end is known beforehand.
  * */
-static void leap(search *s, const double turn[3], const double last_turn[3])
+static void search_leap(search *s, const double turn[3], const double last_turn[3])
 {
   double last2 = hapi_v3_dot(last_turn, last_turn);
   double ratio = last2 > 0.0 ? hapi_v3_dot(turn, last_turn) / last2 : 0.0;
@@ -175,7 +175,7 @@ static void leap(search *s, const double turn[3], const double last_turn[3])
 }
 
 /* At most so many steps; out is of the last one. False: none succeeded. */
-static bool descend(search *s, int steps, hapi_gjk *out)
+static bool search_descend(search *s, int steps, hapi_gjk *out)
 {
   double last_turn[3] = {0.0, 0.0, 0.0};
   for (int i = 0; i < steps; ++i) {
@@ -191,7 +191,7 @@ static bool descend(search *s, int steps, hapi_gjk *out)
     s->depth = depth;
     hapi_v3_copy(out->normal, s->normal);
     if (i % 3 == 2) {
-      leap(s, turn, last_turn);
+      search_leap(s, turn, last_turn);
     }
     hapi_v3_copy(turn, last_turn);
   }
@@ -208,7 +208,7 @@ static void try_everywhere(search *s)
     hapi_gjk unused;
     local.depth = DBL_MAX;
     try_direction(&local, start);
-    if (local.depth < DBL_MAX && descend(&local, 4, &unused)) {
+    if (local.depth < DBL_MAX && search_descend(&local, 4, &unused)) {
       try_direction(s, local.normal);
     }
   }
@@ -231,7 +231,7 @@ static bool settle_apart(search *s, hapi_gjk *out)
   if (hapi_gjk_nearest(s->a, s->b, s->normal, &cores)) {
     try_direction(s, cores.normal);
   }
-  return descend(s, DESCENT_MAX, out);
+  return search_descend(s, DESCENT_MAX, out);
 }
 
 bool hapi_deep_nearest(const hapi_solid *a, const hapi_solid *b, const double *hint, hapi_gjk *out)
@@ -245,7 +245,7 @@ bool hapi_deep_nearest(const hapi_solid *a, const hapi_solid *b, const double *h
   if (!(s.depth < 0.0)) {
     search_globally(&s); /* cores that are apart have one minimum only */
   }
-  if (!descend(&s, DESCENT_MAX, out)) {
+  if (!search_descend(&s, DESCENT_MAX, out)) {
     return false;
   }
   if (s.depth < 0.0 && !settle_apart(&s, out)) {

@@ -31,7 +31,7 @@ static void balls_add(const hapi_solid *a, const hapi_solid *b, const hapi_gjk *
  * the descent in hapi_deep_nearest measures it from farther off. */
 static const double thin_gap = 1e-3;
 
-static bool iterated(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out)
+static bool nearest_iterated(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out)
 {
   hapi_gjk cores;
   bool apart = hapi_gjk_nearest(a, b, NULL, &cores);
@@ -49,12 +49,12 @@ static bool iterated(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out
 }
 
 /* One order of kinds, so that a swapped pair takes the same way to its answer. */
-static bool ordered(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out)
+static bool nearest_ordered(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out)
 {
   if (a->kind <= b->kind) {
-    return iterated(a, b, out);
+    return nearest_iterated(a, b, out);
   }
-  bool found = iterated(b, a, out);
+  bool found = nearest_iterated(b, a, out);
   hapi_nearest_swap(out);
   return found;
 }
@@ -68,7 +68,7 @@ bool hapi_nearest_points(const hapi_shape *a, const hap_pose *pose_a, const hapi
     return false;
   }
   if (!hapi_closed_form(&solid[0], &solid[1], &nearest) &&
-      !ordered(&solid[0], &solid[1], &nearest)) {
+      !nearest_ordered(&solid[0], &solid[1], &nearest)) {
     return false;
   }
   hapi_v3_add(nearest.point_a, pose_a->position, nearest.point_a);

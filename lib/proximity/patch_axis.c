@@ -175,7 +175,7 @@ static bool shifted_nearest(const guess *g, double clear, hapi_gjk *out)
 
 /* Uphill in separation until the normal stays. A large clearance sees farther, on rims a small one
  * arrives sooner. */
-static bool climb(guess *g, int steps, hapi_gjk *out)
+static bool guess_climb(guess *g, int steps, hapi_gjk *out)
 {
   double size = smaller_core(g->a, g->b);
   for (int i = 0; i < steps; ++i) {
@@ -224,7 +224,7 @@ static void guess_again(guess *g)
     guess one = {.a = g->a, .b = g->b, .separation = starts[i].separation};
     hapi_gjk unused;
     hapi_v3_copy(starts[i].normal, one.normal);
-    if (climb(&one, START_STEPS, &unused) && one.separation > g->separation) {
+    if (guess_climb(&one, START_STEPS, &unused) && one.separation > g->separation) {
       g->separation = one.separation;
       hapi_v3_copy(one.normal, g->normal);
     }
@@ -241,10 +241,10 @@ bool hapi_patch_axis(const hapi_solid *a, const hapi_solid *b, const hapi_gjk *s
     return true;
   }
   try_normal(&g, out->normal);
-  bool climbed = climb(&g, STEPS_MAX, out);
+  bool climbed = guess_climb(&g, STEPS_MAX, out);
   if (climbed && out->distance < -shallow_part * small) {
     guess_again(&g);
-    climbed = climb(&g, STEPS_MAX, out);
+    climbed = guess_climb(&g, STEPS_MAX, out);
   }
   return (climbed && out->distance > -deep_part * small) || hapi_deep_nearest(a, b, g.normal, out);
 }

@@ -8,7 +8,7 @@ static const double pi = 3.14159265358979323846;
 /* What lies on the border within rounding is inside: flush faces keep their corners. */
 static const double border = 1e-9;
 
-static hapi_spot between(const hapi_spot *a, const hapi_spot *b, double t)
+static hapi_spot spot_between(const hapi_spot *a, const hapi_spot *b, double t)
 {
   return (hapi_spot){.x = a->x + t * (b->x - a->x),
                      .y = a->y + t * (b->y - a->y),
@@ -19,7 +19,7 @@ static hapi_spot between(const hapi_spot *a, const hapi_spot *b, double t)
 #define LEAST_SINE 0.2
 
 /* Whether a spot lies on the border of the reference, along the way to another one. */
-static bool borders(const hapi_spot *spot, double dx, double dy)
+static bool spot_on_border(const hapi_spot *spot, double dx, double dy)
 {
   double off = fabs(spot->side[0] * dx + spot->side[1] * dy);
   return spot->slide == HAPI_SLIDE_CORNER ||
@@ -28,11 +28,11 @@ static bool borders(const hapi_spot *spot, double dx, double dy)
 
 /* The spot where the way from a to b crosses a side of the reference. On a way along its border that
  * is a corner of the reference, else a point of an edge of the incident feature. */
-static hapi_spot cut(const hapi_spot *a, const hapi_spot *b, double t, const double side[2])
+static hapi_spot edge_cut(const hapi_spot *a, const hapi_spot *b, double t, const double side[2])
 {
-  hapi_spot spot = between(a, b, t);
+  hapi_spot spot = spot_between(a, b, t);
   double way[3] = {b->x - a->x, b->y - a->y, b->gap - a->gap};
-  if (borders(a, way[0], way[1]) && borders(b, way[0], way[1])) {
+  if (spot_on_border(a, way[0], way[1]) && spot_on_border(b, way[0], way[1])) {
     spot.slide = HAPI_SLIDE_CORNER;
     return spot;
   }
@@ -62,7 +62,7 @@ static int clip_side(const hapi_spot *from, const hapi_spot *to, const hapi_spot
   for (int i = 0; i < count; ++i) {
     double next_out = dy * (in[i].x - from->x) - dx * (in[i].y - from->y) - slack;
     if ((last_out > 0.0) != (next_out > 0.0) && kept < HAPI_SPOTS_MAX) {
-      out[kept++] = cut(last, &in[i], last_out / (last_out - next_out), side);
+      out[kept++] = edge_cut(last, &in[i], last_out / (last_out - next_out), side);
     }
     if (!(next_out > 0.0) && kept < HAPI_SPOTS_MAX) {
       out[kept++] = in[i];
@@ -121,7 +121,7 @@ typedef struct overlap {
   int left_at; /* the overlap has left the disc at this spot, -1: it has not */
 } overlap;
 
-static void push(overlap *o, hapi_spot spot)
+static void overlap_push(overlap *o, hapi_spot spot)
 {
   if (o->count < HAPI_SPOTS_MAX) {
     o->out[o->count++] = spot;
@@ -136,7 +136,7 @@ static void push_arc(overlap *o, const hapi_spot *from, double span)
     double angle = start + o->turn * span * i / (steps + 1.0);
     double x = o->radius * cos(angle);
     double y = o->radius * sin(angle);
-    push(o, (hapi_spot){.x = x, .y = y, .gap = o->gap + o->slope[0] * x + o->slope[1] * y});
+    overlap_push(o, (hapi_spot){.x = x, .y = y, .gap = o->gap + o->slope[0] * x + o->slope[1] * y});
   }
 }
 
@@ -208,15 +208,15 @@ static void walk_edges(overlap *o)
     if (!edge_in_disc(o, p, q, t)) {
       continue;
     }
-    hapi_spot entry = t[0] > 0.0 ? between(p, q, t[0]) : *p;
+    hapi_spot entry = t[0] > 0.0 ? spot_between(p, q, t[0]) : *p;
     if (t[0] > 0.0 && o->left_at >= 0) {
       hapi_spot exit = o->out[o->left_at];
       arc_between(o, &exit, &entry);
     }
-    push(o, entry);
+    overlap_push(o, entry);
     first_entry = first_entry < 0 && t[0] > 0.0 && o->left_at < 0 ? o->count - 1 : first_entry;
     if (t[1] < 1.0) {
-      push(o, between(p, q, t[1]));
+      overlap_push(o, spot_between(p, q, t[1]));
       o->left_at = o->count - 1;
     }
   }
@@ -240,7 +240,7 @@ static int clip_disc(double radius, hapi_spot *spots, int count)
   walk_edges(&o);
   if (o.count == 0 && polygon_holds_middle(&o)) {
     hapi_spot start = {.x = radius, .gap = o.gap + o.slope[0] * radius};
-    push(&o, start);
+    overlap_push(&o, start);
     push_arc(&o, &start, 2.0 * pi * (1.0 - 1e-9));
   }
   for (int i = 0; i < o.count; ++i) {

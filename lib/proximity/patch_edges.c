@@ -19,8 +19,8 @@ static void round_set(hapi_patch_point *p, const hapi_edge *a, const hapi_edge *
 }
 
 /* Where the lines come nearest, along each from its middle. sine: of their angle. */
-static void crossing(const hapi_edge *a, const hapi_edge *b, double sine, double *along_a,
-                     double *along_b)
+static void edges_cross(const hapi_edge *a, const hapi_edge *b, double sine, double *along_a,
+                        double *along_b)
 {
   double between[3];
   hapi_v3_sub(b->middle, a->middle, between);
@@ -43,7 +43,7 @@ bool hapi_patch_add_edges(const hapi_pair *pair, const hapi_edge *a, const hapi_
   if (sine < parallel) {
     return false;
   }
-  crossing(a, b, sine, &along_a, &along_b);
+  edges_cross(a, b, sine, &along_a, &along_b);
   if (fabs(along_a) > a->half + slack || fabs(along_b) > b->half + slack) {
     return false;
   }

@@ -18,8 +18,8 @@ typedef struct candidate {
 
 /* The sum goes by edges from the first vertex: small edges then lose no digits to the large
  * coordinates they stand at. */
-static void weighted(const double base[3], const double *tips[2], const double weight[3], int count,
-                     double out[3])
+static void weighted_sum(const double base[3], const double *tips[2], const double weight[3],
+                         int count, double out[3])
 {
   double sum[3] = {0.0, 0.0, 0.0};
   double edge[3];
@@ -30,10 +30,10 @@ static void weighted(const double base[3], const double *tips[2], const double w
   hapi_v3_add(base, sum, out);
 }
 
-static void consider(const hapi_simplex *s, candidate *found, candidate *best)
+static void candidate_consider(const hapi_simplex *s, candidate *found, candidate *best)
 {
   const double *tips[2] = {s->vertex[found->index[1]].gap, s->vertex[found->index[2]].gap};
-  weighted(s->vertex[found->index[0]].gap, tips, found->weight, found->count, found->point);
+  weighted_sum(s->vertex[found->index[0]].gap, tips, found->weight, found->count, found->point);
   found->norm2 = hapi_v3_dot(found->point, found->point);
   if (best->count == 0 || found->norm2 < best->norm2) {
     *best = *found;
@@ -43,7 +43,7 @@ static void consider(const hapi_simplex *s, candidate *found, candidate *best)
 static void try_vertex(const hapi_simplex *s, int i, candidate *best)
 {
   candidate found = {.count = 1, .index = {i, i, i}, .weight = {1.0, 0.0, 0.0}};
-  consider(s, &found, best);
+  candidate_consider(s, &found, best);
 }
 
 static void try_edge(const hapi_simplex *s, int i, int j, candidate *best)
@@ -55,7 +55,7 @@ static void try_edge(const hapi_simplex *s, int i, int j, candidate *best)
   if (along > 0.0 && along < length2) {
     double t = along / length2;
     candidate found = {.count = 2, .index = {i, j, i}, .weight = {1.0 - t, t, 0.0}};
-    consider(s, &found, best);
+    candidate_consider(s, &found, best);
   } else {
     try_vertex(s, along > 0.0 ? j : i, best);
   }
@@ -80,7 +80,7 @@ static void try_face(const hapi_simplex *s, const int v[3], candidate *best)
     double w[2] = {weight_1 / area2, weight_2 / area2};
     candidate found = {
         .count = 3, .index = {v[0], v[1], v[2]}, .weight = {1.0 - w[0] - w[1], w[0], w[1]}};
-    consider(s, &found, best);
+    candidate_consider(s, &found, best);
   }
   /* Also when the face took it: for a sliver the weights may be noise. */
   try_edge(s, v[0], v[1], best);
@@ -148,6 +148,6 @@ void hapi_simplex_witness(const hapi_simplex *simplex, double out_a[3], double o
   double weight[3] = {v[0].weight, v[1].weight, v[2].weight};
   const double *tips_a[2] = {v[1].a, v[2].a};
   const double *tips_b[2] = {v[1].b, v[2].b};
-  weighted(v[0].a, tips_a, weight, simplex->count, out_a);
-  weighted(v[0].b, tips_b, weight, simplex->count, out_b);
+  weighted_sum(v[0].a, tips_a, weight, simplex->count, out_a);
+  weighted_sum(v[0].b, tips_b, weight, simplex->count, out_b);
 }

@@ -47,7 +47,7 @@ struct hapi_reader {
 
 /* ---- what is wrong ---- */
 
-static hap_status bad(const hapi_reader *reader, const char *what, hap_detail *detail)
+static hap_status block_refuse(const hapi_reader *reader, const char *what, hap_detail *detail)
 {
   return hapi_fail(detail, HAP_ERROR_FORMAT,
                    "%s: block %u at byte %llu: %s; the file is damaged and cannot be replayed",
@@ -87,7 +87,7 @@ static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
   }
   if (answer != Z_STREAM_END || z->total_out != reader->head.size) {
-    return bad(reader, "its bytes cannot be unpacked", detail);
+    return block_refuse(reader, "its bytes cannot be unpacked", detail);
   }
   return HAP_OK;
 }
@@ -117,7 +117,7 @@ static hap_status read_block(hapi_reader *reader, hap_detail *detail)
   }
   const char *wrong = wrong_head(reader);
   if (wrong != NULL) {
-    return bad(reader, wrong, detail);
+    return block_refuse(reader, wrong, detail);
   }
   bool packed = head->stored < head->size;
   void *at = packed ? (void *)reader->stored : (void *)reader->bytes;
@@ -125,7 +125,7 @@ static hap_status read_block(hapi_reader *reader, hap_detail *detail)
     return broken_off(reader, detail);
   }
   if (hapi_file_crc_block(head, at) != head->crc) {
-    return bad(reader, "its checksum is wrong", detail);
+    return block_refuse(reader, "its checksum is wrong", detail);
   }
   hap_status status = packed ? inflate_block(reader, detail) : HAP_OK;
   if (status >= HAP_OK) {
@@ -139,17 +139,17 @@ static hap_status read_end(hapi_reader *reader, hap_detail *detail)
 {
   const hapi_grammar *g = &reader->grammar;
   if (reader->head.size != sizeof reader->end) {
-    return bad(reader, "an end of another size", detail);
+    return block_refuse(reader, "an end of another size", detail);
   }
   memcpy(&reader->end, reader->bytes, sizeof reader->end);
   bool totals = reader->end.ticks == g->ticks &&
                 memcmp(reader->end.cells, g->cells, sizeof reader->end.cells) == 0;
   bool why = reader->end.end >= HAPI_RECORD_STOPPED && reader->end.end <= HAPI_RECORD_OVERFLOW;
   if (!totals || !why) {
-    return bad(reader, "its totals are not those of the blocks before", detail);
+    return block_refuse(reader, "its totals are not those of the blocks before", detail);
   }
   if (getc(reader->file) != EOF) {
-    return bad(reader, "something follows the end of the recording", detail);
+    return block_refuse(reader, "something follows the end of the recording", detail);
   }
   reader->over = true;
   return HAP_END;
@@ -168,14 +168,14 @@ static hap_status read_cells(hapi_reader *reader, hapi_stream *out_stream, uint3
     return read_end(reader, detail);
   }
   if (head->type < HAPI_BLOCK_CELLS_OF || head->size % sizeof(hapi_cell) != 0) {
-    return bad(reader, "it does not hold whole cells", detail);
+    return block_refuse(reader, "it does not hold whole cells", detail);
   }
   *out_stream = (hapi_stream)(head->type - HAPI_BLOCK_CELLS_OF);
   *out_count = head->size / (uint32_t)sizeof(hapi_cell);
   for (uint32_t i = 0; i < *out_count; ++i) {
     const char *wrong = hapi_grammar_take(&reader->grammar, *out_stream, &reader->bytes[i]);
     if (wrong != NULL) {
-      return bad(reader, wrong, detail);
+      return block_refuse(reader, wrong, detail);
     }
   }
   return HAP_OK;
@@ -201,7 +201,7 @@ static hap_status read_head(hapi_reader *reader, hap_detail *detail)
                      reader->path);
   }
   if (head.crc != hapi_file_crc_head(&head)) {
-    return bad(reader, "the checksum of the file's head is wrong", detail);
+    return block_refuse(reader, "the checksum of the file's head is wrong", detail);
   }
   if (head.version != HAPI_FILE_VERSION || head.cell_size != sizeof(hapi_cell)) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
@@ -222,7 +222,7 @@ static hap_status other_build(const hapi_reader *reader, const char *what, const
                    reader->path, what, there, here);
 }
 
-static bool terminated(const char *text, size_t size)
+static bool text_is_terminated(const char *text, size_t size)
 {
   return memchr(text, '\0', size) != NULL;
 }
@@ -254,16 +254,17 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
     return status == HAP_END ? broken_off(reader, detail) : status;
   }
   if (reader->head.type != HAPI_BLOCK_INFO || reader->head.size < HAPI_FILE_INFO_LEAST) {
-    return bad(reader, "it should tell what was recorded, and does not", detail);
+    return block_refuse(reader, "it should tell what was recorded, and does not", detail);
   }
   memset(info, 0, sizeof *info);
   memcpy(info, reader->bytes, HAPI_FILE_INFO_LEAST);
   size_t size = reader->head.size - (size_t)info->note_size; /* wraps where the note is too long */
   if (info->note_size > HAPI_NOTE_MAX || size < HAPI_FILE_INFO_LEAST || size > sizeof *info ||
-      !terminated(info->library, sizeof info->library) ||
-      !terminated(info->machine, sizeof info->machine) ||
-      !terminated(info->system, sizeof info->system) || !terminated(info->ode, sizeof info->ode)) {
-    return bad(reader, "it tells what was recorded in a form that there is not", detail);
+      !text_is_terminated(info->library, sizeof info->library) ||
+      !text_is_terminated(info->machine, sizeof info->machine) ||
+      !text_is_terminated(info->system, sizeof info->system) ||
+      !text_is_terminated(info->ode, sizeof info->ode)) {
+    return block_refuse(reader, "it tells what was recorded in a form that there is not", detail);
   }
   memcpy(info, reader->bytes, size);
   memcpy(reader->note, (const char *)reader->bytes + size, info->note_size);
@@ -272,24 +273,24 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
 
 /* ---- life ---- */
 
-static voidpf allocate(voidpf user, uInt count, uInt size)
+static voidpf zlib_allocate(voidpf user, uInt count, uInt size)
 {
   (void)user;
   return hapi_alloc_array(count, size);
 }
 
-static void release(voidpf user, voidpf memory)
+static void zlib_release(voidpf user, voidpf memory)
 {
   (void)user;
   hapi_free(memory);
 }
 
-static bool prepare(hapi_reader *reader)
+static bool reader_prepare(hapi_reader *reader)
 {
   reader->stored = hapi_alloc(HAPI_BLOCK_BYTES);
   reader->bytes = hapi_alloc(HAPI_BLOCK_BYTES);
-  reader->inflater.zalloc = allocate;
-  reader->inflater.zfree = release;
+  reader->inflater.zalloc = zlib_allocate;
+  reader->inflater.zfree = zlib_release;
   reader->inflates = inflateInit(&reader->inflater) == Z_OK;
   return reader->stored != NULL && reader->bytes != NULL && reader->inflates;
 }
@@ -333,7 +334,7 @@ static void keep_path(hapi_reader *reader, const char *path)
 static hap_status open_reader(hapi_reader *reader, const char *path, const char *ode,
                               hap_detail *detail)
 {
-  if (!prepare(reader)) {
+  if (!reader_prepare(reader)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
   }
   reader->file = fopen(path, "rb");
@@ -435,12 +436,12 @@ static bool make_room(cell_queue *q, uint32_t count)
   return true;
 }
 
-static hap_status enqueue(hapi_reader *reader, hapi_stream stream, uint32_t count,
-                          hap_detail *detail)
+static hap_status cells_enqueue(hapi_reader *reader, hapi_stream stream, uint32_t count,
+                                hap_detail *detail)
 {
   cell_queue *q = &reader->queues[stream];
   if (q->count + count > QUEUE_MAX) {
-    return bad(reader, "one thread is far ahead of the others", detail);
+    return block_refuse(reader, "one thread is far ahead of the others", detail);
   }
   if (!make_room(q, count)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
@@ -472,7 +473,7 @@ static hap_status read_on(hapi_reader *reader, hap_detail *detail)
   hapi_stream stream = HAPI_STREAM_HAPTIC;
   uint32_t count = 0;
   hap_status status = reader->over ? HAP_END : read_cells(reader, &stream, &count, detail);
-  return status == HAP_OK ? enqueue(reader, stream, count, detail) : status;
+  return status == HAP_OK ? cells_enqueue(reader, stream, count, detail) : status;
 }
 
 hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,

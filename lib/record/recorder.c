@@ -45,14 +45,14 @@ static bool goes_on(const hapi_recorder *recorder)
   return atomic_load(&recorder->ended) == HAPI_RECORD_GOES_ON;
 }
 
-static void end(hapi_recorder *recorder, hapi_record_end why)
+static void recorder_end(hapi_recorder *recorder, hapi_record_end why)
 {
   int expected = HAPI_RECORD_GOES_ON;
   (void)atomic_compare_exchange_strong(&recorder->ended, &expected, (int)why);
 }
 
 /* No more goes to the file, whatever the recording had ended by before. */
-static void fail(hapi_recorder *recorder, int error)
+static void recorder_fail(hapi_recorder *recorder, int error)
 {
   atomic_store(&recorder->error, error);
   atomic_store(&recorder->ended, HAPI_RECORD_FAILED);
@@ -68,9 +68,9 @@ static void write_bytes(hapi_recorder *recorder, const void *bytes, size_t size)
       size -= (size_t)written;
       atomic_fetch_add(&recorder->bytes, (uint64_t)written);
     } else if (written < 0 && errno != EINTR) {
-      fail(recorder, errno);
+      recorder_fail(recorder, errno);
     } else if (written == 0) {
-      fail(recorder, ENOSPC);
+      recorder_fail(recorder, ENOSPC);
     }
   }
 }
@@ -100,7 +100,7 @@ static bool write_block(hapi_recorder *recorder, uint32_t type, const void *byte
   head.crc = hapi_file_crc_block(&head, stored);
   uint64_t after = atomic_load(&recorder->bytes) + sizeof head + head.stored;
   if (cells && after + END_BYTES > recorder->max_bytes) {
-    end(recorder, HAPI_RECORD_LIMIT);
+    recorder_end(recorder, HAPI_RECORD_LIMIT);
     return false;
   }
   write_bytes(recorder, &head, sizeof head);
@@ -111,7 +111,7 @@ static bool write_block(hapi_recorder *recorder, uint32_t type, const void *byte
 
 /* ---- cells ---- */
 
-static bool flush(hapi_recorder *recorder, hapi_stream stream)
+static bool block_flush(hapi_recorder *recorder, hapi_stream stream)
 {
   uint32_t count = recorder->counts[stream];
   recorder->counts[stream] = 0;
@@ -139,14 +139,14 @@ static bool drain_whole(hapi_recorder *recorder, hapi_stream stream)
         hapi_tape_take(&recorder->tapes[stream], recorder->cells[stream] + recorder->counts[stream],
                        HAPI_BLOCK_CELLS - recorder->counts[stream]);
     recorder->counts[stream] += (uint32_t)got;
-    good = recorder->counts[stream] < HAPI_BLOCK_CELLS || flush(recorder, stream);
+    good = recorder->counts[stream] < HAPI_BLOCK_CELLS || block_flush(recorder, stream);
   }
-  return good && flush(recorder, stream);
+  return good && block_flush(recorder, stream);
 }
 
 /* The loop's cells are written after all that the others had put when these were taken: so what a tick
  * took from them stands before it, and the file can be replayed to wherever it breaks off. */
-static bool drain(hapi_recorder *recorder, bool flushes)
+static bool streams_drain(hapi_recorder *recorder, bool flushes)
 {
   uint32_t *count = &recorder->counts[HAPI_STREAM_HAPTIC];
   bool good = true;
@@ -156,7 +156,8 @@ static bool drain(hapi_recorder *recorder, bool flushes)
     *count += (uint32_t)got;
     if (*count == HAPI_BLOCK_CELLS || (flushes && got == 0)) {
       good = drain_whole(recorder, HAPI_STREAM_PHYSICS) &&
-             drain_whole(recorder, HAPI_STREAM_CONTACT) && flush(recorder, HAPI_STREAM_HAPTIC);
+             drain_whole(recorder, HAPI_STREAM_CONTACT) &&
+             block_flush(recorder, HAPI_STREAM_HAPTIC);
     }
   }
   return good;
@@ -171,7 +172,7 @@ static void end_file(hapi_recorder *recorder)
     (void)write_block(recorder, HAPI_BLOCK_END, &recorder->totals, sizeof recorder->totals);
   }
   if (close(recorder->file) != 0 && atomic_load(&recorder->error) == 0) {
-    fail(recorder, errno);
+    recorder_fail(recorder, errno);
   }
   recorder->file = -1;
 }
@@ -193,33 +194,33 @@ static void *recorder_main(void *arg)
     int64_t now = hapi_clock_now();
     bool flushes = now >= next_flush;
     next_flush = flushes ? now + FLUSH_NS : next_flush;
-    (void)drain(recorder, flushes);
+    (void)streams_drain(recorder, flushes);
     hapi_clock_sleep_until(now + PAUSE_NS);
   }
   int why = atomic_load(&recorder->ended);
   if (why == HAPI_RECORD_GOES_ON || why == HAPI_RECORD_OVERFLOW) {
-    (void)drain(recorder, true); /* what was complete by then */
+    (void)streams_drain(recorder, true); /* what was complete by then */
   }
-  end(recorder, HAPI_RECORD_STOPPED);
+  recorder_end(recorder, HAPI_RECORD_STOPPED);
   end_file(recorder);
   return NULL;
 }
 
 /* ---- life ---- */
 
-static voidpf allocate(voidpf user, uInt count, uInt size)
+static voidpf zlib_allocate(voidpf user, uInt count, uInt size)
 {
   (void)user;
   return hapi_alloc_array(count, size);
 }
 
-static void release(voidpf user, voidpf memory)
+static void zlib_release(voidpf user, voidpf memory)
 {
   (void)user;
   hapi_free(memory);
 }
 
-static bool prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
+static bool recorder_prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
   bool good = true;
   for (int i = 0; i < HAPI_STREAMS; ++i) {
@@ -229,8 +230,8 @@ static bool prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
     good = good && recorder->cells[i] != NULL;
   }
   recorder->stored = hapi_alloc(HAPI_BLOCK_BYTES);
-  recorder->deflater.zalloc = allocate;
-  recorder->deflater.zfree = release;
+  recorder->deflater.zalloc = zlib_allocate;
+  recorder->deflater.zfree = zlib_release;
   recorder->deflates = good && deflateInit(&recorder->deflater, DEFLATE_LEVEL) == Z_OK;
   return good && recorder->stored != NULL && recorder->deflates;
 }
@@ -259,7 +260,7 @@ hap_status hapi_recorder_create(const hapi_recorder_config *config, hapi_recorde
   }
   recorder->file = -1;
   recorder->max_bytes = config->max_bytes;
-  if (!prepare(recorder, config)) {
+  if (!recorder_prepare(recorder, config)) {
     hapi_recorder_destroy(recorder);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a recording");
   }
@@ -311,7 +312,7 @@ void hapi_recorder_stop(hapi_recorder *recorder)
   atomic_store(&recorder->stop, 1);
   hapi_thread_join(&recorder->thread);
   if (recorder->file >= 0) { /* its session never ran */
-    end(recorder, HAPI_RECORD_STOPPED);
+    recorder_end(recorder, HAPI_RECORD_STOPPED);
     end_file(recorder);
   }
 }

@@ -116,7 +116,7 @@ static size_t lay_out(hapi_channel name, void *message, const hapi_capacity *c)
   return 0;
 }
 
-static void measure(const hapi_capacity *capacity, size_t sizes[HAPI_CHANNELS])
+static void slots_measure(const hapi_capacity *capacity, size_t sizes[HAPI_CHANNELS])
 {
   union {
     hapi_model model;
@@ -134,7 +134,7 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
 {
   size_t sizes[HAPI_CHANNELS];
   size_t size = round_up(sizeof(hapi_exchange));
-  measure(capacity, sizes);
+  slots_measure(capacity, sizes);
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
     size += 3 * sizes[i];
   }
@@ -200,14 +200,14 @@ void hapi_exchange_reset(hapi_exchange *exchange)
   hapi_path_reset(&exchange->path);
 }
 
-static void *back(hapi_exchange *exchange, hapi_channel name)
+static void *channel_back(hapi_exchange *exchange, hapi_channel name)
 {
   channel *c = &exchange->channels[name];
   return c->places[hapi_triple_back(&c->buffer)];
 }
 
 /* Replay: the writer's place is always the same, and what is in it is copied. */
-static void publish(hapi_exchange *exchange, hapi_channel name)
+static void channel_publish(hapi_exchange *exchange, hapi_channel name)
 {
   channel *c = &exchange->channels[name];
   unsigned place = hapi_triple_back(&c->buffer);
@@ -219,7 +219,7 @@ static void publish(hapi_exchange *exchange, hapi_channel name)
   hapi_triple_publish(&c->buffer);
 }
 
-static void *take(hapi_exchange *exchange, hapi_channel name)
+static void *channel_take(hapi_exchange *exchange, hapi_channel name)
 {
   channel *c = &exchange->channels[name];
   if (c->queue != NULL) {
@@ -273,46 +273,46 @@ hap_status hapi_exchange_play_status(const hapi_exchange *exchange)
 
 hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
 {
-  return back(exchange, HAPI_CHANNEL_MODEL);
+  return channel_back(exchange, HAPI_CHANNEL_MODEL);
 }
 
 void hapi_exchange_model_publish(hapi_exchange *exchange)
 {
-  publish(exchange, HAPI_CHANNEL_MODEL);
+  channel_publish(exchange, HAPI_CHANNEL_MODEL);
 }
 
 hapi_model *hapi_exchange_model_take(hapi_exchange *exchange)
 {
-  return take(exchange, HAPI_CHANNEL_MODEL);
+  return channel_take(exchange, HAPI_CHANNEL_MODEL);
 }
 
 hapi_state *hapi_exchange_state_back(hapi_exchange *exchange)
 {
-  return back(exchange, HAPI_CHANNEL_STATE);
+  return channel_back(exchange, HAPI_CHANNEL_STATE);
 }
 
 void hapi_exchange_state_publish(hapi_exchange *exchange)
 {
-  publish(exchange, HAPI_CHANNEL_STATE);
+  channel_publish(exchange, HAPI_CHANNEL_STATE);
 }
 
 hapi_state *hapi_exchange_state_take(hapi_exchange *exchange)
 {
-  return take(exchange, HAPI_CHANNEL_STATE);
+  return channel_take(exchange, HAPI_CHANNEL_STATE);
 }
 
 hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
 {
-  return back(exchange, HAPI_CHANNEL_NEAR);
+  return channel_back(exchange, HAPI_CHANNEL_NEAR);
 }
 
 /* Physics alone writes near_is_empty, and the contact thread waits only while it is set: no post is lost, and
  * one too many costs a look. */
 void hapi_exchange_near_publish(hapi_exchange *exchange)
 {
-  const hapi_near *near = back(exchange, HAPI_CHANNEL_NEAR);
+  const hapi_near *near = channel_back(exchange, HAPI_CHANNEL_NEAR);
   int empty = near->pair_count + near->tool_pair_count == 0 && near->always == 0;
-  publish(exchange, HAPI_CHANNEL_NEAR);
+  channel_publish(exchange, HAPI_CHANNEL_NEAR);
   if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
     sem_post(&exchange->near_bell);
   }
@@ -332,37 +332,37 @@ void hapi_exchange_near_ring(hapi_exchange *exchange)
 
 hapi_near *hapi_exchange_near_take(hapi_exchange *exchange)
 {
-  return take(exchange, HAPI_CHANNEL_NEAR);
+  return channel_take(exchange, HAPI_CHANNEL_NEAR);
 }
 
 hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange)
 {
-  return back(exchange, HAPI_CHANNEL_POSES);
+  return channel_back(exchange, HAPI_CHANNEL_POSES);
 }
 
 void hapi_exchange_poses_publish(hapi_exchange *exchange)
 {
-  publish(exchange, HAPI_CHANNEL_POSES);
+  channel_publish(exchange, HAPI_CHANNEL_POSES);
 }
 
 hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange)
 {
-  return take(exchange, HAPI_CHANNEL_POSES);
+  return channel_take(exchange, HAPI_CHANNEL_POSES);
 }
 
 hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange)
 {
-  return back(exchange, HAPI_CHANNEL_PATCHES);
+  return channel_back(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 void hapi_exchange_patches_publish(hapi_exchange *exchange)
 {
-  publish(exchange, HAPI_CHANNEL_PATCHES);
+  channel_publish(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
 {
-  return take(exchange, HAPI_CHANNEL_PATCHES);
+  return channel_take(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 hapi_path *hapi_exchange_path(hapi_exchange *exchange)

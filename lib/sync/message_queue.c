@@ -64,7 +64,7 @@ static void give_back(hapi_message_queue *queue, node *n)
   }
 }
 
-static bool wanted(const hapi_message_queue *queue, uint64_t number)
+static bool number_is_wanted(const hapi_message_queue *queue, uint64_t number)
 {
   return number >= queue->forgotten || number == queue->expected;
 }
@@ -75,7 +75,7 @@ static void drop_unwanted(hapi_message_queue *queue)
   queue->last = NULL;
   while (*link != NULL) {
     node *n = *link;
-    if (wanted(queue, n->number)) {
+    if (number_is_wanted(queue, n->number)) {
       queue->last = n;
       link = &n->next;
     } else {
@@ -99,7 +99,7 @@ static node *new_node(hapi_message_queue *queue)
 
 void hapi_message_queue_put(hapi_message_queue *queue, uint64_t number, const void *message)
 {
-  node *n = wanted(queue, number) ? new_node(queue) : NULL;
+  node *n = number_is_wanted(queue, number) ? new_node(queue) : NULL;
   if (n == NULL) {
     return;
   }

@@ -107,7 +107,7 @@ static double off_line(const face *f, uint32_t index, const uint32_t ends[2], do
 }
 
 /* m, what a point's distance from others is worth when it is higher than the deepest. */
-static double worth(const face *f, uint32_t index, double distance)
+static double face_worth(const face *f, uint32_t index, double distance)
 {
   return distance - (f->in->gaps[index] - f->in->gaps[f->deepest]) / SLOPE_MOST;
 }
@@ -119,7 +119,7 @@ static uint32_t farthest_from(const face *f, uint32_t from)
   for (uint32_t i = 0; i < f->count; ++i) {
     double way[3];
     hapi_v3_sub(f->in->places[f->members[i]], f->in->places[from], way);
-    double value = worth(f, f->members[i], hapi_v3_norm(way));
+    double value = face_worth(f, f->members[i], hapi_v3_norm(way));
     if (value > most) {
       most = value;
       best = f->members[i];
@@ -135,7 +135,7 @@ static uint32_t farthest_off(const face *f, const uint32_t ends[2], const double
   double most = 0.0;
   for (uint32_t i = 0; i < f->count; ++i) {
     double off[3];
-    double distance = worth(f, f->members[i], off_line(f, f->members[i], ends, off));
+    double distance = face_worth(f, f->members[i], off_line(f, f->members[i], ends, off));
     if (distance > most && (beside == NULL || hapi_v3_dot(off, beside) < 0.0)) {
       most = distance;
       best = f->members[i];

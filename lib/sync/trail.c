@@ -59,7 +59,7 @@ hapi_trail_view hapi_trail_look(const hapi_trail *trail)
   return view;
 }
 
-static void note(hapi_trail_view *view, uint64_t row)
+static void row_note(hapi_trail_view *view, uint64_t row)
 {
   view->oldest = row < view->oldest ? row : view->oldest;
 }
@@ -67,7 +67,7 @@ static void note(hapi_trail_view *view, uint64_t row)
 int64_t hapi_trail_time(hapi_trail_view *view, uint64_t row, hapi_trail_clock clock)
 {
   const hapi_trail_row *head = &view->trail->heads[row % view->trail->rows];
-  note(view, row);
+  row_note(view, row);
   return clock == HAPI_TRAIL_TICK ? LOAD(head->time_ns) : LOAD(head->bodies_ns);
 }
 
@@ -97,7 +97,7 @@ bool hapi_trail_body_at(hapi_trail_view *view, uint64_t row, uint32_t slot, uint
                         hap_pose *out)
 {
   const hapi_trail *trail = view->trail;
-  note(view, row);
+  row_note(view, row);
   if (slot >= LOAD(trail->heads[row % trail->rows].body_high)) {
     return false;
   }
@@ -114,7 +114,7 @@ bool hapi_trail_pointer_at(hapi_trail_view *view, uint64_t row, uint32_t index, 
                            hap_pose out_proxy_device[2])
 {
   const hapi_trail_pointer *place = &hapi_trail_pointers(view->trail, row)[index];
-  note(view, row);
+  row_note(view, row);
   if (LOAD(place->generation) != generation) {
     return false;
   }
@@ -127,7 +127,7 @@ bool hapi_trail_pointer_at(hapi_trail_view *view, uint64_t row, uint32_t index, 
 
 bool hapi_trail_proxied_at(hapi_trail_view *view, uint64_t row, uint32_t index)
 {
-  note(view, row);
+  row_note(view, row);
   return LOAD(hapi_trail_pointers(view->trail, row)[index].proxied) != 0;
 }
 

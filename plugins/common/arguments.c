@@ -17,7 +17,7 @@ typedef struct slice {
   size_t length;
 } slice;
 
-static int shown(size_t length)
+static int length_shown(size_t length)
 {
   return length < SHOWN ? (int)length : SHOWN;
 }
@@ -39,7 +39,7 @@ static hap_status fail_item(const hapi_argument_table *table, const char *what, 
   char keys[256];
   list_keys(table, keys, sizeof keys);
   return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s: %s '%.*s'%s; known: %s", table->device, what,
-                   shown(item.length), item.text, tail, keys);
+                   length_shown(item.length), item.text, tail, keys);
 }
 
 hap_status hapi_arguments_fail(const hapi_argument_table *table, const hapi_argument *argument,

@@ -15,7 +15,7 @@ void hapi_output_init(hapi_output *output, double max_force, double max_torque)
 }
 
 /* True when it had to. The largest component comes out first, so that no square overflows. */
-static bool shorten(const double wanted[3], double limit, double out[3])
+static bool vector_shorten(const double wanted[3], double limit, double out[3])
 {
   double largest = hapi_max(fabs(wanted[0]), hapi_max(fabs(wanted[1]), fabs(wanted[2])));
   hapi_v3_copy(wanted, out);
@@ -36,8 +36,8 @@ hap_status hapi_output_write(hapi_output *output, const hap_wrench *wanted, hap_
   if (!hapi_finite(wanted->force, 3) || !hapi_finite(wanted->torque, 3)) {
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = shorten(wanted->force, output->max_force, output->held.force);
-  bool twisted = shorten(wanted->torque, output->max_torque, output->held.torque);
+  bool shortened = vector_shorten(wanted->force, output->max_force, output->held.force);
+  bool twisted = vector_shorten(wanted->torque, output->max_torque, output->held.torque);
   *reached = output->held;
   /* Last, so that a zero that comes in between is taken as one from before this write. */
   atomic_store_explicit(&output->zeroed.raised, false, memory_order_release);

@@ -37,7 +37,7 @@ static const char *skip_blanks(const char *at)
 }
 
 /* Takes the line end and the blanks before it away. */
-static void trim(char *text, size_t length)
+static void line_trim(char *text, size_t length)
 {
   if (length > 0 && text[length - 1] == '\r') {
     --length;
@@ -68,7 +68,7 @@ static hap_status read_line(hapi_csv *csv, hap_detail *detail)
     return hapi_fail(detail, HAP_ERROR_IO, "%s, line %lu: cannot be read: %s",
                      short_path(csv->path), csv->line + !any, strerror(errno));
   }
-  trim(csv->text, length);
+  line_trim(csv->text, length);
   return any ? HAP_OK : HAP_END;
 }
 

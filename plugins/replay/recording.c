@@ -23,8 +23,8 @@ static size_t row_bytes(const hapi_recording *recording)
 }
 
 /* No realloc behind the hooks; half as much again keeps the peak below three times the rows. */
-static hap_status grow(hapi_recording *recording, size_t *capacity, const hapi_csv *csv,
-                       hap_detail *detail)
+static hap_status recording_grow(hapi_recording *recording, size_t *capacity, const hapi_csv *csv,
+                                 hap_detail *detail)
 {
   if (*capacity >= ROWS_MAX) {
     return hapi_csv_fail(csv, HAP_ERROR_CAPACITY, "more than 50 million rows", detail);
@@ -101,7 +101,7 @@ static hap_status read_rows(hapi_recording *recording, hapi_csv *csv, hap_detail
       return hapi_csv_fail(csv, HAP_ERROR_FORMAT, wrong, detail);
     }
     if (recording->count == capacity) {
-      status = grow(recording, &capacity, csv, detail);
+      status = recording_grow(recording, &capacity, csv, detail);
       if (status < 0) {
         return status;
       }

@@ -63,7 +63,8 @@ static hap_status read_arguments(replay_device *device, const char *args, hap_de
   return HAP_OK;
 }
 
-static hap_status load(replay_device *device, const char *name, size_t length, hap_detail *detail)
+static hap_status recording_load(replay_device *device, const char *name, size_t length,
+                                 hap_detail *detail)
 {
   char *path = hapi_alloc(length + 1);
   if (path == NULL) {
@@ -75,7 +76,7 @@ static hap_status load(replay_device *device, const char *name, size_t length, h
   return status < 0 ? status : hapi_spline_solve(&device->recording, detail);
 }
 
-static hap_status configure(replay_device *device, const char *args, hap_detail *detail)
+static hap_status device_configure(replay_device *device, const char *args, hap_detail *detail)
 {
   size_t length = strcspn(args, ",");
   if (length == 0) {
@@ -91,7 +92,7 @@ static hap_status configure(replay_device *device, const char *args, hap_detail 
   if (status < 0) {
     return status;
   }
-  status = load(device, args, length, detail);
+  status = recording_load(device, args, length, detail);
   hapi_output_init(&device->output, MAX_FORCE, device->recording.channels == 7 ? MAX_TORQUE : 0.0);
   return status;
 }
@@ -109,7 +110,7 @@ static hap_status replay_open(const char *args, void **self, hap_detail *detail)
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "replay: out of memory");
   }
-  hap_status status = configure(device, args, detail);
+  hap_status status = device_configure(device, args, detail);
   if (status < 0) {
     replay_close(device);
     return status;
@@ -137,7 +138,7 @@ static hap_status replay_start(void *self)
 }
 
 /* Channels and derivatives; outside of the recording at rest at its ends. */
-static void sample(replay_device *device, double time, double *value, double *slope)
+static void channels_sample(replay_device *device, double time, double *value, double *slope)
 {
   const hapi_recording *recording = &device->recording;
   const double *first = hapi_recording_row(recording, 0);
@@ -170,8 +171,8 @@ static void settle_rotation(const double value[4], const double slope[4], double
   hapi_v3_scale(2.0 / length, rate + 1, angular);
 }
 
-static void place(const replay_device *device, const double *value, const double *slope,
-                  hap_pose *pose, hap_twist *twist)
+static void pose_place(const replay_device *device, const double *value, const double *slope,
+                       hap_pose *pose, hap_twist *twist)
 {
   hapi_v3_scale(device->scale, value, pose->position);
   hapi_quat_rotate(device->rotate, pose->position, pose->position);
@@ -199,8 +200,9 @@ static hap_status replay_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   }
   double value[HAPI_RECORDING_CHANNELS_MAX];
   double slope[HAPI_RECORDING_CHANNELS_MAX];
-  sample(device, device->start + hapi_timeline_seconds(device->timeline.elapsed_ns), value, slope);
-  place(device, value, slope, pose, twist);
+  channels_sample(device, device->start + hapi_timeline_seconds(device->timeline.elapsed_ns), value,
+                  slope);
+  pose_place(device, value, slope, pose, twist);
   *buttons = 0;
   return HAP_OK;
 }

@@ -11,7 +11,7 @@
  *   h0 m[i-1] + 2 (h0 + h1) m[i] + h1 m[i+1] = 6 ((y[i+1] - y[i]) / h1 - (y[i] - y[i-1]) / h0)
  * for all channels together; they share the matrix. It is diagonally dominant: no pivots. upper[i]
  * is what is left right of the diagonal. m[0] = m[count-1] = 0. */
-static void eliminate(hapi_recording *recording, double *upper)
+static void slopes_eliminate(hapi_recording *recording, double *upper)
 {
   int channels = recording->channels;
   upper[0] = 0.0;
@@ -31,7 +31,7 @@ static void eliminate(hapi_recording *recording, double *upper)
   }
 }
 
-static void substitute(hapi_recording *recording, const double *upper)
+static void slopes_substitute(hapi_recording *recording, const double *upper)
 {
   int channels = recording->channels;
   for (size_t i = recording->count - 1; i-- > 1;) {
@@ -51,14 +51,14 @@ hap_status hapi_spline_solve(hapi_recording *recording, hap_detail *detail)
   if (recording->curvature == NULL || upper == NULL) {
     status = hapi_fail(detail, HAP_ERROR_MEMORY, "replay: no memory for the spline");
   } else {
-    eliminate(recording, upper);
-    substitute(recording, upper);
+    slopes_eliminate(recording, upper);
+    slopes_substitute(recording, upper);
   }
   hapi_free(upper);
   return status;
 }
 
-static bool holds(const hapi_recording *recording, size_t segment, double time)
+static bool segment_holds(const hapi_recording *recording, size_t segment, double time)
 {
   return hapi_recording_row(recording, segment)[0] <= time &&
          time < hapi_recording_row(recording, segment + 1)[0];
@@ -68,7 +68,7 @@ size_t hapi_spline_find(const hapi_recording *recording, double time, size_t nea
 {
   size_t last = recording->count - 2;
   for (size_t i = near; i < near + NEAR && i <= last; ++i) {
-    if (holds(recording, i, time)) {
+    if (segment_holds(recording, i, time)) {
       return i;
     }
   }

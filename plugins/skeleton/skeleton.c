@@ -121,7 +121,7 @@ static void skeleton_stop(void *self)
 
 /* REPLACE: your kinematics. Counts to metres, in a right-handed frame whose origin is where the grip
  * rests; the velocity is a difference to the read before. */
-static void place(skeleton *device, int64_t time_ns, const int32_t counts[3])
+static void pose_from_counts(skeleton *device, int64_t time_ns, const int32_t counts[3])
 {
   double length = 1e-9 * (double)(time_ns - device->read_ns);
   bool known = device->read_ns != 0;
@@ -148,7 +148,7 @@ static hap_status skeleton_read(void *self, int64_t time_ns, hap_pose *pose, hap
   if (!hardware_read(device->board, counts)) {
     return HAP_ERROR_DEVICE;
   }
-  place(device, time_ns, counts);
+  pose_from_counts(device, time_ns, counts);
   *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   memcpy(pose->position, device->position, sizeof pose->position);
@@ -158,7 +158,7 @@ static hap_status skeleton_read(void *self, int64_t time_ns, hap_pose *pose, hap
 }
 
 /* To at most that norm, its direction kept; true when it had to. */
-static bool shorten(double force[3], double limit)
+static bool force_shorten(double force[3], double limit)
 {
   double norm = hypot(hypot(force[0], force[1]), force[2]);
   if (norm <= limit) {
@@ -184,7 +184,7 @@ static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrenc
     hardware_off(device->board); /* a number that is none must not become a current */
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = shorten(force, device->limit);
+  bool shortened = force_shorten(force, device->limit);
   *reached = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   for (int axis = 0; axis < 3; ++axis) {
     current[axis] = (int16_t)(force[axis] / NEWTON_MA);

@@ -78,7 +78,7 @@ void hardware_currents(const hardware *board, int16_t milliamperes[3])
 }
 
 /* m v' = f - d v, solved exactly for a force that is constant. */
-static void slide(hardware *board, int axis, double force, double length)
+static void axis_slide(hardware *board, int axis, double force, double length)
 {
   double end = force / DAMPING; /* the velocity that it tends to */
   double decay = exp(-length * DAMPING / MASS);
@@ -91,20 +91,20 @@ static void slide(hardware *board, int axis, double force, double length)
   }
 }
 
-static void move(hardware *board)
+static void board_move(hardware *board)
 {
   int64_t now_ns = clock_now();
   int16_t current[3];
   hardware_currents(board, current);
   for (int axis = 0; axis < 3; ++axis) {
-    slide(board, axis, NEWTON_MA * current[axis], 1e-9 * (double)(now_ns - board->time_ns));
+    axis_slide(board, axis, NEWTON_MA * current[axis], 1e-9 * (double)(now_ns - board->time_ns));
   }
   board->time_ns = now_ns;
 }
 
 bool hardware_read(hardware *board, int32_t counts[3])
 {
-  move(board);
+  board_move(board);
   for (int axis = 0; axis < 3; ++axis) {
     counts[axis] = (int32_t)lround(board->position[axis] / COUNT);
   }
@@ -113,7 +113,7 @@ bool hardware_read(hardware *board, int32_t counts[3])
 
 bool hardware_write(hardware *board, const int16_t milliamperes[3])
 {
-  move(board); /* up to now with the currents before */
+  board_move(board); /* up to now with the currents before */
   memcpy(board->current, milliamperes, sizeof board->current);
   atomic_store(&board->off, false);
   return board->enabled;

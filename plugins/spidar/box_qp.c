@@ -13,7 +13,7 @@
 /* A variable on its bound whose gradient is 0 is right on both sides; rounding must not decide for ever. */
 #define ROUNDING 1e-12
 
-static double entry(const hapi_spidar_box_qp *qp, int row, int column)
+static double matrix_entry(const hapi_spidar_box_qp *qp, int row, int column)
 {
   return row >= column ? qp->h[row][column] : qp->h[column][row];
 }
@@ -36,7 +36,7 @@ static bool solve_free(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at, d
     int i = index[a];
     right[a] = qp->g[i];
     for (int k = 0; k < qp->n; ++k) {
-      right[a] -= entry(qp, i, k) * x[k];
+      right[a] -= matrix_entry(qp, i, k) * x[k];
     }
     for (int b = 0; b <= a; ++b) {
       l[a][b] = qp->h[i][index[b]];
@@ -59,7 +59,7 @@ static double inward_pull(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at
   double gradient = -qp->g[i];
   double size = fabs(qp->g[i]);
   for (int k = 0; k < qp->n; ++k) {
-    double part = entry(qp, i, k) * x[k];
+    double part = matrix_entry(qp, i, k) * x[k];
     gradient += part;
     size += fabs(part);
   }
@@ -68,8 +68,8 @@ static double inward_pull(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at
 }
 
 /* Where variable i belongs, seen from the set. */
-static hapi_spidar_at belongs(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at,
-                              const double *x, int i)
+static hapi_spidar_at bound_belongs(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at,
+                                    const double *x, int i)
 {
   if (at[i] != HAPI_SPIDAR_AT_FREE) {
     return inward_pull(qp, at, x, i) > 0.0 ? HAPI_SPIDAR_AT_FREE : at[i];
@@ -81,7 +81,7 @@ static hapi_spidar_at belongs(const hapi_spidar_box_qp *qp, const hapi_spidar_at
   return x[i] > qp->high[i] + slack ? HAPI_SPIDAR_AT_HIGH : HAPI_SPIDAR_AT_FREE;
 }
 
-static void clip(const hapi_spidar_box_qp *qp, double *x)
+static void values_clip(const hapi_spidar_box_qp *qp, double *x)
 {
   for (int i = 0; i < qp->n; ++i) {
     x[i] = fmax(qp->low[i], fmin(qp->high[i], x[i]));
@@ -94,16 +94,16 @@ static int count_wrong(const hapi_spidar_box_qp *qp, const hapi_spidar_at *at, c
 {
   int wrong = 0;
   for (int i = 0; i < qp->n; ++i) {
-    next[i] = belongs(qp, at, x, i);
+    next[i] = bound_belongs(qp, at, x, i);
     wrong += next[i] != at[i];
   }
   return wrong;
 }
 
 /* Into the box, and the set that this makes. */
-static void settle(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, double *x)
+static void bounds_settle(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, double *x)
 {
-  clip(qp, x);
+  values_clip(qp, x);
   for (int i = 0; i < qp->n; ++i) {
     at[i] = x[i] <= qp->low[i]    ? HAPI_SPIDAR_AT_LOW
             : x[i] >= qp->high[i] ? HAPI_SPIDAR_AT_HIGH
@@ -153,17 +153,17 @@ static bool release_one(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, const 
 }
 
 /* Primal active set; sets were tried before. */
-static int descend(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, double *x, int sets)
+static int bounds_descend(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, double *x, int sets)
 {
   double y[HAPI_SPIDAR_ORDER_MAX];
-  settle(qp, at, x);
+  bounds_settle(qp, at, x);
   for (; sets < SETS_MAX && solve_free(qp, at, y); ++sets) {
     if (!go_until_bound(qp, y, at, x) && !release_one(qp, at, x)) {
-      clip(qp, x); /* of what rounding left */
+      values_clip(qp, x); /* of what rounding left */
       return sets;
     }
   }
-  clip(qp, x);
+  values_clip(qp, x);
   return -1;
 }
 
@@ -177,7 +177,7 @@ int hapi_spidar_box_qp_solve(const hapi_spidar_box_qp *qp, hapi_spidar_at at[HAP
     hapi_spidar_at next[HAPI_SPIDAR_ORDER_MAX];
     int wrong = count_wrong(qp, at, out_x, next);
     if (wrong == 0) {
-      clip(qp, out_x); /* of what rounding left */
+      values_clip(qp, out_x); /* of what rounding left */
       return sets;
     }
     if (wrong >= fewest) {
@@ -186,5 +186,5 @@ int hapi_spidar_box_qp_solve(const hapi_spidar_box_qp *qp, hapi_spidar_at at[HAP
     fewest = wrong;
     memcpy(at, next, (size_t)qp->n * sizeof *at);
   }
-  return descend(qp, at, out_x, sets + 1);
+  return bounds_descend(qp, at, out_x, sets + 1);
 }

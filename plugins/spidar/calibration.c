@@ -70,8 +70,8 @@ void hapi_spidar_calibrate_at(hapi_spidar_model *model, const hap_pose *pose,
 /* ---- one sample ---- */
 
 /* What no motion of the grip explains of a change of the lengths: I - J (J^T J)^-1 J^T. */
-static void project(const hapi_spidar_model *model, const hapi_spidar_rows *rows,
-                    hapi_spidar_matrix out)
+static void untold_project(const hapi_spidar_model *model, const hapi_spidar_rows *rows,
+                           hapi_spidar_matrix out)
 {
   double part[HAPI_SPIDAR_STRINGS_MAX][6];
   hapi_spidar_matrix l;
@@ -102,8 +102,8 @@ static void project(const hapi_spidar_model *model, const hapi_spidar_rows *rows
 }
 
 /* Derivatives of a string's error (length at the pose - measured length) by its unknowns. */
-static void derive(const problem *p, const hapi_spidar_rows *rows, const hapi_spidar_sample *sample,
-                   int string, double out[PER_STRING])
+static void string_derive(const problem *p, const hapi_spidar_rows *rows,
+                          const hapi_spidar_sample *sample, int string, double out[PER_STRING])
 {
   int next = 0;
   out[next++] = -1.0;
@@ -133,7 +133,7 @@ static double place_from(const problem *p, const hap_pose *start, const double *
 
 /* From that of the round before, and where this does not fit from the middle of the workspace: samples need not
  * lie on one way, and from another one's pose a search may end elsewhere. */
-static void place(problem *p, size_t index, const double *lengths)
+static void sample_place(problem *p, size_t index, const double *lengths)
 {
   const hapi_spidar_sample *sample = &p->samples[index];
   hap_pose *pose = &p->poses[index];
@@ -175,12 +175,12 @@ static void add_sample(problem *p, size_t index, equations *e)
   hapi_spidar_rows rows;
   hapi_spidar_matrix left = {{0.0}};
   hapi_spidar_measure(model, sample->counts, lengths);
-  place(p, index, lengths);
+  sample_place(p, index, lengths);
   hapi_spidar_rows_at(model, &p->poses[index], &rows);
-  project(model, &rows, left);
+  untold_project(model, &rows, left);
   for (int i = 0; i < model->strings; ++i) {
     error[i] = rows.length[i] - lengths[i];
-    derive(p, &rows, sample, i, slope[i]);
+    string_derive(p, &rows, sample, i, slope[i]);
   }
   add_errors(p, index, error, e);
   for (int a = 0; a < e->n; ++a) {
@@ -196,7 +196,7 @@ static void add_sample(problem *p, size_t index, equations *e)
   }
 }
 
-static void evaluate(problem *p, equations *e)
+static void problem_evaluate(problem *p, equations *e)
 {
   memset(e, 0, sizeof *e);
   e->n = p->model.strings * p->per_string;
@@ -207,7 +207,7 @@ static void evaluate(problem *p, equations *e)
 
 /* ---- unknowns ---- */
 
-static void change(const problem *p, const double *step, hapi_spidar_model *model)
+static void model_change(const problem *p, const double *step, hapi_spidar_model *model)
 {
   for (int i = 0; i < model->strings; ++i) {
     const double *part = step + (ptrdiff_t)i * p->per_string;
@@ -294,11 +294,11 @@ static int count_untold(const hapi_spidar_eigen *eigen, int n, double noise)
 }
 
 /* Levenberg and Marquardt. What is not told is left alone: it would run away. */
-static void descend(problem *p, equations *here, hapi_spidar_eigen *eigen)
+static void problem_descend(problem *p, equations *here, hapi_spidar_eigen *eigen)
 {
   double damping = 0.0;
   double size = 1.0;
-  evaluate(p, here);
+  problem_evaluate(p, here);
   for (int round = 0; round < ROUNDS && size > ARRIVED; ++round) {
     equations there;
     problem next = *p;
@@ -307,8 +307,8 @@ static void descend(problem *p, equations *here, hapi_spidar_eigen *eigen)
     double rounding = noise_of(p, &(equations){.cost = 0.0}, 0);
     int untold = count_untold(eigen, here->n, rounding);
     size = find_step(eigen, here, untold, damping, step);
-    change(p, step, &next.model);
-    evaluate(&next, &there);
+    model_change(p, step, &next.model);
+    problem_evaluate(&next, &there);
     if (there.cost <= here->cost) {
       p->model = next.model;
       *here = there;
@@ -358,8 +358,8 @@ static int string_of_most(const problem *p, const double *vector, int n)
   return most;
 }
 
-static void report(const problem *p, const equations *e, const hapi_spidar_eigen *eigen,
-                   hapi_spidar_calibration *out)
+static void result_report(const problem *p, const equations *e, const hapi_spidar_eigen *eigen,
+                          hapi_spidar_calibration *out)
 {
   memset(out, 0, sizeof *out);
   out->unknowns = e->n;
@@ -375,8 +375,8 @@ static void report(const problem *p, const equations *e, const hapi_spidar_eigen
   report_deviations(p, eigen, noise, out);
 }
 
-static hap_status judge(const problem *p, const equations *e, hapi_spidar_calibration *out,
-                        hap_detail *detail)
+static hap_status result_judge(const problem *p, const equations *e, hapi_spidar_calibration *out,
+                               hap_detail *detail)
 {
   if (out->told < out->unknowns - out->free) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
@@ -429,7 +429,7 @@ static hap_status check_samples(const problem *p, hap_detail *detail)
 }
 
 /* Middles of the counts, offsets and poses to begin with. */
-static void begin(problem *p)
+static void problem_begin(problem *p)
 {
   const hapi_spidar_sample *first = &p->samples[0];
   for (int i = 0; i < p->model.strings; ++i) {
@@ -450,7 +450,7 @@ static void begin(problem *p)
     }
     double lengths[HAPI_SPIDAR_STRINGS_MAX];
     hapi_spidar_measure(&p->model, p->samples[k].counts, lengths);
-    place(p, k, lengths);
+    sample_place(p, k, lengths);
   }
 }
 
@@ -472,10 +472,10 @@ hap_status hapi_spidar_calibrate(const hapi_spidar_model *model, const hapi_spid
   if (p.poses == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for %zu poses", count);
   }
-  begin(&p);
-  descend(&p, &e, &eigen);
-  report(&p, &e, &eigen, out);
-  status = judge(&p, &e, out, detail);
+  problem_begin(&p);
+  problem_descend(&p, &e, &eigen);
+  result_report(&p, &e, &eigen, out);
+  status = result_judge(&p, &e, out, detail);
   hapi_free(p.poses);
   return status;
 }

@@ -32,7 +32,7 @@ void hapi_spidar_cycle_clear(hapi_spidar_cycle *cycle)
   cycle->have = 0;
 }
 
-static int16_t clip(int16_t current)
+static int16_t current_clip(int16_t current)
 {
   int high = current < HAPI_SPIDAR_CURRENT_MAX ? current : HAPI_SPIDAR_CURRENT_MAX;
   return (int16_t)(high > -HAPI_SPIDAR_CURRENT_MAX ? high : -HAPI_SPIDAR_CURRENT_MAX);
@@ -47,7 +47,7 @@ int hapi_spidar_cycle_commands(const hapi_spidar_cycle *cycle, const int16_t *cu
     int model = cycle->boards.model[i];
     hapi_spidar_frame frame = {.board = cycle->boards.id[i], .command = HAPI_SPIDAR_CURRENT};
     for (int k = 0; k < motors_of(&cycle->boards, i); ++k) {
-      frame.current[k] = clip(currents[motor++]);
+      frame.current[k] = current_clip(currents[motor++]);
     }
     used += hapi_spidar_encode(&frame, model, HAPI_SPIDAR_TO_BOARD, out + used);
     int padding = hapi_spidar_padding(model, HAPI_SPIDAR_CURRENT);

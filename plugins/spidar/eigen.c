@@ -21,7 +21,7 @@ static rotation rotation_of(double pp, double qq, double pq)
   return (rotation){c, t * c};
 }
 
-static void rotate(double *x, double *y, rotation r)
+static void pair_rotate(double *x, double *y, rotation r)
 {
   double before = *x;
   *x = r.c * before - r.s * *y;
@@ -29,8 +29,8 @@ static void rotate(double *x, double *y, rotation r)
 }
 
 /* Rotates until nothing is beside the diagonal: a sweep over all pairs squares what is left. */
-static void diagonalize(int n, double a[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_EIGEN_MAX],
-                        hapi_spidar_eigen *out)
+static void matrix_diagonalize(int n, double a[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_EIGEN_MAX],
+                               hapi_spidar_eigen *out)
 {
   double left = 1.0;
   for (int sweep = 0; sweep < SWEEPS && left > 0.0; ++sweep) {
@@ -43,18 +43,18 @@ static void diagonalize(int n, double a[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_EIGEN
         rotation r = rotation_of(a[p][p], a[q][q], a[p][q]);
         left += fabs(a[p][q]);
         for (int k = 0; k < n; ++k) {
-          rotate(&a[k][p], &a[k][q], r);
+          pair_rotate(&a[k][p], &a[k][q], r);
         }
         for (int k = 0; k < n; ++k) {
-          rotate(&a[p][k], &a[q][k], r);
-          rotate(&out->vector[p][k], &out->vector[q][k], r);
+          pair_rotate(&a[p][k], &a[q][k], r);
+          pair_rotate(&out->vector[p][k], &out->vector[q][k], r);
         }
       }
     }
   }
 }
 
-static void sort(int n, hapi_spidar_eigen *out)
+static void values_sort(int n, hapi_spidar_eigen *out)
 {
   for (int i = 1; i < n; ++i) {
     for (int k = i; k > 0 && out->value[k] < out->value[k - 1]; --k) {
@@ -78,9 +78,9 @@ void hapi_spidar_eigen_find(int n, double h[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_E
   for (int i = 0; i < n; ++i) {
     out->vector[i][i] = 1.0;
   }
-  diagonalize(n, a, out);
+  matrix_diagonalize(n, a, out);
   for (int i = 0; i < n; ++i) {
     out->value[i] = a[i][i];
   }
-  sort(n, out);
+  values_sort(n, out);
 }

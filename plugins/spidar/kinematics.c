@@ -174,7 +174,7 @@ static double find_step(const normal *e, double damping, double step[6])
 }
 
 /* Back to where a grip can be. */
-static void confine(const hapi_spidar_solver *solver, hap_pose *pose)
+static void pose_confine(const hapi_spidar_solver *solver, hap_pose *pose)
 {
   for (int axis = 0; axis < 3; ++axis) {
     double x = pose->position[axis];
@@ -191,8 +191,8 @@ static void confine(const hapi_spidar_solver *solver, hap_pose *pose)
 
 /* The turn by a vector v is taken as (1, v/2), normalised: a small step needs no sine, and none is lost
  * where the steps end. */
-static void move(const hapi_spidar_solver *solver, const hapi_spidar_model *model,
-                 const double step[6], hap_pose *pose)
+static void pose_move(const hapi_spidar_solver *solver, const hapi_spidar_model *model,
+                      const double step[6], hap_pose *pose)
 {
   hapi_v3_add(pose->position, step, pose->position);
   if (model->dof == 6) {
@@ -201,12 +201,12 @@ static void move(const hapi_spidar_solver *solver, const hapi_spidar_model *mode
     hapi_quat_multiply(turn, pose->quat_wxyz, pose->quat_wxyz);
     hapi_quat_normalize(pose->quat_wxyz);
   }
-  confine(solver, pose);
+  pose_confine(solver, pose);
 }
 
 /* Steps until one is below STILL or none is left; true: arrived. */
-static bool descend(hapi_spidar_solver *solver, const hapi_spidar_model *model,
-                    const measured *given, int steps)
+static bool pose_descend(hapi_spidar_solver *solver, const hapi_spidar_model *model,
+                         const measured *given, int steps)
 {
   normal here;
   bool arrived = false;
@@ -216,7 +216,7 @@ static bool descend(hapi_spidar_solver *solver, const hapi_spidar_model *model,
     normal there;
     hap_pose pose = solver->pose;
     double size = find_step(&here, solver->damping, step);
-    move(solver, model, step, &pose);
+    pose_move(solver, model, step, &pose);
     equations_at(model, &pose, given, &there);
     arrived = size < STILL;
     if (there.cost < here.cost) {
@@ -283,7 +283,7 @@ hapi_spidar_fit hapi_spidar_solve(hapi_spidar_solver *solver, const hapi_spidar_
       return HAPI_SPIDAR_FIT_INVALID;
     }
   }
-  bool arrived = descend(solver, model, &given, STEPS);
+  bool arrived = pose_descend(solver, model, &given, STEPS);
   solver->outside = is_outside(solver, model);
   if (!arrived) {
     return HAPI_SPIDAR_FIT_MOVING;
@@ -332,7 +332,7 @@ static without leave_out(const hapi_spidar_model *model, const hap_pose *good,
   hapi_spidar_solver solver;
   hapi_spidar_rows rows;
   hapi_spidar_solver_init(&solver, model, good);
-  if (!descend(&solver, model, &others, STEPS_ALONE)) {
+  if (!pose_descend(&solver, model, &others, STEPS_ALONE)) {
     return (without){HUGE_VAL, 0.0};
   }
   hapi_spidar_rows_at(model, &solver.pose, &rows);

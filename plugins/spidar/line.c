@@ -84,7 +84,7 @@ static int await_answer(const hapi_spidar_port *port, int id)
   }
 }
 
-static int ask(const hapi_spidar_port *port, int id)
+static int board_ask(const hapi_spidar_port *port, int id)
 {
   /* The zeros before it end a command that a board may have received in part. */
   uint8_t bytes[HAPI_SPIDAR_FRAME_MAX + 1 + 26] = {0};
@@ -104,7 +104,7 @@ static int ask_often(const hapi_spidar_port *port, int id)
 {
   int model = 0;
   for (int i = 0; i < TRIES && model == 0; ++i) {
-    model = ask(port, id);
+    model = board_ask(port, id);
   }
   return model;
 }

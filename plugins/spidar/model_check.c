@@ -116,7 +116,7 @@ static hap_status check_string(const hapi_spidar_model *m, int i, hap_detail *de
   return status;
 }
 
-static double apart(const double a[3], const double b[3])
+static double points_apart(const double a[3], const double b[3])
 {
   double way[3];
   hapi_v3_sub(a, b, way);
@@ -127,13 +127,14 @@ static double apart(const double a[3], const double b[3])
 static hap_status check_distinct(const hapi_spidar_model *m, hap_detail *detail)
 {
   for (int i = 0; i < m->strings; ++i) {
-    if (apart(m->motor[i], m->grip[i]) < LENGTH_MIN) {
+    if (points_apart(m->motor[i], m->grip[i]) < LENGTH_MIN) {
       return hapi_fail(detail, HAP_ERROR_FORMAT,
                        "string_%d is shorter than 5 mm at home: its motor and its grip point meet",
                        i);
     }
     for (int k = 0; k < i; ++k) {
-      if (apart(m->motor[i], m->motor[k]) < APART && apart(m->grip[i], m->grip[k]) < APART) {
+      if (points_apart(m->motor[i], m->motor[k]) < APART &&
+          points_apart(m->grip[i], m->grip[k]) < APART) {
         return hapi_fail(detail, HAP_ERROR_FORMAT,
                          "string_%d and string_%d have the same motor and grip points", k, i);
       }
@@ -143,7 +144,7 @@ static hap_status check_distinct(const hapi_spidar_model *m, hap_detail *detail)
 }
 
 /* Whether every direction is told: J^T J - TELL_MIN is positive definite. */
-static bool tells(const hapi_spidar_model *m, const hap_pose *pose)
+static bool pose_is_told(const hapi_spidar_model *m, const hap_pose *pose)
 {
   hapi_spidar_rows rows;
   hapi_spidar_matrix h;
@@ -186,7 +187,7 @@ static hap_status check_workspace(const hapi_spidar_model *m, hap_detail *detail
   for (int i = 0; i < GRID * GRID * GRID * TURNS; ++i) {
     hap_pose pose;
     sample_at(m, i, &pose);
-    if (!tells(m, &pose)) {
+    if (!pose_is_told(m, &pose)) {
       return hapi_fail(detail, HAP_ERROR_FORMAT,
                        "the strings do not tell the pose at %.3g %.3g %.3g mm turned by %.3g "
                        "degrees: make the workspace smaller, or look at the motor and grip points",

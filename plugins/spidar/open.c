@@ -83,7 +83,7 @@ static void name_boards(const hapi_spidar_boards *boards, char *out, size_t size
   }
 }
 
-static bool are(const hapi_spidar_boards *boards, int count, const char *name)
+static bool boards_are(const hapi_spidar_boards *boards, int count, const char *name)
 {
   bool all = boards->count == count;
   for (int i = 0; i < boards->count; ++i) {
@@ -99,8 +99,8 @@ static hap_status choose_model(hapi_spidar_device *device, const hapi_argument *
   char names[80];
   name_boards(boards, names, sizeof names);
   if (!given->given) {
-    bool x4 = are(boards, 2, "B3M");
-    if (!x4 && !are(boards, 1, "B5M")) {
+    bool x4 = boards_are(boards, 2, "B3M");
+    if (!x4 && !boards_are(boards, 1, "B5M")) {
       return hapi_fail(detail, HAP_ERROR_DEVICE,
                        "spidar: %.100s has boards %s, which are neither two B3M (x4r) nor one B5M "
                        "(x5r): say model=",
@@ -221,7 +221,8 @@ static hap_status read_arguments(hapi_spidar_device *device, hapi_argument *entr
 }
 
 /* PORT is what is there before the first comma when it has no '='. */
-static hap_status split(const char *args, size_t *port, const char **rest, hap_detail *detail)
+static hap_status arguments_split(const char *args, size_t *port, const char **rest,
+                                  hap_detail *detail)
 {
   size_t length = strcspn(args, ",");
   *port = memchr(args, '=', length) == NULL ? length : 0;
@@ -242,7 +243,7 @@ hap_status hapi_spidar_configure(hapi_spidar_device *device, const char *args, h
   const char *rest = "";
   size_t port = 0;
   memcpy(entries, known_arguments, sizeof entries);
-  hap_status status = split(args, &port, &rest, detail);
+  hap_status status = arguments_split(args, &port, &rest, detail);
   if (status >= HAP_OK) { /* before anything is sent to a port */
     status = read_arguments(device, entries, rest, detail);
   }

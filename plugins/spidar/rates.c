@@ -37,7 +37,7 @@ static uint32_t find_window(const double *way, const double *per_s, uint32_t cou
 }
 
 /* Slope of the line of least squares through (-age, -way). */
-static double fit(const double *way, const double *age_s, uint32_t window)
+static double slope_fit(const double *way, const double *age_s, uint32_t window)
 {
   double mean_age = 0.0;
   double mean_way = 0.0;
@@ -97,6 +97,6 @@ void hapi_spidar_rates_update(hapi_spidar_rates *rates, const hapi_spidar_model 
       way[age] = counts[i] - rates->counts[i][place_of(rates, age)];
     }
     uint32_t window = find_window(way, per_s, rates->count);
-    out_rates[i] = model->metres_per_count[i] * fit(way, age_s, window);
+    out_rates[i] = model->metres_per_count[i] * slope_fit(way, age_s, window);
   }
 }

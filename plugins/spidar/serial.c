@@ -54,7 +54,7 @@ static hap_status fail_open(const char *path, int error, hap_detail *detail)
 }
 
 /* A guard process of one that has just died may hold it for a moment. */
-static bool lock(int fd)
+static bool port_lock(int fd)
 {
   for (int i = 0; i < LOCK_TRIES; ++i) {
     if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
@@ -80,7 +80,7 @@ static bool make_raw(int fd)
 }
 
 /* What an adapter or a pseudo-terminal does not know does no harm. */
-static void settle(int fd)
+static void port_settle(int fd)
 {
   struct serial_struct about;
   int lines = 0;
@@ -101,14 +101,14 @@ static hap_status set_up(int fd, const char *path, hap_detail *detail)
   if (!isatty(fd)) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "%s is not a serial port", path);
   }
-  if (!lock(fd)) {
+  if (!port_lock(fd)) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "%s is in use by another program or device", path);
   }
   if (!make_raw(fd)) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "%s does not do 2 Mbit/s: %s", path,
                      strerror(errno));
   }
-  settle(fd);
+  port_settle(fd);
   return HAP_OK;
 }
 

@@ -57,7 +57,7 @@ static int send_none(hapi_spidar_device *device)
 
 /* What rounding leaves over is added to the next tick's, so that on the mean the tensions are those wanted: steps
  * of 0.01 N at some 500 Hz are not felt, an error of all strings that lasts is. */
-static void convert(hapi_spidar_device *device, const double *tension)
+static void tensions_convert(hapi_spidar_device *device, const double *tension)
 {
   for (int i = 0; i < device->model.strings; ++i) {
     double wanted = tension[i] * device->model.volts_per_newton[i] / CURRENT_VOLTS;
@@ -134,7 +134,7 @@ static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist
 
 /* ---- every tick ---- */
 
-static hap_status fail(hapi_spidar_device *device, hapi_spidar_cause cause)
+static hap_status device_fail(hapi_spidar_device *device, hapi_spidar_cause cause)
 {
   set_cause(device, cause);
   atomic_store(&device->told, (int)cause);
@@ -153,32 +153,33 @@ static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
 {
   int taken = hapi_spidar_line_receive(&device->line);
   if (taken < 0) {
-    return fail(device, HAPI_SPIDAR_HUNG_UP);
+    return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
   if (taken > 0) {
     hapi_spidar_fit fit = solve_pose(device);
     update_twist(device, time_ns);
     if (!judge_fit(device, fit)) {
-      return fail(device, HAPI_SPIDAR_MISFIT);
+      return device_fail(device, HAPI_SPIDAR_MISFIT);
     }
     set_cause(device, HAPI_SPIDAR_WELL);
   }
   if (hapi_spidar_line_silence(&device->line) > device->timeout) {
     /* Later the way that they jumped would be one that a string can go in the time. */
-    return fail(device, device->line.bad_steps > 0 ? HAPI_SPIDAR_JUMPED : HAPI_SPIDAR_SILENT);
+    return device_fail(device,
+                       device->line.bad_steps > 0 ? HAPI_SPIDAR_JUMPED : HAPI_SPIDAR_SILENT);
   }
   return HAP_OK;
 }
 
 /* Nobody wrote since the last read: the boards are asked all the same. */
-static hap_status ask(hapi_spidar_device *device)
+static hap_status boards_ask(hapi_spidar_device *device)
 {
   int sent = 0;
   if (!device->asked) {
     sent = atomic_load(&device->zeroed) ? send_none(device) : send_currents(device);
   }
   device->asked = false;
-  return sent < 0 ? fail(device, HAPI_SPIDAR_HUNG_UP) : HAP_OK;
+  return sent < 0 ? device_fail(device, HAPI_SPIDAR_HUNG_UP) : HAP_OK;
 }
 
 static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
@@ -192,17 +193,17 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
     return HAP_ERROR_DEVICE;
   }
   if (atomic_load(&device->guard.pulse->stalled)) {
-    return fail(device, HAPI_SPIDAR_STALLED);
+    return device_fail(device, HAPI_SPIDAR_STALLED);
   }
   hap_status status = take_answer(device, time_ns);
-  hap_status asked = needs_restart(device) ? HAP_OK : ask(device);
+  hap_status asked = needs_restart(device) ? HAP_OK : boards_ask(device);
   to_frame(device, pose, twist);
   *buttons = 0;
   return status < HAP_OK ? status : asked;
 }
 
 /* True when it had to. The largest component comes out first, so that no square overflows. */
-static bool shorten(double v[3], double limit)
+static bool vector_shorten(double v[3], double limit)
 {
   double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
   if (largest == 0.0) {
@@ -227,7 +228,7 @@ static double since_write(hapi_spidar_device *device)
 }
 
 /* Wanted in the model's frame; reached in it, too. */
-static bool pull(hapi_spidar_device *device, const hap_wrench *wanted, hap_wrench *reached)
+static bool strings_pull(hapi_spidar_device *device, const hap_wrench *wanted, hap_wrench *reached)
 {
   double tension[HAPI_SPIDAR_STRINGS_MAX];
   double passed = since_write(device);
@@ -244,7 +245,7 @@ static bool pull(hapi_spidar_device *device, const hap_wrench *wanted, hap_wrenc
   device->tensions.seconds = slack ? 0.0 : passed;
   hap_status status = hapi_spidar_tensions_solve(&device->tensions, &device->model,
                                                  &device->solver.pose, wanted, tension, reached);
-  convert(device, tension);
+  tensions_convert(device, tension);
   return status == HAP_SATURATED;
 }
 
@@ -284,8 +285,8 @@ static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
 /* A force at its limit may bring a little more in another direction with it. */
 static void keep_limits(hapi_spidar_device *device)
 {
-  (void)shorten(device->held.force, device->max_force);
-  (void)shorten(device->held.torque, device->max_torque);
+  (void)vector_shorten(device->held.force, device->max_force);
+  (void)vector_shorten(device->held.torque, device->max_torque);
 }
 
 static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
@@ -303,17 +304,17 @@ static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench 
     spidar_zero(device);
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = shorten(local.force, device->max_force);
-  bool eased = shorten(local.torque, device->max_torque) && device->model.dof == 6;
+  bool shortened = vector_shorten(local.force, device->max_force);
+  bool eased = vector_shorten(local.torque, device->max_torque) && device->model.dof == 6;
   hapi_quat_unrotate(device->rotate, local.force, local.force);
   hapi_quat_unrotate(device->rotate, local.torque, local.torque);
-  bool taut = pull(device, &local, &given);
+  bool taut = strings_pull(device, &local, &given);
   tell_reached(device, wanted, &given);
   keep_limits(device);
   lower_zero(device);
   device->asked = true;
   if (send_currents(device) < 0) {
-    return fail(device, HAPI_SPIDAR_HUNG_UP);
+    return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
   *reached = device->held;
   return shortened || eased || taut ? HAP_SATURATED : HAP_OK;
@@ -331,7 +332,7 @@ static void spidar_held(void *self, hap_wrench *out)
 /* ---- start and stop ---- */
 
 /* Port and boards as they were at open; what was lost is opened anew. */
-static bool reopen(hapi_spidar_device *device)
+static bool device_reopen(hapi_spidar_device *device)
 {
   hapi_spidar_boards found;
   hapi_spidar_port port;
@@ -340,16 +341,16 @@ static bool reopen(hapi_spidar_device *device)
   memcpy(path, device->serial.path, sizeof path);
   hapi_spidar_serial_shut(&device->serial);
   if (hapi_spidar_serial_open(&device->serial, path, &detail) < HAP_OK) {
-    (void)fail(device, HAPI_SPIDAR_NOT_OPENED);
+    (void)device_fail(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
   hapi_spidar_serial_port(&device->serial, &port);
   if (hapi_spidar_line_find(&port, &found, &detail) < HAP_OK) {
-    (void)fail(device, HAPI_SPIDAR_NOT_OPENED);
+    (void)device_fail(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
   }
   if (memcmp(&found, &device->boards, sizeof found) != 0) {
-    (void)fail(device, HAPI_SPIDAR_OTHER_BOARDS);
+    (void)device_fail(device, HAPI_SPIDAR_OTHER_BOARDS);
     return false;
   }
   return true;
@@ -373,14 +374,14 @@ static bool begin_line(hapi_spidar_device *device)
 }
 
 /* Winds the strings in by the least tension, which is about no force at home, and looks where they are. */
-static bool tauten(hapi_spidar_device *device)
+static bool strings_tauten(hapi_spidar_device *device)
 {
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench given;
   bool good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
   double end = now_s(device) + TAUT_S;
   while (good && now_s(device) < end) {
-    (void)pull(device, &none, &given);
+    (void)strings_pull(device, &none, &given);
     lower_zero(device);
     atomic_fetch_add(&device->guard.pulse->beats, 1);
     good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
@@ -456,13 +457,13 @@ static void let_go(hapi_spidar_device *device)
 static hap_status fail_start(hapi_spidar_device *device, hapi_spidar_cause cause)
 {
   let_go(device);
-  return fail(device, cause);
+  return device_fail(device, cause);
 }
 
 static hap_status spidar_start(void *self)
 {
   hapi_spidar_device *device = self;
-  if (is_lost(device) && !reopen(device)) {
+  if (is_lost(device) && !device_reopen(device)) {
     return HAP_ERROR_DEVICE;
   }
   set_cause(device, HAPI_SPIDAR_WELL);
@@ -475,7 +476,7 @@ static hap_status spidar_start(void *self)
              "motors keep their currents");
   }
   reset_ticks(device);
-  if (!begin_line(device) || !tauten(device)) {
+  if (!begin_line(device) || !strings_tauten(device)) {
     return fail_start(device, HAPI_SPIDAR_SILENT);
   }
   if (!settle_pose(device)) {

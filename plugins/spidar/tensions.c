@@ -126,7 +126,7 @@ static void direction_of(int index, double out[3])
   hapi_v3_scale(1.0 / hapi_v3_norm(out), out, out);
 }
 
-static bool gives(const hapi_spidar_model *model, bool torque, double size)
+static bool model_gives(const hapi_spidar_model *model, bool torque, double size)
 {
   hapi_spidar_tensions state;
   hap_pose pose;
@@ -151,19 +151,19 @@ static bool gives(const hapi_spidar_model *model, bool torque, double size)
   return all;
 }
 
-static double largest(const hapi_spidar_model *model, bool torque)
+static double wrench_largest(const hapi_spidar_model *model, bool torque)
 {
   double low = 0.0;
   double high = model->max_tension * model->strings;
   for (int i = 0; i < 40; ++i) {
     double middle = 0.5 * (low + high);
-    *(gives(model, torque, middle) ? &low : &high) = middle;
+    *(model_gives(model, torque, middle) ? &low : &high) = middle;
   }
   return low;
 }
 
 void hapi_spidar_capability(const hapi_spidar_model *model, double *out_force, double *out_torque)
 {
-  *out_force = largest(model, false);
-  *out_torque = model->dof == 6 ? largest(model, true) : 0.0;
+  *out_force = wrench_largest(model, false);
+  *out_torque = model->dof == 6 ? wrench_largest(model, true) : 0.0;
 }

@@ -34,7 +34,7 @@ static double standing_share(const hapi_hand *hand, int axis, double friction, c
   return fabs(net[1]) > friction ? (*direction * friction - net[0]) / (net[1] - net[0]) : 1.0;
 }
 
-static double acceleration(const hapi_hand *hand, int axis, double push)
+static double axis_acceleration(const hapi_hand *hand, int axis, double push)
 {
   return (push - hand->def.stiffness * hand->position[axis] -
           (hand->def.damping + hand->def.drag) * hand->velocity[axis]) /
@@ -62,18 +62,18 @@ static double stopping_share(const double velocity[2], const double slope[2], do
 }
 
 /* Moves the axis against the friction until the rest is over or it stops; true in the first case. */
-static bool slide(hapi_hand *hand, int axis, double braked_by, unspent *rest)
+static bool axis_slide(hapi_hand *hand, int axis, double braked_by, unspent *rest)
 {
   double start = hand->position[axis];
   double push[2] = {rest->push[0] - braked_by, rest->push[1] - braked_by};
   double velocity[2] = {hand->velocity[axis]};
-  double slope[2] = {acceleration(hand, axis, push[0])};
+  double slope[2] = {axis_acceleration(hand, axis, push[0])};
   hapi_hand_step_axis(hand, axis, rest->length, push);
   velocity[1] = hand->velocity[axis];
   if (velocity[1] * braked_by > 0.0) {
     return true;
   }
-  slope[1] = acceleration(hand, axis, push[1]);
+  slope[1] = axis_acceleration(hand, axis, push[1]);
   double share = velocity[0] != 0.0 ? stopping_share(velocity, slope, rest->length) : 0.0;
   hand->position[axis] = start;
   hand->velocity[axis] = velocity[0];
@@ -101,7 +101,7 @@ void hapi_friction_step(hapi_hand *hand, int axis, double friction, double lengt
       }
       cut_front(&rest, share);
     }
-    if (slide(hand, axis, direction * friction, &rest)) {
+    if (axis_slide(hand, axis, direction * friction, &rest)) {
       return;
     }
   }

@@ -10,7 +10,7 @@
 #define SIZE 4
 #define TERMS 16 /* of the series: 0.5^17 / 17! is far below the last bit */
 
-static void multiply(double a[SIZE][SIZE], double b[SIZE][SIZE], double out[SIZE][SIZE])
+static void matrix_multiply(double a[SIZE][SIZE], double b[SIZE][SIZE], double out[SIZE][SIZE])
 {
   for (int i = 0; i < SIZE; ++i) {
     for (int j = 0; j < SIZE; ++j) {
@@ -38,7 +38,7 @@ static double norm_of(double a[SIZE][SIZE])
 /* out = exp(a) by scaling and squaring (Higham, Functions of Matrices, chapter 10, with a Taylor
  * series in Horner form). Preferred to the three closed forms of a damped oscillator: no case
  * near critical damping, and none without spring or damper. */
-static void exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
+static void matrix_exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
 {
   int halvings = 0;
   (void)frexp(norm_of(a) * 2.0, &halvings);
@@ -53,7 +53,7 @@ static void exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
     out[i][i] = 1.0;
   }
   for (int term = TERMS; term > 0; --term) {
-    multiply(scaled, out, product);
+    matrix_multiply(scaled, out, product);
     for (int i = 0; i < SIZE; ++i) {
       for (int j = 0; j < SIZE; ++j) {
         out[i][j] = product[i][j] / term + (i == j ? 1.0 : 0.0);
@@ -61,7 +61,7 @@ static void exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
     }
   }
   for (int i = 0; i < halvings; ++i) {
-    multiply(out, out, product);
+    matrix_multiply(out, out, product);
     memcpy(out, product, sizeof product);
   }
 }
@@ -69,7 +69,7 @@ static void exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
 /* The oscillator and a right side u that grows by du over the step are one linear system of the
  * state (x, v / w, u, du); its exponential holds the whole step. w, near the natural frequency,
  * makes rows of like size, which keeps the number of squarings and the rounding small. */
-static void prepare(const hapi_hand_def *def, double length, hapi_hand_solution *out)
+static void solution_prepare(const hapi_hand_def *def, double length, hapi_hand_solution *out)
 {
   double per_mass = 1.0 / def->mass;
   double w = fmax(sqrt(def->stiffness * per_mass), 1.0);
@@ -80,7 +80,7 @@ static void prepare(const hapi_hand_def *def, double length, hapi_hand_solution 
                                {0.0, 0.0, 0.0, 1.0},
                                {0.0, 0.0, 0.0, 0.0}};
   double step[SIZE][SIZE];
-  exponential(system, step);
+  matrix_exponential(system, step);
   for (int i = 0; i < SIZE; ++i) {
     out->p[i] = step[0][i];
     out->q[i] = w * step[1][i];
@@ -99,7 +99,7 @@ static const hapi_hand_solution *solution_of(hapi_hand *hand, double length)
   }
   hapi_hand_solution *oldest = &hand->solutions[hand->next];
   hand->next = (hand->next + 1) % HAPI_HAND_SOLUTIONS;
-  prepare(&hand->def, length, oldest);
+  solution_prepare(&hand->def, length, oldest);
   return oldest;
 }
 
@@ -107,7 +107,7 @@ void hapi_hand_init(hapi_hand *hand, const hapi_hand_def *def)
 {
   *hand = (hapi_hand){.def = *def};
   for (int i = 0; i < HAPI_HAND_SOLUTIONS; ++i) {
-    prepare(&hand->def, 1e-3, &hand->solutions[i]);
+    solution_prepare(&hand->def, 1e-3, &hand->solutions[i]);
   }
 }
 

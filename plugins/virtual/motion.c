@@ -110,7 +110,7 @@ static size_t find_segment(const hapi_motion *motion, double time)
   return low;
 }
 
-static double wrap(const hapi_motion *motion, double time)
+static double time_wrap(const hapi_motion *motion, double time)
 {
   double first = motion->waypoints[0].time;
   double period = motion->waypoints[motion->count - 1].time - first;
@@ -121,7 +121,7 @@ static double wrap(const hapi_motion *motion, double time)
 }
 
 /* Share s of the way and its derivative by u, for the share u of the time. */
-static double blend(hapi_blend kind, double u, double *slope)
+static double blend_value(hapi_blend kind, double u, double *slope)
 {
   if (kind == HAPI_BLEND_LINEAR) {
     *slope = 1.0;
@@ -139,7 +139,7 @@ static void path_at(const hapi_motion *motion, double time, double position[3], 
   if (motion->count == 0) {
     return;
   }
-  double inside = wrap(motion, time);
+  double inside = time_wrap(motion, time);
   size_t i = inside >= motion->waypoints[0].time ? find_segment(motion, inside) : 0;
   const hapi_waypoint *from = &motion->waypoints[i];
   hapi_v3_copy(from->position, position);
@@ -148,14 +148,14 @@ static void path_at(const hapi_motion *motion, double time, double position[3], 
   }
   double duration = from[1].time - from->time;
   double slope = 0.0;
-  double share = blend(motion->blend, (inside - from->time) / duration, &slope);
+  double share = blend_value(motion->blend, (inside - from->time) / duration, &slope);
   double way[3];
   hapi_v3_sub(from[1].position, from->position, way);
   hapi_v3_madd(position, share, way, position);
   hapi_v3_scale(slope / duration, way, velocity);
 }
 
-static bool swings(const hapi_motion *motion)
+static bool motion_swings(const hapi_motion *motion)
 {
   return motion->sine[0] != 0.0 || motion->sine[1] != 0.0 || motion->sine[2] != 0.0;
 }
@@ -163,7 +163,7 @@ static bool swings(const hapi_motion *motion)
 void hapi_motion_at(const hapi_motion *motion, double time, double position[3], double velocity[3])
 {
   path_at(motion, time, position, velocity);
-  if (!swings(motion)) {
+  if (!motion_swings(motion)) {
     return;
   }
   double turns = motion->hz * time;

@@ -322,7 +322,7 @@ static void set_info(virtual_device *device, const hapi_argument *entries)
   hapi_output_init(&device->output, info->max_force, info->dof == 6 ? info->max_torque : 0.0);
 }
 
-static hap_status configure(virtual_device *device, const char *args, hap_detail *detail)
+static hap_status device_configure(virtual_device *device, const char *args, hap_detail *detail)
 {
   hapi_argument entries[ARGUMENT_COUNT];
   memcpy(entries, known_arguments, sizeof entries);
@@ -369,7 +369,7 @@ static hap_status virtual_open(const char *args, void **self, hap_detail *detail
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: out of memory");
   }
-  hap_status status = configure(device, args, detail);
+  hap_status status = device_configure(device, args, detail);
   if (status < 0) {
     virtual_close(device);
     return status;
@@ -396,7 +396,7 @@ static hap_status virtual_start(void *self)
   return HAP_OK;
 }
 
-static bool turns(const virtual_device *device)
+static bool device_turns(const virtual_device *device)
 {
   return device->info.dof == 6;
 }
@@ -476,15 +476,15 @@ static void move_hand(virtual_device *device, uint64_t from_ns, uint64_t to_ns)
       hapi_hand_push(&device->hand, axis, &target, device->delay.acting[axis], push);
       hapi_friction_step(&device->hand, axis, device->info.friction, length, push);
     }
-    if (turns(device)) {
+    if (device_turns(device)) {
       turn_hand(device, from + length * (double)i, length);
     }
   }
 }
 
 /* To where a script is at that time. */
-static void place(const virtual_device *device, const hapi_motion *motion, uint64_t at_ns,
-                  hapi_hand *hand)
+static void hand_place(const virtual_device *device, const hapi_motion *motion, uint64_t at_ns,
+                       hapi_hand *hand)
 {
   double position[3];
   double velocity[3];
@@ -497,9 +497,9 @@ static void place(const virtual_device *device, const hapi_motion *motion, uint6
 
 static void place_hand(virtual_device *device, uint64_t at_ns)
 {
-  place(device, &device->motion, at_ns, &device->hand);
-  if (turns(device)) {
-    place(device, &device->turning, at_ns, &device->wrist);
+  hand_place(device, &device->motion, at_ns, &device->hand);
+  if (device_turns(device)) {
+    hand_place(device, &device->turning, at_ns, &device->wrist);
   }
 }
 
@@ -512,18 +512,18 @@ static void kick_hand(virtual_device *device, uint64_t now_ns)
 }
 
 /* From the read at before_ns to the newest one, cut where a command begins to act and at the kick. */
-static void move(virtual_device *device, uint64_t before_ns)
+static void device_move(virtual_device *device, uint64_t before_ns)
 {
   uint64_t now_ns = device->timeline.elapsed_ns;
   hap_wrench given;
   hapi_output_get(&device->output, &given);
   hapi_delay_give(&device->delay, before_ns, given.force);
-  if (turns(device)) {
+  if (device_turns(device)) {
     hapi_delay_give(&device->torque_delay, before_ns, given.torque);
   }
   for (uint64_t at_ns = before_ns; at_ns < now_ns;) {
     uint64_t to_ns = hapi_delay_take(&device->delay, at_ns);
-    if (turns(device)) {
+    if (device_turns(device)) {
       (void)hapi_delay_take(&device->torque_delay, at_ns); /* changes at the same times */
     }
     kick_hand(device, at_ns);
@@ -539,7 +539,7 @@ static void move(virtual_device *device, uint64_t before_ns)
       move_hand(device, at_ns, to_ns);
     } else {
       place_hand(device, to_ns);
-      device->work += turns(device) ? rigid_turn_work(device, turn) : 0.0;
+      device->work += device_turns(device) ? rigid_turn_work(device, turn) : 0.0;
     }
     hapi_v3_sub(device->hand.position, way, way);
     device->work += hapi_v3_dot(device->delay.acting, way);
@@ -547,7 +547,7 @@ static void move(virtual_device *device, uint64_t before_ns)
   }
 }
 
-static void measure(virtual_device *device, bool first, uint64_t way_ns)
+static void pose_measure(virtual_device *device, bool first, uint64_t way_ns)
 {
   measured *m = &device->measured;
   double quantum = device->info.quantum;
@@ -569,7 +569,7 @@ static void measure(virtual_device *device, bool first, uint64_t way_ns)
 
 static void show_turn(const virtual_device *device, hap_pose *pose, hap_twist *twist)
 {
-  if (!turns(device)) {
+  if (!device_turns(device)) {
     memcpy(pose->quat_wxyz, device->told_orientation, sizeof pose->quat_wxyz);
     return;
   }
@@ -597,9 +597,9 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_
   if (first) {
     place_hand(device, 0);
   } else {
-    move(device, before_ns);
+    device_move(device, before_ns);
   }
-  measure(device, first, device->timeline.elapsed_ns - before_ns);
+  pose_measure(device, first, device->timeline.elapsed_ns - before_ns);
   *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_v3_copy(device->measured.position, pose->position);
   hapi_v3_copy(device->measured.velocity, twist->linear);

@@ -25,7 +25,9 @@ ANY_SIZE = re.compile(r"^(?:lib/sync/|include/hapode/.*:hap_\w*(?:_def|_stats)$)
 
 # Folders where a point does not hold yet: what is found there is printed and counted, no failure.
 NOT_YET = {
-    "names": ("bench/", "lib/", "plugins/", "tests/", "tools/", "scenes/", "examples/"),
+    "names": ("bench/", "examples/", "tests/", "lib/accuracy/", "lib/contact/", "lib/haptic/",
+              "lib/near/", "lib/physics/", "lib/probe/", "lib/research/", "lib/session/",
+              "lib/world/"),
     "structs": ("bench/", "lib/", "plugins/", "tests/", "tools/", "scenes/", "include/"),
     "headers": ("bench/", "lib/", "tests/"),
     "columns": ("bench/", "examples/", "include/", "lib/", "plugins/", "scenes/", "tests/", "tools/",

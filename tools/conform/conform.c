@@ -51,7 +51,7 @@ static const struct {
 
 #define POINTS ((int)(sizeof points / sizeof points[0]))
 
-static void say(conform *c, const char *format, va_list arguments)
+static void diagnostic_say(conform *c, const char *format, va_list arguments)
 {
   char text[600];
   vsnprintf(text, sizeof text, format, arguments);
@@ -65,7 +65,7 @@ void conform_note(conform *c, const char *format, ...)
 {
   va_list arguments;
   va_start(arguments, format);
-  say(c, format, arguments);
+  diagnostic_say(c, format, arguments);
   va_end(arguments);
 }
 
@@ -74,7 +74,7 @@ void conform_fail(conform *c, const char *format, ...)
   va_list arguments;
   c->failed = true;
   va_start(arguments, format);
-  say(c, format, arguments);
+  diagnostic_say(c, format, arguments);
   va_end(arguments);
 }
 
@@ -87,7 +87,7 @@ void conform_skip(conform *c, const char *format, ...)
   c->skip[strcspn(c->skip, "\n")] = '\0';
 }
 
-static void look(conform *c, int index)
+static void point_look(conform *c, int index)
 {
   c->number = index + 2; /* 1 is open */
   c->name = points[index].name;
@@ -122,7 +122,7 @@ static bool open_first(conform *c)
 }
 
 /* Nobody stands beside a simulated device. */
-static bool warn(const conform *c)
+static bool person_warn(const conform *c)
 {
   const conform_options *o = c->options;
   if (conform_is_virtual(c)) {
@@ -146,9 +146,9 @@ static bool warn(const conform *c)
 
 static void look_at_all(conform *c)
 {
-  c->stopped = !warn(c);
+  c->stopped = !person_warn(c);
   for (int i = 0; i < POINTS && !c->stopped; ++i) {
-    look(c, i);
+    point_look(c, i);
   }
   if (c->stopped) {
     c->failures += 1;

@@ -111,7 +111,7 @@ void conform_zero(conform *c)
   conform_leave();
 }
 
-static void judge(conform *c, hap_status status, const conform_sample *s, bool buttons)
+static void read_judge(conform *c, hap_status status, const conform_sample *s, bool buttons)
 {
   const double *q = s->pose.quat_wxyz;
   double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -137,7 +137,7 @@ hap_status conform_read(conform *c, conform_sample *out)
   conform_leave();
   if (c->running) {
     hapi_histogram_add(&c->reads, end_ns - begin_ns);
-    judge(c, status, out, buttons != poison);
+    read_judge(c, status, out, buttons != poison);
   }
   if (c->ops->pacing == HAP_PACING_DEVICE) {
     c->now_ns = end_ns; /* the read has waited */

@@ -16,7 +16,7 @@
 /* ---- the small force ---- */
 
 /* Force and torque as one vector of 6. */
-static void flatten(const hap_wrench *w, double out[6])
+static void wrench_flatten(const hap_wrench *w, double out[6])
 {
   hapi_v3_copy(w->force, out);
   hapi_v3_copy(w->torque, out + 3);
@@ -29,8 +29,8 @@ static bool is_plausible(const hap_wrench *wanted, const hap_wrench *reached, ha
   double along = 0.0;
   double square = 0.0;
   double norm = 0.0;
-  flatten(wanted, w);
-  flatten(reached, r);
+  wrench_flatten(wanted, w);
+  wrench_flatten(reached, r);
   for (int i = 3; i < 6; ++i) { /* as forces, so that both kinds can be compared */
     w[i] /= CONFORM_TORQUE_ARM;
     r[i] /= CONFORM_TORQUE_ARM;
@@ -126,8 +126,8 @@ void conform_held_is_reached(conform *c)
     (void)conform_write(c, &wanted, &reached);
     (void)conform_held(c, &held);
     conform_zero(c);
-    flatten(&reached, r);
-    flatten(&held, h);
+    wrench_flatten(&reached, r);
+    wrench_flatten(&held, h);
     for (int i = 0; i < 6; ++i) {
       off = fmax(off, fabs(h[i] - r[i]));
     }

@@ -239,7 +239,7 @@ static size_t entries_of(const char *folder)
   return count;
 }
 
-static void measure(usage *out)
+static void usage_measure(usage *out)
 {
   struct mallinfo2 heap = mallinfo2();
   out->heap = heap.uordblks + heap.hblkhd;
@@ -271,13 +271,13 @@ void conform_leaks(conform *c)
   unsigned threads = 0;
   usage before;
   conform_close(c);
-  measure(&before);
+  usage_measure(&before);
   for (int round = 0; round < ROUNDS; ++round) {
     usage now;
     if (!one_life(c)) {
       return;
     }
-    measure(&now);
+    usage_measure(&now);
     heap = now.heap > before.heap ? heap + 1 : 0;
     files = now.files > before.files ? files + 1 : 0;
     threads = now.threads > before.threads ? threads + 1 : 0;
@@ -292,7 +292,7 @@ void conform_leaks(conform *c)
 
 /* ---- unplugged ---- */
 
-static void tell(const conform *c, const char *what)
+static void person_tell(const conform *c, const char *what)
 {
   if (!conform_is_virtual(c)) {
     fprintf(stderr, "%s now; there are %g s for it\n", what, c->options->unplug_s);
@@ -363,13 +363,13 @@ void conform_unplugged(conform *c)
     conform_fail(c, "it does not start: %s", detail.text);
     return;
   }
-  tell(c, "pull its plug");
+  person_tell(c, "pull its plug");
   if (!await_failure(c)) {
     conform_fail(c, "nobody unplugged it, or it does not notice");
     return;
   }
   look_while_gone(c);
-  tell(c, "put its plug in again");
+  person_tell(c, "put its plug in again");
   if (!start_when_back(c)) {
     conform_fail(c, "plugged in again, it does not start");
     return;

@@ -51,7 +51,7 @@ static void give_up(void)
   _exit(1);
 }
 
-static void *watch(void *unused)
+static void *watchdog_main(void *unused)
 {
   while (atomic_load(&dog.end) == 0) {
     int64_t deadline_ns = atomic_load(&dog.deadline_ns);
@@ -69,7 +69,7 @@ bool conform_watchdog_begin(conform *c)
   dog.checked = c;
   atomic_store(&dog.end, 0);
   atomic_store(&dog.deadline_ns, 0);
-  return pthread_create(&dog.thread, NULL, watch, NULL) == 0;
+  return pthread_create(&dog.thread, NULL, watchdog_main, NULL) == 0;
 }
 
 void conform_watchdog_end(void)

@@ -57,7 +57,7 @@ static void zero_now(int number)
 }
 
 /* Sends a signal whenever the loop is likely to be in the device. */
-static void *interrupt(void *unused)
+static void *interrupter_main(void *unused)
 {
   while (atomic_load(&aside.end) == 0) {
     if (atomic_exchange(&aside.in_call, 0) == 1) {
@@ -146,7 +146,7 @@ void conform_zero_in_signal(conform *c)
   raise(SIGUSR1);
   conform_leave();
   conform_expect_none(c, "after zero in a signal handler");
-  run_beside(c, interrupt);
+  run_beside(c, interrupter_main);
   sigaction(SIGUSR1, &before, NULL);
 }
 

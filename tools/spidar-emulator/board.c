@@ -89,7 +89,7 @@ static bool begin_reply(board *b, double header_time, double time, board_reply *
 
 /* ---- commands ---- */
 
-static int16_t clip(const board *b, int value)
+static int16_t current_clip(const board *b, int value)
 {
   int limit = b->current_limit;
   return (int16_t)(value > limit ? limit : value < -limit ? -limit : value);
@@ -104,7 +104,7 @@ static void take_all(board *b, const hapi_spidar_frame *frame)
   b->mode = (board_mode)frame->mode;
   for (int i = 0; i < kind->motors; ++i) {
     if (b->mode == BOARD_CURRENT) {
-      b->current[i] = clip(b, frame->shared[i]);
+      b->current[i] = current_clip(b, frame->shared[i]);
     } else {
       b->target[i] = frame->shared[i];
       b->target_velocity[i] = 0;
@@ -141,7 +141,7 @@ static void reset_sensor(board *b, int flags)
   }
 }
 
-static void execute(board *b)
+static void command_execute(board *b)
 {
   const hapi_spidar_frame *frame = &b->pending;
   ++b->executed;
@@ -157,7 +157,7 @@ static void execute(board *b)
     case HAPI_SPIDAR_CURRENT:
       b->mode = BOARD_CURRENT;
       for (int i = 0; i < HAPI_SPIDAR_MOTORS; ++i) {
-        b->current[i] = clip(b, frame->current[i]);
+        b->current[i] = current_clip(b, frame->current[i]);
       }
       break;
     case HAPI_SPIDAR_DIRECT:
@@ -185,7 +185,7 @@ void board_run(board *b, double time)
 {
   if (b->pending_due >= 0.0 && b->pending_due <= time) {
     b->pending_due = -1.0;
-    execute(b);
+    command_execute(b);
   }
 }
 
@@ -195,7 +195,7 @@ static void learn_lengths(board *b, int whose)
   hapi_spidar_cutter_set(&b->cutter, whose, b->cutter.bytes + 1);
 }
 
-static void complete(board *b, int size, double time)
+static void command_complete(board *b, int size, double time)
 {
   int whose = b->cutter.bytes[0] & 7;
   int command = b->cutter.bytes[0] >> 3;
@@ -221,7 +221,7 @@ static bool take_byte(board *b, uint8_t byte, double header_time, double time, b
   bool replies =
       header && (size > 0 || b->cutter.need > 0) && mine && begin_reply(b, header_time, time, out);
   if (size > 0) {
-    complete(b, size, time);
+    command_complete(b, size, time);
   }
   return replies;
 }
@@ -249,20 +249,20 @@ bool board_receive(board *b, uint8_t byte, double time, board_reply *out)
 
 /* ---- control ---- */
 
-static int16_t word(const uint8_t *bytes)
+static int16_t word_read(const uint8_t *bytes)
 {
   return (int16_t)(uint16_t)(bytes[0] | bytes[1] << 8);
 }
 
 /* Position control goes to the newest target at once; only its signs and sizes are the firmware's. */
-static int16_t control(const board *b, int motor, int motors)
+static int16_t motor_control(const board *b, int motor, int motors)
 {
   const uint8_t *gains = b->parameters[HAPI_SPIDAR_PARAMETER_PD];
-  int k = word(gains + (size_t)2 * (size_t)motor);
-  int d = word(gains + (size_t)2 * (size_t)(motors + motor));
+  int k = word_read(gains + (size_t)2 * (size_t)motor);
+  int d = word_read(gains + (size_t)2 * (size_t)(motors + motor));
   int off = (int16_t)(uint16_t)((uint16_t)b->target[motor] - (uint16_t)board_position(b, motor));
   int slow = b->target_velocity[motor] - b->velocity[motor];
-  return clip(b, (k * (off >> GAIN_SHIFT)) + (d * slow >> GAIN_SHIFT));
+  return current_clip(b, (k * (off >> GAIN_SHIFT)) + (d * slow >> GAIN_SHIFT));
 }
 
 void board_tick(board *b, const int32_t counts[HAPI_SPIDAR_MOTORS])
@@ -274,7 +274,7 @@ void board_tick(board *b, const int32_t counts[HAPI_SPIDAR_MOTORS])
     b->counts[i] = counts[i];
     b->output[i] = b->current[i];
     if (b->mode != BOARD_CURRENT) {
-      b->output[i] = control(b, i, motors);
+      b->output[i] = motor_control(b, i, motors);
     }
   }
 }

@@ -28,7 +28,7 @@ typedef struct word {
   size_t length;
 } word;
 
-static int split(const char *line, word words[WORDS_MAX])
+static int line_split(const char *line, word words[WORDS_MAX])
 {
   int count = 0;
   const char *at = line + strspn(line, " \t\r\n");
@@ -41,7 +41,7 @@ static int split(const char *line, word words[WORDS_MAX])
   return *at == '\0' ? count : WORDS_MAX + 1;
 }
 
-static bool is(const word *w, const char *text)
+static bool word_is(const word *w, const char *text)
 {
   return strlen(text) == w->length && memcmp(text, w->text, w->length) == 0;
 }
@@ -61,9 +61,9 @@ static bool read_fault(const word *words, int count, wire_fault *out)
   if (count < 2 || count > (stray ? 4 : 3) || (stray && count < 4)) {
     return false;
   }
-  bool command = is(&words[1], "command");
+  bool command = word_is(&words[1], "command");
   out->direction = command ? HAPI_SPIDAR_TO_BOARD : HAPI_SPIDAR_FROM_BOARD;
-  if ((!command && !is(&words[1], "reply")) ||
+  if ((!command && !word_is(&words[1], "reply")) ||
       (count > 2 && !read_number(&words[2], 0.0, 1e9, &skip)) ||
       (stray && !read_number(&words[3], 0.0, 255.0, &value))) {
     return false;
@@ -77,7 +77,8 @@ static bool read_silent(const word *words, int count, emulator_action *out)
 {
   out->kind = EMULATOR_SILENT;
   out->number[0] = -1.0;
-  return count == 3 && (is(&words[1], "all") || read_number(&words[1], 0.0, 7.0, out->number)) &&
+  return count == 3 &&
+         (word_is(&words[1], "all") || read_number(&words[1], 0.0, 7.0, out->number)) &&
          read_number(&words[2], 0.0, 1.0, &out->number[1]);
 }
 
@@ -97,7 +98,7 @@ static bool read_hand(const word *words, int count, emulator_action *out)
       [EMULATOR_HAND_PUSH] = "push", [EMULATOR_HAND_HOLD] = "hold", [EMULATOR_HAND_NONE] = "none"};
   out->kind = EMULATOR_HAND;
   for (int i = 0; count == 2 && i < 3; ++i) {
-    if (is(&words[1], names[i])) {
+    if (word_is(&words[1], names[i])) {
       out->number[0] = i;
       return true;
     }
@@ -137,7 +138,7 @@ static bool read_simple(const word *words, int count, emulator_action *out)
                {"state", EMULATOR_STATE, -1.0},
                {"quit", EMULATOR_QUIT, -1.0}};
   for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i) {
-    if (is(&words[0], known[i].name)) {
+    if (word_is(&words[0], known[i].name)) {
       out->kind = known[i].kind;
       return known[i].most < 0.0
                  ? count == 1
@@ -162,14 +163,14 @@ static bool read_action(const word *words, int count, emulator_action *out)
                 {"push", read_push},
                 {"unplug", read_unplug}};
   for (size_t i = 0; i < sizeof faults / sizeof faults[0]; ++i) {
-    if (is(&words[0], faults[i].name)) {
+    if (word_is(&words[0], faults[i].name)) {
       out->kind = EMULATOR_FAULT;
       out->fault.kind = faults[i].kind;
       return read_fault(words, count, &out->fault);
     }
   }
   for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
-    if (is(&words[0], others[i].name)) {
+    if (word_is(&words[0], others[i].name)) {
       return others[i].read(words, count, out);
     }
   }
@@ -190,7 +191,7 @@ hap_status emulator_parse(const emulator *e, const char *line, emulator_action *
                           hap_detail *detail)
 {
   word words[WORDS_MAX];
-  int count = split(line, words);
+  int count = line_split(line, words);
   memset(out, 0, sizeof *out);
   if (count == 0 || count > WORDS_MAX || !read_action(words, count, out)) {
     return hapi_fail(detail, HAP_ERROR_FORMAT, "not a command: \"%.60s\"; --help lists them", line);

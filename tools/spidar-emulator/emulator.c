@@ -114,7 +114,8 @@ void emulator_finish(emulator *e)
 
 /* ---- motors and encoders ---- */
 
-static void encode(const emulator *e, int first, int motors, int32_t counts[HAPI_SPIDAR_MOTORS])
+static void counts_encode(const emulator *e, int first, int motors,
+                          int32_t counts[HAPI_SPIDAR_MOTORS])
 {
   for (int i = 0; i < motors; ++i) {
     double way = e->grip.wound[first + i] - e->home[first + i];
@@ -132,7 +133,7 @@ static void tick_boards(emulator *e, double time)
     if (time >= e->next_tick[i]) {
       int32_t counts[HAPI_SPIDAR_MOTORS] = {0};
       e->next_tick[i] += 1.0 / board_tick_hz(b);
-      encode(e, first, motors, counts);
+      counts_encode(e, first, motors, counts);
       board_tick(b, counts);
       for (int k = 0; k < motors; ++k) {
         double volts = CURRENT_VOLTS * b->output[k];
@@ -158,7 +159,7 @@ static void follow_motors(emulator *e)
 }
 
 /* How the grip is turned from the attitude of that rotation vector, world axes. */
-static void unturn(const double quat[4], const double turn[3], double out[4])
+static void quat_unturn(const double quat[4], const double turn[3], double out[4])
 {
   double angle = hapi_v3_norm(turn);
   double share = angle > 0.0 ? -sin(0.5 * angle) / angle : 0.0;
@@ -166,7 +167,7 @@ static void unturn(const double quat[4], const double turn[3], double out[4])
   hapi_quat_multiply(quat, back, out);
 }
 
-static void hold(const emulator *e, hap_wrench *out)
+static void hand_hold(const emulator *e, hap_wrench *out)
 {
   double place[3] = {0.0, 0.0, 0.0};
   double speed[3] = {0.0, 0.0, 0.0};
@@ -178,7 +179,7 @@ static void hold(const emulator *e, hap_wrench *out)
     hapi_motion_at(&e->path, emulator_time(e) - e->drawn, place, speed);
     hapi_motion_at(&e->turn, emulator_time(e) - e->drawn, turn, rate);
   }
-  unturn(g->pose.quat_wxyz, turn, off);
+  quat_unturn(g->pose.quat_wxyz, turn, off);
   double side = off[0] < 0.0 ? -2.0 : 2.0;
   for (int k = 0; k < 3; ++k) {
     out->force[k] += HAND_STIFFNESS * (place[k] - g->pose.position[k]) +
@@ -188,11 +189,11 @@ static void hold(const emulator *e, hap_wrench *out)
   }
 }
 
-static void step(emulator *e)
+static void emulator_step(emulator *e)
 {
   hap_wrench other = {{e->push[0], e->push[1], e->push[2]}, {0.0, 0.0, 0.0}};
   if (e->hand != EMULATOR_HAND_NONE) {
-    hold(e, &other);
+    hand_hold(e, &other);
   }
   tick_boards(e, emulator_time(e));
   follow_motors(e);
@@ -217,7 +218,7 @@ void emulator_advance(emulator *e, double time)
 {
   while (emulator_time(e) + 1.0 / EMULATOR_STEP_HZ <= time) {
     follow_plan(e);
-    step(e);
+    emulator_step(e);
   }
   follow_plan(e);
 }
@@ -255,7 +256,7 @@ static void throw_garbage(emulator *e, int count)
   }
 }
 
-static void silence(emulator *e, int id, bool silent)
+static void board_silence(emulator *e, int id, bool silent)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     if (id < 0 || e->wire.boards[i].id == id) {
@@ -264,7 +265,7 @@ static void silence(emulator *e, int id, bool silent)
   }
 }
 
-static void report(emulator *e, int id, int model)
+static void board_report(emulator *e, int id, int model)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     if (e->wire.boards[i].id == id) {
@@ -273,7 +274,7 @@ static void report(emulator *e, int id, int model)
   }
 }
 
-static void saturate(emulator *e, int limit)
+static void tension_saturate(emulator *e, int limit)
 {
   for (int i = 0; i < e->wire.count; ++i) {
     e->wire.boards[i].current_limit = limit;
@@ -288,7 +289,7 @@ void emulator_do(emulator *e, const emulator_action *action)
       (void)wire_add_fault(&e->wire, &action->fault);
       break;
     case EMULATOR_SILENT:
-      silence(e, (int)n[0], n[1] != 0.0);
+      board_silence(e, (int)n[0], n[1] != 0.0);
       break;
     case EMULATOR_LATE:
       e->wire.late = n[0];
@@ -307,10 +308,10 @@ void emulator_do(emulator *e, const emulator_action *action)
       power_on(e);
       break;
     case EMULATOR_REPORT:
-      report(e, (int)n[0], (int)n[1]);
+      board_report(e, (int)n[0], (int)n[1]);
       break;
     case EMULATOR_SATURATE:
-      saturate(e, (int)n[0]);
+      tension_saturate(e, (int)n[0]);
       break;
     case EMULATOR_PUSH:
       hapi_v3_copy(n, e->push);

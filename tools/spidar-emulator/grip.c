@@ -44,7 +44,7 @@ static void pull_strings(grip *g)
   }
 }
 
-static void turn(hap_pose *pose, const double rate[3], double length)
+static void pose_turn(hap_pose *pose, const double rate[3], double length)
 {
   double half = 0.5 * length;
   double step[4] = {1.0, half * rate[0], half * rate[1], half * rate[2]};
@@ -69,5 +69,5 @@ void grip_step(grip *g, const double pull[HAPI_SPIDAR_STRINGS_MAX], const hap_wr
     }
   }
   hapi_v3_madd(g->pose.position, length, g->twist.linear, g->pose.position);
-  turn(&g->pose, g->twist.angular, length);
+  pose_turn(&g->pose, g->twist.angular, length);
 }

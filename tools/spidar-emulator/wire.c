@@ -20,7 +20,7 @@ bool wire_add_fault(wire *w, const wire_fault *fault)
 }
 
 /* The bytes that come of one: none, itself, two. */
-static int spoil(wire *w, hapi_spidar_direction direction, uint8_t byte, uint8_t out[2])
+static int byte_spoil(wire *w, hapi_spidar_direction direction, uint8_t byte, uint8_t out[2])
 {
   int count = 1;
   out[0] = byte;
@@ -44,7 +44,7 @@ static int spoil(wire *w, hapi_spidar_direction direction, uint8_t byte, uint8_t
 /* ---- replies ---- */
 
 /* Two drivers at once: the one that pulls the line down wins, bit by bit. */
-static void insert(wire *w, const wire_byte *byte)
+static void byte_insert(wire *w, const wire_byte *byte)
 {
   int at = w->reply_count;
   while (at > 0 && w->replies[at - 1].time > byte->time) {
@@ -73,14 +73,14 @@ static void send_reply(wire *w, int index, const board_reply *reply)
   for (int i = 0; i < reply->size; ++i) {
     double time = reply->start + w->late + (i + 1) * BOARD_BYTE_S;
     const wire_byte byte = {time, reply->bytes[i], (int8_t)index};
-    insert(w, &byte);
+    byte_insert(w, &byte);
   }
 }
 
 void wire_noise(wire *w, uint8_t byte, double time)
 {
   const wire_byte noise = {time, byte, -1};
-  insert(w, &noise);
+  byte_insert(w, &noise);
 }
 
 int wire_to_host(wire *w, double time, uint8_t *out, int size)
@@ -89,7 +89,7 @@ int wire_to_host(wire *w, double time, uint8_t *out, int size)
   int taken = 0;
   while (taken < w->reply_count && w->replies[taken].time <= time && used + 2 <= size) {
     uint8_t bytes[2];
-    int count = spoil(w, HAPI_SPIDAR_FROM_BOARD, w->replies[taken].value, bytes);
+    int count = byte_spoil(w, HAPI_SPIDAR_FROM_BOARD, w->replies[taken].value, bytes);
     memcpy(out + used, bytes, (size_t)count);
     used += count;
     ++taken;
@@ -115,7 +115,7 @@ double wire_packet(const wire *w, double length)
 
 /* ---- commands ---- */
 
-static void hear(wire *w, uint8_t byte, double time)
+static void byte_hear(wire *w, uint8_t byte, double time)
 {
   for (int i = 0; i < w->count; ++i) {
     board_reply reply;
@@ -128,11 +128,11 @@ static void hear(wire *w, uint8_t byte, double time)
 void wire_from_host(wire *w, uint8_t byte, double time)
 {
   uint8_t bytes[2];
-  int count = spoil(w, HAPI_SPIDAR_TO_BOARD, byte, bytes);
+  int count = byte_spoil(w, HAPI_SPIDAR_TO_BOARD, byte, bytes);
   double start = time > w->free ? time : w->free;
   w->free = start + BOARD_BYTE_S;
   for (int i = 0; i < count; ++i) {
-    hear(w, bytes[i], w->free);
+    byte_hear(w, bytes[i], w->free);
     w->free += i + 1 < count ? BOARD_BYTE_S : 0.0;
   }
 }
