@@ -57,8 +57,8 @@ static void add_dice(scene *s)
 
 static const double head_joint[3] = {0.072, 0, 0.268};
 
-/* Lamp head, two arms and a heavy base, hinges along y whose friction holds the pose; dice beside it. Out:
- * the head and the upper arm, which are not joined. */
+/* Lamp head, two arms and a heavy base, hinges along y whose friction holds the pose; dice beside
+ * it. Out: the head and the upper arm, which are not joined. */
 static void add_stand(scene *s, dBodyID *out_head, dBodyID *out_upper)
 {
   const double head_radius = 0.035;
@@ -89,8 +89,8 @@ void scene_build_lightstand(scene *s)
   scene_add_hinge(s, head, upper, head_joint, (const double[3]){0, 1, 0});
 }
 
-/* The same with a joint that ODE has and the loop does not: the head slides along the upper arm and turns
- * about it, each against friction. */
+/* The same with a joint that ODE has and the loop does not: the head slides along the upper arm and
+ * turns about it, each against friction. */
 void scene_build_telescope(scene *s)
 {
   const double hold = 2; /* N: twice the weight of the head */

@@ -136,8 +136,8 @@ static void create_world(scene *s)
   dWorldSetAutoDisableFlag(s->world, 0);
 }
 
-/* Where a joint hangs on the world, its place there is taken anew: the bodies are not turned, so that this
- * changes nothing else. */
+/* Where a joint hangs on the world, its place there is taken anew: the bodies are not turned, so
+ * that this changes nothing else. */
 static void shift_joint(dJointID joint, const double shift[3])
 {
   dVector3 at;

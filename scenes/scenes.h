@@ -62,8 +62,9 @@ const scene_parameters *scene_table_at(size_t index);
 hap_status scene_create(const char *spec, scene **out, hap_detail *detail);
 
 /* Builds from changed parameters (a row that was copied and edited; the name tells which scene) and
- * N; 0: count_default of the parameters, and the only N of a scene that has none. Fails as scene_create does;
- * HAP_ERROR_ARGUMENT also for a parameter that cannot be built, named in detail. */
+ * N; 0: count_default of the parameters, and the only N of a scene that has none. Fails as
+ * scene_create does; HAP_ERROR_ARGUMENT also for a parameter that cannot be built, named in
+ * detail. */
 hap_status scene_create_from(const scene_parameters *parameters, int count, scene **out,
                              hap_detail *detail);
 

@@ -7,8 +7,8 @@
 
 #include <scenes/build.h>
 
-/* A bar along x from a hinge along y at the origin, level at the start. A soft stop is the spring against
- * which it is turned down, a block below its end the limit. */
+/* A bar along x from a hinge along y at the origin, level at the start. A soft stop is the spring
+ * against which it is turned down, a block below its end the limit. */
 void scene_build_lever(scene *s)
 {
   const double length = s->parameters.size;
@@ -35,7 +35,8 @@ static void add_wall(scene *s, dBodyID body, const double edges[3], double x, do
   dGeomSetOffsetPosition(wall, x, y, 0);
 }
 
-/* A block on the floor with a square hole through it, as free as the floor's friction lets it: four walls. */
+/* A block on the floor with a square hole through it, as free as the floor's friction lets it: four
+ * walls. */
 void scene_build_peg(scene *s)
 {
   const scene_parameters *p = &s->parameters;

@@ -21,12 +21,12 @@ typedef struct rig_options {
   const char *devices[RIG_POINTERS_MAX]; /* specs in pointer order; "virtual" alone: the scene's
                                             own simulated hand; none given: the same */
   size_t device_count;
-  const char
-      *identities[RIG_POINTERS_MAX]; /* files for the devices; NULL: as they say themselves */
-  double max_force;                  /* N; 0: 20 */
-  double stiffness;                  /* N/m, of the pointers' contacts; 0: the scene's */
-  double friction;                   /* of the pointers; < 0: the scene's */
-  double finger_radius;              /* m, of the pointers; < 0: the scene's */
+  /* files for the devices; NULL: as they say themselves */
+  const char *identities[RIG_POINTERS_MAX];
+  double max_force;     /* N; 0: 20 */
+  double stiffness;     /* N/m, of the pointers' contacts; 0: the scene's */
+  double friction;      /* of the pointers; < 0: the scene's */
+  double finger_radius; /* m, of the pointers; < 0: the scene's */
   hap_coupling coupling;
   double coupling_stiffness; /* N/m, of hap_pointer_def */
   double coupling_damping;   /* N s/m, likewise */
@@ -59,7 +59,8 @@ typedef struct rig {
 /* Defaults: row10, coupling auto, and those of the structs of a session. */
 void rig_options_init(rig_options *options);
 
-/* dInitODE2 was called. On failure nothing is left behind, detail says why and out->failed where. */
+/* dInitODE2 was called. On failure nothing is left behind, detail says why and out->failed
+ * where. */
 hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail);
 void rig_destroy(rig *r); /* zeroed allowed */
 

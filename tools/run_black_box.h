@@ -7,7 +7,8 @@
 
 #include <hapode/hapode.h>
 
-/* Writes a header, and the session's black box where a fault is latched. Returns the ticks in it. */
+/* Writes a header, and the session's black box where a fault is latched. Returns the ticks in
+ * it. */
 size_t run_black_box_write(hap_session *session, FILE *file);
 
 #endif

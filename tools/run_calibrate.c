@@ -57,7 +57,8 @@ static word word_of(session *s)
   return strcmp(s->line, "home") == 0 ? WORD_HOME : WORD_ENTER;
 }
 
-/* Without waiting longer than that. Byte by byte: what comes behind a line is for the next question. */
+/* Without waiting longer than that. Byte by byte: what comes behind a line is for the next
+ * question. */
 static word person_listen(session *s, int wait_ms)
 {
   struct pollfd input = {STDIN_FILENO, POLLIN, 0};
@@ -100,7 +101,8 @@ static bool is_lost(const session *s)
          cause == HAPI_SPIDAR_STALLED || hapi_spidar_line_silence(line) > LOST_S;
 }
 
-/* A tick with the least tensions; lengths that fit no pose are what a calibration is for. False: it is lost. */
+/* A tick with the least tensions; lengths that fit no pose are what a calibration is for. False: it
+ * is lost. */
 static bool hold_taut(const session *s)
 {
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -254,7 +256,8 @@ static hap_status session_sweep(session *s)
     return hapi_fail(s->detail, HAP_ERROR_MEMORY, "--calibrate: no memory for %zu samples",
                      s->room);
   }
-  /* The same tension on all strings everywhere: then what stretches them is a part of the offsets. */
+  /* The same tension on all strings everywhere: then what stretches them is a part of the
+   * offsets. */
   double most = s->spidar->model.max_tension;
   s->spidar->model.max_tension = EVEN * s->spidar->model.min_tension;
   hap_status status = sweep_for(s, seconds);

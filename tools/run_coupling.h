@@ -17,7 +17,8 @@ typedef struct run_coupling {
 /* From time to time during the run. */
 void run_coupling_look(run_coupling *io, const rig *r);
 
-/* "coupling: proxy (ABOVE: 8000 N/m near, the device holds 320 N/m)", several pointers joined by " + ". */
+/* "coupling: proxy (ABOVE: 8000 N/m near, the device holds 320 N/m)", several pointers joined by "
+ * + ". */
 void run_coupling_print(const run_coupling *coupling, size_t pointers, FILE *out);
 
 #endif

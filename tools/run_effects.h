@@ -15,11 +15,12 @@ typedef struct run_effects {
   bool of_all[HAP_EFFECTS]; /* by "all=": left out where the model cannot */
 } run_effects;
 
-/* Takes a list such as "friction=off,torque=auto" over what was there; "all=on" is for all that the model can
- * fulfil. On failure detail says what the list may hold. */
+/* Takes a list such as "friction=off,torque=auto" over what was there; "all=on" is for all that the
+ * model can fulfil. On failure detail says what the list may hold. */
 hap_status run_effects_parse(const char *list, run_effects *io, hap_detail *detail);
 
-/* Into the def, whose model is known by now. HAP_ERROR_UNSUPPORTED for a wish that it cannot fulfil. */
+/* Into the def, whose model is known by now. HAP_ERROR_UNSUPPORTED for a wish that it cannot
+ * fulfil. */
 hap_status run_effects_apply(const run_effects *wanted, hap_model model, hap_expert_def *io,
                              hap_detail *detail);
 

@@ -28,8 +28,8 @@ typedef struct watch {
   hap_detail *detail;
 } watch;
 
-/* Ends the process by the signal, with the force gone. A tick that is under way may write once more:
- * hence twice, with 2 ms between. */
+/* Ends the process by the signal, with the force gone. A tick that is under way may write once
+ * more: hence twice, with 2 ms between. */
 static void let_go_and_die(int number)
 {
   const struct timespec tick = {0, 2000000};

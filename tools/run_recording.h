@@ -17,8 +17,8 @@ typedef struct run_recording {
   char scene[128]; /* of the recording */
 } run_recording;
 
-/* Before the rig is made: fills in what options->rig needs for it. --play takes scene, model and rates
- * from the file. */
+/* Before the rig is made: fills in what options->rig needs for it. --play takes scene, model and
+ * rates from the file. */
 hap_status run_recording_open(run_options *options, run_recording *out, hap_detail *detail);
 void run_recording_close(
     run_recording *recording); /* after the rig was destroyed; zeroed allowed */

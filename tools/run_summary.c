@@ -121,7 +121,8 @@ static void print_side(const char *name, const hap_accuracy_side *side, FILE *ou
   }
 }
 
-/* By the names of hap_session_def, as they could be given one by one; shapes is of the effect shape. */
+/* By the names of hap_session_def, as they could be given one by one; shapes is of the effect
+ * shape. */
 static void print_settings(const hap_accuracy_info *info, FILE *out)
 {
   static const char *const probes[] = {[HAP_PROBE_SHARED] = "shared",

@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A SPIDAR behind a pseudo-terminal, in real time: spidar-emulator/emulator.h with a port and a clock. */
+/* A SPIDAR behind a pseudo-terminal, in real time: spidar-emulator/emulator.h with a port and a
+ * clock. */
 
 #include <errno.h>
 #include <fcntl.h>

@@ -40,7 +40,8 @@ _Noreturn void hapi_assert_failed(const char *condition, const char *file, int l
 /* The first count doubles of v: no NaN, no infinity. */
 #define HAPI_ASSERT_FINITE(v, count) HAPI_ASSERT(hapi_assert_is_finite((v), (count)))
 
-/* m: n x n in one block, n <= 6; positive definite, symmetric within 1e-9 of its largest element. */
+/* m: n x n in one block, n <= 6; positive definite, symmetric within 1e-9 of its largest
+ * element. */
 #define HAPI_ASSERT_POSITIVE(m, n) HAPI_ASSERT(hapi_assert_is_positive((m), (n)))
 
 static inline bool hapi_assert_is_index(int64_t index, int64_t count)

@@ -3,8 +3,8 @@
 #ifndef HAPODE_BASE_CYCLES_H
 #define HAPODE_BASE_CYCLES_H
 
-/* The processor's own counter of time, read in a few nanoseconds and without the system. Its unit is not
- * known: only shares are taken of it. */
+/* The processor's own counter of time, read in a few nanoseconds and without the system. Its unit
+ * is not known: only shares are taken of it. */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -3,7 +3,8 @@
 #ifndef HAPODE_BASE_EFFECT_FIGURES_H
 #define HAPODE_BASE_EFFECT_FIGURES_H
 
-/* What physics and loop each note of an effect: for how many it is on, and why not for the others. */
+/* What physics and loop each note of an effect: for how many it is on, and why not for the
+ * others. */
 
 #include <stdbool.h>
 #include <stdint.h>

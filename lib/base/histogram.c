@@ -11,7 +11,8 @@ static void count_increase(_Atomic uint64_t *value, uint64_t by)
   atomic_store_explicit(value, old + by, memory_order_relaxed);
 }
 
-/* The octave by the exponent of a double, which rounds up to the next one only far beyond the last bucket. */
+/* The octave by the exponent of a double, which rounds up to the next one only far beyond the last
+ * bucket. */
 static unsigned bucket_of(uint64_t ns)
 {
   if (ns < 16) {

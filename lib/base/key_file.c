@@ -21,8 +21,8 @@ static void trim_end(char *text)
   }
 }
 
-/* At the first '='. An empty key: there is nothing but a comment. False: there is no '=', or no key; the key is
- * then all of the line. */
+/* At the first '='. An empty key: there is nothing but a comment. False: there is no '=', or no
+ * key; the key is then all of the line. */
 static bool line_split(char *text, char **key, char **value)
 {
   *key = text + strspn(text, blanks);

@@ -13,12 +13,12 @@ typedef struct hapi_key_file {
   hap_detail *detail; /* may be NULL */
 } hapi_key_file;
 
-/* A line with its key and value, both trimmed, in memory that take may write to; a comment behind the value is
- * a part of it. A negative status ends the reading. */
+/* A line with its key and value, both trimmed, in memory that take may write to; a comment behind
+ * the value is a part of it. A negative status ends the reading. */
 typedef hap_status (*hapi_key_take)(void *self, const hapi_key_file *file, char *key, char *value);
 
-/* [control] Reads the file line by line; *file, with path and detail set, says where it is. What take said,
- * HAP_ERROR_IO, or HAP_ERROR_FORMAT for what is no such line. */
+/* [control] Reads the file line by line; *file, with path and detail set, says where it is. What
+ * take said, HAP_ERROR_IO, or HAP_ERROR_FORMAT for what is no such line. */
 HAP_NODISCARD hap_status hapi_key_file_read(hapi_key_file *file, hapi_key_take take, void *self);
 
 /* Takes a comment and the blanks before it off the end of a value. */

@@ -4,9 +4,9 @@
 #define HAPODE_BASE_LANES_H
 
 /* Two doubles that are worked on at once: SSE2, which every x86-64 has, or plain C (meson's option
- * `lanes`). Both do the same operations in the same order, each rounded by itself, so that results are
- * the same to the last bit. Wider registers (AVX2) were tried by the compiler alone and gained nothing: what a
- * row has are sixes. */
+ * `lanes`). Both do the same operations in the same order, each rounded by itself, so that results
+ * are the same to the last bit. Wider registers (AVX2) were tried by the compiler alone and gained
+ * nothing: what a row has are sixes. */
 
 #if defined(__SSE2__) && !defined(HAPODE_PLAIN_LANES)
 #include <emmintrin.h>

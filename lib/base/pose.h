@@ -7,8 +7,8 @@
 
 #include "base/vec.h"
 
-/* Eq. 11 of the paper: orientation after seconds of an angular velocity; the turn in them is small. The
- * quaternion is normalised because eq. 11 leaves the unit sphere. */
+/* Eq. 11 of the paper: orientation after seconds of an angular velocity; the turn in them is small.
+ * The quaternion is normalised because eq. 11 leaves the unit sphere. */
 static inline void hapi_quat_move(double quat[4], const double w[3], double seconds)
 {
   double turn[4] = {0.0, w[0], w[1], w[2]};

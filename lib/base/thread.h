@@ -22,15 +22,15 @@ hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *a
                              const char *name, int priority);
 void hapi_thread_join(hapi_thread *thread); /* idempotent */
 
-/* The calling thread: wakes up without the timer slack of ordinary threads, and has its stack touched
- * down to 64 KiB. */
+/* The calling thread: wakes up without the timer slack of ordinary threads, and has its stack
+ * touched down to 64 KiB. */
 void hapi_thread_prepare_for_ticks(void);
 
 /* What decays, such as a damped velocity, ends in denormal numbers, which x86 multiplies a hundred
- * times slower. Between flush and restore the calling thread takes them for zero, as operands and as
- * results; flush gives back what restore needs. About what is computed and not about who computes:
- * so lockstep, in the application's thread, has the same bits as the threads. Other processors are
- * left as they are. */
+ * times slower. Between flush and restore the calling thread takes them for zero, as operands and
+ * as results; flush gives back what restore needs. About what is computed and not about who
+ * computes: so lockstep, in the application's thread, has the same bits as the threads. Other
+ * processors are left as they are. */
 unsigned hapi_denormals_flush(void);
 void hapi_denormals_restore(unsigned before);
 

@@ -3,8 +3,9 @@
 #ifndef HAPODE_BASE_TWO_TURNS_H
 #define HAPODE_BASE_TWO_TURNS_H
 
-/* The quaternions of two bodies at once, with the bits of vec.h and pose.h. How a body turns is one long chain
- * of operations that wait for each other: two chains side by side take the time of one. */
+/* The quaternions of two bodies at once, with the bits of vec.h and pose.h. How a body turns is one
+ * long chain of operations that wait for each other: two chains side by side take the time of
+ * one. */
 
 #include "base/lanes.h"
 #include "base/vec.h"

@@ -17,7 +17,8 @@ static inline void hapi_v3_copy(const double a[3], double out[3])
   out[2] = a[2];
 }
 
-/* fmin and fmax without their calls, of which a tick would make a thousand; the bound where x is no number. */
+/* fmin and fmax without their calls, of which a tick would make a thousand; the bound where x is no
+ * number. */
 static inline double hapi_min(double x, double bound)
 {
   return x < bound ? x : bound;
@@ -131,8 +132,8 @@ static inline void hapi_quat_normalize(double q[4])
     q[1] = q[2] = q[3] = 0.0;
     return;
   }
-  /* After a small turn it is nearly of unit length: there the series is exact to rounding, and no root
-   * and division have to be waited for. */
+  /* After a small turn it is nearly of unit length: there the series is exact to rounding, and no
+   * root and division have to be waited for. */
   double off = n2 - 1.0;
   double s = fabs(off) < 1e-4 ? 1.0 - off * (0.5 - off * (0.375 - 0.3125 * off)) : 1.0 / sqrt(n2);
   q[0] *= s;

@@ -3,8 +3,8 @@
 #ifndef HAPODE_BASE_WISHES_H
 #define HAPODE_BASE_WISHES_H
 
-/* The wishes of all effects in one word, two bits each: it is handed between threads and recorded as a
- * whole. */
+/* The wishes of all effects in one word, two bits each: it is handed between threads and recorded
+ * as a whole. */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -24,8 +24,8 @@ struct hap_device {
   void *library; /* of module.h; NULL: built in */
 };
 
-/* [control] Opens a device of these ops; the ways to find ops are the registry and module.h.
- * The ops must outlive the device. HAP_ERROR_UNSUPPORTED for another ABI; detail is not NULL and says
+/* [control] Opens a device of these ops; the ways to find ops are the registry and module.h. The
+ * ops must outlive the device. HAP_ERROR_UNSUPPORTED for another ABI; detail is not NULL and says
  * why it failed. */
 HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args,
                                               hap_device **out, hap_detail *detail);

@@ -9,9 +9,10 @@
 
 /* A fixed table without a lock: a signal handler may come between any two steps of the others.
  *
- * A place is taken, then gets its self, then its ops, by which it is seen. Whoever calls counts itself
- * in before it looks at ops, and out after zero came back: remove hides ops and then waits for the count
- * to fall to 0, so that no device is freed under a call. All in the one order of seq_cst. */
+ * A place is taken, then gets its self, then its ops, by which it is seen. Whoever calls counts
+ * itself in before it looks at ops, and out after zero came back: remove hides ops and then waits
+ * for the count to fall to 0, so that no device is freed under a call. All in the one order of
+ * seq_cst. */
 
 typedef struct place {
   _Atomic int taken;
@@ -57,7 +58,8 @@ uint64_t hapi_emergencies(void)
 
 void hap_emergency_zero(void)
 {
-  /* First: a loop that writes a force after its device was zeroed here sees that and zeroes again. */
+  /* First: a loop that writes a force after its device was zeroed here sees that and zeroes
+   * again. */
   atomic_fetch_add(&emergencies, 1);
   for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
     place *p = &places[i];

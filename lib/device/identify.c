@@ -195,7 +195,8 @@ static hap_status force_write(const run *r, double force)
              : run_fail(r, "hap_emergency_zero was called: its force was taken off");
 }
 
-/* Gives the force, waits for the next tick and reads. Anything but HAP_OK ends the identification. */
+/* Gives the force, waits for the next tick and reads. Anything but HAP_OK ends the
+ * identification. */
 static hap_status tick_step(run *r, double force)
 {
   hapi_identify_record *axis = &r->records[r->axis];

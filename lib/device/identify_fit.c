@@ -1,13 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* m a + b v + c sign(v) + g + k x = f(t - delay), multiplied with functions that vanish with their slopes
- * at both ends of a window and integrated by parts (modulating functions: Shinbrot 1957; Preisig,
- * Rippin 1993): no position is differentiated, so rounded ones do. The second derivatives of the
- * functions are Legendre polynomials of order 2 and up: these are orthogonal, so white noise of the
- * positions is white noise of the rows, and least squares is what it should be. Within a window the
- * velocity keeps its sign. For a delay the equation is linear in the other five; the delay is where
- * the rest is least. */
+/* m a + b v + c sign(v) + g + k x = f(t - delay), multiplied with functions that vanish with their
+ * slopes at both ends of a window and integrated by parts (modulating functions: Shinbrot 1957;
+ * Preisig, Rippin 1993): no position is differentiated, so rounded ones do. The second derivatives
+ * of the functions are Legendre polynomials of order 2 and up: these are orthogonal, so white noise
+ * of the positions is white noise of the rows, and least squares is what it should be. Within a
+ * window the velocity keeps its sign. For a delay the equation is linear in the other five; the
+ * delay is where the rest is least. */
 
 #include <math.h>
 #include <stdbool.h>

@@ -58,8 +58,9 @@ static int compare_doubles(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* Where the axes of the encoders are not those of the device's frame the positions have no grid, yet
- * a moving device repeats some. A step beside a repetition is one quantum: the median of those. */
+/* Where the axes of the encoders are not those of the device's frame the positions have no grid,
+ * yet a moving device repeats some. A step beside a repetition is one quantum: the median of
+ * those. */
 static double step_beside_repeats(const hapi_identify_record *record)
 {
   double *steps = hapi_alloc_array(record->count + 1, sizeof *steps);

@@ -15,15 +15,16 @@
 #include "base/log.h"
 #include "device/device.h"
 
-/* The code that is loaded holds motors, so that it is the file that was named and no other one: a whole
- * path, never a search through LD_LIBRARY_PATH or the folder that the program happens to run in.
+/* The code that is loaded holds motors, so that it is the file that was named and no other one: a
+ * whole path, never a search through LD_LIBRARY_PATH or the folder that the program happens to run
+ * in.
  *
- * Each device holds the library once, and the system's loader counts: the code goes with the last of
- * them. By then nobody is in it: ops->close came back, and before that hapi_emergency_remove waited
- * for every zero that another thread or a signal handler was calling.
+ * Each device holds the library once, and the system's loader counts: the code goes with the last
+ * of them. By then nobody is in it: ops->close came back, and before that hapi_emergency_remove
+ * waited for every zero that another thread or a signal handler was calling.
  *
- * All symbols are bound while it is loaded (RTLD_NOW). Bound at first use, the first zero would call the
- * system's loader, which locks, from a signal handler. */
+ * All symbols are bound while it is loaded (RTLD_NOW). Bound at first use, the first zero would
+ * call the system's loader, which locks, from a signal handler. */
 
 #define SYMBOL "hapode_device_module"
 #define PATH_SHOWN 200 /* characters of a path in a text */
@@ -80,8 +81,8 @@ static bool is_cut_off(const elf_header *header, uint64_t file_size)
          (own_form && (header->e_shoff > file_size || header->e_shoff + table > file_size));
 }
 
-/* The first bytes of both forms of the header, of 32 and of 64 bits, are the same up to e_machine. The
- * system's loader says of a foreign machine that there is no such file. */
+/* The first bytes of both forms of the header, of 32 and of 64 bits, are the same up to e_machine.
+ * The system's loader says of a foreign machine that there is no such file. */
 static hap_status check_header(const module *m, const elf_header *header, uint64_t file_size)
 {
   const elf_header *own = own_header();

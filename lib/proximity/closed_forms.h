@@ -13,8 +13,8 @@
  * are relative to the origin of the solids. False: no closed form for this pair. */
 bool hapi_closed_form(const hapi_solid *a, const hapi_solid *b, hapi_nearest *out);
 
-/* The same of a ball about the origin (a) and a solid, of which no more than hapi_solid_size, kind, center and
- * rotation is looked at. */
+/* The same of a ball about the origin (a) and a solid, of which no more than hapi_solid_size, kind,
+ * center and rotation is looked at. */
 bool hapi_closed_form_ball(double radius, const hapi_solid *solid, hapi_nearest *out);
 
 /* Change of the roles of a and b. */

@@ -4,10 +4,10 @@
 #define HAPODE_PROXIMITY_PATCH_H
 
 /* The contact patch of two convex shapes: a few points that together hold all that the shapes can
- * do to each other until the next call. A point is built to be evaluated again from moved poses:
- * it names points fixed in the shapes and says how its normal follows them. No state, any thread.
- * Allocates only where a core is penetrated beyond the half of its size, or where the search for the
- * normal fails (deep.h). */
+ * do to each other until the next call. A point is built to be evaluated again from moved poses: it
+ * names points fixed in the shapes and says how its normal follows them. No state, any thread.
+ * Allocates only where a core is penetrated beyond the half of its size, or where the search for
+ * the normal fails (deep.h). */
 
 #include "proximity/proximity.h"
 

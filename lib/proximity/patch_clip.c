@@ -26,8 +26,8 @@ static bool spot_on_border(const hapi_spot *spot, double dx, double dy)
          (spot->slide == HAPI_SLIDE_EDGE && off <= 1e-9 * (fabs(dx) + fabs(dy)));
 }
 
-/* The spot where the way from a to b crosses a side of the reference. On a way along its border that
- * is a corner of the reference, else a point of an edge of the incident feature. */
+/* The spot where the way from a to b crosses a side of the reference. On a way along its border
+ * that is a corner of the reference, else a point of an edge of the incident feature. */
 static hapi_spot edge_cut(const hapi_spot *a, const hapi_spot *b, double t, const double side[2])
 {
   hapi_spot spot = spot_between(a, b, t);

@@ -143,7 +143,8 @@ static void look_along(general *g)
 static bool guess_is_right(general *g)
 {
   static const double same = 1e-12;
-  /* cppcheck-suppress ctuuninitvar ; the caller has set the members that are read before they are set */
+  /* cppcheck-suppress ctuuninitvar ; the caller has set the members that are read before they are
+   * set */
   const hapi_pair *pair = g->pair;
   look_along(g);
   bool is_a = prefer_a(g);

@@ -8,9 +8,9 @@
 /* A shape at a pose, in world axes about an origin near the pair: 10 km from the world's origin a
  * coordinate has a grain of 2e-12 m, the small numbers here have not.
  *
- * Every solid is a core blown up by a ball. Sphere: point; capsule: segment; hull:
- * itself, with a ball where it is rounded; others: themselves with no ball. Distances of cores are exact for round shapes, and the cores of a shallow contact
- * of round shapes are still apart. */
+ * Every solid is a core blown up by a ball. Sphere: point; capsule: segment; hull: itself, with a
+ * ball where it is rounded; others: themselves with no ball. Distances of cores are exact for round
+ * shapes, and the cores of a shallow contact of round shapes are still apart. */
 typedef struct hapi_solid {
   hapi_shape_kind kind;
   double center[3];   /* of the pose */
@@ -28,7 +28,8 @@ typedef struct hapi_solid {
 bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose *pose,
                       const double origin[3]);
 
-/* half, disc and ball, which closed forms need beside kind, center and rotation; nothing is checked. */
+/* half, disc and ball, which closed forms need beside kind, center and rotation; nothing is
+ * checked. */
 void hapi_solid_size(hapi_solid *solid, const hapi_shape *shape);
 
 /* Both of a pair, from the position of a. False as above, and for two planes. */

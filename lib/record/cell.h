@@ -3,8 +3,9 @@
 #ifndef HAPODE_RECORD_CELL_H
 #define HAPODE_RECORD_CELL_H
 
-/* What a recording is made of: cells of one size, in three streams, one for each thread that writes.
- * A packet is one cell that says how many follow, and those. docs/recording.md has the table. */
+/* What a recording is made of: cells of one size, in three streams, one for each thread that
+ * writes. A packet is one cell that says how many follow, and those. docs/recording.md has the
+ * table. */
 
 #include <assert.h>
 #include <stdint.h>
@@ -78,7 +79,8 @@ typedef enum hapi_cycle_word {
   HAPI_CYCLE_DROPPED = 6 /* drive FRAME: steps that frames had too much, likewise */
 } hapi_cycle_word;
 
-/* Positions of the dials of a cycle [percent], each + 1 in a byte; 0, of a recording without: the default. */
+/* Positions of the dials of a cycle [percent], each + 1 in a byte; 0, of a recording without: the
+ * default. */
 #define HAPI_DIAL_OF_NONE 50
 
 static inline int hapi_cell_dial(uint64_t word, unsigned shift)

@@ -3,9 +3,10 @@
 #ifndef HAPODE_RECORD_FILE_H
 #define HAPODE_RECORD_FILE_H
 
-/* The file of a recording: a head, then blocks. A block is a head and its bytes, deflated where that
- * makes them fewer, under a CRC-32 over both. The first block is INFO, the last one END. Numbers are
- * those of the machine that wrote it: only the same kind of machine can replay it anyway. */
+/* The file of a recording: a head, then blocks. A block is a head and its bytes, deflated where
+ * that makes them fewer, under a CRC-32 over both. The first block is INFO, the last one END.
+ * Numbers are those of the machine that wrote it: only the same kind of machine can replay it
+ * anyway. */
 
 #include <assert.h>
 #include <stddef.h>

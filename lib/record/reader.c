@@ -13,8 +13,8 @@
 /* Of one stream, read while the cells of another one are sought. In what a recorder writes they
  * stand before. */
 #define QUEUE_MAX (1u << 20)
-/* Cells of the loop in which those of another thread are seen if they belong to its first ticks: some
- * times more than are written at a time. */
+/* Cells of the loop in which those of another thread are seen if they belong to its first ticks:
+ * some times more than are written at a time. */
 #define GLANCE (8u * HAPI_BLOCK_CELLS)
 
 typedef struct cell_queue {
@@ -409,8 +409,8 @@ const hapi_grammar *hapi_reader_whole(const hapi_reader *reader)
 
 /* ---- packets ---- */
 
-/* Behind the last cell: by moving them when as many places are free before them, otherwise by growing,
- * so that no cell is moved often. */
+/* Behind the last cell: by moving them when as many places are free before them, otherwise by
+ * growing, so that no cell is moved often. */
 static bool make_room(cell_queue *q, uint32_t count)
 {
   if (q->first + q->count + count <= q->capacity) {

@@ -3,8 +3,9 @@
 #ifndef HAPODE_RECORD_READER_H
 #define HAPODE_RECORD_READER_H
 
-/* Reads a recording. Open looks at the whole file once: head, machine, version, every block's sum and
- * every cell's form. Only then are its cells handed out, block by block, and looked at again. */
+/* Reads a recording. Open looks at the whole file once: head, machine, version, every block's sum
+ * and every cell's form. Only then are its cells handed out, block by block, and looked at
+ * again. */
 
 #include "record/file.h"
 #include "record/grammar.h"
@@ -12,9 +13,9 @@
 
 typedef struct hapi_reader hapi_reader;
 
-/* incomplete: a file that breaks off, in a block or between two, is taken up to there; its end is then
- * HAPI_RECORD_GOES_ON. HAP_ERROR_IO; HAP_ERROR_FORMAT, with the place; HAP_ERROR_UNSUPPORTED for
- * another machine, version or ode (the configuration of ODE in use; NULL: any). */
+/* incomplete: a file that breaks off, in a block or between two, is taken up to there; its end is
+ * then HAPI_RECORD_GOES_ON. HAP_ERROR_IO; HAP_ERROR_FORMAT, with the place; HAP_ERROR_UNSUPPORTED
+ * for another machine, version or ode (the configuration of ODE in use; NULL: any). */
 hap_status hapi_reader_open(const char *path, bool incomplete, const char *ode, hapi_reader **out,
                             hap_detail *detail);
 void hapi_reader_close(hapi_reader *reader); /* NULL allowed */
@@ -28,8 +29,8 @@ const hapi_grammar *hapi_reader_whole(const hapi_reader *reader); /* after all o
  * open where the file has changed since. pop goes on to the one after it. */
 hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                             uint32_t *out_count, hap_detail *detail);
-/* The same, as far as it can be seen without reading on until a thread's cells pile up: *out NULL when
- * none is in sight, *out_count 1 of 2 where the end of a physics step is not. */
+/* The same, as far as it can be seen without reading on until a thread's cells pile up: *out NULL
+ * when none is in sight, *out_count 1 of 2 where the end of a physics step is not. */
 hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                               uint32_t *out_count, hap_detail *detail);
 void hapi_reader_pop(hapi_reader *reader, hapi_stream stream);

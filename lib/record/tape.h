@@ -9,8 +9,8 @@
  * without system calls; the recorder's thread takes them out. Where a packet finds no room the
  * recording ends: what came later could not be replayed.
  *
- * PLAY: one packet at a time, which the player loads before the part of the session that wrote it is
- * run. That asks for the cells in the order in which they were put. */
+ * PLAY: one packet at a time, which the player loads before the part of the session that wrote it
+ * is run. That asks for the cells in the order in which they were put. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -3,8 +3,8 @@
 #ifndef HAPODE_SYNC_EXCHANGE_H
 #define HAPODE_SYNC_EXCHANGE_H
 
-/* The mailboxes between physics, contact thread and haptic loop: one writer and one reader each. All
- * memory is taken at create. */
+/* The mailboxes between physics, contact thread and haptic loop: one writer and one reader each.
+ * All memory is taken at create. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -72,10 +72,10 @@ uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name);
 /* [writer] how many there were */
 uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel name);
 
-/* Replay, one thread. From now on the messages are kept, and take gives the one that is expected: the
- * threads of a recording are run one after the other, and what one of them told comes to the other
- * at the same place as then, however much the one is ahead by now. Until expect, take
- * gives the newest. Before the first message; ends with destroy. */
+/* Replay, one thread. From now on the messages are kept, and take gives the one that is expected:
+ * the threads of a recording are run one after the other, and what one of them told comes to the
+ * other at the same place as then, however much the one is ahead by now. Until expect, take gives
+ * the newest. Before the first message; ends with destroy. */
 hap_status hapi_exchange_play(hapi_exchange *exchange);
 /* number of the message that take gives; 0: none; one that is held already: none */
 void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t number);
@@ -83,7 +83,8 @@ void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t n
 void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t number);
 /* HAP_ERROR_MEMORY, HAP_ERROR_NOT_FOUND: what hapi_message_queue_status says of any of them. */
 hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
-/* [haptic] -> whoever draws. Not in the block: it is written round and round and stays in memory. */
+/* [haptic] -> whoever draws. Not in the block: it is written round and round and stays in
+ * memory. */
 hapi_trail *hapi_exchange_trail(hapi_exchange *exchange);
 hapi_path *hapi_exchange_path(hapi_exchange *exchange); /* [haptic] -> [physics] */
 

@@ -26,8 +26,8 @@ void hapi_message_queue_expect(hapi_message_queue *queue, uint64_t number); /* U
 /* All before that number but the one that is expected. */
 void hapi_message_queue_forget(hapi_message_queue *queue, uint64_t before);
 uint64_t hapi_message_queue_held(const hapi_message_queue *queue); /* number, 0: none */
-/* HAP_ERROR_MEMORY: there was none for a message; HAP_ERROR_NOT_FOUND: take did not find the one that
- * was expected. */
+/* HAP_ERROR_MEMORY: there was none for a message; HAP_ERROR_NOT_FOUND: take did not find the one
+ * that was expected. */
 hap_status hapi_message_queue_status(const hapi_message_queue *queue);
 
 #endif

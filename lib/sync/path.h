@@ -4,8 +4,9 @@
 #define HAPODE_SYNC_PATH_H
 
 /* Where the pointers went and what the hands felt there, tick by tick, on its way from the loop to
- * physics, which goes over it again (physics/lookback.h). A ring with one writer, the loop, which never waits, and one
- * reader, physics. What finds no room is left out and counted: the reader sees a gap. */
+ * physics, which goes over it again (physics/lookback.h). A ring with one writer, the loop, which
+ * never waits, and one reader, physics. What finds no room is left out and counted: the reader sees
+ * a gap. */
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -47,8 +48,8 @@ void hapi_path_finish(hapi_path *path);
 /* No loop is running. Touches all of the memory. */
 void hapi_path_reset(hapi_path *path);
 
-/* [haptic] Pointers of the next row, to be filled in, then sent; NULL: nothing is kept, or there is no
- * room. */
+/* [haptic] Pointers of the next row, to be filled in, then sent; NULL: nothing is kept, or there is
+ * no room. */
 static inline hapi_path_pointer *hapi_path_next(hapi_path *path)
 {
   if (path->rows == 0) {

@@ -19,8 +19,8 @@ typedef struct hapi_touch_side {
 void hapi_touch_localise(const hapi_touch_side *a, const hapi_touch_side *b,
                          const hapi_patch_point *in, hapi_patch_contact *out);
 
-/* The patch of a pointer's hull (a), of that extent [m], and a shape. Of points within the margin those
- * that are about as near as the nearest: the others would lie on the far side of the hull. */
+/* The patch of a pointer's hull (a), of that extent [m], and a shape. Of points within the margin
+ * those that are about as near as the nearest: the others would lie on the far side of the hull. */
 bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double margin,
                      double extent, hapi_patch *out);
 
@@ -35,8 +35,8 @@ typedef struct hapi_tool_spots {
   uint32_t count;
 } hapi_tool_spots;
 
-/* What is enough of them: of those that push the same way the corners and the deepest. Else the seams of
- * triangles would have shares of the stiffness. Returns how many. */
+/* What is enough of them: of those that push the same way the corners and the deepest. Else the
+ * seams of triangles would have shares of the stiffness. Returns how many. */
 uint32_t hapi_tool_reduce(const hapi_tool_spots *in, uint32_t out_kept[HAPI_TOOL_PAIR_POINTS]);
 
 /* Of the same pair, by what a and b are. */

@@ -3,15 +3,16 @@
 #ifndef HAPODE_SYNC_TRAIL_H
 #define HAPODE_SYNC_TRAIL_H
 
-/* Where the loop's bodies and pointers have been in the last ticks, for those who draw. One writer, the
- * loop, which never waits and asks nobody; any number of readers.
+/* Where the loop's bodies and pointers have been in the last ticks, for those who draw. One writer,
+ * the loop, which never waits and asks nobody; any number of readers.
  *
- * A ring of rows, the newest of which overwrites the oldest. Every number in it is atomic, stored with
- * release and loaded with acquire, and the count of written rows is stored last. So a reader that has
- * seen anything of row n sees, after that, a count of n or more: when the count has not gone past the
- * oldest row that it used by the length of the ring, nothing that it read was being overwritten. It
- * would have to sleep for most of the ring's time to be told to read again. A queue would keep the
- * oldest rows where nobody draws for some time, and the newest are what is wanted. */
+ * A ring of rows, the newest of which overwrites the oldest. Every number in it is atomic, stored
+ * with release and loaded with acquire, and the count of written rows is stored last. So a reader
+ * that has seen anything of row n sees, after that, a count of n or more: when the count has not
+ * gone past the oldest row that it used by the length of the ring, nothing that it read was being
+ * overwritten. It would have to sleep for most of the ring's time to be told to read again. A queue
+ * would keep the oldest rows where nobody draws for some time, and the newest are what is
+ * wanted. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

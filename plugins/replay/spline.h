@@ -4,7 +4,8 @@
 #define HAPODE_PLUGINS_REPLAY_SPLINE_H
 
 /* The natural cubic spline through a recording: twice differentiable, exact at the rows, no filter.
- * A device at 1 kHz would feel the steps of velocity that straight pieces between 100 Hz rows have. */
+ * A device at 1 kHz would feel the steps of velocity that straight pieces between 100 Hz rows
+ * have. */
 
 #include "plugins/replay/recording.h"
 

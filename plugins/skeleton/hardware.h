@@ -5,9 +5,9 @@
 
 /* ============ REPLACE: what stands behind these functions is your hardware. ============
  *
- * In the skeleton it is a simulated toy (toy_hardware.c): three sliding axes, each with a motor and an
- * encoder, that nobody holds. The units of the hardware, counts and milliamperes, end here: skeleton.c
- * turns them into metres and newtons. */
+ * In the skeleton it is a simulated toy (toy_hardware.c): three sliding axes, each with a motor and
+ * an encoder, that nobody holds. The units of the hardware, counts and milliamperes, end here:
+ * skeleton.c turns them into metres and newtons. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -15,8 +15,8 @@
 
 typedef struct hardware hardware;
 
-/* Finds the board and talks to it; motors stay off. NULL: why says, in size bytes, what is wrong and
- * what to do. May block. */
+/* Finds the board and talks to it; motors stay off. NULL: why says, in size bytes, what is wrong
+ * and what to do. May block. */
 hardware *hardware_open(char *why, size_t size);
 void hardware_close(hardware *board);
 
@@ -32,8 +32,8 @@ bool hardware_read(hardware *board, int32_t counts[3]);
 /* [haptic] Currents that the motors hold from now on; false: the board does not answer. */
 bool hardware_write(hardware *board, const int16_t milliamperes[3]);
 
-/* [any, also a signal handler] Currents to zero at once. Nothing but a store to an atomic or a single
- * write(2) of bytes that were prepared before: no lock, no printf, no malloc. */
+/* [any, also a signal handler] Currents to zero at once. Nothing but a store to an atomic or a
+ * single write(2) of bytes that were prepared before: no lock, no printf, no malloc. */
 void hardware_off(hardware *board);
 
 /* What the motors were told last. */

@@ -1,10 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A device to copy: three axes with encoders and motors, polled by the host. It is a loadable module
- * that needs nothing but hapode/device_impl.h, where the contract of each function stands;
- * docs/writing-a-device.md goes through this file from top to bottom. What is marked REPLACE is about
- * the toy hardware of the skeleton. */
+/* A device to copy: three axes with encoders and motors, polled by the host. It is a loadable
+ * module that needs nothing but hapode/device_impl.h, where the contract of each function stands;
+ * docs/writing-a-device.md goes through this file from top to bottom. What is marked REPLACE is
+ * about the toy hardware of the skeleton. */
 
 #include <hapode/device_impl.h>
 
@@ -31,8 +31,8 @@ typedef struct skeleton {
 
 /* ---- open and close ---- */
 
-/* REPLACE: the arguments of your device, all after "module:/path/of/it.so,". What is not understood is
- * refused: a slip of the pen must not leave a limit where it was. */
+/* REPLACE: the arguments of your device, all after "module:/path/of/it.so,". What is not understood
+ * is refused: a slip of the pen must not leave a limit where it was. */
 static hap_status read_arguments(skeleton *device, const char *args, hap_detail *detail)
 {
   static const char key[] = "limit=";
@@ -80,8 +80,8 @@ static void skeleton_close(void *self)
   free(device);
 }
 
-/* REPLACE: what you know of your device; leave at 0 what you do not know, and let hapode-run --identify
- * measure mass, damping, friction, delay and quantum. */
+/* REPLACE: what you know of your device; leave at 0 what you do not know, and let hapode-run
+ * --identify measure mass, damping, friction, delay and quantum. */
 static void skeleton_describe(void *self, hap_device_info *out)
 {
   const skeleton *device = self;
@@ -119,8 +119,8 @@ static void skeleton_stop(void *self)
 
 /* ---- every tick ---- */
 
-/* REPLACE: your kinematics. Counts to metres, in a right-handed frame whose origin is where the grip
- * rests; the velocity is a difference to the read before. */
+/* REPLACE: your kinematics. Counts to metres, in a right-handed frame whose origin is where the
+ * grip rests; the velocity is a difference to the read before. */
 static void pose_from_counts(skeleton *device, int64_t time_ns, const int32_t counts[3])
 {
   double length = 1e-9 * (double)(time_ns - device->read_ns);
@@ -170,8 +170,8 @@ static bool force_shorten(double force[3], double limit)
   return true;
 }
 
-/* REPLACE: your statics. Rounded towards zero, so that rounding goes beyond no limit; reached is what
- * the rounded currents give. */
+/* REPLACE: your statics. Rounded towards zero, so that rounding goes beyond no limit; reached is
+ * what the rounded currents give. */
 static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
 {
   const skeleton *device = self;

@@ -3,8 +3,8 @@
 
 /* ============ REPLACE all of this file by your hardware. ============
  *
- * A toy that lives in real time: a slider of 0.1 kg on each axis, 1 N s/m, stops at 50 mm on both sides.
- * Between two calls it moves as the current of its motor says. */
+ * A toy that lives in real time: a slider of 0.1 kg on each axis, 1 N s/m, stops at 50 mm on both
+ * sides. Between two calls it moves as the current of its motor says. */
 
 #define _POSIX_C_SOURCE 200809L /* clock_gettime */
 

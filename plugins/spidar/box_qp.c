@@ -4,13 +4,15 @@
 
 #include <string.h>
 
-/* Block principal pivoting: all variables that are on the wrong side change over at once, which needs one to
- * four sets. It may go round in circles: as soon as the number of the wrong ones does not fall, a primal active set
- * goes on from where it got to, one variable at a time, downhill, which ends. Judice, Pires, "A block principal
- * pivoting algorithm for large-scale strictly monotone linear complementarity problems", Computers and Operations
- * Research 21(5), 1994; Nocedal, Wright, "Numerical Optimization", 16.5. */
+/* Block principal pivoting: all variables that are on the wrong side change over at once, which
+ * needs one to four sets. It may go round in circles: as soon as the number of the wrong ones does
+ * not fall, a primal active set goes on from where it got to, one variable at a time, downhill,
+ * which ends. Judice, Pires, "A block principal pivoting algorithm for large-scale strictly
+ * monotone linear complementarity problems", Computers and Operations Research 21(5), 1994;
+ * Nocedal, Wright, "Numerical Optimization", 16.5. */
 #define SETS_MAX 100
-/* A variable on its bound whose gradient is 0 is right on both sides; rounding must not decide for ever. */
+/* A variable on its bound whose gradient is 0 is right on both sides; rounding must not decide for
+ * ever. */
 #define ROUNDING 1e-12
 
 static double matrix_entry(const hapi_spidar_box_qp *qp, int row, int column)
@@ -111,8 +113,8 @@ static void bounds_settle(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, doub
   }
 }
 
-/* Goes from x, in the box, towards y until a free variable meets its bound, which is then where it is at.
- * False: none did, x is y. */
+/* Goes from x, in the box, towards y until a free variable meets its bound, which is then where it
+ * is at. False: none did, x is y. */
 static bool go_until_bound(const hapi_spidar_box_qp *qp, const double *y, hapi_spidar_at *at,
                            double *x)
 {
@@ -136,7 +138,8 @@ static bool go_until_bound(const hapi_spidar_box_qp *qp, const double *y, hapi_s
   return met >= 0;
 }
 
-/* Sets the variable free that is drawn into the box the hardest. False: none is, x is the solution. */
+/* Sets the variable free that is drawn into the box the hardest. False: none is, x is the
+ * solution. */
 static bool release_one(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, const double *x)
 {
   double hardest = 0.0;

@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Variable projection: for given unknowns the poses are found by hapi_spidar_solve; what is left of the lengths
- * is then a function of the unknowns alone, whose derivative is that at held poses, projected on what no motion of
- * the grip explains. Golub, Pereyra, SIAM J. Numerical Analysis 10(2), 1973; Kaufman, BIT 15, 1975. */
+/* Variable projection: for given unknowns the poses are found by hapi_spidar_solve; what is left of
+ * the lengths is then a function of the unknowns alone, whose derivative is that at held poses,
+ * projected on what no motion of the grip explains. Golub, Pereyra, SIAM J. Numerical Analysis
+ * 10(2), 1973; Kaufman, BIT 15, 1975. */
 
 #include "plugins/spidar/calibration.h"
 
@@ -131,8 +132,8 @@ static double place_from(const problem *p, const hap_pose *start, const double *
   return solver.residual;
 }
 
-/* From that of the round before, and where this does not fit from the middle of the workspace: samples need not
- * lie on one way, and from another one's pose a search may end elsewhere. */
+/* From that of the round before, and where this does not fit from the middle of the workspace:
+ * samples need not lie on one way, and from another one's pose a search may end elsewhere. */
 static void sample_place(problem *p, size_t index, const double *lengths)
 {
   const hapi_spidar_sample *sample = &p->samples[index];
@@ -223,7 +224,8 @@ static void model_change(const problem *p, const double *step, hapi_spidar_model
   }
 }
 
-/* m, root mean square error of a length: what is left, over what was free to be left; rounding at least. */
+/* m, root mean square error of a length: what is left, over what was free to be left; rounding at
+ * least. */
 static double noise_of(const problem *p, const equations *e, int told)
 {
   double rows = 0.0;
@@ -237,7 +239,8 @@ static double noise_of(const problem *p, const equations *e, int told)
   return rows > told ? fmax(rounding, sqrt(e->cost / (rows - told))) : rounding;
 }
 
-/* Strings that all meet in one point do not tell how the frame is turned either, whatever the dof. */
+/* Strings that all meet in one point do not tell how the frame is turned either, whatever the
+ * dof. */
 static bool arms_differ(const hapi_spidar_model *model)
 {
   bool differ = false;
@@ -262,8 +265,8 @@ static int free_of(const problem *p)
   return p->model.dof == 3 && arms_differ(&p->model) ? 3 : 6;
 }
 
-/* The step down, without the combinations of unknowns that the samples do not tell: the first ones, as the
- * eigenvalues rise. Returns its length. */
+/* The step down, without the combinations of unknowns that the samples do not tell: the first ones,
+ * as the eigenvalues rise. Returns its length. */
 static double find_step(const hapi_spidar_eigen *eigen, const equations *e, int skipped,
                         double damping, double *step)
 {

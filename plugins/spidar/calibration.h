@@ -13,8 +13,8 @@ void hapi_spidar_measure(const hapi_spidar_model *model,
                          const double counts[HAPI_SPIDAR_STRINGS_MAX],
                          double out_lengths[HAPI_SPIDAR_STRINGS_MAX]);
 
-/* [any] The grip is at a known pose, NULL: at home, all strings taut: sets the model's offsets so that the
- * lengths are those of the pose. */
+/* [any] The grip is at a known pose, NULL: at home, all strings taut: sets the model's offsets so
+ * that the lengths are those of the pose. */
 void hapi_spidar_calibrate_at(hapi_spidar_model *model, const hap_pose *pose,
                               const double counts[HAPI_SPIDAR_STRINGS_MAX]);
 
@@ -49,11 +49,11 @@ typedef struct hapi_spidar_calibration {
   double motor_deviation[HAPI_SPIDAR_STRINGS_MAX];  /* m, of the worst axis */
 } hapi_spidar_calibration;
 
-/* [control] From a checked model and samples of all over the workspace, turned all ways. Where the model is not
- * calibrated the first sample is taken as being at home, within some 5 mm, or at its known pose. HAP_ERROR_ARGUMENT
- * with a sentence in detail (may be NULL): too few samples, counts not finite, samples that do not tell what is
- * looked for, or lengths that fit no pose (a slack string); *out then has what was found out for all the
- * figures but model. HAP_ERROR_MEMORY. */
+/* [control] From a checked model and samples of all over the workspace, turned all ways. Where the
+ * model is not calibrated the first sample is taken as being at home, within some 5 mm, or at its
+ * known pose. HAP_ERROR_ARGUMENT with a sentence in detail (may be NULL): too few samples, counts
+ * not finite, samples that do not tell what is looked for, or lengths that fit no pose (a slack
+ * string); *out then has what was found out for all the figures but model. HAP_ERROR_MEMORY. */
 HAP_NODISCARD hap_status hapi_spidar_calibrate(const hapi_spidar_model *model,
                                                const hapi_spidar_sample *samples, size_t count,
                                                unsigned find, hapi_spidar_calibration *out,

@@ -115,8 +115,8 @@ static bool may_begin(const hapi_spidar_cycle *cycle, int place)
   return cycle->begins[place] || (before >= 0 && fits_at(cycle, before));
 }
 
-/* Newest first. Behind a whole cycle there is nothing, or the beginning of the next one: in one with a byte
- * too many or too few something else stands there. */
+/* Newest first. Behind a whole cycle there is nothing, or the beginning of the next one: in one
+ * with a byte too many or too few something else stands there. */
 bool hapi_spidar_cycle_take(hapi_spidar_cycle *cycle, int16_t *out_raw)
 {
   for (int end = cycle->have; end >= cycle->length && cycle->length > 0; --end) {

@@ -5,11 +5,12 @@
 
 /* One exchange with all boards of a line: a CURRENT command to each, a reply of each. Pure.
  *
- * Replies have neither checksum nor number. What is known of a damaged one: the replies of a cycle come
- * in the order of the commands, each begins with its header, their lengths are fixed, nothing comes
- * between them, nothing behind the last but the next cycle, and nothing before the first but a pause or another
- * whole cycle. A cycle of which any of that does not hold is dropped whole: with half of the strings from one tick and half from another the pose is that of
- * neither. After that the steps of the positions are looked at: a string does not jump. */
+ * Replies have neither checksum nor number. What is known of a damaged one: the replies of a cycle
+ * come in the order of the commands, each begins with its header, their lengths are fixed, nothing
+ * comes between them, nothing behind the last but the next cycle, and nothing before the first but
+ * a pause or another whole cycle. A cycle of which any of that does not hold is dropped whole: with
+ * half of the strings from one tick and half from another the pose is that of neither. After that
+ * the steps of the positions are looked at: a string does not jump. */
 
 #include "plugins/spidar/frames.h"
 
@@ -44,12 +45,12 @@ void hapi_spidar_cycle_clear(hapi_spidar_cycle *cycle);
 int hapi_spidar_cycle_commands(const hapi_spidar_cycle *cycle, const int16_t *currents,
                                uint8_t *out);
 
-/* What was received since the push before, of which the first byte is taken to come after a pause. Of more
- * than fits the oldest goes. */
+/* What was received since the push before, of which the first byte is taken to come after a pause.
+ * Of more than fits the oldest goes. */
 void hapi_spidar_cycle_push(hapi_spidar_cycle *cycle, const uint8_t *bytes, int count);
 
-/* Raw positions of the newest whole cycle, in the order of the motors; false: there is none yet. It and
- * all before it are used up. */
+/* Raw positions of the newest whole cycle, in the order of the motors; false: there is none yet. It
+ * and all before it are used up. */
 bool hapi_spidar_cycle_take(hapi_spidar_cycle *cycle, int16_t *out_raw);
 
 /* The first board of which nothing that looks like a reply is among what was received; -1: all seem

@@ -3,7 +3,8 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_EIGEN_H
 #define HAPODE_PLUGINS_SPIDAR_EIGEN_H
 
-/* Eigenvalues of a symmetric matrix by Jacobi's rotations, which find small ones well. Not for the tick. */
+/* Eigenvalues of a symmetric matrix by Jacobi's rotations, which find small ones well. Not for the
+ * tick. */
 
 #define HAPI_SPIDAR_EIGEN_MAX 40
 

@@ -154,7 +154,8 @@ int hapi_spidar_padding(int model, int command)
 
 /* ---- frames and bytes ---- */
 
-/* Number of values that lie in a row of the member: the Jacobian's rows are longer than a board's. */
+/* Number of values that lie in a row of the member: the Jacobian's rows are longer than a
+ * board's. */
 static int row_of(const field *f, const hapi_spidar_kind *kind)
 {
   int count = count_of(f->repeat, kind);

@@ -3,12 +3,12 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_FRAMES_H
 #define HAPODE_PLUGINS_SPIDAR_FRAMES_H
 
-/* What goes over the line of SPIDAR's motor boards: bytes in, frames out. Shared by the device and by its
- * emulator. Nothing here knows a port or a clock.
+/* What goes over the line of SPIDAR's motor boards: bytes in, frames out. Shared by the device and
+ * by its emulator. Nothing here knows a port or a clock.
  *
- * A frame is a header byte, (command << 3) | board, and fields whose number depends on the command and on
- * the model of the board; all fields are little-endian and packed. There is no checksum and no sync
- * byte. Where a header is expected, 0x00 and everything from 0x60 on is padding. */
+ * A frame is a header byte, (command << 3) | board, and fields whose number depends on the command
+ * and on the model of the board; all fields are little-endian and packed. There is no checksum and
+ * no sync byte. Where a header is expected, 0x00 and everything from 0x60 on is padding. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -96,7 +96,8 @@ int hapi_spidar_kind_number(const char *name, size_t length);
 /* Bytes with the header; 0: there is no such frame. model and command may be any. */
 int hapi_spidar_length(int model, int command, hapi_spidar_direction direction);
 
-/* Zero bytes that have to follow a command, so that its reply is over before the next board's begins. */
+/* Zero bytes that have to follow a command, so that its reply is over before the next board's
+ * begins. */
 int hapi_spidar_padding(int model, int command);
 
 static inline uint8_t hapi_spidar_header(int command, int board)
@@ -119,8 +120,8 @@ bool hapi_spidar_decode(const uint8_t *bytes, size_t size, int model,
 
 /* ---- a stream of frames ---- */
 
-/* Cuts a stream by a table of lengths, one for each board: those of SET_CMDLEN are learned by whoever
- * calls. A length of 0 makes a header padding. */
+/* Cuts a stream by a table of lengths, one for each board: those of SET_CMDLEN are learned by
+ * whoever calls. A length of 0 makes a header padding. */
 typedef struct hapi_spidar_cutter {
   uint8_t lengths[HAPI_SPIDAR_BOARDS][HAPI_SPIDAR_COMMANDS]; /* with the header; at most
                                                                 HAPI_SPIDAR_FRAME_MAX */

@@ -38,8 +38,8 @@ void hapi_spidar_guard_finish(hapi_spidar_guard *guard)
   }
 }
 
-/* ---- in the guard: nothing but what a signal handler may call, for other threads of the process that was
- * forked may have held any lock ---- */
+/* ---- in the guard: nothing but what a signal handler may call, for other threads of the process
+ * that was forked may have held any lock ---- */
 
 typedef struct watch {
   int port;
@@ -66,7 +66,8 @@ static void send_zeros(const watch *w)
   }
 }
 
-/* close_range(2) of the kernels that have it, for two calls and not one for each that may be open. */
+/* close_range(2) of the kernels that have it, for two calls and not one for each that may be
+ * open. */
 static void close_between(unsigned first, unsigned last)
 {
   if (first > last || syscall(SYS_close_range, first, last, 0) == 0) {

@@ -3,10 +3,10 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_GUARD_H
 #define HAPODE_PLUGINS_SPIDAR_GUARD_H
 
-/* The boards hold the last current until they are told another one. When the process that drives them is
- * killed, or its loop hangs, nobody tells them: so a second process, made by fork, holds the port open as well
- * and sends zero current as soon as the first one is gone or has not written for a while. It holds nothing
- * else of the first one open, and ends with it. */
+/* The boards hold the last current until they are told another one. When the process that drives
+ * them is killed, or its loop hangs, nobody tells them: so a second process, made by fork, holds
+ * the port open as well and sends zero current as soon as the first one is gone or has not written
+ * for a while. It holds nothing else of the first one open, and ends with it. */
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -34,8 +34,8 @@ typedef struct hapi_spidar_guard {
 bool hapi_spidar_guard_init(hapi_spidar_guard *guard);
 void hapi_spidar_guard_finish(hapi_spidar_guard *guard);
 
-/* [control] Forks. zeros: what takes the force off all boards, at most HAPI_SPIDAR_ZEROS_MAX bytes. stall_s:
- * without a beat for so long while pulling, it sends them. False: there is no guard. */
+/* [control] Forks. zeros: what takes the force off all boards, at most HAPI_SPIDAR_ZEROS_MAX bytes.
+ * stall_s: without a beat for so long while pulling, it sends them. False: there is no guard. */
 bool hapi_spidar_guard_start(hapi_spidar_guard *guard, int port, const uint8_t *zeros, int count,
                              double stall_s);
 

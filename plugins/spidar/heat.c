@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Heat of the motors. Current goes as tension, heat as its square, and leaves through one thermal resistance and
- * capacity. In units of what heat_tension makes in the end: heat_time d share/dt = (tension / heat_tension)^2 -
- * share. */
+/* Heat of the motors. Current goes as tension, heat as its square, and leaves through one thermal
+ * resistance and capacity. In units of what heat_tension makes in the end: heat_time d share/dt =
+ * (tension / heat_tension)^2 - share. */
 
 #include "base/vec.h"
 #include "plugins/spidar/tensions.h"
@@ -18,8 +18,8 @@ void hapi_spidar_heat_init(hapi_spidar_heat *heat, double share)
   }
 }
 
-/* The power that may come in, in units of that of heat_tension: at share 1 just what goes out. step is the length
- * of the next step over heat_time, which must not go beyond 1 either. */
+/* The power that may come in, in units of that of heat_tension: at share 1 just what goes out. step
+ * is the length of the next step over heat_time, which must not go beyond 1 either. */
 static double allowed_power(const hapi_spidar_model *model, double share, double step)
 {
   double most = model->max_tension / model->heat_tension;

@@ -10,11 +10,11 @@
 #define STEPS_ALONE 24   /* of one string left out */
 #define STEP_MAX 0.01    /* m */
 #define TURN_MAX 0.3     /* rad, of a step */
-/* m. After a step of this size what is left is below 1/50 of a count: 1/100 of the step by the damping, its
- * square over some 50 mm by the curvature. */
+/* m. After a step of this size what is left is below 1/50 of a count: 1/100 of the step by the
+ * damping, its square over some 50 mm by the curvature. */
 #define STILL 2e-5
-/* Damping over the gradient: leaves a share of step / (10 TURN_LENGTH) of the way, which vanishes with it,
- * as the error of the linearisation does. */
+/* Damping over the gradient: leaves a share of step / (10 TURN_LENGTH) of the way, which vanishes
+ * with it, as the error of the linearisation does. */
 #define DAMPING (0.1 / TURN_LENGTH)
 #define DAMPING_MOST 1e6
 #define FLOOR 1e-12 /* of the matrix: it can be inverted where the strings fail to tell the pose */
@@ -189,8 +189,8 @@ static void pose_confine(const hapi_spidar_solver *solver, hap_pose *pose)
   }
 }
 
-/* The turn by a vector v is taken as (1, v/2), normalised: a small step needs no sine, and none is lost
- * where the steps end. */
+/* The turn by a vector v is taken as (1, v/2), normalised: a small step needs no sine, and none is
+ * lost where the steps end. */
 static void pose_move(const hapi_spidar_solver *solver, const hapi_spidar_model *model,
                       const double step[6], hap_pose *pose)
 {
@@ -241,7 +241,8 @@ static bool is_outside(const hapi_spidar_solver *solver, const hapi_spidar_model
   return outside;
 }
 
-/* The box of the motors, and that of home and the workspace, which lie beside the motors in some. */
+/* The box of the motors, and that of home and the workspace, which lie beside the motors in
+ * some. */
 static void set_box(hapi_spidar_solver *solver, const hapi_spidar_model *model)
 {
   for (int axis = 0; axis < 3; ++axis) {

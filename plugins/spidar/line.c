@@ -39,8 +39,8 @@ static bool is_board(const hapi_spidar_frame *frame)
   return frame->info[2] == kind->motors && frame->info[4] == kind->forces;
 }
 
-/* The model that a board of that id tells somewhere in these bytes; 0: it does not. Replies to what was sent
- * before, and garbage of boards that were just switched on, may be among them. */
+/* The model that a board of that id tells somewhere in these bytes; 0: it does not. Replies to what
+ * was sent before, and garbage of boards that were just switched on, may be among them. */
 static int find_answer(const uint8_t *bytes, int count, int id)
 {
   hapi_spidar_frame frame;

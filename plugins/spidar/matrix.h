@@ -3,8 +3,8 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_MATRIX_H
 #define HAPODE_PLUGINS_SPIDAR_MATRIX_H
 
-/* Symmetric positive definite systems of up to HAPI_SPIDAR_ORDER_MAX unknowns. Only the lower triangle is
- * read and written. */
+/* Symmetric positive definite systems of up to HAPI_SPIDAR_ORDER_MAX unknowns. Only the lower
+ * triangle is read and written. */
 
 #include <math.h>
 #include <stdbool.h>

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The built-in models. Points are written in millimetres, and divided so that each is the double nearest
- * to it, as a geometry file gives it. */
+/* The built-in models. Points are written in millimetres, and divided so that each is the double
+ * nearest to it, as a geometry file gives it. */
 
 #include "plugins/spidar/model.h"
 
@@ -19,7 +19,8 @@
  * which the boards' own heat limit sums. */
 #define HEAT_SHARE 0.5
 #define HEAT_TIME 20.0
-/* Of 1 N at the middle of the workspace 0.97 N and more are reached in all directions (t1 needs less). */
+/* Of 1 N at the middle of the workspace 0.97 N and more are reached in all directions (t1 needs
+ * less). */
 #define SPREAD 0.0075
 
 /* Signs of eight figures of one size. */

@@ -5,7 +5,8 @@
 
 /* What a string device is made of. Frame of the device: x right, y up, z towards the user, origin
  * where the grip's origin rests at home with its axes along those of the frame. Motors, strings and
- * all arrays by string have the same order. docs/spidar.md, "Models", says where the figures are from. */
+ * all arrays by string have the same order. docs/spidar.md, "Models", says where the figures are
+ * from. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -53,26 +54,27 @@ typedef struct hapi_spidar_model {
   double heat_tension; /* N, that the motor bears for ever, > min_tension */
   double heat_time;    /* s, its thermal time constant */
 
-  /* Of the mechanism, motors and all, as felt at the grip; 0: not known. No maker publishes them. */
+  /* Of the mechanism, motors and all, as felt at the grip; 0: not known. No maker publishes
+   * them. */
   double mass;     /* kg */
   double damping;  /* N s/m */
   double friction; /* N, Coulomb */
 } hapi_spidar_model;
 
-/* [any] A built-in model by its name, in any case of letters: x4r, x4l, x5r, x5l, t1, x3r, x3r4. NULL: there
- * is none of that name. */
+/* [any] A built-in model by its name, in any case of letters: x4r, x4l, x5r, x5l, t1, x3r, x3r4.
+ * NULL: there is none of that name. */
 const hapi_spidar_model *hapi_spidar_model_find(const char *name);
 
 /* [any] Built-in models by number, from 0; NULL behind the last one. */
 const hapi_spidar_model *hapi_spidar_model_at(size_t index);
 
-/* [any] What a file that says nothing about it has: all below the tensions in hapi_spidar_model, made from
- * strings, dof, points and tensions, which must be there. */
+/* [any] What a file that says nothing about it has: all below the tensions in hapi_spidar_model,
+ * made from strings, dof, points and tensions, which must be there. */
 void hapi_spidar_model_default(hapi_spidar_model *model);
 
-/* [control] HAP_ERROR_FORMAT with a sentence in detail (may be NULL): a figure is out of its range or not
- * finite, two strings are the same, or the strings do not tell the pose everywhere in the workspace.
- * All that uses a model relies on this. */
+/* [control] HAP_ERROR_FORMAT with a sentence in detail (may be NULL): a figure is out of its range
+ * or not finite, two strings are the same, or the strings do not tell the pose everywhere in the
+ * workspace. All that uses a model relies on this. */
 HAP_NODISCARD hap_status hapi_spidar_model_check(const hapi_spidar_model *model,
                                                  hap_detail *detail);
 
@@ -81,8 +83,8 @@ HAP_NODISCARD hap_status hapi_spidar_model_check(const hapi_spidar_model *model,
 HAP_NODISCARD hap_status hapi_spidar_model_read(const char *path, hapi_spidar_model *out,
                                                 hap_detail *detail);
 
-/* [control] Checks the model and writes it in the form that is read, with nine digits; a file that was there
- * is replaced when the new one is whole, else stays. HAP_ERROR_IO, HAP_ERROR_FORMAT. */
+/* [control] Checks the model and writes it in the form that is read, with nine digits; a file that
+ * was there is replaced when the new one is whole, else stays. HAP_ERROR_IO, HAP_ERROR_FORMAT. */
 HAP_NODISCARD hap_status hapi_spidar_model_write(const char *path, const hapi_spidar_model *model,
                                                  hap_detail *detail);
 

@@ -163,8 +163,8 @@ static bool pose_is_told(const hapi_spidar_model *m, const hap_pose *pose)
   return hapi_spidar_cholesky(h, m->dof);
 }
 
-/* A grid of GRID points to each side over the workspace; not turned, and half and wholly turned about the 26
- * directions to faces, edges and corners of a cube. */
+/* A grid of GRID points to each side over the workspace; not turned, and half and wholly turned
+ * about the 26 directions to faces, edges and corners of a cube. */
 static void sample_at(const hapi_spidar_model *m, int index, hap_pose *out)
 {
   double axis[3];

@@ -189,8 +189,8 @@ static void set_limits(hapi_spidar_device *device, const hapi_argument *entries)
   }
 }
 
-/* Zeros before the commands end one that was cut in the middle of its currents: else the next header would be
- * taken for a current, and a great one. */
+/* Zeros before the commands end one that was cut in the middle of its currents: else the next
+ * header would be taken for a current, and a great one. */
 static void prepare_zeros(hapi_spidar_device *device)
 {
   const int16_t none[HAPI_SPIDAR_CYCLE_MOTORS] = {0};

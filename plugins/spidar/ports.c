@@ -11,8 +11,8 @@
 
 #include "plugins/spidar/serial.h"
 
-/* Bytes are sent to a port that is looked at, so only those of USB adapters are: whatever else there is may
- * be a console or a modem. */
+/* Bytes are sent to a port that is looked at, so only those of USB adapters are: whatever else
+ * there is may be a console or a modem. */
 
 #ifdef HAPODE_LIBSERIALPORT
 

@@ -17,8 +17,8 @@ static uint32_t place_of(const hapi_spidar_rates *rates, uint32_t age)
   return (rates->newest + HAPI_SPIDAR_RATES_SAMPLES - age) % HAPI_SPIDAR_RATES_SAMPLES;
 }
 
-/* Intervals over which the line from the newest sample to the oldest one stays within a count of all between: the
- * slopes that are left are narrowed down sample by sample. */
+/* Intervals over which the line from the newest sample to the oldest one stays within a count of
+ * all between: the slopes that are left are narrowed down sample by sample. */
 static uint32_t find_window(const double *way, const double *per_s, uint32_t count)
 {
   double low = -HUGE_VAL;

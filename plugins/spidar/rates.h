@@ -3,11 +3,12 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_RATES_H
 #define HAPODE_PLUGINS_SPIDAR_RATES_H
 
-/* Rates of the strings from their counts. The rounding of a count is known exactly, that of a pose is not: so
- * the windows are taken here, string by string, and the twist comes from the rates by hapi_spidar_twist. For each
- * string the longest window over which a straight line stays within a count of every sample, and the slope of the
- * line of least squares in it: short when the motion turns, long when it is slow. Janabi-Sharifi, Hayward, Chen,
- * IEEE Trans. Control Systems Technology 8(6), 2000. Pure: no heap, no lock, no system call, bounded time. */
+/* Rates of the strings from their counts. The rounding of a count is known exactly, that of a pose
+ * is not: so the windows are taken here, string by string, and the twist comes from the rates by
+ * hapi_spidar_twist. For each string the longest window over which a straight line stays within a
+ * count of every sample, and the slope of the line of least squares in it: short when the motion
+ * turns, long when it is slow. Janabi-Sharifi, Hayward, Chen, IEEE Trans. Control Systems
+ * Technology 8(6), 2000. Pure: no heap, no lock, no system call, bounded time. */
 
 #include <stdint.h>
 
@@ -25,9 +26,9 @@ typedef struct hapi_spidar_rates {
 /* Forgets all samples. */
 void hapi_spidar_rates_reset(hapi_spidar_rates *rates);
 
-/* Takes the unwrapped counts that were read at time_ns and gives the rates of the lengths [m/s] there; zero after
- * the first sample. Counts at the time of those before take their place; a time that goes back, and a count that is
- * not finite, make it begin anew. */
+/* Takes the unwrapped counts that were read at time_ns and gives the rates of the lengths [m/s]
+ * there; zero after the first sample. Counts at the time of those before take their place; a time
+ * that goes back, and a count that is not finite, make it begin anew. */
 void hapi_spidar_rates_update(hapi_spidar_rates *rates, const hapi_spidar_model *model,
                               int64_t time_ns, const double counts[HAPI_SPIDAR_STRINGS_MAX],
                               double out_rates[HAPI_SPIDAR_STRINGS_MAX]);

@@ -9,8 +9,9 @@
 
 #define HAPI_SPIDAR_PATH_MAX 256
 
-/* The descriptor has the same number from init to finish, with /dev/null behind it while no port is open: a
- * signal handler may write to it at any time and reaches the port or nothing, never another file. */
+/* The descriptor has the same number from init to finish, with /dev/null behind it while no port is
+ * open: a signal handler may write to it at any time and reaches the port or nothing, never another
+ * file. */
 typedef struct hapi_spidar_serial {
   int fd;
   char path[HAPI_SPIDAR_PATH_MAX];
@@ -19,13 +20,14 @@ typedef struct hapi_spidar_serial {
 HAP_NODISCARD hap_status hapi_spidar_serial_init(hapi_spidar_serial *serial, hap_detail *detail);
 void hapi_spidar_serial_finish(hapi_spidar_serial *serial);
 
-/* [control] Opens path for this process alone. HAP_ERROR_DEVICE with what is wrong and what to do; what
- * was open before stays open. Waits up to 0.5 s for another process to let go of it. */
+/* [control] Opens path for this process alone. HAP_ERROR_DEVICE with what is wrong and what to do;
+ * what was open before stays open. Waits up to 0.5 s for another process to let go of it. */
 HAP_NODISCARD hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path,
                                                  hap_detail *detail);
 void hapi_spidar_serial_shut(hapi_spidar_serial *serial);
 
-/* Its functions work on *serial. send and receive are those of a tick: one write(2), one read(2). */
+/* Its functions work on *serial. send and receive are those of a tick: one write(2), one
+ * read(2). */
 void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out);
 
 /* [any, also a signal handler] Tries a few times when the port is being written to. */
@@ -36,8 +38,8 @@ int hapi_spidar_serial_latency(const char *path);
 
 /* ---- ports.c ---- */
 
-/* [control] Serial ports that a SPIDAR may be on, by number from 0, in path of HAPI_SPIDAR_PATH_MAX.
- * False: no more. The environment's HAPODE_SPIDAR_PORT comes first. */
+/* [control] Serial ports that a SPIDAR may be on, by number from 0, in path of
+ * HAPI_SPIDAR_PATH_MAX. False: no more. The environment's HAPODE_SPIDAR_PORT comes first. */
 bool hapi_spidar_port_at(int index, char *path);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The device SPIDAR. A tick sends the currents of its write and takes, without waiting, what the boards
- * answered to those of the tick before: their positions of that moment. */
+/* The device SPIDAR. A tick sends the currents of its write and takes, without waiting, what the
+ * boards answered to those of the tick before: their positions of that moment. */
 
 #include "plugins/spidar/spidar.h"
 
@@ -38,7 +38,8 @@ static void set_cause(hapi_spidar_device *device, hapi_spidar_cause cause)
 
 /* ---- currents ---- */
 
-/* The zero of another thread may have come between the decision for these currents and their way out. */
+/* The zero of another thread may have come between the decision for these currents and their way
+ * out. */
 static int send_currents(hapi_spidar_device *device)
 {
   int sent = hapi_spidar_line_send(&device->line, device->current);
@@ -55,8 +56,8 @@ static int send_none(hapi_spidar_device *device)
   return hapi_spidar_line_send(&device->line, none);
 }
 
-/* What rounding leaves over is added to the next tick's, so that on the mean the tensions are those wanted: steps
- * of 0.01 N at some 500 Hz are not felt, an error of all strings that lasts is. */
+/* What rounding leaves over is added to the next tick's, so that on the mean the tensions are those
+ * wanted: steps of 0.01 N at some 500 Hz are not felt, an error of all strings that lasts is. */
 static void tensions_convert(hapi_spidar_device *device, const double *tension)
 {
   for (int i = 0; i < device->model.strings; ++i) {
@@ -96,7 +97,8 @@ static hapi_spidar_fit solve_pose(hapi_spidar_device *device)
   return hapi_spidar_solve(&device->solver, &device->model, lengths);
 }
 
-/* At the times of the reads, so that poses and twists are of one motion, whatever the port delays. */
+/* At the times of the reads, so that poses and twists are of one motion, whatever the port
+ * delays. */
 static void update_twist(hapi_spidar_device *device, int64_t time_ns)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
@@ -240,8 +242,8 @@ static bool strings_pull(hapi_spidar_device *device, const hap_wrench *wanted, h
   }
   hapi_spidar_heat_step(&device->heat, &device->model, device->tensions.tension, passed,
                         device->tensions.most);
-  /* From no tension at once: some strings later than others would be a force in another direction, and
-   * who zeroed brings the force back slowly. */
+  /* From no tension at once: some strings later than others would be a force in another direction,
+   * and who zeroed brings the force back slowly. */
   device->tensions.seconds = slack ? 0.0 : passed;
   hap_status status = hapi_spidar_tensions_solve(&device->tensions, &device->model,
                                                  &device->solver.pose, wanted, tension, reached);
@@ -266,8 +268,8 @@ static void lower_zero(hapi_spidar_device *device)
   atomic_store(&device->zeroed, false);
 }
 
-/* What the tensions give, turned to the device's frame. Of no wrench at all the little that the least tensions
- * leave is not told as a force; a geometry in which they do not balance is told. */
+/* What the tensions give, turned to the device's frame. Of no wrench at all the little that the
+ * least tensions leave is not told as a force; a geometry in which they do not balance is told. */
 static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
                          const hap_wrench *given)
 {
@@ -373,7 +375,8 @@ static bool begin_line(hapi_spidar_device *device)
          HAP_OK;
 }
 
-/* Winds the strings in by the least tension, which is about no force at home, and looks where they are. */
+/* Winds the strings in by the least tension, which is about no force at home, and looks where they
+ * are. */
 static bool strings_tauten(hapi_spidar_device *device)
 {
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -394,8 +397,8 @@ static bool strings_tauten(hapi_spidar_device *device)
   return good;
 }
 
-/* Boards count in 16 bits, so of all that a count may be it is the one whose length is nearest to that at
- * home: strings are shorter than a wrap. */
+/* Boards count in 16 bits, so of all that a count may be it is the one whose length is nearest to
+ * that at home: strings are shorter than a wrap. */
 static void unwrap_counts(hapi_spidar_device *device)
 {
   hap_pose home;
@@ -520,7 +523,8 @@ static hap_status spidar_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-/* A force acts when its command has gone out; a read tells the positions of when the tick before asked. */
+/* A force acts when its command has gone out; a read tells the positions of when the tick before
+ * asked. */
 static double delay_of(const hapi_spidar_device *device)
 {
   return PERIOD_S + BYTE_S * (device->zero_count - HAPI_SPIDAR_ZEROS_BEFORE);

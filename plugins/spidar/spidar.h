@@ -3,7 +3,8 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_SPIDAR_H
 #define HAPODE_PLUGINS_SPIDAR_SPIDAR_H
 
-/* The device: open.c finds the port and the boards and reads the arguments, spidar.c does the ticks. */
+/* The device: open.c finds the port and the boards and reads the arguments, spidar.c does the
+ * ticks. */
 
 #include <hapode/device_impl.h>
 
@@ -63,13 +64,14 @@ typedef struct hapi_spidar_device {
   hap_wrench held;                      /* in the device's frame */
 } hapi_spidar_device;
 
-/* [control] open.c: reads the arguments, finds port and boards. On failure everything is to be closed by
- * hapi_spidar_release. */
+/* [control] open.c: reads the arguments, finds port and boards. On failure everything is to be
+ * closed by hapi_spidar_release. */
 HAP_NODISCARD hap_status hapi_spidar_configure(hapi_spidar_device *device, const char *args,
                                                hap_detail *detail);
 void hapi_spidar_release(hapi_spidar_device *device);
 
-/* [control] At the next start the grip is at home, whatever a file said. Not while it is started. */
+/* [control] At the next start the grip is at home, whatever a file said. Not while it is
+ * started. */
 void hapi_spidar_forget_home(hapi_spidar_device *device);
 
 extern const hap_device_ops hapi_spidar_ops;

@@ -52,8 +52,8 @@ static void set_matrix(const hapi_spidar_model *model, const hapi_spidar_rows *r
   }
 }
 
-/* What the string may do now. The rate goes before min_tension, which a string comes to from below at the
- * start, and after most, which is there to save a motor. */
+/* What the string may do now. The rate goes before min_tension, which a string comes to from below
+ * at the start, and after most, which is there to save a motor. */
 static void set_box(const hapi_spidar_tensions *state, const hapi_spidar_model *model,
                     hapi_spidar_box_qp *qp)
 {

@@ -61,7 +61,8 @@ static double stopping_share(const double velocity[2], const double slope[2], do
   return 0.5 * (low + high);
 }
 
-/* Moves the axis against the friction until the rest is over or it stops; true in the first case. */
+/* Moves the axis against the friction until the rest is over or it stops; true in the first
+ * case. */
 static bool axis_slide(hapi_hand *hand, int axis, double braked_by, unspent *rest)
 {
   double start = hand->position[axis];

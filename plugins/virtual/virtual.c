@@ -422,8 +422,8 @@ static void spin_matrix(const double x[3], double out[9])
   out[7] += first * x[0];
 }
 
-/* The handle's turning over a step: as the hand's motion, in rotation vectors. The torque that acts on
- * them is J^T times the device's, so that both do the same work. */
+/* The handle's turning over a step: as the hand's motion, in rotation vectors. The torque that acts
+ * on them is J^T times the device's, so that both do the same work. */
 static void turn_hand(virtual_device *device, double from, double length)
 {
   hapi_hand_target target = {0};
@@ -511,7 +511,8 @@ static void kick_hand(virtual_device *device, uint64_t now_ns)
   }
 }
 
-/* From the read at before_ns to the newest one, cut where a command begins to act and at the kick. */
+/* From the read at before_ns to the newest one, cut where a command begins to act and at the
+ * kick. */
 static void device_move(virtual_device *device, uint64_t before_ns)
 {
   uint64_t now_ns = device->timeline.elapsed_ns;

@@ -24,8 +24,8 @@ def main(root):
         lint.skip_all("needs cppcheck")
     tap = lint.Tap()
     for folder in FOLDERS:
-        run = subprocess.run(["cppcheck", *OPTIONS, "-I", "include", "-I", "lib", "-I", ".", folder],
-                             cwd=root, capture_output=True, text=True)
+        command = ["cppcheck", *OPTIONS, "-I", "include", "-I", "lib", "-I", ".", folder]
+        run = subprocess.run(command, cwd=root, capture_output=True, text=True)
         said = run.stderr.splitlines() + run.stdout.splitlines()
         said = [] if run.returncode == 0 else said or [f"cppcheck: exit status {run.returncode}"]
         tap.point(f"cppcheck, {folder}", said)

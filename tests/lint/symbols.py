@@ -67,7 +67,8 @@ def undocumented(header, text):
     opaque = set(OPAQUE.findall(text))
     for match in OTHER.finditer(text):
         line = text[match.start():text.find("\n", match.end())]
-        if match.group(1) not in opaque and "/*" not in line and not comment_before(text, match.start()):
+        commented = "/*" in line or comment_before(text, match.start())
+        if match.group(1) not in opaque and not commented:
             yield f"{header}: {match.group(1)}"
     seen = set()
     for match in MACRO.finditer(text):

@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_CONFORM_H
 #define HAPODE_TOOLS_CONFORM_H
 
-/* Holds a device against the contract of hapode/device_impl.h, point by point. It knows nothing about
- * the particular device. docs/writing-a-device.md lists the points. */
+/* Holds a device against the contract of hapode/device_impl.h, point by point. It knows nothing
+ * about the particular device. docs/writing-a-device.md lists the points. */
 
 #include <stdbool.h>
 #include <stdio.h>
@@ -24,7 +24,8 @@ typedef struct conform_options {
 #define CONFORM_FORCE_DEFAULT 0.3
 
 /* Test Anything Protocol on out, warnings on stderr. True: every point holds. It does not come back
- * when a function of the device does not: then the force is taken off and the process ends with 1. */
+ * when a function of the device does not: then the force is taken off and the process ends with
+ * 1. */
 bool conform_run(const conform_options *options, FILE *out);
 
 #endif

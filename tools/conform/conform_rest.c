@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the library itself refuses when it opens a device (ABI, names, pacing, limits that are not finite)
- * is not looked at again. */
+/* What the library itself refuses when it opens a device (ABI, names, pacing, limits that are not
+ * finite) is not looked at again. */
 
 void conform_describe(conform *c)
 {

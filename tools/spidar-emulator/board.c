@@ -254,7 +254,8 @@ static int16_t word_read(const uint8_t *bytes)
   return (int16_t)(uint16_t)(bytes[0] | bytes[1] << 8);
 }
 
-/* Position control goes to the newest target at once; only its signs and sizes are the firmware's. */
+/* Position control goes to the newest target at once; only its signs and sizes are the
+ * firmware's. */
 static int16_t motor_control(const board *b, int motor, int motors)
 {
   const uint8_t *gains = b->parameters[HAPI_SPIDAR_PARAMETER_PD];

@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_SPIDAR_BOARD_H
 #define HAPODE_TOOLS_SPIDAR_BOARD_H
 
-/* One motor board: what it does with the bytes of the command line, and when it answers. It knows no
- * clock and no strings; times are told, in s, and never go back. */
+/* One motor board: what it does with the bytes of the command line, and when it answers. It knows
+ * no clock and no strings; times are told, in s, and never go back. */
 
 #include "plugins/spidar/frames.h"
 
@@ -69,8 +69,8 @@ void board_init(board *b, int id, int model, int32_t counts);
 /* Control ticks a second. */
 double board_tick_hz(const board *b);
 
-/* A byte of the command line. True: *out is a reply, of which the bytes come every BOARD_BYTE_S from
- * out->start on. */
+/* A byte of the command line. True: *out is a reply, of which the bytes come every BOARD_BYTE_S
+ * from out->start on. */
 bool board_receive(board *b, uint8_t byte, double time, board_reply *out);
 
 /* Executes what is due. */

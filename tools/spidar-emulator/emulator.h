@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_SPIDAR_EMULATOR_H
 #define HAPODE_TOOLS_SPIDAR_EMULATOR_H
 
-/* A SPIDAR with its boards and a hand that holds it, in simulated time: bytes in, bytes out. Without
- * a port and without a clock, so that a test drives it as it likes. */
+/* A SPIDAR with its boards and a hand that holds it, in simulated time: bytes in, bytes out.
+ * Without a port and without a clock, so that a test drives it as it likes. */
 
 #include "plugins/virtual/motion.h"
 #include "tools/spidar-emulator/grip.h"
@@ -26,8 +26,8 @@ typedef struct emulator_def {
   int board_id[HAPI_SPIDAR_BOARDS];
   int32_t first_count; /* of all encoders at power-on */
   emulator_hand hand;
-  const char
-      *path; /* of the hand, "T:x/y/z;...", m from home, repeated; NULL: to and fro along x */
+  /* of the hand, "T:x/y/z;...", m from home, repeated; NULL: to and fro along x */
+  const char *path;
   const char *turn; /* of the hand, the same with rotation vectors in rad; NULL: not turned */
 } emulator_def;
 
@@ -81,8 +81,8 @@ typedef struct emulator {
   int event_next;
 } emulator;
 
-/* HAP_ERROR_ARGUMENT: the boards do not have as many motors as the model has strings, or the path is
- * wrong; HAP_ERROR_MEMORY. */
+/* HAP_ERROR_ARGUMENT: the boards do not have as many motors as the model has strings, or the path
+ * is wrong; HAP_ERROR_MEMORY. */
 HAP_NODISCARD hap_status emulator_init(emulator *e, const emulator_def *def, hap_detail *detail);
 void emulator_finish(emulator *e);
 
@@ -94,7 +94,8 @@ static inline double emulator_time(const emulator *e)
 /* Goes on to time, in whole steps. */
 void emulator_advance(emulator *e, double time);
 
-/* Bytes from the host, at a time not before emulator_time; bytes to it. Unplugged, they are lost. */
+/* Bytes from the host, at a time not before emulator_time; bytes to it. Unplugged, they are
+ * lost. */
 void emulator_write(emulator *e, const uint8_t *bytes, int count, double time);
 int emulator_read(emulator *e, double time, uint8_t *out, int size);
 

@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_SPIDAR_GRIP_H
 #define HAPODE_TOOLS_SPIDAR_GRIP_H
 
-/* The mechanics of a SPIDAR: a grip, strings that pull and never push, and the motors that wind them.
- * SI units, frame of the model. */
+/* The mechanics of a SPIDAR: a grip, strings that pull and never push, and the motors that wind
+ * them. SI units, frame of the model. */
 
 #include "plugins/spidar/kinematics.h"
 
@@ -18,8 +18,8 @@ typedef struct grip_def {
   double rotor_damping;           /* N s/m */
 } grip_def;
 
-/* Round numbers: a grip of 60 g, thin strings of polyethylene, small motors that are driven by a voltage and so
- * are brakes without one. */
+/* Round numbers: a grip of 60 g, thin strings of polyethylene, small motors that are driven by a
+ * voltage and so are brakes without one. */
 void grip_def_init(grip_def *def, const hapi_spidar_model *model);
 
 typedef struct grip {

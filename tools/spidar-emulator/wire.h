@@ -3,8 +3,8 @@
 #ifndef HAPODE_TOOLS_SPIDAR_WIRE_H
 #define HAPODE_TOOLS_SPIDAR_WIRE_H
 
-/* The two lines between the host and up to 8 boards, byte by byte: commands to all of them, replies of
- * whoever drives the reply line. Faults go in here. No clock: times are told, in s. */
+/* The two lines between the host and up to 8 boards, byte by byte: commands to all of them, replies
+ * of whoever drives the reply line. Faults go in here. No clock: times are told, in s. */
 
 #include "tools/spidar-emulator/board.h"
 
@@ -48,8 +48,8 @@ void wire_init(wire *w); /* no boards */
 /* False: no room for it. */
 bool wire_add_fault(wire *w, const wire_fault *fault);
 
-/* A byte that the host gave to its port at that time; it takes BOARD_BYTE_S on the line, behind those
- * before it. */
+/* A byte that the host gave to its port at that time; it takes BOARD_BYTE_S on the line, behind
+ * those before it. */
 void wire_from_host(wire *w, uint8_t byte, double time);
 
 /* Noise on the reply line. */
@@ -61,8 +61,8 @@ int wire_to_host(wire *w, double time, uint8_t *out, int size);
 /* When the next byte reaches the host; < 0: none is under way. */
 double wire_next(const wire *w);
 
-/* When the last byte does of those that come within length [s] of the next one: what an adapter that collects
- * bytes for so long hands on at once; < 0: none is under way. */
+/* When the last byte does of those that come within length [s] of the next one: what an adapter
+ * that collects bytes for so long hands on at once; < 0: none is under way. */
 double wire_packet(const wire *w, double length);
 
 #endif

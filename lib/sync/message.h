@@ -1,0 +1,72 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SYNC_MESSAGE_H
+#define HAPODE_SYNC_MESSAGE_H
+
+/* What several messages between threads have in common. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/record.h>
+#include <hapode/session.h>
+#include <hapode/spatial.h>
+
+#include "base/assert.h"
+
+#define HAPI_SLOT_NONE 0xffffffffu
+
+typedef struct hapi_capacity {
+  uint32_t bodies; /* slots: those of the range, and as many again around it */
+  uint32_t contacts;
+  uint32_t pointers;
+  uint32_t geoms;        /* near the pointers */
+  uint32_t hull_points;  /* of all hulls together */
+  uint32_t trail_rows;   /* 0: none are kept */
+  uint32_t trail_stride; /* ticks from row to row */
+  uint32_t joints;       /* between bodies of the range */
+  uint32_t tool_points;  /* contacts of pointers that are hulls */
+  uint32_t crosses;      /* cross accelerances; 0: none are measured */
+  uint32_t path_rows;    /* 0: none are kept */
+} hapi_capacity;
+
+#define HAPI_TOOL_POINTS_MAX 64u /* vertices of a pointer's hull */
+
+/* A pointer's hull, in the pointer's frame. */
+typedef struct hapi_tool_hull {
+  uint32_t count; /* 0: the pointer is a sphere */
+  double points[HAPI_TOOL_POINTS_MAX][3];
+} hapi_tool_hull;
+
+/* Defines function(message), which gives the array that lies offset bytes behind the message's
+ * begin. */
+#define HAPI_MESSAGE_ARRAY(function, message, element, offset) \
+  static inline element *function(message *m)                  \
+  {                                                            \
+    HAPI_ASSERT(m->offset >= sizeof *m);                       \
+    return (element *)(void *)((char *)m + m->offset);         \
+  }
+
+enum {
+  HAPI_BODY_DRIVEN = 1,  /* moved by the application: keeps its twist, feels no force */
+  HAPI_BODY_RESTING = 2, /* asleep in the world: does not move until it is pushed */
+  HAPI_BODY_FOLLOWS = 4, /* not pushed in the interval before: the world's state is better */
+  /* Model CONTACT: the loop moves the body, ODE takes its state from the loop. A body that is not
+   * OWNED, DRIVEN or MEASURED is outside of the range: it keeps its twist, and ODE gets what the
+   * loop gave to it. */
+  HAPI_BODY_OWNED = 8,
+  HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
+  HAPI_BODY_GYROSCOPIC = 32,
+  HAPI_BODY_TOUCHED = 64, /* of the loop's message: a contact carried it in this tick */
+  /* Of an OWNED one: nothing can touch it before the next sync, so it waits for no contacts. */
+  HAPI_BODY_ALONE = 256,
+  /* Of a MEASURED one: all its rows go by response; else those of its only pointer contact by that
+   * contact's a. */
+  HAPI_BODY_WHOLE = 128
+};
+
+/* A slower body gets no gyroscopic term, which would change its rotation in a tick by a
+ * millionth. */
+#define HAPI_SPIN_LEAST 1e-3 /* rad/s */
+
+#endif

@@ -1,0 +1,65 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SYNC_PATCHES_H
+#define HAPODE_SYNC_PATCHES_H
+
+/* contact -> haptic: contacts between bodies (model CONTACT). */
+
+#include "proximity/patch.h"
+#include "sync/message.h"
+#include "sync/surface.h"
+
+/* A point of hapi_patch in the frames of its two bodies; the loop places it anew at every tick.
+ * Static world: world frame. */
+typedef struct hapi_patch_contact {
+  uint64_t key; /* of the pair; contacts of a pair follow each other */
+  uint32_t body_a;
+  uint32_t generation_a;
+  uint32_t body_b; /* HAPI_SLOT_NONE: static world */
+  uint32_t generation_b;
+  uint32_t surface; /* index into the message's surfaces */
+  hapi_touch touch;
+  hapi_slide slide;
+  double core_a[3];
+  double core_b[3];
+  double normal[3]; /* from b to a: frame of the face's body; EDGES: world, for the sign */
+  double ball_a;
+  double ball_b;
+  double rim_a;
+  double rim_b;
+  /* For some contacts only: last, so that a tick over a thousand contacts need not load them. */
+  double axis_a[3]; /* of the rims */
+  double axis_b[3];
+  double edge_a[3]; /* EDGES and slides */
+  double edge_b[3];
+  hapi_shape shape; /* BALL: what the ball touches */
+  hap_pose shape_pose;
+} hapi_patch_contact;
+
+/* A point of a patch between a pointer's hull (a) and a geom of a body (b). Side a is in the
+ * pointer's frame. */
+typedef struct hapi_tool_point {
+  uint32_t pointer;
+  uint32_t pointer_generation;
+  double same_within; /* m, pointer's frame: a new point matches an old one nearer than this */
+  double mu;          /* friction of the pointer against the geom; 0: none */
+  hapi_patch_contact at;
+} hapi_tool_point;
+
+typedef struct hapi_patches {
+  uint64_t number;       /* 1, 2, 3 ... */
+  uint64_t model_number; /* of the hapi_near that it was made from */
+  int64_t valid_from_ns; /* the loop uses the message from this time on */
+  uint32_t contact_count;
+  uint32_t surface_count;
+  uint32_t tool_count; /* of pointers that are hulls; those of a key follow each other */
+  uint32_t contacts_offset;
+  uint32_t surfaces_offset;
+  uint32_t tools_offset;
+} hapi_patches;
+
+HAPI_MESSAGE_ARRAY(hapi_patches_contacts, hapi_patches, hapi_patch_contact, contacts_offset)
+HAPI_MESSAGE_ARRAY(hapi_patches_surfaces, hapi_patches, hapi_surface, surfaces_offset)
+HAPI_MESSAGE_ARRAY(hapi_patches_tools, hapi_patches, hapi_tool_point, tools_offset)
+
+#endif

@@ -1,0 +1,90 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SYNC_STATE_H
+#define HAPODE_SYNC_STATE_H
+
+/* haptic -> physics: the state of the loop after a tick. */
+
+#include "sync/message.h"
+
+typedef struct hapi_state_pointer {
+  uint32_t generation; /* 0: no pointer here */
+  uint32_t collide_bits;
+  double radius;
+  double stiffness;
+  double friction;
+  double finger_radius;
+  hap_pose pose;
+  hap_twist twist;
+  uint32_t is_tool; /* a hull: see hapi_state_hulls */
+  double extent;    /* m, of a hull as in hapi_near_tool, else the radius */
+} hapi_state_pointer;
+
+typedef struct hapi_state_body {
+  uint32_t generation; /* 0: slot never used */
+  uint32_t flags;      /* HAPI_BODY_RESTING while nothing has pushed it */
+  uint32_t epoch;      /* of the newest model in use */
+  uint32_t reserved;
+  hap_pose pose;
+  hap_twist twist;
+  double impulse[3];         /* N s, since the slot's generation began: what pointers, and in model
+                                CONTACT bodies of the range, gave while the loop did not own it */
+  double angular_impulse[3]; /* N m s, the same about the centre of mass */
+  double residual[6];        /* how much of hapi_model_body.residual is in the twist */
+  double gain[6]; /* N s, N m s, running total: what pointers gave while the loop owned it */
+  int64_t owned_until_ns; /* last tick in which the loop owned it; 0: none */
+  hap_pose owned_pose;    /* at that tick */
+  hap_twist owned_twist;
+} hapi_state_body;
+
+typedef struct hapi_state_contact {
+  uint32_t slot;
+  uint32_t generation;
+  double force[3]; /* N on the body at this tick */
+} hapi_state_contact;
+
+/* Since the start, of the ticks that had a budget. */
+typedef struct hapi_tick_load {
+  uint64_t ticks;
+  uint64_t over;
+  double spent_ns;
+} hapi_tick_load;
+
+/* How far a closed pointer contact with friction is stretched along the surface. */
+typedef struct hapi_state_spring {
+  uint32_t slot; /* of the contact; HAPI_SLOT_NONE: a point of a hull, told by key and place */
+  uint32_t generation;    /* of the contact */
+  uint64_t key;           /* of hull and geom */
+  double place[3];        /* m, of the point on the hull */
+  double stretch_body[3]; /* m, of the pointer ahead of the body, in the body's frame */
+  double turn;            /* rad, likewise, about the normal */
+} hapi_state_spring;
+
+typedef struct hapi_state {
+  uint64_t model_number;   /* the local model in use; 0: none yet */
+  int64_t now_ns;          /* time for which the poses hold */
+  double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
+  double owned_impulse[3]; /* N s, what the loop's bodies got of it, and from bodies of ODE */
+  hapi_tick_load load;
+  hap_model model;
+  uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */
+  uint32_t contact_count;
+  uint32_t pointer_count; /* slots */
+  uint32_t bodies_offset;
+  uint32_t contacts_offset;
+  uint32_t pointers_offset;
+  uint32_t hulls_offset;
+  uint32_t spring_count;
+  uint32_t spring_capacity; /* 0: springs are not told */
+  uint32_t springs_offset;
+} hapi_state;
+
+HAPI_MESSAGE_ARRAY(hapi_state_bodies, hapi_state, hapi_state_body, bodies_offset)
+HAPI_MESSAGE_ARRAY(hapi_state_contacts, hapi_state, hapi_state_contact, contacts_offset)
+HAPI_MESSAGE_ARRAY(hapi_state_pointers, hapi_state, hapi_state_pointer, pointers_offset)
+HAPI_MESSAGE_ARRAY(hapi_state_springs, hapi_state, hapi_state_spring, springs_offset)
+
+/* By pointer; not set for a sphere. */
+HAPI_MESSAGE_ARRAY(hapi_state_hulls, hapi_state, hapi_tool_hull, hulls_offset)
+
+#endif
