@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/hooks.h"
 
 static void *default_allocate(size_t size, void *user)
@@ -84,6 +85,8 @@ void hapi_free(void *memory)
 
 bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size)
 {
+  HAPI_ASSERT(size > 0 && used <= *capacity);
+  HAPI_ASSERT(*capacity == 0 || *array != NULL);
   if (used + count <= *capacity) {
     return true;
   }

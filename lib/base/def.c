@@ -6,6 +6,7 @@
 
 #include <hapode/version.h>
 
+#include "base/assert.h"
 #include "base/log.h"
 
 typedef struct def_head {
@@ -16,6 +17,7 @@ typedef struct def_head {
 /* A caller of an older build has room for less than this build knows. */
 void hapi_def_init(void *def, size_t size_of_def, const void *defaults, size_t size)
 {
+  HAPI_ASSERT(defaults != NULL && size >= sizeof(def_head));
   def_head head;
   if (def == NULL || size_of_def < sizeof head) {
     return;
@@ -47,6 +49,7 @@ static hap_status def_check_unknown(const void *def, size_t size_of_def, size_t 
 hap_status hapi_def_check(const void *def, uint32_t cookie, const char *init_name,
                           uint32_t *out_size, hap_detail *detail)
 {
+  HAPI_ASSERT(out_size != NULL);
   def_head head;
   if (def == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the def is NULL");

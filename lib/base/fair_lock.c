@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/assert.h"
 #include "base/clock.h"
 
 /* A lock that is given goes to the first waiter at once, asleep as it may be: nobody can come in
@@ -36,12 +37,15 @@ bool hapi_fair_lock_init(hapi_fair_lock *lock)
 
 void hapi_fair_lock_finish(hapi_fair_lock *lock)
 {
+  HAPI_ASSERT(lock->count == 0 && lock->first == NULL);
   pthread_condattr_destroy(&lock->monotonic);
   pthread_mutex_destroy(&lock->mutex);
 }
 
 static void waiter_enqueue(hapi_fair_lock *lock, hapi_fair_waiter *waiter)
 {
+  HAPI_ASSERT(lock->held && waiter->next == NULL && !waiter->has_it);
+  HAPI_ASSERT((lock->first == NULL) == (lock->last == NULL));
   if (lock->last != NULL) {
     lock->last->next = waiter;
   } else {
@@ -53,8 +57,10 @@ static void waiter_enqueue(hapi_fair_lock *lock, hapi_fair_waiter *waiter)
 
 static void leave_queue(hapi_fair_lock *lock, const hapi_fair_waiter *waiter)
 {
+  HAPI_ASSERT(lock->count > 0);
   hapi_fair_waiter *before = NULL;
   for (hapi_fair_waiter *at = lock->first; at != waiter; at = at->next) {
+    HAPI_ASSERT(at->next != NULL);
     before = at;
   }
   if (before != NULL) {
@@ -113,6 +119,7 @@ bool hapi_fair_lock_take(hapi_fair_lock *lock, int64_t deadline_ns)
 void hapi_fair_lock_give(hapi_fair_lock *lock)
 {
   pthread_mutex_lock(&lock->mutex);
+  HAPI_ASSERT(lock->held && pthread_equal(lock->holder, pthread_self()) != 0);
   hapi_fair_waiter *next = lock->first;
   lock->held = next != NULL;
   if (next != NULL) {

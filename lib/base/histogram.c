@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "base/assert.h"
+
 /* A single writer needs no read-modify-write. */
 static void count_increase(_Atomic uint64_t *value, uint64_t by)
 {
@@ -29,6 +31,7 @@ static unsigned bucket_of(uint64_t ns)
 /* Middle of a bucket. */
 static double value_of(unsigned bucket)
 {
+  HAPI_ASSERT_INDEX(bucket, HAPI_HISTOGRAM_BUCKETS);
   if (bucket < 16) {
     return (double)bucket;
   }
@@ -72,6 +75,7 @@ double hapi_histogram_max_ns(const hapi_histogram *h)
 
 double hapi_histogram_quantile_ns(const hapi_histogram *h, double share)
 {
+  HAPI_ASSERT(share >= 0.0 && share <= 1.0);
   uint64_t total = 0;
   for (unsigned i = 0; i < HAPI_HISTOGRAM_BUCKETS; ++i) {
     total += atomic_load_explicit(&h->buckets[i], memory_order_relaxed);

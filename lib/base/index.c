@@ -18,6 +18,7 @@ static uint32_t home_of(const hapi_index *index, uint64_t key)
 /* The place of a key, or the free one where it would be; there is one, as half of them are free. */
 static uint32_t place_of(const hapi_index *index, uint64_t key)
 {
+  HAPI_ASSERT(index->place_count > 0 && (index->place_count & (index->place_count - 1)) == 0);
   uint32_t at = home_of(index, key);
   while (index->places[at].taken != 0 && index->places[at].key != key) {
     at = (at + 1) & (index->place_count - 1);

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/log.h"
 
 #define LINE_SIZE 512
@@ -74,6 +75,7 @@ static hap_status read_lines(hapi_key_file *file, FILE *stream, hapi_key_take ta
 
 hap_status hapi_key_file_read(hapi_key_file *file, hapi_key_take take, void *self)
 {
+  HAPI_ASSERT(file->path != NULL && take != NULL);
   FILE *stream = fopen(file->path, "r");
   if (stream == NULL) {
     return hapi_fail(file->detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", file->path,

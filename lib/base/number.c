@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 static bool is_digit(char c)
@@ -78,6 +79,7 @@ const char *hapi_number_read(const char *text, double *out)
 
 void hapi_number_write(char *out, size_t size, double value)
 {
+  HAPI_ASSERT(size > 0);
   locale_t point = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   locale_t before = uselocale(point);
   snprintf(out, size, "%.9g", value);

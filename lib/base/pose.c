@@ -2,12 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include "base/pose.h"
 
+#include "base/assert.h"
+
 /* Below this half angle [rad] the chord is as good as the arc: their difference along the turn is
  * less than 1e-5 of it. */
 #define SMALL_TURN 0.01
 
 void hapi_pose_slerp(const hap_pose *from, const hap_pose *to, double share, hap_pose *out)
 {
+  HAPI_ASSERT_UNIT_QUAT(from->quat_wxyz);
+  HAPI_ASSERT_UNIT_QUAT(to->quat_wxyz);
   double turn[4];
   double inverse[4] = {from->quat_wxyz[0], -from->quat_wxyz[1], -from->quat_wxyz[2],
                        -from->quat_wxyz[3]};

@@ -5,12 +5,14 @@
 
 #include <hapode/spatial.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 /* Eq. 11 of the paper: orientation after seconds of an angular velocity; the turn in them is small.
  * The quaternion is normalised because eq. 11 leaves the unit sphere. */
 static inline void hapi_quat_move(double quat[4], const double w[3], double seconds)
 {
+  HAPI_ASSERT_UNIT_QUAT(quat);
   double turn[4] = {0.0, w[0], w[1], w[2]};
   double rate[4];
   hapi_quat_multiply(turn, quat, rate);
@@ -32,6 +34,8 @@ static inline void hapi_pose_move(hap_pose *pose, const hap_twist *twist, double
 static inline void hapi_pose_blend(const hap_pose *from, const hap_pose *to, double share,
                                    hap_pose *out)
 {
+  HAPI_ASSERT_UNIT_QUAT(from->quat_wxyz);
+  HAPI_ASSERT_UNIT_QUAT(to->quat_wxyz);
   double side = 0.0;
   for (int i = 0; i < 4; ++i) {
     side += from->quat_wxyz[i] * to->quat_wxyz[i];

@@ -10,6 +10,8 @@
 #endif
 #if defined(__SSE2__)
 #include <xmmintrin.h>
+
+#include "base/assert.h"
 #endif
 
 #define STACK_TOUCHED 65536
@@ -37,6 +39,7 @@ static int thread_create(hapi_thread *thread, void *(*entry)(void *), void *arg,
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority)
 {
+  HAPI_ASSERT(!thread->running && priority >= 0 && priority <= 99);
   bool realtime = priority > 0 && thread_create(thread, main, arg, priority) == 0;
   atomic_store(&thread->realtime, realtime);
   if (!realtime && thread_create(thread, main, arg, 0) != 0) {

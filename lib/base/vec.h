@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "base/assert.h"
+
 static inline void hapi_v3_copy(const double a[3], double out[3])
 {
   out[0] = a[0];
@@ -145,6 +147,7 @@ static inline void hapi_quat_normalize(double q[4])
 /* Row-major 3x3 of a unit quaternion. */
 static inline void hapi_quat_to_matrix(const double q[4], double r[9])
 {
+  HAPI_ASSERT_UNIT_QUAT(q);
   double w = q[0];
   double x = q[1];
   double y = q[2];
@@ -163,6 +166,7 @@ static inline void hapi_quat_to_matrix(const double q[4], double r[9])
 /* out = m v, m row-major 3x3; out is not v */
 static inline void hapi_m3_apply(const double m[9], const double v[3], double out[3])
 {
+  HAPI_ASSERT(v != out);
   out[0] = m[0] * v[0] + m[1] * v[1] + m[2] * v[2];
   out[1] = m[3] * v[0] + m[4] * v[1] + m[5] * v[2];
   out[2] = m[6] * v[0] + m[7] * v[1] + m[8] * v[2];
@@ -171,6 +175,7 @@ static inline void hapi_m3_apply(const double m[9], const double v[3], double ou
 /* out = m^T v; out is not v */
 static inline void hapi_m3_apply_transposed(const double m[9], const double v[3], double out[3])
 {
+  HAPI_ASSERT(v != out);
   out[0] = m[0] * v[0] + m[3] * v[1] + m[6] * v[2];
   out[1] = m[1] * v[0] + m[4] * v[1] + m[7] * v[2];
   out[2] = m[2] * v[0] + m[5] * v[1] + m[8] * v[2];
@@ -190,6 +195,7 @@ static inline void hapi_m3_multiply(const double a[9], const double b[9], double
 
 static inline void hapi_m3_turn(const double r[9], const double m[9], double out[9])
 {
+  HAPI_ASSERT(out != r && out != m);
   double rm[9];
   for (int i = 0; i < 3; ++i) {
     hapi_m3_apply_transposed(m, r + 3 * i, rm + 3 * i); /* row i of r m */
@@ -219,6 +225,7 @@ static inline bool hapi_turns_alike(const double inertia[9])
 /* By the adjugate; a singular one becomes 0. out is not m */
 static inline void hapi_m3_invert(const double m[9], double out[9])
 {
+  HAPI_ASSERT(m != out);
   double adjugate[9] = {
       m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
       m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
 #include "device/module.h"
@@ -114,6 +115,7 @@ static hap_status device_describe(hap_device *device, hap_detail *detail)
 /* The library last: the code of close is in it. */
 static void device_free(hap_device *device)
 {
+  HAPI_ASSERT(device->self != NULL);
   void *library = device->library;
   device->ops->close(device->self);
   hapi_free(device);
@@ -148,6 +150,7 @@ static hap_status open_self(hap_device *device, const char *args, hap_detail *de
 hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap_device **out,
                                 hap_detail *detail)
 {
+  HAPI_ASSERT(ops != NULL && args != NULL && detail != NULL);
   *out = NULL;
   detail->text[0] = '\0';
   hap_status status = check_ops(ops, detail);
@@ -270,6 +273,7 @@ void hapi_device_release(hap_device *device)
 {
   unsigned before =
       atomic_fetch_and_explicit(&device->holders.bits, ~CLAIMED, memory_order_acq_rel);
+  HAPI_ASSERT((before & CLAIMED) != 0);
   if ((before & CLOSED) != 0) {
     device_free(device);
   }

@@ -7,6 +7,8 @@
 
 #include <hapode/device.h>
 
+#include "base/assert.h"
+
 /* A fixed table without a lock: a signal handler may come between any two steps of the others.
  *
  * A place is taken, then gets its self, then its ops, by which it is seen. Whoever calls counts
@@ -26,6 +28,7 @@ static _Atomic uint64_t emergencies;
 
 bool hapi_emergency_add(const hap_device_ops *ops, void *self)
 {
+  HAPI_ASSERT(ops != NULL && ops->zero != NULL);
   for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
     if (atomic_exchange(&places[i].taken, 1) == 0) {
       atomic_store(&places[i].self, self);
@@ -38,6 +41,7 @@ bool hapi_emergency_add(const hap_device_ops *ops, void *self)
 
 void hapi_emergency_remove(const hap_device_ops *ops, const void *self)
 {
+  HAPI_ASSERT(ops != NULL);
   for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
     place *p = &places[i];
     if (atomic_load(&p->ops) == ops && atomic_load(&p->self) == self) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/def.h"
 #include "base/log.h"
@@ -133,6 +134,7 @@ static hap_status read_device(run *r)
 
 static hap_status sample_record(run *r)
 {
+  HAPI_ASSERT_INDEX(r->axis, AXES);
   hapi_identify_record *record = &r->records[r->axis];
   if (record->count == record->capacity) {
     return run_fail(r, "it gives more than rate_hz positions a second; raise rate_hz");
@@ -145,6 +147,7 @@ static hap_status sample_record(run *r)
 static double speed_now(const run *r)
 {
   const hapi_identify_record *record = &r->records[r->axis];
+  HAPI_ASSERT(record->count > 0);
   uint32_t back = record->count - 1 < SPEED_SAMPLES ? record->count - 1 : SPEED_SAMPLES;
   const hapi_identify_sample *now = &record->samples[record->count - 1];
   double length = now->time - now[-(int)back].time;
@@ -200,6 +203,7 @@ static hap_status force_write(const run *r, double force)
 static hap_status tick_step(run *r, double force)
 {
   hapi_identify_record *axis = &r->records[r->axis];
+  HAPI_ASSERT(axis->count > 0 && fabs(force) <= r->limit);
   axis->samples[axis->count - 1].force = force;
   hap_status status = force_write(r, force);
   if (status == HAP_OK) {
@@ -365,6 +369,7 @@ static hap_status move_all(run *r)
 
 static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
 {
+  HAPI_ASSERT_INDEX(axis, AXES);
   hapi_identify_fit fit;
   char text[200];
   hap_detail why = {""};

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "proximity/closed_forms.h"
 
+#include "base/assert.h"
 #include "proximity/direction.h"
 
 /* Point against a solid in the solid's frame: the nearest surface point, the unit normal out of the
@@ -51,6 +52,7 @@ static void point_box(const double half[3], const double p[3], surface *out)
 
 static void point_segment(double half, const double p[3], surface *out)
 {
+  HAPI_ASSERT(half >= 0.0);
   static const double across[3] = {1.0, 0.0, 0.0};
   double gap[3];
   hapi_v3_set(out->point, 0.0, 0.0, fmin(fmax(p[2], -half), half));
@@ -60,6 +62,7 @@ static void point_segment(double half, const double p[3], surface *out)
 
 static void point_cylinder(double radius, double half, const double p[3], surface *out)
 {
+  HAPI_ASSERT(radius >= 0.0 && half >= 0.0);
   double flat[3] = {p[0], p[1], 0.0};
   double radial[3] = {1.0, 0.0, 0.0};
   double beyond_side = hapi_v3_unit(flat, radial) - radius;

@@ -4,6 +4,7 @@
 
 #include <float.h>
 
+#include "base/assert.h"
 #include "proximity/ccd_core.h"
 #include "proximity/direction.h"
 
@@ -34,6 +35,7 @@ typedef struct search {
 
 static double depth_along(const search *s, const double normal[3])
 {
+  HAPI_ASSERT_UNIT(normal);
   double back[3];
   double point_a[3];
   double point_b[3];
@@ -147,6 +149,7 @@ static bool try_ccd(search *s)
  * large makes the direction exact. */
 static bool descent_step(search *s, hapi_gjk *out)
 {
+  HAPI_ASSERT_UNIT(s->normal);
   double clear = 1e-3 * s->small + 1e-8 * s->large;
   clear += s->depth > 0.0 ? 0.1 * s->depth : -2.0 * s->depth;
   double shift[3];
@@ -236,6 +239,7 @@ static bool settle_apart(search *s, hapi_gjk *out)
 
 bool hapi_deep_nearest(const hapi_solid *a, const hapi_solid *b, const double *hint, hapi_gjk *out)
 {
+  HAPI_ASSERT(a->kind != HAPI_SHAPE_PLANE && b->kind != HAPI_SHAPE_PLANE);
   search s = {.a = a, .b = b, .depth = DBL_MAX};
   s.large = fmax(a->reach, b->reach);
   s.small = fmin(a->reach, b->reach);

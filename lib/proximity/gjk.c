@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "proximity/gjk.h"
 
+#include "base/assert.h"
 #include "proximity/direction.h"
 #include "proximity/simplex.h"
 
@@ -101,6 +102,7 @@ static bool search_step(search *s)
     return false;
   }
   hapi_simplex grown = s->simplex;
+  HAPI_ASSERT(s->simplex.count < 4);
   grown.vertex[grown.count++] = newest;
   if (!simplex_has(&s->simplex, &newest) && simplex_accept(s, &grown)) {
     return true;
@@ -114,6 +116,7 @@ static bool search_step(search *s)
 
 bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *start, hapi_gjk *out)
 {
+  HAPI_ASSERT(a->kind != HAPI_SHAPE_PLANE && b->kind != HAPI_SHAPE_PLANE);
   search s = {.a = a, .b = b};
   search_start(&s, start);
   hapi_simplex_reduce(&s.simplex, s.nearest);
@@ -123,6 +126,7 @@ bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *st
   }
   hapi_v3_set(out->normal, 0.0, 0.0, 1.0);
   out->distance = hapi_v3_unit(s.nearest, out->normal);
+  HAPI_ASSERT_UNIT(out->normal);
   hapi_simplex_witness(&s.simplex, out->point_a, out->point_b);
   return s.apart;
 }

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "base/vec.h"
 #include "proximity/patch_parts.h"
 
@@ -56,6 +57,7 @@ static bool balls_apart(const hapi_solid *a, const hapi_solid *b, double margin)
 /* The kinds come in the order of the enumeration. */
 static bool find_ordered(const hapi_pair *pair)
 {
+  HAPI_ASSERT(pair->a->kind <= pair->b->kind);
   if (pair->a->kind == HAPI_SHAPE_PLANE || pair->b->kind == HAPI_SHAPE_PLANE) {
     return hapi_patch_plane(pair);
   }

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
@@ -35,7 +36,9 @@ static double gap_of(const hapi_pair *pair, const hapi_patch_point *p)
 
 void hapi_patch_add(const hapi_pair *pair, const hapi_patch_point *point)
 {
+  HAPI_ASSERT_UNIT(point->normal);
   hapi_patch *patch = pair->out;
+  HAPI_ASSERT(patch->count >= 0 && patch->count <= HAPI_PATCH_POINTS);
   double gap = gap_of(pair, point);
   if (!(gap <= pair->margin)) {
     return;
@@ -103,6 +106,8 @@ static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_fram
 void hapi_patch_add_spots(const hapi_pair *pair, bool reference_is_a, const hapi_frame *frame,
                           const hapi_feature *incident, hapi_spot *spots, int count)
 {
+  HAPI_ASSERT(count >= 0 && count <= HAPI_SPOTS_MAX);
+  HAPI_ASSERT_UNIT(frame->normal);
   hapi_patch *patch = pair->out;
   int kept = 0;
   for (int i = 0; i < count; ++i) {
@@ -119,6 +124,8 @@ void hapi_patch_add_spots(const hapi_pair *pair, bool reference_is_a, const hapi
 bool hapi_patch_add_faces(const hapi_pair *pair, bool reference_is_a, const hapi_feature *reference,
                           const hapi_feature *incident)
 {
+  HAPI_ASSERT(reference->count >= 3 && reference->count <= HAPI_CORNERS_MAX);
+  HAPI_ASSERT(incident->count >= 1 && incident->count <= HAPI_CORNERS_MAX);
   hapi_spot spots[HAPI_SPOTS_MAX];
   hapi_frame frame;
   int before = pair->out->count;

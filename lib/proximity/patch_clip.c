@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "base/vec.h"
 #include "proximity/patch_parts.h"
 
@@ -30,6 +31,7 @@ static bool spot_on_border(const hapi_spot *spot, double dx, double dy)
  * that is a corner of the reference, else a point of an edge of the incident feature. */
 static hapi_spot edge_cut(const hapi_spot *a, const hapi_spot *b, double t, const double side[2])
 {
+  HAPI_ASSERT(t >= 0.0 && t <= 1.0);
   hapi_spot spot = spot_between(a, b, t);
   double way[3] = {b->x - a->x, b->y - a->y, b->gap - a->gap};
   if (spot_on_border(a, way[0], way[1]) && spot_on_border(b, way[0], way[1])) {
@@ -51,6 +53,7 @@ static hapi_spot edge_cut(const hapi_spot *a, const hapi_spot *b, double t, cons
 static int clip_side(const hapi_spot *from, const hapi_spot *to, const hapi_spot *in, int count,
                      hapi_spot *out)
 {
+  HAPI_ASSERT(count > 0 && count <= HAPI_SPOTS_MAX);
   double dx = to->x - from->x;
   double dy = to->y - from->y;
   double slack = border * (dx * dx + dy * dy);
@@ -89,6 +92,7 @@ static bool all_left(const hapi_spot *from, const hapi_spot *to, const hapi_spot
 static int clip_polygon(const hapi_feature *reference, const hapi_frame *frame, hapi_spot *spots,
                         int count)
 {
+  HAPI_ASSERT(reference->count >= 3 && reference->count <= HAPI_CORNERS_MAX);
   hapi_spot side[HAPI_CORNERS_MAX];
   hapi_spot clipped[HAPI_SPOTS_MAX];
   for (int i = 0; i < reference->count; ++i) {
@@ -123,6 +127,7 @@ typedef struct overlap {
 
 static void overlap_push(overlap *o, hapi_spot spot)
 {
+  HAPI_ASSERT(o->count >= 0 && o->count <= HAPI_SPOTS_MAX);
   if (o->count < HAPI_SPOTS_MAX) {
     o->out[o->count++] = spot;
   }

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
@@ -22,6 +23,7 @@ static void round_set(hapi_patch_point *p, const hapi_edge *a, const hapi_edge *
 static void edges_cross(const hapi_edge *a, const hapi_edge *b, double sine, double *along_a,
                         double *along_b)
 {
+  HAPI_ASSERT(sine > 0.0);
   double between[3];
   hapi_v3_sub(b->middle, a->middle, between);
   double cosine = hapi_v3_dot(a->direction, b->direction);
@@ -34,6 +36,8 @@ static void edges_cross(const hapi_edge *a, const hapi_edge *b, double sine, dou
 bool hapi_patch_add_edges(const hapi_pair *pair, const hapi_edge *a, const hapi_edge *b,
                           const double normal[3])
 {
+  HAPI_ASSERT_UNIT(a->direction);
+  HAPI_ASSERT_UNIT(b->direction);
   hapi_patch_point p = {.touch = HAPI_TOUCH_EDGES};
   double along_a;
   double along_b;
@@ -62,6 +66,8 @@ bool hapi_patch_add_edges(const hapi_pair *pair, const hapi_edge *a, const hapi_
 bool hapi_patch_add_lines(const hapi_pair *pair, const hapi_edge *a, const hapi_edge *b,
                           const double normal[3])
 {
+  HAPI_ASSERT_UNIT(a->direction);
+  HAPI_ASSERT_UNIT(b->direction);
   hapi_patch_point p = {.touch = HAPI_TOUCH_FACE_B};
   double between[3];
   hapi_v3_cross(a->direction, b->direction, between);

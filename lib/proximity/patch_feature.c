@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
@@ -48,6 +49,7 @@ static void box_face(const hapi_solid *box, const double d[3], hapi_feature *out
 void hapi_rim_corners(const hapi_solid *cylinder, double side, const double d[3], int count,
                       double (*out)[3])
 {
+  HAPI_ASSERT(cylinder->kind == HAPI_SHAPE_CYLINDER && count <= HAPI_CORNERS_MAX);
   static const double pi = 3.14159265358979323846;
   double axis[3];
   double first[3];
@@ -156,6 +158,7 @@ bool hapi_feature_face(const hapi_solid *solid, const double d[3], hapi_feature 
 
 void hapi_feature_along(const hapi_solid *solid, const double d[3], hapi_feature *out)
 {
+  HAPI_ASSERT(solid->kind != HAPI_SHAPE_PLANE);
   if (solid->kind == HAPI_SHAPE_HULL && solid->ball > 0.0) {
     round_hull(solid, d, out);
     return;

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <float.h>
 
+#include "base/assert.h"
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
@@ -201,6 +202,7 @@ static void corners_sample(const flat *f, hapi_feature *out)
 
 static void corners_measure(hapi_feature *out)
 {
+  HAPI_ASSERT(out->count >= 1 && out->count <= HAPI_CORNERS_MAX);
   double twice[3] = {0.0, 0.0, 0.0};
   hapi_v3_scale(1.0 / out->count, out->corner[0], out->center);
   for (int i = 1; i < out->count; ++i) {

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "base/assert.h"
 #include "proximity/patch_parts.h"
 
 /* Part of a height difference; a spot nearer than that beside a deeper one carries nothing: the
@@ -101,6 +102,7 @@ static void spot_choose(hapi_spot *spots, int place, int count, double slack)
 
 int hapi_patch_reduce(hapi_spot *spots, int count, double size)
 {
+  HAPI_ASSERT(count >= 0 && count <= HAPI_SPOTS_MAX && size >= 0.0);
   double near = 1e-6 * size;
   count = covered_remove(spots, count, near);
   if (count > 0) {

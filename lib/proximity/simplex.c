@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "proximity/simplex.h"
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 /* Every sub-simplex that can hold the nearest point is tried and the least distance wins. Slower
@@ -32,6 +33,7 @@ static void weighted_sum(const double base[3], const double *tips[2], const doub
 
 static void candidate_consider(const hapi_simplex *s, candidate *found, candidate *best)
 {
+  HAPI_ASSERT(found->count >= 1 && found->count <= 3);
   const double *tips[2] = {s->vertex[found->index[1]].gap, s->vertex[found->index[2]].gap};
   weighted_sum(s->vertex[found->index[0]].gap, tips, found->weight, found->count, found->point);
   found->norm2 = hapi_v3_dot(found->point, found->point);
@@ -121,6 +123,7 @@ static bool solid_holds_origin(const hapi_simplex *s, candidate *best)
 
 bool hapi_simplex_reduce(hapi_simplex *simplex, double out_nearest[3])
 {
+  HAPI_ASSERT(simplex->count >= 1 && simplex->count <= 4);
   static const int face[3] = {0, 1, 2};
   candidate best = {.count = 0};
   if (simplex->count == 1) {
@@ -132,6 +135,7 @@ bool hapi_simplex_reduce(hapi_simplex *simplex, double out_nearest[3])
   } else if (solid_holds_origin(simplex, &best)) {
     return false;
   }
+  HAPI_ASSERT(best.count >= 1 && best.count <= simplex->count);
   hapi_simplex kept = {.count = best.count};
   for (int i = 0; i < best.count; ++i) {
     kept.vertex[i] = simplex->vertex[best.index[i]];
@@ -144,6 +148,7 @@ bool hapi_simplex_reduce(hapi_simplex *simplex, double out_nearest[3])
 
 void hapi_simplex_witness(const hapi_simplex *simplex, double out_a[3], double out_b[3])
 {
+  HAPI_ASSERT(simplex->count >= 1 && simplex->count <= 3);
   const hapi_vertex *v = simplex->vertex;
   double weight[3] = {v[0].weight, v[1].weight, v[2].weight};
   const double *tips_a[2] = {v[1].a, v[2].a};

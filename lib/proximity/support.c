@@ -2,10 +2,12 @@
  * SPDX-License-Identifier: MIT */
 #include "proximity/support.h"
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 void hapi_solid_axis(const hapi_solid *solid, int axis, double out[3])
 {
+  HAPI_ASSERT_INDEX(axis, 3);
   const double *r = solid->rotation;
   hapi_v3_set(out, r[axis], r[3 + axis], r[6 + axis]);
 }
@@ -113,6 +115,7 @@ bool hapi_pair_place(const hapi_shape *a, const hap_pose *pose_a, const hapi_sha
 
 static void hull_support(const hapi_solid *solid, const double direction[3], double out[3])
 {
+  HAPI_ASSERT(solid->hull != NULL && solid->hull_count > 0);
   const double *best = solid->hull;
   double best_dot = hapi_v3_dot(best, direction);
   for (size_t i = 1; i < solid->hull_count; ++i) {
@@ -137,6 +140,7 @@ static void rim_support(double radius, const double direction[3], double out[3])
 
 void hapi_solid_support(const hapi_solid *solid, const double direction[3], double out[3])
 {
+  HAPI_ASSERT(solid->kind != HAPI_SHAPE_PLANE);
   double d[3];
   double point[3];
   hapi_solid_to_local(solid, direction, d);

@@ -15,6 +15,8 @@
 
 #include "base/hash.h"
 
+#include "base/assert.h"
+
 typedef enum hapi_stream {
   HAPI_STREAM_HAPTIC = 0,
   HAPI_STREAM_PHYSICS = 1,
@@ -85,6 +87,7 @@ typedef enum hapi_cycle_word {
 
 static inline int hapi_cell_dial(uint64_t word, unsigned shift)
 {
+  HAPI_ASSERT(shift <= 56u);
   int percent = (int)(word >> shift & 0xffu) - 1;
   return percent < 0 || percent > 100 ? HAPI_DIAL_OF_NONE : percent;
 }

@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "record/grammar.h"
 
+#include "base/assert.h"
+
 #define TIME_MAX (INT64_MAX / 4)
 
 static bool good_time(int64_t ns)
@@ -115,6 +117,7 @@ static const char *take_contact(hapi_grammar *g, const hapi_cell *cell)
 
 const char *hapi_grammar_take(hapi_grammar *grammar, hapi_stream stream, const hapi_cell *cell)
 {
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
   const char *wrong = stream == HAPI_STREAM_HAPTIC    ? take_haptic(grammar, cell)
                       : stream == HAPI_STREAM_PHYSICS ? take_physics(grammar, cell)
                                                       : take_contact(grammar, cell);

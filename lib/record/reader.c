@@ -7,6 +7,7 @@
 #include <zlib.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "record/grammar.h"
 
@@ -74,6 +75,7 @@ static hap_status broken_off(hapi_reader *reader, hap_detail *detail)
 
 static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
 {
+  HAPI_ASSERT(reader->inflates && reader->head.size <= HAPI_BLOCK_BYTES);
   z_stream *z = &reader->inflater;
   if (inflateReset(z) != Z_OK) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
@@ -413,6 +415,7 @@ const hapi_grammar *hapi_reader_whole(const hapi_reader *reader)
  * growing, so that no cell is moved often. */
 static bool make_room(cell_queue *q, uint32_t count)
 {
+  HAPI_ASSERT(q->first + q->count <= q->capacity);
   if (q->first + q->count + count <= q->capacity) {
     return true;
   }
@@ -439,6 +442,8 @@ static bool make_room(cell_queue *q, uint32_t count)
 static hap_status cells_enqueue(hapi_reader *reader, hapi_stream stream, uint32_t count,
                                 hap_detail *detail)
 {
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
+  HAPI_ASSERT(count <= HAPI_BLOCK_CELLS);
   cell_queue *q = &reader->queues[stream];
   if (q->count + count > QUEUE_MAX) {
     return block_refuse(reader, "one thread is far ahead of the others", detail);
@@ -446,6 +451,7 @@ static hap_status cells_enqueue(hapi_reader *reader, hapi_stream stream, uint32_
   if (!make_room(q, count)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
   }
+  HAPI_ASSERT(q->first + q->count + count <= q->capacity);
   memcpy(q->cells + q->first + q->count, reader->bytes, count * sizeof *q->cells);
   q->count += count;
   return HAP_OK;
@@ -454,6 +460,7 @@ static hap_status cells_enqueue(hapi_reader *reader, hapi_stream stream, uint32_
 /* Cells of the packet at the front; 0: nothing is there. */
 static uint32_t packet_size(const hapi_reader *reader, hapi_stream stream)
 {
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
   const cell_queue *q = &reader->queues[stream];
   if (q->count == 0) {
     return 0;
@@ -512,6 +519,7 @@ void hapi_reader_pop(hapi_reader *reader, hapi_stream stream)
   if (whole_packet(reader, stream)) {
     cell_queue *q = &reader->queues[stream];
     uint32_t size = packet_size(reader, stream);
+    HAPI_ASSERT(q->first + size <= q->capacity && size <= q->count);
     q->first += size;
     q->count -= size;
   }

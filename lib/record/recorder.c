@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/thread.h"
@@ -78,6 +79,7 @@ static void write_bytes(hapi_recorder *recorder, const void *bytes, size_t size)
 /* Bytes in recorder->stored; 0: they would not be fewer. */
 static uint32_t deflate_bytes(hapi_recorder *recorder, const void *bytes, uint32_t size)
 {
+  HAPI_ASSERT(size <= HAPI_BLOCK_BYTES);
   z_stream *z = &recorder->deflater;
   if (!recorder->deflates || deflateReset(z) != Z_OK) {
     return 0;
@@ -92,6 +94,7 @@ static uint32_t deflate_bytes(hapi_recorder *recorder, const void *bytes, uint32
 /* False: it does not fit below the limit, or cannot be written. */
 static bool write_block(hapi_recorder *recorder, uint32_t type, const void *bytes, uint32_t size)
 {
+  HAPI_ASSERT(recorder->file >= 0 && size <= HAPI_BLOCK_BYTES);
   hapi_block_head head = {HAPI_BLOCK_MARK, type, recorder->blocks, size, size, 0};
   bool cells = type != HAPI_BLOCK_INFO && type != HAPI_BLOCK_END;
   uint32_t fewer = cells ? deflate_bytes(recorder, bytes, size) : 0;
@@ -113,6 +116,8 @@ static bool write_block(hapi_recorder *recorder, uint32_t type, const void *byte
 
 static bool block_flush(hapi_recorder *recorder, hapi_stream stream)
 {
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
+  HAPI_ASSERT(recorder->counts[stream] <= HAPI_BLOCK_CELLS);
   uint32_t count = recorder->counts[stream];
   recorder->counts[stream] = 0;
   if (count == 0) {
@@ -238,6 +243,7 @@ static bool recorder_prepare(hapi_recorder *recorder, const hapi_recorder_config
 
 static void begin_file(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
+  HAPI_ASSERT(config->info.note_size <= HAPI_NOTE_MAX);
   hapi_file_head head = {
       HAPI_FILE_MAGIC, HAPI_FILE_BYTE_ORDER, HAPI_FILE_VERSION, sizeof(hapi_cell), 0, 0};
   head.crc = hapi_file_crc_head(&head);
@@ -298,6 +304,7 @@ void hapi_recorder_destroy(hapi_recorder *recorder)
 
 hapi_tape *hapi_recorder_tape(hapi_recorder *recorder, hapi_stream stream)
 {
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
   return &recorder->tapes[stream];
 }
 

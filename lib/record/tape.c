@@ -3,6 +3,7 @@
 #include "record/tape.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 /* The writer's release of written pairs with the reader's acquire, so that a cell is read whole;
  * the reader's release of read with the writer's acquire, so that none is written while it is
@@ -10,6 +11,7 @@
 
 hap_status hapi_tape_create(hapi_tape *tape, uint32_t cells, _Atomic int *ended)
 {
+  HAPI_ASSERT(cells <= 1u << 31);
   memset(tape, 0, sizeof *tape);
   tape->capacity = 64;
   while (tape->capacity < cells) {
@@ -39,8 +41,10 @@ void hapi_tape_open(hapi_tape *tape)
 
 hapi_cell *hapi_tape_put(hapi_tape *tape, hapi_cell_kind kind, uint32_t index)
 {
+  HAPI_ASSERT(tape->mode == HAPI_TAPE_RECORD && index <= UINT8_MAX);
   hapi_cell *cell = &tape->waste;
   uint64_t read = atomic_load_explicit(&tape->read, memory_order_acquire);
+  HAPI_ASSERT(read <= tape->at && tape->at - read <= tape->capacity);
   tape->overflown = tape->overflown || tape->at - read >= tape->capacity;
   if (tape->open && !tape->overflown) {
     cell = &tape->cells[tape->at++ & (tape->capacity - 1)];
@@ -53,6 +57,7 @@ hapi_cell *hapi_tape_put(hapi_tape *tape, hapi_cell_kind kind, uint32_t index)
 
 uint32_t hapi_tape_put_so_far(const hapi_tape *tape)
 {
+  HAPI_ASSERT(tape->packet <= tape->at);
   return (uint32_t)(tape->at - tape->packet);
 }
 
@@ -79,6 +84,7 @@ size_t hapi_tape_take(hapi_tape *tape, hapi_cell *out, size_t capacity)
 {
   uint64_t read = atomic_load_explicit(&tape->read, memory_order_relaxed);
   uint64_t written = atomic_load_explicit(&tape->written, memory_order_acquire);
+  HAPI_ASSERT(read <= written && written - read <= tape->capacity);
   size_t count = 0;
   while (read < written && count < capacity) {
     out[count++] = tape->cells[read++ & (tape->capacity - 1)];
@@ -89,6 +95,7 @@ size_t hapi_tape_take(hapi_tape *tape, hapi_cell *out, size_t capacity)
 
 void hapi_tape_load(hapi_tape *tape, const hapi_cell *cells, uint32_t count)
 {
+  HAPI_ASSERT(cells != NULL || count == 0);
   tape->packet_cells = cells;
   tape->packet_count = count;
   tape->packet_at = 0;
@@ -104,6 +111,7 @@ bool hapi_tape_next_is(const hapi_tape *tape, hapi_cell_kind kind)
 
 const hapi_cell *hapi_tape_get(hapi_tape *tape, hapi_cell_kind kind, uint32_t index)
 {
+  HAPI_ASSERT(tape->packet_at <= tape->packet_count);
   if (!hapi_tape_next_is(tape, kind) || tape->packet_cells[tape->packet_at].index != index) {
     tape->broken = true;
     memset(&tape->waste, 0, sizeof tape->waste);

@@ -4,9 +4,11 @@
 
 #include <semaphore.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "sync/message_queue.h"
 #include "sync/triple_buffer.h"
 
@@ -38,6 +40,7 @@ static size_t round_up(size_t size)
 /* Offset of an array of a message; moves *at behind it. */
 static uint32_t place_array(size_t *at, size_t count, size_t size)
 {
+  HAPI_ASSERT(round_up(*at) <= UINT32_MAX);
   size_t offset = round_up(*at);
   *at = offset + count * size;
   return (uint32_t)offset;
@@ -202,6 +205,7 @@ void hapi_exchange_reset(hapi_exchange *exchange)
 
 static void *channel_back(hapi_exchange *exchange, hapi_channel name)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
   return c->places[hapi_triple_back(&c->buffer)];
 }
@@ -209,6 +213,7 @@ static void *channel_back(hapi_exchange *exchange, hapi_channel name)
 /* Replay: the writer's place is always the same, and what is in it is copied. */
 static void channel_publish(hapi_exchange *exchange, hapi_channel name)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
   unsigned place = hapi_triple_back(&c->buffer);
   c->numbers[place] = ++c->published;
@@ -221,6 +226,7 @@ static void channel_publish(hapi_exchange *exchange, hapi_channel name)
 
 static void *channel_take(hapi_exchange *exchange, hapi_channel name)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
   if (c->queue != NULL) {
     return hapi_message_queue_take(c->queue);
@@ -230,6 +236,7 @@ static void *channel_take(hapi_exchange *exchange, hapi_channel name)
 
 uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   const channel *c = &exchange->channels[name];
   return c->queue != NULL ? hapi_message_queue_held(c->queue)
                           : c->numbers[hapi_triple_front(&c->buffer)];
@@ -237,6 +244,7 @@ uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name)
 
 uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel name)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   return exchange->channels[name].published;
 }
 
@@ -253,11 +261,15 @@ hap_status hapi_exchange_play(hapi_exchange *exchange)
 
 void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t number)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
+  HAPI_ASSERT(exchange->channels[name].queue != NULL);
   hapi_message_queue_expect(exchange->channels[name].queue, number);
 }
 
 void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t number)
 {
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
+  HAPI_ASSERT(exchange->channels[name].queue != NULL);
   hapi_message_queue_forget(exchange->channels[name].queue, number);
 }
 
@@ -271,6 +283,41 @@ hap_status hapi_exchange_play_status(const hapi_exchange *exchange)
   return status;
 }
 
+/* ---- whether the arrays of a message hold what it counts: for asserts ---- */
+
+static bool model_fits(const hapi_model *m, const hapi_capacity *c)
+{
+  return m->body_count <= c->bodies && m->contact_count <= c->contacts &&
+         m->joint_count <= c->joints && m->tool_count <= c->tool_points &&
+         m->cross_count <= c->crosses && m->watch_count <= HAP_TRACE_BODIES_MAX;
+}
+
+static bool state_fits(const hapi_state *s, const hapi_capacity *c)
+{
+  return s->body_high <= c->bodies && s->contact_count <= c->contacts &&
+         s->pointer_count == c->pointers && s->spring_count <= s->spring_capacity;
+}
+
+static bool near_fits(const hapi_near *n, const hapi_capacity *c)
+{
+  return n->body_count <= c->bodies && n->geom_count <= c->geoms && n->pair_count <= c->contacts &&
+         n->point_count <= c->hull_points && n->tool_count <= c->pointers &&
+         n->tool_pair_count <= c->contacts;
+}
+
+static bool poses_fit(const hapi_poses *p, const hapi_capacity *c)
+{
+  return p->body_count <= c->bodies;
+}
+
+static bool patches_fit(const hapi_patches *p, const hapi_capacity *c)
+{
+  return p->contact_count <= c->contacts && p->surface_count <= c->contacts &&
+         p->tool_count <= c->tool_points;
+}
+
+/* ---- the mailboxes ---- */
+
 hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
 {
   return channel_back(exchange, HAPI_CHANNEL_MODEL);
@@ -278,6 +325,7 @@ hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
 
 void hapi_exchange_model_publish(hapi_exchange *exchange)
 {
+  HAPI_ASSERT(model_fits(channel_back(exchange, HAPI_CHANNEL_MODEL), &exchange->capacity));
   channel_publish(exchange, HAPI_CHANNEL_MODEL);
 }
 
@@ -293,6 +341,7 @@ hapi_state *hapi_exchange_state_back(hapi_exchange *exchange)
 
 void hapi_exchange_state_publish(hapi_exchange *exchange)
 {
+  HAPI_ASSERT(state_fits(channel_back(exchange, HAPI_CHANNEL_STATE), &exchange->capacity));
   channel_publish(exchange, HAPI_CHANNEL_STATE);
 }
 
@@ -311,6 +360,7 @@ hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
 void hapi_exchange_near_publish(hapi_exchange *exchange)
 {
   const hapi_near *near = channel_back(exchange, HAPI_CHANNEL_NEAR);
+  HAPI_ASSERT(near_fits(near, &exchange->capacity));
   int empty = near->pair_count + near->tool_pair_count == 0 && near->always == 0;
   channel_publish(exchange, HAPI_CHANNEL_NEAR);
   if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
@@ -342,6 +392,7 @@ hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange)
 
 void hapi_exchange_poses_publish(hapi_exchange *exchange)
 {
+  HAPI_ASSERT(poses_fit(channel_back(exchange, HAPI_CHANNEL_POSES), &exchange->capacity));
   channel_publish(exchange, HAPI_CHANNEL_POSES);
 }
 
@@ -357,6 +408,7 @@ hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange)
 
 void hapi_exchange_patches_publish(hapi_exchange *exchange)
 {
+  HAPI_ASSERT(patches_fit(channel_back(exchange, HAPI_CHANNEL_PATCHES), &exchange->capacity));
   channel_publish(exchange, HAPI_CHANNEL_PATCHES);
 }
 

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 /* A body that slides over a mesh must not feel the seams between its triangles. A contact whose
@@ -18,6 +19,7 @@
 
 void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
 {
+  HAPI_ASSERT_UNIT(io->normal);
   double sides[2][3];
   double own[3];
   hapi_v3_sub(corners + 3, corners, sides[0]);
@@ -40,6 +42,8 @@ void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
 
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
+  HAPI_ASSERT_UNIT(normal);
+  HAPI_ASSERT((open_edges & ~15u) == 0);
   double sides[3][3];
   double own[3];
   if ((open_edges & TRIANGLE) == 0) {

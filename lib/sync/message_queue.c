@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 typedef struct node {
   struct node *next;
@@ -28,6 +29,7 @@ struct hapi_message_queue {
 
 hap_status hapi_message_queue_create(size_t message_size, hapi_message_queue **out)
 {
+  HAPI_ASSERT(message_size > 0);
   *out = hapi_alloc(sizeof **out);
   if (*out == NULL) {
     return HAP_ERROR_MEMORY;
@@ -99,6 +101,7 @@ static node *new_node(hapi_message_queue *queue)
 
 void hapi_message_queue_put(hapi_message_queue *queue, uint64_t number, const void *message)
 {
+  HAPI_ASSERT(queue->last == NULL || number > queue->last->number);
   node *n = number_is_wanted(queue, number) ? new_node(queue) : NULL;
   if (n == NULL) {
     return;

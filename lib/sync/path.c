@@ -5,9 +5,11 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 hap_status hapi_path_create(hapi_path *path)
 {
+  HAPI_ASSERT(path->rows == 0 || path->pointers > 0);
   if (path->rows == 0) {
     return HAP_OK;
   }
@@ -45,5 +47,6 @@ bool hapi_path_look(const hapi_path *path, int64_t *time_ns, const hapi_path_poi
 void hapi_path_let_go(hapi_path *path)
 {
   uint64_t read = atomic_load_explicit(&path->read, memory_order_relaxed);
+  HAPI_ASSERT(read < atomic_load_explicit(&path->written, memory_order_acquire));
   atomic_store_explicit(&path->read, read + 1, memory_order_release);
 }

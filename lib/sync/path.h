@@ -16,6 +16,8 @@
 #include <hapode/spatial.h>
 #include <hapode/status.h>
 
+#include "base/assert.h"
+
 typedef struct hapi_path_pointer {
   uint32_t generation;  /* 0: no pointer here */
   uint32_t is_tool;     /* a hull */
@@ -67,6 +69,7 @@ static inline hapi_path_pointer *hapi_path_next(hapi_path *path)
 
 static inline void hapi_path_send(hapi_path *path, int64_t time_ns)
 {
+  HAPI_ASSERT(path->rows > 0);
   uint64_t written = atomic_load_explicit(&path->written, memory_order_relaxed);
   path->times_ns[(written % path->rows)] = time_ns;
   atomic_store_explicit(&path->written, written + 1, memory_order_release);

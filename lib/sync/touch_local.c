@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 #define SAME_MOST 0.005  /* m */
@@ -43,6 +44,7 @@ static void fill_axis(const hapi_touch_side *side, double rim, double out[3])
 void hapi_touch_localise(const hapi_touch_side *a, const hapi_touch_side *b,
                          const hapi_patch_point *in, hapi_patch_contact *out)
 {
+  HAPI_ASSERT_UNIT(in->normal);
   const hapi_touch_side *face = in->touch == HAPI_TOUCH_FACE_A ? a : b;
   const hapi_touch_side *target = in->touch == HAPI_TOUCH_BALL_A ? b : a;
   out->touch = in->touch;
@@ -97,6 +99,7 @@ typedef struct face {
 
 static double off_line(const face *f, uint32_t index, const uint32_t ends[2], double out_off[3])
 {
+  HAPI_ASSERT_INDEX(index, f->in->count);
   double line[3];
   double arm[3];
   hapi_v3_sub(f->in->places[ends[1]], f->in->places[ends[0]], line);
@@ -146,6 +149,7 @@ static uint32_t farthest_off(const face *f, const uint32_t ends[2], const double
 
 static bool add_index(uint32_t *kept, uint32_t *io_count, uint32_t index)
 {
+  HAPI_ASSERT(*io_count <= HAPI_TOOL_PAIR_POINTS);
   for (uint32_t i = 0; i < *io_count; ++i) {
     if (kept[i] == index) {
       return false;
@@ -160,6 +164,8 @@ static bool add_index(uint32_t *kept, uint32_t *io_count, uint32_t index)
 /* Its corners, and its deepest point where none of them is. */
 static void keep_face(const face *f, uint32_t *kept, uint32_t *io_count)
 {
+  HAPI_ASSERT(f->count > 0);
+  HAPI_ASSERT_INDEX(f->deepest, f->in->count);
   double beside[3];
   uint32_t ends[2] = {farthest_from(f, f->deepest), 0};
   ends[1] = farthest_from(f, ends[0]);
@@ -180,6 +186,7 @@ static void keep_face(const face *f, uint32_t *kept, uint32_t *io_count)
 
 uint32_t hapi_tool_reduce(const hapi_tool_spots *in, uint32_t out_kept[HAPI_TOOL_PAIR_POINTS])
 {
+  HAPI_ASSERT(in->count <= HAPI_TOOL_SPOTS);
   bool done[HAPI_TOOL_SPOTS] = {false};
   uint32_t kept = 0;
   for (;;) {
@@ -212,5 +219,6 @@ uint64_t hapi_tool_key(uint64_t geom_key, uint32_t pointer, uint32_t generation)
 
 double hapi_tool_same_within(double extent)
 {
+  HAPI_ASSERT(extent >= 0.0);
   return fmin(SAME_MOST, SAME_SHARE * extent);
 }

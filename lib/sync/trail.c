@@ -3,6 +3,7 @@
 #include "sync/trail.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 
 /* The oldest rows are the next to be overwritten: a reader would have to begin again at once. */
 #define MARGIN_ROWS 4u
@@ -66,6 +67,7 @@ static void row_note(hapi_trail_view *view, uint64_t row)
 
 int64_t hapi_trail_time(hapi_trail_view *view, uint64_t row, hapi_trail_clock clock)
 {
+  HAPI_ASSERT(row >= view->first && row < view->end);
   const hapi_trail_row *head = &view->trail->heads[row % view->trail->rows];
   row_note(view, row);
   return clock == HAPI_TRAIL_TICK ? LOAD(head->time_ns) : LOAD(head->bodies_ns);
@@ -97,10 +99,12 @@ bool hapi_trail_body_at(hapi_trail_view *view, uint64_t row, uint32_t slot, uint
                         hap_pose *out)
 {
   const hapi_trail *trail = view->trail;
+  HAPI_ASSERT(row >= view->first && row < view->end);
   row_note(view, row);
   if (slot >= LOAD(trail->heads[row % trail->rows].body_high)) {
     return false;
   }
+  HAPI_ASSERT_INDEX(slot, trail->bodies);
   const hapi_trail_body *place = &hapi_trail_bodies(trail, row)[slot];
   if (LOAD(place->generation) != generation) {
     return false;
@@ -113,6 +117,7 @@ bool hapi_trail_body_at(hapi_trail_view *view, uint64_t row, uint32_t slot, uint
 bool hapi_trail_pointer_at(hapi_trail_view *view, uint64_t row, uint32_t index, uint32_t generation,
                            hap_pose out_proxy_device[2])
 {
+  HAPI_ASSERT_INDEX(index, view->trail->pointers);
   const hapi_trail_pointer *place = &hapi_trail_pointers(view->trail, row)[index];
   row_note(view, row);
   if (LOAD(place->generation) != generation) {
@@ -127,6 +132,7 @@ bool hapi_trail_pointer_at(hapi_trail_view *view, uint64_t row, uint32_t index, 
 
 bool hapi_trail_proxied_at(hapi_trail_view *view, uint64_t row, uint32_t index)
 {
+  HAPI_ASSERT_INDEX(index, view->trail->pointers);
   row_note(view, row);
   return LOAD(hapi_trail_pointers(view->trail, row)[index].proxied) != 0;
 }

@@ -21,6 +21,8 @@
 #include <hapode/spatial.h>
 #include <hapode/status.h>
 
+#include "base/assert.h"
+
 typedef struct hapi_trail_body {
   _Atomic uint32_t generation; /* of the slot; 0: the loop does not lead the body */
   _Atomic double pose[7];      /* position, quaternion w, x, y, z */
@@ -65,11 +67,13 @@ void hapi_trail_reset(hapi_trail *trail);
 
 static inline hapi_trail_body *hapi_trail_bodies(const hapi_trail *trail, uint64_t row)
 {
+  HAPI_ASSERT(trail->rows > 0);
   return trail->body_places + (row % trail->rows) * trail->bodies;
 }
 
 static inline hapi_trail_pointer *hapi_trail_pointers(const hapi_trail *trail, uint64_t row)
 {
+  HAPI_ASSERT(trail->rows > 0);
   return trail->pointer_places + (row % trail->rows) * trail->pointers;
 }
 

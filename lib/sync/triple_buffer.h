@@ -12,6 +12,8 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
+#include "base/assert.h"
+
 #define HAPI_TRIPLE_FRESH 4u
 
 typedef struct hapi_triple_buffer {
@@ -41,6 +43,7 @@ static inline void hapi_triple_publish(hapi_triple_buffer *b)
 {
   unsigned old =
       atomic_exchange_explicit(&b->middle, b->back | HAPI_TRIPLE_FRESH, memory_order_acq_rel);
+  HAPI_ASSERT(b->back < 3u && b->back != (old & 3u));
   b->back = old & 3u;
 }
 
@@ -51,6 +54,7 @@ static inline bool hapi_triple_take(hapi_triple_buffer *b)
     return false;
   }
   unsigned old = atomic_exchange_explicit(&b->middle, b->front, memory_order_acq_rel);
+  HAPI_ASSERT(b->front < 3u && b->front != (old & 3u));
   b->front = old & 3u;
   return true;
 }

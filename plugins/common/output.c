@@ -4,12 +4,14 @@
 
 #include <stdbool.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 _Static_assert(ATOMIC_BOOL_LOCK_FREE == 2, "zero is called from signal handlers");
 
 void hapi_output_init(hapi_output *output, double max_force, double max_torque)
 {
+  HAPI_ASSERT(max_force >= 0.0 && max_torque >= 0.0);
   *output = (hapi_output){.max_force = max_force, .max_torque = max_torque};
   atomic_init(&output->zeroed.raised, true);
 }
@@ -17,6 +19,7 @@ void hapi_output_init(hapi_output *output, double max_force, double max_torque)
 /* True when it had to. The largest component comes out first, so that no square overflows. */
 static bool vector_shorten(const double wanted[3], double limit, double out[3])
 {
+  HAPI_ASSERT(limit >= 0.0);
   double largest = hapi_max(fabs(wanted[0]), hapi_max(fabs(wanted[1]), fabs(wanted[2])));
   hapi_v3_copy(wanted, out);
   if (largest == 0.0) {

@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "plugins/common/timeline.h"
 
+#include "base/assert.h"
+
 void hapi_timeline_start(hapi_timeline *timeline)
 {
   *timeline = (hapi_timeline){.running = true};
@@ -14,6 +16,7 @@ void hapi_timeline_stop(hapi_timeline *timeline)
 
 hap_status hapi_timeline_advance(hapi_timeline *timeline, int64_t time_ns)
 {
+  HAPI_ASSERT(timeline->running || !timeline->begun);
   if (!timeline->running) {
     return HAP_ERROR_STATE;
   }

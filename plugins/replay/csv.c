@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/number.h"
 
@@ -193,6 +194,7 @@ static hap_status read_blank_end(hapi_csv *csv, hap_detail *detail)
 
 hap_status hapi_csv_next(hapi_csv *csv, double row[HAPI_CSV_COLUMNS_MAX], hap_detail *detail)
 {
+  HAPI_ASSERT(csv->columns > 0 && csv->columns <= HAPI_CSV_COLUMNS_MAX);
   hap_status status = read_line(csv, detail);
   if (status != HAP_OK) {
     return status;

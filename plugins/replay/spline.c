@@ -3,6 +3,7 @@
 #include "plugins/replay/spline.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 
 #define NEAR 4 /* rows to look at before bisection */
@@ -44,6 +45,7 @@ static void slopes_substitute(hapi_recording *recording, const double *upper)
 
 hap_status hapi_spline_solve(hapi_recording *recording, hap_detail *detail)
 {
+  HAPI_ASSERT(recording->count > 0 && recording->channels > 0);
   size_t channels = (size_t)recording->channels;
   recording->curvature = hapi_alloc_array(recording->count, channels * sizeof(double));
   double *upper = hapi_alloc_array(recording->count, sizeof(double));
@@ -60,12 +62,14 @@ hap_status hapi_spline_solve(hapi_recording *recording, hap_detail *detail)
 
 static bool segment_holds(const hapi_recording *recording, size_t segment, double time)
 {
+  HAPI_ASSERT(segment + 1 < recording->count);
   return hapi_recording_row(recording, segment)[0] <= time &&
          time < hapi_recording_row(recording, segment + 1)[0];
 }
 
 size_t hapi_spline_find(const hapi_recording *recording, double time, size_t near)
 {
+  HAPI_ASSERT(recording->count >= 2);
   size_t last = recording->count - 2;
   for (size_t i = near; i < near + NEAR && i <= last; ++i) {
     if (segment_holds(recording, i, time)) {
@@ -89,6 +93,7 @@ void hapi_spline_at(const hapi_recording *recording, size_t segment, double time
                     double value[HAPI_RECORDING_CHANNELS_MAX],
                     double slope[HAPI_RECORDING_CHANNELS_MAX])
 {
+  HAPI_ASSERT(segment + 1 < recording->count);
   int channels = recording->channels;
   const double *y0 = hapi_recording_row(recording, segment);
   const double *y1 = hapi_recording_row(recording, segment + 1);

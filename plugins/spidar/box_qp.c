@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "base/assert.h"
+
 /* Block principal pivoting: all variables that are on the wrong side change over at once, which
  * needs one to four sets. It may go round in circles: as soon as the number of the wrong ones does
  * not fall, a primal active set goes on from where it got to, one variable at a time, downhill,
@@ -17,6 +19,8 @@
 
 static double matrix_entry(const hapi_spidar_box_qp *qp, int row, int column)
 {
+  HAPI_ASSERT_INDEX(row, qp->n);
+  HAPI_ASSERT_INDEX(column, qp->n);
   return row >= column ? qp->h[row][column] : qp->h[column][row];
 }
 
@@ -86,6 +90,7 @@ static hapi_spidar_at bound_belongs(const hapi_spidar_box_qp *qp, const hapi_spi
 static void values_clip(const hapi_spidar_box_qp *qp, double *x)
 {
   for (int i = 0; i < qp->n; ++i) {
+    HAPI_ASSERT(qp->low[i] <= qp->high[i]);
     x[i] = fmax(qp->low[i], fmin(qp->high[i], x[i]));
   }
 }
@@ -128,6 +133,7 @@ static bool go_until_bound(const hapi_spidar_box_qp *qp, const double *y, hapi_s
       share = here < share ? here : share;
     }
   }
+  HAPI_ASSERT(share >= 0.0 && share <= 1.0);
   for (int i = 0; i < qp->n; ++i) {
     x[i] += share * (y[i] - x[i]);
   }
@@ -173,6 +179,7 @@ static int bounds_descend(const hapi_spidar_box_qp *qp, hapi_spidar_at *at, doub
 int hapi_spidar_box_qp_solve(const hapi_spidar_box_qp *qp, hapi_spidar_at at[HAPI_SPIDAR_ORDER_MAX],
                              double out_x[HAPI_SPIDAR_ORDER_MAX])
 {
+  HAPI_ASSERT(qp->n > 0 && qp->n <= HAPI_SPIDAR_ORDER_MAX);
   int fewest = HAPI_SPIDAR_ORDER_MAX + 1;
   int sets = 0;
   memset(out_x, 0, HAPI_SPIDAR_ORDER_MAX * sizeof *out_x);

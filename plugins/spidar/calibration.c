@@ -9,6 +9,7 @@
 #include "plugins/spidar/calibration.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
 #include "plugins/spidar/eigen.h"
@@ -106,6 +107,7 @@ static void untold_project(const hapi_spidar_model *model, const hapi_spidar_row
 static void string_derive(const problem *p, const hapi_spidar_rows *rows,
                           const hapi_spidar_sample *sample, int string, double out[PER_STRING])
 {
+  HAPI_ASSERT_INDEX(string, p->model.strings);
   int next = 0;
   out[next++] = -1.0;
   if ((p->find & HAPI_SPIDAR_FIND_SCALES) != 0) {
@@ -136,6 +138,7 @@ static double place_from(const problem *p, const hap_pose *start, const double *
  * samples need not lie on one way, and from another one's pose a search may end elsewhere. */
 static void sample_place(problem *p, size_t index, const double *lengths)
 {
+  HAPI_ASSERT_INDEX(index, p->count);
   const hapi_spidar_sample *sample = &p->samples[index];
   hap_pose *pose = &p->poses[index];
   if (sample->known) {

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/assert.h"
+
 static int reply_length(const hapi_spidar_boards *boards, int index)
 {
   return hapi_spidar_length(boards->model[index], HAPI_SPIDAR_CURRENT, HAPI_SPIDAR_FROM_BOARD);
@@ -25,6 +27,8 @@ void hapi_spidar_cycle_init(hapi_spidar_cycle *cycle, const hapi_spidar_boards *
     cycle->length += reply_length(boards, i);
     cycle->motors += motors_of(boards, i);
   }
+  HAPI_ASSERT(cycle->length <= (int)sizeof cycle->bytes);
+  HAPI_ASSERT(cycle->motors <= HAPI_SPIDAR_CYCLE_MOTORS);
 }
 
 void hapi_spidar_cycle_clear(hapi_spidar_cycle *cycle)
@@ -59,6 +63,7 @@ int hapi_spidar_cycle_commands(const hapi_spidar_cycle *cycle, const int16_t *cu
 
 static void drop_oldest(hapi_spidar_cycle *cycle, int count)
 {
+  HAPI_ASSERT(count >= 0 && count <= cycle->have);
   cycle->have -= count;
   memmove(cycle->bytes, cycle->bytes + count, (size_t)cycle->have);
   memmove(cycle->begins, cycle->begins + count, (size_t)cycle->have * sizeof cycle->begins[0]);
@@ -66,6 +71,7 @@ static void drop_oldest(hapi_spidar_cycle *cycle, int count)
 
 void hapi_spidar_cycle_push(hapi_spidar_cycle *cycle, const uint8_t *bytes, int count)
 {
+  HAPI_ASSERT(count >= 0);
   int room = (int)sizeof cycle->bytes;
   if (count == 0) {
     return;
@@ -77,6 +83,7 @@ void hapi_spidar_cycle_push(hapi_spidar_cycle *cycle, const uint8_t *bytes, int 
   if (cycle->have + count > room) {
     drop_oldest(cycle, cycle->have + count - room);
   }
+  HAPI_ASSERT(cycle->have + count <= room);
   memcpy(cycle->bytes + cycle->have, bytes, (size_t)count);
   memset(cycle->begins + cycle->have, 0, (size_t)count * sizeof cycle->begins[0]);
   cycle->begins[cycle->have] = true;
@@ -98,6 +105,7 @@ static bool fits_at(const hapi_spidar_cycle *cycle, int place)
 
 static void decode_at(const hapi_spidar_cycle *cycle, int place, int16_t *out_raw)
 {
+  HAPI_ASSERT(place >= 0 && place + cycle->length <= cycle->have);
   for (int i = 0; i < cycle->boards.count; ++i) {
     hapi_spidar_frame frame;
     (void)hapi_spidar_decode(cycle->bytes + place + cycle->start[i],
@@ -146,6 +154,7 @@ int hapi_spidar_cycle_silent(const hapi_spidar_cycle *cycle)
 
 bool hapi_spidar_counts_advance(hapi_spidar_counts *counts, const int16_t *raw, int step_max)
 {
+  HAPI_ASSERT(counts->motors > 0 && counts->motors <= HAPI_SPIDAR_CYCLE_MOTORS);
   int16_t step[HAPI_SPIDAR_CYCLE_MOTORS];
   size_t size = (size_t)counts->motors * sizeof raw[0];
   if (!counts->known) {

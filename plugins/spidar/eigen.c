@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
+
 #define SWEEPS 60
 
 typedef struct rotation {
@@ -15,6 +17,7 @@ typedef struct rotation {
 /* The one that makes a[p][q] zero. */
 static rotation rotation_of(double pp, double qq, double pq)
 {
+  HAPI_ASSERT(pq != 0.0);
   double theta = (qq - pp) / (2.0 * pq);
   double t = (theta >= 0.0 ? 1.0 : -1.0) / (fabs(theta) + sqrt(theta * theta + 1.0));
   double c = 1.0 / sqrt(t * t + 1.0);
@@ -72,6 +75,7 @@ static void values_sort(int n, hapi_spidar_eigen *out)
 void hapi_spidar_eigen_find(int n, double h[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_EIGEN_MAX],
                             hapi_spidar_eigen *out)
 {
+  HAPI_ASSERT(n > 0 && n <= HAPI_SPIDAR_EIGEN_MAX);
   double a[HAPI_SPIDAR_EIGEN_MAX][HAPI_SPIDAR_EIGEN_MAX];
   memcpy(a, h, sizeof a);
   memset(out, 0, sizeof *out);

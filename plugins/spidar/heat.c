@@ -5,6 +5,7 @@
  * resistance and capacity. In units of what heat_tension makes in the end: heat_time d share/dt =
  * (tension / heat_tension)^2 - share. */
 
+#include "base/assert.h"
 #include "base/vec.h"
 #include "plugins/spidar/tensions.h"
 
@@ -33,6 +34,7 @@ void hapi_spidar_heat_step(hapi_spidar_heat *heat, const hapi_spidar_model *mode
                            const double tension[HAPI_SPIDAR_STRINGS_MAX], double seconds,
                            double out_most[HAPI_SPIDAR_STRINGS_MAX])
 {
+  HAPI_ASSERT(model->heat_time > 0.0 && model->heat_tension > 0.0);
   double step = seconds > 0.0 && seconds < HUGE_VAL ? seconds / model->heat_time : 0.0;
   for (int i = 0; i < model->strings; ++i) {
     double held =

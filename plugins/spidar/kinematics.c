@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "plugins/spidar/kinematics.h"
 
+#include "base/assert.h"
 #include "base/vec.h"
 #include "plugins/spidar/matrix.h"
 
@@ -34,6 +35,8 @@ void hapi_spidar_home(hap_pose *out)
 void hapi_spidar_rows_at(const hapi_spidar_model *model, const hap_pose *pose,
                          hapi_spidar_rows *out)
 {
+  HAPI_ASSERT(model->strings > 0 && model->strings <= HAPI_SPIDAR_STRINGS_MAX);
+  HAPI_ASSERT(model->dof == 3 || model->dof == 6);
   double turn[9];
   hapi_quat_to_matrix(pose->quat_wxyz, turn);
   for (int i = 0; i < model->strings; ++i) {
@@ -87,6 +90,7 @@ static inline void add_row(normal *e, int n, const double *row, double r)
 
 static void row_of(const hapi_spidar_rows *rows, int string, double row[6])
 {
+  HAPI_ASSERT_INDEX(string, HAPI_SPIDAR_STRINGS_MAX);
   hapi_v3_copy(rows->unit[string], row);
   hapi_v3_scale(1.0 / TURN_LENGTH, rows->moment[string], row + 3);
 }
@@ -328,6 +332,7 @@ typedef struct without {
 static without leave_out(const hapi_spidar_model *model, const hap_pose *good,
                          const double *lengths, int string)
 {
+  HAPI_ASSERT_INDEX(string, model->strings);
   const uint32_t all = (1u << model->strings) - 1u;
   const measured others = {lengths, all & ~(1u << string)};
   hapi_spidar_solver solver;

@@ -9,6 +9,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "base/assert.h"
+
 #define HAPI_SPIDAR_ORDER_MAX 8
 
 typedef double hapi_spidar_matrix[HAPI_SPIDAR_ORDER_MAX][HAPI_SPIDAR_ORDER_MAX];
@@ -16,6 +18,7 @@ typedef double hapi_spidar_matrix[HAPI_SPIDAR_ORDER_MAX][HAPI_SPIDAR_ORDER_MAX];
 /* a = l l^T in place; the diagonal holds 1 / l_ii. False: not positive definite, or not finite. */
 static inline bool hapi_spidar_cholesky(hapi_spidar_matrix a, int n)
 {
+  HAPI_ASSERT(n >= 0 && n <= HAPI_SPIDAR_ORDER_MAX);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < i; ++j) {
       double sum = a[i][j];
@@ -39,6 +42,7 @@ static inline bool hapi_spidar_cholesky(hapi_spidar_matrix a, int n)
 /* x = l^-1 x */
 static inline void hapi_spidar_forward(hapi_spidar_matrix l, int n, double *x)
 {
+  HAPI_ASSERT(n >= 0 && n <= HAPI_SPIDAR_ORDER_MAX);
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < i; ++k) {
       x[i] -= l[i][k] * x[k];

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "plugins/spidar/rates.h"
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 #define QUANTUM 1.0 /* counts */
@@ -14,6 +15,7 @@ void hapi_spidar_rates_reset(hapi_spidar_rates *rates)
 
 static uint32_t place_of(const hapi_spidar_rates *rates, uint32_t age)
 {
+  HAPI_ASSERT_INDEX(age, HAPI_SPIDAR_RATES_SAMPLES);
   return (rates->newest + HAPI_SPIDAR_RATES_SAMPLES - age) % HAPI_SPIDAR_RATES_SAMPLES;
 }
 
@@ -21,6 +23,7 @@ static uint32_t place_of(const hapi_spidar_rates *rates, uint32_t age)
  * all between: the slopes that are left are narrowed down sample by sample. */
 static uint32_t find_window(const double *way, const double *per_s, uint32_t count)
 {
+  HAPI_ASSERT(count <= HAPI_SPIDAR_RATES_SAMPLES);
   double low = -HUGE_VAL;
   double high = HUGE_VAL;
   uint32_t age = 1;
@@ -39,6 +42,7 @@ static uint32_t find_window(const double *way, const double *per_s, uint32_t cou
 /* Slope of the line of least squares through (-age, -way). */
 static double slope_fit(const double *way, const double *age_s, uint32_t window)
 {
+  HAPI_ASSERT_INDEX(window, HAPI_SPIDAR_RATES_SAMPLES);
   double mean_age = 0.0;
   double mean_way = 0.0;
   double product = 0.0;

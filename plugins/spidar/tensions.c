@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "plugins/spidar/tensions.h"
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 #define CAPABILITY_REACHED 0.9
@@ -38,6 +39,7 @@ void hapi_spidar_wrench(const hapi_spidar_model *model, const hap_pose *pose,
 static void set_matrix(const hapi_spidar_model *model, const hapi_spidar_rows *rows,
                        const hap_wrench *wanted, hapi_spidar_box_qp *qp)
 {
+  HAPI_ASSERT(model->strings > 0 && model->strings <= HAPI_SPIDAR_STRINGS_MAX);
   double weight = model->torque_weight;
   qp->n = model->strings;
   for (int i = 0; i < qp->n; ++i) {
@@ -120,6 +122,7 @@ hap_status hapi_spidar_tensions_solve(hapi_spidar_tensions *state, const hapi_sp
 
 static void direction_of(int index, double out[3])
 {
+  HAPI_ASSERT_INDEX(index, DIRECTIONS);
   int code = index < DIRECTIONS / 2 ? index : index + 1; /* not the middle of the cube */
   const double digits[3] = {-1.0, 0.0, 1.0};
   hapi_v3_set(out, digits[code % 3], digits[code / 3 % 3], digits[code / 9]);

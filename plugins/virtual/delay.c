@@ -3,6 +3,7 @@
 #include "plugins/virtual/delay.h"
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/vec.h"
 
 bool hapi_delay_init(hapi_delay *line, uint64_t delay_ns)
@@ -29,6 +30,7 @@ void hapi_delay_clear(hapi_delay *line)
 
 void hapi_delay_give(hapi_delay *line, uint64_t now_ns, const double force[3])
 {
+  HAPI_ASSERT(line->count <= HAPI_DELAY_COMMANDS);
   if (line->commands == NULL) {
     hapi_v3_copy(force, line->acting);
     return;
@@ -41,6 +43,7 @@ void hapi_delay_give(hapi_delay *line, uint64_t now_ns, const double force[3])
 
 uint64_t hapi_delay_take(hapi_delay *line, uint64_t now_ns)
 {
+  HAPI_ASSERT(line->first < HAPI_DELAY_COMMANDS);
   while (line->count > 0 && line->commands[line->first].due_ns <= now_ns) {
     hapi_v3_copy(line->commands[line->first].force, line->acting);
     line->first = (line->first + 1) % HAPI_DELAY_COMMANDS;

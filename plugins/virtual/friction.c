@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "base/assert.h"
+
 #define EVENTS_MAX 8 /* stops and starts in a step; then the axis rests until the next one */
 #define HALVINGS 50  /* of a share of a step */
 
@@ -15,6 +17,7 @@ typedef struct unspent {
 
 static void cut_front(unspent *rest, double share)
 {
+  HAPI_ASSERT(share >= 0.0 && share <= 1.0);
   rest->length *= 1.0 - share;
   rest->push[0] += share * (rest->push[1] - rest->push[0]);
 }
@@ -36,6 +39,8 @@ static double standing_share(const hapi_hand *hand, int axis, double friction, c
 
 static double axis_acceleration(const hapi_hand *hand, int axis, double push)
 {
+  HAPI_ASSERT_INDEX(axis, 3);
+  HAPI_ASSERT(hand->def.mass > 0.0);
   return (push - hand->def.stiffness * hand->position[axis] -
           (hand->def.damping + hand->def.drag) * hand->velocity[axis]) /
          hand->def.mass;
@@ -88,6 +93,7 @@ static bool axis_slide(hapi_hand *hand, int axis, double braked_by, unspent *res
 void hapi_friction_step(hapi_hand *hand, int axis, double friction, double length,
                         const double push[2])
 {
+  HAPI_ASSERT(friction >= 0.0 && length >= 0.0);
   if (friction == 0.0) {
     hapi_hand_step_axis(hand, axis, length, push);
     return;

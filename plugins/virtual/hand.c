@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 
 #define SIZE 4
@@ -71,6 +72,7 @@ static void matrix_exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
  * makes rows of like size, which keeps the number of squarings and the rounding small. */
 static void solution_prepare(const hapi_hand_def *def, double length, hapi_hand_solution *out)
 {
+  HAPI_ASSERT(def->mass > 0.0 && def->stiffness >= 0.0);
   double per_mass = 1.0 / def->mass;
   double w = fmax(sqrt(def->stiffness * per_mass), 1.0);
   double damping = def->damping + def->drag;
@@ -92,6 +94,7 @@ static void solution_prepare(const hapi_hand_def *def, double length, hapi_hand_
 
 static const hapi_hand_solution *solution_of(hapi_hand *hand, double length)
 {
+  HAPI_ASSERT_INDEX(hand->next, HAPI_HAND_SOLUTIONS);
   for (int i = 0; i < HAPI_HAND_SOLUTIONS; ++i) {
     if (hand->solutions[i].length == length) {
       return &hand->solutions[i];
@@ -120,6 +123,7 @@ void hapi_hand_place(hapi_hand *hand, const double position[3], const double vel
 void hapi_hand_push(const hapi_hand *hand, int axis, const hapi_hand_target *target, double force,
                     double out_push[2])
 {
+  HAPI_ASSERT_INDEX(axis, 3);
   for (int end = 0; end < 2; ++end) {
     out_push[end] = hand->def.stiffness * target->position[end][axis] +
                     hand->def.damping * target->velocity[end][axis] + force;
@@ -128,6 +132,7 @@ void hapi_hand_push(const hapi_hand *hand, int axis, const hapi_hand_target *tar
 
 void hapi_hand_step_axis(hapi_hand *hand, int axis, double length, const double push[2])
 {
+  HAPI_ASSERT_INDEX(axis, 3);
   const hapi_hand_solution *s = solution_of(hand, length);
   double x = hand->position[axis];
   double v = hand->velocity[axis];

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "base/number.h"
 #include "base/vec.h"
@@ -97,6 +98,7 @@ void hapi_motion_finish(hapi_motion *motion)
  * state, so that a hand may ask for any time in any order. */
 static size_t find_segment(const hapi_motion *motion, double time)
 {
+  HAPI_ASSERT(motion->count > 0 && time >= motion->waypoints[0].time);
   size_t low = 0;
   size_t high = motion->count;
   while (high - low > 1) {
@@ -123,6 +125,7 @@ static double time_wrap(const hapi_motion *motion, double time)
 /* Share s of the way and its derivative by u, for the share u of the time. */
 static double blend_value(hapi_blend kind, double u, double *slope)
 {
+  HAPI_ASSERT(u >= 0.0 && u <= 1.0);
   if (kind == HAPI_BLEND_LINEAR) {
     *slope = 1.0;
     return u;
