@@ -32,8 +32,8 @@ void hapi_clock_sleep_until(int64_t time_ns)
 int64_t hapi_clock_deadline(uint64_t index, double rate_hz)
 {
   HAPI_ASSERT(rate_hz > 0.0);
-  /* Where the period is a whole number of nanoseconds, as of most rates in use, it is a multiple of
-   * that. The rates next to such a one differ by more than the product's rounding. */
+  /* Most rates have a period of whole nanoseconds: the deadline is a multiple of the period. The
+   * neighbouring rates of such a rate differ by more than the product's rounding. */
   int64_t period_ns = (int64_t)(1e9 / rate_hz);
   if ((double)period_ns * rate_hz == 1e9) {
     return (int64_t)index * period_ns;

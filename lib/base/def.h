@@ -3,8 +3,8 @@
 #ifndef HAPODE_BASE_DEF_H
 #define HAPODE_BASE_DEF_H
 
-/* The def structs of the API begin with size and cookie, both uint32_t: a caller of another build
- * has more members than this one, or fewer, and one that was not initialised is noticed. */
+/* The def structs of the API begin with size and cookie, both uint32_t. The size tells a caller of
+ * another build, with more or fewer members; the cookie tells whether the def was initialised. */
 
 #include <stddef.h>
 #include <stdint.h>

@@ -3,10 +3,10 @@
 #ifndef HAPODE_BASE_FAIR_LOCK_H
 #define HAPODE_BASE_FAIR_LOCK_H
 
-/* A lock between the physics thread and the application that neither can hold off for long: a plain
- * mutex lets a busy physics thread take it again before a waiting application wakes up. Here the
- * thread that waited longest is next. Any number may wait: a place in the queue is on the stack of
- * the one who waits. */
+/* A lock between the physics thread and the application. With a plain mutex a busy physics thread
+ * would take it again before a waiting application wakes up. Here the thread that waited longest is
+ * next. Any number of threads may wait: a place in the queue is on the stack of the thread that
+ * waits. */
 
 #include <pthread.h>
 #include <stdbool.h>

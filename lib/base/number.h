@@ -7,8 +7,8 @@
 
 /* Reads a decimal number such as -1, .5, 2.5e-3 at the start of text, with a point whatever the
  * locale says. No blanks, hex, nan or inf. text ends with a zero byte. Returns the first character
- * behind the number, or NULL when there is no number or it is beyond the range of a double; *out
- * is written only when there is one. [any] */
+ * behind the number; NULL: there is no number, or it is beyond the range of a double. Only then
+ * *out is not written. [any] */
 const char *hapi_number_read(const char *text, double *out);
 
 /* Writes value with nine digits in the form that hapi_number_read reads, whatever the locale says.

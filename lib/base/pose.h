@@ -16,7 +16,7 @@ static inline void hapi_quat_move(double quat[4], const double w[3], double seco
   double turn[4] = {0.0, w[0], w[1], w[2]};
   double rate[4];
   hapi_quat_multiply(turn, quat, rate);
-  quat[0] += 0.5 * seconds * rate[0]; /* no loop: in pairs they would wait for each other */
+  quat[0] += 0.5 * seconds * rate[0]; /* no loop: the compiler would make dependent pairs */
   quat[1] += 0.5 * seconds * rate[1];
   quat[2] += 0.5 * seconds * rate[2];
   quat[3] += 0.5 * seconds * rate[3];

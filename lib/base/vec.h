@@ -19,8 +19,7 @@ static inline void hapi_v3_copy(const double a[3], double out[3])
   out[2] = a[2];
 }
 
-/* fmin and fmax without their calls, of which a tick would make a thousand; the bound where x is no
- * number. */
+/* fmin and fmax without a call, of which a tick would make a thousand. NaN gives the bound. */
 static inline double hapi_min(double x, double bound)
 {
   return x < bound ? x : bound;
@@ -134,8 +133,8 @@ static inline void hapi_quat_normalize(double q[4])
     q[1] = q[2] = q[3] = 0.0;
     return;
   }
-  /* After a small turn it is nearly of unit length: there the series is exact to rounding, and no
-   * root and division have to be waited for. */
+  /* After a small turn the length is nearly 1: there the series is exact to rounding, without the
+   * latency of a root and a division. */
   double off = n2 - 1.0;
   double s = fabs(off) < 1e-4 ? 1.0 - off * (0.5 - off * (0.375 - 0.3125 * off)) : 1.0 / sqrt(n2);
   q[0] *= s;
@@ -181,7 +180,7 @@ static inline void hapi_m3_apply_transposed(const double m[9], const double v[3]
   out[2] = m[2] * v[0] + m[5] * v[1] + m[8] * v[2];
 }
 
-/* out = r m r^T: a tensor of the body in world axes; out is none of the two */
+/* out = a b; out may be a or b */
 static inline void hapi_m3_multiply(const double a[9], const double b[9], double out[9])
 {
   double product[9];
@@ -193,6 +192,7 @@ static inline void hapi_m3_multiply(const double a[9], const double b[9], double
   memcpy(out, product, sizeof product);
 }
 
+/* out = r m r^T: a tensor of the body in world axes; out is neither r nor m */
 static inline void hapi_m3_turn(const double r[9], const double m[9], double out[9])
 {
   HAPI_ASSERT(out != r && out != m);

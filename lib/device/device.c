@@ -218,7 +218,7 @@ void hap_device_close(hap_device *device)
     return;
   }
   device->ops->zero(device->self);
-  /* acq_rel: whoever frees must see all that the other holder did to the device. */
+  /* acq_rel: the thread that frees must see all that the other holder did to the device. */
   unsigned before = atomic_fetch_or_explicit(&device->holders.bits, CLOSED, memory_order_acq_rel);
   if (before == 0) {
     device_free(device);

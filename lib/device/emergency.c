@@ -11,10 +11,9 @@
 
 /* A fixed table without a lock: a signal handler may come between any two steps of the others.
  *
- * A place is taken, then gets its self, then its ops, by which it is seen. Whoever calls counts
- * itself in before it looks at ops, and out after zero came back: remove hides ops and then waits
- * for the count to fall to 0, so that no device is freed under a call. All in the one order of
- * seq_cst. */
+ * A place is taken, then gets its self, then its ops, by which it is seen. A caller counts itself
+ * in before it reads ops, and out after zero has returned. remove hides ops and then waits for a
+ * count of 0, so no device is freed under a call. All accesses are seq_cst. */
 
 typedef struct place {
   _Atomic int taken;

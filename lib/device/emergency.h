@@ -15,8 +15,8 @@
 /* [control] A device that was started; false: no room. */
 bool hapi_emergency_add(const hap_device_ops *ops, void *self);
 
-/* [control] When it comes back, nobody calls zero of this device any more: a call that is under way
- * in another thread is waited for. */
+/* [control] After it has returned, nobody calls zero of this device any more. Waits for a call that
+ * is under way in another thread. */
 void hapi_emergency_remove(const hap_device_ops *ops, const void *self);
 
 /* [any] Calls of hap_emergency_zero so far. */

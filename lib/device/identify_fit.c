@@ -1,13 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* m a + b v + c sign(v) + g + k x = f(t - delay), multiplied with functions that vanish with their
- * slopes at both ends of a window and integrated by parts (modulating functions: Shinbrot 1957;
- * Preisig, Rippin 1993): no position is differentiated, so rounded ones do. The second derivatives
- * of the functions are Legendre polynomials of order 2 and up: these are orthogonal, so white noise
- * of the positions is white noise of the rows, and least squares is what it should be. Within a
- * window the velocity keeps its sign. For a delay the equation is linear in the other five; the
- * delay is where the rest is least. */
+/* m a + b v + c sign(v) + g + k x = f(t - delay) is multiplied with functions that vanish, with
+ * their slopes, at both ends of a window, and is integrated by parts (modulating functions:
+ * Shinbrot 1957; Preisig, Rippin 1993). No position is differentiated, so rounded positions do. The
+ * second derivatives of the functions are Legendre polynomials of order 2 and up. These are
+ * orthogonal: white noise of the positions is white noise of the rows, as least squares needs it.
+ * Within a window the velocity keeps its sign. For a given delay the equation is linear in the
+ * other five unknowns; the delay with the least residual is taken. */
 
 #include <math.h>
 #include <stdbool.h>

@@ -15,13 +15,12 @@
 #include "base/log.h"
 #include "device/device.h"
 
-/* The code that is loaded holds motors, so that it is the file that was named and no other one: a
- * whole path, never a search through LD_LIBRARY_PATH or the folder that the program happens to run
- * in.
+/* The loaded code drives motors, so it must be the named file and no other: a whole path, no search
+ * through LD_LIBRARY_PATH or the working folder.
  *
  * Each device holds the library once, and the system's loader counts: the code goes with the last
- * of them. By then nobody is in it: ops->close came back, and before that hapi_emergency_remove
- * waited for every zero that another thread or a signal handler was calling.
+ * device. By then no thread runs in it: ops->close has returned, and hapi_emergency_remove has
+ * waited for every call of zero.
  *
  * All symbols are bound while it is loaded (RTLD_NOW). Bound at first use, the first zero would
  * call the system's loader, which locks, from a signal handler. */

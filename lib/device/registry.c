@@ -5,8 +5,8 @@
 #include "device/device.h"
 #include "device/module.h"
 
-/* Declared here and not in a header of the plugin: a device sees the library, never the other way
- * round, and these names are all that the library knows of them. */
+/* Declared here and not in a header of the plugin: a device knows the library, never the other way
+ * round. These names are all that the library knows of its devices. */
 extern const hap_device_ops hapi_virtual_ops;
 extern const hap_device_ops hapi_replay_ops;
 extern const hap_device_ops hapi_spidar_ops;

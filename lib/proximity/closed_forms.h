@@ -5,9 +5,9 @@
 
 #include "proximity/support.h"
 
-/* Answers without iteration and without libccd, fit for the haptic loop. Exact inside and outside
- * and stable where the direction is undefined (centre on a surface, an axis, the other centre):
- * there one of the equally good directions is taken, the same one every time. */
+/* Answers without iteration and without libccd, fit for the haptic loop. Exact inside and outside.
+ * Where the direction is undefined (centre on a surface, an axis, the other centre) one of the
+ * equally good directions is taken, always the same one. */
 
 /* Pairs with a sphere and anything but a hull; pairs with a plane and anything but a plane. Points
  * are relative to the origin of the solids. False: no closed form for this pair. */

@@ -84,10 +84,9 @@ static bool simplex_accept(search *s, hapi_simplex *grown)
   return true;
 }
 
-/* One vertex more; false when there is no better answer in doubles: the bound from below (the
- * support plane) has come up to the distance, or rounding keeps the distance from falling. The
- * bound is held far below the 1e-10 wanted of the distance: the error of the direction is its root.
- */
+/* Adds a vertex. False: doubles give no better answer, because the bound from below (the support
+ * plane) has reached the distance, or rounding keeps the distance from falling. The bound is held
+ * far below the 1e-10 wanted of the distance: the error of the direction is its root. */
 static bool search_step(search *s)
 {
   double distance = hapi_v3_norm(s->nearest);

@@ -17,10 +17,10 @@ typedef struct hapi_gjk {
   int iterations;
 } hapi_gjk;
 
-/* False: the cores meet, or are so near (1e-13 of their size) that the answer would be noise; then
- * normal is the last direction looked at, out of the cores when they hardly meet. Not for planes.
- * start: a direction (b to a) to begin with, or NULL; one that separates them is proof that they
- * are apart. */
+/* False: the cores meet, or are so near (1e-13 of their size) that the answer would be noise. Then
+ * normal is the last direction tried, which points out of cores that hardly meet. Not for planes.
+ * start: a direction (b to a) to begin with, or NULL; a separating one proves that they are
+ * apart. */
 bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *start, hapi_gjk *out);
 
 #endif

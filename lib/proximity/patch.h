@@ -56,8 +56,8 @@ typedef struct hapi_patch {
   hapi_patch_point points[HAPI_PATCH_POINTS]; /* deepest first */
 } hapi_patch;
 
-/* The points whose gap is at most margin [m]. The margin acts along the normal only: the points of
- * two faces lie in the overlap that is seen along it, and boxes or hulls that pass each other edge
+/* The points whose gap is at most margin [m]. The margin acts along the normal only. The points of
+ * two faces lie in the overlap seen along the normal; boxes or hulls that pass each other edge
  * beside edge, without an overlap, have no points until they touch. Of more than four points the
  * deepest and those that span the largest area are kept. Faces within 5 degrees of the nearest
  * direction make a patch of faces, so a slight tilt leaves all its corners.

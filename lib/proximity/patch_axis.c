@@ -8,9 +8,9 @@
 
 /* The normal of two cores. It starts with a guess: the best of the faces and of the directions
  * across the axes. Clearly apart: GJK. Nearer or shallowly penetrated: the cores are shifted apart
- * along the guess, GJK tells where they are nearest then, which is a better guess; faces and edges
- * are found after one to three such steps. Only what this does not settle, or is so deep that the
- * guess may have led to a wrong side, goes to hapi_deep_nearest. */
+ * along the guess, and GJK's normal for the shifted cores is a better guess. Faces and edges are
+ * found after one to three such steps. Only what this does not settle, or is so deep that the guess
+ * may have led to a wrong side, goes to hapi_deep_nearest. */
 
 enum {
   STEPS_MAX = 60,

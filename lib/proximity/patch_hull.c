@@ -7,7 +7,7 @@
 #include "proximity/patch_parts.h"
 
 /* A hull is a heap of points with no list of faces. A plane that comes along d is wrapped around
- * it: it meets the farthest point, is tilted until it meets a second one, and is turned about these
+ * the hull. It meets the farthest point, tilts until it meets a second one, and turns about these
  * two until it meets a third. Of the two faces there the one turned least is taken. */
 
 typedef struct wrap {

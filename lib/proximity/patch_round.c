@@ -94,9 +94,9 @@ static bool on_smooth(const hapi_solid *solid, const double normal[3])
   return false;
 }
 
-/* An end that hangs over an edge, with the edge nearer to the middle than the end, is held by the
- * line of the capsule and not by its ball, whose normal would lean. A centre inside of the other
- * solid may leave by another side than the capsule. */
+/* Where an edge is nearer to the middle than the capsule's end, that end hangs over it. The line of
+ * the capsule holds it there; the end's ball would have a leaning normal. A centre inside of the
+ * other solid may leave by another side than the capsule. */
 static bool end_counts(const hapi_solid *other, const double outward[3], const double to_other[3],
                        double core_gap)
 {

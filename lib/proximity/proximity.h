@@ -4,10 +4,10 @@
 #define HAPODE_PROXIMITY_PROXIMITY_H
 
 /* Nearest points, normal and signed distance of two convex shapes. No state, any thread. Pairs with
- * a sphere or a plane (but not sphere against hull) have closed forms and never allocate; neither
- * does anything while the cores of the shapes are well apart (closed_forms.h, gjk.h). Only where a
- * cylinder or a hull is penetrated or all but touched libccd is called, which allocates; that costs
- * 0.2 ms, up to 1.5 ms. */
+ * a sphere or a plane (but not sphere against hull) have closed forms and never allocate. No pair
+ * allocates while the cores of its shapes are well apart (closed_forms.h, gjk.h). Where a cylinder
+ * or a hull is penetrated or nearly touched, libccd is called, which allocates; that costs 0.2 ms,
+ * up to 1.5 ms. */
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -5,8 +5,8 @@
 
 #include "proximity/proximity.h"
 
-/* A shape at a pose, in world axes about an origin near the pair: 10 km from the world's origin a
- * coordinate has a grain of 2e-12 m, the small numbers here have not.
+/* A shape at a pose, in world axes about an origin near the pair: 10 km from the world's origin
+ * coordinates are rounded to 2e-12 m; the small numbers here are not.
  *
  * Every solid is a core blown up by a ball. Sphere: point; capsule: segment; hull: itself, with a
  * ball where it is rounded; others: themselves with no ball. Distances of cores are exact for round

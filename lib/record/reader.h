@@ -25,12 +25,12 @@ const char *hapi_reader_note(const hapi_reader *reader); /* info.note_size bytes
 const hapi_file_end *hapi_reader_end(const hapi_reader *reader);
 const hapi_grammar *hapi_reader_whole(const hapi_reader *reader); /* after all of its cells */
 
-/* The next packet of a stream, valid until the next call; HAP_END when there is none, errors as of
- * open where the file has changed since. pop goes on to the one after it. */
+/* The next packet of a stream, valid until the next call. HAP_END: there is none; errors as of open
+ * where the file has changed since. pop goes on to the packet after it. */
 hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                             uint32_t *out_count, hap_detail *detail);
-/* The same, as far as it can be seen without reading on until a thread's cells pile up: *out NULL
- * when none is in sight, *out_count 1 of 2 where the end of a physics step is not. */
+/* The same, but reads on only until the loop's cells pile up. *out is NULL when no packet was
+ * found; *out_count is 1 instead of 2 when the end of a physics step was not found. */
 hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                               uint32_t *out_count, hap_detail *detail);
 void hapi_reader_pop(hapi_reader *reader, hapi_stream stream);

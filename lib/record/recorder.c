@@ -149,8 +149,9 @@ static bool drain_whole(hapi_recorder *recorder, hapi_stream stream)
   return good && block_flush(recorder, stream);
 }
 
-/* The loop's cells are written after all that the others had put when these were taken: so what a
- * tick took from them stands before it, and the file can be replayed to wherever it breaks off. */
+/* The loop's cells are taken first and written last, after all that the other threads had put by
+ * then. So every message that a tick took stands before the tick, and a file that breaks off can be
+ * replayed up to there. */
 static bool streams_drain(hapi_recorder *recorder, bool flushes)
 {
   uint32_t *count = &recorder->counts[HAPI_STREAM_HAPTIC];

@@ -5,9 +5,8 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 
-/* The writer's release of written pairs with the reader's acquire, so that a cell is read whole;
- * the reader's release of read with the writer's acquire, so that none is written while it is
- * read. */
+/* The writer's release of written pairs with the reader's acquire: a cell is read whole. The
+ * reader's release of read pairs with the writer's acquire: no cell is written while it is read. */
 
 hap_status hapi_tape_create(hapi_tape *tape, uint32_t cells, _Atomic int *ended)
 {

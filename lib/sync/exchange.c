@@ -355,8 +355,8 @@ hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
   return channel_back(exchange, HAPI_CHANNEL_NEAR);
 }
 
-/* Physics alone writes near_is_empty, and the contact thread waits only while it is set: no post is
- * lost, and one too many costs a look. */
+/* Only physics writes near_is_empty, and the contact thread waits only while it is set. So no post
+ * is lost, and a superfluous one costs one check. */
 void hapi_exchange_near_publish(hapi_exchange *exchange)
 {
   const hapi_near *near = channel_back(exchange, HAPI_CHANNEL_NEAR);

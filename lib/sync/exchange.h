@@ -72,19 +72,18 @@ uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name);
 /* [writer] how many there were */
 uint64_t hapi_exchange_published(const hapi_exchange *exchange, hapi_channel name);
 
-/* Replay, one thread. From now on the messages are kept, and take gives the one that is expected:
- * the threads of a recording are run one after the other, and what one of them told comes to the
- * other at the same place as then, however much the one is ahead by now. Until expect, take gives
- * the newest. Before the first message; ends with destroy. */
+/* Replay, one thread. From now on messages are kept, and take gives the expected one. Replay runs
+ * the threads of a recording one after the other; so each thread takes the same messages as when it
+ * was recorded, however far ahead the others are. Until expect, take gives the newest. Before the
+ * first message; ends with destroy. */
 hap_status hapi_exchange_play(hapi_exchange *exchange);
-/* number of the message that take gives; 0: none; one that is held already: none */
+/* Number of the message that take gives. 0, or one that is held already: take gives none. */
 void hapi_exchange_expect(hapi_exchange *exchange, hapi_channel name, uint64_t number);
-/* of those before number none but the expected one is going to be asked for */
+/* Messages before number can go, but for the expected one. */
 void hapi_exchange_forget(hapi_exchange *exchange, hapi_channel name, uint64_t number);
 /* HAP_ERROR_MEMORY, HAP_ERROR_NOT_FOUND: what hapi_message_queue_status says of any of them. */
 hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
-/* [haptic] -> whoever draws. Not in the block: it is written round and round and stays in
- * memory. */
+/* [haptic] -> threads that draw. Not in the block: a ring that is always in use stays in memory. */
 hapi_trail *hapi_exchange_trail(hapi_exchange *exchange);
 hapi_path *hapi_exchange_path(hapi_exchange *exchange); /* [haptic] -> [physics] */
 

@@ -8,9 +8,9 @@
 #include "base/assert.h"
 #include "base/vec.h"
 
-/* A body that slides over a mesh must not feel the seams between its triangles. A contact whose
- * normal is the triangle's own counts always; one that leans over an edge only when no neighbour
- * goes on behind that edge in the same plane or higher. */
+/* A body that slides over a mesh must not feel the seams between its triangles. A contact with the
+ * triangle's own normal always counts. A contact that leans over an edge counts only if no
+ * neighbour continues behind that edge in the same plane or higher. */
 
 #define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
 #define TRIANGLE 8u

@@ -12,9 +12,9 @@
  * hapi_near_geom; corners: 3 x 3, in the axes of the normal, which points out of the triangle. */
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3]);
 
-/* A point between a shape (a) and a triangle of a mesh (b) that a face of the shape gave its normal
- * to: where the two lie on each other the triangle's own normal is taken, as the next triangle has
- * it, too. */
+/* A point between a shape (a) and a triangle of a mesh (b), with the normal of a face of the shape.
+ * Where the face lies on the triangle, the point gets the triangle's normal, which the next
+ * triangle shares. */
 void hapi_mesh_straighten(const double *corners, hapi_patch_point *io);
 
 #endif

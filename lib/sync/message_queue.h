@@ -18,8 +18,8 @@ void hapi_message_queue_destroy(hapi_message_queue *queue); /* NULL allowed */
 /* Copies the message, unless it was forgotten before and is not expected. */
 void hapi_message_queue_put(hapi_message_queue *queue, uint64_t number, const void *message);
 
-/* The message that is expected, or NULL where that is none, held already or not there; valid until
- * the next one is taken. What lies before it is forgotten. */
+/* The expected message, valid until the next one is taken; NULL: none is expected, it is held
+ * already, or it is missing. Messages before it are forgotten. */
 void *hapi_message_queue_take(hapi_message_queue *queue);
 
 void hapi_message_queue_expect(hapi_message_queue *queue, uint64_t number); /* UINT64_MAX: newest */

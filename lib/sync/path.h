@@ -3,10 +3,9 @@
 #ifndef HAPODE_SYNC_PATH_H
 #define HAPODE_SYNC_PATH_H
 
-/* Where the pointers went and what the hands felt there, tick by tick, on its way from the loop to
- * physics, which goes over it again (physics/lookback.h). A ring with one writer, the loop, which
- * never waits, and one reader, physics. What finds no room is left out and counted: the reader sees
- * a gap. */
+/* Where the pointers went and what the hands felt there, tick by tick. The loop writes it, physics
+ * goes over it again (lookback.h). A ring with one writer, which never waits, and one reader. A row
+ * without room is dropped and counted: the reader sees a gap. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -15,12 +15,13 @@ typedef struct hapi_touch_side {
   hap_pose shape_pose; /* of the shape in the body's frame */
 } hapi_touch_side;
 
-/* All but whose contact it is. The shape of a ball's target has no points: a hull is none. */
+/* Fills all but whose contact it is. The shape of a ball's target is never a hull and has no
+ * points. */
 void hapi_touch_localise(const hapi_touch_side *a, const hapi_touch_side *b,
                          const hapi_patch_point *in, hapi_patch_contact *out);
 
-/* The patch of a pointer's hull (a), of that extent [m], and a shape. Of points within the margin
- * those that are about as near as the nearest: the others would lie on the far side of the hull. */
+/* The patch of a pointer's hull (a), of that extent [m], and a shape. Of the points within the
+ * margin, those about as near as the nearest: others lie on the far side of the hull. */
 bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double margin,
                      double extent, hapi_patch *out);
 
@@ -35,14 +36,14 @@ typedef struct hapi_tool_spots {
   uint32_t count;
 } hapi_tool_spots;
 
-/* What is enough of them: of those that push the same way the corners and the deepest. Else the
- * seams of triangles would have shares of the stiffness. Returns how many. */
+/* Keeps the corners and the deepest of the points that push the same way; else the seams between
+ * triangles would share the stiffness. Returns how many. */
 uint32_t hapi_tool_reduce(const hapi_tool_spots *in, uint32_t out_kept[HAPI_TOOL_PAIR_POINTS]);
 
 /* Of the same pair, by what a and b are. */
 uint64_t hapi_tool_key(uint64_t geom_key, uint32_t pointer, uint32_t generation);
 
-/* How far apart two points of a hull of that extent may be to be one that went on. */
+/* A new point of a hull of that extent matches an old one that is nearer than this. */
 double hapi_tool_same_within(double extent);
 
 #endif

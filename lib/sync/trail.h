@@ -3,16 +3,15 @@
 #ifndef HAPODE_SYNC_TRAIL_H
 #define HAPODE_SYNC_TRAIL_H
 
-/* Where the loop's bodies and pointers have been in the last ticks, for those who draw. One writer,
- * the loop, which never waits and asks nobody; any number of readers.
+/* Where the loop's bodies and pointers were in the last ticks, for drawing. One writer, the loop,
+ * which never waits; any number of readers.
  *
  * A ring of rows, the newest of which overwrites the oldest. Every number in it is atomic, stored
  * with release and loaded with acquire, and the count of written rows is stored last. So a reader
- * that has seen anything of row n sees, after that, a count of n or more: when the count has not
- * gone past the oldest row that it used by the length of the ring, nothing that it read was being
- * overwritten. It would have to sleep for most of the ring's time to be told to read again. A queue
- * would keep the oldest rows where nobody draws for some time, and the newest are what is
- * wanted. */
+ * that has seen a part of row n then sees a count of n or more. While the count is less than a
+ * ring's length past the oldest row used, no row was overwritten under the reader. Only a reader
+ * that sleeps for most of the ring's time must read again. A queue would keep the oldest rows when
+ * nobody draws; drawing needs the newest. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -4,10 +4,10 @@
 #define HAPODE_SYNC_TRIPLE_BUFFER_H
 
 /* Hand-over of the newest value from one writer thread to one reader thread. Wait-free on both
- * sides; values between may be skipped. Of three places the writer owns one, the reader one, and
- * the third one lies in the middle; both sides exchange their own with the middle in one atomic
- * step. The release of the writer's exchange pairs with the acquire of the reader's, and the other
- * way round, so that a place is never seen half written and never written while it is read. */
+ * sides; values between may be skipped. The writer owns one place of three, the reader another, the
+ * third is in the middle. Each side exchanges its own with the middle in one atomic step. The
+ * release of one side's exchange pairs with the acquire of the other's: no place is read half
+ * written, and none is written while it is read. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

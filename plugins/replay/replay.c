@@ -153,8 +153,8 @@ static void channels_sample(replay_device *device, double time, double *value, d
   hapi_spline_at(recording, device->segment, time, value, slope);
 }
 
-/* The unit quaternion of a spline that is not, and the angular velocity in the axes of the frame
- * it turns in: omega = 2 q' q*, of which the part of q' along q is real and drops out. */
+/* The unit quaternion along a spline that is not one, and the angular velocity in the axes of the
+ * fixed frame: omega = 2 q' q*. The part of q' along q is real and drops out. */
 static void settle_rotation(const double value[4], const double slope[4], double quat[4],
                             double angular[3])
 {

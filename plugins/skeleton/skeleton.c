@@ -181,7 +181,7 @@ static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrenc
     return HAP_ERROR_STATE;
   }
   if (!(isfinite(force[0]) && isfinite(force[1]) && isfinite(force[2]))) {
-    hardware_off(device->board); /* a number that is none must not become a current */
+    hardware_off(device->board); /* NaN must not become a current */
     return HAP_ERROR_ARGUMENT;
   }
   bool shortened = force_shorten(force, device->limit);

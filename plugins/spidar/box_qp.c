@@ -7,11 +7,11 @@
 #include "base/assert.h"
 
 /* Block principal pivoting: all variables that are on the wrong side change over at once, which
- * needs one to four sets. It may go round in circles: as soon as the number of the wrong ones does
- * not fall, a primal active set goes on from where it got to, one variable at a time, downhill,
- * which ends. Judice, Pires, "A block principal pivoting algorithm for large-scale strictly
- * monotone linear complementarity problems", Computers and Operations Research 21(5), 1994;
- * Nocedal, Wright, "Numerical Optimization", 16.5. */
+ * needs one to four sets. It may cycle. As soon as the number of wrong variables does not fall, a
+ * primal active set goes on from there, one variable at a time and downhill, which always ends.
+ * Judice, Pires, "A block principal pivoting algorithm for large-scale strictly monotone linear
+ * complementarity problems", Computers and Operations Research 21(5), 1994; Nocedal, Wright,
+ * "Numerical Optimization", 16.5. */
 #define SETS_MAX 100
 /* A variable on its bound whose gradient is 0 is right on both sides; rounding must not decide for
  * ever. */

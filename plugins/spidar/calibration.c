@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Variable projection: for given unknowns the poses are found by hapi_spidar_solve; what is left of
- * the lengths is then a function of the unknowns alone, whose derivative is that at held poses,
+/* Variable projection. For given unknowns hapi_spidar_solve finds the poses; the residual of the
+ * lengths is then a function of the unknowns alone. Its derivative is the one at held poses,
  * projected on what no motion of the grip explains. Golub, Pereyra, SIAM J. Numerical Analysis
  * 10(2), 1973; Kaufman, BIT 15, 1975. */
 
@@ -134,8 +134,8 @@ static double place_from(const problem *p, const hap_pose *start, const double *
   return solver.residual;
 }
 
-/* From that of the round before, and where this does not fit from the middle of the workspace:
- * samples need not lie on one way, and from another one's pose a search may end elsewhere. */
+/* From the pose of the round before; where that does not fit, from the middle of the workspace. Not
+ * from the sample before: samples need not lie on one path. */
 static void sample_place(problem *p, size_t index, const double *lengths)
 {
   HAPI_ASSERT_INDEX(index, p->count);

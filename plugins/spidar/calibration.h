@@ -52,8 +52,8 @@ typedef struct hapi_spidar_calibration {
 /* [control] From a checked model and samples of all over the workspace, turned all ways. Where the
  * model is not calibrated the first sample is taken as being at home, within some 5 mm, or at its
  * known pose. HAP_ERROR_ARGUMENT with a sentence in detail (may be NULL): too few samples, counts
- * not finite, samples that do not tell what is looked for, or lengths that fit no pose (a slack
- * string); *out then has what was found out for all the figures but model. HAP_ERROR_MEMORY. */
+ * not finite, samples that do not tell the unknowns, or lengths that fit no pose (a slack string).
+ * *out then has all figures that were found, but no model. HAP_ERROR_MEMORY. */
 HAP_NODISCARD hap_status hapi_spidar_calibrate(const hapi_spidar_model *model,
                                                const hapi_spidar_sample *samples, size_t count,
                                                unsigned find, hapi_spidar_calibration *out,

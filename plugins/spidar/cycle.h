@@ -5,12 +5,12 @@
 
 /* One exchange with all boards of a line: a CURRENT command to each, a reply of each. Pure.
  *
- * Replies have neither checksum nor number. What is known of a damaged one: the replies of a cycle
- * come in the order of the commands, each begins with its header, their lengths are fixed, nothing
- * comes between them, nothing behind the last but the next cycle, and nothing before the first but
- * a pause or another whole cycle. A cycle of which any of that does not hold is dropped whole: with
- * half of the strings from one tick and half from another the pose is that of neither. After that
- * the steps of the positions are looked at: a string does not jump. */
+ * Replies have neither checksum nor number. A damaged one is recognised by its place. The replies
+ * of a cycle come in the order of the commands, without gaps; each has its header and a fixed
+ * length. Before the first there is a pause or another whole cycle, behind the last the next cycle
+ * or nothing. A cycle that breaks one of these rules is dropped whole: strings of two different
+ * ticks would give a pose of neither. Then the steps of the positions are checked: a string does
+ * not jump. */
 
 #include "plugins/spidar/frames.h"
 

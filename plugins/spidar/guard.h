@@ -4,9 +4,9 @@
 #define HAPODE_PLUGINS_SPIDAR_GUARD_H
 
 /* The boards hold the last current until they are told another one. When the process that drives
- * them is killed, or its loop hangs, nobody tells them: so a second process, made by fork, holds
- * the port open as well and sends zero current as soon as the first one is gone or has not written
- * for a while. It holds nothing else of the first one open, and ends with it. */
+ * them is killed, or its loop hangs, nobody tells them. So a second process, made by fork, also
+ * holds the port open. It sends zero current as soon as the first one is gone or has not written
+ * for a while. It keeps nothing else of the first one open, and ends with it. */
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -19,8 +19,8 @@ void hapi_spidar_heat_init(hapi_spidar_heat *heat, double share)
   }
 }
 
-/* The power that may come in, in units of that of heat_tension: at share 1 just what goes out. step
- * is the length of the next step over heat_time, which must not go beyond 1 either. */
+/* The power that may come in, in units of that of heat_tension; at share 1 it equals what goes out.
+ * step: length of the next step over heat_time; share must stay within 1 after it, too. */
 static double allowed_power(const hapi_spidar_model *model, double share, double step)
 {
   double most = model->max_tension / model->heat_tension;

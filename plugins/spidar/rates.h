@@ -4,11 +4,11 @@
 #define HAPODE_PLUGINS_SPIDAR_RATES_H
 
 /* Rates of the strings from their counts. The rounding of a count is known exactly, that of a pose
- * is not: so the windows are taken here, string by string, and the twist comes from the rates by
- * hapi_spidar_twist. For each string the longest window over which a straight line stays within a
- * count of every sample, and the slope of the line of least squares in it: short when the motion
- * turns, long when it is slow. Janabi-Sharifi, Hayward, Chen, IEEE Trans. Control Systems
- * Technology 8(6), 2000. Pure: no heap, no lock, no system call, bounded time. */
+ * is not. So each string has its own window, and hapi_spidar_twist makes the twist from the rates.
+ * A window is the longest one over which a straight line stays within a count of every sample; the
+ * rate is the slope of the least-squares line in it. Windows are short when the motion turns and
+ * long when it is slow. Janabi-Sharifi, Hayward, Chen, IEEE Trans. Control Systems Technology 8(6),
+ * 2000. Pure: no heap, no lock, no system call, bounded time. */
 
 #include <stdint.h>
 

@@ -9,9 +9,8 @@
 
 #define HAPI_SPIDAR_PATH_MAX 256
 
-/* The descriptor has the same number from init to finish, with /dev/null behind it while no port is
- * open: a signal handler may write to it at any time and reaches the port or nothing, never another
- * file. */
+/* The descriptor has the same number from init to finish; while no port is open, it is /dev/null.
+ * So a signal handler may write to it at any time and never reaches another file. */
 typedef struct hapi_spidar_serial {
   int fd;
   char path[HAPI_SPIDAR_PATH_MAX];

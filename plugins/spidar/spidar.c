@@ -56,8 +56,8 @@ static int send_none(hapi_spidar_device *device)
   return hapi_spidar_line_send(&device->line, none);
 }
 
-/* What rounding leaves over is added to the next tick's, so that on the mean the tensions are those
- * wanted: steps of 0.01 N at some 500 Hz are not felt, an error of all strings that lasts is. */
+/* The rounding error is carried to the next tick, so that the mean tensions are the wanted ones.
+ * Steps of 0.01 N at some 500 Hz are not felt; a lasting error of all strings is. */
 static void tensions_convert(hapi_spidar_device *device, const double *tension)
 {
   for (int i = 0; i < device->model.strings; ++i) {

@@ -3,10 +3,10 @@
 #ifndef HAPODE_PLUGINS_VIRTUAL_FRICTION_H
 #define HAPODE_PLUGINS_VIRTUAL_FRICTION_H
 
-/* Coulomb friction on a hand's motion, along each axis by itself: the axis stops at the moment its
- * velocity passes zero, stays where it is while the push is not stronger than the friction, and
- * goes on at the moment it is. Between these moments the step is the hand's exact one, so that
- * nothing chatters, whatever the length of the step. */
+/* Coulomb friction on a hand's motion, for each axis. An axis stops at the moment its velocity
+ * passes zero, stays while the push is not stronger than the friction, and goes on at the moment it
+ * is. Between these moments the step is the hand's exact one, so nothing chatters at any step
+ * length. */
 
 #include "plugins/virtual/hand.h"
 

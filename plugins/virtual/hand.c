@@ -68,8 +68,8 @@ static void matrix_exponential(double a[SIZE][SIZE], double out[SIZE][SIZE])
 }
 
 /* The oscillator and a right side u that grows by du over the step are one linear system of the
- * state (x, v / w, u, du); its exponential holds the whole step. w, near the natural frequency,
- * makes rows of like size, which keeps the number of squarings and the rounding small. */
+ * state (x, v / w, u, du). Its exponential is the whole step. The scale w, near the natural
+ * frequency, makes rows of like size: fewer squarings, less rounding. */
 static void solution_prepare(const hapi_hand_def *def, double length, hapi_hand_solution *out)
 {
   HAPI_ASSERT(def->mass > 0.0 && def->stiffness >= 0.0);
