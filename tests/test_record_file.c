@@ -396,7 +396,7 @@ static hapi_recorder_state record_ticks(uint64_t max_bytes)
   hapi_recorder_config config = {
       .path = recorded_path, .max_bytes = max_bytes, .cells = {4096, 64, 64}};
   hapi_file_describe(&config.info);
-  snprintf(config.info.ode, sizeof config.info.ode, "%s", dGetConfiguration());
+  snprintf(config.info.build.ode, sizeof config.info.build.ode, "%s", dGetConfiguration());
   if (hapi_recorder_create(&config, &recorder, &detail) != HAP_OK) {
     return state;
   }
@@ -479,16 +479,16 @@ TEST(another_machine_version_or_library_is_told)
   f.head.version = 3;
   CHECK(open_changed(&f, "of version 3 of the file format") == HAP_ERROR_UNSUPPORTED);
   f.head.version = 2;
-  char kept = info->machine[0];
-  info->machine[0] = 'Z';
+  char kept = info->build.machine[0];
+  info->build.machine[0] = 'Z';
   CHECK(open_changed(&f, "a machine of type \"Z") == HAP_ERROR_UNSUPPORTED);
-  info->machine[0] = kept;
-  info->library[0] = '7';
+  info->build.machine[0] = kept;
+  info->build.library[0] = '7';
   CHECK(open_changed(&f, "the library's version \"7") == HAP_ERROR_UNSUPPORTED);
-  info->library[0] = '0';
-  info->ode[0] = '?';
+  info->build.library[0] = '0';
+  info->build.ode[0] = '?';
   CHECK(open_changed(&f, "an ODE of configuration") == HAP_ERROR_UNSUPPORTED);
-  memset(info->ode, 'x', sizeof info->ode);
+  memset(info->build.ode, 'x', sizeof info->build.ode);
   CHECK(open_changed(&f, "in a form that there is not") == HAP_ERROR_FORMAT);
   release(&f);
 }

@@ -32,12 +32,13 @@
 
 void hapi_file_describe(hapi_file_info *out)
 {
-  snprintf(out->library, sizeof out->library, "%s", hap_version());
-  snprintf(out->machine, sizeof out->machine, "%s-%s-%zu", PROCESSOR, SYSTEM, 8 * sizeof(void *));
+  snprintf(out->build.library, sizeof out->build.library, "%s", hap_version());
+  snprintf(out->build.machine, sizeof out->build.machine, "%s-%s-%zu", PROCESSOR, SYSTEM,
+           8 * sizeof(void *));
 #if defined(__GLIBC__)
-  snprintf(out->system, sizeof out->system, "glibc %s", gnu_get_libc_version());
+  snprintf(out->build.system, sizeof out->build.system, "glibc %s", gnu_get_libc_version());
 #else
-  snprintf(out->system, sizeof out->system, "other libc");
+  snprintf(out->build.system, sizeof out->build.system, "other libc");
 #endif
   out->joined_size = (uint32_t)sizeof(hapi_joined);
 }

@@ -48,11 +48,16 @@ typedef struct hapi_block_head {
   uint32_t crc;    /* of head, with 0 here, and bytes as stored */
 } hapi_block_head;
 
-typedef struct hapi_file_info {
+/* What wrote the recording. */
+typedef struct hapi_file_build {
   char library[16]; /* version */
   char machine[24]; /* processor, word size, operating system */
   char system[40];  /* C library: its mathematics may differ in the last digit */
   char ode[160];    /* dGetConfiguration */
+} hapi_file_build;
+
+typedef struct hapi_file_info {
+  hapi_file_build build;
   double physics_hz;
   double contact_hz;
   double haptic_hz;
@@ -90,7 +95,7 @@ typedef struct hapi_file_end {
 
 static_assert(sizeof(hapi_file_head) == 32 && sizeof(hapi_block_head) == 24, "the file's");
 
-/* With info.library, .machine, .system and .joined_size of this build. */
+/* Fills build but for ode, and joined_size, as this library is. */
 void hapi_file_describe(hapi_file_info *out);
 
 uint32_t hapi_file_crc_head(const hapi_file_head *head);

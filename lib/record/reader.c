@@ -235,14 +235,17 @@ static hap_status check_build(const hapi_reader *reader, const char *ode, hap_de
   hapi_file_info here;
   memset(&here, 0, sizeof here);
   hapi_file_describe(&here);
-  if (strcmp(info->machine, here.machine) != 0) {
-    return other_build(reader, "a machine of type", info->machine, here.machine, detail);
+  if (strcmp(info->build.machine, here.build.machine) != 0) {
+    return other_build(reader, "a machine of type", info->build.machine, here.build.machine,
+                       detail);
   }
-  if (strcmp(info->library, here.library) != 0 || info->joined_size != here.joined_size) {
-    return other_build(reader, "the library's version", info->library, here.library, detail);
+  if (strcmp(info->build.library, here.build.library) != 0 ||
+      info->joined_size != here.joined_size) {
+    return other_build(reader, "the library's version", info->build.library, here.build.library,
+                       detail);
   }
-  if (ode != NULL && strncmp(info->ode, ode, sizeof info->ode - 1) != 0) {
-    return other_build(reader, "an ODE of configuration", info->ode, ode, detail);
+  if (ode != NULL && strncmp(info->build.ode, ode, sizeof info->build.ode - 1) != 0) {
+    return other_build(reader, "an ODE of configuration", info->build.ode, ode, detail);
   }
   return HAP_OK;
 }
@@ -262,10 +265,10 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
   memcpy(info, reader->bytes, HAPI_FILE_INFO_LEAST);
   size_t size = reader->head.size - (size_t)info->note_size; /* wraps where the note is too long */
   if (info->note_size > HAPI_NOTE_MAX || size < HAPI_FILE_INFO_LEAST || size > sizeof *info ||
-      !text_is_terminated(info->library, sizeof info->library) ||
-      !text_is_terminated(info->machine, sizeof info->machine) ||
-      !text_is_terminated(info->system, sizeof info->system) ||
-      !text_is_terminated(info->ode, sizeof info->ode)) {
+      !text_is_terminated(info->build.library, sizeof info->build.library) ||
+      !text_is_terminated(info->build.machine, sizeof info->build.machine) ||
+      !text_is_terminated(info->build.system, sizeof info->build.system) ||
+      !text_is_terminated(info->build.ode, sizeof info->build.ode)) {
     return block_refuse(reader, "it tells what was recorded in a form that there is not", detail);
   }
   memcpy(info, reader->bytes, size);

@@ -520,7 +520,7 @@ hap_status hap_player_get_info(const hap_player *player, hap_player_info *out, s
       .note = hapi_reader_note(player->reader),
       .note_size = hapi_reader_info(player->reader)->note_size,
   };
-  snprintf(info.system, sizeof info.system, "%s", hapi_reader_info(player->reader)->system);
+  snprintf(info.system, sizeof info.system, "%s", hapi_reader_info(player->reader)->build.system);
   memcpy(out, &info, size);
   return HAP_OK;
 }
@@ -642,7 +642,7 @@ hap_status hap_player_difference(const hap_player *player, hap_play_difference *
   hapi_file_info here;
   memset(&here, 0, sizeof here);
   hapi_file_describe(&here);
-  d.other_system = strcmp(hapi_reader_info(player->reader)->system, here.system) != 0;
+  d.other_system = strcmp(hapi_reader_info(player->reader)->build.system, here.build.system) != 0;
   d.size = (uint32_t)size;
   memcpy(out, &d, size);
   return HAP_OK;

@@ -67,7 +67,7 @@ static hap_status check_session(const hap_session *session, hap_detail *detail)
 static void describe(const hap_session_def *def, hapi_file_info *out)
 {
   hapi_file_describe(out);
-  snprintf(out->ode, sizeof out->ode, "%s", hapi_physics_ode_configuration());
+  snprintf(out->build.ode, sizeof out->build.ode, "%s", hapi_physics_ode_configuration());
   out->physics_hz = def->physics_hz;
   out->contact_hz = def->expert->contact_hz;
   out->haptic_hz = def->haptic_hz;

@@ -180,12 +180,12 @@ static hap_status open_port(hapi_spidar_device *device, const char *name, size_t
 
 static void set_limits(hapi_spidar_device *device, const hapi_argument *entries)
 {
-  hapi_spidar_capability(&device->model, &device->max_force, &device->max_torque);
+  hapi_spidar_capability(&device->model, &device->settings.max_force, &device->settings.max_torque);
   if (entries[MAX_FORCE].given) {
-    device->max_force = fmin(device->max_force, entries[MAX_FORCE].number[0]);
+    device->settings.max_force = fmin(device->settings.max_force, entries[MAX_FORCE].number[0]);
   }
   if (entries[MAX_TORQUE].given) {
-    device->max_torque = fmin(device->max_torque, entries[MAX_TORQUE].number[0]);
+    device->settings.max_torque = fmin(device->settings.max_torque, entries[MAX_TORQUE].number[0]);
   }
 }
 
@@ -209,13 +209,13 @@ static hap_status read_arguments(hapi_spidar_device *device, hapi_argument *entr
   if (status < HAP_OK) {
     return status;
   }
-  device->timeout = entries[TIMEOUT_ARGUMENT].number[0];
-  device->stall = entries[STALL_ARGUMENT].number[0];
-  if (device->stall > 0.0 && device->stall < 0.05) {
+  device->settings.timeout = entries[TIMEOUT_ARGUMENT].number[0];
+  device->settings.stall = entries[STALL_ARGUMENT].number[0];
+  if (device->settings.stall > 0.0 && device->settings.stall < 0.05) {
     return hapi_arguments_fail(&table, &entries[STALL_ARGUMENT], detail);
   }
-  hapi_v3_copy(entries[OFFSET].number, device->offset);
-  memcpy(device->rotate, entries[ROTATE].number, sizeof device->rotate);
+  hapi_v3_copy(entries[OFFSET].number, device->settings.offset);
+  memcpy(device->settings.rotate, entries[ROTATE].number, sizeof device->settings.rotate);
   const hapi_argument *model = &entries[MODEL];
   return model->given ? read_model(model->text, model->length, &device->model, detail) : HAP_OK;
 }

@@ -122,8 +122,8 @@ static bool judge_fit(hapi_spidar_device *device, hapi_spidar_fit fit)
 static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist *twist)
 {
   const hap_pose *grip = &device->solver.pose;
-  const double *r = device->rotate;
-  hapi_pose_point(device->offset, r, grip->position, pose->position);
+  const double *r = device->settings.rotate;
+  hapi_pose_point(device->settings.offset, r, grip->position, pose->position);
   /* Turned as the grip is, in the axes of the frame: at home it is the identity. */
   const double back[4] = {r[0], -r[1], -r[2], -r[3]};
   double turned[4];
@@ -165,7 +165,7 @@ static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
     }
     set_cause(device, HAPI_SPIDAR_WELL);
   }
-  if (hapi_spidar_line_silence(&device->line) > device->timeout) {
+  if (hapi_spidar_line_silence(&device->line) > device->settings.timeout) {
     /* Later the way that they jumped would be one that a string can go in the time. */
     return device_fail(device,
                        device->line.bad_steps > 0 ? HAPI_SPIDAR_JUMPED : HAPI_SPIDAR_SILENT);
@@ -273,13 +273,13 @@ static void lower_zero(hapi_spidar_device *device)
 static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
                          const hap_wrench *given)
 {
-  bool little = hapi_v3_norm(given->force) < LITTLE * device->max_force &&
-                hapi_v3_norm(given->torque) < LITTLE * device->max_torque;
+  bool little = hapi_v3_norm(given->force) < LITTLE * device->settings.max_force &&
+                hapi_v3_norm(given->torque) < LITTLE * device->settings.max_torque;
   memset(&device->held, 0, sizeof device->held);
   if (!is_zero(wanted) || !little) {
-    hapi_quat_rotate(device->rotate, given->force, device->held.force);
+    hapi_quat_rotate(device->settings.rotate, given->force, device->held.force);
     if (device->model.dof == 6) {
-      hapi_quat_rotate(device->rotate, given->torque, device->held.torque);
+      hapi_quat_rotate(device->settings.rotate, given->torque, device->held.torque);
     }
   }
 }
@@ -287,8 +287,8 @@ static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
 /* A force at its limit may bring a little more in another direction with it. */
 static void keep_limits(hapi_spidar_device *device)
 {
-  (void)vector_shorten(device->held.force, device->max_force);
-  (void)vector_shorten(device->held.torque, device->max_torque);
+  (void)vector_shorten(device->held.force, device->settings.max_force);
+  (void)vector_shorten(device->held.torque, device->settings.max_torque);
 }
 
 static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
@@ -306,10 +306,10 @@ static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench 
     spidar_zero(device);
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = vector_shorten(local.force, device->max_force);
-  bool eased = vector_shorten(local.torque, device->max_torque) && device->model.dof == 6;
-  hapi_quat_unrotate(device->rotate, local.force, local.force);
-  hapi_quat_unrotate(device->rotate, local.torque, local.torque);
+  bool shortened = vector_shorten(local.force, device->settings.max_force);
+  bool eased = vector_shorten(local.torque, device->settings.max_torque) && device->model.dof == 6;
+  hapi_quat_unrotate(device->settings.rotate, local.force, local.force);
+  hapi_quat_unrotate(device->settings.rotate, local.torque, local.torque);
   bool taut = strings_pull(device, &local, &given);
   tell_reached(device, wanted, &given);
   keep_limits(device);
@@ -471,9 +471,9 @@ static hap_status spidar_start(void *self)
   }
   set_cause(device, HAPI_SPIDAR_WELL);
   atomic_store(&device->told, HAPI_SPIDAR_WELL);
-  if (device->stall > 0.0 &&
+  if (device->settings.stall > 0.0 &&
       !hapi_spidar_guard_start(&device->guard, device->serial.fd, device->zeros, device->zero_count,
-                               device->stall)) {
+                               device->settings.stall)) {
     hapi_log(HAP_LOG_WARNING,
              "spidar: there is no guard process: when this one is killed, the "
              "motors keep their currents");
@@ -536,8 +536,8 @@ static void spidar_describe(void *self, hap_device_info *out)
   const hapi_spidar_model *model = &device->model;
   snprintf(out->name, sizeof out->name, "spidar-%s", model->name);
   out->dof = (unsigned)model->dof;
-  out->max_force = device->max_force;
-  out->max_torque = model->dof == 6 ? device->max_torque : 0.0;
+  out->max_force = device->settings.max_force;
+  out->max_torque = model->dof == 6 ? device->settings.max_torque : 0.0;
   out->mass = model->mass;
   out->damping = model->damping;
   out->friction = model->friction;

@@ -26,6 +26,16 @@ typedef enum hapi_spidar_cause {
   HAPI_SPIDAR_OTHER_BOARDS /* start: not the boards that it was opened with */
 } hapi_spidar_cause;
 
+/* From the arguments. */
+typedef struct hapi_spidar_settings {
+  double timeout; /* s, of silence */
+  double stall;   /* s, without a write, until the guard takes the force off; 0: no guard */
+  double max_force;
+  double max_torque;
+  double offset[3]; /* where the model's origin is in the device's frame */
+  double rotate[4]; /* the model's axes in it */
+} hapi_spidar_settings;
+
 typedef struct hapi_spidar_device {
   hapi_spidar_serial serial;
   hapi_spidar_guard guard;
@@ -34,13 +44,7 @@ typedef struct hapi_spidar_device {
   hapi_spidar_model model;
   bool model_calibrated; /* by a file: else the grip is taken to be at home at the first start */
 
-  /* Arguments. */
-  double timeout; /* s, of silence */
-  double stall;   /* s, without a write, until the guard takes the force off; 0: no guard */
-  double max_force;
-  double max_torque;
-  double offset[3]; /* where the model's origin is in the device's frame */
-  double rotate[4]; /* the model's axes in it */
+  hapi_spidar_settings settings;
 
   uint8_t zeros[HAPI_SPIDAR_ZEROS_MAX]; /* takes the force off; never changes after open */
   int zero_count;

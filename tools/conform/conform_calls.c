@@ -107,7 +107,7 @@ void conform_zero(conform *c)
   conform_enter("zero", CONFORM_TICK_LIMIT_S);
   int64_t begin_ns = hapi_clock_now();
   c->ops->zero(c->self);
-  hapi_histogram_add(&c->zeros, hapi_clock_now() - begin_ns);
+  hapi_histogram_add(&c->seen.zeros, hapi_clock_now() - begin_ns);
   conform_leave();
 }
 
@@ -115,19 +115,19 @@ static void read_judge(conform *c, hap_status status, const conform_sample *s, b
 {
   const double *q = s->pose.quat_wxyz;
   double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  ++c->read_count;
-  c->wrong.statuses += status < HAP_OK || !conform_status_is_known(status);
+  ++c->seen.read_count;
+  c->seen.wrong.statuses += status < HAP_OK || !conform_status_is_known(status);
   if (status < HAP_OK) {
     return;
   }
-  c->wrong.poses += !(hapi_finite(s->pose.position, 3) && fabs(square - 1.0) < 1e-6);
-  c->wrong.twists += !(hapi_finite(s->twist.linear, 3) && hapi_finite(s->twist.angular, 3));
-  c->wrong.buttons += !buttons;
+  c->seen.wrong.poses += !(hapi_finite(s->pose.position, 3) && fabs(square - 1.0) < 1e-6);
+  c->seen.wrong.twists += !(hapi_finite(s->twist.linear, 3) && hapi_finite(s->twist.angular, 3));
+  c->seen.wrong.buttons += !buttons;
 }
 
 hap_status conform_read(conform *c, conform_sample *out)
 {
-  uint32_t poison = c->read_count % 2 == 0 ? 0x5a5a5a5au : 0xa5a5a5a5u;
+  uint32_t poison = c->seen.read_count % 2 == 0 ? 0x5a5a5a5au : 0xa5a5a5a5u;
   uint32_t buttons = poison;
   memset(out, 0xff, sizeof *out); /* not a number: what is not filled in shows */
   conform_enter("read", CONFORM_TICK_LIMIT_S);
@@ -136,7 +136,7 @@ hap_status conform_read(conform *c, conform_sample *out)
   int64_t end_ns = hapi_clock_now();
   conform_leave();
   if (c->running) {
-    hapi_histogram_add(&c->reads, end_ns - begin_ns);
+    hapi_histogram_add(&c->seen.reads, end_ns - begin_ns);
     read_judge(c, status, out, buttons != poison);
   }
   if (c->ops->pacing == HAP_PACING_DEVICE) {
@@ -153,7 +153,7 @@ hap_status conform_write(conform *c, const hap_wrench *wanted, hap_wrench *reach
   int64_t begin_ns = hapi_clock_now();
   hap_status status = c->ops->write(c->self, wanted, reached);
   if (c->running) {
-    hapi_histogram_add(&c->writes, hapi_clock_now() - begin_ns);
+    hapi_histogram_add(&c->seen.writes, hapi_clock_now() - begin_ns);
   }
   conform_leave();
   return status;
@@ -209,7 +209,7 @@ bool conform_tick(conform *c, conform_sample *out)
 
 bool conform_reads_worse(const conform *c, const conform_wrong *then)
 {
-  const conform_wrong *now = &c->wrong;
+  const conform_wrong *now = &c->seen.wrong;
   return now->statuses > then->statuses || (then->poses == 0 && now->poses > 0) ||
          (then->twists == 0 && now->twists > 0) || (then->buttons == 0 && now->buttons > 0);
 }
@@ -295,7 +295,7 @@ bool conform_needs_force(conform *c)
 
 bool conform_needs_reads(conform *c)
 {
-  if (!c->running || c->wrong.statuses > 0) {
+  if (!c->running || c->seen.wrong.statuses > 0) {
     conform_skip(c, "it cannot be started or read");
     return false;
   }
@@ -314,10 +314,10 @@ bool conform_needs_held(conform *c)
 
 bool conform_needs_zero(conform *c)
 {
-  if (c->zero_wrong) {
+  if (c->said.zero_wrong) {
     conform_skip(c, "zero does not take the force off");
   }
-  return !c->zero_wrong && conform_needs_reads(c);
+  return !c->said.zero_wrong && conform_needs_reads(c);
 }
 
 bool conform_needs_limits(conform *c)
@@ -326,7 +326,7 @@ bool conform_needs_limits(conform *c)
     conform_skip(c, "only with --check-limits: if the device is wrong, it gives all its force");
     return false;
   }
-  if (c->reached_wrong) {
+  if (c->said.reached_wrong) {
     conform_skip(c, "what was reached is not plausible");
     return false;
   }

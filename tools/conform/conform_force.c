@@ -74,10 +74,10 @@ static void push_axis(conform *c, int axis, unsigned *bad)
   for (int i = 0; i < 4 * PUSH_TICKS && !c->stopped; ++i) {
     double sign = i < PUSH_TICKS || i >= 3 * PUSH_TICKS ? 1.0 : -1.0;
     const hap_wrench wanted = conform_small(c, axis, sign);
-    if (!conform_tick(c, &c->record[c->record_count])) {
+    if (!conform_tick(c, &c->seen.record[c->seen.record_count])) {
       return;
     }
-    c->record_count += c->record_count + 1 < CONFORM_RECORD_MAX;
+    c->seen.record_count += c->seen.record_count + 1 < CONFORM_RECORD_MAX;
     push_once(c, &wanted, bad);
   }
 }
@@ -88,20 +88,20 @@ void conform_reached(conform *c)
   if (!conform_needs_reads(c)) {
     return;
   }
-  if (c->wrong.zero_writes > 0) {
+  if (c->seen.wrong.zero_writes > 0) {
     conform_fail(c, "%u times a wrench of zero was not taken, or answered by another one",
-                 c->wrong.zero_writes);
+                 c->seen.wrong.zero_writes);
   }
   if (!conform_needs_force(c)) {
     return;
   }
-  hapi_v3_copy(c->record[c->record_count - 1].pose.position, c->origin);
+  hapi_v3_copy(c->seen.record[c->seen.record_count - 1].pose.position, c->origin);
   c->bounded = true;
   for (int axis = 0; axis < conform_axes(c) && !c->stopped; ++axis) {
     push_axis(c, axis, &bad);
   }
   conform_zero(c);
-  c->reached_wrong = c->failed;
+  c->said.reached_wrong = c->failed;
   if (bad > 1) {
     conform_note(c, "and %u times more", bad - 1);
   }
@@ -112,7 +112,7 @@ void conform_held_is_reached(conform *c)
   if (!conform_needs_force(c) || !conform_needs_held(c)) {
     return;
   }
-  if (c->reached_wrong) {
+  if (c->said.reached_wrong) {
     conform_skip(c, "what was reached is not plausible");
     return;
   }

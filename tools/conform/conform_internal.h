@@ -39,6 +39,29 @@ typedef struct conform_wrong {
   unsigned zero_writes; /* of a zero wrench, between the reads */
 } conform_wrong;
 
+/* What a point has reported: others that find the same do not repeat it. */
+typedef struct conform_said {
+  bool holds_at_open;
+  bool holds_at_start;
+  bool jumps;
+  bool reached_wrong;
+  bool zero_wrong;
+  bool start_wrong;
+  bool reads_unstarted;
+  bool writes_unstarted;
+} conform_said;
+
+/* What the ticks gave. */
+typedef struct conform_seen {
+  hapi_histogram reads;
+  hapi_histogram writes;
+  hapi_histogram zeros;
+  conform_wrong wrong;
+  unsigned read_count;
+  conform_sample record[CONFORM_RECORD_MAX];
+  unsigned record_count;
+} conform_seen;
+
 typedef struct conform {
   const conform_options *options;
   FILE *out;
@@ -63,24 +86,8 @@ typedef struct conform {
   bool bounded; /* under force: it must stay near its origin */
   double origin[3];
 
-  /* Said by a point: others that see the same leave it at that. */
-  bool holds_at_open;
-  bool holds_at_start;
-  bool jumps;
-  bool reached_wrong;
-  bool zero_wrong;
-  bool start_wrong;
-  bool reads_unstarted;
-  bool writes_unstarted;
-
-  /* what was seen */
-  hapi_histogram reads;
-  hapi_histogram writes;
-  hapi_histogram zeros;
-  conform_wrong wrong;
-  unsigned read_count;
-  conform_sample record[CONFORM_RECORD_MAX];
-  unsigned record_count;
+  conform_said said;
+  conform_seen seen;
 } conform;
 
 /* ---- conform.c ---- */

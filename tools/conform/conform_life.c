@@ -40,10 +40,10 @@ void conform_after_stop(conform *c)
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   conform_sample sample;
   hap_wrench reached;
-  if (conform_read(c, &sample) >= HAP_OK && !c->reads_unstarted) {
+  if (conform_read(c, &sample) >= HAP_OK && !c->said.reads_unstarted) {
     conform_fail(c, "after stop it can be read");
   }
-  if (conform_write(c, &none, &reached) >= HAP_OK && !c->writes_unstarted) {
+  if (conform_write(c, &none, &reached) >= HAP_OK && !c->said.writes_unstarted) {
     conform_fail(c, "after stop it takes a wrench");
   }
 }
@@ -59,7 +59,7 @@ void conform_stop_twice(conform *c)
 static void read_some(conform *c, const char *when)
 {
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  conform_wrong before = c->wrong;
+  conform_wrong before = c->seen.wrong;
   conform_sample sample;
   hap_wrench reached;
   unsigned refused = 0;
@@ -73,17 +73,17 @@ static void read_some(conform *c, const char *when)
 
 void conform_start_again(conform *c)
 {
-  if (c->wrong.statuses > 0 || c->start_wrong) {
+  if (c->seen.wrong.statuses > 0 || c->said.start_wrong) {
     conform_skip(c, "it cannot be started or read");
     return;
   }
   hap_status status = conform_start(c);
   if (status < HAP_OK) {
     conform_fail(c, "the second start gave %s", hap_status_name(status));
-    c->start_wrong = true;
+    c->said.start_wrong = true;
     return;
   }
-  if (!c->holds_at_start) {
+  if (!c->said.holds_at_start) {
     conform_expect_none(c, "started again,");
   }
   conform_zero(c);
@@ -136,7 +136,7 @@ static void compare_forces(conform *c, conform *other)
   hap_wrench reached;
   hap_wrench held;
   const hap_wrench push = conform_small(c, 0, 1.0);
-  if (!conform_has_force(c) || c->zero_wrong || !conform_held(c, &held)) {
+  if (!conform_has_force(c) || c->said.zero_wrong || !conform_held(c, &held)) {
     return;
   }
   conform_zero(other);
@@ -172,7 +172,7 @@ static void run_both(conform *c, conform *other)
 void conform_two_devices(conform *c)
 {
   hap_detail detail = {""};
-  if (c->wrong.statuses > 0 || c->start_wrong) {
+  if (c->seen.wrong.statuses > 0 || c->said.start_wrong) {
     conform_skip(c, "it cannot be started again or read");
     return;
   }
@@ -203,7 +203,7 @@ void conform_open_again(conform *c)
   hap_detail detail = {""};
   hap_wrench reached;
   conform_sample sample;
-  if (conform_has_force(c) && !c->start_wrong && conform_start(c) >= HAP_OK &&
+  if (conform_has_force(c) && !c->said.start_wrong && conform_start(c) >= HAP_OK &&
       conform_tick(c, &sample)) {
     const hap_wrench push = conform_small(c, 0, 1.0);
     (void)conform_write(c, &push, &reached);
@@ -213,7 +213,7 @@ void conform_open_again(conform *c)
     conform_fail(c, "closed, it does not open again: %s", detail.text);
     return;
   }
-  if (conform_needs_held(c) && !c->holds_at_open) {
+  if (conform_needs_held(c) && !c->said.holds_at_open) {
     conform_expect_none(c, "opened again,");
   }
 }
@@ -255,7 +255,7 @@ static bool one_life(conform *c)
     conform_fail(c, "it does not open again: %s", detail.text);
     return false;
   }
-  if (c->wrong.statuses == 0 && conform_start(c) >= HAP_OK) {
+  if (c->seen.wrong.statuses == 0 && conform_start(c) >= HAP_OK) {
     for (int i = 0; i < 3 && conform_tick(c, &sample); ++i) {
     }
   }
@@ -320,16 +320,16 @@ static void look_while_gone(conform *c)
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   conform_sample sample;
   hap_wrench reached;
-  hapi_histogram_reset(&c->reads);
-  hapi_histogram_reset(&c->writes);
+  hapi_histogram_reset(&c->seen.reads);
+  hapi_histogram_reset(&c->seen.writes);
   for (int i = 0; i < AGAIN_TICKS && !c->stopped; ++i) {
     (void)conform_tick(c, &sample);
     (void)conform_write(c, &none, &reached);
     conform_zero(c);
   }
   double most_ns = 2e9 * conform_period(c);
-  double read_ns = hapi_histogram_quantile_ns(&c->reads, 0.9);
-  double write_ns = hapi_histogram_quantile_ns(&c->writes, 0.9);
+  double read_ns = hapi_histogram_quantile_ns(&c->seen.reads, 0.9);
+  double write_ns = hapi_histogram_quantile_ns(&c->seen.writes, 0.9);
   if (read_ns > most_ns || write_ns > most_ns) {
     conform_fail(c, "unplugged, it blocks: read %.3g us, write %.3g us", 1e-3 * read_ns,
                  1e-3 * write_ns);
@@ -375,6 +375,6 @@ void conform_unplugged(conform *c)
     return;
   }
   conform_expect_none(c, "plugged in and started again,");
-  memset(&c->wrong, 0, sizeof c->wrong);
+  memset(&c->seen.wrong, 0, sizeof c->seen.wrong);
   read_some(c, "plugged in and started again,");
 }

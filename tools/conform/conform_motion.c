@@ -23,12 +23,12 @@ static void record_rest(conform *c)
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   for (unsigned i = 0; i < CONFORM_REST_TICKS && !c->stopped; ++i) {
     hap_wrench reached;
-    if (!conform_tick(c, &c->record[c->record_count])) {
+    if (!conform_tick(c, &c->seen.record[c->seen.record_count])) {
       return;
     }
-    ++c->record_count;
+    ++c->seen.record_count;
     hap_status status = conform_write(c, &none, &reached);
-    c->wrong.zero_writes +=
+    c->seen.wrong.zero_writes +=
         status < HAP_OK || !conform_status_is_known(status) || !conform_is_zero(&reached);
   }
 }
@@ -39,39 +39,40 @@ void conform_read_status(conform *c)
     return;
   }
   record_rest(c);
-  if (c->wrong.statuses > 0) {
-    conform_fail(c, "of %u reads %u gave an error or what is no hap_status", c->read_count,
-                 c->wrong.statuses);
+  if (c->seen.wrong.statuses > 0) {
+    conform_fail(c, "of %u reads %u gave an error or what is no hap_status", c->seen.read_count,
+                 c->seen.wrong.statuses);
   }
 }
 
 void conform_pose(conform *c)
 {
-  if (conform_needs_reads(c) && c->wrong.poses > 0) {
+  if (conform_needs_reads(c) && c->seen.wrong.poses > 0) {
     conform_fail(c, "of %u reads %u left the pose unfilled, not finite, or its quaternion not unit",
-                 c->read_count, c->wrong.poses);
+                 c->seen.read_count, c->seen.wrong.poses);
   }
 }
 
 void conform_twist(conform *c)
 {
-  if (conform_needs_reads(c) && c->wrong.twists > 0) {
-    conform_fail(c, "of %u reads %u left the twist unfilled or not finite", c->read_count,
-                 c->wrong.twists);
+  if (conform_needs_reads(c) && c->seen.wrong.twists > 0) {
+    conform_fail(c, "of %u reads %u left the twist unfilled or not finite", c->seen.read_count,
+                 c->seen.wrong.twists);
   }
 }
 
 void conform_buttons(conform *c)
 {
-  if (conform_needs_reads(c) && c->wrong.buttons > 0) {
-    conform_fail(c, "of %u reads %u left buttons unfilled", c->read_count, c->wrong.buttons);
+  if (conform_needs_reads(c) && c->seen.wrong.buttons > 0) {
+    conform_fail(c, "of %u reads %u left buttons unfilled", c->seen.read_count,
+                 c->seen.wrong.buttons);
   }
 }
 
 static bool needs_record(conform *c)
 {
   bool good = conform_needs_reads(c);
-  if (good && (c->wrong.poses > 0 || c->wrong.twists > 0 || c->jumps)) {
+  if (good && (c->seen.wrong.poses > 0 || c->seen.wrong.twists > 0 || c->said.jumps)) {
     conform_skip(c, "poses or twists are not finite, or jump");
     return false;
   }
@@ -84,8 +85,8 @@ void conform_steps(conform *c)
     return;
   }
   double fastest = 0.0;
-  for (unsigned i = 1; i < c->record_count; ++i) {
-    const conform_sample *s = &c->record[i];
+  for (unsigned i = 1; i < c->seen.record_count; ++i) {
+    const conform_sample *s = &c->seen.record[i];
     double way[3];
     hapi_v3_sub(s->pose.position, s[-1].pose.position, way);
     fastest = fmax(fastest, hapi_v3_norm(way) / fmax(s->time - s[-1].time, 1e-6));
@@ -94,7 +95,7 @@ void conform_steps(conform *c)
   if (fastest > SPEED_MOST) {
     conform_fail(c, "between two reads it went at %.3g m/s, more than %g: a jump", fastest,
                  SPEED_MOST);
-    c->jumps = true;
+    c->said.jumps = true;
   }
 }
 
@@ -173,9 +174,9 @@ void conform_twist_fits(conform *c)
   if (!needs_record(c)) {
     return;
   }
-  for (unsigned i = 0; i + WINDOW < c->record_count; i += WINDOW) {
-    compare_linear(&c->record[i], &way);
-    compare_angular(&c->record[i], &turn);
+  for (unsigned i = 0; i + WINDOW < c->seen.record_count; i += WINDOW) {
+    compare_linear(&c->seen.record[i], &way);
+    compare_angular(&c->seen.record[i], &turn);
     ++way.windows;
     ++turn.windows;
   }
@@ -210,21 +211,21 @@ void conform_read_time(conform *c)
 {
   double ticks = c->ops->pacing == HAP_PACING_DEVICE ? 2.0 : 1.0;
   if (conform_needs_reads(c)) {
-    judge_time(c, &c->reads, ticks * conform_period(c), "read");
+    judge_time(c, &c->seen.reads, ticks * conform_period(c), "read");
   }
 }
 
 void conform_write_time(conform *c)
 {
   if (conform_needs_reads(c)) {
-    judge_time(c, &c->writes, conform_period(c), "write");
+    judge_time(c, &c->seen.writes, conform_period(c), "write");
   }
 }
 
 void conform_zero_time(conform *c)
 {
   if (conform_needs_reads(c)) {
-    judge_time(c, &c->zeros, conform_period(c), "zero");
+    judge_time(c, &c->seen.zeros, conform_period(c), "zero");
   }
 }
 
@@ -235,7 +236,7 @@ void conform_after_pause(conform *c)
   if (!conform_needs_reads(c)) {
     return;
   }
-  conform_wrong before = c->wrong;
+  conform_wrong before = c->seen.wrong;
   conform_zero(c);
   conform_pause(c, PAUSE_S);
   for (int i = 0; i < 20 && conform_tick(c, &sample); ++i) {

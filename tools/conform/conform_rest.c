@@ -73,7 +73,7 @@ void conform_open_holds_no_force(conform *c)
 {
   if (conform_needs_held(c)) {
     conform_expect_none(c, "opened and not started,");
-    c->holds_at_open = c->failed;
+    c->said.holds_at_open = c->failed;
   }
 }
 
@@ -84,12 +84,12 @@ void conform_before_start(conform *c)
   hap_wrench reached;
   hap_status read = conform_read(c, &sample);
   hap_status written = conform_write(c, &none, &reached);
-  c->reads_unstarted = read >= HAP_OK;
-  c->writes_unstarted = written >= HAP_OK;
-  if (c->reads_unstarted) {
+  c->said.reads_unstarted = read >= HAP_OK;
+  c->said.writes_unstarted = written >= HAP_OK;
+  if (c->said.reads_unstarted) {
     conform_fail(c, "before start, read gave %s and not an error", hap_status_name(read));
   }
-  if (c->writes_unstarted) {
+  if (c->said.writes_unstarted) {
     conform_fail(c, "before start, write gave %s and not an error", hap_status_name(written));
   }
 }
@@ -107,10 +107,10 @@ void conform_start_without_force(conform *c)
   hap_status status = conform_start(c);
   if (status < HAP_OK || !conform_status_is_known(status)) {
     conform_fail(c, "start gave %d, %s", (int)status, hap_status_text(status));
-    c->start_wrong = true;
+    c->said.start_wrong = true;
     return;
   }
   conform_expect_none(c, "started,");
-  c->holds_at_start = c->failed;
+  c->said.holds_at_start = c->failed;
   conform_zero(c);
 }

@@ -36,7 +36,7 @@ void conform_zero_takes_force(conform *c)
     conform_fail(c, "after zero it takes no force any more");
   }
   conform_zero(c);
-  c->zero_wrong = c->failed;
+  c->said.zero_wrong = c->failed;
 }
 
 /* ---- zero beside the loop ---- */
@@ -88,7 +88,7 @@ static bool must_go_on(int ticks, int64_t begin_ns)
 /* Small forces, to and fro, so that it goes nowhere. */
 static void tick_beside(conform *c)
 {
-  conform_wrong before = c->wrong;
+  conform_wrong before = c->seen.wrong;
   conform_sample sample;
   unsigned refused = 0;
   int64_t begin_ns = hapi_clock_now();
