@@ -5,7 +5,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "base/assert.h"
 #include "base/hooks.h"
 
 void hapi_log(hap_log_level level, const char *format, ...)
@@ -24,7 +23,6 @@ void hapi_log(hap_log_level level, const char *format, ...)
 
 hap_status hapi_fail(hap_detail *detail, hap_status status, const char *format, ...)
 {
-  HAPI_ASSERT(status < HAP_OK);
   if (detail == NULL) {
     return status;
   }

@@ -12,7 +12,6 @@
  * The quaternion is normalised because eq. 11 leaves the unit sphere. */
 static inline void hapi_quat_move(double quat[4], const double w[3], double seconds)
 {
-  HAPI_ASSERT_UNIT_QUAT(quat);
   double turn[4] = {0.0, w[0], w[1], w[2]};
   double rate[4];
   hapi_quat_multiply(turn, quat, rate);

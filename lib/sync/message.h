@@ -39,13 +39,15 @@ typedef struct hapi_tool_hull {
 } hapi_tool_hull;
 
 /* Defines function(message), which gives the array that lies offset bytes behind the message's
- * begin. */
+ * begin; 0: the message has no such array. */
+/* NOLINTBEGIN(bugprone-macro-parentheses): types */
 #define HAPI_MESSAGE_ARRAY(function, message, element, offset) \
   static inline element *function(message *m)                  \
   {                                                            \
-    HAPI_ASSERT(m->offset >= sizeof *m);                       \
+    HAPI_ASSERT(m->offset == 0 || m->offset >= sizeof *m);     \
     return (element *)(void *)((char *)m + m->offset);         \
   }
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 enum {
   HAPI_BODY_DRIVEN = 1,  /* moved by the application: keeps its twist, feels no force */
