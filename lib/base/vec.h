@@ -76,6 +76,24 @@ static inline double hapi_v3_norm(const double a[3])
   return sqrt(hapi_v3_dot(a, a));
 }
 
+/* To a length of at most limit, the direction kept. True: it was longer. The largest component comes
+ * out first, so that no square overflows. */
+static inline bool hapi_v3_shorten(double v[3], double limit)
+{
+  HAPI_ASSERT(limit >= 0.0);
+  double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+  if (largest == 0.0) {
+    return false;
+  }
+  double unit[3] = {v[0] / largest, v[1] / largest, v[2] / largest};
+  double norm = hapi_v3_norm(unit);
+  if (largest * norm <= limit) {
+    return false;
+  }
+  hapi_v3_scale(limit / norm, unit, v);
+  return true;
+}
+
 static inline void hapi_v3_cross(const double a[3], const double b[3], double out[3])
 {
   double x = a[1] * b[2] - a[2] * b[1];

@@ -10,6 +10,8 @@
 
 #include <hapode/version.h>
 
+#include "base/alloc.h"
+
 #if defined(__x86_64__)
 #define PROCESSOR "x86_64"
 #elif defined(__aarch64__)
@@ -41,6 +43,18 @@ void hapi_file_describe(hapi_file_info *out)
   snprintf(out->build.system, sizeof out->build.system, "other libc");
 #endif
   out->joined_size = (uint32_t)sizeof(hapi_joined);
+}
+
+void *hapi_file_zlib_allocate(void *user, unsigned count, unsigned size)
+{
+  (void)user;
+  return hapi_alloc_array(count, size);
+}
+
+void hapi_file_zlib_release(void *user, void *memory)
+{
+  (void)user;
+  hapi_free(memory);
 }
 
 static uint32_t crc_of(uint32_t crc, const void *bytes, size_t size)

@@ -98,6 +98,10 @@ static_assert(sizeof(hapi_file_head) == 32 && sizeof(hapi_block_head) == 24, "th
 /* Fills build but for ode, and joined_size, as this library is. */
 void hapi_file_describe(hapi_file_info *out);
 
+/* For zalloc and zfree of zlib: memory of the hooks. */
+void *hapi_file_zlib_allocate(void *user, unsigned count, unsigned size);
+void hapi_file_zlib_release(void *user, void *memory);
+
 uint32_t hapi_file_crc_head(const hapi_file_head *head);
 uint32_t hapi_file_crc_block(const hapi_block_head *head, const void *stored);
 

@@ -278,24 +278,12 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
 
 /* ---- life ---- */
 
-static voidpf zlib_allocate(voidpf user, uInt count, uInt size)
-{
-  (void)user;
-  return hapi_alloc_array(count, size);
-}
-
-static void zlib_release(voidpf user, voidpf memory)
-{
-  (void)user;
-  hapi_free(memory);
-}
-
 static bool reader_prepare(hapi_reader *reader)
 {
   reader->stored = hapi_alloc(HAPI_BLOCK_BYTES);
   reader->bytes = hapi_alloc(HAPI_BLOCK_BYTES);
-  reader->inflater.zalloc = zlib_allocate;
-  reader->inflater.zfree = zlib_release;
+  reader->inflater.zalloc = hapi_file_zlib_allocate;
+  reader->inflater.zfree = hapi_file_zlib_release;
   reader->inflates = inflateInit(&reader->inflater) == Z_OK;
   return reader->stored != NULL && reader->bytes != NULL && reader->inflates;
 }

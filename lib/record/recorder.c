@@ -214,18 +214,6 @@ static void *recorder_main(void *arg)
 
 /* ---- life ---- */
 
-static voidpf zlib_allocate(voidpf user, uInt count, uInt size)
-{
-  (void)user;
-  return hapi_alloc_array(count, size);
-}
-
-static void zlib_release(voidpf user, voidpf memory)
-{
-  (void)user;
-  hapi_free(memory);
-}
-
 static bool recorder_prepare(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
   bool good = true;
@@ -236,8 +224,8 @@ static bool recorder_prepare(hapi_recorder *recorder, const hapi_recorder_config
     good = good && recorder->cells[i] != NULL;
   }
   recorder->stored = hapi_alloc(HAPI_BLOCK_BYTES);
-  recorder->deflater.zalloc = zlib_allocate;
-  recorder->deflater.zfree = zlib_release;
+  recorder->deflater.zalloc = hapi_file_zlib_allocate;
+  recorder->deflater.zfree = hapi_file_zlib_release;
   recorder->deflates = good && deflateInit(&recorder->deflater, DEFLATE_LEVEL) == Z_OK;
   return good && recorder->stored != NULL && recorder->deflates;
 }

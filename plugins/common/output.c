@@ -16,31 +16,14 @@ void hapi_output_init(hapi_output *output, double max_force, double max_torque)
   atomic_init(&output->zeroed.raised, true);
 }
 
-/* True when it had to. The largest component comes out first, so that no square overflows. */
-static bool vector_shorten(const double wanted[3], double limit, double out[3])
-{
-  HAPI_ASSERT(limit >= 0.0);
-  double largest = hapi_max(fabs(wanted[0]), hapi_max(fabs(wanted[1]), fabs(wanted[2])));
-  hapi_v3_copy(wanted, out);
-  if (largest == 0.0) {
-    return false;
-  }
-  double unit[3] = {wanted[0] / largest, wanted[1] / largest, wanted[2] / largest};
-  double norm = hapi_v3_norm(unit);
-  if (largest * norm <= limit) {
-    return false;
-  }
-  hapi_v3_scale(limit / norm, unit, out);
-  return true;
-}
-
 hap_status hapi_output_write(hapi_output *output, const hap_wrench *wanted, hap_wrench *reached)
 {
   if (!hapi_finite(wanted->force, 3) || !hapi_finite(wanted->torque, 3)) {
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = vector_shorten(wanted->force, output->max_force, output->held.force);
-  bool twisted = vector_shorten(wanted->torque, output->max_torque, output->held.torque);
+  output->held = *wanted;
+  bool shortened = hapi_v3_shorten(output->held.force, output->max_force);
+  bool twisted = hapi_v3_shorten(output->held.torque, output->max_torque);
   *reached = output->held;
   /* Last, so that a zero that comes in between is taken as one from before this write. */
   atomic_store_explicit(&output->zeroed.raised, false, memory_order_release);

@@ -204,22 +204,6 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   return status < HAP_OK ? status : asked;
 }
 
-/* True when it had to. The largest component comes out first, so that no square overflows. */
-static bool vector_shorten(double v[3], double limit)
-{
-  double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-  if (largest == 0.0) {
-    return false;
-  }
-  double unit[3] = {v[0] / largest, v[1] / largest, v[2] / largest};
-  double norm = hapi_v3_norm(unit);
-  if (largest * norm <= limit) {
-    return false;
-  }
-  hapi_v3_scale(limit / norm, unit, v);
-  return true;
-}
-
 /* From write to write, for heat and for the rate of the tensions. */
 static double since_write(hapi_spidar_device *device)
 {
@@ -287,8 +271,8 @@ static void tell_reached(hapi_spidar_device *device, const hap_wrench *wanted,
 /* A force at its limit may bring a little more in another direction with it. */
 static void keep_limits(hapi_spidar_device *device)
 {
-  (void)vector_shorten(device->held.force, device->settings.max_force);
-  (void)vector_shorten(device->held.torque, device->settings.max_torque);
+  (void)hapi_v3_shorten(device->held.force, device->settings.max_force);
+  (void)hapi_v3_shorten(device->held.torque, device->settings.max_torque);
 }
 
 static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
@@ -306,8 +290,8 @@ static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench 
     spidar_zero(device);
     return HAP_ERROR_ARGUMENT;
   }
-  bool shortened = vector_shorten(local.force, device->settings.max_force);
-  bool eased = vector_shorten(local.torque, device->settings.max_torque) && device->model.dof == 6;
+  bool shortened = hapi_v3_shorten(local.force, device->settings.max_force);
+  bool eased = hapi_v3_shorten(local.torque, device->settings.max_torque) && device->model.dof == 6;
   hapi_quat_unrotate(device->settings.rotate, local.force, local.force);
   hapi_quat_unrotate(device->settings.rotate, local.torque, local.torque);
   bool taut = strings_pull(device, &local, &given);
