@@ -76,7 +76,7 @@ static inline double hapi_v3_norm(const double a[3])
   return sqrt(hapi_v3_dot(a, a));
 }
 
-/* To a length of at most limit, the direction kept. True: it was longer. The largest component comes
+/* To a length of at most limit, direction kept. True: it was longer. The largest component comes
  * out first, so that no square overflows. */
 static inline bool hapi_v3_shorten(double v[3], double limit)
 {
