@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <time.h>
 
-static bool surface_of_wood(void *user, dGeomID a, dGeomID b,
-                            dSurfaceParameters *io) /* was: near_callback */
+/* In place of a near callback. */
+static bool wood_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user, (void)a, (void)b;
   io->mu = 0.5;
@@ -42,13 +42,12 @@ int main(void)
   hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
-  ode_def.world = world, ode_def.space = space, ode_def.surface = surface_of_wood;
+  ode_def.world = world, ode_def.space = space, ode_def.surface = wood_surface;
   hand_def.friction = 0.5;
   hap_session *session;
   hap_pointer_id hand;
   if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
-      hap_device_open("virtual:path=0:-0.05/0/0.08;1:0.0/0/0.08", &hand_def.device, &why) <
-          HAP_OK ||
+      hap_device_open("virtual:path=0:-0.05/0/0.08;1:0/0/0.08", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK || hap_session_start(session) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;
   }

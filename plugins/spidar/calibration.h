@@ -3,8 +3,8 @@
 #ifndef HAPODE_PLUGINS_SPIDAR_CALIBRATION_H
 #define HAPODE_PLUGINS_SPIDAR_CALIBRATION_H
 
-/* Counts to lengths, docs/spidar.md, "Calibration". Counts are unwrapped; arrays by string have
- * HAPI_SPIDAR_STRINGS_MAX elements, of which the model's are used. */
+/* Counts to lengths, docs/decisions/spidar-strings.md, "Calibration". Counts are unwrapped. Arrays
+ * by string have HAPI_SPIDAR_STRINGS_MAX elements; those of the model's strings are used. */
 
 #include "plugins/spidar/kinematics.h"
 

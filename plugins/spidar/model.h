@@ -50,7 +50,7 @@ typedef struct hapi_spidar_model {
   double workspace_turn; /* rad, largest turn from the attitude at home; 0 for 3 dof */
   double residual;       /* m, beyond which the lengths do not fit a pose: slack or broken string */
 
-  /* Thermal model of a motor and its string, docs/spidar.md, "Heat". */
+  /* Thermal model of a motor and its string, docs/decisions/spidar-strings.md, "Heat". */
   double heat_tension; /* N, that the motor bears for ever, > min_tension */
   double heat_time;    /* s, its thermal time constant */
 

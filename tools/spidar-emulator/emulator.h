@@ -110,7 +110,7 @@ void emulator_say(const emulator *e, char *out, size_t size);
 
 /* ---- commands.c ---- */
 
-/* Reads a command, docs/spidar.md, "Faults". HAP_ERROR_FORMAT with a sentence. */
+/* Reads a command, docs/spidar.md, "Emulator". HAP_ERROR_FORMAT with a sentence. */
 HAP_NODISCARD hap_status emulator_parse(const emulator *e, const char *line, emulator_action *out,
                                         hap_detail *detail);
 
