@@ -5,10 +5,10 @@
 
 /* Friction of a pointer contact: a spring from a point that is fixed in the pointer to one that is
  * fixed in the body, along the surface, and with a soft finger about the normal too
- * (docs/decisions/friction.md). Sliding and turning are one vector of four numbers: along the surface in
- * world axes [m], and the turn about the normal times the finger's radius [m]. Its spring and
- * damper are those of the contact, whatever the direction, and its force is within a ball of mu
- * times the normal force. Each point of a hull has its own. */
+ * (docs/decisions/friction.md). Sliding and turning are one vector of four numbers: along the
+ * surface in world axes [m], and the turn about the normal times the finger's radius [m]. Its
+ * spring and damper are those of the contact, whatever the direction, and its force is within a
+ * ball of mu times the normal force. Each point of a hull has its own. */
 
 #include <stdbool.h>
 

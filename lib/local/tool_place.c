@@ -9,8 +9,9 @@
 #include "local/touch_place.h"
 
 /* Where the contacts of hulls are, and what part of the pointer's stiffness k each has
- * (docs/decisions/tools.md): together, those of a pair that push the same way have k, as a bed of springs.
- * So a flat push on a face is felt as k, and a tilt as the springs' moments about its middle. */
+ * (docs/decisions/tools.md): together, those of a pair that push the same way have k, as a bed of
+ * springs. So a flat push on a face is felt as k, and a tilt as the springs' moments about its
+ * middle. */
 
 #define COME_S 0.02 /* in which a point that is new in a pair that presses gets its share */
 

@@ -5,7 +5,8 @@
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 
-/* Where the loop's world and the global world meet (paper section 6, docs/design.md). */
+/* Where the loop's world and the global world meet (paper section 6,
+ * docs/decisions/step-ends-now.md). */
 
 static hapi_state_body *message_of(hapi_physics *physics, uint32_t slot_index)
 {

@@ -10,8 +10,9 @@
 #include "base/vec.h"
 #include "pointer/rigid_proxy.h"
 
-/* Coupling "proxy" (docs/decisions/proxy.md): the pointer is a light body of mass m behind one spring k
- * and damper d to the device, h and u the device's position and velocity, integrated implicitly:
+/* Coupling "proxy" (docs/decisions/proxy.md): the pointer is a light body of mass m behind one
+ * spring k and damper d to the device, h and u the device's position and velocity, integrated
+ * implicitly:
  *
  *   (m + T d + T^2 k) v' = m v + T k (h - x) + T d u + impulses of the contacts
  *   force on the hand = k (x' - h) + d (v' - u),   x' = x + T v'
