@@ -82,6 +82,16 @@ def check_kinds(stage, kinds):
             path.rename(os.path.join(stage + prefix, libdir, path.name))
 
 
+def missing_docs(stage):
+    """What a reader would miss, by the same paths as in the tree: links between pages hold."""
+    home = pathlib.Path(stage + prefix, "share", "doc", "hapode")
+    source = pathlib.Path(root)
+    wanted = [*source.glob("*.md"), *source.glob("docs/**/*.md"), *source.glob("docs/**/*.svg"),
+              *source.glob("examples/*.c")]
+    names = [path.relative_to(source) for path in wanted]
+    return "\n".join(str(name) for name in names if not (home / name).is_file())
+
+
 def main(stage):
     point(run(["meson", "install", "-C", build, "--no-rebuild", "--quiet", "--destdir", stage])[1],
           "installs to DESTDIR")
@@ -93,6 +103,7 @@ def main(stage):
     headers = {p.name for p in pathlib.Path(root, "include/hapode").glob("*.h")}
     there = {p.name for p in pathlib.Path(stage + prefix, "include/hapode").glob("*.h")}
     point("\n".join(sorted(headers - there)), "all public headers")
+    point(missing_docs(stage), "README, pages and examples")
     out, problem = run([stage + prefix + "/bin/hapode-run", "--version"],
                        env=dict(os.environ, LD_LIBRARY_PATH=str(library)))
     point(problem or ("" if out.startswith("hapode") else out), "hapode-run says its version")
