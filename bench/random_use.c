@@ -8,8 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <hapode/expert.h>
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
+#include <hapode/research.h>
 
 #define BODIES 20
 #define GEOMS 3 /* of a body */
@@ -1295,7 +1297,10 @@ static void pointer_add(use *u, int index)
   double corners[8][3];
   double v[6];
   hap_pointer_def def;
+  hap_pointer_expert_def expert;
   hap_pointer_def_init(&def, sizeof def);
+  hap_pointer_expert_def_init(&expert, sizeof expert);
+  def.expert = &expert;
   dice_fill(u, 0.0, 1.0, 6, v);
   def.device = p->device;
   def.radius = 0.006 + 0.01 * v[0];
@@ -1316,15 +1321,15 @@ static void pointer_add(use *u, int index)
   static const hap_coupling couplings[] = {
       HAP_COUPLING_AUTO,  HAP_COUPLING_AUTO,       HAP_COUPLING_DIRECT, HAP_COUPLING_DIRECT,
       HAP_COUPLING_PROXY, HAP_COUPLING_GOD_OBJECT, HAP_COUPLING_VIRTUAL};
-  def.coupling = couplings[dice_below(u, 7)];
-  if (def.coupling > HAP_COUPLING_DIRECT) {
-    def.coupling_stiffness = 800.0;
-    def.coupling_damping = 1.0;
+  expert.coupling = couplings[dice_below(u, 7)];
+  if (expert.coupling > HAP_COUPLING_DIRECT) {
+    expert.coupling_stiffness = 800.0;
+    expert.coupling_damping = 1.0;
   }
   hap_status status = hap_pointer_add(u->session, &def, &p->id);
   if (status == HAP_ERROR_UNSUPPORTED) { /* not this coupling in this model */
-    def.coupling = HAP_COUPLING_DIRECT;
-    def.coupling_stiffness = def.coupling_damping = 0.0;
+    expert.coupling = HAP_COUPLING_DIRECT;
+    expert.coupling_stiffness = expert.coupling_damping = 0.0;
     status = hap_pointer_add(u->session, &def, &p->id);
   }
   status_expect(u, status, "hap_pointer_add");
@@ -1384,26 +1389,34 @@ static hap_status session_create(use *u, hap_detail *detail)
                                      HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE, HAP_MODEL_SINGLE};
   hap_session_def def;
   hap_ode_def ode;
+  hap_expert_def expert;
+  hap_research_def research;
   hap_session_def_init(&def, sizeof def);
   hap_ode_def_init(&ode, sizeof ode);
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  def.expert = &expert;
+  def.research = &research;
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.model = models[dice_below(u, 6)];
   def.physics_hz = rates[dice_below(u, 5)];
   def.max_pointers = POINTERS;
   def.max_bodies = dice_chance(u, 0.2) ? 3 : def.max_bodies;
-  def.max_edge_probes = dice_chance(u, 0.2) ? 8 : def.max_edge_probes;
-  def.range_hops = dice_chance(u, 0.2) ? dice_below(u, 3) : def.range_hops;
-  def.lookback = dice_chance(u, 0.25) ? 0.2 : 0.0;
+  expert.max_edge_probes = dice_chance(u, 0.2) ? 8 : expert.max_edge_probes;
+  expert.range_hops = dice_chance(u, 0.2) ? dice_below(u, 3) : expert.range_hops;
+  expert.lookback = dice_chance(u, 0.25) ? 0.2 : 0.0;
   def.accuracy = dice_chance(u, 0.3) ? dice_between(u, 0.0, 1.0) : def.accuracy;
-  def.probe = dice_chance(u, 0.3) ? (hap_probe)dice_below(u, 3) : def.probe;
-  def.guard = dice_chance(u, 0.3) ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+  research.probe = dice_chance(u, 0.3) ? (hap_probe)dice_below(u, 3) : research.probe;
+  research.guard = dice_chance(u, 0.3) ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
   def.rt_priority = 0;
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     hap_effect_wish wish =
         dice_chance(u, 0.15) ? (hap_effect_wish)dice_below(u, 3) : HAP_EFFECT_AUTO;
     bool can = hap_effect_check((hap_effect)i, wish, def.model, NULL) == HAP_OK &&
                i != HAP_EFFECT_RECORDING && i != HAP_EFFECT_OBSERVER;
-    def.effects[i] = (uint8_t)(can ? wish : HAP_EFFECT_AUTO);
+    if (can && wish != HAP_EFFECT_AUTO) {
+      *(wish == HAP_EFFECT_ON ? &expert.effects_on : &expert.effects_off) |= HAP_EFFECT_BIT(i);
+    }
   }
   ode.world = u->world;
   ode.space = u->space;

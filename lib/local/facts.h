@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/research.h>
 #include <hapode/session.h>
 
 #include "base/wishes.h"
