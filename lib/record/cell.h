@@ -17,6 +17,8 @@
 
 #include "base/assert.h"
 
+#include "base/hash.h"
+
 typedef enum hapi_stream {
   HAPI_STREAM_HAPTIC = 0,
   HAPI_STREAM_PHYSICS = 1,
