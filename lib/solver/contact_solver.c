@@ -431,7 +431,7 @@ static void run_apart(hapi_solver *solver)
 void hapi_solver_run(hapi_solver *solver)
 {
   HAPI_ASSERT(solver->hub_count <= solver->body_count);
-  HAPI_ASSERT(solver->tolerance >= 0.0 && solver->update_budget > 0);
+  HAPI_ASSERT(solver->tolerance >= 0.0);
   uint32_t rows = solver->row_count;
   uint64_t left = solver->update_budget;
   solver->sweeps = 0;
