@@ -297,7 +297,7 @@ TEST(the_second_cube_of_a_row_moves_between_syncs)
     CHECK(dBodyGetLinearVel(w.bodies[1])[0] == 0.0);
     CHECK(hap_session_advance(w.session, 10) == HAP_OK); /* the step of the sync, not yet in use */
     double world = dBodyGetLinearVel(w.bodies[1])[0];
-    double missed = world_slot(&w, w.bodies[1])->residual[0]; /* eq. 14 */
+    double missed = world_account(&w, w.bodies[1])->residual[0]; /* eq. 14 */
     CHECK(world > 0.005);
     CHECK_NEAR(missed, cross == HAP_EFFECT_ON ? 0.0 : world, 1e-5 * world);
     world_close(&w);
@@ -345,7 +345,8 @@ TEST(two_hands_on_a_pair_leave_no_residual)
     CHECK(hap_session_advance(w.session, 50) == HAP_OK);
     const hapi_body_slot *slots[2] = {world_slot(&w, w.bodies[0]), world_slot(&w, w.bodies[1])};
     CHECK(slots[0]->pushed && slots[1]->pushed);
-    missed[cross - HAP_EFFECT_OFF] = fmax(fabs(slots[0]->residual[2]), fabs(slots[1]->residual[2]));
+    missed[cross - HAP_EFFECT_OFF] = fmax(fabs(world_account(&w, w.bodies[0])->residual[2]),
+                                          fabs(world_account(&w, w.bodies[1])->residual[2]));
     hap_stats stats = world_stats(&w);
     CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
     world_close(&w);

@@ -253,12 +253,13 @@ TEST(a_velocity_that_a_step_made_is_in_no_residual)
   REQUIRE(open_things(&t, HAP_MODEL_ACCELERANCE) && hap_session_start(t.w.session) == HAP_OK);
   CHECK(hap_session_advance(t.w.session, 120) == HAP_OK);
   hapi_physics *physics = world_physics(&t.w);
-  const hapi_body_slot *slot = world_slot(&t.w, t.w.bodies[0]);
-  REQUIRE(slot != NULL);
+  const hapi_slot_account *account = world_account(&t.w, t.w.bodies[0]);
+  REQUIRE(account != NULL);
   dBodySetLinearVel(t.w.bodies[0], no_number, 0.0, 0.0);
   physics->cycle.has_new_state = true;
-  hapi_reconcile_residual(physics);
-  CHECK(hapi_finite(slot->residual, 6));
+  hapi_reconcile_residual(&physics->account, &physics->world, &physics->near.slots,
+                          &physics->cycle);
+  CHECK(hapi_finite(account->residual, 6));
   dBodySetLinearVel(t.w.bodies[0], 0.0, 0.0, 0.0);
   world_close(&t.w);
 }

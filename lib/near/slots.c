@@ -24,7 +24,6 @@ static void slot_renew(hapi_body_slot *slot, uint32_t known)
 void hapi_slots_restart(hapi_body_slot *slot)
 {
   ++slot->epoch; /* the totals of impulse go on */
-  slot->placed = false;
 }
 
 void hapi_slots_renew(hapi_body_slot *slot)

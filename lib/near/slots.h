@@ -31,27 +31,14 @@ typedef struct hapi_body_slot {
   uint64_t retired_at; /* first model without it */
   bool wanted;         /* scratch: in the model being built */
   bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
-  bool placed;         /* left_* hold what we left in ODE */
-  bool left_enabled;
-  bool pose_changed; /* since then, by the application */
+  bool pose_changed;   /* since then, by the application */
   bool velocity_changed;
   double mass;
-  double impulse_taken[3];
-  double angular_impulse_taken[3];
-  double left_position[3];
-  double left_quat[4];
-  double left_velocity[6];
-  double new_impulse[3]; /* of the last interval, to be given to the world */
-  double new_angular_impulse[3];
-  double residual[6]; /* eq. 14, running total */
 
   /* Model CONTACT. */
-  bool loop_owned;        /* in the newest message: ODE's state is the loop's, and is not stepped */
-  bool linked;            /* scratch: a body of the range may touch it */
-  bool held;              /* scratch: switched off for the global step */
-  int64_t owned_until_ns; /* that the loop's last state was taken for */
+  bool loop_owned; /* in the newest message: ODE's state is the loop's, and is not stepped */
+  bool linked;     /* scratch: a body of the range may touch it */
   double gain_taken[6];
-  double falls[3];     /* m/s^2, by gravity and the application's force */
   double exchanged[6]; /* N, N m: mean wrench from the loop in the last interval */
 } hapi_body_slot;
 

@@ -3,50 +3,67 @@
 #ifndef HAPODE_PHYSICS_ACCOUNT_H
 #define HAPODE_PHYSICS_ACCOUNT_H
 
-/* The exchange with the loop: its newest message into the world, a local model back. */
+/* What the loop gave to each body, and what the world was left with. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
-#include <hapode/session.h>
-
+#include "base/assert.h"
 #include "near/slots.h"
 #include "sync/messages.h"
 #include "world/world.h"
 
-typedef struct hapi_physics hapi_physics;
+/* Of the body of a slot. */
+typedef struct hapi_slot_account {
+  uint32_t generation; /* of the slot; another one begins a new account */
+  bool placed;         /* left_* hold what is left in ODE at the end of the last cycle */
+  bool left_enabled;
+  bool held; /* switched off for the global step */
+  double left_position[3];
+  double left_quat[4];
+  double left_velocity[6];
+  double impulse_taken[3]; /* of the loop's totals */
+  double angular_impulse_taken[3];
+  double new_impulse[3]; /* of the last interval, to be given to the world */
+  double new_angular_impulse[3];
+  double residual[6];     /* eq. 14, running total */
+  int64_t owned_until_ns; /* that the loop's last state was taken for */
+  double falls[3];        /* m/s^2, by gravity and the application's force */
+} hapi_slot_account;
+
+typedef struct hapi_account_counts {
+  double world_impulse[3]; /* given to the world: predictions and overwrites */
+  double hand_impulse[3];  /* given to the bodies, as the loop reported */
+  double owned_taken[3];   /* of hapi_state.owned_impulse, in world_impulse */
+  uint64_t states_rejected;
+  uint64_t dropped; /* points of hulls that found no room in a model */
+} hapi_account_counts;
 
 typedef struct hapi_account {
-  uint32_t watch[HAP_TRACE_BODIES_MAX]; /* body table entries */
-  uint32_t watch_count;
+  hapi_slot_account *bodies; /* by slot */
+  uint32_t capacity;
+  hapi_account_counts counts;
 } hapi_account;
 
-/* reconcile.c: eq. 12-14, momentum */
-void hapi_reconcile_take(hapi_physics *physics);      /* newest message of the loop */
-void hapi_reconcile_own(hapi_physics *physics);       /* model CONTACT: the loop's states */
-void hapi_reconcile_hold(hapi_physics *physics);      /* ... are not stepped */
-void hapi_reconcile_let_go(hapi_physics *physics);    /* after the step */
-void hapi_reconcile_push(hapi_physics *physics);      /* pointers' impulse into the global step */
-void hapi_reconcile_residual(hapi_physics *physics);  /* after it: eq. 14 */
-void hapi_reconcile_overwrite(hapi_physics *physics); /* eq. 12 and 13 */
-void hapi_reconcile_leave(hapi_physics *physics);     /* last: what is left in ODE */
+bool hapi_account_create(hapi_account *account, uint32_t slots); /* false: no memory */
+void hapi_account_finish(hapi_account *account);
+void hapi_account_reset(hapi_account *account); /* all slots begin anew */
 
-/* hold.c */
-void hapi_hold_joints(hapi_physics *physics);        /* of owned bodies: off for the step */
-void hapi_hold_let_go_joints(hapi_physics *physics); /* after it; their feedback is zero */
+static inline hapi_slot_account *hapi_account_of(const hapi_account *account,
+                                                 const hapi_slots *slots, uint32_t index)
+{
+  HAPI_ASSERT_INDEX(index, account->capacity);
+  hapi_slot_account *body = &account->bodies[index];
+  if (body->generation != slots->bodies[index].generation) {
+    *body = (hapi_slot_account){.generation = slots->bodies[index].generation};
+  }
+  return body;
+}
 
-/* publish_joints.c */
-/* What a model is made of. */
-typedef struct hapi_publishing {
-  const hapi_cycle *cycle;
-  const hapi_world *world;
-  const hapi_slots *slots;
-} hapi_publishing;
-
-/* Entries of the joint table, which have slots. */
-void hapi_publish_joints(const hapi_publishing *p, const uint32_t *joints, uint32_t count,
-                         hapi_model *out);
-
-/* publish.c */
-void hapi_publish_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
+/* The body of a slot; NULL: it is gone. */
+static inline dBodyID hapi_account_body(const hapi_body_table *table, const hapi_body_slot *slot)
+{
+  return slot->known == HAPI_NONE ? NULL : table->entries[slot->known].body;
+}
 
 #endif

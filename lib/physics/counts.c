@@ -19,6 +19,11 @@ static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
   io_stats->faults.bodies_lost = world->bodies.lost;
   io_stats->physics.quickstep_calls += world->counts.steps + steps;
   io_stats->faults.contacts_rejected += world->counts.contacts_rejected;
+  io_stats->faults.states_rejected += physics->account.counts.states_rejected;
+  io_stats->model.capacity_dropped += physics->account.counts.dropped;
+  io_stats->edits.run = physics->edits.run;
+  io_stats->physics.missed += physics->tape.played_missed;
+  io_stats->physics.frames_dropped += physics->tape.played_dropped;
   io_stats->probes.steps = steps + probe->counts.joint_steps;
   io_stats->probes.clipped = probe->counts.clipped + cross->clipped;
   io_stats->probes.singular = probe->counts.singular + cross->singular;
@@ -47,6 +52,7 @@ void hapi_counts_show(hapi_physics *physics)
   physics->counts.shown = physics->counts.own;
   physics->counts.shown.range_s = physics->near.counts.range_s;
   physics->counts.shown.beyond_s = physics->near.counts.beyond_s;
+  physics->counts.shown_account = physics->account.counts;
   counts_gather(physics, &physics->counts.shown.stats);
   physics->counts.shown.cross_s = physics->research.cross.counts.seconds;
   physics->counts.shown.foretold2 = physics->research.range.foretold2;
@@ -60,22 +66,20 @@ void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
   physics->counts.own.stats.physics.frames_dropped += steps;
   physics->tape.dropped_unrecorded += steps;
   pthread_mutex_lock(&physics->counts.lock);
-  physics->counts.shown.stats.physics.frames_dropped =
-      physics->counts.own.stats.physics.frames_dropped;
+  physics->counts.shown.stats.physics.frames_dropped += steps;
   pthread_mutex_unlock(&physics->counts.lock);
 }
 
-static void fill_lock(const hapi_physics *physics, hap_stats *out)
+static void fill_lock(const hapi_lock_figures *f, hap_stats *out)
 {
-  const hapi_lock_figures *f = &physics->lock.figures;
   out->edits.locks = atomic_load(&f->count);
   out->edits.wait_ms_max = 1e-6 * (double)atomic_load(&f->wait_most_ns);
   out->edits.held_ms_max = 1e-6 * (double)atomic_load(&f->held_most_ns);
 }
 
-static void fill_times(const hapi_physics *physics, hap_stats *out)
+static void fill_times(const hapi_counts *counts, double period_s, hap_stats *out)
 {
-  const hapi_physics_counts *f = &physics->counts.shown;
+  const hapi_physics_counts *f = &counts->shown;
   double per_cycle = f->cycles > 0 ? 1e3 / (double)f->cycles : 0.0;
   out->physics.mean.collide_ms = per_cycle * f->collide_s;
   out->physics.mean.neighbour_ms = per_cycle * f->neighbour_s;
@@ -84,16 +88,16 @@ static void fill_times(const hapi_physics *physics, hap_stats *out)
   out->physics.mean.range_ms = per_cycle * f->range_s;
   out->physics.mean.publish_ms = per_cycle * f->publish_s;
   out->error.range_error = f->foretold2 > 0.0 ? sqrt(f->range_error2 / f->foretold2) : 0.0;
-  out->physics.ms_mean = 1e-6 * hapi_histogram_mean_ns(&physics->counts.cycle_ns);
-  out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&physics->counts.cycle_ns, 0.99);
-  out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&physics->counts.cycle_ns);
-  out->physics.duty = 1e-3 * out->physics.ms_mean / hapi_physics_next_period(physics);
+  out->physics.ms_mean = 1e-6 * hapi_histogram_mean_ns(&counts->cycle_ns);
+  out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&counts->cycle_ns, 0.99);
+  out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&counts->cycle_ns);
+  out->physics.duty = 1e-3 * out->physics.ms_mean / period_s;
 }
 
 /* Impulse on the world over impulse of the hands, along the latter. */
-static void fill_momentum(const hapi_physics *physics, hap_stats *out)
+static void fill_momentum(const hapi_counts *counts, hap_stats *out)
 {
-  const hapi_physics_counts *f = &physics->counts.shown;
+  const hapi_account_counts *f = &counts->shown_account;
   double net2 = hapi_v3_dot(f->hand_impulse, f->hand_impulse);
   double difference[3];
   hapi_v3_sub(f->world_impulse, f->hand_impulse, difference);
@@ -125,16 +129,18 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   *out = physics->counts.shown.stats;
   out->size = loop.size;
   out->hand.impulse_abs_ns = loop.hand.impulse_abs_ns;
-  fill_times(physics, out);
-  fill_lock(physics, out);
-  fill_momentum(physics, out);
+  fill_times(&physics->counts,
+             hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model)),
+             out);
+  fill_lock(&physics->lock.figures, out);
+  fill_momentum(&physics->counts, out);
   pthread_mutex_unlock(&physics->counts.lock);
   out->physics.pose_delay_s = hapi_poses_delay(&physics->drawing);
 }
 
 void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out)
 {
-  uint32_t wishes = hapi_physics_wanted_effects(physics);
+  uint32_t wishes = atomic_load(&physics->wanted.effects);
   pthread_mutex_lock(&physics->counts.lock);
   const hapi_physics_counts *shown = &physics->counts.shown;
   double per_step = shown->cycles > 0 ? 1e3 / (double)shown->cycles : (double)NAN;

@@ -14,6 +14,7 @@
 
 #include "base/effect_figures.h"
 #include "base/histogram.h"
+#include "physics/account.h"
 
 typedef struct hapi_physics hapi_physics;
 
@@ -33,14 +34,12 @@ typedef struct hapi_physics_counts {
   hapi_effect_figures effects[HAP_EFFECTS];
   hap_accuracy_info accuracy;
   uint64_t cycles;
-  double world_impulse[3]; /* given to the world: predictions and overwrites */
-  double hand_impulse[3];  /* given to the bodies, as the loop reported */
-  double owned_taken[3];   /* of hapi_state.owned_impulse, in world_impulse */
 } hapi_physics_counts;
 
 typedef struct hapi_counts {
   hapi_physics_counts own;
   hapi_histogram cycle_ns;
+  hapi_account_counts shown_account;
   hapi_physics_counts shown; /* copied once a cycle for readers */
   pthread_mutex_t lock;      /* of shown */
 } hapi_counts;

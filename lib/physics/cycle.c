@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/vec.h"
@@ -19,7 +20,7 @@ typedef struct stopwatch {
 } stopwatch;
 
 /* Seconds since the last call. */
-static double lap(stopwatch *watch)
+static double stopwatch_lap(stopwatch *watch)
 {
   int64_t now = hapi_clock_now();
   double seconds = 1e-9 * (double)(now - watch->last_ns);
@@ -27,25 +28,25 @@ static double lap(stopwatch *watch)
   return seconds;
 }
 
-static double lead_of(const hapi_physics *physics, hap_model model)
+static double lead_of(const hapi_physics_config *config, hap_model model)
 {
-  return model == HAP_MODEL_IMPULSE ? 1.0 / physics->config.physics_hz : 0.0;
+  return model == HAP_MODEL_IMPULSE ? 1.0 / config->physics_hz : 0.0;
 }
 
 /* A change of model changes how far ahead the world is: the step between makes up for it. */
 static void follow_model(hapi_physics *physics)
 {
-  hap_model wanted = hapi_tape_wanted_model(physics, false);
+  hap_model wanted =
+      hapi_tape_wanted_model(&physics->tape, &physics->wanted, &physics->cycle, false);
   double since_last = physics->cycle.probe_step_s;
-  physics->cycle.step_s =
-      since_last + lead_of(physics, wanted) - lead_of(physics, physics->cycle.model);
+  physics->cycle.step_s = since_last + lead_of(&physics->config, wanted) -
+                          lead_of(&physics->config, physics->cycle.model);
   if (physics->cycle.step_s < 1e-9) {
     physics->cycle.step_s = 0.0;
   }
   physics->cycle.model = wanted;
-  physics->cycle.wishes = hapi_tape_wanted_effects(physics);
-  physics->cycle.probe_step_s =
-      1.0 / (wanted == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
+  physics->cycle.wishes = hapi_tape_wanted_effects(&physics->tape, &physics->wanted);
+  physics->cycle.probe_step_s = hapi_config_period(&physics->config, wanted);
 }
 
 /* ODE aborts the process on a pose that is not finite: nothing that makes one may reach it. */
@@ -75,11 +76,11 @@ static void global_step(hapi_physics *physics)
   bool single = physics->cycle.model == HAP_MODEL_SINGLE;
   hapi_meant meant;
   hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
-  hapi_reconcile_hold(physics);
+  hapi_hold(&physics->account, &physics->world, &physics->near.slots);
   hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
   hapi_world_step(&physics->world, physics->cycle.step_s);
   hapi_world_restore(&physics->world, &meant);
-  hapi_reconcile_let_go(physics);
+  hapi_hold_let_go(&physics->account, &physics->world, &physics->near.slots);
 }
 
 static void call_step(hapi_physics *physics, hap_step_fn callback)
@@ -105,7 +106,7 @@ static void turn_dials(hapi_physics *physics)
     hapi_dial_follow(&physics->dial, &physics->cycle);
   }
   hapi_dial_positions(&physics->dial, percent);
-  hapi_tape_dials(physics, percent);
+  hapi_tape_dials(&physics->tape, percent);
   hapi_dial_place(&physics->dial, percent);
   hapi_physics_fill_settings(physics);
 }
@@ -118,7 +119,7 @@ void hapi_physics_enter_dial(hapi_physics *physics)
 
 static void sync_in(hapi_physics *physics)
 {
-  hapi_edits_run(physics);
+  hapi_physics_run_edits(physics);
   follow_model(physics);
   turn_dials(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
@@ -129,8 +130,10 @@ static void sync_in(hapi_physics *physics)
   int64_t begin_ns = hapi_clock_now();
   hapi_joints_scan(&physics->world);
   physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  hapi_reconcile_take(physics);
-  hapi_reconcile_own(physics);
+  hapi_physics_take_state(physics);
+  if (physics->cycle.has_new_state) {
+    hapi_reconcile_own(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+  }
 }
 
 static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
@@ -144,8 +147,9 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
              !hapi_tape_plays(physics->tape.tape)) {
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
-  hapi_publish_model(physics, state_ns, valid_ns - half_tick);
-  hapi_reconcile_leave(physics);
+  hapi_physics_send_model(physics, state_ns, valid_ns - half_tick);
+  hapi_reconcile_leave(&physics->account, &physics->world, &physics->near.slots);
+  hapi_slots_release(&physics->near);
   hapi_joints_leave(&physics->world.joints);
   physics->cycle.last_cycle_ns = now_ns;
   /* The loop of model IMPULSE shows bodies on their way to a pose that is reached a step later. */
@@ -171,7 +175,8 @@ void hapi_physics_test_range(hapi_physics *physics)
     return;
   }
   hapi_range_error_compare(range, &physics->cycle, &physics->world, &physics->near.slots);
-  /* Not in the collision phase: who asks for a surface first says in which order a pair is looked at. */
+  /* Not in the collision phase: who asks for a surface first says in which order a pair is
+   * looked at. */
   physics->world.counts.contacts_rejected +=
       hapi_world_collide_carried(&physics->world, &physics->cycle);
   hapi_range_error_measure(range, &physics->cycle, &physics->world, &physics->near);
@@ -231,44 +236,46 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
   hapi_counts_show(physics);
 }
 
-static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
+  HAPI_ASSERT(physics->world.begun && hapi_lock_in_callback(&physics->lock));
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
   dJointGroupEmpty(physics->world.contact_group);
-  seconds[0] = lap(&watch);
+  seconds[0] = stopwatch_lap(&watch);
   sync_in(physics);
   if (!world_is_sound(physics)) {
     return;
   }
   hapi_physics_enter_dial(physics);
-  seconds[4] = lap(&watch);
+  seconds[4] = stopwatch_lap(&watch);
   look_back(physics, now_ns);
-  double looked_s = seconds[2] = lap(&watch);
+  double looked_s = seconds[2] = stopwatch_lap(&watch);
   if (physics->cycle.model == HAP_MODEL_IMPULSE) {
     hapi_lookback_open(&physics->lookback, &physics->cycle, &physics->world, &physics->near.slots,
                        &physics->near.neighbors, now_ns);
   }
-  hapi_reconcile_push(physics);
-  seconds[4] += lap(&watch);
+  hapi_reconcile_push(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+  seconds[4] += stopwatch_lap(&watch);
   hapi_physics_collide(physics);
-  seconds[0] += lap(&watch);
+  seconds[0] += stopwatch_lap(&watch);
   hapi_neighbors_collect(&physics->near);
-  seconds[1] = lap(&watch);
+  seconds[1] = stopwatch_lap(&watch);
   global_step(physics);
-  seconds[3] = lap(&watch);
-  hapi_reconcile_residual(physics);
-  hapi_reconcile_overwrite(physics);
+  seconds[3] = stopwatch_lap(&watch);
+  hapi_reconcile_residual(&physics->account, &physics->world, &physics->near.slots,
+                          &physics->cycle);
+  hapi_reconcile_overwrite(&physics->world, &physics->near.slots, &physics->cycle);
   hapi_neighbors_find(&physics->near);
-  seconds[1] += lap(&watch) - physics->near.range.links.cover.boxes_s;
+  seconds[1] += stopwatch_lap(&watch) - physics->near.range.links.cover.boxes_s;
   seconds[0] +=
       physics->near.range.links.cover.boxes_s; /* which the next collision phase finds done */
   hapi_physics_test_range(physics); /* first: it leaves the space as it finds it, which is clean */
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
                     physics->near.range.number);
-  seconds[2] += lap(&watch);
+  seconds[2] += stopwatch_lap(&watch);
   hapi_lookback_note(&physics->lookback, &physics->cycle, &physics->near.slots,
                      &physics->near.neighbors);
   sync_out(physics, now_ns, next_ns);
@@ -277,16 +284,16 @@ static void run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
                        &physics->near.neighbors, now_ns);
   }
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
-  seconds[4] += lap(&watch);
+  seconds[4] += stopwatch_lap(&watch);
   note_times(physics, seconds, looked_s);
   call_step(physics, physics->world.ode.after_step);
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
-  hapi_physics_enter(physics);
-  hapi_tape_cycle(physics, now_ns, next_ns);
-  run(physics, now_ns, next_ns);
-  hapi_tape_cycled(physics);
-  hapi_physics_leave(physics);
+  hapi_lock_enter(&physics->lock);
+  hapi_tape_cycle(&physics->tape, &physics->wanted, now_ns, next_ns);
+  cycle_run(physics, now_ns, next_ns);
+  hapi_tape_cycled(&physics->tape, &physics->cycle);
+  hapi_lock_leave(&physics->lock);
 }

@@ -1,58 +1,60 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "physics/physics_internal.h"
+#include "physics/edits.h"
+
+#include "base/assert.h"
 
 /* Edits that other threads posted, run between two steps in the order of posting. */
 
-hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg)
+hap_status hapi_edits_post(hapi_edits *edits, hap_edit_fn edit, void *arg)
 {
   hap_status status = HAP_ERROR_CAPACITY;
-  pthread_mutex_lock(&physics->edits.lock);
-  if (physics->edits.closed) {
+  pthread_mutex_lock(&edits->lock);
+  HAPI_ASSERT(edits->first < HAPI_EDITS_MAX && edits->count <= HAPI_EDITS_MAX);
+  if (edits->closed) {
     status = HAP_ERROR_STATE;
-  } else if (physics->edits.count < HAPI_EDITS_MAX) {
-    uint32_t at = (physics->edits.first + physics->edits.count++) % HAPI_EDITS_MAX;
-    physics->edits.ring[at] = (hapi_edit){edit, arg};
+  } else if (edits->count < HAPI_EDITS_MAX) {
+    uint32_t at = (edits->first + edits->count++) % HAPI_EDITS_MAX;
+    edits->ring[at] = (hapi_edit){edit, arg};
     status = HAP_OK;
   }
-  pthread_mutex_unlock(&physics->edits.lock);
+  pthread_mutex_unlock(&edits->lock);
   return status;
 }
 
-static bool take_edit(hapi_physics *physics, hapi_edit *out)
+static bool edit_take(hapi_edits *edits, hapi_edit *out)
 {
-  pthread_mutex_lock(&physics->edits.lock);
-  bool any = physics->edits.count > 0;
+  pthread_mutex_lock(&edits->lock);
+  bool any = edits->count > 0;
   if (any) {
-    *out = physics->edits.ring[physics->edits.first];
-    physics->edits.first = (physics->edits.first + 1) % HAPI_EDITS_MAX;
-    --physics->edits.count;
+    *out = edits->ring[edits->first];
+    edits->first = (edits->first + 1) % HAPI_EDITS_MAX;
+    --edits->count;
   }
-  pthread_mutex_unlock(&physics->edits.lock);
+  pthread_mutex_unlock(&edits->lock);
   return any;
 }
 
-void hapi_edits_run(hapi_physics *physics)
+uint32_t hapi_edits_waiting(hapi_edits *edits)
 {
-  pthread_mutex_lock(&physics->edits.lock);
-  uint32_t count = physics->edits.count; /* what an edit posts waits for the next step */
-  pthread_mutex_unlock(&physics->edits.lock);
-  hapi_edit edit;
-  hapi_tape_edits(physics, count);
-  physics->lock.editable = true;
-  for (uint32_t i = 0; i < count && take_edit(physics, &edit); ++i) {
-    edit.run(edit.arg);
-    ++physics->counts.own.stats.edits.run;
-  }
-  physics->lock.editable = false;
+  pthread_mutex_lock(&edits->lock);
+  uint32_t count = edits->count;
+  pthread_mutex_unlock(&edits->lock);
+  return count;
 }
 
-void hapi_physics_close(hapi_physics *physics)
+void hapi_edits_run(hapi_edits *edits, uint32_t count)
 {
-  pthread_mutex_lock(&physics->edits.lock);
-  physics->edits.closed = true;
-  pthread_mutex_unlock(&physics->edits.lock);
-  hapi_physics_enter(physics);
-  hapi_edits_run(physics); /* all of them: no more can come */
-  hapi_physics_leave(physics);
+  hapi_edit edit;
+  for (uint32_t i = 0; i < count && edit_take(edits, &edit); ++i) {
+    edit.run(edit.arg);
+    ++edits->run;
+  }
+}
+
+void hapi_edits_close(hapi_edits *edits)
+{
+  pthread_mutex_lock(&edits->lock);
+  edits->closed = true;
+  pthread_mutex_unlock(&edits->lock);
 }

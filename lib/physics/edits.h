@@ -11,8 +11,6 @@
 
 #include <hapode/session.h>
 
-typedef struct hapi_physics hapi_physics;
-
 #define HAPI_EDITS_MAX 256
 
 typedef struct hapi_edit {
@@ -26,8 +24,13 @@ typedef struct hapi_edits {
   uint32_t first;
   uint32_t count;
   bool closed;
+  uint64_t run; /* so far; of the thread that runs them */
 } hapi_edits;
 
-void hapi_edits_run(hapi_physics *physics);
+/* [any] HAP_ERROR_CAPACITY: too many wait; HAP_ERROR_STATE: closed. */
+hap_status hapi_edits_post(hapi_edits *edits, hap_edit_fn edit, void *arg);
+uint32_t hapi_edits_waiting(hapi_edits *edits);
+void hapi_edits_run(hapi_edits *edits, uint32_t count); /* at most; they may post others */
+void hapi_edits_close(hapi_edits *edits);
 
 #endif

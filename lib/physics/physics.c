@@ -15,10 +15,11 @@
 
 #define LAST_ROUNDS 16 /* of edits, when the session stops: also of what edits post */
 
-static bool allocate(hapi_physics *physics, const hap_ode_def *ode)
+static bool physics_allocate(hapi_physics *physics, const hap_ode_def *ode)
 {
   const hapi_capacity *c = &physics->config.capacity;
-  return hapi_probe_create(&physics->probe, c) &&
+  return hapi_account_create(&physics->account, c->bodies) &&
+         hapi_probe_create(&physics->probe, c) &&
          hapi_cross_create(&physics->research.cross, &physics->cycle, &physics->near.slots,
                            &physics->probe) &&
          hapi_range_error_create(&physics->research.range, c) &&
@@ -48,11 +49,11 @@ static hap_status check_world(hapi_physics *physics, hap_detail *detail)
   return HAP_OK;
 }
 
-static void release_bodies(hapi_physics *physics)
+static void release_bodies(const hapi_body_table *table)
 {
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    if (physics->world.bodies.entries[i].body != NULL) {
-      hapi_sleep_give_back(&physics->world.bodies.entries[i]);
+  for (uint32_t i = 0; i < table->high; ++i) {
+    if (table->entries[i].body != NULL) {
+      hapi_sleep_give_back(&table->entries[i]);
     }
   }
 }
@@ -103,7 +104,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
   atomic_init(&physics->dial.share[HAPI_DIAL_TICK], config->tick_share);
   atomic_init(&physics->dial.share[HAPI_DIAL_PHYSICS], config->physics_share);
-  if (!init_locks(physics) || !allocate(physics, ode)) {
+  if (!init_locks(physics) || !physics_allocate(physics, ode)) {
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
@@ -124,6 +125,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_physics_end(physics);
   hapi_nearby_finish(&physics->near);
   hapi_world_finish(&physics->world);
+  hapi_account_finish(&physics->account);
   hapi_poses_finish(&physics->drawing);
   hapi_probe_finish(&physics->probe);
   hapi_cross_finish(&physics->research.cross);
@@ -143,7 +145,7 @@ static void give_world_back(hapi_physics *physics)
   dJointGroupEmpty(physics->world.carried_group);
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_physics_scan(physics); /* a body without memory for it was given nothing */
-  release_bodies(physics);
+  release_bodies(&physics->world.bodies);
   hapi_islands_end(&physics->world);
   if (physics->world.islands_threads != 0) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world,
@@ -157,20 +159,18 @@ static void reset_figures(hapi_physics *physics)
 {
   memset(&physics->counts.own, 0, sizeof physics->counts.own);
   memset(&physics->world.counts, 0, sizeof physics->world.counts);
+  memset(&physics->account.counts, 0, sizeof physics->account.counts);
+  physics->edits.run = 0;
+  physics->tape.played_missed = physics->tape.played_dropped = 0;
   hapi_histogram_reset(&physics->counts.cycle_ns);
   hapi_lock_figures_reset(&physics->lock.figures);
   hapi_counts_show(physics);
 }
 
-double hapi_period_of(const hapi_physics *physics, hap_model model)
-{
-  return 1.0 / (model == HAP_MODEL_SINGLE ? physics->config.haptic_hz : physics->config.physics_hz);
-}
-
 static void build_first_model(hapi_physics *physics)
 {
   hapi_physics_enter_dial(physics);
-  hapi_reconcile_take(physics);
+  hapi_physics_take_state(physics);
   hapi_physics_collide(physics);
   hapi_neighbors_collect(&physics->near);
   hapi_neighbors_find(&physics->near);
@@ -179,7 +179,7 @@ static void build_first_model(hapi_physics *physics)
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
 }
 
-static void prepare(hapi_physics *physics)
+static void physics_prepare(hapi_physics *physics)
 {
   reset_figures(physics);
   hapi_nearby_reset(&physics->near);
@@ -187,16 +187,16 @@ static void prepare(hapi_physics *physics)
     physics->world.bodies.entries[i].loop_owned = false;
   }
   hapi_lookback_reset(&physics->lookback);
-  hapi_dial_reset(
-      &physics->dial,
-      hapi_tape_dial_at_start(physics, hapi_dial_percent(atomic_load(&physics->dial.wanted))));
+  hapi_dial_reset(&physics->dial,
+                  hapi_tape_dial_at_start(&physics->tape,
+                                          hapi_dial_percent(atomic_load(&physics->dial.wanted))));
   hapi_physics_fill_settings(physics);
   hapi_probe_reset(&physics->probe);
   hapi_cross_reset(&physics->research.cross);
   hapi_range_error_reset(&physics->research.range);
   physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
   physics->cycle.wishes = atomic_load(&physics->wanted.effects);
-  physics->cycle.probe_step_s = hapi_period_of(physics, physics->cycle.model);
+  physics->cycle.probe_step_s = hapi_config_period(&physics->config, physics->cycle.model);
   physics->cycle.state = NULL;
   physics->cycle.step_s = 0.0;
   physics->cycle.model_number = 0;
@@ -215,13 +215,13 @@ static void prepare(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->world.begun = true;
-  hapi_slots_reset(
-      &physics->near); /* of a session before: the scan leaves what is local to others */
+  hapi_account_reset(&physics->account);
+  hapi_slots_reset(&physics->near); /* the scan leaves what is local to others */
   hapi_joints_reset(
       &physics->world.joints); /* as for the meshes below; and walks are counted from 1 again */
   hap_status status = check_world(physics, detail);
   if (status >= HAP_OK) {
-    status = hapi_tape_world(physics, detail);
+    status = hapi_tape_world(&physics->tape, &physics->world, &physics->wanted, detail);
   }
   if (status < HAP_OK) {
     give_world_back(physics);
@@ -233,21 +233,22 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for island_threads = %d",
                      physics->world.ode.island_threads);
   }
-  hapi_physics_claim(physics); /* surfaces are asked for */
-  prepare(physics);
+  hapi_lock_claim(&physics->lock); /* surfaces are asked for */
+  physics_prepare(physics);
   build_first_model(physics);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
-  hapi_tape_start(physics, start_ns);
+  hapi_tape_start(&physics->tape, start_ns);
   physics->pace.start_ns = *start_ns;
   physics->cycle.last_cycle_ns = *start_ns;
   hapi_poses_reset(&physics->drawing);
   const int64_t times_ns[2] = {*start_ns, *start_ns};
   hapi_poses_publish(&physics->drawing, &physics->world, &physics->near.slots, &physics->cycle,
                      times_ns);
-  hapi_publish_model(physics, *start_ns, *start_ns);
-  hapi_tape_started(physics);
-  hapi_reconcile_leave(physics);
-  hapi_physics_unclaim(physics);
+  hapi_physics_send_model(physics, *start_ns, *start_ns);
+  hapi_tape_started(&physics->tape, &physics->cycle);
+  hapi_reconcile_leave(&physics->account, &physics->world, &physics->near.slots);
+  hapi_slots_release(&physics->near);
+  hapi_lock_unclaim(&physics->lock);
   hapi_counts_show(physics);
   return HAP_OK;
 }
@@ -258,13 +259,66 @@ void hapi_physics_end(hapi_physics *physics)
     return;
   }
   hapi_physics_stop_thread(physics);
-  hapi_physics_enter(physics);
+  hapi_lock_enter(&physics->lock);
   for (int round = 0; round < LAST_ROUNDS; ++round) {
-    hapi_edits_run(physics);
+    hapi_physics_run_edits(physics);
   }
   hapi_counts_show(physics);
   give_world_back(physics);
-  hapi_physics_leave(physics);
+  hapi_lock_leave(&physics->lock);
+}
+
+/* ---- what the session asks for ---- */
+
+const char *hapi_physics_ode_configuration(void)
+{
+  return dGetConfiguration();
+}
+
+hap_status hapi_physics_post(hapi_physics *physics, hap_edit_fn edit, void *arg)
+{
+  return hapi_edits_post(&physics->edits, edit, arg);
+}
+
+void hapi_physics_close(hapi_physics *physics)
+{
+  hapi_edits_close(&physics->edits);
+  hapi_lock_enter(&physics->lock);
+  hapi_physics_run_edits(physics); /* all of them: no more can come */
+  hapi_lock_leave(&physics->lock);
+}
+
+bool hapi_physics_in_callback(const hapi_physics *physics)
+{
+  return hapi_lock_in_callback(&physics->lock);
+}
+
+bool hapi_physics_lock_is_mine(hapi_physics *physics)
+{
+  return hapi_fair_lock_is_mine(&physics->lock.fair);
+}
+
+bool hapi_physics_may_edit(hapi_physics *physics)
+{
+  if (hapi_lock_in_callback(&physics->lock)) {
+    return physics->lock.editable;
+  }
+  return !physics->world.begun || physics->config.lockstep ||
+         hapi_fair_lock_is_mine(&physics->lock.fair);
+}
+
+hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
+{
+  hap_status status = hapi_lock_take(&physics->lock, timeout_ns);
+  if (status >= HAP_OK) {
+    ++physics->tape.locks; /* by who has the lock */
+  }
+  return status;
+}
+
+hap_status hapi_physics_unlock(hapi_physics *physics)
+{
+  return hapi_lock_give(&physics->lock);
 }
 
 int64_t hapi_physics_last_cycle(const hapi_physics *physics)
@@ -274,12 +328,12 @@ int64_t hapi_physics_last_cycle(const hapi_physics *physics)
 
 double hapi_physics_period(const hapi_physics *physics)
 {
-  return hapi_period_of(physics, physics->cycle.model);
+  return hapi_config_period(&physics->config, physics->cycle.model);
 }
 
 double hapi_physics_next_period(const hapi_physics *physics)
 {
-  return hapi_period_of(physics, (hap_model)atomic_load(&physics->wanted.model));
+  return hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model));
 }
 
 void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)

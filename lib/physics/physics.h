@@ -31,13 +31,13 @@ void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);
 void hapi_physics_end(hapi_physics *physics); /* gives the world back; idempotent */
 
-/* [control] Before begin: from then on what comes from outside goes to the tape or comes from it, until
- * the tape is taken away after end. NULL: none. A replay has the session's clock from the tape, and what the
- * threads do and lockstep does not. */
+/* [control] Before begin: from then on what comes from outside goes to the tape or comes from
+ * it, until the tape is taken away after end. NULL: none. A replay has the session's clock from
+ * the tape, and what the threads do and lockstep does not. */
 void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape);
 const char *hapi_physics_ode_configuration(void); /* [any] what ODE was built as */
-/* [control] After end, before anything of the session is destroyed: runs the edits that are left, which
- * may call the session. Nothing can be posted any more. */
+/* [control] After end, before anything of the session is destroyed: runs the edits that are
+ * left, which may call the session. Nothing can be posted any more. */
 void hapi_physics_close(hapi_physics *physics);
 
 /* [control] Between begin and end: the thread of drive THREADS. */

@@ -3,8 +3,8 @@
 #ifndef HAPODE_PHYSICS_PHYSICS_INTERNAL_H
 #define HAPODE_PHYSICS_PHYSICS_INTERNAL_H
 
-/* All parts of the physics side in one struct. It belongs to the physics thread, or to whoever holds
- * the lock, unless a member says otherwise. */
+/* All parts of the physics side in one struct. It belongs to the physics thread, or to whoever
+ * holds the lock, unless a member says otherwise. */
 
 #include <stdatomic.h>
 
@@ -18,18 +18,13 @@
 #include "physics/edits.h"
 #include "physics/physics.h"
 #include "physics/poses.h"
+#include "physics/publish.h"
+#include "physics/reconcile.h"
 #include "physics/tape_cycle.h"
 #include "physics/world_lock.h"
 #include "probe/probe.h"
 #include "research/research.h"
 #include "world/world.h"
-
-/* What other threads asked for, from the next cycle on. */
-typedef struct hapi_wanted {
-  _Atomic int model;
-  _Atomic uint32_t effects; /* base/wishes.h */
-  double latency_s;         /* negative: the model's own */
-} hapi_wanted;
 
 /* The thread of drive THREADS. */
 typedef struct hapi_pace {
@@ -49,6 +44,7 @@ struct hapi_physics {
   hapi_lookback lookback;
   hapi_dial dial;
   hapi_account account;
+  hapi_watch watch;
   hapi_drawing drawing;
   hapi_taping tape;
   hapi_counts counts;
@@ -66,13 +62,19 @@ void hapi_physics_test(hapi_physics *physics);
 /* cycle.c: what the dials come to */
 void hapi_physics_fill_settings(hapi_physics *physics);
 void hapi_physics_enter_dial(hapi_physics *physics);
-/* physics.c: H, or T in model SINGLE */
-double hapi_period_of(const hapi_physics *physics, hap_model model);
 
-/* adopt.c */
+/* intake.c */
 void hapi_physics_listen(hapi_physics *physics);     /* to the world, which is created after that */
 hap_status hapi_physics_scan(hapi_physics *physics); /* reads which bodies there are */
-/* ODE would abort on what the world holds. *out_text says what it is and what to do. After a scan. */
+/* ODE would abort on what the world holds. *out_text says what it is and what to do. After a
+ * scan. */
 bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text);
+
+void hapi_physics_run_edits(hapi_physics *physics); /* those that wait; the caller has the lock */
+/* The newest message of the loop, if there is one. */
+void hapi_physics_take_state(hapi_physics *physics);
+
+/* send.c: the next model */
+void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
 
 #endif

@@ -9,9 +9,14 @@
 
 /* Paces the cycles in drive THREADS. */
 
-static int64_t nanoseconds(double seconds)
+static int64_t seconds_to_ns(double seconds)
 {
   return (int64_t)llround(1e9 * seconds);
+}
+
+static int64_t period_ns(const hapi_physics_config *config, hap_model model)
+{
+  return seconds_to_ns(hapi_config_period(config, model));
 }
 
 static void count_missed(hapi_physics *physics, int64_t deadlines)
@@ -36,18 +41,19 @@ static void *physics_main(void *arg)
 {
   hapi_physics *physics = arg;
   dAllocateODEDataForThread(dAllocateMaskAll);
-  int64_t period = nanoseconds(hapi_physics_period(physics));
+  int64_t period = period_ns(&physics->config, physics->cycle.model);
   int64_t deadline = physics->pace.start_ns;
-  if (hapi_physics_steps_to_now(physics)) {
+  if (hapi_cycle_steps_to_now(&physics->cycle)) {
     deadline += period; /* the first model is for the start already */
   }
   while (atomic_load_explicit(&physics->pace.stop, memory_order_acquire) == 0) {
     bool single = physics->cycle.model == HAP_MODEL_SINGLE;
     /* SINGLE works between two ticks: after the one before its time and before the one at it. */
     hapi_clock_sleep_until(single ? deadline - period / 2 : deadline);
-    hapi_physics_cycle(physics, deadline,
-                       deadline + nanoseconds(hapi_physics_next_period(physics)));
-    period = nanoseconds(hapi_physics_period(physics));
+    hapi_physics_cycle(
+        physics, deadline,
+        deadline + period_ns(&physics->config, (hap_model)atomic_load(&physics->wanted.model)));
+    period = period_ns(&physics->config, physics->cycle.model);
     deadline = skip_missed(physics, deadline + period, period);
   }
   dCleanupODEAllDataForThread();

@@ -8,13 +8,14 @@
 #include "base/pose.h"
 #include "physics/physics_internal.h"
 
-/* The world's poses for those who draw: a frame of all bodies at each step, and the time that is drawn.
+/* The world's poses for those who draw: a frame of all bodies at each step, and the time that is
+ * drawn.
  *
- * What is drawn lies behind by a delay: one step H, so that there is a frame after it as well as one
- * before, or as much longer as frames really come late: physics needs its time to compute them, a frame
- * loop asks for them when it draws, a world that is too large takes longer than H. A single hitch does not
- * count. The delay follows slowly, so that the time that is drawn runs neither back nor visibly
- * faster. */
+ * What is drawn lies behind by a delay: one step H, so that there is a frame after it as well as
+ * one before, or as much longer as frames really come late: physics needs its time to compute
+ * them, a frame loop asks for them when it draws, a world that is too large takes longer than H.
+ * A single hitch does not count. The delay follows slowly, so that the time that is drawn runs
+ * neither back nor visibly faster. */
 
 #define DELAY_MOST 6.0         /* H */
 #define HITCH 0.5              /* H, that a single wait is longer than all others */
@@ -36,7 +37,8 @@ static double delay_at(const hapi_frames *frames, int64_t time_ns)
   return fabs(gap) <= way ? frames->delay_wanted_ns : frames->delay_ns + copysign(way, gap);
 }
 
-/* The largest wait for a frame among the last ones; one that stands out is a hitch and does not count. */
+/* The largest wait for a frame among the last ones; one that stands out is a hitch and does not
+ * count. */
 static double usual_wait(const hapi_frames *frames, double step)
 {
   double largest = 0.0;
@@ -58,10 +60,10 @@ static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
   frames->delay_wanted_ns = fmin(fmax(usual_wait(frames, step), step), DELAY_MOST * step);
 }
 
-/* Number of the frame for stamp_ns. One that is not later than those before takes their place, as a
- * change of model leads to. In model SINGLE, whose steps would soon use up the ring, a frame goes when the
- * next one comes unless it is some way behind the one before; elsewhere that would show, where a late
- * frame loop leaves two steps close together. */
+/* Number of the frame for stamp_ns. One that is not later than those before takes their place,
+ * as a change of model leads to. In model SINGLE, whose steps would soon use up the ring, a
+ * frame goes when the next one comes unless it is some way behind the one before; elsewhere that
+ * would show, where a late frame loop leaves two steps close together. */
 static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t stamp_ns,
                            int64_t known_ns)
 {
@@ -83,13 +85,16 @@ static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t
   }
   uint64_t frame = frames->count++;
   frames->stamps[frame % HAPI_FRAMES] = stamp_ns;
+  HAPI_ASSERT(frame == 0 || frame == frames->oldest ||
+              frames->stamps[(frame - 1) % HAPI_FRAMES] < stamp_ns);
   if (frame >= frames->oldest + HAPI_FRAMES) {
     frames->oldest = frame + 1 - HAPI_FRAMES;
   }
   return frame;
 }
 
-/* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it exactly. */
+/* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it
+ * exactly. */
 static bool led_by_loop(const hapi_known_body *known, const hapi_cycle *cycle,
                         const hapi_slots *slots)
 {
@@ -122,6 +127,8 @@ static hap_pose *pose_in(const hapi_drawing *drawing, const hapi_drawn *drawn, u
 static void add_pose(const hapi_drawing *drawing, const hapi_known_body *known, uint32_t index,
                      uint64_t frame)
 {
+  HAPI_ASSERT_INDEX(index, drawing->capacity);
+  HAPI_ASSERT(frame >= drawing->frames.oldest && frame < drawing->frames.count);
   hapi_drawn *drawn = &drawing->drawn[index];
   if (hapi_pose_is_sound(known->body)) {
     hapi_pose_read(known->body, pose_in(drawing, drawn, frame));
@@ -263,9 +270,9 @@ static bool sample_row(scene *d, const hapi_drawn *drawn, uint64_t row, sample *
   return false;
 }
 
-/* The newest that is known of the body up to the time: in the trail, or in a frame where that is later. A
- * frame that only repeats the loop is no better than the trail; it stands in where that does not
- * reach. */
+/* The newest that is known of the body up to the time: in the trail, or in a frame where that is
+ * later. A frame that only repeats the loop is no better than the trail; it stands in where that
+ * does not reach. */
 static bool find_before(scene *d, const hapi_drawn *drawn, sample *out)
 {
   uint64_t first = drawn->first > d->frame_first ? drawn->first : d->frame_first;
@@ -323,7 +330,7 @@ static void go_on(const scene *d, const hapi_drawn *drawn, const sample *last, h
   hapi_pose_slerp(pose_in(d->drawing, drawn, before), &last->pose, 1.0 + since / interval, out);
 }
 
-static void draw(scene *d, const hapi_drawn *drawn, hap_pose *out)
+static void scene_draw(scene *d, const hapi_drawn *drawn, hap_pose *out)
 {
   sample before = {0};
   sample after = {0};
@@ -341,7 +348,7 @@ static void draw(scene *d, const hapi_drawn *drawn, hap_pose *out)
   hapi_pose_slerp(&before.pose, &after.pose, fmin(fmax(share, 0.0), 1.0), out);
 }
 
-static void seek(scene *d)
+static void scene_seek(scene *d)
 {
   const hapi_frames *frames = d->frames;
   d->frame_first = frames->oldest;
@@ -365,7 +372,7 @@ static int64_t drawn_time(const hapi_frames *frames, int64_t time_ns)
 }
 
 /* late_steps: from the last frame, that are in order. */
-static hap_status judge(const scene *d, double late_steps)
+static hap_status scene_judge(const scene *d, double late_steps)
 {
   const hapi_frames *frames = d->frames;
   double late = (double)(d->time_ns - stamp_of(d, frames->count - 1));
@@ -391,12 +398,12 @@ static bool all_known(const hapi_drawing *drawing, const hapi_body_table *table,
 }
 
 /* False: the trail went on so far meanwhile that what was read of it may be torn. */
-static bool draw_all(scene *d, const hapi_body_table *table, struct dxBody *const *bodies,
-                     size_t count, hap_pose *out)
+static bool scene_draw_all(scene *d, const hapi_body_table *table, struct dxBody *const *bodies,
+                           size_t count, hap_pose *out)
 {
-  seek(d);
+  scene_seek(d);
   for (size_t i = 0; i < count; ++i) {
-    draw(d, &d->drawing->drawn[hapi_bodies_find(table, bodies[i])], &out[i]);
+    scene_draw(d, &d->drawing->drawn[hapi_bodies_find(table, bodies[i])], &out[i]);
   }
   return hapi_trail_is_whole(&d->rows);
 }
@@ -418,8 +425,8 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
   for (bool whole = !known || count == 0; !whole;) {
     scene d = scene_begin(physics);
     d.time_ns = drawn_time(&physics->drawing.frames, time_ns);
-    whole = draw_all(&d, &physics->world.bodies, bodies, count, out);
-    status = judge(&d, 1.0);
+    whole = scene_draw_all(&d, &physics->world.bodies, bodies, count, out);
+    status = scene_judge(&d, 1.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
   return known ? status : HAP_ERROR_NOT_FOUND;
@@ -435,8 +442,8 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
     scene d = scene_begin(physics);
     d.newest = true;
     d.time_ns = newest_time(&d);
-    whole = draw_all(&d, &physics->world.bodies, bodies, count, out);
-    status = judge(&d, 2.0);
+    whole = scene_draw_all(&d, &physics->world.bodies, bodies, count, out);
+    status = scene_judge(&d, 2.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
   return known ? status : HAP_ERROR_NOT_FOUND;

@@ -3,13 +3,15 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
-#include "physics/account.h"
+#include "physics/publish.h"
 #include "probe/joint_probe.h"
 
 /* The joints of the range, as the loop has them. */
 
-/* A softness from which on a constraint is a spring, not a rigid one with rounding; as of contacts. */
+/* A softness from which on a constraint is a spring, not a rigid one with rounding; as of
+ * contacts. */
 #define SOFT_CFM 1e-6
 
 /* ODE: a stop at pi and beyond is never met, as the angle goes on at -pi. */
@@ -108,8 +110,10 @@ static void fill_limits(const hapi_publishing *p, const hapi_known_joint *known,
   }
 }
 
-static void fill(const hapi_publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
+static void joint_fill(const hapi_publishing *p, const hapi_known_joint *known,
+                       hapi_model_joint *out)
 {
+  HAPI_ASSERT_INDEX(known->slot, p->world->joints.slot_count);
   memset(out, 0, sizeof *out);
   const hapi_joint_measurement *measured = known->carried ? NULL : known->measurement;
   uint32_t first = measured != NULL ? measured->first : 0;
@@ -137,8 +141,9 @@ void hapi_publish_joints(const hapi_publishing *p, const uint32_t *joints, uint3
                          hapi_model *out)
 {
   hapi_model_joint *to = hapi_model_joints(out);
+  HAPI_ASSERT(count <= p->cycle->config->capacity.joints);
   for (uint32_t i = 0; i < count; ++i) {
-    fill(p, &p->world->joints.entries[joints[i]], &to[i]);
+    joint_fill(p, &p->world->joints.entries[joints[i]], &to[i]);
   }
   out->joint_count = count;
 }

@@ -2,33 +2,31 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
-#include "physics/physics_internal.h"
+#include "near/shapes.h"
+#include "physics/tape_cycle.h"
 
-/* Physics' part of a recording: what a cycle has from outside, and a hash of the local model that it
- * made of it. */
+/* Physics' part of a recording: what a cycle has from outside, and a hash of the local model
+ * that it made of it. */
 
 #define MODEL_BITS 0xffu
 #define LOW_HALF 0xffffffffu
 
 /* Recording: the cell of a cycle until it has taken its message; NULL: none. */
-static hapi_cell *cycle_note(const hapi_physics *physics)
+static hapi_cell *cycle_note(const hapi_taping *taping)
 {
-  bool running = hapi_tape_records(physics->tape.tape) && physics->tape.note != NULL &&
-                 physics->tape.note->kind == HAPI_CELL_CYCLE;
-  return running ? physics->tape.note : NULL;
+  bool running = hapi_tape_records(taping->tape) && taping->note != NULL &&
+                 taping->note->kind == HAPI_CELL_CYCLE;
+  return running ? taping->note : NULL;
 }
 
-static void commit(hapi_physics *physics)
+static void note_commit(hapi_taping *taping)
 {
-  hapi_tape_commit(physics->tape.tape);
-  physics->tape.note = NULL;
-}
-
-const char *hapi_physics_ode_configuration(void)
-{
-  return dGetConfiguration();
+  HAPI_ASSERT(hapi_tape_records(taping->tape));
+  hapi_tape_commit(taping->tape);
+  taping->note = NULL;
 }
 
 /* ---- the world at the start ---- */
@@ -91,18 +89,18 @@ static uint64_t hash_settings(dWorldID world)
   return hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
 }
 
-static void describe_world(hapi_physics *physics, hapi_cell *out)
+static void describe_world(const hapi_world *world, hapi_cell *out)
 {
-  out->u[HAPI_WORLD_HASH] = hash_settings(physics->world.ode.world);
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    dBodyID body = physics->world.bodies.entries[i].body;
+  out->u[HAPI_WORLD_HASH] = hash_settings(world->ode.world);
+  for (uint32_t i = 0; i < world->bodies.high; ++i) {
+    dBodyID body = world->bodies.entries[i].body;
     if (body != NULL) {
       out->u[HAPI_WORLD_HASH] = hash_body(out->u[HAPI_WORLD_HASH], body);
       out->u[HAPI_WORLD_JOINTS] += (uint64_t)dBodyGetNumJoints(body);
       ++out->u[HAPI_WORLD_BODIES];
     }
   }
-  hash_space(physics->world.ode.space, out);
+  hash_space(world->ode.space, out);
 }
 
 static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap_detail *detail)
@@ -123,44 +121,45 @@ static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap
                        : "");
 }
 
-hap_status hapi_tape_world(hapi_physics *physics, hap_detail *detail)
+hap_status hapi_tape_world(hapi_taping *taping, const hapi_world *world, hapi_wanted *wanted,
+                           hap_detail *detail)
 {
   hapi_cell here = {0};
-  if (physics->tape.tape == NULL) {
+  if (taping->tape == NULL) {
     return HAP_OK;
   }
-  physics->tape.locks = 0;
-  physics->tape.missed_unrecorded = 0;
-  physics->tape.dropped_unrecorded = 0;
-  describe_world(physics, &here);
-  if (hapi_tape_records(physics->tape.tape)) {
-    hapi_tape_open(physics->tape.tape);
-    physics->tape.note = hapi_tape_put(physics->tape.tape, HAPI_CELL_WORLD, 0);
-    memcpy(physics->tape.note->u, here.u, sizeof here.u);
-    physics->tape.note->u[HAPI_WORLD_SEED] = dRandGetSeed();
-    physics->tape.note->flags = (uint16_t)atomic_load(&physics->wanted.model);
-    physics->tape.note->word = atomic_load(&physics->wanted.effects);
+  taping->locks = 0;
+  taping->missed_unrecorded = 0;
+  taping->dropped_unrecorded = 0;
+  describe_world(world, &here);
+  if (hapi_tape_records(taping->tape)) {
+    hapi_tape_open(taping->tape);
+    taping->note = hapi_tape_put(taping->tape, HAPI_CELL_WORLD, 0);
+    memcpy(taping->note->u, here.u, sizeof here.u);
+    taping->note->u[HAPI_WORLD_SEED] = dRandGetSeed();
+    taping->note->flags = (uint16_t)atomic_load(&wanted->model);
+    taping->note->word = atomic_load(&wanted->effects);
     return HAP_OK;
   }
-  physics->tape.read = hapi_tape_get(physics->tape.tape, HAPI_CELL_WORLD, 0);
-  if (physics->tape.read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
-    return other_world(physics->tape.read, &here, detail);
+  taping->read = hapi_tape_get(taping->tape, HAPI_CELL_WORLD, 0);
+  if (taping->read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
+    return other_world(taping->read, &here, detail);
   }
-  dRandSetSeed((unsigned long)physics->tape.read->u[HAPI_WORLD_SEED]);
-  hap_model model = (hap_model)(physics->tape.read->flags & MODEL_BITS);
+  dRandSetSeed((unsigned long)taping->read->u[HAPI_WORLD_SEED]);
+  hap_model model = (hap_model)(taping->read->flags & MODEL_BITS);
   if (hap_model_name(model) != NULL) {
-    atomic_store(&physics->wanted.model, (int)model);
+    atomic_store(&wanted->model, (int)model);
   }
-  atomic_store(&physics->wanted.effects, physics->tape.read->word);
+  atomic_store(&wanted->effects, taping->read->word);
   return HAP_OK;
 }
 
-void hapi_tape_start(hapi_physics *physics, int64_t *io_start_ns)
+void hapi_tape_start(hapi_taping *taping, int64_t *io_start_ns)
 {
-  if (hapi_tape_records(physics->tape.tape)) {
-    physics->tape.note->i[HAPI_WORLD_TIME] = *io_start_ns;
-  } else if (hapi_tape_plays(physics->tape.tape)) {
-    *io_start_ns = physics->tape.read->i[HAPI_WORLD_TIME];
+  if (hapi_tape_records(taping->tape)) {
+    taping->note->i[HAPI_WORLD_TIME] = *io_start_ns;
+  } else if (hapi_tape_plays(taping->tape)) {
+    *io_start_ns = taping->read->i[HAPI_WORLD_TIME];
   }
 }
 
@@ -194,9 +193,8 @@ static uint64_t hash_measured(uint64_t hash, const hapi_measured_joint *m)
   return hapi_hash_doubles(hash, m->given, 6);
 }
 
-static uint64_t hash_model(const hapi_physics *physics)
+static uint64_t hash_model(hapi_model *model)
 {
-  hapi_model *model = hapi_exchange_model_back(physics->config.exchange);
   const hapi_model_body *b = hapi_model_bodies(model);
   const hapi_model_contact *c = hapi_model_contacts(model);
   uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, model->number);
@@ -238,171 +236,171 @@ static uint64_t hash_model(const hapi_physics *physics)
   return hash;
 }
 
-static void compare_model(hapi_physics *physics, uint64_t recorded)
+static void compare_model(hapi_taping *taping, uint64_t number, uint64_t recorded)
 {
-  const hapi_difference difference = {.what = HAPI_DIFFERS_STEP,
-                                      .number = physics->cycle.model_number};
-  if (recorded != physics->tape.model_hash) {
-    hapi_tape_differ(physics->tape.tape, &difference);
+  const hapi_difference difference = {.what = HAPI_DIFFERS_STEP, .number = number};
+  if (recorded != taping->model_hash) {
+    hapi_tape_differ(taping->tape, &difference);
   }
 }
 
 /* Before the loop can take the model: its tick then comes later in the recording. */
-static void put_end(hapi_physics *physics, uint64_t number)
+static void put_end(hapi_taping *taping, uint64_t number)
 {
-  hapi_tape_open(physics->tape.tape);
-  hapi_cell *cell = hapi_tape_put(physics->tape.tape, HAPI_CELL_CYCLED, 0);
-  cell->flags = physics->tape.model_next;
+  hapi_tape_open(taping->tape);
+  hapi_cell *cell = hapi_tape_put(taping->tape, HAPI_CELL_CYCLED, 0);
+  HAPI_ASSERT(cell != NULL);
+  cell->flags = taping->model_next;
   cell->u[HAPI_CYCLED_MODEL] = number;
-  cell->u[HAPI_CYCLED_HASH] = physics->tape.model_hash;
-  cell->i[HAPI_CYCLED_SENT] = physics->tape.sent_ns;
-  commit(physics);
+  cell->u[HAPI_CYCLED_HASH] = taping->model_hash;
+  cell->i[HAPI_CYCLED_SENT] = taping->sent_ns;
+  note_commit(taping);
 }
 
-/* The clock's time that the loop takes for a sign of life. The first model needs none: it is sent at the
- * time that it is for. */
-int64_t hapi_tape_sent(hapi_physics *physics)
+/* The clock's time that the loop takes for a sign of life. The first model needs none: it is
+ * sent at the time that it is for. */
+int64_t hapi_tape_sent(hapi_taping *taping, const hapi_cycle *cycle)
 {
-  physics->tape.sent_ns = 0;
-  if (physics->tape.cycling && hapi_tape_plays(physics->tape.tape)) {
-    physics->tape.sent_ns = physics->tape.read_end->i[HAPI_CYCLED_SENT];
-  } else if (physics->tape.cycling && physics->config.frame) {
-    physics->tape.sent_ns = hapi_clock_now();
+  taping->sent_ns = 0;
+  if (taping->cycling && hapi_tape_plays(taping->tape)) {
+    taping->sent_ns = taping->read_end->i[HAPI_CYCLED_SENT];
+  } else if (taping->cycling && cycle->config->frame) {
+    taping->sent_ns = hapi_clock_now();
   }
-  return physics->tape.sent_ns;
+  return taping->sent_ns;
 }
 
-void hapi_tape_model(hapi_physics *physics)
+void hapi_tape_model(hapi_taping *taping, hapi_model *model)
 {
-  if (physics->tape.tape == NULL) {
+  if (taping->tape == NULL) {
     return;
   }
-  physics->tape.model_hash = hash_model(physics);
-  if (hapi_tape_records(physics->tape.tape) && physics->tape.cycling) {
-    put_end(physics, physics->cycle.model_number);
+  taping->model_hash = hash_model(model);
+  if (hapi_tape_records(taping->tape) && taping->cycling) {
+    put_end(taping, model->number);
   }
 }
 
-void hapi_tape_started(hapi_physics *physics)
+void hapi_tape_started(hapi_taping *taping, const hapi_cycle *cycle)
 {
-  if (hapi_tape_records(physics->tape.tape)) {
-    physics->tape.note->u[HAPI_WORLD_MODEL_HASH] = physics->tape.model_hash;
-    commit(physics);
-  } else if (hapi_tape_plays(physics->tape.tape)) {
-    compare_model(physics, physics->tape.read->u[HAPI_WORLD_MODEL_HASH]);
+  HAPI_ASSERT(!taping->cycling);
+  if (hapi_tape_records(taping->tape)) {
+    taping->note->u[HAPI_WORLD_MODEL_HASH] = taping->model_hash;
+    note_commit(taping);
+  } else if (hapi_tape_plays(taping->tape)) {
+    compare_model(taping, cycle->model_number, taping->read->u[HAPI_WORLD_MODEL_HASH]);
   }
 }
 
 /* ---- a cycle ---- */
 
-void hapi_tape_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
+void hapi_tape_cycle(hapi_taping *taping, hapi_wanted *wanted, int64_t now_ns, int64_t next_ns)
 {
-  physics->tape.model_hash = 0;
-  physics->tape.model_next = (uint16_t)atomic_load(&physics->wanted.model);
-  physics->tape.cycling = true;
-  if (hapi_tape_records(physics->tape.tape)) {
-    hapi_tape_open(physics->tape.tape);
-    physics->tape.note = hapi_tape_put(physics->tape.tape, HAPI_CELL_CYCLE, 0);
-    physics->tape.note->i[HAPI_CYCLE_TIME] = now_ns;
-    physics->tape.note->i[HAPI_CYCLE_NEXT] = next_ns;
-    physics->tape.note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
-    physics->tape.note->u[HAPI_CYCLE_LOCKS] = physics->tape.locks;
-    physics->tape.note->u[HAPI_CYCLE_MISSED] = physics->tape.missed_unrecorded;
-    physics->tape.note->u[HAPI_CYCLE_DROPPED] = physics->tape.dropped_unrecorded;
-  } else if (hapi_tape_plays(physics->tape.tape)) {
-    physics->tape.read = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLE, 0);
-    physics->tape.read_end = hapi_tape_get(physics->tape.tape, HAPI_CELL_CYCLED, 0);
-    dRandSetSeed((unsigned long)physics->tape.read->u[HAPI_CYCLE_SEED]);
-    physics->counts.own.stats.physics.missed += physics->tape.read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
-    physics->counts.own.stats.physics.frames_dropped += physics->tape.read->u[HAPI_CYCLE_DROPPED];
+  taping->model_hash = 0;
+  taping->model_next = (uint16_t)atomic_load(&wanted->model);
+  taping->cycling = true;
+  if (hapi_tape_records(taping->tape)) {
+    hapi_tape_open(taping->tape);
+    taping->note = hapi_tape_put(taping->tape, HAPI_CELL_CYCLE, 0);
+    taping->note->i[HAPI_CYCLE_TIME] = now_ns;
+    taping->note->i[HAPI_CYCLE_NEXT] = next_ns;
+    taping->note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
+    taping->note->u[HAPI_CYCLE_LOCKS] = taping->locks;
+    taping->note->u[HAPI_CYCLE_MISSED] = taping->missed_unrecorded;
+    taping->note->u[HAPI_CYCLE_DROPPED] = taping->dropped_unrecorded;
+  } else if (hapi_tape_plays(taping->tape)) {
+    taping->read = hapi_tape_get(taping->tape, HAPI_CELL_CYCLE, 0);
+    taping->read_end = hapi_tape_get(taping->tape, HAPI_CELL_CYCLED, 0);
+    dRandSetSeed((unsigned long)taping->read->u[HAPI_CYCLE_SEED]);
+    taping->played_missed += taping->read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
+    taping->played_dropped += taping->read->u[HAPI_CYCLE_DROPPED];
   }
-  physics->tape.locks = 0;
-  physics->tape.missed_unrecorded = 0;
-  physics->tape.dropped_unrecorded = 0;
+  taping->locks = 0;
+  taping->missed_unrecorded = 0;
+  taping->dropped_unrecorded = 0;
 }
 
 /* Those that this cycle goes by. */
-uint32_t hapi_tape_wanted_effects(hapi_physics *physics)
+uint32_t hapi_tape_wanted_effects(hapi_taping *taping, hapi_wanted *wanted)
 {
-  if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
-    atomic_store(&physics->wanted.effects,
-                 (uint32_t)(physics->tape.read->u[HAPI_CYCLE_LOCKS] >> 32));
+  if (hapi_tape_plays(taping->tape) && taping->read->kind == HAPI_CELL_CYCLE) {
+    atomic_store(&wanted->effects, (uint32_t)(taping->read->u[HAPI_CYCLE_LOCKS] >> 32));
   }
-  uint32_t wanted = atomic_load(&physics->wanted.effects);
-  if (cycle_note(physics) != NULL) {
-    uint64_t *word = &physics->tape.note->u[HAPI_CYCLE_LOCKS];
-    *word = (*word & LOW_HALF) | (uint64_t)wanted << 32;
+  uint32_t effects = atomic_load(&wanted->effects);
+  if (cycle_note(taping) != NULL) {
+    uint64_t *word = &taping->note->u[HAPI_CYCLE_LOCKS];
+    *word = (*word & LOW_HALF) | (uint64_t)effects << 32;
   }
-  return wanted;
+  return effects;
 }
 
-void hapi_tape_dials(hapi_physics *physics, int io_percent[2])
+void hapi_tape_dials(hapi_taping *taping, int io_percent[2])
 {
   for (unsigned i = 0; i < 2; ++i) {
     unsigned shift = 32 + 8 * i;
-    if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
-      io_percent[i] = hapi_cell_dial(physics->tape.read->u[HAPI_CYCLE_MISSED], shift);
-    } else if (cycle_note(physics) != NULL) {
-      physics->tape.note->u[HAPI_CYCLE_MISSED] |= (uint64_t)(io_percent[i] + 1) << shift;
+    if (hapi_tape_plays(taping->tape) && taping->read->kind == HAPI_CELL_CYCLE) {
+      io_percent[i] = hapi_cell_dial(taping->read->u[HAPI_CYCLE_MISSED], shift);
+    } else if (cycle_note(taping) != NULL) {
+      taping->note->u[HAPI_CYCLE_MISSED] |= (uint64_t)(io_percent[i] + 1) << shift;
     }
   }
 }
 
-int hapi_tape_dial_at_start(hapi_physics *physics, int percent)
+int hapi_tape_dial_at_start(hapi_taping *taping, int percent)
 {
-  if (hapi_tape_plays(physics->tape.tape)) {
-    return hapi_cell_dial(physics->tape.read->flags, 8);
+  if (hapi_tape_plays(taping->tape)) {
+    return hapi_cell_dial(taping->read->flags, 8);
   }
-  if (hapi_tape_records(physics->tape.tape)) {
-    physics->tape.note->flags |= (uint16_t)((percent + 1) << 8);
+  if (hapi_tape_records(taping->tape)) {
+    taping->note->flags |= (uint16_t)((percent + 1) << 8);
   }
   return percent;
 }
 
-void hapi_tape_edits(hapi_physics *physics, uint32_t count)
+void hapi_tape_edits(hapi_taping *taping, uint32_t count)
 {
-  hapi_cell *note = cycle_note(physics);
+  hapi_cell *note = cycle_note(taping);
   if (note != NULL) {
     note->word = count;
   }
 }
 
-/* The cell goes out with it, and not at the cycle's end: whoever replays a step that took long knows
- * from here on which of the loop's messages it needs. */
-void hapi_tape_state(hapi_physics *physics, bool taken)
+/* The cell goes out with it, and not at the cycle's end: whoever replays a step that took long
+ * knows from here on which of the loop's messages it needs. */
+void hapi_tape_state(hapi_taping *taping, const hapi_exchange *exchange, bool taken)
 {
-  hapi_cell *note = cycle_note(physics);
+  hapi_cell *note = cycle_note(taping);
   if (note != NULL) {
-    note->u[HAPI_CYCLE_STATE] =
-        taken ? hapi_exchange_taken(physics->config.exchange, HAPI_CHANNEL_STATE) : 0;
-    commit(physics);
+    note->u[HAPI_CYCLE_STATE] = taken ? hapi_exchange_taken(exchange, HAPI_CHANNEL_STATE) : 0;
+    note_commit(taping);
   }
 }
 
 /* at_end: asked for after the step, for the next one. */
-hap_model hapi_tape_wanted_model(hapi_physics *physics, bool at_end)
+hap_model hapi_tape_wanted_model(hapi_taping *taping, hapi_wanted *wanted, const hapi_cycle *cycle,
+                                 bool at_end)
 {
-  int wanted = atomic_load(&physics->wanted.model);
-  if (hapi_tape_plays(physics->tape.tape) && physics->tape.read->kind == HAPI_CELL_CYCLE) {
-    uint16_t flags = at_end ? physics->tape.read_end->flags : physics->tape.read->flags;
-    wanted = hap_model_name((hap_model)flags) != NULL ? (int)flags : (int)physics->cycle.model;
-    atomic_store(&physics->wanted.model, wanted);
+  int model = atomic_load(&wanted->model);
+  if (hapi_tape_plays(taping->tape) && taping->read->kind == HAPI_CELL_CYCLE) {
+    uint16_t flags = at_end ? taping->read_end->flags : taping->read->flags;
+    model = hap_model_name((hap_model)flags) != NULL ? (int)flags : (int)cycle->model;
+    atomic_store(&wanted->model, model);
   } else if (at_end) {
-    physics->tape.model_next = (uint16_t)wanted;
-  } else if (cycle_note(physics) != NULL) {
-    physics->tape.note->flags = (uint16_t)wanted;
+    taping->model_next = (uint16_t)model;
+  } else if (cycle_note(taping) != NULL) {
+    taping->note->flags = (uint16_t)model;
   }
-  return (hap_model)wanted;
+  return (hap_model)model;
 }
 
-void hapi_tape_cycled(hapi_physics *physics)
+void hapi_tape_cycled(hapi_taping *taping, const hapi_cycle *cycle)
 {
-  physics->tape.cycling = false;
-  if (hapi_tape_records(physics->tape.tape)) {
-    if (physics->tape.model_hash == 0) { /* the world was not sound */
-      put_end(physics, 0);
+  taping->cycling = false;
+  if (hapi_tape_records(taping->tape)) {
+    if (taping->model_hash == 0) { /* the world was not sound */
+      put_end(taping, 0);
     }
-  } else if (hapi_tape_plays(physics->tape.tape)) {
-    compare_model(physics, physics->tape.read_end->u[HAPI_CYCLED_HASH]);
+  } else if (hapi_tape_plays(taping->tape)) {
+    compare_model(taping, cycle->model_number, taping->read_end->u[HAPI_CYCLED_HASH]);
   }
 }

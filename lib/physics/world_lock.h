@@ -9,9 +9,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "base/fair_lock.h"
+#include <hapode/status.h>
 
-typedef struct hapi_physics hapi_physics;
+#include "base/fair_lock.h"
 
 /* Of the application's threads. Written by the one that has the lock. */
 typedef struct hapi_lock_figures {
@@ -28,10 +28,16 @@ typedef struct hapi_world_lock {
   bool editable;                      /* in a callback that may create and destroy, or in an edit */
 } hapi_world_lock;
 
-void hapi_physics_enter(hapi_physics *physics); /* takes the lock, for calls of the application */
-void hapi_physics_leave(hapi_physics *physics);
-void hapi_physics_claim(hapi_physics *physics); /* this thread calls the application: it has the */
-void hapi_physics_unclaim(hapi_physics *physics); /* lock already, and may not take or give it */
+/* Takes the lock, for calls of the application. */
+void hapi_lock_enter(hapi_world_lock *lock);
+void hapi_lock_leave(hapi_world_lock *lock);
+/* This thread calls the application: it has the lock already, and may not take or give it. */
+void hapi_lock_claim(hapi_world_lock *lock);
+void hapi_lock_unclaim(hapi_world_lock *lock);
+bool hapi_lock_in_callback(const hapi_world_lock *lock); /* of the calling thread */
+/* For an application's thread. Negative: waits for ever. */
+hap_status hapi_lock_take(hapi_world_lock *lock, int64_t timeout_ns);
+hap_status hapi_lock_give(hapi_world_lock *lock);
 void hapi_lock_figures_reset(hapi_lock_figures *figures);
 
 #endif

@@ -18,7 +18,7 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
   return hapi_index_get(&table->by_address, hapi_index_address(body));
 }
 
-static hap_status grow(hapi_body_table *table, uint32_t capacity)
+static hap_status table_grow(hapi_body_table *table, uint32_t capacity)
 {
   const hapi_world_listener *listener = table->listener;
   if (!hapi_index_reserve(&table->by_address, capacity) ||
@@ -56,7 +56,7 @@ hap_status hapi_bodies_init(hapi_body_table *table, const hapi_world_listener *l
 {
   memset(table, 0, sizeof *table);
   table->listener = listener;
-  return grow(table, FIRST_CAPACITY);
+  return table_grow(table, FIRST_CAPACITY);
 }
 
 void hapi_bodies_finish(hapi_body_table *table)
@@ -86,18 +86,21 @@ static uint32_t free_entry(hapi_body_table *table)
 static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID body)
 {
   hapi_known_rest *rest = known->rest;
+  HAPI_ASSERT(body != NULL && rest == &table->rests[known - table->entries]);
   memset(rest, 0, sizeof *rest);
   *known = (hapi_known_body){.body = body, .rest = rest};
   rest->birth = ++table->births;
   known->slot = HAPI_NONE;
 }
 
-static hap_status add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
+static hap_status entry_add(hapi_body_table *table, dBodyID body, uint32_t *out_index)
 {
   uint32_t index = free_entry(table);
-  if (index == table->capacity && grow(table, 2 * table->capacity) < HAP_OK) {
+  if (index == table->capacity && table_grow(table, 2 * table->capacity) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
+  HAPI_ASSERT_INDEX(index, table->capacity);
+  HAPI_ASSERT(hapi_bodies_find(table, body) == HAPI_NONE);
   begin_entry(table, &table->entries[index], body);
   table->handles[index] = body;
   table->high = index == table->high ? index + 1 : table->high;
@@ -172,12 +175,14 @@ static void follow_push(hapi_known_body *known)
   known->pushed = pushed;
 }
 
-/* All that a cycle wants to know of a body that is far from the pointers, at once: each look is at
- * memory that is not at hand. Of a local body what holds after the loop's state was taken counts. */
+/* All that a cycle wants to know of a body that is far from the pointers, at once: each look is
+ * at memory that is not at hand. Of a local body what holds after the loop's state was taken
+ * counts. */
 static void look_at(hapi_world *world, hapi_known_body *known)
 {
   hapi_body_table *table = &world->bodies;
   dBodyID body = known->body;
+  HAPI_ASSERT(body != NULL && known->seen != table->scan);
   known->seen = table->scan;
   ++table->seen_count;
   known->jointed = dBodyGetJoint(body, 0) != NULL;
@@ -202,8 +207,8 @@ static void look_at(hapi_world *world, hapi_known_body *known)
   }
 }
 
-/* False: there is no memory for a new body. The scan goes on, as it must find out which of the known
- * ones are gone; after the first one it asks for no more memory. */
+/* False: there is no memory for a new body. The scan goes on, as it must find out which of the
+ * known ones are gone; after the first one it asks for no more memory. */
 static bool see_body(hapi_world *world, dBodyID body)
 {
   hapi_body_table *table = &world->bodies;
@@ -212,7 +217,7 @@ static bool see_body(hapi_world *world, dBodyID body)
     follow_life(table, index);
   }
   if (index == HAPI_NONE) {
-    table->starved = table->starved || add(table, body, &index) < HAP_OK;
+    table->starved = table->starved || entry_add(table, body, &index) < HAP_OK;
     if (table->starved) {
       return false;
     }
@@ -227,8 +232,8 @@ static bool see_body(hapi_world *world, dBodyID body)
   return true;
 }
 
-/* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is not is looked
- * at again in each scan. */
+/* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is
+ * not is looked at again in each scan. */
 static void see_geom(hapi_world *world, dGeomID geom)
 {
   hapi_body_table *table = &world->bodies;
@@ -294,6 +299,8 @@ static void see_jointed(hapi_world *world)
 
 static void remove_entry(hapi_body_table *table, uint32_t index)
 {
+  HAPI_ASSERT_INDEX(index, table->high);
+  HAPI_ASSERT(table->used > 0 && table->handles[index] == table->entries[index].body);
   hapi_index_remove(&table->by_address, hapi_index_address(table->handles[index]));
   drop_entry(table, index);
   table->handles[index] = NULL;
@@ -313,8 +320,8 @@ static void say_lost(hapi_body_table *table, const hapi_cycle *cycle, uint32_t c
   }
 }
 
-/* Of an adopted body without geom and joint only the application knows whether it lives, unless another
- * one is at its address. */
+/* Of an adopted body without geom and joint only the application knows whether it lives, unless
+ * another one is at its address. */
 static bool lives_unseen(const hapi_known_body *known)
 {
   return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
@@ -364,7 +371,7 @@ hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body)
 {
   uint32_t index = find_living(table, body);
   if (index == HAPI_NONE) {
-    if (add(table, body, &index) < HAP_OK) {
+    if (entry_add(table, body, &index) < HAP_OK) {
       return HAP_ERROR_MEMORY;
     }
     table->listener->body_begun(table->listener->user, index);

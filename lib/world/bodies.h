@@ -45,7 +45,7 @@ typedef struct hapi_known_rest {
   double user_torque[3];
   hapi_mark mark;
   hapi_sleep sleep;
-  double damping[2]; /* scratch of soften.c */
+  double damping[2]; /* as the application means it, while converted: soften.c */
   void (*moved_callback)(dBodyID);
 } hapi_known_rest;
 

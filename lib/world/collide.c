@@ -24,7 +24,7 @@ static void set_direction(dContact *contact, const double direction[3])
 }
 
 /* A surface that is soft for the world's step, in a world that model SINGLE steps at another. */
-static void soften(const hapi_world *world, const hapi_cycle *cycle, dSurfaceParameters *s)
+static void surface_soften(const hapi_world *world, const hapi_cycle *cycle, dSurfaceParameters *s)
 {
   if (cycle->model != HAP_MODEL_SINGLE || (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
     return;
@@ -37,8 +37,8 @@ static void soften(const hapi_world *world, const hapi_cycle *cycle, dSurfacePar
   s->mode |= dContactSoftERP | dContactSoftCFM;
 }
 
-/* ODE has no getter for what a contact joint holds. Without memory for a note the island of the contact
- * is measured again. */
+/* ODE has no getter for what a contact joint holds. Without memory for a note the island of the
+ * contact is measured again. */
 static void contact_note(hapi_contact_notes *notes, dJointID joint, const dContact *contact)
 {
   if (hapi_reserve((void **)&notes->list, &notes->capacity, notes->count, 1, sizeof *notes->list)) {
@@ -65,9 +65,11 @@ uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cyc
   dJointGroupID group = kind == HAPI_CONTACT_CARRIED ? world->carried_group : world->contact_group;
   double direction[3];
   uint32_t rejected = 0;
+  HAPI_ASSERT(!dGeomIsSpace(a) && !dGeomIsSpace(b));
+  HAPI_ASSERT(touching->bodies[0] != touching->bodies[1]);
   int count = dCollide(a, b, world->ode.max_contacts_per_pair, &contacts[0].geom, sizeof(dContact));
   HAPI_ASSERT(count <= world->ode.max_contacts_per_pair);
-  soften(world, cycle, surface);
+  surface_soften(world, cycle, surface);
   bool directed = count > 0 && (surface->mode & dContactFDir1) != 0 &&
                   hapi_world_direction(world, a, b, direction);
   if (!directed) {

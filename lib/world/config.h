@@ -38,4 +38,10 @@ typedef struct hapi_physics_config {
   void *user;
 } hapi_physics_config;
 
+/* s, from a cycle to the next: H, or T in model SINGLE. */
+static inline double hapi_config_period(const hapi_physics_config *config, hap_model model)
+{
+  return 1.0 / (model == HAP_MODEL_SINGLE ? config->haptic_hz : config->physics_hz);
+}
+
 #endif

@@ -6,10 +6,10 @@
 #include "base/vec.h"
 #include "world/world.h"
 
-/* How far a body reaches from its origin. Measured anew when its geoms have changed: the box around a
- * geom, which it is taken from, is another one in each orientation. */
+/* How far a body reaches from its origin. Measured anew when its geoms have changed: the box
+ * around a geom, which it is taken from, is another one in each orientation. */
 
-static double measure(dBodyID body)
+static double extent_measure(dBodyID body)
 {
   const dReal *at = dBodyGetPosition(body);
   double extent = 0.0;
@@ -28,7 +28,7 @@ static double measure(dBodyID body)
   return isfinite(extent) ? extent : 0.0;
 }
 
-static uint64_t mix(uint64_t print, uint64_t bits)
+static uint64_t print_mix(uint64_t print, uint64_t bits)
 {
   uint64_t x = (print ^ bits) * 0x9e3779b97f4a7c15u;
   return x ^ (x >> 29);
@@ -39,7 +39,7 @@ static uint64_t mix_numbers(uint64_t print, const double *values, int count)
   for (int i = 0; i < count; ++i) {
     uint64_t bits;
     memcpy(&bits, &values[i], sizeof bits);
-    print = mix(print, bits);
+    print = print_mix(print, bits);
   }
   return print;
 }
@@ -75,7 +75,7 @@ static uint64_t print_of(dBodyID body, bool *out_sized)
     int count = sizes_of(geom, kind, sizes);
     *out_sized = *out_sized && count > 0;
     uint64_t address = (uint64_t)(uintptr_t)geom; /* not where sizes say enough: lockstep */
-    print = mix(print, count > 0 ? (uint64_t)kind : address);
+    print = print_mix(print, count > 0 ? (uint64_t)kind : address);
     print = mix_numbers(print, sizes, count);
     if (dGeomIsOffset(geom)) {
       print = mix_numbers(print, dGeomGetOffsetPosition(geom), 3);
@@ -92,7 +92,7 @@ bool hapi_extent_follow(hapi_known_body *known)
     return false;
   }
   known->geoms_print = print;
-  known->extent = measure(known->body);
+  known->extent = extent_measure(known->body);
   return true;
 }
 

@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "world/world.h"
 
 /* Threads of ODE that step separate islands of the world at once, in the global step only. Testing
@@ -9,6 +10,7 @@ bool hapi_islands_begin(hapi_world *world, bool repeats)
 {
   hapi_islands *islands = &world->islands;
   int32_t count = world->ode.island_threads;
+  HAPI_ASSERT(islands->threading == NULL && islands->pool == NULL);
   if (count <= 1 || repeats) {
     return true;
   }

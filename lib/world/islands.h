@@ -15,7 +15,8 @@ typedef struct hapi_islands {
   dThreadingThreadPoolID pool;
 } hapi_islands;
 
-/* repeats: every run must come to the same, so that one thread steps all. False: no threads to be had. */
+/* repeats: every run must come to the same, so that one thread steps all. False: no threads to
+ * be had. */
 bool hapi_islands_begin(hapi_world *world, bool repeats);
 void hapi_islands_end(hapi_world *world);
 void hapi_islands_rest(const hapi_world *world); /* for testing simulations */

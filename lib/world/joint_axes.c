@@ -5,16 +5,16 @@
 #include "base/vec.h"
 #include "world/world.h"
 
-/* Motors and stops of joints that the loop has no rows of its own for. What holds the bodies is measured
- * without them (joint_probe.c): a measurement sees a motor either hold or give way, and a stop either
- * touched or not, and both may change within a tick. Where an axis is, and how far along, ODE says of these:
+/* Motors and stops of joints that the loop has no rows of its own for. What holds the bodies is
+ * measured without them (joint_probe.c): a measurement sees a motor either hold or give way, and a
+ * stop either touched or not, and both may change within a tick. Where an axis is, and how far
+ * along, ODE says of these:
  *
- *   AMotor   up to three axes, turned with the world or one of the bodies
- *   PR       slides along the first axis, turns about the second
- *   piston   slides along and turns about its axis
+ * AMotor   up to three axes, turned with the world or one of the bodies PR       slides along the
+ * first axis, turns about the second piston   slides along and turns about its axis
  *
- * It does not say it of the axes of an LMotor (only their numbers, without the frame), nor of a Plane2D:
- * there motors are part of the measurement. */
+ * It does not say it of the axes of an LMotor (only their numbers, without the frame), nor of a
+ * Plane2D: there motors are part of the measurement. */
 
 typedef struct limits_of {
   dJointType type;
@@ -42,8 +42,8 @@ static const limits_of *kind_of(dJointID joint)
 
 /* ---- where the axes are ---- */
 
-/* In Euler mode the first and last axis that ODE drives lie across those that were set: they turn, as far
- * as they do, with the body of the other one. */
+/* In Euler mode the first and last axis that ODE drives lie across those that were set: they
+ * turn, as far as they do, with the body of the other one. */
 static void read_motor(dJointID joint, int which, bool turned, hapi_joint_axis *out)
 {
   static const uint32_t euler[] = {HAPI_CARRIER_SECOND, HAPI_CARRIER_FIRST, HAPI_CARRIER_FIRST};
@@ -74,7 +74,8 @@ static void read_sliding(dJointID joint, int which, bool turned, hapi_joint_axis
     (which == 0 ? dJointGetPRAxis1 : dJointGetPRAxis2)(joint, axis);
     out->position = which == 0 ? dJointGetPRPosition(joint) : dJointGetPRAngle(joint);
   }
-  /* Attached with the world first, ODE turns round the slide by its axis and the angle by its sign. */
+  /* Attached with the world first, ODE turns round the slide by its axis and the angle by its
+   * sign. */
   hapi_v3_scale(turned && out->slides ? -1.0 : 1.0, axis, out->direction);
   out->position = turned && !out->slides ? -out->position : out->position;
 }

@@ -6,11 +6,11 @@
 #include "base/vec.h"
 #include "world/world.h"
 
-/* Where a joint is in its bodies' frames, and what its parameters are, by ODE's getters. Some of it has
- * none: how a slider or a fixed joint has its bodies turned to each other, where the axis of a hinge is
- * in its second body, the angle that the axes of a hinge-2 are to have. All of that ODE itself takes from
- * the poses at the time when the joint is set; so it is taken here from the poses at the time when the
- * joint is seen for the first time or has changed. */
+/* Where a joint is in its bodies' frames, and what its parameters are, by ODE's getters. Some of
+ * it has none: how a slider or a fixed joint has its bodies turned to each other, where the axis
+ * of a hinge is in its second body, the angle that the axes of a hinge-2 are to have. All of
+ * that ODE itself takes from the poses at the time when the joint is set; so it is taken here
+ * from the poses at the time when the joint is seen for the first time or has changed. */
 
 /* Of what a joint was remembered as, against what its getters say. */
 #define SAME_PLACE 1e-7   /* m, and of unit vectors */
@@ -29,7 +29,7 @@ static void pose_of(dBodyID body, hap_pose *out)
 
 /* ---- geometry ---- */
 
-static void into(const hap_pose *pose, const double world[3], double out[3])
+static void point_into(const hap_pose *pose, const double world[3], double out[3])
 {
   hapi_pose_unpoint(pose->position, pose->quat_wxyz, world, out);
 }
@@ -72,15 +72,16 @@ typedef struct reading {
   double positions[2]; /* of the free axes, as ODE measures them */
 } reading;
 
-/* ODE answers for the body that the application attached first; here it is the one that comes first. */
+/* ODE answers for the body that the application attached first; here it is the one that comes
+ * first. */
 static void read_anchors(reading *r, void (*first)(dJointID, dVector3),
                          void (*second)(dJointID, dVector3))
 {
   dVector3 at = {0.0, 0.0, 0.0, 0.0};
   (r->turned ? second : first)(r->joint, at);
-  into(&r->a, at, r->place.anchor_a);
+  point_into(&r->a, at, r->place.anchor_a);
   (r->turned ? first : second)(r->joint, at);
-  into(&r->b, at, r->place.anchor_b);
+  point_into(&r->b, at, r->place.anchor_b);
 }
 
 static void read_turn(reading *r)
@@ -125,7 +126,7 @@ static void read_slider(reading *r)
   hapi_v3_madd(r->a.position, -r->positions[0], axis, start);
   vector_into(&r->a, axis, r->place.axis_a);
   any_across(r->place.axis_a, r->place.reference_a);
-  into(&r->b, start, r->place.anchor_b);
+  point_into(&r->b, start, r->place.anchor_b);
   read_turn(r);
 }
 
@@ -176,12 +177,12 @@ static bool read_hinge2(reading *r)
   return read_cross(r, first, second);
 }
 
-/* ODE holds the centre of the second body where it is in the first; of one that hangs on the world its
- * own centre. */
+/* ODE holds the centre of the second body where it is in the first; of one that hangs on the
+ * world its own centre. */
 static void read_fixed(reading *r, bool paired)
 {
   if (paired) {
-    into(&r->a, r->b.position, r->place.anchor_a);
+    point_into(&r->a, r->b.position, r->place.anchor_a);
   } else {
     hapi_v3_copy(r->a.position, r->place.anchor_b);
   }
@@ -292,8 +293,8 @@ static bool same_slide(const hapi_joint_place *was, const reading *r)
   return fabs(hapi_v3_dot(way, axis) - r->positions[0]) < SAME_SLIDE;
 }
 
-/* Asked is what the motion of the bodies does not change: anchors and axes in the bodies' own frames,
- * and where the angles have their zero. */
+/* Asked is what the motion of the bodies does not change: anchors and axes in the bodies' own
+ * frames, and where the angles have their zero. */
 static bool same_place(hapi_joint_kind kind, const hapi_joint_place *was, const reading *r)
 {
   const hapi_joint_place *is = &r->place;
@@ -325,7 +326,7 @@ static void relative_pose(const hapi_known_joint *known, hap_pose *out)
   reading r = {0};
   pose_of(known->bodies[0], &r.a);
   pose_of(known->bodies[1], &r.b);
-  into(&r.a, r.b.position, out->position);
+  point_into(&r.a, r.b.position, out->position);
   read_turn(&r);
   memcpy(out->quat_wxyz, r.place.turn, sizeof out->quat_wxyz);
 }

@@ -50,7 +50,7 @@ static void index_all(hapi_joint_table *table)
   }
 }
 
-static bool grow(hapi_joint_table *table)
+static bool table_grow(hapi_joint_table *table)
 {
   uint32_t capacity = table->capacity > 0 ? 2 * table->capacity : FIRST_CAPACITY;
   if (!hapi_index_reserve(&table->by_address, capacity) ||
@@ -71,14 +71,15 @@ static bool grow(hapi_joint_table *table)
 }
 
 /* HAPI_NONE: no memory. */
-static uint32_t add(hapi_joint_table *table, const hapi_joint_name *name)
+static uint32_t entry_add(hapi_joint_table *table, const hapi_joint_name *name)
 {
-  if (table->starved || (table->count == table->capacity && !grow(table))) {
+  if (table->starved || (table->count == table->capacity && !table_grow(table))) {
     table->starved = true;
     return HAPI_NONE;
   }
   hapi_known_joint *known = &table->entries[table->count];
   memset(known, 0, sizeof *known);
+  HAPI_ASSERT(find_named(table, name) == HAPI_NONE);
   known->name = *name;
   known->slot = HAPI_NONE;
   hapi_index_put(&table->by_name, key_of(name), table->count);
@@ -88,6 +89,7 @@ static uint32_t add(hapi_joint_table *table, const hapi_joint_name *name)
 /* Of an address one entry at most. */
 static void set_address(hapi_joint_table *table, uint32_t index, dJointID joint)
 {
+  HAPI_ASSERT_INDEX(index, table->count);
   hapi_known_joint *known = &table->entries[index];
   if (known->joint == joint) {
     return;
@@ -111,6 +113,8 @@ static void drop_unseen(hapi_joint_table *table)
     const hapi_known_joint *known = &table->entries[i];
     bool seen = known->seen == table->scan;
     if (known->slot != HAPI_NONE) {
+      HAPI_ASSERT_INDEX(known->slot, table->slot_high);
+      HAPI_ASSERT(table->slots[known->slot].taken == i + 1);
       table->slots[known->slot].taken = seen ? kept + 1 : 0;
     }
     if (seen) {
@@ -185,7 +189,8 @@ static void read_bodies(const hapi_world *world, dJointID joint, hapi_known_join
   }
 }
 
-/* The entry of a joint that this scan meets for the first time, after all older ones of its bodies. */
+/* The entry of a joint that this scan meets for the first time, after all older ones of its
+ * bodies. */
 static uint32_t find_entry(const hapi_joint_table *table, uint32_t at_address,
                            hapi_joint_name *io_name)
 {
@@ -202,7 +207,7 @@ static uint32_t find_entry(const hapi_joint_table *table, uint32_t at_address,
   }
 }
 
-static void see(hapi_world *world, dJointID joint)
+static void joint_see(hapi_world *world, dJointID joint)
 {
   hapi_joint_table *table = &world->joints;
   hapi_known_joint found = {0};
@@ -214,7 +219,7 @@ static void see(hapi_world *world, dJointID joint)
   found.name.type = dJointGetType(joint);
   index = find_entry(table, index, &found.name);
   bool is_new = index == HAPI_NONE;
-  index = is_new ? add(table, &found.name) : index;
+  index = is_new ? entry_add(table, &found.name) : index;
   if (index != HAPI_NONE) {
     hapi_known_joint *known = &table->entries[index];
     set_address(table, index, joint);
@@ -236,7 +241,7 @@ void hapi_joints_scan(hapi_world *world)
     for (int k = jointed ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
       dJointID joint = dBodyGetJoint(body, k - 1);
       if (dJointGetType(joint) != dJointTypeContact) {
-        see(world, joint);
+        joint_see(world, joint);
       }
     }
   }
@@ -280,7 +285,9 @@ static void take_slot(hapi_joint_table *table, uint32_t index)
 void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint32_t *joints,
                             uint32_t count)
 {
+  HAPI_ASSERT(count <= table->slot_count);
   for (uint32_t i = 0; i < count; ++i) {
+    HAPI_ASSERT_INDEX(joints[i], table->count);
     uint32_t slot = table->entries[joints[i]].slot;
     if (slot != HAPI_NONE) {
       table->slots[slot].model = model;

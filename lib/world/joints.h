@@ -15,8 +15,8 @@
 
 typedef struct hapi_world hapi_world;
 
-/* Names a joint in every run alike. Its address cannot: the heap may give the address of a destroyed
- * joint again or not, and lockstep would depend on that. */
+/* Names a joint in every run alike. Its address cannot: the heap may give the address of a
+ * destroyed joint again or not, and lockstep would depend on that. */
 typedef struct hapi_joint_name {
   uint64_t births[2]; /* of its bodies, in ODE's own order; 0: static world */
   dJointType type;
@@ -43,7 +43,7 @@ typedef struct hapi_known_joint {
   uint32_t index[2]; /* of the body table, in this cycle */
   bool carried;      /* of a kind that the loop has */
   bool usable;       /* place holds */
-  bool held;         /* scratch: switched off for the global step */
+  bool held;         /* switched off for the global step: hold.c */
   bool left_is_known;
   hapi_joint_kind kind;
   hapi_joint_place place; /* as it was set */
@@ -51,7 +51,7 @@ typedef struct hapi_known_joint {
   uint64_t gathered_in;   /* scratch: walk that met it */
   uint64_t ranged_in;     /* model that it is in */
   uint32_t slot;          /* HAPI_NONE: not in the newest model */
-  double meant[3][2];     /* scratch of soften.c */
+  double meant[3][2];     /* softness of its own as the application means it, while converted */
   uint64_t wanted_in;     /* walk that would have taken it if it were measured */
   hapi_joint_measurement *measurement; /* owned; NULL: none */
 } hapi_known_joint;

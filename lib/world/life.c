@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/assert.h"
 #include "world/world.h"
 
 #include "base/alloc.h"
@@ -17,6 +18,7 @@ double hapi_body_mass(dBodyID body)
 bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,
                        const hapi_world_listener *listener)
 {
+  HAPI_ASSERT(world->surfaces == NULL && world->bodies.entries == NULL);
   world->ode = *def;
   world->contact_scratch = hapi_alloc_array((size_t)def->max_contacts_per_pair, sizeof(dContact));
   world->surfaces = hapi_alloc(sizeof *world->surfaces);
@@ -52,6 +54,7 @@ void hapi_world_finish(hapi_world *world)
 
 void hapi_world_step(hapi_world *world, double step_s)
 {
+  HAPI_ASSERT(step_s > 0.0);
   ++world->counts.steps;
   dWorldQuickStep(world->ode.world, step_s);
 }

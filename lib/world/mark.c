@@ -4,12 +4,12 @@
 
 #include "world/world.h"
 
-/* The heap gives a new body the address of a destroyed one, often at once, and nothing that ODE keeps
- * of a body says which one it is. So a body that is known carries a mark in data that ODE does not use
- * while it is there: the idle time and the angular threshold of auto-disable, which is off (sleep.c), and
- * the axis of finite rotation where the application has none and the mode is off. Without any of it the
- * body is another one. Several places, because an application may set some of them in a session; the
- * user pointer is the application's alone. */
+/* The heap gives a new body the address of a destroyed one, often at once, and nothing that ODE
+ * keeps of a body says which one it is. So a body that is known carries a mark in data that ODE
+ * does not use while it is there: the idle time and the angular threshold of auto-disable, which
+ * is off (sleep.c), and the axis of finite rotation where the application has none and the mode
+ * is off. Without any of it the body is another one. Several places, because an application may
+ * set some of them in a session; the user pointer is the application's alone. */
 
 #define MARK_TIME (-4.2424242424e17)   /* s: no application's idle time */
 #define MARK_THRESHOLD 4.2424242424e17 /* rad/s: nor its threshold */

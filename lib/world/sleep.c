@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/assert.h"
 #include "base/log.h"
 #include "world/world.h"
 
@@ -18,7 +19,7 @@ static void start_countdown(hapi_sleep *sleep)
   sleep->time_left = sleep->idle_time;
 }
 
-static double squared(double value)
+static double value_squared(double value)
 {
   return value * value;
 }
@@ -26,15 +27,15 @@ static double squared(double value)
 /* Those that have no mark in their place. */
 static bool were_changed(const hapi_sleep *sleep, dBodyID body)
 {
-  return sleep->linear_threshold != squared(dBodyGetAutoDisableLinearThreshold(body)) ||
+  return sleep->linear_threshold != value_squared(dBodyGetAutoDisableLinearThreshold(body)) ||
          sleep->idle_steps != dBodyGetAutoDisableSteps(body) ||
          sleep->samples != dBodyGetAutoDisableAverageSamplesCount(body);
 }
 
 static void read_settings(hapi_sleep *sleep, dBodyID body)
 {
-  sleep->linear_threshold = squared(dBodyGetAutoDisableLinearThreshold(body));
-  sleep->angular_threshold = squared(dBodyGetAutoDisableAngularThreshold(body));
+  sleep->linear_threshold = value_squared(dBodyGetAutoDisableLinearThreshold(body));
+  sleep->angular_threshold = value_squared(dBodyGetAutoDisableAngularThreshold(body));
   sleep->idle_steps = dBodyGetAutoDisableSteps(body);
   sleep->idle_time = dBodyGetAutoDisableTime(body);
   sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
@@ -62,8 +63,9 @@ static void switch_off(const hapi_sleep *sleep, dBodyID body)
   }
 }
 
-static void take(hapi_known_body *known)
+static void sleep_take(hapi_known_body *known)
 {
+  HAPI_ASSERT(!known->mark_placed);
   hapi_sleep *sleep = &known->rest->sleep;
   memset(sleep, 0, sizeof *sleep);
   known->sleep_taken = true;
@@ -77,15 +79,15 @@ static void take(hapi_known_body *known)
 }
 
 /* With the settings that the application has given to the body by now. */
-static void take_again(hapi_known_body *known)
+static void sleep_take_again(hapi_known_body *known)
 {
   hapi_mark_remove(known);
   hapi_free(known->rest->sleep.velocities);
-  take(known);
+  sleep_take(known);
 }
 
-/* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other trace: the
- * flag is off all the time. */
+/* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other
+ * trace: the flag is off all the time. */
 static bool was_switched_off(const hapi_known_body *known, unsigned changed)
 {
   return (changed & HAPI_MARK_TIME) != 0 &&
@@ -95,20 +97,20 @@ static bool was_switched_off(const hapi_known_body *known, unsigned changed)
 void hapi_sleep_follow(hapi_known_body *known)
 {
   if (!known->sleep_taken) {
-    take(known);
+    sleep_take(known);
     return;
   }
   if (dBodyGetAutoDisableFlag(known->body) != 0) {
-    take_again(known);
+    sleep_take_again(known);
     return;
   }
   unsigned changed = hapi_mark_follow(known);
   if (was_switched_off(known, changed)) {
-    take_again(known);
+    sleep_take_again(known);
   } else if (known->sleep_automatic &&
              (changed != 0 || were_changed(&known->rest->sleep, known->body))) {
     dBodySetAutoDisableFlag(known->body, 1);
-    take_again(known);
+    sleep_take_again(known);
   }
 }
 
@@ -145,6 +147,7 @@ static bool mean_velocity(hapi_sleep *sleep, dBodyID body, double mean[6])
     memcpy(mean, now, sizeof now);
     return true;
   }
+  HAPI_ASSERT_INDEX(sleep->next_sample, sleep->samples);
   memcpy(sleep->velocities + (size_t)sleep->next_sample * 6, now, sizeof now);
   sleep->next_sample = (sleep->next_sample + 1) % sleep->samples;
   sleep->ring_full = sleep->ring_full || sleep->next_sample == 0;
@@ -169,7 +172,7 @@ static bool is_idle(hapi_sleep *sleep, dBodyID body)
   return !(linear > sleep->linear_threshold) && !(angular > sleep->angular_threshold);
 }
 
-static void step_body(hapi_known_body *known, double step_s)
+static void sleep_step_body(hapi_known_body *known, double step_s)
 {
   hapi_sleep *sleep = &known->rest->sleep;
   if (is_idle(sleep, known->body)) {
@@ -200,6 +203,7 @@ static bool can_sleep(const hapi_known_body *known)
 
 void hapi_sleep_step(hapi_body_table *table, double step_s)
 {
+  HAPI_ASSERT(step_s > 0.0);
   for (uint32_t i = 0; i < table->high; ++i) {
     hapi_known_body *known = &table->entries[i];
     if (known->body == NULL || !can_sleep(known)) {
@@ -211,7 +215,7 @@ void hapi_sleep_step(hapi_body_table *table, double step_s)
     }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
     if (awake && (dBodyGetJoint(known->body, 0) != NULL || touches_in_loop(known))) {
-      step_body(known, step_s);
+      sleep_step_body(known, step_s);
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/vec.h"
 #include "world/world.h"
 
@@ -13,6 +14,7 @@
 /* erp = h k / (h k + d), cfm = 1 / (h k + d) for a spring k and a damper d (ODE's manual). */
 void hapi_soften(double ratio, double *erp, double *cfm)
 {
+  HAPI_ASSERT(ratio > 0.0);
   double part = ratio * *erp + 1.0 - *erp;
   if (part > 0.0) {
     *erp = ratio * *erp / part;

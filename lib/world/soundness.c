@@ -28,7 +28,7 @@
 #define ERP_MOST 10.0          /* ODE means 0 .. 1 */
 #define JOINT_NUMBER_MOST 1e12 /* speeds, softness, error reduction of joints */
 
-static bool within(const dReal *v, double limit)
+static bool vector_within(const dReal *v, double limit)
 {
   return fabs(v[0]) <= limit && fabs(v[1]) <= limit && fabs(v[2]) <= limit; /* false for NaN */
 }
@@ -72,14 +72,15 @@ static const char *state_unsoundness(dBodyID body)
   if (what != NULL) {
     return what;
   }
-  if (!within(dBodyGetPosition(body), POSITION_MOST)) {
+  if (!vector_within(dBodyGetPosition(body), POSITION_MOST)) {
     return "has a position that is not finite or beyond 1e9 m";
   }
-  if (!within(dBodyGetLinearVel(body), SPEED_MOST) ||
-      !within(dBodyGetAngularVel(body), SPIN_MOST)) {
+  if (!vector_within(dBodyGetLinearVel(body), SPEED_MOST) ||
+      !vector_within(dBodyGetAngularVel(body), SPIN_MOST)) {
     return "has a velocity that is not finite or beyond 1e8 m/s or 1e7 rad/s";
   }
-  if (!within(dBodyGetForce(body), WRENCH_MOST) || !within(dBodyGetTorque(body), WRENCH_MOST)) {
+  if (!vector_within(dBodyGetForce(body), WRENCH_MOST) ||
+      !vector_within(dBodyGetTorque(body), WRENCH_MOST)) {
     return "has a force or torque on it that is not finite or beyond 1e12";
   }
   if (!hapi_finite(dBodyGetQuaternion(body), 4)) {
@@ -107,7 +108,8 @@ static bool plain_mass(dBodyID body)
          i[5] <= INERTIA_MOST && i[10] >= INERTIA_LEAST && i[10] <= INERTIA_MOST;
 }
 
-/* What nearly all bodies pass, and none that is not sound: a step looks at each body that there is. */
+/* What nearly all bodies pass, and none that is not sound: a step looks at each body that there
+ * is. */
 static bool is_plainly_sound(dBodyID body)
 {
   return plain_mass(body) && is_short(dBodyGetPosition(body), POSITION_MOST) &&
@@ -139,7 +141,8 @@ typedef struct joint_access {
   void (*anchor2)(dJointID, dVector3);
 } joint_access;
 
-/* Axes are not here: ODE normalises them when they are set, and takes none that has no direction. */
+/* Axes are not here: ODE normalises them when they are set, and takes none that has no
+ * direction. */
 static const joint_access joint_accesses[] = {
     {dJointTypeBall, 1, dJointGetBallParam, dJointGetBallAnchor, dJointGetBallAnchor2},
     {dJointTypeHinge, 1, dJointGetHingeParam, dJointGetHingeAnchor, dJointGetHingeAnchor2},
@@ -180,7 +183,7 @@ static bool good_anchor(dJointID joint, void (*read)(dJointID, dVector3))
   if (read != NULL) {
     read(joint, at);
   }
-  return within(at, 2.0 * POSITION_MOST);
+  return vector_within(at, 2.0 * POSITION_MOST);
 }
 
 static bool joint_is_sound(dJointID joint)
@@ -247,7 +250,7 @@ bool hapi_geom_is_sound(dGeomID geom)
 bool hapi_contact_is_sound(const dContactGeom *contact)
 {
   double length = hapi_v3_norm(contact->normal); /* false for NaN */
-  return within(contact->pos, 2.0 * POSITION_MOST) && length > NORMAL_LEAST &&
+  return vector_within(contact->pos, 2.0 * POSITION_MOST) && length > NORMAL_LEAST &&
          length < NORMAL_MOST && fabs(contact->depth) <= POSITION_MOST;
 }
 
@@ -259,7 +262,7 @@ static const char *world_unsoundness(dWorldID world)
   dWorldGetGravity(world, gravity);
   double erp = dWorldGetERP(world);
   double cfm = dWorldGetCFM(world);
-  if (!within(gravity, GRAVITY_MOST)) {
+  if (!vector_within(gravity, GRAVITY_MOST)) {
     return "a gravity that is not finite or beyond 1e6 m/s^2";
   }
   if (!(erp >= 0.0 && erp <= ERP_MOST) || !(cfm >= 0.0 && cfm <= JOINT_NUMBER_MOST)) {
@@ -271,7 +274,7 @@ static const char *world_unsoundness(dWorldID world)
                        : "a contact surface layer or largest correcting velocity that is none";
 }
 
-static void say(hap_detail *out, dBodyID body, const char *what)
+static void body_say(hap_detail *out, dBodyID body, const char *what)
 {
   const dReal *p = dBodyGetPosition(body);
   snprintf(out->text, sizeof out->text, "a body at (%g, %g, %g) %s: set it right%s", p[0], p[1],
@@ -287,7 +290,7 @@ bool hapi_world_is_unsound(const hapi_world *world, hap_detail *out_text)
     return true;
   }
   if (table->unsound_body != NULL) {
-    say(out_text, table->unsound_body, table->unsound_text);
+    body_say(out_text, table->unsound_body, table->unsound_text);
   }
   return table->unsound_body != NULL;
 }
@@ -296,7 +299,7 @@ bool hapi_body_is_unsound(const hapi_known_body *known, hap_detail *out_text)
 {
   const char *what = hapi_body_unsoundness(known->body, known->jointed);
   if (what != NULL) {
-    say(out_text, known->body, what);
+    body_say(out_text, known->body, what);
   }
   return what != NULL;
 }

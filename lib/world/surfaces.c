@@ -86,6 +86,7 @@ static bool ask_application(const hapi_world *world, const hapi_cycle *cycle, dG
  * the collision phase and when it looks for what is near. */
 static hapi_surface_entry *cache_find(hapi_surface_cache *cache, dGeomID a, dGeomID b)
 {
+  HAPI_ASSERT(cache->used < cache->capacity); /* or the search has no end */
   uint64_t x = (uint64_t)(uintptr_t)a;
   uint64_t y = (uint64_t)(uintptr_t)b;
   uint64_t key = (x < y ? x : y) * 0x9e3779b97f4a7c15u ^ (x < y ? y : x);

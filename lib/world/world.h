@@ -37,8 +37,8 @@ typedef struct hapi_world_counts {
   uint64_t contacts_rejected;
 } hapi_world_counts;
 
-/* What is reached through a pointer may change in a const hapi_world: ODE's own objects, entries of the
- * tables, the surface cache, and what contacts are made with. */
+/* What is reached through a pointer may change in a const hapi_world: ODE's own objects, entries
+ * of the tables, the surface cache, and what contacts are made with. */
 struct hapi_world {
   hap_ode_def ode;
   hapi_claim claim;
@@ -56,8 +56,8 @@ struct hapi_world {
 };
 
 /* life.c */
-/* *world is zeroed. joint_slots: of the loop. *listener stays where it is. False: no memory; finish is
- * called in any case. */
+/* *world is zeroed. joint_slots: of the loop. *listener stays where it is. False: no memory;
+ * finish is called in any case. */
 bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,
                        const hapi_world_listener *listener);
 void hapi_world_finish(hapi_world *world);

@@ -2,10 +2,12 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "base/assert.h"
 #include "physics/physics_internal.h"
 
-/* The world's bodies: what changes in their table, and what the application says of them. Those who
- * draw look bodies up in the table, so that it changes under the lock of the drawing. */
+/* What comes in at a cycle: the world's bodies and what the application says of them, its edits,
+ * the loop's newest message. Those who draw look bodies up in the table, so that it changes
+ * under the lock of the drawing. */
 
 static bool listener_grow(void *user, uint32_t capacity)
 {
@@ -22,10 +24,11 @@ static void listener_body_begun(void *user, uint32_t index)
 static void listener_body_gone(void *user, uint32_t index)
 {
   hapi_physics *physics = user;
+  HAPI_ASSERT_INDEX(index, physics->world.bodies.high);
   hapi_slots_drop_body(&physics->near, index);
-  for (uint32_t i = 0; i < physics->account.watch_count; ++i) {
-    if (physics->account.watch[i] == index) {
-      physics->account.watch[i] = HAPI_NONE;
+  for (uint32_t i = 0; i < physics->watch.count; ++i) {
+    if (physics->watch.bodies[i] == index) {
+      physics->watch.bodies[i] = HAPI_NONE;
     }
   }
 }
@@ -54,7 +57,8 @@ hap_status hapi_physics_scan(hapi_physics *physics)
   return status;
 }
 
-/* The local bodies once more: since the scan they may have been given what the loop made of them. */
+/* The local bodies once more: since the scan they may have been given what the loop made of
+ * them. */
 bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text)
 {
   const hapi_slots *slots = &physics->near.slots;
@@ -69,6 +73,27 @@ bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text)
     }
   }
   return hapi_geoms_are_unsound(&physics->world, out_text);
+}
+
+void hapi_physics_run_edits(hapi_physics *physics)
+{
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
+  uint32_t count = hapi_edits_waiting(&physics->edits); /* what one posts waits for the next step */
+  hapi_tape_edits(&physics->tape, count);
+  physics->lock.editable = true;
+  hapi_edits_run(&physics->edits, count);
+  physics->lock.editable = false;
+}
+
+void hapi_physics_take_state(hapi_physics *physics)
+{
+  hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
+  physics->cycle.has_new_state = newest != NULL;
+  hapi_tape_state(&physics->tape, physics->config.exchange, newest != NULL);
+  if (newest != NULL) { /* else the loop has stopped or is late: nothing is taken twice */
+    physics->cycle.state = newest;
+    hapi_reconcile_take(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+  }
 }
 
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body)
@@ -121,7 +146,7 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
       return HAP_ERROR_NOT_FOUND;
     }
   }
-  memcpy(physics->account.watch, watch, count * sizeof watch[0]);
-  physics->account.watch_count = (uint32_t)count;
+  memcpy(physics->watch.bodies, watch, count * sizeof watch[0]);
+  physics->watch.count = (uint32_t)count;
   return HAP_OK;
 }
