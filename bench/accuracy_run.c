@@ -516,7 +516,7 @@ static hap_status record(const rig *r, const joint_gauge *gauge, double haptic_h
     double newest = floor((double)i * haptic_hz / ACCURACY_HAPTIC_HZ + 1e-9);
     for (; ticks <= newest && status >= HAP_OK; ticks += 1.0) {
       status = hap_session_advance(r->session, 1);
-      hap_status read = hap_session_trace_read(r->session, &row, 1, &got);
+      hap_status read = hap_session_trace_read(r->session, &row, 1, sizeof(hap_trace_row), &got);
       status = status >= HAP_OK ? read : status;
       out->deepest = fmax(out->deepest, deepest_now(r));
       read_joints(r, gauge, out);

@@ -244,7 +244,7 @@ static void take_rows(rig *r, effects_result *io)
 {
   hap_trace_row rows[BLOCK];
   size_t got = 0;
-  (void)hap_session_trace_read(r->session, rows, BLOCK, &got);
+  (void)hap_session_trace_read(r->session, rows, BLOCK, sizeof(hap_trace_row), &got);
   for (size_t i = 0; i < got; ++i) {
     for (size_t p = 0; p < r->pointer_count; ++p) {
       memcpy(&io->force[3 * (r->pointer_count * io->count + p)], rows[i].pointers[p].force,

@@ -1,7 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #define _POSIX_C_SOURCE 200809L /* nanosleep */
-#include <hapode/hapode.h>
 #include <hapode/ode.h>
 #include <stdio.h>
 #include <time.h>
@@ -19,16 +18,14 @@ int main(void)
   dJointAttach(dJointCreateSlider(world, NULL), cube, NULL);
 
   hap_detail why = {""};
-  hap_session_def session_def; /* physics at 60 Hz, touch at 1 kHz: both in their own threads */
+  hap_session *session; /* physics at 60 Hz, touch at 1 kHz: both in their own threads */
+  hap_pointer_id hand;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
-  hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
-  hap_pointer_def_init(&hand_def, sizeof hand_def);
   ode_def.world = world, ode_def.space = space;
-  hap_session *session;
-  hap_pointer_id hand;
-  if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
+  hap_pointer_def_init(&hand_def, sizeof hand_def);
+  if (hap_session_create(NULL, &ode_def, &session, &why) < HAP_OK ||
       hap_device_open("virtual:path=0:-0.05/0/0;1:0.1/0/0", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK || hap_session_start(session) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;

@@ -252,7 +252,8 @@ static inline void cw_read(contact_world *w)
 {
   size_t count = 0;
   double period = 1.0 / w->def.haptic_hz;
-  CHECK(hap_session_trace_read(w->session, &w->row, 1, &count) == HAP_OK && count == 1);
+  CHECK(hap_session_trace_read(w->session, &w->row, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 1);
   for (uint32_t i = 0; i < w->row.body_count; ++i) {
     for (int k = 0; k < 3; ++k) {
       w->velocity[i][k] = (w->row.body_position[i][k] - w->position[i][k]) / period;

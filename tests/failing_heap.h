@@ -80,7 +80,10 @@ static inline void fail_each(bool (*work)(void), bool may_degrade)
 
 static inline bool heap_install(void)
 {
-  const hap_hooks hooks = {failing_allocate, counted_release, NULL, NULL};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = failing_allocate;
+  hooks.release = counted_release;
   return hap_hooks_set(&hooks) == HAP_OK;
 }
 

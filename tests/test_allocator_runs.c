@@ -88,7 +88,7 @@ static bool use(rig *r)
   bool good = good_or_starved(hap_pointer_add(r->session, &def, &id));
   CHECK(hap_session_set_model(r->session, (hap_model)((now.model + 1) % 4)) == HAP_OK);
   go_on(r);
-  CHECK(hap_session_trace_read(r->session, &row, 1, &rows) >= HAP_OK);
+  CHECK(hap_session_trace_read(r->session, &row, 1, sizeof(hap_trace_row), &rows) >= HAP_OK);
   if (good) {
     CHECK(hap_pointer_remove(r->session, id) == HAP_OK);
   }

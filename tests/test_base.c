@@ -384,7 +384,12 @@ static void counted_log(hap_log_level level, const char *text, void *user)
 TEST(heap_zeroes_and_goes_through_the_hooks)
 {
   counted_heap heap = {0, 0, ""};
-  hap_hooks hooks = {counted_allocate, counted_release, counted_log, &heap};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = counted_allocate;
+  hooks.release = counted_release;
+  hooks.log = counted_log;
+  hooks.user = &heap;
   REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
   unsigned char *block = hapi_alloc(100);
   REQUIRE(block != NULL);
@@ -402,7 +407,13 @@ TEST(heap_zeroes_and_goes_through_the_hooks)
   CHECK(heap.lives == 0);
   hapi_log(HAP_LOG_WARNING, "%d and %s", 3, "four");
   CHECK(heap.logs == 1 && strcmp(heap.last, "1 3 and four") == 0);
-  hap_hooks half = {counted_allocate, NULL, NULL, &heap};
+  hap_hooks unset;
+  memset(&unset, 0, sizeof unset);
+  CHECK(hap_hooks_set(&unset) == HAP_ERROR_UNINITIALISED);
+  hap_hooks half;
+  hap_hooks_init(&half, sizeof half);
+  half.allocate = counted_allocate;
+  half.user = &heap;
   CHECK(hap_hooks_set(&half) == HAP_ERROR_ARGUMENT);
   CHECK(hap_hooks_set(NULL) == HAP_OK);
   hapi_log(HAP_LOG_ERROR, "nobody hears this");

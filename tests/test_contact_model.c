@@ -120,7 +120,7 @@ TEST(fig5_has_the_closed_forms_peak_and_impulse)
     size_t count = 0;
     double peak = 0.0;
     double impulse = 0.0;
-    CHECK(hap_session_trace_read(r.session, rows, 1200, &count) == HAP_OK);
+    CHECK(hap_session_trace_read(r.session, rows, 1200, sizeof(hap_trace_row), &count) == HAP_OK);
     for (size_t j = 0; j < count; ++j) {
       peak = fmax(peak, cw_norm(rows[j].pointers[0].force));
       impulse += 1e-3 * cw_norm(rows[j].pointers[0].force);
@@ -188,7 +188,8 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
   REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
   CHECK(hap_session_start(r.session) == HAP_OK && hap_session_advance(r.session, 2000) == HAP_OK);
   size_t count = 0;
-  CHECK(hap_session_trace_read(r.session, rows, 2000, &count) == HAP_OK && count == 2000);
+  CHECK(hap_session_trace_read(r.session, rows, 2000, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 2000);
   REQUIRE(scene_create("hold", &exact.scene, &detail) == HAP_OK);
   double worst = 0.0;
   for (size_t t = 0; t < count; ++t) {

@@ -267,11 +267,12 @@ TEST(info_has_a_name_and_fits_any_size)
   CHECK(hap_device_get_info(device, &large.info, sizeof large) == HAP_OK);
   CHECK(strcmp(large.info.name, "fake") == 0);
   CHECK_NEAR(large.info.max_force, 7.5, 0.0);
-  CHECK(large.newer[0] == 0 && large.newer[31] == 0);
+  CHECK(large.info.size == sizeof large.info);
+  CHECK((unsigned char)large.newer[0] == 0xff && (unsigned char)large.newer[31] == 0xff);
   hap_device_info small;
   memset(&small, 0xff, sizeof small);
   CHECK(hap_device_get_info(device, &small, offsetof(hap_device_info, max_force)) == HAP_OK);
-  CHECK(small.dof == 3);
+  CHECK(small.dof == 3 && small.size == offsetof(hap_device_info, max_force));
   CHECK(((unsigned char *)&small.max_force)[0] == 0xff); /* behind the size: not touched */
   hap_device_close(device);
 
@@ -334,7 +335,11 @@ static void failing_release(void *memory, void *user)
 static void open_until_it_fits(const char *spec)
 {
   failing_heap heap = {0, 0};
-  hap_hooks hooks = {failing_allocate, failing_release, NULL, &heap};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = failing_allocate;
+  hooks.release = failing_release;
+  hooks.user = &heap;
   hap_status status = HAP_ERROR_MEMORY;
   long tries = 0;
   REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
@@ -554,12 +559,18 @@ static void keep_log(hap_log_level level, const char *text, void *user)
 
 TEST(hooks_are_used)
 {
-  hap_hooks half = {failing_allocate, NULL, NULL, NULL};
+  hap_hooks half;
+  hap_hooks_init(&half, sizeof half);
+  half.allocate = failing_allocate;
   CHECK(hap_hooks_set(&half) == HAP_ERROR_ARGUMENT);
-  half = (hap_hooks){NULL, failing_release, NULL, NULL};
+  hap_hooks_init(&half, sizeof half);
+  half.release = failing_release;
   CHECK(hap_hooks_set(&half) == HAP_ERROR_ARGUMENT);
   hapi_log(HAP_LOG_ERROR, "thrown away");
-  hap_hooks log_only = {NULL, NULL, keep_log, &seen};
+  hap_hooks log_only;
+  hap_hooks_init(&log_only, sizeof log_only);
+  log_only.log = keep_log;
+  log_only.user = &seen;
   REQUIRE(hap_hooks_set(&log_only) == HAP_OK);
   hapi_log(HAP_LOG_WARNING, "%s %d", "gap", 3);
   CHECK(strcmp(logged, "gap 3") == 0);

@@ -132,7 +132,9 @@ TEST(a_lost_body_is_said_once_a_run_and_counted_always)
 {
   stage s;
   lost_lines = 0;
-  hap_hooks hooks = {.log = count_lost};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = count_lost;
   REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
   REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
   for (int run = 1; run <= 2; ++run) {

@@ -80,7 +80,8 @@ static bool run(const scene_run *of, hap_model model, const uint8_t effects[HAP_
     hap_trace_row row;
     size_t count = 0;
     good = hap_session_advance(r.session, 1) >= HAP_OK &&
-           hap_session_trace_read(r.session, &row, 1, &count) >= HAP_OK && count == 1;
+           hap_session_trace_read(r.session, &row, 1, sizeof(hap_trace_row), &count) >= HAP_OK &&
+           count == 1;
     for (size_t p = 0; good && p < r.pointer_count; ++p) {
       memcpy(out->at[t][p], row.pointers[p].force, sizeof out->at[t][p]);
       for (int k = 0; k < 3; ++k) {

@@ -339,7 +339,8 @@ static void check_return(view *v)
   int at = 0;
   int hitches = 0;
   int longest = 0;
-  CHECK(hap_session_trace_read(v->f.s.session, rows, TRACE_ROWS, &count) == HAP_OK);
+  CHECK(hap_session_trace_read(v->f.s.session, rows, TRACE_ROWS, sizeof(hap_trace_row), &count) ==
+        HAP_OK);
   while (at >= 0) {
     int ticks = ticks_to_normal(rows, (int)count, &at);
     if (at >= 0) {

@@ -59,7 +59,8 @@ static void write_hand(const hold *h, double side, char *out, size_t size)
 static void read_row(const rig *r, hap_trace_row *out)
 {
   size_t count = 0;
-  CHECK(hap_session_trace_read(r->session, out, 1, &count) == HAP_OK && count == 1);
+  CHECK(hap_session_trace_read(r->session, out, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 1);
 }
 
 /* Held from 2 s on, for that long. */

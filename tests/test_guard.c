@@ -634,7 +634,7 @@ static hapi_pointer *open_box(void)
 static size_t read_box(size_t room)
 {
   memset(read_rows, 0xee, sizeof read_rows);
-  return hapi_black_box_read(&box, read_rows, room);
+  return hapi_black_box_read(&box, read_rows, room, sizeof read_rows[0]);
 }
 
 /* The age of a model that there is not would be the time since the machine was switched on. */

@@ -369,13 +369,18 @@ TEST(the_black_box_of_a_session)
   size_t count = 7;
   REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
   CHECK(hap_session_advance(s.session, 400) == HAP_OK);
-  CHECK(hap_session_black_box(s.session, rows, 512, &count) == HAP_END && count == 0);
-  CHECK(hap_session_black_box(NULL, rows, 512, &count) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_black_box(s.session, NULL, 512, &count) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_black_box(s.session, rows, 512, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_END &&
+        count == 0);
+  CHECK(hap_session_black_box(NULL, rows, 512, sizeof(hap_black_box_row), &count) ==
+        HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_black_box(s.session, NULL, 512, sizeof(hap_black_box_row), &count) ==
+        HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), NULL) ==
+        HAP_ERROR_ARGUMENT);
   atomic_store(&device_book.fail_write, 1);
   CHECK(hap_session_advance(s.session, 1) == HAP_FAULTED);
-  CHECK(hap_session_black_box(s.session, rows, 512, &count) == HAP_OK && count == 256);
+  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
+        count == 256);
   CHECK(rows[255].tick == 400 && rows[255].time_ns == 400 * MS);
   CHECK(rows[255].fault == HAP_FAULT_DEVICE_WRITE && rows[254].fault == HAP_FAULT_NONE);
   CHECK(rows[255].pointer.v == hand.v && rows[255].pose.position[0] == -0.057);
@@ -383,7 +388,8 @@ TEST(the_black_box_of_a_session)
   CHECK(rows[255].written.force[0] == 0.0); /* what the device has */
   CHECK_NEAR(rows[254].written.force[0], -3.0, 1e-6);
   CHECK(hap_session_stop(s.session) == HAP_OK); /* it can still be read */
-  CHECK(hap_session_black_box(s.session, rows, 512, &count) == HAP_OK && count == 256);
+  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
+        count == 256);
   end(&s, device);
 }
 
@@ -401,7 +407,8 @@ static void *read_all_the_time(void *arg)
   const hap_black_box_row *row = r->rows;
   size_t count = 0;
   while (atomic_load(&alarm_goes_on) != 0) {
-    if (hap_session_black_box(r->s->session, r->rows, HAP_BLACK_BOX_TICKS, &count) == HAP_OK) {
+    if (hap_session_black_box(r->s->session, r->rows, HAP_BLACK_BOX_TICKS,
+                              sizeof(hap_black_box_row), &count) == HAP_OK) {
       ++r->read;
       r->wrong += row[count - 1].fault != HAP_FAULT_DEVICE_POSE;
       for (size_t i = 1; i < count; ++i) {

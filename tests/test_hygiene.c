@@ -35,7 +35,7 @@ static bool all_finite(const test_world *w)
   }
   hap_trace_row row;
   size_t got = 0;
-  while (hap_session_trace_read(w->session, &row, 1, &got) == HAP_OK) {
+  while (hap_session_trace_read(w->session, &row, 1, sizeof(hap_trace_row), &got) == HAP_OK) {
     good =
         good && hapi_finite(row.pointers[0].position, 3) && hapi_finite(row.pointers[0].force, 3);
     for (uint32_t i = 0; i < row.body_count; ++i) {

@@ -482,7 +482,11 @@ static void failing_release(void *memory, void *user)
 TEST(failed_allocations_are_survived)
 {
   failing_heap heap = {0, 0};
-  hap_hooks hooks = {failing_allocate, failing_release, NULL, &heap};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = failing_allocate;
+  hooks.release = failing_release;
+  hooks.user = &heap;
   hap_status status = HAP_ERROR_MEMORY;
   long tries = 1; /* the first allocation is the device's own */
   REQUIRE(hap_hooks_set(&hooks) == HAP_OK);

@@ -207,7 +207,8 @@ static void play_scene(const play_def *def, scene_course *out)
   for (size_t i = 0; i < out->ticks; ++i) {
     if (i % every == 0) {
       CHECK(hap_session_advance(r.session, 1) == HAP_OK);
-      CHECK(hap_session_trace_read(r.session, &row, 1, &count) == HAP_OK && count == 1);
+      CHECK(hap_session_trace_read(r.session, &row, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
+            count == 1);
     }
     for (size_t p = 0; p < row.pointer_count && p < SCENE_POINTERS_MAX; ++p) {
       memcpy(&out->force[i][3 * p], row.pointers[p].force, 3 * sizeof(double));

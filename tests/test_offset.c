@@ -93,7 +93,7 @@ static void run_scene(const char *name, hap_model model, const double by[3], run
     hap_trace_row row;
     size_t got = 0;
     out->good = out->good && hap_session_advance(session, 1) == HAP_OK &&
-                hap_session_trace_read(session, &row, 1, &got) == HAP_OK;
+                hap_session_trace_read(session, &row, 1, sizeof(hap_trace_row), &got) == HAP_OK;
     hapi_v3_copy(row.pointers[0].force, out->force[i]);
   }
   hap_session_destroy(session);

@@ -83,7 +83,7 @@ static void read_rows(rig *r, reader *reading)
 {
   static hap_trace_row rows[CHUNK];
   size_t count;
-  while (hap_session_trace_read(r->session, rows, CHUNK, &count) == HAP_OK) {
+  while (hap_session_trace_read(r->session, rows, CHUNK, sizeof(hap_trace_row), &count) == HAP_OK) {
     for (size_t i = 0; i < count; ++i) {
       take_row(reading, &rows[i]);
     }

@@ -6,6 +6,8 @@
 
 #include "tests/tap.h"
 
+#include <stddef.h>
+
 #include <pthread.h>
 #include <stdatomic.h>
 
@@ -97,7 +99,7 @@ TEST(null_sessions_are_refused)
   CHECK(hap_session_set_model(NULL, HAP_MODEL_SINGLE) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_reset_fault(NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_detail(NULL, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_read(NULL, &row, 1, &count) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_trace_read(NULL, &row, 1, sizeof(hap_trace_row), &count) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses(NULL, 0, NULL, 0, &pose) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_add(NULL, &def, &id) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_remove(NULL, id) == HAP_ERROR_ARGUMENT);
@@ -108,14 +110,48 @@ TEST(null_sessions_are_refused)
   REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
   CHECK(hap_session_post(s.session, NULL, NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_detail(s.session, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_read(s.session, NULL, 1, &count) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_read(s.session, &row, 1, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_trace_read(s.session, NULL, 1, sizeof(hap_trace_row), &count) ==
+        HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_trace_read(s.session, &row, 1, sizeof(hap_trace_row), NULL) ==
+        HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses(s.session, 0, NULL, 1, &pose) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses(s.session, 0, &s.cube, 1, NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses(s.session, 0, NULL, 0, NULL) == HAP_OK);
   CHECK(hap_session_try_lock(s.session, -1) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_trace_bodies(s.session, NULL, 1) == HAP_ERROR_ARGUMENT);
   CHECK(hap_model_name((hap_model)77) == NULL);
+  stage_end(&s);
+}
+
+/* A program of another build has other rows. */
+TEST(trace_rows_of_another_size)
+{
+  union {
+    hap_trace_row rows[3];
+    unsigned char bytes[3 * sizeof(hap_trace_row)];
+  } block;
+  stage s;
+  size_t count = 0;
+  const size_t small = offsetof(hap_trace_row, tick_us);
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  s.expert.trace_rows = 8;
+  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 4) == HAP_OK);
+  CHECK(hap_session_trace_read(s.session, block.rows, 1, 4, &count) == HAP_ERROR_ARGUMENT);
+  memset(&block, 0xee, sizeof block);
+  CHECK(hap_session_trace_read(s.session, block.rows, 2, small, &count) == HAP_OK && count == 2);
+  uint64_t ticks[2];
+  memcpy(&ticks[0], block.bytes, sizeof ticks[0]);
+  memcpy(&ticks[1], block.bytes + small, sizeof ticks[1]);
+  CHECK(ticks[0] + 1 == ticks[1]);
+  for (size_t i = 2 * small; i < sizeof block; ++i) {
+    CHECK(block.bytes[i] == 0xee);
+  }
+  size_t large = sizeof(hap_trace_row) + 8;
+  memset(&block, 0xee, sizeof block);
+  CHECK(hap_session_trace_read(s.session, block.rows, 2, large, &count) == HAP_OK && count == 2);
+  memcpy(&ticks[1], block.bytes + large, sizeof ticks[1]);
+  CHECK(block.rows[0].tick + 1 == ticks[1] && block.bytes[sizeof(hap_trace_row)] == 0xee);
   stage_end(&s);
 }
 
@@ -471,12 +507,17 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
   dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
   REQUIRE(stage_create(&s) == HAP_OK && hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
   REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
+  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+        count == 0);
   CHECK(hap_session_advance(s.session, 150) == HAP_OK);
   CHECK(stats_of(&s).loop.trace_dropped == 50);
-  CHECK(hap_session_trace_read(s.session, rows, 30, &count) == HAP_OK && count == 30);
-  CHECK(hap_session_trace_read(s.session, rows + 30, 170, &count) == HAP_OK && count == 70);
-  CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
+  CHECK(hap_session_trace_read(s.session, rows, 30, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 30);
+  CHECK(hap_session_trace_read(s.session, rows + 30, 170, sizeof(hap_trace_row), &count) ==
+            HAP_OK &&
+        count == 70);
+  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+        count == 0);
   for (int i = 0; i < 100; ++i) {
     CHECK_NEAR(rows[i].t, 1e-3 * i, 1e-12);
     CHECK(rows[i].tick == rows[0].tick + (uint64_t)i);
@@ -484,11 +525,13 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
     CHECK_NEAR(rows[i].body_position[0][0], 1e-3 * i, 0.021); /* of the newest step */
   }
   CHECK(hap_session_advance(s.session, 10) == HAP_OK); /* goes on after the gap */
-  CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_OK && count == 10);
+  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 10);
   CHECK_NEAR(rows[0].t, 0.15, 1e-12);
   stage_end(&s);
   REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP)); /* without a trace */
   CHECK(hap_session_advance(s.session, 10) == HAP_OK && stats_of(&s).loop.trace_dropped == 0);
-  CHECK(hap_session_trace_read(s.session, rows, 200, &count) == HAP_END && count == 0);
+  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+        count == 0);
   stage_end(&s);
 }

@@ -68,7 +68,6 @@ TEST(missing_arguments_are_refused)
   stage s;
   stage_init(&s, HAP_DRIVE_LOCKSTEP);
   hap_session *out = (hap_session *)&s;
-  CHECK(hap_session_create(NULL, &s.ode, &out, NULL) == HAP_ERROR_ARGUMENT && out == NULL);
   CHECK(hap_session_create(&s.def, NULL, &out, NULL) == HAP_ERROR_ARGUMENT && out == NULL);
   CHECK(hap_session_create(&s.def, &s.ode, NULL, &s.detail) == HAP_ERROR_ARGUMENT);
   CHECK(has(s.detail.text, "out"));
@@ -199,6 +198,20 @@ TEST(every_bad_field_is_named)
   CHECK(refused(&s, HAP_ERROR_ARGUMENT, "at least one tick"));
   s.def.haptic_hz = 500.0;
   CHECK(stage_create(&s) == HAP_OK); /* H = T */
+  stage_end(&s);
+}
+
+TEST(no_def_is_one_of_defaults)
+{
+  stage s;
+  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  hap_accuracy_info info;
+  REQUIRE(hap_session_create(NULL, &s.ode, &s.session, &s.detail) == HAP_OK);
+  CHECK(hap_session_advance(s.session, 1) == HAP_ERROR_STATE);
+  CHECK(has(detail_of(&s), "LOCKSTEP")); /* it is not: the default is THREADS */
+  CHECK(hap_session_start(s.session) >= HAP_OK);
+  CHECK(hap_session_accuracy(s.session, &info, sizeof info) == HAP_OK);
+  CHECK(info.accuracy == HAP_ACCURACY_DEFAULT && info.tick.share == 0.0);
   stage_end(&s);
 }
 

@@ -286,7 +286,8 @@ TEST(a_falling_neighbour_falls_at_the_worlds_speed)
   CHECK(hap_session_advance(s.session, 90) == HAP_OK);
   static hap_trace_row rows[90];
   size_t got = 0;
-  CHECK(hap_session_trace_read(s.session, rows, 90, &got) == HAP_OK && got == 90);
+  CHECK(hap_session_trace_read(s.session, rows, 90, sizeof(hap_trace_row), &got) == HAP_OK &&
+        got == 90);
   /* Between two models, which come at ticks 60 and 80; from row 62 to 78 the mean is at 71 ms. */
   double speed = (rows[78].body_position[0][2] - rows[62].body_position[0][2]) / 0.016;
   CHECK_NEAR(speed, -9.81 * 0.071, 0.02 * 9.81 * 0.071);

@@ -262,7 +262,10 @@ TEST(no_memory_is_said)
   static hapi_spidar_sample samples[SAMPLES];
   uint64_t seed = 9;
   const hapi_spidar_model *m = hapi_spidar_model_find("x4r");
-  const hap_hooks hooks = {failing_allocate, counted_release, NULL, NULL};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = failing_allocate;
+  hooks.release = counted_release;
   hapi_spidar_calibration found;
   hap_detail detail = {""};
   record(m, 1.0, false, &seed, samples);

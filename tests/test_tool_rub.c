@@ -292,7 +292,8 @@ static void next_row(const rig *r, hap_trace_row *out)
 {
   size_t count = 0;
   CHECK(hap_session_advance(r->session, 1) == HAP_OK);
-  CHECK(hap_session_trace_read(r->session, out, 1, &count) == HAP_OK && count == 1);
+  CHECK(hap_session_trace_read(r->session, out, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
+        count == 1);
 }
 
 #define SCENE_TICKS 2400

@@ -40,7 +40,8 @@ size_t run_black_box_write(hap_session *session, FILE *file)
       "tick,t,pointer,fault,guard,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,wanted_fx,wanted_fy,"
       "wanted_fz,wanted_tx,wanted_ty,wanted_tz,fx,fy,fz,tx,ty,tz,model_age_s\n",
       file);
-  if (rows != NULL && hap_session_black_box(session, rows, ROWS, &count) == HAP_OK) {
+  if (rows != NULL &&
+      hap_session_black_box(session, rows, ROWS, sizeof(hap_black_box_row), &count) == HAP_OK) {
     for (size_t i = 0; i < count; ++i) {
       write_row(file, &rows[i]);
       ticks += i == 0 || rows[i].tick != rows[i - 1].tick;

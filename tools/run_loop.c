@@ -110,7 +110,8 @@ static void trace_drain(run_loop *loop)
   if (loop->trace.file == NULL && loop->picture == NULL) {
     return;
   }
-  while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, &count) == HAP_OK) {
+  while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, sizeof(hap_trace_row),
+                                &count) == HAP_OK) {
     for (size_t i = 0; i < count && loop->picture != NULL; ++i) {
       run_picture_add_row(loop->picture, &rows[i]);
     }

@@ -14,7 +14,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#include <hapode/record.h>
+#include <hapode/trace.h>
 
 typedef struct trace_csv {
   FILE *file;

@@ -14,13 +14,23 @@
 #endif
 #endif
 
-/* A status that must be looked at, and a text that is checked as printf's. */
-#if defined(__GNUC__)
+/* A status that must be looked at, or cast to void. It comes first in a declaration. Before C23 and
+ * C++17 only clang has one that the cast silences; GCC's warn_unused_result warns all the same. */
+#if defined(__cplusplus) && __cplusplus >= 201703L
+#define HAP_NODISCARD [[nodiscard]]
+#elif !defined(__cplusplus) && defined(__STDC_VERSION__) && __STDC_VERSION__ > 201710L
+#define HAP_NODISCARD [[nodiscard]]
+#elif defined(__clang__)
 #define HAP_NODISCARD __attribute__((warn_unused_result))
+#else
+#define HAP_NODISCARD
+#endif
+
+/* A text that is checked as printf's. */
+#if defined(__GNUC__)
 #define HAP_PRINTF(format_index, first_argument) \
   __attribute__((format(printf, format_index, first_argument)))
 #else
-#define HAP_NODISCARD
 #define HAP_PRINTF(format_index, first_argument)
 #endif
 

@@ -3,16 +3,17 @@
 #ifndef HAPODE_DEVICE_IMPL_H
 #define HAPODE_DEVICE_IMPL_H
 
-/* For people who write a device: copy plugins/skeleton, read docs/writing-a-device.md, and let
- * "hapode-run --check-device" hold the result against what is said here.
+/* For people who write a device. Copy plugins/skeleton, read docs/writing-a-device.md, and check
+ * the result against this contract with "hapode-run --check-device".
  *
- * Threads: open, describe, start, stop and close are called by the application's thread, read and
- * write by the haptic thread (in lockstep all by one thread), zero by any thread. No two of the others
- * are called at the same time on one device. A session calls start, then read and write once a tick
- * in this order, then, when the haptic thread has let go of the device, zero and stop.
+ * Threads. The application's thread calls open, describe, start, stop and close. The haptic thread
+ * calls read and write; in drive LOCKSTEP one thread calls all of them. Any thread calls zero. No
+ * two of the others are called at the same time on one device. A session calls start, then read and
+ * write once a tick in this order. When the haptic thread has let go of the device, it calls zero
+ * and stop.
  *
- * Devices are independent: two of them may be open at once, each with its own self. Where the hardware
- * is there only once, the second open fails and says so. */
+ * Devices are independent: two of them may be open at once, each with its own self. Where the
+ * hardware is there only once, the second open fails and says so. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -25,14 +26,16 @@
 HAP_BEGIN_DECLS
 
 /* Goes up when a member of hap_device_ops changes its meaning. */
-#define HAP_DEVICE_ABI 1u
+#define HAP_DEVICE_ABI 2u
 
+/* Who sets the pace of the loop. Values are never renumbered. */
 typedef enum hap_device_pacing {
   HAP_PACING_VIRTUAL = 0, /* lives in the time it is given; may run in lockstep */
   HAP_PACING_HOST = 1,    /* answers at once with its newest state; the loop sleeps */
   HAP_PACING_DEVICE = 2   /* read blocks until the device's own tick, at most two ticks */
 } hap_device_pacing;
 
+/* The operations of a device. It has a size and may grow at its end. */
 typedef struct hap_device_ops {
   uint32_t abi;     /* HAP_DEVICE_ABI; checked before any other member */
   uint32_t size;    /* sizeof(hap_device_ops) of the device's build */
@@ -40,64 +43,65 @@ typedef struct hap_device_ops {
   const char *help; /* one line: what it is and its arguments */
   uint32_t pacing;  /* hap_device_pacing */
 
-  /* May block, may allocate. args is the text after "name:" or "" and is not kept; what it does not
-   * understand it refuses. No force yet. *self is not NULL when it succeeded. On failure *self stays
-   * NULL, detail (never NULL) says why, and nothing is left open. */
+  /* May block, may allocate. args is the text after "name:" or "", and is not kept. An argument
+   * that is not understood is refused. No force yet. On success *self is not NULL. On failure it
+   * stays NULL, detail (never NULL) says why, and nothing is left open. */
   hap_status (*open)(const char *args, void **self, hap_detail *detail);
 
-  /* Fills *out, which arrives zeroed; .name may be left empty. The same at every call. Never fails,
-   * never blocks. */
+  /* Fills *out, which arrives zeroed but for its size: no member beyond out->size is written. name
+   * may be left empty. The same at every call. Never fails, never blocks. */
   void (*describe)(void *self, hap_device_info *out);
 
-  /* Energises the device with zero force. May block. Also after stop, and after the device was lost:
-   * what has to be opened anew is opened here. */
+  /* Energises the device with zero force. May block. Also after stop, and after the device was
+   * lost: what must be opened anew is opened here. */
   hap_status (*start)(void *self);
 
-  /* Pose and twist of the end effector in the device's frame at time_ns (for pacing DEVICE: not
-   * later than time_ns). Fills all outputs: the quaternion is unit, a device of dof 3 gives a constant
-   * one. Never blocks except for pacing DEVICE, never allocates. HAP_ERROR_STATE before start and
-   * after stop. On an error the
-   * outputs are not used and the session latches a fault and calls zero. It goes on reading: a device that
-   * was unplugged may answer again, and is used again after hap_session_reset_fault; start is called
-   * in between only by hap_pointer_restart. buttons: bit 0 is the first one. */
+  /* Pose and twist of the end effector in the device's frame at time_ns (pacing DEVICE: not later
+   * than time_ns). buttons: bit 0 is the first one. Fills all outputs: the quaternion is unit, and
+   * a device of dof 3 gives a constant one. Never blocks except with pacing DEVICE, never
+   * allocates. HAP_ERROR_STATE before start and after stop.
+   *
+   * After an error the outputs are not used, and the session latches a fault and calls zero. It
+   * goes on reading: a device that was unplugged may answer again, and is used again after
+   * hap_session_reset_fault. start is called in between only by hap_pointer_restart. */
   hap_status (*read)(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
                      uint32_t *buttons);
 
   /* Wrench on the hand in the device's frame, held until the next write. Never blocks, never
-   * allocates. Beyond max_force or max_torque it is shortened, its direction kept: HAP_SATURATED.
-   * reached is what the device really gives; it is filled in unless the status is an error. A wrench
-   * that is not finite gives no force: HAP_ERROR_ARGUMENT, or a zero. HAP_ERROR_STATE before start
-   * and after stop: then nothing gets to the motors. */
+   * allocates. Beyond max_force or max_torque it is shortened, its direction kept:
+   * HAP_SATURATED. reached is what the device really gives; it is filled in unless the status is
+   * an error. A wrench that is not finite gives no force: HAP_ERROR_ARGUMENT, or a zero.
+   * HAP_ERROR_STATE before start and after stop: then nothing reaches the motors. */
   hap_status (*write)(void *self, const hap_wrench *wanted, hap_wrench *reached);
 
-  /* Zero force now. Any thread, also a signal handler, which may have interrupted any other function
-   * of the device: no lock, no allocation. From open to close at any time; idempotent; never fails. The
-   * force stays off until the next write; one that is under way may come after it, and the session then
-   * calls zero once more. */
+  /* Zero force now. Any thread, also a signal handler, which may have interrupted any other
+   * function of the device: no lock, no allocation. From open to close at any time; idempotent;
+   * never fails. The force stays off until the next write. A write that is under way may come
+   * after it; the session then calls zero once more. */
   void (*zero)(void *self);
 
   /* De-energises: the force is off, also when zero was not called before. May block. A second stop
    * and one without start do nothing. */
   void (*stop)(void *self);
 
-  /* Frees self, after stop. No thread, timer or signal handler of the device is left: its code may be
-   * gone when this comes back. */
+  /* Frees self, after stop. No thread, timer or signal handler of the device is left: its code may
+   * be gone when this returns. */
   void (*close)(void *self);
 
-  /* Optional, NULL or beyond size: what the motors were told last; zero where they are off. Called by
-   * the thread that writes, or when none does, from open to close. For checks. */
+  /* Optional, NULL or beyond size: what the motors were told last; zero where they are off.
+   * Called by the thread that writes, or when none does, from open to close. For checks. */
   void (*held)(void *self, hap_wrench *out);
 
-  /* Optional, NULL or beyond size: why start, read or write failed last, in one sentence that says what
-   * to do; out arrives empty and stays so when nothing failed. Any thread, from open to close, at the same
-   * time as any other operation; never blocks. */
+  /* Optional, NULL or beyond size: why start, read or write failed last, in one sentence that says
+   * what to do. out arrives empty and stays so when nothing failed. Any thread, from open to close,
+   * at the same time as any other operation; never blocks. */
   void (*explain)(void *self, hap_detail *out);
 } hap_device_ops;
 
-/* The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is the
- * HAP_DEVICE_ABI of the library that asks. NULL: the device cannot serve that one. The table must last
- * as long as the module is loaded, which is until the last of its devices was closed. It is called
- * once for every device that is opened, by the thread that opens; there may be several. */
+/* [control] The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is
+ * the HAP_DEVICE_ABI of the library that asks. NULL: the device cannot serve that one. It is called
+ * once for every device that is opened, by the thread that opens; there may be several. The table
+ * must last as long as the module is loaded, which is until the last of its devices was closed. */
 HAP_API const hap_device_ops *hapode_device_module(uint32_t host_abi);
 
 HAP_END_DECLS

@@ -99,9 +99,8 @@ typedef struct hap_pointer_expert_def {
   /* N/m at the device, 0..1e9: of the coupling's spring, and what the device is taken to hold. 0
    * (default): from the device's figures */
   double coupling_stiffness;
-  double
-      coupling_damping; /* N s/m at the device, 0..1e6, default 0; only with coupling_stiffness */
-  double proxy_mass;    /* kg, 0..1e6, default 0: of the proxy of PROXY and AUTO */
+  double coupling_damping; /* N s/m at the device, 0..1e6, default 0; needs coupling_stiffness */
+  double proxy_mass;       /* kg, 0..1e6, default 0: of the proxy of PROXY and AUTO */
   /* N s/m, 0..1e3, default 0: the least that the hand always adds to the device's own damping. A
    * finger held loosely: about 1 */
   double hand_damping;

@@ -12,6 +12,7 @@
 #include <hapode/effects.h>
 #include <hapode/expert.h>
 #include <hapode/hooks.h>
+#include <hapode/identify.h>
 #include <hapode/pointer.h>
 #include <hapode/record.h>
 #include <hapode/research.h>
@@ -19,6 +20,7 @@
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
 #include <hapode/status.h>
+#include <hapode/trace.h>
 #include <hapode/version.h>
 
 #endif

@@ -66,8 +66,7 @@ typedef struct hap_pointer_def {
    * hull it is the radius at each of its points, beside the arms that these have. */
   double finger_radius;
 
-  double
-      max_force; /* N at the device, 1e-6..1e6, default 20; the device's own limit holds as well */
+  double max_force; /* N at the device, 1e-6..1e6, default 20; the device's own holds as well */
   /* N m at the device, 1e-6..1e6, default 1. The torque about the pointer's origin is scaled by
    * force_scale / motion_scale. A device of 3 degrees of freedom gets none and does not turn a
    * tool, which keeps the orientation of pose_world_device. */
@@ -146,12 +145,12 @@ HAP_API const char *hap_coupling_name(hap_coupling coupling);
 
 /* Why a pointer has the coupling that it has. Values are never renumbered. */
 typedef enum hap_coupling_reason {
-  HAP_COUPLING_ASKED = 0,   /* by its definition */
-  HAP_COUPLING_UNKNOWN = 1, /* direct: the device gives neither damping nor rated stiffness, or
-                               force_scale is 0 */
-  HAP_COUPLING_MODEL = 2,   /* direct: the session's model is not CONTACT */
-  HAP_COUPLING_WITHIN = 3,  /* direct: the device can hold what is near */
-  HAP_COUPLING_ABOVE = 4    /* proxy: it cannot */
+  HAP_COUPLING_ASKED = 0, /* by its definition */
+  /* direct: the device gives neither damping nor rated stiffness, or force_scale is 0 */
+  HAP_COUPLING_UNKNOWN = 1,
+  HAP_COUPLING_MODEL = 2,  /* direct: the session's model is not CONTACT */
+  HAP_COUPLING_WITHIN = 3, /* direct: the device can hold what is near */
+  HAP_COUPLING_ABOVE = 4   /* proxy: it cannot */
 } hap_coupling_reason;
 
 /* What the guard did to a pointer's force. Bits; values are never renumbered. */
@@ -166,22 +165,24 @@ typedef enum hap_guard_flag {
 
 /* A pointer in its last tick. It has a size and may grow at its end. */
 typedef struct hap_pointer_state {
-  uint32_t size;             /* bytes filled in */
-  uint32_t contacts;         /* bodies that push back; of a tool the points at which they do */
-  int64_t stamp_ns;          /* of the tick */
-  hap_pose device;           /* in the device's frame */
-  hap_pose proxy;            /* pointer in the world: of the proxy where there is one */
-  hap_twist twist;           /* pointer in the world */
-  hap_wrench wrench;         /* on the hand, world frame, after the guard: what was written to the
-                                device, divided by force_scale */
+  uint32_t size;     /* bytes filled in */
+  uint32_t contacts; /* bodies that push back; of a tool the points at which they do */
+  int64_t stamp_ns;  /* of the tick */
+  hap_pose device;   /* in the device's frame */
+  hap_pose proxy;    /* pointer in the world: of the proxy where there is one */
+  hap_twist twist;   /* pointer in the world */
+  /* on the hand, world frame, after the guard: what was written to the device, divided by
+   * force_scale */
+  hap_wrench wrench;
   uint32_t buttons;          /* bit 0 is the first one */
   uint32_t coupling;         /* hap_coupling in force: never HAP_COUPLING_AUTO */
   uint32_t coupling_reason;  /* hap_coupling_reason */
   uint32_t guard;            /* hap_guard_flag bits */
   double coupling_stiffness; /* N/m at the device, of the proxy's spring; 0: there is none */
   double coupling_damping;   /* N s/m at the device */
-  double contact_stiffness;  /* N/m at the device, sum over the contacts near the pointer; 0 where
-                                contacts do not give (GOD_OBJECT, VIRTUAL) */
+  /* N/m at the device, sum over the contacts near the pointer; 0 where contacts do not give
+   * (GOD_OBJECT, VIRTUAL) */
+  double contact_stiffness;
 } hap_pointer_state;
 
 /* [any] State after the newest tick. size_of_out: sizeof *out of the caller's build.

@@ -157,9 +157,8 @@ typedef struct hap_fault_stats {
 
 /* The world between threads. The haptic loop never waits for the lock. */
 typedef struct hap_edit_stats {
-  uint64_t locks; /* times that application threads had the lock */
-  double
-      wait_ms_max; /* ms, longest wait of one of them; a failed hap_session_try_lock is left out */
+  uint64_t locks;     /* times that application threads had the lock */
+  double wait_ms_max; /* ms, longest wait of one of them; failed hap_session_try_lock left out */
   double held_ms_max; /* ms, longest time that one of them held it; physics cannot step then */
   uint64_t run;       /* edits of hap_session_post that ran */
 } hap_edit_stats;

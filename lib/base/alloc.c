@@ -7,7 +7,10 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/def.h"
 #include "base/hooks.h"
+
+#define HOOKS_COOKIE 0x48484b31u
 
 static void *default_allocate(size_t size, void *user)
 {
@@ -29,18 +32,29 @@ static void default_log(hap_log_level level, const char *text, void *user)
 }
 
 /* Not atomic: hap_hooks_set is promised to come before any object of the library. */
-static hap_hooks current = {default_allocate, default_release, default_log, NULL};
+static hap_hooks current = {
+    .allocate = default_allocate, .release = default_release, .log = default_log};
 
 const hap_hooks *hapi_hooks(void)
 {
   return &current;
 }
 
+void hap_hooks_init(hap_hooks *hooks, size_t size_of_hooks)
+{
+  const hap_hooks none = {.cookie = HOOKS_COOKIE};
+  hapi_def_init(hooks, size_of_hooks, &none, sizeof none);
+}
+
 hap_status hap_hooks_set(const hap_hooks *hooks)
 {
-  hap_hooks wanted = {NULL, NULL, NULL, NULL};
-  if (hooks != NULL) {
-    wanted = *hooks;
+  hap_hooks wanted;
+  hap_hooks_init(&wanted, sizeof wanted);
+  hap_status status = hooks == NULL ? HAP_OK
+                                    : hapi_def_read(&wanted, sizeof wanted, hooks, HOOKS_COOKIE,
+                                                    "hap_hooks_init", NULL);
+  if (status < HAP_OK) {
+    return status;
   }
   /* Half a pair would free the memory of one heap in another. */
   if ((wanted.allocate == NULL) != (wanted.release == NULL)) {

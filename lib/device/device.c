@@ -104,7 +104,9 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
 static hap_status device_describe(hap_device *device, hap_detail *detail)
 {
   hap_device_info *info = &device->info;
+  info->size = sizeof *info;
   device->ops->describe(device->self, info);
+  info->size = sizeof *info;
   info->name[sizeof info->name - 1] = '\0';
   if (info->name[0] == '\0') {
     snprintf(info->name, sizeof info->name, "%s", device->ops->name);
@@ -227,13 +229,13 @@ void hap_device_close(hap_device *device)
 
 hap_status hap_device_get_info(const hap_device *device, hap_device_info *out, size_t size_of_out)
 {
-  if (device == NULL || out == NULL || size_of_out == 0) {
+  if (device == NULL || out == NULL || size_of_out < sizeof out->size) {
     return HAP_ERROR_ARGUMENT;
   }
-  /* A caller built with another version of the struct gets what both sides know. */
-  size_t common = size_of_out < sizeof device->info ? size_of_out : sizeof device->info;
-  memset(out, 0, size_of_out);
-  memcpy(out, &device->info, common);
+  hap_device_info info = device->info;
+  size_t size = size_of_out < sizeof info ? size_of_out : sizeof info;
+  info.size = (uint32_t)size;
+  memcpy(out, &info, size);
   return HAP_OK;
 }
 

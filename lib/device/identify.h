@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-#include <hapode/device.h>
+#include <hapode/identify.h>
 
 /* Longest delay that is looked for [s]. */
 #define HAPI_IDENTIFY_DELAY_MAX 0.03

@@ -10,9 +10,9 @@
 
 #include <hapode/effects.h>
 #include <hapode/pointer.h>
-#include <hapode/record.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
+#include <hapode/trace.h>
 
 #include "base/pointer_setup.h"
 #include "record/tape.h"
@@ -77,8 +77,10 @@ void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault); /* [any] from the 
 bool hapi_haptic_has_fault(const hapi_haptic *haptic);        /* [any] latched at the last tick */
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out); /* [any] its part of *out */
 void hapi_haptic_effects(const hapi_haptic *haptic, hap_effect_info *out); /* [any] likewise */
-size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity);
+size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity,
+                              size_t size_of_row);
 /* [app] */
-size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity);
+size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity,
+                                  size_t size_of_row);
 
 #endif

@@ -429,10 +429,11 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->loop.trace_hash = LOAD(loop.hash);
 }
 
-size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity)
+size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity,
+                                  size_t size_of_row)
 {
   pthread_mutex_lock(&haptic->black_box_lock);
-  size_t count = hapi_black_box_read(&haptic->black_box, rows, capacity);
+  size_t count = hapi_black_box_read(&haptic->black_box, rows, capacity, size_of_row);
   pthread_mutex_unlock(&haptic->black_box_lock);
   return count;
 }

@@ -142,6 +142,25 @@ static bool is_ready(const hapi_pointer_slot *slot)
   return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
+static hap_device_info device_recalled(const hapi_joined_device *recorded)
+{
+  hap_device_info out;
+  memset(&out, 0, sizeof out);
+  out.size = sizeof out;
+  out.dof = recorded->dof;
+  memcpy(out.name, recorded->name, sizeof out.name);
+  out.max_force = recorded->max_force;
+  out.max_torque = recorded->max_torque;
+  out.rated_stiffness = recorded->rated_stiffness;
+  out.damping = recorded->damping;
+  out.quantum = recorded->quantum;
+  out.mass = recorded->mass;
+  out.friction = recorded->friction;
+  out.delay = recorded->delay;
+  out.measures_velocity = recorded->measures_velocity;
+  return out;
+}
+
 static void prepare_slot(hapi_pointer_slot *slot);
 
 /* One that was paused has the id that it had. */
@@ -151,7 +170,7 @@ static void take_in(hapi_haptic *haptic, uint32_t index, const hapi_joined *join
   hapi_pointer_slot *slot = &haptic->slots[index];
   slot->hull = *hull;
   slot->def = joined->def;
-  slot->info = joined->info;
+  slot->info = device_recalled(&joined->device);
   slot->has_device = joined->has_device != 0;
   if (atomic_load(&slot->phase) != HAPI_POINTER_PAUSED || slot->generation != joined->generation) {
     prepare_slot(slot);

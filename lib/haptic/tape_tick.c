@@ -116,6 +116,24 @@ static void get_hull(hapi_haptic *haptic, uint32_t index, uint32_t count, hapi_t
   }
 }
 
+static hapi_joined_device device_recorded(const hap_device_info *info)
+{
+  hapi_joined_device out;
+  memset(&out, 0, sizeof out); /* also what is between members */
+  memcpy(out.name, info->name, sizeof out.name);
+  out.dof = info->dof;
+  out.max_force = info->max_force;
+  out.max_torque = info->max_torque;
+  out.rated_stiffness = info->rated_stiffness;
+  out.damping = info->damping;
+  out.quantum = info->quantum;
+  out.mass = info->mass;
+  out.friction = info->friction;
+  out.delay = info->delay;
+  out.measures_velocity = info->measures_velocity;
+  return out;
+}
+
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -128,7 +146,7 @@ void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
   joined.def = slot->def;
   joined.def.device = NULL;
   joined.def.hull_xyz = NULL;
-  joined.info = slot->info;
+  joined.device = device_recorded(&slot->info);
   joined.generation = slot->generation;
   joined.has_device = slot->has_device;
   memcpy(bytes, &joined, sizeof joined);

@@ -49,14 +49,16 @@ void hapi_trace_ring_write(hapi_haptic *haptic)
   atomic_store_explicit(&ring->written, written + 1, memory_order_release);
 }
 
-size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity)
+size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity,
+                              size_t size_of_row)
 {
+  size_t size = size_of_row < sizeof *rows ? size_of_row : sizeof *rows;
   hapi_trace_ring *ring = &haptic->ring;
   uint64_t read = atomic_load_explicit(&ring->read, memory_order_relaxed);
   uint64_t written = atomic_load_explicit(&ring->written, memory_order_acquire);
   size_t count = 0;
   while (read < written && count < capacity) {
-    rows[count++] = ring->rows[read++ % ring->capacity];
+    memcpy((char *)rows + count++ * size_of_row, &ring->rows[read++ % ring->capacity], size);
   }
   atomic_store_explicit(&ring->read, read, memory_order_release);
   return count;

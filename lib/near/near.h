@@ -15,7 +15,7 @@
 
 /* Since the session began, but for the numbers of the newest model. */
 typedef struct hapi_near_counts {
-  uint64_t dropped; /* what found no room: hap_stats.capacity_dropped */
+  uint64_t dropped; /* what found no room: hap_stats.model.capacity_dropped */
   double range_s;   /* in walks of the range */
   double last_range_s;
   double beyond_s; /* part of range_s: bodies that are no neighbours */

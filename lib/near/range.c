@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include <hapode/expert.h>
+
 #include "base/alloc.h"
 #include "base/assert.h"
 #include "base/clock.h"

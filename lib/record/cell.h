@@ -132,10 +132,25 @@ typedef struct hapi_cell {
 
 static_assert(sizeof(hapi_cell) == 64, "the file's");
 
+/* A device as the file has it. */
+typedef struct hapi_joined_device {
+  char name[64];
+  uint32_t dof;
+  double max_force; /* this and the others: as in hap_device_info */
+  double max_torque;
+  double rated_stiffness;
+  double damping;
+  double quantum;
+  double mass;
+  double friction;
+  double delay;
+  uint32_t measures_velocity;
+} hapi_joined_device;
+
 /* A pointer as the loop takes it in. */
 typedef struct hapi_joined {
   hapi_pointer_setup def; /* device and hull_xyz NULL */
-  hap_device_info info;
+  hapi_joined_device device;
   uint32_t generation;
   uint32_t has_device;
 } hapi_joined;

@@ -190,8 +190,11 @@ hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,
   hap_session_def_init(def, sizeof *def);
   hap_expert_def_init(&out->expert, sizeof out->expert);
   hap_research_def_init(&out->research, sizeof out->research);
-  hap_status status =
-      hapi_def_read(def, sizeof *def, given, HAPI_SESSION_COOKIE, "hap_session_def_init", detail);
+  hap_status status = HAP_OK;
+  if (given != NULL) {
+    status =
+        hapi_def_read(def, sizeof *def, given, HAPI_SESSION_COOKIE, "hap_session_def_init", detail);
+  }
   if (status >= HAP_OK && def->expert != NULL) {
     status = hapi_def_read(&out->expert, sizeof out->expert, def->expert, HAPI_EXPERT_COOKIE,
                            "hap_expert_def_init", detail);

@@ -518,21 +518,21 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
 }
 
 hap_status hap_session_trace_read(hap_session *session, hap_trace_row *rows, size_t capacity,
-                                  size_t *out_count)
+                                  size_t size_of_row, size_t *out_count)
 {
-  if (session == NULL || rows == NULL || out_count == NULL) {
+  if (session == NULL || rows == NULL || out_count == NULL || size_of_row < sizeof rows->tick) {
     return HAP_ERROR_ARGUMENT;
   }
-  *out_count = hapi_haptic_read_trace(session->haptic, rows, capacity);
+  *out_count = hapi_haptic_read_trace(session->haptic, rows, capacity, size_of_row);
   return *out_count == 0 ? HAP_END : HAP_OK;
 }
 
 hap_status hap_session_black_box(hap_session *session, hap_black_box_row *rows, size_t capacity,
-                                 size_t *out_count)
+                                 size_t size_of_row, size_t *out_count)
 {
-  if (session == NULL || rows == NULL || out_count == NULL) {
+  if (session == NULL || rows == NULL || out_count == NULL || size_of_row < sizeof rows->tick) {
     return HAP_ERROR_ARGUMENT;
   }
-  *out_count = hapi_haptic_read_black_box(session->haptic, rows, capacity);
+  *out_count = hapi_haptic_read_black_box(session->haptic, rows, capacity, size_of_row);
   return *out_count == 0 ? HAP_END : HAP_OK;
 }

@@ -89,7 +89,7 @@ hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *de
 uint32_t hapi_session_pack_effects(const hap_expert_def *expert);
 void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io);
 
-/* defs.c: fills in def, expert and research of *out, and checks them. def.expert and def.research are
+/* defs.c: fills in def, expert and research of *out, and checks them. given NULL: defaults. def.expert and def.research are
  * never NULL then. */
 hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,
                                  hap_detail *detail);

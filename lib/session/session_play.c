@@ -301,7 +301,7 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
     memcpy(bytes + i * HAPI_CELL_BYTES, cells[i].d, HAPI_CELL_BYTES);
   }
   memcpy(&joined, bytes, sizeof joined);
-  const hap_device_info *info = &joined.info;
+  const hapi_joined_device *info = &joined.device;
   const double figures[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
                             info->quantum,   info->mass,       info->friction,        info->delay};
   bool good = cells[0].index < player->session->def.max_pointers && joined.generation != 0 &&

@@ -8,9 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include <hapode/record.h>
+#include <hapode/research.h>
 #include <hapode/session.h>
 #include <hapode/spatial.h>
+#include <hapode/trace.h>
 
 #include "base/assert.h"
 

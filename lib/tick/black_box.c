@@ -69,8 +69,10 @@ void hapi_black_box_record(hapi_black_box *box, const hapi_tick *tick)
   }
 }
 
-static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size_t capacity)
+static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
+                        size_t size_of_row)
 {
+  size_t size = size_of_row < sizeof *rows ? size_of_row : sizeof *rows;
   size_t total = 0;
   size_t taken = 0;
   for (uint32_t i = 0; i < HAP_BLACK_BOX_TICKS; ++i) {
@@ -83,21 +85,23 @@ static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size
       if (skip > 0) {
         --skip;
       } else {
-        rows[taken++] = box->rows[(size_t)at * box->pointers + k];
+        memcpy((char *)rows + taken++ * size_of_row, &box->rows[(size_t)at * box->pointers + k],
+               size);
       }
     }
   }
   return taken;
 }
 
-size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity)
+size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
+                           size_t size_of_row)
 {
   int frozen = HAPI_BOX_FROZEN;
   if (!atomic_compare_exchange_strong_explicit(&box->state, &frozen, HAPI_BOX_READING,
                                                memory_order_acquire, memory_order_relaxed)) {
     return 0;
   }
-  size_t count = rows_copy(box, rows, capacity);
+  size_t count = rows_copy(box, rows, capacity, size_of_row);
   atomic_store_explicit(&box->state, HAPI_BOX_FROZEN, memory_order_release);
   return count;
 }

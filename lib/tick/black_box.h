@@ -11,7 +11,7 @@
 
 #include <stdatomic.h>
 
-#include <hapode/record.h>
+#include <hapode/trace.h>
 
 #include "tick/tick.h"
 
@@ -39,6 +39,7 @@ void hapi_black_box_record(hapi_black_box *box, const hapi_tick *tick);
 
 /* One reader at a time, any thread. Rows copied: the newest capacity of them, oldest first; 0: no
  * fault is latched. */
-size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity);
+size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
+                           size_t size_of_row);
 
 #endif

@@ -18,7 +18,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include <hapode/record.h>
+#include <hapode/trace.h>
 
 #include "base/effect_clock.h"
 #include "guard/guard.h"

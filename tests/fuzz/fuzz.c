@@ -38,7 +38,10 @@ static void release(void *memory, void *user)
 
 void fuzz_start(void)
 {
-  const hap_hooks hooks = {allocate, release, NULL, NULL};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.allocate = allocate;
+  hooks.release = release;
   FUZZ_CHECK(hap_hooks_set(&hooks) == HAP_OK);
 }
 

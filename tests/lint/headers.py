@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""headers.py ROOT CC...: each public header compiles alone, twice included, as C11 and as C++17."""
+"""headers.py ROOT CC...: each public header compiles alone, twice included, as C11 and as C++17. A
+status that is thrown away is warned of where the language has an attribute for it, and never when it
+is cast to void."""
 import os
 import shlex
 import shutil
@@ -38,6 +40,42 @@ def find_cxx():
     return None
 
 
+THROWN = """#include <hapode/session.h>
+void look(hap_session *session);
+void look(hap_session *session)
+{
+  %shap_session_start(session);
+}
+"""
+
+
+def check_nodiscard(tap, flags, compilers):
+    for name, command, warns in compilers:
+        if compile_text(command + ["-fsyntax-only", "-"], "int unit;\n"):
+            tap.skip(f"a status cast to void, {name}", "the compiler does not have it")
+            continue
+        run = command + flags + ["-"]
+        tap.point(f"a status cast to void is silent, {name}", compile_text(run, THROWN % "(void)"))
+        thrown = compile_text(run, THROWN % "")
+        good = bool(thrown) == warns
+        tap.point(f"a status thrown away is {'' if warns else 'not '}warned of, {name}",
+                  [] if good else thrown or ["no warning"])
+
+
+def find_compilers(cc, cxx):
+    """(name, command, whether a status that is thrown away gives a warning)"""
+    clang = [c for c in ("clang", "clang-14") if shutil.which(c)][:1]
+    found = [("C23", cc + ["-std=c2x", "-x", "c"], True)]
+    if clang:
+        found.append(("clang in C11", clang + ["-std=c11", "-x", "c"], True))
+    if cxx:
+        found.append(("C++17", cxx + ["-std=c++17", "-x", "c++"], True))
+    version = subprocess.run(cc + ["--version"], capture_output=True, text=True).stdout
+    if "Free Software Foundation" in version:
+        found.append(("GCC in C11", cc + ["-std=c11", "-x", "c"], False))
+    return found
+
+
 def main(root, cc):
     tap = lint.Tap()
     include = os.path.join(root, "include")
@@ -55,6 +93,7 @@ def main(root, cc):
                       compile_text(cxx + ["-std=c++17", "-x", "c++", *flags, "-"], text))
         else:
             tap.skip(f"{name} as C++17", "needs a C++ compiler")
+    check_nodiscard(tap, flags, find_compilers(cc, cxx))
     tap.done()
 
 
