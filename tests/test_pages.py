@@ -91,6 +91,19 @@ def bad_paths():
                 yield f"{page.relative_to(root)}: {name} is not there"
 
 
+def bad_pages_in_code():
+    """Pages, and their headings, that a comment or a text of the code names."""
+    for folder in ("include", "lib", "plugins", "scenes", "tools", "bench", "examples", "tests"):
+        for path in sorted((root / folder).rglob("*.[ch]")):
+            text = path.read_text(encoding="utf-8", errors="replace")
+            for name, heading in re.findall(r'(docs/[\w/-]+\.md)(?:,[\s*]+"([^"\\]+)")?', text):
+                where = path.relative_to(root)
+                if not (root / name).is_file():
+                    yield f"{where}: {name} is not there"
+                elif heading and slug(heading) not in anchors(root / name):
+                    yield f"{where}: {name} has no heading {heading}"
+
+
 def lost_pages():
     """Pages that nobody comes to from the README."""
     reached = set()
@@ -182,6 +195,7 @@ def ode_flags():
 point([] if len(pages) > 20 else [f"{len(pages)} found"], "there are pages")
 point(list(bad_links()), "links lead somewhere")
 point(list(bad_paths()), "files that are named are there")
+point(list(bad_pages_in_code()), "pages that the code names are there")
 point(lost_pages(), "every page is reached from the README")
 ode = ode_flags()
 if ode is None:

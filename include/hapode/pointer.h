@@ -56,14 +56,15 @@ typedef struct hap_pointer_def {
   double damping; /* N s/m, 0..1e6, default 0: d of eq. 7, acts in contact; shared likewise */
   /* 0..10, default 0: Coulomb friction against what the pointer touches, sticking and sliding.
    * hap_ode_def.pointer_surface gives another value for a geom. Each point of a hull that touches
-   * has its own share, so that a face also holds against turning (docs/numerics.md). */
+   * has its own share, so that a face also holds against turning
+   * (docs/decisions/friction.md). */
   double friction;
   /* m, 0..100, default 0: off. Radius of a soft finger. It holds what it touches against turning
    * about the contact's normal, by up to friction x normal force x this radius: 2/3 of the
    * radius of a patch with even pressure. Sliding and turning share one limit
-   * (docs/numerics.md). Needs friction. A pointer on a device of 3 degrees of freedom does not
-   * turn itself. Others turn with the device, whose torque is about the pointer's centre. Of a
-   * hull it is the radius at each of its points, beside the arms that these have. */
+   * (docs/decisions/friction.md). Needs friction. A pointer on a device of 3 degrees of freedom
+   * does not turn itself. Others turn with the device, whose torque is about the pointer's centre.
+   * Of a hull it is the radius at each of its points, beside the arms that these have. */
   double finger_radius;
 
   double max_force; /* N at the device, 1e-6..1e6, default 20; the device's own holds as well */
@@ -125,9 +126,10 @@ typedef enum hap_coupling {
    * other models than CONTACT. */
   HAP_COUPLING_AUTO = 2,
 
-  /* The two of the literature, to compare with (docs/numerics.md). Their contacts do not give: the
-   * pointer does not enter bodies. Stiffness, damping and integration have no part in them. The
-   * spring to the device is that of PROXY, and they are in force where PROXY is. */
+  /* The two of the literature, to compare with (docs/decisions/literature-couplings.md). Their
+   * contacts do not give: the pointer does not enter bodies. Stiffness, damping and integration
+   * have no part in them. The spring to the device is that of PROXY, and they are in force where
+   * PROXY is. */
 
   /* Constraint-based: the pointer has no mass. It is, of all places outside of the bodies that
    * it can slide to, where the spring to the device is shortest (Zilles and Salisbury 1995;

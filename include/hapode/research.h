@@ -77,7 +77,7 @@ typedef struct hap_pointer_research_def {
    * spring at sqrt(coupling_stiffness / virtual_mass) */
   double virtual_mass;
   /* kg m^2, 0..1e12: of the same tool's hull about every axis through the pointer's origin. 0
-   * (default): of a ball of that mass as large as the hull (docs/numerics.md) */
+   * (default): of a ball of that mass as large as the hull (docs/decisions/proxy.md) */
   double virtual_inertia;
 } hap_pointer_research_def;
 
