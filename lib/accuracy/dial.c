@@ -97,8 +97,9 @@ static void dial_follow_wishes(hapi_dial *dial)
   dial->asked = dial->aim = asked;
 }
 
-/* One step at a time, and the window after a turn is left out: in it things come to where they are under the new
- * settings. Those that come then begin where the session is, not with what the old settings have added up. */
+/* One step at a time, and the window after a turn is left out: in it things come to where they
+ * are under the new settings. Those that come then begin where the session is, not with what the
+ * old settings have added up. */
 bool hapi_dial_note_error(hapi_dial *dial, double error, double seconds, bool turns)
 {
   double wanted = atomic_load(&dial->force_error);

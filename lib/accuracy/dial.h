@@ -67,8 +67,8 @@ void hapi_dial_enter(hapi_dial *dial, const hapi_settings *settings, dWorldID wo
 void hapi_dial_leave(const hapi_dial *dial, dWorldID world);
 /* A cycle has taken so long, with the share of it that went into looking back. */
 void hapi_dial_note(hapi_dial *dial, double seconds, double looked_s);
-/* Looking back says that over so long the force was wrong by this share. turns: false in a replay. True:
- * what comes now must not be compared with what was before. */
+/* Looking back says that over so long the force was wrong by this share. turns: false in a
+ * replay. True: what comes now must not be compared with what was before. */
 bool hapi_dial_note_error(hapi_dial *dial, double error, double seconds, bool turns);
 /* s, that the budget leaves for looking back in a cycle of this period. */
 double hapi_dial_spare(const hapi_dial *dial, double period_s);

@@ -4,9 +4,9 @@
 
 #include <hapode/expert.h>
 
-/* The order in which accuracy is given up, and in which it is bought. Measured by hapode-bench accuracy over
- * all scenes (docs/accuracy.md): first goes what costs most for what it adds to the force, last what the
- * force cannot do without. */
+/* The order in which accuracy is given up, and in which it is bought. Measured by hapode-bench
+ * accuracy over all scenes (docs/accuracy.md): first goes what costs most for what it adds to
+ * the force, last what the force cannot do without. */
 
 /* A row holds from its position on up to the next one's. */
 typedef struct tick_row {
@@ -17,10 +17,11 @@ typedef struct tick_row {
   bool shapes;
 } tick_row;
 
-/* What one tick leaves undone the next one goes on with, so what a solve may spend goes first; a bound on its row
- * updates costs less of the force than one on its sweeps, which stops small islands that would soon be solved.
- * Contacts that are found late are felt where things come to new ground. A shorter range is wrong where bodies
- * carry each other, a plane instead of a shape where they roll: the last resort of a budget. */
+/* What one tick leaves undone the next one goes on with, so what a solve may spend goes first; a
+ * bound on its row updates costs less of the force than one on its sweeps, which stops small
+ * islands that would soon be solved. Contacts that are found late are felt where things come to
+ * new ground. A shorter range is wrong where bodies carry each other, a plane instead of a shape
+ * where they roll: the last resort of a budget. */
 static const tick_row tick_rows[] = {
     {0, 50.0, 300, 1, false},
     {10, 50.0, 300, 4, true},
@@ -41,7 +42,8 @@ typedef struct physics_row {
   double reuse;      /* m */
 } physics_row;
 
-/* Iterations last: a world that is solved too badly pushes on the loop with forces that are not there. */
+/* Iterations last: a world that is solved too badly pushes on the loop with forces that are not
+ * there. */
 static const physics_row physics_rows[] = {
     {0, HAP_PROBE_SHARED, 0, 0.5, 1e-4},      {10, HAP_PROBE_SHARED, 1, 0.5, 1e-4},
     {20, HAP_PROBE_SHARED, 1, 0.75, 1e-5},    {30, HAP_PROBE_SHARED, 2, 1.0, 1e-5},
@@ -51,8 +53,8 @@ static const physics_row physics_rows[] = {
     {100, HAP_PROBE_OPERATING, 64, 4.0, 0.0},
 };
 
-/* A row update takes about this on a slow processor. No solve may run past its tick on account of the
- * rows alone; where it is slower still, a budget turns the dial. */
+/* A row update takes about this on a slow processor. No solve may run past its tick on account
+ * of the rows alone; where it is slower still, a budget turns the dial. */
 #define UPDATE_S 12e-9
 #define TICK_SHARE 0.8
 

@@ -3,8 +3,9 @@
 #ifndef HAPODE_ACCURACY_DIAL_SETTINGS_H
 #define HAPODE_ACCURACY_DIAL_SETTINGS_H
 
-/* What the dials come to: a table from the positions of the tick's and of the physics thread's dial to the
- * single settings. Positions are in percent, so that one fits into a byte of a recording. */
+/* What the dials come to: a table from the positions of the tick's and of the physics thread's
+ * dial to the single settings. Positions are in percent, so that one fits into a byte of a
+ * recording. */
 
 #include "world/settings.h"
 

@@ -8,8 +8,8 @@
 #include "base/vec.h"
 #include "research/range_error.h"
 
-/* What the effects of the newest model came to, and why: counted from the model itself, as it goes to the
- * loop. */
+/* What the effects of the newest model came to, and why: counted from the model itself, as it
+ * goes to the loop. */
 
 /* A look at a model. */
 typedef struct sight {
@@ -20,27 +20,27 @@ typedef struct sight {
   const hapi_answers *answers;
 } sight;
 
-static hapi_effect_figures *figures(const sight *s, hap_effect effect)
+static hapi_effect_figures *sight_figures(const sight *s, hap_effect effect)
 {
   return &s->figures[effect];
 }
 
-static bool far(const hapi_model *model)
+static bool model_is_far(const hapi_model *model)
 {
   return model->body_count == 0 && model->touches == 0;
 }
 
-static void sum_up(const sight *s, hap_effect effect, hap_effect_reason none)
+static void effect_sum_up(const sight *s, hap_effect effect, hap_effect_reason none)
 {
-  hapi_effect_sum_up(figures(s, effect), hapi_wish(s->cycle->wishes, effect), none);
+  hapi_effect_sum_up(sight_figures(s, effect), hapi_wish(s->cycle->wishes, effect), none);
 }
 
-static uint32_t roles(const hapi_model_body *body)
+static uint32_t body_roles(const hapi_model_body *body)
 {
   return body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_OWNED | HAPI_BODY_MEASURED);
 }
 
-static bool asleep(const hapi_model_body *body)
+static bool body_is_asleep(const hapi_model_body *body)
 {
   return (body->flags & HAPI_BODY_RESTING) != 0;
 }
@@ -48,7 +48,7 @@ static bool asleep(const hapi_model_body *body)
 /* ---- of bodies ---- */
 
 /* Why a body that could turn gyroscopically does not; CALLED: it does. */
-static hap_effect_reason gyro_of(const sight *s, const hapi_model_body *in)
+static hap_effect_reason body_gyro(const sight *s, const hapi_model_body *in)
 {
   dBodyID body = s->bodies->entries[s->near->slots.bodies[in->slot].known].body;
   if (dBodyGetGyroscopicMode(body) == 0) {
@@ -59,17 +59,17 @@ static hap_effect_reason gyro_of(const sight *s, const hapi_model_body *in)
   }
   return in->max_angular_speed == 0.0                         ? HAP_REASON_LOCKED
          : hapi_turns_alike(in->inertia)                      ? HAP_REASON_SYMMETRIC
-         : asleep(in)                                         ? HAP_REASON_ASLEEP
+         : body_is_asleep(in)                                 ? HAP_REASON_ASLEEP
          : hapi_v3_norm(in->twist.angular) <= HAPI_SPIN_LEAST ? HAP_REASON_STILL
                                                               : HAP_REASON_CALLED;
 }
 
 static void note_gyro(const sight *s, const hapi_model_body *body)
 {
-  hap_effect_reason why = gyro_of(s, body);
+  hap_effect_reason why = body_gyro(s, body);
   bool off = hapi_wish_is_off(s->cycle->wishes, HAP_EFFECT_GYRO);
   if ((body->flags & HAPI_BODY_OWNED) != 0) {
-    hapi_effect_note(figures(s, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !off, why);
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !off, why);
   }
 }
 
@@ -78,8 +78,8 @@ static void note_testing(const sight *s, const hapi_model_body *body)
 {
   bool measured = (body->flags & HAPI_BODY_MEASURED) != 0;
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
-  if (roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(figures(s, HAP_EFFECT_TESTING),
+  if (body_roles(body) != HAPI_BODY_DRIVEN) {
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_TESTING),
                      measured || (owned && hapi_range_error_wanted(s->cycle)),
                      owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
   }
@@ -89,8 +89,8 @@ static void note_range(const sight *s, const hapi_model_body *body)
 {
   uint32_t known = s->near->slots.bodies[body->slot].known;
   bool seed = hapi_nearby_chose(s->near, known, s->cycle->model_number);
-  if (!seed && roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(figures(s, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
+  if (!seed && body_roles(body) != HAPI_BODY_DRIVEN) {
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
                      HAP_REASON_OUTSIDE);
   }
 }
@@ -100,9 +100,9 @@ static void note_contacts(const sight *s, const hapi_model_body *body)
 {
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
   bool linked = owned && (body->flags & HAPI_BODY_ALONE) == 0;
-  if (roles(body) != HAPI_BODY_DRIVEN) {
+  if (body_roles(body) != HAPI_BODY_DRIVEN) {
     hap_effect_reason why = owned ? HAP_REASON_ALONE : HAP_REASON_OUTSIDE;
-    hapi_effect_note(figures(s, HAP_EFFECT_CONTACTS), linked, why);
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_CONTACTS), linked, why);
   }
 }
 
@@ -125,10 +125,10 @@ static void note_touches(const sight *s, hapi_model *model)
   bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     const hapi_contact_slot *slot = &s->near->slots.contacts[contacts[i].slot];
-    hapi_effect_note(figures(s, HAP_EFFECT_FRICTION), contacts[i].mu > 0.0 || asked,
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_FRICTION), contacts[i].mu > 0.0 || asked,
                      HAP_REASON_NO_FRICTION);
     if (model->model == HAP_MODEL_CONTACT && contacts[i].tool == 0) {
-      hapi_effect_note(figures(s, HAP_EFFECT_SHAPE), contacts[i].has_shape != 0,
+      hapi_effect_note(sight_figures(s, HAP_EFFECT_SHAPE), contacts[i].has_shape != 0,
                        slot->shape_reason);
     }
   }
@@ -139,7 +139,7 @@ static void note_tool_pairs(const sight *s)
   const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(s->near->range.near);
   bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
   for (uint32_t i = 0; i < s->near->range.near->tool_pair_count; ++i) {
-    hapi_effect_note(figures(s, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
                      HAP_REASON_NO_FRICTION);
   }
 }
@@ -147,7 +147,7 @@ static void note_tool_pairs(const sight *s)
 /* The pairs whose bodies all sleep are looked at once, as nothing moves. */
 static void note_passes(const sight *s, const hapi_model *model)
 {
-  hapi_effect_figures *f = figures(s, HAP_EFFECT_PASSES);
+  hapi_effect_figures *f = sight_figures(s, HAP_EFFECT_PASSES);
   const hapi_near *near = s->near->range.near;
   uint32_t pairs = near->pair_count + near->tool_pair_count;
   hap_effect_wish wish = hapi_wish(s->cycle->wishes, HAP_EFFECT_PASSES);
@@ -155,12 +155,12 @@ static void note_passes(const sight *s, const hapi_model *model)
   f->on = on ? pairs : 0;
   f->of = pairs;
   f->reason = HAP_REASON_ALONE;
-  hapi_effect_sum_up(f, wish, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
+  hapi_effect_sum_up(f, wish, model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
 }
 
 static void note_joints(const sight *s, hapi_model *model)
 {
-  hapi_effect_figures *f = figures(s, HAP_EFFECT_JOINTS);
+  hapi_effect_figures *f = sight_figures(s, HAP_EFFECT_JOINTS);
   const hapi_model_body *bodies = hapi_model_bodies(model);
   f->on = f->of = model->joint_count;
   for (uint32_t i = 0; i < model->body_count; ++i) {
@@ -170,25 +170,26 @@ static void note_joints(const sight *s, hapi_model *model)
       f->reason = HAP_REASON_OUTSIDE;
     }
   }
-  sum_up(s, HAP_EFFECT_JOINTS, far(model) ? HAP_REASON_FAR : HAP_REASON_FREE);
+  effect_sum_up(s, HAP_EFFECT_JOINTS, model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_FREE);
 }
 
 static void note_restitution(const sight *s, const hapi_model *model)
 {
-  hapi_effect_figures *f = figures(s, HAP_EFFECT_RESTITUTION);
+  hapi_effect_figures *f = sight_figures(s, HAP_EFFECT_RESTITUTION);
   f->on = f->of = model->bounces;
   bool nothing = s->near->range.near->pair_count + model->joint_count == 0;
-  sum_up(s, HAP_EFFECT_RESTITUTION,
-         far(model) ? HAP_REASON_FAR
-         : nothing  ? HAP_REASON_ALONE
-                    : HAP_REASON_NO_BOUNCE);
+  effect_sum_up(s, HAP_EFFECT_RESTITUTION,
+                model_is_far(model) ? HAP_REASON_FAR
+                : nothing           ? HAP_REASON_ALONE
+                                    : HAP_REASON_NO_BOUNCE);
 }
 
 /* ---- the models ---- */
 
-static void set(const sight *s, hap_effect effect, hap_effect_state state, hap_effect_reason reason)
+static void effect_set(const sight *s, hap_effect effect, hap_effect_state state,
+                       hap_effect_reason reason)
 {
-  hapi_effect_figures *f = figures(s, effect);
+  hapi_effect_figures *f = sight_figures(s, effect);
   f->on = f->of = 0;
   f->state = (uint32_t)state;
   f->reason = (uint32_t)reason;
@@ -196,25 +197,25 @@ static void set(const sight *s, hap_effect effect, hap_effect_state state, hap_e
 
 static void note_model_contact(const sight *s, hapi_model *model)
 {
-  hap_effect_reason alone = far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE;
-  hap_effect_reason none = far(model) ? HAP_REASON_FAR : HAP_REASON_OWNED;
+  hap_effect_reason alone = model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE;
+  hap_effect_reason none = model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_OWNED;
   bool tools = s->near->range.near->tool_pair_count > 0; /* hulls, which have points instead */
   note_bodies(s, model);
   note_tool_pairs(s);
   note_passes(s, model);
   note_joints(s, model);
   note_restitution(s, model);
-  sum_up(s, HAP_EFFECT_TESTING, none);
-  sum_up(s, HAP_EFFECT_CONTACTS, alone);
-  sum_up(s, HAP_EFFECT_RANGE, alone);
-  sum_up(s, HAP_EFFECT_GYRO, alone);
-  sum_up(s, HAP_EFFECT_SHAPE, tools ? HAP_REASON_NO_CLOSED_FORM : HAP_REASON_FAR);
+  effect_sum_up(s, HAP_EFFECT_TESTING, none);
+  effect_sum_up(s, HAP_EFFECT_CONTACTS, alone);
+  effect_sum_up(s, HAP_EFFECT_RANGE, alone);
+  effect_sum_up(s, HAP_EFFECT_GYRO, alone);
+  effect_sum_up(s, HAP_EFFECT_SHAPE, tools ? HAP_REASON_NO_CLOSED_FORM : HAP_REASON_FAR);
 }
 
 static void note_model_accelerance(const sight *s, hapi_model *model)
 {
-  hapi_effect_figures *testing = figures(s, HAP_EFFECT_TESTING);
-  hapi_effect_figures *cross = figures(s, HAP_EFFECT_CROSS);
+  hapi_effect_figures *testing = sight_figures(s, HAP_EFFECT_TESTING);
+  hapi_effect_figures *cross = sight_figures(s, HAP_EFFECT_CROSS);
   const hapi_model_body *bodies = hapi_model_bodies(model);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     if ((bodies[i].flags & HAPI_BODY_DRIVEN) == 0) {
@@ -222,11 +223,11 @@ static void note_model_accelerance(const sight *s, hapi_model *model)
     }
   }
   cross->on = cross->of = model->cross_count;
-  sum_up(s, HAP_EFFECT_TESTING, HAP_REASON_FAR);
+  effect_sum_up(s, HAP_EFFECT_TESTING, HAP_REASON_FAR);
   if (hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_CROSS)) {
-    sum_up(s, HAP_EFFECT_CROSS, far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
+    effect_sum_up(s, HAP_EFFECT_CROSS, model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_ALONE);
   } else {
-    set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_PAPERS);
+    effect_set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_PAPERS);
   }
 }
 
@@ -237,13 +238,13 @@ static void note_others(const sight *s)
                                      HAP_EFFECT_RESTITUTION, HAP_EFFECT_PROXY};
   for (size_t i = 0; s->cycle->model != HAP_MODEL_CONTACT && i < sizeof loops / sizeof loops[0];
        ++i) {
-    set(s, loops[i], HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+    effect_set(s, loops[i], HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
   if (s->cycle->model != HAP_MODEL_ACCELERANCE) {
-    set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+    effect_set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
   if (s->cycle->model == HAP_MODEL_SINGLE || s->cycle->model == HAP_MODEL_IMPULSE) {
-    set(s, HAP_EFFECT_TESTING, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+    effect_set(s, HAP_EFFECT_TESTING, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
   }
 }
 
@@ -259,6 +260,6 @@ void hapi_effects_note(hapi_effect_figures out[HAP_EFFECTS], const hapi_cycle *c
   } else if (cycle->model == HAP_MODEL_ACCELERANCE) {
     note_model_accelerance(&s, model);
   }
-  sum_up(&s, HAP_EFFECT_FRICTION, HAP_REASON_FAR);
+  effect_sum_up(&s, HAP_EFFECT_FRICTION, HAP_REASON_FAR);
   note_others(&s);
 }

@@ -23,7 +23,7 @@
 #define REACHES 18      /* 0.5 m to 1 mm */
 #define DEAR 2.0        /* times the budget, for one step */
 
-static bool asked_for(const hapi_cycle *cycle)
+static bool lookback_is_wanted(const hapi_cycle *cycle)
 {
   return cycle->config->lookback_share > 0.0 && cycle->model != HAP_MODEL_SINGLE;
 }
@@ -64,7 +64,7 @@ void hapi_lookback_finish(hapi_lookback *w)
 
 /* ---- what is near ---- */
 
-static bool has(const hapi_lookback *w, uint32_t known)
+static bool window_has(const hapi_lookback *w, uint32_t known)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     if (w->bodies.list[i].known == known) {
@@ -74,7 +74,7 @@ static bool has(const hapi_lookback *w, uint32_t known)
   return false;
 }
 
-static uint64_t key_of(dGeomID a, dGeomID b)
+static uint64_t pair_key(dGeomID a, dGeomID b)
 {
   uint64_t x = hapi_index_address(a);
   uint64_t y = hapi_index_address(b);
@@ -89,10 +89,11 @@ void hapi_lookback_ask(hapi_lookback *w, const hapi_body_table *bodies, dGeomID 
   }
   uint32_t body_a = hapi_bodies_find(bodies, dGeomGetBody(a));
   uint32_t body_b = hapi_bodies_find(bodies, dGeomGetBody(b));
-  if (!(body_a != HAPI_NONE && has(w, body_a)) && !(body_b != HAPI_NONE && has(w, body_b))) {
+  if (!(body_a != HAPI_NONE && window_has(w, body_a)) &&
+      !(body_b != HAPI_NONE && window_has(w, body_b))) {
     return;
   }
-  uint32_t at = hapi_index_get(&w->pairs.index, key_of(a, b));
+  uint32_t at = hapi_index_get(&w->pairs.index, pair_key(a, b));
   if (at == HAPI_INDEX_NONE) {
     if (!hapi_reserve((void **)&w->pairs.list, &w->pairs.capacity, w->pairs.count, 1,
                       sizeof *w->pairs.list) ||
@@ -101,7 +102,7 @@ void hapi_lookback_ask(hapi_lookback *w, const hapi_body_table *bodies, dGeomID 
       return;
     }
     at = w->pairs.count++;
-    hapi_index_put(&w->pairs.index, key_of(a, b), at);
+    hapi_index_put(&w->pairs.index, pair_key(a, b), at);
   }
   w->pairs.list[at] = (hapi_lookback_pair){.a = a, .b = b, .surface = *surface};
   w->pairs.list[at].surface.mode &=
@@ -124,7 +125,7 @@ void hapi_lookback_forget_geom(hapi_lookback *w, dGeomID geom)
 }
 
 /* The pair's place; HAPI_NONE: none left. */
-static uint32_t place_of(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
+static uint32_t touch_place(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
 {
   uint32_t free = HAPI_NONE;
   for (uint32_t i = 0; i < w->touches.count; ++i) {
@@ -144,9 +145,9 @@ static uint32_t place_of(hapi_lookback *w, uint32_t most, const hapi_lookback_to
   return free;
 }
 
-static void note_touch(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
+static void window_note_touch(hapi_lookback *w, uint32_t most, const hapi_lookback_touch *touch)
 {
-  uint32_t at = place_of(w, most, touch);
+  uint32_t at = touch_place(w, most, touch);
   if (at == HAPI_NONE) {
     w->spoilt = true;
     return;
@@ -162,7 +163,7 @@ static void note_touch(hapi_lookback *w, uint32_t most, const hapi_lookback_touc
   t->noted = true;
 }
 
-static void note_slots(hapi_lookback *w, const hapi_slots *slots, uint32_t most)
+static void window_note_slots(hapi_lookback *w, const hapi_slots *slots, uint32_t most)
 {
   for (uint32_t i = 0; i < slots->contact_high; ++i) {
     const hapi_contact_slot *slot = &slots->contacts[i];
@@ -172,13 +173,13 @@ static void note_slots(hapi_lookback *w, const hapi_slots *slots, uint32_t most)
                                        .is_tool = slot->is_tool,
                                        .mu = slot->mu};
     if (slot->phase == HAPI_SLOT_LIVE) {
-      note_touch(w, most, &touch);
+      window_note_touch(w, most, &touch);
     }
   }
 }
 
 /* Of model CONTACT, whose points of hulls have no slots. */
-static void note_hits(hapi_lookback *w, const hapi_cycle *cycle, const hapi_neighbors *hood)
+static void window_note_hits(hapi_lookback *w, const hapi_cycle *cycle, const hapi_neighbors *hood)
 {
   uint32_t most = cycle->config->capacity.contacts;
   for (uint32_t i = 0; i < hood->hit_count; ++i) {
@@ -190,7 +191,7 @@ static void note_hits(hapi_lookback *w, const hapi_cycle *cycle, const hapi_neig
                                        .is_tool = true,
                                        .mu = hit->mu};
     if (hit->tool_count > 0) {
-      note_touch(w, most, &touch);
+      window_note_touch(w, most, &touch);
     }
   }
 }
@@ -201,15 +202,15 @@ void hapi_lookback_note(hapi_lookback *w, const hapi_cycle *cycle, const hapi_sl
   if (w->phase != HAPI_LOOKBACK_OPEN) {
     return;
   }
-  note_slots(w, slots, cycle->config->capacity.contacts);
+  window_note_slots(w, slots, cycle->config->capacity.contacts);
   if (cycle->model == HAP_MODEL_CONTACT) {
-    note_hits(w, cycle, neighbors);
+    window_note_hits(w, cycle, neighbors);
   }
 }
 
 /* The place of the pair whose contact the spring is of; HAPI_NONE: none that is near. */
-static uint32_t touch_of(const hapi_lookback *w, const hapi_slots *slots,
-                         const hapi_state_spring *spring)
+static uint32_t spring_touch(const hapi_lookback *w, const hapi_slots *slots,
+                             const hapi_state_spring *spring)
 {
   const hapi_contact_slot *slot =
       spring->slot != HAPI_SLOT_NONE ? &slots->contacts[spring->slot] : NULL;
@@ -225,7 +226,7 @@ static uint32_t touch_of(const hapi_lookback *w, const hapi_slots *slots,
   return HAPI_NONE;
 }
 
-static void take_springs(hapi_lookback *w, const hapi_cycle *cycle, const hapi_slots *slots)
+static void window_take_springs(hapi_lookback *w, const hapi_cycle *cycle, const hapi_slots *slots)
 {
   const hapi_state_spring *in = hapi_state_springs(cycle->state);
   w->springs.count = 0;
@@ -235,7 +236,7 @@ static void take_springs(hapi_lookback *w, const hapi_cycle *cycle, const hapi_s
     return;
   }
   for (uint32_t i = 0; i < cycle->state->spring_count; ++i) {
-    uint32_t touch = touch_of(w, slots, &in[i]);
+    uint32_t touch = spring_touch(w, slots, &in[i]);
     if (touch != HAPI_NONE && hapi_finite(in[i].stretch_body, 3) && hapi_finite(&in[i].turn, 1)) {
       w->springs.list[w->springs.count++] = (hapi_lookback_spring){.touch = touch, .in = in[i]};
     }
@@ -244,7 +245,7 @@ static void take_springs(hapi_lookback *w, const hapi_cycle *cycle, const hapi_s
 
 /* ---- opening ---- */
 
-static bool add_body(hapi_lookback *w, const hapi_body_table *bodies, uint32_t known)
+static bool window_add_body(hapi_lookback *w, const hapi_body_table *bodies, uint32_t known)
 {
   HAPI_ASSERT_INDEX(known, bodies->high);
   const hapi_known_body *entry = &bodies->entries[known];
@@ -263,7 +264,7 @@ static bool add_body(hapi_lookback *w, const hapi_body_table *bodies, uint32_t k
 }
 
 /* m, from the nearest pointer's surface to the body's */
-static double apart(const hapi_cycle *cycle, const hapi_known_body *known)
+static double body_apart(const hapi_cycle *cycle, const hapi_known_body *known)
 {
   const hapi_state_pointer *pointers = hapi_state_pointers(cycle->state);
   double least = HUGE_VAL;
@@ -278,7 +279,8 @@ static double apart(const hapi_cycle *cycle, const hapi_known_body *known)
 }
 
 /* Within a distance that takes no more than there is room for. */
-static bool add_near(hapi_lookback *w, const hapi_cycle *cycle, const hapi_body_table *bodies)
+static bool window_add_near(hapi_lookback *w, const hapi_cycle *cycle,
+                            const hapi_body_table *bodies)
 {
   double reach = NEAR_M;
   for (int i = 0; i < REACHES; ++i, reach *= 0.7) {
@@ -287,8 +289,8 @@ static bool add_near(hapi_lookback *w, const hapi_cycle *cycle, const hapi_body_
     bool good = true;
     for (uint32_t k = 0; k < bodies->high && count <= BODIES_MAX && good; ++k) {
       const hapi_known_body *known = &bodies->entries[k];
-      if (known->body != NULL && apart(cycle, known) < reach) {
-        good = ++count > BODIES_MAX || add_body(w, bodies, k);
+      if (known->body != NULL && body_apart(cycle, known) < reach) {
+        good = ++count > BODIES_MAX || window_add_body(w, bodies, k);
       }
     }
     if (!good || count <= BODIES_MAX) {
@@ -298,7 +300,7 @@ static bool add_near(hapi_lookback *w, const hapi_cycle *cycle, const hapi_body_
   return false;
 }
 
-static bool add_jointed(hapi_lookback *w, const hapi_body_table *bodies)
+static bool window_add_jointed(hapi_lookback *w, const hapi_body_table *bodies)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     dBodyID body = bodies->entries[w->bodies.list[i].known].body;
@@ -307,7 +309,7 @@ static bool add_jointed(hapi_lookback *w, const hapi_body_table *bodies)
       dJointID joint = dBodyGetJoint(body, k);
       for (int side = 0; side < 2 && dJointGetType(joint) != dJointTypeContact; ++side) {
         uint32_t other = hapi_bodies_find(bodies, dJointGetBody(joint, side));
-        if (other != HAPI_NONE && !has(w, other) && !add_body(w, bodies, other)) {
+        if (other != HAPI_NONE && !window_has(w, other) && !window_add_body(w, bodies, other)) {
           return false;
         }
       }
@@ -325,15 +327,16 @@ static int64_t ticks_ns(const hapi_cycle *cycle, double ticks)
 }
 
 /* The loop's newest state is what its tick came to: the one after that goes on from it. */
-static int64_t first_row(const hapi_cycle *cycle, int64_t now_ns)
+static int64_t window_first_row(const hapi_cycle *cycle, int64_t now_ns)
 {
   return cycle->model == HAP_MODEL_IMPULSE ? now_ns - ticks_ns(cycle, 0.5)
                                            : cycle->state->now_ns + ticks_ns(cycle, 0.5);
 }
 
 /* A body of the loop is where the loop has it, any other where the world's step has left it. */
-static void note_times(hapi_lookback *w, const hapi_cycle *cycle, const hapi_body_table *bodies,
-                       const hapi_slots *slots, int64_t now_ns)
+static void window_note_times(hapi_lookback *w, const hapi_cycle *cycle,
+                              const hapi_body_table *bodies, const hapi_slots *slots,
+                              int64_t now_ns)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     uint32_t index = bodies->entries[w->bodies.list[i].known].slot;
@@ -346,7 +349,7 @@ static void note_times(hapi_lookback *w, const hapi_cycle *cycle, const hapi_bod
 }
 
 /* What the last window had is kept beside what this one will have. */
-static void turn_over(hapi_lookback *w)
+static void window_turn_over(hapi_lookback *w)
 {
   hapi_lookback_bodies ended = w->ended;
   w->ended = w->bodies;
@@ -355,7 +358,7 @@ static void turn_over(hapi_lookback *w)
 }
 
 /* Places of pairs that were not near while the last window was open are free again. */
-static void begin_touches(hapi_lookback *w)
+static void window_begin_touches(hapi_lookback *w)
 {
   for (uint32_t i = 0; i < w->touches.count; ++i) {
     if (!w->touches.list[i].noted) {
@@ -370,36 +373,36 @@ void hapi_lookback_open(hapi_lookback *w, const hapi_cycle *cycle, const hapi_wo
 {
   const hapi_body_table *bodies = &world->bodies;
   double physics_hz = cycle->config->physics_hz;
-  if (!asked_for(cycle) || w->phase != HAPI_LOOKBACK_IDLE || cycle->state == NULL) {
+  if (!lookback_is_wanted(cycle) || w->phase != HAPI_LOOKBACK_IDLE || cycle->state == NULL) {
     return;
   }
   double most = fmax(WINDOW_S, WINDOW_STEPS / physics_hz);
   w->seconds = w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics_hz;
-  turn_over(w);
-  begin_touches(w);
+  window_turn_over(w);
+  window_begin_touches(w);
   memset(w->hand.hull_of, 0, sizeof w->hand.hull_of);
   w->pairs.count = w->rows.count = w->rows.next = w->sums.touched = 0;
   w->rows.pointers = cycle->config->capacity.pointers;
   hapi_index_clear(&w->pairs.index);
   w->sums.wrong2 = w->sums.right2 = w->spent_s = 0.0;
-  w->from_ns = first_row(cycle, now_ns);
+  w->from_ns = window_first_row(cycle, now_ns);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
   w->spoilt = !hapi_lookback_hand_ready(&w->hand, &cycle->config->capacity) ||
-              !add_near(w, cycle, bodies) || !add_jointed(w, bodies) ||
+              !window_add_near(w, cycle, bodies) || !window_add_jointed(w, bodies) ||
               !hapi_reserve((void **)&w->bodies.states, &w->bodies.state_capacity, 0,
                             w->bodies.count, sizeof *w->bodies.states);
   if (!w->spoilt) {
     hapi_lookback_keep(w, bodies);
-    note_times(w, cycle, bodies, slots, now_ns);
+    window_note_times(w, cycle, bodies, slots, now_ns);
   }
   w->phase = HAPI_LOOKBACK_OPEN;
   hapi_lookback_note(w, cycle, slots, neighbors);
-  take_springs(w, cycle, slots);
+  window_take_springs(w, cycle, slots);
 }
 
 /* ---- while it is open ---- */
 
-static void set_lags(hapi_lookback *w, int64_t first_ns)
+static void window_set_lags(hapi_lookback *w, int64_t first_ns)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     w->bodies.list[i].lag_ns += first_ns;
@@ -407,8 +410,8 @@ static void set_lags(hapi_lookback *w, int64_t first_ns)
 }
 
 /* False: what it would feel is not reckoned here. */
-static bool take_kind(hapi_lookback *w, const hapi_cycle *cycle, uint32_t index,
-                      const hapi_path_pointer *in)
+static bool window_takes_kind(hapi_lookback *w, const hapi_cycle *cycle, uint32_t index,
+                              const hapi_path_pointer *in)
 {
   bool pushes = hapi_v3_dot(in->wrench.force, in->wrench.force) > 0.0;
   return in->generation == 0 || (!(in->rigid != 0 && pushes) &&
@@ -416,8 +419,8 @@ static bool take_kind(hapi_lookback *w, const hapi_cycle *cycle, uint32_t index,
                                                           &w->hand, cycle, index, in->generation)));
 }
 
-static void take_row(hapi_lookback *w, const hapi_cycle *cycle, int64_t time_ns,
-                     const hapi_path_pointer *pointers)
+static void window_take_row(hapi_lookback *w, const hapi_cycle *cycle, int64_t time_ns,
+                            const hapi_path_pointer *pointers)
 {
   uint32_t count = w->rows.pointers;
   if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt || time_ns < w->from_ns) {
@@ -431,30 +434,30 @@ static void take_row(hapi_lookback *w, const hapi_cycle *cycle, int64_t time_ns,
     return;
   }
   if (w->rows.count == 0) {
-    set_lags(w, time_ns);
+    window_set_lags(w, time_ns);
   }
   for (uint32_t i = 0; i < count; ++i) {
-    w->spoilt = w->spoilt || !take_kind(w, cycle, i, &pointers[i]);
+    w->spoilt = w->spoilt || !window_takes_kind(w, cycle, i, &pointers[i]);
   }
   w->rows.times_ns[w->rows.count] = time_ns;
   memcpy(&w->rows.path[w->rows.count * count], pointers, count * sizeof *w->rows.path);
   ++w->rows.count;
 }
 
-static void take_rows(hapi_lookback *w, const hapi_cycle *cycle)
+static void window_take_rows(hapi_lookback *w, const hapi_cycle *cycle)
 {
   hapi_path *path = hapi_exchange_path(cycle->config->exchange);
   int64_t time_ns;
   const hapi_path_pointer *pointers;
   while (hapi_path_look(path, &time_ns, &pointers)) {
-    take_row(w, cycle, time_ns, pointers);
+    window_take_row(w, cycle, time_ns, pointers);
     hapi_path_let_go(path);
   }
 }
 
 /* All bodies are those that they were, and nobody else has moved one. */
-static bool still_there(const hapi_lookback *w, const hapi_body_table *bodies,
-                        const hapi_slots *slots)
+static bool window_is_still_there(const hapi_lookback *w, const hapi_body_table *bodies,
+                                  const hapi_slots *slots)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     const hapi_known_body *known = &bodies->entries[w->bodies.list[i].known];
@@ -474,7 +477,7 @@ static bool still_there(const hapi_lookback *w, const hapi_body_table *bodies,
 /* ---- what comes out ---- */
 
 /* The next window may go on where this one's reference has ended. */
-static void link_up(hapi_lookback *w, const hapi_cycle *cycle)
+static void window_link_up(hapi_lookback *w, const hapi_cycle *cycle)
 {
   w->chain_s += 1e-9 * (double)(w->to_ns - w->from_ns);
   if (w->rows.count > 0 && w->chain_s < CHAIN_S) {
@@ -483,7 +486,7 @@ static void link_up(hapi_lookback *w, const hapi_cycle *cycle)
 }
 
 /* True: *out is what the window says. */
-static bool end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_verdict *out)
+static bool window_end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_verdict *out)
 {
   hapi_lookback_sums *sums = &w->sums;
   w->phase = HAPI_LOOKBACK_IDLE;
@@ -492,7 +495,7 @@ static bool end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_verdict
     ++w->counts.spoilt;
     return false;
   }
-  link_up(w, cycle);
+  window_link_up(w, cycle);
   double keep = exp(-1e-9 * (double)(w->to_ns - w->from_ns) / MEMORY_S);
   ++w->counts.windows;
   if (sums->touched == 0) {
@@ -509,17 +512,18 @@ static bool end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_verdict
 }
 
 /* s, for this cycle's share; negative: as long as it takes. */
-static double budget(const hapi_physics_config *config, double spare_s)
+static double window_budget(const hapi_physics_config *config, double spare_s)
 {
   return config->lockstep ? -1.0 : fmin(config->lookback_share / config->physics_hz, spare_s);
 }
 
-/* A world in which one step takes all of the time that there is: the figure would be long out of date,
- * and physics late. The next windows make do with less. */
-static bool too_dear(hapi_lookback *w, const hapi_physics_config *config, double spare_s)
+/* A world in which one step takes all of the time that there is: the figure would be long out of
+ * date, and physics late. The next windows make do with less. */
+static bool window_is_too_costly(hapi_lookback *w, const hapi_physics_config *config,
+                                 double spare_s)
 {
   bool dear = !config->lockstep && w->rows.next > 0 &&
-              w->spent_s > DEAR * budget(config, spare_s) * (double)w->rows.next;
+              w->spent_s > DEAR * window_budget(config, spare_s) * (double)w->rows.next;
   w->lean = w->lean || dear;
   return dear;
 }
@@ -531,19 +535,20 @@ bool hapi_lookback_follow(hapi_lookback *w, const hapi_cycle *cycle, const hapi_
   if (cycle->config->lookback_share <= 0.0) {
     return false;
   }
-  take_rows(w, cycle);
+  window_take_rows(w, cycle);
   if (w->phase == HAPI_LOOKBACK_IDLE) {
     return false;
   }
-  w->spoilt = w->spoilt || !asked_for(cycle) || !still_there(w, &world->bodies, slots);
+  w->spoilt =
+      w->spoilt || !lookback_is_wanted(cycle) || !window_is_still_there(w, &world->bodies, slots);
   if (w->phase == HAPI_LOOKBACK_OPEN && time->now_ns >= w->to_ns) {
     w->phase = HAPI_LOOKBACK_GOING;
   }
   if (w->phase == HAPI_LOOKBACK_GOING && !w->spoilt) {
-    double seconds = budget(cycle->config, time->spare_s);
+    double seconds = window_budget(cycle->config, time->spare_s);
     w->spoilt = hapi_lookback_run(w, cycle, world, time->own_iterations, seconds) < HAP_OK ||
-                too_dear(w, cycle->config, time->spare_s);
+                window_is_too_costly(w, cycle->config, time->spare_s);
   }
   return w->phase == HAPI_LOOKBACK_GOING && (w->spoilt || w->rows.next >= w->rows.count) &&
-         end(w, cycle, out);
+         window_end(w, cycle, out);
 }

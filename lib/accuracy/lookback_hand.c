@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "accuracy/lookback.h"
+#include "accuracy/lookback_window.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,9 +16,9 @@
 #include "tick/tick.h"
 #include "world/world.h"
 
-/* The hands of a window: a tick of the loop in model SINGLE that nobody feels. What of it is near comes as a
- * message of physics, as in a session of that model; so hulls, friction and soft fingers are the loop's own
- * code. */
+/* The hands of a window: a tick of the loop in model SINGLE that nobody feels. What of it is
+ * near comes as a message of physics, as in a session of that model; so hulls, friction and soft
+ * fingers are the loop's own code. */
 
 #define SAME_PLANE_COSINE 0.7 /* as for the contacts of a session */
 
@@ -31,7 +31,7 @@ typedef struct part {
 #define PARTS 12
 
 /* Of all that a tick of model SINGLE uses. */
-static void list_parts(hapi_tick *t, part out[PARTS])
+static void tick_list_parts(hapi_tick *t, part out[PARTS])
 {
   const hapi_capacity *c = &t->capacity;
   size_t tools = (size_t)2 * c->tool_points;
@@ -52,7 +52,7 @@ static void list_parts(hapi_tick *t, part out[PARTS])
   memcpy(out, all, sizeof all);
 }
 
-static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
+static bool hand_create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
 {
   part parts[PARTS];
   bool good = true;
@@ -64,7 +64,7 @@ static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
   hand->tick->capacity = *capacity;
   hand->tick->pointers.high = capacity->pointers;
   hand->tick->touches.tool.capacity = capacity->tool_points;
-  list_parts(hand->tick, parts);
+  tick_list_parts(hand->tick, parts);
   for (int i = 0; i < PARTS; ++i) {
     *parts[i].array = hapi_alloc_array(parts[i].count, parts[i].size);
     good = good && *parts[i].array != NULL;
@@ -72,7 +72,7 @@ static bool create_tick(hapi_lookback_hand *hand, const hapi_capacity *capacity)
   return good;
 }
 
-static bool create_model(hapi_lookback_hand *hand, const hapi_capacity *c)
+static bool hand_create_model(hapi_lookback_hand *hand, const hapi_capacity *c)
 {
   size_t bodies = sizeof(hapi_model);
   size_t contacts = bodies + c->bodies * sizeof(hapi_model_body);
@@ -94,7 +94,7 @@ void hapi_lookback_hand_finish(hapi_lookback_hand *hand)
 {
   part parts[PARTS];
   if (hand->tick != NULL) {
-    list_parts(hand->tick, parts);
+    tick_list_parts(hand->tick, parts);
     for (int i = 0; i < PARTS; ++i) {
       hapi_free(*parts[i].array);
     }
@@ -117,8 +117,8 @@ bool hapi_lookback_hand_ready(hapi_lookback_hand *hand, const hapi_capacity *all
   }
   hand->found = hapi_alloc_array(HAPI_TOOL_SPOTS, sizeof *hand->found);
   hand->told = hapi_alloc_array(capacity.pointers, sizeof *hand->told);
-  hand->ready = hand->found != NULL && hand->told != NULL && create_tick(hand, &capacity) &&
-                create_model(hand, &capacity);
+  hand->ready = hand->found != NULL && hand->told != NULL && hand_create_tick(hand, &capacity) &&
+                hand_create_model(hand, &capacity);
   if (!hand->ready) {
     hapi_lookback_hand_finish(hand);
     return false;
@@ -131,7 +131,7 @@ void hapi_lookback_hand_begin(hapi_lookback_hand *hand)
 {
   hapi_tick *t = hand->tick;
   part parts[PARTS];
-  list_parts(t, parts);
+  tick_list_parts(t, parts);
   for (int i = 0; i < PARTS - 1; ++i) { /* the hulls stay */
     memset(*parts[i].array, 0, parts[i].count * parts[i].size);
   }
@@ -156,15 +156,16 @@ bool hapi_lookback_hand_take_hull(hapi_lookback_hand *hand, const hapi_cycle *cy
 
 /* ---- what is near ---- */
 
-static void blend(const double a[3], const double b[3], double share, double out[3])
+static void vector_blend(const double a[3], const double b[3], double share, double out[3])
 {
   for (int i = 0; i < 3; ++i) {
     out[i] = a[i] + share * (b[i] - a[i]);
   }
 }
 
-/* Where the pointer was then: on the way from a row to the next one, or straight on from the last. */
-static void place_pointer(const hapi_lookback_moment *at, uint32_t index, hapi_pointer *p)
+/* Where the pointer was then: on the way from a row to the next one, or straight on from the
+ * last. */
+static void pointer_place(const hapi_lookback_moment *at, uint32_t index, hapi_pointer *p)
 {
   const hapi_path_pointer *in = &at->row[index];
   const hapi_path_pointer *next = at->next != NULL ? &at->next[index] : NULL;
@@ -172,14 +173,14 @@ static void place_pointer(const hapi_lookback_moment *at, uint32_t index, hapi_p
   p->twist = in->twist;
   if (next != NULL && next->generation == in->generation) {
     hapi_pose_blend(&in->pose, &next->pose, at->share, &p->pose);
-    blend(in->twist.linear, next->twist.linear, at->share, p->twist.linear);
-    blend(in->twist.angular, next->twist.angular, at->share, p->twist.angular);
+    vector_blend(in->twist.linear, next->twist.linear, at->share, p->twist.linear);
+    vector_blend(in->twist.angular, next->twist.angular, at->share, p->twist.angular);
   } else {
     hapi_pose_move(&p->pose, &p->twist, at->later_s);
   }
 }
 
-static double extent_of(const hapi_tool_hull *hull, double radius)
+static double hull_extent(const hapi_tool_hull *hull, double radius)
 {
   double farthest = 0.0;
   for (uint32_t i = 0; i < hull->count; ++i) {
@@ -188,7 +189,7 @@ static double extent_of(const hapi_tool_hull *hull, double radius)
   return farthest + radius;
 }
 
-static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
+static void hand_take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
 {
   for (uint32_t i = 0; i < t->capacity.pointers; ++i) {
     const hapi_path_pointer *in = &at->row[i];
@@ -197,7 +198,7 @@ static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
       memset(p, 0, sizeof *p);
       p->generation = in->generation;
       p->shape.hull = in->is_tool != 0 ? &t->pointers.hulls[i] : NULL;
-      p->shape.extent = p->shape.hull != NULL ? extent_of(p->shape.hull, in->radius) : in->radius;
+      p->shape.extent = p->shape.hull != NULL ? hull_extent(p->shape.hull, in->radius) : in->radius;
     }
     p->shape.radius = in->radius;
     p->surface.stiffness = in->stiffness;
@@ -206,14 +207,14 @@ static void take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
     p->device.turns = in->turns != 0;
     p->device.three_dof = in->three_dof != 0;
     if (p->generation != 0) {
-      place_pointer(at, i, p);
+      pointer_place(at, i, p);
     }
   }
 }
 
-/* What physics knows of the pointers when it looks for what is near: those of the tick before, of new ones those
- * of now. */
-static void tell(hapi_lookback_hand *hand)
+/* What physics knows of the pointers when it looks for what is near: those of the tick before,
+ * of new ones those of now. */
+static void hand_tell(hapi_lookback_hand *hand)
 {
   for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
     const hapi_pointer *p = &hand->tick->pointers.of[i];
@@ -228,7 +229,7 @@ static void tell(hapi_lookback_hand *hand)
   }
 }
 
-static bool all_are_told(const hapi_lookback_hand *hand)
+static bool hand_all_are_told(const hapi_lookback_hand *hand)
 {
   for (uint32_t i = 0; i < hand->tick->capacity.pointers; ++i) {
     if (hand->told[i].generation != hand->tick->pointers.of[i].generation) {
@@ -238,7 +239,8 @@ static bool all_are_told(const hapi_lookback_hand *hand)
   return true;
 }
 
-/* Its place among the window's bodies; HAPI_SLOT_NONE: the static world. False: one that is not among them. */
+/* Its place among the window's bodies; HAPI_SLOT_NONE: the static world. False: one that is not
+ * among them. */
 static bool geom_body(const hapi_test_set *test, dGeomID geom, uint32_t *out)
 {
   dBodyID body = dGeomGetBody(geom);
@@ -248,8 +250,8 @@ static bool geom_body(const hapi_test_set *test, dGeomID geom, uint32_t *out)
   return found || body == NULL;
 }
 
-static hapi_model_contact *add_contact(hapi_lookback *w, const hapi_lookback_touch *t,
-                                       uint32_t body)
+static hapi_model_contact *model_add_contact(hapi_lookback *w, const hapi_lookback_touch *t,
+                                             uint32_t body)
 {
   hapi_model *m = w->hand.model;
   hapi_model_contact *out = &hapi_model_contacts(m)[m->contact_count++];
@@ -263,8 +265,8 @@ static hapi_model_contact *add_contact(hapi_lookback *w, const hapi_lookback_tou
   return out;
 }
 
-static void add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
-                       const hapi_state_pointer *p, double period)
+static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
+                             const hapi_state_pointer *p, double period)
 {
   hapi_nearest at;
   double normal[3];
@@ -283,7 +285,7 @@ static void add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
       t->placed && hapi_v3_dot(normal, t->normal_body) < SAME_PLANE_COSINE; /* another face */
   t->placed = true;
   hapi_v3_copy(normal, t->normal_body);
-  hapi_model_contact *out = add_contact(w, t, body);
+  hapi_model_contact *out = model_add_contact(w, t, body);
   hapi_v3_copy(normal, out->normal_body);
   hapi_v3_copy(at.point_b, out->point_body);
   if (body != HAPI_SLOT_NONE) {
@@ -293,8 +295,8 @@ static void add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
 }
 
 /* False: there are more points than the loop has room for. */
-static bool add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
-                     const hapi_state_pointer *p, double period)
+static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
+                           const hapi_state_pointer *p, double period)
 {
   hapi_lookback_hand *hand = &w->hand;
   hapi_model *m = hand->model;
@@ -318,13 +320,13 @@ static bool add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
     to->mu = t->mu;
     to->at.body_b = body;
     to->at.generation_b = body != HAPI_SLOT_NONE ? 1 : 0;
-    add_contact(w, t, body)->tool = ++m->tool_count;
+    model_add_contact(w, t, body)->tool = ++m->tool_count;
   }
   return true;
 }
 
 /* False: something is touched that the window does not know. */
-static bool add_touches(hapi_lookback *w, double period)
+static bool model_add_touches(hapi_lookback *w, double period)
 {
   const hapi_tick *tick = w->hand.tick;
   for (uint32_t i = 0; i < w->touches.count; ++i) {
@@ -339,15 +341,15 @@ static bool add_touches(hapi_lookback *w, double period)
     }
     const hapi_state_pointer *p = &w->hand.told[t->pointer];
     if (of->shape.hull == NULL) {
-      add_sphere(w, t, body, p, period);
-    } else if (!add_tool(w, t, body, p, period)) {
+      model_add_sphere(w, t, body, p, period);
+    } else if (!model_add_tool(w, t, body, p, period)) {
       return false;
     }
   }
   return true;
 }
 
-static void add_bodies(hapi_lookback *w)
+static void model_add_bodies(hapi_lookback *w)
 {
   hapi_model *m = w->hand.model;
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
@@ -365,14 +367,14 @@ static void add_bodies(hapi_lookback *w)
 
 /* ---- the first tick ---- */
 
-static void resume_ramp(hapi_ramp *ramp, bool *seen)
+static void ramp_resume(hapi_ramp *ramp, bool *seen)
 {
   *seen = true; /* what is deep then was so before */
   ramp->share = 1.0;
   ramp->depth = HUGE_VAL;
 }
 
-static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
+static void spring_resume(hapi_tick *t, const hapi_local_contact *c,
                           const hapi_state_spring *spring)
 {
   double normal[3];
@@ -396,8 +398,8 @@ static void resume_spring(hapi_tick *t, const hapi_local_contact *c,
                        spring->stretch_body, spring->turn);
 }
 
-static bool is_of(const hapi_tick *t, const hapi_local_contact *c,
-                  const hapi_lookback_spring *spring)
+static bool spring_is_of(const hapi_tick *t, const hapi_local_contact *c,
+                         const hapi_lookback_spring *spring)
 {
   return c->tool == 0 ? c->slot == spring->touch
                       : spring->in.slot == HAPI_SLOT_NONE &&
@@ -405,7 +407,8 @@ static bool is_of(const hapi_tick *t, const hapi_local_contact *c,
 }
 
 /* The one that the contact had: of a hull's points the nearest. */
-static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_local_contact *c)
+static const hapi_state_spring *hand_find_spring(const hapi_lookback *w,
+                                                 const hapi_local_contact *c)
 {
   const hapi_tick *t = w->hand.tick;
   const hapi_state_spring *found = NULL;
@@ -413,7 +416,7 @@ static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_l
   for (uint32_t i = 0; i < w->springs.count; ++i) {
     double way[3];
     double far = 0.0;
-    if (!is_of(t, c, &w->springs.list[i])) {
+    if (!spring_is_of(t, c, &w->springs.list[i])) {
       continue;
     }
     if (c->tool != 0) {
@@ -429,29 +432,29 @@ static const hapi_state_spring *find_spring(const hapi_lookback *w, const hapi_l
   return found;
 }
 
-/* The window begins in the midst of what the loop does: nothing comes in slowly, and springs along a surface are as long
- * as they were. */
-static void resume(hapi_lookback *w)
+/* The window begins in the midst of what the loop does: nothing comes in slowly, and springs
+ * along a surface are as long as they were. */
+static void hand_resume(hapi_lookback *w)
 {
   hapi_tick *t = w->hand.tick;
   for (uint32_t i = 0; i < t->touches.tool.pair_count; ++i) {
-    resume_ramp(&t->touches.tool.pairs[i].ramp, &t->touches.tool.pairs[i].seen);
+    ramp_resume(&t->touches.tool.pairs[i].ramp, &t->touches.tool.pairs[i].seen);
   }
   hapi_tool_place(&t->touches, &t->pointers, &t->bodies,
                   t->facts.period); /* says where the points of hulls are */
   for (uint32_t i = 0; i < t->touches.count; ++i) {
     hapi_local_contact *c = &t->touches.of[i];
-    const hapi_state_spring *spring = c->rubs ? find_spring(w, c) : NULL;
-    resume_ramp(&c->ramp, &c->seen);
+    const hapi_state_spring *spring = c->rubs ? hand_find_spring(w, c) : NULL;
+    ramp_resume(&c->ramp, &c->seen);
     if (spring != NULL && (c->tool == 0 || t->touches.tool.tools[c->tool - 1].placed)) {
-      resume_spring(t, c, spring);
+      spring_resume(t, c, spring);
     }
   }
 }
 
 /* ---- the tick ---- */
 
-static void push_bodies(const hapi_lookback *w, double period)
+static void hand_push_bodies(const hapi_lookback *w, double period)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
     hapi_local_body *from = &w->hand.tick->bodies.of[i];
@@ -473,12 +476,12 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
   m->body_count = m->contact_count = m->tool_count = 0;
   m->wishes = hapi_wish_set(wishes, HAP_EFFECT_OBSERVER, HAP_EFFECT_OFF);
   ++m->number;
-  take_pointers(t, at);
-  if (!all_are_told(&w->hand)) {
-    tell(&w->hand);
+  hand_take_pointers(t, at);
+  if (!hand_all_are_told(&w->hand)) {
+    hand_tell(&w->hand);
   }
-  add_bodies(w);
-  if (!add_touches(w, at->period)) {
+  model_add_bodies(w);
+  if (!model_add_touches(w, at->period)) {
     return false;
   }
   t->facts.period = at->period;
@@ -490,13 +493,13 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
     t->bodies.of[i].pushed = false;
   }
   if (!w->hand.begun) {
-    resume(w);
+    hand_resume(w);
     w->hand.begun = true;
   }
   hapi_render(&t->facts, &t->pointers, &t->bodies, &t->touches, &t->sample);
   ++t->facts.tick;
-  tell(&w->hand);
-  push_bodies(w, at->period);
+  hand_tell(&w->hand);
+  hand_push_bodies(w, at->period);
   return true;
 }
 

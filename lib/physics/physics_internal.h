@@ -22,7 +22,9 @@
 #include "physics/reconcile.h"
 #include "physics/tape_cycle.h"
 #include "physics/world_lock.h"
-#include "probe/probe.h"
+#include "probe/accelerance.h"
+#include "probe/joint_probe.h"
+#include "probe/operating_point.h"
 #include "research/research.h"
 #include "world/world.h"
 

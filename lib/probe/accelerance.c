@@ -8,7 +8,6 @@
 #include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "probe/probe.h"
 
 /* Accelerance of the neighbours (paper sections 4.2 and 4.3, eq. 3-6). Each pointer contact has its
  * own A: acceleration of the body by a force at the contact point. The zero probe is shared, and
@@ -120,7 +119,8 @@ static void contacts_begin_step(hapi_probe *probe, const hapi_cycle *cycle, cons
   }
 }
 
-/* Of a body of model CONTACT that answers as a whole b is found with that answer, operating_point.c. */
+/* Of a body of model CONTACT that answers as a whole b is found with that answer,
+ * operating_point.c. */
 static bool body_takes_b(const hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
                          uint32_t index)
 {
@@ -160,8 +160,8 @@ static bool contact_has_axis(const hapi_cycle *cycle, const hapi_contact_slot *c
                              contact->finger_radius > 0.0);
 }
 
-/* About the operating point it is small, and goes into the body: a pull at a body that does not feel
- * the pointer yet would take it off what stands behind it. */
+/* About the operating point it is small, and goes into the body: a pull at a body that does not
+ * feel the pointer yet would take it off what stands behind it. */
 static double contact_perturbation(const hapi_probe *probe, const hapi_cycle *cycle,
                                    const hapi_slots *slots, uint32_t index, int axis)
 {
@@ -244,8 +244,8 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
   out->inverse_mass = 1.0 / mass.mass;
 }
 
-/* Within 0 and what it is of the free body: about the normal, the direction that is used. What only a
- * contact makes of a torque is left as it is measured. */
+/* Within 0 and what it is of the free body: about the normal, the direction that is used. What
+ * only a contact makes of a torque is left as it is measured. */
 static void contact_keep_turn(const hapi_contact_trial *trial, const hapi_free_body *free,
                               const double normal[3], double out_turn[6])
 {
@@ -260,8 +260,8 @@ static void contact_keep_turn(const hapi_contact_trial *trial, const hapi_free_b
   }
 }
 
-/* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that does
- * not give way. */
+/* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that
+ * does not give way. */
 static void contact_keep(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
                          uint32_t index)
 {
@@ -442,8 +442,8 @@ static void round_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi
   }
 }
 
-/* The loop adds A f itself, with the A that it is given: b + A f is what was measured with f, whatever
- * became of A. */
+/* The loop adds A f itself, with the A that it is given: b + A f is what was measured with f,
+ * whatever became of A. */
 static void forces_take_out(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
                             const hapi_contact_watch *watch)
 {

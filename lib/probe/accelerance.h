@@ -8,29 +8,13 @@
 #include <ode/ode.h>
 
 #include "near/slots.h"
-#include "probe/admittance.h"
-#include "probe/reuse.h"
+#include "probe/probe.h"
 #include "world/cycle.h"
 #include "world/world.h"
 
 /* Share of the weight that a probe uses at least where the pointer gave no force yet (eq. 4 would
  * divide by zero). */
 #define HAPI_PROBE_FLOOR 0.01
-
-typedef struct hapi_probe hapi_probe;
-
-/* A contact in the testing simulations of this cycle. */
-typedef struct hapi_contact_trial {
-  uint32_t round;        /* order among the contacts of its island */
-  double measured[6][3]; /* A, before it is known to be good */
-  double measured_turn[6];
-} hapi_contact_trial;
-
-typedef struct hapi_contact_trials {
-  hapi_pushed pushed;       /* slots of the contacts under test */
-  hapi_contact_trial *list; /* by slot */
-  uint32_t *rounds;         /* by island: contacts so far */
-} hapi_contact_trials;
 
 /* Who looks on while contacts are tested. */
 typedef struct hapi_contact_watch {

@@ -13,10 +13,11 @@
 #define N_MAX 6
 #define JACOBI_SWEEPS 16 /* it ends after 5 to 7 */
 
-/* Two things make a measurement leave the bounds. A solver that stops early: a little. And friction,
- * for good: to press a body that slides slows it down, to push it along presses nothing. With a
- * coefficient mu half of the difference is up to mu / 2, and the eigenvalues lie between (1 - s)/2 and
- * (1 + s)/2, s = sqrt(1 + mu^2); measured in the scenes: 0.34, and -0.11 .. 1.3. */
+/* Two things make a measurement leave the bounds. A solver that stops early: a little. And
+ * friction, for good: to press a body that slides slows it down, to push it along presses
+ * nothing. With a coefficient mu half of the difference is up to mu / 2, and the eigenvalues lie
+ * between (1 - s)/2 and (1 + s)/2, s = sqrt(1 + mu^2); measured in the scenes: 0.34, and -0.11
+ * .. 1.3. */
 #define SOLVER_SLACK 1e-3
 #define FRICTION_SLACK 0.25
 /* Beyond these no part of a measurement can be trusted. */
@@ -29,7 +30,7 @@ typedef struct matrix {
 } matrix;
 
 /* Lower triangle L of a = L L^T; false where a is not positive definite. */
-static bool cholesky(const matrix *a, int n, matrix *out)
+static bool matrix_cholesky(const matrix *a, int n, matrix *out)
 {
   memset(out, 0, sizeof *out);
   for (int i = 0; i < n; ++i) {
@@ -48,7 +49,7 @@ static bool cholesky(const matrix *a, int n, matrix *out)
 }
 
 /* b = L^-1 b: column by column. */
-static void solve_lower(const matrix *l, int n, matrix *b)
+static void matrix_solve_lower(const matrix *l, int n, matrix *b)
 {
   for (int c = 0; c < n; ++c) {
     for (int i = 0; i < n; ++i) {
@@ -60,7 +61,7 @@ static void solve_lower(const matrix *l, int n, matrix *b)
   }
 }
 
-static void solve_upper(const matrix *l, int n, matrix *b) /* b = L^-T b */
+static void matrix_solve_upper(const matrix *l, int n, matrix *b) /* b = L^-T b */
 {
   for (int c = 0; c < n; ++c) {
     for (int i = n - 1; i >= 0; --i) {
@@ -72,7 +73,7 @@ static void solve_upper(const matrix *l, int n, matrix *b) /* b = L^-T b */
   }
 }
 
-static void transpose(int n, matrix *a)
+static void matrix_transpose(int n, matrix *a)
 {
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < i; ++k) {
@@ -84,7 +85,7 @@ static void transpose(int n, matrix *a)
 }
 
 /* out = a b^T; out is none of the two */
-static void multiply_transposed(const matrix *a, const matrix *b, int n, matrix *out)
+static void matrix_multiply_transposed(const matrix *a, const matrix *b, int n, matrix *out)
 {
   memset(out, 0, sizeof *out);
   for (int i = 0; i < n; ++i) {
@@ -96,7 +97,7 @@ static void multiply_transposed(const matrix *a, const matrix *b, int n, matrix 
   }
 }
 
-static void symmetrise(int n, matrix *a)
+static void matrix_symmetrise(int n, matrix *a)
 {
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < i; ++k) {
@@ -106,7 +107,7 @@ static void symmetrise(int n, matrix *a)
 }
 
 /* One rotation of Jacobi's method: a[p][q] becomes 0; v collects the eigenvectors as columns. */
-static void rotate(matrix *a, matrix *v, int n, int p, int q)
+static void matrix_rotate(matrix *a, matrix *v, int n, int p, int q)
 {
   double theta = 0.5 * (a->m[q][q] - a->m[p][p]) / a->m[p][q];
   double t = (theta < 0.0 ? -1.0 : 1.0) / (fabs(theta) + sqrt(theta * theta + 1.0));
@@ -130,7 +131,7 @@ static void rotate(matrix *a, matrix *v, int n, int p, int q)
   }
 }
 
-static void eigen(matrix *a, int n, matrix *out_vectors)
+static void matrix_eigen(matrix *a, int n, matrix *out_vectors)
 {
   memset(out_vectors, 0, sizeof *out_vectors);
   for (int i = 0; i < n; ++i) {
@@ -142,7 +143,7 @@ static void eigen(matrix *a, int n, matrix *out_vectors)
       for (int q = p + 1; q < n; ++q) {
         off += a->m[p][q] * a->m[p][q];
         if (fabs(a->m[p][q]) > 1e-17) {
-          rotate(a, out_vectors, n, p, q);
+          matrix_rotate(a, out_vectors, n, p, q);
         }
       }
     }
@@ -152,8 +153,8 @@ static void eigen(matrix *a, int n, matrix *out_vectors)
   }
 }
 
-/* Gershgorin: no eigenvalue is farther from a diagonal entry than the rest of its row is large. Mostly
- * enough, and much cheaper than the eigenvalues. */
+/* Gershgorin: no eigenvalue is farther from a diagonal entry than the rest of its row is large.
+ * Mostly enough, and much cheaper than the eigenvalues. */
 static bool surely_within(const matrix *b, int n, double slack)
 {
   for (int i = 0; i < n; ++i) {
@@ -168,9 +169,9 @@ static bool surely_within(const matrix *b, int n, double slack)
   return true;
 }
 
-/* Brings the eigenvalues of a symmetric b back to 0 .. 1 when one is farther out than slack; how far
- * the farthest was, 0 when nothing was done. */
-static double clip(matrix *b, int n, double slack)
+/* Brings the eigenvalues of a symmetric b back to 0 .. 1 when one is farther out than slack; how
+ * far the farthest was, 0 when nothing was done. */
+static double matrix_clip(matrix *b, int n, double slack)
 {
   matrix values = *b;
   matrix vectors;
@@ -179,7 +180,7 @@ static double clip(matrix *b, int n, double slack)
   if (surely_within(b, n, slack)) {
     return 0.0;
   }
-  eigen(&values, n, &vectors);
+  matrix_eigen(&values, n, &vectors);
   for (int e = 0; e < n; ++e) {
     excess[e] = values.m[e][e] - fmax(0.0, fmin(1.0, values.m[e][e]));
     most = fmax(most, fabs(excess[e]));
@@ -198,7 +199,7 @@ static double clip(matrix *b, int n, double slack)
 }
 
 /* The same for one direction: normal in world axes, to the measure by L^T. */
-static bool clip_along(matrix *b, const matrix *l, const double normal[3])
+static bool matrix_clip_along(matrix *b, const matrix *l, const double normal[3])
 {
   double u[3];
   double turned[3];
@@ -222,7 +223,7 @@ static bool clip_along(matrix *b, const matrix *l, const double normal[3])
   return true;
 }
 
-static bool plausible(const matrix *b, int n)
+static bool matrix_is_plausible(const matrix *b, int n)
 {
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < n; ++k) {
@@ -238,17 +239,17 @@ static bool plausible(const matrix *b, int n)
 }
 
 /* b = L^-1 b L^-T */
-static void to_measure(const matrix *l, int n, matrix *b)
+static void matrix_to_measure(const matrix *l, int n, matrix *b)
 {
-  solve_lower(l, n, b);
-  transpose(n, b);
-  solve_lower(l, n, b);
-  transpose(n, b);
+  matrix_solve_lower(l, n, b);
+  matrix_transpose(n, b);
+  matrix_solve_lower(l, n, b);
+  matrix_transpose(n, b);
 }
 
 /* ---- a force at a point ---- */
 
-static void free_point(const hapi_free_body *body, const double arm[3], double out[6][3])
+static void body_free_point(const hapi_free_body *body, const double arm[3], double out[6][3])
 {
   for (int k = 0; k < 3; ++k) {
     double force[3] = {0.0, 0.0, 0.0};
@@ -265,7 +266,7 @@ static void free_point(const hapi_free_body *body, const double arm[3], double o
 }
 
 /* Acceleration of the point itself. */
-static void at_point(double a[6][3], const double arm[3], matrix *out)
+static void matrix_at_point(double a[6][3], const double arm[3], matrix *out)
 {
   memset(out, 0, sizeof *out);
   for (int k = 0; k < 3; ++k) {
@@ -279,11 +280,12 @@ static void at_point(double a[6][3], const double arm[3], matrix *out)
 }
 
 /* a += free x, where x are the forces at the point that make the difference. */
-static void correct(double free[6][3], const matrix *l, const matrix *difference, double a[6][3])
+static void matrix_correct(double free[6][3], const matrix *l, const matrix *difference,
+                           double a[6][3])
 {
   matrix x;
-  multiply_transposed(difference, l, 3, &x);
-  solve_upper(l, 3, &x);
+  matrix_multiply_transposed(difference, l, 3, &x);
+  matrix_solve_upper(l, 3, &x);
   for (int i = 0; i < 6; ++i) {
     for (int k = 0; k < 3; ++k) {
       a[i][k] += free[i][0] * x.m[0][k] + free[i][1] * x.m[1][k] + free[i][2] * x.m[2][k];
@@ -291,18 +293,18 @@ static void correct(double free[6][3], const matrix *l, const matrix *difference
   }
 }
 
-/* True: something was cut off. What is not symmetric is not averaged, however little it is: a push
- * along a floor that lifts the body by one per cent takes it off its contacts, and a cube that friction
- * held flew away in the loop. */
-static bool cut_measured(matrix *b, const matrix *l, const double normal[3])
+/* True: something was cut off. What is not symmetric is not averaged, however little it is: a
+ * push along a floor that lifts the body by one per cent takes it off its contacts, and a cube
+ * that friction held flew away in the loop. */
+static bool matrix_cut_measured(matrix *b, const matrix *l, const double normal[3])
 {
   matrix symmetric = *b;
-  symmetrise(3, &symmetric);
-  bool cut = clip(&symmetric, 3, FRICTION_SLACK) > 0.0;
+  matrix_symmetrise(3, &symmetric);
+  bool cut = matrix_clip(&symmetric, 3, FRICTION_SLACK) > 0.0;
   if (cut) {
     *b = symmetric;
   }
-  return clip_along(b, l, normal) || cut;
+  return matrix_clip_along(b, l, normal) || cut;
 }
 
 hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const double arm[3],
@@ -312,30 +314,30 @@ hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const dou
   matrix bound;
   matrix l;
   matrix b;
-  free_point(body, arm, free);
-  at_point(free, arm, &bound);
-  at_point(a, arm, &b);
-  if (!hapi_finite(&a[0][0], 18) || !cholesky(&bound, 3, &l)) {
+  body_free_point(body, arm, free);
+  matrix_at_point(free, arm, &bound);
+  matrix_at_point(a, arm, &b);
+  if (!hapi_finite(&a[0][0], 18) || !matrix_cholesky(&bound, 3, &l)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  to_measure(&l, 3, &b);
-  if (!plausible(&b, 3)) {
+  matrix_to_measure(&l, 3, &b);
+  if (!matrix_is_plausible(&b, 3)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
   matrix wanted = b;
-  if (!cut_measured(&wanted, &l, normal)) {
+  if (!matrix_cut_measured(&wanted, &l, normal)) {
     return HAPI_ADMITTANCE_GOOD;
   }
   for (int i = 0; i < 3; ++i) {
     hapi_v3_sub(wanted.m[i], b.m[i], wanted.m[i]);
   }
-  correct(free, &l, &wanted, a);
+  matrix_correct(free, &l, &wanted, a);
   return HAPI_ADMITTANCE_CLIPPED;
 }
 
 /* ---- the same for another body ---- */
 
-static void free_wrench(const hapi_free_body *body, matrix *out)
+static void body_free_wrench(const hapi_free_body *body, matrix *out)
 {
   memset(out, 0, sizeof *out);
   for (int i = 0; i < 3; ++i) {
@@ -347,7 +349,7 @@ static void free_wrench(const hapi_free_body *body, matrix *out)
 }
 
 /* b = b L^-T, of three columns */
-static void solve_rows(const matrix *l, matrix *b)
+static void matrix_solve_rows(const matrix *l, matrix *b)
 {
   for (int i = 0; i < N_MAX; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -360,7 +362,7 @@ static void solve_rows(const matrix *l, matrix *b)
 }
 
 /* The largest that it makes of a vector of length 1; NaN where it cannot be used. */
-static double size_of(const matrix *b)
+static double matrix_size(const matrix *b)
 {
   matrix gram = {{{0.0}}};
   matrix vectors;
@@ -374,12 +376,12 @@ static double size_of(const matrix *b)
       }
     }
   }
-  eigen(&gram, 3, &vectors);
+  matrix_eigen(&gram, 3, &vectors);
   return sqrt(fmax(0.0, fmax(gram.m[0][0], fmax(gram.m[1][1], gram.m[2][2]))));
 }
 
-/* Why half: the answers of point and body together are a matrix between 0 and 1 in this measure, and
- * this is a block beside its diagonal. */
+/* Why half: the answers of point and body together are a matrix between 0 and 1 in this measure,
+ * and this is a block beside its diagonal. */
 hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const double arm[3],
                                            const hapi_free_body *other, double a[6][3],
                                            double *out_share)
@@ -390,19 +392,19 @@ hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const d
   matrix l[2];
   matrix b = {{{0.0}}};
   *out_share = 0.0;
-  free_point(pushed, arm, free);
-  at_point(free, arm, &bounds[0]);
-  free_wrench(other, &bounds[1]);
-  if (!hapi_finite(&a[0][0], 18) || !cholesky(&bounds[0], 3, &l[0]) ||
-      !cholesky(&bounds[1], 6, &l[1])) {
+  body_free_point(pushed, arm, free);
+  matrix_at_point(free, arm, &bounds[0]);
+  body_free_wrench(other, &bounds[1]);
+  if (!hapi_finite(&a[0][0], 18) || !matrix_cholesky(&bounds[0], 3, &l[0]) ||
+      !matrix_cholesky(&bounds[1], 6, &l[1])) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
   for (int i = 0; i < 6; ++i) {
     memcpy(b.m[i], a[i], sizeof a[i]);
   }
-  solve_lower(&l[1], 6, &b);
-  solve_rows(&l[0], &b);
-  double size = size_of(&b);
+  matrix_solve_lower(&l[1], 6, &b);
+  matrix_solve_rows(&l[0], &b);
+  double size = matrix_size(&b);
   if (!isfinite(size)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
@@ -420,24 +422,24 @@ hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double res
   matrix bound;
   matrix l;
   matrix b;
-  free_wrench(body, &bound);
+  body_free_wrench(body, &bound);
   memcpy(b.m, response, sizeof b.m);
-  symmetrise(6, &b);
+  matrix_symmetrise(6, &b);
   matrix tidy = b;
-  if (!hapi_finite(&response[0][0], 36) || !cholesky(&bound, 6, &l)) {
+  if (!hapi_finite(&response[0][0], 36) || !matrix_cholesky(&bound, 6, &l)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  to_measure(&l, 6, &b);
-  if (!plausible(&b, 6)) {
+  matrix_to_measure(&l, 6, &b);
+  if (!matrix_is_plausible(&b, 6)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  double excess = clip(&b, 6, 0.0);
+  double excess = matrix_clip(&b, 6, 0.0);
   if (excess > 0.0) { /* L b L^T */
     matrix half;
-    multiply_transposed(&b, &l, 6, &half);
-    transpose(6, &half);
-    multiply_transposed(&l, &half, 6, &tidy);
-    symmetrise(6, &tidy);
+    matrix_multiply_transposed(&b, &l, 6, &half);
+    matrix_transpose(6, &half);
+    matrix_multiply_transposed(&l, &half, 6, &tidy);
+    matrix_symmetrise(6, &tidy);
   }
   memcpy(response, tidy.m, sizeof tidy.m);
   return excess > SOLVER_SLACK ? HAPI_ADMITTANCE_CLIPPED : HAPI_ADMITTANCE_GOOD;
@@ -445,29 +447,29 @@ hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double res
 
 /* ---- a joint ---- */
 
-/* Of the joint's answer, between none at all and one that lets nothing pass. A spring that is weaker than
- * this within a step is not seen. */
+/* Of the joint's answer, between none at all and one that lets nothing pass. A spring that is
+ * weaker than this within a step is not seen. */
 #define ROW_LEAST 1e-8
 
-static double scale_of(const double wrench[6])
+static double wrench_scale(const double wrench[6])
 {
   return fmax(hapi_v3_norm(wrench), hapi_v3_norm(wrench + 3));
 }
 
-/* An eigenvector u of value s in the measure of the free pair: wrench L^-T u, answered by 1 and softness
- * 1 / s - 1. */
-static void row_of(const matrix *l, const matrix *vectors, int which, double share,
-                   hapi_constraint_row *out)
+/* An eigenvector u of value s in the measure of the free pair: wrench L^-T u, answered by 1 and
+ * softness 1 / s - 1. */
+static void row_from_vector(const matrix *l, const matrix *vectors, int which, double share,
+                            hapi_constraint_row *out)
 {
   matrix u = {{{0.0}}};
   for (int i = 0; i < 6; ++i) {
     u.m[i][0] = vectors->m[i][which];
   }
-  solve_upper(l, 6, &u);
+  matrix_solve_upper(l, 6, &u);
   for (int i = 0; i < 6; ++i) {
     out->wrench[i] = u.m[i][0];
   }
-  double scale = 1.0 / scale_of(out->wrench);
+  double scale = 1.0 / wrench_scale(out->wrench);
   for (int i = 0; i < 6; ++i) {
     out->wrench[i] *= scale;
   }
@@ -475,13 +477,13 @@ static void row_of(const matrix *l, const matrix *vectors, int which, double sha
 }
 
 /* b = L^T b L */
-static void from_measure(const matrix *l, matrix *b)
+static void matrix_from_measure(const matrix *l, matrix *b)
 {
   matrix up = *l;
   matrix half;
-  transpose(6, &up);
-  multiply_transposed(&up, b, 6, &half); /* b is symmetric */
-  multiply_transposed(&half, &up, 6, b);
+  matrix_transpose(6, &up);
+  matrix_multiply_transposed(&up, b, 6, &half); /* b is symmetric */
+  matrix_multiply_transposed(&half, &up, 6, b);
 }
 
 hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[6][6],
@@ -495,15 +497,15 @@ hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[
   *out_count = 0;
   memcpy(bound.m, free, sizeof bound.m);
   memcpy(b.m, held, sizeof b.m);
-  symmetrise(6, &b);
-  if (!hapi_finite(&held[0][0], 36) || !cholesky(&bound, 6, &l)) {
+  matrix_symmetrise(6, &b);
+  if (!hapi_finite(&held[0][0], 36) || !matrix_cholesky(&bound, 6, &l)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  from_measure(&l, &b);
-  if (!plausible(&b, 6)) {
+  matrix_from_measure(&l, &b);
+  if (!matrix_is_plausible(&b, 6)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  eigen(&b, 6, &vectors);
+  matrix_eigen(&b, 6, &vectors);
   for (int i = 0; i < 6; ++i) {
     most = fmax(most, fabs(b.m[i][i] - fmax(0.0, fmin(1.0, b.m[i][i]))));
   }
@@ -517,7 +519,7 @@ hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[
     if (share <= ROW_LEAST) {
       break;
     }
-    row_of(&l, &vectors, best, share, &out[(*out_count)++]);
+    row_from_vector(&l, &vectors, best, share, &out[(*out_count)++]);
   }
   return most > SOLVER_SLACK ? HAPI_ADMITTANCE_CLIPPED : HAPI_ADMITTANCE_GOOD;
 }

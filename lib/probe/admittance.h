@@ -4,9 +4,9 @@
 #define HAPODE_PROBE_ADMITTANCE_H
 
 /* What a measured accelerance can be. The answer of a mechanism without friction to a force is
- * symmetric, it gives way and never comes towards the force, and contacts and joints can only make it
- * less than that of the free body: 0 <= A <= M^-1 (for every direction). A testing simulation that says
- * otherwise has not converged, or met a constraint that has no solution. */
+ * symmetric, it gives way and never comes towards the force, and contacts and joints can only
+ * make it less than that of the free body: 0 <= A <= M^-1 (for every direction). A testing
+ * simulation that says otherwise has not converged, or met a constraint that has no solution. */
 
 #include <stdbool.h>
 
@@ -31,31 +31,33 @@ typedef enum hapi_admittance {
 hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const double arm[3],
                                            const double normal[3], double a[6][3]);
 
-/* The same force to another body, which something ties to the first: the acceleration of that one's
- * centre of mass. In the measure of the two free bodies it is half of a free body's at most, and with
- * friction three quarters; what is more is scaled down to that. *out_share: what it is then, 0 where
- * SINGULAR. */
+/* The same force to another body, which something ties to the first: the acceleration of that
+ * one's centre of mass. In the measure of the two free bodies it is half of a free body's at
+ * most, and with friction three quarters; what is more is scaled down to that. *out_share: what
+ * it is then, 0 where SINGULAR. */
 hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const double arm[3],
                                            const hapi_free_body *other, double a[6][3],
                                            double *out_share);
 
-/* Wrench at the centre of mass to acceleration. Made symmetric and brought within the bounds in any
- * case: the rows of the loop are solved with it. CLIPPED only for more than the rounding of a solver,
- * 1e-3. */
+/* Wrench at the centre of mass to acceleration. Made symmetric and brought within the bounds in
+ * any case: the rows of the loop are solved with it. CLIPPED only for more than the rounding of
+ * a solver, 1e-3. */
 hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double response[6][6]);
 
-/* One equation of a joint: wrench . (velocity of one body against the other) + softness impulse = target,
- * where an impulse gives wrench x impulse to the one body and the reaction to the other. */
+/* One equation of a joint: wrench . (velocity of one body against the other) + softness impulse
+ * = target, where an impulse gives wrench x impulse to the one body and the reaction to the
+ * other. */
 typedef struct hapi_constraint_row {
   double
       wrench[6]; /* force and torque about the centre of mass of the one; one of them of length 1 */
   double softness; /* (velocity along wrench) / impulse, >= 0 */
 } hapi_constraint_row;
 
-/* Equations that hold two bodies as a joint was seen to do. free[6][6]: relative velocity at the centre of
- * the one by a unit impulse there, with no joint; held[6][6]: impulse of the joint by a unit of that
- * velocity, with the sign turned. free^-1 >= held >= 0 for every direction, else it is CLIPPED;
- * SINGULAR: no numbers, or far outside. Sorted, the stiffest first; *out_count is 0 to 6. */
+/* Equations that hold two bodies as a joint was seen to do. free[6][6]: relative velocity at the
+ * centre of the one by a unit impulse there, with no joint; held[6][6]: impulse of the joint by
+ * a unit of that velocity, with the sign turned. free^-1 >= held >= 0 for every direction, else
+ * it is CLIPPED; SINGULAR: no numbers, or far outside. Sorted, the stiffest first; *out_count is
+ * 0 to 6. */
 hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[6][6],
                                      hapi_constraint_row out[6], int *out_count);
 

@@ -40,12 +40,12 @@ typedef struct hapi_answers {
 bool hapi_answers_create(hapi_answers *answers, const hapi_capacity *capacity);
 void hapi_answers_finish(hapi_answers *answers);
 void hapi_answers_reset(hapi_answers *answers);
-/* Forgets those of slots that another body or contact has by now, and takes the slots' flags. Once a
- * cycle, when the slots are those of the model to come. */
+/* Forgets those of slots that another body or contact has by now, and takes the slots' flags.
+ * Once a cycle, when the slots are those of the model to come. */
 void hapi_answers_follow(hapi_answers *answers, const hapi_slots *slots);
 
-/* Model CONTACT: whether the body must answer all that acts on it by one matrix: more than one pointer
- * contact acts on it, or another body may. */
+/* Model CONTACT: whether the body must answer all that acts on it by one matrix: more than one
+ * pointer contact acts on it, or another body may. */
 bool hapi_body_is_whole(const hapi_slots *slots, uint32_t body);
 
 #endif

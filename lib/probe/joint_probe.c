@@ -10,20 +10,20 @@
 #include "base/log.h"
 #include "base/pose.h"
 #include "base/vec.h"
-#include "probe/probe.h"
+#include "probe/accelerance.h"
 
-/* Joints that the loop has no rows of its own for. What holds two bodies together is found by pushing one of
- * them, W, six times, in a world that has nothing but the two and the joint: the joint's impulse is linear in
- * W, and from that come its equations, at the step of the tick (hapi_admittance_rows). They turn with one
- * of the bodies until the next sync. The mechanism that the joint is in then is the loop's as any other:
- * its contacts, its other joints and the hand meet in one solver, where a response of the whole mechanism
- * would be that of one instant. For the same reason it is measured where the bodies will be in the middle of the
- * next interval if they go on as they do: what directions turn until its end, they have turned
- * the other way at its beginning.
+/* Joints that the loop has no rows of its own for. What holds two bodies together is found by
+ * pushing one of them, W, six times, in a world that has nothing but the two and the joint: the
+ * joint's impulse is linear in W, and from that come its equations, at the step of the tick
+ * (hapi_admittance_rows). They turn with one of the bodies until the next sync. The mechanism that
+ * the joint is in then is the loop's as any other: its contacts, its other joints and the hand meet
+ * in one solver, where a response of the whole mechanism would be that of one instant. For the same
+ * reason it is measured where the bodies will be in the middle of the next interval if they go on
+ * as they do: what directions turn until its end, they have turned the other way at its beginning.
  *
- * Steps: with and without the joint 2, the pushes 6, without error reduction 1, each spring 1; a joint that
- * is as it was, 3; one whose bodies rest, none. ODE's exact stepper makes them (dWorldStep): at most six
- * equations, and no friction. */
+ * Steps: with and without the joint 2, the pushes 6, without error reduction 1, each spring 1; a
+ * joint that is as it was, 3; one whose bodies rest, none. ODE's exact stepper makes them
+ * (dWorldStep): at most six equations, and no friction. */
 
 #define PUSH_SPEED 1e-3   /* m/s, that a push gives in a step */
 #define SPRING_SHARE 0.98 /* of a rigid joint's impulse: below it the row is a spring */
@@ -76,7 +76,7 @@ typedef struct twists {
 
 /* ---- the pair ---- */
 
-static void find_free_body(const pair *p, int which, hapi_free_body *out)
+static void pair_free_body(const pair *p, int which, hapi_free_body *out)
 {
   dBodyID body = p->bodies[which];
   dMatrix3 rotation;
@@ -88,7 +88,7 @@ static void find_free_body(const pair *p, int which, hapi_free_body *out)
 }
 
 /* A wrench about the centre of the pushed body, about the other's. */
-static void move_wrench(const pair *p, const double wrench[6], double out[6])
+static void pair_move_wrench(const pair *p, const double wrench[6], double out[6])
 {
   double moment[3];
   memcpy(out, wrench, 6 * sizeof *out);
@@ -96,14 +96,14 @@ static void move_wrench(const pair *p, const double wrench[6], double out[6])
   hapi_v3_add(out + 3, moment, out + 3);
 }
 
-static void respond(const hapi_free_body *body, const double wrench[6], double out[6])
+static void body_respond(const hapi_free_body *body, const double wrench[6], double out[6])
 {
   hapi_v3_scale(body->inverse_mass, wrench, out);
   hapi_m3_apply(body->inverse_inertia, wrench + 3, out + 3);
 }
 
 /* Velocity of the pushed body against what of the other is at its centre. */
-static void relative(const pair *p, const twists *t, double out[6])
+static void twists_relative(const pair *p, const twists *t, double out[6])
 {
   double way[3];
   hapi_v3_cross(t->v[1] + 3, p->apart, way);
@@ -113,11 +113,11 @@ static void relative(const pair *p, const twists *t, double out[6])
   }
 }
 
-static void find_masses(pair *p)
+static void pair_find_masses(pair *p)
 {
   hapi_free_body bodies[2];
-  find_free_body(p, 0, &bodies[0]);
-  find_free_body(p, 1, &bodies[1]);
+  pair_free_body(p, 0, &bodies[0]);
+  pair_free_body(p, 1, &bodies[1]);
   p->own = bodies[0];
   p->mass = 1.0 / p->own.inverse_mass;
   hapi_m3_invert(p->own.inverse_inertia, p->inertia);
@@ -127,21 +127,21 @@ static void find_masses(pair *p)
     twists t = {{{0.0}}};
     double speed[6];
     unit[k] = 1.0;
-    move_wrench(p, unit, moved);
-    respond(&bodies[0], unit, t.v[0]);
-    respond(&bodies[1], moved, t.v[1]);
+    pair_move_wrench(p, unit, moved);
+    body_respond(&bodies[0], unit, t.v[0]);
+    body_respond(&bodies[1], moved, t.v[1]);
     memcpy(p->reaction[k], t.v[1], sizeof p->reaction[k]);
     for (int i = 0; i < 6; ++i) {
       t.v[1][i] = -t.v[1][i];
     }
-    relative(p, &t, speed);
+    twists_relative(p, &t, speed);
     for (int i = 0; i < 6; ++i) {
       p->free[i][k] = speed[i];
     }
   }
 }
 
-static void find_pose(pair *p, int which)
+static void pair_find_pose(pair *p, int which)
 {
   dBodyID body = p->bodies[which];
   hap_pose *out = &p->pose[which];
@@ -180,10 +180,10 @@ static bool pair_begin(pair *p, hapi_probe *probe, const hapi_cycle *cycle, cons
   if (p->bodies[0] == NULL || dBodyIsKinematic(p->bodies[0])) {
     return false;
   }
-  find_pose(p, 0);
-  find_pose(p, 1);
+  pair_find_pose(p, 0);
+  pair_find_pose(p, 1);
   hapi_v3_sub(p->pose[0].position, p->pose[1].position, p->apart);
-  find_masses(p);
+  pair_find_masses(p);
   return true;
 }
 
@@ -191,7 +191,7 @@ static bool pair_begin(pair *p, hapi_probe *probe, const hapi_cycle *cycle, cons
 
 /* The pointers' forces of the last tick: whether a motor holds them or gives way is part of what is
  * measured. */
-static void push_as_pointers(const pair *p, int which)
+static void pair_push_as_pointers(const pair *p, int which)
 {
   const hapi_test_set *test = &p->probe->test;
   uint32_t index = p->index[which];
@@ -207,7 +207,7 @@ static void push_as_pointers(const pair *p, int which)
   }
 }
 
-static void read_twists(const pair *p, twists *out)
+static void pair_read_twists(const pair *p, twists *out)
 {
   memset(out, 0, sizeof *out);
   for (int i = 0; i < 2; ++i) {
@@ -218,7 +218,7 @@ static void read_twists(const pair *p, twists *out)
   }
 }
 
-static void begin_step(const pair *p)
+static void pair_begin_step(const pair *p)
 {
   hapi_test_rewind(&p->probe->test);
   for (int i = 0; i < 2; ++i) {
@@ -227,25 +227,25 @@ static void begin_step(const pair *p)
       dBodySetPosition(p->bodies[i], to->position[0], to->position[1], to->position[2]);
       dBodySetQuaternion(p->bodies[i], to->quat_wxyz);
     }
-    push_as_pointers(p, i);
+    pair_push_as_pointers(p, i);
   }
 }
 
-static void end_step(const pair *p, twists *out)
+static void pair_end_step(const pair *p, twists *out)
 {
   ++p->probe->counts.joint_steps;
   (void)dWorldStep(p->world, p->period);
-  read_twists(p, out);
+  pair_read_twists(p, out);
 }
 
-static void step(const pair *p, twists *out)
+static void pair_step(const pair *p, twists *out)
 {
-  begin_step(p);
-  end_step(p, out);
+  pair_begin_step(p);
+  pair_end_step(p, out);
 }
 
 /* What is no constraint and not linear. */
-static void switch_damping(pair *p, bool on)
+static void pair_switch_damping(pair *p, bool on)
 {
   for (int i = 0; i < 2; ++i) {
     dBodyID body = p->bodies[i];
@@ -268,7 +268,7 @@ static void switch_damping(pair *p, bool on)
 /* ---- equations ---- */
 
 /* Impulse of the joint that changed the velocity of the pushed body. */
-static void impulse_of(const pair *p, const twists *with, const twists *without, double out[6])
+static void joint_impulse(const pair *p, const twists *with, const twists *without, double out[6])
 {
   double change[6];
   for (int i = 0; i < 6; ++i) {
@@ -279,8 +279,8 @@ static void impulse_of(const pair *p, const twists *with, const twists *without,
 }
 
 /* What the other body did not get back of an impulse, and what it should; (m/s)^2. */
-static void compare_reaction(const pair *p, const double impulse[6], const twists *with,
-                             const twists *without, double io[2])
+static void pair_compare_reaction(const pair *p, const double impulse[6], const twists *with,
+                                  const twists *without, double io[2])
 {
   for (int i = 0; i < 6; ++i) {
     double wanted = 0.0;
@@ -294,38 +294,38 @@ static void compare_reaction(const pair *p, const double impulse[6], const twist
 }
 
 /* That gives the body PUSH_SPEED or so in a step. */
-static double push_size(const pair *p, int axis)
+static double pair_push_size(const pair *p, int axis)
 {
   return PUSH_SPEED / p->period * (axis < 3 ? p->mass : p->inertia[4 * (axis - 3)]);
 }
 
 /* The joint's answer to a wrench: out of the step, impulse. */
-static void push(pair *p, const double wrench[6], const twists *base, double out[6],
-                 double io_reaction[2])
+static void pair_push(pair *p, const double wrench[6], const twists *base, double out[6],
+                      double io_reaction[2])
 {
   twists with;
   twists without = *base;
   double change[6];
-  begin_step(p);
+  pair_begin_step(p);
   dBodyAddForce(p->bodies[0], wrench[0], wrench[1], wrench[2]);
   dBodyAddTorque(p->bodies[0], wrench[3], wrench[4], wrench[5]);
-  end_step(p, &with);
-  respond(&p->own, wrench, change);
+  pair_end_step(p, &with);
+  body_respond(&p->own, wrench, change);
   for (int i = 0; i < 6; ++i) { /* as if the joint did not answer the push */
     without.v[0][i] += p->period * change[i];
   }
-  impulse_of(p, &with, &without, out);
-  compare_reaction(p, out, &with, &without, io_reaction);
+  joint_impulse(p, &with, &without, out);
+  pair_compare_reaction(p, out, &with, &without, io_reaction);
 }
 
-static void find_held(pair *p, const twists *base, double out[6][6])
+static void pair_find_held(pair *p, const twists *base, double out[6][6])
 {
   double columns[6][6];
   double reaction[2] = {0.0, 0.0};
   for (int k = 0; k < 6; ++k) {
     double wrench[6] = {0.0};
-    wrench[k] = push_size(p, k);
-    push(p, wrench, base, columns[k], reaction);
+    wrench[k] = pair_push_size(p, k);
+    pair_push(p, wrench, base, columns[k], reaction);
     for (int i = 0; i < 6; ++i) {
       columns[k][i] /= p->period * wrench[k];
     }
@@ -347,7 +347,7 @@ static double dot6(const double a[6], const double b[6])
 }
 
 /* Velocity along a wrench by a unit impulse of it. */
-static double response_of(const pair *p, const double wrench[6])
+static double wrench_response(const pair *p, const double wrench[6])
 {
   double speed[6];
   for (int i = 0; i < 6; ++i) {
@@ -358,15 +358,15 @@ static double response_of(const pair *p, const double wrench[6])
 
 /* Impulses of the rows that make up one of the joint: wrenches are orthogonal in the measure of the
  * free pair. *io_impulse: what is left of it. */
-static void split(const pair *p, const hapi_constraint_row rows[6], int count, double io_impulse[6],
-                  double out[6])
+static void impulse_split(const pair *p, const hapi_constraint_row rows[6], int count,
+                          double io_impulse[6], double out[6])
 {
   double speed[6];
   for (int i = 0; i < 6; ++i) {
     speed[i] = dot6(p->free[i], io_impulse);
   }
   for (int r = 0; r < count; ++r) {
-    out[r] = dot6(rows[r].wrench, speed) / response_of(p, rows[r].wrench);
+    out[r] = dot6(rows[r].wrench, speed) / wrench_response(p, rows[r].wrench);
   }
   for (int r = 0; r < count; ++r) {
     for (int i = 0; i < 6; ++i) {
@@ -375,24 +375,25 @@ static void split(const pair *p, const hapi_constraint_row rows[6], int count, d
   }
 }
 
-/* What the rows ask for in a step, their impulses, and what of the joint's impulse is none of theirs. */
+/* What the rows ask for in a step, their impulses, and what of the joint's impulse is none of
+ * theirs. */
 typedef struct answer {
   double target[6];
   double impulse[6];
   double given[6];
 } answer;
 
-static void ask(const pair *p, const hapi_constraint_row rows[6], int count, const twists *with,
-                const twists *without, answer *out)
+static void rows_ask(const pair *p, const hapi_constraint_row rows[6], int count,
+                     const twists *with, const twists *without, answer *out)
 {
   double speed[6];
-  impulse_of(p, with, without, out->given);
+  joint_impulse(p, with, without, out->given);
   double size = sqrt(dot6(out->given, out->given));
-  split(p, rows, count, out->given, out->impulse);
+  impulse_split(p, rows, count, out->given, out->impulse);
   if (sqrt(dot6(out->given, out->given)) <= GIVEN_LEAST * size) {
     memset(out->given, 0, sizeof out->given);
   }
-  relative(p, with, speed);
+  twists_relative(p, with, speed);
   for (int r = 0; r < count; ++r) {
     out->target[r] = dot6(rows[r].wrench, speed) + rows[r].softness * out->impulse[r];
   }
@@ -400,20 +401,21 @@ static void ask(const pair *p, const hapi_constraint_row rows[6], int count, con
 
 /* ---- error reduction ---- */
 
-/* erp over the step, of a row that is a spring: from its target where the body is a little elsewhere. */
-static double spring_rate(const pair *p, const hapi_constraint_row rows[6], int count, int which,
-                          const answer *base, const twists *without)
+/* erp over the step, of a row that is a spring: from its target where the body is a little
+ * elsewhere. */
+static double row_spring_rate(const pair *p, const hapi_constraint_row rows[6], int count,
+                              int which, const answer *base, const twists *without)
 {
   double way[6];
   twists with;
   answer moved;
   dBodyID first = p->bodies[0];
-  respond(&p->own, rows[which].wrench, way);
+  body_respond(&p->own, rows[which].wrench, way);
   double scale = SPRING_WAY / fmax(hapi_v3_norm(way), hapi_v3_norm(way + 3));
   for (int i = 0; i < 6; ++i) {
     way[i] *= scale;
   }
-  begin_step(p);
+  pair_begin_step(p);
   const double *at = p->pose[0].position;
   const double *q = p->pose[0].quat_wxyz;
   double turn[4] = {1.0, 0.5 * way[3], 0.5 * way[4], 0.5 * way[5]};
@@ -421,20 +423,20 @@ static double spring_rate(const pair *p, const hapi_constraint_row rows[6], int 
   hapi_quat_multiply(turn, q, to);
   dBodySetPosition(first, at[0] + way[0], at[1] + way[1], at[2] + way[2]);
   dBodySetQuaternion(first, to);
-  end_step(p, &with);
-  ask(p, rows, count, &with, without, &moved);
+  pair_end_step(p, &with);
+  rows_ask(p, rows, count, &with, without, &moved);
   return -(moved.target[which] - base->target[which]) / dot6(rows[which].wrench, way);
 }
 
-static bool is_spring(const hapi_constraint_row *row, const pair *p)
+static bool row_is_spring(const hapi_constraint_row *row, const pair *p)
 {
-  double response = response_of(p, row->wrench);
+  double response = wrench_response(p, row->wrench);
   return response < SPRING_SHARE * (response + row->softness);
 }
 
 /* What of the targets is error reduction: gone when the world has none. */
-static void find_errors(pair *p, const hapi_constraint_row rows[6], int count, const answer *base,
-                        const twists *without)
+static void pair_find_errors(pair *p, const hapi_constraint_row rows[6], int count,
+                             const answer *base, const twists *without)
 {
   double world_erp = dWorldGetERP(p->world);
   double erp = fmax(world_erp, hapi_joint_erp(p->known));
@@ -443,15 +445,15 @@ static void find_errors(pair *p, const hapi_constraint_row rows[6], int count, c
     twists with;
     dWorldSetERP(p->world, 0.0);
     hapi_joint_leave_open(p->known, true, p->ratio);
-    step(p, &with);
+    pair_step(p, &with);
     hapi_joint_leave_open(p->known, false, p->ratio);
     dWorldSetERP(p->world, world_erp);
-    ask(p, rows, count, &with, without, &none);
+    rows_ask(p, rows, count, &with, without, &none);
   }
   for (int r = 0; r < count; ++r) {
     hapi_measured_row *out = &p->m->found.rows[r];
-    bool spring = is_spring(&rows[r], p);
-    double rate = spring ? spring_rate(p, rows, count, r, base, without) : erp / p->period;
+    bool spring = row_is_spring(&rows[r], p);
+    double rate = spring ? row_spring_rate(p, rows, count, r, base, without) : erp / p->period;
     double back = spring ? (rate > 0.0 ? base->target[r] : 0.0) : base->target[r] - none.target[r];
     out->softness = (hapi_softness){rate * p->period, rows[r].softness * p->period, spring};
     out->error = rate > 0.0 ? back / rate : 0.0;
@@ -462,7 +464,7 @@ static void find_errors(pair *p, const hapi_constraint_row rows[6], int count, c
 
 /* ---- what turns with what ---- */
 
-static void turn_held(const double from[4], const double to[4], const double held[6][6],
+static void held_turn(const double from[4], const double to[4], const double held[6][6],
                       double out[6][6])
 {
   const double back[4] = {from[0], -from[1], -from[2], -from[3]};
@@ -488,7 +490,7 @@ static void turn_held(const double from[4], const double to[4], const double hel
 }
 
 /* Velocities in the measure of the free pair: of how much differs, and of all. */
-static double misfit(const pair *p, const double was[6][6], const double is[6][6])
+static double held_misfit(const pair *p, const double was[6][6], const double is[6][6])
 {
   double off = 0.0;
   double all = 0.0;
@@ -502,7 +504,7 @@ static double misfit(const pair *p, const double was[6][6], const double is[6][6
   return all > 0.0 ? sqrt(off / all) : 0.0;
 }
 
-static double angle_between(const double a[4], const double b[4])
+static double quat_angle_between(const double a[4], const double b[4])
 {
   double off = 0.0;
   double sign = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] < 0.0 ? -1.0 : 1.0;
@@ -512,18 +514,18 @@ static double angle_between(const double a[4], const double b[4])
   return 2.0 * sqrt(off);
 }
 
-/* With which of the bodies the last measurement should have been turned to give this one, and how far off it
- * was then at the end of its interval. */
-static void choose_carrier(pair *p, const double held[6][6], const double turn[2][4])
+/* With which of the bodies the last measurement should have been turned to give this one, and
+ * how far off it was then at the end of its interval. */
+static void pair_choose_carrier(pair *p, const double held[6][6], const double turn[2][4])
 {
   hapi_joint_measurement *m = p->m;
   double off[2];
   double angle = 0.0;
   for (int i = 0; i < 2; ++i) {
     double turned[6][6];
-    turn_held(m->turn[i], turn[i], (const double(*)[6])m->held, turned);
-    off[i] = misfit(p, (const double(*)[6])turned, held);
-    angle = fmax(angle, angle_between(m->turn[i], turn[i]));
+    held_turn(m->turn[i], turn[i], (const double(*)[6])m->held, turned);
+    off[i] = held_misfit(p, (const double(*)[6])turned, held);
+    angle = fmax(angle, quat_angle_between(m->turn[i], turn[i]));
   }
   uint32_t other = 1 - m->found.carrier;
   if (angle > TURNED_LEAST && off[other] < BETTER * off[m->found.carrier]) {
@@ -534,12 +536,12 @@ static void choose_carrier(pair *p, const double held[6][6], const double turn[2
 
 /* ---- a measurement ---- */
 
-static void into_carrier(const pair *p, const double v[3], double out[3])
+static void pair_into_carrier(const pair *p, const double v[3], double out[3])
 {
   hapi_quat_unrotate(p->pose[p->m->found.carrier].quat_wxyz, v, out);
 }
 
-static void find_place(const pair *p, hapi_joint_place *out)
+static void pair_find_place(const pair *p, hapi_joint_place *out)
 {
   const double *a = p->pose[0].quat_wxyz;
   const double *b = p->pose[1].quat_wxyz;
@@ -549,31 +551,33 @@ static void find_place(const pair *p, hapi_joint_place *out)
   hapi_quat_unrotate(b, p->apart, out->anchor_b);
 }
 
-static bool same_place(const hapi_joint_place *a, const hapi_joint_place *b)
+static bool place_is_same(const hapi_joint_place *a, const hapi_joint_place *b)
 {
   double apart[3];
   hapi_v3_sub(a->anchor_b, b->anchor_b, apart);
-  return hapi_v3_norm(apart) <= SAME_POSE && angle_between(a->turn, b->turn) <= SAME_POSE;
+  return hapi_v3_norm(apart) <= SAME_POSE && quat_angle_between(a->turn, b->turn) <= SAME_POSE;
 }
 
-static void write_rows(pair *p, const hapi_constraint_row rows[6], int count, const answer *base)
+static void pair_write_rows(pair *p, const hapi_constraint_row rows[6], int count,
+                            const answer *base)
 {
   hapi_measured_joint *out = &p->m->found;
+  HAPI_ASSERT(count >= 0 && count <= 6);
   for (int r = 0; r < count; ++r) {
-    into_carrier(p, rows[r].wrench, out->rows[r].force);
-    into_carrier(p, rows[r].wrench + 3, out->rows[r].torque);
+    pair_into_carrier(p, rows[r].wrench, out->rows[r].force);
+    pair_into_carrier(p, rows[r].wrench + 3, out->rows[r].torque);
   }
   double force[6];
   for (int i = 0; i < 6; ++i) {
     force[i] = base->given[i] / p->period;
   }
-  into_carrier(p, force, out->given);
-  into_carrier(p, force + 3, out->given + 3);
+  pair_into_carrier(p, force, out->given);
+  pair_into_carrier(p, force + 3, out->given + 3);
   out->row_count = (uint32_t)count;
   ++out->number;
 }
 
-static void keep_place(pair *p, const hapi_joint_place *place)
+static void pair_keep_place(pair *p, const hapi_joint_place *place)
 {
   p->m->place = *place;
   p->m->found.ahead_s = p->ahead_s;
@@ -581,15 +585,15 @@ static void keep_place(pair *p, const hapi_joint_place *place)
 }
 
 /* False: not to be used; *p says why. */
-static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *with,
-                         const twists *without)
+static bool pair_measure_rows(pair *p, const hapi_joint_place *place, const twists *with,
+                              const twists *without)
 {
   double held[6][6];
   double turn[2][4];
   hapi_constraint_row rows[6];
   int count = 0;
   answer base;
-  find_held(p, with, held);
+  pair_find_held(p, with, held);
   hapi_admittance kind =
       hapi_admittance_rows((const double(*)[6])p->free, (const double(*)[6])held, rows, &count);
   bool whole = p->lost <= MOMENTUM_SLACK; /* false for NaN */
@@ -602,20 +606,20 @@ static bool measure_rows(pair *p, const hapi_joint_place *place, const twists *w
   memcpy(turn[0], p->pose[0].quat_wxyz, sizeof turn[0]);
   memcpy(turn[1], p->pose[1].quat_wxyz, sizeof turn[1]);
   if (p->m->good) {
-    choose_carrier(p, (const double(*)[6])held, (const double(*)[4])turn);
+    pair_choose_carrier(p, (const double(*)[6])held, (const double(*)[4])turn);
   }
   memcpy(p->m->held, held, sizeof held);
   memcpy(p->m->turn, turn, sizeof turn);
-  ask(p, rows, count, with, without, &base);
-  find_errors(p, rows, count, &base, without);
-  write_rows(p, rows, count, &base);
-  keep_place(p, place);
+  rows_ask(p, rows, count, with, without, &base);
+  pair_find_errors(p, rows, count, &base, without);
+  pair_write_rows(p, rows, count, &base);
+  pair_keep_place(p, place);
   p->m->error = fmax(p->m->error, p->lost);
   return true;
 }
 
 /* The rows of the last measurement, world axes. */
-static int old_rows(const pair *p, hapi_constraint_row out[6])
+static int pair_old_rows(const pair *p, hapi_constraint_row out[6])
 {
   const hapi_measured_joint *found = &p->m->found;
   const double *q = p->pose[found->carrier].quat_wxyz;
@@ -628,16 +632,16 @@ static int old_rows(const pair *p, hapi_constraint_row out[6])
 }
 
 /* Whether a joint whose bodies are where they were asks for what it asked for. */
-static bool is_the_same(const pair *p, const twists *with, const twists *without)
+static bool pair_is_the_same(const pair *p, const twists *with, const twists *without)
 {
   hapi_constraint_row rows[6];
   answer now;
   const hapi_measured_joint *found = &p->m->found;
-  int count = old_rows(p, rows);
-  ask(p, rows, count, with, without, &now);
+  int count = pair_old_rows(p, rows);
+  rows_ask(p, rows, count, with, without, &now);
   double given[6];
-  into_carrier(p, now.given, given);
-  into_carrier(p, now.given + 3, given + 3);
+  pair_into_carrier(p, now.given, given);
+  pair_into_carrier(p, now.given + 3, given + 3);
   for (int i = 0; i < 6; ++i) {
     if (!(fabs(given[i] / p->period - found->given[i]) <= SAME_TARGET * p->mass / p->period)) {
       return false;
@@ -654,17 +658,17 @@ static bool is_the_same(const pair *p, const twists *with, const twists *without
 }
 
 /* One push along all axes: a joint set otherwise, or bodies of another mass, answer otherwise. */
-static bool answers_the_same(pair *p, const twists *with)
+static bool pair_answers_the_same(pair *p, const twists *with)
 {
   double wrench[6];
   double speed[6];
   double impulse[6];
   double reaction[2] = {0.0, 0.0};
   for (int k = 0; k < 6; ++k) {
-    wrench[k] = (1.0 + 0.1 * k) * push_size(p, k);
+    wrench[k] = (1.0 + 0.1 * k) * pair_push_size(p, k);
   }
-  push(p, wrench, with, impulse, reaction);
-  respond(&p->own, wrench, speed);
+  pair_push(p, wrench, with, impulse, reaction);
+  body_respond(&p->own, wrench, speed);
   double off[6];
   for (int i = 0; i < 6; ++i) {
     off[i] = impulse[i] + p->period * dot6(p->m->held[i], speed);
@@ -674,24 +678,24 @@ static bool answers_the_same(pair *p, const twists *with)
          fabs(off[4]) <= least * p->inertia[4] && fabs(off[5]) <= least * p->inertia[8];
 }
 
-static bool all_rest(const pair *p)
+static bool pair_rests(const pair *p)
 {
   return !dBodyIsEnabled(p->bodies[0]) &&
          (p->bodies[1] == NULL || dBodyIsKinematic(p->bodies[1]) || !dBodyIsEnabled(p->bodies[1]));
 }
 
 /* Where the axes of motors and stops are. ODE finds the angles of an AMotor as it steps. */
-static void read_axes(pair *p)
+static void pair_read_axes(pair *p)
 {
   hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
   hapi_joint_axis stepped[HAPI_JOINT_LIMITS] = {{0}};
   bool motor = dJointGetType(p->known->joint) == dJointTypeAMotor;
   bool second = p->m->first == 1;
   twists ignored;
-  begin_step(p);
+  pair_begin_step(p);
   int count = hapi_joint_axes(p->known, axes);
   if (motor) {
-    end_step(p, &ignored);
+    pair_end_step(p, &ignored);
     (void)hapi_joint_axes(p->known, stepped);
   }
   for (int i = 0; i < count; ++i) {
@@ -707,23 +711,23 @@ static void read_axes(pair *p)
   }
 }
 
-static void measure_pair(pair *p, const hapi_joint_place *place, bool same)
+static void pair_measure(pair *p, const hapi_joint_place *place, bool same)
 {
   twists with;
   twists without;
-  read_axes(p);
+  pair_read_axes(p);
   if (dJointGetType(p->known->joint) == dJointTypeAMotor) { /* nothing but motors and stops */
-    keep_place(p, place);
+    pair_keep_place(p, place);
     p->m->good = true;
     return;
   }
-  step(p, &with);
+  pair_step(p, &with);
   dJointDisable(p->known->joint);
-  step(p, &without);
+  pair_step(p, &without);
   dJointEnable(p->known->joint);
-  if (!same || !is_the_same(p, &with, &without) || !answers_the_same(p, &with)) {
+  if (!same || !pair_is_the_same(p, &with, &without) || !pair_answers_the_same(p, &with)) {
     p->m->good =
-        measure_rows(p, place, &with, &without); /* if not, the last rows serve once more */
+        pair_measure_rows(p, place, &with, &without); /* if not, the last rows serve once more */
   }
 }
 
@@ -738,7 +742,8 @@ static void say_refused(hapi_probe *probe, const hapi_cycle *cycle, refusal why)
   hapi_say_once(cycle, &probe->said_not_held, text);
 }
 
-/* With the world's and the joint's parameters as those of the tick, and no motors, stops and damping. */
+/* With the world's and the joint's parameters as those of the tick, and no motors, stops and
+ * damping. */
 static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
 {
   hapi_joint_limits limits;
@@ -751,9 +756,9 @@ static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
   dWorldSetCFM(p->world, tick_cfm);
   hapi_joint_soften(p->known, p->ratio);
   hapi_joint_take_limits(p->known, &limits);
-  switch_damping(p, false);
-  measure_pair(p, place, same);
-  switch_damping(p, true);
+  pair_switch_damping(p, false);
+  pair_measure(p, place, same);
+  pair_switch_damping(p, true);
   hapi_joint_give_limits(p->known, &limits);
   hapi_joint_restore(p->known);
   dWorldSetERP(p->world, erp);
@@ -768,9 +773,9 @@ static void joint_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi
   if (!pair_begin(&p, probe, cycle, world, slots, known)) {
     return;
   }
-  find_place(&p, &place);
-  bool same = p.m->good && same_place(&place, &p.m->place);
-  if (same && all_rest(&p)) {
+  pair_find_place(&p, &place);
+  bool same = p.m->good && place_is_same(&place, &p.m->place);
+  if (same && pair_rests(&p)) {
     return;
   }
   if (hapi_test_begin(&probe->test, world, cycle->probe_step_s) < HAP_OK ||

@@ -11,14 +11,13 @@
 #include <ode/ode.h>
 
 #include "near/slots.h"
+#include "probe/probe.h"
 #include "sync/messages.h"
 #include "world/cycle.h"
 #include "world/world.h"
 
-typedef struct hapi_probe hapi_probe;
-
-/* Of the joints that the range's walk of this number has taken, and of those that kept it from taking
- * a mechanism. Their measurements belong to the joints. */
+/* Of the joints that the range's walk of this number has taken, and of those that kept it from
+ * taking a mechanism. Their measurements belong to the joints. */
 void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
                        const hapi_slots *slots, uint64_t walk);
 

@@ -8,13 +8,13 @@
 #include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "probe/probe.h"
+#include "probe/accelerance.h"
 
 /* Testing simulations for bodies that the loop of model CONTACT meets but does not own: jointed
- * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of each
- * the response to a wrench at its centre of mass, 6x6, about the operating point: every probe has
- * the mean wrench of the last interval, so that contacts are loaded as they really are. The bodies
- * that the loop owns are not there in a probe: their contacts are the loop's. */
+ * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of
+ * each the response to a wrench at its centre of mass, 6x6, about the operating point: every
+ * probe has the mean wrench of the last interval, so that contacts are loaded as they really
+ * are. The bodies that the loop owns are not there in a probe: their contacts are the loop's. */
 
 /* Of the weight: within the plateau between rounding and another set of active contacts. */
 #define PROBE_SHARE 0.01
@@ -148,6 +148,7 @@ static void body_keep(hapi_probe *probe, const hapi_slots *slots, uint32_t index
     hapi_reuse_spoil(body_book(probe), &probe->test, slot->known);
     return;
   }
+  HAPI_ASSERT(hapi_assert_is_symmetric(a[0], 6));
   memcpy(answer->response, a, sizeof answer->response);
   answer_keep_b(answer, slot->exchanged, base);
   answer->measured = true;

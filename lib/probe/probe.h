@@ -3,16 +3,34 @@
 #ifndef HAPODE_PROBE_PROBE_H
 #define HAPODE_PROBE_PROBE_H
 
-/* Testing simulations: steps of the global world that are undone. */
+/* Testing simulations: steps of the global world that are undone. Made by accelerance.c,
+ * operating_point.c and joint_probe.c. */
 
 #include <stdbool.h>
 
-#include "probe/accelerance.h"
+#include "probe/admittance.h"
 #include "probe/answers.h"
-#include "probe/joint_probe.h"
-#include "probe/operating_point.h"
 #include "probe/reuse.h"
 #include "probe/test_set.h"
+
+/* A contact in the testing simulations of this cycle. */
+typedef struct hapi_contact_trial {
+  uint32_t round;        /* order among the contacts of its island */
+  double measured[6][3]; /* A, before it is known to be good */
+  double measured_turn[6];
+} hapi_contact_trial;
+
+typedef struct hapi_contact_trials {
+  hapi_pushed pushed;       /* slots of the contacts under test */
+  hapi_contact_trial *list; /* by slot */
+  uint32_t *rounds;         /* by island: contacts so far */
+} hapi_contact_trials;
+
+/* Model CONTACT. */
+typedef struct hapi_body_trials {
+  hapi_pushed pushed; /* slots of the bodies under test */
+  double (*base)[6];  /* their acceleration at the operating point, in the order of pushed */
+} hapi_body_trials;
 
 typedef struct hapi_probe_counts {
   uint64_t joint_steps; /* of joint_probe.c; those of a test set are in it */
@@ -40,8 +58,8 @@ void hapi_probe_finish(hapi_probe *probe);
 void hapi_probe_reset(hapi_probe *probe);
 /* Kind of an answer that was measured. */
 void hapi_probe_count(hapi_probe *probe, hapi_admittance kind);
-/* The island of a body in a slot joins the test set. *out_testable: it can be undone, else the body is
- * driven from now on. HAP_ERROR_MEMORY. */
+/* The island of a body in a slot joins the test set. *out_testable: it can be undone, else the
+ * body is driven from now on. HAP_ERROR_MEMORY. */
 hap_status hapi_probe_add_body(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
                                uint32_t body, bool *out_testable);
 

@@ -99,8 +99,9 @@ static uint32_t touch_count_pair(const hapi_touch_print *first, uint32_t most)
   return count;
 }
 
-/* A collider puts a point on the surface of one of the bodies, of either: where two faces lie on each other
- * the last digit decides. Both together have not moved, or their poses or depths would say so. */
+/* A collider puts a point on the surface of one of the bodies, of either: where two faces lie on
+ * each other the last digit decides. Both together have not moved, or their poses or depths
+ * would say so. */
 static void touch_apart(const hapi_touch_print *a, const hapi_touch_print *b, double out[3])
 {
   hapi_v3_sub(a->position, b->position, out);
@@ -142,8 +143,8 @@ static double touch_way_to_line(const hapi_touch_print *a, const hapi_touch_prin
   return touch_way(a, &between);
 }
 
-/* The points of a pair hold it by the area between them: where the borders of two faces nearly run along each
- * other a collider finds a point more somewhere on the border, or does not. */
+/* The points of a pair hold it by the area between them: where the borders of two faces nearly
+ * run along each other a collider finds a point more somewhere on the border, or does not. */
 static bool touch_lies_within(const hapi_touch_print *touch, const hapi_touch_print *those,
                               uint32_t count, double slack)
 {

@@ -2,11 +2,12 @@
  * SPDX-License-Identifier: MIT */
 #include <ode/ode.h>
 
-#include "probe/reuse.h"
+#include "probe/reuse_book.h"
 
-/* What ODE's getters say of a joint. Some of it has none: how a fixed joint or a slider has its bodies
- * turned. That shows as an error of the joint, which is in b; so b of an island with joints is always
- * measured. Of LMotor and Plane2D the axes or motors have no getter, and a transmission is not probed. */
+/* What ODE's getters say of a joint. Some of it has none: how a fixed joint or a slider has its
+ * bodies turned. That shows as an error of the joint, which is in b; so b of an island with
+ * joints is always measured. Of LMotor and Plane2D the axes or motors have no getter, and a
+ * transmission is not probed. */
 
 typedef void (*point_fn)(dJointID, dVector3);
 typedef dReal (*position_fn)(dJointID);

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "probe/reuse.h"
+#include "probe/reuse_book.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,32 +9,13 @@
 #include "base/alloc.h"
 #include "base/vec.h"
 
-/* All that decides what a testing simulation finds. Lengths are compared as they are, turns at the far
- * point of a body, velocities by the way of a step, forces by the way that they would push the body in
- * one. What only has kinds or is set by the application must be the same. Bodies are known by their birth and
- * not by their address, so that a replay decides as the run did; geoms by what their contacts are. */
+/* All that decides what a testing simulation finds. Lengths are compared as they are, turns at
+ * the far point of a body, velocities by the way of a step, forces by the way that they would
+ * push the body in one. What only has kinds or is set by the application must be the same.
+ * Bodies are known by their birth and not by their address, so that a replay decides as the run
+ * did; geoms by what their contacts are. */
 
 #define SAME (-1.0)
-
-void hapi_print_value(hapi_printer *p, double value, double weight)
-{
-  hapi_print_sheet *sheet = &p->book->now;
-  bool room =
-      sheet->count < sheet->capacity ||
-      hapi_reserve((void **)&sheet->items, &sheet->capacity, sheet->count, 1, sizeof *sheet->items);
-  if (!room || (weight >= 0.0 && !isfinite(value))) {
-    p->good = false;
-    return;
-  }
-  sheet->items[sheet->count++] = (hapi_print_item){value, value, weight};
-}
-
-void hapi_print_vector(hapi_printer *p, const double *values, int count, double weight)
-{
-  for (int i = 0; i < count; ++i) {
-    hapi_print_value(p, values[i], weight);
-  }
-}
 
 static void print_hash(hapi_printer *p, uint64_t hash)
 {
@@ -308,8 +289,9 @@ static bool members_sort(hapi_printer *p)
   return true;
 }
 
-/* A body that goes farther than that within a step will be elsewhere, or will have another velocity: what is
- * found now cannot be used again. Most islands that a hand pushes are left out here. */
+/* A body that goes farther than that within a step will be elsewhere, or will have another
+ * velocity: what is found now cannot be used again. Most islands that a hand pushes are left out
+ * here. */
 static bool island_moves_on(const hapi_printer *p)
 {
   const hapi_cycle *cycle = p->input->cycle;

@@ -7,11 +7,11 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 
-/* A geom that moves goes to the front of its space's list, and the order of the list is the order in
- * which contacts are found. Geoms of awake bodies have moved in the global step already and do not
- * go again; those of a sleeping body move only in the probes. For these the order is put back, and
- * for all where a test set asks for it: model CONTACT cleans the space before its probes, and what is
- * clean goes to the front once more. */
+/* A geom that moves goes to the front of its space's list, and the order of the list is the
+ * order in which contacts are found. Geoms of awake bodies have moved in the global step already
+ * and do not go again; those of a sleeping body move only in the probes. For these the order is
+ * put back, and for all where a test set asks for it: model CONTACT cleans the space before its
+ * probes, and what is clean goes to the front once more. */
 
 static bool order_has(const hapi_space_order *order, dSpaceID space)
 {
@@ -88,9 +88,9 @@ static void order_restore_space(const hapi_space_order *order, uint32_t first, u
   }
 }
 
-/* ODE ends the process where a geom that is to be cleaned is behind one that is clean: so all of them
- * are, before they change places. Inner spaces first, as a space whose list changes is to be cleaned, and
- * goes to the front of the one that it is in. */
+/* ODE ends the process where a geom that is to be cleaned is behind one that is clean: so all of
+ * them are, before they change places. Inner spaces first, as a space whose list changes is to
+ * be cleaned, and goes to the front of the one that it is in. */
 static void order_restore_at(const hapi_space_order *order, int depth)
 {
   uint32_t end = 0;

@@ -55,7 +55,8 @@ typedef struct hapi_test_set {
 
 /* Nothing is under test. step_s: of the steps to come. HAP_ERROR_MEMORY. */
 hap_status hapi_test_begin(hapi_test_set *test, const hapi_world *world, double step_s);
-/* The island of a body. *out_testable: it can be undone, else nothing was added. HAP_ERROR_MEMORY. */
+/* The island of a body. *out_testable: it can be undone, else nothing was added.
+ * HAP_ERROR_MEMORY. */
 hap_status hapi_test_add_island(hapi_test_set *test, uint32_t known, bool *out_testable);
 /* The newest island, whose members begin at first, is under test no more. */
 void hapi_test_drop_island(hapi_test_set *test, uint32_t first);

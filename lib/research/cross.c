@@ -10,8 +10,8 @@
 #include "base/clock.h"
 #include "base/vec.h"
 
-/* The testing simulations of a contact have the answers of the other bodies already; they only have to
- * be read. */
+/* The testing simulations of a contact have the answers of the other bodies already; they only
+ * have to be read. */
 
 /* Of what a free body would do: below it there is nothing but the solver's rounding. */
 #define SHARE_LEAST 1e-6
@@ -182,8 +182,8 @@ static void cross_begin(void *user, const hapi_reuse_book *book)
   }
 }
 
-/* What last_force does to the body by the blocks. Of a body that is not under test b was used again,
- * with nothing in it of what the block adds. */
+/* What last_force does to the body by the blocks. Of a body that is not under test b was used
+ * again, with nothing in it of what the block adds. */
 static void cross_take_out(void *user, uint32_t body, double io_b[6])
 {
   hapi_cross *cross = user;

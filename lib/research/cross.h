@@ -3,13 +3,13 @@
 #ifndef HAPODE_RESEARCH_CROSS_H
 #define HAPODE_RESEARCH_CROSS_H
 
-/* Cross accelerance: what a force at a pointer contact does to the other local bodies of its island.
- * Nothing where the effect is off. */
+/* Cross accelerance: what a force at a pointer contact does to the other local bodies of its
+ * island. Nothing where the effect is off. */
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "probe/probe.h"
+#include "probe/accelerance.h"
 #include "sync/messages.h"
 
 /* Of a contact and a body that it does not push. */

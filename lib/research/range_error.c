@@ -10,9 +10,9 @@
 #include "base/vec.h"
 
 /* What the loop owns needs no testing simulation; here it has some all the same, 1 + 3 for each
- * neighbour, of its whole island with all contacts and joints, about the force that the pointer gives.
- * What they foretell of the next interval is compared with what the loop then made of it: a measure of
- * what lies beyond the range, and of what is linear about the scene. */
+ * neighbour, of its whole island with all contacts and joints, about the force that the pointer
+ * gives. What they foretell of the next interval is compared with what the loop then made of it:
+ * a measure of what lies beyond the range, and of what is linear about the scene. */
 
 #define PROBE_SHARE 0.01 /* of the weight */
 
