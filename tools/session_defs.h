@@ -8,7 +8,8 @@
 #include <hapode/expert.h>
 #include <hapode/research.h>
 
-/* Defaults. *def refers to the other two, which must stay where they are until the session is created. */
+/* Defaults. *def refers to the other two, which must stay where they are until the session is
+ * created. */
 static inline void session_defs_init(hap_session_def *def, hap_expert_def *expert,
                                      hap_research_def *research)
 {

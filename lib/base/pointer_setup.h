@@ -7,8 +7,8 @@
 #include <hapode/pointer.h>
 #include <hapode/research.h>
 
-/* A pointer's three structs of the API in one, as checked by lib/session. Recordings hold it: a member
- * that moves needs another version of the file. Units and ranges are those of the API. */
+/* A pointer's three structs of the API in one, as checked by lib/session. Recordings hold it: a
+ * member that moves needs another version of the file. Units and ranges are those of the API. */
 typedef struct hapi_pointer_setup {
   uint32_t size;   /* of this struct */
   uint32_t cookie; /* that of hap_pointer_def: a mark in recordings */

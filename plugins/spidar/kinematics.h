@@ -21,8 +21,8 @@ typedef struct hapi_spidar_rows {
   double moment[HAPI_SPIDAR_STRINGS_MAX][3]; /* m, arm of the string x unit; 0 for 3 dof */
 } hapi_spidar_rows;
 
-/* A tension t of string i puts force t unit[i] and torque t moment[i] about the grip's origin on the grip;
- * a twist shortens the string by unit[i] . linear + moment[i] . angular a second. */
+/* A tension t of string i puts force t unit[i] and torque t moment[i] about the grip's origin on
+ * the grip; a twist shortens the string by unit[i] . linear + moment[i] . angular a second. */
 void hapi_spidar_rows_at(const hapi_spidar_model *model, const hap_pose *pose,
                          hapi_spidar_rows *out);
 
@@ -59,28 +59,31 @@ typedef struct hapi_spidar_solver {
 void hapi_spidar_solver_init(hapi_spidar_solver *solver, const hapi_spidar_model *model,
                              const hap_pose *start);
 
-/* Goes from solver->pose to the pose whose lengths [m] are nearest to the measured ones, by least squares. At
- * most 6 steps of at most 10 mm and 0.3 rad; never worse than before. The pose stays finite, within the box
- * of the motors or twice the workspace, and turned by at most workspace_turn + 40 degrees. */
+/* Goes from solver->pose to the pose whose lengths [m] are nearest to the measured ones, by
+ * least squares. At most 6 steps of at most 10 mm and 0.3 rad; never worse than before. The pose
+ * stays finite, within the box of the motors or twice the workspace, and turned by at most
+ * workspace_turn + 40 degrees. */
 hapi_spidar_fit hapi_spidar_solve(hapi_spidar_solver *solver, const hapi_spidar_model *model,
                                   const double lengths[HAPI_SPIDAR_STRINGS_MAX]);
 
-/* Twist that fits the rates of the lengths [m/s] at the pose best; zero where a rate is not finite. */
+/* Twist that fits the rates of the lengths [m/s] at the pose best; zero where a rate is not
+ * finite. */
 void hapi_spidar_twist(const hapi_spidar_model *model, const hap_pose *pose,
                        const double rates[HAPI_SPIDAR_STRINGS_MAX], hap_twist *out);
 
 /* ---- what is wrong when the fit is poor ---- */
 
 typedef struct hapi_spidar_diagnosis {
-  uint32_t
-      suspects; /* bit i: without string i all others fit a pose. None: more than one string is wrong,
-                        or offsets or geometry are. All: there is no string to spare that could tell */
-  double error
-      [HAPI_SPIDAR_STRINGS_MAX]; /* m, of a suspect, measured minus fitting: above 0 it is slack,
-                                            below 0 it was wound in: broken, or off the grip */
+  /* bit i: without string i all others fit a pose. None: more than one string is wrong, or offsets
+   * or geometry are. All: there is no string to spare that could tell */
+  uint32_t suspects;
+  /* m, of a suspect, measured minus fitting: above 0 it is slack, below 0 it was wound in: broken,
+   * or off the grip */
+  double error[HAPI_SPIDAR_STRINGS_MAX];
 } hapi_spidar_diagnosis;
 
-/* Leaves out each string in turn, from the last pose that fitted. Bounded, but some 40 us: once a fault. */
+/* Leaves out each string in turn, from the last pose that fitted. Bounded, but some 40 us: once
+ * a fault. */
 void hapi_spidar_diagnose(const hapi_spidar_model *model, const hap_pose *good,
                           const double lengths[HAPI_SPIDAR_STRINGS_MAX],
                           hapi_spidar_diagnosis *out);
