@@ -113,10 +113,10 @@ static void *heap_allocate(size_t size)
 
 static void heap_release(void *memory)
 {
-  heap_block *block = (heap_block *)memory - 1;
   if (memory == NULL) {
     return;
   }
+  heap_block *block = (heap_block *)memory - 1;
   if (block->grains >= HEAP_SIZES || heap_dice(4) == 0) {
     free(block);
     return;

@@ -316,7 +316,7 @@ static void body_place(use *u, dBodyID body)
 
 static void body_turn(use *u, dBodyID body)
 {
-  dQuaternion q;
+  dQuaternion q = {1.0, 0.0, 0.0, 0.0};
   dice_fill(u, -1.0, 1.0, 4, q);
   q[0] += 2.5;
   dNormalize4(q);
@@ -468,7 +468,7 @@ static void joint_place(use *u, dJointID joint)
   dBodyID b = dJointGetBody(joint, 1);
   dBodyID body = a != NULL ? a : b;
   double p[3];
-  dVector3 d;
+  dVector3 d = {0.0};
   dVector3 e;
   dice_fill(u, -0.04, 0.04, 3, p);
   dice_fill(u, -0.3, 0.3, 3, d);

@@ -7,10 +7,6 @@
 #include <string.h>
 
 #include "base/assert.h"
-#include "base/def.h"
-#include "base/hooks.h"
-
-#define HOOKS_COOKIE 0x48484b31u
 
 static void *default_allocate(size_t size, void *user)
 {
@@ -40,35 +36,17 @@ const hap_hooks *hapi_hooks(void)
   return &current;
 }
 
-void hap_hooks_init(hap_hooks *hooks, size_t size_of_hooks)
+void hapi_hooks_use(const hap_hooks *hooks)
 {
-  const hap_hooks none = {.cookie = HOOKS_COOKIE};
-  hapi_def_init(hooks, size_of_hooks, &none, sizeof none);
-}
-
-hap_status hap_hooks_set(const hap_hooks *hooks)
-{
-  hap_hooks wanted;
-  hap_hooks_init(&wanted, sizeof wanted);
-  hap_status status = hooks == NULL ? HAP_OK
-                                    : hapi_def_read(&wanted, sizeof wanted, hooks, HOOKS_COOKIE,
-                                                    "hap_hooks_init", NULL);
-  if (status < HAP_OK) {
-    return status;
+  HAPI_ASSERT((hooks->allocate == NULL) == (hooks->release == NULL));
+  current = *hooks;
+  if (current.allocate == NULL) {
+    current.allocate = default_allocate;
+    current.release = default_release;
   }
-  /* Half a pair would free the memory of one heap in another. */
-  if ((wanted.allocate == NULL) != (wanted.release == NULL)) {
-    return HAP_ERROR_ARGUMENT;
+  if (current.log == NULL) {
+    current.log = default_log;
   }
-  if (wanted.allocate == NULL) {
-    wanted.allocate = default_allocate;
-    wanted.release = default_release;
-  }
-  if (wanted.log == NULL) {
-    wanted.log = default_log;
-  }
-  current = wanted;
-  return HAP_OK;
 }
 
 void *hapi_alloc(size_t size)

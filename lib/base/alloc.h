@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <hapode/hooks.h>
+
 /* The one door to the heap: goes through hap_hooks. Never on the haptic thread while it ticks. */
 
 void *hapi_alloc(size_t size);                     /* zeroed; NULL when there is none */
@@ -14,5 +16,10 @@ void *hapi_alloc_array(size_t count, size_t size); /* zeroed; NULL on overflow a
 void hapi_free(void *memory);                      /* NULL allowed */
 /* Grows an array of elements of one size to hold count more than those in use; false: no memory. */
 bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size);
+
+/* The hooks in force; every member but user is callable. Only base/ calls through them. */
+const hap_hooks *hapi_hooks(void);
+/* Takes them over. NULL members get their defaults: of allocate and release none or both. */
+void hapi_hooks_use(const hap_hooks *hooks);
 
 #endif

@@ -5,7 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "base/hooks.h"
+#include "base/alloc.h"
 
 void hapi_log(hap_log_level level, const char *format, ...)
 {

@@ -218,9 +218,8 @@ static bool contact_place(const hapi_touches *touches, const hapi_pointer *p,
 static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const hapi_bodies *bodies,
                            hapi_touches *touches, hapi_local_contact *c, hapi_effect_sample *sample)
 {
-  plane at;
+  plane at = {.body = hapi_bodies_at(bodies, c->body)};
   double depth = 0.0;
-  at.body = hapi_bodies_at(bodies, c->body);
   hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
   if (!contact_place(touches, p, c, &at)) {

@@ -19,8 +19,8 @@ bool hapi_proxy_end(hapi_pointer *pointer);
 /* A proxy at the tick's begin. */
 void hapi_proxy_place(hapi_pointer *pointer, double period);
 
-/* The velocity that a proxy would have with nothing in touch. */
-void hapi_proxy_free(hapi_pointer *pointer, double period, double v[6]);
+/* The velocity that a proxy would have with nothing in touch. t: s, the period. */
+void hapi_proxy_free(hapi_pointer *p, double t, double v[6]);
 
 /* Where a proxy goes, and the force on the hand. False: its state is not finite; it is where the
  * device is. */

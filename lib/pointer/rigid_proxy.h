@@ -30,7 +30,7 @@ void hapi_rigid_set_reach(hapi_pointer *pointer, double period, const double way
 void hapi_rigid_push_out(hapi_pointer *pointer, double period, double v[6], double free[6]);
 
 /* From where it was at the tick's begin. */
-void hapi_rigid_proxy_move(hapi_pointer *pointer, double period, const double v[6],
+void hapi_rigid_proxy_move(hapi_pointer *p, double period, const double solved[6],
                            const hap_pose *from);
 
 #endif

@@ -362,10 +362,10 @@ static void answers_take_free(hapi_answers *answers, const hapi_cycle *cycle,
     const hapi_body_slot *slot = &slots->bodies[i];
     hapi_body_answer *answer = &answers->bodies[i];
     bool live = slot->phase == HAPI_SLOT_LIVE && (answer->flags & HAPI_BODY_DRIVEN) == 0;
-    const hapi_known_body *known = live ? &world->bodies.entries[slot->known] : NULL;
-    answer->known_free = looks && known != NULL && known->body != NULL && body_is_free(known->body);
+    dBodyID body = live ? world->bodies.entries[slot->known].body : NULL;
+    answer->known_free = looks && body != NULL && body_is_free(body);
     if (answer->known_free) {
-      body_fill_free(world, known, answer->b);
+      body_fill_free(world, &world->bodies.entries[slot->known], answer->b);
     }
   }
   for (uint32_t i = 0; looks && i < slots->contact_high; ++i) {

@@ -11,13 +11,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/pointer_setup.h"
-
-#include "base/hash.h"
-
 #include "base/assert.h"
-
 #include "base/hash.h"
+#include "base/pointer_setup.h"
 
 typedef enum hapi_stream {
   HAPI_STREAM_HAPTIC = 0,

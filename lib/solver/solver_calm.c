@@ -99,8 +99,8 @@ static bool rays_measure(hapi_solver *solver, rays *r)
       without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
       double a = row->impulse * without;
       double b = a - row->impulse * hapi_row_error(solver, row);
-      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign): cleared above, for every
-       * island */
+      /* cleared above, for every island */
+      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
       of->a += a;
       of->b += b;
       of->size += fabs(a) + fabs(b);
