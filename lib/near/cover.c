@@ -6,11 +6,11 @@
 #include "base/clock.h"
 #include "near/cover.h"
 
-/* Many small questions to a space, answered from one. ODE's hash space looks at each of its geoms to find
- * those near one, so a walk over dozens of bodies would cost dozens of passes over the world. Here
- * the space is asked once for a box that holds what the last round of questions asked for; its geoms are
- * kept in the order in which ODE gave them, with their boxes. A question inside the box is
- * answered from the list, with the geoms and in the order that ODE itself would give. */
+/* Many small questions to a space, answered from one. ODE's hash space looks at each of its geoms
+ * to find those near one, so a walk over dozens of bodies would cost dozens of passes over the
+ * world. Here the space is asked once for a box that holds what the last round of questions asked
+ * for; its geoms are kept in the order in which ODE gave them, with their boxes. A question inside
+ * the box is answered from the list, with the geoms and in the order that ODE itself would give. */
 
 #define GROWTH 0.5 /* of its length on each side: a walk that leaves the box asks few times more */
 

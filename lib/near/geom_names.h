@@ -3,9 +3,9 @@
 #ifndef HAPODE_NEAR_GEOM_NAMES_H
 #define HAPODE_NEAR_GEOM_NAMES_H
 
-/* Numbers for the geoms near the pointers. A new geom may have the address of one that was destroyed, or
- * another address, as the heap decides. What goes on with the state of an old geom must not depend
- * on that: it compares these numbers, not addresses. */
+/* Numbers for the geoms near the pointers. A new geom may have the address of one that was
+ * destroyed, or another address, as the heap decides. What goes on with the state of an old geom
+ * must not depend on that: it compares these numbers, not addresses. */
 
 #include <ode/ode.h>
 

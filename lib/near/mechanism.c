@@ -3,8 +3,8 @@
 #include "base/assert.h"
 #include "near/near.h"
 
-/* Bodies that joints tie together, without what is tied to them through the static world or a kinematic
- * body. */
+/* Bodies that joints tie together, without what is tied to them through the static world or a
+ * kinematic body. */
 
 static const hapi_known_body *known_body(const hapi_nearby *nearby, uint32_t known)
 {

@@ -88,8 +88,8 @@ static bool read_mesh(dGeomID geom, hapi_mesh *mesh)
   return true;
 }
 
-/* Some of its triangles are where they were: another mesh may have come to be at the address of geom and
- * data, or its corners may have been moved. */
+/* Some of its triangles are where they were: another mesh may have come to be at the address of
+ * geom and data, or its corners may have been moved. */
 static bool samples_agree(const hapi_mesh *mesh)
 {
   const double *at = dGeomGetPosition(mesh->geom);

@@ -25,8 +25,8 @@ typedef struct hapi_near_counts {
   uint32_t range_joints;
 } hapi_near_counts;
 
-/* What the walks of a cycle have met of a body, by its entry of the body table. Walks have the number
- * of the model that they are for. */
+/* What the walks of a cycle have met of a body, by its entry of the body table. Walks have the
+ * number of the model that they are for. */
 typedef struct hapi_visit {
   uint64_t chosen_in;   /* a neighbour of this model */
   uint64_t ranged_in;   /* in the queue of the range */

@@ -14,8 +14,8 @@
 /* The range of model CONTACT: a walk from the neighbours over what they may touch before the next
  * sync, nearest first, until the loop's capacity is used. Each body gets one of four roles:
  *
- *   owned      bodies of shapes that the contact thread knows, free or in joints that the loop has: it
- *              moves them
+ *   owned      bodies of shapes that the contact thread knows, free or in joints that the loop
+ *              has: it moves them
  *   measured   in other joints, or on ground that only ODE's collider knows: testing simulations
  *   outside    beyond the capacity: a moving boundary
  *   driven     kinematic
@@ -166,8 +166,8 @@ static uint64_t pair_key(uint64_t a, uint64_t b, uint32_t part)
   return hapi_index_mix(both) ^ hapi_index_mix(part + 1u);
 }
 
-/* Where nobody said that a geom was destroyed: its body's slot has another generation, if the body has
- * gone, too. */
+/* Where nobody said that a geom was destroyed: its body's slot has another generation, if the body
+ * has gone, too. */
 static uint64_t geom_holder(const hapi_near_geom *geom)
 {
   return geom->body == HAPI_SLOT_NONE
@@ -309,8 +309,8 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
   }
 }
 
-/* What the hulls may touch, for the contact thread. A body that they touch and that the loop does not own is
- * measured as a whole: its contacts are not known before. */
+/* What the hulls may touch, for the contact thread. A body that they touch and that the loop does
+ * not own is measured as a whole: its contacts are not known before. */
 static void take_tools(hapi_nearby *nearby, uint32_t hit_count)
 {
   for (uint32_t i = 0; i < hit_count; ++i) {
@@ -596,8 +596,8 @@ static bool may_own(const hapi_nearby *nearby, uint32_t known)
          hapi_nearby_chose(nearby, known, nearby->cycle->model_number + 1);
 }
 
-/* A mechanism is owned as a whole: a joint between what the loop moves and what ODE moves would be in
- * neither. Room for its bodies is taken first, then their contacts. */
+/* A mechanism is owned as a whole: a joint between what the loop moves and what ODE moves would be
+ * in neither. Room for its bodies is taken first, then their contacts. */
 static bool mechanism_can_be_owned(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;

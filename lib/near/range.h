@@ -3,8 +3,8 @@
 #ifndef HAPODE_NEAR_RANGE_H
 #define HAPODE_NEAR_RANGE_H
 
-/* Model CONTACT: the bodies that the loop moves itself, from the neighbours on over contacts and joints,
- * and what of the world they may meet. */
+/* Model CONTACT: the bodies that the loop moves itself, from the neighbours on over contacts and
+ * joints, and what of the world they may meet. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -74,8 +74,8 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count);
 void hapi_range_publish(hapi_nearby *nearby); /* with the model of the same number */
 
 /* mechanism.c */
-/* The bodies that joints tie to this one, itself first, into range.mechanism, and their joints behind
- * its joints; false: they cannot be owned. */
+/* The bodies that joints tie to this one, itself first, into range.mechanism, and their joints
+ * behind its joints; false: they cannot be owned. */
 bool hapi_mechanism_gather(hapi_nearby *nearby, uint32_t known);
 void hapi_mechanism_take(hapi_nearby *nearby); /* the joints are in the model */
 void hapi_mechanism_drop(hapi_nearby *nearby); /* they are not */

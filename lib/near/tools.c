@@ -9,9 +9,9 @@
 #include "near/near.h"
 #include "sync/mesh_filter.h"
 
-/* Pointers that are hulls: the patches between them and the geoms near them. Models SINGLE, IMPULSE and
- * ACCELERANCE have their points from here, each a contact with an A of its own; model CONTACT asks here
- * what is near, and its contact thread finds the points. */
+/* Pointers that are hulls: the patches between them and the geoms near them. Models SINGLE, IMPULSE
+ * and ACCELERANCE have their points from here, each a contact with an A of its own; model CONTACT
+ * asks here what is near, and its contact thread finds the points. */
 
 /* The pointer in the world, as proximity and the messages see it. */
 static hapi_touch_side side_of_pointer(const hapi_tool_at *at, const hap_pose *pose)
