@@ -540,9 +540,9 @@ static void report_sweeps(bench *b, const fig67_group *groups, size_t count)
 /* ---- the two programs ---- */
 
 static const int touching_full[] = {10, 1, 20, 40, 80, 130, 200, 300, 1000, 4000, 0};
-static const int touching_quick[] = {10, 1, 80, 300, 0};
+static const int touching_quick[] = {10, 1, 80, 160, 0};
 static const int separate_full[] = {1, 10, 80, 300, 1000, 4000, 0};
-static const int separate_quick[] = {10, 80, 300, 0};
+static const int separate_quick[] = {10, 80, 160, 0};
 static const int at_once_full[] = {1, 2, 4, 8, 16, 32, 64, 128, 256, 0};
 static const int at_once_quick[] = {1, 16, 256, 0};
 

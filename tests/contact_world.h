@@ -138,10 +138,26 @@ static inline void cw_open(contact_world *w, double gravity)
 
 static inline void cw_close(contact_world *w)
 {
+  if (w->world == NULL) { /* closed already */
+    return;
+  }
   hap_session_destroy(w->session);
   dSpaceDestroy(w->space);
   dWorldDestroy(w->world);
   memset(w, 0, sizeof *w);
+}
+
+static inline void cw_close_owned(void *owned)
+{
+  cw_close(owned);
+}
+
+/* Closed when the test has ended. */
+static inline contact_world *cw_new(double gravity)
+{
+  contact_world *w = tap_own(sizeof *w, cw_close_owned);
+  cw_open(w, gravity);
+  return w;
 }
 
 static inline dBodyID cw_add(contact_world *w, dGeomID geom, const dMass *mass, double x, double y,
@@ -302,6 +318,13 @@ static inline void cw_move_hand(contact_world *w, double vx, double vy, double v
   w->hand_velocity[0] = vx;
   w->hand_velocity[1] = vy;
   w->hand_velocity[2] = vz;
+}
+
+/* Moves the hand at a velocity for some ticks. */
+static inline void cw_go(contact_world *w, double vx, double vy, double vz, int ticks)
+{
+  cw_move_hand(w, vx, vy, vz);
+  cw_run(w, ticks);
 }
 
 static inline double cw_norm(const double v[3])

@@ -57,53 +57,9 @@ static void random_quat(uint64_t *state, double out[4])
   hapi_quat_normalize(out);
 }
 
-static double random_size(uint64_t *state)
-{
-  return pow(10.0, random_in(state, -2.0, 0.0));
-}
-
-static void hull_make(thing *t, uint64_t *state)
-{
-  static const double corner[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
-  for (int k = 0; k < 4; ++k) {
-    for (int i = 0; i < 3; ++i) {
-      t->points[3 * k + i] = t->shape.half[i] * (corner[k][i] + random_in(state, -0.2, 0.2));
-    }
-  }
-  for (int k = 4; k < HULL_POINTS; ++k) {
-    for (int i = 0; i < 3; ++i) {
-      t->points[3 * k + i] = 0.24 * (t->points[i] + t->points[3 + i] + t->points[6 + i]) +
-                             0.28 * t->points[9 + i] + 0.02 * t->points[3 * (k - 4) + i];
-    }
-  }
-  t->shape.hull = t->points;
-  t->shape.hull_count = HULL_POINTS;
-}
-
-static void thing_make(thing *t, hapi_shape_kind kind, uint64_t *state)
-{
-  memset(t, 0, sizeof *t);
-  t->shape.kind = kind;
-  t->shape.radius = random_size(state);
-  for (int i = 0; i < 3; ++i) {
-    t->shape.half[i] = random_size(state);
-  }
-  if (kind == HAPI_SHAPE_HULL) {
-    hull_make(t, state);
-  }
-  random_quat(state, t->pose.quat_wxyz);
-}
-
-static double thing_size(const thing *t)
-{
-  const hapi_shape *s = &t->shape;
-  return s->kind == HAPI_SHAPE_PLANE
-             ? 0.0
-             : fmax(s->radius, fmax(s->half[0], fmax(s->half[1], s->half[2])));
-}
-
 /* --- oracle --------------------------------------------------------------------------------- */
 
+/* Largest value of x.n over the shape, in its own frame. */
 static double local_extent(const thing *t, const double n[3])
 {
   const hapi_shape *s = &t->shape;
@@ -136,6 +92,7 @@ static double extent(const thing *t, double sign, const double normal[3])
   return local_extent(t, n);
 }
 
+/* The positions enter by their difference: at an offset of 10 km this loses nothing. */
 static double separation(const thing *a, const thing *b, const double normal[3])
 {
   double between[3];
@@ -197,6 +154,21 @@ static double height(const thing *t, const double world[3])
       break;
   }
   return above_tetrahedron(s->hull, p);
+}
+
+static bool nearest(const thing *a, const thing *b, hapi_nearest *out)
+{
+  return hapi_nearest_points(&a->shape, &a->pose, &b->shape, &b->pose, out);
+}
+
+static void box_to_hull(const thing *box, thing *hull, double corners[24])
+{
+  for (int i = 0; i < 24; ++i) {
+    int axis = i % 3;
+    corners[i] = (i / 3 >> axis & 1) != 0 ? box->shape.half[axis] : -box->shape.half[axis];
+  }
+  *hull = *box;
+  hull->shape = (hapi_shape){.kind = HAPI_SHAPE_HULL, .hull = corners, .hull_count = 8};
 }
 
 #endif

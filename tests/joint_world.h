@@ -85,6 +85,26 @@ static inline bool start_mechanism(mechanism *m)
   return cw_start_following(&m->w, 0.0, 0.0, BALL + m->w.hand_def.radius + NEAR);
 }
 
+static inline void mechanism_owned(void *owned)
+{
+  cw_close(&((mechanism *)owned)->w);
+}
+
+/* Closed when the test has ended. */
+static inline mechanism *mechanism_new(build_fn build, double gravity)
+{
+  mechanism *m = tap_own(sizeof *m, mechanism_owned);
+  open_mechanism(m, build, gravity);
+  return m;
+}
+
+/* The same, started; NULL when not. */
+static inline mechanism *mechanism_running(build_fn build, double gravity)
+{
+  mechanism *m = mechanism_new(build, gravity);
+  return start_mechanism(m) ? m : NULL;
+}
+
 static inline bool begin(mechanism *m, build_fn build, double gravity)
 {
   open_mechanism(m, build, gravity);

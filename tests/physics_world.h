@@ -55,10 +55,26 @@ static inline void world_open(test_world *w, double gravity, int iterations)
 
 static inline void world_close(test_world *w)
 {
+  if (w->world == NULL) { /* closed already */
+    return;
+  }
   hap_session_destroy(w->session);
   dSpaceDestroy(w->space);
   dWorldDestroy(w->world);
   memset(w, 0, sizeof *w);
+}
+
+static inline void world_close_owned(void *owned)
+{
+  world_close(owned);
+}
+
+/* Closed when the test has ended. */
+static inline test_world *world_new(double gravity, int iterations)
+{
+  test_world *w = tap_own(sizeof *w, world_close_owned);
+  world_open(w, gravity, iterations);
+  return w;
 }
 
 static inline dBodyID world_add(test_world *w, dGeomID geom, const dMass *mass, double x, double y,

@@ -90,9 +90,34 @@ static inline bool stage_run(stage *s, hap_drive drive)
 
 static inline void stage_end(stage *s)
 {
+  if (s->world == NULL) { /* closed already */
+    return;
+  }
   hap_session_destroy(s->session);
   dSpaceDestroy(s->space);
   dWorldDestroy(s->world);
+  s->world = NULL;
+}
+
+static inline void stage_end_owned(void *owned)
+{
+  stage_end(owned);
+}
+
+/* Closed when the test has ended. */
+static inline stage *stage_new(hap_drive drive)
+{
+  stage *s = tap_own(sizeof *s, stage_end_owned);
+  stage_init(s, drive);
+  return s;
+}
+
+/* Created and started; NULL when not. */
+static inline stage *stage_running(hap_drive drive)
+{
+  stage *s = stage_new(drive);
+  bool runs = stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK;
+  return runs ? s : NULL;
 }
 
 static inline hap_stats stats_of(const stage *s)

@@ -4,11 +4,13 @@
 #include "tests/tap.h"
 
 #include <stdarg.h>
+#include <time.h>
 
 #include <ode/ode.h>
 
 #define TAP_SHOWN_MAX 20
 #define TAP_ENDS_MAX 8
+#define TAP_SLOW 1.0 /* s: what takes longer is said */
 
 int tap_failures;
 const char *tap_argument = "";
@@ -19,6 +21,14 @@ static char tap_reason[512]; /* why the running test is skipped; empty: it is no
 static int tap_exit_code;    /* when no test is run */
 static void (*tap_ends[TAP_ENDS_MAX])(void);
 static int tap_end_count;
+
+typedef struct tap_owned {
+  struct tap_owned *older;
+  void (*finish)(void *owned);
+  max_align_t memory[];
+} tap_owned;
+
+static tap_owned *tap_newest; /* of the running test */
 
 void tap_note(const char *file, int line, const char *what)
 {
@@ -37,6 +47,16 @@ void tap_check_near(double a, double b, double tolerance, const char *file, int 
              fabs(a - b), tolerance);
     tap_note(file, line, text);
   }
+}
+
+void tap_say(const char *format, ...)
+{
+  va_list list;
+  va_start(list, format);
+  printf("# ");
+  vprintf(format, list);
+  printf("\n");
+  va_end(list);
 }
 
 void tap_skip(const char *format, ...)
@@ -60,6 +80,33 @@ bool tap_bail_out(const char *reason)
   return false;
 }
 
+void *tap_own(size_t size, void (*finish)(void *owned))
+{
+  tap_owned *owned = calloc(1, sizeof *owned + size);
+  if (owned == NULL) {
+    printf("Bail out! no memory\n");
+    exit(1);
+  }
+  owned->older = tap_newest;
+  owned->finish = finish;
+  tap_newest = owned;
+  return owned->memory;
+}
+
+void tap_release(void *memory)
+{
+  tap_owned **at = &tap_newest;
+  while (*at != NULL && (void *)(*at)->memory != memory) {
+    at = &(*at)->older;
+  }
+  tap_owned *owned = *at;
+  if (owned != NULL) {
+    *at = owned->older;
+    owned->finish(memory);
+    free(owned);
+  }
+}
+
 void tap_at_end(void (*function)(void))
 {
   for (int i = 0; i < tap_end_count; ++i) {
@@ -73,11 +120,26 @@ void tap_at_end(void (*function)(void))
   tap_ends[tap_end_count++] = function;
 }
 
+static double tap_seconds(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
 void tap_run(void (*test)(void), const char *name)
 {
+  double begin = tap_seconds();
   tap_failures = 0;
   tap_reason[0] = '\0';
   test();
+  while (tap_newest != NULL) {
+    tap_release(tap_newest->memory);
+  }
+  double seconds = tap_seconds() - begin;
+  if (seconds > TAP_SLOW) {
+    printf("# %.1f s: %s\n", seconds, name);
+  }
   ++tap_count;
   tap_failed_points += tap_failures != 0;
   bool skipped = tap_reason[0] != '\0' && tap_failures == 0;
@@ -92,6 +154,27 @@ int tap_done(void)
   return tap_failed_points == 0 && tap_count > 0 ? 0 : 1;
 }
 
+/* A name that begins with one of the words, which commas part. */
+static bool tap_is_listed(const char *name, const char *words)
+{
+  while (*words != '\0') {
+    size_t length = strcspn(words, ",");
+    if (length > 0 && strncmp(name, words, length) == 0) {
+      return true;
+    }
+    words += length + (words[length] == ',');
+  }
+  return false;
+}
+
+static bool tap_is_asked(const char *name)
+{
+  if (strncmp(tap_argument, "only=", 5) == 0) {
+    return tap_is_listed(name, tap_argument + 5);
+  }
+  return strncmp(tap_argument, "except=", 7) != 0 || !tap_is_listed(name, tap_argument + 7);
+}
+
 int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc, char **argv)
 {
   tap_argument = argc > 1 ? argv[1] : "";
@@ -100,7 +183,9 @@ int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc
     dInitODE2(0);
     dAllocateODEDataForThread(dAllocateMaskAll);
     for (size_t i = 0; i < count; ++i) {
-      tap_run(tests[i].run, tests[i].name);
+      if (tap_is_asked(tests[i].name)) {
+        tap_run(tests[i].run, tests[i].name);
+      }
     }
   }
   while (tap_end_count > 0) {

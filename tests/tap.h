@@ -21,6 +21,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <hapode/attributes.h>
+
 typedef struct tap_test {
   const char *name;
   void (*run)(void);
@@ -32,15 +34,21 @@ extern const char *tap_argument; /* the program's first, or "" */
 void tap_note(const char *file, int line, const char *what);
 void tap_check_near(double a, double b, double tolerance, const char *file, int line,
                     const char *what);
-void tap_skip(const char *format, ...);
+void tap_say(const char *format, ...) HAP_PRINTF(1, 2);
+void tap_skip(const char *format, ...) HAP_PRINTF(1, 2);
 /* Both return false. */
 bool tap_skip_all(const char *reason);
 bool tap_bail_out(const char *reason);
+/* Zeroed memory of the running test. It is finished and freed when the test has ended, the newest
+ * first; tap_release does that at once. */
+void *tap_own(size_t size, void (*finish)(void *owned));
+void tap_release(void *owned);
 /* Functions that are called after the last test, the newest first. */
 void tap_at_end(void (*function)(void));
 void tap_run(void (*test)(void), const char *name);
 int tap_done(void);
-/* set_up: may be NULL. */
+/* set_up: may be NULL. The arguments only=BEGIN,... and except=BEGIN,... choose tests by how their
+ * names begin. */
 int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc, char **argv);
 
 static inline void tap_check(bool good, const char *file, int line, const char *what)
@@ -58,6 +66,14 @@ static inline void tap_check(bool good, const char *file, int line, const char *
   bool tap_set_up(void)
 #define RUN(name) tap_run(test_##name, #name)
 #define CHECK(condition) tap_check((condition), __FILE__, __LINE__, #condition)
+/* With a comment when it fails. */
+#define CHECK_SAY(condition, ...)               \
+  do {                                          \
+    if (!(condition)) {                         \
+      tap_note(__FILE__, __LINE__, #condition); \
+      tap_say(__VA_ARGS__);                     \
+    }                                           \
+  } while (0)
 #define CHECK_NEAR(a, b, tolerance) \
   tap_check_near((a), (b), (tolerance), __FILE__, __LINE__, #a " ~ " #b)
 #define REQUIRE(condition)                               \

@@ -223,15 +223,13 @@ static const size_t case_count = sizeof cases / sizeof cases[0];
 
 static double library_answer(const probe_case *c, int iterations)
 {
-  test_world w;
   double answer = (double)NAN;
-  world_open(&w, c->gravity, iterations);
-  c->build(&w);
-  if (start_at(&w, smooth_planes, c->pointer)) {
-    const hapi_contact_slot *contact = measure_contact(&w, w.bodies[c->body], c->force);
-    answer = contact != NULL ? world_contact_answer(&w, contact)->a[c->row][c->axis] : answer;
+  test_world *w = world_new(c->gravity, iterations);
+  c->build(w);
+  if (start_at(w, smooth_planes, c->pointer)) {
+    const hapi_contact_slot *contact = measure_contact(w, w->bodies[c->body], c->force);
+    answer = contact != NULL ? world_contact_answer(w, contact)->a[c->row][c->axis] : answer;
   }
-  world_close(&w);
   return answer;
 }
 
@@ -353,23 +351,21 @@ typedef struct secant_row {
 /* Eq. 4 perturbs along +x, +y, +z. For a push down the world stands on its head. */
 static double secant(const secant_row *row)
 {
-  test_world w;
   bool along = strcmp(row->direction, "x") == 0;
   double up = strcmp(row->direction, "down") == 0 ? -1.0 : 1.0;
   double height = along ? EDGE / 2 : EDGE + 0.01 + GAP;
   double answer = (double)NAN;
-  world_open(&w, up * GRAVITY, 1000);
-  w.mu = row->mu;
-  dCreatePlane(w.space, 0, 0, up, 0);
-  world_add_cube(&w, EDGE, row->mass, 0, 0, up * (EDGE / 2 - OVERLAP));
+  test_world *w = world_new(up * GRAVITY, 1000);
+  w->mu = row->mu;
+  dCreatePlane(w->space, 0, 0, up, 0);
+  world_add_cube(w, EDGE, row->mass, 0, 0, up * (EDGE / 2 - OVERLAP));
   const double at[3] = {along ? -EDGE / 2 - 0.01 - GAP : 0.0, 0.0, up * height};
-  if (start_at(&w, NULL, at)) {
-    const hapi_contact_slot *contact = measure_contact(&w, w.bodies[0], row->force);
+  if (start_at(w, NULL, at)) {
+    const hapi_contact_slot *contact = measure_contact(w, w->bodies[0], row->force);
     answer = contact == NULL ? answer
-             : along         ? world_contact_answer(&w, contact)->a[0][0]
-                             : world_contact_answer(&w, contact)->a[2][2];
+             : along         ? world_contact_answer(w, contact)->a[0][0]
+                             : world_contact_answer(w, contact)->a[2][2];
   }
-  world_close(&w);
   return answer;
 }
 
@@ -417,35 +413,31 @@ static void push_first(void *user, double step_s)
 
 TEST(b_of_a_resting_body_is_zero)
 {
-  test_world w;
-  world_open(&w, GRAVITY, 1000);
-  dCreatePlane(w.space, 0, 0, 1, 0);
-  dBodyID cube = world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
-  REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, EDGE / 2}));
-  const hapi_body_slot *slot = world_slot(&w, cube);
+  test_world *w = world_new(GRAVITY, 1000);
+  dCreatePlane(w->space, 0, 0, 1, 0);
+  dBodyID cube = world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
+  REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, EDGE / 2}));
+  const hapi_body_slot *slot = world_slot(w, cube);
   REQUIRE(slot != NULL);
   for (int i = 0; i < 6; ++i) {
-    CHECK_NEAR(world_answer(&w, slot)->b[i], 0.0, 1e-6);
+    CHECK_NEAR(world_answer(w, slot)->b[i], 0.0, 1e-6);
   }
-  world_close(&w);
 }
 
 TEST(b_holds_the_forces_of_before_step)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dBodyID cube = world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, 0);
+  test_world *w = world_new(0.0, 20);
+  dBodyID cube = world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, 0);
   dMass mass;
   dBodyGetMass(cube, &mass);
-  w.before_step = push_first;
-  REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
-  world_step(&w, 2);
-  const hapi_body_slot *slot = world_slot(&w, cube);
+  w->before_step = push_first;
+  REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
+  world_step(w, 2);
+  const hapi_body_slot *slot = world_slot(w, cube);
   REQUIRE(slot != NULL);
-  CHECK_NEAR(world_answer(&w, slot)->b[0], 0.02 / 0.5, 1e-12);
-  CHECK_NEAR(world_answer(&w, slot)->b[5], 1e-6 / mass.I[0], 1e-9);
+  CHECK_NEAR(world_answer(w, slot)->b[0], 0.02 / 0.5, 1e-12);
+  CHECK_NEAR(world_answer(w, slot)->b[5], 1e-6 / mass.I[0], 1e-9);
   CHECK(dBodyGetForce(cube)[0] == 0.0); /* probes left nothing behind */
-  world_close(&w);
 }
 
 /* ---- how many ---- */
@@ -546,22 +538,20 @@ TEST(counts_of_testing_simulations)
 
 TEST(two_pointers_on_one_body)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dBodyID cube = world_add_cube(&w, EDGE, 0.5, 0, 0, 0);
-  REQUIRE(world_create_session(&w, NULL) == HAP_OK);
-  world_add_pointer(&w, 0.01, -EDGE / 2 - 0.01 - GAP, 0.01, 0);
-  world_add_pointer(&w, 0.01, EDGE / 2 + 0.01 + GAP, -0.02, 0);
-  REQUIRE(hap_session_start(w.session) == HAP_OK);
-  CHECK(measure(&w) == 1 + 6);
-  const hapi_contact_slot *one = world_contact(&w, cube, 0);
-  const hapi_contact_slot *two = world_contact(&w, cube, 1);
+  test_world *w = world_new(0.0, 20);
+  dBodyID cube = world_add_cube(w, EDGE, 0.5, 0, 0, 0);
+  REQUIRE(world_create_session(w, NULL) == HAP_OK);
+  world_add_pointer(w, 0.01, -EDGE / 2 - 0.01 - GAP, 0.01, 0);
+  world_add_pointer(w, 0.01, EDGE / 2 + 0.01 + GAP, -0.02, 0);
+  REQUIRE(hap_session_start(w->session) == HAP_OK);
+  CHECK(measure(w) == 1 + 6);
+  const hapi_contact_slot *one = world_contact(w, cube, 0);
+  const hapi_contact_slot *two = world_contact(w, cube, 1);
   REQUIRE(one != NULL && two != NULL);
   dMass mass;
   dBodyGetMass(cube, &mass);
-  CHECK_NEAR(world_contact_answer(&w, one)->a[5][0], -0.01 / mass.I[10], 1e-6 / mass.I[10]);
-  CHECK_NEAR(world_contact_answer(&w, two)->a[5][0], 0.02 / mass.I[10], 1e-6 / mass.I[10]);
-  world_close(&w);
+  CHECK_NEAR(world_contact_answer(w, one)->a[5][0], -0.01 / mass.I[10], 1e-6 / mass.I[10]);
+  CHECK_NEAR(world_contact_answer(w, two)->a[5][0], 0.02 / mass.I[10], 1e-6 / mass.I[10]);
 }
 
 TEST(ways_of_probing_agree)
@@ -585,78 +575,73 @@ TEST(ways_of_probing_agree)
 
 TEST(far_bodies_are_not_stepped)
 {
-  test_world w;
   body_bits before;
   body_bits after;
-  world_open(&w, GRAVITY, 20);
-  world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, 0);
-  dBodyID flier = world_add_cube(&w, EDGE, 0.5, 9.0, 0, 0);
+  test_world *w = world_new(GRAVITY, 20);
+  world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, 0);
+  dBodyID flier = world_add_cube(w, EDGE, 0.5, 9.0, 0, 0);
   dBodySetLinearVel(flier, 0.3, 0.2, 0.1);
   dBodySetAngularVel(flier, 3, 2, 1);
   dBodySetMovedCallback(flier, count_far); /* behind the session's back: not silenced */
-  REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
+  REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
   far_moves = 0;
   body_read(flier, &before);
-  CHECK(measure(&w) == 4);
+  CHECK(measure(w) == 4);
   body_read(flier, &after);
   CHECK(far_moves == 0);
   CHECK(memcmp(&before, &after, sizeof before) == 0 && after.enabled);
-  CHECK(hap_session_advance(w.session, 51) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 51) == HAP_OK);
   CHECK(far_moves == 1);
-  world_close(&w);
 }
 
 /* Both cubes lie on one plate that the application drives. */
 TEST(driven_bodies_do_not_link_islands)
 {
-  test_world w;
-  world_open(&w, GRAVITY, 20);
-  dBodyID near = world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
-  dBodyID far = world_add_cube(&w, EDGE, 0.5, 1.0, 0, EDGE / 2 - OVERLAP);
-  dBodyID plate = world_add_box(&w, (const double[3]){3, 1, 0.1}, 1.0, 0, 0, -0.05);
+  test_world *w = world_new(GRAVITY, 20);
+  dBodyID near = world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
+  dBodyID far = world_add_cube(w, EDGE, 0.5, 1.0, 0, EDGE / 2 - OVERLAP);
+  dBodyID plate = world_add_box(w, (const double[3]){3, 1, 0.1}, 1.0, 0, 0, -0.05);
   dBodySetKinematic(plate);
   dBodySetMovedCallback(far, count_far);
-  REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, 0.03}));
+  REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0.03}));
   far_moves = 0;
-  CHECK(world_count_contacts(&w) == 2); /* cube and plate */
-  CHECK(measure(&w) == 4);
+  CHECK(world_count_contacts(w) == 2); /* cube and plate */
+  CHECK(measure(w) == 4);
   CHECK(far_moves == 0);
   CHECK(dBodyIsEnabled(far));
-  const hapi_contact_slot *contact = world_contact(&w, near, 0);
+  const hapi_contact_slot *contact = world_contact(w, near, 0);
   REQUIRE(contact != NULL);
-  CHECK(world_contact_answer(&w, contact)->a[2][0] < 0.1); /* it does stand on the plate */
+  CHECK(world_contact_answer(w, contact)->a[2][0] < 0.1); /* it does stand on the plate */
   CHECK(dBodyGetNumJoints(far) >= 3 && dBodyGetNumJoints(plate) >= 6);
   for (int i = 0; i < dBodyGetNumJoints(plate); ++i) {
     CHECK(dJointIsEnabled(dBodyGetJoint(plate, i)));
   }
-  CHECK(hap_session_advance(w.session, 51) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 51) == HAP_OK);
   CHECK(far_moves == 1);
-  world_close(&w);
 }
 
 static bool measure_on_floor(bool asleep, double a[6][3], double b[6])
 {
-  test_world w;
-  world_open(&w, GRAVITY, 50);
-  dCreatePlane(w.space, 0, 0, 1, 0);
-  dBodyID cube = world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
-  dBodyID other = world_add_cube(&w, EDGE, 0.5, 1.5 * EDGE - OVERLAP, 0, EDGE / 2 - OVERLAP);
+  test_world *w = world_new(GRAVITY, 50);
+  dCreatePlane(w->space, 0, 0, 1, 0);
+  dBodyID cube = world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, EDGE / 2 - OVERLAP);
+  dBodyID other = world_add_cube(w, EDGE, 0.5, 1.5 * EDGE - OVERLAP, 0, EDGE / 2 - OVERLAP);
   if (asleep) {
     dBodyDisable(cube);
     dBodyDisable(other);
   }
-  bool good = start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, EDGE / 2});
-  const hapi_contact_slot *contact = good ? measure_contact(&w, cube, 8.0) : NULL;
-  const hapi_body_slot *slot = good ? world_slot(&w, cube) : NULL;
+  bool good = start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, EDGE / 2});
+  const hapi_contact_slot *contact = good ? measure_contact(w, cube, 8.0) : NULL;
+  const hapi_body_slot *slot = good ? world_slot(w, cube) : NULL;
   if (contact != NULL && slot != NULL) {
-    memcpy(a, world_contact_answer(&w, contact)->a, 18 * sizeof(double));
-    memcpy(b, world_answer(&w, slot)->b, 6 * sizeof(double));
+    memcpy(a, world_contact_answer(w, contact)->a, 18 * sizeof(double));
+    memcpy(b, world_answer(w, slot)->b, 6 * sizeof(double));
     CHECK((dBodyIsEnabled(cube) != 0) == !asleep);
-    world_step(&w, 3);
+    world_step(w, 3);
     CHECK((dBodyIsEnabled(cube) != 0) == !asleep);
     CHECK((dBodyIsEnabled(other) != 0) == !asleep);
   }
-  world_close(&w);
+  world_close(w);
   return contact != NULL && slot != NULL;
 }
 
@@ -681,28 +666,26 @@ static void glue(test_world *w, dBodyID a, dBodyID b)
 /* Two bodies without geom hang on a cube, one behind the other. */
 TEST(bodies_known_only_by_joints_are_undone_too)
 {
-  test_world w;
   dMass mass;
   body_bits before[3];
-  world_open(&w, GRAVITY, 1000);
-  world_add_cube(&w, EDGE, 0.5, EDGE / 2, 0, 0);
+  test_world *w = world_new(GRAVITY, 1000);
+  world_add_cube(w, EDGE, 0.5, EDGE / 2, 0, 0);
   dMassSetSphereTotal(&mass, 0.25, 0.02);
-  world_add(&w, NULL, &mass, EDGE / 2, 0, 0);
-  world_add(&w, NULL, &mass, EDGE / 2, 0, 0);
-  glue(&w, w.bodies[1], w.bodies[0]);
-  glue(&w, w.bodies[1], w.bodies[2]);
-  REQUIRE(start_at(&w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
-  CHECK(world_physics(&w)->world.bodies.used == 3);
+  world_add(w, NULL, &mass, EDGE / 2, 0, 0);
+  world_add(w, NULL, &mass, EDGE / 2, 0, 0);
+  glue(w, w->bodies[1], w->bodies[0]);
+  glue(w, w->bodies[1], w->bodies[2]);
+  REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
+  CHECK(world_physics(w)->world.bodies.used == 3);
   for (int i = 0; i < 3; ++i) {
-    body_read(w.bodies[i], &before[i]);
+    body_read(w->bodies[i], &before[i]);
   }
-  const hapi_contact_slot *contact = measure_contact(&w, w.bodies[0], 3.0);
+  const hapi_contact_slot *contact = measure_contact(w, w->bodies[0], 3.0);
   REQUIRE(contact != NULL);
-  CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 1.0, 1e-6);
+  CHECK_NEAR(world_contact_answer(w, contact)->a[0][0], 1.0, 1e-6);
   for (int i = 0; i < 3; ++i) {
     body_bits after;
-    body_read(w.bodies[i], &after);
+    body_read(w->bodies[i], &after);
     CHECK(memcmp(&before[i], &after, sizeof after) == 0);
   }
-  world_close(&w);
 }

@@ -382,30 +382,28 @@ TEST(a_block_that_cannot_be_is_cut_or_refused)
  * one unit in the last place where it should have got 0.6. */
 TEST(a_singular_probe_keeps_the_last_good_one)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dBodyID cube = world_add_cube(&w, 0.1, 1.0, 0.05, 0.0, 0.0);
-  REQUIRE(world_start(&w, 0.01, -0.02, 0.0, 0.0));
+  test_world *w = world_new(0.0, 20);
+  dBodyID cube = world_add_cube(w, 0.1, 1.0, 0.05, 0.0, 0.0);
+  REQUIRE(world_start(w, 0.01, -0.02, 0.0, 0.0));
   dBodySetLinearVel(cube, 1.0, 1.0, 1.0);
-  hapi_physics *physics = world_physics(&w);
-  hapi_contact_slot *contact = world_contact(&w, cube, 0);
-  hapi_body_slot *slot = world_slot(&w, cube);
-  REQUIRE(contact != NULL && slot != NULL && world_contact_answer(&w, contact)->probed);
+  hapi_physics *physics = world_physics(w);
+  hapi_contact_slot *contact = world_contact(w, cube, 0);
+  hapi_body_slot *slot = world_slot(w, cube);
+  REQUIRE(contact != NULL && slot != NULL && world_contact_answer(w, contact)->probed);
   double good[6][3];
-  memcpy(good, world_contact_answer(&w, contact)->a, sizeof good);
+  memcpy(good, world_contact_answer(w, contact)->a, sizeof good);
   CHECK_NEAR(good[0][0], 1.0, 1e-9);
   for (int round = 0; round < 3; ++round) {
-    slot->mass = round == 1 ? 1.35e-16 * w.def.physics_hz / 0.0981 : 1.0;
+    slot->mass = round == 1 ? 1.35e-16 * w->def.physics_hz / 0.0981 : 1.0;
     contact->speed = 0.0;
-    world_measure(&w);
+    world_measure(w);
     CHECK(physics->probe.counts.singular == (round > 0));
     CHECK_NEAR(physics->probe.contacts.list[contact - physics->near.slots.contacts].measured[0][0],
                round == 1 ? 1.64 : 1.0, 0.05);
-    CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 1.0, 1e-9);
-    CHECK(round != 1 || memcmp(good, world_contact_answer(&w, contact)->a, sizeof good) == 0);
-    memcpy(good, world_contact_answer(&w, contact)->a, sizeof good);
+    CHECK_NEAR(world_contact_answer(w, contact)->a[0][0], 1.0, 1e-9);
+    CHECK(round != 1 || memcmp(good, world_contact_answer(w, contact)->a, sizeof good) == 0);
+    memcpy(good, world_contact_answer(w, contact)->a, sizeof good);
   }
-  world_close(&w);
 }
 
 /* Every contact's A obeys the bounds: tidied once more it stays. */
@@ -484,33 +482,32 @@ static dTriMeshDataID build_overdetermined(test_world *w, bool walls)
 TEST(an_overdetermined_body_stays_in_bounds)
 {
   for (int i = 0; i < 8; ++i) {
-    test_world w;
     int iterations = i % 4 < 2 ? 5 : 50;
-    world_open(&w, 9.81, iterations);
-    w.def.model = i / 4 == 0 ? HAP_MODEL_ACCELERANCE : HAP_MODEL_CONTACT;
-    dTriMeshDataID data = build_overdetermined(&w, i % 2 == 0);
-    REQUIRE(world_start(&w, 0.01, -0.061, 0.02, 0.06));
+    test_world *w = world_new(9.81, iterations);
+    w->def.model = i / 4 == 0 ? HAP_MODEL_ACCELERANCE : HAP_MODEL_CONTACT;
+    dTriMeshDataID data = build_overdetermined(w, i % 2 == 0);
+    REQUIRE(world_start(w, 0.01, -0.061, 0.02, 0.06));
     double most = 0.0;
     int measured = 0;
     for (int tick = 0; tick < 2000; ++tick) { /* 6 mm into it and out again */
       double x = -0.061 + 0.006 * sin(2.0 * 3.14159265358979 * tick / 1000.0);
-      world_move_pointer(&w, 0, (const double[3]){x, 0.02, 0.06}, NULL);
-      CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+      world_move_pointer(w, 0, (const double[3]){x, 0.02, 0.06}, NULL);
+      CHECK(hap_session_advance(w->session, 1) == HAP_OK);
       hap_pointer_state state;
-      CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
+      CHECK(hap_pointer_get(w->session, w->pointers[0], &state, sizeof state) == HAP_OK);
       most = fmax(most, hapi_v3_norm(state.wrench.force));
-      check_contacts(&w);
-      check_responses(&w, &measured);
+      check_contacts(w);
+      check_responses(w, &measured);
     }
     CHECK((measured > 0) == (i / 4 == 1 && i % 2 == 1)); /* the joints of model CONTACT */
-    hap_stats stats = world_stats(&w);
+    hap_stats stats = world_stats(w);
     printf("# %s, %s, %d iterations: force up to %.2f N, %llu clipped, %llu singular\n",
-           hap_model_name(w.def.model), i % 2 == 0 ? "walls" : "joints", iterations, most,
+           hap_model_name(w->def.model), i % 2 == 0 ? "walls" : "joints", iterations, most,
            (unsigned long long)stats.probes.clipped, (unsigned long long)stats.probes.singular);
     /* 5 mm of 1000 N/m; ODE itself shakes the joints with so few iterations */
     CHECK(most > 1.0 && most < (iterations == 5 ? 15.0 : 6.5));
-    CHECK(hapi_v3_norm(dBodyGetLinearVel(w.bodies[0])) < 0.5 && stats.faults.count == 0);
-    world_close(&w);
+    CHECK(hapi_v3_norm(dBodyGetLinearVel(w->bodies[0])) < 0.5 && stats.faults.count == 0);
+    world_close(w);
     if (data != NULL) {
       dGeomTriMeshDataDestroy(data);
     }

@@ -40,158 +40,141 @@ static int count_awake(const contact_world *w)
 
 TEST(a_body_falls_asleep_beside_the_hand_and_wakes_when_touched)
 {
-  contact_world w;
-  cw_open(&w, G);
-  let_sleep(&w);
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.06, 0.0, 0.0, 0.03);
-  REQUIRE(cw_start(&w, -0.045, 0.0, 0.03));
-  cw_run(&w, 1001);
-  CHECK(w.range_min == 1);
-  CHECK(count_awake(&w) == 0);
+  contact_world *w = cw_new(G);
+  let_sleep(w);
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.03);
+  REQUIRE(cw_start(w, -0.045, 0.0, 0.03));
+  cw_run(w, 1001);
+  CHECK(w->range_min == 1);
+  CHECK(count_awake(w) == 0);
   double where[3];
-  memcpy(where, w.position[0], sizeof where);
-  cw_run(&w, 1000);
-  CHECK(count_awake(&w) == 0);
-  CHECK(distance(where, w.position[0]) == 0.0);
-  cw_move_hand(&w, 0.1, 0.0, 0.0);
-  cw_run(&w, 200);
-  CHECK(count_awake(&w) == 1);
-  CHECK(w.position[0][0] > 0.005);
-  CHECK(-w.force[0] > 1.0);
-  cw_close(&w);
+  memcpy(where, w->position[0], sizeof where);
+  cw_run(w, 1000);
+  CHECK(count_awake(w) == 0);
+  CHECK(distance(where, w->position[0]) == 0.0);
+  cw_go(w, 0.1, 0.0, 0.0, 200);
+  CHECK(count_awake(w) == 1);
+  CHECK(w->position[0][0] > 0.005);
+  CHECK(-w->force[0] > 1.0);
 }
 
 TEST(a_sleeping_body_wakes_when_another_one_hits_it)
 {
-  contact_world w;
-  cw_open(&w, G);
-  let_sleep(&w);
-  w.surface.mu = 0.1;
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.06, 0.0, 0.0, 0.0299);
-  cw_add_cube(&w, 1.0, 0.06, -0.3, 0.0, 0.0299);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.075));
-  cw_run(&w, 1001);
-  CHECK(count_awake(&w) == 0);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dBodyEnable(w.bodies[1]);
-  dBodySetLinearVel(w.bodies[1], 1.0, 0.0, 0.0);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_run(&w, 700);
-  CHECK(w.position[0][0] > 0.04); /* half of 0.7 m/s, against friction */
-  CHECK(w.position[0][0] - w.position[1][0] > 0.0595);
-  cw_close(&w);
+  contact_world *w = cw_new(G);
+  let_sleep(w);
+  w->surface.mu = 0.1;
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.0299);
+  cw_add_cube(w, 1.0, 0.06, -0.3, 0.0, 0.0299);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.075));
+  cw_run(w, 1001);
+  CHECK(count_awake(w) == 0);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dBodyEnable(w->bodies[1]);
+  dBodySetLinearVel(w->bodies[1], 1.0, 0.0, 0.0);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_run(w, 700);
+  CHECK(w->position[0][0] > 0.04); /* half of 0.7 m/s, against friction */
+  CHECK(w->position[0][0] - w->position[1][0] > 0.0595);
 }
 
 TEST(a_tower_falls_asleep_in_its_whole)
 {
-  contact_world w;
-  cw_open(&w, G);
-  let_sleep(&w);
-  cw_add_floor(&w);
+  contact_world *w = cw_new(G);
+  let_sleep(w);
+  cw_add_floor(w);
   for (int i = 0; i < 5; ++i) {
-    cw_add_cube(&w, 1.0, 0.06, 0.0, 0.0, 0.03 + 0.06 * i - 1e-4 * (i + 1));
+    cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.03 + 0.06 * i - 1e-4 * (i + 1));
   }
-  REQUIRE(cw_start(&w, -0.045, 0.0, 0.15));
-  cw_run(&w, 2001);
-  printf("# %d awake, range %u .. %u\n", count_awake(&w), w.range_min, w.range_max);
-  CHECK(count_awake(&w) == 0);
-  CHECK(w.range_min == 5);
+  REQUIRE(cw_start(w, -0.045, 0.0, 0.15));
+  cw_run(w, 2001);
+  printf("# %d awake, range %u .. %u\n", count_awake(w), w->range_min, w->range_max);
+  CHECK(count_awake(w) == 0);
+  CHECK(w->range_min == 5);
   for (int i = 0; i < 5; ++i) {
-    CHECK(fabs(w.position[i][0]) < 1e-4);
+    CHECK(fabs(w->position[i][0]) < 1e-4);
   }
-  cw_close(&w);
 }
 
 /* ---- the range ---- */
 
 TEST(the_range_is_the_touched_island_when_it_fits)
 {
-  contact_world w;
-  cw_open(&w, G);
-  w.def.physics_hz = 100.0; /* a short reach */
-  cw_add_floor(&w);
+  contact_world *w = cw_new(G);
+  w->def.physics_hz = 100.0; /* a short reach */
+  cw_add_floor(w);
   for (int i = 0; i < 6; ++i) {
-    cw_add_cube(&w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
+    cw_add_cube(w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
   }
   for (int i = 0; i < 6; ++i) {
-    cw_add_cube(&w, 1.0, 0.05, 0.05 * i, 0.3, 0.0249);
+    cw_add_cube(w, 1.0, 0.05, 0.05 * i, 0.3, 0.0249);
   }
-  REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
-  cw_run(&w, 200);
-  hap_stats stats = cw_stats(&w);
+  REQUIRE(cw_start(w, -0.036, 0.0, 0.025));
+  cw_run(w, 200);
+  hap_stats stats = cw_stats(w);
   CHECK(stats.model.range_bodies == 6 && stats.model.edge_bodies == 0 &&
         stats.model.measured_bodies == 0);
-  CHECK(w.range_min == 6 && w.range_max == 6);
-  cw_close(&w);
+  CHECK(w->range_min == 6 && w->range_max == 6);
 }
 
 /* Outside of the range a body does not wake: the nearest three answer at once. */
 TEST(what_does_not_fit_is_left_out_from_the_far_end)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.surface.mu = 0.0;
-  w.def.physics_hz = 100.0;
-  w.def.max_bodies = 3;
-  w.expert.max_edge_probes = 0;
+  contact_world *w = cw_new(0.0);
+  w->surface.mu = 0.0;
+  w->def.physics_hz = 100.0;
+  w->def.max_bodies = 3;
+  w->expert.max_edge_probes = 0;
   for (int i = 0; i < 8; ++i) {
-    cw_add_cube(&w, 1.0, 0.05, 0.05 * (7 - i), 0.0, 0.0); /* the far one first */
+    cw_add_cube(w, 1.0, 0.05, 0.05 * (7 - i), 0.0, 0.0); /* the far one first */
   }
-  REQUIRE(cw_start(&w, -0.036, 0.0, 0.0));
-  cw_run(&w, 100);
-  hap_stats stats = cw_stats(&w);
+  REQUIRE(cw_start(w, -0.036, 0.0, 0.0));
+  cw_run(w, 100);
+  hap_stats stats = cw_stats(w);
   CHECK(stats.model.range_bodies == 3);
   CHECK(stats.model.edge_bodies == 1);
-  cw_close(&w);
 }
 
 /* Sliding and turning cubes that the hand flies past: they do not notice. */
 static void fly_past(double hz, double gravity)
 {
-  contact_world w;
   double worst_place = 0.0;
   double worst_speed = 0.0;
   uint32_t owned = 0;
   double start[12][3];
-  cw_open(&w, gravity);
-  w.surface.mu = 0.0;
-  w.def.physics_hz = hz;
+  contact_world *w = cw_new(gravity);
+  w->surface.mu = 0.0;
+  w->def.physics_hz = hz;
   if (gravity > 0.0) {
-    cw_add_floor(&w);
+    cw_add_floor(w);
   }
   for (int i = 0; i < 12; ++i) {
-    dBodyID cube = cw_add_cube(&w, 1.0, 0.06, 0.12 * i, -0.2, 0.0299);
+    dBodyID cube = cw_add_cube(w, 1.0, 0.06, 0.12 * i, -0.2, 0.0299);
     dBodySetLinearVel(cube, 0.0, 0.3, 0.0);
     dBodySetAngularVel(cube, 0.0, 0.0, gravity > 0.0 ? 0.0 : 1.0);
     memcpy(start[i], dBodyGetPosition(cube), sizeof start[i]);
   }
-  if (!cw_start(&w, -0.2, 0.0, 0.09)) {
-    CHECK(false);
-    cw_close(&w);
-    return;
-  }
-  cw_move_hand(&w, 1.2, 0.0, 0.0);
+  REQUIRE(cw_start(w, -0.2, 0.0, 0.09));
+  cw_move_hand(w, 1.2, 0.0, 0.0);
   int step = (int)(1000.0 / hz + 0.5);
   for (int i = 1; i <= 1400 / step; ++i) {
-    cw_run(&w, i == 1 ? step + 1 : step);
+    cw_run(w, i == 1 ? step + 1 : step);
     double t = (double)i / hz;
     for (int k = 0; k < 12; ++k) {
       double wanted[3] = {start[k][0], start[k][1] + 0.3 * t, start[k][2]};
       double speed[3] = {0.0, 0.3, 0.0};
-      worst_place = fmax(worst_place, distance(dBodyGetPosition(w.bodies[k]), wanted));
-      worst_speed = fmax(worst_speed, distance(dBodyGetLinearVel(w.bodies[k]), speed) / 0.3);
+      worst_place = fmax(worst_place, distance(dBodyGetPosition(w->bodies[k]), wanted));
+      worst_speed = fmax(worst_speed, distance(dBodyGetLinearVel(w->bodies[k]), speed) / 0.3);
     }
-    owned += cw_stats(&w).model.range_bodies;
+    owned += cw_stats(w).model.range_bodies;
   }
   printf("# %g Hz gravity %g: place %.3g mm, speed %.3g, owned %u\n", hz, gravity,
          1e3 * worst_place, worst_speed, owned);
   CHECK(owned > 5);
   CHECK(worst_place < 1e-3);
   CHECK(worst_speed < 0.01);
-  CHECK(cw_stats(&w).loop.contact_ticks == 0);
-  cw_close(&w);
+  CHECK(cw_stats(w).loop.contact_ticks == 0);
 }
 
 TEST(what_enters_and_leaves_the_range_keeps_its_motion)
@@ -206,27 +189,21 @@ TEST(what_enters_and_leaves_the_range_keeps_its_motion)
 
 static void hit(double speed, double hz)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.surface.mu = 0.0;
-  w.def.physics_hz = hz;
-  cw_add_ball(&w, 1.0, 0.03, 0.0, 0.0, 0.0);
-  cw_add_ball(&w, 1.0, 0.03, -0.06 - 0.37 * speed, 0.0, 0.0);
-  dBodySetLinearVel(w.bodies[1], speed, 0.0, 0.0);
-  if (!cw_start(&w, 0.0, 0.0, 0.042)) {
-    CHECK(false);
-    cw_close(&w);
-    return;
-  }
-  cw_run(&w, 801);
-  const dReal *a = dBodyGetLinearVel(w.bodies[1]);
-  const dReal *b = dBodyGetLinearVel(w.bodies[0]);
-  double gap = dBodyGetPosition(w.bodies[0])[0] - dBodyGetPosition(w.bodies[1])[0] - 0.06;
+  contact_world *w = cw_new(0.0);
+  w->surface.mu = 0.0;
+  w->def.physics_hz = hz;
+  cw_add_ball(w, 1.0, 0.03, 0.0, 0.0, 0.0);
+  cw_add_ball(w, 1.0, 0.03, -0.06 - 0.37 * speed, 0.0, 0.0);
+  dBodySetLinearVel(w->bodies[1], speed, 0.0, 0.0);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.042));
+  cw_run(w, 801);
+  const dReal *a = dBodyGetLinearVel(w->bodies[1]);
+  const dReal *b = dBodyGetLinearVel(w->bodies[0]);
+  double gap = dBodyGetPosition(w->bodies[0])[0] - dBodyGetPosition(w->bodies[1])[0] - 0.06;
   printf("# %g m/s at %g Hz: %.4f %.4f, gap %.3g mm\n", speed, hz, a[0], b[0], 1e3 * gap);
   CHECK_NEAR((a[0] + b[0]) / speed, 1.0, 5e-3);
   CHECK_NEAR(b[0] / speed, 0.5, 0.05);
   CHECK(gap > -2e-3);
-  cw_close(&w);
 }
 
 TEST(a_ball_that_flies_in_hits_what_is_near_the_hand)
@@ -248,8 +225,7 @@ static bool start_push(contact_world *w)
   cw_add_cube(w, 1.0, 0.06, 0.3, 0.0, 0.0);
   bool good = cw_start(w, -0.0405, 0.0, 0.0);
   if (good) {
-    cw_move_hand(w, 0.05, 0.0, 0.0);
-    cw_run(w, 30);
+    cw_go(w, 0.05, 0.0, 0.0, 30);
   }
   return good;
 }
@@ -301,8 +277,7 @@ TEST(a_body_put_back_under_the_hand_is_felt_there)
   dBodySetPosition(w.bodies[0], -0.002, 0.003, 0.0);
   dBodySetLinearVel(w.bodies[0], 0.0, 0.0, 0.0);
   CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
-  cw_run(&w, 22);
+  cw_go(&w, 0.0, 0.0, 0.0, 22);
   CHECK_NEAR(w.position[0][0], -0.002, 5e-4);
   CHECK_NEAR(w.position[0][1], 0.003, 1e-6);
   cw_run(&w, 5);
@@ -319,8 +294,7 @@ TEST(a_new_mass_counts_from_the_next_step)
   dMassSetBoxTotal(&mass, 4.0, 0.06, 0.06, 0.06);
   dBodySetMass(w.bodies[0], &mass);
   CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_move_hand(&w, 0.4, 0.0, 0.0);
-  cw_run(&w, 22);
+  cw_go(&w, 0.4, 0.0, 0.0, 22);
   for (int i = 0; i < 20; ++i) {
     double before = w.velocity[0][0];
     cw_tick(&w);
@@ -333,40 +307,35 @@ TEST(a_new_mass_counts_from_the_next_step)
 
 TEST(a_geom_that_grows_is_felt_and_stands_on_its_new_faces)
 {
-  contact_world w;
-  cw_open(&w, G);
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.06, 0.0, 0.0, 0.0299);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0695));
-  cw_run(&w, 100);
-  double before = w.force[2];
+  contact_world *w = cw_new(G);
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.0299);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.0695));
+  cw_run(w, 100);
+  double before = w->force[2];
   CHECK_NEAR(before, 2000.0 * 4e-4, 0.05);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dGeomBoxSetLengths(dBodyGetFirstGeom(w.bodies[0]), 0.06, 0.06, 0.064);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_run(&w, 1500);
-  CHECK_NEAR(w.position[0][2], 0.032 - 1e-4, 2e-4);
-  CHECK_NEAR(w.force[2], 2000.0 * 4.4e-3, 0.1);
-  cw_close(&w);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dGeomBoxSetLengths(dBodyGetFirstGeom(w->bodies[0]), 0.06, 0.06, 0.064);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_run(w, 1500);
+  CHECK_NEAR(w->position[0][2], 0.032 - 1e-4, 2e-4);
+  CHECK_NEAR(w->force[2], 2000.0 * 4.4e-3, 0.1);
 }
 
 TEST(a_body_added_in_front_of_another_is_pushed_with_it)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 1.0, 0.06, 0.0, 0.0, 0.0);
-  REQUIRE(cw_start(&w, -0.0405, 0.0, 0.0));
-  cw_move_hand(&w, 0.05, 0.0, 0.0);
-  cw_run(&w, 40);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  cw_add_cube(&w, 1.0, 0.06, 0.07, 0.0, 0.0);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_run(&w, 561);
-  CHECK(cw_stats(&w).model.range_bodies == 2);
-  CHECK(dBodyGetLinearVel(w.bodies[1])[0] > 0.03);
-  CHECK(dBodyGetPosition(w.bodies[1])[0] - dBodyGetPosition(w.bodies[0])[0] > 0.0595);
-  CHECK_NEAR(w.momentum[0] / w.synced_impulse[0], 1.0, 5e-3);
-  cw_close(&w);
+  contact_world *w = cw_new(0.0);
+  cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.0);
+  REQUIRE(cw_start(w, -0.0405, 0.0, 0.0));
+  cw_go(w, 0.05, 0.0, 0.0, 40);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  cw_add_cube(w, 1.0, 0.06, 0.07, 0.0, 0.0);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_run(w, 561);
+  CHECK(cw_stats(w).model.range_bodies == 2);
+  CHECK(dBodyGetLinearVel(w->bodies[1])[0] > 0.03);
+  CHECK(dBodyGetPosition(w->bodies[1])[0] - dBodyGetPosition(w->bodies[0])[0] > 0.0595);
+  CHECK_NEAR(w->momentum[0] / w->synced_impulse[0], 1.0, 5e-3);
 }
 
 /* ---- ground of triangles ---- */
@@ -449,8 +418,7 @@ static slide push_over(bool triangles)
     cw_close(&w);
     return s;
   }
-  cw_move_hand(&w, 0.1, 0.0, 0.0);
-  cw_run(&w, 700);
+  cw_go(&w, 0.1, 0.0, 0.0, 700);
   for (int i = 0; i < 1500; ++i) {
     cw_tick(&w);
     s.mean -= w.force[0] / 1500.0;
@@ -487,50 +455,47 @@ TEST(a_box_slides_over_triangles_as_over_a_plane)
 TEST(a_ball_rolls_over_triangles_as_over_a_plane)
 {
   static mesh m;
-  contact_world w;
   double lowest = 1.0;
   double highest = 0.0;
-  cw_open(&w, G);
-  w.expert.max_hull_points = 100000;
-  add_mesh(&w, &m, 0.031, flat);
-  cw_add_ball(&w, 1.0, 0.03, -0.1, 0.013, 0.0299);
-  dBodySetLinearVel(w.bodies[0], 0.2, 0.013, 0.0);
-  dBodySetAngularVel(w.bodies[0], -0.013 / 0.03, 0.2 / 0.03, 0.0);
-  REQUIRE(cw_start_following(&w, 0.0, 0.0, 0.043));
+  contact_world *w = cw_new(G);
+  w->expert.max_hull_points = 100000;
+  add_mesh(w, &m, 0.031, flat);
+  cw_add_ball(w, 1.0, 0.03, -0.1, 0.013, 0.0299);
+  dBodySetLinearVel(w->bodies[0], 0.2, 0.013, 0.0);
+  dBodySetAngularVel(w->bodies[0], -0.013 / 0.03, 0.2 / 0.03, 0.0);
+  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
   for (int i = 0; i < 1001; ++i) {
-    cw_tick(&w);
-    lowest = fmin(lowest, w.position[0][2]);
-    highest = fmax(highest, w.position[0][2]);
+    cw_tick(w);
+    lowest = fmin(lowest, w->position[0][2]);
+    highest = fmax(highest, w->position[0][2]);
   }
-  printf("# ball: v %.5f %.5f, z %.5f .. %.5f, range %u\n", w.velocity[0][0], w.velocity[0][1],
-         lowest, highest, w.range_min);
-  CHECK(w.range_min == 1 && cw_norm(w.force) == 0.0);
-  CHECK_NEAR(w.velocity[0][0] / 0.2, 1.0, 0.01);
-  CHECK_NEAR(w.velocity[0][1], 0.013, 0.01 * 0.2);
+  printf("# ball: v %.5f %.5f, z %.5f .. %.5f, range %u\n", w->velocity[0][0], w->velocity[0][1],
+         lowest, highest, w->range_min);
+  CHECK(w->range_min == 1 && cw_norm(w->force) == 0.0);
+  CHECK_NEAR(w->velocity[0][0] / 0.2, 1.0, 0.01);
+  CHECK_NEAR(w->velocity[0][1], 0.013, 0.01 * 0.2);
   CHECK(highest - lowest < 1.5e-4);
-  cw_close(&w);
+  cw_close(w);
   dGeomTriMeshDataDestroy(m.data);
 }
 
 TEST(ridges_carry_a_box)
 {
   static mesh m;
-  contact_world w;
-  cw_open(&w, G);
-  w.expert.max_hull_points = 100000;
-  add_mesh(&w, &m, 0.05, ridges);
-  cw_add_box(&w, 1.0, (const double[3]){0.24, 0.1, 0.04}, 0.01, 0.013, 0.0199);
-  REQUIRE(cw_start(&w, 0.01, 0.013, 0.055));
-  cw_run(&w, 1500);
-  printf("# ridges: x %.5f z %.5f, range %u\n", w.position[0][0], w.position[0][2], w.range_min);
-  CHECK(w.range_min == 1);
-  CHECK_NEAR(w.position[0][2], 0.02, 1e-3);
-  CHECK_NEAR(w.position[0][0], 0.01, 1e-3);
-  cw_move_hand(&w, 0.0, 0.0, -0.02);
-  cw_run(&w, 400);
-  CHECK_NEAR(w.force[2], 2000.0 * 3e-3, 2.0);
-  CHECK_NEAR(w.position[0][2], 0.02, 2e-3);
-  cw_close(&w);
+  contact_world *w = cw_new(G);
+  w->expert.max_hull_points = 100000;
+  add_mesh(w, &m, 0.05, ridges);
+  cw_add_box(w, 1.0, (const double[3]){0.24, 0.1, 0.04}, 0.01, 0.013, 0.0199);
+  REQUIRE(cw_start(w, 0.01, 0.013, 0.055));
+  cw_run(w, 1500);
+  printf("# ridges: x %.5f z %.5f, range %u\n", w->position[0][0], w->position[0][2], w->range_min);
+  CHECK(w->range_min == 1);
+  CHECK_NEAR(w->position[0][2], 0.02, 1e-3);
+  CHECK_NEAR(w->position[0][0], 0.01, 1e-3);
+  cw_go(w, 0.0, 0.0, -0.02, 400);
+  CHECK_NEAR(w->force[2], 2000.0 * 3e-3, 2.0);
+  CHECK_NEAR(w->position[0][2], 0.02, 2e-3);
+  cw_close(w);
   dGeomTriMeshDataDestroy(m.data);
 }
 
@@ -544,34 +509,32 @@ static dReal heights(void *user, int x, int z)
 
 TEST(a_ball_on_a_heightfield_is_measured_and_felt)
 {
-  contact_world w;
-  cw_open(&w, G);
+  contact_world *w = cw_new(G);
   dHeightfieldDataID data = dGeomHeightfieldDataCreate();
   dGeomHeightfieldDataBuildCallback(data, NULL, heights, 2.0, 2.0, 20, 20, 1.0, 0.0, 0.5, 0);
   dGeomHeightfieldDataSetBounds(data, -0.1, 0.1);
-  dGeomID field = dCreateHeightfield(w.space, data, 1);
+  dGeomID field = dCreateHeightfield(w->space, data, 1);
   dMatrix3 rotation;
   dRFromAxisAndAngle(rotation, 1.0, 0.0, 0.0, M_PI / 2.0);
   dGeomSetRotation(field, rotation); /* its y upwards */
-  cw_add_ball(&w, 1.0, 0.05, 0.02, 0.03, 0.0499);
-  REQUIRE(cw_start(&w, 0.02, 0.03, 0.112));
-  cw_run(&w, 200);
-  hap_stats stats = cw_stats(&w);
+  cw_add_ball(w, 1.0, 0.05, 0.02, 0.03, 0.0499);
+  REQUIRE(cw_start(w, 0.02, 0.03, 0.112));
+  cw_run(w, 200);
+  hap_stats stats = cw_stats(w);
   CHECK(stats.model.measured_bodies == 1 && stats.model.range_bodies == 0);
-  cw_move_hand(&w, 0.0, 0.0, -0.02);
-  cw_run(&w, 200);
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
+  cw_go(w, 0.0, 0.0, -0.02, 200);
+  cw_move_hand(w, 0.0, 0.0, 0.0);
   double least = 1e9;
   double most = 0.0;
   for (int i = 0; i < 500; ++i) {
-    cw_tick(&w);
-    least = fmin(least, w.force[2]);
-    most = fmax(most, w.force[2]);
+    cw_tick(w);
+    least = fmin(least, w->force[2]);
+    most = fmax(most, w->force[2]);
   }
-  printf("# heightfield: %.3f .. %.3f N, z %.5f\n", least, most, w.position[0][2]);
+  printf("# heightfield: %.3f .. %.3f N, z %.5f\n", least, most, w->position[0][2]);
   CHECK(least > 0.5 * 4.0 && most < 1.5 * 4.4);
-  CHECK(w.position[0][2] > 0.045 && w.position[0][2] < 0.055);
-  cw_close(&w);
+  CHECK(w->position[0][2] > 0.045 && w->position[0][2] < 0.055);
+  cw_close(w);
   dGeomHeightfieldDataDestroy(data);
 }
 
@@ -587,52 +550,46 @@ static unsigned cube_faces[] = {4, 1, 3, 7, 5, 4, 0, 4, 6, 2, 4, 2, 6, 7, 3,
 
 TEST(a_hull_slides_as_a_box_does)
 {
-  contact_world w;
   dMass mass;
-  cw_open(&w, G);
-  cw_add_floor(&w);
+  contact_world *w = cw_new(G);
+  cw_add_floor(w);
   dMassSetBoxTotal(&mass, 1.0, 0.08, 0.08, 0.08);
-  cw_add(&w, dCreateConvex(w.space, cube_planes, 6, cube_points, 8, cube_faces), &mass, 0.0, 0.0,
+  cw_add(w, dCreateConvex(w->space, cube_planes, 6, cube_points, 8, cube_faces), &mass, 0.0, 0.0,
          0.0399);
-  REQUIRE(cw_start(&w, -0.0505, 0.0, 0.012));
-  cw_move_hand(&w, 0.1, 0.0, 0.0);
-  cw_run(&w, 600);
+  REQUIRE(cw_start(w, -0.0505, 0.0, 0.012));
+  cw_go(w, 0.1, 0.0, 0.0, 600);
   double worst = 0.0;
   for (int i = 0; i < 600; ++i) {
-    cw_tick(&w);
-    worst = fmax(worst, fabs(-w.force[0] / (0.5 * G) - 1.0));
+    cw_tick(w);
+    worst = fmax(worst, fabs(-w->force[0] / (0.5 * G) - 1.0));
   }
-  CHECK(w.range_min == 1);
+  CHECK(w->range_min == 1);
   CHECK(worst < 0.02);
-  CHECK_NEAR(w.position[0][2], 0.0399, 2e-4);
-  cw_close(&w);
+  CHECK_NEAR(w->position[0][2], 0.0399, 2e-4);
 }
 
 /* A table of a plate and two bars below it, in a space of its own. */
 TEST(a_body_of_several_geoms_in_a_nested_space_stands)
 {
-  contact_world w;
   dMass mass;
-  cw_open(&w, G);
-  cw_add_floor(&w);
-  dSpaceID own = dSimpleSpaceCreate(w.space);
+  contact_world *w = cw_new(G);
+  cw_add_floor(w);
+  dSpaceID own = dSimpleSpaceCreate(w->space);
   dMassSetBoxTotal(&mass, 1.0, 0.2, 0.1, 0.06);
-  cw_add(&w, dCreateBox(own, 0.2, 0.1, 0.02), &mass, 0.0, 0.0, 0.05);
+  cw_add(w, dCreateBox(own, 0.2, 0.1, 0.02), &mass, 0.0, 0.0, 0.05);
   for (int i = 0; i < 2; ++i) {
     dGeomID leg = dCreateBox(own, 0.02, 0.1, 0.04);
-    dGeomSetBody(leg, w.bodies[0]);
+    dGeomSetBody(leg, w->bodies[0]);
     dGeomSetOffsetPosition(leg, i == 0 ? -0.08 : 0.08, 0.0, -0.0299);
   }
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.075));
-  cw_run(&w, 500);
-  CHECK(w.range_min == 1);
-  CHECK_NEAR(w.position[0][2], 0.05, 4e-4);
-  cw_move_hand(&w, 0.0, 0.0, -0.02);
-  cw_run(&w, 500);
-  CHECK_NEAR(w.position[0][2], 0.05, 4e-4);
-  CHECK_NEAR(w.force[2], 2000.0 * 5e-3, 1.6);
-  CHECK(fabs(w.position[0][0]) < 1e-4);
-  cw_close(&w);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.075));
+  cw_run(w, 500);
+  CHECK(w->range_min == 1);
+  CHECK_NEAR(w->position[0][2], 0.05, 4e-4);
+  cw_go(w, 0.0, 0.0, -0.02, 500);
+  CHECK_NEAR(w->position[0][2], 0.05, 4e-4);
+  CHECK_NEAR(w->force[2], 2000.0 * 5e-3, 1.6);
+  CHECK(fabs(w->position[0][0]) < 1e-4);
 }
 
 static bool no_pair(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -647,20 +604,18 @@ static bool no_pair(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 /* One cube flies through another one. */
 static void fly_through(bool by_bits)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.ode.surface = by_bits ? cw_surface : no_pair;
+  contact_world *w = cw_new(0.0);
+  w->ode.surface = by_bits ? cw_surface : no_pair;
   for (int i = 0; i < 2; ++i) {
-    dGeomID geom = dBodyGetFirstGeom(cw_add_cube(&w, 1.0, 0.06, 0.07 * i, 0.0, 0.0));
+    dGeomID geom = dBodyGetFirstGeom(cw_add_cube(w, 1.0, 0.06, 0.07 * i, 0.0, 0.0));
     dGeomSetCategoryBits(geom, by_bits ? 1ul << i : ~0ul);
     dGeomSetCollideBits(geom, by_bits ? 1ul << i : ~0ul);
   }
-  dBodySetLinearVel(w.bodies[0], 0.2, 0.0, 0.0);
-  REQUIRE(cw_start_following(&w, 0.0, 0.0, 0.043));
-  cw_run(&w, 501);
-  CHECK_NEAR(w.velocity[0][0], 0.2, 1e-9);
-  CHECK_NEAR(dBodyGetPosition(w.bodies[1])[0], 0.07, 1e-12);
-  cw_close(&w);
+  dBodySetLinearVel(w->bodies[0], 0.2, 0.0, 0.0);
+  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
+  cw_run(w, 501);
+  CHECK_NEAR(w->velocity[0][0], 0.2, 1e-9);
+  CHECK_NEAR(dBodyGetPosition(w->bodies[1])[0], 0.07, 1e-12);
 }
 
 TEST(a_pair_without_common_bits_or_refused_has_no_contact)
@@ -698,27 +653,24 @@ static void forget_asked(void *user, double step_s)
 
 static void ask_in_pile(int range, int probes)
 {
-  contact_world w;
-  cw_open(&w, G);
+  contact_world *w = cw_new(G);
   memset(&asking, 0, sizeof asking);
-  w.ode.surface = ask;
-  w.ode.before_step = forget_asked;
-  w.def.max_bodies = range;
-  w.expert.max_edge_probes = probes;
-  cw_add_floor(&w);
+  w->ode.surface = ask;
+  w->ode.before_step = forget_asked;
+  w->def.max_bodies = range;
+  w->expert.max_edge_probes = probes;
+  cw_add_floor(w);
   for (int i = 0; i < 8; ++i) {
-    cw_add_cube(&w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
+    cw_add_cube(w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
   }
-  if (!cw_start(&w, -0.0355, 0.0, 0.025)) {
+  if (!cw_start(w, -0.0355, 0.0, 0.025)) {
     CHECK(false);
   } else {
-    cw_move_hand(&w, 0.05, 0.0, 0.0);
-    cw_run(&w, 500);
+    cw_go(w, 0.05, 0.0, 0.0, 500);
     printf("# range %d: %d pairs asked twice in a step, of %u steps\n", range, asking.twice,
-           w.steps);
+           w->steps);
     CHECK(asking.twice == 0);
   }
-  cw_close(&w);
 }
 
 TEST(the_surface_of_a_pair_is_asked_once_a_step)
@@ -734,70 +686,64 @@ TEST(other_models_take_over_without_a_jump)
 {
   static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_ACCELERANCE, HAP_MODEL_CONTACT,
                                      HAP_MODEL_IMPULSE, HAP_MODEL_CONTACT};
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.surface.mu = 0.0;
+  contact_world *w = cw_new(0.0);
+  w->surface.mu = 0.0;
   for (int i = 0; i < 3; ++i) {
-    cw_add_cube(&w, 1.0, 0.05, 0.0501 * i, 0.0, 0.0);
+    cw_add_cube(w, 1.0, 0.05, 0.0501 * i, 0.0, 0.0);
   }
-  REQUIRE(cw_start(&w, -0.0355, 0.0, 0.0));
+  REQUIRE(cw_start(w, -0.0355, 0.0, 0.0));
   for (int m = 0; m < 6; ++m) {
     double worst = 0.0;
-    cw_move_hand(&w, 0.05 + 0.05 * m, 0.0, 0.0);
+    cw_move_hand(w, 0.05 + 0.05 * m, 0.0, 0.0);
     for (int i = 0; i < 6; ++i) {
       double before[3];
-      memcpy(before, dBodyGetPosition(w.bodies[0]), sizeof before);
-      cw_run(&w, 50);
-      double way = distance(before, dBodyGetPosition(w.bodies[0]));
-      worst = fmax(worst, way - 0.05 * fmax(cw_norm(dBodyGetLinearVel(w.bodies[0])), 0.1));
+      memcpy(before, dBodyGetPosition(w->bodies[0]), sizeof before);
+      cw_run(w, 50);
+      double way = distance(before, dBodyGetPosition(w->bodies[0]));
+      worst = fmax(worst, way - 0.05 * fmax(cw_norm(dBodyGetLinearVel(w->bodies[0])), 0.1));
     }
     printf("# %s: %.3g mm too far in a step, momentum %.5f of %.5f, speed %.3f, force %.2f\n",
-           m == 0 ? "contact" : hap_model_name(models[m - 1]), 1e3 * worst, w.momentum[0],
-           w.synced_impulse[0], dBodyGetLinearVel(w.bodies[0])[0], w.force[0]);
+           m == 0 ? "contact" : hap_model_name(models[m - 1]), 1e3 * worst, w->momentum[0],
+           w->synced_impulse[0], dBodyGetLinearVel(w->bodies[0])[0], w->force[0]);
     CHECK(worst < 0.02);
     if (m < 5) {
-      CHECK(hap_session_set_model(w.session, models[m]) == HAP_OK);
+      CHECK(hap_session_set_model(w->session, models[m]) == HAP_OK);
     }
   }
-  cw_move_hand(&w, -0.5, 0.0, 0.0);
-  cw_run(&w, 301);
-  printf("# momentum %.5f, impulse %.5f, stats %.5f\n", w.momentum[0], w.impulse[0],
-         cw_stats(&w).hand.momentum_ratio);
-  CHECK_NEAR(w.momentum[0] / w.impulse[0], 1.0, 5e-3);
-  CHECK(cw_stats(&w).faults.count == 0);
-  cw_close(&w);
+  cw_go(w, -0.5, 0.0, 0.0, 301);
+  printf("# momentum %.5f, impulse %.5f, stats %.5f\n", w->momentum[0], w->impulse[0],
+         cw_stats(w).hand.momentum_ratio);
+  CHECK_NEAR(w->momentum[0] / w->impulse[0], 1.0, 5e-3);
+  CHECK(cw_stats(w).faults.count == 0);
 }
 
 /* ---- the same again, at every rate ---- */
 
 static hap_stats push_stack(double physics_hz, double contact_hz, double haptic_hz, int latency)
 {
-  contact_world w;
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
-  cw_open(&w, G);
-  w.def.physics_hz = physics_hz;
-  w.expert.contact_hz = contact_hz;
-  w.def.haptic_hz = haptic_hz;
-  w.research.physics_latency_ticks = latency;
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0249);
-  cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0748);
-  cw_add_cube(&w, 1.0, 0.05, 0.0501, 0.0, 0.0249);
-  cw_add_ball(&w, 0.2, 0.02, 0.09, 0.0, 0.02);
-  if (cw_start(&w, -0.0355, 0.0, 0.02)) {
-    cw_move_hand(&w, 0.08, 0.0, 0.0);
-    cw_run(&w, (int)haptic_hz);
-    stats = cw_stats(&w);
+  contact_world *w = cw_new(G);
+  w->def.physics_hz = physics_hz;
+  w->expert.contact_hz = contact_hz;
+  w->def.haptic_hz = haptic_hz;
+  w->research.physics_latency_ticks = latency;
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.05, 0.0, 0.0, 0.0249);
+  cw_add_cube(w, 1.0, 0.05, 0.0, 0.0, 0.0748);
+  cw_add_cube(w, 1.0, 0.05, 0.0501, 0.0, 0.0249);
+  cw_add_ball(w, 0.2, 0.02, 0.09, 0.0, 0.02);
+  if (cw_start(w, -0.0355, 0.0, 0.02)) {
+    cw_go(w, 0.08, 0.0, 0.0, (int)haptic_hz);
+    stats = cw_stats(w);
     CHECK(stats.faults.count == 0);
     CHECK(stats.loop.contact_ticks > 100);
-    CHECK(w.position[0][0] > 0.02 && w.position[0][0] < 0.12);
-    CHECK(w.position[0][2] > 0.0235 && w.position[0][2] < 0.03);
-    CHECK(w.position[1][2] > 0.0225 && w.position[1][2] < 0.09);
+    CHECK(w->position[0][0] > 0.02 && w->position[0][0] < 0.12);
+    CHECK(w->position[0][2] > 0.0235 && w->position[0][2] < 0.03);
+    CHECK(w->position[1][2] > 0.0225 && w->position[1][2] < 0.09);
   } else {
     CHECK(false);
   }
-  cw_close(&w);
   return stats;
 }
 

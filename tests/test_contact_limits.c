@@ -55,18 +55,17 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
   static const unsigned polygons[] = {4, 0, 2, 3, 1, 4, 0, 1, 5, 4, 4, 0, 4, 6, 2,
                                       4, 7, 5, 1, 3, 4, 7, 3, 2, 6, 4, 7, 6, 4, 5};
   for (int room = 0; room < 2; ++room) {
-    contact_world w;
     dMass mass;
-    cw_open(&w, CW_GRAVITY);
-    cw_add_floor(&w);
+    contact_world *w = cw_new(CW_GRAVITY);
+    cw_add_floor(w);
     dMassSetBoxTotal(&mass, 0.5, 0.05, 0.05, 0.05);
-    w.expert.max_hull_points = room != 0 ? 64 : 0;
-    cw_add(&w, dCreateConvex(w.space, planes, 6, points, 8, polygons), &mass, 0.0, 0.0, 0.0249);
-    REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
-    CHECK(hap_session_advance(w.session, 1000) == HAP_OK);
-    CHECK(cw_stats(&w).model.range_bodies == (room != 0 ? 1u : 0u));
-    CHECK_NEAR(height(&w), 0.025, 1e-3);
-    cw_close(&w);
+    w->expert.max_hull_points = room != 0 ? 64 : 0;
+    cw_add(w, dCreateConvex(w->space, planes, 6, points, 8, polygons), &mass, 0.0, 0.0, 0.0249);
+    REQUIRE(cw_start(w, 0.0, 0.0, 0.065));
+    CHECK(hap_session_advance(w->session, 1000) == HAP_OK);
+    CHECK(cw_stats(w).model.range_bodies == (room != 0 ? 1u : 0u));
+    CHECK_NEAR(height(w), 0.025, 1e-3);
+    cw_close(w);
   }
 }
 
@@ -74,39 +73,35 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
  * come before them in the list. */
 TEST(where_contacts_find_no_room_those_that_touch_are_kept)
 {
-  contact_world w;
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
   for (int i = 0; i < 4; ++i) {
-    (void)cw_add_cube(&w, 0.5, 0.05, 0.051 * (i % 2), 0.051 * (i / 2), 0.025);
+    (void)cw_add_cube(w, 0.5, 0.05, 0.051 * (i % 2), 0.051 * (i / 2), 0.025);
   }
-  w.def.max_contacts = 18;
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
+  w->def.max_contacts = 18;
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.065));
   for (int i = 0; i < 300; ++i) {
-    cw_tick(&w);
+    cw_tick(w);
     for (int k = 0; k < 4 && i > 50; ++k) {
-      CHECK_NEAR(w.position[k][2], 0.025, 3e-4);
+      CHECK_NEAR(w->position[k][2], 0.025, 3e-4);
     }
   }
-  CHECK(w.range_max == 4);
-  CHECK(cw_stats(&w).model.capacity_dropped > 0);
-  cw_close(&w);
+  CHECK(w->range_max == 4);
+  CHECK(cw_stats(w).model.capacity_dropped > 0);
 }
 
 /* Without Approx1 friction is a force of its own: there must be none before the touch. */
 TEST(a_box_falls_beside_a_wall_that_it_does_not_touch)
 {
-  contact_world w;
-  cw_open(&w, CW_GRAVITY);
-  w.surface = (dSurfaceParameters){.mode = 0, .mu = dInfinity};
-  (void)cw_add_box(&w, 0.5, (const double[3]){0.05, 0.05, 0.05}, 0.0, 0.0, 0.0);
-  dGeomID wall = dCreateBox(w.space, 0.1, 1.0, 10.0);
+  contact_world *w = cw_new(CW_GRAVITY);
+  w->surface = (dSurfaceParameters){.mode = 0, .mu = dInfinity};
+  (void)cw_add_box(w, 0.5, (const double[3]){0.05, 0.05, 0.05}, 0.0, 0.0, 0.0);
+  dGeomID wall = dCreateBox(w->space, 0.1, 1.0, 10.0);
   dGeomSetPosition(wall, 0.0755, 0.0, 0.0); /* 0.5 mm away */
-  REQUIRE(cw_start(&w, -0.037, 0.0, 0.0));
-  CHECK(hap_session_advance(w.session, 101) == HAP_OK);
-  CHECK(cw_stats(&w).model.range_bodies == 1);
-  CHECK_NEAR(dBodyGetLinearVel(w.bodies[0])[2], -CW_GRAVITY * 0.1, 0.02);
-  cw_close(&w);
+  REQUIRE(cw_start(w, -0.037, 0.0, 0.0));
+  CHECK(hap_session_advance(w->session, 101) == HAP_OK);
+  CHECK(cw_stats(w).model.range_bodies == 1);
+  CHECK_NEAR(dBodyGetLinearVel(w->bodies[0])[2], -CW_GRAVITY * 0.1, 0.02);
 }
 
 TEST(a_body_that_the_application_puts_to_sleep_stays_so)
@@ -174,23 +169,22 @@ static int check_measured(const contact_world *w)
  * each by a measurement of its own would make energy. */
 TEST(a_measured_body_answers_all_that_touch_it_alike)
 {
-  contact_world w;
   int met = 0;
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
-  dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.025);
-  dTriMeshDataID data = add_unknown_shape(w.space, cube);
-  (void)cw_add_cube(&w, 0.2, 0.05, 0.0755, 0.0, 0.025);
-  REQUIRE(cw_start(&w, -0.012, 0.003, 0.035));
-  cw_move_hand(&w, 0.1, 0.0, 0.0);
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  dBodyID cube = cw_add_cube(w, 0.2, 0.05, 0.025, 0.0, 0.025);
+  dTriMeshDataID data = add_unknown_shape(w->space, cube);
+  (void)cw_add_cube(w, 0.2, 0.05, 0.0755, 0.0, 0.025);
+  REQUIRE(cw_start(w, -0.012, 0.003, 0.035));
+  cw_move_hand(w, 0.1, 0.0, 0.0);
   for (int i = 0; i < 300; ++i) {
-    cw_tick(&w);
-    met += check_measured(&w);
+    cw_tick(w);
+    met += check_measured(w);
   }
-  CHECK(cw_stats(&w).model.measured_bodies == 1 && cw_stats(&w).model.range_bodies == 1);
+  CHECK(cw_stats(w).model.measured_bodies == 1 && cw_stats(w).model.range_bodies == 1);
   CHECK(met > 100);
-  CHECK(w.position[1][0] > 0.08); /* it was pushed on */
-  cw_close(&w);
+  CHECK(w->position[1][0] > 0.08); /* it was pushed on */
+  cw_close(w);
   dGeomTriMeshDataDestroy(data);
 }
 
@@ -198,24 +192,23 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
 TEST(a_measured_body_answers_two_hands_alike)
 {
   const hap_pose pose = {{-0.008, -0.012, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  contact_world w;
   hap_pointer_id other;
   int met = 0;
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
-  dBodyID cube = cw_add_cube(&w, 2.0, 0.05, 0.025, 0.0, 0.025);
-  dTriMeshDataID data = add_unknown_shape(w.space, cube);
-  REQUIRE(cw_start(&w, -0.012, 0.01, 0.03));
-  CHECK(hap_pointer_add(w.session, &w.hand_def, &other) == HAP_OK);
-  CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
-  cw_move_hand(&w, 0.02, 0.0, 0.0);
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  dBodyID cube = cw_add_cube(w, 2.0, 0.05, 0.025, 0.0, 0.025);
+  dTriMeshDataID data = add_unknown_shape(w->space, cube);
+  REQUIRE(cw_start(w, -0.012, 0.01, 0.03));
+  CHECK(hap_pointer_add(w->session, &w->hand_def, &other) == HAP_OK);
+  CHECK(hap_pointer_set_target(w->session, other, &pose, NULL) == HAP_OK);
+  cw_move_hand(w, 0.02, 0.0, 0.0);
   for (int i = 0; i < 200; ++i) {
-    cw_tick(&w);
-    met += check_measured(&w);
+    cw_tick(w);
+    met += check_measured(w);
   }
-  CHECK(cw_stats(&w).model.measured_bodies == 1);
+  CHECK(cw_stats(w).model.measured_bodies == 1);
   CHECK(met > 10);
-  cw_close(&w);
+  cw_close(w);
   dGeomTriMeshDataDestroy(data);
 }
 
@@ -225,19 +218,18 @@ TEST(the_range_ends_after_so_many_contacts)
   static const int hops[] = {0, 1, 4, 5, HAP_RANGE_ALL};
   static const uint32_t bodies[] = {1, 2, 5, 6, 6};
   for (size_t i = 0; i < sizeof hops / sizeof hops[0]; ++i) {
-    contact_world w;
-    cw_open(&w, CW_GRAVITY);
-    w.def.physics_hz = 100.0;
-    w.expert.range_hops = hops[i];
-    cw_add_floor(&w);
+    contact_world *w = cw_new(CW_GRAVITY);
+    w->def.physics_hz = 100.0;
+    w->expert.range_hops = hops[i];
+    cw_add_floor(w);
     for (int k = 0; k < 6; ++k) {
-      cw_add_cube(&w, 1.0, 0.05, 0.05 * k, 0.0, 0.0249);
+      cw_add_cube(w, 1.0, 0.05, 0.05 * k, 0.0, 0.0249);
     }
-    REQUIRE(cw_start(&w, -0.036, 0.0, 0.025));
-    cw_run(&w, 200);
-    CHECK(w.range_min == bodies[i] && w.range_max == bodies[i]);
-    CHECK(cw_stats(&w).model.edge_bodies == (bodies[i] < 6 ? 1u : 0u));
-    cw_close(&w);
+    REQUIRE(cw_start(w, -0.036, 0.0, 0.025));
+    cw_run(w, 200);
+    CHECK(w->range_min == bodies[i] && w->range_max == bodies[i]);
+    CHECK(cw_stats(w).model.edge_bodies == (bodies[i] < 6 ? 1u : 0u));
+    cw_close(w);
   }
 }
 
@@ -245,23 +237,22 @@ TEST(the_range_ends_after_so_many_contacts)
 TEST(what_hangs_together_is_one_hop)
 {
   for (int hops = 0; hops < 2; ++hops) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    w.def.physics_hz = 100.0;
-    w.expert.range_hops = hops;
+    contact_world *w = cw_new(0.0);
+    w->def.physics_hz = 100.0;
+    w->expert.range_hops = hops;
     for (int k = 0; k < 4; ++k) {
-      cw_add_cube(&w, 1.0, 0.05, 0.051 * k, 0.0, 0.0);
+      cw_add_cube(w, 1.0, 0.05, 0.051 * k, 0.0, 0.0);
     }
     for (int k = 0; k < 2; ++k) {
-      dJointID hinge = dJointCreateHinge(w.world, 0);
-      dJointAttach(hinge, w.bodies[k], w.bodies[k + 1]);
+      dJointID hinge = dJointCreateHinge(w->world, 0);
+      dJointAttach(hinge, w->bodies[k], w->bodies[k + 1]);
       dJointSetHingeAnchor(hinge, 0.0255 + 0.051 * k, 0.0, 0.0);
       dJointSetHingeAxis(hinge, 0.0, 0.0, 1.0);
     }
-    REQUIRE(cw_start(&w, -0.036, 0.0, 0.0));
-    cw_run(&w, 100);
-    CHECK(w.range_min == 3u + (uint32_t)hops && w.range_max == 3u + (uint32_t)hops);
-    cw_close(&w);
+    REQUIRE(cw_start(w, -0.036, 0.0, 0.0));
+    cw_run(w, 100);
+    CHECK(w->range_min == 3u + (uint32_t)hops && w->range_max == 3u + (uint32_t)hops);
+    cw_close(w);
   }
 }
 
@@ -273,20 +264,19 @@ TEST(sweeps_are_no_more_than_asked)
   double sweeps[4];
   double undone[4];
   for (int i = 0; i < 4; ++i) {
-    contact_world w;
-    cw_open(&w, CW_GRAVITY);
-    w.expert.max_sweeps = most[i];
-    cw_add_floor(&w);
+    contact_world *w = cw_new(CW_GRAVITY);
+    w->expert.max_sweeps = most[i];
+    cw_add_floor(w);
     for (int k = 0; k < 6; ++k) {
-      cw_add_cube(&w, 1.0, 0.05, 0.0, 0.0, 0.0249 + 0.0499 * k);
+      cw_add_cube(w, 1.0, 0.05, 0.0, 0.0, 0.0249 + 0.0499 * k);
     }
-    REQUIRE(cw_start(&w, 0.0, 0.0, 0.308));
-    cw_run(&w, 300);
-    hap_stats stats = cw_stats(&w);
-    CHECK(w.range_max == 6 && fabs(w.force[2]) > 1.0);
+    REQUIRE(cw_start(w, 0.0, 0.0, 0.308));
+    cw_run(w, 300);
+    hap_stats stats = cw_stats(w);
+    CHECK(w->range_max == 6 && fabs(w->force[2]) > 1.0);
     sweeps[i] = (double)stats.contact.sweeps / (double)stats.loop.ticks;
     undone[i] = stats.contact.residual_max;
-    cw_close(&w);
+    cw_close(w);
   }
   printf("# sweeps a tick %.2f %.2f %.2f %.2f, undone %.2g %.2g %.2g %.2g m/s\n", sweeps[0],
          sweeps[1], sweeps[2], sweeps[3], undone[0], undone[1], undone[2], undone[3]);

@@ -81,26 +81,23 @@ TEST(a_wall_and_the_proxy_are_springs_in_series)
   for (size_t i = 0; i < sizeof stiffness / sizeof stiffness[0]; ++i) {
     double k = stiffness[i];
     double k_v = 500.0;
-    contact_world w;
-    cw_open(&w, 0.0);
-    cw_add_floor(&w);
-    cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
-    w.hand_def.stiffness = k;
-    w.hand_def.damping = 0.0;
-    use_proxy(&w, k_v);
-    REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
-    cw_move_hand(&w, 0.0, 0.0, -0.03);
-    cw_run(&w, 100);
-    cw_move_hand(&w, 0.0, 0.0, 0.0);
-    cw_run(&w, 100);
+    contact_world *w = cw_new(0.0);
+    cw_add_floor(w);
+    cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
+    w->hand_def.stiffness = k;
+    w->hand_def.damping = 0.0;
+    use_proxy(w, k_v);
+    REQUIRE(cw_start(w, 0.0, 0.0, HAND_RADIUS + 0.001));
+    cw_go(w, 0.0, 0.0, -0.03, 100);
+    cw_go(w, 0.0, 0.0, 0.0, 100);
     double series = k * k_v / (k + k_v);
-    hap_pointer_state state = state_of(&w);
-    CHECK_NEAR(w.force[2], 0.002 * series, 1e-6);
+    hap_pointer_state state = state_of(w);
+    CHECK_NEAR(w->force[2], 0.002 * series, 1e-6);
     CHECK(state.coupling == HAP_COUPLING_PROXY && state.coupling_reason == HAP_COUPLING_ASKED);
     CHECK_NEAR(state.coupling_stiffness, k_v, 1e-9);
     CHECK_NEAR(state.device.position[2], HAND_RADIUS - 0.002, 1e-12);
     CHECK_NEAR(state.proxy.position[2], HAND_RADIUS - 0.002 * k_v / (k + k_v), 1e-8);
-    cw_close(&w);
+    cw_close(w);
   }
 }
 
@@ -112,46 +109,40 @@ TEST(the_spring_is_the_devices_whatever_its_frame_and_scales)
   const double k_device = 1500.0;
   const double k_v = k_device / 2.5;
   const double series = k * k_v / (k + k_v);
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
-  w.hand_def.stiffness = k;
-  w.hand_def.damping = 0.0;
-  w.hand_def.motion_scale = 5.0;
-  w.hand_def.force_scale = 0.5;
-  w.hand_def.pose_world_device = (hap_pose){{0.0, 0.0, 0.002}, {M_SQRT1_2, M_SQRT1_2, 0.0, 0.0}};
-  use_proxy(&w, k_device);
-  REQUIRE(cw_start(&w, 0.0, (HAND_RADIUS - 0.001) / 5.0, 0.0)); /* y: 1 mm above the floor */
-  cw_move_hand(&w, 0.0, -0.006, 0.0);
-  cw_run(&w, 100);
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
-  cw_run(&w, 100);
-  hap_pointer_state state = state_of(&w);
+  contact_world *w = cw_new(0.0);
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w->hand_def.stiffness = k;
+  w->hand_def.damping = 0.0;
+  w->hand_def.motion_scale = 5.0;
+  w->hand_def.force_scale = 0.5;
+  w->hand_def.pose_world_device = (hap_pose){{0.0, 0.0, 0.002}, {M_SQRT1_2, M_SQRT1_2, 0.0, 0.0}};
+  use_proxy(w, k_device);
+  REQUIRE(cw_start(w, 0.0, (HAND_RADIUS - 0.001) / 5.0, 0.0)); /* y: 1 mm above the floor */
+  cw_go(w, 0.0, -0.006, 0.0, 100);
+  cw_go(w, 0.0, 0.0, 0.0, 100);
+  hap_pointer_state state = state_of(w);
   CHECK_NEAR(state.wrench.force[2], 0.002 * series, 1e-6);
   CHECK_NEAR(state.proxy.position[2], HAND_RADIUS - 0.002 * k_v / (k + k_v), 1e-8);
   CHECK_NEAR(state.coupling_stiffness, k_device, 1e-9);
   CHECK_NEAR(state.contact_stiffness, 2.5 * k, 1e-9);
-  cw_close(&w);
 }
 
 TEST(in_the_air_the_proxy_is_at_the_device_and_gives_no_force)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
-  use_proxy(&w, 500.0);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
-  cw_move_hand(&w, 0.3, -0.2, 0.1);
+  contact_world *w = cw_new(0.0);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  use_proxy(w, 500.0);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+  cw_move_hand(w, 0.3, -0.2, 0.1);
   for (int i = 0; i < 100; ++i) {
-    cw_tick(&w);
-    hap_pointer_state state = state_of(&w);
+    cw_tick(w);
+    hap_pointer_state state = state_of(w);
     for (int k = 0; k < 3; ++k) {
       CHECK_NEAR(state.proxy.position[k], state.device.position[k], 1e-12);
-      CHECK_NEAR(w.force[k], 0.0, 1e-9);
+      CHECK_NEAR(w->force[k], 0.0, 1e-9);
     }
   }
-  cw_close(&w);
 }
 
 /* A kinematic cube comes from below: a wall that moves, at the tick and at both ends of its way. */
@@ -161,43 +152,39 @@ TEST(a_driven_body_presses_through_the_proxy)
   const double k_v = 500.0;
   const double speed = 0.05;
   const double series = k * k_v / (k + k_v);
-  contact_world w;
-  cw_open(&w, 0.0);
-  dBodyID cube = cw_add_cube(&w, 1.0, 0.1, 0.0, 0.0, -0.05 - 0.001);
+  contact_world *w = cw_new(0.0);
+  dBodyID cube = cw_add_cube(w, 1.0, 0.1, 0.0, 0.0, -0.05 - 0.001);
   dBodySetKinematic(cube);
   dBodySetLinearVel(cube, 0.0, 0.0, speed);
-  w.hand_def.stiffness = k;
-  w.hand_def.damping = 0.0;
-  use_proxy(&w, k_v);
-  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS));
+  w->hand_def.stiffness = k;
+  w->hand_def.damping = 0.0;
+  use_proxy(w, k_v);
+  REQUIRE(cw_start(w, 0.0, 0.0, HAND_RADIUS));
   for (int i = 0; i < 200; ++i) {
-    cw_tick(&w);
-    double depth = w.position[0][2] + 0.05;
-    CHECK_NEAR(w.force[2], fmax(0.0, series * depth), 1.1 * series * speed * T);
+    cw_tick(w);
+    double depth = w->position[0][2] + 0.05;
+    CHECK_NEAR(w->force[2], fmax(0.0, series * depth), 1.1 * series * speed * T);
   }
-  CHECK(w.force[2] > 4.0);
-  cw_close(&w);
+  CHECK(w->force[2] > 4.0);
 }
 
 /* A cube on rails is moved by what testing simulations say of it, where it has a shape that the loop does
  * not know as well. */
 TEST(a_measured_body_is_pushed_through_the_proxy)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
-  dJointAttach(dJointCreateSlider(w.world, NULL), cube, NULL);
-  dTriMeshDataID data = add_unknown_shape(w.space, cube);
-  w.hand_def.stiffness = 1e5;
-  use_proxy(&w, 400.0);
-  REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.001, 0.002));
-  cw_move_hand(&w, 0.2, 0.0, 0.0);
-  cw_run(&w, 400);
-  CHECK(cw_stats(&w).model.measured_bodies == 1);
-  CHECK(w.impulse[0] > 0.05 && cw_stats(&w).faults.count == 0);
-  CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 0.01 * w.impulse[0]);
-  CHECK_NEAR(cw_stats(&w).hand.momentum_ratio, 1.0, 0.01);
-  cw_close(&w);
+  contact_world *w = cw_new(0.0);
+  dBodyID cube = cw_add_cube(w, 0.2, 0.05, 0.025, 0.0, 0.0);
+  dJointAttach(dJointCreateSlider(w->world, NULL), cube, NULL);
+  dTriMeshDataID data = add_unknown_shape(w->space, cube);
+  w->hand_def.stiffness = 1e5;
+  use_proxy(w, 400.0);
+  REQUIRE(cw_start(w, -HAND_RADIUS - 0.002, 0.001, 0.002));
+  cw_go(w, 0.2, 0.0, 0.0, 400);
+  CHECK(cw_stats(w).model.measured_bodies == 1);
+  CHECK(w->impulse[0] > 0.05 && cw_stats(w).faults.count == 0);
+  CHECK_NEAR(0.2 * w->velocity[0][0], w->impulse[0], 0.01 * w->impulse[0]);
+  CHECK_NEAR(cw_stats(w).hand.momentum_ratio, 1.0, 0.01);
+  cw_close(w);
   dGeomTriMeshDataDestroy(data);
 }
 
@@ -245,18 +232,15 @@ TEST(pointers_of_one_body_have_each_their_own_coupling)
 /* Without mass the proxy keeps nothing: what the hand gives the cube gets. */
 TEST(a_proxy_passes_the_whole_impulse_on)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 0.2, 0.05, 0.025, 0.0, 0.0);
-  w.hand_def.stiffness = 1e5;
-  use_proxy(&w, 400.0);
-  REQUIRE(cw_start(&w, -HAND_RADIUS - 0.002, 0.0, 0.0));
-  cw_move_hand(&w, 0.2, 0.0, 0.0);
-  cw_run(&w, 400);
-  CHECK(w.impulse[0] > 0.05);
-  CHECK_NEAR(0.2 * w.velocity[0][0], w.impulse[0], 1e-6 * w.impulse[0]);
-  CHECK_NEAR(cw_stats(&w).hand.momentum_ratio, 1.0, 1e-9);
-  cw_close(&w);
+  contact_world *w = cw_new(0.0);
+  cw_add_cube(w, 0.2, 0.05, 0.025, 0.0, 0.0);
+  w->hand_def.stiffness = 1e5;
+  use_proxy(w, 400.0);
+  REQUIRE(cw_start(w, -HAND_RADIUS - 0.002, 0.0, 0.0));
+  cw_go(w, 0.2, 0.0, 0.0, 400);
+  CHECK(w->impulse[0] > 0.05);
+  CHECK_NEAR(0.2 * w->velocity[0][0], w->impulse[0], 1e-6 * w->impulse[0]);
+  CHECK_NEAR(cw_stats(w).hand.momentum_ratio, 1.0, 1e-9);
 }
 
 /* A cube of 60 g hit through the coupling: half a period of mass and spring, as if the hand were a
@@ -267,26 +251,24 @@ TEST(an_impact_through_the_proxy_has_the_time_of_its_spring)
   const double k = 1e4;
   const double mass = 0.06;
   const double speed = 0.1;
-  contact_world w;
-  cw_open(&w, 0.0);
-  dBodyID cube = cw_add_cube(&w, mass, 0.05, 0.025 + 0.005, 0.0, 0.0);
+  contact_world *w = cw_new(0.0);
+  dBodyID cube = cw_add_cube(w, mass, 0.05, 0.025 + 0.005, 0.0, 0.0);
   dBodySetLinearVel(cube, -speed, 0.0, 0.0);
-  w.hand_def.stiffness = k;
-  w.hand_def.damping = 0.0;
-  use_proxy(&w, k_v);
-  REQUIRE(cw_start(&w, -HAND_RADIUS, 0.0, 0.0));
+  w->hand_def.stiffness = k;
+  w->hand_def.damping = 0.0;
+  use_proxy(w, k_v);
+  REQUIRE(cw_start(w, -HAND_RADIUS, 0.0, 0.0));
   int touching = 0;
   double peak = 0.0;
   for (int i = 0; i < 300; ++i) {
-    cw_tick(&w);
-    touching += state_of(&w).contacts > 0;
-    peak = fmax(peak, cw_norm(w.force));
+    cw_tick(w);
+    touching += state_of(w).contacts > 0;
+    peak = fmax(peak, cw_norm(w->force));
   }
   double series = k * k_v / (k + k_v);
   CHECK_NEAR(touching * T, M_PI * sqrt(mass / series), 2.5 * T);
   CHECK_NEAR(peak, speed * sqrt(mass * series), 0.01 * speed * sqrt(mass * series));
-  CHECK_NEAR(w.velocity[0][0], speed, 0.01 * speed);
-  cw_close(&w);
+  CHECK_NEAR(w->velocity[0][0], speed, 0.01 * speed);
 }
 
 /* ---- the choice ---- */
@@ -339,8 +321,7 @@ TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
     CHECK(state.coupling_reason == cases[i].reason);
     CHECK_NEAR(state.coupling_stiffness, above ? cases[i].hold : 0.0, 1e-9);
     CHECK_NEAR(state.contact_stiffness, 300.0 * cases[i].count, 1e-9);
-    cw_move_hand(&w, 0.0, 0.0, 0.05);
-    cw_run(&w, 300);
+    cw_go(&w, 0.0, 0.0, 0.05, 300);
     CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT); /* and is let go of again */
     CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
     cw_close(&w);
@@ -351,38 +332,34 @@ TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
  * changes while there is force. */
 TEST(the_change_while_pressing_has_no_jump)
 {
-  contact_world w;
   const double press = 0.002;
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
-  cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
-  cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
-  w.hand_expert.coupling = HAP_COUPLING_AUTO;
-  w.hand_expert.coupling_stiffness = 1500.0; /* one contact of 1 kN/m, not two */
-  w.hand_def.stiffness = 1000.0;
-  w.hand_def.damping = 0.0;
-  REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
-  cw_move_hand(&w, 0.0, 0.0, -0.03);
-  cw_run(&w, (int)lround((press + 0.001) / 0.03 / T));
-  cw_move_hand(&w, 0.05, 0.0, 0.0);
-  double before = w.force[2];
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  cw_add_cube(w, 5.0, 0.1, -0.05, 0.0, 0.05);
+  cw_add_cube(w, 5.0, 0.1, 0.05, 0.0, 0.05);
+  w->hand_expert.coupling = HAP_COUPLING_AUTO;
+  w->hand_expert.coupling_stiffness = 1500.0; /* one contact of 1 kN/m, not two */
+  w->hand_def.stiffness = 1000.0;
+  w->hand_def.damping = 0.0;
+  REQUIRE(cw_start(w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
+  cw_go(w, 0.0, 0.0, -0.03, (int)lround((press + 0.001) / 0.03 / T));
+  cw_move_hand(w, 0.05, 0.0, 0.0);
+  double before = w->force[2];
   CHECK_NEAR(before, 1000.0 * press, 0.05);
   double jump = 0.0;
   bool changed = false;
   for (int i = 0; i < 600 && !changed; ++i) {
-    before = w.force[2];
-    cw_tick(&w);
-    changed = state_of(&w).coupling == HAP_COUPLING_PROXY;
-    jump = fmax(jump, fabs(w.force[2] - before));
+    before = w->force[2];
+    cw_tick(w);
+    changed = state_of(w).coupling == HAP_COUPLING_PROXY;
+    jump = fmax(jump, fabs(w->force[2] - before));
   }
   CHECK(changed);
-  CHECK(state_of(&w).contacts == 1);   /* before the second contact closes */
+  CHECK(state_of(w).contacts == 1);    /* before the second contact closes */
   CHECK(jump < 0.06 * 1000.0 * press); /* 20 ms long 1 / 20 of the difference at most */
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
-  cw_run(&w, 300);
+  cw_go(w, 0.0, 0.0, 0.0, 300);
   double series = 1000.0 * 1500.0 / 2500.0;
-  CHECK_NEAR(w.force[2], series * press, 0.02 * series * press);
-  cw_close(&w);
+  CHECK_NEAR(w->force[2], series * press, 0.02 * series * press);
 }
 
 /* Seen, not felt: whatever is near, there is nothing that could shake. */
@@ -390,21 +367,19 @@ TEST(auto_without_a_force_stays_direct)
 {
   static const double scale[] = {0.0, 1e-300};
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    cw_add_floor(&w);
-    cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
-    w.hand_expert.coupling = HAP_COUPLING_AUTO;
-    w.hand_expert.coupling_stiffness = 100.0;
-    w.hand_def.force_scale = scale[i];
-    REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
-    cw_move_hand(&w, 0.0, 0.0, -0.03);
-    cw_run(&w, 100);
-    hap_pointer_state state = state_of(&w);
+    contact_world *w = cw_new(0.0);
+    cw_add_floor(w);
+    cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
+    w->hand_expert.coupling = HAP_COUPLING_AUTO;
+    w->hand_expert.coupling_stiffness = 100.0;
+    w->hand_def.force_scale = scale[i];
+    REQUIRE(cw_start(w, 0.0, 0.0, HAND_RADIUS + 0.001));
+    cw_go(w, 0.0, 0.0, -0.03, 100);
+    hap_pointer_state state = state_of(w);
     CHECK(state.contacts == 1 && state.coupling == HAP_COUPLING_DIRECT);
     CHECK(state.coupling_reason == (i == 0 ? HAP_COUPLING_UNKNOWN : HAP_COUPLING_WITHIN));
-    CHECK(cw_stats(&w).faults.count == 0);
-    cw_close(&w);
+    CHECK(cw_stats(w).faults.count == 0);
+    cw_close(w);
   }
 }
 
@@ -441,33 +416,31 @@ TEST(a_hop_does_not_change_the_coupling)
  * is, not where it would leap. */
 TEST(a_heavy_proxy_is_let_go_of_at_the_device)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  add_ring(&w, 4);
-  w.hand_expert.coupling = HAP_COUPLING_AUTO;
-  w.hand_expert.coupling_stiffness = 1000.0;
-  w.hand_expert.coupling_damping = 2.0;
-  w.hand_def.stiffness = 300.0;
-  w.hand_expert.proxy_mass = 0.5;
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.03));
-  cw_move_hand(&w, 0.0, 0.0, -0.05);
-  while (state_of(&w).contacts < 4 && w.ticks < 1000) {
-    cw_tick(&w);
+  contact_world *w = cw_new(0.0);
+  add_ring(w, 4);
+  w->hand_expert.coupling = HAP_COUPLING_AUTO;
+  w->hand_expert.coupling_stiffness = 1000.0;
+  w->hand_expert.coupling_damping = 2.0;
+  w->hand_def.stiffness = 300.0;
+  w->hand_expert.proxy_mass = 0.5;
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.03));
+  cw_move_hand(w, 0.0, 0.0, -0.05);
+  while (state_of(w).contacts < 4 && w->ticks < 1000) {
+    cw_tick(w);
   }
-  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
-  hap_pointer_state state = state_of(&w);
+  CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
+  hap_pointer_state state = state_of(w);
   double leap = 0.0;
   for (int i = 0; i < 5000 && state.coupling == HAP_COUPLING_PROXY; ++i) {
-    cw_move_hand(&w, 0.0, 0.0, i < 50 ? 1.0 : 0.0);
+    cw_move_hand(w, 0.0, 0.0, i < 50 ? 1.0 : 0.0);
     double before = state.proxy.position[2];
     double way = T * state.twist.linear[2];
-    cw_tick(&w);
-    state = state_of(&w);
+    cw_tick(w);
+    state = state_of(w);
     leap = fabs(state.proxy.position[2] - before - way);
   }
   CHECK(state.coupling == HAP_COUPLING_DIRECT);
   CHECK(leap < 1e-4);
-  cw_close(&w);
 }
 
 TEST(a_proxy_is_refused_where_it_cannot_be)
@@ -524,23 +497,22 @@ TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
 {
   double speed[2];
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    dBodyID cube = cw_add_cube(&w, 0.2, 0.05, 0.025 + 0.05, 0.0, 0.0);
+    contact_world *w = cw_new(0.0);
+    dBodyID cube = cw_add_cube(w, 0.2, 0.05, 0.025 + 0.05, 0.0, 0.0);
     dBodySetLinearVel(cube, -1.0, 0.0, 0.0);
-    w.research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
-    w.hand_def.stiffness = 1e5;
-    w.hand_def.damping = 0.0;
-    use_proxy(&w, 800.0);
-    REQUIRE(cw_start(&w, -HAND_RADIUS, 0.0, 0.0));
-    cw_run(&w, 45);
-    double given = port_energy(&w, 20);
-    cw_move_hand(&w, -0.3, 0.0, 0.0); /* and gives way */
-    given += port_energy(&w, 200);
-    speed[i] = w.velocity[0][0];
+    w->research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w->hand_def.stiffness = 1e5;
+    w->hand_def.damping = 0.0;
+    use_proxy(w, 800.0);
+    REQUIRE(cw_start(w, -HAND_RADIUS, 0.0, 0.0));
+    cw_run(w, 45);
+    double given = port_energy(w, 20);
+    cw_move_hand(w, -0.3, 0.0, 0.0); /* and gives way */
+    given += port_energy(w, 200);
+    speed[i] = w->velocity[0][0];
     CHECK(given > 0.01);
-    CHECK(cw_stats(&w).faults.energy_ticks == 0);
-    cw_close(&w);
+    CHECK(cw_stats(w).faults.energy_ticks == 0);
+    cw_close(w);
   }
   CHECK_NEAR(speed[1], speed[0], 1e-9);
 }
@@ -550,34 +522,33 @@ TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
 TEST(a_change_of_the_coupling_is_no_source_of_energy)
 {
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    cw_add_floor(&w);
-    cw_add_cube(&w, 5.0, 0.1, -0.05, 0.0, 0.05);
-    cw_add_cube(&w, 5.0, 0.1, 0.05, 0.0, 0.05);
-    w.research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
-    w.hand_expert.coupling = HAP_COUPLING_AUTO;
-    w.hand_expert.coupling_stiffness = 4500.0;
-    w.hand_def.stiffness = 4000.0;
-    w.hand_def.damping = 0.0;
-    w.hand_def.max_force = 20.0;
-    REQUIRE(cw_start(&w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
-    double given = port_energy(&w, 30);
-    cw_move_hand(&w, 0.0, 0.0, -0.03);
-    given += port_energy(&w, 133);
-    cw_move_hand(&w, 0.1, 0.0, 0.0);
-    while (state_of(&w).coupling == HAP_COUPLING_DIRECT && w.ticks < 1000) {
-      given += port_energy(&w, 1);
+    contact_world *w = cw_new(0.0);
+    cw_add_floor(w);
+    cw_add_cube(w, 5.0, 0.1, -0.05, 0.0, 0.05);
+    cw_add_cube(w, 5.0, 0.1, 0.05, 0.0, 0.05);
+    w->research.guard = i == 0 ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+    w->hand_expert.coupling = HAP_COUPLING_AUTO;
+    w->hand_expert.coupling_stiffness = 4500.0;
+    w->hand_def.stiffness = 4000.0;
+    w->hand_def.damping = 0.0;
+    w->hand_def.max_force = 20.0;
+    REQUIRE(cw_start(w, -0.03, 0.0, 0.1 + HAND_RADIUS + 0.001));
+    double given = port_energy(w, 30);
+    cw_move_hand(w, 0.0, 0.0, -0.03);
+    given += port_energy(w, 133);
+    cw_move_hand(w, 0.1, 0.0, 0.0);
+    while (state_of(w).coupling == HAP_COUPLING_DIRECT && w->ticks < 1000) {
+      given += port_energy(w, 1);
     }
-    CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+    CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
     double put_in = -given;
-    cw_move_hand(&w, 0.0, 0.0, 1.0);
-    given += port_energy(&w, 100);
+    cw_move_hand(w, 0.0, 0.0, 1.0);
+    given += port_energy(w, 100);
     printf("# guard %s: put in %.4g J, got back %.4g J\n", i == 0 ? "off" : "on", put_in,
            given + put_in);
     CHECK(put_in > 0.01);
     CHECK(i == 0 || given < 0.02 * put_in); /* 1 % of what the two springs held together */
-    cw_close(&w);
+    cw_close(w);
   }
 }
 
@@ -598,39 +569,33 @@ TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
   const double k = 8000.0;
   const double k_v = 500.0;
   const double series = k * k_v / (k + k_v);
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_floor(&w);
-  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 1.0);
-  w.hand_def.stiffness = k;
-  w.hand_def.damping = 0.0;
-  use_proxy(&w, k_v);
-  REQUIRE(cw_start(&w, 0.0, 0.0, HAND_RADIUS + 0.001));
-  cw_move_hand(&w, 0.0, 0.0, -0.03);
-  cw_run(&w, 100);
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
-  cw_run(&w, 100);
-  CHECK_NEAR(w.force[2], 0.002 * series, 1e-6);
-  change_model(&w, HAP_MODEL_ACCELERANCE);
-  hap_pointer_state state = state_of(&w);
+  contact_world *w = cw_new(0.0);
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w->hand_def.stiffness = k;
+  w->hand_def.damping = 0.0;
+  use_proxy(w, k_v);
+  REQUIRE(cw_start(w, 0.0, 0.0, HAND_RADIUS + 0.001));
+  cw_go(w, 0.0, 0.0, -0.03, 100);
+  cw_go(w, 0.0, 0.0, 0.0, 100);
+  CHECK_NEAR(w->force[2], 0.002 * series, 1e-6);
+  change_model(w, HAP_MODEL_ACCELERANCE);
+  hap_pointer_state state = state_of(w);
   CHECK(state.coupling == HAP_COUPLING_DIRECT && state.coupling_reason == HAP_COUPLING_MODEL);
   CHECK(state.coupling_stiffness == 0.0 && state.contact_stiffness == 0.0);
   CHECK_NEAR(state.proxy.position[2], state.device.position[2], 1e-12);
-  CHECK(w.force[2] <= 0.002 * k / 20.0 + 1e-9); /* what was behind the spring comes in slowly */
-  cw_run(&w, 100);
-  CHECK_NEAR(w.force[2], 0.002 * k, 1e-6);
-  cw_move_hand(&w, 0.3, 0.0, 0.0);
-  cw_run(&w, 100); /* far from where the proxy was */
-  cw_move_hand(&w, 0.0, 0.0, 0.0);
-  cw_run(&w, 10);
-  change_model(&w, HAP_MODEL_CONTACT);
-  state = state_of(&w);
+  CHECK(w->force[2] <= 0.002 * k / 20.0 + 1e-9); /* what was behind the spring comes in slowly */
+  cw_run(w, 100);
+  CHECK_NEAR(w->force[2], 0.002 * k, 1e-6);
+  cw_go(w, 0.3, 0.0, 0.0, 100); /* far from where the proxy was */
+  cw_go(w, 0.0, 0.0, 0.0, 10);
+  change_model(w, HAP_MODEL_CONTACT);
+  state = state_of(w);
   CHECK(state.coupling == HAP_COUPLING_PROXY && state.coupling_reason == HAP_COUPLING_ASKED);
-  CHECK_NEAR(w.force[0], 0.0, 1e-6);
-  CHECK(w.force[2] > 0.0 && w.force[2] < 0.002 * k + 1e-6);
-  cw_run(&w, 300);
-  CHECK_NEAR(w.force[2], 0.002 * series, 1e-5);
-  cw_close(&w);
+  CHECK_NEAR(w->force[0], 0.0, 1e-6);
+  CHECK(w->force[2] > 0.0 && w->force[2] < 0.002 * k + 1e-6);
+  cw_run(w, 300);
+  CHECK_NEAR(w->force[2], 0.002 * series, 1e-5);
 }
 
 /* ---- eight contacts at once ---- */

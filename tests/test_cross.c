@@ -197,27 +197,26 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
 /* Of the pairs of a glued row those with the largest answers have the places. */
 TEST(with_too_few_places_the_largest_stay)
 {
-  test_world w;
   hapi_cross_block all[6];
-  world_open(&w, 0.0, 200);
-  expert_wish(&w.expert, HAP_EFFECT_CROSS, HAP_EFFECT_ON);
+  test_world *w = world_new(0.0, 200);
+  expert_wish(&w->expert, HAP_EFFECT_CROSS, HAP_EFFECT_ON);
   for (int i = 0; i < 3; ++i) {
-    world_add_cube(&w, EDGE, 0.2 + 0.3 * i, 2 * APART * i, 0, 0);
+    world_add_cube(w, EDGE, 0.2 + 0.3 * i, 2 * APART * i, 0, 0);
   }
   for (int i = 0; i < 2; ++i) {
-    dJointID joint = dJointCreateFixed(w.world, NULL);
-    dJointAttach(joint, w.bodies[i], w.bodies[i + 1]);
+    dJointID joint = dJointCreateFixed(w->world, NULL);
+    dJointAttach(joint, w->bodies[i], w->bodies[i + 1]);
     dJointSetFixed(joint);
   }
-  REQUIRE(start_above(&w, 2 * APART));
-  hapi_physics *physics = world_physics(&w);
-  CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w.def.max_bodies);
-  measure(&w);
+  REQUIRE(start_above(w, 2 * APART));
+  hapi_physics *physics = world_physics(w);
+  CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w->def.max_bodies);
+  measure(w);
   REQUIRE(physics->research.cross.block_count == 6);
   CHECK(physics->research.cross.counts.dropped == 0);
   memcpy(all, physics->research.cross.blocks, sizeof all);
   physics->config.capacity.crosses = 4;
-  measure(&w);
+  measure(w);
   REQUIRE(physics->research.cross.block_count == 4);
   CHECK(physics->research.cross.counts.dropped == 2);
   for (int i = 0; i < 6; ++i) {
@@ -231,7 +230,6 @@ TEST(with_too_few_places_the_largest_stay)
     }
     CHECK(kept == (larger < 4));
   }
-  world_close(&w);
 }
 
 /* A perturbation of nothing, as of a body without weight, divides nothing by nothing. */
@@ -538,18 +536,17 @@ TEST(what_does_not_answer_has_no_block)
 TEST(perturbations_go_into_the_body)
 {
   for (int side = -1; side <= 1; side += 2) {
-    test_world w;
-    world_open(&w, 0.0, 1000);
-    w.mu = 0.0;
-    w.research.probe = HAP_PROBE_OPERATING;
+    test_world *w = world_new(0.0, 1000);
+    w->mu = 0.0;
+    w->research.probe = HAP_PROBE_OPERATING;
     for (int i = 0; i < 2; ++i) {
-      world_add_cube(&w, EDGE, 0.5, side * (EDGE / 2 + i * (EDGE - OVERLAP)), 0, 0);
+      world_add_cube(w, EDGE, 0.5, side * (EDGE / 2 + i * (EDGE - OVERLAP)), 0, 0);
     }
-    REQUIRE(world_start(&w, RADIUS, side * (-RADIUS - GAP), 0, 0));
-    const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
+    REQUIRE(world_start(w, RADIUS, side * (-RADIUS - GAP), 0, 0));
+    const hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
     REQUIRE(contact != NULL);
-    CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 1.0, 1e-6);
-    world_close(&w);
+    CHECK_NEAR(world_contact_answer(w, contact)->a[0][0], 1.0, 1e-6);
+    world_close(w);
   }
 }
 

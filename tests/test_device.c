@@ -443,10 +443,7 @@ TEST(bad_arguments_say_why)
     CHECK(read_arguments(bad[i][0], e, &detail) == HAP_ERROR_ARGUMENT);
     bool told_why = strstr(detail.text, bad[i][1]) != NULL &&
                     strstr(detail.text, "known: number, vector, turn, word, text") != NULL;
-    CHECK(told_why);
-    if (!told_why) {
-      printf("# '%s' gave '%s'\n", bad[i][0], detail.text);
-    }
+    CHECK_SAY(told_why, "'%s' gave '%s'", bad[i][0], detail.text);
   }
 }
 

@@ -363,18 +363,17 @@ static hap_effect_info shape_of(const contact_world *w)
 TEST(a_shape_that_is_asked_for_stays)
 {
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    cw_add_cube(&w, 0.3, EDGE, 0.0, 0.0, 0.5 * EDGE);
-    w.hand_def.radius = RADIUS;
-    w.def.accuracy = 0.0;
-    expert_wish(&w.expert, HAP_EFFECT_SHAPE, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
-    REQUIRE(start_row(&w));
-    cw_run(&w, 120);
-    hap_effect_info shape = shape_of(&w);
+    contact_world *w = cw_new(0.0);
+    cw_add_cube(w, 0.3, EDGE, 0.0, 0.0, 0.5 * EDGE);
+    w->hand_def.radius = RADIUS;
+    w->def.accuracy = 0.0;
+    expert_wish(&w->expert, HAP_EFFECT_SHAPE, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
+    REQUIRE(start_row(w));
+    cw_run(w, 120);
+    hap_effect_info shape = shape_of(w);
     CHECK(shape.state == (i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON));
     CHECK(shape.reason == (i == 0 ? HAP_REASON_ACCURACY : HAP_REASON_ASKED));
-    cw_close(&w);
+    cw_close(w);
   }
 }
 

@@ -191,11 +191,10 @@ static void look_in_step(void *user, double step_s)
  * application's thread, which lockstep works in, is as it was. */
 static void check_decay(hap_model model, bool touched)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  w.def.model = model;
-  w.before_step = look_in_step;
-  dBodyID cube = world_add_cube(&w, 0.1, 1.0, 0.05, 0.0, 0.0);
+  test_world *w = world_new(0.0, 20);
+  w->def.model = model;
+  w->before_step = look_in_step;
+  dBodyID cube = world_add_cube(w, 0.1, 1.0, 0.05, 0.0, 0.0);
   double speed = touched ? 0.0 : 0.125 * DBL_MIN;
   dBodySetLinearDamping(cube, touched ? 0.9 : 0.0);
   dBodySetAngularDamping(cube, touched ? 0.9 : 0.0);
@@ -203,23 +202,22 @@ static void check_decay(hap_model model, bool touched)
   dBodySetAngularDampingThreshold(cube, 0.0);
   dBodySetLinearVel(cube, speed, -speed, speed);
   dBodySetAngularVel(cube, speed, speed, -speed);
-  REQUIRE(world_start(&w, 0.01, touched ? -0.008 : -0.012, 0.03, 0.02));
-  CHECK(hap_session_advance(w.session, 20) == HAP_OK);
-  const hapi_tick *tick = &w.session->haptic->tick;
+  REQUIRE(world_start(w, 0.01, touched ? -0.008 : -0.012, 0.03, 0.02));
+  CHECK(hap_session_advance(w->session, 20) == HAP_OK);
+  const hapi_tick *tick = &w->session->haptic->tick;
   REQUIRE(tick->bodies.live_count == 1);
   const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[0]];
   CHECK((hapi_v3_norm(body->twist.linear) > 1e-3) == touched);
   CHECK((hapi_v3_norm(body->twist.angular) > 1e-3) == touched);
-  world_move_pointer(&w, 0, (const double[3]){-0.012, 0.03, 0.02}, NULL);
+  world_move_pointer(w, 0, (const double[3]){-0.012, 0.03, 0.02}, NULL);
   int found = 0;
   for (int i = 0; i < (touched ? 25000 : 200); ++i) {
-    CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+    CHECK(hap_session_advance(w->session, 1) == HAP_OK);
     found += denormals_of(tick);
   }
-  CHECK(found == 0 && tick->bodies.live_count == 1 && world_stats(&w).faults.count == 0);
+  CHECK(found == 0 && tick->bodies.live_count == 1 && world_stats(w).faults.count == 0);
   CHECK(hapi_v3_norm(body->twist.linear) < 1e-150 && hapi_v3_norm(body->twist.angular) < 1e-150);
   CHECK(!flushes() && !flushed_in_step);
-  world_close(&w);
 }
 
 TEST(nothing_in_the_loop_is_denormal)

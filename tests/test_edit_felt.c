@@ -185,11 +185,8 @@ static void check_case(const edit_case *what, hap_model model)
   double force = felt_force();
   bool good = force >= what->least - 1e-9 && force <= what->most + 1e-9 && felt.bad == 0 &&
               stats_of(&f.s).faults.count == 0;
-  if (!good) {
-    printf("# %s, %s: %.4f N, steps of %.3f N, peak %.3f\n", what->name, hap_model_name(model),
-           force, felt.steepest, felt.peak);
-  }
-  CHECK(good);
+  CHECK_SAY(good, "%s, %s: %.4f N, steps of %.3f N, peak %.3f", what->name, hap_model_name(model),
+            force, felt.steepest, felt.peak);
   felt_end(&f);
 }
 

@@ -80,36 +80,34 @@ static void old_callback(dBodyID body)
 
 static void check_replacement(hap_model model, bool touched)
 {
-  stage s;
   hap_pose pose;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.model = model;
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, touched ? -0.058 : -1.0);
-  CHECK(hap_session_set_moved_callback(s.session, s.cube, old_callback) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 60) == HAP_OK);
-  CHECK((state_of(&s, hand).contacts > 0) == touched);
-  if (!replace_cube(&s)) {
-    stage_end(&s);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->def.model = model;
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, touched ? -0.058 : -1.0);
+  CHECK(hap_session_set_moved_callback(s->session, s->cube, old_callback) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 60) == HAP_OK);
+  CHECK((state_of(s, hand).contacts > 0) == touched);
+  if (!replace_cube(s)) {
+    stage_end(s);
     SKIP("the heap gives no address twice");
   }
-  dBodySetPosition(s.cube, 0.0, 3.0, 0.0);
+  dBodySetPosition(s->cube, 0.0, 3.0, 0.0);
   calls_of_old = 0;
-  CHECK(hap_session_advance(s.session, 25) == HAP_BODY_LOST);
-  CHECK(stats_of(&s).faults.bodies_lost == 1 && stats_of(&s).model.bodies_known == 1);
-  CHECK(has(detail_of(&s), "hap_session_forget_body"));
-  CHECK(dBodyGetPosition(s.cube)[1] == 3.0 && hapi_v3_norm(dBodyGetLinearVel(s.cube)) == 0.0);
-  CHECK(hap_session_poses(s.session, hap_session_now(s.session), &s.cube, 1, &pose) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 25) == HAP_BODY_LOST);
+  CHECK(stats_of(s).faults.bodies_lost == 1 && stats_of(s).model.bodies_known == 1);
+  CHECK(has(detail_of(s), "hap_session_forget_body"));
+  CHECK(dBodyGetPosition(s->cube)[1] == 3.0 && hapi_v3_norm(dBodyGetLinearVel(s->cube)) == 0.0);
+  CHECK(hap_session_poses(s->session, hap_session_now(s->session), &s->cube, 1, &pose) == HAP_OK);
   CHECK(pose.position[1] == 3.0); /* not on its way from where the other one was */
-  CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-  CHECK(calls_of_old == 0 && state_of(&s, hand).contacts == 0);
-  CHECK(hapi_v3_norm(state_of(&s, hand).wrench.force) == 0.0);
-  hap_stats stats = stats_of(&s);
+  CHECK(hap_session_advance(s->session, 200) == HAP_OK);
+  CHECK(calls_of_old == 0 && state_of(s, hand).contacts == 0);
+  CHECK(hapi_v3_norm(state_of(s, hand).wrench.force) == 0.0);
+  hap_stats stats = stats_of(s);
   CHECK(stats.faults.bodies_lost == 1 && stats.faults.count == 0);
   CHECK(!touched ||
         fabs(stats.hand.momentum_ratio - 1.0) < 1e-9); /* also what the old one took along */
-  stage_end(&s);
 }
 
 TEST(a_body_at_the_address_of_a_destroyed_one_is_another_body)
@@ -155,60 +153,59 @@ TEST(a_lost_body_is_said_once_a_run_and_counted_always)
 
 TEST(a_body_is_taken_for_itself_whatever_is_set_on_it)
 {
-  stage s;
   dMass mass;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
   dMassSetBoxTotal(&mass, 3.0, 0.2, 0.1, 0.1);
   for (int i = 0; i < 14; ++i) {
-    CHECK(hap_session_advance(s.session, 25) == HAP_OK); /* not HAP_BODY_LOST */
-    dBodySetAutoDisableTime(s.cube, 1.0 + i);            /* in whatever state it is */
+    CHECK(hap_session_advance(s->session, 25) == HAP_OK); /* not HAP_BODY_LOST */
+    dBodySetAutoDisableTime(s->cube, 1.0 + i);            /* in whatever state it is */
     switch (i) {
       case 0:
-        dBodySetAutoDisableTime(s.cube, 2.0);
+        dBodySetAutoDisableTime(s->cube, 2.0);
         break;
       case 1:
-        dBodySetAutoDisableDefaults(s.cube);
+        dBodySetAutoDisableDefaults(s->cube);
         break;
       case 2:
-        dBodySetAutoDisableFlag(s.cube, 1);
+        dBodySetAutoDisableFlag(s->cube, 1);
         break;
       case 3:
-        dBodySetAutoDisableFlag(s.cube, 0);
+        dBodySetAutoDisableFlag(s->cube, 0);
         break;
       case 4:
-        dBodySetFiniteRotationMode(s.cube, 1);
+        dBodySetFiniteRotationMode(s->cube, 1);
         break;
       case 5:
-        dBodySetFiniteRotationMode(s.cube, 0);
+        dBodySetFiniteRotationMode(s->cube, 0);
         break;
       case 6:
-        dBodySetMass(s.cube, &mass);
+        dBodySetMass(s->cube, &mass);
         break;
       case 7:
-        dBodySetKinematic(s.cube);
+        dBodySetKinematic(s->cube);
         break;
       case 8:
-        dBodySetDynamic(s.cube);
+        dBodySetDynamic(s->cube);
         break;
       case 9:
-        dBodySetPosition(s.cube, 5.0, 5.0, 5.0);
-        dGeomDestroy(s.geom);
-        s.geom = dCreateSphere(s.space, 0.1);
-        dGeomSetBody(s.geom, s.cube);
+        dBodySetPosition(s->cube, 5.0, 5.0, 5.0);
+        dGeomDestroy(s->geom);
+        s->geom = dCreateSphere(s->space, 0.1);
+        dGeomSetBody(s->geom, s->cube);
         break;
       case 10:
-        dBodySetData(s.cube, &s);
+        dBodySetData(s->cube, s);
         break;
       case 11:
-        dBodySetDampingDefaults(s.cube);
+        dBodySetDampingDefaults(s->cube);
         break;
       default:
-        dBodyDisable(s.cube);
+        dBodyDisable(s->cube);
         break;
     }
   }
-  CHECK(stats_of(&s).faults.bodies_lost == 0 && dBodyGetData(s.cube) == &s);
-  stage_end(&s);
+  CHECK(stats_of(s).faults.bodies_lost == 0 && dBodyGetData(s->cube) == s);
 }
 
 /* ---- ODE's settings are the application's ---- */
@@ -226,80 +223,77 @@ static void set_all(dBodyID body)
 TEST(settings_are_given_back_as_they_were)
 {
   for (int forgotten = 0; forgotten < 2; ++forgotten) {
-    stage s;
     body_bits before[2];
     body_bits after[2];
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    dBodyID bodies[2] = {s.cube, add_cube(&s, 1.0, NULL)};
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    dBodyID bodies[2] = {s->cube, add_cube(s, 1.0, NULL)};
     set_all(bodies[1]);
     dBodySetFiniteRotationAxis(bodies[1], 0.0, 1.0, 0.0);
     body_read(bodies[0], &before[0]);
     body_read(bodies[1], &before[1]);
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 41) == HAP_OK); /* too short to sleep */
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 41) == HAP_OK); /* too short to sleep */
     if (forgotten != 0) {
-      CHECK(hap_session_forget_body(s.session, bodies[0]) == HAP_OK);
-      CHECK(hap_session_forget_body(s.session, bodies[1]) == HAP_OK);
+      CHECK(hap_session_forget_body(s->session, bodies[0]) == HAP_OK);
+      CHECK(hap_session_forget_body(s->session, bodies[1]) == HAP_OK);
     } else {
-      CHECK(hap_session_stop(s.session) == HAP_OK);
+      CHECK(hap_session_stop(s->session) == HAP_OK);
     }
     for (int i = 0; i < 2; ++i) {
       body_read(bodies[i], &after[i]);
       CHECK(memcmp(&before[i], &after[i], sizeof before[i]) == 0);
     }
-    stage_end(&s);
+    stage_end(s);
   }
 }
 
 TEST(settings_of_sleep_that_are_changed_while_running_hold)
 {
-  stage s;
   body_bits bits;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  set_all(s.cube);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  dBodySetAutoDisableTime(s.cube, 2.5);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 7);
-  dBodySetAutoDisableSteps(s.cube, 9);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  dBodySetAutoDisableAngularThreshold(s.cube, 0.75);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(fabs(sleep_of(&s)->angular_threshold - 0.75 * 0.75) < 1e-15);
-  CHECK(sleep_of(&s)->idle_time == 2.5 && sleep_of(&s)->idle_steps == 9);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  body_read(s.cube, &bits);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  set_all(s->cube);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  dBodySetAutoDisableTime(s->cube, 2.5);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK(sleep_of(s)->idle_time == 2.5 && sleep_of(s)->idle_steps == 7);
+  dBodySetAutoDisableSteps(s->cube, 9);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  dBodySetAutoDisableAngularThreshold(s->cube, 0.75);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK(fabs(sleep_of(s)->angular_threshold - 0.75 * 0.75) < 1e-15);
+  CHECK(sleep_of(s)->idle_time == 2.5 && sleep_of(s)->idle_steps == 9);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  body_read(s->cube, &bits);
   CHECK(bits.automatic == 1 && bits.idle_time == 2.5 && bits.idle_steps == 9 && bits.samples == 4);
   CHECK(fabs(bits.thresholds[0] - 0.25) + fabs(bits.thresholds[1] - 0.75) < 1e-15);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  dBodySetAutoDisableFlag(s.cube, 0);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  body_read(s.cube, &bits);
-  CHECK(bits.automatic == 0 && bits.idle_time == dWorldGetAutoDisableTime(s.world));
-  stage_end(&s);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  dBodySetAutoDisableFlag(s->cube, 0);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  body_read(s->cube, &bits);
+  CHECK(bits.automatic == 0 && bits.idle_time == dWorldGetAutoDisableTime(s->world));
 }
 
 static void finite_spin(double *out_w, bool in_session)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetAngularDamping(s.world, 0.0);
-  dBodySetAngularVel(s.cube, 0.0, 0.0, 20.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetAngularDamping(s->world, 0.0);
+  dBodySetAngularVel(s->cube, 0.0, 0.0, 20.0);
+  REQUIRE(stage_create(s) == HAP_OK);
   if (in_session) {
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    dBodySetFiniteRotationMode(s.cube, 1); /* on a body that carries a mark in its axis */
-    CHECK(hap_session_advance(s.session, 20) == HAP_OK);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    dBodySetFiniteRotationMode(s->cube, 1); /* on a body that carries a mark in its axis */
+    CHECK(hap_session_advance(s->session, 20) == HAP_OK);
   } else {
-    dBodySetFiniteRotationMode(s.cube, 1);
-    dWorldQuickStep(s.world, 0.02);
+    dBodySetFiniteRotationMode(s->cube, 1);
+    dWorldQuickStep(s->world, 0.02);
   }
-  memcpy(out_w, dBodyGetQuaternion(s.cube), 4 * sizeof(double));
-  stage_end(&s);
+  memcpy(out_w, dBodyGetQuaternion(s->cube), 4 * sizeof(double));
+  stage_end(s);
 }
 
 TEST(finite_rotation_switched_on_while_running_is_odes)
@@ -313,84 +307,79 @@ TEST(finite_rotation_switched_on_while_running_is_odes)
 
 TEST(a_body_that_was_asleep_counts_anew_after_the_session)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  set_all(s.cube);
-  dBodySetAutoDisableTime(s.cube, 0.5);
-  dBodySetAutoDisableAverageSamplesCount(s.cube, 1);
-  dBodySetAutoDisableSteps(s.cube, 0);
-  dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0); /* awake while the session runs */
-  dJointAttach(dJointCreateSlider(s.world, NULL), s.cube, NULL);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 101) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  dBodySetLinearVel(s.cube, 0.0, 0.0, 0.0);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  set_all(s->cube);
+  dBodySetAutoDisableTime(s->cube, 0.5);
+  dBodySetAutoDisableAverageSamplesCount(s->cube, 1);
+  dBodySetAutoDisableSteps(s->cube, 0);
+  dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0); /* awake while the session runs */
+  dJointAttach(dJointCreateSlider(s->world, NULL), s->cube, NULL);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 101) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  dBodySetLinearVel(s->cube, 0.0, 0.0, 0.0);
   int steps = 0;
-  while (dBodyIsEnabled(s.cube) && steps < 100) {
-    dWorldQuickStep(s.world, 0.02);
+  while (dBodyIsEnabled(s->cube) && steps < 100) {
+    dWorldQuickStep(s->world, 0.02);
     ++steps;
   }
   CHECK(steps >= 25 && steps <= 28); /* 0.5 s */
-  stage_end(&s);
 }
 
 TEST(an_adopted_body_that_lost_its_geom_lives_when_it_is_adopted_again)
 {
   for (int again = 0; again < 2; ++again) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    REQUIRE(stage_create(&s) == HAP_OK);
-    CHECK(hap_session_adopt_body(s.session, s.cube) == HAP_OK);
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-    dGeomDestroy(s.geom);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    REQUIRE(stage_create(s) == HAP_OK);
+    CHECK(hap_session_adopt_body(s->session, s->cube) == HAP_OK);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+    dGeomDestroy(s->geom);
     if (again != 0) {
-      CHECK(hap_session_adopt_body(s.session, s.cube) == HAP_OK);
+      CHECK(hap_session_adopt_body(s->session, s->cube) == HAP_OK);
     }
-    CHECK(hap_session_advance(s.session, 50) == (again != 0 ? HAP_OK : HAP_BODY_LOST));
-    CHECK(stats_of(&s).model.bodies_known == (again != 0 ? 1u : 0u));
-    stage_end(&s);
+    CHECK(hap_session_advance(s->session, 50) == (again != 0 ? HAP_OK : HAP_BODY_LOST));
+    CHECK(stats_of(s).model.bodies_known == (again != 0 ? 1u : 0u));
+    stage_end(s);
   }
 }
 
 TEST(the_reach_of_a_body_is_that_of_its_geoms_now)
 {
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK_NEAR(extent_of(&s), 0.05 * sqrt(3.0), 1e-12);
-  dGeomBoxSetLengths(s.geom, 2.0, 0.1, 0.1);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK_NEAR(extent_of(&s), sqrt(1.0 + 2 * 0.0025), 1e-12);
-  dGeomSetOffsetPosition(s.geom, 1.0, 0.0, 0.0);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK_NEAR(extent_of(&s), sqrt(4.0 + 2 * 0.0025), 1e-12);
-  dGeomDestroy(s.geom);
-  s.geom = dCreateSphere(s.space, 0.3);
-  dGeomSetBody(s.geom, s.cube);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK_NEAR(extent_of(&s), 0.3 * sqrt(3.0), 1e-12); /* of its box */
-  stage_end(&s);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK_NEAR(extent_of(s), 0.05 * sqrt(3.0), 1e-12);
+  dGeomBoxSetLengths(s->geom, 2.0, 0.1, 0.1);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK_NEAR(extent_of(s), sqrt(1.0 + 2 * 0.0025), 1e-12);
+  dGeomSetOffsetPosition(s->geom, 1.0, 0.0, 0.0);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK_NEAR(extent_of(s), sqrt(4.0 + 2 * 0.0025), 1e-12);
+  dGeomDestroy(s->geom);
+  s->geom = dCreateSphere(s->space, 0.3);
+  dGeomSetBody(s->geom, s->cube);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK_NEAR(extent_of(s), 0.3 * sqrt(3.0), 1e-12); /* of its box */
 }
 
 /* ---- the lock ---- */
 
 TEST(errors_of_the_lock_say_what_to_do)
 {
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_unlock(s.session) == HAP_ERROR_THREAD && has(detail_of(&s), "unlock"));
-  CHECK(hap_session_try_lock(s.session, -1) == HAP_ERROR_ARGUMENT);
-  CHECK(has(detail_of(&s), "timeout_ns is -1"));
-  CHECK(hap_session_try_lock(s.session, INT64_MIN) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_try_lock(s.session, 0) == HAP_OK);
-  CHECK(hap_session_lock(s.session) == HAP_ERROR_THREAD && has(detail_of(&s), "not recursive"));
-  CHECK(hap_session_try_lock(s.session, INT64_MAX) == HAP_ERROR_THREAD);
-  CHECK(hap_session_advance(s.session, 1) == HAP_ERROR_THREAD); /* would wait for itself */
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
-  CHECK(hap_session_try_lock(s.session, INT64_MAX) == HAP_OK);
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
-  CHECK(stats_of(&s).edits.locks == 2);
-  stage_end(&s);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_unlock(s->session) == HAP_ERROR_THREAD && has(detail_of(s), "unlock"));
+  CHECK(hap_session_try_lock(s->session, -1) == HAP_ERROR_ARGUMENT);
+  CHECK(has(detail_of(s), "timeout_ns is -1"));
+  CHECK(hap_session_try_lock(s->session, INT64_MIN) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_try_lock(s->session, 0) == HAP_OK);
+  CHECK(hap_session_lock(s->session) == HAP_ERROR_THREAD && has(detail_of(s), "not recursive"));
+  CHECK(hap_session_try_lock(s->session, INT64_MAX) == HAP_ERROR_THREAD);
+  CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_THREAD); /* would wait for itself */
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
+  CHECK(hap_session_try_lock(s->session, INT64_MAX) == HAP_OK);
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
+  CHECK(stats_of(s).edits.locks == 2);
 }
 
 static bool ticks_go_on(stage *s)
@@ -441,20 +430,19 @@ static void *count_under_the_lock(void *arg)
 
 TEST(a_hundred_threads_may_wait_for_the_lock)
 {
-  stage s;
   pthread_t threads[CROWD];
-  REQUIRE(stage_run(&s, HAP_DRIVE_THREADS));
-  CHECK(hap_session_lock(s.session) == HAP_OK);
+  stage *s = stage_running(HAP_DRIVE_THREADS);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_lock(s->session) == HAP_OK);
   for (int i = 0; i < CROWD; ++i) {
-    REQUIRE(pthread_create(&threads[i], NULL, count_under_the_lock, &s) == 0);
+    REQUIRE(pthread_create(&threads[i], NULL, count_under_the_lock, s) == 0);
   }
   sleep_ms(20);
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
   for (int i = 0; i < CROWD; ++i) {
     pthread_join(threads[i], NULL);
   }
-  CHECK(s.seen[0] == 20 * CROWD && stats_of(&s).edits.locks == 20 * CROWD + 1);
-  stage_end(&s);
+  CHECK(s->seen[0] == 20 * CROWD && stats_of(s).edits.locks == 20 * CROWD + 1);
 }
 
 /* ---- callbacks ---- */
@@ -481,25 +469,23 @@ static bool edit_in_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters
 /* There the lists of what is near are in use. */
 TEST(a_surface_callback_may_not_forget)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  in_surface = &s;
-  s.ode.surface = edit_in_surface;
-  (void)add_cube(&s, 0.1, NULL);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  (void)add_hand(&s, -0.058);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  in_surface = s;
+  s->ode.surface = edit_in_surface;
+  (void)add_cube(s, 0.1, NULL);
+  REQUIRE(stage_create(s) == HAP_OK);
+  (void)add_hand(s, -0.058);
   for (int start = 0; start < 2; ++start) { /* in start, and in a step */
-    s.seen[4] = 0;
-    CHECK((start == 0 ? hap_session_start(s.session) : hap_session_advance(s.session, 30)) ==
+    s->seen[4] = 0;
+    CHECK((start == 0 ? hap_session_start(s->session) : hap_session_advance(s->session, 30)) ==
           HAP_OK);
-    CHECK(s.seen[4] > 0);
+    CHECK(s->seen[4] > 0);
     for (int i = 0; i < 4; ++i) {
-      CHECK(s.seen[i] == HAP_ERROR_THREAD);
+      CHECK(s->seen[i] == HAP_ERROR_THREAD);
     }
   }
-  s.seen[0] = hap_session_forget_body(s.session, s.cube); /* lockstep, and not in a callback */
-  CHECK(s.seen[0] == HAP_OK);
-  stage_end(&s);
+  s->seen[0] = hap_session_forget_body(s->session, s->cube); /* lockstep, and not in a callback */
+  CHECK(s->seen[0] == HAP_OK);
 }
 
 /* ---- posted edits ---- */
@@ -530,18 +516,18 @@ static void check_bad(stage *s, int runs)
 
 TEST(an_edit_that_stop_or_destroy_runs_is_a_callback_too)
 {
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_post(s.session, be_bad, &s) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 21) == HAP_OK);
-  check_bad(&s, 1);
-  CHECK(hap_session_post(s.session, be_bad, &s) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  check_bad(&s, 2);
-  CHECK(stats_of(&s).edits.run == 2);
-  CHECK(hap_session_post(s.session, be_bad, &s) == HAP_OK);
-  stage_end(&s);
-  check_bad(&s, 3);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_post(s->session, be_bad, s) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 21) == HAP_OK);
+  check_bad(s, 1);
+  CHECK(hap_session_post(s->session, be_bad, s) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  check_bad(s, 2);
+  CHECK(stats_of(s).edits.run == 2);
+  CHECK(hap_session_post(s->session, be_bad, s) == HAP_OK);
+  stage_end(s);
+  check_bad(s, 3);
 }
 
 static void post_again(void *arg)
@@ -556,19 +542,19 @@ static void post_again(void *arg)
 /* Taken is run: as often as a post was good. */
 TEST(edits_that_post_themselves_end_with_the_session)
 {
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_post(s.session, post_again, &s) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 110) == HAP_OK);
-  CHECK(s.seen[0] == 5 && s.seen[1] == 5);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(s.seen[1] == s.seen[0]); /* one waits, for the next start or destroy */
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  int before = s.seen[0];
-  CHECK(hap_session_advance(s.session, 110) == HAP_OK);
-  CHECK(s.seen[0] == before + 5);
-  stage_end(&s);
-  CHECK(s.seen[2] == 1 && s.seen[0] == s.seen[1] + 1);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_post(s->session, post_again, s) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 110) == HAP_OK);
+  CHECK(s->seen[0] == 5 && s->seen[1] == 5);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(s->seen[1] == s->seen[0]); /* one waits, for the next start or destroy */
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  int before = s->seen[0];
+  CHECK(hap_session_advance(s->session, 110) == HAP_OK);
+  CHECK(s->seen[0] == before + 5);
+  stage_end(s);
+  CHECK(s->seen[2] == 1 && s->seen[0] == s->seen[1] + 1);
 }
 
 enum {
@@ -605,15 +591,15 @@ static void *post_many(void *arg)
 
 TEST(what_was_taken_is_run_once_whatever_threads_post)
 {
-  stage s;
   pthread_t threads[POSTERS];
   poster posters[POSTERS];
   atomic_int run = 0;
   int taken = 0;
   int full = 0;
-  REQUIRE(stage_run(&s, HAP_DRIVE_THREADS));
+  stage *s = stage_running(HAP_DRIVE_THREADS);
+  REQUIRE(s != NULL);
   for (int i = 0; i < POSTERS; ++i) {
-    posters[i] = (poster){.s = &s, .run = &run};
+    posters[i] = (poster){.s = s, .run = &run};
     REQUIRE(pthread_create(&threads[i], NULL, post_many, &posters[i]) == 0);
   }
   for (int i = 0; i < POSTERS; ++i) {
@@ -622,7 +608,7 @@ TEST(what_was_taken_is_run_once_whatever_threads_post)
     full += posters[i].full;
     CHECK(posters[i].other == 0);
   }
-  stage_end(&s);
+  stage_end(s);
   printf("# %d taken, %d times full\n", taken, full);
   CHECK(full > 0 && taken > 0 && taken + full == 4000 * POSTERS);
   CHECK(atomic_load(&run) == taken);
@@ -630,15 +616,15 @@ TEST(what_was_taken_is_run_once_whatever_threads_post)
 
 TEST(a_full_queue_is_said)
 {
-  stage s;
   atomic_int run = 0;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
   for (int i = 0; i < 256; ++i) {
-    CHECK(hap_session_post(s.session, note_run, &run) == HAP_OK);
+    CHECK(hap_session_post(s->session, note_run, &run) == HAP_OK);
   }
-  CHECK(hap_session_post(s.session, note_run, &run) == HAP_ERROR_CAPACITY);
-  CHECK(has(detail_of(&s), "256"));
-  stage_end(&s);
+  CHECK(hap_session_post(s->session, note_run, &run) == HAP_ERROR_CAPACITY);
+  CHECK(has(detail_of(s), "256"));
+  stage_end(s);
   CHECK(atomic_load(&run) == 256);
 }
 
@@ -661,38 +647,37 @@ static int list_order(const stage *s, dGeomID mover, dGeomID out[16])
 TEST(a_sleeping_neighbour_may_lie_behind_geoms_that_rest)
 {
   for (int nested = 0; nested < 2; ++nested) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.def.model = HAP_MODEL_ACCELERANCE;
-    dBodyDisable(s.cube);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->def.model = HAP_MODEL_ACCELERANCE;
+    dBodyDisable(s->cube);
     if (nested != 0) {
-      dSpaceID inside = dSimpleSpaceCreate(dHashSpaceCreate(s.space));
-      dSpaceRemove(s.space, s.geom);
-      dSpaceAdd(inside, s.geom);
+      dSpaceID inside = dSimpleSpaceCreate(dHashSpaceCreate(s->space));
+      dSpaceRemove(s->space, s->geom);
+      dSpaceAdd(inside, s->geom);
       dGeomSetPosition(dCreateSphere(inside, 0.1), 0.0, 5.0, 0.0);
     }
     for (int i = 1; i < 5; ++i) {
-      dGeomSetPosition(dCreateSphere(s.space, 0.1), 0.0, 0.0, i);
-      dBodyDisable(add_cube(&s, 1.0 * i, NULL));
+      dGeomSetPosition(dCreateSphere(s->space, 0.1), 0.0, 0.0, i);
+      dBodyDisable(add_cube(s, 1.0 * i, NULL));
     }
     dGeomID before[16];
     dGeomID after[16];
     dGeomID flier;
-    dBodyID flies = add_cube(&s, 20.0, &flier);
+    dBodyID flies = add_cube(s, 20.0, &flier);
     dBodySetLinearVel(flies, 1.0, 0.0, 0.0);
-    REQUIRE(stage_create(&s) == HAP_OK);
-    hap_pointer_id hand = add_hand(&s, -0.0605); /* not touching */
-    int count = list_order(&s, flier, before);
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 500) == HAP_OK); /* ODE would end the process */
-    CHECK(stats_of(&s).probes.steps > 0 && !dBodyIsEnabled(s.cube));
-    CHECK(list_order(&s, flier, after) == count && count == 9);
+    REQUIRE(stage_create(s) == HAP_OK);
+    hap_pointer_id hand = add_hand(s, -0.0605); /* not touching */
+    int count = list_order(s, flier, before);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 500) == HAP_OK); /* ODE would end the process */
+    CHECK(stats_of(s).probes.steps > 0 && !dBodyIsEnabled(s->cube));
+    CHECK(list_order(s, flier, after) == count && count == 9);
     CHECK(memcmp(before, after, (size_t)count * sizeof before[0]) == 0);
     const hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-    CHECK(hap_pointer_set_target(s.session, hand, &pose, NULL) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 300) == HAP_OK);
-    CHECK(dBodyGetPosition(s.cube)[0] > 0.01); /* it was felt */
-    stage_end(&s);
+    CHECK(hap_pointer_set_target(s->session, hand, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 300) == HAP_OK);
+    CHECK(dBodyGetPosition(s->cube)[0] > 0.01); /* it was felt */
+    stage_end(s);
   }
 }
 

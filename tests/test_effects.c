@@ -69,32 +69,29 @@ static bool start_left(contact_world *w, double gap)
 
 TEST(a_free_body_alone_calls_for_nothing)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.research.guard = HAP_GUARD_ON;
-  cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
-  REQUIRE(cw_start(&w, -EDGE / 2 - HAND - 0.002, 0.0, 0.0));
-  cw_move_hand(&w, 0.1, 0.0, 0.0);
-  cw_run(&w, 60);
-  CHECK(is_off(&w, HAP_EFFECT_TESTING, HAP_REASON_OWNED));
-  CHECK(is_off(&w, HAP_EFFECT_CROSS, HAP_REASON_NOT_IN_MODEL));
-  CHECK(is_off(&w, HAP_EFFECT_CONTACTS, HAP_REASON_ALONE));
-  CHECK(is_off(&w, HAP_EFFECT_PASSES, HAP_REASON_ALONE));
-  CHECK(is_off(&w, HAP_EFFECT_JOINTS, HAP_REASON_FREE));
-  CHECK(is_off(&w, HAP_EFFECT_RANGE, HAP_REASON_ALONE));
-  CHECK(is_off(&w, HAP_EFFECT_RESTITUTION, HAP_REASON_ALONE));
-  CHECK(is_off(&w, HAP_EFFECT_FRICTION, HAP_REASON_NO_FRICTION));
-  CHECK(is_off(&w, HAP_EFFECT_TORQUE, HAP_REASON_ROUND));
-  CHECK(is_off(&w, HAP_EFFECT_GYRO, HAP_REASON_SYMMETRIC));
-  CHECK(is_called(&w, HAP_EFFECT_SHAPE));
-  CHECK(is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_DEVICE_UNKNOWN));
-  CHECK(is_called(&w, HAP_EFFECT_OBSERVER));
-  CHECK(is_off(&w, HAP_EFFECT_RECORDING, HAP_REASON_NOT_RECORDED));
-  hap_stats stats = cw_stats(&w);
+  contact_world *w = cw_new(0.0);
+  w->research.guard = HAP_GUARD_ON;
+  cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
+  REQUIRE(cw_start(w, -EDGE / 2 - HAND - 0.002, 0.0, 0.0));
+  cw_go(w, 0.1, 0.0, 0.0, 60);
+  CHECK(is_off(w, HAP_EFFECT_TESTING, HAP_REASON_OWNED));
+  CHECK(is_off(w, HAP_EFFECT_CROSS, HAP_REASON_NOT_IN_MODEL));
+  CHECK(is_off(w, HAP_EFFECT_CONTACTS, HAP_REASON_ALONE));
+  CHECK(is_off(w, HAP_EFFECT_PASSES, HAP_REASON_ALONE));
+  CHECK(is_off(w, HAP_EFFECT_JOINTS, HAP_REASON_FREE));
+  CHECK(is_off(w, HAP_EFFECT_RANGE, HAP_REASON_ALONE));
+  CHECK(is_off(w, HAP_EFFECT_RESTITUTION, HAP_REASON_ALONE));
+  CHECK(is_off(w, HAP_EFFECT_FRICTION, HAP_REASON_NO_FRICTION));
+  CHECK(is_off(w, HAP_EFFECT_TORQUE, HAP_REASON_ROUND));
+  CHECK(is_off(w, HAP_EFFECT_GYRO, HAP_REASON_SYMMETRIC));
+  CHECK(is_called(w, HAP_EFFECT_SHAPE));
+  CHECK(is_off(w, HAP_EFFECT_PROXY, HAP_REASON_DEVICE_UNKNOWN));
+  CHECK(is_called(w, HAP_EFFECT_OBSERVER));
+  CHECK(is_off(w, HAP_EFFECT_RECORDING, HAP_REASON_NOT_RECORDED));
+  hap_stats stats = cw_stats(w);
   CHECK(stats.probes.steps == 0 && stats.contact.passes == 0 && stats.contact.us_max == 0.0);
   CHECK(stats.loop.contact_ticks > 0 &&
-        w.velocity[0][0] > 0.01); /* it is pushed, and does not wait */
-  cw_close(&w);
+        w->velocity[0][0] > 0.01); /* it is pushed, and does not wait */
 }
 
 TEST(far_away_nothing_is_on)
@@ -192,9 +189,8 @@ TEST(why_a_body_has_no_gyroscopic_term)
                {true, false, false, false, HAP_REASON_NOT_IN_WORLD},
                {false, false, true, true, HAP_REASON_ASLEEP}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    dBodyID plate = cw_add_box(&w, 0.5, (const double[3]){0.2, 0.1, 0.02}, 0.0, 0.0, 0.0);
+    contact_world *w = cw_new(0.0);
+    dBodyID plate = cw_add_box(w, 0.5, (const double[3]){0.2, 0.1, 0.02}, 0.0, 0.0, 0.0);
     dBodySetAngularVel(plate, 0.0, cases[i].spins ? 0.3 : 0.0, cases[i].spins ? 0.4 : 0.0);
     dBodySetGyroscopicMode(plate, cases[i].mode);
     if (cases[i].locked) {
@@ -203,12 +199,12 @@ TEST(why_a_body_has_no_gyroscopic_term)
     if (cases[i].sleeps) {
       dBodyDisable(plate);
     }
-    REQUIRE(cw_start(&w, 0.0, 0.0, 0.01 + HAND + 0.012));
-    cw_run(&w, 60);
-    CHECK(is(&w, HAP_EFFECT_GYRO,
+    REQUIRE(cw_start(w, 0.0, 0.0, 0.01 + HAND + 0.012));
+    cw_run(w, 60);
+    CHECK(is(w, HAP_EFFECT_GYRO,
              cases[i].reason == HAP_REASON_CALLED ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF,
              cases[i].reason));
-    cw_close(&w);
+    cw_close(w);
   }
 }
 
@@ -314,20 +310,18 @@ TEST(a_free_body_needs_no_testing_simulation_and_answers_alike)
   double force[2][3];
   double velocity[2];
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    w.def.model = HAP_MODEL_ACCELERANCE;
-    wish(&w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
-    cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
-    REQUIRE(cw_start(&w, -EDGE / 2 - HAND - 0.002, 0.01, 0.0)); /* beside the middle: it turns */
-    cw_move_hand(&w, 0.1, 0.0, 0.0);
-    cw_run(&w, 80);
-    CHECK(i == 0 ? is_off(&w, HAP_EFFECT_TESTING, HAP_REASON_FREE)
-                 : is(&w, HAP_EFFECT_TESTING, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-    CHECK((cw_stats(&w).probes.steps == 0) == (i == 0));
-    memcpy(force[i], w.force, sizeof w.force);
-    velocity[i] = w.velocity[0][0];
-    cw_close(&w);
+    contact_world *w = cw_new(0.0);
+    w->def.model = HAP_MODEL_ACCELERANCE;
+    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
+    cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
+    REQUIRE(cw_start(w, -EDGE / 2 - HAND - 0.002, 0.01, 0.0)); /* beside the middle: it turns */
+    cw_go(w, 0.1, 0.0, 0.0, 80);
+    CHECK(i == 0 ? is_off(w, HAP_EFFECT_TESTING, HAP_REASON_FREE)
+                 : is(w, HAP_EFFECT_TESTING, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+    CHECK((cw_stats(w).probes.steps == 0) == (i == 0));
+    memcpy(force[i], w->force, sizeof w->force);
+    velocity[i] = w->velocity[0][0];
+    cw_close(w);
   }
   CHECK(cw_norm(force[0]) > 0.01 || velocity[0] > 0.01);
   for (int k = 0; k < 3; ++k) {
@@ -352,26 +346,25 @@ TEST(a_body_on_a_floor_is_tested)
 TEST(bodies_of_one_island_call_for_cross_accelerance)
 {
   for (int i = 0; i < 3; ++i) {
-    contact_world w;
-    cw_open(&w, 0.0);
-    w.def.model = HAP_MODEL_ACCELERANCE;
-    expert_wish(&w.expert, HAP_EFFECT_CROSS, i < 2 ? HAP_EFFECT_ON : HAP_EFFECT_AUTO);
-    dBodyID a = cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
-    dBodyID b = cw_add_cube(&w, 0.2, EDGE, EDGE + 0.002, 0.0, 0.0);
+    contact_world *w = cw_new(0.0);
+    w->def.model = HAP_MODEL_ACCELERANCE;
+    expert_wish(&w->expert, HAP_EFFECT_CROSS, i < 2 ? HAP_EFFECT_ON : HAP_EFFECT_AUTO);
+    dBodyID a = cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
+    dBodyID b = cw_add_cube(w, 0.2, EDGE, EDGE + 0.002, 0.0, 0.0);
     if (i != 1) {
-      dJointID joint = dJointCreateFixed(w.world, NULL);
+      dJointID joint = dJointCreateFixed(w->world, NULL);
       dJointAttach(joint, a, b);
       dJointSetFixed(joint);
     }
-    REQUIRE(cw_start(&w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
-    cw_run(&w, 130); /* two ticks of them are looked at */
-    hap_effect_info info = look(&w, HAP_EFFECT_CROSS);
-    CHECK(i == 2 ? is_off(&w, HAP_EFFECT_CROSS, HAP_REASON_NOT_PAPERS)
+    REQUIRE(cw_start(w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
+    cw_run(w, 130); /* two ticks of them are looked at */
+    hap_effect_info info = look(w, HAP_EFFECT_CROSS);
+    CHECK(i == 2 ? is_off(w, HAP_EFFECT_CROSS, HAP_REASON_NOT_PAPERS)
                  : info.reason == HAP_REASON_ASKED);
     CHECK((info.on > 0) == (i == 0));
     CHECK((info.physics_ms > 0.0) == (i < 2)); /* that there is none has to be found out */
     CHECK(isnan(info.tick_us) || (info.tick_us > 0.0) == (i == 0));
-    cw_close(&w);
+    cw_close(w);
   }
 }
 
@@ -381,23 +374,21 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
  * syncs, before the world could say anything of it. */
 static double second_moves(hap_effect effect, hap_effect_wish wished)
 {
-  contact_world w;
   double speed = 0.0;
-  cw_open(&w, 0.0);
-  wish(&w, effect, wished);
-  cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
-  cw_add_cube(&w, 0.2, EDGE, EDGE + 1e-4, 0.0, 0.0);
-  dJointID joint = dJointCreateBall(w.world, NULL);
+  contact_world *w = cw_new(0.0);
+  wish(w, effect, wished);
+  cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
+  cw_add_cube(w, 0.2, EDGE, EDGE + 1e-4, 0.0, 0.0);
+  dJointID joint = dJointCreateBall(w->world, NULL);
   if (effect == HAP_EFFECT_JOINTS) {
-    dJointAttach(joint, w.bodies[0], w.bodies[1]);
+    dJointAttach(joint, w->bodies[0], w->bodies[1]);
     dJointSetBallAnchor(joint, EDGE / 2, 0.0, 0.0);
   }
-  cw_move_hand(&w, 0.2, 0.0, 0.0);
-  if (cw_start(&w, -EDGE / 2 - HAND - 0.011, 0.0, 0.0)) { /* touches just after a sync */
-    cw_run(&w, 75);
-    speed = w.velocity[1][0];
+  cw_move_hand(w, 0.2, 0.0, 0.0);
+  if (cw_start(w, -EDGE / 2 - HAND - 0.011, 0.0, 0.0)) { /* touches just after a sync */
+    cw_run(w, 75);
+    speed = w->velocity[1][0];
   }
-  cw_close(&w);
   return speed;
 }
 
@@ -469,32 +460,27 @@ TEST(passes_that_are_off_come_with_the_syncs)
 
 TEST(passes_that_are_asked_for_come_without_need)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  wish(&w, HAP_EFFECT_PASSES, HAP_EFFECT_ON);
-  cw_add_cube(&w, 0.2, EDGE, 0.0, 0.0, 0.0);
-  REQUIRE(cw_start(&w, -EDGE, 0.0, 0.0));
-  cw_run(&w, 200);
-  CHECK(cw_stats(&w).contact.passes >= 35);
-  cw_close(&w);
+  contact_world *w = cw_new(0.0);
+  wish(w, HAP_EFFECT_PASSES, HAP_EFFECT_ON);
+  cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
+  REQUIRE(cw_start(w, -EDGE, 0.0, 0.0));
+  cw_run(w, 200);
+  CHECK(cw_stats(w).contact.passes >= 35);
 }
 
 static double bounces_to(hap_effect_wish wished)
 {
-  contact_world w;
   double most = 0.0;
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
-  w.surface.mode |= dContactBounce;
-  w.surface.bounce = 0.8;
-  wish(&w, HAP_EFFECT_RESTITUTION, wished);
-  cw_add_ball(&w, 0.2, 0.02, 0.0, 0.0, 0.05);
-  if (cw_start(&w, 0.0, 0.0, 0.02 + 0.05 + HAND + 0.002)) {
-    cw_move_hand(&w, 0.0, 0.0, 0.1);
-    cw_run(&w, 120);
-    most = w.velocity[0][2];
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  w->surface.mode |= dContactBounce;
+  w->surface.bounce = 0.8;
+  wish(w, HAP_EFFECT_RESTITUTION, wished);
+  cw_add_ball(w, 0.2, 0.02, 0.0, 0.0, 0.05);
+  if (cw_start(w, 0.0, 0.0, 0.02 + 0.05 + HAND + 0.002)) {
+    cw_go(w, 0.0, 0.0, 0.1, 120);
+    most = w->velocity[0][2];
   }
-  cw_close(&w);
   return most;
 }
 
@@ -509,18 +495,16 @@ TEST(restitution_that_is_off_gives_back_nothing)
 /* Along a floor that is pressed on: force and torque at the end. */
 static void rub_floor(hap_effect effect, hap_effect_wish wished, double mu, hap_wrench *out)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_floor(&w);
-  w.hand_def.friction = mu;
-  wish(&w, effect, wished);
-  cw_move_hand(&w, 0.05, 0.0, 0.0);
-  if (cw_start(&w, 0.0, 0.0, HAND - 0.001)) {
-    cw_run(&w, 200);
-    memcpy(out->force, w.row.pointers[0].force, sizeof out->force);
-    memcpy(out->torque, w.row.pointers[0].torque, sizeof out->torque);
+  contact_world *w = cw_new(0.0);
+  cw_add_floor(w);
+  w->hand_def.friction = mu;
+  wish(w, effect, wished);
+  cw_move_hand(w, 0.05, 0.0, 0.0);
+  if (cw_start(w, 0.0, 0.0, HAND - 0.001)) {
+    cw_run(w, 200);
+    memcpy(out->force, w->row.pointers[0].force, sizeof out->force);
+    memcpy(out->torque, w->row.pointers[0].torque, sizeof out->torque);
   }
-  cw_close(&w);
 }
 
 TEST(friction_and_torque_that_are_off_are_zero)
@@ -544,21 +528,19 @@ TEST(friction_and_torque_that_are_off_are_zero)
 /* The inertia of a plate in a ball, spinning about its middle axis and a little about another one. */
 static double tumbles(hap_effect_wish wished)
 {
-  contact_world w;
   double turned = 0.0;
-  cw_open(&w, 0.0);
-  wish(&w, HAP_EFFECT_GYRO, wished);
+  contact_world *w = cw_new(0.0);
+  wish(w, HAP_EFFECT_GYRO, wished);
   dMass mass;
   dMassSetBoxTotal(&mass, 0.5, 0.2, 0.1, 0.02);
-  dBodyID plate = cw_add(&w, dCreateSphere(w.space, 0.05), &mass, 0.0, 0.0, 0.0);
+  dBodyID plate = cw_add(w, dCreateSphere(w->space, 0.05), &mass, 0.0, 0.0, 0.0);
   dBodySetAngularVel(plate, 0.5, 8.0, 0.0);
   dBodySetGyroscopicMode(plate, 1);
-  if (cw_start(&w, 0.0, 0.0, 0.05 + HAND + 0.003)) {
-    cw_run(&w, 301);
-    CHECK(look(&w, HAP_EFFECT_GYRO).of == 1 && cw_stats(&w).loop.contact_ticks == 0);
+  if (cw_start(w, 0.0, 0.0, 0.05 + HAND + 0.003)) {
+    cw_run(w, 301);
+    CHECK(look(w, HAP_EFFECT_GYRO).of == 1 && cw_stats(w).loop.contact_ticks == 0);
     turned = dBodyGetAngularVel(plate)[2];
   }
-  cw_close(&w);
   return turned;
 }
 
@@ -572,18 +554,16 @@ TEST(a_gyroscopic_term_that_is_off_does_not_tumble)
 /* A hand that goes across a ball without pressing it: on a plane it would sink in beside it. */
 static double across_ball(hap_effect_wish wished)
 {
-  contact_world w;
   double force = 0.0;
-  cw_open(&w, 0.0);
-  wish(&w, HAP_EFFECT_SHAPE, wished);
-  dGeomID ball = dCreateSphere(w.space, 0.05);
+  contact_world *w = cw_new(0.0);
+  wish(w, HAP_EFFECT_SHAPE, wished);
+  dGeomID ball = dCreateSphere(w->space, 0.05);
   dGeomSetPosition(ball, 0.0, 0.0, 0.0);
-  cw_move_hand(&w, 0.2, 0.0, 0.0);
-  if (cw_start(&w, 0.0, 0.0, 0.05 + HAND - 0.005)) {
-    cw_run(&w, 99); /* two ticks short of a sync */
-    force = w.force[2];
+  cw_move_hand(w, 0.2, 0.0, 0.0);
+  if (cw_start(w, 0.0, 0.0, 0.05 + HAND - 0.005)) {
+    cw_run(w, 99); /* two ticks short of a sync */
+    force = w->force[2];
   }
-  cw_close(&w);
   return force;
 }
 
@@ -765,27 +745,26 @@ TEST(times_are_of_what_is_on)
 /* A free row of eight that is pushed at 0.5 m/s^2: 1/(8 m) in the world, as in a loop that has all of it. */
 static double error_of_range(int max_bodies)
 {
-  contact_world w;
-  cw_open(&w, 0.0);
-  w.surface.mu = 0.0;
-  w.def.max_bodies = max_bodies;
-  w.expert.max_edge_probes = 0;
-  dWorldSetQuickStepNumIterations(w.world, 2000);
-  wish(&w, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
+  contact_world *w = cw_new(0.0);
+  w->surface.mu = 0.0;
+  w->def.max_bodies = max_bodies;
+  w->expert.max_edge_probes = 0;
+  dWorldSetQuickStepNumIterations(w->world, 2000);
+  wish(w, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
   for (int i = 0; i < 8; ++i) {
-    cw_add_cube(&w, 0.2, EDGE, i * EDGE, 0.0, 0.0);
+    cw_add_cube(w, 0.2, EDGE, i * EDGE, 0.0, 0.0);
   }
   double error = -1.0;
-  if (cw_start(&w, -EDGE / 2 - HAND, 0.0, 0.0)) {
+  if (cw_start(w, -EDGE / 2 - HAND, 0.0, 0.0)) {
     for (int i = 0; i < 600; ++i) {
-      cw_move_hand(&w, 0.5e-3 * i, 0.0, 0.0);
-      cw_tick(&w);
+      cw_move_hand(w, 0.5e-3 * i, 0.0, 0.0);
+      cw_tick(w);
     }
-    hap_stats stats = cw_stats(&w);
+    hap_stats stats = cw_stats(w);
     CHECK(stats.probes.steps > 20);
     error = stats.error.range_error;
   }
-  cw_close(&w);
+  cw_close(w);
   printf("# range of %d: error %.3f\n", max_bodies, error);
   return error;
 }

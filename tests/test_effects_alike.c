@@ -115,11 +115,8 @@ static void check_alike(const scene_run *of, hap_model model, const hand_force *
   REQUIRE(run(of, model, effects, &on, NULL));
   double apart = difference(automatic, &on);
   bool alike = apart <= FORCE_BOUND;
-  if (!alike) {
-    printf("# %s, %s, %s on: force is %.3g %% off\n", of->scene, hap_model_name(model), which,
-           100.0 * apart);
-  }
-  CHECK(alike);
+  CHECK_SAY(alike, "%s, %s, %s on: force is %.3g %% off", of->scene, hap_model_name(model), which,
+            100.0 * apart);
 }
 
 static void check_scene(const scene_run *of, hap_model model)

@@ -39,10 +39,8 @@ static bool press_floor(contact_world *w, double depth)
     return false;
   }
   cw_run(w, 20);
-  cw_move_hand(w, 0.0, 0.0, -(0.001 + depth) / 0.05);
-  cw_run(w, 50);
-  cw_move_hand(w, 0.0, 0.0, 0.0);
-  cw_run(w, 40);
+  cw_go(w, 0.0, 0.0, -(0.001 + depth) / 0.05, 50);
+  cw_go(w, 0.0, 0.0, 0.0, 40);
   return true;
 }
 
@@ -57,10 +55,8 @@ TEST(sticking_is_a_spring_of_the_contacts_stiffness)
     CHECK_NEAR(w.force[2], 4.0, 4e-3);
     CHECK_NEAR(w.force[0], 0.0, 1e-9);
     for (int i = 1; i <= 4; ++i) {
-      cw_move_hand(&w, 0.2, -0.1, 0.0);
-      cw_run(&w, 1);
-      cw_move_hand(&w, 0.0, 0.0, 0.0);
-      cw_run(&w, 1);
+      cw_go(&w, 0.2, -0.1, 0.0, 1);
+      cw_go(&w, 0.0, 0.0, 0.0, 1);
       CHECK_NEAR(w.force[0], -2000.0 * 2e-4 * i, 1e-3 * 2000.0 * 2e-4 * i);
       CHECK_NEAR(w.force[1], 2000.0 * 1e-4 * i, 1e-3 * 2000.0 * 1e-4 * i);
     }
@@ -80,8 +76,7 @@ TEST(sliding_is_coulombs_in_every_direction)
       contact_world w;
       open_world(&w, models[m], CW_GRAVITY);
       REQUIRE(press_floor(&w, 0.002));
-      cw_move_hand(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0);
-      cw_run(&w, 100);
+      cw_go(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 100);
       CHECK_NEAR(w.force[0], -MU * w.force[2] * cos(angle), 1e-3 * MU * w.force[2]);
       CHECK_NEAR(w.force[1], -MU * w.force[2] * sin(angle), 1e-3 * MU * w.force[2]);
       CHECK_NEAR(w.force[2], 4.0, 1e-6);
@@ -123,10 +118,8 @@ static bool press_cube(contact_world *w, double mass, double edge, double floor_
     return false;
   }
   cw_run(w, 20);
-  cw_move_hand(w, 0.0, 0.0, -(0.001 + depth) / 0.05);
-  cw_run(w, 50);
-  cw_move_hand(w, 0.0, 0.0, 0.0);
-  cw_run(w, 100);
+  cw_go(w, 0.0, 0.0, -(0.001 + depth) / 0.05, 50);
+  cw_go(w, 0.0, 0.0, 0.0, 100);
   return true;
 }
 
@@ -140,21 +133,17 @@ TEST(a_heavy_body_is_held_and_slid_on_as_a_wall)
     double stiffness = ways[i].coupling == HAP_COUPLING_PROXY ? 2000.0 / 1.002 : 2000.0;
     double normal = 0.002 * stiffness;
     CHECK_NEAR(w.force[2], normal, 1e-3 * normal);
-    cw_move_hand(&w, 0.02, -0.015, 0.0);
-    cw_run(&w, 20);
-    cw_move_hand(&w, 0.0, 0.0, 0.0);
-    cw_run(&w, 50);
+    cw_go(&w, 0.02, -0.015, 0.0, 20);
+    cw_go(&w, 0.0, 0.0, 0.0, 50);
     CHECK_NEAR(w.force[0], -stiffness * 4e-4, 1e-3 * stiffness * 4e-4);
     CHECK_NEAR(w.force[1], stiffness * 3e-4, 1e-3 * stiffness * 3e-4);
     for (int k = 0; k < 12; ++k) {
       double angle = 2.0 * M_PI * (k + 0.3) / 12.0;
-      cw_move_hand(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0);
-      cw_run(&w, 250); /* the spring turns round */
+      cw_go(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 250); /* the spring turns round */
       CHECK_NEAR(w.force[0], -MU * w.force[2] * cos(angle), 2e-3 * MU * w.force[2]);
       CHECK_NEAR(w.force[1], -MU * w.force[2] * sin(angle), 2e-3 * MU * w.force[2]);
       CHECK_NEAR(hypot(w.force[0], w.force[1]), MU * w.force[2], 1e-6 * w.force[2]);
-      cw_move_hand(&w, -0.05 * cos(angle), -0.05 * sin(angle), 0.0);
-      cw_run(&w, 250);
+      cw_go(&w, -0.05 * cos(angle), -0.05 * sin(angle), 0.0, 250);
     }
     cw_close(&w);
   }
@@ -170,8 +159,7 @@ TEST(sliding_pulls_a_free_body_along)
       open_world(&w, HAP_MODEL_CONTACT, CW_GRAVITY);
       take_way(&w, &ways[i]);
       REQUIRE(press_cube(&w, 1.0, 0.3, 0.0, 0.002));
-      cw_move_hand(&w, 1.0 * cos(angle), 1.0 * sin(angle), 0.0);
-      cw_run(&w, 20);
+      cw_go(&w, 1.0 * cos(angle), 1.0 * sin(angle), 0.0, 20);
       double before[2] = {w.velocity[0][0], w.velocity[0][1]};
       double force = 0.0;
       for (int j = 0; j < 80; ++j) {
@@ -198,8 +186,7 @@ TEST(sticking_drags_a_block_over_the_floor)
     w.hand_def.damping = 20.0;
     w.hand_def.friction = 0.9;
     REQUIRE(press_cube(&w, mass, 0.1, 0.1, 0.003));
-    cw_move_hand(&w, 0.05, 0.0, 0.0);
-    cw_run(&w, 400);
+    cw_go(&w, 0.05, 0.0, 0.0, 400);
     double at = w.position[0][0] - w.hand_at[0];
     cw_run(&w, 400);
     double needed = 0.1 * (mass * CW_GRAVITY + w.force[2]);

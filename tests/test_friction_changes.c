@@ -59,12 +59,9 @@ static bool pull(contact_world *w, double way)
     return false;
   }
   cw_run(w, 30);
-  cw_move_hand(w, 0.0, 0.0, -0.06);
-  cw_run(w, 50);
-  cw_move_hand(w, way / 0.05, 0.0, 0.0);
-  cw_run(w, 50);
-  cw_move_hand(w, 0.0, 0.0, 0.0);
-  cw_run(w, 60);
+  cw_go(w, 0.0, 0.0, -0.06, 50);
+  cw_go(w, way / 0.05, 0.0, 0.0, 50);
+  cw_go(w, 0.0, 0.0, 0.0, 60);
   return true;
 }
 
@@ -92,8 +89,7 @@ TEST(the_callback_says_the_friction_of_a_geom)
     cw_run(&w, 60);
     CHECK_NEAR(w.force[0], 0.0, 1e-6);
     asked.keeps = true;
-    cw_move_hand(&w, 0.05, 0.0, 0.0);
-    cw_run(&w, 100);
+    cw_go(&w, 0.05, 0.0, 0.0, 100);
     CHECK_NEAR(w.force[0], -0.3 * w.force[2], 2e-3 * w.force[2]);
     cw_close(&w);
   }
@@ -106,8 +102,7 @@ TEST(more_than_ten_is_ten)
   w.ode.pointer_surface = pointer_surface;
   asked.says = 1e6;
   REQUIRE(pull(&w, 0.0));
-  cw_move_hand(&w, 0.3, 0.0, 0.0);
-  cw_run(&w, 120);
+  cw_go(&w, 0.3, 0.0, 0.0, 120);
   CHECK_NEAR(w.force[0], -10.0 * w.force[2], 1e-2 * w.force[2]);
   cw_close(&w);
 }
@@ -233,8 +228,7 @@ TEST(a_conveyor_takes_the_hand_along)
     dBodySetKinematic(w.bodies[0]);
     REQUIRE(cw_start(&w, 0.0, 0.0, 0.3 + RADIUS + 0.001));
     cw_run(&w, 30);
-    cw_move_hand(&w, 0.0, 0.0, -0.06);
-    cw_run(&w, 50);
+    cw_go(&w, 0.0, 0.0, -0.06, 50);
     cw_move_hand(&w, 0.0, 0.0, 0.0);
     CHECK(hap_session_lock(w.session) == HAP_OK);
     dBodySetLinearVel(w.bodies[0], 0.0, 0.05, 0.0);

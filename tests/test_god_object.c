@@ -47,8 +47,7 @@ static void go_to(contact_world *w, const double to[3], int ticks)
   for (int k = 0; k < 3; ++k) {
     v[k] = (to[k] - w->hand_at[k]) / (ticks * T);
   }
-  cw_move_hand(w, v[0], v[1], v[2]);
-  cw_run(w, ticks);
+  cw_go(w, v[0], v[1], v[2], ticks);
   cw_move_hand(w, 0.0, 0.0, 0.0);
 }
 
@@ -105,8 +104,7 @@ TEST(a_god_objects_damper_resists_the_way_in)
   open_world(&w, HAP_COUPLING_GOD_OBJECT, 2.0);
   cw_add_floor(&w);
   REQUIRE(start(&w, 0.0, 0.0, RADIUS + 0.001));
-  cw_move_hand(&w, 0.0, 0.0, -0.05);
-  cw_run(&w, 60);
+  cw_go(&w, 0.0, 0.0, -0.05, 60);
   hap_pointer_state state = state_of(&w);
   CHECK_NEAR(state.proxy.position[2], RADIUS, 1e-9);
   CHECK_NEAR(w.force[2], KV * 0.002 + 2.0 * 0.05, 1e-6);

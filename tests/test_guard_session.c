@@ -504,15 +504,14 @@ TEST(lockstep_knows_no_stall)
                                      HAP_MODEL_CONTACT};
   for (int m = 0; m < 4; ++m) {
     for (int latency = 0; latency <= 20; latency += 20) {
-      stage s;
-      stage_init(&s, HAP_DRIVE_LOCKSTEP);
-      s.def.model = models[m];
-      s.def.physics_hz = 49.0; /* no whole number of ticks */
-      s.research.physics_latency_ticks = latency;
-      REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-      CHECK(hap_session_advance(s.session, 500) == HAP_OK);
-      CHECK(stats_of(&s).faults.stale_times == 0);
-      stage_end(&s);
+      stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+      s->def.model = models[m];
+      s->def.physics_hz = 49.0; /* no whole number of ticks */
+      s->research.physics_latency_ticks = latency;
+      REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+      CHECK(hap_session_advance(s->session, 500) == HAP_OK);
+      CHECK(stats_of(s).faults.stale_times == 0);
+      stage_end(s);
     }
   }
 }

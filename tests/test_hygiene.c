@@ -347,20 +347,19 @@ TEST(no_surface_that_is_no_number_reaches_a_contact)
 {
   for (size_t i = 0; i < COUNT(bad_surfaces); ++i) {
     for (int model = 0; model <= HAP_MODEL_CONTACT; ++model) {
-      test_world w;
       hap_detail detail;
       surface_now = &bad_surfaces[i];
-      world_open(&w, 9.81, 20);
-      w.def.model = (hap_model)model;
-      (void)world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0.0, EDGE / 2);
-      dCreatePlane(w.space, 0.0, 0.0, 1.0, 0.0);
-      REQUIRE(world_create_session(&w, give_surface) == HAP_OK);
-      world_add_pointer(&w, RADIUS, -RADIUS + 0.002, 0.0, EDGE / 2);
-      REQUIRE(hap_session_start(w.session) == HAP_OK);
-      CHECK(hap_session_advance(w.session, 200) == HAP_FAULTED);
-      CHECK(hap_session_detail(w.session, &detail) == HAP_OK);
-      CHECK(strstr(detail.text, "surface") != NULL && all_finite(&w));
-      world_close(&w);
+      test_world *w = world_new(9.81, 20);
+      w->def.model = (hap_model)model;
+      (void)world_add_cube(w, EDGE, 1.0, EDGE / 2, 0.0, EDGE / 2);
+      dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
+      REQUIRE(world_create_session(w, give_surface) == HAP_OK);
+      world_add_pointer(w, RADIUS, -RADIUS + 0.002, 0.0, EDGE / 2);
+      REQUIRE(hap_session_start(w->session) == HAP_OK);
+      CHECK(hap_session_advance(w->session, 200) == HAP_FAULTED);
+      CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
+      CHECK(strstr(detail.text, "surface") != NULL && all_finite(w));
+      world_close(w);
     }
   }
 }
@@ -405,16 +404,14 @@ TEST(a_contact_that_is_no_number_is_dropped_and_counted)
       *places[i] = before;
     }
   }
-  test_world w;
-  world_open(&w, 9.81, 20);
-  (void)world_add_cube(&w, EDGE, 1.0, 0.0, 0.0, 0.04);
+  test_world *w = world_new(9.81, 20);
+  (void)world_add_cube(w, EDGE, 1.0, 0.0, 0.0, 0.04);
   dGeomClass class = {.bytes = 8, .collider = collider_of, .aabb = box_of_nothing};
-  dSpaceAdd(w.space, dCreateGeom(dCreateGeomClass(&class)));
-  REQUIRE(world_start(&w, RADIUS, -0.3, 0.0, 0.05));
-  CHECK(hap_session_advance(w.session, 500) >= HAP_OK); /* as if nothing were there */
-  CHECK(world_stats(&w).faults.contacts_rejected >= 9);
-  CHECK(all_finite(&w) && dBodyGetPosition(w.bodies[0])[2] < -0.5);
-  world_close(&w);
+  dSpaceAdd(w->space, dCreateGeom(dCreateGeomClass(&class)));
+  REQUIRE(world_start(w, RADIUS, -0.3, 0.0, 0.05));
+  CHECK(hap_session_advance(w->session, 500) >= HAP_OK); /* as if nothing were there */
+  CHECK(world_stats(w).faults.contacts_rejected >= 9);
+  CHECK(all_finite(w) && dBodyGetPosition(w->bodies[0])[2] < -0.5);
 }
 
 /* Where a convex geom and a box just touch, ODE's collider gives the normal (0, 0, 0). */
@@ -428,17 +425,16 @@ TEST(a_contact_without_a_normal_is_dropped_and_counted)
   static const unsigned faces[] = {4, 1, 2, 6, 5, 4, 0, 4, 7, 3, 4, 3, 7, 6, 2,
                                    4, 0, 1, 5, 4, 4, 4, 5, 6, 7, 4, 0, 3, 2, 1};
   for (int model = 0; model <= HAP_MODEL_CONTACT; ++model) {
-    test_world w;
     dMass mass;
-    world_open(&w, 0.0, 20);
-    w.def.model = (hap_model)model;
+    test_world *w = world_new(0.0, 20);
+    w->def.model = (hap_model)model;
     dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
-    (void)world_add(&w, dCreateConvex(w.space, planes, 6, points, 8, faces), &mass, 0.0, 0.0, 0.0);
-    (void)world_add(&w, dCreateBox(w.space, 0.1, 0.1, 0.1), &mass, -0.1, 0.01, 0.075);
-    REQUIRE(world_start(&w, RADIUS, 5.0, 0.0, 0.0));
-    CHECK(hap_session_advance(w.session, 200) == HAP_OK);
-    CHECK(world_stats(&w).faults.contacts_rejected > 0 && all_finite(&w));
-    world_close(&w);
+    (void)world_add(w, dCreateConvex(w->space, planes, 6, points, 8, faces), &mass, 0.0, 0.0, 0.0);
+    (void)world_add(w, dCreateBox(w->space, 0.1, 0.1, 0.1), &mass, -0.1, 0.01, 0.075);
+    REQUIRE(world_start(w, RADIUS, 5.0, 0.0, 0.0));
+    CHECK(hap_session_advance(w->session, 200) == HAP_OK);
+    CHECK(world_stats(w).faults.contacts_rejected > 0 && all_finite(w));
+    world_close(w);
   }
 }
 
@@ -446,68 +442,62 @@ TEST(a_contact_without_a_normal_is_dropped_and_counted)
 
 TEST(targets_beyond_the_world_change_nothing)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  (void)world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0.0, 0.0);
-  REQUIRE(world_start(&w, RADIUS, -0.5, 0.0, 0.0));
-  CHECK(hap_session_advance(w.session, 2) == HAP_OK);
+  test_world *w = world_new(0.0, 20);
+  (void)world_add_cube(w, EDGE, 1.0, EDGE / 2, 0.0, 0.0);
+  REQUIRE(world_start(w, RADIUS, -0.5, 0.0, 0.0));
+  CHECK(hap_session_advance(w->session, 2) == HAP_OK);
   const double bad[] = {no_number, too_far, 1e300, -1e7, DBL_MAX};
   for (size_t i = 0; i < COUNT(bad); ++i) {
     hap_detail detail;
     hap_pose pose = {{0.0, bad[i], 0.0}, {1.0, 0.0, 0.0, 0.0}};
-    CHECK(hap_pointer_set_target(w.session, w.pointers[0], &pose, NULL) == HAP_ERROR_ARGUMENT);
-    CHECK(hap_session_detail(w.session, &detail) == HAP_OK && strstr(detail.text, "position"));
+    CHECK(hap_pointer_set_target(w->session, w->pointers[0], &pose, NULL) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_detail(w->session, &detail) == HAP_OK && strstr(detail.text, "position"));
     pose.position[1] = 0.0;
     hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, bad[i]}};
-    CHECK(hap_pointer_set_target(w.session, w.pointers[0], &pose, &twist) == HAP_ERROR_ARGUMENT);
-    CHECK(hap_session_detail(w.session, &detail) == HAP_OK && strstr(detail.text, "twist"));
+    CHECK(hap_pointer_set_target(w->session, w->pointers[0], &pose, &twist) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_detail(w->session, &detail) == HAP_OK && strstr(detail.text, "twist"));
   }
-  CHECK(hap_session_advance(w.session, 10) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 10) == HAP_OK);
   hap_pointer_state state;
-  CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, w->pointers[0], &state, sizeof state) == HAP_OK);
   CHECK(state.proxy.position[0] == -0.5 && state.device.position[0] == -0.5);
-  world_close(&w);
 }
 
 /* A target that is good in its own frame, and that frame and scale take out of the world. */
 TEST(a_pointer_out_of_the_world_stays_where_it_was)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  REQUIRE(world_create_session(&w, NULL) == HAP_OK);
+  test_world *w = world_new(0.0, 20);
+  REQUIRE(world_create_session(w, NULL) == HAP_OK);
   hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
   def.motion_scale = 1e6;
-  CHECK(hap_pointer_add(w.session, &def, &w.pointers[0]) == HAP_OK);
-  w.pointer_count = 1;
-  world_move_pointer(&w, 0, (const double[3]){1e-6, 0.0, 0.0}, NULL);
-  REQUIRE(hap_session_start(w.session) == HAP_OK);
-  CHECK(hap_session_advance(w.session, 2) == HAP_OK);
-  world_move_pointer(&w, 0, (const double[3]){1e5, 0.0, 0.0}, NULL);
-  CHECK(hap_session_advance(w.session, 2) == HAP_FAULTED);
-  CHECK(world_stats(&w).faults.fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
+  w->pointer_count = 1;
+  world_move_pointer(w, 0, (const double[3]){1e-6, 0.0, 0.0}, NULL);
+  REQUIRE(hap_session_start(w->session) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 2) == HAP_OK);
+  world_move_pointer(w, 0, (const double[3]){1e5, 0.0, 0.0}, NULL);
+  CHECK(hap_session_advance(w->session, 2) == HAP_FAULTED);
+  CHECK(world_stats(w).faults.fault == HAP_FAULT_DEVICE_POSE);
   hap_pointer_state state;
-  CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, w->pointers[0], &state, sizeof state) == HAP_OK);
   CHECK_NEAR(state.proxy.position[0], 1.0, 1e-15);
   CHECK_NEAR(state.device.position[0], 1e-6, 0.0);
-  world_close(&w);
 }
 
 TEST(long_frame_times_are_one_call_long_and_no_frame_times_are_refused)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  w.def.drive = HAP_DRIVE_FRAME;
-  w.def.rt_priority = 0;
-  REQUIRE(world_create_session(&w, NULL) == HAP_OK && hap_session_start(w.session) == HAP_OK);
+  test_world *w = world_new(0.0, 20);
+  w->def.drive = HAP_DRIVE_FRAME;
+  w->def.rt_priority = 0;
+  REQUIRE(world_create_session(w, NULL) == HAP_OK && hap_session_start(w->session) == HAP_OK);
   for (int i = 0; i < 40; ++i) {
-    CHECK(hap_session_update(w.session, 86400.0 / (1 << i % 12)) == HAP_DROPPED);
-    CHECK(hap_session_update(w.session, 0.0) == HAP_OK); /* and not dropped again and again */
-    CHECK(hap_session_update(w.session, 1.7e5 * pow(1.5, 40.0 * i)) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_update(w->session, 86400.0 / (1 << i % 12)) == HAP_DROPPED);
+    CHECK(hap_session_update(w->session, 0.0) == HAP_OK); /* and not dropped again and again */
+    CHECK(hap_session_update(w->session, 1.7e5 * pow(1.5, 40.0 * i)) == HAP_ERROR_ARGUMENT);
   }
-  CHECK(hap_session_update(w.session, DBL_TRUE_MIN) == HAP_OK);
-  CHECK(hap_session_update(w.session, 0.051) == HAP_OK);
-  CHECK(world_stats(&w).physics.steps == 121);
-  CHECK(hap_session_stop(w.session) == HAP_OK);
-  world_close(&w);
+  CHECK(hap_session_update(w->session, DBL_TRUE_MIN) == HAP_OK);
+  CHECK(hap_session_update(w->session, 0.051) == HAP_OK);
+  CHECK(world_stats(w).physics.steps == 121);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
 }

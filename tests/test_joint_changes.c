@@ -70,40 +70,38 @@ static void set_stop(void *arg)
 
 TEST(joints_come_change_and_go)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_free, 9.81));
-  cw_run(&m.w, STEP_TICKS + 1);
-  check_owned(&m, 1);
-  edit(&m, hang_up);
-  check_owned(&m, 1);
-  CHECK(openness(&m) <= CLOSED);
-  edit(&m, set_stop);
-  cw_run(&m.w, 200);
-  CHECK(openness(&m) <= CLOSED);
-  CHECK(cw_norm(m.w.velocity[0]) < 1e-3); /* it hangs between its stops */
-  check_owned(&m, 1);
-  double z = m.w.position[0][2];
-  edit(&m, cut_down);
-  cw_run(&m.w, 100);
-  CHECK(m.w.position[0][2] < z - 0.05);
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_free, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, STEP_TICKS + 1);
+  check_owned(m, 1);
+  edit(m, hang_up);
+  check_owned(m, 1);
+  CHECK(openness(m) <= CLOSED);
+  edit(m, set_stop);
+  cw_run(&m->w, 200);
+  CHECK(openness(m) <= CLOSED);
+  CHECK(cw_norm(m->w.velocity[0]) < 1e-3); /* it hangs between its stops */
+  check_owned(m, 1);
+  double z = m->w.position[0][2];
+  edit(m, cut_down);
+  cw_run(&m->w, 100);
+  CHECK(m->w.position[0][2] < z - 0.05);
+  check_owned(m, 1);
 }
 
 TEST(disabled_joint_is_none)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_hinge, 9.81));
-  cw_run(&m.w, STEP_TICKS + 1);
-  edit(&m, disable);
-  CHECK(cw_stats(&m.w).model.range_joints == 1 && cw_stats(&m.w).probes.steps == 0);
-  CHECK(dJointIsEnabled(m.joints[0]) == 0 && dJointIsEnabled(m.joints[1]) != 0);
-  cw_run(&m.w, 100);
+  mechanism *m = mechanism_running(build_hinge, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, STEP_TICKS + 1);
+  edit(m, disable);
+  CHECK(cw_stats(&m->w).model.range_joints == 1 && cw_stats(&m->w).probes.steps == 0);
+  CHECK(dJointIsEnabled(m->joints[0]) == 0 && dJointIsEnabled(m->joints[1]) != 0);
+  cw_run(&m->w, 100);
   dVector3 a = {0.0, 0.0, 0.0, 0.0};
   dVector3 b = {0.0, 0.0, 0.0, 0.0};
-  (void)anchors_of(m.joints[0], a, b);
+  (void)anchors_of(m->joints[0], a, b);
   CHECK(fabs(a[2] - b[2]) > 0.05);
-  cw_close(&m.w);
 }
 
 static void add_motor_joint(void *arg)
@@ -126,29 +124,28 @@ static void remove_motor_joint(void *arg)
 /* One that the loop has no rows for is ODE's until it is measured. */
 TEST(other_joints_are_taken_over_a_sync_later)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_hinge, 9.81));
-  cw_run(&m.w, STEP_TICKS + 1);
-  check_owned(&m, 2);
-  CHECK(hap_session_post(m.w.session, add_motor_joint, &m) == HAP_OK);
-  cw_run(&m.w, STEP_TICKS);
-  hap_stats stats = cw_stats(&m.w);
+  mechanism *m = mechanism_running(build_hinge, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, STEP_TICKS + 1);
+  check_owned(m, 2);
+  CHECK(hap_session_post(m->w.session, add_motor_joint, m) == HAP_OK);
+  cw_run(&m->w, STEP_TICKS);
+  hap_stats stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 0 && stats.model.range_bodies == 0 &&
         stats.model.measured_bodies == 1);
-  CHECK(openness(&m) < 5e-3);
-  cw_run(&m.w, STEP_TICKS);
-  stats = cw_stats(&m.w);
+  CHECK(openness(m) < 5e-3);
+  cw_run(&m->w, STEP_TICKS);
+  stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 3 && stats.model.range_bodies == 2 &&
         stats.model.measured_bodies == 0);
   CHECK(stats.model.measured_joints == 1);
-  edit(&m, remove_motor_joint);
-  stats = cw_stats(&m.w);
+  edit(m, remove_motor_joint);
+  stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 2 && stats.model.range_bodies == 2 &&
         stats.model.measured_bodies == 0);
-  cw_run(&m.w, 100);
-  CHECK(openness(&m) <= CLOSED);
+  cw_run(&m->w, 100);
+  CHECK(openness(m) <= CLOSED);
   CHECK(stats.faults.fault == 0);
-  cw_close(&m.w);
 }
 
 /* The application puts the first bar, and with it the second, elsewhere on their hinges. */
@@ -167,19 +164,18 @@ static void put_up(void *arg)
 
 TEST(moved_mechanism_goes_on_from_there)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_hinge, 9.81));
-  cw_run(&m.w, 10 * STEP_TICKS + 1);
-  CHECK(hap_session_post(m.w.session, put_up, &m) == HAP_OK);
-  cw_run(&m.w, STEP_TICKS);
-  CHECK_NEAR(dJointGetHingeAngle(m.joints[1]), 0.0, 1e-6);
-  CHECK_NEAR(dJointGetHingeAngle(m.joints[0]), 0.5, 1e-6);
-  CHECK(openness(&m) <= CLOSED);
-  cw_run(&m.w, STEP_TICKS);
-  CHECK(openness(&m) <= CLOSED);
-  CHECK(dJointGetHingeAngle(m.joints[0]) < 0.5); /* it falls */
-  check_owned(&m, 2);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_hinge, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 10 * STEP_TICKS + 1);
+  CHECK(hap_session_post(m->w.session, put_up, m) == HAP_OK);
+  cw_run(&m->w, STEP_TICKS);
+  CHECK_NEAR(dJointGetHingeAngle(m->joints[1]), 0.0, 1e-6);
+  CHECK_NEAR(dJointGetHingeAngle(m->joints[0]), 0.5, 1e-6);
+  CHECK(openness(m) <= CLOSED);
+  cw_run(&m->w, STEP_TICKS);
+  CHECK(openness(m) <= CLOSED);
+  CHECK(dJointGetHingeAngle(m->joints[0]) < 0.5); /* it falls */
+  check_owned(m, 2);
 }
 
 /* The second bar alone, turned about its hinge: the first one is the loop's meanwhile. */
@@ -209,21 +205,19 @@ static void build_parallel(mechanism *m)
 /* A loop that is late still has the body as its own at the next sync, from before. */
 TEST(body_that_is_moved_alone_waits_for_the_others)
 {
-  mechanism m;
-  open_mechanism(&m, build_parallel, 9.81);
-  m.w.research.physics_latency_ticks = STEP_TICKS;
-  REQUIRE(start_mechanism(&m));
-  cw_run(&m.w, 8 * STEP_TICKS + 1);
-  CHECK(hap_session_post(m.w.session, fold, &m) == HAP_OK);
-  cw_run(&m.w, STEP_TICKS);
-  CHECK(openness(&m) <= CLOSED);
+  mechanism *m = mechanism_new(build_parallel, 9.81);
+  m->w.research.physics_latency_ticks = STEP_TICKS;
+  REQUIRE(start_mechanism(m));
+  cw_run(&m->w, 8 * STEP_TICKS + 1);
+  CHECK(hap_session_post(m->w.session, fold, m) == HAP_OK);
+  cw_run(&m->w, STEP_TICKS);
+  CHECK(openness(m) <= CLOSED);
   for (int step = 0; step < 3; ++step) {
-    cw_run(&m.w, STEP_TICKS);
-    CHECK(openness(&m) <= CLOSED);
+    cw_run(&m->w, STEP_TICKS);
+    CHECK(openness(m) <= CLOSED);
   }
-  CHECK(dJointGetHingeAngle(m.joints[1]) > 1e-3 || dJointGetHingeAngle(m.joints[1]) < -1e-3);
-  check_owned(&m, 2);
-  cw_close(&m.w);
+  CHECK(dJointGetHingeAngle(m->joints[1]) > 1e-3 || dJointGetHingeAngle(m->joints[1]) < -1e-3);
+  check_owned(m, 2);
 }
 
 /* A hinge that is set elsewhere while it turns: from there on the bar hangs at that point. */
@@ -237,22 +231,21 @@ static void set_anchor(void *arg)
 
 TEST(hinge_set_anew_holds_there)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_pendulum, 9.81));
-  cw_run(&m.w, 5 * STEP_TICKS + 1);
-  edit(&m, set_anchor);
-  cw_run(&m.w, 10 * STEP_TICKS); /* the loop had gone on while it was set */
+  mechanism *m = mechanism_running(build_pendulum, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 5 * STEP_TICKS + 1);
+  edit(m, set_anchor);
+  cw_run(&m->w, 10 * STEP_TICKS); /* the loop had gone on while it was set */
   dVector3 at;
-  dJointGetHingeAnchor2(m.joints[0], at);
+  dJointGetHingeAnchor2(m->joints[0], at);
   for (int s = 0; s < 25; ++s) {
-    cw_run(&m.w, STEP_TICKS);
-    CHECK(openness(&m) <= CLOSED);
-    const double *x = m.w.position[0];
+    cw_run(&m->w, STEP_TICKS);
+    CHECK(openness(m) <= CLOSED);
+    const double *x = m->w.position[0];
     CHECK_NEAR(cw_norm((const double[3]){x[0] - at[0], x[1] - at[1], x[2] - at[2]}), 0.05, 1e-4);
     CHECK_NEAR(x[0], at[0], 1e-5); /* it turns about x now */
   }
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  check_owned(m, 1);
 }
 
 /* The stops count from where the axis was set. */
@@ -266,21 +259,20 @@ static void set_zero(void *arg)
 
 TEST(angle_begins_where_the_axis_is_set)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_hinge, 9.81));
-  cw_run(&m.w, 5 * STEP_TICKS + 1);
+  mechanism *m = mechanism_running(build_hinge, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 5 * STEP_TICKS + 1);
   double before[3];
-  memcpy(before, m.w.position[0], sizeof before);
-  edit(&m, set_zero);
-  cw_run(&m.w, 20 * STEP_TICKS);
-  const double *x = m.w.position[0];
+  memcpy(before, m->w.position[0], sizeof before);
+  edit(m, set_zero);
+  cw_run(&m->w, 20 * STEP_TICKS);
+  const double *x = m->w.position[0];
   double way = cw_norm((const double[3]){x[0] - before[0], x[1] - before[1], x[2] - before[2]});
-  double angle = dJointGetHingeAngle(m.joints[0]);
+  double angle = dJointGetHingeAngle(m->joints[0]);
   printf("# held %.3g mm farther, at %.3g rad\n", 1e3 * way, angle);
   CHECK(fabs(angle) < 1e-4);
   CHECK(way < 0.05); /* a step's way; to the old zero it is 0.05 m and more */
-  CHECK(cw_norm(m.w.velocity[0]) < 1e-3);
-  cw_close(&m.w);
+  CHECK(cw_norm(m->w.velocity[0]) < 1e-3);
 }
 
 static void build_fixed_bar(mechanism *m)
@@ -298,33 +290,31 @@ static void fix_elsewhere(void *arg)
 
 TEST(fixed_joint_set_anew_holds_there)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_fixed_bar, 9.81));
-  cw_run(&m.w, 5 * STEP_TICKS + 1);
-  edit(&m, fix_elsewhere);
-  CHECK_NEAR(m.w.position[0][0], 0.15, 1e-5);
-  CHECK_NEAR(m.w.position[0][2], 0.1, 1e-5);
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_fixed_bar, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 5 * STEP_TICKS + 1);
+  edit(m, fix_elsewhere);
+  CHECK_NEAR(m->w.position[0][0], 0.15, 1e-5);
+  CHECK_NEAR(m->w.position[0][2], 0.1, 1e-5);
+  check_owned(m, 1);
 }
 
 /* Stopped, changed and started again: nothing is remembered. */
 TEST(second_start_reads_the_joints_anew)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_fixed_bar, 9.81));
-  cw_run(&m.w, 5 * STEP_TICKS + 1);
-  CHECK(hap_session_stop(m.w.session) == HAP_OK);
-  fix_elsewhere(&m);
-  CHECK(hap_session_start(m.w.session) == HAP_OK);
+  mechanism *m = mechanism_running(build_fixed_bar, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 5 * STEP_TICKS + 1);
+  CHECK(hap_session_stop(m->w.session) == HAP_OK);
+  fix_elsewhere(m);
+  CHECK(hap_session_start(m->w.session) == HAP_OK);
   for (int i = 0; i < 10 * STEP_TICKS; ++i) {
-    cw_tick(&m.w);
-    CHECK(i < STEP_TICKS || cw_stats(&m.w).model.range_joints == 1);
+    cw_tick(&m->w);
+    CHECK(i < STEP_TICKS || cw_stats(&m->w).model.range_joints == 1);
   }
-  CHECK_NEAR(m.w.position[0][0], 0.15, 1e-5);
-  CHECK_NEAR(m.w.position[0][2], 0.1, 1e-5);
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  CHECK_NEAR(m->w.position[0][0], 0.15, 1e-5);
+  CHECK_NEAR(m->w.position[0][2], 0.1, 1e-5);
+  check_owned(m, 1);
 }
 
 TEST(feedback_is_zero)
@@ -389,10 +379,9 @@ static void build_many_joints(mechanism *m)
 
 TEST(joints_without_room_are_odes)
 {
-  mechanism m;
-  open_mechanism(&m, build_many_joints, 9.81);
-  m.w.def.max_bodies = 2;
-  check_left_to_ode(&m);
+  mechanism *m = mechanism_new(build_many_joints, 9.81);
+  m->w.def.max_bodies = 2;
+  check_left_to_ode(m);
 }
 
 /* ---- sleep ---- */
@@ -412,16 +401,15 @@ static void build_sleeping(mechanism *m)
 
 TEST(pushed_body_wakes_what_hangs_on_it)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_sleeping, 0.0));
-  cw_run(&m.w, 400);
-  CHECK(!dBodyIsEnabled(m.w.bodies[0]) && !dBodyIsEnabled(m.w.bodies[1]));
-  m.w.follows = false;
-  cw_move_hand(&m.w, 0.0, 0.0, -0.1);
-  cw_run(&m.w, 300);
-  CHECK(cw_norm(m.w.impulse) > 1e-3);
-  CHECK(cw_norm(m.w.velocity[1]) > 1e-3);
-  CHECK(openness(&m) <= CLOSED);
-  CHECK(cw_stats(&m.w).hand.momentum_error_ns <= 1e-9 * cw_stats(&m.w).hand.impulse_abs_ns + 1e-12);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_sleeping, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 400);
+  CHECK(!dBodyIsEnabled(m->w.bodies[0]) && !dBodyIsEnabled(m->w.bodies[1]));
+  m->w.follows = false;
+  cw_go(&m->w, 0.0, 0.0, -0.1, 300);
+  CHECK(cw_norm(m->w.impulse) > 1e-3);
+  CHECK(cw_norm(m->w.velocity[1]) > 1e-3);
+  CHECK(openness(m) <= CLOSED);
+  CHECK(cw_stats(&m->w).hand.momentum_error_ns <=
+        1e-9 * cw_stats(&m->w).hand.impulse_abs_ns + 1e-12);
 }

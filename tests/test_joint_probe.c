@@ -126,14 +126,13 @@ static void build_pu(mechanism *m)
 /* ODE's has no reaction for all that it gives: the loop would make momentum of it at each tick. */
 TEST(joint_without_reaction_is_left_to_ode)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_pu, 0.0));
-  cw_run(&m.w, 200);
-  hap_stats stats = cw_stats(&m.w);
+  mechanism *m = mechanism_running(build_pu, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 200);
+  hap_stats stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 0 && stats.model.measured_joints == 0 &&
         stats.model.range_bodies == 0);
   CHECK(stats.model.measured_bodies == 1 && stats.probes.singular > 0 && stats.faults.fault == 0);
-  cw_close(&m.w);
 }
 
 static void build_rod(mechanism *m)
@@ -253,12 +252,11 @@ static void build_sprung(mechanism *m)
 /* x of m x" + d x' + k x = -m g from rest at 0. */
 TEST(piston_on_a_spring_swings)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_sprung, 9.81));
-  cw_run(&m.w, 3000);
-  CHECK_NEAR(m.w.position[0][2], -0.5 * 9.81 / 300.0, 2e-4);
-  CHECK(cw_stats(&m.w).model.measured_bodies == 0 && cw_stats(&m.w).model.range_bodies == 1);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_sprung, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 3000);
+  CHECK_NEAR(m->w.position[0][2], -0.5 * 9.81 / 300.0, 2e-4);
+  CHECK(cw_stats(&m->w).model.measured_bodies == 0 && cw_stats(&m->w).model.range_bodies == 1);
 }
 
 /* ---- motors and stops ---- */
@@ -310,18 +308,17 @@ static void build_weak_lift(mechanism *m)
 
 TEST(motor_gives_no_more_than_its_force)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_weak_lift, 9.81));
-  cw_run(&m.w, 60);
-  double before = m.w.position[0][2];
+  mechanism *m = mechanism_running(build_weak_lift, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 60);
+  double before = m->w.position[0][2];
   double ways[2];
   for (int i = 0; i < 2; ++i) {
-    cw_run(&m.w, 100);
-    ways[i] = m.w.position[0][2] - before;
-    before = m.w.position[0][2];
+    cw_run(&m->w, 100);
+    ways[i] = m->w.position[0][2] - before;
+    before = m->w.position[0][2];
   }
   CHECK_NEAR((ways[1] - ways[0]) / 0.01, -0.5 * 9.81, 1e-3);
-  cw_close(&m.w);
 }
 
 /* A limb: a ball joint whose three angles have stops, as in a rag doll. */
@@ -351,20 +348,19 @@ static double angle_from_vertical(const mechanism *m)
 
 TEST(stops_of_a_limb_hold)
 {
-  mechanism m;
   double widest = 0.0;
-  REQUIRE(begin(&m, build_limb, 9.81));
+  mechanism *m = mechanism_running(build_limb, 9.81);
+  REQUIRE(m != NULL);
   for (int i = 0; i < 1000; ++i) {
-    cw_tick(&m.w);
-    widest = fmax(widest, angle_from_vertical(&m));
+    cw_tick(&m->w);
+    widest = fmax(widest, angle_from_vertical(m));
   }
   printf("# swung to %.3f rad\n", widest);
-  hap_stats stats = cw_stats(&m.w);
+  hap_stats stats = cw_stats(&m->w);
   CHECK(widest > 0.25 && widest < 0.45); /* of two stops at once, sqrt(2) 0.3 */
   CHECK(stats.model.range_joints == 2 && stats.model.measured_joints == 1 &&
         stats.model.range_bodies == 1);
   CHECK(stats.faults.fault == 0);
-  cw_close(&m.w);
 }
 
 /* ---- what it costs ---- */
@@ -395,40 +391,36 @@ TEST(probes_are_few_and_reused)
 
 TEST(sleeping_joint_is_not_probed)
 {
-  mechanism m;
-  open_mechanism(&m, build_sprung, 9.81);
-  dBodySetAutoDisableFlag(m.w.bodies[0], 1);
-  dBodySetAutoDisableTime(m.w.bodies[0], 0.1);
-  REQUIRE(start_mechanism(&m));
-  cw_run(&m.w, 10000);
-  CHECK(!dBodyIsEnabled(m.w.bodies[0]));
-  CHECK(probes_of_a_sync(&m) == 0);
-  cw_close(&m.w);
+  mechanism *m = mechanism_new(build_sprung, 9.81);
+  dBodySetAutoDisableFlag(m->w.bodies[0], 1);
+  dBodySetAutoDisableTime(m->w.bodies[0], 0.1);
+  REQUIRE(start_mechanism(m));
+  cw_run(&m->w, 10000);
+  CHECK(!dBodyIsEnabled(m->w.bodies[0]));
+  CHECK(probes_of_a_sync(m) == 0);
 }
 
 /* The world is not touched by a measurement. */
 TEST(probes_leave_no_trace)
 {
-  mechanism m;
-  open_mechanism(&m, build_lift, 9.81);
-  dBodySetLinearDamping(m.w.bodies[0], 0.01);
-  dBodySetAngularDamping(m.w.bodies[0], 0.02);
-  dBodySetMaxAngularSpeed(m.w.bodies[0], 50.0);
-  double erp = dWorldGetERP(m.w.world);
-  double cfm = dWorldGetCFM(m.w.world);
-  REQUIRE(start_mechanism(&m));
-  cw_run(&m.w, 100);
-  CHECK(cw_stats(&m.w).model.measured_joints == 1);
-  CHECK(dWorldGetERP(m.w.world) == erp && dWorldGetCFM(m.w.world) == cfm);
-  CHECK(dBodyGetLinearDamping(m.w.bodies[0]) == 0.01);
-  CHECK(dBodyGetAngularDamping(m.w.bodies[0]) == 0.02);
-  CHECK(dBodyGetMaxAngularSpeed(m.w.bodies[0]) == 50.0);
-  CHECK(dBodyGetGyroscopicMode(m.w.bodies[0]) != 0);
-  CHECK(dJointIsEnabled(m.joints[0]) != 0);
-  CHECK(dJointGetPistonParam(m.joints[0], dParamFMax) == 6.0);
-  CHECK(dJointGetPistonParam(m.joints[0], dParamHiStop) == 0.006);
-  CHECK(dJointGetPistonParam(m.joints[0], dParamLoStop) == -0.006);
-  cw_close(&m.w);
+  mechanism *m = mechanism_new(build_lift, 9.81);
+  dBodySetLinearDamping(m->w.bodies[0], 0.01);
+  dBodySetAngularDamping(m->w.bodies[0], 0.02);
+  dBodySetMaxAngularSpeed(m->w.bodies[0], 50.0);
+  double erp = dWorldGetERP(m->w.world);
+  double cfm = dWorldGetCFM(m->w.world);
+  REQUIRE(start_mechanism(m));
+  cw_run(&m->w, 100);
+  CHECK(cw_stats(&m->w).model.measured_joints == 1);
+  CHECK(dWorldGetERP(m->w.world) == erp && dWorldGetCFM(m->w.world) == cfm);
+  CHECK(dBodyGetLinearDamping(m->w.bodies[0]) == 0.01);
+  CHECK(dBodyGetAngularDamping(m->w.bodies[0]) == 0.02);
+  CHECK(dBodyGetMaxAngularSpeed(m->w.bodies[0]) == 50.0);
+  CHECK(dBodyGetGyroscopicMode(m->w.bodies[0]) != 0);
+  CHECK(dJointIsEnabled(m->joints[0]) != 0);
+  CHECK(dJointGetPistonParam(m->joints[0], dParamFMax) == 6.0);
+  CHECK(dJointGetPistonParam(m->joints[0], dParamHiStop) == 0.006);
+  CHECK(dJointGetPistonParam(m->joints[0], dParamLoStop) == -0.006);
 }
 
 /* ---- changes ---- */
@@ -446,23 +438,22 @@ static void swap_joint(void *arg)
 /* Perhaps at the same address. The bodies are not held for a sync, as before a first measurement. */
 TEST(another_joint_is_measured_anew)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_sprung, 0.0));
-  cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
-  CHECK(cw_stats(&m.w).model.measured_joints == 1);
-  REQUIRE(hap_session_post(m.w.session, swap_joint, &m) == HAP_OK);
-  cw_run(&m.w, SETTLED_STEPS * STEP_TICKS);
-  CHECK(cw_stats(&m.w).model.measured_joints == 1);
-  dBodyID body = m.w.bodies[0];
+  mechanism *m = mechanism_running(build_sprung, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, SETTLED_STEPS * STEP_TICKS + 1);
+  CHECK(cw_stats(&m->w).model.measured_joints == 1);
+  REQUIRE(hap_session_post(m->w.session, swap_joint, m) == HAP_OK);
+  cw_run(&m->w, SETTLED_STEPS * STEP_TICKS);
+  CHECK(cw_stats(&m->w).model.measured_joints == 1);
+  dBodyID body = m->w.bodies[0];
   double gone[3];
-  memcpy(gone, m.w.position[0], sizeof gone);
-  REQUIRE(hap_session_lock(m.w.session) == HAP_OK);
+  memcpy(gone, m->w.position[0], sizeof gone);
+  REQUIRE(hap_session_lock(m->w.session) == HAP_OK);
   dBodySetLinearVel(body, 0.1, 0.1, 0.1);
-  hap_session_unlock(m.w.session);
-  cw_run(&m.w, 100);
-  CHECK(m.w.position[0][0] - gone[0] > 7e-3); /* along the axis */
-  CHECK(fabs(m.w.position[0][1] - gone[1]) < 1e-4 && fabs(m.w.position[0][2] - gone[2]) < 1e-4);
-  cw_close(&m.w);
+  hap_session_unlock(m->w.session);
+  cw_run(&m->w, 100);
+  CHECK(m->w.position[0][0] - gone[0] > 7e-3); /* along the axis */
+  CHECK(fabs(m->w.position[0][1] - gone[1]) < 1e-4 && fabs(m->w.position[0][2] - gone[2]) < 1e-4);
 }
 
 static void turn_axis(void *arg)
@@ -493,13 +484,13 @@ TEST(joint_that_is_set_anew_at_rest_is_measured_anew)
 {
   const hap_edit_fn edits[] = {turn_axis, make_heavier};
   for (int i = 0; i < 2; ++i) {
-    mechanism m;
-    REQUIRE(begin(&m, build_plain_piston, 0.0));
-    cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
-    CHECK(probes_of_a_sync(&m) == 3);
-    REQUIRE(hap_session_post(m.w.session, edits[i], &m) == HAP_OK);
-    CHECK(probes_of_a_sync(&m) > 3);
-    CHECK(probes_of_a_sync(&m) == 3);
-    cw_close(&m.w);
+    mechanism *m = mechanism_running(build_plain_piston, 0.0);
+    REQUIRE(m != NULL);
+    cw_run(&m->w, SETTLED_STEPS * STEP_TICKS + 1);
+    CHECK(probes_of_a_sync(m) == 3);
+    REQUIRE(hap_session_post(m->w.session, edits[i], m) == HAP_OK);
+    CHECK(probes_of_a_sync(m) > 3);
+    CHECK(probes_of_a_sync(m) == 3);
+    cw_close(&m->w);
   }
 }

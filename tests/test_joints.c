@@ -291,23 +291,22 @@ static void build_skew_bars(mechanism *m)
 
 TEST(closed_loop_that_does_not_fit_is_stable)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_skew_bars, 0.0));
-  cw_run(&m.w, STEP_TICKS + 1);
-  double before = kinetic(&m);
+  mechanism *m = mechanism_running(build_skew_bars, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, STEP_TICKS + 1);
+  double before = kinetic(m);
   double most = 0.0;
   double widest = 0.0;
   for (int s = 0; s < 150; ++s) {
-    cw_run(&m.w, STEP_TICKS);
-    most = fmax(most, kinetic(&m));
-    widest = fmax(widest, openness(&m));
+    cw_run(&m->w, STEP_TICKS);
+    most = fmax(most, kinetic(m));
+    widest = fmax(widest, openness(m));
   }
   printf("# energy %.4g of %.4g J, open by %.3g mm, residual %.2g m/s\n", most, before,
-         1e3 * widest, cw_stats(&m.w).contact.residual_max);
+         1e3 * widest, cw_stats(&m->w).contact.residual_max);
   CHECK(before > 1e-3 && most <= 1.001 * before);
   CHECK(widest <= CLOSED);
-  check_owned(&m, 3);
-  cw_close(&m.w);
+  check_owned(m, 3);
 }
 
 /* A door on two hinges. */
@@ -323,18 +322,17 @@ static void build_two_hinges(mechanism *m)
 
 TEST(redundant_hinges_let_it_turn)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_two_hinges, 9.81));
-  cw_run(&m.w, 1001);
-  dBodyID door = m.w.bodies[0];
+  mechanism *m = mechanism_running(build_two_hinges, 9.81);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 1001);
+  dBodyID door = m->w.bodies[0];
   printf("# turns at %.4f rad/s, open by %.3g mm\n", dBodyGetAngularVel(door)[2],
-         1e3 * openness(&m));
+         1e3 * openness(m));
   CHECK_NEAR(dBodyGetAngularVel(door)[2], 1.0, 5e-3);
-  CHECK_NEAR(dJointGetHingeAngle(m.joints[0]), 1.0, 5e-3);
+  CHECK_NEAR(dJointGetHingeAngle(m->joints[0]), 1.0, 5e-3);
   CHECK_NEAR(dBodyGetPosition(door)[2], 0.0, 1e-5);
-  CHECK(openness(&m) <= CLOSED);
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  CHECK(openness(m) <= CLOSED);
+  check_owned(m, 1);
 }
 
 /* At rest, but 5 mm aside of where its end is to hang. */
@@ -347,16 +345,15 @@ static void build_open(mechanism *m)
 
 TEST(open_joint_closes_and_nothing_moves_on)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_open, 0.0));
-  cw_run(&m.w, 10);
-  CHECK_NEAR(m.w.velocity[0][1], -0.1, 0.1); /* on its way */
-  CHECK(m.w.velocity[0][1] < -1e-3);
-  cw_run(&m.w, 4 * STEP_TICKS - 9);
-  CHECK(openness(&m) <= 2e-6);
-  CHECK(cw_norm(dBodyGetLinearVel(m.w.bodies[0])) < 1e-4);
-  CHECK(cw_norm(dBodyGetAngularVel(m.w.bodies[0])) < 1e-3);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_open, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 10);
+  CHECK_NEAR(m->w.velocity[0][1], -0.1, 0.1); /* on its way */
+  CHECK(m->w.velocity[0][1] < -1e-3);
+  cw_run(&m->w, 4 * STEP_TICKS - 9);
+  CHECK(openness(m) <= 2e-6);
+  CHECK(cw_norm(dBodyGetLinearVel(m->w.bodies[0])) < 1e-4);
+  CHECK(cw_norm(dBodyGetAngularVel(m->w.bodies[0])) < 1e-3);
 }
 
 /* ---- closed forms ---- */
@@ -412,16 +409,15 @@ static void build_motor(mechanism *m)
 /* 2 m/s^2 up to 0.2 m/s. */
 TEST(motor_pushes_with_its_largest_force)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_motor, 0.0));
+  mechanism *m = mechanism_running(build_motor, 0.0);
+  REQUIRE(m != NULL);
   for (int i = 1; i <= 400; ++i) {
     double t = i * PERIOD;
-    cw_tick(&m.w);
+    cw_tick(&m->w);
     double x = t < 0.1 ? t * t : 0.01 + 0.2 * (t - 0.1);
-    CHECK_NEAR(m.w.position[0][0], x, 2.5e-4);
+    CHECK_NEAR(m->w.position[0][0], x, 2.5e-4);
   }
-  CHECK_NEAR(m.w.velocity[0][0], 0.2, 1e-9);
-  cw_close(&m.w);
+  CHECK_NEAR(m->w.velocity[0][0], 0.2, 1e-9);
 }
 
 /* Without gravity, towards its high stop at 1 rad/s. */
@@ -473,17 +469,16 @@ static void build_resting(mechanism *m)
 
 TEST(stop_holds_what_leans_on_it)
 {
-  mechanism m;
   double most = 0.0;
-  REQUIRE(begin(&m, build_resting, 9.81));
+  mechanism *m = mechanism_running(build_resting, 9.81);
+  REQUIRE(m != NULL);
   for (int i = 0; i < 1000; ++i) {
-    cw_tick(&m.w);
-    most = fmax(most, fabs(atan2(m.w.position[0][2], m.w.position[0][0])));
+    cw_tick(&m->w);
+    most = fmax(most, fabs(atan2(m->w.position[0][2], m->w.position[0][0])));
   }
-  CHECK_NEAR(atan2(m.w.position[0][2], m.w.position[0][0]), -0.25, 1e-5);
+  CHECK_NEAR(atan2(m->w.position[0][2], m->w.position[0][0]), -0.25, 1e-5);
   CHECK(most <= 0.25 + 1e-4);
-  CHECK(cw_norm(m.w.velocity[0]) < 1e-6);
-  cw_close(&m.w);
+  CHECK(cw_norm(m->w.velocity[0]) < 1e-6);
 }
 
 /* Stop of 20 N m/rad and 0.2 N m s/rad at the world's step: erp = h k / (h k + d). */
@@ -497,16 +492,14 @@ static void build_soft_stop(mechanism *m)
 
 static void check_soft_stop(hap_model model)
 {
-  mechanism m;
-  open_mechanism(&m, build_soft_stop, 9.81);
-  m.w.def.model = model;
-  REQUIRE(start_mechanism(&m));
-  cw_run(&m.w, 3000);
-  double angle = -atan2(m.w.position[0][2], m.w.position[0][0]);
+  mechanism *m = mechanism_new(build_soft_stop, 9.81);
+  m->w.def.model = model;
+  REQUIRE(start_mechanism(m));
+  cw_run(&m->w, 3000);
+  double angle = -atan2(m->w.position[0][2], m->w.position[0][0]);
   double torque = 0.5 * 9.81 * 0.1 * cos(angle);
   printf("# %.5f rad into the stop for %.5f N m\n", angle - 0.25, torque);
   CHECK_NEAR(20.0 * (angle - 0.25), torque, 0.01 * torque);
-  cw_close(&m.w);
 }
 
 TEST(soft_stop_is_a_spring)
@@ -528,17 +521,16 @@ static void build_fudged(mechanism *m)
 
 TEST(fudge_factor_holds_the_motor_back)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_fudged, 0.0));
+  mechanism *m = mechanism_running(build_fudged, 0.0);
+  REQUIRE(m != NULL);
   int first = 0;
-  while (first < 10 && m.w.velocity[0][0] == 0.0) {
-    cw_tick(&m.w);
+  while (first < 10 && m->w.velocity[0][0] == 0.0) {
+    cw_tick(&m->w);
     ++first;
   }
-  CHECK_NEAR(m.w.velocity[0][0], 0.1 * 2e-3, 1e-9);
-  cw_run(&m.w, 9);
-  CHECK_NEAR(m.w.velocity[0][0], 9.1 * 2e-3, 1e-9);
-  cw_close(&m.w);
+  CHECK_NEAR(m->w.velocity[0][0], 0.1 * 2e-3, 1e-9);
+  cw_run(&m->w, 9);
+  CHECK_NEAR(m->w.velocity[0][0], 9.1 * 2e-3, 1e-9);
 }
 
 static void build_locked(mechanism *m)
@@ -569,10 +561,9 @@ static void build_turning(mechanism *m)
 
 TEST(stops_at_pi_are_none)
 {
-  mechanism m;
-  REQUIRE(begin(&m, build_turning, 0.0));
-  cw_run(&m.w, 1001);
-  CHECK(dBodyGetAngularVel(m.w.bodies[0])[2] > 7.5);
-  check_owned(&m, 1);
-  cw_close(&m.w);
+  mechanism *m = mechanism_running(build_turning, 0.0);
+  REQUIRE(m != NULL);
+  cw_run(&m->w, 1001);
+  CHECK(dBodyGetAngularVel(m->w.bodies[0])[2] > 7.5);
+  check_owned(m, 1);
 }

@@ -345,27 +345,26 @@ static void play_mesh(hap_model model, double lookback, course *out)
   static const double corners[] = {-0.3, -0.3, 0.0, 0.3, -0.3, 0.0, 0.3, 0.3, 0.0, -0.3, 0.3, 0.0};
   static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
   double hull[24];
-  contact_world w;
-  cw_open(&w, CW_GRAVITY);
+  contact_world *w = cw_new(CW_GRAVITY);
   dTriMeshDataID data = dGeomTriMeshDataCreate();
   dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
                               3 * (int)sizeof(dTriIndex));
-  dCreateTriMesh(w.space, data, NULL, NULL, NULL);
+  dCreateTriMesh(w->space, data, NULL, NULL, NULL);
   for (int i = 0; i < 24; ++i) {
     hull[i] = (i / 3 >> i % 3 & 1) != 0 ? RADIUS : -RADIUS;
   }
-  w.def.model = model;
-  w.expert.lookback = lookback;
-  w.hand_def.hull_xyz = hull;
-  w.hand_def.hull_points = 8;
-  w.hand_def.radius = 0.0;
-  w.hand_def.friction = 0.5;
-  w.hand_velocity[0] = 0.01;
-  w.hand_velocity[2] = -0.01;
-  CHECK(cw_start(&w, 0.0, 0.0, 1.3 * RADIUS));
-  cw_run(&w, TICKS / 2);
-  out->stats = cw_stats(&w);
-  cw_close(&w);
+  w->def.model = model;
+  w->expert.lookback = lookback;
+  w->hand_def.hull_xyz = hull;
+  w->hand_def.hull_points = 8;
+  w->hand_def.radius = 0.0;
+  w->hand_def.friction = 0.5;
+  w->hand_velocity[0] = 0.01;
+  w->hand_velocity[2] = -0.01;
+  CHECK(cw_start(w, 0.0, 0.0, 1.3 * RADIUS));
+  cw_run(w, TICKS / 2);
+  out->stats = cw_stats(w);
+  cw_close(w);
   dGeomTriMeshDataDestroy(data);
 }
 
@@ -459,17 +458,15 @@ TEST(a_change_of_model_ends_the_window)
 TEST(refuses_other_shares)
 {
   const double wrong[] = {-0.1, 0.6, (double)NAN, (double)INFINITY};
-  contact_world w;
-  cw_open(&w, 0.0);
+  contact_world *w = cw_new(0.0);
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
     hap_detail detail = {""};
-    w.expert.lookback = wrong[i];
-    w.ode.world = w.world;
-    w.ode.space = w.space;
-    CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
+    w->expert.lookback = wrong[i];
+    w->ode.world = w->world;
+    w->ode.space = w->space;
+    CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
     CHECK(strstr(detail.text, "lookback") != NULL);
   }
-  cw_close(&w);
 }
 
 TEST(threads_have_a_figure_too)

@@ -12,41 +12,11 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
-#include "device/device.h"
-#include "plugins/virtual/virtual.h"
+#include "tests/device_rig.h"
 
 #define MS 1000000LL
 
-typedef struct rig {
-  hap_device *device;
-  const hap_device_ops *ops;
-  void *self;
-  hap_pose pose;
-  hap_twist twist;
-  hapi_virtual_port port;
-} rig;
-
-static bool rig_open(rig *r, const char *spec)
-{
-  hap_detail detail;
-  memset(r, 0, sizeof *r);
-  if (hap_device_open(spec, &r->device, &detail) != HAP_OK) {
-    printf("# %s: %s\n", spec, detail.text);
-    return false;
-  }
-  r->ops = hapi_device_ops(r->device);
-  r->self = hapi_device_self(r->device);
-  return r->ops->start(r->self) == HAP_OK;
-}
-
-static void rig_close(rig *r)
-{
-  r->ops->zero(r->self);
-  r->ops->stop(r->self);
-  hap_device_close(r->device);
-}
-
-static double rig_read(rig *r, int64_t since_ns)
+static double rig_read(device_rig *r, int64_t since_ns)
 {
   uint32_t buttons = 0;
   CHECK(r->ops->read(r->self, 7000 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
@@ -54,7 +24,7 @@ static double rig_read(rig *r, int64_t since_ns)
   return r->pose.position[0];
 }
 
-static void rig_push(rig *r, double x, double y)
+static void rig_push(device_rig *r, double x, double y)
 {
   hap_wrench wanted = {{x, y, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench reached;
@@ -65,21 +35,20 @@ TEST(device_alone_has_mass_and_damping)
 {
   static const int64_t steps[] = {1 * MS, 333333, 37 * MS};
   for (int k = 0; k < 3; ++k) {
-    rig r;
-    REQUIRE(
-        rig_open(&r, "virtual:hand=none,device_mass=0.4,device_damping=2,path=0:1/2/3;1:9/9/9"));
-    CHECK_NEAR(rig_read(&r, 0), 1.0, 0.0);
-    CHECK(hapi_v3_norm(r.twist.linear) == 0.0);
-    rig_push(&r, 3.0, 0.0);
+    device_rig *r =
+        rig_new("virtual:hand=none,device_mass=0.4,device_damping=2,path=0:1/2/3;1:9/9/9");
+    REQUIRE(r != NULL);
+    CHECK_NEAR(rig_read(r, 0), 1.0, 0.0);
+    CHECK(hapi_v3_norm(r->twist.linear) == 0.0);
+    rig_push(r, 3.0, 0.0);
     for (int i = 1; i <= 300; ++i) {
       double t = (double)(i * steps[k]) / 1e9;
-      double x = rig_read(&r, i * steps[k]);
+      double x = rig_read(r, i * steps[k]);
       double rise = 1.0 - exp(-5.0 * t);
-      CHECK_NEAR(r.twist.linear[0], 1.5 * rise, 1e-11);
+      CHECK_NEAR(r->twist.linear[0], 1.5 * rise, 1e-11);
       CHECK_NEAR(x, 1.0 + 1.5 * (t - rise / 5.0), 1e-11 * (1.0 + t));
-      CHECK(r.pose.position[1] == 2.0 && r.pose.position[2] == 3.0);
+      CHECK(r->pose.position[1] == 2.0 && r->pose.position[2] == 3.0);
     }
-    rig_close(&r);
   }
 }
 
@@ -87,91 +56,84 @@ TEST(device_alone_has_mass_and_damping)
  * the ground, which at rest is the same. */
 TEST(hand_and_device_are_one_body)
 {
-  rig both;
-  rig hand;
-  REQUIRE(rig_open(&both, "virtual:hand=relaxed,device_mass=0.3,device_damping=4"));
-  REQUIRE(rig_open(&hand, "virtual:mass=0.5,damping=7,stiffness=150"));
-  rig_read(&both, 0);
-  rig_read(&hand, 0);
-  rig_push(&both, 2.0, 0.0);
-  rig_push(&hand, 2.0, 0.0);
+  device_rig *both = rig_new("virtual:hand=relaxed,device_mass=0.3,device_damping=4");
+  REQUIRE(both != NULL);
+  device_rig *hand = rig_new("virtual:mass=0.5,damping=7,stiffness=150");
+  REQUIRE(hand != NULL);
+  rig_read(both, 0);
+  rig_read(hand, 0);
+  rig_push(both, 2.0, 0.0);
+  rig_push(hand, 2.0, 0.0);
   for (int i = 1; i < 800; ++i) {
-    CHECK_NEAR(rig_read(&both, i * MS), rig_read(&hand, i * MS), 1e-15);
+    CHECK_NEAR(rig_read(both, i * MS), rig_read(hand, i * MS), 1e-15);
   }
-  CHECK_NEAR(both.port.mass, 0.5, 1e-15);
-  rig_close(&both);
-  rig_close(&hand);
+  CHECK_NEAR(both->port.mass, 0.5, 1e-15);
   /* moved along, the ground holds back: it lags behind the target by b v / k */
-  REQUIRE(
-      rig_open(&both, "virtual:path=0:0/0/0;9:0.9/0/0,blend=linear,hand=tense,device_damping=4"));
-  rig_read(&both, 0);
+  both = rig_new("virtual:path=0:0/0/0;9:0.9/0/0,blend=linear,hand=tense,device_damping=4");
+  REQUIRE(both != NULL);
+  rig_read(both, 0);
   for (int i = 1; i <= 4000; ++i) {
-    rig_read(&both, i * MS);
+    rig_read(both, i * MS);
   }
-  CHECK_NEAR(both.pose.position[0], 0.4 - 4.0 * 0.1 / 800.0, 1e-9);
-  rig_close(&both);
+  CHECK_NEAR(both->pose.position[0], 0.4 - 4.0 * 0.1 / 800.0, 1e-9);
 }
 
 TEST(rigid_hand_does_not_feel_the_mechanism)
 {
-  rig plain;
-  rig heavy;
-  REQUIRE(rig_open(&plain, "virtual:path=0:0/0/0;1:0.1/0.2/0"));
-  REQUIRE(rig_open(&heavy,
-                   "virtual:path=0:0/0/0;1:0.1/0.2/0,device_mass=2,device_damping=9,friction=3,"
-                   "delay=0.0013"));
+  device_rig *plain = rig_new("virtual:path=0:0/0/0;1:0.1/0.2/0");
+  REQUIRE(plain != NULL);
+  device_rig *heavy = rig_new(
+      "virtual:path=0:0/0/0;1:0.1/0.2/0,device_mass=2,device_damping=9,friction=3,"
+      "delay=0.0013");
+  REQUIRE(heavy != NULL);
   for (int i = 0; i < 1200; ++i) {
-    CHECK(rig_read(&plain, i * MS) == rig_read(&heavy, i * MS));
-    CHECK(memcmp(&plain.twist, &heavy.twist, sizeof plain.twist) == 0);
-    rig_push(&plain, 5.0, 0.0);
-    rig_push(&heavy, 5.0, 0.0);
+    CHECK(rig_read(plain, i * MS) == rig_read(heavy, i * MS));
+    CHECK(memcmp(&plain->twist, &heavy->twist, sizeof plain->twist) == 0);
+    rig_push(plain, 5.0, 0.0);
+    rig_push(heavy, 5.0, 0.0);
   }
-  CHECK_NEAR(plain.port.work, 0.5, 1e-12);
-  double early = heavy.port.work; /* the way before the force came is not paid for */
+  CHECK_NEAR(plain->port.work, 0.5, 1e-12);
+  double early = heavy->port.work; /* the way before the force came is not paid for */
   CHECK(early < 0.5 && early > 0.4999);
-  CHECK(plain.port.mass == 0.0);
-  rig_close(&plain);
-  rig_close(&heavy);
+  CHECK(plain->port.mass == 0.0);
 }
 
 TEST(info_says_what_the_mechanism_is)
 {
-  rig r;
-  REQUIRE(rig_open(&r,
-                   "virtual:device_mass=0.25,device_damping=1.5,friction=0.2,delay=0.0015,"
-                   "quantum=3e-5,rated_stiffness=900"));
+  device_rig *r = rig_new(
+      "virtual:device_mass=0.25,device_damping=1.5,friction=0.2,delay=0.0015,"
+      "quantum=3e-5,rated_stiffness=900");
+  REQUIRE(r != NULL);
   hap_device_info info;
-  CHECK(hap_device_get_info(r.device, &info, sizeof info) == HAP_OK);
+  CHECK(hap_device_get_info(r->device, &info, sizeof info) == HAP_OK);
   CHECK(info.mass == 0.25 && info.damping == 1.5 && info.friction == 0.2);
   CHECK(info.delay == 0.0015 && info.quantum == 3e-5 && info.rated_stiffness == 900.0);
   CHECK(info.measures_velocity == 0);
-  rig_close(&r);
-  REQUIRE(rig_open(&r, "virtual"));
-  CHECK(hapi_device_info(r.device)->measures_velocity == 1);
-  rig_close(&r);
+  r = rig_new("virtual");
+  REQUIRE(r != NULL);
+  CHECK(hapi_device_info(r->device)->measures_velocity == 1);
 }
 
 TEST(friction_stops_a_mass_and_holds_it)
 {
   static const int64_t steps[] = {1 * MS, 333333, 7 * MS, 50 * MS};
   for (int k = 0; k < 4; ++k) {
-    rig r;
-    REQUIRE(rig_open(&r, "virtual:hand=none,device_mass=0.5,friction=0.25,kick=0:0.2/-0.1/0"));
-    rig_read(&r, 0);
+    device_rig *r = rig_new("virtual:hand=none,device_mass=0.5,friction=0.25,kick=0:0.2/-0.1/0");
+    REQUIRE(r != NULL);
+    rig_read(r, 0);
     for (int64_t at = steps[k]; at < 1000 * MS; at += steps[k]) {
       double t = (double)at / 1e9; /* 0.5 m/s^2: at rest after 0.4 s and 0.2 s */
-      double x = rig_read(&r, at);
+      double x = rig_read(r, at);
       CHECK_NEAR(x, t < 0.4 ? 0.2 * t - 0.25 * t * t : 0.04, 1e-12);
-      CHECK_NEAR(r.pose.position[1], t < 0.2 ? -0.1 * t + 0.25 * t * t : -0.01, 1e-12);
-      CHECK(t < 0.4001 || r.twist.linear[0] == 0.0);
+      CHECK_NEAR(r->pose.position[1], t < 0.2 ? -0.1 * t + 0.25 * t * t : -0.01, 1e-12);
+      CHECK(t < 0.4001 || r->twist.linear[0] == 0.0);
     }
-    rig_push(&r, 0.2499, -0.2499);
-    double x = rig_read(&r, 2000 * MS);
+    rig_push(r, 0.2499, -0.2499);
+    double x = rig_read(r, 2000 * MS);
     CHECK_NEAR(x, 0.04, 1e-12);
-    CHECK(hapi_v3_norm(r.twist.linear) == 0.0);
-    rig_push(&r, 0.75, 0.0); /* 1 m/s^2 beyond the friction */
-    CHECK_NEAR(rig_read(&r, 3000 * MS), 0.54, 1e-11);
-    rig_close(&r);
+    CHECK(hapi_v3_norm(r->twist.linear) == 0.0);
+    rig_push(r, 0.75, 0.0); /* 1 m/s^2 beyond the friction */
+    CHECK_NEAR(rig_read(r, 3000 * MS), 0.54, 1e-11);
   }
 }
 
@@ -191,12 +153,12 @@ static void drag_reference(double state[2], double target, double friction)
 
 TEST(friction_sticks_and_slips_without_chatter)
 {
-  rig r;
-  REQUIRE(rig_open(&r,
-                   "virtual:sine=0.005/0/0,hz=1,mass=0.1,damping=0,stiffness=400,device_mass=0.2,"
-                   "friction=0.5"));
-  rig_read(&r, 0);
-  double state[2] = {0.0, r.twist.linear[0]};
+  device_rig *r = rig_new(
+      "virtual:sine=0.005/0/0,hz=1,mass=0.1,damping=0,stiffness=400,device_mass=0.2,"
+      "friction=0.5");
+  REQUIRE(r != NULL);
+  rig_read(r, 0);
+  double state[2] = {0.0, r->twist.linear[0]};
   int stops = 0;
   int resting = 0;
   bool moved = true;
@@ -204,14 +166,13 @@ TEST(friction_sticks_and_slips_without_chatter)
     for (int k = 0; k < 1000; ++k) {
       drag_reference(state, 0.005 * sin(2e-6 * acos(-1.0) * (i * 1000 - 1000 + k)), 0.5);
     }
-    CHECK_NEAR(rig_read(&r, i * MS), state[0], 1e-7);
-    stops += moved && r.twist.linear[0] == 0.0;
-    resting += r.twist.linear[0] == 0.0;
-    moved = r.twist.linear[0] != 0.0;
+    CHECK_NEAR(rig_read(r, i * MS), state[0], 1e-7);
+    stops += moved && r->twist.linear[0] == 0.0;
+    resting += r->twist.linear[0] == 0.0;
+    moved = r->twist.linear[0] != 0.0;
   }
   printf("# %d stops, at rest in %d of 4000 reads\n", stops, resting);
   CHECK(stops >= 8 && stops <= 30 && resting > 500);
-  rig_close(&r);
 }
 
 TEST(delay_shifts_the_answer_exactly)
@@ -220,9 +181,9 @@ TEST(delay_shifts_the_answer_exactly)
   for (int k = 0; k < 6; ++k) {
     char spec[120];
     snprintf(spec, sizeof spec, "virtual:hand=none,device_mass=0.5,delay=%.17g", delays[k]);
-    rig r;
-    REQUIRE(rig_open(&r, spec));
-    rig_read(&r, 0);
+    device_rig *r = rig_new(spec);
+    REQUIRE(r != NULL);
+    rig_read(r, 0);
     double forces[300];
     srand(3);
     for (int i = 0; i < 300; ++i) {
@@ -237,52 +198,49 @@ TEST(delay_shifts_the_answer_exactly)
         x += way;
         v += 2.0 * forces[j] * h;
       }
-      CHECK_NEAR(rig_read(&r, i * MS), x, 1e-12);
-      CHECK_NEAR(r.twist.linear[0], v, 1e-12);
-      CHECK_NEAR(r.port.work, work, 1e-12);
-      CHECK_NEAR(r.port.work, 0.25 * v * v, 1e-12); /* all of it is motion */
+      CHECK_NEAR(rig_read(r, i * MS), x, 1e-12);
+      CHECK_NEAR(r->twist.linear[0], v, 1e-12);
+      CHECK_NEAR(r->port.work, work, 1e-12);
+      CHECK_NEAR(r->port.work, 0.25 * v * v, 1e-12); /* all of it is motion */
       forces[i] = 4.0 * rand() / RAND_MAX - 2.0;
-      rig_push(&r, forces[i], 0.0);
+      rig_push(r, forces[i], 0.0);
     }
-    rig_close(&r);
   }
 }
 
 TEST(full_line_of_commands_loses_none_but_the_last)
 {
-  rig r;
-  REQUIRE(rig_open(&r, "virtual:hand=none,device_mass=1,delay=0.1"));
-  rig_read(&r, 0);
+  device_rig *r = rig_new("virtual:hand=none,device_mass=1,delay=0.1");
+  REQUIRE(r != NULL);
+  rig_read(r, 0);
   for (int i = 0; i < 10000; ++i) { /* at 1 MHz */
-    rig_push(&r, i < 5000 ? 1.0 : -3.0, 0.0);
-    rig_read(&r, i * 1000 + 1000);
+    rig_push(r, i < 5000 ? 1.0 : -3.0, 0.0);
+    rig_read(r, i * 1000 + 1000);
   }
-  rig_read(&r, 104 * MS);
-  CHECK_NEAR(r.twist.linear[0], 0.004, 1e-9);
-  rig_read(&r, 200 * MS);
-  CHECK(r.port.force[0] == -3.0);
-  rig_close(&r);
+  rig_read(r, 104 * MS);
+  CHECK_NEAR(r->twist.linear[0], 0.004, 1e-9);
+  rig_read(r, 200 * MS);
+  CHECK(r->port.force[0] == -3.0);
 }
 
 TEST(zero_goes_through_the_delay)
 {
-  rig r;
-  REQUIRE(rig_open(&r, "virtual:hand=none,device_mass=1,delay=0.01"));
-  rig_read(&r, 0);
-  rig_push(&r, 1.0, 0.0);
-  rig_read(&r, 100 * MS);
-  r.ops->zero(r.self);
-  rig_read(&r, 200 * MS);
-  CHECK_NEAR(r.twist.linear[0], 0.1, 1e-12); /* from 10 ms to 110 ms */
-  rig_push(&r, 1.0, 0.0);
-  rig_read(&r, 250 * MS);
-  CHECK(r.port.force[0] == 1.0);
-  r.ops->stop(r.self);
-  CHECK(r.ops->start(r.self) == HAP_OK);
-  rig_read(&r, 0);
-  rig_read(&r, 5 * MS);
-  CHECK(r.twist.linear[0] == 0.0 && r.port.work == 0.0);
-  rig_close(&r);
+  device_rig *r = rig_new("virtual:hand=none,device_mass=1,delay=0.01");
+  REQUIRE(r != NULL);
+  rig_read(r, 0);
+  rig_push(r, 1.0, 0.0);
+  rig_read(r, 100 * MS);
+  r->ops->zero(r->self);
+  rig_read(r, 200 * MS);
+  CHECK_NEAR(r->twist.linear[0], 0.1, 1e-12); /* from 10 ms to 110 ms */
+  rig_push(r, 1.0, 0.0);
+  rig_read(r, 250 * MS);
+  CHECK(r->port.force[0] == 1.0);
+  r->ops->stop(r->self);
+  CHECK(r->ops->start(r->self) == HAP_OK);
+  rig_read(r, 0);
+  rig_read(r, 5 * MS);
+  CHECK(r->twist.linear[0] == 0.0 && r->port.work == 0.0);
 }
 
 TEST(quantum_rounds_what_is_measured)
@@ -291,38 +249,36 @@ TEST(quantum_rounds_what_is_measured)
       "virtual:sine=0.02/0.01/0,hz=2,quantum=3e-5",
       "virtual:sine=0.02/0.01/0,hz=2,quantum=3e-5,hand=relaxed,device_mass=0.1"};
   for (int k = 0; k < 2; ++k) {
-    rig r;
-    REQUIRE(rig_open(&r, specs[k]));
-    rig_read(&r, 0);
-    CHECK(r.twist.linear[0] == 0.0);
+    device_rig *r = rig_new(specs[k]);
+    REQUIRE(r != NULL);
+    rig_read(r, 0);
+    CHECK(r->twist.linear[0] == 0.0);
     for (int i = 1; i < 1000; ++i) {
-      double before = r.pose.position[0];
-      double x = rig_read(&r, i * MS);
+      double before = r->pose.position[0];
+      double x = rig_read(r, i * MS);
       CHECK_NEAR(x / 3e-5, round(x / 3e-5), 1e-9);
-      CHECK_NEAR(x, r.port.position[0], 1.5001e-5);
-      CHECK_NEAR(r.twist.linear[0], (x - before) / 1e-3, 1e-9);
-      double again = r.twist.linear[0];
-      CHECK(rig_read(&r, i * MS) == x && r.twist.linear[0] == again);
+      CHECK_NEAR(x, r->port.position[0], 1.5001e-5);
+      CHECK_NEAR(r->twist.linear[0], (x - before) / 1e-3, 1e-9);
+      double again = r->twist.linear[0];
+      CHECK(rig_read(r, i * MS) == x && r->twist.linear[0] == again);
     }
-    rig_close(&r);
   }
 }
 
 TEST(kick_is_a_jump_of_the_velocity)
 {
-  rig r;
-  REQUIRE(rig_open(&r, "virtual:hand=none,device_mass=2,kick=0.1503:0.02/0/-0.01,start=0.1"));
+  device_rig *r = rig_new("virtual:hand=none,device_mass=2,kick=0.1503:0.02/0/-0.01,start=0.1");
+  REQUIRE(r != NULL);
   for (int i = 0; i < 200; ++i) {
     double t = fmax(0.0, i * 1e-3 - 0.0503);
-    CHECK_NEAR(rig_read(&r, i * MS), 0.02 * t, 1e-15);
-    CHECK_NEAR(r.pose.position[2], -0.01 * t, 1e-15);
+    CHECK_NEAR(rig_read(r, i * MS), 0.02 * t, 1e-15);
+    CHECK_NEAR(r->pose.position[2], -0.01 * t, 1e-15);
   }
-  r.ops->stop(r.self);
-  CHECK(r.ops->start(r.self) == HAP_OK);
-  rig_read(&r, 0);
-  CHECK_NEAR(rig_read(&r, 150 * MS), 0.02 * 0.0997, 1e-15); /* once after every start */
-  CHECK_NEAR(rig_read(&r, 250 * MS), 0.02 * 0.1997, 1e-15);
-  rig_close(&r);
+  r->ops->stop(r->self);
+  CHECK(r->ops->start(r->self) == HAP_OK);
+  rig_read(r, 0);
+  CHECK_NEAR(rig_read(r, 150 * MS), 0.02 * 0.0997, 1e-15); /* once after every start */
+  CHECK_NEAR(rig_read(r, 250 * MS), 0.02 * 0.1997, 1e-15);
 }
 
 TEST(bad_specs_say_why)

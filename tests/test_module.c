@@ -46,10 +46,7 @@ static void refused(const char *spec, hap_status status, const char *const said[
   for (int i = 0; i < 3 && said[i] != NULL; ++i) {
     good = good && strstr(detail.text, said[i]) != NULL;
   }
-  CHECK(good);
-  if (!good) {
-    printf("# %.100s: %s, \"%s\"\n", spec, hap_status_name(got), detail.text);
-  }
+  CHECK_SAY(good, "%.100s: %s, \"%s\"", spec, hap_status_name(got), detail.text);
   CHECK(hap_device_open(spec, &device, NULL) == status && device == NULL);
 }
 
@@ -228,25 +225,24 @@ TEST(the_code_goes_with_the_last_device)
 /* The session still writes and zeroes when the application has closed the device too early. */
 TEST(the_code_stays_while_a_session_has_the_device)
 {
-  stage s;
   hap_device *device = NULL;
   hap_pointer_id id;
   hap_pointer_def def;
   const char *path = module_of("HAPODE_TABLES");
   REQUIRE(hap_device_open(spec_of(path, ""), &device, NULL) == HAP_OK);
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
   hap_pointer_def_init(&def, sizeof def);
   def.device = device;
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  CHECK(hap_session_start(s.session) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_OK);
   hap_device_close(device);
   CHECK(is_loaded(path));
-  CHECK(hap_session_advance(s.session, 20) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 20) == HAP_OK);
   hap_emergency_zero();
-  CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
-  CHECK(hap_session_stop(s.session) == HAP_OK && is_loaded(path));
-  stage_end(&s);
+  CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
+  CHECK(hap_session_stop(s->session) == HAP_OK && is_loaded(path));
+  stage_end(s);
   CHECK(!is_loaded(path));
 }
 

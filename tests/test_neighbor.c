@@ -163,20 +163,19 @@ TEST(edges_of_convex_and_trimesh)
 TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
 {
   for (int kind = CONVEX; kind <= TRIMESH; ++kind) {
-    test_world w;
     dMass mass;
     dTriMeshDataID mesh = make_mesh();
-    world_open(&w, 0.0, 20);
+    test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-    dBodyID body = world_add(&w, make_geom(w.space, (shape)kind, mesh), &mass, 0, 0, 0);
-    CHECK(world_start(&w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002));
-    const hapi_contact_slot *contact = world_contact(&w, body, 0);
+    dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
+    CHECK(world_start(w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002));
+    const hapi_contact_slot *contact = world_contact(w, body, 0);
     REQUIRE(contact != NULL);
     for (int i = 0; i < 3; ++i) {
-      CHECK_NEAR(world_contact_answer(&w, contact)->a[i][i], 1 / 0.3, 1e-9);
+      CHECK_NEAR(world_contact_answer(w, contact)->a[i][i], 1 / 0.3, 1e-9);
     }
-    CHECK_NEAR(world_contact_answer(&w, contact)->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
-    world_close(&w);
+    CHECK_NEAR(world_contact_answer(w, contact)->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
+    world_close(w);
     dGeomTriMeshDataDestroy(mesh);
   }
 }
@@ -217,18 +216,17 @@ TEST(geom_offsets_and_several_geoms_of_a_body)
 /* Between two geoms of one body: two contacts, one neighbour. */
 TEST(a_body_is_touched_at_two_geoms)
 {
-  test_world w;
   dMass mass;
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   dMassSetSphereTotal(&mass, 0.3, 0.05);
-  dBodyID body = world_add(&w, dCreateBox(w.space, 0.1, 0.1, 0.02), &mass, 0, 0, 0);
-  dGeomID ball = dCreateSphere(w.space, 0.02);
+  dBodyID body = world_add(w, dCreateBox(w->space, 0.1, 0.1, 0.02), &mass, 0, 0, 0);
+  dGeomID ball = dCreateSphere(w->space, 0.02);
   dGeomSetBody(ball, body);
   dGeomSetOffsetPosition(ball, 0.04, 0, 0.01 + RADIUS + 0.002);
-  REQUIRE(world_start(&w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002));
-  CHECK(world_count_contacts(&w) == 2);
-  CHECK(hapi_neighbors_bodies(&world_physics(&w)->near) == 1);
-  hapi_physics *physics = world_physics(&w);
+  REQUIRE(world_start(w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002));
+  CHECK(world_count_contacts(w) == 2);
+  CHECK(hapi_neighbors_bodies(&world_physics(w)->near) == 1);
+  hapi_physics *physics = world_physics(w);
   double sum = 0.0;
   for (uint32_t i = 0; i < 2; ++i) {
     CHECK(physics->near.slots.contacts[i].phase == HAPI_SLOT_LIVE &&
@@ -236,7 +234,6 @@ TEST(a_body_is_touched_at_two_geoms)
     sum += physics->near.slots.contacts[i].distance;
   }
   CHECK_NEAR(sum, 0.002 + 0.01, 1e-9);
-  world_close(&w);
 }
 
 /* ---- spaces ---- */
@@ -273,26 +270,24 @@ TEST(nested_spaces_are_searched)
 /* Two cubes that touch in a space of their own, with so many things of the outer space around. */
 static int pair_calls_a_step(int things)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dSpaceID inner = dHashSpaceCreate(w.space);
+  test_world *w = world_new(0.0, 20);
+  dSpaceID inner = dHashSpaceCreate(w->space);
   for (int i = 0; i < 2; ++i) {
-    dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0.04999 * i, 0, 0);
+    dBodyID cube = world_add_cube(w, 0.05, 0.3, 0.04999 * i, 0, 0);
     dGeomID geom = dBodyGetFirstGeom(cube);
-    dSpaceRemove(w.space, geom);
+    dSpaceRemove(w->space, geom);
     dSpaceAdd(inner, geom);
   }
   for (int i = 0; i < things; ++i) {
-    dGeomID ball = dCreateSphere(w.space, 0.01); /* within the box around both, touching nothing */
+    dGeomID ball = dCreateSphere(w->space, 0.01); /* within the box around both, touching nothing */
     dGeomSetPosition(ball, 0.025, 0.03, 0.02 + 0.001 * i);
   }
-  CHECK(world_create_session(&w, count_pairs) == HAP_OK);
-  world_add_pointer(&w, RADIUS, 5, 0, 0);
-  CHECK(hap_session_start(w.session) == HAP_OK);
+  CHECK(world_create_session(w, count_pairs) == HAP_OK);
+  world_add_pointer(w, RADIUS, 5, 0, 0);
+  CHECK(hap_session_start(w->session) == HAP_OK);
   pair_calls = 0;
-  CHECK(hap_session_advance(w.session, 51) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 51) == HAP_OK);
   int calls = pair_calls;
-  world_close(&w);
   return calls;
 }
 
@@ -307,17 +302,15 @@ TEST(pairs_in_nested_spaces_collide_once)
 
 static bool found_at(double distance, double pointer_speed, double body_speed)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0, 0, 0);
+  test_world *w = world_new(0.0, 20);
+  dBodyID cube = world_add_cube(w, 0.05, 0.3, 0, 0, 0);
   dBodySetLinearVel(cube, body_speed, 0, 0);
   double at = 0.025 + RADIUS + distance;
-  CHECK(world_create_session(&w, NULL) == HAP_OK);
-  world_add_pointer(&w, RADIUS, at, 0, 0);
-  world_move_pointer(&w, 0, (const double[3]){at, 0, 0}, (const double[3]){-pointer_speed, 0, 0});
-  CHECK(hap_session_start(w.session) == HAP_OK);
-  bool found = world_contact(&w, cube, 0) != NULL;
-  world_close(&w);
+  CHECK(world_create_session(w, NULL) == HAP_OK);
+  world_add_pointer(w, RADIUS, at, 0, 0);
+  world_move_pointer(w, 0, (const double[3]){at, 0, 0}, (const double[3]){-pointer_speed, 0, 0});
+  CHECK(hap_session_start(w->session) == HAP_OK);
+  bool found = world_contact(w, cube, 0) != NULL;
   return found;
 }
 
@@ -337,51 +330,48 @@ TEST(reach_grows_with_speed)
 TEST(a_fast_body_is_known_before_it_arrives)
 {
   for (int offset = 0; offset < 5; ++offset) {
-    test_world w;
-    world_open(&w, 0.0, 20);
-    dBodyID cube = world_add_cube(&w, 0.05, 0.3, -1.0 - 0.03 * offset, 0, 0);
+    test_world *w = world_new(0.0, 20);
+    dBodyID cube = world_add_cube(w, 0.05, 0.3, -1.0 - 0.03 * offset, 0, 0);
     dBodySetLinearVel(cube, 3.0, 0, 0);
-    REQUIRE(world_start(&w, RADIUS, 0, 0, 0));
+    REQUIRE(world_start(w, RADIUS, 0, 0, 0));
     double impulse = 0.0;
     for (int i = 0; i < 600 && impulse == 0.0; ++i) {
-      CHECK(hap_session_advance(w.session, 1) == HAP_OK);
-      impulse = world_stats(&w).hand.peak_force_n;
+      CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+      impulse = world_stats(w).hand.peak_force_n;
     }
     CHECK(impulse > 0.0);
     CHECK(impulse < 10.0); /* the first touch, not one from deep inside: 3 mm a tick, 1 kN/m */
-    world_close(&w);
+    world_close(w);
   }
 }
 
 TEST(disabled_geoms_and_collide_bits)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   dBodyID cubes[3];
   for (int i = 0; i < 3; ++i) {
-    cubes[i] = world_add_cube(&w, 0.05, 0.3, 0.06 * (i - 1), 0, 0);
+    cubes[i] = world_add_cube(w, 0.05, 0.3, 0.06 * (i - 1), 0, 0);
     dGeomSetCategoryBits(dBodyGetFirstGeom(cubes[i]), 1ul << i);
   }
   hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
   def.radius = 1.0;
   def.collide_bits = 1u | 2u;
-  REQUIRE(world_create_session(&w, NULL) == HAP_OK);
-  REQUIRE(hap_pointer_add(w.session, &def, &w.pointers[0]) == HAP_OK);
-  w.pointer_count = 1;
-  world_move_pointer(&w, 0, (const double[3]){0, 0, 1.0 + 0.025 + 0.01}, NULL);
-  REQUIRE(hap_session_start(w.session) == HAP_OK);
-  CHECK(world_contact(&w, cubes[0], 0) != NULL);
-  CHECK(world_contact(&w, cubes[1], 0) != NULL);
-  CHECK(world_contact(&w, cubes[2], 0) == NULL);
+  REQUIRE(world_create_session(w, NULL) == HAP_OK);
+  REQUIRE(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
+  w->pointer_count = 1;
+  world_move_pointer(w, 0, (const double[3]){0, 0, 1.0 + 0.025 + 0.01}, NULL);
+  REQUIRE(hap_session_start(w->session) == HAP_OK);
+  CHECK(world_contact(w, cubes[0], 0) != NULL);
+  CHECK(world_contact(w, cubes[1], 0) != NULL);
+  CHECK(world_contact(w, cubes[2], 0) == NULL);
   dGeomDisable(dBodyGetFirstGeom(cubes[0]));
-  world_step(&w, 2);
-  CHECK(world_contact(&w, cubes[0], 0) == NULL);
-  CHECK(world_contact(&w, cubes[1], 0) != NULL);
+  world_step(w, 2);
+  CHECK(world_contact(w, cubes[0], 0) == NULL);
+  CHECK(world_contact(w, cubes[1], 0) != NULL);
   dGeomEnable(dBodyGetFirstGeom(cubes[0]));
-  world_step(&w, 1);
-  CHECK(world_contact(&w, cubes[0], 0) != NULL);
-  world_close(&w);
+  world_step(w, 1);
+  CHECK(world_contact(w, cubes[0], 0) != NULL);
 }
 
 /* ---- capacity ---- */
@@ -442,23 +432,21 @@ TEST(the_nearest_is_found_in_a_crowd)
 /* Full of bodies that stay near, and a nearer one comes. */
 static void check_newcomer(int bodies, int contacts)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  w.def.max_bodies = bodies;
-  w.def.max_contacts = contacts;
+  test_world *w = world_new(0.0, 20);
+  w->def.max_bodies = bodies;
+  w->def.max_contacts = contacts;
   for (int i = 0; i < 4; ++i) {
-    world_add_sphere(&w, 0.01, 0.1, 0.03 * i, 0, -0.010 - 0.010);
+    world_add_sphere(w, 0.01, 0.1, 0.03 * i, 0, -0.010 - 0.010);
   }
-  dBodyID late = world_add_sphere(&w, 0.01, 0.1, -0.03, 0, -1.0);
-  REQUIRE(world_start(&w, 100.0, 0, 0, 100.0));
-  world_step(&w, 3);
-  CHECK(world_count_contacts(&w) == 4);
-  CHECK(world_contact(&w, late, 0) == NULL);
+  dBodyID late = world_add_sphere(w, 0.01, 0.1, -0.03, 0, -1.0);
+  REQUIRE(world_start(w, 100.0, 0, 0, 100.0));
+  world_step(w, 3);
+  CHECK(world_count_contacts(w) == 4);
+  CHECK(world_contact(w, late, 0) == NULL);
   dBodySetPosition(late, -0.03, 0, -0.010 - 0.002);
-  world_step(&w, 5);
-  CHECK(world_contact(&w, late, 0) != NULL);
-  CHECK(world_count_contacts(&w) == 4);
-  world_close(&w);
+  world_step(w, 5);
+  CHECK(world_contact(w, late, 0) != NULL);
+  CHECK(world_count_contacts(w) == 4);
 }
 
 TEST(a_nearer_newcomer_gets_a_place)

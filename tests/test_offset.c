@@ -235,16 +235,14 @@ TEST(the_tick_far_from_the_origin)
 
 static void measure_at(double at, double out[6][3])
 {
-  test_world w;
-  world_open(&w, 9.81, 200);
-  w.mu = 0.0;
-  dBodyID cube = world_add_cube(&w, 0.1, 1.0, at + 0.05, at, at + 0.05);
-  dCreatePlane(w.space, 0.0, 0.0, 1.0, at);
-  REQUIRE(world_start(&w, 0.01, at - 0.011, at + 0.02, at + 0.03));
-  const hapi_contact_slot *contact = world_contact(&w, cube, 0);
-  REQUIRE(contact != NULL && world_contact_answer(&w, contact)->probed);
-  memcpy(out, world_contact_answer(&w, contact)->a, 18 * sizeof(double));
-  world_close(&w);
+  test_world *w = world_new(9.81, 200);
+  w->mu = 0.0;
+  dBodyID cube = world_add_cube(w, 0.1, 1.0, at + 0.05, at, at + 0.05);
+  dCreatePlane(w->space, 0.0, 0.0, 1.0, at);
+  REQUIRE(world_start(w, 0.01, at - 0.011, at + 0.02, at + 0.03));
+  const hapi_contact_slot *contact = world_contact(w, cube, 0);
+  REQUIRE(contact != NULL && world_contact_answer(w, contact)->probed);
+  memcpy(out, world_contact_answer(w, contact)->a, 18 * sizeof(double));
 }
 
 TEST(accelerance_far_from_the_origin)

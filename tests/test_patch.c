@@ -14,16 +14,58 @@ enum {
   POLYGON_MAX = 32
 };
 
+/* --- random things -------------------------------------------------------------------------- */
+
+static double random_size(uint64_t *state)
+{
+  return pow(10.0, random_in(state, -2.0, 0.0));
+}
+
+static void hull_make(thing *t, uint64_t *state)
+{
+  static const double corner[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  for (int k = 0; k < 4; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      t->points[3 * k + i] = t->shape.half[i] * (corner[k][i] + random_in(state, -0.2, 0.2));
+    }
+  }
+  for (int k = 4; k < HULL_POINTS; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      t->points[3 * k + i] = 0.24 * (t->points[i] + t->points[3 + i] + t->points[6 + i]) +
+                             0.28 * t->points[9 + i] + 0.02 * t->points[3 * (k - 4) + i];
+    }
+  }
+  t->shape.hull = t->points;
+  t->shape.hull_count = HULL_POINTS;
+}
+
+static void thing_make(thing *t, hapi_shape_kind kind, uint64_t *state)
+{
+  memset(t, 0, sizeof *t);
+  t->shape.kind = kind;
+  t->shape.radius = random_size(state);
+  for (int i = 0; i < 3; ++i) {
+    t->shape.half[i] = random_size(state);
+  }
+  if (kind == HAPI_SHAPE_HULL) {
+    hull_make(t, state);
+  }
+  random_quat(state, t->pose.quat_wxyz);
+}
+
+static double thing_size(const thing *t)
+{
+  const hapi_shape *s = &t->shape;
+  return s->kind == HAPI_SHAPE_PLANE
+             ? 0.0
+             : fmax(s->radius, fmax(s->half[0], fmax(s->half[1], s->half[2])));
+}
+
 /* --- points of a patch ---------------------------------------------------------------------- */
 
 static bool find(const thing *a, const thing *b, double margin, hapi_patch *out)
 {
   return hapi_patch_find(&a->shape, &a->pose, &b->shape, &b->pose, margin, out);
-}
-
-static bool nearest(const thing *a, const thing *b, hapi_nearest *out)
-{
-  return hapi_nearest_points(&a->shape, &a->pose, &b->shape, &b->pose, out);
 }
 
 /* The formula of patch.h. */
@@ -425,16 +467,6 @@ static double overlap_area(const polygon *p, const polygon *q, double reach)
   return 4.0 * reach * reach * inside / (GRID * GRID);
 }
 
-static void box_as_hull(const thing *box, thing *hull, double corners[24])
-{
-  for (int i = 0; i < 24; ++i) {
-    int axis = i % 3;
-    corners[i] = (i / 3 >> axis & 1) != 0 ? box->shape.half[axis] : -box->shape.half[axis];
-  }
-  *hull = *box;
-  hull->shape = (hapi_shape){.kind = HAPI_SHAPE_HULL, .hull = corners, .hull_count = 8};
-}
-
 /* Share of the overlap that the points span; negative: one of them is outside of a face. */
 static double overlap_share(uint64_t *state, bool as_hulls)
 {
@@ -451,8 +483,8 @@ static double overlap_share(uint64_t *state, bool as_hulls)
   polygon q = rectangle(high.shape.half, middle, angle);
   double area = overlap_area(&p, &q, 0.06);
   if (as_hulls) {
-    box_as_hull(&low, &low, corners[0]);
-    box_as_hull(&high, &high, corners[1]);
+    box_to_hull(&low, &low, corners[0]);
+    box_to_hull(&high, &high, corners[1]);
   }
   if (area < 1e-4 || !find(&high, &low, margin, &patch)) {
     return area < 1e-4 ? 1.0 : -1.0;
@@ -512,7 +544,7 @@ TEST(margin_does_not_reach_sideways)
     }
     REQUIRE(find(&beside, &low, margins[i], &patch));
     CHECK(patch.count == 0);
-    box_as_hull(&beside, &corner, corners);
+    box_to_hull(&beside, &corner, corners);
     REQUIRE(find(&corner, &low, margins[i], &patch));
     CHECK(patch.count == 0);
   }
@@ -788,7 +820,7 @@ TEST(triangle_carries_everything)
         continue;
       }
       if (kind == HAPI_SHAPE_HULL) {
-        box_as_hull(&load, &load, corners);
+        box_to_hull(&load, &load, corners);
       }
       if (kind == HAPI_SHAPE_CAPSULE) {
         turn(&load, along_y, 1.5707963267948966);

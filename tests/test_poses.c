@@ -97,19 +97,18 @@ static void flip_sign(stage *s)
 TEST(a_body_that_turns_fast_is_drawn_on_the_arc)
 {
   for (int flipped = 0; flipped < 2; ++flipped) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.in_step = flipped != 0 ? flip_sign : NULL;
-    dBodySetAngularVel(s.cube, 0.0, 0.0, 60.0);
-    dBodySetGyroscopicMode(s.cube, 0);
-    dBodySetFiniteRotationMode(s.cube, 1); /* exact turns */
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->in_step = flipped != 0 ? flip_sign : NULL;
+    dBodySetAngularVel(s->cube, 0.0, 0.0, 60.0);
+    dBodySetGyroscopicMode(s->cube, 0);
+    dBodySetFiniteRotationMode(s->cube, 1); /* exact turns */
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
     double worst = 0.0;
     for (int i = 0; i < 400; ++i) {
-      CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-      int64_t now = hap_session_now(s.session);
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+      int64_t now = hap_session_now(s->session);
       if (now >= 2 * H_MS * MS) {
-        hap_pose pose = drawn_at(&s, s.cube, now);
+        hap_pose pose = drawn_at(s, s->cube, now);
         double angle = 60.0 * 1e-9 * (double)(now - H_MS * MS);
         double turn = 2.0 * atan2(pose.quat_wxyz[3], pose.quat_wxyz[0]) - angle;
         worst = fmax(worst, fabs(remainder(turn, 2.0 * acos(-1.0))));
@@ -117,7 +116,7 @@ TEST(a_body_that_turns_fast_is_drawn_on_the_arc)
     }
     printf("# off by %.2g rad, sign changed %d times\n", worst, flips);
     CHECK(worst < 1e-6);
-    stage_end(&s);
+    stage_end(s);
   }
   CHECK(flips > 10);
 }
@@ -145,51 +144,47 @@ TEST(a_turn_may_be_anything)
 /* Between two steps a chord of the parabola is drawn: g H^2 / 8 at most below it. */
 TEST(a_body_that_falls_is_drawn_near_its_parabola)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetGravity(s->world, 0.0, 0.0, -9.81);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
   double worst = 0.0;
   const double h = 1e-3 * H_MS;
   for (int i = 0; i < 500; ++i) {
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    double t = 1e-9 * (double)hap_session_now(s.session) - h;
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    double t = 1e-9 * (double)hap_session_now(s->session) - h;
     if (t > h) {
       double z = -0.5 * 9.81 * t * (t + h); /* as ODE falls: velocity first */
-      double off = drawn_at(&s, s.cube, hap_session_now(s.session)).position[2] - z;
+      double off = drawn_at(s, s->cube, hap_session_now(s->session)).position[2] - z;
       worst = fmax(worst, fabs(off));
     }
   }
   printf("# off by %.3g m, chord %.3g m\n", worst, 9.81 * h * h / 8.0);
   CHECK(worst <= 1.001 * 9.81 * h * h / 8.0);
-  stage_end(&s);
 }
 
 /* Near the hand model SINGLE draws every tick of it, as the others do of what the loop moves. */
 TEST(a_body_that_falls_beside_the_hand_is_drawn_tick_by_tick_in_model_single)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.model = HAP_MODEL_SINGLE;
-  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 0.062);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->def.model = HAP_MODEL_SINGLE;
+  dWorldSetGravity(s->world, 0.0, 0.0, -9.81);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 0.062);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   double worst = 0.0;
   for (int i = 0; i < 300; ++i) {
-    hap_pose pose = {{0.0, 0.062, dBodyGetPosition(s.cube)[2]}, {1.0, 0.0, 0.0, 0.0}};
-    CHECK(hap_pointer_set_target(s.session, hand, &pose, NULL) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    int64_t now = hap_session_now(s.session) - 500000;
+    hap_pose pose = {{0.0, 0.062, dBodyGetPosition(s->cube)[2]}, {1.0, 0.0, 0.0, 0.0}};
+    CHECK(hap_pointer_set_target(s->session, hand, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    int64_t now = hap_session_now(s->session) - 500000;
     double t = 1e-9 * (double)now - 1e-3 * H_MS;
     if (t > 1e-3 * H_MS) {
-      double off = drawn_at(&s, s.cube, now).position[2] + 0.5 * 9.81 * t * (t + 1e-3);
+      double off = drawn_at(s, s->cube, now).position[2] + 0.5 * 9.81 * t * (t + 1e-3);
       worst = fmax(worst, fabs(off));
     }
   }
   printf("# off by %.3g m\n", worst);
   CHECK(worst < 3e-6);
-  stage_end(&s);
 }
 
 /* ---- into the local world and out of it ---- */
@@ -204,34 +199,33 @@ static void move_hand(stage *s, hap_pointer_id id, double x, double y)
  * IMPULSE draws what the loop shows, which is a step behind. */
 static void check_comings_and_goings(hap_model model)
 {
-  stage s;
   uint32_t least = 9;
   uint32_t most = 0;
   double worst = 0.0;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.model = model;
-  dBodySetLinearVel(s.cube, 0.5, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 5.0);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->def.model = model;
+  dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 5.0);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 1000; ++i) {
     double t = 1e-3 * i;
-    move_hand(&s, hand, 0.5 * t, i / 35 % 2 == 0 ? 5.0 : 0.062);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    hap_stats stats = stats_of(&s);
+    move_hand(s, hand, 0.5 * t, i / 35 % 2 == 0 ? 5.0 : 0.062);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    hap_stats stats = stats_of(s);
     least = i > 100 && stats.model.neighbours < least ? stats.model.neighbours : least;
     most = stats.model.neighbours > most ? stats.model.neighbours : most;
-    int64_t now = hap_session_now(s.session) - 300000; /* between ticks */
+    int64_t now = hap_session_now(s->session) - 300000; /* between ticks */
     double lag = 1e-3 * H_MS * (model == HAP_MODEL_IMPULSE ? 2.0 : 1.0);
     double wanted = 0.5 * (1e-9 * (double)now - lag);
-    double off = drawn_at(&s, s.cube, now).position[0] - wanted;
+    double off = drawn_at(s, s->cube, now).position[0] - wanted;
     worst = t > 0.1 ? fmax(worst, fabs(off)) : worst;
   }
   printf("# %s: %u .. %u neighbours, off by %.2g m\n", hap_model_name(model), least, most, worst);
   CHECK(least == 0 && most == 1);
-  CHECK(stats_of(&s).hand.impulse_abs_ns == 0.0);
+  CHECK(stats_of(s).hand.impulse_abs_ns == 0.0);
   CHECK(worst < 1e-6);
-  stage_end(&s);
+  stage_end(s);
 }
 
 TEST(bodies_come_into_the_local_world_and_leave_it_without_a_jump)
@@ -245,27 +239,26 @@ TEST(bodies_come_into_the_local_world_and_leave_it_without_a_jump)
  * is a step behind, the way of a step is made up for: once and a half as fast, or half. */
 TEST(a_change_of_model_does_not_show)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetLinearVel(s.cube, 0.5, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  dBodyID far = add_cube(&s, 0.0, NULL);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
+  dBodyID far = add_cube(s, 0.0, NULL);
   dBodySetPosition(far, 0.0, 3.0, 0.0);
   dBodySetLinearVel(far, 0.5, 0.0, 0.0);
-  hap_pointer_id hand = add_hand(&s, 0.105);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 0.105);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   double last[2] = {0.0, 0.0};
   double fastest = 0.0;
   double slowest = HUGE_VAL;
   for (int i = 0; i < 4000; ++i) {
     static const int order[] = {3, 1, 3, 2, 0, 3, 0, 1, 2, 1, 0, 2};
-    move_hand(&s, hand, 0.5e-3 * i, 0.105);
+    move_hand(s, hand, 0.5e-3 * i, 0.105);
     if (i % 100 == 50) {
-      CHECK(hap_session_set_model(s.session, (hap_model)order[i / 100 % 12]) == HAP_OK);
+      CHECK(hap_session_set_model(s->session, (hap_model)order[i / 100 % 12]) == HAP_OK);
     }
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
     for (int k = 0; k < 2; ++k) {
-      double x = drawn_at(&s, k == 0 ? s.cube : far, hap_session_now(s.session)).position[0];
+      double x = drawn_at(s, k == 0 ? s->cube : far, hap_session_now(s->session)).position[0];
       if (i > 2 * H_MS) {
         fastest = fmax(fastest, (x - last[k]) / 1e-3);
         slowest = fmin(slowest, (x - last[k]) / 1e-3);
@@ -275,94 +268,88 @@ TEST(a_change_of_model_does_not_show)
   }
   printf("# drawn at %.3g .. %.3g m/s, goes at 0.5\n", slowest, fastest);
   CHECK(slowest >= 0.1 && fastest <= 1.6);
-  stage_end(&s);
 }
 
 TEST(bodies_are_made_and_destroyed)
 {
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
   hap_pose pose;
-  CHECK(hap_session_advance(s.session, 105) == HAP_OK);
-  dBodyID fresh = add_cube(&s, 0.7, NULL);
+  CHECK(hap_session_advance(s->session, 105) == HAP_OK);
+  dBodyID fresh = add_cube(s, 0.7, NULL);
   dBodySetLinearVel(fresh, 0.5, 0.0, 0.0);
-  CHECK(hap_session_poses(s.session, 0, &fresh, 1, &pose) == HAP_ERROR_NOT_FOUND);
-  CHECK(hap_session_adopt_body(s.session, fresh) == HAP_OK);
+  CHECK(hap_session_poses(s->session, 0, &fresh, 1, &pose) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_adopt_body(s->session, fresh) == HAP_OK);
   double last = 0.7;
   for (int i = 0; i < 200; ++i) { /* at once, and where it was made until it is known to move */
-    double x = drawn_at(&s, fresh, hap_session_now(s.session)).position[0];
+    double x = drawn_at(s, fresh, hap_session_now(s->session)).position[0];
     CHECK(x >= last && x <= last + 0.7e-3);
     last = x;
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
   }
   CHECK(last > 0.75);
-  CHECK(hap_session_forget_body(s.session, fresh) == HAP_OK);
-  CHECK(hap_session_poses(s.session, 0, &fresh, 1, &pose) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_forget_body(s->session, fresh) == HAP_OK);
+  CHECK(hap_session_poses(s->session, 0, &fresh, 1, &pose) == HAP_ERROR_NOT_FOUND);
   dGeomDestroy(dBodyGetFirstGeom(fresh));
   dBodyDestroy(fresh);
-  dBodyID other = add_cube(&s, -0.6, NULL); /* most likely at the same address */
+  dBodyID other = add_cube(s, -0.6, NULL); /* most likely at the same address */
   printf("# address %s\n", other == fresh ? "used again" : "new");
-  CHECK(hap_session_advance(s.session, 20) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 20) == HAP_OK);
   for (int i = 0; i < 60; ++i) {
-    CHECK_NEAR(drawn_at(&s, other, hap_session_now(s.session)).position[0], -0.6, 1e-12);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    CHECK_NEAR(drawn_at(s, other, hap_session_now(s->session)).position[0], -0.6, 1e-12);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
   }
-  stage_end(&s);
 }
 
 /* ... and without a word, between two steps. That it is another one shows by ODE's auto-disable, which the
  * session had switched off on the first. */
 TEST(a_body_made_where_another_one_was_in_memory_is_not_drawn_on_its_way)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetAutoDisableFlag(s.world, 1);
-  dBodyID first = add_cube(&s, 0.7, NULL);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 101) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetAutoDisableFlag(s->world, 1);
+  dBodyID first = add_cube(s, 0.7, NULL);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 101) == HAP_OK);
   dGeomDestroy(dBodyGetFirstGeom(first));
   dBodyDestroy(first);
-  dBodyID second = add_cube(&s, -0.6, NULL);
+  dBodyID second = add_cube(s, -0.6, NULL);
   printf("# address %s\n", second == first ? "used again" : "new");
-  CHECK(hap_session_advance(s.session, 20) >= HAP_OK);
+  CHECK(hap_session_advance(s->session, 20) >= HAP_OK);
   for (int i = 0; i < 60; ++i) {
-    CHECK_NEAR(drawn_at(&s, second, hap_session_now(s.session)).position[0], -0.6, 1e-12);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    CHECK_NEAR(drawn_at(s, second, hap_session_now(s->session)).position[0], -0.6, 1e-12);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
   }
-  stage_end(&s);
 }
 
 /* A body that sleeps, one that the application moves, and one that wakes up. */
 TEST(bodies_that_sleep_or_are_driven_are_drawn_like_others)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodyID driven = add_cube(&s, 2.0, NULL);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodyID driven = add_cube(s, 2.0, NULL);
   dBodySetKinematic(driven);
   dBodySetLinearVel(driven, 0.0, 0.4, 0.0);
-  dBodyDisable(s.cube);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 0.07);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 201) == HAP_OK);
-  CHECK(dBodyIsEnabled(s.cube) == 0);
+  dBodyDisable(s->cube);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 0.07);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 201) == HAP_OK);
+  CHECK(dBodyIsEnabled(s->cube) == 0);
   for (int i = 0; i < 100; ++i) {
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    int64_t now = hap_session_now(s.session);
-    CHECK(drawn_at(&s, s.cube, now).position[1] == 0.0);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    int64_t now = hap_session_now(s->session);
+    CHECK(drawn_at(s, s->cube, now).position[1] == 0.0);
     double wanted = 0.4 * 1e-9 * (double)(now - H_MS * MS);
-    CHECK_NEAR(drawn_at(&s, driven, now).position[1], wanted, 1e-9);
+    CHECK_NEAR(drawn_at(s, driven, now).position[1], wanted, 1e-9);
   }
   double last = 0.0;
   for (int i = 0; i < 300; ++i) { /* pushed from +y by a hand that comes at 0.1 m/s */
-    move_hand(&s, hand, 0.0, 0.07 - 1e-4 * i);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    double y = drawn_at(&s, s.cube, hap_session_now(s.session)).position[1];
+    move_hand(s, hand, 0.0, 0.07 - 1e-4 * i);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    double y = drawn_at(s, s->cube, hap_session_now(s->session)).position[1];
     CHECK(y <= last && y >= last - 1e-3);
     last = y;
   }
-  CHECK(last < -1e-3 && dBodyIsEnabled(s.cube) != 0);
-  stage_end(&s);
+  CHECK(last < -1e-3 && dBodyIsEnabled(s->cube) != 0);
 }
 
 /* ---- any time ---- */
@@ -370,11 +357,10 @@ TEST(bodies_that_sleep_or_are_driven_are_drawn_like_others)
 TEST(growing_times_give_motion_that_neither_goes_back_nor_jumps)
 {
   for (int m = 0; m < 4; ++m) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.def.model = models[m];
-    dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->def.model = models[m];
+    dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
     int64_t time = 0;
     double last = 0.0;
     uint32_t random = 12345;
@@ -382,31 +368,30 @@ TEST(growing_times_give_motion_that_neither_goes_back_nor_jumps)
       random = random * 1664525u + 1013904223u;
       int64_t step = (int64_t)(random >> 12); /* ns, up to 1 ms */
       time += step;
-      while (hap_session_now(s.session) < time) {
-        CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+      while (hap_session_now(s->session) < time) {
+        CHECK(hap_session_advance(s->session, 1) == HAP_OK);
       }
-      double x = drawn_at(&s, s.cube, time).position[0];
+      double x = drawn_at(s, s->cube, time).position[0];
       CHECK(x >= last && x - last <= 1.01e-9 * (double)step + 1e-12);
-      CHECK(drawn_at(&s, s.cube, time).position[0] == x); /* asked again */
+      CHECK(drawn_at(s, s->cube, time).position[0] == x); /* asked again */
       last = x;
     }
     CHECK(last > 1.0);
-    stage_end(&s);
+    stage_end(s);
   }
 }
 
 TEST(times_that_are_not_known_are_clamped_and_said)
 {
-  stage s;
   hap_pose pose;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 1.0);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_poses(s.session, 0, &s.cube, 1, &pose) == HAP_OK); /* the start, as it is */
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 1.0);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_poses(s->session, 0, &s->cube, 1, &pose) == HAP_OK); /* the start, as it is */
   CHECK(pose.position[0] == 0.0);
-  CHECK(hap_session_advance(s.session, 1001) == HAP_OK); /* the last frame is for 1 s */
+  CHECK(hap_session_advance(s->session, 1001) == HAP_OK); /* the last frame is for 1 s */
   static const struct {
     int64_t at;
     hap_status status;
@@ -417,155 +402,147 @@ TEST(times_that_are_not_known_are_clamped_and_said)
       {1040 * MS, HAP_OK, 1.0},       {1041 * MS, HAP_STALE, 1.0}, {INT64_MAX, HAP_STALE, 1.0},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    CHECK(hap_session_poses(s.session, cases[i].at, &s.cube, 1, &pose) == cases[i].status);
+    CHECK(hap_session_poses(s->session, cases[i].at, &s->cube, 1, &pose) == cases[i].status);
     CHECK_NEAR(pose.position[0], cases[i].x, 1e-9);
   }
-  CHECK(hap_pointer_poses(s.session, hand, 1000 * MS, &pose, NULL) == HAP_OK);
-  CHECK(hap_pointer_poses(s.session, hand, INT64_MAX, &pose, NULL) == HAP_STALE);
-  CHECK(hap_pointer_poses(s.session, hand, INT64_MIN, &pose, NULL) == HAP_CLAMPED);
-  CHECK(hap_pointer_poses(s.session, hand, 700 * MS, &pose, NULL) == HAP_CLAMPED);
+  CHECK(hap_pointer_poses(s->session, hand, 1000 * MS, &pose, NULL) == HAP_OK);
+  CHECK(hap_pointer_poses(s->session, hand, INT64_MAX, &pose, NULL) == HAP_STALE);
+  CHECK(hap_pointer_poses(s->session, hand, INT64_MIN, &pose, NULL) == HAP_CLAMPED);
+  CHECK(hap_pointer_poses(s->session, hand, 700 * MS, &pose, NULL) == HAP_CLAMPED);
   CHECK(pose.position[1] == 1.0);
-  stage_end(&s);
 }
 
 /* A world that was started again begins its history anew. */
 TEST(a_second_run_draws_nothing_of_the_first)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 0.2);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 301) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK_NEAR(drawn_at(&s, s.cube, 310 * MS).position[0], 0.29, 1e-9); /* still there */
-  dBodySetPosition(s.cube, -3.0, 0.0, 0.0);
-  move_hand(&s, hand, 7.0, 0.2);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 0.2);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 301) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK_NEAR(drawn_at(s, s->cube, 310 * MS).position[0], 0.29, 1e-9); /* still there */
+  dBodySetPosition(s->cube, -3.0, 0.0, 0.0);
+  move_hand(s, hand, 7.0, 0.2);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 300; ++i) {
     hap_pose pose;
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    int64_t now = hap_session_now(s.session);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    int64_t now = hap_session_now(s->session);
     double t = 1e-9 * (double)(now - H_MS * MS);
-    CHECK_NEAR(drawn_at(&s, s.cube, now).position[0], -3.0 + fmax(t, 0.0), 1e-9);
-    CHECK(hap_pointer_poses(s.session, hand, now, &pose, NULL) == HAP_OK &&
+    CHECK_NEAR(drawn_at(s, s->cube, now).position[0], -3.0 + fmax(t, 0.0), 1e-9);
+    CHECK(hap_pointer_poses(s->session, hand, now, &pose, NULL) == HAP_OK &&
           pose.position[0] == 7.0);
   }
-  stage_end(&s);
 }
 
 /* ---- pointers ---- */
 
 TEST(pointers_are_drawn_at_the_time_of_the_bodies)
 {
-  stage s;
   hap_pose proxy;
   hap_pose device;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 2.0);
-  CHECK(hap_pointer_poses(s.session, hand, 0, &proxy, &device) == HAP_ERROR_NOT_FOUND);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 2.0);
+  CHECK(hap_pointer_poses(s->session, hand, 0, &proxy, &device) == HAP_ERROR_NOT_FOUND);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 300; ++i) {
-    move_hand(&s, hand, 1e-3 * i, 2.0);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    int64_t at = hap_session_now(s.session) - 400000;
-    CHECK(hap_pointer_poses(s.session, hand, at, &proxy, &device) == HAP_OK);
+    move_hand(s, hand, 1e-3 * i, 2.0);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    int64_t at = hap_session_now(s->session) - 400000;
+    CHECK(hap_pointer_poses(s->session, hand, at, &proxy, &device) == HAP_OK);
     double wanted = fmax(1e-9 * (double)(at - H_MS * MS), 0.0);
     CHECK_NEAR(proxy.position[0], wanted, 1e-9);
     CHECK(memcmp(&proxy, &device, sizeof proxy) == 0);
-    CHECK(hap_pointer_poses(s.session, hand, at, NULL, &device) == HAP_OK);
+    CHECK(hap_pointer_poses(s->session, hand, at, NULL, &device) == HAP_OK);
   }
-  CHECK(hap_pointer_poses(s.session, hand, 0, NULL, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_poses(s->session, hand, 0, NULL, NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_poses(NULL, hand, 0, &proxy, NULL) == HAP_ERROR_ARGUMENT);
-  hap_pointer_id late = add_hand(&s, 3.0); /* is where it came until that is as old as the bodies */
-  CHECK(hap_pointer_poses(s.session, late, 300 * MS, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
-  CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-  CHECK(hap_pointer_poses(s.session, late, 301 * MS, &proxy, NULL) == HAP_OK);
+  hap_pointer_id late = add_hand(s, 3.0); /* is where it came until that is as old as the bodies */
+  CHECK(hap_pointer_poses(s->session, late, 300 * MS, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+  CHECK(hap_pointer_poses(s->session, late, 301 * MS, &proxy, NULL) == HAP_OK);
   CHECK(proxy.position[1] == 3.0);
-  CHECK(hap_pointer_remove(s.session, late) == HAP_OK);
+  CHECK(hap_pointer_remove(s->session, late) == HAP_OK);
   memset(&proxy, 0x5a, sizeof proxy);
   device = proxy;
-  CHECK(hap_pointer_poses(s.session, late, 301 * MS, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
-  CHECK(hap_pointer_poses(s.session, (hap_pointer_id){0}, 0, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_poses(s->session, late, 301 * MS, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_poses(s->session, (hap_pointer_id){0}, 0, &proxy, NULL) == HAP_ERROR_NOT_FOUND);
   CHECK(memcmp(&proxy, &device, sizeof proxy) == 0);
-  stage_end(&s);
 }
 
 /* Pressed onto a wall: the proxy is at the wall, the device behind it. */
 TEST(a_proxy_and_its_device_are_drawn_apart)
 {
-  stage s;
   hap_pose proxy;
   hap_pose device;
   hap_pointer_def def;
   hap_pointer_expert_def expert;
   hap_pointer_research_def research;
   hap_pointer_id id;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dGeomID wall = dCreatePlane(s.space, 0.0, 1.0, 0.0, -1.0);
-  REQUIRE(wall != NULL && stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dGeomID wall = dCreatePlane(s->space, 0.0, 1.0, 0.0, -1.0);
+  REQUIRE(wall != NULL && stage_create(s) == HAP_OK);
   pointer_defs_init(&def, &expert, &research);
   expert.coupling = HAP_COUPLING_PROXY;
   expert.coupling_stiffness = 500.0;
   def.stiffness = 1e5;
-  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  move_hand(&s, id, 0.0, -0.9);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  move_hand(s, id, 0.0, -0.9);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 400; ++i) {
-    move_hand(&s, id, 0.0, -0.9 - 1e-4 * fmin(i, 300));
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+    move_hand(s, id, 0.0, -0.9 - 1e-4 * fmin(i, 300));
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
   }
   for (int i = 0; i < 100; ++i) {
-    move_hand(&s, id, 0.0, -0.93 - 1e-3 * fmin(i, 70)); /* to 1 cm below the touch */
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    CHECK(hap_pointer_poses(s.session, id, hap_session_now(s.session), &proxy, &device) == HAP_OK);
+    move_hand(s, id, 0.0, -0.93 - 1e-3 * fmin(i, 70)); /* to 1 cm below the touch */
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    CHECK(hap_pointer_poses(s->session, id, hap_session_now(s->session), &proxy, &device) ==
+          HAP_OK);
     CHECK(proxy.position[1] > -0.9902);
     double wanted = -0.93 - 1e-3 * fmin(fmax(i + 1 - H_MS, 0), 70);
     CHECK_NEAR(device.position[1], wanted, 1e-9);
   }
   hap_pointer_state newest;
-  CHECK(hap_pointer_get(s.session, id, &newest, sizeof newest) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, id, &newest, sizeof newest) == HAP_OK);
   CHECK(newest.coupling == HAP_COUPLING_PROXY);
   CHECK(proxy.position[1] - device.position[1] > 0.009);
-  stage_end(&s);
 }
 
 /* ---- now ---- */
 
 TEST(now_is_the_newest_of_the_loop_and_what_the_world_would_come_to)
 {
-  stage s;
   hap_pose poses[2];
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetLinearVel(s.cube, 0.5, 0.0, 0.0);
-  dBodyID far = add_cube(&s, 0.0, NULL);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
+  dBodyID far = add_cube(s, 0.0, NULL);
   dBodySetPosition(far, 0.0, 3.0, 0.0);
   dBodySetLinearVel(far, 0.5, 0.0, 0.0);
-  dBodyID both[2] = {s.cube, far};
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_poses_now(s.session, both, 2, poses) == HAP_ERROR_NOT_FOUND); /* not started */
-  hap_pointer_id hand = add_hand(&s, 0.105);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_poses_now(s.session, both, 2, poses) == HAP_OK);
+  dBodyID both[2] = {s->cube, far};
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_poses_now(s->session, both, 2, poses) == HAP_ERROR_NOT_FOUND); /* not started */
+  hap_pointer_id hand = add_hand(s, 0.105);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_poses_now(s->session, both, 2, poses) == HAP_OK);
   for (int i = 0; i < 400; ++i) {
-    move_hand(&s, hand, 0.5e-3 * i, 0.105);
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    CHECK(hap_session_poses_now(s.session, both, 2, poses) == HAP_OK);
-    double wanted = 0.5e-9 * (double)hap_session_now(s.session);
+    move_hand(s, hand, 0.5e-3 * i, 0.105);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    CHECK(hap_session_poses_now(s->session, both, 2, poses) == HAP_OK);
+    double wanted = 0.5e-9 * (double)hap_session_now(s->session);
     CHECK_NEAR(poses[0].position[0], wanted, i > H_MS ? 1e-9 : 0.02);
     CHECK_NEAR(poses[1].position[0], wanted, i > H_MS ? 1e-9 : 0.02);
   }
-  dBodyID unknown = dBodyCreate(s.world);
+  dBodyID unknown = dBodyCreate(s->world);
   both[1] = unknown;
   memset(poses, 0x5a, sizeof poses);
-  CHECK(hap_session_poses_now(s.session, both, 2, poses) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_poses_now(s->session, both, 2, poses) == HAP_ERROR_NOT_FOUND);
   CHECK(((unsigned char *)poses)[0] == 0x5a);
   CHECK(hap_session_poses_now(NULL, both, 1, poses) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_poses_now(s.session, NULL, 1, poses) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_poses_now(s.session, NULL, 0, NULL) == HAP_OK);
-  stage_end(&s);
+  CHECK(hap_session_poses_now(s->session, NULL, 1, poses) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_poses_now(s->session, NULL, 0, NULL) == HAP_OK);
 }
 
 /* ---- threads ---- */
@@ -609,32 +586,31 @@ static void *draw_on(void *arg)
 /* The hand keeps near the cube for some time, and is away for some time. */
 static void check_threads(hap_drive drive)
 {
-  stage s;
   drawer drawers[3];
   atomic_int stop = 0;
-  stage_init(&s, drive);
-  dBodySetLinearVel(s.cube, 0.5, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, 0.2);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(drive);
+  dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, 0.2);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 3; ++i) {
-    drawers[i] = (drawer){.s = &s, .hand = hand, .stop = &stop};
+    drawers[i] = (drawer){.s = s, .hand = hand, .stop = &stop};
     REQUIRE(pthread_create(&drawers[i].thread, NULL, draw_on, &drawers[i]) == 0);
   }
-  int64_t last = hap_session_now(s.session);
+  int64_t last = hap_session_now(s->session);
   for (int i = 0; i < 120; ++i) {
     sleep_ms(7);
-    int64_t now = hap_session_now(s.session);
+    int64_t now = hap_session_now(s->session);
     hap_pose cube;
-    CHECK(hap_session_poses_now(s.session, &s.cube, 1, &cube) >= HAP_OK);
-    move_hand(&s, hand, cube.position[0], i / 12 % 2 == 0 ? 0.2 : 0.12);
+    CHECK(hap_session_poses_now(s->session, &s->cube, 1, &cube) >= HAP_OK);
+    move_hand(s, hand, cube.position[0], i / 12 % 2 == 0 ? 0.2 : 0.12);
     if (drive == HAP_DRIVE_FRAME) {
-      CHECK(hap_session_update(s.session, 1e-9 * (double)(now - last)) >= HAP_OK);
+      CHECK(hap_session_update(s->session, 1e-9 * (double)(now - last)) >= HAP_OK);
     }
     last = now;
   }
   atomic_store(&stop, 1);
-  hap_stats stats = stats_of(&s);
+  hap_stats stats = stats_of(s);
   for (int i = 0; i < 3; ++i) {
     CHECK(pthread_join(drawers[i].thread, NULL) == 0);
     printf("# %d frames, %d back, %d wrong, at %.3f m, jump %.2g m\n", drawers[i].frames,
@@ -644,9 +620,8 @@ static void check_threads(hap_drive drive)
     /* A loop or a world that the host kept from running has no even path. */
     CHECK(drawers[i].back == 0 || stats.loop.missed_ticks > 0 || stats.physics.missed > 0);
   }
-  CHECK(stats_of(&s).physics.pose_delay_s >= 0.02 &&
-        stats_of(&s).physics.pose_delay_s <= 6.0 * 0.02);
-  stage_end(&s);
+  CHECK(stats_of(s).physics.pose_delay_s >= 0.02 && stats_of(s).physics.pose_delay_s <= 6.0 * 0.02);
+  stage_end(s);
 }
 
 TEST(any_threads_may_draw_while_the_session_runs)

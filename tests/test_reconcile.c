@@ -45,20 +45,19 @@ static void push_along(test_world *w, double *x, double speed, int ticks)
 /* The paper's figure 5: 60 kg at 17 mm/s against a fixed pointer, thrown back as fast. */
 static void check_fig5(double stiffness)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  dBodyID cube = world_add_cube(&w, 0.2, 60.0, 0.1 + RADIUS + 0.0019, 0, 0);
+  test_world *w = world_new(0.0, 20);
+  dBodyID cube = world_add_cube(w, 0.2, 60.0, 0.1 + RADIUS + 0.0019, 0, 0);
   dBodySetLinearVel(cube, -0.017, 0, 0);
   hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
   def.radius = RADIUS;
   def.stiffness = stiffness;
-  REQUIRE(world_create_session(&w, NULL) == HAP_OK);
-  REQUIRE(hap_pointer_add(w.session, &def, &w.pointers[0]) == HAP_OK);
-  world_move_pointer(&w, 0, (const double[3]){0, 0, 0}, NULL);
-  REQUIRE(hap_session_start(w.session) == HAP_OK);
-  forward(&w, 2001);
-  hap_stats stats = world_stats(&w);
+  REQUIRE(world_create_session(w, NULL) == HAP_OK);
+  REQUIRE(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
+  world_move_pointer(w, 0, (const double[3]){0, 0, 0}, NULL);
+  REQUIRE(hap_session_start(w->session) == HAP_OK);
+  forward(w, 2001);
+  hap_stats stats = world_stats(w);
   printf("# k %g: impulse %.6f, ratio %.12f, peak %.4f\n", stiffness, stats.hand.impulse_ns,
          stats.hand.momentum_ratio, stats.hand.peak_force_n);
   CHECK_NEAR(stats.hand.impulse_ns, 2.04, 0.0005 * 2.04);
@@ -68,7 +67,6 @@ static void check_fig5(double stiffness)
   for (int i = 1; i < 3; ++i) {
     CHECK_NEAR(dBodyGetLinearVel(cube)[i], 0.0, 1e-12);
   }
-  world_close(&w);
 }
 
 TEST(fig5_keeps_the_momentum)
@@ -81,48 +79,44 @@ TEST(fig5_keeps_the_momentum)
 /* A row that is pushed must have the momentum that the hand gave. */
 TEST(a_pushed_row_keeps_the_momentum)
 {
-  test_world w;
   double x = -RADIUS - 0.001;
-  world_open(&w, 0.0, 200);
-  w.mu = 0.0;
+  test_world *w = world_new(0.0, 200);
+  w->mu = 0.0;
   for (int i = 0; i < 5; ++i) {
-    world_add_cube(&w, EDGE, 0.5, EDGE / 2 + i * (EDGE - 1e-6), 0, 0);
+    world_add_cube(w, EDGE, 0.5, EDGE / 2 + i * (EDGE - 1e-6), 0, 0);
   }
-  REQUIRE(world_start(&w, RADIUS, x, 0, 0));
-  push_along(&w, &x, 0.05, 400);
-  push_along(&w, &x, -0.2, 201); /* away; every impulse has arrived after a step */
+  REQUIRE(world_start(w, RADIUS, x, 0, 0));
+  push_along(w, &x, 0.05, 400);
+  push_along(w, &x, -0.2, 201); /* away; every impulse has arrived after a step */
   double momentum = 0.0;
   for (int i = 0; i < 5; ++i) {
-    momentum += 0.5 * dBodyGetLinearVel(w.bodies[i])[0];
+    momentum += 0.5 * dBodyGetLinearVel(w->bodies[i])[0];
   }
-  hap_stats stats = world_stats(&w);
+  hap_stats stats = world_stats(w);
   CHECK(stats.hand.impulse_ns > 0.05);
   CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
   CHECK_NEAR(momentum / stats.hand.impulse_ns, 1.0, 1e-6);
-  world_close(&w);
 }
 
 /* Eq. 14: what the linear model did not know of. The cube is pushed against a wall. */
 TEST(an_impact_reaches_the_loop)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
   const double wall = EDGE + 0.02;
-  world_open(&w, 0.0, 20);
-  dCreatePlane(w.space, -1, 0, 0, -wall);
-  dBodyID cube = world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0, 0);
-  REQUIRE(world_start(&w, RADIUS, x, 0, 0));
+  test_world *w = world_new(0.0, 20);
+  dCreatePlane(w->space, -1, 0, 0, -wall);
+  dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
+  REQUIRE(world_start(w, RADIUS, x, 0, 0));
   double farthest = 0.0;
   for (int i = 0; i < 40; ++i) {
-    push_along(&w, &x, x < 0.013 ? 0.1 : 0.0, 25);
+    push_along(w, &x, x < 0.013 ? 0.1 : 0.0, 25);
     double face = dBodyGetPosition(cube)[0] + EDGE / 2;
     farthest = face > farthest ? face : farthest;
   }
   printf("# farthest %.4f into the wall\n", farthest - wall);
   CHECK(farthest - wall < 0.25 * 0.05); /* 0.25 m/s, at most for one step */
-  CHECK(world_stats(&w).loop.contact_ticks > 100);
+  CHECK(world_stats(w).loop.contact_ticks > 100);
   CHECK(hapi_v3_norm(dBodyGetLinearVel(cube)) < 0.3);
-  world_close(&w);
 }
 
 /* ---- the application's hand ---- */
@@ -219,20 +213,18 @@ TEST(a_changed_mass_is_read_again)
 
 TEST(a_body_added_near_the_pointer_is_felt)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
-  REQUIRE(world_start(&w, RADIUS, 0, 0, 0));
-  forward(&w, 120);
-  CHECK(world_stats(&w).model.bodies_known == 0);
-  dBodyID cube = world_add_cube(&w, EDGE, 1.0, EDGE / 2 + RADIUS + 0.001, 0, 0);
-  forward(&w, 31);
-  CHECK(world_stats(&w).model.bodies_known == 1);
-  CHECK(world_contact(&w, cube, 0) != NULL);
+  test_world *w = world_new(0.0, 20);
+  REQUIRE(world_start(w, RADIUS, 0, 0, 0));
+  forward(w, 120);
+  CHECK(world_stats(w).model.bodies_known == 0);
+  dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2 + RADIUS + 0.001, 0, 0);
+  forward(w, 31);
+  CHECK(world_stats(w).model.bodies_known == 1);
+  CHECK(world_contact(w, cube, 0) != NULL);
   double x = 0.0;
-  push_along(&w, &x, 0.05, 100);
-  CHECK(world_stats(&w).loop.contact_ticks > 20);
-  check_bounded(&w, cube, 0.2);
-  world_close(&w);
+  push_along(w, &x, 0.05, 100);
+  CHECK(world_stats(w).loop.contact_ticks > 20);
+  check_bounded(w, cube, 0.2);
 }
 
 /* ---- bodies that go ---- */
@@ -305,23 +297,21 @@ static void destroy_in_callback(void *user, double step_s)
 
 static void check_destroyed_in_callback(bool after, bool forget)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
-  world_open(&w, 0.0, 20);
-  callback_world = &w;
+  test_world *w = world_new(0.0, 20);
+  callback_world = w;
   callback_countdown = 3;
   callback_forgets = forget;
-  *(after ? &w.after_step : &w.before_step) = destroy_in_callback;
-  world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0, 0);
-  world_add_cube(&w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
-  REQUIRE(world_start(&w, RADIUS, x, 0, 0));
-  push_along(&w, &x, 0.1, 250);
+  *(after ? &w->after_step : &w->before_step) = destroy_in_callback;
+  world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
+  world_add_cube(w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
+  REQUIRE(world_start(w, RADIUS, x, 0, 0));
+  push_along(w, &x, 0.1, 250);
   CHECK(callback_countdown < 0);
-  hap_stats stats = world_stats(&w);
+  hap_stats stats = world_stats(w);
   CHECK(stats.model.bodies_known == 1);
   CHECK(stats.faults.bodies_lost == (forget ? 0u : 1u));
-  CHECK(fault_of(&w) == HAP_FAULT_NONE);
-  world_close(&w);
+  CHECK(fault_of(w) == HAP_FAULT_NONE);
 }
 
 /* The callbacks are among the places where the world may be touched (ode.h). */
@@ -451,18 +441,16 @@ static void break_after(void *user, double step_s)
 /* Between the step and the testing simulations, behind a neighbour: none may be run on it. */
 TEST(a_body_broken_in_after_step_is_not_probed)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   callback_countdown = 2;
-  w.after_step = break_after;
-  dBodyID cube = world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0, 0);
-  world_add_cube(&w, EDGE, 1.0, 1.5 * EDGE - 1e-6, 0, 0);
-  REQUIRE(world_start(&w, RADIUS, -RADIUS - 0.002, 0, 0));
-  forward(&w, 201);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  const hapi_contact_slot *contact = world_contact(&w, cube, 0);
-  CHECK(contact == NULL || hapi_finite(&world_contact_answer(&w, contact)->a[0][0], 18));
-  world_close(&w);
+  w->after_step = break_after;
+  dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
+  world_add_cube(w, EDGE, 1.0, 1.5 * EDGE - 1e-6, 0, 0);
+  REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
+  forward(w, 201);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD);
+  const hapi_contact_slot *contact = world_contact(w, cube, 0);
+  CHECK(contact == NULL || hapi_finite(&world_contact_answer(w, contact)->a[0][0], 18));
 }
 
 static void break_before(void *user, double step_s)
@@ -476,16 +464,14 @@ static void break_before(void *user, double step_s)
 
 TEST(a_body_broken_in_before_step_is_not_stepped)
 {
-  test_world w;
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   callback_countdown = 2;
-  w.before_step = break_before;
-  world_add_cube(&w, EDGE, 1.0, EDGE / 2, 0, 0);
-  REQUIRE(world_start(&w, RADIUS, -RADIUS - 0.002, 0, 0));
-  forward(&w, 201);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  CHECK(hapi_finite(dBodyGetAngularVel(w.bodies[0]), 3));
-  world_close(&w);
+  w->before_step = break_before;
+  world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
+  REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
+  forward(w, 201);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD);
+  CHECK(hapi_finite(dBodyGetAngularVel(w->bodies[0]), 3));
 }
 
 /* ---- models ---- */

@@ -274,10 +274,7 @@ TEST(what_is_replaced)
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     bool same = repeat_run(run_case, &cases[i]);
-    if (!same) {
-      printf("# in another place: %s\n", cases[i].name);
-    }
-    CHECK(same);
+    CHECK_SAY(same, "in another place: %s", cases[i].name);
   }
 }
 

@@ -449,10 +449,7 @@ TEST(malformed_files_are_named_by_line)
     CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
     bool told =
         strstr(r.detail.text, place) != NULL && strstr(r.detail.text, bad_files[i].why) != NULL;
-    CHECK(told);
-    if (!told) {
-      printf("# file %zu gave '%s'\n", i, r.detail.text);
-    }
+    CHECK_SAY(told, "file %zu gave '%s'", i, r.detail.text);
   }
 }
 

@@ -59,10 +59,8 @@ static bool start(stack *s)
 {
   double radius = s->w.hand_def.radius;
   bool good = cw_start(&s->w, -0.5 * EDGE - radius, 0.0, 1.5 * EDGE - 2.0 * OVERLAP);
-  cw_move_hand(&s->w, 0.01, 0.0, 0.0);
-  cw_run(&s->w, (int)(1000.0 * HELD / 0.01));
-  cw_move_hand(&s->w, 0.0, 0.0, 0.0);
-  cw_run(&s->w, SETTLE_STEPS * STEP_TICKS);
+  cw_go(&s->w, 0.01, 0.0, 0.0, (int)(1000.0 * HELD / 0.01));
+  cw_go(&s->w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
   return good;
 }
 
@@ -393,8 +391,7 @@ static bool start_held(held *h)
   bool good = cw_start(&h->w, 0.5 * EDGE + h->w.hand_def.radius, 0.0, 0.0);
   cw_move_hand(&h->w, -0.02, 0.0, 0.0); /* through the hinge's axis */
   cw_run(&h->w, 100);
-  cw_move_hand(&h->w, 0.0, 0.0, 0.0);
-  cw_run(&h->w, SETTLE_STEPS * STEP_TICKS);
+  cw_go(&h->w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
   return good;
 }
 
@@ -490,10 +487,8 @@ static bool begin_row(contact_world *w, double reuse)
     (void)cw_add_cube(w, 0.5, EDGE, (EDGE - OVERLAP) * i, 0.0, 0.5 * EDGE - OVERLAP);
   }
   bool good = cw_start(w, -0.5 * EDGE - w->hand_def.radius, 0.0, 0.5 * EDGE);
-  cw_move_hand(w, 0.04, 0.0, 0.0);
-  cw_run(w, 100);
-  cw_move_hand(w, 0.0, 0.0, 0.0);
-  cw_run(w, SETTLE_STEPS * STEP_TICKS);
+  cw_go(w, 0.04, 0.0, 0.0, 100);
+  cw_go(w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
   return good;
 }
 

@@ -289,10 +289,7 @@ TEST(the_coupling_can_be_chosen_and_is_reported)
     REQUIRE(value_of("coupling") != NULL && value_of("effects") != NULL);
     bool good = strcmp(value_of("coupling"), cases[i].coupling) == 0 &&
                 strstr(value_of("effects"), cases[i].effect) != NULL;
-    if (!good) {
-      printf("# %s: %s\n", cases[i].arguments, value_of("coupling"));
-    }
-    CHECK(good);
+    CHECK_SAY(good, "%s: %s", cases[i].arguments, value_of("coupling"));
   }
 }
 
@@ -443,10 +440,7 @@ TEST(every_scene_runs_in_every_model)
       for (size_t n = 0; n < sizeof finite / sizeof finite[0]; ++n) {
         good = good && isfinite(number_of(finite[n]));
       }
-      if (!good) {
-        printf("# %s, %s: exit %d, %.300s\n", names[i], models[k], code, ran.err);
-      }
-      CHECK(good);
+      CHECK_SAY(good, "%s, %s: exit %d, %.300s", names[i], models[k], code, ran.err);
     }
   }
 }

@@ -17,14 +17,12 @@
 
 TEST(a_session_that_never_starts)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(strcmp(detail_of(&s), "") == 0);
-  CHECK(stats_of(&s).loop.ticks == 0);
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(strcmp(detail_of(s), "") == 0);
+  CHECK(stats_of(s).loop.ticks == 0);
   hap_session_destroy(NULL);
-  stage_end(&s);
 }
 
 TEST(start_and_stop_in_every_drive)
@@ -53,25 +51,23 @@ TEST(start_and_stop_in_every_drive)
 
 TEST(calls_of_another_drive_are_refused)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_FRAME);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_update(s.session, 0.01) == HAP_ERROR_STATE); /* not started */
-  CHECK(hap_session_advance(s.session, 1) == HAP_ERROR_STATE);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 1) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&s), "LOCKSTEP"));
+  stage *s = stage_new(HAP_DRIVE_FRAME);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_update(s->session, 0.01) == HAP_ERROR_STATE); /* not started */
+  CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE);
+  CHECK(has(detail_of(s), "LOCKSTEP"));
   static const double bad[] = {-1e-9, (double)NAN, (double)INFINITY, -(double)INFINITY};
   for (int i = 0; i < 4; ++i) {
-    CHECK(hap_session_update(s.session, bad[i]) == HAP_ERROR_ARGUMENT);
-    CHECK(has(detail_of(&s), "frame_s"));
+    CHECK(hap_session_update(s->session, bad[i]) == HAP_ERROR_ARGUMENT);
+    CHECK(has(detail_of(s), "frame_s"));
   }
-  CHECK(atomic_load(&s.steps) == 0);
-  stage_end(&s);
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_update(s.session, 0.01) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&s), "FRAME"));
-  stage_end(&s);
+  CHECK(atomic_load(&s->steps) == 0);
+  stage_end(s);
+  REQUIRE(stage_run(s, HAP_DRIVE_LOCKSTEP));
+  CHECK(hap_session_update(s->session, 0.01) == HAP_ERROR_STATE);
+  CHECK(has(detail_of(s), "FRAME"));
 }
 
 static void no_edit(void *arg)
@@ -106,21 +102,20 @@ TEST(null_sessions_are_refused)
   CHECK(hap_session_adopt_body(NULL, NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_forget_body(NULL, NULL) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_now(NULL) > 0);
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  CHECK(hap_session_post(s.session, NULL, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_detail(s.session, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_read(s.session, NULL, 1, sizeof(hap_trace_row), &count) ==
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_post(s->session, NULL, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_detail(s->session, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_trace_read(s->session, NULL, 1, sizeof(hap_trace_row), &count) ==
         HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_read(s.session, &row, 1, sizeof(hap_trace_row), NULL) ==
+  CHECK(hap_session_trace_read(s->session, &row, 1, sizeof(hap_trace_row), NULL) ==
         HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_poses(s.session, 0, NULL, 1, &pose) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_poses(s.session, 0, &s.cube, 1, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_poses(s.session, 0, NULL, 0, NULL) == HAP_OK);
-  CHECK(hap_session_try_lock(s.session, -1) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_trace_bodies(s.session, NULL, 1) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_poses(s->session, 0, NULL, 1, &pose) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_poses(s->session, 0, &s->cube, 1, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_poses(s->session, 0, NULL, 0, NULL) == HAP_OK);
+  CHECK(hap_session_try_lock(s->session, -1) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_trace_bodies(s->session, NULL, 1) == HAP_ERROR_ARGUMENT);
   CHECK(hap_model_name((hap_model)77) == NULL);
-  stage_end(&s);
 }
 
 /* A program of another build has other rows. */
@@ -130,16 +125,15 @@ TEST(trace_rows_of_another_size)
     hap_trace_row rows[3];
     unsigned char bytes[3 * sizeof(hap_trace_row)];
   } block;
-  stage s;
   size_t count = 0;
   const size_t small = offsetof(hap_trace_row, tick_us);
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.expert.trace_rows = 8;
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 4) == HAP_OK);
-  CHECK(hap_session_trace_read(s.session, block.rows, 1, 4, &count) == HAP_ERROR_ARGUMENT);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->expert.trace_rows = 8;
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 4) == HAP_OK);
+  CHECK(hap_session_trace_read(s->session, block.rows, 1, 4, &count) == HAP_ERROR_ARGUMENT);
   memset(&block, 0xee, sizeof block);
-  CHECK(hap_session_trace_read(s.session, block.rows, 2, small, &count) == HAP_OK && count == 2);
+  CHECK(hap_session_trace_read(s->session, block.rows, 2, small, &count) == HAP_OK && count == 2);
   uint64_t ticks[2];
   memcpy(&ticks[0], block.bytes, sizeof ticks[0]);
   memcpy(&ticks[1], block.bytes + small, sizeof ticks[1]);
@@ -149,10 +143,9 @@ TEST(trace_rows_of_another_size)
   }
   size_t large = sizeof(hap_trace_row) + 8;
   memset(&block, 0xee, sizeof block);
-  CHECK(hap_session_trace_read(s.session, block.rows, 2, large, &count) == HAP_OK && count == 2);
+  CHECK(hap_session_trace_read(s->session, block.rows, 2, large, &count) == HAP_OK && count == 2);
   memcpy(&ticks[1], block.bytes + large, sizeof ticks[1]);
   CHECK(block.rows[0].tick + 1 == ticks[1] && block.bytes[sizeof(hap_trace_row)] == 0xee);
-  stage_end(&s);
 }
 
 /* ---- drives ---- */
@@ -162,23 +155,22 @@ TEST(lockstep_steps_are_due_at_whole_ticks)
 {
   static const double rates[] = {60.0, 50.0, 1000.0, 333.0};
   for (int r = 0; r < 4; ++r) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.def.physics_hz = rates[r];
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->def.physics_hz = rates[r];
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
     double per_step = 1000.0 / rates[r];
     for (int tick = 0; tick < 1000; ++tick) {
-      CHECK(hap_session_now(s.session) == tick * MS);
-      CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+      CHECK(hap_session_now(s->session) == tick * MS);
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
       int due = 0; /* the step that ends at tick 0 is not there */
       while (floor((due + 1) * per_step + 1e-6) <= tick) {
         ++due;
       }
-      CHECK(atomic_load(&s.steps) == due);
+      CHECK(atomic_load(&s->steps) == due);
     }
-    hap_stats stats = stats_of(&s);
+    hap_stats stats = stats_of(s);
     CHECK(stats.loop.ticks == 1000 && stats.loop.missed_ticks == 0);
-    CHECK(stats.physics.steps == (uint64_t)atomic_load(&s.steps));
+    CHECK(stats.physics.steps == (uint64_t)atomic_load(&s->steps));
     CHECK(stats.model.bodies_known == 1 && stats.loop.model == HAP_MODEL_CONTACT);
     CHECK(stats.loop.model_age_s <= 2.0 * per_step * 1e-3 && stats.loop.models_adopted > 0);
     CHECK(stats.loop.tick_us_p50 <= stats.loop.tick_us_p99 * 1.01 && stats.loop.tick_us_p99 > 0.0);
@@ -186,7 +178,7 @@ TEST(lockstep_steps_are_due_at_whole_ticks)
     CHECK(stats.loop.duty > 0.0 && stats.physics.duty > 0.0 && stats.loop.trace_hash != 0);
     CHECK(stats.model.capacity_dropped == 0 && stats.faults.states_rejected == 0 &&
           stats.faults.count == 0);
-    stage_end(&s);
+    stage_end(s);
   }
 }
 
@@ -217,50 +209,48 @@ TEST(models_change_while_running)
 {
   static const hap_model models[] = {HAP_MODEL_IMPULSE, HAP_MODEL_SINGLE,  HAP_MODEL_ACCELERANCE,
                                      HAP_MODEL_SINGLE,  HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE};
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
-  dBodySetLinearVel(s.cube, 0.1, 0.0, 0.0);
-  CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
+  dBodySetLinearVel(s->cube, 0.1, 0.0, 0.0);
+  CHECK(hap_session_advance(s->session, 100) == HAP_OK);
   for (int i = 0; i < 6; ++i) {
-    int before = atomic_load(&s.steps);
-    CHECK(hap_session_set_model(s.session, models[i]) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-    CHECK(stats_of(&s).loop.model == models[i]);
-    int steps = atomic_load(&s.steps) - before;
+    int before = atomic_load(&s->steps);
+    CHECK(hap_session_set_model(s->session, models[i]) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 200) == HAP_OK);
+    CHECK(stats_of(s).loop.model == models[i]);
+    int steps = atomic_load(&s->steps) - before;
     CHECK(models[i] == HAP_MODEL_SINGLE ? steps > 170 && steps <= 201 : steps >= 9 && steps <= 30);
     /* Whatever the model: the world is where time says, to the step it is ahead or behind. */
-    double lag = 1e-9 * (double)hap_session_now(s.session) * 0.1 - dBodyGetPosition(s.cube)[0];
+    double lag = 1e-9 * (double)hap_session_now(s->session) * 0.1 - dBodyGetPosition(s->cube)[0];
     CHECK_NEAR(lag, 0.0, 0.1 * 0.0205);
   }
-  CHECK(stats_of(&s).faults.count == 0);
-  stage_end(&s);
+  CHECK(stats_of(s).faults.count == 0);
 }
 
 /* Two seconds of real time. How many ticks are run or missed follows from the clock alone, so it
  * holds on a loaded machine as well. */
 TEST(threads_run_on_the_clock)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  dBodySetLinearVel(s.cube, 0.5, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK);
   int64_t begin = hapi_clock_now();
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   int64_t started = hapi_clock_now();
   double last = 0.0;
   for (int i = 0; i < 200; ++i) { /* drawing at the same time */
     hap_pose pose;
     sleep_ms(10);
-    CHECK(hap_session_poses(s.session, hap_session_now(s.session), &s.cube, 1, &pose) >=
+    CHECK(hap_session_poses(s->session, hap_session_now(s->session), &s->cube, 1, &pose) >=
           HAP_OK); /* late on a busy machine */
     CHECK(pose.position[0] >= last);
     last = pose.position[0];
   }
   int64_t before_stop = hapi_clock_now();
-  CHECK(hap_session_stop(s.session) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
   double most = 1e-6 * (double)(hapi_clock_now() - begin);
   double least = 1e-6 * (double)(before_stop - started);
-  hap_stats stats = stats_of(&s);
+  hap_stats stats = stats_of(s);
   double windows = (double)(stats.loop.ticks + stats.loop.missed_ticks);
   printf("# %llu ticks, %llu missed in %.0f ms, %llu steps, p99 %.1f us\n",
          (unsigned long long)stats.loop.ticks, (unsigned long long)stats.loop.missed_ticks, least,
@@ -269,7 +259,6 @@ TEST(threads_run_on_the_clock)
   CHECK((double)(stats.physics.steps + stats.physics.missed) <= most / 20.0 + 2.0);
   CHECK(stats.physics.steps > 0 && last > 0.0);
   CHECK(stats.loop.trace_hash == 0 && stats.loop.realtime == 0 && stats.faults.count == 0);
-  stage_end(&s);
 }
 
 /* ---- lock ---- */
@@ -285,27 +274,25 @@ static void *unlock_elsewhere(void *arg)
 
 TEST(lock_belongs_to_a_thread)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  REQUIRE(stage_create(s) == HAP_OK);
   for (int round = 0; round < 3; ++round) { /* before start, running, after stop */
     pthread_t thread;
-    CHECK(hap_session_unlock(s.session) == HAP_ERROR_THREAD);
-    REQUIRE(hap_session_lock(s.session) == HAP_OK);
-    CHECK(hap_session_lock(s.session) == HAP_ERROR_THREAD);
-    CHECK(hap_session_try_lock(s.session, 0) == HAP_ERROR_THREAD);
-    REQUIRE(pthread_create(&thread, NULL, unlock_elsewhere, &s) == 0);
+    CHECK(hap_session_unlock(s->session) == HAP_ERROR_THREAD);
+    REQUIRE(hap_session_lock(s->session) == HAP_OK);
+    CHECK(hap_session_lock(s->session) == HAP_ERROR_THREAD);
+    CHECK(hap_session_try_lock(s->session, 0) == HAP_ERROR_THREAD);
+    REQUIRE(pthread_create(&thread, NULL, unlock_elsewhere, s) == 0);
     pthread_join(thread, NULL);
-    CHECK(s.seen[0] == HAP_ERROR_THREAD);
-    CHECK(s.seen[1] == HAP_ERROR_TIMEOUT && s.seen[2] == HAP_ERROR_TIMEOUT);
-    CHECK(round == 1 || hap_session_start(s.session) == HAP_ERROR_THREAD);
-    CHECK(hap_session_unlock(s.session) == HAP_OK);
-    CHECK(hap_session_unlock(s.session) == HAP_ERROR_THREAD);
-    CHECK(hap_session_try_lock(s.session, 1000 * MS) == HAP_OK);
-    CHECK(hap_session_unlock(s.session) == HAP_OK);
-    CHECK((round == 0 ? hap_session_start(s.session) : hap_session_stop(s.session)) == HAP_OK);
+    CHECK(s->seen[0] == HAP_ERROR_THREAD);
+    CHECK(s->seen[1] == HAP_ERROR_TIMEOUT && s->seen[2] == HAP_ERROR_TIMEOUT);
+    CHECK(round == 1 || hap_session_start(s->session) == HAP_ERROR_THREAD);
+    CHECK(hap_session_unlock(s->session) == HAP_OK);
+    CHECK(hap_session_unlock(s->session) == HAP_ERROR_THREAD);
+    CHECK(hap_session_try_lock(s->session, 1000 * MS) == HAP_OK);
+    CHECK(hap_session_unlock(s->session) == HAP_OK);
+    CHECK((round == 0 ? hap_session_start(s->session) : hap_session_stop(s->session)) == HAP_OK);
   }
-  stage_end(&s);
 }
 
 static void call_all_that_lock(stage *s)
@@ -322,19 +309,18 @@ static void call_all_that_lock(stage *s)
 TEST(callbacks_may_not_lock)
 {
   for (int d = 0; d < 2; ++d) {
-    stage s;
-    stage_init(&s, d == 0 ? HAP_DRIVE_LOCKSTEP : HAP_DRIVE_FRAME);
-    s.in_step = call_all_that_lock;
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-    CHECK((d == 0 ? hap_session_advance(s.session, 21) : hap_session_update(s.session, 0.02)) ==
+    stage *s = stage_new(d == 0 ? HAP_DRIVE_LOCKSTEP : HAP_DRIVE_FRAME);
+    s->in_step = call_all_that_lock;
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+    CHECK((d == 0 ? hap_session_advance(s->session, 21) : hap_session_update(s->session, 0.02)) ==
           HAP_OK);
-    CHECK(atomic_load(&s.steps) == 1);
+    CHECK(atomic_load(&s->steps) == 1);
     for (int i = 0; i < 5; ++i) {
-      CHECK(s.seen[i] == HAP_ERROR_THREAD);
+      CHECK(s->seen[i] == HAP_ERROR_THREAD);
     }
-    CHECK(s.seen[5] == HAP_OK);
-    CHECK(hap_session_lock(s.session) == HAP_OK && hap_session_unlock(s.session) == HAP_OK);
-    stage_end(&s);
+    CHECK(s->seen[5] == HAP_OK);
+    CHECK(hap_session_lock(s->session) == HAP_OK && hap_session_unlock(s->session) == HAP_OK);
+    stage_end(s);
   }
 }
 
@@ -347,53 +333,49 @@ static void be_slow(stage *s)
 /* Physics needs 8 ms for a step every 5 ms and takes the lock again at once; counted in steps. */
 TEST(lock_waits_for_about_one_step_of_an_overloaded_physics_thread)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  s.def.physics_hz = 200.0;
-  s.in_step = be_slow;
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  while (atomic_load(&s.steps) < 3) {
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  s->def.physics_hz = 200.0;
+  s->in_step = be_slow;
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  while (atomic_load(&s->steps) < 3) {
     sleep_ms(1);
   }
   int worst = 0;
   for (int i = 0; i < 30; ++i) {
-    int before = atomic_load(&s.steps);
-    REQUIRE(hap_session_lock(s.session) == HAP_OK);
-    int waited = atomic_load(&s.steps) - before;
-    CHECK(hap_session_unlock(s.session) == HAP_OK);
+    int before = atomic_load(&s->steps);
+    REQUIRE(hap_session_lock(s->session) == HAP_OK);
+    int waited = atomic_load(&s->steps) - before;
+    CHECK(hap_session_unlock(s->session) == HAP_OK);
     sleep_ms(1); /* so that physics has it again */
     worst = waited > worst ? waited : worst;
   }
-  CHECK(atomic_load(&s.steps) >= 8); /* some had to wait */
+  CHECK(atomic_load(&s->steps) >= 8); /* some had to wait */
   printf("# at most %d steps\n", worst);
   CHECK(worst <= 2); /* one may begin between the count and the queue */
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).physics.missed > 0); /* it was overloaded */
-  stage_end(&s);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(stats_of(s).physics.missed > 0); /* it was overloaded */
 }
 
 TEST(bodies_are_told_of_only_under_the_lock)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  dBodyID loose = dBodyCreate(s.world);
-  CHECK(hap_session_adopt_body(s.session, loose) == HAP_OK); /* before start */
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_adopt_body(s.session, loose) == HAP_ERROR_THREAD);
-  CHECK(hap_session_forget_body(s.session, loose) == HAP_ERROR_THREAD);
-  CHECK(hap_session_forget_geom(s.session, s.geom) == HAP_ERROR_THREAD);
-  CHECK(hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_ERROR_THREAD);
-  REQUIRE(hap_session_lock(s.session) == HAP_OK);
-  CHECK(hap_session_forget_body(s.session, loose) == HAP_OK);
-  CHECK(hap_session_forget_body(s.session, loose) == HAP_ERROR_NOT_FOUND);
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  REQUIRE(stage_create(s) == HAP_OK);
+  dBodyID loose = dBodyCreate(s->world);
+  CHECK(hap_session_adopt_body(s->session, loose) == HAP_OK); /* before start */
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_adopt_body(s->session, loose) == HAP_ERROR_THREAD);
+  CHECK(hap_session_forget_body(s->session, loose) == HAP_ERROR_THREAD);
+  CHECK(hap_session_forget_geom(s->session, s->geom) == HAP_ERROR_THREAD);
+  CHECK(hap_session_trace_bodies(s->session, &s->cube, 1) == HAP_ERROR_THREAD);
+  REQUIRE(hap_session_lock(s->session) == HAP_OK);
+  CHECK(hap_session_forget_body(s->session, loose) == HAP_OK);
+  CHECK(hap_session_forget_body(s->session, loose) == HAP_ERROR_NOT_FOUND);
   dBodyDestroy(loose);
-  CHECK(hap_session_trace_bodies(s.session, &loose, 1) == HAP_ERROR_NOT_FOUND);
-  dBodyID many[HAP_TRACE_BODIES_MAX + 1] = {s.cube};
-  CHECK(hap_session_trace_bodies(s.session, many, HAP_TRACE_BODIES_MAX + 1) == HAP_ERROR_CAPACITY);
-  CHECK(hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
-  stage_end(&s);
+  CHECK(hap_session_trace_bodies(s->session, &loose, 1) == HAP_ERROR_NOT_FOUND);
+  dBodyID many[HAP_TRACE_BODIES_MAX + 1] = {s->cube};
+  CHECK(hap_session_trace_bodies(s->session, many, HAP_TRACE_BODIES_MAX + 1) == HAP_ERROR_CAPACITY);
+  CHECK(hap_session_trace_bodies(s->session, &s->cube, 1) == HAP_OK);
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
 }
 
 /* ---- posted edits ---- */
@@ -421,27 +403,26 @@ static void post_again(void *arg)
 TEST(edits_run_in_order_before_the_next_step)
 {
   static edit edits[257];
-  stage s;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
   for (int i = 0; i < 257; ++i) {
-    edits[i] = (edit){&s, i};
-    CHECK(hap_session_post(s.session, run_edit, &edits[i]) ==
+    edits[i] = (edit){s, i};
+    CHECK(hap_session_post(s->session, run_edit, &edits[i]) ==
           (i < 256 ? HAP_OK : HAP_ERROR_CAPACITY));
   }
-  CHECK(s.seen[0] == 0);
-  CHECK(hap_session_advance(s.session, 21) == HAP_OK);
-  CHECK(s.seen[0] == 256 && s.seen[1] == 0);
-  CHECK(s.seen[2] == HAP_ERROR_THREAD);                                /* an edit may not lock */
-  CHECK(hap_session_post(s.session, run_edit, &edits[256]) == HAP_OK); /* there is room again */
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(s.seen[0] == 257 && s.seen[1] == 0); /* stop ran it */
-  edit again = {&s, 0};
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_post(s.session, post_again, &again) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 101) == HAP_OK);
-  CHECK(s.seen[3] >= 5 && s.seen[3] <= 6 && s.seen[4] == 0); /* once a step */
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  stage_end(&s);
+  CHECK(s->seen[0] == 0);
+  CHECK(hap_session_advance(s->session, 21) == HAP_OK);
+  CHECK(s->seen[0] == 256 && s->seen[1] == 0);
+  CHECK(s->seen[2] == HAP_ERROR_THREAD);                                /* an edit may not lock */
+  CHECK(hap_session_post(s->session, run_edit, &edits[256]) == HAP_OK); /* there is room again */
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(s->seen[0] == 257 && s->seen[1] == 0); /* stop ran it */
+  edit again = {s, 0};
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_post(s->session, post_again, &again) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 101) == HAP_OK);
+  CHECK(s->seen[3] >= 5 && s->seen[3] <= 6 && s->seen[4] == 0); /* once a step */
+  CHECK(hap_session_stop(s->session) == HAP_OK);
 }
 
 TEST(edits_left_over_run_at_stop_in_every_drive)
@@ -465,58 +446,55 @@ TEST(edits_left_over_run_at_stop_in_every_drive)
 
 TEST(poses_for_drawing_are_interpolated_one_step_behind)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 201) == HAP_OK); /* stepped to 0.2 s */
-  CHECK(stats_of(&s).physics.pose_delay_s == 0.02);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 201) == HAP_OK); /* stepped to 0.2 s */
+  CHECK(stats_of(s).physics.pose_delay_s == 0.02);
   for (int i = -120; i <= 30; ++i) { /* eight steps are kept */
     hap_pose pose;
     int64_t at = 200 * MS + i * MS;
-    CHECK(hap_session_poses(s.session, at, &s.cube, 1, &pose) == HAP_OK);
+    CHECK(hap_session_poses(s->session, at, &s->cube, 1, &pose) == HAP_OK);
     double expected = i > 20 ? 0.2 : 1e-9 * (double)at - 0.02;
     CHECK_NEAR(pose.position[0], expected, 1e-12);
     CHECK_NEAR(pose.quat_wxyz[0], 1.0, 1e-12);
   }
-  dBodyID unknown = dBodyCreate(s.world);
-  dBodyID asked[3] = {s.cube, unknown, s.cube};
+  dBodyID unknown = dBodyCreate(s->world);
+  dBodyID asked[3] = {s->cube, unknown, s->cube};
   hap_pose out[3];
   memset(out, 0x5a, sizeof out);
   hap_pose untouched[3];
   memcpy(untouched, out, sizeof out);
-  CHECK(hap_session_poses(s.session, 210 * MS, asked, 3, out) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_poses(s->session, 210 * MS, asked, 3, out) == HAP_ERROR_NOT_FOUND);
   CHECK(memcmp(out, untouched, sizeof out) == 0);
-  CHECK(hap_session_poses(s.session, INT64_MAX, &s.cube, 1, out) == HAP_STALE);
-  CHECK(hap_session_poses(s.session, 240 * MS, &s.cube, 1, out) == HAP_OK);
-  CHECK(hap_session_poses(s.session, 241 * MS, &s.cube, 1, out) == HAP_STALE);
-  CHECK(hap_session_poses(s.session, 79 * MS, &s.cube, 1, out) == HAP_CLAMPED);
+  CHECK(hap_session_poses(s->session, INT64_MAX, &s->cube, 1, out) == HAP_STALE);
+  CHECK(hap_session_poses(s->session, 240 * MS, &s->cube, 1, out) == HAP_OK);
+  CHECK(hap_session_poses(s->session, 241 * MS, &s->cube, 1, out) == HAP_STALE);
+  CHECK(hap_session_poses(s->session, 79 * MS, &s->cube, 1, out) == HAP_CLAMPED);
   CHECK_NEAR(out[0].position[0], 0.06, 1e-12);
-  CHECK(hap_session_poses(s.session, INT64_MIN, &s.cube, 1, out) == HAP_CLAMPED);
+  CHECK(hap_session_poses(s->session, INT64_MIN, &s->cube, 1, out) == HAP_CLAMPED);
   CHECK_NEAR(out[0].position[0], 0.06, 1e-12);
-  stage_end(&s);
 }
 
 TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
 {
   static hap_trace_row rows[200];
   size_t count = 7;
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.expert.trace_rows = 100;
-  dBodySetLinearVel(s.cube, 1.0, 0.0, 0.0);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->expert.trace_rows = 100;
+  dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_trace_bodies(s->session, &s->cube, 1) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_trace_read(s->session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
         count == 0);
-  CHECK(hap_session_advance(s.session, 150) == HAP_OK);
-  CHECK(stats_of(&s).loop.trace_dropped == 50);
-  CHECK(hap_session_trace_read(s.session, rows, 30, sizeof(hap_trace_row), &count) == HAP_OK &&
+  CHECK(hap_session_advance(s->session, 150) == HAP_OK);
+  CHECK(stats_of(s).loop.trace_dropped == 50);
+  CHECK(hap_session_trace_read(s->session, rows, 30, sizeof(hap_trace_row), &count) == HAP_OK &&
         count == 30);
-  CHECK(hap_session_trace_read(s.session, rows + 30, 170, sizeof(hap_trace_row), &count) ==
+  CHECK(hap_session_trace_read(s->session, rows + 30, 170, sizeof(hap_trace_row), &count) ==
             HAP_OK &&
         count == 70);
-  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+  CHECK(hap_session_trace_read(s->session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
         count == 0);
   for (int i = 0; i < 100; ++i) {
     CHECK_NEAR(rows[i].t, 1e-3 * i, 1e-12);
@@ -524,14 +502,13 @@ TEST(trace_keeps_the_oldest_rows_and_counts_the_rest)
     CHECK(rows[i].body_count == 1 && rows[i].pointer_count == 0);
     CHECK_NEAR(rows[i].body_position[0][0], 1e-3 * i, 0.021); /* of the newest step */
   }
-  CHECK(hap_session_advance(s.session, 10) == HAP_OK); /* goes on after the gap */
-  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_OK &&
+  CHECK(hap_session_advance(s->session, 10) == HAP_OK); /* goes on after the gap */
+  CHECK(hap_session_trace_read(s->session, rows, 200, sizeof(hap_trace_row), &count) == HAP_OK &&
         count == 10);
   CHECK_NEAR(rows[0].t, 0.15, 1e-12);
-  stage_end(&s);
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP)); /* without a trace */
-  CHECK(hap_session_advance(s.session, 10) == HAP_OK && stats_of(&s).loop.trace_dropped == 0);
-  CHECK(hap_session_trace_read(s.session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
+  stage_end(s);
+  REQUIRE(stage_run(s, HAP_DRIVE_LOCKSTEP)); /* without a trace */
+  CHECK(hap_session_advance(s->session, 10) == HAP_OK && stats_of(s).loop.trace_dropped == 0);
+  CHECK(hap_session_trace_read(s->session, rows, 200, sizeof(hap_trace_row), &count) == HAP_END &&
         count == 0);
-  stage_end(&s);
 }

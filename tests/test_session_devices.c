@@ -294,33 +294,32 @@ TEST(a_device_that_does_not_start)
 {
   static const hap_drive drives[] = {HAP_DRIVE_LOCKSTEP, HAP_DRIVE_THREADS};
   for (int d = 0; d < 2; ++d) {
-    stage s;
     hap_device *devices[2];
     hap_pointer_id id[2];
     fakes_opened = 0;
-    stage_init(&s, drives[d]);
-    REQUIRE(stage_create(&s) == HAP_OK);
+    stage *s = stage_new(drives[d]);
+    REQUIRE(stage_create(s) == HAP_OK);
     for (int i = 0; i < 2; ++i) {
       devices[i] = open_fake(HAP_PACING_VIRTUAL);
       hap_pointer_def def = pointer_def(devices[i]);
-      CHECK(hap_pointer_add(s.session, &def, &id[i]) == HAP_OK);
+      CHECK(hap_pointer_add(s->session, &def, &id[i]) == HAP_OK);
     }
     atomic_store(&fakes[1].fail_start, 1);
-    CHECK(hap_session_start(s.session) == HAP_ERROR_DEVICE);
-    CHECK(has(detail_of(&s), "fake"));
+    CHECK(hap_session_start(s->session) == HAP_ERROR_DEVICE);
+    CHECK(has(detail_of(s), "fake"));
     CHECK(atomic_load(&fakes[0].running) == 0 && atomic_load(&fakes[0].zeroed) == 1);
     CHECK(atomic_load(&fakes[0].reads) == 0);
     atomic_store(&fakes[1].fail_start, 0);
-    CHECK(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_stop(s.session) == HAP_OK);
-    CHECK(hap_pointer_remove(s.session, id[1]) == HAP_OK);
-    CHECK(hap_session_start(s.session) == HAP_OK);
+    CHECK(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_stop(s->session) == HAP_OK);
+    CHECK(hap_pointer_remove(s->session, id[1]) == HAP_OK);
+    CHECK(hap_session_start(s->session) == HAP_OK);
     atomic_store(&fakes[1].fail_start, 1); /* the same for one that is added while it runs */
     hap_pointer_def def = pointer_def(devices[1]);
-    CHECK(hap_pointer_add(s.session, &def, &id[1]) == HAP_ERROR_DEVICE);
+    CHECK(hap_pointer_add(s->session, &def, &id[1]) == HAP_ERROR_DEVICE);
     atomic_store(&fakes[1].fail_start, 0);
-    CHECK(hap_pointer_add(s.session, &def, &id[1]) == HAP_OK); /* it was let go */
-    stage_end(&s);
+    CHECK(hap_pointer_add(s->session, &def, &id[1]) == HAP_OK); /* it was let go */
+    stage_end(s);
     hap_device_close(devices[0]);
     hap_device_close(devices[1]);
     CHECK(atomic_load(&fakes[0].wrong) == 0 && atomic_load(&fakes[1].wrong) == 0);
@@ -331,21 +330,20 @@ TEST(devices_with_a_clock_of_their_own_cannot_run_in_lockstep)
 {
   static const hap_device_pacing pacings[] = {HAP_PACING_HOST, HAP_PACING_DEVICE};
   for (int i = 0; i < 2; ++i) {
-    stage s;
     hap_pointer_id id;
     fakes_opened = 0;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
     hap_device *device = open_fake(pacings[i]);
     hap_pointer_def def = pointer_def(device);
-    REQUIRE(stage_create(&s) == HAP_OK);
-    CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-    CHECK(hap_session_start(s.session) == HAP_ERROR_UNSUPPORTED);
-    CHECK(has(detail_of(&s), "lockstep"));
-    CHECK(hap_pointer_remove(s.session, id) == HAP_OK);
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNSUPPORTED && id.v == 0);
+    REQUIRE(stage_create(s) == HAP_OK);
+    CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+    CHECK(hap_session_start(s->session) == HAP_ERROR_UNSUPPORTED);
+    CHECK(has(detail_of(s), "lockstep"));
+    CHECK(hap_pointer_remove(s->session, id) == HAP_OK);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_UNSUPPORTED && id.v == 0);
     CHECK(atomic_load(&fakes[0].starts) == 0);
-    stage_end(&s);
+    stage_end(s);
     hap_device_close(device);
     CHECK(atomic_load(&fakes[0].closes) == 1);
   }
@@ -558,44 +556,43 @@ static hap_status move_to(stage *s, hap_pointer_id id, double x)
 TEST(a_pointer_without_device_goes_to_its_target_and_pushes)
 {
   for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_ACCELERANCE; ++model) {
-    stage s;
     hap_pointer_id id;
     hap_pointer_state state;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.def.model = (hap_model)model;
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->def.model = (hap_model)model;
     hap_pointer_def def = pointer_def(NULL);
-    REQUIRE(stage_create(&s) == HAP_OK && hap_pointer_add(s.session, &def, &id) == HAP_OK);
-    CHECK(move_to(&s, id, -0.1) == HAP_OK); /* also before start */
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
+    REQUIRE(stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK);
+    CHECK(move_to(s, id, -0.1) == HAP_OK); /* also before start */
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
     for (int i = 0; i < 400; ++i) {
-      CHECK(move_to(&s, id, -0.1 + 1e-4 * i) == HAP_OK); /* 60 mm: touches after 400 mm of a 1/10 */
-      CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+      CHECK(move_to(s, id, -0.1 + 1e-4 * i) == HAP_OK); /* 60 mm: touches after 400 mm of a 1/10 */
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
     }
-    CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);
+    CHECK(hap_pointer_get(s->session, id, &state, sizeof state) == HAP_OK);
     CHECK_NEAR(state.proxy.position[0], -0.0601, 1e-12);
-    CHECK(stats_of(&s).loop.contact_ticks == 0);
+    CHECK(stats_of(s).loop.contact_ticks == 0);
     for (int i = 400; i < 900; ++i) {
-      CHECK(move_to(&s, id, -0.1 + 1e-4 * i) == HAP_OK);
-      CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+      CHECK(move_to(s, id, -0.1 + 1e-4 * i) == HAP_OK);
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
     }
-    CHECK(stats_of(&s).loop.contact_ticks > 10 && stats_of(&s).hand.peak_force_n > 0.5);
-    CHECK(dBodyGetLinearVel(s.cube)[0] > 0.05 && dBodyGetPosition(s.cube)[0] > 0.02);
-    CHECK_NEAR(dBodyGetPosition(s.cube)[1], 0.0, 1e-3);
-    CHECK(stats_of(&s).hand.impulse_ns > 0.05 && stats_of(&s).faults.count == 0);
-    CHECK_NEAR(stats_of(&s).hand.momentum_ratio, 1.0, 0.1);
-    stage_end(&s);
+    CHECK(stats_of(s).loop.contact_ticks > 10 && stats_of(s).hand.peak_force_n > 0.5);
+    CHECK(dBodyGetLinearVel(s->cube)[0] > 0.05 && dBodyGetPosition(s->cube)[0] > 0.02);
+    CHECK_NEAR(dBodyGetPosition(s->cube)[1], 0.0, 1e-3);
+    CHECK(stats_of(s).hand.impulse_ns > 0.05 && stats_of(s).faults.count == 0);
+    CHECK_NEAR(stats_of(s).hand.momentum_ratio, 1.0, 0.1);
+    stage_end(s);
   }
 }
 
 TEST(bad_targets_change_nothing)
 {
-  stage s;
   hap_pointer_id id;
   hap_pointer_state state;
-  REQUIRE(stage_run(&s, HAP_DRIVE_LOCKSTEP));
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(s != NULL);
   hap_pointer_def def = pointer_def(NULL);
-  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  CHECK(move_to(&s, id, 0.5) == HAP_OK);
+  REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  CHECK(move_to(s, id, 0.5) == HAP_OK);
   const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
   for (int i = 0; i < 3 * 13; ++i) {
     hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
@@ -606,16 +603,15 @@ TEST(bad_targets_change_nothing)
                     : k < 10 ? &twist.linear[k - 7]
                              : &twist.angular[k - 10];
     *place = bad[i % 3];
-    CHECK(hap_pointer_set_target(s.session, id, &pose, &twist) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_pointer_set_target(s->session, id, &pose, &twist) == HAP_ERROR_ARGUMENT);
   }
   const hap_pose long_one = {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0, 0.0}};
-  CHECK(hap_pointer_set_target(s.session, id, &long_one, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_pointer_set_target(s.session, id, NULL, NULL) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_advance(s.session, 3) == HAP_OK);
-  CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_set_target(s->session, id, &long_one, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_set_target(s->session, id, NULL, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_advance(s->session, 3) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, id, &state, sizeof state) == HAP_OK);
   CHECK_NEAR(state.proxy.position[0], 0.5, 0.0);
-  CHECK(stats_of(&s).faults.count == 0);
-  stage_end(&s);
+  CHECK(stats_of(s).faults.count == 0);
 }
 
 /* ---- many at once ---- */
@@ -633,60 +629,57 @@ static void *move_about(void *arg)
 
 TEST(pointers_come_and_go_while_threads_run)
 {
-  stage s;
   hap_pointer_id id;
   pthread_t mover;
-  stage_init(&s, HAP_DRIVE_THREADS);
+  stage *s = stage_new(HAP_DRIVE_THREADS);
   hap_pointer_def def = pointer_def(NULL);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  CHECK(move_to(&s, id, -0.2) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  REQUIRE(pthread_create(&mover, NULL, move_about, &s) == 0);
+  REQUIRE(stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  CHECK(move_to(s, id, -0.2) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  REQUIRE(pthread_create(&mover, NULL, move_about, s) == 0);
   hap_device *device = NULL;
-  REQUIRE(hap_device_open("virtual:sine=0.05/0/0,hz=3", &device, &s.detail) == HAP_OK);
+  REQUIRE(hap_device_open("virtual:sine=0.05/0/0,hz=3", &device, &s->detail) == HAP_OK);
   def.device = device;
   for (int i = 0; i < 40; ++i) {
     hap_pointer_id second;
     hap_pointer_state state;
-    CHECK(hap_pointer_add(s.session, &def, &second) == HAP_OK);
+    CHECK(hap_pointer_add(s->session, &def, &second) == HAP_OK);
     sleep_ms(i % 5);
-    CHECK(hap_pointer_get(s.session, second, &state, sizeof state) == HAP_OK);
-    CHECK(hap_session_set_model(s.session, (hap_model)(i % 3)) == HAP_OK);
-    CHECK(hap_pointer_remove(s.session, second) == HAP_OK);
-    CHECK(hap_pointer_get(s.session, second, &state, sizeof state) == HAP_ERROR_NOT_FOUND);
+    CHECK(hap_pointer_get(s->session, second, &state, sizeof state) == HAP_OK);
+    CHECK(hap_session_set_model(s->session, (hap_model)(i % 3)) == HAP_OK);
+    CHECK(hap_pointer_remove(s->session, second) == HAP_OK);
+    CHECK(hap_pointer_get(s->session, second, &state, sizeof state) == HAP_ERROR_NOT_FOUND);
   }
   pthread_join(mover, NULL);
-  CHECK(s.seen[0] == 0);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).faults.count == 0 && stats_of(&s).loop.ticks > 0);
-  stage_end(&s);
+  CHECK(s->seen[0] == 0);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(stats_of(s).faults.count == 0 && stats_of(s).loop.ticks > 0);
+  stage_end(s);
   hap_device_close(device);
 }
 
 TEST(full_capacities_lose_nothing_but_are_counted)
 {
-  stage s;
   hap_pointer_id ids[4];
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   for (int i = 1; i < 6; ++i) {
-    (void)add_cube(&s, 0.1 * i, NULL);
+    (void)add_cube(s, 0.1 * i, NULL);
   }
-  s.def.max_bodies = 2;
-  s.def.max_contacts = 3;
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  s->def.max_bodies = 2;
+  s->def.max_contacts = 3;
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
   for (int i = 0; i < 4; ++i) {
     hap_pointer_def def = pointer_def(NULL);
     def.radius = 0.05;
-    CHECK(hap_pointer_add(s.session, &def, &ids[i]) == HAP_OK);
+    CHECK(hap_pointer_add(s->session, &def, &ids[i]) == HAP_OK);
     const hap_pose pose = {{0.1 * i + 0.05, 0.0, 0.095}, {1.0, 0.0, 0.0, 0.0}};
-    CHECK(hap_pointer_set_target(s.session, ids[i], &pose, NULL) == HAP_OK);
+    CHECK(hap_pointer_set_target(s->session, ids[i], &pose, NULL) == HAP_OK);
   }
-  CHECK(hap_session_advance(s.session, 500) == HAP_OK);
-  hap_stats stats = stats_of(&s);
+  CHECK(hap_session_advance(s->session, 500) == HAP_OK);
+  hap_stats stats = stats_of(s);
   CHECK(stats.model.capacity_dropped > 0 && stats.loop.contact_ticks > 0);
   CHECK(stats.model.neighbours_max <= 2 && stats.model.pointer_contacts <= 3);
   CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
-  stage_end(&s);
 }
 
 /* ---- bodies that go away ---- */
@@ -731,22 +724,21 @@ TEST(a_body_may_go_while_it_is_pushed)
 
 TEST(bodies_come_and_go_under_the_lock_while_threads_run)
 {
-  stage s;
   hap_pointer_id id;
-  REQUIRE(stage_run(&s, HAP_DRIVE_THREADS));
+  stage *s = stage_running(HAP_DRIVE_THREADS);
+  REQUIRE(s != NULL);
   hap_pointer_def def = pointer_def(NULL);
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK && move_to(&s, id, -0.058) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK && move_to(s, id, -0.058) == HAP_OK);
   for (int i = 0; i < 30; ++i) {
     sleep_ms(i % 4 * 10);
-    REQUIRE(hap_session_lock(s.session) == HAP_OK);
+    REQUIRE(hap_session_lock(s->session) == HAP_OK);
     if (i % 2 == 0) {
-      CHECK(hap_session_forget_body(s.session, s.cube) >= HAP_ERROR_NOT_FOUND);
+      CHECK(hap_session_forget_body(s->session, s->cube) >= HAP_ERROR_NOT_FOUND);
     }
-    destroy_cube(&s);
-    s.cube = add_cube(&s, 0.0, &s.geom);
-    CHECK(hap_session_unlock(s.session) == HAP_OK);
+    destroy_cube(s);
+    s->cube = add_cube(s, 0.0, &s->geom);
+    CHECK(hap_session_unlock(s->session) == HAP_OK);
   }
-  CHECK(hap_session_stop(s.session) == HAP_OK);
-  CHECK(stats_of(&s).faults.count == 0);
-  stage_end(&s);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(stats_of(s).faults.count == 0);
 }

@@ -41,43 +41,39 @@ static hap_stats figures(stage *s)
 /* The face of the cube is at x = -0.05, the hand has a radius of 0.01. */
 TEST(a_new_hand_does_not_feel_what_the_old_one_touched)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.max_pointers = 1;
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id first = add_hand(&s, ~0u);
-  move_hand(&s, first, -0.0601, 0.0);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 30) == HAP_OK);
-  move_hand(&s, first, -0.055, 0.0);
-  CHECK(hap_session_advance(s.session, 2) == HAP_OK);
-  CHECK(felt(&s, first) < -1.0);
-  CHECK(hap_pointer_remove(s.session, first) == HAP_OK);
-  hap_pointer_id second = add_hand(&s, 0u); /* touches nothing at all */
-  move_hand(&s, second, -0.045, 0.0);
-  double impulse = figures(&s).hand.impulse_ns;
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->def.max_pointers = 1;
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id first = add_hand(s, ~0u);
+  move_hand(s, first, -0.0601, 0.0);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 30) == HAP_OK);
+  move_hand(s, first, -0.055, 0.0);
+  CHECK(hap_session_advance(s->session, 2) == HAP_OK);
+  CHECK(felt(s, first) < -1.0);
+  CHECK(hap_pointer_remove(s->session, first) == HAP_OK);
+  hap_pointer_id second = add_hand(s, 0u); /* touches nothing at all */
+  move_hand(s, second, -0.045, 0.0);
+  double impulse = figures(s).hand.impulse_ns;
   for (int i = 0; i < 100; ++i) {
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    CHECK(felt(&s, second) == 0.0);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    CHECK(felt(s, second) == 0.0);
   }
-  CHECK(figures(&s).hand.impulse_ns == impulse);
-  stage_end(&s);
+  CHECK(figures(s).hand.impulse_ns == impulse);
 }
 
 TEST(a_hand_without_a_target_is_not_in_the_world)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, ~0u); /* the cube is at the origin */
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-  CHECK(figures(&s).model.pointer_contacts == 0 && figures(&s).hand.impulse_abs_ns == 0.0);
-  CHECK(dBodyGetPosition(s.cube)[0] == 0.0);
-  move_hand(&s, hand, -0.055, 0.0);
-  CHECK(hap_session_advance(s.session, 200) == HAP_OK);
-  CHECK(figures(&s).hand.impulse_abs_ns > 0.0);
-  stage_end(&s);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, ~0u); /* the cube is at the origin */
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 200) == HAP_OK);
+  CHECK(figures(s).model.pointer_contacts == 0 && figures(s).hand.impulse_abs_ns == 0.0);
+  CHECK(dBodyGetPosition(s->cube)[0] == 0.0);
+  move_hand(s, hand, -0.055, 0.0);
+  CHECK(hap_session_advance(s->session, 200) == HAP_OK);
+  CHECK(figures(s).hand.impulse_abs_ns > 0.0);
 }
 
 static void nudge(stage *s)
@@ -90,22 +86,21 @@ static void nudge(stage *s)
 TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
 {
   for (int nudged = 0; nudged < 2; ++nudged) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.in_step = nudged != 0 ? nudge : NULL;
-    REQUIRE(stage_create(&s) == HAP_OK);
-    hap_pointer_id hand = add_hand(&s, ~0u);
-    move_hand(&s, hand, -0.07, 0.0);
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->in_step = nudged != 0 ? nudge : NULL;
+    REQUIRE(stage_create(s) == HAP_OK);
+    hap_pointer_id hand = add_hand(s, ~0u);
+    move_hand(s, hand, -0.07, 0.0);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
     for (int i = 0; i < 600; ++i) { /* into the cube and back out of its way */
-      move_hand(&s, hand, i < 300 ? -0.07 + 1e-4 * i : -0.07, i < 300 ? 0.1 : 0.0);
-      CHECK(hap_session_advance(s.session, 1) == HAP_OK);
+      move_hand(s, hand, i < 300 ? -0.07 + 1e-4 * i : -0.07, i < 300 ? 0.1 : 0.0);
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
     }
-    hap_stats stats = figures(&s);
+    hap_stats stats = figures(s);
     CHECK(stats.hand.impulse_ns > 0.05);
     CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
-    CHECK_NEAR(dBodyGetLinearVel(s.cube)[0], stats.hand.impulse_ns, 1e-9); /* 1 kg */
-    stage_end(&s);
+    CHECK_NEAR(dBodyGetLinearVel(s->cube)[0], stats.hand.impulse_ns, 1e-9); /* 1 kg */
+    stage_end(s);
   }
 }
 
@@ -133,14 +128,12 @@ TEST(a_world_has_one_session_at_a_time)
 /* A create that fails leaves the world free. */
 TEST(a_session_that_could_not_be_created_has_no_claim_on_the_world)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   const double nothing = (double)NAN;
-  dBodySetLinearVel(s.cube, nothing, 0.0, 0.0);
-  CHECK(stage_create(&s) == HAP_ERROR_WORLD);
-  dBodySetLinearVel(s.cube, 0.0, 0.0, 0.0);
-  CHECK(stage_create(&s) == HAP_OK);
-  stage_end(&s);
+  dBodySetLinearVel(s->cube, nothing, 0.0, 0.0);
+  CHECK(stage_create(s) == HAP_ERROR_WORLD);
+  dBodySetLinearVel(s->cube, 0.0, 0.0, 0.0);
+  CHECK(stage_create(s) == HAP_OK);
 }
 
 static void *hold_the_lock(void *arg)
@@ -155,28 +148,25 @@ static void *hold_the_lock(void *arg)
 
 TEST(a_lock_can_be_waited_for_as_long_as_there_is_time)
 {
-  stage s;
   pthread_t other;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  REQUIRE(pthread_create(&other, NULL, hold_the_lock, &s) == 0);
-  while (atomic_load(&s.steps) != -1) {
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  REQUIRE(pthread_create(&other, NULL, hold_the_lock, s) == 0);
+  while (atomic_load(&s->steps) != -1) {
     hapi_clock_sleep_until(hapi_clock_now() + MS);
   }
-  CHECK(hap_session_try_lock(s.session, INT64_MAX) == HAP_OK);
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
+  CHECK(hap_session_try_lock(s->session, INT64_MAX) == HAP_OK);
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
   pthread_join(other, NULL);
-  stage_end(&s);
 }
 
 TEST(a_session_is_destroyed_by_the_thread_that_has_its_lock)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_THREADS);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_start(s.session) >= HAP_OK);
-  CHECK(hap_session_lock(s.session) == HAP_OK);
-  stage_end(&s); /* would wait for ever */
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_start(s->session) >= HAP_OK);
+  CHECK(hap_session_lock(s->session) == HAP_OK);
+  stage_end(s); /* would wait for ever */
 }
 
 static bool bad_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -191,67 +181,60 @@ static bool bad_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io
 
 TEST(a_surface_that_is_no_number_does_not_reach_ode)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.ode.surface = bad_surface;
-  (void)add_cube(&s, 0.0995, NULL);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 100) == HAP_FAULTED); /* and no abort */
-  CHECK(figures(&s).faults.fault == HAP_FAULT_WORLD);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->ode.surface = bad_surface;
+  (void)add_cube(s, 0.0995, NULL);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 100) == HAP_FAULTED); /* and no abort */
+  CHECK(figures(s).faults.fault == HAP_FAULT_WORLD);
   hap_detail detail;
-  CHECK(hap_session_detail(s.session, &detail) == HAP_OK);
+  CHECK(hap_session_detail(s->session, &detail) == HAP_OK);
   CHECK(strstr(detail.text, "surface") != NULL);
-  stage_end(&s);
 }
 
 TEST(an_inertia_that_is_no_number_is_refused)
 {
-  stage s;
   dMass mass;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodyGetMass(s.cube, &mass);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodyGetMass(s->cube, &mass);
   mass.I[0] = (dReal)NAN;
-  dBodySetMass(s.cube, &mass);
-  CHECK(stage_create(&s) == HAP_ERROR_WORLD);
-  CHECK(strstr(s.detail.text, "inertia") != NULL);
-  stage_end(&s);
+  dBodySetMass(s->cube, &mass);
+  CHECK(stage_create(s) == HAP_ERROR_WORLD);
+  CHECK(strstr(s->detail.text, "inertia") != NULL);
 }
 
 TEST(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_adopt_body(s.session, s.cube) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  dGeomDestroy(s.geom);
-  dBodyDestroy(s.cube);
-  CHECK(hap_session_advance(s.session, 50) == HAP_BODY_LOST);
-  CHECK(figures(&s).faults.bodies_lost == 1 && figures(&s).model.bodies_known == 0);
-  stage_end(&s);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_adopt_body(s->session, s->cube) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  dGeomDestroy(s->geom);
+  dBodyDestroy(s->cube);
+  CHECK(hap_session_advance(s->session, 50) == HAP_BODY_LOST);
+  CHECK(figures(s).faults.bodies_lost == 1 && figures(s).model.bodies_known == 0);
 }
 
 TEST(a_transmission_is_not_probed_and_that_is_said)
 {
   for (int with = 0; with < 2; ++with) {
-    stage s;
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    dBodyID other = add_cube(&s, 1.0, NULL);
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    dBodyID other = add_cube(s, 1.0, NULL);
     if (with != 0) {
-      dJointAttach(dJointCreateTransmission(s.world, NULL), s.cube, other);
+      dJointAttach(dJointCreateTransmission(s->world, NULL), s->cube, other);
     }
-    REQUIRE(stage_create(&s) == HAP_OK);
-    hap_pointer_id hand = add_hand(&s, ~0u);
-    move_hand(&s, hand, -0.055, 0.0);
-    REQUIRE(hap_session_start(s.session) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-    CHECK(figures(&s).probes.steps == 0 || with == 0);
-    CHECK(figures(&s).probes.steps > 0 || with != 0 || s.def.model == HAP_MODEL_CONTACT);
-    CHECK((strstr(detail_of(&s), "transmission") != NULL) == (with != 0));
-    CHECK(felt(&s, hand) < 0.0 || with == 0);
-    CHECK(figures(&s).hand.impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
-    stage_end(&s);
+    REQUIRE(stage_create(s) == HAP_OK);
+    hap_pointer_id hand = add_hand(s, ~0u);
+    move_hand(s, hand, -0.055, 0.0);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 100) == HAP_OK);
+    CHECK(figures(s).probes.steps == 0 || with == 0);
+    CHECK(figures(s).probes.steps > 0 || with != 0 || s->def.model == HAP_MODEL_CONTACT);
+    CHECK((strstr(detail_of(s), "transmission") != NULL) == (with != 0));
+    CHECK(felt(s, hand) < 0.0 || with == 0);
+    CHECK(figures(s).hand.impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
+    stage_end(s);
   }
 }
 
@@ -262,60 +245,55 @@ static void count(void *arg)
 
 TEST(edits_of_a_session_that_never_ran_are_run)
 {
-  stage s;
   int run = 0;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_post(s.session, count, &run) == HAP_OK);
-  stage_end(&s);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_post(s->session, count, &run) == HAP_OK);
+  stage_end(s);
   CHECK(run == 1);
 }
 
 TEST(a_falling_neighbour_falls_at_the_worlds_speed)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
-  s.research.physics_latency_ticks = 20; /* one step */
-  s.expert.trace_rows = 4096;
-  REQUIRE(stage_create(&s) == HAP_OK);
-  hap_pointer_id hand = add_hand(&s, ~0u);
-  move_hand(&s, hand, -0.061, 0.0); /* beside the cube */
-  REQUIRE(hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 90) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetGravity(s->world, 0.0, 0.0, -9.81);
+  s->research.physics_latency_ticks = 20; /* one step */
+  s->expert.trace_rows = 4096;
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_id hand = add_hand(s, ~0u);
+  move_hand(s, hand, -0.061, 0.0); /* beside the cube */
+  REQUIRE(hap_session_trace_bodies(s->session, &s->cube, 1) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 90) == HAP_OK);
   static hap_trace_row rows[90];
   size_t got = 0;
-  CHECK(hap_session_trace_read(s.session, rows, 90, sizeof(hap_trace_row), &got) == HAP_OK &&
+  CHECK(hap_session_trace_read(s->session, rows, 90, sizeof(hap_trace_row), &got) == HAP_OK &&
         got == 90);
   /* Between two models, which come at ticks 60 and 80; from row 62 to 78 the mean is at 71 ms. */
   double speed = (rows[78].body_position[0][2] - rows[62].body_position[0][2]) / 0.016;
   CHECK_NEAR(speed, -9.81 * 0.071, 0.02 * 9.81 * 0.071);
   CHECK(rows[0].tick == 0 && rows[89].tick == 89 && fabs(rows[89].t - 0.089) < 1e-9);
-  stage_end(&s);
 }
 
 /* Its frame and its first target together take it out of the world: a fault, and poses that are poses. */
 TEST(a_hand_that_never_came_in_has_a_pose)
 {
-  stage s;
   hap_pointer_def def;
   hap_pointer_id id;
   hap_pose poses[2];
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
   hap_pointer_def_init(&def, sizeof def);
   def.pose_world_device.position[0] = 9e5;
-  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  move_hand(&s, id, 9e5, 0.0);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 100) >= HAP_OK);
-  CHECK(figures(&s).faults.fault == HAP_FAULT_DEVICE_POSE);
-  const int64_t times[] = {0, hap_session_now(s.session), INT64_MAX};
+  REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  move_hand(s, id, 9e5, 0.0);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 100) >= HAP_OK);
+  CHECK(figures(s).faults.fault == HAP_FAULT_DEVICE_POSE);
+  const int64_t times[] = {0, hap_session_now(s->session), INT64_MAX};
   for (int i = 0; i < 6; ++i) {
-    CHECK(hap_pointer_poses(s.session, id, times[i / 2], &poses[0], &poses[1]) >= HAP_OK);
+    CHECK(hap_pointer_poses(s->session, id, times[i / 2], &poses[0], &poses[1]) >= HAP_OK);
     const double *q = poses[i % 2].quat_wxyz;
     CHECK_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1.0, 1e-9);
   }
-  stage_end(&s);
 }

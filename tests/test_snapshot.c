@@ -281,86 +281,80 @@ static void leave_forces(test_world *w)
 
 TEST(probes_leave_every_bit)
 {
-  test_world w;
   body_bits before[WORLD_BODIES_MAX];
   body_bits after[WORLD_BODIES_MAX];
-  world_open(&w, 9.81, 20);
-  build_stirred(&w);
-  unsettle(&w);
-  REQUIRE(start_silent(&w, true));
-  world_step(&w, 7);
-  leave_forces(&w);
-  dBodyDisable(w.bodies[5]);
+  test_world *w = world_new(9.81, 20);
+  build_stirred(w);
+  unsettle(w);
+  REQUIRE(start_silent(w, true));
+  world_step(w, 7);
+  leave_forces(w);
+  dBodyDisable(w->bodies[5]);
   dRandSetSeed(123456789);
-  for (int i = 0; i < w.body_count; ++i) {
-    body_read(w.bodies[i], &before[i]);
+  for (int i = 0; i < w->body_count; ++i) {
+    body_read(w->bodies[i], &before[i]);
   }
-  uint64_t probes = world_physics(&w)->probe.test.steps;
-  world_measure(&w);
-  CHECK(world_physics(&w)->probe.test.steps >= probes + 4);
+  uint64_t probes = world_physics(w)->probe.test.steps;
+  world_measure(w);
+  CHECK(world_physics(w)->probe.test.steps >= probes + 4);
   CHECK(dRandGetSeed() == 123456789);
-  for (int i = 0; i < w.body_count; ++i) {
-    body_read(w.bodies[i], &after[i]);
+  for (int i = 0; i < w->body_count; ++i) {
+    body_read(w->bodies[i], &after[i]);
     CHECK(memcmp(&before[i], &after[i], sizeof before[i]) == 0);
   }
-  CHECK(under_test(&w, w.bodies[5]));
-  world_close(&w);
+  CHECK(under_test(w, w->bodies[5]));
 }
 
 TEST(probes_leave_joint_feedback)
 {
-  test_world w;
   dJointFeedback feedback[2];
   dJointFeedback before[2];
   memset(feedback, 0, sizeof feedback);
-  world_open(&w, 9.81, 20);
-  build_stirred(&w);
-  dJointID paddle = dBodyGetJoint(w.bodies[0], 0);
-  dJointID pair = dBodyGetJoint(w.bodies[9], 0);
+  test_world *w = world_new(9.81, 20);
+  build_stirred(w);
+  dJointID paddle = dBodyGetJoint(w->bodies[0], 0);
+  dJointID pair = dBodyGetJoint(w->bodies[9], 0);
   dJointSetFeedback(paddle, &feedback[0]);
   dJointSetFeedback(pair, &feedback[1]);
-  REQUIRE(start_silent(&w, true));
-  world_step(&w, 7);
+  REQUIRE(start_silent(w, true));
+  world_step(w, 7);
   CHECK(feedback[0].f1[2] != 0.0);
   CHECK(feedback[1].f1[2] != 0.0);
   memcpy(before, feedback, sizeof before);
-  dBodyAddForce(w.bodies[0], 3.0, 2.0, 1.0); /* the probes' feedback would be another */
-  dBodyAddForce(w.bodies[9], 3.0, 2.0, 1.0);
-  world_measure(&w);
+  dBodyAddForce(w->bodies[0], 3.0, 2.0, 1.0); /* the probes' feedback would be another */
+  dBodyAddForce(w->bodies[9], 3.0, 2.0, 1.0);
+  world_measure(w);
   CHECK(memcmp(before, feedback, sizeof before) == 0);
   CHECK(dJointGetFeedback(paddle) == &feedback[0] && dJointGetFeedback(pair) == &feedback[1]);
-  CHECK(under_test(&w, w.bodies[0]) && under_test(&w, w.bodies[9]));
-  world_close(&w);
+  CHECK(under_test(w, w->bodies[0]) && under_test(w, w->bodies[9]));
 }
 
 TEST(callbacks_are_silent_in_probes)
 {
-  test_world w;
-  world_open(&w, 9.81, 20);
-  build_stirred(&w);
-  w.before_step = count_before;
-  w.after_step = count_after;
-  REQUIRE(start_silent(&w, true));
-  for (int i = 0; i < w.body_count; ++i) {
-    CHECK(hap_session_set_moved_callback(w.session, w.bodies[i], count_moved) == HAP_OK);
+  test_world *w = world_new(9.81, 20);
+  build_stirred(w);
+  w->before_step = count_before;
+  w->after_step = count_after;
+  REQUIRE(start_silent(w, true));
+  for (int i = 0; i < w->body_count; ++i) {
+    CHECK(hap_session_set_moved_callback(w->session, w->bodies[i], count_moved) == HAP_OK);
   }
   moved_calls = before_calls = after_calls = 0;
-  world_step(&w, 1);
+  world_step(w, 1);
   CHECK(before_calls == 0 && after_calls == 0); /* the first step is due at tick 50 */
-  CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 1) == HAP_OK);
   CHECK(before_calls == 1 && after_calls == 1);
-  CHECK(moved_calls == w.body_count); /* once for each body that the step moved */
-  int surfaces = w.surface_calls;
-  uint64_t probes = world_physics(&w)->probe.test.steps;
-  world_measure(&w);
-  CHECK(world_physics(&w)->probe.test.steps >= probes + 4);
-  CHECK(moved_calls == w.body_count);
+  CHECK(moved_calls == w->body_count); /* once for each body that the step moved */
+  int surfaces = w->surface_calls;
+  uint64_t probes = world_physics(w)->probe.test.steps;
+  world_measure(w);
+  CHECK(world_physics(w)->probe.test.steps >= probes + 4);
+  CHECK(moved_calls == w->body_count);
   CHECK(before_calls == 1 && after_calls == 1);
-  CHECK(w.surface_calls == surfaces);
-  world_step(&w, 1);
-  CHECK(moved_calls == 2 * w.body_count); /* they are back after the probes */
+  CHECK(w->surface_calls == surfaces);
+  world_step(w, 1);
+  CHECK(moved_calls == 2 * w->body_count); /* they are back after the probes */
   CHECK(before_calls == 2 && after_calls == 2);
-  world_close(&w);
 }
 
 /* ---- (b) and (c) ---- */
@@ -494,59 +488,56 @@ static bool settings_are(dBodyID body, const body_bits *was)
 TEST(auto_disable_comes_back_at_stop)
 {
   for (size_t k = 0; k < sizeof sleeps / sizeof sleeps[0]; ++k) {
-    test_world w;
     body_bits before[WORLD_BODIES_MAX];
     sleep_now = &sleeps[k];
-    world_open(&w, 9.81, 20);
-    build_falling(&w);
-    set_sleep(&w, -1);
-    for (int i = 0; i < w.body_count; ++i) {
-      body_read(w.bodies[i], &before[i]);
+    test_world *w = world_new(9.81, 20);
+    build_falling(w);
+    set_sleep(w, -1);
+    for (int i = 0; i < w->body_count; ++i) {
+      body_read(w->bodies[i], &before[i]);
     }
-    REQUIRE(start_silent(&w, true));
-    CHECK(dBodyGetAutoDisableFlag(w.bodies[0]) == 0);
-    world_step(&w, 60);
+    REQUIRE(start_silent(w, true));
+    CHECK(dBodyGetAutoDisableFlag(w->bodies[0]) == 0);
+    world_step(w, 60);
     int asleep = 0;
-    for (int i = 0; i < w.body_count; ++i) {
-      asleep += !dBodyIsEnabled(w.bodies[i]);
+    for (int i = 0; i < w->body_count; ++i) {
+      asleep += !dBodyIsEnabled(w->bodies[i]);
     }
     CHECK(asleep > 0);
-    CHECK(hap_session_stop(w.session) == HAP_OK);
-    for (int i = 0; i < w.body_count; ++i) {
-      CHECK(settings_are(w.bodies[i], &before[i]));
-      asleep -= !dBodyIsEnabled(w.bodies[i]);
+    CHECK(hap_session_stop(w->session) == HAP_OK);
+    for (int i = 0; i < w->body_count; ++i) {
+      CHECK(settings_are(w->bodies[i], &before[i]));
+      asleep -= !dBodyIsEnabled(w->bodies[i]);
     }
     CHECK(asleep == 0); /* stop woke nobody and put nobody to sleep */
-    CHECK(hap_session_start(w.session) == HAP_OK);
-    CHECK(dBodyGetAutoDisableFlag(w.bodies[0]) == 0);
-    hap_session_destroy(w.session);
-    w.session = NULL;
-    CHECK(settings_are(w.bodies[0], &before[0]));
-    world_close(&w);
+    CHECK(hap_session_start(w->session) == HAP_OK);
+    CHECK(dBodyGetAutoDisableFlag(w->bodies[0]) == 0);
+    hap_session_destroy(w->session);
+    w->session = NULL;
+    CHECK(settings_are(w->bodies[0], &before[0]));
+    world_close(w);
   }
 }
 
 /* Probes leave it asleep; a push wakes it, in the world too, and it can fall asleep again. */
 TEST(a_pushed_sleeper_wakes_up)
 {
-  test_world w;
-  world_open(&w, 9.81, 50);
-  dCreatePlane(w.space, 0, 0, 1, 0);
-  dBodyID cube = world_add_cube(&w, 0.05, 0.2, 0.025, 0, 0.025 - 1e-5);
+  test_world *w = world_new(9.81, 50);
+  dCreatePlane(w->space, 0, 0, 1, 0);
+  dBodyID cube = world_add_cube(w, 0.05, 0.2, 0.025, 0, 0.025 - 1e-5);
   dBodySetAutoDisableFlag(cube, 1);
-  REQUIRE(world_start(&w, 0.01, -0.0125, 0, 0.025));
-  world_step(&w, 30);
+  REQUIRE(world_start(w, 0.01, -0.0125, 0, 0.025));
+  world_step(w, 30);
   CHECK(!dBodyIsEnabled(cube)); /* although it was probed at every step */
   for (int i = 0; i < 1500; ++i) {
     double x = -0.0125 + 2e-5 * i; /* 20 mm/s */
-    world_move_pointer(&w, 0, (const double[3]){x, 0, 0.025}, (const double[3]){0.02, 0, 0});
-    CHECK(hap_session_advance(w.session, 1) == HAP_OK);
+    world_move_pointer(w, 0, (const double[3]){x, 0, 0.025}, (const double[3]){0.02, 0, 0});
+    CHECK(hap_session_advance(w->session, 1) == HAP_OK);
   }
   CHECK(dBodyIsEnabled(cube));
   CHECK(dBodyGetForce(cube)[0] == 0.0); /* what was given has been used up by the step */
   CHECK_NEAR(dBodyGetPosition(cube)[0], 0.025 + 0.0275, 0.004);
-  world_move_pointer(&w, 0, (const double[3]){-0.1, 0, 0.025}, NULL);
-  world_step(&w, 30);
+  world_move_pointer(w, 0, (const double[3]){-0.1, 0, 0.025}, NULL);
+  world_step(w, 30);
   CHECK(!dBodyIsEnabled(cube));
-  world_close(&w);
 }

@@ -286,10 +286,7 @@ static void tell(stage *s, const char *line)
   emulator_action action;
   hap_detail detail = {""};
   bool good = emulator_parse(&s->emulator, line, &action, &detail) >= HAP_OK;
-  if (!good) {
-    printf("# %s: %s\n", line, detail.text);
-  }
-  CHECK(good);
+  CHECK_SAY(good, "%s: %s", line, detail.text);
   emulator_do(&s->emulator, &action);
 }
 
@@ -767,18 +764,12 @@ TEST(commands_are_understood_or_refused)
   REQUIRE(s != NULL);
   for (size_t i = 0; i < sizeof good_commands / sizeof good_commands[0]; ++i) {
     bool taken = emulator_parse(&s->emulator, good_commands[i], &action, &detail) == HAP_OK;
-    if (!taken) {
-      printf("# %s\n", good_commands[i]);
-    }
-    CHECK(taken);
+    CHECK_SAY(taken, "%s", good_commands[i]);
   }
   for (size_t i = 0; i < sizeof bad_commands / sizeof bad_commands[0]; ++i) {
     bool refused =
         emulator_parse(&s->emulator, bad_commands[i], &action, &detail) == HAP_ERROR_FORMAT;
-    if (!refused) {
-      printf("# %s\n", bad_commands[i]);
-    }
-    CHECK(refused);
+    CHECK_SAY(refused, "%s", bad_commands[i]);
   }
   emulator_finish(&s->emulator);
 }

@@ -466,10 +466,7 @@ TEST(slips_are_said_with_their_line)
     CHECK(hapi_spidar_model_read(path, &m, &detail) == HAP_ERROR_FORMAT);
     CHECK(strstr(detail.text, path) != NULL);
     bool said = strstr(detail.text, slips[i].said) != NULL;
-    CHECK(said);
-    if (!said) {
-      printf("# \"%s\": expected \"%s\": %s\n", slips[i].line, slips[i].said, detail.text);
-    }
+    CHECK_SAY(said, "\"%s\": expected \"%s\": %s", slips[i].line, slips[i].said, detail.text);
     CHECK(memcmp(&m, &before, sizeof m) == 0);
     CHECK(hapi_spidar_model_read(path, &m, NULL) == HAP_ERROR_FORMAT);
   }

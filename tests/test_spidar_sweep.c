@@ -14,7 +14,7 @@
 #include "plugins/spidar/calibration.h"
 #include "tests/spidar_rig.h"
 
-#define SWEEP "25" /* s */
+#define SWEEP "12" /* s */
 #define PATH_SIZE 6000
 
 static emulated machine;

@@ -40,29 +40,27 @@ static void push_cube(hap_model model, double physics_hz, motion *out)
 {
   static const double half[3] = {0.025, 0.025, 0.025};
   static const double at[3] = {0.0, 0.0, 0.0249};
-  tool_world w;
-  tool_begin(&w, model);
-  w.def.physics_hz = physics_hz;
-  dWorldSetContactSurfaceLayer(w.world, 1e-4);
-  dWorldSetQuickStepNumIterations(w.world, model == HAP_MODEL_SINGLE ? 1000 : 50);
-  w.tool_def.damping = 5.0;
-  tool_add_floor(&w);
-  dBodyID body = add_box(&w, 0.5, half, at);
-  CHECK(tool_start(&w));
-  tool_go(&w, -0.037, 0.012, 0.025, 0.0);
-  tool_run(&w, 30);
+  tool_world *w = tool_new(model);
+  w->def.physics_hz = physics_hz;
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  dWorldSetQuickStepNumIterations(w->world, model == HAP_MODEL_SINGLE ? 1000 : 50);
+  w->tool_def.damping = 5.0;
+  tool_add_floor(w);
+  dBodyID body = add_box(w, 0.5, half, at);
+  CHECK(tool_start(w));
+  tool_go(w, -0.037, 0.012, 0.025, 0.0);
+  tool_run(w, 30);
   for (int i = 0; i < FRAMES; ++i) {
     double s = (double)i / FRAMES;
-    tool_go(&w, -0.037 + 0.03 * s * s * (3.0 - 2.0 * s), 0.012, 0.025, 0.1 * s);
-    w.twist.linear[0] = 0.03 * 6.0 * s * (1.0 - s) / (FRAMES * 1e-3);
-    w.twist.angular[1] = 0.1 / (FRAMES * 1e-3);
-    tool_step(&w);
-    hapi_v3_copy(w.state.wrench.force, out->force[i]);
-    hapi_v3_copy(w.state.wrench.torque, out->torque[i]);
+    tool_go(w, -0.037 + 0.03 * s * s * (3.0 - 2.0 * s), 0.012, 0.025, 0.1 * s);
+    w->twist.linear[0] = 0.03 * 6.0 * s * (1.0 - s) / (FRAMES * 1e-3);
+    w->twist.angular[1] = 0.1 / (FRAMES * 1e-3);
+    tool_step(w);
+    hapi_v3_copy(w->state.wrench.force, out->force[i]);
+    hapi_v3_copy(w->state.wrench.torque, out->torque[i]);
   }
-  CHECK(hap_session_stop(w.session) == HAP_OK);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
   hapi_v3_copy(dBodyGetPosition(body), out->end);
-  tool_end(&w);
 }
 
 /* RMS of the difference over RMS. */
@@ -107,25 +105,24 @@ TEST(several_bodies_are_felt_at_once)
   static const double middle[3] = {0.0, 0.0, 0.0};
   static const double half[3] = {0.008, 0.008, 0.01};
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
-    tool_begin(&w, all_models[m]);
-    dWorldSetContactSurfaceLayer(w.world, 1e-4);
-    tool_set_box(&w, plate, middle);
-    tool_add_floor(&w);
+    tool_world *w = tool_new(all_models[m]);
+    dWorldSetContactSurfaceLayer(w->world, 1e-4);
+    tool_set_box(w, plate, middle);
+    tool_add_floor(w);
     for (int i = -1; i <= 1; ++i) {
-      add_box(&w, 1.0, half, (const double[3]){0.03 * i, 0.0, 0.0099});
+      add_box(w, 1.0, half, (const double[3]){0.03 * i, 0.0, 0.0099});
     }
-    CHECK(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, 0.0199 + 0.003 + 0.004, 0.0);
-    tool_run(&w, 60);
-    tool_move(&w, 0.0, 0.0, 0.0199 + 0.003 - 0.001, 0.0, 100);
-    tool_run(&w, 200);
-    printf("# model %d: %.5f N, %u contacts\n", (int)all_models[m], w.state.wrench.force[2],
-           w.state.contacts);
-    CHECK(w.state.contacts == 12);
-    CHECK_NEAR(w.state.wrench.force[2], 3.0 * K * 0.001, 0.02);
-    CHECK_NEAR(hapi_v3_norm(w.state.wrench.torque), 0.0, 1e-3);
-    tool_end(&w);
+    CHECK(tool_start(w));
+    tool_go(w, 0.0, 0.0, 0.0199 + 0.003 + 0.004, 0.0);
+    tool_run(w, 60);
+    tool_move(w, 0.0, 0.0, 0.0199 + 0.003 - 0.001, 0.0, 100);
+    tool_run(w, 200);
+    printf("# model %d: %.5f N, %u contacts\n", (int)all_models[m], w->state.wrench.force[2],
+           w->state.contacts);
+    CHECK(w->state.contacts == 12);
+    CHECK_NEAR(w->state.wrench.force[2], 3.0 * K * 0.001, 0.02);
+    CHECK_NEAR(hapi_v3_norm(w->state.wrench.torque), 0.0, 1e-3);
+    tool_end(w);
   }
 }
 
@@ -172,30 +169,29 @@ TEST(momentum_and_spin_go_to_a_free_body)
 TEST(a_measured_body_answers_to_a_tool)
 {
   static const double half[3] = {0.02, 0.02, 0.02};
-  tool_world w;
   double impulse = 0.0;
   hap_stats stats;
-  tool_begin(&w, HAP_MODEL_CONTACT);
-  dWorldSetGravity(w.world, 0.0, 0.0, 0.0);
-  dBodyID body = add_box(&w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
-  dTriMeshDataID data = add_unknown_shape(w.space, body);
-  CHECK(tool_start(&w));
-  tool_go(&w, -0.034, 0.005, 0.0, 0.0);
-  tool_run(&w, 60);
+  tool_world *w = tool_new(HAP_MODEL_CONTACT);
+  dWorldSetGravity(w->world, 0.0, 0.0, 0.0);
+  dBodyID body = add_box(w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
+  dTriMeshDataID data = add_unknown_shape(w->space, body);
+  CHECK(tool_start(w));
+  tool_go(w, -0.034, 0.005, 0.0, 0.0);
+  tool_run(w, 60);
   for (int i = 0; i < 160; ++i) {
-    tool_move(&w, -0.034 + 0.0001 * fmin(i, 80), 0.005, 0.0, 0.0, 1);
-    impulse -= 1e-3 * w.state.wrench.force[0];
+    tool_move(w, -0.034 + 0.0001 * fmin(i, 80), 0.005, 0.0, 0.0, 1);
+    impulse -= 1e-3 * w->state.wrench.force[0];
   }
-  CHECK(hap_session_stats(w.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
   CHECK(stats.model.measured_bodies == 1);
-  tool_go(&w, -0.2, 0.0, 0.0, 0.0);
-  tool_run(&w, 100);
-  CHECK(hap_session_stop(w.session) == HAP_OK);
+  tool_go(w, -0.2, 0.0, 0.0, 0.0);
+  tool_run(w, 100);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
   printf("# %.5f of %.5f N s\n", 0.5 * dBodyGetLinearVel(body)[0], impulse);
   CHECK(impulse > 0.01 && impulse < 0.2);
   CHECK_NEAR(0.5 * dBodyGetLinearVel(body)[0], impulse, 0.02 * impulse);
   CHECK(fabs(dBodyGetAngularVel(body)[2]) > 0.05); /* it was pushed beside its middle */
-  tool_end(&w);
+  tool_end(w);
   dGeomTriMeshDataDestroy(data);
 }
 
@@ -204,38 +200,37 @@ TEST(a_body_and_a_tool_may_go_while_they_touch)
 {
   static const double half[3] = {0.02, 0.02, 0.02};
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
-    tool_begin(&w, all_models[m]);
-    dWorldSetContactSurfaceLayer(w.world, 1e-4);
-    tool_add_floor(&w);
-    dBodyID body = add_box(&w, 1.0, half, (const double[3]){0.0, 0.0, 0.0199});
+    tool_world *w = tool_new(all_models[m]);
+    dWorldSetContactSurfaceLayer(w->world, 1e-4);
+    tool_add_floor(w);
+    dBodyID body = add_box(w, 1.0, half, (const double[3]){0.0, 0.0, 0.0199});
     dGeomID geom = dBodyGetFirstGeom(body);
-    CHECK(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, 0.0399 + HALF + 0.004, 0.0);
-    tool_run(&w, 60);
-    tool_move(&w, 0.0, 0.0, 0.0399 + HALF - 0.001, 0.0, 100);
-    tool_run(&w, 100);
-    CHECK_NEAR(w.state.wrench.force[2], 1.0, 0.02);
-    CHECK(hap_session_lock(w.session) == HAP_OK);
-    CHECK(hap_session_forget_geom(w.session, geom) == HAP_OK);
-    CHECK(hap_session_forget_body(w.session, body) == HAP_OK);
+    CHECK(tool_start(w));
+    tool_go(w, 0.0, 0.0, 0.0399 + HALF + 0.004, 0.0);
+    tool_run(w, 60);
+    tool_move(w, 0.0, 0.0, 0.0399 + HALF - 0.001, 0.0, 100);
+    tool_run(w, 100);
+    CHECK_NEAR(w->state.wrench.force[2], 1.0, 0.02);
+    CHECK(hap_session_lock(w->session) == HAP_OK);
+    CHECK(hap_session_forget_geom(w->session, geom) == HAP_OK);
+    CHECK(hap_session_forget_body(w->session, body) == HAP_OK);
     dGeomDestroy(geom);
     dBodyDestroy(body);
-    CHECK(hap_session_unlock(w.session) == HAP_OK);
-    tool_run(&w, 60);
-    CHECK(hapi_v3_norm(w.state.wrench.force) == 0.0 && w.state.contacts == 0);
-    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(&w, 60);
-    tool_move(&w, 0.0, 0.0, HALF - 0.001, 0.0, 100);
-    tool_run(&w, 60);
-    CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9);
-    CHECK(hap_pointer_remove(w.session, w.tool) == HAP_OK);
-    CHECK(hap_session_advance(w.session, 60) == HAP_OK);
-    CHECK(hap_pointer_add(w.session, &w.tool_def, &w.tool) == HAP_OK); /* in its place */
-    w.state.stamp_ns = 0;
-    tool_run(&w, 200);
-    CHECK_NEAR(w.state.wrench.force[2], 1.0, 1e-9);
-    tool_end(&w);
+    CHECK(hap_session_unlock(w->session) == HAP_OK);
+    tool_run(w, 60);
+    CHECK(hapi_v3_norm(w->state.wrench.force) == 0.0 && w->state.contacts == 0);
+    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(w, 60);
+    tool_move(w, 0.0, 0.0, HALF - 0.001, 0.0, 100);
+    tool_run(w, 60);
+    CHECK_NEAR(w->state.wrench.force[2], 1.0, 1e-9);
+    CHECK(hap_pointer_remove(w->session, w->tool) == HAP_OK);
+    CHECK(hap_session_advance(w->session, 60) == HAP_OK);
+    CHECK(hap_pointer_add(w->session, &w->tool_def, &w->tool) == HAP_OK); /* in its place */
+    w->state.stamp_ns = 0;
+    tool_run(w, 200);
+    CHECK_NEAR(w->state.wrench.force[2], 1.0, 1e-9);
+    tool_end(w);
   }
 }
 
@@ -243,17 +238,16 @@ TEST(a_body_and_a_tool_may_go_while_they_touch)
 TEST(a_tool_that_arrives_deep_comes_in_slowly)
 {
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
-    tool_begin(&w, all_models[m]);
-    tool_add_floor(&w);
-    CHECK(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, HALF - 0.005, 0.0);
-    tool_run(&w, 100);
+    tool_world *w = tool_new(all_models[m]);
+    tool_add_floor(w);
+    CHECK(tool_start(w));
+    tool_go(w, 0.0, 0.0, HALF - 0.005, 0.0);
+    tool_run(w, 100);
     printf("# model %d: %.3f N, at most %.3f N a tick\n", (int)all_models[m],
-           w.state.wrench.force[2], w.steepest);
-    CHECK_NEAR(w.state.wrench.force[2], 5.0, 1e-9);
-    CHECK(w.steepest <= 0.3); /* 5 N in 20 ms */
-    tool_end(&w);
+           w->state.wrench.force[2], w->steepest);
+    CHECK_NEAR(w->state.wrench.force[2], 5.0, 1e-9);
+    CHECK(w->steepest <= 0.3); /* 5 N in 20 ms */
+    tool_end(w);
   }
 }
 
@@ -262,55 +256,52 @@ TEST(a_tool_that_arrives_deep_comes_in_slowly)
 TEST(a_stack_of_light_cubes_stays_calm_under_a_tool)
 {
   static const double half[3] = {HALF, HALF, HALF};
-  tool_world w;
-  tool_begin(&w, HAP_MODEL_CONTACT);
-  dWorldSetContactSurfaceLayer(w.world, 1e-4);
-  dWorldSetQuickStepNumIterations(w.world, 100);
-  tool_add_floor(&w);
+  tool_world *w = tool_new(HAP_MODEL_CONTACT);
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  dWorldSetQuickStepNumIterations(w->world, 100);
+  tool_add_floor(w);
   dBodyID cubes[3];
   for (int i = 0; i < 3; ++i) {
     cubes[i] =
-        add_box(&w, 0.002, half, (const double[3]){0.0, 0.0, HALF + (2 * HALF - 1e-4) * i - 1e-4});
+        add_box(w, 0.002, half, (const double[3]){0.0, 0.0, HALF + (2 * HALF - 1e-4) * i - 1e-4});
   }
-  CHECK(tool_start(&w));
+  CHECK(tool_start(w));
   double top = 6 * HALF - 3e-4;
-  tool_go(&w, 0.0, 0.0, top + HALF + 0.004, 0.0);
-  tool_run(&w, 60);
-  tool_move(&w, 0.0, 0.0, top + HALF - 0.003, 0.0, 150);
+  tool_go(w, 0.0, 0.0, top + HALF + 0.004, 0.0);
+  tool_run(w, 60);
+  tool_move(w, 0.0, 0.0, top + HALF - 0.003, 0.0, 150);
   for (int i = 0; i < 2000; ++i) {
-    tool_go(&w, 0.0, 0.0, top + HALF - 0.003, 0.01 * sin(0.02 * i));
-    w.twist.angular[1] = 0.01 * 20.0 * cos(0.02 * i);
-    tool_step(&w);
+    tool_go(w, 0.0, 0.0, top + HALF - 0.003, 0.01 * sin(0.02 * i));
+    w->twist.angular[1] = 0.01 * 20.0 * cos(0.02 * i);
+    tool_step(w);
   }
-  CHECK_NEAR(w.state.wrench.force[2], 3.0, 0.1);
-  CHECK(w.steepest < 0.1);
-  CHECK(w.work_most < 0.01 * 0.5 * K * 0.003 * 0.003);
-  CHECK(hap_session_stop(w.session) == HAP_OK);
+  CHECK_NEAR(w->state.wrench.force[2], 3.0, 0.1);
+  CHECK(w->steepest < 0.1);
+  CHECK(w->work_most < 0.01 * 0.5 * K * 0.003 * 0.003);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
   for (int i = 0; i < 3; ++i) {
     const dReal *at = dBodyGetPosition(cubes[i]);
     printf("# cube %d at %.3f %.3f %.3f mm\n", i, 1e3 * at[0], 1e3 * at[1], 1e3 * at[2]);
     CHECK(fabs(at[0]) + fabs(at[1]) < 1e-3);
   }
-  printf("# the hand got at most %.3g J, and %.3g J at the end\n", w.work_most, w.work);
-  tool_end(&w);
+  printf("# the hand got at most %.3g J, and %.3g J at the end\n", w->work_most, w->work);
 }
 
 /* Between two walls that are nearer to each other than the tool is wide. */
 TEST(a_tool_wedged_between_walls_is_held_in_the_middle)
 {
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
-    tool_begin(&w, all_models[m]);
+    tool_world *w = tool_new(all_models[m]);
     for (int side = -1; side <= 1; side += 2) {
-      dGeomID wall = dCreateBox(w.space, 0.1, 0.2, 0.2);
+      dGeomID wall = dCreateBox(w->space, 0.1, 0.2, 0.2);
       dGeomSetPosition(wall, side * (0.05 + HALF - 0.0005), 0.0, 0.0);
     }
-    CHECK(tool_start(&w));
-    tool_go(&w, 0.0002, 0.0, 0.0, 0.0);
-    tool_run(&w, 400);
-    CHECK_NEAR(w.state.wrench.force[0], -K * 0.0004, 1e-9);
-    CHECK(w.state.contacts == 8);
-    tool_end(&w);
+    CHECK(tool_start(w));
+    tool_go(w, 0.0002, 0.0, 0.0, 0.0);
+    tool_run(w, 400);
+    CHECK_NEAR(w->state.wrench.force[0], -K * 0.0004, 1e-9);
+    CHECK(w->state.contacts == 8);
+    tool_end(w);
   }
 }
 
@@ -318,24 +309,23 @@ TEST(a_tool_wedged_between_walls_is_held_in_the_middle)
  * points make energy. */
 static double go_rounds(hap_model model, hap_guard guard, double *out_stored)
 {
-  tool_world w;
-  tool_begin(&w, model);
-  w.research.guard = guard;
-  tool_add_floor(&w);
-  CHECK(tool_start(&w));
-  tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
-  tool_run(&w, 60);
-  w.work = w.work_most = 0.0;
+  tool_world *w = tool_new(model);
+  w->research.guard = guard;
+  tool_add_floor(w);
+  CHECK(tool_start(w));
+  tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+  tool_run(w, 60);
+  w->work = w->work_most = 0.0;
   *out_stored = 0.0;
   for (int i = 0; i < 10; ++i) {
-    tool_move(&w, 0.0, 0.0, HALF - 0.002, 0.0, 150);
-    tool_move(&w, 0.0, 0.0, HALF - 0.002, 0.1, 150);
-    *out_stored = fmax(*out_stored, -w.work);
-    tool_move(&w, 0.0, 0.0, HALF + 0.004, 0.1, 150);
-    tool_move(&w, 0.0, 0.0, HALF + 0.004, 0.0, 50);
+    tool_move(w, 0.0, 0.0, HALF - 0.002, 0.0, 150);
+    tool_move(w, 0.0, 0.0, HALF - 0.002, 0.1, 150);
+    *out_stored = fmax(*out_stored, -w->work);
+    tool_move(w, 0.0, 0.0, HALF + 0.004, 0.1, 150);
+    tool_move(w, 0.0, 0.0, HALF + 0.004, 0.0, 50);
   }
-  tool_end(&w);
-  return w.work;
+  tool_end(w);
+  return w->work;
 }
 
 TEST(no_round_on_a_wall_gives_energy)

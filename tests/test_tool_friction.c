@@ -310,22 +310,21 @@ TEST(a_change_of_model_lets_nothing_go)
 /* A device of 3 dof does not turn its tool, and gets no torque; a world that turns under it does not move it. */
 TEST(a_device_without_torque_feels_it_slide)
 {
-  tool_world w;
-  tool_begin(&w, HAP_MODEL_CONTACT);
-  w.tool_def.friction = MU;
-  w.tool_def.finger_radius = 0.005;
+  tool_world *w = tool_new(HAP_MODEL_CONTACT);
+  w->tool_def.friction = MU;
+  w->tool_def.finger_radius = 0.005;
   REQUIRE(hap_device_open("virtual:path=0:0/0/0.013;0.3:0/0/0.008;1:0.01/0.005/0.008,blend=linear,"
                           "hand=rigid",
-                          &w.tool_def.device, &w.detail) == HAP_OK);
-  tool_add_floor(&w);
-  REQUIRE(tool_start(&w));
-  CHECK(hap_session_advance(w.session, 900) == HAP_OK);
-  CHECK(hap_pointer_get(w.session, w.tool, &w.state, sizeof w.state) == HAP_OK);
-  CHECK_NEAR(w.state.wrench.force[2], LOAD, 1e-6);
-  CHECK_NEAR(w.state.wrench.force[0], -MU * LOAD * 2.0 / sqrt(5.0), 1e-3);
-  CHECK_NEAR(w.state.wrench.force[1], -MU * LOAD / sqrt(5.0), 1e-3);
-  hap_device *device = w.tool_def.device;
-  tool_end(&w);
+                          &w->tool_def.device, &w->detail) == HAP_OK);
+  tool_add_floor(w);
+  REQUIRE(tool_start(w));
+  CHECK(hap_session_advance(w->session, 900) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, w->tool, &w->state, sizeof w->state) == HAP_OK);
+  CHECK_NEAR(w->state.wrench.force[2], LOAD, 1e-6);
+  CHECK_NEAR(w->state.wrench.force[0], -MU * LOAD * 2.0 / sqrt(5.0), 1e-3);
+  CHECK_NEAR(w->state.wrench.force[1], -MU * LOAD / sqrt(5.0), 1e-3);
+  hap_device *device = w->tool_def.device;
+  tool_end(w);
   hap_device_close(device);
 }
 
@@ -335,27 +334,26 @@ TEST(points_that_leap_hold_where_they_are)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
   for (int m = 0; m < 2; ++m) {
-    tool_world w;
-    tool_begin(&w, all[m]);
-    w.tool_def.friction = MU;
-    dGeomID box = dCreateBox(w.space, 0.016, 0.016, 0.1);
+    tool_world *w = tool_new(all[m]);
+    w->tool_def.friction = MU;
+    dGeomID box = dCreateBox(w->space, 0.016, 0.016, 0.1);
     dGeomSetPosition(box, 0.0, 0.0, -0.05);
-    REQUIRE(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(&w, 40);
-    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
-    stand(&w, 2e-4, 0.0, HALF - DEEP, 0.04);
-    tool_run(&w, 40);
+    REQUIRE(tool_start(w));
+    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(w, 40);
+    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    stand(w, 2e-4, 0.0, HALF - DEEP, 0.04);
+    tool_run(w, 40);
     double stiffness = 2.0 * K * 0.008 * 0.008;
-    CHECK_NEAR(w.state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
-    CHECK(hap_session_lock(w.session) == HAP_OK);
+    CHECK_NEAR(w->state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
+    CHECK(hap_session_lock(w->session) == HAP_OK);
     dGeomBoxSetLengths(box, 0.0136, 0.0136, 0.1);
-    CHECK(hap_session_unlock(w.session) == HAP_OK);
-    tool_run(&w, 80);
+    CHECK(hap_session_unlock(w->session) == HAP_OK);
+    tool_run(w, 80);
     stiffness = 2.0 * K * 0.0068 * 0.0068;
-    CHECK_NEAR(w.state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
-    CHECK_NEAR(w.state.wrench.force[0], -K * 2e-4, 0.01 * K * 2e-4);
-    tool_end(&w);
+    CHECK_NEAR(w->state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
+    CHECK_NEAR(w->state.wrench.force[0], -K * 2e-4, 0.01 * K * 2e-4);
+    tool_end(w);
   }
 }
 
@@ -366,27 +364,26 @@ TEST(a_mesh_holds_as_a_floor)
   static const double corners[] = {-0.2, -0.2, 0.0, 0.2, -0.2, 0.0, 0.2, 0.2, 0.0, -0.2, 0.2, 0.0};
   static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
   for (int m = 0; m < 3; ++m) {
-    tool_world w;
-    tool_begin(&w, all[m]);
-    w.tool_def.friction = MU;
+    tool_world *w = tool_new(all[m]);
+    w->tool_def.friction = MU;
     dTriMeshDataID data = dGeomTriMeshDataCreate();
     dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
                                 3 * (int)sizeof(dTriIndex));
-    dCreateTriMesh(w.space, data, NULL, NULL, NULL);
-    REQUIRE(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(&w, 40);
-    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
-    stand(&w, 4e-4, 0.0, HALF - DEEP, 0.0);
-    tool_run(&w, 1000);
-    CHECK_NEAR(w.state.wrench.force[0], -K * 4e-4, 1e-3 * K * 4e-4);
-    stand(&w, 0.0, 0.0, HALF - DEEP, 0.02);
-    tool_run(&w, 1000);
+    dCreateTriMesh(w->space, data, NULL, NULL, NULL);
+    REQUIRE(tool_start(w));
+    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(w, 40);
+    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    stand(w, 4e-4, 0.0, HALF - DEEP, 0.0);
+    tool_run(w, 1000);
+    CHECK_NEAR(w->state.wrench.force[0], -K * 4e-4, 1e-3 * K * 4e-4);
+    stand(w, 0.0, 0.0, HALF - DEEP, 0.02);
+    tool_run(w, 1000);
     double stiffness = 2.0 * K * HALF * HALF;
-    CHECK_NEAR(w.state.wrench.torque[2], -stiffness * 0.02, 2e-3 * stiffness * 0.02);
-    tool_move(&w, 0.03, 0.004, HALF - DEEP, 0.0, 600);
-    CHECK_NEAR(slip_of(&w), MU * LOAD, 2e-3 * LOAD);
-    tool_end(&w);
+    CHECK_NEAR(w->state.wrench.torque[2], -stiffness * 0.02, 2e-3 * stiffness * 0.02);
+    tool_move(w, 0.03, 0.004, HALF - DEEP, 0.0, 600);
+    CHECK_NEAR(slip_of(w), MU * LOAD, 2e-3 * LOAD);
+    tool_end(w);
     dGeomTriMeshDataDestroy(data);
   }
 }
@@ -415,32 +412,32 @@ TEST(each_geom_has_its_friction)
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
                                   HAP_MODEL_CONTACT};
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
-    tool_begin(&w, all[m]);
+    tool_world *w = tool_new(all[m]);
     memset(&asked, 0, sizeof asked);
     asked.says[0] = 0.2;
     asked.says[1] = 0.8;
-    w.ode.pointer_surface = pointer_surface;
-    w.tool_def.friction = 0.3;
-    asked.left = dCreateBox(w.space, 0.1, 0.2, 0.1);
+    w->ode.pointer_surface = pointer_surface;
+    w->tool_def.friction = 0.3;
+    asked.left = dCreateBox(w->space, 0.1, 0.2, 0.1);
     dGeomSetPosition(asked.left, -0.051, 0.0, -0.05);
-    dGeomSetPosition(dCreateBox(w.space, 0.1, 0.2, 0.1), 0.051, 0.0, -0.05);
-    REQUIRE(tool_start(&w));
-    tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(&w, 40);
-    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
-    tool_move(&w, 0.0, 0.005, HALF - DEEP, 0.0, 100);
+    dGeomSetPosition(dCreateBox(w->space, 0.1, 0.2, 0.1), 0.051, 0.0, -0.05);
+    REQUIRE(tool_start(w));
+    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+    tool_run(w, 40);
+    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    tool_move(w, 0.0, 0.005, HALF - DEEP, 0.0, 100);
     CHECK(asked.calls > 0 && asked.came_with == 0.3);
-    CHECK_NEAR(w.state.wrench.force[2], 2.0 * LOAD, 1e-3 * LOAD);
-    CHECK_NEAR(w.state.wrench.force[1], -1.0 * LOAD, 2e-3 * LOAD);
-    CHECK_NEAR(w.state.wrench.torque[2], -0.6 * LOAD * 0.0055, 2e-3 * LOAD * HALF); /* 1 to 10 mm */
+    CHECK_NEAR(w->state.wrench.force[2], 2.0 * LOAD, 1e-3 * LOAD);
+    CHECK_NEAR(w->state.wrench.force[1], -1.0 * LOAD, 2e-3 * LOAD);
+    CHECK_NEAR(w->state.wrench.torque[2], -0.6 * LOAD * 0.0055,
+               2e-3 * LOAD * HALF); /* 1 to 10 mm */
     asked.says[0] = asked.says[1] = 0.1;
-    tool_run(&w, 60);
-    CHECK_NEAR(w.state.wrench.force[1], -0.2 * LOAD, 2e-3 * LOAD);
+    tool_run(w, 60);
+    CHECK_NEAR(w->state.wrench.force[1], -0.2 * LOAD, 2e-3 * LOAD);
     asked.says[0] = asked.says[1] = 0.0;
-    tool_run(&w, 60);
-    CHECK_NEAR(slip_of(&w), 0.0, 1e-9);
-    tool_end(&w);
+    tool_run(w, 60);
+    CHECK_NEAR(slip_of(w), 0.0, 1e-9);
+    tool_end(w);
   }
 }
 
@@ -541,27 +538,25 @@ static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored
                                      {0, -0.07, 0.06}, {0, -0.07, 0},   {0, 0, 0}};
   double best = -HUGE_VAL;
   const ground g = {model, true, false, 0.0};
-  tool_world w;
-  tool_begin(&w, g.model);
-  w.research.guard = guard;
-  w.tool_def.friction = 10.0;
-  dGeomSetPosition(dCreateBox(w.space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
-  CHECK(tool_start(&w));
-  tool_go(&w, 0.0, 0.0, HALF + 0.004, 0.07);
-  tool_run(&w, 60);
+  tool_world *w = tool_new(g.model);
+  w->research.guard = guard;
+  w->tool_def.friction = 10.0;
+  dGeomSetPosition(dCreateBox(w->space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
+  CHECK(tool_start(w));
+  tool_go(w, 0.0, 0.0, HALF + 0.004, 0.07);
+  tool_run(w, 60);
   *out_stored = 0.0;
   for (int i = 0; i < 5; ++i) {
-    w.work = 0.0;
-    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.07, 100);
+    w->work = 0.0;
+    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.07, 100);
     for (int k = 0; k + 1 < 6; ++k) {
-      go_to(&w, &stations[k], &stations[k + 1], 100);
-      *out_stored = fmax(*out_stored, -w.work);
+      go_to(w, &stations[k], &stations[k + 1], 100);
+      *out_stored = fmax(*out_stored, -w->work);
     }
-    tool_move(&w, 0.0, 0.0, HALF + 0.004, 0.0, 100);
-    tool_move(&w, 0.0, 0.0, HALF + 0.004, 0.07, 20);
-    best = fmax(best, w.work);
+    tool_move(w, 0.0, 0.0, HALF + 0.004, 0.0, 100);
+    tool_move(w, 0.0, 0.0, HALF + 0.004, 0.07, 20);
+    best = fmax(best, w->work);
   }
-  tool_end(&w);
   return best;
 }
 

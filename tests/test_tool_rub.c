@@ -51,50 +51,48 @@ typedef struct drag {
 static void drag_block(const drag *d, hap_model model, double physics_hz, motion *out)
 {
   const double top = EDGE - 1e-4;
-  tool_world w;
   dMass mass;
   floor_mu = d->floor_mu;
-  tool_begin(&w, model);
-  w.ode.surface = floor_surface;
-  w.def.physics_hz = physics_hz;
-  dWorldSetContactSurfaceLayer(w.world, 1e-4);
-  dWorldSetQuickStepNumIterations(w.world, model == HAP_MODEL_SINGLE ? 1000 : 50);
-  w.tool_def.stiffness = STIFF;
-  w.tool_def.damping = 5.0;
-  w.tool_def.friction = d->mu;
-  w.tool_def.finger_radius = d->finger;
+  tool_world *w = tool_new(model);
+  w->ode.surface = floor_surface;
+  w->def.physics_hz = physics_hz;
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  dWorldSetQuickStepNumIterations(w->world, model == HAP_MODEL_SINGLE ? 1000 : 50);
+  w->tool_def.stiffness = STIFF;
+  w->tool_def.damping = 5.0;
+  w->tool_def.friction = d->mu;
+  w->tool_def.finger_radius = d->finger;
   if (d->proxied && model == HAP_MODEL_CONTACT) {
-    w.tool_expert.coupling = HAP_COUPLING_PROXY;
-    w.tool_expert.coupling_stiffness = 1e6;
+    w->tool_expert.coupling = HAP_COUPLING_PROXY;
+    w->tool_expert.coupling_stiffness = 1e6;
   }
-  tool_add_floor(&w);
-  dBodyID body = dBodyCreate(w.world);
-  dGeomSetBody(dCreateBox(w.space, EDGE, EDGE, EDGE), body);
+  tool_add_floor(w);
+  dBodyID body = dBodyCreate(w->world);
+  dGeomSetBody(dCreateBox(w->space, EDGE, EDGE, EDGE), body);
   dMassSetBoxTotal(&mass, 0.3, EDGE, EDGE, EDGE);
   dBodySetMass(body, &mass);
   dBodySetPosition(body, 0.0, 0.0, EDGE / 2 - 1e-4);
-  CHECK(tool_start(&w));
-  tool_go(&w, 0.0, d->beside, top + HALF + 0.003, 0.0);
-  tool_run(&w, 60);
-  tool_move(&w, 0.0, d->beside, top + HALF - 0.002, 0.0, 100);
+  CHECK(tool_start(w));
+  tool_go(w, 0.0, d->beside, top + HALF + 0.003, 0.0);
+  tool_run(w, 60);
+  tool_move(w, 0.0, d->beside, top + HALF - 0.002, 0.0, 100);
   for (int i = 0; i < FRAMES; ++i) {
     double s = fmin((double)i / (FRAMES - 100), 1.0);
     double rate = s < 1.0 ? 6.0 * s * (1.0 - s) / ((FRAMES - 100) * 1e-3) : 0.0;
     double share = s * s * (3.0 - 2.0 * s);
     double angle = d->turn * share;
-    w.pose = (hap_pose){{0.02 * share, d->beside, top + HALF - 0.002},
-                        {cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle)}};
-    hapi_v3_set(w.twist.linear, 0.02 * rate, 0.0, 0.0);
-    hapi_v3_set(w.twist.angular, 0.0, 0.0, d->turn * rate);
-    tool_step(&w);
-    hapi_v3_copy(w.state.wrench.force, out->force[i]);
-    hapi_v3_copy(w.state.wrench.torque, out->torque[i]);
+    w->pose = (hap_pose){{0.02 * share, d->beside, top + HALF - 0.002},
+                         {cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle)}};
+    hapi_v3_set(w->twist.linear, 0.02 * rate, 0.0, 0.0);
+    hapi_v3_set(w->twist.angular, 0.0, 0.0, d->turn * rate);
+    tool_step(w);
+    hapi_v3_copy(w->state.wrench.force, out->force[i]);
+    hapi_v3_copy(w->state.wrench.torque, out->torque[i]);
   }
-  CHECK(hap_session_stop(w.session) == HAP_OK);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
   hapi_v3_copy(dBodyGetPosition(body), out->end);
   const dReal *q = dBodyGetQuaternion(body);
   out->turn = 2.0 * atan2(q[3], q[0]);
-  tool_end(&w);
 }
 
 /* RMS of the difference over RMS. */

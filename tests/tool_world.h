@@ -105,9 +105,26 @@ static inline bool tool_start(tool_world *w)
 
 static inline void tool_end(tool_world *w)
 {
+  if (w->world == NULL) { /* closed already */
+    return;
+  }
   hap_session_destroy(w->session);
   dSpaceDestroy(w->space);
   dWorldDestroy(w->world);
+  w->world = NULL;
+}
+
+static inline void tool_end_owned(void *owned)
+{
+  tool_end(owned);
+}
+
+/* Closed when the test has ended. */
+static inline tool_world *tool_new(hap_model model)
+{
+  tool_world *w = tap_own(sizeof *w, tool_end_owned);
+  tool_begin(w, model);
+  return w;
 }
 
 static inline void tool_step(tool_world *w)

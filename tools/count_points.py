@@ -14,6 +14,7 @@ import sys
 import xml.etree.ElementTree as et
 
 OUTPUT_LINES_MAX = 100
+SLOWEST = 10
 
 
 def read_points(folder):
@@ -78,7 +79,8 @@ def main(folder, code):
     count = {"pass": 0, "fail": 0, "skip": 0}
     skipped = []
     failed = []
-    for program in read_programs(folder):
+    programs = list(read_programs(folder))
+    for program in programs:
         rows = judge(program, points.get(program["name"], []))
         bad = []
         for name, fate, reason in rows:
@@ -93,7 +95,9 @@ def main(folder, code):
     if code != 0 and count["fail"] == 0:
         failed += ["", f"failed: meson test ended with {code}"]
         count["fail"] += 1
-    print("\n".join(["", *skipped, *failed, ""]))
+    slowest = sorted(programs, key=lambda p: -p["duration"])[:SLOWEST]
+    slow = [f"slowest: {p['duration']:6.1f} s  {p['name']}" for p in slowest]
+    print("\n".join(["", *skipped, *failed, "", *slow, ""]))
     print(f"{count['pass']} passed, {count['fail']} failed")
     return 0 if count["pass"] > 0 and count["fail"] == 0 else 1
 

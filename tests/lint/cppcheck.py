@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""cppcheck.py ROOT: cppcheck over all code but the tests, for Linux with threads and SSE."""
+"""cppcheck.py ROOT [--all]: cppcheck over the units that changed since the branch began, or over
+all; not over tests; for Linux with threads and SSE."""
 import os
 import shutil
 import subprocess
@@ -19,17 +20,26 @@ OPTIONS = [
 ]
 
 
-def main(root):
+def main(root, whole):
     if not shutil.which("cppcheck"):
         lint.skip_all("needs cppcheck")
     tap = lint.Tap()
+    units = [name for name in lint.code_files(root) if name.endswith(".c")]
     for folder in FOLDERS:
-        command = ["cppcheck", *OPTIONS, "-I", "include", "-I", "lib", "-I", ".", folder]
-        run = subprocess.run(command, cwd=root, capture_output=True, text=True)
-        said = run.stderr.splitlines() + run.stdout.splitlines()
-        said = [] if run.returncode == 0 else said or [f"cppcheck: exit status {run.returncode}"]
+        chosen = [name for name in units if name.split("/")[0] == folder]
+        count = len(chosen)
+        if not whole:
+            chosen = lint.changed_units(root, chosen, ["tests/lint/cppcheck.py"])
+        print(f"# {folder}: {len(chosen)} of {count} units", flush=True)
+        said = [] if count else [f"there is no unit in {folder}/"]
+        if chosen:
+            command = ["cppcheck", *OPTIONS, "-I", "include", "-I", "lib", "-I", ".", *chosen]
+            run = subprocess.run(command, cwd=root, capture_output=True, text=True)
+            said = run.stderr.splitlines() + run.stdout.splitlines()
+            said = said or [f"cppcheck: exit status {run.returncode}"]
+            said = said if run.returncode != 0 else []
         tap.point(f"cppcheck, {folder}", said)
     tap.done()
 
 
-main(sys.argv[1])
+main(sys.argv[1], "--all" in sys.argv[2:])

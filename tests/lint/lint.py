@@ -74,6 +74,62 @@ def code_files(root):
             if n.endswith((".c", ".h")) and n.split("/")[0] in CODE_DIRS]
 
 
+def _git(root, *args):
+    """What git says; None when it cannot."""
+    try:
+        run = subprocess.run(["git", "-C", root, *args], capture_output=True, check=True, text=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return run.stdout.strip()
+
+
+def _base(root):
+    """Where this branch left the main one; on the main branch itself the last commit but one."""
+    head = _git(root, "rev-parse", "HEAD")
+    for main in ("origin/HEAD", "origin/main", "main"):
+        base = _git(root, "merge-base", "HEAD", main)
+        if base and base != head:
+            return base
+    return _git(root, "rev-parse", "HEAD^")
+
+
+def changed_files(root):
+    """Files that differ from the base, and new ones; None: any may have changed."""
+    base = _base(root)
+    changed = base and _git(root, "diff", "--name-only", base)
+    new = _git(root, "ls-files", "--others", "--exclude-standard")
+    return None if not base or changed is None or new is None else \
+        set(changed.splitlines()) | set(new.splitlines())
+
+
+_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^>"\n]+)[>"]', re.M)
+
+
+def _resolve(root, name, target):
+    for start in (os.path.dirname(name), "lib", "", "include"):
+        path = os.path.normpath(os.path.join(start, target))
+        if not path.startswith("..") and os.path.isfile(os.path.join(root, path)):
+            return path
+    return None
+
+
+def changed_units(root, names, settings):
+    """Files that changed or include what changed; all when a file of settings changed."""
+    changed = changed_files(root)
+    if changed is None or changed & set(settings):
+        return list(names)
+    known = {}  # file: it or what it includes changed
+
+    def is_changed(name):
+        if name not in known:
+            known[name] = name in changed
+            found = {_resolve(root, name, target) for target in _INCLUDE.findall(read(root, name))}
+            known[name] = known[name] or any(is_changed(other) for other in found if other)
+        return known[name]
+
+    return [name for name in names if is_changed(name)]
+
+
 def read(root, name):
     with open(os.path.join(root, name), encoding="utf-8", errors="replace") as f:
         return f.read()

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""tidy.py ROOT BUILD FOLDER...: clang-tidy 14 (.clang-tidy) over every unit of the folders that the
-build compiles, one test point a folder."""
+"""tidy.py ROOT BUILD [--all] FOLDER...: clang-tidy 14 (.clang-tidy) over the compiled units of the
+folders that changed since the branch began, or over all; one test point a folder."""
 import json
 import os
 import shutil
@@ -43,6 +43,8 @@ def tidy(root, build, name):
 
 
 def main(root, build, folders):
+    whole = "--all" in folders
+    folders = [f for f in folders if f != "--all"]
     os.nice(19)
     if not shutil.which("clang-tidy-14"):
         lint.skip_all("needs clang-tidy-14")
@@ -55,6 +57,10 @@ def main(root, build, folders):
         for folder in folders:
             chosen = [n for n in names if n.split("/")[0] == folder]
             found = [] if chosen else [f"no unit of {folder}/ is compiled"]
+            count = len(chosen)
+            if not whole:
+                chosen = lint.changed_units(root, chosen, [".clang-tidy"])
+            print(f"# {folder}: {len(chosen)} of {count} units", flush=True)
             for problems in pool.map(lambda name: tidy(root, commands, name), chosen):
                 found += problems
             tap.point(f"clang-tidy, {folder}", sorted(set(found)))
