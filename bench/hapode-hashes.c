@@ -194,8 +194,7 @@ static uint64_t hash_stats(uint64_t hash, const hap_stats *s)
   const uint64_t counts[] = {s->loop.ticks,         s->loop.contact_ticks,     s->physics.steps,
                              s->model.bodies_known, s->model.capacity_dropped, s->faults.count,
                              s->probes.reused,      s->error.lookbacks,        s->error.spoilt};
-  const double values[] = {s->hand.impulse_ns, s->hand.peak_force_n, s->error.force_error,
-                           s->error.range_error};
+  const double values[] = {s->hand.impulse_ns, s->hand.peak_force_n, s->error.force_error};
   for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
     hash = hash_word(hash, counts[i]);
   }

@@ -1464,7 +1464,6 @@ static void session_note(use *u)
     hash_word(u, counts[i]);
   }
   hash_doubles(u, &s.error.force_error, 1);
-  hash_doubles(u, &s.error.range_error, 1);
   u->out->trace_hash = (u->out->trace_hash ^ s.loop.trace_hash) * 0x9e3779b97f4a7c15u;
   u->out->probe_steps += s.probes.steps;
   u->out->contact_ticks += s.loop.contact_ticks;

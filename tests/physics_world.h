@@ -251,7 +251,7 @@ static inline void world_measure(const test_world *w)
 {
   hapi_physics *physics = world_physics(w);
   hapi_accelerance_measure(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
-                           hapi_cross_watch(&physics->research.cross));
+                           hapi_cross_watch(&physics->cross));
 }
 
 static inline const hapi_slot_account *world_account(const test_world *w, dBodyID body)

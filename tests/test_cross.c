@@ -30,8 +30,8 @@ static const hapi_cross_block *block(const test_world *w, dBodyID pushed, dBodyI
   const hapi_physics *physics = world_physics(w);
   const hapi_contact_slot *contact = world_contact(w, pushed, 0);
   const hapi_body_slot *body = world_slot(w, other);
-  for (uint32_t i = 0; i < physics->research.cross.block_count; ++i) {
-    const hapi_cross_block *cross = &physics->research.cross.blocks[i];
+  for (uint32_t i = 0; i < physics->cross.block_count; ++i) {
+    const hapi_cross_block *cross = &physics->cross.blocks[i];
     if (&physics->near.slots.contacts[cross->contact] == contact &&
         &physics->near.slots.bodies[cross->body] == body) {
       return cross;
@@ -126,9 +126,9 @@ TEST(a_fixed_pair_answers_as_one_body)
   expect_rigid(mass, contact->point_world, expected);
   check_block(cross, expected);
   CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_physics(&w)->research.cross.block_count == 2);
+  CHECK(world_physics(&w)->cross.block_count == 2);
   CHECK(world_physics(&w)->probe.counts.clipped == 0 &&
-        world_physics(&w)->research.cross.counts.clipped == 0);
+        world_physics(&w)->cross.counts.clipped == 0);
   world_close(&w);
 }
 
@@ -188,7 +188,7 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
     measure(&w);
     probes[joined] = *made - before;
     CHECK(world_count_contacts(&w) == 2);
-    CHECK(world_physics(&w)->research.cross.block_count == (joined != 0 ? 2u : 0u));
+    CHECK(world_physics(&w)->cross.block_count == (joined != 0 ? 2u : 0u));
     world_close(&w);
   }
   CHECK(probes[0] == 1 + 3 && probes[1] == 1 + 6);
@@ -212,13 +212,13 @@ TEST(with_too_few_places_the_largest_stay)
   hapi_physics *physics = world_physics(w);
   CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w->def.max_bodies);
   measure(w);
-  REQUIRE(physics->research.cross.block_count == 6);
-  CHECK(physics->research.cross.counts.dropped == 0);
-  memcpy(all, physics->research.cross.blocks, sizeof all);
+  REQUIRE(physics->cross.block_count == 6);
+  CHECK(physics->cross.counts.dropped == 0);
+  memcpy(all, physics->cross.blocks, sizeof all);
   physics->config.capacity.crosses = 4;
   measure(w);
-  REQUIRE(physics->research.cross.block_count == 4);
-  CHECK(physics->research.cross.counts.dropped == 2);
+  REQUIRE(physics->cross.block_count == 4);
+  CHECK(physics->cross.counts.dropped == 2);
   for (int i = 0; i < 6; ++i) {
     int larger = 0;
     bool kept = false;
@@ -226,7 +226,7 @@ TEST(with_too_few_places_the_largest_stay)
       larger += all[k].response > all[i].response;
     }
     for (uint32_t k = 0; k < 4; ++k) {
-      kept = kept || memcmp(physics->research.cross.blocks[k].a, all[i].a, sizeof all[i].a) == 0;
+      kept = kept || memcmp(physics->cross.blocks[k].a, all[i].a, sizeof all[i].a) == 0;
     }
     CHECK(kept == (larger < 4));
   }
@@ -240,7 +240,7 @@ TEST(a_block_that_is_no_number_is_left_out)
   join_fixed(&w);
   REQUIRE(start_above(&w, -0.02));
   const hapi_probe_counts *counts = &world_physics(&w)->probe.counts;
-  const hapi_cross_counts *blocks = &world_physics(&w)->research.cross.counts;
+  const hapi_cross_counts *blocks = &world_physics(&w)->cross.counts;
   world_slot(&w, w.bodies[0])->mass = 0.0;
   measure(&w);
   CHECK(counts->singular == 1 && counts->clipped == 0); /* A of the contact ... */
@@ -526,7 +526,7 @@ TEST(what_does_not_answer_has_no_block)
     f.contact = world_contact(w, w->bodies[0], 0);
     REQUIRE(f.contact != NULL && world_slot(w, w->bodies[1]) != NULL);
     measure_with(&f, force, 0.0, 0.0);
-    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->research.cross.block_count);
+    printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->cross.block_count);
     CHECK((block(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
     world_close(w);
   }

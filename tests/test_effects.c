@@ -740,44 +740,7 @@ TEST(times_are_of_what_is_on)
   cw_close(&w);
 }
 
-/* ---- the error of the range ---- */
-
-/* A free row of eight that is pushed at 0.5 m/s^2: 1/(8 m) in the world, as in a loop that has all of it. */
-static double error_of_range(int max_bodies)
-{
-  contact_world *w = cw_new(0.0);
-  w->surface.mu = 0.0;
-  w->def.max_bodies = max_bodies;
-  w->expert.max_edge_probes = 0;
-  dWorldSetQuickStepNumIterations(w->world, 2000);
-  wish(w, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
-  for (int i = 0; i < 8; ++i) {
-    cw_add_cube(w, 0.2, EDGE, i * EDGE, 0.0, 0.0);
-  }
-  double error = -1.0;
-  if (cw_start(w, -EDGE / 2 - HAND, 0.0, 0.0)) {
-    for (int i = 0; i < 600; ++i) {
-      cw_move_hand(w, 0.5e-3 * i, 0.0, 0.0);
-      cw_tick(w);
-    }
-    hap_stats stats = cw_stats(w);
-    CHECK(stats.probes.steps > 20);
-    error = stats.error.range_error;
-  }
-  cw_close(w);
-  printf("# range of %d: error %.3f\n", max_bodies, error);
-  return error;
-}
-
-TEST(testing_that_is_asked_for_tells_the_error_of_the_range)
-{
-  double all = error_of_range(8);
-  double few = error_of_range(2);
-  CHECK(all > 0.0 && all < 0.5);
-  CHECK(few > 2.0 * all);
-}
-
-TEST(testing_that_is_asked_for_changes_no_force)
+TEST(bodies_of_the_loop_are_not_tested_when_it_is_asked_for)
 {
   double force[2];
   for (int i = 0; i < 2; ++i) {
@@ -787,9 +750,9 @@ TEST(testing_that_is_asked_for_changes_no_force)
     REQUIRE(start_left(&w, 0.002));
     cw_run(&w, 400);
     force[i] = w.force[0];
-    CHECK((cw_stats(&w).probes.steps > 0) == (i == 1));
+    CHECK(cw_stats(&w).probes.steps == 0);
     cw_close(&w);
   }
   CHECK(force[0] < -0.1);
-  CHECK_NEAR(force[0], force[1], -1e-5 * force[0]);
+  CHECK(force[0] == force[1]);
 }

@@ -176,12 +176,6 @@ typedef struct hap_error_stats {
   /* windows that could not be: something was moved, added or removed meanwhile, or there was too
    * much for lookback's share */
   uint64_t spoilt;
-  /* model CONTACT with effect TESTING on: how differently the loop moved neighbours than testing
-   * simulations of the whole world foretold, made at the beginning of the interval with the
-   * pointers' forces. Root of the sums of squares, over the root of what was foretold; 0 without
-   * the effect. The forecast is linear in the pointer's impulse: it leaves out what begins or
-   * ends to touch or slide */
-  double range_error;
 } hap_error_stats;
 
 /* All of it. */

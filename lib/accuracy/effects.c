@@ -6,7 +6,6 @@
 
 #include "base/assert.h"
 #include "base/vec.h"
-#include "research/range_error.h"
 
 /* What the effects of the newest model came to, and why: counted from the model itself, as it
  * goes to the loop. */
@@ -79,8 +78,7 @@ static void note_testing(const sight *s, const hapi_model_body *body)
   bool measured = (body->flags & HAPI_BODY_MEASURED) != 0;
   bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
   if (body_roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_TESTING),
-                     measured || (owned && hapi_range_error_wanted(s->cycle)),
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_TESTING), measured,
                      owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
   }
 }

@@ -98,7 +98,7 @@ static void window_collide(hapi_lookback *w, const hapi_cycle *cycle)
       const hapi_touching touching = {{pair->a, pair->b}, {body_a, body_b}};
       dSurfaceParameters surface = pair->surface;
       w->counts.contacts_rejected +=
-          hapi_world_make_contacts(w->test.world, cycle, &touching, &surface, HAPI_CONTACT_PLAIN);
+          hapi_world_make_contacts(w->test.world, cycle, &touching, &surface, false);
     }
   }
 }

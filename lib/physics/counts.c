@@ -13,18 +13,17 @@ static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
 {
   const hapi_world *world = &physics->world;
   const hapi_probe *probe = &physics->probe;
-  const hapi_cross_counts *cross = &physics->research.cross.counts;
-  uint64_t steps = probe->test.steps + physics->research.range.test.steps;
+  const hapi_cross_counts *cross = &physics->cross.counts;
   io_stats->model.bodies_known = world->bodies.used;
   io_stats->faults.bodies_lost = world->bodies.lost;
-  io_stats->physics.quickstep_calls += world->counts.steps + steps;
+  io_stats->physics.quickstep_calls += world->counts.steps + probe->test.steps;
   io_stats->faults.contacts_rejected += world->counts.contacts_rejected;
   io_stats->faults.states_rejected += physics->account.counts.states_rejected;
   io_stats->model.capacity_dropped += physics->account.counts.dropped;
   io_stats->edits.run = physics->edits.run;
   io_stats->physics.missed += physics->tape.played_missed;
   io_stats->physics.frames_dropped += physics->tape.played_dropped;
-  io_stats->probes.steps = steps + probe->counts.joint_steps;
+  io_stats->probes.steps = probe->test.steps + probe->counts.joint_steps;
   io_stats->probes.clipped = probe->counts.clipped + cross->clipped;
   io_stats->probes.singular = probe->counts.singular + cross->singular;
   io_stats->probes.reused = probe->counts.reused;
@@ -54,9 +53,7 @@ void hapi_counts_show(hapi_physics *physics)
   physics->counts.shown.beyond_s = physics->near.counts.beyond_s;
   physics->counts.shown_account = physics->account.counts;
   counts_gather(physics, &physics->counts.shown.stats);
-  physics->counts.shown.cross_s = physics->research.cross.counts.seconds;
-  physics->counts.shown.foretold2 = physics->research.range.foretold2;
-  physics->counts.shown.range_error2 = physics->research.range.error2;
+  physics->counts.shown.cross_s = physics->cross.counts.seconds;
   pthread_mutex_unlock(&physics->counts.lock);
 }
 
@@ -87,7 +84,6 @@ static void fill_times(const hapi_counts *counts, double period_s, hap_stats *ou
   out->physics.mean.step_ms = per_cycle * f->step_s;
   out->physics.mean.range_ms = per_cycle * f->range_s;
   out->physics.mean.publish_ms = per_cycle * f->publish_s;
-  out->error.range_error = f->foretold2 > 0.0 ? sqrt(f->range_error2 / f->foretold2) : 0.0;
   out->physics.ms_mean = 1e-6 * hapi_histogram_mean_ns(&counts->cycle_ns);
   out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&counts->cycle_ns, 0.99);
   out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&counts->cycle_ns);

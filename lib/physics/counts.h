@@ -25,12 +25,10 @@ typedef struct hapi_physics_counts {
   double testing_s;
   double step_s;
   double publish_s;
-  double range_s;      /* part of neighbour_s */
-  double beyond_s;     /* part of range_s: bodies that are no neighbours */
-  double joints_s;     /* of joints: their scan and their part of the message; of publish_s */
-  double cross_s;      /* part of testing_s and publish_s */
-  double foretold2;    /* m^2/s^2, sum over what testing simulations foretold of owned bodies ... */
-  double range_error2; /* ... and over what the loop made different from it */
+  double range_s;  /* part of neighbour_s */
+  double beyond_s; /* part of range_s: bodies that are no neighbours */
+  double joints_s; /* of joints: their scan and their part of the message; of publish_s */
+  double cross_s;  /* part of testing_s and publish_s */
   hapi_effect_figures effects[HAP_EFFECTS];
   hap_accuracy_info accuracy;
   uint64_t cycles;

@@ -163,24 +163,9 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 
 void hapi_physics_collide(hapi_physics *physics)
 {
-  bool notes = hapi_reuse_open(&physics->probe.reuse, &physics->cycle,
-                               !hapi_cross_is_full(&physics->research.cross));
+  bool notes =
+      hapi_reuse_open(&physics->probe.reuse, &physics->cycle, !hapi_cross_is_full(&physics->cross));
   hapi_world_collide(&physics->world, &physics->cycle, notes);
-}
-
-void hapi_physics_test_range(hapi_physics *physics)
-{
-  hapi_range_error *range = &physics->research.range;
-  if (!hapi_range_error_wanted(&physics->cycle)) {
-    return;
-  }
-  hapi_range_error_compare(range, &physics->cycle, &physics->world, &physics->near.slots);
-  /* Not in the collision phase: who asks for a surface first says in which order a pair is
-   * looked at. */
-  physics->world.counts.contacts_rejected +=
-      hapi_world_collide_carried(&physics->world, &physics->cycle);
-  hapi_range_error_measure(range, &physics->cycle, &physics->world, &physics->near);
-  dJointGroupEmpty(physics->world.carried_group);
 }
 
 /* What testing simulations find out of a body's role is the slots' before anybody reads it. */
@@ -190,7 +175,7 @@ void hapi_physics_test(hapi_physics *physics)
   hapi_slots *slots = &physics->near.slots;
   hapi_answers_follow(&probe->answers, slots);
   hapi_accelerance_measure(probe, &physics->cycle, &physics->world, slots,
-                           hapi_cross_watch(&physics->research.cross));
+                           hapi_cross_watch(&physics->cross));
   hapi_operating_point_measure(probe, &physics->cycle, &physics->world, slots);
   for (uint32_t i = 0; i < slots->body_high; ++i) {
     hapi_slots_set_flags(slots, i, probe->answers.bodies[i].flags);
@@ -271,7 +256,6 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[1] += stopwatch_lap(&watch) - physics->near.range.links.cover.boxes_s;
   seconds[0] +=
       physics->near.range.links.cover.boxes_s; /* which the next collision phase finds done */
-  hapi_physics_test_range(physics); /* first: it leaves the space as it finds it, which is clean */
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
                     physics->near.range.number);

@@ -20,9 +20,8 @@ static bool physics_allocate(hapi_physics *physics, const hap_ode_def *ode)
   const hapi_capacity *c = &physics->config.capacity;
   return hapi_account_create(&physics->account, c->bodies) &&
          hapi_probe_create(&physics->probe, c) &&
-         hapi_cross_create(&physics->research.cross, &physics->cycle, &physics->near.slots,
+         hapi_cross_create(&physics->cross, &physics->cycle, &physics->near.slots,
                            &physics->probe) &&
-         hapi_range_error_create(&physics->research.range, c) &&
          hapi_nearby_create(&physics->near, &physics->world, &physics->cycle) &&
          hapi_world_create(&physics->world, ode, c->joints, &physics->listener);
 }
@@ -128,8 +127,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_account_finish(&physics->account);
   hapi_poses_finish(&physics->drawing);
   hapi_probe_finish(&physics->probe);
-  hapi_cross_finish(&physics->research.cross);
-  hapi_range_error_finish(&physics->research.range);
+  hapi_cross_finish(&physics->cross);
   hapi_lookback_finish(&physics->lookback);
   hapi_fair_lock_finish(&physics->lock.fair);
   pthread_mutex_destroy(&physics->edits.lock);
@@ -142,7 +140,6 @@ void hapi_physics_destroy(hapi_physics *physics)
 static void give_world_back(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->world.contact_group);
-  dJointGroupEmpty(physics->world.carried_group);
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_physics_scan(physics); /* a body without memory for it was given nothing */
   release_bodies(&physics->world.bodies);
@@ -175,7 +172,6 @@ static void build_first_model(hapi_physics *physics)
   hapi_neighbors_collect(&physics->near);
   hapi_neighbors_find(&physics->near);
   hapi_physics_test(physics);
-  hapi_physics_test_range(physics);
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
 }
 
@@ -192,8 +188,7 @@ static void physics_prepare(hapi_physics *physics)
                                           hapi_dial_percent(atomic_load(&physics->dial.wanted))));
   hapi_physics_fill_settings(physics);
   hapi_probe_reset(&physics->probe);
-  hapi_cross_reset(&physics->research.cross);
-  hapi_range_error_reset(&physics->research.range);
+  hapi_cross_reset(&physics->cross);
   physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
   physics->cycle.wishes = atomic_load(&physics->wanted.effects);
   physics->cycle.probe_step_s = hapi_config_period(&physics->config, physics->cycle.model);

@@ -25,7 +25,7 @@
 #include "probe/accelerance.h"
 #include "probe/joint_probe.h"
 #include "probe/operating_point.h"
-#include "research/research.h"
+#include "research/cross.h"
 #include "world/world.h"
 
 /* The thread of drive THREADS. */
@@ -42,7 +42,7 @@ struct hapi_physics {
   hapi_world_listener listener; /* of world */
   hapi_nearby near;
   hapi_probe probe;
-  hapi_research research;
+  hapi_cross cross;
   hapi_lookback lookback;
   hapi_dial dial;
   hapi_account account;
@@ -59,7 +59,6 @@ struct hapi_physics {
 
 /* cycle.c: the collision phase, and testing simulations */
 void hapi_physics_collide(hapi_physics *physics);
-void hapi_physics_test_range(hapi_physics *physics);
 void hapi_physics_test(hapi_physics *physics);
 /* cycle.c: what the dials come to */
 void hapi_physics_fill_settings(hapi_physics *physics);

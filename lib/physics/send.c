@@ -77,7 +77,7 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   hapi_publish_contacts(&p, out);
   out->cross_count = 0;
   for (uint32_t i = 0; i < out->contact_count; ++i) {
-    hapi_cross_publish(&physics->research.cross, hapi_model_contacts(out)[i].slot, i, out);
+    hapi_cross_publish(&physics->cross, hapi_model_contacts(out)[i].slot, i, out);
   }
   send_joints(physics, &p, out);
   out->bounces = count_bounces(&physics->near.range, out);

@@ -9,9 +9,8 @@
 
 /* A geom that moves goes to the front of its space's list, and the order of the list is the
  * order in which contacts are found. Geoms of awake bodies have moved in the global step already
- * and do not go again; those of a sleeping body move only in the probes. For these the order is
- * put back, and for all where a test set asks for it: model CONTACT cleans the space before its
- * probes, and what is clean goes to the front once more. */
+ * and do not go again; those of a sleeping body move only in the probes, and for these the order
+ * is put back. */
 
 static bool order_has(const hapi_space_order *order, dSpaceID space)
 {

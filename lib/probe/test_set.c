@@ -248,7 +248,7 @@ static hap_status members_save_order(hapi_test_set *test)
   hapi_space_order_begin(&test->order);
   for (uint32_t i = 0; i < test->member_count && status >= HAP_OK; ++i) {
     dBodyID body = member_body(test, i);
-    if (test->keeps_order || !dBodyIsEnabled(body)) {
+    if (!dBodyIsEnabled(body)) {
       status = hapi_space_order_add(&test->order, body);
     }
   }
@@ -341,11 +341,7 @@ void hapi_test_leave(hapi_test_set *test)
     dBodyEnable(off->bodies[i]);
   }
   hapi_snapshot_restore(&test->snapshot); /* also switches sleeping members off again */
-  bool clean = test->keeps_order && test->order.count > 0;
   hapi_space_order_restore(&test->order);
-  if (clean) { /* as they were: what is dirty does not go to the front */
-    dSpaceClean(test->world->ode.space);
-  }
   off->joint_count = 0;
   off->body_count = 0;
   dWorldSetStepIslandsProcessingMaxThreadCount(test->world->ode.world, off->islands_threads);

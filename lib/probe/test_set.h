@@ -43,8 +43,7 @@ typedef struct hapi_test_set {
   uint32_t island_count;
   hapi_test_place *places; /* by entry of the body table, as of the newest begin */
   uint32_t place_count;
-  bool mechanisms;  /* there are joints other than contacts */
-  bool keeps_order; /* of all members' spaces, not of sleeping ones alone */
+  bool mechanisms; /* there are joints other than contacts */
   bool entered;
   double step_s;
   uint64_t steps; /* testing simulations so far */

@@ -57,12 +57,11 @@ const dContact *hapi_world_contact_of(const hapi_world *world, dJointID joint)
 
 uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
                                   const hapi_touching *touching, dSurfaceParameters *surface,
-                                  hapi_contact_kind kind)
+                                  bool notes)
 {
   dGeomID a = touching->geoms[0];
   dGeomID b = touching->geoms[1];
   dContact *contacts = world->contact_scratch;
-  dJointGroupID group = kind == HAPI_CONTACT_CARRIED ? world->carried_group : world->contact_group;
   double direction[3];
   uint32_t rejected = 0;
   HAPI_ASSERT(!dGeomIsSpace(a) && !dGeomIsSpace(b));
@@ -84,9 +83,9 @@ uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cyc
     if (directed) {
       set_direction(&contacts[i], direction);
     }
-    dJointID joint = dJointCreateContact(world->ode.world, group, &contacts[i]);
+    dJointID joint = dJointCreateContact(world->ode.world, world->contact_group, &contacts[i]);
     dJointAttach(joint, touching->bodies[0], touching->bodies[1]);
-    if (kind == HAPI_CONTACT_NOTED) {
+    if (notes) {
       contact_note(world->notes, joint, &contacts[i]);
     }
   }
@@ -108,7 +107,7 @@ static bool carried_by_loop(const hapi_body_table *table, dBodyID body)
 typedef struct collision {
   const hapi_world *world;
   const hapi_cycle *cycle;
-  hapi_contact_kind kind; /* CARRIED: the pairs that the loop carries, else the others */
+  bool notes;
   uint32_t rejected;
 } collision;
 
@@ -128,14 +127,13 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   bool turned;
   bool carried =
       carried_by_loop(&c->world->bodies, body_a) || carried_by_loop(&c->world->bodies, body_b);
-  if (carried != (c->kind == HAPI_CONTACT_CARRIED) ||
-      !hapi_world_ask_surface(c->world, c->cycle, a, b, &surface, &turned)) {
+  if (carried || !hapi_world_ask_surface(c->world, c->cycle, a, b, &surface, &turned)) {
     return;
   }
   hapi_touching touching = {.geoms = {turned ? b : a, turned ? a : b}};
   touching.bodies[0] = dGeomGetBody(touching.geoms[0]);
   touching.bodies[1] = dGeomGetBody(touching.geoms[1]);
-  c->rejected += hapi_world_make_contacts(c->world, c->cycle, &touching, &surface, c->kind);
+  c->rejected += hapi_world_make_contacts(c->world, c->cycle, &touching, &surface, c->notes);
 }
 
 /* The pairs inside a space, and those inside each space in it: every pair once. */
@@ -153,17 +151,10 @@ static void collide_inside(collision *c, dSpaceID space)
 
 void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
 {
-  collision c = {world, cycle, notes ? HAPI_CONTACT_NOTED : HAPI_CONTACT_PLAIN, 0};
+  collision c = {world, cycle, notes, 0};
   dJointGroupEmpty(world->contact_group);
   hapi_world_forget_surfaces(world);
   world->notes->count = 0;
   collide_inside(&c, world->ode.space);
   world->counts.contacts_rejected += c.rejected;
-}
-
-uint32_t hapi_world_collide_carried(const hapi_world *world, const hapi_cycle *cycle)
-{
-  collision c = {world, cycle, HAPI_CONTACT_CARRIED, 0};
-  collide_inside(&c, world->ode.space);
-  return c.rejected;
 }

@@ -29,7 +29,6 @@ bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint
     return false;
   }
   world->contact_group = dJointGroupCreate(0);
-  world->carried_group = dJointGroupCreate(0);
   return true;
 }
 
@@ -37,7 +36,6 @@ void hapi_world_finish(hapi_world *world)
 {
   if (world->contact_group != NULL) {
     dJointGroupDestroy(world->contact_group);
-    dJointGroupDestroy(world->carried_group);
   }
   hapi_bodies_finish(&world->bodies);
   hapi_joints_finish(&world->joints);

@@ -48,7 +48,6 @@ struct hapi_world {
   hapi_surface_cache *surfaces;
   hapi_contact_notes *notes;
   dJointGroupID contact_group;
-  dJointGroupID carried_group; /* contacts of what the loop owns, see range_error.c */
   dContact *contact_scratch;
   hapi_islands islands;
   unsigned islands_threads; /* ODE's setting as it was found */
@@ -75,12 +74,6 @@ bool hapi_geom_is_sound(dGeomID geom);
 bool hapi_contact_is_sound(const dContactGeom *contact);
 
 /* collide.c */
-typedef enum hapi_contact_kind {
-  HAPI_CONTACT_PLAIN = 0,
-  HAPI_CONTACT_NOTED,  /* with a note */
-  HAPI_CONTACT_CARRIED /* in carried_group */
-} hapi_contact_kind;
-
 typedef struct hapi_touching {
   dGeomID geoms[2];
   dBodyID bodies[2]; /* NULL: the static world */
@@ -88,12 +81,10 @@ typedef struct hapi_touching {
 
 /* Contact joints for the next step. notes: each with a note. */
 void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes);
-/* Those of what the loop carries, into carried_group. Returns how many were rejected. */
-uint32_t hapi_world_collide_carried(const hapi_world *world, const hapi_cycle *cycle);
-/* Contact joints of two geoms. Returns how many were rejected. */
+/* Contact joints of two geoms; notes as above. Returns how many were rejected. */
 uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
                                   const hapi_touching *touching, dSurfaceParameters *surface,
-                                  hapi_contact_kind kind);
+                                  bool notes);
 /* NULL: there is no note, the joint is the application's own. */
 const dContact *hapi_world_contact_of(const hapi_world *world, dJointID joint);
 
