@@ -40,6 +40,7 @@ hap_status bench_accuracy(bench *b);
 hap_status bench_couplings(bench *b);
 hap_status bench_edits(bench *b);
 hap_status bench_effects(bench *b);
+hap_status bench_faults(bench *b);
 hap_status bench_fig5(bench *b);
 hap_status bench_fig6(bench *b);
 hap_status bench_fig7(bench *b);

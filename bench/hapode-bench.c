@@ -34,6 +34,9 @@ static const program programs[] = {
     {"effects", bench_effects,
      "what each effect costs in a scene, and everything on against all left to the library; "
      "--scene NAME"},
+    {"faults", bench_faults,
+     "the felt force against an independent reference, scene by scene, and where it is wrong; "
+     "--scene NAME"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
@@ -164,7 +167,7 @@ static bool fits(const program *p, const bench *b)
   bool known = b->estimates == NULL || strcmp(b->estimates, "all") == 0 ||
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
-      p->run != bench_effects) {
+      p->run != bench_effects && p->run != bench_faults) {
     wrong = "has no scenes to choose from";
   } else if (b->coupling != NULL && !takes_coupling(p)) {
     wrong = "has no couplings to choose from: --coupling is for accuracy and impedance";

@@ -1,0 +1,224 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench faults: every scene in model contact at 20 and 60 Hz against the reference, and the
+ * reference against itself at half the step. A row that is beyond its bound says FAULT. */
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "bench/faults.h"
+
+#define REFERENCE_HZ 2000.0
+
+/* Of a run against the reference, while either pushes. */
+typedef struct comparison {
+  double error; /* RMS of the difference / RMS of the reference */
+  double jump;  /* N, largest change from tick to tick */
+  double peak;  /* N */
+} comparison;
+
+typedef struct references {
+  faults_run run;
+  faults_run half; /* at half the step */
+  comparison own;
+  double floor;
+} references;
+
+static double force_norm(const double f[3])
+{
+  return sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+}
+
+static double force_distance(const double a[3], const double b[3])
+{
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return force_norm(d);
+}
+
+/* The device's limit holds in the reference too. */
+static void force_limit(const faults_motion *m, double force[3])
+{
+  double most = m->max_force > 0.0 ? m->max_force : 20.0;
+  double length = force_norm(force);
+  for (int k = 0; k < 3 && length > most; ++k) {
+    force[k] *= most / length;
+  }
+}
+
+static void run_compare(const faults_scene *scene, const faults_run *reference,
+                        const faults_run *test, comparison *out)
+{
+  double off = 0.0;
+  double all = 0.0;
+  size_t first = (size_t)lround(scene->check.begin_s / FAULTS_TICK_S);
+  memset(out, 0, sizeof *out);
+  for (size_t i = first; i < test->count; ++i) {
+    off += pow(force_distance(test->force[i], reference->force[i]), 2);
+    all += pow(force_norm(reference->force[i]), 2);
+    out->peak = fmax(out->peak, force_norm(test->force[i]));
+    if (i > first) {
+      out->jump = fmax(out->jump, force_distance(test->force[i], test->force[i - 1]));
+    }
+  }
+  out->error = all > 0.0 ? sqrt(off / all) : sqrt(off);
+}
+
+/* The same of what joints told. */
+static double told_error(const faults_scene *scene, const faults_run *reference,
+                         const faults_run *test)
+{
+  double off = 0.0;
+  double all = 0.0;
+  for (size_t i = (size_t)lround(scene->check.begin_s / FAULTS_TICK_S); i < test->count; ++i) {
+    off += pow(test->told[i] - reference->told[i], 2);
+    all += pow(reference->told[i], 2);
+  }
+  return all > 0.0 ? sqrt(off / all) : 1.0;
+}
+
+/* The largest force in the reference's direction before it falls to half of what it was while the
+ * reference's does not: there the hand falls through. */
+static double held_force(const faults_run *reference, const faults_run *test)
+{
+  double held = 0.0;
+  double most = 0.0;
+  for (size_t i = 0; i < test->count; ++i) {
+    const double *r = reference->force[i];
+    const double *f = test->force[i];
+    double wanted = force_norm(r);
+    double felt = wanted > 0.0 ? (f[0] * r[0] + f[1] * r[1] + f[2] * r[2]) / wanted : 0.0;
+    most = fmax(most, wanted);
+    if (wanted > 0.99 * most && felt < 0.5 * held) {
+      return held;
+    }
+    held = fmax(held, felt);
+  }
+  return held;
+}
+
+static bool references_make(bench *b, const faults_scene *scene, references *out)
+{
+  memset(out, 0, sizeof *out);
+  double rate = scene->check.reference_hz > 0.0 ? scene->check.reference_hz : REFERENCE_HZ;
+  if (!faults_reference_run(scene, rate, &out->run) ||
+      !faults_reference_run(scene, 2.0 * rate, &out->half)) {
+    (void)bench_fail(b, HAP_ERROR_MEMORY, "no memory for the reference of %s", scene->name);
+    return false;
+  }
+  for (size_t i = 0; i < out->run.count; ++i) {
+    force_limit(&scene->motion, out->run.force[i]);
+    force_limit(&scene->motion, out->half.force[i]);
+  }
+  comparison half;
+  run_compare(scene, &out->half, &out->run, &half);
+  run_compare(scene, &out->half, &out->half, &out->own);
+  out->floor =
+      scene->check.kind == FAULTS_FEEDBACK ? told_error(scene, &out->half, &out->run) : half.error;
+  return true;
+}
+
+static void references_free(references *r)
+{
+  faults_run_free(&r->run);
+  faults_run_free(&r->half);
+}
+
+/* Whether the scene is as good as it has to be. io_error: what of the kind is judged. */
+static bool run_judge(const faults_scene *scene, double hz, const references *r,
+                      const faults_run *run, comparison *io)
+{
+  const faults_check *check = &scene->check;
+  double bound = hz < 30.0 && check->bound_20 > 0.0 ? check->bound_20 : check->bound;
+  bool is_calm = io->jump <= 2.0 * r->own.jump + 0.01 * r->own.peak;
+  switch (check->kind) {
+    case FAULTS_HOLD:
+      io->error = 1.0 - held_force(&r->half, run) / r->own.peak;
+      return io->error <= bound;
+    case FAULTS_STEPS:
+      return io->error <= fmax(bound, 2.0 * r->floor) &&
+             (hz < 30.0 || io->jump <= r->own.jump + 0.1);
+    case FAULTS_FEEDBACK:
+      io->error = told_error(scene, &r->half, run);
+      return io->error <= bound;
+    case FAULTS_DUTY:
+      io->error = run->duty;
+      return run->duty <= bound;
+    case FAULTS_CAPACITY:
+      return io->error <= bound || (run->said > 0 && run->dropped > 0);
+    case FAULTS_ARRIVAL:
+    case FAULTS_FORCE:
+      return io->error <= fmax(bound, 2.0 * r->floor) && is_calm;
+  }
+  return false;
+}
+
+static const char *kind_name(faults_kind kind)
+{
+  static const char *const names[] = {"force",   "hold",     "steps", "told",
+                                      "arrival", "capacity", "duty"};
+  return names[kind];
+}
+
+static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, int *io_faults)
+{
+  static const double rates[] = {20.0, 60.0};
+  references r;
+  hap_status status = HAP_OK;
+  if (!references_make(b, scene, &r)) {
+    references_free(&r);
+    return HAP_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < 2 && status >= HAP_OK; ++i) {
+    faults_run run = {.count = 0};
+    comparison c;
+    status = faults_session_run(b, scene, HAP_MODEL_CONTACT, rates[i], &run);
+    if (status >= HAP_OK) {
+      run_compare(scene, &r.half, &run, &c);
+      bool good = run_judge(scene, rates[i], &r, &run, &c);
+      *io_faults += !good;
+      b->off += b->verify && !good;
+      bench_say(
+          "%2d %-14s %2.0f Hz %-8s error %8.3f %%  floor %7.3f %%  jump %7.3f N of %7.3f  "
+          "peak %7.3f N of %7.3f  %s",
+          scene->item, scene->name, rates[i], kind_name(scene->check.kind), 100.0 * c.error,
+          100.0 * r.floor, c.jump, r.own.jump, c.peak, r.own.peak, good ? "ok" : "FAULT");
+      fprintf(csv, "%d,%s,%g,%s,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%s\n", scene->item, scene->name,
+              rates[i], kind_name(scene->check.kind), c.error, r.floor, c.jump, r.own.jump, c.peak,
+              r.own.peak, scene->check.bound, good ? "ok" : "FAULT");
+    }
+    faults_run_free(&run);
+  }
+  references_free(&r);
+  return status;
+}
+
+hap_status bench_faults(bench *b)
+{
+  int faults = 0;
+  bool found = false;
+  FILE *csv = bench_csv_open(b, "faults",
+                             "item,scene,hz,measure,error,floor,jump_n,jump_reference_n,peak_n,"
+                             "peak_reference_n,bound,verdict");
+  if (csv == NULL) {
+    return HAP_ERROR_IO;
+  }
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < faults_table_count && status >= HAP_OK; ++i) {
+    if (b->scene == NULL || strcmp(b->scene, faults_table[i].name) == 0) {
+      found = true;
+      status = scene_measure(b, &faults_table[i], csv, &faults);
+    }
+  }
+  hap_status closed = bench_csv_close(b, csv);
+  if (status < HAP_OK) {
+    return status;
+  }
+  if (!found) {
+    return bench_fail(b, HAP_ERROR_ARGUMENT, "there is no scene \"%s\"", b->scene);
+  }
+  bench_say("%d rows beyond their bounds", faults);
+  return closed;
+}

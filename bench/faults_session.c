@@ -1,0 +1,185 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* The same worlds in a session, by public headers alone. */
+
+#include <math.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#include "bench/faults.h"
+
+#define MAX_TORQUE 1.0
+
+typedef struct run_state {
+  faults_world w;
+  double world_s; /* time of the application's world */
+  unsigned long steps;
+} run_state;
+
+static atomic_ulong lines_said;
+
+static void count_line(hap_log_level level, const char *text, void *user)
+{
+  (void)text, (void)user;
+  if (level != HAP_LOG_INFO) {
+    atomic_fetch_add(&lines_said, 1);
+  }
+}
+
+static bool pair_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  const run_state *run = user;
+  dBodyID x = dGeomGetBody(a);
+  io->mu = run->w.mu;
+  return !run->w.scene->has_own_contacts && (x == NULL || x != dGeomGetBody(b));
+}
+
+static void before_step(void *user, double step_s)
+{
+  run_state *run = user;
+  if (run->w.scene->before != NULL) {
+    run->w.scene->before(&run->w, run->world_s, run->world_s + step_s);
+  }
+}
+
+static void after_step(void *user, double step_s)
+{
+  run_state *run = user;
+  if (run->w.scene->after != NULL) {
+    run->w.scene->after(&run->w, run->world_s, run->world_s + step_s);
+  }
+  run->world_s += step_s;
+  ++run->steps;
+}
+
+/* Corners of a cube whose half edge is the pointer's radius. */
+static void cube_corners(double half, double out[FAULTS_HULL_MAX][3])
+{
+  for (int i = 0; i < FAULTS_HULL_MAX; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out[i][k] = (i >> k & 1) != 0 ? half : -half;
+    }
+  }
+}
+
+static hap_status pointer_add(bench *b, const faults_scene *scene, hap_session *session,
+                              hap_pointer_id *out)
+{
+  const faults_motion *m = &scene->motion;
+  double corners[FAULTS_HULL_MAX][3];
+  hap_pointer_def def;
+  hap_pointer_expert_def expert;
+  hap_pointer_def_init(&def, sizeof def);
+  hap_pointer_expert_def_init(&expert, sizeof expert);
+  def.radius = m->radius;
+  def.stiffness = m->stiffness;
+  def.friction = m->friction;
+  def.max_force = m->max_force > 0.0 ? m->max_force : def.max_force;
+  def.max_torque = MAX_TORQUE;
+  if (m->cube_tool) {
+    cube_corners(m->radius, corners);
+    def.radius = 0.0;
+    def.hull_xyz = &corners[0][0];
+    def.hull_points = FAULTS_HULL_MAX;
+  }
+  if (m->through != NULL) {
+    if (!bench_find_coupling(m->through, &expert.coupling)) {
+      return bench_fail(b, HAP_ERROR_ARGUMENT, "no coupling %s", m->through);
+    }
+    expert.coupling_stiffness = m->stiffness;
+    def.expert = &expert;
+  }
+  hap_status status = hap_pointer_add(session, &def, out);
+  if (status < HAP_OK) {
+    (void)hap_session_detail(session, &b->detail);
+  }
+  return status;
+}
+
+static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *session,
+                            hap_pointer_id hand, run_state *run, faults_run *out)
+{
+  for (size_t i = 0; i < out->count; ++i) {
+    hap_pose pose = {.quat_wxyz = {1.0}};
+    hap_twist twist = {{0.0}, {0.0}};
+    hap_pointer_state state;
+    scene->motion.hand((double)i * FAULTS_TICK_S, pose.position, twist.linear);
+    hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
+    if (status >= HAP_OK && i == 0) {
+      status = hap_session_start(session);
+    }
+    if (status >= HAP_OK) {
+      status = hap_session_advance(session, 1);
+    }
+    if (status >= HAP_OK) {
+      status = hap_pointer_get(session, hand, &state, sizeof state);
+    }
+    if (status < HAP_OK) {
+      (void)hap_session_detail(session, &b->detail);
+      return status;
+    }
+    memcpy(out->force[i], state.wrench.force, sizeof out->force[i]);
+    out->told[i] = run->w.told;
+  }
+  return HAP_OK;
+}
+
+static hap_status session_make(bench *b, hap_model model, double physics_hz, run_state *run,
+                               hap_session **out)
+{
+  hap_session_def def;
+  hap_research_def research;
+  hap_ode_def ode;
+  hap_session_def_init(&def, sizeof def);
+  hap_research_def_init(&research, sizeof research);
+  hap_ode_def_init(&ode, sizeof ode);
+  def.drive = HAP_DRIVE_LOCKSTEP;
+  def.model = model;
+  def.physics_hz = physics_hz;
+  research.guard = HAP_GUARD_MEASURE;
+  def.research = &research;
+  ode.world = run->w.world;
+  ode.space = run->w.space;
+  ode.surface = pair_surface;
+  ode.before_step = before_step;
+  ode.after_step = after_step;
+  ode.user = run;
+  return hap_session_create(&def, &ode, out, &b->detail);
+}
+
+hap_status faults_session_run(bench *b, const faults_scene *scene, hap_model model,
+                              double physics_hz, faults_run *out)
+{
+  run_state run = {.world_s = 0.0};
+  hap_session *session = NULL;
+  hap_pointer_id hand;
+  hap_stats stats;
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = count_line;
+  atomic_store(&lines_said, 0);
+  if (hap_hooks_set(&hooks) < HAP_OK || !faults_run_create(scene, out) ||
+      !faults_world_create(scene, false, &run.w)) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", scene->name);
+  }
+  hap_status status = session_make(b, model, physics_hz, &run, &session);
+  if (status >= HAP_OK) {
+    status = pointer_add(b, scene, session, &hand);
+  }
+  if (status >= HAP_OK) {
+    status = ticks_run(b, scene, session, hand, &run, out);
+  }
+  if (status >= HAP_OK && hap_session_stats(session, &stats, sizeof stats) >= HAP_OK) {
+    out->dropped = (unsigned long)stats.model.capacity_dropped;
+    out->duty = stats.physics.ms_mean * 1e-3 * physics_hz;
+  }
+  hap_session_destroy(session);
+  faults_world_destroy(&run.w);
+  (void)hap_hooks_set(NULL);
+  out->said = atomic_load(&lines_said);
+  return status;
+}

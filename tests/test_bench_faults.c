@@ -1,0 +1,89 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench faults: its controls are good, and the reference is what a formula says.
+ * HAPODE_BENCH: path of the program. */
+
+#include <math.h>
+
+#include "bench/faults.h"
+#include "tests/program.h"
+#include "tests/tap.h"
+
+static const faults_scene *scene_find(const char *name)
+{
+  for (size_t i = 0; i < faults_table_count; ++i) {
+    if (strcmp(faults_table[i].name, name) == 0) {
+      return &faults_table[i];
+    }
+  }
+  return NULL;
+}
+
+TEST(a_pressed_block_is_felt_as_its_spring)
+{
+  faults_run run;
+  const faults_scene *press = scene_find("press");
+  REQUIRE(press != NULL && faults_reference_run(press, 2000.0, &run));
+  for (size_t i = 0; i < run.count; ++i) {
+    double at[3];
+    double velocity[3];
+    press->motion.hand(FAULTS_TICK_S * (double)i, at, velocity);
+    double depth = fmax(press->motion.radius - at[2], 0.0);
+    CHECK(fabs(run.force[i][2] - press->motion.stiffness * depth) < 1e-9);
+    CHECK(fabs(run.force[i][0]) + fabs(run.force[i][1]) < 1e-12);
+  }
+  faults_run_free(&run);
+}
+
+/* A sheet of 0.1 mm with the whole finger through it. */
+TEST(the_reference_keeps_its_side_of_a_sheet)
+{
+  faults_run run;
+  const faults_scene *sheet = scene_find("sheet_0.1mm");
+  REQUIRE(sheet != NULL && faults_reference_run(sheet, 2000.0, &run));
+  for (size_t i = 0; i < run.count; ++i) {
+    double at[3];
+    double velocity[3];
+    sheet->motion.hand(FAULTS_TICK_S * (double)i, at, velocity);
+    double depth = fmax(sheet->motion.radius - at[2], 0.0);
+    CHECK(fabs(run.force[i][2] - sheet->motion.stiffness * depth) < 1e-9);
+  }
+  faults_run_free(&run);
+}
+
+/* A free cube of 1 kg: the work of the hand is the energy of cube and spring, 7 mJ, but for what the
+ * step is too long. */
+TEST(the_reference_keeps_energy)
+{
+  faults_run run;
+  faults_run half;
+  const faults_scene *push = scene_find("push");
+  REQUIRE(push != NULL && faults_reference_run(push, 4000.0, &run));
+  REQUIRE(faults_reference_run(push, 8000.0, &half));
+  CHECK(run.energy_off < 6e-5);
+  CHECK(half.energy_off < 0.6 * run.energy_off);
+  CHECK(run.force[200][0] < -1.0);
+  faults_run_free(&run);
+  faults_run_free(&half);
+}
+
+TEST(the_controls_are_good)
+{
+  folder_clear();
+  REQUIRE(run("faults --verify --scene push --out %s", test_folder) == 0);
+  const char *text = file_text(folder_path("faults.csv"));
+  CHECK(lines_with(text, "push") == 2);
+  CHECK(lines_with(text, ",ok") == 2);
+}
+
+TEST(a_scene_that_is_not_there_is_refused)
+{
+  folder_clear();
+  CHECK(run("faults --scene nothing --out %s", test_folder) == 1);
+}
+
+SET_UP
+{
+  return program_use("HAPODE_BENCH");
+}
