@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "base/def.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include <hapode/version.h>
@@ -15,74 +16,95 @@ typedef struct def_head {
 } def_head;
 
 /* A caller of an older build has room for less than this build knows. */
-void hapi_def_init(void *def, size_t size_of_def, const void *defaults, size_t size)
+void hapi_def_init(const hapi_def_type *type, void *def, size_t size_of_def)
 {
-  HAPI_ASSERT(defaults != NULL && size >= sizeof(def_head));
-  def_head head;
-  if (def == NULL || size_of_def < sizeof head) {
+  HAPI_ASSERT(type->defaults != NULL && type->size >= sizeof(def_head));
+  uint32_t size = (uint32_t)size_of_def;
+  if (def == NULL || size_of_def < sizeof(def_head)) {
     return;
   }
   memset(def, 0, size_of_def);
-  memcpy(def, defaults, size < size_of_def ? size : size_of_def);
-  memcpy(&head, def, sizeof head);
-  head.size = (uint32_t)size_of_def;
-  memcpy(def, &head, sizeof head);
+  memcpy(def, type->defaults, type->size < size_of_def ? type->size : size_of_def);
+  memcpy(def, &size, sizeof size);
 }
 
-/* What a newer build of the caller has set must not be passed over. */
-static hap_status def_check_unknown(const void *def, size_t size_of_def, size_t known,
-                                    const char *init_name, hap_detail *detail)
+static hap_status head_read(const hapi_def_type *type, const void *def, def_head *out,
+                            hap_detail *detail)
 {
-  const unsigned char *bytes = def;
-  for (size_t i = known; i < size_of_def; ++i) {
-    if (bytes[i] != 0) {
-      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                       "%.*s: byte %zu is set, but hapode %s knows %zu of its %zu bytes: the "
-                       "program was built with newer headers and sets a newer field",
-                       (int)(strlen(init_name) - strlen("_init")), init_name, i, hap_version(),
-                       known, size_of_def);
-    }
-  }
-  return HAP_OK;
-}
-
-hap_status hapi_def_check(const void *def, uint32_t cookie, const char *init_name,
-                          uint32_t *out_size, hap_detail *detail)
-{
-  HAPI_ASSERT(out_size != NULL);
-  def_head head;
+  def_head wanted;
   if (def == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the def is NULL");
   }
-  memcpy(&head, def, sizeof head);
-  if (head.cookie != cookie || head.size < sizeof head || head.size > 65536) {
-    return hapi_fail(detail, HAP_ERROR_UNINITIALISED, "the def was not initialised: call %s first",
-                     init_name);
+  memcpy(out, def, sizeof *out);
+  memcpy(&wanted, type->defaults, sizeof wanted);
+  if (out->cookie != wanted.cookie || out->size < sizeof *out || out->size > 65536) {
+    return hapi_fail(detail, HAP_ERROR_UNINITIALISED,
+                     "the def was not initialised: call %s_init first", type->name);
   }
-  *out_size = head.size;
   return HAP_OK;
 }
 
-hap_status hapi_def_read(void *out, size_t size_of_out, const void *def, uint32_t cookie,
-                         const char *init_name, hap_detail *detail)
-{
-  uint32_t size = 0;
-  hap_status status = hapi_def_check(def, cookie, init_name, &size, detail);
-  if (status >= HAP_OK) {
-    status = def_check_unknown(def, size, size_of_out, init_name, detail);
-  }
-  if (status >= HAP_OK) {
-    def_head head = {(uint32_t)size_of_out, cookie};
-    memcpy(out, def, size < size_of_out ? size : size_of_out);
-    memcpy(out, &head, sizeof head);
-  }
-  return status;
-}
-
-void hapi_def_write(void *def, const void *known, size_t size_of_known)
+/* What a newer build of the caller has set must not be passed over. */
+hap_status hapi_def_read(const hapi_def_type *type, const void *def, void *out, hap_detail *detail)
 {
   def_head head;
-  memcpy(&head, def, sizeof head);
-  size_t size = head.size < size_of_known ? head.size : size_of_known;
+  const unsigned char *bytes = def;
+  memcpy(out, type->defaults, type->size);
+  HAPI_TRY(head_read(type, def, &head, detail));
+  for (size_t i = type->size; i < head.size; ++i) {
+    if (bytes[i] != 0) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                       "%s: byte %zu is set, but hapode %s knows %zu of its %u bytes: the program "
+                       "was built with newer headers and sets a newer field",
+                       type->name, i, hap_version(), type->size, head.size);
+    }
+  }
+  memcpy(out, def, head.size < type->size ? head.size : type->size);
+  head.size = (uint32_t)type->size;
+  memcpy(out, &head, sizeof head);
+  return HAP_OK;
+}
+
+hap_status hapi_def_read_optional(const hapi_def_type *type, const void *def, void *out,
+                                  hap_detail *detail)
+{
+  if (def == NULL) {
+    hapi_def_init(type, out, type->size);
+    return HAP_OK;
+  }
+  return hapi_def_read(type, def, out, detail);
+}
+
+hap_status hapi_def_write(const hapi_def_type *type, const void *known, void *def,
+                          hap_detail *detail)
+{
+  def_head head;
+  HAPI_TRY(head_read(type, def, &head, detail));
+  size_t size = head.size < type->size ? head.size : type->size;
   memcpy((char *)def + sizeof head, (const char *)known + sizeof head, size - sizeof head);
+  return HAP_OK;
+}
+
+hap_status hapi_struct_give(const void *value, size_t size, void *out, size_t size_of_out)
+{
+  uint32_t given = (uint32_t)(size_of_out < size ? size_of_out : size);
+  if (out == NULL || size_of_out < sizeof given) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  memcpy(out, value, given);
+  memcpy(out, &given, sizeof given);
+  return HAP_OK;
+}
+
+hap_status hapi_numbers_check(const hapi_number_rule *rules, size_t count, hap_detail *detail)
+{
+  for (size_t i = 0; i < count; ++i) {
+    const hapi_number_rule *r = &rules[i];
+    bool other = r->other_name != NULL && r->value == r->other;
+    if (!other && !(r->value >= r->low && r->value <= r->high)) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not %sin %g .. %g", r->name, r->value,
+                       r->other_name != NULL ? r->other_name : "", r->low, r->high);
+    }
+  }
+  return HAP_OK;
 }

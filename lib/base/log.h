@@ -15,4 +15,13 @@ void hapi_log(hap_log_level level, const char *format, ...) HAP_PRINTF(2, 3);
 hap_status hapi_fail(hap_detail *detail, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
 
+/* Returns from the calling function whatever of a call is not HAP_OK. */
+#define HAPI_TRY(call)         \
+  do {                         \
+    hap_status tried = (call); \
+    if (tried != HAP_OK) {     \
+      return tried;            \
+    }                          \
+  } while (0)
+
 #endif

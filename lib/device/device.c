@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/assert.h"
+#include "base/def.h"
 #include "base/log.h"
 #include "base/vec.h"
 #include "device/module.h"
@@ -61,10 +62,7 @@ static hap_status check_abi(const hap_device_ops *ops, hap_detail *detail)
 
 static hap_status check_ops(const hap_device_ops *ops, hap_detail *detail)
 {
-  hap_status status = check_abi(ops, detail);
-  if (status < 0) {
-    return status;
-  }
+  HAPI_TRY(check_abi(ops, detail));
   if (!name_is_good(ops->name)) {
     return hapi_fail(detail, HAP_ERROR_DEVICE,
                      "the device's name is missing or not made of [a-z0-9_-]");
@@ -155,17 +153,14 @@ hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap
   HAPI_ASSERT(ops != NULL && args != NULL && detail != NULL);
   *out = NULL;
   detail->text[0] = '\0';
-  hap_status status = check_ops(ops, detail);
-  if (status < 0) {
-    return status;
-  }
+  HAPI_TRY(check_ops(ops, detail));
   hap_device *device = hapi_alloc(sizeof *device);
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "device '%s': out of memory", ops->name);
   }
   device->ops = ops;
   atomic_init(&device->holders.bits, 0);
-  status = open_self(device, args, detail);
+  hap_status status = open_self(device, args, detail);
   if (status < 0) {
     hapi_free(device);
     return status;
@@ -229,14 +224,8 @@ void hap_device_close(hap_device *device)
 
 hap_status hap_device_get_info(const hap_device *device, hap_device_info *out, size_t size_of_out)
 {
-  if (device == NULL || out == NULL || size_of_out < sizeof out->size) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  hap_device_info info = device->info;
-  size_t size = size_of_out < sizeof info ? size_of_out : sizeof info;
-  info.size = (uint32_t)size;
-  memcpy(out, &info, size);
-  return HAP_OK;
+  return device != NULL ? hapi_struct_give(&device->info, sizeof device->info, out, size_of_out)
+                        : HAP_ERROR_ARGUMENT;
 }
 
 const hap_device_ops *hapi_device_ops(const hap_device *device)

@@ -15,7 +15,6 @@
 #include "device/device.h"
 #include "device/emergency.h"
 
-#define COOKIE 0x48494431u
 #define FORCE_SHARE 0.3    /* of the device's own limit */
 #define FORCE_UNKNOWN 1.0  /* N, for a device that does not know its limit */
 #define REST_S 0.1         /* before an axis */
@@ -52,35 +51,28 @@ typedef struct run {
   hapi_identify_record records[AXES];
 } run;
 
+static const hap_identify_def def_defaults = {
+    .cookie = 0x48494431u,
+    .rate_hz = 1000.0,
+    .max_travel = 0.05,
+    .max_speed = 0.5,
+};
+static const hapi_def_type def_type = HAPI_DEF_TYPE(hap_identify_def, def_defaults);
+
 void hap_identify_def_init(hap_identify_def *def, size_t size_of_def)
 {
-  hap_identify_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = COOKIE;
-  d.rate_hz = 1000.0;
-  d.max_travel = 0.05;
-  d.max_speed = 0.5;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&def_type, def, size_of_def);
 }
 
-static hap_status check_def(const hap_identify_def *def, double limit, hap_detail *detail)
+static hap_status def_check(const hap_identify_def *def, double limit, hap_detail *detail)
 {
-  const struct {
-    double value;
-    double low;
-    double high;
-    const char *name;
-  } rules[] = {{def->rate_hz, 100.0, 20000.0, "rate_hz"},
-               {def->max_force, 0.0, limit, "max_force"},
-               {def->max_travel, 0.005, 0.5, "max_travel"},
-               {def->max_speed, 0.05, 2.0, "max_speed"}};
-  for (size_t i = 0; i < sizeof rules / sizeof rules[0]; ++i) {
-    if (!(rules[i].value >= rules[i].low && rules[i].value <= rules[i].high)) {
-      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "identification: %s is %g, not in %g .. %g",
-                       rules[i].name, rules[i].value, rules[i].low, rules[i].high);
-    }
-  }
-  return HAP_OK;
+  const hapi_number_rule rules[] = {
+      HAPI_RULE(def, rate_hz, 100.0, 20000.0),
+      HAPI_RULE(def, max_force, 0.0, limit),
+      HAPI_RULE(def, max_travel, 0.005, 0.5),
+      HAPI_RULE(def, max_speed, 0.05, 2.0),
+  };
+  return hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail);
 }
 
 /* ---- one tick ---- */
@@ -205,28 +197,21 @@ static hap_status tick_step(run *r, double force)
   hapi_identify_record *axis = &r->records[r->axis];
   HAPI_ASSERT(axis->count > 0 && fabs(force) <= r->limit);
   axis->samples[axis->count - 1].force = force;
-  hap_status status = force_write(r, force);
-  if (status == HAP_OK) {
-    status = read_device(r);
-  }
-  if (status == HAP_OK) {
-    status = sample_record(r);
-  }
-  if (status == HAP_OK) {
-    status = check_limits(r);
-  }
-  return status == HAP_OK ? progress_tell(r) : status;
+  HAPI_TRY(force_write(r, force));
+  HAPI_TRY(read_device(r));
+  HAPI_TRY(sample_record(r));
+  HAPI_TRY(check_limits(r));
+  return progress_tell(r);
 }
 
 /* ---- the phases of an axis ---- */
 
 static hap_status axis_rest(run *r)
 {
-  hap_status status = HAP_OK;
-  for (double end = r->time + REST_S; r->time < end && status == HAP_OK;) {
-    status = tick_step(r, 0.0);
+  for (double end = r->time + REST_S; r->time < end;) {
+    HAPI_TRY(tick_step(r, 0.0));
   }
-  return status;
+  return HAP_OK;
 }
 
 /* More and more force until it moves; *level is then that force. */
@@ -242,10 +227,7 @@ static hap_status friction_search(run *r, double home, double *level)
       return run_fail(r, text);
     }
     *level = fmin((r->time - begin) / RISE_S, 1.0) * r->limit;
-    hap_status status = tick_step(r, *level);
-    if (status != HAP_OK) {
-      return status;
-    }
+    HAPI_TRY(tick_step(r, *level));
   }
   return HAP_OK;
 }
@@ -319,10 +301,7 @@ static hap_status swing_about(run *r, double home, double *level)
       s.level = fmin(1.25 * s.level, r->limit);
       s.turned = r->time;
     }
-    hap_status status = tick_step(r, s.direction * s.share * s.level);
-    if (status != HAP_OK) {
-      return status;
-    }
+    HAPI_TRY(tick_step(r, s.direction * s.share * s.level));
   }
   *level = s.level;
   return HAP_OK;
@@ -330,39 +309,32 @@ static hap_status swing_about(run *r, double home, double *level)
 
 static hap_status axis_brake(run *r, double level)
 {
-  hap_status status = HAP_OK;
-  for (double end = r->time + BRAKE_S; r->time < end && status == HAP_OK;) {
-    status = tick_step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0));
+  for (double end = r->time + BRAKE_S; r->time < end;) {
+    HAPI_TRY(tick_step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0)));
   }
-  return status;
+  return HAP_OK;
 }
 
 static hap_status move_axis(run *r)
 {
-  hap_status status = sample_record(r); /* of where the last axis ended */
   double level = 0.0;
-  if (status == HAP_OK) {
-    status = axis_rest(r);
-  }
+  HAPI_TRY(sample_record(r)); /* of where the last axis ended */
+  HAPI_TRY(axis_rest(r));
   double home = r->position[r->axis];
-  if (status == HAP_OK) {
-    status = friction_search(r, home, &level);
-  }
-  if (status == HAP_OK) {
-    status = swing_about(r, home, &level);
-  }
-  return status == HAP_OK ? axis_brake(r, level) : status;
+  HAPI_TRY(friction_search(r, home, &level));
+  HAPI_TRY(swing_about(r, home, &level));
+  return axis_brake(r, level);
 }
 
 static hap_status move_all(run *r)
 {
   r->start_ns = r->device->ops->pacing == HAP_PACING_VIRTUAL ? 0 : hapi_clock_now();
-  hap_status status = read_device(r);
+  HAPI_TRY(read_device(r));
   hapi_v3_copy(r->position, r->origin);
-  for (r->axis = 0; r->axis < AXES && status == HAP_OK; ++r->axis) {
-    status = move_axis(r);
+  for (r->axis = 0; r->axis < AXES; ++r->axis) {
+    HAPI_TRY(move_axis(r));
   }
-  return status;
+  return HAP_OK;
 }
 
 /* ---- what it comes to ---- */
@@ -397,19 +369,17 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   io->delay = fmax(io->delay, fit.delay);
   io->quantum = fmax(io->quantum, hapi_identify_quantum(&r->records[axis]));
   io->residual = fmax(io->residual, fit.residual);
-
   return HAP_OK;
 }
 
 static hap_status identity_conclude(const run *r, hap_device_identity *out)
 {
-  hap_status status = HAP_OK;
   hap_device_identity_init(out, sizeof *out);
   memcpy(out->device, r->device->info.name, sizeof out->device);
-  for (int axis = 0; axis < AXES && status == HAP_OK; ++axis) {
-    status = add_axis(r, axis, out);
+  for (int axis = 0; axis < AXES; ++axis) {
+    HAPI_TRY(add_axis(r, axis, out));
   }
-  return status;
+  return HAP_OK;
 }
 
 static hap_status run_device(run *r, hap_device_identity *out)
@@ -460,23 +430,16 @@ hap_status hap_device_identify(hap_device *device, const hap_identify_def *def,
   if (device == NULL || out == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_identify: device or out is NULL");
   }
-  hap_identify_def_init(&known, sizeof known);
-  hap_status status =
-      hapi_def_read(&known, sizeof known, def, COOKIE, "hap_identify_def_init", detail);
+  HAPI_TRY(hapi_def_read(&def_type, def, &known, detail));
   double limit =
       device->info.max_force > 0.0 ? FORCE_SHARE * device->info.max_force : FORCE_UNKNOWN;
-  if (status >= HAP_OK) {
-    status = check_def(&known, limit, detail);
-  }
-  if (status < HAP_OK) {
-    return status;
-  }
+  HAPI_TRY(def_check(&known, limit, detail));
   if (!hapi_device_claim(device)) {
     return hapi_fail(detail, HAP_ERROR_STATE, "a pointer has the device");
   }
   run r = {.device = device, .def = &known, .detail = detail != NULL ? detail : &unread};
   r.limit = known.max_force > 0.0 ? known.max_force : limit;
-  status = run_with_records(&r, &found);
+  hap_status status = run_with_records(&r, &found);
   hapi_device_release(device);
   return status == HAP_OK ? hapi_device_identity_give(&found, out, detail) : status;
 }

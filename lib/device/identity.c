@@ -14,8 +14,10 @@
 #include "device/device.h"
 #include "device/identify.h"
 
-#define COOKIE 0x48444931u
 #define VERSION 1.0
+
+static const hap_device_identity nobody = {.cookie = 0x48444931u};
+static const hapi_def_type identity_type = HAPI_DEF_TYPE(hap_device_identity, nobody);
 
 typedef struct figure {
   const char *key;
@@ -43,29 +45,19 @@ static double *value_of(hap_device_identity *identity, size_t index)
 
 void hap_device_identity_init(hap_device_identity *identity, size_t size_of_identity)
 {
-  hap_device_identity defaults;
-  memset(&defaults, 0, sizeof defaults);
-  defaults.cookie = COOKIE;
-  hapi_def_init(identity, size_of_identity, &defaults, sizeof defaults);
+  hapi_def_init(&identity_type, identity, size_of_identity);
 }
 
 /* The caller's identity as this build's, its values checked. */
 static hap_status identity_read(const hap_device_identity *given, hap_device_identity *out,
                                 hap_detail *detail)
 {
-  hap_device_identity_init(out, sizeof *out);
-  hap_status status =
-      hapi_def_read(out, sizeof *out, given, COOKIE, "hap_device_identity_init", detail);
-  if (status < 0) {
-    return status;
-  }
+  HAPI_TRY(hapi_def_read(&identity_type, given, out, detail));
   out->device[sizeof out->device - 1] = '\0';
   for (size_t i = 0; i < FIGURES; ++i) {
-    double value = *value_of(out, i);
-    if (!(value >= 0.0 && value <= figures[i].most)) {
-      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "identity: %s is %g, not in 0 .. %g",
-                       figures[i].key, value, figures[i].most);
-    }
+    const hapi_number_rule rule = {
+        figures[i].key, *value_of(out, i), 0.0, figures[i].most, NULL, 0.0};
+    HAPI_TRY(hapi_numbers_check(&rule, 1, detail));
   }
   return HAP_OK;
 }
@@ -73,12 +65,7 @@ static hap_status identity_read(const hap_device_identity *given, hap_device_ide
 hap_status hapi_device_identity_give(const hap_device_identity *identity, hap_device_identity *out,
                                      hap_detail *detail)
 {
-  uint32_t size = 0;
-  hap_status status = hapi_def_check(out, COOKIE, "hap_device_identity_init", &size, detail);
-  if (status >= 0) {
-    hapi_def_write(out, identity, sizeof *identity);
-  }
-  return status;
+  return hapi_def_write(&identity_type, identity, out, detail);
 }
 
 /* ---- reading ---- */
@@ -182,12 +169,9 @@ hap_status hap_device_identity_read(const char *path, hap_device_identity *out, 
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the path of the identity is NULL");
   }
   reader r = {.file = {.path = path, .detail = detail}};
-  hap_device_identity_init(&r.identity, sizeof r.identity);
-  hap_status status = hapi_key_file_read(&r.file, take_line, &r);
-  if (status >= 0) {
-    status = check_complete(&r);
-  }
-  return status >= 0 ? hapi_device_identity_give(&r.identity, out, detail) : status;
+  HAPI_TRY(hapi_key_file_read(&r.file, take_line, &r));
+  HAPI_TRY(check_complete(&r));
+  return hapi_device_identity_give(&r.identity, out, detail);
 }
 
 /* ---- writing ---- */
@@ -216,10 +200,7 @@ hap_status hap_device_identity_write(const char *path, const hap_device_identity
                                      hap_detail *detail)
 {
   hap_device_identity known;
-  hap_status status = identity_read(identity, &known, detail);
-  if (status < 0) {
-    return status;
-  }
+  HAPI_TRY(identity_read(identity, &known, detail));
   if (path == NULL || !name_fits_a_line(known.device)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "the path is NULL, or the device's name is not one line of text");
@@ -245,10 +226,7 @@ hap_status hap_device_set_identity(hap_device *device, const hap_device_identity
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_set_identity: device is NULL");
   }
-  hap_status status = identity_read(identity, &known, detail);
-  if (status < 0) {
-    return status;
-  }
+  HAPI_TRY(identity_read(identity, &known, detail));
   if (strcmp(known.device, device->info.name) != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the identity is that of '%s', the device is '%s'",
                      known.device, device->info.name);

@@ -174,11 +174,8 @@ static hap_status open_device(const module *m, const char *args, hap_device **ou
 {
   const hap_device_ops *ops = NULL;
   hap_detail why = {""};
-  hap_status status = find_table(m, &ops);
-  if (status < 0) {
-    return status;
-  }
-  status = hapi_device_open_ops(ops, args, out, &why);
+  HAPI_TRY(find_table(m, &ops));
+  hap_status status = hapi_device_open_ops(ops, args, out, &why);
   return status < 0
              ? hapi_fail(m->detail, status, "module %.*s: %.290s", PATH_SHOWN, m->path, why.text)
              : status;
@@ -186,14 +183,9 @@ static hap_status open_device(const module *m, const char *args, hap_device **ou
 
 static hap_status open_module(module *m, const char *args, hap_device **out)
 {
-  hap_status status = check_file(m);
-  if (status >= 0) {
-    status = module_load(m);
-  }
-  if (status < 0) {
-    return status;
-  }
-  status = open_device(m, args, out);
+  HAPI_TRY(check_file(m));
+  HAPI_TRY(module_load(m));
+  hap_status status = open_device(m, args, out);
   if (status < 0) {
     hapi_module_unload(m->library);
     return status;

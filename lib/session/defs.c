@@ -13,197 +13,151 @@
 
 /* The def structs: defaults and checks. */
 
+static const hap_session_def session_defaults = {
+    .cookie = 0x48534531u,
+    .drive = HAP_DRIVE_THREADS,
+    .model = HAP_MODEL_CONTACT,
+    .physics_hz = 60.0,
+    .haptic_hz = 1000.0,
+    .max_bodies = 64,
+    .max_contacts = 1024,
+    .max_pointers = 4,
+    .rt_priority = 80,
+    .accuracy = HAP_ACCURACY_DEFAULT,
+};
+
+static const hap_expert_def expert_defaults = {
+    .cookie = 0x48455831u,
+    .contact_hz = HAP_BY_ACCURACY,
+    .max_sweeps = HAP_BY_ACCURACY,
+    .range_hops = HAP_BY_ACCURACY,
+    .max_edge_probes = HAP_BY_ACCURACY,
+    .iterations = HAP_BY_ACCURACY,
+    .reuse = HAP_BY_ACCURACY,
+    .max_hull_points = 4096,
+};
+
+static const hap_research_def research_defaults = {
+    .cookie = 0x48525331u,
+    .probe = HAP_PROBE_BY_ACCURACY,
+    .physics_latency_ticks = HAP_LATENCY_DEFAULT,
+};
+
+static const hap_pointer_def pointer_defaults = {
+    .cookie = HAPI_POINTER_COOKIE,
+    .radius = 0.01,
+    .stiffness = 1000.0,
+    .pose_world_device = {.quat_wxyz = {1.0}},
+    .motion_scale = 1.0,
+    .force_scale = 1.0,
+    .max_force = 20.0,
+    .max_torque = 1.0,
+    .collide_bits = 0xffffffffu,
+};
+
+static const hap_pointer_expert_def pointer_expert_defaults = {
+    .cookie = 0x48505831u,
+    .coupling = HAP_COUPLING_AUTO,
+};
+
+static const hap_pointer_research_def pointer_research_defaults = {
+    .cookie = 0x48505331u,
+    .virtual_mass = 0.1,
+};
+
+const hapi_def_type hapi_session_def_type = HAPI_DEF_TYPE(hap_session_def, session_defaults);
+const hapi_def_type hapi_expert_def_type = HAPI_DEF_TYPE(hap_expert_def, expert_defaults);
+const hapi_def_type hapi_research_def_type = HAPI_DEF_TYPE(hap_research_def, research_defaults);
+const hapi_def_type hapi_pointer_def_type = HAPI_DEF_TYPE(hap_pointer_def, pointer_defaults);
+const hapi_def_type hapi_pointer_expert_def_type =
+    HAPI_DEF_TYPE(hap_pointer_expert_def, pointer_expert_defaults);
+const hapi_def_type hapi_pointer_research_def_type =
+    HAPI_DEF_TYPE(hap_pointer_research_def, pointer_research_defaults);
+
 void hap_session_def_init(hap_session_def *def, size_t size_of_def)
 {
-  hap_session_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_SESSION_COOKIE;
-  d.drive = HAP_DRIVE_THREADS;
-  d.model = HAP_MODEL_CONTACT;
-  d.physics_hz = 60.0;
-  d.haptic_hz = 1000.0;
-  d.max_bodies = 64;
-  d.max_contacts = 1024;
-  d.max_pointers = 4;
-  d.rt_priority = 80;
-  d.accuracy = HAP_ACCURACY_DEFAULT;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_session_def_type, def, size_of_def);
 }
 
 void hap_expert_def_init(hap_expert_def *def, size_t size_of_def)
 {
-  hap_expert_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_EXPERT_COOKIE;
-  d.contact_hz = HAP_BY_ACCURACY;
-  d.max_sweeps = HAP_BY_ACCURACY;
-  d.range_hops = HAP_BY_ACCURACY;
-  d.max_edge_probes = HAP_BY_ACCURACY;
-  d.iterations = HAP_BY_ACCURACY;
-  d.reuse = HAP_BY_ACCURACY;
-  d.max_hull_points = 4096;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_expert_def_type, def, size_of_def);
 }
 
 void hap_research_def_init(hap_research_def *def, size_t size_of_def)
 {
-  hap_research_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_RESEARCH_COOKIE;
-  d.probe = HAP_PROBE_BY_ACCURACY;
-  d.physics_latency_ticks = HAP_LATENCY_DEFAULT;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_research_def_type, def, size_of_def);
 }
 
 void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def)
 {
-  hap_pointer_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_POINTER_COOKIE;
-  d.radius = 0.01;
-  d.stiffness = 1000.0;
-  d.pose_world_device.quat_wxyz[0] = 1.0;
-  d.motion_scale = 1.0;
-  d.force_scale = 1.0;
-  d.max_force = 20.0;
-  d.max_torque = 1.0;
-  d.collide_bits = 0xffffffffu;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_pointer_def_type, def, size_of_def);
 }
 
 void hap_pointer_expert_def_init(hap_pointer_expert_def *def, size_t size_of_def)
 {
-  hap_pointer_expert_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_POINTER_EXPERT_COOKIE;
-  d.coupling = HAP_COUPLING_AUTO;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_pointer_expert_def_type, def, size_of_def);
 }
 
 void hap_pointer_research_def_init(hap_pointer_research_def *def, size_t size_of_def)
 {
-  hap_pointer_research_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_POINTER_RESEARCH_COOKIE;
-  d.virtual_mass = 0.1;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&hapi_pointer_research_def_type, def, size_of_def);
 }
 
-static hap_status check_number(double value, double low, double high, const char *name,
-                               hap_detail *detail)
-{
-  if (value >= low && value <= high) { /* false for NaN */
-    return HAP_OK;
-  }
-  return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not in %g .. %g", name, value, low, high);
-}
-
-typedef struct number_rule {
-  double value;
-  double low;
-  double high;
-  const char *name;
-} number_rule;
-
-static hap_status check_numbers(const number_rule *rules, size_t count, hap_detail *detail)
-{
-  hap_status status = HAP_OK;
-  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
-    status = check_number(rules[i].value, rules[i].low, rules[i].high, rules[i].name, detail);
-  }
-  return status;
-}
-
-/* HAP_BY_ACCURACY, or a number within its limits. */
-static hap_status check_knobs(const hap_expert_def *expert, hap_detail *detail)
-{
-  const number_rule rules[] = {
-      {expert->contact_hz, 20.0, 1000.0, "contact_hz"},
-      {expert->max_edge_probes, 0, 1024, "max_edge_probes"},
-      {expert->max_sweeps, 0, 10000, "max_sweeps"},
-      {expert->range_hops, HAP_RANGE_ALL, 1024, "range_hops"},
-      {expert->iterations, 0, 10000, "iterations"},
-      {expert->reuse, 0.0, 0.01, "reuse"},
-  };
-  for (size_t i = 0; i < sizeof rules / sizeof rules[0]; ++i) {
-    const number_rule *r = &rules[i];
-    if (r->value != HAP_BY_ACCURACY && !(r->value >= r->low && r->value <= r->high)) {
-      return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not HAP_BY_ACCURACY or in %g .. %g",
-                       r->name, r->value, r->low, r->high);
-    }
-  }
-  return HAP_OK;
-}
-
-static hap_status check_choices(const hap_session_def *def, hap_detail *detail)
-{
-  if (def->expert->max_sweeps == 1) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_sweeps is 1: a solve is 2 sweeps at least");
-  }
-  hap_status status = check_knobs(def->expert, detail);
-  if (status >= HAP_OK) {
-    status = hapi_session_check_dial(def, detail);
-  }
-  return status >= HAP_OK ? hapi_session_check_effects(def, detail) : status;
-}
-
-static hap_status check_def(const hap_session_def *def, hap_detail *detail)
+static hap_status def_check(const hap_session_def *def, hap_detail *detail)
 {
   const hap_expert_def *expert = def->expert;
   const hap_research_def *research = def->research;
-  const number_rule rules[] = {
-      {def->drive, 0, 2, "drive"},
-      {def->model, 0, 3, "model"},
-      {def->haptic_hz, 100.0, 20000.0, "haptic_hz"},
-      {def->physics_hz, 1.0, 1000.0, "physics_hz"},
-      {def->max_bodies, 1, 1024, "max_bodies"},
-      {def->max_contacts, 1, 4096, "max_contacts"},
-      {def->max_pointers, 1, HAP_TRACE_POINTERS_MAX, "max_pointers"},
-      {def->rt_priority, 0, 99, "rt_priority"},
-      {research->physics_latency_ticks, -1, 20000, "physics_latency_ticks"},
-      {expert->trace_rows, 0, 1048576, "trace_rows"},
-      {research->impulse_pose, 0, 1, "impulse_pose"},
-      {research->probe, 0, 3, "probe"},
-      {expert->max_hull_points, 0, 1048576, "max_hull_points"},
-      {research->guard, 0, 1, "guard"},
-      {expert->lookback, 0.0, 0.5, "lookback"},
+  const hapi_number_rule rules[] = {
+      HAPI_RULE(def, drive, 0, 2),
+      HAPI_RULE(def, model, 0, 3),
+      HAPI_RULE(def, haptic_hz, 100.0, 20000.0),
+      HAPI_RULE(def, physics_hz, 1.0, 1000.0),
+      HAPI_RULE(def, max_bodies, 1, 1024),
+      HAPI_RULE(def, max_contacts, 1, 4096),
+      HAPI_RULE(def, max_pointers, 1, HAP_TRACE_POINTERS_MAX),
+      HAPI_RULE(def, rt_priority, 0, 99),
+      HAPI_RULE(expert, trace_rows, 0, 1048576),
+      HAPI_RULE(expert, max_hull_points, 0, 1048576),
+      HAPI_RULE(expert, lookback, 0.0, 0.5),
+      HAPI_RULE_OR(expert, contact_hz, HAP_BY_ACCURACY, 20.0, 1000.0),
+      HAPI_RULE_OR(expert, max_edge_probes, HAP_BY_ACCURACY, 0, 1024),
+      HAPI_RULE_OR(expert, max_sweeps, HAP_BY_ACCURACY, 0, 10000),
+      HAPI_RULE_OR(expert, range_hops, HAP_BY_ACCURACY, HAP_RANGE_ALL, 1024),
+      HAPI_RULE_OR(expert, iterations, HAP_BY_ACCURACY, 0, 10000),
+      HAPI_RULE_OR(expert, reuse, HAP_BY_ACCURACY, 0.0, 0.01),
+      HAPI_RULE(research, physics_latency_ticks, -1, 20000),
+      HAPI_RULE(research, impulse_pose, 0, 1),
+      HAPI_RULE(research, probe, 0, 3),
+      HAPI_RULE(research, guard, 0, 1),
   };
-  hap_status status = check_numbers(rules, sizeof rules / sizeof rules[0], detail);
-  if (status >= HAP_OK && def->physics_hz > def->haptic_hz) {
+  HAPI_TRY(hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail));
+  if (def->physics_hz > def->haptic_hz) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "physics_hz is %g, above haptic_hz %g: there must be at least one tick to a "
                      "step",
                      def->physics_hz, def->haptic_hz);
   }
   double most = floor(def->haptic_hz / def->physics_hz + 1e-9);
-  if (status >= HAP_OK && research->physics_latency_ticks > most) {
+  if (research->physics_latency_ticks > most) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "physics_latency_ticks is %d, above the %g ticks of a physics step",
                      research->physics_latency_ticks, most);
   }
-  return status >= HAP_OK ? check_choices(def, detail) : status;
+  if (expert->max_sweeps == 1) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_sweeps is 1: a solve is 2 sweeps at least");
+  }
+  HAPI_TRY(hapi_session_check_dial(def, detail));
+  return hapi_session_check_effects(def, detail);
 }
 
 hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out, hap_detail *detail)
 {
   hap_session_def *def = &out->def;
-  hap_session_def_init(def, sizeof *def);
-  hap_expert_def_init(&out->expert, sizeof out->expert);
-  hap_research_def_init(&out->research, sizeof out->research);
-  hap_status status = HAP_OK;
-  if (given != NULL) {
-    status =
-        hapi_def_read(def, sizeof *def, given, HAPI_SESSION_COOKIE, "hap_session_def_init", detail);
-  }
-  if (status >= HAP_OK && def->expert != NULL) {
-    status = hapi_def_read(&out->expert, sizeof out->expert, def->expert, HAPI_EXPERT_COOKIE,
-                           "hap_expert_def_init", detail);
-  }
-  if (status >= HAP_OK && def->research != NULL) {
-    status = hapi_def_read(&out->research, sizeof out->research, def->research,
-                           HAPI_RESEARCH_COOKIE, "hap_research_def_init", detail);
-  }
+  HAPI_TRY(hapi_def_read_optional(&hapi_session_def_type, given, def, detail));
+  HAPI_TRY(hapi_def_read_optional(&hapi_expert_def_type, def->expert, &out->expert, detail));
+  HAPI_TRY(hapi_def_read_optional(&hapi_research_def_type, def->research, &out->research, detail));
   def->expert = &out->expert;
   def->research = &out->research;
-  return status >= HAP_OK ? check_def(def, detail) : status;
+  return def_check(def, detail);
 }

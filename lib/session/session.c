@@ -40,9 +40,32 @@ hap_status hapi_session_fail(const hap_session *session, hap_status status, cons
   return status;
 }
 
-static hap_status note_detail(hap_session *session, hap_status status, const hap_detail *detail)
+hap_status hapi_session_note(const hap_session *session, hap_status status,
+                             const hap_detail *detail)
 {
   return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail->text) : status;
+}
+
+hap_status hapi_session_may_change(const hap_session *session)
+{
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return session->player == NULL
+             ? HAP_OK
+             : hapi_session_fail(session, HAP_ERROR_STATE,
+                                 "the session plays a recording, and what happened is in it");
+}
+
+void hapi_session_free(hap_session *session)
+{
+  hapi_haptic_destroy(session->haptic);
+  hapi_physics_destroy(session->physics);
+  hapi_contact_destroy(session->contact);
+  hapi_exchange_destroy(session->exchange);
+  hapi_recorder_destroy(session->recorder);
+  pthread_mutex_destroy(&session->detail_lock);
+  hapi_free(session);
 }
 
 void hap_session_destroy(hap_session *session)
@@ -57,13 +80,7 @@ void hap_session_destroy(hap_session *session)
   (void)hapi_physics_unlock(session->physics); /* where this thread has it, stop would wait */
   hap_session_stop(session);
   hapi_physics_close(session->physics);
-  hapi_haptic_destroy(session->haptic);
-  hapi_physics_destroy(session->physics);
-  hapi_contact_destroy(session->contact);
-  hapi_exchange_destroy(session->exchange);
-  hapi_recorder_destroy(session->recorder);
-  pthread_mutex_destroy(&session->detail_lock);
-  hapi_free(session);
+  hapi_session_free(session);
 }
 
 /* ---- start and stop ---- */
@@ -73,13 +90,6 @@ static bool may_run(hap_session *session)
 {
   return !hapi_physics_in_callback(session->physics) &&
          !hapi_physics_lock_is_mine(session->physics);
-}
-
-static void lock_memory(hap_session *session)
-{
-  size_t size = 0;
-  void *block = hapi_exchange_memory(session->exchange, &size);
-  session->memory_locked = session->def.rt_priority > 0 && hapi_memory_lock(block, size);
 }
 
 static hap_status start_threads(hap_session *session)
@@ -99,9 +109,15 @@ static hap_status start_threads(hap_session *session)
   return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
 
-/* The first local model, and the first contacts: the first tick has both. */
-static void prepare_loop(hap_session *session, int64_t start_ns)
+static hap_status session_begin(hap_session *session, hap_detail *detail)
 {
+  int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
+  hapi_exchange_reset(session->exchange);
+  HAPI_TRY(session->player != NULL ? hapi_play_begin(session, &start_ns, detail)
+                                   : hapi_record_begin(session, detail));
+  HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
+  HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+  /* The first local model, and the first contacts: the first tick has both. */
   hapi_haptic_set_start(session->haptic, start_ns);
   hapi_contact_begin(session->contact, start_ns);
   hapi_haptic_receive(session->haptic, start_ns);
@@ -110,30 +126,13 @@ static void prepare_loop(hap_session *session, int64_t start_ns)
   atomic_store(&session->tick, 0);
   session->base = session->step = session->pass_tick = 0;
   session->frame_remainder_s = 0.0;
-}
-
-static hap_status begin(hap_session *session)
-{
-  hap_detail detail = {""};
-  int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
-  hapi_exchange_reset(session->exchange);
-  hap_status status = session->player != NULL ? hapi_play_begin(session, &start_ns, &detail)
-                                              : hapi_record_begin(session, &detail);
-  if (status >= HAP_OK) {
-    status = hapi_haptic_begin(session->haptic, start_ns, &detail);
-  }
-  if (status >= HAP_OK) {
-    status = hapi_physics_begin(session->physics, &start_ns, &detail);
-  }
-  if (status >= HAP_OK) {
-    prepare_loop(session, start_ns);
-    status = session->player != NULL ? hapi_play_begun(session, start_ns, &detail) : HAP_OK;
-  }
-  return status < HAP_OK ? note_detail(session, status, &detail) : HAP_OK;
+  return session->player != NULL ? hapi_play_begun(session, start_ns, detail) : HAP_OK;
 }
 
 hap_status hap_session_start(hap_session *session)
 {
+  size_t size = 0;
+  hap_detail detail = {""};
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
@@ -150,12 +149,13 @@ hap_status hap_session_start(hap_session *session)
                              "a replay is started once: open the recording and create the session "
                              "anew");
   }
-  hap_status status = begin(session);
+  hap_status status = hapi_session_note(session, session_begin(session, &detail), &detail);
   (void)hapi_physics_unlock(session->physics);
   session->started = session->ran = true;
   session->starter = pthread_self();
   if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {
-    lock_memory(session);
+    void *block = hapi_exchange_memory(session->exchange, &size);
+    session->memory_locked = session->def.rt_priority > 0 && hapi_memory_lock(block, size);
     status = start_threads(session);
   }
   if (status < HAP_OK) {
@@ -193,7 +193,7 @@ hap_status hap_session_stop(hap_session *session)
 /* ---- the drives ---- */
 
 /* What update and advance have to say when they have done their work. */
-static hap_status outcome(const hap_session *session, uint64_t lost_before)
+static hap_status drive_outcome(const hap_session *session, uint64_t lost_before)
 {
   if (hapi_haptic_has_fault(session->haptic)) {
     return HAP_FAULTED;
@@ -202,8 +202,11 @@ static hap_status outcome(const hap_session *session, uint64_t lost_before)
   return lost ? HAP_BODY_LOST : HAP_OK;
 }
 
-static hap_status check_update(hap_session *session, double frame_s)
+static hap_status update_check(hap_session *session, double frame_s)
 {
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
   if (!(frame_s >= 0.0 && frame_s <= HAPI_FRAME_S_MOST)) { /* false for NaN */
     return hapi_session_fail(
         session, HAP_ERROR_ARGUMENT,
@@ -227,13 +230,7 @@ static hap_status check_update(hap_session *session, double frame_s)
 
 hap_status hap_session_update(hap_session *session, double frame_s)
 {
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  hap_status status = check_update(session, frame_s);
-  if (status < HAP_OK) {
-    return status;
-  }
+  HAPI_TRY(update_check(session, frame_s));
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
   double period = hapi_physics_next_period(session->physics);
   hapi_frame_steps steps =
@@ -247,7 +244,7 @@ hap_status hap_session_update(hap_session *session, double frame_s)
     hapi_physics_count_dropped_frames(session->physics, steps.dropped);
     return HAP_DROPPED;
   }
-  return outcome(session, lost);
+  return drive_outcome(session, lost);
 }
 
 /* Whole ones; signed on the way, as unsigned numbers are dear to convert. */
@@ -261,7 +258,7 @@ static int64_t time_of(const hap_session *session, uint64_t tick)
   return hapi_clock_deadline(tick, session->def.haptic_hz);
 }
 
-static int64_t nanoseconds(double seconds)
+static int64_t seconds_in_ns(double seconds)
 {
   return (int64_t)llround(1e9 * seconds);
 }
@@ -276,10 +273,10 @@ static void step_when_due(hap_session *session)
   double next_period = hapi_physics_next_period(session->physics);
   bool changes = next_period != period;
   /* Where H is no whole number of ticks, the step's own time lies between two ticks. */
-  int64_t now = time_of(session, session->base) + nanoseconds((double)session->step * period);
+  int64_t now = time_of(session, session->base) + seconds_in_ns((double)session->step * period);
   /* SINGLE steps up to now, and at the start there is nothing to step. */
   if (session->tick > 0 || !hapi_physics_steps_to_now(session->physics)) {
-    hapi_physics_cycle(session->physics, now, now + nanoseconds(next_period));
+    hapi_physics_cycle(session->physics, now, now + seconds_in_ns(next_period));
   }
   session->base = changes ? session->tick : session->base;
   session->step = changes ? 1 : session->step + 1;
@@ -318,7 +315,7 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
   if (session->player != NULL) {
     hap_status status = hapi_play_advance(session, ticks);
-    return status != HAP_OK ? status : outcome(session, lost);
+    return status != HAP_OK ? status : drive_outcome(session, lost);
   }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
@@ -328,7 +325,7 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
     hapi_haptic_cycle(session->haptic, now);
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);
   }
-  return outcome(session, lost);
+  return drive_outcome(session, lost);
 }
 
 int64_t hap_session_now(const hap_session *session)
@@ -403,19 +400,11 @@ hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
              : status;
 }
 
-static hap_status refuse_in_replay(const hap_session *session)
-{
-  return hapi_session_fail(session, HAP_ERROR_STATE,
-                           "the session plays a recording, and what happened is in it");
-}
-
 hap_status hap_session_set_model(hap_session *session, hap_model model)
 {
-  if (session == NULL || (int)model < 0 || hap_model_name(model) == NULL) {
+  HAPI_TRY(hapi_session_may_change(session));
+  if ((int)model < 0 || hap_model_name(model) == NULL) {
     return HAP_ERROR_ARGUMENT;
-  }
-  if (session->player != NULL) {
-    return refuse_in_replay(session);
   }
   hapi_physics_set_model(session->physics, model);
   return HAP_OK;
@@ -471,12 +460,7 @@ static void write_fault(hapi_haptic *haptic, const hap_stats *stats, hap_detail 
 
 hap_status hap_session_reset_fault(hap_session *session)
 {
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  if (session->player != NULL) {
-    return refuse_in_replay(session);
-  }
+  HAPI_TRY(hapi_session_may_change(session));
   hapi_haptic_reset_fault(session->haptic);
   return HAP_OK;
 }
@@ -484,20 +468,15 @@ hap_status hap_session_reset_fault(hap_session *session)
 hap_status hap_session_stats(const hap_session *session, hap_stats *out, size_t size_of_out)
 {
   hap_stats stats;
-  hap_stats loop;
-  if (session == NULL || out == NULL || size_of_out < sizeof stats.size) {
+  if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  memset(&loop, 0, sizeof loop);
-  hapi_haptic_stats(session->haptic, &loop);
-  stats = loop;
+  memset(&stats, 0, sizeof stats);
+  hapi_haptic_stats(session->haptic, &stats); /* physics looks at it */
   hapi_physics_stats(session->physics, &stats);
   hapi_haptic_stats(session->haptic, &stats);
   hapi_contact_stats(session->contact, &stats);
-  size_t size = size_of_out < sizeof stats ? size_of_out : sizeof stats;
-  stats.size = (uint32_t)size;
-  memcpy(out, &stats, size);
-  return HAP_OK;
+  return hapi_struct_give(&stats, sizeof stats, out, size_of_out);
 }
 
 hap_status hap_session_detail(const hap_session *session, hap_detail *out)

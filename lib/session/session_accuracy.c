@@ -1,7 +1,5 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <string.h>
-
 #include <hapode/accuracy.h>
 
 #include "base/log.h"
@@ -25,48 +23,33 @@ const char *hap_accuracy_reason_text(hap_accuracy_reason reason)
   return index < sizeof texts / sizeof texts[0] ? texts[index] : "";
 }
 
-/* 0 is none. */
-static hap_status check_wish(double value, double least, const char *name, hap_detail *detail)
+static hap_status error_check(const hap_session_def *def, double wanted, hap_detail *detail)
 {
-  return value == 0.0 || (value >= least && value <= 1.0) /* false for NaN */
-             ? HAP_OK
-             : hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not 0 or in %g .. 1", name, value,
-                         least);
-}
-
-static hap_status check_accuracy(double accuracy, hap_detail *detail)
-{
-  return accuracy >= 0.0 && accuracy <= 1.0
-             ? HAP_OK
-             : hapi_fail(detail, HAP_ERROR_ARGUMENT, "accuracy is %g, not in 0 .. 1", accuracy);
-}
-
-static hap_status check_error(const hap_session_def *def, double wanted, hap_detail *detail)
-{
-  hap_status status = check_wish(wanted, ERROR_LEAST, "force_error_wanted", detail);
-  if (status >= HAP_OK && wanted > 0.0 && def->expert->lookback == 0.0) {
+  const hapi_number_rule rule = {"force_error_wanted", wanted, ERROR_LEAST, 1.0, "0 or ", 0.0};
+  HAPI_TRY(hapi_numbers_check(&rule, 1, detail));
+  if (wanted > 0.0 && def->expert->lookback == 0.0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                      "force_error_wanted is %g, and nothing tells the error: set lookback, to 0.1 "
                      "say",
                      wanted);
   }
-  return status;
+  return HAP_OK;
 }
 
-static hap_status check_budget(const hap_session_def *def, double tick_share, double physics_share,
+static hap_status budget_check(const hap_session_def *def, double tick_share, double physics_share,
                                hap_detail *detail)
 {
-  hap_status status = check_wish(tick_share, SHARE_LEAST, "tick_share", detail);
-  if (status >= HAP_OK) {
-    status = check_wish(physics_share, SHARE_LEAST, "physics_share", detail);
-  }
-  bool budget = tick_share > 0.0 || physics_share > 0.0;
-  if (status >= HAP_OK && budget && def->drive == HAP_DRIVE_LOCKSTEP) {
+  const hapi_number_rule rules[] = {
+      {"tick_share", tick_share, SHARE_LEAST, 1.0, "0 or ", 0.0},
+      {"physics_share", physics_share, SHARE_LEAST, 1.0, "0 or ", 0.0},
+  };
+  HAPI_TRY(hapi_numbers_check(rules, 2, detail));
+  if ((tick_share > 0.0 || physics_share > 0.0) && def->drive == HAP_DRIVE_LOCKSTEP) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                      "budget, tick_share or physics_share in drive LOCKSTEP, which does the same "
                      "on every run, however long it takes: set accuracy instead");
   }
-  return status;
+  return HAP_OK;
 }
 
 double hapi_session_share(const hap_session_def *def, double own)
@@ -76,90 +59,57 @@ double hapi_session_share(const hap_session_def *def, double own)
 
 hap_status hapi_session_check_dial(const hap_session_def *def, hap_detail *detail)
 {
-  hap_status status = check_accuracy(def->accuracy, detail);
-  if (status >= HAP_OK) {
-    status = check_error(def, def->expert->force_error_wanted, detail);
-  }
-  if (status >= HAP_OK) {
-    status = check_wish(def->budget, SHARE_LEAST, "budget", detail);
-  }
-  return status >= HAP_OK
-             ? check_budget(def, hapi_session_share(def, def->expert->tick_share),
-                            hapi_session_share(def, def->expert->physics_share), detail)
-             : status;
-}
-
-static hap_status check_free(const hap_session *session, hap_detail *detail)
-{
-  return session->player != NULL
-             ? hapi_fail(detail, HAP_ERROR_STATE,
-                         "the session plays a recording, and what happened is in it")
-             : HAP_OK;
-}
-
-static hap_status give(hap_session *session, hap_status status, const hap_detail *detail)
-{
-  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail->text) : HAP_OK;
+  const hapi_number_rule rules[] = {
+      HAPI_RULE(def, accuracy, 0.0, 1.0),
+      HAPI_RULE_OR(def, budget, 0, SHARE_LEAST, 1.0),
+  };
+  HAPI_TRY(hapi_numbers_check(rules, 2, detail));
+  HAPI_TRY(error_check(def, def->expert->force_error_wanted, detail));
+  return budget_check(def, hapi_session_share(def, def->expert->tick_share),
+                      hapi_session_share(def, def->expert->physics_share), detail);
 }
 
 hap_status hap_session_set_accuracy(hap_session *session, double accuracy)
 {
+  const hapi_number_rule rule = {"accuracy", accuracy, 0.0, 1.0, NULL, 0.0};
   hap_detail detail = {""};
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  hap_status status = check_accuracy(accuracy, &detail);
-  if (status >= HAP_OK) {
-    status = check_free(session, &detail);
-  }
+  HAPI_TRY(hapi_session_may_change(session));
+  hap_status status = hapi_numbers_check(&rule, 1, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_accuracy(session->physics, accuracy);
   }
-  return give(session, status, &detail);
+  return hapi_session_note(session, status, &detail);
 }
 
 hap_status hap_session_set_force_error(hap_session *session, double wanted)
 {
   hap_detail detail = {""};
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  hap_status status = check_error(&session->def, wanted, &detail);
-  if (status >= HAP_OK) {
-    status = check_free(session, &detail);
-  }
+  HAPI_TRY(hapi_session_may_change(session));
+  hap_status status = error_check(&session->def, wanted, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_force_error(session->physics, wanted);
   }
-  return give(session, status, &detail);
+  return hapi_session_note(session, status, &detail);
 }
 
 hap_status hap_session_set_budget(hap_session *session, double tick_share, double physics_share)
 {
   hap_detail detail = {""};
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  hap_status status = check_budget(&session->def, tick_share, physics_share, &detail);
-  if (status >= HAP_OK) {
-    status = check_free(session, &detail);
-  }
+  HAPI_TRY(hapi_session_may_change(session));
+  hap_status status = budget_check(&session->def, tick_share, physics_share, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_budget(session->physics, tick_share, physics_share);
   }
-  return give(session, status, &detail);
+  return hapi_session_note(session, status, &detail);
 }
 
 hap_status hap_session_accuracy(const hap_session *session, hap_accuracy_info *out,
                                 size_t size_of_out)
 {
   hap_accuracy_info info;
-  if (session == NULL || out == NULL || size_of_out < sizeof out->size) {
+  if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  size_t size = size_of_out < sizeof info ? size_of_out : sizeof info;
   hapi_physics_accuracy(session->physics, &info);
-  info.size = (uint32_t)size;
-  memcpy(out, &info, size);
-  return HAP_OK;
+  return hapi_struct_give(&info, sizeof info, out, size_of_out);
 }

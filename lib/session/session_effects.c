@@ -105,8 +105,8 @@ const char *hap_effect_reason_text(hap_effect_reason reason)
 
 /* ---- what can be wished for ---- */
 
-static hap_status refuse(hap_effect effect, hap_effect_wish wish, hap_model model,
-                         hap_detail *detail)
+static hap_status effect_refuse(hap_effect effect, hap_effect_wish wish, hap_model model,
+                                hap_detail *detail)
 {
   const effect_row *e = &effects[effect];
   if (effect == HAP_EFFECT_RECORDING) {
@@ -134,12 +134,14 @@ hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap_model m
   }
   bool lacks = wish == HAP_EFFECT_ON && (effects[effect].has & BIT(model)) == 0;
   bool needs = wish == HAP_EFFECT_OFF && (effects[effect].needs & BIT(model)) != 0;
-  return lacks || needs ? refuse(effect, wish, model, detail) : HAP_OK;
+  return lacks || needs ? effect_refuse(effect, wish, model, detail) : HAP_OK;
 }
 
-static hap_status check_guard(const hap_session_def *def, hap_effect effect, hap_effect_wish wish,
-                              hap_detail *detail)
+/* hap_effect_check, and what else the session says to it. */
+static hap_status wish_check(const hap_session_def *def, hap_effect effect, hap_effect_wish wish,
+                             hap_model model, hap_detail *detail)
 {
+  HAPI_TRY(hap_effect_check(effect, wish, model, detail));
   return effect == HAP_EFFECT_OBSERVER && wish == HAP_EFFECT_ON &&
                  def->research->guard == HAP_GUARD_MEASURE
              ? hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
@@ -158,36 +160,22 @@ static hap_effect_wish wish_of(const hap_expert_def *expert, int effect)
                                             : HAP_EFFECT_AUTO;
 }
 
-static hap_status check_bits(const hap_expert_def *expert, hap_detail *detail)
+hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail)
 {
-  if ((expert->effects_on & ~KNOWN) != 0) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects_on has unknown bits 0x%x",
-                     expert->effects_on & ~KNOWN);
-  }
-  if ((expert->effects_off & ~KNOWN) != 0) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "effects_off has unknown bits 0x%x",
-                     expert->effects_off & ~KNOWN);
+  const hap_expert_def *expert = def->expert;
+  uint32_t unknown = (expert->effects_on | expert->effects_off) & ~KNOWN;
+  if (unknown != 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s has unknown bits 0x%x",
+                     (expert->effects_on & ~KNOWN) != 0 ? "effects_on" : "effects_off", unknown);
   }
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     if ((expert->effects_on & expert->effects_off & HAP_EFFECT_BIT(i)) != 0) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is in effects_on and in effects_off",
                        effects[i].name);
     }
+    HAPI_TRY(wish_check(def, (hap_effect)i, wish_of(expert, i), def->model, detail));
   }
   return HAP_OK;
-}
-
-hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *detail)
-{
-  hap_status status = check_bits(def->expert, detail);
-  for (int i = 0; i < HAP_EFFECTS && status >= HAP_OK; ++i) {
-    hap_effect_wish wish = wish_of(def->expert, i);
-    status = hap_effect_check((hap_effect)i, wish, def->model, detail);
-    if (status >= HAP_OK) {
-      status = check_guard(def, (hap_effect)i, wish, detail);
-    }
-  }
-  return status;
 }
 
 uint32_t hapi_session_pack_effects(const hap_expert_def *expert)
@@ -212,41 +200,21 @@ void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io)
 hap_status hap_session_set_effect(hap_session *session, hap_effect effect, hap_effect_wish wish)
 {
   hap_detail detail = {""};
-  if (session == NULL) {
-    return HAP_ERROR_ARGUMENT;
-  }
-  if (session->player != NULL) {
-    return hapi_session_fail(session, HAP_ERROR_STATE,
-                             "the session plays a recording, and what happened is in it");
-  }
+  HAPI_TRY(hapi_session_may_change(session));
   hap_status status =
-      hap_effect_check(effect, wish, hapi_physics_wanted_model(session->physics), &detail);
-  if (status >= HAP_OK) {
-    status = check_guard(&session->def, effect, wish, &detail);
-  }
+      wish_check(&session->def, effect, wish, hapi_physics_wanted_model(session->physics), &detail);
   if (status >= HAP_OK && effect == HAP_EFFECT_RECORDING && wish == HAP_EFFECT_OFF &&
       session->recorder != NULL) {
     status = hapi_fail(&detail, HAP_ERROR_STATE,
                        "recording=off: the session is recorded, until it is stopped");
   }
-  if (status < HAP_OK) {
-    return hapi_session_fail(session, status, "%s", detail.text);
+  if (status >= HAP_OK) {
+    hapi_physics_set_effect(session->physics, effect, wish);
   }
-  hapi_physics_set_effect(session->physics, effect, wish);
-  return HAP_OK;
+  return hapi_session_note(session, status, &detail);
 }
 
 /* ---- what they do ---- */
-
-static void fill_recording(const hap_session *session, hap_effect_info *out)
-{
-  bool on = session->recorder != NULL;
-  out->state = on ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF;
-  out->reason = on                            ? HAP_REASON_ASKED
-                : out->wish == HAP_EFFECT_OFF ? HAP_REASON_ASKED
-                                              : HAP_REASON_NOT_RECORDED;
-  out->on = out->of = 0;
-}
 
 hap_status hap_session_effects(const hap_session *session, hap_effect_info *out, size_t count,
                                size_t size_of_one)
@@ -265,7 +233,12 @@ hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
   hapi_physics_effects(session->physics, all);
   hapi_haptic_effects(session->haptic, all);
   hapi_contact_effects(session->contact, all);
-  fill_recording(session, &all[HAP_EFFECT_RECORDING]);
+  hap_effect_info *recording = &all[HAP_EFFECT_RECORDING];
+  bool recorded = session->recorder != NULL;
+  recording->state = recorded ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF;
+  recording->reason =
+      recorded || recording->wish == HAP_EFFECT_OFF ? HAP_REASON_ASKED : HAP_REASON_NOT_RECORDED;
+  recording->on = recording->of = 0;
   for (size_t i = 0; i < count; ++i) {
     memcpy((char *)out + i * size_of_one, &all[i], size);
   }

@@ -19,14 +19,7 @@
 #include "record/recorder.h"
 #include "sync/exchange.h"
 
-#define HAPI_SESSION_COOKIE 0x48534531u
-#define HAPI_EXPERT_COOKIE 0x48455831u
-#define HAPI_RESEARCH_COOKIE 0x48525331u
-#define HAPI_POINTER_COOKIE 0x48505431u
-#define HAPI_POINTER_EXPERT_COOKIE 0x48505831u
-#define HAPI_POINTER_RESEARCH_COOKIE 0x48505331u
-#define HAPI_ODE_COOKIE 0x484f4431u
-#define HAPI_RECORD_COOKIE 0x48524331u
+#define HAPI_POINTER_COOKIE 0x48505431u /* recordings have it */
 
 struct hap_session {
   hap_session_def def; /* its expert and research are the next two */
@@ -61,10 +54,20 @@ struct hap_session {
 /* Notes the text of an error on the session and gives back status. */
 hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
+/* The same with the detail of a failed check; nothing where the status is none. */
+hap_status hapi_session_note(const hap_session *session, hap_status status,
+                             const hap_detail *detail);
+/* HAP_ERROR_ARGUMENT: NULL. HAP_ERROR_STATE: it plays a recording, and what happened is in it. */
+hap_status hapi_session_may_change(const hap_session *session);
+/* What create has made; stopped before. */
+void hapi_session_free(hap_session *session);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player either */
 hap_status hapi_record_begin(hap_session *session, hap_detail *detail);
 void hapi_record_stop(hap_session *session);
+/* What the recorded session is, between its defs and the file. From the file: over what is there. */
+void hapi_session_move_defs(hapi_file_info *info, hap_session_def *def, hap_expert_def *expert,
+                            hap_research_def *research, bool to_file);
 void hapi_session_set_tapes(hap_session *session, hapi_tape *const tapes[HAPI_STREAMS]);
 
 /* session_play.c, of a session with a player: around what begins a session, and instead of its drive */
@@ -89,8 +92,15 @@ hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *de
 uint32_t hapi_session_pack_effects(const hap_expert_def *expert);
 void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io);
 
-/* defs.c: fills in def, expert and research of *out, and checks them. given NULL: defaults. def.expert and def.research are
- * never NULL then. */
+/* defs.c */
+extern const hapi_def_type hapi_session_def_type;
+extern const hapi_def_type hapi_expert_def_type;
+extern const hapi_def_type hapi_research_def_type;
+extern const hapi_def_type hapi_pointer_def_type;
+extern const hapi_def_type hapi_pointer_expert_def_type;
+extern const hapi_def_type hapi_pointer_research_def_type;
+/* Fills in def, expert and research of *out, and checks them. given NULL: defaults. def.expert and
+ * def.research are never NULL then. */
 hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,
                                  hap_detail *detail);
 

@@ -20,37 +20,32 @@
 /* What of the session has ODE types: create. The other calls of hapode/ode.h end in
  * lib/physics/adopt.c, through the session's physics. */
 
+static const hap_ode_def ode_defaults = {
+    .cookie = 0x484f4431u, .max_contacts_per_pair = 8, .island_threads = 1};
+static const hapi_def_type ode_type = HAPI_DEF_TYPE(hap_ode_def, ode_defaults);
+
 void hap_ode_def_init(hap_ode_def *def, size_t size_of_def)
 {
-  hap_ode_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_ODE_COOKIE;
-  d.max_contacts_per_pair = 8;
-  d.island_threads = 1;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&ode_type, def, size_of_def);
 }
 
-static hap_status check_ode(const hap_ode_def *def, hap_detail *detail)
+static hap_status ode_check(const hap_ode_def *def, hap_detail *detail)
 {
+  const hapi_number_rule rules[] = {
+      HAPI_RULE(def, max_contacts_per_pair, 1, 64),
+      HAPI_RULE(def, island_threads, 1, 64),
+  };
   if (def->world == NULL || def->space == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is NULL",
                      def->world == NULL ? "world" : "space");
   }
-  if (def->max_contacts_per_pair < 1 || def->max_contacts_per_pair > 64) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_contacts_per_pair is %d, not in 1 .. 64",
-                     def->max_contacts_per_pair);
-  }
-  if (def->island_threads < 1 || def->island_threads > 64) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "island_threads is %d, not in 1 .. 64",
-                     def->island_threads);
-  }
   if (dCheckConfiguration("ODE_double_precision") == 0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "the ODE library loaded is single precision");
   }
-  return HAP_OK;
+  return hapi_numbers_check(rules, 2, detail);
 }
 
-static void note(void *user, hap_fault fault, const char *text)
+static void world_report(void *user, hap_fault fault, const char *text)
 {
   hap_session *session = user;
   if (fault != HAP_FAULT_NONE) {
@@ -87,7 +82,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .frame = def->drive == HAP_DRIVE_FRAME,
       .rt_priority = def->rt_priority,
       .exchange = session->exchange,
-      .report = note,
+      .report = world_report,
       .user = session,
   };
   hap_status status = hapi_physics_create(&config, ode, &session->physics, detail);
@@ -99,23 +94,13 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   return status;
 }
 
-static hap_status create_contact(hap_session *session, const hapi_capacity *capacity)
-{
-  hapi_contact_config config = {
-      .capacity = *capacity,
-      .haptic_hz = session->def.haptic_hz,
-      .rt_priority = session->def.rt_priority,
-      .exchange = session->exchange,
-  };
-  return hapi_contact_create(&config, &session->contact);
-}
-
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
 
 /* Slots for the range, as many again for what stands around it, and some for those that have left and
  * that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss two. */
 static hapi_capacity capacity_of(const hap_session_def *def)
 {
+  bool looks_back = def->expert->lookback > 0.0;
   hapi_capacity capacity = {
       .bodies = 2 * (uint32_t)def->max_bodies + 16,
       .contacts = (uint32_t)def->max_contacts,
@@ -125,8 +110,8 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .trail_rows = TRAIL_ROWS_MOST,
       .joints = 2 * (uint32_t)def->max_bodies + 16,
       .tool_points = TOOL_POINTS,
-      .path_rows =
-          def->expert->lookback > 0.0 ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
+      .path_rows = looks_back ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
+      .springs = looks_back ? (uint32_t)def->max_contacts + 2 * TOOL_POINTS : 0,
       .crosses = 8 * (uint32_t)def->max_bodies,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
@@ -156,7 +141,13 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
     status = hapi_haptic_create(&config, &session->haptic);
   }
   if (status >= HAP_OK) {
-    status = create_contact(session, &capacity);
+    hapi_contact_config config = {
+        .capacity = capacity,
+        .haptic_hz = def->haptic_hz,
+        .rt_priority = def->rt_priority,
+        .exchange = session->exchange,
+    };
+    status = hapi_contact_create(&config, &session->contact);
   }
   if (status < HAP_OK) {
     return hapi_fail(detail, status, "no memory for a session of %d bodies and %d contacts",
@@ -165,22 +156,19 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
   return create_physics(session, ode, &capacity, detail);
 }
 
-static hap_status read_defs(const hap_session_def *def, const hap_ode_def *ode, hap_session *out,
-                            hap_ode_def *out_ode, hap_detail *detail)
+static hap_status session_init(hap_session *session, const hap_session_def *def,
+                               const hap_ode_def *ode, hap_detail *detail)
 {
-  hap_ode_def_init(out_ode, sizeof *out_ode);
-  hap_status status = hapi_session_read_def(def, out, detail);
-  if (status >= HAP_OK) {
-    status =
-        hapi_def_read(out_ode, sizeof *out_ode, ode, HAPI_ODE_COOKIE, "hap_ode_def_init", detail);
-  }
-  return status >= HAP_OK ? check_ode(out_ode, detail) : status;
+  hap_ode_def checked_ode;
+  HAPI_TRY(hapi_session_read_def(def, session, detail));
+  HAPI_TRY(hapi_def_read(&ode_type, ode, &checked_ode, detail));
+  HAPI_TRY(ode_check(&checked_ode, detail));
+  return create_parts(session, &checked_ode, detail);
 }
 
 hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode, hap_session **out,
                               hap_detail *detail)
 {
-  hap_ode_def checked_ode;
   if (out == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "out is NULL");
   }
@@ -189,20 +177,10 @@ hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode
   if (session == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a session");
   }
-  hap_status status = read_defs(def, ode, session, &checked_ode, detail);
-  if (status < HAP_OK) {
-    hapi_free(session);
-    return status;
-  }
   pthread_mutex_init(&session->detail_lock, NULL);
-  status = create_parts(session, &checked_ode, detail);
+  hap_status status = session_init(session, def, ode, detail);
   if (status < HAP_OK) {
-    hapi_haptic_destroy(session->haptic);
-    hapi_physics_destroy(session->physics);
-    hapi_contact_destroy(session->contact);
-    hapi_exchange_destroy(session->exchange);
-    pthread_mutex_destroy(&session->detail_lock);
-    hapi_free(session);
+    hapi_session_free(session);
     return status;
   }
   *out = session;
@@ -228,31 +206,28 @@ static hap_status may_edit(hap_session *session, const void *object)
 
 hap_status hap_session_adopt_body(hap_session *session, dBodyID body)
 {
-  hap_status status = may_edit(session, body);
-  return status < HAP_OK ? status : hapi_physics_adopt(session->physics, body);
+  HAPI_TRY(may_edit(session, body));
+  return hapi_physics_adopt(session->physics, body);
 }
 
 hap_status hap_session_forget_body(hap_session *session, dBodyID body)
 {
-  hap_status status = may_edit(session, body);
-  return status < HAP_OK ? status : hapi_physics_forget(session->physics, body);
+  HAPI_TRY(may_edit(session, body));
+  return hapi_physics_forget(session->physics, body);
 }
 
 hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)
 {
-  hap_status status = may_edit(session, geom);
-  if (status >= HAP_OK) {
-    hapi_physics_forget_geom(session->physics, geom);
-  }
-  return status;
+  HAPI_TRY(may_edit(session, geom));
+  hapi_physics_forget_geom(session->physics, geom);
+  return HAP_OK;
 }
 
 hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                           void (*callback)(dBodyID))
 {
-  hap_status status = may_edit(session, body);
-  return status < HAP_OK ? status
-                         : hapi_physics_set_moved_callback(session->physics, body, callback);
+  HAPI_TRY(may_edit(session, body));
+  return hapi_physics_set_moved_callback(session->physics, body, callback);
 }
 
 hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
@@ -275,6 +250,6 @@ hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, si
 
 hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)
 {
-  hap_status status = may_edit(session, bodies);
-  return status < HAP_OK ? status : hapi_physics_trace_bodies(session->physics, bodies, count);
+  HAPI_TRY(may_edit(session, bodies));
+  return hapi_physics_trace_bodies(session->physics, bodies, count);
 }

@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <assert.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -14,18 +16,21 @@
 #define CELLS_OF_OTHERS 8192u /* rings of physics and contact thread: some seconds */
 #define CELLS_MIN 4096.0
 
+static const hap_record_def record_defaults = {
+    .cookie = 0x48524331u,
+    .max_bytes = (uint64_t)1 << 30,
+    .buffer_s = 1.0,
+};
+static const hapi_def_type record_type = HAPI_DEF_TYPE(hap_record_def, record_defaults);
+
 void hap_record_def_init(hap_record_def *def, size_t size_of_def)
 {
-  hap_record_def d;
-  memset(&d, 0, sizeof d);
-  d.cookie = HAPI_RECORD_COOKIE;
-  d.max_bytes = (uint64_t)1 << 30;
-  d.buffer_s = 1.0;
-  hapi_def_init(def, size_of_def, &d, sizeof d);
+  hapi_def_init(&record_type, def, size_of_def);
 }
 
-static hap_status check_def(const hap_record_def *d, hap_detail *detail)
+static hap_status def_check(const hap_record_def *d, hap_detail *detail)
 {
+  const hapi_number_rule rule = HAPI_RULE(d, buffer_s, 0.01, 10.0);
   if (d->path == NULL || d->path[0] == '\0') {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "path is %s", d->path == NULL ? "NULL" : "empty");
   }
@@ -33,17 +38,14 @@ static hap_status check_def(const hap_record_def *d, hap_detail *detail)
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "max_bytes is %llu, below %u",
                      (unsigned long long)d->max_bytes, BYTES_MIN);
   }
-  if (!(d->buffer_s >= 0.01 && d->buffer_s <= 10.0)) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "buffer_s is %g, not in 0.01 .. 10", d->buffer_s);
-  }
   if (d->note_size > HAP_RECORD_NOTE_MAX || (d->note_size > 0 && d->note == NULL)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "note is NULL or of more than %d bytes",
                      HAP_RECORD_NOTE_MAX);
   }
-  return HAP_OK;
+  return hapi_numbers_check(&rule, 1, detail);
 }
 
-static hap_status check_session(const hap_session *session, hap_detail *detail)
+static hap_status session_check(const hap_session *session, hap_detail *detail)
 {
   if (session->recorder != NULL || session->player != NULL) {
     return hapi_fail(detail, HAP_ERROR_STATE, "the session is recorded or plays already");
@@ -64,30 +66,63 @@ static hap_status check_session(const hap_session *session, hap_detail *detail)
   return HAP_OK;
 }
 
-static void describe(const hap_session_def *def, hapi_file_info *out)
+/* ---- the defs in the file ---- */
+
+enum {
+  OF_SESSION,
+  OF_EXPERT,
+  OF_RESEARCH
+};
+
+/* A member that the file has in the same form. */
+typedef struct file_member {
+  int def;
+  size_t in_def;
+  size_t in_file;
+  size_t size;
+} file_member;
+
+#define SESSION(member) MEMBER(OF_SESSION, hap_session_def, member)
+#define EXPERT(member) MEMBER(OF_EXPERT, hap_expert_def, member)
+#define RESEARCH(member) MEMBER(OF_RESEARCH, hap_research_def, member)
+#define MEMBER(of, def, member)                                  \
+  {                                                              \
+    of, offsetof(def, member), offsetof(hapi_file_info, member), \
+        sizeof(((hapi_file_info *)0)->member)                    \
+  }
+
+static const file_member file_members[] = {
+    SESSION(model),          SESSION(physics_hz),     SESSION(haptic_hz), SESSION(max_bodies),
+    SESSION(max_contacts),   SESSION(max_pointers),   SESSION(accuracy),  EXPERT(contact_hz),
+    EXPERT(max_sweeps),      EXPERT(max_edge_probes), EXPERT(iterations), EXPERT(reuse),
+    EXPERT(max_hull_points), RESEARCH(probe),         RESEARCH(guard),    RESEARCH(impulse_pose),
+};
+
+static_assert(sizeof(hap_model) == sizeof(int32_t), "enums are in the file as they are");
+
+void hapi_session_move_defs(hapi_file_info *info, hap_session_def *def, hap_expert_def *expert,
+                            hap_research_def *research, bool to_file)
 {
-  hapi_file_describe(out);
-  snprintf(out->build.ode, sizeof out->build.ode, "%s", hapi_physics_ode_configuration());
-  out->physics_hz = def->physics_hz;
-  out->contact_hz = def->expert->contact_hz;
-  out->haptic_hz = def->haptic_hz;
-  out->drive = (int32_t)def->drive;
-  out->model = (int32_t)def->model;
-  out->max_bodies = def->max_bodies;
-  out->max_contacts = def->max_contacts;
-  out->max_pointers = def->max_pointers;
-  out->impulse_pose = (int32_t)def->research->impulse_pose;
-  out->probe = (int32_t)def->research->probe;
-  out->max_edge_probes = def->expert->max_edge_probes;
-  out->max_hull_points = def->expert->max_hull_points;
-  out->guard = (int32_t)def->research->guard;
-  out->max_sweeps = def->expert->max_sweeps;
-  out->range_hops_1 = def->expert->range_hops + 1;
-  out->reuse = def->expert->reuse;
-  out->effects = hapi_session_pack_effects(def->expert);
-  out->iterations = def->expert->iterations;
-  out->accuracy = def->accuracy;
+  char *const defs[] = {(char *)def, (char *)expert, (char *)research};
+  for (size_t i = 0; i < sizeof file_members / sizeof file_members[0]; ++i) {
+    const file_member *m = &file_members[i];
+    char *in_def = defs[m->def] + m->in_def;
+    char *in_file = (char *)info + m->in_file;
+    memcpy(to_file ? in_file : in_def, to_file ? in_def : in_file, m->size);
+  }
+  if (to_file) {
+    info->drive = (int32_t)def->drive;
+    info->range_hops_1 = expert->range_hops + 1;
+    info->effects = hapi_session_pack_effects(expert);
+  } else {
+    def->drive = HAP_DRIVE_LOCKSTEP;
+    expert->range_hops = info->range_hops_1 - 1;
+    hapi_session_unpack_effects(info->effects, expert);
+    research->physics_latency_ticks = HAP_LATENCY_DEFAULT;
+  }
 }
+
+/* ---- begin and end ---- */
 
 /* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */
 static uint32_t cells_of_loop(const hap_session_def *def, double buffer_s)
@@ -103,18 +138,9 @@ hap_status hap_session_record(hap_session *session, const hap_record_def *def, h
   if (session == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "session is NULL");
   }
-  hap_record_def_init(&d, sizeof d);
-  hap_status status =
-      hapi_def_read(&d, sizeof d, def, HAPI_RECORD_COOKIE, "hap_record_def_init", detail);
-  if (status >= HAP_OK) {
-    status = check_def(&d, detail);
-  }
-  if (status >= HAP_OK) {
-    status = check_session(session, detail);
-  }
-  if (status < HAP_OK) {
-    return status;
-  }
+  HAPI_TRY(hapi_def_read(&record_type, def, &d, detail));
+  HAPI_TRY(def_check(&d, detail));
+  HAPI_TRY(session_check(session, detail));
   hapi_recorder_config config;
   memset(&config, 0, sizeof config);
   config.path = d.path;
@@ -122,7 +148,10 @@ hap_status hap_session_record(hap_session *session, const hap_record_def *def, h
   config.cells[HAPI_STREAM_HAPTIC] = cells_of_loop(&session->def, d.buffer_s);
   config.cells[HAPI_STREAM_PHYSICS] = CELLS_OF_OTHERS;
   config.cells[HAPI_STREAM_CONTACT] = CELLS_OF_OTHERS;
-  describe(&session->def, &config.info);
+  hapi_session_move_defs(&config.info, &session->def, &session->expert, &session->research, true);
+  hapi_file_describe(&config.info);
+  snprintf(config.info.build.ode, sizeof config.info.build.ode, "%s",
+           hapi_physics_ode_configuration());
   config.info.note_size = (uint32_t)d.note_size;
   config.note = d.note;
   return hapi_recorder_create(&config, &session->recorder, detail);
@@ -170,13 +199,9 @@ hap_status hap_session_record_state(const hap_session *session, hap_record_state
     return hapi_fail(detail, HAP_ERROR_STATE, "the session is not recorded");
   }
   hapi_recorder_state now = hapi_recorder_look(session->recorder);
-  size_t size = size_of_out < sizeof *out ? size_of_out : sizeof *out;
-  hap_record_state state = {.size = (uint32_t)size,
-                            .end = (uint32_t)now.end,
-                            .ticks = now.ticks,
-                            .bytes = now.bytes,
-                            .lost_ticks = now.lost};
-  memcpy(out, &state, size);
+  hap_record_state state = {
+      .end = (uint32_t)now.end, .ticks = now.ticks, .bytes = now.bytes, .lost_ticks = now.lost};
+  HAPI_TRY(hapi_struct_give(&state, sizeof state, out, size_of_out));
   if (now.end == HAPI_RECORD_FAILED) {
     return hapi_fail(detail, HAP_ERROR_IO, "the recording cannot be written: %s",
                      strerror(now.error));

@@ -37,109 +37,104 @@ static size_t round_up(size_t size)
   return (size + 63u) & ~(size_t)63u;
 }
 
-/* Offset of an array of a message; moves *at behind it. */
-static uint32_t place_array(size_t *at, size_t count, size_t size)
-{
-  HAPI_ASSERT(round_up(*at) <= UINT32_MAX);
-  size_t offset = round_up(*at);
-  *at = offset + count * size;
-  return (uint32_t)offset;
-}
+/* ---- what is in a message ---- */
 
-static size_t lay_out_model(hapi_model *m, const hapi_capacity *c)
-{
-  size_t at = sizeof *m;
-  m->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_model_body));
-  m->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_model_contact));
-  m->joints_offset = place_array(&at, c->joints, sizeof(hapi_model_joint));
-  m->tools_offset = place_array(&at, c->tool_points, sizeof(hapi_tool_point));
-  m->crosses_offset = place_array(&at, c->crosses, sizeof(hapi_model_cross));
-  return at;
-}
+/* An array behind a message's head. All but channel and element are offsets of uint32_t members. */
+typedef struct message_array {
+  hapi_channel channel;
+  size_t begins;  /* in the message: where the array lies */
+  size_t count;   /* in the message: elements in use */
+  size_t element; /* bytes of one */
+  size_t most;    /* in hapi_capacity: elements that there is room for */
+} message_array;
 
-static size_t lay_out_state(hapi_state *s, const hapi_capacity *c)
-{
-  size_t at = sizeof *s;
-  s->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_state_body));
-  s->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_state_contact));
-  s->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_state_pointer));
-  s->hulls_offset = place_array(&at, c->pointers, sizeof(hapi_tool_hull));
-  s->pointer_count = c->pointers;
-  s->spring_capacity = c->path_rows > 0 ? c->contacts + 2 * c->tool_points : 0;
-  s->springs_offset = place_array(&at, s->spring_capacity, sizeof(hapi_state_spring));
-  return at;
-}
-
-static size_t lay_out_near(hapi_near *n, const hapi_capacity *c)
-{
-  size_t at = sizeof *n;
-  n->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_near_body));
-  n->geoms_offset = place_array(&at, c->geoms, sizeof(hapi_near_geom));
-  n->pairs_offset = place_array(&at, c->contacts, sizeof(hapi_near_pair));
-  n->points_offset = place_array(&at, c->hull_points, 3 * sizeof(double));
-  n->tools_offset = place_array(&at, c->pointers, sizeof(hapi_near_tool));
-  n->tool_pairs_offset = place_array(&at, c->contacts, sizeof(hapi_near_tool_pair));
-  return at;
-}
-
-static size_t lay_out_poses(hapi_poses *p, const hapi_capacity *c)
-{
-  size_t at = sizeof *p;
-  p->bodies_offset = place_array(&at, c->bodies, sizeof(hapi_poses_body));
-  p->pointers_offset = place_array(&at, c->pointers, sizeof(hapi_poses_pointer));
-  return at;
-}
-
-static size_t lay_out_patches(hapi_patches *p, const hapi_capacity *c)
-{
-  size_t at = sizeof *p;
-  p->contacts_offset = place_array(&at, c->contacts, sizeof(hapi_patch_contact));
-  p->surfaces_offset = place_array(&at, c->contacts, sizeof(hapi_surface));
-  p->tools_offset = place_array(&at, c->tool_points, sizeof(hapi_tool_point));
-  return at;
-}
-
-/* Writes the offsets of a message, and gives back its size. */
-static size_t lay_out(hapi_channel name, void *message, const hapi_capacity *c)
-{
-  switch (name) {
-    case HAPI_CHANNEL_MODEL:
-      return lay_out_model(message, c);
-    case HAPI_CHANNEL_STATE:
-      return lay_out_state(message, c);
-    case HAPI_CHANNEL_NEAR:
-      return lay_out_near(message, c);
-    case HAPI_CHANNEL_POSES:
-      return lay_out_poses(message, c);
-    case HAPI_CHANNEL_PATCHES:
-      return lay_out_patches(message, c);
-    case HAPI_CHANNELS:
-      break;
+#define ARRAY(channel, message, begins, count, element, most)                      \
+  {                                                                                \
+    channel, offsetof(message, begins), offsetof(message, count), sizeof(element), \
+        offsetof(hapi_capacity, most)                                              \
   }
-  return 0;
+
+static const message_array arrays[] = {
+#define MODEL(...) ARRAY(HAPI_CHANNEL_MODEL, hapi_model, __VA_ARGS__)
+    MODEL(bodies_offset, body_count, hapi_model_body, bodies),
+    MODEL(contacts_offset, contact_count, hapi_model_contact, contacts),
+    MODEL(joints_offset, joint_count, hapi_model_joint, joints),
+    MODEL(tools_offset, tool_count, hapi_tool_point, tool_points),
+    MODEL(crosses_offset, cross_count, hapi_model_cross, crosses),
+#define STATE(...) ARRAY(HAPI_CHANNEL_STATE, hapi_state, __VA_ARGS__)
+    STATE(bodies_offset, body_high, hapi_state_body, bodies),
+    STATE(contacts_offset, contact_count, hapi_state_contact, contacts),
+    STATE(pointers_offset, pointer_count, hapi_state_pointer, pointers),
+    STATE(hulls_offset, pointer_count, hapi_tool_hull, pointers),
+    STATE(springs_offset, spring_count, hapi_state_spring, springs),
+#define NEAR(...) ARRAY(HAPI_CHANNEL_NEAR, hapi_near, __VA_ARGS__)
+    NEAR(bodies_offset, body_count, hapi_near_body, bodies),
+    NEAR(geoms_offset, geom_count, hapi_near_geom, geoms),
+    NEAR(pairs_offset, pair_count, hapi_near_pair, contacts),
+    NEAR(points_offset, point_count, double[3], hull_points),
+    NEAR(tools_offset, tool_count, hapi_near_tool, pointers),
+    NEAR(tool_pairs_offset, tool_pair_count, hapi_near_tool_pair, contacts),
+#define POSES(...) ARRAY(HAPI_CHANNEL_POSES, hapi_poses, __VA_ARGS__)
+    POSES(bodies_offset, body_count, hapi_poses_body, bodies),
+    POSES(pointers_offset, pointer_count, hapi_poses_pointer, pointers),
+#define PATCHES(...) ARRAY(HAPI_CHANNEL_PATCHES, hapi_patches, __VA_ARGS__)
+    PATCHES(contacts_offset, contact_count, hapi_patch_contact, contacts),
+    PATCHES(surfaces_offset, surface_count, hapi_surface, contacts),
+    PATCHES(tools_offset, tool_count, hapi_tool_point, tool_points),
+};
+
+#define ARRAYS (sizeof arrays / sizeof arrays[0])
+
+static const size_t head_sizes[HAPI_CHANNELS] = {
+    [HAPI_CHANNEL_MODEL] = sizeof(hapi_model),     [HAPI_CHANNEL_STATE] = sizeof(hapi_state),
+    [HAPI_CHANNEL_NEAR] = sizeof(hapi_near),       [HAPI_CHANNEL_POSES] = sizeof(hapi_poses),
+    [HAPI_CHANNEL_PATCHES] = sizeof(hapi_patches),
+};
+
+static uint32_t member_at(const void *of, size_t offset)
+{
+  uint32_t value;
+  memcpy(&value, (const char *)of + offset, sizeof value);
+  return value;
 }
 
-static void slots_measure(const hapi_capacity *capacity, size_t sizes[HAPI_CHANNELS])
+/* Size of a message. Where message is not NULL its head is told where the arrays lie. */
+static size_t message_lay_out(hapi_channel name, void *message, const hapi_capacity *capacity)
 {
-  union {
-    hapi_model model;
-    hapi_state state;
-    hapi_near near;
-    hapi_poses poses;
-    hapi_patches patches;
-  } scratch;
-  for (int i = 0; i < HAPI_CHANNELS; ++i) {
-    sizes[i] = round_up(lay_out((hapi_channel)i, &scratch, capacity));
+  size_t size = head_sizes[name];
+  for (size_t i = 0; i < ARRAYS; ++i) {
+    const message_array *array = &arrays[i];
+    if (array->channel == name) {
+      uint32_t begins = (uint32_t)round_up(size);
+      HAPI_ASSERT(round_up(size) <= UINT32_MAX);
+      size = begins + member_at(capacity, array->most) * array->element;
+      if (message != NULL) {
+        memcpy((char *)message + array->begins, &begins, sizeof begins);
+      }
+    }
   }
+  return round_up(size);
 }
+
+/* Whether the arrays of a message hold what it counts: for asserts. */
+static bool message_fits(hapi_channel name, const void *message, const hapi_capacity *capacity)
+{
+  bool fits = true;
+  for (size_t i = 0; i < ARRAYS; ++i) {
+    const message_array *array = &arrays[i];
+    fits = fits && (array->channel != name ||
+                    member_at(message, array->count) <= member_at(capacity, array->most));
+  }
+  return fits;
+}
+
+/* ---- life ---- */
 
 hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out)
 {
-  size_t sizes[HAPI_CHANNELS];
   size_t size = round_up(sizeof(hapi_exchange));
-  slots_measure(capacity, sizes);
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
-    size += 3 * sizes[i];
+    size += 3 * message_lay_out((hapi_channel)i, NULL, capacity);
   }
   *out = NULL;
   char *memory = hapi_alloc(size);
@@ -152,10 +147,10 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   sem_init(&e->near_bell, 0, 0);
   char *at = memory + round_up(sizeof(hapi_exchange));
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
-    e->channels[i].size = sizes[i];
+    e->channels[i].size = message_lay_out((hapi_channel)i, NULL, capacity);
     for (int k = 0; k < 3; ++k) {
       e->channels[i].places[k] = at;
-      at += sizes[i];
+      at += e->channels[i].size;
     }
   }
   e->trail.rows = capacity->trail_rows;
@@ -195,36 +190,58 @@ void hapi_exchange_reset(hapi_exchange *exchange)
     for (int k = 0; k < 3; ++k) {
       c->numbers[k] = 0;
       memset(c->places[k], 0, c->size);
-      lay_out((hapi_channel)i, c->places[k], &exchange->capacity);
+      (void)message_lay_out((hapi_channel)i, c->places[k], &exchange->capacity);
     }
+  }
+  for (int k = 0; k < 3; ++k) {
+    hapi_state *state = exchange->channels[HAPI_CHANNEL_STATE].places[k];
+    state->pointer_count = exchange->capacity.pointers;
+    state->spring_capacity = exchange->capacity.springs;
   }
   atomic_store(&exchange->near_is_empty, 1);
   hapi_trail_reset(&exchange->trail);
   hapi_path_reset(&exchange->path);
 }
 
-static void *channel_back(hapi_exchange *exchange, hapi_channel name)
+/* ---- the mailboxes ---- */
+
+void *hapi_exchange_back(hapi_exchange *exchange, hapi_channel name)
 {
   HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
   return c->places[hapi_triple_back(&c->buffer)];
 }
 
+/* Only physics writes near_is_empty, and the contact thread waits only while it is set. So no post
+ * is lost, and a superfluous one costs one check. */
+static void bell_follow(hapi_exchange *exchange, int empty)
+{
+  if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
+    sem_post(&exchange->near_bell);
+  }
+}
+
 /* Replay: the writer's place is always the same, and what is in it is copied. */
-static void channel_publish(hapi_exchange *exchange, hapi_channel name)
+void hapi_exchange_publish(hapi_exchange *exchange, hapi_channel name)
 {
   HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
   unsigned place = hapi_triple_back(&c->buffer);
+  const hapi_near *near = name == HAPI_CHANNEL_NEAR ? c->places[place] : NULL;
+  int empty = near != NULL && near->pair_count + near->tool_pair_count == 0 && near->always == 0;
+  HAPI_ASSERT(message_fits(name, c->places[place], &exchange->capacity));
   c->numbers[place] = ++c->published;
   if (c->queue != NULL) {
     hapi_message_queue_put(c->queue, c->published, c->places[place]);
-    return;
+  } else {
+    hapi_triple_publish(&c->buffer);
   }
-  hapi_triple_publish(&c->buffer);
+  if (near != NULL) {
+    bell_follow(exchange, empty);
+  }
 }
 
-static void *channel_take(hapi_exchange *exchange, hapi_channel name)
+void *hapi_exchange_take(hapi_exchange *exchange, hapi_channel name)
 {
   HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
   channel *c = &exchange->channels[name];
@@ -233,6 +250,20 @@ static void *channel_take(hapi_exchange *exchange, hapi_channel name)
   }
   return hapi_triple_take(&c->buffer) ? c->places[hapi_triple_front(&c->buffer)] : NULL;
 }
+
+void hapi_exchange_near_wait(hapi_exchange *exchange)
+{
+  if (atomic_load(&exchange->near_is_empty) != 0) {
+    (void)sem_wait(&exchange->near_bell); /* a signal may end it early */
+  }
+}
+
+void hapi_exchange_near_ring(hapi_exchange *exchange)
+{
+  sem_post(&exchange->near_bell);
+}
+
+/* ---- recordings ---- */
 
 uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name)
 {
@@ -281,140 +312,6 @@ hap_status hapi_exchange_play_status(const hapi_exchange *exchange)
     status = queue != NULL ? hapi_message_queue_status(queue) : HAP_OK;
   }
   return status;
-}
-
-/* ---- whether the arrays of a message hold what it counts: for asserts ---- */
-
-static bool model_fits(const hapi_model *m, const hapi_capacity *c)
-{
-  return m->body_count <= c->bodies && m->contact_count <= c->contacts &&
-         m->joint_count <= c->joints && m->tool_count <= c->tool_points &&
-         m->cross_count <= c->crosses && m->watch_count <= HAP_TRACE_BODIES_MAX;
-}
-
-static bool state_fits(const hapi_state *s, const hapi_capacity *c)
-{
-  return s->body_high <= c->bodies && s->contact_count <= c->contacts &&
-         s->pointer_count == c->pointers && s->spring_count <= s->spring_capacity;
-}
-
-static bool near_fits(const hapi_near *n, const hapi_capacity *c)
-{
-  return n->body_count <= c->bodies && n->geom_count <= c->geoms && n->pair_count <= c->contacts &&
-         n->point_count <= c->hull_points && n->tool_count <= c->pointers &&
-         n->tool_pair_count <= c->contacts;
-}
-
-static bool poses_fit(const hapi_poses *p, const hapi_capacity *c)
-{
-  return p->body_count <= c->bodies;
-}
-
-static bool patches_fit(const hapi_patches *p, const hapi_capacity *c)
-{
-  return p->contact_count <= c->contacts && p->surface_count <= c->contacts &&
-         p->tool_count <= c->tool_points;
-}
-
-/* ---- the mailboxes ---- */
-
-hapi_model *hapi_exchange_model_back(hapi_exchange *exchange)
-{
-  return channel_back(exchange, HAPI_CHANNEL_MODEL);
-}
-
-void hapi_exchange_model_publish(hapi_exchange *exchange)
-{
-  HAPI_ASSERT(model_fits(channel_back(exchange, HAPI_CHANNEL_MODEL), &exchange->capacity));
-  channel_publish(exchange, HAPI_CHANNEL_MODEL);
-}
-
-hapi_model *hapi_exchange_model_take(hapi_exchange *exchange)
-{
-  return channel_take(exchange, HAPI_CHANNEL_MODEL);
-}
-
-hapi_state *hapi_exchange_state_back(hapi_exchange *exchange)
-{
-  return channel_back(exchange, HAPI_CHANNEL_STATE);
-}
-
-void hapi_exchange_state_publish(hapi_exchange *exchange)
-{
-  HAPI_ASSERT(state_fits(channel_back(exchange, HAPI_CHANNEL_STATE), &exchange->capacity));
-  channel_publish(exchange, HAPI_CHANNEL_STATE);
-}
-
-hapi_state *hapi_exchange_state_take(hapi_exchange *exchange)
-{
-  return channel_take(exchange, HAPI_CHANNEL_STATE);
-}
-
-hapi_near *hapi_exchange_near_back(hapi_exchange *exchange)
-{
-  return channel_back(exchange, HAPI_CHANNEL_NEAR);
-}
-
-/* Only physics writes near_is_empty, and the contact thread waits only while it is set. So no post
- * is lost, and a superfluous one costs one check. */
-void hapi_exchange_near_publish(hapi_exchange *exchange)
-{
-  const hapi_near *near = channel_back(exchange, HAPI_CHANNEL_NEAR);
-  HAPI_ASSERT(near_fits(near, &exchange->capacity));
-  int empty = near->pair_count + near->tool_pair_count == 0 && near->always == 0;
-  channel_publish(exchange, HAPI_CHANNEL_NEAR);
-  if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
-    sem_post(&exchange->near_bell);
-  }
-}
-
-void hapi_exchange_near_wait(hapi_exchange *exchange)
-{
-  if (atomic_load(&exchange->near_is_empty) != 0) {
-    (void)sem_wait(&exchange->near_bell); /* a signal may end it early */
-  }
-}
-
-void hapi_exchange_near_ring(hapi_exchange *exchange)
-{
-  sem_post(&exchange->near_bell);
-}
-
-hapi_near *hapi_exchange_near_take(hapi_exchange *exchange)
-{
-  return channel_take(exchange, HAPI_CHANNEL_NEAR);
-}
-
-hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange)
-{
-  return channel_back(exchange, HAPI_CHANNEL_POSES);
-}
-
-void hapi_exchange_poses_publish(hapi_exchange *exchange)
-{
-  HAPI_ASSERT(poses_fit(channel_back(exchange, HAPI_CHANNEL_POSES), &exchange->capacity));
-  channel_publish(exchange, HAPI_CHANNEL_POSES);
-}
-
-hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange)
-{
-  return channel_take(exchange, HAPI_CHANNEL_POSES);
-}
-
-hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange)
-{
-  return channel_back(exchange, HAPI_CHANNEL_PATCHES);
-}
-
-void hapi_exchange_patches_publish(hapi_exchange *exchange)
-{
-  HAPI_ASSERT(patches_fit(channel_back(exchange, HAPI_CHANNEL_PATCHES), &exchange->capacity));
-  channel_publish(exchange, HAPI_CHANNEL_PATCHES);
-}
-
-hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange)
-{
-  return channel_take(exchange, HAPI_CHANNEL_PATCHES);
 }
 
 hapi_path *hapi_exchange_path(hapi_exchange *exchange)

@@ -17,6 +17,15 @@
 
 typedef struct hapi_exchange hapi_exchange;
 
+typedef enum hapi_channel {
+  HAPI_CHANNEL_MODEL = 0,
+  HAPI_CHANNEL_STATE = 1,
+  HAPI_CHANNEL_NEAR = 2,
+  HAPI_CHANNEL_POSES = 3,
+  HAPI_CHANNEL_PATCHES = 4,
+  HAPI_CHANNELS = 5
+} hapi_channel;
+
 hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out);
 void hapi_exchange_destroy(hapi_exchange *exchange); /* NULL allowed */
 
@@ -26,44 +35,48 @@ void hapi_exchange_reset(hapi_exchange *exchange);
 /* For each message: the place to write to, its hand-over, and the newest one (NULL: none newer; the
  * one taken before stays valid then, and only then). */
 
+void *hapi_exchange_back(hapi_exchange *exchange, hapi_channel name);
+void hapi_exchange_publish(hapi_exchange *exchange, hapi_channel name);
+void *hapi_exchange_take(hapi_exchange *exchange, hapi_channel name);
+
+/* Defines the three for one message. */
+/* NOLINTBEGIN(bugprone-macro-parentheses): types */
+#define HAPI_MAILBOX(back, publish, take, message, channel) \
+  static inline message *back(hapi_exchange *exchange)      \
+  {                                                         \
+    return hapi_exchange_back(exchange, channel);           \
+  }                                                         \
+  static inline void publish(hapi_exchange *exchange)       \
+  {                                                         \
+    hapi_exchange_publish(exchange, channel);               \
+  }                                                         \
+  static inline message *take(hapi_exchange *exchange)      \
+  {                                                         \
+    return hapi_exchange_take(exchange, channel);           \
+  }
+/* NOLINTEND(bugprone-macro-parentheses) */
+
 /* [physics] -> [haptic] */
-hapi_model *hapi_exchange_model_back(hapi_exchange *exchange);
-void hapi_exchange_model_publish(hapi_exchange *exchange);
-hapi_model *hapi_exchange_model_take(hapi_exchange *exchange);
-
+HAPI_MAILBOX(hapi_exchange_model_back, hapi_exchange_model_publish, hapi_exchange_model_take,
+             hapi_model, HAPI_CHANNEL_MODEL)
 /* [haptic] -> [physics] */
-hapi_state *hapi_exchange_state_back(hapi_exchange *exchange);
-void hapi_exchange_state_publish(hapi_exchange *exchange);
-hapi_state *hapi_exchange_state_take(hapi_exchange *exchange);
-
+HAPI_MAILBOX(hapi_exchange_state_back, hapi_exchange_state_publish, hapi_exchange_state_take,
+             hapi_state, HAPI_CHANNEL_STATE)
 /* [physics] -> [contact] */
-hapi_near *hapi_exchange_near_back(hapi_exchange *exchange);
-void hapi_exchange_near_publish(hapi_exchange *exchange);
-hapi_near *hapi_exchange_near_take(hapi_exchange *exchange);
-/* [contact] Waits while the newest message has nothing to find; may come back early. */
+HAPI_MAILBOX(hapi_exchange_near_back, hapi_exchange_near_publish, hapi_exchange_near_take,
+             hapi_near, HAPI_CHANNEL_NEAR)
+/* [haptic] -> [contact] */
+HAPI_MAILBOX(hapi_exchange_poses_back, hapi_exchange_poses_publish, hapi_exchange_poses_take,
+             hapi_poses, HAPI_CHANNEL_POSES)
+/* [contact] -> [haptic] */
+HAPI_MAILBOX(hapi_exchange_patches_back, hapi_exchange_patches_publish, hapi_exchange_patches_take,
+             hapi_patches, HAPI_CHANNEL_PATCHES)
+
+/* [contact] Waits while the newest message of physics has nothing to find; may come back early. */
 void hapi_exchange_near_wait(hapi_exchange *exchange);
 void hapi_exchange_near_ring(hapi_exchange *exchange); /* [any] ends such a wait */
 
-/* [haptic] -> [contact] */
-hapi_poses *hapi_exchange_poses_back(hapi_exchange *exchange);
-void hapi_exchange_poses_publish(hapi_exchange *exchange);
-hapi_poses *hapi_exchange_poses_take(hapi_exchange *exchange);
-
-/* [contact] -> [haptic] */
-hapi_patches *hapi_exchange_patches_back(hapi_exchange *exchange);
-void hapi_exchange_patches_publish(hapi_exchange *exchange);
-hapi_patches *hapi_exchange_patches_take(hapi_exchange *exchange);
-
 /* ---- recordings ---- */
-
-typedef enum hapi_channel {
-  HAPI_CHANNEL_MODEL = 0,
-  HAPI_CHANNEL_STATE = 1,
-  HAPI_CHANNEL_NEAR = 2,
-  HAPI_CHANNEL_POSES = 3,
-  HAPI_CHANNEL_PATCHES = 4,
-  HAPI_CHANNELS = 5
-} hapi_channel;
 
 #define HAPI_EXCHANGE_NEWEST UINT64_MAX
 

@@ -23,8 +23,9 @@ typedef struct hapi_poses_pointer {
 typedef struct hapi_poses {
   uint64_t model_number; /* the local model in use */
   uint32_t body_count;
+  uint32_t pointer_count;
   uint32_t bodies_offset;
-  uint32_t pointers_offset; /* capacity.pointers */
+  uint32_t pointers_offset;
 } hapi_poses;
 
 HAPI_MESSAGE_ARRAY(hapi_poses_bodies, hapi_poses, hapi_poses_body, bodies_offset)

@@ -220,6 +220,7 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
     bodies[i].twist = in->twist;
   }
   out->body_count = tick->bodies.live_count;
+  out->pointer_count = tick->pointers.high;
   out->model_number = tick->facts.model_number;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     const hapi_pointer *in = &tick->pointers.of[i];
