@@ -96,30 +96,28 @@ static void check_free_column(const test_world *w, const hapi_contact_slot *cont
 
 TEST(free_body_has_its_closed_form)
 {
-  test_world w;
   const double mass = 0.4;
   const double inertia[3] = {3e-4, 7e-4, 9e-4};
   dMass m;
   dQuaternion turn = {0.8, 0.3, -0.2, 0.4};
-  world_open(&w, GRAVITY, 20);
+  test_world *w = world_new(GRAVITY, 20);
   dMassSetParameters(&m, mass, 0, 0, 0, inertia[0], inertia[1], inertia[2], 0, 0, 0);
-  dBodyID body = world_add(&w, dCreateBox(w.space, 0.1, 0.05, 0.04), &m, 1.0, 2.0, 3.0);
+  dBodyID body = world_add(w, dCreateBox(w->space, 0.1, 0.05, 0.04), &m, 1.0, 2.0, 3.0);
   dBodySetQuaternion(body, turn);
-  REQUIRE(start_at(&w, NULL, (const double[3]){0.97, 1.98, 3.05}));
+  REQUIRE(start_at(w, NULL, (const double[3]){0.97, 1.98, 3.05}));
   for (int i = 0; i < 3; ++i) {
     const double forces[3] = {0.0, 0.7, 30.0};
-    const hapi_contact_slot *contact = measure_contact(&w, body, forces[i]);
+    const hapi_contact_slot *contact = measure_contact(w, body, forces[i]);
     REQUIRE(contact != NULL);
     for (int axis = 0; axis < 3; ++axis) {
-      check_free_column(&w, contact, body, mass, inertia, axis);
+      check_free_column(w, contact, body, mass, inertia, axis);
     }
   }
-  const hapi_body_slot *slot = world_slot(&w, body);
+  const hapi_body_slot *slot = world_slot(w, body);
   REQUIRE(slot != NULL);
   for (int i = 0; i < 6; ++i) {
-    CHECK_NEAR(world_answer(&w, slot)->b[i], i == 2 ? -GRAVITY : 0.0, 1e-9);
+    CHECK_NEAR(world_answer(w, slot)->b[i], i == 2 ? -GRAVITY : 0.0, 1e-9);
   }
-  world_close(&w);
 }
 
 /* ---- cases with a closed form, and two other solvers ---- */
@@ -286,12 +284,11 @@ static void oracle_near(void *user, dGeomID a, dGeomID b)
 /* Change of the body's velocity over one step of a fresh world, divided by the step. */
 static double oracle_acceleration(const probe_case *c, bool exact, double force)
 {
-  test_world w;
   double push[3] = {0.0, 0.0, 0.0};
   double at[3];
-  world_open(&w, c->gravity, 5000);
-  c->build(&w);
-  dBodyID body = w.bodies[c->body];
+  test_world *w = world_new(c->gravity, 5000);
+  c->build(w);
+  dBodyID body = w->bodies[c->body];
   push[c->axis] = force;
   hapi_v3_copy(c->pointer, at);
   at[c->row == 0 ? 0 : 1] += 0.01 + GAP; /* to the face */
@@ -300,17 +297,16 @@ static double oracle_acceleration(const probe_case *c, bool exact, double force)
   }
   oracle_group = dJointGroupCreate(0);
   dRandSetSeed(0);
-  dSpaceCollide(w.space, &w, oracle_near);
+  dSpaceCollide(w->space, w, oracle_near);
   dBodyAddForceAtPos(body, push[0], push[1], push[2], at[0], at[1], at[2]);
   if (exact) {
-    dWorldStep(w.world, PROBE_STEP);
+    dWorldStep(w->world, PROBE_STEP);
   } else {
-    dWorldQuickStep(w.world, PROBE_STEP);
+    dWorldQuickStep(w->world, PROBE_STEP);
   }
   const dReal *v = c->row < 3 ? dBodyGetLinearVel(body) : dBodyGetAngularVel(body);
   double result = v[c->row % 3] / PROBE_STEP;
   dJointGroupDestroy(oracle_group);
-  world_close(&w);
   return result;
 }
 
@@ -442,11 +438,12 @@ TEST(b_holds_the_forces_of_before_step)
 
 /* ---- how many ---- */
 
-static void open_count(test_world *w, hap_probe probe)
+static test_world *open_count(hap_probe probe)
 {
-  world_open(w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   w->research.probe = probe;
   far_moves = 0;
+  return w;
 }
 
 /* A large pointer above what lies in the plane z = 0. */
@@ -476,20 +473,18 @@ static void check_all_measured(const test_world *w)
 
 static uint64_t count_probes(void (*build)(test_world *w), hap_probe probe, int contacts)
 {
-  test_world w;
-  open_count(&w, probe);
-  build(&w);
-  CHECK(start_above(&w));
-  CHECK(world_count_contacts(&w) == contacts);
-  uint64_t probes = measure(&w);
-  check_all_measured(&w);
-  uint64_t before = world_physics(&w)->probe.test.steps;
-  CHECK(hap_session_advance(w.session, 51) == HAP_OK); /* to the first step, which is in it */
-  hap_stats after = world_stats(&w);
+  test_world *w = open_count(probe);
+  build(w);
+  CHECK(start_above(w));
+  CHECK(world_count_contacts(w) == contacts);
+  uint64_t probes = measure(w);
+  check_all_measured(w);
+  uint64_t before = world_physics(w)->probe.test.steps;
+  CHECK(hap_session_advance(w->session, 51) == HAP_OK); /* to the first step, which is in it */
+  hap_stats after = world_stats(w);
   CHECK(after.physics.steps == 1);
   CHECK(after.probes.steps == before + probes);
   CHECK(after.physics.quickstep_calls == after.probes.steps + 1);
-  world_close(&w);
   return probes;
 }
 
@@ -558,15 +553,13 @@ TEST(ways_of_probing_agree)
 {
   double a[2][6][3];
   for (int k = 0; k < 2; ++k) {
-    test_world w;
-    open_count(&w, k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_PAPER);
-    build_mixed(&w);
-    REQUIRE(start_above(&w));
-    measure(&w);
-    const hapi_contact_slot *contact = world_contact(&w, w.bodies[2], 0);
+    test_world *w = open_count(k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_PAPER);
+    build_mixed(w);
+    REQUIRE(start_above(w));
+    measure(w);
+    const hapi_contact_slot *contact = world_contact(w, w->bodies[2], 0);
     REQUIRE(contact != NULL);
-    memcpy(a[k], world_contact_answer(&w, contact)->a, sizeof a[k]);
-    world_close(&w);
+    memcpy(a[k], world_contact_answer(w, contact)->a, sizeof a[k]);
   }
   CHECK(memcmp(a[0], a[1], sizeof a[0]) == 0);
 }

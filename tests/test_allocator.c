@@ -24,14 +24,13 @@ static bool create(stage *s)
 
 static bool work_create(void)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.expert.trace_rows = 10;
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->expert.trace_rows = 10;
   for (int i = 1; i < 100; ++i) { /* the table of bodies has to grow */
-    (void)add_cube(&s, 0.2 * i, NULL);
+    (void)add_cube(s, 0.2 * i, NULL);
   }
-  bool good = create(&s);
-  stage_end(&s);
+  bool good = create(s);
+  stage_end(s);
   return good;
 }
 
@@ -44,35 +43,34 @@ TEST(create_with_failing_allocations)
  * it goes on without. */
 static bool run_all(hap_drive drive)
 {
-  stage s;
   hap_device *device = NULL;
   hap_pointer_id id;
   hap_pointer_def def;
-  stage_init(&s, drive);
-  dBodySetAutoDisableFlag(s.cube, 1);
-  dBodySetAutoDisableAverageSamplesCount(s.cube, 5);
-  hap_status status = hap_device_open("virtual:path=0:-0.1/0/0;0.1:-0.05/0/0", &device, &s.detail);
+  stage *s = stage_new(drive);
+  dBodySetAutoDisableFlag(s->cube, 1);
+  dBodySetAutoDisableAverageSamplesCount(s->cube, 5);
+  hap_status status = hap_device_open("virtual:path=0:-0.1/0/0;0.1:-0.05/0/0", &device, &s->detail);
   CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
-  bool good = status == HAP_OK && create(&s);
+  bool good = status == HAP_OK && create(s);
   if (good) {
     hap_pointer_def_init(&def, sizeof def);
     def.device = device;
-    status = hap_pointer_add(s.session, &def, &id);
+    status = hap_pointer_add(s->session, &def, &id);
     CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
     good = status == HAP_OK;
   }
   if (good) {
-    status = hap_session_start(s.session);
+    status = hap_session_start(s->session);
     CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
     good = status >= HAP_OK;
   }
   if (good && drive == HAP_DRIVE_LOCKSTEP) {
-    CHECK(hap_session_advance(s.session, 150) == HAP_OK);
-    CHECK(stats_of(&s).faults.fault == HAP_FAULT_NONE && stats_of(&s).loop.ticks == 150);
+    CHECK(hap_session_advance(s->session, 150) == HAP_OK);
+    CHECK(stats_of(s).faults.fault == HAP_FAULT_NONE && stats_of(s).loop.ticks == 150);
   } else if (good) {
     sleep_ms(30);
   }
-  stage_end(&s);
+  stage_end(s);
   hap_device_close(device);
   return good;
 }
@@ -100,24 +98,23 @@ TEST(a_threaded_run_with_failing_allocations)
 /* Bodies that are added while it runs, when there is no memory for them. */
 static bool work_grow(void)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   long fail_at = atomic_load(&heap.fail_at);
   int on = atomic_load(&heap.fail_on);
   fail_from_now(0, 0);
-  bool good = create(&s) && hap_session_start(s.session) == HAP_OK;
+  bool good = create(s) && hap_session_start(s->session) == HAP_OK;
   fail_from_now(fail_at, on);
   for (int i = 1; good && i < 200; ++i) {
-    (void)add_cube(&s, 0.2 * i, NULL);
+    (void)add_cube(s, 0.2 * i, NULL);
   }
-  CHECK(good && hap_session_advance(s.session, 50) == HAP_OK);
-  dBodyID loose = dBodyCreate(s.world);
-  hap_status status = hap_session_adopt_body(s.session, loose);
+  CHECK(good && hap_session_advance(s->session, 50) == HAP_OK);
+  dBodyID loose = dBodyCreate(s->world);
+  hap_status status = hap_session_adopt_body(s->session, loose);
   CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
-  hap_session_destroy(s.session);
-  s.session = NULL;
+  hap_session_destroy(s->session);
+  s->session = NULL;
   dBodyDestroy(loose);
-  stage_end(&s);
+  stage_end(s);
   return good;
 }
 
@@ -207,38 +204,37 @@ static char recording[] = "/tmp/hapode-allocator-XXXXXX";
 /* A cube, and a hand in it; with a player it plays. */
 static bool run_recording(hap_drive drive, hap_player *player)
 {
-  stage s;
   hap_pointer_id id;
   hap_pointer_def hand;
   hap_record_def def;
   hap_pose pose = {{-0.055, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  stage_init(&s, drive);
+  stage *s = stage_new(drive);
   if (player != NULL) {
-    CHECK(hap_player_get_def(player, &s.def, &s.expert, &s.research) == HAP_OK);
+    CHECK(hap_player_get_def(player, &s->def, &s->expert, &s->research) == HAP_OK);
   }
   hap_pointer_def_init(&hand, sizeof hand);
   hap_record_def_init(&def, sizeof def);
   def.path = recording;
-  bool good = create(&s);
+  bool good = create(s);
   hap_status status = HAP_OK;
   if (good && player != NULL) {
-    status = hap_session_play(s.session, player, &s.detail);
+    status = hap_session_play(s->session, player, &s->detail);
   } else if (good) {
-    CHECK(hap_pointer_add(s.session, &hand, &id) == HAP_OK);
-    CHECK(hap_pointer_set_target(s.session, id, &pose, NULL) == HAP_OK);
-    status = hap_session_record(s.session, &def, &s.detail);
+    CHECK(hap_pointer_add(s->session, &hand, &id) == HAP_OK);
+    CHECK(hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
+    status = hap_session_record(s->session, &def, &s->detail);
   }
-  status = good && status == HAP_OK ? hap_session_start(s.session) : status;
+  status = good && status == HAP_OK ? hap_session_start(s->session) : status;
   good = good && status >= HAP_OK;
   CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
   if (good && player != NULL) {
-    status = hap_session_advance(s.session, 1000000);
+    status = hap_session_advance(s->session, 1000000);
     CHECK(status >= HAP_OK || status == HAP_ERROR_MEMORY);
     good = status == HAP_END;
   } else if (good) {
     sleep_ms(30);
   }
-  stage_end(&s);
+  stage_end(s);
   return good;
 }
 

@@ -218,48 +218,44 @@ TEST(bad_specs_with_failing_allocations)
 
 TEST(without_memory_auto_disable_is_given_back_as_it_was)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetAutoDisableFlag(s.cube, 1);
-  dBodySetAutoDisableAverageSamplesCount(s.cube, 7);
-  dBodySetAutoDisableSteps(s.cube, 23);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetAutoDisableFlag(s->cube, 1);
+  dBodySetAutoDisableAverageSamplesCount(s->cube, 7);
+  dBodySetAutoDisableSteps(s->cube, 23);
+  REQUIRE(stage_create(s) == HAP_OK);
   fail_from_now(1, 1); /* there is none for the seven samples */
-  CHECK(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-  CHECK(dBodyGetAutoDisableFlag(s.cube) == 0);
+  CHECK(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 100) == HAP_OK);
+  CHECK(dBodyGetAutoDisableFlag(s->cube) == 0);
   for (int i = 1; i < 200; ++i) { /* nor for so many bodies */
-    (void)add_cube(&s, 0.2 * i, NULL);
+    (void)add_cube(s, 0.2 * i, NULL);
   }
-  CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-  CHECK(hap_session_stop(s.session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 100) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
   fail_from_now(0, 0);
-  CHECK(dBodyGetAutoDisableFlag(s.cube) == 1);
-  CHECK(dBodyGetAutoDisableAverageSamplesCount(s.cube) == 7);
-  CHECK(dBodyGetAutoDisableSteps(s.cube) == 23);
-  stage_end(&s);
+  CHECK(dBodyGetAutoDisableFlag(s->cube) == 1);
+  CHECK(dBodyGetAutoDisableAverageSamplesCount(s->cube) == 7);
+  CHECK(dBodyGetAutoDisableSteps(s->cube) == 23);
 }
 
 /* There is no room for the new bodies, and one that was known is destroyed without a word. */
 TEST(without_memory_a_destroyed_body_is_noticed)
 {
-  stage s;
   dGeomID geom;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodyID gone = add_cube(&s, -1.0, &geom);
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodyID gone = add_cube(s, -1.0, &geom);
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
   fail_from_now(1, 1);
   for (int i = 1; i < 200; ++i) {
-    (void)add_cube(&s, 0.2 * i, NULL);
+    (void)add_cube(s, 0.2 * i, NULL);
   }
   dGeomDestroy(geom);
   dBodyDestroy(gone);
-  CHECK(hap_session_advance(s.session, 50) == HAP_BODY_LOST);
-  CHECK(stats_of(&s).faults.bodies_lost == 1);
+  CHECK(hap_session_advance(s->session, 50) == HAP_BODY_LOST);
+  CHECK(stats_of(s).faults.bodies_lost == 1);
   fail_from_now(0, 0);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(stats_of(&s).model.bodies_known == 200);
-  stage_end(&s);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK(stats_of(s).model.bodies_known == 200);
 }
 
 /* A testing simulation switches off and puts back what is known: it must not be made while bodies
@@ -267,29 +263,28 @@ TEST(without_memory_a_destroyed_body_is_noticed)
 TEST(without_memory_no_probe_moves_a_body_that_is_not_known)
 {
   for (int model = HAP_MODEL_ACCELERANCE; model <= HAP_MODEL_CONTACT; ++model) {
-    stage s;
     dBodyID bodies[200];
-    stage_init(&s, HAP_DRIVE_LOCKSTEP);
-    s.def.model = (hap_model)model;
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    s->def.model = (hap_model)model;
     hap_pointer_id id;
     hap_pointer_def def;
     const hap_pose pose = {{-0.06, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
     hap_pointer_def_init(&def, sizeof def);
-    REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
-    REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-    CHECK(hap_pointer_set_target(s.session, id, &pose, NULL) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+    REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
+    REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+    CHECK(hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 100) == HAP_OK);
     fail_from_now(1, 1);
     for (int i = 0; i < 200; ++i) {
-      bodies[i] = add_cube(&s, 1.0 + 0.2 * i, NULL);
+      bodies[i] = add_cube(s, 1.0 + 0.2 * i, NULL);
       dBodySetLinearVel(bodies[i], 0.0, 1.0, 0.0);
     }
-    CHECK(hap_session_advance(s.session, 200) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 200) == HAP_OK);
     for (int i = 0; i < 200; ++i) {
       CHECK_NEAR(dBodyGetPosition(bodies[i])[1], 0.2, 1e-9);
     }
     fail_from_now(0, 0);
-    stage_end(&s);
+    stage_end(s);
   }
 }
 
@@ -331,37 +326,36 @@ static void add_ground(stage *s, ground kind, field *out)
  * no memory for them, the body is left to ODE. */
 static void check_stands(ground kind)
 {
-  stage s;
   field f = {NULL};
   hap_pointer_id id;
   hap_pointer_def def;
   const hap_pose above = {{0.0, 0.0, 0.12}, {1.0, 0.0, 0.0, 0.0}};
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
-  dWorldSetContactSurfaceLayer(s.world, 1e-4);
-  dBodySetPosition(s.cube, 0.0, 0.0, 0.05);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetGravity(s->world, 0.0, 0.0, -9.81);
+  dWorldSetContactSurfaceLayer(s->world, 1e-4);
+  dBodySetPosition(s->cube, 0.0, 0.0, 0.05);
   if (kind != GROUND_BODY) {
-    add_ground(&s, kind, &f);
+    add_ground(s, kind, &f);
   }
   hap_pointer_def_init(&def, sizeof def);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  REQUIRE(hap_pointer_add(s.session, &def, &id) == HAP_OK);
-  CHECK(hap_pointer_set_target(s.session, id, &above, NULL) == HAP_OK);
+  REQUIRE(stage_create(s) == HAP_OK);
+  REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  CHECK(hap_pointer_set_target(s->session, id, &above, NULL) == HAP_OK);
   fail_from_now(1, 1);
-  CHECK(hap_session_start(s.session) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_OK);
   for (int i = 0; kind == GROUND_BODY && i < 200; ++i) {
-    (void)add_cube(&s, 5.0 + 0.2 * i, NULL); /* the table of bodies is full */
+    (void)add_cube(s, 5.0 + 0.2 * i, NULL); /* the table of bodies is full */
   }
   if (kind == GROUND_BODY) {
-    add_ground(&s, kind, &f);
+    add_ground(s, kind, &f);
   }
-  CHECK(hap_session_advance(s.session, 500) == HAP_OK);
-  CHECK_NEAR(dBodyGetPosition(s.cube)[2], 0.05, 2e-3);
+  CHECK(hap_session_advance(s->session, 500) == HAP_OK);
+  CHECK_NEAR(dBodyGetPosition(s->cube)[2], 0.05, 2e-3);
   fail_from_now(0, 0);
-  CHECK(hap_session_advance(s.session, 500) == HAP_OK);
-  CHECK_NEAR(dBodyGetPosition(s.cube)[2], 0.05, 2e-3);
-  CHECK(stats_of(&s).model.range_bodies > 0); /* the loop has it again */
-  stage_end(&s);
+  CHECK(hap_session_advance(s->session, 500) == HAP_OK);
+  CHECK_NEAR(dBodyGetPosition(s->cube)[2], 0.05, 2e-3);
+  CHECK(stats_of(s).model.range_bodies > 0); /* the loop has it again */
+  stage_end(s);
   if (f.data != NULL) {
     dGeomTriMeshDataDestroy(f.data);
   }

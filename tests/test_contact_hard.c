@@ -175,6 +175,7 @@ static void fly_past(double hz, double gravity)
   CHECK(worst_place < 1e-3);
   CHECK(worst_speed < 0.01);
   CHECK(cw_stats(w).loop.contact_ticks == 0);
+  cw_close(w);
 }
 
 TEST(what_enters_and_leaves_the_range_keeps_its_motion)
@@ -204,6 +205,7 @@ static void hit(double speed, double hz)
   CHECK_NEAR((a[0] + b[0]) / speed, 1.0, 5e-3);
   CHECK_NEAR(b[0] / speed, 0.5, 0.05);
   CHECK(gap > -2e-3);
+  cw_close(w);
 }
 
 TEST(a_ball_that_flies_in_hits_what_is_near_the_hand)
@@ -218,91 +220,87 @@ TEST(a_ball_that_flies_in_hits_what_is_near_the_hand)
 /* ---- edits under the hand ---- */
 
 /* A free cube that the hand pushes; after a third of a second it is steady. */
-static bool start_push(contact_world *w)
+static contact_world *start_push(void)
 {
-  cw_open(w, 0.0);
+  contact_world *w = cw_new(0.0);
   cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.0);
   cw_add_cube(w, 1.0, 0.06, 0.3, 0.0, 0.0);
   bool good = cw_start(w, -0.0405, 0.0, 0.0);
   if (good) {
     cw_go(w, 0.05, 0.0, 0.0, 30);
   }
-  return good;
+  return good ? w : NULL;
 }
 
 TEST(a_body_destroyed_under_the_hand_is_gone)
 {
-  contact_world w;
-  REQUIRE(start_push(&w));
-  CHECK(w.force[0] < 0.0);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dGeomID geom = dBodyGetFirstGeom(w.bodies[0]);
-  CHECK(hap_session_forget_geom(w.session, geom) == HAP_OK);
-  CHECK(hap_session_forget_body(w.session, w.bodies[0]) == HAP_OK);
+  contact_world *w = start_push();
+  REQUIRE(w != NULL);
+  CHECK(w->force[0] < 0.0);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dGeomID geom = dBodyGetFirstGeom(w->bodies[0]);
+  CHECK(hap_session_forget_geom(w->session, geom) == HAP_OK);
+  CHECK(hap_session_forget_body(w->session, w->bodies[0]) == HAP_OK);
   dGeomDestroy(geom);
-  dBodyDestroy(w.bodies[0]);
-  w.bodies[0] = NULL;
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  w.ode.before_step = NULL;
-  cw_run(&w, 100);
-  CHECK(cw_norm(w.force) == 0.0);
-  CHECK(cw_stats(&w).faults.count == 0 && cw_stats(&w).faults.bodies_lost == 0);
-  cw_close(&w);
+  dBodyDestroy(w->bodies[0]);
+  w->bodies[0] = NULL;
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  w->ode.before_step = NULL;
+  cw_run(w, 100);
+  CHECK(cw_norm(w->force) == 0.0);
+  CHECK(cw_stats(w).faults.count == 0 && cw_stats(w).faults.bodies_lost == 0);
 }
 
 TEST(a_body_moved_by_the_application_stays_where_it_was_put)
 {
-  contact_world w;
-  REQUIRE(start_push(&w));
-  CHECK(w.force[0] < 0.0);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dBodySetPosition(w.bodies[0], 0.0, 0.02, 0.5);
-  dBodySetLinearVel(w.bodies[0], 0.0, 0.0, 0.1); /* another one than before: that can be seen */
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_run(&w, 121);
+  contact_world *w = start_push();
+  REQUIRE(w != NULL);
+  CHECK(w->force[0] < 0.0);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dBodySetPosition(w->bodies[0], 0.0, 0.02, 0.5);
+  dBodySetLinearVel(w->bodies[0], 0.0, 0.0, 0.1); /* another one than before: that can be seen */
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_run(w, 121);
   const double wanted[3] = {0.0, 0.02, 0.5 + 0.1 * 0.1};
   /* the loop's push of the one tick until it hears of it is the body's */
   const double speed[3] = {0.0, 0.0, 0.1};
-  CHECK(distance(dBodyGetPosition(w.bodies[0]), wanted) < 6e-3);
-  CHECK(distance(dBodyGetLinearVel(w.bodies[0]), speed) < 5e-3);
-  CHECK(cw_norm(w.force) == 0.0);
-  cw_close(&w);
+  CHECK(distance(dBodyGetPosition(w->bodies[0]), wanted) < 6e-3);
+  CHECK(distance(dBodyGetLinearVel(w->bodies[0]), speed) < 5e-3);
+  CHECK(cw_norm(w->force) == 0.0);
 }
 
 TEST(a_body_put_back_under_the_hand_is_felt_there)
 {
-  contact_world w;
-  REQUIRE(start_push(&w));
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dBodySetPosition(w.bodies[0], -0.002, 0.003, 0.0);
-  dBodySetLinearVel(w.bodies[0], 0.0, 0.0, 0.0);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_go(&w, 0.0, 0.0, 0.0, 22);
-  CHECK_NEAR(w.position[0][0], -0.002, 5e-4);
-  CHECK_NEAR(w.position[0][1], 0.003, 1e-6);
-  cw_run(&w, 5);
-  CHECK(w.force[0] < -0.5);
-  cw_close(&w);
+  contact_world *w = start_push();
+  REQUIRE(w != NULL);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dBodySetPosition(w->bodies[0], -0.002, 0.003, 0.0);
+  dBodySetLinearVel(w->bodies[0], 0.0, 0.0, 0.0);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_go(w, 0.0, 0.0, 0.0, 22);
+  CHECK_NEAR(w->position[0][0], -0.002, 5e-4);
+  CHECK_NEAR(w->position[0][1], 0.003, 1e-6);
+  cw_run(w, 5);
+  CHECK(w->force[0] < -0.5);
 }
 
 TEST(a_new_mass_counts_from_the_next_step)
 {
-  contact_world w;
-  REQUIRE(start_push(&w));
+  contact_world *w = start_push();
+  REQUIRE(w != NULL);
   dMass mass;
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
   dMassSetBoxTotal(&mass, 4.0, 0.06, 0.06, 0.06);
-  dBodySetMass(w.bodies[0], &mass);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  cw_go(&w, 0.4, 0.0, 0.0, 22);
+  dBodySetMass(w->bodies[0], &mass);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  cw_go(w, 0.4, 0.0, 0.0, 22);
   for (int i = 0; i < 20; ++i) {
-    double before = w.velocity[0][0];
-    cw_tick(&w);
-    CHECK(w.force[0] < 0.0);
-    CHECK_NEAR((w.velocity[0][0] - before) * 4.0 / 1e-3, -w.force[0],
-               1e-6 * fabs(w.force[0]) + 1e-6);
+    double before = w->velocity[0][0];
+    cw_tick(w);
+    CHECK(w->force[0] < 0.0);
+    CHECK_NEAR((w->velocity[0][0] - before) * 4.0 / 1e-3, -w->force[0],
+               1e-6 * fabs(w->force[0]) + 1e-6);
   }
-  cw_close(&w);
 }
 
 TEST(a_geom_that_grows_is_felt_and_stands_on_its_new_faces)
@@ -403,39 +401,37 @@ typedef struct slide {
 static slide push_over(bool triangles)
 {
   static mesh m;
-  contact_world w;
   slide s = {0.0, 1e9, 0.0, 1e9, -1e9};
-  cw_open(&w, G);
-  w.expert.max_hull_points = 100000;
+  contact_world *w = cw_new(G);
+  w->expert.max_hull_points = 100000;
   if (triangles) {
-    add_mesh(&w, &m, 0.031, flat);
+    add_mesh(w, &m, 0.031, flat);
   } else {
-    cw_add_floor(&w);
+    cw_add_floor(w);
   }
-  cw_add_box(&w, 1.0, (const double[3]){0.08, 0.08, 0.06}, -0.1, 0.013, 0.0299);
-  if (!cw_start(&w, -0.1505, 0.013, 0.012)) {
+  cw_add_box(w, 1.0, (const double[3]){0.08, 0.08, 0.06}, -0.1, 0.013, 0.0299);
+  if (!cw_start(w, -0.1505, 0.013, 0.012)) {
     CHECK(false);
-    cw_close(&w);
     return s;
   }
-  cw_go(&w, 0.1, 0.0, 0.0, 700);
+  cw_go(w, 0.1, 0.0, 0.0, 700);
   for (int i = 0; i < 1500; ++i) {
-    cw_tick(&w);
-    s.mean -= w.force[0] / 1500.0;
-    s.least = fmin(s.least, -w.force[0]);
-    s.most = fmax(s.most, -w.force[0]);
-    s.lowest = fmin(s.lowest, w.position[0][2]);
-    s.highest = fmax(s.highest, w.position[0][2]);
+    cw_tick(w);
+    s.mean -= w->force[0] / 1500.0;
+    s.least = fmin(s.least, -w->force[0]);
+    s.most = fmax(s.most, -w->force[0]);
+    s.lowest = fmin(s.lowest, w->position[0][2]);
+    s.highest = fmax(s.highest, w->position[0][2]);
   }
-  hap_stats stats = cw_stats(&w);
+  hap_stats stats = cw_stats(w);
   printf(
       "# triangles %d: %.4f N, %.4f .. %.4f, z %.5f .. %.5f, x %.3f, range %u, "
       "dropped %llu\n",
-      triangles, s.mean, s.least, s.most, s.lowest, s.highest, w.position[0][0], w.range_min,
+      triangles, s.mean, s.least, s.most, s.lowest, s.highest, w->position[0][0], w->range_min,
       (unsigned long long)stats.model.capacity_dropped);
-  CHECK(w.range_min == 1);
+  CHECK(w->range_min == 1);
   CHECK(stats.faults.count == 0);
-  cw_close(&w);
+  cw_close(w);
   if (triangles) {
     dGeomTriMeshDataDestroy(m.data);
   }
@@ -616,6 +612,7 @@ static void fly_through(bool by_bits)
   cw_run(w, 501);
   CHECK_NEAR(w->velocity[0][0], 0.2, 1e-9);
   CHECK_NEAR(dBodyGetPosition(w->bodies[1])[0], 0.07, 1e-12);
+  cw_close(w);
 }
 
 TEST(a_pair_without_common_bits_or_refused_has_no_contact)
@@ -671,6 +668,7 @@ static void ask_in_pile(int range, int probes)
            w->steps);
     CHECK(asking.twice == 0);
   }
+  cw_close(w);
 }
 
 TEST(the_surface_of_a_pair_is_asked_once_a_step)
@@ -744,6 +742,7 @@ static hap_stats push_stack(double physics_hz, double contact_hz, double haptic_
   } else {
     CHECK(false);
   }
+  cw_close(w);
   return stats;
 }
 

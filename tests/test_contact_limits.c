@@ -20,28 +20,27 @@ static double height(const contact_world *w)
 }
 
 /* A cube on the floor and the hand above it, not in touch. */
-static void open_cube(contact_world *w)
+static contact_world *open_cube(void)
 {
-  cw_open(w, CW_GRAVITY);
+  contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   (void)cw_add_box(w, 0.5, (const double[3]){0.05, 0.05, 0.05}, 0.0, 0.0, 0.025);
+  return w;
 }
 
 TEST(a_session_that_starts_again_owns_what_it_owned)
 {
-  contact_world w;
-  open_cube(&w);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
+  contact_world *w = open_cube();
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.065));
   for (int round = 0; round < 4; ++round) {
-    CHECK(hap_session_advance(w.session, round == 1 ? 51 : 120) == HAP_OK);
-    CHECK(cw_stats(&w).model.range_bodies == 1);
-    CHECK_NEAR(height(&w), 0.025, 3e-4);
-    CHECK(hap_session_stop(w.session) == HAP_OK);
-    CHECK(hap_session_start(w.session) >= HAP_OK);
-    cw_put_hand(&w, 0.0, 0.0, 0.0);
-    CHECK(cw_stats(&w).faults.count == 0);
+    CHECK(hap_session_advance(w->session, round == 1 ? 51 : 120) == HAP_OK);
+    CHECK(cw_stats(w).model.range_bodies == 1);
+    CHECK_NEAR(height(w), 0.025, 3e-4);
+    CHECK(hap_session_stop(w->session) == HAP_OK);
+    CHECK(hap_session_start(w->session) >= HAP_OK);
+    cw_put_hand(w, 0.0, 0.0, 0.0);
+    CHECK(cw_stats(w).faults.count == 0);
   }
-  cw_close(&w);
 }
 
 /* Of these the loop would have no contacts: ODE keeps them. */
@@ -106,16 +105,14 @@ TEST(a_box_falls_beside_a_wall_that_it_does_not_touch)
 
 TEST(a_body_that_the_application_puts_to_sleep_stays_so)
 {
-  contact_world w;
-  open_cube(&w);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.065));
-  CHECK(hap_session_advance(w.session, 120) == HAP_OK);
-  REQUIRE(hap_session_lock(w.session) == HAP_OK);
-  dBodyDisable(w.bodies[0]);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  CHECK(hap_session_advance(w.session, 200) == HAP_OK);
-  CHECK(!dBodyIsEnabled(w.bodies[0]));
-  cw_close(&w);
+  contact_world *w = open_cube();
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.065));
+  CHECK(hap_session_advance(w->session, 120) == HAP_OK);
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dBodyDisable(w->bodies[0]);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 200) == HAP_OK);
+  CHECK(!dBodyIsEnabled(w->bodies[0]));
 }
 
 /* A row as one of its bodies has it. */

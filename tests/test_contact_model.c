@@ -25,28 +25,26 @@ typedef struct bounce {
 /* Dropped with its lowest point at a height, beside the hand. */
 static bounce drop(hap_model model, bool ball, double e, double threshold, double height)
 {
-  contact_world w;
   bounce b = {0.0, 0.0, 0};
-  cw_open(&w, G);
-  w.def.model = model;
-  w.surface.mode |= dContactBounce;
-  w.surface.bounce = e;
-  w.surface.bounce_vel = threshold;
-  cw_add_floor(&w);
+  contact_world *w = cw_new(G);
+  w->def.model = model;
+  w->surface.mode |= dContactBounce;
+  w->surface.bounce = e;
+  w->surface.bounce_vel = threshold;
+  cw_add_floor(w);
   if (ball) {
-    cw_add_ball(&w, 0.5, 0.03, 0.0, 0.0, 0.03 + height);
+    cw_add_ball(w, 0.5, 0.03, 0.0, 0.0, 0.03 + height);
   } else {
-    cw_add_cube(&w, 0.5, 0.06, 0.0, 0.0, 0.03 + height);
+    cw_add_cube(w, 0.5, 0.06, 0.0, 0.0, 0.03 + height);
   }
-  if (!cw_start_following(&w, 0.043, 0.0, 0.0)) {
+  if (!cw_start_following(w, 0.043, 0.0, 0.0)) {
     CHECK(false);
-    cw_close(&w);
     return b;
   }
   bool down = true; /* the loop lets a body bounce before it touches: only its speed tells */
   for (int i = 0; i < 600; ++i) {
-    cw_tick(&w);
-    double v = w.velocity[0][2];
+    cw_tick(w);
+    double v = w->velocity[0][2];
     if (down) {
       b.in = fmin(b.in, v);
       down = v < 0.95 * b.in || b.in == 0.0;
@@ -55,8 +53,8 @@ static bounce drop(hap_model model, bool ball, double e, double threshold, doubl
       b.out = fmax(b.out, v);
     }
   }
-  b.owned = w.range_min;
-  cw_close(&w);
+  b.owned = w->range_min;
+  cw_close(w);
   return b;
 }
 
@@ -242,6 +240,7 @@ static void push_row(int count, int range, int probes)
   CHECK(stats.hand.impulse_ns > 0.0);
   CHECK_NEAR(stats.hand.impulse_ns / w->impulse[0], 1.0, 5e-3);
   CHECK(stats.faults.count == 0);
+  cw_close(w);
 }
 
 TEST(the_momentum_of_a_pushed_row_is_the_hands_impulse)
@@ -357,6 +356,7 @@ static void spin_box(double speed, double angle_bound)
   CHECK(worst_l <= 1e-9);
   CHECK(worst_e <= 1e-3);
   CHECK(angle <= angle_bound);
+  cw_close(w);
 }
 
 TEST(a_spinning_box_keeps_momentum_and_energy)
@@ -411,6 +411,7 @@ static void roll(int kind)
   CHECK_NEAR(v / before, 1.0, 0.01);
   CHECK_NEAR(turning * radius / v, 1.0, 1e-3);
   CHECK(fabs(w->velocity[0][1]) < 1e-3 && fabs(w->position[0][2] - radius) < 2e-4);
+  cw_close(w);
 }
 
 TEST(what_rolls_goes_on_rolling)
@@ -492,29 +493,26 @@ TEST(slip_is_a_speed_for_a_force)
 
 TEST(a_belt_carries_a_box_at_its_speed)
 {
-  contact_world w;
-  cw_open(&w, G);
-  w.surface = (dSurfaceParameters){
+  contact_world *w = cw_new(G);
+  w->surface = (dSurfaceParameters){
       .mode = dContactApprox1 | dContactFDir1 | dContactMotion1, .mu = 0.5, .motion1 = 0.2};
-  w.direction[1] = 1.0;
-  lay_box(&w);
-  REQUIRE(start_over_box(&w));
-  cw_run(&w, 500);
-  double contact = w.velocity[0][1];
-  CHECK(w.range_min == 1);
+  w->direction[1] = 1.0;
+  lay_box(w);
+  REQUIRE(start_over_box(w));
+  cw_run(w, 500);
+  double contact = w->velocity[0][1];
+  CHECK(w->range_min == 1);
   CHECK_NEAR(fabs(contact), 0.2, 1e-3);
-  CHECK(fabs(w.velocity[0][0]) < 1e-3);
-  cw_close(&w);
-  cw_open(&w, G);
-  w.def.model = HAP_MODEL_SINGLE;
-  w.surface = (dSurfaceParameters){
+  CHECK(fabs(w->velocity[0][0]) < 1e-3);
+  w = cw_new(G);
+  w->def.model = HAP_MODEL_SINGLE;
+  w->surface = (dSurfaceParameters){
       .mode = dContactApprox1 | dContactFDir1 | dContactMotion1, .mu = 0.5, .motion1 = 0.2};
-  w.direction[1] = 1.0;
-  lay_box(&w);
-  REQUIRE(start_over_box(&w));
-  cw_run(&w, 500);
-  CHECK_NEAR(w.velocity[0][1], contact, 1e-3);
-  cw_close(&w);
+  w->direction[1] = 1.0;
+  lay_box(w);
+  REQUIRE(start_over_box(w));
+  cw_run(w, 500);
+  CHECK_NEAR(w->velocity[0][1], contact, 1e-3);
 }
 
 /* k = erp / (H cfm) of each contact, with the layer above it. */
@@ -684,6 +682,7 @@ static void bounce_on_hand(double stiffness, double mass)
   CHECK(most <= 1.03);
   CHECK(isfinite(w->position[0][2]) && w->position[0][2] > 0.0);
   CHECK(cw_stats(w).faults.count == 0);
+  cw_close(w);
 }
 
 TEST(a_gram_on_a_spring_of_a_meganewton_stays_calm)
@@ -752,6 +751,7 @@ static void squeeze(double stiffness, double damping)
   CHECK_NEAR(w->force[2] / (stiffness * (0.02 - 1e-4 + 0.01 - 0.0294)), 1.0, 0.25);
   CHECK_NEAR(w->position[0][2], 0.0099, 2e-4);
   CHECK(cw_stats(w).faults.count == 0);
+  cw_close(w);
 }
 
 TEST(a_gram_squeezed_onto_the_floor_stays_there)

@@ -193,40 +193,39 @@ TEST(pointers_of_one_body_have_each_their_own_coupling)
 {
   const double k = 2000.0;
   const double k_v = 500.0;
-  contact_world w;
   hap_pointer_id other;
   hap_pose pose = {{HAND_RADIUS + 0.05 - 0.002, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 0.5, 0.05, 0.025, 0.0, 0.0);
-  w.hand_def.stiffness = k;
-  w.hand_def.damping = 5.0;
-  use_proxy(&w, k_v);
-  REQUIRE(cw_start(&w, -HAND_RADIUS + 0.002, 0.0, 0.0));
-  hap_pointer_def def = w.hand_def;
-  hap_pointer_expert_def expert = w.hand_expert;
+  contact_world *w = cw_new(0.0);
+  cw_add_cube(w, 0.5, 0.05, 0.025, 0.0, 0.0);
+  w->hand_def.stiffness = k;
+  w->hand_def.damping = 5.0;
+  use_proxy(w, k_v);
+  REQUIRE(cw_start(w, -HAND_RADIUS + 0.002, 0.0, 0.0));
+  hap_pointer_def def = w->hand_def;
+  hap_pointer_expert_def expert = w->hand_expert;
   def.expert = &expert;
   expert.coupling = HAP_COUPLING_DIRECT;
-  CHECK(hap_pointer_add(w.session, &def, &other) == HAP_OK);
-  CHECK(hap_pointer_set_target(w.session, other, &pose, NULL) == HAP_OK);
-  cw_run(&w, 3000); /* until it has come to rest between them */
+  CHECK(hap_pointer_add(w->session, &def, &other) == HAP_OK);
+  CHECK(hap_pointer_set_target(w->session, other, &pose, NULL) == HAP_OK);
+  cw_run(w, 3000); /* until it has come to rest between them */
   hap_pointer_state state;
   double soft = k * k_v / (k + k_v);
-  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, other, &state, sizeof state) == HAP_OK);
   CHECK(state.coupling == HAP_COUPLING_DIRECT && state.contacts == 1);
-  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY && state_of(&w).contacts == 1);
+  CHECK(state_of(w).coupling == HAP_COUPLING_PROXY && state_of(w).contacts == 1);
   CHECK_NEAR(state.wrench.force[0], 0.004 * soft * k / (soft + k), 1e-3);
-  CHECK_NEAR(w.force[0], -state.wrench.force[0], 1e-3);
-  CHECK(hap_pointer_remove(w.session, w.hand) == HAP_OK); /* its place in the solver goes with it */
-  CHECK(hap_session_advance(w.session, 200) == HAP_OK);
-  CHECK(hap_pointer_get(w.session, other, &state, sizeof state) == HAP_OK);
+  CHECK_NEAR(w->force[0], -state.wrench.force[0], 1e-3);
+  CHECK(hap_pointer_remove(w->session, w->hand) ==
+        HAP_OK); /* its place in the solver goes with it */
+  CHECK(hap_session_advance(w->session, 200) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, other, &state, sizeof state) == HAP_OK);
   CHECK(state.wrench.force[0] == 0.0);
-  w.hand_expert.coupling_stiffness = 1000.0;
-  CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
-  cw_put_hand(&w, 0.0, 0.0, 0.0);
-  CHECK(hap_session_advance(w.session, 3) == HAP_OK);
-  CHECK_NEAR(state_of(&w).coupling_stiffness, 1000.0, 1e-9);
-  CHECK_NEAR(state_of(&w).proxy.position[0], -HAND_RADIUS + 0.002, 1e-9);
-  cw_close(&w);
+  w->hand_expert.coupling_stiffness = 1000.0;
+  CHECK(hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK);
+  cw_put_hand(w, 0.0, 0.0, 0.0);
+  CHECK(hap_session_advance(w->session, 3) == HAP_OK);
+  CHECK_NEAR(state_of(w).coupling_stiffness, 1000.0, 1e-9);
+  CHECK_NEAR(state_of(w).proxy.position[0], -HAND_RADIUS + 0.002, 1e-9);
 }
 
 /* Without mass the proxy keeps nothing: what the hand gives the cube gets. */
@@ -284,14 +283,14 @@ static void add_ring(contact_world *w, int count)
   cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 0.0);
 }
 
-static bool open_many(contact_world *w, int count, double hold)
+static contact_world *open_many(int count, double hold)
 {
-  cw_open(w, 0.0);
+  contact_world *w = cw_new(0.0);
   add_ring(w, count);
   w->hand_expert.coupling = HAP_COUPLING_AUTO;
   w->hand_expert.coupling_stiffness = hold;
   w->hand_def.stiffness = 300.0;
-  return cw_start(w, 0.0, 0.0, 0.03);
+  return cw_start(w, 0.0, 0.0, 0.03) ? w : NULL;
 }
 
 TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
@@ -306,25 +305,24 @@ TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
                {4, 1150.0, HAP_COUPLING_ABOVE},
                {4, 0.0, HAP_COUPLING_UNKNOWN}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    contact_world w;
     bool above = cases[i].reason == HAP_COUPLING_ABOVE;
-    REQUIRE(open_many(&w, cases[i].count, cases[i].hold));
-    cw_run(&w, 10);
-    CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT); /* nothing is near */
-    cw_move_hand(&w, 0.0, 0.0, -0.05);
-    while (state_of(&w).contacts < (uint32_t)cases[i].count && w.ticks < 500) {
-      cw_tick(&w);
+    contact_world *w = open_many(cases[i].count, cases[i].hold);
+    REQUIRE(w != NULL);
+    cw_run(w, 10);
+    CHECK(state_of(w).coupling == HAP_COUPLING_DIRECT); /* nothing is near */
+    cw_move_hand(w, 0.0, 0.0, -0.05);
+    while (state_of(w).contacts < (uint32_t)cases[i].count && w->ticks < 500) {
+      cw_tick(w);
     }
-    hap_pointer_state state = state_of(&w);
+    hap_pointer_state state = state_of(w);
     CHECK(state.contacts == (uint32_t)cases[i].count);
     CHECK(state.coupling == (above ? HAP_COUPLING_PROXY : HAP_COUPLING_DIRECT));
     CHECK(state.coupling_reason == cases[i].reason);
     CHECK_NEAR(state.coupling_stiffness, above ? cases[i].hold : 0.0, 1e-9);
     CHECK_NEAR(state.contact_stiffness, 300.0 * cases[i].count, 1e-9);
-    cw_go(&w, 0.0, 0.0, 0.05, 300);
-    CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT); /* and is let go of again */
-    CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
-    cw_close(&w);
+    cw_go(w, 0.0, 0.0, 0.05, 300);
+    CHECK(state_of(w).coupling == HAP_COUPLING_DIRECT); /* and is let go of again */
+    CHECK_NEAR(cw_norm(w->force), 0.0, 1e-9);
   }
 }
 
@@ -386,30 +384,29 @@ TEST(auto_without_a_force_stays_direct)
 /* A hand that taps: between two touches the coupling does not change, and after the last it does. */
 TEST(a_hop_does_not_change_the_coupling)
 {
-  contact_world w;
-  REQUIRE(open_many(&w, 4, 1000.0));
-  cw_move_hand(&w, 0.0, 0.0, -0.05);
-  while (state_of(&w).contacts < 4 && w.ticks < 1000) {
-    cw_tick(&w);
+  contact_world *w = open_many(4, 1000.0);
+  REQUIRE(w != NULL);
+  cw_move_hand(w, 0.0, 0.0, -0.05);
+  while (state_of(w).contacts < 4 && w->ticks < 1000) {
+    cw_tick(w);
   }
-  CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
+  CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
   int apart = 0;
   for (int i = 0; i < 44; ++i) { /* 2 mm away and back */
-    cw_move_hand(&w, 0.0, 0.0, i < 20 ? 0.1 : -0.1);
-    cw_tick(&w);
-    CHECK(state_of(&w).coupling == HAP_COUPLING_PROXY);
-    apart += state_of(&w).contacts == 0;
+    cw_move_hand(w, 0.0, 0.0, i < 20 ? 0.1 : -0.1);
+    cw_tick(w);
+    CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
+    apart += state_of(w).contacts == 0;
   }
   CHECK(apart > 20 && apart < 44);
   apart = 0;
-  cw_move_hand(&w, 0.0, 0.0, 0.1);
+  cw_move_hand(w, 0.0, 0.0, 0.1);
   for (int i = 0; i < 200; ++i) {
-    cw_tick(&w);
-    apart = state_of(&w).contacts == 0 ? apart + 1 : 0;
-    CHECK(apart >= 50 || state_of(&w).coupling == HAP_COUPLING_PROXY);
+    cw_tick(w);
+    apart = state_of(w).contacts == 0 ? apart + 1 : 0;
+    CHECK(apart >= 50 || state_of(w).coupling == HAP_COUPLING_PROXY);
   }
-  CHECK(state_of(&w).coupling == HAP_COUPLING_DIRECT);
-  cw_close(&w);
+  CHECK(state_of(w).coupling == HAP_COUPLING_DIRECT);
 }
 
 /* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the device
@@ -446,31 +443,28 @@ TEST(a_heavy_proxy_is_let_go_of_at_the_device)
 TEST(a_proxy_is_refused_where_it_cannot_be)
 {
   hap_pointer_id id;
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
-  hap_pointer_def def = w.hand_def;
-  hap_pointer_expert_def expert = w.hand_expert;
+  contact_world *w = cw_new(0.0);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+  hap_pointer_def def = w->hand_def;
+  hap_pointer_expert_def expert = w->hand_expert;
   def.expert = &expert;
   expert.coupling = HAP_COUPLING_PROXY;
-  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  CHECK(hap_pointer_add(w->session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   expert.coupling_stiffness = 100.0;
   def.force_scale = 0.0; /* a spring without a force at its other end */
-  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  CHECK(hap_pointer_add(w->session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   def.force_scale = 1e-300; /* no number for the spring in the world */
-  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
+  CHECK(hap_pointer_add(w->session, &def, &id) == HAP_ERROR_ARGUMENT && id.v == 0);
   def.force_scale = 1.0;
-  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_OK);
-  cw_close(&w);
-  cw_open(&w, 0.0);
-  cw_add_cube(&w, 1.0, 0.1, 1.0, 0.0, 0.0);
-  w.def.model = HAP_MODEL_ACCELERANCE;
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
-  CHECK(hap_pointer_add(w.session, &def, &id) == HAP_ERROR_UNSUPPORTED);
-  cw_tick(&w);
-  CHECK(state_of(&w).coupling_reason == HAP_COUPLING_MODEL);
-  cw_close(&w);
+  CHECK(hap_pointer_add(w->session, &def, &id) == HAP_OK);
+  w = cw_new(0.0);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 0.0);
+  w->def.model = HAP_MODEL_ACCELERANCE;
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+  CHECK(hap_pointer_add(w->session, &def, &id) == HAP_ERROR_UNSUPPORTED);
+  cw_tick(w);
+  CHECK(state_of(w).coupling_reason == HAP_COUPLING_MODEL);
 }
 
 /* ---- proxy and guard ---- */
@@ -604,36 +598,35 @@ TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
  * fastest it moves when it should have come to rest. */
 static double shaking(hap_coupling coupling, int count, double stiffness)
 {
-  contact_world w;
   hap_detail detail = {""};
   double fastest = 0.0;
-  cw_open(&w, 0.0);
-  add_ring(&w, count);
-  w.hand_def.stiffness = stiffness;
-  w.hand_def.damping = 0.0;
-  w.hand_expert.coupling = coupling;
-  w.ode.world = w.world;
-  w.ode.space = w.space;
-  w.ode.user = &w;
-  CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_OK);
+  contact_world *w = cw_new(0.0);
+  add_ring(w, count);
+  w->hand_def.stiffness = stiffness;
+  w->hand_def.damping = 0.0;
+  w->hand_expert.coupling = coupling;
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  w->ode.user = w;
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_OK);
   CHECK(hap_device_open("virtual:hand=relaxed,device_mass=0.1,device_damping=0.2,max_force=1000,"
                         "path=0:0/0/0.014;1:0/0/0",
-                        &w.hand_def.device, &detail) == HAP_OK);
-  CHECK(hap_pointer_add(w.session, &w.hand_def, &w.hand) == HAP_OK);
-  CHECK(hap_session_start(w.session) == HAP_OK);
-  CHECK(hap_session_advance(w.session, 3000) == HAP_OK);
-  hap_pointer_state state = state_of(&w);
+                        &w->hand_def.device, &detail) == HAP_OK);
+  CHECK(hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK);
+  CHECK(hap_session_start(w->session) == HAP_OK);
+  CHECK(hap_session_advance(w->session, 3000) == HAP_OK);
+  hap_pointer_state state = state_of(w);
   double at = state.device.position[2];
   for (int i = 0; i < 500; ++i) {
-    CHECK(hap_session_advance(w.session, 1) == HAP_OK);
-    state = state_of(&w);
+    CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+    state = state_of(w);
     fastest = fmax(fastest, fabs(state.device.position[2] - at) / T);
     at = state.device.position[2];
   }
   CHECK(state.contacts == (uint32_t)count || coupling == HAP_COUPLING_DIRECT);
-  hap_session_stop(w.session);
-  hap_device *device = w.hand_def.device;
-  cw_close(&w);
+  hap_session_stop(w->session);
+  hap_device *device = w->hand_def.device;
+  cw_close(w);
   hap_device_close(device);
   return fastest;
 }

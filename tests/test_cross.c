@@ -63,12 +63,13 @@ static bool start_above(test_world *w, double x)
 }
 
 /* Two cubes along x, their joint in the origin. */
-static void open_pair(test_world *w, hap_effect_wish cross, double mass_a, double mass_b)
+static test_world *open_pair(hap_effect_wish cross, double mass_a, double mass_b)
 {
-  world_open(w, 0.0, 1000);
+  test_world *w = world_new(0.0, 1000);
   expert_wish(&w->expert, HAP_EFFECT_CROSS, cross);
   world_add_cube(w, EDGE, mass_a, -APART, 0, 0);
   world_add_cube(w, EDGE, mass_b, APART, 0, 0);
+  return w;
 }
 
 static void join_fixed(test_world *w)
@@ -113,23 +114,20 @@ static void expect_rigid(const double mass[2], const double p[3], double out[6][
 
 TEST(a_fixed_pair_answers_as_one_body)
 {
-  test_world w;
   const double mass[2] = {0.5, 0.2};
   double expected[6][3];
-  open_pair(&w, HAP_EFFECT_ON, mass[0], mass[1]);
-  join_fixed(&w);
-  REQUIRE(start_above(&w, -0.02));
-  measure(&w);
-  const hapi_cross_block *cross = block(&w, w.bodies[0], w.bodies[1]);
-  const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
+  test_world *w = open_pair(HAP_EFFECT_ON, mass[0], mass[1]);
+  join_fixed(w);
+  REQUIRE(start_above(w, -0.02));
+  measure(w);
+  const hapi_cross_block *cross = block(w, w->bodies[0], w->bodies[1]);
+  const hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_rigid(mass, contact->point_world, expected);
   check_block(cross, expected);
-  CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_physics(&w)->cross.block_count == 2);
-  CHECK(world_physics(&w)->probe.counts.clipped == 0 &&
-        world_physics(&w)->cross.counts.clipped == 0);
-  world_close(&w);
+  CHECK(block(w, w->bodies[1], w->bodies[0]) != NULL);
+  CHECK(world_physics(w)->cross.block_count == 2);
+  CHECK(world_physics(w)->probe.counts.clipped == 0 && world_physics(w)->cross.counts.clipped == 0);
 }
 
 /* Cubes alike, a hinge along z between them: about x and y they turn as one body, about z each by
@@ -159,37 +157,33 @@ static void expect_hinged(double mass, const double p[3], double out[6][3])
 
 TEST(a_hinged_pair_has_its_closed_form)
 {
-  test_world w;
   double expected[6][3];
-  open_pair(&w, HAP_EFFECT_ON, 0.4, 0.4);
-  join_hinge(&w);
-  REQUIRE(start_above(&w, -0.02));
-  measure(&w);
-  const hapi_cross_block *cross = block(&w, w.bodies[0], w.bodies[1]);
-  const hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
+  test_world *w = open_pair(HAP_EFFECT_ON, 0.4, 0.4);
+  join_hinge(w);
+  REQUIRE(start_above(w, -0.02));
+  measure(w);
+  const hapi_cross_block *cross = block(w, w->bodies[0], w->bodies[1]);
+  const hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_hinged(0.4, contact->point_world, expected);
   check_block(cross, expected);
-  world_close(&w);
 }
 
 TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
 {
   uint64_t probes[2];
   for (int joined = 0; joined < 2; ++joined) {
-    test_world w;
-    open_pair(&w, HAP_EFFECT_ON, 0.4, 0.4);
+    test_world *w = open_pair(HAP_EFFECT_ON, 0.4, 0.4);
     if (joined != 0) {
-      join_fixed(&w);
+      join_fixed(w);
     }
-    REQUIRE(start_above(&w, -0.02));
-    const uint64_t *made = &world_physics(&w)->probe.test.steps;
+    REQUIRE(start_above(w, -0.02));
+    const uint64_t *made = &world_physics(w)->probe.test.steps;
     uint64_t before = *made;
-    measure(&w);
+    measure(w);
     probes[joined] = *made - before;
-    CHECK(world_count_contacts(&w) == 2);
-    CHECK(world_physics(&w)->cross.block_count == (joined != 0 ? 2u : 0u));
-    world_close(&w);
+    CHECK(world_count_contacts(w) == 2);
+    CHECK(world_physics(w)->cross.block_count == (joined != 0 ? 2u : 0u));
   }
   CHECK(probes[0] == 1 + 3 && probes[1] == 1 + 6);
 }
@@ -235,21 +229,19 @@ TEST(with_too_few_places_the_largest_stay)
 /* A perturbation of nothing, as of a body without weight, divides nothing by nothing. */
 TEST(a_block_that_is_no_number_is_left_out)
 {
-  test_world w;
-  open_pair(&w, HAP_EFFECT_ON, 0.5, 0.2);
-  join_fixed(&w);
-  REQUIRE(start_above(&w, -0.02));
-  const hapi_probe_counts *counts = &world_physics(&w)->probe.counts;
-  const hapi_cross_counts *blocks = &world_physics(&w)->cross.counts;
-  world_slot(&w, w.bodies[0])->mass = 0.0;
-  measure(&w);
+  test_world *w = open_pair(HAP_EFFECT_ON, 0.5, 0.2);
+  join_fixed(w);
+  REQUIRE(start_above(w, -0.02));
+  const hapi_probe_counts *counts = &world_physics(w)->probe.counts;
+  const hapi_cross_counts *blocks = &world_physics(w)->cross.counts;
+  world_slot(w, w->bodies[0])->mass = 0.0;
+  measure(w);
   CHECK(counts->singular == 1 && counts->clipped == 0); /* A of the contact ... */
   CHECK(blocks->singular == 1 && blocks->clipped == 0); /* ... and its block */
-  CHECK(block(&w, w.bodies[0], w.bodies[1]) == NULL);
-  CHECK(block(&w, w.bodies[1], w.bodies[0]) != NULL);
-  CHECK(world_contact_answer(&w, world_contact(&w, w.bodies[0], 0))->a[0][0] >
+  CHECK(block(w, w->bodies[0], w->bodies[1]) == NULL);
+  CHECK(block(w, w->bodies[1], w->bodies[0]) != NULL);
+  CHECK(world_contact_answer(w, world_contact(w, w->bodies[0], 0))->a[0][0] >
         0.1); /* the last good one */
-  world_close(&w);
 }
 
 /* ---- in the loop ---- */
@@ -262,9 +254,9 @@ static const hapi_local_body *local(const test_world *w, int body)
 
 /* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so that the
  * loop knows it. */
-static bool open_row(test_world *w, hap_effect_wish cross)
+static test_world *open_row(hap_effect_wish cross)
 {
-  world_open(w, 0.0, 1000);
+  test_world *w = world_new(0.0, 1000);
   w->mu = 0.0;
   expert_wish(&w->expert, HAP_EFFECT_CROSS, cross);
   w->research.guard = HAP_GUARD_MEASURE;
@@ -272,56 +264,54 @@ static bool open_row(test_world *w, hap_effect_wish cross)
     world_add_cube(w, EDGE, 0.5, EDGE / 2 + i * (EDGE - OVERLAP), 0, 0);
   }
   if (world_create_session(w, NULL) < HAP_OK) {
-    return false;
+    return NULL;
   }
   world_add_pointer(w, RADIUS, -RADIUS - GAP, 0, 0);
   world_add_pointer(w, RADIUS, 1.5 * EDGE, 0, EDGE / 2 + RADIUS + 0.005);
   bool good = hap_session_start(w->session) == HAP_OK;
   CHECK(hap_session_advance(w->session, 2) == HAP_OK);
   world_move_pointer(w, 0, (const double[3]){-RADIUS + 0.002, 0, 0}, NULL);
-  return good;
+  return good ? w : NULL;
 }
 
 TEST(the_second_cube_of_a_row_moves_between_syncs)
 {
   for (int cross = HAP_EFFECT_OFF; cross <= HAP_EFFECT_ON; ++cross) {
-    test_world w;
-    REQUIRE(open_row(&w, (hap_effect_wish)cross));
-    CHECK(hap_session_advance(w.session, 40) == HAP_OK); /* the first sync is at 50 */
-    double first = local(&w, 0)->twist.linear[0];
-    double second = local(&w, 1)->twist.linear[0];
+    test_world *w = open_row((hap_effect_wish)cross);
+    REQUIRE(w != NULL);
+    CHECK(hap_session_advance(w->session, 40) == HAP_OK); /* the first sync is at 50 */
+    double first = local(w, 0)->twist.linear[0];
+    double second = local(w, 1)->twist.linear[0];
     CHECK(first > 0.005);
     CHECK_NEAR(second, cross == HAP_EFFECT_ON ? first : 0.0, 1e-6 * first);
-    CHECK(dBodyGetLinearVel(w.bodies[1])[0] == 0.0);
-    CHECK(hap_session_advance(w.session, 10) == HAP_OK); /* the step of the sync, not yet in use */
-    double world = dBodyGetLinearVel(w.bodies[1])[0];
-    double missed = world_account(&w, w.bodies[1])->residual[0]; /* eq. 14 */
+    CHECK(dBodyGetLinearVel(w->bodies[1])[0] == 0.0);
+    CHECK(hap_session_advance(w->session, 10) == HAP_OK); /* the step of the sync, not yet in use */
+    double world = dBodyGetLinearVel(w->bodies[1])[0];
+    double missed = world_account(w, w->bodies[1])->residual[0]; /* eq. 14 */
     CHECK(world > 0.005);
     CHECK_NEAR(missed, cross == HAP_EFFECT_ON ? 0.0 : world, 1e-5 * world);
-    world_close(&w);
   }
 }
 
 /* What the hand gave is in the world once, and the loop's bodies go where the world's do. */
 TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
 {
-  test_world w;
-  REQUIRE(open_row(&w, HAP_EFFECT_ON));
-  CHECK(hap_session_advance(w.session, 60) == HAP_OK);
-  CHECK((local(&w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
-  CHECK((local(&w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
-  CHECK(local(&w, 1)->account.impulse[0] == 0.0);
-  world_move_pointer(&w, 0, (const double[3]){-0.1, 0, 0}, NULL);
-  CHECK(hap_session_advance(w.session, 101) == HAP_OK);
-  hap_stats stats = world_stats(&w);
+  test_world *w = open_row(HAP_EFFECT_ON);
+  REQUIRE(w != NULL);
+  CHECK(hap_session_advance(w->session, 60) == HAP_OK);
+  CHECK((local(w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
+  CHECK((local(w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
+  CHECK(local(w, 1)->account.impulse[0] == 0.0);
+  world_move_pointer(w, 0, (const double[3]){-0.1, 0, 0}, NULL);
+  CHECK(hap_session_advance(w->session, 101) == HAP_OK);
+  hap_stats stats = world_stats(w);
   double momentum = 0.0;
   for (int i = 0; i < 3; ++i) {
-    momentum += 0.5 * dBodyGetLinearVel(w.bodies[i])[0];
+    momentum += 0.5 * dBodyGetLinearVel(w->bodies[i])[0];
   }
   CHECK(stats.hand.impulse_ns > 0.01);
   CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
   CHECK_NEAR(momentum / stats.hand.impulse_ns, 1.0, 1e-6);
-  world_close(&w);
 }
 
 /* A hand on each of two jointed cubes: each force moves both, and eq. 14 finds nothing left. */
@@ -329,25 +319,23 @@ TEST(two_hands_on_a_pair_leave_no_residual)
 {
   double missed[2];
   for (int cross = HAP_EFFECT_OFF; cross <= HAP_EFFECT_ON; ++cross) {
-    test_world w;
-    open_pair(&w, (hap_effect_wish)cross, 0.5, 0.3);
-    w.research.guard = HAP_GUARD_MEASURE;
-    join_fixed(&w);
-    REQUIRE(world_create_session(&w, NULL) == HAP_OK);
-    world_add_pointer(&w, RADIUS, -APART, 0, EDGE / 2 + RADIUS + GAP);
-    world_add_pointer(&w, RADIUS, APART, 0, EDGE / 2 + RADIUS + GAP);
-    REQUIRE(hap_session_start(w.session) == HAP_OK);
-    CHECK(hap_session_advance(w.session, 2) == HAP_OK);
-    world_move_pointer(&w, 0, (const double[3]){-APART, 0, EDGE / 2 + RADIUS - 0.001}, NULL);
-    world_move_pointer(&w, 1, (const double[3]){APART, 0, EDGE / 2 + RADIUS - 0.0005}, NULL);
-    CHECK(hap_session_advance(w.session, 50) == HAP_OK);
-    const hapi_body_slot *slots[2] = {world_slot(&w, w.bodies[0]), world_slot(&w, w.bodies[1])};
+    test_world *w = open_pair((hap_effect_wish)cross, 0.5, 0.3);
+    w->research.guard = HAP_GUARD_MEASURE;
+    join_fixed(w);
+    REQUIRE(world_create_session(w, NULL) == HAP_OK);
+    world_add_pointer(w, RADIUS, -APART, 0, EDGE / 2 + RADIUS + GAP);
+    world_add_pointer(w, RADIUS, APART, 0, EDGE / 2 + RADIUS + GAP);
+    REQUIRE(hap_session_start(w->session) == HAP_OK);
+    CHECK(hap_session_advance(w->session, 2) == HAP_OK);
+    world_move_pointer(w, 0, (const double[3]){-APART, 0, EDGE / 2 + RADIUS - 0.001}, NULL);
+    world_move_pointer(w, 1, (const double[3]){APART, 0, EDGE / 2 + RADIUS - 0.0005}, NULL);
+    CHECK(hap_session_advance(w->session, 50) == HAP_OK);
+    const hapi_body_slot *slots[2] = {world_slot(w, w->bodies[0]), world_slot(w, w->bodies[1])};
     CHECK(slots[0]->pushed && slots[1]->pushed);
-    missed[cross - HAP_EFFECT_OFF] = fmax(fabs(world_account(&w, w.bodies[0])->residual[2]),
-                                          fabs(world_account(&w, w.bodies[1])->residual[2]));
-    hap_stats stats = world_stats(&w);
+    missed[cross - HAP_EFFECT_OFF] = fmax(fabs(world_account(w, w->bodies[0])->residual[2]),
+                                          fabs(world_account(w, w->bodies[1])->residual[2]));
+    hap_stats stats = world_stats(w);
     CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
-    world_close(&w);
   }
   printf("# eq. 14: %g m/s without, %g m/s with cross accelerance\n", missed[0], missed[1]);
   CHECK(missed[0] > 1e-3 && missed[1] < 0.02 * missed[0]);
@@ -480,28 +468,27 @@ TEST(a_cube_that_slides_answers_with_its_mass)
 /* What the base probe came to is what b, A f and the blocks make together, of every body. */
 TEST(b_and_the_forces_make_the_base_again)
 {
-  test_world w;
   double base[3];
   double wanted = 3.0 / 1.5;
-  REQUIRE(open_row(&w, HAP_EFFECT_ON));
-  hapi_physics *physics = world_physics(&w);
+  test_world *w = open_row(HAP_EFFECT_ON);
+  REQUIRE(w != NULL);
+  hapi_physics *physics = world_physics(w);
   physics->cycle.settings.probe = HAP_PROBE_OPERATING;
-  hapi_contact_slot *contact = world_contact(&w, w.bodies[0], 0);
-  REQUIRE(contact != NULL && block(&w, w.bodies[0], w.bodies[1]) != NULL);
+  hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
+  REQUIRE(contact != NULL && block(w, w->bodies[0], w->bodies[1]) != NULL);
   hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);
-  measure(&w);
-  base[0] = world_answer(&w, world_slot(&w, w.bodies[0]))->b[0] +
-            3.0 * world_contact_answer(&w, contact)->a[0][0];
-  base[1] = world_answer(&w, world_slot(&w, w.bodies[1]))->b[0] +
-            3.0 * block(&w, w.bodies[0], w.bodies[1])->a[0][0];
+  measure(w);
+  base[0] = world_answer(w, world_slot(w, w->bodies[0]))->b[0] +
+            3.0 * world_contact_answer(w, contact)->a[0][0];
+  base[1] = world_answer(w, world_slot(w, w->bodies[1]))->b[0] +
+            3.0 * block(w, w->bodies[0], w->bodies[1])->a[0][0];
   CHECK_NEAR(base[0], wanted, 1e-6);
   CHECK_NEAR(base[1], wanted, 1e-6);
-  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[1]))->b[0], 0.0, 1e-6);
+  CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[1]))->b[0], 0.0, 1e-6);
   physics->config.capacity.crosses = 0; /* off: the force of the last tick is held in b */
-  measure(&w);
-  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[0]))->b[0], 0.0, 1e-6);
-  CHECK_NEAR(world_answer(&w, world_slot(&w, w.bodies[1]))->b[0], wanted, 1e-6);
-  world_close(&w);
+  measure(w);
+  CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[0]))->b[0], 0.0, 1e-6);
+  CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[1]))->b[0], wanted, 1e-6);
 }
 
 /* Two cubes side by side on the floor are one island; friction holds both. */
@@ -554,16 +541,14 @@ TEST(operating_probes_are_as_many_as_shared_ones)
 {
   uint64_t steps[2];
   for (int k = 0; k < 2; ++k) {
-    test_world w;
-    open_pair(&w, HAP_EFFECT_OFF, 0.4, 0.4);
-    w.research.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
-    join_fixed(&w);
-    REQUIRE(start_above(&w, -0.02));
-    const uint64_t *made = &world_physics(&w)->probe.test.steps;
+    test_world *w = open_pair(HAP_EFFECT_OFF, 0.4, 0.4);
+    w->research.probe = k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_OPERATING;
+    join_fixed(w);
+    REQUIRE(start_above(w, -0.02));
+    const uint64_t *made = &world_physics(w)->probe.test.steps;
     uint64_t before = *made;
-    measure(&w);
+    measure(w);
     steps[k] = *made - before;
-    world_close(&w);
   }
   CHECK(steps[0] == 7 && steps[1] == 7);
 }

@@ -160,15 +160,16 @@ TEST(a_dial_does_not_go_to_and_fro)
 /* ---- sessions ---- */
 
 /* A row of cubes on a floor, pushed along it. */
-static void open_row(contact_world *w, int cubes)
+static contact_world *open_row(int cubes)
 {
-  cw_open(w, CW_GRAVITY);
+  contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   for (int i = 0; i < cubes; ++i) {
     cw_add_cube(w, 0.3, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
   }
   w->hand_def.radius = RADIUS;
   w->hand_velocity[0] = 0.1;
+  return w;
 }
 
 static bool start_row(contact_world *w)
@@ -190,23 +191,21 @@ static hap_accuracy_info accuracy_of(const contact_world *w)
 
 static double push_row(double accuracy, double force[TICKS])
 {
-  contact_world w;
-  open_row(&w, ROW);
-  w.def.accuracy = accuracy;
+  contact_world *w = open_row(ROW);
+  w->def.accuracy = accuracy;
   double sweeps = 0.0;
-  if (start_row(&w)) {
+  if (start_row(w)) {
     for (int i = 0; i < TICKS; ++i) {
-      cw_tick(&w);
-      force[i] = w.force[0];
+      cw_tick(w);
+      force[i] = w->force[0];
     }
-    sweeps = (double)cw_stats(&w).contact.sweeps / TICKS;
+    sweeps = (double)cw_stats(w).contact.sweeps / TICKS;
     double most =
-        3.0 + accuracy_of(&w).row_updates / (double)ROW_ROWS; /* it ends beyond its bound */
+        3.0 + accuracy_of(w).row_updates / (double)ROW_ROWS; /* it ends beyond its bound */
     CHECK(2.0 * most >= sweeps); /* two solves a tick, where something is pushed out */
   } else {
     CHECK(!"a session");
   }
-  cw_close(&w);
   return sweeps;
 }
 
@@ -240,53 +239,47 @@ TEST(accuracy_costs_sweeps_and_buys_force)
 
 TEST(the_session_tells_where_it_stands)
 {
-  contact_world w;
-  open_row(&w, 2);
-  w.def.accuracy = 0.1;
-  w.expert.max_sweeps = 7;
-  REQUIRE(start_row(&w));
-  cw_run(&w, 120);
-  hap_accuracy_info info = accuracy_of(&w);
+  contact_world *w = open_row(2);
+  w->def.accuracy = 0.1;
+  w->expert.max_sweeps = 7;
+  REQUIRE(start_row(w));
+  cw_run(w, 120);
+  hap_accuracy_info info = accuracy_of(w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
   CHECK(info.tick.reason == HAP_ACCURACY_ASKED && info.physics.reason == HAP_ACCURACY_ASKED);
   CHECK(info.max_sweeps == 7 && info.range_hops == 4 && info.shapes == 1);
   CHECK(info.contact_hz == 50.0 && info.edge_probes == 1 && info.iterations == 50);
   CHECK(info.probe == HAP_PROBE_SHARED && info.row_updates == 300);
   CHECK(info.tick.share == 0.0 && info.tick.load == 0.0 && info.tick.turns == 0);
-  cw_close(&w);
 }
 
 /* The first model is a sync. */
 TEST(it_tells_so_from_the_start)
 {
-  contact_world w;
-  open_row(&w, 2);
-  w.def.accuracy = 0.1;
-  w.expert.lookback = 0.1;
-  w.expert.force_error_wanted = 0.3;
-  REQUIRE(start_row(&w));
-  hap_accuracy_info info = accuracy_of(&w);
+  contact_world *w = open_row(2);
+  w->def.accuracy = 0.1;
+  w->expert.lookback = 0.1;
+  w->expert.force_error_wanted = 0.3;
+  REQUIRE(start_row(w));
+  hap_accuracy_info info = accuracy_of(w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
   CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_UNTOLD);
   CHECK(info.max_sweeps == 0 && info.row_updates == 300 && info.contact_hz == 50.0);
-  cw_close(&w);
 }
 
 static double passes_in(double accuracy)
 {
-  contact_world w;
-  open_row(&w, 2);
-  w.def.accuracy = accuracy;
+  contact_world *w = open_row(2);
+  w->def.accuracy = accuracy;
   double passes = 0.0;
-  if (start_row(&w)) {
-    cw_run(&w, 200);
-    double before = (double)cw_stats(&w).contact.passes;
-    cw_run(&w, 1000);
-    passes = (double)cw_stats(&w).contact.passes - before;
+  if (start_row(w)) {
+    cw_run(w, 200);
+    double before = (double)cw_stats(w).contact.passes;
+    cw_run(w, 1000);
+    passes = (double)cw_stats(w).contact.passes - before;
   } else {
     CHECK(!"a session");
   }
-  cw_close(&w);
   return passes;
 }
 
@@ -313,44 +306,40 @@ static void see_before(void *user, double step_s)
 
 TEST(the_worlds_iterations_are_the_applications)
 {
-  contact_world w;
-  open_row(&w, 2);
-  w.def.accuracy = 1.0;
-  w.ode.before_step = see_before;
-  w.ode.surface = see_surface;
-  watched = w.world;
-  REQUIRE(start_row(&w));
-  CHECK(dWorldGetQuickStepNumIterations(w.world) == 100);
-  cw_run(&w, 120);
-  CHECK(seen_iterations == 100 && accuracy_of(&w).iterations == 400);
-  CHECK(dWorldGetQuickStepNumIterations(w.world) == 100);
-  dWorldSetQuickStepNumIterations(w.world, 31); /* between two steps */
-  CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
-  cw_run(&w, 60);
-  CHECK(seen_iterations == 31 && accuracy_of(&w).iterations == 16);
-  CHECK(dWorldGetQuickStepNumIterations(w.world) == 31);
-  cw_close(&w);
+  contact_world *w = open_row(2);
+  w->def.accuracy = 1.0;
+  w->ode.before_step = see_before;
+  w->ode.surface = see_surface;
+  watched = w->world;
+  REQUIRE(start_row(w));
+  CHECK(dWorldGetQuickStepNumIterations(w->world) == 100);
+  cw_run(w, 120);
+  CHECK(seen_iterations == 100 && accuracy_of(w).iterations == 400);
+  CHECK(dWorldGetQuickStepNumIterations(w->world) == 100);
+  dWorldSetQuickStepNumIterations(w->world, 31); /* between two steps */
+  CHECK(hap_session_set_accuracy(w->session, 0.0) == HAP_OK);
+  cw_run(w, 60);
+  CHECK(seen_iterations == 31 && accuracy_of(w).iterations == 16);
+  CHECK(dWorldGetQuickStepNumIterations(w->world) == 31);
 }
 
 TEST(it_is_turned_while_the_session_runs)
 {
-  contact_world w;
-  open_row(&w, 3);
-  REQUIRE(start_row(&w));
-  cw_run(&w, 300);
-  double force = w.force[0];
-  CHECK(accuracy_of(&w).accuracy == 0.5 && accuracy_of(&w).shapes == 1);
-  CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
-  cw_run(&w, 60);
-  hap_accuracy_info info = accuracy_of(&w);
+  contact_world *w = open_row(3);
+  REQUIRE(start_row(w));
+  cw_run(w, 300);
+  double force = w->force[0];
+  CHECK(accuracy_of(w).accuracy == 0.5 && accuracy_of(w).shapes == 1);
+  CHECK(hap_session_set_accuracy(w->session, 0.0) == HAP_OK);
+  cw_run(w, 60);
+  hap_accuracy_info info = accuracy_of(w);
   CHECK(info.accuracy == 0.0 && info.row_updates == 300);
   CHECK(info.shapes == 0 && info.range_hops == 1);
-  CHECK(w.force[0] < 0.5 * force && w.force[0] > 1.5 * force); /* it pushes on */
-  CHECK(hap_session_set_accuracy(w.session, 0.5) == HAP_OK);
-  cw_run(&w, 300);
-  CHECK(accuracy_of(&w).accuracy == 0.5 && accuracy_of(&w).row_updates > 300);
-  CHECK_NEAR(w.force[0], force, 0.05 * fabs(force));
-  cw_close(&w);
+  CHECK(w->force[0] < 0.5 * force && w->force[0] > 1.5 * force); /* it pushes on */
+  CHECK(hap_session_set_accuracy(w->session, 0.5) == HAP_OK);
+  cw_run(w, 300);
+  CHECK(accuracy_of(w).accuracy == 0.5 && accuracy_of(w).row_updates > 300);
+  CHECK_NEAR(w->force[0], force, 0.05 * fabs(force));
 }
 
 static hap_effect_info shape_of(const contact_world *w)
@@ -390,46 +379,42 @@ static void stroke(contact_world *w, int ticks)
 
 static hap_accuracy_info look_for_error(double from, double wanted)
 {
-  contact_world w;
   hap_accuracy_info info;
-  open_row(&w, 4);
-  w.def.accuracy = from;
-  w.expert.force_error_wanted = wanted;
-  w.expert.lookback = 0.1;
+  contact_world *w = open_row(4);
+  w->def.accuracy = from;
+  w->expert.force_error_wanted = wanted;
+  w->expert.lookback = 0.1;
   memset(&info, 0, sizeof info);
-  if (start_row(&w)) {
-    stroke(&w, 6000);
-    info = accuracy_of(&w);
+  if (start_row(w)) {
+    stroke(w, 6000);
+    info = accuracy_of(w);
     printf("# from %g, %g wanted: at %g, told %.3g\n", from, wanted, info.accuracy,
-           cw_stats(&w).error.force_error);
+           cw_stats(w).error.force_error);
   } else {
     CHECK(!"a session");
   }
-  cw_close(&w);
   return info;
 }
 
 /* What is not touched, and what spoils every window, has no error. */
 TEST(it_says_when_no_error_has_been_told)
 {
-  contact_world w;
-  open_row(&w, 2);
-  w.expert.lookback = 0.1;
-  w.expert.force_error_wanted = 0.02;
-  REQUIRE(start_row(&w));
+  contact_world *w = open_row(2);
+  w->expert.lookback = 0.1;
+  w->expert.force_error_wanted = 0.02;
+  REQUIRE(start_row(w));
   for (int i = 0; i < 1000; ++i) { /* away, and back as far */
-    cw_move_hand(&w, i < 500 ? -0.1 : 0.1, 0.0, 0.0);
-    cw_tick(&w);
+    cw_move_hand(w, i < 500 ? -0.1 : 0.1, 0.0, 0.0);
+    cw_tick(w);
   }
-  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_UNTOLD);
-  CHECK(accuracy_of(&w).physics.reason == HAP_ACCURACY_UNTOLD && accuracy_of(&w).accuracy == 0.5);
-  stroke(&w, 1000);
-  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_ERROR);
-  CHECK(accuracy_of(&w).physics.reason == HAP_ACCURACY_ERROR);
-  CHECK(hap_session_set_force_error(w.session, 0.0) == HAP_OK);
-  cw_run(&w, 600);
-  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_ASKED);
-  cw_close(&w);
+  CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_UNTOLD);
+  CHECK(accuracy_of(w).physics.reason == HAP_ACCURACY_UNTOLD && accuracy_of(w).accuracy == 0.5);
+  stroke(w, 1000);
+  CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_ERROR);
+  CHECK(accuracy_of(w).physics.reason == HAP_ACCURACY_ERROR);
+  CHECK(hap_session_set_force_error(w->session, 0.0) == HAP_OK);
+  cw_run(w, 600);
+  CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_ASKED);
 }
 
 TEST(a_wanted_error_is_looked_for)
@@ -443,19 +428,17 @@ TEST(a_wanted_error_is_looked_for)
 
 TEST(without_a_wanted_error_it_goes_back)
 {
-  contact_world w;
-  open_row(&w, 4);
-  w.def.accuracy = 0.0;
-  w.expert.force_error_wanted = 0.02;
-  w.expert.lookback = 0.1;
-  REQUIRE(start_row(&w));
-  stroke(&w, 3000);
-  CHECK(accuracy_of(&w).accuracy > 0.0);
-  CHECK(hap_session_set_force_error(w.session, 0.0) == HAP_OK);
-  cw_run(&w, 60);
-  CHECK(accuracy_of(&w).accuracy == 0.0 && accuracy_of(&w).tick.accuracy == 0.0);
-  CHECK(accuracy_of(&w).tick.reason == HAP_ACCURACY_ASKED);
-  cw_close(&w);
+  contact_world *w = open_row(4);
+  w->def.accuracy = 0.0;
+  w->expert.force_error_wanted = 0.02;
+  w->expert.lookback = 0.1;
+  REQUIRE(start_row(w));
+  stroke(w, 3000);
+  CHECK(accuracy_of(w).accuracy > 0.0);
+  CHECK(hap_session_set_force_error(w->session, 0.0) == HAP_OK);
+  cw_run(w, 60);
+  CHECK(accuracy_of(w).accuracy == 0.0 && accuracy_of(w).tick.accuracy == 0.0);
+  CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_ASKED);
 }
 
 /* ---- budgets ---- */
@@ -500,34 +483,30 @@ static bool physics_at_least(const hap_accuracy_info *info)
 /* A tick of 0.5 us, which no processor makes: it goes down to the least, and says that this is not enough. */
 TEST(a_budget_turns_the_tick_back)
 {
-  contact_world w;
-  open_row(&w, 6);
-  w.def.haptic_hz = 20000.0;
-  w.expert.tick_share = 0.01;
-  hap_accuracy_info info = run_threads(&w, tick_at_least);
+  contact_world *w = open_row(6);
+  w->def.haptic_hz = 20000.0;
+  w->expert.tick_share = 0.01;
+  hap_accuracy_info info = run_threads(w, tick_at_least);
   CHECK(tick_at_least(&info) && info.tick.accuracy == 0.0 && info.tick.turns >= 2);
   CHECK(info.tick.share == 0.01 && info.tick.load > 0.19); /* all of them are over */
   CHECK(info.row_updates <= 300 && info.range_hops == 1);
   CHECK(info.physics.accuracy == 0.5 && info.physics.reason == HAP_ACCURACY_ASKED);
-  CHECK(hap_session_set_budget(w.session, 0.0, 0.0) == HAP_OK);
+  CHECK(hap_session_set_budget(w->session, 0.0, 0.0) == HAP_OK);
   hapi_clock_sleep_until(hapi_clock_now() + 500000000);
-  CHECK(hap_session_accuracy(w.session, &info, sizeof info) == HAP_OK);
+  CHECK(hap_session_accuracy(w->session, &info, sizeof info) == HAP_OK);
   CHECK(info.tick.accuracy == 0.5 && info.tick.reason == HAP_ACCURACY_ASKED);
-  cw_close(&w);
 }
 
 TEST(a_budget_turns_physics_back)
 {
-  contact_world w;
-  open_row(&w, 6);
-  w.def.model = HAP_MODEL_ACCELERANCE;
-  w.def.physics_hz = 1000.0;
-  w.expert.physics_share = 0.01;
-  hap_accuracy_info info = run_threads(&w, physics_at_least);
+  contact_world *w = open_row(6);
+  w->def.model = HAP_MODEL_ACCELERANCE;
+  w->def.physics_hz = 1000.0;
+  w->expert.physics_share = 0.01;
+  hap_accuracy_info info = run_threads(w, physics_at_least);
   CHECK(physics_at_least(&info) && info.physics.accuracy == 0.0);
   CHECK(info.iterations == 50 && info.edge_probes == 0);
   CHECK(info.tick.accuracy == 0.5);
-  cw_close(&w);
 }
 
 static bool some_seconds(const hap_accuracy_info *info)
@@ -538,16 +517,14 @@ static bool some_seconds(const hap_accuracy_info *info)
 
 TEST(a_budget_that_is_wide_leaves_all_as_it_is)
 {
-  contact_world w;
-  open_row(&w, 1);
-  w.def.haptic_hz = 100.0; /* 10 ms for a cube */
-  w.expert.tick_share = 1.0;
-  w.expert.physics_share = 1.0;
-  w.def.accuracy = 0.6;
-  hap_accuracy_info info = run_threads(&w, some_seconds);
+  contact_world *w = open_row(1);
+  w->def.haptic_hz = 100.0; /* 10 ms for a cube */
+  w->expert.tick_share = 1.0;
+  w->expert.physics_share = 1.0;
+  w->def.accuracy = 0.6;
+  hap_accuracy_info info = run_threads(w, some_seconds);
   CHECK(info.tick.accuracy == 0.6 && info.physics.accuracy == 0.6);
   CHECK(info.tick.reason == HAP_ACCURACY_ASKED && info.tick.load > 0.0 && info.tick.load < 1.0);
-  cw_close(&w);
 }
 
 /* ---- what cannot be ---- */
@@ -555,46 +532,42 @@ TEST(a_budget_that_is_wide_leaves_all_as_it_is)
 TEST(wrong_settings_are_refused_and_change_nothing)
 {
   const double wrong[] = {-0.1, 1.1, (double)NAN, (double)INFINITY};
-  contact_world w;
   hap_detail detail;
   hap_accuracy_info info;
-  open_row(&w, 1);
-  REQUIRE(start_row(&w));
+  contact_world *w = open_row(1);
+  REQUIRE(start_row(w));
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
-    CHECK(hap_session_set_accuracy(w.session, wrong[i]) == HAP_ERROR_ARGUMENT);
-    CHECK(hap_session_set_force_error(w.session, wrong[i]) == HAP_ERROR_ARGUMENT);
-    CHECK(hap_session_set_budget(w.session, wrong[i], 0.0) == HAP_ERROR_ARGUMENT);
-    CHECK(hap_session_set_budget(w.session, 0.0, wrong[i]) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_set_accuracy(w->session, wrong[i]) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_set_force_error(w->session, wrong[i]) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_set_budget(w->session, wrong[i], 0.0) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_set_budget(w->session, 0.0, wrong[i]) == HAP_ERROR_ARGUMENT);
   }
-  CHECK(hap_session_set_force_error(w.session, 0.05) == HAP_ERROR_UNSUPPORTED);
-  CHECK(hap_session_detail(w.session, &detail) == HAP_OK &&
+  CHECK(hap_session_set_force_error(w->session, 0.05) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_detail(w->session, &detail) == HAP_OK &&
         strstr(detail.text, "lookback") != NULL);
-  CHECK(hap_session_set_budget(w.session, 0.5, 0.0) == HAP_ERROR_UNSUPPORTED);
-  CHECK(hap_session_detail(w.session, &detail) == HAP_OK &&
+  CHECK(hap_session_set_budget(w->session, 0.5, 0.0) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_detail(w->session, &detail) == HAP_OK &&
         strstr(detail.text, "LOCKSTEP") != NULL);
   CHECK(hap_session_set_accuracy(NULL, 0.5) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_set_force_error(NULL, 0.5) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_set_budget(NULL, 0.5, 0.5) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_accuracy(NULL, &info, sizeof info) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_accuracy(w.session, NULL, sizeof info) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_accuracy(w.session, &info, 3) == HAP_ERROR_ARGUMENT);
-  cw_run(&w, 120);
-  CHECK(accuracy_of(&w).accuracy == 0.5);
+  CHECK(hap_session_accuracy(w->session, NULL, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_accuracy(w->session, &info, 3) == HAP_ERROR_ARGUMENT);
+  cw_run(w, 120);
+  CHECK(accuracy_of(w).accuracy == 0.5);
   CHECK(hap_accuracy_reason_text((hap_accuracy_reason)99)[0] == '\0');
-  cw_close(&w);
 }
 
 TEST(an_older_caller_gets_what_it_has_room_for)
 {
-  contact_world w;
   char room[sizeof(hap_accuracy_info)];
-  open_row(&w, 1);
-  REQUIRE(start_row(&w));
-  cw_run(&w, 60);
+  contact_world *w = open_row(1);
+  REQUIRE(start_row(w));
+  cw_run(w, 60);
   memset(room, 0x5a, sizeof room);
-  CHECK(hap_session_accuracy(w.session, (hap_accuracy_info *)(void *)room, 24) == HAP_OK);
+  CHECK(hap_session_accuracy(w->session, (hap_accuracy_info *)(void *)room, 24) == HAP_OK);
   uint32_t size;
   memcpy(&size, room, sizeof size);
   CHECK(size == 24 && room[24] == 0x5a);
-  cw_close(&w);
 }

@@ -12,16 +12,18 @@
 #define MS 1e-3
 
 static hapi_tick_load told; /* by the loop, so far */
+static hap_session *session;
 
-static hapi_physics *begin(test_world *w)
+static hapi_physics *begin(void)
 {
   static const double edges[3] = {0.1, 0.1, 0.1};
+  test_world *w = world_new(0.0, 20);
   told = (hapi_tick_load){0};
-  world_open(w, 0.0, 20);
   (void)world_add_box(w, edges, 1.0, 0.0, 0.0, 0.0);
   if (world_create_session(w, NULL) < HAP_OK || hap_session_start(w->session) < HAP_OK) {
     return NULL;
   }
+  session = w->session;
   return world_physics(w);
 }
 
@@ -60,20 +62,17 @@ static int tell_cycles(hapi_physics *physics, int cycles, double seconds)
 
 TEST(ticks_that_fit_change_nothing)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   for (int i = 0; i < 100; ++i) {
     CHECK(tell_ticks(physics, 100, 0.09, 4) == 50); /* 4 % are over: somebody else had the core */
   }
-  world_close(&w);
 }
 
 TEST(a_mean_that_is_over_turns_the_tick)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 99, 0.11, 0) == 50); /* not looked at yet */
@@ -83,43 +82,37 @@ TEST(a_mean_that_is_over_turns_the_tick)
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 0);
   CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_LEAST);
   CHECK_NEAR(physics->counts.own.accuracy.tick.load, 0.3, 1e-9);
-  world_close(&w);
 }
 
 /* Where nothing is left to be turned back it is said all the same. */
 TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, SHARE);
-  CHECK(hap_session_set_accuracy(w.session, 0.0) == HAP_OK);
+  CHECK(hap_session_set_accuracy(session, 0.0) == HAP_OK);
   CHECK(tell_ticks(physics, 100, 0.09, 0) == 0);
   CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_ASKED);
   CHECK(tell_ticks(physics, 100, 0.11, 0) == 0);
   CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_LEAST);
   CHECK(tell_cycles(physics, 4, 5.5 * MS) == 0);
   CHECK(physics->counts.own.accuracy.physics.reason == HAP_ACCURACY_LEAST);
-  world_close(&w);
 }
 
 TEST(many_ticks_that_are_over_turn_it_as_well)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
   CHECK_NEAR(physics->counts.own.accuracy.tick.load, SHARE * 0.06 / 0.05, 1e-9);
   CHECK(tell_ticks(physics, 16, 0.05, 7) == 40); /* too few of both */
   CHECK(tell_ticks(physics, 1, 0.05, 7) == 10);  /* most of them: at once */
-  world_close(&w);
 }
 
 TEST(room_brings_it_back_as_far_as_was_asked)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 20);
@@ -134,32 +127,28 @@ TEST(room_brings_it_back_as_far_as_was_asked)
   for (int i = 0; i < 100; ++i) {
     CHECK(tell_ticks(physics, 100, 0.07, 0) == 50);
   }
-  world_close(&w);
 }
 
 TEST(what_is_asked_for_later_waits_for_the_budget)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.11, 0) == 40);
-  CHECK(hap_session_set_accuracy(w.session, 0.9) == HAP_OK);
+  CHECK(hap_session_set_accuracy(session, 0.9) == HAP_OK);
   CHECK(tell_ticks(physics, 100, 0.09, 0) == 40);
   CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 90);
-  CHECK(hap_session_set_accuracy(w.session, 0.3) == HAP_OK);
+  CHECK(hap_session_set_accuracy(session, 0.3) == HAP_OK);
   CHECK(tell_ticks(physics, 100, 0.09, 0) == 30);
   set_shares(physics, 0.0, 0.0);
-  CHECK(hap_session_set_accuracy(w.session, 0.7) == HAP_OK);
+  CHECK(hap_session_set_accuracy(session, 0.7) == HAP_OK);
   CHECK(tell_ticks(physics, 100, 0.5, 0) == 70);
-  world_close(&w);
 }
 
 /* 20 Hz: a tenth is 5 ms. */
 TEST(cycles_that_are_over_turn_physics)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   set_shares(physics, 0.0, SHARE);
   CHECK(tell_cycles(physics, 40, 4.5 * MS) == 50);
@@ -169,13 +158,11 @@ TEST(cycles_that_are_over_turn_physics)
   CHECK(physics->counts.own.accuracy.physics.reason == HAP_ACCURACY_BUDGET);
   CHECK(tell_cycles(physics, 400, 1.0 * MS) == 50);
   CHECK(physics->dial.sides[HAPI_DIAL_TICK].percent == 50);
-  world_close(&w);
 }
 
 TEST(looking_back_has_what_is_left)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   CHECK(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s) == HUGE_VAL);
   set_shares(physics, 0.0, SHARE);
@@ -187,7 +174,6 @@ TEST(looking_back_has_what_is_left)
   CHECK_NEAR(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s), 3.0 * MS, 1e-6);
   hapi_dial_note(&physics->dial, 6.0 * MS, 0.0);
   CHECK(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s) == 0.0);
-  world_close(&w);
 }
 
 /* ---- a wanted error ---- */
@@ -207,20 +193,17 @@ static int tell_error(hapi_physics *physics, int windows, double error)
 
 TEST(an_error_as_wanted_turns_nothing)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   atomic_store(&physics->dial.force_error, WANTED);
   CHECK(tell_error(physics, 100, 0.99 * WANTED) == 50);
   CHECK(tell_error(physics, 100, 0.7 * WANTED) == 50);
   CHECK(tell_error(physics, 100, 0.4 * WANTED) == 50);
-  world_close(&w);
 }
 
 TEST(a_larger_error_turns_both_up_and_a_small_one_down)
 {
-  test_world w;
-  hapi_physics *physics = begin(&w);
+  hapi_physics *physics = begin();
   REQUIRE(physics != NULL);
   atomic_store(&physics->dial.force_error, WANTED);
   CHECK(tell_error(physics, 1, 1.1 * WANTED) == 60);
@@ -230,5 +213,4 @@ TEST(a_larger_error_turns_both_up_and_a_small_one_down)
   CHECK(physics->counts.own.accuracy.tick.reason == HAP_ACCURACY_ERROR);
   CHECK(tell_error(physics, 2, 0.2 * WANTED) == 70); /* not for long enough */
   CHECK(tell_error(physics, 40, 0.2 * WANTED) < 70);
-  world_close(&w);
 }

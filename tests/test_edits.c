@@ -689,23 +689,23 @@ static const dTriIndex triangles[6] = {0, 1, 2, 0, 2, 3};
 /* Height of a cube of 0.1 m that lies on a mesh which is lowered without a word. */
 static double height_after(bool told)
 {
-  stage s;
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dWorldSetGravity(s.world, 0.0, 0.0, -9.81);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dWorldSetGravity(s->world, 0.0, 0.0, -9.81);
   for (int i = 0; i < 4; ++i) {
     corners[i][2] = 0.0;
   }
   dTriMeshDataID data = dGeomTriMeshDataCreate();
   dGeomTriMeshDataBuildDouble(data, corners, sizeof corners[0], 4, triangles, 6,
                               3 * sizeof triangles[0]);
-  dGeomID mesh = dCreateTriMesh(s.space, data, NULL, NULL, NULL);
-  dBodySetPosition(s.cube, 0.0, 0.0, 0.05);
+  dGeomID mesh = dCreateTriMesh(s->space, data, NULL, NULL, NULL);
+  dBodySetPosition(s->cube, 0.0, 0.0, 0.05);
   double height = (double)NAN;
-  if (stage_create(&s) == HAP_OK) {
-    (void)add_hand(&s, -0.07);
-    CHECK(hap_session_start(s.session) == HAP_OK && hap_session_advance(s.session, 300) == HAP_OK);
-    CHECK(stats_of(&s).model.range_bodies == 1);
-    CHECK_NEAR(dBodyGetPosition(s.cube)[2], 0.05, 1e-3);
+  if (stage_create(s) == HAP_OK) {
+    (void)add_hand(s, -0.07);
+    CHECK(hap_session_start(s->session) == HAP_OK &&
+          hap_session_advance(s->session, 300) == HAP_OK);
+    CHECK(stats_of(s).model.range_bodies == 1);
+    CHECK_NEAR(dBodyGetPosition(s->cube)[2], 0.05, 1e-3);
     for (int i = 0; i < 4; ++i) {
       corners[i][2] = -0.03;
     }
@@ -713,12 +713,12 @@ static double height_after(bool told)
                                 3 * sizeof triangles[0]);
     dGeomTriMeshSetData(mesh, data);
     if (told) {
-      CHECK(hap_session_forget_geom(s.session, mesh) == HAP_OK);
+      CHECK(hap_session_forget_geom(s->session, mesh) == HAP_OK);
     }
-    CHECK(hap_session_advance(s.session, 1500) == HAP_OK);
-    height = dBodyGetPosition(s.cube)[2];
+    CHECK(hap_session_advance(s->session, 1500) == HAP_OK);
+    height = dBodyGetPosition(s->cube)[2];
   }
-  stage_end(&s);
+  stage_end(s);
   dGeomTriMeshDataDestroy(data);
   return height;
 }

@@ -49,14 +49,14 @@ static void wish(contact_world *w, hap_effect effect, hap_effect_wish wished)
 }
 
 /* A cube on a floor, and a hand that comes from its left. */
-static bool open_on_floor(contact_world *w, int cubes)
+static contact_world *open_on_floor(int cubes)
 {
-  cw_open(w, CW_GRAVITY);
+  contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   for (int i = 0; i < cubes; ++i) {
     cw_add_cube(w, 0.2, EDGE, i * (EDGE + 1e-4), 0.0, EDGE / 2);
   }
-  return true;
+  return w;
 }
 
 static bool start_left(contact_world *w, double gap)
@@ -96,50 +96,45 @@ TEST(a_free_body_alone_calls_for_nothing)
 
 TEST(far_away_nothing_is_on)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 2));
-  w.research.guard = HAP_GUARD_ON;
-  REQUIRE(cw_start(&w, 0.0, 0.0, 5.0));
-  cw_run(&w, 60);
+  contact_world *w = open_on_floor(2);
+  w->research.guard = HAP_GUARD_ON;
+  REQUIRE(cw_start(w, 0.0, 0.0, 5.0));
+  cw_run(w, 60);
   for (int i = HAP_EFFECT_TESTING; i <= HAP_EFFECT_PASSES; ++i) {
     hap_effect effect = (hap_effect)i;
-    CHECK(effect == HAP_EFFECT_CROSS || is_off(&w, effect, HAP_REASON_FAR));
+    CHECK(effect == HAP_EFFECT_CROSS || is_off(w, effect, HAP_REASON_FAR));
   }
-  CHECK(is_off(&w, HAP_EFFECT_JOINTS, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_RANGE, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_RESTITUTION, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_FRICTION, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_GYRO, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_FAR));
-  CHECK(is_off(&w, HAP_EFFECT_OBSERVER, HAP_REASON_FAR));
-  CHECK(cw_stats(&w).contact.passes == 0);
-  cw_close(&w);
+  CHECK(is_off(w, HAP_EFFECT_JOINTS, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_RANGE, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_RESTITUTION, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_FRICTION, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_GYRO, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_FAR));
+  CHECK(is_off(w, HAP_EFFECT_OBSERVER, HAP_REASON_FAR));
+  CHECK(cw_stats(w).contact.passes == 0);
 }
 
 TEST(a_row_on_a_floor_calls_for_contacts_passes_and_range)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 3) && start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is_called(&w, HAP_EFFECT_CONTACTS) && look(&w, HAP_EFFECT_CONTACTS).on == 3);
-  CHECK(is_called(&w, HAP_EFFECT_PASSES));
-  CHECK(is_called(&w, HAP_EFFECT_RANGE) && look(&w, HAP_EFFECT_RANGE).on == 2);
-  CHECK(is_off(&w, HAP_EFFECT_RESTITUTION, HAP_REASON_NO_BOUNCE));
-  CHECK(is_off(&w, HAP_EFFECT_OBSERVER, HAP_REASON_MEASURING));
-  CHECK(cw_stats(&w).contact.passes > 8);
-  cw_close(&w);
+  contact_world *w = open_on_floor(3);
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is_called(w, HAP_EFFECT_CONTACTS) && look(w, HAP_EFFECT_CONTACTS).on == 3);
+  CHECK(is_called(w, HAP_EFFECT_PASSES));
+  CHECK(is_called(w, HAP_EFFECT_RANGE) && look(w, HAP_EFFECT_RANGE).on == 2);
+  CHECK(is_off(w, HAP_EFFECT_RESTITUTION, HAP_REASON_NO_BOUNCE));
+  CHECK(is_off(w, HAP_EFFECT_OBSERVER, HAP_REASON_MEASURING));
+  CHECK(cw_stats(w).contact.passes > 8);
 }
 
 TEST(surfaces_that_give_back_speed_call_for_restitution)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 1));
-  w.surface.mode |= dContactBounce;
-  w.surface.bounce = 0.4;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is_called(&w, HAP_EFFECT_RESTITUTION));
-  cw_close(&w);
+  contact_world *w = open_on_floor(1);
+  w->surface.mode |= dContactBounce;
+  w->surface.bounce = 0.4;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is_called(w, HAP_EFFECT_RESTITUTION));
 }
 
 static dBodyID add_hinged_door(contact_world *w)
@@ -152,12 +147,12 @@ static dBodyID add_hinged_door(contact_world *w)
   return door;
 }
 
-static bool open_door(contact_world *w)
+static contact_world *open_door(void)
 {
-  cw_open(w, 0.0);
+  contact_world *w = cw_new(0.0);
   add_hinged_door(w);
   cw_move_hand(w, 0.0, 0.1, 0.0);
-  return true;
+  return w;
 }
 
 static bool start_at_door(contact_world *w)
@@ -167,12 +162,11 @@ static bool start_at_door(contact_world *w)
 
 TEST(a_hinge_calls_for_joints)
 {
-  contact_world w;
-  REQUIRE(open_door(&w) && start_at_door(&w));
-  cw_run(&w, 160);
-  CHECK(is_called(&w, HAP_EFFECT_JOINTS) && look(&w, HAP_EFFECT_JOINTS).on == 1);
-  CHECK(is_called(&w, HAP_EFFECT_GYRO)); /* a box that spins by now */
-  cw_close(&w);
+  contact_world *w = open_door();
+  REQUIRE(start_at_door(w));
+  cw_run(w, 160);
+  CHECK(is_called(w, HAP_EFFECT_JOINTS) && look(w, HAP_EFFECT_JOINTS).on == 1);
+  CHECK(is_called(w, HAP_EFFECT_GYRO)); /* a box that spins by now */
 }
 
 TEST(why_a_body_has_no_gyroscopic_term)
@@ -210,14 +204,12 @@ TEST(why_a_body_has_no_gyroscopic_term)
 
 TEST(friction_calls_for_friction_and_for_torque)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 1));
-  w.hand_def.friction = 0.5;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is_called(&w, HAP_EFFECT_FRICTION));
-  CHECK(is_called(&w, HAP_EFFECT_TORQUE)); /* this hand turns */
-  cw_close(&w);
+  contact_world *w = open_on_floor(1);
+  w->hand_def.friction = 0.5;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is_called(w, HAP_EFFECT_FRICTION));
+  CHECK(is_called(w, HAP_EFFECT_TORQUE)); /* this hand turns */
 }
 
 TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
@@ -229,25 +221,22 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
                                   -.02, .02,  -.02, .02,  .02,  .02,  .02,  .02};
   static const unsigned polygons[] = {4, 4, 5, 7, 6, 4, 0, 2, 3, 1, 4, 2, 6, 7, 3,
                                       4, 0, 1, 5, 4, 4, 1, 3, 7, 5, 4, 0, 4, 6, 2};
-  contact_world w;
-  cw_open(&w, 0.0);
-  cw_add_floor(&w);
-  REQUIRE(cw_start(&w, 0.0, 0.0, HAND + 0.002));
-  cw_run(&w, 60);
-  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_FLAT));
-  CHECK(hap_session_set_effect(w.session, HAP_EFFECT_SHAPE, HAP_EFFECT_ON) == HAP_OK);
-  cw_run(&w, 60);
-  CHECK(is(&w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-  cw_close(&w);
+  contact_world *w = cw_new(0.0);
+  cw_add_floor(w);
+  REQUIRE(cw_start(w, 0.0, 0.0, HAND + 0.002));
+  cw_run(w, 60);
+  CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_FLAT));
+  CHECK(hap_session_set_effect(w->session, HAP_EFFECT_SHAPE, HAP_EFFECT_ON) == HAP_OK);
+  cw_run(w, 60);
+  CHECK(is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
 
   dMass m;
-  cw_open(&w, 0.0);
+  w = cw_new(0.0);
   dMassSetBoxTotal(&m, 0.1, 0.04, 0.04, 0.04);
-  cw_add(&w, dCreateConvex(w.space, planes, 6, points, 8, polygons), &m, 0.0, 0.0, 0.0);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.02 + HAND + 0.002));
-  cw_run(&w, 60);
-  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
-  cw_close(&w);
+  cw_add(w, dCreateConvex(w->space, planes, 6, points, 8, polygons), &m, 0.0, 0.0, 0.0);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.02 + HAND + 0.002));
+  cw_run(w, 60);
+  CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
 }
 
 TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
@@ -255,51 +244,42 @@ TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
   static const double corners[8][3] = {
       {-HAND, -HAND, -HAND}, {HAND, -HAND, -HAND}, {-HAND, HAND, -HAND}, {HAND, HAND, -HAND},
       {-HAND, -HAND, HAND},  {HAND, -HAND, HAND},  {-HAND, HAND, HAND},  {HAND, HAND, HAND}};
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 1));
-  w.hand_def.hull_xyz = &corners[0][0];
-  w.hand_def.hull_points = 8;
-  w.hand_def.radius = 0.001;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(cw_stats(&w).loop.contact_ticks > 0);
-  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
-  cw_close(&w);
+  contact_world *w = open_on_floor(1);
+  w->hand_def.hull_xyz = &corners[0][0];
+  w->hand_def.hull_points = 8;
+  w->hand_def.radius = 0.001;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(cw_stats(w).loop.contact_ticks > 0);
+  CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
 }
 
 TEST(the_range_that_has_no_room_is_told)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 4));
-  w.def.max_bodies = 2;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is(&w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_PARTLY, HAP_REASON_OUTSIDE));
-  cw_close(&w);
+  contact_world *w = open_on_floor(4);
+  w->def.max_bodies = 2;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_PARTLY, HAP_REASON_OUTSIDE));
 }
 
 TEST(a_coupling_of_its_own_is_a_reason)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 1));
-  w.hand_expert.coupling = HAP_COUPLING_DIRECT;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_COUPLING));
-  cw_close(&w);
+  contact_world *w = open_on_floor(1);
+  w->hand_expert.coupling = HAP_COUPLING_DIRECT;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is_off(w, HAP_EFFECT_PROXY, HAP_REASON_COUPLING));
 }
 
 TEST(what_the_device_can_hold_decides_on_the_proxy)
 {
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    REQUIRE(open_on_floor(&w, 1));
-    w.hand_expert.coupling_stiffness = i == 0 ? 5000.0 : 500.0;
-    REQUIRE(start_left(&w, 0.0));
-    cw_run(&w, 101);
-    CHECK(i == 0 ? is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_WITHIN)
-                 : is_called(&w, HAP_EFFECT_PROXY));
-    cw_close(&w);
+    contact_world *w = open_on_floor(1);
+    w->hand_expert.coupling_stiffness = i == 0 ? 5000.0 : 500.0;
+    REQUIRE(start_left(w, 0.0));
+    cw_run(w, 101);
+    CHECK(i == 0 ? is_off(w, HAP_EFFECT_PROXY, HAP_REASON_WITHIN) : is_called(w, HAP_EFFECT_PROXY));
   }
 }
 
@@ -332,15 +312,13 @@ TEST(a_free_body_needs_no_testing_simulation_and_answers_alike)
 
 TEST(a_body_on_a_floor_is_tested)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 2));
-  w.def.model = HAP_MODEL_ACCELERANCE;
-  REQUIRE(start_left(&w, 0.002));
-  cw_run(&w, 60);
-  CHECK(is_called(&w, HAP_EFFECT_TESTING));
-  CHECK(is_off(&w, HAP_EFFECT_GYRO, HAP_REASON_NOT_IN_MODEL));
-  CHECK(is_off(&w, HAP_EFFECT_PROXY, HAP_REASON_NOT_IN_MODEL));
-  cw_close(&w);
+  contact_world *w = open_on_floor(2);
+  w->def.model = HAP_MODEL_ACCELERANCE;
+  REQUIRE(start_left(w, 0.002));
+  cw_run(w, 60);
+  CHECK(is_called(w, HAP_EFFECT_TESTING));
+  CHECK(is_off(w, HAP_EFFECT_GYRO, HAP_REASON_NOT_IN_MODEL));
+  CHECK(is_off(w, HAP_EFFECT_PROXY, HAP_REASON_NOT_IN_MODEL));
 }
 
 TEST(bodies_of_one_island_call_for_cross_accelerance)
@@ -407,36 +385,32 @@ TEST(contacts_and_joints_that_are_off_are_not_in_the_loop)
 TEST(what_the_loop_does_not_simulate_is_measured_or_nothing_is_known_of_it)
 {
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    REQUIRE(open_door(&w));
-    wish(&w, HAP_EFFECT_JOINTS, HAP_EFFECT_OFF);
-    wish(&w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_OFF);
-    REQUIRE(start_at_door(&w));
-    cw_run(&w, 60);
-    hap_stats stats = cw_stats(&w);
+    contact_world *w = open_door();
+    wish(w, HAP_EFFECT_JOINTS, HAP_EFFECT_OFF);
+    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_OFF);
+    REQUIRE(start_at_door(w));
+    cw_run(w, 60);
+    hap_stats stats = cw_stats(w);
     CHECK(stats.model.range_bodies == 0 && stats.model.range_joints == 0);
     CHECK((stats.model.measured_bodies == 1) == (i == 0) && (stats.probes.steps > 0) == (i == 0));
-    CHECK(is(&w, HAP_EFFECT_JOINTS, HAP_EFFECT_IS_OFF, HAP_REASON_ASKED));
-    CHECK(i == 0 ? is_called(&w, HAP_EFFECT_TESTING)
-                 : is_off(&w, HAP_EFFECT_TESTING, HAP_REASON_ASKED));
-    cw_close(&w);
+    CHECK(is(w, HAP_EFFECT_JOINTS, HAP_EFFECT_IS_OFF, HAP_REASON_ASKED));
+    CHECK(i == 0 ? is_called(w, HAP_EFFECT_TESTING)
+                 : is_off(w, HAP_EFFECT_TESTING, HAP_REASON_ASKED));
   }
 }
 
 TEST(the_range_that_is_off_ends_at_the_neighbours)
 {
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    REQUIRE(open_on_floor(&w, 4));
-    wish(&w, HAP_EFFECT_RANGE, i == 0 ? HAP_EFFECT_OFF : HAP_EFFECT_ON);
-    cw_add_cube(&w, 0.2, EDGE, 2.0, 2.0, EDGE / 2); /* far from all */
-    w.def.physics_hz = 50.0;
-    REQUIRE(start_left(&w, 0.002));
-    cw_run(&w, 60);
-    CHECK(cw_stats(&w).model.range_bodies == (i == 0 ? 1u : 5u));
-    CHECK(i == 0 ? is_off(&w, HAP_EFFECT_RANGE, HAP_REASON_ASKED)
-                 : is(&w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-    cw_close(&w);
+    contact_world *w = open_on_floor(4);
+    wish(w, HAP_EFFECT_RANGE, i == 0 ? HAP_EFFECT_OFF : HAP_EFFECT_ON);
+    cw_add_cube(w, 0.2, EDGE, 2.0, 2.0, EDGE / 2); /* far from all */
+    w->def.physics_hz = 50.0;
+    REQUIRE(start_left(w, 0.002));
+    cw_run(w, 60);
+    CHECK(cw_stats(w).model.range_bodies == (i == 0 ? 1u : 5u));
+    CHECK(i == 0 ? is_off(w, HAP_EFFECT_RANGE, HAP_REASON_ASKED)
+                 : is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
   }
 }
 
@@ -445,14 +419,12 @@ TEST(passes_that_are_off_come_with_the_syncs)
   static const hap_effect_wish wishes[] = {HAP_EFFECT_OFF, HAP_EFFECT_AUTO, HAP_EFFECT_ON};
   uint64_t passes[3];
   for (int i = 0; i < 3; ++i) {
-    contact_world w;
-    REQUIRE(open_on_floor(&w, 1));
-    wish(&w, HAP_EFFECT_PASSES, wishes[i]);
-    REQUIRE(start_left(&w, 0.002));
-    cw_run(&w, 500);
-    passes[i] = cw_stats(&w).contact.passes;
-    CHECK(fabs(w.position[0][2] - EDGE / 2) < 1e-3); /* the floor holds all the same */
-    cw_close(&w);
+    contact_world *w = open_on_floor(1);
+    wish(w, HAP_EFFECT_PASSES, wishes[i]);
+    REQUIRE(start_left(w, 0.002));
+    cw_run(w, 500);
+    passes[i] = cw_stats(w).contact.passes;
+    CHECK(fabs(w->position[0][2] - EDGE / 2) < 1e-3); /* the floor holds all the same */
   }
   CHECK(passes[0] >= 8 && passes[0] <= 12); /* 0.5 s at 20 Hz */
   CHECK(passes[1] >= 90 && passes[1] == passes[2]);
@@ -578,18 +550,15 @@ TEST(the_proxy_can_be_had_and_left_out)
 {
   static const hap_effect_wish wishes[] = {HAP_EFFECT_OFF, HAP_EFFECT_ON};
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
     hap_pointer_state state;
-    REQUIRE(open_on_floor(&w, 1));
-    w.hand_expert.coupling_stiffness = i == 0 ? 500.0 : 5000.0; /* auto would do the other */
-    wish(&w, HAP_EFFECT_PROXY, wishes[i]);
-    REQUIRE(start_left(&w, 0.0));
-    cw_run(&w, 101);
-    REQUIRE(hap_pointer_get(w.session, w.hand, &state, sizeof state) == HAP_OK);
+    contact_world *w = open_on_floor(1);
+    w->hand_expert.coupling_stiffness = i == 0 ? 500.0 : 5000.0; /* auto would do the other */
+    wish(w, HAP_EFFECT_PROXY, wishes[i]);
+    REQUIRE(start_left(w, 0.0));
+    cw_run(w, 101);
+    REQUIRE(hap_pointer_get(w->session, w->hand, &state, sizeof state) == HAP_OK);
     CHECK(state.coupling == (uint32_t)(i == 0 ? HAP_COUPLING_DIRECT : HAP_COUPLING_PROXY));
-    CHECK(
-        is(&w, HAP_EFFECT_PROXY, i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-    cw_close(&w);
+    CHECK(is(w, HAP_EFFECT_PROXY, i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
   }
 }
 
@@ -597,30 +566,28 @@ TEST(the_proxy_can_be_had_and_left_out)
 
 TEST(wishes_can_change_from_sync_to_sync)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 2));
-  w.hand_def.friction = 0.3;
-  w.hand_expert.coupling_stiffness = 5000.0;
-  w.research.guard = HAP_GUARD_ON;
-  REQUIRE(start_left(&w, 0.0));
+  contact_world *w = open_on_floor(2);
+  w->hand_def.friction = 0.3;
+  w->hand_expert.coupling_stiffness = 5000.0;
+  w->research.guard = HAP_GUARD_ON;
+  REQUIRE(start_left(w, 0.0));
   for (int round = 0; round < 3; ++round) {
     hap_effect_wish wished = (hap_effect_wish)(round == 2 ? HAP_EFFECT_AUTO : round + 1);
     for (int i = 0; i < HAP_EFFECT_RECORDING; ++i) {
       if (i != HAP_EFFECT_CROSS) {
-        CHECK(hap_session_set_effect(w.session, (hap_effect)i, wished) == HAP_OK);
-        CHECK(look(&w, (hap_effect)i).wish == (uint32_t)wished);
+        CHECK(hap_session_set_effect(w->session, (hap_effect)i, wished) == HAP_OK);
+        CHECK(look(w, (hap_effect)i).wish == (uint32_t)wished);
       }
     }
-    cw_run(&w, 101);
+    cw_run(w, 101);
     bool off = wished == HAP_EFFECT_OFF;
-    CHECK((look(&w, HAP_EFFECT_OBSERVER).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK((look(&w, HAP_EFFECT_FRICTION).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK((look(&w, HAP_EFFECT_CONTACTS).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((look(w, HAP_EFFECT_OBSERVER).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((look(w, HAP_EFFECT_FRICTION).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((look(w, HAP_EFFECT_CONTACTS).state == HAP_EFFECT_IS_OFF) == off);
     CHECK(wished == HAP_EFFECT_AUTO || /* which stays one as long as it is touched */
-          (look(&w, HAP_EFFECT_PROXY).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK(isfinite(w.force[0]) && cw_stats(&w).faults.fault == HAP_FAULT_NONE);
+          (look(w, HAP_EFFECT_PROXY).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK(isfinite(w->force[0]) && cw_stats(w).faults.fault == HAP_FAULT_NONE);
   }
-  cw_close(&w);
 }
 
 static bool says(const hap_detail *detail, const char *what)
@@ -645,51 +612,48 @@ TEST(what_a_model_cannot_do_is_refused_with_what_to_do)
                {HAP_EFFECT_TESTING, HAP_EFFECT_ON, HAP_MODEL_SINGLE, "use model contact"},
                {HAP_EFFECT_RECORDING, HAP_EFFECT_ON, HAP_MODEL_CONTACT, "hap_session_record"}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    contact_world w;
     hap_detail detail = {""};
     CHECK(hap_effect_check(cases[i].effect, cases[i].wish, cases[i].model, &detail) ==
           HAP_ERROR_UNSUPPORTED);
     CHECK(says(&detail, cases[i].text) && says(&detail, hap_effect_name(cases[i].effect)));
-    cw_open(&w, 0.0);
-    w.def.model = cases[i].model;
-    REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
-    uint32_t before = look(&w, cases[i].effect).wish;
-    CHECK(hap_session_set_effect(w.session, cases[i].effect, cases[i].wish) ==
+    contact_world *w = cw_new(0.0);
+    w->def.model = cases[i].model;
+    REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+    uint32_t before = look(w, cases[i].effect).wish;
+    CHECK(hap_session_set_effect(w->session, cases[i].effect, cases[i].wish) ==
           HAP_ERROR_UNSUPPORTED);
-    CHECK(hap_session_detail(w.session, &detail) == HAP_OK && says(&detail, cases[i].text));
-    CHECK(look(&w, cases[i].effect).wish == before);
-    hap_session_destroy(w.session);
-    w.session = NULL;
-    wish(&w, cases[i].effect, cases[i].wish);
-    w.ode.world = w.world;
-    CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_UNSUPPORTED);
+    CHECK(hap_session_detail(w->session, &detail) == HAP_OK && says(&detail, cases[i].text));
+    CHECK(look(w, cases[i].effect).wish == before);
+    hap_session_destroy(w->session);
+    w->session = NULL;
+    wish(w, cases[i].effect, cases[i].wish);
+    w->ode.world = w->world;
+    CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_UNSUPPORTED);
     CHECK(says(&detail, cases[i].text));
-    cw_close(&w);
   }
 }
 
 TEST(bad_arguments_change_nothing)
 {
-  contact_world w;
   hap_effect_info info;
   hap_detail detail = {""};
-  cw_open(&w, 0.0);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.0));
+  contact_world *w = cw_new(0.0);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
   CHECK(hap_session_set_effect(NULL, HAP_EFFECT_GYRO, HAP_EFFECT_ON) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_set_effect(w.session, (hap_effect)HAP_EFFECTS, HAP_EFFECT_ON) ==
+  CHECK(hap_session_set_effect(w->session, (hap_effect)HAP_EFFECTS, HAP_EFFECT_ON) ==
         HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_set_effect(w.session, (hap_effect)-1, HAP_EFFECT_ON) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_set_effect(w.session, HAP_EFFECT_GYRO, (hap_effect_wish)3) ==
+  CHECK(hap_session_set_effect(w->session, (hap_effect)-1, HAP_EFFECT_ON) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_set_effect(w->session, HAP_EFFECT_GYRO, (hap_effect_wish)3) ==
         HAP_ERROR_ARGUMENT);
   /* this guard only measures */
-  CHECK(hap_session_set_effect(w.session, HAP_EFFECT_OBSERVER, HAP_EFFECT_ON) ==
+  CHECK(hap_session_set_effect(w->session, HAP_EFFECT_OBSERVER, HAP_EFFECT_ON) ==
         HAP_ERROR_UNSUPPORTED);
   memset(&info, 0xee, sizeof info);
-  CHECK(hap_session_effects(w.session, &info, HAP_EFFECTS + 1, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_effects(w->session, &info, HAP_EFFECTS + 1, sizeof info) == HAP_ERROR_ARGUMENT);
   CHECK(info.size == 0xeeeeeeeeu); /* nothing is changed */
-  CHECK(hap_session_effects(w.session, NULL, 1, sizeof info) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_effects(w.session, &info, 1, 2) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_effects(w.session, &info, 1, sizeof info) == HAP_OK && info.effect == 0);
+  CHECK(hap_session_effects(w->session, NULL, 1, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_effects(w->session, &info, 1, 2) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_effects(w->session, &info, 1, sizeof info) == HAP_OK && info.effect == 0);
   CHECK(hap_effect_name((hap_effect)HAP_EFFECTS) == NULL &&
         hap_effect_name((hap_effect)-1) == NULL);
   CHECK(hap_effect_reason_text((hap_effect_reason)1000)[0] == '\0');
@@ -697,61 +661,54 @@ TEST(bad_arguments_change_nothing)
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     CHECK(hap_effect_name((hap_effect)i) != NULL && hap_effect_text((hap_effect)i) != NULL);
   }
-  hap_session_destroy(w.session);
-  w.session = NULL;
-  w.expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECTS);
-  CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
+  hap_session_destroy(w->session);
+  w->session = NULL;
+  w->expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECTS);
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
   CHECK(says(&detail, "effects_off"));
-  w.expert.effects_off = w.expert.effects_on = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
-  CHECK(hap_session_create(&w.def, &w.ode, &w.session, &detail) == HAP_ERROR_ARGUMENT);
+  w->expert.effects_off = w->expert.effects_on = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
   CHECK(says(&detail, "gyro is in effects_on and in effects_off"));
-  cw_close(&w);
 }
 
 TEST(a_wish_outlives_a_model_that_cannot_fulfil_it)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 1));
-  wish(&w, HAP_EFFECT_SHAPE, HAP_EFFECT_ON);
-  REQUIRE(start_left(&w, 0.002));
-  CHECK(hap_session_set_model(w.session, HAP_MODEL_IMPULSE) == HAP_OK);
-  cw_run(&w, 101);
-  CHECK(is_off(&w, HAP_EFFECT_SHAPE, HAP_REASON_NOT_IN_MODEL));
-  CHECK(look(&w, HAP_EFFECT_SHAPE).wish == HAP_EFFECT_ON);
-  CHECK(hap_session_set_model(w.session, HAP_MODEL_CONTACT) == HAP_OK);
-  cw_run(&w, 151);
-  CHECK(is(&w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
-  cw_close(&w);
+  contact_world *w = open_on_floor(1);
+  wish(w, HAP_EFFECT_SHAPE, HAP_EFFECT_ON);
+  REQUIRE(start_left(w, 0.002));
+  CHECK(hap_session_set_model(w->session, HAP_MODEL_IMPULSE) == HAP_OK);
+  cw_run(w, 101);
+  CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_NOT_IN_MODEL));
+  CHECK(look(w, HAP_EFFECT_SHAPE).wish == HAP_EFFECT_ON);
+  CHECK(hap_session_set_model(w->session, HAP_MODEL_CONTACT) == HAP_OK);
+  cw_run(w, 151);
+  CHECK(is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
 }
 
 TEST(times_are_of_what_is_on)
 {
-  contact_world w;
-  REQUIRE(open_on_floor(&w, 3));
-  REQUIRE(start_left(&w, 0.0));
-  cw_run(&w, 640);
-  hap_stats stats = cw_stats(&w);
-  hap_effect_info contacts = look(&w, HAP_EFFECT_CONTACTS);
+  contact_world *w = open_on_floor(3);
+  REQUIRE(start_left(w, 0.0));
+  cw_run(w, 640);
+  hap_stats stats = cw_stats(w);
+  hap_effect_info contacts = look(w, HAP_EFFECT_CONTACTS);
   CHECK(isnan(contacts.tick_us) ||
         (contacts.tick_us > 0.0 && contacts.tick_us < stats.loop.tick_us_max));
   CHECK(contacts.contact_us > 0.0 && contacts.physics_ms > 0.0);
-  CHECK(isnan(look(&w, HAP_EFFECT_GYRO).tick_us) || look(&w, HAP_EFFECT_GYRO).tick_us == 0.0);
-  CHECK(isnan(look(&w, HAP_EFFECT_RANGE).tick_us));
-  cw_close(&w);
+  CHECK(isnan(look(w, HAP_EFFECT_GYRO).tick_us) || look(w, HAP_EFFECT_GYRO).tick_us == 0.0);
+  CHECK(isnan(look(w, HAP_EFFECT_RANGE).tick_us));
 }
 
 TEST(bodies_of_the_loop_are_not_tested_when_it_is_asked_for)
 {
   double force[2];
   for (int i = 0; i < 2; ++i) {
-    contact_world w;
-    REQUIRE(open_on_floor(&w, 3));
-    wish(&w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
-    REQUIRE(start_left(&w, 0.002));
-    cw_run(&w, 400);
-    force[i] = w.force[0];
-    CHECK(cw_stats(&w).probes.steps == 0);
-    cw_close(&w);
+    contact_world *w = open_on_floor(3);
+    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
+    REQUIRE(start_left(w, 0.002));
+    cw_run(w, 400);
+    force[i] = w->force[0];
+    CHECK(cw_stats(w).probes.steps == 0);
   }
   CHECK(force[0] < -0.1);
   CHECK(force[0] == force[1]);

@@ -150,9 +150,9 @@ TEST(a_round_asks_the_space_seldom)
 #define FAR_BODIES 40
 
 /* One cube under the pointer, the others in the distance, awake and spinning a little. */
-static bool open_far(test_world *w)
+static test_world *open_far(void)
 {
-  world_open(w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   world_add_cube(w, 0.05, 0.3, 0, 0, 0);
   for (int i = 1; i < FAR_BODIES; ++i) {
     dBodyID body = world_add_sphere(w, 0.02, 0.1, 3.0 + i, 0, 0);
@@ -161,7 +161,7 @@ static bool open_far(test_world *w)
   w->def.model = HAP_MODEL_CONTACT;
   bool started = world_start(w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002);
   world_step(w, 3);
-  return started;
+  return started ? w : NULL;
 }
 
 static const hapi_known_body *known_of(const test_world *w, dBodyID body)
@@ -172,35 +172,33 @@ static const hapi_known_body *known_of(const test_world *w, dBodyID body)
 
 TEST(a_far_body_that_grows_is_measured_at_the_next_step)
 {
-  test_world w;
-  REQUIRE(open_far(&w));
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
   for (int i = 1; i < FAR_BODIES; ++i) {
-    CHECK_NEAR(known_of(&w, w.bodies[i])->extent, sqrt(3.0) * 0.02, 1e-12);
-    dGeomSphereSetRadius(dBodyGetFirstGeom(w.bodies[i]), 0.02 + 0.01 * i);
-    world_step(&w, 1);
-    CHECK_NEAR(known_of(&w, w.bodies[i])->extent, sqrt(3.0) * (0.02 + 0.01 * i), 1e-9);
+    CHECK_NEAR(known_of(w, w->bodies[i])->extent, sqrt(3.0) * 0.02, 1e-12);
+    dGeomSphereSetRadius(dBodyGetFirstGeom(w->bodies[i]), 0.02 + 0.01 * i);
+    world_step(w, 1);
+    CHECK_NEAR(known_of(w, w->bodies[i])->extent, sqrt(3.0) * (0.02 + 0.01 * i), 1e-9);
   }
-  dGeomID second = dCreateSphere(w.space, 0.02);
-  dGeomSetBody(second, w.bodies[1]);
+  dGeomID second = dCreateSphere(w->space, 0.02);
+  dGeomSetBody(second, w->bodies[1]);
   dGeomSetOffsetPosition(second, 0.0, 0.0, 2.0);
-  world_step(&w, 1);
-  CHECK(known_of(&w, w.bodies[1])->extent > 2.0);
-  world_close(&w);
+  world_step(w, 1);
+  CHECK(known_of(w, w->bodies[1])->extent > 2.0);
 }
 
 TEST(the_fastest_of_all_bodies_sets_the_reach)
 {
-  test_world w;
-  REQUIRE(open_far(&w));
-  const hapi_neighbors *hood = &world_physics(&w)->near.neighbors;
-  dBodySetLinearVel(w.bodies[FAR_BODIES / 2], 0, 3.0, 0);
-  world_step(&w, 1);
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
+  const hapi_neighbors *hood = &world_physics(w)->near.neighbors;
+  dBodySetLinearVel(w->bodies[FAR_BODIES / 2], 0, 3.0, 0);
+  world_step(w, 1);
   CHECK(hood->fastest > 3.0 && hood->fastest < 3.1);
-  dBodyDisable(w.bodies[FAR_BODIES / 2]);
-  dBodySetLinearVel(w.bodies[0], 0, 0, -2.0); /* away from the pointer */
-  world_step(&w, 1);
+  dBodyDisable(w->bodies[FAR_BODIES / 2]);
+  dBodySetLinearVel(w->bodies[0], 0, 0, -2.0); /* away from the pointer */
+  world_step(w, 1);
   CHECK(hood->fastest > 1.9 && hood->fastest < 2.1);
-  world_close(&w);
 }
 
 static bool stands(test_world *w)
@@ -225,64 +223,61 @@ TEST(a_bad_body_is_kept_from_ode_wherever_it_is)
 {
   const double nan = (double)NAN;
   const int which[] = {0, 1, FAR_BODIES / 2, FAR_BODIES - 1};
-  test_world w;
-  REQUIRE(open_far(&w));
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
   for (int i = 0; i < 8; ++i) {
-    dBodyID body = w.bodies[which[i % 4]];
+    dBodyID body = w->bodies[which[i % 4]];
     if (i >= 4) {
       dBodyDisable(body);
     }
     dBodySetLinearVel(body, nan, 0, 0);
-    CHECK(stands(&w));
-    CHECK(stands(&w));
+    CHECK(stands(w));
+    CHECK(stands(w));
     dBodySetLinearVel(body, 0, 0, 0);
     dBodySetAngularVel(body, 0, 0, 0);
-    go_on(&w);
+    go_on(w);
   }
-  world_close(&w);
 }
 
 /* Of a body and of none; a body with its only geom, and one whose other geom is good. */
 TEST(a_bad_geom_keeps_the_world_from_being_stepped_until_it_is_set_right)
 {
-  test_world w;
-  REQUIRE(open_far(&w));
-  dGeomID ground = dCreateBox(w.space, 1, 1, 1);
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
+  dGeomID ground = dCreateBox(w->space, 1, 1, 1);
   dGeomSetPosition(ground, 0, 100, 0);
-  dGeomID extra = dCreateSphere(w.space, 0.02);
-  dGeomSetBody(extra, w.bodies[2]);
-  dGeomID geoms[] = {dBodyGetFirstGeom(w.bodies[FAR_BODIES - 1]), dBodyGetFirstGeom(w.bodies[0]),
+  dGeomID extra = dCreateSphere(w->space, 0.02);
+  dGeomSetBody(extra, w->bodies[2]);
+  dGeomID geoms[] = {dBodyGetFirstGeom(w->bodies[FAR_BODIES - 1]), dBodyGetFirstGeom(w->bodies[0]),
                      extra};
-  world_step(&w, 2);
+  world_step(w, 2);
   for (int i = 0; i < 3; ++i) {
     dGeomSetOffsetPosition(geoms[i], 0, 0, (double)NAN);
-    CHECK(stands(&w));
-    CHECK(stands(&w)); /* nothing has changed since, and it is no better */
+    CHECK(stands(w));
+    CHECK(stands(w)); /* nothing has changed since, and it is no better */
     dGeomSetOffsetPosition(geoms[i], 0, 0, 0);
-    go_on(&w);
+    go_on(w);
   }
   dGeomSetPosition(ground, (double)NAN, 0, 0);
-  CHECK(stands(&w));
-  CHECK(stands(&w));
+  CHECK(stands(w));
+  CHECK(stands(w));
   dGeomSetPosition(ground, 0, 100, 0);
-  go_on(&w);
-  world_close(&w);
+  go_on(w);
 }
 
 /* The geom's size is spoiled while its body's pose is none, and the pose alone is set right. */
 TEST(a_bad_geom_is_found_behind_a_bad_pose)
 {
-  test_world w;
-  REQUIRE(open_far(&w));
-  dBodyID body = w.bodies[FAR_BODIES - 2];
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
+  dBodyID body = w->bodies[FAR_BODIES - 2];
   dBodySetPosition(body, (double)NAN, 0, 0);
   dGeomSetOffsetPosition(dBodyGetFirstGeom(body), 0, 0, (double)NAN);
-  CHECK(stands(&w));
+  CHECK(stands(w));
   dBodySetPosition(body, 50, 0, 0);
-  CHECK(stands(&w));
+  CHECK(stands(w));
   dGeomSetOffsetPosition(dBodyGetFirstGeom(body), 0, 0, 0);
-  go_on(&w);
-  world_close(&w);
+  go_on(w);
 }
 
 /* ---- which bodies there are ---- */
@@ -308,53 +303,51 @@ static void destroy_body(test_world *w, int i)
 /* Each changes the order in which the scan meets the bodies, or leaves out one that it expects. */
 TEST(the_scan_follows_whatever_the_order_becomes)
 {
-  test_world w;
   int count = FAR_BODIES;
-  REQUIRE(open_far(&w));
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
   dRandSetSeed(3);
   for (int round = 0; round < 12; ++round) {
     for (int k = 0; k < 6; ++k) {
       int i = 1 + dRandInt(FAR_BODIES - 1);
-      if (w.bodies[i] != NULL) {
-        dGeomID geom = dBodyGetFirstGeom(w.bodies[i]);
-        dSpaceRemove(w.space, geom);
-        dSpaceAdd(w.space, geom);
-        (dRandInt(2) != 0 ? dBodyDisable : dBodyEnable)(w.bodies[i]);
+      if (w->bodies[i] != NULL) {
+        dGeomID geom = dBodyGetFirstGeom(w->bodies[i]);
+        dSpaceRemove(w->space, geom);
+        dSpaceAdd(w->space, geom);
+        (dRandInt(2) != 0 ? dBodyDisable : dBodyEnable)(w->bodies[i]);
       }
     }
     int gone = 1 + 3 * round;
-    destroy_body(&w, gone);
+    destroy_body(w, gone);
     --count;
     if (round % 3 == 0) {
-      world_add_sphere(&w, 0.02, 0.1, 60.0 + round, 0, 0);
+      world_add_sphere(w, 0.02, 0.1, 60.0 + round, 0, 0);
       ++count;
     }
-    CHECK(hap_session_advance(w.session, 50) == HAP_BODY_LOST);
-    check_table(&w, count);
+    CHECK(hap_session_advance(w->session, 50) == HAP_BODY_LOST);
+    check_table(w, count);
   }
-  CHECK(world_stats(&w).faults.bodies_lost == 12);
-  world_close(&w);
+  CHECK(world_stats(w).faults.bodies_lost == 12);
 }
 
 TEST(a_far_chain_without_geoms_is_known_by_its_joints)
 {
-  test_world w;
-  REQUIRE(open_far(&w));
+  test_world *w = open_far();
+  REQUIRE(w != NULL);
   dMass mass;
   dMassSetSphereTotal(&mass, 0.1, 0.02);
   for (int i = 0; i < 3; ++i) {
-    dBodyID before = w.bodies[w.body_count - 1];
+    dBodyID before = w->bodies[w->body_count - 1];
     const dReal *at = dBodyGetPosition(before);
-    dBodyID body = world_add(&w, NULL, &mass, at[0] + 0.1, at[1], at[2]);
-    dJointID joint = dJointCreateBall(w.world, NULL);
+    dBodyID body = world_add(w, NULL, &mass, at[0] + 0.1, at[1], at[2]);
+    dJointID joint = dJointCreateBall(w->world, NULL);
     dJointAttach(joint, before, body);
     dJointSetBallAnchor(joint, at[0] + 0.05, at[1], at[2]);
   }
-  world_step(&w, 1);
-  check_table(&w, FAR_BODIES + 3);
-  dBodySetLinearVel(w.bodies[FAR_BODIES + 2], (double)NAN, 0, 0);
-  CHECK(stands(&w));
-  dBodySetLinearVel(w.bodies[FAR_BODIES + 2], 0, 0, 0);
-  go_on(&w);
-  world_close(&w);
+  world_step(w, 1);
+  check_table(w, FAR_BODIES + 3);
+  dBodySetLinearVel(w->bodies[FAR_BODIES + 2], (double)NAN, 0, 0);
+  CHECK(stands(w));
+  dBodySetLinearVel(w->bodies[FAR_BODIES + 2], 0, 0, 0);
+  go_on(w);
 }

@@ -18,9 +18,9 @@ static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODE
                                    HAP_MODEL_CONTACT};
 #define MODELS (sizeof models / sizeof models[0])
 
-static void open_world(contact_world *w, hap_model model, double gravity)
+static contact_world *open_world(hap_model model, double gravity)
 {
-  cw_open(w, gravity);
+  contact_world *w = cw_new(gravity);
   w->def.model = model;
   w->def.physics_hz = 60.0;
   w->hand_def.radius = RADIUS;
@@ -28,6 +28,7 @@ static void open_world(contact_world *w, hap_model model, double gravity)
   w->hand_def.damping = 0.0;
   w->hand_def.friction = MU;
   w->hand_def.max_torque = 1e6;
+  return w;
 }
 
 /* Over the floor, then pressed into it by depth. A body that nobody touches makes it a world. */
@@ -49,22 +50,21 @@ static bool press_floor(contact_world *w, double depth)
 TEST(sticking_is_a_spring_of_the_contacts_stiffness)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world w;
-    open_world(&w, models[m], CW_GRAVITY);
-    REQUIRE(press_floor(&w, 0.002));
-    CHECK_NEAR(w.force[2], 4.0, 4e-3);
-    CHECK_NEAR(w.force[0], 0.0, 1e-9);
+    contact_world *w = open_world(models[m], CW_GRAVITY);
+    REQUIRE(press_floor(w, 0.002));
+    CHECK_NEAR(w->force[2], 4.0, 4e-3);
+    CHECK_NEAR(w->force[0], 0.0, 1e-9);
     for (int i = 1; i <= 4; ++i) {
-      cw_go(&w, 0.2, -0.1, 0.0, 1);
-      cw_go(&w, 0.0, 0.0, 0.0, 1);
-      CHECK_NEAR(w.force[0], -2000.0 * 2e-4 * i, 1e-3 * 2000.0 * 2e-4 * i);
-      CHECK_NEAR(w.force[1], 2000.0 * 1e-4 * i, 1e-3 * 2000.0 * 1e-4 * i);
+      cw_go(w, 0.2, -0.1, 0.0, 1);
+      cw_go(w, 0.0, 0.0, 0.0, 1);
+      CHECK_NEAR(w->force[0], -2000.0 * 2e-4 * i, 1e-3 * 2000.0 * 2e-4 * i);
+      CHECK_NEAR(w->force[1], 2000.0 * 1e-4 * i, 1e-3 * 2000.0 * 1e-4 * i);
     }
     for (int i = 0; i < 500; ++i) {
-      cw_tick(&w);
+      cw_tick(w);
     }
-    CHECK_NEAR(w.force[0], -1.6, 1.6e-3); /* and stays */
-    cw_close(&w);
+    CHECK_NEAR(w->force[0], -1.6, 1.6e-3); /* and stays */
+    cw_close(w);
   }
 }
 
@@ -73,14 +73,13 @@ TEST(sliding_is_coulombs_in_every_direction)
   for (size_t m = 0; m < MODELS; ++m) {
     for (int i = 0; i < 24; ++i) {
       double angle = 2.0 * M_PI * (i + 0.3) / 24.0;
-      contact_world w;
-      open_world(&w, models[m], CW_GRAVITY);
-      REQUIRE(press_floor(&w, 0.002));
-      cw_go(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 100);
-      CHECK_NEAR(w.force[0], -MU * w.force[2] * cos(angle), 1e-3 * MU * w.force[2]);
-      CHECK_NEAR(w.force[1], -MU * w.force[2] * sin(angle), 1e-3 * MU * w.force[2]);
-      CHECK_NEAR(w.force[2], 4.0, 1e-6);
-      cw_close(&w);
+      contact_world *w = open_world(models[m], CW_GRAVITY);
+      REQUIRE(press_floor(w, 0.002));
+      cw_go(w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 100);
+      CHECK_NEAR(w->force[0], -MU * w->force[2] * cos(angle), 1e-3 * MU * w->force[2]);
+      CHECK_NEAR(w->force[1], -MU * w->force[2] * sin(angle), 1e-3 * MU * w->force[2]);
+      CHECK_NEAR(w->force[2], 4.0, 1e-6);
+      cw_close(w);
     }
   }
 }
@@ -126,26 +125,25 @@ static bool press_cube(contact_world *w, double mass, double edge, double floor_
 TEST(a_heavy_body_is_held_and_slid_on_as_a_wall)
 {
   for (size_t i = 0; i < WAYS; ++i) {
-    contact_world w;
-    open_world(&w, HAP_MODEL_CONTACT, CW_GRAVITY);
-    take_way(&w, &ways[i]);
-    REQUIRE(press_cube(&w, 1000.0, 0.3, 0.8, 0.002));
+    contact_world *w = open_world(HAP_MODEL_CONTACT, CW_GRAVITY);
+    take_way(w, &ways[i]);
+    REQUIRE(press_cube(w, 1000.0, 0.3, 0.8, 0.002));
     double stiffness = ways[i].coupling == HAP_COUPLING_PROXY ? 2000.0 / 1.002 : 2000.0;
     double normal = 0.002 * stiffness;
-    CHECK_NEAR(w.force[2], normal, 1e-3 * normal);
-    cw_go(&w, 0.02, -0.015, 0.0, 20);
-    cw_go(&w, 0.0, 0.0, 0.0, 50);
-    CHECK_NEAR(w.force[0], -stiffness * 4e-4, 1e-3 * stiffness * 4e-4);
-    CHECK_NEAR(w.force[1], stiffness * 3e-4, 1e-3 * stiffness * 3e-4);
+    CHECK_NEAR(w->force[2], normal, 1e-3 * normal);
+    cw_go(w, 0.02, -0.015, 0.0, 20);
+    cw_go(w, 0.0, 0.0, 0.0, 50);
+    CHECK_NEAR(w->force[0], -stiffness * 4e-4, 1e-3 * stiffness * 4e-4);
+    CHECK_NEAR(w->force[1], stiffness * 3e-4, 1e-3 * stiffness * 3e-4);
     for (int k = 0; k < 12; ++k) {
       double angle = 2.0 * M_PI * (k + 0.3) / 12.0;
-      cw_go(&w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 250); /* the spring turns round */
-      CHECK_NEAR(w.force[0], -MU * w.force[2] * cos(angle), 2e-3 * MU * w.force[2]);
-      CHECK_NEAR(w.force[1], -MU * w.force[2] * sin(angle), 2e-3 * MU * w.force[2]);
-      CHECK_NEAR(hypot(w.force[0], w.force[1]), MU * w.force[2], 1e-6 * w.force[2]);
-      cw_go(&w, -0.05 * cos(angle), -0.05 * sin(angle), 0.0, 250);
+      cw_go(w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 250); /* the spring turns round */
+      CHECK_NEAR(w->force[0], -MU * w->force[2] * cos(angle), 2e-3 * MU * w->force[2]);
+      CHECK_NEAR(w->force[1], -MU * w->force[2] * sin(angle), 2e-3 * MU * w->force[2]);
+      CHECK_NEAR(hypot(w->force[0], w->force[1]), MU * w->force[2], 1e-6 * w->force[2]);
+      cw_go(w, -0.05 * cos(angle), -0.05 * sin(angle), 0.0, 250);
     }
-    cw_close(&w);
+    cw_close(w);
   }
 }
 
@@ -155,21 +153,20 @@ TEST(sliding_pulls_a_free_body_along)
   for (size_t i = 0; i < WAYS; ++i) {
     for (int k = 0; k < 8; ++k) {
       double angle = 2.0 * M_PI * (k + 0.3) / 8.0;
-      contact_world w;
-      open_world(&w, HAP_MODEL_CONTACT, CW_GRAVITY);
-      take_way(&w, &ways[i]);
-      REQUIRE(press_cube(&w, 1.0, 0.3, 0.0, 0.002));
-      cw_go(&w, 1.0 * cos(angle), 1.0 * sin(angle), 0.0, 20);
-      double before[2] = {w.velocity[0][0], w.velocity[0][1]};
+      contact_world *w = open_world(HAP_MODEL_CONTACT, CW_GRAVITY);
+      take_way(w, &ways[i]);
+      REQUIRE(press_cube(w, 1.0, 0.3, 0.0, 0.002));
+      cw_go(w, 1.0 * cos(angle), 1.0 * sin(angle), 0.0, 20);
+      double before[2] = {w->velocity[0][0], w->velocity[0][1]};
       double force = 0.0;
       for (int j = 0; j < 80; ++j) {
-        cw_tick(&w);
-        force += w.force[2] / 80.0;
+        cw_tick(w);
+        force += w->force[2] / 80.0;
       }
       double gain = MU * force * 0.08 / 1.0;
-      CHECK_NEAR(w.velocity[0][0] - before[0], gain * cos(angle), 2e-3 * gain);
-      CHECK_NEAR(w.velocity[0][1] - before[1], gain * sin(angle), 2e-3 * gain);
-      cw_close(&w);
+      CHECK_NEAR(w->velocity[0][0] - before[0], gain * cos(angle), 2e-3 * gain);
+      CHECK_NEAR(w->velocity[0][1] - before[1], gain * sin(angle), 2e-3 * gain);
+      cw_close(w);
     }
   }
 }
@@ -177,23 +174,22 @@ TEST(sliding_pulls_a_free_body_along)
 TEST(sticking_drags_a_block_over_the_floor)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world w;
     double mass = 0.5;
     if (models[m] == HAP_MODEL_IMPULSE || models[m] == HAP_MODEL_ACCELERANCE) {
       continue; /* as far as they go: see test_grasp */
     }
-    open_world(&w, models[m], CW_GRAVITY);
-    w.hand_def.damping = 20.0;
-    w.hand_def.friction = 0.9;
-    REQUIRE(press_cube(&w, mass, 0.1, 0.1, 0.003));
-    cw_go(&w, 0.05, 0.0, 0.0, 400);
-    double at = w.position[0][0] - w.hand_at[0];
-    cw_run(&w, 400);
-    double needed = 0.1 * (mass * CW_GRAVITY + w.force[2]);
-    CHECK_NEAR(w.position[0][0] - w.hand_at[0], at, 1e-6);
-    CHECK_NEAR(w.force[0], -needed, 2e-3 * needed);
-    CHECK_NEAR(w.force[2], 6.0, 0.05);
-    cw_close(&w);
+    contact_world *w = open_world(models[m], CW_GRAVITY);
+    w->hand_def.damping = 20.0;
+    w->hand_def.friction = 0.9;
+    REQUIRE(press_cube(w, mass, 0.1, 0.1, 0.003));
+    cw_go(w, 0.05, 0.0, 0.0, 400);
+    double at = w->position[0][0] - w->hand_at[0];
+    cw_run(w, 400);
+    double needed = 0.1 * (mass * CW_GRAVITY + w->force[2]);
+    CHECK_NEAR(w->position[0][0] - w->hand_at[0], at, 1e-6);
+    CHECK_NEAR(w->force[0], -needed, 2e-3 * needed);
+    CHECK_NEAR(w->force[2], 6.0, 0.05);
+    cw_close(w);
   }
 }
 
@@ -202,7 +198,7 @@ TEST(sticking_drags_a_block_over_the_floor)
 #define FINGER 0.006
 
 typedef struct pinch {
-  contact_world w;
+  contact_world *w;
   hap_pointer_id other; /* at the other side of the box */
   double depth;         /* m, of each */
 } pinch;
@@ -210,49 +206,49 @@ typedef struct pinch {
 static void put_other(pinch *p)
 {
   const hap_pose pose = {{0.1 + RADIUS - p->depth, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  CHECK(hap_pointer_set_target(p->w.session, p->other, &pose, NULL) == HAP_OK);
+  CHECK(hap_pointer_set_target(p->w->session, p->other, &pose, NULL) == HAP_OK);
 }
 
 /* A box that floats, between two fingers along x. */
 static bool open_pinch(pinch *p, hap_model model, double damping)
 {
-  open_world(&p->w, model, 0.0);
+  p->w = open_world(model, 0.0);
   p->depth = 0.002;
-  p->w.hand_def.damping = damping;
-  p->w.hand_def.finger_radius = FINGER;
-  p->w.hand_def.max_torque = 1e3;
-  cw_add_cube(&p->w, 0.2, 0.2, 0.0, 0.0, 0.0);
-  p->w.ode.max_contacts_per_pair = 4;
-  if (!cw_start(&p->w, -0.1 - RADIUS - 0.001, 0.0, 0.0) ||
-      hap_pointer_add(p->w.session, &p->w.hand_def, &p->other) < HAP_OK) {
+  p->w->hand_def.damping = damping;
+  p->w->hand_def.finger_radius = FINGER;
+  p->w->hand_def.max_torque = 1e3;
+  cw_add_cube(p->w, 0.2, 0.2, 0.0, 0.0, 0.0);
+  p->w->ode.max_contacts_per_pair = 4;
+  if (!cw_start(p->w, -0.1 - RADIUS - 0.001, 0.0, 0.0) ||
+      hap_pointer_add(p->w->session, &p->w->hand_def, &p->other) < HAP_OK) {
     return false;
   }
   double depth = p->depth;
   for (int i = 0; i <= 50; ++i) {
     p->depth = -0.001 + (0.001 + depth) * i / 50.0;
-    p->w.hand_at[0] = -0.1 - RADIUS + p->depth;
+    p->w->hand_at[0] = -0.1 - RADIUS + p->depth;
     put_other(p);
-    cw_tick(&p->w);
+    cw_tick(p->w);
   }
   p->depth = depth;
-  cw_run(&p->w, 200);
+  cw_run(p->w, 200);
   return true;
 }
 
 static double other_torque(const pinch *p)
 {
-  return p->w.row.pointers[1].torque[0];
+  return p->w->row.pointers[1].torque[0];
 }
 
 static double spin_about_x(const pinch *p)
 {
-  return dBodyGetAngularVel(p->w.bodies[0])[0];
+  return dBodyGetAngularVel(p->w->bodies[0])[0];
 }
 
 /* Radians that the box has turned about x. */
 static double turn_about_x(const pinch *p)
 {
-  const dReal *q = dBodyGetQuaternion(p->w.bodies[0]);
+  const dReal *q = dBodyGetQuaternion(p->w->bodies[0]);
   return 2.0 * asin(q[1]);
 }
 
@@ -265,17 +261,17 @@ TEST(soft_fingers_are_a_torsion_spring_of_k_r2)
     }
     REQUIRE(open_pinch(&p, models[m], 120.0));
     double torque = 0.01; /* of 0.024 that they hold */
-    p.w.user_torque[0] = torque;
-    cw_run(&p.w, 3000);
+    p.w->user_torque[0] = torque;
+    cw_run(p.w, 3000);
     double angle = torque / (2.0 * 2000.0 * FINGER * FINGER);
     CHECK_NEAR(turn_about_x(&p), angle, 1e-3 * angle);
-    CHECK_NEAR(p.w.row.pointers[0].torque[0], 0.5 * torque, 1e-3 * torque);
+    CHECK_NEAR(p.w->row.pointers[0].torque[0], 0.5 * torque, 1e-3 * torque);
     CHECK_NEAR(other_torque(&p), 0.5 * torque, 1e-3 * torque);
-    CHECK_NEAR(cw_norm(p.w.force), 4.0, 1e-2);
-    p.w.user_torque[0] = 0.0;
-    cw_run(&p.w, 3000);
+    CHECK_NEAR(cw_norm(p.w->force), 4.0, 1e-2);
+    p.w->user_torque[0] = 0.0;
+    cw_run(p.w, 3000);
     CHECK_NEAR(turn_about_x(&p), 0.0, 1e-3 * angle); /* and back: nothing has slid */
-    cw_close(&p.w);
+    cw_close(p.w);
   }
 }
 
@@ -290,14 +286,14 @@ TEST(beyond_their_limit_soft_fingers_slip_and_brake)
     double torque = 0.1;
     double limit = 2.0 * MU * 4.0 * FINGER;
     double inertia = 0.2 * 0.2 * 0.2 / 6.0;
-    p.w.user_torque[0] = torque;
-    cw_run(&p.w, 200);
+    p.w->user_torque[0] = torque;
+    cw_run(p.w, 200);
     double before = spin_about_x(&p);
-    cw_run(&p.w, 200);
+    cw_run(p.w, 200);
     double gain = (torque - limit) / inertia * 0.2;
     CHECK_NEAR(spin_about_x(&p) - before, gain, 5e-3 * gain);
     CHECK_NEAR(other_torque(&p), 0.5 * limit, 2e-3 * limit);
-    cw_close(&p.w);
+    cw_close(p.w);
   }
 }
 
@@ -305,28 +301,27 @@ TEST(beyond_their_limit_soft_fingers_slip_and_brake)
 TEST(turning_and_sliding_share_one_limit)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world w;
     hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
     hap_twist twist = {{0.05, 0.0, 0.0}, {0.0, 0.0, 4.0}};
-    open_world(&w, models[m], CW_GRAVITY);
-    w.hand_def.finger_radius = FINGER;
-    REQUIRE(press_floor(&w, 0.002));
+    contact_world *w = open_world(models[m], CW_GRAVITY);
+    w->hand_def.finger_radius = FINGER;
+    REQUIRE(press_floor(w, 0.002));
     for (int i = 1; i <= 400; ++i) {
       double angle = 4.0 * 1e-3 * i;
-      memcpy(pose.position, w.hand_at, sizeof pose.position);
+      memcpy(pose.position, w->hand_at, sizeof pose.position);
       pose.position[0] += 0.05 * 1e-3 * i;
       pose.quat_wxyz[0] = cos(0.5 * angle);
       pose.quat_wxyz[3] = sin(0.5 * angle);
-      CHECK(hap_pointer_set_target(w.session, w.hand, &pose, &twist) == HAP_OK);
-      CHECK(hap_session_advance(w.session, 1) == HAP_OK);
-      cw_read(&w);
+      CHECK(hap_pointer_set_target(w->session, w->hand, &pose, &twist) == HAP_OK);
+      CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+      cw_read(w);
     }
-    double limit = MU * w.force[2];
-    double slide = w.force[0] / limit;
-    double turn = w.row.pointers[0].torque[2] / (limit * FINGER);
+    double limit = MU * w->force[2];
+    double slide = w->force[0] / limit;
+    double turn = w->row.pointers[0].torque[2] / (limit * FINGER);
     CHECK_NEAR(slide * slide + turn * turn, 1.0, 1e-3);
     CHECK_NEAR(turn / slide, FINGER * 4.0 / 0.05, 5e-3); /* along the motion */
     CHECK(slide < -0.5 && turn < -0.2);
-    cw_close(&w);
+    cw_close(w);
   }
 }

@@ -123,12 +123,11 @@ static const hap_device_ops booked_ops = {
 static hap_pointer_id hand;
 
 /* The cube stands still whatever pushes it. */
-static bool begin(stage *s, hap_drive drive, hap_device **out)
+static bool start_with_device(stage *s, hap_device **out)
 {
   hap_pointer_def def;
   hap_detail detail;
   memset(&device_book, 0, sizeof device_book);
-  stage_init(s, drive);
   dBodySetKinematic(s->cube);
   hap_pointer_def_init(&def, sizeof def);
   bool opened = hapi_device_open_ops(&booked_ops, "", out, &detail) == HAP_OK;
@@ -136,6 +135,13 @@ static bool begin(stage *s, hap_drive drive, hap_device **out)
   return opened && stage_create(s) == HAP_OK &&
          hap_pointer_add(s->session, &def, &hand) == HAP_OK &&
          hap_session_start(s->session) == HAP_OK;
+}
+
+/* NULL when it does not start. */
+static stage *begin(hap_drive drive, hap_device **out)
+{
+  stage *s = stage_new(drive);
+  return start_with_device(s, out) ? s : NULL;
 }
 
 static void end(stage *s, hap_device *device)
@@ -185,42 +191,42 @@ TEST(a_device_that_fails_is_zeroed_at_once)
 {
   atomic_int *const causes[] = {&device_book.fail_read, &device_book.fail_write};
   for (int i = 0; i < 2; ++i) {
-    stage s;
     hap_device *device;
-    REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
-    CHECK(hap_session_advance(s.session, 100) == HAP_OK && pushes(&s));
+    stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+    REQUIRE(s != NULL);
+    CHECK(hap_session_advance(s->session, 100) == HAP_OK && pushes(s));
     int forces = atomic_load(&device_book.forces);
     atomic_store(causes[i], 1);
-    CHECK(hap_session_advance(s.session, 1) == HAP_FAULTED);
-    CHECK(atomic_load(&device_book.zeros) >= 1 && !pushes(&s));
-    CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
+    CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
+    CHECK(atomic_load(&device_book.zeros) >= 1 && !pushes(s));
+    CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
     CHECK(atomic_load(&device_book.forces) == forces); /* none since */
-    CHECK(stats_of(&s).faults.pointer == hand.v && has(detail_of(&s), "pointer 1: the device"));
-    CHECK(hap_pointer_remove(s.session, hand) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 1) == HAP_FAULTED);
-    CHECK(stats_of(&s).faults.pointer == hand.v); /* nobody else's, ever */
-    end(&s, device);
+    CHECK(stats_of(s).faults.pointer == hand.v && has(detail_of(s), "pointer 1: the device"));
+    CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
+    CHECK(stats_of(s).faults.pointer == hand.v); /* nobody else's, ever */
+    end(s, device);
   }
 }
 
 TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
 {
-  stage s;
   hap_device *device;
-  REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
-  CHECK(hap_session_advance(s.session, 100) == HAP_OK);
+  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 100) == HAP_OK);
   hap_pointer_state state;
   atomic_store(&device_book.bad_pose, 1);
-  CHECK(hap_session_advance(s.session, 3) == HAP_FAULTED && !pushes(&s));
+  CHECK(hap_session_advance(s->session, 3) == HAP_FAULTED && !pushes(s));
   CHECK(atomic_load(&device_book.zeros) == 0); /* by writes alone */
-  CHECK(hap_pointer_get(s.session, hand, &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, hand, &state, sizeof state) == HAP_OK);
   CHECK(state.guard == HAP_GUARD_FAULT && hapi_v3_norm(state.wrench.force) == 0.0);
   atomic_store(&device_book.bad_pose, 0);
-  CHECK(hap_session_reset_fault(s.session) == HAP_OK);
+  CHECK(hap_session_reset_fault(s->session) == HAP_OK);
   double before = 0.0;
   for (int i = 0; i < 25; ++i) {
-    CHECK(hap_session_advance(s.session, 1) == HAP_OK);
-    CHECK(hap_pointer_get(s.session, hand, &state, sizeof state) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    CHECK(hap_pointer_get(s->session, hand, &state, sizeof state) == HAP_OK);
     double force = hapi_v3_norm(state.wrench.force);
     CHECK(force >= before && force - before <= 2.0 * 3.0 / 20.0); /* the contact ramps as well */
     CHECK(((state.guard & HAP_GUARD_RAMP_IN) != 0) == (i < 19));
@@ -228,7 +234,7 @@ TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
   }
   CHECK_NEAR(before, 3.0, 1e-6);
   CHECK(atomic_load(&device_book.steep) == 0);
-  end(&s, device);
+  end(s, device);
 }
 
 TEST(every_fault_has_a_text)
@@ -250,62 +256,62 @@ static void on_signal(int number)
 TEST(an_emergency_takes_all_force_until_the_reset)
 {
   for (int d = 0; d < 2; ++d) {
-    stage s;
     hap_device *device;
-    REQUIRE(begin(&s, drives[d], &device));
-    REQUIRE(run_until(&s, pushes));
+    stage *s = begin(drives[d], &device);
+    REQUIRE(s != NULL);
+    REQUIRE(run_until(s, pushes));
     signal(SIGUSR1, on_signal);
     raise(SIGUSR1);
     CHECK(atomic_load(&device_book.zeros) >= 1);
-    REQUIRE(run_until(&s, has_fault));
+    REQUIRE(run_until(s, has_fault));
     int forces = atomic_load(&device_book.forces);
-    uint64_t ticks = stats_of(&s).loop.ticks;
-    while (stats_of(&s).loop.ticks < ticks + 20) {
-      CHECK(!run_until(&s, has_fault) || s.def.drive != HAP_DRIVE_LOCKSTEP ||
-            hap_session_advance(s.session, 1) == HAP_FAULTED);
+    uint64_t ticks = stats_of(s).loop.ticks;
+    while (stats_of(s).loop.ticks < ticks + 20) {
+      CHECK(!run_until(s, has_fault) || s->def.drive != HAP_DRIVE_LOCKSTEP ||
+            hap_session_advance(s->session, 1) == HAP_FAULTED);
     }
-    CHECK(atomic_load(&device_book.forces) == forces && !pushes(&s));
-    CHECK(stats_of(&s).faults.fault == HAP_FAULT_EMERGENCY && stats_of(&s).faults.pointer == 0);
-    CHECK(has(detail_of(&s), "hap_emergency_zero"));
-    CHECK(hap_session_reset_fault(s.session) == HAP_OK);
-    CHECK(run_until(&s, has_no_fault) && run_until(&s, pushes));
-    end(&s, device);
+    CHECK(atomic_load(&device_book.forces) == forces && !pushes(s));
+    CHECK(stats_of(s).faults.fault == HAP_FAULT_EMERGENCY && stats_of(s).faults.pointer == 0);
+    CHECK(has(detail_of(s), "hap_emergency_zero"));
+    CHECK(hap_session_reset_fault(s->session) == HAP_OK);
+    CHECK(run_until(s, has_no_fault) && run_until(s, pushes));
+    end(s, device);
   }
 }
 
 TEST(a_force_that_is_written_during_an_emergency_does_not_stay)
 {
-  stage s;
   hap_device *device;
-  REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK && pushes(&s));
+  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
   atomic_store(&device_book.alarm_in_write, 1);
-  CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
-  CHECK(!pushes(&s)); /* the write ended after the zero of the emergency */
+  CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
+  CHECK(!pushes(s)); /* the write ended after the zero of the emergency */
   int forces = atomic_load(&device_book.forces);
-  CHECK(hap_session_advance(s.session, 10) == HAP_FAULTED);
+  CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
   CHECK(atomic_load(&device_book.forces) == forces);
-  end(&s, device);
+  end(s, device);
 }
 
 TEST(an_emergency_before_the_start_or_after_the_end_reaches_nobody)
 {
-  stage s;
   hap_device *device;
   hap_emergency_zero();
-  REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK && pushes(&s));
-  CHECK(hap_session_stop(s.session) == HAP_OK);
+  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
+  CHECK(hap_session_stop(s->session) == HAP_OK);
   int zeros = atomic_load(&device_book.zeros);
   hap_emergency_zero();
   CHECK(atomic_load(&device_book.zeros) == zeros); /* the device may be gone by now */
-  CHECK(hap_session_start(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK && pushes(&s));
-  CHECK(hap_pointer_remove(s.session, hand) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
+  CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
   zeros = atomic_load(&device_book.zeros);
   hap_emergency_zero();
   CHECK(atomic_load(&device_book.zeros) == zeros);
-  end(&s, device);
+  end(s, device);
 }
 
 TEST(there_are_places_for_64_devices)
@@ -317,14 +323,14 @@ TEST(there_are_places_for_64_devices)
     ++added;
   }
   CHECK(added == HAPI_EMERGENCY_DEVICES);
-  stage s;
   hap_device *device;
-  CHECK(!begin(&s, HAP_DRIVE_LOCKSTEP, &device) && has(detail_of(&s), "64 places"));
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  CHECK(!start_with_device(s, &device) && has(detail_of(s), "64 places"));
   CHECK(atomic_load(&device_book.stops) == 1);
   for (int i = 0; i < added; ++i) {
     hapi_emergency_remove(&booked_ops, &selves[i]);
   }
-  end(&s, device);
+  end(s, device);
   CHECK(hapi_emergency_add(&booked_ops, &books[0]) && hapi_emergency_add(&booked_ops, &books[1]));
   hapi_emergency_remove(&booked_ops, &books[0]);
   hap_emergency_zero();
@@ -364,22 +370,23 @@ static hap_black_box_row rows[2 * HAP_BLACK_BOX_TICKS];
 
 TEST(the_black_box_of_a_session)
 {
-  stage s;
   hap_device *device;
   size_t count = 7;
-  REQUIRE(begin(&s, HAP_DRIVE_LOCKSTEP, &device));
-  CHECK(hap_session_advance(s.session, 400) == HAP_OK);
-  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_END &&
+  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 400) == HAP_OK);
+  CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) ==
+            HAP_END &&
         count == 0);
   CHECK(hap_session_black_box(NULL, rows, 512, sizeof(hap_black_box_row), &count) ==
         HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_black_box(s.session, NULL, 512, sizeof(hap_black_box_row), &count) ==
+  CHECK(hap_session_black_box(s->session, NULL, 512, sizeof(hap_black_box_row), &count) ==
         HAP_ERROR_ARGUMENT);
-  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), NULL) ==
+  CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), NULL) ==
         HAP_ERROR_ARGUMENT);
   atomic_store(&device_book.fail_write, 1);
-  CHECK(hap_session_advance(s.session, 1) == HAP_FAULTED);
-  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
+  CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
+  CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
         count == 256);
   CHECK(rows[255].tick == 400 && rows[255].time_ns == 400 * MS);
   CHECK(rows[255].fault == HAP_FAULT_DEVICE_WRITE && rows[254].fault == HAP_FAULT_NONE);
@@ -387,10 +394,10 @@ TEST(the_black_box_of_a_session)
   CHECK_NEAR(rows[255].wanted.force[0], -3.0, 1e-6);
   CHECK(rows[255].written.force[0] == 0.0); /* what the device has */
   CHECK_NEAR(rows[254].written.force[0], -3.0, 1e-6);
-  CHECK(hap_session_stop(s.session) == HAP_OK); /* it can still be read */
-  CHECK(hap_session_black_box(s.session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
+  CHECK(hap_session_stop(s->session) == HAP_OK); /* it can still be read */
+  CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
         count == 256);
-  end(&s, device);
+  end(s, device);
 }
 
 typedef struct reader {
@@ -421,22 +428,22 @@ static void *read_all_the_time(void *arg)
 
 TEST(faults_and_resets_race_with_readers)
 {
-  stage s;
   hap_device *device;
   static reader readers[2];
-  REQUIRE(begin(&s, HAP_DRIVE_THREADS, &device));
+  stage *s = begin(HAP_DRIVE_THREADS, &device);
+  REQUIRE(s != NULL);
   atomic_store(&alarm_goes_on, 1);
   for (int i = 0; i < 2; ++i) {
-    readers[i].s = &s;
+    readers[i].s = s;
     REQUIRE(pthread_create(&readers[i].thread, NULL, read_all_the_time, &readers[i]) == 0);
   }
   for (int i = 0; i < 50; ++i) {
     atomic_store(&device_book.bad_pose, 1);
-    CHECK(run_until(&s, has_fault));
+    CHECK(run_until(s, has_fault));
     atomic_store(&device_book.bad_pose, 0);
     sleep_ms(2); /* a tick that still sees the bad pose */
-    CHECK(hap_session_reset_fault(s.session) == HAP_OK);
-    CHECK(run_until(&s, has_no_fault));
+    CHECK(hap_session_reset_fault(s->session) == HAP_OK);
+    CHECK(run_until(s, has_no_fault));
   }
   atomic_store(&alarm_goes_on, 0);
   for (int i = 0; i < 2; ++i) {
@@ -444,7 +451,7 @@ TEST(faults_and_resets_race_with_readers)
     CHECK(readers[i].read > 0 && readers[i].wrong == 0);
   }
   CHECK(atomic_load(&device_book.steep) == 0);
-  end(&s, device);
+  end(s, device);
 }
 
 /* ---- a stall of physics ---- */
@@ -481,21 +488,21 @@ static bool feels_all(stage *s)
 
 TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
 {
-  stage s;
   hap_device *device;
   atomic_store(&stall, 0);
-  REQUIRE(begin(&s, HAP_DRIVE_THREADS, &device));
-  CHECK(hap_session_lock(s.session) == HAP_OK);
-  s.in_step = hang;
-  CHECK(hap_session_unlock(s.session) == HAP_OK);
-  CHECK(run_until(&s, feels_all));
+  stage *s = begin(HAP_DRIVE_THREADS, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_lock(s->session) == HAP_OK);
+  s->in_step = hang;
+  CHECK(hap_session_unlock(s->session) == HAP_OK);
+  CHECK(run_until(s, feels_all));
   atomic_store(&stall, 1);
-  CHECK(run_until(&s, feels_nothing));
+  CHECK(run_until(s, feels_nothing));
   atomic_store(&stall, 0);
-  CHECK(run_until(&s, feels_all));
-  CHECK(stats_of(&s).faults.stale_times >= 1 && stats_of(&s).faults.stale_ticks >= 50);
-  CHECK(stats_of(&s).faults.count == 0 && atomic_load(&device_book.steep) == 0);
-  end(&s, device);
+  CHECK(run_until(s, feels_all));
+  CHECK(stats_of(s).faults.stale_times >= 1 && stats_of(s).faults.stale_ticks >= 50);
+  CHECK(stats_of(s).faults.count == 0 && atomic_load(&device_book.steep) == 0);
+  end(s, device);
 }
 
 TEST(lockstep_knows_no_stall)
@@ -520,7 +527,6 @@ TEST(lockstep_knows_no_stall)
 
 TEST(a_slew_limit_of_the_application)
 {
-  stage s;
   hap_pointer_def def;
   hap_pointer_expert_def expert;
   hap_pointer_research_def research;
@@ -528,26 +534,25 @@ TEST(a_slew_limit_of_the_application)
   hap_device *device = NULL;
   hap_detail detail;
   memset(&device_book, 0, sizeof device_book);
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  dBodySetKinematic(s.cube);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  dBodySetKinematic(s->cube);
   pointer_defs_init(&def, &expert, &research);
   REQUIRE(hapi_device_open_ops(&booked_ops, "", &device, &detail) == HAP_OK);
-  REQUIRE(stage_create(&s) == HAP_OK);
+  REQUIRE(stage_create(s) == HAP_OK);
   def.device = device;
   expert.max_slew = -1.0;
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
-  CHECK(has(detail_of(&s), "max_slew"));
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_ARGUMENT);
+  CHECK(has(detail_of(s), "max_slew"));
   expert.max_slew = 50.0; /* 0.05 N a tick */
-  REQUIRE(hap_pointer_add(s.session, &def, &hand) == HAP_OK);
-  REQUIRE(hap_session_start(s.session) == HAP_OK);
+  REQUIRE(hap_pointer_add(s->session, &def, &hand) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
   uint32_t guard;
-  CHECK(hap_session_advance(s.session, 40) == HAP_OK);
-  double force = felt(&s, &guard);
+  CHECK(hap_session_advance(s->session, 40) == HAP_OK);
+  double force = felt(s, &guard);
   CHECK(force > 1.0 && force <= 2.0 + 1e-9 && guard == HAP_GUARD_SLEW);
-  CHECK(stats_of(&s).faults.slewed_ticks > 0);
+  CHECK(stats_of(s).faults.slewed_ticks > 0);
   atomic_store(&device_book.bad_pose, 1);
-  CHECK(hap_session_advance(s.session, 10) == HAP_FAULTED);
-  CHECK_NEAR(felt(&s, &guard), force - 1.0,
-             1e-9); /* after a fault 10 N go in 100 ms at the least */
-  end(&s, device);
+  CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
+  CHECK_NEAR(felt(s, &guard), force - 1.0, 1e-9); /* after a fault 10 N go in 100 ms at the least */
+  end(s, device);
 }

@@ -20,9 +20,9 @@
   5e-3 /* what a cube that is hit a tick earlier changes, and a window may begin after it */
 
 /* A row of cubes on a floor, the last of which hangs on a hinge, and one that sleeps; the hand comes along x. */
-static void begin(contact_world *w, hap_model model, double physics_hz, double lookback)
+static contact_world *begin(hap_model model, double physics_hz, double lookback)
 {
-  cw_open(w, CW_GRAVITY);
+  contact_world *w = cw_new(CW_GRAVITY);
   w->def.model = model;
   w->def.physics_hz = physics_hz;
   w->expert.lookback = lookback;
@@ -39,6 +39,7 @@ static void begin(contact_world *w, hap_model model, double physics_hz, double l
   dJointSetHingeAxis(hinge, 0.0, 1.0, 0.0);
   w->hand_def.radius = RADIUS;
   w->hand_velocity[0] = SPEED;
+  return w;
 }
 
 static void start(contact_world *w, double z)
@@ -66,9 +67,8 @@ static void run(contact_world *w, double z, course *out)
 
 static void play(hap_model model, double physics_hz, double lookback, course *out)
 {
-  contact_world w;
-  begin(&w, model, physics_hz, lookback);
-  run(&w, 0.5 * EDGE, out);
+  contact_world *w = begin(model, physics_hz, lookback);
+  run(w, 0.5 * EDGE, out);
 }
 
 /* RMS of the difference / RMS of the reference. */
@@ -132,10 +132,9 @@ TEST(changes_no_bit)
 TEST(friction_on_the_pointer_is_part_of_it)
 {
   static course c;
-  contact_world w;
-  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
-  w.hand_def.friction = 0.8;
-  run(&w, 0.7 * EDGE, &c);
+  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  w->hand_def.friction = 0.8;
+  run(w, 0.7 * EDGE, &c);
   printf("# force error %.4f\n", c.stats.error.force_error);
   CHECK(c.stats.error.force_error > 0.0 && c.stats.error.force_error < 0.05);
 }
@@ -386,15 +385,13 @@ TEST(a_hull_may_touch_a_mesh_and_nothing_else)
 /* What is near is near the pointer's surface: its middle may be far off. */
 TEST(a_pointer_of_metres_is_near_what_it_touches)
 {
-  contact_world w;
-  begin(&w, HAP_MODEL_CONTACT, 60.0, 0.1);
-  w.hand_def.radius = 2.0;
-  w.hand_velocity[0] = 0.0;
-  w.hand_velocity[2] = -0.01;
-  CHECK(cw_start(&w, 0.0, 0.0, EDGE + 2.0 + 1e-4));
-  cw_run(&w, TICKS / 2);
-  hap_stats stats = cw_stats(&w);
-  cw_close(&w);
+  contact_world *w = begin(HAP_MODEL_CONTACT, 60.0, 0.1);
+  w->hand_def.radius = 2.0;
+  w->hand_velocity[0] = 0.0;
+  w->hand_velocity[2] = -0.01;
+  CHECK(cw_start(w, 0.0, 0.0, EDGE + 2.0 + 1e-4));
+  cw_run(w, TICKS / 2);
+  hap_stats stats = cw_stats(w);
   printf("# force error %.5f\n", stats.error.force_error);
   CHECK(stats.error.lookbacks > 0 && stats.error.spoilt == 0);
   CHECK(stats.error.force_error > 0.0 && stats.error.force_error < 0.02);
@@ -404,53 +401,47 @@ TEST(a_pointer_of_metres_is_near_what_it_touches)
 
 TEST(a_body_that_the_application_moves_spoils_the_window)
 {
-  contact_world w;
-  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
-  start(&w, 0.5 * EDGE);
-  cw_run(&w, 420);
-  uint64_t before = cw_stats(&w).error.lookbacks;
-  dBodySetLinearVel(w.bodies[0], 0.0, 0.3, 0.0);
-  cw_run(&w, 300);
-  CHECK(cw_stats(&w).error.spoilt == 1);
-  cw_run(&w, 600);
-  CHECK(cw_stats(&w).error.spoilt == 1 && cw_stats(&w).error.lookbacks > before);
-  cw_close(&w);
+  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  start(w, 0.5 * EDGE);
+  cw_run(w, 420);
+  uint64_t before = cw_stats(w).error.lookbacks;
+  dBodySetLinearVel(w->bodies[0], 0.0, 0.3, 0.0);
+  cw_run(w, 300);
+  CHECK(cw_stats(w).error.spoilt == 1);
+  cw_run(w, 600);
+  CHECK(cw_stats(w).error.spoilt == 1 && cw_stats(w).error.lookbacks > before);
 }
 
 TEST(bodies_and_geoms_that_go_away_meanwhile)
 {
-  contact_world w;
-  begin(&w, HAP_MODEL_CONTACT, 20.0, 0.1);
-  start(&w, 0.5 * EDGE);
+  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  start(w, 0.5 * EDGE);
   for (int i = 0; i < 3; ++i) { /* at several places of a window */
-    cw_run(&w, 230);
-    dGeomID geom = dBodyGetFirstGeom(w.bodies[i]);
-    CHECK(hap_session_forget_geom(w.session, geom) == HAP_OK);
-    CHECK(hap_session_forget_body(w.session, w.bodies[i]) == HAP_OK);
+    cw_run(w, 230);
+    dGeomID geom = dBodyGetFirstGeom(w->bodies[i]);
+    CHECK(hap_session_forget_geom(w->session, geom) == HAP_OK);
+    CHECK(hap_session_forget_body(w->session, w->bodies[i]) == HAP_OK);
     dGeomDestroy(geom);
-    dBodyDestroy(w.bodies[i]);
-    w.bodies[i] = NULL;
+    dBodyDestroy(w->bodies[i]);
+    w->bodies[i] = NULL;
   }
-  cw_run(&w, 300);
-  CHECK(cw_stats(&w).error.spoilt >= 2);
-  CHECK(cw_stats(&w).faults.count == 0);
-  cw_close(&w);
+  cw_run(w, 300);
+  CHECK(cw_stats(w).error.spoilt >= 2);
+  CHECK(cw_stats(w).faults.count == 0);
 }
 
 TEST(a_change_of_model_ends_the_window)
 {
-  contact_world w;
-  begin(&w, HAP_MODEL_IMPULSE, 20.0, 0.1);
-  start(&w, 0.5 * EDGE);
-  cw_run(&w, 450);
-  CHECK(hap_session_set_model(w.session, HAP_MODEL_SINGLE) == HAP_OK);
-  cw_run(&w, 300);
-  uint64_t seen = cw_stats(&w).error.lookbacks;
-  CHECK(hap_session_set_model(w.session, HAP_MODEL_CONTACT) == HAP_OK);
-  cw_run(&w, 900);
-  CHECK(cw_stats(&w).error.lookbacks > seen);
-  CHECK(cw_stats(&w).error.spoilt <= 2);
-  cw_close(&w);
+  contact_world *w = begin(HAP_MODEL_IMPULSE, 20.0, 0.1);
+  start(w, 0.5 * EDGE);
+  cw_run(w, 450);
+  CHECK(hap_session_set_model(w->session, HAP_MODEL_SINGLE) == HAP_OK);
+  cw_run(w, 300);
+  uint64_t seen = cw_stats(w).error.lookbacks;
+  CHECK(hap_session_set_model(w->session, HAP_MODEL_CONTACT) == HAP_OK);
+  cw_run(w, 900);
+  CHECK(cw_stats(w).error.lookbacks > seen);
+  CHECK(cw_stats(w).error.spoilt <= 2);
 }
 
 /* ---- the setting ---- */
@@ -471,21 +462,19 @@ TEST(refuses_other_shares)
 
 TEST(threads_have_a_figure_too)
 {
-  contact_world w;
-  begin(&w, HAP_MODEL_ACCELERANCE, 60.0, 0.4);
-  w.def.drive = HAP_DRIVE_THREADS;
-  w.def.rt_priority = 0;
-  w.expert.trace_rows = 0;
-  start(&w, 0.5 * EDGE);
-  hap_stats stats = cw_stats(&w);
+  contact_world *w = begin(HAP_MODEL_ACCELERANCE, 60.0, 0.4);
+  w->def.drive = HAP_DRIVE_THREADS;
+  w->def.rt_priority = 0;
+  w->expert.trace_rows = 0;
+  start(w, 0.5 * EDGE);
+  hap_stats stats = cw_stats(w);
   for (int i = 0; i < 1000 && stats.error.lookbacks < 3;
        ++i) { /* the hand stays where it is, in the cube */
     hap_pose pose = {{-0.5 * EDGE, 0.0, 0.5 * EDGE}, {1.0, 0.0, 0.0, 0.0}};
     hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    CHECK(hap_pointer_set_target(w.session, w.hand, &pose, &twist) == HAP_OK);
+    CHECK(hap_pointer_set_target(w->session, w->hand, &pose, &twist) == HAP_OK);
     hapi_clock_sleep_until(hapi_clock_now() + 20000000);
-    stats = cw_stats(&w);
+    stats = cw_stats(w);
   }
   CHECK(stats.error.lookbacks >= 3);
-  cw_close(&w);
 }

@@ -104,7 +104,6 @@ static void tilt(dBodyID body, const double away[3])
 /* The pointer is above the top face, in the body's frame, whatever way the body is turned. */
 static void check_shape(shape kind, bool turned)
 {
-  test_world w;
   dMass mass;
   dTriMeshDataID mesh = make_mesh();
   const double apart = 0.004;
@@ -113,21 +112,21 @@ static void check_shape(shape kind, bool turned)
   if (kind == SPHERE || kind == CAPSULE) {
     at[0] = at[1] = 0.0;
   }
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-  dBodyID body = world_add(&w, make_geom(w.space, kind, mesh), &mass, 0, 0, 0);
+  dBodyID body = world_add(w, make_geom(w->space, kind, mesh), &mass, 0, 0, 0);
   if (turned) {
     tilt(body, (const double[3]){1.0, -2.0, 0.5});
     hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), at, at);
     hapi_quat_rotate(dBodyGetQuaternion(body), e.normal, e.normal);
   }
   printf("# %s%s\n", shape_names[kind], turned ? ", turned" : "");
-  CHECK(world_start(&w, RADIUS, at[0], at[1], at[2]));
-  check_contact(&w, body, &e);
-  CHECK(world_count_contacts(&w) == 1);
-  const hapi_contact_slot *contact = world_contact(&w, body, 0);
-  CHECK(contact != NULL && world_contact_answer(&w, contact)->probed);
-  world_close(&w);
+  CHECK(world_start(w, RADIUS, at[0], at[1], at[2]));
+  check_contact(w, body, &e);
+  CHECK(world_count_contacts(w) == 1);
+  const hapi_contact_slot *contact = world_contact(w, body, 0);
+  CHECK(contact != NULL && world_contact_answer(w, contact)->probed);
+  world_close(w);
   dGeomTriMeshDataDestroy(mesh);
 }
 
@@ -144,18 +143,17 @@ TEST(edges_of_convex_and_trimesh)
 {
   const double s = sqrt(0.5);
   for (int kind = BOX; kind <= TRIMESH; ++kind) {
-    test_world w;
     dMass mass;
     dTriMeshDataID mesh = make_mesh();
     const double apart = RADIUS + 0.005;
     expectation e = {0.005, {s, 0, s}, 1e-7};
     printf("# %s\n", shape_names[kind]);
-    world_open(&w, 0.0, 20);
+    test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-    dBodyID body = world_add(&w, make_geom(w.space, (shape)kind, mesh), &mass, 0, 0, 0);
-    CHECK(world_start(&w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart));
-    check_contact(&w, body, &e);
-    world_close(&w);
+    dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
+    CHECK(world_start(w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart));
+    check_contact(w, body, &e);
+    world_close(w);
     dGeomTriMeshDataDestroy(mesh);
   }
 }
@@ -182,35 +180,31 @@ TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
 
 TEST(planes_are_found)
 {
-  test_world w;
   const double n[3] = {0.6, 0.0, 0.8};
   expectation e = {0.003, {0.6, 0.0, 0.8}, 1e-12};
-  world_open(&w, 0.0, 20);
-  dCreatePlane(w.space, n[0], n[1], n[2], 0.25);
+  test_world *w = world_new(0.0, 20);
+  dCreatePlane(w->space, n[0], n[1], n[2], 0.25);
   double out = 0.25 + RADIUS + 0.003;
-  REQUIRE(world_start(&w, RADIUS, n[0] * out, 7.0, n[2] * out));
-  check_contact(&w, NULL, &e);
-  CHECK(world_stats(&w).model.neighbours == 0); /* static ones are contacts, not neighbours */
-  world_close(&w);
+  REQUIRE(world_start(w, RADIUS, n[0] * out, 7.0, n[2] * out));
+  check_contact(w, NULL, &e);
+  CHECK(world_stats(w).model.neighbours == 0); /* static ones are contacts, not neighbours */
 }
 
 TEST(geom_offsets_and_several_geoms_of_a_body)
 {
-  test_world w;
   dMass mass;
   expectation e = {0.002, {0, 0, 1}, 1e-9};
-  world_open(&w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   dMassSetSphereTotal(&mass, 0.3, 0.05);
-  dGeomID low = dCreateBox(w.space, 0.1, 0.1, 0.02);
-  dBodyID body = world_add(&w, low, &mass, 1, 2, 3);
-  dGeomID ball = dCreateSphere(w.space, 0.02);
+  dGeomID low = dCreateBox(w->space, 0.1, 0.1, 0.02);
+  dBodyID body = world_add(w, low, &mass, 1, 2, 3);
+  dGeomID ball = dCreateSphere(w->space, 0.02);
   dGeomSetBody(ball, body);
   dGeomSetOffsetPosition(ball, 0.3, 0.0, 0.1);
   dBodySetQuaternion(body, (const dQuaternion){sqrt(0.5), 0, 0, sqrt(0.5)}); /* x to y */
-  REQUIRE(world_start(&w, RADIUS, 1.0, 2.3, 3.1 + 0.02 + RADIUS + 0.002));
-  CHECK(world_count_contacts(&w) == 1);
-  check_contact(&w, body, &e);
-  world_close(&w);
+  REQUIRE(world_start(w, RADIUS, 1.0, 2.3, 3.1 + 0.02 + RADIUS + 0.002));
+  CHECK(world_count_contacts(w) == 1);
+  check_contact(w, body, &e);
 }
 
 /* Between two geoms of one body: two contacts, one neighbour. */
@@ -250,21 +244,19 @@ static bool count_pairs(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io
 
 TEST(nested_spaces_are_searched)
 {
-  test_world w;
   expectation e = {0.002, {0, 0, 1}, 1e-9};
-  world_open(&w, 0.0, 20);
-  dSpaceID inner = dSimpleSpaceCreate(w.space);
+  test_world *w = world_new(0.0, 20);
+  dSpaceID inner = dSimpleSpaceCreate(w->space);
   dSpaceID inmost = dHashSpaceCreate(inner);
-  dBodyID cube = world_add_cube(&w, 0.05, 0.3, 0, 0, 0);
+  dBodyID cube = world_add_cube(w, 0.05, 0.3, 0, 0, 0);
   dGeomID geom = dBodyGetFirstGeom(cube);
-  dSpaceRemove(w.space, geom);
+  dSpaceRemove(w->space, geom);
   dSpaceAdd(inmost, geom);
-  REQUIRE(world_start(&w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002));
-  check_contact(&w, cube, &e);
-  world_step(&w, 2);
-  check_contact(&w, cube, &e);
-  CHECK(world_physics(&w)->world.bodies.used == 1);
-  world_close(&w);
+  REQUIRE(world_start(w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002));
+  check_contact(w, cube, &e);
+  world_step(w, 2);
+  check_contact(w, cube, &e);
+  CHECK(world_physics(w)->world.bodies.used == 1);
 }
 
 /* Two cubes that touch in a space of their own, with so many things of the outer space around. */
@@ -380,16 +372,16 @@ TEST(disabled_geoms_and_collide_bits)
 
 /* Free balls along x; the pointer is a plane to them, number i is i mm farther away than the
  * nearest one. */
-static bool start_crowd(test_world *w, int bodies, int contacts, bool nearest_first)
+static test_world *start_crowd(int bodies, int contacts, bool nearest_first)
 {
-  world_open(w, 0.0, 20);
+  test_world *w = world_new(0.0, 20);
   w->def.max_bodies = bodies;
   w->def.max_contacts = contacts;
   for (int i = 0; i < CROWD; ++i) {
     int rank = nearest_first ? i : CROWD - 1 - i;
     world_add_sphere(w, 0.01, 0.1, 0.021 * (i - CROWD / 2), 0, -0.0105 - 0.001 * rank);
   }
-  return world_start(w, 100.0, 0, 0, 100.0 + 0.0005);
+  return world_start(w, 100.0, 0, 0, 100.0 + 0.0005) ? w : NULL;
 }
 
 static int count_nearest(const test_world *w, bool nearest_first, int count)
@@ -405,15 +397,14 @@ static int count_nearest(const test_world *w, bool nearest_first, int count)
 static void check_crowd(int bodies, int contacts, int expected)
 {
   for (int order = 0; order < 2; ++order) {
-    test_world w;
     printf("# %d bodies, %d contacts, %s\n", bodies, contacts, order ? "nearest first" : "last");
-    REQUIRE(start_crowd(&w, bodies, contacts, order != 0));
-    CHECK(world_count_contacts(&w) == expected);
-    CHECK(count_nearest(&w, order != 0, expected) == expected);
-    world_step(&w, 3);
-    CHECK(count_nearest(&w, order != 0, expected) == expected);
-    CHECK(world_stats(&w).model.capacity_dropped > 0);
-    world_close(&w);
+    test_world *w = start_crowd(bodies, contacts, order != 0);
+    REQUIRE(w != NULL);
+    CHECK(world_count_contacts(w) == expected);
+    CHECK(count_nearest(w, order != 0, expected) == expected);
+    world_step(w, 3);
+    CHECK(count_nearest(w, order != 0, expected) == expected);
+    CHECK(world_stats(w).model.capacity_dropped > 0);
   }
 }
 

@@ -22,12 +22,12 @@ static hap_fault fault_of(const test_world *w)
 }
 
 /* A cube of 1 kg on ice, the pointer 2 mm beside it. */
-static dBodyID open_cube(test_world *w)
+static test_world *open_cube(void)
 {
-  world_open(w, 0.0, 20);
-  dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
+  test_world *w = world_new(0.0, 20);
+  (void)world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
   CHECK(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
-  return cube;
+  return w;
 }
 
 /* Moves the pointer along x from where the last push ended, tick by tick. */
@@ -134,32 +134,31 @@ static void move_body(void *arg)
 
 static void check_moved(bool posted)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
-  dBodyID cube = open_cube(&w);
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
   move_edit edit = {cube, {0.4, 0.3, 0.2}};
-  push_along(&w, &x, 0.1, 130); /* in contact, in the middle of a step */
-  CHECK(world_stats(&w).loop.contact_ticks > 50);
+  push_along(w, &x, 0.1, 130); /* in contact, in the middle of a step */
+  CHECK(world_stats(w).loop.contact_ticks > 50);
   double speed = dBodyGetLinearVel(cube)[0];
   if (posted) {
-    CHECK(hap_session_post(w.session, move_body, &edit) == HAP_OK);
+    CHECK(hap_session_post(w->session, move_body, &edit) == HAP_OK);
   } else {
-    CHECK(hap_session_lock(w.session) == HAP_OK);
+    CHECK(hap_session_lock(w->session) == HAP_OK);
     move_body(&edit);
-    CHECK(hap_session_unlock(w.session) == HAP_OK);
+    CHECK(hap_session_unlock(w->session) == HAP_OK);
   }
-  forward(&w, 21); /* over the next step at tick 150 */
+  forward(w, 21); /* over the next step at tick 150 */
   CHECK_NEAR(dBodyGetPosition(cube)[0], 0.4, 0.3 * 0.05);
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.3, 1e-3);
   CHECK_NEAR(dBodyGetPosition(cube)[2], 0.2, 1e-3);
-  world_move_pointer(&w, 0, (const double[3]){-1, 0, 0}, NULL);
+  world_move_pointer(w, 0, (const double[3]){-1, 0, 0}, NULL);
   double before = dBodyGetPosition(cube)[0];
-  forward(&w, 100);
+  forward(w, 100);
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.3, 1e-3);
   CHECK(dBodyGetLinearVel(cube)[0] >= speed - 1e-9 && dBodyGetLinearVel(cube)[0] < 0.3);
   CHECK_NEAR(dBodyGetPosition(cube)[0], before + 0.1 * dBodyGetLinearVel(cube)[0], 1e-3);
-  CHECK_NEAR(world_stats(&w).hand.momentum_ratio, 1.0, 1e-9); /* the push before the move counts */
-  world_close(&w);
+  CHECK_NEAR(world_stats(w).hand.momentum_ratio, 1.0, 1e-9); /* the push before the move counts */
 }
 
 TEST(what_the_application_moves_stays_there)
@@ -170,15 +169,14 @@ TEST(what_the_application_moves_stays_there)
 
 TEST(a_velocity_set_by_the_application_holds)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
-  dBodyID cube = open_cube(&w);
-  push_along(&w, &x, 0.1, 130);
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
+  push_along(w, &x, 0.1, 130);
   dBodySetLinearVel(cube, 0.0, 0.1, 0.0);
-  push_along(&w, &x, 0.02, 121); /* over three steps, the first one of them from 100 to 150 */
+  push_along(w, &x, 0.02, 121); /* over three steps, the first one of them from 100 to 150 */
   CHECK_NEAR(dBodyGetLinearVel(cube)[1], 0.1, 0.01);
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.1 * 0.15, 0.002);
-  world_close(&w);
 }
 
 static void check_bounded(const test_world *w, dBodyID body, double speed)
@@ -190,25 +188,24 @@ static void check_bounded(const test_world *w, dBodyID body, double speed)
 
 TEST(a_changed_mass_is_read_again)
 {
-  test_world w;
   dMass mass;
   double x = -RADIUS - 0.002;
-  dBodyID cube = open_cube(&w);
-  push_along(&w, &x, 0.02, 175);
-  const hapi_contact_slot *contact = world_contact(&w, cube, 0);
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
+  push_along(w, &x, 0.02, 175);
+  const hapi_contact_slot *contact = world_contact(w, cube, 0);
   REQUIRE(contact != NULL);
-  CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 1.0, 1e-9);
+  CHECK_NEAR(world_contact_answer(w, contact)->a[0][0], 1.0, 1e-9);
   dMassSetBoxTotal(&mass, 4.0, EDGE, EDGE, EDGE);
   dBodySetMass(cube, &mass);
-  push_along(&w, &x, 0.02, 26);
-  contact = world_contact(&w, cube, 0);
+  push_along(w, &x, 0.02, 26);
+  contact = world_contact(w, cube, 0);
   REQUIRE(contact != NULL);
-  CHECK_NEAR(world_contact_answer(&w, contact)->a[0][0], 0.25, 1e-9);
-  CHECK_NEAR(world_slot(&w, cube)->mass, 4.0, 0.0);
-  push_along(&w, &x, 0.02, 200);
-  check_bounded(&w, cube, 0.1);
-  CHECK_NEAR(world_stats(&w).hand.momentum_ratio, 1.0, 1e-9);
-  world_close(&w);
+  CHECK_NEAR(world_contact_answer(w, contact)->a[0][0], 0.25, 1e-9);
+  CHECK_NEAR(world_slot(w, cube)->mass, 4.0, 0.0);
+  push_along(w, &x, 0.02, 200);
+  check_bounded(w, cube, 0.1);
+  CHECK_NEAR(world_stats(w).hand.momentum_ratio, 1.0, 1e-9);
 }
 
 TEST(a_body_added_near_the_pointer_is_felt)
@@ -250,30 +247,28 @@ static void destroy_first(test_world *w, bool forget)
 
 static void check_destroyed(bool forget)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
-  open_cube(&w);
-  dBodyID other = world_add_cube(&w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
-  push_along(&w, &x, 0.1, 130);
-  CHECK(world_stats(&w).loop.contact_ticks > 50);
-  CHECK(hap_session_lock(w.session) == HAP_OK);
-  destroy_first(&w, forget);
-  CHECK(hap_session_unlock(w.session) == HAP_OK);
-  forward(&w, 200);
-  hap_stats stats = world_stats(&w);
+  test_world *w = open_cube();
+  dBodyID other = world_add_cube(w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
+  push_along(w, &x, 0.1, 130);
+  CHECK(world_stats(w).loop.contact_ticks > 50);
+  CHECK(hap_session_lock(w->session) == HAP_OK);
+  destroy_first(w, forget);
+  CHECK(hap_session_unlock(w->session) == HAP_OK);
+  forward(w, 200);
+  hap_stats stats = world_stats(w);
   CHECK(stats.faults.bodies_lost == (forget ? 0u : 1u));
   CHECK(stats.model.bodies_known == 1);
-  CHECK(fault_of(&w) == HAP_FAULT_NONE);
+  CHECK(fault_of(w) == HAP_FAULT_NONE);
   hap_pointer_state state;
-  CHECK(hap_pointer_get(w.session, w.pointers[0], &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(w->session, w->pointers[0], &state, sizeof state) == HAP_OK);
   CHECK(state.contacts == 0 && state.wrench.force[0] == 0.0);
-  check_bounded(&w, other, 1e-9);
+  check_bounded(w, other, 1e-9);
   if (!forget) {
     hap_detail detail;
-    CHECK(hap_session_detail(w.session, &detail) == HAP_OK);
+    CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
     CHECK(strstr(detail.text, "hap_session_forget_body") != NULL);
   }
-  world_close(&w);
 }
 
 TEST(a_neighbour_is_destroyed)
@@ -329,22 +324,21 @@ TEST(a_neighbour_is_destroyed_in_after_step)
 
 TEST(a_body_in_place_of_a_destroyed_one_is_a_new_body)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
-  dBodyID cube = open_cube(&w);
-  push_along(&w, &x, 0.1, 130);
-  destroy_first(&w, false);
-  dBodyID next = world_add_cube(&w, EDGE, 2.0, EDGE / 2, 1.0, 0); /* often the same address */
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
+  push_along(w, &x, 0.1, 130);
+  destroy_first(w, false);
+  dBodyID next = world_add_cube(w, EDGE, 2.0, EDGE / 2, 1.0, 0); /* often the same address */
   printf("# address %s\n", next == cube ? "used again" : "not used again");
   dBodySetAutoDisableFlag(next, 1);
-  world_move_pointer(&w, 0, (const double[3]){-1, 0, 0}, NULL);
-  forward(&w, 121);
+  world_move_pointer(w, 0, (const double[3]){-1, 0, 0}, NULL);
+  forward(w, 121);
   CHECK(dBodyGetPosition(next)[0] == EDGE / 2 && dBodyGetPosition(next)[1] == 1.0);
   CHECK(hapi_v3_norm(dBodyGetLinearVel(next)) == 0.0);
   CHECK(dBodyGetAutoDisableFlag(next) == 0); /* taken over like any other's */
-  CHECK(hap_session_stop(w.session) == HAP_OK);
+  CHECK(hap_session_stop(w->session) == HAP_OK);
   CHECK(dBodyGetAutoDisableFlag(next) == 1);
-  world_close(&w);
 }
 
 /* ---- states that would end the process ---- */
@@ -375,37 +369,36 @@ static void mend(dBodyID body)
 
 static void check_broken(hap_edit_fn edit)
 {
-  test_world w;
   hap_detail detail;
   double x = -RADIUS - 0.002;
-  dBodyID cube = open_cube(&w);
-  dBodyID witness = world_add_cube(&w, EDGE, 1.0, 3, 0, 0);
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
+  dBodyID witness = world_add_cube(w, EDGE, 1.0, 3, 0, 0);
   dBodySetLinearVel(witness, 0.1, 0, 0);
-  push_along(&w, &x, 0.1, 130);
-  CHECK(hap_session_post(w.session, edit, cube) == HAP_OK);
-  forward(&w, 21);
+  push_along(w, &x, 0.1, 130);
+  CHECK(hap_session_post(w->session, edit, cube) == HAP_OK);
+  forward(w, 21);
   double stopped = dBodyGetPosition(witness)[0];
-  forward(&w, 100);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  CHECK(world_stats(&w).faults.count == 1);
+  forward(w, 100);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD);
+  CHECK(world_stats(w).faults.count == 1);
   CHECK(dBodyGetPosition(witness)[0] == stopped); /* not stepped */
   CHECK(hapi_finite(dBodyGetLinearVel(cube), 3)); /* none of the three is in it yet */
-  CHECK(hap_session_detail(w.session, &detail) == HAP_OK);
+  CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
   CHECK(strstr(detail.text, "not finite") != NULL);
   mend(cube);
   x = -RADIUS - 0.002;
-  world_move_pointer(&w, 0, (const double[3]){x, 0, 0}, NULL);
-  forward(&w, 100);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD); /* stays until it is reset */
+  world_move_pointer(w, 0, (const double[3]){x, 0, 0}, NULL);
+  forward(w, 100);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD); /* stays until it is reset */
   CHECK(dBodyGetPosition(witness)[0] > stopped);
-  CHECK(hap_session_reset_fault(w.session) == HAP_OK);
-  forward(&w, 51);
-  CHECK(fault_of(&w) == HAP_FAULT_NONE);
-  uint64_t touched = world_stats(&w).loop.contact_ticks;
-  push_along(&w, &x, 0.1, 130);
-  CHECK(world_stats(&w).loop.contact_ticks > touched + 20);
-  check_bounded(&w, cube, 0.5);
-  world_close(&w);
+  CHECK(hap_session_reset_fault(w->session) == HAP_OK);
+  forward(w, 51);
+  CHECK(fault_of(w) == HAP_FAULT_NONE);
+  uint64_t touched = world_stats(w).loop.contact_ticks;
+  push_along(w, &x, 0.1, 130);
+  CHECK(world_stats(w).loop.contact_ticks > touched + 20);
+  check_bounded(w, cube, 0.5);
 }
 
 TEST(a_broken_body_is_not_stepped)
@@ -418,15 +411,14 @@ TEST(a_broken_body_is_not_stepped)
 /* The hand must not be let near a world that is not stepped, whoever resets what. */
 TEST(a_fault_comes_back_while_the_world_is_broken)
 {
-  test_world w;
-  dBodyID cube = open_cube(&w);
-  CHECK(hap_session_post(w.session, break_position, cube) == HAP_OK);
-  forward(&w, 101);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  CHECK(hap_session_reset_fault(w.session) == HAP_OK);
-  forward(&w, 101);
-  CHECK(fault_of(&w) == HAP_FAULT_WORLD);
-  world_close(&w);
+  test_world *w = open_cube();
+  dBodyID cube = w->bodies[0];
+  CHECK(hap_session_post(w->session, break_position, cube) == HAP_OK);
+  forward(w, 101);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD);
+  CHECK(hap_session_reset_fault(w->session) == HAP_OK);
+  forward(w, 101);
+  CHECK(fault_of(w) == HAP_FAULT_WORLD);
 }
 
 static void break_after(void *user, double step_s)
@@ -488,15 +480,15 @@ static void check_continuous(dBodyID body, double before[3], double seconds)
 }
 
 /* Within what model IMPULSE keeps stable at 50 Hz: H^2 k / m is 0.1. */
-static dBodyID open_switching(test_world *w, hap_model first)
+static test_world *open_switching(hap_model first)
 {
   hap_pointer_def def;
-  world_open(w, 9.81, 50);
+  test_world *w = world_new(9.81, 50);
   w->mu = 0.1;
   w->def.physics_hz = 50.0;
   w->def.model = first;
   dCreatePlane(w->space, 0, 0, 1, -EDGE / 2 + 1e-5);
-  dBodyID cube = world_add_cube(w, EDGE, 2.0, EDGE / 2, 0, 0);
+  (void)world_add_cube(w, EDGE, 2.0, EDGE / 2, 0, 0);
   hap_pointer_def_init(&def, sizeof def);
   def.radius = RADIUS;
   def.stiffness = 500.0;
@@ -505,34 +497,33 @@ static dBodyID open_switching(test_world *w, hap_model first)
   CHECK(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
   world_move_pointer(w, 0, (const double[3]){-RADIUS - 0.002, 0, 0}, NULL);
   CHECK(hap_session_start(w->session) == HAP_OK);
-  return cube;
+  return w;
 }
 
 static void switch_models(const hap_model *order, int count, int gap_ticks)
 {
-  test_world w;
   double x = -RADIUS - 0.002;
   double before[3];
-  dBodyID cube = open_switching(&w, order[0]);
+  test_world *w = open_switching(order[0]);
+  dBodyID cube = w->bodies[0];
   hapi_v3_copy(dBodyGetPosition(cube), before);
   for (int i = 0; i < 20; ++i) {
-    CHECK(hap_session_set_model(w.session, order[i % count]) == HAP_OK);
+    CHECK(hap_session_set_model(w->session, order[i % count]) == HAP_OK);
     for (int k = 0; k < gap_ticks; k += 10) {
-      push_along(&w, &x, 0.03, 10);
+      push_along(w, &x, 0.03, 10);
       check_continuous(cube, before, 0.04); /* a step is at most 2 H long */
     }
   }
-  push_along(&w, &x, -0.2, 200);
-  hap_stats stats = world_stats(&w);
+  push_along(w, &x, -0.2, 200);
+  hap_stats stats = world_stats(w);
   printf("# gap %d: impulse %.6f, ratio %.12f, peak %.3f, x %.4f\n", gap_ticks,
          stats.hand.impulse_ns, stats.hand.momentum_ratio, stats.hand.peak_force_n,
          dBodyGetPosition(cube)[0]);
   CHECK(stats.hand.impulse_ns > 0.1);
   CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
-  CHECK(fault_of(&w) == HAP_FAULT_NONE && stats.faults.states_rejected == 0);
+  CHECK(fault_of(w) == HAP_FAULT_NONE && stats.faults.states_rejected == 0);
   CHECK(stats.hand.peak_force_n < 15.0);
   CHECK(dBodyGetPosition(cube)[0] > 0.03 * 1e-3 * 20 * gap_ticks - 0.03 + EDGE / 2);
-  world_close(&w);
 }
 
 TEST(models_are_switched_while_pushing)

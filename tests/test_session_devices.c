@@ -165,16 +165,18 @@ static hap_pointer_def pointer_def(hap_device *device)
 }
 
 /* The cube stands still whatever pushes it: then the fake stays in contact. */
-static bool run_with_fake(stage *s, hap_drive drive, hap_device **out)
+static stage *run_with_fake(hap_drive drive, hap_device **out)
 {
   hap_pointer_id id;
   fakes_opened = 0;
-  stage_init(s, drive);
+  stage *s = stage_new(drive);
   dBodySetKinematic(s->cube);
   *out = open_fake(HAP_PACING_VIRTUAL);
   hap_pointer_def def = pointer_def(*out);
-  return stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK &&
-         hap_session_start(s->session) == HAP_OK;
+  return (stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK &&
+          hap_session_start(s->session) == HAP_OK)
+             ? s
+             : NULL;
 }
 
 static void end_with_fake(stage *s, hap_device *device)
@@ -196,29 +198,29 @@ static bool pushes(const fake *d)
 /* A fault comes, stays when its cause has gone, and goes with a reset. */
 static void fault_and_reset(atomic_int *cause, hap_fault fault, const char *text)
 {
-  stage s;
   hap_device *device;
-  REQUIRE(run_with_fake(&s, HAP_DRIVE_LOCKSTEP, &device));
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
-  CHECK(pushes(&fakes[0]) && stats_of(&s).faults.fault == HAP_FAULT_NONE);
+  stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL);
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
+  CHECK(pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_NONE);
   atomic_store(cause, 1);
-  CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
-  CHECK(stats_of(&s).faults.count == 1 || fault == HAP_FAULT_DEVICE_WRITE);
-  CHECK(hap_session_advance(s.session, 20) == HAP_FAULTED);
-  CHECK(stats_of(&s).faults.fault == fault && stats_of(&s).faults.count == 1);
+  CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
+  CHECK(stats_of(s).faults.count == 1 || fault == HAP_FAULT_DEVICE_WRITE);
+  CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
+  CHECK(stats_of(s).faults.fault == fault && stats_of(s).faults.count == 1);
   CHECK(!pushes(&fakes[0]) && atomic_load(&fakes[0].zeroed) == 1);
-  CHECK(has(detail_of(&s), text));
+  CHECK(has(detail_of(s), text));
   int writes = atomic_load(&fakes[0].writes);
   atomic_store(cause, 0);
-  CHECK(hap_session_advance(s.session, 50) == HAP_FAULTED);
-  CHECK(stats_of(&s).faults.fault == fault && !pushes(&fakes[0])); /* latched */
-  CHECK(atomic_load(&fakes[0].writes) == writes + 50);             /* zeros go on being written */
-  CHECK(hap_session_reset_fault(s.session) == HAP_OK);
-  CHECK(hap_session_advance(s.session, 2) == HAP_OK);
-  CHECK(stats_of(&s).faults.fault == HAP_FAULT_NONE && pushes(&fakes[0]));
-  CHECK(strcmp(detail_of(&s), "") == 0);
-  CHECK(stats_of(&s).faults.count == 1 && stats_of(&s).loop.ticks == 123);
-  end_with_fake(&s, device);
+  CHECK(hap_session_advance(s->session, 50) == HAP_FAULTED);
+  CHECK(stats_of(s).faults.fault == fault && !pushes(&fakes[0])); /* latched */
+  CHECK(atomic_load(&fakes[0].writes) == writes + 50);            /* zeros go on being written */
+  CHECK(hap_session_reset_fault(s->session) == HAP_OK);
+  CHECK(hap_session_advance(s->session, 2) == HAP_OK);
+  CHECK(stats_of(s).faults.fault == HAP_FAULT_NONE && pushes(&fakes[0]));
+  CHECK(strcmp(detail_of(s), "") == 0);
+  CHECK(stats_of(s).faults.count == 1 && stats_of(s).loop.ticks == 123);
+  end_with_fake(s, device);
 }
 
 TEST(a_read_that_fails_latches_a_fault)
@@ -238,25 +240,25 @@ TEST(a_pose_that_is_not_finite_latches_a_fault)
 
 TEST(one_bad_device_takes_the_force_of_all)
 {
-  stage s;
   hap_device *devices[2];
   hap_pointer_id id;
-  REQUIRE(run_with_fake(&s, HAP_DRIVE_LOCKSTEP, &devices[0]));
+  stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &devices[0]);
+  REQUIRE(s != NULL);
   devices[1] = open_fake(HAP_PACING_VIRTUAL);
   hap_pointer_def def = pointer_def(devices[1]);
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK); /* while it runs */
-  CHECK(hap_session_advance(s.session, 50) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK); /* while it runs */
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK);
   CHECK(pushes(&fakes[0]) && atomic_load(&fakes[1].writes) == 50);
   atomic_store(&fakes[1].bad_pose, 1);
-  CHECK(hap_session_advance(s.session, 1) >= HAP_OK);
-  CHECK(!pushes(&fakes[0]) && stats_of(&s).faults.fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
+  CHECK(!pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_DEVICE_POSE);
   hap_pointer_state shown;
-  CHECK(hap_pointer_get(s.session, id, &shown, sizeof shown) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, id, &shown, sizeof shown) == HAP_OK);
   CHECK(hapi_finite(shown.device.position, 3) && hapi_finite(shown.proxy.position, 3));
-  CHECK(hap_session_stop(s.session) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
   hap_device_close(devices[1]); /* late: the session still has it */
   CHECK(atomic_load(&fakes[1].closes) == 0);
-  end_with_fake(&s, devices[0]);
+  end_with_fake(s, devices[0]);
   CHECK(atomic_load(&fakes[1].closes) == 1 && atomic_load(&fakes[1].wrong) == 0);
 }
 
@@ -266,27 +268,27 @@ TEST(zero_is_the_last_thing_that_is_written)
 {
   static const hap_drive drives[] = {HAP_DRIVE_LOCKSTEP, HAP_DRIVE_THREADS, HAP_DRIVE_FRAME};
   for (int way = 0; way < 9; ++way) {
-    stage s;
     hap_device *device;
-    REQUIRE(run_with_fake(&s, drives[way % 3], &device));
+    stage *s = run_with_fake(drives[way % 3], &device);
+    REQUIRE(s != NULL);
     for (int i = 0; i < 2000 && !pushes(&fakes[0]); ++i) {
-      sleep_ms(s.def.drive == HAP_DRIVE_LOCKSTEP ? 0 : 1);
-      CHECK(s.def.drive != HAP_DRIVE_LOCKSTEP || hap_session_advance(s.session, 1) == HAP_OK);
-      CHECK(s.def.drive != HAP_DRIVE_FRAME || hap_session_update(s.session, 0.001) >= HAP_OK);
+      sleep_ms(s->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : 1);
+      CHECK(s->def.drive != HAP_DRIVE_LOCKSTEP || hap_session_advance(s->session, 1) == HAP_OK);
+      CHECK(s->def.drive != HAP_DRIVE_FRAME || hap_session_update(s->session, 0.001) >= HAP_OK);
     }
     CHECK(pushes(&fakes[0]));
     if (way / 3 == 0) {
-      CHECK(hap_session_stop(s.session) == HAP_OK);
+      CHECK(hap_session_stop(s->session) == HAP_OK);
     } else if (way / 3 == 1) {
-      hap_session_destroy(s.session); /* without stop */
-      s.session = NULL;
+      hap_session_destroy(s->session); /* without stop */
+      s->session = NULL;
     } else {
       hap_pointer_id id = {((uint64_t)1 << 32) | 1};
-      CHECK(hap_pointer_remove(s.session, id) == HAP_OK);
+      CHECK(hap_pointer_remove(s->session, id) == HAP_OK);
     }
     CHECK(atomic_load(&fakes[0].zeroed) == 1 && atomic_load(&fakes[0].stops) == 1);
     CHECK(atomic_load(&fakes[0].running) == 0);
-    end_with_fake(&s, device);
+    end_with_fake(s, device);
   }
 }
 
@@ -352,65 +354,63 @@ TEST(devices_with_a_clock_of_their_own_cannot_run_in_lockstep)
 
 TEST(a_device_limits_the_force)
 {
-  stage s;
   hap_device *device;
-  REQUIRE(run_with_fake(&s, HAP_DRIVE_LOCKSTEP, &device)); /* 12 N, below the pointer's 20 */
+  stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device);
+  REQUIRE(s != NULL); /* 12 N, below the pointer's 20 */
   for (int i = 0; i <= 30; ++i) {
     fakes[0].x = -0.06 + 1e-3 * i; /* 30 mm deep: 30 N */
-    CHECK(hap_session_advance(s.session, 10) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 10) == HAP_OK);
   }
   hap_pointer_state state;
   hap_pointer_id id = {((uint64_t)1 << 32) | 1};
-  CHECK(hap_pointer_get(s.session, id, &state, sizeof state) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, id, &state, sizeof state) == HAP_OK);
   CHECK_NEAR(hapi_v3_norm(state.wrench.force), 12.0, 1e-9);
   CHECK(state.wrench.force[0] < 0.0 && state.buttons == 5 && state.contacts == 1);
   CHECK_NEAR(state.proxy.position[0], -0.03, 0.0);
-  CHECK(stats_of(&s).faults.saturated_ticks > 0);
-  CHECK_NEAR(stats_of(&s).hand.peak_force_n, 12.0, 1e-9);
-  end_with_fake(&s, device); /* no write was beyond the limit */
+  CHECK(stats_of(s).faults.saturated_ticks > 0);
+  CHECK_NEAR(stats_of(s).hand.peak_force_n, 12.0, 1e-9);
+  end_with_fake(s, device); /* no write was beyond the limit */
 }
 
 /* ---- ids and defs ---- */
 
 TEST(ids_of_removed_pointers_are_never_valid_again)
 {
-  stage s;
   hap_pointer_id ids[8];
   hap_pointer_state state;
   const hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  s.def.max_pointers = 2;
-  REQUIRE(stage_create(&s) == HAP_OK && hap_session_start(s.session) == HAP_OK);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  s->def.max_pointers = 2;
+  REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
   hap_pointer_def def = pointer_def(NULL);
   for (int i = 0; i < 8; ++i) {
-    REQUIRE(hap_pointer_add(s.session, &def, &ids[i]) == HAP_OK);
+    REQUIRE(hap_pointer_add(s->session, &def, &ids[i]) == HAP_OK);
     CHECK(ids[i].v != 0);
-    CHECK(hap_session_advance(s.session, i % 3) == HAP_OK);
-    CHECK(hap_pointer_get(s.session, ids[i], &state, sizeof state) == HAP_OK);
-    CHECK(hap_pointer_remove(s.session, ids[i]) == HAP_OK);
+    CHECK(hap_session_advance(s->session, i % 3) == HAP_OK);
+    CHECK(hap_pointer_get(s->session, ids[i], &state, sizeof state) == HAP_OK);
+    CHECK(hap_pointer_remove(s->session, ids[i]) == HAP_OK);
     for (int k = 0; k <= i; ++k) {
-      CHECK(hap_pointer_get(s.session, ids[k], &state, sizeof state) == HAP_ERROR_NOT_FOUND);
-      CHECK(hap_pointer_remove(s.session, ids[k]) == HAP_ERROR_NOT_FOUND);
-      CHECK(hap_pointer_set_target(s.session, ids[k], &pose, NULL) == HAP_ERROR_NOT_FOUND);
-      CHECK(has(detail_of(&s), "it was removed"));
+      CHECK(hap_pointer_get(s->session, ids[k], &state, sizeof state) == HAP_ERROR_NOT_FOUND);
+      CHECK(hap_pointer_remove(s->session, ids[k]) == HAP_ERROR_NOT_FOUND);
+      CHECK(hap_pointer_set_target(s->session, ids[k], &pose, NULL) == HAP_ERROR_NOT_FOUND);
+      CHECK(has(detail_of(s), "it was removed"));
       CHECK(k == i || ids[k].v != ids[i].v);
     }
   }
   const uint64_t never[] = {0, 1, 3, UINT64_MAX, (uint64_t)1 << 32};
   for (int i = 0; i < 5; ++i) {
     hap_pointer_id id = {never[i]};
-    CHECK(hap_pointer_remove(s.session, id) == HAP_ERROR_NOT_FOUND);
+    CHECK(hap_pointer_remove(s->session, id) == HAP_ERROR_NOT_FOUND);
   }
-  CHECK(hap_pointer_add(s.session, &def, &ids[0]) == HAP_OK);
-  CHECK(hap_pointer_add(s.session, &def, &ids[1]) == HAP_OK);
-  CHECK(hap_pointer_add(s.session, &def, &ids[2]) == HAP_ERROR_CAPACITY && ids[2].v == 0);
-  CHECK(has(detail_of(&s), "max_pointers"));
-  CHECK(hap_pointer_get(s.session, ids[0], &state, 3) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_pointer_get(s.session, ids[0], NULL, sizeof state) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_add(s->session, &def, &ids[0]) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &def, &ids[1]) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &def, &ids[2]) == HAP_ERROR_CAPACITY && ids[2].v == 0);
+  CHECK(has(detail_of(s), "max_pointers"));
+  CHECK(hap_pointer_get(s->session, ids[0], &state, 3) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_get(s->session, ids[0], NULL, sizeof state) == HAP_ERROR_ARGUMENT);
   memset(&state, 0xee, sizeof state);
-  CHECK(hap_pointer_get(s.session, ids[0], &state, 8) == HAP_OK);
+  CHECK(hap_pointer_get(s->session, ids[0], &state, 8) == HAP_OK);
   CHECK(state.size == 8 && state.buttons == 0xeeeeeeeeu);
-  stage_end(&s);
 }
 
 TEST(a_device_serves_one_pointer)

@@ -107,22 +107,20 @@ TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
 /* Two sessions would step the world of each other, which ends in an abort of the process. */
 TEST(a_world_has_one_session_at_a_time)
 {
-  stage s;
   hap_session *second = NULL;
   hap_detail why = {""};
-  stage_init(&s, HAP_DRIVE_LOCKSTEP);
-  REQUIRE(stage_create(&s) == HAP_OK);
-  CHECK(hap_session_create(&s.def, &s.ode, &second, &why) == HAP_ERROR_STATE && second == NULL);
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_create(&s->def, &s->ode, &second, &why) == HAP_ERROR_STATE && second == NULL);
   CHECK(strstr(why.text, "already has a session") != NULL);
-  CHECK(hap_session_start(s.session) == HAP_OK && hap_session_stop(s.session) == HAP_OK);
-  CHECK(hap_session_create(&s.def, &s.ode, &second, NULL) == HAP_ERROR_STATE && second == NULL);
+  CHECK(hap_session_start(s->session) == HAP_OK && hap_session_stop(s->session) == HAP_OK);
+  CHECK(hap_session_create(&s->def, &s->ode, &second, NULL) == HAP_ERROR_STATE && second == NULL);
 
   stage other; /* another world has its own */
   CHECK(stage_run(&other, HAP_DRIVE_LOCKSTEP));
-  hap_session_destroy(s.session);
-  CHECK(hap_session_create(&s.def, &s.ode, &s.session, &why) == HAP_OK);
+  hap_session_destroy(s->session);
+  CHECK(hap_session_create(&s->def, &s->ode, &s->session, &why) == HAP_OK);
   stage_end(&other);
-  stage_end(&s);
 }
 
 /* A create that fails leaves the world free. */

@@ -172,9 +172,9 @@ static void step_run(test_world *w, run_kind kind)
   world_step(w, 1);
 }
 
-static void begin_run(test_world *w, const run_plan *plan, run_kind kind)
+static test_world *begin_run(const run_plan *plan, run_kind kind)
 {
-  world_open(w, 9.81, 20);
+  test_world *w = world_new(9.81, 20);
   plan->build(w);
   if (plan->setup != NULL) {
     plan->setup(w, -1);
@@ -187,29 +187,28 @@ static void begin_run(test_world *w, const run_plan *plan, run_kind kind)
     /* Physics has its first step at tick H/T: be just before it. */
     CHECK(hap_session_advance(w->session, 1) == HAP_OK);
   }
+  return w;
 }
 
 /* Record k is the state after k + 1 steps. */
 static history record(const run_plan *plan, run_kind kind)
 {
-  test_world w;
   history h = {NULL, plan->steps, 0, 0};
-  begin_run(&w, plan, kind);
-  h.bodies = w.body_count;
+  test_world *w = begin_run(plan, kind);
+  h.bodies = w->body_count;
   h.bits = calloc((size_t)h.steps * (size_t)h.bodies, sizeof *h.bits);
   for (int i = 0; i < h.steps && h.bits != NULL; ++i) {
     if (plan->event != NULL) {
-      plan->event(&w, i);
+      plan->event(w, i);
     }
-    step_run(&w, kind);
-    keep_bits(&h, &w, i);
+    step_run(w, kind);
+    keep_bits(&h, w, i);
   }
   if (kind == PLAIN) {
     dJointGroupDestroy(plain_group);
   } else {
-    h.probes = world_stats(&w).probes.steps;
+    h.probes = world_stats(w).probes.steps;
   }
-  world_close(&w);
   return h;
 }
 

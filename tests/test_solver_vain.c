@@ -25,32 +25,30 @@ typedef struct figures {
 
 static figures push_row(int count)
 {
-  contact_world w;
   figures out = {0};
-  cw_open(&w, CW_GRAVITY);
-  cw_add_floor(&w);
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
   for (int i = 0; i < count; ++i) {
-    cw_add_cube(&w, 0.15, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
+    cw_add_cube(w, 0.15, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
   }
-  w.def.physics_hz = 60.0;
-  w.hand_def.radius = RADIUS;
-  w.hand_velocity[0] = SPEED;
-  CHECK(cw_start(&w, -0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE));
-  const hapi_solver *solver = &w.session->haptic->tick.rows.solver;
+  w->def.physics_hz = 60.0;
+  w->hand_def.radius = RADIUS;
+  w->hand_velocity[0] = SPEED;
+  CHECK(cw_start(w, -0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE));
+  const hapi_solver *solver = &w->session->haptic->tick.rows.solver;
   uint64_t before = 0;
   for (int i = 0; i < SETTLES + TICKS; ++i) {
-    cw_tick(&w);
-    double updates = (double)(cw_stats(&w).contact.sweeps - before) * solver->row_count;
-    before = cw_stats(&w).contact.sweeps;
+    cw_tick(w);
+    double updates = (double)(cw_stats(w).contact.sweeps - before) * solver->row_count;
+    before = cw_stats(w).contact.sweeps;
     if (i >= SETTLES) {
       out.rests += solver->dear_runs > 0 && solver->dear_rows > 0;
       out.solved += solver->direct_solves > 0;
       out.most = updates > out.most ? updates : out.most;
-      out.force -= w.force[0] / TICKS;
+      out.force -= w->force[0] / TICKS;
     }
   }
   out.rows = solver->row_count;
-  cw_close(&w);
   printf("# %d cubes: %u rows, %d rest, %d solved, %g updates, %.3f N\n", count, out.rows,
          out.rests, out.solved, out.most, out.force);
   return out;

@@ -465,37 +465,35 @@ typedef struct swing {
 /* A light mechanism with a tool of which nobody holds more than a finger, against a wall of 20 kN/m. */
 static swing strike_wall(hap_coupling coupling)
 {
-  tool_world w;
   swing out = {0.0, 0.0};
-  tool_begin(&w, HAP_MODEL_CONTACT);
-  w.research.guard = HAP_GUARD_ON;
+  tool_world *w = tool_new(HAP_MODEL_CONTACT);
+  w->research.guard = HAP_GUARD_ON;
   CHECK(hap_device_open(
             "virtual:dof=6,hand=relaxed,device_mass=0.1,device_damping=1,device_inertia=1e-4,"
             "device_turn_damping=1e-4,max_force=20,max_torque=1,"
             "path=0:0/0/0.03;0.3:0/0/0;3:0/0/0,turn=0:0/0/0;0.3:0/0.1/0;3:0.1/-0.1/0",
-            &w.tool_def.device, &w.detail) == HAP_OK);
-  w.tool_def.stiffness = 20000.0;
-  w.tool_expert.coupling = coupling;
-  tool_add_floor(&w);
-  CHECK(tool_start(&w));
+            &w->tool_def.device, &w->detail) == HAP_OK);
+  w->tool_def.stiffness = 20000.0;
+  w->tool_expert.coupling = coupling;
+  tool_add_floor(w);
+  CHECK(tool_start(w));
   for (int i = 0; i < 3000; ++i) {
-    hap_pointer_state before = w.state;
-    CHECK(hap_session_advance(w.session, 1) == HAP_OK);
-    CHECK(hap_pointer_get(w.session, w.tool, &w.state, sizeof w.state) == HAP_OK);
+    hap_pointer_state before = w->state;
+    CHECK(hap_session_advance(w->session, 1) == HAP_OK);
+    CHECK(hap_pointer_get(w->session, w->tool, &w->state, sizeof w->state) == HAP_OK);
     double change[2][3];
-    hapi_v3_sub(w.state.wrench.force, before.wrench.force, change[0]);
-    hapi_v3_sub(w.state.wrench.torque, before.wrench.torque, change[1]);
+    hapi_v3_sub(w->state.wrench.force, before.wrench.force, change[0]);
+    hapi_v3_sub(w->state.wrench.torque, before.wrench.torque, change[1]);
     if (i > 2000) {
       out.late_force = fmax(out.late_force, hapi_v3_norm(change[0]));
       out.late_torque = fmax(out.late_torque, hapi_v3_norm(change[1]));
     }
   }
-  CHECK(w.state.wrench.force[2] > 1.0);
-  hap_device *device = w.tool_def.device;
-  hap_session_destroy(w.session);
-  w.session = NULL;
+  CHECK(w->state.wrench.force[2] > 1.0);
+  hap_device *device = w->tool_def.device;
+  hap_session_destroy(w->session);
+  w->session = NULL;
   hap_device_close(device);
-  tool_end(&w);
   return out;
 }
 

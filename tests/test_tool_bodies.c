@@ -131,27 +131,26 @@ TEST(momentum_and_spin_go_to_a_free_body)
 {
   static const double half[3] = {0.02, 0.02, 0.02};
   for (int m = 0; m < 4; ++m) {
-    tool_world w;
     double impulse[3] = {0.0, 0.0, 0.0};
     double turn[3] = {0.0, 0.0, 0.0};
-    tool_begin(&w, all_models[m]);
-    dWorldSetGravity(w.world, 0.0, 0.0, 0.0);
-    dBodyID body = add_box(&w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
-    CHECK(tool_start(&w));
-    tool_go(&w, -0.032, 0.0, 0.015, 0.0);
-    tool_run(&w, 20);
+    tool_world *w = tool_new(all_models[m]);
+    dWorldSetGravity(w->world, 0.0, 0.0, 0.0);
+    dBodyID body = add_box(w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
+    CHECK(tool_start(w));
+    tool_go(w, -0.032, 0.0, 0.015, 0.0);
+    tool_run(w, 20);
     for (int i = 0; i < 80; ++i) {
-      tool_move(&w, -0.032 + 0.0002 * fmin(i, 40), 0.0, 0.015, 0.0, 1);
-      const hap_wrench *f = &w.state.wrench;
+      tool_move(w, -0.032 + 0.0002 * fmin(i, 40), 0.0, 0.015, 0.0, 1);
+      const hap_wrench *f = &w->state.wrench;
       double moment[3];
       hapi_v3_madd(impulse, -1e-3, f->force, impulse);
-      hapi_v3_cross(w.state.proxy.position, f->force, moment); /* the body hardly moves */
+      hapi_v3_cross(w->state.proxy.position, f->force, moment); /* the body hardly moves */
       hapi_v3_add(moment, f->torque, moment);
       hapi_v3_madd(turn, -1e-3, moment, turn);
     }
-    tool_go(&w, -0.2, 0.0, 0.0, 0.0);
-    tool_run(&w, 60);
-    CHECK(hap_session_stop(w.session) == HAP_OK);
+    tool_go(w, -0.2, 0.0, 0.0, 0.0);
+    tool_run(w, 60);
+    CHECK(hap_session_stop(w->session) == HAP_OK);
     dMass mass;
     dBodyGetMass(body, &mass);
     printf("# model %d: %.6f of %.6f N s, %.7f of %.7f N m s\n", (int)all_models[m],
@@ -160,7 +159,6 @@ TEST(momentum_and_spin_go_to_a_free_body)
     CHECK(impulse[0] > 0.01);
     CHECK_NEAR(0.5 * dBodyGetLinearVel(body)[0], impulse[0], 1e-3 * impulse[0]);
     CHECK_NEAR(mass.I[5] * dBodyGetAngularVel(body)[1], turn[1], 0.03 * fabs(turn[1]));
-    tool_end(&w);
   }
 }
 

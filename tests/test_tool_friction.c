@@ -38,9 +38,9 @@ static void stand(tool_world *w, double x, double y, double z, double angle)
 }
 
 /* With its face flat on the ground, pressed into it. */
-static bool press(tool_world *w, const ground *g)
+static tool_world *press(const ground *g)
 {
-  tool_begin(w, g->model);
+  tool_world *w = tool_new(g->model);
   w->tool_def.friction = MU;
   w->tool_def.finger_radius = g->finger;
   if (g->proxied) {
@@ -53,13 +53,13 @@ static bool press(tool_world *w, const ground *g)
     tool_add_floor(w);
   }
   if (!tool_start(w)) {
-    return false;
+    return NULL;
   }
   tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
   tool_run(w, 40);
   tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
   tool_run(w, 40);
-  return true;
+  return w;
 }
 
 /* N/m, of the contact, and behind a proxy of both springs. */
@@ -77,39 +77,39 @@ static double slip_of(const tool_world *w)
 TEST(a_face_sticks_as_a_spring)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
-    tool_world w;
-    REQUIRE(press(&w, &grounds[i]));
+    tool_world *w = press(&grounds[i]);
+    REQUIRE(w != NULL);
     double k = felt(&grounds[i]);
-    CHECK_NEAR(w.state.wrench.force[2], k * DEEP, 1e-3 * LOAD);
-    CHECK(slip_of(&w) < 1e-6);
-    CHECK(w.state.contacts == 4);
-    stand(&w, 4e-4, -3e-4, HALF - DEEP, 0.0);
-    tool_run(&w, 300);
-    CHECK_NEAR(w.state.wrench.force[0], -k * 4e-4, 1e-3 * k * 4e-4);
-    CHECK_NEAR(w.state.wrench.force[1], k * 3e-4, 1e-3 * k * 3e-4);
+    CHECK_NEAR(w->state.wrench.force[2], k * DEEP, 1e-3 * LOAD);
+    CHECK(slip_of(w) < 1e-6);
+    CHECK(w->state.contacts == 4);
+    stand(w, 4e-4, -3e-4, HALF - DEEP, 0.0);
+    tool_run(w, 300);
+    CHECK_NEAR(w->state.wrench.force[0], -k * 4e-4, 1e-3 * k * 4e-4);
+    CHECK_NEAR(w->state.wrench.force[1], k * 3e-4, 1e-3 * k * 3e-4);
     double arm = -(HALF - 0.5 * DEEP); /* half-way between the surfaces */
-    CHECK_NEAR(w.state.wrench.torque[1], arm * -k * 4e-4, 2e-3 * HALF * k * 4e-4);
-    CHECK_NEAR(w.state.wrench.torque[0], -arm * k * 3e-4, 2e-3 * HALF * k * 3e-4);
-    tool_end(&w);
+    CHECK_NEAR(w->state.wrench.torque[1], arm * -k * 4e-4, 2e-3 * HALF * k * 4e-4);
+    CHECK_NEAR(w->state.wrench.torque[0], -arm * k * 3e-4, 2e-3 * HALF * k * 3e-4);
+    tool_end(w);
   }
 }
 
 TEST(a_face_slides_as_coulomb_says)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
-    tool_world w;
-    REQUIRE(press(&w, &grounds[i]));
+    tool_world *w = press(&grounds[i]);
+    REQUIRE(w != NULL);
     for (int j = 0; j < 8; ++j) {
       double angle = 2.0 * M_PI * (j + 0.3) / 8.0;
-      tool_move(&w, 0.01 * cos(angle), 0.01 * sin(angle), HALF - DEEP, 0.0, 200);
-      double limit = MU * w.state.wrench.force[2];
-      CHECK_NEAR(w.state.wrench.force[2], felt(&grounds[i]) * DEEP, 1e-3 * LOAD);
-      CHECK_NEAR(slip_of(&w), limit, 1e-3 * limit);
-      tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 200);
-      CHECK_NEAR(w.state.wrench.force[0], limit * cos(angle), 2e-3 * limit);
-      CHECK_NEAR(w.state.wrench.force[1], limit * sin(angle), 2e-3 * limit);
+      tool_move(w, 0.01 * cos(angle), 0.01 * sin(angle), HALF - DEEP, 0.0, 200);
+      double limit = MU * w->state.wrench.force[2];
+      CHECK_NEAR(w->state.wrench.force[2], felt(&grounds[i]) * DEEP, 1e-3 * LOAD);
+      CHECK_NEAR(slip_of(w), limit, 1e-3 * limit);
+      tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 200);
+      CHECK_NEAR(w->state.wrench.force[0], limit * cos(angle), 2e-3 * limit);
+      CHECK_NEAR(w->state.wrench.force[1], limit * sin(angle), 2e-3 * limit);
     }
-    tool_end(&w);
+    tool_end(w);
   }
 }
 
@@ -119,27 +119,27 @@ TEST(a_face_slides_as_coulomb_says)
 TEST(a_face_holds_against_turning)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
-    tool_world w;
     double a = grounds[i].finger;
     double radius = sqrt(2.0 * HALF * HALF + a * a);
-    REQUIRE(press(&w, &grounds[i]));
+    tool_world *w = press(&grounds[i]);
+    REQUIRE(w != NULL);
     double k = felt(&grounds[i]) * radius * radius;
     for (int j = 1; j <= 5; ++j) {
-      stand(&w, 0.0, 0.0, HALF - DEEP, 0.01 * j);
-      tool_run(&w, 20);
-      CHECK_NEAR(w.state.wrench.torque[2], -k * 0.01 * j, 2e-3 * k * 0.01 * j);
+      stand(w, 0.0, 0.0, HALF - DEEP, 0.01 * j);
+      tool_run(w, 20);
+      CHECK_NEAR(w->state.wrench.torque[2], -k * 0.01 * j, 2e-3 * k * 0.01 * j);
     }
-    CHECK(slip_of(&w) < 1e-6);
+    CHECK(slip_of(w) < 1e-6);
     for (int j = 0; j < 300; ++j) {
-      stand(&w, 0.0, 0.0, HALF - DEEP, 0.05 + 1e-3 * j);
-      w.twist.angular[2] = 1.0;
-      tool_step(&w);
+      stand(w, 0.0, 0.0, HALF - DEEP, 0.05 + 1e-3 * j);
+      w->twist.angular[2] = 1.0;
+      tool_step(w);
     }
     double lag = MU * DEEP / radius;
     double arm2 = 2.0 * HALF * HALF;
     double limit = MU * LOAD / radius * (arm2 * sqrt(1.0 - lag * lag) + a * a);
-    CHECK_NEAR(w.state.wrench.torque[2], -limit, 2e-3 * limit);
-    tool_end(&w);
+    CHECK_NEAR(w->state.wrench.torque[2], -limit, 2e-3 * limit);
+    tool_end(w);
   }
 }
 
@@ -213,25 +213,24 @@ typedef struct crept {
 /* In that time, in which it tilts; level before and after. */
 static crept creep(const rest *r, int ticks)
 {
-  tool_world w;
   crept out = {HUGE_VAL, HUGE_VAL};
-  tool_begin(&w, r->model);
-  w.tool_def.friction = MU;
-  w.tool_def.damping = 2.0;
+  tool_world *w = tool_new(r->model);
+  w->tool_def.friction = MU;
+  w->tool_def.damping = 2.0;
   if (r->round) {
-    make_round(&w);
+    make_round(w);
   }
   if (r->proxied) {
-    w.tool_expert.coupling = HAP_COUPLING_PROXY;
-    w.tool_expert.coupling_stiffness = 5e3;
-    w.tool_expert.coupling_damping = 5.0;
+    w->tool_expert.coupling = HAP_COUPLING_PROXY;
+    w->tool_expert.coupling_stiffness = 5e3;
+    w->tool_expert.coupling_damping = 5.0;
   }
   double edge = r->narrow ? 0.025 : 0.2;
-  dGeomSetPosition(dCreateBox(w.space, edge, edge, 0.1), r->narrow ? 0.007 : 0.0, 0.0, -0.05);
+  dGeomSetPosition(dCreateBox(w->space, edge, edge, 0.1), r->narrow ? 0.007 : 0.0, 0.0, -0.05);
   hand h = {.at = {0.0, 0.0, HALF + 1e-3}, .push = {0.0, 0.0, -LOAD}};
   double start[3] = {0.0, 0.0, 0.0};
   double angle = 0.0;
-  if (!tool_start(&w)) {
+  if (!tool_start(w)) {
     CHECK(false);
     return out;
   }
@@ -247,11 +246,11 @@ static crept creep(const rest *r, int ticks)
     }
     h.tilt[0] = i > 1000 && i < 1000 + ticks && !r->one_axis ? r->tilt : 0.0;
     h.tilt[1] = i > 1000 && i < 1000 + ticks ? r->tilt : 0.0;
-    hold_tool(&w, &h, i - 1000);
+    hold_tool(w, &h, i - 1000);
   }
   out.way = hypot(h.at[0] - start[0], h.at[1] - start[1]);
   out.turn = h.angle - angle;
-  tool_end(&w);
+  tool_end(w);
   return out;
 }
 
@@ -290,21 +289,20 @@ TEST(a_change_of_model_lets_nothing_go)
   static const hap_model next[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE,
                                    HAP_MODEL_IMPULSE, HAP_MODEL_CONTACT};
   const ground g = {HAP_MODEL_CONTACT, true, false, 0.005};
-  tool_world w;
-  REQUIRE(press(&w, &g));
-  stand(&w, 4e-4, 0.0, HALF - DEEP, 0.02);
-  tool_run(&w, 50);
-  double force = w.state.wrench.force[0];
-  double torque = w.state.wrench.torque[2];
+  tool_world *w = press(&g);
+  REQUIRE(w != NULL);
+  stand(w, 4e-4, 0.0, HALF - DEEP, 0.02);
+  tool_run(w, 50);
+  double force = w->state.wrench.force[0];
+  double torque = w->state.wrench.torque[2];
   CHECK(force < -0.39 && torque < -4e-3);
   for (int m = 0; m < 5; ++m) {
-    CHECK(hap_session_set_model(w.session, next[m]) == HAP_OK);
-    tool_run(&w, 100);
-    CHECK(w.state.contacts == 4);
-    CHECK_NEAR(w.state.wrench.force[0], force, 1e-3);
-    CHECK_NEAR(w.state.wrench.torque[2], torque, 1e-5);
+    CHECK(hap_session_set_model(w->session, next[m]) == HAP_OK);
+    tool_run(w, 100);
+    CHECK(w->state.contacts == 4);
+    CHECK_NEAR(w->state.wrench.force[0], force, 1e-3);
+    CHECK_NEAR(w->state.wrench.torque[2], torque, 1e-5);
   }
-  tool_end(&w);
 }
 
 /* A device of 3 dof does not turn its tool, and gets no torque; a world that turns under it does not move it. */
@@ -451,37 +449,36 @@ typedef struct round_trip {
 /* Down, along, round, along, back again, with a tilt in between, and off. */
 static round_trip go_round(const ground *g, hap_guard guard, double tilt)
 {
-  tool_world w;
   round_trip out = {0.0, 0.0};
-  tool_begin(&w, g->model);
-  w.research.guard = guard;
-  w.tool_def.friction = MU;
-  w.tool_def.finger_radius = g->finger;
+  tool_world *w = tool_new(g->model);
+  w->research.guard = guard;
+  w->tool_def.friction = MU;
+  w->tool_def.finger_radius = g->finger;
   if (g->proxied) {
-    w.tool_expert.coupling = HAP_COUPLING_PROXY;
-    w.tool_expert.coupling_stiffness = 1e4;
+    w->tool_expert.coupling = HAP_COUPLING_PROXY;
+    w->tool_expert.coupling_stiffness = 1e4;
   }
-  dGeomSetPosition(dCreateBox(w.space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
-  CHECK(tool_start(&w));
-  tool_go(&w, 0.0, 0.0, HALF + 0.003, 0.0);
-  tool_run(&w, 60);
-  w.work = w.work_most = 0.0;
+  dGeomSetPosition(dCreateBox(w->space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
+  CHECK(tool_start(w));
+  tool_go(w, 0.0, 0.0, HALF + 0.003, 0.0);
+  tool_run(w, 60);
+  w->work = w->work_most = 0.0;
   for (int i = 0; i < 4; ++i) {
-    tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 100);
-    out.stored = fmax(out.stored, -w.work);
+    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 100);
+    out.stored = fmax(out.stored, -w->work);
     for (int j = 0; j < 3; ++j) {
-      tool_move(&w, 6e-4, 3e-4, HALF - DEEP, 0.0, 50);
-      tool_move(&w, 6e-4, 3e-4, HALF - DEEP, tilt, 80);
-      tool_move(&w, -2e-4, -6e-4, HALF - DEEP, tilt, 50);
-      tool_move(&w, -2e-4, -6e-4, HALF - DEEP, 0.0, 80);
-      tool_move(&w, 0.0, 0.0, HALF - DEEP, 0.0, 50);
+      tool_move(w, 6e-4, 3e-4, HALF - DEEP, 0.0, 50);
+      tool_move(w, 6e-4, 3e-4, HALF - DEEP, tilt, 80);
+      tool_move(w, -2e-4, -6e-4, HALF - DEEP, tilt, 50);
+      tool_move(w, -2e-4, -6e-4, HALF - DEEP, 0.0, 80);
+      tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 50);
     }
-    tool_move(&w, 3e-3, 0.0, HALF - DEEP, 0.0, 50);
-    tool_move(&w, 3e-3, 0.0, HALF + 0.003, 0.0, 100);
-    tool_move(&w, 0.0, 0.0, HALF + 0.003, 0.0, 20);
+    tool_move(w, 3e-3, 0.0, HALF - DEEP, 0.0, 50);
+    tool_move(w, 3e-3, 0.0, HALF + 0.003, 0.0, 100);
+    tool_move(w, 0.0, 0.0, HALF + 0.003, 0.0, 20);
   }
-  out.work_most = w.work_most;
-  tool_end(&w);
+  out.work_most = w->work_most;
+  tool_end(w);
   return out;
 }
 
@@ -557,6 +554,7 @@ static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored
     tool_move(w, 0.0, 0.0, HALF + 0.004, 0.07, 20);
     best = fmax(best, w->work);
   }
+  tool_end(w);
   return best;
 }
 
@@ -586,20 +584,20 @@ TEST(no_round_that_sticks_gives_energy)
   };
   for (size_t i = 0; i < GROUNDS; ++i) {
     for (int r = 0; r < 6; ++r) { /* and the other way round */
-      tool_world w;
-      REQUIRE(press(&w, &grounds[i]));
-      w.work = w.work_most = 0.0;
+      tool_world *w = press(&grounds[i]);
+      REQUIRE(w != NULL);
+      w->work = w->work_most = 0.0;
       for (int j = 0; j < 5; ++j) {
         const station *s = rounds[r % 3];
         for (int k = 0; k < 5; ++k) {
-          go_to(&w, &s[r < 3 ? k : (5 - k) % 5], &s[r < 3 ? (k + 1) % 5 : 4 - k], 40);
+          go_to(w, &s[r < 3 ? k : (5 - k) % 5], &s[r < 3 ? (k + 1) % 5 : 4 - k], 40);
         }
       }
       printf("# %s, round %d: %.3g mJ in five\n", hap_model_name(grounds[i].model), r,
-             1e3 * w.work);
-      CHECK(w.work < 0.01 * 0.5 * LOAD * DEEP);
-      CHECK(w.work_most < 0.01 * 0.5 * LOAD * DEEP);
-      tool_end(&w);
+             1e3 * w->work);
+      CHECK(w->work < 0.01 * 0.5 * LOAD * DEEP);
+      CHECK(w->work_most < 0.01 * 0.5 * LOAD * DEEP);
+      tool_end(w);
     }
   }
 }
