@@ -250,8 +250,7 @@ static inline hapi_contact_answer *world_contact_answer(const test_world *w,
 static inline void world_measure(const test_world *w)
 {
   hapi_physics *physics = world_physics(w);
-  hapi_accelerance_measure(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
-                           hapi_cross_watch(&physics->cross));
+  hapi_accelerance_measure(&physics->probe, hapi_cross_watch(&physics->cross));
 }
 
 static inline const hapi_slot_account *world_account(const test_world *w, dBodyID body)

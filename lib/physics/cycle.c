@@ -174,9 +174,8 @@ void hapi_physics_test(hapi_physics *physics)
   hapi_probe *probe = &physics->probe;
   hapi_slots *slots = &physics->near.slots;
   hapi_answers_follow(&probe->answers, slots);
-  hapi_accelerance_measure(probe, &physics->cycle, &physics->world, slots,
-                           hapi_cross_watch(&physics->cross));
-  hapi_operating_point_measure(probe, &physics->cycle, &physics->world, slots);
+  hapi_accelerance_measure(probe, hapi_cross_watch(&physics->cross));
+  hapi_operating_point_measure(probe);
   for (uint32_t i = 0; i < slots->body_high; ++i) {
     hapi_slots_set_flags(slots, i, probe->answers.bodies[i].flags);
   }
@@ -257,8 +256,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[0] +=
       physics->near.range.links.cover.boxes_s; /* which the next collision phase finds done */
   hapi_physics_test(physics);
-  hapi_joint_probes(&physics->probe, &physics->cycle, &physics->world, &physics->near.slots,
-                    physics->near.range.number);
+  hapi_joint_probes(&physics->probe, &physics->world.joints, physics->near.range.number);
   seconds[2] += stopwatch_lap(&watch);
   hapi_lookback_note(&physics->lookback, &physics->cycle, &physics->near.slots,
                      &physics->near.neighbors);

@@ -19,7 +19,8 @@ static bool physics_allocate(hapi_physics *physics, const hap_ode_def *ode)
 {
   const hapi_capacity *c = &physics->config.capacity;
   return hapi_account_create(&physics->account, c->bodies) &&
-         hapi_probe_create(&physics->probe, c) &&
+         hapi_probe_create(&physics->probe, &physics->cycle, &physics->world,
+                           &physics->near.slots) &&
          hapi_cross_create(&physics->cross, &physics->cycle, &physics->near.slots,
                            &physics->probe) &&
          hapi_nearby_create(&physics->near, &physics->world, &physics->cycle) &&

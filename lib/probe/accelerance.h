@@ -31,7 +31,6 @@ typedef struct hapi_contact_watch {
 /* Of a dynamic body at a rotation of ODE's. */
 void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out);
 /* watch: NULL for none. */
-void hapi_accelerance_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                              const hapi_slots *slots, const hapi_contact_watch *watch);
+void hapi_accelerance_measure(hapi_probe *probe, const hapi_contact_watch *watch);
 
 #endif

@@ -47,7 +47,6 @@ typedef enum refusal {
 
 typedef struct pair {
   hapi_probe *probe;
-  const hapi_slots *slots;
   dWorldID world;
   hapi_known_joint *known;
   hapi_joint_measurement *m;
@@ -156,18 +155,16 @@ static void pair_find_pose(pair *p, int which)
   }
 }
 
-static bool pair_begin(pair *p, hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                       const hapi_slots *slots, hapi_known_joint *known)
+static bool pair_begin(pair *p, hapi_probe *probe, hapi_known_joint *known)
 {
-  const hapi_physics_config *config = cycle->config;
+  const hapi_physics_config *config = probe->cycle->config;
   memset(p, 0, sizeof *p);
   p->probe = probe;
-  p->slots = slots;
-  p->world = world->ode.world;
+  p->world = probe->world->ode.world;
   p->known = known;
   p->m = known->measurement;
   p->period = 1.0 / config->haptic_hz;
-  p->ahead_s = 0.5 * cycle->probe_step_s;
+  p->ahead_s = 0.5 * probe->cycle->probe_step_s;
   p->ratio = config->physics_hz / config->haptic_hz;
   bool second = known->bodies[0] == NULL || dBodyIsKinematic(known->bodies[0]);
   uint32_t first = second ? 1 : 0;
@@ -196,8 +193,8 @@ static void pair_push_as_pointers(const pair *p, int which)
   const hapi_test_set *test = &p->probe->test;
   uint32_t index = p->index[which];
   uint32_t slot = index == HAPI_NONE ? HAPI_NONE : test->world->bodies.entries[index].slot;
-  for (uint32_t i = 0; i < p->slots->contact_high && slot != HAPI_NONE; ++i) {
-    const hapi_contact_slot *c = &p->slots->contacts[i];
+  for (uint32_t i = 0; i < p->probe->slots->contact_high && slot != HAPI_NONE; ++i) {
+    const hapi_contact_slot *c = &p->probe->slots->contacts[i];
     if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_force, 3)) {
       double at[3];
       hapi_pose_point(p->pose[which].position, p->pose[which].quat_wxyz, c->point_body, at);
@@ -731,7 +728,7 @@ static void pair_measure(pair *p, const hapi_joint_place *place, bool same)
   }
 }
 
-static void say_refused(hapi_probe *probe, const hapi_cycle *cycle, refusal why)
+static void say_refused(hapi_probe *probe, refusal why)
 {
   const char *text =
       why == REFUSED_NUMBERS
@@ -739,7 +736,7 @@ static void say_refused(hapi_probe *probe, const hapi_cycle *cycle, refusal why)
             "left to ODE between syncs"
           : "a joint does not give one body back what it takes from the other (ODE's PU "
             "joint does not); its bodies are left to ODE between syncs";
-  hapi_say_once(cycle, &probe->said_not_held, text);
+  hapi_say_once(probe->cycle, &probe->said_not_held, text);
 }
 
 /* With the world's and the joint's parameters as those of the tick, and no motors, stops and
@@ -765,12 +762,11 @@ static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
   dWorldSetCFM(p->world, cfm);
 }
 
-static void joint_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                          const hapi_slots *slots, hapi_known_joint *known)
+static void joint_measure(hapi_probe *probe, hapi_known_joint *known)
 {
   pair p;
   hapi_joint_place place;
-  if (!pair_begin(&p, probe, cycle, world, slots, known)) {
+  if (!pair_begin(&p, probe, known)) {
     return;
   }
   pair_find_place(&p, &place);
@@ -778,7 +774,7 @@ static void joint_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi
   if (same && pair_rests(&p)) {
     return;
   }
-  if (hapi_test_begin(&probe->test, world, cycle->probe_step_s) < HAP_OK ||
+  if (hapi_test_begin(&probe->test, probe->world, probe->cycle->probe_step_s) < HAP_OK ||
       hapi_test_enter_pair(&probe->test, known->joint, p.index) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
     return;
@@ -786,7 +782,7 @@ static void joint_measure(hapi_probe *probe, const hapi_cycle *cycle, const hapi
   pair_measure_bare(&p, &place, same);
   hapi_test_leave(&probe->test);
   if (p.refused != REFUSED_NOT) {
-    say_refused(probe, cycle, p.refused);
+    say_refused(probe, p.refused);
   }
 }
 
@@ -801,18 +797,16 @@ static hapi_joint_measurement *joint_measurement(hapi_known_joint *known)
   return known->measurement;
 }
 
-void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                       const hapi_slots *slots, uint64_t walk)
+void hapi_joint_probes(hapi_probe *probe, hapi_joint_table *joints, uint64_t walk)
 {
-  const hapi_joint_table *table = &world->joints;
   hapi_probe_counts *counts = &probe->counts;
   counts->joints = 0;
   counts->joint_error = 0.0;
-  if (cycle->model != HAP_MODEL_CONTACT) {
+  if (probe->cycle->model != HAP_MODEL_CONTACT) {
     return;
   }
-  for (uint32_t i = 0; i < table->count; ++i) {
-    hapi_known_joint *known = &table->entries[i];
+  for (uint32_t i = 0; i < joints->count; ++i) {
+    hapi_known_joint *known = &joints->entries[i];
     bool taken = known->ranged_in == walk;
     bool asked = known->wanted_in == walk;
     if (known->carried || !asked || dJointGetType(known->joint) == dJointTypeTransmission) {
@@ -820,7 +814,7 @@ void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_wo
     }
     const hapi_joint_measurement *found = joint_measurement(known);
     if (found != NULL && (taken || !found->good)) {
-      joint_measure(probe, cycle, world, slots, known);
+      joint_measure(probe, known);
     }
     if (found != NULL && taken) {
       ++counts->joints;

@@ -18,7 +18,6 @@
 
 /* Of the joints that the range's walk of this number has taken, and of those that kept it from
  * taking a mechanism. Their measurements belong to the joints. */
-void hapi_joint_probes(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                       const hapi_slots *slots, uint64_t walk);
+void hapi_joint_probes(hapi_probe *probe, hapi_joint_table *joints, uint64_t walk);
 
 #endif

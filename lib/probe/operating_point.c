@@ -35,16 +35,16 @@ static double slot_exchanged_norm(const hapi_body_slot *slot)
 }
 
 /* Those outside of the range that took most of the loop's impulse first. */
-static void edges_choose(hapi_answers *answers, const hapi_slots *slots, uint32_t most)
+static void edges_choose(hapi_probe *probe)
 {
   const uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
-  for (uint32_t n = 0; n < most; ++n) {
+  for (uint32_t n = 0; n < probe->cycle->settings.edge_probes; ++n) {
     uint32_t best = HAPI_NONE;
     double best_norm = 0.0;
-    for (uint32_t i = 0; i < slots->body_high; ++i) {
-      const hapi_body_slot *slot = &slots->bodies[i];
-      bool outside =
-          slot->phase == HAPI_SLOT_LIVE && slot->wanted && (answers->bodies[i].flags & role) == 0;
+    for (uint32_t i = 0; i < probe->slots->body_high; ++i) {
+      const hapi_body_slot *slot = &probe->slots->bodies[i];
+      bool outside = slot->phase == HAPI_SLOT_LIVE && slot->wanted &&
+                     (probe->answers.bodies[i].flags & role) == 0;
       if (outside && slot_exchanged_norm(slot) > best_norm) {
         best = i;
         best_norm = slot_exchanged_norm(slot);
@@ -53,29 +53,28 @@ static void edges_choose(hapi_answers *answers, const hapi_slots *slots, uint32_
     if (best == HAPI_NONE) {
       return;
     }
-    hapi_body_answer *answer = &answers->bodies[best];
+    hapi_body_answer *answer = &probe->answers.bodies[best];
     answer->edge = true;
     answer->flags = (answer->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
   }
 }
 
 /* The islands of the measured bodies. */
-static hap_status bodies_gather(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
-                                const hapi_slots *slots)
+static hap_status bodies_gather(hapi_probe *probe)
 {
   hapi_test_set *test = &probe->test;
   hapi_pushed *pushed = &probe->bodies.pushed;
   pushed->count = 0;
-  hap_status status = hapi_test_begin(test, world, cycle->probe_step_s);
-  for (uint32_t i = 0; i < slots->body_high && status >= HAP_OK; ++i) {
+  hap_status status = hapi_test_begin(test, probe->world, probe->cycle->probe_step_s);
+  for (uint32_t i = 0; i < probe->slots->body_high && status >= HAP_OK; ++i) {
     hapi_body_answer *answer = &probe->answers.bodies[i];
-    if (slots->bodies[i].phase != HAPI_SLOT_LIVE || (answer->flags & HAPI_BODY_MEASURED) == 0 ||
-        !hapi_body_is_whole(slots, i)) {
+    if (probe->slots->bodies[i].phase != HAPI_SLOT_LIVE ||
+        (answer->flags & HAPI_BODY_MEASURED) == 0 || !hapi_body_is_whole(probe->slots, i)) {
       continue;
     }
     bool testable = false;
     uint32_t first = test->member_count;
-    status = hapi_probe_add_body(probe, cycle, slots, i, &testable);
+    status = hapi_probe_add_body(probe, i, &testable);
     if (status >= HAP_OK && testable && answer->edge &&
         test->member_count - first > EDGE_ISLAND_MAX) {
       hapi_test_drop_island(test, first);
@@ -109,11 +108,11 @@ static void body_add_wrench(dBodyID body, const double wrench[6])
   dBodyAddTorque(body, wrench[3], wrench[4], wrench[5]);
 }
 
-static void bodies_begin_step(hapi_probe *probe, const hapi_slots *slots)
+static void bodies_begin_step(hapi_probe *probe)
 {
   hapi_test_rewind(&probe->test);
   for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
-    const hapi_body_slot *slot = &slots->bodies[probe->bodies.pushed.slots[i]];
+    const hapi_body_slot *slot = &probe->slots->bodies[probe->bodies.pushed.slots[i]];
     body_add_wrench(hapi_test_state(&probe->test, slot->known)->body, slot->exchanged);
   }
 }
@@ -131,10 +130,9 @@ static void answer_keep_b(hapi_body_answer *answer, const double exchanged[6], c
 }
 
 /* Where it cannot be one the last good one stays, or the body is outside. */
-static void body_keep(hapi_probe *probe, const hapi_slots *slots, uint32_t index, double a[6][6],
-                      const double base[6])
+static void body_keep(hapi_probe *probe, uint32_t index, double a[6][6], const double base[6])
 {
-  const hapi_body_slot *slot = &slots->bodies[index];
+  const hapi_body_slot *slot = &probe->slots->bodies[index];
   hapi_body_answer *answer = &probe->answers.bodies[index];
   const hapi_body_state *tested = hapi_test_state(&probe->test, slot->known);
   hapi_free_body free;
@@ -154,10 +152,9 @@ static void body_keep(hapi_probe *probe, const hapi_slots *slots, uint32_t index
   answer->measured = true;
 }
 
-static void body_measure(hapi_probe *probe, const hapi_slots *slots, uint32_t index,
-                         const double base[6])
+static void body_measure(hapi_probe *probe, uint32_t index, const double base[6])
 {
-  const hapi_body_slot *slot = &slots->bodies[index];
+  const hapi_body_slot *slot = &probe->slots->bodies[index];
   double extent = probe->test.world->bodies.entries[slot->known].extent;
   dBodyID body = hapi_test_state(&probe->test, slot->known)->body;
   double a[6][6];
@@ -165,7 +162,7 @@ static void body_measure(hapi_probe *probe, const hapi_slots *slots, uint32_t in
     double wrench[6] = {0.0};
     double column[6];
     wrench[axis] = axis < 3 ? body_push_force(slot) : body_push_torque(slot, extent);
-    bodies_begin_step(probe, slots);
+    bodies_begin_step(probe);
     body_add_wrench(body, wrench);
     hapi_test_step(&probe->test);
     hapi_test_acceleration(&probe->test, slot->known, column);
@@ -173,16 +170,16 @@ static void body_measure(hapi_probe *probe, const hapi_slots *slots, uint32_t in
       a[i][axis] = (column[i] - base[i]) / wrench[axis];
     }
   }
-  body_keep(probe, slots, index, a, base);
+  body_keep(probe, index, a, base);
 }
 
 /* The step that all differences are taken from. */
-static void bodies_measure_base(hapi_probe *probe, const hapi_slots *slots)
+static void bodies_measure_base(hapi_probe *probe)
 {
-  bodies_begin_step(probe, slots);
+  bodies_begin_step(probe);
   hapi_test_step(&probe->test);
   for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
-    uint32_t known = slots->bodies[probe->bodies.pushed.slots[i]].known;
+    uint32_t known = probe->slots->bodies[probe->bodies.pushed.slots[i]].known;
     hapi_test_acceleration(&probe->test, known, probe->bodies.base[i]);
   }
 }
@@ -190,22 +187,21 @@ static void bodies_measure_base(hapi_probe *probe, const hapi_slots *slots)
 /* ---- all of them ---- */
 
 /* Islands whose response holds still. All are gathered again then. */
-static hap_status islands_measure_b_alone(hapi_probe *probe, const hapi_cycle *cycle,
-                                          const hapi_world *world, const hapi_slots *slots)
+static hap_status islands_measure_b_alone(hapi_probe *probe)
 {
   hapi_reuse_book *book = body_book(probe);
   if (!hapi_reuse_has(book, HAPI_REUSE_A)) {
     return HAP_OK;
   }
-  hapi_reuse_select(book, HAPI_REUSE_A, slots, &probe->test, &probe->bodies.pushed);
+  hapi_reuse_select(book, HAPI_REUSE_A, probe->slots, &probe->test, &probe->bodies.pushed);
   hap_status status = hapi_test_enter(&probe->test);
   if (status < HAP_OK) {
     return status;
   }
-  bodies_measure_base(probe, slots);
+  bodies_measure_base(probe);
   for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
     uint32_t index = probe->bodies.pushed.slots[i];
-    const hapi_body_slot *slot = &slots->bodies[index];
+    const hapi_body_slot *slot = &probe->slots->bodies[index];
     if (hapi_finite(probe->bodies.base[i], 6)) {
       answer_keep_b(&probe->answers.bodies[index], slot->exchanged, probe->bodies.base[i]);
     } else {
@@ -213,45 +209,44 @@ static hap_status islands_measure_b_alone(hapi_probe *probe, const hapi_cycle *c
     }
   }
   hapi_test_leave(&probe->test);
-  return bodies_gather(probe, cycle, world, slots);
+  return bodies_gather(probe);
 }
 
 /* The flags are of this cycle, the response of another. */
-static void bodies_take_again(hapi_probe *probe, const hapi_slots *slots)
+static void bodies_take_again(hapi_probe *probe)
 {
   for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
     uint32_t index = probe->bodies.pushed.slots[i];
-    uint32_t known = slots->bodies[index].known;
+    uint32_t known = probe->slots->bodies[index].known;
     if (hapi_reuse_kind_of(body_book(probe), &probe->test, known) != HAPI_REUSE_NONE) {
       probe->answers.bodies[index].flags |= HAPI_BODY_WHOLE;
     }
   }
 }
 
-static hap_status bodies_measure(hapi_probe *probe, const hapi_cycle *cycle,
-                                 const hapi_world *world, const hapi_slots *slots)
+static hap_status bodies_measure(hapi_probe *probe)
 {
   hapi_pushed *pushed = &probe->bodies.pushed;
   hapi_reuse_book *book = body_book(probe);
-  hap_status status = bodies_gather(probe, cycle, world, slots);
+  hap_status status = bodies_gather(probe);
   if (status >= HAP_OK) {
-    const hapi_reuse_input input = {cycle, slots, &probe->answers, &probe->test};
+    const hapi_reuse_input input = {probe->cycle, probe->slots, &probe->answers, &probe->test};
     hapi_reuse_look(&probe->reuse, book, &input, pushed);
-    status = islands_measure_b_alone(probe, cycle, world, slots);
+    status = islands_measure_b_alone(probe);
   }
   if (status < HAP_OK) {
     return status;
   }
-  bodies_take_again(probe, slots);
-  hapi_reuse_select(book, HAPI_REUSE_NONE, slots, &probe->test, pushed);
+  bodies_take_again(probe);
+  hapi_reuse_select(book, HAPI_REUSE_NONE, probe->slots, &probe->test, pushed);
   if (pushed->count > 0) {
     status = hapi_test_enter(&probe->test);
     if (status < HAP_OK) {
       return status;
     }
-    bodies_measure_base(probe, slots);
+    bodies_measure_base(probe);
     for (uint32_t i = 0; i < pushed->count; ++i) {
-      body_measure(probe, slots, pushed->slots[i], probe->bodies.base[i]);
+      body_measure(probe, pushed->slots[i], probe->bodies.base[i]);
     }
     hapi_test_leave(&probe->test);
   }
@@ -259,16 +254,15 @@ static hap_status bodies_measure(hapi_probe *probe, const hapi_cycle *cycle,
   return HAP_OK;
 }
 
-void hapi_operating_point_measure(hapi_probe *probe, const hapi_cycle *cycle,
-                                  const hapi_world *world, const hapi_slots *slots)
+void hapi_operating_point_measure(hapi_probe *probe)
 {
-  if (cycle->model != HAP_MODEL_CONTACT) {
+  if (probe->cycle->model != HAP_MODEL_CONTACT) {
     return;
   }
-  if (!hapi_wish_is_off(cycle->wishes, HAP_EFFECT_TESTING)) {
-    edges_choose(&probe->answers, slots, cycle->settings.edge_probes);
+  if (!hapi_wish_is_off(probe->cycle->wishes, HAP_EFFECT_TESTING)) {
+    edges_choose(probe);
   }
-  if (bodies_measure(probe, cycle, world, slots) < HAP_OK) {
+  if (bodies_measure(probe) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last response stays");
   }
 }

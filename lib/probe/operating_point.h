@@ -10,7 +10,6 @@
 #include "world/cycle.h"
 #include "world/world.h"
 
-void hapi_operating_point_measure(hapi_probe *probe, const hapi_cycle *cycle,
-                                  const hapi_world *world, const hapi_slots *slots);
+void hapi_operating_point_measure(hapi_probe *probe);
 
 #endif

@@ -13,10 +13,15 @@ static bool pushed_create(hapi_pushed *pushed, uint32_t capacity)
   return pushed->slots != NULL;
 }
 
-bool hapi_probe_create(hapi_probe *probe, const hapi_capacity *capacity)
+bool hapi_probe_create(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                       const hapi_slots *slots)
 {
+  const hapi_capacity *capacity = &cycle->config->capacity;
   hapi_contact_trials *contacts = &probe->contacts;
   hapi_body_trials *bodies = &probe->bodies;
+  probe->cycle = cycle;
+  probe->world = world;
+  probe->slots = slots;
   contacts->list = hapi_alloc_array(capacity->contacts, sizeof *contacts->list);
   contacts->rounds = hapi_alloc_array(capacity->contacts, sizeof *contacts->rounds);
   bodies->base = hapi_alloc_array(capacity->bodies, sizeof *bodies->base);
@@ -54,13 +59,13 @@ void hapi_probe_count(hapi_probe *probe, hapi_admittance kind)
   probe->counts.clipped += kind == HAPI_ADMITTANCE_CLIPPED;
 }
 
-hap_status hapi_probe_add_body(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
-                               uint32_t body, bool *out_testable)
+hap_status hapi_probe_add_body(hapi_probe *probe, uint32_t body, bool *out_testable)
 {
-  HAPI_ASSERT_INDEX(body, slots->body_high);
-  hap_status status = hapi_test_add_island(&probe->test, slots->bodies[body].known, out_testable);
+  HAPI_ASSERT_INDEX(body, probe->slots->body_high);
+  hap_status status =
+      hapi_test_add_island(&probe->test, probe->slots->bodies[body].known, out_testable);
   if (status >= HAP_OK && !*out_testable) {
-    hapi_say_once(cycle, &probe->said_not_probed,
+    hapi_say_once(probe->cycle, &probe->said_not_probed,
                   "bodies with a transmission joint are not probed: a pointer feels them as moved "
                   "by the application");
     probe->answers.bodies[body].flags = HAPI_BODY_DRIVEN;

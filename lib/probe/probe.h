@@ -42,6 +42,11 @@ typedef struct hapi_probe_counts {
 } hapi_probe_counts;
 
 typedef struct hapi_probe {
+  /* What it reads. */
+  const hapi_cycle *cycle;
+  const hapi_world *world;
+  const hapi_slots *slots;
+
   hapi_test_set test;
   hapi_answers answers;
   hapi_contact_trials contacts;
@@ -52,7 +57,9 @@ typedef struct hapi_probe {
   bool said_not_held;   /* of a joint that cannot be measured, likewise */
 } hapi_probe;
 
-bool hapi_probe_create(hapi_probe *probe, const hapi_capacity *capacity); /* false: no memory */
+/* What is read outlives it. False: no memory. */
+bool hapi_probe_create(hapi_probe *probe, const hapi_cycle *cycle, const hapi_world *world,
+                       const hapi_slots *slots);
 void hapi_probe_finish(hapi_probe *probe);
 /* A session begins: nothing was found out. */
 void hapi_probe_reset(hapi_probe *probe);
@@ -60,7 +67,6 @@ void hapi_probe_reset(hapi_probe *probe);
 void hapi_probe_count(hapi_probe *probe, hapi_admittance kind);
 /* The island of a body in a slot joins the test set. *out_testable: it can be undone, else the
  * body is driven from now on. HAP_ERROR_MEMORY. */
-hap_status hapi_probe_add_body(hapi_probe *probe, const hapi_cycle *cycle, const hapi_slots *slots,
-                               uint32_t body, bool *out_testable);
+hap_status hapi_probe_add_body(hapi_probe *probe, uint32_t body, bool *out_testable);
 
 #endif
