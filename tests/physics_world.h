@@ -257,9 +257,9 @@ static inline const hapi_slot_account *world_account(const test_world *w, dBodyI
 {
   hapi_physics *physics = world_physics(w);
   const hapi_body_slot *slot = world_slot(w, body);
-  return slot != NULL ? hapi_account_of(&physics->account, &physics->near.slots,
-                                        (uint32_t)(slot - physics->near.slots.bodies))
-                      : NULL;
+  return slot != NULL
+             ? hapi_account_of(&physics->account, (uint32_t)(slot - physics->near.slots.bodies))
+             : NULL;
 }
 
 /* Everything about a body that a getter of ODE gives and a step can change. */

@@ -5,8 +5,7 @@
 
 #include "tests/tap.h"
 
-#include "accuracy/dial_settings.h"
-#include "accuracy/dial_turn.h"
+#include "accuracy/dial.h"
 #include "base/clock.h"
 #include "tests/contact_world.h"
 

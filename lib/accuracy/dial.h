@@ -10,9 +10,37 @@
 #include <hapode/accuracy.h>
 #include <ode/ode.h>
 
-#include "accuracy/dial_settings.h"
-#include "accuracy/dial_turn.h"
 #include "world/cycle.h"
+
+#define HAPI_DIAL_MOST 100
+#define HAPI_DIAL_DEFAULT 50 /* HAP_ACCURACY_DEFAULT */
+
+/* What the dials come to: a table from the positions of the tick's and of the physics thread's
+ * dial to the single settings. Positions are in percent, so that one fits into a byte of a
+ * recording. period_s: of a
+ * tick. */
+void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_percent,
+                        double period_s, hapi_settings *out);
+
+static inline int hapi_dial_percent(double accuracy) /* 0..1 */
+{
+  return (int)(100.0 * accuracy + 0.5);
+}
+
+/* When a dial is turned: at once where a load is above 1, and back where it has been low for a
+ * while. A load that comes again soon after that makes the next while twice as long, so that a
+ * dial between two positions does not go to and fro. */
+
+typedef struct hapi_turn {
+  double low_s;      /* that the load has been low */
+  double since_s;    /* the last turn back */
+  bool tried;        /* it is the last turn */
+  double patience_s; /* that it is to be low; 0: not begun */
+} hapi_turn;
+
+/* Steps that relieve the load: 3 where it is above 2, 1 where above 1, -1 where one may be taken
+ * back, else 0. seconds: that the load was measured over. */
+int hapi_turn_by(hapi_turn *turn, double load, double seconds);
 
 enum {
   HAPI_DIAL_TICK = 0,

@@ -7,8 +7,338 @@
 
 #include "base/alloc.h"
 #include "base/assert.h"
+#include "base/clock.h"
 #include "base/vec.h"
 #include "sync/exchange.h"
+
+/* Going over a window: the reference of a tick is what ODE and the loop's tick of model SINGLE
+ * make of it, with the bodies where they are by that reckoning. */
+
+#define ITERATIONS 2         /* times those of the world: what they leave undone shows as well */
+#define ITERATIONS_LEAST 200 /* where there is time for them */
+#define RATE_HZ 1000.0       /* at least, of its steps */
+#define APART_M 0.5          /* from the session's body: it would not know what is there */
+
+/* ---- which geoms there still are ---- */
+
+static bool window_see_geoms(hapi_lookback *w, dSpaceID space, uint32_t *count)
+{
+  int geoms = dSpaceGetNumGeoms(space);
+  if (!hapi_index_reserve(&w->geoms, *count + (uint32_t)geoms)) {
+    return false;
+  }
+  for (int i = 0; i < geoms; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    hapi_index_put(&w->geoms, hapi_index_address(geom), 0);
+    ++*count;
+    if (dGeomIsSpace(geom) && !window_see_geoms(w, (dSpaceID)geom, count)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static bool geom_is_there(const hapi_lookback *w, dGeomID geom)
+{
+  return hapi_index_get(&w->geoms, hapi_index_address(geom)) != HAPI_INDEX_NONE;
+}
+
+static bool window_find_geoms(hapi_lookback *w, dSpaceID space)
+{
+  uint32_t count = 0;
+  hapi_index_clear(&w->geoms);
+  if (!window_see_geoms(w, space, &count)) {
+    return false;
+  }
+  for (uint32_t i = 0; i < w->pairs.count; ++i) {
+    w->pairs.list[i].there =
+        geom_is_there(w, w->pairs.list[i].a) && geom_is_there(w, w->pairs.list[i].b);
+  }
+  for (uint32_t i = 0; i < w->touches.count; ++i) {
+    w->touches.list[i].there =
+        w->touches.list[i].geom != NULL && geom_is_there(w, w->touches.list[i].geom);
+  }
+  return true;
+}
+
+/* ---- contacts between bodies ---- */
+
+static bool body_is_under_test(const hapi_test_set *test, dBodyID body)
+{
+  uint32_t known = hapi_bodies_find(&test->world->bodies, body);
+  return known != HAPI_NONE && hapi_test_has(test, known);
+}
+
+static bool boxes_meet(dGeomID a, dGeomID b)
+{
+  dReal x[6];
+  dReal y[6];
+  dGeomGetAABB(a, x);
+  dGeomGetAABB(b, y);
+  return x[0] <= y[1] && y[0] <= x[1] && x[2] <= y[3] && y[2] <= x[3] && x[4] <= y[5] &&
+         y[4] <= x[5];
+}
+
+/* What is not under test stands still. */
+static void window_collide(hapi_lookback *w, const hapi_cycle *as_single)
+{
+  dJointGroupEmpty(w->test.world->contact_group);
+  for (uint32_t i = 0; i < w->pairs.count; ++i) {
+    const hapi_lookback_pair *pair = &w->pairs.list[i];
+    if (!pair->there || !dGeomIsEnabled(pair->a) || !dGeomIsEnabled(pair->b) ||
+        !boxes_meet(pair->a, pair->b)) {
+      continue;
+    }
+    dBodyID body_a = dGeomGetBody(pair->a);
+    dBodyID body_b = dGeomGetBody(pair->b);
+    body_a = body_is_under_test(&w->test, body_a) ? body_a : NULL;
+    body_b = body_is_under_test(&w->test, body_b) ? body_b : NULL;
+    bool awake =
+        (body_a != NULL && dBodyIsEnabled(body_a)) || (body_b != NULL && dBodyIsEnabled(body_b));
+    if (awake) {
+      const hapi_touching touching = {{pair->a, pair->b}, {body_a, body_b}};
+      dSurfaceParameters surface = pair->surface;
+      w->counts.contacts_rejected +=
+          hapi_world_make_contacts(w->test.world, as_single, &touching, &surface, false);
+    }
+  }
+}
+
+/* ---- what comes out ---- */
+
+/* What is felt is held until the next row. */
+static void window_compare(hapi_lookback *w, const hapi_path_pointer *row)
+{
+  for (uint32_t i = 0; i < w->rows.pointers; ++i) {
+    double wrong[3];
+    const double *felt = row[i].wrench.force;
+    const double *right = hapi_lookback_felt(w, i);
+    if (row[i].generation == 0) {
+      continue;
+    }
+    hapi_v3_sub(felt, right, wrong);
+    if (hapi_v3_dot(right, right) > 0.0 || hapi_v3_dot(felt, felt) > 0.0) {
+      w->sums.wrong2 += hapi_v3_dot(wrong, wrong);
+      w->sums.right2 += hapi_v3_dot(right, right);
+      ++w->sums.touched;
+    }
+  }
+}
+
+/* ---- steps ---- */
+
+static void window_add_wrenches(const hapi_lookback *w)
+{
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
+    const double *f = w->bodies.list[i].wrench;
+    if (dBodyIsEnabled(body)) {
+      dBodyAddForce(body, f[0], f[1], f[2]);
+      dBodyAddTorque(body, f[3], f[4], f[5]);
+    }
+  }
+}
+
+/* One that is no more is not to be stepped: ODE would abort the process. */
+static bool window_is_sound(const hapi_lookback *w)
+{
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    if (!hapi_pose_is_sound(w->test.world->bodies.entries[w->bodies.list[i].known].body)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static double row_period(const hapi_lookback *w, double haptic_hz, uint32_t row)
+{
+  return row + 1 < w->rows.count
+             ? 1e-9 * (double)(w->rows.times_ns[row + 1] - w->rows.times_ns[row])
+             : 1.0 / haptic_hz;
+}
+
+/* Steps from a row to the next one. */
+static int row_parts(double haptic_hz)
+{
+  return haptic_hz < RATE_HZ ? (int)ceil(RATE_HZ / haptic_hz - 1e-6) : 1;
+}
+
+/* as_single: the cycle as that of a session of model SINGLE at the reference's own rate. */
+static bool row_go_over(hapi_lookback *w, const hapi_cycle *as_single, double haptic_hz,
+                        uint32_t row)
+{
+  HAPI_ASSERT_INDEX(row, w->rows.count);
+  uint32_t count = w->rows.pointers;
+  int parts = row_parts(haptic_hz);
+  double period = row_period(w, haptic_hz, row) / parts;
+  for (int i = 0; i < parts; ++i) {
+    const hapi_lookback_moment at = {
+        .row = &w->rows.path[row * count],
+        .next = row + 1 < w->rows.count ? &w->rows.path[(row + 1) * count] : NULL,
+        .share = (double)i / parts,
+        .later_s = i * period,
+        .period = period};
+    if (!hapi_lookback_feel(w, as_single->wishes, &at)) {
+      return false;
+    }
+    window_compare(w, at.row);
+    window_add_wrenches(w);
+    window_collide(w, as_single);
+    ++w->counts.steps;
+    dWorldQuickStep(w->test.world->ode.world, period);
+    if (!window_is_sound(w)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static void window_put_states(hapi_lookback *w)
+{
+  hapi_snapshot states = {
+      .bodies = w->bodies.states, .body_count = w->bodies.count, .seed = w->bodies.seed};
+  hapi_snapshot_rewind(&states);
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodySetForce(w->bodies.states[i].body, 0.0, 0.0, 0.0);
+    dBodySetTorque(w->bodies.states[i].body, 0.0, 0.0, 0.0);
+    if (w->bodies.states[i].enabled) {
+      dBodyEnable(w->bodies.states[i].body);
+    } else {
+      dBodyDisable(w->bodies.states[i].body);
+    }
+  }
+}
+
+/* Where the bodies were at the first row, of which some were kept a part of a tick before or
+ * after. */
+static void window_even_out(const hapi_lookback *w)
+{
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->bodies.states[i].body;
+    double lag = 1e-9 * (double)w->bodies.list[i].lag_ns;
+    const dReal *p = dBodyGetPosition(body);
+    const dReal *v = dBodyGetLinearVel(body);
+    dBodySetPosition(body, p[0] + lag * v[0], p[1] + lag * v[1], p[2] + lag * v[2]);
+  }
+}
+
+static void window_keep(hapi_lookback *w)
+{
+  hapi_snapshot states = {.bodies = w->bodies.states, .body_capacity = w->bodies.state_capacity};
+  hapi_snapshot_clear(&states);
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    hapi_snapshot_add_body(&states, w->world->bodies.entries[w->bodies.list[i].known].body, NULL);
+  }
+  w->bodies.seed = states.seed;
+}
+
+static const hapi_body_state *window_end_of(const hapi_lookback *w, const hapi_lookback_body *body)
+{
+  for (uint32_t i = 0; i < w->ended.count; ++i) {
+    if (w->ended.list[i].known == body->known && w->ended.list[i].birth == body->birth) {
+      return &w->ended.states[i];
+    }
+  }
+  return NULL;
+}
+
+/* Whether the reference of the window before ended when this one begins, and not too far from
+ * where the session is. */
+static bool window_can_chain(const hapi_lookback *w, double haptic_hz)
+{
+  double apart_s = 1e-9 * fabs((double)(w->rows.times_ns[0] - w->end_ns));
+  bool good = w->end_ns != 0 && apart_s < 0.5 / haptic_hz;
+  for (uint32_t i = 0; i < w->bodies.count && good; ++i) {
+    const hapi_body_state *end = window_end_of(w, &w->bodies.list[i]);
+    double apart[3] = {0.0};
+    if (end != NULL) {
+      hapi_v3_sub(end->position, w->bodies.states[i].position, apart);
+    }
+    good = hapi_v3_norm(apart) < APART_M;
+  }
+  return good;
+}
+
+/* Goes on from there; a body that was not part of it comes in as the session has it. */
+static void window_chain(hapi_lookback *w, double haptic_hz)
+{
+  w->chained = window_can_chain(w, haptic_hz);
+  w->chain_s = w->chained ? w->chain_s : 0.0;
+  if (!w->chained) {
+    hapi_lookback_hand_begin(&w->hand);
+  }
+  for (uint32_t i = 0; i < w->bodies.count && w->chained; ++i) {
+    const hapi_body_state *end = window_end_of(w, &w->bodies.list[i]);
+    if (end != NULL) {
+      w->bodies.states[i] = *end;
+      w->bodies.list[i].lag_ns = 0;
+    }
+  }
+}
+
+static int window_iterations(const hapi_lookback *w, int world)
+{
+  int more = ITERATIONS * world;
+  return !w->lean && more < ITERATIONS_LEAST ? ITERATIONS_LEAST : more;
+}
+
+static bool window_go(hapi_lookback *w, int own_iterations, double seconds)
+{
+  const hapi_world *world = w->test.world;
+  int64_t begin_ns = hapi_clock_now();
+  int iterations = dWorldGetQuickStepNumIterations(world->ode.world);
+  double haptic_hz = w->cycle->config->haptic_hz;
+  bool good = true;
+  hapi_physics_config config = *w->cycle->config;
+  hapi_cycle as_single = *w->cycle;
+  hapi_meant meant;
+  config.haptic_hz = row_parts(haptic_hz) * haptic_hz;
+  as_single.config = &config;
+  as_single.model = HAP_MODEL_SINGLE; /* whose step this is */
+  dWorldSetQuickStepNumIterations(world->ode.world, window_iterations(w, own_iterations));
+  hapi_world_convert(world, hapi_step_ratio(&as_single), &meant);
+  bool first = w->rows.next == 0;
+  if (first) {
+    window_chain(w, haptic_hz);
+  }
+  window_put_states(w);
+  if (first) {
+    window_even_out(w);
+  }
+  while (good && w->rows.next < w->rows.count &&
+         (seconds < 0.0 || 1e-9 * (double)(hapi_clock_now() - begin_ns) < seconds)) {
+    good = row_go_over(w, &as_single, haptic_hz, w->rows.next++);
+  }
+  w->spent_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  window_keep(w);
+  dJointGroupEmpty(world->contact_group);
+  hapi_world_restore(world, &meant);
+  dWorldSetQuickStepNumIterations(world->ode.world, iterations);
+  return good;
+}
+
+static hap_status window_enter(hapi_lookback *w, double step_s)
+{
+  hap_status status = hapi_test_begin(&w->test, w->world, step_s);
+  for (uint32_t i = 0; i < w->bodies.count && status >= HAP_OK; ++i) {
+    status = hapi_test_add_body(&w->test, w->bodies.list[i].known);
+  }
+  return status >= HAP_OK ? hapi_test_enter(&w->test) : status;
+}
+
+static hap_status window_run(hapi_lookback *w, int own_iterations, double seconds)
+{
+  if (!window_find_geoms(w, w->world->ode.space)) {
+    return HAP_ERROR_MEMORY;
+  }
+  hap_status status = window_enter(w, w->cycle->probe_step_s);
+  if (status >= HAP_OK) {
+    bool good = w->rows.count == 0 || window_go(w, own_iterations, seconds);
+    status = good ? status : HAP_ERROR_STATE;
+    hapi_test_leave(&w->test);
+  }
+  return status;
+}
 
 /* The life of a window: what it keeps, what is noted while it is open, what comes out. */
 
@@ -23,9 +353,9 @@
 #define REACHES 18      /* 0.5 m to 1 mm */
 #define DEAR 2.0        /* times the budget, for one step */
 
-static bool lookback_is_wanted(const hapi_cycle *cycle)
+static bool lookback_is_wanted(const hapi_lookback *w)
 {
-  return cycle->config->lookback_share > 0.0 && cycle->model != HAP_MODEL_SINGLE;
+  return w->cycle->config->lookback_share > 0.0 && w->cycle->model != HAP_MODEL_SINGLE;
 }
 
 void hapi_lookback_reset(hapi_lookback *w)
@@ -81,14 +411,13 @@ static uint64_t pair_key(dGeomID a, dGeomID b)
   return hapi_index_mix(x < y ? x : y) ^ (x < y ? y : x);
 }
 
-void hapi_lookback_ask(hapi_lookback *w, const hapi_body_table *bodies, dGeomID a, dGeomID b,
-                       const dSurfaceParameters *surface)
+void hapi_lookback_ask(hapi_lookback *w, dGeomID a, dGeomID b, const dSurfaceParameters *surface)
 {
   if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt) {
     return;
   }
-  uint32_t body_a = hapi_bodies_find(bodies, dGeomGetBody(a));
-  uint32_t body_b = hapi_bodies_find(bodies, dGeomGetBody(b));
+  uint32_t body_a = hapi_bodies_find(&w->world->bodies, dGeomGetBody(a));
+  uint32_t body_b = hapi_bodies_find(&w->world->bodies, dGeomGetBody(b));
   if (!(body_a != HAPI_NONE && window_has(w, body_a)) &&
       !(body_b != HAPI_NONE && window_has(w, body_b))) {
     return;
@@ -157,16 +486,16 @@ static void window_note_touch(hapi_lookback *w, uint32_t most, const hapi_lookba
     uint32_t generation = t->contact_generation;
     *t = *touch;
     t->contact_generation = generation + 1;
-    t->key = touch->is_tool ? w->asker.key(w->asker.user, touch->geom, touch->pointer) : 0;
+    t->key = touch->is_tool ? hapi_tool_geom_key(w->near, touch->geom, touch->pointer) : 0;
   }
   t->mu = touch->mu;
   t->noted = true;
 }
 
-static void window_note_slots(hapi_lookback *w, const hapi_slots *slots, uint32_t most)
+static void window_note_slots(hapi_lookback *w, uint32_t most)
 {
-  for (uint32_t i = 0; i < slots->contact_high; ++i) {
-    const hapi_contact_slot *slot = &slots->contacts[i];
+  for (uint32_t i = 0; i < w->near->slots.contact_high; ++i) {
+    const hapi_contact_slot *slot = &w->near->slots.contacts[i];
     const hapi_lookback_touch touch = {.geom = slot->geom,
                                        .pointer = slot->pointer,
                                        .generation = slot->pointer_generation,
@@ -179,12 +508,12 @@ static void window_note_slots(hapi_lookback *w, const hapi_slots *slots, uint32_
 }
 
 /* Of model CONTACT, whose points of hulls have no slots. */
-static void window_note_hits(hapi_lookback *w, const hapi_cycle *cycle, const hapi_neighbors *hood)
+static void window_note_hits(hapi_lookback *w)
 {
-  uint32_t most = cycle->config->capacity.contacts;
-  for (uint32_t i = 0; i < hood->hit_count; ++i) {
-    const hapi_hit *hit = &hood->hits[i];
-    const hapi_state_pointer *pointer = &hapi_state_pointers(cycle->state)[hit->pointer];
+  uint32_t most = w->cycle->config->capacity.contacts;
+  for (uint32_t i = 0; i < w->near->neighbors.hit_count; ++i) {
+    const hapi_hit *hit = &w->near->neighbors.hits[i];
+    const hapi_state_pointer *pointer = &hapi_state_pointers(w->cycle->state)[hit->pointer];
     const hapi_lookback_touch touch = {.geom = hit->geom,
                                        .pointer = hit->pointer,
                                        .generation = pointer->generation,
@@ -196,24 +525,22 @@ static void window_note_hits(hapi_lookback *w, const hapi_cycle *cycle, const ha
   }
 }
 
-void hapi_lookback_note(hapi_lookback *w, const hapi_cycle *cycle, const hapi_slots *slots,
-                        const hapi_neighbors *neighbors)
+void hapi_lookback_note(hapi_lookback *w)
 {
   if (w->phase != HAPI_LOOKBACK_OPEN) {
     return;
   }
-  window_note_slots(w, slots, cycle->config->capacity.contacts);
-  if (cycle->model == HAP_MODEL_CONTACT) {
-    window_note_hits(w, cycle, neighbors);
+  window_note_slots(w, w->cycle->config->capacity.contacts);
+  if (w->cycle->model == HAP_MODEL_CONTACT) {
+    window_note_hits(w);
   }
 }
 
 /* The place of the pair whose contact the spring is of; HAPI_NONE: none that is near. */
-static uint32_t spring_touch(const hapi_lookback *w, const hapi_slots *slots,
-                             const hapi_state_spring *spring)
+static uint32_t spring_touch(const hapi_lookback *w, const hapi_state_spring *spring)
 {
   const hapi_contact_slot *slot =
-      spring->slot != HAPI_SLOT_NONE ? &slots->contacts[spring->slot] : NULL;
+      spring->slot != HAPI_SLOT_NONE ? &w->near->slots.contacts[spring->slot] : NULL;
   for (uint32_t i = 0; i < w->touches.count; ++i) {
     const hapi_lookback_touch *t = &w->touches.list[i];
     bool same = slot != NULL ? t->geom == slot->geom && t->pointer == slot->pointer &&
@@ -226,17 +553,17 @@ static uint32_t spring_touch(const hapi_lookback *w, const hapi_slots *slots,
   return HAPI_NONE;
 }
 
-static void window_take_springs(hapi_lookback *w, const hapi_cycle *cycle, const hapi_slots *slots)
+static void window_take_springs(hapi_lookback *w)
 {
-  const hapi_state_spring *in = hapi_state_springs(cycle->state);
+  const hapi_state_spring *in = hapi_state_springs(w->cycle->state);
   w->springs.count = 0;
-  if (!hapi_reserve((void **)&w->springs.list, &w->springs.capacity, 0, cycle->state->spring_count,
-                    sizeof *w->springs.list)) {
+  if (!hapi_reserve((void **)&w->springs.list, &w->springs.capacity, 0,
+                    w->cycle->state->spring_count, sizeof *w->springs.list)) {
     w->spoilt = true;
     return;
   }
-  for (uint32_t i = 0; i < cycle->state->spring_count; ++i) {
-    uint32_t touch = spring_touch(w, slots, &in[i]);
+  for (uint32_t i = 0; i < w->cycle->state->spring_count; ++i) {
+    uint32_t touch = spring_touch(w, &in[i]);
     if (touch != HAPI_NONE && hapi_finite(in[i].stretch_body, 3) && hapi_finite(&in[i].turn, 1)) {
       w->springs.list[w->springs.count++] = (hapi_lookback_spring){.touch = touch, .in = in[i]};
     }
@@ -245,10 +572,10 @@ static void window_take_springs(hapi_lookback *w, const hapi_cycle *cycle, const
 
 /* ---- opening ---- */
 
-static bool window_add_body(hapi_lookback *w, const hapi_body_table *bodies, uint32_t known)
+static bool window_add_body(hapi_lookback *w, uint32_t known)
 {
-  HAPI_ASSERT_INDEX(known, bodies->high);
-  const hapi_known_body *entry = &bodies->entries[known];
+  HAPI_ASSERT_INDEX(known, w->world->bodies.high);
+  const hapi_known_body *entry = &w->world->bodies.entries[known];
   if (w->bodies.count == HAPI_LOOKBACK_BODIES ||
       !hapi_reserve((void **)&w->bodies.list, &w->bodies.capacity, w->bodies.count, 1,
                     sizeof *w->bodies.list)) {
@@ -264,11 +591,11 @@ static bool window_add_body(hapi_lookback *w, const hapi_body_table *bodies, uin
 }
 
 /* m, from the nearest pointer's surface to the body's */
-static double body_apart(const hapi_cycle *cycle, const hapi_known_body *known)
+static double body_apart(const hapi_lookback *w, const hapi_known_body *known)
 {
-  const hapi_state_pointer *pointers = hapi_state_pointers(cycle->state);
+  const hapi_state_pointer *pointers = hapi_state_pointers(w->cycle->state);
   double least = HUGE_VAL;
-  for (uint32_t i = 0; i < cycle->state->pointer_count; ++i) {
+  for (uint32_t i = 0; i < w->cycle->state->pointer_count; ++i) {
     if (pointers[i].generation != 0) {
       double d[3];
       hapi_v3_sub(dBodyGetPosition(known->body), pointers[i].pose.position, d);
@@ -279,18 +606,17 @@ static double body_apart(const hapi_cycle *cycle, const hapi_known_body *known)
 }
 
 /* Within a distance that takes no more than there is room for. */
-static bool window_add_near(hapi_lookback *w, const hapi_cycle *cycle,
-                            const hapi_body_table *bodies)
+static bool window_add_near(hapi_lookback *w)
 {
   double reach = NEAR_M;
   for (int i = 0; i < REACHES; ++i, reach *= 0.7) {
     uint32_t count = 0;
     w->bodies.count = 0;
     bool good = true;
-    for (uint32_t k = 0; k < bodies->high && count <= BODIES_MAX && good; ++k) {
-      const hapi_known_body *known = &bodies->entries[k];
-      if (known->body != NULL && body_apart(cycle, known) < reach) {
-        good = ++count > BODIES_MAX || window_add_body(w, bodies, k);
+    for (uint32_t k = 0; k < w->world->bodies.high && count <= BODIES_MAX && good; ++k) {
+      const hapi_known_body *known = &w->world->bodies.entries[k];
+      if (known->body != NULL && body_apart(w, known) < reach) {
+        good = ++count > BODIES_MAX || window_add_body(w, k);
       }
     }
     if (!good || count <= BODIES_MAX) {
@@ -300,16 +626,16 @@ static bool window_add_near(hapi_lookback *w, const hapi_cycle *cycle,
   return false;
 }
 
-static bool window_add_jointed(hapi_lookback *w, const hapi_body_table *bodies)
+static bool window_add_jointed(hapi_lookback *w)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    dBodyID body = bodies->entries[w->bodies.list[i].known].body;
+    dBodyID body = w->world->bodies.entries[w->bodies.list[i].known].body;
     int joints = dBodyGetNumJoints(body);
     for (int k = 0; k < joints; ++k) {
       dJointID joint = dBodyGetJoint(body, k);
       for (int side = 0; side < 2 && dJointGetType(joint) != dJointTypeContact; ++side) {
-        uint32_t other = hapi_bodies_find(bodies, dJointGetBody(joint, side));
-        if (other != HAPI_NONE && !window_has(w, other) && !window_add_body(w, bodies, other)) {
+        uint32_t other = hapi_bodies_find(&w->world->bodies, dJointGetBody(joint, side));
+        if (other != HAPI_NONE && !window_has(w, other) && !window_add_body(w, other)) {
           return false;
         }
       }
@@ -321,29 +647,27 @@ static bool window_add_jointed(hapi_lookback *w, const hapi_body_table *bodies)
   return true;
 }
 
-static int64_t ticks_ns(const hapi_cycle *cycle, double ticks)
+static int64_t ticks_ns(const hapi_lookback *w, double ticks)
 {
-  return (int64_t)(1e9 * ticks / cycle->config->haptic_hz);
+  return (int64_t)(1e9 * ticks / w->cycle->config->haptic_hz);
 }
 
 /* The loop's newest state is what its tick came to: the one after that goes on from it. */
-static int64_t window_first_row(const hapi_cycle *cycle, int64_t now_ns)
+static int64_t window_first_row(const hapi_lookback *w, int64_t now_ns)
 {
-  return cycle->model == HAP_MODEL_IMPULSE ? now_ns - ticks_ns(cycle, 0.5)
-                                           : cycle->state->now_ns + ticks_ns(cycle, 0.5);
+  return w->cycle->model == HAP_MODEL_IMPULSE ? now_ns - ticks_ns(w, 0.5)
+                                              : w->cycle->state->now_ns + ticks_ns(w, 0.5);
 }
 
 /* A body of the loop is where the loop has it, any other where the world's step has left it. */
-static void window_note_times(hapi_lookback *w, const hapi_cycle *cycle,
-                              const hapi_body_table *bodies, const hapi_slots *slots,
-                              int64_t now_ns)
+static void window_note_times(hapi_lookback *w, int64_t now_ns)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    uint32_t index = bodies->entries[w->bodies.list[i].known].slot;
-    const hapi_body_slot *slot = index != HAPI_NONE ? &slots->bodies[index] : NULL;
-    bool loops = slot != NULL && cycle->model != HAP_MODEL_IMPULSE &&
-                 (slot->loop_owned || (cycle->model == HAP_MODEL_ACCELERANCE && slot->pushed));
-    w->bodies.list[i].lag_ns = loops ? -cycle->state->now_ns - ticks_ns(cycle, 1.0)
+    uint32_t index = w->world->bodies.entries[w->bodies.list[i].known].slot;
+    const hapi_body_slot *slot = index != HAPI_NONE ? &w->near->slots.bodies[index] : NULL;
+    bool loops = slot != NULL && w->cycle->model != HAP_MODEL_IMPULSE &&
+                 (slot->loop_owned || (w->cycle->model == HAP_MODEL_ACCELERANCE && slot->pushed));
+    w->bodies.list[i].lag_ns = loops ? -w->cycle->state->now_ns - ticks_ns(w, 1.0)
                                      : -now_ns; /* and the first row's time */
   }
 }
@@ -368,12 +692,10 @@ static void window_begin_touches(hapi_lookback *w)
   }
 }
 
-void hapi_lookback_open(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
-                        const hapi_slots *slots, const hapi_neighbors *neighbors, int64_t now_ns)
+void hapi_lookback_open(hapi_lookback *w, int64_t now_ns)
 {
-  const hapi_body_table *bodies = &world->bodies;
-  double physics_hz = cycle->config->physics_hz;
-  if (!lookback_is_wanted(cycle) || w->phase != HAPI_LOOKBACK_IDLE || cycle->state == NULL) {
+  double physics_hz = w->cycle->config->physics_hz;
+  if (!lookback_is_wanted(w) || w->phase != HAPI_LOOKBACK_IDLE || w->cycle->state == NULL) {
     return;
   }
   double most = fmax(WINDOW_S, WINDOW_STEPS / physics_hz);
@@ -382,22 +704,22 @@ void hapi_lookback_open(hapi_lookback *w, const hapi_cycle *cycle, const hapi_wo
   window_begin_touches(w);
   memset(w->hand.hull_of, 0, sizeof w->hand.hull_of);
   w->pairs.count = w->rows.count = w->rows.next = w->sums.touched = 0;
-  w->rows.pointers = cycle->config->capacity.pointers;
+  w->rows.pointers = w->cycle->config->capacity.pointers;
   hapi_index_clear(&w->pairs.index);
   w->sums.wrong2 = w->sums.right2 = w->spent_s = 0.0;
-  w->from_ns = window_first_row(cycle, now_ns);
+  w->from_ns = window_first_row(w, now_ns);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
-  w->spoilt = !hapi_lookback_hand_ready(&w->hand, &cycle->config->capacity) ||
-              !window_add_near(w, cycle, bodies) || !window_add_jointed(w, bodies) ||
+  w->spoilt = !hapi_lookback_hand_ready(&w->hand, &w->cycle->config->capacity) ||
+              !window_add_near(w) || !window_add_jointed(w) ||
               !hapi_reserve((void **)&w->bodies.states, &w->bodies.state_capacity, 0,
                             w->bodies.count, sizeof *w->bodies.states);
   if (!w->spoilt) {
-    hapi_lookback_keep(w, bodies);
-    window_note_times(w, cycle, bodies, slots, now_ns);
+    window_keep(w);
+    window_note_times(w, now_ns);
   }
   w->phase = HAPI_LOOKBACK_OPEN;
-  hapi_lookback_note(w, cycle, slots, neighbors);
-  window_take_springs(w, cycle, slots);
+  hapi_lookback_note(w);
+  window_take_springs(w);
 }
 
 /* ---- while it is open ---- */
@@ -410,17 +732,16 @@ static void window_set_lags(hapi_lookback *w, int64_t first_ns)
 }
 
 /* False: what it would feel is not reckoned here. */
-static bool window_takes_kind(hapi_lookback *w, const hapi_cycle *cycle, uint32_t index,
-                              const hapi_path_pointer *in)
+static bool window_takes_kind(hapi_lookback *w, uint32_t index, const hapi_path_pointer *in)
 {
   bool pushes = hapi_v3_dot(in->wrench.force, in->wrench.force) > 0.0;
-  return in->generation == 0 || (!(in->rigid != 0 && pushes) &&
-                                 (in->is_tool == 0 || hapi_lookback_hand_take_hull(
-                                                          &w->hand, cycle, index, in->generation)));
+  return in->generation == 0 ||
+         (!(in->rigid != 0 && pushes) &&
+          (in->is_tool == 0 ||
+           hapi_lookback_hand_take_hull(&w->hand, w->cycle, index, in->generation)));
 }
 
-static void window_take_row(hapi_lookback *w, const hapi_cycle *cycle, int64_t time_ns,
-                            const hapi_path_pointer *pointers)
+static void window_take_row(hapi_lookback *w, int64_t time_ns, const hapi_path_pointer *pointers)
 {
   uint32_t count = w->rows.pointers;
   if (w->phase != HAPI_LOOKBACK_OPEN || w->spoilt || time_ns < w->from_ns) {
@@ -437,35 +758,34 @@ static void window_take_row(hapi_lookback *w, const hapi_cycle *cycle, int64_t t
     window_set_lags(w, time_ns);
   }
   for (uint32_t i = 0; i < count; ++i) {
-    w->spoilt = w->spoilt || !window_takes_kind(w, cycle, i, &pointers[i]);
+    w->spoilt = w->spoilt || !window_takes_kind(w, i, &pointers[i]);
   }
   w->rows.times_ns[w->rows.count] = time_ns;
   memcpy(&w->rows.path[w->rows.count * count], pointers, count * sizeof *w->rows.path);
   ++w->rows.count;
 }
 
-static void window_take_rows(hapi_lookback *w, const hapi_cycle *cycle)
+static void window_take_rows(hapi_lookback *w)
 {
-  hapi_path *path = hapi_exchange_path(cycle->config->exchange);
+  hapi_path *path = hapi_exchange_path(w->cycle->config->exchange);
   int64_t time_ns;
   const hapi_path_pointer *pointers;
   while (hapi_path_look(path, &time_ns, &pointers)) {
-    window_take_row(w, cycle, time_ns, pointers);
+    window_take_row(w, time_ns, pointers);
     hapi_path_let_go(path);
   }
 }
 
 /* All bodies are those that they were, and nobody else has moved one. */
-static bool window_is_still_there(const hapi_lookback *w, const hapi_body_table *bodies,
-                                  const hapi_slots *slots)
+static bool window_is_still_there(const hapi_lookback *w)
 {
   for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    const hapi_known_body *known = &bodies->entries[w->bodies.list[i].known];
+    const hapi_known_body *known = &w->world->bodies.entries[w->bodies.list[i].known];
     if (known->body == NULL || known->rest->birth != w->bodies.list[i].birth) {
       return false;
     }
     if (w->phase == HAPI_LOOKBACK_OPEN && known->slot != HAPI_NONE) {
-      const hapi_body_slot *slot = &slots->bodies[known->slot];
+      const hapi_body_slot *slot = &w->near->slots.bodies[known->slot];
       if (slot->pose_changed || slot->velocity_changed) {
         return false;
       }
@@ -477,16 +797,16 @@ static bool window_is_still_there(const hapi_lookback *w, const hapi_body_table 
 /* ---- what comes out ---- */
 
 /* The next window may go on where this one's reference has ended. */
-static void window_link_up(hapi_lookback *w, const hapi_cycle *cycle)
+static void window_link_up(hapi_lookback *w)
 {
   w->chain_s += 1e-9 * (double)(w->to_ns - w->from_ns);
   if (w->rows.count > 0 && w->chain_s < CHAIN_S) {
-    w->end_ns = w->rows.times_ns[w->rows.count - 1] + ticks_ns(cycle, 1.0);
+    w->end_ns = w->rows.times_ns[w->rows.count - 1] + ticks_ns(w, 1.0);
   }
 }
 
 /* True: *out is what the window says. */
-static bool window_end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_verdict *out)
+static bool window_end(hapi_lookback *w, hapi_lookback_verdict *out)
 {
   hapi_lookback_sums *sums = &w->sums;
   w->phase = HAPI_LOOKBACK_IDLE;
@@ -495,7 +815,7 @@ static bool window_end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_
     ++w->counts.spoilt;
     return false;
   }
-  window_link_up(w, cycle);
+  window_link_up(w);
   double keep = exp(-1e-9 * (double)(w->to_ns - w->from_ns) / MEMORY_S);
   ++w->counts.windows;
   if (sums->touched == 0) {
@@ -512,43 +832,41 @@ static bool window_end(hapi_lookback *w, const hapi_cycle *cycle, hapi_lookback_
 }
 
 /* s, for this cycle's share; negative: as long as it takes. */
-static double window_budget(const hapi_physics_config *config, double spare_s)
+static double window_budget(const hapi_lookback *w, double spare_s)
 {
+  const hapi_physics_config *config = w->cycle->config;
   return config->lockstep ? -1.0 : fmin(config->lookback_share / config->physics_hz, spare_s);
 }
 
 /* A world in which one step takes all of the time that there is: the figure would be long out of
  * date, and physics late. The next windows make do with less. */
-static bool window_is_too_costly(hapi_lookback *w, const hapi_physics_config *config,
-                                 double spare_s)
+static bool window_is_too_costly(hapi_lookback *w, double spare_s)
 {
-  bool dear = !config->lockstep && w->rows.next > 0 &&
-              w->spent_s > DEAR * window_budget(config, spare_s) * (double)w->rows.next;
+  bool dear = !w->cycle->config->lockstep && w->rows.next > 0 &&
+              w->spent_s > DEAR * window_budget(w, spare_s) * (double)w->rows.next;
   w->lean = w->lean || dear;
   return dear;
 }
 
-bool hapi_lookback_follow(hapi_lookback *w, const hapi_cycle *cycle, const hapi_world *world,
-                          const hapi_slots *slots, const hapi_lookback_time *time,
+bool hapi_lookback_follow(hapi_lookback *w, const hapi_lookback_time *time,
                           hapi_lookback_verdict *out)
 {
-  if (cycle->config->lookback_share <= 0.0) {
+  if (w->cycle->config->lookback_share <= 0.0) {
     return false;
   }
-  window_take_rows(w, cycle);
+  window_take_rows(w);
   if (w->phase == HAPI_LOOKBACK_IDLE) {
     return false;
   }
-  w->spoilt =
-      w->spoilt || !lookback_is_wanted(cycle) || !window_is_still_there(w, &world->bodies, slots);
+  w->spoilt = w->spoilt || !lookback_is_wanted(w) || !window_is_still_there(w);
   if (w->phase == HAPI_LOOKBACK_OPEN && time->now_ns >= w->to_ns) {
     w->phase = HAPI_LOOKBACK_GOING;
   }
   if (w->phase == HAPI_LOOKBACK_GOING && !w->spoilt) {
-    double seconds = window_budget(cycle->config, time->spare_s);
-    w->spoilt = hapi_lookback_run(w, cycle, world, time->own_iterations, seconds) < HAP_OK ||
-                window_is_too_costly(w, cycle->config, time->spare_s);
+    double seconds = window_budget(w, time->spare_s);
+    w->spoilt = window_run(w, time->own_iterations, seconds) < HAP_OK ||
+                window_is_too_costly(w, time->spare_s);
   }
   return w->phase == HAPI_LOOKBACK_GOING && (w->spoilt || w->rows.next >= w->rows.count) &&
-         window_end(w, cycle, out);
+         window_end(w, out);
 }

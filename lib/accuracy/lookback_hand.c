@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "accuracy/lookback_window.h"
+#include "accuracy/lookback.h"
 
 #include <math.h>
 #include <string.h>
@@ -272,7 +272,7 @@ static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t 
   double normal[3];
   const double *center = p->pose.position;
   double reach = hapi_neighbors_reach(hapi_neighbors_speed(t->geom, p, center), period);
-  if (!w->asker.nearest(w->asker.user, t->geom, center, p->radius, reach, &at)) {
+  if (!hapi_geom_nearest(w->near, t->geom, center, p->radius, reach, &at)) {
     t->placed = false;
     ++t->contact_generation;
     return;
@@ -310,7 +310,7 @@ static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t bo
                            .key = t->key,
                            .reach = hapi_neighbors_reach(speed, period),
                            .horizon = period};
-  uint32_t count = w->asker.points(w->asker.user, &at, hand->found);
+  uint32_t count = hapi_tool_points(w->near, &at, hand->found);
   if (m->tool_count + count > hand->tick->capacity.tool_points) {
     return false;
   }

@@ -255,10 +255,10 @@ static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double
   return found;
 }
 
-uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6])
+uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], uint64_t walk)
 {
   hapi_meshes *meshes = &nearby->meshes;
-  const hapi_mesh *mesh = find_mesh(meshes, geom, nearby->range.number);
+  const hapi_mesh *mesh = find_mesh(meshes, geom, walk);
   double local[6];
   uint32_t found = 0;
   if (mesh == NULL) {

@@ -224,7 +224,7 @@ static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *tria
 /* The triangles of static ground near a geom, each as a geom of its own. */
 static void add_mesh(hapi_nearby *nearby, const hapi_link *link)
 {
-  uint32_t count = hapi_mesh_near(nearby, link->other, link->box);
+  uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     const hapi_near_triangle *triangle = &nearby->meshes.found[i];
     uint32_t geom = add_triangle(nearby, triangle);
@@ -299,7 +299,7 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
   for (int k = 0; k < 6; ++k) {
     box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
   }
-  uint32_t count = hapi_mesh_near(nearby, hit->geom, box);
+  uint32_t count = hapi_mesh_near(nearby, hit->geom, box, nearby->range.number);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
     if (geom != HAPI_NONE && body != NULL) {
@@ -514,7 +514,7 @@ static void need_link(hapi_nearby *nearby, const hapi_link *link, range_need *io
     ++io->pairs;
     return;
   }
-  uint32_t count = hapi_mesh_near(nearby, link->other, link->box);
+  uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
   bool all = count < HAPI_NEAR_TRIANGLES;
   io->geoms += count;
   io->points += 3 * count;

@@ -106,9 +106,7 @@ static void add_mesh(tool_search *s, dGeomID geom)
 {
   double box[6];
   search_box(s, box);
-  s->nearby->range.number =
-      s->nearby->cycle->model_number + 1; /* as its walk will: of this cycle */
-  uint32_t count = hapi_mesh_near(s->nearby, geom, box);
+  uint32_t count = hapi_mesh_near(s->nearby, geom, box, s->nearby->cycle->model_number + 1);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
     hapi_touch_side other = {

@@ -14,7 +14,7 @@
 
 #include "base/effect_figures.h"
 #include "base/histogram.h"
-#include "physics/account.h"
+#include "physics/reconcile.h"
 
 typedef struct hapi_physics hapi_physics;
 

@@ -76,11 +76,11 @@ static void global_step(hapi_physics *physics)
   bool single = physics->cycle.model == HAP_MODEL_SINGLE;
   hapi_meant meant;
   hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
-  hapi_hold(&physics->account, &physics->world, &physics->near.slots);
+  hapi_hold(&physics->account);
   hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
   hapi_world_step(&physics->world, physics->cycle.step_s);
   hapi_world_restore(&physics->world, &meant);
-  hapi_hold_let_go(&physics->account, &physics->world, &physics->near.slots);
+  hapi_hold_let_go(&physics->account);
 }
 
 static void call_step(hapi_physics *physics, hap_step_fn callback)
@@ -132,7 +132,7 @@ static void sync_in(hapi_physics *physics)
   physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   hapi_physics_take_state(physics);
   if (physics->cycle.has_new_state) {
-    hapi_reconcile_own(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+    hapi_reconcile_own(&physics->account);
   }
 }
 
@@ -148,7 +148,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
   hapi_physics_send_model(physics, state_ns, valid_ns - half_tick);
-  hapi_reconcile_leave(&physics->account, &physics->world, &physics->near.slots);
+  hapi_reconcile_leave(&physics->account);
   hapi_slots_release(&physics->near);
   hapi_joints_leave(&physics->world.joints);
   physics->cycle.last_cycle_ns = now_ns;
@@ -181,17 +181,13 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
-/* The reference asks for what is near, by numbers of walks that are not of this cycle. */
 static void look_back(hapi_physics *physics, int64_t now_ns)
 {
   const hapi_lookback_time time = {now_ns,
                                    hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s),
                                    physics->dial.own_iterations};
-  uint64_t walk = physics->near.range.number;
   hapi_lookback_verdict verdict;
-  bool told = hapi_lookback_follow(&physics->lookback, &physics->cycle, &physics->world,
-                                   &physics->near.slots, &time, &verdict);
-  physics->near.range.number = walk;
+  bool told = hapi_lookback_follow(&physics->lookback, &time, &verdict);
   if (told && hapi_dial_note_error(&physics->dial, verdict.error, verdict.seconds,
                                    !hapi_tape_plays(physics->tape.tape))) {
     hapi_lookback_unchain(&physics->lookback);
@@ -237,10 +233,9 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   look_back(physics, now_ns);
   double looked_s = seconds[2] = stopwatch_lap(&watch);
   if (physics->cycle.model == HAP_MODEL_IMPULSE) {
-    hapi_lookback_open(&physics->lookback, &physics->cycle, &physics->world, &physics->near.slots,
-                       &physics->near.neighbors, now_ns);
+    hapi_lookback_open(&physics->lookback, now_ns);
   }
-  hapi_reconcile_push(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+  hapi_reconcile_push(&physics->account);
   seconds[4] += stopwatch_lap(&watch);
   hapi_physics_collide(physics);
   seconds[0] += stopwatch_lap(&watch);
@@ -248,9 +243,8 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[1] = stopwatch_lap(&watch);
   global_step(physics);
   seconds[3] = stopwatch_lap(&watch);
-  hapi_reconcile_residual(&physics->account, &physics->world, &physics->near.slots,
-                          &physics->cycle);
-  hapi_reconcile_overwrite(&physics->world, &physics->near.slots, &physics->cycle);
+  hapi_reconcile_residual(&physics->account);
+  hapi_reconcile_overwrite(&physics->account);
   hapi_neighbors_find(&physics->near);
   seconds[1] += stopwatch_lap(&watch) - physics->near.range.links.cover.boxes_s;
   seconds[0] +=
@@ -258,12 +252,10 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->world.joints, physics->near.range.number);
   seconds[2] += stopwatch_lap(&watch);
-  hapi_lookback_note(&physics->lookback, &physics->cycle, &physics->near.slots,
-                     &physics->near.neighbors);
+  hapi_lookback_note(&physics->lookback);
   sync_out(physics, now_ns, next_ns);
   if (physics->cycle.model != HAP_MODEL_IMPULSE) {
-    hapi_lookback_open(&physics->lookback, &physics->cycle, &physics->world, &physics->near.slots,
-                       &physics->near.neighbors, now_ns);
+    hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
   seconds[4] += stopwatch_lap(&watch);

@@ -37,7 +37,7 @@ static void listener_surface_asked(void *user, dGeomID a, dGeomID b,
                                    const dSurfaceParameters *surface)
 {
   hapi_physics *physics = user;
-  hapi_lookback_ask(&physics->lookback, &physics->world.bodies, a, b, surface);
+  hapi_lookback_ask(&physics->lookback, a, b, surface);
 }
 
 void hapi_physics_listen(hapi_physics *physics)
@@ -92,7 +92,7 @@ void hapi_physics_take_state(hapi_physics *physics)
   hapi_tape_state(&physics->tape, physics->config.exchange, newest != NULL);
   if (newest != NULL) { /* else the loop has stopped or is late: nothing is taken twice */
     physics->cycle.state = newest;
-    hapi_reconcile_take(&physics->account, &physics->world, &physics->near.slots, &physics->cycle);
+    hapi_reconcile_take(&physics->account);
   }
 }
 

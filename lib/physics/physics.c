@@ -18,7 +18,8 @@
 static bool physics_allocate(hapi_physics *physics, const hap_ode_def *ode)
 {
   const hapi_capacity *c = &physics->config.capacity;
-  return hapi_account_create(&physics->account, c->bodies) &&
+  return hapi_account_create(&physics->account, &physics->cycle, &physics->world,
+                             &physics->near.slots) &&
          hapi_probe_create(&physics->probe, &physics->cycle, &physics->world,
                            &physics->near.slots) &&
          hapi_cross_create(&physics->cross, &physics->cycle, &physics->near.slots,
@@ -58,25 +59,6 @@ static void release_bodies(const hapi_body_table *table)
   }
 }
 
-/* ---- what looking back asks for ---- */
-
-static bool ask_nearest(void *user, dGeomID geom, const double center[3], double radius,
-                        double reach, hapi_nearest *out)
-{
-  return hapi_geom_nearest(user, geom, center, radius, reach, out);
-}
-
-static uint32_t ask_tool_points(void *user, const hapi_tool_at *at,
-                                hapi_found_point out[HAPI_TOOL_SPOTS])
-{
-  return hapi_tool_points(user, at, out);
-}
-
-static uint64_t ask_tool_key(void *user, dGeomID geom, uint32_t pointer)
-{
-  return hapi_tool_geom_key(user, geom, pointer);
-}
-
 hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
                                hapi_physics **out, hap_detail *detail)
 {
@@ -97,8 +79,9 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->wanted.latency_s = -1.0;
   atomic_init(&physics->wanted.model, (int)config->model);
   atomic_init(&physics->wanted.effects, config->effects);
-  physics->lookback.asker =
-      (hapi_lookback_asker){&physics->near, ask_nearest, ask_tool_points, ask_tool_key};
+  physics->lookback.cycle = &physics->cycle;
+  physics->lookback.world = &physics->world;
+  physics->lookback.near = &physics->near;
   physics->dial.knobs = config->knobs;
   atomic_init(&physics->dial.wanted, config->accuracy);
   atomic_init(&physics->dial.force_error, config->force_error_wanted);
@@ -242,7 +225,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
                      times_ns);
   hapi_physics_send_model(physics, *start_ns, *start_ns);
   hapi_tape_started(&physics->tape, &physics->cycle);
-  hapi_reconcile_leave(&physics->account, &physics->world, &physics->near.slots);
+  hapi_reconcile_leave(&physics->account);
   hapi_slots_release(&physics->near);
   hapi_lock_unclaim(&physics->lock);
   hapi_counts_show(physics);

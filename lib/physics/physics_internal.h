@@ -13,12 +13,10 @@
 #include "accuracy/lookback.h"
 #include "base/thread.h"
 #include "near/near.h"
-#include "physics/account.h"
 #include "physics/counts.h"
 #include "physics/edits.h"
 #include "physics/physics.h"
 #include "physics/poses.h"
-#include "physics/publish.h"
 #include "physics/reconcile.h"
 #include "physics/tape_cycle.h"
 #include "physics/world_lock.h"
@@ -27,6 +25,12 @@
 #include "probe/operating_point.h"
 #include "research/cross.h"
 #include "world/world.h"
+
+/* Bodies whose positions are traced: body table entries. */
+typedef struct hapi_watch {
+  uint32_t bodies[HAP_TRACE_BODIES_MAX]; /* HAPI_NONE: it is gone */
+  uint32_t count;
+} hapi_watch;
 
 /* The thread of drive THREADS. */
 typedef struct hapi_pace {
@@ -75,7 +79,7 @@ void hapi_physics_run_edits(hapi_physics *physics); /* those that wait; the call
 /* The newest message of the loop, if there is one. */
 void hapi_physics_take_state(hapi_physics *physics);
 
-/* send.c: the next model */
+/* publish.c: the next model */
 void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
 
 #endif

@@ -4,8 +4,21 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/clock.h"
 #include "base/vec.h"
-#include "physics/publish.h"
+#include "physics/physics_internal.h"
+
+/* The local model: what the loop is told after a step. Each part writes its own into the message.
+ */
+
+/* What a model is made of. */
+typedef struct publishing {
+  const hapi_cycle *cycle;
+  const hapi_world *world;
+  const hapi_slots *slots;
+  const hapi_answers *answers;
+  hapi_account *account;
+} publishing;
 
 /* Row-major 3x3 of ODE's rows of four. */
 static void read_matrix(const dReal in[12], double out[9])
@@ -47,7 +60,7 @@ static void fill_mass(uint32_t wishes, dBodyID body, hapi_model_body *out)
 }
 
 /* What the loop needs to move the body itself. */
-static void fill_dynamics(const hapi_publishing *p, const hapi_body_slot *slot,
+static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
                           const hapi_body_answer *answer, hapi_slot_account *of,
                           hapi_model_body *out)
 {
@@ -76,10 +89,10 @@ static void fill_dynamics(const hapi_publishing *p, const hapi_body_slot *slot,
   memcpy(out->response, answer->response, sizeof out->response);
 }
 
-static bool fill_body(const hapi_publishing *p, uint32_t index, hapi_model_body *out)
+static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
 {
   const hapi_body_slot *slot = &p->slots->bodies[index];
-  hapi_slot_account *of = hapi_account_of(p->account, p->slots, index);
+  hapi_slot_account *of = hapi_account_of(p->account, index);
   const hapi_body_answer *answer = &p->answers->bodies[index];
   HAPI_ASSERT_INDEX(slot->known, p->world->bodies.high);
   dBodyID body = p->world->bodies.entries[slot->known].body;
@@ -130,7 +143,7 @@ static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answe
 }
 
 /* False: a point of a hull, and no room for more of them. */
-static bool fill_tool(const hapi_publishing *p, const hapi_contact_slot *slot, hapi_model *out,
+static bool fill_tool(const publishing *p, const hapi_contact_slot *slot, hapi_model *out,
                       hapi_model_contact *contact)
 {
   if (!slot->is_tool) {
@@ -145,7 +158,7 @@ static bool fill_tool(const hapi_publishing *p, const hapi_contact_slot *slot, h
   return true;
 }
 
-void hapi_publish_bodies(const hapi_publishing *p, hapi_model *out)
+static void publish_bodies(const publishing *p, hapi_model *out)
 {
   hapi_model_body *bodies = hapi_model_bodies(out);
   out->body_count = 0;
@@ -157,7 +170,7 @@ void hapi_publish_bodies(const hapi_publishing *p, hapi_model *out)
   }
 }
 
-void hapi_publish_contacts(const hapi_publishing *p, hapi_model *out)
+static void publish_contacts(const publishing *p, hapi_model *out)
 {
   hapi_model_contact *contacts = hapi_model_contacts(out);
   out->contact_count = 0;
@@ -173,7 +186,7 @@ void hapi_publish_contacts(const hapi_publishing *p, hapi_model *out)
   }
 }
 
-void hapi_publish_watch(const hapi_watch *watch, const hapi_body_table *table, hapi_model *out)
+static void publish_watch(const hapi_watch *watch, const hapi_body_table *table, hapi_model *out)
 {
   out->watch_count = watch->count;
   for (uint32_t i = 0; i < watch->count; ++i) {
@@ -186,4 +199,230 @@ void hapi_publish_watch(const hapi_watch *watch, const hapi_body_table *table, h
       hapi_v3_copy(dBodyGetPosition(known->body), out->watch_position[i]);
     }
   }
+}
+
+/* ---- the joints of the range, as the loop has them ---- */
+
+/* A softness from which on a constraint is a spring, not a rigid one with rounding; as of
+ * contacts. */
+#define SOFT_CFM 1e-6
+
+/* ODE: a stop at pi and beyond is never met, as the angle goes on at -pi. */
+#define WHOLE_TURN (M_PI - 1e-9)
+
+typedef dReal (*parameter_fn)(dJointID, int);
+
+static const hapi_body_slot *slot_of(const publishing *p, uint32_t body)
+{
+  uint32_t slot = body != HAPI_NONE ? p->world->bodies.entries[body].slot : HAPI_NONE;
+  return slot != HAPI_NONE ? &p->slots->bodies[slot] : NULL;
+}
+
+static hapi_softness softness_of(const publishing *p, double erp, double cfm)
+{
+  hapi_softness out = {erp, cfm, cfm > SOFT_CFM};
+  hapi_soften(hapi_step_ratio(p->cycle), &out.erp, &out.cfm);
+  return out;
+}
+
+static uint32_t stop_flag(double stop, bool turns, uint32_t flag)
+{
+  bool there = turns ? fabs(stop) < WHOLE_TURN : isfinite(stop);
+  return there ? flag : 0u;
+}
+
+static void fill_limit(const publishing *p, dJointID joint, parameter_fn get, int group, bool turns,
+                       hapi_model_limit *out)
+{
+  out->low = get(joint, dParamLoStop + group);
+  out->high = get(joint, dParamHiStop + group);
+  if (out->low <= out->high) { /* else ODE has none */
+    out->flags |= stop_flag(out->low, turns, HAPI_LIMIT_LOW);
+    out->flags |= stop_flag(out->high, turns, HAPI_LIMIT_HIGH);
+  }
+  if (out->flags == (HAPI_LIMIT_LOW | HAPI_LIMIT_HIGH) && out->low == out->high) {
+    out->flags = HAPI_LIMIT_LOCKED;
+  }
+  out->stop = softness_of(p, get(joint, dParamStopERP + group), get(joint, dParamStopCFM + group));
+  out->bounce = hapi_wish_is_off(p->cycle->wishes, HAP_EFFECT_RESTITUTION)
+                    ? 0.0
+                    : get(joint, dParamBounce + group);
+  out->speed = get(joint, dParamVel + group);
+  out->force = get(joint, dParamFMax + group);
+  out->motor_cfm = get(joint, dParamCFM + group);
+  out->fudge = get(joint, dParamFudgeFactor + group);
+  bool drives = out->force > 0.0 && (out->flags & HAPI_LIMIT_LOCKED) == 0;
+  out->flags |= drives ? HAPI_LIMIT_MOTOR : 0u;
+}
+
+static void fill_parameters(const publishing *p, const hapi_known_joint *known,
+                            hapi_model_joint *out)
+{
+  dJointID joint = known->joint;
+  dWorldID world = p->world->ode.world;
+  out->linear = softness_of(p, dWorldGetERP(world), dWorldGetCFM(world));
+  out->angular = out->along = out->linear;
+  switch (known->kind) {
+    case HAPI_JOINT_BALL:
+      out->linear = softness_of(p, dJointGetBallParam(joint, dParamERP),
+                                dJointGetBallParam(joint, dParamCFM));
+      break;
+    case HAPI_JOINT_HINGE:
+      fill_limit(p, joint, dJointGetHingeParam, 0, true, &out->limits[0]);
+      break;
+    case HAPI_JOINT_SLIDER:
+      fill_limit(p, joint, dJointGetSliderParam, 0, false, &out->limits[0]);
+      break;
+    case HAPI_JOINT_UNIVERSAL:
+      fill_limit(p, joint, dJointGetUniversalParam, 0, true, &out->limits[0]);
+      fill_limit(p, joint, dJointGetUniversalParam, dParamGroup, true, &out->limits[1]);
+      break;
+    case HAPI_JOINT_HINGE2:
+      fill_limit(p, joint, dJointGetHinge2Param, 0, true, &out->limits[0]);
+      fill_limit(p, joint, dJointGetHinge2Param, dParamGroup, true, &out->limits[1]);
+      out->limits[1].flags &= HAPI_LIMIT_MOTOR; /* ODE never stops the second axis */
+      out->along = softness_of(p, dJointGetHinge2Param(joint, dParamSuspensionERP),
+                               dJointGetHinge2Param(joint, dParamSuspensionCFM));
+      break;
+    case HAPI_JOINT_FIXED:
+      out->linear = softness_of(p, dJointGetFixedParam(joint, dParamERP),
+                                dJointGetFixedParam(joint, dParamCFM));
+      break;
+    case HAPI_JOINT_MEASURED:
+      break;
+  }
+}
+
+static void fill_limits(const publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
+{
+  hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
+  int count = hapi_joint_axes(known, axes);
+  for (int i = 0; i < count; ++i) {
+    fill_limit(p, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
+  }
+}
+
+static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
+{
+  HAPI_ASSERT_INDEX(known->slot, p->world->joints.slot_count);
+  memset(out, 0, sizeof *out);
+  const hapi_joint_measurement *measured = known->carried ? NULL : known->measurement;
+  uint32_t first = measured != NULL ? measured->first : 0;
+  const hapi_body_slot *a = slot_of(p, known->index[first]);
+  const hapi_body_slot *b = slot_of(p, known->index[1 - first]);
+  out->slot = known->slot;
+  out->generation = p->world->joints.slots[known->slot].generation;
+  out->kind = known->kind;
+  out->body_a = (uint32_t)(a - p->slots->bodies);
+  out->generation_a = a->generation;
+  out->body_b = b != NULL ? (uint32_t)(b - p->slots->bodies) : HAPI_SLOT_NONE;
+  out->generation_b = b != NULL ? b->generation : 0;
+  if (measured != NULL) {
+    out->kind = HAPI_JOINT_MEASURED;
+    out->place = measured->place;
+    out->measured = measured->found;
+    fill_limits(p, known, out);
+    return;
+  }
+  out->place = known->place;
+  fill_parameters(p, known, out);
+}
+
+static void publish_joints(const publishing *p, const uint32_t *joints, uint32_t count,
+                           hapi_model *out)
+{
+  hapi_model_joint *to = hapi_model_joints(out);
+  HAPI_ASSERT(count <= p->cycle->config->capacity.joints);
+  for (uint32_t i = 0; i < count; ++i) {
+    joint_fill(p, &p->world->joints.entries[joints[i]], &to[i]);
+  }
+  out->joint_count = count;
+}
+
+/* ---- the message ---- */
+
+static uint32_t count_bounces(const hapi_range *range, hapi_model *model)
+{
+  if (model->model != HAP_MODEL_CONTACT) {
+    return 0;
+  }
+  uint32_t count = range->number == model->number ? range->bounces : 0;
+  for (uint32_t i = 0; i < model->joint_count; ++i) {
+    for (int k = 0; k < HAPI_JOINT_LIMITS; ++k) {
+      count += hapi_model_joints(model)[i].limits[k].bounce > 0.0;
+    }
+  }
+  return count;
+}
+
+static void count_model(hap_stats *stats, const hapi_nearby *near, const hapi_model *model)
+{
+  stats->model.neighbours = hapi_neighbors_bodies(near);
+  stats->model.pointer_contacts = model->contact_count;
+  if (model->model == HAP_MODEL_CONTACT && near->range.number == model->number) {
+    stats->model.pointer_contacts +=
+        near->range.near->tool_pair_count; /* whose points are found later */
+  }
+  if (stats->model.neighbours > stats->model.neighbours_max) {
+    stats->model.neighbours_max = stats->model.neighbours;
+  }
+}
+
+static void fill_header(hapi_model *out, const hapi_cycle *cycle, int64_t state_ns,
+                        int64_t valid_from_ns)
+{
+  out->number = cycle->model_number;
+  out->state_ns = state_ns;
+  out->valid_from_ns = valid_from_ns;
+  out->blend_s = cycle->model == HAP_MODEL_IMPULSE ? cycle->probe_step_s : 0.0;
+  out->model = cycle->model;
+  out->impulse_pose = cycle->config->impulse_pose;
+  out->wishes = cycle->wishes;
+  out->max_sweeps = cycle->settings.max_sweeps;
+  out->row_updates = cycle->settings.row_updates;
+}
+
+static void send_joints(hapi_physics *physics, const publishing *p, hapi_model *out)
+{
+  const hapi_range *range = &physics->near.range;
+  int64_t begin_ns = hapi_clock_now();
+  out->joint_count = 0;
+  if (out->model == HAP_MODEL_CONTACT && range->number == out->number) {
+    hapi_joints_take_slots(&physics->world.joints, out->number, range->mechanism.joints,
+                           range->mechanism.joint_count);
+    publish_joints(p, range->mechanism.joints, range->mechanism.joint_count, out);
+  }
+  physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+}
+
+void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
+{
+  hapi_cycle *cycle = &physics->cycle;
+  hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
+  const publishing p = {cycle, &physics->world, &physics->near.slots, &physics->probe.answers,
+                        &physics->account};
+  ++cycle->model_number;
+  HAPI_ASSERT(cycle->probe_step_s > 0.0);
+  fill_header(out, cycle, state_ns, valid_from_ns);
+  out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
+  out->period_s = hapi_config_period(
+      &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
+  out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
+  publish_bodies(&p, out);
+  publish_contacts(&p, out);
+  out->cross_count = 0;
+  for (uint32_t i = 0; i < out->contact_count; ++i) {
+    hapi_cross_publish(&physics->cross, hapi_model_contacts(out)[i].slot, i, out);
+  }
+  send_joints(physics, &p, out);
+  out->bounces = count_bounces(&physics->near.range, out);
+  publish_watch(&physics->watch, &physics->world.bodies, out);
+  count_model(&physics->counts.own.stats, &physics->near, out);
+  out->touches = physics->counts.own.stats.model.pointer_contacts;
+  hapi_effects_note(physics->counts.own.effects, cycle, &physics->world, &physics->near,
+                    &physics->probe.answers, out);
+  hapi_tape_model(&physics->tape, out);
+  /* First: the contact thread waits for the loop to use the model. */
+  hapi_range_publish(&physics->near);
+  hapi_exchange_model_publish(physics->config.exchange);
 }

@@ -1,23 +1,48 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "physics/reconcile.h"
+
 #include <string.h>
 
+#include "base/alloc.h"
 #include "base/assert.h"
 #include "base/vec.h"
-#include "physics/reconcile.h"
+
+bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, const hapi_world *world,
+                         const hapi_slots *slots)
+{
+  uint32_t capacity = cycle->config->capacity.bodies;
+  account->cycle = cycle;
+  account->world = world;
+  account->slots = slots;
+  account->bodies = hapi_alloc_array(capacity, sizeof *account->bodies);
+  account->capacity = account->bodies != NULL ? capacity : 0;
+  return account->bodies != NULL;
+}
+
+void hapi_account_finish(hapi_account *account)
+{
+  hapi_free(account->bodies);
+  account->bodies = NULL;
+  account->capacity = 0;
+}
+
+void hapi_account_reset(hapi_account *account)
+{
+  memset(account->bodies, 0, account->capacity * sizeof *account->bodies);
+}
 
 /* Where the loop's world and the global world meet (paper section 6,
  * docs/decisions/step-ends-now.md). */
 
 /* What the newest message says of the body of a slot; NULL: nothing. */
-static const hapi_state_body *state_of_slot(const hapi_cycle *cycle, const hapi_slots *slots,
-                                            uint32_t slot_index)
+static const hapi_state_body *state_of_slot(const hapi_account *account, uint32_t slot_index)
 {
-  if (cycle->state == NULL || slot_index >= cycle->state->body_high) {
+  if (account->cycle->state == NULL || slot_index >= account->cycle->state->body_high) {
     return NULL;
   }
-  const hapi_state_body *body = &hapi_state_bodies(cycle->state)[slot_index];
-  return body->generation == slots->bodies[slot_index].generation ? body : NULL;
+  const hapi_state_body *body = &hapi_state_bodies(account->cycle->state)[slot_index];
+  return body->generation == account->slots->bodies[slot_index].generation ? body : NULL;
 }
 
 static void velocity_read(dBodyID body, double out[6])
@@ -88,13 +113,12 @@ static void write_off(hapi_account *account, hapi_slot_account *of, hapi_body_sl
   }
 }
 
-static void take_body(hapi_account *account, const hapi_world *world, const hapi_slots *slots,
-                      const hapi_cycle *cycle, uint32_t index)
+static void take_body(hapi_account *account, uint32_t index)
 {
-  hapi_body_slot *slot = &slots->bodies[index];
-  hapi_slot_account *of = hapi_account_of(account, slots, index);
-  const hapi_state_body *in = state_of_slot(cycle, slots, index);
-  dBodyID body = hapi_account_body(&world->bodies, slot);
+  hapi_body_slot *slot = &account->slots->bodies[index];
+  hapi_slot_account *of = hapi_account_of(account, index);
+  const hapi_state_body *in = state_of_slot(account, index);
+  dBodyID body = hapi_account_body(account, slot);
   bool driven = (slot->flags & HAPI_BODY_DRIVEN) != 0;
   slot->loop_owned = false;
   if (in == NULL || slot->phase == HAPI_SLOT_FREE) {
@@ -115,9 +139,9 @@ static void take_body(hapi_account *account, const hapi_world *world, const hapi
   take_impulse(of, slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
   if (slot->loop_owned) {
-    HAPI_ASSERT_INDEX(slot->known, world->bodies.high);
-    world->bodies.entries[slot->known].loop_owned = true;
-    world->bodies.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
+    HAPI_ASSERT_INDEX(slot->known, account->world->bodies.high);
+    account->world->bodies.entries[slot->known].loop_owned = true;
+    account->world->bodies.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
   }
   memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(of, slot, body)) {
@@ -126,15 +150,16 @@ static void take_body(hapi_account *account, const hapi_world *world, const hapi
   }
 }
 
-static void take_forces(const hapi_slots *slots, const hapi_cycle *cycle)
+static void take_forces(const hapi_account *account)
 {
-  const hapi_state_contact *in = hapi_state_contacts(cycle->state);
-  for (uint32_t i = 0; i < slots->contact_high; ++i) {
-    memset(slots->contacts[i].last_force, 0, sizeof slots->contacts[i].last_force);
+  const hapi_state_contact *in = hapi_state_contacts(account->cycle->state);
+  for (uint32_t i = 0; i < account->slots->contact_high; ++i) {
+    memset(account->slots->contacts[i].last_force, 0,
+           sizeof account->slots->contacts[i].last_force);
   }
-  for (uint32_t i = 0; i < cycle->state->contact_count; ++i) {
-    HAPI_ASSERT_INDEX(in[i].slot, cycle->config->capacity.contacts);
-    hapi_contact_slot *contact = &slots->contacts[in[i].slot];
+  for (uint32_t i = 0; i < account->cycle->state->contact_count; ++i) {
+    HAPI_ASSERT_INDEX(in[i].slot, account->cycle->config->capacity.contacts);
+    hapi_contact_slot *contact = &account->slots->contacts[in[i].slot];
     if (contact->phase == HAPI_SLOT_LIVE && contact->generation == in[i].generation &&
         hapi_finite(in[i].force, 3)) {
       hapi_v3_copy(in[i].force, contact->last_force);
@@ -152,21 +177,20 @@ static void take_owned_impulse(hapi_account_counts *f, const hapi_state *state)
   }
 }
 
-void hapi_reconcile_take(hapi_account *account, const hapi_world *world, const hapi_slots *slots,
-                         const hapi_cycle *cycle)
+void hapi_reconcile_take(hapi_account *account)
 {
-  HAPI_ASSERT(cycle->has_new_state && cycle->state != NULL);
-  hapi_v3_copy(cycle->state->hand_impulse, account->counts.hand_impulse);
-  take_owned_impulse(&account->counts, cycle->state);
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    if (hapi_account_body(&world->bodies, &slots->bodies[i]) != NULL) {
-      world->bodies.entries[slots->bodies[i].known].loop_owned = false;
+  HAPI_ASSERT(account->cycle->has_new_state && account->cycle->state != NULL);
+  hapi_v3_copy(account->cycle->state->hand_impulse, account->counts.hand_impulse);
+  take_owned_impulse(&account->counts, account->cycle->state);
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    if (hapi_account_body(account, &account->slots->bodies[i]) != NULL) {
+      account->world->bodies.entries[account->slots->bodies[i].known].loop_owned = false;
     }
   }
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    take_body(account, world, slots, cycle, i);
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    take_body(account, i);
   }
-  take_forces(slots, cycle);
+  take_forces(account);
 }
 
 /* What the application has not changed itself. */
@@ -188,12 +212,12 @@ static void set_state(const hapi_body_slot *slot, dBodyID body, const hap_pose *
 
 /* A body that the loop has let go since the last message. It did so some ticks after the time that
  * ODE's state is for: back by that, as the step to come goes over the whole interval. */
-static void take_last_state(const hapi_cycle *cycle, const hapi_slot_account *of,
+static void take_last_state(const hapi_account *account, const hapi_slot_account *of,
                             const hapi_body_slot *slot, dBodyID body, const hapi_state_body *in)
 {
   hap_pose pose = in->owned_pose;
-  double since = 1e-9 * (double)(in->owned_until_ns - cycle->last_cycle_ns);
-  since = since > cycle->step_s ? cycle->step_s : since < 0.0 ? 0.0 : since;
+  double since = 1e-9 * (double)(in->owned_until_ns - account->cycle->last_cycle_ns);
+  since = since > account->cycle->step_s ? account->cycle->step_s : since < 0.0 ? 0.0 : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
   if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */
@@ -203,15 +227,13 @@ static void take_last_state(const hapi_cycle *cycle, const hapi_slot_account *of
 }
 
 /* Model CONTACT: where the loop owns a body, its state is the body's. */
-void hapi_reconcile_own(hapi_account *account, const hapi_world *world, const hapi_slots *slots,
-                        const hapi_cycle *cycle)
+void hapi_reconcile_own(hapi_account *account)
 {
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    const hapi_body_slot *slot = &slots->bodies[i];
-    hapi_slot_account *of = hapi_account_of(account, slots, i);
-    const hapi_state_body *in =
-        slot->phase == HAPI_SLOT_FREE ? NULL : state_of_slot(cycle, slots, i);
-    dBodyID body = in != NULL ? hapi_account_body(&world->bodies, slot) : NULL;
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    const hapi_state_body *in = slot->phase == HAPI_SLOT_FREE ? NULL : state_of_slot(account, i);
+    dBodyID body = in != NULL ? hapi_account_body(account, slot) : NULL;
     if (body == NULL) {
       continue;
     }
@@ -224,7 +246,7 @@ void hapi_reconcile_own(hapi_account *account, const hapi_world *world, const ha
     } else if (in->owned_until_ns > of->owned_until_ns) {
       of->owned_until_ns = in->owned_until_ns;
       if (in->epoch == slot->epoch) { /* else the application has moved it since */
-        take_last_state(cycle, of, slot, body, in);
+        take_last_state(account, of, slot, body, in);
       }
     }
   }
@@ -250,47 +272,46 @@ static void push_body(hapi_account_counts *counts, hapi_slot_account *of, hapi_b
   memset(of->new_angular_impulse, 0, sizeof of->new_angular_impulse);
 }
 
-void hapi_reconcile_push(hapi_account *account, const hapi_world *world, const hapi_slots *slots,
-                         const hapi_cycle *cycle)
+void hapi_reconcile_push(hapi_account *account)
 {
-  for (uint32_t i = 0; i < slots->body_high && cycle->step_s > 0.0; ++i) {
-    hapi_body_slot *slot = &slots->bodies[i];
-    hapi_slot_account *of = hapi_account_of(account, slots, i);
-    dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(&world->bodies, slot);
+  for (uint32_t i = 0; i < account->slots->body_high && account->cycle->step_s > 0.0; ++i) {
+    hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(account, slot);
     memset(slot->exchanged, 0, sizeof slot->exchanged);
     if (body != NULL && (is_pushed(of->new_impulse) || is_pushed(of->new_angular_impulse))) {
-      push_body(&account->counts, of, slot, body, 1.0 / cycle->step_s);
+      push_body(&account->counts, of, slot, body, 1.0 / account->cycle->step_s);
     }
   }
 }
 
 /* Whether the loop moved the body by A and b in the interval that the message closes. */
-static const hapi_state_body *moved_by_loop(const hapi_slots *slots, const hapi_cycle *cycle,
-                                            uint32_t index)
+static const hapi_state_body *moved_by_loop(const hapi_account *account, uint32_t index)
 {
-  bool moves = cycle->has_new_state && slots->bodies[index].phase != HAPI_SLOT_FREE &&
-               (slots->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
-  const hapi_state_body *in = moves ? state_of_slot(cycle, slots, index) : NULL;
-  if (in == NULL || in->epoch != slots->bodies[index].epoch) {
+  bool moves = account->cycle->has_new_state &&
+               account->slots->bodies[index].phase != HAPI_SLOT_FREE &&
+               (account->slots->bodies[index].flags & HAPI_BODY_DRIVEN) == 0;
+  const hapi_state_body *in = moves ? state_of_slot(account, index) : NULL;
+  if (in == NULL || in->epoch != account->slots->bodies[index].epoch) {
     return NULL;
   }
-  bool linear = cycle->state->model == HAP_MODEL_ACCELERANCE ||
-                (cycle->state->model == HAP_MODEL_CONTACT && (in->flags & HAPI_BODY_OWNED) == 0);
+  bool linear =
+      account->cycle->state->model == HAP_MODEL_ACCELERANCE ||
+      (account->cycle->state->model == HAP_MODEL_CONTACT && (in->flags & HAPI_BODY_OWNED) == 0);
   return linear ? in : NULL;
 }
 
 /* Eq. 14. The global step had the same impulse from the pointers as the loop; where it came to
  * another velocity, the linear model missed something: an impact, a change of friction. What was
  * found before and is still on its way to the loop does not count twice. */
-void hapi_reconcile_residual(hapi_account *account, const hapi_world *world,
-                             const hapi_slots *slots, const hapi_cycle *cycle)
+void hapi_reconcile_residual(hapi_account *account)
 {
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    const hapi_body_slot *slot = &slots->bodies[i];
-    hapi_slot_account *of = hapi_account_of(account, slots, i);
-    const hapi_state_body *in = moved_by_loop(slots, cycle, i);
-    dBodyID body = slot->phase == HAPI_SLOT_LIVE ? hapi_account_body(&world->bodies, slot) : NULL;
-    if (in == NULL || body == NULL || cycle->step_s <= 0.0) {
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    const hapi_state_body *in = moved_by_loop(account, i);
+    dBodyID body = slot->phase == HAPI_SLOT_LIVE ? hapi_account_body(account, slot) : NULL;
+    if (in == NULL || body == NULL || account->cycle->step_s <= 0.0) {
       continue;
     }
     double there[6];
@@ -311,12 +332,11 @@ void hapi_reconcile_residual(hapi_account *account, const hapi_world *world,
  * is on its way to the loop. What is left is the pose; the contact planes are sought on it, as
  * it is the pose that the loop goes on with. A body that no pointer pushed keeps the world's:
  * for a body alone the two are equal, and what another body pushes is moved by the world only. */
-static void overwrite_body(const hapi_world *world, const hapi_slots *slots,
-                           const hapi_cycle *cycle, uint32_t index)
+static void overwrite_body(const hapi_account *account, uint32_t index)
 {
-  const hapi_body_slot *slot = &slots->bodies[index];
-  const hapi_state_body *in = moved_by_loop(slots, cycle, index);
-  dBodyID body = hapi_account_body(&world->bodies, slot);
+  const hapi_body_slot *slot = &account->slots->bodies[index];
+  const hapi_state_body *in = moved_by_loop(account, index);
+  dBodyID body = hapi_account_body(account, slot);
   if (in != NULL && body != NULL && slot->pushed) {
     const double *p = in->pose.position;
     dBodySetPosition(body, p[0], p[1], p[2]);
@@ -324,20 +344,19 @@ static void overwrite_body(const hapi_world *world, const hapi_slots *slots,
   }
 }
 
-void hapi_reconcile_overwrite(const hapi_world *world, const hapi_slots *slots,
-                              const hapi_cycle *cycle)
+void hapi_reconcile_overwrite(const hapi_account *account)
 {
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    overwrite_body(world, slots, cycle, i);
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    overwrite_body(account, i);
   }
 }
 
-void hapi_reconcile_leave(hapi_account *account, const hapi_world *world, const hapi_slots *slots)
+void hapi_reconcile_leave(hapi_account *account)
 {
-  for (uint32_t i = 0; i < slots->body_high; ++i) {
-    const hapi_body_slot *slot = &slots->bodies[i];
-    hapi_slot_account *of = hapi_account_of(account, slots, i);
-    dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(&world->bodies, slot);
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(account, slot);
     of->placed = body != NULL;
     if (body != NULL) {
       hapi_v3_copy(dBodyGetPosition(body), of->left_position);
@@ -346,4 +365,110 @@ void hapi_reconcile_leave(hapi_account *account, const hapi_world *world, const 
       velocity_read(body, of->left_velocity);
     }
   }
+}
+
+/* What the loop owns is not stepped by ODE: its bodies and joints are switched off for the step. */
+
+static bool is_owned(const hapi_body_table *table, uint32_t body)
+{
+  return body != HAPI_NONE && table->entries[body].loop_owned;
+}
+
+static hapi_slot_account *account_of_known(const hapi_account *account, uint32_t known)
+{
+  uint32_t slot = known != HAPI_NONE ? account->world->bodies.entries[known].slot : HAPI_NONE;
+  return slot != HAPI_NONE ? hapi_account_of(account, slot) : NULL;
+}
+
+/* A body that the application has just moved is no more the loop's, but what hangs on it is
+ * still: it waits for the next model where it was put, or its joints would open. False: neither
+ * is to wait. */
+static bool partners_hold(const hapi_account *account, const hapi_known_joint *known)
+{
+  hapi_slot_account *of[2];
+  for (int i = 0; i < 2; ++i) {
+    of[i] = account_of_known(account, known->index[i]);
+  }
+  for (int i = 0; i < 2; ++i) {
+    dBodyID body = known->bodies[i];
+    if (of[i] != NULL && of[1 - i] != NULL && !of[i]->held && of[1 - i]->held &&
+        !dBodyIsKinematic(body) && dBodyIsEnabled(body)) {
+      of[i]->held = true;
+      dBodyDisable(body);
+      return true;
+    }
+  }
+  return false;
+}
+
+/* ODE's search for islands goes through joints and wakes what it finds. */
+static void joints_hold(const hapi_account *account)
+{
+  const hapi_joint_table *table = &account->world->joints;
+  bool again = true;
+  for (uint32_t i = 0; i < table->count; ++i) {
+    hapi_known_joint *known = &table->entries[i];
+    known->held =
+        dJointIsEnabled(known->joint) != 0 && (is_owned(&account->world->bodies, known->index[0]) ||
+                                               is_owned(&account->world->bodies, known->index[1]));
+    if (known->held) {
+      dJointDisable(known->joint);
+    }
+  }
+  while (again) {
+    again = false;
+    for (uint32_t i = 0; i < table->count; ++i) {
+      const hapi_known_joint *known = &table->entries[i];
+      again = (known->held && partners_hold(account, known)) || again;
+    }
+  }
+}
+
+/* The feedback of a held joint is zero. */
+static void joints_let_go(const hapi_joint_table *table)
+{
+  for (uint32_t i = 0; i < table->count; ++i) {
+    hapi_known_joint *known = &table->entries[i];
+    dJointFeedback *feedback = known->held ? dJointGetFeedback(known->joint) : NULL;
+    if (feedback != NULL) {
+      memset(feedback, 0, sizeof *feedback);
+    }
+    if (known->held) {
+      dJointEnable(known->joint);
+    }
+    known->held = false;
+  }
+}
+
+void hapi_hold(hapi_account *account)
+{
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    dBodyID body = slot->loop_owned ? hapi_account_body(account, slot) : NULL;
+    HAPI_ASSERT(!of->held);
+    of->held = body != NULL && dBodyIsEnabled(body);
+    if (of->held) {
+      dBodyDisable(body);
+    }
+  }
+  joints_hold(account);
+}
+
+void hapi_hold_let_go(hapi_account *account)
+{
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    hapi_slot_account *of = hapi_account_of(account, i);
+    dBodyID body = slot->loop_owned || of->held ? hapi_account_body(account, slot) : NULL;
+    if (body != NULL) {
+      dBodySetForce(body, 0.0, 0.0, 0.0); /* as a step does; the loop has them from the message */
+      dBodySetTorque(body, 0.0, 0.0, 0.0);
+    }
+    if (body != NULL && of->held) {
+      dBodyEnable(body);
+    }
+    of->held = false;
+  }
+  joints_let_go(&account->world->joints);
 }

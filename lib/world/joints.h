@@ -43,7 +43,7 @@ typedef struct hapi_known_joint {
   uint32_t index[2]; /* of the body table, in this cycle */
   bool carried;      /* of a kind that the loop has */
   bool usable;       /* place holds */
-  bool held;         /* switched off for the global step: hold.c */
+  bool held;         /* switched off for the global step */
   bool left_is_known;
   hapi_joint_kind kind;
   hapi_joint_place place; /* as it was set */
