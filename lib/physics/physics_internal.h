@@ -20,9 +20,7 @@
 #include "physics/reconcile.h"
 #include "physics/tape_cycle.h"
 #include "physics/world_lock.h"
-#include "probe/accelerance.h"
-#include "probe/joint_probe.h"
-#include "probe/operating_point.h"
+#include "probe/probe.h"
 #include "research/cross.h"
 #include "world/world.h"
 

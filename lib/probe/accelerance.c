@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "probe/accelerance.h"
+#include "probe/probe.h"
 
 #include <math.h>
 #include <string.h>
@@ -14,6 +14,9 @@
  * the contacts of different islands are probed in the same step, as islands do not feel each
  * other: a round perturbs one contact of each island. */
 
+/* Share of the weight that a probe uses at least where the pointer gave no force yet (eq. 4 would
+ * divide by zero). */
+#define PUSH_LEAST 0.01
 #define TORSION 3 /* the axis after x, y and z: a torque about the normal, for soft fingers */
 
 static uint32_t contact_known(const hapi_probe *probe, const hapi_contact_slot *contact)
@@ -74,7 +77,7 @@ static hap_status contacts_gather(hapi_probe *probe)
  * v sqrt(k m). At least a small share of the weight. */
 static double contact_push(const hapi_probe *probe, const hapi_contact_slot *contact, double mass)
 {
-  double least = HAPI_PROBE_FLOOR * HAPI_STANDARD_GRAVITY * mass;
+  double least = PUSH_LEAST * HAPI_STANDARD_GRAVITY * mass;
   if (at_operating_point(probe)) {
     return least;
   }

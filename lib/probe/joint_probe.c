@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "probe/joint_probe.h"
+#include "probe/probe.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,7 +10,6 @@
 #include "base/log.h"
 #include "base/pose.h"
 #include "base/vec.h"
-#include "probe/accelerance.h"
 
 /* Joints that the loop has no rows of its own for. What holds two bodies together is found by
  * pushing one of them, W, six times, in a world that has nothing but the two and the joint: the

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "probe/operating_point.h"
+#include "probe/probe.h"
 
 #include <math.h>
 #include <string.h>
@@ -8,7 +8,6 @@
 #include "base/assert.h"
 #include "base/log.h"
 #include "base/vec.h"
-#include "probe/accelerance.h"
 
 /* Testing simulations for bodies that the loop of model CONTACT meets but does not own: jointed
  * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of

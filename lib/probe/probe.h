@@ -69,4 +69,32 @@ void hapi_probe_count(hapi_probe *probe, hapi_admittance kind);
  * body is driven from now on. HAP_ERROR_MEMORY. */
 hap_status hapi_probe_add_body(hapi_probe *probe, uint32_t body, bool *out_testable);
 
+/* accelerance.c: A and b of contacts (eq. 3-6) */
+
+/* Who looks on while contacts are tested. */
+typedef struct hapi_contact_watch {
+  void *user;
+  /* Before the islands that are measured are: of which others A is used again. */
+  void (*begin)(void *user, const hapi_reuse_book *book);
+  /* After a testing simulation with a force [N] at a contact. */
+  void (*column)(void *user, uint32_t contact, int axis, double force);
+  void (*keep)(void *user, uint32_t contact); /* after three of them */
+  /* About the operating point: out of the b of a body under test what the loop adds by itself. */
+  void (*take_out)(void *user, uint32_t body, double io_b[6]);
+} hapi_contact_watch;
+
+/* Of a dynamic body at a rotation of ODE's. */
+void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_free_body *out);
+/* watch: NULL for none. */
+void hapi_accelerance_measure(hapi_probe *probe, const hapi_contact_watch *watch);
+
+/* operating_point.c: the answer of whole bodies in model CONTACT */
+void hapi_operating_point_measure(hapi_probe *probe);
+
+/* joint_probe.c: what is kept of joints that the loop has no rows of its own for */
+
+/* Of the joints that the range's walk of this number has taken, and of those that kept it from
+ * taking a mechanism. Their measurements belong to the joints. */
+void hapi_joint_probes(hapi_probe *probe, hapi_joint_table *joints, uint64_t walk);
+
 #endif

@@ -299,8 +299,7 @@ void hapi_reuse_look(hapi_reuse *reuse, hapi_reuse_book *book, const hapi_reuse_
   book_list_pushed(book, input->test, input->slots, pushed);
   for (uint32_t i = 0; i < book->island_count; ++i) {
     hapi_reuse_island *island = &book->islands[i];
-    hapi_printer printer = {input, book, island, true};
-    island->spoiled = !hapi_print_island(&printer);
+    island->spoiled = !hapi_print_island(input, book, island);
     island->kind = island_kind(book, island, input->cycle->settings.reuse);
   }
 }

@@ -1,13 +1,14 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "probe/reuse_book.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ode/ode.h>
+
 #include "base/alloc.h"
 #include "base/vec.h"
+#include "probe/reuse.h"
 
 /* All that decides what a testing simulation finds. Lengths are compared as they are, turns at
  * the far point of a body, velocities by the way of a step, forces by the way that they would
@@ -17,28 +18,226 @@
 
 #define SAME (-1.0)
 
-static void print_hash(hapi_printer *p, uint64_t hash)
+typedef struct printer {
+  const hapi_reuse_input *input;
+  hapi_reuse_book *book;
+  hapi_reuse_island *island;
+  bool good; /* false: something has no getter, or there is no memory */
+} printer;
+
+/* weight as in an item */
+static void print_value(printer *p, double value, double weight)
 {
-  hapi_print_value(p, (double)(uint32_t)hash, SAME);
-  hapi_print_value(p, (double)(hash >> 32), SAME);
+  hapi_print_sheet *sheet = &p->book->now;
+  bool room =
+      sheet->count < sheet->capacity ||
+      hapi_reserve((void **)&sheet->items, &sheet->capacity, sheet->count, 1, sizeof *sheet->items);
+  if (!room || (weight >= 0.0 && !isfinite(value))) {
+    p->good = false;
+    return;
+  }
+  sheet->items[sheet->count++] = (hapi_print_item){value, value, weight};
 }
 
-static void print_world(hapi_printer *p)
+static void print_vector(printer *p, const double *values, int count, double weight)
+{
+  for (int i = 0; i < count; ++i) {
+    print_value(p, values[i], weight);
+  }
+}
+
+/* ---- joints ---- */
+
+/* What ODE's getters say of a joint. Some of it has none: how a fixed joint or a slider has its
+ * bodies turned. That shows as an error of the joint, which is in b; so b of an island with
+ * joints is always measured. Of LMotor and Plane2D the axes or motors have no getter, and a
+ * transmission is not probed. */
+
+typedef void (*point_fn)(dJointID, dVector3);
+typedef dReal (*position_fn)(dJointID);
+
+typedef struct joint_reader {
+  dJointType type;
+  dReal (*parameter)(dJointID, int);
+  int groups; /* of parameters */
+  point_fn points[2];
+  point_fn axes[3];
+  position_fn lengths[1];
+  position_fn angles[2];
+} joint_reader;
+
+static const joint_reader readers[] = {
+    {dJointTypeBall,
+     dJointGetBallParam,
+     1,
+     {dJointGetBallAnchor, dJointGetBallAnchor2},
+     {NULL},
+     {NULL},
+     {NULL}},
+    {dJointTypeHinge,
+     dJointGetHingeParam,
+     1,
+     {dJointGetHingeAnchor, dJointGetHingeAnchor2},
+     {dJointGetHingeAxis},
+     {NULL},
+     {dJointGetHingeAngle}},
+    {dJointTypeSlider,
+     dJointGetSliderParam,
+     1,
+     {NULL},
+     {dJointGetSliderAxis},
+     {dJointGetSliderPosition},
+     {NULL}},
+    {dJointTypeUniversal,
+     dJointGetUniversalParam,
+     2,
+     {dJointGetUniversalAnchor, dJointGetUniversalAnchor2},
+     {dJointGetUniversalAxis1, dJointGetUniversalAxis2},
+     {NULL},
+     {dJointGetUniversalAngle1, dJointGetUniversalAngle2}},
+    {dJointTypeHinge2,
+     dJointGetHinge2Param,
+     2,
+     {dJointGetHinge2Anchor, dJointGetHinge2Anchor2},
+     {dJointGetHinge2Axis1, dJointGetHinge2Axis2},
+     {NULL},
+     {dJointGetHinge2Angle1, dJointGetHinge2Angle2}},
+    {dJointTypePR,
+     dJointGetPRParam,
+     2,
+     {dJointGetPRAnchor},
+     {dJointGetPRAxis1, dJointGetPRAxis2},
+     {dJointGetPRPosition},
+     {dJointGetPRAngle}},
+    {dJointTypePU,
+     dJointGetPUParam,
+     3,
+     {dJointGetPUAnchor},
+     {dJointGetPUAxis1, dJointGetPUAxis2, dJointGetPUAxis3},
+     {dJointGetPUPosition},
+     {dJointGetPUAngle1, dJointGetPUAngle2}},
+    {dJointTypePiston,
+     dJointGetPistonParam,
+     2,
+     {dJointGetPistonAnchor, dJointGetPistonAnchor2},
+     {dJointGetPistonAxis},
+     {dJointGetPistonPosition},
+     {dJointGetPistonAngle}},
+    {dJointTypeAMotor, dJointGetAMotorParam, 3, {NULL}, {NULL}, {NULL}, {NULL}},
+    {dJointTypeFixed, dJointGetFixedParam, 1, {NULL}, {NULL}, {NULL}, {NULL}},
+    {dJointTypeDBall,
+     dJointGetDBallParam,
+     1,
+     {dJointGetDBallAnchor1, dJointGetDBallAnchor2},
+     {NULL},
+     {dJointGetDBallDistance},
+     {NULL}},
+    {dJointTypeDHinge,
+     dJointGetDHingeParam,
+     1,
+     {dJointGetDHingeAnchor1, dJointGetDHingeAnchor2},
+     {dJointGetDHingeAxis},
+     {dJointGetDHingeDistance},
+     {NULL}},
+};
+
+static const joint_reader *joint_reader_of(dJointType type)
+{
+  for (size_t i = 0; i < sizeof readers / sizeof readers[0]; ++i) {
+    if (readers[i].type == type) {
+      return &readers[i];
+    }
+  }
+  return NULL;
+}
+
+static void print_parameters(printer *p, dJointID joint, const joint_reader *reader)
+{
+  static const int names[] = {dParamLoStop,        dParamHiStop,        dParamVel,
+                              dParamFMax,          dParamFudgeFactor,   dParamBounce,
+                              dParamCFM,           dParamStopERP,       dParamStopCFM,
+                              dParamSuspensionERP, dParamSuspensionCFM, dParamERP};
+  for (int group = 0; group < reader->groups; ++group) {
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+      print_value(p, reader->parameter(joint, names[i] + group * dParamGroup), -1.0);
+    }
+  }
+}
+
+static void print_points(printer *p, dJointID joint, const joint_reader *reader, double arm)
+{
+  dVector3 v = {0.0, 0.0, 0.0, 0.0};
+  for (int i = 0; i < 2 && reader->points[i] != NULL; ++i) {
+    reader->points[i](joint, v);
+    print_vector(p, v, 3, 1.0);
+  }
+  for (int i = 0; i < 3 && reader->axes[i] != NULL; ++i) {
+    reader->axes[i](joint, v);
+    print_vector(p, v, 3, arm);
+  }
+}
+
+static void print_positions(printer *p, dJointID joint, const joint_reader *reader, double arm)
+{
+  if (reader->lengths[0] != NULL) {
+    print_value(p, reader->lengths[0](joint), 1.0);
+  }
+  for (int i = 0; i < 2 && reader->angles[i] != NULL; ++i) {
+    print_value(p, reader->angles[i](joint), arm);
+  }
+}
+
+static void print_motor(printer *p, dJointID joint, double arm)
+{
+  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
+  int count = dJointGetAMotorNumAxes(joint);
+  print_value(p, count, -1.0);
+  print_value(p, dJointGetAMotorMode(joint), -1.0);
+  for (int i = 0; i < count; ++i) {
+    print_value(p, dJointGetAMotorAxisRel(joint, i), -1.0);
+    dJointGetAMotorAxis(joint, i, axis);
+    print_vector(p, axis, 3, arm);
+    print_value(p, dJointGetAMotorAngle(joint, i), arm);
+  }
+}
+
+static void print_joint(printer *p, dJointID joint, double arm)
+{
+  const joint_reader *reader = joint_reader_of(dJointGetType(joint));
+  if (reader == NULL) {
+    p->good = false;
+    return;
+  }
+  print_parameters(p, joint, reader);
+  print_points(p, joint, reader, arm);
+  print_positions(p, joint, reader, arm);
+  if (reader->type == dJointTypeAMotor) {
+    print_motor(p, joint, arm);
+  }
+}
+
+static void print_hash(printer *p, uint64_t hash)
+{
+  print_value(p, (double)(uint32_t)hash, SAME);
+  print_value(p, (double)(hash >> 32), SAME);
+}
+
+static void print_world(printer *p)
 {
   const hapi_cycle *cycle = p->input->cycle;
   dWorldID world = p->input->test->world->ode.world;
   dVector3 gravity = {0.0, 0.0, 0.0, 0.0};
   dWorldGetGravity(world, gravity);
-  hapi_print_vector(p, gravity, 3, SAME);
-  hapi_print_value(p, dWorldGetERP(world), SAME);
-  hapi_print_value(p, dWorldGetCFM(world), SAME);
-  hapi_print_value(p, dWorldGetQuickStepNumIterations(world), SAME);
-  hapi_print_value(p, dWorldGetQuickStepW(world), SAME);
-  hapi_print_value(p, dWorldGetContactMaxCorrectingVel(world), SAME);
-  hapi_print_value(p, dWorldGetContactSurfaceLayer(world), SAME);
-  hapi_print_value(p, cycle->probe_step_s, SAME);
-  hapi_print_value(p, cycle->model, SAME);
-  hapi_print_value(p, hapi_wish(cycle->wishes, HAP_EFFECT_CROSS), SAME);
+  print_vector(p, gravity, 3, SAME);
+  print_value(p, dWorldGetERP(world), SAME);
+  print_value(p, dWorldGetCFM(world), SAME);
+  print_value(p, dWorldGetQuickStepNumIterations(world), SAME);
+  print_value(p, dWorldGetQuickStepW(world), SAME);
+  print_value(p, dWorldGetContactMaxCorrectingVel(world), SAME);
+  print_value(p, dWorldGetContactSurfaceLayer(world), SAME);
+  print_value(p, cycle->probe_step_s, SAME);
+  print_value(p, cycle->model, SAME);
+  print_value(p, hapi_wish(cycle->wishes, HAP_EFFECT_CROSS), SAME);
 }
 
 /* ---- bodies ---- */
@@ -51,12 +250,12 @@ typedef struct measures {
   double torque;   /* m per N m, at the far point */
 } measures;
 
-static const hapi_known_body *known_body(const hapi_printer *p, uint32_t known)
+static const hapi_known_body *known_body(const printer *p, uint32_t known)
 {
   return &p->input->test->world->bodies.entries[known];
 }
 
-static void body_measures(const hapi_printer *p, uint32_t known, const dMass *mass, measures *out)
+static void body_measures(const printer *p, uint32_t known, const dMass *mass, measures *out)
 {
   double step = p->input->cycle->probe_step_s;
   double extent = known_body(p, known)->extent;
@@ -72,49 +271,48 @@ static void body_measures(const hapi_printer *p, uint32_t known, const dMass *ma
   out->torque = step * step * out->arm * (inverse[0] + inverse[4] + inverse[8]);
 }
 
-static void print_wrench(hapi_printer *p, const double *force, const double *torque,
-                         const measures *m)
+static void print_wrench(printer *p, const double *force, const double *torque, const measures *m)
 {
-  hapi_print_vector(p, force, 3, m->force);
-  hapi_print_vector(p, torque, 3, m->torque);
+  print_vector(p, force, 3, m->force);
+  print_vector(p, torque, 3, m->torque);
 }
 
-static void print_mass(hapi_printer *p, dBodyID body, const dMass *mass)
+static void print_mass(printer *p, dBodyID body, const dMass *mass)
 {
-  hapi_print_value(p, mass->mass, SAME);
+  print_value(p, mass->mass, SAME);
   for (int i = 0; i < 3; ++i) {
-    hapi_print_vector(p, mass->I + (size_t)4 * (size_t)i, 3, SAME);
+    print_vector(p, mass->I + (size_t)4 * (size_t)i, 3, SAME);
   }
-  hapi_print_value(p, dBodyIsKinematic(body), SAME);
-  hapi_print_value(p, dBodyGetGravityMode(body), SAME);
-  hapi_print_value(p, dBodyGetGyroscopicMode(body), SAME);
-  hapi_print_value(p, dBodyGetLinearDamping(body), SAME);
-  hapi_print_value(p, dBodyGetAngularDamping(body), SAME);
-  hapi_print_value(p, dBodyGetLinearDampingThreshold(body), SAME);
-  hapi_print_value(p, dBodyGetAngularDampingThreshold(body), SAME);
-  hapi_print_value(p, dBodyGetMaxAngularSpeed(body), SAME);
+  print_value(p, dBodyIsKinematic(body), SAME);
+  print_value(p, dBodyGetGravityMode(body), SAME);
+  print_value(p, dBodyGetGyroscopicMode(body), SAME);
+  print_value(p, dBodyGetLinearDamping(body), SAME);
+  print_value(p, dBodyGetAngularDamping(body), SAME);
+  print_value(p, dBodyGetLinearDampingThreshold(body), SAME);
+  print_value(p, dBodyGetAngularDampingThreshold(body), SAME);
+  print_value(p, dBodyGetMaxAngularSpeed(body), SAME);
 }
 
 /* The loop's slot: what is found is kept there. */
-static void print_slot(hapi_printer *p, uint32_t index)
+static void print_slot(printer *p, uint32_t index)
 {
   bool local = index != HAPI_NONE;
-  hapi_print_value(p, index, SAME);
-  hapi_print_value(p, local ? p->input->slots->bodies[index].generation : 0, SAME);
-  hapi_print_value(p, local ? p->input->answers->bodies[index].flags & HAPI_BODY_DRIVEN : 0, SAME);
+  print_value(p, index, SAME);
+  print_value(p, local ? p->input->slots->bodies[index].generation : 0, SAME);
+  print_value(p, local ? p->input->answers->bodies[index].flags & HAPI_BODY_DRIVEN : 0, SAME);
 }
 
-static void print_body(hapi_printer *p, uint32_t known, const dMass *mass, const measures *m)
+static void print_body(printer *p, uint32_t known, const dMass *mass, const measures *m)
 {
   const hapi_known_body *entry = known_body(p, known);
   dBodyID body = entry->body;
   print_hash(p, entry->rest->birth);
   print_slot(p, entry->slot);
   print_mass(p, body, mass);
-  hapi_print_vector(p, dBodyGetPosition(body), 3, 1.0);
-  hapi_print_vector(p, dBodyGetQuaternion(body), 4, 2.0 * m->arm);
-  hapi_print_vector(p, dBodyGetLinearVel(body), 3, m->velocity);
-  hapi_print_vector(p, dBodyGetAngularVel(body), 3, m->velocity * m->arm);
+  print_vector(p, dBodyGetPosition(body), 3, 1.0);
+  print_vector(p, dBodyGetQuaternion(body), 4, 2.0 * m->arm);
+  print_vector(p, dBodyGetLinearVel(body), 3, m->velocity);
+  print_vector(p, dBodyGetAngularVel(body), 3, m->velocity * m->arm);
   print_wrench(p, dBodyGetForce(body), dBodyGetTorque(body), m);
   print_wrench(p, entry->rest->user_force, entry->rest->user_torque, m);
 }
@@ -136,7 +334,7 @@ static uint64_t surface_hash(const dSurfaceParameters *s)
   return hash;
 }
 
-static uint64_t body_birth(const hapi_printer *p, dBodyID body)
+static uint64_t body_birth(const printer *p, dBodyID body)
 {
   uint32_t known = hapi_bodies_find(&p->input->test->world->bodies, body);
   return known != HAPI_NONE ? known_body(p, known)->rest->birth : 0;
@@ -146,7 +344,7 @@ static uint64_t body_birth(const hapi_printer *p, dBodyID body)
 #define MOTIONS (dContactMotion1 | dContactMotion2 | dContactMotionN)
 
 /* A space gives a pair in any order. */
-static void print_contact(hapi_printer *p, dJointID joint, double arm)
+static void print_contact(printer *p, dJointID joint, double arm)
 {
   hapi_print_sheet *sheet = &p->book->now;
   const dContact *contact = hapi_world_contact_of(p->input->test->world, joint);
@@ -173,18 +371,18 @@ static void print_contact(hapi_printer *p, dJointID joint, double arm)
   }
 }
 
-static void print_held(hapi_printer *p, dJointID joint, double arm)
+static void print_held(printer *p, dJointID joint, double arm)
 {
   if (dJointGetType(joint) == dJointTypeContact) {
     print_contact(p, joint, arm);
     return;
   }
   p->island->has_joints = true;
-  hapi_print_value(p, dJointGetType(joint), SAME);
+  print_value(p, dJointGetType(joint), SAME);
   for (int i = 0; i < 2; ++i) {
     print_hash(p, body_birth(p, dJointGetBody(joint, i)));
   }
-  hapi_print_joint(p, joint, arm);
+  print_joint(p, joint, arm);
 }
 
 /* A joint of two moving bodies is met at the first of them. */
@@ -194,7 +392,7 @@ static bool joint_is_met_at(dBodyID body, dJointID joint)
   return first == NULL || first == body || dBodyIsKinematic(first);
 }
 
-static void print_member(hapi_printer *p, uint32_t known)
+static void print_member(printer *p, uint32_t known)
 {
   dBodyID body = known_body(p, known)->body;
   dMass mass;
@@ -213,7 +411,7 @@ static void print_member(hapi_printer *p, uint32_t known)
 
 /* ---- what is pushed ---- */
 
-static void print_pushed_contact(hapi_printer *p, uint32_t index)
+static void print_pushed_contact(printer *p, uint32_t index)
 {
   const hapi_contact_slot *contact = &p->input->slots->contacts[index];
   const hapi_contact_answer *answer = &p->input->answers->contacts[index];
@@ -222,29 +420,29 @@ static void print_pushed_contact(hapi_printer *p, uint32_t index)
   measures m;
   dBodyGetMass(known_body(p, known)->body, &mass);
   body_measures(p, known, &mass, &m);
-  hapi_print_value(p, index, SAME);
-  hapi_print_value(p, contact->generation, SAME);
-  hapi_print_value(p, contact->body, SAME);
-  hapi_print_value(p, answer->probed, SAME);
-  hapi_print_value(p, contact->mu > 0.0, SAME);
-  hapi_print_value(p, contact->finger_radius, SAME);
-  hapi_print_vector(p, contact->point_body, 3, 1.0);
-  hapi_print_vector(p, contact->normal_body, 3, m.arm);
-  hapi_print_vector(p, contact->last_force, 3, m.force);
-  hapi_print_value(p, answer->push, m.force);
+  print_value(p, index, SAME);
+  print_value(p, contact->generation, SAME);
+  print_value(p, contact->body, SAME);
+  print_value(p, answer->probed, SAME);
+  print_value(p, contact->mu > 0.0, SAME);
+  print_value(p, contact->finger_radius, SAME);
+  print_vector(p, contact->point_body, 3, 1.0);
+  print_vector(p, contact->normal_body, 3, m.arm);
+  print_vector(p, contact->last_force, 3, m.force);
+  print_value(p, answer->push, m.force);
 }
 
-static void print_pushed_body(hapi_printer *p, uint32_t index)
+static void print_pushed_body(printer *p, uint32_t index)
 {
   const hapi_body_slot *slot = &p->input->slots->bodies[index];
   dMass mass;
   measures m;
   dBodyGetMass(known_body(p, slot->known)->body, &mass);
   body_measures(p, slot->known, &mass, &m);
-  hapi_print_value(p, index, SAME);
-  hapi_print_value(p, slot->generation, SAME);
-  hapi_print_value(p, p->input->answers->bodies[index].measured, SAME);
-  hapi_print_value(p, m.arm, SAME);
+  print_value(p, index, SAME);
+  print_value(p, slot->generation, SAME);
+  print_value(p, p->input->answers->bodies[index].measured, SAME);
+  print_value(p, m.arm, SAME);
   print_wrench(p, slot->exchanged, slot->exchanged + 3, &m);
 }
 
@@ -272,7 +470,7 @@ static int births_compare(const void *a, const void *b)
 }
 
 /* Members are gathered along their contacts, which come in any order. */
-static bool members_sort(hapi_printer *p)
+static bool members_sort(printer *p)
 {
   hapi_reuse_book *book = p->book;
   const hapi_reuse_island *island = p->island;
@@ -292,7 +490,7 @@ static bool members_sort(hapi_printer *p)
 /* A body that goes farther than that within a step will be elsewhere, or will have another
  * velocity: what is found now cannot be used again. Most islands that a hand pushes are left out
  * here. */
-static bool island_moves_on(const hapi_printer *p)
+static bool island_moves_on(const printer *p)
 {
   const hapi_cycle *cycle = p->input->cycle;
   double most = cycle->settings.reuse / cycle->probe_step_s;
@@ -308,10 +506,10 @@ static bool island_moves_on(const hapi_printer *p)
   return false;
 }
 
-bool hapi_print_island(hapi_printer *p)
+bool hapi_print_island(const hapi_reuse_input *input, hapi_reuse_book *book, hapi_reuse_island *of)
 {
-  hapi_reuse_book *book = p->book;
-  hapi_reuse_island *of = p->island;
+  printer holder = {input, book, of, true};
+  printer *p = &holder;
   of->first = book->now.count;
   of->first_touch = book->now.touch_count;
   p->good = !island_moves_on(p) && members_sort(p);

@@ -3,7 +3,8 @@
 #ifndef HAPODE_PROBE_SNAPSHOT_H
 #define HAPODE_PROBE_SNAPSHOT_H
 
-/* Everything of bodies that a step touches, kept and put back bit by bit. */
+/* What a step touches, kept and put back: bodies bit by bit, and the order of the geoms in their
+ * spaces. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -49,5 +50,19 @@ void hapi_snapshot_add_feedback(hapi_snapshot *snapshot, dJointFeedback *feedbac
 void hapi_snapshot_rewind(const hapi_snapshot *snapshot);
 /* Rewinds, and restores flags and feedback as well. */
 void hapi_snapshot_restore(const hapi_snapshot *snapshot);
+
+typedef struct hapi_space_order {
+  dGeomID *geoms; /* space by space */
+  uint32_t count;
+  uint32_t capacity;
+} hapi_space_order;
+
+/* Nothing is kept. */
+void hapi_space_order_begin(hapi_space_order *order);
+/* All spaces that the body's geoms are in, and the spaces around those. HAP_ERROR_MEMORY. */
+hap_status hapi_space_order_add(hapi_space_order *order, dBodyID body);
+/* After the poses: it asks where the geoms are. */
+void hapi_space_order_restore(hapi_space_order *order);
+void hapi_space_order_finish(hapi_space_order *order);
 
 #endif

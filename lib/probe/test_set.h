@@ -15,7 +15,6 @@
 
 #include "base/assert.h"
 #include "probe/snapshot.h"
-#include "probe/space_order.h"
 #include "world/world.h"
 
 /* Of a body. */

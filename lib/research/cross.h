@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "probe/accelerance.h"
+#include "probe/probe.h"
 #include "sync/messages.h"
 
 /* Of a contact and a body that it does not push. */

@@ -24,7 +24,7 @@ typedef struct hapi_joint_name {
 } hapi_joint_name;
 
 /* The equations of a joint of another kind than the loop has, found by testing simulations
- * (probe/joint_probe.h). */
+ * (probe/joint_probe.c). */
 typedef struct hapi_joint_measurement {
   bool good;      /* what follows holds */
   uint32_t first; /* of the joint's bodies, the one that was pushed */
