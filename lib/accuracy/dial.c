@@ -81,12 +81,6 @@ static const physics_row *physics_row_of(int percent)
   return row;
 }
 
-static uint32_t updates_within(uint32_t updates, double period_s)
-{
-  double most = TICK_SHARE * period_s / UPDATE_S;
-  return most < updates ? (uint32_t)most : updates;
-}
-
 void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_percent,
                         double period_s, hapi_settings *out)
 {
@@ -95,7 +89,8 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   bool by_accuracy = knobs->iterations == HAP_BY_ACCURACY;
   out->contact_hz = knobs->contact_hz > 0.0 ? knobs->contact_hz : tick->contact_hz;
   out->max_sweeps = knobs->max_sweeps > 0 ? (uint32_t)knobs->max_sweeps : 0;
-  out->row_updates = updates_within(tick->row_updates, period_s);
+  double most = TICK_SHARE * period_s / UPDATE_S;
+  out->row_updates = most < tick->row_updates ? (uint32_t)most : tick->row_updates;
   out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
   out->shapes = tick->shapes;
   out->probe = knobs->probe != HAP_PROBE_BY_ACCURACY ? knobs->probe : physics->probe;

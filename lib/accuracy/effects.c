@@ -39,11 +39,6 @@ static uint32_t body_roles(const hapi_model_body *body)
   return body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_OWNED | HAPI_BODY_MEASURED);
 }
 
-static bool body_is_asleep(const hapi_model_body *body)
-{
-  return (body->flags & HAPI_BODY_RESTING) != 0;
-}
-
 /* ---- of bodies ---- */
 
 /* Why a body that could turn gyroscopically does not; CALLED: it does. */
@@ -58,7 +53,7 @@ static hap_effect_reason body_gyro(const sight *s, const hapi_model_body *in)
   }
   return in->max_angular_speed == 0.0                         ? HAP_REASON_LOCKED
          : hapi_turns_alike(in->inertia)                      ? HAP_REASON_SYMMETRIC
-         : body_is_asleep(in)                                 ? HAP_REASON_ASLEEP
+         : ((in->flags & HAPI_BODY_RESTING) != 0)             ? HAP_REASON_ASLEEP
          : hapi_v3_norm(in->twist.angular) <= HAPI_SPIN_LEAST ? HAP_REASON_STILL
                                                               : HAP_REASON_CALLED;
 }
@@ -132,16 +127,6 @@ static void note_touches(const sight *s, hapi_model *model)
   }
 }
 
-static void note_tool_pairs(const sight *s)
-{
-  const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(s->near->range.near);
-  bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
-  for (uint32_t i = 0; i < s->near->range.near->tool_pair_count; ++i) {
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
-                     HAP_REASON_NO_FRICTION);
-  }
-}
-
 /* The pairs whose bodies all sleep are looked at once, as nothing moves. */
 static void note_passes(const sight *s, const hapi_model *model)
 {
@@ -171,17 +156,6 @@ static void note_joints(const sight *s, hapi_model *model)
   effect_sum_up(s, HAP_EFFECT_JOINTS, model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_FREE);
 }
 
-static void note_restitution(const sight *s, const hapi_model *model)
-{
-  hapi_effect_figures *f = sight_figures(s, HAP_EFFECT_RESTITUTION);
-  f->on = f->of = model->bounces;
-  bool nothing = s->near->range.near->pair_count + model->joint_count == 0;
-  effect_sum_up(s, HAP_EFFECT_RESTITUTION,
-                model_is_far(model) ? HAP_REASON_FAR
-                : nothing           ? HAP_REASON_ALONE
-                                    : HAP_REASON_NO_BOUNCE);
-}
-
 /* ---- the models ---- */
 
 static void effect_set(const sight *s, hap_effect effect, hap_effect_state state,
@@ -199,10 +173,21 @@ static void note_model_contact(const sight *s, hapi_model *model)
   hap_effect_reason none = model_is_far(model) ? HAP_REASON_FAR : HAP_REASON_OWNED;
   bool tools = s->near->range.near->tool_pair_count > 0; /* hulls, which have points instead */
   note_bodies(s, model);
-  note_tool_pairs(s);
+  const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(s->near->range.near);
+  bool asked = hapi_wish_is_on(s->cycle->wishes, HAP_EFFECT_FRICTION);
+  for (uint32_t i = 0; i < s->near->range.near->tool_pair_count; ++i) {
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_FRICTION), pairs[i].mu > 0.0 || asked,
+                     HAP_REASON_NO_FRICTION);
+  }
   note_passes(s, model);
   note_joints(s, model);
-  note_restitution(s, model);
+  hapi_effect_figures *bounces = sight_figures(s, HAP_EFFECT_RESTITUTION);
+  bounces->on = bounces->of = model->bounces;
+  bool nothing = s->near->range.near->pair_count + model->joint_count == 0;
+  effect_sum_up(s, HAP_EFFECT_RESTITUTION,
+                model_is_far(model) ? HAP_REASON_FAR
+                : nothing           ? HAP_REASON_ALONE
+                                    : HAP_REASON_NO_BOUNCE);
   effect_sum_up(s, HAP_EFFECT_TESTING, none);
   effect_sum_up(s, HAP_EFFECT_CONTACTS, alone);
   effect_sum_up(s, HAP_EFFECT_RANGE, alone);

@@ -106,38 +106,7 @@ static void window_collide(hapi_lookback *w, const hapi_cycle *as_single)
 
 /* ---- what comes out ---- */
 
-/* What is felt is held until the next row. */
-static void window_compare(hapi_lookback *w, const hapi_path_pointer *row)
-{
-  for (uint32_t i = 0; i < w->rows.pointers; ++i) {
-    double wrong[3];
-    const double *felt = row[i].wrench.force;
-    const double *right = hapi_lookback_felt(w, i);
-    if (row[i].generation == 0) {
-      continue;
-    }
-    hapi_v3_sub(felt, right, wrong);
-    if (hapi_v3_dot(right, right) > 0.0 || hapi_v3_dot(felt, felt) > 0.0) {
-      w->sums.wrong2 += hapi_v3_dot(wrong, wrong);
-      w->sums.right2 += hapi_v3_dot(right, right);
-      ++w->sums.touched;
-    }
-  }
-}
-
 /* ---- steps ---- */
-
-static void window_add_wrenches(const hapi_lookback *w)
-{
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
-    const double *f = w->bodies.list[i].wrench;
-    if (dBodyIsEnabled(body)) {
-      dBodyAddForce(body, f[0], f[1], f[2]);
-      dBodyAddTorque(body, f[3], f[4], f[5]);
-    }
-  }
-}
 
 /* One that is no more is not to be stepped: ODE would abort the process. */
 static bool window_is_sound(const hapi_lookback *w)
@@ -148,13 +117,6 @@ static bool window_is_sound(const hapi_lookback *w)
     }
   }
   return true;
-}
-
-static double row_period(const hapi_lookback *w, double haptic_hz, uint32_t row)
-{
-  return row + 1 < w->rows.count
-             ? 1e-9 * (double)(w->rows.times_ns[row + 1] - w->rows.times_ns[row])
-             : 1.0 / haptic_hz;
 }
 
 /* Steps from a row to the next one. */
@@ -170,7 +132,10 @@ static bool row_go_over(hapi_lookback *w, const hapi_cycle *as_single, double ha
   HAPI_ASSERT_INDEX(row, w->rows.count);
   uint32_t count = w->rows.pointers;
   int parts = row_parts(haptic_hz);
-  double period = row_period(w, haptic_hz, row) / parts;
+  double period =
+      (row + 1 < w->rows.count ? 1e-9 * (double)(w->rows.times_ns[row + 1] - w->rows.times_ns[row])
+                               : 1.0 / haptic_hz) /
+      parts;
   for (int i = 0; i < parts; ++i) {
     const hapi_lookback_moment at = {
         .row = &w->rows.path[row * count],
@@ -181,8 +146,29 @@ static bool row_go_over(hapi_lookback *w, const hapi_cycle *as_single, double ha
     if (!hapi_lookback_feel(w, as_single->wishes, &at)) {
       return false;
     }
-    window_compare(w, at.row);
-    window_add_wrenches(w);
+    /* What is felt is held until the next row. */
+    for (uint32_t k = 0; k < w->rows.pointers; ++k) {
+      double wrong[3];
+      const double *felt = at.row[k].wrench.force;
+      const double *right = hapi_lookback_felt(w, k);
+      if (at.row[k].generation == 0) {
+        continue;
+      }
+      hapi_v3_sub(felt, right, wrong);
+      if (hapi_v3_dot(right, right) > 0.0 || hapi_v3_dot(felt, felt) > 0.0) {
+        w->sums.wrong2 += hapi_v3_dot(wrong, wrong);
+        w->sums.right2 += hapi_v3_dot(right, right);
+        ++w->sums.touched;
+      }
+    }
+    for (uint32_t k = 0; k < w->bodies.count; ++k) {
+      dBodyID body = w->test.world->bodies.entries[w->bodies.list[k].known].body;
+      const double *f = w->bodies.list[k].wrench;
+      if (dBodyIsEnabled(body)) {
+        dBodyAddForce(body, f[0], f[1], f[2]);
+        dBodyAddTorque(body, f[3], f[4], f[5]);
+      }
+    }
     window_collide(w, as_single);
     ++w->counts.steps;
     dWorldQuickStep(w->test.world->ode.world, period);
@@ -206,19 +192,6 @@ static void window_put_states(hapi_lookback *w)
     } else {
       dBodyDisable(w->bodies.states[i].body);
     }
-  }
-}
-
-/* Where the bodies were at the first row, of which some were kept a part of a tick before or
- * after. */
-static void window_even_out(const hapi_lookback *w)
-{
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    dBodyID body = w->bodies.states[i].body;
-    double lag = 1e-9 * (double)w->bodies.list[i].lag_ns;
-    const dReal *p = dBodyGetPosition(body);
-    const dReal *v = dBodyGetLinearVel(body);
-    dBodySetPosition(body, p[0] + lag * v[0], p[1] + lag * v[1], p[2] + lag * v[2]);
   }
 }
 
@@ -303,7 +276,15 @@ static bool window_go(hapi_lookback *w, int own_iterations, double seconds)
   }
   window_put_states(w);
   if (first) {
-    window_even_out(w);
+    /* Where the bodies were at the first row, of which some were kept a part of a tick before or
+     * after. */
+    for (uint32_t i = 0; i < w->bodies.count; ++i) {
+      dBodyID body = w->bodies.states[i].body;
+      double lag = 1e-9 * (double)w->bodies.list[i].lag_ns;
+      const dReal *p = dBodyGetPosition(body);
+      const dReal *v = dBodyGetLinearVel(body);
+      dBodySetPosition(body, p[0] + lag * v[0], p[1] + lag * v[1], p[2] + lag * v[2]);
+    }
   }
   while (good && w->rows.next < w->rows.count &&
          (seconds < 0.0 || 1e-9 * (double)(hapi_clock_now() - begin_ns) < seconds)) {
@@ -492,8 +473,11 @@ static void window_note_touch(hapi_lookback *w, uint32_t most, const hapi_lookba
   t->noted = true;
 }
 
-static void window_note_slots(hapi_lookback *w, uint32_t most)
+void hapi_lookback_note(hapi_lookback *w)
 {
+  if (w->phase != HAPI_LOOKBACK_OPEN) {
+    return;
+  }
   for (uint32_t i = 0; i < w->near->slots.contact_high; ++i) {
     const hapi_contact_slot *slot = &w->near->slots.contacts[i];
     const hapi_lookback_touch touch = {.geom = slot->geom,
@@ -502,37 +486,24 @@ static void window_note_slots(hapi_lookback *w, uint32_t most)
                                        .is_tool = slot->is_tool,
                                        .mu = slot->mu};
     if (slot->phase == HAPI_SLOT_LIVE) {
-      window_note_touch(w, most, &touch);
+      window_note_touch(w, w->cycle->config->capacity.contacts, &touch);
     }
   }
-}
-
-/* Of model CONTACT, whose points of hulls have no slots. */
-static void window_note_hits(hapi_lookback *w)
-{
-  uint32_t most = w->cycle->config->capacity.contacts;
-  for (uint32_t i = 0; i < w->near->neighbors.hit_count; ++i) {
-    const hapi_hit *hit = &w->near->neighbors.hits[i];
-    const hapi_state_pointer *pointer = &hapi_state_pointers(w->cycle->state)[hit->pointer];
-    const hapi_lookback_touch touch = {.geom = hit->geom,
-                                       .pointer = hit->pointer,
-                                       .generation = pointer->generation,
-                                       .is_tool = true,
-                                       .mu = hit->mu};
-    if (hit->tool_count > 0) {
-      window_note_touch(w, most, &touch);
-    }
-  }
-}
-
-void hapi_lookback_note(hapi_lookback *w)
-{
-  if (w->phase != HAPI_LOOKBACK_OPEN) {
-    return;
-  }
-  window_note_slots(w, w->cycle->config->capacity.contacts);
   if (w->cycle->model == HAP_MODEL_CONTACT) {
-    window_note_hits(w);
+    /* Of model CONTACT, whose points of hulls have no slots. */
+    uint32_t most = w->cycle->config->capacity.contacts;
+    for (uint32_t i = 0; i < w->near->neighbors.hit_count; ++i) {
+      const hapi_hit *hit = &w->near->neighbors.hits[i];
+      const hapi_state_pointer *pointer = &hapi_state_pointers(w->cycle->state)[hit->pointer];
+      const hapi_lookback_touch touch = {.geom = hit->geom,
+                                         .pointer = hit->pointer,
+                                         .generation = pointer->generation,
+                                         .is_tool = true,
+                                         .mu = hit->mu};
+      if (hit->tool_count > 0) {
+        window_note_touch(w, most, &touch);
+      }
+    }
   }
 }
 
@@ -652,46 +623,6 @@ static int64_t ticks_ns(const hapi_lookback *w, double ticks)
   return (int64_t)(1e9 * ticks / w->cycle->config->haptic_hz);
 }
 
-/* The loop's newest state is what its tick came to: the one after that goes on from it. */
-static int64_t window_first_row(const hapi_lookback *w, int64_t now_ns)
-{
-  return w->cycle->model == HAP_MODEL_IMPULSE ? now_ns - ticks_ns(w, 0.5)
-                                              : w->cycle->state->now_ns + ticks_ns(w, 0.5);
-}
-
-/* A body of the loop is where the loop has it, any other where the world's step has left it. */
-static void window_note_times(hapi_lookback *w, int64_t now_ns)
-{
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    uint32_t index = w->world->bodies.entries[w->bodies.list[i].known].slot;
-    const hapi_body_slot *slot = index != HAPI_NONE ? &w->near->slots.bodies[index] : NULL;
-    bool loops = slot != NULL && w->cycle->model != HAP_MODEL_IMPULSE &&
-                 (slot->loop_owned || (w->cycle->model == HAP_MODEL_ACCELERANCE && slot->pushed));
-    w->bodies.list[i].lag_ns = loops ? -w->cycle->state->now_ns - ticks_ns(w, 1.0)
-                                     : -now_ns; /* and the first row's time */
-  }
-}
-
-/* What the last window had is kept beside what this one will have. */
-static void window_turn_over(hapi_lookback *w)
-{
-  hapi_lookback_bodies ended = w->ended;
-  w->ended = w->bodies;
-  w->bodies = ended;
-  w->bodies.count = 0;
-}
-
-/* Places of pairs that were not near while the last window was open are free again. */
-static void window_begin_touches(hapi_lookback *w)
-{
-  for (uint32_t i = 0; i < w->touches.count; ++i) {
-    if (!w->touches.list[i].noted) {
-      w->touches.list[i].geom = NULL;
-    }
-    w->touches.list[i].noted = false;
-  }
-}
-
 void hapi_lookback_open(hapi_lookback *w, int64_t now_ns)
 {
   double physics_hz = w->cycle->config->physics_hz;
@@ -700,14 +631,26 @@ void hapi_lookback_open(hapi_lookback *w, int64_t now_ns)
   }
   double most = fmax(WINDOW_S, WINDOW_STEPS / physics_hz);
   w->seconds = w->seconds > 0.0 ? fmin(2.0 * w->seconds, most) : FIRST_STEPS / physics_hz;
-  window_turn_over(w);
-  window_begin_touches(w);
+  /* What the last window had is kept beside what this one will have. */
+  hapi_lookback_bodies last = w->ended;
+  w->ended = w->bodies;
+  w->bodies = last;
+  w->bodies.count = 0;
+  /* Places of pairs that were not near while the last window was open are free again. */
+  for (uint32_t i = 0; i < w->touches.count; ++i) {
+    if (!w->touches.list[i].noted) {
+      w->touches.list[i].geom = NULL;
+    }
+    w->touches.list[i].noted = false;
+  }
   memset(w->hand.hull_of, 0, sizeof w->hand.hull_of);
   w->pairs.count = w->rows.count = w->rows.next = w->sums.touched = 0;
   w->rows.pointers = w->cycle->config->capacity.pointers;
   hapi_index_clear(&w->pairs.index);
   w->sums.wrong2 = w->sums.right2 = w->spent_s = 0.0;
-  w->from_ns = window_first_row(w, now_ns);
+  /* The loop's newest state is what its tick came to: the one after that goes on from it. */
+  w->from_ns = w->cycle->model == HAP_MODEL_IMPULSE ? now_ns - ticks_ns(w, 0.5)
+                                                    : w->cycle->state->now_ns + ticks_ns(w, 0.5);
   w->to_ns = now_ns + (int64_t)(1e9 * w->seconds);
   w->spoilt = !hapi_lookback_hand_ready(&w->hand, &w->cycle->config->capacity) ||
               !window_add_near(w) || !window_add_jointed(w) ||
@@ -715,7 +658,15 @@ void hapi_lookback_open(hapi_lookback *w, int64_t now_ns)
                             w->bodies.count, sizeof *w->bodies.states);
   if (!w->spoilt) {
     window_keep(w);
-    window_note_times(w, now_ns);
+    /* A body of the loop is where the loop has it, any other where the world's step has left it. */
+    for (uint32_t i = 0; i < w->bodies.count; ++i) {
+      uint32_t index = w->world->bodies.entries[w->bodies.list[i].known].slot;
+      const hapi_body_slot *slot = index != HAPI_NONE ? &w->near->slots.bodies[index] : NULL;
+      bool loops = slot != NULL && w->cycle->model != HAP_MODEL_IMPULSE &&
+                   (slot->loop_owned || (w->cycle->model == HAP_MODEL_ACCELERANCE && slot->pushed));
+      w->bodies.list[i].lag_ns = loops ? -w->cycle->state->now_ns - ticks_ns(w, 1.0)
+                                       : -now_ns; /* and the first row's time */
+    }
   }
   w->phase = HAPI_LOOKBACK_OPEN;
   hapi_lookback_note(w);
@@ -723,13 +674,6 @@ void hapi_lookback_open(hapi_lookback *w, int64_t now_ns)
 }
 
 /* ---- while it is open ---- */
-
-static void window_set_lags(hapi_lookback *w, int64_t first_ns)
-{
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    w->bodies.list[i].lag_ns += first_ns;
-  }
-}
 
 /* False: what it would feel is not reckoned here. */
 static bool window_takes_kind(hapi_lookback *w, uint32_t index, const hapi_path_pointer *in)
@@ -755,7 +699,9 @@ static void window_take_row(hapi_lookback *w, int64_t time_ns, const hapi_path_p
     return;
   }
   if (w->rows.count == 0) {
-    window_set_lags(w, time_ns);
+    for (uint32_t i = 0; i < w->bodies.count; ++i) {
+      w->bodies.list[i].lag_ns += time_ns;
+    }
   }
   for (uint32_t i = 0; i < count; ++i) {
     w->spoilt = w->spoilt || !window_takes_kind(w, i, &pointers[i]);
@@ -796,15 +742,6 @@ static bool window_is_still_there(const hapi_lookback *w)
 
 /* ---- what comes out ---- */
 
-/* The next window may go on where this one's reference has ended. */
-static void window_link_up(hapi_lookback *w)
-{
-  w->chain_s += 1e-9 * (double)(w->to_ns - w->from_ns);
-  if (w->rows.count > 0 && w->chain_s < CHAIN_S) {
-    w->end_ns = w->rows.times_ns[w->rows.count - 1] + ticks_ns(w, 1.0);
-  }
-}
-
 /* True: *out is what the window says. */
 static bool window_end(hapi_lookback *w, hapi_lookback_verdict *out)
 {
@@ -815,7 +752,11 @@ static bool window_end(hapi_lookback *w, hapi_lookback_verdict *out)
     ++w->counts.spoilt;
     return false;
   }
-  window_link_up(w);
+  /* The next window may go on where this one's reference has ended. */
+  w->chain_s += 1e-9 * (double)(w->to_ns - w->from_ns);
+  if (w->rows.count > 0 && w->chain_s < CHAIN_S) {
+    w->end_ns = w->rows.times_ns[w->rows.count - 1] + ticks_ns(w, 1.0);
+  }
   double keep = exp(-1e-9 * (double)(w->to_ns - w->from_ns) / MEMORY_S);
   ++w->counts.windows;
   if (sums->touched == 0) {

@@ -163,23 +163,6 @@ static void vector_blend(const double a[3], const double b[3], double share, dou
   }
 }
 
-/* Where the pointer was then: on the way from a row to the next one, or straight on from the
- * last. */
-static void pointer_place(const hapi_lookback_moment *at, uint32_t index, hapi_pointer *p)
-{
-  const hapi_path_pointer *in = &at->row[index];
-  const hapi_path_pointer *next = at->next != NULL ? &at->next[index] : NULL;
-  p->pose = in->pose;
-  p->twist = in->twist;
-  if (next != NULL && next->generation == in->generation) {
-    hapi_pose_blend(&in->pose, &next->pose, at->share, &p->pose);
-    vector_blend(in->twist.linear, next->twist.linear, at->share, p->twist.linear);
-    vector_blend(in->twist.angular, next->twist.angular, at->share, p->twist.angular);
-  } else {
-    hapi_pose_move(&p->pose, &p->twist, at->later_s);
-  }
-}
-
 static double hull_extent(const hapi_tool_hull *hull, double radius)
 {
   double farthest = 0.0;
@@ -207,7 +190,18 @@ static void hand_take_pointers(hapi_tick *t, const hapi_lookback_moment *at)
     p->device.turns = in->turns != 0;
     p->device.three_dof = in->three_dof != 0;
     if (p->generation != 0) {
-      pointer_place(at, i, p);
+      /* Where the pointer was then: on the way from a row to the next one, or straight on from the
+       * last. */
+      const hapi_path_pointer *next = at->next != NULL ? &at->next[i] : NULL;
+      p->pose = in->pose;
+      p->twist = in->twist;
+      if (next != NULL && next->generation == in->generation) {
+        hapi_pose_blend(&in->pose, &next->pose, at->share, &p->pose);
+        vector_blend(in->twist.linear, next->twist.linear, at->share, p->twist.linear);
+        vector_blend(in->twist.angular, next->twist.angular, at->share, p->twist.angular);
+      } else {
+        hapi_pose_move(&p->pose, &p->twist, at->later_s);
+      }
     }
   }
 }
@@ -349,22 +343,6 @@ static bool model_add_touches(hapi_lookback *w, double period)
   return true;
 }
 
-static void model_add_bodies(hapi_lookback *w)
-{
-  hapi_model *m = w->hand.model;
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
-    hapi_model_body *out = &hapi_model_bodies(m)[m->body_count++];
-    memset(out, 0, sizeof *out);
-    out->slot = i;
-    out->generation = 1;
-    out->flags = dBodyIsKinematic(body) ? HAPI_BODY_DRIVEN : 0;
-    hapi_pose_read(body, &out->pose);
-    hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
-    hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
-  }
-}
-
 /* ---- the first tick ---- */
 
 static void ramp_resume(hapi_ramp *ramp, bool *seen)
@@ -454,21 +432,6 @@ static void hand_resume(hapi_lookback *w)
 
 /* ---- the tick ---- */
 
-static void hand_push_bodies(const hapi_lookback *w, double period)
-{
-  for (uint32_t i = 0; i < w->bodies.count; ++i) {
-    hapi_local_body *from = &w->hand.tick->bodies.of[i];
-    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
-    const double *f = from->account.impulse;
-    const double *m = from->account.angular_impulse;
-    if (from->pushed && !dBodyIsKinematic(body)) {
-      dBodyEnable(body);
-      dBodyAddForce(body, f[0] / period, f[1] / period, f[2] / period);
-      dBodyAddTorque(body, m[0] / period, m[1] / period, m[2] / period);
-    }
-  }
-}
-
 bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_moment *at)
 {
   hapi_tick *t = w->hand.tick;
@@ -480,7 +443,16 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
   if (!hand_all_are_told(&w->hand)) {
     hand_tell(&w->hand);
   }
-  model_add_bodies(w);
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
+    hapi_model_body *out = &hapi_model_bodies(m)[m->body_count++];
+    memset(out, 0, sizeof *out);
+    out->slot = i;
+    out->generation = 1;
+    out->flags = dBodyIsKinematic(body) ? HAPI_BODY_DRIVEN : 0;
+    hapi_pose_read(body, &out->pose);
+    hapi_twist_read(body, &out->twist);
+  }
   if (!model_add_touches(w, at->period)) {
     return false;
   }
@@ -499,7 +471,18 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
   hapi_render(&t->facts, &t->pointers, &t->bodies, &t->touches, &t->sample);
   ++t->facts.tick;
   hand_tell(&w->hand);
-  hand_push_bodies(w, at->period);
+  double period = at->period;
+  for (uint32_t i = 0; i < w->bodies.count; ++i) {
+    hapi_local_body *from = &w->hand.tick->bodies.of[i];
+    dBodyID body = w->test.world->bodies.entries[w->bodies.list[i].known].body;
+    const double *force = from->account.impulse;
+    const double *moment = from->account.angular_impulse;
+    if (from->pushed && !dBodyIsKinematic(body)) {
+      dBodyEnable(body);
+      dBodyAddForce(body, force[0] / period, force[1] / period, force[2] / period);
+      dBodyAddTorque(body, moment[0] / period, moment[1] / period, moment[2] / period);
+    }
+  }
   return true;
 }
 

@@ -50,6 +50,15 @@ static inline void hapi_pose_blend(const hap_pose *from, const hap_pose *to, dou
 }
 
 /* The same along the arc, so that a body turns evenly; a share beyond 1 goes on. */
+/* A pose of the world in the frame of another one. */
+static inline void hapi_pose_into(const double position[3], const double quat[4],
+                                  const hap_pose *world, hap_pose *out)
+{
+  const double back[4] = {quat[0], -quat[1], -quat[2], -quat[3]};
+  hapi_pose_unpoint(position, quat, world->position, out->position);
+  hapi_quat_multiply(back, world->quat_wxyz, out->quat_wxyz);
+}
+
 void hapi_pose_slerp(const hap_pose *from, const hap_pose *to, double share, hap_pose *out);
 
 #endif

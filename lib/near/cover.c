@@ -76,28 +76,6 @@ static void note_geom(void *data, dGeomID a, dGeomID b)
   }
 }
 
-/* Asks for what was covered before and the new box, with room around it. */
-static void cover_fill(hapi_cover *cover, dSpaceID space, const dReal box[6])
-{
-  dReal length[3];
-  dReal middle[3];
-  box_unite(cover->box, &cover->has_box, box);
-  for (int k = 0; k < 3; ++k) {
-    length[k] = (1.0 + 2.0 * GROWTH) * (cover->box[2 * k + 1] - cover->box[2 * k]);
-    middle[k] = 0.5 * (cover->box[2 * k] + cover->box[2 * k + 1]);
-  }
-  dGeomBoxSetLengths(cover->box_geom, length[0], length[1], length[2]);
-  dGeomSetPosition(cover->box_geom, middle[0], middle[1], middle[2]);
-  dGeomGetAABB(cover->box_geom, cover->box);
-  cover->count = 0;
-  cover->missing = false;
-  int64_t begin_ns = hapi_clock_now();
-  dSpaceClean(space); /* ODE does it first of all when it is asked */
-  cover->boxes_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-  dSpaceCollide2(cover->box_geom, (dGeomID)space, cover, note_geom);
-  cover->filled = !cover->missing;
-}
-
 void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
                     dNearCallback *callback)
 {
@@ -105,7 +83,24 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
   dGeomGetAABB(geom, box);
   box_unite(cover->asked, &cover->has_asked, box);
   if (!cover->filled || !box_holds(cover->box, box)) {
-    cover_fill(cover, space, box);
+    /* Asks for what was covered before and the new box, with room around it. */
+    dReal length[3];
+    dReal middle[3];
+    box_unite(cover->box, &cover->has_box, box);
+    for (int k = 0; k < 3; ++k) {
+      length[k] = (1.0 + 2.0 * GROWTH) * (cover->box[2 * k + 1] - cover->box[2 * k]);
+      middle[k] = 0.5 * (cover->box[2 * k] + cover->box[2 * k + 1]);
+    }
+    dGeomBoxSetLengths(cover->box_geom, length[0], length[1], length[2]);
+    dGeomSetPosition(cover->box_geom, middle[0], middle[1], middle[2]);
+    dGeomGetAABB(cover->box_geom, cover->box);
+    cover->count = 0;
+    cover->missing = false;
+    int64_t begin_ns = hapi_clock_now();
+    dSpaceClean(space); /* ODE does it first of all when it is asked */
+    cover->boxes_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+    dSpaceCollide2(cover->box_geom, (dGeomID)space, cover, note_geom);
+    cover->filled = !cover->missing;
   }
   if (!cover->filled ||
       !box_holds(cover->box, box)) { /* no memory, or so far out that it is rounded off */

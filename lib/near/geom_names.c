@@ -26,19 +26,6 @@ static bool name_is_current(const hapi_geom_name *name, uint64_t model)
   return name->model + 1 >= model;
 }
 
-static void names_drop_old(hapi_geom_names *names, uint64_t model)
-{
-  uint32_t kept = 0;
-  hapi_index_clear(&names->by_address);
-  for (uint32_t i = 0; i < names->count; ++i) {
-    if (name_is_current(&names->list[i], model)) {
-      names->list[kept] = names->list[i];
-      hapi_index_put(&names->by_address, hapi_index_address(names->list[i].geom), kept++);
-    }
-  }
-  names->count = kept;
-}
-
 static bool names_grow(hapi_geom_names *names)
 {
   uint32_t capacity = names->capacity > 0 ? 2 * names->capacity : FIRST_CAPACITY;
@@ -62,7 +49,15 @@ static bool names_make_room(hapi_geom_names *names, uint64_t model)
   if (names->count < names->capacity) {
     return true;
   }
-  names_drop_old(names, model);
+  uint32_t kept = 0;
+  hapi_index_clear(&names->by_address);
+  for (uint32_t i = 0; i < names->count; ++i) {
+    if (name_is_current(&names->list[i], model)) {
+      names->list[kept] = names->list[i];
+      hapi_index_put(&names->by_address, hapi_index_address(names->list[i].geom), kept++);
+    }
+  }
+  names->count = kept;
   /* At most half full after a drop: the next few geoms do not make it drop again. */
   return 2 * names->count < names->capacity || names_grow(names) || names->count < names->capacity;
 }

@@ -11,13 +11,6 @@ static const hapi_known_body *known_body(const hapi_nearby *nearby, uint32_t kno
   return &nearby->world->bodies.entries[known];
 }
 
-static void swap_members(uint32_t *a, uint32_t *b)
-{
-  uint32_t c = *a;
-  *a = *b;
-  *b = c;
-}
-
 /* Those that can move stand before the kinematic ones. */
 static bool add_member(hapi_nearby *nearby, uint32_t known)
 {
@@ -29,13 +22,14 @@ static bool add_member(hapi_nearby *nearby, uint32_t known)
     ++nearby->counts.dropped;
     return false;
   }
-  uint32_t at = range->mechanism.count++;
-  HAPI_ASSERT(range->mechanism.moving <= at);
-  range->mechanism.members[at] = known;
+  hapi_mechanism *m = &range->mechanism;
+  HAPI_ASSERT(m->moving <= m->count);
+  m->members[m->count] = known;
   if (moves) {
-    swap_members(&range->mechanism.members[at],
-                 &range->mechanism.members[range->mechanism.moving++]);
+    m->members[m->count] = m->members[m->moving];
+    m->members[m->moving++] = known;
   }
+  ++m->count;
   return true;
 }
 

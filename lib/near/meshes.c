@@ -142,18 +142,6 @@ static bool boxes_meet(const double a[6], const double b[6])
          b[4] <= a[5];
 }
 
-/* A box of the world in the geom's frame: one that holds it. */
-static void box_to_geom(dGeomID geom, const double box[6], double out[6])
-{
-  dQuaternion quat;
-  dGeomGetQuaternion(geom, quat);
-  for (int i = 0; i < 8; ++i) {
-    double corner[3] = {box[i & 1], box[2 + ((i >> 1) & 1)], box[4 + ((i >> 2) & 1)]};
-    hapi_pose_unpoint(dGeomGetPosition(geom), quat, corner, corner);
-    grow_box(out, corner, i == 0);
-  }
-}
-
 /* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
 
 static const double *edge_corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
@@ -164,32 +152,6 @@ static const double *edge_corner(const hapi_meshes *meshes, uint32_t edge, uint3
 static bool same_point(const double *a, const double *b)
 {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
-}
-
-static bool same_edge(const hapi_meshes *meshes, uint32_t a, uint32_t b)
-{
-  const double *p = edge_corner(meshes, a, 0);
-  const double *q = edge_corner(meshes, a, 1);
-  const double *r = edge_corner(meshes, b, 0);
-  const double *s = edge_corner(meshes, b, 1);
-  return (same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s));
-}
-
-/* Of both directions the same. */
-static uint32_t edge_hash(const hapi_meshes *meshes, uint32_t edge)
-{
-  uint64_t sum = 0;
-  for (uint32_t end = 0; end < 2; ++end) {
-    uint64_t mixed = 0;
-    for (int k = 0; k < 3; ++k) {
-      uint64_t bits;
-      memcpy(&bits, &edge_corner(meshes, edge, end)[k], sizeof bits);
-      mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
-      mixed ^= mixed >> 32;
-    }
-    sum += mixed;
-  }
-  return (uint32_t)(sum ^ (sum >> 29));
 }
 
 /* Whether the triangle of edge `other` lies level with that of `edge` or above it. */
@@ -210,10 +172,26 @@ static void meet_edge(hapi_meshes *meshes, uint32_t edge)
 {
   HAPI_ASSERT_INDEX(edge, 3 * HAPI_NEAR_TRIANGLES); /* less than half of the places */
   uint32_t mask = HAPI_EDGE_PLACES - 1;
-  uint32_t at = edge_hash(meshes, edge) & mask;
+  /* Of both directions the same. */
+  uint64_t sum = 0;
+  for (uint32_t end = 0; end < 2; ++end) {
+    uint64_t mixed = 0;
+    for (int k = 0; k < 3; ++k) {
+      uint64_t bits;
+      memcpy(&bits, &edge_corner(meshes, edge, end)[k], sizeof bits);
+      mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
+      mixed ^= mixed >> 32;
+    }
+    sum += mixed;
+  }
+  uint32_t at = ((uint32_t)(sum ^ (sum >> 29))) & mask;
   for (; meshes->places[at] != 0; at = (at + 1) & mask) {
     uint32_t other = meshes->places[at] - 1;
-    if (same_edge(meshes, edge, other)) {
+    const double *p = edge_corner(meshes, edge, 0);
+    const double *q = edge_corner(meshes, edge, 1);
+    const double *r = edge_corner(meshes, other, 0);
+    const double *s = edge_corner(meshes, other, 1);
+    if ((same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s))) {
       if (edge_is_closed_by(meshes, edge, other)) {
         meshes->found[edge / 3].open_edges &= ~(1u << (edge % 3));
       }
@@ -223,17 +201,6 @@ static void meet_edge(hapi_meshes *meshes, uint32_t edge)
     }
   }
   meshes->places[at] = edge + 1;
-}
-
-static void find_open_edges(hapi_meshes *meshes, uint32_t count)
-{
-  memset(meshes->places, 0, sizeof meshes->places);
-  for (uint32_t i = 0; i < count; ++i) {
-    meshes->found[i].open_edges = 15;
-  }
-  for (uint32_t edge = 0; edge < 3 * count; ++edge) {
-    meet_edge(meshes, edge);
-  }
 }
 
 static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
@@ -265,7 +232,14 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
     ++nearby->counts.dropped;
     return FOUND_MAX; /* ODE collides it: a body that the loop moved would fall through */
   }
-  box_to_geom(geom, box, local);
+  /* A box of the world in the geom's frame: one that holds it. */
+  dQuaternion turn;
+  dGeomGetQuaternion(geom, turn);
+  for (int i = 0; i < 8; ++i) {
+    double corner[3] = {box[i & 1], box[2 + ((i >> 1) & 1)], box[4 + ((i >> 2) & 1)]};
+    hapi_pose_unpoint(dGeomGetPosition(geom), turn, corner, corner);
+    grow_box(local, corner, i == 0);
+  }
   for (uint32_t chunk = 0; chunk < (mesh->count + CHUNK - 1) / CHUNK; ++chunk) {
     if (boxes_meet(mesh->boxes + (size_t)6 * chunk, local)) {
       found = search_chunk(mesh, chunk, local, meshes, found);
@@ -274,7 +248,13 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
   if (found == FOUND_MAX) {
     return found; /* too many: the caller leaves them to ODE */
   }
-  find_open_edges(meshes, found);
+  memset(meshes->places, 0, sizeof meshes->places);
+  for (uint32_t i = 0; i < found; ++i) {
+    meshes->found[i].open_edges = 15;
+  }
+  for (uint32_t edge = 0; edge < 3 * found; ++edge) {
+    meet_edge(meshes, edge);
+  }
   dQuaternion quat;
   dGeomGetQuaternion(geom, quat);
   for (uint32_t i = 0; i < found; ++i) {

@@ -9,6 +9,7 @@
 #include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/pose.h"
 #include "base/vec.h"
 #include "near/near.h"
 
@@ -22,18 +23,6 @@
 double hapi_neighbors_reach(double relative_speed, double horizon_s)
 {
   return REACH_FLOOR + relative_speed * horizon_s + REACH_ACCELERATION * horizon_s * horizon_s;
-}
-
-static double fastest_body(const hapi_nearby *nearby)
-{
-  double fastest = nearby->world->bodies.fastest;
-  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) { /* what the loop moved since the scan */
-    uint32_t known = nearby->slots.bodies[i].known;
-    double speed =
-        known != HAPI_NONE ? hapi_extent_speed(&nearby->world->bodies.entries[known]) : 0.0;
-    fastest = speed > fastest ? speed : fastest;
-  }
-  return fastest;
 }
 
 /* How many geoms are near is the world's affair: the lists grow as they must. */
@@ -90,8 +79,13 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
     return;
   }
   const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
-  double fastest = fastest_body(nearby);
-  hood->fastest = fastest;
+  hood->fastest = nearby->world->bodies.fastest;
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) { /* what the loop moved since the scan */
+    uint32_t known = nearby->slots.bodies[i].known;
+    double speed =
+        known != HAPI_NONE ? hapi_extent_speed(&nearby->world->bodies.entries[known]) : 0.0;
+    hood->fastest = speed > hood->fastest ? speed : hood->fastest;
+  }
   hapi_cover_begin(&hood->cover);
   for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
     if (pointers[i].generation == 0) {
@@ -100,7 +94,7 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
     const double *at = pointers[i].pose.position;
     bool is_tool = pointers[i].is_tool != 0;
     double size = is_tool ? pointers[i].extent : pointers[i].radius;
-    double speed = fastest + hapi_v3_norm(pointers[i].twist.linear);
+    double speed = hood->fastest + hapi_v3_norm(pointers[i].twist.linear);
     speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
     double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s);
     hood->current_pointer = i;
@@ -171,33 +165,6 @@ static int hit_by_distance(const void *a, const void *b)
 /* A plane that turned far is another contact: it does not go on with the force of the old one. */
 #define SAME_PLANE_COSINE 0.7
 
-/* The shape itself, in the body's frame, for the loop to ask. */
-static void place_shape(const hapi_nearby *nearby, dGeomID geom, hapi_contact_slot *slot)
-{
-  dBodyID body = dGeomGetBody(geom);
-  hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
-  slot->has_shape = hapi_shape_of_geom(geom, &slot->shape, &world);
-  slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
-                       : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
-                                                              : HAP_REASON_CALLED;
-  if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
-      !nearby->cycle->settings.shapes) {
-    slot->shape_reason = HAP_REASON_ACCURACY;
-  }
-  if (wish == HAP_EFFECT_OFF ||
-      (wish == HAP_EFFECT_AUTO && slot->shape_reason != HAP_REASON_CALLED)) {
-    slot->has_shape = false;
-  }
-  slot->shape_pose = world;
-  if (slot->has_shape && body != NULL) {
-    const dReal *q = dBodyGetQuaternion(body);
-    double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
-    hapi_pose_unpoint(dBodyGetPosition(body), q, world.position, slot->shape_pose.position);
-    hapi_quat_multiply(inverse, world.quat_wxyz, slot->shape_pose.quat_wxyz);
-  }
-}
-
 #define FRICTION_MOST 10.0 /* as between bodies */
 
 /* What the application says of the pair. */
@@ -240,7 +207,25 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
     ++slot->generation;
     memset(slot->last_force, 0, sizeof slot->last_force);
   }
-  place_shape(nearby, hit->geom, slot);
+  /* The shape itself, in the body's frame, for the loop to ask. */
+  hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
+  slot->has_shape = hapi_shape_of_geom(hit->geom, &slot->shape, &world);
+  slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
+                       : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
+                                                              : HAP_REASON_CALLED;
+  if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
+      !nearby->cycle->settings.shapes) {
+    slot->shape_reason = HAP_REASON_ACCURACY;
+  }
+  if (wish == HAP_EFFECT_OFF ||
+      (wish == HAP_EFFECT_AUTO && slot->shape_reason != HAP_REASON_CALLED)) {
+    slot->has_shape = false;
+  }
+  slot->shape_pose = world;
+  if (slot->has_shape && body != NULL) {
+    hapi_pose_into(dBodyGetPosition(body), dBodyGetQuaternion(body), &world, &slot->shape_pose);
+  }
   hapi_v3_copy(normal, slot->normal_body);
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
@@ -253,11 +238,6 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
 static uint32_t body_of_hit(const hapi_nearby *nearby, const hapi_hit *hit)
 {
   return hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(hit->geom));
-}
-
-static uint32_t hit_contacts(const hapi_hit *hit)
-{
-  return hit->tool_count > 0 ? hit->tool_count : 1;
 }
 
 /* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
@@ -273,7 +253,7 @@ static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
     uint32_t index = body_of_hit(nearby, &hits[i]);
     bool known = index != HAPI_NONE;
     bool counted = known && hapi_nearby_chose(nearby, index, nearby->cycle->model_number + 1);
-    uint32_t more = hit_contacts(&hits[i]);
+    uint32_t more = hits[i].tool_count > 0 ? hits[i].tool_count : 1;
     bool room = contacts + more <= nearby->cycle->config->capacity.contacts &&
                 (!has_body || known) &&
                 (!known || counted || bodies < nearby->cycle->config->max_bodies);

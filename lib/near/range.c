@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 #include "base/clock.h"
+#include "base/pose.h"
 #include "base/vec.h"
 #include "near/near.h"
 
@@ -121,10 +122,7 @@ static bool fill_geom(hapi_nearby *nearby, dGeomID geom, hapi_near_geom *out)
     }
     out->pose = world;
     if (body != NULL) {
-      const dReal *q = dBodyGetQuaternion(body);
-      double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
-      hapi_pose_unpoint(dBodyGetPosition(body), q, world.position, out->pose.position);
-      hapi_quat_multiply(inverse, world.quat_wxyz, out->pose.quat_wxyz);
+      hapi_pose_into(dBodyGetPosition(body), dBodyGetQuaternion(body), &world, &out->pose);
     }
   }
   if (body != NULL) {
@@ -273,20 +271,6 @@ static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geo
   pair->mu = hit->mu;
 }
 
-/* The corners of a mesh that a body carries, in the body's frame. */
-static void hold_triangle(hapi_nearby *nearby, dBodyID body, hapi_near_geom *out)
-{
-  double *corners = hapi_near_points(nearby->range.near) + (size_t)3 * out->hull_first;
-  uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
-  out->body = slot;
-  out->generation = nearby->slots.bodies[slot].generation;
-  for (int k = 0; k < 3; ++k) {
-    double *corner = corners + (size_t)3 * k;
-    hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
-    out->extent = fmax(out->extent, hapi_v3_norm(corner));
-  }
-}
-
 static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
@@ -303,7 +287,17 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
     if (geom != HAPI_NONE && body != NULL) {
-      hold_triangle(nearby, body, &hapi_near_geoms(nearby->range.near)[geom]);
+      /* The corners of a mesh that a body carries, in the body's frame. */
+      hapi_near_geom *out = &hapi_near_geoms(nearby->range.near)[geom];
+      double *corners = hapi_near_points(nearby->range.near) + (size_t)3 * out->hull_first;
+      uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
+      out->body = slot;
+      out->generation = nearby->slots.bodies[slot].generation;
+      for (int k = 0; k < 3; ++k) {
+        double *corner = corners + (size_t)3 * k;
+        hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
+        out->extent = fmax(out->extent, hapi_v3_norm(corner));
+      }
     }
     add_tool_pair(nearby, hit, geom);
   }
@@ -382,19 +376,6 @@ static bool met_before(const hapi_range *range, dGeomID own, dGeomID other)
   bool found = false;
   (void)pair_place(range, meeting_key(own, other), &found);
   return found;
-}
-
-static void note_pair(hapi_nearby *nearby, const hapi_link *link)
-{
-  hapi_range *range = &nearby->range;
-  uint64_t key = meeting_key(link->own, link->other);
-  bool found = false;
-  hapi_pair_place *place = pair_place(range, key, &found);
-  if (!found && 2 * range->links.pairs_noted < range->links.pair_place_count) {
-    place->key = key;
-    place->walk = range->number;
-    ++range->links.pairs_noted;
-  }
 }
 
 static double surface_speed(const hapi_nearby *nearby, dBodyID body)
@@ -507,37 +488,6 @@ static void need_geom(hapi_nearby *nearby, dGeomID geom, range_need *io)
   }
 }
 
-static void need_link(hapi_nearby *nearby, const hapi_link *link, range_need *io)
-{
-  if (dGeomGetClass(link->other) != dTriMeshClass) {
-    need_geom(nearby, link->other, io);
-    ++io->pairs;
-    return;
-  }
-  uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
-  bool all = count < HAPI_NEAR_TRIANGLES;
-  io->geoms += count;
-  io->points += 3 * count;
-  io->pairs += all ? count : nearby->cycle->config->capacity.contacts + 1;
-}
-
-/* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of its
- * mechanism that were looked at before. */
-static bool has_room(hapi_nearby *nearby, const hapi_known_body *known, range_need *io)
-{
-  const hapi_range *range = &nearby->range;
-  const hapi_capacity *c = &nearby->cycle->config->capacity;
-  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    need_geom(nearby, geom, io);
-  }
-  for (uint32_t i = 0; i < range->links.count; ++i) {
-    need_link(nearby, &range->links.list[i], io);
-  }
-  return range->near->geom_count + io->geoms <= c->geoms &&
-         range->near->point_count + io->points <= c->hull_points &&
-         range->near->pair_count + io->pairs <= c->contacts;
-}
-
 /* One that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
 static bool body_is_known(const hapi_nearby *nearby, dBodyID body)
 {
@@ -562,7 +512,28 @@ static bool can_be_owned(hapi_nearby *nearby, const hapi_known_body *known, rang
       return false;
     }
   }
-  return has_room(nearby, known, io);
+  /* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of its
+   * mechanism that were looked at before. */
+  const hapi_capacity *c = &nearby->cycle->config->capacity;
+  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+    need_geom(nearby, geom, io);
+  }
+  for (uint32_t i = 0; i < range->links.count; ++i) {
+    const hapi_link *link = &range->links.list[i];
+    if (dGeomGetClass(link->other) != dTriMeshClass) {
+      need_geom(nearby, link->other, io);
+      ++io->pairs;
+      continue;
+    }
+    uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
+    bool all = count < HAPI_NEAR_TRIANGLES;
+    io->geoms += count;
+    io->points += 3 * count;
+    io->pairs += all ? count : nearby->cycle->config->capacity.contacts + 1;
+  }
+  return range->near->geom_count + io->geoms <= c->geoms &&
+         range->near->point_count + io->points <= c->hull_points &&
+         range->near->pair_count + io->pairs <= c->contacts;
 }
 
 static void take_links(hapi_nearby *nearby)
@@ -571,7 +542,14 @@ static void take_links(hapi_nearby *nearby)
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
     dBodyID body = dGeomGetBody(link->other);
-    note_pair(nearby, link);
+    uint64_t key = meeting_key(link->own, link->other);
+    bool found = false;
+    hapi_pair_place *place = pair_place(range, key, &found);
+    if (!found && 2 * range->links.pairs_noted < range->links.pair_place_count) {
+      place->key = key;
+      place->walk = range->number;
+      ++range->links.pairs_noted;
+    }
     range->bounces +=
         (link->surface.flags & HAPI_SURFACE_BOUNCE) != 0 && link->surface.bounce > 0.0;
     uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
@@ -693,19 +671,11 @@ static void range_expand_further(hapi_nearby *nearby)
   }
 }
 
-static double fastest_pointer(const hapi_nearby *nearby)
+void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
 {
-  double fastest = 0.0;
-  const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
-  for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
-    double speed = pointers[i].generation != 0 ? hapi_v3_norm(pointers[i].twist.linear) : 0.0;
-    fastest = speed > fastest ? speed : fastest;
+  if (nearby->cycle->model != HAP_MODEL_CONTACT || nearby->cycle->state == NULL) {
+    return;
   }
-  return fastest;
-}
-
-static void range_begin(hapi_nearby *nearby)
-{
   hapi_range *range = &nearby->range;
   range->near = hapi_exchange_near_back(nearby->cycle->config->exchange);
   range->near->body_count = 0;
@@ -722,17 +692,13 @@ static void range_begin(hapi_nearby *nearby)
   range->refused = false;
   range->hops = 0;
   range->mechanism.joint_count = range->mechanism.count = range->mechanism.moving = 0;
-  range->fastest = fastest_pointer(nearby);
-  hapi_cover_begin(&range->links.cover);
-}
-
-void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
-{
-  if (nearby->cycle->model != HAP_MODEL_CONTACT || nearby->cycle->state == NULL) {
-    return;
+  range->fastest = 0.0;
+  const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
+  for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
+    double speed = pointers[i].generation != 0 ? hapi_v3_norm(pointers[i].twist.linear) : 0.0;
+    range->fastest = speed > range->fastest ? speed : range->fastest;
   }
-  hapi_range *range = &nearby->range;
-  range_begin(nearby);
+  hapi_cover_begin(&range->links.cover);
   for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */
     uint32_t known =
         hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(nearby->neighbors.hits[i].geom));
@@ -758,19 +724,22 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
 
 /* ---- the message to the contact thread ---- */
 
-static void fill_body(hapi_nearby *nearby, uint32_t known, hapi_near_body *out)
+void hapi_range_publish(hapi_nearby *nearby)
 {
-  dBodyID body = known_body(nearby, known)->body;
-  out->slot = known_body(nearby, known)->slot;
-  out->generation = nearby->slots.bodies[out->slot].generation;
-  hapi_v3_copy(dBodyGetPosition(body), out->pose.position);
-  memcpy(out->pose.quat_wxyz, dBodyGetQuaternion(body), sizeof out->pose.quat_wxyz);
-  hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
-  hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
-}
-
-static void count_roles(hapi_nearby *nearby)
-{
+  hapi_range *range = &nearby->range;
+  if (nearby->cycle->model != HAP_MODEL_CONTACT || range->number != nearby->cycle->model_number) {
+    return;
+  }
+  hapi_near_body *bodies = hapi_near_bodies(range->near);
+  for (uint32_t i = 0; i < range->count; ++i) {
+    hapi_near_body *out = &bodies[range->near->body_count++];
+    dBodyID handle = known_body(nearby, range->queue[i])->body;
+    out->slot = known_body(nearby, range->queue[i])->slot;
+    out->generation = nearby->slots.bodies[out->slot].generation;
+    hapi_pose_read(handle, &out->pose);
+    hapi_twist_read(handle, &out->twist);
+  }
+  range->near->model_number = nearby->cycle->model_number;
   hapi_near_counts *counts = &nearby->counts;
   counts->range_bodies = counts->edge_bodies = counts->measured_bodies = 0;
   counts->range_joints = nearby->range.mechanism.joint_count;
@@ -780,20 +749,6 @@ static void count_roles(hapi_nearby *nearby)
     counts->measured_bodies += (flags & HAPI_BODY_MEASURED) != 0;
     counts->edge_bodies += (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
   }
-}
-
-void hapi_range_publish(hapi_nearby *nearby)
-{
-  hapi_range *range = &nearby->range;
-  if (nearby->cycle->model != HAP_MODEL_CONTACT || range->number != nearby->cycle->model_number) {
-    return;
-  }
-  hapi_near_body *bodies = hapi_near_bodies(range->near);
-  for (uint32_t i = 0; i < range->count; ++i) {
-    fill_body(nearby, range->queue[i], &bodies[range->near->body_count++]);
-  }
-  range->near->model_number = nearby->cycle->model_number;
-  count_roles(nearby);
   hapi_exchange_near_publish(nearby->cycle->config->exchange);
 }
 

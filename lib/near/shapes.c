@@ -12,12 +12,6 @@
 
 #define FALLBACK_CONTACTS 64
 
-static void pose_of(dGeomID geom, hap_pose *out)
-{
-  hapi_v3_copy(dGeomGetPosition(geom), out->position);
-  dGeomGetQuaternion(geom, out->quat_wxyz);
-}
-
 /* The turn that brings z to a unit vector n. */
 static void turn_z_to(const double n[3], double quat[4])
 {
@@ -73,7 +67,8 @@ bool hapi_shape_of_geom(dGeomID geom, hapi_shape *out_shape, hap_pose *out_pose)
     default:
       return false;
   }
-  pose_of(geom, out_pose);
+  hapi_v3_copy(dGeomGetPosition(geom), out_pose->position);
+  dGeomGetQuaternion(geom, out_pose->quat_wxyz);
   return true;
 }
 

@@ -51,19 +51,13 @@ uint32_t hapi_slots_body(hapi_nearby *nearby, uint32_t known_index)
   return HAPI_NONE;
 }
 
-static bool slot_is_contact(const hapi_contact_slot *slot, uint32_t body, dGeomID geom,
-                            uint32_t pointer, uint32_t pointer_generation)
-{
-  return slot->phase == HAPI_SLOT_LIVE && slot->body == body && slot->geom == geom &&
-         slot->pointer == pointer && slot->pointer_generation == pointer_generation;
-}
-
 hapi_contact_slot *hapi_slots_find_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                            uint32_t pointer, uint32_t pointer_generation)
 {
   for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
     hapi_contact_slot *slot = &nearby->slots.contacts[i];
-    if (slot_is_contact(slot, body, geom, pointer, pointer_generation)) {
+    if ((slot->phase == HAPI_SLOT_LIVE && slot->body == body && slot->geom == geom &&
+         slot->pointer == pointer && slot->pointer_generation == pointer_generation)) {
       return slot;
     }
   }

@@ -13,31 +13,6 @@
  * and ACCELERANCE have their points from here, each a contact with an A of its own; model CONTACT
  * asks here what is near, and its contact thread finds the points. */
 
-/* The pointer in the world, as proximity and the messages see it. */
-static hapi_touch_side side_of_pointer(const hapi_tool_at *at, const hap_pose *pose)
-{
-  const hapi_state_pointer *pointer = at->pointer;
-  const hapi_tool_hull *hull = at->hull;
-  return (hapi_touch_side){.body = pose,
-                           .pose = *pose,
-                           .shape = {.kind = HAPI_SHAPE_HULL,
-                                     .rounding = pointer->radius,
-                                     .hull = &hull->points[0][0],
-                                     .hull_count = hull->count},
-                           .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
-}
-
-static void shape_in_body(const hapi_touch_side *side, hap_pose *out)
-{
-  *out = side->pose;
-  if (side->body != NULL) {
-    const double *q = side->body->quat_wxyz;
-    double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
-    hapi_pose_unpoint(side->body->position, q, side->pose.position, out->position);
-    hapi_quat_multiply(inverse, side->pose.quat_wxyz, out->quat_wxyz);
-  }
-}
-
 /* ---- what is found ---- */
 
 typedef struct tool_search {
@@ -77,7 +52,10 @@ static void add_shape(tool_search *s, hapi_touch_side *other, const double *corn
 {
   hapi_patch patch;
   other->body = s->has_body ? &s->body_pose : NULL;
-  shape_in_body(other, &other->shape_pose);
+  other->shape_pose = other->pose;
+  if (other->body != NULL) {
+    hapi_pose_into(other->body->position, other->body->quat_wxyz, &other->pose, &other->shape_pose);
+  }
   if (!hapi_tool_patch(&s->tool, other, s->margin, s->pointer->extent, &patch)) {
     return;
   }
@@ -93,19 +71,14 @@ static void add_shape(tool_search *s, hapi_touch_side *other, const double *corn
   ++s->patches;
 }
 
-static void search_box(const tool_search *s, double box[6])
+static void add_mesh(tool_search *s, dGeomID geom)
 {
+  double box[6];
   double far = s->pointer->extent + s->margin;
   for (int k = 0; k < 3; ++k) {
     box[2 * k] = s->tool.pose.position[k] - far;
     box[2 * k + 1] = s->tool.pose.position[k] + far;
   }
-}
-
-static void add_mesh(tool_search *s, dGeomID geom)
-{
-  double box[6];
-  search_box(s, box);
   uint32_t count = hapi_mesh_near(s->nearby, geom, box, s->nearby->cycle->model_number + 1);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
@@ -115,44 +88,6 @@ static void add_mesh(tool_search *s, dGeomID geom)
     add_shape(s, &other, triangle->corners, triangle->open_edges);
   }
   s->nearby->counts.dropped += count == HAPI_NEAR_TRIANGLES;
-}
-
-bool hapi_tool_knows(dGeomID geom)
-{
-  switch (dGeomGetClass(geom)) {
-    case dSphereClass:
-    case dBoxClass:
-    case dCapsuleClass:
-    case dCylinderClass:
-    case dPlaneClass:
-    case dConvexClass:
-    case dTriMeshClass:
-      return true;
-    default:
-      return false;
-  }
-}
-
-static void say_not_touched(hapi_nearby *nearby)
-{
-  const char *text =
-      "a pointer that is a hull does not touch heightfields and geoms of user-made "
-      "classes; take a trimesh there";
-  hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched, text);
-}
-
-static void add_geom(tool_search *s, dGeomID geom)
-{
-  hapi_touch_side other;
-  if (!hapi_tool_knows(geom)) {
-    say_not_touched(s->nearby);
-  } else if (dGeomGetClass(geom) == dTriMeshClass) {
-    add_mesh(s, geom);
-  } else if (dGeomGetClass(geom) == dConvexClass
-                 ? hapi_hull_of_convex(s->nearby, geom, &other.shape, &other.pose)
-                 : hapi_shape_of_geom(geom, &other.shape, &other.pose)) {
-    add_shape(s, &other, NULL, 0);
-  }
 }
 
 static void search_reduce(tool_search *s)
@@ -190,38 +125,45 @@ uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
   return hapi_tool_key(key, pointer, hapi_state_pointers(nearby->cycle->state)[pointer].generation);
 }
 
-static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
-                         const hap_pose *pose)
+/* The points of the pointer where that pose puts it. */
+static void search_find(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
+                        const hap_pose *pose)
 {
+  const hapi_state_pointer *pointer = at->pointer;
   dBodyID body = dGeomGetBody(at->geom);
+  hapi_touch_side other;
   s->nearby = nearby;
   s->index = at->index;
-  s->pointer = at->pointer;
-  s->tool = side_of_pointer(at, pose);
+  s->pointer = pointer;
+  s->tool = (hapi_touch_side){.body = pose,
+                              .pose = *pose,
+                              .shape = {.kind = HAPI_SHAPE_HULL,
+                                        .rounding = pointer->radius,
+                                        .hull = &at->hull->points[0][0],
+                                        .hull_count = at->hull->count},
+                              .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
   s->has_body = body != NULL;
   if (s->has_body) {
     hapi_pose_read(body, &s->body_pose);
   }
   s->key = at->key;
   s->count = s->patches = 0;
-}
-
-/* How fast a point of the pointer may come nearer to the geom. */
-static double approach_speed(const hapi_tool_at *at)
-{
-  const hapi_state_pointer *pointer = at->pointer;
-  return hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
-         pointer->extent * hapi_v3_norm(pointer->twist.angular) +
-         hapi_neighbors_spin(at->geom, pointer->extent);
-}
-
-/* The points of the pointer where that pose puts it. */
-static void search_find(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
-                        const hap_pose *pose)
-{
-  search_begin(s, nearby, at, pose);
-  s->margin = fmin(at->reach, hapi_neighbors_reach(approach_speed(at), at->horizon));
-  add_geom(s, at->geom);
+  /* How fast a point of the pointer may come nearer to the geom. */
+  double speed = hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
+                 pointer->extent * hapi_v3_norm(pointer->twist.angular) +
+                 hapi_neighbors_spin(at->geom, pointer->extent);
+  s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
+  int kind = dGeomGetClass(at->geom);
+  if (kind == dTriMeshClass) {
+    add_mesh(s, at->geom);
+  } else if (kind == dConvexClass ? hapi_hull_of_convex(nearby, at->geom, &other.shape, &other.pose)
+                                  : hapi_shape_of_geom(at->geom, &other.shape, &other.pose)) {
+    add_shape(s, &other, NULL, 0);
+  } else if (kind != dConvexClass) {
+    hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched,
+                  "a pointer that is a hull does not touch heightfields and geoms of user-made "
+                  "classes; take a trimesh there");
+  }
 }
 
 uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,

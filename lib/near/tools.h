@@ -42,7 +42,6 @@ typedef struct hapi_tool_search {
   bool said_not_touched; /* of a heightfield by a hull, once a session */
 } hapi_tool_search;
 
-bool hapi_tool_knows(dGeomID geom); /* whether they can touch it */
 bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out);
 /* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
 uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,

@@ -8,9 +8,15 @@
 
 /* Physics' part of the statistics. */
 
-/* What the parts count themselves. */
-static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
+void hapi_counts_show(hapi_physics *physics)
 {
+  pthread_mutex_lock(&physics->counts.lock);
+  physics->counts.shown = physics->counts.own;
+  physics->counts.shown.range_s = physics->near.counts.range_s;
+  physics->counts.shown.beyond_s = physics->near.counts.beyond_s;
+  physics->counts.shown_account = physics->account.counts;
+  /* What the parts count themselves. */
+  hap_stats *io_stats = &physics->counts.shown.stats;
   const hapi_world *world = &physics->world;
   const hapi_probe *probe = &physics->probe;
   const hapi_cross_counts *cross = &physics->cross.counts;
@@ -43,16 +49,6 @@ static void counts_gather(const hapi_physics *physics, hap_stats *io_stats)
   io_stats->model.measured_bodies = near->measured_bodies;
   io_stats->model.range_joints = near->range_joints;
   io_stats->physics.last.range_ms = 1e3 * near->last_range_s;
-}
-
-void hapi_counts_show(hapi_physics *physics)
-{
-  pthread_mutex_lock(&physics->counts.lock);
-  physics->counts.shown = physics->counts.own;
-  physics->counts.shown.range_s = physics->near.counts.range_s;
-  physics->counts.shown.beyond_s = physics->near.counts.beyond_s;
-  physics->counts.shown_account = physics->account.counts;
-  counts_gather(physics, &physics->counts.shown.stats);
   physics->counts.shown.cross_s = physics->cross.counts.seconds;
   pthread_mutex_unlock(&physics->counts.lock);
 }
@@ -65,42 +61,6 @@ void hapi_physics_count_dropped_frames(hapi_physics *physics, uint64_t steps)
   pthread_mutex_lock(&physics->counts.lock);
   physics->counts.shown.stats.physics.frames_dropped += steps;
   pthread_mutex_unlock(&physics->counts.lock);
-}
-
-static void fill_lock(const hapi_lock_figures *f, hap_stats *out)
-{
-  out->edits.locks = atomic_load(&f->count);
-  out->edits.wait_ms_max = 1e-6 * (double)atomic_load(&f->wait_most_ns);
-  out->edits.held_ms_max = 1e-6 * (double)atomic_load(&f->held_most_ns);
-}
-
-static void fill_times(const hapi_counts *counts, double period_s, hap_stats *out)
-{
-  const hapi_physics_counts *f = &counts->shown;
-  double per_cycle = f->cycles > 0 ? 1e3 / (double)f->cycles : 0.0;
-  out->physics.mean.collide_ms = per_cycle * f->collide_s;
-  out->physics.mean.neighbour_ms = per_cycle * f->neighbour_s;
-  out->physics.mean.testing_ms = per_cycle * f->testing_s;
-  out->physics.mean.step_ms = per_cycle * f->step_s;
-  out->physics.mean.range_ms = per_cycle * f->range_s;
-  out->physics.mean.publish_ms = per_cycle * f->publish_s;
-  out->physics.ms_mean = 1e-6 * hapi_histogram_mean_ns(&counts->cycle_ns);
-  out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&counts->cycle_ns, 0.99);
-  out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&counts->cycle_ns);
-  out->physics.duty = 1e-3 * out->physics.ms_mean / period_s;
-}
-
-/* Impulse on the world over impulse of the hands, along the latter. */
-static void fill_momentum(const hapi_counts *counts, hap_stats *out)
-{
-  const hapi_account_counts *f = &counts->shown_account;
-  double net2 = hapi_v3_dot(f->hand_impulse, f->hand_impulse);
-  double difference[3];
-  hapi_v3_sub(f->world_impulse, f->hand_impulse, difference);
-  out->hand.momentum_error_ns = hapi_v3_norm(difference);
-  bool meaningful = net2 > 0.0 && sqrt(net2) >= 0.05 * out->hand.impulse_abs_ns;
-  out->hand.momentum_ratio =
-      meaningful ? hapi_v3_dot(f->world_impulse, f->hand_impulse) / net2 : (double)NAN;
 }
 
 void hapi_physics_accuracy(hapi_physics *physics, hap_accuracy_info *out)
@@ -125,11 +85,34 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   *out = physics->counts.shown.stats;
   out->size = loop.size;
   out->hand.impulse_abs_ns = loop.hand.impulse_abs_ns;
-  fill_times(&physics->counts,
-             hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model)),
-             out);
-  fill_lock(&physics->lock.figures, out);
-  fill_momentum(&physics->counts, out);
+  const hapi_counts *counts = &physics->counts;
+  const hapi_physics_counts *f = &counts->shown;
+  double per_cycle = f->cycles > 0 ? 1e3 / (double)f->cycles : 0.0;
+  out->physics.mean.collide_ms = per_cycle * f->collide_s;
+  out->physics.mean.neighbour_ms = per_cycle * f->neighbour_s;
+  out->physics.mean.testing_ms = per_cycle * f->testing_s;
+  out->physics.mean.step_ms = per_cycle * f->step_s;
+  out->physics.mean.range_ms = per_cycle * f->range_s;
+  out->physics.mean.publish_ms = per_cycle * f->publish_s;
+  out->physics.ms_mean = 1e-6 * hapi_histogram_mean_ns(&counts->cycle_ns);
+  out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&counts->cycle_ns, 0.99);
+  out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&counts->cycle_ns);
+  out->physics.duty =
+      1e-3 * out->physics.ms_mean /
+      hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model));
+  const hapi_lock_figures *lock = &physics->lock.figures;
+  out->edits.locks = atomic_load(&lock->count);
+  out->edits.wait_ms_max = 1e-6 * (double)atomic_load(&lock->wait_most_ns);
+  out->edits.held_ms_max = 1e-6 * (double)atomic_load(&lock->held_most_ns);
+  /* Impulse on the world over impulse of the hands, along the latter. */
+  const hapi_account_counts *account = &physics->counts.shown_account;
+  double net2 = hapi_v3_dot(account->hand_impulse, account->hand_impulse);
+  double difference[3];
+  hapi_v3_sub(account->world_impulse, account->hand_impulse, difference);
+  out->hand.momentum_error_ns = hapi_v3_norm(difference);
+  bool meaningful = net2 > 0.0 && sqrt(net2) >= 0.05 * out->hand.impulse_abs_ns;
+  out->hand.momentum_ratio =
+      meaningful ? hapi_v3_dot(account->world_impulse, account->hand_impulse) / net2 : (double)NAN;
   pthread_mutex_unlock(&physics->counts.lock);
   out->physics.pose_delay_s = hapi_poses_delay(&physics->drawing);
 }

@@ -50,15 +50,6 @@ static hap_status check_world(hapi_physics *physics, hap_detail *detail)
   return HAP_OK;
 }
 
-static void release_bodies(const hapi_body_table *table)
-{
-  for (uint32_t i = 0; i < table->high; ++i) {
-    if (table->entries[i].body != NULL) {
-      hapi_sleep_give_back(&table->entries[i]);
-    }
-  }
-}
-
 hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
                                hapi_physics **out, hap_detail *detail)
 {
@@ -126,7 +117,12 @@ static void give_world_back(hapi_physics *physics)
   dJointGroupEmpty(physics->world.contact_group);
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_physics_scan(physics); /* a body without memory for it was given nothing */
-  release_bodies(&physics->world.bodies);
+  const hapi_body_table *table = &physics->world.bodies;
+  for (uint32_t i = 0; i < table->high; ++i) {
+    if (table->entries[i].body != NULL) {
+      hapi_sleep_give_back(&table->entries[i]);
+    }
+  }
   hapi_islands_end(&physics->world);
   if (physics->world.islands_threads != 0) {
     dWorldSetStepIslandsProcessingMaxThreadCount(physics->world.ode.world,
@@ -136,7 +132,7 @@ static void give_world_back(hapi_physics *physics)
   physics->world.begun = false;
 }
 
-static void reset_figures(hapi_physics *physics)
+static void physics_prepare(hapi_physics *physics)
 {
   memset(&physics->counts.own, 0, sizeof physics->counts.own);
   memset(&physics->world.counts, 0, sizeof physics->world.counts);
@@ -146,22 +142,6 @@ static void reset_figures(hapi_physics *physics)
   hapi_histogram_reset(&physics->counts.cycle_ns);
   hapi_lock_figures_reset(&physics->lock.figures);
   hapi_counts_show(physics);
-}
-
-static void build_first_model(hapi_physics *physics)
-{
-  hapi_physics_enter_dial(physics);
-  hapi_physics_take_state(physics);
-  hapi_physics_collide(physics);
-  hapi_neighbors_collect(&physics->near);
-  hapi_neighbors_find(&physics->near);
-  hapi_physics_test(physics);
-  hapi_dial_leave(&physics->dial, physics->world.ode.world);
-}
-
-static void physics_prepare(hapi_physics *physics)
-{
-  reset_figures(physics);
   hapi_nearby_reset(&physics->near);
   for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
     physics->world.bodies.entries[i].loop_owned = false;
@@ -214,7 +194,13 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   }
   hapi_lock_claim(&physics->lock); /* surfaces are asked for */
   physics_prepare(physics);
-  build_first_model(physics);
+  hapi_physics_enter_dial(physics);
+  hapi_physics_take_state(physics);
+  hapi_physics_collide(physics);
+  hapi_neighbors_collect(&physics->near);
+  hapi_neighbors_find(&physics->near);
+  hapi_physics_test(physics);
+  hapi_dial_leave(&physics->dial, physics->world.ode.world);
   *start_ns = physics->config.lockstep ? 0 : hapi_clock_now();
   hapi_tape_start(&physics->tape, start_ns);
   physics->pace.start_ns = *start_ns;

@@ -9,20 +9,9 @@
 
 /* Paces the cycles in drive THREADS. */
 
-static int64_t seconds_to_ns(double seconds)
-{
-  return (int64_t)llround(1e9 * seconds);
-}
-
 static int64_t period_ns(const hapi_physics_config *config, hap_model model)
 {
-  return seconds_to_ns(hapi_config_period(config, model));
-}
-
-static void count_missed(hapi_physics *physics, int64_t deadlines)
-{
-  physics->counts.own.stats.physics.missed += (uint64_t)deadlines; /* shown with the next cycle */
-  physics->tape.missed_unrecorded += (uint32_t)deadlines;
+  return (int64_t)llround(1e9 * hapi_config_period(config, model));
 }
 
 /* Where the next cycle belongs: at its deadline, or, when that has passed by whole periods, at the
@@ -33,7 +22,9 @@ static int64_t skip_missed(hapi_physics *physics, int64_t deadline, int64_t peri
   if (late < period) {
     return deadline;
   }
-  count_missed(physics, late / period);
+  int64_t deadlines = late / period;
+  physics->counts.own.stats.physics.missed += (uint64_t)deadlines; /* shown with the next cycle */
+  physics->tape.missed_unrecorded += (uint32_t)deadlines;
   return deadline + late / period * period;
 }
 

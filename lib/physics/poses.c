@@ -37,29 +37,6 @@ static double delay_at(const hapi_frames *frames, int64_t time_ns)
   return fabs(gap) <= way ? frames->delay_wanted_ns : frames->delay_ns + copysign(way, gap);
 }
 
-/* The largest wait for a frame among the last ones; one that stands out is a hitch and does not
- * count. */
-static double usual_wait(const hapi_frames *frames, double step)
-{
-  double largest = 0.0;
-  double second = 0.0;
-  for (unsigned i = 0; i < HAPI_WAITS; ++i) {
-    double wait = frames->waits_ns[i];
-    second = hapi_max(second, hapi_min(wait, largest));
-    largest = hapi_max(largest, wait);
-  }
-  return largest - second > HITCH * step ? second : largest;
-}
-
-static void follow_waits(hapi_frames *frames, double step, int64_t known_ns)
-{
-  double wait = (double)(known_ns - frames->stamps[(frames->count - 1) % HAPI_FRAMES]);
-  frames->waits_ns[frames->wait_count++ % HAPI_WAITS] = wait;
-  frames->delay_ns = delay_at(frames, known_ns);
-  frames->delay_from_ns = known_ns;
-  frames->delay_wanted_ns = fmin(fmax(usual_wait(frames, step), step), DELAY_MOST * step);
-}
-
 /* Number of the frame for stamp_ns. One that is not later than those before takes their place,
  * as a change of model leads to. In model SINGLE, whose steps would soon use up the ring, a
  * frame goes when the next one comes unless it is some way behind the one before; elsewhere that
@@ -72,7 +49,21 @@ static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t
     frames->delay_ns = frames->delay_wanted_ns = step;
     frames->delay_from_ns = known_ns;
   } else {
-    follow_waits(frames, step, known_ns);
+    double wait = (double)(known_ns - frames->stamps[(frames->count - 1) % HAPI_FRAMES]);
+    frames->waits_ns[frames->wait_count++ % HAPI_WAITS] = wait;
+    frames->delay_ns = delay_at(frames, known_ns);
+    frames->delay_from_ns = known_ns;
+    /* The largest wait for a frame among the last ones; one that stands out is a hitch and does not
+     * count. */
+    double largest = 0.0;
+    double second = 0.0;
+    for (unsigned i = 0; i < HAPI_WAITS; ++i) {
+      double one = frames->waits_ns[i];
+      second = hapi_max(second, hapi_min(one, largest));
+      largest = hapi_max(largest, one);
+    }
+    double usual = largest - second > HITCH * step ? second : largest;
+    frames->delay_wanted_ns = fmin(fmax(usual, step), DELAY_MOST * step);
   }
   while (frames->count > frames->oldest &&
          frames->stamps[(frames->count - 1) % HAPI_FRAMES] >= stamp_ns) {
@@ -91,16 +82,6 @@ static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t
     frames->oldest = frame + 1 - HAPI_FRAMES;
   }
   return frame;
-}
-
-/* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it
- * exactly. */
-static bool led_by_loop(const hapi_known_body *known, const hapi_cycle *cycle,
-                        const hapi_slots *slots)
-{
-  bool pushed = cycle->model == HAP_MODEL_ACCELERANCE || cycle->model == HAP_MODEL_CONTACT;
-  pushed = pushed && known->slot != HAPI_NONE && slots->bodies[known->slot].pushed;
-  return known->loop_owned || pushed;
 }
 
 static void note_slot(const hapi_known_body *known, const hapi_slots *slots, hapi_drawn *drawn)
@@ -138,15 +119,6 @@ static void add_pose(const hapi_drawing *drawing, const hapi_known_body *known, 
   }
 }
 
-static void note_leader(const hapi_drawing *drawing, const hapi_known_body *known,
-                        const hapi_cycle *cycle, const hapi_slots *slots, uint32_t index)
-{
-  hapi_drawn *drawn = &drawing->drawn[index];
-  uint32_t bit = 1u << ((drawing->frames.count - 1) % HAPI_FRAMES);
-  drawn->led = led_by_loop(known, cycle, slots) ? drawn->led | bit : drawn->led & ~bit;
-  note_slot(known, slots, drawn);
-}
-
 void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const hapi_slots *slots,
                         const hapi_cycle *cycle, const int64_t times_ns[2])
 {
@@ -156,7 +128,14 @@ void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const ha
     hapi_known_body *known = &world->bodies.entries[i];
     if (known->body != NULL) {
       add_pose(drawing, known, i, frame);
-      note_leader(drawing, known, cycle, slots, i);
+      hapi_drawn *drawn = &drawing->drawn[i];
+      uint32_t bit = 1u << ((drawing->frames.count - 1) % HAPI_FRAMES);
+      /* Whether the pose in ODE is only the loop's, of a time near the frame's: the trail has it
+       * exactly. */
+      bool pushed = cycle->model == HAP_MODEL_ACCELERANCE || cycle->model == HAP_MODEL_CONTACT;
+      pushed = pushed && known->slot != HAPI_NONE && slots->bodies[known->slot].pushed;
+      drawn->led = known->loop_owned || pushed ? drawn->led | bit : drawn->led & ~bit;
+      note_slot(known, slots, drawn);
       if (cycle->step_s > 0.0) { /* here, as each body is at hand */
         hapi_sleep_note(known);
       }
@@ -348,23 +327,6 @@ static void scene_draw(scene *d, const hapi_drawn *drawn, hap_pose *out)
   hapi_pose_slerp(&before.pose, &after.pose, fmin(fmax(share, 0.0), 1.0), out);
 }
 
-static void scene_seek(scene *d)
-{
-  const hapi_frames *frames = d->frames;
-  d->frame_first = frames->oldest;
-  d->frame = frames->count;
-  while (d->frame > d->frame_first && stamp_of(d, d->frame - 1) > d->time_ns) {
-    --d->frame;
-  }
-  d->row = hapi_trail_after(&d->rows, d->time_ns, HAPI_TRAIL_BODIES);
-}
-
-static int64_t newest_time(scene *d)
-{
-  return d->rows.end > d->rows.first ? hapi_trail_time(&d->rows, d->rows.end - 1, HAPI_TRAIL_BODIES)
-                                     : stamp_of(d, d->frames->count - 1);
-}
-
 static int64_t drawn_time(const hapi_frames *frames, int64_t time_ns)
 {
   int64_t time = time_ns > TIME_LIMIT ? TIME_LIMIT : time_ns < -TIME_LIMIT ? -TIME_LIMIT : time_ns;
@@ -401,7 +363,13 @@ static bool all_known(const hapi_drawing *drawing, const hapi_body_table *table,
 static bool scene_draw_all(scene *d, const hapi_body_table *table, struct dxBody *const *bodies,
                            size_t count, hap_pose *out)
 {
-  scene_seek(d);
+  const hapi_frames *frames = d->frames;
+  d->frame_first = frames->oldest;
+  d->frame = frames->count;
+  while (d->frame > d->frame_first && stamp_of(d, d->frame - 1) > d->time_ns) {
+    --d->frame;
+  }
+  d->row = hapi_trail_after(&d->rows, d->time_ns, HAPI_TRAIL_BODIES);
   for (size_t i = 0; i < count; ++i) {
     scene_draw(d, &d->drawing->drawn[hapi_bodies_find(table, bodies[i])], &out[i]);
   }
@@ -441,7 +409,9 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
   for (bool whole = !known || count == 0; !whole;) {
     scene d = scene_begin(physics);
     d.newest = true;
-    d.time_ns = newest_time(&d);
+    d.time_ns = d.rows.end > d.rows.first
+                    ? hapi_trail_time(&d.rows, d.rows.end - 1, HAPI_TRAIL_BODIES)
+                    : stamp_of(&d, d.frames->count - 1);
     whole = scene_draw_all(&d, &physics->world.bodies, bodies, count, out);
     status = scene_judge(&d, 2.0);
   }

@@ -20,14 +20,6 @@ typedef struct publishing {
   hapi_account *account;
 } publishing;
 
-/* Row-major 3x3 of ODE's rows of four. */
-static void read_matrix(const dReal in[12], double out[9])
-{
-  for (int i = 0; i < 9; ++i) {
-    out[i] = in[4 * (i / 3) + i % 3];
-  }
-}
-
 static double keep_per_tick(const hapi_cycle *cycle, double damping)
 {
   double share = damping < 0.0 ? 0.0 : damping > 1.0 ? 1.0 : damping; /* lost in a step of H */
@@ -37,28 +29,6 @@ static double keep_per_tick(const hapi_cycle *cycle, double damping)
   return pow(1.0 - share, hapi_step_ratio(cycle));
 }
 
-/* Whether the loop is to let its inertia turn. One that does not spin yet may do so before the
- * next sync: that is the tick's to see. */
-static bool is_gyroscopic(uint32_t wishes, dBodyID body, const double inertia[9])
-{
-  hap_effect_wish wish = hapi_wish(wishes, HAP_EFFECT_GYRO);
-  bool turns = dBodyGetMaxAngularSpeed(body) > 0.0;
-  return dBodyGetGyroscopicMode(body) != 0 && wish != HAP_EFFECT_OFF &&
-         (wish == HAP_EFFECT_ON || (turns && !hapi_turns_alike(inertia)));
-}
-
-static void fill_mass(uint32_t wishes, dBodyID body, hapi_model_body *out)
-{
-  dMass mass;
-  dBodyGetMass(body, &mass);
-  out->mass = mass.mass;
-  read_matrix(mass.I, out->inertia);
-  hapi_m3_invert(out->inertia, out->inverse_inertia);
-  if (is_gyroscopic(wishes, body, out->inertia)) {
-    out->flags |= HAPI_BODY_GYROSCOPIC;
-  }
-}
-
 /* What the loop needs to move the body itself. */
 static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
                           const hapi_body_answer *answer, hapi_slot_account *of,
@@ -66,7 +36,19 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
 {
   const hapi_known_body *known = &p->world->bodies.entries[slot->known];
   dBodyID body = known->body;
-  fill_mass(p->cycle->wishes, body, out);
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  out->mass = mass.mass;
+  hapi_matrix_read(mass.I, out->inertia);
+  hapi_m3_invert(out->inertia, out->inverse_inertia);
+  /* Whether the loop is to let its inertia turn. One that does not spin yet may do so before the
+   * next sync: that is the tick's to see. */
+  hap_effect_wish wish = hapi_wish(p->cycle->wishes, HAP_EFFECT_GYRO);
+  bool turns = dBodyGetMaxAngularSpeed(body) > 0.0;
+  if ((dBodyGetGyroscopicMode(body) != 0 && wish != HAP_EFFECT_OFF &&
+       (wish == HAP_EFFECT_ON || (turns && !hapi_turns_alike(out->inertia))))) {
+    out->flags |= HAPI_BODY_GYROSCOPIC;
+  }
   if (dBodyGetGravityMode(body) != 0) {
     dVector3 gravity;
     dWorldGetGravity(p->world->ode.world, gravity);
@@ -102,8 +84,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
   out->epoch = slot->epoch;
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   hapi_pose_read(body, &out->pose);
-  hapi_v3_copy(dBodyGetLinearVel(body), out->twist.linear);
-  hapi_v3_copy(dBodyGetAngularVel(body), out->twist.angular);
+  hapi_twist_read(body, &out->twist);
   memcpy(out->b, answer->b, sizeof out->b);
   memcpy(out->residual, of->residual, sizeof out->residual);
   hapi_v3_copy(of->impulse_taken, out->impulse_taken);
@@ -293,15 +274,6 @@ static void fill_parameters(const publishing *p, const hapi_known_joint *known,
   }
 }
 
-static void fill_limits(const publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
-{
-  hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
-  int count = hapi_joint_axes(known, axes);
-  for (int i = 0; i < count; ++i) {
-    fill_limit(p, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
-  }
-}
-
 static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
 {
   HAPI_ASSERT_INDEX(known->slot, p->world->joints.slot_count);
@@ -321,7 +293,11 @@ static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_
     out->kind = HAPI_JOINT_MEASURED;
     out->place = measured->place;
     out->measured = measured->found;
-    fill_limits(p, known, out);
+    hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
+    int count = hapi_joint_axes(known, axes);
+    for (int i = 0; i < count; ++i) {
+      fill_limit(p, known->joint, axes[i].get, axes[i].group, !axes[i].slides, &out->limits[i]);
+    }
     return;
   }
   out->place = known->place;
@@ -368,20 +344,6 @@ static void count_model(hap_stats *stats, const hapi_nearby *near, const hapi_mo
   }
 }
 
-static void fill_header(hapi_model *out, const hapi_cycle *cycle, int64_t state_ns,
-                        int64_t valid_from_ns)
-{
-  out->number = cycle->model_number;
-  out->state_ns = state_ns;
-  out->valid_from_ns = valid_from_ns;
-  out->blend_s = cycle->model == HAP_MODEL_IMPULSE ? cycle->probe_step_s : 0.0;
-  out->model = cycle->model;
-  out->impulse_pose = cycle->config->impulse_pose;
-  out->wishes = cycle->wishes;
-  out->max_sweeps = cycle->settings.max_sweeps;
-  out->row_updates = cycle->settings.row_updates;
-}
-
 static void send_joints(hapi_physics *physics, const publishing *p, hapi_model *out)
 {
   const hapi_range *range = &physics->near.range;
@@ -403,7 +365,15 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
                         &physics->account};
   ++cycle->model_number;
   HAPI_ASSERT(cycle->probe_step_s > 0.0);
-  fill_header(out, cycle, state_ns, valid_from_ns);
+  out->number = cycle->model_number;
+  out->state_ns = state_ns;
+  out->valid_from_ns = valid_from_ns;
+  out->blend_s = cycle->model == HAP_MODEL_IMPULSE ? cycle->probe_step_s : 0.0;
+  out->model = cycle->model;
+  out->impulse_pose = cycle->config->impulse_pose;
+  out->wishes = cycle->wishes;
+  out->max_sweeps = cycle->settings.max_sweeps;
+  out->row_updates = cycle->settings.row_updates;
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
   out->period_s = hapi_config_period(
       &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));

@@ -150,8 +150,25 @@ static void take_body(hapi_account *account, uint32_t index)
   }
 }
 
-static void take_forces(const hapi_account *account)
+void hapi_reconcile_take(hapi_account *account)
 {
+  HAPI_ASSERT(account->cycle->has_new_state && account->cycle->state != NULL);
+  hapi_v3_copy(account->cycle->state->hand_impulse, account->counts.hand_impulse);
+  /* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an
+   * impulse. */
+  hapi_account_counts *f = &account->counts;
+  for (int i = 0; i < 3; ++i) {
+    f->world_impulse[i] += account->cycle->state->owned_impulse[i] - f->owned_taken[i];
+    f->owned_taken[i] = account->cycle->state->owned_impulse[i];
+  }
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    if (hapi_account_body(account, &account->slots->bodies[i]) != NULL) {
+      account->world->bodies.entries[account->slots->bodies[i].known].loop_owned = false;
+    }
+  }
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    take_body(account, i);
+  }
   const hapi_state_contact *in = hapi_state_contacts(account->cycle->state);
   for (uint32_t i = 0; i < account->slots->contact_high; ++i) {
     memset(account->slots->contacts[i].last_force, 0,
@@ -165,32 +182,6 @@ static void take_forces(const hapi_account *account)
       hapi_v3_copy(in[i].force, contact->last_force);
     }
   }
-}
-
-/* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an
- * impulse. */
-static void take_owned_impulse(hapi_account_counts *f, const hapi_state *state)
-{
-  for (int i = 0; i < 3; ++i) {
-    f->world_impulse[i] += state->owned_impulse[i] - f->owned_taken[i];
-    f->owned_taken[i] = state->owned_impulse[i];
-  }
-}
-
-void hapi_reconcile_take(hapi_account *account)
-{
-  HAPI_ASSERT(account->cycle->has_new_state && account->cycle->state != NULL);
-  hapi_v3_copy(account->cycle->state->hand_impulse, account->counts.hand_impulse);
-  take_owned_impulse(&account->counts, account->cycle->state);
-  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
-    if (hapi_account_body(account, &account->slots->bodies[i]) != NULL) {
-      account->world->bodies.entries[account->slots->bodies[i].known].loop_owned = false;
-    }
-  }
-  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
-    take_body(account, i);
-  }
-  take_forces(account);
 }
 
 /* What the application has not changed itself. */
@@ -252,26 +243,6 @@ void hapi_reconcile_own(hapi_account *account)
   }
 }
 
-/* What the pointers gave in the last interval acts over the global step. */
-static void push_body(hapi_account_counts *counts, hapi_slot_account *of, hapi_body_slot *slot,
-                      dBodyID body, double rate)
-{
-  HAPI_ASSERT_FINITE(of->new_impulse, 3);
-  HAPI_ASSERT_FINITE(of->new_angular_impulse, 3);
-  const double *p = of->new_impulse;
-  const double *l = of->new_angular_impulse;
-  if (!dBodyIsEnabled(body)) {
-    dBodyEnable(body);
-  }
-  dBodyAddForce(body, p[0] * rate, p[1] * rate, p[2] * rate);
-  dBodyAddTorque(body, l[0] * rate, l[1] * rate, l[2] * rate);
-  hapi_v3_add(counts->world_impulse, p, counts->world_impulse);
-  hapi_v3_scale(rate, p, slot->exchanged);
-  hapi_v3_scale(rate, l, slot->exchanged + 3);
-  memset(of->new_impulse, 0, sizeof of->new_impulse);
-  memset(of->new_angular_impulse, 0, sizeof of->new_angular_impulse);
-}
-
 void hapi_reconcile_push(hapi_account *account)
 {
   for (uint32_t i = 0; i < account->slots->body_high && account->cycle->step_s > 0.0; ++i) {
@@ -280,7 +251,22 @@ void hapi_reconcile_push(hapi_account *account)
     dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(account, slot);
     memset(slot->exchanged, 0, sizeof slot->exchanged);
     if (body != NULL && (is_pushed(of->new_impulse) || is_pushed(of->new_angular_impulse))) {
-      push_body(&account->counts, of, slot, body, 1.0 / account->cycle->step_s);
+      /* What the pointers gave in the last interval acts over the global step. */
+      double rate = 1.0 / account->cycle->step_s;
+      HAPI_ASSERT_FINITE(of->new_impulse, 3);
+      HAPI_ASSERT_FINITE(of->new_angular_impulse, 3);
+      const double *p = of->new_impulse;
+      const double *l = of->new_angular_impulse;
+      if (!dBodyIsEnabled(body)) {
+        dBodyEnable(body);
+      }
+      dBodyAddForce(body, p[0] * rate, p[1] * rate, p[2] * rate);
+      dBodyAddTorque(body, l[0] * rate, l[1] * rate, l[2] * rate);
+      hapi_v3_add(account->counts.world_impulse, p, account->counts.world_impulse);
+      hapi_v3_scale(rate, p, slot->exchanged);
+      hapi_v3_scale(rate, l, slot->exchanged + 3);
+      memset(of->new_impulse, 0, sizeof of->new_impulse);
+      memset(of->new_angular_impulse, 0, sizeof of->new_angular_impulse);
     }
   }
 }
@@ -328,26 +314,21 @@ void hapi_reconcile_residual(hapi_account *account)
   }
 }
 
-/* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference, and it
- * is on its way to the loop. What is left is the pose; the contact planes are sought on it, as
- * it is the pose that the loop goes on with. A body that no pointer pushed keeps the world's:
- * for a body alone the two are equal, and what another body pushes is moved by the world only. */
-static void overwrite_body(const hapi_account *account, uint32_t index)
-{
-  const hapi_body_slot *slot = &account->slots->bodies[index];
-  const hapi_state_body *in = moved_by_loop(account, index);
-  dBodyID body = hapi_account_body(account, slot);
-  if (in != NULL && body != NULL && slot->pushed) {
-    const double *p = in->pose.position;
-    dBodySetPosition(body, p[0], p[1], p[2]);
-    dBodySetQuaternion(body, in->pose.quat_wxyz);
-  }
-}
-
 void hapi_reconcile_overwrite(const hapi_account *account)
 {
   for (uint32_t i = 0; i < account->slots->body_high; ++i) {
-    overwrite_body(account, i);
+    /* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference, and it
+     * is on its way to the loop. What is left is the pose; the contact planes are sought on it, as
+     * it is the pose that the loop goes on with. A body that no pointer pushed keeps the world's:
+     * for a body alone the two are equal, and what another body pushes is moved by the world only. */
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    const hapi_state_body *in = moved_by_loop(account, i);
+    dBodyID body = hapi_account_body(account, slot);
+    if (in != NULL && body != NULL && slot->pushed) {
+      const double *p = in->pose.position;
+      dBodySetPosition(body, p[0], p[1], p[2]);
+      dBodySetQuaternion(body, in->pose.quat_wxyz);
+    }
   }
 }
 
@@ -374,12 +355,6 @@ static bool is_owned(const hapi_body_table *table, uint32_t body)
   return body != HAPI_NONE && table->entries[body].loop_owned;
 }
 
-static hapi_slot_account *account_of_known(const hapi_account *account, uint32_t known)
-{
-  uint32_t slot = known != HAPI_NONE ? account->world->bodies.entries[known].slot : HAPI_NONE;
-  return slot != HAPI_NONE ? hapi_account_of(account, slot) : NULL;
-}
-
 /* A body that the application has just moved is no more the loop's, but what hangs on it is
  * still: it waits for the next model where it was put, or its joints would open. False: neither
  * is to wait. */
@@ -387,7 +362,10 @@ static bool partners_hold(const hapi_account *account, const hapi_known_joint *k
 {
   hapi_slot_account *of[2];
   for (int i = 0; i < 2; ++i) {
-    of[i] = account_of_known(account, known->index[i]);
+    uint32_t slot = known->index[i] != HAPI_NONE
+                        ? account->world->bodies.entries[known->index[i]].slot
+                        : HAPI_NONE;
+    of[i] = slot != HAPI_NONE ? hapi_account_of(account, slot) : NULL;
   }
   for (int i = 0; i < 2; ++i) {
     dBodyID body = known->bodies[i];
@@ -424,22 +402,6 @@ static void joints_hold(const hapi_account *account)
   }
 }
 
-/* The feedback of a held joint is zero. */
-static void joints_let_go(const hapi_joint_table *table)
-{
-  for (uint32_t i = 0; i < table->count; ++i) {
-    hapi_known_joint *known = &table->entries[i];
-    dJointFeedback *feedback = known->held ? dJointGetFeedback(known->joint) : NULL;
-    if (feedback != NULL) {
-      memset(feedback, 0, sizeof *feedback);
-    }
-    if (known->held) {
-      dJointEnable(known->joint);
-    }
-    known->held = false;
-  }
-}
-
 void hapi_hold(hapi_account *account)
 {
   for (uint32_t i = 0; i < account->slots->body_high; ++i) {
@@ -470,5 +432,16 @@ void hapi_hold_let_go(hapi_account *account)
     }
     of->held = false;
   }
-  joints_let_go(&account->world->joints);
+  /* The feedback of a held joint is zero. */
+  for (uint32_t i = 0; i < account->world->joints.count; ++i) {
+    hapi_known_joint *known = &account->world->joints.entries[i];
+    dJointFeedback *feedback = known->held ? dJointGetFeedback(known->joint) : NULL;
+    if (feedback != NULL) {
+      memset(feedback, 0, sizeof *feedback);
+    }
+    if (known->held) {
+      dJointEnable(known->joint);
+    }
+    known->held = false;
+  }
 }

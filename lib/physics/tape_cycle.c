@@ -75,23 +75,18 @@ static uint64_t hash_body(uint64_t hash, dBodyID body)
   return hapi_hash_word(hash, (uint64_t)dBodyIsEnabled(body));
 }
 
-static uint64_t hash_settings(dWorldID world)
-{
-  dVector3 gravity;
-  dWorldGetGravity(world, gravity);
-  const double values[] = {dWorldGetERP(world),
-                           dWorldGetCFM(world),
-                           dWorldGetQuickStepNumIterations(world),
-                           dWorldGetQuickStepW(world),
-                           dWorldGetContactSurfaceLayer(world),
-                           dWorldGetContactMaxCorrectingVel(world)};
-  uint64_t hash = hapi_hash_doubles(HAPI_HASH_BEGIN, gravity, 3);
-  return hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
-}
-
 static void describe_world(const hapi_world *world, hapi_cell *out)
 {
-  out->u[HAPI_WORLD_HASH] = hash_settings(world->ode.world);
+  dVector3 gravity;
+  dWorldGetGravity(world->ode.world, gravity);
+  const double values[] = {dWorldGetERP(world->ode.world),
+                           dWorldGetCFM(world->ode.world),
+                           dWorldGetQuickStepNumIterations(world->ode.world),
+                           dWorldGetQuickStepW(world->ode.world),
+                           dWorldGetContactSurfaceLayer(world->ode.world),
+                           dWorldGetContactMaxCorrectingVel(world->ode.world)};
+  uint64_t hash = hapi_hash_doubles(HAPI_HASH_BEGIN, gravity, 3);
+  out->u[HAPI_WORLD_HASH] = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
   for (uint32_t i = 0; i < world->bodies.high; ++i) {
     dBodyID body = world->bodies.entries[i].body;
     if (body != NULL) {

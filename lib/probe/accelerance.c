@@ -87,16 +87,6 @@ static double contact_push(const hapi_probe *probe, const hapi_contact_slot *con
   return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
 }
 
-static void contacts_choose_push(hapi_probe *probe)
-{
-  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
-    uint32_t index = probe->contacts.pushed.slots[i];
-    const hapi_contact_slot *contact = &probe->slots->contacts[index];
-    probe->answers.contacts[index].push =
-        contact_push(probe, contact, probe->slots->bodies[contact->body].mass);
-  }
-}
-
 /* ---- a testing simulation ---- */
 
 static void contact_add_force(const hapi_probe *probe, const hapi_contact_slot *contact,
@@ -176,22 +166,17 @@ static double contact_perturbation(const hapi_probe *probe, uint32_t index, int 
   return axis != TORSION && normal[axis] > 0.0 ? -size : size;
 }
 
-/* As large as the force at the finger's radius. */
-static void contact_twist(const hapi_probe *probe, uint32_t index)
-{
-  const hapi_contact_slot *contact = &probe->slots->contacts[index];
-  dBodyID body = hapi_test_state(&probe->test, contact_known(probe, contact))->body;
-  double size = contact_perturbation(probe, index, TORSION);
-  double torque[3];
-  hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, torque);
-  hapi_v3_scale(size * contact->finger_radius, torque, torque);
-  dBodyAddTorque(body, torque[0], torque[1], torque[2]);
-}
-
 static void contact_perturb(const hapi_probe *probe, uint32_t index, int axis)
 {
   if (axis == TORSION) {
-    contact_twist(probe, index);
+    /* As large as the force at the finger's radius. */
+    const hapi_contact_slot *contact = &probe->slots->contacts[index];
+    dBodyID body = hapi_test_state(&probe->test, contact_known(probe, contact))->body;
+    double size = contact_perturbation(probe, index, TORSION);
+    double torque[3];
+    hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, torque);
+    hapi_v3_scale(size * contact->finger_radius, torque, torque);
+    dBodyAddTorque(body, torque[0], torque[1], torque[2]);
     return;
   }
   double force[3] = {0.0, 0.0, 0.0};
@@ -232,29 +217,11 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
   double r[9];
   dBodyGetMass(body, &mass);
   HAPI_ASSERT(mass.mass > 0.0);
-  for (int i = 0; i < 9; ++i) {
-    inertia[i] = mass.I[4 * (i / 3) + i % 3];
-    r[i] = rotation[4 * (i / 3) + i % 3];
-  }
+  hapi_matrix_read(mass.I, inertia);
+  hapi_matrix_read(rotation, r);
   hapi_m3_invert(inertia, inverse);
   hapi_m3_turn(r, inverse, out->inverse_inertia);
   out->inverse_mass = 1.0 / mass.mass;
-}
-
-/* Within 0 and what it is of the free body: about the normal, the direction that is used. What
- * only a contact makes of a torque is left as it is measured. */
-static void contact_keep_turn(const hapi_contact_trial *trial, const hapi_free_body *free,
-                              const double normal[3], double out_turn[6])
-{
-  double of_free[3];
-  hapi_m3_apply(free->inverse_inertia, normal, of_free);
-  double most = hapi_v3_dot(normal, of_free);
-  double turn = hapi_v3_dot(normal, trial->measured_turn + 3);
-  double kept = fmin(fmax(turn, 0.0), most);
-  if (hapi_finite(trial->measured_turn, 6)) {
-    memcpy(out_turn, trial->measured_turn, sizeof trial->measured_turn);
-    hapi_v3_madd(out_turn + 3, kept - turn, normal, out_turn + 3);
-  }
 }
 
 /* A of eq. 6 when it can be one; else the last good one stays, and at first that of a body that
@@ -276,7 +243,18 @@ static void contact_keep(hapi_probe *probe, uint32_t index)
     hapi_quat_rotate(tested->quat, contact->normal_body, normal);
     kind = hapi_admittance_tidy_point(&free, arm, normal, trial->measured);
     if (contact_has_axis(probe, contact, TORSION)) {
-      contact_keep_turn(trial, &free, normal, answer->turn);
+      /* Within 0 and what it is of the free body: about the normal, the direction that is used. What
+       * only a contact makes of a torque is left as it is measured. */
+      double *out_turn = answer->turn;
+      double of_free[3];
+      hapi_m3_apply(free.inverse_inertia, normal, of_free);
+      double most = hapi_v3_dot(normal, of_free);
+      double turn = hapi_v3_dot(normal, trial->measured_turn + 3);
+      double kept = fmin(fmax(turn, 0.0), most);
+      if (hapi_finite(trial->measured_turn, 6)) {
+        memcpy(out_turn, trial->measured_turn, sizeof trial->measured_turn);
+        hapi_v3_madd(out_turn + 3, kept - turn, normal, out_turn + 3);
+      }
     }
   }
   hapi_probe_count(probe, kind);
@@ -299,26 +277,11 @@ static bool body_is_free(dBodyID body)
   dMass mass;
   double inertia[9];
   dBodyGetMass(body, &mass);
-  for (int i = 0; i < 9; ++i) {
-    inertia[i] = mass.I[4 * (i / 3) + i % 3];
-  }
+  hapi_matrix_read(mass.I, inertia);
   bool limited = dBodyGetMaxAngularSpeed(body) < (double)dInfinity;
   return dBodyIsEnabled(body) && dBodyGetNumJoints(body) == 0 && !limited &&
          dBodyGetLinearDamping(body) == 0.0 && dBodyGetAngularDamping(body) == 0.0 &&
          (dBodyGetGyroscopicMode(body) == 0 || hapi_turns_alike(inertia));
-}
-
-static void body_fill_free(const hapi_world *world, const hapi_known_body *known, double out_b[6])
-{
-  hapi_free_body free;
-  dVector3 gravity = {0.0, 0.0, 0.0};
-  hapi_accelerance_free_body(known->body, dBodyGetRotation(known->body), &free);
-  if (dBodyGetGravityMode(known->body) != 0) {
-    dWorldGetGravity(world->ode.world, gravity);
-  }
-  const hapi_known_rest *rest = known->rest; /* as a probe has them */
-  hapi_v3_madd(gravity, free.inverse_mass, rest->user_force, out_b);
-  hapi_m3_apply(free.inverse_inertia, rest->user_torque, out_b + 3);
 }
 
 /* Of a force at the contact point: 1/m, and I^-1 times the arm crossed with it. */
@@ -331,17 +294,7 @@ static void contact_fill_free(dBodyID body, const hapi_contact_slot *contact,
   hapi_accelerance_free_body(body, dBodyGetRotation(body), &free);
   hapi_quat_rotate(dBodyGetQuaternion(body), contact->point_body, arm);
   hapi_quat_rotate(dBodyGetQuaternion(body), contact->normal_body, normal);
-  for (int axis = 0; axis < 3; ++axis) {
-    double unit[3] = {axis == 0, axis == 1, axis == 2};
-    double moment[3];
-    double turn[3];
-    hapi_v3_cross(arm, unit, moment);
-    hapi_m3_apply(free.inverse_inertia, moment, turn);
-    for (int i = 0; i < 3; ++i) {
-      out->a[i][axis] = i == axis ? free.inverse_mass : 0.0;
-      out->a[3 + i][axis] = turn[i];
-    }
-  }
+  hapi_free_point(&free, arm, out->a);
   memset(out->turn, 0, sizeof out->turn);
   hapi_m3_apply(free.inverse_inertia, normal, out->turn + 3);
   out->probed = true;
@@ -360,7 +313,16 @@ static void answers_take_free(hapi_probe *probe)
     dBodyID body = live ? probe->world->bodies.entries[slot->known].body : NULL;
     answer->known_free = looks && body != NULL && body_is_free(body);
     if (answer->known_free) {
-      body_fill_free(probe->world, &probe->world->bodies.entries[slot->known], answer->b);
+      const hapi_known_body *known = &probe->world->bodies.entries[slot->known];
+      hapi_free_body free;
+      dVector3 gravity = {0.0, 0.0, 0.0};
+      hapi_accelerance_free_body(known->body, dBodyGetRotation(known->body), &free);
+      if (dBodyGetGravityMode(known->body) != 0) {
+        dWorldGetGravity(probe->world->ode.world, gravity);
+      }
+      const hapi_known_rest *rest = known->rest; /* as a probe has them */
+      hapi_v3_madd(gravity, free.inverse_mass, rest->user_force, answer->b);
+      hapi_m3_apply(free.inverse_inertia, rest->user_torque, answer->b + 3);
     }
   }
   for (uint32_t i = 0; looks && i < probe->slots->contact_high; ++i) {
@@ -395,17 +357,6 @@ static bool round_has_axis(const hapi_probe *probe, uint32_t round, int axis)
   return any;
 }
 
-static void round_perturb(hapi_probe *probe, uint32_t round, int axis)
-{
-  contacts_begin_step(probe);
-  for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
-    uint32_t index = round_contact(probe, i, round, axis);
-    if (index != HAPI_NONE) {
-      contact_perturb(probe, index, axis);
-    }
-  }
-}
-
 /* Three probes for the contacts of one round, and a fourth one for soft fingers. */
 static void round_measure(hapi_probe *probe, uint32_t round, const hapi_contact_watch *watch)
 {
@@ -414,7 +365,13 @@ static void round_measure(hapi_probe *probe, uint32_t round, const hapi_contact_
     if (!round_has_axis(probe, round, axis)) {
       continue;
     }
-    round_perturb(probe, round, axis);
+    contacts_begin_step(probe);
+    for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+      uint32_t index = round_contact(probe, i, round, axis);
+      if (index != HAPI_NONE) {
+        contact_perturb(probe, index, axis);
+      }
+    }
     hapi_test_step(&probe->test);
     for (uint32_t i = 0; i < pushed->count; ++i) {
       uint32_t index = round_contact(probe, i, round, axis);
@@ -512,7 +469,12 @@ static hap_status contacts_measure(hapi_probe *probe, const hapi_contact_watch *
   hap_status status = contacts_gather(probe);
   if (status >= HAP_OK) {
     const hapi_reuse_input input = {probe->cycle, probe->slots, &probe->answers, &probe->test};
-    contacts_choose_push(probe);
+    for (uint32_t i = 0; i < probe->contacts.pushed.count; ++i) {
+      uint32_t index = probe->contacts.pushed.slots[i];
+      const hapi_contact_slot *contact = &probe->slots->contacts[index];
+      probe->answers.contacts[index].push =
+          contact_push(probe, contact, probe->slots->bodies[contact->body].mass);
+    }
     hapi_reuse_look(&probe->reuse, book, &input, &probe->contacts.pushed);
     status = islands_measure_b_alone(probe, watch);
   }

@@ -249,7 +249,7 @@ static void matrix_to_measure(const matrix *l, int n, matrix *b)
 
 /* ---- a force at a point ---- */
 
-static void body_free_point(const hapi_free_body *body, const double arm[3], double out[6][3])
+void hapi_free_point(const hapi_free_body *body, const double arm[3], double out[6][3])
 {
   for (int k = 0; k < 3; ++k) {
     double force[3] = {0.0, 0.0, 0.0};
@@ -314,7 +314,7 @@ hapi_admittance hapi_admittance_tidy_point(const hapi_free_body *body, const dou
   matrix bound;
   matrix l;
   matrix b;
-  body_free_point(body, arm, free);
+  hapi_free_point(body, arm, free);
   matrix_at_point(free, arm, &bound);
   matrix_at_point(a, arm, &b);
   if (!hapi_finite(&a[0][0], 18) || !matrix_cholesky(&bound, 3, &l)) {
@@ -344,19 +344,6 @@ static void body_free_wrench(const hapi_free_body *body, matrix *out)
     out->m[i][i] = body->inverse_mass;
     for (int k = 0; k < 3; ++k) {
       out->m[3 + i][3 + k] = body->inverse_inertia[3 * i + k];
-    }
-  }
-}
-
-/* b = b L^-T, of three columns */
-static void matrix_solve_rows(const matrix *l, matrix *b)
-{
-  for (int i = 0; i < N_MAX; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      for (int j = 0; j < k; ++j) {
-        b->m[i][k] -= l->m[k][j] * b->m[i][j];
-      }
-      b->m[i][k] /= l->m[k][k];
     }
   }
 }
@@ -392,7 +379,7 @@ hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const d
   matrix l[2];
   matrix b = {{{0.0}}};
   *out_share = 0.0;
-  body_free_point(pushed, arm, free);
+  hapi_free_point(pushed, arm, free);
   matrix_at_point(free, arm, &bounds[0]);
   body_free_wrench(other, &bounds[1]);
   if (!hapi_finite(&a[0][0], 18) || !matrix_cholesky(&bounds[0], 3, &l[0]) ||
@@ -403,7 +390,15 @@ hapi_admittance hapi_admittance_tidy_cross(const hapi_free_body *pushed, const d
     memcpy(b.m[i], a[i], sizeof a[i]);
   }
   matrix_solve_lower(&l[1], 6, &b);
-  matrix_solve_rows(&l[0], &b);
+  /* b = b L^-T, of three columns */
+  for (int i = 0; i < N_MAX; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < k; ++j) {
+        b.m[i][k] -= l[0].m[k][j] * b.m[i][j];
+      }
+      b.m[i][k] /= l[0].m[k][k];
+    }
+  }
   double size = matrix_size(&b);
   if (!isfinite(size)) {
     return HAPI_ADMITTANCE_SINGULAR;
@@ -451,11 +446,6 @@ hapi_admittance hapi_admittance_tidy_body(const hapi_free_body *body, double res
  * weaker than this within a step is not seen. */
 #define ROW_LEAST 1e-8
 
-static double wrench_scale(const double wrench[6])
-{
-  return fmax(hapi_v3_norm(wrench), hapi_v3_norm(wrench + 3));
-}
-
 /* An eigenvector u of value s in the measure of the free pair: wrench L^-T u, answered by 1 and
  * softness 1 / s - 1. */
 static void row_from_vector(const matrix *l, const matrix *vectors, int which, double share,
@@ -469,21 +459,11 @@ static void row_from_vector(const matrix *l, const matrix *vectors, int which, d
   for (int i = 0; i < 6; ++i) {
     out->wrench[i] = u.m[i][0];
   }
-  double scale = 1.0 / wrench_scale(out->wrench);
+  double scale = 1.0 / (fmax(hapi_v3_norm(out->wrench), hapi_v3_norm(out->wrench + 3)));
   for (int i = 0; i < 6; ++i) {
     out->wrench[i] *= scale;
   }
   out->softness = scale * scale * (1.0 / share - 1.0);
-}
-
-/* b = L^T b L */
-static void matrix_from_measure(const matrix *l, matrix *b)
-{
-  matrix up = *l;
-  matrix half;
-  matrix_transpose(6, &up);
-  matrix_multiply_transposed(&up, b, 6, &half); /* b is symmetric */
-  matrix_multiply_transposed(&half, &up, 6, b);
 }
 
 hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[6][6],
@@ -501,7 +481,12 @@ hapi_admittance hapi_admittance_rows(const double free[6][6], const double held[
   if (!hapi_finite(&held[0][0], 36) || !matrix_cholesky(&bound, 6, &l)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }
-  matrix_from_measure(&l, &b);
+  /* b = L^T b L */
+  matrix up = l;
+  matrix half;
+  matrix_transpose(6, &up);
+  matrix_multiply_transposed(&up, &b, 6, &half); /* b is symmetric */
+  matrix_multiply_transposed(&half, &up, 6, &b);
   if (!matrix_is_plausible(&b, 6)) {
     return HAPI_ADMITTANCE_SINGULAR;
   }

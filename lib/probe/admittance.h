@@ -22,6 +22,9 @@ typedef enum hapi_admittance {
   HAPI_ADMITTANCE_SINGULAR = 2 /* no numbers, or far outside: not to be used; not changed */
 } hapi_admittance;
 
+/* Of a free body: force at a point, at arm from its centre of mass, to its acceleration. */
+void hapi_free_point(const hapi_free_body *body, const double arm[3], double out[6][3]);
+
 /* Eq. 6: force at a point of the body, at arm from its centre of mass, to the body's acceleration.
  * The bounds hold for the acceleration of the point, a 3x3 part; what is done to that is done by
  * forces at the point, so that the rest follows as in the free body. Along the normal, where a

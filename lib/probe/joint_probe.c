@@ -85,15 +85,6 @@ static void pair_free_body(const pair *p, int which, hapi_free_body *out)
   }
 }
 
-/* A wrench about the centre of the pushed body, about the other's. */
-static void pair_move_wrench(const pair *p, const double wrench[6], double out[6])
-{
-  double moment[3];
-  memcpy(out, wrench, 6 * sizeof *out);
-  hapi_v3_cross(p->apart, wrench, moment);
-  hapi_v3_add(out + 3, moment, out + 3);
-}
-
 static void body_respond(const hapi_free_body *body, const double wrench[6], double out[6])
 {
   hapi_v3_scale(body->inverse_mass, wrench, out);
@@ -125,7 +116,11 @@ static void pair_find_masses(pair *p)
     twists t = {{{0.0}}};
     double speed[6];
     unit[k] = 1.0;
-    pair_move_wrench(p, unit, moved);
+    /* A wrench about the centre of the pushed body, about the other's. */
+    double moment[3];
+    memcpy(moved, unit, 6 * sizeof *moved);
+    hapi_v3_cross(p->apart, unit, moment);
+    hapi_v3_add(moved + 3, moment, moved + 3);
     body_respond(&bodies[0], unit, t.v[0]);
     body_respond(&bodies[1], moved, t.v[1]);
     memcpy(p->reaction[k], t.v[1], sizeof p->reaction[k]);
@@ -143,13 +138,10 @@ static void pair_find_pose(pair *p, int which)
 {
   dBodyID body = p->bodies[which];
   hap_pose *out = &p->pose[which];
-  *out = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hapi_pose_read(body, out);
   if (body != NULL) {
-    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    hapi_v3_copy(dBodyGetPosition(body), out->position);
-    memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
-    hapi_v3_copy(dBodyGetLinearVel(body), twist.linear);
-    hapi_v3_copy(dBodyGetAngularVel(body), twist.angular);
+    hap_twist twist;
+    hapi_twist_read(body, &twist);
     hapi_pose_move(out, &twist, p->ahead_s);
   }
 }
@@ -185,35 +177,6 @@ static bool pair_begin(pair *p, hapi_probe *probe, hapi_known_joint *known)
 
 /* ---- steps ---- */
 
-/* The pointers' forces of the last tick: whether a motor holds them or gives way is part of what is
- * measured. */
-static void pair_push_as_pointers(const pair *p, int which)
-{
-  const hapi_test_set *test = &p->probe->test;
-  uint32_t index = p->index[which];
-  uint32_t slot = index == HAPI_NONE ? HAPI_NONE : test->world->bodies.entries[index].slot;
-  for (uint32_t i = 0; i < p->probe->slots->contact_high && slot != HAPI_NONE; ++i) {
-    const hapi_contact_slot *c = &p->probe->slots->contacts[i];
-    if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_force, 3)) {
-      double at[3];
-      hapi_pose_point(p->pose[which].position, p->pose[which].quat_wxyz, c->point_body, at);
-      dBodyAddForceAtPos(p->bodies[which], c->last_force[0], c->last_force[1], c->last_force[2],
-                         at[0], at[1], at[2]);
-    }
-  }
-}
-
-static void pair_read_twists(const pair *p, twists *out)
-{
-  memset(out, 0, sizeof *out);
-  for (int i = 0; i < 2; ++i) {
-    if (p->bodies[i] != NULL) {
-      hapi_v3_copy(dBodyGetLinearVel(p->bodies[i]), out->v[i]);
-      hapi_v3_copy(dBodyGetAngularVel(p->bodies[i]), out->v[i] + 3);
-    }
-  }
-}
-
 static void pair_begin_step(const pair *p)
 {
   hapi_test_rewind(&p->probe->test);
@@ -223,7 +186,19 @@ static void pair_begin_step(const pair *p)
       dBodySetPosition(p->bodies[i], to->position[0], to->position[1], to->position[2]);
       dBodySetQuaternion(p->bodies[i], to->quat_wxyz);
     }
-    pair_push_as_pointers(p, i);
+    /* The pointers' forces of the last tick: whether a motor holds them or gives way is part of what is
+     * measured. */
+    uint32_t index = p->index[i];
+    uint32_t slot = index == HAPI_NONE ? HAPI_NONE : p->probe->world->bodies.entries[index].slot;
+    for (uint32_t k = 0; k < p->probe->slots->contact_high && slot != HAPI_NONE; ++k) {
+      const hapi_contact_slot *c = &p->probe->slots->contacts[k];
+      if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_force, 3)) {
+        double at[3];
+        hapi_pose_point(to->position, to->quat_wxyz, c->point_body, at);
+        dBodyAddForceAtPos(p->bodies[i], c->last_force[0], c->last_force[1], c->last_force[2],
+                           at[0], at[1], at[2]);
+      }
+    }
   }
 }
 
@@ -231,7 +206,13 @@ static void pair_end_step(const pair *p, twists *out)
 {
   ++p->probe->counts.joint_steps;
   (void)dWorldStep(p->world, p->period);
-  pair_read_twists(p, out);
+  memset(out, 0, sizeof *out);
+  for (int i = 0; i < 2; ++i) {
+    if (p->bodies[i] != NULL) {
+      hapi_v3_copy(dBodyGetLinearVel(p->bodies[i]), out->v[i]);
+      hapi_v3_copy(dBodyGetAngularVel(p->bodies[i]), out->v[i] + 3);
+    }
+  }
 }
 
 static void pair_step(const pair *p, twists *out)
@@ -274,21 +255,6 @@ static void joint_impulse(const pair *p, const twists *with, const twists *witho
   hapi_m3_apply(p->inertia, change + 3, out + 3);
 }
 
-/* What the other body did not get back of an impulse, and what it should; (m/s)^2. */
-static void pair_compare_reaction(const pair *p, const double impulse[6], const twists *with,
-                                  const twists *without, double io[2])
-{
-  for (int i = 0; i < 6; ++i) {
-    double wanted = 0.0;
-    for (int k = 0; k < 6; ++k) {
-      wanted -= p->reaction[k][i] * impulse[k];
-    }
-    double off = with->v[1][i] - without->v[1][i] - wanted;
-    io[0] += off * off;
-    io[1] += wanted * wanted;
-  }
-}
-
 /* That gives the body PUSH_SPEED or so in a step. */
 static double pair_push_size(const pair *p, int axis)
 {
@@ -311,7 +277,16 @@ static void pair_push(pair *p, const double wrench[6], const twists *base, doubl
     without.v[0][i] += p->period * change[i];
   }
   joint_impulse(p, &with, &without, out);
-  pair_compare_reaction(p, out, &with, &without, io_reaction);
+  /* What the other body did not get back of an impulse, and what it should; (m/s)^2. */
+  for (int i = 0; i < 6; ++i) {
+    double wanted = 0.0;
+    for (int k = 0; k < 6; ++k) {
+      wanted -= p->reaction[k][i] * out[k];
+    }
+    double off = with.v[1][i] - without.v[1][i] - wanted;
+    io_reaction[0] += off * off;
+    io_reaction[1] += wanted * wanted;
+  }
 }
 
 static void pair_find_held(pair *p, const twists *base, double out[6][6])
@@ -352,25 +327,6 @@ static double wrench_response(const pair *p, const double wrench[6])
   return dot6(wrench, speed);
 }
 
-/* Impulses of the rows that make up one of the joint: wrenches are orthogonal in the measure of the
- * free pair. *io_impulse: what is left of it. */
-static void impulse_split(const pair *p, const hapi_constraint_row rows[6], int count,
-                          double io_impulse[6], double out[6])
-{
-  double speed[6];
-  for (int i = 0; i < 6; ++i) {
-    speed[i] = dot6(p->free[i], io_impulse);
-  }
-  for (int r = 0; r < count; ++r) {
-    out[r] = dot6(rows[r].wrench, speed) / wrench_response(p, rows[r].wrench);
-  }
-  for (int r = 0; r < count; ++r) {
-    for (int i = 0; i < 6; ++i) {
-      io_impulse[i] -= out[r] * rows[r].wrench[i];
-    }
-  }
-}
-
 /* What the rows ask for in a step, their impulses, and what of the joint's impulse is none of
  * theirs. */
 typedef struct answer {
@@ -385,7 +341,19 @@ static void rows_ask(const pair *p, const hapi_constraint_row rows[6], int count
   double speed[6];
   joint_impulse(p, with, without, out->given);
   double size = sqrt(dot6(out->given, out->given));
-  impulse_split(p, rows, count, out->given, out->impulse);
+  /* Impulses of the rows that make up the joint's: wrenches are orthogonal in the measure of the free
+   * pair. What is left of it is none of theirs. */
+  for (int i = 0; i < 6; ++i) {
+    speed[i] = dot6(p->free[i], out->given);
+  }
+  for (int r = 0; r < count; ++r) {
+    out->impulse[r] = dot6(rows[r].wrench, speed) / wrench_response(p, rows[r].wrench);
+  }
+  for (int r = 0; r < count; ++r) {
+    for (int i = 0; i < 6; ++i) {
+      out->given[i] -= out->impulse[r] * rows[r].wrench[i];
+    }
+  }
   if (sqrt(dot6(out->given, out->given)) <= GIVEN_LEAST * size) {
     memset(out->given, 0, sizeof out->given);
   }
@@ -424,12 +392,6 @@ static double row_spring_rate(const pair *p, const hapi_constraint_row rows[6], 
   return -(moved.target[which] - base->target[which]) / dot6(rows[which].wrench, way);
 }
 
-static bool row_is_spring(const hapi_constraint_row *row, const pair *p)
-{
-  double response = wrench_response(p, row->wrench);
-  return response < SPRING_SHARE * (response + row->softness);
-}
-
 /* What of the targets is error reduction: gone when the world has none. */
 static void pair_find_errors(pair *p, const hapi_constraint_row rows[6], int count,
                              const answer *base, const twists *without)
@@ -448,7 +410,8 @@ static void pair_find_errors(pair *p, const hapi_constraint_row rows[6], int cou
   }
   for (int r = 0; r < count; ++r) {
     hapi_measured_row *out = &p->m->found.rows[r];
-    bool spring = row_is_spring(&rows[r], p);
+    double response = wrench_response(p, rows[r].wrench);
+    bool spring = response < SPRING_SHARE * (response + rows[r].softness);
     double rate = spring ? row_spring_rate(p, rows, count, r, base, without) : erp / p->period;
     double back = spring ? (rate > 0.0 ? base->target[r] : 0.0) : base->target[r] - none.target[r];
     out->softness = (hapi_softness){rate * p->period, rows[r].softness * p->period, spring};
@@ -537,40 +500,11 @@ static void pair_into_carrier(const pair *p, const double v[3], double out[3])
   hapi_quat_unrotate(p->pose[p->m->found.carrier].quat_wxyz, v, out);
 }
 
-static void pair_find_place(const pair *p, hapi_joint_place *out)
-{
-  const double *a = p->pose[0].quat_wxyz;
-  const double *b = p->pose[1].quat_wxyz;
-  const double back[4] = {a[0], -a[1], -a[2], -a[3]};
-  memset(out, 0, sizeof *out);
-  hapi_quat_multiply(back, b, out->turn);
-  hapi_quat_unrotate(b, p->apart, out->anchor_b);
-}
-
 static bool place_is_same(const hapi_joint_place *a, const hapi_joint_place *b)
 {
   double apart[3];
   hapi_v3_sub(a->anchor_b, b->anchor_b, apart);
   return hapi_v3_norm(apart) <= SAME_POSE && quat_angle_between(a->turn, b->turn) <= SAME_POSE;
-}
-
-static void pair_write_rows(pair *p, const hapi_constraint_row rows[6], int count,
-                            const answer *base)
-{
-  hapi_measured_joint *out = &p->m->found;
-  HAPI_ASSERT(count >= 0 && count <= 6);
-  for (int r = 0; r < count; ++r) {
-    pair_into_carrier(p, rows[r].wrench, out->rows[r].force);
-    pair_into_carrier(p, rows[r].wrench + 3, out->rows[r].torque);
-  }
-  double force[6];
-  for (int i = 0; i < 6; ++i) {
-    force[i] = base->given[i] / p->period;
-  }
-  pair_into_carrier(p, force, out->given);
-  pair_into_carrier(p, force + 3, out->given + 3);
-  out->row_count = (uint32_t)count;
-  ++out->number;
 }
 
 static void pair_keep_place(pair *p, const hapi_joint_place *place)
@@ -608,7 +542,20 @@ static bool pair_measure_rows(pair *p, const hapi_joint_place *place, const twis
   memcpy(p->m->turn, turn, sizeof turn);
   rows_ask(p, rows, count, with, without, &base);
   pair_find_errors(p, rows, count, &base, without);
-  pair_write_rows(p, rows, count, &base);
+  hapi_measured_joint *out = &p->m->found;
+  HAPI_ASSERT(count >= 0 && count <= 6);
+  for (int r = 0; r < count; ++r) {
+    pair_into_carrier(p, rows[r].wrench, out->rows[r].force);
+    pair_into_carrier(p, rows[r].wrench + 3, out->rows[r].torque);
+  }
+  double force[6];
+  for (int i = 0; i < 6; ++i) {
+    force[i] = base.given[i] / p->period;
+  }
+  pair_into_carrier(p, force, out->given);
+  pair_into_carrier(p, force + 3, out->given + 3);
+  out->row_count = (uint32_t)count;
+  ++out->number;
   pair_keep_place(p, place);
   p->m->error = fmax(p->m->error, p->lost);
   return true;
@@ -727,22 +674,30 @@ static void pair_measure(pair *p, const hapi_joint_place *place, bool same)
   }
 }
 
-static void say_refused(hapi_probe *probe, refusal why)
+static void joint_measure(hapi_probe *probe, hapi_known_joint *known)
 {
-  const char *text =
-      why == REFUSED_NUMBERS
-          ? "a joint answers pushes with numbers that no joint can have; its bodies are "
-            "left to ODE between syncs"
-          : "a joint does not give one body back what it takes from the other (ODE's PU "
-            "joint does not); its bodies are left to ODE between syncs";
-  hapi_say_once(probe->cycle, &probe->said_not_held, text);
-}
-
-/* With the world's and the joint's parameters as those of the tick, and no motors, stops and
- * damping. */
-static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
-{
+  pair own;
+  pair *p = &own;
+  hapi_joint_place place = {.turn = {0.0}};
   hapi_joint_limits limits;
+  if (!pair_begin(p, probe, known)) {
+    return;
+  }
+  const double *a = p->pose[0].quat_wxyz;
+  const double back[4] = {a[0], -a[1], -a[2], -a[3]};
+  hapi_quat_multiply(back, p->pose[1].quat_wxyz, place.turn);
+  hapi_quat_unrotate(p->pose[1].quat_wxyz, p->apart, place.anchor_b);
+  bool same = p->m->good && place_is_same(&place, &p->m->place);
+  if (same && pair_rests(p)) {
+    return;
+  }
+  if (hapi_test_begin(&probe->test, probe->world, probe->cycle->probe_step_s) < HAP_OK ||
+      hapi_test_enter_pair(&probe->test, known->joint, p->index) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
+    return;
+  }
+  /* With the world's and the joint's parameters as those of the tick, and no motors, stops and
+   * damping. */
   double erp = dWorldGetERP(p->world);
   double cfm = dWorldGetCFM(p->world);
   double tick_erp = erp;
@@ -750,38 +705,24 @@ static void pair_measure_bare(pair *p, const hapi_joint_place *place, bool same)
   hapi_soften(p->ratio, &tick_erp, &tick_cfm);
   dWorldSetERP(p->world, tick_erp);
   dWorldSetCFM(p->world, tick_cfm);
-  hapi_joint_soften(p->known, p->ratio);
-  hapi_joint_take_limits(p->known, &limits);
+  hapi_joint_soften(known, p->ratio);
+  hapi_joint_take_limits(known, &limits);
   pair_switch_damping(p, false);
-  pair_measure(p, place, same);
+  pair_measure(p, &place, same);
   pair_switch_damping(p, true);
-  hapi_joint_give_limits(p->known, &limits);
-  hapi_joint_restore(p->known);
+  hapi_joint_give_limits(known, &limits);
+  hapi_joint_restore(known);
   dWorldSetERP(p->world, erp);
   dWorldSetCFM(p->world, cfm);
-}
-
-static void joint_measure(hapi_probe *probe, hapi_known_joint *known)
-{
-  pair p;
-  hapi_joint_place place;
-  if (!pair_begin(&p, probe, known)) {
-    return;
-  }
-  pair_find_place(&p, &place);
-  bool same = p.m->good && place_is_same(&place, &p.m->place);
-  if (same && pair_rests(&p)) {
-    return;
-  }
-  if (hapi_test_begin(&probe->test, probe->world, probe->cycle->probe_step_s) < HAP_OK ||
-      hapi_test_enter_pair(&probe->test, known->joint, p.index) < HAP_OK) {
-    hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
-    return;
-  }
-  pair_measure_bare(&p, &place, same);
   hapi_test_leave(&probe->test);
-  if (p.refused != REFUSED_NOT) {
-    say_refused(probe, p.refused);
+  if (p->refused != REFUSED_NOT) {
+    hapi_say_once(
+        probe->cycle, &probe->said_not_held,
+        p->refused == REFUSED_NUMBERS
+            ? "a joint answers pushes with numbers that no joint can have; its bodies are "
+              "left to ODE between syncs"
+            : "a joint does not give one body back what it takes from the other (ODE's PU "
+              "joint does not); its bodies are left to ODE between syncs");
   }
 }
 

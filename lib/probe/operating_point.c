@@ -96,11 +96,6 @@ static double body_push_force(const hapi_body_slot *slot)
   return fmax(least, hapi_v3_norm(slot->exchanged));
 }
 
-static double body_push_torque(const hapi_body_slot *slot, double extent)
-{
-  return body_push_force(slot) * (extent > 0.0 ? extent : 1.0);
-}
-
 static void body_add_wrench(dBodyID body, const double wrench[6])
 {
   dBodyAddForce(body, wrench[0], wrench[1], wrench[2]);
@@ -160,7 +155,8 @@ static void body_measure(hapi_probe *probe, uint32_t index, const double base[6]
   for (int axis = 0; axis < 6; ++axis) {
     double wrench[6] = {0.0};
     double column[6];
-    wrench[axis] = axis < 3 ? body_push_force(slot) : body_push_torque(slot, extent);
+    wrench[axis] =
+        axis < 3 ? body_push_force(slot) : (body_push_force(slot) * (extent > 0.0 ? extent : 1.0));
     bodies_begin_step(probe);
     body_add_wrench(body, wrench);
     hapi_test_step(&probe->test);
@@ -211,18 +207,6 @@ static hap_status islands_measure_b_alone(hapi_probe *probe)
   return bodies_gather(probe);
 }
 
-/* The flags are of this cycle, the response of another. */
-static void bodies_take_again(hapi_probe *probe)
-{
-  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
-    uint32_t index = probe->bodies.pushed.slots[i];
-    uint32_t known = probe->slots->bodies[index].known;
-    if (hapi_reuse_kind_of(body_book(probe), &probe->test, known) != HAPI_REUSE_NONE) {
-      probe->answers.bodies[index].flags |= HAPI_BODY_WHOLE;
-    }
-  }
-}
-
 static hap_status bodies_measure(hapi_probe *probe)
 {
   hapi_pushed *pushed = &probe->bodies.pushed;
@@ -236,7 +220,14 @@ static hap_status bodies_measure(hapi_probe *probe)
   if (status < HAP_OK) {
     return status;
   }
-  bodies_take_again(probe);
+  /* The flags are of this cycle, the response of another. */
+  for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
+    uint32_t index = probe->bodies.pushed.slots[i];
+    uint32_t known = probe->slots->bodies[index].known;
+    if (hapi_reuse_kind_of(body_book(probe), &probe->test, known) != HAPI_REUSE_NONE) {
+      probe->answers.bodies[index].flags |= HAPI_BODY_WHOLE;
+    }
+  }
   hapi_reuse_select(book, HAPI_REUSE_NONE, probe->slots, &probe->test, pushed);
   if (pushed->count > 0) {
     status = hapi_test_enter(&probe->test);

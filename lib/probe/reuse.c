@@ -99,17 +99,6 @@ static uint32_t touch_count_pair(const hapi_touch_print *first, uint32_t most)
   return count;
 }
 
-/* A collider puts a point on the surface of one of the bodies, of either: where two faces lie on
- * each other the last digit decides. Both together have not moved, or their poses or depths
- * would say so. */
-static void touch_apart(const hapi_touch_print *a, const hapi_touch_print *b, double out[3])
-{
-  hapi_v3_sub(a->position, b->position, out);
-  double along = hapi_v3_dot(out, a->normal);
-  double free = fmax(-a->depth, fmin(a->depth, along));
-  hapi_v3_madd(out, -free, a->normal, out);
-}
-
 static double touch_way(const hapi_touch_print *a, const hapi_touch_print *b)
 {
   double way = fabs(a->depth - b->depth);
@@ -117,7 +106,13 @@ static double touch_way(const hapi_touch_print *a, const hapi_touch_print *b)
   if (a->surface != b->surface) {
     return HUGE_VAL;
   }
-  touch_apart(a, b, off);
+  /* A collider puts a point on the surface of one of the bodies, of either: where two faces lie on
+   * each other the last digit decides. Both together have not moved, or their poses or depths
+   * would say so. */
+  hapi_v3_sub(a->position, b->position, off);
+  double along = hapi_v3_dot(off, a->normal);
+  double free = fmax(-a->depth, fmin(a->depth, along));
+  hapi_v3_madd(off, -free, a->normal, off);
   for (int i = 0; i < 3; ++i) {
     way = fmax(way, fabs(off[i]));
     way = fmax(way, a->arm * fabs(a->normal[i] - b->normal[i]));
@@ -210,28 +205,6 @@ static bool round_begin(hapi_reuse_book *book, bool wanted, uint32_t islands)
   return book->in_use;
 }
 
-/* The members of an island follow each other. */
-static void book_list_members(hapi_reuse_book *book, const hapi_test_set *test,
-                              const hapi_slots *slots)
-{
-  book->island_count = test->island_count;
-  for (uint32_t i = 0; i < book->island_count; ++i) {
-    book->islands[i] = (hapi_reuse_island){.pushed = HAPI_NONE};
-  }
-  for (uint32_t i = test->member_count; i-- > 0;) {
-    uint32_t known = test->members[i];
-    HAPI_ASSERT_INDEX(hapi_test_island(test, known), book->island_count);
-    hapi_reuse_island *island = &book->islands[hapi_test_island(test, known)];
-    island->first_member = i;
-    ++island->member_count;
-    island->slot = test->world->bodies.entries[known].slot;
-  }
-  for (uint32_t i = 0; i < book->island_count; ++i) {
-    HAPI_ASSERT_INDEX(book->islands[i].slot, slots->body_high); /* the first one is pushed */
-    book->islands[i].generation = slots->bodies[book->islands[i].slot].generation;
-  }
-}
-
 static hapi_reuse_island *island_of(const hapi_reuse_book *book, const hapi_test_set *test,
                                     uint32_t known)
 {
@@ -246,18 +219,6 @@ static hapi_reuse_island *island_of_pushed(const hapi_reuse_book *book, const ha
 {
   uint32_t body = book->bodies ? index : slots->contacts[index].body;
   return island_of(book, test, slots->bodies[body].known);
-}
-
-static void book_list_pushed(hapi_reuse_book *book, const hapi_test_set *test,
-                             const hapi_slots *slots, const hapi_pushed *pushed)
-{
-  for (uint32_t i = pushed->count; i-- > 0;) {
-    uint32_t index = pushed->slots[i];
-    hapi_reuse_island *island = island_of_pushed(book, test, slots, index);
-    book->next_pushed[index] = island->pushed;
-    island->pushed = index;
-    ++island->pushed_count;
-  }
 }
 
 /* Without any touch there may be no list either. */
@@ -295,8 +256,31 @@ void hapi_reuse_look(hapi_reuse *reuse, hapi_reuse_book *book, const hapi_reuse_
   if (!round_begin(book, reuse->wanted, input->test->island_count)) {
     return;
   }
-  book_list_members(book, input->test, input->slots);
-  book_list_pushed(book, input->test, input->slots, pushed);
+  /* The members of an island follow each other. */
+  const hapi_test_set *test = input->test;
+  book->island_count = test->island_count;
+  for (uint32_t i = 0; i < book->island_count; ++i) {
+    book->islands[i] = (hapi_reuse_island){.pushed = HAPI_NONE};
+  }
+  for (uint32_t i = test->member_count; i-- > 0;) {
+    uint32_t known = test->members[i];
+    HAPI_ASSERT_INDEX(hapi_test_island(test, known), book->island_count);
+    hapi_reuse_island *island = &book->islands[hapi_test_island(test, known)];
+    island->first_member = i;
+    ++island->member_count;
+    island->slot = test->world->bodies.entries[known].slot;
+  }
+  for (uint32_t i = 0; i < book->island_count; ++i) {
+    HAPI_ASSERT_INDEX(book->islands[i].slot, input->slots->body_high); /* the first one is pushed */
+    book->islands[i].generation = input->slots->bodies[book->islands[i].slot].generation;
+  }
+  for (uint32_t i = pushed->count; i-- > 0;) {
+    uint32_t index = pushed->slots[i];
+    hapi_reuse_island *island = island_of_pushed(book, input->test, input->slots, index);
+    book->next_pushed[index] = island->pushed;
+    island->pushed = index;
+    ++island->pushed_count;
+  }
   for (uint32_t i = 0; i < book->island_count; ++i) {
     hapi_reuse_island *island = &book->islands[i];
     island->spoiled = !hapi_print_island(input, book, island);

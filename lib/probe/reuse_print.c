@@ -151,8 +151,13 @@ static const joint_reader *joint_reader_of(dJointType type)
   return NULL;
 }
 
-static void print_parameters(printer *p, dJointID joint, const joint_reader *reader)
+static void print_joint(printer *p, dJointID joint, double arm)
 {
+  const joint_reader *reader = joint_reader_of(dJointGetType(joint));
+  if (reader == NULL) {
+    p->good = false;
+    return;
+  }
   static const int names[] = {dParamLoStop,        dParamHiStop,        dParamVel,
                               dParamFMax,          dParamFudgeFactor,   dParamBounce,
                               dParamCFM,           dParamStopERP,       dParamStopCFM,
@@ -162,10 +167,6 @@ static void print_parameters(printer *p, dJointID joint, const joint_reader *rea
       print_value(p, reader->parameter(joint, names[i] + group * dParamGroup), -1.0);
     }
   }
-}
-
-static void print_points(printer *p, dJointID joint, const joint_reader *reader, double arm)
-{
   dVector3 v = {0.0, 0.0, 0.0, 0.0};
   for (int i = 0; i < 2 && reader->points[i] != NULL; ++i) {
     reader->points[i](joint, v);
@@ -175,44 +176,23 @@ static void print_points(printer *p, dJointID joint, const joint_reader *reader,
     reader->axes[i](joint, v);
     print_vector(p, v, 3, arm);
   }
-}
-
-static void print_positions(printer *p, dJointID joint, const joint_reader *reader, double arm)
-{
   if (reader->lengths[0] != NULL) {
     print_value(p, reader->lengths[0](joint), 1.0);
   }
   for (int i = 0; i < 2 && reader->angles[i] != NULL; ++i) {
     print_value(p, reader->angles[i](joint), arm);
   }
-}
-
-static void print_motor(printer *p, dJointID joint, double arm)
-{
-  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
-  int count = dJointGetAMotorNumAxes(joint);
-  print_value(p, count, -1.0);
-  print_value(p, dJointGetAMotorMode(joint), -1.0);
-  for (int i = 0; i < count; ++i) {
-    print_value(p, dJointGetAMotorAxisRel(joint, i), -1.0);
-    dJointGetAMotorAxis(joint, i, axis);
-    print_vector(p, axis, 3, arm);
-    print_value(p, dJointGetAMotorAngle(joint, i), arm);
-  }
-}
-
-static void print_joint(printer *p, dJointID joint, double arm)
-{
-  const joint_reader *reader = joint_reader_of(dJointGetType(joint));
-  if (reader == NULL) {
-    p->good = false;
-    return;
-  }
-  print_parameters(p, joint, reader);
-  print_points(p, joint, reader, arm);
-  print_positions(p, joint, reader, arm);
   if (reader->type == dJointTypeAMotor) {
-    print_motor(p, joint, arm);
+    dVector3 axis = {0.0, 0.0, 0.0, 0.0};
+    int count = dJointGetAMotorNumAxes(joint);
+    print_value(p, count, -1.0);
+    print_value(p, dJointGetAMotorMode(joint), -1.0);
+    for (int i = 0; i < count; ++i) {
+      print_value(p, dJointGetAMotorAxisRel(joint, i), -1.0);
+      dJointGetAMotorAxis(joint, i, axis);
+      print_vector(p, axis, 3, arm);
+      print_value(p, dJointGetAMotorAngle(joint, i), arm);
+    }
   }
 }
 
@@ -261,9 +241,7 @@ static void body_measures(const printer *p, uint32_t known, const dMass *mass, m
   double extent = known_body(p, known)->extent;
   double inertia[9];
   double inverse[9];
-  for (int i = 0; i < 9; ++i) {
-    inertia[i] = mass->I[4 * (i / 3) + i % 3];
-  }
+  hapi_matrix_read(mass->I, inertia);
   hapi_m3_invert(inertia, inverse);
   out->arm = extent > 0.0 ? extent : 1.0;
   out->velocity = step;
@@ -277,62 +255,7 @@ static void print_wrench(printer *p, const double *force, const double *torque, 
   print_vector(p, torque, 3, m->torque);
 }
 
-static void print_mass(printer *p, dBodyID body, const dMass *mass)
-{
-  print_value(p, mass->mass, SAME);
-  for (int i = 0; i < 3; ++i) {
-    print_vector(p, mass->I + (size_t)4 * (size_t)i, 3, SAME);
-  }
-  print_value(p, dBodyIsKinematic(body), SAME);
-  print_value(p, dBodyGetGravityMode(body), SAME);
-  print_value(p, dBodyGetGyroscopicMode(body), SAME);
-  print_value(p, dBodyGetLinearDamping(body), SAME);
-  print_value(p, dBodyGetAngularDamping(body), SAME);
-  print_value(p, dBodyGetLinearDampingThreshold(body), SAME);
-  print_value(p, dBodyGetAngularDampingThreshold(body), SAME);
-  print_value(p, dBodyGetMaxAngularSpeed(body), SAME);
-}
-
-/* The loop's slot: what is found is kept there. */
-static void print_slot(printer *p, uint32_t index)
-{
-  bool local = index != HAPI_NONE;
-  print_value(p, index, SAME);
-  print_value(p, local ? p->input->slots->bodies[index].generation : 0, SAME);
-  print_value(p, local ? p->input->answers->bodies[index].flags & HAPI_BODY_DRIVEN : 0, SAME);
-}
-
-static void print_body(printer *p, uint32_t known, const dMass *mass, const measures *m)
-{
-  const hapi_known_body *entry = known_body(p, known);
-  dBodyID body = entry->body;
-  print_hash(p, entry->rest->birth);
-  print_slot(p, entry->slot);
-  print_mass(p, body, mass);
-  print_vector(p, dBodyGetPosition(body), 3, 1.0);
-  print_vector(p, dBodyGetQuaternion(body), 4, 2.0 * m->arm);
-  print_vector(p, dBodyGetLinearVel(body), 3, m->velocity);
-  print_vector(p, dBodyGetAngularVel(body), 3, m->velocity * m->arm);
-  print_wrench(p, dBodyGetForce(body), dBodyGetTorque(body), m);
-  print_wrench(p, entry->rest->user_force, entry->rest->user_torque, m);
-}
-
 /* ---- contacts and joints ---- */
-
-static uint64_t surface_hash(const dSurfaceParameters *s)
-{
-  const double values[] = {s->mode,    s->mu,      s->mu2,        s->rho,      s->rho2,
-                           s->rhoN,    s->bounce,  s->bounce_vel, s->soft_erp, s->soft_cfm,
-                           s->motion1, s->motion2, s->motionN,    s->slip1,    s->slip2};
-  uint64_t hash = 0xcbf29ce484222325u;
-  for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
-    uint64_t bits;
-    memcpy(&bits, &values[i], sizeof bits);
-    hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 29;
-  }
-  return hash;
-}
 
 static uint64_t body_birth(const printer *p, dBodyID body)
 {
@@ -361,7 +284,18 @@ static void print_contact(printer *p, dJointID joint, double arm)
   bool turned = first > second && (contact->surface.mode & MOTIONS) == 0;
   out->births[0] = turned ? second : first;
   out->births[1] = turned ? first : second;
-  out->surface = surface_hash(&contact->surface);
+  const dSurfaceParameters *s = &contact->surface;
+  const double values[] = {s->mode,    s->mu,      s->mu2,        s->rho,      s->rho2,
+                           s->rhoN,    s->bounce,  s->bounce_vel, s->soft_erp, s->soft_cfm,
+                           s->motion1, s->motion2, s->motionN,    s->slip1,    s->slip2};
+  uint64_t hash = 0xcbf29ce484222325u;
+  for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
+    uint64_t bits;
+    memcpy(&bits, &values[i], sizeof bits);
+    hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+    hash ^= hash >> 29;
+  }
+  out->surface = hash;
   out->arm = arm;
   hapi_v3_copy(contact->geom.pos, out->position);
   hapi_v3_scale(turned ? -1.0 : 1.0, contact->geom.normal, out->normal);
@@ -394,12 +328,37 @@ static bool joint_is_met_at(dBodyID body, dJointID joint)
 
 static void print_member(printer *p, uint32_t known)
 {
-  dBodyID body = known_body(p, known)->body;
+  const hapi_known_body *entry = known_body(p, known);
+  dBodyID body = entry->body;
   dMass mass;
   measures m;
   dBodyGetMass(body, &mass);
   body_measures(p, known, &mass, &m);
-  print_body(p, known, &mass, &m);
+  print_hash(p, entry->rest->birth);
+  /* The loop's slot: what is found is kept there. */
+  uint32_t index = entry->slot;
+  bool local = index != HAPI_NONE;
+  print_value(p, index, SAME);
+  print_value(p, local ? p->input->slots->bodies[index].generation : 0, SAME);
+  print_value(p, local ? p->input->answers->bodies[index].flags & HAPI_BODY_DRIVEN : 0, SAME);
+  print_value(p, mass.mass, SAME);
+  for (int i = 0; i < 3; ++i) {
+    print_vector(p, mass.I + (size_t)4 * (size_t)i, 3, SAME);
+  }
+  print_value(p, dBodyIsKinematic(body), SAME);
+  print_value(p, dBodyGetGravityMode(body), SAME);
+  print_value(p, dBodyGetGyroscopicMode(body), SAME);
+  print_value(p, dBodyGetLinearDamping(body), SAME);
+  print_value(p, dBodyGetAngularDamping(body), SAME);
+  print_value(p, dBodyGetLinearDampingThreshold(body), SAME);
+  print_value(p, dBodyGetAngularDampingThreshold(body), SAME);
+  print_value(p, dBodyGetMaxAngularSpeed(body), SAME);
+  print_vector(p, dBodyGetPosition(body), 3, 1.0);
+  print_vector(p, dBodyGetQuaternion(body), 4, 2.0 * m.arm);
+  print_vector(p, dBodyGetLinearVel(body), 3, m.velocity);
+  print_vector(p, dBodyGetAngularVel(body), 3, m.velocity * m.arm);
+  print_wrench(p, dBodyGetForce(body), dBodyGetTorque(body), &m);
+  print_wrench(p, entry->rest->user_force, entry->rest->user_torque, &m);
   int joints = dBodyIsKinematic(body) ? 0 : dBodyGetNumJoints(body);
   for (int i = 0; i < joints && p->good; ++i) {
     dJointID joint = dBodyGetJoint(body, i);
@@ -453,13 +412,6 @@ static int touches_compare(const void *a, const void *b)
   int first = (x->births[0] > y->births[0]) - (x->births[0] < y->births[0]);
   int second = (x->births[1] > y->births[1]) - (x->births[1] < y->births[1]);
   return first != 0 ? first : second;
-}
-
-static void touches_sort(hapi_touch_print *touches, uint32_t count)
-{
-  if (count > 0) {
-    qsort(touches, count, sizeof *touches, touches_compare);
-  }
 }
 
 static int births_compare(const void *a, const void *b)
@@ -530,7 +482,10 @@ bool hapi_print_island(const hapi_reuse_input *input, hapi_reuse_book *book, hap
   of->count = book->now.count - of->first;
   of->touch_count = book->now.touch_count - of->first_touch;
   if (of->touch_count > 0) { /* else there may be none at all yet, nor a place for them */
-    touches_sort(book->now.touches + of->first_touch, of->touch_count);
+    hapi_touch_print *touches = book->now.touches + of->first_touch;
+    if (of->touch_count > 0) {
+      qsort(touches, of->touch_count, sizeof *touches, touches_compare);
+    }
   }
   return p->good;
 }

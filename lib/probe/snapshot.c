@@ -175,27 +175,6 @@ static int space_depth(dSpaceID space)
   return depth;
 }
 
-static void space_clean_around(dSpaceID space)
-{
-  dSpaceID outer = dGeomGetSpace((dGeomID)space);
-  while (outer != NULL) {
-    space = outer;
-    outer = dGeomGetSpace((dGeomID)space);
-  }
-  dSpaceClean(space);
-}
-
-/* Adding puts a geom in front: from the last to the first. */
-static void order_restore_space(const hapi_space_order *order, uint32_t first, uint32_t end)
-{
-  dSpaceID space = dGeomGetSpace(order->geoms[first]);
-  space_clean_around(space);
-  for (uint32_t i = end; i > first; --i) {
-    dSpaceRemove(space, order->geoms[i - 1]);
-    dSpaceAdd(space, order->geoms[i - 1]);
-  }
-}
-
 /* ODE ends the process where a geom that is to be cleaned is behind one that is clean: so all of
  * them are, before they change places. Inner spaces first, as a space whose list changes is to
  * be cleaned, and goes to the front of the one that it is in. */
@@ -208,7 +187,16 @@ static void order_restore_at(const hapi_space_order *order, int depth)
       ++end;
     }
     if (space_depth(space) == depth) {
-      order_restore_space(order, first, end);
+      dSpaceID outermost = space;
+      while (dGeomGetSpace((dGeomID)outermost) != NULL) {
+        outermost = dGeomGetSpace((dGeomID)outermost);
+      }
+      dSpaceClean(outermost);
+      /* Adding puts a geom in front: from the last to the first. */
+      for (uint32_t i = end; i > first; --i) {
+        dSpaceRemove(space, order->geoms[i - 1]);
+        dSpaceAdd(space, order->geoms[i - 1]);
+      }
     }
   }
 }

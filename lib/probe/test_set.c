@@ -351,27 +351,23 @@ void hapi_test_leave(hapi_test_set *test)
 
 /* ---- a testing simulation ---- */
 
-/* The application's forces of the last step act in a probe as well: it may add them at each step,
- * in a callback that probes must not call. What waits in the accumulators already goes first. */
-static void member_add_user_wrench(const hapi_known_body *known)
-{
-  const dReal *f = dBodyGetForce(known->body);
-  const dReal *t = dBodyGetTorque(known->body);
-  if (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0 || t[0] != 0.0 || t[1] != 0.0 || t[2] != 0.0) {
-    return;
-  }
-  dBodySetForce(known->body, known->rest->user_force[0], known->rest->user_force[1],
-                known->rest->user_force[2]);
-  dBodySetTorque(known->body, known->rest->user_torque[0], known->rest->user_torque[1],
-                 known->rest->user_torque[2]);
-}
-
 void hapi_test_rewind(hapi_test_set *test)
 {
   HAPI_ASSERT(test->entered);
   hapi_snapshot_rewind(&test->snapshot);
   for (uint32_t i = 0; i < test->member_count; ++i) {
-    member_add_user_wrench(&test->world->bodies.entries[test->members[i]]);
+    /* The application's forces of the last step act in a probe as well: it may add them at each step,
+     * in a callback that probes must not call. What waits in the accumulators already goes first. */
+    const hapi_known_body *known = &test->world->bodies.entries[test->members[i]];
+    const dReal *f = dBodyGetForce(known->body);
+    const dReal *t = dBodyGetTorque(known->body);
+    if (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0 || t[0] != 0.0 || t[1] != 0.0 || t[2] != 0.0) {
+      continue;
+    }
+    dBodySetForce(known->body, known->rest->user_force[0], known->rest->user_force[1],
+                  known->rest->user_force[2]);
+    dBodySetTorque(known->body, known->rest->user_torque[0], known->rest->user_torque[1],
+                   known->rest->user_torque[2]);
   }
 }
 

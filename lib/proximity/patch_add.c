@@ -58,16 +58,22 @@ void hapi_patch_add(const hapi_pair *pair, const hapi_patch_point *point)
   patch->points[place].gap = gap;
 }
 
-static void spot_point(const hapi_frame *frame, const hapi_spot *spot, double out[3])
+/* Field by field: clearing the point first takes as long as all the rest. */
+static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
+                       const hapi_feature *incident, const hapi_spot *spot)
 {
+  double *fixed = reference_is_a ? p->core_a : p->core_b;
+  double *pushed = reference_is_a ? p->core_b : p->core_a;
+  p->touch = reference_is_a ? HAPI_TOUCH_FACE_A : HAPI_TOUCH_FACE_B;
   for (int i = 0; i < 3; ++i) {
-    out[i] = frame->origin[i] + spot->x * frame->x[i] + spot->y * frame->y[i];
+    fixed[i] = frame->origin[i] + spot->x * frame->x[i] + spot->y * frame->y[i];
   }
-}
-
-static void set_slide(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
-                      const hapi_feature *incident, const hapi_spot *spot)
-{
+  hapi_v3_madd(fixed, spot->gap, frame->normal, pushed);
+  hapi_v3_sub(pushed, incident->lift, pushed);
+  p->ball_a = reference_is_a ? 0.0 : incident->ball;
+  p->ball_b = reference_is_a ? incident->ball : 0.0;
+  p->rim_a = reference_is_a ? 0.0 : incident->rim;
+  p->rim_b = reference_is_a ? incident->rim : 0.0;
   double *side = reference_is_a ? p->edge_a : p->edge_b;
   double *edge = reference_is_a ? p->edge_b : p->edge_a;
   p->slide = spot->slide;
@@ -82,23 +88,6 @@ static void set_slide(hapi_patch_point *p, bool reference_is_a, const hapi_frame
   } else if (spot->slide == HAPI_SLIDE_CORNER) {
     hapi_v3_copy(incident->normal, edge);
   }
-}
-
-/* Field by field: clearing the point first takes as long as all the rest. */
-static void face_point(hapi_patch_point *p, bool reference_is_a, const hapi_frame *frame,
-                       const hapi_feature *incident, const hapi_spot *spot)
-{
-  double *fixed = reference_is_a ? p->core_a : p->core_b;
-  double *pushed = reference_is_a ? p->core_b : p->core_a;
-  p->touch = reference_is_a ? HAPI_TOUCH_FACE_A : HAPI_TOUCH_FACE_B;
-  spot_point(frame, spot, fixed);
-  hapi_v3_madd(fixed, spot->gap, frame->normal, pushed);
-  hapi_v3_sub(pushed, incident->lift, pushed);
-  p->ball_a = reference_is_a ? 0.0 : incident->ball;
-  p->ball_b = reference_is_a ? incident->ball : 0.0;
-  p->rim_a = reference_is_a ? 0.0 : incident->rim;
-  p->rim_b = reference_is_a ? incident->rim : 0.0;
-  set_slide(p, reference_is_a, frame, incident, spot);
   hapi_v3_scale(reference_is_a ? -1.0 : 1.0, frame->normal, p->normal);
   p->gap = spot->gap;
 }

@@ -163,22 +163,6 @@ static void support_edge(const hapi_solid *box, int axis, const double d[3], hap
   hapi_solid_axis(box, axis, out->direction);
 }
 
-/* Unit, from b to a. */
-static void edge_normal(const sat *s, double out[3])
-{
-  double between[3];
-  double u[3];
-  double v[3];
-  hapi_solid_axis(s->a, s->edge_a, u);
-  hapi_solid_axis(s->b, s->edge_b, v);
-  hapi_v3_cross(u, v, out);
-  hapi_v3_unit(out, out);
-  hapi_v3_sub(s->a->center, s->b->center, between);
-  if (hapi_v3_dot(between, out) < 0.0) {
-    hapi_v3_scale(-1.0, out, out);
-  }
-}
-
 static bool add_edges(const hapi_pair *pair, const sat *s, const double normal[3])
 {
   double back[3];
@@ -238,7 +222,18 @@ bool hapi_patch_boxes(const hapi_pair *pair)
   sat_edges(&s, best + edge_bias * depth + edge_bias_size * pair->size);
   if (s.edge_a >= 0) {
     double normal[3];
-    edge_normal(&s, normal);
+    /* Unit, from b to a. */
+    double between[3];
+    double u[3];
+    double v[3];
+    hapi_solid_axis(s.a, s.edge_a, u);
+    hapi_solid_axis(s.b, s.edge_b, v);
+    hapi_v3_cross(u, v, normal);
+    hapi_v3_unit(normal, normal);
+    hapi_v3_sub(s.a->center, s.b->center, between);
+    if (hapi_v3_dot(between, normal) < 0.0) {
+      hapi_v3_scale(-1.0, normal, normal);
+    }
     if (s.edge > pair->margin || add_edges_or_near(pair, &s, normal)) {
       return true;
     }

@@ -19,20 +19,6 @@ static void round_set(hapi_patch_point *p, const hapi_edge *a, const hapi_edge *
   p->rim_b = b->rim;
 }
 
-/* Where the lines come nearest, along each from its middle. sine: of their angle. */
-static void edges_cross(const hapi_edge *a, const hapi_edge *b, double sine, double *along_a,
-                        double *along_b)
-{
-  HAPI_ASSERT(sine > 0.0);
-  double between[3];
-  hapi_v3_sub(b->middle, a->middle, between);
-  double cosine = hapi_v3_dot(a->direction, b->direction);
-  double u = hapi_v3_dot(between, a->direction);
-  double v = hapi_v3_dot(between, b->direction);
-  *along_a = (u - cosine * v) / (sine * sine);
-  *along_b = (cosine * u - v) / (sine * sine);
-}
-
 bool hapi_patch_add_edges(const hapi_pair *pair, const hapi_edge *a, const hapi_edge *b,
                           const double normal[3])
 {
@@ -47,7 +33,15 @@ bool hapi_patch_add_edges(const hapi_pair *pair, const hapi_edge *a, const hapi_
   if (sine < parallel) {
     return false;
   }
-  edges_cross(a, b, sine, &along_a, &along_b);
+  /* Where the lines come nearest, along each from its middle. sine: of their angle. */
+  HAPI_ASSERT(sine > 0.0);
+  double between[3];
+  hapi_v3_sub(b->middle, a->middle, between);
+  double cosine = hapi_v3_dot(a->direction, b->direction);
+  double u = hapi_v3_dot(between, a->direction);
+  double v = hapi_v3_dot(between, b->direction);
+  along_a = (u - cosine * v) / (sine * sine);
+  along_b = (cosine * u - v) / (sine * sine);
   if (fabs(along_a) > a->half + slack || fabs(along_b) > b->half + slack) {
     return false;
   }

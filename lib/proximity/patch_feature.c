@@ -16,19 +16,14 @@ static const double cap_tilt = 0.0349;
  * are wrong by 1e-5. */
 static const double square_to = 1e-3;
 
-static int largest_of(const double d[3])
-{
-  int largest = fabs(d[1]) > fabs(d[0]) ? 1 : 0;
-  return fabs(d[2]) > fabs(d[largest]) ? 2 : largest;
-}
-
 static void box_face(const hapi_solid *box, const double d[3], hapi_feature *out)
 {
   static const double side[4][2] = {{1.0, 1.0}, {-1.0, 1.0}, {-1.0, -1.0}, {1.0, -1.0}};
   double local[3];
   double axis[3][3];
   hapi_solid_to_local(box, d, local);
-  int k = largest_of(local);
+  int largest = fabs(local[1]) > fabs(local[0]) ? 1 : 0;
+  int k = fabs(local[2]) > fabs(local[largest]) ? 2 : largest;
   double sign = local[k] < 0.0 ? -1.0 : 1.0;
   for (int i = 0; i < 3; ++i) {
     hapi_solid_axis(box, (k + i) % 3, axis[i]);
@@ -86,20 +81,6 @@ static void cylinder_cap(const hapi_solid *cylinder, const double d[3], hapi_fea
   out->area = pi * cylinder->disc * cylinder->disc;
 }
 
-/* The line of a capsule's or cylinder's side, or a sphere's point. */
-static void round_line(const hapi_solid *solid, const double d[3], hapi_feature *out)
-{
-  double axis[3];
-  hapi_solid_axis(solid, 2, axis);
-  out->ball = solid->ball;
-  out->rim = solid->disc;
-  hapi_surface_lift(solid, out->ball, out->rim, d, out->lift);
-  hapi_v3_add(solid->center, out->lift, out->corner[0]);
-  hapi_v3_madd(out->corner[0], solid->half[2], axis, out->corner[1]);
-  hapi_v3_madd(out->corner[0], -solid->half[2], axis, out->corner[0]);
-  out->count = solid->half[2] > 0.0 ? 2 : 1;
-}
-
 static void feature_clear(hapi_feature *out)
 {
   out->count = 0;
@@ -122,26 +103,6 @@ static void move_corners(hapi_feature *io, const double way[3])
   hapi_v3_add(io->center, way, io->center);
 }
 
-/* Of a rounded hull the flat part of its surface. */
-static void raise_face(const hapi_solid *hull, hapi_feature *io)
-{
-  double way[3];
-  if (hull->ball > 0.0) {
-    hapi_v3_scale(hull->ball, io->normal, way);
-    move_corners(io, way);
-  }
-}
-
-/* What of a rounded hull comes nearest along d: the corners of the core, each with its ball. */
-static void round_hull(const hapi_solid *hull, const double d[3], hapi_feature *out)
-{
-  feature_clear(out);
-  hapi_hull_feature(hull, d, out);
-  out->ball = hull->ball;
-  hapi_v3_scale(hull->ball, d, out->lift);
-  move_corners(out, out->lift);
-}
-
 bool hapi_feature_face(const hapi_solid *solid, const double d[3], hapi_feature *out)
 {
   feature_clear(out);
@@ -151,7 +112,12 @@ bool hapi_feature_face(const hapi_solid *solid, const double d[3], hapi_feature 
     cylinder_cap(solid, d, out);
   } else if (solid->kind == HAPI_SHAPE_HULL) {
     hapi_hull_feature(solid, d, out);
-    raise_face(solid, out);
+    /* Of a rounded hull the flat part of its surface. */
+    double way[3];
+    if (solid->ball > 0.0) {
+      hapi_v3_scale(solid->ball, out->normal, way);
+      move_corners(out, way);
+    }
   }
   return out->count > 2 && out->area > 0.0;
 }
@@ -160,7 +126,12 @@ void hapi_feature_along(const hapi_solid *solid, const double d[3], hapi_feature
 {
   HAPI_ASSERT(solid->kind != HAPI_SHAPE_PLANE);
   if (solid->kind == HAPI_SHAPE_HULL && solid->ball > 0.0) {
-    round_hull(solid, d, out);
+    /* What of a rounded hull comes nearest along d: the corners of the core, each with its ball. */
+    feature_clear(out);
+    hapi_hull_feature(solid, d, out);
+    out->ball = solid->ball;
+    hapi_v3_scale(solid->ball, d, out->lift);
+    move_corners(out, out->lift);
     return;
   }
   if (solid->kind == HAPI_SHAPE_BOX || solid->kind == HAPI_SHAPE_HULL ||
@@ -169,7 +140,16 @@ void hapi_feature_along(const hapi_solid *solid, const double d[3], hapi_feature
     return;
   }
   feature_clear(out);
-  round_line(solid, d, out);
+  /* The line of a capsule's or cylinder's side, or a sphere's point. */
+  double axis[3];
+  hapi_solid_axis(solid, 2, axis);
+  out->ball = solid->ball;
+  out->rim = solid->disc;
+  hapi_surface_lift(solid, out->ball, out->rim, d, out->lift);
+  hapi_v3_add(solid->center, out->lift, out->corner[0]);
+  hapi_v3_madd(out->corner[0], solid->half[2], axis, out->corner[1]);
+  hapi_v3_madd(out->corner[0], -solid->half[2], axis, out->corner[0]);
+  out->count = solid->half[2] > 0.0 ? 2 : 1;
 }
 
 static bool box_edge(const hapi_solid *box, const double d[3], hapi_edge *out)

@@ -35,9 +35,13 @@ static void wrap_top(wrap *w)
   hapi_v3_copy(hull->hull + 3 * best, w->top);
 }
 
-/* Of edges that fall alike the longest one: points inside an edge are passed over. */
-static void wrap_edge(wrap *w)
+static void wrap_start(wrap *w, const hapi_solid *hull, const double d[3])
 {
+  *w = (wrap){.hull = hull};
+  hapi_solid_to_local(hull, d, w->d);
+  hapi_v3_unit(w->d, w->d);
+  wrap_top(w);
+  /* Of edges that fall alike the longest one: points inside an edge are passed over. */
   double least2 = DBL_MAX;
   double longest2 = 0.0;
   double tiny2 = pow(same_point * w->hull->reach, 2.0);
@@ -58,15 +62,6 @@ static void wrap_edge(wrap *w)
   }
   w->has_edge = least2 < DBL_MAX;
   w->slope = w->has_edge ? sqrt(least2) : 0.0;
-}
-
-static void wrap_start(wrap *w, const hapi_solid *hull, const double d[3])
-{
-  *w = (wrap){.hull = hull};
-  hapi_solid_to_local(hull, d, w->d);
-  hapi_v3_unit(w->d, w->d);
-  wrap_top(w);
-  wrap_edge(w);
 }
 
 /* Frame of the tilted plane: edge, across, up. */

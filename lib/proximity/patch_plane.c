@@ -5,17 +5,6 @@
 
 /* The plane is the reference; what is pushed against it keeps its own points. */
 
-/* The plane seen from above; its origin below the other solid, so that coordinates stay small. */
-static void plane_frame(const hapi_solid *plane, const hapi_solid *solid, hapi_frame *out)
-{
-  double height[3];
-  hapi_solid_axis(plane, 0, out->x);
-  hapi_solid_axis(plane, 1, out->y);
-  hapi_solid_axis(plane, 2, out->normal);
-  hapi_v3_sub(solid->center, plane->center, height);
-  hapi_v3_madd(solid->center, -hapi_v3_dot(height, out->normal), out->normal, out->origin);
-}
-
 static hapi_spot spot_of(const hapi_frame *frame, const double point[3])
 {
   double arm[3];
@@ -117,7 +106,13 @@ bool hapi_patch_plane(const hapi_pair *pair)
     hapi_patch_add_ends(pair);
     return true;
   }
-  plane_frame(plane, solid, &frame);
+  /* The plane seen from above; its origin below the other solid, so that coordinates stay small. */
+  double height[3];
+  hapi_solid_axis(plane, 0, frame.x);
+  hapi_solid_axis(plane, 1, frame.y);
+  hapi_solid_axis(plane, 2, frame.normal);
+  hapi_v3_sub(solid->center, plane->center, height);
+  hapi_v3_madd(solid->center, -hapi_v3_dot(height, frame.normal), frame.normal, frame.origin);
   if (solid->kind == HAPI_SHAPE_CYLINDER) {
     cylinder_add(pair, plane_is_a, solid, &frame);
     return true;

@@ -46,13 +46,6 @@ static int covered_remove(hapi_spot *spots, int count, double near)
   return kept;
 }
 
-static void swap_spots(hapi_spot *a, hapi_spot *b)
-{
-  hapi_spot kept = *a;
-  *a = *b;
-  *b = kept;
-}
-
 static double triangle_area(const hapi_spot *a, const hapi_spot *b, const hapi_spot *c)
 {
   return (b->x - a->x) * (c->y - a->y) - (b->y - a->y) * (c->x - a->x);
@@ -97,7 +90,9 @@ static void spot_choose(hapi_spot *spots, int place, int count, double slack)
       best = i;
     }
   }
-  swap_spots(&spots[place], &spots[best]);
+  hapi_spot kept = spots[place];
+  spots[place] = spots[best];
+  spots[best] = kept;
 }
 
 int hapi_patch_reduce(hapi_spot *spots, int count, double size)

@@ -68,20 +68,6 @@ static void cross_read_column(void *user, uint32_t contact, int axis, double for
 
 /* ---- blocks ---- */
 
-/* (m/s^2)/N, of the body's surface. */
-static double body_response(const hapi_cross *cross, uint32_t body)
-{
-  const double(*column)[3] = (const double(*)[3])cross->columns[body];
-  uint32_t known = cross->slots->bodies[body].known;
-  double linear = 0.0;
-  double angular = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    linear += hapi_v3_dot(column[i], column[i]);
-    angular += hapi_v3_dot(column[3 + i], column[3 + i]);
-  }
-  return sqrt(linear) + cross->probe->test.world->bodies.entries[known].extent * sqrt(angular);
-}
-
 /* A free place, or that of the one that answers least, if that is less; NULL: there is none. */
 static hapi_cross_block *block_place(hapi_cross *cross, double response)
 {
@@ -100,7 +86,17 @@ static hapi_cross_block *block_place(hapi_cross *cross, double response)
 
 static void block_keep(hapi_cross *cross, uint32_t contact, uint32_t body)
 {
-  double response = body_response(cross, body);
+  /* (m/s^2)/N, of the body's surface. */
+  const double(*column)[3] = (const double(*)[3])cross->columns[body];
+  uint32_t known = cross->slots->bodies[body].known;
+  double linear = 0.0;
+  double angular = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    linear += hapi_v3_dot(column[i], column[i]);
+    angular += hapi_v3_dot(column[3 + i], column[3 + i]);
+  }
+  double response =
+      sqrt(linear) + cross->probe->test.world->bodies.entries[known].extent * sqrt(angular);
   hapi_cross_block *place = block_place(cross, response);
   if (place != NULL) {
     place->contact = contact;

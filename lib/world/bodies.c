@@ -162,19 +162,6 @@ static bool is_zero(const dReal *v)
   return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
 }
 
-/* What is written must go back to memory: not where nobody pushes. */
-static void follow_push(hapi_known_body *known)
-{
-  const dReal *force = dBodyGetForce(known->body);
-  const dReal *torque = dBodyGetTorque(known->body);
-  bool pushed = !is_zero(force) || !is_zero(torque);
-  if (pushed || known->pushed) {
-    hapi_v3_copy(force, known->rest->user_force);
-    hapi_v3_copy(torque, known->rest->user_torque);
-  }
-  known->pushed = pushed;
-}
-
 /* All that a cycle wants to know of a body that is far from the pointers, at once: each look is
  * at memory that is not at hand. Of a local body what holds after the loop's state was taken
  * counts. */
@@ -194,7 +181,15 @@ static void look_at(hapi_world *world, hapi_known_body *known)
   if (world->begun) {
     hapi_sleep_follow(known);
   }
-  follow_push(known);
+  /* What is written must go back to memory: not where nobody pushes. */
+  const dReal *force = dBodyGetForce(known->body);
+  const dReal *torque = dBodyGetTorque(known->body);
+  bool pushed = !is_zero(force) || !is_zero(torque);
+  if (pushed || known->pushed) {
+    hapi_v3_copy(force, known->rest->user_force);
+    hapi_v3_copy(torque, known->rest->user_torque);
+  }
+  known->pushed = pushed;
   if (known->slot != HAPI_NONE) {
     return;
   }
@@ -307,26 +302,6 @@ static void remove_entry(hapi_body_table *table, uint32_t index)
   --table->used;
 }
 
-/* Once a run: an application that does it does it often. The statistics count on. */
-static void say_lost(hapi_body_table *table, const hapi_cycle *cycle, uint32_t count)
-{
-  table->lost += count;
-  if (count > 0) {
-    hapi_say_once(
-        cycle, &table->said_lost,
-        "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
-        "without hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts "
-        "them");
-  }
-}
-
-/* Of an adopted body without geom and joint only the application knows whether it lives, unless
- * another one is at its address. */
-static bool lives_unseen(const hapi_known_body *known)
-{
-  return known->rest->adopted && !known->found && !hapi_mark_is_gone(known);
-}
-
 static void drop_unseen(hapi_world *world, const hapi_cycle *cycle)
 {
   hapi_body_table *table = &world->bodies;
@@ -337,14 +312,25 @@ static void drop_unseen(hapi_world *world, const hapi_cycle *cycle)
     if (known->body == NULL || known->seen == table->scan) {
       continue;
     }
-    if (lives_unseen(known)) {
+    /* Of an adopted body without geom and joint only the application knows whether it lives, unless
+     * another one is at its address. */
+    if (known->rest->adopted && !known->found && !hapi_mark_is_gone(known)) {
       look_at(world, known);
       continue;
     }
     remove_entry(table, i);
     ++dropped;
   }
-  say_lost(table, cycle, dropped + table->replaced);
+  /* Once a run: an application that does it does it often. The statistics count on. */
+  uint32_t lost = dropped + table->replaced;
+  table->lost += lost;
+  if (lost > 0) {
+    hapi_say_once(
+        cycle, &table->said_lost,
+        "a body was destroyed without hap_session_forget_body, or lost its last geom and joint "
+        "without hap_session_adopt_body; it was dropped. This is said once; bodies_lost counts "
+        "them");
+  }
   table->replaced = 0;
 }
 

@@ -135,8 +135,10 @@ bool hapi_mark_is_gone(const hapi_known_body *known); /* it is another body */
 unsigned hapi_mark_follow(hapi_known_body *known);
 void hapi_mark_remove(hapi_known_body *known); /* idempotent */
 
-void hapi_pose_read(dBodyID body, hap_pose *out);
-bool hapi_pose_is_sound(dBodyID body); /* its numbers are finite */
+void hapi_pose_read(dBodyID body, hap_pose *out); /* NULL: the static world's */
+void hapi_twist_read(dBodyID body, hap_twist *out);
+void hapi_matrix_read(const dReal in[12], double out[9]); /* ODE's rows of four */
+bool hapi_pose_is_sound(dBodyID body);                    /* its numbers are finite */
 
 /* sleep.c */
 void hapi_sleep_follow(hapi_known_body *known);              /* takes over; and what is set later */

@@ -18,15 +18,6 @@
 #define SAME_SLIDE 1e-4   /* m */
 #define LEAST_ACROSS 1e-6 /* of two axes, below which they have no plane */
 
-static void pose_of(dBodyID body, hap_pose *out)
-{
-  *out = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  if (body != NULL) {
-    hapi_v3_copy(dBodyGetPosition(body), out->position);
-    memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
-  }
-}
-
 /* ---- geometry ---- */
 
 static void point_into(const hap_pose *pose, const double world[3], double out[3])
@@ -177,18 +168,6 @@ static bool read_hinge2(reading *r)
   return read_cross(r, first, second);
 }
 
-/* ODE holds the centre of the second body where it is in the first; of one that hangs on the
- * world its own centre. */
-static void read_fixed(reading *r, bool paired)
-{
-  if (paired) {
-    point_into(&r->a, r->b.position, r->place.anchor_a);
-  } else {
-    hapi_v3_copy(r->a.position, r->place.anchor_b);
-  }
-  read_turn(r);
-}
-
 static bool place_is_finite(const hapi_joint_place *p)
 {
   return hapi_finite(p->anchor_a, 3) && hapi_finite(p->anchor_b, 3) && hapi_finite(p->axis_a, 3) &&
@@ -203,8 +182,8 @@ static bool read_place(const hapi_known_joint *known, reading *r)
   memset(r, 0, sizeof *r);
   r->joint = known->joint;
   r->turned = dJointGetBody(known->joint, 0) == NULL;
-  pose_of(known->bodies[0], &r->a);
-  pose_of(known->bodies[1], &r->b);
+  hapi_pose_read(known->bodies[0], &r->a);
+  hapi_pose_read(known->bodies[1], &r->b);
   switch (known->kind) {
     case HAPI_JOINT_BALL:
       read_anchors(r, dJointGetBallAnchor, dJointGetBallAnchor2);
@@ -222,7 +201,14 @@ static bool read_place(const hapi_known_joint *known, reading *r)
       good = known->bodies[1] != NULL && read_hinge2(r);
       break;
     case HAPI_JOINT_FIXED:
-      read_fixed(r, known->bodies[1] != NULL);
+      /* ODE holds the centre of the second body where it is in the first; of one that hangs on the
+       * world its own centre. */
+      if (known->bodies[1] != NULL) {
+        point_into(&r->a, r->b.position, r->place.anchor_a);
+      } else {
+        hapi_v3_copy(r->a.position, r->place.anchor_b);
+      }
+      read_turn(r);
       break;
     case HAPI_JOINT_MEASURED:
       break;
@@ -324,8 +310,8 @@ static bool same_place(hapi_joint_kind kind, const hapi_joint_place *was, const 
 static void relative_pose(const hapi_known_joint *known, hap_pose *out)
 {
   reading r = {0};
-  pose_of(known->bodies[0], &r.a);
-  pose_of(known->bodies[1], &r.b);
+  hapi_pose_read(known->bodies[0], &r.a);
+  hapi_pose_read(known->bodies[1], &r.b);
   point_into(&r.a, r.b.position, out->position);
   read_turn(&r);
   memcpy(out->quat_wxyz, r.place.turn, sizeof out->quat_wxyz);

@@ -161,34 +161,6 @@ static bool is_local(const hapi_body_table *bodies, uint32_t body)
   return body != HAPI_NONE && bodies->entries[body].slot != HAPI_NONE;
 }
 
-/* One that is far from the pointers is read when it is new, and again when it comes near. */
-static void look_at(const hapi_world *world, hapi_known_joint *known, bool is_new)
-{
-  bool near =
-      is_local(&world->bodies, known->index[0]) || is_local(&world->bodies, known->index[1]);
-  known->seen = world->joints.scan;
-  known->carried = hapi_joint_kind_of(known->joint, &known->kind);
-  if (known->carried && (is_new || near || known->left_is_known)) {
-    hapi_joint_read(known, is_new);
-  }
-}
-
-/* ODE's own order: the world comes second. */
-static void read_bodies(const hapi_world *world, dJointID joint, hapi_known_joint *out)
-{
-  dBodyID a = dJointGetBody(joint, 0);
-  dBodyID b = dJointGetBody(joint, 1);
-  out->bodies[0] = a != NULL ? a : b;
-  out->bodies[1] = a != NULL ? b : NULL;
-  for (int i = 0; i < 2; ++i) {
-    uint32_t index = hapi_bodies_find(&world->bodies, out->bodies[i]);
-    out->index[i] = index;
-    out->name.births[i] = out->bodies[i] == NULL ? 0
-                          : index == HAPI_NONE   ? UNKNOWN_BIRTH
-                                                 : world->bodies.entries[index].rest->birth;
-  }
-}
-
 /* The entry of a joint that this scan meets for the first time, after all older ones of its
  * bodies. */
 static uint32_t find_entry(const hapi_joint_table *table, uint32_t at_address,
@@ -215,7 +187,18 @@ static void joint_see(hapi_world *world, dJointID joint)
   if (index != HAPI_NONE && table->entries[index].seen == table->scan) {
     return; /* by its other body */
   }
-  read_bodies(world, joint, &found);
+  /* ODE's own order: the world comes second. */
+  dBodyID a = dJointGetBody(joint, 0);
+  dBodyID b = dJointGetBody(joint, 1);
+  found.bodies[0] = a != NULL ? a : b;
+  found.bodies[1] = a != NULL ? b : NULL;
+  for (int i = 0; i < 2; ++i) {
+    uint32_t body = hapi_bodies_find(&world->bodies, found.bodies[i]);
+    found.index[i] = body;
+    found.name.births[i] = found.bodies[i] == NULL ? 0
+                           : body == HAPI_NONE     ? UNKNOWN_BIRTH
+                                                   : world->bodies.entries[body].rest->birth;
+  }
   found.name.type = dJointGetType(joint);
   index = find_entry(table, index, &found.name);
   bool is_new = index == HAPI_NONE;
@@ -225,7 +208,14 @@ static void joint_see(hapi_world *world, dJointID joint)
     set_address(table, index, joint);
     memcpy(known->bodies, found.bodies, sizeof known->bodies);
     memcpy(known->index, found.index, sizeof known->index);
-    look_at(world, known, is_new);
+    /* One that is far from the pointers is read when it is new, and again when it comes near. */
+    bool near =
+        is_local(&world->bodies, known->index[0]) || is_local(&world->bodies, known->index[1]);
+    known->seen = world->joints.scan;
+    known->carried = hapi_joint_kind_of(known->joint, &known->kind);
+    if (known->carried && (is_new || near || known->left_is_known)) {
+      hapi_joint_read(known, is_new);
+    }
   }
 }
 
@@ -267,21 +257,6 @@ void hapi_joints_reset(hapi_joint_table *table)
 
 /* ---- numbers in the loop ---- */
 
-/* A place among those that the loop keeps impulses for. The range takes no more joints
- * than there are. */
-static void take_slot(hapi_joint_table *table, uint32_t index)
-{
-  uint32_t at = 0;
-  while (table->slots[at].taken != 0) {
-    ++at;
-  }
-  HAPI_ASSERT_INDEX(at, table->slot_count);
-  table->slots[at].taken = index + 1;
-  table->slot_high = at >= table->slot_high ? at + 1 : table->slot_high;
-  ++table->slots[at].generation;
-  table->entries[index].slot = at;
-}
-
 void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint32_t *joints,
                             uint32_t count)
 {
@@ -302,7 +277,17 @@ void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint3
   }
   for (uint32_t i = 0; i < count; ++i) {
     if (table->entries[joints[i]].slot == HAPI_NONE) {
-      take_slot(table, joints[i]);
+      /* A place among those that the loop keeps impulses for. The range takes no more joints
+       * than there are. */
+      uint32_t at = 0;
+      while (table->slots[at].taken != 0) {
+        ++at;
+      }
+      HAPI_ASSERT_INDEX(at, table->slot_count);
+      table->slots[at].taken = joints[i] + 1;
+      table->slot_high = at >= table->slot_high ? at + 1 : table->slot_high;
+      ++table->slots[at].generation;
+      table->entries[joints[i]].slot = at;
     }
   }
 }

@@ -1,9 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "base/alloc.h"
 #include "base/assert.h"
 #include "world/world.h"
-
-#include "base/alloc.h"
 
 double hapi_body_mass(dBodyID body)
 {

@@ -40,17 +40,6 @@ static bool axis_is_there(dBodyID body)
   return axis_is(body, mark_axis[0], mark_axis[1], mark_axis[2]);
 }
 
-static void place_axis(hapi_known_body *known)
-{
-  dBodyID body = known->body;
-  bool left_over = axis_is_there(body); /* of a session that lost sight of it */
-  known->mark_in_axis =
-      dBodyGetFiniteRotationMode(body) == 0 && (left_over || axis_is(body, 0.0, 0.0, 0.0));
-  if (known->mark_in_axis) {
-    dBodySetFiniteRotationAxis(body, mark_axis[0], mark_axis[1], mark_axis[2]);
-  }
-}
-
 static void place_time(hapi_known_body *known)
 {
   double time = dBodyGetAutoDisableTime(known->body);
@@ -72,7 +61,13 @@ void hapi_mark_place(hapi_known_body *known)
 {
   place_time(known);
   place_threshold(known);
-  place_axis(known);
+  dBodyID body = known->body;
+  bool left_over = axis_is_there(body); /* of a session that lost sight of it */
+  known->mark_in_axis =
+      dBodyGetFiniteRotationMode(body) == 0 && (left_over || axis_is(body, 0.0, 0.0, 0.0));
+  if (known->mark_in_axis) {
+    dBodySetFiniteRotationAxis(body, mark_axis[0], mark_axis[1], mark_axis[2]);
+  }
   known->mark_placed = true;
 }
 

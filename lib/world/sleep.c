@@ -32,37 +32,6 @@ static bool were_changed(const hapi_sleep *sleep, dBodyID body)
          sleep->samples != dBodyGetAutoDisableAverageSamplesCount(body);
 }
 
-static void read_settings(hapi_sleep *sleep, dBodyID body)
-{
-  sleep->linear_threshold = value_squared(dBodyGetAutoDisableLinearThreshold(body));
-  sleep->angular_threshold = value_squared(dBodyGetAutoDisableAngularThreshold(body));
-  sleep->idle_steps = dBodyGetAutoDisableSteps(body);
-  sleep->idle_time = dBodyGetAutoDisableTime(body);
-  sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
-  start_countdown(sleep);
-  if (sleep->samples > 1) {
-    sleep->velocities = hapi_alloc_array((size_t)sleep->samples, 6 * sizeof(double));
-    if (sleep->velocities == NULL) {
-      hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
-    }
-  }
-}
-
-/* Switching it off also enables the body, and gives it the world's steps, time and samples. */
-static void switch_off(const hapi_sleep *sleep, dBodyID body)
-{
-  bool enabled = dBodyIsEnabled(body) != 0;
-  dBodySetAutoDisableFlag(body, 0);
-  dBodySetAutoDisableSteps(body, sleep->idle_steps);
-  dBodySetAutoDisableTime(body, sleep->idle_time);
-  if (dBodyGetAutoDisableAverageSamplesCount(body) != sleep->samples) {
-    dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
-  }
-  if (!enabled) {
-    dBodyDisable(body);
-  }
-}
-
 static void sleep_take(hapi_known_body *known)
 {
   HAPI_ASSERT(!known->mark_placed);
@@ -72,8 +41,30 @@ static void sleep_take(hapi_known_body *known)
   known->awake = true;
   known->sleep_automatic = dBodyGetAutoDisableFlag(known->body) != 0;
   if (known->sleep_automatic) {
-    read_settings(sleep, known->body);
-    switch_off(sleep, known->body);
+    dBodyID body = known->body;
+    sleep->linear_threshold = value_squared(dBodyGetAutoDisableLinearThreshold(body));
+    sleep->angular_threshold = value_squared(dBodyGetAutoDisableAngularThreshold(body));
+    sleep->idle_steps = dBodyGetAutoDisableSteps(body);
+    sleep->idle_time = dBodyGetAutoDisableTime(body);
+    sleep->samples = dBodyGetAutoDisableAverageSamplesCount(body);
+    start_countdown(sleep);
+    if (sleep->samples > 1) {
+      sleep->velocities = hapi_alloc_array((size_t)sleep->samples, 6 * sizeof(double));
+      if (sleep->velocities == NULL) {
+        hapi_log(HAP_LOG_WARNING, "no memory for a body's sleep: it stays awake");
+      }
+    }
+    /* Switching it off also enables the body, and gives it the world's steps, time and samples. */
+    bool enabled = dBodyIsEnabled(body) != 0;
+    dBodySetAutoDisableFlag(body, 0);
+    dBodySetAutoDisableSteps(body, sleep->idle_steps);
+    dBodySetAutoDisableTime(body, sleep->idle_time);
+    if (dBodyGetAutoDisableAverageSamplesCount(body) != sleep->samples) {
+      dBodySetAutoDisableAverageSamplesCount(body, (unsigned)sleep->samples);
+    }
+    if (!enabled) {
+      dBodyDisable(body);
+    }
   }
   hapi_mark_place(known);
 }
@@ -84,14 +75,6 @@ static void sleep_take_again(hapi_known_body *known)
   hapi_mark_remove(known);
   hapi_free(known->rest->sleep.velocities);
   sleep_take(known);
-}
-
-/* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other
- * trace: the flag is off all the time. */
-static bool was_switched_off(const hapi_known_body *known, unsigned changed)
-{
-  return (changed & HAPI_MARK_TIME) != 0 &&
-         known->rest->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body));
 }
 
 void hapi_sleep_follow(hapi_known_body *known)
@@ -105,22 +88,15 @@ void hapi_sleep_follow(hapi_known_body *known)
     return;
   }
   unsigned changed = hapi_mark_follow(known);
-  if (was_switched_off(known, changed)) {
+  /* dBodySetAutoDisableFlag(body, 0) gives the body the world's idle time, and leaves no other
+   * trace: the flag is off all the time. */
+  if (((changed & HAPI_MARK_TIME) != 0 &&
+       known->rest->mark.idle_time == dWorldGetAutoDisableTime(dBodyGetWorld(known->body)))) {
     sleep_take_again(known);
   } else if (known->sleep_automatic &&
              (changed != 0 || were_changed(&known->rest->sleep, known->body))) {
     dBodySetAutoDisableFlag(known->body, 1);
     sleep_take_again(known);
-  }
-}
-
-/* What ODE counted before the session does not count any more. */
-static void restart_countdown(dBodyID body)
-{
-  int samples = dBodyGetAutoDisableAverageSamplesCount(body);
-  dBodySetAutoDisableAverageSamplesCount(body, (unsigned)samples);
-  if (dBodyIsEnabled(body)) {
-    dBodyEnable(body);
   }
 }
 
@@ -130,7 +106,13 @@ void hapi_sleep_give_back(hapi_known_body *known)
   hapi_mark_remove(known);
   if (known->sleep_taken && known->sleep_automatic) {
     dBodySetAutoDisableFlag(known->body, 1);
-    restart_countdown(known->body);
+    /* What ODE counted before the session does not count any more. */
+    dBodyID body = known->body;
+    int samples = dBodyGetAutoDisableAverageSamplesCount(body);
+    dBodySetAutoDisableAverageSamplesCount(body, (unsigned)samples);
+    if (dBodyIsEnabled(body)) {
+      dBodyEnable(body);
+    }
   }
   hapi_free(sleep->velocities);
   memset(sleep, 0, sizeof *sleep);
@@ -188,12 +170,6 @@ static void sleep_step_body(hapi_known_body *known, double step_s)
   }
 }
 
-/* A body that the loop owns has its contacts there. */
-static bool touches_in_loop(const hapi_known_body *known)
-{
-  return known->loop_owned && known->loop_touched;
-}
-
 /* With no samples ODE never puts a body to sleep; nor do we where they found no memory. */
 static bool can_sleep(const hapi_known_body *known)
 {
@@ -214,7 +190,9 @@ void hapi_sleep_step(hapi_body_table *table, double step_s)
       start_countdown(&known->rest->sleep);
     }
     /* ODE leaves bodies alone that have no joint, and those asleep already. */
-    if (awake && (dBodyGetJoint(known->body, 0) != NULL || touches_in_loop(known))) {
+    /* A body that the loop owns has its contacts there. */
+    if (awake &&
+        (dBodyGetJoint(known->body, 0) != NULL || (known->loop_owned && known->loop_touched))) {
       sleep_step_body(known, step_s);
     }
   }

@@ -122,8 +122,24 @@ static bool is_plainly_sound(dBodyID body)
 
 void hapi_pose_read(dBodyID body, hap_pose *out)
 {
-  hapi_v3_copy(dBodyGetPosition(body), out->position);
-  memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+  *out = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  if (body != NULL) {
+    hapi_v3_copy(dBodyGetPosition(body), out->position);
+    memcpy(out->quat_wxyz, dBodyGetQuaternion(body), sizeof out->quat_wxyz);
+  }
+}
+
+void hapi_twist_read(dBodyID body, hap_twist *out)
+{
+  hapi_v3_copy(dBodyGetLinearVel(body), out->linear);
+  hapi_v3_copy(dBodyGetAngularVel(body), out->angular);
+}
+
+void hapi_matrix_read(const dReal in[12], double out[9])
+{
+  for (int i = 0; i < 9; ++i) {
+    out[i] = in[4 * (i / 3) + i % 3];
+  }
 }
 
 bool hapi_pose_is_sound(dBodyID body)

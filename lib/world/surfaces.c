@@ -145,8 +145,12 @@ bool hapi_world_ask_surface(const hapi_world *world, const hapi_cycle *cycle, dG
   return entry->collides;
 }
 
-static uint32_t surface_flags(const dSurfaceParameters *s, double cfm)
+static void fill_surface(dWorldID world, const hapi_cycle *cycle, const dSurfaceParameters *s,
+                         hapi_surface *out)
 {
+  memset(out, 0, sizeof *out);
+  out->erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world);
+  out->cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world);
   const struct {
     int mode;
     uint32_t flag;
@@ -156,20 +160,11 @@ static uint32_t surface_flags(const dSurfaceParameters *s, double cfm)
       {dContactSlip1, HAPI_SURFACE_SLIP1},         {dContactSlip2, HAPI_SURFACE_SLIP2},
   };
   bool asked = (s->mode & (dContactSoftERP | dContactSoftCFM)) != 0;
-  uint32_t flags = (asked && cfm > 0.0) || cfm > SOFT_CFM ? HAPI_SURFACE_SOFT : 0u;
+  uint32_t flags = (asked && out->cfm > 0.0) || out->cfm > SOFT_CFM ? HAPI_SURFACE_SOFT : 0u;
   for (size_t i = 0; i < sizeof bits / sizeof bits[0]; ++i) {
     flags |= (s->mode & bits[i].mode) != 0 ? bits[i].flag : 0u;
   }
-  return flags;
-}
-
-static void fill_surface(dWorldID world, const hapi_cycle *cycle, const dSurfaceParameters *s,
-                         hapi_surface *out)
-{
-  memset(out, 0, sizeof *out);
-  out->erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world);
-  out->cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world);
-  out->flags = surface_flags(s, out->cfm);
+  out->flags = flags;
   hapi_soften(hapi_step_ratio(cycle), &out->erp, &out->cfm);
   out->mu = s->mu;
   out->mu2 = (s->mode & dContactMu2) != 0 ? s->mu2 : s->mu;
