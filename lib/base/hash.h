@@ -6,6 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include <hapode/spatial.h>
+
 #define HAPI_HASH_BEGIN 0xcbf29ce484222325u
 
 /* FNV-1a over 64-bit words: cheap, and any changed bit changes it. */
@@ -23,6 +25,14 @@ static inline uint64_t hapi_hash_doubles(uint64_t hash, const double *values, in
     hash = hapi_hash_word(hash, word);
   }
   return hash;
+}
+
+static inline uint64_t hapi_hash_motion(uint64_t hash, const hap_pose *pose, const hap_twist *twist)
+{
+  hash = hapi_hash_doubles(hash, pose->position, 3);
+  hash = hapi_hash_doubles(hash, pose->quat_wxyz, 4);
+  hash = hapi_hash_doubles(hash, twist->linear, 3);
+  return hapi_hash_doubles(hash, twist->angular, 3);
 }
 
 #endif

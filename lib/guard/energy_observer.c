@@ -50,47 +50,25 @@ static double world_per_device(const hapi_pointer *p)
   return p->device.force_scale > 0.0 ? p->device.motion_scale / p->device.force_scale : 0.0;
 }
 
-static double spin_energy(const double inertia[9], const double w[3])
+/* J of the body's turning at w, in the orientation that it has (after) or had (before). */
+static double spin_energy(const hapi_local_body *body, const double w[3], bool after)
 {
+  double local[3];
   double momentum[3];
-  hapi_m3_apply(inertia, w, momentum);
-  return 0.5 * hapi_v3_dot(w, momentum);
-}
-
-static bool body_spins(const double w[3])
-{
-  return hapi_v3_dot(w, w) > 0.0;
-}
-
-static double round_energy(const hapi_local_body *body, const double w[3])
-{
-  return 0.5 * body->given.inertia[0] * hapi_v3_dot(w, w);
-}
-
-static double spin_before(const hapi_local_body *body)
-{
-  double local[3];
+  double w2 = hapi_v3_dot(w, w);
   if (body->round) {
-    return round_energy(body, body->start_twist + 3);
+    return 0.5 * body->given.inertia[0] * w2;
   }
-  if (!body_spins(body->start_twist + 3)) {
+  if (!(w2 > 0.0)) {
     return 0.0;
   }
-  hapi_m3_apply_transposed(body->rotation, body->start_twist + 3, local);
-  return spin_energy(body->given.inertia, local);
-}
-
-static double spin_after(const hapi_local_body *body)
-{
-  double local[3];
-  if (body->round) {
-    return round_energy(body, body->twist.angular);
+  if (after) {
+    hapi_quat_unrotate(body->pose.quat_wxyz, w, local);
+  } else {
+    hapi_m3_apply_transposed(body->rotation, w, local);
   }
-  if (!body_spins(body->twist.angular)) {
-    return 0.0;
-  }
-  hapi_quat_unrotate(body->pose.quat_wxyz, body->twist.angular, local);
-  return spin_energy(body->given.inertia, local);
+  hapi_m3_apply(body->given.inertia, local, momentum);
+  return 0.5 * hapi_v3_dot(local, momentum);
 }
 
 /* J that the body lost to contacts in this tick; its energy after it is added to *io_stored. With
@@ -109,14 +87,11 @@ static double body_loses(const hapi_local_body *body, double period, double *io_
   hapi_v3_add(pull, given->user_wrench, pull);
   double work = hapi_v3_dot(pull, mean) + hapi_v3_dot(given->user_wrench + 3, turn);
   work *= body->waiting ? 0.0 : 0.5 * period; /* one that waits feels its contacts alone */
-  double kinetic = 0.5 * given->mass * hapi_v3_dot(after, after) + spin_after(body);
+  double kinetic =
+      0.5 * given->mass * hapi_v3_dot(after, after) + spin_energy(body, body->twist.angular, true);
   *io_stored += kinetic;
-  return 0.5 * given->mass * hapi_v3_dot(before, before) + spin_before(body) - kinetic + work;
-}
-
-static bool moves_owned(const hapi_tick_facts *facts, const hapi_local_body *body)
-{
-  return facts->model == HAP_MODEL_CONTACT && (body->flags & HAPI_BODY_OWNED) != 0;
+  return 0.5 * given->mass * hapi_v3_dot(before, before) + spin_energy(body, before + 3, false) -
+         kinetic + work;
 }
 
 static double bodies_lose(const hapi_tick_facts *facts, const hapi_bodies *bodies,
@@ -128,7 +103,7 @@ static double bodies_lose(const hapi_tick_facts *facts, const hapi_bodies *bodie
   }
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     const hapi_local_body *body = &bodies->of[bodies->live[i]];
-    if ((body->flags & HAPI_BODY_RESTING) == 0 && moves_owned(facts, body)) {
+    if ((body->flags & HAPI_BODY_RESTING) == 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
       sum += body_loses(body, facts->period, io_stored);
     }
   }
@@ -155,45 +130,33 @@ static double half_compliance(const hapi_pointer *p)
   return p->surface.stiffness > 0.0 ? 0.5 / p->surface.stiffness : 0.0;
 }
 
-/* J in the spring of a contact of model CONTACT with that force. */
-static double contact_stores(const hapi_pointer *p, const hapi_local_contact *c, double force2)
-{
-  return p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
-}
-
-/* The same of the paper's models, as hapi_render has noted it: another walk over the contacts would
- * cost as much as a tenth of the tick. */
-static double rendered_gives(double period, const hapi_pointers *pointers, double *io_stored)
-{
-  double sum = 0.0;
-  for (uint32_t i = 0; i < pointers->high; ++i) {
-    const hapi_pointer *p = &pointers->of[i];
-    if (p->generation != 0 && p->guard.force2 > 0.0) {
-      *io_stored += half_compliance(p) * p->guard.force2;
-      sum += period * p->guard.power;
-    }
-  }
-  return sum;
-}
-
 /* J that bodies of given motion do on the pointers' springs in this tick. */
 static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                             const hapi_bodies *bodies, const hapi_touches *touches,
                             double *io_stored)
 {
   double sum = 0.0;
-  if (facts->model != HAP_MODEL_CONTACT) {
-    return rendered_gives(facts->period, pointers, io_stored);
+  if (facts->model != HAP_MODEL_CONTACT) { /* as hapi_render has noted it: another walk over the
+                                              contacts would cost as much as a tenth of the tick */
+    for (uint32_t i = 0; i < pointers->high; ++i) {
+      const hapi_pointer *p = &pointers->of[i];
+      if (p->generation != 0 && p->guard.force2 > 0.0) {
+        *io_stored += half_compliance(p) * p->guard.force2;
+        sum += facts->period * p->guard.power;
+      }
+    }
+    return sum;
   }
   for (uint32_t i = 0; i < touches->count; ++i) {
     const hapi_local_contact *c = &touches->of[i];
+    const hapi_pointer *p = &pointers->of[c->pointer];
     const hapi_local_body *body = hapi_bodies_at(bodies, c->body);
     double force2 = hapi_v3_dot(c->force, c->force);
     if (!(force2 > 0.0)) {
       continue;
     }
-    *io_stored += contact_stores(&pointers->of[c->pointer], c, force2);
-    if (body != NULL && !moves_owned(facts, body)) {
+    *io_stored += p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
+    if (body != NULL && (body->flags & HAPI_BODY_OWNED) == 0) {
       sum -= work_on(facts->period, body, c);
     }
   }
@@ -212,18 +175,6 @@ static double spring_energy(const hapi_pointer *p, double share, double depth)
                                  : p->guard.limit * (depth - 0.5 * p->guard.limit / k);
 }
 
-static void note_limits(const hapi_guard *guard, const hapi_pointers *pointers)
-{
-  for (uint32_t i = 0; i < pointers->high; ++i) {
-    hapi_pointer *p = &pointers->of[i];
-    if (p->generation != 0) {
-      p->guard.limit =
-          p->device.force_scale > 0.0 ? p->device.limits.max_force / p->device.force_scale : 0.0;
-      p->guard.felt = p->guard.share * (1.0 - guard->age_loss);
-    }
-  }
-}
-
 /* J that ramps and fading added to the springs in this tick. */
 static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
                          const hapi_touches *touches, uint64_t tick)
@@ -231,7 +182,14 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
   double gone = guard->sprung;
   double sum = 0.0;
   guard->sprung = 0.0;
-  note_limits(guard, pointers);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    hapi_pointer *p = &pointers->of[i];
+    if (p->generation != 0) {
+      double scale = p->device.force_scale;
+      p->guard.limit = scale > 0.0 ? p->device.limits.max_force / scale : 0.0;
+      p->guard.felt = p->guard.share * (1.0 - guard->age_loss);
+    }
+  }
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
@@ -272,20 +230,6 @@ static double couplings_store(const hapi_pointers *pointers)
   return sum;
 }
 
-/* To the third order of the turn of a tick; of a sphere none. */
-static void note_turn(hapi_pointer *p)
-{
-  hapi_guard_pointer *g = &p->guard;
-  if (p->shape.hull == NULL) {
-    return;
-  }
-  double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
-  double q[4];
-  hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
-  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
-  memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
-}
-
 /* J that the written force gave to the hand in the seconds since the last tick. A way that no hand
  * goes in that time is a jump: nobody put in what it would have cost, and nobody got more than at
  * the fastest. */
@@ -294,7 +238,13 @@ static double port_gave(hapi_pointer *p, double seconds)
   hapi_guard_pointer *g = &p->guard;
   hapi_v3_sub(p->device.pose.position, g->position, g->moved);
   hapi_v3_copy(p->device.pose.position, g->position);
-  note_turn(p);
+  if (p->shape.hull != NULL) { /* to the third order of the turn of a tick; of a sphere none */
+    double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
+    double q[4];
+    hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
+    hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
+    memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
+  }
   if (!g->placed) {
     hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
     hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
@@ -376,17 +326,6 @@ static void pay_no_more_than(const hapi_pointers *pointers, double budget)
   }
 }
 
-/* A debt that comes all at once, after a time without the loop or when something vanished that had
- * been pressed, cannot be paid back by a hand that rests: its force would come and go for ever. So
- * in a touch that lasts, the ledger comes back to what is in the springs. */
-static void settle_debt(hapi_guard *guard, double period)
-{
-  guard->touch_s += period;
-  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
-    guard->balance += (guard->sprung - guard->balance) * hapi_min(period / DEBT_S, 1.0);
-  }
-}
-
 /* After a fault nothing is known of where the devices were. */
 static void ledger_forget(hapi_guard *guard, const hapi_pointers *pointers,
                           const hapi_touches *touches)
@@ -425,12 +364,17 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
     guard->touch_s = 0.0;
     return;
   }
-  double stored = 0.0;
-  stored += couplings_store(pointers);
+  double stored = couplings_store(pointers);
   guard->balance += given + bodies_lose(facts, bodies, &stored) +
                     surfaces_give(facts, pointers, bodies, touches, &stored);
   guard->stored_max = hapi_max(stored, guard->stored_max);
   double overdraft = hapi_max(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
-  settle_debt(guard, facts->period);
+  /* A debt that comes all at once, after a time without the loop or when something vanished that
+   * had been pressed, cannot be paid back by a hand that rests: its force would come and go for
+   * ever. So in a touch that lasts, the ledger comes back to what is in the springs. */
+  guard->touch_s += facts->period;
+  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
+    guard->balance += (guard->sprung - guard->balance) * hapi_min(facts->period / DEBT_S, 1.0);
+  }
   pay_no_more_than(pointers, guard->balance + overdraft);
 }

@@ -50,14 +50,10 @@ void hapi_guard_cut(hapi_pointer *pointer)
   memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
 }
 
-static bool usable_number(double x)
+static bool vector_is_usable(const double v[3])
 {
-  return fabs(x) <= WRENCH_LIMIT; /* false for NaN */
-}
-
-static bool usable_vector(const double v[3])
-{
-  return usable_number(v[0]) && usable_number(v[1]) && usable_number(v[2]);
+  return fabs(v[0]) <= WRENCH_LIMIT && fabs(v[1]) <= WRENCH_LIMIT &&
+         fabs(v[2]) <= WRENCH_LIMIT; /* false for NaN */
 }
 
 /* A sum of squares within the limit says so of each; only what is far out is looked at one by
@@ -66,17 +62,7 @@ static inline bool wrench_is_usable(const hap_wrench *w)
 {
   return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
              WRENCH_LIMIT * WRENCH_LIMIT ||
-         (usable_vector(w->force) && usable_vector(w->torque));
-}
-
-static void check_finite(hapi_guard *guard, const hapi_pointers *pointers)
-{
-  for (uint32_t i = 0; i < pointers->high; ++i) {
-    const hapi_pointer *p = &pointers->of[i];
-    if (p->generation != 0 && !wrench_is_usable(&p->wrench)) {
-      hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
-    }
-  }
+         (vector_is_usable(w->force) && vector_is_usable(w->torque));
 }
 
 /* A world that does not answer is felt less and less: a state, which ends with the next model. One
@@ -158,21 +144,6 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
 }
 
-static void limit_norm(hapi_pointer *p)
-{
-  bool force = vector_saturate(p->device.wrench.force, p->device.limits.max_force);
-  bool torque = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque);
-  p->guard.flags |= force || torque ? HAP_GUARD_SATURATED : 0;
-}
-
-static void report_torque(hapi_pointer *p)
-{
-  double scale = hapi_coupling_torque_scale(p);
-  hapi_quat_rotate(p->device.pose_world_device.quat_wxyz, p->device.wrench.torque,
-                   p->wrench.torque);
-  hapi_v3_scale(scale > 0.0 ? 1.0 / scale : 0.0, p->wrench.torque, p->wrench.torque);
-}
-
 /* What is reported is what the hand feels. */
 static void report_written(hapi_pointer *p)
 {
@@ -187,33 +158,23 @@ static void report_written(hapi_pointer *p)
   if (p->device.force_scale > 0.0) {
     hapi_quat_rotate(q, p->device.wrench.force, p->wrench.force);
     hapi_v3_scale(1.0 / p->device.force_scale, p->wrench.force, p->wrench.force);
-    report_torque(p);
+    double scale = hapi_coupling_torque_scale(p);
+    hapi_quat_rotate(q, p->device.wrench.torque, p->wrench.torque);
+    hapi_v3_scale(scale > 0.0 ? 1.0 / scale : 0.0, p->wrench.torque, p->wrench.torque);
   } else if ((p->guard.flags & HAP_GUARD_FAULT) != 0) {
     memset(&p->wrench, 0, sizeof p->wrench); /* it may be not finite */
   }
 }
 
-/* Whatever came in, and whatever went wrong here: NaN does not get to the motors. */
-static void check_written(hapi_guard *guard, hapi_pointer *p, uint32_t index)
-{
-  if (!wrench_is_usable(&p->device.wrench)) {
-    hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, index + 1, p->generation);
-    p->guard.flags = HAP_GUARD_FAULT;
-    memset(&p->device.wrench, 0, sizeof p->device.wrench);
-  }
-}
-
-static void count_flags(hapi_guard *guard, uint32_t flags)
-{
-  guard->saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
-  guard->slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
-  guard->energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
-}
-
 void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
                       const hapi_pointers *pointers)
 {
-  check_finite(guard, pointers);
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
+    if (p->generation != 0 && !wrench_is_usable(&p->wrench)) {
+      hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
+    }
+  }
   follow_age(guard, facts);
   for (uint32_t i = 0; i < pointers->high; ++i) {
     if (pointers->of[i].generation != 0) {
@@ -233,8 +194,15 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     if (guard->mode == HAP_GUARD_ON) {
       limit_slew(guard, period, p);
     }
-    limit_norm(p);
-    check_written(guard, p, i);
+    bool force_cut = vector_saturate(p->device.wrench.force, p->device.limits.max_force);
+    bool torque_cut = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque);
+    p->guard.flags |= force_cut || torque_cut ? HAP_GUARD_SATURATED : 0;
+    /* Whatever came in, and whatever went wrong here: NaN does not get to the motors. */
+    if (!wrench_is_usable(&p->device.wrench)) {
+      hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
+      p->guard.flags = HAP_GUARD_FAULT;
+      memset(&p->device.wrench, 0, sizeof p->device.wrench);
+    }
     report_written(p);
     HAPI_ASSERT_FINITE(p->device.wrench.force, 3);
     HAPI_ASSERT_FINITE(p->device.wrench.torque, 3);
@@ -242,7 +210,7 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     double force = hapi_v3_norm(p->wrench.force);
     guard->peak_force = force > guard->peak_force ? force : guard->peak_force;
   }
-  if (flags != 0) {
-    count_flags(guard, flags);
-  }
+  guard->saturated_ticks += (flags & HAP_GUARD_SATURATED) != 0;
+  guard->slewed_ticks += (flags & HAP_GUARD_SLEW) != 0;
+  guard->energy_ticks += (flags & HAP_GUARD_ENERGY) != 0;
 }

@@ -44,10 +44,9 @@ typedef struct hapi_pointer_slot {
   bool has_device; /* also in a replay, where there are no ops */
   bool started;
   hap_device_info info;
-  pthread_mutex_t target_lock; /* between applications that set */
+  pthread_mutex_t lock; /* between applications that set, get, ask and remove */
   hapi_triple_buffer target_buffer;
   hapi_pointer_target targets[3];
-  pthread_mutex_t state_lock; /* between applications that get */
   hapi_triple_buffer state_buffer;
   hap_pointer_state states[3];
 } hapi_pointer_slot;
@@ -183,7 +182,7 @@ void hapi_tape_ticked(hapi_haptic *haptic);
 /* Replay only; false: no more of them come now. */
 bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
-                         hapi_tool_hull *out_hull);
+                         hap_device_info *out_info, hapi_tool_hull *out_hull);
 
 /* loop_effects.c */
 void hapi_loop_effects_reset(hapi_haptic *haptic);
@@ -200,8 +199,6 @@ hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail);
 void hapi_pointers_stop_devices(hapi_haptic *haptic);
 
 /* trace_ring.c */
-hap_status hapi_trace_ring_create(hapi_trace_ring *ring, uint32_t capacity);
-void hapi_trace_ring_finish(hapi_trace_ring *ring);
 void hapi_trace_ring_write(hapi_haptic *haptic);
 
 #endif

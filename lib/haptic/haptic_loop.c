@@ -17,40 +17,31 @@
   atomic_store_explicit(&haptic->figures.field, (value), memory_order_relaxed)
 #define LOAD(field) atomic_load_explicit(&haptic->figures.field, memory_order_relaxed)
 
-static bool prepare_slots(hapi_haptic *haptic)
-{
-  haptic->slots = hapi_alloc_array(haptic->config.capacity.pointers, sizeof *haptic->slots);
-  if (haptic->slots == NULL) {
-    return false;
-  }
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
-    atomic_init(&haptic->slots[i].phase, HAPI_POINTER_EMPTY);
-    pthread_mutex_init(&haptic->slots[i].target_lock, NULL);
-    pthread_mutex_init(&haptic->slots[i].state_lock, NULL);
-  }
-  return true;
-}
-
-static bool create_black_box(hapi_black_box *box, uint32_t pointers)
-{
-  box->pointers = pointers;
-  box->rows = hapi_alloc_array((size_t)HAP_BLACK_BOX_TICKS * pointers, sizeof *box->rows);
-  box->counts = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *box->counts);
-  return box->rows != NULL && box->counts != NULL;
-}
-
 hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out)
 {
+  const uint32_t pointers = config->capacity.pointers;
   *out = NULL;
   hapi_haptic *haptic = hapi_alloc(sizeof *haptic);
   if (haptic == NULL) {
     return HAP_ERROR_MEMORY;
   }
+  hapi_black_box *box = &haptic->black_box;
   haptic->config = *config;
   pthread_mutex_init(&haptic->black_box_lock, NULL);
-  if (!create_black_box(&haptic->black_box, config->capacity.pointers) ||
-      !hapi_tick_memory_create(&haptic->tick, &config->capacity) || !prepare_slots(haptic) ||
-      hapi_trace_ring_create(&haptic->ring, config->trace_rows) != HAP_OK) {
+  /* hapi_alloc_array writes zeros: no tick is the first to touch a page. */
+  box->pointers = pointers;
+  box->rows = hapi_alloc_array((size_t)HAP_BLACK_BOX_TICKS * pointers, sizeof *box->rows);
+  box->counts = hapi_alloc_array(HAP_BLACK_BOX_TICKS, sizeof *box->counts);
+  haptic->ring.capacity = config->trace_rows;
+  haptic->ring.rows = hapi_alloc_array(config->trace_rows, sizeof *haptic->ring.rows);
+  haptic->slots = hapi_alloc_array(pointers, sizeof *haptic->slots);
+  for (uint32_t i = 0; haptic->slots != NULL && i < pointers; ++i) {
+    atomic_init(&haptic->slots[i].phase, HAPI_POINTER_EMPTY);
+    pthread_mutex_init(&haptic->slots[i].lock, NULL);
+  }
+  bool tick = hapi_tick_memory_create(&haptic->tick, &config->capacity);
+  if (!tick || box->rows == NULL || box->counts == NULL || haptic->ring.rows == NULL ||
+      haptic->slots == NULL) {
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;
   }
@@ -71,11 +62,10 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   for (uint32_t i = 0; haptic->slots != NULL && i < haptic->config.capacity.pointers; ++i) {
     hap_pointer_id id = {((uint64_t)haptic->slots[i].generation << 32) | (i + 1)};
     hapi_haptic_remove_pointer(haptic, id);
-    pthread_mutex_destroy(&haptic->slots[i].target_lock);
-    pthread_mutex_destroy(&haptic->slots[i].state_lock);
+    pthread_mutex_destroy(&haptic->slots[i].lock);
   }
   hapi_free(haptic->slots);
-  hapi_trace_ring_finish(&haptic->ring);
+  hapi_free(haptic->ring.rows);
   hapi_free(haptic->black_box.rows);
   hapi_free(haptic->black_box.counts);
   pthread_mutex_destroy(&haptic->black_box_lock);
@@ -83,35 +73,49 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   hapi_free(haptic);
 }
 
-static void reset_figures(hapi_haptic *haptic)
+static void figures_publish(hapi_haptic *haptic)
+{
+  const hapi_tick *tick = &haptic->tick;
+  const hapi_fault_latch *latch = &tick->guard.latch;
+  int64_t age = tick->facts.model_number != 0 ? tick->facts.now_ns - tick->facts.state_ns : 0;
+  STORE(loop.ticks, tick->facts.tick);
+  STORE(hand.contact_ticks, tick->touches.contact_ticks);
+  STORE(hand.saturated_ticks, tick->guard.saturated_ticks);
+  STORE(faults.count, latch->count);
+  STORE(faults.fault, (int)latch->fault);
+  STORE(faults.fault_pointer,
+        ((uint64_t)latch->generation << 32) | latch->pointer); /* id; 0: none */
+  STORE(faults.stale_times, tick->guard.stale_times);
+  STORE(faults.stale_ticks, tick->guard.stale_ticks);
+  STORE(hand.slewed_ticks, tick->guard.slewed_ticks);
+  STORE(hand.energy_ticks, tick->guard.energy_ticks);
+  STORE(loop.model, (int)tick->facts.model);
+  STORE(loop.hash, tick->hashing && tick->facts.tick > 0 ? tick->hash : 0);
+  STORE(loop.age_ns, age);
+  if (age > LOAD(loop.age_max_ns)) {
+    STORE(loop.age_max_ns, age);
+  }
+  STORE(hand.peak_force, tick->guard.peak_force);
+  STORE(solver.sweeps, tick->rows.sweeps);
+  STORE(solver.residual, tick->rows.residual_max);
+  STORE(solver.local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
+  STORE(hand.impulse_abs, tick->touches.hand_impulse_abs);
+  for (int i = 0; i < 3; ++i) {
+    STORE(hand.impulse[i], tick->touches.hand_impulse[i]);
+  }
+}
+
+/* Of a tick that has been reset. */
+static void figures_reset(hapi_haptic *haptic)
 {
   hapi_histogram_reset(&haptic->figures.loop.tick_ns);
   hapi_histogram_reset(&haptic->figures.loop.wake_ns);
-  STORE(loop.ticks, 0);
   STORE(loop.missed_ticks, 0);
   STORE(loop.models_adopted, 0);
   STORE(loop.contact_passes, 0);
-  STORE(solver.sweeps, 0);
-  STORE(solver.residual, 0.0);
-  STORE(solver.local_contacts, 0);
   STORE(loop.trace_dropped, 0);
-  STORE(hand.contact_ticks, 0);
-  STORE(hand.saturated_ticks, 0);
-  STORE(faults.count, 0);
-  STORE(faults.fault, HAP_FAULT_NONE);
-  STORE(faults.fault_pointer, 0);
-  STORE(faults.stale_times, 0);
-  STORE(faults.stale_ticks, 0);
-  STORE(hand.slewed_ticks, 0);
-  STORE(hand.energy_ticks, 0);
-  STORE(loop.hash, 0);
-  STORE(hand.peak_force, 0.0);
-  STORE(hand.impulse_abs, 0.0);
-  for (int i = 0; i < 3; ++i) {
-    STORE(hand.impulse[i], 0.0);
-  }
-  STORE(loop.age_ns, 0);
   STORE(loop.age_max_ns, 0);
+  figures_publish(haptic);
   atomic_store(&haptic->ring.read, 0);
   atomic_store(&haptic->ring.written, 0);
   atomic_store(&haptic->reset_fault, 0);
@@ -132,7 +136,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   memset(haptic->tick.pointers.of, 0,
          haptic->config.capacity.pointers * sizeof *haptic->tick.pointers.of);
   haptic->tick.pointers.high = 0;
-  reset_figures(haptic);
+  figures_reset(haptic);
   hapi_loop_effects_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);
   hapi_black_box_reset(&haptic->black_box);
@@ -211,15 +215,6 @@ static void take_messages(hapi_haptic *haptic)
   }
 }
 
-static void receive_patches(hapi_haptic *haptic, int64_t now_ns)
-{
-  if (haptic->pending_patches != NULL && now_ns >= haptic->pending_patches->valid_from_ns) {
-    hapi_tick_adopt_patches(&haptic->tick, haptic->pending_patches);
-    haptic->pending_patches = NULL;
-    STORE(loop.contact_passes, LOAD(loop.contact_passes) + 1);
-  }
-}
-
 static void messages_receive(hapi_haptic *haptic, int64_t now_ns)
 {
   take_messages(haptic);
@@ -232,7 +227,11 @@ static void messages_receive(hapi_haptic *haptic, int64_t now_ns)
     hapi_loop_note_effects(haptic);
     publish_poses(haptic); /* the contact thread looks for new bodies */
   }
-  receive_patches(haptic, now_ns);
+  if (haptic->pending_patches != NULL && now_ns >= haptic->pending_patches->valid_from_ns) {
+    hapi_tick_adopt_patches(&haptic->tick, haptic->pending_patches);
+    haptic->pending_patches = NULL;
+    STORE(loop.contact_passes, LOAD(loop.contact_passes) + 1);
+  }
 }
 
 void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
@@ -242,26 +241,22 @@ void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
   hapi_denormals_restore(before);
 }
 
-static void take_calls(hapi_haptic *haptic, hapi_loop_calls *out)
+/* What other threads want of the tick. */
+static void calls_follow(hapi_haptic *haptic)
 {
-  out->reset = atomic_load_explicit(&haptic->reset_fault, memory_order_acquire) != 0;
-  if (out->reset) {
+  hapi_loop_calls calls;
+  calls.reset = atomic_load_explicit(&haptic->reset_fault, memory_order_acquire) != 0;
+  if (calls.reset) {
     atomic_store_explicit(&haptic->reset_fault, 0, memory_order_relaxed);
   }
-  int outside = atomic_load_explicit(&haptic->outside_fault, memory_order_acquire);
-  out->outside_fault = (hap_fault)outside;
-  if (outside != HAP_FAULT_NONE) {
+  calls.outside_fault =
+      (hap_fault)atomic_load_explicit(&haptic->outside_fault, memory_order_acquire);
+  if (calls.outside_fault != HAP_FAULT_NONE) {
     atomic_store_explicit(&haptic->outside_fault, HAP_FAULT_NONE, memory_order_relaxed);
   }
   uint64_t emergencies = hapi_emergencies();
-  out->emergency = emergencies != haptic->emergencies;
+  calls.emergency = emergencies != haptic->emergencies;
   haptic->emergencies = emergencies;
-}
-
-static void follow_faults(hapi_haptic *haptic)
-{
-  hapi_loop_calls calls;
-  take_calls(haptic, &calls);
   hapi_tape_calls(haptic, &calls);
   if (calls.reset) {
     hapi_tick_reset_fault(&haptic->tick);
@@ -277,54 +272,17 @@ static void follow_faults(hapi_haptic *haptic)
   }
 }
 
-/* hap_pointer_id.v; 0: none. */
-static uint64_t fault_pointer(const hapi_tick *tick)
+static void time_note(hapi_haptic *haptic, int64_t begin_ns)
 {
-  return ((uint64_t)tick->guard.latch.generation << 32) | tick->guard.latch.pointer;
-}
-
-static void note_load(hapi_haptic *haptic, int64_t spent_ns)
-{
+  int64_t spent_ns = hapi_clock_now() - begin_ns;
+  hapi_histogram_add(&haptic->figures.loop.tick_ns, spent_ns);
+  hapi_loop_sample_end(haptic, spent_ns);
+  haptic->last_tick_us = 1e-3 * (double)spent_ns;
   if (haptic->tick_budget_ns > 0) {
     ++haptic->load.ticks;
     haptic->load.over += spent_ns > haptic->tick_budget_ns;
     haptic->load.spent_ns += (double)spent_ns;
   }
-}
-
-static void publish_figures(hapi_haptic *haptic, int64_t begin_ns)
-{
-  const hapi_tick *tick = &haptic->tick;
-  int64_t age = tick->facts.model_number != 0 ? tick->facts.now_ns - tick->facts.state_ns : 0;
-  STORE(loop.ticks, tick->facts.tick);
-  STORE(hand.contact_ticks, tick->touches.contact_ticks);
-  STORE(hand.saturated_ticks, tick->guard.saturated_ticks);
-  STORE(faults.count, tick->guard.latch.count);
-  STORE(faults.fault, (int)tick->guard.latch.fault);
-  STORE(faults.fault_pointer, fault_pointer(tick));
-  STORE(faults.stale_times, tick->guard.stale_times);
-  STORE(faults.stale_ticks, tick->guard.stale_ticks);
-  STORE(hand.slewed_ticks, tick->guard.slewed_ticks);
-  STORE(hand.energy_ticks, tick->guard.energy_ticks);
-  STORE(loop.model, (int)tick->facts.model);
-  STORE(loop.hash, tick->hashing ? tick->hash : 0);
-  STORE(loop.age_ns, age);
-  if (age > LOAD(loop.age_max_ns)) {
-    STORE(loop.age_max_ns, age);
-  }
-  STORE(hand.peak_force, tick->guard.peak_force);
-  STORE(solver.sweeps, tick->rows.sweeps);
-  STORE(solver.residual, tick->rows.residual_max);
-  STORE(solver.local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
-  STORE(hand.impulse_abs, tick->touches.hand_impulse_abs);
-  for (int i = 0; i < 3; ++i) {
-    STORE(hand.impulse[i], tick->touches.hand_impulse[i]);
-  }
-  int64_t spent = hapi_clock_now() - begin_ns;
-  hapi_histogram_add(&haptic->figures.loop.tick_ns, spent);
-  hapi_loop_sample_end(haptic, spent);
-  haptic->last_tick_us = 1e-3 * (double)spent;
-  note_load(haptic, spent);
 }
 
 static void note_tick(hapi_haptic *haptic)
@@ -345,7 +303,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
     hapi_tape_tick(haptic, now_ns);
   }
   hapi_pointers_follow(haptic);
-  follow_faults(haptic);
+  calls_follow(haptic);
   messages_receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
   hapi_tick_run(&haptic->tick, now_ns);
@@ -360,7 +318,8 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
   hapi_trace_ring_write(haptic);
-  publish_figures(haptic, begin_ns);
+  figures_publish(haptic);
+  time_note(haptic, begin_ns);
   hapi_denormals_restore(before);
 }
 
@@ -379,29 +338,24 @@ bool hapi_haptic_has_fault(const hapi_haptic *haptic)
   return LOAD(faults.fault) != HAP_FAULT_NONE;
 }
 
-static void fill_times(const hapi_haptic *haptic, hap_stats *out)
-{
-  const hapi_histogram *h = &haptic->figures.loop.tick_ns;
-  out->loop.tick_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
-  out->loop.tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
-  out->loop.tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
-  out->loop.tick_us_max = 1e-3 * hapi_histogram_max_ns(h);
-  out->loop.duty = 1e-6 * out->loop.tick_us_mean * haptic->config.haptic_hz;
-  h = &haptic->figures.loop.wake_ns;
-  out->loop.wake_us_mean = 1e-3 * hapi_histogram_mean_ns(h);
-  out->loop.wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(h, 0.5);
-  out->loop.wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(h, 0.99);
-  out->loop.wake_us_p999 = 1e-3 * hapi_histogram_quantile_ns(h, 0.999);
-  out->loop.wake_us_max = 1e-3 * hapi_histogram_max_ns(h);
-}
-
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
 {
+  const hapi_histogram *tick = &haptic->figures.loop.tick_ns;
+  const hapi_histogram *wake = &haptic->figures.loop.wake_ns;
   double impulse[3];
-  fill_times(haptic, out);
   for (int i = 0; i < 3; ++i) {
     impulse[i] = LOAD(hand.impulse[i]);
   }
+  out->loop.tick_us_mean = 1e-3 * hapi_histogram_mean_ns(tick);
+  out->loop.tick_us_p50 = 1e-3 * hapi_histogram_quantile_ns(tick, 0.5);
+  out->loop.tick_us_p99 = 1e-3 * hapi_histogram_quantile_ns(tick, 0.99);
+  out->loop.tick_us_max = 1e-3 * hapi_histogram_max_ns(tick);
+  out->loop.duty = 1e-6 * out->loop.tick_us_mean * haptic->config.haptic_hz;
+  out->loop.wake_us_mean = 1e-3 * hapi_histogram_mean_ns(wake);
+  out->loop.wake_us_p50 = 1e-3 * hapi_histogram_quantile_ns(wake, 0.5);
+  out->loop.wake_us_p99 = 1e-3 * hapi_histogram_quantile_ns(wake, 0.99);
+  out->loop.wake_us_p999 = 1e-3 * hapi_histogram_quantile_ns(wake, 0.999);
+  out->loop.wake_us_max = 1e-3 * hapi_histogram_max_ns(wake);
   out->loop.model = (uint32_t)LOAD(loop.model);
   out->loop.ticks = LOAD(loop.ticks);
   out->loop.missed_ticks = LOAD(loop.missed_ticks);

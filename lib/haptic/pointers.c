@@ -142,60 +142,53 @@ static bool is_ready(const hapi_pointer_slot *slot)
   return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
-static hap_device_info device_recalled(const hapi_joined_device *recorded)
+/* For a new user of the slot, whose def is in it. */
+static void slot_prepare(hapi_pointer_slot *slot)
 {
-  hap_device_info out;
-  memset(&out, 0, sizeof out);
-  out.size = sizeof out;
-  out.dof = recorded->dof;
-  memcpy(out.name, recorded->name, sizeof out.name);
-  out.max_force = recorded->max_force;
-  out.max_torque = recorded->max_torque;
-  out.rated_stiffness = recorded->rated_stiffness;
-  out.damping = recorded->damping;
-  out.quantum = recorded->quantum;
-  out.mass = recorded->mass;
-  out.friction = recorded->friction;
-  out.delay = recorded->delay;
-  out.measures_velocity = recorded->measures_velocity;
-  return out;
-}
-
-static void prepare_slot(hapi_pointer_slot *slot);
-
-/* One that was paused has the id that it had. */
-static void take_in(hapi_haptic *haptic, uint32_t index, const hapi_joined *joined,
-                    const hapi_tool_hull *hull)
-{
-  hapi_pointer_slot *slot = &haptic->slots[index];
-  slot->hull = *hull;
-  slot->def = joined->def;
-  slot->info = device_recalled(&joined->device);
-  slot->has_device = joined->has_device != 0;
-  if (atomic_load(&slot->phase) != HAPI_POINTER_PAUSED || slot->generation != joined->generation) {
-    prepare_slot(slot);
-    atomic_store(&slot->generation, joined->generation);
+  pthread_mutex_lock(&slot->lock);
+  atomic_fetch_add(&slot->generation, 1);
+  hapi_triple_init(&slot->target_buffer);
+  hapi_triple_init(&slot->state_buffer);
+  memset(slot->targets, 0, sizeof slot->targets);
+  memset(slot->states, 0, sizeof slot->states);
+  for (int i = 0; i < 3; ++i) {
+    slot->targets[i].pose.quat_wxyz[0] = 1.0;
+    slot->states[i].device.quat_wxyz[0] = 1.0;
+    slot->states[i].proxy.quat_wxyz[0] = 1.0;
+    slot->states[i].size = sizeof slot->states[i];
   }
-  pointer_activate(haptic, index);
-  atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
+  pthread_mutex_unlock(&slot->lock);
 }
 
 /* A replay has the pointers of the recording, and no devices. */
 static void follow_tape(hapi_haptic *haptic)
 {
   uint32_t index = 0;
+  bool pauses = false;
   hapi_joined joined;
+  hap_device_info info;
   hapi_tool_hull hull;
-  for (bool more = true; more;) {
-    bool pauses = false;
-    more = hapi_tape_next_leave(haptic, &index, &pauses);
-    if (more) {
+  for (;;) {
+    if (hapi_tape_next_leave(haptic, &index, &pauses)) {
       haptic->tick.pointers.of[index].generation = 0;
       atomic_store(&haptic->slots[index].phase, pauses ? HAPI_POINTER_PAUSED : HAPI_POINTER_EMPTY);
-    } else if (hapi_tape_next_join(haptic, &index, &joined, &hull)) {
-      take_in(haptic, index, &joined, &hull);
-      more = true;
+      continue;
     }
+    if (!hapi_tape_next_join(haptic, &index, &joined, &info, &hull)) {
+      return;
+    }
+    hapi_pointer_slot *slot = &haptic->slots[index];
+    slot->hull = hull;
+    slot->def = joined.def;
+    slot->info = info;
+    slot->has_device = joined.has_device != 0;
+    if (atomic_load(&slot->phase) != HAPI_POINTER_PAUSED ||
+        slot->generation != joined.generation) { /* one that was paused has the id that it had */
+      slot_prepare(slot);
+      atomic_store(&slot->generation, joined.generation);
+    }
+    pointer_activate(haptic, index);
+    atomic_store_explicit(&slot->phase, HAPI_POINTER_ACTIVE, memory_order_release);
   }
 }
 
@@ -304,17 +297,6 @@ void hapi_pointers_write(hapi_haptic *haptic)
   }
 }
 
-static void publish_coupling(const hapi_pointer *p, hap_pointer_state *out)
-{
-  double scale = p->device.motion_scale * p->device.force_scale;
-  hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
-  out->coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT;
-  out->coupling_reason = (uint32_t)p->coupling.reason;
-  out->coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0;
-  out->coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0;
-  out->contact_stiffness = scale * p->coupling.contact_stiffness;
-}
-
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
@@ -323,17 +305,24 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     if (p->generation == 0) {
       continue;
     }
-    hap_pointer_state *out = &slot->states[hapi_triple_back(&slot->state_buffer)];
-    out->size = sizeof *out;
-    out->contacts = p->contacts;
-    out->stamp_ns = haptic->tick.facts.now_ns;
-    out->device = p->device.good;
-    out->proxy = p->pose;
-    out->twist = p->twist;
-    out->wrench = p->wrench;
-    out->buttons = p->device.buttons;
-    publish_coupling(p, out);
-    out->guard = p->guard.flags;
+    double scale = p->device.motion_scale * p->device.force_scale;
+    hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
+    slot->states[hapi_triple_back(&slot->state_buffer)] = (hap_pointer_state){
+        .size = sizeof(hap_pointer_state),
+        .contacts = p->contacts,
+        .stamp_ns = haptic->tick.facts.now_ns,
+        .device = p->device.good,
+        .proxy = p->pose,
+        .twist = p->twist,
+        .wrench = p->wrench,
+        .buttons = p->device.buttons,
+        .coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT,
+        .coupling_reason = (uint32_t)p->coupling.reason,
+        .guard = p->guard.flags,
+        .coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0,
+        .coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0,
+        .contact_stiffness = scale * p->coupling.contact_stiffness,
+    };
     hapi_triple_publish(&slot->state_buffer);
   }
 }
@@ -428,34 +417,19 @@ bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id)
   return find_slot(haptic, id) != NULL;
 }
 
-static uint32_t free_slot(hapi_haptic *haptic)
+/* With its lock taken; NULL: it is not there, or it was removed in between. */
+static hapi_pointer_slot *slot_lock(hapi_haptic *haptic, hap_pointer_id id)
 {
-  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
-    if (atomic_load(&haptic->slots[i].phase) == HAPI_POINTER_EMPTY) {
-      return i;
-    }
+  hapi_pointer_slot *slot = find_slot(haptic, id);
+  if (slot == NULL) {
+    return NULL;
   }
-  return HAPI_SLOT_NONE;
-}
-
-/* For a new user of the slot, whose def is in it. */
-static void prepare_slot(hapi_pointer_slot *slot)
-{
-  pthread_mutex_lock(&slot->target_lock);
-  pthread_mutex_lock(&slot->state_lock);
-  atomic_fetch_add(&slot->generation, 1);
-  hapi_triple_init(&slot->target_buffer);
-  hapi_triple_init(&slot->state_buffer);
-  memset(slot->targets, 0, sizeof slot->targets);
-  memset(slot->states, 0, sizeof slot->states);
-  for (int i = 0; i < 3; ++i) {
-    slot->targets[i].pose.quat_wxyz[0] = 1.0;
-    slot->states[i].device.quat_wxyz[0] = 1.0;
-    slot->states[i].proxy.quat_wxyz[0] = 1.0;
-    slot->states[i].size = sizeof slot->states[i];
+  pthread_mutex_lock(&slot->lock);
+  if (find_slot(haptic, id) != slot) {
+    pthread_mutex_unlock(&slot->lock);
+    return NULL;
   }
-  pthread_mutex_unlock(&slot->state_lock);
-  pthread_mutex_unlock(&slot->target_lock);
+  return slot;
 }
 
 static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
@@ -474,7 +448,7 @@ static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
   if (def->device != NULL) {
     hap_device_get_info(def->device, &slot->info, sizeof slot->info);
   }
-  prepare_slot(slot);
+  slot_prepare(slot);
 }
 
 static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
@@ -505,8 +479,12 @@ static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_s
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup *def,
                                    hap_pointer_id *out, hap_detail *detail)
 {
-  uint32_t index = free_slot(haptic);
-  if (index == HAPI_SLOT_NONE) {
+  uint32_t index = 0;
+  while (index < haptic->config.capacity.pointers &&
+         atomic_load(&haptic->slots[index].phase) != HAPI_POINTER_EMPTY) {
+    ++index;
+  }
+  if (index == haptic->config.capacity.pointers) {
     return hapi_fail(detail, HAP_ERROR_CAPACITY,
                      "all %u pointers of the session are in use; raise max_pointers",
                      haptic->config.capacity.pointers);
@@ -552,9 +530,9 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   leave_loop(haptic, slot, HAPI_POINTER_LEAVING);
   stop_device(slot);
   if (slot->def.device != NULL) {
-    pthread_mutex_lock(&slot->target_lock); /* nobody is asking it to explain itself */
+    pthread_mutex_lock(&slot->lock); /* nobody is asking it to explain itself */
     hapi_device_release(slot->def.device);
-    pthread_mutex_unlock(&slot->target_lock);
+    pthread_mutex_unlock(&slot->lock);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
   return HAP_OK;
@@ -562,16 +540,15 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
 
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out)
 {
-  hapi_pointer_slot *slot = find_slot(haptic, id);
+  hapi_pointer_slot *slot = slot_lock(haptic, id);
   out->text[0] = '\0';
   if (slot == NULL) {
     return;
   }
-  pthread_mutex_lock(&slot->target_lock);
-  if (find_slot(haptic, id) == slot && slot->ops != NULL) { /* not removed in between */
+  if (slot->ops != NULL) {
     hapi_device_explain(slot->ops, slot->self, out);
   }
-  pthread_mutex_unlock(&slot->target_lock);
+  pthread_mutex_unlock(&slot->lock);
 }
 
 /* Not in the loop's thread: start may block. */
@@ -598,42 +575,29 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist)
 {
-  hapi_pointer_slot *slot = find_slot(haptic, id);
+  const hap_twist rest = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hapi_pointer_slot *slot = slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
-  if (slot->ops != NULL) {
-    return HAP_ERROR_STATE;
+  bool free = slot->ops == NULL;
+  if (free) {
+    slot->targets[hapi_triple_back(&slot->target_buffer)] =
+        (hapi_pointer_target){*pose, twist != NULL ? *twist : rest};
+    hapi_triple_publish(&slot->target_buffer);
   }
-  pthread_mutex_lock(&slot->target_lock);
-  if (find_slot(haptic, id) != slot) { /* removed in between */
-    pthread_mutex_unlock(&slot->target_lock);
-    return HAP_ERROR_NOT_FOUND;
-  }
-  hapi_pointer_target *target = &slot->targets[hapi_triple_back(&slot->target_buffer)];
-  memset(target, 0, sizeof *target);
-  target->pose = *pose;
-  if (twist != NULL) {
-    target->twist = *twist;
-  }
-  hapi_triple_publish(&slot->target_buffer);
-  pthread_mutex_unlock(&slot->target_lock);
-  return HAP_OK;
+  pthread_mutex_unlock(&slot->lock);
+  return free ? HAP_OK : HAP_ERROR_STATE;
 }
 
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out)
 {
-  hapi_pointer_slot *slot = find_slot(haptic, id);
+  hapi_pointer_slot *slot = slot_lock(haptic, id);
   if (slot == NULL) {
-    return HAP_ERROR_NOT_FOUND;
-  }
-  pthread_mutex_lock(&slot->state_lock);
-  if (find_slot(haptic, id) != slot) { /* removed in between */
-    pthread_mutex_unlock(&slot->state_lock);
     return HAP_ERROR_NOT_FOUND;
   }
   hapi_triple_take(&slot->state_buffer);
   *out = slot->states[hapi_triple_front(&slot->state_buffer)];
-  pthread_mutex_unlock(&slot->state_lock);
+  pthread_mutex_unlock(&slot->lock);
   return HAP_OK;
 }

@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
-#include "base/vec.h"
 #include "haptic/haptic_internal.h"
 
 /* The loop's part of a recording: all that a tick has from outside is put on the tape, or in a
@@ -91,70 +91,66 @@ void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches)
 
 /* ---- pointers come and go ---- */
 
-static void put_hull(hapi_haptic *haptic, uint32_t index)
+static void hull_move(hapi_tape *tape, uint32_t index, hapi_tool_hull *io)
 {
-  const hapi_tool_hull *hull = &haptic->slots[index].hull;
-  for (uint32_t i = 0; i < hull->count; i += 2) {
-    hapi_cell *cell = hapi_tape_put(haptic->tape, HAPI_CELL_HULL, index);
-    memset(cell->d, 0, sizeof cell->d);
-    hapi_v3_copy(hull->points[i], cell->d);
-    if (i + 1 < hull->count) {
-      hapi_v3_copy(hull->points[i + 1], cell->d + 3);
-    }
+  for (uint32_t i = 0; i < io->count; i += 2) {
+    size_t size = (i + 1 < io->count ? 2 : 1) * sizeof io->points[0];
+    hapi_tape_move(tape, hapi_tape_next(tape, HAPI_CELL_HULL, index)->d,
+                   (char *)io->points + i * sizeof io->points[0], size);
   }
 }
 
-static void get_hull(hapi_haptic *haptic, uint32_t index, uint32_t count, hapi_tool_hull *out)
+static void joined_move(hapi_tape *tape, uint32_t index, hapi_joined *io)
 {
-  out->count = count <= HAPI_TOOL_POINTS_MAX ? count : 0;
-  for (uint32_t i = 0; i < out->count; i += 2) {
-    const hapi_cell *cell = hapi_tape_get(haptic->tape, HAPI_CELL_HULL, index);
-    hapi_v3_copy(cell->d, out->points[i]);
-    if (i + 1 < out->count) {
-      hapi_v3_copy(cell->d + 3, out->points[i + 1]);
-    }
+  char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES] = {0};
+  memcpy(bytes, io, sizeof *io);
+  for (uint32_t i = 0; i < HAPI_JOIN_CELLS; ++i) {
+    hapi_tape_move(tape, hapi_tape_next(tape, HAPI_CELL_JOIN, index)->d,
+                   bytes + i * HAPI_CELL_BYTES, HAPI_CELL_BYTES);
   }
+  memcpy(io, bytes, sizeof *io);
 }
 
-static hapi_joined_device device_recorded(const hap_device_info *info)
+/* What the file has of a device. */
+#define FIGURE(member)                                                       \
+  {                                                                          \
+    offsetof(hapi_joined_device, member), offsetof(hap_device_info, member), \
+        sizeof(((hap_device_info *)0)->member)                               \
+  }
+
+static void device_move(const hapi_tape *tape, hapi_joined_device *in_cell, hap_device_info *io)
 {
-  hapi_joined_device out;
-  memset(&out, 0, sizeof out); /* also what is between members */
-  memcpy(out.name, info->name, sizeof out.name);
-  out.dof = info->dof;
-  out.max_force = info->max_force;
-  out.max_torque = info->max_torque;
-  out.rated_stiffness = info->rated_stiffness;
-  out.damping = info->damping;
-  out.quantum = info->quantum;
-  out.mass = info->mass;
-  out.friction = info->friction;
-  out.delay = info->delay;
-  out.measures_velocity = info->measures_velocity;
-  return out;
+  static const struct {
+    size_t joined;
+    size_t info;
+    size_t size;
+  } figures[] = {
+      FIGURE(name),     FIGURE(dof),     FIGURE(max_force),         FIGURE(max_torque),
+      FIGURE(mass),     FIGURE(damping), FIGURE(quantum),           FIGURE(rated_stiffness),
+      FIGURE(friction), FIGURE(delay),   FIGURE(measures_velocity),
+  };
+  for (size_t i = 0; i < sizeof figures / sizeof figures[0]; ++i) {
+    hapi_tape_move(tape, (char *)in_cell + figures[i].joined, (char *)io + figures[i].info,
+                   figures[i].size);
+  }
 }
 
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
 {
-  const hapi_pointer_slot *slot = &haptic->slots[index];
-  char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES] = {0};
+  hapi_pointer_slot *slot = &haptic->slots[index];
   hapi_joined joined;
   if (!hapi_tape_records(haptic->tape)) {
     return;
   }
-  memset(&joined, 0, sizeof joined);
+  memset(&joined, 0, sizeof joined); /* also what is between members */
   joined.def = slot->def;
   joined.def.device = NULL;
   joined.def.hull_xyz = NULL;
-  joined.device = device_recorded(&slot->info);
+  device_move(haptic->tape, &joined.device, &slot->info);
   joined.generation = slot->generation;
   joined.has_device = slot->has_device;
-  memcpy(bytes, &joined, sizeof joined);
-  for (uint32_t i = 0; i < HAPI_JOIN_CELLS; ++i) {
-    memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_JOIN, index)->d, bytes + i * HAPI_CELL_BYTES,
-           HAPI_CELL_BYTES);
-  }
-  put_hull(haptic, index);
+  joined_move(haptic->tape, index, &joined);
+  hull_move(haptic->tape, index, &slot->hull);
 }
 
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses)
@@ -177,20 +173,21 @@ bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pa
 }
 
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
-                         hapi_tool_hull *out_hull)
+                         hap_device_info *out_info, hapi_tool_hull *out_hull)
 {
   hapi_tape *tape = haptic->tape;
-  char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES];
   if (!hapi_tape_next_is(tape, HAPI_CELL_JOIN)) {
     return false;
   }
   *out_index = tape->packet_cells[tape->packet_at].index;
-  for (uint32_t i = 0; i < HAPI_JOIN_CELLS; ++i) {
-    memcpy(bytes + i * HAPI_CELL_BYTES, hapi_tape_get(tape, HAPI_CELL_JOIN, *out_index)->d,
-           HAPI_CELL_BYTES);
-  }
-  memcpy(out, bytes, sizeof *out);
-  get_hull(haptic, *out_index, (uint32_t)out->def.hull_points, out_hull);
+  memset(out, 0, sizeof *out);
+  joined_move(tape, *out_index, out);
+  memset(out_info, 0, sizeof *out_info);
+  out_info->size = sizeof *out_info;
+  device_move(tape, &out->device, out_info);
+  uint32_t points = (uint32_t)out->def.hull_points;
+  out_hull->count = points <= HAPI_TOOL_POINTS_MAX ? points : 0;
+  hull_move(tape, *out_index, out_hull);
   return !tape->broken && *out_index < haptic->config.capacity.pointers;
 }
 
@@ -198,32 +195,20 @@ bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *
 
 void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io)
 {
-  if (hapi_tape_records(haptic->tape)) {
-    hapi_cell *pose = hapi_tape_put(haptic->tape, HAPI_CELL_POSE, index);
-    pose->flags = io->failed ? HAPI_CELL_FAILED : 0;
-    pose->word = io->buttons;
-    memcpy(pose->d, &io->pose, sizeof io->pose);
-    memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_TWIST, index)->d, &io->twist, sizeof io->twist);
-  } else if (hapi_tape_plays(haptic->tape)) {
-    const hapi_cell *pose = hapi_tape_get(haptic->tape, HAPI_CELL_POSE, index);
-    io->failed = (pose->flags & HAPI_CELL_FAILED) != 0;
-    io->buttons = pose->word;
-    memcpy(&io->pose, pose->d, sizeof io->pose);
-    memcpy(&io->twist, hapi_tape_get(haptic->tape, HAPI_CELL_TWIST, index)->d, sizeof io->twist);
-  }
+  hapi_tape *tape = haptic->tape;
+  hapi_cell *pose = hapi_tape_next(tape, HAPI_CELL_POSE, index);
+  hapi_tape_move_flag(tape, pose, HAPI_CELL_FAILED, &io->failed);
+  hapi_tape_move(tape, &pose->word, &io->buttons, sizeof io->buttons);
+  hapi_tape_move(tape, pose->d, &io->pose, sizeof io->pose);
+  hapi_tape_move(tape, hapi_tape_next(tape, HAPI_CELL_TWIST, index)->d, &io->twist,
+                 sizeof io->twist);
 }
 
 static uint64_t hash_pointer(const hapi_pointer *p)
 {
   uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, p->device.buttons);
-  hash = hapi_hash_doubles(hash, p->device.pose.position, 3);
-  hash = hapi_hash_doubles(hash, p->device.pose.quat_wxyz, 4);
-  hash = hapi_hash_doubles(hash, p->device.twist.linear, 3);
-  hash = hapi_hash_doubles(hash, p->device.twist.angular, 3);
-  hash = hapi_hash_doubles(hash, p->pose.position, 3);
-  hash = hapi_hash_doubles(hash, p->pose.quat_wxyz, 4);
-  hash = hapi_hash_doubles(hash, p->twist.linear, 3);
-  hash = hapi_hash_doubles(hash, p->twist.angular, 3);
+  hash = hapi_hash_motion(hash, &p->device.pose, &p->device.twist);
+  hash = hapi_hash_motion(hash, &p->pose, &p->twist);
   hash = hapi_hash_doubles(hash, p->wrench.force, 3);
   hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
   return hapi_hash_doubles(hash, p->device.wrench.torque, 3);
@@ -242,32 +227,30 @@ static void cell_compare(hapi_haptic *haptic, hapi_difference *difference, const
 
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io)
 {
+  hapi_tape *tape = haptic->tape;
   const hapi_pointer *p = &haptic->tick.pointers.of[index];
-  uint64_t hash =
-      hapi_tape_records(haptic->tape) || hapi_tape_plays(haptic->tape) ? hash_pointer(p) : 0;
-  if (hapi_tape_records(haptic->tape)) {
-    hapi_cell *force = hapi_tape_put(haptic->tape, HAPI_CELL_FORCE, index);
-    force->flags = io->failed ? HAPI_CELL_FAILED : 0;
-    memcpy(force->d, &p->device.wrench, sizeof p->device.wrench);
+  uint64_t hash = hash_pointer(p);
+  double wrench[6];
+  double reached[6]; /* bit by bit: no padding in it */
+  memcpy(wrench, &p->device.wrench, sizeof wrench);
+  memcpy(reached, &io->reached, sizeof reached);
+  hapi_cell *force = hapi_tape_next(tape, HAPI_CELL_FORCE, index);
+  hapi_tape_move_flag(tape, force, HAPI_CELL_FAILED, &io->failed);
+  if (hapi_tape_records(tape)) {
+    memcpy(force->d, wrench, sizeof wrench);
     force->u[6] = hash;
-    const void *reached = &io->reached; /* bit by bit: no padding in it */
-    if (memcmp(reached, &p->device.wrench, sizeof io->reached) != 0) {
-      memcpy(hapi_tape_put(haptic->tape, HAPI_CELL_REACHED, index)->d, &io->reached,
-             sizeof io->reached);
+    if (memcmp(reached, wrench, sizeof reached) != 0) {
+      memcpy(hapi_tape_put(tape, HAPI_CELL_REACHED, index)->d, reached, sizeof reached);
     }
-  } else if (hapi_tape_plays(haptic->tape)) {
-    const hapi_cell *force = hapi_tape_get(haptic->tape, HAPI_CELL_FORCE, index);
-    io->failed = (force->flags & HAPI_CELL_FAILED) != 0;
-    if (force->u[6] != hash) {
-      double wrench[6];
-      hapi_difference difference = {.what = HAPI_DIFFERS_POINTER,
-                                    .number = ((uint64_t)p->generation << 32) | (index + 1)};
-      memcpy(wrench, &p->device.wrench, sizeof wrench);
-      cell_compare(haptic, &difference, force, wrench, 6);
-    }
-    if (hapi_tape_next_is(haptic->tape, HAPI_CELL_REACHED)) {
-      (void)hapi_tape_get(haptic->tape, HAPI_CELL_REACHED, index);
-    }
+    return;
+  }
+  if (force->u[6] != hash) {
+    hapi_difference difference = {.what = HAPI_DIFFERS_POINTER,
+                                  .number = ((uint64_t)p->generation << 32) | (index + 1)};
+    cell_compare(haptic, &difference, force, wrench, 6);
+  }
+  if (hapi_tape_next_is(tape, HAPI_CELL_REACHED)) {
+    (void)hapi_tape_get(tape, HAPI_CELL_REACHED, index);
   }
 }
 
@@ -285,32 +268,21 @@ static uint64_t hash_tick(const hapi_tick *tick)
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
     const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
     hash = hapi_hash_word(hash, tick->bodies.live[i]);
-    hash = hapi_hash_doubles(hash, body->pose.position, 3);
-    hash = hapi_hash_doubles(hash, body->pose.quat_wxyz, 4);
-    hash = hapi_hash_doubles(hash, body->twist.linear, 3);
-    hash = hapi_hash_doubles(hash, body->twist.angular, 3);
+    hash = hapi_hash_motion(hash, &body->pose, &body->twist);
   }
   return hash;
 }
 
 /* Of many bodies one part after the other. */
-static uint32_t first_body(hapi_haptic *haptic, uint32_t *out_end)
-{
-  uint32_t count = haptic->tick.bodies.live_count;
-  uint32_t parts = (count + HAPI_CELL_BODIES - 1) / HAPI_CELL_BODIES;
-  uint32_t first = parts > 1 ? haptic->turn++ % parts * HAPI_CELL_BODIES : 0;
-  *out_end = first + HAPI_CELL_BODIES < count ? first + HAPI_CELL_BODIES : count;
-  return first;
-}
-
 static void put_bodies(hapi_haptic *haptic)
 {
-  const hapi_tick *tick = &haptic->tick;
-  uint32_t end = 0;
-  for (uint32_t i = first_body(haptic, &end); i < end; ++i) {
+  const hapi_bodies *bodies = &haptic->tick.bodies;
+  uint32_t parts = (bodies->live_count + HAPI_CELL_BODIES - 1) / HAPI_CELL_BODIES;
+  uint32_t first = parts > 1 ? haptic->turn++ % parts * HAPI_CELL_BODIES : 0;
+  for (uint32_t i = first; i < first + HAPI_CELL_BODIES && i < bodies->live_count; ++i) {
     hapi_cell *cell = hapi_tape_put(haptic->tape, HAPI_CELL_BODY, 0);
-    cell->word = tick->bodies.live[i];
-    memcpy(cell->d, &tick->bodies.of[tick->bodies.live[i]].pose, sizeof(hap_pose));
+    cell->word = bodies->live[i];
+    memcpy(cell->d, &bodies->of[bodies->live[i]].pose, sizeof(hap_pose));
   }
 }
 

@@ -2,31 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include <string.h>
 
-#include "base/alloc.h"
 #include "haptic/haptic_internal.h"
 #include "tick/report.h"
-
-hap_status hapi_trace_ring_create(hapi_trace_ring *ring, uint32_t capacity)
-{
-  ring->capacity = capacity;
-  ring->rows = NULL;
-  if (capacity == 0) {
-    return HAP_OK;
-  }
-  ring->rows = hapi_alloc_array(capacity, sizeof *ring->rows);
-  if (ring->rows == NULL) {
-    return HAP_ERROR_MEMORY;
-  }
-  memset(ring->rows, 0, capacity * sizeof *ring->rows); /* so that no tick touches new memory */
-  return HAP_OK;
-}
-
-void hapi_trace_ring_finish(hapi_trace_ring *ring)
-{
-  hapi_free(ring->rows);
-  ring->rows = NULL;
-  ring->capacity = 0;
-}
 
 void hapi_trace_ring_write(hapi_haptic *haptic)
 {

@@ -17,12 +17,8 @@ hap_status hapi_tape_create(hapi_tape *tape, uint32_t cells, _Atomic int *ended)
     tape->capacity *= 2;
   }
   tape->ended = ended;
-  tape->cells = hapi_alloc_array(tape->capacity, sizeof *tape->cells);
-  if (tape->cells == NULL) {
-    return HAP_ERROR_MEMORY;
-  }
-  memset(tape->cells, 0, tape->capacity * sizeof *tape->cells); /* no tick touches new memory */
-  return HAP_OK;
+  tape->cells = hapi_alloc_array(tape->capacity, sizeof *tape->cells); /* written once with zeros */
+  return tape->cells != NULL ? HAP_OK : HAP_ERROR_MEMORY;
 }
 
 void hapi_tape_finish(hapi_tape *tape)
@@ -117,6 +113,30 @@ const hapi_cell *hapi_tape_get(hapi_tape *tape, hapi_cell_kind kind, uint32_t in
     return &tape->waste;
   }
   return &tape->packet_cells[tape->packet_at++];
+}
+
+hapi_cell *hapi_tape_next(hapi_tape *tape, hapi_cell_kind kind, uint32_t index)
+{
+  if (hapi_tape_records(tape)) {
+    return hapi_tape_put(tape, kind, index);
+  }
+  tape->waste = *hapi_tape_get(tape, kind, index);
+  return &tape->waste;
+}
+
+void hapi_tape_move(const hapi_tape *tape, void *in_cell, void *io, size_t size)
+{
+  bool records = hapi_tape_records(tape);
+  memcpy(records ? in_cell : io, records ? io : in_cell, size);
+}
+
+void hapi_tape_move_flag(const hapi_tape *tape, hapi_cell *cell, uint16_t flag, bool *io)
+{
+  if (hapi_tape_records(tape)) {
+    cell->flags = (uint16_t)(cell->flags | (*io ? flag : 0));
+  } else {
+    *io = (cell->flags & flag) != 0;
+  }
 }
 
 void hapi_tape_differ(hapi_tape *tape, const hapi_difference *difference)

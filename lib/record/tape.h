@@ -100,6 +100,11 @@ void hapi_tape_commit(hapi_tape *tape);
  * is broken then. */
 const hapi_cell *hapi_tape_get(hapi_tape *tape, hapi_cell_kind kind, uint32_t index);
 bool hapi_tape_next_is(const hapi_tape *tape, hapi_cell_kind kind);
+/* Either way: RECORD puts a cell and fills it in from *io, PLAY gets one and fills *io in from it.
+ * The cell is valid until the next one. */
+hapi_cell *hapi_tape_next(hapi_tape *tape, hapi_cell_kind kind, uint32_t index);
+void hapi_tape_move(const hapi_tape *tape, void *in_cell, void *io, size_t size);
+void hapi_tape_move_flag(const hapi_tape *tape, hapi_cell *cell, uint16_t flag, bool *io);
 /* Notes the first difference of the packet. Those with values count more than those without. */
 void hapi_tape_differ(hapi_tape *tape, const hapi_difference *difference);
 

@@ -50,24 +50,29 @@ static void pointers_adopt(hapi_pointers *pointers, hapi_model *model)
   pointers->proxies = proxies;
 }
 
-static void solver_adopt(hapi_solver *solver, const hapi_model *model)
+void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
 {
+  hapi_tick_facts *facts = &tick->facts;
+  hapi_solver *solver = &tick->rows.solver;
+  hapi_tick_watch *watch = &tick->watch;
+  double age_s = 1e-9 * (double)(now_ns - model->state_ns);
+  age_s = age_s > 0.1 ? 0.1 : age_s < -0.1 ? -0.1 : age_s;
+  HAPI_ASSERT(model->body_count <= tick->capacity.bodies);
+  HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
+  HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
+  HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
+  hapi_local_bodies_adopt(&tick->bodies, model, age_s, facts);
   solver->max_sweeps = model->max_sweeps;
   if (model->row_updates > 0) {
     solver->update_budget = model->row_updates;
   }
-}
-
-static void watch_adopt(hapi_tick_watch *watch, const hapi_model *model)
-{
-  watch->count = model->watch_count;
-  memcpy(watch->slot, model->watch_slot, sizeof watch->slot);
-  memcpy(watch->position, model->watch_position, sizeof watch->position);
-}
-
-static void facts_adopt(hapi_tick_facts *facts, const hapi_model *model, int64_t now_ns,
-                        bool observes)
-{
+  bool observes = model_observes(&tick->pointers, model);
+  if (observes && !facts->observes) {
+    hapi_energy_resume(&tick->guard, &tick->pointers, facts->now_ns);
+  }
+  pointers_adopt(&tick->pointers, model);
+  hapi_touches_adopt(&tick->touches, &tick->pointers, &tick->bodies, model);
+  hapi_joints_adopt(&tick->joints, model);
   facts->wishes = model->wishes;
   facts->bounces = model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION);
   facts->observes = observes;
@@ -79,27 +84,9 @@ static void facts_adopt(hapi_tick_facts *facts, const hapi_model *model, int64_t
   facts->state_ns = model->state_ns;
   facts->sent_ns = model->sent_ns;
   facts->physics_period = model->period_s;
-}
-
-void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
-{
-  double age_s = 1e-9 * (double)(now_ns - model->state_ns);
-  age_s = age_s > 0.1 ? 0.1 : age_s < -0.1 ? -0.1 : age_s;
-  HAPI_ASSERT(model->body_count <= tick->capacity.bodies);
-  HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
-  HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
-  HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
-  hapi_local_bodies_adopt(&tick->bodies, model, age_s, &tick->facts);
-  solver_adopt(&tick->rows.solver, model);
-  bool observes = model_observes(&tick->pointers, model);
-  if (observes && !tick->facts.observes) {
-    hapi_energy_resume(&tick->guard, &tick->pointers, tick->facts.now_ns);
-  }
-  pointers_adopt(&tick->pointers, model);
-  hapi_touches_adopt(&tick->touches, &tick->pointers, &tick->bodies, model);
-  hapi_joints_adopt(&tick->joints, model);
-  facts_adopt(&tick->facts, model, now_ns, observes);
-  watch_adopt(&tick->watch, model);
+  watch->count = model->watch_count;
+  memcpy(watch->slot, model->watch_slot, sizeof watch->slot);
+  memcpy(watch->position, model->watch_position, sizeof watch->position);
 }
 
 void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches)

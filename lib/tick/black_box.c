@@ -13,68 +13,67 @@ void hapi_black_box_reset(hapi_black_box *box)
   atomic_store(&box->state, HAPI_BOX_FILLING);
 }
 
-static void row_fill(const hapi_tick *tick, uint32_t index, hap_black_box_row *out)
-{
-  const hapi_pointer *p = &tick->pointers.of[index];
-  out->tick = tick->facts.tick - 1; /* the one that has just been run */
-  out->time_ns = tick->facts.now_ns;
-  out->pointer.v = ((uint64_t)p->generation << 32) | (index + 1);
-  out->fault = (uint32_t)tick->guard.latch.fault;
-  out->guard = p->guard.flags;
-  out->pose = p->device.pose;
-  out->twist = p->device.twist;
-  out->wanted = p->guard.wanted;
-  out->written = p->guard.written;
-  out->model_age_s = tick->facts.model_number != 0
-                         ? 1e-9 * (double)(tick->facts.now_ns - tick->facts.state_ns)
-                         : 0.0;
-}
-
-static void fill_tick(hapi_black_box *box, const hapi_tick *tick)
+static void tick_fill(hapi_black_box *box, const hapi_tick *tick)
 {
   uint32_t count = 0;
   box->newest = (box->newest + 1) % HAP_BLACK_BOX_TICKS;
   hap_black_box_row *rows = box->rows + (size_t)box->newest * box->pointers;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    if (tick->pointers.of[i].generation != 0) {
-      row_fill(tick, i, &rows[count++]);
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      rows[count++] = (hap_black_box_row){
+          .tick = tick->facts.tick - 1, /* the one that has just been run */
+          .time_ns = tick->facts.now_ns,
+          .pointer.v = ((uint64_t)p->generation << 32) | (i + 1),
+          .fault = (uint32_t)tick->guard.latch.fault,
+          .guard = p->guard.flags,
+          .pose = p->device.pose,
+          .twist = p->device.twist,
+          .wanted = p->guard.wanted,
+          .written = p->guard.written,
+          .model_age_s = tick->facts.model_number != 0
+                             ? 1e-9 * (double)(tick->facts.now_ns - tick->facts.state_ns)
+                             : 0.0,
+      };
     }
   }
   box->counts[box->newest] = count;
 }
 
-/* The rows belong to the loop again, unless they are being read. */
-static bool begin_anew(hapi_black_box *box)
+/* Takes a frozen box; false: it is not frozen, or the other side has it. */
+static bool box_take(hapi_black_box *box, int state)
 {
   int frozen = HAPI_BOX_FROZEN;
-  if (!atomic_compare_exchange_strong_explicit(&box->state, &frozen, HAPI_BOX_FILLING,
-                                               memory_order_acquire, memory_order_relaxed)) {
-    return false;
-  }
-  memset(box->counts, 0, HAP_BLACK_BOX_TICKS * sizeof *box->counts);
-  return true;
+  return atomic_compare_exchange_strong_explicit(&box->state, &frozen, state, memory_order_acquire,
+                                                 memory_order_relaxed);
 }
 
 void hapi_black_box_record(hapi_black_box *box, const hapi_tick *tick)
 {
-  bool filling = atomic_load_explicit(&box->state, memory_order_relaxed) == HAPI_BOX_FILLING;
-  bool told = tick->guard.latch.fault != HAP_FAULT_NONE && tick->guard.latch.count == box->faults;
-  if (!filling && (told || !begin_anew(box))) {
-    return;
+  const hapi_fault_latch *latch = &tick->guard.latch;
+  if (atomic_load_explicit(&box->state, memory_order_relaxed) != HAPI_BOX_FILLING) {
+    bool told = latch->fault != HAP_FAULT_NONE && latch->count == box->faults;
+    if (told || !box_take(box, HAPI_BOX_FILLING)) {
+      return;
+    }
+    memset(box->counts, 0, HAP_BLACK_BOX_TICKS * sizeof *box->counts);
   }
-  fill_tick(box, tick);
-  if (tick->guard.latch.fault != HAP_FAULT_NONE) {
-    box->faults = tick->guard.latch.count;
+  tick_fill(box, tick);
+  if (latch->fault != HAP_FAULT_NONE) {
+    box->faults = latch->count;
     atomic_store_explicit(&box->state, HAPI_BOX_FROZEN, memory_order_release);
   }
 }
 
-static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
-                        size_t size_of_row)
+size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
+                           size_t size_of_row)
 {
   size_t size = size_of_row < sizeof *rows ? size_of_row : sizeof *rows;
   size_t total = 0;
   size_t taken = 0;
+  if (!box_take(box, HAPI_BOX_READING)) {
+    return 0;
+  }
   for (uint32_t i = 0; i < HAP_BLACK_BOX_TICKS; ++i) {
     total += box->counts[i];
   }
@@ -90,18 +89,6 @@ static size_t rows_copy(const hapi_black_box *box, hap_black_box_row *rows, size
       }
     }
   }
-  return taken;
-}
-
-size_t hapi_black_box_read(hapi_black_box *box, hap_black_box_row *rows, size_t capacity,
-                           size_t size_of_row)
-{
-  int frozen = HAPI_BOX_FROZEN;
-  if (!atomic_compare_exchange_strong_explicit(&box->state, &frozen, HAPI_BOX_READING,
-                                               memory_order_acquire, memory_order_relaxed)) {
-    return 0;
-  }
-  size_t count = rows_copy(box, rows, capacity, size_of_row);
   atomic_store_explicit(&box->state, HAPI_BOX_FROZEN, memory_order_release);
-  return count;
+  return taken;
 }

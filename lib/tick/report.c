@@ -105,23 +105,19 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   report_pointers(&tick->pointers, out);
 }
 
-/* The loop gave the body something that the world has not had yet. */
-static bool has_news(const hapi_local_body *body)
-{
-  return memcmp(body->account.impulse, body->given.impulse_taken, sizeof body->account.impulse) !=
-             0 ||
-         memcmp(body->account.angular_impulse, body->given.impulse_taken + 3,
-                sizeof body->account.angular_impulse) != 0;
-}
-
 /* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body
- * that it does not own and gave nothing takes the world's state then. */
+ * that it does not own, and gave nothing that the world has not had yet, takes the world's state
+ * then. */
 static bool loop_leads(hap_model model, const hapi_local_body *body)
 {
   if (!body->live || (body->flags & HAPI_BODY_DRIVEN) != 0 || model == HAP_MODEL_IMPULSE) {
     return false;
   }
-  return model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 || has_news(body);
+  const double *taken = body->given.impulse_taken;
+  return model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
+         memcmp(body->account.impulse, taken, sizeof body->account.impulse) != 0 ||
+         memcmp(body->account.angular_impulse, taken + 3, sizeof body->account.angular_impulse) !=
+             0;
 }
 
 static void store_position(_Atomic double *to, const double from[3])
@@ -235,17 +231,6 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
 
 /* ---- the trace ---- */
 
-static void trace_bodies(const hapi_tick_watch *watch, const hapi_bodies *bodies,
-                         hap_trace_row *out)
-{
-  out->body_count = watch->count;
-  for (uint32_t i = 0; i < watch->count; ++i) {
-    uint32_t slot = watch->slot[i];
-    const double *at = slot == HAPI_SLOT_NONE ? watch->position[i] : bodies->of[slot].pose.position;
-    hapi_v3_copy(at, out->body_position[i]);
-  }
-}
-
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
 {
   out->tick = tick->facts.tick - 1; /* the one that has just been run */
@@ -260,7 +245,13 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
     hapi_v3_copy(p->wrench.force, out->pointers[i].force);
     hapi_v3_copy(p->wrench.torque, out->pointers[i].torque);
   }
-  trace_bodies(&tick->watch, &tick->bodies, out);
+  out->body_count = tick->watch.count;
+  for (uint32_t i = 0; i < tick->watch.count; ++i) {
+    uint32_t slot = tick->watch.slot[i];
+    hapi_v3_copy(
+        slot == HAPI_SLOT_NONE ? tick->watch.position[i] : tick->bodies.of[slot].pose.position,
+        out->body_position[i]);
+  }
 }
 
 uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
@@ -275,10 +266,7 @@ uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
   }
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
     const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[i]];
-    hash = hapi_hash_doubles(hash, body->pose.position, 3);
-    hash = hapi_hash_doubles(hash, body->pose.quat_wxyz, 4);
-    hash = hapi_hash_doubles(hash, body->twist.linear, 3);
-    hash = hapi_hash_doubles(hash, body->twist.angular, 3);
+    hash = hapi_hash_motion(hash, &body->pose, &body->twist);
   }
   return hash;
 }

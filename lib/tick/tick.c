@@ -13,95 +13,77 @@
 #include "pointer/proxy.h"
 #include "tick/report.h"
 
-/* ---- reset: arrays stay, and every page of theirs is touched once, so that no tick is the first
- * ---- */
-
-static void bodies_reset(hapi_bodies *bodies, const hapi_capacity *c)
-{
-  *bodies = (hapi_bodies){.of = bodies->of, .live = bodies->live};
-  memset(bodies->of, 0, c->bodies * sizeof *bodies->of);
-  memset(bodies->live, 0, c->bodies * sizeof *bodies->live);
-}
-
-static void tools_reset(hapi_tool_world *w, const hapi_capacity *c)
-{
-  size_t tools = (size_t)2 * c->tool_points;
-  w->count = w->pair_count = 0;
-  w->capacity = c->tool_points;
-  if (tools > 0) {
-    memset(w->tools, 0, tools * sizeof *w->tools);
-    memset(w->old_tools, 0, tools * sizeof *w->old_tools);
-    memset(w->old_contacts, 0, tools * sizeof *w->old_contacts);
-    memset(w->pairs, 0, HAPI_TOOL_PAIRS(c) * sizeof *w->pairs);
+#define ARRAY(member, count)                      \
+  {                                               \
+    &tick->member, count, sizeof *tick->member, 0 \
   }
+
+void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
+{
+  const hapi_capacity *c = &tick->capacity;
+  const size_t tools = (size_t)2 * c->tool_points;
+  const size_t places = (size_t)c->bodies + c->pointers + 1; /* and the static world */
+  const hapi_tick_array all[HAPI_TICK_ARRAYS] = {
+      {&tick->pointers.of, c->pointers, sizeof *tick->pointers.of, true},
+      {&tick->pointers.hulls, c->pointers, sizeof *tick->pointers.hulls, true},
+      ARRAY(bodies.of, c->bodies),
+      ARRAY(bodies.live, c->bodies),
+      ARRAY(touches.of, c->contacts + tools),
+      ARRAY(touches.ramps, c->contacts),
+      ARRAY(touches.ramp_generations, c->contacts),
+      ARRAY(touches.frictions, c->contacts),
+      ARRAY(touches.tool.tools, tools),
+      ARRAY(touches.tool.old_tools, tools),
+      ARRAY(touches.tool.old_contacts, tools),
+      ARRAY(touches.tool.pairs, HAPI_TOOL_PAIRS(c)),
+      ARRAY(touches.crosses.of, c->crosses),
+      ARRAY(contacts.memory, c->contacts),
+      ARRAY(contacts.old_memory, c->contacts),
+      ARRAY(contacts.buckets, tick->contacts.bucket_count),
+      ARRAY(joints.of, c->joints),
+      ARRAY(joints.memory, c->joints),
+      ARRAY(rows.sources, tick->rows.capacity),
+      ARRAY(rows.solver.rows, tick->rows.capacity),
+      ARRAY(rows.solver.v, places),
+      ARRAY(rows.solver.free, places),
+      ARRAY(rows.solver.work, tick->rows.solver.work_count),
+  };
+  memcpy(out, all, sizeof all);
 }
 
-static void crosses_reset(hapi_crosses *crosses, const hapi_capacity *c)
+/* The arrays stay, and every page of theirs is touched once, so that no tick is the first. */
+void hapi_tick_reset(hapi_tick *tick)
 {
-  crosses->count = 0;
-  if (c->crosses > 0) {
-    memset(crosses->of, 0, c->crosses * sizeof *crosses->of);
+  hapi_tick_array arrays[HAPI_TICK_ARRAYS];
+  hapi_tick_arrays(tick, arrays);
+  for (int i = 0; i < HAPI_TICK_ARRAYS; ++i) {
+    void *memory;
+    memcpy(&memory, arrays[i].at, sizeof memory);
+    if (memory != NULL && !arrays[i].stays) {
+      memset(memory, 0, arrays[i].count * arrays[i].size);
+    }
   }
-}
-
-static void touches_reset(hapi_touches *touches, const hapi_capacity *c)
-{
+  hapi_touches *touches = &tick->touches;
+  hapi_solver *solver = &tick->rows.solver;
+  tick->facts = (hapi_tick_facts){.period = tick->facts.period, .observes = true};
+  tick->pointers.high = tick->capacity.pointers;
+  tick->pointers.proxies = false;
+  tick->bodies = (hapi_bodies){.of = tick->bodies.of, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
   touches->rubs = false;
   touches->contact_ticks = 0;
   memset(touches->hand_impulse, 0, sizeof touches->hand_impulse);
   touches->hand_impulse_abs = 0.0;
-  memset(touches->of, 0, (c->contacts + (size_t)2 * c->tool_points) * sizeof *touches->of);
-  memset(touches->ramps, 0, c->contacts * sizeof *touches->ramps);
-  memset(touches->ramp_generations, 0, c->contacts * sizeof *touches->ramp_generations);
-  memset(touches->frictions, 0, c->contacts * sizeof *touches->frictions);
-  tools_reset(&touches->tool, c);
-  crosses_reset(&touches->crosses, c);
-}
-
-static void contacts_reset(hapi_body_contacts *contacts, const hapi_capacity *c)
-{
-  contacts->patches = NULL;
-  contacts->memory_count = contacts->buckets_used = contacts->active = 0;
-  memset(contacts->memory, 0, c->contacts * sizeof *contacts->memory);
-  memset(contacts->old_memory, 0, c->contacts * sizeof *contacts->old_memory);
-  memset(contacts->buckets, 0, contacts->bucket_count * sizeof *contacts->buckets);
-}
-
-static void joints_reset(hapi_joints *joints, const hapi_capacity *c)
-{
-  joints->count = 0;
-  memset(joints->of, 0, c->joints * sizeof *joints->of);
-  memset(joints->memory, 0, c->joints * sizeof *joints->memory);
-}
-
-static void rows_reset(hapi_rows *rows, const hapi_capacity *c)
-{
-  hapi_solver *solver = &rows->solver;
-  size_t places = (size_t)c->bodies + c->pointers + 1;
-  rows->residual_max = 0.0;
-  rows->sweeps = 0;
+  touches->tool.count = touches->tool.pair_count = touches->crosses.count = 0;
+  touches->tool.capacity = tick->capacity.tool_points;
+  tick->contacts.patches = NULL;
+  tick->contacts.memory_count = tick->contacts.buckets_used = tick->contacts.active = 0;
+  tick->joints.count = 0;
+  tick->rows.residual_max = 0.0;
+  tick->rows.sweeps = 0;
   solver->row_count = solver->body_count = 0;
   solver->dear_rows = solver->dear_runs = solver->vain_runs = 0;
   solver->ready = true; /* as the rows are made */
-  memset(rows->sources, 0, rows->capacity * sizeof *rows->sources);
-  memset(solver->rows, 0, rows->capacity * sizeof *solver->rows);
-  memset(solver->v, 0, places * sizeof *solver->v);
-  memset(solver->free, 0, places * sizeof *solver->free);
-  memset(solver->work, 0, solver->work_count * sizeof *solver->work);
-}
-
-void hapi_tick_reset(hapi_tick *tick)
-{
-  const hapi_capacity *c = &tick->capacity;
-  tick->facts = (hapi_tick_facts){.period = tick->facts.period, .observes = true};
-  tick->pointers.high = c->pointers;
-  tick->pointers.proxies = false;
-  bodies_reset(&tick->bodies, c);
-  touches_reset(&tick->touches, c);
-  contacts_reset(&tick->contacts, c);
-  joints_reset(&tick->joints, c);
-  rows_reset(&tick->rows, c);
   tick->guard = (hapi_guard){.mode = tick->guard.mode};
   memset(&tick->sample, 0, sizeof tick->sample);
   memset(&tick->watch, 0, sizeof tick->watch);

@@ -16,6 +16,7 @@
  * Each part has a struct of its own and knows those before it. */
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <hapode/trace.h>
@@ -53,6 +54,19 @@ typedef struct hapi_tick {
   bool hashing; /* lockstep */
   uint64_t hash;
 } hapi_tick;
+
+/* One of the arrays of a tick, as its owner allocates it. */
+typedef struct hapi_tick_array {
+  void *at; /* address of the pointer to it */
+  size_t count;
+  size_t size; /* of an element */
+  bool stays;  /* hapi_tick_reset does not touch it */
+} hapi_tick_array;
+
+#define HAPI_TICK_ARRAYS 23
+
+/* All of them; the capacity, and that of rows, buckets and work, are set. */
+void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS]);
 
 /* Zeroes the state; arrays, capacity, period, hashing and the guard's mode are set by the caller
  * before. */
