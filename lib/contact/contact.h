@@ -48,9 +48,6 @@ void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns);
 /* [contact] Seconds from one pass to the next one, as physics asks for. */
 double hapi_contact_period(const hapi_contact *contact);
 
-/* [contact] Whether there is anything to find in what it has taken. */
-bool hapi_contact_has_work(const hapi_contact *contact);
-
 void hapi_contact_effects(const hapi_contact *contact, hap_effect_info *out); /* [any] likewise */
 void hapi_contact_stats(const hapi_contact *contact, hap_stats *out); /* [any] its part of *out */
 

@@ -71,6 +71,11 @@ static hap_status broken_off(hapi_reader *reader, hap_detail *detail)
                    reader->path, reader->blocks, (unsigned long long)reader->offset);
 }
 
+static hap_status reader_starve(const hapi_reader *reader, hap_detail *detail)
+{
+  return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+}
+
 /* ---- blocks ---- */
 
 static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
@@ -78,7 +83,7 @@ static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
   HAPI_ASSERT(reader->inflates && reader->head.size <= HAPI_BLOCK_BYTES);
   z_stream *z = &reader->inflater;
   if (inflateReset(z) != Z_OK) {
-    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+    return reader_starve(reader, detail);
   }
   z->next_in = (Bytef *)reader->stored;
   z->avail_in = reader->head.stored;
@@ -86,7 +91,7 @@ static hap_status inflate_block(hapi_reader *reader, hap_detail *detail)
   z->avail_out = reader->head.size;
   int answer = inflate(z, Z_FINISH);
   if (answer == Z_MEM_ERROR) {
-    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+    return reader_starve(reader, detail);
   }
   if (answer != Z_STREAM_END || z->total_out != reader->head.size) {
     return block_refuse(reader, "its bytes cannot be unpacked", detail);
@@ -129,12 +134,10 @@ static hap_status read_block(hapi_reader *reader, hap_detail *detail)
   if (hapi_file_crc_block(head, at) != head->crc) {
     return block_refuse(reader, "its checksum is wrong", detail);
   }
-  hap_status status = packed ? inflate_block(reader, detail) : HAP_OK;
-  if (status >= HAP_OK) {
-    reader->offset += sizeof *head + head->stored;
-    ++reader->blocks;
-  }
-  return status;
+  HAPI_TRY(packed ? inflate_block(reader, detail) : HAP_OK);
+  reader->offset += sizeof *head + head->stored;
+  ++reader->blocks;
+  return HAP_OK;
 }
 
 static hap_status read_end(hapi_reader *reader, hap_detail *detail)
@@ -161,11 +164,8 @@ static hap_status read_end(hapi_reader *reader, hap_detail *detail)
 static hap_status read_cells(hapi_reader *reader, hapi_stream *out_stream, uint32_t *out_count,
                              hap_detail *detail)
 {
-  hap_status status = read_block(reader, detail);
   const hapi_block_head *head = &reader->head;
-  if (status != HAP_OK) {
-    return status;
-  }
+  HAPI_TRY(read_block(reader, detail));
   if (head->type == HAPI_BLOCK_END) {
     return read_end(reader, detail);
   }
@@ -224,11 +224,6 @@ static hap_status other_build(const hapi_reader *reader, const char *what, const
                    reader->path, what, there, here);
 }
 
-static bool text_is_terminated(const char *text, size_t size)
-{
-  return memchr(text, '\0', size) != NULL;
-}
-
 static hap_status check_build(const hapi_reader *reader, const char *ode, hap_detail *detail)
 {
   const hapi_file_info *info = &reader->info;
@@ -263,12 +258,13 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
   }
   memset(info, 0, sizeof *info);
   memcpy(info, reader->bytes, HAPI_FILE_INFO_LEAST);
+  const hapi_file_build *build = &info->build;
   size_t size = reader->head.size - (size_t)info->note_size; /* wraps where the note is too long */
   if (info->note_size > HAPI_NOTE_MAX || size < HAPI_FILE_INFO_LEAST || size > sizeof *info ||
-      !text_is_terminated(info->build.library, sizeof info->build.library) ||
-      !text_is_terminated(info->build.machine, sizeof info->build.machine) ||
-      !text_is_terminated(info->build.system, sizeof info->build.system) ||
-      !text_is_terminated(info->build.ode, sizeof info->build.ode)) {
+      memchr(build->library, '\0', sizeof build->library) == NULL ||
+      memchr(build->machine, '\0', sizeof build->machine) == NULL ||
+      memchr(build->system, '\0', sizeof build->system) == NULL ||
+      memchr(build->ode, '\0', sizeof build->ode) == NULL) {
     return block_refuse(reader, "it tells what was recorded in a form that there is not", detail);
   }
   memcpy(info, reader->bytes, size);
@@ -277,16 +273,6 @@ static hap_status read_info(hapi_reader *reader, const char *ode, hap_detail *de
 }
 
 /* ---- life ---- */
-
-static bool reader_prepare(hapi_reader *reader)
-{
-  reader->stored = hapi_alloc(HAPI_BLOCK_BYTES);
-  reader->bytes = hapi_alloc(HAPI_BLOCK_BYTES);
-  reader->inflater.zalloc = hapi_file_zlib_allocate;
-  reader->inflater.zfree = hapi_file_zlib_release;
-  reader->inflates = inflateInit(&reader->inflater) == Z_OK;
-  return reader->stored != NULL && reader->bytes != NULL && reader->inflates;
-}
 
 /* Looks at all of it, and comes back to the first cells. */
 static hap_status look_through(hapi_reader *reader, hap_detail *detail)
@@ -316,30 +302,28 @@ static hap_status look_through(hapi_reader *reader, hap_detail *detail)
   return HAP_OK;
 }
 
-/* The end of a long path tells more than its beginning. */
-static void keep_path(hapi_reader *reader, const char *path)
+static hap_status reader_prepare(hapi_reader *reader, const char *path, const char *ode,
+                                 hap_detail *detail)
 {
   size_t length = strlen(path);
-  size_t skip = length >= 200 ? length - 199 : 0;
+  size_t skip = length >= 200 ? length - 199 : 0; /* the end of a long path tells more */
   snprintf(reader->path, sizeof reader->path, "%s", path + skip);
-}
-
-static hap_status open_reader(hapi_reader *reader, const char *path, const char *ode,
-                              hap_detail *detail)
-{
-  if (!reader_prepare(reader)) {
-    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
+  reader->stored = hapi_alloc(HAPI_BLOCK_BYTES);
+  reader->bytes = hapi_alloc(HAPI_BLOCK_BYTES);
+  reader->inflater.zalloc = hapi_file_zlib_allocate;
+  reader->inflater.zfree = hapi_file_zlib_release;
+  reader->inflates = inflateInit(&reader->inflater) == Z_OK;
+  if (reader->stored == NULL || reader->bytes == NULL || !reader->inflates) {
+    return reader_starve(reader, detail);
   }
   reader->file = fopen(path, "rb");
   if (reader->file == NULL) {
     return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", reader->path,
                      strerror(errno));
   }
-  hap_status status = read_head(reader, detail);
-  if (status >= HAP_OK) {
-    status = read_info(reader, ode, detail);
-  }
-  return status >= HAP_OK ? look_through(reader, detail) : status;
+  HAPI_TRY(read_head(reader, detail));
+  HAPI_TRY(read_info(reader, ode, detail));
+  return look_through(reader, detail);
 }
 
 hap_status hapi_reader_open(const char *path, bool incomplete, const char *ode, hapi_reader **out,
@@ -350,9 +334,8 @@ hap_status hapi_reader_open(const char *path, bool incomplete, const char *ode, 
   if (reader == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading a recording");
   }
-  keep_path(reader, path);
   reader->incomplete = incomplete;
-  hap_status status = open_reader(reader, path, ode, detail);
+  hap_status status = reader_prepare(reader, path, ode, detail);
   if (status < HAP_OK) {
     hapi_reader_close(reader);
     return status;
@@ -430,24 +413,6 @@ static bool make_room(cell_queue *q, uint32_t count)
   return true;
 }
 
-static hap_status cells_enqueue(hapi_reader *reader, hapi_stream stream, uint32_t count,
-                                hap_detail *detail)
-{
-  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
-  HAPI_ASSERT(count <= HAPI_BLOCK_CELLS);
-  cell_queue *q = &reader->queues[stream];
-  if (q->count + count > QUEUE_MAX) {
-    return block_refuse(reader, "one thread is far ahead of the others", detail);
-  }
-  if (!make_room(q, count)) {
-    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for reading %s", reader->path);
-  }
-  HAPI_ASSERT(q->first + q->count + count <= q->capacity);
-  memcpy(q->cells + q->first + q->count, reader->bytes, count * sizeof *q->cells);
-  q->count += count;
-  return HAP_OK;
-}
-
 /* Cells of the packet at the front; 0: nothing is there. */
 static uint32_t packet_size(const hapi_reader *reader, hapi_stream stream)
 {
@@ -466,28 +431,38 @@ static bool whole_packet(const hapi_reader *reader, hapi_stream stream)
   return size > 0 && size <= reader->queues[stream].count;
 }
 
+/* The next block of cells, behind those of its stream. */
 static hap_status read_on(hapi_reader *reader, hap_detail *detail)
 {
   hapi_stream stream = HAPI_STREAM_HAPTIC;
   uint32_t count = 0;
-  hap_status status = reader->over ? HAP_END : read_cells(reader, &stream, &count, detail);
-  return status == HAP_OK ? cells_enqueue(reader, stream, count, detail) : status;
+  HAPI_TRY(reader->over ? HAP_END : read_cells(reader, &stream, &count, detail));
+  HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
+  HAPI_ASSERT(count <= HAPI_BLOCK_CELLS);
+  cell_queue *q = &reader->queues[stream];
+  if (q->count + count > QUEUE_MAX) {
+    return block_refuse(reader, "one thread is far ahead of the others", detail);
+  }
+  if (!make_room(q, count)) {
+    return reader_starve(reader, detail);
+  }
+  HAPI_ASSERT(q->first + q->count + count <= q->capacity);
+  memcpy(q->cells + q->first + q->count, reader->bytes, count * sizeof *q->cells);
+  q->count += count;
+  return HAP_OK;
 }
 
 hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                             uint32_t *out_count, hap_detail *detail)
 {
-  hap_status status = HAP_OK;
-  while (status == HAP_OK && !whole_packet(reader, stream)) {
-    status = read_on(reader, detail);
-  }
   *out = NULL;
   *out_count = 0;
-  if (status == HAP_OK) {
-    *out = reader->queues[stream].cells + reader->queues[stream].first;
-    *out_count = packet_size(reader, stream);
+  while (!whole_packet(reader, stream)) {
+    HAPI_TRY(read_on(reader, detail));
   }
-  return status;
+  *out = reader->queues[stream].cells + reader->queues[stream].first;
+  *out_count = packet_size(reader, stream);
+  return HAP_OK;
 }
 
 hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,

@@ -135,15 +135,20 @@ static bool block_flush(hapi_recorder *recorder, hapi_stream stream)
   return true;
 }
 
+static size_t cells_take(hapi_recorder *recorder, hapi_stream stream)
+{
+  uint32_t *count = &recorder->counts[stream];
+  size_t got = hapi_tape_take(&recorder->tapes[stream], recorder->cells[stream] + *count,
+                              HAPI_BLOCK_CELLS - *count);
+  *count += (uint32_t)got;
+  return got;
+}
+
 /* Takes what is there of a stream, and writes it out. */
 static bool drain_whole(hapi_recorder *recorder, hapi_stream stream)
 {
   bool good = true;
-  for (size_t got = 1; got > 0 && good;) {
-    got =
-        hapi_tape_take(&recorder->tapes[stream], recorder->cells[stream] + recorder->counts[stream],
-                       HAPI_BLOCK_CELLS - recorder->counts[stream]);
-    recorder->counts[stream] += (uint32_t)got;
+  while (good && cells_take(recorder, stream) > 0) {
     good = recorder->counts[stream] < HAPI_BLOCK_CELLS || block_flush(recorder, stream);
   }
   return good && block_flush(recorder, stream);
@@ -154,13 +159,10 @@ static bool drain_whole(hapi_recorder *recorder, hapi_stream stream)
  * replayed up to there. */
 static bool streams_drain(hapi_recorder *recorder, bool flushes)
 {
-  uint32_t *count = &recorder->counts[HAPI_STREAM_HAPTIC];
   bool good = true;
   for (size_t got = 1; got > 0 && good;) {
-    got = hapi_tape_take(&recorder->tapes[HAPI_STREAM_HAPTIC],
-                         recorder->cells[HAPI_STREAM_HAPTIC] + *count, HAPI_BLOCK_CELLS - *count);
-    *count += (uint32_t)got;
-    if (*count == HAPI_BLOCK_CELLS || (flushes && got == 0)) {
+    got = cells_take(recorder, HAPI_STREAM_HAPTIC);
+    if (recorder->counts[HAPI_STREAM_HAPTIC] == HAPI_BLOCK_CELLS || (flushes && got == 0)) {
       good = drain_whole(recorder, HAPI_STREAM_PHYSICS) &&
              drain_whole(recorder, HAPI_STREAM_CONTACT) &&
              block_flush(recorder, HAPI_STREAM_HAPTIC);
@@ -183,18 +185,13 @@ static void end_file(hapi_recorder *recorder)
   recorder->file = -1;
 }
 
-/* A file that may grow no further is an error to be told, and no signal that ends the process. */
-static void block_signals(void)
-{
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, NULL);
-}
-
 static void *recorder_main(void *arg)
 {
   hapi_recorder *recorder = arg;
-  block_signals();
+  sigset_t all;
+  sigfillset(&all); /* a file that may grow no further is an error to be told, and no signal that
+                       ends the process */
+  pthread_sigmask(SIG_BLOCK, &all, NULL);
   int64_t next_flush = hapi_clock_now() + FLUSH_NS;
   while (goes_on(recorder) && atomic_load_explicit(&recorder->stop, memory_order_acquire) == 0) {
     int64_t now = hapi_clock_now();
@@ -230,18 +227,19 @@ static bool recorder_prepare(hapi_recorder *recorder, const hapi_recorder_config
   return good && recorder->stored != NULL && recorder->deflates;
 }
 
-static void begin_file(hapi_recorder *recorder, const hapi_recorder_config *config)
+static void file_begin(hapi_recorder *recorder, const hapi_recorder_config *config)
 {
+  char *info = (char *)recorder->cells[0];
   HAPI_ASSERT(config->info.note_size <= HAPI_NOTE_MAX);
   hapi_file_head head = {
       HAPI_FILE_MAGIC, HAPI_FILE_BYTE_ORDER, HAPI_FILE_VERSION, sizeof(hapi_cell), 0, 0};
   head.crc = hapi_file_crc_head(&head);
   write_bytes(recorder, &head, sizeof head);
-  memcpy(recorder->cells[0], &config->info, sizeof config->info);
+  memcpy(info, &config->info, sizeof config->info);
   if (config->info.note_size > 0) {
-    memcpy((char *)recorder->cells[0] + sizeof config->info, config->note, config->info.note_size);
+    memcpy(info + sizeof config->info, config->note, config->info.note_size);
   }
-  (void)write_block(recorder, HAPI_BLOCK_INFO, recorder->cells[0],
+  (void)write_block(recorder, HAPI_BLOCK_INFO, info,
                     (uint32_t)sizeof config->info + config->info.note_size);
 }
 
@@ -262,7 +260,7 @@ hap_status hapi_recorder_create(const hapi_recorder_config *config, hapi_recorde
   recorder->file = open(config->path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   int error = recorder->file < 0 ? errno : 0;
   if (error == 0) {
-    begin_file(recorder, config);
+    file_begin(recorder, config);
     error = atomic_load(&recorder->error);
   }
   if (error != 0) {
