@@ -34,9 +34,9 @@ typedef struct accuracy_work {
   int file;
 } accuracy_work;
 
-/* Which rows of a scene are worth their time: those to which no other one is at least as good in less
- * time. Errors are those from the first start, which every row has, and an error below the noise
- * floor is none that could be told from it. */
+/* Which rows of a scene are worth their time: those to which no other one is at least as good in
+ * less time. Errors are those from the first start, which every row has, and an error below the
+ * noise floor is none that could be told from it. */
 
 #define TIME_NOISE 0.9 /* of a time: nearer ones cannot be told apart in a single run */
 
@@ -54,48 +54,19 @@ static double accuracy_front_error(const accuracy_row *row)
   return fmax(row->first_force, row->noise_floor);
 }
 
-/* a leaves no reason to take b. */
-static bool beats(const accuracy_row *a, const accuracy_row *b)
-{
-  double error_a = accuracy_front_error(a);
-  double error_b = accuracy_front_error(b);
-  return error_a <= error_b && a->duty <= b->duty && (error_a < error_b || a->duty < b->duty);
-}
-
 /* Sets front in the rows of a scene, which stand together. */
 static void accuracy_mark_front(accuracy_row *rows, size_t count)
 {
   for (size_t i = 0; i < count; ++i) {
+    double error = accuracy_front_error(&rows[i]);
     bool beaten = !accuracy_is_choice(&rows[i]);
     for (size_t k = 0; k < count && !beaten; ++k) {
-      beaten = accuracy_is_choice(&rows[k]) && beats(&rows[k], &rows[i]);
+      double other = accuracy_front_error(&rows[k]);
+      beaten = accuracy_is_choice(&rows[k]) && other <= error && rows[k].duty <= rows[i].duty &&
+               (other < error || rows[k].duty < rows[i].duty);
     }
     rows[i].front = beaten ? 0.0 : 1.0;
   }
-}
-
-/* The fastest that is as accurate as this one. */
-static const accuracy_row *faster_than(const accuracy_row *rows, size_t count,
-                                       const accuracy_row *of)
-{
-  const accuracy_row *best = of;
-  for (size_t i = 0; i < count; ++i) {
-    bool as_good = accuracy_front_error(&rows[i]) <= accuracy_front_error(of);
-    best = rows[i].front > 0.0 && as_good && rows[i].duty < best->duty ? &rows[i] : best;
-  }
-  return best;
-}
-
-/* The most accurate that takes no longer. */
-static const accuracy_row *better_than(const accuracy_row *rows, size_t count,
-                                       const accuracy_row *of)
-{
-  const accuracy_row *best = of;
-  for (size_t i = 0; i < count; ++i) {
-    bool better = accuracy_front_error(&rows[i]) < accuracy_front_error(best);
-    best = rows[i].front > 0.0 && rows[i].duty <= of->duty && better ? &rows[i] : best;
-  }
-  return best;
 }
 
 /* What a row is: "contact 20 Hz, iterations 5". */
@@ -111,12 +82,21 @@ static void accuracy_label(const accuracy_row *row, char out[ACCURACY_LABEL_MAX]
   }
 }
 
-static void say_how_far(const accuracy_row *rows, size_t count, const accuracy_row *of,
-                        const char *what)
+/* How far a row is from the front of its scene. */
+static void front_say(const accuracy_row *rows, size_t count, const accuracy_row *of,
+                      const char *what)
 {
   char label[ACCURACY_LABEL_MAX];
-  const accuracy_row *fast = faster_than(rows, count, of);
-  const accuracy_row *good = better_than(rows, count, of);
+  const accuracy_row *fast = of; /* the fastest that is as accurate */
+  const accuracy_row *good = of; /* the most accurate that takes no longer */
+  for (size_t i = 0; i < count; ++i) {
+    double error = accuracy_front_error(&rows[i]);
+    bool front = rows[i].front > 0.0;
+    bool as_good = error <= accuracy_front_error(of);
+    bool better = error < accuracy_front_error(good);
+    fast = front && as_good && rows[i].duty < fast->duty ? &rows[i] : fast;
+    good = front && better && rows[i].duty <= of->duty ? &rows[i] : good;
+  }
   if (good == of && fast->duty >= TIME_NOISE * of->duty) {
     bench_say("%s: %s is on the front", of->scene, what);
     return;
@@ -132,23 +112,10 @@ static void say_how_far(const accuracy_row *rows, size_t count, const accuracy_r
   }
 }
 
-/* Says how far the paper's choice and the default are from the front of their scene. */
-static void accuracy_report_front(const accuracy_row *rows, size_t count)
-{
-  for (size_t i = 0; i < count; ++i) {
-    if (accuracy_row_is(&rows[i], HAP_MODEL_CONTACT, ACCURACY_DEFAULT) &&
-        rows[i].physics_hz == ACCURACY_DEFAULT_HZ) {
-      say_how_far(rows, count, &rows[i], "the default");
-    } else if (accuracy_row_is(&rows[i], HAP_MODEL_ACCELERANCE, ACCURACY_PAPER) &&
-               rows[i].physics_hz == ACCURACY_PAPER_HZ) {
-      say_how_far(rows, count, &rows[i], "the paper's choice");
-    }
-  }
-}
-
-/* accuracy.svg: a panel for each scene, on the same axes. accuracy_SCENE.svg: the same of one scene,
- * large, with the points of the front told by their knobs. Every point is a row's error from the first
- * start, which all rows have; a thin line goes up from a model's default to its worst start. */
+/* accuracy.svg: a panel for each scene, on the same axes. accuracy_SCENE.svg: the same of one
+ * scene, large, with the points of the front told by their knobs. Every point is a row's error
+ * from the first start, which all rows have; a thin line goes up from a model's default to its
+ * worst start. */
 
 #define COLUMNS 4
 #define PANEL_WIDTH 400
@@ -174,7 +141,7 @@ static const series all_series[] = {
     {HAP_MODEL_CONTACT, "contact", 7},
 };
 
-#define SERIES_COUNT (sizeof all_series / sizeof all_series[0])
+#define SERIES_COUNT BENCH_COUNT(all_series)
 
 static bool is_default_of(const accuracy_row *row, const series *of)
 {
@@ -187,20 +154,22 @@ static bool is_knob_of(const accuracy_row *row, const series *of)
          strcmp(row->knob, ACCURACY_DEFAULT) != 0 && accuracy_is_choice(row);
 }
 
-static bool is_our_default(const accuracy_row *row)
+static bool is_our_default(const accuracy_row *row, const series *of)
 {
+  (void)of;
   return accuracy_row_is(row, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) &&
          row->physics_hz == ACCURACY_DEFAULT_HZ;
 }
 
-static bool is_papers(const accuracy_row *row)
+static bool is_papers(const accuracy_row *row, const series *of)
 {
+  (void)of;
   return accuracy_row_is(row, HAP_MODEL_ACCELERANCE, ACCURACY_PAPER) &&
          row->physics_hz == ACCURACY_PAPER_HZ;
 }
 
 /* What lies beyond an axis is drawn at its end. */
-static double shown(double error)
+static double error_shown(double error)
 {
   return fmin(fmax(error, ERROR_LEAST), ERROR_MOST);
 }
@@ -213,8 +182,8 @@ static double shown_time(const accuracy_row *row)
 /* time, error from the first start, error from the worst one, physics rate */
 static void put_point(FILE *script, const accuracy_row *row)
 {
-  fprintf(script, "%.6g %.6g %.6g %g\n", shown_time(row), shown(row->first_force),
-          shown(row->errors.force), row->physics_hz);
+  fprintf(script, "%.6g %.6g %.6g %g\n", shown_time(row), error_shown(row->first_force),
+          error_shown(row->errors.force), row->physics_hz);
 }
 
 typedef bool (*is_fn)(const accuracy_row *row, const series *of);
@@ -231,19 +200,8 @@ static void put_block(FILE *script, const char *name, size_t number, is_fn is,
   fprintf(script, "EOD\n");
 }
 
-static bool is_marked(const accuracy_row *row, const series *of)
-{
-  (void)of;
-  return is_our_default(row);
-}
-
-static bool is_the_papers(const accuracy_row *row, const series *of)
-{
-  (void)of;
-  return is_papers(row);
-}
-
-/* A path is that of the library's model at the rate of the paper; its middle is the default there. */
+/* A path is that of the library's model at the rate of the paper; its middle is the default
+ * there. */
 static bool is_dial(const accuracy_row *row)
 {
   return accuracy_row_is(row, HAP_MODEL_CONTACT, ACCURACY_DIAL) &&
@@ -293,7 +251,7 @@ static void put_dial(FILE *script, const accuracy_row *rows, size_t count)
   }
   fprintf(script, "EOD\n$ends << EOD\n");
   for (int i = 0; i < 2 && ends[i] != NULL; ++i) {
-    fprintf(script, "%.6g %.6g %g\n", shown_time(ends[i]), shown(ends[i]->first_force),
+    fprintf(script, "%.6g %.6g %g\n", shown_time(ends[i]), error_shown(ends[i]->first_force),
             dial_of(ends[i]));
   }
   fprintf(script, "EOD\n");
@@ -321,7 +279,8 @@ static void put_front(FILE *script, const accuracy_row *rows, size_t count)
   int number = 0;
   for (const accuracy_row *row = next_on_front(rows, count, NULL); row != NULL;
        row = next_on_front(rows, count, row)) {
-    fprintf(script, "%.6g %.6g %d\n", shown_time(row), shown(accuracy_front_error(row)), ++number);
+    fprintf(script, "%.6g %.6g %d\n", shown_time(row), error_shown(accuracy_front_error(row)),
+            ++number);
   }
   fprintf(script, "EOD\n");
 }
@@ -333,14 +292,14 @@ static void put_data(FILE *script, const accuracy_row *rows, size_t count)
     put_block(script, "default", m, is_default_of, rows, count);
     put_block(script, "knob", m, is_knob_of, rows, count);
   }
-  put_block(script, "ours", 0, is_marked, rows, count);
-  put_block(script, "paper", 0, is_the_papers, rows, count);
+  put_block(script, "ours", 0, is_our_default, rows, count);
+  put_block(script, "paper", 0, is_papers, rows, count);
   put_dial(script, rows, count);
   put_front(script, rows, count);
   for (size_t i = 0; i < count; ++i) {
-    noise_floor = is_our_default(&rows[i]) ? rows[i].noise_floor : noise_floor;
+    noise_floor = is_our_default(&rows[i], NULL) ? rows[i].noise_floor : noise_floor;
   }
-  fprintf(script, "noise = %.6g\n", shown(noise_floor));
+  fprintf(script, "noise = %.6g\n", error_shown(noise_floor));
 }
 
 /* What all pictures show, from the back to the front. size: of the points. */
@@ -407,23 +366,19 @@ static void set_axes(FILE *script)
 
 /* ---- all scenes ---- */
 
-static size_t count_scenes(const accuracy_table *table)
+/* With room for the key. */
+static size_t panel_lines(const accuracy_table *table)
 {
   size_t scenes = 0;
   for (size_t i = 0; i < table->count; i += accuracy_rows_of_scene(table, i)) {
     ++scenes;
   }
-  return scenes;
+  return scenes / COLUMNS + 1;
 }
 
-static hap_status draw_all(bench *b, const accuracy_table *table)
+static void all_draw(FILE *script, const void *data)
 {
-  size_t lines = count_scenes(table) / COLUMNS + 1; /* room for the key */
-  FILE *script =
-      bench_picture_begin(b, "accuracy", COLUMNS * PANEL_WIDTH, (int)lines * PANEL_HEIGHT);
-  if (script == NULL) {
-    return bench_picture_end(b, "accuracy", script);
-  }
+  const accuracy_table *table = data;
   set_axes(script);
   fprintf(script,
           "set xrange [1e-4:10]\nset yrange [1e-5:100]\nunset key\n"
@@ -432,7 +387,7 @@ static hap_status draw_all(bench *b, const accuracy_table *table)
           "'10' 10, '100' 100)\n"
           "set multiplot layout %zu,%d title 'Force error (first start; thin: up to the worst) and "
           "computing time'\n",
-          lines, COLUMNS);
+          panel_lines(table), COLUMNS);
   for (size_t i = 0; i < table->count; i += accuracy_rows_of_scene(table, i)) {
     fprintf(script, "set title ");
     plot_string(script, table->rows[i].scene);
@@ -445,7 +400,6 @@ static hap_status draw_all(bench *b, const accuracy_table *table)
           "set key center center\n");
   plot_key(script, has_dial(table->rows, table->count));
   fprintf(script, "unset multiplot\n");
-  return bench_picture_end(b, "accuracy", script);
 }
 
 /* ---- one scene ---- */
@@ -469,20 +423,16 @@ static void list_front(FILE *script, const accuracy_row *rows, size_t count)
   }
 }
 
-static hap_status draw_scene(bench *b, const accuracy_row *rows, size_t count)
+/* data: a table of its rows alone. */
+static void scene_draw(FILE *script, const void *data)
 {
-  char name[2 * ACCURACY_NAME_MAX + 16];
-  snprintf(name, sizeof name, "accuracy_%s", rows->scene);
-  FILE *script = bench_picture_begin(b, name, SCENE_WIDTH, SCENE_HEIGHT);
-  if (script == NULL) {
-    return bench_picture_end(b, name, script);
-  }
+  const accuracy_table *table = data;
   set_axes(script);
   fprintf(script, "set format y '%%g'\nset format x '%%g'\nset title ");
-  plot_string(script, rows->scene);
+  plot_string(script, table->rows->scene);
   fprintf(script, "\nset key outside\nunset key\nset rmargin at screen 0.64\n");
-  list_front(script, rows, count);
-  put_data(script, rows, count);
+  list_front(script, table->rows, table->count);
+  put_data(script, table->rows, table->count);
   fprintf(script, "set multiplot\n");
   plot_scene(script, 1.0, true);
   fprintf(script,
@@ -490,18 +440,21 @@ static hap_status draw_scene(bench *b, const accuracy_row *rows, size_t count)
           "unset ylabel\nset xrange [1:2]\nset yrange [1:2]\nset lmargin at screen 0.65\n"
           "set rmargin at screen 0.99\nset bmargin at screen 0.62\nset tmargin at screen 0.97\n"
           "set key inside left top Left reverse font ',10'\n");
-  plot_key(script, has_dial(rows, count));
+  plot_key(script, has_dial(table->rows, table->count));
   fprintf(script, "unset multiplot\n");
-  return bench_picture_end(b, name, script);
 }
 
 static hap_status accuracy_draw(bench *b, const accuracy_table *table)
 {
-  hap_status status = draw_all(b, table);
-  bool draws = plot_available();
-  for (size_t i = 0; i < table->count && status >= HAP_OK && draws;
-       i += accuracy_rows_of_scene(table, i)) {
-    status = draw_scene(b, &table->rows[i], accuracy_rows_of_scene(table, i));
+  hap_status status = bench_draw(b, "accuracy", COLUMNS * PANEL_WIDTH,
+                                 (int)panel_lines(table) * PANEL_HEIGHT, all_draw, table);
+  size_t count = 0;
+  for (size_t i = 0; i < table->count && status >= HAP_OK && plot_available(); i += count) {
+    char name[2 * ACCURACY_NAME_MAX + 16];
+    count = accuracy_rows_of_scene(table, i);
+    const accuracy_table of_scene = {.rows = &table->rows[i], .count = count};
+    snprintf(name, sizeof name, "accuracy_%s", table->rows[i].scene);
+    status = bench_draw(b, name, SCENE_WIDTH, SCENE_HEIGHT, scene_draw, &of_scene);
   }
   return status;
 }
@@ -559,9 +512,9 @@ static hap_status run_reference(const sweep *s, size_t index, double haptic_hz,
 {
   accuracy_run_def def;
   accuracy_run_def_init(&def);
-  def.model = HAP_MODEL_SINGLE;
-  def.physics_hz = s->group->physics_hz; /* what soft constraints are converted from */
-  def.haptic_hz = haptic_hz;
+  def.session.model = HAP_MODEL_SINGLE;
+  def.session.physics_hz = s->group->physics_hz; /* what soft constraints are converted from */
+  def.session.haptic_hz = haptic_hz;
   def.iterations = accuracy_reference_iterations(&s->parameters);
   return run_from(s, &def, index, out);
 }
@@ -573,17 +526,10 @@ static hap_status need_reference(sweep *s, size_t index)
              : run_reference(s, index, ACCURACY_HAPTIC_HZ, &s->references[index]);
 }
 
-static hap_status untouched(const sweep *s)
+static hap_status fail_untouched(const sweep *s)
 {
   return bench_fail(s->bench, HAP_ERROR_STATE, "%s: the hand touches nothing",
                     s->group->scene->name);
-}
-
-static void free_references(sweep *s)
-{
-  for (size_t i = 0; i < ACCURACY_STARTS_MAX; ++i) {
-    accuracy_motion_free(&s->references[i]);
-  }
 }
 
 /* ---- the noise floor ---- */
@@ -593,7 +539,7 @@ static hap_status raise_floor(sweep *s, const accuracy_motion *a, const accuracy
 {
   accuracy_errors errors;
   if (!accuracy_compare(a, b, NULL, s->group->physics_hz, &errors)) {
-    return untouched(s);
+    return fail_untouched(s);
   }
   s->noise_floor = fmax(s->noise_floor, errors.force);
   s->torque_floor = fmax(s->torque_floor, errors.torque);
@@ -660,14 +606,6 @@ typedef struct times {
   double duty[ACCURACY_STARTS_MAX];
 } times;
 
-/* All in one thread: what it used of the processor is not stretched by what else runs there. */
-static void note_times(const accuracy_motion *m, size_t i, times *out)
-{
-  out->tick_us[i] = m->stats.loop.tick_us_mean;
-  out->physics_ms[i] = m->stats.physics.ms_mean;
-  out->duty[i] = m->used_s * ACCURACY_HAPTIC_HZ / (double)m->count;
-}
-
 static double widest_of_references(const sweep *s)
 {
   double widest = 0.0;
@@ -684,11 +622,11 @@ static void begin_row(const sweep *s, const accuracy_point *point, accuracy_row 
   memset(row, 0, sizeof *row);
   snprintf(row->scene, sizeof row->scene, "%s", of->name);
   snprintf(row->knob, sizeof row->knob, "%s", point->knob);
-  snprintf(row->model, sizeof row->model, "%s", hap_model_name(point->def.model));
+  snprintf(row->model, sizeof row->model, "%s", hap_model_name(point->def.session.model));
   snprintf(row->hand, sizeof row->hand, "%s", of->recording != NULL ? "recorded" : "rigid");
   row->physics_hz = point->physics_hz;
   row->value = point->value;
-  row->haptic_hz = point->def.haptic_hz;
+  row->haptic_hz = point->def.session.haptic_hz;
   row->noise_floor = s->noise_floor;
   row->torque_floor = s->torque_floor;
   row->joint_floor = widest_of_references(s);
@@ -699,7 +637,8 @@ static void begin_row(const sweep *s, const accuracy_point *point, accuracy_row 
 
 static bool is_main(const accuracy_point *point)
 {
-  return point->def.model == HAP_MODEL_CONTACT && strcmp(point->knob, ACCURACY_DEFAULT) == 0;
+  return point->def.session.model == HAP_MODEL_CONTACT &&
+         strcmp(point->knob, ACCURACY_DEFAULT) == 0;
 }
 
 /* From start i. */
@@ -720,30 +659,33 @@ static hap_status measure_start(sweep *s, const accuracy_point *point, size_t i,
   }
   if (controls) {
     accuracy_run_def def = point->def;
-    def.physics_hz = CONTROL_RATE * hz;
+    def.session.physics_hz = CONTROL_RATE * hz;
     status = run_from(s, &def, i, &control);
   }
   if (status >= HAP_OK &&
       !accuracy_compare(&s->references[i], &motion, controls ? &control : NULL, hz, out)) {
-    status = untouched(s);
+    status = fail_untouched(s);
   }
-  note_times(&motion, i, t);
+  t->tick_us[i] = motion.stats.loop.tick_us_mean;
+  t->physics_ms[i] = motion.stats.physics.ms_mean;
+  /* All in one thread: what it used of the processor is not stretched by what else runs there. */
+  t->duty[i] = motion.used_s * ACCURACY_HAPTIC_HZ / (double)motion.count;
   accuracy_motion_free(&motion);
   accuracy_motion_free(&control);
   return status;
 }
 
-/* What the session itself says of its error. In a run of its own, as looking back takes time; it changes no
- * bit. */
+/* What the session itself says of its error. In a run of its own, as looking back takes time; it
+ * changes no bit. */
 static hap_status measure_estimate(sweep *s, const accuracy_point *point, accuracy_row *row)
 {
   accuracy_run_def def = point->def;
   accuracy_motion motion;
   bool asked = accuracy_estimates_all(s->bench) || strcmp(point->knob, ACCURACY_DEFAULT) == 0;
-  if (def.model == HAP_MODEL_SINGLE || !asked) {
+  if (def.session.model == HAP_MODEL_SINGLE || !asked) {
     return HAP_OK; /* SINGLE is what it is held against */
   }
-  def.lookback = LOOKBACK;
+  def.expert.lookback = LOOKBACK;
   hap_status status = run_from(s, &def, s->worst, &motion);
   if (status < HAP_OK) {
     return status;
@@ -778,8 +720,8 @@ static hap_status sweep_measure(sweep *s, const accuracy_point *point, accuracy_
   return measure_estimate(s, point, row);
 }
 
-/* When an impact falls between two ticks, its time depends on the start by up to a tick, and so does
- * how far the reference is off: the floor is that of the start it is held against. */
+/* When an impact falls between two ticks, its time depends on the start by up to a tick, and so
+ * does how far the reference is off: the floor is that of the start it is held against. */
 static hap_status measure_point(sweep *s, const accuracy_point *point, accuracy_row *row)
 {
   hap_status status = need_floor(s);
@@ -817,8 +759,8 @@ static hap_status set_speed(sweep *s)
   accuracy_run_def def;
   accuracy_motion motion;
   accuracy_run_def_init(&def);
-  def.model = HAP_MODEL_IMPULSE;
-  def.physics_hz = HAND_HZ;
+  def.session.model = HAP_MODEL_IMPULSE;
+  def.session.physics_hz = HAND_HZ;
   hap_status status = run_from(s, &def, 0, &motion);
   if (status < HAP_OK) {
     return status;
@@ -843,24 +785,19 @@ static hap_status begin_sweep(bench *b, const accuracy_plan *plan, const accurac
   return status >= HAP_OK && group->hand_speed > 0.0 ? set_speed(s) : status;
 }
 
-/* The group's first row has settled the floor. */
-static void take_floor(sweep *s, const accuracy_row *first)
-{
-  if (first->scene[0] != '\0') {
-    s->noise_floor = first->noise_floor;
-    s->torque_floor = first->torque_floor;
-    s->has_floor = true;
-  }
-}
-
-/* Measures the points of a group. have: rows by point, of those whose scene is not empty; they are not
- * measured again. */
+/* Measures the points of a group. have: rows by point, of those whose scene is not empty; they
+ * are not measured again. */
 static hap_status accuracy_sweep(bench *b, const accuracy_plan *plan, const accuracy_group *group,
                                  const accuracy_row *have, accuracy_done_fn done, void *user)
 {
   sweep s;
   hap_status status = begin_sweep(b, plan, group, &s);
-  take_floor(&s, &have[group->first]);
+  const accuracy_row *first = &have[group->first];
+  if (first->scene[0] != '\0') { /* it has settled the floor */
+    s.noise_floor = first->noise_floor;
+    s.torque_floor = first->torque_floor;
+    s.has_floor = true;
+  }
   for (size_t i = group->first; i < group->first + group->count && status >= HAP_OK; ++i) {
     accuracy_row row;
     if (have[i].scene[0] != '\0') {
@@ -871,13 +808,15 @@ static hap_status accuracy_sweep(bench *b, const accuracy_plan *plan, const accu
       status = done(user, i, &row);
     }
   }
-  free_references(&s);
+  for (size_t i = 0; i < ACCURACY_STARTS_MAX; ++i) {
+    accuracy_motion_free(&s.references[i]);
+  }
   return status;
 }
 
-/* The groups of a run, each in a process of its own: no session exists yet, so that a process can be
- * split, and what one leaves behind in ODE does not matter to the next. A finished row goes into the
- * file at once; a pipe says so to the parent, which shows how far it is. */
+/* The groups of a run, each in a process of its own: no session exists yet, so that a process
+ * can be split, and what one leaves behind in ODE does not matter to the next. A finished row
+ * goes into the file at once; a pipe says so to the parent, which shows how far it is. */
 
 #define LOOK_MS 200
 #define LINE_EVERY_S 30.0 /* where stderr is no terminal */
@@ -908,18 +847,7 @@ static double now_s(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static void write_left(double seconds)
-{
-  if (seconds < 90.0) {
-    fprintf(stderr, "about %.0f s left", seconds);
-  } else if (seconds < 5400.0) {
-    fprintf(stderr, "about %.0f min left", seconds / 60.0);
-  } else {
-    fprintf(stderr, "about %.1f h left", seconds / 3600.0);
-  }
-}
-
-static void show(progress *p)
+static void progress_show(progress *p)
 {
   double now = now_s();
   if (p->finished == p->rows || (!p->terminal && now - p->spoken < LINE_EVERY_S)) {
@@ -928,17 +856,18 @@ static void show(progress *p)
   p->spoken = now;
   fprintf(stderr, "%saccuracy: %zu of %zu rows", p->terminal ? "\r" : "", p->finished, p->rows);
   if (p->done > 0.0) {
-    fputs(", ", stderr);
-    write_left((now - p->began) * (p->cost - p->done) / p->done);
+    double left = (now - p->began) * (p->cost - p->done) / p->done;
+    bool hours = left >= 5400.0;
+    bool seconds = left < 90.0;
+    fprintf(stderr, ", about %.*f %s left", hours,
+            left / (hours     ? 3600.0
+                    : seconds ? 1.0
+                              : 60.0),
+            hours     ? "h"
+            : seconds ? "s"
+                      : "min");
   }
   fputs(p->terminal ? "\033[K" : "\n", stderr);
-}
-
-static void end_progress(const progress *p)
-{
-  if (p->terminal) {
-    fputs("\r\033[K", stderr);
-  }
 }
 
 /* ---- in a process of its own ---- */
@@ -951,7 +880,7 @@ typedef struct worker {
 } worker;
 
 /* The parent is gone when nobody reads any more. */
-static bool tell(const worker *w, const news *n)
+static bool parent_tell(const worker *w, const news *n)
 {
   return write(w->to, n, sizeof *n) == (ssize_t)sizeof *n;
 }
@@ -962,7 +891,7 @@ static hap_status take_row(void *user, size_t point, const accuracy_row *row)
   const accuracy_plan *plan = w->work->plan;
   news n = {.status = accuracy_rows_append(w->bench, w->work->file, row)};
   n.cost = accuracy_point_cost(plan, w->group, &plan->points[point]);
-  if (n.status >= HAP_OK && !tell(w, &n)) {
+  if (n.status >= HAP_OK && !parent_tell(w, &n)) {
     return bench_fail(w->bench, HAP_ERROR_SYSTEM, "the run was ended");
   }
   return n.status;
@@ -976,7 +905,7 @@ static void work_on(worker *w)
   prctl(PR_SET_PDEATHSIG, SIGKILL); /* a run that is killed ends as a whole */
   n.status = accuracy_sweep(w->bench, w->work->plan, w->group, w->work->have, take_row, w);
   n.detail = w->bench->detail;
-  _exit(n.status >= HAP_OK || tell(w, &n) ? 0 : 1);
+  _exit(n.status >= HAP_OK || parent_tell(w, &n) ? 0 : 1);
 }
 
 /* ---- in the parent ---- */
@@ -1056,7 +985,7 @@ static void wait_for_one(bench *b, int from, progress *p, hap_status *io)
     (void)poll(&wait, 1, LOOK_MS);
     child = waitpid(-1, &result, WNOHANG);
     read_news(b, from, p, io);
-    show(p);
+    progress_show(p);
   }
   if ((!WIFEXITED(result) || WEXITSTATUS(result) != 0) && *io >= HAP_OK) {
     *io = bench_fail(b, HAP_ERROR_SYSTEM, "a scene's process did not end well");
@@ -1082,7 +1011,9 @@ static hap_status run_all(bench *b, const accuracy_work *work, const int pipe_en
       break;
     }
   }
-  end_progress(&p);
+  if (p.terminal) {
+    fputs("\r\033[K", stderr);
+  }
   return status;
 }
 
@@ -1148,8 +1079,8 @@ static hap_status check_rate(bench *b, const scene_parameters *p, double physics
   def.parameters = p;
   def.hands[0] = hand;
   def.seconds = p->duration;
-  def.model = HAP_MODEL_CONTACT;
-  def.physics_hz = physics_hz;
+  def.session.model = HAP_MODEL_CONTACT;
+  def.session.physics_hz = physics_hz;
   hap_status status = accuracy_run(b, &def, &test);
   if (status < HAP_OK) {
     return status;
@@ -1171,14 +1102,15 @@ static hap_status accuracy_check_hold(bench *b)
 {
   const scene_parameters *p = cycles_scene("hold");
   hap_status status = HAP_OK;
-  for (size_t i = 0; i < sizeof rates / sizeof rates[0] && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(rates) && status >= HAP_OK; ++i) {
     status = check_rate(b, p, rates[i]);
   }
   return status;
 }
 
 /* hapode-bench accuracy: what accuracy costs in time. Every scene with a prescribed motion of the
- * hand, in every model, against model SINGLE at 1 kHz with 1000 iterations, twice the scene's at least. Columns:
+ * hand, in every model, against model SINGLE at 1 kHz with 1000 iterations, twice the scene's at
+ * least. Columns:
  *
  *   knob, value    what differs from the library's defaults; default: nothing, the worst of ten
  *                  starts that are 1 um to 1 mm apart. operating, operating_cross: probes about the
@@ -1189,20 +1121,21 @@ static hap_status accuracy_check_hold(bench *b)
  *   duty           processor time of physics, contact passes and loop / simulated time
  *   noise_floor    the same error between references at 1 and 2 kHz, at the first start and at the
  *                  worst one of model contact, or 1 um apart
- *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none, with
- *                  --quick beside the default alone, unless --estimates all
+ *   estimate       of force_rel_rms, by looking back in the worst start's session; 0: it has none,
+ *                  with --quick beside the default alone, unless --estimates all
  *   pose_*_mm      distance of the bodies that the loop moves from their reference
  *   sync_line_n    largest line of the difference at the physics rate and 5 harmonics, above what
- *                  is half way to the next ones and, in rows "default" of model contact, above what a
- *                  run at 1.3 times that rate has there; 0 when contact is shorter than 4 steps
+ *                  is half way to the next ones and, in rows "default" of model contact, above
+ *                  what a run at 1.3 times that rate has there; 0 when contact is shorter than 4
+ *                  steps
  *   rest_share     of the ticks with contact, those in which no hand moves
  *   start_um       the worst start
  *   torque_*       as force_rel_rms and noise_floor, of the torque; 0: the hands feel none
- *   joint_*        the widest any joint opens at any tick, from anchor to anchor, and of those that slide
- *                  across the axis; 0: no joints. open: between bodies that the loop moves, in the loop;
- *                  world: of the same in ODE's world; left: there, of the others, which ODE alone
- *                  moves; floor: in the world of the references; turn: of axes, or of bodies that
- *                  cannot turn, the largest of open and world */
+ *   joint_*        the widest any joint opens at any tick, from anchor to anchor, and of those that
+ *                  slide across the axis; 0: no joints. open: between bodies that the loop moves,
+ *                  in the loop; world: of the same in ODE's world; left: there, of the others,
+ *                  which ODE alone moves; floor: in the world of the references; turn: of axes, or
+ *                  of bodies that cannot turn, the largest of open and world */
 
 #define REST_BOUND 0.3
 #define PEAK_BOUND 1.05
@@ -1225,28 +1158,17 @@ static bool is_default(const accuracy_row *row)
   return strcmp(row->knob, ACCURACY_DEFAULT) == 0;
 }
 
-static bool is_way_of_testing(const accuracy_row *row)
-{
-  return strcmp(row->knob, ACCURACY_EQ4) == 0 || strcmp(row->knob, ACCURACY_OPERATING) == 0 ||
-         strcmp(row->knob, ACCURACY_CROSS) == 0;
-}
-
-static bool is_coupling(const accuracy_row *row)
-{
-  hap_coupling coupling;
-  return bench_find_coupling(row->knob, &coupling);
-}
-
-static hap_status write_table(bench *b, const accuracy_table *table)
+static hap_status table_write(bench *b, const accuracy_table *table)
 {
   FILE *csv = bench_csv_open(b, "accuracy", NULL);
-  if (csv != NULL) {
-    accuracy_write_header(csv);
+  if (csv == NULL) {
+    return HAP_ERROR_IO;
   }
-  for (size_t i = 0; i < table->count && csv != NULL; ++i) {
+  accuracy_write_header(csv);
+  for (size_t i = 0; i < table->count; ++i) {
     accuracy_write_row(csv, &table->rows[i]);
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 /* ---- numbers ---- */
@@ -1309,14 +1231,8 @@ static void check_joints(bench *b, const accuracy_row *r)
               1e3 * r->joint_floor, 1e3 * e->joint_left, DEGREES * e->joint_turn);
 }
 
-/* Whether the session was asked for the row's error, where there is more to it than noise. */
-static bool is_estimated(const bench *b, const accuracy_row *r)
-{
-  return strcmp(r->model, hap_model_name(HAP_MODEL_SINGLE)) != 0 &&
-         (accuracy_estimates_all(b) || is_default(r)) && r->errors.force > r->noise_floor;
-}
-
-/* Whether what the session says of its error is right; nothing said is wrong. The bound is on the whole table. */
+/* Whether what the session says of its error is right; nothing said is wrong. The bound is on
+ * the whole table. */
 static void check_estimates(bench *b, const accuracy_table *table)
 {
   size_t judged = 0;
@@ -1324,7 +1240,10 @@ static void check_estimates(bench *b, const accuracy_table *table)
   size_t without = 0;
   for (size_t i = 0; i < table->count; ++i) {
     const accuracy_row *r = &table->rows[i];
-    if (is_estimated(b, r)) {
+    bool asked = accuracy_estimates_all(b) || is_default(r);
+    /* where there is more to it than noise */
+    if (strcmp(r->model, hap_model_name(HAP_MODEL_SINGLE)) != 0 && asked &&
+        r->errors.force > r->noise_floor) {
       double ratio = r->estimate / r->errors.force;
       ++judged;
       without += r->estimate == 0.0;
@@ -1342,8 +1261,9 @@ static void check_estimates(bench *b, const accuracy_table *table)
   }
 }
 
-/* What the dial comes to at its default. The haptic thread's share of a core is that of its ticks by the clock,
- * or less where all that the session does takes less of the processor's time. */
+/* What the dial comes to at its default. The haptic thread's share of a core is that of its
+ * ticks by the clock, or less where all that the session does takes less of the processor's
+ * time. */
 static void check_dial(bench *b, const accuracy_row *r)
 {
   double ticks = 1e-6 * r->tick_us * r->haptic_hz;
@@ -1415,23 +1335,33 @@ static void check_dial_apart(bench *b, const dial_ends *ends)
   }
 }
 
-static void check_rest(bench *b, const accuracy_row *r)
+/* How far the paper's choice and the default are from the front of their scene. */
+static void front_report(const accuracy_row *rows, size_t count)
 {
-  bench_check(b, r->rest_share <= REST_BOUND,
-              "%s: the hand rests in %.1f %% of the contact (%g %%)", r->scene,
-              100.0 * r->rest_share, 100.0 * REST_BOUND);
+  for (size_t i = 0; i < count; ++i) {
+    if (is_our_default(&rows[i], NULL)) {
+      front_say(rows, count, &rows[i], "the default");
+    } else if (is_papers(&rows[i], NULL)) {
+      front_say(rows, count, &rows[i], "the paper's choice");
+    }
+  }
 }
 
-static void report(bench *b, const accuracy_table *table)
+static void accuracy_report(bench *b, const accuracy_table *table)
 {
   const char *before = "";
+  hap_coupling coupling;
   dial_ends ends = {0};
   for (size_t i = 0; i < table->count; ++i) {
     const accuracy_row *r = &table->rows[i];
     bool bounded = r->physics_hz == 20.0 || r->physics_hz == 60.0;
+    bool beside = strcmp(r->knob, ACCURACY_EQ4) == 0 || strcmp(r->knob, ACCURACY_OPERATING) == 0 ||
+                  strcmp(r->knob, ACCURACY_CROSS) == 0 || bench_find_coupling(r->knob, &coupling);
     if (is_default(r) && strcmp(before, r->scene) != 0) {
       before = r->scene;
-      check_rest(b, r);
+      bench_check(b, r->rest_share <= REST_BOUND,
+                  "%s: the hand rests in %.1f %% of the contact (%g %%)", r->scene,
+                  100.0 * r->rest_share, 100.0 * REST_BOUND);
     }
     if (accuracy_row_is(r, HAP_MODEL_CONTACT, ACCURACY_DEFAULT) && bounded) {
       check_row(b, r);
@@ -1445,7 +1375,7 @@ static void report(bench *b, const accuracy_table *table)
     } else if (is_default(r) && bounded) {
       bench_say("%s at %g Hz: %s: force error %.3g %%, peak ratio %.3f", r->scene, r->physics_hz,
                 r->model, 100.0 * r->errors.force, r->errors.peak_ratio);
-    } else if ((is_way_of_testing(r) || is_coupling(r)) && bounded) {
+    } else if (beside && bounded) {
       bench_say("%s at %g Hz: %s, %s: force error %.3g %%, peak ratio %.3f", r->scene,
                 r->physics_hz, r->model, r->knob, 100.0 * r->errors.force, r->errors.peak_ratio);
     }
@@ -1481,59 +1411,33 @@ static size_t choose_scenes(bench *b, const accuracy_scene **out)
   return count;
 }
 
-/* The rows that are there, in the order of the plan. */
-static hap_status fill_table(bench *b, const accuracy_plan *plan, const accuracy_row *rows,
-                             accuracy_table *out)
-{
-  hap_status status = HAP_OK;
-  for (size_t i = 0; i < plan->count && status >= HAP_OK; ++i) {
-    status = accuracy_table_add(b, out, &rows[i]);
-  }
-  for (size_t i = 0; i < out->count; i += accuracy_rows_of_scene(out, i)) {
-    accuracy_mark_front(&out->rows[i], accuracy_rows_of_scene(out, i));
-  }
-  return status;
-}
-
-static hap_status finish(bench *b, const accuracy_plan *plan, const accuracy_row *rows)
+/* Of the rows that are there, in the order of the plan. */
+static hap_status plan_finish(bench *b, const accuracy_plan *plan, const accuracy_row *rows)
 {
   accuracy_table table = {0};
-  hap_status status = fill_table(b, plan, rows, &table);
-  if (status >= HAP_OK) {
-    status = write_table(b, &table);
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < plan->count && status >= HAP_OK; ++i) {
+    status = accuracy_table_add(b, &table, &rows[i]);
   }
+  for (size_t i = 0; i < table.count; i += accuracy_rows_of_scene(&table, i)) {
+    accuracy_mark_front(&table.rows[i], accuracy_rows_of_scene(&table, i));
+  }
+  status = status >= HAP_OK ? table_write(b, &table) : status;
   if (status >= HAP_OK) {
-    report(b, &table);
+    accuracy_report(b, &table);
     for (size_t i = 0; i < table.count; i += accuracy_rows_of_scene(&table, i)) {
-      accuracy_report_front(&table.rows[i], accuracy_rows_of_scene(&table, i));
+      front_report(&table.rows[i], accuracy_rows_of_scene(&table, i));
     }
     status = b->scene == NULL || strcmp(b->scene, "hold") == 0 ? accuracy_check_hold(b) : HAP_OK;
   }
-  if (status >= HAP_OK) {
-    status = accuracy_draw(b, &table);
-  }
+  status = status >= HAP_OK ? accuracy_draw(b, &table) : status;
   accuracy_table_free(&table);
   return status;
 }
 
-static size_t processors(void)
-{
-  long count = sysconf(_SC_NPROCESSORS_ONLN);
-  return count > 1 ? (size_t)count : 1;
-}
-
-static size_t rows_there(const accuracy_plan *plan, const accuracy_row *rows)
-{
-  size_t there = 0;
-  for (size_t i = 0; i < plan->count; ++i) {
-    there += rows[i].scene[0] != '\0';
-  }
-  return there;
-}
-
 /* A shard's processes are the scheduler's business: it has one. */
-static hap_status measure(bench *b, const accuracy_plan *plan, const accuracy_identity *identity,
-                          accuracy_row *rows)
+static hap_status plan_measure(bench *b, const accuracy_plan *plan,
+                               const accuracy_identity *identity, accuracy_row *rows)
 {
   accuracy_work work = {.plan = plan, .shard = identity->shard - 1, .have = rows};
   size_t *shard_of = calloc(plan->group_count + 1, sizeof *shard_of);
@@ -1541,13 +1445,16 @@ static hap_status measure(bench *b, const accuracy_plan *plan, const accuracy_id
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the plan");
   }
   work.shard_of = shard_of;
-  work.processes = b->shards > 0 ? 1 : processors();
+  work.processes = b->shards > 0 ? 1 : (size_t)fmax(1.0, (double)sysconf(_SC_NPROCESSORS_ONLN));
   hap_status status = accuracy_deal(b, plan, identity->shards, shard_of);
   if (status >= HAP_OK) {
     status = accuracy_rows_open(b, plan, identity, rows, &work.file);
   }
   if (status >= HAP_OK) {
-    size_t there = rows_there(plan, rows);
+    size_t there = 0;
+    for (size_t i = 0; i < plan->count; ++i) {
+      there += rows[i].scene[0] != '\0';
+    }
     if (there > 0) {
       fprintf(stderr, "accuracy: goes on from %zu finished rows; --fresh begins anew\n", there);
     }
@@ -1558,13 +1465,13 @@ static hap_status measure(bench *b, const accuracy_plan *plan, const accuracy_id
   return status;
 }
 
-static hap_status run(bench *b, const accuracy_plan *plan, accuracy_row *rows)
+static hap_status plan_run(bench *b, const accuracy_plan *plan, accuracy_row *rows)
 {
   accuracy_identity identity;
   char path[PATH_MAX];
   hap_status status = accuracy_identify(b, plan, &identity);
   if (status >= HAP_OK) {
-    status = measure(b, plan, &identity, rows);
+    status = plan_measure(b, plan, &identity, rows);
   }
   if (status < HAP_OK || !accuracy_rows_path(b, &identity, path, sizeof path)) {
     return status;
@@ -1577,7 +1484,7 @@ static hap_status run(bench *b, const accuracy_plan *plan, accuracy_row *rows)
   memset(rows, 0, plan->count * sizeof *rows); /* the file has these as well */
   status = accuracy_rows_read(b, path, plan, rows);
   if (status >= HAP_OK) {
-    status = finish(b, plan, rows);
+    status = plan_finish(b, plan, rows);
   }
   if (status >= HAP_OK) {
     unlink(path); /* the next run measures anew */
@@ -1612,9 +1519,9 @@ static hap_status run_or_merge(bench *b)
     status = bench_fail(b, HAP_ERROR_MEMORY, "no memory for the rows");
   } else if (b->merge != NULL) {
     status = accuracy_merge(b, &plan, rows);
-    status = status >= HAP_OK ? finish(b, &plan, rows) : status;
+    status = status >= HAP_OK ? plan_finish(b, &plan, rows) : status;
   } else {
-    status = run(b, &plan, rows);
+    status = plan_run(b, &plan, rows);
   }
   free(rows);
   accuracy_plan_free(&plan);

@@ -4,8 +4,8 @@
 #define HAPODE_BENCH_ACCURACY_H
 
 /* hapode-bench accuracy: runs and the comparison of two (accuracy_run.c), what is measured
- * (accuracy_plan.c), rows as text and in files (accuracy_rows.c), the measurement, what is worth its
- * time, and the picture (accuracy.c). */
+ * (accuracy_plan.c), rows as text and in files (accuracy_rows.c), the measurement, what is worth
+ * its time, and the picture (accuracy.c). */
 
 #include <stdint.h>
 
@@ -68,30 +68,18 @@ typedef struct accuracy_motion {
   hap_stats stats;
 } accuracy_motion;
 
-/* Every knob is here, and only open_rig of accuracy_run.c hands them on. */
 typedef struct accuracy_run_def {
   const scene_parameters *parameters; /* shift as it shall be */
   const char *hands[SCENE_POINTERS_MAX];
   double seconds;
-  hap_model model;
-  double physics_hz;
-  double haptic_hz;
-  double contact_hz;
-  int latency_ticks;
-  hap_probe probe;
-  hap_effect_wish cross;
+  hap_session_def session; /* drive, guard and trace are those of the bench */
+  hap_expert_def expert;
+  hap_research_def research;
   hap_coupling coupling;     /* default: direct */
   double coupling_stiffness; /* N/m */
   double coupling_damping;   /* N s/m */
-  int iterations;            /* of QuickStep; 0: the scene's */
-  int32_t max_sweeps;
-  int32_t range_hops;
-  int32_t max_edge_probes;
-  double accuracy; /* of all of these that are HAP_BY_ACCURACY */
-  hap_effect_wish shape;
-  double lookback;
-  double reuse;
   hap_integration integration;
+  int32_t iterations; /* of QuickStep; 0: the scene's */
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */
@@ -117,8 +105,8 @@ typedef struct accuracy_errors {
   double joint_turn;  /* rad, of those that the loop moves, in either world */
 } accuracy_errors;
 
-/* control: as test, at another physics rate; may be NULL. False: nothing is touched in the reference,
- * or no memory. */
+/* control: as test, at another physics rate; may be NULL. False: nothing is touched in the
+ * reference, or no memory. */
 bool accuracy_compare(const accuracy_motion *reference, const accuracy_motion *test,
                       const accuracy_motion *control, double physics_hz, accuracy_errors *out);
 
@@ -249,8 +237,8 @@ bool accuracy_row_is(const accuracy_row *row, hap_model model, const char *knob)
 
 /* ---- accuracy_rows.c: the file ---- */
 
-/* The file of finished rows. Its head says of which build, settings and shard it is; the rows are in
- * the order in which they were finished. */
+/* The file of finished rows. Its head says of which build, settings and shard it is; the rows
+ * are in the order in which they were finished. */
 typedef struct accuracy_identity {
   char build[40];     /* of program, library and ODE */
   char settings[200]; /* what was asked for */
@@ -265,12 +253,13 @@ hap_status accuracy_identify(bench *b, const accuracy_plan *plan, accuracy_ident
 /* "K/N" of a shard, 1 <= K <= N. */
 bool accuracy_read_shard(const char *text, size_t *shard, size_t *shards);
 
-/* rows: by point of the plan, which is the file's. What is not in the file stays as it is. A last line that
- * breaks off is left out. HAP_ERROR_FORMAT with a text. */
+/* rows: by point of the plan, which is the file's. What is not in the file stays as it is. A
+ * last line that breaks off is left out. HAP_ERROR_FORMAT with a text. */
 hap_status accuracy_rows_read(bench *b, const char *path, const accuracy_plan *plan,
                               accuracy_row *rows);
 
-/* Opens the run's file, new or to go on with: then its rows are in have. Nobody else has it open. */
+/* Opens the run's file, new or to go on with: then its rows are in have. Nobody else has it
+ * open. */
 hap_status accuracy_rows_open(bench *b, const accuracy_plan *plan,
                               const accuracy_identity *identity, accuracy_row *have, int *out_file);
 

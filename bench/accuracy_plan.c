@@ -6,6 +6,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,8 +23,8 @@
 #define LOOKBACK_ITERATIONS 100   /* half of the fewest of the session's own reference */
 #define SCENE_SPEED 0.1           /* m/s, about that of most hands */
 
-/* Against the hand, so that no scene's gap to a wall is closed. The first two differ by 1 um, which is
- * one of the noise floors. */
+/* Against the hand, so that no scene's gap to a wall is closed. The first two differ by 1 um,
+ * which is one of the noise floors. */
 static const double starts[ACCURACY_STARTS_MAX] = {1e-6, 2e-6, 5e-6, 1e-5, 2e-5,
                                                    5e-5, 1e-4, 2e-4, 5e-4, 1e-3};
 
@@ -34,10 +35,9 @@ typedef struct values {
   size_t quick; /* so many of them */
 } values;
 
-#define COUNT(array) (sizeof(array) / sizeof(array)[0])
-#define VALUES(name, quick)  \
-  {                          \
-    name, COUNT(name), quick \
+#define VALUES(name, quick)        \
+  {                                \
+    name, BENCH_COUNT(name), quick \
   }
 
 static const double rates[] = {10.0, 20.0, 60.0, 120.0, 250.0, 500.0, 1000.0};
@@ -79,7 +79,7 @@ size_t accuracy_starts(const accuracy_scene *which, bool quick, size_t out[ACCUR
 
 /* ---- the lists ---- */
 
-static hap_status grow(bench *b, void **array, size_t *capacity, size_t count, size_t size)
+static hap_status array_grow(bench *b, void **array, size_t *capacity, size_t count, size_t size)
 {
   if (count < *capacity) {
     return HAP_OK;
@@ -113,8 +113,8 @@ static void begin_group(writer *w, const accuracy_scene *which, double physics_h
 {
   accuracy_plan *plan = w->plan;
   if (w->status >= HAP_OK) {
-    w->status = grow(w->bench, (void **)&plan->groups, &plan->group_capacity, plan->group_count,
-                     sizeof *plan->groups);
+    w->status = array_grow(w->bench, (void **)&plan->groups, &plan->group_capacity,
+                           plan->group_count, sizeof *plan->groups);
   }
   if (w->status < HAP_OK) {
     return;
@@ -130,8 +130,8 @@ static accuracy_point point_of(const writer *w, hap_model model, const char *kno
   memset(&p, 0, sizeof p);
   snprintf(p.knob, sizeof p.knob, "%s", knob);
   accuracy_run_def_init(&p.def);
-  p.def.model = model;
-  p.def.physics_hz = p.physics_hz = w->group != NULL ? w->group->physics_hz : 0.0;
+  p.def.session.model = model;
+  p.def.session.physics_hz = p.physics_hz = w->group != NULL ? w->group->physics_hz : 0.0;
   p.value = value;
   p.all_starts = strcmp(knob, ACCURACY_DEFAULT) == 0;
   return p;
@@ -139,24 +139,24 @@ static accuracy_point point_of(const writer *w, hap_model model, const char *kno
 
 static bool is_same(const accuracy_point *a, const accuracy_point *b)
 {
-  return a->def.model == b->def.model && strcmp(a->knob, b->knob) == 0 && a->value == b->value &&
-         a->physics_hz == b->physics_hz;
+  return a->def.session.model == b->def.session.model && strcmp(a->knob, b->knob) == 0 &&
+         a->value == b->value && a->physics_hz == b->physics_hz;
 }
 
 /* A row is known by its model, knob, value and rate. */
-static void add(writer *w, const accuracy_point *point)
+static void point_add(writer *w, const accuracy_point *point)
 {
   accuracy_plan *plan = w->plan;
   if (w->status >= HAP_OK) {
-    w->status =
-        grow(w->bench, (void **)&plan->points, &plan->capacity, plan->count, sizeof *plan->points);
+    w->status = array_grow(w->bench, (void **)&plan->points, &plan->capacity, plan->count,
+                           sizeof *plan->points);
   }
   if (w->status < HAP_OK) {
     return;
   }
   plan->points[plan->count] = *point;
-  if (point->def.model == HAP_MODEL_SINGLE) { /* its steps are the loop's */
-    plan->points[plan->count].physics_hz = point->def.haptic_hz;
+  if (point->def.session.model == HAP_MODEL_SINGLE) { /* its steps are the loop's */
+    plan->points[plan->count].physics_hz = point->def.session.haptic_hz;
   }
   for (size_t i = w->group->first; i < plan->count; ++i) {
     assert(!is_same(&plan->points[i], &plan->points[plan->count]));
@@ -167,56 +167,22 @@ static void add(writer *w, const accuracy_point *point)
 
 /* ---- knobs ---- */
 
-typedef void (*turn_fn)(accuracy_run_def *def, double value);
-
-static void turn_contact_hz(accuracy_run_def *def, double value)
-{
-  def->contact_hz = value;
-}
-
-static void turn_iterations(accuracy_run_def *def, double value)
-{
-  def->iterations = (int)value;
-}
-
-static void turn_sweeps(accuracy_run_def *def, double value)
-{
-  def->max_sweeps = (int32_t)value;
-}
-
-static void turn_hops(accuracy_run_def *def, double value)
-{
-  def->range_hops = (int32_t)value;
-}
-
-static void turn_edge_probes(accuracy_run_def *def, double value)
-{
-  def->max_edge_probes = (int32_t)value;
-}
-
-static void turn_reuse(accuracy_run_def *def, double value)
-{
-  def->reuse = value;
-}
-
-static void turn_haptic_hz(accuracy_run_def *def, double value)
-{
-  def->haptic_hz = value;
-}
+#define KNOB(member) offsetof(accuracy_run_def, member)
 
 static const struct {
   const char *name;
-  turn_fn turn;
+  size_t at;  /* in the def */
+  bool whole; /* an int32_t, else a double */
   values values;
   size_t models; /* so many of the first ones; with all of them model SINGLE too */
 } knobs[] = {
-    {"contact_hz", turn_contact_hz, VALUES(contact_rates, 4), 1},
-    {"iterations", turn_iterations, VALUES(iterations, 2), COUNT(models)},
-    {"sweeps", turn_sweeps, VALUES(sweeps, 2), 1},
-    {"range_hops", turn_hops, VALUES(hops, 2), 1},
-    {"edge_probes", turn_edge_probes, VALUES(edge_probes, 0), 1},
-    {"reuse", turn_reuse, VALUES(reuses, 0), 2},
-    {"haptic_hz", turn_haptic_hz, VALUES(haptic_rates, 2), COUNT(models)},
+    {"contact_hz", KNOB(expert.contact_hz), false, VALUES(contact_rates, 4), 1},
+    {"iterations", KNOB(iterations), true, VALUES(iterations, 2), BENCH_COUNT(models)},
+    {"sweeps", KNOB(expert.max_sweeps), true, VALUES(sweeps, 2), 1},
+    {"range_hops", KNOB(expert.range_hops), true, VALUES(hops, 2), 1},
+    {"edge_probes", KNOB(expert.max_edge_probes), true, VALUES(edge_probes, 0), 1},
+    {"reuse", KNOB(expert.reuse), false, VALUES(reuses, 0), 2},
+    {"haptic_hz", KNOB(session.haptic_hz), false, VALUES(haptic_rates, 2), BENCH_COUNT(models)},
 };
 
 static void add_knob(writer *w, size_t knob, hap_model model)
@@ -225,9 +191,12 @@ static void add_knob(writer *w, size_t knob, hap_model model)
   size_t count = w->plan->quick ? v->quick : v->count;
   for (size_t i = 0; i < count; ++i) {
     accuracy_point p = point_of(w, model, knobs[knob].name, v->all[i]);
-    knobs[knob].turn(&p.def, v->all[i]);
-    if (p.def.haptic_hz >= p.def.physics_hz || model == HAP_MODEL_SINGLE) {
-      add(w, &p);
+    int32_t whole = (int32_t)v->all[i];
+    char *at = (char *)&p.def + knobs[knob].at;
+    memcpy(at, knobs[knob].whole ? (const void *)&whole : &v->all[i],
+           knobs[knob].whole ? sizeof whole : sizeof v->all[i]);
+    if (p.def.session.haptic_hz >= p.def.session.physics_hz || model == HAP_MODEL_SINGLE) {
+      point_add(w, &p);
     }
   }
 }
@@ -241,12 +210,12 @@ static void add_plane_and_integrations(writer *w)
                       {"implicit", HAP_INTEGRATION_IMPLICIT},
                       {"midpoint", HAP_INTEGRATION_MIDPOINT}};
   accuracy_point plane = point_of(w, HAP_MODEL_CONTACT, "plane", 0.0);
-  plane.def.shape = HAP_EFFECT_OFF;
-  add(w, &plane);
-  for (size_t i = 0; i < COUNT(integrations); ++i) {
+  expert_wish(&plane.def.expert, HAP_EFFECT_SHAPE, HAP_EFFECT_OFF);
+  point_add(w, &plane);
+  for (size_t i = 0; i < BENCH_COUNT(integrations); ++i) {
     accuracy_point p = point_of(w, HAP_MODEL_CONTACT, integrations[i].name, 0.0);
     p.def.integration = integrations[i].integration;
-    add(w, &p);
+    point_add(w, &p);
   }
 }
 
@@ -255,8 +224,8 @@ static void add_dial(writer *w, hap_model model)
 {
   for (size_t i = 0; i < (w->plan->quick ? dial.quick : dial.count); ++i) {
     accuracy_point p = point_of(w, model, ACCURACY_DIAL, dial.all[i]);
-    p.def.accuracy = dial.all[i];
-    add(w, &p);
+    p.def.session.accuracy = dial.all[i];
+    point_add(w, &p);
   }
 }
 
@@ -265,14 +234,14 @@ static void add_ages(writer *w, hap_model model)
   int step = (int)(ACCURACY_HAPTIC_HZ / w->group->physics_hz);
   const int ages[] = {0, 1, step / 2, step};
   int oldest = -1;
-  for (size_t i = 0; i < COUNT(ages); ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(ages); ++i) {
     if (ages[i] <= oldest) {
       continue;
     }
     oldest = ages[i];
     accuracy_point p = point_of(w, model, ACCURACY_AGE, ages[i] / ACCURACY_HAPTIC_HZ);
-    p.def.latency_ticks = ages[i];
-    add(w, &p);
+    p.def.research.physics_latency_ticks = ages[i];
+    point_add(w, &p);
   }
 }
 
@@ -289,14 +258,14 @@ static void add_probes(writer *w)
               {ACCURACY_CROSS, HAP_PROBE_OPERATING, HAP_EFFECT_ON, false},
               {ACCURACY_PAPER, HAP_PROBE_PAPER, HAP_EFFECT_OFF, false}};
   bool quick = w->plan->quick;
-  for (size_t i = 0; i < COUNT(ways); ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(ways); ++i) {
     bool paper = strcmp(ways[i].knob, ACCURACY_PAPER) == 0;
     accuracy_point p = point_of(w, HAP_MODEL_ACCELERANCE, ways[i].knob, 0.0);
-    p.def.probe = ways[i].probe;
-    p.def.cross = ways[i].cross;
+    p.def.research.probe = ways[i].probe;
+    expert_wish(&p.def.expert, HAP_EFFECT_CROSS, ways[i].cross);
     p.all_starts = !quick && !paper; /* the same force as by default, in another time */
     if (quick ? !paper || p.physics_hz == ACCURACY_PAPER_HZ : !ways[i].quick_alone) {
-      add(w, &p);
+      point_add(w, &p);
     }
   }
 }
@@ -310,7 +279,7 @@ bool accuracy_knob_has_value(const char *knob)
 {
   bool has = strcmp(knob, ACCURACY_SPEED) == 0 || strcmp(knob, ACCURACY_AGE) == 0 ||
              strcmp(knob, ACCURACY_DIAL) == 0;
-  for (size_t i = 0; i < COUNT(knobs); ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(knobs); ++i) {
     has = has || strcmp(knob, knobs[i].name) == 0;
   }
   return has;
@@ -321,34 +290,34 @@ bool accuracy_knob_has_value(const char *knob)
 static void add_models(writer *w)
 {
   accuracy_point contact = point_of(w, HAP_MODEL_CONTACT, ACCURACY_DEFAULT, 0.0);
-  add(w, &contact); /* first: it settles the noise floor */
+  point_add(w, &contact); /* first: it settles the noise floor */
   if (w->bench->coupling != NULL) {
     double stiffness = cycles_scene(w->group->scene->base)->stiffness;
     accuracy_point p = point_of(w, HAP_MODEL_CONTACT, w->bench->coupling, stiffness);
     (void)bench_find_coupling(w->bench->coupling, &p.def.coupling);
     p.all_starts = true;
-    add(w, &p);
+    point_add(w, &p);
   }
-  for (size_t i = 1; i < COUNT(models); ++i) {
+  for (size_t i = 1; i < BENCH_COUNT(models); ++i) {
     accuracy_point p = point_of(w, models[i], ACCURACY_DEFAULT, 0.0);
-    add(w, &p);
+    point_add(w, &p);
   }
   add_probes(w);
   if (w->group->physics_hz == ACCURACY_DEFAULT_HZ) { /* whose soft constraints it is given */
     accuracy_point p = point_of(w, HAP_MODEL_SINGLE, ACCURACY_DEFAULT, 0.0);
-    add(w, &p);
+    point_add(w, &p);
   }
 }
 
 static void add_knobs(writer *w)
 {
   bool single = w->group->physics_hz == ACCURACY_DEFAULT_HZ && !w->plan->quick;
-  for (size_t knob = 0; knob < COUNT(knobs); ++knob) {
+  for (size_t knob = 0; knob < BENCH_COUNT(knobs); ++knob) {
     add_knob(w, knob, HAP_MODEL_CONTACT);
-    for (size_t m = 1; m < COUNT(models) && m < knobs[knob].models && !w->plan->quick; ++m) {
+    for (size_t m = 1; m < BENCH_COUNT(models) && m < knobs[knob].models && !w->plan->quick; ++m) {
       add_knob(w, knob, models[m]);
     }
-    if (single && knobs[knob].models == COUNT(models)) {
+    if (single && knobs[knob].models == BENCH_COUNT(models)) {
       add_knob(w, knob, HAP_MODEL_SINGLE);
     }
   }
@@ -357,7 +326,7 @@ static void add_knobs(writer *w)
   if (!w->plan->quick) {
     add_dial(w, HAP_MODEL_ACCELERANCE);
   }
-  for (size_t m = 0; m < COUNT(models); ++m) {
+  for (size_t m = 0; m < BENCH_COUNT(models); ++m) {
     add_ages(w, models[m]);
   }
 }
@@ -377,19 +346,9 @@ static void add_rate(writer *w, const accuracy_scene *which, double physics_hz)
 static void add_speed(writer *w, const accuracy_scene *which, double speed)
 {
   begin_group(w, which, SPEEDS_AT_HZ, speed);
-  for (size_t m = 0; m < COUNT(models) && w->status >= HAP_OK; ++m) {
+  for (size_t m = 0; m < BENCH_COUNT(models) && w->status >= HAP_OK; ++m) {
     accuracy_point p = point_of(w, models[m], ACCURACY_SPEED, speed);
-    add(w, &p);
-  }
-}
-
-static void set_costs(accuracy_plan *plan)
-{
-  for (size_t i = 0; i < plan->group_count; ++i) {
-    accuracy_group *g = &plan->groups[i];
-    for (size_t k = 0; k < g->count; ++k) {
-      g->cost += accuracy_point_cost(plan, g, &plan->points[g->first + k]);
-    }
+    point_add(w, &p);
   }
 }
 
@@ -404,7 +363,7 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
     if (cycles_scene(scenes[i]->base) == NULL) {
       w.status = bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", scenes[i]->base);
     }
-    for (size_t k = 0; k < (b->quick ? COUNT(rates_quick) : COUNT(rates)); ++k) {
+    for (size_t k = 0; k < (b->quick ? BENCH_COUNT(rates_quick) : BENCH_COUNT(rates)); ++k) {
       add_rate(&w, scenes[i], b->quick ? rates_quick[k] : rates[k]);
     }
     for (size_t k = 0; scenes[i]->speeds && k < (b->quick ? all_speeds.quick : all_speeds.count);
@@ -416,7 +375,12 @@ hap_status accuracy_plan_make(bench *b, const accuracy_scene *const *scenes, siz
     accuracy_plan_free(out);
     return w.status;
   }
-  set_costs(out);
+  for (size_t i = 0; i < out->group_count; ++i) {
+    accuracy_group *g = &out->groups[i];
+    for (size_t k = 0; k < g->count; ++k) {
+      g->cost += accuracy_point_cost(out, g, &out->points[g->first + k]);
+    }
+  }
   return HAP_OK;
 }
 
@@ -439,16 +403,16 @@ static double step_cost(const scene_parameters *p, int its)
 static double run_cost(const scene_parameters *p, const accuracy_run_def *def, double seconds)
 {
   double step = step_cost(p, def->iterations);
-  double ticks = seconds * def->haptic_hz;
-  if (def->model == HAP_MODEL_SINGLE) {
+  double ticks = seconds * def->session.haptic_hz;
+  if (def->session.model == HAP_MODEL_SINGLE) {
     return ticks * step;
   }
-  double tests = def->model == HAP_MODEL_ACCELERANCE ? PROBES : 0.0;
-  return ticks * TICK_COST + seconds * def->physics_hz * (1.0 + tests) * step;
+  double tests = def->session.model == HAP_MODEL_ACCELERANCE ? PROBES : 0.0;
+  return ticks * TICK_COST + seconds * def->session.physics_hz * (1.0 + tests) * step;
 }
 
-/* What takes more iterations to be simulated well takes more of them to be a reference: in the tower, which has
- * 2000, the force with 1000 is 1 % off, and the noise floor does not show it. */
+/* What takes more iterations to be simulated well takes more of them to be a reference: in the
+ * tower, which has 2000, the force with 1000 is 1 % off, and the noise floor does not show it. */
 int accuracy_reference_iterations(const scene_parameters *p)
 {
   return p->iterations > REFERENCE_ITERATIONS / 2 ? 2 * p->iterations : REFERENCE_ITERATIONS;
@@ -474,7 +438,7 @@ double accuracy_point_cost(const accuracy_plan *plan, const accuracy_group *grou
   bool main = first && point->all_starts;
   double references = !first ? 0.0 : FLOOR_REFERENCES + (main ? (double)all : 2.0);
   double runs = point->all_starts ? (double)all * (main ? 2.0 : 1.0) : 1.0;
-  bool estimated = point->def.model != HAP_MODEL_SINGLE &&
+  bool estimated = point->def.session.model != HAP_MODEL_SINGLE &&
                    (plan->estimates_all || strcmp(point->knob, ACCURACY_DEFAULT) == 0);
   double looks = estimated ? 2.0 * step_cost(p, LOOKBACK_ITERATIONS + p->iterations) : 0.0;
   return references * seconds * ACCURACY_HAPTIC_HZ *
@@ -512,7 +476,7 @@ hap_status accuracy_deal(bench *b, const accuracy_plan *plan, size_t shards, siz
 
 /* ---- whether it is the same ---- */
 
-static uint64_t mix(uint64_t hash, const char *text) /* FNV-1a */
+static uint64_t hash_text(uint64_t hash, const char *text) /* FNV-1a */
 {
   for (; *text != '\0'; ++text) {
     hash = (hash ^ (unsigned char)*text) * 0x100000001b3ull;
@@ -529,8 +493,8 @@ uint64_t accuracy_plan_hash(const accuracy_plan *plan)
       const accuracy_point *p = &plan->points[g->first + k];
       char text[160];
       snprintf(text, sizeof text, "%s %g %g %s %d %g %g;", g->scene->name, g->physics_hz,
-               g->hand_speed, p->knob, (int)p->def.model, p->value, p->physics_hz);
-      hash = mix(hash, text);
+               g->hand_speed, p->knob, (int)p->def.session.model, p->value, p->physics_hz);
+      hash = hash_text(hash, text);
     }
   }
   return hash;

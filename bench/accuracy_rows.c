@@ -186,8 +186,9 @@ static bool accuracy_is_header(const char *line)
   return true;
 }
 
-/* The file of finished rows: what a run that was killed goes on from, and what a shard leaves. It is
- * a few lines that begin with # and say whose rows these are, then a table as accuracy.csv. */
+/* The file of finished rows: what a run that was killed goes on from, and what a shard leaves.
+ * It is a few lines that begin with # and say whose rows these are, then a table as
+ * accuracy.csv. */
 
 #define LINE_LENGTH 1024
 #define LOCK_TRIES 50 /* of 20 ms: processes of a run that was killed end within moments */
@@ -326,15 +327,9 @@ static bool read_head(FILE *file, accuracy_identity *out)
          fgets(line, sizeof line, file) != NULL && accuracy_is_header(line);
 }
 
-static bool alike(double a, double b)
+static bool values_alike(double a, double b)
 {
   return fabs(a - b) <= 1e-5 * fabs(b); /* as the table prints them */
-}
-
-static bool is_point(const accuracy_row *row, const accuracy_point *point)
-{
-  return accuracy_row_is(row, point->def.model, point->knob) &&
-         alike(row->physics_hz, point->physics_hz) && alike(row->value, point->value);
 }
 
 /* plan->count: none. */
@@ -344,7 +339,10 @@ static size_t find_point(const accuracy_plan *plan, const accuracy_row *row)
     const accuracy_group *group = &plan->groups[g];
     bool of_scene = strcmp(row->scene, group->scene->name) == 0;
     for (size_t i = 0; of_scene && i < group->count; ++i) {
-      if (is_point(row, &plan->points[group->first + i])) {
+      const accuracy_point *point = &plan->points[group->first + i];
+      if (accuracy_row_is(row, point->def.session.model, point->knob) &&
+          values_alike(row->physics_hz, point->physics_hz) &&
+          values_alike(row->value, point->value)) {
         return group->first + i;
       }
     }
@@ -478,7 +476,7 @@ static hap_status cut_last_line(bench *b, const char *path, int file)
                                    : bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
 }
 
-static hap_status lock(bench *b, const char *path, int file)
+static hap_status file_lock(bench *b, const char *path, int file)
 {
   for (int i = 0; i < LOCK_TRIES; ++i) {
     if (flock(file, LOCK_EX | LOCK_NB) == 0) {
@@ -490,11 +488,11 @@ static hap_status lock(bench *b, const char *path, int file)
 }
 
 /* The file is the caller's, also after a failure. */
-static hap_status prepare(bench *b, const char *path, int file, const accuracy_plan *plan,
-                          const accuracy_identity *identity, accuracy_row *have)
+static hap_status file_prepare(bench *b, const char *path, int file, const accuracy_plan *plan,
+                               const accuracy_identity *identity, accuracy_row *have)
 {
   struct stat info;
-  hap_status status = lock(b, path, file);
+  hap_status status = file_lock(b, path, file);
   if (status < HAP_OK) {
     return status;
   }
@@ -526,7 +524,7 @@ hap_status accuracy_rows_open(bench *b, const accuracy_plan *plan,
   if (file < 0) {
     return bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
   }
-  hap_status status = prepare(b, path, file, plan, identity, have);
+  hap_status status = file_prepare(b, path, file, plan, identity, have);
   if (status < HAP_OK) {
     close(file);
     return status;
@@ -535,7 +533,8 @@ hap_status accuracy_rows_open(bench *b, const accuracy_plan *plan,
   return HAP_OK;
 }
 
-/* Files of several processes or machines, each with the finished rows of a shard, into one table. */
+/* Files of several processes or machines, each with the finished rows of a shard, into one
+ * table. */
 
 hap_status accuracy_merge_settings(bench *b, accuracy_settings *out)
 {
@@ -558,7 +557,7 @@ hap_status accuracy_merge_settings(bench *b, accuracy_settings *out)
 static hap_status check_heads(bench *b, const accuracy_identity *here,
                               const accuracy_identity *heads)
 {
-  /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): there is one for each file, and one file at least */
+  /* NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): one file at least */
   if (strcmp(heads[0].settings, here->settings) != 0) {
     return bench_fail(b, HAP_ERROR_STATE,
                       "%s is of a run with \"%s\", which here would be \"%s\": merge with the "
@@ -637,15 +636,6 @@ static hap_status check_rows(bench *b, const accuracy_plan *plan, const char *pa
   return HAP_OK;
 }
 
-static void take_rows(const accuracy_plan *plan, const accuracy_row *from, accuracy_row *rows)
-{
-  for (size_t i = 0; i < plan->count; ++i) {
-    if (from[i].scene[0] != '\0') {
-      rows[i] = from[i];
-    }
-  }
-}
-
 typedef struct files {
   accuracy_identity *heads; /* merge_count */
   accuracy_row *rows;       /* of one file, by point */
@@ -676,8 +666,10 @@ static hap_status read_files(bench *b, const accuracy_plan *plan, files *f, accu
     if (status >= HAP_OK) {
       status = check_rows(b, plan, b->merge[i], &f->heads[i], f->shard_of, f->rows);
     }
-    if (status >= HAP_OK) {
-      take_rows(plan, f->rows, out);
+    for (size_t point = 0; point < plan->count && status >= HAP_OK; ++point) {
+      if (f->rows[point].scene[0] != '\0') {
+        out[point] = f->rows[point];
+      }
     }
   }
   return status;

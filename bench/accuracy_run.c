@@ -4,10 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/log.h"
+#include "base/vec.h"
 #include "bench/accuracy.h"
 #include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
@@ -153,17 +153,14 @@ hap_status accuracy_recorded_hand(bench *b, const accuracy_scene *which, char *o
 #define CHANNELS (SCENE_POINTERS_MAX * 3)
 #define REST_SPEED 0.01 /* of the hand's largest speed */
 
-static double norm(const double v[3])
+static double points_distance(const double a[3], const double b[3])
 {
-  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  double apart[3];
+  hapi_v3_sub(a, b, apart);
+  return hapi_v3_norm(apart);
 }
 
-static double distance(const double a[3], const double b[3])
-{
-  return norm((const double[3]){a[0] - b[0], a[1] - b[1], a[2] - b[2]});
-}
-
-static bool touches(const accuracy_frame *f)
+static bool frame_touches(const accuracy_frame *f)
 {
   for (size_t i = 0; i < CHANNELS; ++i) {
     if (f->force[i / 3][i % 3] != 0.0) {
@@ -173,7 +170,7 @@ static bool touches(const accuracy_frame *f)
   return false;
 }
 
-static double difference(const accuracy_frame *a, const accuracy_frame *b, size_t channel)
+static double force_difference(const accuracy_frame *a, const accuracy_frame *b, size_t channel)
 {
   return a->force[channel / 3][channel % 3] - b->force[channel / 3][channel % 3];
 }
@@ -193,7 +190,7 @@ typedef struct sums {
 static void add_norms(const accuracy_frame *f, double *impulse, double *peak)
 {
   for (size_t i = 0; i < SCENE_POINTERS_MAX; ++i) {
-    double force = norm(f->force[i]);
+    double force = hapi_v3_norm(f->force[i]);
     *impulse += force;
     *peak = fmax(*peak, force);
   }
@@ -201,11 +198,11 @@ static void add_norms(const accuracy_frame *f, double *impulse, double *peak)
 
 static void add_tick(const accuracy_frame *reference, const accuracy_frame *test, sums *s)
 {
-  if (!touches(reference) && !touches(test)) {
+  if (!frame_touches(reference) && !frame_touches(test)) {
     return;
   }
   for (size_t i = 0; i < CHANNELS; ++i) {
-    double e = difference(test, reference, i);
+    double e = force_difference(test, reference, i);
     double f = reference->force[i / 3][i % 3];
     s->error += e * e;
     s->reference += f * f;
@@ -221,8 +218,9 @@ static void add_tick(const accuracy_frame *reference, const accuracy_frame *test
 
 /* ---- lines ---- */
 
-/* Amplitude of the difference at a frequency, N. The window from the first to the last tick with contact, faded at both ends (Hann): what drifts
- * over it, and ends where it did not begin, would else look like a line. */
+/* Amplitude of the difference at a frequency, N. The window from the first to the last tick with
+ * contact, faded at both ends (Hann): what drifts over it, and ends where it did not begin,
+ * would else look like a line. */
 static double line_at(const accuracy_motion *reference, const accuracy_motion *test,
                       const size_t window[2], double hz)
 {
@@ -236,7 +234,7 @@ static double line_at(const accuracy_motion *reference, const accuracy_motion *t
     double phase = 2.0 * M_PI * hz * (double)t / ACCURACY_HAPTIC_HZ;
     weights += w;
     for (size_t i = 0; i < CHANNELS; ++i) {
-      double e = w * difference(&test->frames[t], &reference->frames[t], i);
+      double e = w * force_difference(&test->frames[t], &reference->frames[t], i);
       re[i] += e * cos(phase);
       im[i] += e * sin(phase);
     }
@@ -247,16 +245,16 @@ static double line_at(const accuracy_motion *reference, const accuracy_motion *t
   return 2.0 * sqrt(power) / weights;
 }
 
-/* A line is what stands out of its surroundings, here those half way to its neighbours: an impact
- * that is a tick late is in all frequencies alike. Two impacts make a spectrum of hills and valleys,
- * and a harmonic may lie on a hill: what a run at another physics rate has there as well is no line
- * of this one. False: the window is too short to tell the two apart. */
+/* A line is what stands out of its surroundings, here those half way to its neighbours: an
+ * impact that is a tick late is in all frequencies alike. Two impacts make a spectrum of hills
+ * and valleys, and a harmonic may lie on a hill: what a run at another physics rate has there as
+ * well is no line of this one. False: the window is too short to tell the two apart. */
 static bool largest_line(const accuracy_motion *reference, const accuracy_motion *test,
                          const accuracy_motion *control, double physics_hz, double *out)
 {
   size_t window[2] = {reference->count, 0};
   for (size_t t = 0; t < reference->count; ++t) {
-    if (touches(&reference->frames[t]) || touches(&test->frames[t])) {
+    if (frame_touches(&reference->frames[t]) || frame_touches(&test->frames[t])) {
       window[0] = t < window[0] ? t : window[0];
       window[1] = t + 1;
     }
@@ -293,7 +291,7 @@ static bool compare_poses(const accuracy_motion *reference, const accuracy_motio
   for (size_t t = 0; t < test->count; ++t) {
     for (size_t i = 0; i < test->bodies; ++i) {
       if ((test->frames[t].local >> i & 1u) != 0) {
-        distances[count] = distance(test->frames[t].body[i], reference->frames[t].body[i]);
+        distances[count] = points_distance(test->frames[t].body[i], reference->frames[t].body[i]);
         ++count;
       }
     }
@@ -334,7 +332,7 @@ static double speed_at(const accuracy_motion *m, size_t t)
 {
   double fastest = 0.0;
   for (size_t i = 0; i < SCENE_POINTERS_MAX; ++i) {
-    fastest = fmax(fastest, distance(m->frames[t].hand[i], m->frames[t - 1].hand[i]));
+    fastest = fmax(fastest, points_distance(m->frames[t].hand[i], m->frames[t - 1].hand[i]));
   }
   return fastest * ACCURACY_HAPTIC_HZ;
 }
@@ -354,7 +352,7 @@ double accuracy_rest_share(const accuracy_motion *m)
   size_t touched = 0;
   size_t rested = 0;
   for (size_t t = 1; t < m->count; ++t) {
-    if (touches(&m->frames[t])) {
+    if (frame_touches(&m->frames[t])) {
       ++touched;
       rested += speed_at(m, t) <= slow;
     }
@@ -366,44 +364,20 @@ double accuracy_rest_share(const accuracy_motion *m)
 
 void accuracy_run_def_init(accuracy_run_def *def)
 {
-  hap_session_def library;
-  hap_expert_def expert;
-  hap_research_def research;
-  session_defs_init(&library, &expert, &research);
   memset(def, 0, sizeof *def);
-  def->model = library.model;
-  def->physics_hz = library.physics_hz;
-  def->haptic_hz = library.haptic_hz;
-  def->contact_hz = expert.contact_hz;
-  def->latency_ticks = research.physics_latency_ticks;
-  def->probe = research.probe;
-  def->cross = HAP_EFFECT_AUTO;
+  session_defs_init(&def->session, &def->expert, &def->research);
   def->coupling = HAP_COUPLING_DIRECT;
-  def->max_sweeps = expert.max_sweeps;
-  def->range_hops = expert.range_hops;
-  def->max_edge_probes = expert.max_edge_probes;
-  def->accuracy = library.accuracy;
-  def->reuse = expert.reuse;
-  def->shape = HAP_EFFECT_AUTO;
   def->integration = HAP_INTEGRATION_AUTO;
 }
 
-/* Before the start: the joints are as the scene has built them. The loop's poses are read through the list of
- * the trace. */
+/* Before the start: the joints are as the scene has built them. The loop's poses are read
+ * through the list of the trace. */
 static hap_status open_gauge(const scene *s, joint_gauge *out, hap_detail *detail)
 {
   hap_status status = joint_gauge_init(out, s->bodies, s->body_count, detail);
   if (status >= HAP_OK && out->count > 0 && s->body_count > HAP_TRACE_BODIES_MAX) {
     status = hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "%s: joints, and more than %d bodies",
                        s->parameters.name, HAP_TRACE_BODIES_MAX);
-  }
-  return status;
-}
-
-static hap_status explain(bench *b, const rig *r, hap_status status)
-{
-  if (status < HAP_OK) {
-    (void)hap_session_detail(r->session, &b->detail);
   }
   return status;
 }
@@ -418,32 +392,21 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   options.max_force = UNLIMITED_N;
   options.device_count = (size_t)def->parameters->pointers;
   memcpy(options.devices, def->hands, sizeof def->hands);
+  options.def = def->session;
+  options.expert = def->expert;
+  options.research = def->research;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.research.guard = HAP_GUARD_MEASURE;
-  options.def.model = def->model;
-  options.def.physics_hz = def->physics_hz;
-  options.def.haptic_hz = def->haptic_hz;
-  options.expert.contact_hz = def->contact_hz;
-  options.research.physics_latency_ticks = def->latency_ticks;
-  options.research.probe = def->probe;
-  expert_wish(&options.expert, HAP_EFFECT_CROSS, def->cross);
-  options.expert.max_sweeps = def->max_sweeps;
-  options.expert.range_hops = def->range_hops;
-  options.expert.max_edge_probes = def->max_edge_probes;
-  options.def.accuracy = def->accuracy;
-  expert_wish(&options.expert, HAP_EFFECT_SHAPE, def->shape);
+  options.expert.trace_rows = 8; /* read after each tick */
   options.integration = def->integration;
   options.coupling = def->coupling;
   options.coupling_stiffness = def->coupling_stiffness;
   options.coupling_damping = def->coupling_damping;
-  options.expert.trace_rows = 8; /* read after each tick */
-  options.expert.lookback = def->lookback;
-  options.expert.reuse = def->reuse;
   hap_status status = rig_create(&options, r, &b->detail);
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);
   }
-  return status >= HAP_OK ? explain(b, r, hap_session_start(r->session)) : status;
+  return status >= HAP_OK ? bench_explain(b, r->session, hap_session_start(r->session)) : status;
 }
 
 /* The trace does not say which bodies are local; the loop's own list does. */
@@ -495,17 +458,10 @@ static double deepest_now(const rig *r)
   return deepest;
 }
 
-static double used_seconds(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* A frame is the newest tick at its time: with a faster loop the first of its ticks, with a slower one
- * the same for as long as it lasts. */
-static hap_status record(const rig *r, const joint_gauge *gauge, double haptic_hz,
-                         accuracy_motion *out)
+/* A frame is the newest tick at its time: with a faster loop the first of its ticks, with a
+ * slower one the same for as long as it lasts. */
+static hap_status run_record(const rig *r, const joint_gauge *gauge, double haptic_hz,
+                             accuracy_motion *out)
 {
   hap_trace_row row;
   size_t got = 0;
@@ -541,9 +497,9 @@ hap_status accuracy_run(bench *b, const accuracy_run_def *def, accuracy_motion *
   hap_status status = open_rig(b, def, &r, &gauge);
   if (status >= HAP_OK) {
     out->joints = gauge.count;
-    double before = used_seconds();
-    status = explain(b, &r, record(&r, &gauge, def->haptic_hz, out));
-    out->used_s = used_seconds() - before;
+    double before = bench_used_seconds();
+    status = bench_explain(b, r.session, run_record(&r, &gauge, def->session.haptic_hz, out));
+    out->used_s = bench_used_seconds() - before;
     (void)hap_session_stats(r.session, &out->stats, sizeof out->stats);
   }
   if (r.session != NULL) {

@@ -100,29 +100,19 @@ static void find_contacts(bare *b)
   dSpaceCollide(b->scene->space, b, near_callback);
 }
 
-static double since(int64_t begin_ns)
+static double seconds_since(int64_t begin_ns)
 {
   return 1e-9 * (double)(hapi_clock_now() - begin_ns);
 }
 
-double bare_cycle(bare *b, double step_s)
+double bare_cycle(bare *b, double step_s, bool step_alone)
 {
   unsigned long seed = dRandGetSeed();
   int64_t begin_ns = hapi_clock_now();
   find_contacts(b);
+  begin_ns = step_alone ? hapi_clock_now() : begin_ns;
   dWorldQuickStep(b->scene->world, step_s);
-  double spent = since(begin_ns);
-  dRandSetSeed(seed);
-  return spent;
-}
-
-double bare_global_step(bare *b, double step_s)
-{
-  unsigned long seed = dRandGetSeed();
-  find_contacts(b);
-  int64_t begin_ns = hapi_clock_now();
-  dWorldQuickStep(b->scene->world, step_s);
-  double spent = since(begin_ns);
+  double spent = seconds_since(begin_ns);
   dRandSetSeed(seed);
   return spent;
 }
@@ -135,7 +125,7 @@ void bare_exact_step(bare *b, double step_s)
 
 /* ---- islands ---- */
 
-static double distance2(dBodyID body, const double at[3])
+static double distance_squared(dBodyID body, const double at[3])
 {
   const dReal *p = dBodyGetPosition(body);
   return (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) +
@@ -148,7 +138,8 @@ static dBodyID nearest_off(const scene *s, const double at[3])
   dBodyID nearest = NULL;
   for (size_t i = 0; i < s->body_count; ++i) {
     bool off = dBodyIsEnabled(s->bodies[i]) == 0;
-    if (off && (nearest == NULL || distance2(s->bodies[i], at) < distance2(nearest, at))) {
+    if (off &&
+        (nearest == NULL || distance_squared(s->bodies[i], at) < distance_squared(nearest, at))) {
       nearest = s->bodies[i];
     }
   }
@@ -185,22 +176,6 @@ static dBodyID enable_islands(const scene *s, size_t neighbours, const double ha
   return first;
 }
 
-static void enable_all(const scene *s)
-{
-  for (size_t i = 0; i < s->body_count; ++i) {
-    dBodyEnable(s->bodies[i]);
-  }
-}
-
-/* On the touched body, where the hand meets it. */
-static void push(const scene *s, dBodyID body, int axis, double force)
-{
-  const dReal *at = dBodyGetPosition(body);
-  double f[3] = {0.0, 0.0, 0.0};
-  f[axis] = force;
-  dBodyAddForceAtPos(body, f[0], f[1], f[2], at[0] - 0.5 * s->parameters.size, at[1], at[2]);
-}
-
 double bare_island_step(bare *b, size_t neighbours, const double hand[3], double force,
                         double step_s)
 {
@@ -211,14 +186,18 @@ double bare_island_step(bare *b, size_t neighbours, const double hand[3], double
   for (int i = 0; i < 4; ++i) {
     write_states(b);
     if (i > 0 && touched != NULL) {
-      push(b->scene, touched, i - 1, force);
+      const dReal *at = dBodyGetPosition(touched); /* where the hand meets it */
+      dBodyAddForceAtPos(touched, i == 1 ? force : 0.0, i == 2 ? force : 0.0, i == 3 ? force : 0.0,
+                         at[0] - 0.5 * b->scene->parameters.size, at[1], at[2]);
     }
     dRandSetSeed(seed);
     int64_t begin_ns = hapi_clock_now();
     dWorldQuickStep(b->scene->world, step_s);
-    spent += since(begin_ns);
+    spent += seconds_since(begin_ns);
   }
-  enable_all(b->scene);
+  for (size_t i = 0; i < b->scene->body_count; ++i) {
+    dBodyEnable(b->scene->bodies[i]);
+  }
   dRandSetSeed(seed);
   return spent / 4.0;
 }

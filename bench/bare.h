@@ -7,6 +7,8 @@
  * without haptics spends on the same states. ODE's random seed is left as it was found, so that
  * nothing here shows in the run that is measured. */
 
+#include <stdbool.h>
+
 #include <hapode/status.h>
 
 #include "scenes/scenes.h"
@@ -33,20 +35,17 @@ void bare_destroy(bare *b); /* zeroed allowed */
 /* Puts every body into the state that it has in another copy of the scene. */
 void bare_follow(bare *b, const scene *from);
 
-/* Collision and global step over step_s, timed [s]. */
-double bare_cycle(bare *b, double step_s);
-
-/* The same, but of the two the global step alone is timed [s]. */
-double bare_global_step(bare *b, double step_s);
+/* Collision and global step over step_s, timed [s]; step_alone: of the two the step alone is. */
+double bare_cycle(bare *b, double step_s, bool step_alone);
 
 /* The same with ODE's direct solver. Forces that were added before act in it. */
 void bare_exact_step(bare *b, double step_s);
 
-/* One QuickStep of the islands of the bodies nearest to the hand, all others switched off [s]: the
- * mean of four in a row from the same state, without and with a force on the nearest body along x, y
- * and z, as testing simulations are. So it has what makes these dearer than a step alone: colder
- * caches at first, and friction that slips under the force. The contacts are those of the last
- * bare_cycle. The last step is not undone. */
+/* One QuickStep of the islands of the bodies nearest to the hand, all others switched off [s]:
+ * the mean of four in a row from the same state, without and with a force on the nearest body
+ * along x, y and z, as testing simulations are. So it has what makes these dearer than a step
+ * alone: colder caches at first, and friction that slips under the force. The contacts are those
+ * of the last bare_cycle. The last step is not undone. */
 double bare_island_step(bare *b, size_t neighbours, const double hand[3], double force,
                         double step_s);
 

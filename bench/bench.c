@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 
 #include "bench/bench.h"
 #include "tools/plot.h"
@@ -43,17 +44,32 @@ FILE *bench_csv_open(bench *b, const char *name, const char *header)
   return csv;
 }
 
-hap_status bench_csv_close(bench *b, FILE *csv)
+hap_status bench_csv_close(bench *b, FILE *csv, hap_status status)
 {
   if (csv == NULL) {
     return HAP_ERROR_IO;
   }
   bool broken = ferror(csv) != 0;
-  if (fclose(csv) != 0 || broken) {
+  if ((fclose(csv) != 0 || broken) && status >= HAP_OK) {
     return bench_fail(b, HAP_ERROR_IO, "a table in %s could not be written: %s", b->out,
                       strerror(errno));
   }
-  return HAP_OK;
+  return status;
+}
+
+hap_status bench_explain(bench *b, hap_session *session, hap_status status)
+{
+  if (status < HAP_OK) {
+    (void)hap_session_detail(session, &b->detail);
+  }
+  return status;
+}
+
+double bench_used_seconds(void)
+{
+  struct timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 void bench_say(const char *format, ...)
@@ -120,6 +136,11 @@ bool bench_within(double value, double wanted, double relative)
   return fabs(value - wanted) <= relative * fabs(wanted);
 }
 
+double bench_percent(double value, double wanted)
+{
+  return 100.0 * (value / wanted - 1.0);
+}
+
 bool bench_find_coupling(const char *name, hap_coupling *out)
 {
   for (int i = 0; hap_coupling_name((hap_coupling)i) != NULL; ++i) {
@@ -131,21 +152,21 @@ bool bench_find_coupling(const char *name, hap_coupling *out)
   return false;
 }
 
-FILE *bench_picture_begin(bench *b, const char *name, int width, int height)
+hap_status bench_draw(bench *b, const char *name, int width, int height, bench_draw_fn draw,
+                      const void *data)
 {
   char path[PATH_MAX];
-  if (!plot_available() ||
-      snprintf(path, sizeof path, "%s/%s.svg", b->out, name) >= (int)sizeof path) {
-    return NULL;
-  }
-  return plot_begin(path, width, height, &b->detail);
-}
-
-hap_status bench_picture_end(bench *b, const char *name, FILE *script)
-{
   if (!plot_available()) {
     bench_say("no picture %s.svg: %s", name, PLOT_ABSENT_TEXT);
     return HAP_OK;
   }
-  return script != NULL ? plot_end(script, &b->detail) : HAP_ERROR_IO;
+  if (snprintf(path, sizeof path, "%s/%s.svg", b->out, name) >= (int)sizeof path) {
+    return bench_fail(b, HAP_ERROR_IO, "the name of the folder is too long");
+  }
+  FILE *script = plot_begin(path, width, height, &b->detail);
+  if (script == NULL) {
+    return HAP_ERROR_IO;
+  }
+  draw(script, data);
+  return plot_end(script, &b->detail);
 }

@@ -11,7 +11,10 @@
 
 #include <hapode/attributes.h>
 #include <hapode/pointer.h>
+#include <hapode/session.h>
 #include <hapode/status.h>
+
+#define BENCH_COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
 typedef struct bench {
   const char *out;   /* folder of tables and pictures */
@@ -57,9 +60,16 @@ hap_status bench_tick(bench *b);
 
 /* Opens OUT/NAME.csv and writes its header line, NULL: none; NULL on failure. */
 FILE *bench_csv_open(bench *b, const char *name, const char *header);
-hap_status bench_csv_close(bench *b, FILE *csv); /* NULL: what open said */
+/* status, or where that is good how the table was written. NULL: what open said. */
+hap_status bench_csv_close(bench *b, FILE *csv, hap_status status);
 
 hap_status bench_fail(bench *b, hap_status status, const char *format, ...) HAP_PRINTF(3, 4);
+
+/* status; of a bad one bench.detail has what the session says. */
+hap_status bench_explain(bench *b, hap_session *session, hap_status status);
+
+/* s of the processor that the calling thread has used. */
+double bench_used_seconds(void);
 
 /* One with a spring, by its name; false: there is none. */
 bool bench_find_coupling(const char *name, hap_coupling *out);
@@ -75,14 +85,16 @@ void bench_skip(const bench *b, const char *format, ...) HAP_PRINTF(2, 3);
 
 double bench_median(double *values, size_t count);                       /* sorts; 0 of none */
 double bench_quantile(const double *sorted, size_t count, double share); /* 0 of none */
+double bench_percent(double value, double wanted);                       /* off, signed */
 bool bench_within(double value, double wanted, double relative);         /* false for NaN */
 
 /* ---- pictures ---- */
 
-/* The script of OUT/NAME.svg, see tools/plot.h; NULL when there is no gnuplot. */
-FILE *bench_picture_begin(bench *b, const char *name, int width, int height);
+/* What a picture shows, as gnuplot's words, see tools/plot.h. */
+typedef void (*bench_draw_fn)(FILE *script, const void *data);
 
-/* Draws. Without gnuplot one line says that there is no picture, and the status is good. */
-hap_status bench_picture_end(bench *b, const char *name, FILE *script);
+/* OUT/NAME.svg. Without gnuplot one line says that there is no picture, and the status is good. */
+hap_status bench_draw(bench *b, const char *name, int width, int height, bench_draw_fn draw,
+                      const void *data);
 
 #endif

@@ -6,18 +6,20 @@
 #include <string.h>
 
 #include "bench/accuracy.h"
-#include "bench/bench.h"
+#include "bench/cycles.h"
 #include "bench/impedance.h"
 
-/* hapode-bench couplings: the library's own couplings and the two that the literature knows, side by
- * side. In the scenes the coupling's spring and damper are those of the scene's contacts, so that the hand
- * feels a wall as the reference has it, but through a proxy half as stiff. */
+/* hapode-bench couplings: the library's own couplings and the two that the literature knows,
+ * side by side. In the scenes the coupling's spring and damper are those of the scene's
+ * contacts, so that the hand feels a wall as the reference has it, but through a proxy half as
+ * stiff. */
 
 #define COUPLINGS 4
 #define COUPLINGS_SCENES 4
 
-extern const hap_coupling couplings_compared[COUPLINGS];
-extern const char *const couplings_scenes[COUPLINGS_SCENES];
+static const hap_coupling couplings_compared[COUPLINGS] = {
+    HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY, HAP_COUPLING_VIRTUAL, HAP_COUPLING_GOD_OBJECT};
+static const char *const couplings_scenes[COUPLINGS_SCENES] = {"slide", "row10", "wedge", "peg"};
 
 typedef struct couplings_cell {
   accuracy_errors errors; /* against model single without a coupling */
@@ -118,18 +120,15 @@ static void draw_device(FILE *script, const couplings_table *table)
           "offset 0,0.7 notitle\n");
 }
 
-static hap_status couplings_draw(bench *b, const couplings_table *table)
+static void couplings_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "couplings", 1100, 800);
-  if (script != NULL) {
-    fprintf(script, "set multiplot layout 2,2\n");
-    draw_forces(script, table);
-    draw_scenes(script, table, false);
-    draw_scenes(script, table, true);
-    draw_device(script, table);
-    fprintf(script, "unset multiplot\n");
-  }
-  return bench_picture_end(b, "couplings", script);
+  const couplings_table *table = data;
+  fprintf(script, "set multiplot layout 2,2\n");
+  draw_forces(script, table);
+  draw_scenes(script, table, false);
+  draw_scenes(script, table, true);
+  draw_device(script, table);
+  fprintf(script, "unset multiplot\n");
 }
 
 #define PHYSICS_HZ 60.0
@@ -146,24 +145,10 @@ static hap_status couplings_draw(bench *b, const couplings_table *table)
 #define MASS_BOUND 0.02
 #define DEPTH_SHARE 0.01 /* of a pointer that does not give, of that of a direct one */
 
-const hap_coupling couplings_compared[COUPLINGS] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY,
-                                                    HAP_COUPLING_VIRTUAL, HAP_COUPLING_GOD_OBJECT};
-const char *const couplings_scenes[COUPLINGS_SCENES] = {"slide", "row10", "wedge", "peg"};
-
 /* ---- scenes ---- */
 
-static const scene_parameters *find_scene(const char *name)
-{
-  for (size_t i = 0; scene_table_at(i) != NULL; ++i) {
-    if (strcmp(scene_table_at(i)->name, name) == 0) {
-      return scene_table_at(i);
-    }
-  }
-  return NULL;
-}
-
-static hap_status run(bench *b, const scene_parameters *which, hap_model model,
-                      hap_coupling coupling, accuracy_motion *out)
+static hap_status scene_run(bench *b, const scene_parameters *which, hap_model model,
+                            hap_coupling coupling, accuracy_motion *out)
 {
   accuracy_run_def def;
   scene_parameters parameters = *which;
@@ -180,8 +165,8 @@ static hap_status run(bench *b, const scene_parameters *which, hap_model model,
   def.parameters = &parameters;
   def.hands[0] = hand;
   def.seconds = which->duration;
-  def.model = model;
-  def.physics_hz = PHYSICS_HZ;
+  def.session.model = model;
+  def.session.physics_hz = PHYSICS_HZ;
   def.coupling = coupling;
   if (coupling != HAP_COUPLING_DIRECT) {
     def.coupling_stiffness = which->stiffness;
@@ -190,37 +175,28 @@ static hap_status run(bench *b, const scene_parameters *which, hap_model model,
   return accuracy_run(b, &def, out);
 }
 
-static hap_status measure_coupling(bench *b, const scene_parameters *which, size_t c,
-                                   const accuracy_motion *reference, couplings_cell *out,
-                                   accuracy_motion *motion)
-{
-  hap_status status = run(b, which, HAP_MODEL_CONTACT, couplings_compared[c], motion);
-  if (status >= HAP_OK && !accuracy_compare(reference, motion, NULL, PHYSICS_HZ, &out->errors)) {
-    status = bench_fail(b, HAP_ERROR_STATE, "%s: the hand touches nothing", which->name);
-  }
-  out->deepest = motion->deepest;
-  out->tick_us = motion->stats.loop.tick_us_mean;
-  return status;
-}
-
 static hap_status measure_scene(bench *b, size_t index, couplings_table *table)
 {
-  const scene_parameters *which = find_scene(couplings_scenes[index]);
+  const scene_parameters *which = cycles_scene(couplings_scenes[index]);
   accuracy_motion reference = {.count = 0};
-  if (which == NULL) {
-    return bench_fail(b, HAP_ERROR_NOT_FOUND, "there is no scene %s", couplings_scenes[index]);
-  }
-  hap_status status = run(b, which, HAP_MODEL_SINGLE, HAP_COUPLING_DIRECT, &reference);
+  hap_status status = scene_run(b, which, HAP_MODEL_SINGLE, HAP_COUPLING_DIRECT, &reference);
   for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
+    couplings_cell *cell = &table->columns[c].scenes[index];
     accuracy_motion motion = {.count = 0};
-    status = measure_coupling(b, which, c, &reference, &table->columns[c].scenes[index], &motion);
-    if (status >= HAP_OK && index == 0) {
+    status = scene_run(b, which, HAP_MODEL_CONTACT, couplings_compared[c], &motion);
+    if (status >= HAP_OK &&
+        !accuracy_compare(&reference, &motion, NULL, PHYSICS_HZ, &cell->errors)) {
+      status = bench_fail(b, HAP_ERROR_STATE, "%s: the hand touches nothing", which->name);
+    }
+    cell->deepest = motion.deepest;
+    cell->tick_us = motion.stats.loop.tick_us_mean;
+    if (index == 0) {
       table->motions[c] = motion;
     } else {
       accuracy_motion_free(&motion);
     }
   }
-  if (status >= HAP_OK && index == 0) {
+  if (index == 0) {
     table->reference = reference;
   } else {
     accuracy_motion_free(&reference);
@@ -229,23 +205,6 @@ static hap_status measure_scene(bench *b, size_t index, couplings_table *table)
 }
 
 /* ---- in the air ---- */
-
-/* The part of force and motion at the frequency of the hand. */
-static hap_status listen(bench *b, port *p, double complex *out_force, double complex *out_motion)
-{
-  hap_status status = HAP_OK;
-  *out_force = *out_motion = 0.0;
-  for (int i = 0; i < AIR_SETTLE && status >= HAP_OK; ++i) {
-    status = port_advance(b, p);
-  }
-  for (int i = 0; i < AIR_TICKS && status >= HAP_OK; ++i) {
-    status = port_advance(b, p);
-    double complex wave = cexp(-2.0 * M_PI * I * AIR_HZ * PORT_TICK_S * i);
-    *out_force -= p->state.wrench.force[2] * wave;
-    *out_motion += p->state.device.position[2] * wave;
-  }
-  return status;
-}
 
 static hap_status measure_air(bench *b, hap_coupling coupling, couplings_column *out)
 {
@@ -268,33 +227,17 @@ static hap_status measure_air(bench *b, hap_coupling coupling, couplings_column 
   if (status < HAP_OK) {
     return status;
   }
-  double complex force;
-  double complex motion;
-  status = listen(b, &p, &force, &motion);
-  out->mass = -creal(force / motion) / (w * w);
-  out->damping = cimag(force / motion) / w;
+  impedance_sums s = {.ticks = AIR_TICKS, .periods = AIR_HZ * PORT_TICK_S * AIR_TICKS};
+  status = impedance_listen(b, &p, AIR_SETTLE, &s);
+  out->mass = -creal(s.force / s.motion) / (w * w);
+  out->damping = cimag(s.force / s.motion) / w;
   port_close(&p);
   return status;
 }
 
 /* ---- all ---- */
 
-static hap_status measure(bench *b, couplings_table *table)
-{
-  hap_status status = HAP_OK;
-  for (size_t i = 0; i < COUPLINGS_SCENES && status >= HAP_OK; ++i) {
-    status = measure_scene(b, i, table);
-  }
-  for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
-    status = zwidth_of_coupling(b, couplings_compared[c], &table->columns[c].stiffness);
-    if (status >= HAP_OK) {
-      status = measure_air(b, couplings_compared[c], &table->columns[c]);
-    }
-  }
-  return status;
-}
-
-static hap_status write_table(bench *b, const couplings_table *table)
+static hap_status table_write(bench *b, const couplings_table *table)
 {
   FILE *csv = bench_csv_open(b, "couplings",
                              "coupling,scene,force_rel_rms,torque_rel_rms,peak_ratio,"
@@ -311,10 +254,10 @@ static hap_status write_table(bench *b, const couplings_table *table)
     fprintf(csv, "%s,stylus,,,,,,%.6g,,\n", name, column->stiffness);
     fprintf(csv, "%s,air,,,,,,,%.6g,%.6g\n", name, column->mass, column->damping);
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
-static void report(bench *b, const couplings_table *table)
+static void couplings_report(bench *b, const couplings_table *table)
 {
   for (size_t c = 0; c < COUPLINGS; ++c) {
     const couplings_column *column = &table->columns[c];
@@ -337,26 +280,29 @@ static void report(bench *b, const couplings_table *table)
   }
 }
 
-static void free_motions(couplings_table *table)
-{
-  accuracy_motion_free(&table->reference);
-  for (size_t c = 0; c < COUPLINGS; ++c) {
-    accuracy_motion_free(&table->motions[c]);
-  }
-}
-
 hap_status bench_couplings(bench *b)
 {
   couplings_table table;
+  hap_status status = HAP_OK;
   memset(&table, 0, sizeof table);
-  hap_status status = measure(b, &table);
-  if (status >= HAP_OK) {
-    status = write_table(b, &table);
+  for (size_t i = 0; i < COUPLINGS_SCENES && status >= HAP_OK; ++i) {
+    status = measure_scene(b, i, &table);
   }
-  if (status >= HAP_OK) {
-    report(b, &table);
-    status = couplings_draw(b, &table);
+  for (size_t c = 0; c < COUPLINGS && status >= HAP_OK; ++c) {
+    couplings_column *column = &table.columns[c];
+    status = zwidth_of_coupling(b, couplings_compared[c], &column->stiffness);
+    if (status >= HAP_OK) {
+      status = measure_air(b, couplings_compared[c], column);
+    }
   }
-  free_motions(&table);
+  status = status >= HAP_OK ? table_write(b, &table) : status;
+  if (status >= HAP_OK) {
+    couplings_report(b, &table);
+    status = bench_draw(b, "couplings", 1100, 800, couplings_draw, &table);
+  }
+  accuracy_motion_free(&table.reference);
+  for (size_t c = 0; c < COUPLINGS; ++c) {
+    accuracy_motion_free(&table.motions[c]);
+  }
   return status;
 }

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/vec.h"
 #include "bench/bare.h"
 
 #define PROBE_FLOOR 0.0981 /* N a kg: the library's smallest perturbation */
@@ -63,17 +64,9 @@ static hap_status open_watcher(bench *b, const cycles_def *def, watcher *w)
   return status >= HAP_OK ? hap_session_start(w->rig.session) : status;
 }
 
-static void close_watcher(watcher *w)
-{
-  bare_destroy(&w->bare);
-  if (w->rig.session != NULL) {
-    rig_destroy(&w->rig);
-  }
-}
-
 static void measure_bare(watcher *w, double period_s, cycle *out)
 {
-  out->v[CYCLE_BARE] = 1e3 * bare_cycle(&w->bare, period_s);
+  out->v[CYCLE_BARE] = 1e3 * bare_cycle(&w->bare, period_s, false);
   if (w->def->model != HAP_MODEL_SINGLE) {
     hap_pointer_state hand;
     if (hap_pointer_get(w->rig.session, w->rig.pointers[0], &hand, sizeof hand) >= HAP_OK) {
@@ -99,11 +92,6 @@ static void note_cycle(watcher *w, const hap_stats *stats, cycle *out)
   w->neighbours = stats->model.neighbours > 0 ? stats->model.neighbours : 1;
 }
 
-static double norm(const double v[3])
-{
-  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
 /* The last force on the body; before the first touch that of the touch to come. */
 static double next_push(const watcher *w)
 {
@@ -114,11 +102,9 @@ static double next_push(const watcher *w)
     return 0.0;
   }
   const dReal *v = dBodyGetLinearVel(w->rig.scene->bodies[0]);
-  for (int i = 0; i < 3; ++i) {
-    relative[i] = state.twist.linear[i] - v[i];
-  }
-  double last = norm(state.wrench.force);
-  double touch = norm(relative) * sqrt(p->stiffness * p->mass);
+  hapi_v3_sub(state.twist.linear, v, relative);
+  double last = hapi_v3_norm(state.wrench.force);
+  double touch = hapi_v3_norm(relative) * sqrt(p->stiffness * p->mass);
   return last > 0.0 ? last : fmax(touch, PROBE_FLOOR * p->mass);
 }
 
@@ -168,7 +154,7 @@ static hap_status watch_run(watcher *w, double period_s, cycle *rows, size_t *ou
   return status;
 }
 
-static hap_status one_run(bench *b, const cycles_def *def, size_t run, cycle *rows, cycles *out)
+static hap_status run_once(bench *b, const cycles_def *def, size_t run, cycle *rows, cycles *out)
 {
   watcher w = {.def = def, .run = run, .neighbours = 1};
   hap_stats stats;
@@ -186,7 +172,8 @@ static hap_status one_run(bench *b, const cycles_def *def, size_t run, cycle *ro
   } else if (w.rig.session != NULL) {
     (void)hap_session_detail(w.rig.session, &b->detail);
   }
-  close_watcher(&w);
+  bare_destroy(&w.bare);
+  rig_destroy(&w.rig);
   return status;
 }
 
@@ -216,7 +203,7 @@ hap_status cycles_measure(bench *b, const cycles_def *def, cycles *out)
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the cycles");
   }
   for (int run = 0; run < def->repeats && status >= HAP_OK; ++run) {
-    status = one_run(b, def, (size_t)run, &out->rows[(size_t)run * room], out);
+    status = run_once(b, def, (size_t)run, &out->rows[(size_t)run * room], out);
   }
   if (status < HAP_OK) {
     cycles_free(out);

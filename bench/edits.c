@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench edits: a world that three threads change 60 times a second each under the lock, and a fourth
- * by posted edits, with sixteen hands in it that come and go. What it shows: the loop goes on, physics
- * keeps its steps, nobody waits for the lock longer than a step, and no force jumps. */
+/* hapode-bench edits: a world that three threads change 60 times a second each under the lock,
+ * and a fourth by posted edits, with sixteen hands in it that come and go. What it shows: the
+ * loop goes on, physics keeps its steps, nobody waits for the lock longer than a step, and no
+ * force jumps. */
 
 #include <math.h>
 
@@ -25,7 +26,7 @@ static const edits_case cases[] = {
     {HAP_DRIVE_THREADS, HAP_MODEL_ACCELERANCE, "threads"},
     {HAP_DRIVE_FRAME, HAP_MODEL_CONTACT, "frame"},
 };
-#define CASES (sizeof cases / sizeof cases[0])
+#define CASES BENCH_COUNT(cases)
 
 static storm_def def_of(const bench *b, const edits_case *what)
 {
@@ -43,8 +44,8 @@ static storm_def def_of(const bench *b, const edits_case *what)
                      .telling = STORM_TELLS_HALF};
 }
 
-static void write_row(FILE *csv, const edits_case *what, const storm_def *def,
-                      const storm_result *r)
+static void case_write(FILE *csv, const edits_case *what, const storm_def *def,
+                       const storm_result *r)
 {
   const hap_stats *s = &r->stats;
   fprintf(csv, "%s,%s,%g,%d,%d,%llu,%llu,%llu,%llu,%llu,%llu,%llu,%.4g,%llu,%.4g,%.4g,%.4g,%.4g,",
@@ -60,7 +61,8 @@ static void write_row(FILE *csv, const edits_case *what, const storm_def *def,
           s->hand.momentum_error_ns, (unsigned long long)r->faults);
 }
 
-static void report(bench *b, const edits_case *what, const storm_def *def, const storm_result *r)
+static void case_report(bench *b, const edits_case *what, const storm_def *def,
+                        const storm_result *r)
 {
   const hap_stats *s = &r->stats;
   /* In drive FRAME physics is an ordinary thread, which others may keep from running. */
@@ -101,26 +103,23 @@ static void report(bench *b, const edits_case *what, const storm_def *def, const
               (unsigned long long)r->untold);
 }
 
-static hap_status draw(bench *b, const storm_result results[CASES])
+static void edits_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "edits", 700, 400);
-  if (script != NULL) {
-    fprintf(script, "$w << EOD\n");
-    for (size_t i = 0; i < CASES; ++i) {
-      const storm_result *r = &results[i];
-      fprintf(script, "\"%s, %s\" %g %g %g\n", cases[i].drive_name, hap_model_name(cases[i].model),
-              r->wait_ms_p50, r->wait_ms_p99, r->stats.edits.wait_ms_max);
-    }
-    fprintf(
-        script,
-        "EOD\nset title 'Waits for the lock while a world is edited'\n"
-        "set style data histograms\nset style fill solid 0.6\nset logscale y\n"
-        "set yrange [1e-5:100]\nset format y '%%g'\nset ylabel 'wait [ms]'\nset key top left\n"
-        "plot $w using 2:xtic(1) title 'median', $w using 3 title '99 %%', "
-        "$w using 4 title 'longest', %g with lines lc rgb '#606060' dt 2 title 'a physics step'\n",
-        1e3 / 60.0);
+  const storm_result *results = data;
+  fprintf(script, "$w << EOD\n");
+  for (size_t i = 0; i < CASES; ++i) {
+    const storm_result *r = &results[i];
+    fprintf(script, "\"%s, %s\" %g %g %g\n", cases[i].drive_name, hap_model_name(cases[i].model),
+            r->wait_ms_p50, r->wait_ms_p99, r->stats.edits.wait_ms_max);
   }
-  return bench_picture_end(b, "edits", script);
+  fprintf(
+      script,
+      "EOD\nset title 'Waits for the lock while a world is edited'\n"
+      "set style data histograms\nset style fill solid 0.6\nset logscale y\n"
+      "set yrange [1e-5:100]\nset format y '%%g'\nset ylabel 'wait [ms]'\nset key top left\n"
+      "plot $w using 2:xtic(1) title 'median', $w using 3 title '99 %%', "
+      "$w using 4 title 'longest', %g with lines lc rgb '#606060' dt 2 title 'a physics step'\n",
+      1e3 / 60.0);
 }
 
 hap_status bench_edits(bench *b)
@@ -137,11 +136,10 @@ hap_status bench_edits(bench *b)
     storm_def def = def_of(b, &cases[i]);
     status = storm_run(&def, &results[i], &b->detail);
     if (status >= HAP_OK) {
-      write_row(csv, &cases[i], &def, &results[i]);
-      report(b, &cases[i], &def, &results[i]);
+      case_write(csv, &cases[i], &def, &results[i]);
+      case_report(b, &cases[i], &def, &results[i]);
     }
   }
-  hap_status closed = bench_csv_close(b, csv);
-  status = status >= HAP_OK ? closed : status;
-  return status >= HAP_OK ? draw(b, results) : status;
+  status = bench_csv_close(b, csv, status);
+  return status >= HAP_OK ? bench_draw(b, "edits", 700, 400, edits_draw, results) : status;
 }

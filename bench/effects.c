@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "bench/bench.h"
@@ -34,7 +33,7 @@ typedef struct effects_result {
   double contact_us;   /* a pass */
   double total_ms;     /* processor's time of a simulated second, all threads' work */
   uint32_t neighbours; /* most at once, at the syncs that were looked at */
-  hap_effect_info effects[HAP_EFFECTS]; /* in the middle of the contact, see look */
+  hap_effect_info effects[HAP_EFFECTS]; /* in the middle of the contact, see states_look */
   double *force;                        /* N, of all pointers, tick by tick; owned */
   size_t count;
 } effects_result;
@@ -56,17 +55,10 @@ typedef struct effects_column {
   bool each; /* cost was measured */
 } effects_column;
 
-typedef struct effects_counting {
-  const char *scene;
-  const char *list;   /* of effects, as for hapode-run */
-  const char *inside; /* the function, with all that it calls */
-  int ticks;
-} effects_counting;
+/* Instructions of a tick: effects-tick, which lies beside this program, under valgrind's
+ * callgrind, which counts inside of one function alone. */
 
-/* Instructions of a tick: effects-tick, which lies beside this program, under valgrind's callgrind, which
- * counts inside of one function alone. */
-
-static bool beside(const char *name, char *out, size_t size)
+static bool program_beside(const char *name, char *out, size_t size)
 {
   char self[PATH_MAX];
   ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
@@ -85,14 +77,14 @@ static bool effects_can_count(const char **out_why_not)
   *out_why_not = NULL;
   if (system("valgrind --version >/dev/null 2>&1") != 0) { /* NOLINT(cert-env33-c): a fixed text */
     *out_why_not = "there is no valgrind";
-  } else if (!beside("effects-tick", path, sizeof path)) {
+  } else if (!program_beside("effects-tick", path, sizeof path)) {
     *out_why_not = "there is no effects-tick beside this program (ninja effects-tick)";
   }
   return *out_why_not == NULL;
 }
 
 /* "refs: N" or "Collected : N" of what callgrind says. */
-static double read_count(FILE *in)
+static double count_read(FILE *in)
 {
   char line[256];
   double count = -1.0;
@@ -103,54 +95,50 @@ static double read_count(FILE *in)
   return count;
 }
 
-/* A tick; -1: not known. */
-static double effects_instructions(const effects_counting *of)
+/* Of a tick with effects as name=state, in the function inside with all that it calls; -1:
+ * unknown. */
+static double effects_count(const char *in_scene, const char *name, const char *state,
+                            const char *inside, int ticks)
 {
   char program[PATH_MAX];
   char command[2 * PATH_MAX];
-  if (!beside("effects-tick", program, sizeof program)) {
+  if (!program_beside("effects-tick", program, sizeof program)) {
     return -1.0;
   }
   snprintf(command, sizeof command,
            "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect=%s "
-           "'%s' %s %s %d 2>&1",
-           of->inside, program, of->scene, of->list, of->ticks);
+           "'%s' %s %s=%s %d 2>&1",
+           inside, program, in_scene, name, state, ticks);
   FILE *in = popen(command, "r"); /* NOLINT(cert-env33-c): names of the library's own */
   if (in == NULL) {
     return -1.0;
   }
-  double count = read_count(in);
-  return pclose(in) == 0 && count > 0.0 ? count / of->ticks : -1.0;
+  double count = count_read(in);
+  return pclose(in) == 0 && count > 0.0 ? count / ticks : -1.0;
 }
 
-/* Left: what all scenes cost with everything on and as the library decides. Right: what single effects cost
- * in some of them. */
+/* Above: what all scenes cost with everything on and as the library decides. Below: what single
+ * effects cost in some of them. */
 
-static void draw_wholes(FILE *script, const effects_column *columns, size_t count)
-{
-  fprintf(script, "$w << EOD\n");
-  for (size_t i = 0; i < count; ++i) {
-    fprintf(script, "\"%s\" %.6g %.6g\n", columns[i].scene, columns[i].all, columns[i].automatic);
-  }
-  fprintf(script,
-          "EOD\nset title 'all on, and as the library decides'\n"
-          "set ylabel 'ms a simulated second'\nset logscale y\nset style data histograms\n"
-          "set style fill solid 0.8\nset xtics rotate by -60 noenhanced\nset key top left\n"
-          "plot $w using 2:xtic(1) lt 2 title 'all on', $w using 3 lt 1 title 'auto'\n");
-}
+typedef struct sweep {
+  bench *bench;
+  FILE *csv;
+  effects_column columns[EFFECTS_SCENES_MAX];
+  size_t count;
+} sweep;
 
 /* Behind the six of all pictures: as many effects are drawn side by side. */
 static const char *const more_colours[] = {"#000000", "#f0e442", "#882255", "#999999",
                                            "#332288", "#88ccaa", "#661100", "#bbcc33"};
 
-static void draw_each(FILE *script, const effects_column *columns, size_t count)
+static void each_draw(FILE *script, const sweep *s)
 {
   fprintf(script, "$e << EOD\n");
-  for (size_t i = 0; i < count; ++i) {
-    if (columns[i].each) {
-      fprintf(script, "\"%s\"", columns[i].scene);
+  for (size_t i = 0; i < s->count; ++i) {
+    if (s->columns[i].each) {
+      fprintf(script, "\"%s\"", s->columns[i].scene);
       for (int k = 0; k < HAP_EFFECTS; ++k) {
-        fprintf(script, " %.6g", fmax(columns[i].cost[k], 0.01));
+        fprintf(script, " %.6g", fmax(s->columns[i].cost[k], 0.01));
       }
       fprintf(script, "\n");
     }
@@ -159,7 +147,7 @@ static void draw_each(FILE *script, const effects_column *columns, size_t count)
       script,
       "EOD\nset title 'an effect that is on, less with it off (below 0.01: lost in the noise)'\n"
       "set yrange [0.01:*]\nset key outside right top noenhanced\n");
-  for (size_t i = 0; i < sizeof more_colours / sizeof more_colours[0]; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(more_colours); ++i) {
     fprintf(script, "set linetype %zu lc rgb '%s' lw 1.5\n", 7 + i, more_colours[i]);
   }
   fprintf(script, "plot ");
@@ -172,22 +160,27 @@ static void draw_each(FILE *script, const effects_column *columns, size_t count)
   fprintf(script, "\n");
 }
 
-static hap_status effects_draw(bench *b, const effects_column *columns, size_t count)
+static void effects_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "effects", 1300, 950);
+  const sweep *s = data;
   bool any = false;
-  for (size_t i = 0; i < count; ++i) {
-    any = any || columns[i].each;
+  for (size_t i = 0; i < s->count; ++i) {
+    any = any || s->columns[i].each;
   }
-  if (script != NULL) {
-    fprintf(script, "set multiplot layout %d,1\n", any ? 2 : 1);
-    draw_wholes(script, columns, count);
-    if (any) {
-      draw_each(script, columns, count);
-    }
-    fprintf(script, "unset multiplot\n");
+  fprintf(script, "set multiplot layout %d,1\n$w << EOD\n", any ? 2 : 1);
+  for (size_t i = 0; i < s->count; ++i) {
+    fprintf(script, "\"%s\" %.6g %.6g\n", s->columns[i].scene, s->columns[i].all,
+            s->columns[i].automatic);
   }
-  return bench_picture_end(b, "effects", script);
+  fprintf(script,
+          "EOD\nset title 'all on, and as the library decides'\n"
+          "set ylabel 'ms a simulated second'\nset logscale y\nset style data histograms\n"
+          "set style fill solid 0.8\nset xtics rotate by -60 noenhanced\nset key top left\n"
+          "plot $w using 2:xtic(1) lt 2 title 'all on', $w using 3 lt 1 title 'auto'\n");
+  if (any) {
+    each_draw(script, s);
+  }
+  fprintf(script, "unset multiplot\n");
 }
 
 #define HAPTIC_HZ 1000.0
@@ -200,22 +193,6 @@ typedef struct times {
   double physics_ms[EFFECTS_ROUNDS_MAX];
   double contact_us[EFFECTS_ROUNDS_MAX];
 } times;
-
-static void effects_run_init(effects_run *run, const scene_parameters *parameters, hap_model model)
-{
-  memset(run, 0, sizeof *run);
-  run->parameters = parameters;
-  run->model = model;
-  run->rounds = 1;
-  run->physics_hz = 60.0;
-}
-
-static double used_seconds(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static hap_status open_rig(bench *b, const effects_run *run, const effects_variant *variant,
                            rig *out)
@@ -237,7 +214,8 @@ static hap_status open_rig(bench *b, const effects_run *run, const effects_varia
     expert_wish(&options.expert, i, (can ? wish : HAP_EFFECT_AUTO));
   }
   hap_status status = rig_create(&options, out, &b->detail);
-  return status >= HAP_OK ? hap_session_start(out->session) : status;
+  return status >= HAP_OK ? bench_explain(b, out->session, hap_session_start(out->session))
+                          : status;
 }
 
 static void take_rows(rig *r, effects_result *io)
@@ -255,7 +233,7 @@ static void take_rows(rig *r, effects_result *io)
 }
 
 /* The states are those of the last sync at which something was touched. */
-static void look(rig *r, uint64_t *io_touched, effects_result *io)
+static void states_look(rig *r, uint64_t *io_touched, effects_result *io)
 {
   hap_stats stats;
   (void)hap_session_stats(r->session, &stats, sizeof stats);
@@ -272,17 +250,16 @@ static hap_status run_once(bench *b, const effects_run *run, size_t ticks, effec
 {
   rig r;
   hap_stats stats;
-  memset(&r, 0, sizeof r);
   hap_status status = open_rig(b, run, io, &r);
   uint64_t touched = 0;
   double used = 0.0;
   io->result.count = 0;
   for (size_t t = 0; t < ticks && status >= HAP_OK; t += BLOCK) {
-    double begin = used_seconds();
-    status = hap_session_advance(r.session, BLOCK);
-    used += used_seconds() - begin;
+    double begin = bench_used_seconds();
+    status = bench_explain(b, r.session, hap_session_advance(r.session, BLOCK));
+    used += bench_used_seconds() - begin;
     take_rows(&r, &io->result);
-    look(&r, &touched, &io->result);
+    states_look(&r, &touched, &io->result);
   }
   if (status >= HAP_OK) {
     (void)hap_session_stats(r.session, &stats, sizeof stats);
@@ -291,43 +268,38 @@ static hap_status run_once(bench *b, const effects_run *run, size_t ticks, effec
     out->physics_ms[round] = stats.physics.ms_mean;
     out->contact_us[round] = stats.contact.us_mean;
     io->result.count *= r.pointer_count;
-  } else if (r.session != NULL) {
-    (void)hap_session_detail(r.session, &b->detail);
   }
   rig_destroy(&r);
   return status;
-}
-
-static void take_medians(times *t, size_t rounds, effects_result *out)
-{
-  out->total_ms = bench_median(t->total_ms, rounds);
-  out->tick_us = bench_median(t->tick_us, rounds);
-  out->physics_ms = bench_median(t->physics_ms, rounds);
-  out->contact_us = bench_median(t->contact_us, rounds);
 }
 
 static hap_status run_rounds(bench *b, const effects_run *run, size_t ticks,
                              effects_variant *variants, size_t count, times *all)
 {
   hap_status status = HAP_OK;
-  double begin = used_seconds();
+  double begin = bench_used_seconds();
   size_t round = 0;
   for (bool more = true; more && status >= HAP_OK; ++round) {
     for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
       size_t which = round % 2 == 0 ? i : count - 1 - i;
       status = run_once(b, run, ticks, &variants[which], round, &all[which]);
     }
-    double spent = used_seconds() - begin;
+    double spent = bench_used_seconds() - begin;
     bool room = spent * (double)(round + 2) / (double)(round + 1) < run->budget_s;
     more = round + 1 < EFFECTS_ROUNDS_MAX && (round + 1 < (size_t)run->rounds || room);
   }
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
-    take_medians(&all[i], round, &variants[i].result);
+    effects_result *out = &variants[i].result;
+    out->total_ms = bench_median(all[i].total_ms, round);
+    out->tick_us = bench_median(all[i].tick_us, round);
+    out->physics_ms = bench_median(all[i].physics_ms, round);
+    out->contact_us = bench_median(all[i].contact_us, round);
   }
   return status;
 }
 
-/* All variants in turn, forwards and backwards, so that what slows the machine down slows all of them. */
+/* All variants in turn, forwards and backwards, so that what slows the machine down slows all of
+ * them. */
 static hap_status effects_run_variants(bench *b, const effects_run *run, effects_variant *variants,
                                        size_t count)
 {
@@ -369,10 +341,9 @@ static double effects_difference(const effects_result *a, const effects_result *
   return of2 > 0.0 ? sqrt(apart2 / of2) : 0.0;
 }
 
-/* hapode-bench effects: each effect on, off and as the library decides, all on against all left to the
- * library, in models contact and accelerance. effects.csv and effects.svg. */
+/* hapode-bench effects: each effect on, off and as the library decides, all on against all left
+ * to the library, in models contact and accelerance. effects.csv and effects.svg. */
 
-#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 #define FORCE_BOUND 1e-3
 #define EFFECTS_BOUND 0.2 /* of fig5 */
 #define PILE_BOUND 0.3
@@ -396,13 +367,6 @@ enum {
   ALL_ASIDE, /* on, with bodies that stand a little aside: what a force is exact to */
   WHOLES
 };
-
-typedef struct sweep {
-  bench *bench;
-  FILE *csv;
-  effects_column columns[EFFECTS_SCENES_MAX];
-  size_t count;
-} sweep;
 
 /* A scene under measurement. */
 typedef struct subject {
@@ -432,7 +396,7 @@ static const char *reason_of(const effects_result *r, int effect)
   return hap_effect_reason_text((hap_effect_reason)r->effects[effect].reason);
 }
 
-static bool can(const subject *s, int effect, hap_effect_wish wish)
+static bool effect_can(const subject *s, int effect, hap_effect_wish wish)
 {
   return hap_effect_check((hap_effect)effect, wish, s->run.model, NULL) >= HAP_OK;
 }
@@ -485,14 +449,9 @@ static void print_wholes(const subject *s)
   }
 }
 
-static double whole_instructions(const char *list)
-{
-  const effects_counting of = {"fig5", list, "hap_session_advance", WHOLE_TICKS};
-  return effects_instructions(&of);
-}
-
-/* Most of what a scene of one free body costs is no effect: device, messages, the step of the world. So it is told
- * as well what the effects add to that: a tenth of a millisecond in a second, so with many rounds. */
+/* Most of what a scene of one free body costs is no effect: device, messages, the step of the
+ * world. So it is told as well what the effects add to that: a tenth of a millisecond in a
+ * second, so with many rounds. */
 static hap_status check_fig5(const subject *s)
 {
   bench *b = s->sweep->bench;
@@ -518,9 +477,9 @@ static hap_status check_fig5(const subject *s)
   bench_say("%s, %s: effects take %.3f ms a second against %.3f: %.3f x", s->name, s->model,
             automatic - off, on - off, (automatic - off) / (on - off));
   if (!b->quick && effects_can_count(&why)) {
-    on = whole_instructions("all=on");
-    off = whole_instructions("all=off");
-    automatic = whole_instructions("all=auto");
+    on = effects_count("fig5", "all", "on", "hap_session_advance", WHOLE_TICKS);
+    off = effects_count("fig5", "all", "off", "hap_session_advance", WHOLE_TICKS);
+    automatic = effects_count("fig5", "all", "auto", "hap_session_advance", WHOLE_TICKS);
     bench_say(
         "%s, %s: %.0f instructions a tick with all that belongs to it, all on %.0f, all off "
         "%.0f: %.3f x all on, effects %.3f x",
@@ -557,12 +516,6 @@ static hap_status check_wholes(const subject *s)
 
 /* ---- one by one ---- */
 
-static double count_tick(const subject *s, const char *list)
-{
-  const effects_counting of = {s->name, list, "hapi_tick_run", COUNT_TICKS};
-  return s->counts ? effects_instructions(&of) : -1.0;
-}
-
 /* The variants of single effects stand in the order in which add_each put them. */
 static void print_each(const subject *s)
 {
@@ -571,24 +524,21 @@ static void print_each(const subject *s)
   for (int i = 0; i < HAP_EFFECTS && s->each; ++i) {
     const char *name = hap_effect_name((hap_effect)i);
     double total_ms[3] = {0.0, 0.0, 0.0};
-    if (!can(s, i, HAP_EFFECT_ON)) {
+    if (!effect_can(s, i, HAP_EFFECT_ON)) {
       continue;
     }
     print_row(s, &(row){name, "auto", reason_of(automatic, i), -1.0, 0.0, &automatic->effects[i]},
               automatic);
     for (int w = HAP_EFFECT_OFF; w <= HAP_EFFECT_ON; ++w) {
-      if (can(s, i, (hap_effect_wish)w)) {
+      if (effect_can(s, i, (hap_effect_wish)w)) {
         const effects_result *r = &s->variants[next++].result;
         const char *state = hap_effect_wish_name((hap_effect_wish)w);
-        char list[64];
-        snprintf(list, sizeof list, "%s=%s", name, state);
-        const row line = {name,
-                          state,
-                          reason_of(r, i),
-                          count_tick(s, list),
-                          effects_difference(automatic, r),
-                          &r->effects[i]};
-        print_row(s, &line, r);
+        double count =
+            s->counts ? effects_count(s->name, name, state, "hapi_tick_run", COUNT_TICKS) : -1.0;
+        print_row(s,
+                  &(row){name, state, reason_of(r, i), count, effects_difference(automatic, r),
+                         &r->effects[i]},
+                  r);
         total_ms[w] = r->total_ms;
       }
     }
@@ -616,14 +566,14 @@ static void add_each(subject *s)
 {
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     for (int w = HAP_EFFECT_OFF; w <= HAP_EFFECT_ON; ++w) {
-      if (can(s, i, HAP_EFFECT_ON) && can(s, i, (hap_effect_wish)w)) {
+      if (effect_can(s, i, HAP_EFFECT_ON) && effect_can(s, i, (hap_effect_wish)w)) {
         add_variant(s, HAP_EFFECT_AUTO)->wishes[i] = (hap_effect_wish)w;
       }
     }
   }
 }
 
-static hap_status measure(subject *s)
+static hap_status subject_measure(subject *s)
 {
   s->count = 0;
   (void)add_variant(s, HAP_EFFECT_ON);
@@ -652,87 +602,75 @@ static hap_status measure(subject *s)
   return status;
 }
 
-static hap_status measure_scene(sweep *sweep_of, const scene_parameters *parameters,
-                                hap_model model)
+static void subject_init(subject *s, sweep *of, const scene_parameters *parameters,
+                         const char *name, hap_model model)
+{
+  bool draws = model == HAP_MODEL_CONTACT && of->count < EFFECTS_SCENES_MAX;
+  memset(s, 0, sizeof *s);
+  s->sweep = of;
+  s->model = hap_model_name(model);
+  s->column = draws ? &of->columns[of->count++] : NULL;
+  s->run = (effects_run){.parameters = parameters, .model = model, .rounds = 1, .physics_hz = 60.0};
+  snprintf(s->name, sizeof s->name, "%s", name);
+}
+
+static hap_status measure_scene(sweep *of, const scene_parameters *parameters, hap_model model)
 {
   static subject s; /* the variants are large */
-  bench *b = sweep_of->bench;
-  bool draws = model == HAP_MODEL_CONTACT && sweep_of->count < EFFECTS_SCENES_MAX;
-  memset(&s, 0, sizeof s);
-  s.sweep = sweep_of;
-  s.model = hap_model_name(model);
-  s.column = draws ? &sweep_of->columns[sweep_of->count++] : NULL;
-  snprintf(s.name, sizeof s.name, "%s", parameters->name);
-  effects_run_init(&s.run, parameters, model);
-  s.run.rounds = b->quick ? 1 : 3;
-  s.run.budget_s = b->quick ? 0.3 : 2.0;
+  bool quick = of->bench->quick;
   const char *why = NULL;
+  subject_init(&s, of, parameters, parameters->name, model);
+  s.run.rounds = quick ? 1 : 3;
+  s.run.budget_s = quick ? 0.3 : 2.0;
   s.each =
-      is_among(s.name, detailed, COUNT(detailed)) && !(b->quick && strcmp(s.name, "slide") != 0);
-  s.counts = model == HAP_MODEL_CONTACT && is_among(s.name, counted, COUNT(counted)) && !b->quick &&
-             effects_can_count(&why);
-  return measure(&s);
+      is_among(s.name, detailed, BENCH_COUNT(detailed)) && !(quick && strcmp(s.name, "slide") != 0);
+  s.counts = model == HAP_MODEL_CONTACT && is_among(s.name, counted, BENCH_COUNT(counted)) &&
+             !quick && effects_can_count(&why);
+  return subject_measure(&s);
 }
 
 /* A thousand cubes of which the hand touches one; a few steps. */
-static hap_status measure_pile(sweep *sweep_of)
+static hap_status measure_pile(sweep *of)
 {
   static subject s;
   scene_parameters pile = *cycles_scene("pile");
-  memset(&s, 0, sizeof s);
-  s.sweep = sweep_of;
-  s.model = hap_model_name(HAP_MODEL_CONTACT);
-  s.column = sweep_of->count < EFFECTS_SCENES_MAX ? &sweep_of->columns[sweep_of->count++] : NULL;
-  snprintf(s.name, sizeof s.name, "pile:1000");
   pile.hands[0] = "virtual:path=0:-0.0105/0/0.025;0.1:-0.007/0/0.025,blend=smooth,hand=tense";
-  effects_run_init(&s.run, &pile, HAP_MODEL_CONTACT);
+  subject_init(&s, of, &pile, "pile:1000", HAP_MODEL_CONTACT);
   s.run.count = 1000;
-  s.run.physics_hz = 60.0;
   s.run.seconds = 0.1;
-  return measure(&s);
+  return subject_measure(&s);
 }
 
 /* ---- effects that are off ---- */
 
-static double count_wish(const char *in, const char *name, const char *wish)
-{
-  char list[64];
-  snprintf(list, sizeof list, "%s=%s", name, wish);
-  const effects_counting counting = {in, list, "hapi_tick_run", COUNT_TICKS};
-  return effects_instructions(&counting);
-}
-
-static void check_one(sweep *s, const char *name, const char *in)
-{
-  double off = count_wish(in, name, "off");
-  double automatic = count_wish(in, name, "auto");
-  double on = count_wish(in, name, "on");
-  if (!(off > 0.0) || !(automatic > 0.0) || !(on > 0.0)) {
-    bench_skip(s->bench, "%s: its instructions could not be counted", name);
-    return;
-  }
-  bench_check(s->bench, off <= (1.0 + OFF_BOUND) * on,
-              "%s: a tick takes %.1f instructions with %s off, %.1f with auto (off: %+.3f %%), "
-              "%.1f with on (off: %+.3f %%, bound %+g %%)",
-              in, off, name, automatic, 100.0 * (off / automatic - 1.0), on,
-              100.0 * (off / on - 1.0), 100.0 * OFF_BOUND);
-}
-
-/* A tick with an effect off, as the library decides, and on, in one build: an effect that is off costs no more
- * than one that is on. */
+/* A tick with an effect off, as the library decides, and on, in one build: an effect that is off
+ * costs no more than one that is on. */
 static void check_off(sweep *s)
 {
   static const hap_effect effects[] = {
       HAP_EFFECT_GYRO,     HAP_EFFECT_CONTACTS, HAP_EFFECT_JOINTS,
       HAP_EFFECT_FRICTION, HAP_EFFECT_TORQUE,   HAP_EFFECT_RESTITUTION,
       HAP_EFFECT_SHAPE,    HAP_EFFECT_PROXY,    HAP_EFFECT_OBSERVER};
+  const char *in = s->bench->scene != NULL ? s->bench->scene : "slide";
   const char *why = NULL;
   if (!effects_can_count(&why)) {
     bench_skip(s->bench, "instructions are not counted: %s", why);
     return;
   }
-  for (size_t i = 0; i < (s->bench->quick ? 1 : COUNT(effects)); ++i) {
-    check_one(s, hap_effect_name(effects[i]), s->bench->scene != NULL ? s->bench->scene : "slide");
+  for (size_t i = 0; i < (s->bench->quick ? 1 : BENCH_COUNT(effects)); ++i) {
+    const char *name = hap_effect_name(effects[i]);
+    double off = effects_count(in, name, "off", "hapi_tick_run", COUNT_TICKS);
+    double automatic = effects_count(in, name, "auto", "hapi_tick_run", COUNT_TICKS);
+    double on = effects_count(in, name, "on", "hapi_tick_run", COUNT_TICKS);
+    if (!(off > 0.0) || !(automatic > 0.0) || !(on > 0.0)) {
+      bench_skip(s->bench, "%s: its instructions could not be counted", name);
+      continue;
+    }
+    bench_check(s->bench, off <= (1.0 + OFF_BOUND) * on,
+                "%s: a tick takes %.1f instructions with %s off, %.1f with auto (off: %+.3f %%), "
+                "%.1f with on (off: %+.3f %%, bound %+g %%)",
+                in, off, name, automatic, bench_percent(off, automatic), on, bench_percent(off, on),
+                100.0 * OFF_BOUND);
   }
 }
 
@@ -743,7 +681,7 @@ static hap_status measure_all(sweep *s)
   bool pile = only == NULL || strcmp(only, "pile:1000") == 0;
   bool found = pile;
   hap_status status = HAP_OK;
-  for (size_t m = 0; m < COUNT(models); ++m) {
+  for (size_t m = 0; m < BENCH_COUNT(models); ++m) {
     for (size_t i = 0; scene_table_at(i) != NULL && status >= HAP_OK; ++i) {
       if (only == NULL || strcmp(only, scene_table_at(i)->name) == 0) {
         found = true;
@@ -772,7 +710,6 @@ hap_status bench_effects(bench *b)
   if (status >= HAP_OK && (b->scene == NULL || strchr(b->scene, ':') == NULL)) {
     check_off(&s);
   }
-  hap_status closed = bench_csv_close(b, s.csv);
-  status = status >= HAP_OK ? closed : status;
-  return status >= HAP_OK ? effects_draw(b, s.columns, s.count) : status;
+  status = bench_csv_close(b, s.csv, status);
+  return status >= HAP_OK ? bench_draw(b, "effects", 1300, 950, effects_draw, &s) : status;
 }

@@ -6,7 +6,8 @@
 #include "tools/rig.h"
 #include "tools/run_effects.h"
 
-/* effects-tick SCENE LIST TICKS: a lockstep run of the same ticks every time, to count their instructions. */
+/* effects-tick SCENE LIST TICKS: a lockstep run of the same ticks every time, to count their
+ * instructions. */
 
 int main(int argc, char **argv)
 {

@@ -21,25 +21,33 @@
 
 static const double speed = 0.017; /* m/s, of the scene; the paper's section 7.2 */
 static const double stiffnesses[] = {1000.0, 3000.0, 10000.0};
-#define STIFFNESS_COUNT (sizeof stiffnesses / sizeof stiffnesses[0])
+#define STIFFNESS_COUNT BENCH_COUNT(stiffnesses)
 
 typedef struct variant {
   const char *name;
   hap_model model;
   hap_impulse_pose pose;
   double physics_hz; /* as written; model SINGLE steps the world at the haptic rate */
+  const char *title;
+  const char *line; /* gnuplot's */
 } variant;
 
 static const variant variants[] = {
-    {"single", HAP_MODEL_SINGLE, HAP_IMPULSE_HELD, 1000.0},
-    {"accelerance", HAP_MODEL_ACCELERANCE, HAP_IMPULSE_HELD, 20.0},
-    {"impulse_held", HAP_MODEL_IMPULSE, HAP_IMPULSE_HELD, 20.0},
-    {"impulse_held", HAP_MODEL_IMPULSE, HAP_IMPULSE_HELD, 50.0},
-    {"impulse_interpolated", HAP_MODEL_IMPULSE, HAP_IMPULSE_INTERPOLATED, 20.0},
-    {"impulse_interpolated", HAP_MODEL_IMPULSE, HAP_IMPULSE_INTERPOLATED, 50.0},
-    {"contact", HAP_MODEL_CONTACT, HAP_IMPULSE_HELD, 20.0},
+    {"single", HAP_MODEL_SINGLE, HAP_IMPULSE_HELD, 1000.0, "1: single, 1 ms",
+     "lc rgb '#b8b8b8' lw 6"},
+    {"accelerance", HAP_MODEL_ACCELERANCE, HAP_IMPULSE_HELD, 20.0, "2: accelerance, 50 ms", "lt 1"},
+    {"impulse_held", HAP_MODEL_IMPULSE, HAP_IMPULSE_HELD, 20.0, "3: impulse, held, 50 ms",
+     "lt 3 dt (6,3)"},
+    {"impulse_held", HAP_MODEL_IMPULSE, HAP_IMPULSE_HELD, 50.0, "3: impulse, held, 20 ms",
+     "lt 6 dt (6,3)"},
+    {"impulse_interpolated", HAP_MODEL_IMPULSE, HAP_IMPULSE_INTERPOLATED, 20.0,
+     "3: impulse, interpolated, 50 ms", "lt 2 lw 1.8"},
+    {"impulse_interpolated", HAP_MODEL_IMPULSE, HAP_IMPULSE_INTERPOLATED, 50.0,
+     "3: impulse, interpolated, 20 ms", "lt 5 lw 1.8"},
+    {"contact", HAP_MODEL_CONTACT, HAP_IMPULSE_HELD, 20.0, "contact, 50 ms",
+     "lc rgb '#000000' dt (2,5)"},
 };
-#define VARIANT_COUNT (sizeof variants / sizeof variants[0])
+#define VARIANT_COUNT BENCH_COUNT(variants)
 
 typedef struct summary {
   double contact_s;
@@ -94,10 +102,7 @@ static hap_status run_variant(bench *b, const variant *v, const scene_parameters
   if (status < HAP_OK) {
     return status;
   }
-  status = follow_force(&r, force);
-  if (status < HAP_OK) {
-    (void)hap_session_detail(r.session, &b->detail);
-  }
+  status = bench_explain(b, r.session, follow_force(&r, force));
   rig_destroy(&r);
   return status;
 }
@@ -105,12 +110,12 @@ static hap_status run_variant(bench *b, const variant *v, const scene_parameters
 /* ---- what a curve amounts to ---- */
 
 /* Time from the first sample to where the line through it and its inner neighbour meets zero. */
-static double overhang(double outer, double inner)
+static double end_overhang(double outer, double inner)
 {
   return inner > outer ? TICK_S * outer / (inner - outer) : 0.0;
 }
 
-static summary summarise(const double *force)
+static summary curve_summarise(const double *force)
 {
   summary s = {0.0, 0.0, 0.0};
   int first = -1;
@@ -125,8 +130,8 @@ static summary summarise(const double *force)
     s.impulse_ns += TICK_S * force[i];
   }
   if (last - first >= 3) {
-    s.contact_s = TICK_S * (last - first) + overhang(force[first], force[first + 1]) +
-                  overhang(force[last], force[last - 1]);
+    s.contact_s = TICK_S * (last - first) + end_overhang(force[first], force[first + 1]) +
+                  end_overhang(force[last], force[last - 1]);
   }
   s.peak_n = force[top];
   return s;
@@ -145,7 +150,7 @@ static hap_status write_curves(bench *b, const figure *f)
       }
     }
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 static hap_status write_summary(bench *b, const figure *f)
@@ -159,35 +164,7 @@ static hap_status write_summary(bench *b, const figure *f)
               stiffnesses[k], s->contact_s, s->peak_n, s->impulse_ns);
     }
   }
-  return bench_csv_close(b, csv);
-}
-
-static const char *line_of(size_t v)
-{
-  static const char *const lines[VARIANT_COUNT] = {
-      "lc rgb '#b8b8b8' lw 6",
-      "lt 1",
-      "lt 3 dt (6,3)",
-      "lt 6 dt (6,3)",
-      "lt 2 lw 1.8",
-      "lt 5 lw 1.8",
-      "lc rgb '#000000' dt (2,5)",
-  };
-  return lines[v];
-}
-
-static const char *title_of(size_t v)
-{
-  static const char *const titles[VARIANT_COUNT] = {
-      "1: single, 1 ms",
-      "2: accelerance, 50 ms",
-      "3: impulse, held, 50 ms",
-      "3: impulse, held, 20 ms",
-      "3: impulse, interpolated, 50 ms",
-      "3: impulse, interpolated, 20 ms",
-      "contact, 50 ms",
-  };
-  return titles[v];
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 static void draw_panel(FILE *script, const figure *f, size_t k)
@@ -202,25 +179,22 @@ static void draw_panel(FILE *script, const figure *f, size_t k)
   fprintf(script, "set title 'k = %g kN/m'\n%s\nplot ", 1e-3 * stiffnesses[k],
           k + 1 == STIFFNESS_COUNT ? "set key top right" : "unset key");
   for (size_t v = 0; v < VARIANT_COUNT; ++v) {
-    fprintf(script, "%s$c%zu using 1:2 with lines %s title '%s'", v > 0 ? ", " : "", v, line_of(v),
-            title_of(v));
+    fprintf(script, "%s$c%zu using 1:2 with lines %s title '%s'", v > 0 ? ", " : "", v,
+            variants[v].line, variants[v].title);
   }
   fprintf(script, "\n");
 }
 
-static hap_status draw(bench *b, const figure *f)
+static void fig5_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "fig5", 900, 1000);
-  if (script != NULL) {
-    fprintf(script,
-            "set multiplot layout 3,1\nset xlabel 'time [s]'\n"
-            "set ylabel 'force on the cube [N]'\nset xrange [0:1.2]\nset yrange [0:*]\n");
-    for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
-      draw_panel(script, f, k);
-    }
-    fprintf(script, "unset multiplot\n");
+  const figure *f = data;
+  fprintf(script,
+          "set multiplot layout 3,1\nset xlabel 'time [s]'\n"
+          "set ylabel 'force on the cube [N]'\nset xrange [0:1.2]\nset yrange [0:*]\n");
+  for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
+    draw_panel(script, f, k);
   }
-  return bench_picture_end(b, "fig5", script);
+  fprintf(script, "unset multiplot\n");
 }
 
 /* ---- --verify ---- */
@@ -229,11 +203,6 @@ static summary closed_form(double mass, double k)
 {
   return (summary){3.14159265358979323846 * sqrt(mass / k), speed * sqrt(k * mass),
                    2.0 * mass * speed};
-}
-
-static double percent(double value, double wanted)
-{
-  return 100.0 * (value / wanted - 1.0);
 }
 
 /* single, accelerance and contact */
@@ -252,11 +221,11 @@ static void check_exact(bench *b, const figure *f, size_t k, size_t v)
   };
   /* The spring of model contact shows the ends of a contact over two ticks. */
   double bound = variants[v].model == HAP_MODEL_CONTACT ? 1e-3 : 5e-4;
-  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(rows); ++i) {
     bench_check(b, bench_within(rows[i].value, rows[i].wanted, bound),
                 "k = %5g N/m, %s, %s: %.6f, closed form %.6f (%+.4f %%, bound %g %%)",
                 stiffnesses[k], variants[v].name, rows[i].name, rows[i].value, rows[i].wanted,
-                percent(rows[i].value, rows[i].wanted), 100.0 * bound);
+                bench_percent(rows[i].value, rows[i].wanted), 100.0 * bound);
   }
 }
 
@@ -265,9 +234,9 @@ static void check_impulse(bench *b, const figure *f, size_t k, size_t v)
 {
   const summary *s = &f->curves[k][v].sum;
   const summary *one = &f->curves[k][0].sum;
-  double longer = percent(s->contact_s, one->contact_s);
-  double larger = percent(s->impulse_ns, one->impulse_ns);
-  double higher = percent(s->peak_n, one->peak_n);
+  double longer = bench_percent(s->contact_s, one->contact_s);
+  double larger = bench_percent(s->impulse_ns, one->impulse_ns);
+  double higher = bench_percent(s->peak_n, one->peak_n);
   const char *text =
       "k = %5g N/m, %s at %g Hz against single: contact %+.2f %%, impulse %+.2f %%, "
       "peak %+.2f %%%s";
@@ -281,16 +250,8 @@ static void check_impulse(bench *b, const figure *f, size_t k, size_t v)
   }
 }
 
-static FILE *open_oracle(void)
-{
-  char path[ORACLE_TEXT_MAX];
-  const char *shared = getenv("HAPODE_SHARED");
-  snprintf(path, sizeof path, "%s/oracles/fig5.csv", shared != NULL ? shared : "../shared");
-  return fopen(path, "r");
-}
-
 /* Column of a text "a,b,c", from 0; NAN when there is none. */
-static double column(const char *text, int index)
+static double column_of(const char *text, int index)
 {
   for (; index > 0 && text != NULL; --index) {
     text = strchr(text, ',');
@@ -316,9 +277,9 @@ static bool quantity_of(const char *line, const summary *s, double *out)
 static void check_line(bench *b, const figure *f, const char *line)
 {
   for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
-    for (size_t v = 0; v < VARIANT_COUNT && column(line, 0) == stiffnesses[k]; ++v) {
+    for (size_t v = 0; v < VARIANT_COUNT && column_of(line, 0) == stiffnesses[k]; ++v) {
       double value = 0.0;
-      double wanted = column(line, variants[v].physics_hz == 50.0 ? 5 : 6);
+      double wanted = column_of(line, variants[v].physics_hz == 50.0 ? 5 : 6);
       if (variants[v].model == HAP_MODEL_IMPULSE && variants[v].pose == HAP_IMPULSE_INTERPOLATED &&
           quantity_of(line, &f->curves[k][v].sum, &value)) {
         int length = (int)strcspn(strchr(line, ',') + 1, ",");
@@ -326,7 +287,7 @@ static void check_line(bench *b, const figure *f, const char *line)
                     "k = %5g N/m, impulse_interpolated at %g Hz, %.*s: %.4f, oracle %.4f "
                     "(%+.2f %%, bound 5 %%)",
                     stiffnesses[k], variants[v].physics_hz, length, strchr(line, ',') + 1, value,
-                    wanted, percent(value, wanted));
+                    wanted, bench_percent(value, wanted));
       }
     }
   }
@@ -335,7 +296,9 @@ static void check_line(bench *b, const figure *f, const char *line)
 static void check_oracle(bench *b, const figure *f)
 {
   char line[ORACLE_TEXT_MAX];
-  FILE *oracle = open_oracle();
+  const char *shared = getenv("HAPODE_SHARED");
+  snprintf(line, sizeof line, "%s/oracles/fig5.csv", shared != NULL ? shared : "../shared");
+  FILE *oracle = fopen(line, "r");
   if (oracle == NULL) {
     bench_skip(b, "impulse_interpolated: no oracle (HAPODE_SHARED/oracles/fig5.csv)");
     return;
@@ -346,7 +309,7 @@ static void check_oracle(bench *b, const figure *f)
   fclose(oracle);
 }
 
-static void report(bench *b, const figure *f)
+static void fig5_report(bench *b, const figure *f)
 {
   for (size_t k = 0; k < STIFFNESS_COUNT; ++k) {
     for (size_t v = 0; v < VARIANT_COUNT; ++v) {
@@ -360,7 +323,7 @@ static void report(bench *b, const figure *f)
   check_oracle(b, f);
 }
 
-static hap_status measure(bench *b, figure *f)
+static hap_status fig5_measure(bench *b, figure *f)
 {
   scene_parameters parameters = *cycles_scene("fig5");
   f->mass = parameters.mass;
@@ -372,7 +335,7 @@ static hap_status measure(bench *b, figure *f)
       if (status < HAP_OK) {
         return status;
       }
-      c->sum = summarise(c->force);
+      c->sum = curve_summarise(c->force);
     }
   }
   return HAP_OK;
@@ -384,7 +347,7 @@ hap_status bench_fig5(bench *b)
   if (f == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the curves");
   }
-  hap_status status = measure(b, f);
+  hap_status status = fig5_measure(b, f);
   if (status >= HAP_OK) {
     status = write_curves(b, f);
   }
@@ -392,8 +355,8 @@ hap_status bench_fig5(bench *b)
     status = write_summary(b, f);
   }
   if (status >= HAP_OK) {
-    report(b, f);
-    status = draw(b, f);
+    fig5_report(b, f);
+    status = bench_draw(b, "fig5", 900, 1000, fig5_draw, f);
   }
   free(f);
   return status;

@@ -26,7 +26,15 @@ enum {
   FIG67_MODELS
 };
 
-#define FIG67_SERIES 5 /* accelerance is there with its testing simulations and without */
+/* Accelerance is there with its testing simulations and without. */
+enum {
+  SERIES_SINGLE,
+  SERIES_TESTED,
+  SERIES_UNTESTED,
+  SERIES_IMPULSE,
+  SERIES_CONTACT,
+  FIG67_SERIES
+};
 
 typedef struct fig67_series {
   int model;
@@ -36,13 +44,24 @@ typedef struct fig67_series {
   int point; /* gnuplot's shape */
 } fig67_series;
 
-extern const fig67_series fig67_all[FIG67_SERIES];
+static const fig67_series fig67_all[FIG67_SERIES] = {
+    {FIG67_SINGLE, false, "single", "single, 1 ms", 1},
+    {FIG67_ACCELERANCE, true, "accelerance", "accelerance, 50 ms", 7},
+    {FIG67_ACCELERANCE, false, "accelerance", "accelerance without testing", 5},
+    {FIG67_IMPULSE, false, "impulse", "impulse, 50 ms", 9},
+    {FIG67_CONTACT, false, "contact", "contact, 50 ms", 13},
+};
 
 typedef struct fig67_group {
   int bodies;
   const char *layout;
   cycles of[FIG67_MODELS];
 } fig67_group;
+
+typedef struct fig67_table {
+  fig67_group groups[FIG67_GROUPS_MAX]; /* the ten cubes of the paper, then by layout and number */
+  size_t count;
+} fig67_table;
 
 static double fig67_duty(const cycles *c, size_t step, bool testing)
 {
@@ -67,7 +86,7 @@ static double fig67_typical(const fig67_group *g, size_t series)
 }
 
 /* Data blocks $time0 .. of a group's series over time. */
-static void put_group(FILE *script, const fig67_group *g)
+static void group_put(FILE *script, const fig67_group *g)
 {
   for (size_t i = 0; i < FIG67_SERIES; ++i) {
     const cycles *c = &g->of[fig67_all[i].model];
@@ -79,7 +98,7 @@ static void put_group(FILE *script, const fig67_group *g)
   }
 }
 
-static void plot_times(FILE *script)
+static void times_plot(FILE *script)
 {
   fprintf(script, "set xlabel 'time [s]'\nset ylabel 'duty factor'\nplot ");
   for (size_t i = 0; i < FIG67_SERIES; ++i) {
@@ -91,28 +110,26 @@ static void plot_times(FILE *script)
           FIG67_DUTY_BOUND);
 }
 
-static hap_status fig6_draw(bench *b, const fig67_group *g)
+static void fig6_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "fig6", 1100, 500);
-  if (script != NULL) {
-    put_group(script, g);
-    fprintf(script,
-            "set title 'One cube (logarithmic: all of it is far below the paper''s "
-            "0.25)'\nset logscale y\nset format y '%%g'\nset yrange [5e-5:1]\n"
-            "set key outside right top Left reverse\n");
-    plot_times(script);
-  }
-  return bench_picture_end(b, "fig6", script);
+  const fig67_group *g = data;
+  group_put(script, g);
+  fprintf(script,
+          "set title 'One cube (logarithmic: all of it is far below the paper''s "
+          "0.25)'\nset logscale y\nset format y '%%g'\nset yrange [5e-5:1]\n"
+          "set key outside right top Left reverse\n");
+  times_plot(script);
 }
 
 /* ---- by the number of cubes ---- */
 
 /* $of0 .. of a layout: bodies and median duty. ticks: of model contact, the loop's own share. */
-static void put_sweep(FILE *script, const fig67_group *groups, size_t count, const char *layout)
+static void sweep_put(FILE *script, const fig67_table *table, const char *layout)
 {
+  const fig67_group *groups = table->groups;
   for (size_t s = 0; s < FIG67_SERIES; ++s) {
     fprintf(script, "$of%zu << EOD\n", s);
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < table->count; ++i) {
       if (strcmp(groups[i].layout, layout) == 0) {
         fprintf(script, "%d %.6g\n", groups[i].bodies, fig67_typical(&groups[i], s));
       }
@@ -120,7 +137,7 @@ static void put_sweep(FILE *script, const fig67_group *groups, size_t count, con
     fprintf(script, "EOD\n");
   }
   fprintf(script, "$ticks << EOD\n");
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < table->count; ++i) {
     if (strcmp(groups[i].layout, layout) == 0) {
       fprintf(script, "%d %.6g\n", groups[i].bodies,
               1e-6 * CYCLES_HAPTIC_HZ * groups[i].of[FIG67_CONTACT].tick_us);
@@ -129,20 +146,7 @@ static void put_sweep(FILE *script, const fig67_group *groups, size_t count, con
   fprintf(script, "EOD\n");
 }
 
-static void plot_sweep(FILE *script, const char *title, const char *x_label, const char *range)
-{
-  fprintf(script,
-          "set title '%s'\nset xlabel '%s'\nset ylabel 'median duty factor'\nset xrange %s\n"
-          "plot 1 with lines lc rgb 'black' lw 1.5 notitle",
-          title, x_label, range);
-  for (size_t s = 0; s < FIG67_SERIES; ++s) {
-    fprintf(script, ", $of%zu with linespoints lt %zu pt %d ps 0.7 notitle", s, s + 1,
-            fig67_all[s].point);
-  }
-  fprintf(script, ", $ticks with linespoints lt 6 pt 2 ps 0.7 dt 3 notitle\n");
-}
-
-static void plot_key(FILE *script)
+static void key_plot(FILE *script)
 {
   fprintf(script,
           "unset title\nunset border\nunset tics\nunset grid\nunset xlabel\n"
@@ -157,49 +161,57 @@ static void plot_key(FILE *script)
           "1 ms'\n");
 }
 
-static hap_status draw_sweeps(bench *b, const fig67_group *groups, size_t count)
+static void sizes_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "fig7_sizes", 1200, 900);
-  if (script != NULL) {
+  static const struct {
+    const char *layout;
+    const char *title;
+    const char *x_label;
+    const char *range;
+  } panels[] = {
+      {FIG67_TOUCHING, "(a) a row that touches", "cubes", "[0.8:6000]"},
+      {FIG67_SEPARATE, "(b) cubes far from each other, one is pushed", "cubes", "[0.8:6000]"},
+      {FIG67_AT_ONCE, "(c) all are touched at once", "cubes = neighbours", "[0.8:320]"},
+  };
+  fprintf(script,
+          "set termoption noenhanced\nset multiplot layout 2,2 title 'Time of a physics "
+          "cycle / its period, by size'\nset logscale xy\nset format '%%g'\n"
+          "set yrange [1e-4:100]\n");
+  for (size_t i = 0; i < BENCH_COUNT(panels); ++i) {
+    sweep_put(script, data, panels[i].layout);
     fprintf(script,
-            "set termoption noenhanced\nset multiplot layout 2,2 title 'Time of a physics "
-            "cycle / its period, by size'\nset logscale xy\nset format '%%g'\n"
-            "set yrange [1e-4:100]\n");
-    put_sweep(script, groups, count, FIG67_TOUCHING);
-    plot_sweep(script, "(a) a row that touches", "cubes", "[0.8:6000]");
-    put_sweep(script, groups, count, FIG67_SEPARATE);
-    plot_sweep(script, "(b) cubes far from each other, one is pushed", "cubes", "[0.8:6000]");
-    put_sweep(script, groups, count, FIG67_AT_ONCE);
-    plot_sweep(script, "(c) all are touched at once", "cubes = neighbours", "[0.8:320]");
-    plot_key(script);
-    fprintf(script, "unset multiplot\n");
+            "set title '%s'\nset xlabel '%s'\nset ylabel 'median duty factor'\nset xrange %s\n"
+            "plot 1 with lines lc rgb 'black' lw 1.5 notitle",
+            panels[i].title, panels[i].x_label, panels[i].range);
+    for (size_t s = 0; s < FIG67_SERIES; ++s) {
+      fprintf(script, ", $of%zu with linespoints lt %zu pt %d ps 0.7 notitle", s, s + 1,
+              fig67_all[s].point);
+    }
+    fprintf(script, ", $ticks with linespoints lt 6 pt 2 ps 0.7 dt 3 notitle\n");
   }
-  return bench_picture_end(b, "fig7_sizes", script);
+  key_plot(script);
+  fprintf(script, "unset multiplot\n");
 }
 
-/* groups[0]: the ten cubes of the paper; the others by layout and rising number. */
-static hap_status fig7_draw(bench *b, const fig67_group *groups, size_t count)
+static void fig7_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "fig7", 1100, 500);
-  if (script != NULL) {
-    put_group(script, &groups[0]);
-    fprintf(script,
-            "set title '%d cubes, apart at first: all models'\nset logscale y\n"
-            "set format y '%%g'\nset yrange [1e-4:1]\nset key outside right top Left reverse\n",
-            groups[0].bodies);
-    plot_times(script);
-  }
-  hap_status status = bench_picture_end(b, "fig7", script);
-  return status >= HAP_OK && script != NULL ? draw_sweeps(b, groups, count) : status;
+  const fig67_group *g = data;
+  group_put(script, g);
+  fprintf(script,
+          "set title '%d cubes, apart at first: all models'\nset logscale y\n"
+          "set format y '%%g'\nset yrange [1e-4:1]\nset key outside right top Left reverse\n",
+          g->bodies);
+  times_plot(script);
 }
 
 /* The paper's Fig. 6 and 7: duty factors (time of a physics cycle / its period) while one cube, and
  * while ten cubes that do not touch at first, are pushed. Method 1: single, 1 ms; 2: accelerance,
- * 50 ms, with and without the testing simulations; 3: impulse, 50 ms; and contact, 50 ms. A cycle is
- * all that the physics side does: collision, neighbours, testing simulations, global step, messages.
+ * 50 ms, with and without the testing simulations; 3: impulse, 50 ms; and contact, 50 ms. A cycle
+ * is all that the physics side does: collision, neighbours, testing simulations, global step,
+ * messages.
  *
- * Fig. 7 goes on with 1 to 4000 cubes in a row that touch, or stand far from each other, and with 1
- * to 256 that a large pointer touches at once: where does each model pass duty 1? */
+ * Fig. 7 goes on with 1 to 4000 cubes in a row that touch, or stand far from each other, and
+ * with 1 to 256 that a large pointer touches at once: where does each model pass duty 1? */
 
 #define PHYSICS_HZ 20.0 /* the paper's 50 ms */
 #define SPEC_MAX 512
@@ -216,14 +228,6 @@ typedef struct plan {
   int32_t max_bodies; /* of the session; 0: its default */
 } plan;
 
-const fig67_series fig67_all[FIG67_SERIES] = {
-    {FIG67_SINGLE, false, "single", "single, 1 ms", 1},
-    {FIG67_ACCELERANCE, true, "accelerance", "accelerance, 50 ms", 7},
-    {FIG67_ACCELERANCE, false, "accelerance", "accelerance without testing", 5},
-    {FIG67_IMPULSE, false, "impulse", "impulse, 50 ms", 9},
-    {FIG67_CONTACT, false, "contact", "contact, 50 ms", 13},
-};
-
 static const hap_model models[FIG67_MODELS] = {
     [FIG67_SINGLE] = HAP_MODEL_SINGLE,
     [FIG67_ACCELERANCE] = HAP_MODEL_ACCELERANCE,
@@ -239,14 +243,14 @@ static double mean_duty(const cycles *c, bool testing)
 
 /* ---- measure ---- */
 
-static void free_group(fig67_group *g)
+static void group_free(fig67_group *g)
 {
   for (size_t i = 0; i < FIG67_MODELS; ++i) {
     cycles_free(&g->of[i]);
   }
 }
 
-static hap_status measure_group(bench *b, const plan *p, fig67_group *out)
+static hap_status group_measure(bench *b, const plan *p, fig67_group *out)
 {
   memset(out, 0, sizeof *out);
   out->bodies = p->count > 0 ? p->count : 1;
@@ -267,7 +271,7 @@ static hap_status measure_group(bench *b, const plan *p, fig67_group *out)
     status = cycles_measure(b, &def, &out->of[i]);
   }
   if (status < HAP_OK) {
-    free_group(out);
+    group_free(out);
   }
   return status;
 }
@@ -283,65 +287,54 @@ static plan plan_of(const bench *b, const char *name, const char *layout)
 
 /* ---- table ---- */
 
-static void write_group(FILE *csv, const fig67_group *g)
+static hap_status table_write(bench *b, const char *name, const fig67_group *groups, size_t count)
 {
-  for (size_t i = 0; i < FIG67_SERIES; ++i) {
-    const cycles *c = &g->of[fig67_all[i].model];
-    bool testing = fig67_all[i].testing;
+  FILE *csv = bench_csv_open(b, name, "model,step,t,duty,testing,bodies,layout,neighbours,tick_us");
+  for (size_t i = 0; i < count * FIG67_SERIES && csv != NULL; ++i) {
+    const fig67_group *g = &groups[i / FIG67_SERIES];
+    const fig67_series *series = &fig67_all[i % FIG67_SERIES];
+    const cycles *c = &g->of[series->model];
     for (size_t k = 0; k < c->count; ++k) {
-      fprintf(csv, "%s,%zu,%.3f,%.6g,%d,%d,%s,%g,%.4g\n", fig67_all[i].name, k,
-              c->rows[k].v[CYCLE_T], fig67_duty(c, k, testing), testing, g->bodies, g->layout,
+      fprintf(csv, "%s,%zu,%.3f,%.6g,%d,%d,%s,%g,%.4g\n", series->name, k, c->rows[k].v[CYCLE_T],
+              fig67_duty(c, k, series->testing), series->testing, g->bodies, g->layout,
               c->rows[k].v[CYCLE_NEIGHBOURS], c->tick_us);
     }
   }
-}
-
-static hap_status write_table(bench *b, const char *name, const fig67_group *groups, size_t count)
-{
-  FILE *csv = bench_csv_open(b, name, "model,step,t,duty,testing,bodies,layout,neighbours,tick_us");
-  for (size_t i = 0; i < count && csv != NULL; ++i) {
-    write_group(csv, &groups[i]);
-  }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 /* ---- numbers ---- */
 
-static double largest_duty(const cycles *c, bool testing)
+typedef struct duty_range {
+  double low;
+  double high;
+} duty_range;
+
+static duty_range duties_of(const fig67_group *g, size_t series)
 {
-  double largest = 0.0;
+  const cycles *c = &g->of[fig67_all[series].model];
+  duty_range range = {HUGE_VAL, 0.0};
   for (size_t i = 0; i < c->count; ++i) {
-    largest = fmax(largest, fig67_duty(c, i, testing));
+    double duty = fig67_duty(c, i, fig67_all[series].testing);
+    range = (duty_range){fmin(range.low, duty), fmax(range.high, duty)};
   }
-  return largest;
+  return range;
 }
 
-static double smallest_duty(const cycles *c, bool testing)
+/* Below the paper's bound, and flat where asked. */
+static void duty_check(bench *b, const fig67_group *g, size_t series, bool flat)
 {
-  double smallest = largest_duty(c, testing);
-  for (size_t i = 0; i < c->count; ++i) {
-    smallest = fmin(smallest, fig67_duty(c, i, testing));
+  const char *model = fig67_all[series].name;
+  duty_range range = duties_of(g, series);
+  if (flat) {
+    bench_check(b, range.high - range.low < 0.05,
+                "%d bodies, %s, %s: flat: duty factor from %.5f to %.5f (bound: 0.05 apart)",
+                g->bodies, g->layout, model, range.low, range.high);
+  } else {
+    bench_check(b, range.high < FIG67_DUTY_BOUND,
+                "%d bodies, %s, %s: largest duty factor %.4f (bound %g)", g->bodies, g->layout,
+                model, range.high, FIG67_DUTY_BOUND);
   }
-  return smallest;
-}
-
-static void check_below(bench *b, const fig67_group *g, const char *model, const cycles *c,
-                        bool testing)
-{
-  double largest = largest_duty(c, testing);
-  bench_check(b, largest < FIG67_DUTY_BOUND,
-              "%d bodies, %s, %s: largest duty factor %.4f (bound %g)", g->bodies, g->layout, model,
-              largest, FIG67_DUTY_BOUND);
-}
-
-static void check_flat(bench *b, const fig67_group *g, const char *model, const cycles *c,
-                       bool testing)
-{
-  double low = smallest_duty(c, testing);
-  double high = largest_duty(c, testing);
-  bench_check(b, high - low < 0.05,
-              "%d bodies, %s, %s: flat: duty factor from %.5f to %.5f (bound: 0.05 apart)",
-              g->bodies, g->layout, model, low, high);
 }
 
 /* What a cycle consists of, by model, in means over the run. */
@@ -433,12 +426,12 @@ static void check_untested(bench *b, const fig67_group *g)
               g->bodies, g->layout, untested, impulse, untested / impulse);
 }
 
-static void report_fig7_group(bench *b, const fig67_group *g)
+static void fig7_report(bench *b, const fig67_group *g)
 {
-  check_below(b, g, "accelerance", &g->of[FIG67_ACCELERANCE], true);
-  check_below(b, g, "impulse", &g->of[FIG67_IMPULSE], false);
-  check_flat(b, g, "accelerance", &g->of[FIG67_ACCELERANCE], true);
-  check_flat(b, g, "impulse", &g->of[FIG67_IMPULSE], false);
+  duty_check(b, g, SERIES_TESTED, false);
+  duty_check(b, g, SERIES_IMPULSE, false);
+  duty_check(b, g, SERIES_TESTED, true);
+  duty_check(b, g, SERIES_IMPULSE, true);
   say_parts(g);
   check_parts(b, g, true);
   check_untested(b, g);
@@ -446,95 +439,38 @@ static void report_fig7_group(bench *b, const fig67_group *g)
 
 /* ---- where a model is too slow ---- */
 
-/* Where the line through two points reaches duty 1, of whatever grows with the bodies in proportion or
- * by a power. */
-static double crossing(double bodies_a, double duty_a, double bodies_b, double duty_b)
-{
-  double slope = log(duty_b / duty_a) / log(bodies_b / bodies_a);
-  return bodies_b * exp(-log(duty_b) / slope);
-}
-
-static bool is_of(const fig67_group *g, const char *layout)
-{
-  return strcmp(g->layout, layout) == 0;
-}
-
-/* Groups of a layout stand together by rising number of bodies. */
-static double find_crossing(const fig67_group *groups, size_t count, const char *layout,
-                            size_t series, bool *out_beyond)
-{
-  const fig67_group *before = NULL;
-  const fig67_group *last = NULL;
-  for (size_t i = 0; i < count; ++i) {
-    if (!is_of(&groups[i], layout)) {
-      continue;
-    }
-    before = last;
-    last = &groups[i];
-    if (before != NULL && fig67_typical(last, series) > 1.0) {
-      break;
-    }
-  }
-  if (before == NULL || !(fig67_typical(last, series) > fig67_typical(before, series))) {
-    return (double)NAN;
-  }
-  *out_beyond = fig67_typical(last, series) <= 1.0;
-  return crossing(before->bodies, fig67_typical(before, series), last->bodies,
-                  fig67_typical(last, series));
-}
-
-static void say_crossings(const fig67_group *groups, size_t count, const char *layout,
-                          const char *what)
-{
-  for (size_t s = 0; s < FIG67_SERIES; ++s) {
-    bool beyond = false;
-    double bodies = find_crossing(groups, count, layout, s, &beyond);
-    if (isfinite(bodies)) {
-      bench_say("%s: %s passes duty 1 at %.0f%s", what, fig67_all[s].title, bodies,
-                beyond ? ", by the last two points: it is below 1 in all that were measured" : "");
-    } else {
-      bench_say("%s: %s does not grow towards duty 1", what, fig67_all[s].title);
-    }
-  }
-}
-
-static void say_typical(const fig67_group *g)
-{
-  bench_say(
-      "%d cubes, %s: duty factor of single %.4f, accelerance %.4f, impulse %.4f, contact "
-      "%.4f; tick of contact %.1f us",
-      g->bodies, g->layout, fig67_typical(g, 0), fig67_typical(g, 1), fig67_typical(g, 3),
-      fig67_typical(g, 4), g->of[FIG67_CONTACT].tick_us);
-}
-
 /* Where single first is too slow, the others are not. */
-static void check_single(bench *b, const fig67_group *groups, size_t count)
+static void single_check(bench *b, const fig67_table *table)
 {
   const fig67_group *slow = NULL;
-  for (size_t i = 0; i < count && slow == NULL; ++i) {
-    bool touching = is_of(&groups[i], FIG67_TOUCHING);
-    slow = touching && fig67_typical(&groups[i], 0) > 1.0 ? &groups[i] : NULL;
+  for (size_t i = 0; i < table->count && slow == NULL; ++i) {
+    const fig67_group *g = &table->groups[i];
+    bool touching = strcmp(g->layout, FIG67_TOUCHING) == 0;
+    slow = touching && fig67_typical(g, SERIES_SINGLE) > 1.0 ? g : NULL;
   }
   bench_check(b, slow != NULL, "single passes duty 1 in a row that touches%s",
               slow != NULL ? "" : " (wanted)");
   if (slow != NULL) {
-    double tested = fig67_typical(slow, 1);
-    double impulse = fig67_typical(slow, 3);
+    double tested = fig67_typical(slow, SERIES_TESTED);
+    double impulse = fig67_typical(slow, SERIES_IMPULSE);
     bench_check(b, tested < FIG67_DUTY_BOUND && impulse < FIG67_DUTY_BOUND,
                 "at %d cubes accelerance and impulse are at %.4f and %.4f (bound %g)", slow->bodies,
                 tested, impulse, FIG67_DUTY_BOUND);
   }
 }
 
-static void report_sweeps(bench *b, const fig67_group *groups, size_t count)
+static void sweeps_report(bench *b, const fig67_table *table)
 {
-  for (size_t i = 1; i < count; ++i) {
-    say_typical(&groups[i]);
+  for (size_t i = 1; i < table->count; ++i) {
+    const fig67_group *g = &table->groups[i];
+    bench_say(
+        "%d cubes, %s: duty factor of single %.4f, accelerance %.4f, impulse %.4f, contact "
+        "%.4f; tick of contact %.1f us",
+        g->bodies, g->layout, fig67_typical(g, SERIES_SINGLE), fig67_typical(g, SERIES_TESTED),
+        fig67_typical(g, SERIES_IMPULSE), fig67_typical(g, SERIES_CONTACT),
+        g->of[FIG67_CONTACT].tick_us);
   }
-  check_single(b, groups, count);
-  say_crossings(groups, count, FIG67_TOUCHING, "cubes that touch");
-  say_crossings(groups, count, FIG67_SEPARATE, "cubes apart");
-  say_crossings(groups, count, FIG67_AT_ONCE, "cubes touched at once");
+  single_check(b, table);
 }
 
 /* ---- the two programs ---- */
@@ -557,20 +493,20 @@ static double seconds_for(const bench *b, int bodies, bool single)
   return !single ? seconds : bodies >= 1000 ? 0.1 : bodies >= 300 ? 0.2 : seconds;
 }
 
-static hap_status sweep(bench *b, const sweep_def *def, fig67_group *groups, size_t *count)
+static hap_status sweep_measure(bench *b, const sweep_def *def, fig67_table *io)
 {
   plan p = def->plan;
   for (int i = 0; def->sizes[i] != 0; ++i) {
-    bool bounded = *count == 1; /* the ten cubes whose parts are checked */
+    bool bounded = io->count == 1; /* the ten cubes whose parts are checked */
     p.count = def->sizes[i];
     p.seconds = bounded ? 1.5 : seconds_for(b, p.count, false);
     p.single_seconds = bounded ? 1.5 : seconds_for(b, p.count, true);
     p.repeats = bounded ? def->plan.repeats : 3;
-    hap_status status = measure_group(b, &p, &groups[*count]);
+    hap_status status = group_measure(b, &p, &io->groups[io->count]);
     if (status < HAP_OK) {
       return status;
     }
-    ++*count;
+    ++io->count;
   }
   return HAP_OK;
 }
@@ -583,8 +519,8 @@ static int by_bodies(const void *a, const void *b)
   return layouts != 0 ? layouts : (x->bodies > y->bodies) - (x->bodies < y->bodies);
 }
 
-/* groups[0] is there. Rows begin at a moment at which the hand has just reached them. */
-static hap_status sweep_all(bench *b, const plan *of, fig67_group *groups, size_t *count)
+/* The first group is there. Rows begin at a moment at which the hand has just reached them. */
+static hap_status sweeps_measure(bench *b, const plan *of, fig67_table *io)
 {
   char device[SPEC_MAX];
   sweep_def row = {b->quick ? touching_quick : touching_full, *of};
@@ -594,69 +530,70 @@ static hap_status sweep_all(bench *b, const plan *of, fig67_group *groups, size_
   row.plan.layout = FIG67_TOUCHING;
   row.plan.parameters.gap = cycles_scene("row10")->gap;
   field.plan.max_bodies = FIG67_AT_ONCE_MOST;
-  hap_status status = sweep(b, &row, groups, count);
+  hap_status status = sweep_measure(b, &row, io);
   if (status >= HAP_OK) {
     row.sizes = b->quick ? separate_quick : separate_full;
     row.plan.layout = FIG67_SEPARATE;
     row.plan.parameters.gap = FAR_GAP;
-    status = sweep(b, &row, groups, count);
+    status = sweep_measure(b, &row, io);
   }
-  return status >= HAP_OK ? sweep(b, &field, groups, count) : status;
+  return status >= HAP_OK ? sweep_measure(b, &field, io) : status;
 }
 
 hap_status bench_fig6(bench *b)
 {
+  static const size_t bounded[] = {SERIES_SINGLE, SERIES_TESTED, SERIES_IMPULSE, SERIES_CONTACT};
   fig67_group g;
   plan p = plan_of(b, "fig6", "alone");
-  hap_status status = measure_group(b, &p, &g);
+  hap_status status = group_measure(b, &p, &g);
   if (status < HAP_OK) {
     return status;
   }
-  status = write_table(b, "fig6", &g, 1);
+  status = table_write(b, "fig6", &g, 1);
   if (status >= HAP_OK) {
-    check_below(b, &g, "single", &g.of[FIG67_SINGLE], false);
-    check_below(b, &g, "accelerance", &g.of[FIG67_ACCELERANCE], true);
-    check_below(b, &g, "impulse", &g.of[FIG67_IMPULSE], false);
-    check_below(b, &g, "contact", &g.of[FIG67_CONTACT], false);
+    for (size_t i = 0; i < BENCH_COUNT(bounded); ++i) {
+      duty_check(b, &g, bounded[i], false);
+    }
     say_parts(&g);
     check_parts(b, &g, false);
     check_untested(b, &g);
-    status = fig6_draw(b, &g);
+    status = bench_draw(b, "fig6", 1100, 500, fig6_draw, &g);
   }
-  free_group(&g);
+  group_free(&g);
   return status;
 }
 
-static hap_status finish_fig7(bench *b, fig67_group *groups, size_t count)
+static hap_status fig7_finish(bench *b, fig67_table *table)
 {
-  hap_status status = write_table(b, "fig7", groups, count);
-  if (status >= HAP_OK) {
-    bench_say("10 cubes, apart at first: duty factor of single up to %.3f",
-              largest_duty(&groups[0].of[FIG67_SINGLE], false));
-    report_fig7_group(b, &groups[0]);
-    report_fig7_group(b, &groups[1]);
-    qsort(groups + 1, count - 1, sizeof *groups, by_bodies);
-    report_sweeps(b, groups, count);
-    status = fig7_draw(b, groups, count);
+  fig67_group *groups = table->groups;
+  hap_status status = table_write(b, "fig7", groups, table->count);
+  if (status < HAP_OK) {
+    return status;
   }
-  return status;
+  bench_say("10 cubes, apart at first: duty factor of single up to %.3f",
+            duties_of(&groups[0], SERIES_SINGLE).high);
+  fig7_report(b, &groups[0]);
+  fig7_report(b, &groups[1]);
+  qsort(groups + 1, table->count - 1, sizeof *groups, by_bodies);
+  sweeps_report(b, table);
+  status = bench_draw(b, "fig7", 1100, 500, fig7_draw, &groups[0]);
+  return status >= HAP_OK ? bench_draw(b, "fig7_sizes", 1200, 900, sizes_draw, table) : status;
 }
 
 hap_status bench_fig7(bench *b)
 {
-  fig67_group groups[FIG67_GROUPS_MAX];
-  size_t count = 0;
+  fig67_table table = {.count = 0};
   plan p = plan_of(b, "fig7", "apart");
-  hap_status status = measure_group(b, &p, &groups[0]);
+  hap_status status = group_measure(b, &p, &table.groups[0]);
   if (status >= HAP_OK) {
-    count = 1;
-    status = sweep_all(b, &p, groups, &count);
+    table.count = 1;
+    status = sweeps_measure(b, &p, &table);
   }
   if (status >= HAP_OK) {
-    status = finish_fig7(b, groups, count);
+    status = fig7_finish(b, &table);
   }
-  for (size_t i = 0; i < count; ++i) {
-    free_group(&groups[i]);
+  for (size_t i = 0; i < table.count; ++i) {
+    group_free(&table.groups[i]);
   }
   return status;
 }

@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling NAME]
- * [--estimates all|default] [--shard K/N | --merge FILE...] [--fresh]: measures, writes NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
+/* hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER] [--coupling
+ * NAME] [--estimates all|default] [--shard K/N | --merge FILE...] [--fresh]: measures, writes
+ * NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
 #include <string.h>
 
@@ -159,7 +160,7 @@ static bool take_option(int count, char **arguments, bench *b, int *io)
 }
 
 /* That the bench takes what was given; stderr says what it does not. */
-static bool fits(const program *p, const bench *b)
+static bool options_fit(const program *p, const bench *b)
 {
   const char *wrong = NULL;
   bool of_accuracy = b->shards > 0 || b->shard == BAD_SHARD || b->merge != NULL || b->fresh;
@@ -214,10 +215,10 @@ static bool read_arguments(int count, char **arguments, bench *b, const program 
     fprintf(stderr, "hapode-bench: which bench?\n");
     return false;
   }
-  return fits(*out, b);
+  return options_fit(*out, b);
 }
 
-static int run(const program *p, bench *b)
+static int program_run(const program *p, bench *b)
 {
   dInitODE2(0);
   hap_status status = p->run(b);
@@ -247,5 +248,5 @@ int main(int argc, char **argv)
     return 2;
   }
   setvbuf(stdout, NULL, _IOLBF, 0);
-  return run(p, &b);
+  return program_run(p, &b);
 }

@@ -2,10 +2,11 @@
  * SPDX-License-Identifier: MIT */
 
 /* hapode-hashes [--quick] [--only TEXT] [--seeds FIRST-LAST] [--heap N] [--compare FILE]
- * [--recordings DIR] [--list]: runs everything in lockstep and prints one line for each run: the hash of all ticks, a hash of the
- * world, the number of testing simulations, and the run's name. A change of the library that is
- * meant to change no result leaves every line as it is. The name of a scene's run is what
- * hapode-run takes to repeat it. Exit 0: done, 1: a run failed or a line differs, 2: usage. */
+ * [--recordings DIR] [--list]: runs everything in lockstep and prints one line for each run: the
+ * hash of all ticks, a hash of the world, the number of testing simulations, and the run's name.
+ * A change of the library that is meant to change no result leaves every line as it is. The name
+ * of a scene's run is what hapode-run takes to repeat it. Exit 0: done, 1: a run failed or a
+ * line differs, 2: usage. */
 
 #include <inttypes.h>
 #include <math.h>
@@ -380,8 +381,8 @@ static bool file_exists(const char *path)
   return access(path, F_OK) == 0;
 }
 
-/* In real time, where there is no such file yet. Then the replay is the run, or it is an error; the line
- * is of the replay, and worth something to those who keep the file for the next build. */
+/* In real time, where there is no such file yet. Then the replay is the run, or it is an error;
+ * the line is of the replay, and worth something to those who keep the file for the next build. */
 static hap_status run_recorded(const net *n, const net_case *c, net_line *out, hap_detail *detail)
 {
   char file[300];

@@ -29,8 +29,8 @@ const impedance_case impedance_cases[PORT_BODIES] = {
  *
  *   I q" = r dF - (F0 (radius - depth) - m g h) q
  *
- * as the lever from hinge to contact gets shorter while the flap rises and its centre of mass, which
- * is h above the hinge, comes nearer to the hinge's axis. */
+ * as the lever from hinge to contact gets shorter while the flap rises and its centre of mass,
+ * which is h above the hinge, comes nearer to the hinge's axis. */
 static void set_flap(impedance_truth *truth)
 {
   const double arm2 = PORT_FLAP_ARM * PORT_FLAP_ARM;
@@ -71,10 +71,11 @@ static double complex impedance_of(const impedance_truth *truth, double hz)
   return 1.0 / compliance;
 }
 
-/* What ticks make of the closed form, T a tick, z = exp(i w T) one tick ahead. A body moves by
- * x' = x + T v', v' = v + T F / m: its w^2 is that of the central difference. Direct, u the device's place
- * and x the body's: the midpoint rule takes the mean of x z, x, x, x / z, and the damper the velocity from
- * before the tick, x (1 - 1/z) / T, half a tick old. Through a proxy whose place after the tick is p:
+/* What ticks make of the closed form, T a tick, z = exp(i w T) one tick ahead. A body moves by x' =
+ * x + T v', v' = v + T F / m: its w^2 is that of the central difference. Direct, u the device's
+ * place and x the body's: the midpoint rule takes the mean of x z, x, x, x / z, and the damper the
+ * velocity from before the tick, x (1 - 1/z) / T, half a tick old. Through a proxy whose place
+ * after the tick is p:
  *
  *   F = k (p - (x z - x + x / z)) + d (1 - 1/z) / T (p - x z)
  *   F = k_v (u - p) + d_v (i w u - (1 - 1/z) / T p) */
@@ -103,7 +104,7 @@ static double complex impedance_sampled(const impedance_truth *truth, double hz)
 
 /* ---- fit: Gauss and Newton, relative errors ---- */
 
-static double *parameter(impedance_truth *truth, int index)
+static double *truth_parameter(impedance_truth *truth, int index)
 {
   return index == 0 ? &truth->stiffness : index == 1 ? &truth->damping : &truth->mass;
 }
@@ -119,7 +120,7 @@ static void add_point(normal_equations *n, const impedance_point *point, impedan
   double complex slope[PARAMETERS];
   double complex here = impedance_of(at, point->hz);
   for (int i = 0; i < count; ++i) {
-    double *p = parameter(at, i);
+    double *p = truth_parameter(at, i);
     double kept = *p;
     double step = 1e-6 * fmax(fabs(kept), 1e-3);
     *p = kept + step;
@@ -135,7 +136,7 @@ static void add_point(normal_equations *n, const impedance_point *point, impedan
 }
 
 /* The matrix is that of least squares: positive definite, no pivots are needed. */
-static bool eliminate(normal_equations *n, int count)
+static bool equations_solve(normal_equations *n, int count)
 {
   for (int i = 0; i < count; ++i) {
     if (!(n->a[i][i] > 0.0)) {
@@ -158,8 +159,8 @@ static bool eliminate(normal_equations *n, int count)
   return true;
 }
 
-/* Mass, stiffness and damping of the contact that fit the felt values best, up to hz_max; all else is
- * taken from the truth. */
+/* Mass, stiffness and damping of the contact that fit the felt values best, up to hz_max; all
+ * else is taken from the truth. */
 static bool impedance_fit(const impedance_point *points, size_t count, double hz_max,
                           const impedance_truth *truth, impedance_truth *out)
 {
@@ -171,11 +172,11 @@ static bool impedance_fit(const impedance_point *points, size_t count, double hz
     for (size_t i = 0; i < count && points[i].hz <= hz_max; ++i) {
       add_point(&n, &points[i], out, free_count);
     }
-    if (!eliminate(&n, free_count)) {
+    if (!equations_solve(&n, free_count)) {
       return false;
     }
     for (int i = 0; i < free_count; ++i) {
-      double *p = parameter(out, i);
+      double *p = truth_parameter(out, i);
       *p += n.b[i];
       change = fmax(change, fabs(n.b[i] / *p));
     }
@@ -254,22 +255,18 @@ static void draw_case(FILE *script, const impedance_table *table, int body)
   plot_column(script, DAMPING);
 }
 
-static hap_status impedance_draw(bench *b, const impedance_table *table)
+static void impedance_draw(FILE *script, const void *data)
 {
-  FILE *script =
-      bench_picture_begin(b, "impedance", 3 * PANEL_WIDTH, PORT_BODIES * PANEL_HEIGHT + 40);
-  if (script != NULL) {
-    fprintf(script,
-            "set multiplot layout %d,3 title 'Dynamic stiffness at the port: felt and true'\n"
-            "set logscale x\nset xrange [0.4:250]\nset xlabel 'frequency [Hz]'\n"
-            "set key bottom right font ',8'\n",
-            (int)PORT_BODIES);
-    for (int body = 0; body < PORT_BODIES; ++body) {
-      draw_case(script, table, body);
-    }
-    fprintf(script, "unset multiplot\n");
+  const impedance_table *table = data;
+  fprintf(script,
+          "set multiplot layout %d,3 title 'Dynamic stiffness at the port: felt and true'\n"
+          "set logscale x\nset xrange [0.4:250]\nset xlabel 'frequency [Hz]'\n"
+          "set key bottom right font ',8'\n",
+          (int)PORT_BODIES);
+  for (int body = 0; body < PORT_BODIES; ++body) {
+    draw_case(script, table, body);
   }
-  return bench_picture_end(b, "impedance", script);
+  fprintf(script, "unset multiplot\n");
 }
 
 /* Z-width: the stiffest wall that a device holds without a hand, for each damper of the wall. A
@@ -309,7 +306,7 @@ static const zwidth_device devices[] = {
     {"parallel", "parallel device: 0.25 kg, 2.5 N s/m", 0.25, 2.5, 0.0},
     {"strings", "strings: 0.05 kg, 0.5 N s/m, 1 ms late", 0.05, 0.5, 0.001},
 };
-#define DEVICES (sizeof devices / sizeof devices[0])
+#define DEVICES BENCH_COUNT(devices)
 
 /* Dampers of the walls in units of mass over tick: at 2 the damper alone is unstable. */
 static const double walls[WALLS_MAX] = {0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5};
@@ -335,7 +332,8 @@ typedef struct matrix {
   double v[STATES][STATES];
 } matrix;
 
-/* Mass and damper under a held force, place and velocity after a time: x += p v + q f, v = r v + s f. */
+/* Mass and damper under a held force, place and velocity after a time: x += p v + q f, v = r v +
+ * s f. */
 typedef struct motion {
   double p, q, r, s;
 } motion;
@@ -348,8 +346,9 @@ static motion motion_of(const zwidth_device *d, double seconds)
                   decay / d->damping};
 }
 
-/* One tick. States: place, velocity, the forces of the last ticks, newest first. The force of a tick
- * is -K x - B v of its start, and acts after the delay: after whole ticks and a part of one. */
+/* One tick. States: place, velocity, the forces of the last ticks, newest first. The force of a
+ * tick is -K x - B v of its start, and acts after the delay: after whole ticks and a part of
+ * one. */
 static matrix loop_of(const zwidth_device *d, double k, double b)
 {
   matrix m = {{{0.0}}};
@@ -380,7 +379,7 @@ static matrix loop_of(const zwidth_device *d, double k, double b)
   return m;
 }
 
-static double square(matrix *m)
+static double matrix_square(matrix *m)
 {
   matrix out;
   double norm = 0.0;
@@ -409,7 +408,7 @@ static bool loop_is_stable(const zwidth_device *d, double k, double b)
   matrix m = loop_of(d, k, b);
   double log_norm = 0.0;
   for (int i = 0; i < 40; ++i) {
-    log_norm = 2.0 * log_norm + log(square(&m));
+    log_norm = 2.0 * log_norm + log(matrix_square(&m));
   }
   return log_norm < 0.0;
 }
@@ -517,42 +516,33 @@ static double linear_limit(const zwidth_device *d, double b)
   return low;
 }
 
-static hap_status find_direct(bench *b, const zwidth_device *d, double damping, double *out)
+/* The stiffest that is stable, by halving between least and the most; 0: none. */
+static hap_status stiffest_find(bench *b, trial *t, double least, double step, double *out)
 {
-  trial t = {.device = d, .k = STIFFNESS_LEAST, .b = damping};
-  double low = STIFFNESS_LEAST;
+  double low = least;
   double high = STIFFNESS_MOST;
-  t.coupling = HAP_COUPLING_DIRECT;
-  hap_status status = run_trial(b, &t);
-  bool any = t.stable;
-  while (any && status >= HAP_OK && high > low * STIFFNESS_STEP) {
-    t.k = sqrt(low * high);
-    status = run_trial(b, &t);
-    *(t.stable ? &low : &high) = t.k;
+  hap_status status = HAP_OK;
+  *out = 0.0;
+  for (double k = low; status >= HAP_OK && high > low * step; k = sqrt(low * high)) {
+    *(t->given ? &t->coupling_stiffness : &t->k) = k;
+    status = run_trial(b, t);
+    *(t->stable ? &low : &high) = k;
+    *out = t->stable ? felt_stiffness(t) : *out;
   }
-  *out = any ? low : 0.0;
   return status;
 }
 
 hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out)
 {
-  trial t = {.device = &devices[0], .k = STIFFNESS_MOST, .coupling = coupling};
-  double low = 10.0 * STIFFNESS_LEAST;
-  double high = STIFFNESS_MOST;
-  hap_status status = HAP_OK;
-  t.given = coupling != HAP_COUPLING_DIRECT;
-  *out = 0.0;
-  for (double middle = low; status >= HAP_OK && high > low * COUPLING_STEP;
-       middle = sqrt(low * high)) {
-    *(t.given ? &t.coupling_stiffness : &t.k) = middle;
-    status = run_trial(b, &t);
-    *(t.stable ? &low : &high) = middle;
-    *out = t.stable ? felt_stiffness(&t) : *out;
-  }
-  return status;
+  trial t = {.device = &devices[0],
+             .k = STIFFNESS_MOST,
+             .coupling = coupling,
+             .given = coupling != HAP_COUPLING_DIRECT};
+  return stiffest_find(b, &t, 10.0 * STIFFNESS_LEAST, COUPLING_STEP, out);
 }
 
-/* Behind a proxy every wall is to be stable: tried from soft to stiff, up to the first that is not. */
+/* Behind a proxy every wall is to be stable: tried from soft to stiff, up to the first that is
+ * not. */
 static hap_status find_proxy(bench *b, const zwidth_device *d, double coupling, zwidth_row *row)
 {
   static const double tried[] = {30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, STIFFNESS_MOST};
@@ -560,7 +550,7 @@ static hap_status find_proxy(bench *b, const zwidth_device *d, double coupling, 
   hap_status status = HAP_OK;
   t.coupling = HAP_COUPLING_PROXY;
   row->proxy = row->felt = 0.0;
-  for (size_t i = 0; i < sizeof tried / sizeof tried[0] && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(tried) && status >= HAP_OK; ++i) {
     t.k = tried[i];
     status = run_trial(b, &t);
     if (!t.stable) {
@@ -604,7 +594,8 @@ static hap_status measure_device(bench *b, size_t device, zwidth_table *table)
     row->damping = walls[wall] * d->mass / PORT_TICK_S;
     row->linear = linear_limit(d, row->damping);
     row->passive = fmax(0.0, (d->damping - row->damping) / late);
-    status = find_direct(b, d, row->damping, &row->direct);
+    trial t = {.device = d, .b = row->damping, .coupling = HAP_COUPLING_DIRECT};
+    status = stiffest_find(b, &t, STIFFNESS_LEAST, STIFFNESS_STEP, &row->direct);
     if (status >= HAP_OK) {
       status = find_proxy(b, d, table->coupling[device], row);
     }
@@ -628,7 +619,7 @@ static hap_status zwidth_write_table(bench *b, const zwidth_table *table)
               r->linear, r->passive, table->coupling[d], r->proxy, r->felt);
     }
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 static void report_row(bench *b, size_t device, const zwidth_row *r)
@@ -673,22 +664,19 @@ static void draw_device(FILE *script, const zwidth_table *table, size_t device)
       d->damping, 0.5 * PORT_TICK_S + d->delay);
 }
 
-static hap_status draw(bench *b, const zwidth_table *table)
+static void zwidth_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "zwidth", 1000, 760);
-  if (script != NULL) {
-    fprintf(
-        script,
-        "set multiplot layout 2,2 title 'Z-width: the stiffest wall that each device holds, "
-        "alone'\nset xlabel 'damping of device and wall b + B [N s/m]'\nset ylabel 'stiffness "
-        "[N/m]'\n"
-        "set logscale xy\nset yrange [1:1e6]\nset samples 1000\nset key bottom right font ',8'\n");
-    for (size_t d = 0; d < DEVICES; ++d) {
-      draw_device(script, table, d);
-    }
-    fprintf(script, "unset multiplot\n");
+  const zwidth_table *table = data;
+  fprintf(
+      script,
+      "set multiplot layout 2,2 title 'Z-width: the stiffest wall that each device holds, "
+      "alone'\nset xlabel 'damping of device and wall b + B [N s/m]'\nset ylabel 'stiffness "
+      "[N/m]'\n"
+      "set logscale xy\nset yrange [1:1e6]\nset samples 1000\nset key bottom right font ',8'\n");
+  for (size_t d = 0; d < DEVICES; ++d) {
+    draw_device(script, table, d);
   }
-  return bench_picture_end(b, "zwidth", script);
+  fprintf(script, "unset multiplot\n");
 }
 
 static hap_status zwidth_run(bench *b)
@@ -706,14 +694,15 @@ static hap_status zwidth_run(bench *b)
     }
   }
   hap_status status = zwidth_write_table(b, &table);
-  return status >= HAP_OK ? draw(b, &table) : status;
+  return status >= HAP_OK ? bench_draw(b, "zwidth", 1000, 760, zwidth_draw, &table) : status;
 }
 
-/* A rigid hand moves the device by a sine, about a place at which the contact stays closed. Force and
- * motion are taken at the ticks, as the device reads and is given them, over whole periods after all
- * else has died away. Truth is the closed form in continuous time; what ticks make of it is a second
- * closed form, to which model contact is held closely. That a device holds a force until the next tick is no part of it: the hand feels
- * everything another half tick later. */
+/* A rigid hand moves the device by a sine, about a place at which the contact stays closed.
+ * Force and motion are taken at the ticks, as the device reads and is given them, over whole
+ * periods after all else has died away. Truth is the closed form in continuous time; what ticks
+ * make of it is a second closed form, to which model contact is held closely. That a device
+ * holds a force until the next tick is no part of it: the hand feels everything another half
+ * tick later. */
 
 #define HZ_LEAST 0.5
 #define HZ_MOST 200.0
@@ -744,51 +733,35 @@ impedance_variant impedance_variants[IMPEDANCE_VARIANTS] = {
 
 /* ---- one frequency ---- */
 
-typedef struct sums {
-  size_t ticks;
-  double periods;
-  double complex force;
-  double complex motion;
-  double force_mean;
-  double force_square;
-  size_t touching;
-} sums;
-
 /* Whole periods in whole ticks, near the wanted frequency. */
-static double choose_window(double hz, sums *s)
+static double choose_window(double hz, impedance_sums *s)
 {
   s->periods = fmax(PERIODS_LEAST, ceil(WINDOW_S * hz));
   s->ticks = (size_t)lround(s->periods / hz * PORT_HAPTIC_HZ);
   return s->periods / (double)s->ticks * PORT_HAPTIC_HZ;
 }
 
-static hap_status settle(bench *b, port *p)
+hap_status impedance_listen(bench *b, port *p, int settle_ticks, impedance_sums *io)
 {
   hap_status status = HAP_OK;
-  for (int i = 0; i < SETTLE_TICKS && status >= HAP_OK; ++i) {
+  for (int i = 0; i < settle_ticks && status >= HAP_OK; ++i) {
     status = port_advance(b, p);
   }
-  return status;
-}
-
-static hap_status listen(bench *b, port *p, sums *s)
-{
-  hap_status status = HAP_OK;
-  for (size_t i = 0; i < s->ticks && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < io->ticks && status >= HAP_OK; ++i) {
     status = port_advance(b, p);
-    double turns = fmod(s->periods * (double)i, (double)s->ticks) / (double)s->ticks;
+    double turns = fmod(io->periods * (double)i, (double)io->ticks) / (double)io->ticks;
     double complex wave = cexp(-2.0 * M_PI * I * turns);
     double force = -p->state.wrench.force[2];
-    s->force += force * wave;
-    s->motion += p->state.device.position[2] * wave;
-    s->force_mean += force;
-    s->force_square += force * force;
-    s->touching += p->state.contacts > 0;
+    io->force += force * wave;
+    io->motion += p->state.device.position[2] * wave;
+    io->force_mean += force;
+    io->force_square += force * force;
+    io->touching += p->state.contacts > 0;
   }
   return status;
 }
 
-static void conclude(const sums *s, impedance_point *out)
+static void point_conclude(const impedance_sums *s, impedance_point *out)
 {
   double count = (double)s->ticks;
   double mean = s->force_mean / count;
@@ -804,7 +777,7 @@ static hap_status measure_point(bench *b, const port_def *common, double hz,
 {
   port p;
   port_def def = *common;
-  sums s = {0};
+  impedance_sums s = {0};
   char device[256];
   double preload = impedance_cases[def.body].preload;
   double depth = preload / IMPEDANCE_STIFFNESS;
@@ -821,12 +794,9 @@ static hap_status measure_point(bench *b, const port_def *common, double hz,
   if (status < HAP_OK) {
     return status;
   }
-  status = settle(b, &p);
+  status = impedance_listen(b, &p, SETTLE_TICKS, &s);
   if (status >= HAP_OK) {
-    status = listen(b, &p, &s);
-  }
-  if (status >= HAP_OK) {
-    conclude(&s, out);
+    point_conclude(&s, out);
     out->truth = impedance_of(truth, out->hz);
     out->sampled = impedance_sampled(truth, out->hz);
   }
@@ -878,20 +848,6 @@ static hap_status measure_curve(bench *b, port_body body, size_t variant, impeda
   return HAP_OK;
 }
 
-static hap_status measure(bench *b, impedance_table *table)
-{
-  table->points = b->quick ? POINTS_QUICK : IMPEDANCE_POINTS_MAX;
-  for (int body = 0; body < PORT_BODIES; ++body) {
-    for (size_t v = 0; v < IMPEDANCE_VARIANTS; ++v) {
-      hap_status status = measure_curve(b, (port_body)body, v, table);
-      if (status < HAP_OK) {
-        return status;
-      }
-    }
-  }
-  return HAP_OK;
-}
-
 static double error_of(const impedance_point *p)
 {
   return cabs(p->felt / p->truth - 1.0);
@@ -907,34 +863,30 @@ static double phase_error(const impedance_point *p)
   return 180.0 / M_PI * carg(p->felt / p->truth);
 }
 
-static void write_point(FILE *csv, int body, size_t variant, const impedance_point *p)
-{
-  double w = 2.0 * M_PI * p->hz;
-  const impedance_variant *v = &impedance_variants[variant];
-  fprintf(csv, "%s,%s,%s,%.6g,%.6g", impedance_cases[body].name, hap_model_name(v->model),
-          hap_coupling_name(v->coupling), p->hz, p->amplitude);
-  fprintf(csv, ",%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", creal(p->felt), cimag(p->felt) / w,
-          -creal(p->felt) / (w * w), creal(p->truth), cimag(p->truth) / w,
-          -creal(p->truth) / (w * w));
-  fprintf(csv, ",%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g\n", cabs(p->felt), cabs(p->truth), error_of(p),
-          phase_error(p), p->residual, p->contact_share, sampled_error(p));
-}
-
-static hap_status write_table(bench *b, const impedance_table *table)
+static hap_status table_write(bench *b, const impedance_table *table)
 {
   FILE *csv = bench_csv_open(
       b, "impedance",
       "case,model,coupling,hz,amplitude_m,stiffness_felt,damping_felt,mass_felt,stiffness_true,"
       "damping_true,mass_true,magnitude_felt,magnitude_true,error,phase_error_deg,residual,"
       "contact_share,error_sampled");
-  for (int body = 0; body < PORT_BODIES && csv != NULL; ++body) {
-    for (size_t v = 0; v < IMPEDANCE_VARIANTS; ++v) {
-      for (size_t i = 0; i < table->points; ++i) {
-        write_point(csv, body, v, &table->curves[body][v].points[i]);
-      }
-    }
+  for (size_t row = 0; row < PORT_BODIES * IMPEDANCE_VARIANTS * table->points && csv != NULL;
+       ++row) {
+    size_t curve = row / table->points;
+    size_t body = curve / IMPEDANCE_VARIANTS;
+    const impedance_variant *v = &impedance_variants[curve % IMPEDANCE_VARIANTS];
+    const impedance_point *p =
+        &table->curves[body][curve % IMPEDANCE_VARIANTS].points[row % table->points];
+    double w = 2.0 * M_PI * p->hz;
+    fprintf(csv, "%s,%s,%s,%.6g,%.6g", impedance_cases[body].name, hap_model_name(v->model),
+            hap_coupling_name(v->coupling), p->hz, p->amplitude);
+    fprintf(csv, ",%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", creal(p->felt), cimag(p->felt) / w,
+            -creal(p->felt) / (w * w), creal(p->truth), cimag(p->truth) / w,
+            -creal(p->truth) / (w * w));
+    fprintf(csv, ",%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g\n", cabs(p->felt), cabs(p->truth),
+            error_of(p), phase_error(p), p->residual, p->contact_share, sampled_error(p));
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
 /* ---- what is said ---- */
@@ -965,11 +917,6 @@ static worst find_worst(const impedance_curve *c, size_t points, double hz_most)
   return w;
 }
 
-static double percent(double value, double wanted)
-{
-  return 100.0 * (value / wanted - 1.0);
-}
-
 /* What a hand takes the body for. */
 static void report_fit(bench *b, const char *name, const impedance_curve *c, bool bound)
 {
@@ -987,10 +934,11 @@ static void report_fit(bench *b, const char *name, const impedance_curve *c, boo
   char mass[64] = "";
   char text[160];
   if (moves) {
-    snprintf(mass, sizeof mass, "%.5f kg (%+.3f %%), ", f->mass, percent(f->mass, t->mass));
+    snprintf(mass, sizeof mass, "%.5f kg (%+.3f %%), ", f->mass, bench_percent(f->mass, t->mass));
   }
   snprintf(text, sizeof text, "%s%.2f N/m (%+.3f %%), %.4f N s/m (%+.3f %%)", mass, f->stiffness,
-           percent(f->stiffness, t->stiffness), f->damping, percent(f->damping, t->damping));
+           bench_percent(f->stiffness, t->stiffness), f->damping,
+           bench_percent(f->damping, t->damping));
   if (bound) {
     bench_check(b, good, "%s: felt up to 50 Hz: %s (bound %g %%)", name, text, 100.0 * most);
   } else {
@@ -1025,17 +973,20 @@ static void report_curve(bench *b, int body, size_t variant, const impedance_tab
 
 static hap_status run_impedance(bench *b, impedance_table *table)
 {
-  hap_status status = measure(b, table);
-  if (status < HAP_OK) {
-    return status;
-  }
+  hap_status status = HAP_OK;
+  table->points = b->quick ? POINTS_QUICK : IMPEDANCE_POINTS_MAX;
   for (int body = 0; body < PORT_BODIES; ++body) {
-    for (size_t v = 0; v < IMPEDANCE_VARIANTS; ++v) {
-      report_curve(b, body, v, table);
+    for (size_t v = 0; v < IMPEDANCE_VARIANTS && status >= HAP_OK; ++v) {
+      status = measure_curve(b, (port_body)body, v, table);
+      if (status >= HAP_OK) {
+        report_curve(b, body, v, table);
+      }
     }
   }
-  status = write_table(b, table);
-  return status >= HAP_OK ? impedance_draw(b, table) : status;
+  status = status >= HAP_OK ? table_write(b, table) : status;
+  return status >= HAP_OK ? bench_draw(b, "impedance", 3 * PANEL_WIDTH,
+                                       PORT_BODIES * PANEL_HEIGHT + 40, impedance_draw, table)
+                          : status;
 }
 
 static void choose_coupling(const char *name)

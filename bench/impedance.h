@@ -69,8 +69,22 @@ extern const impedance_case impedance_cases[PORT_BODIES];
 #define IMPEDANCE_STIFFNESS 1000.0 /* N/m, of the contact */
 #define IMPEDANCE_DAMPING 2.0      /* N s/m */
 
-/* N/m, the stiffest that a desktop stylus without a hand feels and holds: direct of a wall, else of a
- * coupling's spring before a wall that does not give (1 MN/m). */
+/* Of a sine that the hand makes, at its frequency. */
+typedef struct impedance_sums {
+  size_t ticks; /* and periods: of the window, whole ones */
+  double periods;
+  double complex force; /* on the world; motion of the device */
+  double complex motion;
+  double force_mean;
+  double force_square;
+  size_t touching;
+} impedance_sums;
+
+/* Adds up a window after so many ticks that do not count. */
+hap_status impedance_listen(bench *b, port *p, int settle_ticks, impedance_sums *io);
+
+/* N/m, the stiffest that a desktop stylus without a hand feels and holds: direct of a wall, else
+ * of a coupling's spring before a wall that does not give (1 MN/m). */
 hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out);
 
 #endif

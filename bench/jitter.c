@@ -1,10 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* How late the haptic thread wakes up, and what it then costs: scene row10 in threads with its simulated
- * hand, by turns with cyclictest at the same period, priority and duration, which shows what this
- * machine gives to any program. What the kernel counts of the thread's ticks: faults of pages and
- * context switches. */
+/* How late the haptic thread wakes up, and what it then costs: scene row10 in threads with its
+ * simulated hand, by turns with cyclictest at the same period, priority and duration, which
+ * shows what this machine gives to any program. What the kernel counts of the thread's ticks:
+ * faults of pages and context switches. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,21 +40,7 @@ static void wait_for(double seconds)
 
 /* ---- the library ---- */
 
-static void take_figures(const hap_stats *stats, turn *out)
-{
-  out->ticks = stats->loop.ticks;
-  out->missed = stats->loop.missed_ticks;
-  out->realtime = stats->loop.realtime != 0;
-  out->wake_us[0] = stats->loop.wake_us_p50;
-  out->wake_us[1] = stats->loop.wake_us_p99;
-  out->wake_us[2] = stats->loop.wake_us_p999;
-  out->wake_us[3] = stats->loop.wake_us_max;
-  out->tick_us[0] = stats->loop.tick_us_p50;
-  out->tick_us[1] = stats->loop.tick_us_p99;
-  out->tick_us[2] = stats->loop.tick_us_max;
-}
-
-static hap_status watch(bench *b, hap_session *session, double seconds, turn *out)
+static hap_status session_watch(bench *b, hap_session *session, double seconds, turn *out)
 {
   hap_stats stats;
   thread_counts before;
@@ -68,7 +54,14 @@ static hap_status watch(bench *b, hap_session *session, double seconds, turn *ou
   if (status < HAP_OK || stats.faults.count != 0) {
     return bench_fail(b, HAP_ERROR_STATE, "jitter: the session has a fault");
   }
-  take_figures(&stats, out);
+  *out = (turn){
+      .ticks = stats.loop.ticks,
+      .missed = stats.loop.missed_ticks,
+      .wake_us = {stats.loop.wake_us_p50, stats.loop.wake_us_p99, stats.loop.wake_us_p999,
+                  stats.loop.wake_us_max},
+      .tick_us = {stats.loop.tick_us_p50, stats.loop.tick_us_p99, stats.loop.tick_us_max},
+      .realtime = stats.loop.realtime != 0,
+  };
   if (counted) {
     out->counts = thread_counts_since(&after, &before);
   }
@@ -89,7 +82,7 @@ static hap_status run_session(bench *b, double hz, double seconds, turn *out)
   }
   status = hap_session_start(r.session);
   if (status >= HAP_OK) {
-    status = watch(b, r.session, seconds, out);
+    status = session_watch(b, r.session, seconds, out);
   }
   rig_destroy(&r);
   return status;
@@ -97,7 +90,7 @@ static hap_status run_session(bench *b, double hz, double seconds, turn *out)
 
 /* ---- cyclictest ---- */
 
-static double quantile(const uint64_t *counts, uint64_t total, double share)
+static double counts_quantile(const uint64_t *counts, uint64_t total, double share)
 {
   uint64_t below = 0;
   for (int us = 0; us < LATE_US_MAX; ++us) {
@@ -109,7 +102,8 @@ static double quantile(const uint64_t *counts, uint64_t total, double share)
   return LATE_US_MAX;
 }
 
-/* Lines "microseconds count", and comments, of which "Max Latencies" and "Histogram Overflows" count. */
+/* Lines "microseconds count", and comments, of which "Max Latencies" and "Histogram Overflows"
+ * count. */
 static bool read_histogram(FILE *from, double period_us, turn *out)
 {
   static uint64_t counts[LATE_US_MAX];
@@ -133,7 +127,7 @@ static bool read_histogram(FILE *from, double period_us, turn *out)
   out->missed += beyond;
   static const double shares[] = {0.5, 0.99, 0.999};
   for (int i = 0; i < 3; ++i) {
-    out->wake_us[i] = quantile(counts, out->ticks, shares[i]);
+    out->wake_us[i] = counts_quantile(counts, out->ticks, shares[i]);
   }
   return out->ticks > 0;
 }
@@ -154,7 +148,7 @@ static bool run_cyclictest(double hz, double seconds, bool realtime, turn *out)
 
 /* ---- both ---- */
 
-static void write_row(FILE *csv, double hz, int number, const char *source, const turn *t)
+static void turn_write(FILE *csv, double hz, int number, const char *source, const turn *t)
 {
   fprintf(csv, "%.0f,%s", hz, t->realtime ? "fifo" : "other");
   for (int i = 0; i < 4; ++i) {
@@ -195,7 +189,7 @@ static turn sum_up(const turn *turns)
   return sum;
 }
 
-static void report(bench *b, double hz, double seconds, const turn *own, const turn *other)
+static void rate_report(bench *b, double hz, double seconds, const turn *own, const turn *other)
 {
   bench_say(
       "%.0f Hz: woken up %.0f / %.0f / %.0f us late (p50, p99, p99.9), at most %.0f; %llu of %llu "
@@ -224,6 +218,8 @@ static void report(bench *b, double hz, double seconds, const turn *own, const t
               hz, 100.0 * excess);
 }
 
+#define RATES 3
+
 typedef struct rate {
   double hz;
   turn own;
@@ -241,17 +237,17 @@ static hap_status run_rate(bench *b, FILE *csv, double seconds, rate *out)
     if (status < HAP_OK) {
       return status;
     }
-    write_row(csv, out->hz, i, "hapode", &own[i]);
+    turn_write(csv, out->hz, i, "hapode", &own[i]);
     out->compared = out->compared && run_cyclictest(out->hz, seconds, own[i].realtime, &other[i]);
     if (out->compared) {
-      write_row(csv, out->hz, i, "cyclictest", &other[i]);
+      turn_write(csv, out->hz, i, "cyclictest", &other[i]);
     }
   }
   out->own = sum_up(own);
   if (out->compared) {
     out->other = sum_up(other);
   }
-  report(b, out->hz, seconds, &out->own, out->compared ? &out->other : NULL);
+  rate_report(b, out->hz, seconds, &out->own, out->compared ? &out->other : NULL);
   return HAP_OK;
 }
 
@@ -264,43 +260,38 @@ static void draw_line(FILE *script, const char *name, size_t number, const turn 
   fprintf(script, "EOD\n");
 }
 
-static hap_status draw(bench *b, const rate *rates, size_t count)
+static void jitter_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "jitter", 800, 500);
-  if (script != NULL) {
-    for (size_t i = 0; i < count; ++i) {
-      draw_line(script, "own", i, &rates[i].own);
-      draw_line(script, "other", i, rates[i].compared ? &rates[i].other : &rates[i].own);
-    }
-    fprintf(script,
-            "set title 'Woken up late: the haptic thread and cyclictest'\n"
-            "set xtics ('median' 0, '99 in 100' 1, '999 in 1000' 2, 'largest' 3)\nset xrange "
-            "[-0.2:3.2]\n"
-            "set ylabel 'us'\nset logscale y\nset grid y\nset key top left\nplot ");
-    for (size_t i = 0; i < count; ++i) {
-      fprintf(script, "$own%zu with linespoints lw 2 title 'hapode, %.0f Hz'%s", i, rates[i].hz,
-              rates[i].compared || i + 1 < count ? ", " : "");
-      if (rates[i].compared) {
-        fprintf(script, "$other%zu with linespoints dt 2 title 'cyclictest, %.0f Hz'%s", i,
-                rates[i].hz, i + 1 < count ? ", " : "");
-      }
-    }
-    fprintf(script, "\n");
+  const rate *rates = data;
+  for (size_t i = 0; i < RATES; ++i) {
+    draw_line(script, "own", i, &rates[i].own);
+    draw_line(script, "other", i, rates[i].compared ? &rates[i].other : &rates[i].own);
   }
-  return bench_picture_end(b, "jitter", script);
+  fprintf(script,
+          "set title 'Woken up late: the haptic thread and cyclictest'\n"
+          "set xtics ('median' 0, '99 in 100' 1, '999 in 1000' 2, 'largest' 3)\nset xrange "
+          "[-0.2:3.2]\n"
+          "set ylabel 'us'\nset logscale y\nset grid y\nset key top left\nplot ");
+  for (size_t i = 0; i < RATES; ++i) {
+    fprintf(script, "$own%zu with linespoints lw 2 title 'hapode, %.0f Hz'%s", i, rates[i].hz,
+            rates[i].compared || i + 1 < RATES ? ", " : "");
+    if (rates[i].compared) {
+      fprintf(script, "$other%zu with linespoints dt 2 title 'cyclictest, %.0f Hz'%s", i,
+              rates[i].hz, i + 1 < RATES ? ", " : "");
+    }
+  }
+  fprintf(script, "\n");
 }
 
 hap_status bench_jitter(bench *b)
 {
-  rate rates[] = {{.hz = 1000.0}, {.hz = 4000.0}, {.hz = 10000.0}};
-  const size_t count = sizeof rates / sizeof rates[0];
+  rate rates[RATES] = {{.hz = 1000.0}, {.hz = 4000.0}, {.hz = 10000.0}};
   const double seconds = b->quick ? 1.0 : 15.0;
   FILE *csv = bench_csv_open(b, "jitter", columns);
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
-  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < RATES && status >= HAP_OK; ++i) {
     status = run_rate(b, csv, seconds, &rates[i]);
   }
-  hap_status closed = bench_csv_close(b, csv);
-  status = status >= HAP_OK ? closed : status;
-  return status >= HAP_OK ? draw(b, rates, count) : status;
+  status = bench_csv_close(b, csv, status);
+  return status >= HAP_OK ? bench_draw(b, "jitter", 800, 500, jitter_draw, rates) : status;
 }

@@ -203,15 +203,6 @@ static double turn_of(const joint_gauge_joint *joint, const hap_pose *a, const h
   return fabs(angle_between(axes[0], axes[1]) - joint->angle);
 }
 
-static void raise(const joint_gauge_joint *joint, const hap_pose *poses, joint_opening *worst)
-{
-  const int *at = joint->bodies;
-  const hap_pose *a = at[0] < 0 ? &world_pose : &poses[at[0]];
-  const hap_pose *b = at[1] < 0 ? &world_pose : &poses[at[1]];
-  worst->way = fmax(worst->way, way_of(joint, a, b));
-  worst->turn = fmax(worst->turn, turn_of(joint, a, b));
-}
-
 void joint_gauge_read(const joint_gauge *gauge, const hap_pose *poses, const bool *set,
                       joint_opening *in, joint_opening *out)
 {
@@ -221,7 +212,10 @@ void joint_gauge_read(const joint_gauge *gauge, const hap_pose *poses, const boo
     bool has_b = set == NULL || at[1] < 0 || set[at[1]];
     joint_opening *worst = has_a && has_b ? in : out;
     if (worst != NULL) {
-      raise(&gauge->joints[i], poses, worst);
+      const hap_pose *a = at[0] < 0 ? &world_pose : &poses[at[0]];
+      const hap_pose *b = at[1] < 0 ? &world_pose : &poses[at[1]];
+      worst->way = fmax(worst->way, way_of(&gauge->joints[i], a, b));
+      worst->turn = fmax(worst->turn, turn_of(&gauge->joints[i], a, b));
     }
   }
 }

@@ -3,8 +3,8 @@
 #ifndef HAPODE_BENCH_JOINT_GAUGE_H
 #define HAPODE_BENCH_JOINT_GAUGE_H
 
-/* How far joints are open, from nothing but ODE's getters and poses of the bodies, wherever these come from:
- * the world's, or the loop's. For the bench and the tests. */
+/* How far joints are open, from nothing but ODE's getters and poses of the bodies, wherever
+ * these come from: the world's, or the loop's. For the bench and the tests. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -37,15 +37,16 @@ typedef struct joint_opening {
   double turn; /* rad, of the axes, or of the bodies, from where they are to be to each other */
 } joint_opening;
 
-/* Ball, hinge, slider, universal, hinge-2, piston and fixed joints of the bodies. What ODE has no getter for
- * (axis of a hinge in the second body, how a slider or fixed joint has its bodies) is what the poses are now.
- * HAP_ERROR_UNSUPPORTED (another kind, a body that is not in the list), HAP_ERROR_MEMORY (too many joints). */
+/* Ball, hinge, slider, universal, hinge-2, piston and fixed joints of the bodies. What ODE has
+ * no getter for (axis of a hinge in the second body, how a slider or fixed joint has its bodies)
+ * is what the poses are now. HAP_ERROR_UNSUPPORTED (another kind, a body that is not in the
+ * list), HAP_ERROR_MEMORY (too many joints). */
 hap_status joint_gauge_init(joint_gauge *gauge, const dBodyID *bodies, size_t count,
                             hap_detail *detail);
 
-/* In the order of the list. Raises in to the widest joint between bodies of a set (NULL: all of them), out, which
- * may be NULL, to that of the other joints. The poses of bodies that are not in the set are not read where out
- * is NULL. */
+/* In the order of the list. Raises in to the widest joint between bodies of a set (NULL: all of
+ * them), out, which may be NULL, to that of the other joints. The poses of bodies that are not
+ * in the set are not read where out is NULL. */
 void joint_gauge_read(const joint_gauge *gauge, const hap_pose *poses, const bool *set,
                       joint_opening *in, joint_opening *out);
 

@@ -20,8 +20,9 @@
 #include "device/device.h"
 #include "plugins/spidar/spidar.h"
 
-/* A loop of 1 kHz that asks something at each tick and wants the answer by the next one; and the least that
- * can be asked: a few bytes through a pseudo-terminal to a process that gives some back. */
+/* A loop of 1 kHz that asks something at each tick and wants the answer by the next one; and the
+ * least that can be asked: a few bytes through a pseudo-terminal to a process that gives some
+ * back. */
 
 #define LINE_HZ 1000.0
 #define LINE_PRIORITY 70      /* of the loop, SCHED_FIFO */
@@ -102,7 +103,8 @@ static void *run_loop(void *argument)
   return NULL;
 }
 
-/* So many ticks, after some that do not count, in a thread of its own; the figures are added to *io. */
+/* So many ticks, after some that do not count, in a thread of its own; the figures are added to
+ * *io. */
 static hap_status line_loop_run(line_tick tick, void *self, uint64_t ticks, line_figures *io)
 {
   job j = {tick, self, ticks, io};
@@ -118,7 +120,7 @@ static hap_status line_loop_run(line_tick tick, void *self, uint64_t ticks, line
 /* ---- the floor ---- */
 
 /* In a process of its own, as an emulator is; it ends when the other end is closed. */
-static void echo(int master, const line_floor_def *def)
+static void echo_bytes(int master, const line_floor_def *def)
 {
   const struct sched_param parameters = {.sched_priority = LINE_ECHO_PRIORITY};
   const uint8_t reply[BYTES_MAX] = {0};
@@ -162,7 +164,7 @@ static hap_status line_floor_start(bench *b, const line_floor_def *def, line_flo
   out->echo = out->port >= 0 ? fork() : -1;
   if (out->echo == 0) {
     close(out->port);
-    echo(master, def);
+    echo_bytes(master, def);
     _exit(0);
   }
   if (master >= 0) {
@@ -195,9 +197,10 @@ static line_answer line_floor_tick(void *self)
   return count >= f->def.reply ? LINE_ANSWERED : LINE_LATE;
 }
 
-/* A SPIDAR at 1 kHz through the emulator, both in real time: how many ticks found no new answer of all boards,
- * and what read and write cost. Positions come over a pseudo-terminal, so what is measured is the code and the
- * scheduler, not a USB adapter; and in turns with it, how many are late where there is nothing but the scheduler. */
+/* A SPIDAR at 1 kHz through the emulator, both in real time: how many ticks found no new answer
+ * of all boards, and what read and write cost. Positions come over a pseudo-terminal, so what is
+ * measured is the code and the scheduler, not a USB adapter; and in turns with it, how many are
+ * late where there is nothing but the scheduler. */
 
 #define LATE_MOST 0.005 /* share of the ticks */
 #define PULLED_MS_MOST 5.0
@@ -219,19 +222,14 @@ typedef struct setup {
 
 /* ---- the emulator ---- */
 
-static void path_of_emulator(char *out, size_t size)
-{
-  ssize_t length = readlink("/proc/self/exe", out, size - 1);
-  out[length > 0 ? length : 0] = '\0';
-  char *name = strrchr(out, '/');
-  size_t used = name != NULL ? (size_t)(name - out) : 0;
-  (void)snprintf(out + used, size - used, "/spidar-emulator");
-}
-
 static void run_emulator(const setup *s, int in, int out)
 {
   char path[4096];
-  path_of_emulator(path, sizeof path);
+  ssize_t length = readlink("/proc/self/exe", path, sizeof path - 1);
+  path[length > 0 ? length : 0] = '\0';
+  char *name = strrchr(path, '/');
+  size_t used = name != NULL ? (size_t)(name - path) : 0;
+  (void)snprintf(path + used, sizeof path - used, "/spidar-emulator");
   dup2(in, STDIN_FILENO);
   dup2(out, STDOUT_FILENO);
   execl(path, path, "--model", s->model, "--hand", "hold", "--fifo", "60", (char *)NULL);
@@ -281,7 +279,7 @@ typedef struct subject {
   hapi_spidar_device *self;
 } subject;
 
-static line_answer tick(void *self)
+static line_answer device_tick(void *self)
 {
   const subject *s = self;
   const hap_wrench wanted = {{0.2, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -299,13 +297,13 @@ static line_answer tick(void *self)
 }
 
 /* In turns, so that what the machine does to one it does to the other. */
-static hap_status alternate(const bench *b, subject *s, line_floor *lowest, line_figures out[2])
+static hap_status measure_turns(const bench *b, subject *s, line_floor *lowest, line_figures out[2])
 {
   int segments = b->quick ? SEGMENTS_QUICK : SEGMENTS;
   uint64_t ticks = b->quick ? SEGMENT_TICKS_QUICK : SEGMENT_TICKS;
   hap_status status = HAP_OK;
   for (int i = 0; i < segments && status >= HAP_OK; ++i) {
-    status = line_loop_run(tick, s, ticks, &out[0]);
+    status = line_loop_run(device_tick, s, ticks, &out[0]);
     s->ops->zero(s->self);
     if (status >= HAP_OK) {
       status = line_loop_run(line_floor_tick, lowest, ticks, &out[1]);
@@ -314,7 +312,8 @@ static hap_status alternate(const bench *b, subject *s, line_floor *lowest, line
   return status;
 }
 
-/* ms, from when the emulator is told to pull the cable out until a tick fails and says so; < 0: none does. */
+/* ms, from when the emulator is told to pull the cable out until a tick fails and says so; < 0:
+ * none does. */
 static double pull_cable(const setup *s, subject *measured)
 {
   static const char word[] = "unplug\n";
@@ -323,7 +322,7 @@ static double pull_cable(const setup *s, subject *measured)
     return -1.0;
   }
   for (int i = 0; i < 1000; ++i) {
-    if (tick(measured) == LINE_FAILED) {
+    if (device_tick(measured) == LINE_FAILED) {
       int64_t passed_ns = hapi_clock_now() - begin_ns;
       hap_detail why = {""};
       hapi_device_explain(measured->ops, measured->self, &why);
@@ -344,7 +343,7 @@ static hap_status measure_with(bench *b, setup *s, line_floor *lowest, line_figu
   subject measured = {hapi_device_ops(device), hapi_device_self(device)};
   status = measured.ops->start(measured.self);
   if (status >= HAP_OK) {
-    status = alternate(b, &measured, lowest, out);
+    status = measure_turns(b, &measured, lowest, out);
     s->pulled_ms = pull_cable(s, &measured);
   } else {
     status = bench_fail(b, status, "line: the device did not start");
@@ -354,7 +353,7 @@ static hap_status measure_with(bench *b, setup *s, line_floor *lowest, line_figu
   return status;
 }
 
-static hap_status measure(bench *b, setup *s, line_figures out[2])
+static hap_status setup_measure(bench *b, setup *s, line_figures out[2])
 {
   line_floor lowest;
   hap_status status = line_floor_start(b, &s->floor, &lowest);
@@ -374,9 +373,10 @@ static double late_share(const line_figures *f)
   return (double)f->late / (double)f->ticks;
 }
 
-/* More than it may be is the code's doing only where the machine itself is hardly ever late: the chain of the
- * floor is a part of that of the device, so what is left over is no measure of the code alone. */
-static void judge(bench *b, const setup *s, const line_figures figures[2])
+/* More than it may be is the code's doing only where the machine itself is hardly ever late: the
+ * chain of the floor is a part of that of the device, so what is left over is no measure of the
+ * code alone. */
+static void late_judge(bench *b, const setup *s, const line_figures figures[2])
 {
   double share = late_share(&figures[0]);
   double lowest = late_share(&figures[1]);
@@ -393,12 +393,12 @@ static void judge(bench *b, const setup *s, const line_figures figures[2])
   }
 }
 
-static void report(bench *b, const setup *s, const line_figures figures[2], FILE *csv)
+static void setup_report(bench *b, const setup *s, const line_figures figures[2], FILE *csv)
 {
   const line_figures *f = &figures[0];
   bench_check(b, f->failed == 0, "line: %s: %llu of %llu ticks failed", s->boards,
               (unsigned long long)f->failed, (unsigned long long)f->ticks);
-  judge(b, s, figures);
+  late_judge(b, s, figures);
   bool pulled = s->pulled_ms >= 0.0 && s->pulled_ms <= PULLED_MS_MOST;
   const char *text = "line: %s: a pulled cable failed with its cause after %.2f ms";
   if (pulled || s->pulled_ms < 0.0 || (!b->quick && late_share(&figures[1]) <= FLOOR_MOST)) {
@@ -416,19 +416,6 @@ static void report(bench *b, const setup *s, const line_figures figures[2], FILE
           late_share(&figures[1]), s->pulled_ms);
 }
 
-static hap_status run_one(bench *b, setup *s, FILE *csv)
-{
-  line_figures figures[2];
-  memset(figures, 0, sizeof figures);
-  hapi_histogram_reset(&figures[0].tick_ns);
-  hapi_histogram_reset(&figures[1].tick_ns);
-  hap_status status = measure(b, s, figures);
-  if (status >= HAP_OK) {
-    report(b, s, figures, csv);
-  }
-  return status;
-}
-
 hap_status bench_line(bench *b)
 {
   setup setups[] = {
@@ -441,12 +428,18 @@ hap_status bench_line(bench *b)
                              "tick_us_p99,tick_us_max,floor_ticks,floor_late,floor_missed,"
                              "floor_late_share,pulled_ms");
   if (csv == NULL) {
-    return bench_csv_close(b, csv);
+    return HAP_ERROR_IO;
   }
   signal(SIGPIPE, SIG_IGN);
-  for (size_t i = 0; i < sizeof setups / sizeof setups[0] && status >= HAP_OK; ++i) {
-    status = run_one(b, &setups[i], csv);
+  for (size_t i = 0; i < BENCH_COUNT(setups) && status >= HAP_OK; ++i) {
+    line_figures figures[2];
+    memset(figures, 0, sizeof figures);
+    hapi_histogram_reset(&figures[0].tick_ns);
+    hapi_histogram_reset(&figures[1].tick_ns);
+    status = setup_measure(b, &setups[i], figures);
+    if (status >= HAP_OK) {
+      setup_report(b, &setups[i], figures, csv);
+    }
   }
-  hap_status closed = bench_csv_close(b, csv);
-  return status < HAP_OK ? status : closed;
+  return bench_csv_close(b, csv, status);
 }

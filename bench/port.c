@@ -12,7 +12,7 @@ static const double surface_layer = 1e-3; /* m */
 /* A body on one point would tip over: its rotation is made so slow that nothing of it is seen. */
 static const double free_inertia = 1.0; /* kg m^2 */
 
-static bool surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool surface_set(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user;
   (void)a;
@@ -126,7 +126,7 @@ static hap_status create_session(bench *b, port *p, const port_def *def)
   session_defs_init(&session, &expert, &research);
   ode.world = p->world;
   ode.space = p->space;
-  ode.surface = surface;
+  ode.surface = surface_set;
   session.drive = HAP_DRIVE_LOCKSTEP;
   research.guard = HAP_GUARD_MEASURE;
   session.model = def->model;

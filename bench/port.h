@@ -3,9 +3,9 @@
 #ifndef HAPODE_BENCH_PORT_H
 #define HAPODE_BENCH_PORT_H
 
-/* The port at which a hand meets the world, for benches that measure there: one pointer below a body
- * whose lower face is the plane z = 0, in lockstep. The device moves along z; what comes out is what
- * it read and what it was given. */
+/* The port at which a hand meets the world, for benches that measure there: one pointer below a
+ * body whose lower face is the plane z = 0, in lockstep. The device moves along z; what comes
+ * out is what it read and what it was given. */
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>

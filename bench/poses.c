@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench poses: what is drawn at 90 Hz of scenes that a hand pushes, against where the loop had
- * hand and bodies at the time that is drawn; and what a call costs in a large world. Columns of
- * poses.csv in mm, see poses_run.h; of poses_cost.csv: bodies, us a call for all of them. */
+/* hapode-bench poses: what is drawn at 90 Hz of scenes that a hand pushes, against where the
+ * loop had hand and bodies at the time that is drawn; and what a call costs in a large world.
+ * Columns of poses.csv in mm, see poses_run.h; of poses_cost.csv: bodies, us a call for all of
+ * them. */
 
 #include <string.h>
 
@@ -21,9 +22,9 @@ static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODE
 static const char *const scenes[] = {"row10", "stack"};
 static const double rates[] = {20.0, 60.0, 90.0};
 
-#define MODELS (sizeof models / sizeof models[0])
-#define SCENES (sizeof scenes / sizeof scenes[0])
-#define RATES (sizeof rates / sizeof rates[0])
+#define MODELS BENCH_COUNT(models)
+#define SCENES BENCH_COUNT(scenes)
+#define RATES BENCH_COUNT(rates)
 #define ROWS (MODELS * SCENES * RATES)
 
 typedef struct poses_row {
@@ -31,23 +32,17 @@ typedef struct poses_row {
   poses_result result;
 } poses_row;
 
-static void report(bench *b, const poses_row *row)
-{
-  const poses_result *r = &row->result;
-  bench_check(b, r->gap_mm <= BOUND_MM && r->hand_mm <= BOUND_MM && r->back_mm <= BACK_MM,
-              "%s, %s, physics %g Hz: %zu frames, gaps off by %.3g mm, hand on body by %.3g mm "
-              "(bound %g mm; newest hand on drawn body %.3g mm), bodies off their path by %.3g mm, "
-              "jumps %.3g mm, back %.3g mm",
-              row->def.scene, hap_model_name(row->def.model), row->def.physics_hz, r->frames,
-              r->gap_mm, r->hand_mm, BOUND_MM, r->undelayed_mm, r->path_mm, r->jump_mm, r->back_mm);
-}
+typedef struct poses_table {
+  poses_row rows[ROWS];
+  size_t count;
+} poses_table;
 
-static hap_status measure(bench *b, poses_row rows[ROWS], size_t *out_count)
+static hap_status poses_run(bench *b, poses_table *out)
 {
-  size_t count = 0;
   hap_status status = HAP_OK;
   for (size_t i = 0; i < ROWS && status >= HAP_OK; ++i) {
-    poses_row *row = &rows[count];
+    poses_row *row = &out->rows[out->count];
+    const poses_result *r = &row->result;
     row->def = (poses_def){.scene = scenes[i / (MODELS * RATES)],
                            .model = models[i / RATES % MODELS],
                            .physics_hz = rates[i % RATES],
@@ -58,33 +53,40 @@ static hap_status measure(bench *b, poses_row rows[ROWS], size_t *out_count)
     }
     status = poses_measure(&row->def, &row->result, &b->detail);
     if (status >= HAP_OK) {
-      report(b, row);
-      ++count;
+      ++out->count;
+      bench_check(
+          b, r->gap_mm <= BOUND_MM && r->hand_mm <= BOUND_MM && r->back_mm <= BACK_MM,
+          "%s, %s, physics %g Hz: %zu frames, gaps off by %.3g mm, hand on body by %.3g mm "
+          "(bound %g mm; newest hand on drawn body %.3g mm), bodies off their path by %.3g mm, "
+          "jumps %.3g mm, back %.3g mm",
+          row->def.scene, hap_model_name(row->def.model), row->def.physics_hz, r->frames, r->gap_mm,
+          r->hand_mm, BOUND_MM, r->undelayed_mm, r->path_mm, r->jump_mm, r->back_mm);
     }
   }
-  *out_count = count;
   return status;
 }
 
-static hap_status write_rows(bench *b, const poses_row *rows, size_t count)
+static hap_status write_rows(bench *b, const poses_table *table)
 {
+  const poses_row *rows = table->rows;
   FILE *csv = bench_csv_open(b, "poses",
                              "scene,model,physics_hz,frame_hz,frames,moved_mm,gap_mm,hand_mm,"
                              "undelayed_hand_mm,path_mm,jump_mm,back_mm");
-  for (size_t i = 0; i < count && csv != NULL; ++i) {
+  for (size_t i = 0; i < table->count && csv != NULL; ++i) {
     const poses_result *r = &rows[i].result;
     fprintf(csv, "%s,%s,%g,%g,%zu,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", rows[i].def.scene,
             hap_model_name(rows[i].def.model), rows[i].def.physics_hz, rows[i].def.frame_hz,
             r->frames, r->moved_mm, r->gap_mm, r->hand_mm, r->undelayed_mm, r->path_mm, r->jump_mm,
             r->back_mm);
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
-static void plot_scene(FILE *script, const poses_row *rows, size_t count, const char *name)
+static void plot_scene(FILE *script, const poses_table *table, const char *name)
 {
+  const poses_row *rows = table->rows;
   fprintf(script, "$d << EOD\n");
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < table->count; ++i) {
     if (strcmp(rows[i].def.scene, name) == 0) {
       const poses_result *r = &rows[i].result;
       fprintf(script, "\"%s %g Hz\" %.6g %.6g %.6g\n", hap_model_name(rows[i].def.model),
@@ -99,21 +101,17 @@ static void plot_scene(FILE *script, const poses_row *rows, size_t count, const 
           name, BOUND_MM);
 }
 
-static hap_status draw(bench *b, const poses_row *rows, size_t count)
+static void poses_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "poses", 1000, 760);
-  if (script != NULL) {
-    fprintf(script,
-            "set multiplot layout 2,1 title 'Drawn at 90 Hz against the loop at the same time'\n"
-            "set logscale y\nset yrange [1e-6:100]\nset ylabel 'largest error [mm]'\n"
-            "set xtics rotate by -25 font ',8'\nset key top left font ',8'\n"
-            "floor_of(x) = x < 1e-6 ? 1e-6 : x\n");
-    for (size_t i = 0; i < SCENES; ++i) {
-      plot_scene(script, rows, count, scenes[i]);
-    }
-    fprintf(script, "unset multiplot\n");
+  fprintf(script,
+          "set multiplot layout 2,1 title 'Drawn at 90 Hz against the loop at the same time'\n"
+          "set logscale y\nset yrange [1e-6:100]\nset ylabel 'largest error [mm]'\n"
+          "set xtics rotate by -25 font ',8'\nset key top left font ',8'\n"
+          "floor_of(x) = x < 1e-6 ? 1e-6 : x\n");
+  for (size_t i = 0; i < SCENES; ++i) {
+    plot_scene(script, data, scenes[i]);
   }
-  return bench_picture_end(b, "poses", script);
+  fprintf(script, "unset multiplot\n");
 }
 
 /* ---- cost ---- */
@@ -152,13 +150,6 @@ static hap_status crowd_open(bench *b, int count, crowd *c)
   return status >= HAP_OK ? hap_session_advance(c->session, 101) : status;
 }
 
-static void crowd_close(crowd *c)
-{
-  hap_session_destroy(c->session);
-  dSpaceDestroy(c->space);
-  dWorldDestroy(c->world);
-}
-
 static hap_status cost_of(bench *b, int count, double *out_us)
 {
   static crowd c;
@@ -173,7 +164,9 @@ static hap_status cost_of(bench *b, int count, double *out_us)
     times[i] = 1e-3 * (double)(hapi_clock_now() - begin);
   }
   *out_us = status >= HAP_OK ? bench_median(times, 101) : 0.0;
-  crowd_close(&c);
+  hap_session_destroy(c.session);
+  dSpaceDestroy(c.space);
+  dWorldDestroy(c.world);
   return status;
 }
 
@@ -182,7 +175,7 @@ static hap_status measure_cost(bench *b)
   static const int counts[] = {1, 10, 100, 1000, COST_BODIES_MAX};
   FILE *csv = bench_csv_open(b, "poses_cost", "bodies,call_us");
   hap_status status = csv != NULL ? HAP_OK : HAP_ERROR_IO;
-  for (size_t i = 0; i < sizeof counts / sizeof counts[0] && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(counts) && status >= HAP_OK; ++i) {
     double us = 0.0;
     status = cost_of(b, counts[i], &us);
     if (status >= HAP_OK) {
@@ -190,16 +183,15 @@ static hap_status measure_cost(bench *b)
       fprintf(csv, "%d,%.4g\n", counts[i], us);
     }
   }
-  hap_status closed = bench_csv_close(b, csv);
-  return status >= HAP_OK ? closed : status;
+  return bench_csv_close(b, csv, status);
 }
 
 hap_status bench_poses(bench *b)
 {
-  static poses_row rows[ROWS + 1];
-  size_t count = 0;
-  hap_status status = measure(b, rows, &count);
+  static poses_table table;
+  memset(&table, 0, sizeof table);
+  hap_status status = poses_run(b, &table);
   status = status >= HAP_OK ? measure_cost(b) : status;
-  status = status >= HAP_OK ? write_rows(b, rows, count) : status;
-  return status >= HAP_OK ? draw(b, rows, count) : status;
+  status = status >= HAP_OK ? write_rows(b, &table) : status;
+  return status >= HAP_OK ? bench_draw(b, "poses", 1000, 760, poses_draw, &table) : status;
 }

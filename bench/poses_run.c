@@ -37,7 +37,7 @@ typedef struct run {
   poses_result *out;
 } run;
 
-static double distance(const double a[3], const double b[3])
+static double points_distance(const double a[3], const double b[3])
 {
   double d[3];
   hapi_v3_sub(a, b, d);
@@ -97,16 +97,17 @@ static double path_length(const path *p, int64_t from_ns, int64_t to_ns)
   double length = 0.0;
   for (size_t i = path_find(p, from_ns); i < p->count && p->times_ns[i] < to_ns; ++i) {
     if (p->times_ns[i] > from_ns) {
-      length += distance(at.position, p->poses[i].position);
+      length += points_distance(at.position, p->poses[i].position);
       at = p->poses[i];
     }
   }
   hap_pose end = path_at(p, to_ns);
-  return length + distance(at.position, end.position);
+  return length + points_distance(at.position, end.position);
 }
 
-/* In model SINGLE the loop shows the world as it is; else it moves bodies that it owns or has pushed
- * since the last sync. What it makes do with of the others, until the next sync, is nobody's path. */
+/* In model SINGLE the loop shows the world as it is; else it moves bodies that it owns or has
+ * pushed since the last sync. What it makes do with of the others, until the next sync, is
+ * nobody's path. */
 static bool loop_has(const hapi_tick *tick, uint32_t slot)
 {
   if (slot == HAPI_SLOT_NONE || tick->facts.model == HAP_MODEL_IMPULSE) {
@@ -114,16 +115,7 @@ static bool loop_has(const hapi_tick *tick, uint32_t slot)
   }
   const hapi_local_body *body = &tick->bodies.of[slot];
   return tick->facts.model == HAP_MODEL_SINGLE || (body->flags & HAPI_BODY_OWNED) != 0 ||
-         distance(body->account.impulse, body->given.impulse_taken) > 0.0;
-}
-
-static bool has_stepped(run *r)
-{
-  hap_stats stats = {0};
-  (void)hap_session_stats(r->rig.session, &stats, sizeof stats);
-  bool stepped = stats.physics.steps != r->steps;
-  r->steps = stats.physics.steps;
-  return stepped;
+         points_distance(body->account.impulse, body->given.impulse_taken) > 0.0;
 }
 
 /* A tick moves bodies to the time of the next one. A step of model IMPULSE is for a step ahead, and
@@ -135,7 +127,10 @@ static void note_tick(run *r)
   int64_t ahead_ns =
       tick->facts.model == HAP_MODEL_IMPULSE ? (int64_t)(2e9 / r->def->physics_hz) : 0;
   int64_t step_ns = hapi_physics_last_cycle(r->rig.session->physics);
-  bool stepped = has_stepped(r);
+  hap_stats stats = {0};
+  (void)hap_session_stats(r->rig.session, &stats, sizeof stats);
+  bool stepped = stats.physics.steps != r->steps;
+  r->steps = stats.physics.steps;
   for (size_t i = 0; i < r->bodies; ++i) {
     uint32_t slot = i < tick->watch.count ? tick->watch.slot[i] : HAPI_SLOT_NONE;
     hap_pose pose;
@@ -151,7 +146,7 @@ static void note_tick(run *r)
   path_add(&r->hand, tick->facts.now_ns + (pointer->proxied ? r->tick_ns : 0), &pointer->pose);
 }
 
-static void worst(double *out_mm, double metres)
+static void worst_raise(double *out_mm, double metres)
 {
   *out_mm = 1e3 * metres > *out_mm ? 1e3 * metres : *out_mm;
 }
@@ -166,7 +161,7 @@ static double shift_between(const hap_pose *own_a, const hap_pose *own_b, const 
   hapi_pose_unpoint(own_a->position, own_a->quat_wxyz, own, own);
   hapi_pose_point(drawn_b->position, drawn_b->quat_wxyz, point_b, drawn);
   hapi_pose_unpoint(drawn_a->position, drawn_a->quat_wxyz, drawn, drawn);
-  return distance(own, drawn);
+  return points_distance(own, drawn);
 }
 
 static void compare_bodies(run *r, size_t i, int64_t time_ns, const hap_pose *drawn)
@@ -176,15 +171,15 @@ static void compare_bodies(run *r, size_t i, int64_t time_ns, const hap_pose *dr
   for (int corner = 0; corner < 8; ++corner) {
     double point[3] = {corner & 1 ? r->half : -r->half, corner & 2 ? r->half : -r->half,
                        corner & 4 ? r->half : -r->half};
-    worst(&r->out->path_mm, shift_between(&world, &own, &world, &drawn[i], point));
+    worst_raise(&r->out->path_mm, shift_between(&world, &own, &world, &drawn[i], point));
     if (i > 0) {
       hap_pose before = path_at(&r->paths[i - 1], time_ns);
-      worst(&r->out->gap_mm, shift_between(&before, &own, &drawn[i - 1], &drawn[i], point));
+      worst_raise(&r->out->gap_mm, shift_between(&before, &own, &drawn[i - 1], &drawn[i], point));
     }
   }
   if (r->out->frames > 0) {
     double along = path_length(&r->paths[i], r->drawn_ns, time_ns);
-    worst(&r->out->jump_mm, distance(drawn[i].position, r->drawn[i].position) - along);
+    worst_raise(&r->out->jump_mm, points_distance(drawn[i].position, r->drawn[i].position) - along);
   }
 }
 
@@ -194,9 +189,10 @@ static void compare_hand(run *r, int64_t time_ns, const hap_pose *body, const ha
   hap_pose own_body = path_at(&r->paths[0], time_ns);
   hap_pose own_hand = path_at(&r->hand, time_ns);
   hap_pointer_state newest;
-  worst(&r->out->hand_mm, shift_between(&own_body, &own_hand, body, hand, center));
+  worst_raise(&r->out->hand_mm, shift_between(&own_body, &own_hand, body, hand, center));
   if (hap_pointer_get(r->rig.session, r->rig.pointers[0], &newest, sizeof newest) >= HAP_OK) {
-    worst(&r->out->undelayed_mm, shift_between(&own_body, &own_hand, body, &newest.proxy, center));
+    worst_raise(&r->out->undelayed_mm,
+                shift_between(&own_body, &own_hand, body, &newest.proxy, center));
   }
 }
 
@@ -211,7 +207,7 @@ static void look_back(run *r, int64_t time_ns, const hap_pose *body)
   hapi_v3_sub(body->position, r->drawn[0].position, drawn);
   double way = hapi_v3_norm(own);
   if (r->out->frames > 0 && way > 0.0) {
-    worst(&r->out->back_mm, -hapi_v3_dot(own, drawn) / way);
+    worst_raise(&r->out->back_mm, -hapi_v3_dot(own, drawn) / way);
   }
 }
 
@@ -238,14 +234,14 @@ static hap_status draw_frame(run *r, int64_t now_ns, hap_detail *detail)
   }
   compare_hand(r, time_ns, &drawn[0], &hand);
   look_back(r, time_ns, &drawn[0]);
-  worst(&r->out->moved_mm, distance(drawn[0].position, r->start.position));
+  worst_raise(&r->out->moved_mm, points_distance(drawn[0].position, r->start.position));
   memcpy(r->drawn, drawn, sizeof drawn);
   r->drawn_ns = time_ns;
   ++r->out->frames;
   return HAP_OK;
 }
 
-static hap_status go(run *r, hap_detail *detail)
+static hap_status run_frames(run *r, hap_detail *detail)
 {
   uint64_t ticks = (uint64_t)llround(1e9 * r->def->seconds) / (uint64_t)r->tick_ns;
   uint64_t frame = 1;
@@ -297,7 +293,7 @@ hap_status poses_measure(const poses_def *def, poses_result *out, hap_detail *de
   r.out = out;
   hap_status status = open_run(&r, detail);
   if (status >= HAP_OK) {
-    status = go(&r, detail);
+    status = run_frames(&r, detail);
   }
   for (size_t i = 0; i < BODIES_MAX; ++i) {
     path_finish(&r.paths[i]);

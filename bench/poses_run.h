@@ -3,8 +3,9 @@
 #ifndef HAPODE_BENCH_POSES_RUN_H
 #define HAPODE_BENCH_POSES_RUN_H
 
-/* What a frame loop would draw of a scene whose hand pushes, in lockstep, held against where the loop
- * itself had hand and bodies at the time that is drawn. Shared by hapode-bench poses and its test. */
+/* What a frame loop would draw of a scene whose hand pushes, in lockstep, held against where the
+ * loop itself had hand and bodies at the time that is drawn. Shared by hapode-bench poses and
+ * its test. */
 
 #include <stddef.h>
 
@@ -26,11 +27,11 @@ typedef struct poses_result {
   double gap_mm;   /* between neighbouring bodies: how far a corner of one, seen from the other, is
                            from where it was in the loop. No gap and no overlap is off by more */
   double hand_mm;  /* the same of the pointer's centre, seen from the first body */
-  double
-      undelayed_mm; /* the same of the newest pointer on the drawn body: without hap_pointer_poses */
-  double path_mm;   /* a corner of a body, from where it was */
-  double jump_mm;   /* by which a body went farther between two frames than along its path */
-  double back_mm;   /* by which the first body went back while its path went on */
+  /* the same of the newest pointer on the drawn body: without hap_pointer_poses */
+  double undelayed_mm;
+  double path_mm; /* a corner of a body, from where it was */
+  double jump_mm; /* by which a body went farther between two frames than along its path */
+  double back_mm; /* by which the first body went back while its path went on */
 } poses_result;
 
 hap_status poses_measure(const poses_def *def, poses_result *out, hap_detail *detail);

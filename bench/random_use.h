@@ -3,9 +3,9 @@
 #ifndef HAPODE_BENCH_RANDOM_USE_H
 #define HAPODE_BENCH_RANDOM_USE_H
 
-/* A program of random calls to ODE and to the public headers, over one session in lockstep. The seed
- * decides all of it, so that two runs of a seed must give the same bits, whatever addresses the heap
- * gives. It tells the session of all that docs/editing.md asks for. */
+/* A program of random calls to ODE and to the public headers, over one session in lockstep. The
+ * seed decides all of it, so that two runs of a seed must give the same bits, whatever addresses
+ * the heap gives. It tells the session of all that docs/editing.md asks for. */
 
 #include <stdbool.h>
 #include <stdint.h>

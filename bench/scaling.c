@@ -13,10 +13,11 @@
  * Range: bodies that the loop may move itself, owned: those that it moves. */
 #define SCALING_CONTACT_COLUMNS "scene,range,owned,range_ms,publish_ms,gap"
 
-/* hapode-bench scaling, model CONTACT: what the local model costs that physics hands to the loop and
- * to the contact thread. The walk goes from the neighbours of the pointers over what touches, until
- * the loop's capacity is used. Pointers rest 2 mm above cubes of a row. After each physics cycle
- * plain ODE finds the contacts of the same scene in the same state and makes one global step. */
+/* hapode-bench scaling, model CONTACT: what the local model costs that physics hands to the loop
+ * and to the contact thread. The walk goes from the neighbours of the pointers over what
+ * touches, until the loop's capacity is used. Pointers rest 2 mm above cubes of a row. After
+ * each physics cycle plain ODE finds the contacts of the same scene in the same state and makes
+ * one global step. */
 
 #define CONTACT_PHYSICS_HZ 20.0
 #define CONTACT_LARGE_WORLD 1000
@@ -97,16 +98,10 @@ static hap_status open_bed(bench *b, const world_case *what, world_bed *w)
   return status >= HAP_OK ? hap_session_start(w->rig.session) : status;
 }
 
-static void close_bed(world_bed *w)
-{
-  bare_destroy(&w->bare);
-  rig_destroy(&w->rig);
-}
-
 static double bare_step(world_bed *w)
 {
   bare_follow(&w->bare, w->rig.scene);
-  return 1e3 * bare_global_step(&w->bare, 1.0 / CONTACT_PHYSICS_HZ);
+  return 1e3 * bare_cycle(&w->bare, 1.0 / CONTACT_PHYSICS_HZ, true);
 }
 
 /* Who goes first, the library or plain ODE, finds colder caches: they take turns. */
@@ -154,55 +149,39 @@ static hap_status contact_measure(bench *b, const world_case *what, world_bed *w
   return status;
 }
 
-static double middle(const world_bed *w, int figure)
+static double world_middle(const world_bed *w, int figure)
 {
   return bench_quantile(w->values[figure], w->cycles, 0.5);
 }
 
 static double build_ms(const world_bed *w)
 {
-  return middle(w, NEIGHBOUR) + middle(w, PUBLISH) + middle(w, TESTING);
+  return world_middle(w, NEIGHBOUR) + world_middle(w, PUBLISH) + world_middle(w, TESTING);
 }
 
-static void write_row(FILE *csv, const world_bed *w)
+static void contact_write(FILE *csv, const world_bed *w)
 {
   double probes = (double)w->probes / (double)w->cycles;
-  double library = build_ms(w) - middle(w, TESTING);
+  double library = build_ms(w) - world_middle(w, TESTING);
   fprintf(csv, "%d,%u,contact,%.6g,%.6g,%.4g,%g,%.6g,%.6g,%.6g,%s,%d,%u,%.6g,%.6g,%g\n",
-          w->what->bodies, w->stats.model.neighbours, build_ms(w), middle(w, STEP),
-          w->stats.loop.tick_us_p50, probes, middle(w, TESTING), middle(w, BARE_STEP), library,
-          w->what->scene, w->what->range, w->stats.model.range_bodies, middle(w, RANGE),
-          middle(w, PUBLISH), w->parameters.gap);
-}
-
-/* The bound is for bodies that are separate; where they are not, the range is as full as it can be. */
-static void report_far(bench *b, const world_bed *w, double own, double step)
-{
-  hap_detail text;
-  snprintf(text.text, sizeof text.text,
-           "contact, %d cubes %g m apart, %u near, %u in the loop: library / global step = %.4f ms "
-           "/ %.4f ms = %.2f %%, %.0f ns a body",
-           w->what->bodies, w->parameters.gap, w->stats.model.neighbours,
-           w->stats.model.range_bodies, own, step, 100.0 * own / step, 1e6 * own / w->what->bodies);
-  if (w->what->gap > 0.0) {
-    bench_check(b, own <= FAR_SHARE * step, "%s (bound 5 %%)", text.text);
-  } else {
-    bench_say("%s", text.text);
-  }
+          w->what->bodies, w->stats.model.neighbours, build_ms(w), world_middle(w, STEP),
+          w->stats.loop.tick_us_p50, probes, world_middle(w, TESTING), world_middle(w, BARE_STEP),
+          library, w->what->scene, w->what->range, w->stats.model.range_bodies,
+          world_middle(w, RANGE), world_middle(w, PUBLISH), w->parameters.gap);
 }
 
 static void contact_report(bench *b, const world_bed *w)
 {
   const world_case *what = w->what;
   double build = build_ms(w);
-  double step = middle(w, BARE_STEP);
+  double step = world_middle(w, BARE_STEP);
   bench_say(
       "contact, %s:%d, gap %g m, %u neighbours, %u of at most %d bodies in the loop: local model "
       "%.4f ms (neighbours %.4f, of it range %.4f, publish %.4f, testing %.4f), global step %.4f "
       "ms",
       what->scene, what->bodies, w->parameters.gap, w->stats.model.neighbours,
-      w->stats.model.range_bodies, what->range, build, middle(w, NEIGHBOUR), middle(w, RANGE),
-      middle(w, PUBLISH), middle(w, TESTING), step);
+      w->stats.model.range_bodies, what->range, build, world_middle(w, NEIGHBOUR),
+      world_middle(w, RANGE), world_middle(w, PUBLISH), world_middle(w, TESTING), step);
   if (what->bodies == 10 && strcmp(what->scene, "row10") == 0) {
     bench_check(b, build <= BUILD_SHARE * step && w->probes == 0,
                 "contact, ten cubes that touch: local model / global step = %.4f ms / %.4f ms = "
@@ -210,7 +189,19 @@ static void contact_report(bench *b, const world_bed *w)
                 build, step, build / step, BUILD_SHARE, (unsigned long long)w->probes);
   }
   if (what->bodies == FAR_WORLD) {
-    report_far(b, w, build - middle(w, TESTING), step);
+    double own = build - world_middle(w, TESTING);
+    hap_detail text;
+    snprintf(
+        text.text, sizeof text.text,
+        "contact, %d cubes %g m apart, %u near, %u in the loop: library / global step = %.4f ms "
+        "/ %.4f ms = %.2f %%, %.0f ns a body",
+        what->bodies, w->parameters.gap, w->stats.model.neighbours, w->stats.model.range_bodies,
+        own, step, 100.0 * own / step, 1e6 * own / what->bodies);
+    if (what->gap > 0.0) { /* of bodies that are not separate the range is as full as it can be */
+      bench_check(b, own <= FAR_SHARE * step, "%s (bound 5 %%)", text.text);
+    } else {
+      bench_say("%s", text.text);
+    }
   }
 }
 
@@ -222,13 +213,14 @@ static hap_status bench_scaling_contact(bench *b, FILE *csv)
   if (w == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the cycles");
   }
-  for (size_t i = 0; i < sizeof cases / sizeof cases[0] && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(cases) && status >= HAP_OK; ++i) {
     status = contact_measure(b, &cases[i], w);
     if (status >= HAP_OK) {
-      write_row(csv, w);
+      contact_write(csv, w);
       contact_report(b, w);
     }
-    close_bed(w);
+    bare_destroy(&w->bare);
+    rig_destroy(&w->rig);
   }
   free(w);
   return status;
@@ -244,16 +236,16 @@ static hap_status bench_scaling_contact(bench *b, FILE *csv)
  *   island_step_ms  one step of the neighbour's island alone, by plain ODE calls
  *   library_ms      what is neither collision nor a step of ODE
  *
- * Model CONTACT has its own rows, see scaling_contact.c. */
+ * Model CONTACT has its own rows, see above. */
 
 #define PROBES_PHYSICS_HZ 20.0
 #define PROBES_LARGE_WORLD 1000
 
 static const int sizes[] = {1, 10, 100, PROBES_LARGE_WORLD};
-#define SIZE_COUNT (sizeof sizes / sizeof sizes[0])
+#define SIZE_COUNT BENCH_COUNT(sizes)
 
 static const hap_model models[] = {HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE};
-#define MODEL_COUNT (sizeof models / sizeof models[0])
+#define MODEL_COUNT BENCH_COUNT(models)
 
 typedef struct world {
   double neighbours;
@@ -314,25 +306,22 @@ static void probes_report(bench *b, int bodies, const world *w)
   }
 }
 
-static hap_status draw(bench *b, const world worlds[SIZE_COUNT])
+static void scaling_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "scaling", 800, 500);
-  if (script != NULL) {
-    fprintf(script, "$w << EOD\n");
-    for (size_t i = 0; i < SIZE_COUNT; ++i) {
-      fprintf(script, "%d %g %g %g %g\n", sizes[i], worlds[i].step_ms, worlds[i].probe_ms,
-              worlds[i].island_step_ms, 1e-3 * worlds[i].tick_us);
-    }
-    fprintf(script,
-            "EOD\nset title 'One neighbour among cubes that lie apart'\nset logscale xy\n"
-            "set format y '%%g'\nset xlabel 'bodies in the world'\nset ylabel 'time [ms]'\n"
-            "set key top left\n"
-            "plot $w using 1:2 with linespoints lt 1 pt 7 ps 0.6 title 'global step', "
-            "$w using 1:3 with linespoints lt 2 pt 7 ps 0.6 title 'all testing simulations', "
-            "$w using 1:4 with linespoints lt 3 pt 5 ps 0.6 title 'one island step', "
-            "$w using 1:5 with linespoints lt 4 pt 9 ps 0.6 title 'haptic tick'\n");
+  const world *worlds = data;
+  fprintf(script, "$w << EOD\n");
+  for (size_t i = 0; i < SIZE_COUNT; ++i) {
+    fprintf(script, "%d %g %g %g %g\n", sizes[i], worlds[i].step_ms, worlds[i].probe_ms,
+            worlds[i].island_step_ms, 1e-3 * worlds[i].tick_us);
   }
-  return bench_picture_end(b, "scaling", script);
+  fprintf(script,
+          "EOD\nset title 'One neighbour among cubes that lie apart'\nset logscale xy\n"
+          "set format y '%%g'\nset xlabel 'bodies in the world'\nset ylabel 'time [ms]'\n"
+          "set key top left\n"
+          "plot $w using 1:2 with linespoints lt 1 pt 7 ps 0.6 title 'global step', "
+          "$w using 1:3 with linespoints lt 2 pt 7 ps 0.6 title 'all testing simulations', "
+          "$w using 1:4 with linespoints lt 3 pt 5 ps 0.6 title 'one island step', "
+          "$w using 1:5 with linespoints lt 4 pt 9 ps 0.6 title 'haptic tick'\n");
 }
 
 hap_status bench_scaling(bench *b)
@@ -357,7 +346,8 @@ hap_status bench_scaling(bench *b)
     }
   }
   status = status >= HAP_OK ? bench_scaling_contact(b, csv) : status;
-  hap_status closed = bench_csv_close(b, csv);
-  status = status >= HAP_OK ? closed : status;
-  return status >= HAP_OK ? draw(b, worlds[MODEL_COUNT - 1]) : status;
+  status = bench_csv_close(b, csv, status);
+  return status >= HAP_OK
+             ? bench_draw(b, "scaling", 800, 500, scaling_draw, worlds[MODEL_COUNT - 1])
+             : status;
 }

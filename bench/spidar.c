@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The numerics of string devices, model by model: pose errors in motion, how fast poses are found from home, what
- * rounding can do, velocity, tensions against the exact solution, wrenches reached at home, times. */
+/* The numerics of string devices, model by model: pose errors in motion, how fast poses are
+ * found from home, what rounding can do, velocity, tensions against the exact solution, wrenches
+ * reached at home, times. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -52,6 +53,11 @@ typedef struct figures {
   double force_n; /* capability */
   double torque_nm;
 } figures;
+
+typedef struct spidar_table {
+  figures all[MODELS_MAX];
+  size_t count;
+} spidar_table;
 
 /* ---- pose ---- */
 
@@ -106,7 +112,7 @@ static void difference_of(const hap_pose *before, const hap_pose *now, hap_twist
 }
 
 /* One call a tick, from the last tick's pose. */
-static void follow(const spidar_motion *motion, figures *f, sums *s)
+static void motion_follow(const spidar_motion *motion, figures *f, sums *s)
 {
   const hapi_spidar_model *model = f->model;
   hapi_spidar_solver solver;
@@ -162,9 +168,9 @@ static void measure_motion(const bench *b, figures *f)
   for (int i = 0; i < motions; ++i) {
     spidar_motion motion;
     spidar_motion_init(&motion, f->model, SPEED, TURN_SPEED, &seed);
-    follow(&motion, f, &fast);
+    motion_follow(&motion, f, &fast);
     spidar_motion_init(&motion, f->model, 0.05, 0.5, &seed); /* velocities: of a hand that works */
-    follow(&motion, f, &s);
+    motion_follow(&motion, f, &s);
   }
   f->position_rms_mm = 1e3 * sqrt(fast.position / fast.ticks);
   f->turn_rms_deg = DEGREES * sqrt(fast.turn / fast.ticks);
@@ -246,7 +252,7 @@ static void measure_qp(const bench *b, figures *f)
   }
 }
 
-static double reach(const hapi_spidar_model *model, bool torque, uint64_t *seed)
+static double wrench_reach(const hapi_spidar_model *model, bool torque, uint64_t *seed)
 {
   hapi_spidar_tensions state;
   hap_pose pose;
@@ -278,9 +284,9 @@ static void measure_reach(figures *f)
   f->force_reached = HUGE_VAL;
   f->torque_reached = f->model->dof == 6 ? HUGE_VAL : 0.0;
   for (int i = 0; i < 5000; ++i) {
-    f->force_reached = fmin(f->force_reached, reach(f->model, false, &seed));
+    f->force_reached = fmin(f->force_reached, wrench_reach(f->model, false, &seed));
     if (f->model->dof == 6) {
-      f->torque_reached = fmin(f->torque_reached, reach(f->model, true, &seed));
+      f->torque_reached = fmin(f->torque_reached, wrench_reach(f->model, true, &seed));
     }
   }
   hapi_spidar_capability(f->model, &f->force_n, &f->torque_nm);
@@ -294,7 +300,7 @@ typedef struct timed {
   hap_wrench wrench[REPEATS];
 } timed;
 
-static void prepare(const hapi_spidar_model *model, bool jumps, uint64_t *seed, timed *out)
+static void timed_prepare(const hapi_spidar_model *model, bool jumps, uint64_t *seed, timed *out)
 {
   spidar_motion motion;
   spidar_motion_init(&motion, model, SPEED, TURN_SPEED, seed);
@@ -354,10 +360,10 @@ static void measure_time(const bench *b, figures *f)
   int jumped = 0;
   for (size_t i = 0; i < rounds; ++i) {
     timed t;
-    prepare(f->model, false, &seed, &t);
+    timed_prepare(f->model, false, &seed, &t);
     times[0][i] = time_solves(f->model, &t);
     times[1][i] = time_tensions(f->model, &t, &f->changes);
-    prepare(f->model, true, &seed, &t);
+    timed_prepare(f->model, true, &seed, &t);
     times[2][i] = time_tensions(f->model, &t, &jumped);
   }
   f->solve_us = bench_median(times[0], rounds);
@@ -409,7 +415,7 @@ static void report_tensions(bench *b, const figures *f)
               f->solve_us, f->tensions_us, f->jump_us);
 }
 
-static hap_status write_table(bench *b, const figures *f, size_t count)
+static hap_status table_write(bench *b, const spidar_table *table)
 {
   FILE *csv = bench_csv_open(
       b, "spidar",
@@ -417,7 +423,8 @@ static hap_status write_table(bench *b, const figures *f, size_t count)
       "excess_counts,calls,lost,velocity_mm_s,velocity_windows_mm_s,velocity_difference_mm_s,"
       "angular_rad_s,angular_windows_rad_s,angular_difference_rad_s,qp_gap,qp_brute_n,changes,"
       "force_reached,torque_reached,force_n,torque_nm,solve_us,tensions_us,jump_us");
-  for (size_t i = 0; i < count && csv != NULL; ++i, ++f) {
+  for (size_t i = 0; i < table->count && csv != NULL; ++i) {
+    const figures *f = &table->all[i];
     fprintf(csv,
             "%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.3g,%d,%d,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%.3g,"
             "%.3g,%d,%.5g,%.5g,%.4g,%.4g,%.3g,%.3g,%.3g\n",
@@ -429,38 +436,35 @@ static hap_status write_table(bench *b, const figures *f, size_t count)
             f->angular_rad_s[2], f->qp_gap, f->qp_brute, f->changes, f->force_reached,
             f->torque_reached, f->force_n, f->torque_nm, f->solve_us, f->tensions_us, f->jump_us);
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
-static hap_status draw(bench *b, const figures *f, size_t count)
+static void spidar_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "spidar", 900, 420);
-  if (script != NULL) {
-    fprintf(script, "$d << EOD\n");
-    for (size_t i = 0; i < count; ++i) {
-      fprintf(script, "%s %.6g %.6g %.6g %.6g\n", f[i].model->name, f[i].position_mm, f[i].bound_mm,
-              f[i].turn_deg, f[i].model->dof == 6 ? f[i].bound_deg : 0.0);
-    }
-    fprintf(script,
-            "EOD\nset multiplot layout 1,2 title 'Pose from rounded counts at 1 m/s, 5 rad/s'\n"
-            "set style data histograms\nset style fill solid 0.6\nset yrange [0:*]\n"
-            "set key top left font ',8'\nset ylabel 'largest error [mm]'\n"
-            "plot $d using 2:xtic(1) title 'one call a tick', '' using 3 title 'rounding, worst'\n"
-            "set ylabel 'largest error [degrees]'\n"
-            "plot $d using 4:xtic(1) title 'one call a tick', '' using 5 title 'rounding, worst'\n"
-            "unset multiplot\n");
+  const spidar_table *table = data;
+  const figures *f = table->all;
+  fprintf(script, "$d << EOD\n");
+  for (size_t i = 0; i < table->count; ++i) {
+    fprintf(script, "%s %.6g %.6g %.6g %.6g\n", f[i].model->name, f[i].position_mm, f[i].bound_mm,
+            f[i].turn_deg, f[i].model->dof == 6 ? f[i].bound_deg : 0.0);
   }
-  return bench_picture_end(b, "spidar", script);
+  fprintf(script,
+          "EOD\nset multiplot layout 1,2 title 'Pose from rounded counts at 1 m/s, 5 rad/s'\n"
+          "set style data histograms\nset style fill solid 0.6\nset yrange [0:*]\n"
+          "set key top left font ',8'\nset ylabel 'largest error [mm]'\n"
+          "plot $d using 2:xtic(1) title 'one call a tick', '' using 3 title 'rounding, worst'\n"
+          "set ylabel 'largest error [degrees]'\n"
+          "plot $d using 4:xtic(1) title 'one call a tick', '' using 5 title 'rounding, worst'\n"
+          "unset multiplot\n");
 }
 
 hap_status bench_spidar(bench *b)
 {
-  static figures all[MODELS_MAX];
-  size_t count = 0;
-  for (; count < MODELS_MAX && hapi_spidar_model_at(count) != NULL; ++count) {
-    figures *f = &all[count];
-    memset(f, 0, sizeof *f);
-    f->model = hapi_spidar_model_at(count);
+  static spidar_table table;
+  memset(&table, 0, sizeof table);
+  while (table.count < MODELS_MAX && hapi_spidar_model_at(table.count) != NULL) {
+    figures *f = &table.all[table.count];
+    f->model = hapi_spidar_model_at(table.count++);
     measure_motion(b, f);
     measure_grid(b, f);
     measure_qp(b, f);
@@ -469,6 +473,6 @@ hap_status bench_spidar(bench *b)
     report_pose(b, f);
     report_tensions(b, f);
   }
-  hap_status status = write_table(b, all, count);
-  return status >= HAP_OK ? draw(b, all, count) : status;
+  hap_status status = table_write(b, &table);
+  return status >= HAP_OK ? bench_draw(b, "spidar", 900, 420, spidar_draw, &table) : status;
 }

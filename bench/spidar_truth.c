@@ -73,7 +73,7 @@ void spidar_motion_init(spidar_motion *motion, const hapi_spidar_model *model, d
   motion->turn_hz = motion->turn > 0.0 ? turn_speed / (2.0 * sin(0.5 * motion->turn)) : 0.0;
 }
 
-static void around(const double pair[2][3], double angle, double out[3])
+static void pair_at(const double pair[2][3], double angle, double out[3])
 {
   hapi_v3_scale(cos(angle), pair[0], out);
   hapi_v3_madd(out, sin(angle), pair[1], out);
@@ -82,9 +82,9 @@ static void around(const double pair[2][3], double angle, double out[3])
 void spidar_motion_at(const spidar_motion *motion, double time, hap_pose *pose)
 {
   double axis[3];
-  around(motion->across, motion->hz * time, pose->position);
+  pair_at(motion->across, motion->hz * time, pose->position);
   hapi_v3_add(pose->position, motion->middle, pose->position);
-  around(motion->axis, motion->turn_hz * time, axis);
+  pair_at(motion->axis, motion->turn_hz * time, axis);
   turn_to(axis, motion->turn, pose->quat_wxyz);
 }
 
@@ -132,7 +132,7 @@ double spidar_turn_between(const hap_pose *a, const hap_pose *b)
 /* ---- rounding ---- */
 
 /* Gauss and Jordan with the largest pivot: a x = b for several right sides, in b. */
-static bool eliminate(double a[8][8], int n, double b[8][8], int columns)
+static bool rows_eliminate(double a[8][8], int n, double b[8][8], int columns)
 {
   for (int k = 0; k < n; ++k) {
     int best = k;
@@ -184,7 +184,7 @@ static bool pseudo_inverse(const hapi_spidar_model *model, const hap_pose *pose,
       }
     }
   }
-  return eliminate(normal, model->dof, out, model->strings);
+  return rows_eliminate(normal, model->dof, out, model->strings);
 }
 
 void spidar_rounding_bound(const hapi_spidar_model *model, const hap_pose *pose,
@@ -211,16 +211,16 @@ void spidar_rounding_bound(const hapi_spidar_model *model, const hap_pose *pose,
 
 /* ---- the box ---- */
 
-static double entry(const hapi_spidar_box_qp *qp, int i, int k)
+static double qp_entry(const hapi_spidar_box_qp *qp, int i, int k)
 {
   return i >= k ? qp->h[i][k] : qp->h[k][i];
 }
 
-static double gradient(const hapi_spidar_box_qp *qp, const double *x, int i)
+static double qp_gradient(const hapi_spidar_box_qp *qp, const double *x, int i)
 {
   double sum = -qp->g[i];
   for (int k = 0; k < qp->n; ++k) {
-    sum += entry(qp, i, k) * x[k];
+    sum += qp_entry(qp, i, k) * x[k];
   }
   return sum;
 }
@@ -229,7 +229,7 @@ double spidar_cost(const hapi_spidar_box_qp *qp, const double *x)
 {
   double sum = 0.0;
   for (int i = 0; i < qp->n; ++i) {
-    sum += 0.5 * x[i] * (gradient(qp, x, i) - qp->g[i]);
+    sum += 0.5 * x[i] * (qp_gradient(qp, x, i) - qp->g[i]);
   }
   return sum;
 }
@@ -238,7 +238,7 @@ double spidar_gap(const hapi_spidar_box_qp *qp, const double *x)
 {
   double sum = 0.0;
   for (int i = 0; i < qp->n; ++i) {
-    double slope = gradient(qp, x, i);
+    double slope = qp_gradient(qp, x, i);
     sum += slope * (x[i] - (slope > 0.0 ? qp->low[i] : qp->high[i]));
   }
   return sum;
@@ -260,19 +260,19 @@ static bool try_set(const hapi_spidar_box_qp *qp, int code, double *x)
     }
   }
   for (int r = 0; r < count; ++r) {
-    b[r][0] = -gradient(qp, x, free[r]);
+    b[r][0] = -qp_gradient(qp, x, free[r]);
     for (int c = 0; c < count; ++c) {
-      a[r][c] = entry(qp, free[r], free[c]);
+      a[r][c] = qp_entry(qp, free[r], free[c]);
     }
   }
-  bool good = eliminate(a, count, b, 1);
+  bool good = rows_eliminate(a, count, b, 1);
   for (int r = 0; r < count && good; ++r) {
     double value = b[r][0];
     x[free[r]] = value;
     good = value >= qp->low[free[r]] - 1e-9 && value <= qp->high[free[r]] + 1e-9;
   }
   for (int i = 0; i < qp->n && good; ++i) {
-    double slope = gradient(qp, x, i);
+    double slope = qp_gradient(qp, x, i);
     good = kind[i] == 2 || (kind[i] == 0 ? slope >= -1e-9 : slope <= 1e-9);
   }
   return good;

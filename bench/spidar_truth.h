@@ -3,8 +3,9 @@
 #ifndef HAPODE_BENCH_SPIDAR_TRUTH_H
 #define HAPODE_BENCH_SPIDAR_TRUTH_H
 
-/* What the numerics of plugins/spidar are held against, by the bench and by tests: motions of a known pose and
- * twist, what rounding of the counts can do, the box-constrained problem by trying all active sets. */
+/* What the numerics of plugins/spidar are held against, by the bench and by tests: motions of a
+ * known pose and twist, what rounding of the counts can do, the box-constrained problem by
+ * trying all active sets. */
 
 #include <stdint.h>
 
@@ -46,8 +47,8 @@ void spidar_counts(const hapi_spidar_model *model, const hap_pose *pose,
 double spidar_distance(const hap_pose *a, const hap_pose *b);
 double spidar_turn_between(const hap_pose *a, const hap_pose *b);
 
-/* The largest error of position [m] and turn [rad] that half a count on each string can make in the pose of least
- * squares there, to first order: over all signs. */
+/* The largest error of position [m] and turn [rad] that half a count on each string can make in
+ * the pose of least squares there, to first order: over all signs. */
 void spidar_rounding_bound(const hapi_spidar_model *model, const hap_pose *pose,
                            double *out_position, double *out_turn);
 
@@ -57,11 +58,12 @@ bool spidar_brute_force(const hapi_spidar_box_qp *qp, double out_x[HAPI_SPIDAR_O
 /* 1/2 x^T h x - g^T x */
 double spidar_cost(const hapi_spidar_box_qp *qp, const double *x);
 
-/* How far the cost of x is above the minimum at most: the sum of what each variable could still gain in its box,
- * which for a convex cost is not less than the truth. */
+/* How far the cost of x is above the minimum at most: the sum of what each variable could still
+ * gain in its box, which for a convex cost is not less than the truth. */
 double spidar_gap(const hapi_spidar_box_qp *qp, const double *x);
 
-/* A random problem of a model, as the tensions have it, with boxes of all kinds, or of no model (NULL). */
+/* A random problem of a model, as the tensions have it, with boxes of all kinds, or of no model
+ * (NULL). */
 void spidar_random_qp(const hapi_spidar_model *model, uint64_t *seed, hapi_spidar_box_qp *out);
 
 #endif

@@ -38,41 +38,28 @@ typedef struct field {
   double number;
 } field;
 
-static bool find_word(const stability_row *row, const char *key, size_t length, field *out)
+static bool field_find(const stability_row *row, const char *key, size_t length, field *out)
 {
   const stability_point *p = &row->point;
   const struct {
     const char *key;
-    const char *word;
-  } words[] = {
-      {"integrator", row->integrator},
-      {"coupling", stability_coupling_word(p->coupling)},
-      {"layout", stability_layout_word(p->layout)},
-      {"hand", stability_hand_word(p->hand)},
-      {"body", p->cubes ? "cube" : "ball"},
+    field field;
+  } fields[] = {
+      {"integrator", {row->integrator, 0.0}},
+      {"coupling", {hap_coupling_name(p->coupling), 0.0}},
+      {"layout", {stability_layout_word(p->layout), 0.0}},
+      {"hand", {stability_hand_word(p->hand), 0.0}},
+      {"body", {p->cubes ? "cube" : "ball", 0.0}},
+      {"stiffness", {NULL, p->stiffness}},
+      {"mass", {NULL, p->mass}},
+      {"contacts", {NULL, p->contacts}},
+      {"delay_ticks", {NULL, p->delay_ticks}},
+      {"quantum", {NULL, p->quantum}},
+      {"missed", {NULL, p->missed}},
   };
-  for (size_t i = 0; i < sizeof words / sizeof words[0]; ++i) {
-    if (strlen(words[i].key) == length && strncmp(words[i].key, key, length) == 0) {
-      out->word = words[i].word;
-      return true;
-    }
-  }
-  return false;
-}
-
-static bool find_number(const stability_row *row, const char *key, size_t length, field *out)
-{
-  const stability_point *p = &row->point;
-  const struct {
-    const char *key;
-    double number;
-  } numbers[] = {
-      {"stiffness", p->stiffness},     {"mass", p->mass},       {"contacts", p->contacts},
-      {"delay_ticks", p->delay_ticks}, {"quantum", p->quantum}, {"missed", p->missed ? 1.0 : 0.0},
-  };
-  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
-    if (strlen(numbers[i].key) == length && strncmp(numbers[i].key, key, length) == 0) {
-      *out = (field){.number = numbers[i].number};
+  for (size_t i = 0; i < BENCH_COUNT(fields); ++i) {
+    if (strlen(fields[i].key) == length && strncmp(fields[i].key, key, length) == 0) {
+      *out = fields[i].field;
       return true;
     }
   }
@@ -80,7 +67,7 @@ static bool find_number(const stability_row *row, const char *key, size_t length
 }
 
 /* *out_has: the value, up to `length`, is the field's. False: not a value of such a field. */
-static bool compare(const field *f, const char *value, size_t length, bool *out_has)
+static bool field_compare(const field *f, const char *value, size_t length, bool *out_has)
 {
   if (f->word != NULL) {
     *out_has = strlen(f->word) == length && strncmp(f->word, value, length) == 0;
@@ -97,14 +84,14 @@ static bool look_at(const char *item, size_t length, const stability_row *row, b
   size_t key = strcspn(item, "=,");
   field f = {NULL, 0.0};
   bool any = false;
-  if (key >= length || (!find_word(row, item, key, &f) && !find_number(row, item, key, &f))) {
+  if (key >= length || !field_find(row, item, key, &f)) {
     return false;
   }
   for (size_t at = key; at < length;) {
     const char *value = item + at + 1;
     size_t size = strcspn(value, "/,");
     bool has = false;
-    if (!compare(&f, value, size, &has)) {
+    if (!field_compare(&f, value, size, &has)) {
       return false;
     }
     any = any || has;
@@ -181,17 +168,9 @@ static void put_places(FILE *script, const stability_table *table, const char *n
 }
 
 /* column: 2 mass, with the middle number of contacts, 3 contacts, with the middle mass. */
-static void plot_panel(FILE *script, int column)
-{
-  const char *pick = column == 2 ? "($3 == 8 ? $2 : NaN)" : "($2 == 0.1 ? $3 : NaN)";
-  fprintf(script,
-          "plot $s using 1:%s with points pt 7 ps 0.9 lt 1 title 'stable', "
-          "$u using 1:%s with points pt 2 ps 0.9 lw 1.5 lt 2 title 'unstable'\n",
-          pick, pick);
-}
-
 static void draw_row(FILE *script, const stability_table *table, int column)
 {
+  const char *pick = column == 2 ? "($3 == 8 ? $2 : NaN)" : "($2 == 0.1 ? $3 : NaN)";
   fprintf(script, column == 2 ? "set yrange [3e-4:3e3]\nset ylabel 'mass of each body [kg]'\n"
                                 "set format y '10^{%%L}'\n"
                               : "set yrange [0.7:90]\nset ylabel 'contacts at once'\n"
@@ -201,32 +180,30 @@ static void draw_row(FILE *script, const stability_table *table, int column)
             column == 2 ? ", 8 contacts" : ", bodies of 0.1 kg");
     put_places(script, table, names[i], true);
     put_places(script, table, names[i], false);
-    plot_panel(script, column);
+    fprintf(script,
+            "plot $s using 1:%s with points pt 7 ps 0.9 lt 1 title 'stable', "
+            "$u using 1:%s with points pt 2 ps 0.9 lw 1.5 lt 2 title 'unstable'\n",
+            pick, pick);
   }
 }
 
-/* stability.svg. Points that differ in layout and hand alone are one: the worst of them. */
-static hap_status stability_draw(bench *b, const stability_table *table)
+/* Points that differ in layout and hand alone are one: the worst of them. */
+static void stability_draw(FILE *script, const void *data)
 {
-  FILE *script = bench_picture_begin(b, "stability", COLUMNS * PANEL_WIDTH, 2 * PANEL_HEIGHT);
-  if (script == NULL) {
-    return bench_picture_end(b, "stability", script);
-  }
   fprintf(script,
           "set multiplot layout 2,%d title 'Where each integrator holds: device of %g kg and %g N "
           "s/m at %g Hz, pushed by 1 mm'\n"
           "set logscale xy\nset format x '10^{%%L}'\nset xrange [0.3:3e6]\n"
           "set xlabel 'stiffness of each contact [N/m]'\nset key below\n",
           COLUMNS, STABILITY_DEVICE_MASS, STABILITY_DEVICE_DAMPING, STABILITY_HAPTIC_HZ);
-  draw_row(script, table, 2);
-  draw_row(script, table, 3);
+  draw_row(script, data, 2);
+  draw_row(script, data, 3);
   fprintf(script, "unset multiplot\n");
-  return bench_picture_end(b, "stability", script);
 }
 
-/* hapode-bench stability: where each integrator holds, over stiffness and mass and over stiffness and
- * the number of contacts at once, and what becomes of implicit+proxy with delay, encoder, missed
- * ticks and other hands. What a point is, and when it is stable: stability.h. */
+/* hapode-bench stability: where each integrator holds, over stiffness and mass and over
+ * stiffness and the number of contacts at once, and what becomes of implicit+proxy with delay,
+ * encoder, missed ticks and other hands. What a point is, and when it is stable: stability.h. */
 
 #define SECONDS 5.0
 #define SPEAK_S 60.0    /* between two lines about how far it is */
@@ -235,7 +212,6 @@ static hap_status stability_draw(bench *b, const stability_table *table)
 #define QUANTUM 3e-5     /* m, an encoder */
 #define FELT_SHARE 0.9   /* of coupling and contacts in series */
 #define LIMIT_MARGIN 2.0 /* how far from a limit the theory is asked */
-#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
 
 static const double stiffnesses[] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
 static const double masses[] = {1e-3, 1e-2, 0.1, 1, 10, 100, 1e3};
@@ -260,11 +236,6 @@ static const integrator integrators[] = {
 
 /* ---- measuring ---- */
 
-static double in_series(double a, double b)
-{
-  return a * b / (a + b);
-}
-
 static bool same_bed(const stability_point *a, const stability_point *b)
 {
   return a->coupling == b->coupling && a->stiffness == b->stiffness && a->mass == b->mass &&
@@ -273,12 +244,13 @@ static bool same_bed(const stability_point *a, const stability_point *b)
 }
 
 /* The stiffness at the hand is one of the same bodies, backed: neighbours in the table share it. */
-static hap_status feel(bench *b, const stability_table *table, stability_row *row)
+static hap_status row_feel(bench *b, const stability_table *table, stability_row *row)
 {
   const stability_row *before = table->count > 0 ? &table->rows[table->count - 1] : NULL;
+  double stiffness = row->point.stiffness * row->point.contacts;
   row->expected = stability_is_rigid(row->point.coupling)
                       ? row->result.held
-                      : in_series(row->result.held, row->point.stiffness * row->point.contacts);
+                      : row->result.held * stiffness / (row->result.held + stiffness);
   if (before != NULL && before->felt > 0.0 && same_bed(&before->point, &row->point)) {
     row->felt = before->felt;
     return HAP_OK;
@@ -315,13 +287,14 @@ static hap_status add_point(bench *b, stability_table *table, const char *name,
   say_how_far(table);
   status = stability_run(b, point, SECONDS, &row.result);
   if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
-    status = feel(b, table, &row);
+    status = row_feel(b, table, &row);
   }
   table->rows[table->count++] = row;
   return status;
 }
 
-/* Touched and left, held against something, and between two sides; the device alone and in a hand. */
+/* Touched and left, held against something, and between two sides; the device alone and in a
+ * hand. */
 static hap_status add_plain(bench *b, stability_table *table, const integrator *i,
                             stability_point *point)
 {
@@ -345,17 +318,17 @@ static hap_status add_map(bench *b, stability_table *table, const integrator *i)
 {
   const size_t step = b->quick ? 3 : 1;
   hap_status status = HAP_OK;
-  for (size_t k = 0; k < LENGTH(stiffnesses); k += step) {
+  for (size_t k = 0; k < BENCH_COUNT(stiffnesses); k += step) {
     stability_point point = {.integration = i->integration,
                              .coupling = i->coupling,
                              .stiffness = stiffnesses[k],
                              .contacts = MIDDLE_CONTACTS};
-    for (size_t m = 0; m < LENGTH(masses) && status >= HAP_OK; m += step) {
+    for (size_t m = 0; m < BENCH_COUNT(masses) && status >= HAP_OK; m += step) {
       point.mass = masses[m];
       status = add_plain(b, table, i, &point);
     }
     point.mass = MIDDLE_MASS;
-    for (size_t n = 0; n < LENGTH(contacts) && status >= HAP_OK; n += step) {
+    for (size_t n = 0; n < BENCH_COUNT(contacts) && status >= HAP_OK; n += step) {
       point.contacts = contacts[n];
       if (point.contacts != MIDDLE_CONTACTS || b->quick) {
         status = add_plain(b, table, i, &point);
@@ -397,7 +370,7 @@ static hap_status add_corners(bench *b, stability_table *table, const integrator
     point.stiffness = corner == 8 ? 1e3 : (corner & 1) != 0 ? 1e6 : 1.0;
     point.mass = corner == 8 ? 1.0 : (corner & 2) != 0 ? 1e3 : 1e-3;
     point.contacts = corner == 8 ? MIDDLE_CONTACTS : (corner & 4) != 0 ? 64 : 1;
-    for (size_t d = 0; d < LENGTH(delays) && status >= HAP_OK; d += b->quick ? 3 : 1) {
+    for (size_t d = 0; d < BENCH_COUNT(delays) && status >= HAP_OK; d += b->quick ? 3 : 1) {
       point.delay_ticks = delays[d];
       status = add_device(b, table, i, &point);
     }
@@ -469,7 +442,7 @@ static void check_explicit(bench *b, const stability_table *table)
 
 static void say_counts(const stability_table *table)
 {
-  for (size_t i = 0; i < LENGTH(integrators); ++i) {
+  for (size_t i = 0; i < BENCH_COUNT(integrators); ++i) {
     bool rigid = stability_is_rigid(integrators[i].coupling);
     size_t points = 0;
     size_t stable = 0;
@@ -491,7 +464,7 @@ static void say_counts(const stability_table *table)
 
 /* ---- the program ---- */
 
-static hap_status write_table(bench *b, const stability_table *table)
+static hap_status table_write(bench *b, const stability_table *table)
 {
   FILE *csv = bench_csv_open(b, "stability",
                              "integrator,stiffness,mass,contacts,stable,energy_ratio,coupling,"
@@ -502,7 +475,7 @@ static hap_status write_table(bench *b, const stability_table *table)
     const stability_point *p = &row->point;
     fprintf(csv, "%s,%g,%g,%d,%d,%.6g,%s,%s,%s,%g,%g,%d,%g,", row->integrator, p->stiffness,
             p->mass, p->contacts, row->result.stable, row->result.energy_ratio,
-            stability_coupling_word(p->coupling), stability_layout_word(p->layout),
+            hap_coupling_name(p->coupling), stability_layout_word(p->layout),
             stability_hand_word(p->hand), p->delay_ticks, p->quantum, p->missed, row->result.held);
     if (is_proxy(row)) {
       fprintf(csv, "%.6g,%.6g", row->felt, row->expected);
@@ -511,37 +484,25 @@ static hap_status write_table(bench *b, const stability_table *table)
     }
     fprintf(csv, ",%.3g,%s\n", row->result.residual, p->cubes ? "cube" : "ball");
   }
-  return bench_csv_close(b, csv);
+  return bench_csv_close(b, csv, HAP_OK);
 }
 
-/* Those of the literature only where they are asked for: they are not what the library is held to. */
-static bool is_asked_for(const bench *b, const integrator *i)
-{
-  return !stability_is_rigid(i->coupling) ||
-         (b->only != NULL && strstr(b->only, hap_coupling_name(i->coupling)) != NULL);
-}
-
-static hap_status measure(bench *b, stability_table *table)
+static hap_status points_measure(bench *b, stability_table *table)
 {
   hap_status status = HAP_OK;
-  for (size_t i = 0; i < LENGTH(integrators) && status >= HAP_OK; ++i) {
-    if (!is_asked_for(b, &integrators[i])) {
+  for (size_t i = 0; i < BENCH_COUNT(integrators) && status >= HAP_OK; ++i) {
+    hap_coupling coupling = integrators[i].coupling;
+    /* Those of the literature only where asked for: they are not what the library is held to. */
+    if (stability_is_rigid(coupling) &&
+        (b->only == NULL || strstr(b->only, hap_coupling_name(coupling)) == NULL)) {
       continue;
     }
     status = add_map(b, table, &integrators[i]);
-    if (status >= HAP_OK && integrators[i].coupling != HAP_COUPLING_DIRECT) {
+    if (status >= HAP_OK && coupling != HAP_COUPLING_DIRECT) {
       status = add_corners(b, table, &integrators[i]);
     }
   }
   return status;
-}
-
-static hap_status check_points(bench *b, const stability_table *table)
-{
-  return table->planned > 0
-             ? HAP_OK
-             : bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
-                          b->only != NULL ? b->only : "");
 }
 
 hap_status bench_stability(bench *b)
@@ -551,23 +512,21 @@ hap_status bench_stability(bench *b)
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
   }
   table->planning = true;
-  hap_status status = measure(b, table);
+  hap_status status = points_measure(b, table);
   table->planning = false;
-  if (status >= HAP_OK) {
-    status = check_points(b, table);
+  if (status >= HAP_OK && table->planned == 0) {
+    status = bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
+                        b->only != NULL ? b->only : "");
   }
-  if (status >= HAP_OK) {
-    status = measure(b, table);
-  }
-  if (status >= HAP_OK) {
-    status = write_table(b, table);
-  }
+  status = status >= HAP_OK ? points_measure(b, table) : status;
+  status = status >= HAP_OK ? table_write(b, table) : status;
   if (status >= HAP_OK) {
     say_counts(table);
     check_proxy(b, table);
     if (b->only == NULL) { /* else it may have no points, and the planes have holes */
       check_explicit(b, table);
-      status = stability_draw(b, table);
+      status = bench_draw(b, "stability", COLUMNS * PANEL_WIDTH, 2 * PANEL_HEIGHT, stability_draw,
+                          table);
     }
   }
   free(table);

@@ -3,8 +3,8 @@
 #ifndef HAPODE_BENCH_STABILITY_H
 #define HAPODE_BENCH_STABILITY_H
 
-/* One point of the stability map: a device, a hand, a pointer and bodies that it touches all at once,
- * pushed by 1 mm in model CONTACT.
+/* One point of the stability map: a device, a hand, a pointer and bodies that it touches all at
+ * once, pushed by 1 mm in model CONTACT.
  *
  * Energy. The port is the grip: hand and moving part of the device are one mass there, and the
  * device's damping belongs to the device. With P the work of the force that really acted on that
@@ -15,10 +15,10 @@
  *   energy_ratio = 1 + max made / max (K + energy of the springs, but no more than was taken
  *                                         + kinetic energy at the grip)
  *
- * The springs (of the contacts and of the coupling) are empty at the start: what they give was taken
- * before, so that made stays below 0 unless sampling, delay or integration make energy. What the
- * hand's own damping takes is not set off against it. A point is stable when all numbers are finite,
- * no fault was latched and energy_ratio <= 1.01. */
+ * The springs (of the contacts and of the coupling) are empty at the start: what they give was
+ * taken before, so that made stays below 0 unless sampling, delay or integration make energy.
+ * What the hand's own damping takes is not set off against it. A point is stable when all
+ * numbers are finite, no fault was latched and energy_ratio <= 1.01. */
 
 #include "bench/bench.h"
 
@@ -69,7 +69,6 @@ typedef struct stability_result {
 
 const char *stability_hand_word(stability_hand hand); /* as the virtual device spells it */
 const char *stability_layout_word(stability_layout layout);
-const char *stability_coupling_word(hap_coupling coupling);
 bool stability_is_rigid(hap_coupling coupling); /* contacts that do not give */
 
 hap_status stability_run(bench *b, const stability_point *point, double seconds,

@@ -198,7 +198,7 @@ static double kinetic_of(const stability_bed *s, const double linear[3], const d
          0.5 * inertia * hapi_v3_dot(angular, angular);
 }
 
-static void look(stability_bed *s)
+static void bodies_look(stability_bed *s)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
   const hapi_physics *physics = s->session->physics;
@@ -223,7 +223,7 @@ static void look(stability_bed *s)
 
 /* J, of the contacts' springs, from their forces, and of the coupling's, with the device where it
  * was measured last. */
-static double springs(const stability_bed *s)
+static double springs_energy(const stability_bed *s)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
   const hapi_pointer *p = &tick->pointers.of[0];
@@ -242,8 +242,8 @@ static double springs(const stability_bed *s)
   return sum;
 }
 
-static void account(stability_bed *s, const hapi_virtual_port *was, const hapi_virtual_port *now,
-                    double period)
+static void tick_account(stability_bed *s, const hapi_virtual_port *was,
+                         const hapi_virtual_port *now, double period)
 {
   double way[3];
   hapi_v3_sub(now->position, was->position, way);
@@ -253,7 +253,7 @@ static void account(stability_bed *s, const hapi_virtual_port *was, const hapi_v
       0.5 * (hapi_v3_dot(was->velocity, was->velocity) + hapi_v3_dot(now->velocity, now->velocity));
   s->lost += STABILITY_DEVICE_DAMPING * period * (2.0 * mean + ends) / 3.0;
   double made = now->work - s->lost + s->kinetic;
-  double held = fmin(springs(s), fmax(0.0, -made)); /* no more than was taken */
+  double held = fmin(springs_energy(s), fmax(0.0, -made)); /* no more than was taken */
   double stored = s->kinetic + held + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
   s->finite = s->finite && isfinite(made) && isfinite(stored);
   s->made = fmax(s->made, made);
@@ -270,11 +270,6 @@ const char *stability_hand_word(stability_hand hand)
 const char *stability_layout_word(stability_layout layout)
 {
   return layout == STABILITY_FREE ? "free" : layout == STABILITY_BACKED ? "backed" : "cage";
-}
-
-const char *stability_coupling_word(hap_coupling coupling)
-{
-  return hap_coupling_name(coupling);
 }
 
 bool stability_is_rigid(hap_coupling coupling)
@@ -310,13 +305,13 @@ static void tick_once(stability_bed *s, uint64_t index, hapi_virtual_port *port,
     atomic_fetch_add(&s->session->tick, 1);
   }
   (void)hap_session_advance(s->session, 1);
-  look(s);
+  bodies_look(s);
   hapi_virtual_get_port(hapi_device_self(s->device), port);
-  account(s, &was, port, period);
+  tick_account(s, &was, port, period);
   *way = fmax(*way, -port->position[2]);
 }
 
-static void finish(stability_bed *s, double way, int touched, stability_result *out)
+static void run_finish(stability_bed *s, double way, int touched, stability_result *out)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
   out->energy_ratio = s->finite && s->stored > 0.0 ? 1.0 + s->made / s->stored : HUGE_VAL;
@@ -349,7 +344,7 @@ hap_status stability_run(bench *b, const stability_point *point, double seconds,
       int pushing = (int)s.session->haptic->tick.touches.pushing;
       touched = pushing > touched ? pushing : touched;
     }
-    finish(&s, way, touched, out);
+    run_finish(&s, way, touched, out);
   }
   close_bed(&s);
   return status;

@@ -72,20 +72,20 @@ static double storm_uniform(uint64_t *seed, double low, double high)
   return low + (high - low) * (double)(*seed >> 11) * 0x1p-53;
 }
 
-static double uniform(storm_world *w, double low, double high)
+static double world_uniform(storm_world *w, double low, double high)
 {
   return storm_uniform(&w->seed, low, high);
 }
 
-static int below(storm_world *w, int count)
+static int world_below(storm_world *w, int count)
 {
-  int n = (int)uniform(w, 0.0, count);
+  int n = (int)world_uniform(w, 0.0, count);
   return n < count ? n : count - 1;
 }
 
-static bool chance(storm_world *w, double share)
+static bool world_chance(storm_world *w, double share)
 {
-  return uniform(w, 0.0, 1.0) < share;
+  return world_uniform(w, 0.0, 1.0) < share;
 }
 
 static void world_expect(storm_world *w, bool good)
@@ -96,10 +96,10 @@ static void world_expect(storm_world *w, bool good)
 /* Most things are where a hand is. */
 static void choose_place(storm_world *w, double out[3])
 {
-  double wide = w->spot_count > 0 && chance(w, 0.8) ? 0.04 : 0.3;
-  const double *spot = w->spots[w->spot_count > 0 ? below(w, w->spot_count) : 0];
+  double wide = w->spot_count > 0 && world_chance(w, 0.8) ? 0.04 : 0.3;
+  const double *spot = w->spots[w->spot_count > 0 ? world_below(w, w->spot_count) : 0];
   for (int k = 0; k < 3; ++k) {
-    out[k] = (wide < 0.1 ? spot[k] : 0.0) + uniform(w, -wide, wide);
+    out[k] = (wide < 0.1 ? spot[k] : 0.0) + world_uniform(w, -wide, wide);
   }
 }
 
@@ -107,10 +107,10 @@ static void choose_place(storm_world *w, double out[3])
 
 static dGeomID make_geom(storm_world *w)
 {
-  dSpaceID space = chance(w, 0.3) ? w->nested : w->space;
-  double a = uniform(w, 0.01, 0.05);
-  double b = uniform(w, 0.02, 0.1);
-  switch (below(w, 4)) {
+  dSpaceID space = world_chance(w, 0.3) ? w->nested : w->space;
+  double a = world_uniform(w, 0.01, 0.05);
+  double b = world_uniform(w, 0.02, 0.1);
+  switch (world_below(w, 4)) {
     case 0:
       return dCreateSphere(space, a);
     case 1:
@@ -118,7 +118,7 @@ static dGeomID make_geom(storm_world *w)
     case 2:
       return dCreateCylinder(space, a, b);
     default:
-      return dCreateBox(space, 2 * a, b, uniform(w, 0.02, 0.1));
+      return dCreateBox(space, 2 * a, b, world_uniform(w, 0.02, 0.1));
   }
 }
 
@@ -128,7 +128,8 @@ static void add_geom(storm_world *w, storm_thing *t)
     dGeomID geom = make_geom(w);
     dGeomSetBody(geom, t->body);
     if (t->geom_count > 0) {
-      dGeomSetOffsetPosition(geom, uniform(w, -0.05, 0.05), uniform(w, -0.05, 0.05), 0.0);
+      dGeomSetOffsetPosition(geom, world_uniform(w, -0.05, 0.05), world_uniform(w, -0.05, 0.05),
+                             0.0);
     }
     t->geoms[t->geom_count++] = geom;
   }
@@ -145,8 +146,8 @@ static void drop_geom(storm_world *w, storm_thing *t, bool tell)
 
 static void resize_geom(storm_world *w, dGeomID geom)
 {
-  double a = uniform(w, 0.01, 0.05);
-  double b = uniform(w, 0.02, 0.1);
+  double a = world_uniform(w, 0.01, 0.05);
+  double b = world_uniform(w, 0.02, 0.1);
   switch (dGeomGetClass(geom)) {
     case dSphereClass:
       dGeomSphereSetRadius(geom, a);
@@ -168,8 +169,8 @@ static void resize_geom(storm_world *w, dGeomID geom)
 static void set_mass(storm_world *w, storm_thing *t)
 {
   dMass mass;
-  double edge = uniform(w, 0.03, 0.1);
-  dMassSetBoxTotal(&mass, uniform(w, 0.05, 2.0), edge, edge, uniform(w, 0.03, 0.1));
+  double edge = world_uniform(w, 0.03, 0.1);
+  dMassSetBoxTotal(&mass, world_uniform(w, 0.05, 2.0), edge, edge, world_uniform(w, 0.03, 0.1));
   dBodySetMass(t->body, &mass);
 }
 
@@ -186,18 +187,18 @@ static void create_body(storm_world *w, storm_thing *t)
 
 static void destroy_body(storm_world *w, storm_thing *t)
 {
-  bool tell =
-      t->adopted || w->telling == STORM_TELLS || (w->telling == STORM_TELLS_HALF && chance(w, 0.5));
+  bool tell = t->adopted || w->telling == STORM_TELLS ||
+              (w->telling == STORM_TELLS_HALF && world_chance(w, 0.5));
   w->untold += !tell;
   if (tell) {
     hap_status status = hap_session_forget_body(w->session, t->body);
     world_expect(w, status == HAP_OK || status == HAP_ERROR_NOT_FOUND);
   }
-  if (t->joint != NULL && chance(w, 0.5)) {
+  if (t->joint != NULL && world_chance(w, 0.5)) {
     dJointDestroy(t->joint);
     t->joint = NULL;
   }
-  bool geoms_first = chance(w, 0.5);
+  bool geoms_first = world_chance(w, 0.5);
   for (int round = 0; round < 2; ++round) {
     while (geoms_first == (round == 0) && t->geom_count > 0) {
       drop_geom(w, t, tell);
@@ -223,7 +224,7 @@ static void edit_replace(storm_world *w, storm_thing *t)
 static void edit_pose(storm_world *w, storm_thing *t)
 {
   double at[3];
-  dQuaternion q = {uniform(w, -1, 1), uniform(w, -1, 1), uniform(w, -1, 1), 0.1};
+  dQuaternion q = {world_uniform(w, -1, 1), world_uniform(w, -1, 1), world_uniform(w, -1, 1), 0.1};
   choose_place(w, at);
   dBodySetPosition(t->body, at[0], at[1], at[2]);
   dBodySetQuaternion(t->body, q);
@@ -231,23 +232,26 @@ static void edit_pose(storm_world *w, storm_thing *t)
 
 static void edit_velocity(storm_world *w, storm_thing *t)
 {
-  dBodySetLinearVel(t->body, uniform(w, -1, 1), uniform(w, -1, 1), uniform(w, -1, 1));
-  dBodySetAngularVel(t->body, uniform(w, -5, 5), uniform(w, -5, 5), uniform(w, -5, 5));
+  dBodySetLinearVel(t->body, world_uniform(w, -1, 1), world_uniform(w, -1, 1),
+                    world_uniform(w, -1, 1));
+  dBodySetAngularVel(t->body, world_uniform(w, -5, 5), world_uniform(w, -5, 5),
+                     world_uniform(w, -5, 5));
 }
 
 static void edit_shape(storm_world *w, storm_thing *t)
 {
   if (t->geom_count > 0) {
-    resize_geom(w, t->geoms[below(w, t->geom_count)]);
+    resize_geom(w, t->geoms[world_below(w, t->geom_count)]);
   }
 }
 
 static void edit_offset(storm_world *w, storm_thing *t)
 {
   if (t->geom_count > 0) {
-    dGeomID geom = t->geoms[below(w, t->geom_count)];
-    if (chance(w, 0.5)) {
-      dGeomSetOffsetPosition(geom, uniform(w, -0.04, 0.04), uniform(w, -0.04, 0.04), 0.01);
+    dGeomID geom = t->geoms[world_below(w, t->geom_count)];
+    if (world_chance(w, 0.5)) {
+      dGeomSetOffsetPosition(geom, world_uniform(w, -0.04, 0.04), world_uniform(w, -0.04, 0.04),
+                             0.01);
     } else {
       dGeomClearOffset(geom);
     }
@@ -260,13 +264,13 @@ static void edit_kinematic(storm_world *w, storm_thing *t)
     dBodySetDynamic(t->body);
   } else {
     dBodySetKinematic(t->body);
-    dBodySetLinearVel(t->body, uniform(w, -0.2, 0.2), uniform(w, -0.2, 0.2), 0.0);
+    dBodySetLinearVel(t->body, world_uniform(w, -0.2, 0.2), world_uniform(w, -0.2, 0.2), 0.0);
   }
 }
 
 static void edit_enabled(storm_world *w, storm_thing *t)
 {
-  if (chance(w, 0.7)) {
+  if (world_chance(w, 0.7)) {
     dBodyEnable(t->body);
   } else {
     dBodyDisable(t->body);
@@ -275,8 +279,8 @@ static void edit_enabled(storm_world *w, storm_thing *t)
 
 static void edit_geoms(storm_world *w, storm_thing *t)
 {
-  if (t->geom_count > 1 && chance(w, 0.5)) {
-    drop_geom(w, t, chance(w, 0.5) || w->telling == STORM_TELLS);
+  if (t->geom_count > 1 && world_chance(w, 0.5)) {
+    drop_geom(w, t, world_chance(w, 0.5) || w->telling == STORM_TELLS);
   } else if (t->geom_count == 1 && dBodyGetNumJoints(t->body) == 0) { /* a point mass */
     world_expect(w, hap_session_adopt_body(w->session, t->body) == HAP_OK);
     t->adopted = true;
@@ -290,9 +294,9 @@ static void edit_geoms(storm_world *w, storm_thing *t)
 static void edit_geom_flags(storm_world *w, storm_thing *t)
 {
   if (t->geom_count > 0) {
-    dGeomID geom = t->geoms[below(w, t->geom_count)];
-    dGeomSetCategoryBits(geom, chance(w, 0.8) ? ~0ul : 2ul);
-    if (chance(w, 0.8)) {
+    dGeomID geom = t->geoms[world_below(w, t->geom_count)];
+    dGeomSetCategoryBits(geom, world_chance(w, 0.8) ? ~0ul : 2ul);
+    if (world_chance(w, 0.8)) {
       dGeomEnable(geom);
     } else {
       dGeomDisable(geom);
@@ -307,9 +311,9 @@ static void edit_geom_flags(storm_world *w, storm_thing *t)
 static void set_joint(storm_world *w, storm_thing *t)
 {
   const dReal *at = dBodyGetPosition(t->body);
-  const storm_thing *partner = &w->things[below(w, STORM_THINGS)];
+  const storm_thing *partner = &w->things[world_below(w, STORM_THINGS)];
   dBodyID other = partner == t || partner->geom_count == 0 ? NULL : partner->body;
-  switch (below(w, 4)) {
+  switch (world_below(w, 4)) {
     case 0:
       t->joint = dJointCreateBall(w->world, NULL);
       dJointAttach(t->joint, t->body, other);
@@ -320,7 +324,7 @@ static void set_joint(storm_world *w, storm_thing *t)
       dJointAttach(t->joint, t->body, other);
       dJointSetHingeAnchor(t->joint, at[0], at[1], at[2]);
       dJointSetHingeAxis(t->joint, 0.0, 0.0, 1.0);
-      dJointSetHingeParam(t->joint, dParamVel, uniform(w, -2, 2));
+      dJointSetHingeParam(t->joint, dParamVel, world_uniform(w, -2, 2));
       dJointSetHingeParam(t->joint, dParamFMax, 0.1);
       break;
     case 2:
@@ -348,32 +352,33 @@ static void edit_joint(storm_world *w, storm_thing *t)
 
 static void edit_settings(storm_world *w, storm_thing *t)
 {
-  dBodySetAutoDisableFlag(t->body, chance(w, 0.5));
-  dBodySetAutoDisableTime(t->body, uniform(w, 0.0, 0.5));
-  dBodySetAutoDisableSteps(t->body, below(w, 20));
-  dBodySetLinearDamping(t->body, uniform(w, 0.0, 0.1));
-  dBodySetGyroscopicMode(t->body, chance(w, 0.5));
-  dBodySetGravityMode(t->body, chance(w, 0.8));
-  dBodySetFiniteRotationMode(t->body, chance(w, 0.1));
-  dBodyAddForce(t->body, uniform(w, -5, 5), uniform(w, -5, 5), uniform(w, -5, 5));
+  dBodySetAutoDisableFlag(t->body, world_chance(w, 0.5));
+  dBodySetAutoDisableTime(t->body, world_uniform(w, 0.0, 0.5));
+  dBodySetAutoDisableSteps(t->body, world_below(w, 20));
+  dBodySetLinearDamping(t->body, world_uniform(w, 0.0, 0.1));
+  dBodySetGyroscopicMode(t->body, world_chance(w, 0.5));
+  dBodySetGravityMode(t->body, world_chance(w, 0.8));
+  dBodySetFiniteRotationMode(t->body, world_chance(w, 0.1));
+  dBodyAddForce(t->body, world_uniform(w, -5, 5), world_uniform(w, -5, 5), world_uniform(w, -5, 5));
 }
 
 static void edit_world(storm_world *w, storm_thing *t)
 {
-  int i = below(w, STORM_WALLS);
+  int i = world_below(w, STORM_WALLS);
   double at[3];
   (void)t;
-  dWorldSetGravity(w->world, uniform(w, -2, 2), uniform(w, -2, 2), uniform(w, -9.81, 0.0));
-  dWorldSetERP(w->world, uniform(w, 0.1, 0.4));
-  dWorldSetQuickStepNumIterations(w->world, 10 + below(w, 20));
-  dWorldSetContactSurfaceLayer(w->world, uniform(w, 0.0, 1e-3));
+  dWorldSetGravity(w->world, world_uniform(w, -2, 2), world_uniform(w, -2, 2),
+                   world_uniform(w, -9.81, 0.0));
+  dWorldSetERP(w->world, world_uniform(w, 0.1, 0.4));
+  dWorldSetQuickStepNumIterations(w->world, 10 + world_below(w, 20));
+  dWorldSetContactSurfaceLayer(w->world, world_uniform(w, 0.0, 1e-3));
   choose_place(w, at);
-  if (chance(w, 0.5)) {
+  if (world_chance(w, 0.5)) {
     if (w->telling == STORM_TELLS) {
       world_expect(w, hap_session_forget_geom(w->session, w->walls[i]) == HAP_OK);
     }
     dGeomDestroy(w->walls[i]);
-    w->walls[i] = dCreateBox(w->space, uniform(w, 0.05, 0.3), 0.05, 0.05);
+    w->walls[i] = dCreateBox(w->space, world_uniform(w, 0.05, 0.3), 0.05, 0.05);
   }
   dGeomSetPosition(w->walls[i], at[0], at[1], at[2]);
 }
@@ -387,7 +392,7 @@ static const edit_fn edits[] = {
 };
 
 /* Joints between bodies that were put elsewhere throw them about. */
-static void calm(storm_world *w)
+static void world_calm(storm_world *w)
 {
   for (int i = 0; i < STORM_THINGS; ++i) {
     storm_thing *t = &w->things[i];
@@ -405,15 +410,15 @@ static void calm(storm_world *w)
 static void storm_world_edit(storm_world *w, int count)
 {
   for (int i = 0; i < count; ++i) {
-    storm_thing *t = &w->things[below(w, STORM_THINGS)];
+    storm_thing *t = &w->things[world_below(w, STORM_THINGS)];
     if (t->body == NULL) {
       create_body(w, t);
     } else {
-      edits[below(w, sizeof edits / sizeof edits[0])](w, t);
+      edits[world_below(w, sizeof edits / sizeof edits[0])](w, t);
     }
     ++w->edits;
   }
-  calm(w);
+  world_calm(w);
   for (int i = 0; i < STORM_THINGS; ++i) {
     atomic_store_explicit(&w->shown[i], w->things[i].body, memory_order_relaxed);
   }
@@ -437,13 +442,6 @@ static void storm_world_open(storm_world *w, uint64_t seed)
   for (int i = 0; i < STORM_THINGS / 2; ++i) {
     create_body(w, &w->things[i]);
   }
-}
-
-/* after its session */
-static void storm_world_close(storm_world *w)
-{
-  dSpaceDestroy(w->space);
-  dWorldDestroy(w->world);
 }
 
 typedef struct storm_hand {
@@ -472,7 +470,7 @@ static hap_status hand_open_hand(const char *args, void **self, hap_detail *deta
   return HAP_OK;
 }
 
-static void describe(void *self, hap_device_info *out)
+static void hand_describe(void *self, hap_device_info *out)
 {
   (void)self;
   out->dof = 3;
@@ -480,13 +478,13 @@ static void describe(void *self, hap_device_info *out)
   out->max_torque = 1.0;
 }
 
-static void hold(storm_hand *hand, const double force[3])
+static void hand_hold(storm_hand *hand, const double force[3])
 {
   hapi_v3_copy(force, hand->force);
   atomic_store(&hand->book.holds, hapi_v3_norm(force) > 0.0);
 }
 
-static hap_status start(void *self)
+static hap_status hand_start(void *self)
 {
   storm_hand *hand = self;
   hand->running = true;
@@ -522,18 +520,18 @@ static hap_status write_hand(void *self, const hap_wrench *wanted, hap_wrench *r
   book->peak = fmax(book->peak, force);
   book->steepest = fmax(book->steepest, step);
   ++book->writes;
-  hold(hand, wanted->force);
+  hand_hold(hand, wanted->force);
   *reached = *wanted;
   return HAP_OK;
 }
 
-static void zero(void *self)
+static void hand_zero(void *self)
 {
   static const double none[3] = {0.0, 0.0, 0.0};
-  hold(self, none);
+  hand_hold(self, none);
 }
 
-static void stop(void *self)
+static void hand_stop(void *self)
 {
   storm_hand *hand = self;
   hand->book.stops_with_force += atomic_load(&hand->book.holds);
@@ -552,12 +550,12 @@ static const hap_device_ops ops = {
     .help = "a circle, for measurements",
     .pacing = HAP_PACING_VIRTUAL,
     .open = hand_open_hand,
-    .describe = describe,
-    .start = start,
+    .describe = hand_describe,
+    .start = hand_start,
     .read = read_hand,
     .write = write_hand,
-    .zero = zero,
-    .stop = stop,
+    .zero = hand_zero,
+    .stop = hand_stop,
     .close = close_hand,
 };
 
@@ -606,7 +604,7 @@ typedef struct storm {
   storm_result *out;
 } storm;
 
-static void expect(storm *s, bool good)
+static void storm_expect(storm *s, bool good)
 {
   if (!good) {
     atomic_fetch_add(&s->unexpected, 1);
@@ -622,10 +620,10 @@ static void sleep_ns(int64_t ns)
 
 static void run_edit(void *arg);
 
-static void post(storm *s)
+static void storm_post(storm *s)
 {
   hap_status status = hap_session_post(s->session, run_edit, s);
-  expect(s, status == HAP_OK || status == HAP_ERROR_CAPACITY || status == HAP_ERROR_STATE);
+  storm_expect(s, status == HAP_OK || status == HAP_ERROR_CAPACITY || status == HAP_ERROR_STATE);
   atomic_fetch_add(status == HAP_OK ? &s->posts_taken : &s->posts_refused, 1);
 }
 
@@ -633,9 +631,9 @@ static void run_edit(void *arg)
 {
   storm *s = arg;
   storm_world_edit(&s->world, 2);
-  expect(s, hap_session_lock(s->session) == HAP_ERROR_THREAD);
+  storm_expect(s, hap_session_lock(s->session) == HAP_ERROR_THREAD);
   if (atomic_fetch_add(&s->posts_run, 1) % 16 == 0) {
-    post(s); /* from within */
+    storm_post(s); /* from within */
   }
 }
 
@@ -653,13 +651,6 @@ static hap_status lock_somehow(storm *s, int way)
   }
 }
 
-static void note_wait(storm *s, int64_t ns)
-{
-  pthread_mutex_lock(&s->waits_lock);
-  hapi_histogram_add(&s->waits, ns);
-  pthread_mutex_unlock(&s->waits_lock);
-}
-
 static void edit_locked(storm *s, int way)
 {
   int64_t begin = hapi_clock_now();
@@ -668,11 +659,14 @@ static void edit_locked(storm *s, int way)
     atomic_fetch_add(&s->in_vain, 1);
     return;
   }
-  expect(s, status == HAP_OK);
+  storm_expect(s, status == HAP_OK);
   if (status == HAP_OK) {
-    note_wait(s, hapi_clock_now() - begin);
+    int64_t waited = hapi_clock_now() - begin;
+    pthread_mutex_lock(&s->waits_lock);
+    hapi_histogram_add(&s->waits, waited);
+    pthread_mutex_unlock(&s->waits_lock);
     storm_world_edit(&s->world, 3);
-    expect(s, hap_session_unlock(s->session) == HAP_OK);
+    storm_expect(s, hap_session_unlock(s->session) == HAP_OK);
   }
 }
 
@@ -695,7 +689,7 @@ static void *poster_main(void *arg)
 {
   storm *s = arg;
   while (!atomic_load(&s->stop)) {
-    post(s);
+    storm_post(s);
     sleep_ns(3 * MS);
   }
   return NULL;
@@ -709,7 +703,7 @@ static void look_at_bodies(storm *s)
     if (body != NULL) {
       hap_status status =
           hap_session_poses(s->session, hap_session_now(s->session), &body, 1, &pose);
-      expect(s, status >= HAP_OK || status == HAP_ERROR_NOT_FOUND); /* it may have gone */
+      storm_expect(s, status >= HAP_OK || status == HAP_ERROR_NOT_FOUND); /* it may have gone */
     }
   }
 }
@@ -721,7 +715,7 @@ static void look_at_hands(storm *s)
     hap_pointer_id id = {atomic_load(&s->hands[i].id)};
     if (id.v != 0) {
       hap_status status = hap_pointer_get(s->session, id, &state, sizeof state);
-      expect(s, status == HAP_OK || status == HAP_ERROR_NOT_FOUND);
+      storm_expect(s, status == HAP_OK || status == HAP_ERROR_NOT_FOUND);
     }
   }
 }
@@ -734,8 +728,8 @@ static void *viewer_main(void *arg)
     hap_detail detail;
     look_at_bodies(s);
     look_at_hands(s);
-    expect(s, hap_session_stats(s->session, &stats, sizeof stats) == HAP_OK);
-    expect(s, hap_session_detail(s->session, &detail) == HAP_OK);
+    storm_expect(s, hap_session_stats(s->session, &stats, sizeof stats) == HAP_OK);
+    storm_expect(s, hap_session_detail(s->session, &detail) == HAP_OK);
     sleep_ns(8 * MS);
   }
   return NULL;
@@ -743,19 +737,11 @@ static void *viewer_main(void *arg)
 
 /* ---- hands ---- */
 
-static void place_hand(storm *s, int index, double out[3])
-{
-  out[0] = 0.1 * (index % 4) - 0.15;
-  out[1] = 0.1 * (index / 4 % 4) - 0.15;
-  out[2] = 0.0;
-  memcpy(s->world.spots[index], out, 3 * sizeof out[0]);
-}
-
 /* Hands with a device have even numbers. */
 static hap_status open_hand(storm *s, int index, hap_detail *detail)
 {
-  double at[3];
-  place_hand(s, index, at);
+  const double at[3] = {0.1 * (index % 4) - 0.15, 0.1 * (index / 4 % 4) - 0.15, 0.0};
+  hapi_v3_copy(at, s->world.spots[index]);
   return index % 2 == 0
              ? storm_hand_open(at, 0.04, 0.4 + 0.05 * index, &s->hands[index].device, detail)
              : HAP_OK;
@@ -771,7 +757,7 @@ static void add_hand(storm *s, int index)
   def.stiffness = 500.0 * (1 + index % 4);
   def.damping = index % 3;
   def.max_force = STORM_FORCE;
-  expect(s, hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  storm_expect(s, hap_pointer_add(s->session, &def, &id) == HAP_OK);
   atomic_store(&s->hands[index].id, id.v);
   ++s->out->hands_added;
 }
@@ -786,10 +772,10 @@ static void remove_hand(storm *s, int index)
 {
   hap_pointer_state state;
   hap_pointer_id id = {atomic_exchange(&s->hands[index].id, 0)};
-  expect(s, hap_pointer_remove(s->session, id) == HAP_OK);
+  storm_expect(s, hap_pointer_remove(s->session, id) == HAP_OK);
   s->out->unreleased += is_held(s, index);
-  expect(s, hap_pointer_remove(s->session, id) == HAP_ERROR_NOT_FOUND);
-  expect(s, hap_pointer_get(s->session, id, &state, sizeof state) == HAP_ERROR_NOT_FOUND);
+  storm_expect(s, hap_pointer_remove(s->session, id) == HAP_ERROR_NOT_FOUND);
+  storm_expect(s, hap_pointer_get(s->session, id, &state, sizeof state) == HAP_ERROR_NOT_FOUND);
 }
 
 static void move_hands(storm *s)
@@ -801,12 +787,12 @@ static void move_hands(storm *s)
     hap_pose pose = {{at[0] + 0.04 * sin(angle), at[1] + 0.04 * cos(angle), at[2]},
                      {1.0, 0.0, 0.0, 0.0}};
     if (id.v != 0) {
-      expect(s, hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
+      storm_expect(s, hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
     }
   }
 }
 
-static void churn(storm *s)
+static void hands_churn(storm *s)
 {
   int index = (int)storm_uniform(&s->seed, 0.0, s->def.hands);
   if (atomic_load(&s->hands[index].id) != 0) {
@@ -821,7 +807,7 @@ static void churn(storm *s)
 static void take_figures(storm *s)
 {
   storm_result *out = s->out;
-  expect(s, hap_session_stats(s->session, &out->stats, sizeof out->stats) == HAP_OK);
+  storm_expect(s, hap_session_stats(s->session, &out->stats, sizeof out->stats) == HAP_OK);
   out->faults += out->stats.faults.count;
   if (out->stats.faults.count > 0) {
     hap_detail detail = {""};
@@ -830,15 +816,8 @@ static void take_figures(storm *s)
   }
 }
 
-static void restart(storm *s)
-{
-  expect(s, hap_session_stop(s->session) == HAP_OK);
-  take_figures(s);
-  expect(s, hap_session_start(s->session) >= HAP_OK);
-}
-
 /* A millisecond, or a tick in lockstep. */
-static void drive(storm *s, uint64_t round)
+static void storm_drive(storm *s, uint64_t round)
 {
   int64_t before = s->now_ns;
   if (s->def.drive == HAP_DRIVE_LOCKSTEP) {
@@ -846,9 +825,9 @@ static void drive(storm *s, uint64_t round)
       storm_world_edit(&s->world, 1);
     }
     if (s->def.posts && round % 7 == 0) {
-      post(s);
+      storm_post(s);
     }
-    expect(s, hap_session_advance(s->session, 1) >= HAP_OK);
+    storm_expect(s, hap_session_advance(s->session, 1) >= HAP_OK);
     s->now_ns += MS;
     if (s->def.ticked != NULL) {
       s->def.ticked(s->session, s->def.ticked_arg);
@@ -858,7 +837,7 @@ static void drive(storm *s, uint64_t round)
   sleep_ns(MS);
   s->now_ns = hapi_clock_now();
   if (s->def.drive == HAP_DRIVE_FRAME) {
-    expect(s, hap_session_update(s->session, 1e-9 * (double)(s->now_ns - before)) >= HAP_OK);
+    storm_expect(s, hap_session_update(s->session, 1e-9 * (double)(s->now_ns - before)) >= HAP_OK);
   }
 }
 
@@ -871,13 +850,15 @@ static void drive_to_the_end(storm *s)
   for (uint64_t round = 0; s->now_ns < end; ++round) {
     move_hands(s);
     if (s->def.churn && round % 11 == 0) {
-      churn(s);
+      hands_churn(s);
     }
     if (!restarted && s->now_ns > begin + (end - begin) / 2) {
-      restart(s);
+      storm_expect(s, hap_session_stop(s->session) == HAP_OK);
+      take_figures(s);
+      storm_expect(s, hap_session_start(s->session) >= HAP_OK);
       restarted = true;
     }
-    drive(s, round);
+    storm_drive(s, round);
   }
 }
 
@@ -894,7 +875,7 @@ static bool start_threads(storm *s, int *out_editors)
 static void run_threads(storm *s)
 {
   int editors = 0;
-  expect(s, start_threads(s, &editors));
+  storm_expect(s, start_threads(s, &editors));
   drive_to_the_end(s);
   atomic_store(&s->stop, true);
   for (int i = 0; i < editors; ++i) {
@@ -925,7 +906,7 @@ static hap_status create_session(storm *s, hap_detail *detail)
   return status;
 }
 
-static hap_status begin(storm *s, hap_detail *detail)
+static hap_status storm_begin(storm *s, hap_detail *detail)
 {
   hap_status status = HAP_OK;
   s->world.spot_count = s->def.hands;
@@ -959,7 +940,7 @@ static void close_hands(storm *s)
   }
 }
 
-static void conclude(storm *s)
+static void storm_conclude(storm *s)
 {
   storm_result *out = s->out;
   out->edits = s->world.edits;
@@ -986,20 +967,21 @@ hap_status storm_run(const storm_def *def, storm_result *out, hap_detail *detail
   pthread_mutex_init(&s->waits_lock, NULL);
   storm_world_open(&s->world, def->seed);
   s->world.telling = def->telling;
-  hap_status status = begin(s, detail);
+  hap_status status = storm_begin(s, detail);
   if (status >= HAP_OK) {
     if (def->drive == HAP_DRIVE_LOCKSTEP) {
       drive_to_the_end(s);
     } else {
       run_threads(s);
     }
-    expect(s, hap_session_stop(s->session) == HAP_OK);
+    storm_expect(s, hap_session_stop(s->session) == HAP_OK);
     take_figures(s);
   }
   hap_session_destroy(s->session);
-  conclude(s); /* destroy runs what was posted last */
+  storm_conclude(s); /* destroy runs what was posted last */
   close_hands(s);
-  storm_world_close(&s->world);
+  dSpaceDestroy(s->world.space);
+  dWorldDestroy(s->world.world);
   pthread_mutex_destroy(&s->waits_lock);
   return status;
 }

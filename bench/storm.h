@@ -3,8 +3,8 @@
 #ifndef HAPODE_BENCH_STORM_H
 #define HAPODE_BENCH_STORM_H
 
-/* A session over a world that several threads change all the time, with hands in the middle of it that
- * come and go. For the bench and the tests. */
+/* A session over a world that several threads change all the time, with hands in the middle of
+ * it that come and go. For the bench and the tests. */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -343,8 +343,8 @@ static bool run_scene(const char *name, hap_model model, double physics_hz, accu
   accuracy_run_def_init(&def);
   def.parameters = &parameters;
   def.seconds = parameters.duration;
-  def.model = model;
-  def.physics_hz = physics_hz;
+  def.session.model = model;
+  def.session.physics_hz = physics_hz;
   for (int h = 0; h < parameters.pointers; ++h) {
     def.hands[h] = hands[h];
     if (!accuracy_hand(parameters.hands[h], 1.0, hands[h], sizeof hands[h])) {
