@@ -212,13 +212,12 @@ hap_status bench_faults(bench *b)
       status = scene_measure(b, &faults_table[i], csv, &faults);
     }
   }
-  hap_status closed = bench_csv_close(b, csv);
-  if (status < HAP_OK) {
-    return status;
-  }
   if (!found) {
-    return bench_fail(b, HAP_ERROR_ARGUMENT, "there is no scene \"%s\"", b->scene);
+    status = bench_fail(b, HAP_ERROR_ARGUMENT, "there is no scene \"%s\"", b->scene);
   }
-  bench_say("%d rows beyond their bounds", faults);
-  return closed;
+  status = bench_csv_close(b, csv, status);
+  if (status >= HAP_OK) {
+    bench_say("%d rows beyond their bounds", faults);
+  }
+  return status;
 }
