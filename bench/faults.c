@@ -13,12 +13,24 @@
 
 #define REFERENCE_HZ 2000.0
 
+#define TOUCH_N 0.05 /* of the first contact */
+#define JOINT_OPEN_MAX 1e-3
+
 /* Of a run against the reference, while either pushes. */
 typedef struct comparison {
   double error; /* RMS of the difference / RMS of the reference */
   double jump;  /* N, largest change from tick to tick */
   double peak;  /* N */
+  double shift; /* s, by which the first contact is late */
+  bool good;
 } comparison;
+
+/* The first contact of a run. */
+typedef struct arrival {
+  size_t begin;
+  double peak;    /* N */
+  double impulse; /* N s */
+} arrival;
 
 typedef struct references {
   faults_run run;
@@ -99,9 +111,34 @@ static double held_force(const faults_run *reference, const faults_run *test)
   return held;
 }
 
+static arrival run_arrival(const faults_run *run)
+{
+  arrival a = {.begin = 0};
+  while (a.begin < run->count && force_norm(run->force[a.begin]) < TOUCH_N) {
+    ++a.begin;
+  }
+  for (size_t i = a.begin; i < run->count && force_norm(run->force[i]) > 0.0; ++i) {
+    a.peak = fmax(a.peak, force_norm(run->force[i]));
+    a.impulse += FAULTS_TICK_S * force_norm(run->force[i]);
+  }
+  return a;
+}
+
+/* In time, with the right peak and impulse. error: the larger of these two. */
+static void arrival_compare(const faults_run *reference, const faults_run *test, comparison *io)
+{
+  arrival right = run_arrival(reference);
+  arrival found = run_arrival(test);
+  io->shift = FAULTS_TICK_S * ((double)found.begin - (double)right.begin);
+  io->error = fmax(fabs(found.peak / right.peak - 1.0), fabs(found.impulse / right.impulse - 1.0));
+}
+
 static bool references_make(bench *b, const faults_scene *scene, references *out)
 {
   memset(out, 0, sizeof *out);
+  if (scene->check.kind == FAULTS_DUTY || scene->check.kind == FAULTS_DUTY_OWN) {
+    return faults_run_create(scene, &out->run) && faults_run_create(scene, &out->half);
+  }
   double rate = scene->check.reference_hz > 0.0 ? scene->check.reference_hz : REFERENCE_HZ;
   if (!faults_reference_run(scene, rate, &out->run) ||
       !faults_reference_run(scene, 2.0 * rate, &out->half)) {
@@ -145,12 +182,18 @@ static bool run_judge(const faults_scene *scene, double hz, const references *r,
       return io->error <= bound;
     case FAULTS_DUTY:
       io->error = run->duty;
-      return run->duty <= bound;
+      return io->error <= bound;
+    case FAULTS_DUTY_OWN:
+      io->error = run->duty_own;
+      return io->error <= bound;
     case FAULTS_CAPACITY:
       return io->error <= bound || (run->said > 0 && run->dropped > 0);
     case FAULTS_ARRIVAL:
+      arrival_compare(&r->half, run, io);
+      return io->error <= bound && fabs(io->shift) <= fmax(2e-3, 0.1 / hz);
     case FAULTS_FORCE:
-      return io->error <= fmax(bound, 2.0 * r->floor) && is_calm;
+      return io->error <= fmax(bound, 2.0 * r->floor) && is_calm &&
+             run->joint_open <= fmax(JOINT_OPEN_MAX, 2.0 * r->half.joint_open);
   }
   return false;
 }
@@ -158,8 +201,37 @@ static bool run_judge(const faults_scene *scene, double hz, const references *r,
 static const char *kind_name(faults_kind kind)
 {
   static const char *const names[] = {"force",   "hold",     "steps", "told",
-                                      "arrival", "capacity", "duty"};
+                                      "arrival", "capacity", "duty",  "own_duty"};
   return names[kind];
+}
+
+static void row_say(const faults_scene *scene, double hz, const references *r,
+                    const faults_run *run, const comparison *c)
+{
+  char more[100] = "";
+  if (scene->check.kind == FAULTS_ARRIVAL) {
+    snprintf(more, sizeof more, "%.0f ms late  ", 1e3 * c->shift);
+  } else if (run->joint_open > 0.0) {
+    snprintf(more, sizeof more, "joints open %.2f mm of %.2f  ", 1e3 * run->joint_open,
+             1e3 * r->half.joint_open);
+  } else if (scene->check.kind == FAULTS_CAPACITY) {
+    snprintf(more, sizeof more, "%lu dropped, %lu lines  ", run->dropped, run->said);
+  }
+  bench_say(
+      "%2d %-14s %2.0f Hz %-8s error %8.3f %%  floor %7.3f %%  jump %7.3f N of %7.3f  "
+      "peak %7.3f N of %7.3f  %s%s",
+      scene->item, scene->name, hz, kind_name(scene->check.kind), 100.0 * c->error,
+      100.0 * r->floor, c->jump, r->own.jump, c->peak, r->own.peak, more, c->good ? "ok" : "FAULT");
+}
+
+static void row_write(FILE *csv, const faults_scene *scene, double hz, const references *r,
+                      const faults_run *run, const comparison *c)
+{
+  fprintf(csv, "%d,%s,%g,%s,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,", scene->item, scene->name, hz,
+          kind_name(scene->check.kind), c->error, r->floor, c->jump, r->own.jump, c->peak,
+          r->own.peak, scene->check.bound);
+  fprintf(csv, "%s,%.3g,%.3g,%lu,%lu\n", c->good ? "ok" : "FAULT", 1e3 * c->shift,
+          1e3 * run->joint_open, run->dropped, run->said);
 }
 
 static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, int *io_faults)
@@ -177,17 +249,11 @@ static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, 
     status = faults_session_run(b, scene, HAP_MODEL_CONTACT, rates[i], &run);
     if (status >= HAP_OK) {
       run_compare(scene, &r.half, &run, &c);
-      bool good = run_judge(scene, rates[i], &r, &run, &c);
-      *io_faults += !good;
-      b->off += b->verify && !good;
-      bench_say(
-          "%2d %-14s %2.0f Hz %-8s error %8.3f %%  floor %7.3f %%  jump %7.3f N of %7.3f  "
-          "peak %7.3f N of %7.3f  %s",
-          scene->item, scene->name, rates[i], kind_name(scene->check.kind), 100.0 * c.error,
-          100.0 * r.floor, c.jump, r.own.jump, c.peak, r.own.peak, good ? "ok" : "FAULT");
-      fprintf(csv, "%d,%s,%g,%s,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%s\n", scene->item, scene->name,
-              rates[i], kind_name(scene->check.kind), c.error, r.floor, c.jump, r.own.jump, c.peak,
-              r.own.peak, scene->check.bound, good ? "ok" : "FAULT");
+      c.good = run_judge(scene, rates[i], &r, &run, &c);
+      *io_faults += !c.good;
+      b->off += b->verify && !c.good;
+      row_say(scene, rates[i], &r, &run, &c);
+      row_write(csv, scene, rates[i], &r, &run, &c);
     }
     faults_run_free(&run);
   }
@@ -201,15 +267,16 @@ hap_status bench_faults(bench *b)
   bool found = false;
   FILE *csv = bench_csv_open(b, "faults",
                              "item,scene,hz,measure,error,floor,jump_n,jump_reference_n,peak_n,"
-                             "peak_reference_n,bound,verdict");
+                             "peak_reference_n,bound,verdict,shift_ms,joint_open_mm,dropped,said");
   if (csv == NULL) {
     return HAP_ERROR_IO;
   }
   hap_status status = HAP_OK;
-  for (size_t i = 0; i < faults_table_count && status >= HAP_OK; ++i) {
-    if (b->scene == NULL || strcmp(b->scene, faults_table[i].name) == 0) {
+  const faults_scene *scene;
+  for (size_t i = 0; (scene = faults_scene_at(i)) != NULL && status >= HAP_OK; ++i) {
+    if (b->scene == NULL || strcmp(b->scene, scene->name) == 0) {
       found = true;
-      status = scene_measure(b, &faults_table[i], csv, &faults);
+      status = scene_measure(b, scene, csv, &faults);
     }
   }
   if (!found) {

@@ -16,6 +16,7 @@
 #include "bench/bench.h"
 
 #define FAULTS_BODIES_MAX 1100
+#define FAULTS_HINGES_MAX 16
 #define FAULTS_HULL_MAX 8
 #define FAULTS_TICK_S 0.001
 
@@ -45,6 +46,8 @@ typedef struct faults_world {
   dHeightfieldDataID field_data;
   double *field; /* heights, the application's copy */
   dJointFeedback feedback;
+  dJointID hinges[FAULTS_HINGES_MAX]; /* that have to hold */
+  size_t hinge_count;
   double told; /* N, norm of the force on body 0 that the feedback told at the last step */
 } faults_world;
 
@@ -56,7 +59,8 @@ typedef enum faults_kind {
   FAULTS_FEEDBACK, /* dJointFeedback */
   FAULTS_ARRIVAL,  /* time, peak and impulse of the first contact */
   FAULTS_CAPACITY, /* as FORCE, or said and counted */
-  FAULTS_DUTY      /* share of a period that physics takes */
+  FAULTS_DUTY,     /* share of a period that physics takes */
+  FAULTS_DUTY_OWN  /* the same without what a plain loop of ODE would take */
 } faults_kind;
 
 /* The hand's position [m] and velocity [m/s] at a time [s]. */
@@ -69,6 +73,7 @@ typedef struct faults_motion {
   faults_hand_fn hand;
   double radius;       /* m */
   double stiffness;    /* N/m */
+  double damping;      /* N s/m */
   double friction;     /* of the pointer */
   double max_force;    /* N; 0: the library's default */
   bool cube_tool;      /* a hull, a cube of edge 2 radius, in the place of a sphere */
@@ -103,15 +108,23 @@ typedef struct faults_run {
   double (*force)[3]; /* N */
   double *told;       /* N, what the feedback said */
   size_t count;
-  double joint_open_mm; /* the widest joint */
-  double energy_off;    /* J, largest of bodies and spring beside the work of the hand; reference */
+  double joint_open; /* m, the widest hinge */
+  double energy_off; /* J, largest of bodies and spring beside the work of the hand; reference */
   unsigned long dropped; /* session: stats.model.capacity_dropped */
   unsigned long said;    /* session: lines of log of warnings and errors */
   double duty;           /* session: of physics */
+  double duty_own;
 } faults_run;
 
 extern const faults_scene faults_table[];
 extern const size_t faults_table_count;
+extern const faults_scene faults_moving_table[];
+extern const size_t faults_moving_count;
+
+const faults_scene *faults_scene_at(size_t index); /* of all; NULL past the end */
+
+/* m, between the anchors of the hinge that is widest open. */
+double faults_world_open(const faults_world *w);
 
 /* False: no memory. */
 bool faults_world_create(const faults_scene *scene, bool is_reference, faults_world *out);

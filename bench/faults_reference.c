@@ -429,21 +429,35 @@ static void pointer_rub(pointer *p, const faults_motion *m, double pushed, doubl
   }
 }
 
+/* Of spring and damper along the normal; they do not pull. */
+static double touch_push(const touch *t, const faults_motion *m, const double velocity[3])
+{
+  dVector3 body = {0.0, 0.0, 0.0};
+  double to_body[3];
+  if (t->body != NULL) {
+    dBodyGetPointVel(t->body, t->point[0], t->point[1], t->point[2], body);
+  }
+  vector_between(velocity, body, to_body);
+  return fmax(0.0, m->stiffness * t->depth + m->damping * vector_dot(t->normal, to_body));
+}
+
 /* Force on the hand; the bodies get the opposite. */
-static void pointer_push(pointer *p, const faults_motion *m, double out_force[3])
+static void pointer_push(pointer *p, const faults_motion *m, const double velocity[3],
+                         double out_force[3])
 {
   double rub[3] = {0.0, 0.0, 0.0};
   if (p->count == 0) {
     p->sticks = false;
   } else if (m->friction > 0.0) {
-    pointer_rub(p, m, m->stiffness * p->touches[0].depth, rub);
+    pointer_rub(p, m, touch_push(&p->touches[0], m, velocity), rub);
   }
   memset(out_force, 0, 3 * sizeof *out_force);
   for (size_t i = 0; i < p->count; ++i) {
     const touch *t = &p->touches[i];
+    double push = touch_push(t, m, velocity);
     double f[3];
     for (int k = 0; k < 3; ++k) {
-      f[k] = m->stiffness * t->depth * t->normal[k] + (i == 0 ? rub[k] : 0.0);
+      f[k] = push * t->normal[k] + (i == 0 ? rub[k] : 0.0);
       out_force[k] += f[k];
     }
     if (t->body != NULL) {
@@ -550,7 +564,7 @@ bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run 
     pointer_look(p, &w);
     double energy = world_energy(&w) + pointer_energy(p, &scene->motion);
     work -= 0.5 * vector_dot(force, moved);
-    pointer_push(p, &scene->motion, force);
+    pointer_push(p, &scene->motion, velocity, force);
     if (n == 0) {
       work = energy;
     } else {
@@ -573,6 +587,7 @@ bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run 
     if (scene->after != NULL) {
       scene->after(&w, t, t + h);
     }
+    out->joint_open = fmax(out->joint_open, faults_world_open(&w));
   }
   faults_world_destroy(&w);
   free(p);

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
+#include <time.h>
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
@@ -17,7 +18,7 @@
 typedef struct run_state {
   faults_world w;
   double world_s; /* time of the application's world */
-  unsigned long steps;
+  double open;    /* m, the widest hinge so far */
 } run_state;
 
 static atomic_ulong lines_said;
@@ -53,7 +54,15 @@ static void after_step(void *user, double step_s)
     run->w.scene->after(&run->w, run->world_s, run->world_s + step_s);
   }
   run->world_s += step_s;
-  ++run->steps;
+  run->open = fmax(run->open, faults_world_open(&run->w));
+}
+
+/* s, of this thread: other programs on the machine do not count. */
+static double thread_seconds(void)
+{
+  struct timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 /* Corners of a cube whose half edge is the pointer's radius. */
@@ -77,6 +86,7 @@ static hap_status pointer_add(bench *b, const faults_scene *scene, hap_session *
   hap_pointer_expert_def_init(&expert, sizeof expert);
   def.radius = m->radius;
   def.stiffness = m->stiffness;
+  def.damping = m->damping;
   def.friction = m->friction;
   def.max_force = m->max_force > 0.0 ? m->max_force : def.max_force;
   def.max_torque = MAX_TORQUE;
@@ -100,9 +110,32 @@ static hap_status pointer_add(bench *b, const faults_scene *scene, hap_session *
   return status;
 }
 
+/* In lockstep a physics step runs inside of a tick: what such a tick takes longer than others. */
+typedef struct tick_times {
+  double with_step; /* s, sum */
+  double without;
+  unsigned long steps;
+  unsigned long others;
+} tick_times;
+
+static void tick_times_add(tick_times *t, double spent, bool has_step)
+{
+  *(has_step ? &t->with_step : &t->without) += spent;
+  *(has_step ? &t->steps : &t->others) += 1;
+}
+
+static double tick_times_step(const tick_times *t)
+{
+  if (t->steps == 0 || t->others == 0) {
+    return 0.0;
+  }
+  return t->with_step / (double)t->steps - t->without / (double)t->others;
+}
+
 static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *session,
                             hap_pointer_id hand, run_state *run, faults_run *out)
 {
+  tick_times times = {.steps = 0};
   for (size_t i = 0; i < out->count; ++i) {
     hap_pose pose = {.quat_wxyz = {1.0}};
     hap_twist twist = {{0.0}, {0.0}};
@@ -112,9 +145,12 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
     if (status >= HAP_OK && i == 0) {
       status = hap_session_start(session);
     }
+    double world_s = run->world_s;
+    double begin = thread_seconds();
     if (status >= HAP_OK) {
       status = hap_session_advance(session, 1);
     }
+    tick_times_add(&times, thread_seconds() - begin, run->world_s > world_s);
     if (status >= HAP_OK) {
       status = hap_pointer_get(session, hand, &state, sizeof state);
     }
@@ -125,6 +161,7 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
     memcpy(out->force[i], state.wrench.force, sizeof out->force[i]);
     out->told[i] = run->w.told;
   }
+  out->duty = tick_times_step(&times);
   return HAP_OK;
 }
 
@@ -175,7 +212,11 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, hap_model mod
   }
   if (status >= HAP_OK && hap_session_stats(session, &stats, sizeof stats) >= HAP_OK) {
     out->dropped = (unsigned long)stats.model.capacity_dropped;
-    out->duty = stats.physics.ms_mean * 1e-3 * physics_hz;
+    const hap_cycle_times *mean = &stats.physics.mean;
+    double plain = (mean->collide_ms + mean->step_ms) / stats.physics.ms_mean;
+    out->duty *= physics_hz;
+    out->duty_own = out->duty * (1.0 - plain);
+    out->joint_open = run.open;
   }
   hap_session_destroy(session);
   faults_world_destroy(&run.w);

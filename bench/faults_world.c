@@ -52,6 +52,19 @@ void faults_glide(double t, double begin, double end, double way, double *io_pos
   *io_velocity += way * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end - begin);
 }
 
+double faults_world_open(const faults_world *w)
+{
+  double widest = 0.0;
+  for (size_t i = 0; i < w->hinge_count; ++i) {
+    dVector3 a;
+    dVector3 b;
+    dJointGetHingeAnchor(w->hinges[i], a);
+    dJointGetHingeAnchor2(w->hinges[i], b);
+    widest = fmax(widest, hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]));
+  }
+  return widest;
+}
+
 bool faults_world_create(const faults_scene *scene, bool is_reference, faults_world *out)
 {
   memset(out, 0, sizeof *out);

@@ -12,12 +12,12 @@
 
 static const faults_scene *scene_find(const char *name)
 {
-  for (size_t i = 0; i < faults_table_count; ++i) {
-    if (strcmp(faults_table[i].name, name) == 0) {
-      return &faults_table[i];
-    }
+  const faults_scene *scene;
+  size_t i = 0;
+  while ((scene = faults_scene_at(i)) != NULL && strcmp(scene->name, name) != 0) {
+    ++i;
   }
-  return NULL;
+  return scene;
 }
 
 TEST(a_pressed_block_is_felt_as_its_spring)
