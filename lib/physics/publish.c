@@ -241,36 +241,21 @@ static void fill_parameters(const publishing *p, const hapi_known_joint *known,
 {
   dJointID joint = known->joint;
   dWorldID world = p->world->ode.world;
+  const hapi_joint_traits *traits = hapi_joint_traits_of(joint);
   out->linear = softness_of(p, dWorldGetERP(world), dWorldGetCFM(world));
   out->angular = out->along = out->linear;
-  switch (known->kind) {
-    case HAPI_JOINT_BALL:
-      out->linear = softness_of(p, dJointGetBallParam(joint, dParamERP),
-                                dJointGetBallParam(joint, dParamCFM));
-      break;
-    case HAPI_JOINT_HINGE:
-      fill_limit(p, joint, dJointGetHingeParam, 0, true, &out->limits[0]);
-      break;
-    case HAPI_JOINT_SLIDER:
-      fill_limit(p, joint, dJointGetSliderParam, 0, false, &out->limits[0]);
-      break;
-    case HAPI_JOINT_UNIVERSAL:
-      fill_limit(p, joint, dJointGetUniversalParam, 0, true, &out->limits[0]);
-      fill_limit(p, joint, dJointGetUniversalParam, dParamGroup, true, &out->limits[1]);
-      break;
-    case HAPI_JOINT_HINGE2:
-      fill_limit(p, joint, dJointGetHinge2Param, 0, true, &out->limits[0]);
-      fill_limit(p, joint, dJointGetHinge2Param, dParamGroup, true, &out->limits[1]);
-      out->limits[1].flags &= HAPI_LIMIT_MOTOR; /* ODE never stops the second axis */
-      out->along = softness_of(p, dJointGetHinge2Param(joint, dParamSuspensionERP),
-                               dJointGetHinge2Param(joint, dParamSuspensionCFM));
-      break;
-    case HAPI_JOINT_FIXED:
-      out->linear = softness_of(p, dJointGetFixedParam(joint, dParamERP),
-                                dJointGetFixedParam(joint, dParamCFM));
-      break;
-    case HAPI_JOINT_MEASURED:
-      break;
+  if (traits->soft == HAPI_SOFT_OWN) { /* a ball or a fixed joint has no free axis */
+    out->linear = softness_of(p, traits->get(joint, dParamERP), traits->get(joint, dParamCFM));
+    return;
+  }
+  for (int i = 0; i < traits->groups; ++i) {
+    bool turns = known->kind != HAPI_JOINT_SLIDER;
+    fill_limit(p, joint, traits->get, i * dParamGroup, turns, &out->limits[i]);
+  }
+  if (traits->soft == HAPI_SOFT_SUSPENSION) {
+    out->limits[1].flags &= HAPI_LIMIT_MOTOR; /* ODE never stops the second axis */
+    out->along = softness_of(p, traits->get(joint, dParamSuspensionERP),
+                             traits->get(joint, dParamSuspensionCFM));
   }
 }
 

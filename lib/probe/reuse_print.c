@@ -53,136 +53,41 @@ static void print_vector(printer *p, const double *values, int count, double wei
  * joints is always measured. Of LMotor and Plane2D the axes or motors have no getter, and a
  * transmission is not probed. */
 
-typedef void (*point_fn)(dJointID, dVector3);
-typedef dReal (*position_fn)(dJointID);
-
-typedef struct joint_reader {
-  dJointType type;
-  dReal (*parameter)(dJointID, int);
-  int groups; /* of parameters */
-  point_fn points[2];
-  point_fn axes[3];
-  position_fn lengths[1];
-  position_fn angles[2];
-} joint_reader;
-
-static const joint_reader readers[] = {
-    {dJointTypeBall,
-     dJointGetBallParam,
-     1,
-     {dJointGetBallAnchor, dJointGetBallAnchor2},
-     {NULL},
-     {NULL},
-     {NULL}},
-    {dJointTypeHinge,
-     dJointGetHingeParam,
-     1,
-     {dJointGetHingeAnchor, dJointGetHingeAnchor2},
-     {dJointGetHingeAxis},
-     {NULL},
-     {dJointGetHingeAngle}},
-    {dJointTypeSlider,
-     dJointGetSliderParam,
-     1,
-     {NULL},
-     {dJointGetSliderAxis},
-     {dJointGetSliderPosition},
-     {NULL}},
-    {dJointTypeUniversal,
-     dJointGetUniversalParam,
-     2,
-     {dJointGetUniversalAnchor, dJointGetUniversalAnchor2},
-     {dJointGetUniversalAxis1, dJointGetUniversalAxis2},
-     {NULL},
-     {dJointGetUniversalAngle1, dJointGetUniversalAngle2}},
-    {dJointTypeHinge2,
-     dJointGetHinge2Param,
-     2,
-     {dJointGetHinge2Anchor, dJointGetHinge2Anchor2},
-     {dJointGetHinge2Axis1, dJointGetHinge2Axis2},
-     {NULL},
-     {dJointGetHinge2Angle1, dJointGetHinge2Angle2}},
-    {dJointTypePR,
-     dJointGetPRParam,
-     2,
-     {dJointGetPRAnchor},
-     {dJointGetPRAxis1, dJointGetPRAxis2},
-     {dJointGetPRPosition},
-     {dJointGetPRAngle}},
-    {dJointTypePU,
-     dJointGetPUParam,
-     3,
-     {dJointGetPUAnchor},
-     {dJointGetPUAxis1, dJointGetPUAxis2, dJointGetPUAxis3},
-     {dJointGetPUPosition},
-     {dJointGetPUAngle1, dJointGetPUAngle2}},
-    {dJointTypePiston,
-     dJointGetPistonParam,
-     2,
-     {dJointGetPistonAnchor, dJointGetPistonAnchor2},
-     {dJointGetPistonAxis},
-     {dJointGetPistonPosition},
-     {dJointGetPistonAngle}},
-    {dJointTypeAMotor, dJointGetAMotorParam, 3, {NULL}, {NULL}, {NULL}, {NULL}},
-    {dJointTypeFixed, dJointGetFixedParam, 1, {NULL}, {NULL}, {NULL}, {NULL}},
-    {dJointTypeDBall,
-     dJointGetDBallParam,
-     1,
-     {dJointGetDBallAnchor1, dJointGetDBallAnchor2},
-     {NULL},
-     {dJointGetDBallDistance},
-     {NULL}},
-    {dJointTypeDHinge,
-     dJointGetDHingeParam,
-     1,
-     {dJointGetDHingeAnchor1, dJointGetDHingeAnchor2},
-     {dJointGetDHingeAxis},
-     {dJointGetDHingeDistance},
-     {NULL}},
-};
-
-static const joint_reader *joint_reader_of(dJointType type)
-{
-  for (size_t i = 0; i < sizeof readers / sizeof readers[0]; ++i) {
-    if (readers[i].type == type) {
-      return &readers[i];
-    }
-  }
-  return NULL;
-}
-
 static void print_joint(printer *p, dJointID joint, double arm)
 {
-  const joint_reader *reader = joint_reader_of(dJointGetType(joint));
-  if (reader == NULL) {
+  const hapi_joint_traits *traits = hapi_joint_traits_of(joint);
+  if (traits == NULL || !traits->told) {
     p->good = false;
     return;
   }
+  void (*const points[])(dJointID, dVector3) = {traits->anchor, traits->anchor2};
+  void (*const axes[])(dJointID, dVector3) = {traits->axis, traits->axis2, traits->axis3};
+  dReal (*const angles[])(dJointID) = {traits->angle, traits->angle2};
   static const int names[] = {dParamLoStop,        dParamHiStop,        dParamVel,
                               dParamFMax,          dParamFudgeFactor,   dParamBounce,
                               dParamCFM,           dParamStopERP,       dParamStopCFM,
                               dParamSuspensionERP, dParamSuspensionCFM, dParamERP};
-  for (int group = 0; group < reader->groups; ++group) {
+  for (int group = 0; group < traits->groups; ++group) {
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
-      print_value(p, reader->parameter(joint, names[i] + group * dParamGroup), -1.0);
+      print_value(p, traits->get(joint, names[i] + group * dParamGroup), -1.0);
     }
   }
   dVector3 v = {0.0, 0.0, 0.0, 0.0};
-  for (int i = 0; i < 2 && reader->points[i] != NULL; ++i) {
-    reader->points[i](joint, v);
+  for (int i = 0; i < 2 && points[i] != NULL; ++i) {
+    points[i](joint, v);
     print_vector(p, v, 3, 1.0);
   }
-  for (int i = 0; i < 3 && reader->axes[i] != NULL; ++i) {
-    reader->axes[i](joint, v);
+  for (int i = 0; i < 3 && axes[i] != NULL; ++i) {
+    axes[i](joint, v);
     print_vector(p, v, 3, arm);
   }
-  if (reader->lengths[0] != NULL) {
-    print_value(p, reader->lengths[0](joint), 1.0);
+  if (traits->length != NULL) {
+    print_value(p, traits->length(joint), 1.0);
   }
-  for (int i = 0; i < 2 && reader->angles[i] != NULL; ++i) {
-    print_value(p, reader->angles[i](joint), arm);
+  for (int i = 0; i < 2 && angles[i] != NULL; ++i) {
+    print_value(p, angles[i](joint), arm);
   }
-  if (reader->type == dJointTypeAMotor) {
+  if (traits->type == dJointTypeAMotor) {
     dVector3 axis = {0.0, 0.0, 0.0, 0.0};
     int count = dJointGetAMotorNumAxes(joint);
     print_value(p, count, -1.0);

@@ -16,28 +16,10 @@
  * It does not say it of the axes of an LMotor (only their numbers, without the frame), nor of a
  * Plane2D: there motors are part of the measurement. */
 
-typedef struct limits_of {
-  dJointType type;
-  dReal (*get)(dJointID, int);
-  void (*set)(dJointID, int, dReal);
-  int count;
-} limits_of;
-
-static const limits_of kinds[] = {
-    {dJointTypeAMotor, dJointGetAMotorParam, dJointSetAMotorParam, 3},
-    {dJointTypePR, dJointGetPRParam, dJointSetPRParam, 2},
-    {dJointTypePiston, dJointGetPistonParam, dJointSetPistonParam, 2},
-};
-
-static const limits_of *kind_of(dJointID joint)
+static const hapi_joint_traits *limited_traits(dJointID joint)
 {
-  dJointType type = dJointGetType(joint);
-  for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
-    if (kinds[i].type == type) {
-      return &kinds[i];
-    }
-  }
-  return NULL;
+  const hapi_joint_traits *traits = hapi_joint_traits_of(joint);
+  return traits != NULL && traits->limits ? traits : NULL;
 }
 
 /* ---- where the axes are ---- */
@@ -82,10 +64,10 @@ static void read_sliding(dJointID joint, int which, bool turned, hapi_joint_axis
 
 int hapi_joint_axes(const hapi_known_joint *known, hapi_joint_axis out[HAPI_JOINT_LIMITS])
 {
-  const limits_of *kind = kind_of(known->joint);
+  const hapi_joint_traits *kind = limited_traits(known->joint);
   bool turned = dJointGetBody(known->joint, 0) == NULL;
   bool motor = kind != NULL && kind->type == dJointTypeAMotor;
-  int count = motor ? dJointGetAMotorNumAxes(known->joint) : kind != NULL ? kind->count : 0;
+  int count = motor ? dJointGetAMotorNumAxes(known->joint) : kind != NULL ? kind->groups : 0;
   count = count < HAPI_JOINT_LIMITS ? count : HAPI_JOINT_LIMITS;
   for (int i = 0; i < count; ++i) {
     memset(&out[i], 0, sizeof out[i]);
@@ -107,8 +89,8 @@ static const int names[] = {dParamFMax, dParamLoStop, dParamHiStop};
 void hapi_joint_take_limits(const hapi_known_joint *known, hapi_joint_limits *out)
 {
   static const double none[] = {0.0, -dInfinity, dInfinity};
-  const limits_of *kind = kind_of(known->joint);
-  for (int i = 0; kind != NULL && i < kind->count; ++i) {
+  const hapi_joint_traits *kind = limited_traits(known->joint);
+  for (int i = 0; kind != NULL && i < kind->groups; ++i) {
     for (int k = 0; k < 3; ++k) {
       out->values[i][k] = kind->get(known->joint, names[k] + i * dParamGroup);
       kind->set(known->joint, names[k] + i * dParamGroup, none[k]);
@@ -118,8 +100,8 @@ void hapi_joint_take_limits(const hapi_known_joint *known, hapi_joint_limits *ou
 
 void hapi_joint_give_limits(const hapi_known_joint *known, const hapi_joint_limits *limits)
 {
-  const limits_of *kind = kind_of(known->joint);
-  for (int i = 0; kind != NULL && i < kind->count; ++i) {
+  const hapi_joint_traits *kind = limited_traits(known->joint);
+  for (int i = 0; kind != NULL && i < kind->groups; ++i) {
     for (int k = 0; k < 3; ++k) {
       kind->set(known->joint, names[k] + i * dParamGroup, limits->values[i][k]);
     }

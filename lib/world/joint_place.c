@@ -345,25 +345,6 @@ static bool has_been_moved(const hapi_known_joint *known)
   return !near_to(now.position, known->left.position) || !(turned <= SAME_PLACE);
 }
 
-bool hapi_joint_kind_of(dJointID joint, hapi_joint_kind *out)
-{
-  static const struct {
-    dJointType type;
-    hapi_joint_kind kind;
-  } kinds[] = {
-      {dJointTypeBall, HAPI_JOINT_BALL},     {dJointTypeHinge, HAPI_JOINT_HINGE},
-      {dJointTypeSlider, HAPI_JOINT_SLIDER}, {dJointTypeUniversal, HAPI_JOINT_UNIVERSAL},
-      {dJointTypeHinge2, HAPI_JOINT_HINGE2}, {dJointTypeFixed, HAPI_JOINT_FIXED},
-  };
-  for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
-    if (kinds[i].type == dJointGetType(joint)) {
-      *out = kinds[i].kind;
-      return true;
-    }
-  }
-  return false;
-}
-
 void hapi_joint_read(hapi_known_joint *known, bool is_new)
 {
   reading r;

@@ -212,7 +212,9 @@ static void joint_see(hapi_world *world, dJointID joint)
     bool near =
         is_local(&world->bodies, known->index[0]) || is_local(&world->bodies, known->index[1]);
     known->seen = world->joints.scan;
-    known->carried = hapi_joint_kind_of(known->joint, &known->kind);
+    const hapi_joint_traits *traits = hapi_joint_traits_of(known->joint);
+    known->carried = traits != NULL && traits->kind != HAPI_JOINT_MEASURED;
+    known->kind = known->carried ? traits->kind : known->kind;
     if (known->carried && (is_new || near || known->left_is_known)) {
       hapi_joint_read(known, is_new);
     }

@@ -29,73 +29,48 @@ static double keep_of(double damping, double ratio)
   return 1.0 - pow(1.0 - fmin(fmax(damping, 0.0), 1.0), ratio);
 }
 
-/* Where a joint has error reduction and softness of its own: beside those of the world's rows. */
-typedef struct joint_parameters {
-  dJointType type;
-  dReal (*get)(dJointID, int);
-  void (*set)(dJointID, int, dReal);
-  int count;
-  int names[3][2];
-} joint_parameters;
-
-#define STOP(group)                                                          \
-  {                                                                          \
-    dParamStopERP + (group)*dParamGroup, dParamStopCFM + (group)*dParamGroup \
-  }
-
-static const joint_parameters own_parameters[] = {
-    {dJointTypeBall, dJointGetBallParam, dJointSetBallParam, 1, {{dParamERP, dParamCFM}}},
-    {dJointTypeDBall, dJointGetDBallParam, dJointSetDBallParam, 1, {{dParamERP, dParamCFM}}},
-    {dJointTypeDHinge, dJointGetDHingeParam, dJointSetDHingeParam, 1, {{dParamERP, dParamCFM}}},
-    {dJointTypeFixed, dJointGetFixedParam, dJointSetFixedParam, 1, {{dParamERP, dParamCFM}}},
-    {dJointTypeHinge, dJointGetHingeParam, dJointSetHingeParam, 1, {STOP(0)}},
-    {dJointTypeSlider, dJointGetSliderParam, dJointSetSliderParam, 1, {STOP(0)}},
-    {dJointTypeUniversal, dJointGetUniversalParam, dJointSetUniversalParam, 2, {STOP(0), STOP(1)}},
-    {dJointTypeHinge2,
-     dJointGetHinge2Param,
-     dJointSetHinge2Param,
-     2,
-     {STOP(0), {dParamSuspensionERP, dParamSuspensionCFM}}},
-    {dJointTypeAMotor, dJointGetAMotorParam, dJointSetAMotorParam, 3, {STOP(0), STOP(1), STOP(2)}},
-    {dJointTypeLMotor, dJointGetLMotorParam, dJointSetLMotorParam, 3, {STOP(0), STOP(1), STOP(2)}},
-    {dJointTypePR, dJointGetPRParam, dJointSetPRParam, 2, {STOP(0), STOP(1)}},
-    {dJointTypePU, dJointGetPUParam, dJointSetPUParam, 3, {STOP(0), STOP(1), STOP(2)}},
-    {dJointTypePiston, dJointGetPistonParam, dJointSetPistonParam, 2, {STOP(0), STOP(1)}},
-};
-
-static const joint_parameters *parameters_of(dJointID joint)
+/* Of a joint's error reductions and softnesses of its own: how many, and the parameter of one. */
+static int soft_count(const hapi_joint_traits *traits)
 {
-  dJointType type = dJointGetType(joint);
-  for (size_t i = 0; i < sizeof own_parameters / sizeof own_parameters[0]; ++i) {
-    if (own_parameters[i].type == type) {
-      return &own_parameters[i];
-    }
-  }
-  return NULL;
+  return traits == NULL ? 0 : traits->soft == HAPI_SOFT_OWN ? 1 : traits->groups;
+}
+
+static int soft_erp(const hapi_joint_traits *traits, int i)
+{
+  return traits->soft == HAPI_SOFT_OWN                    ? dParamERP
+         : traits->soft == HAPI_SOFT_SUSPENSION && i == 1 ? dParamSuspensionERP
+                                                          : dParamStopERP + i * dParamGroup;
+}
+
+static int soft_cfm(const hapi_joint_traits *traits, int i)
+{
+  return traits->soft == HAPI_SOFT_OWN                    ? dParamCFM
+         : traits->soft == HAPI_SOFT_SUSPENSION && i == 1 ? dParamSuspensionCFM
+                                                          : dParamStopCFM + i * dParamGroup;
 }
 
 void hapi_joint_soften(hapi_known_joint *known, double ratio)
 {
-  const joint_parameters *own = parameters_of(known->joint);
-  for (int i = 0; own != NULL && i < own->count; ++i) {
+  const hapi_joint_traits *own = hapi_joint_traits_of(known->joint);
+  for (int i = 0; i < soft_count(own); ++i) {
     double *meant = known->meant[i];
-    meant[0] = own->get(known->joint, own->names[i][0]);
-    meant[1] = own->get(known->joint, own->names[i][1]);
+    meant[0] = own->get(known->joint, soft_erp(own, i));
+    meant[1] = own->get(known->joint, soft_cfm(own, i));
     double erp = meant[0];
     double cfm = meant[1];
     hapi_soften(ratio, &erp, &cfm);
-    own->set(known->joint, own->names[i][0], erp);
-    own->set(known->joint, own->names[i][1], cfm);
+    own->set(known->joint, soft_erp(own, i), erp);
+    own->set(known->joint, soft_cfm(own, i), cfm);
   }
 }
 
 /* The largest error reduction of its own, 0 where it has none. */
 double hapi_joint_erp(const hapi_known_joint *known)
 {
-  const joint_parameters *own = parameters_of(known->joint);
+  const hapi_joint_traits *own = hapi_joint_traits_of(known->joint);
   double most = 0.0;
-  for (int i = 0; own != NULL && i < own->count; ++i) {
-    most = fmax(most, own->get(known->joint, own->names[i][0]));
+  for (int i = 0; i < soft_count(own); ++i) {
+    most = fmax(most, own->get(known->joint, soft_erp(own, i)));
   }
   return most;
 }
@@ -103,21 +78,21 @@ double hapi_joint_erp(const hapi_known_joint *known)
 /* Between soften and restore. */
 void hapi_joint_leave_open(const hapi_known_joint *known, bool open, double ratio)
 {
-  const joint_parameters *own = parameters_of(known->joint);
-  for (int i = 0; own != NULL && i < own->count; ++i) {
+  const hapi_joint_traits *own = hapi_joint_traits_of(known->joint);
+  for (int i = 0; i < soft_count(own); ++i) {
     double erp = known->meant[i][0];
     double cfm = known->meant[i][1];
     hapi_soften(ratio, &erp, &cfm);
-    own->set(known->joint, own->names[i][0], open ? 0.0 : erp);
+    own->set(known->joint, soft_erp(own, i), open ? 0.0 : erp);
   }
 }
 
 void hapi_joint_restore(const hapi_known_joint *known)
 {
-  const joint_parameters *own = parameters_of(known->joint);
-  for (int i = 0; own != NULL && i < own->count; ++i) {
-    own->set(known->joint, own->names[i][0], known->meant[i][0]);
-    own->set(known->joint, own->names[i][1], known->meant[i][1]);
+  const hapi_joint_traits *own = hapi_joint_traits_of(known->joint);
+  for (int i = 0; i < soft_count(own); ++i) {
+    own->set(known->joint, soft_erp(own, i), known->meant[i][0]);
+    own->set(known->joint, soft_cfm(own, i), known->meant[i][1]);
   }
 }
 

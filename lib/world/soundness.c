@@ -149,33 +149,6 @@ bool hapi_pose_is_sound(dBodyID body)
 
 /* ---- joints ---- */
 
-typedef struct joint_access {
-  dJointType type;
-  int groups; /* of parameters */
-  dReal (*parameter)(dJointID, int);
-  void (*anchor)(dJointID, dVector3);
-  void (*anchor2)(dJointID, dVector3);
-} joint_access;
-
-/* Axes are not here: ODE normalises them when they are set, and takes none that has no
- * direction. */
-static const joint_access joint_accesses[] = {
-    {dJointTypeBall, 1, dJointGetBallParam, dJointGetBallAnchor, dJointGetBallAnchor2},
-    {dJointTypeHinge, 1, dJointGetHingeParam, dJointGetHingeAnchor, dJointGetHingeAnchor2},
-    {dJointTypeSlider, 1, dJointGetSliderParam, NULL, NULL},
-    {dJointTypeUniversal, 2, dJointGetUniversalParam, dJointGetUniversalAnchor,
-     dJointGetUniversalAnchor2},
-    {dJointTypeHinge2, 2, dJointGetHinge2Param, dJointGetHinge2Anchor, dJointGetHinge2Anchor2},
-    {dJointTypeFixed, 1, dJointGetFixedParam, NULL, NULL},
-    {dJointTypeAMotor, 3, dJointGetAMotorParam, NULL, NULL},
-    {dJointTypeLMotor, 3, dJointGetLMotorParam, NULL, NULL},
-    {dJointTypePR, 2, dJointGetPRParam, dJointGetPRAnchor, NULL},
-    {dJointTypePU, 3, dJointGetPUParam, dJointGetPUAnchor, NULL},
-    {dJointTypePiston, 2, dJointGetPistonParam, dJointGetPistonAnchor, dJointGetPistonAnchor2},
-    {dJointTypeDBall, 1, dJointGetDBallParam, dJointGetDBallAnchor1, dJointGetDBallAnchor2},
-    {dJointTypeDHinge, 1, dJointGetDHingeParam, dJointGetDHingeAnchor1, dJointGetDHingeAnchor2},
-};
-
 /* Stops are infinite where there are none, and a largest force where there is no limit. */
 static bool good_parameter(int name, double value)
 {
@@ -202,24 +175,20 @@ static bool good_anchor(dJointID joint, void (*read)(dJointID, dVector3))
   return vector_within(at, 2.0 * POSITION_MOST);
 }
 
+/* Axes are not looked at: ODE normalises them when they are set, and takes none that has no
+ * direction. */
 static bool joint_is_sound(dJointID joint)
 {
-  dJointType type = dJointGetType(joint);
-  for (size_t i = 0; i < sizeof joint_accesses / sizeof joint_accesses[0]; ++i) {
-    const joint_access *access = &joint_accesses[i];
-    if (access->type != type) {
-      continue;
-    }
-    for (int group = 0; group < access->groups; ++group) {
-      for (int name = dParamLoStop; name < dParamsInGroup; ++name) {
-        if (!good_parameter(name, access->parameter(joint, name + group * dParamGroup))) {
-          return false;
-        }
+  const hapi_joint_traits *traits = hapi_joint_traits_of(joint);
+  for (int group = 0; traits != NULL && group < traits->groups; ++group) {
+    for (int name = dParamLoStop; name < dParamsInGroup; ++name) {
+      if (!good_parameter(name, traits->get(joint, name + group * dParamGroup))) {
+        return false;
       }
     }
-    return good_anchor(joint, access->anchor) && good_anchor(joint, access->anchor2);
   }
-  return true;
+  return traits == NULL ||
+         (good_anchor(joint, traits->anchor) && good_anchor(joint, traits->anchor2));
 }
 
 /* Each joint once: by its first body. */
