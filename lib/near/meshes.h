@@ -37,10 +37,9 @@ typedef struct hapi_meshes {
   uint32_t places[HAPI_EDGE_PLACES]; /* of their edges, + 1; open addressing */
 } hapi_meshes;
 
-/* Triangles of a static mesh that meet a box of the world, into near.meshes.found. walk: the number of
- * the model that they are for;
- * HAPI_NEAR_TRIANGLES: there may be more, or there is no memory for them, and they are not to be
- * used. */
+/* Triangles of a static mesh that meet a box of the world, into near.meshes.found. walk: the
+ * number of the model that they are for; HAPI_NEAR_TRIANGLES: there may be more, or there is no
+ * memory for them, and they are not to be used. */
 uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], uint64_t walk);
 void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
 void hapi_meshes_finish(hapi_meshes *meshes);

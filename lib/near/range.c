@@ -512,8 +512,8 @@ static bool can_be_owned(hapi_nearby *nearby, const hapi_known_body *known, rang
       return false;
     }
   }
-  /* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of its
-   * mechanism that were looked at before. */
+  /* The loop must have all contacts of what it owns: ODE has none of them. *io: of the bodies of
+   * its mechanism that were looked at before. */
   const hapi_capacity *c = &nearby->cycle->config->capacity;
   for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     need_geom(nearby, geom, io);

@@ -317,10 +317,11 @@ void hapi_reconcile_residual(hapi_account *account)
 void hapi_reconcile_overwrite(const hapi_account *account)
 {
   for (uint32_t i = 0; i < account->slots->body_high; ++i) {
-    /* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference, and it
-     * is on its way to the loop. What is left is the pose; the contact planes are sought on it, as
-     * it is the pose that the loop goes on with. A body that no pointer pushed keeps the world's:
-     * for a body alone the two are equal, and what another body pushes is moved by the world only. */
+    /* Eq. 12 and 13. With eq. 14 the velocities are the same: the residual is the difference,
+     * and it is on its way to the loop. What is left is the pose; the contact planes are sought
+     * on it, as it is the pose that the loop goes on with. A body that no pointer pushed keeps
+     * the world's: for a body alone the two are equal, and what another body pushes is moved by
+     * the world only. */
     const hapi_body_slot *slot = &account->slots->bodies[i];
     const hapi_state_body *in = moved_by_loop(account, i);
     dBodyID body = hapi_account_body(account, slot);

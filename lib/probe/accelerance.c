@@ -243,8 +243,8 @@ static void contact_keep(hapi_probe *probe, uint32_t index)
     hapi_quat_rotate(tested->quat, contact->normal_body, normal);
     kind = hapi_admittance_tidy_point(&free, arm, normal, trial->measured);
     if (contact_has_axis(probe, contact, TORSION)) {
-      /* Within 0 and what it is of the free body: about the normal, the direction that is used. What
-       * only a contact makes of a torque is left as it is measured. */
+      /* Within 0 and what it is of the free body: about the normal, the direction that is used.
+       * What only a contact makes of a torque is left as it is measured. */
       double *out_turn = answer->turn;
       double of_free[3];
       hapi_m3_apply(free.inverse_inertia, normal, of_free);

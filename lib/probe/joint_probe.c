@@ -186,8 +186,8 @@ static void pair_begin_step(const pair *p)
       dBodySetPosition(p->bodies[i], to->position[0], to->position[1], to->position[2]);
       dBodySetQuaternion(p->bodies[i], to->quat_wxyz);
     }
-    /* The pointers' forces of the last tick: whether a motor holds them or gives way is part of what is
-     * measured. */
+    /* The pointers' forces of the last tick: whether a motor holds them or gives way is part of
+     * what is measured. */
     uint32_t index = p->index[i];
     uint32_t slot = index == HAPI_NONE ? HAPI_NONE : p->probe->world->bodies.entries[index].slot;
     for (uint32_t k = 0; k < p->probe->slots->contact_high && slot != HAPI_NONE; ++k) {
@@ -341,8 +341,8 @@ static void rows_ask(const pair *p, const hapi_constraint_row rows[6], int count
   double speed[6];
   joint_impulse(p, with, without, out->given);
   double size = sqrt(dot6(out->given, out->given));
-  /* Impulses of the rows that make up the joint's: wrenches are orthogonal in the measure of the free
-   * pair. What is left of it is none of theirs. */
+  /* Impulses of the rows that make up the joint's: wrenches are orthogonal in the measure of the
+   * free pair. What is left of it is none of theirs. */
   for (int i = 0; i < 6; ++i) {
     speed[i] = dot6(p->free[i], out->given);
   }

@@ -146,8 +146,8 @@ void hapi_reuse_spoil(hapi_reuse_book *book, const hapi_test_set *test, uint32_t
 /* Last, unless it failed. Returns how much of what is pushed was not measured anew. */
 uint32_t hapi_reuse_keep(hapi_reuse_book *book);
 
-/* reuse_print.c: all that decides what is found of an island, into the book. False: something has no
- * getter, or there is no memory. */
+/* reuse_print.c: all that decides what is found of an island, into the book. False: something
+ * has no getter, or there is no memory. */
 bool hapi_print_island(const hapi_reuse_input *input, hapi_reuse_book *book,
                        hapi_reuse_island *island);
 

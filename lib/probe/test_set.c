@@ -356,8 +356,9 @@ void hapi_test_rewind(hapi_test_set *test)
   HAPI_ASSERT(test->entered);
   hapi_snapshot_rewind(&test->snapshot);
   for (uint32_t i = 0; i < test->member_count; ++i) {
-    /* The application's forces of the last step act in a probe as well: it may add them at each step,
-     * in a callback that probes must not call. What waits in the accumulators already goes first. */
+    /* The application's forces of the last step act in a probe as well: it may add them at each
+     * step, in a callback that probes must not call. What waits in the accumulators already goes
+     * first. */
     const hapi_known_body *known = &test->world->bodies.entries[test->members[i]];
     const dReal *f = dBodyGetForce(known->body);
     const dReal *t = dBodyGetTorque(known->body);

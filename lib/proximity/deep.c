@@ -33,26 +33,13 @@ typedef struct search {
   double depth;
 } search;
 
-static double depth_along(const search *s, const double normal[3])
-{
-  HAPI_ASSERT_UNIT(normal);
-  double back[3];
-  double point_a[3];
-  double point_b[3];
-  hapi_v3_scale(-1.0, normal, back);
-  hapi_solid_support(s->a, back, point_a);
-  hapi_solid_support(s->b, normal, point_b);
-  hapi_v3_sub(point_b, point_a, point_b);
-  return hapi_v3_dot(point_b, normal);
-}
-
 static void try_direction(search *s, const double direction[3])
 {
   double normal[3] = {0.0, 0.0, 0.0};
   if (!(hapi_v3_unit(direction, normal) > 0.0)) {
     return;
   }
-  double depth = depth_along(s, normal);
+  double depth = -hapi_solid_separation(s->a, s->b, normal);
   if (depth < s->depth) {
     s->depth = depth;
     hapi_v3_copy(normal, s->normal);
@@ -143,27 +130,6 @@ static bool try_ccd(search *s)
   return depth > 0.0 && s->depth * scale <= depth * (1.0 + 1e-5) + 10.0 * tolerance;
 }
 
-/* a moved clear of b along the normal: the nearest points then show the way downhill. With C = b -
- * a it is the projection of a point outside C back onto C; the depth never rises, and falls to the
- * minimum at once where C is flat. The clearance is a compromise: small is fast on curved parts,
- * large makes the direction exact. */
-static bool descent_step(search *s, hapi_gjk *out)
-{
-  HAPI_ASSERT_UNIT(s->normal);
-  double clear = 1e-3 * s->small + 1e-8 * s->large;
-  clear += s->depth > 0.0 ? 0.1 * s->depth : -2.0 * s->depth;
-  double shift[3];
-  hapi_solid moved = *s->a;
-  hapi_v3_scale(s->depth + clear, s->normal, shift);
-  hapi_v3_add(moved.center, shift, moved.center);
-  hapi_v3_add(moved.inside, shift, moved.inside);
-  if (!hapi_gjk_nearest(&moved, s->b, s->normal, out)) {
-    return false;
-  }
-  hapi_v3_sub(out->point_a, shift, out->point_a);
-  return true;
-}
-
 /* The turns shrink by a constant ratio on curved parts; their sum to the end is known beforehand.
  * */
 static void search_leap(search *s, const double turn[3], const double last_turn[3])
@@ -177,16 +143,23 @@ static void search_leap(search *s, const double turn[3], const double last_turn[
   }
 }
 
-/* At most so many steps; out is of the last one. False: none succeeded. */
+/* a moved clear of b along the normal: the nearest points then show the way downhill. With C = b -
+ * a it is the projection of a point outside C back onto C; the depth never rises, and falls to the
+ * minimum at once where C is flat. The clearance is a compromise: small is fast on curved parts,
+ * large makes the direction exact.
+ *
+ * At most so many steps; out is of the last one. False: none succeeded. */
 static bool search_descend(search *s, int steps, hapi_gjk *out)
 {
   double last_turn[3] = {0.0, 0.0, 0.0};
   for (int i = 0; i < steps; ++i) {
     double turn[3];
-    if (!descent_step(s, out)) {
+    double clear = 1e-3 * s->small + 1e-8 * s->large;
+    clear += s->depth > 0.0 ? 0.1 * s->depth : -2.0 * s->depth;
+    if (!hapi_gjk_shifted(s->a, s->b, s->normal, s->depth + clear, out)) {
       return i > 0;
     }
-    double depth = depth_along(s, out->normal);
+    double depth = -hapi_solid_separation(s->a, s->b, out->normal);
     hapi_v3_sub(out->normal, s->normal, turn);
     if (depth > s->depth || hapi_v3_norm(turn) < 1e-11) {
       return true;

@@ -129,3 +129,19 @@ bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *st
   hapi_simplex_witness(&s.simplex, out->point_a, out->point_b);
   return s.apart;
 }
+
+bool hapi_gjk_shifted(const hapi_solid *a, const hapi_solid *b, const double normal[3],
+                      double shift, hapi_gjk *out)
+{
+  HAPI_ASSERT_UNIT(normal);
+  double way[3];
+  hapi_solid moved = *a;
+  hapi_v3_scale(shift, normal, way);
+  hapi_v3_add(moved.center, way, moved.center);
+  hapi_v3_add(moved.inside, way, moved.inside);
+  if (!hapi_gjk_nearest(&moved, b, normal, out)) {
+    return false;
+  }
+  hapi_v3_sub(out->point_a, way, out->point_a);
+  return true;
+}

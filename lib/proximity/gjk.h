@@ -23,4 +23,9 @@ typedef struct hapi_gjk {
  * apart. */
 bool hapi_gjk_nearest(const hapi_solid *a, const hapi_solid *b, const double *start, hapi_gjk *out);
 
+/* The same after a was moved by a shift [m] along a unit normal, which is where it starts. The
+ * points are of a where it is. */
+bool hapi_gjk_shifted(const hapi_solid *a, const hapi_solid *b, const double normal[3],
+                      double shift, hapi_gjk *out);
+
 #endif

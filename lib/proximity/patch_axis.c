@@ -30,18 +30,6 @@ static double smaller_core(const hapi_solid *a, const hapi_solid *b)
   return small > 0.0 ? small : fmax(a->reach, b->reach);
 }
 
-double hapi_patch_separation(const hapi_solid *a, const hapi_solid *b, const double normal[3])
-{
-  double back[3];
-  double point_a[3];
-  double point_b[3];
-  hapi_v3_scale(-1.0, normal, back);
-  hapi_solid_support(a, back, point_a);
-  hapi_solid_support(b, normal, point_b);
-  hapi_v3_sub(point_a, point_b, point_a);
-  return hapi_v3_dot(point_a, normal);
-}
-
 typedef struct candidate {
   double normal[3];
   double separation; /* m */
@@ -86,7 +74,7 @@ static void try_normal(guess *g, const double direction[3])
   if (!(hapi_v3_unit(direction, normal) > 0.0)) {
     return;
   }
-  double separation = hapi_patch_separation(g->a, g->b, normal);
+  double separation = hapi_solid_separation(g->a, g->b, normal);
   if (g->starts != NULL) {
     keep_start(g, normal, separation);
   }
@@ -158,21 +146,6 @@ static void guess_all(guess *g)
   try_hull_along(g, g->normal);
 }
 
-/* GJK of the cores shifted apart until the guess has a clear gap [m]. */
-static bool shifted_nearest(const guess *g, double clear, hapi_gjk *out)
-{
-  double shift[3];
-  hapi_solid moved = *g->a;
-  hapi_v3_scale(clear - g->separation, g->normal, shift);
-  hapi_v3_add(moved.center, shift, moved.center);
-  hapi_v3_add(moved.inside, shift, moved.inside);
-  if (!hapi_gjk_nearest(&moved, g->b, g->normal, out)) {
-    return false;
-  }
-  hapi_v3_sub(out->point_a, shift, out->point_a);
-  return true;
-}
-
 /* Uphill in separation until the normal stays. A large clearance sees farther, on rims a small one
  * arrives sooner. */
 static bool guess_climb(guess *g, int steps, hapi_gjk *out)
@@ -181,10 +154,12 @@ static bool guess_climb(guess *g, int steps, hapi_gjk *out)
   for (int i = 0; i < steps; ++i) {
     double turn[3];
     double clear = i < START_STEPS ? 0.02 * size + 0.2 * fabs(g->separation) : 1e-3 * size;
-    if (!shifted_nearest(g, fmax(clear, g->separation), out)) {
+    /* The cores shifted apart until the guess has a clear gap. */
+    double shift = fmax(clear, g->separation) - g->separation;
+    if (!hapi_gjk_shifted(g->a, g->b, g->normal, shift, out)) {
       return false;
     }
-    double separation = hapi_patch_separation(g->a, g->b, out->normal);
+    double separation = hapi_solid_separation(g->a, g->b, out->normal);
     hapi_v3_sub(out->normal, g->normal, turn);
     if (separation < g->separation || hapi_v3_norm(turn) < 1e-9) {
       hapi_v3_copy(g->normal, out->normal);

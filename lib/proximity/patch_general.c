@@ -42,7 +42,7 @@ static void side_find(const general *g, bool is_a, side *out)
   hapi_v3_scale(is_a ? -1.0 : 1.0, out->face.normal, normal);
   double slack = face_bias * fabs(g->gap) + face_bias_size * pair->size;
   out->taken = out->cosine > cos_face ||
-               hapi_patch_separation(pair->a, pair->b, normal) >= g->cores.distance - slack;
+               hapi_solid_separation(pair->a, pair->b, normal) >= g->cores.distance - slack;
 }
 
 /* The face more parallel to the direction is the reference, of equals the larger one, then b's. */

@@ -47,12 +47,6 @@ typedef struct hapi_edge {
 /* The edge that is square to d, among those farthest along d. False: there is none. */
 bool hapi_feature_edge(const hapi_solid *solid, const double d[3], hapi_edge *out);
 
-/* The same for hulls (patch_hull.c). */
-bool hapi_hull_edge(const hapi_solid *hull, const double d[3], hapi_edge *out);
-
-/* One of the faces at the corner farthest along d; or a line or corner, if the hull has no more. */
-void hapi_hull_feature(const hapi_solid *hull, const double d[3], hapi_feature *out);
-
 /* Points on a rim of a cylinder (side 1 or -1), the first one farthest along d. */
 void hapi_rim_corners(const hapi_solid *cylinder, double side, const double d[3], int count,
                       double (*out)[3]);
@@ -78,10 +72,6 @@ typedef struct hapi_frame {
   double y[3];
   double normal[3]; /* out of the reference */
 } hapi_frame;
-
-/* Keeps what is inside of the reference face, which lies in the plane of the frame. */
-int hapi_patch_clip(const hapi_feature *reference, const hapi_frame *frame, hapi_spot *spots,
-                    int count);
 
 /* Drops repeated spots and those that stand over a deeper one, and all but four. Deepest first. */
 int hapi_patch_reduce(hapi_spot *spots, int count, double size);
@@ -136,8 +126,5 @@ bool hapi_patch_guess(const hapi_solid *a, const hapi_solid *b, hapi_gjk *out);
  * guess. */
 bool hapi_patch_axis(const hapi_solid *a, const hapi_solid *b, const hapi_gjk *start,
                      hapi_gjk *out);
-
-/* Gap along a normal (b to a), of the cores. */
-double hapi_patch_separation(const hapi_solid *a, const hapi_solid *b, const double normal[3]);
 
 #endif

@@ -157,3 +157,15 @@ void hapi_solid_support(const hapi_solid *solid, const double direction[3], doub
   hapi_solid_to_world(solid, point, out);
   hapi_v3_add(solid->center, out, out);
 }
+
+double hapi_solid_separation(const hapi_solid *a, const hapi_solid *b, const double normal[3])
+{
+  double back[3];
+  double point_a[3];
+  double point_b[3];
+  hapi_v3_scale(-1.0, normal, back);
+  hapi_solid_support(a, back, point_a);
+  hapi_solid_support(b, normal, point_b);
+  hapi_v3_sub(point_a, point_b, point_a);
+  return hapi_v3_dot(point_a, normal);
+}

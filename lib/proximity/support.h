@@ -45,4 +45,7 @@ void hapi_solid_axis(const hapi_solid *solid, int axis, double out[3]);
 void hapi_solid_to_local(const hapi_solid *solid, const double vector[3], double out[3]);
 void hapi_solid_to_world(const hapi_solid *solid, const double vector[3], double out[3]);
 
+/* Gap along a normal (b to a), of the cores. */
+double hapi_solid_separation(const hapi_solid *a, const hapi_solid *b, const double normal[3]);
+
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <stddef.h>
+#include "world/joint_traits.h"
 
-#include "world/joints.h"
+#include <stddef.h>
 
 /* All that ODE's kinds of joints differ in. A transmission and a contact are not here, nor is
  * Plane2D, which has no getters. */
