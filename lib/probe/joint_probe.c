@@ -312,7 +312,7 @@ static void pair_find_held(pair *p, const twists *base, double out[6][6])
   p->lost = sqrt(reaction[0] / fmax(reaction[1], least * least));
 }
 
-static double dot6(const double a[6], const double b[6])
+static double wrench_dot(const double a[6], const double b[6])
 {
   return hapi_v3_dot(a, b) + hapi_v3_dot(a + 3, b + 3);
 }
@@ -322,9 +322,9 @@ static double wrench_response(const pair *p, const double wrench[6])
 {
   double speed[6];
   for (int i = 0; i < 6; ++i) {
-    speed[i] = dot6(p->free[i], wrench);
+    speed[i] = wrench_dot(p->free[i], wrench);
   }
-  return dot6(wrench, speed);
+  return wrench_dot(wrench, speed);
 }
 
 /* What the rows ask for in a step, their impulses, and what of the joint's impulse is none of
@@ -340,26 +340,26 @@ static void rows_ask(const pair *p, const hapi_constraint_row rows[6], int count
 {
   double speed[6];
   joint_impulse(p, with, without, out->given);
-  double size = sqrt(dot6(out->given, out->given));
+  double size = sqrt(wrench_dot(out->given, out->given));
   /* Impulses of the rows that make up the joint's: wrenches are orthogonal in the measure of the
    * free pair. What is left of it is none of theirs. */
   for (int i = 0; i < 6; ++i) {
-    speed[i] = dot6(p->free[i], out->given);
+    speed[i] = wrench_dot(p->free[i], out->given);
   }
   for (int r = 0; r < count; ++r) {
-    out->impulse[r] = dot6(rows[r].wrench, speed) / wrench_response(p, rows[r].wrench);
+    out->impulse[r] = wrench_dot(rows[r].wrench, speed) / wrench_response(p, rows[r].wrench);
   }
   for (int r = 0; r < count; ++r) {
     for (int i = 0; i < 6; ++i) {
       out->given[i] -= out->impulse[r] * rows[r].wrench[i];
     }
   }
-  if (sqrt(dot6(out->given, out->given)) <= GIVEN_LEAST * size) {
+  if (sqrt(wrench_dot(out->given, out->given)) <= GIVEN_LEAST * size) {
     memset(out->given, 0, sizeof out->given);
   }
   twists_relative(p, with, speed);
   for (int r = 0; r < count; ++r) {
-    out->target[r] = dot6(rows[r].wrench, speed) + rows[r].softness * out->impulse[r];
+    out->target[r] = wrench_dot(rows[r].wrench, speed) + rows[r].softness * out->impulse[r];
   }
 }
 
@@ -389,7 +389,7 @@ static double row_spring_rate(const pair *p, const hapi_constraint_row rows[6], 
   dBodySetQuaternion(first, to);
   pair_end_step(p, &with);
   rows_ask(p, rows, count, &with, without, &moved);
-  return -(moved.target[which] - base->target[which]) / dot6(rows[which].wrench, way);
+  return -(moved.target[which] - base->target[which]) / wrench_dot(rows[which].wrench, way);
 }
 
 /* What of the targets is error reduction: gone when the world has none. */
@@ -614,7 +614,7 @@ static bool pair_answers_the_same(pair *p, const twists *with)
   body_respond(&p->own, wrench, speed);
   double off[6];
   for (int i = 0; i < 6; ++i) {
-    off[i] = impulse[i] + p->period * dot6(p->m->held[i], speed);
+    off[i] = impulse[i] + p->period * wrench_dot(p->m->held[i], speed);
   }
   double least = SAME_ANSWER * PUSH_SPEED;
   return hapi_v3_norm(off) <= least * p->mass && fabs(off[3]) <= least * p->inertia[0] &&
