@@ -34,11 +34,6 @@ static void effect_sum_up(const sight *s, hap_effect effect, hap_effect_reason n
   hapi_effect_sum_up(sight_figures(s, effect), hapi_wish(s->cycle->wishes, effect), none);
 }
 
-static uint32_t body_roles(const hapi_model_body *body)
-{
-  return body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_OWNED | HAPI_BODY_MEASURED);
-}
-
 /* ---- of bodies ---- */
 
 /* Why a body that could turn gyroscopically does not; CALLED: it does. */
@@ -53,60 +48,36 @@ static hap_effect_reason body_gyro(const sight *s, const hapi_model_body *in)
   }
   return in->max_angular_speed == 0.0                         ? HAP_REASON_LOCKED
          : hapi_turns_alike(in->inertia)                      ? HAP_REASON_SYMMETRIC
-         : ((in->flags & HAPI_BODY_RESTING) != 0)             ? HAP_REASON_ASLEEP
+         : (in->flags & HAPI_BODY_RESTING) != 0               ? HAP_REASON_ASLEEP
          : hapi_v3_norm(in->twist.angular) <= HAPI_SPIN_LEAST ? HAP_REASON_STILL
                                                               : HAP_REASON_CALLED;
-}
-
-static void note_gyro(const sight *s, const hapi_model_body *body)
-{
-  hap_effect_reason why = body_gyro(s, body);
-  bool off = hapi_wish_is_off(s->cycle->wishes, HAP_EFFECT_GYRO);
-  if ((body->flags & HAPI_BODY_OWNED) != 0) {
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !off, why);
-  }
-}
-
-/* Bodies that the loop moves without owning them are what testing simulations are for. */
-static void note_testing(const sight *s, const hapi_model_body *body)
-{
-  bool measured = (body->flags & HAPI_BODY_MEASURED) != 0;
-  bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
-  if (body_roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_TESTING), measured,
-                     owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
-  }
-}
-
-static void note_range(const sight *s, const hapi_model_body *body)
-{
-  uint32_t known = s->near->slots.bodies[body->slot].known;
-  bool seed = hapi_nearby_chose(s->near, known, s->cycle->model_number);
-  if (!seed && body_roles(body) != HAPI_BODY_DRIVEN) {
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_RANGE), (body->flags & HAPI_BODY_OWNED) != 0,
-                     HAP_REASON_OUTSIDE);
-  }
-}
-
-/* Of contacts, whether there is anything for a body to touch; of passes, whether it may move. */
-static void note_contacts(const sight *s, const hapi_model_body *body)
-{
-  bool owned = (body->flags & HAPI_BODY_OWNED) != 0;
-  bool linked = owned && (body->flags & HAPI_BODY_ALONE) == 0;
-  if (body_roles(body) != HAPI_BODY_DRIVEN) {
-    hap_effect_reason why = owned ? HAP_REASON_ALONE : HAP_REASON_OUTSIDE;
-    hapi_effect_note(sight_figures(s, HAP_EFFECT_CONTACTS), linked, why);
-  }
 }
 
 static void note_bodies(const sight *s, hapi_model *model)
 {
   const hapi_model_body *bodies = hapi_model_bodies(model);
+  bool gyro_off = hapi_wish_is_off(s->cycle->wishes, HAP_EFFECT_GYRO);
   for (uint32_t i = 0; i < model->body_count; ++i) {
-    note_gyro(s, &bodies[i]);
-    note_testing(s, &bodies[i]);
-    note_range(s, &bodies[i]);
-    note_contacts(s, &bodies[i]);
+    uint32_t flags = bodies[i].flags;
+    uint32_t known = s->near->slots.bodies[bodies[i].slot].known;
+    bool owned = (flags & HAPI_BODY_OWNED) != 0;
+    if (owned) {
+      hap_effect_reason why = body_gyro(s, &bodies[i]);
+      hapi_effect_note(sight_figures(s, HAP_EFFECT_GYRO), why == HAP_REASON_CALLED && !gyro_off,
+                       why);
+    }
+    if ((flags & (HAPI_BODY_DRIVEN | HAPI_BODY_OWNED | HAPI_BODY_MEASURED)) == HAPI_BODY_DRIVEN) {
+      continue;
+    }
+    /* Bodies that the loop moves without owning them are what testing simulations are for. */
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_TESTING), (flags & HAPI_BODY_MEASURED) != 0,
+                     owned ? HAP_REASON_OWNED : HAP_REASON_OUTSIDE);
+    if (!hapi_nearby_chose(s->near, known, s->cycle->model_number)) {
+      hapi_effect_note(sight_figures(s, HAP_EFFECT_RANGE), owned, HAP_REASON_OUTSIDE);
+    }
+    /* Whether there is anything for it to touch. */
+    hapi_effect_note(sight_figures(s, HAP_EFFECT_CONTACTS), owned && (flags & HAPI_BODY_ALONE) == 0,
+                     owned ? HAP_REASON_ALONE : HAP_REASON_OUTSIDE);
   }
 }
 

@@ -69,24 +69,19 @@ static bool body_is_under_test(const hapi_test_set *test, dBodyID body)
   return known != HAPI_NONE && hapi_test_has(test, known);
 }
 
-static bool boxes_meet(dGeomID a, dGeomID b)
-{
-  dReal x[6];
-  dReal y[6];
-  dGeomGetAABB(a, x);
-  dGeomGetAABB(b, y);
-  return x[0] <= y[1] && y[0] <= x[1] && x[2] <= y[3] && y[2] <= x[3] && x[4] <= y[5] &&
-         y[4] <= x[5];
-}
-
 /* What is not under test stands still. */
 static void window_collide(hapi_lookback *w, const hapi_cycle *as_single)
 {
   dJointGroupEmpty(w->test.world->contact_group);
   for (uint32_t i = 0; i < w->pairs.count; ++i) {
     const hapi_lookback_pair *pair = &w->pairs.list[i];
-    if (!pair->there || !dGeomIsEnabled(pair->a) || !dGeomIsEnabled(pair->b) ||
-        !boxes_meet(pair->a, pair->b)) {
+    if (!pair->there || !dGeomIsEnabled(pair->a) || !dGeomIsEnabled(pair->b)) {
+      continue;
+    }
+    dReal boxes[2][6];
+    dGeomGetAABB(pair->a, boxes[0]);
+    dGeomGetAABB(pair->b, boxes[1]);
+    if (!hapi_boxes_meet(boxes[0], boxes[1])) {
       continue;
     }
     dBodyID body_a = dGeomGetBody(pair->a);
@@ -249,12 +244,6 @@ static void window_chain(hapi_lookback *w, double haptic_hz)
   }
 }
 
-static int window_iterations(const hapi_lookback *w, int world)
-{
-  int more = ITERATIONS * world;
-  return !w->lean && more < ITERATIONS_LEAST ? ITERATIONS_LEAST : more;
-}
-
 static bool window_go(hapi_lookback *w, int own_iterations, double seconds)
 {
   const hapi_world *world = w->test.world;
@@ -268,7 +257,9 @@ static bool window_go(hapi_lookback *w, int own_iterations, double seconds)
   config.haptic_hz = row_parts(haptic_hz) * haptic_hz;
   as_single.config = &config;
   as_single.model = HAP_MODEL_SINGLE; /* whose step this is */
-  dWorldSetQuickStepNumIterations(world->ode.world, window_iterations(w, own_iterations));
+  int more = ITERATIONS * own_iterations;
+  more = !w->lean && more < ITERATIONS_LEAST ? ITERATIONS_LEAST : more;
+  dWorldSetQuickStepNumIterations(world->ode.world, more);
   hapi_world_convert(world, hapi_step_ratio(&as_single), &meant);
   bool first = w->rows.next == 0;
   if (first) {

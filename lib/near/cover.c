@@ -20,12 +20,6 @@ static bool box_holds(const dReal outer[6], const dReal inner[6])
          inner[3] <= outer[3] && outer[4] <= inner[4] && inner[5] <= outer[5];
 }
 
-static bool boxes_meet(const dReal a[6], const dReal b[6])
-{
-  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
-         b[4] <= a[5];
-}
-
 static void box_unite(dReal box[6], bool *has, const dReal other[6])
 {
   for (int k = 0; k < 6; k += 2) {
@@ -108,7 +102,7 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
     return;
   }
   for (uint32_t i = 0; i < cover->count; ++i) {
-    if (boxes_meet(cover->found[i].box, box)) {
+    if (hapi_boxes_meet(cover->found[i].box, box)) {
       callback(data, geom, cover->found[i].geom);
     }
   }

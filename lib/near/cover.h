@@ -30,6 +30,13 @@ typedef struct hapi_cover {
   uint32_t capacity;
 } hapi_cover;
 
+/* Boxes are low and high by axis, as ODE's. */
+static inline bool hapi_boxes_meet(const double a[6], const double b[6])
+{
+  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
+         b[4] <= a[5];
+}
+
 bool hapi_cover_create(hapi_cover *cover);
 void hapi_cover_finish(hapi_cover *cover);
 void hapi_cover_begin(hapi_cover *cover); /* a round: what was moved since counts */

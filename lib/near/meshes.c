@@ -136,12 +136,6 @@ static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom, uint64_t wa
   return &meshes->meshes[meshes->count++];
 }
 
-static bool boxes_meet(const double a[6], const double b[6])
-{
-  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
-         b[4] <= a[5];
-}
-
 /* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
 
 static const double *edge_corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
@@ -214,7 +208,7 @@ static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double
     for (int k = 0; k < 3; ++k) {
       grow_box(own, corners + 3 * k, k == 0);
     }
-    if (boxes_meet(own, box)) {
+    if (hapi_boxes_meet(own, box)) {
       memcpy(meshes->found[found].corners, corners, sizeof meshes->found[found].corners);
       meshes->found[found++].index = i;
     }
@@ -241,7 +235,7 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
     grow_box(local, corner, i == 0);
   }
   for (uint32_t chunk = 0; chunk < (mesh->count + CHUNK - 1) / CHUNK; ++chunk) {
-    if (boxes_meet(mesh->boxes + (size_t)6 * chunk, local)) {
+    if (hapi_boxes_meet(mesh->boxes + (size_t)6 * chunk, local)) {
       found = search_chunk(mesh, chunk, local, meshes, found);
     }
   }

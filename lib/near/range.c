@@ -371,13 +371,6 @@ static uint64_t meeting_key(dGeomID own, dGeomID other)
   return pair_key(hapi_index_address(own), hapi_index_address(other), 0);
 }
 
-static bool met_before(const hapi_range *range, dGeomID own, dGeomID other)
-{
-  bool found = false;
-  (void)pair_place(range, meeting_key(own, other), &found);
-  return found;
-}
-
 static double surface_speed(const hapi_nearby *nearby, dBodyID body)
 {
   uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
@@ -420,8 +413,12 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   double reach = link_reach(nearby, range->links.own_speed + surface_speed(nearby, body));
   if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->links.own_body ||
       !bits_meet(range->links.own_geom, geom) ||
-      !boxes_come_near(range->links.own_box, geom, reach) ||
-      met_before(range, range->links.own_geom, geom)) {
+      !boxes_come_near(range->links.own_box, geom, reach)) {
+    return;
+  }
+  bool met_before = false;
+  (void)pair_place(range, meeting_key(range->links.own_geom, geom), &met_before);
+  if (met_before) {
     return;
   }
   if (!hapi_reserve((void **)&range->links.list, &range->links.capacity, range->links.count, 1,

@@ -99,20 +99,9 @@ void hapi_physics_fill_settings(hapi_physics *physics)
   hapi_dial_tell(&physics->dial, settings, &physics->counts.own.accuracy);
 }
 
-static void turn_dials(hapi_physics *physics)
-{
-  int percent[HAPI_DIALS];
-  if (!hapi_tape_plays(physics->tape.tape)) {
-    hapi_dial_follow(&physics->dial, &physics->cycle);
-  }
-  hapi_dial_positions(&physics->dial, percent);
-  hapi_tape_dials(&physics->tape, percent);
-  hapi_dial_place(&physics->dial, percent);
-  hapi_physics_fill_settings(physics);
-}
-
 void hapi_physics_enter_dial(hapi_physics *physics)
 {
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_dial_enter(&physics->dial, &physics->cycle.settings, physics->world.ode.world);
   physics->counts.own.accuracy.iterations = physics->dial.iterations;
 }
@@ -121,7 +110,14 @@ static void sync_in(hapi_physics *physics)
 {
   hapi_physics_run_edits(physics);
   follow_model(physics);
-  turn_dials(physics);
+  int percent[HAPI_DIALS];
+  if (!hapi_tape_plays(physics->tape.tape)) {
+    hapi_dial_follow(&physics->dial, &physics->cycle);
+  }
+  hapi_dial_positions(&physics->dial, percent);
+  hapi_tape_dials(&physics->tape, percent);
+  hapi_dial_place(&physics->dial, percent);
+  hapi_physics_fill_settings(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   call_step(physics, physics->world.ode.before_step);
   if (hapi_physics_scan(physics) < HAP_OK) {
@@ -163,6 +159,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 
 void hapi_physics_collide(hapi_physics *physics)
 {
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   bool notes =
       hapi_reuse_open(&physics->probe.reuse, &physics->cycle, !hapi_cross_is_full(&physics->cross));
   hapi_world_collide(&physics->world, &physics->cycle, notes);
@@ -171,6 +168,7 @@ void hapi_physics_collide(hapi_physics *physics)
 /* What testing simulations find out of a body's role is the slots' before anybody reads it. */
 void hapi_physics_test(hapi_physics *physics)
 {
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_probe *probe = &physics->probe;
   hapi_slots *slots = &physics->near.slots;
   hapi_answers_follow(&probe->answers, slots);

@@ -87,6 +87,7 @@ void hapi_physics_run_edits(hapi_physics *physics)
 
 void hapi_physics_take_state(hapi_physics *physics)
 {
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
   physics->cycle.has_new_state = newest != NULL;
   hapi_tape_state(&physics->tape, physics->config.exchange, newest != NULL);

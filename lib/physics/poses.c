@@ -384,39 +384,37 @@ static scene scene_begin(const hapi_physics *physics)
                  .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
 }
 
-hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
-                              size_t count, hap_pose *out)
+/* time_ns NULL: newest of all, where a frame may be two steps old. */
+static hap_status poses_draw(hapi_physics *physics, const int64_t *time_ns,
+                             struct dxBody *const *bodies, size_t count, hap_pose *out)
 {
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->drawing.lock);
   bool known = all_known(&physics->drawing, &physics->world.bodies, bodies, count);
   for (bool whole = !known || count == 0; !whole;) {
     scene d = scene_begin(physics);
-    d.time_ns = drawn_time(&physics->drawing.frames, time_ns);
+    d.newest = time_ns == NULL;
+    d.time_ns = time_ns != NULL ? drawn_time(d.frames, *time_ns)
+                : d.rows.end > d.rows.first
+                    ? hapi_trail_time(&d.rows, d.rows.end - 1, HAPI_TRAIL_BODIES)
+                    : stamp_of(&d, d.frames->count - 1);
     whole = scene_draw_all(&d, &physics->world.bodies, bodies, count, out);
-    status = scene_judge(&d, 1.0);
+    status = scene_judge(&d, d.newest ? 2.0 : 1.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
   return known ? status : HAP_ERROR_NOT_FOUND;
 }
 
+hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
+                              size_t count, hap_pose *out)
+{
+  return poses_draw(physics, &time_ns, bodies, count, out);
+}
+
 hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
                                   hap_pose *out)
 {
-  hap_status status = HAP_OK;
-  pthread_mutex_lock(&physics->drawing.lock);
-  bool known = all_known(&physics->drawing, &physics->world.bodies, bodies, count);
-  for (bool whole = !known || count == 0; !whole;) {
-    scene d = scene_begin(physics);
-    d.newest = true;
-    d.time_ns = d.rows.end > d.rows.first
-                    ? hapi_trail_time(&d.rows, d.rows.end - 1, HAPI_TRAIL_BODIES)
-                    : stamp_of(&d, d.frames->count - 1);
-    whole = scene_draw_all(&d, &physics->world.bodies, bodies, count, out);
-    status = scene_judge(&d, 2.0);
-  }
-  pthread_mutex_unlock(&physics->drawing.lock);
-  return known ? status : HAP_ERROR_NOT_FOUND;
+  return poses_draw(physics, NULL, bodies, count, out);
 }
 
 int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)

@@ -139,18 +139,6 @@ static bool fill_tool(const publishing *p, const hapi_contact_slot *slot, hapi_m
   return true;
 }
 
-static void publish_bodies(const publishing *p, hapi_model *out)
-{
-  hapi_model_body *bodies = hapi_model_bodies(out);
-  out->body_count = 0;
-  for (uint32_t i = 0; i < p->slots->body_high; ++i) {
-    HAPI_ASSERT(out->body_count < p->cycle->config->capacity.bodies);
-    if (p->slots->bodies[i].phase == HAPI_SLOT_LIVE && fill_body(p, i, &bodies[out->body_count])) {
-      ++out->body_count;
-    }
-  }
-}
-
 static void publish_contacts(const publishing *p, hapi_model *out)
 {
   hapi_model_contact *contacts = hapi_model_contacts(out);
@@ -289,17 +277,6 @@ static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_
   fill_parameters(p, known, out);
 }
 
-static void publish_joints(const publishing *p, const uint32_t *joints, uint32_t count,
-                           hapi_model *out)
-{
-  hapi_model_joint *to = hapi_model_joints(out);
-  HAPI_ASSERT(count <= p->cycle->config->capacity.joints);
-  for (uint32_t i = 0; i < count; ++i) {
-    joint_fill(p, &p->world->joints.entries[joints[i]], &to[i]);
-  }
-  out->joint_count = count;
-}
-
 /* ---- the message ---- */
 
 static uint32_t count_bounces(const hapi_range *range, hapi_model *model)
@@ -316,34 +293,9 @@ static uint32_t count_bounces(const hapi_range *range, hapi_model *model)
   return count;
 }
 
-static void count_model(hap_stats *stats, const hapi_nearby *near, const hapi_model *model)
-{
-  stats->model.neighbours = hapi_neighbors_bodies(near);
-  stats->model.pointer_contacts = model->contact_count;
-  if (model->model == HAP_MODEL_CONTACT && near->range.number == model->number) {
-    stats->model.pointer_contacts +=
-        near->range.near->tool_pair_count; /* whose points are found later */
-  }
-  if (stats->model.neighbours > stats->model.neighbours_max) {
-    stats->model.neighbours_max = stats->model.neighbours;
-  }
-}
-
-static void send_joints(hapi_physics *physics, const publishing *p, hapi_model *out)
-{
-  const hapi_range *range = &physics->near.range;
-  int64_t begin_ns = hapi_clock_now();
-  out->joint_count = 0;
-  if (out->model == HAP_MODEL_CONTACT && range->number == out->number) {
-    hapi_joints_take_slots(&physics->world.joints, out->number, range->mechanism.joints,
-                           range->mechanism.joint_count);
-    publish_joints(p, range->mechanism.joints, range->mechanism.joint_count, out);
-  }
-  physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-}
-
 void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
 {
+  HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_cycle *cycle = &physics->cycle;
   hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
   const publishing p = {cycle, &physics->world, &physics->near.slots, &physics->probe.answers,
@@ -363,16 +315,47 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->period_s = hapi_config_period(
       &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
   out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
-  publish_bodies(&p, out);
+  hapi_model_body *bodies = hapi_model_bodies(out);
+  out->body_count = 0;
+  for (uint32_t i = 0; i < p.slots->body_high; ++i) {
+    HAPI_ASSERT(out->body_count < p.cycle->config->capacity.bodies);
+    if (p.slots->bodies[i].phase == HAPI_SLOT_LIVE && fill_body(&p, i, &bodies[out->body_count])) {
+      ++out->body_count;
+    }
+  }
   publish_contacts(&p, out);
   out->cross_count = 0;
   for (uint32_t i = 0; i < out->contact_count; ++i) {
     hapi_cross_publish(&physics->cross, hapi_model_contacts(out)[i].slot, i, out);
   }
-  send_joints(physics, &p, out);
+  const hapi_range *range = &physics->near.range;
+  int64_t begin_ns = hapi_clock_now();
+  out->joint_count = 0;
+  if (out->model == HAP_MODEL_CONTACT && range->number == out->number) {
+    hapi_joints_take_slots(&physics->world.joints, out->number, range->mechanism.joints,
+                           range->mechanism.joint_count);
+    uint32_t count = range->mechanism.joint_count;
+    hapi_model_joint *to = hapi_model_joints(out);
+    HAPI_ASSERT(count <= p.cycle->config->capacity.joints);
+    for (uint32_t i = 0; i < count; ++i) {
+      joint_fill(&p, &p.world->joints.entries[range->mechanism.joints[i]], &to[i]);
+    }
+    out->joint_count = count;
+  }
+  physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
   out->bounces = count_bounces(&physics->near.range, out);
   publish_watch(&physics->watch, &physics->world.bodies, out);
-  count_model(&physics->counts.own.stats, &physics->near, out);
+  hap_stats *stats = &physics->counts.own.stats;
+  const hapi_nearby *near = &physics->near;
+  stats->model.neighbours = hapi_neighbors_bodies(near);
+  stats->model.pointer_contacts = out->contact_count;
+  if (out->model == HAP_MODEL_CONTACT && near->range.number == out->number) {
+    stats->model.pointer_contacts +=
+        near->range.near->tool_pair_count; /* whose points are found later */
+  }
+  if (stats->model.neighbours > stats->model.neighbours_max) {
+    stats->model.neighbours_max = stats->model.neighbours;
+  }
   out->touches = physics->counts.own.stats.model.pointer_contacts;
   hapi_effects_note(physics->counts.own.effects, cycle, &physics->world, &physics->near,
                     &physics->probe.answers, out);

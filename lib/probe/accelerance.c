@@ -221,6 +221,7 @@ void hapi_accelerance_free_body(dBodyID body, const dReal rotation[12], hapi_fre
   hapi_matrix_read(rotation, r);
   hapi_m3_invert(inertia, inverse);
   hapi_m3_turn(r, inverse, out->inverse_inertia);
+  HAPI_ASSERT_POSITIVE(out->inverse_inertia, 3);
   out->inverse_mass = 1.0 / mass.mass;
 }
 
@@ -433,18 +434,6 @@ static uint32_t rounds_plan(hapi_probe *probe)
   return probe->cycle->settings.probe == HAP_PROBE_PAPER ? trials->pushed.count : most;
 }
 
-static void rounds_measure(hapi_probe *probe, const hapi_contact_watch *watch)
-{
-  uint32_t rounds = rounds_plan(probe);
-  for (uint32_t round = 0; round < rounds; ++round) {
-    if (round == 0 || probe->cycle->settings.probe == HAP_PROBE_PAPER) {
-      bodies_measure_b(probe);
-    }
-    round_measure(probe, round, watch);
-  }
-  forces_take_out(probe, watch);
-}
-
 /* Islands whose A holds still. All are gathered again then. */
 static hap_status islands_measure_b_alone(hapi_probe *probe, const hapi_contact_watch *watch)
 {
@@ -490,7 +479,14 @@ static hap_status contacts_measure(hapi_probe *probe, const hapi_contact_watch *
     if (status < HAP_OK) {
       return status;
     }
-    rounds_measure(probe, watch);
+    uint32_t rounds = rounds_plan(probe);
+    for (uint32_t round = 0; round < rounds; ++round) {
+      if (round == 0 || probe->cycle->settings.probe == HAP_PROBE_PAPER) {
+        bodies_measure_b(probe);
+      }
+      round_measure(probe, round, watch);
+    }
+    forces_take_out(probe, watch);
     hapi_test_leave(&probe->test);
   }
   probe->counts.reused += hapi_reuse_keep(book);

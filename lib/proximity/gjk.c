@@ -61,17 +61,6 @@ static bool simplex_has(const hapi_simplex *simplex, const hapi_vertex *vertex)
   return found;
 }
 
-/* The nearest point as a vertex of its own, for it is a point of a - b like the others, and the
- * newest one. On a rim the vertices crowd until a face of them has no normal in doubles (at 1e-4 of
- * the radius); a line to the newest vertex still leads nearer. */
-static void simplex_collapse(const search *s, const hapi_vertex *newest, hapi_simplex *out)
-{
-  hapi_vertex merged = {.weight = 1.0};
-  hapi_simplex_witness(&s->simplex, merged.a, merged.b);
-  hapi_v3_sub(merged.a, merged.b, merged.gap);
-  *out = (hapi_simplex){.vertex = {merged, *newest}, .count = 2};
-}
-
 /* Takes the simplex when it comes nearer. */
 static bool simplex_accept(search *s, hapi_simplex *grown)
 {
@@ -109,7 +98,13 @@ static bool search_step(search *s)
   if (!s->apart) {
     return false;
   }
-  simplex_collapse(s, &newest, &grown);
+  /* The nearest point as a vertex of its own, for it is a point of a - b like the others, and
+   * the newest one. On a rim the vertices crowd until a face of them has no normal in doubles
+   * (at 1e-4 of the radius); a line to the newest vertex still leads nearer. */
+  hapi_vertex merged = {.weight = 1.0};
+  hapi_simplex_witness(&s->simplex, merged.a, merged.b);
+  hapi_v3_sub(merged.a, merged.b, merged.gap);
+  grown = (hapi_simplex){.vertex = {merged, newest}, .count = 2};
   return simplex_accept(s, &grown);
 }
 

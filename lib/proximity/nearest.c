@@ -6,27 +6,6 @@
 
 #include "base/vec.h"
 
-/* Makes point_a - point_b = distance x normal to the last bit that the coordinates allow; what is
- * left over of an iteration is shared by both points. */
-static void points_align(hapi_nearest *nearest)
-{
-  double middle[3];
-  hapi_v3_add(nearest->point_a, nearest->point_b, middle);
-  hapi_v3_scale(0.5, middle, middle);
-  hapi_v3_madd(middle, 0.5 * nearest->distance, nearest->normal, nearest->point_a);
-  hapi_v3_madd(middle, -0.5 * nearest->distance, nearest->normal, nearest->point_b);
-}
-
-static void balls_add(const hapi_solid *a, const hapi_solid *b, const hapi_gjk *cores,
-                      hapi_nearest *out)
-{
-  hapi_v3_copy(cores->normal, out->normal);
-  hapi_v3_madd(cores->point_a, -a->ball, cores->normal, out->point_a);
-  hapi_v3_madd(cores->point_b, b->ball, cores->normal, out->point_b);
-  out->distance = cores->distance - a->ball - b->ball;
-  points_align(out);
-}
-
 /* Below this gap of the cores, in parts of their size, the normal of GJK is losing digits;
  * the descent in hapi_deep_nearest measures it from farther off. */
 static const double thin_gap = 1e-3;
@@ -44,7 +23,17 @@ static bool nearest_iterated(const hapi_solid *a, const hapi_solid *b, hapi_near
       }
     }
   }
-  balls_add(a, b, &cores, out);
+  hapi_v3_copy(cores.normal, out->normal);
+  hapi_v3_madd(cores.point_a, -a->ball, cores.normal, out->point_a);
+  hapi_v3_madd(cores.point_b, b->ball, cores.normal, out->point_b);
+  out->distance = cores.distance - a->ball - b->ball;
+  /* Makes point_a - point_b = distance x normal to the last bit that the coordinates allow; what is
+   * left over of an iteration is shared by both points. */
+  double middle[3];
+  hapi_v3_add(out->point_a, out->point_b, middle);
+  hapi_v3_scale(0.5, middle, middle);
+  hapi_v3_madd(middle, 0.5 * out->distance, out->normal, out->point_a);
+  hapi_v3_madd(middle, -0.5 * out->distance, out->normal, out->point_b);
   return true;
 }
 

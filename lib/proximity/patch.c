@@ -36,16 +36,6 @@ static hapi_touch touch_swapped(hapi_touch touch)
   return HAPI_TOUCH_EDGES;
 }
 
-static void point_swap(hapi_patch_point *p)
-{
-  p->touch = touch_swapped(p->touch);
-  swap_vectors(p->core_a, p->core_b);
-  swap_vectors(p->edge_a, p->edge_b);
-  swap_numbers(&p->ball_a, &p->ball_b);
-  swap_numbers(&p->rim_a, &p->rim_b);
-  hapi_v3_scale(-1.0, p->normal, p->normal);
-}
-
 static bool balls_apart(const hapi_solid *a, const hapi_solid *b, double margin)
 {
   double between[3];
@@ -98,7 +88,12 @@ bool hapi_patch_find(const hapi_shape *a, const hap_pose *pose_a, const hapi_sha
     hapi_v3_add(point->core_a, pose_a->position, point->core_a);
     hapi_v3_add(point->core_b, pose_a->position, point->core_b);
     if (swapped) {
-      point_swap(point);
+      point->touch = touch_swapped(point->touch);
+      swap_vectors(point->core_a, point->core_b);
+      swap_vectors(point->edge_a, point->edge_b);
+      swap_numbers(&point->ball_a, &point->ball_b);
+      swap_numbers(&point->rim_a, &point->rim_b);
+      hapi_v3_scale(-1.0, point->normal, point->normal);
     }
   }
   return true;

@@ -28,16 +28,6 @@ static bool ball_point(const hapi_pair *pair, bool of_a, const double center[3],
 
 /* --- spheres ---------------------------------------------------------------------------------- */
 
-/* A normal within 1e-4 rad of the face's is the face's: then the plane is exact. */
-static void snap_to_face(const hapi_solid *hull, double normal[3])
-{
-  hapi_feature face;
-  if (hapi_feature_face(hull, normal, &face) &&
-      hapi_v3_dot(face.normal, normal) > 1.0 - 0.5 * 1e-4 * 1e-4) {
-    hapi_v3_copy(face.normal, normal);
-  }
-}
-
 static bool sphere_hull(const hapi_pair *pair)
 {
   hapi_gjk start;
@@ -49,7 +39,13 @@ static bool sphere_hull(const hapi_pair *pair)
     return false;
   }
   hapi_v3_copy(cores.normal, p.normal);
-  snap_to_face(pair->b, p.normal);
+  /* A normal within 1e-4 rad of the face's is the face's: then the plane is exact. */
+  double *normal = p.normal;
+  hapi_feature face;
+  if (hapi_feature_face(pair->b, normal, &face) &&
+      hapi_v3_dot(face.normal, normal) > 1.0 - 0.5 * 1e-4 * 1e-4) {
+    hapi_v3_copy(face.normal, normal);
+  }
   hapi_v3_copy(pair->a->center, p.core_a);
   hapi_v3_madd(p.core_a, -cores.distance, p.normal, p.core_b);
   hapi_patch_add(pair, &p);

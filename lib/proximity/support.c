@@ -129,15 +129,6 @@ static void hull_support(const hapi_solid *solid, const double direction[3], dou
   hapi_v3_copy(best, out);
 }
 
-/* Point of the disc: its middle when the direction stands on it, where every point is as good. */
-static void rim_support(double radius, const double direction[3], double out[3])
-{
-  double across = sqrt(direction[0] * direction[0] + direction[1] * direction[1]);
-  double scale = across > 0.0 ? radius / across : 0.0;
-  out[0] = scale * direction[0];
-  out[1] = scale * direction[1];
-}
-
 void hapi_solid_support(const hapi_solid *solid, const double direction[3], double out[3])
 {
   HAPI_ASSERT(solid->kind != HAPI_SHAPE_PLANE);
@@ -151,7 +142,12 @@ void hapi_solid_support(const hapi_solid *solid, const double direction[3], doub
       point[i] = d[i] < 0.0 ? -solid->half[i] : solid->half[i];
     }
     if (solid->kind == HAPI_SHAPE_CYLINDER) {
-      rim_support(solid->disc, d, point);
+      /* Point of the disc: its middle when the direction stands on it, where every point is as
+       * good. */
+      double across = sqrt(d[0] * d[0] + d[1] * d[1]);
+      double scale = across > 0.0 ? solid->disc / across : 0.0;
+      point[0] = scale * d[0];
+      point[1] = scale * d[1];
     }
   }
   hapi_solid_to_world(solid, point, out);
