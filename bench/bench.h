@@ -31,6 +31,7 @@ typedef struct bench {
   size_t merge_count;
   const char *estimates; /* accuracy: all, default: rows beside which the session's own estimate is
                             measured; NULL: with quick those of the default, else all */
+  long random_worlds;    /* faults: so many of them in place of the scenes; 0: the scenes */
   bool fresh;            /* accuracy: do not go on from what an earlier run has finished */
   int off;               /* checks that were off */
   hap_detail detail;     /* why a program failed */

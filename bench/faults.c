@@ -263,6 +263,9 @@ static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, 
 
 hap_status bench_faults(bench *b)
 {
+  if (b->random_worlds > 0) {
+    return faults_random_run(b, b->random_worlds);
+  }
   int faults = 0;
   bool found = false;
   FILE *csv = bench_csv_open(b, "faults",

@@ -5,6 +5,7 @@
  * NAME] [--estimates all|default] [--shard K/N | --merge FILE...] [--fresh]: measures, writes
  * NAME.csv and NAME.svg. Exit 0: done, 1: failed or --verify found something off, 2: usage. */
 
+#include <stdlib.h>
 #include <string.h>
 
 #include <ode/ode.h>
@@ -37,7 +38,8 @@ static const program programs[] = {
      "--scene NAME"},
     {"faults", bench_faults,
      "the felt force against an independent reference, scene by scene, and where it is wrong; "
-     "--scene NAME"},
+     "--scene NAME;\n"
+     "             --random N: N worlds of random bodies instead, and how many end their process"},
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
@@ -70,6 +72,7 @@ static void print_usage(FILE *to)
       "usage: hapode-bench NAME [--out DIR] [--quick] [--verify] [--scene SCENE] [--only FILTER]\n"
       "                    [--coupling NAME] [--estimates all|default] [--shard K/N | --merge "
       "FILE...] [--fresh]\n"
+      "                    [--random N]\n"
       "NAME.csv and NAME.svg go to DIR, by default the current folder. NAME is one of:\n");
   for (size_t i = 0; i < PROGRAM_COUNT; ++i) {
     fprintf(to, "  %-9s  %s\n", programs[i].name, programs[i].text);
@@ -86,6 +89,7 @@ static const program *find_program(const char *name)
   return NULL;
 }
 
+#define RANDOM_WORLDS_MAX 100000000
 #define BAD_SHARD SIZE_MAX
 #define TEXT_OF(number) TEXT_OF_(number)
 #define TEXT_OF_(number) #number
@@ -140,6 +144,12 @@ static bool take_option(int count, char **arguments, bench *b, int *io)
       return true;
     }
   }
+  const char *random = value_of("--random", count, arguments, io);
+  if (random != NULL) {
+    char *end;
+    b->random_worlds = strtol(random, &end, 10);
+    return *end == '\0' && b->random_worlds >= 1 && b->random_worlds <= RANDOM_WORLDS_MAX;
+  }
   const char *shard = value_of("--shard", count, arguments, io);
   if (shard != NULL) {
     b->shards = 0;
@@ -170,6 +180,8 @@ static bool options_fit(const program *p, const bench *b)
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults) {
     wrong = "has no scenes to choose from";
+  } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
+    wrong = "has no random worlds: --random is for faults, without --scene";
   } else if (b->coupling != NULL && !takes_coupling(p)) {
     wrong = "has no couplings to choose from: --coupling is for accuracy and impedance";
   } else if (b->coupling != NULL && !bench_find_coupling(b->coupling, &coupling)) {

@@ -52,8 +52,8 @@ TEST(the_reference_keeps_its_side_of_a_sheet)
   faults_run_free(&run);
 }
 
-/* A free cube of 1 kg: the work of the hand is the energy of cube and spring, 7 mJ, but for what the
- * step is too long. */
+/* A free cube of 1 kg: the hand's work is the energy of cube and spring, 7 mJ. What is
+ * missing is in proportion to the step. */
 TEST(the_reference_keeps_energy)
 {
   faults_run run;
@@ -75,6 +75,15 @@ TEST(the_controls_are_good)
   const char *text = file_text(folder_path("faults.csv"));
   CHECK(lines_with(text, "push") == 2);
   CHECK(lines_with(text, ",ok") == 2);
+}
+
+TEST(random_worlds_end_no_process)
+{
+  CHECK(run("faults --verify --random 60") == 0);
+  CHECK(said_lines("60 random worlds: 0 ended") == 1);
+  CHECK(run("faults --random 0") == 2);
+  CHECK(run("faults --random 5 --scene push") == 2);
+  CHECK(run("fig5 --random 5") == 2);
 }
 
 TEST(a_scene_that_is_not_there_is_refused)
