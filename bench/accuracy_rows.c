@@ -191,7 +191,7 @@ static bool accuracy_is_header(const char *line)
  * accuracy.csv. */
 
 #define LINE_LENGTH 1024
-#define LOCK_TRIES 50 /* of 20 ms: processes of a run that was killed end within moments */
+#define LOCK_TRIES 250 /* of 20 ms: processes of a run that was killed end within moments */
 #define FNV_BEGIN 0xcbf29ce484222325ull
 #define FNV_PRIME 0x100000001b3ull
 

@@ -10,6 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/log.h"
+
 bool plot_available(void)
 {
 #ifdef PLOT_DISABLED
@@ -101,8 +103,7 @@ static hap_status wait_for(pid_t child, FILE *errors, hap_detail *detail)
   char words[400];
   while (waitpid(child, &result, 0) < 0) {
     if (errno != EINTR) {
-      snprintf(detail->text, sizeof detail->text, "gnuplot was lost: %s", strerror(errno));
-      return HAP_ERROR_SYSTEM;
+      return hapi_fail(detail, HAP_ERROR_SYSTEM, "gnuplot was lost: %s", strerror(errno));
     }
   }
   if (WIFEXITED(result) && WEXITSTATUS(result) == 0) {
@@ -110,22 +111,19 @@ static hap_status wait_for(pid_t child, FILE *errors, hap_detail *detail)
   }
   rewind(errors);
   words[fread(words, 1, sizeof words - 1, errors)] = '\0';
-  snprintf(detail->text, sizeof detail->text, "gnuplot failed: %s", words);
-  return HAP_ERROR_IO;
+  return hapi_fail(detail, HAP_ERROR_IO, "gnuplot failed: %s", words);
 }
 
 /* The offset of script's descriptor is where gnuplot begins to read. */
 static hap_status gnuplot_run(FILE *script, hap_detail *detail)
 {
   if (ferror(script) != 0 || fflush(script) != 0 || lseek(fileno(script), 0, SEEK_SET) != 0) {
-    snprintf(detail->text, sizeof detail->text, "gnuplot's script could not be written: %s",
-             strerror(errno));
-    return HAP_ERROR_IO;
+    return hapi_fail(detail, HAP_ERROR_IO, "gnuplot's script could not be written: %s",
+                     strerror(errno));
   }
   FILE *errors = tmpfile();
   if (errors == NULL) {
-    snprintf(detail->text, sizeof detail->text, "no temporary file: %s", strerror(errno));
-    return HAP_ERROR_IO;
+    return hapi_fail(detail, HAP_ERROR_IO, "no temporary file: %s", strerror(errno));
   }
   pid_t child = 0;
   hap_status status = HAP_ERROR_SYSTEM;
@@ -152,16 +150,4 @@ hap_status plot_end(FILE *script, hap_detail *detail)
   }
   fclose(script);
   return status;
-}
-
-hap_status plot_run(const char *gnuplot_script_text, hap_detail *detail)
-{
-  FILE *script = tmpfile();
-  if (script == NULL) {
-    snprintf(detail->text, sizeof detail->text, "no temporary file for gnuplot's script: %s",
-             strerror(errno));
-    return HAP_ERROR_IO;
-  }
-  fputs(gnuplot_script_text, script);
-  return plot_end(script, detail);
 }

@@ -34,7 +34,4 @@ void plot_string(FILE *script, const char *text);
  * HAP_ERROR_IO with gnuplot's own words when it failed. NULL is HAP_ERROR_ARGUMENT. */
 hap_status plot_end(FILE *script, hap_detail *detail);
 
-/* The same for a script that is complete, set terminal and set output included. */
-hap_status plot_run(const char *gnuplot_script_text, hap_detail *detail);
-
 #endif

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/log.h"
 #include "device/device.h"
 
 void rig_options_init(rig_options *options)
@@ -92,11 +93,10 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   pointer_defs_init(&def, &expert, &research);
   const char *spec = device_spec(options, r->scene, index);
   if (strcmp(spec, "virtual") == 0) {
-    snprintf(detail->text, sizeof detail->text,
-             "scene %s has %d simulated hands: give device %zu a motion, as in "
-             "virtual:path=0:0/0/0;1:0.1/0/0",
-             p->name, p->pointers, index + 1);
-    return HAP_ERROR_ARGUMENT;
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "scene %s has %d simulated hands: give device %zu a motion, as in "
+                     "virtual:path=0:0/0/0;1:0.1/0/0",
+                     p->name, p->pointers, index + 1);
   }
   hap_status status = hap_device_open(spec, &r->devices[index], detail);
   if (status >= HAP_OK) {

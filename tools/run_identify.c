@@ -8,6 +8,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "device/device.h"
 #include "tools/run_loop.h"
 
@@ -20,9 +21,8 @@ static hap_status check_writable(const char *path, hap_detail *detail)
   bool made = stat(path, &before) != 0;
   FILE *file = fopen(path, "a");
   if (file == NULL) {
-    snprintf(detail->text, sizeof detail->text, "--identify %.300s: cannot be written: %s", path,
-             strerror(errno));
-    return HAP_ERROR_IO;
+    return hapi_fail(detail, HAP_ERROR_IO, "--identify %.300s: cannot be written: %s", path,
+                     strerror(errno));
   }
   fclose(file);
   if (made) {

@@ -192,73 +192,25 @@ static hap_status take_priority(run_options *options, const option *self, const 
   return HAP_OK;
 }
 
-static hap_status take_no_realtime(run_options *options, const option *self, const char *value,
-                                   hap_detail *detail)
+static hap_status take_flag(run_options *options, const option *self, const char *value,
+                            hap_detail *detail)
 {
-  (void)self;
   (void)value;
   (void)detail;
-  options->rig.def.rt_priority = 0;
+  *(bool *)((char *)options + self->offset) = true;
   return HAP_OK;
 }
 
-static hap_status take_effects_table(run_options *options, const option *self, const char *value,
-                                     hap_detail *detail)
-{
-  (void)self;
-  (void)value;
-  (void)detail;
-  options->effects_table = true;
-  return HAP_OK;
-}
+_Static_assert(sizeof(hap_drive) == sizeof(int) && sizeof(run_action) == sizeof(int), "int");
 
-static hap_status take_lockstep(run_options *options, const option *self, const char *value,
+/* The option's low, into a member of the size of an int. */
+static hap_status take_constant(run_options *options, const option *self, const char *value,
                                 hap_detail *detail)
 {
-  (void)self;
+  const int constant = (int)self->low;
   (void)value;
   (void)detail;
-  options->rig.def.drive = HAP_DRIVE_LOCKSTEP;
-  return HAP_OK;
-}
-
-static hap_status take_incomplete(run_options *options, const option *self, const char *value,
-                                  hap_detail *detail)
-{
-  (void)self;
-  (void)value;
-  (void)detail;
-  options->play_incomplete = true;
-  return HAP_OK;
-}
-
-static hap_status take_reconnect(run_options *options, const option *self, const char *value,
-                                 hap_detail *detail)
-{
-  (void)self;
-  (void)value;
-  (void)detail;
-  options->reconnect = true;
-  return HAP_OK;
-}
-
-static hap_status take_limits(run_options *options, const option *self, const char *value,
-                              hap_detail *detail)
-{
-  (void)self;
-  (void)value;
-  (void)detail;
-  options->check.limits = true;
-  return HAP_OK;
-}
-
-/* The action is the option's low. */
-static hap_status take_action(run_options *options, const option *self, const char *value,
-                              hap_detail *detail)
-{
-  (void)value;
-  (void)detail;
-  options->action = (run_action)self->low;
+  memcpy((char *)options + self->offset, &constant, sizeof constant);
   return HAP_OK;
 }
 
@@ -284,7 +236,7 @@ static const option table[] = {
     {"--reconnect", NULL,
      "a device that was lost is started again until it answers; then the force\n"
      "comes back over 20 ms (default: a lost device ends the run)",
-     take_reconnect, 0, 0, 0},
+     take_flag, offsetof(run_options, reconnect), 0, 0},
     {"--check-device", "SPEC",
      "no session: holds the device against the contract of hapode/device_impl.h, with\n"
      "a small force; prints ok or not ok for each point; let go of the grip",
@@ -294,7 +246,7 @@ static const option table[] = {
     {"--check-limits", NULL,
      "also ask for more than the device can, and for what is no number: if it is\n"
      "wrong, it may give all its force for a moment",
-     take_limits, 0, 0, 0},
+     take_flag, offsetof(run_options, check.limits), 0, 0},
     {"--check-unplug", "S", "also ask a person to pull its plug, S seconds for each turn",
      take_number, offsetof(run_options, check.unplug_s), 0.001, 3600},
     {"--check-wait", "S", "seconds of warning before it is energised (default 5)", take_number,
@@ -325,7 +277,8 @@ static const option table[] = {
      take_count, offsetof(run_options, rig.expert.max_edge_probes), 0, 1024},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
-    {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_lockstep, 0, 0, 0},
+    {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_constant,
+     offsetof(run_options, rig.def.drive), HAP_DRIVE_LOCKSTEP, 0},
     {"--model-age", "S", "lockstep: seconds from a physics step's start to the use of its result",
      take_number, offsetof(run_options, model_age_s), 0, 200},
     {"--impulse-pose", "NAME", "model impulse shows bodies held or interpolated (default)",
@@ -374,7 +327,7 @@ static const option table[] = {
     {"--effects", "LIST", "such as friction=off,torque=auto, or all=on; see --list", take_effects,
      0, 0, 0},
     {"--effects-table", NULL, "after the summary, a line for each effect: why, and what it costs",
-     take_effects_table, 0, 0, 0},
+     take_flag, offsetof(run_options, effects_table), 0, 0},
     {"--trace", "FILE", "every tick as a row of a CSV file", take_text,
      offsetof(run_options, trace_path), 0, 0},
     {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
@@ -389,15 +342,17 @@ static const option table[] = {
      "what --record wrote, once more, bit for bit; says where it is not. Scene,\n"
      "model, rates and hands are those of the file",
      take_text, offsetof(run_options, play_path), 0, 0},
-    {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_incomplete, 0,
-     0, 0},
+    {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_flag,
+     offsetof(run_options, play_incomplete), 0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
      take_priority, 0, 0, 99},
-    {"--no-realtime", NULL, "do not ask for real-time rights", take_no_realtime, 0, 0, 0},
-    {"--list", NULL, "scenes with their parameters, models, devices, effects", take_action, 0,
-     RUN_LIST, 0},
-    {"--help", NULL, "this text", take_action, 0, RUN_HELP, 0},
-    {"--version", NULL, "version of the library", take_action, 0, RUN_VERSION, 0},
+    {"--no-realtime", NULL, "do not ask for real-time rights", take_constant,
+     offsetof(run_options, rig.def.rt_priority), 0, 0},
+    {"--list", NULL, "scenes with their parameters, models, devices, effects", take_constant,
+     offsetof(run_options, action), RUN_LIST, 0},
+    {"--help", NULL, "this text", take_constant, offsetof(run_options, action), RUN_HELP, 0},
+    {"--version", NULL, "version of the library", take_constant, offsetof(run_options, action),
+     RUN_VERSION, 0},
 };
 
 #define OPTIONS (sizeof table / sizeof table[0])
@@ -625,12 +580,10 @@ static hap_status options_check(run_options *o, hap_detail *detail)
     }
     o->rig.research.physics_latency_ticks = (int32_t)ticks;
   }
-  if (o->trace_path != NULL && o->plot_path != NULL && strcmp(o->trace_path, o->plot_path) == 0) {
+  if (texts_same(o->trace_path, o->plot_path)) {
     return options_fail(detail, "--plot: the same file as --trace");
   }
-  if (o->black_box_path != NULL &&
-      ((o->trace_path != NULL && strcmp(o->black_box_path, o->trace_path) == 0) ||
-       (o->plot_path != NULL && strcmp(o->black_box_path, o->plot_path) == 0))) {
+  if (texts_same(o->black_box_path, o->trace_path) || texts_same(o->black_box_path, o->plot_path)) {
     return options_fail(detail, "--black-box: the same file as --trace or --plot");
   }
   if (o->check.spec != NULL && (o->identify_path != NULL || o->rig.device_count > 0)) {

@@ -5,6 +5,8 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "base/log.h"
+
 #define NOTE_BEGIN "hapode-run\nscene "
 
 static const char *const ends[] = {
@@ -20,16 +22,14 @@ static hap_status read_note(run_recording *r, const char *path, hap_detail *deta
   size_t begin = strlen(NOTE_BEGIN);
   size_t size = r->info.note_size;
   if (size <= begin || memcmp(note, NOTE_BEGIN, begin) != 0) {
-    snprintf(detail->text, sizeof detail->text,
-             "--play %.300s: was recorded by another program, which alone can build its world",
-             path);
-    return HAP_ERROR_UNSUPPORTED;
+    return hapi_fail(
+        detail, HAP_ERROR_UNSUPPORTED,
+        "--play %.300s: was recorded by another program, which alone can build its world", path);
   }
   const char *end = memchr(note + begin, '\n', size - begin);
   size_t length = end != NULL ? (size_t)(end - note) - begin : 0;
   if (length == 0 || length >= sizeof r->scene) {
-    snprintf(detail->text, sizeof detail->text, "--play %.300s: it does not name its scene", path);
-    return HAP_ERROR_FORMAT;
+    return hapi_fail(detail, HAP_ERROR_FORMAT, "--play %.300s: it does not name its scene", path);
   }
   memcpy(r->scene, note + begin, length);
   return HAP_OK;
