@@ -472,8 +472,9 @@ void hapi_contact_pass(hapi_contact *contact, int64_t valid_from_ns)
 {
   int64_t begin_ns = hapi_clock_now();
   bool news = hapi_contact_has_news(contact);
-  if (news) { /* pairs that the loop is not ready for stay in the mailbox: those that it goes on with
-                 would lose their contacts */
+  /* Pairs that the loop is not ready for stay in the mailbox: those that it goes on with would lose
+   * their contacts. */
+  if (news) {
     hapi_near *near = hapi_exchange_near_take(contact->config.exchange);
     contact->near = near != NULL ? near : contact->near;
   }

@@ -54,20 +54,6 @@ void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns)
 
 /* ---- states ---- */
 
-static void note_torque(const hapi_pointer *p, hapi_effect_figures *io)
-{
-  hap_effect_reason why = p->device.three_dof ? HAP_REASON_NO_TORQUE : HAP_REASON_ROUND;
-  hapi_effect_note(io, p->device.feels_torque, why);
-}
-
-static void note_proxy(const hapi_pointer *p, hapi_effect_figures *io)
-{
-  hap_effect_reason why = p->coupling.kind != HAP_COUPLING_AUTO ? HAP_REASON_COUPLING
-                          : p->coupling.hold_known              ? HAP_REASON_WITHIN
-                                                                : HAP_REASON_DEVICE_UNKNOWN;
-  hapi_effect_note(io, p->proxied, why);
-}
-
 /* In one word each: a reader never sees half of it. */
 static uint64_t figures_packed(const hapi_effect_figures *f)
 {
@@ -75,36 +61,28 @@ static uint64_t figures_packed(const hapi_effect_figures *f)
          (uint64_t)f->state << 48;
 }
 
-static hapi_effect_figures figures_unpacked(uint64_t word)
-{
-  return (hapi_effect_figures){.on = (uint32_t)(word & 0xffffu),
-                               .of = (uint32_t)(word >> 16 & 0xffffu),
-                               .reason = (uint32_t)(word >> 32 & 0xffffu),
-                               .state = (uint32_t)(word >> 48)};
-}
-
-static void note_observer(const hapi_tick *tick, hapi_effect_figures *out)
-{
-  hapi_effect_note(out, tick->facts.observes && tick->guard.mode == HAP_GUARD_ON,
-                   tick->guard.mode == HAP_GUARD_MEASURE ? HAP_REASON_MEASURING : HAP_REASON_FAR);
-  hapi_effect_sum_up(out, hapi_wish(tick->facts.wishes, HAP_EFFECT_OBSERVER), HAP_REASON_NOT_YET);
-}
-
 void hapi_loop_note_effects(hapi_haptic *haptic)
 {
   const hapi_tick *tick = &haptic->tick;
+  const uint32_t wishes = tick->facts.wishes;
   hapi_effect_figures f[HAPI_LOOP_NOTED] = {{0}};
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    if (tick->pointers.of[i].generation != 0) {
-      note_torque(&tick->pointers.of[i], &f[HAPI_LOOP_TORQUE]);
-      note_proxy(&tick->pointers.of[i], &f[HAPI_LOOP_PROXY]);
+    const hapi_pointer *p = &tick->pointers.of[i];
+    if (p->generation != 0) {
+      hapi_effect_note(&f[HAPI_LOOP_TORQUE], p->device.feels_torque,
+                       p->device.three_dof ? HAP_REASON_NO_TORQUE : HAP_REASON_ROUND);
+      hapi_effect_note(&f[HAPI_LOOP_PROXY], p->proxied,
+                       p->coupling.kind != HAP_COUPLING_AUTO ? HAP_REASON_COUPLING
+                       : p->coupling.hold_known              ? HAP_REASON_WITHIN
+                                                             : HAP_REASON_DEVICE_UNKNOWN);
     }
   }
-  hapi_effect_sum_up(&f[HAPI_LOOP_TORQUE], hapi_wish(tick->facts.wishes, HAP_EFFECT_TORQUE),
-                     HAP_REASON_FAR);
-  hapi_effect_sum_up(&f[HAPI_LOOP_PROXY], hapi_wish(tick->facts.wishes, HAP_EFFECT_PROXY),
-                     HAP_REASON_FAR);
-  note_observer(tick, &f[HAPI_LOOP_OBSERVER]);
+  hapi_effect_note(&f[HAPI_LOOP_OBSERVER], tick->facts.observes && tick->guard.mode == HAP_GUARD_ON,
+                   tick->guard.mode == HAP_GUARD_MEASURE ? HAP_REASON_MEASURING : HAP_REASON_FAR);
+  hapi_effect_sum_up(&f[HAPI_LOOP_TORQUE], hapi_wish(wishes, HAP_EFFECT_TORQUE), HAP_REASON_FAR);
+  hapi_effect_sum_up(&f[HAPI_LOOP_PROXY], hapi_wish(wishes, HAP_EFFECT_PROXY), HAP_REASON_FAR);
+  hapi_effect_sum_up(&f[HAPI_LOOP_OBSERVER], hapi_wish(wishes, HAP_EFFECT_OBSERVER),
+                     HAP_REASON_NOT_YET);
   for (int i = 0; i < HAPI_LOOP_NOTED; ++i) {
     atomic_store_explicit(&haptic->effects.shown[i], figures_packed(&f[i]), memory_order_relaxed);
   }
@@ -112,12 +90,11 @@ void hapi_loop_note_effects(hapi_haptic *haptic)
 
 static void fill_state(const hapi_haptic *haptic, int noted, hap_effect_info *out)
 {
-  hapi_effect_figures f =
-      figures_unpacked(atomic_load_explicit(&haptic->effects.shown[noted], memory_order_relaxed));
-  out->state = f.state;
-  out->reason = f.reason;
-  out->on = f.on;
-  out->of = f.of;
+  uint64_t word = atomic_load_explicit(&haptic->effects.shown[noted], memory_order_relaxed);
+  out->on = (uint32_t)(word & 0xffffu);
+  out->of = (uint32_t)(word >> 16 & 0xffffu);
+  out->reason = (uint32_t)(word >> 32 & 0xffffu);
+  out->state = (uint32_t)(word >> 48);
 }
 
 /* What has no part of its own in a tick, or none that can be told from the rest. */

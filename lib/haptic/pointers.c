@@ -21,13 +21,6 @@
 
 /* ---- the loop's side ---- */
 
-static double mass_of(const hapi_pointer_setup *def)
-{
-  return def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
-         : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
-                                                  : def->proxy_mass;
-}
-
 /* In the world, where a metre of the device is motion_scale metres and a newton its share. */
 static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
 {
@@ -43,7 +36,9 @@ static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slo
   p->coupling.hold = p->coupling.hold_known ? gains.stiffness / scale : HUGE_VAL;
   p->coupling.stiffness = p->coupling.hold_known ? p->coupling.hold : 0.0;
   p->coupling.damping = p->coupling.hold_known ? gains.damping / scale : 0.0;
-  p->coupling.mass = mass_of(def);
+  p->coupling.mass = def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
+                     : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
+                                                              : def->proxy_mass;
   p->coupling.reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
 }
 
@@ -81,11 +76,6 @@ static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
   }
 }
 
-static bool is_unturned(const double q[4])
-{
-  return q[0] == 1.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0;
-}
-
 static void pointer_activate(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
@@ -113,7 +103,8 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.motion_scale = def->motion_scale;
   p->device.force_scale = def->force_scale;
   p->device.pose_world_device = def->pose_world_device;
-  p->device.aligned = is_unturned(def->pose_world_device.quat_wxyz);
+  const double *turn = def->pose_world_device.quat_wxyz;
+  p->device.aligned = turn[0] == 1.0 && turn[1] == 0.0 && turn[2] == 0.0 && turn[3] == 0.0;
   p->device.limits.max_force =
       info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
   p->device.limits.max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque
@@ -134,12 +125,6 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.good.quat_wxyz[0] = 1.0;
   p->handle.quat[0] = p->proxy.quat[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
-}
-
-/* A pointer that the application moves comes in with its first target. */
-static bool is_ready(const hapi_pointer_slot *slot)
-{
-  return slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
 }
 
 /* For a new user of the slot, whose def is in it. */
@@ -206,7 +191,9 @@ void hapi_pointers_follow(hapi_haptic *haptic)
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
-    if (phase == HAPI_POINTER_ADDED && is_ready(slot)) {
+    /* A pointer that the application moves comes in with its first target. */
+    bool ready = slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
+    if (phase == HAPI_POINTER_ADDED && ready) {
       pointer_activate(haptic, i);
       hapi_tape_join(haptic, i);
       /* Fails when the application wants it back meanwhile: seen at the next tick. */

@@ -20,52 +20,20 @@ typedef struct plane {
   double force;          /* N, along the normal */
 } plane;
 
-static void place_plane(const hapi_local_contact *c, plane *out)
-{
-  const hapi_local_body *body = out->body;
-  if (body == NULL) {
-    hapi_v3_copy(c->point_body, out->point);
-    hapi_v3_copy(c->normal_body, out->normal);
-    hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
-    return;
-  }
-  hapi_quat_rotate(body->pose.quat_wxyz, c->point_body, out->arm);
-  hapi_quat_rotate(body->pose.quat_wxyz, c->normal_body, out->normal);
-  hapi_v3_add(body->pose.position, out->arm, out->point);
-}
-
-/* Where hapi_tool_place found it. */
-static void place_tool(const hapi_local_contact *c, plane *out)
-{
-  const hapi_local_body *body = out->body;
-  hapi_v3_copy(c->point_now, out->point);
-  hapi_v3_copy(c->normal_now, out->normal);
-  hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
-  if (body != NULL) {
-    hapi_v3_sub(c->point_now, body->pose.position, out->arm);
-  }
-}
-
-/* Of the pointer where the contact is; a sphere's turning moves nothing along the normal. */
-static void pointer_velocity(const hapi_pointer *p, const plane *at, double out[3])
-{
-  double arm[3];
-  double swing[3];
-  hapi_v3_copy(p->twist.linear, out);
-  if (p->shape.hull != NULL) {
-    hapi_v3_sub(at->point, p->pose.position, arm);
-    hapi_v3_cross(p->twist.angular, arm, swing);
-    hapi_v3_add(out, swing, out);
-  }
-}
-
 /* Rate at which the pointer goes into the plane [m/s]. *out_own: how much of it its own motion
  * makes. */
 static double closing_rate(const hapi_pointer *p, const plane *at, double *out_own)
 {
   const hapi_local_body *body = at->body;
-  double relative[3];
-  pointer_velocity(p, at, relative);
+  double relative[3]; /* of the pointer where the contact is */
+  hapi_v3_copy(p->twist.linear, relative);
+  if (p->shape.hull != NULL) { /* a sphere's turning moves nothing along the normal */
+    double arm[3];
+    double swing[3];
+    hapi_v3_sub(at->point, p->pose.position, arm);
+    hapi_v3_cross(p->twist.angular, arm, swing);
+    hapi_v3_add(relative, swing, relative);
+  }
   *out_own = -hapi_v3_dot(at->normal, relative);
   if (body != NULL) {
     double surface[3];
@@ -177,40 +145,29 @@ static void push_body(const hapi_local_contact *c, const plane *at, double perio
   }
 }
 
-/* A sum that is kept: a force that is no number, which the guard stops, would stay in it for
- * ever. */
-static void force_audit(hapi_touches *touches, double period, const double vector[3], double norm)
-{
-  if (!isfinite(norm)) {
-    return;
-  }
-  hapi_v3_madd(touches->hand_impulse, period, vector, touches->hand_impulse);
-  touches->hand_impulse_abs += period * norm;
-}
-
-/* Torque about the pointer's origin. */
-static void turn_pointer(hapi_pointer *p, const plane *at, double force)
-{
-  double arm[3];
-  double moment[3];
-  hapi_v3_sub(at->point, p->pose.position, arm);
-  hapi_v3_cross(arm, at->normal, moment);
-  hapi_v3_madd(p->wrench.torque, force, moment, p->wrench.torque);
-}
-
 /* Where the contact is; false: it is nowhere. */
-static bool contact_place(const hapi_touches *touches, const hapi_pointer *p,
-                          const hapi_local_contact *c, plane *out)
+static bool plane_place(const hapi_touches *touches, const hapi_pointer *p,
+                        const hapi_local_contact *c, plane *out)
 {
-  if (p->generation != c->pointer_generation) {
+  const hapi_local_body *body = out->body;
+  if (p->generation != c->pointer_generation ||
+      (c->tool != 0 && !touches->tool.tools[c->tool - 1].placed)) {
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
-  if (c->tool == 0) {
-    place_plane(c, out);
-  } else if (touches->tool.tools[c->tool - 1].placed) {
-    place_tool(c, out);
+  hapi_v3_set(out->arm, 0.0, 0.0, 0.0);
+  if (c->tool != 0) { /* where hapi_tool_place found it */
+    hapi_v3_copy(c->point_now, out->point);
+    hapi_v3_copy(c->normal_now, out->normal);
+    if (body != NULL) {
+      hapi_v3_sub(c->point_now, body->pose.position, out->arm);
+    }
+  } else if (body == NULL) {
+    hapi_v3_copy(c->point_body, out->point);
+    hapi_v3_copy(c->normal_body, out->normal);
   } else {
-    return false;
+    hapi_quat_rotate(body->pose.quat_wxyz, c->point_body, out->arm);
+    hapi_quat_rotate(body->pose.quat_wxyz, c->normal_body, out->normal);
+    hapi_v3_add(body->pose.position, out->arm, out->point);
   }
   return true;
 }
@@ -222,7 +179,7 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
   double depth = 0.0;
   hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   hapi_v3_set(c->couple, 0.0, 0.0, 0.0);
-  if (!contact_place(touches, p, c, &at)) {
+  if (!plane_place(touches, p, c, &at)) {
     return;
   }
   double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
@@ -234,7 +191,11 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
   hapi_v3_scale(-force, at.normal, c->force);
   if (c->tool != 0 && p->device.feels_torque) {
     uint64_t begin = hapi_effect_begin(sample);
-    turn_pointer(p, &at, force);
+    double arm[3];
+    double moment[3];
+    hapi_v3_sub(at.point, p->pose.position, arm);
+    hapi_v3_cross(arm, at.normal, moment);
+    hapi_v3_madd(p->wrench.torque, force, moment, p->wrench.torque);
     hapi_effect_end(sample, HAP_EFFECT_TORQUE, begin);
   }
   if (c->rubs) {
@@ -250,7 +211,10 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
     at.body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
     at.body->pushed = true;
     push_body(c, &at, facts->period);
-    force_audit(touches, facts->period, c->force, force);
+    if (isfinite(force)) { /* NaN, which the guard stops, would stay in a sum */
+      hapi_v3_madd(touches->hand_impulse, facts->period, c->force, touches->hand_impulse);
+      touches->hand_impulse_abs += facts->period * force;
+    }
   }
 }
 

@@ -19,8 +19,8 @@ typedef struct hapi_frame_steps {
 
 /* Takes frame_s in. The steps end where the frame time has come to, which is the remainder before
  * now_ns: so they lie as evenly on the clock as if physics had a thread of its own, whenever frames
- * come. Where frame time goes faster than the clock they share what there is of it since last_ns, the
- * time of the last step. */
+ * come. Where frame time goes faster than the clock they share what there is of it since last_ns,
+ * the time of the last step. */
 hapi_frame_steps hapi_frame_take(double *remainder_s, double frame_s, double period, int64_t now_ns,
                                  int64_t last_ns);
 

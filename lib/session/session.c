@@ -438,26 +438,6 @@ const char *hap_fault_text(hap_fault fault)
   return "";
 }
 
-/* Says which pointer a fault came from, by the number of its place, and what its device says to it. */
-static void write_fault(hapi_haptic *haptic, const hap_stats *stats, hap_detail *out)
-{
-  const char *text = hap_fault_text((hap_fault)stats->faults.fault);
-  unsigned place = (unsigned)(stats->faults.pointer & 0xffffffffu);
-  bool device =
-      stats->faults.fault == HAP_FAULT_DEVICE_READ || stats->faults.fault == HAP_FAULT_DEVICE_WRITE;
-  hap_detail why = {""};
-  if (device && place != 0) {
-    const hap_pointer_id id = {stats->faults.pointer};
-    hapi_haptic_explain(haptic, id, &why);
-  }
-  if (place == 0) {
-    snprintf(out->text, sizeof out->text, "%s", text);
-  } else {
-    snprintf(out->text, sizeof out->text, "pointer %u: %s%s%.300s", place, text,
-             why.text[0] != '\0' ? ": " : "", why.text);
-  }
-}
-
 hap_status hap_session_reset_fault(hap_session *session)
 {
   HAPI_TRY(hapi_session_may_change(session));
@@ -490,9 +470,21 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
   *out = s->detail;
   pthread_mutex_unlock(&s->detail_lock);
   hapi_haptic_stats(session->haptic, &stats);
-  if (stats.faults.fault != HAP_FAULT_NONE && stats.faults.fault != HAP_FAULT_WORLD) {
-    write_fault(session->haptic, &stats, out);
+  hap_fault fault = (hap_fault)stats.faults.fault;
+  if (fault == HAP_FAULT_NONE || fault == HAP_FAULT_WORLD) {
+    return HAP_OK;
   }
+  unsigned place = (unsigned)(stats.faults.pointer & 0xffffffffu);
+  if (place == 0) {
+    snprintf(out->text, sizeof out->text, "%s", hap_fault_text(fault));
+    return HAP_OK;
+  }
+  hap_detail why = {""}; /* the pointer it came from, by the number of its place, and its device */
+  if (fault == HAP_FAULT_DEVICE_READ || fault == HAP_FAULT_DEVICE_WRITE) {
+    hapi_haptic_explain(session->haptic, (hap_pointer_id){stats.faults.pointer}, &why);
+  }
+  snprintf(out->text, sizeof out->text, "pointer %u: %s%s%.300s", place, hap_fault_text(fault),
+           why.text[0] != '\0' ? ": " : "", why.text);
   return HAP_OK;
 }
 

@@ -62,15 +62,18 @@ hap_status hapi_session_may_change(const hap_session *session);
 /* What create has made; stopped before. */
 void hapi_session_free(hap_session *session);
 
-/* session_record.c; begin does nothing where there is no recorder, stop where there is no player either */
+/* session_record.c; begin does nothing where there is no recorder, stop where there is no player
+ * either */
 hap_status hapi_record_begin(hap_session *session, hap_detail *detail);
 void hapi_record_stop(hap_session *session);
-/* What the recorded session is, between its defs and the file. From the file: over what is there. */
+/* What the recorded session is, between its defs and the file. From the file: over what is there.
+ * */
 void hapi_session_move_defs(hapi_file_info *info, hap_session_def *def, hap_expert_def *expert,
                             hap_research_def *research, bool to_file);
 void hapi_session_set_tapes(hap_session *session, hapi_tape *const tapes[HAPI_STREAMS]);
 
-/* session_play.c, of a session with a player: around what begins a session, and instead of its drive */
+/* session_play.c, of a session with a player: around what begins a session, and instead of its
+ * drive */
 hap_status hapi_play_begin(hap_session *session, int64_t *out_start_ns, hap_detail *detail);
 hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *detail);
 hap_status hapi_play_advance(hap_session *session, uint64_t ticks);

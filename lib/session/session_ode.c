@@ -9,8 +9,8 @@
 #include "base/log.h"
 #include "session/session_internal.h"
 
-/* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows of at
- * most 8 MB, which are some ticks apart where that is not enough for all. */
+/* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows
+ * of at most 8 MB, which are some ticks apart where that is not enough for all. */
 #define TRAIL_STEPS 8.0
 #define TRAIL_ROWS_MOST 256u
 #define TRAIL_ROWS_LEAST 64u
@@ -96,8 +96,9 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
 
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
 
-/* Slots for the range, as many again for what stands around it, and some for those that have left and
- * that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss two. */
+/* Slots for the range, as many again for what stands around it, and some for those that have left
+ * and that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss
+ * two. */
 static hapi_capacity capacity_of(const hap_session_def *def)
 {
   bool looks_back = def->expert->lookback > 0.0;

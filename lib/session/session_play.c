@@ -14,9 +14,9 @@
 
 /* Replay. A tick, a physics step and a contact pass of the recording each took what others had told
  * them by then, and the recording says which message that was. So each is run as a whole as soon as
- * the messages it took are there, in one thread, and the mailboxes hand over what was taken then: it
- * does not matter that a step is over before a tick that in truth was run while it
- * was being computed. */
+ * the messages it took are there, in one thread, and the mailboxes hand over what was taken then:
+ * it does not matter that a step is over before a tick that in truth was run while it was being
+ * computed. */
 
 struct hap_player {
   hapi_reader *reader;

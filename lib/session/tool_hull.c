@@ -7,7 +7,8 @@
 #include "session/session_internal.h"
 #include "sync/messages.h"
 
-/* Whether points span a body that can be pushed with: ODE's colliders and the patches want a volume. */
+/* Whether points span a body that can be pushed with: ODE's colliders and the patches want a
+ * volume. */
 
 #define COORDINATE_MOST 100.0 /* m */
 #define THIN_SHARE 1e-4       /* of the length: less is no thickness */

@@ -180,17 +180,6 @@ static double row_change(hapi_row *row, double error, double lo, double hi)
   return hapi_clamp(wanted, lo - old, hi - old);
 }
 
-static double half_width(const hapi_row *friction, double p)
-{
-  return p > 0.0 ? friction->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
-}
-
-static double change_friction(hapi_row *row, double error, double p)
-{
-  double hi = half_width(row, p);
-  return row_change(row, error, -hi, hi);
-}
-
 /* v += b0 d0 + b1 d1 + b2 d2 */
 static void push_triple(double v[6], const double d[3], const double b0[6], const double b1[6],
                         const double b2[6])
@@ -217,9 +206,10 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
   if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
     return 0.0; /* a contact that does not push */
   }
-  d[1] = change_friction(&r[1], e[1] - r[1].coupling[0] * d[0], r[0].impulse);
-  d[2] = change_friction(&r[2], e[2] - r[2].coupling[0] * d[0] - r[2].coupling[1] * d[1],
-                         r[0].impulse);
+  double most = hapi_friction_most(&r[1], r[0].impulse);
+  d[1] = row_change(&r[1], e[1] - r[1].coupling[0] * d[0], -most, most);
+  most = hapi_friction_most(&r[2], r[0].impulse);
+  d[2] = row_change(&r[2], e[2] - r[2].coupling[0] * d[0] - r[2].coupling[1] * d[1], -most, most);
   push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
   if (r->paired) {
     push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);

@@ -87,11 +87,15 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
 /* A few sweeps more, two at least. */
 void hapi_solver_sweep_on(hapi_solver *solver);
 
-/* The radius of a ball of frictions [N s]. */
+/* N s, the largest impulse of a friction under a normal's; of a ball the radius. */
+static inline double hapi_friction_most(const hapi_row *friction, double normal)
+{
+  return normal > 0.0 ? friction->mu * normal : 0.0; /* mu may be infinite: no 0 x infinity */
+}
+
 static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
 {
-  double p = rows[first->normal].impulse;
-  return p > 0.0 ? first->mu * p : 0.0;
+  return hapi_friction_most(first, rows[first->normal].impulse);
 }
 
 /* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out
@@ -128,8 +132,7 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   *out_lo = row->lo;
   *out_hi = row->hi;
   if (row->normal >= 0) {
-    double p = rows[row->normal].impulse;
-    *out_hi = p > 0.0 ? row->mu * p : 0.0; /* mu may be infinite: no 0 x infinity */
+    *out_hi = hapi_friction_most(row, rows[row->normal].impulse);
     if (row->round > 0) {
       *out_hi = hapi_row_left(row, *out_hi);
     }

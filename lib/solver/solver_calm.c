@@ -32,16 +32,15 @@ typedef struct rays {
   ray of[HAPI_SOLVER_BODIES];
 } rays;
 
-/* The island of a row; all are one where there are too many bodies to tell. */
-static uint32_t island_of(const hapi_solver *solver, const rays *r, const hapi_row *row)
-{
-  bool told = solver->body_count <= HAPI_SOLVER_BODIES;
-  return told ? r->root[row->moves_a ? row->a : row->b] : 0;
-}
-
-static uint32_t island_of_body(const hapi_solver *solver, const rays *r, uint32_t body)
+/* The island of a body; all are one where there are too many bodies to tell. */
+static uint32_t island_of(const hapi_solver *solver, const rays *r, uint32_t body)
 {
   return solver->body_count <= HAPI_SOLVER_BODIES ? r->root[body] : 0;
+}
+
+static uint32_t row_island(const hapi_solver *solver, const rays *r, const hapi_row *row)
+{
+  return island_of(solver, r, row->moves_a ? row->a : row->b);
 }
 
 static void find_islands(const hapi_solver *solver, rays *out)
@@ -94,7 +93,7 @@ static bool rays_measure(hapi_solver *solver, rays *r)
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0 && row->impulse != 0.0) {
-      ray *of = &r->of[island_of(solver, r, row)];
+      ray *of = &r->of[row_island(solver, r, row)];
       double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
       without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
       double a = row->impulse * without;
@@ -121,11 +120,11 @@ static void impulses_shorten(hapi_solver *solver, const rays *r)
 {
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     hapi_row *row = &solver->rows[i];
-    double share = row->inverse != 0.0 ? r->of[island_of(solver, r, row)].share : 0.0;
+    double share = row->inverse != 0.0 ? r->of[row_island(solver, r, row)].share : 0.0;
     row->impulse = share > 0.0 ? share * row->impulse : 0.0;
   }
   for (uint32_t i = 0; i < solver->body_count; ++i) {
-    double share = r->of[island_of_body(solver, r, i)].share;
+    double share = r->of[island_of(solver, r, i)].share;
     for (int k = 0; k < 6; ++k) {
       double change = share > 0.0 ? share * (solver->v[i][k] - solver->free[i][k]) : 0.0;
       solver->v[i][k] = solver->free[i][k] + change; /* share 0: whatever v is */

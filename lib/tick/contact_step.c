@@ -26,21 +26,16 @@
 
 /* ---- bodies ---- */
 
-/* A body that came into the range moves on with its twist until the contact thread has seen it:
- * without its contacts it would fall through the floor. */
-static bool body_waits(const hapi_local_body *body, const hapi_patches *patches)
-{
-  return (body->flags & HAPI_BODY_OWNED) != 0 && body->entered_model != 0 &&
-         (patches == NULL || patches->model_number < body->entered_model);
-}
-
 static void body_begin(hapi_local_body *body, const hapi_patches *patches)
 {
   HAPI_ASSERT_UNIT_QUAT(body->pose.quat_wxyz);
   hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
   memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
   body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
-  body->waiting = body_waits(body, patches);
+  /* A body that came into the range moves on with its twist until the contact thread has seen it:
+   * without its contacts it would fall through the floor. */
+  body->waiting = (body->flags & HAPI_BODY_OWNED) != 0 && body->entered_model != 0 &&
+                  (patches == NULL || patches->model_number < body->entered_model);
   body->rowed = false;
   if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
     hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
@@ -120,29 +115,13 @@ static void body_damp(hapi_local_body *body)
   }
 }
 
-static void limit_spin(hapi_local_body *body)
+static void body_take_velocity(hapi_local_body *body, const double v[6])
 {
   double *w = body->twist.angular;
   double most = body->given.max_angular_speed;
+  memcpy(&body->twist, v, sizeof body->twist);
   if (hapi_v3_dot(w, w) > most * most) {
     hapi_v3_scale(most / hapi_v3_norm(w), w, w);
-  }
-}
-
-static void take_velocity(hapi_local_body *body, const double v[6])
-{
-  memcpy(&body->twist, v, sizeof body->twist);
-}
-
-static void step_body(hapi_bodies *bodies, hapi_local_body *body, const hapi_tick_facts *facts,
-                      hapi_effect_sample *sample)
-{
-  hap_pose before = body->pose;
-  body_move(body, facts, sample);
-  body_damp(body);
-  if (!hapi_body_sound(&body->twist, body->pose.position)) {
-    body->pose = before;
-    hapi_body_stop(bodies, body);
   }
 }
 
@@ -180,13 +159,18 @@ static void bodies_step(hapi_bodies *bodies, const hapi_rows *rows, const hapi_t
       memset(body->linear.residual, 0, sizeof body->linear.residual);
     }
     if (hapi_body_responds(body)) {
-      take_velocity(body, rows->solver.v[body->row]);
-      limit_spin(body);
+      body_take_velocity(body, rows->solver.v[body->row]);
     } else if ((body->flags & HAPI_BODY_RESTING) != 0) {
       continue;
     }
     if (!turns_once(body, facts)) {
-      step_body(bodies, body, facts, sample);
+      hap_pose before = body->pose;
+      body_move(body, facts, sample);
+      body_damp(body);
+      if (!hapi_body_sound(&body->twist, body->pose.position)) {
+        body->pose = before;
+        hapi_body_stop(bodies, body);
+      }
     } else if (hapi_body_shift(bodies, body, facts->period)) {
       turning[count++] = body;
     }
@@ -204,8 +188,7 @@ static void bodies_take_velocities(const hapi_bodies *bodies, const hapi_rows *r
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (hapi_body_responds(body)) {
-      take_velocity(body, rows->solver.v[body->row]);
-      limit_spin(body);
+      body_take_velocity(body, rows->solver.v[body->row]);
       if (body_wobbles(body, wishes)) {
         hapi_gyro_follow(body);
       }
@@ -216,20 +199,20 @@ static void bodies_take_velocities(const hapi_bodies *bodies, const hapi_rows *r
 
 /* ---- rows ---- */
 
-/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
-static void give_outside(hapi_local_body *body, const double j[6], double impulse)
-{
-  if (body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0) {
-    body->pushed = true;
-    hapi_v3_madd(body->account.impulse, impulse, j, body->account.impulse);
-    hapi_v3_madd(body->account.angular_impulse, impulse, j + 3, body->account.angular_impulse);
-  }
-}
-
 /* Of physics, and it can be pushed. */
 static bool is_outside(const hapi_local_body *body)
 {
   return body != NULL && (body->flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0;
+}
+
+/* What the rows gave to bodies that the loop does not own is for physics to pass on. */
+static void give_outside(hapi_local_body *body, const double j[6], double impulse)
+{
+  if (is_outside(body)) {
+    body->pushed = true;
+    hapi_v3_madd(body->account.impulse, impulse, j, body->account.impulse);
+    hapi_v3_madd(body->account.angular_impulse, impulse, j + 3, body->account.angular_impulse);
+  }
 }
 
 static void body_touch(hapi_local_body *body)
@@ -437,17 +420,6 @@ static void step_begin(hapi_tick *tick)
   }
 }
 
-/* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
-static void bodies_wake(hapi_tick *tick)
-{
-  double period = tick->facts.period;
-  if (tick->bodies.resting > 0) {
-    hapi_joint_wake(&tick->joints, &tick->bodies, &tick->rows, period);
-    hapi_contact_wake(&tick->contacts, &tick->bodies, &tick->rows, period);
-    hapi_joint_wake(&tick->joints, &tick->bodies, &tick->rows, period);
-  }
-}
-
 static void rows_make(hapi_tick *tick)
 {
   hapi_rows *rows = &tick->rows;
@@ -458,7 +430,12 @@ static void rows_make(hapi_tick *tick)
   }
   hapi_pointer_rows(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, rows, sample);
   uint32_t of_pointers = rows->solver.row_count;
-  bodies_wake(tick);
+  /* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
+  if (tick->bodies.resting > 0) {
+    hapi_joint_wake(&tick->joints, &tick->bodies, rows, tick->facts.period);
+    hapi_contact_wake(&tick->contacts, &tick->bodies, rows, tick->facts.period);
+    hapi_joint_wake(&tick->joints, &tick->bodies, rows, tick->facts.period);
+  }
   if (tick->joints.count > 0) {
     uint64_t begin = hapi_effect_begin(sample);
     hapi_joint_rows(&tick->joints, &tick->bodies, rows, &tick->facts);
