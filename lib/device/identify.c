@@ -206,14 +206,6 @@ static hap_status tick_step(run *r, double force)
 
 /* ---- the phases of an axis ---- */
 
-static hap_status axis_rest(run *r)
-{
-  for (double end = r->time + REST_S; r->time < end;) {
-    HAPI_TRY(tick_step(r, 0.0));
-  }
-  return HAP_OK;
-}
-
 /* More and more force until it moves; *level is then that force. */
 static hap_status friction_search(run *r, double home, double *level)
 {
@@ -307,23 +299,20 @@ static hap_status swing_about(run *r, double home, double *level)
   return HAP_OK;
 }
 
-static hap_status axis_brake(run *r, double level)
-{
-  for (double end = r->time + BRAKE_S; r->time < end;) {
-    HAPI_TRY(tick_step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0)));
-  }
-  return HAP_OK;
-}
-
 static hap_status move_axis(run *r)
 {
   double level = 0.0;
   HAPI_TRY(sample_record(r)); /* of where the last axis ended */
-  HAPI_TRY(axis_rest(r));
+  for (double end = r->time + REST_S; r->time < end;) {
+    HAPI_TRY(tick_step(r, 0.0));
+  }
   double home = r->position[r->axis];
   HAPI_TRY(friction_search(r, home, &level));
   HAPI_TRY(swing_about(r, home, &level));
-  return axis_brake(r, level);
+  for (double end = r->time + BRAKE_S; r->time < end;) {
+    HAPI_TRY(tick_step(r, -level * fmin(fmax(speed_now(r) / BRAKE_SPEED, -1.0), 1.0)));
+  }
+  return HAP_OK;
 }
 
 static hap_status move_all(run *r)
@@ -372,16 +361,6 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   return HAP_OK;
 }
 
-static hap_status identity_conclude(const run *r, hap_device_identity *out)
-{
-  hap_device_identity_init(out, sizeof *out);
-  memcpy(out->device, r->device->info.name, sizeof out->device);
-  for (int axis = 0; axis < AXES; ++axis) {
-    HAPI_TRY(add_axis(r, axis, out));
-  }
-  return HAP_OK;
-}
-
 static hap_status run_device(run *r, hap_device_identity *out)
 {
   const hap_device_ops *ops = r->device->ops;
@@ -398,7 +377,13 @@ static hap_status run_device(run *r, hap_device_identity *out)
   ops->zero(r->device->self);
   hapi_emergency_remove(ops, r->device->self);
   ops->stop(r->device->self);
-  return status == HAP_OK ? identity_conclude(r, out) : status;
+  HAPI_TRY(status);
+  hap_device_identity_init(out, sizeof *out);
+  memcpy(out->device, r->device->info.name, sizeof out->device);
+  for (int axis = 0; axis < AXES; ++axis) {
+    HAPI_TRY(add_axis(r, axis, out));
+  }
+  return HAP_OK;
 }
 
 static hap_status run_with_records(run *r, hap_device_identity *out)

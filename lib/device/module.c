@@ -138,18 +138,7 @@ static hap_status check_file(const module *m)
 
 /* ---- loading ---- */
 
-static hap_status module_load(module *m)
-{
-  m->library = dlopen(m->path, RTLD_NOW | RTLD_LOCAL);
-  if (m->library == NULL) {
-    const char *why = dlerror();
-    return module_fail(m, HAP_ERROR_IO,
-                       "cannot be loaded: ", why != NULL ? why : "no reason given");
-  }
-  return HAP_OK;
-}
-
-static hap_status find_table(const module *m, const hap_device_ops **out)
+static hap_status table_find(const module *m, const hap_device_ops **out)
 {
   void *symbol = dlsym(m->library, SYMBOL);
   module_fn table;
@@ -170,22 +159,24 @@ static hap_status find_table(const module *m, const hap_device_ops **out)
   return HAP_OK;
 }
 
-static hap_status open_device(const module *m, const char *args, hap_device **out)
+static hap_status module_open(module *m, const char *args, hap_device **out)
 {
   const hap_device_ops *ops = NULL;
   hap_detail why = {""};
-  HAPI_TRY(find_table(m, &ops));
-  hap_status status = hapi_device_open_ops(ops, args, out, &why);
-  return status < 0
-             ? hapi_fail(m->detail, status, "module %.*s: %.290s", PATH_SHOWN, m->path, why.text)
-             : status;
-}
-
-static hap_status open_module(module *m, const char *args, hap_device **out)
-{
   HAPI_TRY(check_file(m));
-  HAPI_TRY(module_load(m));
-  hap_status status = open_device(m, args, out);
+  m->library = dlopen(m->path, RTLD_NOW | RTLD_LOCAL);
+  if (m->library == NULL) {
+    const char *cause = dlerror();
+    return module_fail(m, HAP_ERROR_IO,
+                       "cannot be loaded: ", cause != NULL ? cause : "no reason given");
+  }
+  hap_status status = table_find(m, &ops);
+  if (status >= 0) {
+    status = hapi_device_open_ops(ops, args, out, &why);
+    if (status < 0) {
+      hapi_fail(m->detail, status, "module %.*s: %.290s", PATH_SHOWN, m->path, why.text);
+    }
+  }
   if (status < 0) {
     hapi_module_unload(m->library);
     return status;
@@ -209,7 +200,7 @@ hap_status hapi_module_open(const char *args, hap_device **out, hap_detail *deta
   }
   memcpy(path, args, length);
   module m = {.path = path, .detail = detail};
-  hap_status status = open_module(&m, args[length] == ',' ? args + length + 1 : "", out);
+  hap_status status = module_open(&m, args[length] == ',' ? args + length + 1 : "", out);
   hapi_free(path);
   return status;
 }

@@ -331,7 +331,7 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
 int64_t hap_session_now(const hap_session *session)
 {
   if (session != NULL && session->player != NULL) {
-    return hapi_play_now(session);
+    return session->played_ns;
   }
   bool virtual_clock = session != NULL && session->def.drive == HAP_DRIVE_LOCKSTEP;
   return virtual_clock ? time_of(session, session->tick) : hapi_clock_now();

@@ -77,7 +77,6 @@ void hapi_session_set_tapes(hap_session *session, hapi_tape *const tapes[HAPI_ST
 hap_status hapi_play_begin(hap_session *session, int64_t *out_start_ns, hap_detail *detail);
 hap_status hapi_play_begun(hap_session *session, int64_t start_ns, hap_detail *detail);
 hap_status hapi_play_advance(hap_session *session, uint64_t ticks);
-int64_t hapi_play_now(const hap_session *session);
 
 /* session_pointer.c; detail may be NULL */
 /* The structs of the API in one, checked. */

@@ -363,11 +363,6 @@ hap_status hapi_play_advance(hap_session *session, uint64_t ticks)
   return hapi_session_note(session, status, &detail);
 }
 
-int64_t hapi_play_now(const hap_session *session)
-{
-  return session->played_ns;
-}
-
 /* ---- start ---- */
 
 static hap_status start_load(hap_player *player, hapi_stream stream, hapi_cell_kind kind,

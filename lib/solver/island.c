@@ -175,12 +175,6 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
   return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
-/* The row whose error drives this row's impulse. */
-static const hapi_row *drive_source(const hapi_island *is, const hapi_row *row)
-{
-  return row->state == HAPI_ROW_TIED ? &is->solver->rows[row->normal] : row;
-}
-
 /* A row whose error drives another row's impulse, and how much. */
 typedef struct drive {
   const hapi_row *from;
@@ -192,7 +186,7 @@ typedef struct drive {
  * loops. */
 static inline drive drive_of(const hapi_island *is, const hapi_row *row, uint32_t index)
 {
-  const hapi_row *from = drive_source(is, row);
+  const hapi_row *from = row->state == HAPI_ROW_TIED ? &is->solver->rows[row->normal] : row;
   return (drive){from, is->gain[index], is->error[from - is->solver->rows]};
 }
 

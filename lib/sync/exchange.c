@@ -212,15 +212,6 @@ void *hapi_exchange_back(hapi_exchange *exchange, hapi_channel name)
   return c->places[hapi_triple_back(&c->buffer)];
 }
 
-/* Only physics writes near_is_empty, and the contact thread waits only while it is set. So no post
- * is lost, and a superfluous one costs one check. */
-static void bell_follow(hapi_exchange *exchange, int empty)
-{
-  if (atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
-    sem_post(&exchange->near_bell);
-  }
-}
-
 /* Replay: the writer's place is always the same, and what is in it is copied. */
 void hapi_exchange_publish(hapi_exchange *exchange, hapi_channel name)
 {
@@ -236,8 +227,10 @@ void hapi_exchange_publish(hapi_exchange *exchange, hapi_channel name)
   } else {
     hapi_triple_publish(&c->buffer);
   }
-  if (near != NULL) {
-    bell_follow(exchange, empty);
+  /* Only physics writes near_is_empty, and the contact thread waits only while it is set. So no
+   * post is lost, and a superfluous one costs one check. */
+  if (near != NULL && atomic_exchange(&exchange->near_is_empty, empty) != 0 && empty == 0) {
+    sem_post(&exchange->near_bell);
   }
 }
 

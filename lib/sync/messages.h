@@ -16,7 +16,6 @@
 #include "sync/model.h"
 #include "sync/near.h"
 #include "sync/patches.h"
-#include "sync/poses.h"
 #include "sync/state.h"
 
 #endif

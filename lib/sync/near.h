@@ -3,11 +3,11 @@
 #ifndef HAPODE_SYNC_NEAR_H
 #define HAPODE_SYNC_NEAR_H
 
-/* physics -> contact: what may touch what (model CONTACT). */
+/* To the contact thread (model CONTACT). From physics: what may touch what. */
 
 #include "proximity/patch.h"
 #include "sync/message.h"
-#include "sync/surface.h"
+#include "sync/patches.h"
 
 typedef struct hapi_near_geom {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
@@ -78,5 +78,31 @@ HAPI_MESSAGE_ARRAY(hapi_near_pairs, hapi_near, hapi_near_pair, pairs_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_points, hapi_near, double, points_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_tools, hapi_near, hapi_near_tool, tools_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_tool_pairs, hapi_near, hapi_near_tool_pair, tool_pairs_offset)
+
+/* ---- haptic -> contact: where the bodies are (model CONTACT) ---- */
+
+typedef struct hapi_poses_body {
+  uint32_t slot;
+  uint32_t generation;
+  hap_pose pose;
+  hap_twist twist;
+} hapi_poses_body;
+
+typedef struct hapi_poses_pointer {
+  uint32_t generation; /* 0: no hull here */
+  hap_pose pose;
+  hap_twist twist;
+} hapi_poses_pointer;
+
+typedef struct hapi_poses {
+  uint64_t model_number; /* the local model in use */
+  uint32_t body_count;
+  uint32_t pointer_count;
+  uint32_t bodies_offset;
+  uint32_t pointers_offset;
+} hapi_poses;
+
+HAPI_MESSAGE_ARRAY(hapi_poses_bodies, hapi_poses, hapi_poses_body, bodies_offset)
+HAPI_MESSAGE_ARRAY(hapi_poses_pointers, hapi_poses, hapi_poses_pointer, pointers_offset)
 
 #endif

@@ -449,29 +449,11 @@ static void rows_make(hapi_tick *tick)
   rows->solver.apart &= rows->solver.row_count == of_pointers;
 }
 
-static void proxies_push_out(const hapi_pointers *pointers, hapi_solver *solver, double period)
-{
-  for (uint32_t i = 0; i < pointers->high; ++i) {
-    hapi_pointer *p = &pointers->of[i];
-    if (p->generation != 0 && p->rigid) {
-      hapi_rigid_push_out(p, period, solver->v[p->proxy.row], solver->free[p->proxy.row]);
-    }
-  }
-}
-
-static void proxies_move(hapi_tick *tick)
-{
-  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
-    hapi_pointer *p = &tick->pointers.of[i];
-    if (p->generation != 0 && p->proxied &&
-        !hapi_proxy_move(p, tick->facts.period, tick->rows.solver.v[p->proxy.row])) {
-      hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, i + 1);
-    }
-  }
-}
-
 void hapi_contact_step(hapi_tick *tick)
 {
+  const hapi_pointers *pointers = &tick->pointers;
+  const hapi_solver *solver = &tick->rows.solver;
+  double period = tick->facts.period;
   step_begin(tick);
   rows_make(tick);
   rows_solve(&tick->rows, &tick->sample);
@@ -481,17 +463,26 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
   }
   if (again) {
-    if (tick->pointers.proxies) {
-      proxies_push_out(&tick->pointers, &tick->rows.solver, tick->facts.period);
+    for (uint32_t i = 0; pointers->proxies && i < pointers->high; ++i) {
+      hapi_pointer *p = &pointers->of[i];
+      if (p->generation != 0 && p->rigid) {
+        hapi_rigid_push_out(p, period, solver->v[p->proxy.row], solver->free[p->proxy.row]);
+      }
     }
     rows_solve(&tick->rows, &tick->sample);
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);
-  if (tick->pointers.proxies) {
+  if (pointers->proxies) {
     uint64_t begin = hapi_effect_begin(&tick->sample);
-    proxies_move(tick);
+    for (uint32_t i = 0; i < pointers->high; ++i) {
+      hapi_pointer *p = &pointers->of[i];
+      if (p->generation != 0 && p->proxied &&
+          !hapi_proxy_move(p, period, solver->v[p->proxy.row])) {
+        hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, i + 1);
+      }
+    }
     hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
   }
   rows_account(&tick->rows, &tick->bodies, &tick->contacts, &tick->joints, tick->facts.observes);

@@ -9,7 +9,7 @@
 
 #include <ode/ode.h>
 
-#include "sync/joint.h"
+#include "sync/model.h"
 
 /* Which error reduction and softness a joint has of its own, beside those of the world's rows. */
 typedef enum hapi_joint_soft {
