@@ -234,7 +234,19 @@ static void row_write(FILE *csv, const faults_scene *scene, double hz, const ref
           1e3 * run->joint_open, run->dropped, run->said);
 }
 
-static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, int *io_faults)
+/* Of a scene that was asked for alone: all forces. */
+static void trace_write(FILE *trace, double hz, const references *r, const faults_run *run)
+{
+  for (size_t i = 0; i < run->count; ++i) {
+    const double *f = run->force[i];
+    const double *right = r->half.force[i];
+    fprintf(trace, "%g,%g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", hz, FAULTS_TICK_S * (double)i,
+            f[0], f[1], f[2], right[0], right[1], right[2], run->told[i], r->half.told[i]);
+  }
+}
+
+static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, FILE *trace,
+                                int *io_faults)
 {
   static const double rates[] = {20.0, 60.0};
   references r;
@@ -246,7 +258,7 @@ static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, 
   for (size_t i = 0; i < 2 && status >= HAP_OK; ++i) {
     faults_run run = {.count = 0};
     comparison c;
-    status = faults_session_run(b, scene, HAP_MODEL_CONTACT, rates[i], &run);
+    status = faults_session_run(b, scene, rates[i], &run);
     if (status >= HAP_OK) {
       run_compare(scene, &r.half, &run, &c);
       c.good = run_judge(scene, rates[i], &r, &run, &c);
@@ -254,6 +266,9 @@ static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, 
       b->off += b->verify && !c.good;
       row_say(scene, rates[i], &r, &run, &c);
       row_write(csv, scene, rates[i], &r, &run, &c);
+      if (trace != NULL) {
+        trace_write(trace, rates[i], &r, &run);
+      }
     }
     faults_run_free(&run);
   }
@@ -268,22 +283,26 @@ hap_status bench_faults(bench *b)
   }
   int faults = 0;
   bool found = false;
+  FILE *trace = NULL;
   FILE *csv = bench_csv_open(b, "faults",
                              "item,scene,hz,measure,error,floor,jump_n,jump_reference_n,peak_n,"
                              "peak_reference_n,bound,verdict,shift_ms,joint_open_mm,dropped,said");
-  if (csv == NULL) {
-    return HAP_ERROR_IO;
+  if (csv != NULL && b->scene != NULL) {
+    trace = bench_csv_open(b, "faults_trace", "hz,t,fx,fy,fz,ref_fx,ref_fy,ref_fz,told,ref_told");
   }
-  hap_status status = HAP_OK;
+  hap_status status = csv != NULL && (b->scene == NULL || trace != NULL) ? HAP_OK : HAP_ERROR_IO;
   const faults_scene *scene;
   for (size_t i = 0; (scene = faults_scene_at(i)) != NULL && status >= HAP_OK; ++i) {
     if (b->scene == NULL || strcmp(b->scene, scene->name) == 0) {
       found = true;
-      status = scene_measure(b, scene, csv, &faults);
+      status = scene_measure(b, scene, csv, trace, &faults);
     }
   }
-  if (!found) {
+  if (status >= HAP_OK && !found) {
     status = bench_fail(b, HAP_ERROR_ARGUMENT, "there is no scene \"%s\"", b->scene);
+  }
+  if (trace != NULL) {
+    status = bench_csv_close(b, trace, status);
   }
   status = bench_csv_close(b, csv, status);
   if (status >= HAP_OK) {

@@ -86,6 +86,7 @@ typedef struct faults_check {
   double bound_20;     /* of the error at 20 Hz; 0: the same */
   double begin_s;      /* from when on it is judged */
   double reference_hz; /* 0: 2 kHz */
+  const char *model;   /* name of the session's; NULL: contact */
   int iterations;      /* of QuickStep in the reference; 0: dWorldStep */
 } faults_check;
 
@@ -140,8 +141,8 @@ void faults_run_free(faults_run *r); /* zeroed allowed */
 bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run *out);
 
 /* A lockstep session. */
-hap_status faults_session_run(bench *b, const faults_scene *scene, hap_model model,
-                              double physics_hz, faults_run *out);
+hap_status faults_session_run(bench *b, const faults_scene *scene, double physics_hz,
+                              faults_run *out);
 
 /* Worlds of random bodies, a process for each block; the number of processes that did not end. */
 hap_status faults_random_run(bench *b, long worlds);

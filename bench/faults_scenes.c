@@ -63,6 +63,13 @@ static void rim_hand(double t, double x[3], double v[3])
   faults_glide(t, 0.05, 0.15, 0.009, &x[0], &v[0]);
 }
 
+/* The same with a cube, whose face meets the rim along its height. */
+static void rim_cube_hand(double t, double x[3], double v[3])
+{
+  rim_hand(t, x, v);
+  x[0] -= 0.005;
+}
+
 /* A wheel on a tip 30 mm below its middle, without weight, so that the axis stands until touched.
  * ODE's gyroscopic term loses energy in proportion to the step: the reference needs 128 kHz. */
 static void top_build(faults_world *w)
@@ -117,11 +124,54 @@ static void post_build(faults_world *w)
 
 /* ---- thin things ---- */
 
+/* A box; of triangles where it is not the reference's. */
+static void mesh_box(faults_world *w, dBodyID body, const double size[3])
+{
+  static const dTriIndex faces[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
+                                      2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
+  if (w->is_reference) {
+    faults_box(w, body, size, (double[3]){0.0, 0.0, 0.0});
+    return;
+  }
+  faults_mesh *m = &w->mesh;
+  m->vertices = calloc((size_t)3 * 8, sizeof *m->vertices);
+  m->indices = calloc(36, sizeof *m->indices);
+  memcpy(m->indices, faces, sizeof faces);
+  for (int i = 0; i < 8; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      m->vertices[3 * i + k] = (i >> k & 1) != 0 ? 0.5 * size[k] : -0.5 * size[k];
+    }
+  }
+  w->mesh_data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(w->mesh_data, m->vertices, 3 * sizeof(double), 8, m->indices, 36,
+                              3 * sizeof(dTriIndex));
+  dGeomSetBody(dCreateTriMesh(w->space, w->mesh_data, NULL, NULL, NULL), body);
+}
+
 /* Its upper side is z = 0. */
 static void sheet_build(faults_world *w)
 {
   double thick = w->scene->size;
   faults_box(w, NULL, (double[3]){0.2, 0.2, thick}, (double[3]){0.0, 0.0, -0.5 * thick});
+}
+
+/* A coin, and a sheet of triangles; the reference's are boxes, which have the same upper side. */
+static void coin_build(faults_world *w)
+{
+  double thick = w->scene->size;
+  if (w->is_reference) {
+    sheet_build(w);
+    return;
+  }
+  dGeomID coin = dCreateCylinder(w->space, 0.1, thick);
+  dGeomSetPosition(coin, 0.0, 0.0, -0.5 * thick);
+}
+
+static void sheet_mesh_build(faults_world *w)
+{
+  double thick = w->scene->size;
+  mesh_box(w, NULL, (double[3]){0.2, 0.2, thick});
+  dGeomSetPosition(dSpaceGetGeom(w->space, 0), 0.0, 0.0, -0.5 * thick);
 }
 
 /* Down until a spring of half the stiffness would give the largest force. */
@@ -382,30 +432,6 @@ static void ball_on_field_build(faults_world *w)
   dGeomSetBody(dCreateSphere(w->space, 0.025), ball);
 }
 
-/* A box; of triangles where it is not the reference's. */
-static void mesh_box(faults_world *w, dBodyID body, const double size[3])
-{
-  static const dTriIndex faces[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
-                                      2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
-  if (w->is_reference) {
-    faults_box(w, body, size, (double[3]){0.0, 0.0, 0.0});
-    return;
-  }
-  faults_mesh *m = &w->mesh;
-  m->vertices = calloc((size_t)3 * 8, sizeof *m->vertices);
-  m->indices = calloc(36, sizeof *m->indices);
-  memcpy(m->indices, faces, sizeof faces);
-  for (int i = 0; i < 8; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      m->vertices[3 * i + k] = (i >> k & 1) != 0 ? 0.5 * size[k] : -0.5 * size[k];
-    }
-  }
-  w->mesh_data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(w->mesh_data, m->vertices, 3 * sizeof(double), 8, m->indices, 36,
-                              3 * sizeof(dTriIndex));
-  dGeomSetBody(dCreateTriMesh(w->space, w->mesh_data, NULL, NULL, NULL), body);
-}
-
 static void mesh_on_plane_build(faults_world *w)
 {
   faults_gravity(w);
@@ -644,6 +670,11 @@ static void feedback_hand(double t, double x[3], double v[3])
     .motion = {.hand = deep_hand, .radius = 0.005, .stiffness = 1000.0, .through = (coupling)}, \
     .seconds = 0.8, .check = HELD, .size = 0.001                                                \
   }
+#define SHEET_MODEL(text, with)                                                                   \
+  {                                                                                               \
+    .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(deep_hand),              \
+    .seconds = 0.8, .check = {.kind = FAULTS_HOLD, .bound = 0.02, .model = (with)}, .size = 0.001 \
+  }
 #define SHEET_HIT(text, thick, h)                                                            \
   {                                                                                          \
     .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(h), .seconds = 0.3, \
@@ -667,6 +698,12 @@ const faults_scene faults_table[] = {
      .name = "disc",
      .build = disc_build,
      .motion = FINGERTIP(rim_hand),
+     .seconds = 1.0,
+     .check = WITHIN(0.02)},
+    {.item = 1,
+     .name = "disc_tool",
+     .build = disc_build,
+     .motion = {.hand = rim_cube_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
      .seconds = 1.0,
      .check = WITHIN(0.02)},
     {.item = 1,
@@ -700,6 +737,30 @@ const faults_scene faults_table[] = {
     SHEET_HIT("sheet_hit_0.5", 1e-3, hit_hand_slow),
     SHEET_HIT("sheet_hit_2", 1e-3, hit_hand_fast),
     SHEET_HIT("foil_hit_2", 1e-4, hit_hand_fast),
+    {.item = 2,
+     .name = "foil_pin_2",
+     .build = sheet_build,
+     .motion = {.hand = hit_hand_fast, .radius = 0.001, .stiffness = 1000.0},
+     .seconds = 0.3,
+     .check = {.kind = FAULTS_HOLD, .bound = 0.02, .reference_hz = 8000.0},
+     .size = 1e-4},
+    {.item = 2,
+     .name = "coin_1mm",
+     .build = coin_build,
+     .motion = FINGERTIP(deep_hand),
+     .seconds = 0.8,
+     .check = HELD,
+     .size = 0.001},
+    {.item = 2,
+     .name = "sheet_mesh",
+     .build = sheet_mesh_build,
+     .motion = FINGERTIP(deep_hand),
+     .seconds = 0.8,
+     .check = HELD,
+     .size = 0.001},
+    SHEET_MODEL("sheet_single", "single"),
+    SHEET_MODEL("sheet_impulse", "impulse"),
+    SHEET_MODEL("sheet_accel", "accelerance"),
     {.item = 2,
      .name = "sheet_flying",
      .build = flying_build,

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
-#include <time.h>
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
@@ -57,14 +56,6 @@ static void after_step(void *user, double step_s)
   run->open = fmax(run->open, faults_world_open(&run->w));
 }
 
-/* s, of this thread: other programs on the machine do not count. */
-static double thread_seconds(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* Corners of a cube whose half edge is the pointer's radius. */
 static void cube_corners(double half, double out[FAULTS_HULL_MAX][3])
 {
@@ -103,11 +94,7 @@ static hap_status pointer_add(bench *b, const faults_scene *scene, hap_session *
     expert.coupling_stiffness = m->stiffness;
     def.expert = &expert;
   }
-  hap_status status = hap_pointer_add(session, &def, out);
-  if (status < HAP_OK) {
-    (void)hap_session_detail(session, &b->detail);
-  }
-  return status;
+  return bench_explain(b, session, hap_pointer_add(session, &def, out));
 }
 
 /* In lockstep a physics step runs inside of a tick: what such a tick takes longer than others. */
@@ -146,17 +133,16 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
       status = hap_session_start(session);
     }
     double world_s = run->world_s;
-    double begin = thread_seconds();
+    double begin = bench_used_seconds();
     if (status >= HAP_OK) {
       status = hap_session_advance(session, 1);
     }
-    tick_times_add(&times, thread_seconds() - begin, run->world_s > world_s);
+    tick_times_add(&times, bench_used_seconds() - begin, run->world_s > world_s);
     if (status >= HAP_OK) {
       status = hap_pointer_get(session, hand, &state, sizeof state);
     }
     if (status < HAP_OK) {
-      (void)hap_session_detail(session, &b->detail);
-      return status;
+      return bench_explain(b, session, status);
     }
     memcpy(out->force[i], state.wrench.force, sizeof out->force[i]);
     out->told[i] = run->w.told;
@@ -188,8 +174,18 @@ static hap_status session_make(bench *b, hap_model model, double physics_hz, run
   return hap_session_create(&def, &ode, out, &b->detail);
 }
 
-hap_status faults_session_run(bench *b, const faults_scene *scene, hap_model model,
-                              double physics_hz, faults_run *out)
+static hap_model scene_model(const faults_scene *scene)
+{
+  int model = HAP_MODEL_SINGLE;
+  while (scene->check.model != NULL && hap_model_name((hap_model)model) != NULL &&
+         strcmp(hap_model_name((hap_model)model), scene->check.model) != 0) {
+    ++model;
+  }
+  return scene->check.model == NULL ? HAP_MODEL_CONTACT : (hap_model)model;
+}
+
+hap_status faults_session_run(bench *b, const faults_scene *scene, double physics_hz,
+                              faults_run *out)
 {
   run_state run = {.world_s = 0.0};
   hap_session *session = NULL;
@@ -203,7 +199,7 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, hap_model mod
       !faults_world_create(scene, false, &run.w)) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", scene->name);
   }
-  hap_status status = session_make(b, model, physics_hz, &run, &session);
+  hap_status status = session_make(b, scene_model(scene), physics_hz, &run, &session);
   if (status >= HAP_OK) {
     status = pointer_add(b, scene, session, &hand);
   }
