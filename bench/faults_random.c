@@ -78,7 +78,7 @@ typedef struct random_world {
   hull hulls[BODIES_MAX];
 } random_world;
 
-static double draw(random_world *r, double least, double most)
+static double draw_between(random_world *r, double least, double most)
 {
   r->state ^= r->state << 13;
   r->state ^= r->state >> 7;
@@ -88,12 +88,13 @@ static double draw(random_world *r, double least, double most)
 
 static bool draw_chance(random_world *r, double share)
 {
-  return draw(r, 0.0, 1.0) < share;
+  return draw_between(r, 0.0, 1.0) < share;
 }
 
 static dGeomID hull_create(random_world *r, hull *h, const double size[3])
 {
-  const solid *s = &solids[(size_t)draw(r, 0.0, (double)(sizeof solids / sizeof solids[0]))];
+  const solid *s =
+      &solids[(size_t)draw_between(r, 0.0, (double)(sizeof solids / sizeof solids[0]))];
   const unsigned *polygon = s->polygons;
   for (unsigned i = 0; i < s->points; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -126,7 +127,7 @@ static dGeomID hull_create(random_world *r, hull *h, const double size[3])
 
 static dGeomID geom_create(random_world *r, hull *h, const double size[3])
 {
-  double kind = draw(r, 0.0, 1.0);
+  double kind = draw_between(r, 0.0, 1.0);
   if (kind < 0.4) {
     return hull_create(r, h, size);
   }
@@ -147,23 +148,26 @@ static void body_create(random_world *r, hull *h, bool on_grid)
   double size[3];
   double at[3];
   for (int k = 0; k < 3; ++k) {
-    size[k] = on_grid ? 0.02 * floor(draw(r, 1.0, 4.0)) : draw(r, 0.01, 0.1);
-    at[k] = on_grid ? 0.01 * floor(draw(r, -5.0, 6.0)) : draw(r, -0.06, 0.06);
+    size[k] = on_grid ? 0.02 * floor(draw_between(r, 1.0, 4.0)) : draw_between(r, 0.01, 0.1);
+    at[k] = on_grid ? 0.01 * floor(draw_between(r, -5.0, 6.0)) : draw_between(r, -0.06, 0.06);
   }
   dBodyID body = dBodyCreate(r->world);
-  dMassSetBoxTotal(&mass, draw(r, 0.02, 1.0), size[0], size[1], size[2]);
+  dMassSetBoxTotal(&mass, draw_between(r, 0.02, 1.0), size[0], size[1], size[2]);
   dBodySetMass(body, &mass);
   dBodySetPosition(body, at[0], at[1], at[2] + 0.06);
-  dRFromEulerAngles(turned, draw(r, 0.0, 4.0), draw(r, 0.0, 4.0), draw(r, 0.0, 4.0));
+  dRFromEulerAngles(turned, draw_between(r, 0.0, 4.0), draw_between(r, 0.0, 4.0),
+                    draw_between(r, 0.0, 4.0));
   if (on_grid) {
-    double quarter = 0.5 * M_PI * floor(draw(r, 0.0, 4.0));
+    double quarter = 0.5 * M_PI * floor(draw_between(r, 0.0, 4.0));
     dRFromAxisAndAngle(turned, draw_chance(r, 0.5), draw_chance(r, 0.5), 1.0, quarter);
   }
   dBodySetRotation(body, turned);
   dGeomSetBody(geom_create(r, h, size), body);
   if (draw_chance(r, 0.3)) {
-    dBodySetLinearVel(body, draw(r, -1.0, 1.0), draw(r, -1.0, 1.0), draw(r, -1.0, 1.0));
-    dBodySetAngularVel(body, draw(r, -20.0, 20.0), draw(r, -20.0, 20.0), draw(r, -20.0, 20.0));
+    dBodySetLinearVel(body, draw_between(r, -1.0, 1.0), draw_between(r, -1.0, 1.0),
+                      draw_between(r, -1.0, 1.0));
+    dBodySetAngularVel(body, draw_between(r, -20.0, 20.0), draw_between(r, -20.0, 20.0),
+                       draw_between(r, -20.0, 20.0));
   }
 }
 
@@ -172,10 +176,10 @@ static void world_create(random_world *r, long number)
   memset(r, 0, sizeof *r);
   r->state = (uint64_t)number * 0x9e3779b97f4a7c15u + 0x1234567u;
   for (int i = 0; i < 4; ++i) {
-    (void)draw(r, 0.0, 1.0);
+    (void)draw_between(r, 0.0, 1.0);
   }
   bool on_grid = draw_chance(r, 0.5);
-  int bodies = 2 + (int)draw(r, 0.0, BODIES_MAX - 1.0);
+  int bodies = 2 + (int)draw_between(r, 0.0, BODIES_MAX - 1.0);
   r->world = dWorldCreate();
   r->space = dHashSpaceCreate(NULL);
   dWorldSetGravity(r->world, 0.0, 0.0, -9.81);
@@ -193,8 +197,10 @@ static void world_create(random_world *r, long number)
 static bool world_run(random_world *r)
 {
   bool is_finite = true;
-  double from[3] = {draw(r, -0.1, 0.1), draw(r, -0.1, 0.1), draw(r, 0.0, 0.15)};
-  double speed[3] = {draw(r, -1.0, 1.0), draw(r, -1.0, 1.0), draw(r, -1.0, 0.5)};
+  double from[3] = {draw_between(r, -0.1, 0.1), draw_between(r, -0.1, 0.1),
+                    draw_between(r, 0.0, 0.15)};
+  double speed[3] = {draw_between(r, -1.0, 1.0), draw_between(r, -1.0, 1.0),
+                     draw_between(r, -1.0, 0.5)};
   hap_session *session;
   hap_pointer_id hand;
   hap_session_def def;
