@@ -148,7 +148,9 @@ TEST(what_a_model_cannot_do_is_said)
   CHECK(strstr(ran.out, "contacts=on") != NULL && strstr(ran.out, "shape=off") != NULL &&
         strstr(ran.out, "testing=off") != NULL);
   CHECK(run("--lockstep --seconds 0.5 --effects all=on --effects-table") == 0 &&
-        strstr(ran.out, "testing=on,cross=off") != NULL && strstr(ran.out, "asked for") != NULL);
+        strstr(ran.out, "testing=off,cross=off,contacts=on") != NULL &&
+        strstr(ran.out, "the loop simulates it all") != NULL &&
+        strstr(ran.out, "asked for") != NULL);
 }
 
 TEST(ways_of_testing_can_be_chosen)
