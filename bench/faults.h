@@ -48,7 +48,7 @@ typedef struct faults_world {
   dJointFeedback feedback;
   dJointID hinges[FAULTS_HINGES_MAX]; /* that have to hold */
   size_t hinge_count;
-  double told; /* N, norm of the force on body 0 that the feedback told at the last step */
+  double told; /* what an application reads of body 0 after a step: force of a joint, height */
 } faults_world;
 
 /* What a scene is judged by. */
@@ -102,6 +102,9 @@ typedef struct faults_scene {
   bool has_own_contacts;  /* the application makes the contact joints, in before */
   int count;              /* of bodies, where the scene has a choice */
   double size;            /* m, likewise */
+  /* Slow motion: share of the hand's time that passes for the bodies. Such a session is in drive
+   * FRAME, in real time. 0: no slow motion, in drive LOCKSTEP */
+  double slow;
 } faults_scene;
 
 /* Forces on the hand at the begin of each tick. */

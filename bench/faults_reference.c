@@ -538,6 +538,7 @@ bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run 
   faults_world w;
   pointer *p = calloc(1, sizeof *p);
   double h = 1.0 / rate_hz;
+  double body_h = scene->slow > 0.0 ? scene->slow * h : h;
   if (p == NULL || !faults_run_create(scene, out) || !faults_world_create(scene, true, &w)) {
     free(p);
     return false;
@@ -580,9 +581,9 @@ bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run 
     }
     faults_world_collide(&w);
     if (scene->check.iterations > 0) {
-      dWorldQuickStep(w.world, h);
+      dWorldQuickStep(w.world, body_h);
     } else {
-      dWorldStep(w.world, h);
+      dWorldStep(w.world, body_h);
     }
     if (scene->after != NULL) {
       scene->after(&w, t, t + h);

@@ -160,6 +160,35 @@ static void arm_hand(double t, double x[3], double v[3])
   faults_hand_at(x, v, 0.12, 0.021, 0.0);
 }
 
+/* ---- slow motion ---- */
+
+static void slow_wall_build(faults_world *w)
+{
+  faults_box(w, NULL, (double[3]){0.1, 0.1, 0.1}, (double[3]){0.0, 0.0, -0.05});
+}
+
+/* 5 N from the begin. */
+static void slow_wall_hand(double t, double x[3], double v[3])
+{
+  (void)t;
+  faults_hand_at(x, v, 0.0, 0.0, 0.005);
+}
+
+/* Beside the hand, which does not touch it. */
+static void slow_fall_build(faults_world *w)
+{
+  const double size[3] = {0.04, 0.04, 0.04};
+  faults_gravity(w);
+  dBodyID cube = faults_body(w, 0.1, size, (double[3]){0.035, 0.0, 0.0});
+  faults_box(w, cube, size, (double[3]){0.0, 0.0, 0.0});
+}
+
+static void height_read(faults_world *w, double begin, double end)
+{
+  (void)begin, (void)end;
+  w->told = dBodyGetPosition(w->bodies[0])[2];
+}
+
 #define FINGER(h)                                    \
   {                                                  \
     .hand = (h), .radius = 0.01, .stiffness = 1000.0 \
@@ -182,6 +211,21 @@ static void arm_hand(double t, double x[3], double v[3])
   }
 
 const faults_scene faults_moving_table[] = {
+    {.item = 11,
+     .name = "slow_wall",
+     .build = slow_wall_build,
+     .motion = FINGER(slow_wall_hand),
+     .seconds = 1.0,
+     .check = {.kind = FAULTS_FORCE, .bound = 0.02, .begin_s = 0.1},
+     .slow = 0.1},
+    {.item = 11,
+     .name = "slow_fall",
+     .build = slow_fall_build,
+     .motion = FINGER(still_hand),
+     .seconds = 1.0,
+     .check = {.kind = FAULTS_FEEDBACK, .bound = 0.05, .begin_s = 0.1},
+     .after = height_read,
+     .slow = 0.1},
     {.item = 12,
      .name = "chain_let_go",
      .build = chain_build,

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
+#include <time.h>
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
@@ -151,6 +152,49 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
   return HAP_OK;
 }
 
+/* In real time: a frame of the application is a step of physics, but time passes slowly. */
+static hap_status frames_run(bench *b, const faults_scene *scene, hap_session *session,
+                             hap_pointer_id hand, double physics_hz, run_state *run,
+                             faults_run *out)
+{
+  double frame_s = 1.0 / physics_hz;
+  double next_frame = frame_s;
+  struct timespec at;
+  clock_gettime(CLOCK_MONOTONIC, &at);
+  for (size_t i = 0; i < out->count; ++i) {
+    hap_pose pose = {.quat_wxyz = {1.0}};
+    hap_twist twist = {{0.0}, {0.0}};
+    hap_pose drawn;
+    hap_pointer_state state;
+    double t = (double)i * FAULTS_TICK_S;
+    scene->motion.hand(t, pose.position, twist.linear);
+    hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
+    if (status >= HAP_OK && i == 0) {
+      status = hap_session_start(session);
+    }
+    if (status >= HAP_OK && t >= next_frame) {
+      next_frame += frame_s;
+      status = hap_session_update(session, scene->slow * frame_s);
+    }
+    at.tv_nsec += (long)(1e9 * FAULTS_TICK_S);
+    at.tv_sec += at.tv_nsec / 1000000000;
+    at.tv_nsec %= 1000000000;
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, NULL);
+    if (status >= HAP_OK) {
+      status = hap_pointer_get(session, hand, &state, sizeof state);
+    }
+    if (status >= HAP_OK && run->w.body_count > 0) {
+      status = hap_session_poses_now(session, run->w.bodies, 1, &drawn);
+      out->told[i] = drawn.position[2];
+    }
+    if (status < HAP_OK) {
+      return bench_explain(b, session, status);
+    }
+    memcpy(out->force[i], state.wrench.force, sizeof out->force[i]);
+  }
+  return HAP_OK;
+}
+
 static hap_status session_make(bench *b, hap_model model, double physics_hz, run_state *run,
                                hap_session **out)
 {
@@ -160,10 +204,11 @@ static hap_status session_make(bench *b, hap_model model, double physics_hz, run
   hap_session_def_init(&def, sizeof def);
   hap_research_def_init(&research, sizeof research);
   hap_ode_def_init(&ode, sizeof ode);
-  def.drive = HAP_DRIVE_LOCKSTEP;
+  def.drive = run->w.scene->slow > 0.0 ? HAP_DRIVE_FRAME : HAP_DRIVE_LOCKSTEP;
   def.model = model;
   def.physics_hz = physics_hz;
-  research.guard = HAP_GUARD_MEASURE;
+  /* In slow motion the guard fades the force while physics waits: that is felt too. */
+  research.guard = run->w.scene->slow > 0.0 ? HAP_GUARD_ON : HAP_GUARD_MEASURE;
   def.research = &research;
   ode.world = run->w.world;
   ode.space = run->w.space;
@@ -204,7 +249,8 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, double physic
     status = pointer_add(b, scene, session, &hand);
   }
   if (status >= HAP_OK) {
-    status = ticks_run(b, scene, session, hand, &run, out);
+    status = scene->slow > 0.0 ? frames_run(b, scene, session, hand, physics_hz, &run, out)
+                               : ticks_run(b, scene, session, hand, &run, out);
   }
   if (status >= HAP_OK && hap_session_stats(session, &stats, sizeof stats) >= HAP_OK) {
     out->dropped = (unsigned long)stats.model.capacity_dropped;
