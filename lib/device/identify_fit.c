@@ -171,11 +171,6 @@ static void make_row(const fitting *f, const window *w, const shape *factor, dou
   }
 }
 
-static double clamp_to_unit(double s)
-{
-  return fmin(fmax(s, 0.0), 1.0);
-}
-
 /* Integral of the shape times the force, which is held from sample to sample. */
 static double push_on(const fitting *f, const window *w, const shape *factor, double delay)
 {
@@ -186,21 +181,12 @@ static double push_on(const fitting *f, const window *w, const shape *factor, do
   double upper = polynomial_evaluate(factor->integral, 1.0);
   double s = 1.0;
   for (uint32_t i = w->last; i-- > 0 && s > 0.0;) {
-    s = clamp_to_unit((samples[i].time - start) / length);
+    s = fmin(fmax((samples[i].time - start) / length, 0.0), 1.0);
     double lower = polynomial_evaluate(factor->integral, s);
     sum += samples[i].force * (upper - lower);
     upper = lower;
   }
   return sum * length * weight_of(length);
-}
-
-static bool fitting_allocate(fitting *f)
-{
-  uint32_t most = f->record->count / WINDOW_LEAST + 1;
-  f->windows = hapi_alloc_array(most, sizeof *f->windows);
-  f->rows = hapi_alloc_array((size_t)most * SHAPES, sizeof *f->rows);
-  f->force = hapi_alloc_array((size_t)most * SHAPES, sizeof *f->force);
-  return f->windows != NULL && f->rows != NULL && f->force != NULL;
 }
 
 static void make_rows(fitting *f)
@@ -342,7 +328,12 @@ hap_status hapi_identify_fit_record(const hapi_identify_record *record, hapi_ide
                                     hap_detail *detail)
 {
   fitting f = {.record = record};
-  hap_status status = fitting_allocate(&f)
+  uint32_t most = record->count / WINDOW_LEAST + 1;
+  f.windows = hapi_alloc_array(most, sizeof *f.windows);
+  f.rows = hapi_alloc_array((size_t)most * SHAPES, sizeof *f.rows);
+  f.force = hapi_alloc_array((size_t)most * SHAPES, sizeof *f.force);
+  bool room = f.windows != NULL && f.rows != NULL && f.force != NULL;
+  hap_status status = room
                           ? fitting_run(&f, out, detail)
                           : hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the identification");
   hapi_free(f.windows);

@@ -198,7 +198,4 @@ void hapi_pointers_publish(hapi_haptic *haptic);
 hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail);
 void hapi_pointers_stop_devices(hapi_haptic *haptic);
 
-/* trace_ring.c */
-void hapi_trace_ring_write(hapi_haptic *haptic);
-
 #endif

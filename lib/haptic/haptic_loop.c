@@ -285,13 +285,24 @@ static void time_note(hapi_haptic *haptic, int64_t begin_ns)
   }
 }
 
-static void note_tick(hapi_haptic *haptic)
+/* A row without room is dropped and counted: the loop never waits. */
+static void trace_write(hapi_haptic *haptic)
 {
-  uint64_t recording = hapi_effect_begin(&haptic->tick.sample);
-  hapi_tape_ticked(haptic);
-  if (hapi_tape_records(haptic->tape)) {
-    hapi_effect_end(&haptic->tick.sample, HAP_EFFECT_RECORDING, recording);
+  hapi_trace_ring *ring = &haptic->ring;
+  if (ring->capacity == 0) {
+    return;
   }
+  uint64_t written = atomic_load_explicit(&ring->written, memory_order_relaxed);
+  uint64_t read = atomic_load_explicit(&ring->read, memory_order_acquire);
+  if (written - read >= ring->capacity) {
+    STORE(loop.trace_dropped, LOAD(loop.trace_dropped) + 1);
+    return;
+  }
+  hap_trace_row *row = &ring->rows[written % ring->capacity];
+  hapi_tick_trace(&haptic->tick, row);
+  row->t = 1e-9 * (double)(haptic->tick.facts.now_ns - haptic->start_ns);
+  row->tick_us = haptic->last_tick_us;
+  atomic_store_explicit(&ring->written, written + 1, memory_order_release);
 }
 
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
@@ -309,7 +320,11 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
   if (haptic->tape != NULL) {
-    note_tick(haptic);
+    uint64_t recording = hapi_effect_begin(&haptic->tick.sample);
+    hapi_tape_ticked(haptic);
+    if (hapi_tape_records(haptic->tape)) {
+      hapi_effect_end(&haptic->tick.sample, HAP_EFFECT_RECORDING, recording);
+    }
   }
   hapi_black_box_record(&haptic->black_box, &haptic->tick);
   state_report(haptic);
@@ -317,7 +332,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
-  hapi_trace_ring_write(haptic);
+  trace_write(haptic);
   figures_publish(haptic);
   time_note(haptic, begin_ns);
   hapi_denormals_restore(before);
@@ -389,5 +404,20 @@ size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, 
   pthread_mutex_lock(&haptic->black_box_lock);
   size_t count = hapi_black_box_read(&haptic->black_box, rows, capacity, size_of_row);
   pthread_mutex_unlock(&haptic->black_box_lock);
+  return count;
+}
+
+size_t hapi_haptic_read_trace(hapi_haptic *haptic, hap_trace_row *rows, size_t capacity,
+                              size_t size_of_row)
+{
+  size_t size = size_of_row < sizeof *rows ? size_of_row : sizeof *rows;
+  hapi_trace_ring *ring = &haptic->ring;
+  uint64_t read = atomic_load_explicit(&ring->read, memory_order_relaxed);
+  uint64_t written = atomic_load_explicit(&ring->written, memory_order_acquire);
+  size_t count = 0;
+  while (read < written && count < capacity) {
+    memcpy((char *)rows + count++ * size_of_row, &ring->rows[read++ % ring->capacity], size);
+  }
+  atomic_store_explicit(&ring->read, read, memory_order_release);
   return count;
 }

@@ -379,30 +379,24 @@ static void matrix_assemble(hapi_island *is)
   }
 }
 
-/* One step of Gauss and Jordan: row k by the pivot, the others freed of column k, in which the
- * inverse grows. */
-static void block_eliminate(double m[36], int k)
-{
-  double pivot = 1.0 / m[7 * k];
-  m[7 * k] = 1.0;
-  for (int c = 0; c < 6; ++c) {
-    m[6 * k + c] *= pivot;
-  }
-  for (int i = 0; i < 6; ++i) {
-    if (i != k) {
-      double f = m[6 * i + k];
-      m[6 * i + k] = 0.0;
-      hapi_madd6(m + 6 * i, -f, m + 6 * k);
-    }
-  }
-}
-
-/* m = m^-1. No pivoting: such a block is 1 plus a product of positive definite matrices as long as
- * nothing slides, and what sliding spoils is not accepted. */
+/* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in which
+ * the inverse grows. No pivoting: such a block is 1 plus a product of positive definite matrices as
+ * long as nothing slides, and what sliding spoils is not accepted. */
 static void block_invert(double m[36])
 {
   for (int k = 0; k < 6; ++k) {
-    block_eliminate(m, k);
+    double pivot = 1.0 / m[7 * k];
+    m[7 * k] = 1.0;
+    for (int c = 0; c < 6; ++c) {
+      m[6 * k + c] *= pivot;
+    }
+    for (int i = 0; i < 6; ++i) {
+      if (i != k) {
+        double f = m[6 * i + k];
+        m[6 * i + k] = 0.0;
+        hapi_madd6(m + 6 * i, -f, m + 6 * k);
+      }
+    }
   }
 }
 
