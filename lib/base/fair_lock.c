@@ -74,18 +74,10 @@ static void leave_queue(hapi_fair_lock *lock, const hapi_fair_waiter *waiter)
   --lock->count;
 }
 
-static bool wait_for_word(hapi_fair_lock *lock, hapi_fair_waiter *waiter, int64_t deadline_ns)
-{
-  if (deadline_ns == INT64_MAX) {
-    return pthread_cond_wait(&waiter->served, &lock->mutex) == 0;
-  }
-  struct timespec at = {.tv_sec = deadline_ns / HAPI_NS_PER_S,
-                        .tv_nsec = deadline_ns % HAPI_NS_PER_S};
-  return pthread_cond_timedwait(&waiter->served, &lock->mutex, &at) == 0;
-}
-
 static bool queue_up(hapi_fair_lock *lock, int64_t deadline_ns)
 {
+  const struct timespec until = {.tv_sec = deadline_ns / HAPI_NS_PER_S,
+                                 .tv_nsec = deadline_ns % HAPI_NS_PER_S};
   hapi_fair_waiter waiter = {.thread = pthread_self()};
   if (pthread_cond_init(&waiter.served, &lock->monotonic) != 0) {
     return false;
@@ -93,7 +85,10 @@ static bool queue_up(hapi_fair_lock *lock, int64_t deadline_ns)
   waiter_enqueue(lock, &waiter);
   bool in_time = true;
   while (!waiter.has_it && in_time) {
-    in_time = wait_for_word(lock, &waiter, deadline_ns);
+    int answer = deadline_ns == INT64_MAX
+                     ? pthread_cond_wait(&waiter.served, &lock->mutex)
+                     : pthread_cond_timedwait(&waiter.served, &lock->mutex, &until);
+    in_time = answer == 0;
   }
   if (!waiter.has_it) {
     leave_queue(lock, &waiter);

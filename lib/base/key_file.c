@@ -43,47 +43,38 @@ static bool line_split(char *text, char **key, char **value)
   return true;
 }
 
-static hap_status take_line(const hapi_key_file *file, char *text, hapi_key_take take, void *self)
-{
-  char *key = NULL;
-  char *value = NULL;
-  if (!line_split(text, &key, &value)) {
-    return hapi_key_file_fail(file, "expected key = value, not ", key);
-  }
-  return *key == '\0' ? HAP_OK : take(self, file, key, value);
-}
-
-/* A line of more than the buffer and one with a zero byte have no line end where it should be. */
-static hap_status read_lines(hapi_key_file *file, FILE *stream, hapi_key_take take, void *self)
-{
-  char text[LINE_SIZE];
-  hap_status status = HAP_OK;
-  for (file->line = 1; fgets(text, sizeof text, stream) != NULL; ++file->line) {
-    bool whole = strchr(text, '\n') != NULL || feof(stream) != 0;
-    status = whole ? take_line(file, text, take, self)
-                   : hapi_key_file_fail(file, "longer than 510 characters, or not text", "");
-    if (status < HAP_OK) {
-      return status;
-    }
-  }
-  if (ferror(stream) != 0) {
-    return hapi_fail(file->detail, HAP_ERROR_IO, "%.200s, line %lu: cannot be read: %s", file->path,
-                     file->line, strerror(errno));
-  }
-  return HAP_OK;
-}
-
 hap_status hapi_key_file_read(hapi_key_file *file, hapi_key_take take, void *self)
 {
+  char text[LINE_SIZE];
+  char *key = NULL;
+  char *value = NULL;
+  hap_status status = HAP_OK;
   HAPI_ASSERT(file->path != NULL && take != NULL);
   FILE *stream = fopen(file->path, "r");
   if (stream == NULL) {
     return hapi_fail(file->detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", file->path,
                      strerror(errno));
   }
-  hap_status status = read_lines(file, stream, take, self);
+  for (file->line = 1; fgets(text, sizeof text, stream) != NULL; ++file->line) {
+    /* A line of more than the buffer, and one with a zero byte, have no line end where it should
+     * be. */
+    if (strchr(text, '\n') == NULL && feof(stream) == 0) {
+      status = hapi_key_file_fail(file, "longer than 510 characters, or not text", "");
+    } else if (!line_split(text, &key, &value)) {
+      status = hapi_key_file_fail(file, "expected key = value, not ", key);
+    } else if (*key != '\0') {
+      status = take(self, file, key, value);
+    }
+    if (status < HAP_OK) {
+      break;
+    }
+  }
+  if (status >= HAP_OK && ferror(stream) != 0) {
+    status = hapi_fail(file->detail, HAP_ERROR_IO, "%.200s, line %lu: cannot be read: %s",
+                       file->path, file->line, strerror(errno));
+  }
   fclose(stream);
-  return status;
+  return status < HAP_OK ? status : HAP_OK;
 }
 
 void hapi_key_file_uncomment(char *value)

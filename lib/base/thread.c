@@ -61,20 +61,15 @@ void hapi_thread_join(hapi_thread *thread)
   }
 }
 
-static void touch_stack(void)
-{
-  volatile char deep[STACK_TOUCHED];
-  for (size_t i = 0; i < sizeof deep; i += 1024) {
-    deep[i] = 0;
-  }
-}
-
 void hapi_thread_prepare_for_ticks(void)
 {
 #if defined(__linux__)
   prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
 #endif
-  touch_stack();
+  volatile char deep[STACK_TOUCHED];
+  for (size_t i = 0; i < sizeof deep; i += 1024) {
+    deep[i] = 0;
+  }
 }
 
 #if defined(__SSE2__)

@@ -185,17 +185,6 @@ static bool name_fits_a_line(const char *name)
   return good;
 }
 
-static void write_lines(FILE *file, hap_device_identity *identity)
-{
-  fprintf(file, "# hapode: what an identification found out about a device\nversion = 1\n");
-  fprintf(file, "device = %s\n", identity->device);
-  for (size_t i = 0; i < FIGURES; ++i) {
-    char number[32];
-    hapi_number_write(number, sizeof number, *value_of(identity, i));
-    fprintf(file, "%s = %s # %s\n", figures[i].key, number, figures[i].about);
-  }
-}
-
 hap_status hap_device_identity_write(const char *path, const hap_device_identity *identity,
                                      hap_detail *detail)
 {
@@ -209,7 +198,13 @@ hap_status hap_device_identity_write(const char *path, const hap_device_identity
   if (file == NULL) {
     return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
   }
-  write_lines(file, &known);
+  fprintf(file, "# hapode: what an identification found out about a device\nversion = 1\n");
+  fprintf(file, "device = %s\n", known.device);
+  for (size_t i = 0; i < FIGURES; ++i) {
+    char number[32];
+    hapi_number_write(number, sizeof number, *value_of(&known, i));
+    fprintf(file, "%s = %s # %s\n", figures[i].key, number, figures[i].about);
+  }
   bool good = ferror(file) == 0;
   good = fclose(file) == 0 && good;
   return good ? HAP_OK

@@ -42,19 +42,6 @@ static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slo
   p->coupling.reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
 }
 
-static void set_hull(hapi_haptic *haptic, uint32_t index)
-{
-  const hapi_tool_hull *hull = &haptic->slots[index].hull;
-  hapi_pointer *p = &haptic->tick.pointers.of[index];
-  double farthest = 0.0;
-  haptic->tick.pointers.hulls[index] = *hull;
-  p->shape.hull = &haptic->tick.pointers.hulls[index];
-  for (uint32_t i = 0; i < hull->count; ++i) {
-    farthest = fmax(farthest, hapi_v3_norm(hull->points[i]));
-  }
-  p->shape.extent += farthest;
-}
-
 /* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long
  * tool's: the device's grip is not as long. */
 static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
@@ -91,7 +78,13 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.three_dof = slot->has_device && info->dof < 6;
   p->shape.extent = def->radius;
   if (slot->hull.count > 0) {
-    set_hull(haptic, index);
+    double farthest = 0.0;
+    haptic->tick.pointers.hulls[index] = slot->hull;
+    p->shape.hull = &haptic->tick.pointers.hulls[index];
+    for (uint32_t i = 0; i < slot->hull.count; ++i) {
+      farthest = fmax(farthest, hapi_v3_norm(slot->hull.points[i]));
+    }
+    p->shape.extent += farthest;
   }
   p->surface.stiffness = def->stiffness;
   p->surface.damping = def->damping;

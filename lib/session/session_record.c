@@ -124,14 +124,6 @@ void hapi_session_move_defs(hapi_file_info *info, hap_session_def *def, hap_expe
 
 /* ---- begin and end ---- */
 
-/* A tick of which nothing but the usual is recorded: of each pointer what was read and written. */
-static uint32_t cells_of_loop(const hap_session_def *def, double buffer_s)
-{
-  double tick = 1.0 + 4.0 * def->max_pointers + HAPI_CELL_BODIES;
-  double cells = buffer_s * def->haptic_hz * tick;
-  return (uint32_t)(cells > CELLS_MIN ? cells : CELLS_MIN);
-}
-
 hap_status hap_session_record(hap_session *session, const hap_record_def *def, hap_detail *detail)
 {
   hap_record_def d;
@@ -145,7 +137,10 @@ hap_status hap_session_record(hap_session *session, const hap_record_def *def, h
   memset(&config, 0, sizeof config);
   config.path = d.path;
   config.max_bytes = d.max_bytes;
-  config.cells[HAPI_STREAM_HAPTIC] = cells_of_loop(&session->def, d.buffer_s);
+  /* Of a tick of which nothing but the usual is recorded: what each pointer read and wrote. */
+  double tick = 1.0 + 4.0 * session->def.max_pointers + HAPI_CELL_BODIES;
+  double cells = d.buffer_s * session->def.haptic_hz * tick;
+  config.cells[HAPI_STREAM_HAPTIC] = (uint32_t)(cells > CELLS_MIN ? cells : CELLS_MIN);
   config.cells[HAPI_STREAM_PHYSICS] = CELLS_OF_OTHERS;
   config.cells[HAPI_STREAM_CONTACT] = CELLS_OF_OTHERS;
   hapi_session_move_defs(&config.info, &session->def, &session->expert, &session->research, true);

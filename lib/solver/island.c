@@ -379,9 +379,9 @@ static void matrix_assemble(hapi_island *is)
   }
 }
 
-/* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in which
- * the inverse grows. No pivoting: such a block is 1 plus a product of positive definite matrices as
- * long as nothing slides, and what sliding spoils is not accepted. */
+/* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in
+ * which the inverse grows. No pivoting: such a block is 1 plus a product of positive definite
+ * matrices as long as nothing slides, and what sliding spoils is not accepted. */
 static void block_invert(double m[36])
 {
   for (int k = 0; k < 6; ++k) {
