@@ -116,7 +116,8 @@ static void edits_draw(FILE *script, const void *data)
       script,
       "EOD\nset title 'Waits for the lock while a world is edited'\n"
       "set style data histograms\nset style fill solid 0.6\nset logscale y\n"
-      "set yrange [1e-5:100]\nset format y '%%g'\nset ylabel 'wait [ms]'\nset key top left\n"
+      "set yrange [1e-5:100]\nset format y '%%g'\nset ylabel 'wait [ms]'\nset key outside right "
+      "top\n"
       "plot $w using 2:xtic(1) title 'median', $w using 3 title '99 %%', "
       "$w using 4 title 'longest', %g with lines lc rgb '#606060' dt 2 title 'a physics step'\n",
       1e3 / 60.0);
@@ -141,5 +142,5 @@ hap_status bench_edits(bench *b)
     }
   }
   status = bench_csv_close(b, csv, status);
-  return status >= HAP_OK ? bench_draw(b, "edits", 700, 400, edits_draw, results) : status;
+  return status >= HAP_OK ? bench_draw(b, "edits", 900, 400, edits_draw, results) : status;
 }

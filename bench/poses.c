@@ -106,7 +106,8 @@ static void poses_draw(FILE *script, const void *data)
   fprintf(script,
           "set multiplot layout 2,1 title 'Drawn at 90 Hz against the loop at the same time'\n"
           "set logscale y\nset yrange [1e-6:100]\nset ylabel 'largest error [mm]'\n"
-          "set xtics rotate by -25 font ',8'\nset key top left font ',8'\n"
+          "set format y '%%g'\nset offsets 0.5, 0.5, 0, 0\n"
+          "set xtics rotate by -25 font ',8'\nset key outside right top font ',8'\n"
           "floor_of(x) = x < 1e-6 ? 1e-6 : x\n");
   for (size_t i = 0; i < SCENES; ++i) {
     plot_scene(script, data, scenes[i]);
