@@ -8,7 +8,6 @@
 #include "near/meshes.h"
 #include "near/neighbors.h"
 #include "near/range.h"
-#include "near/shapes.h"
 #include "near/slots.h"
 #include "near/tools.h"
 #include "world/world.h"

@@ -43,6 +43,5 @@ typedef struct hapi_counts {
 } hapi_counts;
 
 void hapi_counts_show(hapi_physics *physics); /* copies the figures for readers */
-void hapi_counts_range(hapi_physics *physics, double seconds);
 
 #endif

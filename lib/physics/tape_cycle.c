@@ -5,7 +5,7 @@
 #include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
-#include "near/shapes.h"
+#include "near/neighbors.h"
 #include "physics/tape_cycle.h"
 
 /* Physics' part of a recording: what a cycle has from outside, and a hash of the local model

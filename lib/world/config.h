@@ -3,7 +3,7 @@
 #ifndef HAPODE_WORLD_CONFIG_H
 #define HAPODE_WORLD_CONFIG_H
 
-/* What the physics side is created with. Constant from then on. */
+/* What the physics side is created with, and what the dial comes to. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -13,8 +13,32 @@
 #include <hapode/stats.h>
 
 #include "sync/exchange.h"
-#include "world/settings.h"
 
+/* As in hap_expert_def: HAP_BY_ACCURACY, or the fixed value. */
+typedef struct hapi_knobs {
+  double contact_hz;
+  hap_probe probe;
+  int32_t max_sweeps;
+  int32_t range_hops;
+  int32_t edge_probes;
+  int32_t iterations;
+  double reuse;
+} hapi_knobs;
+
+typedef struct hapi_settings {
+  double contact_hz;
+  hap_probe probe;
+  uint32_t max_sweeps;  /* 0: until the system is solved */
+  uint32_t row_updates; /* the most, in a solve of a tick */
+  int32_t range_hops;
+  uint32_t edge_probes;
+  double iterations; /* times those of the world; 0: fixed_iterations */
+  int32_t fixed_iterations;
+  double reuse; /* m */
+  bool shapes;  /* where the effect is auto */
+} hapi_settings;
+
+/* What the physics side is created with. Constant from then on. */
 typedef struct hapi_physics_config {
   hapi_capacity capacity;
   uint32_t max_bodies; /* that the loop may move itself; capacity.bodies is more */

@@ -13,7 +13,6 @@
 #include "base/wishes.h"
 #include "sync/messages.h"
 #include "world/config.h"
-#include "world/settings.h"
 
 typedef struct hapi_cycle {
   const hapi_physics_config *config;

@@ -11,9 +11,7 @@
 #include <hapode/ode.h>
 
 #include "world/bodies.h"
-#include "world/claim.h"
 #include "world/cycle.h"
-#include "world/islands.h"
 #include "world/joints.h"
 #include "world/surfaces.h"
 
@@ -36,6 +34,20 @@ typedef struct hapi_world_counts {
   uint64_t steps;
   uint64_t contacts_rejected;
 } hapi_world_counts;
+
+/* One session at most steps a world. Two of them give the world each other's contact joints and
+ * undo each other's steps, until ODE aborts the process. The list of claimed worlds is shared by
+ * all threads and has a lock of its own. */
+typedef struct hapi_claim {
+  dWorldID world; /* NULL: nothing is claimed */
+  struct hapi_claim *next;
+} hapi_claim;
+
+/* Threads for the islands of the global step, between begin and end of a session. */
+typedef struct hapi_islands {
+  dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
+  dThreadingThreadPoolID pool;
+} hapi_islands;
 
 /* What is reached through a pointer may change in a const hapi_world: ODE's own objects, entries
  * of the tables, the surface cache, and what contacts are made with. */
@@ -62,6 +74,19 @@ bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint
 void hapi_world_finish(hapi_world *world);
 void hapi_world_step(hapi_world *world, double step_s); /* the global step */
 double hapi_body_mass(dBodyID body);                    /* 0 for a kinematic one */
+
+/* False: another claim has the world, and *claim is unchanged. *claim stays where it is until
+ * release. */
+bool hapi_claim_take(hapi_claim *claim, dWorldID world);
+/* A zeroed claim is allowed. */
+void hapi_claim_release(hapi_claim *claim);
+
+/* repeats: every run must come to the same, so that one thread steps all. False: no threads to
+ * be had. */
+bool hapi_islands_begin(hapi_world *world, bool repeats);
+void hapi_islands_end(hapi_world *world);
+void hapi_islands_rest(const hapi_world *world); /* for testing simulations */
+void hapi_islands_go_on(const hapi_world *world);
 
 /* soundness.c: states that ODE would abort the process on, or make NaN of. *out_text says what was
  * found and what to do. After a scan. */
