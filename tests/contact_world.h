@@ -36,23 +36,29 @@ typedef struct contact_world {
 
   double hand_at[3];
   double hand_velocity[3];
-  bool follows; /* the hand goes with the first body, hand_offset from it */
-  double hand_offset[3];
-  double user_force[3]; /* N on the first body, in every step */
-  double user_torque[3];
+  struct { /* the hand goes with the first body, offset from it */
+    bool on;
+    double offset[3];
+  } follow;
+  struct { /* on the first body, in every step */
+    double force[3];
+    double torque[3];
+  } user;
 
-  uint64_t ticks;
   hap_trace_row row;                 /* of the newest tick */
   double position[CW_TRACED_MAX][3]; /* after it */
   double velocity[CW_TRACED_MAX][3]; /* of the way made in it */
   double force[3];                   /* on the hand */
   double impulse[3];                 /* N s, the hand's on the bodies, up to now */
-  double synced_impulse[3];          /* up to the newest sync */
-  double momentum[3];                /* of all bodies, in ODE at the newest sync */
-  uint32_t range_min;                /* bodies in the range, at the syncs so far */
-  uint32_t range_max;
-  uint32_t steps;
-  int surface_calls;
+  struct {
+    uint64_t ticks;
+    uint32_t steps;
+    double impulse[3];  /* up to the newest sync */
+    double momentum[3]; /* of all bodies, in ODE at the newest sync */
+    uint32_t range_min; /* bodies in the range, at the syncs so far */
+    uint32_t range_max;
+    int surface_calls;
+  } seen;
 } contact_world;
 
 static inline bool cw_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -60,7 +66,7 @@ static inline bool cw_surface(void *user, dGeomID a, dGeomID b, dSurfaceParamete
   contact_world *w = user;
   (void)a;
   (void)b;
-  ++w->surface_calls;
+  ++w->seen.surface_calls;
   *io = w->surface;
   return true;
 }
@@ -77,8 +83,8 @@ static inline bool cw_direction(void *user, dGeomID a, dGeomID b, double out[3])
 static inline void cw_before_step(void *user, double step_s)
 {
   contact_world *w = user;
-  const double *f = w->user_force;
-  const double *t = w->user_torque;
+  const double *f = w->user.force;
+  const double *t = w->user.torque;
   (void)step_s;
   if (w->body_count > 0 && (f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0)) {
     dBodyAddForce(w->bodies[0], f[0], f[1], f[2]);
@@ -93,7 +99,7 @@ static inline void cw_after_step(void *user, double step_s)
 {
   contact_world *w = user;
   (void)step_s;
-  memset(w->momentum, 0, sizeof w->momentum);
+  memset(w->seen.momentum, 0, sizeof w->seen.momentum);
   for (int i = 0; i < w->body_count; ++i) {
     dMass mass;
     if (w->bodies[i] == NULL || dBodyIsKinematic(w->bodies[i])) {
@@ -101,11 +107,11 @@ static inline void cw_after_step(void *user, double step_s)
     }
     dBodyGetMass(w->bodies[i], &mass);
     for (int k = 0; k < 3; ++k) {
-      w->momentum[k] += mass.mass * dBodyGetLinearVel(w->bodies[i])[k];
+      w->seen.momentum[k] += mass.mass * dBodyGetLinearVel(w->bodies[i])[k];
     }
   }
-  memcpy(w->synced_impulse, w->impulse, sizeof w->impulse);
-  ++w->steps;
+  memcpy(w->seen.impulse, w->impulse, sizeof w->impulse);
+  ++w->seen.steps;
 }
 
 static inline void cw_open(contact_world *w, double gravity)
@@ -229,7 +235,7 @@ static inline bool cw_start(contact_world *w, double x, double y, double z)
   w->ode.world = w->world;
   w->ode.space = w->space;
   w->ode.user = w;
-  w->range_min = UINT32_MAX;
+  w->seen.range_min = UINT32_MAX;
   if (hap_session_create(&w->def, &w->ode, &w->session, &detail) < HAP_OK) {
     printf("# %s\n", detail.text);
     return false;
@@ -257,10 +263,10 @@ static inline bool cw_start(contact_world *w, double x, double y, double z)
 static inline bool cw_start_following(contact_world *w, double dx, double dy, double dz)
 {
   const dReal *p = dBodyGetPosition(w->bodies[0]);
-  w->follows = true;
-  w->hand_offset[0] = dx;
-  w->hand_offset[1] = dy;
-  w->hand_offset[2] = dz;
+  w->follow.on = true;
+  w->follow.offset[0] = dx;
+  w->follow.offset[1] = dy;
+  w->follow.offset[2] = dz;
   return cw_start(w, p[0] + dx, p[1] + dy, p[2] + dz);
 }
 
@@ -281,8 +287,10 @@ static inline void cw_read(contact_world *w)
     w->impulse[k] -= period * w->force[k];
   }
   hap_stats stats = cw_stats(w);
-  w->range_min = stats.model.range_bodies < w->range_min ? stats.model.range_bodies : w->range_min;
-  w->range_max = stats.model.range_bodies > w->range_max ? stats.model.range_bodies : w->range_max;
+  w->seen.range_min =
+      stats.model.range_bodies < w->seen.range_min ? stats.model.range_bodies : w->seen.range_min;
+  w->seen.range_max =
+      stats.model.range_bodies > w->seen.range_max ? stats.model.range_bodies : w->seen.range_max;
 }
 
 /* One tick. */
@@ -290,9 +298,9 @@ static inline void cw_tick(contact_world *w)
 {
   const double *v = w->hand_velocity;
   double period = 1.0 / w->def.haptic_hz;
-  if (w->follows) {
+  if (w->follow.on) {
     for (int k = 0; k < 3; ++k) {
-      w->hand_at[k] = w->position[0][k] + w->hand_offset[k];
+      w->hand_at[k] = w->position[0][k] + w->follow.offset[k];
     }
     cw_put_hand(w, w->velocity[0][0], w->velocity[0][1], w->velocity[0][2]);
   } else {
@@ -302,7 +310,7 @@ static inline void cw_tick(contact_world *w)
     cw_put_hand(w, v[0], v[1], v[2]);
   }
   CHECK(hap_session_advance(w->session, 1) == HAP_OK);
-  ++w->ticks;
+  ++w->seen.ticks;
   cw_read(w);
 }
 

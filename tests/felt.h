@@ -3,8 +3,9 @@
 #ifndef HAPODE_TESTS_FELT_H
 #define HAPODE_TESTS_FELT_H
 
-/* What a hand feels, for the tests of faults: the device "virtual" with its simulated hand, behind a
- * device that can break and that keeps book of every write. One at a time. Include after tap.h. */
+/* What a hand feels, for the tests of faults: the device "virtual" with its simulated hand,
+ * behind a device that can break and that keeps book of every write. One at a time. Include
+ * after tap.h. */
 
 #include <stdatomic.h>
 
@@ -176,8 +177,8 @@ static const hap_device_ops felt_ops = {
     .close = felt_close,
 };
 
-/* What a test is made of: a stage, whose cube is replaced by a box with its face at x = -0.05 m, and
- * the hand before it. */
+/* What a test is made of: a stage, whose cube is replaced by a box with its face at x = -0.05 m,
+ * and the hand before it. */
 typedef struct felt_stage {
   stage s;
   hap_device *device;

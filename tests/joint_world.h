@@ -3,8 +3,8 @@
 #ifndef HAPODE_TESTS_JOINT_WORLD_H
 #define HAPODE_TESTS_JOINT_WORLD_H
 
-/* Mechanisms in a contact_world. The hand stays near the first body, so that all of it is in the range, and
- * touches nothing unless a test says so. Include after tap.h. */
+/* Mechanisms in a contact_world. The hand stays near the first body, so that all of it is in the
+ * range, and touches nothing unless a test says so. Include after tap.h. */
 
 #include <math.h>
 
@@ -37,7 +37,7 @@ static inline dBodyID add_body(mechanism *m, double mass, const double edges[3],
 
 static const double bar[3] = {0.2, 0.04, 0.02};
 
-static inline dJointID keep(mechanism *m, dJointID joint, dBodyID a, dBodyID b)
+static inline dJointID joint_keep(mechanism *m, dJointID joint, dBodyID a, dBodyID b)
 {
   dJointAttach(joint, a, b);
   m->joints[m->joint_count++] = joint;
@@ -46,7 +46,7 @@ static inline dJointID keep(mechanism *m, dJointID joint, dBodyID a, dBodyID b)
 
 static inline dJointID add_ball(mechanism *m, dBodyID a, dBodyID b, double x, double y, double z)
 {
-  dJointID joint = keep(m, dJointCreateBall(m->w.world, NULL), a, b);
+  dJointID joint = joint_keep(m, dJointCreateBall(m->w.world, NULL), a, b);
   dJointSetBallAnchor(joint, x, y, z);
   return joint;
 }
@@ -54,7 +54,7 @@ static inline dJointID add_ball(mechanism *m, dBodyID a, dBodyID b, double x, do
 static inline dJointID add_hinge(mechanism *m, dBodyID a, dBodyID b, const double at[3],
                                  const double axis[3])
 {
-  dJointID joint = keep(m, dJointCreateHinge(m->w.world, NULL), a, b);
+  dJointID joint = joint_keep(m, dJointCreateHinge(m->w.world, NULL), a, b);
   dJointSetHingeAnchor(joint, at[0], at[1], at[2]);
   dJointSetHingeAxis(joint, axis[0], axis[1], axis[2]);
   return joint;
@@ -62,7 +62,7 @@ static inline dJointID add_hinge(mechanism *m, dBodyID a, dBodyID b, const doubl
 
 static inline dJointID add_slider(mechanism *m, dBodyID a, dBodyID b, const double axis[3])
 {
-  dJointID joint = keep(m, dJointCreateSlider(m->w.world, NULL), a, b);
+  dJointID joint = joint_keep(m, dJointCreateSlider(m->w.world, NULL), a, b);
   dJointSetSliderAxis(joint, axis[0], axis[1], axis[2]);
   return joint;
 }
@@ -105,7 +105,7 @@ static inline mechanism *mechanism_running(build_fn build, double gravity)
   return start_mechanism(m) ? m : NULL;
 }
 
-static inline bool begin(mechanism *m, build_fn build, double gravity)
+static inline bool mechanism_begin(mechanism *m, build_fn build, double gravity)
 {
   open_mechanism(m, build, gravity);
   return start_mechanism(m);
@@ -133,7 +133,7 @@ static inline bool anchors_of(dJointID joint, dVector3 a, dVector3 b)
 }
 
 /* m, how far the joints are open at the last sync. */
-static inline double openness(const mechanism *m)
+static inline double mechanism_openness(const mechanism *m)
 {
   double widest = 0.0;
   for (int i = 0; i < m->joint_count; ++i) {

@@ -3,9 +3,10 @@
 #ifndef HAPODE_TESTS_REPEAT_H
 #define HAPODE_TESTS_REPEAT_H
 
-/* The same program in several layouts of ODE's memory, compared tick by tick: where does it differ first,
- * and in what? Bodies, geoms and joints get the addresses of destroyed ones at once, never, or sometimes;
- * what is new holds rubbish, in each layout another one. Include after tap.h; call repeat_init before dInitODE2. */
+/* The same program in several layouts of ODE's memory, compared tick by tick: where does it
+ * differ first, and in what? Bodies, geoms and joints get the addresses of destroyed ones at
+ * once, never, or sometimes; what is new holds rubbish, in each layout another one. Include
+ * after tap.h; call repeat_init before dInitODE2. */
 
 #include <pthread.h>
 #include <stdint.h>

@@ -134,7 +134,7 @@ static inline const char *detail_of(stage *s)
   return s->detail.text;
 }
 
-static inline bool has(const char *text, const char *part)
+static inline bool text_has(const char *text, const char *part)
 {
   bool found = strstr(text, part) != NULL;
   if (!found) {

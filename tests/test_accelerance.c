@@ -44,7 +44,7 @@ static bool start_at(test_world *w, hap_surface_fn surface, const double at[3])
   return hap_session_start(w->session) == HAP_OK;
 }
 
-static uint64_t measure(test_world *w)
+static uint64_t world_probe(test_world *w)
 {
   uint64_t before = world_physics(w)->probe.test.steps;
   world_measure(w);
@@ -57,7 +57,7 @@ static hapi_contact_slot *measure_contact(test_world *w, dBodyID body, double fo
   hapi_contact_slot *contact = world_contact(w, body, 0);
   if (contact != NULL) {
     hapi_v3_set(contact->last_force, 0.0, 0.0, -force);
-    measure(w);
+    world_probe(w);
   }
   return contact;
 }
@@ -310,7 +310,7 @@ static double oracle_acceleration(const probe_case *c, bool exact, double force)
   return result;
 }
 
-static double oracle(const probe_case *c, bool exact, double force)
+static double accelerance_oracle(const probe_case *c, bool exact, double force)
 {
   double base = oracle_acceleration(c, exact, 0.0);
   return (oracle_acceleration(c, exact, force) - base) / force;
@@ -323,8 +323,8 @@ TEST(two_of_three_oracles_agree)
   dSetMessageHandler(count_message);
   for (size_t i = 0; i < case_count; ++i) {
     const probe_case *c = &cases[i];
-    double exact = oracle(c, true, 1e-2) / c->expected;
-    double quick = oracle(c, false, c->force) / c->expected;
+    double exact = accelerance_oracle(c, true, 1e-2) / c->expected;
+    double quick = accelerance_oracle(c, false, c->force) / c->expected;
     int agree =
         (fabs(exact - 1.0) < 1e-6) + (fabs(quick - 1.0) < 1e-6) + (fabs(exact - quick) < 1e-6);
     printf("# %s: exact %.9g, quick %.9g of the closed form\n", c->name, exact, quick);
@@ -345,7 +345,7 @@ typedef struct secant_row {
 } secant_row;
 
 /* Eq. 4 perturbs along +x, +y, +z. For a push down the world stands on its head. */
-static double secant(const secant_row *row)
+static double accelerance_secant(const secant_row *row)
 {
   bool along = strcmp(row->direction, "x") == 0;
   double up = strcmp(row->direction, "down") == 0 ? -1.0 : 1.0;
@@ -375,7 +375,7 @@ static int check_secants(FILE *file)
                row.direction, &row.expected) != 5) {
       continue;
     }
-    double answer = secant(&row);
+    double answer = accelerance_secant(&row);
     printf("# %g N %s, mu %g: %.4f, oracle %.3f\n", row.force, row.direction, row.mu, answer,
            row.expected);
     CHECK_NEAR(answer, row.expected, 0.01);
@@ -477,7 +477,7 @@ static uint64_t count_probes(void (*build)(test_world *w), hap_probe probe, int 
   build(w);
   CHECK(start_above(w));
   CHECK(world_count_contacts(w) == contacts);
-  uint64_t probes = measure(w);
+  uint64_t probes = world_probe(w);
   check_all_measured(w);
   uint64_t before = world_physics(w)->probe.test.steps;
   CHECK(hap_session_advance(w->session, 51) == HAP_OK); /* to the first step, which is in it */
@@ -539,7 +539,7 @@ TEST(two_pointers_on_one_body)
   world_add_pointer(w, 0.01, -EDGE / 2 - 0.01 - GAP, 0.01, 0);
   world_add_pointer(w, 0.01, EDGE / 2 + 0.01 + GAP, -0.02, 0);
   REQUIRE(hap_session_start(w->session) == HAP_OK);
-  CHECK(measure(w) == 1 + 6);
+  CHECK(world_probe(w) == 1 + 6);
   const hapi_contact_slot *one = world_contact(w, cube, 0);
   const hapi_contact_slot *two = world_contact(w, cube, 1);
   REQUIRE(one != NULL && two != NULL);
@@ -556,7 +556,7 @@ TEST(ways_of_probing_agree)
     test_world *w = open_count(k == 0 ? HAP_PROBE_SHARED : HAP_PROBE_PAPER);
     build_mixed(w);
     REQUIRE(start_above(w));
-    measure(w);
+    world_probe(w);
     const hapi_contact_slot *contact = world_contact(w, w->bodies[2], 0);
     REQUIRE(contact != NULL);
     memcpy(a[k], world_contact_answer(w, contact)->a, sizeof a[k]);
@@ -579,7 +579,7 @@ TEST(far_bodies_are_not_stepped)
   REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
   far_moves = 0;
   body_read(flier, &before);
-  CHECK(measure(w) == 4);
+  CHECK(world_probe(w) == 4);
   body_read(flier, &after);
   CHECK(far_moves == 0);
   CHECK(memcmp(&before, &after, sizeof before) == 0 && after.enabled);
@@ -599,7 +599,7 @@ TEST(driven_bodies_do_not_link_islands)
   REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0.03}));
   far_moves = 0;
   CHECK(world_count_contacts(w) == 2); /* cube and plate */
-  CHECK(measure(w) == 4);
+  CHECK(world_probe(w) == 4);
   CHECK(far_moves == 0);
   CHECK(dBodyIsEnabled(far));
   const hapi_contact_slot *contact = world_contact(w, near, 0);
@@ -649,7 +649,7 @@ TEST(sleepers_answer_like_those_awake)
   CHECK(a[0][0][0] > 0.1 && a[0][0][0] < 1.0); /* 8 N against two cubes with friction */
 }
 
-static void glue(test_world *w, dBodyID a, dBodyID b)
+static void bodies_glue(test_world *w, dBodyID a, dBodyID b)
 {
   dJointID joint = dJointCreateFixed(w->world, NULL);
   dJointAttach(joint, a, b);
@@ -666,8 +666,8 @@ TEST(bodies_known_only_by_joints_are_undone_too)
   dMassSetSphereTotal(&mass, 0.25, 0.02);
   world_add(w, NULL, &mass, EDGE / 2, 0, 0);
   world_add(w, NULL, &mass, EDGE / 2, 0, 0);
-  glue(w, w->bodies[1], w->bodies[0]);
-  glue(w, w->bodies[1], w->bodies[2]);
+  bodies_glue(w, w->bodies[1], w->bodies[0]);
+  bodies_glue(w, w->bodies[1], w->bodies[2]);
   REQUIRE(start_at(w, NULL, (const double[3]){-0.01 - GAP, 0, 0}));
   CHECK(world_physics(w)->world.bodies.used == 3);
   for (int i = 0; i < 3; ++i) {

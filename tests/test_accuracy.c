@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-bench accuracy in parts: shards and their table, a run that was killed and goes on, and files
- * that do not belong together. On the quickest scene. HAPODE_BENCH: path of the program,
+/* hapode-bench accuracy in parts: shards and their table, a run that was killed and goes on, and
+ * files that do not belong together. On the quickest scene. HAPODE_BENCH: path of the program,
  * HAPODE_SOURCE: of the sources, for the job files. */
 
 #include "tests/files.h"
@@ -18,9 +18,9 @@
 #define PATH_LENGTH 512
 #define WHAT "--quick --scene topple"
 
-/* Exit code of a shell's command; what it says goes to FOLDER/said. In the command $B is the program, $F
- * the folder and $S the sources. */
-static int shell(const char *format, ...)
+/* Exit code of a shell's command; what it says goes to FOLDER/said. In the command $B is the
+ * program, $F the folder and $S the sources. */
+static int shell_run(const char *format, ...)
 {
   char command[2048];
   char whole[3072];
@@ -45,7 +45,7 @@ static int count_lines(const char *name)
   return lines;
 }
 
-static bool said(const char *part)
+static bool shell_said(const char *part)
 {
   const char *text = file_text(folder_path("said"));
   bool has = strstr(text, part) != NULL;
@@ -55,13 +55,13 @@ static bool said(const char *part)
   return has;
 }
 
-/* That two tables have the same rows but for what a clock says: up to peak_ratio, and from haptic_hz to
- * lines, which is the last column but the front's. */
+/* That two tables have the same rows but for what a clock says: up to peak_ratio, and from
+ * haptic_hz to lines, which is the last column but the front's. */
 static void check_same_rows(const char *a, const char *b)
 {
-  CHECK(shell("cut -d, -f1-8,12-27 $F/%s >$F/a.cut && cut -d, "
-              "-f1-8,12-27 $F/%s >$F/b.cut && cmp $F/a.cut $F/b.cut",
-              a, b) == 0);
+  CHECK(shell_run("cut -d, -f1-8,12-27 $F/%s >$F/a.cut && cut -d, "
+                  "-f1-8,12-27 $F/%s >$F/b.cut && cmp $F/a.cut $F/b.cut",
+                  a, b) == 0);
   CHECK(count_lines(a) > 30 && count_lines(a) == count_lines(b));
 }
 
@@ -70,17 +70,18 @@ static void check_same_rows(const char *a, const char *b)
 TEST(shards_of_the_slurm_file_make_the_table)
 {
   for (int shard = 1; shard <= 2; ++shard) {
-    REQUIRE(shell("HAPODE_BENCH=$B HAPODE_OUT=$F/s SLURM_ARRAY_TASK_ID=%d SLURM_ARRAY_TASK_COUNT=2 "
+    REQUIRE(
+        shell_run("HAPODE_BENCH=$B HAPODE_OUT=$F/s SLURM_ARRAY_TASK_ID=%d SLURM_ARRAY_TASK_COUNT=2 "
                   "sh $S/bench/jobs/accuracy.slurm " WHAT,
                   shard) == 0);
-    CHECK(said("is done"));
+    CHECK(shell_said("is done"));
     CHECK(!file_exists(folder_path("s/accuracy.csv")));
   }
-  CHECK(shell("env -u SLURM_ARRAY_TASK_ID sh $S/bench/jobs/accuracy.slurm") != 0);
-  CHECK(said("submit it as an array"));
-  REQUIRE(shell("$B accuracy --merge $F/s/accuracy-1-of-2.rows $F/s/accuracy-2-of-2.rows --out "
-                "$F/s") == 0);
-  CHECK(said("topple: the default is "));
+  CHECK(shell_run("env -u SLURM_ARRAY_TASK_ID sh $S/bench/jobs/accuracy.slurm") != 0);
+  CHECK(shell_said("submit it as an array"));
+  REQUIRE(shell_run("$B accuracy --merge $F/s/accuracy-1-of-2.rows $F/s/accuracy-2-of-2.rows --out "
+                    "$F/s") == 0);
+  CHECK(shell_said("topple: the default is "));
   CHECK(count_lines("s/accuracy.csv") > 40);
   CHECK(file_exists(folder_path("s/accuracy-1-of-2.rows")) &&
         file_exists(folder_path("s/accuracy-2-of-2.rows")));
@@ -88,24 +89,25 @@ TEST(shards_of_the_slurm_file_make_the_table)
 
 TEST(shards_under_parallel_make_the_same_table)
 {
-  if (shell("command -v parallel") != 0) {
+  if (shell_run("command -v parallel") != 0) {
     SKIP("needs GNU parallel");
   }
-  REQUIRE(shell("HAPODE_BENCH=$B HAPODE_OUT=$F/p $S/bench/jobs/accuracy-parallel 3 " WHAT) == 0);
+  REQUIRE(shell_run("HAPODE_BENCH=$B HAPODE_OUT=$F/p $S/bench/jobs/accuracy-parallel 3 " WHAT) ==
+          0);
   check_same_rows("s/accuracy.csv", "p/accuracy.csv");
 }
 
 TEST(a_shard_that_is_done_is_not_done_again)
 {
   REQUIRE(file_exists(folder_path("s/accuracy-1-of-2.rows")));
-  CHECK(shell("cp $F/s/accuracy-1-of-2.rows $F/kept; $B accuracy " WHAT
-              " --shard 1/2 --out $F/s && cmp $F/kept $F/s/accuracy-1-of-2.rows") == 0);
+  CHECK(shell_run("cp $F/s/accuracy-1-of-2.rows $F/kept; $B accuracy " WHAT
+                  " --shard 1/2 --out $F/s && cmp $F/kept $F/s/accuracy-1-of-2.rows") == 0);
 }
 
 /* There are fewer references than shards. */
 TEST(a_shard_may_have_nothing_to_do)
 {
-  REQUIRE(shell("$B accuracy " WHAT " --shard 50/50 --out $F/n") == 0);
+  REQUIRE(shell_run("$B accuracy " WHAT " --shard 50/50 --out $F/n") == 0);
   CHECK(count_lines("n/accuracy-50-of-50.rows") == 6); /* a head alone */
 }
 
@@ -129,13 +131,13 @@ TEST(files_that_do_not_belong_together_are_refused)
       {"$F/s/accuracy.csv", "not a file of finished rows"},
       {"$F/nothing", "No such file"},
   };
-  REQUIRE(shell("cd $F; a=s/accuracy-2-of-2.rows; sed '2s/: .*/: 0/' $a >other; "
-                "sed '5s/2$/3/' $a >three; sed '3s/quick/full/' $a >quick; sed '$d' $a >short; "
-                "sed '5s/1/2/' s/accuracy-1-of-2.rows >swapped; head -c -20 $a >torn; "
-                "sed '9s/,/;/' $a >garbage; sed '9p' $a >double") == 0);
+  REQUIRE(shell_run("cd $F; a=s/accuracy-2-of-2.rows; sed '2s/: .*/: 0/' $a >other; "
+                    "sed '5s/2$/3/' $a >three; sed '3s/quick/full/' $a >quick; sed '$d' $a >short; "
+                    "sed '5s/1/2/' s/accuracy-1-of-2.rows >swapped; head -c -20 $a >torn; "
+                    "sed '9s/,/;/' $a >garbage; sed '9p' $a >double") == 0);
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    CHECK(shell("$B accuracy --merge %s --out $F/m", cases[i].files) == 1);
-    CHECK(said(cases[i].says));
+    CHECK(shell_run("$B accuracy --merge %s --out $F/m", cases[i].files) == 1);
+    CHECK(shell_said(cases[i].says));
     CHECK(!file_exists(folder_path("m/accuracy.csv")));
   }
 }
@@ -163,8 +165,8 @@ TEST(wrong_parts_are_usage)
       {"accuracy --merge a --estimates all", "from its files"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    CHECK(shell("$B %s", cases[i].arguments) == 2);
-    CHECK(said(cases[i].says));
+    CHECK(shell_run("$B %s", cases[i].arguments) == 2);
+    CHECK(shell_said(cases[i].says));
   }
 }
 
@@ -193,28 +195,31 @@ TEST(a_run_that_is_killed_goes_on_where_it_was)
   int there = count_lines("k/accuracy.rows") - 6;
   REQUIRE(there >= 8 && !file_exists(folder_path("k/accuracy.csv")));
   /* in the middle of a row, as it may be */
-  REQUIRE(shell("printf 'topple,contact,20' >>$F/k/accuracy.rows; cp $F/k/accuracy.rows $F/kept") ==
-          0);
-  REQUIRE(shell("$B accuracy " WHAT " --out $F/k") == 0);
-  CHECK(said("goes on from "));
+  REQUIRE(
+      shell_run("printf 'topple,contact,20' >>$F/k/accuracy.rows; cp $F/k/accuracy.rows $F/kept") ==
+      0);
+  REQUIRE(shell_run("$B accuracy " WHAT " --out $F/k") == 0);
+  CHECK(shell_said("goes on from "));
   CHECK(!file_exists(folder_path("k/accuracy.rows")));
   check_same_rows("s/accuracy.csv", "k/accuracy.csv");
   /* what was finished was not measured again: its times are the same */
-  CHECK(shell("sed 1,6d $F/kept | sed '$d' | cut -d, -f1-11 | while read row; do grep -qF \"$row\" "
-              "$F/k/accuracy.csv || exit 1; done") == 0);
+  CHECK(shell_run(
+            "sed 1,6d $F/kept | sed '$d' | cut -d, -f1-11 | while read row; do grep -qF \"$row\" "
+            "$F/k/accuracy.csv || exit 1; done") == 0);
 }
 
 TEST(rows_of_another_build_or_setting_are_kept_and_told)
 {
-  REQUIRE(shell("mkdir -p $F/o; sed '2s/: .*/: 0/' $F/kept >$F/o/accuracy.rows; cp "
-                "$F/o/accuracy.rows $F/before") == 0);
-  CHECK(shell("$B accuracy " WHAT " --out $F/o") == 1);
-  CHECK(said("another build") && said("--fresh"));
-  CHECK(shell("cmp $F/o/accuracy.rows $F/before") == 0);
-  CHECK(shell("cp $F/kept $F/o/accuracy.rows; $B accuracy --quick --scene hit --out $F/o") == 1);
-  CHECK(said("other settings"));
-  CHECK(shell("echo nothing >$F/o/accuracy.rows; $B accuracy " WHAT " --out $F/o") == 1);
-  CHECK(said("not a file of finished rows"));
+  REQUIRE(shell_run("mkdir -p $F/o; sed '2s/: .*/: 0/' $F/kept >$F/o/accuracy.rows; cp "
+                    "$F/o/accuracy.rows $F/before") == 0);
+  CHECK(shell_run("$B accuracy " WHAT " --out $F/o") == 1);
+  CHECK(shell_said("another build") && shell_said("--fresh"));
+  CHECK(shell_run("cmp $F/o/accuracy.rows $F/before") == 0);
+  CHECK(shell_run("cp $F/kept $F/o/accuracy.rows; $B accuracy --quick --scene hit --out $F/o") ==
+        1);
+  CHECK(shell_said("other settings"));
+  CHECK(shell_run("echo nothing >$F/o/accuracy.rows; $B accuracy " WHAT " --out $F/o") == 1);
+  CHECK(shell_said("not a file of finished rows"));
 }
 
 SET_UP

@@ -97,7 +97,7 @@ static void at_arm(double r[6][6], const double arm[3], double out[6][3])
 }
 
 /* Acceleration along a direction of the point that is pushed along it. */
-static double along(double a[6][3], const double arm[3], const double n[3])
+static double accelerance_along(double a[6][3], const double arm[3], const double n[3])
 {
   double answer[6];
   double way[3];
@@ -119,7 +119,7 @@ static double largest_difference(const double *a, const double *b, int count)
   return most;
 }
 
-static double largest(const double *a, int count)
+static double largest_of(const double *a, int count)
 {
   const double zero[36] = {0.0};
   return largest_difference(a, zero, count);
@@ -148,7 +148,7 @@ TEST(what_constraints_leave_of_a_body_is_left_alone)
     CHECK(memcmp(a, a_before, sizeof a) == 0);
     CHECK(hapi_admittance_tidy_body(&body, response) == HAPI_ADMITTANCE_GOOD);
     CHECK(largest_difference(&response[0][0], &before[0][0], 36) <=
-          1e-12 * largest(&before[0][0], 36));
+          1e-12 * largest_of(&before[0][0], 36));
   }
 }
 
@@ -177,7 +177,7 @@ TEST(what_is_outside_is_brought_back_or_refused)
       hapi_v3_scale(sizes[round % 4], arm, arm);
       constrained_body(&body, 0, response);
       at_arm(response, arm, a);
-      double whole = along(a, arm, normal);
+      double whole = accelerance_along(a, arm, normal);
       double scale = response[0][0];
       for (int i = 0; i < 36; ++i) {
         response[i / 6][i % 6] *= shares[s].share;
@@ -195,7 +195,7 @@ TEST(what_is_outside_is_brought_back_or_refused)
       }
       CHECK(point == (inside ? HAPI_ADMITTANCE_GOOD : HAPI_ADMITTANCE_CLIPPED));
       CHECK(all == (inside ? HAPI_ADMITTANCE_GOOD : HAPI_ADMITTANCE_CLIPPED));
-      CHECK_NEAR(along(a, arm, normal) / whole, shares[s].becomes, 1e-9);
+      CHECK_NEAR(accelerance_along(a, arm, normal) / whole, shares[s].becomes, 1e-9);
       CHECK_NEAR(response[0][0] / scale, shares[s].becomes, 1e-9);
     }
   }
@@ -226,7 +226,8 @@ TEST(numbers_that_are_none_are_refused_and_nothing_is_changed)
   }
 }
 
-/* Noise of any size: what comes out obeys the bounds for every direction, and is not touched again. */
+/* Noise of any size: what comes out obeys the bounds for every direction, and is not touched
+ * again. */
 TEST(the_bounds_hold_for_every_direction)
 {
   int seen[3] = {0};
@@ -267,7 +268,8 @@ TEST(the_bounds_hold_for_every_direction)
   CHECK(seen[0] > 50 && seen[1] > 50 && seen[2] > 50);
 }
 
-/* A cube that slides along x, mu 0.5: pressed upon it slows down, pushed along it does not press. */
+/* A cube that slides along x, mu 0.5: pressed upon it slows down, pushed along it does not
+ * press. */
 TEST(what_friction_does_is_kept)
 {
   hapi_free_body body = {.inverse_mass = 2.0, .inverse_inertia = {3, 0, 0, 0, 3, 0, 0, 0, 3}};
@@ -284,9 +286,10 @@ TEST(what_friction_does_is_kept)
 
 /* ---- another body ---- */
 
-/* Of two bodies that constraints tie together: what a force at an arm of the first does to the second. */
-static void tied(const hapi_free_body bodies[2], int constraints, const double arm[3],
-                 double out[6][3])
+/* Of two bodies that constraints tie together: what a force at an arm of the first does to the
+ * second. */
+static void bodies_tied(const hapi_free_body bodies[2], int constraints, const double arm[3],
+                        double out[6][3])
 {
   double r[12][12] = {{0.0}};
   double second[6][6];
@@ -335,7 +338,7 @@ TEST(what_ties_a_body_to_another_is_left_alone)
     double share = -1.0;
     random_vector(arm);
     hapi_v3_scale(size, arm, arm);
-    tied(bodies, round % 11, arm, a);
+    bodies_tied(bodies, round % 11, arm, a);
     memcpy(before, a, sizeof a);
     CHECK(hapi_admittance_tidy_cross(&bodies[0], arm, &bodies[1], a, &share) ==
           HAPI_ADMITTANCE_GOOD);
@@ -378,8 +381,8 @@ TEST(a_block_that_cannot_be_is_cut_or_refused)
 
 /* ---- in a world ---- */
 
-/* A probe whose force is so small that it drowns in the rounding of the velocity: a cube at 1 m/s gets
- * one unit in the last place where it should have got 0.6. */
+/* A probe whose force is so small that it drowns in the rounding of the velocity: a cube at 1
+ * m/s gets one unit in the last place where it should have got 0.6. */
 TEST(a_singular_probe_keeps_the_last_good_one)
 {
   test_world *w = world_new(0.0, 20);
@@ -452,8 +455,9 @@ static void check_responses(test_world *w, int *measured)
   }
 }
 
-/* A cube pressed 0.2 mm into two walls and the floor, or one held by two hinges that are the same and
- * a fixed joint: more constraints than the body has ways to move, and CFM 0. Data of a geom, or NULL. */
+/* A cube pressed 0.2 mm into two walls and the floor, or one held by two hinges that are the
+ * same and a fixed joint: more constraints than the body has ways to move, and CFM 0. Data of a
+ * geom, or NULL. */
 static dTriMeshDataID build_overdetermined(test_world *w, bool walls)
 {
   dBodyID cube = world_add_cube(w, 0.1, 1.0, 0.0, 0.0, 0.05);
@@ -532,8 +536,8 @@ static void random_spd(double out[6][6])
   }
 }
 
-/* held of rows w with softness c that do not meet each other: sum w w^T / (w free w + c), with each made
- * orthogonal to those before it. */
+/* held of rows w with softness c that do not meet each other: sum w w^T / (w free w + c), with
+ * each made orthogonal to those before it. */
 static void hold_by(const double free[6][6], double rows[6][6], const double softness[6], int count,
                     double out[6][6])
 {

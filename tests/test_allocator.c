@@ -13,12 +13,12 @@
 
 /* ---- session ---- */
 
-static bool create(stage *s)
+static bool stage_try(stage *s)
 {
   hap_status status = stage_create(s);
   CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
   CHECK((s->session != NULL) == (status == HAP_OK));
-  CHECK(status == HAP_OK || has(s->detail.text, "no memory"));
+  CHECK(status == HAP_OK || text_has(s->detail.text, "no memory"));
   return status == HAP_OK;
 }
 
@@ -29,7 +29,7 @@ static bool work_create(void)
   for (int i = 1; i < 100; ++i) { /* the table of bodies has to grow */
     (void)add_cube(s, 0.2 * i, NULL);
   }
-  bool good = create(s);
+  bool good = stage_try(s);
   stage_end(s);
   return good;
 }
@@ -51,7 +51,7 @@ static bool run_all(hap_drive drive)
   dBodySetAutoDisableAverageSamplesCount(s->cube, 5);
   hap_status status = hap_device_open("virtual:path=0:-0.1/0/0;0.1:-0.05/0/0", &device, &s->detail);
   CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
-  bool good = status == HAP_OK && create(s);
+  bool good = status == HAP_OK && stage_try(s);
   if (good) {
     hap_pointer_def_init(&def, sizeof def);
     def.device = device;
@@ -102,7 +102,7 @@ static bool work_grow(void)
   long fail_at = atomic_load(&heap.fail_at);
   int on = atomic_load(&heap.fail_on);
   fail_from_now(0, 0);
-  bool good = create(s) && hap_session_start(s->session) == HAP_OK;
+  bool good = stage_try(s) && hap_session_start(s->session) == HAP_OK;
   fail_from_now(fail_at, on);
   for (int i = 1; good && i < 200; ++i) {
     (void)add_cube(s, 0.2 * i, NULL);
@@ -157,7 +157,7 @@ static bool open_device(const char *spec)
   hap_status status = hap_device_open(spec, &device, &detail);
   CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
   CHECK((device != NULL) == (status == HAP_OK));
-  CHECK(status == HAP_OK || has(detail.text, "memory"));
+  CHECK(status == HAP_OK || text_has(detail.text, "memory"));
   hap_device_close(device);
   return status == HAP_OK;
 }
@@ -215,7 +215,7 @@ static bool run_recording(hap_drive drive, hap_player *player)
   hap_pointer_def_init(&hand, sizeof hand);
   hap_record_def_init(&def, sizeof def);
   def.path = recording;
-  bool good = create(s);
+  bool good = stage_try(s);
   hap_status status = HAP_OK;
   if (good && player != NULL) {
     status = hap_session_play(s->session, player, &s->detail);

@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Whole runs with the first, the second, the third ... allocation failing, alone and with all behind
- * it: every model, drive and kind of pointer. What failed for want of memory works once there is
- * some, and what a session cannot see for want of memory it leaves alone. */
+/* Whole runs with the first, the second, the third ... allocation failing, alone and with all
+ * behind it: every model, drive and kind of pointer. What failed for want of memory works once
+ * there is some, and what a session cannot see for want of memory it leaves alone. */
 
 #include "tests/files.h"
 #include "tests/tap.h"
@@ -78,7 +78,7 @@ static bool good_or_starved(hap_status status)
 }
 
 /* One more pointer comes and goes, in another model; what was traced is read. */
-static bool use(rig *r)
+static bool rig_use(rig *r)
 {
   hap_pointer_def def;
   hap_pointer_id id;
@@ -102,7 +102,7 @@ static bool start_and_use(rig *r)
   bool good = good_or_starved(hap_session_start(r->session));
   if (good) {
     go_on(r);
-    good = use(r);
+    good = rig_use(r);
     CHECK(hap_session_stop(r->session) == HAP_OK);
   }
   return good;
@@ -132,7 +132,7 @@ static bool work_run(void)
   options_of(&now, &options);
   hap_status status = rig_create(&options, &r, &detail);
   if (!good_or_starved(status)) {
-    CHECK(has(detail.text, "memory") && r.session == NULL && r.scene == NULL);
+    CHECK(text_has(detail.text, "memory") && r.session == NULL && r.scene == NULL);
     return false;
   }
   bool good = start_and_use(&r);

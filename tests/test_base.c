@@ -145,7 +145,7 @@ typedef struct contest {
 } contest;
 
 /* Takes the lock again as soon as it has given it, as an overloaded physics thread does. */
-static void *hog(void *arg)
+static void *lock_hog(void *arg)
 {
   contest *c = arg;
   while (atomic_load(&c->stop) == 0) {
@@ -166,7 +166,7 @@ TEST(fair_lock_lets_a_waiter_in_after_one_round_of_a_busy_holder)
   memset(&c, 0, sizeof c);
   pthread_t thread;
   REQUIRE(hapi_fair_lock_init(&c.lock));
-  REQUIRE(pthread_create(&thread, NULL, hog, &c) == 0);
+  REQUIRE(pthread_create(&thread, NULL, lock_hog, &c) == 0);
   unsigned long long worst = 0;
   for (int i = 0; i < 200; ++i) {
     /* Counted from the moment this thread is in the queue: one round may be running then, and the
@@ -186,7 +186,7 @@ TEST(fair_lock_lets_a_waiter_in_after_one_round_of_a_busy_holder)
   hapi_fair_lock_finish(&c.lock);
 }
 
-static void *adder(void *arg)
+static void *count_adder(void *arg)
 {
   contest *c = arg;
   for (int i = 0; i < 3000; ++i) {
@@ -208,7 +208,7 @@ TEST(fair_lock_excludes)
   pthread_t threads[THREADS];
   REQUIRE(hapi_fair_lock_init(&c.lock));
   for (int i = 0; i < THREADS; ++i) {
-    REQUIRE(pthread_create(&threads[i], NULL, adder, &c) == 0);
+    REQUIRE(pthread_create(&threads[i], NULL, count_adder, &c) == 0);
   }
   for (int i = 0; i < THREADS; ++i) {
     pthread_join(threads[i], NULL);
@@ -234,7 +234,7 @@ static void *queue_up(void *arg)
   return NULL;
 }
 
-static unsigned waiters(hapi_fair_lock *lock)
+static unsigned lock_waiters(hapi_fair_lock *lock)
 {
   pthread_mutex_lock(&lock->mutex);
   unsigned count = lock->count;
@@ -244,7 +244,7 @@ static unsigned waiters(hapi_fair_lock *lock)
 
 static void wait_for_waiters(hapi_fair_lock *lock, unsigned count)
 {
-  for (int i = 0; i < 5000 && waiters(lock) != count; ++i) {
+  for (int i = 0; i < 5000 && lock_waiters(lock) != count; ++i) {
     hapi_clock_sleep_until(hapi_clock_now() + MS);
   }
 }

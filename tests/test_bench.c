@@ -13,7 +13,7 @@
 #include "tools/plot.h"
 
 /* Into the folder, which is empty before; the exit code. */
-static int bench(const char *format, ...)
+static int bench_run(const char *format, ...)
 {
   char arguments[1000];
   va_list list;
@@ -68,7 +68,7 @@ static void check_picture(const char *name)
 
 static void check_program(const char *name, const char *header, int rows_least)
 {
-  REQUIRE(bench("%s --quick", name) == 0);
+  REQUIRE(bench_run("%s --quick", name) == 0);
   CHECK(table_rows(name, header) >= rows_least);
   check_picture(name);
 }
@@ -81,7 +81,7 @@ TEST(fig5_leaves_its_tables)
 
 TEST(fig5_is_as_the_paper_and_the_closed_form_say)
 {
-  CHECK(bench("fig5 --verify --quick") == 0);
+  CHECK(bench_run("fig5 --verify --quick") == 0);
   CHECK(said_lines("ok ") >= 24);
   CHECK(said_lines("fig5: 0 off") == 1);
 }
@@ -90,12 +90,12 @@ TEST(fig5_is_as_the_paper_and_the_closed_form_say)
   "scene,effect,state,reason,tick_us,physics_ms,instructions,contact_us,total_ms,force_rel," \
   "model,own_tick_us,own_physics_ms,own_contact_us"
 
-/* A scene of which each effect is measured: in model contact 12 are on, off and auto beside all of them, in
- * accelerance five, of which testing cannot be off. Instructions are no time; without valgrind they are not
- * counted. */
+/* A scene of which each effect is measured: in model contact 12 are on, off and auto beside all
+ * of them, in accelerance five, of which testing cannot be off. Instructions are no time;
+ * without valgrind they are not counted. */
 TEST(effects_are_alike_and_leave_no_code)
 {
-  CHECK(bench("effects --quick --verify --scene slide") == 0);
+  CHECK(bench_run("effects --quick --verify --scene slide") == 0);
   CHECK(said_lines("ok   slide, contact: force of auto is") == 1);
   CHECK(said_lines("ok   slide, accelerance: force of auto is") == 1);
   CHECK(said_lines("skip instructions are not counted") == 1 ||
@@ -106,14 +106,14 @@ TEST(effects_are_alike_and_leave_no_code)
 
 TEST(effects_knows_its_scenes)
 {
-  CHECK(bench("effects --scene slides") == 1);
+  CHECK(bench_run("effects --scene slides") == 1);
   CHECK(said_lines("slides") == 1);
 }
 
 /* Of the checks those that are no times hold on every machine. */
 TEST(edits_leaves_its_table)
 {
-  int status = bench("edits --quick --verify");
+  int status = bench_run("edits --quick --verify");
   CHECK(status == 0 || status == 1);
   CHECK(said_lines(" 0 bad, 0 devices not released, 0 faults, 0 wrong") == 3);
   CHECK(said_lines("ok     momentum: hands gave") == 3);
@@ -138,7 +138,7 @@ TEST(fig7_leaves_its_table)
 /* Of the checks those that are no times hold on every machine. */
 TEST(spidar_numerics_hold)
 {
-  int status = bench("spidar --quick --verify");
+  int status = bench_run("spidar --quick --verify");
   CHECK(status == 0 || status == 1);
   CHECK(said_lines("ok ") >= 7 * 6);
   CHECK(table_rows("spidar",
@@ -153,7 +153,7 @@ TEST(spidar_numerics_hold)
 /* Its share of late ticks is the machine's; that all were answered is not. */
 TEST(the_line_of_a_spidar_is_measured)
 {
-  CHECK(bench("line --quick --verify") == 0);
+  CHECK(bench_run("line --quick --verify") == 0);
   CHECK(said_lines("ok   line: two B3M: 0 of 2000 ticks failed") == 1);
   CHECK(said_lines("ok   line: one B5M: 0 of 2000 ticks failed") == 1);
   CHECK(said_lines("by the machine alone (too few to judge)") == 2);
@@ -183,7 +183,7 @@ TEST(jitter_leaves_its_table)
 
 TEST(poses_are_drawn_within_their_bound)
 {
-  CHECK(bench("poses --verify --quick") == 0);
+  CHECK(bench_run("poses --verify --quick") == 0);
   CHECK(said_lines("poses: 0 off") == 1);
   CHECK(table_rows("poses",
                    "scene,model,physics_hz,frame_hz,frames,moved_mm,gap_mm,hand_mm,"
@@ -194,7 +194,7 @@ TEST(poses_are_drawn_within_their_bound)
 
 TEST(couplings_are_side_by_side)
 {
-  CHECK(bench("couplings --verify --quick") == 0);
+  CHECK(bench_run("couplings --verify --quick") == 0);
   CHECK(said_lines("couplings: 0 off") == 1);
   CHECK(table_rows("couplings",
                    "coupling,scene,force_rel_rms,torque_rel_rms,peak_ratio,penetration_mm,tick_us,"
@@ -204,8 +204,9 @@ TEST(couplings_are_side_by_side)
 
 TEST(impedance_is_that_of_the_closed_forms)
 {
-  CHECK(bench("impedance --verify --quick") == 0);
-  /* Two of each of six bodies direct and through a proxy, two of each of four walls of four devices. */
+  CHECK(bench_run("impedance --verify --quick") == 0);
+  /* Two of each of six bodies direct and through a proxy, two of each of four walls of four
+   * devices. */
   CHECK(said_lines("ok ") == 2 * 2 * 6 + 2 * 4 * 4);
   CHECK(said_lines("impedance: 0 off") == 1);
   CHECK(table_rows("impedance",
@@ -277,7 +278,7 @@ TEST(accuracy_sets_models_side_by_side)
     ROWS = sizeof rows / sizeof rows[0]
   };
   double errors[ROWS];
-  REQUIRE(bench("accuracy --quick --scene slide") == 0);
+  REQUIRE(bench_run("accuracy --quick --scene slide") == 0);
   CHECK(lines_with(file_text(csv_path("accuracy")), ",default,") == DEFAULTS);
   for (int i = 0; i < ROWS; ++i) {
     errors[i] = force_error(rows[i]);
@@ -303,7 +304,7 @@ TEST(accuracy_sets_models_side_by_side)
 
 TEST(accuracy_says_how_far_joints_open)
 {
-  REQUIRE(bench("accuracy --quick --verify --scene lever") == 0);
+  REQUIRE(bench_run("accuracy --quick --verify --scene lever") == 0);
   CHECK(table_rows("accuracy", ACCURACY_COLUMNS) > 0);
   CHECK(said_lines("ok   lever at 20 Hz: joints open by") == 1);
   CHECK(said_lines("ok   lever at 60 Hz: joints open by") == 1);
@@ -311,15 +312,15 @@ TEST(accuracy_says_how_far_joints_open)
 
 TEST(accuracy_knows_its_scenes)
 {
-  CHECK(bench("accuracy --scene slides") == 1);
+  CHECK(bench_run("accuracy --scene slides") == 1);
   CHECK(said_lines("slides") == 1);
 }
 
 /* The whole map takes minutes; a part of it has no picture. */
 TEST(stability_of_some_points_alone)
 {
-  REQUIRE(bench("stability --quick --only "
-                "stiffness=1,mass=1e-3/2,contacts=8,layout=cage,coupling=proxy/auto") == 0);
+  REQUIRE(bench_run("stability --quick --only "
+                    "stiffness=1,mass=1e-3/2,contacts=8,layout=cage,coupling=proxy/auto") == 0);
   const char *text = file_text(csv_path("stability"));
   CHECK(lines_with(text, "implicit+proxy,1,0.001,8,1,") == 2);
   CHECK(lines_with(text, "") == 3); /* the header as well */
@@ -331,10 +332,10 @@ TEST(stability_knows_its_points)
   static const char *const wrong[] = {
       "stiff=1", "mass", "mass=", "mass=1/", "mass=1x", "hand=,body=cube"};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
-    CHECK(bench("stability --only %s", wrong[i]) == 1);
+    CHECK(bench_run("stability --only %s", wrong[i]) == 1);
     CHECK(said_lines("keys are integrator, stiffness") == 1);
   }
-  CHECK(bench("stability --only mass=3") == 1);
+  CHECK(bench_run("stability --only mass=3") == 1);
   CHECK(said_lines("no such point") == 1);
 }
 

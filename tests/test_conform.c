@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-run --check-device: a device with one fault is caught by the line that is meant, and by no other
- * one. HAPODE_RUN, HAPODE_BROKEN, HAPODE_SKELETON: paths of the program and of the modules. */
+/* hapode-run --check-device: a device with one fault is caught by the line that is meant, and by
+ * no other one. HAPODE_RUN, HAPODE_BROKEN, HAPODE_SKELETON: paths of the program and of the
+ * modules. */
 
 #include "tests/program.h"
 #include "tests/tap.h"
@@ -34,12 +35,12 @@ static bool await_line(const char *line)
 }
 
 /* Exit code. */
-static int check(const char *spec, const char *options)
+static int device_check(const char *spec, const char *options)
 {
   return program_finish(check_start(spec, options));
 }
 
-static const char *broken(const char *fault)
+static const char *broken_check(const char *fault)
 {
   static char spec[600];
   snprintf(spec, sizeof spec, "module:%s,break=%s", getenv("HAPODE_BROKEN"), fault);
@@ -56,7 +57,7 @@ static bool caught_by(const char *point)
   return one;
 }
 
-static void show(void)
+static void output_show(void)
 {
   for (const char *line = strtok(ran.out, "\n"); line != NULL; line = strtok(NULL, "\n")) {
     printf("#   %s\n", line);
@@ -126,24 +127,24 @@ static const struct {
 TEST(each_fault_is_caught_by_its_line_alone)
 {
   for (size_t i = 0; i < sizeof faults / sizeof faults[0]; ++i) {
-    int code = check(broken(faults[i].fault), "");
+    int code = device_check(broken_check(faults[i].fault), "");
     bool good = code == 1 && caught_by(faults[i].point) &&
                 lines_from(ran.out, "ok ") + lines_from(ran.out, "not ok ") == POINTS;
     CHECK(good);
     if (!good) {
       printf("# %s, for %s: exit code %d\n", faults[i].fault, faults[i].point, code);
-      show();
+      output_show();
     }
   }
 }
 
 TEST(without_a_fault_every_point_holds)
 {
-  int code = check(broken("none"), "");
+  int code = device_check(broken_check("none"), "");
   CHECK(code == 0 && lines_from(ran.out, "not ok") == 0 && lines_from(ran.out, "ok ") == POINTS);
   CHECK(lines_from(ran.out, "1..33") == 1);
   if (code != 0) {
-    show();
+    output_show();
   }
 }
 
@@ -151,16 +152,16 @@ TEST(without_a_fault_every_point_holds)
 
 TEST(a_device_that_hangs_is_given_up_with_its_line)
 {
-  CHECK(check(broken("read_hangs"), "") == 1);
+  CHECK(device_check(broken_check("read_hangs"), "") == 1);
   CHECK(strstr(ran.out, "# read has not come back\nnot ok 8 - read_status\nBail out!") != NULL ||
         strstr(ran.out, "# read has not come back\nnot ok 6 - ") != NULL);
-  CHECK(check(broken("zero_locks"), "") == 1);
+  CHECK(device_check(broken_check("zero_locks"), "") == 1);
   CHECK(caught_by("zero_in_a_signal_handler") && strstr(ran.out, "Bail out!") != NULL);
 }
 
 /* ---- what may be asked for ---- */
 
-static int skips(const char *reason)
+static int output_skips(const char *reason)
 {
   int count = 0;
   for (const char *at = ran.out; (at = strstr(at, reason)) != NULL; ++at) {
@@ -171,33 +172,33 @@ static int skips(const char *reason)
 
 TEST(a_check_without_force_asks_for_none)
 {
-  CHECK(check(broken("refuses_all_force"), "--check-force 0") == 0);
-  CHECK(lines_from(ran.out, "not ok") == 0 && skips("# SKIP a check without force") >= 4);
-  CHECK(skips("what this check must not ask for") == 0);
-  CHECK(check(broken("refuses_all_force"), "") == 1); /* the fault is one */
+  CHECK(device_check(broken_check("refuses_all_force"), "--check-force 0") == 0);
+  CHECK(lines_from(ran.out, "not ok") == 0 && output_skips("# SKIP a check without force") >= 4);
+  CHECK(output_skips("what this check must not ask for") == 0);
+  CHECK(device_check(broken_check("refuses_all_force"), "") == 1); /* the fault is one */
 }
 
 TEST(a_device_in_real_time_gets_small_forces_alone)
 {
-  CHECK(check(broken("refuses_much_force,pacing=host"), "") == 0);
-  CHECK(lines_from(ran.out, "not ok") == 0 && skips("# SKIP only with --check-limits") == 2);
-  CHECK(skips("what this check must not ask for") == 0);
-  CHECK(check(broken("refuses_much_force,pacing=host"), "--check-limits") == 1);
-  CHECK(skips("what this check must not ask for") > 0);
+  CHECK(device_check(broken_check("refuses_much_force,pacing=host"), "") == 0);
+  CHECK(lines_from(ran.out, "not ok") == 0 && output_skips("# SKIP only with --check-limits") == 2);
+  CHECK(output_skips("what this check must not ask for") == 0);
+  CHECK(device_check(broken_check("refuses_much_force,pacing=host"), "--check-limits") == 1);
+  CHECK(output_skips("what this check must not ask for") > 0);
 }
 
 TEST(a_device_that_runs_away_is_let_go)
 {
-  CHECK(check(broken("runs_away,pacing=host"), "") == 1);
+  CHECK(device_check(broken_check("runs_away,pacing=host"), "") == 1);
   CHECK(caught_by("reached_is_plausible"));
   CHECK(strstr(ran.out, "moved more than 50 mm") != NULL);
   CHECK(strstr(ran.out, "Bail out! the force was taken off") != NULL);
-  CHECK(skips("what this check must not ask for") == 0);
+  CHECK(output_skips("what this check must not ask for") == 0);
 }
 
 TEST(a_stop_in_the_countdown_energises_nothing)
 {
-  pid_t child = check_start(broken("start_fails,pacing=host"), "--check-wait 600");
+  pid_t child = check_start(broken_check("start_fails,pacing=host"), "--check-wait 600");
   CHECK(child > 0 && await_line("\nok 1 - open") && kill(child, SIGINT) == 0);
   CHECK(program_finish(child) == 1);
   CHECK(lines_from(ran.out, "ok ") == 1 && lines_from(ran.out, "not ok") == 0);
@@ -206,22 +207,22 @@ TEST(a_stop_in_the_countdown_energises_nothing)
 
 TEST(a_device_with_a_clock_of_its_own_is_waited_for)
 {
-  int code = check(broken("none,pacing=device"), "--check-limits");
+  int code = device_check(broken_check("none,pacing=device"), "--check-limits");
   CHECK(code == 0 && lines_from(ran.out, "not ok") == 0);
   if (code != 0) {
-    show();
+    output_show();
   }
-  CHECK(check(broken("read_is_slow,pacing=device"), "") == 1);
+  CHECK(device_check(broken_check("read_is_slow,pacing=device"), "") == 1);
   CHECK(caught_by("read_comes_back_in_time"));
 }
 
 TEST(a_device_is_followed_through_its_plug)
 {
-  int code = check(broken("unplugged"), "--check-unplug 3");
+  int code = device_check(broken_check("unplugged"), "--check-unplug 3");
   printf("# exit code %d\n", code);
   CHECK(lines_from(ran.out, "ok 33 - unplugged") == 1 &&
         lines_from(ran.out, "ok 33 - unplugged # SKIP") == 0);
-  CHECK(check(broken("none"), "--check-unplug 3") == 1 && caught_by("unplugged"));
+  CHECK(device_check(broken_check("none"), "--check-unplug 3") == 1 && caught_by("unplugged"));
   CHECK(strstr(ran.out, "nobody unplugged it") != NULL);
 }
 
@@ -229,24 +230,24 @@ TEST(a_device_is_followed_through_its_plug)
 
 TEST(a_device_that_does_not_open_is_said)
 {
-  CHECK(check("module:/nowhere/libfoo.so", "") == 1);
+  CHECK(device_check("module:/nowhere/libfoo.so", "") == 1);
   CHECK(strstr(ran.out, "# module /nowhere/libfoo.so: cannot be opened") != NULL);
   CHECK(strstr(ran.out, "not ok 1 - open\nBail out!") != NULL);
-  CHECK(check("no_such_device", "") == 1);
+  CHECK(device_check("no_such_device", "") == 1);
   CHECK(strstr(ran.out, "there are: virtual, replay, spidar, module") != NULL);
-  CHECK(check(getenv("HAPODE_BROKEN"), "") == 1); /* no name before the path */
+  CHECK(device_check(getenv("HAPODE_BROKEN"), "") == 1); /* no name before the path */
 }
 
 TEST(options_that_do_not_go_together_are_refused)
 {
-  CHECK(check("virtual", "--device virtual") == 2);
-  CHECK(check("virtual", "--check-force 5") == 2);
+  CHECK(device_check("virtual", "--device virtual") == 2);
+  CHECK(device_check("virtual", "--check-force 5") == 2);
 }
 
 /* Ctrl-C, in the middle. */
 TEST(a_signal_ends_it_with_the_force_off)
 {
-  pid_t child = check_start(broken("none,pacing=host"), "--check-unplug 600");
+  pid_t child = check_start(broken_check("none,pacing=host"), "--check-unplug 600");
   CHECK(child > 0 && await_line("\nok 15 - ") && kill(child, SIGINT) == 0);
   CHECK(program_finish(child) == 1);
   CHECK(strstr(ran.out, "Bail out! stopped") != NULL);

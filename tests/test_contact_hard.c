@@ -15,7 +15,7 @@
 
 #define G CW_GRAVITY
 
-static double distance(const double a[3], const double b[3])
+static double points_distance(const double a[3], const double b[3])
 {
   double apart[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   return cw_norm(apart);
@@ -46,13 +46,13 @@ TEST(a_body_falls_asleep_beside_the_hand_and_wakes_when_touched)
   cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.03);
   REQUIRE(cw_start(w, -0.045, 0.0, 0.03));
   cw_run(w, 1001);
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK(count_awake(w) == 0);
   double where[3];
   memcpy(where, w->position[0], sizeof where);
   cw_run(w, 1000);
   CHECK(count_awake(w) == 0);
-  CHECK(distance(where, w->position[0]) == 0.0);
+  CHECK(points_distance(where, w->position[0]) == 0.0);
   cw_go(w, 0.1, 0.0, 0.0, 200);
   CHECK(count_awake(w) == 1);
   CHECK(w->position[0][0] > 0.005);
@@ -89,9 +89,9 @@ TEST(a_tower_falls_asleep_in_its_whole)
   }
   REQUIRE(cw_start(w, -0.045, 0.0, 0.15));
   cw_run(w, 2001);
-  printf("# %d awake, range %u .. %u\n", count_awake(w), w->range_min, w->range_max);
+  printf("# %d awake, range %u .. %u\n", count_awake(w), w->seen.range_min, w->seen.range_max);
   CHECK(count_awake(w) == 0);
-  CHECK(w->range_min == 5);
+  CHECK(w->seen.range_min == 5);
   for (int i = 0; i < 5; ++i) {
     CHECK(fabs(w->position[i][0]) < 1e-4);
   }
@@ -115,7 +115,7 @@ TEST(the_range_is_the_touched_island_when_it_fits)
   hap_stats stats = cw_stats(w);
   CHECK(stats.model.range_bodies == 6 && stats.model.edge_bodies == 0 &&
         stats.model.measured_bodies == 0);
-  CHECK(w->range_min == 6 && w->range_max == 6);
+  CHECK(w->seen.range_min == 6 && w->seen.range_max == 6);
 }
 
 /* Outside of the range a body does not wake: the nearest three answer at once. */
@@ -164,8 +164,9 @@ static void fly_past(double hz, double gravity)
     for (int k = 0; k < 12; ++k) {
       double wanted[3] = {start[k][0], start[k][1] + 0.3 * t, start[k][2]};
       double speed[3] = {0.0, 0.3, 0.0};
-      worst_place = fmax(worst_place, distance(dBodyGetPosition(w->bodies[k]), wanted));
-      worst_speed = fmax(worst_speed, distance(dBodyGetLinearVel(w->bodies[k]), speed) / 0.3);
+      worst_place = fmax(worst_place, points_distance(dBodyGetPosition(w->bodies[k]), wanted));
+      worst_speed =
+          fmax(worst_speed, points_distance(dBodyGetLinearVel(w->bodies[k]), speed) / 0.3);
     }
     owned += cw_stats(w).model.range_bodies;
   }
@@ -188,7 +189,7 @@ TEST(what_enters_and_leaves_the_range_keeps_its_motion)
 
 /* ---- fast things come in from outside ---- */
 
-static void hit(double speed, double hz)
+static void wall_hit(double speed, double hz)
 {
   contact_world *w = cw_new(0.0);
   w->surface.mu = 0.0;
@@ -212,8 +213,8 @@ TEST(a_ball_that_flies_in_hits_what_is_near_the_hand)
 {
   static const double speeds[] = {0.3, 1.0, 3.0, 6.0};
   for (int i = 0; i < 4; ++i) {
-    hit(speeds[i], 20.0);
-    hit(speeds[i], 60.0);
+    wall_hit(speeds[i], 20.0);
+    wall_hit(speeds[i], 60.0);
   }
 }
 
@@ -264,8 +265,8 @@ TEST(a_body_moved_by_the_application_stays_where_it_was_put)
   const double wanted[3] = {0.0, 0.02, 0.5 + 0.1 * 0.1};
   /* the loop's push of the one tick until it hears of it is the body's */
   const double speed[3] = {0.0, 0.0, 0.1};
-  CHECK(distance(dBodyGetPosition(w->bodies[0]), wanted) < 6e-3);
-  CHECK(distance(dBodyGetLinearVel(w->bodies[0]), speed) < 5e-3);
+  CHECK(points_distance(dBodyGetPosition(w->bodies[0]), wanted) < 6e-3);
+  CHECK(points_distance(dBodyGetLinearVel(w->bodies[0]), speed) < 5e-3);
   CHECK(cw_norm(w->force) == 0.0);
 }
 
@@ -333,7 +334,7 @@ TEST(a_body_added_in_front_of_another_is_pushed_with_it)
   CHECK(cw_stats(w).model.range_bodies == 2);
   CHECK(dBodyGetLinearVel(w->bodies[1])[0] > 0.03);
   CHECK(dBodyGetPosition(w->bodies[1])[0] - dBodyGetPosition(w->bodies[0])[0] > 0.0595);
-  CHECK_NEAR(w->momentum[0] / w->synced_impulse[0], 1.0, 5e-3);
+  CHECK_NEAR(w->seen.momentum[0] / w->seen.impulse[0], 1.0, 5e-3);
 }
 
 /* ---- ground of triangles ---- */
@@ -346,7 +347,7 @@ typedef struct mesh {
   dTriIndex indices[GRID * GRID * 6];
 } mesh;
 
-static double flat(double x, double y)
+static double ground_flat(double x, double y)
 {
   (void)x;
   (void)y;
@@ -354,7 +355,7 @@ static double flat(double x, double y)
 }
 
 /* Ridges along y, 0.1 m apart and 0.05 m high. */
-static double ridges(double x, double y)
+static double ground_ridges(double x, double y)
 {
   (void)y;
   double t = fmod(x + 10.0, 0.1) / 0.1;
@@ -405,7 +406,7 @@ static slide push_over(bool triangles)
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
   if (triangles) {
-    add_mesh(w, &m, 0.031, flat);
+    add_mesh(w, &m, 0.031, ground_flat);
   } else {
     cw_add_floor(w);
   }
@@ -427,9 +428,9 @@ static slide push_over(bool triangles)
   printf(
       "# triangles %d: %.4f N, %.4f .. %.4f, z %.5f .. %.5f, x %.3f, range %u, "
       "dropped %llu\n",
-      triangles, s.mean, s.least, s.most, s.lowest, s.highest, w->position[0][0], w->range_min,
+      triangles, s.mean, s.least, s.most, s.lowest, s.highest, w->position[0][0], w->seen.range_min,
       (unsigned long long)stats.model.capacity_dropped);
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK(stats.faults.count == 0);
   cw_close(w);
   if (triangles) {
@@ -455,7 +456,7 @@ TEST(a_ball_rolls_over_triangles_as_over_a_plane)
   double highest = 0.0;
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
-  add_mesh(w, &m, 0.031, flat);
+  add_mesh(w, &m, 0.031, ground_flat);
   cw_add_ball(w, 1.0, 0.03, -0.1, 0.013, 0.0299);
   dBodySetLinearVel(w->bodies[0], 0.2, 0.013, 0.0);
   dBodySetAngularVel(w->bodies[0], -0.013 / 0.03, 0.2 / 0.03, 0.0);
@@ -466,8 +467,8 @@ TEST(a_ball_rolls_over_triangles_as_over_a_plane)
     highest = fmax(highest, w->position[0][2]);
   }
   printf("# ball: v %.5f %.5f, z %.5f .. %.5f, range %u\n", w->velocity[0][0], w->velocity[0][1],
-         lowest, highest, w->range_min);
-  CHECK(w->range_min == 1 && cw_norm(w->force) == 0.0);
+         lowest, highest, w->seen.range_min);
+  CHECK(w->seen.range_min == 1 && cw_norm(w->force) == 0.0);
   CHECK_NEAR(w->velocity[0][0] / 0.2, 1.0, 0.01);
   CHECK_NEAR(w->velocity[0][1], 0.013, 0.01 * 0.2);
   CHECK(highest - lowest < 1.5e-4);
@@ -480,12 +481,13 @@ TEST(ridges_carry_a_box)
   static mesh m;
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
-  add_mesh(w, &m, 0.05, ridges);
+  add_mesh(w, &m, 0.05, ground_ridges);
   cw_add_box(w, 1.0, (const double[3]){0.24, 0.1, 0.04}, 0.01, 0.013, 0.0199);
   REQUIRE(cw_start(w, 0.01, 0.013, 0.055));
   cw_run(w, 1500);
-  printf("# ridges: x %.5f z %.5f, range %u\n", w->position[0][0], w->position[0][2], w->range_min);
-  CHECK(w->range_min == 1);
+  printf("# ridges: x %.5f z %.5f, range %u\n", w->position[0][0], w->position[0][2],
+         w->seen.range_min);
+  CHECK(w->seen.range_min == 1);
   CHECK_NEAR(w->position[0][2], 0.02, 1e-3);
   CHECK_NEAR(w->position[0][0], 0.01, 1e-3);
   cw_go(w, 0.0, 0.0, -0.02, 400);
@@ -495,7 +497,7 @@ TEST(ridges_carry_a_box)
   dGeomTriMeshDataDestroy(m.data);
 }
 
-static dReal heights(void *user, int x, int z)
+static dReal ground_height(void *user, int x, int z)
 {
   (void)user;
   (void)x;
@@ -507,7 +509,7 @@ TEST(a_ball_on_a_heightfield_is_measured_and_felt)
 {
   contact_world *w = cw_new(G);
   dHeightfieldDataID data = dGeomHeightfieldDataCreate();
-  dGeomHeightfieldDataBuildCallback(data, NULL, heights, 2.0, 2.0, 20, 20, 1.0, 0.0, 0.5, 0);
+  dGeomHeightfieldDataBuildCallback(data, NULL, ground_height, 2.0, 2.0, 20, 20, 1.0, 0.0, 0.5, 0);
   dGeomHeightfieldDataSetBounds(data, -0.1, 0.1);
   dGeomID field = dCreateHeightfield(w->space, data, 1);
   dMatrix3 rotation;
@@ -559,7 +561,7 @@ TEST(a_hull_slides_as_a_box_does)
     cw_tick(w);
     worst = fmax(worst, fabs(-w->force[0] / (0.5 * G) - 1.0));
   }
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK(worst < 0.02);
   CHECK_NEAR(w->position[0][2], 0.0399, 2e-4);
 }
@@ -580,7 +582,7 @@ TEST(a_body_of_several_geoms_in_a_nested_space_stands)
   }
   REQUIRE(cw_start(w, 0.0, 0.0, 0.075));
   cw_run(w, 500);
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK_NEAR(w->position[0][2], 0.05, 4e-4);
   cw_go(w, 0.0, 0.0, -0.02, 500);
   CHECK_NEAR(w->position[0][2], 0.05, 4e-4);
@@ -627,7 +629,7 @@ static struct {
   int twice;
 } asking;
 
-static bool ask(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool surface_ask(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   contact_world *w = user;
   for (int i = 0; i < asking.count; ++i) {
@@ -652,7 +654,7 @@ static void ask_in_pile(int range, int probes)
 {
   contact_world *w = cw_new(G);
   memset(&asking, 0, sizeof asking);
-  w->ode.surface = ask;
+  w->ode.surface = surface_ask;
   w->ode.before_step = forget_asked;
   w->def.max_bodies = range;
   w->expert.max_edge_probes = probes;
@@ -665,7 +667,7 @@ static void ask_in_pile(int range, int probes)
   } else {
     cw_go(w, 0.05, 0.0, 0.0, 500);
     printf("# range %d: %d pairs asked twice in a step, of %u steps\n", range, asking.twice,
-           w->steps);
+           w->seen.steps);
     CHECK(asking.twice == 0);
   }
   cw_close(w);
@@ -697,21 +699,21 @@ TEST(other_models_take_over_without_a_jump)
       double before[3];
       memcpy(before, dBodyGetPosition(w->bodies[0]), sizeof before);
       cw_run(w, 50);
-      double way = distance(before, dBodyGetPosition(w->bodies[0]));
+      double way = points_distance(before, dBodyGetPosition(w->bodies[0]));
       worst = fmax(worst, way - 0.05 * fmax(cw_norm(dBodyGetLinearVel(w->bodies[0])), 0.1));
     }
     printf("# %s: %.3g mm too far in a step, momentum %.5f of %.5f, speed %.3f, force %.2f\n",
-           m == 0 ? "contact" : hap_model_name(models[m - 1]), 1e3 * worst, w->momentum[0],
-           w->synced_impulse[0], dBodyGetLinearVel(w->bodies[0])[0], w->force[0]);
+           m == 0 ? "contact" : hap_model_name(models[m - 1]), 1e3 * worst, w->seen.momentum[0],
+           w->seen.impulse[0], dBodyGetLinearVel(w->bodies[0])[0], w->force[0]);
     CHECK(worst < 0.02);
     if (m < 5) {
       CHECK(hap_session_set_model(w->session, models[m]) == HAP_OK);
     }
   }
   cw_go(w, -0.5, 0.0, 0.0, 301);
-  printf("# momentum %.5f, impulse %.5f, stats %.5f\n", w->momentum[0], w->impulse[0],
+  printf("# momentum %.5f, impulse %.5f, stats %.5f\n", w->seen.momentum[0], w->impulse[0],
          cw_stats(w).hand.momentum_ratio);
-  CHECK_NEAR(w->momentum[0] / w->impulse[0], 1.0, 5e-3);
+  CHECK_NEAR(w->seen.momentum[0] / w->impulse[0], 1.0, 5e-3);
   CHECK(cw_stats(w).faults.count == 0);
 }
 

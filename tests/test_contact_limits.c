@@ -14,7 +14,7 @@
 #include "tests/contact_world.h"
 #include "tests/unknown_shape.h"
 
-static double height(const contact_world *w)
+static double cube_height(const contact_world *w)
 {
   return dBodyGetPosition(w->bodies[0])[2];
 }
@@ -35,7 +35,7 @@ TEST(a_session_that_starts_again_owns_what_it_owned)
   for (int round = 0; round < 4; ++round) {
     CHECK(hap_session_advance(w->session, round == 1 ? 51 : 120) == HAP_OK);
     CHECK(cw_stats(w).model.range_bodies == 1);
-    CHECK_NEAR(height(w), 0.025, 3e-4);
+    CHECK_NEAR(cube_height(w), 0.025, 3e-4);
     CHECK(hap_session_stop(w->session) == HAP_OK);
     CHECK(hap_session_start(w->session) >= HAP_OK);
     cw_put_hand(w, 0.0, 0.0, 0.0);
@@ -63,13 +63,13 @@ TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
     REQUIRE(cw_start(w, 0.0, 0.0, 0.065));
     CHECK(hap_session_advance(w->session, 1000) == HAP_OK);
     CHECK(cw_stats(w).model.range_bodies == (room != 0 ? 1u : 0u));
-    CHECK_NEAR(height(w), 0.025, 1e-3);
+    CHECK_NEAR(cube_height(w), 0.025, 1e-3);
     cw_close(w);
   }
 }
 
-/* Four cubes a millimetre apart: the floor's sixteen contacts have room, not those to the sides, which
- * come before them in the list. */
+/* Four cubes a millimetre apart: the floor's sixteen contacts have room, not those to the sides,
+ * which come before them in the list. */
 TEST(where_contacts_find_no_room_those_that_touch_are_kept)
 {
   contact_world *w = cw_new(CW_GRAVITY);
@@ -85,7 +85,7 @@ TEST(where_contacts_find_no_room_those_that_touch_are_kept)
       CHECK_NEAR(w->position[k][2], 0.025, 3e-4);
     }
   }
-  CHECK(w->range_max == 4);
+  CHECK(w->seen.range_max == 4);
   CHECK(cw_stats(w).model.capacity_dropped > 0);
 }
 
@@ -130,8 +130,8 @@ static bool find_side(const hapi_tick *tick, uint32_t index, uint32_t slot, row_
   return is_a || (!source->pointer && source->body_b == slot);
 }
 
-/* How many rows act on the body beside one of a pointer. What an N s of one makes of the other is what
- * one of the other makes of it. */
+/* How many rows act on the body beside one of a pointer. What an N s of one makes of the other
+ * is what one of the other makes of it. */
 static int check_body(const hapi_tick *tick, uint32_t slot)
 {
   int met = 0;
@@ -162,8 +162,8 @@ static int check_measured(const contact_world *w)
   return met;
 }
 
-/* A cube with a shape that the loop does not know, between the hand and another cube: rows that answered
- * each by a measurement of its own would make energy. */
+/* A cube with a shape that the loop does not know, between the hand and another cube: rows that
+ * answered each by a measurement of its own would make energy. */
 TEST(a_measured_body_answers_all_that_touch_it_alike)
 {
   int met = 0;
@@ -224,7 +224,7 @@ TEST(the_range_ends_after_so_many_contacts)
     }
     REQUIRE(cw_start(w, -0.036, 0.0, 0.025));
     cw_run(w, 200);
-    CHECK(w->range_min == bodies[i] && w->range_max == bodies[i]);
+    CHECK(w->seen.range_min == bodies[i] && w->seen.range_max == bodies[i]);
     CHECK(cw_stats(w).model.edge_bodies == (bodies[i] < 6 ? 1u : 0u));
     cw_close(w);
   }
@@ -248,13 +248,13 @@ TEST(what_hangs_together_is_one_hop)
     }
     REQUIRE(cw_start(w, -0.036, 0.0, 0.0));
     cw_run(w, 100);
-    CHECK(w->range_min == 3u + (uint32_t)hops && w->range_max == 3u + (uint32_t)hops);
+    CHECK(w->seen.range_min == 3u + (uint32_t)hops && w->seen.range_max == 3u + (uint32_t)hops);
     cw_close(w);
   }
 }
 
-/* A tower under a hand. A tick has two solves at most; two sweeps alone, without the direct solve that comes
- * next, leave it undone. */
+/* A tower under a hand. A tick has two solves at most; two sweeps alone, without the direct
+ * solve that comes next, leave it undone. */
 TEST(sweeps_are_no_more_than_asked)
 {
   static const int32_t most[] = {0, 2, 3, 10000};
@@ -270,7 +270,7 @@ TEST(sweeps_are_no_more_than_asked)
     REQUIRE(cw_start(w, 0.0, 0.0, 0.308));
     cw_run(w, 300);
     hap_stats stats = cw_stats(w);
-    CHECK(w->range_max == 6 && fabs(w->force[2]) > 1.0);
+    CHECK(w->seen.range_max == 6 && fabs(w->force[2]) > 1.0);
     sweeps[i] = (double)stats.contact.sweeps / (double)stats.loop.ticks;
     undone[i] = stats.contact.residual_max;
     cw_close(w);

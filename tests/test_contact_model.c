@@ -23,7 +23,7 @@ typedef struct bounce {
 } bounce;
 
 /* Dropped with its lowest point at a height, beside the hand. */
-static bounce drop(hap_model model, bool ball, double e, double threshold, double height)
+static bounce body_drop(hap_model model, bool ball, double e, double threshold, double height)
 {
   bounce b = {0.0, 0.0, 0};
   contact_world *w = cw_new(G);
@@ -53,7 +53,7 @@ static bounce drop(hap_model model, bool ball, double e, double threshold, doubl
       b.out = fmax(b.out, v);
     }
   }
-  b.owned = w->range_min;
+  b.owned = w->seen.range_min;
   cw_close(w);
   return b;
 }
@@ -63,7 +63,7 @@ TEST(half_of_the_speed_comes_back)
   static const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_SINGLE};
   for (int m = 0; m < 2; ++m) {
     for (int ball = 0; ball < 2; ++ball) {
-      bounce b = drop(models[m], ball == 1, 0.5, 0.1, 0.1);
+      bounce b = body_drop(models[m], ball == 1, 0.5, 0.1, 0.1);
       printf("# %s %s: in %.3f out %.3f\n", hap_model_name(models[m]), ball ? "ball" : "box", b.in,
              b.out);
       CHECK(b.in < -1.3);
@@ -76,7 +76,7 @@ TEST(half_of_the_speed_comes_back)
 TEST(nothing_comes_back_without_restitution)
 {
   for (int ball = 0; ball < 2; ++ball) {
-    bounce b = drop(HAP_MODEL_CONTACT, ball == 1, 0.0, 0.0, 0.1);
+    bounce b = body_drop(HAP_MODEL_CONTACT, ball == 1, 0.0, 0.0, 0.1);
     CHECK(b.in < -1.3 && b.out <= -0.02 * b.in);
     printf("# in %.3f out %.3f\n", b.in, b.out);
   }
@@ -84,8 +84,8 @@ TEST(nothing_comes_back_without_restitution)
 
 TEST(below_the_threshold_nothing_bounces)
 {
-  bounce slow = drop(HAP_MODEL_CONTACT, true, 0.8, 0.5, 0.4 * 0.4 / (2.0 * G));
-  bounce fast = drop(HAP_MODEL_CONTACT, true, 0.8, 0.5, 0.7 * 0.7 / (2.0 * G));
+  bounce slow = body_drop(HAP_MODEL_CONTACT, true, 0.8, 0.5, 0.4 * 0.4 / (2.0 * G));
+  bounce fast = body_drop(HAP_MODEL_CONTACT, true, 0.8, 0.5, 0.7 * 0.7 / (2.0 * G));
   printf("# slow %.3f %.3f fast %.3f %.3f\n", slow.in, slow.out, fast.in, fast.out);
   CHECK(slow.in < -0.35 && slow.out < 0.01);
   CHECK(fast.in < -0.6);
@@ -208,8 +208,8 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
 
 /* ---- momentum ---- */
 
-/* Frictionless cubes in a row, weightless, pushed for 0.4 s; the hand goes back, and 0.4 s later all
- * that it gave is in the world. */
+/* Frictionless cubes in a row, weightless, pushed for 0.4 s; the hand goes back, and 0.4 s later
+ * all that it gave is in the world. */
 static void push_row(int count, int range, int probes)
 {
   double worst = 0.0;
@@ -225,12 +225,12 @@ static void push_row(int count, int range, int probes)
   cw_move_hand(w, 0.1, 0.0, 0.0);
   for (int i = 0; i < 400; ++i) {
     cw_tick(w);
-    double error = fabs(w->momentum[0] - w->synced_impulse[0]);
+    double error = fabs(w->seen.momentum[0] - w->seen.impulse[0]);
     worst = fmax(worst, error);
   }
   cw_go(w, -0.3, 0.0, 0.0, 401);
   hap_stats stats = cw_stats(w);
-  double ratio = w->momentum[0] / w->impulse[0];
+  double ratio = w->seen.momentum[0] / w->impulse[0];
   printf("# N %d range %d probes %d: impulse %.4f, ratio %.5f, stats %.5f, worst on the way %.3g\n",
          count, range, probes, w->impulse[0], ratio, stats.hand.momentum_ratio,
          worst / w->impulse[0]);
@@ -350,8 +350,8 @@ static void spin_box(double speed, double angle_bound)
       sqrt(start[0] * start[0] + start[1] * start[1] + start[2] * start[2] + start[3] * start[3]);
   double angle = 2.0 * acos(fmin(1.0, dot / norm));
   printf("# %g rad/s: momentum %.2g, energy %.2g, angle %.3g rad; range %u\n", speed, worst_l,
-         worst_e, angle, w->range_min);
-  CHECK(w->range_min == 1);
+         worst_e, angle, w->seen.range_min);
+  CHECK(w->seen.range_min == 1);
   CHECK(cw_norm(w->force) == 0.0);
   CHECK(worst_l <= 1e-9);
   CHECK(worst_e <= 1e-3);
@@ -376,7 +376,7 @@ enum {
   CYLINDER
 };
 
-static void roll(int kind)
+static void body_roll(int kind)
 {
   const double radius = 0.05;
   dMass mass;
@@ -405,8 +405,8 @@ static void roll(int kind)
   double v = dBodyGetLinearVel(w->bodies[0])[0];
   double turning = dBodyGetAngularVel(w->bodies[0])[1];
   printf("# %d: %.5f m/s, after 1 s %.5f, w r %.5f, range %u\n", kind, before, v, turning * radius,
-         w->range_min);
-  CHECK(cw_norm(w->force) == 0.0 && w->range_min == 1);
+         w->seen.range_min);
+  CHECK(cw_norm(w->force) == 0.0 && w->seen.range_min == 1);
   CHECK(before > 0.15);
   CHECK_NEAR(v / before, 1.0, 0.01);
   CHECK_NEAR(turning * radius / v, 1.0, 1e-3);
@@ -416,9 +416,9 @@ static void roll(int kind)
 
 TEST(what_rolls_goes_on_rolling)
 {
-  roll(BALL);
-  roll(CAPSULE);
-  roll(CYLINDER);
+  body_roll(BALL);
+  body_roll(CAPSULE);
+  body_roll(CYLINDER);
 }
 
 /* ---- ODE's surface parameters ---- */
@@ -483,7 +483,7 @@ TEST(slip_is_a_speed_for_a_force)
         .slip2 = 0.3};
     w->direction[0] = 1.0;
     lay_box(w);
-    w->user_force[axis] = 2.0;
+    w->user.force[axis] = 2.0;
     REQUIRE(start_over_box(w));
     cw_run(w, 1000);
     CHECK_NEAR(w->velocity[0][axis] / ((axis == 0 ? 0.1 : 0.3) * 2.0 / 4.0), 1.0, 0.01);
@@ -501,7 +501,7 @@ TEST(a_belt_carries_a_box_at_its_speed)
   REQUIRE(start_over_box(w));
   cw_run(w, 500);
   double contact = w->velocity[0][1];
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK_NEAR(fabs(contact), 0.2, 1e-3);
   CHECK(fabs(w->velocity[0][0]) < 1e-3);
   w = cw_new(G);
@@ -539,7 +539,7 @@ TEST(a_soft_contact_sinks_by_its_spring)
       double k = 0.3 / (step * 2e-3) * (ball ? 1.0 : 4.0);
       double sink = half - w->position[0][2] - 1e-4;
       CHECK_NEAR(sink / (G / k), 1.0, 0.02);
-      CHECK(w->range_min == 1);
+      CHECK(w->seen.range_min == 1);
       cw_close(w);
     }
   }
@@ -593,7 +593,7 @@ TEST(a_body_comes_out_of_the_ground_without_energy)
     CHECK(fabs(w->velocity[0][2]) < 0.01);
     CHECK(w->position[0][2] > 0.0298 && w->position[0][2] < 0.0303);
     printf("# fastest %.3f, left %.4g m/s, z %.5f, range %u\n", fastest, w->velocity[0][2],
-           w->position[0][2], w->range_min);
+           w->position[0][2], w->seen.range_min);
     cw_close(w);
   }
 }
@@ -625,8 +625,8 @@ TEST(user_forces_act_every_tick)
 {
   contact_world *w = cw_new(0.0);
   cw_add_ball(w, 0.5, 0.03, 0.0, 0.0, 0.0);
-  w->user_force[0] = 0.3;
-  w->user_torque[1] = 1e-4;
+  w->user.force[0] = 0.3;
+  w->user.torque[1] = 1e-4;
   REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
   cw_run(w, 60);
   double worst = 0.0;
@@ -636,11 +636,11 @@ TEST(user_forces_act_every_tick)
     worst = fmax(worst, fabs(w->velocity[0][0] - before - 1e-3 * 0.3 / 0.5));
   }
   CHECK(worst < 1e-9);
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   double spun = dBodyGetAngularVel(w->bodies[0])[1];
   cw_run(w, 50);
   CHECK_NEAR(dBodyGetAngularVel(w->bodies[0])[1] - spun, 0.05 * 1e-4 / (0.4 * 0.5 * 9e-4), 1e-9);
-  w->user_force[0] = 0.0;
+  w->user.force[0] = 0.0;
   cw_run(w, 60);
   double before = w->velocity[0][0];
   cw_run(w, 100);
@@ -654,7 +654,7 @@ TEST(a_body_without_gravity_stays)
   dBodySetGravityMode(w->bodies[0], 0);
   REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
   cw_run(w, 500);
-  CHECK(w->range_min == 1);
+  CHECK(w->seen.range_min == 1);
   CHECK_NEAR(w->position[0][2], 0.1, 1e-12);
 }
 
@@ -678,7 +678,7 @@ static void bounce_on_hand(double stiffness, double mass)
     most = fmax(most, energy / first);
   }
   printf("# k %g m %g: energy at most %.5f, z %.5f, |x| %.2g, range %u\n", stiffness, mass, most,
-         w->position[0][2], fabs(w->position[0][0]), w->range_min);
+         w->position[0][2], fabs(w->position[0][0]), w->seen.range_min);
   CHECK(most <= 1.03);
   CHECK(isfinite(w->position[0][2]) && w->position[0][2] > 0.0);
   CHECK(cw_stats(w).faults.count == 0);
@@ -729,7 +729,7 @@ TEST(a_bounce_on_the_hand_gives_no_energy)
 }
 
 /* Between the floor and a hand that stands in it by half a millimetre. */
-static void squeeze(double stiffness, double damping)
+static void cube_squeeze(double stiffness, double damping)
 {
   contact_world *w = cw_new(G);
   w->hand_def.stiffness = stiffness;
@@ -756,11 +756,11 @@ static void squeeze(double stiffness, double damping)
 
 TEST(a_gram_squeezed_onto_the_floor_stays_there)
 {
-  squeeze(1e3, 0.0);
-  squeeze(1e4, 0.0);
-  squeeze(1e5, 0.0);
-  squeeze(1e6, 0.0);
-  squeeze(1e6, 100.0);
+  cube_squeeze(1e3, 0.0);
+  cube_squeeze(1e4, 0.0);
+  cube_squeeze(1e5, 0.0);
+  cube_squeeze(1e6, 0.0);
+  cube_squeeze(1e6, 100.0);
 }
 
 /* ---- kinematic bodies ---- */
@@ -774,7 +774,7 @@ TEST(a_moving_platform_carries_a_box)
   dBodySetLinearVel(platform, 0.1, 0.0, 0.0);
   REQUIRE(cw_start_following(w, 0.0, 0.0, 0.025 + 0.013));
   cw_run(w, 1001);
-  CHECK(w->range_min == 1 && w->range_max == 1);
+  CHECK(w->seen.range_min == 1 && w->seen.range_max == 1);
   CHECK_NEAR(w->velocity[0][0], 0.1, 1e-4);
   CHECK_NEAR(dBodyGetLinearVel(platform)[0], 0.1, 0.0);
   CHECK_NEAR(dBodyGetPosition(platform)[0], 0.1 * 1.0, 1e-9);

@@ -57,7 +57,7 @@ static uint32_t add_cube(double mass, double x, double y, double z, double half)
   return add_box(mass, (double[3]){x, y, z}, (double[3]){half, half, half});
 }
 
-static void respond(uint32_t body, const double j[6], double out[6])
+static void body_respond(uint32_t body, const double j[6], double out[6])
 {
   const box *b = &s.boxes[body];
   for (int i = 0; i < 3; ++i) {
@@ -69,8 +69,8 @@ static void respond(uint32_t body, const double j[6], double out[6])
   }
 }
 
-static void lever(uint32_t body, const double point[3], const double n[3], double sign,
-                  double out[6])
+static void row_lever(uint32_t body, const double point[3], const double n[3], double sign,
+                      double out[6])
 {
   double r[3];
   for (int i = 0; i < 3; ++i) {
@@ -89,10 +89,10 @@ static hapi_row *add_row(uint32_t a, uint32_t b, const double point[3], const do
 {
   hapi_row *row = &s.rows[s.row_count++];
   memset(row, 0, sizeof *row);
-  lever(a, point, n, 1.0, row->ja);
-  lever(b, point, n, -1.0, row->jb);
-  respond(a, row->ja, row->ba);
-  respond(b, row->jb, row->bb);
+  row_lever(a, point, n, 1.0, row->ja);
+  row_lever(b, point, n, -1.0, row->jb);
+  body_respond(a, row->ja, row->ba);
+  body_respond(b, row->jb, row->bb);
   row->hi = HUGE_VAL;
   row->normal = -1;
   row->a = a;
@@ -152,28 +152,28 @@ static void make_chain(uint32_t count, double mu)
   }
 }
 
-static void fall(void)
+static void bodies_fall(void)
 {
   for (uint32_t i = 1; i < s.body_count; ++i) {
     s.v[i][2] -= s.boxes[i].mass > 0.0 ? G * DT : 0.0;
   }
 }
 
-static void push(uint32_t body, const double point[3], const double force[3])
+static void body_push(uint32_t body, const double point[3], const double force[3])
 {
   double n[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
   for (int axis = 0; axis < 3; ++axis) {
     double j[6];
     double b[6];
-    lever(body, point, n[axis], 1.0, j);
-    respond(body, j, b);
+    row_lever(body, point, n[axis], 1.0, j);
+    body_respond(body, j, b);
     for (int i = 0; i < 6; ++i) {
       s.v[body][i] += DT * force[axis] * b[i];
     }
   }
 }
 
-static void run(void)
+static void solver_run(void)
 {
   memcpy(s.free_v, s.v, sizeof s.v);
   s.solver.rows = s.rows;
@@ -188,7 +188,7 @@ static void run(void)
 
 /* ---- what a solution must fulfil ---- */
 
-static double dot(const double a[6], const double b[6])
+static double row_dot(const double a[6], const double b[6])
 {
   double sum = 0.0;
   for (int i = 0; i < 6; ++i) {
@@ -199,8 +199,8 @@ static double dot(const double a[6], const double b[6])
 
 static double error_of(const hapi_row *row)
 {
-  return row->target - row->softness * row->impulse - dot(row->ja, s.v[row->a]) -
-         dot(row->jb, s.v[row->b]);
+  return row->target - row->softness * row->impulse - row_dot(row->ja, s.v[row->a]) -
+         row_dot(row->jb, s.v[row->b]);
 }
 
 static void bounds_of(const hapi_row *row, double *out_lo, double *out_hi)
@@ -253,8 +253,8 @@ static void solve_slowly(uint32_t sweeps, double out_v[BODIES][6])
     largest = 0.0;
     for (uint32_t i = 0; i < s.row_count; ++i) {
       const hapi_row *row = &s.rows[i];
-      double d = dot(row->ja, row->ba) + dot(row->jb, row->bb) + row->softness;
-      double w = dot(row->ja, out_v[row->a]) + dot(row->jb, out_v[row->b]);
+      double d = row_dot(row->ja, row->ba) + row_dot(row->jb, row->bb) + row->softness;
+      double w = row_dot(row->ja, out_v[row->a]) + row_dot(row->jb, out_v[row->b]);
       double hi = row->normal >= 0 ? row->mu * p[row->normal] : row->hi;
       double lo = row->normal >= 0 ? -hi : row->lo;
       double old = p[i];
@@ -293,9 +293,9 @@ static void push_cube(double mu, double force, uint32_t direct_rows)
 {
   make_tower(1, mu);
   s.solver.direct_rows = direct_rows;
-  fall();
-  push(1, s.boxes[1].centre, (double[3]){force, 0.0, 0.0});
-  run();
+  bodies_fall();
+  body_push(1, s.boxes[1].centre, (double[3]){force, 0.0, 0.0});
+  solver_run();
   check_complementarity(1e-9);
 }
 
@@ -323,15 +323,15 @@ TEST(without_friction_nothing_holds_and_with_infinite_friction_all)
   CHECK_NEAR(s.v[1][2], 0.0, 1e-9);
   CHECK(sum_of(1, 3) == 0.0);
   make_tower(1, HUGE_VAL);
-  fall();
-  push(1, (double[3]){0.0, 0.0, 0.0}, (double[3]){1000.0, -500.0, 0.0});
-  run();
+  bodies_fall();
+  body_push(1, (double[3]){0.0, 0.0, 0.0}, (double[3]){1000.0, -500.0, 0.0});
+  solver_run();
   check_complementarity(1e-8);
   CHECK_NEAR(s.v[1][0], 0.0, 1e-8);
   CHECK_NEAR(sum_of(1, 3), -1.0, 1e-6);
   make_tower(1, HUGE_VAL); /* lifted: no normal impulse, no friction */
-  push(1, s.boxes[1].centre, (double[3]){7.0, 0.0, 20.0});
-  run();
+  body_push(1, s.boxes[1].centre, (double[3]){7.0, 0.0, 20.0});
+  solver_run();
   check_complementarity(1e-12);
   CHECK(s.v[1][0] == s.free_v[1][0] && s.v[1][2] == s.free_v[1][2]);
 }
@@ -350,7 +350,7 @@ TEST(a_soft_row_is_a_spring_and_a_damper)
   hapi_row *row = add_row(body, GROUND, (double[3]){0.0, 0.0, 0.0}, (double[3]){0.0, 0.0, 1.0});
   make_soft(row, 5000.0, 40.0, 0.002);
   s.v[body][2] = -0.3;
-  run();
+  solver_run();
   /* F = k (x - T v) - d v, with the new v */
   double v = (2.0 * -0.3 + DT * 5000.0 * 0.002) / (2.0 + DT * (DT * 5000.0 + 40.0));
   CHECK_NEAR(s.v[body][2], v, 1e-12);
@@ -359,8 +359,8 @@ TEST(a_soft_row_is_a_spring_and_a_damper)
   memset(s.v, 0, sizeof s.v);
   for (int tick = 0; tick < 3000; ++tick) {
     make_soft(row, 5000.0, 40.0, depth);
-    fall();
-    run();
+    bodies_fall();
+    solver_run();
     depth -= DT * s.v[body][2];
   }
   CHECK_NEAR(depth, 2.0 * G / 5000.0, 1e-9);
@@ -377,7 +377,7 @@ TEST(two_bodies_collide)
     s.v[a][0] = 2.0;
     s.v[b][0] = -1.0;
     row->target = e * 3.0; /* restitution */
-    run();
+    solver_run();
     double mean = (2.0 - 3.0) / 4.0;
     CHECK_NEAR(s.v[a][0], mean - e * 0.75 * 3.0, 1e-12);
     CHECK_NEAR(s.v[b][0], mean + e * 0.25 * 3.0, 1e-12);
@@ -394,11 +394,11 @@ TEST(fixed_bounds_hold)
     row->lo = -0.02;
     row->hi = 0.05;
     s.v[a][1] = sign * 1.0;
-    run();
+    solver_run();
     CHECK(row->impulse == (sign > 0 ? -0.02 : 0.05));
     CHECK_NEAR(s.v[a][1], sign + 0.5 * row->impulse, 1e-15);
     s.v[a][1] = sign * 0.005;
-    run();
+    solver_run();
     CHECK_NEAR(s.v[a][1], 0.0, 1e-12);
     CHECK_NEAR(row->impulse, sign * -0.01, 1e-12);
   }
@@ -409,8 +409,8 @@ TEST(a_moving_floor_carries_the_block_along)
   push_cube(0.5, 0.0, 100);
   for (int tick = 0; tick < 50; ++tick) {
     s.v[GROUND][0] = 0.1;
-    fall();
-    run();
+    bodies_fall();
+    solver_run();
   }
   CHECK_NEAR(s.v[1][0], 0.1, 1e-8);
   CHECK(s.v[GROUND][0] == 0.1);
@@ -420,7 +420,7 @@ TEST(a_moving_floor_carries_the_block_along)
 
 static uint32_t seed;
 
-static double uniform(double lo, double hi)
+static double random_uniform(double lo, double hi)
 {
   seed = seed * 1664525u + 1013904223u;
   return lo + (hi - lo) * (seed >> 8) / 16777216.0;
@@ -431,25 +431,26 @@ static void make_random(uint32_t number)
 {
   set_up();
   seed = number;
-  (void)add_cube(uniform(0.5, 2.0), 0.0, 0.0, 0.0, 0.1);
-  (void)add_cube(uniform(0.5, 2.0), 0.2, 0.0, 0.0, 0.1);
+  (void)add_cube(random_uniform(0.5, 2.0), 0.0, 0.0, 0.0, 0.1);
+  (void)add_cube(random_uniform(0.5, 2.0), 0.2, 0.0, 0.0, 0.1);
   for (uint32_t i = 0; i < 6; ++i) {
-    double point[3] = {uniform(0.0, 0.2), uniform(-0.1, 0.1), uniform(-0.1, 0.1)};
-    double n[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
+    double point[3] = {random_uniform(0.0, 0.2), random_uniform(-0.1, 0.1),
+                       random_uniform(-0.1, 0.1)};
+    double n[3] = {random_uniform(-1.0, 1.0), random_uniform(-1.0, 1.0), random_uniform(-1.0, 1.0)};
     hapi_row *row = add_row(i < 3 ? 1 : 2, i < 3 || number % 2 == 0 ? GROUND : 1, point, n);
-    row->target = uniform(-0.2, 0.2);
-    row->softness = number % 3 == 0 ? uniform(0.0, 0.5) : 0.0;
+    row->target = random_uniform(-0.2, 0.2);
+    row->softness = number % 3 == 0 ? random_uniform(0.0, 0.5) : 0.0;
     if (i % 3 > 0 && number % 5 != 0) {
       row->normal = (int32_t)(i - i % 3);
-      row->mu = uniform(0.0, 0.6);
+      row->mu = random_uniform(0.0, 0.6);
     } else if (number % 5 == 0) {
-      row->lo = uniform(-0.2, 0.0);
-      row->hi = uniform(0.0, 0.2);
+      row->lo = random_uniform(-0.2, 0.0);
+      row->hi = random_uniform(0.0, 0.2);
     }
   }
   for (int k = 0; k < 6; ++k) {
-    s.v[1][k] = uniform(-1.0, 1.0);
-    s.v[2][k] = uniform(-1.0, 1.0);
+    s.v[1][k] = random_uniform(-1.0, 1.0);
+    s.v[2][k] = random_uniform(-1.0, 1.0);
   }
 }
 
@@ -482,13 +483,13 @@ static bool solve_dense(double m[6][7], double out[6])
 }
 
 /* Response of row i to row k. */
-static double response(const hapi_row *i, const hapi_row *k)
+static double row_response(const hapi_row *i, const hapi_row *k)
 {
   double sum = 0.0;
-  sum += i->a == k->a ? dot(i->ja, k->ba) : 0.0;
-  sum += i->a == k->b ? dot(i->ja, k->bb) : 0.0;
-  sum += i->b == k->a ? dot(i->jb, k->ba) : 0.0;
-  sum += i->b == k->b ? dot(i->jb, k->bb) : 0.0;
+  sum += i->a == k->a ? row_dot(i->ja, k->ba) : 0.0;
+  sum += i->a == k->b ? row_dot(i->ja, k->bb) : 0.0;
+  sum += i->b == k->a ? row_dot(i->jb, k->ba) : 0.0;
+  sum += i->b == k->b ? row_dot(i->jb, k->bb) : 0.0;
   return sum;
 }
 
@@ -510,9 +511,9 @@ static bool solve_set(int set, double p[6])
       continue;
     }
     for (int k = 0; k < 6; ++k) {
-      m[i][k] = response(row, &s.rows[k]) + (i == k ? row->softness : 0.0);
+      m[i][k] = row_response(row, &s.rows[k]) + (i == k ? row->softness : 0.0);
     }
-    m[i][6] = row->target - dot(row->ja, s.free_v[row->a]) - dot(row->jb, s.free_v[row->b]);
+    m[i][6] = row->target - row_dot(row->ja, s.free_v[row->a]) - row_dot(row->jb, s.free_v[row->b]);
   }
   for (int i = 0; i < 6; ++i) {
     if (!(fabs(m[i][6]) < 1e300)) {
@@ -528,10 +529,10 @@ static bool is_solution(const double p[6])
     const hapi_row *row = &s.rows[i];
     double hi = row->normal >= 0 ? row->mu * p[row->normal] : row->hi;
     double lo = row->normal >= 0 ? -hi : row->lo;
-    double error = row->target - row->softness * p[i] - dot(row->ja, s.free_v[row->a]) -
-                   dot(row->jb, s.free_v[row->b]);
+    double error = row->target - row->softness * p[i] - row_dot(row->ja, s.free_v[row->a]) -
+                   row_dot(row->jb, s.free_v[row->b]);
     for (int k = 0; k < 6; ++k) {
-      error -= response(row, &s.rows[k]) * p[k];
+      error -= row_response(row, &s.rows[k]) * p[k];
     }
     if (p[i] < lo - 1e-10 || p[i] > hi + 1e-10 || (error > 1e-10 && p[i] < hi - 1e-10) ||
         (error < -1e-10 && p[i] > lo + 1e-10)) {
@@ -548,7 +549,7 @@ TEST(random_problems_have_the_solution_of_one_active_set)
     make_random(number);
     s.solver.tolerance = 1e-11;
     s.solver.update_budget = 1000000;
-    run();
+    solver_run();
     check_complementarity(1e-8);
     double nearest = HUGE_VAL;
     for (int set = 0; set < 729; ++set) {
@@ -576,16 +577,16 @@ static void make_pile(uint32_t number, uint32_t layers)
   seed = number;
   double top = 0.0;
   for (uint32_t layer = 0; layer < layers; ++layer) {
-    double half = uniform(0.03, 0.06);
+    double half = random_uniform(0.03, 0.06);
     for (uint32_t i = 0; i < 4; ++i) {
-      double c[3] = {(i % 2 == 1 ? 0.2 : 0.0) + uniform(-0.03, 0.03),
-                     (i >= 2 ? 0.2 : 0.0) + uniform(-0.03, 0.03), top + half};
-      double h[3] = {uniform(0.06, 0.1), uniform(0.06, 0.1), half};
-      uint32_t body = add_box(uniform(0.2, 2.0), c, h);
+      double c[3] = {(i % 2 == 1 ? 0.2 : 0.0) + random_uniform(-0.03, 0.03),
+                     (i >= 2 ? 0.2 : 0.0) + random_uniform(-0.03, 0.03), top + half};
+      double h[3] = {random_uniform(0.06, 0.1), random_uniform(0.06, 0.1), half};
+      uint32_t body = add_box(random_uniform(0.2, 2.0), c, h);
       if (layer == 0) {
-        add_face(body, GROUND, 2, uniform(0.2, 0.8));
+        add_face(body, GROUND, 2, random_uniform(0.2, 0.8));
       } else {
-        add_face(body, body - 4, 2, uniform(0.2, 0.8));
+        add_face(body, body - 4, 2, random_uniform(0.2, 0.8));
       }
     }
     top += 2.0 * half;
@@ -601,7 +602,7 @@ static void make_pile(uint32_t number, uint32_t layers)
 static void check_against_slow(void)
 {
   static double v[BODIES][6];
-  run();
+  solver_run();
   check_complementarity(2e-8);
   CHECK(s.solver.residual < s.solver.tolerance);
   solve_slowly(200000, v);
@@ -611,22 +612,22 @@ static void check_against_slow(void)
 TEST(towers_chains_and_piles_agree_with_a_slow_solver)
 {
   make_tower(8, 0.5);
-  fall();
-  push(4, (double[3]){-0.05, 0.01, 0.37}, (double[3]){6.0, 1.0, 0.0});
+  bodies_fall();
+  body_push(4, (double[3]){-0.05, 0.01, 0.37}, (double[3]){6.0, 1.0, 0.0});
   check_against_slow();
   make_chain(10, 0.5);
-  fall();
-  push(1, (double[3]){-0.05, 0.01, 0.04}, (double[3]){60.0, 0.0, 0.0});
+  bodies_fall();
+  body_push(1, (double[3]){-0.05, 0.01, 0.04}, (double[3]){60.0, 0.0, 0.0});
   check_against_slow();
   make_chain(10, 0.3);
-  fall();
-  push(1, (double[3]){-0.05, 0.0, 0.06}, (double[3]){25.0, 0.0, -5.0});
+  bodies_fall();
+  body_push(1, (double[3]){-0.05, 0.0, 0.06}, (double[3]){25.0, 0.0, -5.0});
   check_against_slow();
   /* Not all piles will do: what slides on four contacts has more than one solution. */
   for (uint32_t number = 1; number <= 9; number += number == 4 ? 2 : 1) {
     make_pile(number, 1 + number % 5);
-    fall();
-    push(1, (double[3]){-0.1, 0.0, 0.05}, (double[3]){3.0 * (number % 7), 1.0, 0.0});
+    bodies_fall();
+    body_push(1, (double[3]){-0.1, 0.0, 0.05}, (double[3]){3.0 * (number % 7), 1.0, 0.0});
     check_against_slow();
   }
 }
@@ -638,12 +639,12 @@ TEST(direct_solves_and_sweeps_agree)
     uint32_t sweeps[2];
     for (uint32_t direct = 0; direct < 2; ++direct) {
       scene == 0 ? make_tower(4, 0.5) : scene == 1 ? make_chain(5, 0.4) : make_pile(3, 2);
-      fall();
-      push(1, (double[3]){-0.05, 0.0, 0.04}, (double[3]){12.0, 0.0, 0.0});
+      bodies_fall();
+      body_push(1, (double[3]){-0.05, 0.0, 0.04}, (double[3]){12.0, 0.0, 0.0});
       s.solver.direct_rows = direct == 0 ? 1000 : 0;
       s.solver.update_budget = direct == 0 ? 100000 : 100000000;
       s.solver.tolerance = direct == 0 ? 1e-10 : 1e-13;
-      run();
+      solver_run();
       sweeps[direct] = s.solver.sweeps;
       CHECK((s.solver.direct_solves > 0) == (direct == 0));
       if (direct == 0) {
@@ -666,9 +667,9 @@ TEST(a_heavy_box_rests_on_light_ones)
     }
     s.solver.tolerance = 1e-7;
     s.solver.update_budget = 200 * s.row_count;
-    fall();
-    push(4, (double[3]){-0.05, 0.01, 0.37}, (double[3]){5.0, 1.0, 0.0});
-    run();
+    bodies_fall();
+    body_push(4, (double[3]){-0.05, 0.01, 0.37}, (double[3]){5.0, 1.0, 0.0});
+    solver_run();
     check_complementarity(1e-6);
     CHECK_NEAR(s.v[8][2], 0.0, 1e-5);
   }
@@ -680,11 +681,11 @@ static void load_slowly(int scene, int tick)
 {
   double wave = 0.5 - 0.5 * cos(0.01 * tick);
   double y = 0.02 * sin(0.003 * tick);
-  fall();
+  bodies_fall();
   if (scene == 0) {
-    push(4, (double[3]){-0.05, y, 0.37}, (double[3]){8.0 * wave, 2.0 * wave, 0.0});
+    body_push(4, (double[3]){-0.05, y, 0.37}, (double[3]){8.0 * wave, 2.0 * wave, 0.0});
   } else {
-    push(1, (double[3]){-0.05, y, 0.04}, (double[3]){60.0 * wave, 0.0, 0.0});
+    body_push(1, (double[3]){-0.05, y, 0.04}, (double[3]){60.0 * wave, 0.0, 0.0});
   }
 }
 
@@ -697,7 +698,7 @@ TEST(warm_started_ticks_need_few_sweeps)
     uint32_t sweeps = 0;
     for (int tick = 0; tick < 400; ++tick) {
       load_slowly(scene, tick);
-      run();
+      solver_run();
       sweeps += s.solver.sweeps;
       CHECK(s.solver.residual < 2e-5);
       if (tick % 40 == 39) {
@@ -713,8 +714,8 @@ TEST(an_unchanged_load_is_solved_at_once)
   make_tower(5, 0.5);
   for (int tick = 0; tick < 20; ++tick) {
     memset(s.v, 0, sizeof s.v);
-    fall();
-    run();
+    bodies_fall();
+    solver_run();
   }
   CHECK(s.solver.sweeps == 1);
   CHECK(s.solver.direct_solves == 0);
@@ -728,8 +729,8 @@ TEST(the_same_input_gives_the_same_bits)
   for (int repeat = 0; repeat < 2; ++repeat) {
     make_pile(5, 4);
     memset(s.work, repeat == 0 ? 0 : 0x7f, sizeof s.work);
-    fall();
-    run();
+    bodies_fall();
+    solver_run();
     for (uint32_t i = 0; i < s.row_count; ++i) {
       CHECK(repeat == 0 || p[i] == s.rows[i].impulse);
       p[i] = s.rows[i].impulse;
@@ -752,17 +753,18 @@ TEST(islands_are_solved_one_by_one)
     uint32_t body = add_cube(1.0, i, 0.0, 0.05, 0.05);
     add_face(body, GROUND, 2, 0.5);
   }
-  fall();
-  push(1, s.boxes[1].centre, (double[3]){3.0, 1.0, 0.0});
-  push(3, s.boxes[3].centre, (double[3]){-3.0, 2.0, 0.0});
+  bodies_fall();
+  body_push(1, s.boxes[1].centre, (double[3]){3.0, 1.0, 0.0});
+  body_push(3, s.boxes[3].centre, (double[3]){-3.0, 2.0, 0.0});
   s.solver.direct_rows = 12; /* rows of one island, not of all */
-  run();
+  solver_run();
   check_complementarity(1e-9);
   CHECK(s.solver.direct_solves >= 2);
   CHECK(s.solver.sweeps <= 5);
 }
 
-/* Cubes on the ground, each pressed near a corner by a body that weighs nothing beside their springs. */
+/* Cubes on the ground, each pressed near a corner by a body that weighs nothing beside their
+ * springs. */
 static void make_star(uint32_t count)
 {
   const uint32_t hub = count + 1;
@@ -770,18 +772,19 @@ static void make_star(uint32_t count)
   seed = count;
   s.boxes[hub] = (box){.centre = {0.0, 0.0, 1.0}, .half = {0.1, 0.1, 0.1}, .mass = 4e-4};
   for (uint32_t i = 0; i < count; ++i) {
-    uint32_t body = add_cube(pow(10.0, uniform(-3.0, 0.0)), 0.2 * i, 0.0, 0.05, 0.05);
-    const double n[3] = {uniform(-0.3, 0.3), uniform(-0.3, 0.3), -1.0};
-    const double point[3] = {0.2 * i + uniform(-0.06, 0.06), uniform(-0.06, 0.06), 0.1};
+    uint32_t body = add_cube(pow(10.0, random_uniform(-3.0, 0.0)), 0.2 * i, 0.0, 0.05, 0.05);
+    const double n[3] = {random_uniform(-0.3, 0.3), random_uniform(-0.3, 0.3), -1.0};
+    const double point[3] = {0.2 * i + random_uniform(-0.06, 0.06), random_uniform(-0.06, 0.06),
+                             0.1};
     add_face(body, GROUND, 2, 0.5);
     hapi_row *row = add_row(body, hub, point, n);
     memset(row->jb + 3, 0, 3 * sizeof(double)); /* the hub does not turn */
     memset(row->bb + 3, 0, 3 * sizeof(double));
-    make_soft(row, 1e4, 0.0, uniform(-1e-4, 1e-3));
+    make_soft(row, 1e4, 0.0, random_uniform(-1e-4, 1e-3));
   }
   s.body_count = hub + 1;
   s.solver.hub_count = 1;
-  fall();
+  bodies_fall();
   s.v[hub][2] = -0.1;
 }
 
@@ -789,7 +792,7 @@ TEST(many_bodies_about_a_light_one_are_solved_to_the_end)
 {
   for (uint32_t count = 2; count <= 40; count += 19) {
     make_star(count);
-    run();
+    solver_run();
     CHECK(s.solver.residual < s.solver.tolerance && s.solver.sweeps <= 4);
     check_complementarity(1e-7);
   }
@@ -799,12 +802,12 @@ TEST(budget_and_limits_hold)
 {
   for (int limit = 0; limit < 4; ++limit) {
     make_chain(6, 0.5);
-    fall();
-    push(1, (double[3]){-0.05, 0.0, 0.04}, (double[3]){30.0, 0.0, 0.0});
+    bodies_fall();
+    body_push(1, (double[3]){-0.05, 0.0, 0.04}, (double[3]){30.0, 0.0, 0.0});
     s.solver.tolerance = limit == 3 ? HUGE_VAL : 0.0; /* never, at once */
     s.solver.update_budget = limit == 0 ? 0 : 30 * s.row_count;
     s.solver.direct_rows = limit == 1 ? 5 : 1000;
-    run();
+    solver_run();
     CHECK(limit != 0 || (s.solver.sweeps == 2 && s.solver.direct_solves == 0));
     CHECK(limit != 1 || (s.solver.sweeps == 30 && s.solver.direct_solves == 0));
     CHECK(limit != 2 || (s.solver.sweeps < 30 && s.solver.direct_solves > 0));
@@ -824,8 +827,8 @@ TEST(work_that_is_too_small_is_left_alone)
 {
   for (size_t room = 0; room <= 1000; room += 250) {
     make_tower(8, 0.5);
-    fall();
-    run();
+    bodies_fall();
+    solver_run();
     memcpy(s.v, s.free_v, sizeof s.v);
     for (uint32_t i = 0; i < s.row_count; ++i) {
       s.rows[i].impulse = 0.0;
@@ -845,11 +848,11 @@ TEST(work_that_is_too_small_is_left_alone)
 TEST(hostile_input_ends)
 {
   set_up();
-  run();
+  solver_run();
   CHECK(s.solver.residual == 0.0);
   for (int kind = 0; kind < 9; ++kind) {
     make_tower(3, 0.5);
-    fall();
+    bodies_fall();
     hapi_row *row = &s.rows[kind == 8 ? 13 : 12];
     row->target = kind == 0 ? NAN : 0.0;
     row->ja[2] = kind == 1 ? NAN : row->ja[2];
@@ -861,7 +864,7 @@ TEST(hostile_input_ends)
     memset(row->ba, 0, kind == 7 ? sizeof row->ba : 0); /* responds no more */
     memset(row->bb, 0, kind == 7 ? sizeof row->bb : 0);
     row->mu = kind == 8 ? NAN : row->mu;
-    run();
+    solver_run();
     CHECK(row->impulse == 0.0 && row->inverse == 0.0); /* left out; three contacts do */
     CHECK_NEAR(s.v[3][2], 0.0, 1e-3);
     CHECK(s.solver.residual < 1e-3);
@@ -869,9 +872,9 @@ TEST(hostile_input_ends)
   make_tower(3, 0.5);
   s.v[2][1] = NAN;
   s.solver.update_budget = 1000;
-  run();
+  solver_run();
   CHECK(s.solver.residual == HUGE_VAL);
   s.v[2][1] = HUGE_VAL;
-  run();
+  solver_run();
   CHECK(s.solver.residual == HUGE_VAL);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The coupling between device and world: what a device can hold, the proxy, the choice between it and
- * the direct coupling. */
+/* The coupling between device and world: what a device can hold, the proxy, the choice between
+ * it and the direct coupling. */
 
 #include "tests/tap.h"
 
@@ -101,8 +101,8 @@ TEST(a_wall_and_the_proxy_are_springs_in_series)
   }
 }
 
-/* A device turned by 90 degrees about x, whose motions are 5 times as large in the world and which gives
- * half of the world's force: 1 N/m of the device is 1 / (5 x 0.5) N/m there. */
+/* A device turned by 90 degrees about x, whose motions are 5 times as large in the world and
+ * which gives half of the world's force: 1 N/m of the device is 1 / (5 x 0.5) N/m there. */
 TEST(the_spring_is_the_devices_whatever_its_frame_and_scales)
 {
   const double k = 1000.0;
@@ -168,8 +168,8 @@ TEST(a_driven_body_presses_through_the_proxy)
   CHECK(w->force[2] > 4.0);
 }
 
-/* A cube on rails is moved by what testing simulations say of it, where it has a shape that the loop does
- * not know as well. */
+/* A cube on rails is moved by what testing simulations say of it, where it has a shape that the
+ * loop does not know as well. */
 TEST(a_measured_body_is_pushed_through_the_proxy)
 {
   contact_world *w = cw_new(0.0);
@@ -311,7 +311,7 @@ TEST(auto_takes_the_proxy_for_more_than_the_device_holds)
     cw_run(w, 10);
     CHECK(state_of(w).coupling == HAP_COUPLING_DIRECT); /* nothing is near */
     cw_move_hand(w, 0.0, 0.0, -0.05);
-    while (state_of(w).contacts < (uint32_t)cases[i].count && w->ticks < 500) {
+    while (state_of(w).contacts < (uint32_t)cases[i].count && w->seen.ticks < 500) {
       cw_tick(w);
     }
     hap_pointer_state state = state_of(w);
@@ -381,13 +381,14 @@ TEST(auto_without_a_force_stays_direct)
   }
 }
 
-/* A hand that taps: between two touches the coupling does not change, and after the last it does. */
+/* A hand that taps: between two touches the coupling does not change, and after the last it
+ * does. */
 TEST(a_hop_does_not_change_the_coupling)
 {
   contact_world *w = open_many(4, 1000.0);
   REQUIRE(w != NULL);
   cw_move_hand(w, 0.0, 0.0, -0.05);
-  while (state_of(w).contacts < 4 && w->ticks < 1000) {
+  while (state_of(w).contacts < 4 && w->seen.ticks < 1000) {
     cw_tick(w);
   }
   CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
@@ -409,8 +410,8 @@ TEST(a_hop_does_not_change_the_coupling)
   CHECK(state_of(w).coupling == HAP_COUPLING_DIRECT);
 }
 
-/* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the device
- * is, not where it would leap. */
+/* A proxy of 0.5 kg swings about the device when the touch is over: it is let go of where the
+ * device is, not where it would leap. */
 TEST(a_heavy_proxy_is_let_go_of_at_the_device)
 {
   contact_world *w = cw_new(0.0);
@@ -422,7 +423,7 @@ TEST(a_heavy_proxy_is_let_go_of_at_the_device)
   w->hand_expert.proxy_mass = 0.5;
   REQUIRE(cw_start(w, 0.0, 0.0, 0.03));
   cw_move_hand(w, 0.0, 0.0, -0.05);
-  while (state_of(w).contacts < 4 && w->ticks < 1000) {
+  while (state_of(w).contacts < 4 && w->seen.ticks < 1000) {
     cw_tick(w);
   }
   CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
@@ -511,8 +512,8 @@ TEST(the_guard_leaves_an_impact_through_a_proxy_alone)
   CHECK_NEAR(speed[1], speed[0], 1e-9);
 }
 
-/* At the change the spring of the coupling is there at once, with a force in it: the hand must not get
- * what it never put in. */
+/* At the change the spring of the coupling is there at once, with a force in it: the hand must
+ * not get what it never put in. */
 TEST(a_change_of_the_coupling_is_no_source_of_energy)
 {
   for (int i = 0; i < 2; ++i) {
@@ -531,7 +532,7 @@ TEST(a_change_of_the_coupling_is_no_source_of_energy)
     cw_move_hand(w, 0.0, 0.0, -0.03);
     given += port_energy(w, 133);
     cw_move_hand(w, 0.1, 0.0, 0.0);
-    while (state_of(w).coupling == HAP_COUPLING_DIRECT && w->ticks < 1000) {
+    while (state_of(w).coupling == HAP_COUPLING_DIRECT && w->seen.ticks < 1000) {
       given += port_energy(w, 1);
     }
     CHECK(state_of(w).coupling == HAP_COUPLING_PROXY);
@@ -596,7 +597,7 @@ TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
 
 /* A device of 0.1 kg and 0.2 N s/m in a relaxed hand that presses it into a ring of balls; the
  * fastest it moves when it should have come to rest. */
-static double shaking(hap_coupling coupling, int count, double stiffness)
+static double hand_shaking(hap_coupling coupling, int count, double stiffness)
 {
   hap_detail detail = {""};
   double fastest = 0.0;
@@ -633,10 +634,10 @@ static double shaking(hap_coupling coupling, int count, double stiffness)
 
 TEST(eight_contacts_at_once_do_not_shake_the_device)
 {
-  double direct = shaking(HAP_COUPLING_DIRECT, 8, 2000.0);
-  double chosen = shaking(HAP_COUPLING_AUTO, 8, 2000.0);
+  double direct = hand_shaking(HAP_COUPLING_DIRECT, 8, 2000.0);
+  double chosen = hand_shaking(HAP_COUPLING_AUTO, 8, 2000.0);
   printf("# device at rest moves: direct %.3g m/s, auto %.3g m/s\n", direct, chosen);
   CHECK(direct > 1e-3);
   CHECK(chosen < 1e-6);
-  CHECK(shaking(HAP_COUPLING_AUTO, 64, 1e6) < 1e-6);
+  CHECK(hand_shaking(HAP_COUPLING_AUTO, 64, 1e6) < 1e-6);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Options of model accelerance: cross accelerance and probes about the operating point, against closed
- * forms; what they do in the loop and at the sync. */
+/* Options of model accelerance: cross accelerance and probes about the operating point, against
+ * closed forms; what they do in the loop and at the sync. */
 
 #include <tests/tap.h>
 
@@ -19,13 +19,13 @@
 #define RADIUS 0.01   /* m */
 #define BIG_RADIUS 1. /* m: a pointer above that is near to all of them */
 
-static void measure(const test_world *w)
+static void blocks_measure(const test_world *w)
 {
   world_measure(w);
 }
 
 /* The block of a pointer's contact with one body and of another body; NULL: none. */
-static const hapi_cross_block *block(const test_world *w, dBodyID pushed, dBodyID other)
+static const hapi_cross_block *block_of(const test_world *w, dBodyID pushed, dBodyID other)
 {
   const hapi_physics *physics = world_physics(w);
   const hapi_contact_slot *contact = world_contact(w, pushed, 0);
@@ -119,13 +119,13 @@ TEST(a_fixed_pair_answers_as_one_body)
   test_world *w = open_pair(HAP_EFFECT_ON, mass[0], mass[1]);
   join_fixed(w);
   REQUIRE(start_above(w, -0.02));
-  measure(w);
-  const hapi_cross_block *cross = block(w, w->bodies[0], w->bodies[1]);
+  blocks_measure(w);
+  const hapi_cross_block *cross = block_of(w, w->bodies[0], w->bodies[1]);
   const hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_rigid(mass, contact->point_world, expected);
   check_block(cross, expected);
-  CHECK(block(w, w->bodies[1], w->bodies[0]) != NULL);
+  CHECK(block_of(w, w->bodies[1], w->bodies[0]) != NULL);
   CHECK(world_physics(w)->cross.block_count == 2);
   CHECK(world_physics(w)->probe.counts.clipped == 0 && world_physics(w)->cross.counts.clipped == 0);
 }
@@ -161,8 +161,8 @@ TEST(a_hinged_pair_has_its_closed_form)
   test_world *w = open_pair(HAP_EFFECT_ON, 0.4, 0.4);
   join_hinge(w);
   REQUIRE(start_above(w, -0.02));
-  measure(w);
-  const hapi_cross_block *cross = block(w, w->bodies[0], w->bodies[1]);
+  blocks_measure(w);
+  const hapi_cross_block *cross = block_of(w, w->bodies[0], w->bodies[1]);
   const hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
   REQUIRE(cross != NULL && contact != NULL);
   expect_hinged(0.4, contact->point_world, expected);
@@ -180,7 +180,7 @@ TEST(what_nothing_ties_has_no_block_and_no_probe_is_added)
     REQUIRE(start_above(w, -0.02));
     const uint64_t *made = &world_physics(w)->probe.test.steps;
     uint64_t before = *made;
-    measure(w);
+    blocks_measure(w);
     probes[joined] = *made - before;
     CHECK(world_count_contacts(w) == 2);
     CHECK(world_physics(w)->cross.block_count == (joined != 0 ? 2u : 0u));
@@ -205,12 +205,12 @@ TEST(with_too_few_places_the_largest_stay)
   REQUIRE(start_above(w, 2 * APART));
   hapi_physics *physics = world_physics(w);
   CHECK(physics->config.capacity.crosses == 8 * (uint32_t)w->def.max_bodies);
-  measure(w);
+  blocks_measure(w);
   REQUIRE(physics->cross.block_count == 6);
   CHECK(physics->cross.counts.dropped == 0);
   memcpy(all, physics->cross.blocks, sizeof all);
   physics->config.capacity.crosses = 4;
-  measure(w);
+  blocks_measure(w);
   REQUIRE(physics->cross.block_count == 4);
   CHECK(physics->cross.counts.dropped == 2);
   for (int i = 0; i < 6; ++i) {
@@ -235,25 +235,25 @@ TEST(a_block_that_is_no_number_is_left_out)
   const hapi_probe_counts *counts = &world_physics(w)->probe.counts;
   const hapi_cross_counts *blocks = &world_physics(w)->cross.counts;
   world_slot(w, w->bodies[0])->mass = 0.0;
-  measure(w);
+  blocks_measure(w);
   CHECK(counts->singular == 1 && counts->clipped == 0); /* A of the contact ... */
   CHECK(blocks->singular == 1 && blocks->clipped == 0); /* ... and its block */
-  CHECK(block(w, w->bodies[0], w->bodies[1]) == NULL);
-  CHECK(block(w, w->bodies[1], w->bodies[0]) != NULL);
+  CHECK(block_of(w, w->bodies[0], w->bodies[1]) == NULL);
+  CHECK(block_of(w, w->bodies[1], w->bodies[0]) != NULL);
   CHECK(world_contact_answer(w, world_contact(w, w->bodies[0], 0))->a[0][0] >
         0.1); /* the last good one */
 }
 
 /* ---- in the loop ---- */
 
-static const hapi_local_body *local(const test_world *w, int body)
+static const hapi_local_body *local_of(const test_world *w, int body)
 {
   const hapi_body_slot *slot = world_slot(w, w->bodies[body]);
   return &w->session->haptic->tick.bodies.of[slot - world_physics(w)->near.slots.bodies];
 }
 
-/* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so that the
- * loop knows it. */
+/* A smooth row in empty space, pushed along; another pointer hovers over the second cube, so
+ * that the loop knows it. */
 static test_world *open_row(hap_effect_wish cross)
 {
   test_world *w = world_new(0.0, 1000);
@@ -280,8 +280,8 @@ TEST(the_second_cube_of_a_row_moves_between_syncs)
     test_world *w = open_row((hap_effect_wish)cross);
     REQUIRE(w != NULL);
     CHECK(hap_session_advance(w->session, 40) == HAP_OK); /* the first sync is at 50 */
-    double first = local(w, 0)->twist.linear[0];
-    double second = local(w, 1)->twist.linear[0];
+    double first = local_of(w, 0)->twist.linear[0];
+    double second = local_of(w, 1)->twist.linear[0];
     CHECK(first > 0.005);
     CHECK_NEAR(second, cross == HAP_EFFECT_ON ? first : 0.0, 1e-6 * first);
     CHECK(dBodyGetLinearVel(w->bodies[1])[0] == 0.0);
@@ -299,9 +299,9 @@ TEST(an_impulse_counts_once_and_what_answers_follows_the_world)
   test_world *w = open_row(HAP_EFFECT_ON);
   REQUIRE(w != NULL);
   CHECK(hap_session_advance(w->session, 60) == HAP_OK);
-  CHECK((local(w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
-  CHECK((local(w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
-  CHECK(local(w, 1)->account.impulse[0] == 0.0);
+  CHECK((local_of(w, 1)->given.flags & HAPI_BODY_FOLLOWS) != 0);
+  CHECK((local_of(w, 0)->given.flags & HAPI_BODY_FOLLOWS) == 0);
+  CHECK(local_of(w, 1)->account.impulse[0] == 0.0);
   world_move_pointer(w, 0, (const double[3]){-0.1, 0, 0}, NULL);
   CHECK(hap_session_advance(w->session, 101) == HAP_OK);
   hap_stats stats = world_stats(w);
@@ -413,7 +413,7 @@ static void measure_with(on_floor *f, double x, double z, double speed)
 {
   hapi_v3_set(f->contact->last_force, x, 0.0, z);
   f->contact->speed = speed;
-  measure(&f->w);
+  blocks_measure(&f->w);
 }
 
 /* b + A f: what the loop comes to with the force of the operating point. */
@@ -475,18 +475,18 @@ TEST(b_and_the_forces_make_the_base_again)
   hapi_physics *physics = world_physics(w);
   physics->cycle.settings.probe = HAP_PROBE_OPERATING;
   hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
-  REQUIRE(contact != NULL && block(w, w->bodies[0], w->bodies[1]) != NULL);
+  REQUIRE(contact != NULL && block_of(w, w->bodies[0], w->bodies[1]) != NULL);
   hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);
-  measure(w);
+  blocks_measure(w);
   base[0] = world_answer(w, world_slot(w, w->bodies[0]))->b[0] +
             3.0 * world_contact_answer(w, contact)->a[0][0];
   base[1] = world_answer(w, world_slot(w, w->bodies[1]))->b[0] +
-            3.0 * block(w, w->bodies[0], w->bodies[1])->a[0][0];
+            3.0 * block_of(w, w->bodies[0], w->bodies[1])->a[0][0];
   CHECK_NEAR(base[0], wanted, 1e-6);
   CHECK_NEAR(base[1], wanted, 1e-6);
   CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[1]))->b[0], 0.0, 1e-6);
   physics->config.capacity.crosses = 0; /* off: the force of the last tick is held in b */
-  measure(w);
+  blocks_measure(w);
   CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[0]))->b[0], 0.0, 1e-6);
   CHECK_NEAR(world_answer(w, world_slot(w, w->bodies[1]))->b[0], wanted, 1e-6);
 }
@@ -514,7 +514,7 @@ TEST(what_does_not_answer_has_no_block)
     REQUIRE(f.contact != NULL && world_slot(w, w->bodies[1]) != NULL);
     measure_with(&f, force, 0.0, 0.0);
     printf("# pushed with %g N: %u blocks\n", force, world_physics(w)->cross.block_count);
-    CHECK((block(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
+    CHECK((block_of(w, w->bodies[0], w->bodies[1]) != NULL) == (pushed != 0));
     world_close(w);
   }
 }
@@ -547,7 +547,7 @@ TEST(operating_probes_are_as_many_as_shared_ones)
     REQUIRE(start_above(w, -0.02));
     const uint64_t *made = &world_physics(w)->probe.test.steps;
     uint64_t before = *made;
-    measure(w);
+    blocks_measure(w);
     steps[k] = *made - before;
   }
   CHECK(steps[0] == 7 && steps[1] == 7);

@@ -5,8 +5,8 @@
 
 #include "tests/tick_world.h"
 
-/* Body 0 is pushed by pointer 0 with 1 N, body 1 by pointer 1 with 3 N; each has an answer of bodies 2
- * and 3. */
+/* Body 0 is pushed by pointer 0 with 1 N, body 1 by pointer 1 with 3 N; each has an answer of
+ * bodies 2 and 3. */
 static void set_up_crosses(void)
 {
   set_up();
@@ -32,11 +32,11 @@ static void press_both(void)
 TEST(a_force_moves_the_other_bodies_by_their_blocks)
 {
   set_up_crosses();
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   CHECK((f.bodies[3].flags & HAPI_BODY_RESTING) != 0);
   press_both();
-  run(1);
+  ticks_run(1);
   check_v3(f.bodies[0].twist.linear, T, 0.0, 0.0, 1e-15);
   check_v3(f.bodies[1].twist.linear, 3.0 * T, 0.0, 0.0, 1e-15);
   check_v3(f.bodies[2].twist.linear, (0.25 + 3.0 * 1.25) * T, 0.0, 0.0, 1e-15);
@@ -48,17 +48,17 @@ TEST(a_force_moves_the_other_bodies_by_their_blocks)
   }
   check_v3(f.tick.touches.hand_impulse, 4.0 * T, 0.0, 0.0, 1e-15);
   f.pointers[0].device.pose.position[0] = f.pointers[1].device.pose.position[0] = -0.1;
-  run(5); /* no force, no acceleration */
+  ticks_run(5); /* no force, no acceleration */
   check_v3(f.bodies[2].twist.linear, 4.0 * T, 0.0, 0.0, 1e-15);
 }
 
 TEST(a_body_that_only_answers_follows_the_world)
 {
   set_up_crosses();
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   press_both();
-  run(10);
+  ticks_run(10);
   begin_model();
   for (uint32_t i = 0; i < 4; ++i) {
     hapi_model_body *body = add_body(i);
@@ -67,10 +67,10 @@ TEST(a_body_that_only_answers_follows_the_world)
     body->residual[0] = i < 2 ? 0.0 : 7.0; /* is in the twist */
   }
   double pushed = f.bodies[0].twist.linear[0];
-  adopt();
+  model_adopt();
   check_v3(f.bodies[0].twist.linear, pushed, 0.0, 0.0, 0.0);
   check_v3(f.bodies[2].twist.linear, 0.0, 5.0, 0.0, 0.0);
-  run(5);
+  ticks_run(5);
   check_v3(f.bodies[2].twist.linear, 0.0, 5.0, 0.0, 0.0); /* this model has no blocks */
   check_v3(f.bodies[3].twist.linear, 0.0, 5.0, 0.0, 0.0);
 }
@@ -79,20 +79,20 @@ TEST(blocks_go_with_their_contact_and_their_body)
 {
   set_up_crosses();
   f.pointers[0].generation = 2; /* gone while the message was on its way */
-  adopt();
+  model_adopt();
   CHECK(f.tick.touches.crosses.count == 2 && f.tick.touches.count == 1);
-  run(1);
+  ticks_run(1);
   press_both();
-  run(1);
+  ticks_run(1);
   check_v3(f.bodies[0].twist.linear, 0.0, 0.0, 0.0, 0.0);
   check_v3(f.bodies[2].twist.linear, 3.0 * 1.25 * T, 0.0, 0.0, 1e-15);
   set_up_crosses();
   --f.model->body_count; /* body 3 could not be sent */
-  adopt();
+  model_adopt();
   CHECK(f.tick.touches.crosses.count == 2);
-  run(1);
+  ticks_run(1);
   press_both();
-  run(1);
+  ticks_run(1);
   CHECK(f.bodies[3].twist.linear[0] == 0.0);
   check_v3(f.bodies[2].twist.linear, 4.0 * T, 0.0, 0.0, 1e-15);
 }

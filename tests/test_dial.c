@@ -24,7 +24,7 @@ static const hapi_knobs by_accuracy = {.contact_hz = HAP_BY_ACCURACY,
 
 /* ---- the table ---- */
 
-static double endless(int value)
+static double value_is_endless(int value)
 {
   return value <= 0 ? (double)INFINITY : value; /* 0 sweeps, and HAP_RANGE_ALL: no end */
 }
@@ -33,7 +33,7 @@ static void check_more(const hapi_settings *a, const hapi_settings *b)
 {
   CHECK(a->contact_hz <= b->contact_hz);
   CHECK(a->max_sweeps == 0 && b->max_sweeps == 0);
-  CHECK(endless(a->range_hops) <= endless(b->range_hops));
+  CHECK(value_is_endless(a->range_hops) <= value_is_endless(b->range_hops));
   CHECK(a->row_updates <= b->row_updates);
   CHECK(a->edge_probes <= b->edge_probes);
   CHECK(a->iterations <= b->iterations);
@@ -128,7 +128,8 @@ TEST(a_load_that_is_too_much_turns_at_once)
   CHECK(hapi_turn_by(&turn, 0.99, 100.0) == 0); /* neither too much nor room */
 }
 
-/* Down to where it fits is one turn, in however many steps: it does not make the way back longer. */
+/* Down to where it fits is one turn, in however many steps: it does not make the way back
+ * longer. */
 TEST(a_long_way_down_is_not_held_against_it)
 {
   hapi_turn once = {0.0};
@@ -208,7 +209,7 @@ static double push_row(double accuracy, double force[TICKS])
   return sweeps;
 }
 
-static double difference(const double *a, const double *b)
+static double force_difference(const double *a, const double *b)
 {
   double wrong = 0.0;
   double right = 0.0;
@@ -228,7 +229,7 @@ TEST(accuracy_costs_sweeps_and_buys_force)
   (void)push_row(1.0, force[3]);
   double error[3];
   for (int i = 0; i < 3; ++i) {
-    error[i] = difference(force[i], force[3]);
+    error[i] = force_difference(force[i], force[3]);
   }
   printf("# off the force at 1: %.3g at 0, %.3g at 0.2, %.3g at 0.5; sweeps %.3g, %.3g, %.3g\n",
          error[0], error[1], error[2], least, low, middle);
@@ -368,7 +369,7 @@ TEST(a_shape_that_is_asked_for_stays)
 /* ---- a wanted error ---- */
 
 /* Strokes against the row: what stands still is right at any accuracy. */
-static void stroke(contact_world *w, int ticks)
+static void row_stroke(contact_world *w, int ticks)
 {
   for (int i = 0; i < ticks; ++i) {
     cw_move_hand(w, 0.05 + 0.15 * sin(0.02 * i), 0.0, 0.0);
@@ -385,7 +386,7 @@ static hap_accuracy_info look_for_error(double from, double wanted)
   w->expert.lookback = 0.1;
   memset(&info, 0, sizeof info);
   if (start_row(w)) {
-    stroke(w, 6000);
+    row_stroke(w, 6000);
     info = accuracy_of(w);
     printf("# from %g, %g wanted: at %g, told %.3g\n", from, wanted, info.accuracy,
            cw_stats(w).error.force_error);
@@ -408,7 +409,7 @@ TEST(it_says_when_no_error_has_been_told)
   }
   CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_UNTOLD);
   CHECK(accuracy_of(w).physics.reason == HAP_ACCURACY_UNTOLD && accuracy_of(w).accuracy == 0.5);
-  stroke(w, 1000);
+  row_stroke(w, 1000);
   CHECK(accuracy_of(w).tick.reason == HAP_ACCURACY_ERROR);
   CHECK(accuracy_of(w).physics.reason == HAP_ACCURACY_ERROR);
   CHECK(hap_session_set_force_error(w->session, 0.0) == HAP_OK);
@@ -432,7 +433,7 @@ TEST(without_a_wanted_error_it_goes_back)
   w->expert.force_error_wanted = 0.02;
   w->expert.lookback = 0.1;
   REQUIRE(start_row(w));
-  stroke(w, 3000);
+  row_stroke(w, 3000);
   CHECK(accuracy_of(w).accuracy > 0.0);
   CHECK(hap_session_set_force_error(w->session, 0.0) == HAP_OK);
   cw_run(w, 60);
@@ -479,7 +480,8 @@ static bool physics_at_least(const hap_accuracy_info *info)
   return info->physics.reason == HAP_ACCURACY_LEAST;
 }
 
-/* A tick of 0.5 us, which no processor makes: it goes down to the least, and says that this is not enough. */
+/* A tick of 0.5 us, which no processor makes: it goes down to the least, and says that this is
+ * not enough. */
 TEST(a_budget_turns_the_tick_back)
 {
   contact_world *w = open_row(6);

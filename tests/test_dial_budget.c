@@ -14,7 +14,7 @@
 static hapi_tick_load told; /* by the loop, so far */
 static hap_session *session;
 
-static hapi_physics *begin(void)
+static hapi_physics *physics_begin(void)
 {
   static const double edges[3] = {0.1, 0.1, 0.1};
   test_world *w = world_new(0.0, 20);
@@ -34,20 +34,21 @@ static void set_shares(hapi_physics *physics, double tick, double cycle)
 }
 
 /* What a cycle does with the dials. */
-static void follow(hapi_physics *physics)
+static void dial_follow(hapi_physics *physics)
 {
   hapi_dial_follow(&physics->dial, &physics->cycle);
   hapi_physics_fill_settings(physics);
 }
 
-/* So many ticks of a share of their period, of which some are over the budget; a cycle looks at them. */
+/* So many ticks of a share of their period, of which some are over the budget; a cycle looks at
+ * them. */
 static int tell_ticks(hapi_physics *physics, uint64_t ticks, double share, uint64_t over)
 {
   told.ticks += ticks;
   told.over += over;
   told.spent_ns += (double)ticks * share * PERIOD_NS;
   physics->cycle.state->load = told;
-  follow(physics);
+  dial_follow(physics);
   return physics->dial.sides[HAPI_DIAL_TICK].percent;
 }
 
@@ -55,14 +56,14 @@ static int tell_cycles(hapi_physics *physics, int cycles, double seconds)
 {
   for (int i = 0; i < cycles; ++i) {
     hapi_dial_note(&physics->dial, seconds, 0.0);
-    follow(physics);
+    dial_follow(physics);
   }
   return physics->dial.sides[HAPI_DIAL_PHYSICS].percent;
 }
 
 TEST(ticks_that_fit_change_nothing)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   for (int i = 0; i < 100; ++i) {
@@ -72,7 +73,7 @@ TEST(ticks_that_fit_change_nothing)
 
 TEST(a_mean_that_is_over_turns_the_tick)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 99, 0.11, 0) == 50); /* not looked at yet */
@@ -87,7 +88,7 @@ TEST(a_mean_that_is_over_turns_the_tick)
 /* Where nothing is left to be turned back it is said all the same. */
 TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, SHARE);
   CHECK(hap_session_set_accuracy(session, 0.0) == HAP_OK);
@@ -101,7 +102,7 @@ TEST(a_dial_that_was_asked_to_be_at_its_least_says_that_it_does_not_fit)
 
 TEST(many_ticks_that_are_over_turn_it_as_well)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.01, 6) == 40);
@@ -112,7 +113,7 @@ TEST(many_ticks_that_are_over_turn_it_as_well)
 
 TEST(room_brings_it_back_as_far_as_was_asked)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.3, 0) == 20);
@@ -131,7 +132,7 @@ TEST(room_brings_it_back_as_far_as_was_asked)
 
 TEST(what_is_asked_for_later_waits_for_the_budget)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, SHARE, 0.0);
   CHECK(tell_ticks(physics, 100, 0.11, 0) == 40);
@@ -148,7 +149,7 @@ TEST(what_is_asked_for_later_waits_for_the_budget)
 /* 20 Hz: a tenth is 5 ms. */
 TEST(cycles_that_are_over_turn_physics)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   set_shares(physics, 0.0, SHARE);
   CHECK(tell_cycles(physics, 40, 4.5 * MS) == 50);
@@ -162,13 +163,13 @@ TEST(cycles_that_are_over_turn_physics)
 
 TEST(looking_back_has_what_is_left)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   CHECK(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s) == HUGE_VAL);
   set_shares(physics, 0.0, SHARE);
   for (int i = 0; i < 40; ++i) {
     hapi_dial_note(&physics->dial, 9.0 * MS, 7.0 * MS);
-    follow(physics);
+    dial_follow(physics);
   }
   CHECK(physics->dial.sides[HAPI_DIAL_PHYSICS].percent == 50); /* it does not count */
   CHECK_NEAR(hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s), 3.0 * MS, 1e-6);
@@ -187,13 +188,13 @@ static int tell_error(hapi_physics *physics, int windows, double error)
   for (int i = 0; i < windows; ++i) {
     (void)hapi_dial_note_error(&physics->dial, error, WINDOW, true);
   }
-  follow(physics);
+  dial_follow(physics);
   return physics->dial.sides[HAPI_DIAL_TICK].percent;
 }
 
 TEST(an_error_as_wanted_turns_nothing)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   atomic_store(&physics->dial.force_error, WANTED);
   CHECK(tell_error(physics, 100, 0.99 * WANTED) == 50);
@@ -203,7 +204,7 @@ TEST(an_error_as_wanted_turns_nothing)
 
 TEST(a_larger_error_turns_both_up_and_a_small_one_down)
 {
-  hapi_physics *physics = begin();
+  hapi_physics *physics = physics_begin();
   REQUIRE(physics != NULL);
   atomic_store(&physics->dial.force_error, WANTED);
   CHECK(tell_error(physics, 1, 1.1 * WANTED) == 60);

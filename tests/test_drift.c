@@ -62,13 +62,13 @@ static void check_model(hap_model model)
   (void)add_spinning(1, owned | HAPI_BODY_GYROSCOPIC, plank);
   (void)add_spinning(2, HAPI_BODY_DRIVEN, ball);
   (void)add_spinning(3, HAPI_BODY_MEASURED, ball);
-  adopt();
+  model_adopt();
   adopt_no_contacts();
   worst = 0.0;
   double fastest = 0.0;
   double slowest = HUGE_VAL;
   for (long i = 0; i < ticks; ++i) {
-    run(1);
+    ticks_run(1);
     for (int k = 0; k < 4; ++k) {
       note_length(f.bodies[k].pose.quat_wxyz);
       double spin = hapi_v3_norm(f.bodies[k].twist.angular);
@@ -90,7 +90,8 @@ TEST(orientations_of_bodies_stay_unit)
   check_model(HAP_MODEL_CONTACT);
 }
 
-/* Models that show the world's poses: blended from one to the next, which are 10 rad/s x 50 ms apart. */
+/* Models that show the world's poses: blended from one to the next, which are 10 rad/s x 50 ms
+ * apart. */
 TEST(orientations_that_are_shown_stay_unit)
 {
   for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_IMPULSE; ++model) {
@@ -106,9 +107,9 @@ TEST(orientations_that_are_shown_stay_unit)
       body->pose.quat_wxyz[0] = cos(angle);
       body->pose.quat_wxyz[2] = 0.6 * sin(angle);
       body->pose.quat_wxyz[3] = 0.8 * sin(angle);
-      adopt();
+      model_adopt();
       for (int k = 0; k < 50; ++k) {
-        run(1);
+        ticks_run(1);
         note_length(f.bodies[0].pose.quat_wxyz);
       }
     }
@@ -130,7 +131,7 @@ TEST(orientations_of_pointers_stay_unit)
     double length = 1.0 + 1e-4 * sin((double)i);
     p->device.pose.quat_wxyz[0] = length * cos(angle);
     p->device.pose.quat_wxyz[1] = length * sin(angle);
-    run(1);
+    ticks_run(1);
     note_length(p->pose.quat_wxyz);
   }
   printf("# pointer: %.2g\n", worst);
@@ -139,7 +140,7 @@ TEST(orientations_of_pointers_stay_unit)
 
 /* ---- denormals ---- */
 
-static int denormals(const double *values, int count)
+static int count_denormals(const double *values, int count)
 {
   int found = 0;
   for (int i = 0; i < count; ++i) {
@@ -153,25 +154,25 @@ static int denormals_of(const hapi_tick *tick)
   int found = 0;
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
     const hapi_local_body *b = &tick->bodies.of[tick->bodies.live[i]];
-    found += denormals(b->pose.position, 3) + denormals(b->pose.quat_wxyz, 4) +
-             denormals(b->twist.linear, 3) + denormals(b->twist.angular, 3) +
-             denormals(b->linear.residual, 6) + denormals(b->account.impulse, 3) +
-             denormals(b->account.angular_impulse, 3) + denormals(b->account.gain, 6) +
-             denormals(b->start_twist, 6);
+    found += count_denormals(b->pose.position, 3) + count_denormals(b->pose.quat_wxyz, 4) +
+             count_denormals(b->twist.linear, 3) + count_denormals(b->twist.angular, 3) +
+             count_denormals(b->linear.residual, 6) + count_denormals(b->account.impulse, 3) +
+             count_denormals(b->account.angular_impulse, 3) + count_denormals(b->account.gain, 6) +
+             count_denormals(b->start_twist, 6);
   }
   for (uint32_t i = 0; i < tick->touches.count; ++i) {
-    found += denormals(tick->touches.of[i].force, 3);
+    found += count_denormals(tick->touches.of[i].force, 3);
   }
   for (uint32_t i = 0; i < tick->contacts.memory_count; ++i) {
-    found += denormals(tick->contacts.memory[i].impulse, 3);
+    found += count_denormals(tick->contacts.memory[i].impulse, 3);
   }
   for (uint32_t i = 0; i < tick->rows.solver.row_count; ++i) {
-    found += denormals(&tick->rows.solver.rows[i].impulse, 1);
+    found += count_denormals(&tick->rows.solver.rows[i].impulse, 1);
   }
   return found;
 }
 
-static bool flushes(void)
+static bool cpu_flushes(void)
 {
   volatile double least = DBL_MIN;
   return 0.5 * least == 0.0;
@@ -183,12 +184,12 @@ static void look_in_step(void *user, double step_s)
 {
   (void)user;
   (void)step_s;
-  flushed_in_step = flushed_in_step || flushes();
+  flushed_in_step = flushed_in_step || cpu_flushes();
 }
 
-/* A cube near a pointer with a speed and spin that are denormal, as ODE's damping leaves them, and one
- * that is touched and then braked to a tenth of its speed in each step. The arithmetic of the
- * application's thread, which lockstep works in, is as it was. */
+/* A cube near a pointer with a speed and spin that are denormal, as ODE's damping leaves them,
+ * and one that is touched and then braked to a tenth of its speed in each step. The arithmetic
+ * of the application's thread, which lockstep works in, is as it was. */
 static void check_decay(hap_model model, bool touched)
 {
   test_world *w = world_new(0.0, 20);
@@ -217,7 +218,7 @@ static void check_decay(hap_model model, bool touched)
   }
   CHECK(found == 0 && tick->bodies.live_count == 1 && world_stats(w).faults.count == 0);
   CHECK(hapi_v3_norm(body->twist.linear) < 1e-150 && hapi_v3_norm(body->twist.angular) < 1e-150);
-  CHECK(!flushes() && !flushed_in_step);
+  CHECK(!cpu_flushes() && !flushed_in_step);
 }
 
 TEST(nothing_in_the_loop_is_denormal)

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* One edit of the body that a hand presses on: what the hand feels of it. Every write is looked at (felt.h):
- * finite, within the limit, no steeper than the slew limit. */
+/* One edit of the body that a hand presses on: what the hand feels of it. Every write is looked
+ * at (felt.h): finite, within the limit, no steeper than the slew limit. */
 
 #include "tests/tap.h"
 
@@ -47,7 +47,7 @@ static void destroy_geom(void)
   dGeomDestroy(f.s.geom);
 }
 
-static void build(void)
+static void floor_build(void)
 {
   f.s.cube = dBodyCreate(f.s.world);
   f.s.geom = dCreateBox(f.s.space, 1.0, 1.0, 1.0);
@@ -59,16 +59,16 @@ static void build(void)
 static void replace_told(void)
 {
   destroy_told();
-  build();
+  floor_build();
 }
 
 static void replace_untold(void)
 {
   destroy_untold();
-  build();
+  floor_build();
 }
 
-static void grow(void)
+static void cube_grow(void)
 {
   dGeomBoxSetLengths(f.s.geom, 1.01, 1.0, 1.0);
 }
@@ -78,12 +78,12 @@ static void grow_much(void)
   dGeomBoxSetLengths(f.s.geom, 1.1, 1.0, 1.0);
 }
 
-static void shrink(void)
+static void cube_shrink(void)
 {
   dGeomBoxSetLengths(f.s.geom, 0.8, 1.0, 1.0);
 }
 
-static void shift(void)
+static void cube_shift(void)
 {
   dGeomSetOffsetPosition(f.s.geom, -0.01, 0.0, 0.0);
 }
@@ -113,7 +113,7 @@ static void switch_off(void)
   dGeomDisable(f.s.geom);
 }
 
-static void hide(void)
+static void cube_hide(void)
 {
   dGeomSetCategoryBits(f.s.geom, 0);
 }
@@ -123,7 +123,7 @@ static void take_off(void)
   dGeomSetBody(f.s.geom, NULL); /* stays where it is */
 }
 
-static void hinge(void)
+static void cube_hinge(void)
 {
   dJointID joint = dJointCreateHinge(f.s.world, NULL);
   dJointAttach(joint, f.s.cube, NULL);
@@ -138,7 +138,7 @@ static void change_world(void)
   dWorldSetCFM(f.s.world, 1e-3);
 }
 
-static void disable(void)
+static void cube_disable(void)
 {
   dBodyDisable(f.s.cube);
 }
@@ -149,20 +149,20 @@ static const edit_case cases[] = {
     {"its geom destroyed", destroy_geom, 0.0, 0.0},
     {"replaced, told", replace_told, PRESSED - 0.01, PRESSED + 0.01},
     {"replaced, not told", replace_untold, PRESSED - 0.01, PRESSED + 0.01},
-    {"grown by 5 mm", grow, PRESSED + 0.6, PRESSED + 0.8},
+    {"grown by 5 mm", cube_grow, PRESSED + 0.6, PRESSED + 0.8},
     {"grown by 50 mm", grow_much, FELT_LIMIT, FELT_LIMIT},
-    {"shrunk", shrink, 0.0, 0.0},
-    {"shifted by 10 mm", shift, PRESSED + 1.2, PRESSED + 1.5},
+    {"shrunk", cube_shrink, 0.0, 0.0},
+    {"shifted by 10 mm", cube_shift, PRESSED + 1.2, PRESSED + 1.5},
     {"moved away", move_away, 0.0, 0.0},
     {"moved over the hand", move_over, FELT_LIMIT, FELT_LIMIT},
     {"pulled back", pull_back, 0.0, 0.0},
     {"set free", set_free, 0.0, 0.0},
     {"geom switched off", switch_off, 0.0, 0.0},
-    {"geom without category", hide, 0.0, 0.0},
+    {"geom without category", cube_hide, 0.0, 0.0},
     {"geom without body", take_off, PRESSED - 0.01, PRESSED + 0.01},
-    {"on a hinge, through its middle", hinge, PRESSED - 0.2, PRESSED + 0.2},
+    {"on a hinge, through its middle", cube_hinge, PRESSED - 0.2, PRESSED + 0.2},
     {"gravity, ERP, CFM", change_world, PRESSED - 0.01, PRESSED + 0.01},
-    {"disabled", disable, PRESSED - 0.01, PRESSED + 0.01},
+    {"disabled", cube_disable, PRESSED - 0.01, PRESSED + 0.01},
 };
 
 /* A sync of 50 Hz, a tick more, and the way down at the slew limit. */

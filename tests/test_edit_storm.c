@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Everything in the world changes all the time, under hands that come and go. "long": for a minute each;
- * "SECONDS": for so long. */
+/* Everything in the world changes all the time, under hands that come and go. "long": for a
+ * minute each; "SECONDS": for so long. */
 
 #include "tests/tap.h"
 
@@ -11,7 +11,7 @@
 
 static double seconds = 2.0;
 
-static void say(const storm_result *r)
+static void storm_say(const storm_result *r)
 {
   const hap_stats *s = &r->stats;
   printf(
@@ -31,7 +31,7 @@ static void say(const storm_result *r)
          s->hand.momentum_error_ns, s->hand.impulse_abs_ns);
 }
 
-static void check(const storm_def *def, storm_result *out)
+static void storm_check(const storm_def *def, storm_result *out)
 {
   hap_detail detail = {""};
   hap_status status = storm_run(def, out, &detail);
@@ -39,7 +39,7 @@ static void check(const storm_def *def, storm_result *out)
     printf("# %s\n", detail.text);
   }
   REQUIRE(status >= HAP_OK);
-  say(out);
+  storm_say(out);
   CHECK(out->bad == 0 && out->unreleased == 0);
   CHECK(out->peak <= STORM_FORCE * (1.0 + 1e-9) && out->steepest <= STORM_SLEW * (1.0 + 1e-9));
   CHECK(out->unexpected == 0 && out->faults == 0);
@@ -50,7 +50,7 @@ static void check(const storm_def *def, storm_result *out)
   CHECK(out->stats.hand.momentum_error_ns <= 1e-6 * out->stats.hand.impulse_abs_ns);
 }
 
-static storm_def usual(hap_drive drive, hap_model model)
+static storm_def storm_usual(hap_drive drive, hap_model model)
 {
   return (storm_def){.drive = drive,
                      .model = model,
@@ -68,8 +68,8 @@ static storm_def usual(hap_drive drive, hap_model model)
 TEST(threads_in_model_contact)
 {
   storm_result r;
-  storm_def def = usual(HAP_DRIVE_THREADS, HAP_MODEL_CONTACT);
-  check(&def, &r);
+  storm_def def = storm_usual(HAP_DRIVE_THREADS, HAP_MODEL_CONTACT);
+  storm_check(&def, &r);
   CHECK(r.tries_in_vain > 0 && r.stats.edits.locks > 0);
 }
 
@@ -77,22 +77,22 @@ TEST(threads_in_the_other_models)
 {
   for (int model = HAP_MODEL_SINGLE; model < HAP_MODEL_CONTACT; ++model) {
     storm_result r;
-    storm_def def = usual(HAP_DRIVE_THREADS, (hap_model)model);
+    storm_def def = storm_usual(HAP_DRIVE_THREADS, (hap_model)model);
     def.seconds = 0.5 * seconds;
-    check(&def, &r);
+    storm_check(&def, &r);
   }
 }
 
-TEST(frame)
+TEST(storm_frame)
 {
   storm_result r;
-  storm_def def = usual(HAP_DRIVE_FRAME, HAP_MODEL_CONTACT);
+  storm_def def = storm_usual(HAP_DRIVE_FRAME, HAP_MODEL_CONTACT);
   def.telling = STORM_TELLS_NOT;
-  check(&def, &r);
+  storm_check(&def, &r);
   CHECK(r.lost > 0);
 }
 
-static void note(hap_session *session, void *log)
+static void trace_note(hap_session *session, void *log)
 {
   repeat_note(log, session);
 }
@@ -101,9 +101,9 @@ static void run_told(repeat_log *log, const void *arg)
 {
   storm_result r;
   storm_def def = *(const storm_def *)arg;
-  def.ticked = note;
+  def.ticked = trace_note;
   def.ticked_arg = log;
-  check(&def, &r);
+  storm_check(&def, &r);
   CHECK(r.stats.loop.ticks == log->count && r.stats.loop.trace_hash != 0);
 }
 
@@ -112,7 +112,7 @@ TEST(lockstep_repeats_bit_by_bit)
 {
   int seeds = seconds < 30.0 ? 1 : 3;
   for (int model = HAP_MODEL_SINGLE; model <= HAP_MODEL_CONTACT; ++model) {
-    storm_def def = usual(HAP_DRIVE_LOCKSTEP, (hap_model)model);
+    storm_def def = storm_usual(HAP_DRIVE_LOCKSTEP, (hap_model)model);
     def.telling = STORM_TELLS;
     def.restarts = false;
     for (int i = 0; i < seeds; ++i) {
@@ -126,10 +126,10 @@ TEST(lockstep_untold)
 {
   for (uint64_t seed = 1; seed < 4; ++seed) {
     storm_result r;
-    storm_def def = usual(HAP_DRIVE_LOCKSTEP, HAP_MODEL_CONTACT);
+    storm_def def = storm_usual(HAP_DRIVE_LOCKSTEP, HAP_MODEL_CONTACT);
     def.seed = seed;
     def.telling = STORM_TELLS_NOT;
-    check(&def, &r);
+    storm_check(&def, &r);
     CHECK(r.lost > 0);
   }
 }

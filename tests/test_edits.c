@@ -10,8 +10,8 @@
 #include "tests/physics_world.h"
 #include "tests/stage.h"
 
-/* What an application changes in a world that is felt: bodies in place of others, settings, the lock,
- * posted edits. */
+/* What an application changes in a world that is felt: bodies in place of others, settings, the
+ * lock, posted edits. */
 
 static hap_pointer_id add_hand(stage *s, double x)
 {
@@ -97,7 +97,7 @@ static void check_replacement(hap_model model, bool touched)
   calls_of_old = 0;
   CHECK(hap_session_advance(s->session, 25) == HAP_BODY_LOST);
   CHECK(stats_of(s).faults.bodies_lost == 1 && stats_of(s).model.bodies_known == 1);
-  CHECK(has(detail_of(s), "hap_session_forget_body"));
+  CHECK(text_has(detail_of(s), "hap_session_forget_body"));
   CHECK(dBodyGetPosition(s->cube)[1] == 3.0 && hapi_v3_norm(dBodyGetLinearVel(s->cube)) == 0.0);
   CHECK(hap_session_poses(s->session, hap_session_now(s->session), &s->cube, 1, &pose) == HAP_OK);
   CHECK(pose.position[1] == 3.0); /* not on its way from where the other one was */
@@ -368,12 +368,13 @@ TEST(errors_of_the_lock_say_what_to_do)
 {
   stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
   REQUIRE(s != NULL);
-  CHECK(hap_session_unlock(s->session) == HAP_ERROR_THREAD && has(detail_of(s), "unlock"));
+  CHECK(hap_session_unlock(s->session) == HAP_ERROR_THREAD && text_has(detail_of(s), "unlock"));
   CHECK(hap_session_try_lock(s->session, -1) == HAP_ERROR_ARGUMENT);
-  CHECK(has(detail_of(s), "timeout_ns is -1"));
+  CHECK(text_has(detail_of(s), "timeout_ns is -1"));
   CHECK(hap_session_try_lock(s->session, INT64_MIN) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_try_lock(s->session, 0) == HAP_OK);
-  CHECK(hap_session_lock(s->session) == HAP_ERROR_THREAD && has(detail_of(s), "not recursive"));
+  CHECK(hap_session_lock(s->session) == HAP_ERROR_THREAD &&
+        text_has(detail_of(s), "not recursive"));
   CHECK(hap_session_try_lock(s->session, INT64_MAX) == HAP_ERROR_THREAD);
   CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_THREAD); /* would wait for itself */
   CHECK(hap_session_unlock(s->session) == HAP_OK);
@@ -623,7 +624,7 @@ TEST(a_full_queue_is_said)
     CHECK(hap_session_post(s->session, note_run, &run) == HAP_OK);
   }
   CHECK(hap_session_post(s->session, note_run, &run) == HAP_ERROR_CAPACITY);
-  CHECK(has(detail_of(s), "256"));
+  CHECK(text_has(detail_of(s), "256"));
   stage_end(s);
   CHECK(atomic_load(&run) == 256);
 }

@@ -8,12 +8,13 @@
 #include "contact_world.h"
 #include "tools/rig.h"
 
-/* Each effect: decided from worlds that are made for it, for its reason; off leaves it out; auto is as on. */
+/* Each effect: decided from worlds that are made for it, for its reason; off leaves it out; auto
+ * is as on. */
 
 #define EDGE 0.05
 #define HAND 0.01
 
-static hap_effect_info look(const contact_world *w, hap_effect effect)
+static hap_effect_info effect_look(const contact_world *w, hap_effect effect)
 {
   hap_effect_info all[HAP_EFFECTS];
   memset(all, 0, sizeof all);
@@ -21,10 +22,10 @@ static hap_effect_info look(const contact_world *w, hap_effect effect)
   return all[effect];
 }
 
-static bool is(const contact_world *w, hap_effect effect, hap_effect_state state,
-               hap_effect_reason reason)
+static bool effect_is(const contact_world *w, hap_effect effect, hap_effect_state state,
+                      hap_effect_reason reason)
 {
-  hap_effect_info info = look(w, effect);
+  hap_effect_info info = effect_look(w, effect);
   bool good = info.state == (uint32_t)state && info.reason == (uint32_t)reason;
   if (!good) {
     printf("# %s: state %u, %u of %u, %s\n", hap_effect_name(effect), info.state, info.on, info.of,
@@ -35,15 +36,15 @@ static bool is(const contact_world *w, hap_effect effect, hap_effect_state state
 
 static bool is_off(const contact_world *w, hap_effect effect, hap_effect_reason reason)
 {
-  return is(w, effect, HAP_EFFECT_IS_OFF, reason);
+  return effect_is(w, effect, HAP_EFFECT_IS_OFF, reason);
 }
 
 static bool is_called(const contact_world *w, hap_effect effect)
 {
-  return is(w, effect, HAP_EFFECT_IS_ON, HAP_REASON_CALLED);
+  return effect_is(w, effect, HAP_EFFECT_IS_ON, HAP_REASON_CALLED);
 }
 
-static void wish(contact_world *w, hap_effect effect, hap_effect_wish wished)
+static void effect_wish(contact_world *w, hap_effect effect, hap_effect_wish wished)
 {
   expert_wish(&w->expert, effect, wished);
 }
@@ -119,9 +120,9 @@ TEST(a_row_on_a_floor_calls_for_contacts_passes_and_range)
   contact_world *w = open_on_floor(3);
   REQUIRE(start_left(w, 0.002));
   cw_run(w, 60);
-  CHECK(is_called(w, HAP_EFFECT_CONTACTS) && look(w, HAP_EFFECT_CONTACTS).on == 3);
+  CHECK(is_called(w, HAP_EFFECT_CONTACTS) && effect_look(w, HAP_EFFECT_CONTACTS).on == 3);
   CHECK(is_called(w, HAP_EFFECT_PASSES));
-  CHECK(is_called(w, HAP_EFFECT_RANGE) && look(w, HAP_EFFECT_RANGE).on == 2);
+  CHECK(is_called(w, HAP_EFFECT_RANGE) && effect_look(w, HAP_EFFECT_RANGE).on == 2);
   CHECK(is_off(w, HAP_EFFECT_RESTITUTION, HAP_REASON_NO_BOUNCE));
   CHECK(is_off(w, HAP_EFFECT_OBSERVER, HAP_REASON_MEASURING));
   CHECK(cw_stats(w).contact.passes > 8);
@@ -165,7 +166,7 @@ TEST(a_hinge_calls_for_joints)
   contact_world *w = open_door();
   REQUIRE(start_at_door(w));
   cw_run(w, 160);
-  CHECK(is_called(w, HAP_EFFECT_JOINTS) && look(w, HAP_EFFECT_JOINTS).on == 1);
+  CHECK(is_called(w, HAP_EFFECT_JOINTS) && effect_look(w, HAP_EFFECT_JOINTS).on == 1);
   CHECK(is_called(w, HAP_EFFECT_GYRO)); /* a box that spins by now */
 }
 
@@ -195,9 +196,9 @@ TEST(why_a_body_has_no_gyroscopic_term)
     }
     REQUIRE(cw_start(w, 0.0, 0.0, 0.01 + HAND + 0.012));
     cw_run(w, 60);
-    CHECK(is(w, HAP_EFFECT_GYRO,
-             cases[i].reason == HAP_REASON_CALLED ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF,
-             cases[i].reason));
+    CHECK(effect_is(w, HAP_EFFECT_GYRO,
+                    cases[i].reason == HAP_REASON_CALLED ? HAP_EFFECT_IS_ON : HAP_EFFECT_IS_OFF,
+                    cases[i].reason));
     cw_close(w);
   }
 }
@@ -228,7 +229,7 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
   CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_FLAT));
   CHECK(hap_session_set_effect(w->session, HAP_EFFECT_SHAPE, HAP_EFFECT_ON) == HAP_OK);
   cw_run(w, 60);
-  CHECK(is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+  CHECK(effect_is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
 
   dMass m;
   w = cw_new(0.0);
@@ -260,7 +261,7 @@ TEST(the_range_that_has_no_room_is_told)
   w->def.max_bodies = 2;
   REQUIRE(start_left(w, 0.002));
   cw_run(w, 60);
-  CHECK(is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_PARTLY, HAP_REASON_OUTSIDE));
+  CHECK(effect_is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_PARTLY, HAP_REASON_OUTSIDE));
 }
 
 TEST(a_coupling_of_its_own_is_a_reason)
@@ -292,12 +293,12 @@ TEST(a_free_body_needs_no_testing_simulation_and_answers_alike)
   for (int i = 0; i < 2; ++i) {
     contact_world *w = cw_new(0.0);
     w->def.model = HAP_MODEL_ACCELERANCE;
-    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
+    effect_wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
     cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
     REQUIRE(cw_start(w, -EDGE / 2 - HAND - 0.002, 0.01, 0.0)); /* beside the middle: it turns */
     cw_go(w, 0.1, 0.0, 0.0, 80);
     CHECK(i == 0 ? is_off(w, HAP_EFFECT_TESTING, HAP_REASON_FREE)
-                 : is(w, HAP_EFFECT_TESTING, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+                 : effect_is(w, HAP_EFFECT_TESTING, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
     CHECK((cw_stats(w).probes.steps == 0) == (i == 0));
     memcpy(force[i], w->force, sizeof w->force);
     velocity[i] = w->velocity[0][0];
@@ -336,7 +337,7 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
     }
     REQUIRE(cw_start(w, EDGE / 2, 0.0, EDGE / 2 + HAND + 0.002));
     cw_run(w, 130); /* two ticks of them are looked at */
-    hap_effect_info info = look(w, HAP_EFFECT_CROSS);
+    hap_effect_info info = effect_look(w, HAP_EFFECT_CROSS);
     CHECK(i == 2 ? is_off(w, HAP_EFFECT_CROSS, HAP_REASON_NOT_PAPERS)
                  : info.reason == HAP_REASON_ASKED);
     CHECK((info.on > 0) == (i == 0));
@@ -348,13 +349,13 @@ TEST(bodies_of_one_island_call_for_cross_accelerance)
 
 /* ---- off leaves it out ---- */
 
-/* Two cubes in a row, of which the first is pushed: how fast the second one moves in the loop between two
- * syncs, before the world could say anything of it. */
+/* Two cubes in a row, of which the first is pushed: how fast the second one moves in the loop
+ * between two syncs, before the world could say anything of it. */
 static double second_moves(hap_effect effect, hap_effect_wish wished)
 {
   double speed = 0.0;
   contact_world *w = cw_new(0.0);
-  wish(w, effect, wished);
+  effect_wish(w, effect, wished);
   cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
   cw_add_cube(w, 0.2, EDGE, EDGE + 1e-4, 0.0, 0.0);
   dJointID joint = dJointCreateBall(w->world, NULL);
@@ -386,14 +387,14 @@ TEST(what_the_loop_does_not_simulate_is_measured_or_nothing_is_known_of_it)
 {
   for (int i = 0; i < 2; ++i) {
     contact_world *w = open_door();
-    wish(w, HAP_EFFECT_JOINTS, HAP_EFFECT_OFF);
-    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_OFF);
+    effect_wish(w, HAP_EFFECT_JOINTS, HAP_EFFECT_OFF);
+    effect_wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_OFF);
     REQUIRE(start_at_door(w));
     cw_run(w, 60);
     hap_stats stats = cw_stats(w);
     CHECK(stats.model.range_bodies == 0 && stats.model.range_joints == 0);
     CHECK((stats.model.measured_bodies == 1) == (i == 0) && (stats.probes.steps > 0) == (i == 0));
-    CHECK(is(w, HAP_EFFECT_JOINTS, HAP_EFFECT_IS_OFF, HAP_REASON_ASKED));
+    CHECK(effect_is(w, HAP_EFFECT_JOINTS, HAP_EFFECT_IS_OFF, HAP_REASON_ASKED));
     CHECK(i == 0 ? is_called(w, HAP_EFFECT_TESTING)
                  : is_off(w, HAP_EFFECT_TESTING, HAP_REASON_ASKED));
   }
@@ -403,14 +404,14 @@ TEST(the_range_that_is_off_ends_at_the_neighbours)
 {
   for (int i = 0; i < 2; ++i) {
     contact_world *w = open_on_floor(4);
-    wish(w, HAP_EFFECT_RANGE, i == 0 ? HAP_EFFECT_OFF : HAP_EFFECT_ON);
+    effect_wish(w, HAP_EFFECT_RANGE, i == 0 ? HAP_EFFECT_OFF : HAP_EFFECT_ON);
     cw_add_cube(w, 0.2, EDGE, 2.0, 2.0, EDGE / 2); /* far from all */
     w->def.physics_hz = 50.0;
     REQUIRE(start_left(w, 0.002));
     cw_run(w, 60);
     CHECK(cw_stats(w).model.range_bodies == (i == 0 ? 1u : 5u));
     CHECK(i == 0 ? is_off(w, HAP_EFFECT_RANGE, HAP_REASON_ASKED)
-                 : is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+                 : effect_is(w, HAP_EFFECT_RANGE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
   }
 }
 
@@ -420,7 +421,7 @@ TEST(passes_that_are_off_come_with_the_syncs)
   uint64_t passes[3];
   for (int i = 0; i < 3; ++i) {
     contact_world *w = open_on_floor(1);
-    wish(w, HAP_EFFECT_PASSES, wishes[i]);
+    effect_wish(w, HAP_EFFECT_PASSES, wishes[i]);
     REQUIRE(start_left(w, 0.002));
     cw_run(w, 500);
     passes[i] = cw_stats(w).contact.passes;
@@ -433,7 +434,7 @@ TEST(passes_that_are_off_come_with_the_syncs)
 TEST(passes_that_are_asked_for_come_without_need)
 {
   contact_world *w = cw_new(0.0);
-  wish(w, HAP_EFFECT_PASSES, HAP_EFFECT_ON);
+  effect_wish(w, HAP_EFFECT_PASSES, HAP_EFFECT_ON);
   cw_add_cube(w, 0.2, EDGE, 0.0, 0.0, 0.0);
   REQUIRE(cw_start(w, -EDGE, 0.0, 0.0));
   cw_run(w, 200);
@@ -447,7 +448,7 @@ static double bounces_to(hap_effect_wish wished)
   cw_add_floor(w);
   w->surface.mode |= dContactBounce;
   w->surface.bounce = 0.8;
-  wish(w, HAP_EFFECT_RESTITUTION, wished);
+  effect_wish(w, HAP_EFFECT_RESTITUTION, wished);
   cw_add_ball(w, 0.2, 0.02, 0.0, 0.0, 0.05);
   if (cw_start(w, 0.0, 0.0, 0.02 + 0.05 + HAND + 0.002)) {
     cw_go(w, 0.0, 0.0, 0.1, 120);
@@ -470,7 +471,7 @@ static void rub_floor(hap_effect effect, hap_effect_wish wished, double mu, hap_
   contact_world *w = cw_new(0.0);
   cw_add_floor(w);
   w->hand_def.friction = mu;
-  wish(w, effect, wished);
+  effect_wish(w, effect, wished);
   cw_move_hand(w, 0.05, 0.0, 0.0);
   if (cw_start(w, 0.0, 0.0, HAND - 0.001)) {
     cw_run(w, 200);
@@ -497,12 +498,13 @@ TEST(friction_and_torque_that_are_off_are_zero)
   CHECK_NEAR(with.force[2], without.force[2], 1e-9);
 }
 
-/* The inertia of a plate in a ball, spinning about its middle axis and a little about another one. */
-static double tumbles(hap_effect_wish wished)
+/* The inertia of a plate in a ball, spinning about its middle axis and a little about another
+ * one. */
+static double box_tumbles(hap_effect_wish wished)
 {
   double turned = 0.0;
   contact_world *w = cw_new(0.0);
-  wish(w, HAP_EFFECT_GYRO, wished);
+  effect_wish(w, HAP_EFFECT_GYRO, wished);
   dMass mass;
   dMassSetBoxTotal(&mass, 0.5, 0.2, 0.1, 0.02);
   dBodyID plate = cw_add(w, dCreateSphere(w->space, 0.05), &mass, 0.0, 0.0, 0.0);
@@ -510,7 +512,7 @@ static double tumbles(hap_effect_wish wished)
   dBodySetGyroscopicMode(plate, 1);
   if (cw_start(w, 0.0, 0.0, 0.05 + HAND + 0.003)) {
     cw_run(w, 301);
-    CHECK(look(w, HAP_EFFECT_GYRO).of == 1 && cw_stats(w).loop.contact_ticks == 0);
+    CHECK(effect_look(w, HAP_EFFECT_GYRO).of == 1 && cw_stats(w).loop.contact_ticks == 0);
     turned = dBodyGetAngularVel(plate)[2];
   }
   return turned;
@@ -518,9 +520,9 @@ static double tumbles(hap_effect_wish wished)
 
 TEST(a_gyroscopic_term_that_is_off_does_not_tumble)
 {
-  CHECK(fabs(tumbles(HAP_EFFECT_AUTO)) > 0.5);
-  CHECK_NEAR(tumbles(HAP_EFFECT_ON), tumbles(HAP_EFFECT_AUTO), 1e-9);
-  CHECK_NEAR(tumbles(HAP_EFFECT_OFF), 0.0, 1e-9);
+  CHECK(fabs(box_tumbles(HAP_EFFECT_AUTO)) > 0.5);
+  CHECK_NEAR(box_tumbles(HAP_EFFECT_ON), box_tumbles(HAP_EFFECT_AUTO), 1e-9);
+  CHECK_NEAR(box_tumbles(HAP_EFFECT_OFF), 0.0, 1e-9);
 }
 
 /* A hand that goes across a ball without pressing it: on a plane it would sink in beside it. */
@@ -528,7 +530,7 @@ static double across_ball(hap_effect_wish wished)
 {
   double force = 0.0;
   contact_world *w = cw_new(0.0);
-  wish(w, HAP_EFFECT_SHAPE, wished);
+  effect_wish(w, HAP_EFFECT_SHAPE, wished);
   dGeomID ball = dCreateSphere(w->space, 0.05);
   dGeomSetPosition(ball, 0.0, 0.0, 0.0);
   cw_move_hand(w, 0.2, 0.0, 0.0);
@@ -553,12 +555,13 @@ TEST(the_proxy_can_be_had_and_left_out)
     hap_pointer_state state;
     contact_world *w = open_on_floor(1);
     w->hand_expert.coupling_stiffness = i == 0 ? 500.0 : 5000.0; /* auto would do the other */
-    wish(w, HAP_EFFECT_PROXY, wishes[i]);
+    effect_wish(w, HAP_EFFECT_PROXY, wishes[i]);
     REQUIRE(start_left(w, 0.0));
     cw_run(w, 101);
     REQUIRE(hap_pointer_get(w->session, w->hand, &state, sizeof state) == HAP_OK);
     CHECK(state.coupling == (uint32_t)(i == 0 ? HAP_COUPLING_DIRECT : HAP_COUPLING_PROXY));
-    CHECK(is(w, HAP_EFFECT_PROXY, i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+    CHECK(effect_is(w, HAP_EFFECT_PROXY, i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON,
+                    HAP_REASON_ASKED));
   }
 }
 
@@ -576,21 +579,21 @@ TEST(wishes_can_change_from_sync_to_sync)
     for (int i = 0; i < HAP_EFFECT_RECORDING; ++i) {
       if (i != HAP_EFFECT_CROSS) {
         CHECK(hap_session_set_effect(w->session, (hap_effect)i, wished) == HAP_OK);
-        CHECK(look(w, (hap_effect)i).wish == (uint32_t)wished);
+        CHECK(effect_look(w, (hap_effect)i).wish == (uint32_t)wished);
       }
     }
     cw_run(w, 101);
     bool off = wished == HAP_EFFECT_OFF;
-    CHECK((look(w, HAP_EFFECT_OBSERVER).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK((look(w, HAP_EFFECT_FRICTION).state == HAP_EFFECT_IS_OFF) == off);
-    CHECK((look(w, HAP_EFFECT_CONTACTS).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((effect_look(w, HAP_EFFECT_OBSERVER).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((effect_look(w, HAP_EFFECT_FRICTION).state == HAP_EFFECT_IS_OFF) == off);
+    CHECK((effect_look(w, HAP_EFFECT_CONTACTS).state == HAP_EFFECT_IS_OFF) == off);
     CHECK(wished == HAP_EFFECT_AUTO || /* which stays one as long as it is touched */
-          (look(w, HAP_EFFECT_PROXY).state == HAP_EFFECT_IS_OFF) == off);
+          (effect_look(w, HAP_EFFECT_PROXY).state == HAP_EFFECT_IS_OFF) == off);
     CHECK(isfinite(w->force[0]) && cw_stats(w).faults.fault == HAP_FAULT_NONE);
   }
 }
 
-static bool says(const hap_detail *detail, const char *what)
+static bool detail_says(const hap_detail *detail, const char *what)
 {
   bool found = strstr(detail->text, what) != NULL;
   if (!found) {
@@ -615,21 +618,22 @@ TEST(what_a_model_cannot_do_is_refused_with_what_to_do)
     hap_detail detail = {""};
     CHECK(hap_effect_check(cases[i].effect, cases[i].wish, cases[i].model, &detail) ==
           HAP_ERROR_UNSUPPORTED);
-    CHECK(says(&detail, cases[i].text) && says(&detail, hap_effect_name(cases[i].effect)));
+    CHECK(detail_says(&detail, cases[i].text) &&
+          detail_says(&detail, hap_effect_name(cases[i].effect)));
     contact_world *w = cw_new(0.0);
     w->def.model = cases[i].model;
     REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
-    uint32_t before = look(w, cases[i].effect).wish;
+    uint32_t before = effect_look(w, cases[i].effect).wish;
     CHECK(hap_session_set_effect(w->session, cases[i].effect, cases[i].wish) ==
           HAP_ERROR_UNSUPPORTED);
-    CHECK(hap_session_detail(w->session, &detail) == HAP_OK && says(&detail, cases[i].text));
-    CHECK(look(w, cases[i].effect).wish == before);
+    CHECK(hap_session_detail(w->session, &detail) == HAP_OK && detail_says(&detail, cases[i].text));
+    CHECK(effect_look(w, cases[i].effect).wish == before);
     hap_session_destroy(w->session);
     w->session = NULL;
-    wish(w, cases[i].effect, cases[i].wish);
+    effect_wish(w, cases[i].effect, cases[i].wish);
     w->ode.world = w->world;
     CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_UNSUPPORTED);
-    CHECK(says(&detail, cases[i].text));
+    CHECK(detail_says(&detail, cases[i].text));
   }
 }
 
@@ -665,24 +669,24 @@ TEST(bad_arguments_change_nothing)
   w->session = NULL;
   w->expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECTS);
   CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(says(&detail, "effects_off"));
+  CHECK(detail_says(&detail, "effects_off"));
   w->expert.effects_off = w->expert.effects_on = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
   CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
-  CHECK(says(&detail, "gyro is in effects_on and in effects_off"));
+  CHECK(detail_says(&detail, "gyro is in effects_on and in effects_off"));
 }
 
 TEST(a_wish_outlives_a_model_that_cannot_fulfil_it)
 {
   contact_world *w = open_on_floor(1);
-  wish(w, HAP_EFFECT_SHAPE, HAP_EFFECT_ON);
+  effect_wish(w, HAP_EFFECT_SHAPE, HAP_EFFECT_ON);
   REQUIRE(start_left(w, 0.002));
   CHECK(hap_session_set_model(w->session, HAP_MODEL_IMPULSE) == HAP_OK);
   cw_run(w, 101);
   CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_NOT_IN_MODEL));
-  CHECK(look(w, HAP_EFFECT_SHAPE).wish == HAP_EFFECT_ON);
+  CHECK(effect_look(w, HAP_EFFECT_SHAPE).wish == HAP_EFFECT_ON);
   CHECK(hap_session_set_model(w->session, HAP_MODEL_CONTACT) == HAP_OK);
   cw_run(w, 151);
-  CHECK(is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
+  CHECK(effect_is(w, HAP_EFFECT_SHAPE, HAP_EFFECT_IS_ON, HAP_REASON_ASKED));
 }
 
 TEST(times_are_of_what_is_on)
@@ -691,12 +695,13 @@ TEST(times_are_of_what_is_on)
   REQUIRE(start_left(w, 0.0));
   cw_run(w, 640);
   hap_stats stats = cw_stats(w);
-  hap_effect_info contacts = look(w, HAP_EFFECT_CONTACTS);
+  hap_effect_info contacts = effect_look(w, HAP_EFFECT_CONTACTS);
   CHECK(isnan(contacts.tick_us) ||
         (contacts.tick_us > 0.0 && contacts.tick_us < stats.loop.tick_us_max));
   CHECK(contacts.contact_us > 0.0 && contacts.physics_ms > 0.0);
-  CHECK(isnan(look(w, HAP_EFFECT_GYRO).tick_us) || look(w, HAP_EFFECT_GYRO).tick_us == 0.0);
-  CHECK(isnan(look(w, HAP_EFFECT_RANGE).tick_us));
+  CHECK(isnan(effect_look(w, HAP_EFFECT_GYRO).tick_us) ||
+        effect_look(w, HAP_EFFECT_GYRO).tick_us == 0.0);
+  CHECK(isnan(effect_look(w, HAP_EFFECT_RANGE).tick_us));
 }
 
 TEST(bodies_of_the_loop_are_not_tested_when_it_is_asked_for)
@@ -704,7 +709,7 @@ TEST(bodies_of_the_loop_are_not_tested_when_it_is_asked_for)
   double force[2];
   for (int i = 0; i < 2; ++i) {
     contact_world *w = open_on_floor(3);
-    wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
+    effect_wish(w, HAP_EFFECT_TESTING, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
     REQUIRE(start_left(w, 0.002));
     cw_run(w, 400);
     force[i] = w->force[0];

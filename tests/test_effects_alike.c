@@ -10,8 +10,8 @@
 #include "base/cycles.h"
 #include "tools/rig.h"
 
-/* What is left to the library feels as if it were on: every effect by itself and all together, in scenes that
- * call for different ones, in all models. And what is on has its time told. */
+/* What is left to the library feels as if it were on: every effect by itself and all together,
+ * in scenes that call for different ones, in all models. And what is on has its time told. */
 
 #define TICKS_MAX 900
 #define FORCE_BOUND 1e-3
@@ -35,7 +35,7 @@ static const scene_run scenes[] = {
 static const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE, HAP_MODEL_IMPULSE,
                                    HAP_MODEL_SINGLE};
 
-static bool can(int effect, hap_effect_wish wish, hap_model model)
+static bool effect_can(int effect, hap_effect_wish wish, hap_model model)
 {
   return hap_effect_check((hap_effect)effect, wish, model, NULL) >= HAP_OK;
 }
@@ -43,7 +43,7 @@ static bool can(int effect, hap_effect_wish wish, hap_model model)
 /* Cross accelerance is another model of the world, and not what auto stands for. */
 static bool is_alike(int effect, hap_model model)
 {
-  return can(effect, HAP_EFFECT_ON, model) && effect != HAP_EFFECT_CROSS;
+  return effect_can(effect, HAP_EFFECT_ON, model) && effect != HAP_EFFECT_CROSS;
 }
 
 static bool open_rig(const scene_run *of, hap_model model, const uint8_t effects[HAP_EFFECTS],
@@ -69,8 +69,8 @@ static bool open_rig(const scene_run *of, hap_model model, const uint8_t effects
 }
 
 /* False: the session failed. info may be NULL. */
-static bool run(const scene_run *of, hap_model model, const uint8_t effects[HAP_EFFECTS],
-                hand_force *out, hap_effect_info info[HAP_EFFECTS])
+static bool scene_run_with(const scene_run *of, hap_model model, const uint8_t effects[HAP_EFFECTS],
+                           hand_force *out, hap_effect_info info[HAP_EFFECTS])
 {
   rig r;
   double sum2 = 0.0;
@@ -97,7 +97,7 @@ static bool run(const scene_run *of, hap_model model, const uint8_t effects[HAP_
   return good;
 }
 
-static double difference(const hand_force *a, const hand_force *b)
+static double force_difference(const hand_force *a, const hand_force *b)
 {
   const double *x = &a->at[0][0][0];
   const double *y = &b->at[0][0][0];
@@ -112,8 +112,8 @@ static void check_alike(const scene_run *of, hap_model model, const hand_force *
                         const uint8_t effects[HAP_EFFECTS], const char *which)
 {
   static hand_force on;
-  REQUIRE(run(of, model, effects, &on, NULL));
-  double apart = difference(automatic, &on);
+  REQUIRE(scene_run_with(of, model, effects, &on, NULL));
+  double apart = force_difference(automatic, &on);
   bool alike = apart <= FORCE_BOUND;
   CHECK_SAY(alike, "%s, %s, %s on: force is %.3g %% off", of->scene, hap_model_name(model), which,
             100.0 * apart);
@@ -123,7 +123,7 @@ static void check_scene(const scene_run *of, hap_model model)
 {
   static hand_force automatic;
   uint8_t all[HAP_EFFECTS] = {0};
-  REQUIRE(run(of, model, (uint8_t[HAP_EFFECTS]){0}, &automatic, NULL));
+  REQUIRE(scene_run_with(of, model, (uint8_t[HAP_EFFECTS]){0}, &automatic, NULL));
   CHECK(automatic.share > 0.0); /* something was touched */
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     uint8_t one[HAP_EFFECTS] = {0};
@@ -144,7 +144,8 @@ TEST(auto_is_as_on_in_force)
   }
 }
 
-/* Else the comparison above would say nothing: each of these is felt in one scene at least when it is off. */
+/* Else the comparison above would say nothing: each of these is felt in one scene at least when
+ * it is off. */
 TEST(what_is_off_is_felt)
 {
   static const struct {
@@ -157,18 +158,18 @@ TEST(what_is_off_is_felt)
   static hand_force off;
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     uint8_t effects[HAP_EFFECTS] = {0};
-    REQUIRE(run(&cases[i].in, HAP_MODEL_CONTACT, effects, &automatic, NULL));
+    REQUIRE(scene_run_with(&cases[i].in, HAP_MODEL_CONTACT, effects, &automatic, NULL));
     effects[cases[i].effect] = HAP_EFFECT_OFF;
-    REQUIRE(run(&cases[i].in, HAP_MODEL_CONTACT, effects, &off, NULL));
-    double apart = difference(&automatic, &off);
+    REQUIRE(scene_run_with(&cases[i].in, HAP_MODEL_CONTACT, effects, &off, NULL));
+    double apart = force_difference(&automatic, &off);
     printf("# %s off in %s: force is %.3g %% off\n", hap_effect_name(cases[i].effect),
            cases[i].in.scene, 100.0 * apart);
     CHECK(apart > FORCE_BOUND);
   }
 }
 
-/* Where docs/effects.md says that an effect has a time, it has one when it is on in a scene that calls for it; of
- * cross see test_effects. */
+/* Where docs/effects.md says that an effect has a time, it has one when it is on in a scene that
+ * calls for it; of cross see test_effects. */
 TEST(every_time_is_filled_in)
 {
   enum {
@@ -203,7 +204,7 @@ TEST(every_time_is_filled_in)
     hap_effect_info info[HAP_EFFECTS];
     uint8_t effects[HAP_EFFECTS] = {0};
     effects[cases[i].effect] = HAP_EFFECT_ON;
-    REQUIRE(run(&cases[i].in, cases[i].model, effects, &force, info));
+    REQUIRE(scene_run_with(&cases[i].in, cases[i].model, effects, &force, info));
     const hap_effect_info *own = &info[cases[i].effect];
     bool tick = (cases[i].where & TICK) == 0 || !HAPI_HAS_CYCLES || own->tick_us > 0.0;
     bool physics = (cases[i].where & PHYSICS) == 0 || own->physics_ms > 0.0;

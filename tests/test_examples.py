@@ -142,8 +142,8 @@ def shows(page, name):
 
 
 def part(lines, old):
-    """The lines from the first to the last one of an old part; as many as it had where its last line
-    has changed."""
+    """The lines from the first to the last one of an old part; as many as it had where its last
+    line has changed."""
     start = lines.index(old[0])
     try:
         end = lines.index(old[-1], start + 1) if len(old) > 1 else start

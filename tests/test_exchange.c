@@ -115,29 +115,29 @@ typedef struct message {
   uint64_t sum;
 } message;
 
-static uint64_t mix(uint64_t x)
+static uint64_t bits_mix(uint64_t x)
 {
   x = (x ^ (x >> 31)) * 0x9e3779b97f4a7c15u;
   return x ^ (x >> 29);
 }
 
-static void fill(message *m, uint64_t number)
+static void message_fill(message *m, uint64_t number)
 {
   m->number = number;
-  m->sum = mix(number);
+  m->sum = bits_mix(number);
   for (int i = 0; i < PAYLOAD; ++i) {
-    m->words[i] = mix(number + (uint64_t)i);
+    m->words[i] = bits_mix(number + (uint64_t)i);
     m->sum += m->words[i];
   }
 }
 
-static bool whole(const message *m)
+static bool message_is_whole(const message *m)
 {
-  uint64_t sum = mix(m->number);
+  uint64_t sum = bits_mix(m->number);
   for (int i = 0; i < PAYLOAD; ++i) {
     sum += m->words[i];
   }
-  return sum == m->sum && m->words[0] == mix(m->number);
+  return sum == m->sum && m->words[0] == bits_mix(m->number);
 }
 
 typedef struct stream {
@@ -158,14 +158,14 @@ static void take_one(stream *s)
   }
   const message *m = &s->places[hapi_triple_front(&s->buffer)];
   ++s->taken;
-  s->torn += !whole(m);
+  s->torn += !message_is_whole(m);
   s->backwards += m->number <= s->last;
   s->last = m->number;
 }
 
 static void send_one(stream *s, uint64_t number)
 {
-  fill(&s->places[hapi_triple_back(&s->buffer)], number);
+  message_fill(&s->places[hapi_triple_back(&s->buffer)], number);
   hapi_triple_publish(&s->buffer);
 }
 
@@ -201,7 +201,7 @@ static void run_side(pair *p, stream *out, stream *in)
   take_one(in);
 }
 
-static void *answer(void *arg)
+static void *physics_answer(void *arg)
 {
   pair *p = arg;
   run_side(p, &p->back, &p->there);
@@ -227,7 +227,7 @@ TEST(messages_are_never_torn_in_either_direction)
   hapi_triple_init(&p.there.buffer);
   hapi_triple_init(&p.back.buffer);
   int64_t begin = hapi_clock_now();
-  REQUIRE(pthread_create(&thread, NULL, answer, &p) == 0);
+  REQUIRE(pthread_create(&thread, NULL, physics_answer, &p) == 0);
   run_side(&p, &p.there, &p.back);
   pthread_join(thread, NULL);
   printf("# %.2f s\n", 1e-9 * (double)(hapi_clock_now() - begin));
@@ -249,19 +249,21 @@ static const hapi_capacity capacities[] = {
 static void fill_model(hapi_model *m, const hapi_capacity *c, uint64_t seed)
 {
   m->number = seed;
-  m->state_ns = (int64_t)mix(seed);
+  m->state_ns = (int64_t)bits_mix(seed);
   m->model = HAP_MODEL_ACCELERANCE;
   m->body_count = c->bodies;
   m->contact_count = c->contacts;
-  memset(hapi_model_bodies(m), (int)(mix(seed) & 0xff), c->bodies * sizeof(hapi_model_body));
-  memset(hapi_model_contacts(m), (int)(mix(seed + 1) & 0xff),
+  memset(hapi_model_bodies(m), (int)(bits_mix(seed) & 0xff), c->bodies * sizeof(hapi_model_body));
+  memset(hapi_model_contacts(m), (int)(bits_mix(seed + 1) & 0xff),
          c->contacts * sizeof(hapi_model_contact));
   m->joint_count = c->joints;
-  memset(hapi_model_joints(m), (int)(mix(seed + 2) & 0xff), c->joints * sizeof(hapi_model_joint));
+  memset(hapi_model_joints(m), (int)(bits_mix(seed + 2) & 0xff),
+         c->joints * sizeof(hapi_model_joint));
   m->cross_count = c->crosses;
-  memset(hapi_model_crosses(m), (int)(mix(seed + 3) & 0xff), c->crosses * sizeof(hapi_model_cross));
+  memset(hapi_model_crosses(m), (int)(bits_mix(seed + 3) & 0xff),
+         c->crosses * sizeof(hapi_model_cross));
   m->tool_count = c->tool_points;
-  memset(hapi_model_tools(m), (int)(mix(seed + 4) & 0xff),
+  memset(hapi_model_tools(m), (int)(bits_mix(seed + 4) & 0xff),
          c->tool_points * sizeof(hapi_tool_point));
 }
 
@@ -278,40 +280,44 @@ static bool all_bytes(const void *block, size_t size, uint64_t byte)
 
 static bool model_is(hapi_model *m, const hapi_capacity *c, uint64_t seed)
 {
-  return m->number == seed && m->state_ns == (int64_t)mix(seed) && m->body_count == c->bodies &&
-         m->contact_count == c->contacts &&
-         all_bytes(hapi_model_bodies(m), c->bodies * sizeof(hapi_model_body), mix(seed)) &&
+  return m->number == seed && m->state_ns == (int64_t)bits_mix(seed) &&
+         m->body_count == c->bodies && m->contact_count == c->contacts &&
+         all_bytes(hapi_model_bodies(m), c->bodies * sizeof(hapi_model_body), bits_mix(seed)) &&
          all_bytes(hapi_model_contacts(m), c->contacts * sizeof(hapi_model_contact),
-                   mix(seed + 1)) &&
+                   bits_mix(seed + 1)) &&
          m->joint_count == c->joints &&
-         all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint), mix(seed + 2)) &&
+         all_bytes(hapi_model_joints(m), c->joints * sizeof(hapi_model_joint),
+                   bits_mix(seed + 2)) &&
          m->cross_count == c->crosses &&
-         all_bytes(hapi_model_crosses(m), c->crosses * sizeof(hapi_model_cross), mix(seed + 3)) &&
+         all_bytes(hapi_model_crosses(m), c->crosses * sizeof(hapi_model_cross),
+                   bits_mix(seed + 3)) &&
          m->tool_count == c->tool_points &&
-         all_bytes(hapi_model_tools(m), c->tool_points * sizeof(hapi_tool_point), mix(seed + 4));
+         all_bytes(hapi_model_tools(m), c->tool_points * sizeof(hapi_tool_point),
+                   bits_mix(seed + 4));
 }
 
 static void fill_state(hapi_state *s, const hapi_capacity *c, uint64_t seed)
 {
   s->model_number = seed;
-  s->hand_impulse[0] = (double)(mix(seed) >> 12);
+  s->hand_impulse[0] = (double)(bits_mix(seed) >> 12);
   s->body_high = c->bodies;
   s->contact_count = c->contacts;
-  memset(hapi_state_bodies(s), (int)(mix(seed) & 0xff), c->bodies * sizeof(hapi_state_body));
-  memset(hapi_state_contacts(s), (int)(mix(seed + 1) & 0xff),
+  memset(hapi_state_bodies(s), (int)(bits_mix(seed) & 0xff), c->bodies * sizeof(hapi_state_body));
+  memset(hapi_state_contacts(s), (int)(bits_mix(seed + 1) & 0xff),
          c->contacts * sizeof(hapi_state_contact));
-  memset(hapi_state_pointers(s), (int)(mix(seed + 2) & 0xff),
+  memset(hapi_state_pointers(s), (int)(bits_mix(seed + 2) & 0xff),
          c->pointers * sizeof(hapi_state_pointer));
 }
 
 static bool state_is(hapi_state *s, const hapi_capacity *c, uint64_t seed)
 {
-  return s->model_number == seed && s->hand_impulse[0] == (double)(mix(seed) >> 12) &&
+  return s->model_number == seed && s->hand_impulse[0] == (double)(bits_mix(seed) >> 12) &&
          s->body_high == c->bodies && s->pointer_count == c->pointers &&
-         all_bytes(hapi_state_bodies(s), c->bodies * sizeof(hapi_state_body), mix(seed)) &&
+         all_bytes(hapi_state_bodies(s), c->bodies * sizeof(hapi_state_body), bits_mix(seed)) &&
          all_bytes(hapi_state_contacts(s), c->contacts * sizeof(hapi_state_contact),
-                   mix(seed + 1)) &&
-         all_bytes(hapi_state_pointers(s), c->pointers * sizeof(hapi_state_pointer), mix(seed + 2));
+                   bits_mix(seed + 1)) &&
+         all_bytes(hapi_state_pointers(s), c->pointers * sizeof(hapi_state_pointer),
+                   bits_mix(seed + 2));
 }
 
 /* The six blocks are filled to the brim before any is read: none may reach into another one. */

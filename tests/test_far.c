@@ -19,25 +19,25 @@ typedef struct answer {
   int count;
 } answer;
 
-static void note(void *data, dGeomID a, dGeomID b)
+static void pair_note(void *data, dGeomID a, dGeomID b)
 {
   answer *to = data;
   dGeomID geom = a == to->asker ? b : a;
   if (dGeomIsSpace(geom)) {
-    dSpaceCollide2(to->asker, geom, data, note);
+    dSpaceCollide2(to->asker, geom, data, pair_note);
   } else if (to->count < GEOMS) {
     to->geoms[to->count++] = geom;
   }
 }
 
-static double uniform(double low, double high)
+static double random_uniform(double low, double high)
 {
   return low + (high - low) * dRandReal();
 }
 
-static void scatter(dGeomID geom)
+static void geom_scatter(dGeomID geom)
 {
-  dGeomSetPosition(geom, uniform(-5, 5), uniform(-5, 5), uniform(-1, 1));
+  dGeomSetPosition(geom, random_uniform(-5, 5), random_uniform(-5, 5), random_uniform(-1, 1));
 }
 
 /* Some in spaces in the space, switched off, without bits; and a plane, which is everywhere. */
@@ -48,8 +48,9 @@ static void fill_space(dSpaceID space, dGeomID geoms[GEOMS])
   dCreatePlane(space, 0, 0, 1, 0);
   for (int i = 0; i < GEOMS - 1; ++i) {
     dSpaceID in = i % 7 == 0 ? inner : i % 11 == 0 ? inmost : space;
-    geoms[i] = i % 2 == 0 ? dCreateSphere(in, uniform(0.01, 0.3)) : dCreateBox(in, 0.1, 0.4, 0.2);
-    scatter(geoms[i]);
+    geoms[i] =
+        i % 2 == 0 ? dCreateSphere(in, random_uniform(0.01, 0.3)) : dCreateBox(in, 0.1, 0.4, 0.2);
+    geom_scatter(geoms[i]);
     if (i % 13 == 0) {
       dGeomDisable(geoms[i]);
     }
@@ -68,11 +69,11 @@ static int ask_round(hapi_cover *cover, dSpaceID space, dGeomID asker, double fr
   int found = 0;
   hapi_cover_begin(cover);
   for (int i = 0; i < ASKED; ++i) {
-    dGeomSetPosition(asker, from + 0.1 * i, uniform(-1, 1), 0.0);
+    dGeomSetPosition(asker, from + 0.1 * i, random_uniform(-1, 1), 0.0);
     plain = (answer){.asker = asker};
     covered = (answer){.asker = asker};
-    hapi_cover_ask(cover, space, asker, &covered, note);
-    dSpaceCollide2(asker, (dGeomID)space, &plain, note);
+    hapi_cover_ask(cover, space, asker, &covered, pair_note);
+    dSpaceCollide2(asker, (dGeomID)space, &plain, pair_note);
     CHECK(covered.count == plain.count);
     CHECK(memcmp(covered.geoms, plain.geoms, sizeof plain.geoms) == 0);
     found += plain.count;
@@ -91,7 +92,7 @@ static void check_space(dSpaceID space)
   for (int round = 0; round < 6; ++round) {
     found += ask_round(&cover, space, asker, -5.0 + round);
     for (int i = round; i < GEOMS - 1; i += 3) {
-      scatter(geoms[i]);
+      geom_scatter(geoms[i]);
     }
   }
   CHECK(found > 6 * ASKED * 2);
@@ -132,7 +133,7 @@ TEST(a_round_asks_the_space_seldom)
       got = (answer){.asker = asker};
       dGeomSetPosition(asker, 0.1 * i, 0, 0);
       dGeomGetAABB(cover.box_geom, before);
-      hapi_cover_ask(&cover, space, asker, &got, note);
+      hapi_cover_ask(&cover, space, asker, &got, pair_note);
       dGeomGetAABB(cover.box_geom, after);
       fills[round] += memcmp(before, after, sizeof after) != 0;
     }
@@ -201,7 +202,7 @@ TEST(the_fastest_of_all_bodies_sets_the_reach)
   CHECK(hood->fastest > 1.9 && hood->fastest < 2.1);
 }
 
-static bool stands(test_world *w)
+static bool cube_stands(test_world *w)
 {
   uint64_t before = world_stats(w).physics.steps;
   CHECK(hap_session_advance(w->session, 50) == HAP_FAULTED);
@@ -231,8 +232,8 @@ TEST(a_bad_body_is_kept_from_ode_wherever_it_is)
       dBodyDisable(body);
     }
     dBodySetLinearVel(body, nan, 0, 0);
-    CHECK(stands(w));
-    CHECK(stands(w));
+    CHECK(cube_stands(w));
+    CHECK(cube_stands(w));
     dBodySetLinearVel(body, 0, 0, 0);
     dBodySetAngularVel(body, 0, 0, 0);
     go_on(w);
@@ -253,14 +254,14 @@ TEST(a_bad_geom_keeps_the_world_from_being_stepped_until_it_is_set_right)
   world_step(w, 2);
   for (int i = 0; i < 3; ++i) {
     dGeomSetOffsetPosition(geoms[i], 0, 0, (double)NAN);
-    CHECK(stands(w));
-    CHECK(stands(w)); /* nothing has changed since, and it is no better */
+    CHECK(cube_stands(w));
+    CHECK(cube_stands(w)); /* nothing has changed since, and it is no better */
     dGeomSetOffsetPosition(geoms[i], 0, 0, 0);
     go_on(w);
   }
   dGeomSetPosition(ground, (double)NAN, 0, 0);
-  CHECK(stands(w));
-  CHECK(stands(w));
+  CHECK(cube_stands(w));
+  CHECK(cube_stands(w));
   dGeomSetPosition(ground, 0, 100, 0);
   go_on(w);
 }
@@ -273,9 +274,9 @@ TEST(a_bad_geom_is_found_behind_a_bad_pose)
   dBodyID body = w->bodies[FAR_BODIES - 2];
   dBodySetPosition(body, (double)NAN, 0, 0);
   dGeomSetOffsetPosition(dBodyGetFirstGeom(body), 0, 0, (double)NAN);
-  CHECK(stands(w));
+  CHECK(cube_stands(w));
   dBodySetPosition(body, 50, 0, 0);
-  CHECK(stands(w));
+  CHECK(cube_stands(w));
   dGeomSetOffsetPosition(dBodyGetFirstGeom(body), 0, 0, 0);
   go_on(w);
 }
@@ -347,7 +348,7 @@ TEST(a_far_chain_without_geoms_is_known_by_its_joints)
   world_step(w, 1);
   check_table(w, FAR_BODIES + 3);
   dBodySetLinearVel(w->bodies[FAR_BODIES + 2], (double)NAN, 0, 0);
-  CHECK(stands(w));
+  CHECK(cube_stands(w));
   dBodySetLinearVel(w->bodies[FAR_BODIES + 2], 0, 0, 0);
   go_on(w);
 }

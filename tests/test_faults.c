@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* What the hand feels when something breaks, tick by tick: one test a fault. In all of them the force
- * stays finite, within the device's limit and within the slew limit from write to write, and zero is the
- * last thing that a device gets (felt_end). Threads and processes: test_faults_threads.c. */
+/* What the hand feels when something breaks, tick by tick: one test a fault. In all of them the
+ * force stays finite, within the device's limit and within the slew limit from write to write,
+ * and zero is the last thing that a device gets (felt_end). Threads and processes:
+ * test_faults_threads.c. */
 
 #include "tests/tap.h"
 
@@ -68,7 +69,7 @@ static void run_alone(int ticks)
   }
 }
 
-static bool begin(const char *hand)
+static bool fault_begin(const char *hand)
 {
   tick = 0;
   at_sync = NULL;
@@ -83,7 +84,7 @@ static bool begin(const char *hand)
 static bool begin_pressing(void)
 {
   felt_init(&f, HAP_DRIVE_LOCKSTEP, false);
-  if (!begin(PRESSING)) {
+  if (!fault_begin(PRESSING)) {
     return false;
   }
   run_ticks(2000);
@@ -178,7 +179,7 @@ static bool begin_tapping(hap_guard guard, const char *hand)
   felt_init(&f, HAP_DRIVE_LOCKSTEP, false);
   f.s.research.guard = guard;
   snprintf(spec, sizeof spec, "hand=%s," TAPPING, hand);
-  return begin(spec);
+  return fault_begin(spec);
 }
 
 static taps tap_with_drops(hap_guard guard, const char *hand, int dropped)
@@ -256,10 +257,11 @@ TEST(a_loop_that_stood_still_while_the_hand_went_in_takes_the_surface_to_the_han
 {
   for (int i = 0; i < 2; ++i) { /* the hand starts outside and in contact */
     felt_init(&f, HAP_DRIVE_LOCKSTEP, false);
-    REQUIRE(begin(i == 0 ? "path=0:-0.1/0/0;1:-0.1/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
-                           "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"
-                         : "path=0:-0.057/0/0;1:-0.057/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
-                           "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"));
+    REQUIRE(fault_begin(i == 0
+                            ? "path=0:-0.1/0/0;1:-0.1/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
+                              "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"
+                            : "path=0:-0.057/0/0;1:-0.057/0/0;1.3:0.2/0/0;2:0.2/0/0;2.1:0.202/0/0;"
+                              "3:0.202/0/0;4:-0.1/0/0;5:-0.057/0/0"));
     run_ticks(1000);
     CHECK_NEAR(felt_force(), i == 0 ? 0.0 : 3.0, 1e-6);
     drop_ticks(300);
@@ -293,7 +295,7 @@ TEST(a_pose_that_is_nan_ramps_to_zero_and_a_reset_ramps_in)
 }
 
 /* The fault lasts; then the device answers again, and the hand has gone in deeper meanwhile. */
-static void unplug(atomic_int *how, hap_fault fault)
+static void device_unplug(atomic_int *how, hap_fault fault)
 {
   REQUIRE(begin_pressing());
   atomic_store(how, 1);
@@ -317,15 +319,16 @@ static void unplug(atomic_int *how, hap_fault fault)
 
 TEST(unplugged_between_read_and_write_is_zero_at_once_and_comes_back_by_a_reset)
 {
-  unplug(&felt.fail_write, HAP_FAULT_DEVICE_WRITE);
+  device_unplug(&felt.fail_write, HAP_FAULT_DEVICE_WRITE);
 }
 
 TEST(unplugged_before_the_read_is_zero_at_once_and_comes_back_by_a_reset)
 {
-  unplug(&felt.fail_read, HAP_FAULT_DEVICE_READ);
+  device_unplug(&felt.fail_read, HAP_FAULT_DEVICE_READ);
 }
 
-/* Only a start brings it back; the hand begins its script anew then, and is where it was by its end. */
+/* Only a start brings it back; the hand begins its script anew then, and is where it was by its
+ * end. */
 TEST(a_device_that_was_lost_comes_back_by_a_restart_and_a_reset)
 {
   hap_pointer_state state;
@@ -339,7 +342,7 @@ TEST(a_device_that_was_lost_comes_back_by_a_restart_and_a_reset)
   check_latched(HAP_FAULT_DEVICE_READ, 100);
   CHECK(felt.starts == 1); /* nothing is started unless it is asked for */
   CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_DEVICE);
-  CHECK(has(detail_of(&f.s), "could not be read") && felt.starts == 2); /* the fault */
+  CHECK(text_has(detail_of(&f.s), "could not be read") && felt.starts == 2); /* the fault */
   check_latched(HAP_FAULT_DEVICE_READ, 100);
   CHECK(hap_pointer_get(f.s.session, f.hand, &state, sizeof state) == HAP_OK);
   atomic_store(&felt.fail_start, 0);
@@ -381,14 +384,14 @@ TEST(a_restart_has_its_place)
   hap_pointer_def_init(&def, sizeof def);
   REQUIRE(hap_pointer_add(f.s.session, &def, &free_id) == HAP_OK);
   CHECK(hap_pointer_restart(f.s.session, free_id) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&f.s), "no device"));
+  CHECK(text_has(detail_of(&f.s), "no device"));
   atomic_store(&felt.fail_start, 1);
   CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_DEVICE);
   run_ticks(10); /* out of the world, and no fault */
   CHECK(stats_of(&f.s).faults.fault == HAP_FAULT_NONE && felt_force() == 0.0);
   CHECK(hap_session_stop(f.s.session) == HAP_OK);
   CHECK(hap_pointer_restart(f.s.session, f.hand) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&f.s), "not started"));
+  CHECK(text_has(detail_of(&f.s), "not started"));
   atomic_store(&felt.fail_start, 0);
   CHECK(hap_session_start(f.s.session) == HAP_OK); /* starts all of them */
   CHECK(hap_session_advance(f.s.session, 2000) == HAP_OK);
@@ -403,7 +406,7 @@ TEST(a_restart_has_its_place)
 TEST(a_device_plugged_in_again_deep_in_a_body_comes_up_from_zero)
 {
   felt_init(&f, HAP_DRIVE_LOCKSTEP, true); /* a body of 1 kg */
-  REQUIRE(begin("path=0:-0.07/0/0"));
+  REQUIRE(fault_begin("path=0:-0.07/0/0"));
   run_ticks(100);
   atomic_store(&felt.fail_read, 1);
   run_ticks(100);
@@ -439,7 +442,7 @@ static bool begin_to_jump(bool body, hap_coupling coupling, double stiffness)
     f.pointer_expert.proxy_mass = 0.01;
   }
   fastest = 0.0;
-  bool good = begin("path=0:-0.07/0/0");
+  bool good = fault_begin("path=0:-0.07/0/0");
   at_sync = note_speed;
   run_ticks(100);
   felt.steepest = 0.0;
@@ -453,7 +456,7 @@ TEST(a_hand_that_went_into_a_body_during_a_fault_does_not_shoot_it_away)
     felt_init(&f, HAP_DRIVE_LOCKSTEP, true);
     f.s.def.model = models[i];
     fastest = 0.0;
-    REQUIRE(begin("path=0:-0.07/0/0;0.2:-0.07/0/0;1:0.1/0/0")); /* 160 mm deep */
+    REQUIRE(fault_begin("path=0:-0.07/0/0;0.2:-0.07/0/0;1:0.1/0/0")); /* 160 mm deep */
     at_sync = note_speed;
     run_ticks(100);
     atomic_store(&felt.bad_pose, 1);
@@ -474,7 +477,7 @@ TEST(a_hand_that_went_into_a_body_during_a_fault_does_not_shoot_it_away)
 
 static const hap_coupling couplings[] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY};
 
-static void jump(double way)
+static void hand_jump(double way)
 {
   felt.jump += way;
   felt.fast = true; /* and its velocity is the difference */
@@ -487,7 +490,7 @@ TEST(a_device_that_jumps_half_a_metre_into_a_wall_takes_the_surface_with_it)
   for (int i = 0; i < 4; ++i) {
     double stiffness = i / 2 == 0 ? 1000.0 : 10000.0;
     REQUIRE(begin_to_jump(false, couplings[i % 2], stiffness));
-    jump(0.5);
+    hand_jump(0.5);
     run_ticks(400);
     CHECK(stats_of(&f.s).faults.count == 0 && felt.peak == 0.0);
     felt.jump += 1e-3; /* a hand that goes on feels it */
@@ -509,9 +512,9 @@ TEST(a_device_that_jumps_half_a_metre_into_a_body_does_not_shoot_it_away)
   for (int i = 0; i < 4; ++i) {
     double stiffness = i / 2 == 0 ? 1000.0 : 10000.0;
     REQUIRE(begin_to_jump(true, couplings[i % 2], stiffness));
-    jump(0.5);
+    hand_jump(0.5);
     run_ticks(1000);
-    jump(-0.5);
+    hand_jump(-0.5);
     run_ticks(1000);
     CHECK(fastest == 0.0 && felt.peak == 0.0);
     CHECK(stats_of(&f.s).faults.count == 0);
@@ -543,8 +546,8 @@ TEST(a_device_that_jumps_for_a_tick_and_back_is_felt_as_a_dip)
     REQUIRE(begin_pressing());
     felt.peak = 0.0;
     double way = i == 0 ? 0.5 : -0.5; /* deep into the wall, and out of it */
-    jump(way);
-    jump(-way);
+    hand_jump(way);
+    hand_jump(-way);
     run_ticks(2000);
     /* From nothing the hand swings over; after the wall it has it 5 mm deeper. */
     CHECK(felt.peak < 8.0 && fabs(felt_force() - 5.217) < 0.75);
@@ -578,7 +581,7 @@ TEST(a_body_destroyed_and_created_at_every_sync_is_felt_less_and_never_jumps)
 {
   felt_init(&f, HAP_DRIVE_LOCKSTEP, true);
   dBodySetKinematic(f.s.cube);
-  REQUIRE(begin(PRESSING));
+  REQUIRE(fault_begin(PRESSING));
   run_ticks(2000);
   CHECK_NEAR(felt_force(), 5.217, 0.01);
   felt.work = felt.work_most = felt.work_once = 0.0;
@@ -625,8 +628,8 @@ TEST(capacities_that_overflow_at_every_sync_leave_a_force_without_jumps)
   f.s.def.max_bodies = 1;
   f.s.def.max_contacts = 2;
   REQUIRE(
-      begin("hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.02/0/0,"
-            "sine=0/0.04/0.02,hz=0.7"));
+      fault_begin("hand=relaxed,device_mass=0.1,device_damping=2,path=0:-0.02/0/0,"
+                  "sine=0/0.04/0.02,hz=0.7"));
   run_ticks(1000);
   CHECK(felt_force() > 1.0);
   dropped_before = stats_of(&f.s).model.capacity_dropped;

@@ -22,7 +22,7 @@ extern char **environ;
 static felt_stage f;
 static atomic_int hangs; /* physics does not come back */
 
-static void hang(stage *s)
+static void step_hang(stage *s)
 {
   (void)s;
   while (atomic_load(&hangs) != 0) {
@@ -34,7 +34,7 @@ static bool begin_threads(void)
 {
   atomic_store(&hangs, 0);
   felt_init(&f, HAP_DRIVE_THREADS, false);
-  f.s.in_step = hang;
+  f.s.in_step = step_hang;
   return felt_begin(&f, PRESSING);
 }
 
@@ -47,7 +47,7 @@ static bool wait_until(bool (*condition)(void))
   return condition();
 }
 
-static bool presses(void)
+static bool hand_presses(void)
 {
   return felt_guard(&f) == 0 && fabs(hapi_v3_norm(f.state.wrench.force) - 5.217) < 0.05;
 }
@@ -59,7 +59,7 @@ static bool lets_go(void)
 
 /* ---- threads ---- */
 
-static void *stop(void *arg)
+static void *session_stop(void *arg)
 {
   (void)arg;
   CHECK(hap_session_stop(f.s.session) == HAP_OK);
@@ -70,9 +70,9 @@ TEST(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back)
 {
   pthread_t stopper;
   REQUIRE(begin_threads());
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   atomic_store(&hangs, 1);
-  REQUIRE(pthread_create(&stopper, NULL, stop, NULL) == 0);
+  REQUIRE(pthread_create(&stopper, NULL, session_stop, NULL) == 0);
   CHECK(wait_until(lets_go));
   uint64_t ticks = stats_of(&f.s).loop.ticks;
   sleep_ms(20);
@@ -85,7 +85,7 @@ TEST(a_stop_lets_go_of_the_hand_though_physics_does_not_come_back)
 TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
 {
   REQUIRE(begin_threads());
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   uint64_t missed = stats_of(&f.s).loop.missed_ticks;
   for (int i = 0; i < 3; ++i) {
     atomic_store(&felt.block_ms, 300);
@@ -96,7 +96,7 @@ TEST(a_device_whose_read_takes_300_ms_is_felt_as_a_pause)
   }
   CHECK(stats_of(&f.s).loop.missed_ticks >=
         missed + 3 * 290); /* they are passed over, not caught up */
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   CHECK(stats_of(&f.s).faults.count == 0);
   CHECK(hap_session_stop(f.s.session) == HAP_OK);
   CHECK(felt.peak < FELT_LIMIT);
@@ -121,7 +121,7 @@ TEST(a_lost_device_is_restarted_while_the_loop_runs)
   atomic_int wrong;
   atomic_init(&wrong, 0);
   REQUIRE(begin_threads());
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   REQUIRE(pthread_create(&looker, NULL, look_often, &wrong) == 0);
   for (int i = 0; i < 5; ++i) {
     atomic_store(&felt.lost, 1);
@@ -133,7 +133,7 @@ TEST(a_lost_device_is_restarted_while_the_loop_runs)
     sleep_ms(20);
     CHECK(lets_go());
     CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
-    CHECK(wait_until(presses));
+    CHECK(wait_until(hand_presses));
   }
   atomic_store(&hangs, 1);
   pthread_join(looker, NULL);
@@ -146,7 +146,7 @@ TEST(a_lost_device_is_restarted_while_the_loop_runs)
 TEST(a_device_that_blocks_and_then_fails_is_zeroed)
 {
   REQUIRE(begin_threads());
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   atomic_store(&felt.fail_read, 1);
   atomic_store(&felt.block_ms, 100);
   CHECK(wait_until(lets_go));
@@ -158,7 +158,7 @@ TEST(a_device_that_blocks_and_then_fails_is_zeroed)
   sleep_ms(20);
   CHECK(lets_go());
   CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
-  CHECK(wait_until(presses));
+  CHECK(wait_until(hand_presses));
   felt_end(&f);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Drive FRAME in a frame loop: even and uneven frames, hitches, pauses, wrong calls. What hangs on the
- * host's clock is asked of the clock; nothing is expected of it. */
+/* Drive FRAME in a frame loop: even and uneven frames, hitches, pauses, wrong calls. What hangs
+ * on the host's clock is asked of the clock; nothing is expected of it. */
 
 #include "tests/tap.h"
 
@@ -27,7 +27,7 @@ typedef struct loop {
   double late_ns;   /* largest time from a step to the frame that made it */
 } loop;
 
-static void frame(loop *l, double clock_s, double frame_s, double period)
+static void loop_frame(loop *l, double clock_s, double frame_s, double period)
 {
   l->now_ns += (int64_t)llround(1e9 * clock_s);
   hapi_frame_steps f = hapi_frame_take(&l->remainder_s, frame_s, period, l->now_ns, l->last_ns);
@@ -44,7 +44,7 @@ static void frame(loop *l, double clock_s, double frame_s, double period)
 }
 
 /* From -share to +share. */
-static double jitter(uint32_t *random, double share)
+static double frame_jitter(uint32_t *random, double share)
 {
   *random = *random * 1664525u + 1013904223u;
   return share * ((double)(*random >> 8) / (1 << 23) - 1.0);
@@ -60,8 +60,8 @@ TEST(steps_lie_evenly_on_the_clock_at_any_frame_rate)
       double share = uneven == 0 ? 0.0 : rates[r] < 40.0 ? 0.1 : 0.4; /* less than four steps */
       double total = 0.0;
       for (int i = 0; i < 5000; ++i) {
-        double dt = (1.0 + jitter(&random, share)) / rates[r];
-        frame(&l, dt, dt, 1.0 / 60.0);
+        double dt = (1.0 + frame_jitter(&random, share)) / rates[r];
+        loop_frame(&l, dt, dt, 1.0 / 60.0);
         total += dt;
       }
       CHECK(l.dropped == 0);
@@ -76,16 +76,16 @@ TEST(a_hitch_drops_what_is_beyond_three_steps_and_goes_on)
 {
   loop l = {0};
   for (int i = 0; i < 90; ++i) {
-    frame(&l, 1.0 / 90.0, 1.0 / 90.0, 0.02);
+    loop_frame(&l, 1.0 / 90.0, 1.0 / 90.0, 0.02);
   }
   CHECK(l.steps == 50 && l.dropped == 0);
   double before = l.remainder_s;
-  frame(&l, 0.3, 0.3, 0.02);
+  loop_frame(&l, 0.3, 0.3, 0.02);
   CHECK(l.steps == 53 && l.dropped == 12);
   CHECK_NEAR(l.remainder_s, before, 1e-9);
   CHECK(l.now_ns - l.last_ns < 20 * MS);
   for (int i = 0; i < 90; ++i) {
-    frame(&l, 1.0 / 90.0, 1.0 / 90.0, 0.02);
+    loop_frame(&l, 1.0 / 90.0, 1.0 / 90.0, 0.02);
   }
   CHECK(l.steps == 103 && l.dropped == 12);
 }
@@ -96,22 +96,22 @@ TEST(frame_time_may_go_slower_or_faster_than_the_clock_or_stand)
   for (int p = 0; p < 6; ++p) {
     loop l = {0};
     for (int i = 0; i < 2000; ++i) {
-      frame(&l, 0.01, 0.01 * paces[p], 0.02);
+      loop_frame(&l, 0.01, 0.01 * paces[p], 0.02);
       CHECK(l.last_ns <= l.now_ns); /* never ahead of the clock */
     }
     CHECK(fabs((double)(l.steps + l.dropped) - 1000.0 * paces[p]) <= 1.0);
     CHECK(l.late_ns < 41e6);
   }
   loop l = {0};
-  frame(&l, 0.02, 0.02, 0.02);
+  loop_frame(&l, 0.02, 0.02, 0.02);
   for (int i = 0; i < 1000; ++i) { /* paused: neither steps nor a debt */
-    frame(&l, 0.01, 0.0, 0.02);
+    loop_frame(&l, 0.01, 0.0, 0.02);
   }
   CHECK(l.steps == 1 && l.dropped == 0);
-  frame(&l, 0.01, 0.02, 0.02);
+  loop_frame(&l, 0.01, 0.02, 0.02);
   CHECK(l.steps == 2 && l.now_ns - l.last_ns < MS);
   for (int i = 0; i < 1000; ++i) { /* no time at all between frames: steps are in order still */
-    frame(&l, 0.0, 0.06, 0.02);
+    loop_frame(&l, 0.0, 0.06, 0.02);
   }
   CHECK(l.steps == 3002 && l.last_ns - l.now_ns <= 3000);
 }
@@ -197,7 +197,7 @@ static uint64_t view_frames(view *v, double hz, int count, double uneven)
   static uint32_t random = 7;
   uint64_t dropped = 0;
   for (int i = 0; i < count; ++i) {
-    double dt = (1.0 + jitter(&random, uneven)) / hz;
+    double dt = (1.0 + frame_jitter(&random, uneven)) / hz;
     dropped += view_frame(v, v->last + (int64_t)(1e9 * dt), 1.0) == HAP_DROPPED;
   }
   return dropped;
@@ -216,8 +216,9 @@ static void check_world(view *v)
   CHECK(stats.faults.count == 0 && stats.physics.missed == 0);
 }
 
-/* Jitter of 40 % of a frame; the delay needs a second to find how late frames come. Where the host kept
- * a frame from coming, drawing is a matter of the clock: the bounds grow by what was seen. */
+/* Jitter of 40 % of a frame; the delay needs a second to find how late frames come. Where the
+ * host kept a frame from coming, drawing is a matter of the clock: the bounds grow by what was
+ * seen. */
 static void check_rate(double hz)
 {
   view v;
@@ -264,8 +265,8 @@ static void frames_until_normal(view *v)
   CHECK(is_normal(v));
 }
 
-/* Frames of 33 ms, two steps of 20 ms are good for 41: the remainder that the world is behind by makes no
- * difference. Not on a host that makes frames longer. */
+/* Frames of 33 ms, two steps of 20 ms are good for 41: the remainder that the world is behind by
+ * makes no difference. Not on a host that makes frames longer. */
 TEST(slow_frames_are_felt_in_full)
 {
   view v;
@@ -293,7 +294,7 @@ TEST(slow_frames_are_felt_in_full)
 }
 
 /* No frame for 300 ms, and until the hand feels nothing any more. */
-static void hang(view *v)
+static void view_hang(view *v)
 {
   int64_t until = hap_session_now(v->f.s.session) + 300 * MS;
   for (int i = 0; i < 20000; ++i) {
@@ -310,9 +311,9 @@ static double force_of(const hap_trace_row *row)
   return hapi_v3_norm(row->pointers[0].force);
 }
 
-/* Ticks from the first one with a new model, after some without force, to the whole force; 0 where the
- * model became old again meanwhile, as the host kept the next frame from coming. *at: from there on, and
- * where it ended; -1: there is no more. */
+/* Ticks from the first one with a new model, after some without force, to the whole force; 0
+ * where the model became old again meanwhile, as the host kept the next frame from coming. *at:
+ * from there on, and where it ended; -1: there is no more. */
 static int ticks_to_normal(const hap_trace_row *rows, int count, int *at)
 {
   int i = *at;
@@ -362,7 +363,7 @@ TEST(a_hitch_fades_the_force_drops_time_and_is_over_within_two_syncs)
   for (int i = 0; i < 5; ++i) {
     uint64_t dropped = stats_of(&v.f.s).physics.frames_dropped;
     uint64_t steps = stats_of(&v.f.s).physics.steps;
-    hang(&v);
+    view_hang(&v);
     CHECK(view_frame(&v, 0, 1.0) == HAP_DROPPED);
     CHECK(stats_of(&v.f.s).physics.steps == steps + 3);
     CHECK(stats_of(&v.f.s).physics.frames_dropped >= dropped + 11); /* of 15 or more */
@@ -378,7 +379,7 @@ TEST(a_hitch_fades_the_force_drops_time_and_is_over_within_two_syncs)
 }
 
 /* The hand of a paused program still moves, and is drawn so. */
-static void pause(view *v, bool calls)
+static void view_pause(view *v, bool calls)
 {
   hap_pose first = {{0.0}, {0.0}};
   hap_pose pose;
@@ -412,7 +413,7 @@ TEST(a_pause_stands_still_and_goes_on_where_it_was)
     frames_until_normal(&v);
     for (int i = 0; i < 3; ++i) {
       uint64_t dropped = stats_of(&v.f.s).physics.frames_dropped;
-      pause(&v, calls != 0);
+      view_pause(&v, calls != 0);
       view_forget(&v);
       uint64_t frames_dropped = view_frames(&v, 90.0, 30, 0.2);
       CHECK(frames_dropped > 0 || stats_of(&v.f.s).physics.frames_dropped == dropped);
@@ -463,7 +464,7 @@ static void *update_elsewhere(void *arg)
 {
   stage *s = arg;
   s->seen[0] = hap_session_update(s->session, 0.1);
-  s->seen[1] = has(detail_of(s), "another thread");
+  s->seen[1] = text_has(detail_of(s), "another thread");
   return NULL;
 }
 
@@ -477,14 +478,14 @@ TEST(wrong_calls_say_so_and_change_nothing)
   CHECK(hap_session_update(s.session, 0.015) == HAP_OK);
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
     CHECK(hap_session_update(s.session, bad[i]) == HAP_ERROR_ARGUMENT);
-    CHECK(has(detail_of(&s), "frame_s") && has(s.detail.text, "seconds"));
+    CHECK(text_has(detail_of(&s), "frame_s") && text_has(s.detail.text, "seconds"));
   }
   REQUIRE(pthread_create(&thread, NULL, update_elsewhere, &s) == 0);
   CHECK(pthread_join(thread, NULL) == 0);
   CHECK(s.seen[0] == HAP_ERROR_THREAD && s.seen[1] == 1);
   REQUIRE(hap_session_lock(s.session) == HAP_OK);
   CHECK(hap_session_update(s.session, 0.1) == HAP_ERROR_THREAD);
-  CHECK(has(detail_of(&s), "lock"));
+  CHECK(text_has(detail_of(&s), "lock"));
   CHECK(hap_session_unlock(s.session) == HAP_OK);
   CHECK(atomic_load(&s.steps) == 0 && stats_of(&s).physics.frames_dropped == 0);
   CHECK(hap_session_update(s.session, 0.005) == HAP_OK); /* the remainder is still there */
@@ -498,7 +499,7 @@ TEST(wrong_calls_say_so_and_change_nothing)
   for (int i = 0; i < 2; ++i) {
     REQUIRE(stage_run(&s, others[i]));
     CHECK(hap_session_update(s.session, 0.02) == HAP_ERROR_STATE);
-    CHECK(has(detail_of(&s), "FRAME"));
+    CHECK(text_has(detail_of(&s), "FRAME"));
     stage_end(&s);
   }
 }

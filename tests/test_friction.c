@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Friction of the pointer against closed forms: sticking, sliding in every direction, what it drags, what
- * a soft finger holds. In every model, direct and behind a proxy. */
+/* Friction of the pointer against closed forms: sticking, sliding in every direction, what it
+ * drags, what a soft finger holds. In every model, direct and behind a proxy. */
 
 #include "tests/tap.h"
 
@@ -261,14 +261,14 @@ TEST(soft_fingers_are_a_torsion_spring_of_k_r2)
     }
     REQUIRE(open_pinch(&p, models[m], 120.0));
     double torque = 0.01; /* of 0.024 that they hold */
-    p.w->user_torque[0] = torque;
+    p.w->user.torque[0] = torque;
     cw_run(p.w, 3000);
     double angle = torque / (2.0 * 2000.0 * FINGER * FINGER);
     CHECK_NEAR(turn_about_x(&p), angle, 1e-3 * angle);
     CHECK_NEAR(p.w->row.pointers[0].torque[0], 0.5 * torque, 1e-3 * torque);
     CHECK_NEAR(other_torque(&p), 0.5 * torque, 1e-3 * torque);
     CHECK_NEAR(cw_norm(p.w->force), 4.0, 1e-2);
-    p.w->user_torque[0] = 0.0;
+    p.w->user.torque[0] = 0.0;
     cw_run(p.w, 3000);
     CHECK_NEAR(turn_about_x(&p), 0.0, 1e-3 * angle); /* and back: nothing has slid */
     cw_close(p.w);
@@ -286,7 +286,7 @@ TEST(beyond_their_limit_soft_fingers_slip_and_brake)
     double torque = 0.1;
     double limit = 2.0 * MU * 4.0 * FINGER;
     double inertia = 0.2 * 0.2 * 0.2 / 6.0;
-    p.w->user_torque[0] = torque;
+    p.w->user.torque[0] = torque;
     cw_run(p.w, 200);
     double before = spin_about_x(&p);
     cw_run(p.w, 200);

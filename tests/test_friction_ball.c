@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Frictions of the solver that are one vector: on random bodies under random pointers the impulses are
- * within the ball, the error is none inside of it, and at its border it is along the force. */
+/* Frictions of the solver that are one vector: on random bodies under random pointers the
+ * impulses are within the ball, the error is none inside of it, and at its border it is along
+ * the force. */
 
 #include "tests/tap.h"
 
@@ -25,20 +26,20 @@ static struct {
 } s;
 
 /* 0 .. 1 */
-static double uniform(void)
+static double random_uniform(void)
 {
   s.random = s.random * 6364136223846793005u + 1442695040888963407u;
   return (double)(s.random >> 11) / 9007199254740992.0;
 }
 
-static double within(double most)
+static double random_within(double most)
 {
-  return most * (2.0 * uniform() - 1.0);
+  return most * (2.0 * random_uniform() - 1.0);
 }
 
 static double from_to(double low, double high)
 {
-  return low * pow(high / low, uniform());
+  return low * pow(high / low, random_uniform());
 }
 
 /* Along a direction at an arm from the first body, less the second one's linear motion. */
@@ -68,13 +69,13 @@ static const double axes[3][3] = {{0.0, 0.0, -1.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 
 /* Pushes the body down; the frictions pull at it, the third one turns it. */
 static uint32_t add_pointer(uint32_t body, uint32_t pointer, double mu, int ball)
 {
-  double arm[3] = {within(0.02), within(0.02), 0.025};
+  double arm[3] = {random_within(0.02), random_within(0.02), 0.025};
   uint32_t first = s.count;
   double softness = from_to(1e-2, 1e3);
   for (int i = 0; i <= ball; ++i) {
     hapi_row *row = add_row(body, pointer, axes[i % 3], arm);
     row->softness = softness;
-    row->target = i == 0 ? from_to(0.01, 1.0) : within(0.1);
+    row->target = i == 0 ? from_to(0.01, 1.0) : random_within(0.1);
     if (i == 3) { /* about the normal, at 6 mm */
       memset(row->ja, 0, sizeof row->ja);
       memset(row->ba, 0, sizeof row->ba);
@@ -155,11 +156,11 @@ TEST(balls_hold_what_they_say)
     for (uint32_t i = 1; i < BODIES - 1; ++i) {
       s.mass[i] = from_to(1e-2, 1.0);
       s.v[i][2] = -9.81e-3;
-      s.v[i][0] = within(0.1);
-      s.v[i][5] = within(1.0);
+      s.v[i][0] = random_within(0.1);
+      s.v[i][5] = random_within(1.0);
     }
     for (uint32_t i = 1; i < BODIES - 1; ++i) {
-      balls[i] = add_pointer(i, BODIES - 1, 0.6 * uniform(), ball);
+      balls[i] = add_pointer(i, BODIES - 1, 0.6 * random_uniform(), ball);
       if (i % 2 == 0) {
         add_ground(i);
       }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Friction of a pointer's contact in the tick alone: what sticks does not creep, what rolls does not
- * slide, anchors go over from model to model, energy. */
+/* Friction of a pointer's contact in the tick alone: what sticks does not creep, what rolls does
+ * not slide, anchors go over from model to model, energy. */
 
 #include "tests/tap.h"
 
@@ -24,8 +24,8 @@ static hapi_pointer *surface_and_pointer(hap_model model, double finger)
   begin_model();
   add_body(0)->flags = HAPI_BODY_DRIVEN;
   add_contact(0, 0, 0)->mu = MU;
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   return p;
 }
 
@@ -38,7 +38,7 @@ static void sync_again(void)
   body->flags = HAPI_BODY_DRIVEN;
   body->pose = pose;
   add_contact(0, 0, 0)->mu = MU;
-  adopt();
+  model_adopt();
 }
 
 static void turn_body(double about_x, double about_y)
@@ -49,13 +49,13 @@ static void turn_body(double about_x, double about_y)
   f.bodies[0].shown.to = f.bodies[0].pose;
 }
 
-static double rounded(double x, double quantum)
+static double value_rounded(double x, double quantum)
 {
   return quantum * floor(x / quantum + 0.5);
 }
 
 /* -1 .. 1 */
-static double noise(uint64_t *state)
+static double random_noise(uint64_t *state)
 {
   *state = *state * 6364136223846793005u + 1442695040888963407u;
   return (double)(int64_t)*state / 9223372036854775808.0;
@@ -68,7 +68,7 @@ typedef struct shake {
   double spin; /* rad in all */
 } shake;
 
-static void put(hapi_pointer *p, double x, double y, double z)
+static void pointer_put(hapi_pointer *p, double x, double y, double z)
 {
   hapi_v3_set(p->device.pose.position, x, y, z);
 }
@@ -79,26 +79,27 @@ static double creep_of(const shake *how)
   const int ticks = 1000000;
   uint64_t state = 7;
   hapi_pointer *p = surface_and_pointer(how->model, how->finger);
-  put(p, -RADIUS + 0.002, 0.0, 0.0);
-  run(30);
-  put(p, -RADIUS + 0.002, 2e-4, -1e-4);
-  run(2);
+  pointer_put(p, -RADIUS + 0.002, 0.0, 0.0);
+  ticks_run(30);
+  pointer_put(p, -RADIUS + 0.002, 2e-4, -1e-4);
+  ticks_run(2);
   double before[3];
   hapi_v3_copy(p->wrench.force, before);
   for (int i = 0; i < ticks; ++i) {
     double share = (double)i / ticks;
     double swing = sin(2.0 * M_PI * 1000.0 * share);
     turn_body(how->spin * share, how->tilt * swing);
-    put(p, rounded(-RADIUS + 0.002 + 1e-5 * noise(&state), 3e-5),
-        rounded(2e-4 + 2e-5 * noise(&state), 3e-5), rounded(-1e-4 + 2e-5 * noise(&state), 3e-5));
+    pointer_put(p, value_rounded(-RADIUS + 0.002 + 1e-5 * random_noise(&state), 3e-5),
+                value_rounded(2e-4 + 2e-5 * random_noise(&state), 3e-5),
+                value_rounded(-1e-4 + 2e-5 * random_noise(&state), 3e-5));
     if (i % 16 == 0) {
       sync_again();
     }
-    run(1);
+    ticks_run(1);
   }
   turn_body(0.0, 0.0);
-  put(p, -RADIUS + 0.002, 2e-4, -1e-4);
-  run(2);
+  pointer_put(p, -RADIUS + 0.002, 2e-4, -1e-4);
+  ticks_run(2);
   CHECK(hapi_v3_norm(before) > 2.0);
   hapi_v3_sub(p->wrench.force, before, before);
   return hapi_v3_norm(before) / K;
@@ -119,8 +120,8 @@ TEST(what_sticks_does_not_creep_in_a_million_ticks)
   }
 }
 
-/* The body turns about the place where it touches the pointer, which rests: as it goes round the ball by
- * 0.6 rad, the contact moves by 5 mm on both. */
+/* The body turns about the place where it touches the pointer, which rests: as it goes round the
+ * ball by 0.6 rad, the contact moves by 5 mm on both. */
 TEST(what_rolls_does_not_slide)
 {
   static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
@@ -128,8 +129,8 @@ TEST(what_rolls_does_not_slide)
     hapi_pointer *p = surface_and_pointer(models[m], 0.0);
     const double step[4] = {cos(5e-4), 0.0, sin(5e-4), 0.0};
     double normal[3] = {-1.0, 0.0, 0.0};
-    put(p, -RADIUS + 0.002, 0.0, 0.0);
-    run(30);
+    pointer_put(p, -RADIUS + 0.002, 0.0, 0.0);
+    ticks_run(30);
     for (int i = 0; i < 600; ++i) {
       static const double out[3] = {-1.0, 0.0, 0.0};
       hap_pose *pose = &f.bodies[0].pose;
@@ -143,7 +144,7 @@ TEST(what_rolls_does_not_slide)
       hapi_quat_multiply(step, pose->quat_wxyz, pose->quat_wxyz);
       f.bodies[0].shown.to = *pose;
       hapi_quat_rotate(pose->quat_wxyz, out, normal);
-      run(1);
+      ticks_run(1);
     }
     double along = hapi_v3_dot(p->wrench.force, normal);
     hapi_v3_madd(p->wrench.force, -along, normal, normal);
@@ -171,11 +172,11 @@ TEST(all_rows_of_a_measured_body_answer_by_one_matrix)
     }
   }
   add_contact(0, 0, 0)->mu = MU; /* whose own probes say something else */
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   for (int i = 0; i < 20; ++i) {
-    put(p, -RADIUS + 0.001, 1e-5 * i, -2e-5 * i);
-    run(1);
+    pointer_put(p, -RADIUS + 0.001, 1e-5 * i, -2e-5 * i);
+    ticks_run(1);
   }
   const hapi_solver *solver = &f.tick.rows.solver;
   CHECK(solver->row_count == 4);

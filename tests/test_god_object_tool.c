@@ -13,7 +13,7 @@
 
 static const hap_coupling rigid_couplings[] = {HAP_COUPLING_GOD_OBJECT, HAP_COUPLING_VIRTUAL};
 
-static tool_world *begin(hap_coupling coupling)
+static tool_world *tool_of(hap_coupling coupling)
 {
   tool_world *w = tool_new(HAP_MODEL_CONTACT);
   w->tool_expert.coupling = coupling;
@@ -42,7 +42,7 @@ static double depth_of(const hap_pose *pose, const double *hull, size_t points)
 
 TEST(in_the_air_a_god_object_tool_is_the_device_to_the_bit)
 {
-  tool_world *w = begin(HAP_COUPLING_GOD_OBJECT);
+  tool_world *w = tool_of(HAP_COUPLING_GOD_OBJECT);
   tool_add_floor(w);
   CHECK(tool_start(w));
   for (int i = 0; i < 300; ++i) {
@@ -60,7 +60,7 @@ TEST(a_tool_lies_on_the_floor)
 {
   for (size_t i = 0; i < 2; ++i) {
     double deepest = 0.0;
-    tool_world *w = begin(rigid_couplings[i]);
+    tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
     CHECK(tool_start(w));
     tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
@@ -85,12 +85,12 @@ TEST(a_tool_lies_on_the_floor)
   }
 }
 
-/* Turned farther it stands on its edge, as the springs along and about agree: the place where their energy
- * is least of all that lie on the floor. */
+/* Turned farther it stands on its edge, as the springs along and about agree: the place where
+ * their energy is least of all that lie on the floor. */
 TEST(a_tool_stands_on_its_edge_where_the_springs_agree)
 {
   double deepest = 0.0;
-  tool_world *w = begin(HAP_COUPLING_GOD_OBJECT);
+  tool_world *w = tool_of(HAP_COUPLING_GOD_OBJECT);
   tool_add_floor(w);
   CHECK(tool_start(w));
   tool_go(w, 0.0, 0.0, 0.03, 0.0);
@@ -123,7 +123,7 @@ TEST(a_tool_stands_on_its_edge_where_the_springs_agree)
 TEST(a_tool_rests_in_a_corner)
 {
   for (size_t i = 0; i < 2; ++i) {
-    tool_world *w = begin(rigid_couplings[i]);
+    tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
     dCreatePlane(w->space, -1.0, 0.0, 0.0, -0.05);
     CHECK(tool_start(w));
@@ -138,11 +138,12 @@ TEST(a_tool_rests_in_a_corner)
   }
 }
 
-/* Flat on the floor it holds within the cone, slides at its surface, and sticks where it has come to. */
+/* Flat on the floor it holds within the cone, slides at its surface, and sticks where it has
+ * come to. */
 TEST(friction_holds_a_tool_to_the_cone)
 {
   for (size_t i = 0; i < 2; ++i) {
-    tool_world *w = begin(rigid_couplings[i]);
+    tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
     CHECK(tool_start(w));
@@ -180,7 +181,7 @@ TEST(friction_holds_a_tool_against_turning)
 {
   for (size_t i = 0; i < 2; ++i) {
     const double most = 0.5 * 0.004 * KV * sqrt(2.0) * HALF;
-    tool_world *w = begin(rigid_couplings[i]);
+    tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
     CHECK(tool_start(w));
@@ -213,7 +214,7 @@ TEST(a_tool_pushes_a_cube)
 {
   for (size_t i = 0; i < 2; ++i) {
     dMass mass;
-    tool_world *w = begin(rigid_couplings[i]);
+    tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_expert.coupling_damping = 10.0; /* else it swings against the friction */
     tool_add_floor(w);
     dBodyID body = dBodyCreate(w->world);
@@ -237,7 +238,7 @@ TEST(the_virtual_tool_is_felt_as_its_inertia)
   static const double given[] = {0.0, 1e-4};
   for (int i = 0; i < 2; ++i) {
     const double inertia = i == 0 ? 0.4 * 0.2 * 3.0 * HALF * HALF : given[i];
-    tool_world *w = begin(HAP_COUPLING_VIRTUAL);
+    tool_world *w = tool_of(HAP_COUPLING_VIRTUAL);
     w->tool_research.virtual_mass = 0.2;
     w->tool_research.virtual_inertia = given[i];
     w->tool_expert.coupling_damping = 30.0;

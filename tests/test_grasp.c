@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Two fingers hold a box: by how much grip, for how long, and with the motion of recorded fingers. */
+/* Two fingers hold a box: by how much grip, for how long, and with the motion of recorded
+ * fingers. */
 
 #include "tests/tap.h"
 
@@ -35,7 +36,7 @@ typedef struct held {
   double force; /* N, largest */
 } held;
 
-static scene_parameters grasp(void)
+static scene_parameters cube_grasp(void)
 {
   size_t i = 0;
   while (strcmp(scene_table_at(i)->name, "grasp") != 0) {
@@ -72,7 +73,7 @@ static held hold_box(const hold *h, double seconds)
   rig r;
   rig_options options;
   hap_trace_row row;
-  scene_parameters parameters = grasp();
+  scene_parameters parameters = cube_grasp();
   rig_options_init(&options);
   parameters.friction = MU;
   parameters.finger_radius = h->finger;
@@ -157,7 +158,8 @@ TEST(without_soft_fingers_a_box_swings)
 
 /* ---- recorded fingers ---- */
 
-/* Thumb and index of one hand, which close three times in this time, about a box at their middle. */
+/* Thumb and index of one hand, which close three times in this time, about a box at their
+ * middle. */
 #define PLACE "scale=0.5,rotate=0.983/0/0/0.1835,offset=-0.1126/-0.1899/-0.0665,start=8"
 
 typedef struct grips {
@@ -209,7 +211,7 @@ TEST(recorded_fingers_grip_a_box)
     hap_trace_row row;
     rig r;
     rig_options options;
-    scene_parameters parameters = grasp();
+    scene_parameters parameters = cube_grasp();
     parameters.size = 0.036;
     rig_options_init(&options);
     options.parameters = &parameters;

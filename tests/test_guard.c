@@ -32,8 +32,8 @@ static hapi_pointer *guarded_wall(void)
   begin_model();
   f.model->period_s = 0.02;
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   return p;
 }
 
@@ -82,7 +82,7 @@ static void random_vector(double v[3], int decades)
   hapi_v3_set(v, size * random_number(), size * random_number(), size * random_number());
 }
 
-static double distance(const double a[3], const double b[3])
+static double points_distance(const double a[3], const double b[3])
 {
   double apart[3];
   hapi_v3_sub(a, b, apart);
@@ -111,9 +111,9 @@ TEST(a_million_random_wrenches_keep_limit_and_slew)
     }
     hapi_tick_guard(&f.tick);
     double force = hapi_v3_norm(p->device.wrench.force);
-    double change = distance(p->device.wrench.force, before.force);
+    double change = points_distance(p->device.wrench.force, before.force);
     double torque = hapi_v3_norm(p->device.wrench.torque);
-    double turn = distance(p->device.wrench.torque, before.torque);
+    double turn = points_distance(p->device.wrench.torque, before.torque);
     wrong += !(force <= LIMIT * (1.0 + ROUNDING) && change <= STEP * (1.0 + ROUNDING) &&
                torque <= 1.0 + ROUNDING && turn <= 0.5 * (1.0 + ROUNDING));
     largest = fmax(largest, force);
@@ -309,9 +309,9 @@ static void stalled_tick(int tick)
     begin_model();
     f.model->period_s = 0.02;
     (void)add_contact(0, HAPI_SLOT_NONE, 0);
-    adopt();
+    model_adopt();
   }
-  run(1);
+  ticks_run(1);
 }
 
 TEST(a_stall_takes_the_force_down_and_the_next_model_brings_it_back)
@@ -345,10 +345,10 @@ TEST(a_model_of_two_steps_is_not_too_old)
   hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0);
   int64_t state_ns = f.tick.facts.state_ns;
   while (f.now_ns <= state_ns + 41 * TICK_NS) { /* two steps and a tick */
-    run(1);
+    ticks_run(1);
     CHECK(!f.tick.guard.stale);
   }
-  run(1);
+  ticks_run(1);
   CHECK(f.tick.guard.stale);
 }
 
@@ -356,17 +356,17 @@ TEST(without_a_model_and_in_model_single_nothing_grows_old)
 {
   hapi_pointer *p = guarded_alone();
   f.now_ns = 1000 * TICK_NS;
-  run(50);
+  ticks_run(50);
   CHECK(f.tick.guard.stale_times == 0);
   begin_model();
   f.model->model = HAP_MODEL_SINGLE;
   f.model->period_s = T;
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
+  model_adopt();
   hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0);
-  run(10); /* models late by a few ms are no reason */
+  ticks_run(10); /* models late by a few ms are no reason */
   CHECK(f.tick.guard.stale_times == 0);
-  run(10);
+  ticks_run(10);
   CHECK(f.tick.guard.stale_times == 1);
 }
 
@@ -379,9 +379,9 @@ typedef struct energy {
   double peak;   /* N */
 } energy;
 
-/* The hand goes 10 mm to and fro about the wall's surface, at hz; a device that is scale times smaller
- * and weaker. The work is taken from
- * what was written and where the device was, nothing else. */
+/* The hand goes 10 mm to and fro about the wall's surface, at hz; a device that is scale times
+ * smaller and weaker. The work is taken from what was written and where the device was, nothing
+ * else. */
 static energy tap_wall(hap_guard mode, double scale, double hz, double damping, int ticks)
 {
   const double depth = 0.01;
@@ -400,7 +400,7 @@ static energy tap_wall(hap_guard mode, double scale, double hz, double damping, 
     e.most = fmax(e.most, e.gained);
     p->device.pose.position[0] = x / scale;
     p->device.twist.linear[0] = 2.0 * 3.14159265358979 * hz * depth * sin(angle) / scale;
-    run(1);
+    ticks_run(1);
     double deep = fmax(x + 0.01, 0.0);
     e.stored = fmax(e.stored, 0.5 * p->surface.stiffness * deep * deep);
     e.peak = fmax(e.peak, hapi_v3_norm(p->wrench.force));
@@ -444,7 +444,7 @@ TEST(a_wall_with_a_damper_is_left_alone)
 
 /* A body of 1 kg comes at 0.5 m/s, at a hand of 0.3 kg on a spring of hand_k [N/m]; 0: at rest. The
  * largest sum of what the hand has gained and the body still has goes to *out_total. */
-static double impact(hap_guard mode, double hand_k, double *out_total)
+static double wall_impact(hap_guard mode, double hand_k, double *out_total)
 {
   set_up();
   f.tick.guard.mode = mode;
@@ -466,13 +466,13 @@ static double impact(hap_guard mode, double hand_k, double *out_total)
   body->twist.linear[0] = -0.5;
   hapi_model_contact *c = add_contact(0, 0, 0);
   c->point_body[0] = -0.02;
-  adopt();
+  model_adopt();
   double peak = 0.0;
   double speed = 0.0;
   double gained = 0.0;
   *out_total = 0.0;
   for (int i = 0; i < 160; ++i) {
-    run(1);
+    ticks_run(1);
     double force = p->device.wrench.force[0];
     peak = fmax(peak, fabs(force));
     if (hand_k > 0.0) {
@@ -492,8 +492,8 @@ TEST(an_honest_impact_is_felt_whole)
   static const double hands[] = {0.0, 100.0, 1000.0};
   for (int i = 0; i < 3; ++i) {
     double total[2];
-    double bare = impact(HAP_GUARD_MEASURE, hands[i], &total[0]);
-    double kept = impact(HAP_GUARD_ON, hands[i], &total[1]);
+    double bare = wall_impact(HAP_GUARD_MEASURE, hands[i], &total[0]);
+    double kept = wall_impact(HAP_GUARD_ON, hands[i], &total[1]);
     printf("# hand of %g N/m: peak %.4g N, guarded %.4g; of 0.125 J at most %.5g, guarded %.5g\n",
            hands[i], bare, kept, total[0], total[1]);
     CHECK(bare > 2.0 && fabs(kept - bare) <= 0.02 * bare);
@@ -502,8 +502,8 @@ TEST(an_honest_impact_is_felt_whole)
   }
 }
 
-/* A body presses against a hand that gives way at 0.05 m/s: with its weight, or because it is driven. The
- * hand gains energy all the time, and the world loses it. */
+/* A body presses against a hand that gives way at 0.05 m/s: with its weight, or because it is
+ * driven. The hand gains energy all the time, and the world loses it. */
 static void yield_to(uint32_t flags, hap_model model)
 {
   set_up();
@@ -525,7 +525,7 @@ static void yield_to(uint32_t flags, hap_model model)
   body->twist.linear[0] = -0.05;
   hapi_model_contact *c = add_contact(0, 0, 0);
   c->point_body[0] = -0.02;
-  adopt();
+  model_adopt();
   hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
   patches->model_number = f.model->number;
   patches->contact_count = 0;
@@ -536,7 +536,7 @@ static void yield_to(uint32_t flags, hap_model model)
   for (int i = 0; i < 2000; ++i) { /* 100 mm: 0.2 J, a hundred times what the spring holds */
     p->device.pose.position[0] = -0.05 * T * i;
     p->device.twist.linear[0] = -0.05;
-    run(1);
+    ticks_run(1);
     CHECK_NEAR(p->device.wrench.force[0], -2.0, 0.05);
   }
   CHECK(f.tick.guard.energy_ticks == 0 && f.tick.guard.stored_max < 0.01);
@@ -572,12 +572,12 @@ static hapi_pointer *pressed_in_two(void)
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   (void)add_contact(1, HAPI_SLOT_NONE, 0);
-  adopt();
+  model_adopt();
   f.tick.facts.physics_period = 0.0; /* the walls do not grow old */
   p->guard.share = 1.0;
   for (int i = -100; i <= 50; ++i) {
     p->device.pose.position[0] = -0.01 + 1e-4 * i;
-    run(1);
+    ticks_run(1);
   }
   CHECK_NEAR(p->device.wrench.force[0], -10.0, 1e-9);
   CHECK_NEAR(f.tick.guard.balance, 0.025, 1e-3);
@@ -589,8 +589,8 @@ TEST(the_spring_of_a_contact_that_vanishes_is_lost)
   hapi_pointer *p = pressed_in_two();
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
   CHECK_NEAR(f.tick.guard.balance, 0.0125, 1e-3);
 }
@@ -601,7 +601,7 @@ TEST(nobody_pays_for_a_jump_but_what_it_gives_is_given)
     hapi_pointer *p = pressed_in_two();
     p->device.speed_limit = 10.0;
     p->device.pose.position[0] += out != 0 ? -0.1 : 0.1;
-    run(1);
+    ticks_run(1);
     /* Of 1 J no more than 10 N at 10 m/s give in a tick. */
     CHECK_NEAR(f.tick.guard.balance, out != 0 ? 0.025 - 0.1 : 0.0, 1e-3);
   }
@@ -614,10 +614,10 @@ static uint32_t box_counts[HAP_BLACK_BOX_TICKS];
 static hap_black_box_row read_rows[HAP_BLACK_BOX_TICKS * POINTERS];
 static hapi_black_box box;
 
-static void record(int ticks)
+static void ticks_record(int ticks)
 {
   for (int i = 0; i < ticks; ++i) {
-    run(1);
+    ticks_run(1);
     hapi_black_box_record(&box, &f.tick);
   }
 }
@@ -644,9 +644,9 @@ TEST(the_black_box_knows_no_age_before_the_first_model)
   box = (hapi_black_box){.rows = box_rows, .counts = box_counts, .pointers = POINTERS};
   hapi_black_box_reset(&box);
   f.now_ns = 1000000 * TICK_NS;
-  record(2);
+  ticks_record(2);
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
-  record(1);
+  ticks_record(1);
   REQUIRE(read_box(10) == 3);
   CHECK(read_rows[0].model_age_s == 0.0 && read_rows[2].model_age_s == 0.0);
 }
@@ -654,14 +654,14 @@ TEST(the_black_box_knows_no_age_before_the_first_model)
 TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
 {
   hapi_pointer *p = open_box();
-  record(1000);
+  ticks_record(1000);
   CHECK(read_box(1000) == 0); /* nothing has happened */
   p->surface.stiffness = (double)INFINITY;
   p->device.pose.position[0] = -0.005;
-  record(1);
+  ticks_record(1);
   p->surface.stiffness = 1000.0;
   uint64_t last = f.tick.facts.tick - 1;
-  record(100);
+  ticks_record(100);
   for (int again = 0; again < 2; ++again) {
     REQUIRE(read_box(1000) == 256);
     for (uint64_t i = 0; i < 256; ++i) {
@@ -676,11 +676,11 @@ TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
   CHECK(read_rows[255].guard == HAP_GUARD_FAULT);
   CHECK(read_box(3) == 3 && read_rows[0].tick == last - 2 && read_rows[2].tick == last);
   hapi_tick_reset_fault(&f.tick);
-  record(1);
+  ticks_record(1);
   CHECK(read_box(1000) == 0);
-  record(9);
+  ticks_record(9);
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
-  record(1);
+  ticks_record(1);
   CHECK(read_box(1000) == 11 && read_rows[10].fault == HAP_FAULT_WORLD);
   CHECK(read_rows[1].written.force[0] < 0.0 && read_rows[0].guard == HAP_GUARD_RAMP_IN);
 }
@@ -688,11 +688,11 @@ TEST(the_black_box_keeps_the_last_256_ticks_until_the_reset)
 TEST(each_pointer_has_its_rows)
 {
   (void)open_box();
-  record(3);
+  ticks_record(3);
   (void)guarded_pointer(2);
-  record(2);
+  ticks_record(2);
   hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_POSE, 3);
-  record(1);
+  ticks_record(1);
   CHECK(read_box(1000) == 9);
   CHECK(read_rows[2].tick + 1 == read_rows[3].tick && read_rows[3].tick == read_rows[4].tick);
   CHECK((uint32_t)read_rows[3].pointer.v == 1 && (uint32_t)read_rows[4].pointer.v == 3);
@@ -701,16 +701,16 @@ TEST(each_pointer_has_its_rows)
 TEST(a_loop_never_waits_for_a_reader)
 {
   (void)open_box();
-  record(5);
+  ticks_record(5);
   hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
-  record(1);
+  ticks_record(1);
   box.state = HAPI_BOX_READING; /* a reader that takes its time */
   hapi_tick_reset_fault(&f.tick);
-  record(4); /* not kept */
+  ticks_record(4); /* not kept */
   hapi_tick_fault(&f.tick, HAP_FAULT_LOCAL_STATE, 0);
-  record(1);
+  ticks_record(1);
   box.state = HAPI_BOX_FROZEN; /* done */
-  record(3);
+  ticks_record(3);
   CHECK(read_box(1000) == 1); /* of the new fault, not of the old one */
   CHECK(read_rows[0].fault == HAP_FAULT_LOCAL_STATE);
 }

@@ -138,13 +138,13 @@ static bool start_with_device(stage *s, hap_device **out)
 }
 
 /* NULL when it does not start. */
-static stage *begin(hap_drive drive, hap_device **out)
+static stage *stage_begin(hap_drive drive, hap_device **out)
 {
   stage *s = stage_new(drive);
   return start_with_device(s, out) ? s : NULL;
 }
 
-static void end(stage *s, hap_device *device)
+static void stage_finish(stage *s, hap_device *device)
 {
   stage_end(s);
   hap_device_close(device);
@@ -167,7 +167,7 @@ static bool run_until(stage *s, bool (*condition)(stage *s))
   return false;
 }
 
-static bool pushes(stage *s)
+static bool hand_pushes(stage *s)
 {
   (void)s;
   return atomic_load(&device_book.pushing) != 0;
@@ -192,32 +192,32 @@ TEST(a_device_that_fails_is_zeroed_at_once)
   atomic_int *const causes[] = {&device_book.fail_read, &device_book.fail_write};
   for (int i = 0; i < 2; ++i) {
     hap_device *device;
-    stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+    stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
     REQUIRE(s != NULL);
-    CHECK(hap_session_advance(s->session, 100) == HAP_OK && pushes(s));
+    CHECK(hap_session_advance(s->session, 100) == HAP_OK && hand_pushes(s));
     int forces = atomic_load(&device_book.forces);
     atomic_store(causes[i], 1);
     CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
-    CHECK(atomic_load(&device_book.zeros) >= 1 && !pushes(s));
+    CHECK(atomic_load(&device_book.zeros) >= 1 && !hand_pushes(s));
     CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
     CHECK(atomic_load(&device_book.forces) == forces); /* none since */
-    CHECK(stats_of(s).faults.pointer == hand.v && has(detail_of(s), "pointer 1: the device"));
+    CHECK(stats_of(s).faults.pointer == hand.v && text_has(detail_of(s), "pointer 1: the device"));
     CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
     CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
     CHECK(stats_of(s).faults.pointer == hand.v); /* nobody else's, ever */
-    end(s, device);
+    stage_finish(s, device);
   }
 }
 
 TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
 {
   hap_device *device;
-  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
   REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 100) == HAP_OK);
   hap_pointer_state state;
   atomic_store(&device_book.bad_pose, 1);
-  CHECK(hap_session_advance(s->session, 3) == HAP_FAULTED && !pushes(s));
+  CHECK(hap_session_advance(s->session, 3) == HAP_FAULTED && !hand_pushes(s));
   CHECK(atomic_load(&device_book.zeros) == 0); /* by writes alone */
   CHECK(hap_pointer_get(s->session, hand, &state, sizeof state) == HAP_OK);
   CHECK(state.guard == HAP_GUARD_FAULT && hapi_v3_norm(state.wrench.force) == 0.0);
@@ -234,14 +234,14 @@ TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
   }
   CHECK_NEAR(before, 3.0, 1e-6);
   CHECK(atomic_load(&device_book.steep) == 0);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 TEST(every_fault_has_a_text)
 {
   CHECK(strcmp(hap_fault_text(HAP_FAULT_NONE), "") == 0);
   for (int i = HAP_FAULT_DEVICE_READ; i <= HAP_FAULT_EMERGENCY; ++i) {
-    CHECK(has(hap_fault_text((hap_fault)i), "zero until the fault is reset"));
+    CHECK(text_has(hap_fault_text((hap_fault)i), "zero until the fault is reset"));
   }
 }
 
@@ -257,9 +257,9 @@ TEST(an_emergency_takes_all_force_until_the_reset)
 {
   for (int d = 0; d < 2; ++d) {
     hap_device *device;
-    stage *s = begin(drives[d], &device);
+    stage *s = stage_begin(drives[d], &device);
     REQUIRE(s != NULL);
-    REQUIRE(run_until(s, pushes));
+    REQUIRE(run_until(s, hand_pushes));
     signal(SIGUSR1, on_signal);
     raise(SIGUSR1);
     CHECK(atomic_load(&device_book.zeros) >= 1);
@@ -270,48 +270,48 @@ TEST(an_emergency_takes_all_force_until_the_reset)
       CHECK(!run_until(s, has_fault) || s->def.drive != HAP_DRIVE_LOCKSTEP ||
             hap_session_advance(s->session, 1) == HAP_FAULTED);
     }
-    CHECK(atomic_load(&device_book.forces) == forces && !pushes(s));
+    CHECK(atomic_load(&device_book.forces) == forces && !hand_pushes(s));
     CHECK(stats_of(s).faults.fault == HAP_FAULT_EMERGENCY && stats_of(s).faults.pointer == 0);
-    CHECK(has(detail_of(s), "hap_emergency_zero"));
+    CHECK(text_has(detail_of(s), "hap_emergency_zero"));
     CHECK(hap_session_reset_fault(s->session) == HAP_OK);
-    CHECK(run_until(s, has_no_fault) && run_until(s, pushes));
-    end(s, device);
+    CHECK(run_until(s, has_no_fault) && run_until(s, hand_pushes));
+    stage_finish(s, device);
   }
 }
 
 TEST(a_force_that_is_written_during_an_emergency_does_not_stay)
 {
   hap_device *device;
-  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
   REQUIRE(s != NULL);
-  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
   atomic_store(&device_book.alarm_in_write, 1);
   CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
-  CHECK(!pushes(s)); /* the write ended after the zero of the emergency */
+  CHECK(!hand_pushes(s)); /* the write ended after the zero of the emergency */
   int forces = atomic_load(&device_book.forces);
   CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
   CHECK(atomic_load(&device_book.forces) == forces);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 TEST(an_emergency_before_the_start_or_after_the_end_reaches_nobody)
 {
   hap_device *device;
   hap_emergency_zero();
-  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
   REQUIRE(s != NULL);
-  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
   CHECK(hap_session_stop(s->session) == HAP_OK);
   int zeros = atomic_load(&device_book.zeros);
   hap_emergency_zero();
   CHECK(atomic_load(&device_book.zeros) == zeros); /* the device may be gone by now */
   CHECK(hap_session_start(s->session) == HAP_OK);
-  CHECK(hap_session_advance(s->session, 50) == HAP_OK && pushes(s));
+  CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
   CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
   zeros = atomic_load(&device_book.zeros);
   hap_emergency_zero();
   CHECK(atomic_load(&device_book.zeros) == zeros);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 TEST(there_are_places_for_64_devices)
@@ -325,12 +325,12 @@ TEST(there_are_places_for_64_devices)
   CHECK(added == HAPI_EMERGENCY_DEVICES);
   hap_device *device;
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
-  CHECK(!start_with_device(s, &device) && has(detail_of(s), "64 places"));
+  CHECK(!start_with_device(s, &device) && text_has(detail_of(s), "64 places"));
   CHECK(atomic_load(&device_book.stops) == 1);
   for (int i = 0; i < added; ++i) {
     hapi_emergency_remove(&booked_ops, &selves[i]);
   }
-  end(s, device);
+  stage_finish(s, device);
   CHECK(hapi_emergency_add(&booked_ops, &books[0]) && hapi_emergency_add(&booked_ops, &books[1]));
   hapi_emergency_remove(&booked_ops, &books[0]);
   hap_emergency_zero();
@@ -340,7 +340,7 @@ TEST(there_are_places_for_64_devices)
 
 static atomic_int alarm_goes_on;
 
-static void *ring(void *arg)
+static void *alarm_ring(void *arg)
 {
   (void)arg;
   while (atomic_load(&alarm_goes_on) != 0) {
@@ -353,7 +353,7 @@ TEST(devices_come_and_go_under_emergencies)
 {
   pthread_t thread;
   atomic_store(&alarm_goes_on, 1);
-  REQUIRE(pthread_create(&thread, NULL, ring, NULL) == 0);
+  REQUIRE(pthread_create(&thread, NULL, alarm_ring, NULL) == 0);
   for (int i = 0; i < 2000; ++i) {
     booked *fresh = calloc(1, sizeof *fresh);
     CHECK(hapi_emergency_add(&booked_ops, fresh));
@@ -372,7 +372,7 @@ TEST(the_black_box_of_a_session)
 {
   hap_device *device;
   size_t count = 7;
-  stage *s = begin(HAP_DRIVE_LOCKSTEP, &device);
+  stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
   REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 400) == HAP_OK);
   CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) ==
@@ -397,7 +397,7 @@ TEST(the_black_box_of_a_session)
   CHECK(hap_session_stop(s->session) == HAP_OK); /* it can still be read */
   CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
         count == 256);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 typedef struct reader {
@@ -430,7 +430,7 @@ TEST(faults_and_resets_race_with_readers)
 {
   hap_device *device;
   static reader readers[2];
-  stage *s = begin(HAP_DRIVE_THREADS, &device);
+  stage *s = stage_begin(HAP_DRIVE_THREADS, &device);
   REQUIRE(s != NULL);
   atomic_store(&alarm_goes_on, 1);
   for (int i = 0; i < 2; ++i) {
@@ -451,14 +451,14 @@ TEST(faults_and_resets_race_with_readers)
     CHECK(readers[i].read > 0 && readers[i].wrong == 0);
   }
   CHECK(atomic_load(&device_book.steep) == 0);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 /* ---- a stall of physics ---- */
 
 static atomic_int stall;
 
-static void hang(stage *s)
+static void step_hang(stage *s)
 {
   (void)s;
   while (atomic_load(&stall) != 0) {
@@ -466,7 +466,7 @@ static void hang(stage *s)
   }
 }
 
-static double felt(stage *s, uint32_t *out_guard)
+static double force_felt(stage *s, uint32_t *out_guard)
 {
   hap_pointer_state state;
   CHECK(hap_pointer_get(s->session, hand, &state, sizeof state) == HAP_OK);
@@ -477,23 +477,23 @@ static double felt(stage *s, uint32_t *out_guard)
 static bool feels_nothing(stage *s)
 {
   uint32_t guard;
-  return felt(s, &guard) < 1e-9 && (guard & HAP_GUARD_STALE) != 0;
+  return force_felt(s, &guard) < 1e-9 && (guard & HAP_GUARD_STALE) != 0;
 }
 
 static bool feels_all(stage *s)
 {
   uint32_t guard;
-  return fabs(felt(s, &guard) - 3.0) < 1e-6 && guard == 0;
+  return fabs(force_felt(s, &guard) - 3.0) < 1e-6 && guard == 0;
 }
 
 TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
 {
   hap_device *device;
   atomic_store(&stall, 0);
-  stage *s = begin(HAP_DRIVE_THREADS, &device);
+  stage *s = stage_begin(HAP_DRIVE_THREADS, &device);
   REQUIRE(s != NULL);
   CHECK(hap_session_lock(s->session) == HAP_OK);
-  s->in_step = hang;
+  s->in_step = step_hang;
   CHECK(hap_session_unlock(s->session) == HAP_OK);
   CHECK(run_until(s, feels_all));
   atomic_store(&stall, 1);
@@ -502,7 +502,7 @@ TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
   CHECK(run_until(s, feels_all));
   CHECK(stats_of(s).faults.stale_times >= 1 && stats_of(s).faults.stale_ticks >= 50);
   CHECK(stats_of(s).faults.count == 0 && atomic_load(&device_book.steep) == 0);
-  end(s, device);
+  stage_finish(s, device);
 }
 
 TEST(lockstep_knows_no_stall)
@@ -542,17 +542,18 @@ TEST(a_slew_limit_of_the_application)
   def.device = device;
   expert.max_slew = -1.0;
   CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_ARGUMENT);
-  CHECK(has(detail_of(s), "max_slew"));
+  CHECK(text_has(detail_of(s), "max_slew"));
   expert.max_slew = 50.0; /* 0.05 N a tick */
   REQUIRE(hap_pointer_add(s->session, &def, &hand) == HAP_OK);
   REQUIRE(hap_session_start(s->session) == HAP_OK);
   uint32_t guard;
   CHECK(hap_session_advance(s->session, 40) == HAP_OK);
-  double force = felt(s, &guard);
+  double force = force_felt(s, &guard);
   CHECK(force > 1.0 && force <= 2.0 + 1e-9 && guard == HAP_GUARD_SLEW);
   CHECK(stats_of(s).faults.slewed_ticks > 0);
   atomic_store(&device_book.bad_pose, 1);
   CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
-  CHECK_NEAR(felt(s, &guard), force - 1.0, 1e-9); /* after a fault 10 N go in 100 ms at the least */
-  end(s, device);
+  CHECK_NEAR(force_felt(s, &guard), force - 1.0,
+             1e-9); /* after a fault 10 N go in 100 ms at the least */
+  stage_finish(s, device);
 }

@@ -22,7 +22,7 @@ TEST(force_is_spring_on_depth)
   for (int mm10 = -200; mm10 <= 200; ++mm10) {
     double depth = 1e-4 * mm10;
     p->device.pose.position[0] = -0.01 + depth;
-    run(1);
+    ticks_run(1);
     check_v3(p->device.wrench.force, depth > 0.0 ? -1000.0 * depth : 0.0, 0.0, 0.0, 1e-11);
     CHECK(p->contacts == (depth > 0.0 ? 1u : 0u));
   }
@@ -34,21 +34,21 @@ TEST(damper_acts_only_in_contact_and_never_pulls)
   p->surface.damping = 20.0;
   p->device.twist.linear[0] = 0.1; /* closing, 2 N */
   p->device.pose.position[0] = -0.0101;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0); /* apart, however fast it comes */
   p->device.pose.position[0] = -0.009;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, -3.0, 0.0, 0.0, 1e-12);
   p->device.twist.linear[0] = -0.02;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, -0.6, 0.0, 0.0, 1e-12);
   p->device.twist.linear[0] = -0.5; /* opening: 1 N - 10 N would pull */
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
   CHECK(p->contacts == 0);
   p->device.twist.linear[0] = 0.0;
   p->device.twist.linear[1] = 5.0; /* along the plane: no force */
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, -1.0, 0.0, 0.0, 1e-12);
 }
 
@@ -63,13 +63,13 @@ TEST(damper_takes_the_speed_of_the_surface)
   hapi_v3_set(body->twist.linear, 0.3, 0.0, 0.0);
   hapi_v3_set(body->twist.angular, 0.0, 0.0, 2.0);
   hapi_v3_set(add_contact(0, 2, 0)->point_body, 0.0, 0.05, 0.0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   /* The point moves at 0.3 - 2 x 0.05 = 0.2 m/s; put the pointer there, 1 mm deep. */
   f.bodies[2].pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   hapi_v3_set(p->device.pose.position, -0.009, 0.05, 0.0);
   p->device.twist.linear[0] = 0.25;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, -(1.0 + 10.0 * 0.05), 0.0, 0.0, 1e-11);
 }
 
@@ -77,12 +77,12 @@ TEST(a_static_contact_takes_no_impulse)
 {
   hapi_pointer *p = pointer_before_wall();
   p->device.pose.position[0] = 0.0;
-  run(100);
+  ticks_run(100);
   check_v3(p->device.wrench.force, -10.0, 0.0, 0.0, 1e-11);
   CHECK(f.tick.touches.contact_ticks == 100);
   CHECK_NEAR(f.tick.touches.hand_impulse_abs, 0.0, 0.0); /* the audit is about dynamic bodies */
   CHECK_NEAR(f.tick.guard.peak_force, 10.0, 1e-11);
-  hapi_state *state = report();
+  hapi_state *state = tick_report();
   check_v3(hapi_state_contacts(state)[0].force, 10.0, 0.0, 0.0, 1e-11);
   CHECK(state->body_high == 0);
 }
@@ -99,8 +99,8 @@ static hapi_model_body *body_under_pointer(double depth)
   hapi_model_contact *c = add_contact(1, 3, 0);
   hapi_v3_set(c->point_body, -0.025, 0.01, 0.0);
   set_free(c, 2.0, 0.02);
-  adopt();
-  run(1); /* seen apart */
+  model_adopt();
+  ticks_run(1); /* seen apart */
   f.pointers[0].device.pose.position[0] = -0.025 - 0.01 + depth;
   return body;
 }
@@ -110,7 +110,7 @@ TEST(one_step_of_eq_8_and_9_to_the_last_digit)
   body_under_pointer(0.003);
   static const double b[6] = {0.5, -9.81, 0.25, 1.0, -2.0, 3.0};
   memcpy(f.bodies[3].linear.b, b, sizeof b);
-  run(1);
+  ticks_run(1);
   const hapi_local_body *body = &f.bodies[3];
   const double w[3] = {1.0 * T, -2.0 * T, (3.0 - 0.03 / 0.02) * T}; /* r x F = (0, 0, -0.03) */
   check_v3(f.pointers[0].device.wrench.force, -3.0, 0.0, 0.0, 1e-12);
@@ -137,17 +137,17 @@ TEST(contact_turns_with_the_body)
   const double quarter[4] = {half, 0.0, 0.0, half};
   memcpy(body->pose.quat_wxyz, quarter, sizeof quarter);
   hapi_v3_set(add_contact(0, 0, 0)->point_body, -0.5, 0.0, 0.0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
   p->device.pose.position[1] = 1.5 - 0.01 + 0.002;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, -2.0, 0.0, 1e-11);
   check_v3(f.bodies[0].account.impulse, 0.0, 2.0 * T, 0.0, 1e-14);
   /* moment of (0, 2, 0) at the arm (0, -0.5, 0) */
   check_v3(f.bodies[0].account.angular_impulse, 0.0, 0.0, 0.0, 1e-14);
   p->device.pose.position[0] += 0.1;
-  run(1);
+  ticks_run(1);
   check_v3(f.bodies[0].account.angular_impulse, 0.0, 0.0, 0.0,
            1e-14); /* at the contact point still */
 }
@@ -161,10 +161,10 @@ TEST(quaternion_stays_unit_over_a_million_ticks)
   begin_model();
   hap_twist *twist = &add_body(0)->twist;
   hapi_v3_set(twist->angular, 6.0, 0.0, 8.0); /* 10 rad/s */
-  adopt();
+  model_adopt();
   double worst = 0.0;
   for (int i = 0; i < TICKS; ++i) {
-    run(1);
+    ticks_run(1);
     const double *q = f.bodies[0].pose.quat_wxyz;
     double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     worst = fmax(worst, fabs(norm - 1.0));
@@ -182,8 +182,8 @@ TEST(free_fall_is_symplectic_euler)
   set_up();
   begin_model();
   add_body(0)->b[2] = -9.81;
-  adopt();
-  run(1000);
+  model_adopt();
+  ticks_run(1000);
   CHECK_NEAR(f.bodies[0].twist.linear[2], -9.81, 1e-12);
   CHECK_NEAR(f.bodies[0].pose.position[2], -9.81 * T * T * 1000.0 * 1001.0 / 2.0, 1e-11);
   CHECK(f.tick.facts.tick == 1000);
@@ -202,12 +202,12 @@ TEST(several_pointers_on_one_body_add_up)
     hapi_v3_set(c->point_body, 0.0, 0.02 * i, 0.0);
     set_free(c, 1.5, 0.01);
   }
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   for (uint32_t i = 0; i < 3; ++i) {
     f.pointers[i].device.pose.position[0] = -0.01 + 0.001 * (i + 1); /* 1, 2, 3 N */
   }
-  run(1);
+  ticks_run(1);
   for (uint32_t i = 0; i < 3; ++i) {
     check_v3(f.pointers[i].device.wrench.force, -1.0 * (i + 1), 0.0, 0.0, 1e-12);
     CHECK(f.pointers[i].contacts == 1);
@@ -235,18 +235,18 @@ TEST(one_pointer_between_several_bodies)
     hapi_v3_scale(-0.008, c->normal_body, c->point_body); /* each 2 mm deep at z = 0 */
     set_free(c, 1.0 + i, 1.0);
   }
-  adopt();
+  model_adopt();
   f.tick.touches.of[0].point_body[2] = 0.0;
   p->device.pose.position[0] = 1.0; /* far from half of them only: come back through the ramp */
-  run(1);
+  ticks_run(1);
   hapi_v3_set(p->device.pose.position, 0.0, 0.0, 0.0);
-  run(30);
+  ticks_run(30);
   /* Let go, then all around at once: forces cancel on the hand, each body gets its own. */
   for (uint32_t i = 0; i < BODIES; ++i) {
     f.bodies[i].pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
     memset(&f.bodies[i].twist, 0, sizeof f.bodies[i].twist);
   }
-  run(1);
+  ticks_run(1);
   CHECK(p->contacts == BODIES);
   check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 1e-12);
   for (uint32_t i = 0; i < BODIES; ++i) {
@@ -264,10 +264,10 @@ TEST(a_driven_body_pushes_and_is_not_pushed)
   body->twist.linear[0] = -0.5;
   body->b[0] = 100.0; /* must not matter */
   set_free(add_contact(0, 0, 0), 1e-3, 1e-6);
-  adopt();
-  run(180);
+  model_adopt();
+  ticks_run(180);
   check_v3(f.bodies[0].pose.position, -0.09, 0.0, 0.0, 1e-12);
-  run(10);
+  ticks_run(10);
   check_v3(p->device.wrench.force, -1000.0 * 0.0045, 0.0, 0.0,
            1e-9); /* places of the tick before */
   check_v3(f.bodies[0].twist.linear, -0.5, 0.0, 0.0, 0.0);
@@ -286,21 +286,21 @@ TEST(a_resting_body_moves_only_after_a_push)
   body->flags = HAPI_BODY_RESTING;
   body->b[2] = -1.0; /* what a testing simulation of a waking body may see */
   set_free(add_contact(0, 0, 0), 1.0, 1.0);
-  adopt();
-  run(50);
+  model_adopt();
+  ticks_run(50);
   check_v3(f.bodies[0].pose.position, 0.0, 0.0, 0.0, 0.0);
   check_v3(f.bodies[0].twist.linear, 0.0, 0.0, 0.0, 0.0);
-  CHECK((hapi_state_bodies(report())[0].flags & HAPI_BODY_RESTING) != 0);
+  CHECK((hapi_state_bodies(tick_report())[0].flags & HAPI_BODY_RESTING) != 0);
   p->device.pose.position[0] = -0.009;
-  run(1);
+  ticks_run(1);
   check_v3(f.bodies[0].twist.linear, T, 0.0, -T, 1e-15);
-  CHECK((hapi_state_bodies(report())[0].flags & HAPI_BODY_RESTING) == 0);
+  CHECK((hapi_state_bodies(tick_report())[0].flags & HAPI_BODY_RESTING) == 0);
   p->device.pose.position[0] = -0.1;
   begin_model(); /* physics still thinks that it rests: the loop knows better */
   body = add_body(0);
   body->flags = HAPI_BODY_RESTING;
-  adopt();
-  run(10);
+  model_adopt();
+  ticks_run(10);
   CHECK(f.bodies[0].pose.position[0] > 10.0 * T * T);
 }
 
@@ -313,17 +313,17 @@ TEST(follows_hands_a_body_that_was_not_pushed_to_the_world)
       begin_model();
       (void)add_body(0);
       set_free(add_contact(0, 0, 0), 1.0, 1.0);
-      adopt();
-      run(1);
+      model_adopt();
+      ticks_run(1);
       p->device.pose.position[0] = push != 0 ? -0.009 : -0.1;
-      run(1);
+      ticks_run(1);
       p->device.pose.position[0] = -0.1;
       begin_model();
       hapi_model_body *body = add_body(0);
       body->flags = follows != 0 ? HAPI_BODY_FOLLOWS : 0;
       hapi_v3_set(body->pose.position, 7.0, 8.0, 9.0);
       hapi_v3_set(body->twist.linear, 1.0, 2.0, 3.0);
-      adopt();
+      model_adopt();
       bool worlds = follows != 0 && push == 0;
       CHECK((f.bodies[0].pose.position[0] == 7.0) == worlds);
       CHECK((f.bodies[0].twist.linear[0] == 1.0) == worlds);
@@ -339,13 +339,13 @@ TEST(a_body_that_comes_in_is_advanced_by_the_age_of_the_model)
   hapi_model_body *body = add_body(5);
   hapi_v3_set(body->twist.linear, 1.0, -2.0, 0.0);
   f.now_ns += 20 * TICK_NS;
-  adopt();
+  model_adopt();
   check_v3(f.bodies[5].pose.position, 0.02, -0.04, 0.0, 1e-15);
   begin_model();
   body = add_body(5);
   body->generation = 2; /* the slot has another body now */
   hapi_v3_set(body->pose.position, 1.0, 1.0, 1.0);
-  adopt();
+  model_adopt();
   check_v3(f.bodies[5].pose.position, 1.0, 1.0, 1.0, 0.0);
   check_v3(f.bodies[5].twist.linear, 0.0, 0.0, 0.0, 0.0);
 }
@@ -357,33 +357,33 @@ static void adopt_residual(double total)
   for (int i = 0; i < 6; ++i) {
     body->residual[i] = total * (i + 1);
   }
-  adopt();
+  model_adopt();
 }
 
 TEST(residual_is_added_once_also_when_a_model_is_skipped)
 {
   set_up();
   adopt_residual(3.0); /* it was there before the body came in: is in its twist already */
-  run(5);
+  ticks_run(5);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 0.0, 0.0);
   adopt_residual(3.5);
-  run(1);
+  ticks_run(1);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
   CHECK_NEAR(f.bodies[0].twist.angular[2], 0.5 * 6, 1e-14);
-  run(20);
+  ticks_run(20);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
   adopt_residual(3.5); /* nothing new */
-  run(3);
+  ticks_run(3);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 0.5, 1e-15);
   /* 3.75 is lost on the way; the next one has it in its total */
   adopt_residual(4.0);
-  run(2);
+  ticks_run(2);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 1.0, 1e-15);
   adopt_residual(4.25); /* two adoptions between two ticks */
   adopt_residual(4.5);
-  run(2);
+  ticks_run(2);
   CHECK_NEAR(f.bodies[0].twist.linear[0], 1.5, 1e-15);
-  const hapi_state_body *told = &hapi_state_bodies(report())[0];
+  const hapi_state_body *told = &hapi_state_bodies(tick_report())[0];
   for (int i = 0; i < 6; ++i) {
     CHECK_NEAR(told->residual[i], 4.5 * (i + 1), 1e-14);
   }
@@ -397,27 +397,27 @@ TEST(a_contact_that_arrives_deep_ramps_from_zero)
   hapi_pointer *p = add_pointer(0, 0.0, 0.0, 0.0); /* 10 mm deep, 10 N */
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
+  model_adopt();
   int ticks = (int)lround(HAPI_RAMP_S / T);
   for (int i = 0; i <= ticks + 5; ++i) {
     if (i == ticks / 2) { /* a new model of the same contact goes on where it was */
       begin_model();
       (void)add_contact(0, HAPI_SLOT_NONE, 0);
-      adopt();
+      model_adopt();
     }
-    run(1);
+    ticks_run(1);
     double share = i < ticks ? (double)i / ticks : 1.0;
     check_v3(p->device.wrench.force, -10.0 * share, 0.0, 0.0, 1e-9);
   }
   begin_model(); /* another contact in the same slot begins anew */
   add_contact(0, HAPI_SLOT_NONE, 0)->generation = 2;
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
   p->device.pose.position[0] = -0.1; /* letting go ends the ramp */
-  run(1);
+  ticks_run(1);
   p->device.pose.position[0] = 0.0;
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, -10.0, 0.0, 0.0, 1e-9);
 }
 
@@ -427,14 +427,14 @@ TEST(contacts_of_a_pointer_that_has_gone_are_not_used)
   (void)add_pointer(0, 0.0, 0.0, 0.0);
   begin_model();
   add_contact(0, HAPI_SLOT_NONE, 0)->pointer_generation = 7;
-  adopt();
-  run(40);
+  model_adopt();
+  ticks_run(40);
   CHECK(f.tick.touches.count == 0 && f.tick.touches.contact_ticks == 0);
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
+  model_adopt();
   f.pointers[0].generation = 0;
-  run(40);
+  ticks_run(40);
   CHECK(f.tick.touches.contact_ticks == 0);
 }
 
@@ -452,19 +452,19 @@ TEST(saturation_keeps_the_direction)
     hapi_v3_set(c->normal_body, 0.0, 0.0, 0.0);
     c->normal_body[i] = -1.0;
   }
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) == 0 && f.tick.guard.saturated_ticks == 0);
   p->surface.stiffness = 10000.0;
   hapi_v3_set(p->device.pose.position, -0.008, -0.007, -0.004); /* 20, 30, 60 N, 4 times that */
-  run(1);
+  ticks_run(1);
   const double norm = sqrt(4.0 + 9.0 + 36.0);
   check_v3(p->device.wrench.force, -20.0 * 2 / norm, -20.0 * 3 / norm, -20.0 * 6 / norm, 1e-12);
   check_v3(p->wrench.force, -5.0 * 2 / norm, -5.0 * 3 / norm, -5.0 * 6 / norm, 1e-12);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) != 0 && f.tick.guard.saturated_ticks == 1);
   CHECK_NEAR(f.tick.guard.peak_force, 5.0, 1e-12);
   hapi_v3_set(p->device.pose.position, -1.0, -1.0, -0.0099);
-  run(1);
+  ticks_run(1);
   check_v3(p->device.wrench.force, 0.0, 0.0, -4.0, 1e-11);
   CHECK((p->guard.flags & HAP_GUARD_SATURATED) == 0 && f.tick.guard.saturated_ticks == 1);
 }
@@ -502,7 +502,7 @@ static void bad_sample(int place, double bad)
   body_under_pointer(0.003);
   hapi_pointer *other = add_pointer(1, 3.0, 0.0, 0.0);
   hapi_pointer *p = &f.pointers[0];
-  run(1);
+  ticks_run(1);
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE && p->device.wrench.force[0] < -1.0);
   hap_pose good_pose = p->device.pose;
   double *sample[13];
@@ -513,24 +513,24 @@ static void bad_sample(int place, double bad)
                          : &p->device.twist.angular[i - 10];
   }
   *sample[place] = bad;
-  run(1);
+  ticks_run(1);
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_DEVICE_POSE && f.tick.guard.latch.count == 1);
   CHECK(force_is_zero(p) && force_is_zero(other));
-  CHECK(state_is_finite(report()));
+  CHECK(state_is_finite(tick_report()));
   p->device.pose = good_pose;
   memset(&p->device.twist, 0, sizeof p->device.twist);
-  run(10); /* latched */
+  ticks_run(10); /* latched */
   CHECK(force_is_zero(p) && f.tick.guard.latch.fault == HAP_FAULT_DEVICE_POSE &&
         f.tick.guard.latch.count == 1);
   double before = f.bodies[3].account.impulse[0];
-  run(5);
+  ticks_run(5);
   CHECK_NEAR(f.bodies[3].account.impulse[0], before, 0.0); /* and the world is not pushed either */
   p->device.pose.position[0] += 0.01;
   hapi_tick_reset_fault(&f.tick);
-  run(1);
+  ticks_run(1);
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE &&
         force_is_zero(p)); /* its contacts begin anew */
-  run(21);
+  ticks_run(21);
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE && p->device.wrench.force[0] < -1.0);
 }
 
@@ -548,10 +548,10 @@ TEST(a_fault_that_goes_on_latches_again_after_a_reset)
 {
   body_under_pointer(0.003);
   f.pointers[0].device.pose.position[1] = (double)NAN;
-  run(5);
+  ticks_run(5);
   CHECK(f.tick.guard.latch.count == 1);
   hapi_tick_reset_fault(&f.tick);
-  run(5);
+  ticks_run(5);
   CHECK(f.tick.guard.latch.count == 2 && f.tick.guard.latch.fault == HAP_FAULT_DEVICE_POSE);
   hapi_tick_fault(&f.tick, HAP_FAULT_DEVICE_WRITE, 0); /* the first one stays */
   CHECK(f.tick.guard.latch.count == 2 && f.tick.guard.latch.fault == HAP_FAULT_DEVICE_POSE);
@@ -563,18 +563,18 @@ TEST(a_local_state_that_is_not_finite_is_stopped)
   for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
     for (int place = 0; place < 6; ++place) {
       body_under_pointer(0.003);
-      run(1);
+      ticks_run(1);
       f.bodies[3].linear.b[place] = bad[k];
       hap_pose before = f.bodies[3].pose;
-      run(1);
+      ticks_run(1);
       CHECK(f.tick.guard.latch.fault == HAP_FAULT_LOCAL_STATE);
       CHECK(force_is_zero(&f.pointers[0]));
-      CHECK(state_is_finite(report()));
+      CHECK(state_is_finite(tick_report()));
       CHECK(memcmp(&before, &f.bodies[3].pose, sizeof before) == 0);
       body_under_pointer(0.003);
       f.contacts[0].a[place][0] = bad[k];
-      run(1);
-      CHECK(f.tick.guard.latch.fault == HAP_FAULT_LOCAL_STATE && state_is_finite(report()));
+      ticks_run(1);
+      CHECK(f.tick.guard.latch.fault == HAP_FAULT_LOCAL_STATE && state_is_finite(tick_report()));
       CHECK(force_is_zero(&f.pointers[0]));
     }
   }
@@ -586,13 +586,13 @@ TEST(a_force_that_overflows_is_not_written)
   for (int k = 0; k < 2; ++k) {
     body_under_pointer(0.003);
     memset(f.contacts[0].a, 0, sizeof f.contacts[0].a); /* stays where it is */
-    run(50);                                            /* the ramp is over */
+    ticks_run(50);                                      /* the ramp is over */
     CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE && f.pointers[0].contacts == 1);
     f.pointers[0].surface.stiffness = k == 0 ? 1e308 : 1e306;
     f.pointers[0].surface.damping = k == 0 ? 1e308 : 0.0;
     f.pointers[0].device.twist.linear[0] = k == 0 ? 1e3 : 0.0;
     f.pointers[0].device.force_scale = 1e6;
-    run(1);
+    ticks_run(1);
     CHECK(f.tick.guard.latch.fault ==
           (k == 0 ? HAP_FAULT_LOCAL_STATE : HAP_FAULT_FORCE)); /* the first one */
     CHECK(force_is_zero(&f.pointers[0]));
@@ -623,7 +623,7 @@ TEST(scales_and_frame_keep_virtual_work)
     hapi_v3_scale(1.0 / p->device.motion_scale, p->device.pose.position, p->device.pose.position);
     hapi_v3_set(p->device.twist.linear, 0.02, -0.05, 0.03);
     hapi_v3_set(p->device.twist.angular, 0.5, 0.2, -0.1);
-    run(1);
+    ticks_run(1);
     check_v3(p->pose.position, target[0], target[1], target[2], 1e-14);
     check_v3(p->wrench.force, -2.0, 0.0, 0.0, 1e-10);
     double at_device = hapi_v3_dot(p->device.wrench.force, p->device.twist.linear);
@@ -636,7 +636,7 @@ TEST(scales_and_frame_keep_virtual_work)
     hapi_v3_copy(p->pose.position, moved);
     hapi_v3_copy(p->device.wrench.force, force_before);
     hapi_v3_madd(p->device.pose.position, 1e-3, p->device.twist.linear, p->device.pose.position);
-    run(1);
+    ticks_run(1);
     hapi_v3_madd(moved, 1e-3, p->twist.linear, moved);
     check_v3(p->pose.position, moved[0], moved[1], moved[2], 1e-14);
     /* stiffness at the device = k x motion_scale x force_scale, along the wall's normal there */
@@ -660,7 +660,7 @@ static void press_wall(bool aligned, hapi_pointer *out)
   memcpy(p->device.pose.quat_wxyz, (double[4]){0.5, -0.1, 0.7, 0.3}, 4 * sizeof(double));
   hapi_v3_set(p->device.twist.linear, 0.02, -0.05, 0.03);
   hapi_v3_set(p->device.twist.angular, 0.5, 0.2, -0.1);
-  run(1);
+  ticks_run(1);
   *out = *p;
 }
 
@@ -690,7 +690,7 @@ static void impulse_model(hap_impulse_pose shown, double x, double sign)
   body->pose.quat_wxyz[0] = sign;
   body->b[2] = -9.81; /* not of this model */
   set_free(add_contact(0, 0, 0), 1.0, 1.0);
-  adopt();
+  model_adopt();
 }
 
 TEST(impulse_interpolates_from_the_last_but_one_to_the_last_pose)
@@ -698,17 +698,17 @@ TEST(impulse_interpolates_from_the_last_but_one_to_the_last_pose)
   set_up();
   (void)add_pointer(0, -1.0, 0.0, 0.0);
   impulse_model(HAP_IMPULSE_INTERPOLATED, 0.0, 1.0);
-  run(50);
+  ticks_run(50);
   impulse_model(HAP_IMPULSE_INTERPOLATED, 0.1, -1.0); /* -q is the same attitude */
   for (int i = 0; i < 80; ++i) {
-    run(1);
+    ticks_run(1);
     double share = i < 50 ? i / 50.0 : 1.0;
     check_v3(f.bodies[0].pose.position, 0.1 * share, 0.0, 0.0, 1e-14);
     CHECK_NEAR(fabs(f.bodies[0].pose.quat_wxyz[0]), 1.0, 1e-15);
     CHECK_NEAR(f.bodies[0].twist.linear[0], i < 50 ? 2.0 : 0.0, 1e-13);
   }
   impulse_model(HAP_IMPULSE_INTERPOLATED, 0.0, 1.0);
-  run(1);
+  ticks_run(1);
   CHECK_NEAR(f.bodies[0].pose.position[0], 0.1, 1e-14); /* without a jump */
 }
 
@@ -717,13 +717,13 @@ TEST(impulse_holds_the_last_pose_and_sums_the_impulse)
   set_up();
   hapi_pointer *p = add_pointer(0, -1.0, 0.0, 0.0);
   impulse_model(HAP_IMPULSE_HELD, 0.0, 1.0);
-  run(1);
+  ticks_run(1);
   p->device.pose.position[0] = -0.008;
-  run(49);
+  ticks_run(49);
   check_v3(f.bodies[0].pose.position, 0.0, 0.0, 0.0, 0.0);
   check_v3(f.bodies[0].account.impulse, 49 * 2.0 * T, 0.0, 0.0, 1e-13);
   impulse_model(HAP_IMPULSE_HELD, 0.002, 1.0);
-  run(50);
+  ticks_run(50);
   check_v3(f.bodies[0].pose.position, 0.002, 0.0, 0.0, 0.0);
   CHECK_NEAR(f.bodies[0].account.impulse[0], 49 * 2.0 * T, 1e-13); /* total goes on; apart now */
   f.model->model = HAP_MODEL_SINGLE;
@@ -731,8 +731,8 @@ TEST(impulse_holds_the_last_pose_and_sums_the_impulse)
   begin_model();
   add_body(0)->pose.position[0] = -0.001;
   (void)add_contact(0, 0, 0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   check_v3(f.bodies[0].pose.position, -0.001, 0.0, 0.0, 0.0);
   CHECK_NEAR(f.bodies[0].account.impulse[0], 49 * 2.0 * T + 3.0 * T, 1e-13);
 }
@@ -757,10 +757,10 @@ TEST(a_bounce_conserves_energy)
     hapi_model_contact *c = add_contact(0, 0, 0);
     c->point_body[0] = -0.1;
     set_free(c, m, 0.4);
-    adopt();
+    model_adopt();
     double contact_ns = 0.0;
     for (int i = 0; i < 1200; ++i) {
-      run(1);
+      ticks_run(1);
       contact_ns += f.pointers[0].contacts != 0 ? TICK_NS : 0.0;
     }
     double bound = omega * omega * T * T;
@@ -782,23 +782,23 @@ TEST(totals_run_on_over_models_and_begin_anew_with_a_generation)
     begin_model();
     (void)add_body(0);
     (void)add_contact(0, 0, 0); /* A = 0: does not give way */
-    adopt();
+    model_adopt();
     for (int i = 0; i < 20; ++i) {
-      run(1);
+      ticks_run(1);
       expected += T * fabs(p->wrench.force[0]);
     }
     p->device.pose.position[0] = n % 2 == 0 ? -0.005 : -1.0;
   }
   CHECK_NEAR(expected, 10 * 20 * 5.0 * T, 1e-12); /* every second of 20 intervals */
-  CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], expected, 1e-12);
+  CHECK_NEAR(hapi_state_bodies(tick_report())[0].impulse[0], expected, 1e-12);
   CHECK_NEAR(f.tick.touches.hand_impulse[0], expected, 1e-12);
   CHECK_NEAR(f.tick.touches.hand_impulse_abs, expected, 1e-12);
   begin_model();
   add_body(0)->generation = 2;
-  adopt();
-  run(1);
-  CHECK_NEAR(hapi_state_bodies(report())[0].impulse[0], 0.0, 0.0);
-  CHECK(hapi_state_bodies(report())[0].generation == 2);
+  model_adopt();
+  ticks_run(1);
+  CHECK_NEAR(hapi_state_bodies(tick_report())[0].impulse[0], 0.0, 0.0);
+  CHECK(hapi_state_bodies(tick_report())[0].generation == 2);
   CHECK_NEAR(f.tick.touches.hand_impulse[0], expected, 1e-12);
 }
 
@@ -808,7 +808,7 @@ TEST(the_hash_tells_any_change)
   for (int run_number = 0; run_number < 3; ++run_number) {
     body_under_pointer(0.003);
     f.pointers[0].device.pose.position[1] += run_number == 2 ? 1e-16 : 0.0;
-    run(100);
+    ticks_run(100);
     first = run_number == 0 ? f.tick.hash : first;
     CHECK((f.tick.hash == first) == (run_number < 2));
   }

@@ -86,54 +86,54 @@ typedef struct damage {
   int kinds;        /* of bad_numbers, a bit each: others are legal, or ODE itself refuses them */
 } damage;
 
-static void gravity(things *t, double bad)
+static void gravity_set(things *t, double bad)
 {
   dWorldSetGravity(t->w.world, 0.0, bad, 0.0);
 }
-static void erp(things *t, double bad)
+static void erp_set(things *t, double bad)
 {
   dWorldSetERP(t->w.world, bad);
 }
-static void cfm(things *t, double bad)
+static void cfm_set(things *t, double bad)
 {
   dWorldSetCFM(t->w.world, bad);
 }
-static void layer(things *t, double bad)
+static void layer_set(things *t, double bad)
 {
   dWorldSetContactSurfaceLayer(t->w.world, bad);
 }
-static void position(things *t, double bad)
+static void position_set(things *t, double bad)
 {
   dBodySetPosition(t->w.bodies[0], 0.0, bad, 0.0);
 }
-static void velocity(things *t, double bad)
+static void velocity_set(things *t, double bad)
 {
   dBodySetLinearVel(t->w.bodies[1], bad, 0.0, 0.0);
 }
-static void spin(things *t, double bad)
+static void spin_set(things *t, double bad)
 {
   dBodySetAngularVel(t->w.bodies[0], bad, 0.0, 0.0);
 }
-static void force(things *t, double bad)
+static void force_set(things *t, double bad)
 {
   dBodyAddForce(t->w.bodies[2], 0.0, 0.0, bad);
 }
-static void torque(things *t, double bad)
+static void torque_set(things *t, double bad)
 {
   dBodyAddTorque(t->w.bodies[0], 0.0, bad, 0.0);
 }
-static void damping(things *t, double bad)
+static void damping_set(things *t, double bad)
 {
   dBodySetAngularDamping(t->w.bodies[0], bad);
 }
-static void mass(things *t, double bad)
+static void mass_set(things *t, double bad)
 {
   dMass m;
   dBodyGetMass(t->w.bodies[0], &m);
   m.mass = bad;
   dBodySetMass(t->w.bodies[0], &m);
 }
-static void inertia(things *t, double bad)
+static void inertia_set(things *t, double bad)
 {
   dMass m;
   dBodyGetMass(t->w.bodies[0], &m);
@@ -147,16 +147,16 @@ static void inertia_product(things *t, double bad)
   m.I[1] = m.I[4] = bad;
   dBodySetMass(t->w.bodies[0], &m);
 }
-static void anchor(things *t, double bad)
+static void anchor_set(things *t, double bad)
 {
   dJointSetHingeAnchor(t->hinge, bad, 0.0, 0.0);
 }
-static void motor(things *t, double bad)
+static void motor_set(things *t, double bad)
 {
   dJointSetHingeParam(t->hinge, dParamFMax, 1.0);
   dJointSetHingeParam(t->hinge, dParamVel, bad);
 }
-static void stop(things *t, double bad)
+static void stop_set(things *t, double bad)
 {
   dJointSetHingeParam(t->hinge, dParamLoStop, bad);
 }
@@ -170,22 +170,22 @@ static void block_place(things *t, double bad)
 }
 
 static const damage damages[] = {
-    {"gravity", gravity, "gravity", 1 | 2 | 4},
-    {"erp", erp, "ERP", 1 | 2 | 4},
-    {"cfm", cfm, "CFM", 1 | 2 | 4},
-    {"layer", layer, "layer", 1 | 2 | 4},
-    {"position", position, "position", 1 | 2 | 4},
-    {"velocity", velocity, "velocity", 1 | 2 | 4},
-    {"spin", spin, "velocity", 1 | 2 | 4},
-    {"force", force, "force", 1 | 2 | 4},
-    {"torque", torque, "torque", 1 | 2 | 4},
-    {"damping", damping, "damping", 1 | 2 | 4},
-    {"mass", mass, "mass", 2 | 8},
-    {"inertia", inertia, "inertia", 1},
+    {"gravity", gravity_set, "gravity", 1 | 2 | 4},
+    {"erp", erp_set, "ERP", 1 | 2 | 4},
+    {"cfm", cfm_set, "CFM", 1 | 2 | 4},
+    {"layer", layer_set, "layer", 1 | 2 | 4},
+    {"position", position_set, "position", 1 | 2 | 4},
+    {"velocity", velocity_set, "velocity", 1 | 2 | 4},
+    {"spin", spin_set, "velocity", 1 | 2 | 4},
+    {"force", force_set, "force", 1 | 2 | 4},
+    {"torque", torque_set, "torque", 1 | 2 | 4},
+    {"damping", damping_set, "damping", 1 | 2 | 4},
+    {"mass", mass_set, "mass", 2 | 8},
+    {"inertia", inertia_set, "inertia", 1},
     {"product of inertia", inertia_product, "inertia", 1},
-    {"joint anchor", anchor, "joint", 1 | 2 | 4},
-    {"joint motor", motor, "joint", 1 | 2 | 4},
-    {"joint stop", stop, "joint", 1 | 2},
+    {"joint anchor", anchor_set, "joint", 1 | 2 | 4},
+    {"joint motor", motor_set, "joint", 1 | 2 | 4},
+    {"joint stop", stop_set, "joint", 1 | 2},
     {"joint softness", stop_softness, "joint", 1 | 2 | 4},
     {"geom place", block_place, "geom", 1},
 };
@@ -285,7 +285,7 @@ TEST(a_world_that_was_set_right_goes_on)
   things t;
   REQUIRE(open_things(&t, HAP_MODEL_ACCELERANCE) && hap_session_start(t.w.session) == HAP_OK);
   CHECK(hap_session_advance(t.w.session, 60) == HAP_OK);
-  gravity(&t, no_number);
+  gravity_set(&t, no_number);
   CHECK(hap_session_advance(t.w.session, 60) == HAP_FAULTED);
   dWorldSetGravity(t.w.world, 0.0, 0.0, -9.81);
   CHECK(hap_session_advance(t.w.session, 60) == HAP_FAULTED); /* until it is reset */

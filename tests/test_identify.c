@@ -17,7 +17,7 @@
 #include "device/device.h"
 #include "device/identify.h"
 
-static hap_status identify(hap_device *device, hap_device_identity *out, hap_detail *detail)
+static hap_status device_identify(hap_device *device, hap_device_identity *out, hap_detail *detail)
 {
   hap_identify_def def;
   hap_identify_def_init(&def, sizeof def);
@@ -29,7 +29,7 @@ static hap_status identify_spec(const char *spec, hap_device_identity *out, hap_
 {
   hap_device *device = NULL;
   hap_status status = hap_device_open(spec, &device, detail);
-  status = status < HAP_OK ? status : identify(device, out, detail);
+  status = status < HAP_OK ? status : device_identify(device, out, detail);
   hap_device_close(device);
   return status;
 }
@@ -254,7 +254,7 @@ static hap_status identify_fake(const fake *as, hap_device_identity *out, hap_de
 {
   hap_device *device = open_fake(as);
   detail->text[0] = '\0';
-  hap_status status = identify(device, out, detail);
+  hap_status status = device_identify(device, out, detail);
   CHECK(the.stops == 1 && the.zeros >= 1 && hapi_v3_norm(the.force) == 0.0);
   CHECK(hapi_device_claim(device)); /* it was let go */
   hapi_device_release(device);
@@ -386,7 +386,8 @@ TEST(person_can_stop_it)
     if (status != HAP_END) {
       printf("# pacing %u: %s\n", pacings[k], detail.text);
     }
-    /* in real time, a machine that lets the thread wait lets the device run: then it is let go of */
+    /* in real time, a machine that lets the thread wait lets the device run: then it is let go
+     * of */
     bool ran = pacings[k] != HAP_PACING_VIRTUAL && status == HAP_ERROR_DEVICE &&
                strstr(detail.text, "its force was taken off") != NULL;
     CHECK(status == HAP_END || ran || (fast && strstr(detail.text, "raise rate_hz") != NULL));

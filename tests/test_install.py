@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""What an installation gives: staged by DESTDIR, the README's program builds against it with nothing but
-pkg-config, by gcc and by clang, shared and static, and runs. Arguments: source root, build folder,
-meson's b_sanitize, prefix, libdir."""
+"""What an installation gives: staged by DESTDIR, the README's program builds against it with
+nothing but pkg-config, by gcc and by clang, shared and static, and runs. Arguments: source root,
+build folder, meson's b_sanitize, prefix, libdir."""
 import os
 import pathlib
 import shutil
@@ -54,7 +54,8 @@ def build_and_run(stage, compiler, static):
     library = os.path.join(stage + prefix, libdir)
     if not problem and static:
         needs, problem = run(["ldd", program])
-        problem = problem or ("it needs the shared library\n" + needs if "libhapode" in needs else "")
+        if not problem and "libhapode" in needs:
+            problem = "it needs the shared library\n" + needs
     out, failure = ("", problem) if problem else run(
         [program], env=dict(os.environ, LD_LIBRARY_PATH="" if static else library))
     return failure or ("" if "hand feels" in out else "it printed:\n" + out)
@@ -98,7 +99,7 @@ def main(stage):
     library = pathlib.Path(stage + prefix, libdir)
     outside = [str(p) for p in pathlib.Path(stage).rglob("*")
                if p.is_file() and not str(p).startswith(stage + prefix) and
-               not str(p).startswith(stage + "/etc/") and not str(p).startswith(stage + "/lib/udev")]
+               not str(p).startswith((stage + "/etc/", stage + "/lib/udev"))]
     point("\n".join(outside), "everything is below the prefix")
     headers = {p.name for p in pathlib.Path(root, "include/hapode").glob("*.h")}
     there = {p.name for p in pathlib.Path(stage + prefix, "include/hapode").glob("*.h")}

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Threads that step islands of the world: what the world does, and that nothing of them is left or used
- * where runs repeat bit by bit. */
+/* Threads that step islands of the world: what the world does, and that nothing of them is left
+ * or used where runs repeat bit by bit. */
 
 #include "tests/tap.h"
 
@@ -45,7 +45,8 @@ static bool open_rig(hap_drive drive, hap_model model, int threads, rig *out)
   return status >= HAP_OK;
 }
 
-/* Frames of 10 ms, one second, in which each cube is pushed sideways and up by a force of its own. */
+/* Frames of 10 ms, one second, in which each cube is pushed sideways and up by a force of its
+ * own. */
 static void run_frames(int threads, double out[CUBES][3])
 {
   rig r;

@@ -34,7 +34,7 @@ static void build_free(mechanism *m)
 }
 
 /* An edit runs at the next sync. */
-static void edit(mechanism *m, hap_edit_fn run)
+static void mechanism_edit(mechanism *m, hap_edit_fn run)
 {
   CHECK(hap_session_post(m->w.session, run, m) == HAP_OK);
   cw_run(&m->w, 2 * STEP_TICKS);
@@ -54,7 +54,7 @@ static void cut_down(void *arg)
   m->joint_count = 0;
 }
 
-static void disable(void *arg)
+static void body_disable(void *arg)
 {
   mechanism *m = arg;
   dJointDisable(m->joints[0]);
@@ -74,16 +74,16 @@ TEST(joints_come_change_and_go)
   REQUIRE(m != NULL);
   cw_run(&m->w, STEP_TICKS + 1);
   check_owned(m, 1);
-  edit(m, hang_up);
+  mechanism_edit(m, hang_up);
   check_owned(m, 1);
-  CHECK(openness(m) <= CLOSED);
-  edit(m, set_stop);
+  CHECK(mechanism_openness(m) <= CLOSED);
+  mechanism_edit(m, set_stop);
   cw_run(&m->w, 200);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   CHECK(cw_norm(m->w.velocity[0]) < 1e-3); /* it hangs between its stops */
   check_owned(m, 1);
   double z = m->w.position[0][2];
-  edit(m, cut_down);
+  mechanism_edit(m, cut_down);
   cw_run(&m->w, 100);
   CHECK(m->w.position[0][2] < z - 0.05);
   check_owned(m, 1);
@@ -94,7 +94,7 @@ TEST(disabled_joint_is_none)
   mechanism *m = mechanism_running(build_hinge, 9.81);
   REQUIRE(m != NULL);
   cw_run(&m->w, STEP_TICKS + 1);
-  edit(m, disable);
+  mechanism_edit(m, body_disable);
   CHECK(cw_stats(&m->w).model.range_joints == 1 && cw_stats(&m->w).probes.steps == 0);
   CHECK(dJointIsEnabled(m->joints[0]) == 0 && dJointIsEnabled(m->joints[1]) != 0);
   cw_run(&m->w, 100);
@@ -133,18 +133,18 @@ TEST(other_joints_are_taken_over_a_sync_later)
   hap_stats stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 0 && stats.model.range_bodies == 0 &&
         stats.model.measured_bodies == 1);
-  CHECK(openness(m) < 5e-3);
+  CHECK(mechanism_openness(m) < 5e-3);
   cw_run(&m->w, STEP_TICKS);
   stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 3 && stats.model.range_bodies == 2 &&
         stats.model.measured_bodies == 0);
   CHECK(stats.model.measured_joints == 1);
-  edit(m, remove_motor_joint);
+  mechanism_edit(m, remove_motor_joint);
   stats = cw_stats(&m->w);
   CHECK(stats.model.range_joints == 2 && stats.model.range_bodies == 2 &&
         stats.model.measured_bodies == 0);
   cw_run(&m->w, 100);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   CHECK(stats.faults.fault == 0);
 }
 
@@ -171,15 +171,15 @@ TEST(moved_mechanism_goes_on_from_there)
   cw_run(&m->w, STEP_TICKS);
   CHECK_NEAR(dJointGetHingeAngle(m->joints[1]), 0.0, 1e-6);
   CHECK_NEAR(dJointGetHingeAngle(m->joints[0]), 0.5, 1e-6);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   cw_run(&m->w, STEP_TICKS);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   CHECK(dJointGetHingeAngle(m->joints[0]) < 0.5); /* it falls */
   check_owned(m, 2);
 }
 
 /* The second bar alone, turned about its hinge: the first one is the loop's meanwhile. */
-static void fold(void *arg)
+static void mechanism_fold(void *arg)
 {
   mechanism *m = arg;
   dMatrix3 r;
@@ -209,12 +209,12 @@ TEST(body_that_is_moved_alone_waits_for_the_others)
   m->w.research.physics_latency_ticks = STEP_TICKS;
   REQUIRE(start_mechanism(m));
   cw_run(&m->w, 8 * STEP_TICKS + 1);
-  CHECK(hap_session_post(m->w.session, fold, m) == HAP_OK);
+  CHECK(hap_session_post(m->w.session, mechanism_fold, m) == HAP_OK);
   cw_run(&m->w, STEP_TICKS);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   for (int step = 0; step < 3; ++step) {
     cw_run(&m->w, STEP_TICKS);
-    CHECK(openness(m) <= CLOSED);
+    CHECK(mechanism_openness(m) <= CLOSED);
   }
   CHECK(dJointGetHingeAngle(m->joints[1]) > 1e-3 || dJointGetHingeAngle(m->joints[1]) < -1e-3);
   check_owned(m, 2);
@@ -234,13 +234,13 @@ TEST(hinge_set_anew_holds_there)
   mechanism *m = mechanism_running(build_pendulum, 9.81);
   REQUIRE(m != NULL);
   cw_run(&m->w, 5 * STEP_TICKS + 1);
-  edit(m, set_anchor);
+  mechanism_edit(m, set_anchor);
   cw_run(&m->w, 10 * STEP_TICKS); /* the loop had gone on while it was set */
   dVector3 at;
   dJointGetHingeAnchor2(m->joints[0], at);
   for (int s = 0; s < 25; ++s) {
     cw_run(&m->w, STEP_TICKS);
-    CHECK(openness(m) <= CLOSED);
+    CHECK(mechanism_openness(m) <= CLOSED);
     const double *x = m->w.position[0];
     CHECK_NEAR(cw_norm((const double[3]){x[0] - at[0], x[1] - at[1], x[2] - at[2]}), 0.05, 1e-4);
     CHECK_NEAR(x[0], at[0], 1e-5); /* it turns about x now */
@@ -264,7 +264,7 @@ TEST(angle_begins_where_the_axis_is_set)
   cw_run(&m->w, 5 * STEP_TICKS + 1);
   double before[3];
   memcpy(before, m->w.position[0], sizeof before);
-  edit(m, set_zero);
+  mechanism_edit(m, set_zero);
   cw_run(&m->w, 20 * STEP_TICKS);
   const double *x = m->w.position[0];
   double way = cw_norm((const double[3]){x[0] - before[0], x[1] - before[1], x[2] - before[2]});
@@ -278,7 +278,7 @@ TEST(angle_begins_where_the_axis_is_set)
 static void build_fixed_bar(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
-  dJointSetFixed(keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
+  dJointSetFixed(joint_keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
 }
 
 static void fix_elsewhere(void *arg)
@@ -293,7 +293,7 @@ TEST(fixed_joint_set_anew_holds_there)
   mechanism *m = mechanism_running(build_fixed_bar, 9.81);
   REQUIRE(m != NULL);
   cw_run(&m->w, 5 * STEP_TICKS + 1);
-  edit(m, fix_elsewhere);
+  mechanism_edit(m, fix_elsewhere);
   CHECK_NEAR(m->w.position[0][0], 0.15, 1e-5);
   CHECK_NEAR(m->w.position[0][2], 0.1, 1e-5);
   check_owned(m, 1);
@@ -362,7 +362,7 @@ TEST(chain_longer_than_the_range_is_odes)
   open_mechanism(&m, build_long_chain, 9.81);
   m.w.def.max_bodies = 9;
   check_left_to_ode(&m);
-  REQUIRE(begin(&m, build_long_chain, 9.81));
+  REQUIRE(mechanism_begin(&m, build_long_chain, 9.81));
   m.w.def.max_bodies = 10;
   cw_run(&m.w, 200);
   check_owned(&m, 10);
@@ -405,11 +405,11 @@ TEST(pushed_body_wakes_what_hangs_on_it)
   REQUIRE(m != NULL);
   cw_run(&m->w, 400);
   CHECK(!dBodyIsEnabled(m->w.bodies[0]) && !dBodyIsEnabled(m->w.bodies[1]));
-  m->w.follows = false;
+  m->w.follow.on = false;
   cw_go(&m->w, 0.0, 0.0, -0.1, 300);
   CHECK(cw_norm(m->w.impulse) > 1e-3);
   CHECK(cw_norm(m->w.velocity[1]) > 1e-3);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   CHECK(cw_stats(&m->w).hand.momentum_error_ns <=
         1e-9 * cw_stats(&m->w).hand.impulse_abs_ns + 1e-12);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* How far joints open: the gauge of hapode-bench accuracy itself, each kind of joint in the loop at every
- * tick, and the scenes that have joints. */
+/* How far joints open: the gauge of hapode-bench accuracy itself, each kind of joint in the loop
+ * at every tick, and the scenes that have joints. */
 
 #include "tests/tap.h"
 
@@ -123,8 +123,8 @@ static void turn_pose(hap_pose *pose, const double axis[3], double angle)
 }
 
 /* Of the first body moved and turned. */
-static joint_opening opened(const joint_gauge *gauge, const dBodyID bodies[2], const double way[3],
-                            const double *axis)
+static joint_opening joint_opened(const joint_gauge *gauge, const dBodyID bodies[2],
+                                  const double way[3], const double *axis)
 {
   hap_pose poses[2] = {joint_gauge_pose(bodies[0]), joint_gauge_pose(bodies[1])};
   joint_opening worst = {0.0, 0.0};
@@ -142,14 +142,15 @@ static void check_gauge(size_t k, const dBodyID bodies[2])
   joint_gauge gauge;
   REQUIRE(joint_gauge_init(&gauge, bodies, 2, NULL) == HAP_OK);
   CHECK(gauge.count == 1);
-  CHECK(opened(&gauge, bodies, none, NULL).way < 1e-12);
-  CHECK(opened(&gauge, bodies, none, NULL).turn < 1e-12);
-  CHECK_NEAR(opened(&gauge, bodies, across, NULL).way, WAY, 1e-12);
-  CHECK_NEAR(opened(&gauge, bodies, third, NULL).way, WAY, 1e-12);
-  CHECK_NEAR(opened(&gauge, bodies, along, NULL).way, kinds[k].slides ? 0.0 : WAY, 1e-12);
-  CHECK(opened(&gauge, bodies, third, NULL).turn < 1e-12);
-  CHECK_NEAR(opened(&gauge, bodies, none, along).turn, kinds[k].turns_along ? 0.0 : TURN, 1e-9);
-  CHECK_NEAR(opened(&gauge, bodies, none, third).turn, kinds[k].turns ? 0.0 : TURN, 1e-9);
+  CHECK(joint_opened(&gauge, bodies, none, NULL).way < 1e-12);
+  CHECK(joint_opened(&gauge, bodies, none, NULL).turn < 1e-12);
+  CHECK_NEAR(joint_opened(&gauge, bodies, across, NULL).way, WAY, 1e-12);
+  CHECK_NEAR(joint_opened(&gauge, bodies, third, NULL).way, WAY, 1e-12);
+  CHECK_NEAR(joint_opened(&gauge, bodies, along, NULL).way, kinds[k].slides ? 0.0 : WAY, 1e-12);
+  CHECK(joint_opened(&gauge, bodies, third, NULL).turn < 1e-12);
+  CHECK_NEAR(joint_opened(&gauge, bodies, none, along).turn, kinds[k].turns_along ? 0.0 : TURN,
+             1e-9);
+  CHECK_NEAR(joint_opened(&gauge, bodies, none, third).turn, kinds[k].turns ? 0.0 : TURN, 1e-9);
 }
 
 /* Between two bodies, and between the first and the world in either order. */
@@ -247,7 +248,8 @@ static void read_both(const mechanism *m, const joint_gauge *gauge, both *out)
   joint_gauge_read(gauge, poses, NULL, &out->world, NULL);
 }
 
-/* A joint that has to be measured is the loop's one step late, and then closes what ODE has opened. */
+/* A joint that has to be measured is the loop's one step late, and then closes what ODE has
+ * opened. */
 static int ticks_until_held(size_t k)
 {
   return kinds[k].join == join_piston ? 3 * STEP_TICKS : 0;

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Joints that the loop has no rows of its own for, as testing simulations find them: each kind against ODE
- * itself stepped at the loop's rate. */
+/* Joints that the loop has no rows of its own for, as testing simulations find them: each kind
+ * against ODE itself stepped at the loop's rate. */
 
 #include "tests/tap.h"
 
@@ -17,7 +17,8 @@ typedef struct difference {
   double turn; /* rad, at the end */
 } difference;
 
-/* The same state for both, once the loop owns the mechanism: what is held against ODE is the joint. */
+/* The same state for both, once the loop owns the mechanism: what is held against ODE is the
+ * joint. */
 static void copy_state(const mechanism *from, mechanism *to)
 {
   for (int i = 0; i < from->w.body_count; ++i) {
@@ -33,7 +34,7 @@ static void copy_state(const mechanism *from, mechanism *to)
   }
 }
 
-static difference compare(mechanism *loop, mechanism *ode, double seconds)
+static difference mechanisms_compare(mechanism *loop, mechanism *ode, double seconds)
 {
   difference out = {0.0, 0.0};
   int ticks = STEP_TICKS * (int)lround(seconds / (STEP_TICKS * PERIOD));
@@ -58,14 +59,14 @@ static void check_against_ode(build_fn build, double gravity, double way, double
   mechanism loop;
   mechanism ode;
   open_mechanism(&ode, build, gravity);
-  REQUIRE(begin(&loop, build, gravity));
+  REQUIRE(mechanism_begin(&loop, build, gravity));
   uint32_t moving = 0;
   for (int i = 0; i < loop.w.body_count; ++i) {
     moving += dBodyIsKinematic(loop.w.bodies[i]) == 0;
   }
   cw_run(&loop.w, SETTLED_STEPS * STEP_TICKS + 1);
   copy_state(&loop, &ode);
-  difference d = compare(&loop, &ode, 1.0);
+  difference d = mechanisms_compare(&loop, &ode, 1.0);
   hap_stats stats = cw_stats(&loop.w);
   printf("# off by %.3g mm, %.3g mrad; equations by %.3g, %llu probes\n", 1e3 * d.way, 1e3 * d.turn,
          stats.model.joint_error, (unsigned long long)stats.probes.steps);
@@ -84,7 +85,7 @@ static void build_piston(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.1, 0.15, 0.2);
-  dJointID joint = keep(m, dJointCreatePiston(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreatePiston(m->w.world, NULL), first, second);
   dJointSetPistonAnchor(joint, 0.0, 0.0, 0.1);
   dJointSetPistonAxis(joint, 0.6, 0.0, 0.8);
   dBodySetAngularVel(first, 0.5, 1.0, -0.7);
@@ -100,7 +101,7 @@ static void build_pr(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.1, 0.15, 0.2);
-  dJointID joint = keep(m, dJointCreatePR(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreatePR(m->w.world, NULL), first, second);
   dJointSetPRAnchor(joint, 0.05, 0.1, 0.1);
   dJointSetPRAxis1(joint, 1.0, 0.0, 0.0);
   dJointSetPRAxis2(joint, 0.0, 1.0, 0.0);
@@ -117,7 +118,7 @@ static void build_pu(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.1, 0.15, 0.2);
-  dJointID joint = keep(m, dJointCreatePU(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreatePU(m->w.world, NULL), first, second);
   dJointSetPUAnchor(joint, 0.05, 0.1, 0.1);
   dBodySetAngularVel(first, 0.5, 1.0, -0.7);
   dBodySetLinearVel(second, 0.1, 0.0, 0.2);
@@ -140,7 +141,7 @@ static void build_rod(mechanism *m)
   dBodyID first = add_body(m, 0.5, rod, 0.0, 0.0, -0.1);
   dBodyID second = add_body(m, 0.3, rod, 0.0, 0.0, -0.4);
   add_ball(m, first, NULL, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreateDBall(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreateDBall(m->w.world, NULL), first, second);
   dJointSetDBallAnchor1(joint, 0.0, 0.0, -0.2);
   dJointSetDBallAnchor2(joint, 0.0, 0.0, -0.3);
   dBodySetLinearVel(second, 0.2, 0.1, 0.0);
@@ -158,7 +159,7 @@ static void build_double_hinge(mechanism *m)
   dBodyID first = add_body(m, 0.5, rod, 0.0, 0.0, -0.1);
   dBodyID second = add_body(m, 0.3, rod, 0.0, 0.0, -0.4);
   add_hinge(m, NULL, first, AT(0.0, 0.0, 0.0), AT(0.0, 1.0, 0.0));
-  dJointID joint = keep(m, dJointCreateDHinge(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreateDHinge(m->w.world, NULL), first, second);
   dJointSetDHingeAxis(joint, 0.0, 1.0, 0.0);
   dJointSetDHingeAnchor1(joint, 0.0, 0.0, -0.2);
   dJointSetDHingeAnchor2(joint, 0.0, 0.0, -0.3);
@@ -174,7 +175,7 @@ static void build_flat(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.2, 0.0, 0.0);
-  keep(m, dJointCreatePlane2D(m->w.world, NULL), first, NULL);
+  joint_keep(m, dJointCreatePlane2D(m->w.world, NULL), first, NULL);
   add_hinge(m, first, second, AT(0.1, 0.0, 0.0), AT(0.0, 0.0, 1.0));
   dBodySetAngularVel(first, 0.0, 0.0, 3.0);
   dBodySetLinearVel(second, 0.1, 0.3, 0.0);
@@ -191,7 +192,7 @@ static void build_motor(mechanism *m)
   dBodyID second = add_body(m, 0.3, bar, 0.3, 0.0, 0.0);
   add_hinge(m, NULL, first, AT(0.0, 0.0, 0.0), AT(0.0, 1.0, 0.0));
   add_hinge(m, first, second, AT(0.2, 0.0, 0.0), AT(0.0, 1.0, 0.0));
-  dJointID joint = keep(m, dJointCreateAMotor(m->w.world, NULL), second, first);
+  dJointID joint = joint_keep(m, dJointCreateAMotor(m->w.world, NULL), second, first);
   dJointSetAMotorNumAxes(joint, 1);
   dJointSetAMotorAxis(joint, 0, 1, 0.0, 1.0, 0.0);
   dJointSetAMotorParam(joint, dParamVel, 2.0);
@@ -217,7 +218,7 @@ TEST(motor_at_its_limit_is_odes)
 static void build_drive(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreateLMotor(m->w.world, NULL), first, NULL);
+  dJointID joint = joint_keep(m, dJointCreateLMotor(m->w.world, NULL), first, NULL);
   dJointSetLMotorNumAxes(joint, 2);
   dJointSetLMotorAxis(joint, 0, 0, 1.0, 0.0, 0.0);
   dJointSetLMotorAxis(joint, 1, 0, 0.0, 0.0, 1.0);
@@ -237,7 +238,7 @@ TEST(linear_motor_is_odes)
 static void build_sprung(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreatePiston(m->w.world, NULL), first, NULL);
+  dJointID joint = joint_keep(m, dJointCreatePiston(m->w.world, NULL), first, NULL);
   dJointSetPistonAnchor(joint, 0.0, 0.0, 0.0);
   dJointSetPistonAxis(joint, 0.0, 0.0, 1.0);
   double h = STEP_TICKS * PERIOD;
@@ -265,7 +266,7 @@ TEST(piston_on_a_spring_swings)
 static void build_lift(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreatePiston(m->w.world, NULL), NULL, first);
+  dJointID joint = joint_keep(m, dJointCreatePiston(m->w.world, NULL), NULL, first);
   dJointSetPistonAnchor(joint, 0.0, 0.0, 0.0);
   dJointSetPistonAxis(joint, 0.0, 0.0, 1.0);
   dJointSetPistonParam(joint, dParamVel, -0.05); /* the world is the first body */
@@ -284,7 +285,7 @@ TEST(lift_goes_up_to_its_stop)
   }
   double stop = dBodyGetPosition(ode.w.bodies[0])[2];
   CHECK_NEAR(fabs(stop), 0.006, 1e-4);
-  REQUIRE(begin(&m, build_lift, 9.81));
+  REQUIRE(mechanism_begin(&m, build_lift, 9.81));
   cw_run(&m.w, 60);
   double z = m.w.position[0][2];
   cw_run(&m.w, 20);
@@ -328,7 +329,7 @@ static void build_limb(mechanism *m)
   dBodyID trunk = add_body(m, 2.0, bar, 0.0, 0.0, 0.0);
   dBodySetKinematic(trunk);
   add_ball(m, trunk, limb, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreateAMotor(m->w.world, NULL), trunk, limb);
+  dJointID joint = joint_keep(m, dJointCreateAMotor(m->w.world, NULL), trunk, limb);
   dJointSetAMotorMode(joint, dAMotorEuler);
   dJointSetAMotorAxis(joint, 0, 1, 1.0, 0.0, 0.0);
   dJointSetAMotorAxis(joint, 2, 2, 0.0, 0.0, 1.0);
@@ -376,12 +377,12 @@ static uint64_t probes_of_a_sync(mechanism *m)
 TEST(probes_are_few_and_reused)
 {
   mechanism m;
-  REQUIRE(begin(&m, build_piston, 0.0));
+  REQUIRE(mechanism_begin(&m, build_piston, 0.0));
   cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
   uint64_t moving = probes_of_a_sync(&m);
   CHECK(moving >= 8 && moving <= 13);
   cw_close(&m.w);
-  REQUIRE(begin(&m, build_sprung, 9.81));
+  REQUIRE(mechanism_begin(&m, build_sprung, 9.81));
   cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
   CHECK(probes_of_a_sync(&m) <= 13);
   cw_run(&m.w, 8000);
@@ -435,7 +436,8 @@ static void swap_joint(void *arg)
   dJointSetPistonAxis(m->joints[0], 1.0, 0.0, 0.0);
 }
 
-/* Perhaps at the same address. The bodies are not held for a sync, as before a first measurement. */
+/* Perhaps at the same address. The bodies are not held for a sync, as before a first
+ * measurement. */
 TEST(another_joint_is_measured_anew)
 {
   mechanism *m = mechanism_running(build_sprung, 0.0);
@@ -474,7 +476,7 @@ static void make_heavier(void *arg)
 static void build_plain_piston(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
-  dJointID joint = keep(m, dJointCreatePiston(m->w.world, NULL), first, NULL);
+  dJointID joint = joint_keep(m, dJointCreatePiston(m->w.world, NULL), first, NULL);
   dJointSetPistonAnchor(joint, 0.0, 0.0, 0.0);
   dJointSetPistonAxis(joint, 0.0, 0.0, 1.0);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Joints as rows of the loop: each kind against ODE itself stepped at the loop's rate, and closed forms
- * where there are some. */
+/* Joints as rows of the loop: each kind against ODE itself stepped at the loop's rate, and
+ * closed forms where there are some. */
 
 #include "tests/tap.h"
 
@@ -36,7 +36,7 @@ static difference compare_for(mechanism *loop, mechanism *ode, double seconds)
   int steps = (int)lround(seconds / (STEP_TICKS * PERIOD));
   for (int s = 0; s < steps; ++s) {
     compare_step(loop, ode, &out);
-    out.open = fmax(out.open, openness(loop));
+    out.open = fmax(out.open, mechanism_openness(loop));
   }
   cw_tick(&loop->w); /* with its sync */
   for (int i = 0; i < loop->w.body_count; ++i) {
@@ -51,7 +51,7 @@ static void check_against_ode(build_fn build, double gravity, double way, double
   mechanism loop;
   mechanism ode;
   open_mechanism(&ode, build, gravity);
-  REQUIRE(begin(&loop, build, gravity));
+  REQUIRE(mechanism_begin(&loop, build, gravity));
   uint32_t moving = 0;
   for (int i = 0; i < loop.w.body_count; ++i) {
     moving += dBodyIsKinematic(loop.w.bodies[i]) == 0;
@@ -131,8 +131,8 @@ static void build_universal(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.3, 0.0, 0.0);
-  dJointID joints[2] = {keep(m, dJointCreateUniversal(m->w.world, NULL), NULL, first),
-                        keep(m, dJointCreateUniversal(m->w.world, NULL), first, second)};
+  dJointID joints[2] = {joint_keep(m, dJointCreateUniversal(m->w.world, NULL), NULL, first),
+                        joint_keep(m, dJointCreateUniversal(m->w.world, NULL), first, second)};
   for (int i = 0; i < 2; ++i) {
     dJointSetUniversalAnchor(joints[i], 0.2 * i, 0.0, 0.0);
     dJointSetUniversalAxis1(joints[i], 0.0, 1.0, 0.0);
@@ -160,7 +160,7 @@ static void build_hinge2(mechanism *m)
   const double across[3] = {0.0, 1.0, 0.0};
   dBodyID first = add_body(m, 1.0, AT(0.4, 0.2, 0.1), 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, wheel, 0.2, 0.15, -0.05);
-  dJointID joint = keep(m, dJointCreateHinge2(m->w.world, NULL), first, second);
+  dJointID joint = joint_keep(m, dJointCreateHinge2(m->w.world, NULL), first, second);
   dJointSetHinge2Anchor(joint, 0.2, 0.15, -0.05);
   dJointSetHinge2Axes(joint, up, across);
   dJointSetHinge2Param(joint, dParamSuspensionERP, 0.5);
@@ -190,7 +190,7 @@ TEST(hinge2_is_odes)
   mechanism loop;
   mechanism ode;
   open_mechanism(&ode, build_hinge2_soft, 0.0);
-  REQUIRE(begin(&loop, build_hinge2, 0.0));
+  REQUIRE(mechanism_begin(&loop, build_hinge2, 0.0));
   difference d = compare_for(&loop, &ode, 1.0);
   printf("# off by %.3g mm, %.3g mrad\n", 1e3 * d.way, 1e3 * d.turn);
   CHECK(d.way <= 1e-3 && d.turn <= 2e-2);
@@ -203,7 +203,7 @@ static void build_fixed(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.15, 0.1, 0.05);
-  dJointSetFixed(keep(m, dJointCreateFixed(m->w.world, NULL), first, second));
+  dJointSetFixed(joint_keep(m, dJointCreateFixed(m->w.world, NULL), first, second));
   dBodySetAngularVel(first, 0.4, 1.0, 0.7);
 }
 
@@ -215,7 +215,7 @@ TEST(fixed_is_odes)
 static void build_fixed_to_world(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
-  dJointSetFixed(keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
+  dJointSetFixed(joint_keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
 }
 
 TEST(fixed_to_the_world_stays)
@@ -240,7 +240,8 @@ TEST(kinematic_body_carries)
   check_against_ode(build_kinematic, 9.81, 2e-3, 2e-2);
 }
 
-/* Four bars with the world, in the plane y = 0; in space three degrees of freedom are held twice. */
+/* Four bars with the world, in the plane y = 0; in space three degrees of freedom are held
+ * twice. */
 static void build_four_bars(mechanism *m)
 {
   const double upright[3] = {0.02, 0.02, 0.2};
@@ -261,7 +262,7 @@ TEST(four_bars_move_as_odes)
   check_against_ode(build_four_bars, 0.0, 2e-3, 2e-2);
 }
 
-static double kinetic(const mechanism *m)
+static double kinetic_energy(const mechanism *m)
 {
   double sum = 0.0;
   for (int i = 0; i < m->w.body_count; ++i) {
@@ -294,13 +295,13 @@ TEST(closed_loop_that_does_not_fit_is_stable)
   mechanism *m = mechanism_running(build_skew_bars, 0.0);
   REQUIRE(m != NULL);
   cw_run(&m->w, STEP_TICKS + 1);
-  double before = kinetic(m);
+  double before = kinetic_energy(m);
   double most = 0.0;
   double widest = 0.0;
   for (int s = 0; s < 150; ++s) {
     cw_run(&m->w, STEP_TICKS);
-    most = fmax(most, kinetic(m));
-    widest = fmax(widest, openness(m));
+    most = fmax(most, kinetic_energy(m));
+    widest = fmax(widest, mechanism_openness(m));
   }
   printf("# energy %.4g of %.4g J, open by %.3g mm, residual %.2g m/s\n", most, before,
          1e3 * widest, cw_stats(&m->w).contact.residual_max);
@@ -327,11 +328,11 @@ TEST(redundant_hinges_let_it_turn)
   cw_run(&m->w, 1001);
   dBodyID door = m->w.bodies[0];
   printf("# turns at %.4f rad/s, open by %.3g mm\n", dBodyGetAngularVel(door)[2],
-         1e3 * openness(m));
+         1e3 * mechanism_openness(m));
   CHECK_NEAR(dBodyGetAngularVel(door)[2], 1.0, 5e-3);
   CHECK_NEAR(dJointGetHingeAngle(m->joints[0]), 1.0, 5e-3);
   CHECK_NEAR(dBodyGetPosition(door)[2], 0.0, 1e-5);
-  CHECK(openness(m) <= CLOSED);
+  CHECK(mechanism_openness(m) <= CLOSED);
   check_owned(m, 1);
 }
 
@@ -351,7 +352,7 @@ TEST(open_joint_closes_and_nothing_moves_on)
   CHECK_NEAR(m->w.velocity[0][1], -0.1, 0.1); /* on its way */
   CHECK(m->w.velocity[0][1] < -1e-3);
   cw_run(&m->w, 4 * STEP_TICKS - 9);
-  CHECK(openness(m) <= 2e-6);
+  CHECK(mechanism_openness(m) <= 2e-6);
   CHECK(cw_norm(dBodyGetLinearVel(m->w.bodies[0])) < 1e-4);
   CHECK(cw_norm(dBodyGetAngularVel(m->w.bodies[0])) < 1e-3);
 }
@@ -372,7 +373,7 @@ TEST(pendulum_has_its_period)
   mechanism m;
   double crossings[2] = {0.0, 0.0};
   int count = 0;
-  REQUIRE(begin(&m, build_pendulum, 9.81));
+  REQUIRE(mechanism_begin(&m, build_pendulum, 9.81));
   double inertia = 0.5 * (0.02 * 0.02 + 0.3 * 0.3) / 12.0 + 0.5 * 0.15 * 0.15;
   double period = 2.0 * M_PI * sqrt(inertia / (0.5 * 9.81 * 0.15)) * (1.0 + 0.01 / 16.0);
   for (int i = 0; i < 5000; ++i) {
@@ -438,7 +439,7 @@ TEST(stops_throw_back_their_share)
   double highest = -1.0;
   double lowest = 1.0;
   double speeds[3] = {0.0, 0.0, 0.0}; /* before, after the high stop, after the low one */
-  REQUIRE(begin(&m, build_bouncing, 0.0));
+  REQUIRE(mechanism_begin(&m, build_bouncing, 0.0));
   for (int i = 0; i < 1500; ++i) {
     cw_tick(&m.w);
     double angle = atan2(m.w.position[0][1], m.w.position[0][0]);
@@ -508,7 +509,8 @@ TEST(soft_stop_is_a_spring)
   check_soft_stop(HAP_MODEL_SINGLE); /* stepped at 1 kHz: ODE's parameters are converted */
 }
 
-/* At its low stop, driven away from it: the first tick has the share of the force that ODE gives. */
+/* At its low stop, driven away from it: the first tick has the share of the force that ODE
+ * gives. */
 static void build_fudged(mechanism *m)
 {
   dBodyID body = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);

@@ -19,7 +19,7 @@ typedef struct heard {
   const char *refused; /* a key */
 } heard;
 
-static hap_status take(void *self, const hapi_key_file *file, char *key, char *value)
+static hap_status line_take(void *self, const hapi_key_file *file, char *key, char *value)
 {
   heard *h = self;
   size_t used = strlen(h->text);
@@ -35,7 +35,7 @@ static hap_status read_text(const char *text, heard *h, hap_detail *detail)
   hapi_key_file file = {.path = path, .detail = detail};
   file_write(path, text);
   h->text[0] = '\0';
-  return hapi_key_file_read(&file, take, h);
+  return hapi_key_file_read(&file, line_take, h);
 }
 
 TEST(keys_and_values_are_trimmed)
@@ -92,15 +92,15 @@ TEST(lines_have_an_end)
   line[1] = '=';
   line[510] = '\n';
   file_write_bytes(path, line, 511);
-  CHECK(hapi_key_file_read(&file, take, &h) == HAP_OK);
+  CHECK(hapi_key_file_read(&file, line_take, &h) == HAP_OK);
   CHECK(strlen(h.text) == strlen("1:x=") + 508 + 1);
   line[510] = 'x';
   line[511] = '\n';
   file_write_bytes(path, line, 512);
-  CHECK(hapi_key_file_read(&file, take, &h) == HAP_ERROR_FORMAT);
+  CHECK(hapi_key_file_read(&file, line_take, &h) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 1: longer than 510") != NULL);
   file_write_bytes(path, "a=1\nb\0=2\n", 9);
-  CHECK(hapi_key_file_read(&file, take, &h) == HAP_ERROR_FORMAT);
+  CHECK(hapi_key_file_read(&file, line_take, &h) == HAP_ERROR_FORMAT);
   CHECK(strstr(detail.text, "line 2: longer") != NULL);
 }
 
@@ -123,11 +123,11 @@ TEST(what_cannot_be_read_says_why)
   hapi_key_file none = {.path = "/nowhere/at/all", .detail = &detail};
   hapi_key_file folder = {.path = "/tmp", .detail = &detail};
   hapi_key_file quiet = {.path = "/nowhere/at/all"};
-  CHECK(hapi_key_file_read(&none, take, &h) == HAP_ERROR_IO);
+  CHECK(hapi_key_file_read(&none, line_take, &h) == HAP_ERROR_IO);
   CHECK(strstr(detail.text, "/nowhere/at/all: cannot be opened: ") != NULL);
-  CHECK(hapi_key_file_read(&folder, take, &h) == HAP_ERROR_IO);
+  CHECK(hapi_key_file_read(&folder, line_take, &h) == HAP_ERROR_IO);
   CHECK(strstr(detail.text, "/tmp, line 1: cannot be read: ") != NULL);
-  CHECK(hapi_key_file_read(&quiet, take, &h) == HAP_ERROR_IO);
+  CHECK(hapi_key_file_read(&quiet, line_take, &h) == HAP_ERROR_IO);
   folder.line = 7;
   CHECK(hapi_key_file_lacks(&folder, "of.", "it") == HAP_ERROR_FORMAT);
   CHECK(strcmp(detail.text, "/tmp, line 7: the file ends without a line of.it = ...") == 0);

@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The solver two numbers at a time against the same sources in plain C (`plain_`, see meson.build): the
- * same bits, from the rows' preparation to direct solves and what is done with islands that are not
- * solved. */
+/* The solver two numbers at a time against the same sources in plain C (`plain_`, see
+ * meson.build): the same bits, from the rows' preparation to direct solves and what is done with
+ * islands that are not solved. */
 
 #include "tests/tap.h"
 
@@ -35,40 +35,40 @@ static problem wide;
 static problem plain;
 static uint64_t state;
 
-static double next(void) /* -1 .. 1 */
+static double random_next(void) /* -1 .. 1 */
 {
   state = state * 6364136223846793005u + 1442695040888963407u;
   return (double)(int64_t)state / 9.3e18;
 }
 
-static void fill(hapi_row *row, uint32_t a, uint32_t b, double inertia[BODIES][6])
+static void row_fill(hapi_row *row, uint32_t a, uint32_t b, double inertia[BODIES][6])
 {
   memset(row, 0, sizeof *row);
   row->a = a;
   row->b = b;
   for (int k = 0; k < 6; ++k) {
-    row->ja[k] = next();
-    row->jb[k] = b != 0 ? next() : 0.0;
+    row->ja[k] = random_next();
+    row->jb[k] = b != 0 ? random_next() : 0.0;
     row->ba[k] = row->ja[k] * inertia[a][k];
     row->bb[k] = row->jb[k] * inertia[b][k];
   }
   row->hi = HUGE_VAL;
   row->normal = -1;
-  row->impulse = 1e-3 * next();
-  row->target = 0.1 * next();
-  row->softness = 0.01 * fabs(next());
+  row->impulse = 1e-3 * random_next();
+  row->target = 0.1 * random_next();
+  row->softness = 0.01 * fabs(random_next());
 }
 
 /* Contacts between bodies of unlike mass, some with the world, and a few rows by themselves. */
-static void make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
+static void problem_make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
 {
   double inertia[BODIES][6];
   memset(&wide, 0, sizeof wide);
   state = seed;
   for (uint32_t i = 0; i < BODIES; ++i) {
     for (int k = 0; k < 6; ++k) {
-      inertia[i][k] = i == 0 ? 0.0 : exp(3.0 * next());
-      wide.v[i][k] = wide.free_v[i][k] = i == 0 ? 0.0 : next();
+      inertia[i][k] = i == 0 ? 0.0 : exp(3.0 * random_next());
+      wide.v[i][k] = wide.free_v[i][k] = i == 0 ? 0.0 : random_next();
     }
   }
   uint32_t count = 0;
@@ -76,14 +76,14 @@ static void make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
     uint32_t a = 1 + c % (BODIES - 1);
     uint32_t b = c % 3 == 0 ? 0 : a > 1 ? a - 1 : BODIES - 1;
     for (int part = 0; part < 3; ++part) {
-      fill(&wide.rows[count + (uint32_t)part], a, b, inertia);
+      row_fill(&wide.rows[count + (uint32_t)part], a, b, inertia);
       wide.rows[count + (uint32_t)part].normal = part == 0 ? -1 : (int32_t)count;
       wide.rows[count + (uint32_t)part].mu = part == 0 ? 0.0 : 0.6;
     }
     count += 3;
   }
   for (; count < ROWS; ++count) {
-    fill(&wide.rows[count], 1 + count % (BODIES - 1), 0, inertia);
+    row_fill(&wide.rows[count], 1 + count % (BODIES - 1), 0, inertia);
   }
   wide.solver = (hapi_solver){.row_count = ROWS,
                               .body_count = BODIES,
@@ -101,7 +101,7 @@ static void make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
   }
 }
 
-static void compare(void)
+static void solvers_compare(void)
 {
   CHECK(memcmp(wide.v, plain.v, sizeof wide.v) == 0);
   for (uint32_t i = 0; i < ROWS; ++i) {
@@ -123,13 +123,13 @@ static bool is_plain(void)
 #endif
 }
 
-TEST(sweeps)
+TEST(solver_sweeps)
 {
   for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
-    make(seed, 20000, 0);
+    problem_make(seed, 20000, 0);
     hapi_solver_run(&wide.solver);
     plain_hapi_solver_run(&plain.solver);
-    compare();
+    solvers_compare();
   }
 }
 
@@ -137,10 +137,10 @@ TEST(direct_solves)
 {
   uint32_t solves = 0;
   for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
-    make(seed, 200000, ROWS);
+    problem_make(seed, 200000, ROWS);
     hapi_solver_run(&wide.solver);
     plain_hapi_solver_run(&plain.solver);
-    compare();
+    solvers_compare();
     solves += wide.solver.direct_solves;
   }
   CHECK(is_plain() || solves > 0);
@@ -150,7 +150,7 @@ TEST(direct_solves)
 TEST(contacts_one_by_one)
 {
   for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
-    make(seed, 1000, 0);
+    problem_make(seed, 1000, 0);
     for (uint32_t i = 0; i < ROWS; i += i < 3 * CONTACTS ? 3 : 1) {
       uint32_t count = i < 3 * CONTACTS ? 3 : 1;
       hapi_contact_ready(&wide.solver, i, count);
@@ -161,7 +161,7 @@ TEST(contacts_one_by_one)
     plain_hapi_solver_run(&plain.solver);
     hapi_solver_calm(&wide.solver);
     plain_hapi_solver_calm(&plain.solver);
-    compare();
+    solvers_compare();
   }
 }
 
@@ -169,7 +169,7 @@ TEST(contacts_one_by_one)
 TEST(contact_as_rows)
 {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
-    make(seed, 1000, 0);
+    problem_make(seed, 1000, 0);
     for (uint32_t i = 0; i < 3 * CONTACTS; ++i) {
       hapi_row_ready(&plain.solver, i);
     }
@@ -189,11 +189,12 @@ TEST(contact_as_rows)
   }
 }
 
-/* A row by itself of which the sum is known, added up one by one; one that cannot be used likewise. */
+/* A row by itself of which the sum is known, added up one by one; one that cannot be used
+ * likewise. */
 TEST(single_as_row)
 {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
-    make(seed, 1000, 0);
+    problem_make(seed, 1000, 0);
     for (uint32_t i = 3 * CONTACTS; i < ROWS; ++i) {
       hapi_row *row = &wide.rows[i];
       row->single = 1;
@@ -213,7 +214,7 @@ TEST(single_as_row)
 static void random_quat(double out[4], double length)
 {
   for (int i = 0; i < 4; ++i) {
-    out[i] = next();
+    out[i] = random_next();
   }
   hapi_quat_normalize(out);
   for (int i = 0; i < 4; ++i) {
@@ -232,9 +233,9 @@ TEST(two_turns)
     double moved_alone[2][4];
     double spins[2][3];
     for (int k = 0; k < 2; ++k) {
-      random_quat(quats[k], i % 10 == 0 && k == i % 20 / 10 ? 2.0 + next() : 1.0);
+      random_quat(quats[k], i % 10 == 0 && k == i % 20 / 10 ? 2.0 + random_next() : 1.0);
       for (int axis = 0; axis < 3; ++axis) {
-        spins[k][axis] = i % 7 == 0 ? 0.0 : 40.0 * next();
+        spins[k][axis] = i % 7 == 0 ? 0.0 : 40.0 * random_next();
       }
     }
     memcpy(alone, quats, sizeof alone);

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Physics goes over short times of the past again, as model SINGLE has them: what it says of the felt
- * force, and that it changes nothing else. */
+/* Physics goes over short times of the past again, as model SINGLE has them: what it says of the
+ * felt force, and that it changes nothing else. */
 
 #include "tests/tap.h"
 
@@ -19,8 +19,9 @@
 #define A_TICK \
   5e-3 /* what a cube that is hit a tick earlier changes, and a window may begin after it */
 
-/* A row of cubes on a floor, the last of which hangs on a hinge, and one that sleeps; the hand comes along x. */
-static contact_world *begin(hap_model model, double physics_hz, double lookback)
+/* A row of cubes on a floor, the last of which hangs on a hinge, and one that sleeps; the hand
+ * comes along x. */
+static contact_world *world_begin(hap_model model, double physics_hz, double lookback)
 {
   contact_world *w = cw_new(CW_GRAVITY);
   w->def.model = model;
@@ -42,7 +43,7 @@ static contact_world *begin(hap_model model, double physics_hz, double lookback)
   return w;
 }
 
-static void start(contact_world *w, double z)
+static void world_start_at(contact_world *w, double z)
 {
   CHECK(cw_start(w, -0.5 * EDGE - RADIUS - 1e-3, 0.0, z));
 }
@@ -53,22 +54,22 @@ typedef struct course {
   int surface_calls;
 } course;
 
-static void run(contact_world *w, double z, course *out)
+static void course_run(contact_world *w, double z, course *out)
 {
-  start(w, z);
+  world_start_at(w, z);
   for (int i = 0; i < TICKS; ++i) {
     cw_tick(w);
     memcpy(out->force[i], w->force, sizeof out->force[i]);
   }
   out->stats = cw_stats(w);
-  out->surface_calls = w->surface_calls;
+  out->surface_calls = w->seen.surface_calls;
   cw_close(w);
 }
 
-static void play(hap_model model, double physics_hz, double lookback, course *out)
+static void course_play(hap_model model, double physics_hz, double lookback, course *out)
 {
-  contact_world *w = begin(model, physics_hz, lookback);
-  run(w, 0.5 * EDGE, out);
+  contact_world *w = world_begin(model, physics_hz, lookback);
+  course_run(w, 0.5 * EDGE, out);
 }
 
 /* RMS of the difference / RMS of the reference. */
@@ -103,10 +104,10 @@ TEST(estimates_the_error_of_the_force)
 {
   static course reference;
   static course c;
-  play(HAP_MODEL_SINGLE, 20.0, 0.1, &reference);
+  course_play(HAP_MODEL_SINGLE, 20.0, 0.1, &reference);
   CHECK(reference.stats.error.lookbacks == 0); /* it is the reference itself */
   for (size_t i = 0; i < CASES; ++i) {
-    play(cases[i].model, cases[i].physics_hz, 0.1, &c);
+    course_play(cases[i].model, cases[i].physics_hz, 0.1, &c);
     double error = error_of(&c, &reference);
     double estimate = c.stats.error.force_error;
     printf("# %s: error %.4f, estimate %.4f\n", cases[i].name, error, estimate);
@@ -121,8 +122,8 @@ TEST(changes_no_bit)
   static course without;
   static course with;
   for (size_t i = 0; i < CASES; ++i) {
-    play(cases[i].model, cases[i].physics_hz, 0.0, &without);
-    play(cases[i].model, cases[i].physics_hz, 0.1, &with);
+    course_play(cases[i].model, cases[i].physics_hz, 0.0, &without);
+    course_play(cases[i].model, cases[i].physics_hz, 0.1, &with);
     CHECK(without.stats.error.lookbacks == 0 && with.stats.error.lookbacks > 0);
     CHECK(without.stats.loop.trace_hash == with.stats.loop.trace_hash);
     CHECK(without.surface_calls == with.surface_calls); /* nor calls the application */
@@ -132,9 +133,9 @@ TEST(changes_no_bit)
 TEST(friction_on_the_pointer_is_part_of_it)
 {
   static course c;
-  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  contact_world *w = world_begin(HAP_MODEL_CONTACT, 20.0, 0.1);
   w->hand_def.friction = 0.8;
-  run(w, 0.7 * EDGE, &c);
+  course_run(w, 0.7 * EDGE, &c);
   printf("# force error %.4f\n", c.stats.error.force_error);
   CHECK(c.stats.error.force_error > 0.0 && c.stats.error.force_error < 0.05);
 }
@@ -178,7 +179,7 @@ static void set_up(const play_def *def, rig_options *options)
 }
 
 /* Changes nothing that anybody could feel. */
-static void nudge(const rig *r)
+static void rig_nudge(const rig *r)
 {
   dBodyID body = r->scene->bodies[0];
   const dReal *v = dBodyGetLinearVel(body);
@@ -213,7 +214,7 @@ static void play_scene(const play_def *def, scene_course *out)
       memcpy(&out->force[i][3 * p], row.pointers[p].force, 3 * sizeof(double));
     }
     if (def->interrupted && i % 600 == 599) {
-      nudge(&r);
+      rig_nudge(&r);
     }
   }
   CHECK(hap_session_stats(r.session, &out->stats, sizeof out->stats) == HAP_OK);
@@ -270,7 +271,8 @@ TEST(hulls_are_part_of_it)
   }
 }
 
-/* Physics looks for what is near where the pointer was a tick before: on what is round that is another normal. */
+/* Physics looks for what is near where the pointer was a tick before: on what is round that is
+ * another normal. */
 TEST(round_things_are_felt_as_model_single_has_them)
 {
   const play_def def = {"chain", HAP_MODEL_CONTACT, 20.0, 1000.0, -1.0, false, 0.0, 0};
@@ -385,7 +387,7 @@ TEST(a_hull_may_touch_a_mesh_and_nothing_else)
 /* What is near is near the pointer's surface: its middle may be far off. */
 TEST(a_pointer_of_metres_is_near_what_it_touches)
 {
-  contact_world *w = begin(HAP_MODEL_CONTACT, 60.0, 0.1);
+  contact_world *w = world_begin(HAP_MODEL_CONTACT, 60.0, 0.1);
   w->hand_def.radius = 2.0;
   w->hand_velocity[0] = 0.0;
   w->hand_velocity[2] = -0.01;
@@ -401,8 +403,8 @@ TEST(a_pointer_of_metres_is_near_what_it_touches)
 
 TEST(a_body_that_the_application_moves_spoils_the_window)
 {
-  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
-  start(w, 0.5 * EDGE);
+  contact_world *w = world_begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  world_start_at(w, 0.5 * EDGE);
   cw_run(w, 420);
   uint64_t before = cw_stats(w).error.lookbacks;
   dBodySetLinearVel(w->bodies[0], 0.0, 0.3, 0.0);
@@ -414,8 +416,8 @@ TEST(a_body_that_the_application_moves_spoils_the_window)
 
 TEST(bodies_and_geoms_that_go_away_meanwhile)
 {
-  contact_world *w = begin(HAP_MODEL_CONTACT, 20.0, 0.1);
-  start(w, 0.5 * EDGE);
+  contact_world *w = world_begin(HAP_MODEL_CONTACT, 20.0, 0.1);
+  world_start_at(w, 0.5 * EDGE);
   for (int i = 0; i < 3; ++i) { /* at several places of a window */
     cw_run(w, 230);
     dGeomID geom = dBodyGetFirstGeom(w->bodies[i]);
@@ -432,8 +434,8 @@ TEST(bodies_and_geoms_that_go_away_meanwhile)
 
 TEST(a_change_of_model_ends_the_window)
 {
-  contact_world *w = begin(HAP_MODEL_IMPULSE, 20.0, 0.1);
-  start(w, 0.5 * EDGE);
+  contact_world *w = world_begin(HAP_MODEL_IMPULSE, 20.0, 0.1);
+  world_start_at(w, 0.5 * EDGE);
   cw_run(w, 450);
   CHECK(hap_session_set_model(w->session, HAP_MODEL_SINGLE) == HAP_OK);
   cw_run(w, 300);
@@ -462,11 +464,11 @@ TEST(refuses_other_shares)
 
 TEST(threads_have_a_figure_too)
 {
-  contact_world *w = begin(HAP_MODEL_ACCELERANCE, 60.0, 0.4);
+  contact_world *w = world_begin(HAP_MODEL_ACCELERANCE, 60.0, 0.4);
   w->def.drive = HAP_DRIVE_THREADS;
   w->def.rt_priority = 0;
   w->expert.trace_rows = 0;
-  start(w, 0.5 * EDGE);
+  world_start_at(w, 0.5 * EDGE);
   hap_stats stats = cw_stats(w);
   for (int i = 0; i < 1000 && stats.error.lookbacks < 3;
        ++i) { /* the hand stays where it is, in the cube */

@@ -76,7 +76,7 @@ static hap_pointer_id add_hand(crowd *c, int index)
   return id;
 }
 
-static bool begin(crowd *c)
+static bool crowd_begin(crowd *c)
 {
   if (stage_create(&c->s) != HAP_OK) {
     printf("# %s\n", c->s.detail.text);
@@ -89,7 +89,7 @@ static bool begin(crowd *c)
   return hap_session_start(c->s.session) == HAP_OK;
 }
 
-static void forward(crowd *c, int ticks)
+static void crowd_forward(crowd *c, int ticks)
 {
   for (int i = 0; i < ticks; ++i) {
     move_hands(c, 1e-9 * (double)hap_session_now(c->s.session));
@@ -137,8 +137,8 @@ static double sum_of_stiffness(const crowd *c)
   return sum;
 }
 
-/* Springs side by side: each carries its part of the weight. Nothing holds the bar sideways: left alone long
- * enough it slides off. Model impulse, whose force is late, throws it. */
+/* Springs side by side: each carries its part of the weight. Nothing holds the bar sideways:
+ * left alone long enough it slides off. Model impulse, whose force is late, throws it. */
 static void check_held_bar(hap_model model, bool jointed)
 {
   crowd c;
@@ -151,8 +151,8 @@ static void check_held_bar(hap_model model, bool jointed)
   }
   place_under_bar(&c);
   c.damping = 10.0;
-  REQUIRE(begin(&c));
-  forward(&c, jointed ? 4000 : 2000);
+  REQUIRE(crowd_begin(&c));
+  crowd_forward(&c, jointed ? 4000 : 2000);
   double weight = BAR_MASS * 9.81;
   double sum = 0.0;
   double worst = 0.0;
@@ -193,8 +193,8 @@ TEST(one_that_leaves_changes_nothing_for_the_others)
   for (int i = 0; i < HANDS; ++i) {
     c.at[i][2] += 1e-3 + 1e-4 * i;
   }
-  REQUIRE(begin(&c));
-  forward(&c, 100);
+  REQUIRE(crowd_begin(&c));
+  crowd_forward(&c, 100);
   for (int i = 0; i < HANDS; ++i) {
     force_of(&c, i, before[i]);
     CHECK_NEAR(before[i][2], -c.stiffness[i] * (9e-4 + 1e-4 * i), 1e-9);
@@ -203,7 +203,7 @@ TEST(one_that_leaves_changes_nothing_for_the_others)
     hap_pointer_id id = c.hands[gone];
     CHECK(hap_pointer_remove(c.s.session, id) == HAP_OK);
     c.hands[gone].v = 0;
-    forward(&c, 1);
+    crowd_forward(&c, 1);
     for (int i = 0; i < HANDS; ++i) {
       double force[3];
       if (c.hands[i].v != 0) {
@@ -214,7 +214,7 @@ TEST(one_that_leaves_changes_nothing_for_the_others)
     c.hands[gone] = add_hand(&c, gone);
     CHECK(c.hands[gone].v != id.v);
     move_hands(&c, 0.0);
-    forward(&c, 100);
+    crowd_forward(&c, 100);
     double again[3];
     force_of(&c, gone, again);
     CHECK_NEAR(again[2], before[gone][2], 1e-9);
@@ -237,17 +237,17 @@ static double push_apart(hap_model model, int count)
     (void)add_box(&c, (const double[3]){EDGE, EDGE, EDGE}, 0.2, at);
     hapi_v3_set(c.at[i], -RADIUS - 0.005, 0.3 * i, 0.0);
   }
-  if (!begin(&c)) {
+  if (!crowd_begin(&c)) {
     CHECK(false);
     stage_end(&c.s);
     return 0.0;
   }
-  forward(&c, 50);
+  crowd_forward(&c, 50);
   for (int i = 0; i < count; ++i) {
     force_of(&c, i, force);
     CHECK(force[0] < 0.0);
   }
-  forward(&c, 350);
+  crowd_forward(&c, 350);
   sum = stats_of(&c.s).hand.impulse_ns;
   check_audit(&c, 1e-9);
   stage_end(&c.s);
@@ -280,7 +280,7 @@ static void build_row(crowd *c, bool abreast)
   }
 }
 
-static bool slippery(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool surface_slippery(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user;
   (void)a;
@@ -293,17 +293,17 @@ static void check_row(hap_model model, bool abreast)
 {
   crowd c;
   crowd_init(&c, model, 9.81);
-  c.s.ode.surface = slippery;
+  c.s.ode.surface = surface_slippery;
   build_row(&c, abreast);
   c.speed = 0.05;
   c.damping = 2.0;
-  REQUIRE(begin(&c));
-  forward(&c, 1000);
+  REQUIRE(crowd_begin(&c));
+  crowd_forward(&c, 1000);
   double sum = 0.0;
   double least = HUGE_VAL;
   double most = 0.0;
   for (int i = 0; i < 100; ++i) {
-    forward(&c, 1);
+    crowd_forward(&c, 1);
     for (int k = 0; k < HANDS; ++k) {
       double force[3];
       force_of(&c, k, force);
@@ -338,17 +338,17 @@ static uint64_t hash_of_run(hap_model model)
   crowd c;
   uint64_t hash = 0;
   crowd_init(&c, model, 9.81);
-  c.s.ode.surface = slippery;
+  c.s.ode.surface = surface_slippery;
   build_row(&c, false);
   c.speed = 0.1;
-  if (begin(&c)) {
+  if (crowd_begin(&c)) {
     for (int i = 0; i < 40; ++i) { /* they come and go */
       int index = i * 7 % HANDS;
       CHECK(hap_pointer_remove(c.s.session, c.hands[index]) == HAP_OK);
       c.hands[index].v = 0;
-      forward(&c, 3 + i % 5);
+      crowd_forward(&c, 3 + i % 5);
       c.hands[index] = add_hand(&c, index);
-      forward(&c, 2);
+      crowd_forward(&c, 2);
     }
     hash = stats_of(&c.s).loop.trace_hash;
   }
@@ -372,14 +372,14 @@ TEST(a_seventeenth_is_refused_and_says_why)
   hap_pointer_def def;
   hap_pointer_id id;
   crowd_init(&c, HAP_MODEL_CONTACT, 0.0);
-  REQUIRE(begin(&c));
+  REQUIRE(crowd_begin(&c));
   hap_pointer_def_init(&def, sizeof def);
   CHECK(hap_pointer_add(c.s.session, &def, &id) == HAP_ERROR_CAPACITY && id.v == 0);
-  CHECK(has(detail_of(&c.s), "max_pointers"));
+  CHECK(text_has(detail_of(&c.s), "max_pointers"));
   CHECK(hap_pointer_remove(c.s.session, c.hands[3]) == HAP_OK);
   CHECK(hap_pointer_add(c.s.session, &def, &id) == HAP_OK && id.v != c.hands[3].v);
   CHECK(hap_pointer_remove(c.s.session, c.hands[3]) == HAP_ERROR_NOT_FOUND);
-  CHECK(has(detail_of(&c.s), "it was removed"));
+  CHECK(text_has(detail_of(&c.s), "it was removed"));
   c.hands[3].v = 0;
   stage_end(&c.s);
 }

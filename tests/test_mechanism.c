@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The mechanism of the virtual device (mass, damping, friction, delay, quantum) against closed forms
- * and a fine integration. */
+/* The mechanism of the virtual device (mass, damping, friction, delay, quantum) against closed
+ * forms and a fine integration. */
 
 #include "tests/tap.h"
 

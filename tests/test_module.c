@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Devices from shared objects: what is refused and how that is said, how long the code stays, threads
- * and signals in it, and a session that lives with a device that does all wrong.
- * HAPODE_TABLES, HAPODE_BROKEN, HAPODE_SKELETON, HAPODE_SYMBOLLESS, HAPODE_UNRESOLVED: the modules. */
+/* Devices from shared objects: what is refused and how that is said, how long the code stays,
+ * threads and signals in it, and a session that lives with a device that does all wrong.
+ * HAPODE_TABLES, HAPODE_BROKEN, HAPODE_SKELETON, HAPODE_SYMBOLLESS, HAPODE_UNRESOLVED: the
+ * modules. */
 
 #include "tests/files.h"
 #include "tests/tap.h"
@@ -37,7 +38,7 @@ static const char *module_of(const char *variable)
 
 /* ---- refusals ---- */
 
-static void refused(const char *spec, hap_status status, const char *const said[3])
+static void module_refused(const char *spec, hap_status status, const char *const said[3])
 {
   hap_device *device = (hap_device *)test_folder; /* must be overwritten */
   hap_detail detail = {"of before"};
@@ -61,7 +62,7 @@ TEST(paths_are_whole_and_not_searched_for)
   file_write_bytes("a.so", "x", 1);
   setenv("LD_LIBRARY_PATH", test_folder, 1);
   for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
-    refused(specs[i], HAP_ERROR_ARGUMENT, said);
+    module_refused(specs[i], HAP_ERROR_ARGUMENT, said);
   }
   unsetenv("LD_LIBRARY_PATH");
   remove("a.so");
@@ -78,25 +79,25 @@ TEST(what_is_no_module_is_refused)
                                  "hapode_device_module"};
   const char *const unresolved[3] = {"cannot be loaded", "hapode_test_nobody_has_this", NULL};
   const char *const cut[3] = {"cut.so", "cut off", NULL};
-  refused("module:/no/such/libfoo.so,limit=1", HAP_ERROR_NOT_FOUND, missing);
+  module_refused("module:/no/such/libfoo.so,limit=1", HAP_ERROR_NOT_FOUND, missing);
   file_write_bytes(folder_path("empty.so"), "", 0);
-  refused(spec_of(folder_path("empty.so"), ""), HAP_ERROR_FORMAT, empty);
+  module_refused(spec_of(folder_path("empty.so"), ""), HAP_ERROR_FORMAT, empty);
   file_write_bytes(folder_path("text.so"), "INPUT(libfoo.so)\n", 17);
-  refused(spec_of(folder_path("text.so"), ""), HAP_ERROR_FORMAT, text);
-  refused(spec_of(test_folder, ""), HAP_ERROR_IO, kind);
+  module_refused(spec_of(folder_path("text.so"), ""), HAP_ERROR_FORMAT, text);
+  module_refused(spec_of(test_folder, ""), HAP_ERROR_IO, kind);
   REQUIRE(mkfifo(folder_path("pipe.so"), 0600) == 0);
-  refused(spec_of(folder_path("pipe.so"), ""), HAP_ERROR_IO, kind); /* and does not wait */
-  refused("module:/dev/null", HAP_ERROR_IO, kind);
-  refused(spec_of(module_of("HAPODE_SYMBOLLESS"), ""), HAP_ERROR_FORMAT, symbol);
-  refused(spec_of(module_of("HAPODE_UNRESOLVED"), ""), HAP_ERROR_IO, unresolved);
+  module_refused(spec_of(folder_path("pipe.so"), ""), HAP_ERROR_IO, kind); /* and does not wait */
+  module_refused("module:/dev/null", HAP_ERROR_IO, kind);
+  module_refused(spec_of(module_of("HAPODE_SYMBOLLESS"), ""), HAP_ERROR_FORMAT, symbol);
+  module_refused(spec_of(module_of("HAPODE_UNRESOLVED"), ""), HAP_ERROR_IO, unresolved);
   char bytes[2000];
   FILE *file = fopen(module_of("HAPODE_TABLES"), "r");
   REQUIRE(file != NULL && fread(bytes, 1, sizeof bytes, file) == sizeof bytes);
   fclose(file);
   file_write_bytes(folder_path("cut.so"), bytes, sizeof bytes);
-  refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
+  module_refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
   CHECK(truncate(folder_path("cut.so"), 10) == 0);
-  refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
+  module_refused(spec_of(folder_path("cut.so"), ""), HAP_ERROR_FORMAT, cut);
 }
 
 TEST(other_architectures_are_named)
@@ -117,21 +118,21 @@ TEST(other_architectures_are_named)
   bytes[at] = (char)EM_AARCH64;
   bytes[at + 1] = 0;
   file_write_bytes(folder_path("arm.so"), bytes, size);
-  refused(spec_of(folder_path("arm.so"), ""), HAP_ERROR_UNSUPPORTED, machine);
+  module_refused(spec_of(folder_path("arm.so"), ""), HAP_ERROR_UNSUPPORTED, machine);
 #else
   (void)machine;
 #endif
   bytes[at] = bytes[at + 1] = 0x7f;
   file_write_bytes(folder_path("odd.so"), bytes, size);
-  refused(spec_of(folder_path("odd.so"), ""), HAP_ERROR_UNSUPPORTED, unknown);
+  module_refused(spec_of(folder_path("odd.so"), ""), HAP_ERROR_UNSUPPORTED, unknown);
   memcpy(bytes + at, kept, sizeof kept);
   bytes[offsetof(Elf64_Ehdr, e_type)] = ET_REL;
   file_write_bytes(folder_path("object.so"), bytes, size);
-  refused(spec_of(folder_path("object.so"), ""), HAP_ERROR_FORMAT, object);
+  module_refused(spec_of(folder_path("object.so"), ""), HAP_ERROR_FORMAT, object);
   bytes[EI_CLASS] = bytes[EI_CLASS] == ELFCLASS64 ? ELFCLASS32 : ELFCLASS64;
   if (sizeof(void *) == 8) {
     file_write_bytes(folder_path("small.so"), bytes, size);
-    refused(spec_of(folder_path("small.so"), ""), HAP_ERROR_UNSUPPORTED, bits);
+    module_refused(spec_of(folder_path("small.so"), ""), HAP_ERROR_UNSUPPORTED, bits);
   }
 }
 
@@ -161,9 +162,9 @@ TEST(wrong_tables_are_refused)
   const char *path = module_of("HAPODE_TABLES");
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
     setenv("HAPODE_TEST_TABLE", cases[i].wrong, 1);
-    refused(spec_of(path, ""), cases[i].status, cases[i].said);
+    module_refused(spec_of(path, ""), cases[i].status, cases[i].said);
     const char *const where[3] = {path, NULL};
-    refused(spec_of(path, ""), cases[i].status, where);
+    module_refused(spec_of(path, ""), cases[i].status, where);
     CHECK(dlopen(path, RTLD_NOW | RTLD_NOLOAD) == NULL); /* nothing stays loaded */
   }
   unsetenv("HAPODE_TEST_TABLE");
@@ -175,15 +176,15 @@ TEST(long_paths_and_arguments_end_in_a_text)
   const char *const said[3] = {"module /", NULL};
   memset(args, 'a', sizeof args - 1);
   args[0] = '/';
-  refused(spec_of(args, ""), HAP_ERROR_IO, said); /* ENAMETOOLONG */
+  module_refused(spec_of(args, ""), HAP_ERROR_IO, said); /* ENAMETOOLONG */
   const char *const limit[3] = {"skeleton: expected limit=N", NULL};
   args[0] = ',';
-  refused(spec_of(module_of("HAPODE_SKELETON"), args), HAP_ERROR_ARGUMENT, limit);
+  module_refused(spec_of(module_of("HAPODE_SKELETON"), args), HAP_ERROR_ARGUMENT, limit);
 }
 
 /* ---- how long the code stays ---- */
 
-static int *counter(void *library, const char *name)
+static int *module_counter(void *library, const char *name)
 {
   return dlsym(library, name);
 }
@@ -207,8 +208,8 @@ TEST(the_code_goes_with_the_last_device)
     }
     void *library = dlopen(path, RTLD_NOW | RTLD_NOLOAD);
     REQUIRE(library != NULL);
-    CHECK(*counter(library, "tables_opened") == 3); /* one load of it */
-    CHECK(*counter(library, "tables_zeroed") == 0);
+    CHECK(*module_counter(library, "tables_opened") == 3); /* one load of it */
+    CHECK(*module_counter(library, "tables_zeroed") == 0);
     dlclose(library);
     CHECK(hapi_device_self(devices[0]) != hapi_device_self(devices[1]));
     CHECK(hapi_device_ops(devices[0]) == hapi_device_ops(devices[1]));
@@ -319,7 +320,8 @@ TEST(threads_may_load_at_the_same_time)
   atomic_init(&failures, 0);
   hap_device *kept = NULL;
 #if defined(__SANITIZE_THREAD__)
-  /* It does not know the locks of the system's loader, by which one load comes behind another one. */
+  /* It does not know the locks of the system's loader, by which one load comes behind another
+   * one. */
   CHECK(hap_device_open(spec_of(module_of("HAPODE_TABLES"), ""), &kept, NULL) == HAP_OK);
 #endif
   for (int i = 0; i < 4; ++i) {

@@ -94,7 +94,7 @@ static dTriMeshDataID make_mesh(void)
   return mesh;
 }
 
-static void tilt(dBodyID body, const double away[3])
+static void body_tilt(dBodyID body, const double away[3])
 {
   const dQuaternion q = {0.8, 0.36, 0.0, 0.48};
   dBodySetQuaternion(body, q);
@@ -116,7 +116,7 @@ static void check_shape(shape kind, bool turned)
   dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
   dBodyID body = world_add(w, make_geom(w->space, kind, mesh), &mass, 0, 0, 0);
   if (turned) {
-    tilt(body, (const double[3]){1.0, -2.0, 0.5});
+    body_tilt(body, (const double[3]){1.0, -2.0, 0.5});
     hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), at, at);
     hapi_quat_rotate(dBodyGetQuaternion(body), e.normal, e.normal);
   }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A scene that lies 10 km from the origin, along all three axes, feels as it does at the origin. There
- * a double has steps of 1.8e-12 m: with 2 kN/m that is 4e-9 N. */
+/* A scene that lies 10 km from the origin, along all three axes, feels as it does at the origin.
+ * There a double has steps of 1.8e-12 m: with 2 kN/m that is 4e-9 N. */
 
 #include "tests/tap.h"
 
@@ -20,7 +20,7 @@ static const double far[3] = {FAR, FAR, FAR};
 /* What is static and what moves; planes have no pose. */
 static double shake; /* m */
 
-static void carry(dSpaceID space, const double by[3])
+static void space_carry(dSpaceID space, const double by[3])
 {
   int count = dSpaceGetNumGeoms(space);
   for (int i = 0; i < count; ++i) {
@@ -86,7 +86,7 @@ static void run_scene(const char *name, hap_model model, const double by[3], run
   hap_device *device = NULL;
   memset(out, 0, sizeof *out);
   REQUIRE(scene_create(name, &s, NULL) == HAP_OK);
-  carry(s->space, by);
+  space_carry(s->space, by);
   hap_session *session = start_scene(s, model, &device, by);
   out->good = session != NULL;
   for (int i = 0; session != NULL && i < TICKS; ++i) {
@@ -118,9 +118,9 @@ static run_result here;
 static run_result there;
 static run_result shaken;
 
-/* What a picometre at the origin does: where the force hangs on a picometre, no place is better than
- * 10 km away. */
-static double conditioning(const char *name, hap_model model)
+/* What a picometre at the origin does: where the force hangs on a picometre, no place is better
+ * than 10 km away. */
+static double scene_conditioning(const char *name, hap_model model)
 {
   const double origin[3] = {0.0, 0.0, 0.0};
   double most = 0.0;
@@ -141,7 +141,7 @@ static void check_scene(const char *name, hap_model model)
   run_scene(name, model, origin, &here);
   run_scene(name, model, far, &there);
   double off = difference_of(&here, &there, &peak) / peak;
-  double allowed = fmin(0.25, fmax(1e-6, 10.0 * conditioning(name, model)));
+  double allowed = fmin(0.25, fmax(1e-6, 10.0 * scene_conditioning(name, model)));
   printf("# %s, %s: %.2g of %.3g N, allowed %.2g\n", name, hap_model_name(model), off, peak,
          allowed);
   CHECK(here.good && there.good && peak > 1.0);
@@ -195,7 +195,7 @@ static void run_tick(hap_model model, double at, double stiffness, double *force
   hapi_v3_set(c->point_body, -0.05, 0.02, 0.01);
   set_free(c, 0.5, 0.01);
   set_box(c);
-  adopt();
+  model_adopt();
   hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
   patches->contact_count = patches->surface_count = 0;
   patches->model_number = f.model->number;
@@ -203,7 +203,7 @@ static void run_tick(hap_model model, double at, double stiffness, double *force
   for (int i = 0; i < TICKS; ++i) {
     p->device.twist.linear[0] = i < TICKS / 2 ? 0.05 : -0.05;
     p->device.pose.position[0] += T * p->device.twist.linear[0];
-    run(1);
+    ticks_run(1);
     forces[i] = p->wrench.force[0];
   }
 }

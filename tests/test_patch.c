@@ -63,14 +63,14 @@ static double thing_size(const thing *t)
 
 /* --- points of a patch ---------------------------------------------------------------------- */
 
-static bool find(const thing *a, const thing *b, double margin, hapi_patch *out)
+static bool patch_find(const thing *a, const thing *b, double margin, hapi_patch *out)
 {
   return hapi_patch_find(&a->shape, &a->pose, &b->shape, &b->pose, margin, out);
 }
 
 /* The formula of patch.h. */
-static void surface(const thing *t, const double core[3], double ball, double rim,
-                    const double dir[3], double out[3])
+static void thing_surface(const thing *t, const double core[3], double ball, double rim,
+                          const double dir[3], double out[3])
 {
   double across[3];
   hapi_quat_unrotate(t->pose.quat_wxyz, dir, across);
@@ -82,13 +82,13 @@ static void surface(const thing *t, const double core[3], double ball, double ri
   hapi_v3_add(core, out, out);
 }
 
-static void surfaces(const thing *a, const thing *b, const hapi_patch_point *p, double out_a[3],
-                     double out_b[3])
+static void things_surfaces(const thing *a, const thing *b, const hapi_patch_point *p,
+                            double out_a[3], double out_b[3])
 {
   double back[3];
   hapi_v3_scale(-1.0, p->normal, back);
-  surface(a, p->core_a, p->ball_a, p->rim_a, back, out_a);
-  surface(b, p->core_b, p->ball_b, p->rim_b, p->normal, out_b);
+  thing_surface(a, p->core_a, p->ball_a, p->rim_a, back, out_a);
+  thing_surface(b, p->core_b, p->ball_b, p->rim_b, p->normal, out_b);
 }
 
 /* All relative to the larger thing. */
@@ -104,7 +104,7 @@ typedef struct errors {
 
 /* The ball of a tilted capsule's upper end is a bit inside, and so are points of a hull that are
  * given and not needed. */
-static double off(const thing *t, double ball, const double point[3])
+static double point_off(const thing *t, double ball, const double point[3])
 {
   double h = height(t, point);
   return ball > 0.0 || t->shape.kind == HAPI_SHAPE_HULL ? h : fabs(h);
@@ -117,15 +117,15 @@ static void point_errors(const thing *a, const thing *b, const hapi_patch_point 
   double on_b[3];
   double gap[3];
   double edges[3];
-  surfaces(a, b, p, on_a, on_b);
+  things_surfaces(a, b, p, on_a, on_b);
   hapi_v3_sub(on_a, on_b, gap);
   double length = hapi_v3_dot(gap, p->normal);
   hapi_v3_madd(gap, -length, p->normal, gap);
   worst->gap = fmax(worst->gap, fabs(length - p->gap) / size);
   worst->gap = fmax(worst->gap, fabs(hapi_v3_norm(p->normal) - 1.0));
   worst->sideways = fmax(worst->sideways, hapi_v3_norm(gap) / size);
-  worst->surface =
-      fmax(worst->surface, fmax(off(a, p->ball_a, on_a), off(b, p->ball_b, on_b)) / size);
+  worst->surface = fmax(worst->surface,
+                        fmax(point_off(a, p->ball_a, on_a), point_off(b, p->ball_b, on_b)) / size);
   bool ball = p->touch == HAPI_TOUCH_BALL_A || p->touch == HAPI_TOUCH_BALL_B;
   if (!ball) {
     worst->deeper = fmax(worst->deeper, (separation(a, b, p->normal) - p->gap) / size);
@@ -196,7 +196,7 @@ static void pair_run(const hapi_shape_kind kinds[2], double deepest, uint64_t *s
     hapi_nearest n;
     hapi_patch patch;
     REQUIRE(pair_make(&a, &b, kinds, deepest, state));
-    REQUIRE(nearest(&a, &b, &n) && find(&a, &b, margin, &patch));
+    REQUIRE(nearest(&a, &b, &n) && patch_find(&a, &b, margin, &patch));
     if (n.distance < 0.999 * margin) {
       patch_errors(&a, &b, n.distance, &patch, &worst);
     }
@@ -239,7 +239,7 @@ TEST(random_pairs_in_penetration)
 
 /* --- order ---------------------------------------------------------------------------------- */
 
-static hapi_touch mirrored(hapi_touch touch)
+static hapi_touch touch_mirrored(hapi_touch touch)
 {
   static const hapi_touch other[] = {HAPI_TOUCH_FACE_B, HAPI_TOUCH_FACE_A, HAPI_TOUCH_EDGES,
                                      HAPI_TOUCH_BALL_B, HAPI_TOUCH_BALL_A};
@@ -256,7 +256,7 @@ static bool has_mirror(const hapi_patch *patch, const hapi_patch_point *p, bool 
     hapi_v3_add(p->normal, q->normal, between);
     if (fabs(p->gap - q->gap) < 1e-6 && hapi_v3_norm(apart) < 1e-3 &&
         hapi_v3_norm(between) < 5e-3 && p->ball_a == q->ball_b && p->rim_b == q->rim_a &&
-        (!same_touch || q->touch == mirrored(p->touch))) {
+        (!same_touch || q->touch == touch_mirrored(p->touch))) {
       return true;
     }
   }
@@ -279,7 +279,7 @@ TEST(swapping_mirrors_the_patch)
         !pair_make(&a, &b, kinds, 0.01, &state)) {
       continue;
     }
-    REQUIRE(find(&a, &b, margin, &one) && find(&b, &a, margin, &other));
+    REQUIRE(patch_find(&a, &b, margin, &one) && patch_find(&b, &a, margin, &other));
     bool alike = one.count == other.count;
     for (int k = 0; k < one.count; ++k) {
       alike = alike && has_mirror(&other, &one.points[k], kinds[0] != kinds[1]);
@@ -292,7 +292,7 @@ TEST(swapping_mirrors_the_patch)
 
 /* --- faces ---------------------------------------------------------------------------------- */
 
-static thing simple(hapi_shape_kind kind, double x, double y, double z)
+static thing thing_simple(hapi_shape_kind kind, double x, double y, double z)
 {
   thing t;
   memset(&t, 0, sizeof t);
@@ -302,7 +302,7 @@ static thing simple(hapi_shape_kind kind, double x, double y, double z)
 }
 
 /* Turns a thing about a world axis through its centre. */
-static void turn(thing *t, const double axis[3], double angle)
+static void thing_turn(thing *t, const double axis[3], double angle)
 {
   double q[4] = {cos(0.5 * angle), sin(0.5 * angle) * axis[0], sin(0.5 * angle) * axis[1],
                  sin(0.5 * angle) * axis[2]};
@@ -316,14 +316,14 @@ static const double along_z[3] = {0.0, 0.0, 1.0};
 TEST(box_on_plane_keeps_four_corners)
 {
   static const double tilts[] = {0.0, 1e-9, 1e-4, 0.00873, 0.02};
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.3, 0.1, 0.0);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.3, 0.1, 0.0);
   for (size_t i = 0; i < sizeof tilts / sizeof tilts[0]; ++i) {
-    thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.1005);
+    thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.1005);
     hapi_patch patch;
-    turn(&box, along_z, 0.3);
-    turn(&box, along_x, tilts[i]);
-    turn(&box, along_y, 0.3 * tilts[i]);
-    REQUIRE(find(&box, &plane, margin, &patch));
+    thing_turn(&box, along_z, 0.3);
+    thing_turn(&box, along_x, tilts[i]);
+    thing_turn(&box, along_y, 0.3 * tilts[i]);
+    REQUIRE(patch_find(&box, &plane, margin, &patch));
     CHECK(patch.count == 4);
     for (int k = 0; k < patch.count; ++k) {
       double corner[3];
@@ -338,12 +338,12 @@ TEST(box_on_plane_keeps_four_corners)
 
 TEST(thin_plate_on_plane_stands_on_its_lower_face)
 {
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
-  thing plate = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.002);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
+  thing plate = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.002);
   hapi_patch patch;
   plate.shape.half[2] = 0.001;
-  turn(&plate, along_x, 0.08); /* the higher corners are out of the margin */
-  REQUIRE(find(&plate, &plane, 0.004, &patch));
+  thing_turn(&plate, along_x, 0.08); /* the higher corners are out of the margin */
+  REQUIRE(patch_find(&plate, &plane, 0.004, &patch));
   CHECK(patch.count == 2);
   for (int k = 0; k < patch.count; ++k) {
     double corner[3];
@@ -354,12 +354,12 @@ TEST(thin_plate_on_plane_stands_on_its_lower_face)
 
 static void rectangle_check(double tilt, double gap)
 {
-  thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
-  thing high = simple(HAPI_SHAPE_BOX, 0.03, 0.05, 0.2 + gap);
+  thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+  thing high = thing_simple(HAPI_SHAPE_BOX, 0.03, 0.05, 0.2 + gap);
   hapi_patch patch;
   int seen = 0;
-  turn(&high, along_y, tilt);
-  REQUIRE(find(&high, &low, margin, &patch));
+  thing_turn(&high, along_y, tilt);
+  REQUIRE(patch_find(&high, &low, margin, &patch));
   CHECK(patch.count == 4);
   for (int i = 0; i < patch.count; ++i) {
     const hapi_patch_point *p = &patch.points[i];
@@ -384,13 +384,13 @@ TEST(stacked_boxes_touch_in_the_corners_of_their_overlap)
 
 TEST(equal_boxes_do_not_flip)
 {
-  thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+  thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
   for (int i = 0; i < 200; ++i) {
-    thing high = simple(HAPI_SHAPE_BOX, 0.01, 0.02, 0.2);
+    thing high = thing_simple(HAPI_SHAPE_BOX, 0.01, 0.02, 0.2);
     hapi_patch patch;
-    turn(&high, along_x, 1e-5 * sin(i));
-    turn(&high, along_y, 1e-5 * cos(3.0 * i));
-    REQUIRE(find(&high, &low, margin, &patch));
+    thing_turn(&high, along_x, 1e-5 * sin(i));
+    thing_turn(&high, along_y, 1e-5 * cos(3.0 * i));
+    REQUIRE(patch_find(&high, &low, margin, &patch));
     CHECK(patch.count == 4 && patch.points[0].touch == HAPI_TOUCH_FACE_B);
   }
 }
@@ -403,7 +403,7 @@ typedef struct polygon {
 } polygon;
 
 /* Corners of a rectangle turned by angle. */
-static polygon rectangle(const double half[2], const double middle[2], double angle)
+static polygon polygon_rectangle(const double half[2], const double middle[2], double angle)
 {
   static const double side[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
   polygon p = {.count = 4};
@@ -417,7 +417,7 @@ static polygon rectangle(const double half[2], const double middle[2], double an
 }
 
 /* How far a point is outside; negative: inside. */
-static double outside(const polygon *p, const double at[2])
+static double polygon_outside(const polygon *p, const double at[2])
 {
   double most = -INFINITY;
   for (int i = 0; i < p->count; ++i) {
@@ -462,7 +462,7 @@ static double overlap_area(const polygon *p, const polygon *q, double reach)
     int cell[2] = {i % GRID, i / GRID};
     double at[2] = {reach * (2.0 * (cell[0] + 0.5) / GRID - 1.0),
                     reach * (2.0 * (cell[1] + 0.5) / GRID - 1.0)};
-    inside += outside(p, at) < 0.0 && outside(q, at) < 0.0;
+    inside += polygon_outside(p, at) < 0.0 && polygon_outside(q, at) < 0.0;
   }
   return 4.0 * reach * reach * inside / (GRID * GRID);
 }
@@ -470,29 +470,29 @@ static double overlap_area(const polygon *p, const polygon *q, double reach)
 /* Share of the overlap that the points span; negative: one of them is outside of a face. */
 static double overlap_share(uint64_t *state, bool as_hulls)
 {
-  thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+  thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
   double middle[2] = {random_in(state, -0.05, 0.05), random_in(state, -0.05, 0.05)};
   double angle = random_in(state, -3.0, 3.0);
-  thing high = simple(HAPI_SHAPE_BOX, middle[0], middle[1], 0.1 + 0.03 - 1e-4);
+  thing high = thing_simple(HAPI_SHAPE_BOX, middle[0], middle[1], 0.1 + 0.03 - 1e-4);
   double corners[2][24];
   hapi_patch patch;
   static const double origin[2] = {0.0, 0.0};
   hapi_v3_set(high.shape.half, random_in(state, 0.01, 0.1), random_in(state, 0.01, 0.1), 0.03);
-  turn(&high, along_z, angle);
-  polygon p = rectangle(low.shape.half, origin, 0.0);
-  polygon q = rectangle(high.shape.half, middle, angle);
+  thing_turn(&high, along_z, angle);
+  polygon p = polygon_rectangle(low.shape.half, origin, 0.0);
+  polygon q = polygon_rectangle(high.shape.half, middle, angle);
   double area = overlap_area(&p, &q, 0.06);
   if (as_hulls) {
     box_to_hull(&low, &low, corners[0]);
     box_to_hull(&high, &high, corners[1]);
   }
-  if (area < 1e-4 || !find(&high, &low, margin, &patch)) {
+  if (area < 1e-4 || !patch_find(&high, &low, margin, &patch)) {
     return area < 1e-4 ? 1.0 : -1.0;
   }
   polygon found = {.count = patch.count};
   for (int i = 0; i < patch.count; ++i) {
     memcpy(found.at[i], patch.points[i].core_a, sizeof found.at[i]);
-    if (fmax(outside(&p, found.at[i]), outside(&q, found.at[i])) > 1e-8) {
+    if (fmax(polygon_outside(&p, found.at[i]), polygon_outside(&q, found.at[i])) > 1e-8) {
       return -1.0;
     }
   }
@@ -531,28 +531,29 @@ TEST(margin_does_not_reach_sideways)
 {
   static const double margins[] = {1e-4, 0.01, 0.05};
   for (size_t i = 0; i < sizeof margins / sizeof margins[0]; ++i) {
-    thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
-    thing high = simple(HAPI_SHAPE_BOX, 0.08, 0.0, 0.2);
-    thing beside = simple(HAPI_SHAPE_BOX, 0.1005, 0.0, 0.2001);
-    thing corner = simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0);
+    thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+    thing high = thing_simple(HAPI_SHAPE_BOX, 0.08, 0.0, 0.2);
+    thing beside = thing_simple(HAPI_SHAPE_BOX, 0.1005, 0.0, 0.2001);
+    thing corner = thing_simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0);
     double corners[24];
     hapi_patch patch;
-    REQUIRE(find(&high, &low, margins[i], &patch));
+    REQUIRE(patch_find(&high, &low, margins[i], &patch));
     CHECK(patch.count == 4);
     for (int k = 0; k < patch.count; ++k) {
       CHECK(patch.points[k].core_a[0] > 0.03 - 1e-9 && patch.points[k].core_a[0] < 0.05 + 1e-9);
     }
-    REQUIRE(find(&beside, &low, margins[i], &patch));
+    REQUIRE(patch_find(&beside, &low, margins[i], &patch));
     CHECK(patch.count == 0);
     box_to_hull(&beside, &corner, corners);
-    REQUIRE(find(&corner, &low, margins[i], &patch));
+    REQUIRE(patch_find(&corner, &low, margins[i], &patch));
     CHECK(patch.count == 0);
   }
 }
 
 /* --- points evaluated again from moved poses ------------------------------------------------- */
 
-static void carry(const hap_pose *from, const hap_pose *to, const double point[3], double out[3])
+static void point_carry(const hap_pose *from, const hap_pose *to, const double point[3],
+                        double out[3])
 {
   hapi_pose_unpoint(from->position, from->quat_wxyz, point, out);
   hapi_pose_point(to->position, to->quat_wxyz, out, out);
@@ -576,14 +577,14 @@ static double ball_gap(const double center[3], double radius, const thing *other
 }
 
 /* What the haptic loop does with a point: a and b have moved to a2 and b2. */
-static double evaluate(const hapi_patch_point *p, const thing *const was[2],
-                       const thing *const is[2])
+static double point_evaluate(const hapi_patch_point *p, const thing *const was[2],
+                             const thing *const is[2])
 {
   hapi_patch_point now = *p;
   double on_a[3];
   double on_b[3];
-  carry(&was[0]->pose, &is[0]->pose, p->core_a, now.core_a);
-  carry(&was[1]->pose, &is[1]->pose, p->core_b, now.core_b);
+  point_carry(&was[0]->pose, &is[0]->pose, p->core_a, now.core_a);
+  point_carry(&was[1]->pose, &is[1]->pose, p->core_b, now.core_b);
   if (p->touch == HAPI_TOUCH_BALL_A) {
     return ball_gap(now.core_a, p->ball_a, is[1]);
   }
@@ -600,22 +601,22 @@ static double evaluate(const hapi_patch_point *p, const thing *const was[2],
     hapi_v3_cross(now.edge_a, now.edge_b, now.normal);
     hapi_v3_scale((sign < 0.0 ? -1.0 : 1.0) / hapi_v3_norm(now.normal), now.normal, now.normal);
   }
-  surfaces(is[0], is[1], &now, on_a, on_b);
+  things_surfaces(is[0], is[1], &now, on_a, on_b);
   hapi_v3_sub(on_a, on_b, on_a);
   return hapi_v3_dot(on_a, now.normal);
 }
 
-static void move(thing *t, double step, uint64_t *state)
+static void thing_move(thing *t, double step, uint64_t *state)
 {
   double direction[3];
   random_direction(state, direction);
-  turn(t, direction, step);
+  thing_turn(t, direction, step);
   random_direction(state, direction);
   hapi_v3_madd(t->pose.position, 0.1 * step, direction, t->pose.position);
 }
 
 /* The least gap of the points must follow the distance of the shapes but for step squared. */
-static double follow(const thing *a, const thing *b, double step, uint64_t *state)
+static double patch_follow(const thing *a, const thing *b, double step, uint64_t *state)
 {
   double worst = 0.0;
   for (int i = 0; i < 200; ++i) {
@@ -626,12 +627,12 @@ static double follow(const thing *a, const thing *b, double step, uint64_t *stat
     hapi_patch patch;
     hapi_nearest n;
     double least = INFINITY;
-    CHECK(find(a, b, margin, &patch) && patch.count > 0);
-    move(&a2, step, state);
-    move(&b2, step, state);
+    CHECK(patch_find(a, b, margin, &patch) && patch.count > 0);
+    thing_move(&a2, step, state);
+    thing_move(&b2, step, state);
     CHECK(nearest(&a2, &b2, &n));
     for (int k = 0; k < patch.count; ++k) {
-      least = fmin(least, evaluate(&patch.points[k], was, is));
+      least = fmin(least, point_evaluate(&patch.points[k], was, is));
     }
     worst = fmax(worst, fabs(least - n.distance));
   }
@@ -641,8 +642,8 @@ static double follow(const thing *a, const thing *b, double step, uint64_t *stat
 static void follow_check(const thing *a, const thing *b, const char *what)
 {
   uint64_t state = 9;
-  double coarse = follow(a, b, 4e-3, &state);
-  double fine = follow(a, b, 1e-3, &state);
+  double coarse = patch_follow(a, b, 4e-3, &state);
+  double fine = patch_follow(a, b, 1e-3, &state);
   printf("# %-28s error %.1e m after 4 mrad, %.1e after 1 mrad\n", what, coarse, fine);
   CHECK(fine < 0.5 * 1e-3 * 1e-3);
   CHECK(coarse < 0.5 * 4e-3 * 4e-3);
@@ -650,29 +651,29 @@ static void follow_check(const thing *a, const thing *b, const char *what)
 
 TEST(points_follow_small_motions)
 {
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
-  thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.1);
-  thing corner = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.123);
-  thing rod = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.04);
-  thing pill = simple(HAPI_SHAPE_CAPSULE, 0.0, 0.0, 0.04);
-  turn(&corner, along_x, 0.6);
-  turn(&corner, along_y, 0.6);
-  turn(&rod, along_y, 1.5707963267948966);
-  turn(&pill, along_y, 1.5707963267948966);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.1);
+  thing corner = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.123);
+  thing rod = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.04);
+  thing pill = thing_simple(HAPI_SHAPE_CAPSULE, 0.0, 0.0, 0.04);
+  thing_turn(&corner, along_x, 0.6);
+  thing_turn(&corner, along_y, 0.6);
+  thing_turn(&rod, along_y, 1.5707963267948966);
+  thing_turn(&pill, along_y, 1.5707963267948966);
   follow_check(&box, &plane, "box standing on plane");
   follow_check(&corner, &plane, "corner of a box over plane");
   follow_check(&rod, &plane, "cylinder lying on plane");
   follow_check(&plane, &pill, "plane under lying capsule");
-  thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
+  thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
   follow_check(&pill, &low, "capsule over box, overhanging");
-  thing roof = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.11);
-  thing ridge = simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.107);
-  turn(&roof, along_x, 0.8);
-  turn(&ridge, along_y, 0.8);
+  thing roof = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.11);
+  thing ridge = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.107);
+  thing_turn(&roof, along_x, 0.8);
+  thing_turn(&ridge, along_y, 0.8);
   roof.pose.position[2] = 0.1112;
   follow_check(&roof, &ridge, "edge on edge");
-  thing cross = simple(HAPI_SHAPE_CYLINDER, 0.01, 0.0, -0.04);
-  turn(&cross, along_x, 1.5707963267948966);
+  thing cross = thing_simple(HAPI_SHAPE_CYLINDER, 0.01, 0.0, -0.04);
+  thing_turn(&cross, along_x, 1.5707963267948966);
   follow_check(&rod, &cross, "crossed cylinders");
   follow_check(&pill, &cross, "capsule across cylinder");
 }
@@ -680,21 +681,21 @@ TEST(points_follow_small_motions)
 /* A whole turn without a new patch: the rim keeps the gap. */
 TEST(lying_cylinder_rolls_exactly)
 {
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
-  thing rod = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.0395);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
+  thing rod = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.0395);
   hapi_patch patch;
-  turn(&rod, along_y, 1.5707963267948966);
-  REQUIRE(find(&rod, &plane, margin, &patch));
+  thing_turn(&rod, along_y, 1.5707963267948966);
+  REQUIRE(patch_find(&rod, &plane, margin, &patch));
   CHECK(patch.count == 2);
   for (int i = 0; i < 24; ++i) {
     thing rolled = rod;
     const thing *was[2] = {&rod, &plane};
     const thing *is[2] = {&rolled, &plane};
-    turn(&rolled, along_x, 0.26 * i);
+    thing_turn(&rolled, along_x, 0.26 * i);
     rolled.pose.position[1] = -0.04 * 0.26 * i;
     for (int k = 0; k < patch.count; ++k) {
       CHECK(patch.points[k].rim_a == 0.04);
-      CHECK_NEAR(evaluate(&patch.points[k], was, is), -0.0005, 1e-12);
+      CHECK_NEAR(point_evaluate(&patch.points[k], was, is), -0.0005, 1e-12);
     }
   }
 }
@@ -712,19 +713,19 @@ static int count_touch(const hapi_patch *patch, hapi_touch touch)
 
 TEST(standing_cylinder_has_four_points_and_a_leaning_one_its_rim)
 {
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
-  thing table = simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
+  thing table = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
   for (int i = 0; i < 2; ++i) {
     const thing *ground = i == 0 ? &plane : &table;
-    thing rod = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.1);
+    thing rod = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.1);
     hapi_patch patch;
-    turn(&rod, along_x, 0.01);
-    REQUIRE(find(&rod, ground, margin, &patch));
+    thing_turn(&rod, along_x, 0.01);
+    REQUIRE(patch_find(&rod, ground, margin, &patch));
     CHECK(patch.count == 4);
     CHECK_NEAR(patch.points[0].gap, 0.1 - 0.1 * cos(0.01) - 0.04 * sin(0.01), 1e-12);
     CHECK(patch.points[0].rim_a == 0.0);
-    turn(&rod, along_x, 0.09);
-    REQUIRE(find(&rod, ground, margin, &patch));
+    thing_turn(&rod, along_x, 0.09);
+    REQUIRE(patch_find(&rod, ground, margin, &patch));
     CHECK(patch.count == 1 && patch.points[0].rim_a == 0.04);
     CHECK_NEAR(patch.points[0].gap, 0.1 - 0.1 * cos(0.1) - 0.04 * sin(0.1), 1e-12);
   }
@@ -732,11 +733,11 @@ TEST(standing_cylinder_has_four_points_and_a_leaning_one_its_rim)
 
 TEST(capsule_over_a_box_face_ends_at_the_face)
 {
-  thing low = simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
-  thing pill = simple(HAPI_SHAPE_CAPSULE, 0.08, 0.0, 0.0395);
+  thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, -0.1);
+  thing pill = thing_simple(HAPI_SHAPE_CAPSULE, 0.08, 0.0, 0.0395);
   hapi_patch patch;
-  turn(&pill, along_y, 1.5707963267948966);
-  REQUIRE(find(&pill, &low, margin, &patch));
+  thing_turn(&pill, along_y, 1.5707963267948966);
+  REQUIRE(patch_find(&pill, &low, margin, &patch));
   CHECK(patch.count == 2);
   CHECK(count_touch(&patch, HAPI_TOUCH_BALL_A) == 1);
   CHECK(count_touch(&patch, HAPI_TOUCH_FACE_B) == 1);
@@ -749,16 +750,16 @@ TEST(capsule_over_a_box_face_ends_at_the_face)
 
 TEST(capsules_across_and_along_each_other)
 {
-  thing one = simple(HAPI_SHAPE_CAPSULE, 0.0795, 0.01, 0.03);
-  thing two = simple(HAPI_SHAPE_CAPSULE, 0.0, 0.0, 0.0);
+  thing one = thing_simple(HAPI_SHAPE_CAPSULE, 0.0795, 0.01, 0.03);
+  thing two = thing_simple(HAPI_SHAPE_CAPSULE, 0.0, 0.0, 0.0);
   hapi_patch patch;
   one.pose.position[1] = 0.0;
-  REQUIRE(find(&one, &two, margin, &patch));
+  REQUIRE(patch_find(&one, &two, margin, &patch));
   CHECK(patch.count == 2); /* ends of the overlap */
   CHECK(count_touch(&patch, HAPI_TOUCH_BALL_A) == 1);
   CHECK(count_touch(&patch, HAPI_TOUCH_BALL_B) == 1);
-  turn(&one, along_x, 1.0);
-  REQUIRE(find(&one, &two, margin, &patch));
+  thing_turn(&one, along_x, 1.0);
+  REQUIRE(patch_find(&one, &two, margin, &patch));
   CHECK(patch.count == 1 && patch.points[0].touch == HAPI_TOUCH_EDGES);
   CHECK_NEAR(patch.points[0].gap, -0.0005, 1e-12);
 }
@@ -766,13 +767,13 @@ TEST(capsules_across_and_along_each_other)
 /* A box on the half of a cap: the rim between its sides belongs to the overlap. */
 TEST(cap_under_a_box_has_its_rim)
 {
-  thing cap = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, -0.1);
-  thing box = simple(HAPI_SHAPE_BOX, 0.08, 0.0, 0.0995);
+  thing cap = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, -0.1);
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.08, 0.0, 0.0995);
   hapi_patch patch;
   cap.shape.radius = 0.1;
   hapi_v3_set(box.shape.half, 0.08, 0.08, 0.1);
-  turn(&box, along_y, -0.002);
-  REQUIRE(find(&box, &cap, margin, &patch));
+  thing_turn(&box, along_y, -0.002);
+  REQUIRE(patch_find(&box, &cap, margin, &patch));
   CHECK(patch.count == 4 && patch.points[0].touch == HAPI_TOUCH_FACE_B);
   double farthest = 0.0;
   for (int i = 0; i < patch.count; ++i) {
@@ -785,12 +786,12 @@ TEST(cap_under_a_box_has_its_rim)
 
 TEST(cap_on_cap_touches_in_the_overlap_of_the_discs)
 {
-  thing low = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, -0.1);
-  thing high = simple(HAPI_SHAPE_CYLINDER, 0.03, 0.0, 0.099);
+  thing low = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, -0.1);
+  thing high = thing_simple(HAPI_SHAPE_CYLINDER, 0.03, 0.0, 0.099);
   hapi_patch patch;
   polygon found = {.count = 0};
-  turn(&high, along_z, 0.4);
-  REQUIRE(find(&high, &low, margin, &patch));
+  thing_turn(&high, along_z, 0.4);
+  REQUIRE(patch_find(&high, &low, margin, &patch));
   found.count = patch.count;
   for (int i = 0; i < patch.count; ++i) {
     const double *at = patch.points[i].core_b;
@@ -810,8 +811,8 @@ TEST(triangle_carries_everything)
   static const double up[KINDS] = {0.04, 0.1, 0.04, 0.1, 0.0, 0.1};
   for (int kind = 0; kind < KINDS; ++kind) {
     for (int side = -1; side <= 1; side += 2) {
-      thing ground = simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0);
-      thing load = simple((hapi_shape_kind)kind, 0.0, 0.0, side * (up[kind] - 0.002));
+      thing ground = thing_simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0);
+      thing load = thing_simple((hapi_shape_kind)kind, 0.0, 0.0, side * (up[kind] - 0.002));
       double corners[24];
       hapi_patch patch;
       ground.shape.hull = triangle;
@@ -823,9 +824,9 @@ TEST(triangle_carries_everything)
         box_to_hull(&load, &load, corners);
       }
       if (kind == HAPI_SHAPE_CAPSULE) {
-        turn(&load, along_y, 1.5707963267948966);
+        thing_turn(&load, along_y, 1.5707963267948966);
       }
-      REQUIRE(find(&load, &ground, margin, &patch));
+      REQUIRE(patch_find(&load, &ground, margin, &patch));
       CHECK(patch.count == wanted[kind]);
       for (int k = 0; k < patch.count; ++k) {
         CHECK_NEAR(patch.points[k].normal[2], side, 1e-9);
@@ -837,13 +838,13 @@ TEST(triangle_carries_everything)
 
 TEST(no_answer)
 {
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
-  thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0);
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
   hapi_patch patch = {.count = 3};
-  CHECK(!find(&plane, &plane, margin, &patch) && patch.count == 0);
-  CHECK(!find(&box, &plane, NAN, &patch));
+  CHECK(!patch_find(&plane, &plane, margin, &patch) && patch.count == 0);
+  CHECK(!patch_find(&box, &plane, NAN, &patch));
   box.pose.position[1] = NAN;
-  CHECK(!find(&box, &plane, margin, &patch));
-  box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 5.0);
-  CHECK(find(&box, &plane, margin, &patch) && patch.count == 0);
+  CHECK(!patch_find(&box, &plane, margin, &patch));
+  box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 5.0);
+  CHECK(patch_find(&box, &plane, margin, &patch) && patch.count == 0);
 }

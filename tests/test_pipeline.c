@@ -118,7 +118,7 @@ static outcome run_seeded(rig_options *options, double seconds, unsigned long se
   return out;
 }
 
-static outcome run(rig_options *options, double seconds)
+static outcome scene_run(rig_options *options, double seconds)
 {
   return run_seeded(options, seconds, 0);
 }
@@ -145,7 +145,7 @@ TEST(every_run_of_a_scene_has_the_same_hash)
       hashes[m] = 0;
       for (int round = 0; round < 3; ++round) {
         rig_options options = options_of(scenes[i], models[m], 20.0);
-        outcome out = run(&options, 1.0);
+        outcome out = scene_run(&options, 1.0);
         CHECK(out.good && out.finite && out.stats.loop.ticks == 1000 &&
               out.stats.faults.count == 0);
         CHECK(out.stats.loop.trace_hash != 0);
@@ -168,7 +168,7 @@ TEST(a_change_in_the_last_digit_changes_the_hash)
     rig_options options = options_of("fig5", HAP_MODEL_ACCELERANCE, 20.0);
     parameters.gap += i == 0 ? 0.0 : 1e-15;
     options.parameters = &parameters;
-    outcome out = run(&options, 0.3);
+    outcome out = scene_run(&options, 0.3);
     CHECK(out.good && out.stats.loop.trace_hash != hash);
     hash = out.stats.loop.trace_hash;
   }
@@ -183,7 +183,7 @@ static outcome run_fig5(hap_model model, double stiffness)
   parameters.stiffness = stiffness;
   options.parameters = &parameters;
   options.max_force = 100.0;
-  return run(&options, 1.2);
+  return scene_run(&options, 1.2);
 }
 
 static void check_share(double value, double wanted, double share, const char *what)
@@ -244,7 +244,7 @@ TEST(a_pushed_cube_and_a_pushed_row_give_sane_forces)
   for (int i = 0; i < 2; ++i) {
     for (int m = 0; m < 3; ++m) {
       rig_options options = options_of(rows[i].scene, models[m], 50.0);
-      outcome out = run(&options, 2.0);
+      outcome out = scene_run(&options, 2.0);
       CHECK(out.good && out.finite && out.stats.faults.count == 0);
       CHECK(out.stats.loop.contact_ticks > 100);
       CHECK(out.largest_force > 1.0 && out.largest_force <= 20.0 * (1.0 + 1e-12));
@@ -323,7 +323,7 @@ static void push_with_recording(size_t index)
     rig_options options = options_of("row10", models[m], 60.0);
     options.devices[0] = spec;
     options.device_count = 1;
-    outcome out = run(&options, recordings[index].seconds);
+    outcome out = scene_run(&options, recordings[index].seconds);
     CHECK(out.good && out.finite);
     CHECK(out.stats.faults.count == 0 && out.stats.faults.states_rejected == 0);
     CHECK(out.stats.loop.contact_ticks >= 500);

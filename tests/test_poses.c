@@ -195,8 +195,8 @@ static void move_hand(stage *s, hap_pointer_id id, double x, double y)
   CHECK(hap_pointer_set_target(s->session, id, &pose, NULL) == HAP_OK);
 }
 
-/* A cube goes on at 0.5 m/s; the hand comes near it and away again every 70 ms and never touches it.
- * IMPULSE draws what the loop shows, which is a step behind. */
+/* A cube goes on at 0.5 m/s; the hand comes near it and away again every 70 ms and never touches
+ * it. IMPULSE draws what the loop shows, which is a step behind. */
 static void check_comings_and_goings(hap_model model)
 {
   uint32_t least = 9;
@@ -235,8 +235,8 @@ TEST(bodies_come_into_the_local_world_and_leave_it_without_a_jump)
   }
 }
 
-/* The same body near the hand while the model changes at every fifth step. From and to IMPULSE, which
- * is a step behind, the way of a step is made up for: once and a half as fast, or half. */
+/* The same body near the hand while the model changes at every fifth step. From and to IMPULSE,
+ * which is a step behind, the way of a step is made up for: once and a half as fast, or half. */
 TEST(a_change_of_model_does_not_show)
 {
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
@@ -301,8 +301,8 @@ TEST(bodies_are_made_and_destroyed)
   }
 }
 
-/* ... and without a word, between two steps. That it is another one shows by ODE's auto-disable, which the
- * session had switched off on the first. */
+/* ... and without a word, between two steps. That it is another one shows by ODE's auto-disable,
+ * which the session had switched off on the first. */
 TEST(a_body_made_where_another_one_was_in_memory_is_not_drawn_on_its_way)
 {
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);

@@ -81,7 +81,7 @@ static double thing_size(const thing *t)
 
 /* --- oracle --------------------------------------------------------------------------------- */
 
-static double climb(const thing *a, const thing *b, double normal[3], uint64_t *state)
+static double normal_climb(const thing *a, const thing *b, double normal[3], uint64_t *state)
 {
   double best = separation(a, b, normal);
   for (double step = 0.2; step > 1e-10; step *= 0.6) {
@@ -124,7 +124,7 @@ static double best_separation(const thing *a, const thing *b, uint64_t *state)
         hapi_v3_copy(trial, normal);
       }
     }
-    best = fmax(best, climb(a, b, normal, state));
+    best = fmax(best, normal_climb(a, b, normal, state));
   }
   return best;
 }
@@ -138,7 +138,7 @@ static void clamp_length(double v[2], double most)
 }
 
 /* Nearest point of the solid. Not for hulls. */
-static void project(const thing *t, const double world[3], double out[3])
+static void point_project(const thing *t, const double world[3], double out[3])
 {
   const hapi_shape *s = &t->shape;
   double p[3];
@@ -164,15 +164,15 @@ static void project(const thing *t, const double world[3], double out[3])
 }
 
 /* Distance by projecting to and fro: falls towards the truth from above. */
-static double alternate(const thing *a, const thing *b, int rounds)
+static double points_alternate(const thing *a, const thing *b, int rounds)
 {
   double p[3];
   double q[3];
   double gap[3];
   hapi_v3_copy(a->pose.position, p);
   for (int i = 0; i < rounds; ++i) {
-    project(b, p, q);
-    project(a, q, p);
+    point_project(b, p, q);
+    point_project(a, q, p);
   }
   hapi_v3_sub(p, q, gap);
   return hapi_v3_norm(gap);
@@ -384,7 +384,7 @@ static void project_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_
   if (n.distance < 0.3 || kind_a == HAPI_SHAPE_HULL || kind_b == HAPI_SHAPE_HULL) {
     return;
   }
-  double distance = alternate(&a, &b, 3000);
+  double distance = points_alternate(&a, &b, 3000);
   CHECK(distance >= n.distance - 1e-12);
   CHECK_NEAR(distance, n.distance, 1e-4);
   largest_projection_error = fmax(largest_projection_error, distance - n.distance);
@@ -431,7 +431,7 @@ static void move_to_gap(thing *a, const hapi_nearest *answer, double gap)
 
 /* Moving along the normal changes the distance by as much, until contact. Beyond, another normal
  * may be better, and a needle may even come out again. */
-static void approach(thing *a, const thing *b, double reach, double grain)
+static void thing_approach(thing *a, const thing *b, double reach, double grain)
 {
   static const double gaps[] = {1.0, 1e-3, 1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-3};
   hapi_nearest start;
@@ -461,7 +461,7 @@ static void approach_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64
   if (kind_a == HAPI_SHAPE_PLANE || kind_b == HAPI_SHAPE_PLANE) {
     hapi_v3_set(a.pose.position, 0.0, 0.0, 0.0);
   }
-  approach(&a, &b, 1e-2, rim_pair(kind_a, kind_b) ? 1e-6 : 1e-10);
+  thing_approach(&a, &b, 1e-2, rim_pair(kind_a, kind_b) ? 1e-6 : 1e-10);
 }
 
 TEST(distance_follows_the_approach)
@@ -477,7 +477,7 @@ static void extreme_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_
   thing_make(&b, kind_b, state, 100.0);
   random_direction(state, a.pose.position);
   hapi_v3_scale(1000.0, a.pose.position, a.pose.position);
-  approach(&a, &b, 1e-3, rim_pair(kind_a, kind_b) ? 1e-5 : 1e-6);
+  thing_approach(&a, &b, 1e-3, rim_pair(kind_a, kind_b) ? 1e-5 : 1e-6);
 }
 
 TEST(millimetre_against_hundred_metres)
@@ -578,7 +578,7 @@ TEST(coincident_frames)
 
 /* --- single cases --------------------------------------------------------------------------- */
 
-static thing simple(hapi_shape_kind kind, double radius, double x, double y, double z)
+static thing thing_simple(hapi_shape_kind kind, double radius, double x, double y, double z)
 {
   thing t;
   memset(&t, 0, sizeof t);
@@ -587,7 +587,7 @@ static thing simple(hapi_shape_kind kind, double radius, double x, double y, dou
   return t;
 }
 
-static void expect(const thing *a, const thing *b, double distance, int axis)
+static void touch_expect(const thing *a, const thing *b, double distance, int axis)
 {
   hapi_nearest n;
   REQUIRE(nearest(a, b, &n));
@@ -599,59 +599,59 @@ static void expect(const thing *a, const thing *b, double distance, int axis)
 
 TEST(centre_of_sphere_on_surface_axis_and_centre)
 {
-  thing ball = simple(HAPI_SHAPE_SPHERE, 0.1, 0.0, 0.0, 0.0);
-  thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.3, 0.0, 0.0);
-  thing capsule = simple(HAPI_SHAPE_CAPSULE, 0.2, 0.0, 0.0, 0.1);
-  thing tube = simple(HAPI_SHAPE_CYLINDER, 0.2, 0.0, 0.0, 0.5);
-  thing other = simple(HAPI_SHAPE_SPHERE, 0.2, 0.0, 0.0, 0.0);
-  thing floor = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0, 0.0);
-  expect(&ball, &box, -0.1, 0);
-  expect(&ball, &capsule, -0.3, -1);
-  expect(&ball, &tube, -0.1, 2);
-  expect(&ball, &other, -0.3, -1);
-  expect(&ball, &floor, -0.1, 2);
+  thing ball = thing_simple(HAPI_SHAPE_SPHERE, 0.1, 0.0, 0.0, 0.0);
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.3, 0.0, 0.0);
+  thing capsule = thing_simple(HAPI_SHAPE_CAPSULE, 0.2, 0.0, 0.0, 0.1);
+  thing tube = thing_simple(HAPI_SHAPE_CYLINDER, 0.2, 0.0, 0.0, 0.5);
+  thing other = thing_simple(HAPI_SHAPE_SPHERE, 0.2, 0.0, 0.0, 0.0);
+  thing floor = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0, 0.0);
+  touch_expect(&ball, &box, -0.1, 0);
+  touch_expect(&ball, &capsule, -0.3, -1);
+  touch_expect(&ball, &tube, -0.1, 2);
+  touch_expect(&ball, &other, -0.3, -1);
+  touch_expect(&ball, &floor, -0.1, 2);
   box.pose.position[0] = 0.0;
   tube.pose.position[2] = 0.0;
   capsule.pose.position[2] = 0.5; /* the end of the segment */
-  expect(&ball, &box, -0.4, 0);
-  expect(&ball, &tube, -0.3, -1);
-  expect(&ball, &capsule, -0.3, -1);
+  touch_expect(&ball, &box, -0.4, 0);
+  touch_expect(&ball, &tube, -0.3, -1);
+  touch_expect(&ball, &capsule, -0.3, -1);
   tube.pose.position[0] = 0.2;
-  expect(&ball, &tube, -0.1, 0);
+  touch_expect(&ball, &tube, -0.1, 0);
   ball.pose.position[0] = 1e-200; /* a hair off the centre */
-  expect(&ball, &other, -0.3, 0);
+  touch_expect(&ball, &other, -0.3, 0);
 }
 
 TEST(parallel_boxes)
 {
-  thing a = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
-  thing b = simple(HAPI_SHAPE_BOX, 0.0, 0.1, 0.1, 1.0);
-  expect(&a, &b, 0.0, 2);
+  thing a = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
+  thing b = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.1, 0.1, 1.0);
+  touch_expect(&a, &b, 0.0, 2);
   b.pose.position[2] = 1.25;
-  expect(&a, &b, 0.25, 2);
+  touch_expect(&a, &b, 0.25, 2);
   b.pose.position[2] = 0.9;
-  expect(&a, &b, -0.1, 2);
+  touch_expect(&a, &b, -0.1, 2);
   hapi_v3_set(b.pose.position, 0.6, 0.8, 1.0); /* corner to corner */
-  expect(&a, &b, 0.0, -1);
+  touch_expect(&a, &b, 0.0, -1);
   hapi_v3_set(b.pose.position, 0.0, 0.0, 0.0);
-  expect(&a, &b, -0.6, 0);
+  touch_expect(&a, &b, -0.6, 0);
 }
 
 TEST(capsules_on_one_axis_and_crossed)
 {
-  thing a = simple(HAPI_SHAPE_CAPSULE, 0.1, 0.0, 0.0, 0.0);
-  thing b = simple(HAPI_SHAPE_CAPSULE, 0.2, 0.0, 0.0, 0.7);
-  expect(&a, &b, -0.3, -1);
+  thing a = thing_simple(HAPI_SHAPE_CAPSULE, 0.1, 0.0, 0.0, 0.0);
+  thing b = thing_simple(HAPI_SHAPE_CAPSULE, 0.2, 0.0, 0.0, 0.7);
+  touch_expect(&a, &b, -0.3, -1);
   b.pose.position[2] = 1.5;
-  expect(&a, &b, 0.2, 2);
+  touch_expect(&a, &b, 0.2, 2);
   hapi_v3_set(b.pose.position, 0.1, 0.0, 0.0);
-  expect(&a, &b, -0.2, 0);
+  touch_expect(&a, &b, -0.2, 0);
   hapi_v3_set(b.pose.position, 0.0, 0.0, 0.0);
   b.pose.quat_wxyz[0] = b.pose.quat_wxyz[1] = sqrt(0.5);
-  expect(&a, &b, -0.3, 0);
+  touch_expect(&a, &b, -0.3, 0);
 }
 
-static bool refused(const thing *a, const thing *b)
+static bool touch_refused(const thing *a, const thing *b)
 {
   hapi_nearest n;
   memset(&n, 0x5a, sizeof n);
@@ -662,40 +662,40 @@ static bool refused(const thing *a, const thing *b)
 
 TEST(no_answer)
 {
-  thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
-  thing plane = simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0, 0.0);
-  thing hull = simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0, 0.0);
-  CHECK(!refused(&box, &box));
-  CHECK(refused(&plane, &plane));
-  CHECK(refused(&hull, &box) && refused(&box, &hull));
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
+  thing plane = thing_simple(HAPI_SHAPE_PLANE, 0.0, 0.0, 0.0, 0.0);
+  thing hull = thing_simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0, 0.0);
+  CHECK(!touch_refused(&box, &box));
+  CHECK(touch_refused(&plane, &plane));
+  CHECK(touch_refused(&hull, &box) && touch_refused(&box, &hull));
   hull.shape.hull = hull.points;
-  CHECK(refused(&hull, &box));
+  CHECK(touch_refused(&hull, &box));
   hull.shape.hull_count = 1;
-  CHECK(!refused(&hull, &box));
+  CHECK(!touch_refused(&hull, &box));
   hull.points[1] = NAN;
-  CHECK(refused(&hull, &box));
+  CHECK(touch_refused(&hull, &box));
   thing bad = box;
   bad.pose.position[1] = NAN;
-  CHECK(refused(&bad, &box) && refused(&box, &bad));
+  CHECK(touch_refused(&bad, &box) && touch_refused(&box, &bad));
   bad = box;
   bad.pose.quat_wxyz[2] = INFINITY;
-  CHECK(refused(&bad, &plane) && refused(&plane, &bad));
+  CHECK(touch_refused(&bad, &plane) && touch_refused(&plane, &bad));
   bad = box;
   bad.pose.position[0] = 1e31;
-  CHECK(refused(&bad, &box) && refused(&plane, &bad));
+  CHECK(touch_refused(&bad, &box) && touch_refused(&plane, &bad));
   bad.pose.position[0] = 1e29;
-  CHECK(!refused(&bad, &plane));
+  CHECK(!touch_refused(&bad, &plane));
   bad = box;
   bad.shape.half[0] = -0.1;
-  CHECK(refused(&bad, &box));
+  CHECK(touch_refused(&bad, &box));
 }
 
 TEST(points_and_plates)
 {
-  thing box = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
-  thing speck = simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0, 0.5);
-  thing plate = simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.45);
-  thing rod = simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.0, 0.0);
+  thing box = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.0);
+  thing speck = thing_simple(HAPI_SHAPE_HULL, 0.0, 0.0, 0.0, 0.5);
+  thing plate = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0, 0.45);
+  thing rod = thing_simple(HAPI_SHAPE_CYLINDER, 0.0, 0.0, 0.0, 0.0);
   hapi_nearest n;
   speck.shape.hull = speck.points;
   speck.shape.hull_count = 1;
@@ -704,7 +704,7 @@ TEST(points_and_plates)
   CHECK_NEAR(n.distance, 0.0, 1e-14);
   REQUIRE(nearest(&speck, &speck, &n));
   CHECK_NEAR(n.distance, 0.0, 1e-14);
-  expect(&plate, &box, -0.05, 2);
-  expect(&rod, &box, -0.3, 0);
-  expect(&plate, &rod, -0.05, 2);
+  touch_expect(&plate, &box, -0.05, 2);
+  touch_expect(&rod, &box, -0.3, 0);
+  touch_expect(&plate, &rod, -0.05, 2);
 }

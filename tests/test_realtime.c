@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The running haptic thread, seen by the kernel: in 10,000 ticks in contact it touches no memory for the
- * first time and waits for nothing but its next tick. Its symbols: lint/rt_symbols.py; allocations and
- * locks: test_rtsan.c. */
+/* The running haptic thread, seen by the kernel: in 10,000 ticks in contact it touches no memory
+ * for the first time and waits for nothing but its next tick. Its symbols: lint/rt_symbols.py;
+ * allocations and locks: test_rtsan.c. */
 
 #include "tests/tap.h"
 
@@ -44,7 +44,7 @@ static bool wait_for_ticks(uint64_t ticks)
   return stats_now().loop.ticks >= ticks;
 }
 
-static bool begin(const char *scene_name, hap_model model)
+static bool rig_begin(const char *scene_name, hap_model model)
 {
   rig_options options;
   hap_detail detail = {0};
@@ -65,7 +65,7 @@ static void ticks_are_quiet(const char *scene_name, hap_model model)
 {
   thread_counts before;
   thread_counts after;
-  if (!begin(scene_name, model)) {
+  if (!rig_begin(scene_name, model)) {
     return;
   }
   int thread = thread_find("hapode-haptic");

@@ -11,7 +11,7 @@
 #define EDGE 0.05
 #define RADIUS 0.01
 
-static void forward(test_world *w, int ticks)
+static void world_forward(test_world *w, int ticks)
 {
   CHECK(hap_session_advance(w->session, (uint64_t)ticks) >= HAP_OK);
 }
@@ -36,7 +36,7 @@ static void push_along(test_world *w, double *x, double speed, int ticks)
   for (int i = 0; i < ticks; ++i) {
     *x += 1e-3 * speed;
     world_move_pointer(w, 0, (const double[3]){*x, 0, 0}, (const double[3]){speed, 0, 0});
-    forward(w, 1);
+    world_forward(w, 1);
   }
 }
 
@@ -56,7 +56,7 @@ static void check_fig5(double stiffness)
   REQUIRE(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
   world_move_pointer(w, 0, (const double[3]){0, 0, 0}, NULL);
   REQUIRE(hap_session_start(w->session) == HAP_OK);
-  forward(w, 2001);
+  world_forward(w, 2001);
   hap_stats stats = world_stats(w);
   printf("# k %g: impulse %.6f, ratio %.12f, peak %.4f\n", stiffness, stats.hand.impulse_ns,
          stats.hand.momentum_ratio, stats.hand.peak_force_n);
@@ -148,13 +148,13 @@ static void check_moved(bool posted)
     move_body(&edit);
     CHECK(hap_session_unlock(w->session) == HAP_OK);
   }
-  forward(w, 21); /* over the next step at tick 150 */
+  world_forward(w, 21); /* over the next step at tick 150 */
   CHECK_NEAR(dBodyGetPosition(cube)[0], 0.4, 0.3 * 0.05);
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.3, 1e-3);
   CHECK_NEAR(dBodyGetPosition(cube)[2], 0.2, 1e-3);
   world_move_pointer(w, 0, (const double[3]){-1, 0, 0}, NULL);
   double before = dBodyGetPosition(cube)[0];
-  forward(w, 100);
+  world_forward(w, 100);
   CHECK_NEAR(dBodyGetPosition(cube)[1], 0.3, 1e-3);
   CHECK(dBodyGetLinearVel(cube)[0] >= speed - 1e-9 && dBodyGetLinearVel(cube)[0] < 0.3);
   CHECK_NEAR(dBodyGetPosition(cube)[0], before + 0.1 * dBodyGetLinearVel(cube)[0], 1e-3);
@@ -212,10 +212,10 @@ TEST(a_body_added_near_the_pointer_is_felt)
 {
   test_world *w = world_new(0.0, 20);
   REQUIRE(world_start(w, RADIUS, 0, 0, 0));
-  forward(w, 120);
+  world_forward(w, 120);
   CHECK(world_stats(w).model.bodies_known == 0);
   dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2 + RADIUS + 0.001, 0, 0);
-  forward(w, 31);
+  world_forward(w, 31);
   CHECK(world_stats(w).model.bodies_known == 1);
   CHECK(world_contact(w, cube, 0) != NULL);
   double x = 0.0;
@@ -255,7 +255,7 @@ static void check_destroyed(bool forget)
   CHECK(hap_session_lock(w->session) == HAP_OK);
   destroy_first(w, forget);
   CHECK(hap_session_unlock(w->session) == HAP_OK);
-  forward(w, 200);
+  world_forward(w, 200);
   hap_stats stats = world_stats(w);
   CHECK(stats.faults.bodies_lost == (forget ? 0u : 1u));
   CHECK(stats.model.bodies_known == 1);
@@ -333,7 +333,7 @@ TEST(a_body_in_place_of_a_destroyed_one_is_a_new_body)
   printf("# address %s\n", next == cube ? "used again" : "not used again");
   dBodySetAutoDisableFlag(next, 1);
   world_move_pointer(w, 0, (const double[3]){-1, 0, 0}, NULL);
-  forward(w, 121);
+  world_forward(w, 121);
   CHECK(dBodyGetPosition(next)[0] == EDGE / 2 && dBodyGetPosition(next)[1] == 1.0);
   CHECK(hapi_v3_norm(dBodyGetLinearVel(next)) == 0.0);
   CHECK(dBodyGetAutoDisableFlag(next) == 0); /* taken over like any other's */
@@ -358,7 +358,7 @@ static void break_force(void *arg)
   dBodyAddForce(arg, 0.0, 0.0, (double)NAN);
 }
 
-static void mend(dBodyID body)
+static void body_mend(dBodyID body)
 {
   dBodySetPosition(body, EDGE / 2, 0, 0);
   dBodySetLinearVel(body, 0, 0, 0);
@@ -377,23 +377,23 @@ static void check_broken(hap_edit_fn edit)
   dBodySetLinearVel(witness, 0.1, 0, 0);
   push_along(w, &x, 0.1, 130);
   CHECK(hap_session_post(w->session, edit, cube) == HAP_OK);
-  forward(w, 21);
+  world_forward(w, 21);
   double stopped = dBodyGetPosition(witness)[0];
-  forward(w, 100);
+  world_forward(w, 100);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   CHECK(world_stats(w).faults.count == 1);
   CHECK(dBodyGetPosition(witness)[0] == stopped); /* not stepped */
   CHECK(hapi_finite(dBodyGetLinearVel(cube), 3)); /* none of the three is in it yet */
   CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
   CHECK(strstr(detail.text, "not finite") != NULL);
-  mend(cube);
+  body_mend(cube);
   x = -RADIUS - 0.002;
   world_move_pointer(w, 0, (const double[3]){x, 0, 0}, NULL);
-  forward(w, 100);
+  world_forward(w, 100);
   CHECK(fault_of(w) == HAP_FAULT_WORLD); /* stays until it is reset */
   CHECK(dBodyGetPosition(witness)[0] > stopped);
   CHECK(hap_session_reset_fault(w->session) == HAP_OK);
-  forward(w, 51);
+  world_forward(w, 51);
   CHECK(fault_of(w) == HAP_FAULT_NONE);
   uint64_t touched = world_stats(w).loop.contact_ticks;
   push_along(w, &x, 0.1, 130);
@@ -414,10 +414,10 @@ TEST(a_fault_comes_back_while_the_world_is_broken)
   test_world *w = open_cube();
   dBodyID cube = w->bodies[0];
   CHECK(hap_session_post(w->session, break_position, cube) == HAP_OK);
-  forward(w, 101);
+  world_forward(w, 101);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   CHECK(hap_session_reset_fault(w->session) == HAP_OK);
-  forward(w, 101);
+  world_forward(w, 101);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
 }
 
@@ -439,7 +439,7 @@ TEST(a_body_broken_in_after_step_is_not_probed)
   dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
   world_add_cube(w, EDGE, 1.0, 1.5 * EDGE - 1e-6, 0, 0);
   REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
-  forward(w, 201);
+  world_forward(w, 201);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   const hapi_contact_slot *contact = world_contact(w, cube, 0);
   CHECK(contact == NULL || hapi_finite(&world_contact_answer(w, contact)->a[0][0], 18));
@@ -461,7 +461,7 @@ TEST(a_body_broken_in_before_step_is_not_stepped)
   w->before_step = break_before;
   world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
   REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
-  forward(w, 201);
+  world_forward(w, 201);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   CHECK(hapi_finite(dBodyGetAngularVel(w->bodies[0]), 3));
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Threaded sessions are recorded, and replayed in lockstep bit for bit. What is wrong with a file is
- * in test_record_file.c. */
+/* Threaded sessions are recorded, and replayed in lockstep bit for bit. What is wrong with a
+ * file is in test_record_file.c. */
 
 #include "tests/tap.h"
 
@@ -400,7 +400,8 @@ static dBodyID add_ball(small_world *w, double mass, double x)
   return ball;
 }
 
-/* A ball between the hands and the cube is exchanged for another one, which often gets its address. */
+/* A ball between the hands and the cube is exchanged for another one, which often gets its
+ * address. */
 static void exchange_balls(void *user, double step_s)
 {
   small_world *w = user;
@@ -480,7 +481,7 @@ TEST(changes_of_model)
 
 static hap_pointer_id guest;
 
-static void trouble(rig *r, int look)
+static void make_trouble(rig *r, int look)
 {
   static atomic_int *const troubles[] = {&hand.fail_read, &hand.fail_write, &hand.bad_pose};
   hap_pose pose = {{0.5, 0.0, 0.025}, {1.0, 0.0, 0.0, 0.0}};
@@ -514,7 +515,7 @@ TEST(a_device_with_troubles_and_pointers_that_come_and_go)
   rig r;
   recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 1100);
   s.devices[0] = "virtual:path=0:0/0.2/0.025"; /* elsewhere */
-  s.meanwhile = trouble;
+  s.meanwhile = make_trouble;
   REQUIRE(recorded_create(&s, &r));
   hap_pointer_id id = add_hand(&r);
   guest.v = 0;

@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A dial that the application and the clock turn while a session is recorded: a replay turns it likewise. */
+/* A dial that the application and the clock turn while a session is recorded: a replay turns it
+ * likewise. */
 
 #include "tests/tap.h"
 

@@ -48,7 +48,7 @@ static bool read_raw(void)
   return raw_size > sizeof(hapi_file_head) && raw_size < sizeof raw;
 }
 
-static bool unpack(file *f)
+static bool file_unpack(file *f)
 {
   memset(f, 0, sizeof *f);
   memcpy(&f->head, raw, sizeof f->head);
@@ -69,7 +69,7 @@ static bool unpack(file *f)
 }
 
 /* With right sums, whatever is in it. */
-static void pack(file *f)
+static void file_pack(file *f)
 {
   size_t at = sizeof f->head;
   f->head.crc = hapi_file_crc_head(&f->head);
@@ -85,7 +85,7 @@ static void pack(file *f)
   write_raw(at);
 }
 
-static void release(file *f)
+static void file_release(file *f)
 {
   for (uint32_t i = 0; i < f->count; ++i) {
     free(f->blocks[i].bytes);
@@ -109,13 +109,13 @@ static hapi_cell *find_cell(file *f, uint64_t tick, hapi_cell_kind kind)
   return NULL;
 }
 
-static file fresh(const char *scene_name, int ms)
+static file file_fresh(const char *scene_name, int ms)
 {
   file f = {.count = 0};
   recorded_setup s = recorded_setup_of(scene_name, HAP_MODEL_CONTACT, ms);
   s.ticks = (uint64_t)ms;
   (void)recorded_make(&s);
-  CHECK(read_raw() && unpack(&f));
+  CHECK(read_raw() && file_unpack(&f));
   return f;
 }
 
@@ -123,12 +123,12 @@ static file fresh(const char *scene_name, int ms)
 
 static void check_ulp(hapi_cell_kind kind, int place)
 {
-  file f = fresh("row10", 600);
+  file f = file_fresh("row10", 600);
   hapi_cell *cell = find_cell(&f, 321, kind);
   REQUIRE(cell != NULL);
   cell->d[place] = nextafter(cell->d[place], 1e9);
-  pack(&f);
-  release(&f);
+  file_pack(&f);
+  file_release(&f);
   replay again = recorded_play("row10", 0);
   printf("# %s\n", again.difference.text);
   CHECK(again.status == HAP_END && again.diverged_after == 322);
@@ -159,13 +159,13 @@ static uint64_t first_push(file *f)
 
 TEST(a_position_off_by_a_millimetre_is_told_with_its_force)
 {
-  file f = fresh("row10", 900);
+  file f = file_fresh("row10", 900);
   uint64_t tick = first_push(&f);
   hapi_cell *cell = find_cell(&f, tick, HAPI_CELL_POSE);
   REQUIRE(cell != NULL);
   cell->d[0] += 1e-3;
-  pack(&f);
-  release(&f);
+  file_pack(&f);
+  file_release(&f);
   replay again = recorded_play("row10", 0);
   printf("# %s\n", again.difference.text);
   CHECK(again.difference.tick == tick && again.difference.shown == HAP_DIFFERENCE_POINTER);
@@ -181,12 +181,12 @@ TEST(a_position_off_by_a_millimetre_is_told_with_its_force)
 
 TEST(a_body_elsewhere_is_told_with_its_distance)
 {
-  file f = fresh("row10", 900);
+  file f = file_fresh("row10", 900);
   hapi_cell *cell = find_cell(&f, 444, HAPI_CELL_BODY);
   REQUIRE(cell != NULL);
   cell->d[1] += 2e-6;
-  pack(&f);
-  release(&f);
+  file_pack(&f);
+  file_release(&f);
   replay again = recorded_play("row10", 0);
   printf("# %s\n", again.difference.text);
   CHECK(again.difference.what == HAP_DIFFERENCE_BODY && again.difference.tick == 444);
@@ -216,12 +216,12 @@ TEST(what_physics_and_passes_make_is_compared)
   static const int places[] = {HAPI_CYCLED_HASH, HAPI_PASS_HASH};
   static const hap_difference what[] = {HAP_DIFFERENCE_STEP, HAP_DIFFERENCE_PASS};
   for (int i = 0; i < 2; ++i) {
-    file f = fresh("stack", 400);
+    file f = file_fresh("stack", 400);
     hapi_cell *cell = find_physics(&f, kinds[i], 9);
     REQUIRE(cell != NULL);
     cell->u[places[i]] ^= 1;
-    pack(&f);
-    release(&f);
+    file_pack(&f);
+    file_release(&f);
     replay again = recorded_play("stack", 0);
     printf("# %s\n", again.difference.text);
     CHECK(again.status == HAP_END && again.difference.what == (uint32_t)what[i]);
@@ -233,12 +233,12 @@ TEST(what_physics_and_passes_make_is_compared)
 /* A pass that had another set of poses than in truth: taken at another time. */
 TEST(a_message_taken_at_another_time_is_noticed)
 {
-  file f = fresh("row10", 900);
+  file f = file_fresh("row10", 900);
   hapi_cell *cell = find_physics(&f, HAPI_CELL_CYCLE, 30);
   REQUIRE(cell != NULL && cell->u[HAPI_CYCLE_STATE] > 1);
   --cell->u[HAPI_CYCLE_STATE];
-  pack(&f);
-  release(&f);
+  file_pack(&f);
+  file_release(&f);
   replay again = recorded_play("row10", 0);
   printf("# %s\n", again.difference.text);
   CHECK(again.difference.what == HAP_DIFFERENCE_STEP && again.difference.number == 32);
@@ -296,11 +296,11 @@ static void no_pointer(file *f)
 
 static void check_contradiction(spoil_fn spoil, bool may_end)
 {
-  file f = fresh("stack", 300);
+  file f = file_fresh("stack", 300);
   REQUIRE(find_cell(&f, 20, HAPI_CELL_TICK) != NULL);
   spoil(&f);
-  pack(&f);
-  release(&f);
+  file_pack(&f);
+  file_release(&f);
   replay again = recorded_play("stack", 0);
   bool ended = may_end && again.status == HAP_END && again.stats.loop.ticks < 100;
   CHECK(again.status == HAP_ERROR_FORMAT || ended);
@@ -334,8 +334,8 @@ static hap_status try_open(uint32_t flags, hap_detail *detail)
 TEST(cut_at_every_100th_byte)
 {
   hap_detail detail;
-  file f = fresh("row10", 300);
-  release(&f);
+  file f = file_fresh("row10", 300);
+  file_release(&f);
   size_t playable = 0;
   for (size_t size = 0; size < raw_size; size += 100) {
     write_raw(size);
@@ -358,8 +358,8 @@ TEST(cut_at_every_100th_byte)
 TEST(every_changed_byte_is_noticed)
 {
   hap_detail detail;
-  file f = fresh("fig5", 200);
-  release(&f);
+  file f = file_fresh("fig5", 200);
+  file_release(&f);
   for (size_t at = 0; at < raw_size; at += at < 500 ? 1 : 97) {
     raw[at] = (char)(raw[at] ^ 0x10);
     write_raw(raw_size);
@@ -375,14 +375,14 @@ TEST(every_changed_byte_is_noticed)
 TEST(blocks_in_another_order_are_noticed)
 {
   hap_detail detail;
-  file f = fresh("fig5", 600);
+  file f = file_fresh("fig5", 600);
   block kept = f.blocks[2];
   f.blocks[2] = f.blocks[3];
   f.blocks[3] = kept;
-  pack(&f);
+  file_pack(&f);
   CHECK(try_open(0, &detail) == HAP_ERROR_FORMAT &&
         strstr(detail.text, "missing or twice") != NULL);
-  release(&f);
+  file_release(&f);
 }
 
 /* ---- the recorder by itself ---- */
@@ -460,7 +460,7 @@ TEST(a_ring_that_is_full_ends_the_recording)
 static hap_status open_changed(file *f, const char *says)
 {
   hap_detail detail;
-  pack(f);
+  file_pack(f);
   hap_status status = try_open(0, &detail);
   if (strstr(detail.text, says) == NULL) {
     printf("# \"%s\" does not say \"%s\"\n", detail.text, says);
@@ -471,7 +471,7 @@ static hap_status open_changed(file *f, const char *says)
 
 TEST(another_machine_version_or_library_is_told)
 {
-  file f = fresh("fig5", 100);
+  file f = file_fresh("fig5", 100);
   hapi_file_info *info = (hapi_file_info *)(void *)f.blocks[0].bytes;
   f.head.byte_order = 0x04030201u;
   CHECK(open_changed(&f, "other byte order") == HAP_ERROR_UNSUPPORTED);
@@ -490,20 +490,20 @@ TEST(another_machine_version_or_library_is_told)
   CHECK(open_changed(&f, "an ODE of configuration") == HAP_ERROR_UNSUPPORTED);
   memset(info->build.ode, 'x', sizeof info->build.ode);
   CHECK(open_changed(&f, "in a form that there is not") == HAP_ERROR_FORMAT);
-  release(&f);
+  file_release(&f);
 }
 
 /* What it has not is as it was before there was a choice. */
 TEST(a_file_of_before_plays)
 {
-  file f = fresh("row10", 300);
+  file f = file_fresh("row10", 300);
   block *b = &f.blocks[0];
   uint32_t more = (uint32_t)(sizeof(hapi_file_info) - HAPI_FILE_INFO_LEAST);
   b->head.size -= more;
   char *bytes = (char *)b->bytes;
   memmove(bytes + HAPI_FILE_INFO_LEAST, bytes + sizeof(hapi_file_info),
           b->head.size - HAPI_FILE_INFO_LEAST);
-  pack(&f);
+  file_pack(&f);
   replay again = recorded_play("row10", 0);
   hap_player *player = NULL;
   hap_session_def def;
@@ -517,20 +517,20 @@ TEST(a_file_of_before_plays)
   hap_player_close(player);
   b->head.size = HAPI_FILE_INFO_LEAST - 4;
   CHECK(open_changed(&f, "what was recorded") == HAP_ERROR_FORMAT);
-  release(&f);
+  file_release(&f);
 }
 
 TEST(another_scene_is_told)
 {
-  file f = fresh("row10", 200);
-  release(&f);
+  file f = file_fresh("row10", 200);
+  file_release(&f);
   replay again = recorded_play("stack", 0);
   CHECK(again.status == HAP_ERROR_WORLD && again.stats.loop.ticks == 0);
   CHECK(strstr(again.detail.text, "it had 10 bodies with 11 geoms") != NULL);
   again = recorded_play("row10:9", 0);
   CHECK(again.status == HAP_ERROR_WORLD);
-  f = fresh("fig5", 200);
-  release(&f);
+  f = file_fresh("fig5", 200);
+  file_release(&f);
   again = recorded_play("fig6", 0); /* one cube as well */
   CHECK(again.status == HAP_ERROR_WORLD);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Lockstep has the same bits in every run, whatever addresses ODE's heap gives to what the application
- * makes in place of what it destroyed. */
+/* Lockstep has the same bits in every run, whatever addresses ODE's heap gives to what the
+ * application makes in place of what it destroyed. */
 
 #include "tests/tap.h"
 
@@ -115,7 +115,7 @@ static void replace_convex(scene *s)
   add_convex(s, (s->edits + 1) % 2);
 }
 
-static void hinge(scene *s, dBodyID other)
+static void hinge_make(scene *s, dBodyID other)
 {
   const dReal *at = dBodyGetPosition(s->w.bodies[0]);
   dJointID joint = dJointCreateHinge(s->w.world, NULL);
@@ -127,7 +127,7 @@ static void hinge(scene *s, dBodyID other)
 
 static void begin_hinge(scene *s)
 {
-  hinge(s, s->w.bodies[1]);
+  hinge_make(s, s->w.bodies[1]);
 }
 
 static void drop_joints(scene *s)
@@ -140,11 +140,11 @@ static void drop_joints(scene *s)
 static void replace_hinge(scene *s)
 {
   drop_joints(s);
-  hinge(s, s->w.bodies[1]);
+  hinge_make(s, s->w.bodies[1]);
 }
 
 /* Two of the same kind between the same bodies, which change addresses. */
-static void balls(scene *s)
+static void balls_make(scene *s)
 {
   const dReal *at = dBodyGetPosition(s->w.bodies[0]);
   for (int i = 0; i < 2; ++i) {
@@ -164,10 +164,10 @@ static void replace_balls(scene *s)
     dJointDestroy(s->joints[1]);
     s->joint_count = 0;
   }
-  balls(s);
+  balls_make(s);
 }
 
-static void fix(scene *s)
+static void fixed_make(scene *s)
 {
   dJointID joint = dJointCreateFixed(s->w.world, NULL);
   dJointAttach(joint, s->w.bodies[0], s->w.bodies[1]);
@@ -178,11 +178,11 @@ static void fix(scene *s)
 static void replace_fixed(scene *s)
 {
   drop_joints(s);
-  fix(s);
+  fixed_make(s);
 }
 
 /* One that the loop has to measure; along another axis each time. */
-static void slide(scene *s)
+static void slider_make(scene *s)
 {
   const dReal *at = dBodyGetPosition(s->w.bodies[0]);
   dJointID joint = dJointCreatePiston(s->w.world, NULL);
@@ -195,7 +195,7 @@ static void slide(scene *s)
 static void replace_slide(scene *s)
 {
   drop_joints(s);
-  slide(s);
+  slider_make(s);
 }
 
 static void replace_body_on_hinge(scene *s)
@@ -206,7 +206,7 @@ static void replace_body_on_hinge(scene *s)
   drop_geom(s, s->geoms[1]);
   dBodyDestroy(s->w.bodies[1]);
   add_cube(s, 1, x);
-  hinge(s, s->w.bodies[1]);
+  hinge_make(s, s->w.bodies[1]);
 }
 
 /* ---- a run ---- */
@@ -263,9 +263,9 @@ TEST(what_is_replaced)
       {"a convex geom", begin_convex, replace_convex},
       {"a static geom", NULL, replace_slab},
       {"a joint", begin_hinge, replace_hinge},
-      {"two joints of the same bodies", balls, replace_balls},
-      {"a fixed joint", fix, replace_fixed},
-      {"a joint that is measured", slide, replace_slide},
+      {"two joints of the same bodies", balls_make, replace_balls},
+      {"a fixed joint", fixed_make, replace_fixed},
+      {"a joint that is measured", slider_make, replace_slide},
       {"a body and its joint", begin_hinge, replace_body_on_hinge},
       {"a geom at a tool", NULL, replace_geom, .tool = true},
       {"a geom at a tool, by its like", NULL, replace_geom_by_its_like, .tool = true},

@@ -250,7 +250,7 @@ TEST(sine_comes_back_smooth)
   rig_close(&r);
 }
 
-static double hash01(uint32_t *state)
+static double random_share(uint32_t *state)
 {
   *state = *state * 1664525u + 1013904223u;
   return (double)(*state >> 8) / 16777216.0;
@@ -268,7 +268,7 @@ static void write_turning(int rows, bool signs)
   fputs("t,x,y,z,qw,qx,qy,qz\n", file);
   for (int i = 0; i < rows; ++i) {
     double half = 0.5 * (3.0 * t + sin(5.0 * t));
-    double sign = signs && hash01(&state) < 0.5 ? -1.0 : 1.0;
+    double sign = signs && random_share(&state) < 0.5 ? -1.0 : 1.0;
     fprintf(file, "%.9f,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", t, sin(9.0 * t), cos(4.0 * t),
             t * t, sign * cos(half), sign * sin(half) * 0.6, 0.0, sign * sin(half) * 0.8);
     t += 0.005 + 0.01 * (i % 3) / 2.0;
@@ -550,17 +550,18 @@ TEST(random_damage_never_crashes)
   int opened = 0;
   for (int trial = 0; trial < 4000; ++trial) {
     memcpy(damaged, text, size);
-    for (int n = 1 + (int)(hash01(&state) * 3.0); n > 0; --n) {
-      size_t at = (size_t)(hash01(&state) * (double)size);
-      if (hash01(&state) < 0.7) {
-        damaged[at] = likely[(size_t)(hash01(&state) * (double)(sizeof likely - 1))];
+    for (int n = 1 + (int)(random_share(&state) * 3.0); n > 0; --n) {
+      size_t at = (size_t)(random_share(&state) * (double)size);
+      if (random_share(&state) < 0.7) {
+        damaged[at] = likely[(size_t)(random_share(&state) * (double)(sizeof likely - 1))];
       } else {
-        unsigned char any = (unsigned char)(hash01(&state) * 256.0);
+        unsigned char any = (unsigned char)(random_share(&state) * 256.0);
         memcpy(&damaged[at], &any, 1);
       }
     }
-    file_write_bytes(motion_path, damaged,
-                     hash01(&state) < 0.1 ? (size_t)(hash01(&state) * (double)size) : size);
+    file_write_bytes(
+        motion_path, damaged,
+        random_share(&state) < 0.1 ? (size_t)(random_share(&state) * (double)size) : size);
     rig r;
     hap_status status = rig_open(&r, motion_path, "");
     CHECK(status == HAP_OK || status == HAP_ERROR_FORMAT);

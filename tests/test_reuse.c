@@ -38,7 +38,7 @@ static bool stack_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *
   return !s->apart || (a != s->floor && b != s->floor);
 }
 
-static bool begin(stack *s, double reuse, hap_probe probe)
+static bool stack_begin(stack *s, double reuse, hap_probe probe)
 {
   memset(s, 0, sizeof *s);
   cw_open(&s->w, CW_GRAVITY);
@@ -55,7 +55,7 @@ static bool begin(stack *s, double reuse, hap_probe probe)
   return true;
 }
 
-static bool start(stack *s)
+static bool stack_start(stack *s)
 {
   double radius = s->w.hand_def.radius;
   bool good = cw_start(&s->w, -0.5 * EDGE - radius, 0.0, 1.5 * EDGE - 2.0 * OVERLAP);
@@ -78,9 +78,9 @@ static void check_rest(hap_probe probe)
 {
   stack s;
   stack reference;
-  begin(&s, 1e-6, probe);
-  begin(&reference, 0.0, probe);
-  REQUIRE(start(&s) && start(&reference));
+  stack_begin(&s, 1e-6, probe);
+  stack_begin(&reference, 0.0, probe);
+  REQUIRE(stack_start(&s) && stack_start(&reference));
   CHECK_NEAR(s.w.force[0], -2000.0 * HELD, 0.02);
   for (int step = 0; step < 20; ++step) {
     uint64_t made = probes_of(&s.w, 1);
@@ -103,13 +103,13 @@ TEST(what_rests_is_measured_once)
 TEST(as_in_the_paper_all_are_made)
 {
   stack s;
-  begin(&s, 1e-6, HAP_PROBE_PAPER);
-  REQUIRE(start(&s));
+  stack_begin(&s, 1e-6, HAP_PROBE_PAPER);
+  REQUIRE(stack_start(&s));
   CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
-  begin(&s, 1e-6, HAP_PROBE_SHARED);
+  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
   expert_wish(&s.w.expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
-  REQUIRE(start(&s));
+  REQUIRE(stack_start(&s));
   CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
   cw_close(&s.w);
 }
@@ -118,8 +118,8 @@ TEST(as_in_the_paper_all_are_made)
 TEST(what_creeps_is_measured_again)
 {
   stack s;
-  begin(&s, 1e-6, HAP_PROBE_SHARED);
-  REQUIRE(start(&s));
+  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
+  REQUIRE(stack_start(&s));
   uint64_t before = cw_stats(&s.w).probes.reused;
   for (int step = 0; step < 12; ++step) {
     s.w.hand_at[2] += 3e-7;
@@ -185,7 +185,7 @@ static void change_direction(stack *s)
   s->w.direction[1] = 0.8;
 }
 
-static void part(stack *s)
+static void stack_part(stack *s)
 {
   s->apart = true;
 }
@@ -200,7 +200,7 @@ static void tilt_floor(stack *s)
   dGeomPlaneSetParams(s->floor, 1e-3, 0.0, 1.0, 0.0);
 }
 
-static void shrink(stack *s)
+static void stack_shrink(stack *s)
 {
   dGeomBoxSetLengths(s->top_geom, EDGE, EDGE - 4.0 * MOVED, EDGE);
 }
@@ -251,7 +251,7 @@ static void change_layer(stack *s)
 
 static void add_force(stack *s)
 {
-  s->w.user_force[0] = 0.05;
+  s->w.user.force[0] = 0.05;
 }
 
 static void make_kinematic(stack *s)
@@ -264,7 +264,7 @@ static void move_hand(stack *s)
   s->w.hand_at[2] += MOVED;
 }
 
-static void press(stack *s)
+static void stack_press(stack *s)
 {
   s->w.hand_at[0] += 10.0 * MOVED;
 }
@@ -282,10 +282,10 @@ static const struct {
     {"mu", change_friction, 1},
     {"softness", change_softness, 1},
     {"friction direction", change_direction, 1},
-    {"contact gone", part, 1},
+    {"contact gone", stack_part, 1},
     {"floor lowered", lower_floor, 1},
     {"floor tilted", tilt_floor, 1},
-    {"size", shrink, 1},
+    {"size", stack_shrink, 1},
     {"geom", add_geom, 1},
     {"body", add_body, 1},
     {"joint", add_joint, 1},
@@ -297,16 +297,16 @@ static const struct {
     {"force", add_force, 1},
     {"kinematic", make_kinematic, 1},
     {"hand along", move_hand, 2},
-    {"hand into", press, 2},
+    {"hand into", stack_press, 2},
 };
 
 static void check_change(size_t which, double *out_worst)
 {
   stack s;
   stack reference;
-  begin(&s, 1e-6, HAP_PROBE_SHARED);
-  begin(&reference, 0.0, HAP_PROBE_SHARED);
-  REQUIRE(start(&s) && start(&reference));
+  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
+  stack_begin(&reference, 0.0, HAP_PROBE_SHARED);
+  REQUIRE(stack_start(&s) && stack_start(&reference));
   CHECK(probes_of(&s.w, 1) <= 1);
   (void)probes_of(&reference.w, 1);
   changes[which].change(&s);

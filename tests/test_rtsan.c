@@ -73,14 +73,14 @@ static bool runs_clean(void (*work)(void), bool show)
 
 static void *volatile sink;
 
-static void allocate(void)
+static void heap_allocate(void)
 {
   __rtsan_realtime_enter();
   sink = malloc(16);
   __rtsan_realtime_exit();
 }
 
-static void release(void)
+static void heap_release(void)
 {
   sink = malloc(16);
   __rtsan_realtime_enter();
@@ -96,7 +96,7 @@ static void take_mutex(void)
   __rtsan_realtime_exit();
 }
 
-static void nothing(void)
+static void violate_nothing(void)
 {
   __rtsan_realtime_enter();
   sink = NULL;
@@ -105,9 +105,9 @@ static void nothing(void)
 
 TEST(the_sanitizer_catches_what_it_should)
 {
-  CHECK(runs_clean(nothing, true));
-  CHECK(!runs_clean(allocate, false));
-  CHECK(!runs_clean(release, false));
+  CHECK(runs_clean(violate_nothing, true));
+  CHECK(!runs_clean(heap_allocate, false));
+  CHECK(!runs_clean(heap_release, false));
   CHECK(!runs_clean(take_mutex, false));
 }
 
@@ -154,7 +154,8 @@ static void publish_model(uint64_t number)
 
 #define TOOL_HALF 0.01 /* m, of the third pointer, a cube */
 
-/* Its lower face against a floor of its own, with friction; now and then it is found to have other points. */
+/* Its lower face against a floor of its own, with friction; now and then it is found to have
+ * other points. */
 static void publish_tool(hapi_patches *patches)
 {
   hapi_tool_point *tools = hapi_patches_tools(patches);
@@ -252,7 +253,7 @@ static bool set_up(void)
   return good && hapi_haptic_begin(haptic, 0, &detail) == HAP_OK;
 }
 
-static void cycles(void)
+static void physics_cycles(void)
 {
   int rubbed = 0; /* ticks in which the tool feels friction, in model CONTACT */
   for (int i = 0; i < TICKS; ++i) {
@@ -285,7 +286,7 @@ static void recorded_cycles(void)
     _exit(1);
   }
   hapi_haptic_set_tape(haptic, &tape);
-  cycles();
+  physics_cycles();
   if (atomic_load(&tape.written) < TICKS / 2 || atomic_load(&ended) != HAPI_RECORD_OVERFLOW ||
       atomic_load(&tape.lost) < TICKS / 2) {
     fprintf(stderr, "nothing was recorded\n");
@@ -293,7 +294,7 @@ static void recorded_cycles(void)
   }
 }
 
-static void ticks(void)
+static void loop_ticks(void)
 {
   __rtsan_realtime_enter();
   for (int i = 0; i < TICKS; ++i) {
@@ -306,9 +307,9 @@ static void ticks(void)
 TEST(haptic_cycle_neither_allocates_nor_locks)
 {
   REQUIRE(set_up());
-  CHECK(runs_clean(cycles, true));
+  CHECK(runs_clean(physics_cycles, true));
   CHECK(runs_clean(recorded_cycles, true));
-  CHECK(runs_clean(ticks, true));
+  CHECK(runs_clean(loop_ticks, true));
 }
 
 int main(void)

@@ -511,7 +511,7 @@ TEST(a_deadly_signal_still_kills)
   }
 }
 
-static void interrupt(int number, const char *arguments)
+static void run_interrupt(int number, const char *arguments)
 {
   const struct timespec pause = {0, 300000000};
   pid_t child = program_start(arguments, NULL);
@@ -526,8 +526,8 @@ static void interrupt(int number, const char *arguments)
 
 TEST(a_signal_ends_the_run_with_its_summary)
 {
-  interrupt(SIGINT, "--seconds 10000 --no-realtime");
-  interrupt(SIGTERM, "--seconds 80000 --lockstep");
+  run_interrupt(SIGINT, "--seconds 10000 --no-realtime");
+  run_interrupt(SIGTERM, "--seconds 80000 --lockstep");
 }
 
 TEST(a_device_is_identified_and_its_identity_used)

@@ -13,7 +13,7 @@
 static run_options options;
 static hap_detail why;
 
-static hap_status parse(const char *arguments)
+static hap_status options_parse(const char *arguments)
 {
   static char words[400];
   char *argv[WORDS_MAX] = {words};
@@ -28,9 +28,9 @@ static hap_status parse(const char *arguments)
 }
 
 /* Refused, with a text that begins with the option and has this in it. */
-static bool refused(const char *arguments, const char *option, const char *text)
+static bool options_refused(const char *arguments, const char *option, const char *text)
 {
-  bool good = parse(arguments) < HAP_OK && strncmp(why.text, option, strlen(option)) == 0 &&
+  bool good = options_parse(arguments) < HAP_OK && strncmp(why.text, option, strlen(option)) == 0 &&
               why.text[strlen(option)] == ':' && strstr(why.text, text) != NULL;
   if (!good) {
     printf("# %s: %s\n", arguments, why.text);
@@ -40,56 +40,57 @@ static bool refused(const char *arguments, const char *option, const char *text)
 
 TEST(a_wanted_error_needs_looking_back)
 {
-  CHECK(parse("--seconds 1") == HAP_OK && options.rig.expert.lookback == 0.0);
-  CHECK(parse("--lookback 0.3") == HAP_OK && options.rig.expert.lookback == 0.3);
-  CHECK(parse("--force-error 0.05") == HAP_OK && options.rig.expert.lookback == 0.1);
-  CHECK(parse("--force-error 0.05 --lookback 0.3") == HAP_OK && options.rig.expert.lookback == 0.3);
-  CHECK(refused("--force-error 0.05 --lookback 0", "--force-error", "--lookback 0"));
+  CHECK(options_parse("--seconds 1") == HAP_OK && options.rig.expert.lookback == 0.0);
+  CHECK(options_parse("--lookback 0.3") == HAP_OK && options.rig.expert.lookback == 0.3);
+  CHECK(options_parse("--force-error 0.05") == HAP_OK && options.rig.expert.lookback == 0.1);
+  CHECK(options_parse("--force-error 0.05 --lookback 0.3") == HAP_OK &&
+        options.rig.expert.lookback == 0.3);
+  CHECK(options_refused("--force-error 0.05 --lookback 0", "--force-error", "--lookback 0"));
 }
 
 TEST(the_reference_has_no_error)
 {
-  CHECK(refused("--model single --lookback 0.1", "--lookback", "single"));
-  CHECK(refused("--model single --force-error 0.1", "--force-error", "single"));
-  CHECK(parse("--model single --lookback 0") == HAP_OK);
-  CHECK(parse("--model impulse --force-error 0.1") == HAP_OK);
+  CHECK(options_refused("--model single --lookback 0.1", "--lookback", "single"));
+  CHECK(options_refused("--model single --force-error 0.1", "--force-error", "single"));
+  CHECK(options_parse("--model single --lookback 0") == HAP_OK);
+  CHECK(options_parse("--model impulse --force-error 0.1") == HAP_OK);
 }
 
 TEST(a_budget_needs_a_clock)
 {
-  CHECK(refused("--lockstep --tick-share 0.1", "--tick-share", "--accuracy"));
-  CHECK(refused("--physics-share 0.1 --lockstep", "--physics-share", "--accuracy"));
-  CHECK(parse("--tick-share 0.1 --physics-share 0.2") == HAP_OK);
+  CHECK(options_refused("--lockstep --tick-share 0.1", "--tick-share", "--accuracy"));
+  CHECK(options_refused("--physics-share 0.1 --lockstep", "--physics-share", "--accuracy"));
+  CHECK(options_parse("--tick-share 0.1 --physics-share 0.2") == HAP_OK);
   CHECK(options.rig.expert.tick_share == 0.1 && options.rig.expert.physics_share == 0.2);
 }
 
 TEST(a_budget_of_the_tick_needs_a_model_with_something_to_leave_out)
 {
-  CHECK(refused("--model accelerance --tick-share 0.1", "--tick-share", "contact"));
-  CHECK(refused("--tick-share 0.1 --model single", "--tick-share", "contact"));
-  CHECK(parse("--model accelerance --physics-share 0.1") == HAP_OK);
+  CHECK(options_refused("--model accelerance --tick-share 0.1", "--tick-share", "contact"));
+  CHECK(options_refused("--tick-share 0.1 --model single", "--tick-share", "contact"));
+  CHECK(options_parse("--model accelerance --physics-share 0.1") == HAP_OK);
 }
 
 TEST(single_settings_stay_when_they_are_given)
 {
   const hap_expert_def *expert = &options.rig.expert;
-  CHECK(parse("--seconds 1") == HAP_OK && expert->iterations == HAP_BY_ACCURACY);
+  CHECK(options_parse("--seconds 1") == HAP_OK && expert->iterations == HAP_BY_ACCURACY);
   CHECK(expert->max_sweeps == HAP_BY_ACCURACY && expert->range_hops == HAP_BY_ACCURACY);
   CHECK(expert->max_edge_probes == HAP_BY_ACCURACY);
-  CHECK(parse("--iterations 500 --sweeps 4 --range 0 --edge-probes 7") == HAP_OK);
+  CHECK(options_parse("--iterations 500 --sweeps 4 --range 0 --edge-probes 7") == HAP_OK);
   CHECK(expert->iterations == 500 && expert->max_sweeps == 4);
   CHECK(expert->range_hops == 0 && expert->max_edge_probes == 7);
-  CHECK(parse("--iterations world --range all --edge-probes 0") == HAP_OK);
+  CHECK(options_parse("--iterations world --range all --edge-probes 0") == HAP_OK);
   CHECK(expert->iterations == 0 && expert->range_hops == HAP_RANGE_ALL &&
         expert->max_edge_probes == 0);
-  CHECK(refused("--iterations 0", "--iterations", "1 to 10000"));
-  CHECK(refused("--iterations worlds", "--iterations", "1 to 10000"));
-  CHECK(refused("--sweeps 1", "--sweeps", "2 to 10000"));
-  CHECK(refused("--sweeps 2.5", "--sweeps", "whole number"));
-  CHECK(refused("--range -1", "--range", "0 to 1024"));
-  CHECK(refused("--range nan", "--range", "0 to 1024"));
-  CHECK(refused("--edge-probes 1e3x", "--edge-probes", "0 to 1024"));
-  CHECK(refused("--edge-probes 1025", "--edge-probes", "0 to 1024"));
+  CHECK(options_refused("--iterations 0", "--iterations", "1 to 10000"));
+  CHECK(options_refused("--iterations worlds", "--iterations", "1 to 10000"));
+  CHECK(options_refused("--sweeps 1", "--sweeps", "2 to 10000"));
+  CHECK(options_refused("--sweeps 2.5", "--sweeps", "whole number"));
+  CHECK(options_refused("--range -1", "--range", "0 to 1024"));
+  CHECK(options_refused("--range nan", "--range", "0 to 1024"));
+  CHECK(options_refused("--edge-probes 1e3x", "--edge-probes", "0 to 1024"));
+  CHECK(options_refused("--edge-probes 1025", "--edge-probes", "0 to 1024"));
 }
 
 /* Each line of the help begins an option, or goes on below its text. */

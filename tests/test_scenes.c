@@ -39,7 +39,7 @@ static bool near_zero_or_more(double x)
   return isfinite(x) && x >= 0;
 }
 
-static void near(void *user, dGeomID a, dGeomID b)
+static void pair_near(void *user, dGeomID a, dGeomID b)
 {
   run *r = user;
   dContact contacts[CONTACTS_MAX];
@@ -57,9 +57,9 @@ static void near(void *user, dGeomID a, dGeomID b)
   }
 }
 
-static void step(run *r, double seconds)
+static void run_step(run *r, double seconds)
 {
-  dSpaceCollide(r->s->space, r, near);
+  dSpaceCollide(r->s->space, r, pair_near);
   dWorldQuickStep(r->s->world, seconds);
   dJointGroupEmpty(r->contacts);
 }
@@ -86,7 +86,7 @@ static void close_run(run *r)
   scene_destroy(r->s);
 }
 
-static double field(const char *text, const char *key, double otherwise)
+static double text_field(const char *text, const char *key, double otherwise)
 {
   const char *at = strstr(text, key);
   return at != NULL ? atof(at + strlen(key)) : otherwise;
@@ -112,10 +112,10 @@ static void parse_hand(const char *text, hand *out)
   }
   const bool tense = strstr(text, "hand=tense") != NULL;
   const bool relaxed = strstr(text, "hand=relaxed") != NULL;
-  out->hz = field(text, ",hz=", 0);
-  out->mass = field(text, ",mass=", tense ? 0.3 : relaxed ? 0.2 : 0);
-  out->damping = field(text, ",damping=", tense ? 10 : 3);
-  out->stiffness = field(text, ",stiffness=", tense ? 800 : 150);
+  out->hz = text_field(text, ",hz=", 0);
+  out->mass = text_field(text, ",mass=", tense ? 0.3 : relaxed ? 0.2 : 0);
+  out->damping = text_field(text, ",damping=", tense ? 10 : 3);
+  out->stiffness = text_field(text, ",stiffness=", tense ? 800 : 150);
 }
 
 /* Where the hand wants to be. Smooth: at rest at each waypoint. */
@@ -153,7 +153,7 @@ static void hand_step(const hand *h, double t, const double force[3], double x[3
 
 /* Contact of the pointer with one body; adds to the force on the hand and pushes the body. True if
  * it pushes. */
-static bool touch(run *r, dGeomID ball, dBodyID body, const double v[3], double force[3])
+static bool ball_touch(run *r, dGeomID ball, dBodyID body, const double v[3], double force[3])
 {
   bool pushes = false;
   for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
@@ -206,7 +206,7 @@ static void player_init(player *one, const scene_parameters *p, int index)
   path_at(&one->h, 0, one->x);
 }
 
-static double norm(const double *x)
+static double vector_norm(const double *x)
 {
   return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
 }
@@ -220,27 +220,27 @@ static void player_tick(player *one, run *r, double t, felt *out)
   dGeomSetPosition(one->ball, one->x[0], one->x[1], one->x[2]);
   memset(one->force, 0, sizeof one->force);
   for (size_t b = 0; b < r->s->body_count; ++b) {
-    const bool pushes = touch(r, one->ball, r->s->bodies[b], one->v, one->force);
+    const bool pushes = ball_touch(r, one->ball, r->s->bodies[b], one->v, one->force);
     out->first = out->first || (b == 0 && pushes);
     touched += pushes;
   }
-  const double f = norm(one->force);
+  const double f = vector_norm(one->force);
   out->last_n = f;
   out->peak_n = fmax(out->peak_n, f);
   out->share += f > 0 ? part : 0;
-  out->held += norm(one->v) < 1e-3 ? part : 0;
+  out->held += vector_norm(one->v) < 1e-3 ? part : 0;
   out->impulse += f * tick;
   out->at_once = touched > out->at_once ? touched : out->at_once;
 }
 
-static void watch(run *r)
+static void run_watch(run *r)
 {
   const double x = dBodyGetPosition(r->s->bodies[0])[0];
   const size_t other = r->s->body_count > 1 ? 1 : 0;
   r->least = fmin(r->least, x);
   r->most = fmax(r->most, x);
-  if (norm(dBodyGetLinearVel(r->s->bodies[other])) < 0.01) {
-    r->fastest = fmax(r->fastest, norm(dBodyGetLinearVel(r->s->bodies[0])));
+  if (vector_norm(dBodyGetLinearVel(r->s->bodies[other])) < 0.01) {
+    r->fastest = fmax(r->fastest, vector_norm(dBodyGetLinearVel(r->s->bodies[0])));
   }
 }
 
@@ -259,15 +259,15 @@ static void play_all(run *r, felt out[SCENE_POINTERS_MAX])
     for (int k = 0; k < p->pointers; ++k) {
       player_tick(&players[k], r, (double)i * tick, &out[k]);
     }
-    step(r, tick);
-    watch(r);
+    run_step(r, tick);
+    run_watch(r);
   }
   for (int k = 0; k < p->pointers; ++k) {
     dGeomDestroy(players[k].ball);
   }
 }
 
-static felt play(run *r)
+static felt run_play(run *r)
 {
   felt all[SCENE_POINTERS_MAX];
   play_all(r, all);
@@ -307,7 +307,7 @@ static void check_start(const char *spec)
   REQUIRE(open_run(&r, spec));
   check_parameters(r.s);
   check_bodies(r.s);
-  dSpaceCollide(r.s->space, &r, near);
+  dSpaceCollide(r.s->space, &r, pair_near);
   CHECK(r.deepest <= r.s->parameters.layer + 1e-4);
   close_run(&r);
 }
@@ -397,7 +397,7 @@ static void check_rest(const char *spec, double seconds)
   run r;
   REQUIRE(open_run(&r, spec));
   for (int i = 0; i * slow_step < seconds; ++i) {
-    step(&r, slow_step);
+    run_step(&r, slow_step);
   }
   printf("# %s: moved %.4f mm\n", spec, 1e3 * largest_move(&r));
   CHECK(largest_move(&r) < 1e-3);
@@ -422,7 +422,7 @@ TEST(fig5_flies_at_its_speed)
   const dBodyID cube = r.s->bodies[0];
   const double start = dBodyGetPosition(cube)[0];
   for (int i = 0; i < 40; ++i) {
-    step(&r, slow_step);
+    run_step(&r, slow_step);
     const dReal *v = dBodyGetLinearVel(cube);
     const dReal *w = dBodyGetAngularVel(cube);
     CHECK(v[0] == -0.017 && v[1] == 0 && v[2] == 0);
@@ -444,7 +444,7 @@ TEST(fig5_rebounds_as_a_spring_does)
   run r;
   REQUIRE(open_run(&r, "fig5"));
   const scene_parameters p = r.s->parameters;
-  const felt f = play(&r);
+  const felt f = run_play(&r);
   CHECK_NEAR(f.peak_n, 0.017 * sqrt(p.stiffness * p.mass), 1e-3);
   CHECK_NEAR(f.share * p.duration, M_PI * sqrt(p.mass / p.stiffness), 2 * tick);
   CHECK_NEAR(f.impulse, 2 * p.mass * 0.017, 1e-3);
@@ -467,7 +467,7 @@ TEST(hands_are_felt)
   for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
     run r;
     REQUIRE(open_run(&r, specs[i]));
-    const felt f = play(&r);
+    const felt f = run_play(&r);
     check_felt(&r, &f, 10, 0.4);
     CHECK(f.held <= 0.3);
     CHECK(r.s->parameters.hinge_torque == 0 || check_joints(r.s) > 0);
@@ -514,7 +514,7 @@ TEST(topple_falls_over)
   /* its height lies along x, and it rests */
   CHECK_NEAR(dBodyGetRotation(r.s->bodies[0])[2], 1, 1e-3);
   CHECK_NEAR(dBodyGetPosition(r.s->bodies[0])[2], r.s->parameters.size / 2, 2e-3);
-  CHECK(norm(dBodyGetLinearVel(r.s->bodies[0])) < 0.01);
+  CHECK(vector_norm(dBodyGetLinearVel(r.s->bodies[0])) < 0.01);
   close_run(&r);
 }
 
@@ -527,7 +527,7 @@ TEST(edge_falls_to_the_floor)
   const dReal *x = dBodyGetPosition(r.s->bodies[0]);
   CHECK_NEAR(x[2], p->size / 2, 2e-3);
   CHECK(x[0] > 1.4 * p->size + p->gap);
-  CHECK(norm(dBodyGetLinearVel(r.s->bodies[0])) < 0.05);
+  CHECK(vector_norm(dBodyGetLinearVel(r.s->bodies[0])) < 0.05);
   close_run(&r);
 }
 
@@ -629,7 +629,7 @@ TEST(paths_reach_the_first_body)
       const int touches = dCollide(ball, dBodyGetFirstGeom(r.s->bodies[0]), 1, &c, sizeof c);
       CHECK(t > 0 || touches == 0);
       reached = reached || touches > 0;
-      step(&r, slow_step);
+      run_step(&r, slow_step);
     }
     CHECK(reached);
     dGeomDestroy(ball);
@@ -655,7 +655,8 @@ static void check_closed(const scene *s)
   dWorldSetGravity(s->world, 0, 0, 0);
   dWorldQuickStep(s->world, tick);
   for (size_t b = 0; b < s->body_count; ++b) {
-    CHECK(dBodyGetNumJoints(s->bodies[b]) == 0 || norm(dBodyGetLinearVel(s->bodies[b])) < 1e-9);
+    CHECK(dBodyGetNumJoints(s->bodies[b]) == 0 ||
+          vector_norm(dBodyGetLinearVel(s->bodies[b])) < 1e-9);
   }
 }
 
@@ -665,7 +666,7 @@ static void check_shifted(scene_parameters p)
   run still;
   scene *s = NULL;
   REQUIRE(open_run(&still, p.name));
-  CHECK(norm(still.s->parameters.shift) == 0);
+  CHECK(vector_norm(still.s->parameters.shift) == 0);
   memcpy(p.shift, shift, sizeof shift);
   REQUIRE(scene_create_from(&p, 0, &s, NULL) == HAP_OK);
   CHECK(s->body_count == still.s->body_count);
@@ -701,7 +702,7 @@ TEST(infinite_friction_stays_finite)
   const double start = dBodyGetPosition(r.s->bodies[0])[0];
   for (int i = 0; i < 50; ++i) {
     dBodyAddForce(r.s->bodies[0], 4, 0, 0);
-    step(&r, slow_step);
+    run_step(&r, slow_step);
   }
   CHECK_NEAR(dBodyGetPosition(r.s->bodies[0])[0], start, 1e-4);
   close_run(&r);

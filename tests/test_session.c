@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A session from outside: life, drives, lock, posted edits, poses, trace. Defs and bad worlds are in
- * test_session_defs.c, pointers and devices in test_session_devices.c. */
+/* A session from outside: life, drives, lock, posted edits, poses, trace. Defs and bad worlds
+ * are in test_session_defs.c, pointers and devices in test_session_devices.c. */
 
 #include "tests/tap.h"
 
@@ -32,7 +32,7 @@ TEST(start_and_stop_in_every_drive)
     stage s;
     REQUIRE(stage_run(&s, drives[d]));
     CHECK(hap_session_start(s.session) == HAP_ERROR_STATE);
-    CHECK(has(detail_of(&s), "started already"));
+    CHECK(text_has(detail_of(&s), "started already"));
     for (int i = 0; i < 3; ++i) {
       sleep_ms(drives[d] == HAP_DRIVE_LOCKSTEP ? 0 : 20);
       CHECK(hap_session_advance(s.session, 30) ==
@@ -57,17 +57,17 @@ TEST(calls_of_another_drive_are_refused)
   CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE);
   REQUIRE(hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(s), "LOCKSTEP"));
+  CHECK(text_has(detail_of(s), "LOCKSTEP"));
   static const double bad[] = {-1e-9, (double)NAN, (double)INFINITY, -(double)INFINITY};
   for (int i = 0; i < 4; ++i) {
     CHECK(hap_session_update(s->session, bad[i]) == HAP_ERROR_ARGUMENT);
-    CHECK(has(detail_of(s), "frame_s"));
+    CHECK(text_has(detail_of(s), "frame_s"));
   }
   CHECK(atomic_load(&s->steps) == 0);
   stage_end(s);
   REQUIRE(stage_run(s, HAP_DRIVE_LOCKSTEP));
   CHECK(hap_session_update(s->session, 0.01) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(s), "FRAME"));
+  CHECK(text_has(detail_of(s), "FRAME"));
 }
 
 static void no_edit(void *arg)

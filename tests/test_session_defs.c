@@ -12,12 +12,12 @@
 /* ---- defs ---- */
 
 /* Creates with the defs of s as they are; must fail and say part. */
-static bool refused(stage *s, hap_status status, const char *part)
+static bool stage_refused(stage *s, hap_status status, const char *part)
 {
   s->session = (hap_session *)s; /* must be overwritten */
   s->detail.text[0] = '\0';
   hap_status answer = stage_create(s);
-  bool good = answer == status && s->session == NULL && has(s->detail.text, part);
+  bool good = answer == status && s->session == NULL && text_has(s->detail.text, part);
   if (answer != status) {
     printf("# %s for \"%s\"\n", hap_status_name(answer), part);
   }
@@ -35,27 +35,27 @@ TEST(unset_defs_are_refused)
   for (size_t i = 0; i < sizeof garbage; ++i) {
     hap_session_def good = s->def;
     memset(&s->def, garbage[i], sizeof s->def);
-    CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+    CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
     s->def = good;
     hap_expert_def good_expert = s->expert;
     memset(&s->expert, garbage[i], sizeof s->expert);
-    CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_expert_def_init"));
+    CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_expert_def_init"));
     s->expert = good_expert;
     hap_research_def good_research = s->research;
     memset(&s->research, garbage[i], sizeof s->research);
-    CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_research_def_init"));
+    CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_research_def_init"));
     s->research = good_research;
     hap_ode_def good_ode = s->ode;
     memset(&s->ode, garbage[i], sizeof s->ode);
-    CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_ode_def_init"));
+    CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_ode_def_init"));
     s->ode = good_ode;
   }
   uint32_t cookie = s->def.cookie;
   s->def.cookie = s->ode.cookie; /* one def for another */
-  CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+  CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
   s->def.cookie = cookie;
   s->def.size = 3;
-  CHECK(refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
+  CHECK(stage_refused(s, HAP_ERROR_UNINITIALISED, "hap_session_def_init"));
   hap_session_def_init(NULL, sizeof s->def); /* do nothing */
   hap_session_def_init(&s->def, 3);
   hap_ode_def_init(NULL, sizeof s->ode);
@@ -67,22 +67,22 @@ TEST(missing_arguments_are_refused)
   hap_session *out = (hap_session *)s;
   CHECK(hap_session_create(&s->def, NULL, &out, NULL) == HAP_ERROR_ARGUMENT && out == NULL);
   CHECK(hap_session_create(&s->def, &s->ode, NULL, &s->detail) == HAP_ERROR_ARGUMENT);
-  CHECK(has(s->detail.text, "out"));
+  CHECK(text_has(s->detail.text, "out"));
   s->ode.world = NULL;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "world"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "world"));
   s->ode.world = s->world;
   s->ode.space = NULL;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "space"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "space"));
   s->ode.space = s->space;
   s->ode.max_contacts_per_pair = 0;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
   s->ode.max_contacts_per_pair = 65;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
   s->ode.max_contacts_per_pair = 8;
   s->ode.island_threads = 0;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "island_threads"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "island_threads"));
   s->ode.island_threads = 65;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "island_threads"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "island_threads"));
 }
 
 /* Fields by their place in a stage. */
@@ -185,12 +185,12 @@ TEST(every_bad_field_is_named)
     } else {
       memcpy(at, &whole, sizeof whole);
     }
-    CHECK(refused(s, HAP_ERROR_ARGUMENT, bad_fields[i].name));
+    CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, bad_fields[i].name));
     memcpy(at, good, bad_fields[i].real ? sizeof(double) : sizeof whole);
   }
   s->def.physics_hz = 500.0;
   s->def.haptic_hz = 499.0; /* H / T below 1 */
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "at least one tick"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "at least one tick"));
   s->def.haptic_hz = 500.0;
   CHECK(stage_create(s) == HAP_OK); /* H = T */
 }
@@ -201,7 +201,7 @@ TEST(no_def_is_one_of_defaults)
   hap_accuracy_info info;
   REQUIRE(hap_session_create(NULL, &s->ode, &s->session, &s->detail) == HAP_OK);
   CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(s), "LOCKSTEP")); /* it is not: the default is THREADS */
+  CHECK(text_has(detail_of(s), "LOCKSTEP")); /* it is not: the default is THREADS */
   CHECK(hap_session_start(s->session) >= HAP_OK);
   CHECK(hap_session_accuracy(s->session, &info, sizeof info) == HAP_OK);
   CHECK(info.accuracy == HAP_ACCURACY_DEFAULT && info.tick.share == 0.0);
@@ -211,7 +211,7 @@ TEST(an_effect_is_on_or_off_and_not_both)
 {
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   s->expert.effects_on = s->expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECT_GYRO);
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "gyro"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "gyro"));
   s->expert.effects_on = 0;
   CHECK(stage_create(s) == HAP_OK);
 }
@@ -220,7 +220,7 @@ TEST(a_budget_is_for_real_time)
 {
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   s->def.budget = 0.5;
-  CHECK(refused(s, HAP_ERROR_UNSUPPORTED, "LOCKSTEP"));
+  CHECK(stage_refused(s, HAP_ERROR_UNSUPPORTED, "LOCKSTEP"));
   s->def.drive = HAP_DRIVE_THREADS;
   s->expert.physics_share = 0.25; /* and the tick has the budget */
   REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) >= HAP_OK);
@@ -282,25 +282,25 @@ TEST(unknown_bytes_of_a_larger_def_are_refused)
   hap_session_def_init(&block.def, sizeof block);
   block.bytes[sizeof(hap_session_def) + 11] = 1;
   CHECK(hap_session_create(&block.def, &s->ode, &session, &s->detail) == HAP_ERROR_ARGUMENT);
-  CHECK(session == NULL && has(s->detail.text, "hap_session_def: byte"));
+  CHECK(session == NULL && text_has(s->detail.text, "hap_session_def: byte"));
   hap_expert_def_init(&block.expert, sizeof block);
   s->def.expert = &block.expert;
   CHECK(stage_create(s) == HAP_OK); /* all of them 0 */
   hap_session_destroy(s->session);
   block.bytes[sizeof block - 1] = 0x80;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "hap_expert_def: byte 1023"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "hap_expert_def: byte 1023"));
   s->def.expert = NULL;
   hap_research_def_init(&block.research, sizeof block);
   s->def.research = &block.research;
   block.bytes[sizeof(hap_research_def)] = 1;
-  CHECK(refused(s, HAP_ERROR_ARGUMENT, "hap_research_def: byte"));
+  CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "hap_research_def: byte"));
   s->def.research = NULL;
   hap_ode_def_init(&block.ode, sizeof block);
   block.ode.world = s->world;
   block.ode.space = s->space;
   block.bytes[sizeof(hap_ode_def)] = 1;
   CHECK(hap_session_create(&s->def, &block.ode, &session, &s->detail) == HAP_ERROR_ARGUMENT);
-  CHECK(has(s->detail.text, "hap_ode_def: byte"));
+  CHECK(text_has(s->detail.text, "hap_ode_def: byte"));
   CHECK(stage_create(s) == HAP_OK); /* both NULL */
 }
 
@@ -335,7 +335,7 @@ TEST(statistics_of_a_smaller_struct)
 
 /* ---- worlds that cannot be stepped ---- */
 
-static void spoil(dBodyID body, int way)
+static void body_spoil(dBodyID body, int way)
 {
   const double nan = (double)NAN;
   dMass mass;
@@ -370,12 +370,12 @@ TEST(a_body_that_cannot_be_simulated_is_refused_at_create_and_start)
   for (int way = 0; way < 7; ++way) {
     stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
     REQUIRE(stage_create(s) == HAP_OK);
-    spoil(add_cube(s, 5.0, NULL), way);
+    body_spoil(add_cube(s, 5.0, NULL), way);
     CHECK(hap_session_start(s->session) == HAP_ERROR_WORLD);
-    CHECK(has(detail_of(s), "a body at ("));
+    CHECK(text_has(detail_of(s), "a body at ("));
     CHECK(hap_session_advance(s->session, 1) == HAP_ERROR_STATE); /* has not started */
     hap_session_destroy(s->session);
-    CHECK(refused(s, HAP_ERROR_WORLD, way < 6 ? "not finite" : "has no mass"));
+    CHECK(stage_refused(s, HAP_ERROR_WORLD, way < 6 ? "not finite" : "has no mass"));
     stage_end(s);
   }
 }
@@ -389,13 +389,13 @@ TEST(a_body_that_goes_bad_is_kept_from_ode)
     dMass mass;
     dBodyGetMass(s.cube, &mass);
     REQUIRE(hap_session_lock(s.session) == HAP_OK);
-    spoil(s.cube, way);
+    body_spoil(s.cube, way);
     CHECK(hap_session_unlock(s.session) == HAP_OK);
     uint64_t steps = stats_of(&s).physics.steps;
     CHECK(hap_session_advance(s.session, 100) == HAP_FAULTED);
     CHECK(stats_of(&s).faults.fault == HAP_FAULT_WORLD && stats_of(&s).faults.count == 1);
     CHECK(stats_of(&s).physics.steps == steps && stats_of(&s).loop.ticks == 200);
-    CHECK(has(detail_of(&s), "body at"));
+    CHECK(text_has(detail_of(&s), "body at"));
     dBodySetMass(s.cube, &mass);
     dBodySetPosition(s.cube, 0.0, 0.0, 0.0);
     ((dReal *)(uintptr_t)dBodyGetQuaternion(s.cube))[2] = 0.0;

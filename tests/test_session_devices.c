@@ -188,7 +188,7 @@ static void end_with_fake(stage *s, hap_device *device)
   CHECK(atomic_load(&fakes[0].closes) == 1 && atomic_load(&fakes[0].zeroed) == 1);
 }
 
-static bool pushes(const fake *d)
+static bool fake_pushes(const fake *d)
 {
   return atomic_load(&d->pushing) == 1;
 }
@@ -202,22 +202,22 @@ static void fault_and_reset(atomic_int *cause, hap_fault fault, const char *text
   stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device);
   REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 50) == HAP_OK);
-  CHECK(pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_NONE);
+  CHECK(fake_pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_NONE);
   atomic_store(cause, 1);
   CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
   CHECK(stats_of(s).faults.count == 1 || fault == HAP_FAULT_DEVICE_WRITE);
   CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
   CHECK(stats_of(s).faults.fault == fault && stats_of(s).faults.count == 1);
-  CHECK(!pushes(&fakes[0]) && atomic_load(&fakes[0].zeroed) == 1);
-  CHECK(has(detail_of(s), text));
+  CHECK(!fake_pushes(&fakes[0]) && atomic_load(&fakes[0].zeroed) == 1);
+  CHECK(text_has(detail_of(s), text));
   int writes = atomic_load(&fakes[0].writes);
   atomic_store(cause, 0);
   CHECK(hap_session_advance(s->session, 50) == HAP_FAULTED);
-  CHECK(stats_of(s).faults.fault == fault && !pushes(&fakes[0])); /* latched */
-  CHECK(atomic_load(&fakes[0].writes) == writes + 50);            /* zeros go on being written */
+  CHECK(stats_of(s).faults.fault == fault && !fake_pushes(&fakes[0])); /* latched */
+  CHECK(atomic_load(&fakes[0].writes) == writes + 50); /* zeros go on being written */
   CHECK(hap_session_reset_fault(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 2) == HAP_OK);
-  CHECK(stats_of(s).faults.fault == HAP_FAULT_NONE && pushes(&fakes[0]));
+  CHECK(stats_of(s).faults.fault == HAP_FAULT_NONE && fake_pushes(&fakes[0]));
   CHECK(strcmp(detail_of(s), "") == 0);
   CHECK(stats_of(s).faults.count == 1 && stats_of(s).loop.ticks == 123);
   end_with_fake(s, device);
@@ -248,10 +248,10 @@ TEST(one_bad_device_takes_the_force_of_all)
   hap_pointer_def def = pointer_def(devices[1]);
   CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK); /* while it runs */
   CHECK(hap_session_advance(s->session, 50) == HAP_OK);
-  CHECK(pushes(&fakes[0]) && atomic_load(&fakes[1].writes) == 50);
+  CHECK(fake_pushes(&fakes[0]) && atomic_load(&fakes[1].writes) == 50);
   atomic_store(&fakes[1].bad_pose, 1);
   CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
-  CHECK(!pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(!fake_pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_DEVICE_POSE);
   hap_pointer_state shown;
   CHECK(hap_pointer_get(s->session, id, &shown, sizeof shown) == HAP_OK);
   CHECK(hapi_finite(shown.device.position, 3) && hapi_finite(shown.proxy.position, 3));
@@ -271,12 +271,12 @@ TEST(zero_is_the_last_thing_that_is_written)
     hap_device *device;
     stage *s = run_with_fake(drives[way % 3], &device);
     REQUIRE(s != NULL);
-    for (int i = 0; i < 2000 && !pushes(&fakes[0]); ++i) {
+    for (int i = 0; i < 2000 && !fake_pushes(&fakes[0]); ++i) {
       sleep_ms(s->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : 1);
       CHECK(s->def.drive != HAP_DRIVE_LOCKSTEP || hap_session_advance(s->session, 1) == HAP_OK);
       CHECK(s->def.drive != HAP_DRIVE_FRAME || hap_session_update(s->session, 0.001) >= HAP_OK);
     }
-    CHECK(pushes(&fakes[0]));
+    CHECK(fake_pushes(&fakes[0]));
     if (way / 3 == 0) {
       CHECK(hap_session_stop(s->session) == HAP_OK);
     } else if (way / 3 == 1) {
@@ -308,7 +308,7 @@ TEST(a_device_that_does_not_start)
     }
     atomic_store(&fakes[1].fail_start, 1);
     CHECK(hap_session_start(s->session) == HAP_ERROR_DEVICE);
-    CHECK(has(detail_of(s), "fake"));
+    CHECK(text_has(detail_of(s), "fake"));
     CHECK(atomic_load(&fakes[0].running) == 0 && atomic_load(&fakes[0].zeroed) == 1);
     CHECK(atomic_load(&fakes[0].reads) == 0);
     atomic_store(&fakes[1].fail_start, 0);
@@ -340,7 +340,7 @@ TEST(devices_with_a_clock_of_their_own_cannot_run_in_lockstep)
     REQUIRE(stage_create(s) == HAP_OK);
     CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK);
     CHECK(hap_session_start(s->session) == HAP_ERROR_UNSUPPORTED);
-    CHECK(has(detail_of(s), "lockstep"));
+    CHECK(text_has(detail_of(s), "lockstep"));
     CHECK(hap_pointer_remove(s->session, id) == HAP_OK);
     REQUIRE(hap_session_start(s->session) == HAP_OK);
     CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_UNSUPPORTED && id.v == 0);
@@ -393,7 +393,7 @@ TEST(ids_of_removed_pointers_are_never_valid_again)
       CHECK(hap_pointer_get(s->session, ids[k], &state, sizeof state) == HAP_ERROR_NOT_FOUND);
       CHECK(hap_pointer_remove(s->session, ids[k]) == HAP_ERROR_NOT_FOUND);
       CHECK(hap_pointer_set_target(s->session, ids[k], &pose, NULL) == HAP_ERROR_NOT_FOUND);
-      CHECK(has(detail_of(s), "it was removed"));
+      CHECK(text_has(detail_of(s), "it was removed"));
       CHECK(k == i || ids[k].v != ids[i].v);
     }
   }
@@ -405,7 +405,7 @@ TEST(ids_of_removed_pointers_are_never_valid_again)
   CHECK(hap_pointer_add(s->session, &def, &ids[0]) == HAP_OK);
   CHECK(hap_pointer_add(s->session, &def, &ids[1]) == HAP_OK);
   CHECK(hap_pointer_add(s->session, &def, &ids[2]) == HAP_ERROR_CAPACITY && ids[2].v == 0);
-  CHECK(has(detail_of(s), "max_pointers"));
+  CHECK(text_has(detail_of(s), "max_pointers"));
   CHECK(hap_pointer_get(s->session, ids[0], &state, 3) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_get(s->session, ids[0], NULL, sizeof state) == HAP_ERROR_ARGUMENT);
   memset(&state, 0xee, sizeof state);
@@ -427,11 +427,11 @@ TEST(a_device_serves_one_pointer)
   }
   CHECK(hap_pointer_add(s[0].session, &def, &id[0]) == HAP_OK);
   CHECK(hap_pointer_add(s[0].session, &def, &id[1]) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&s[0]), "another pointer"));
+  CHECK(text_has(detail_of(&s[0]), "another pointer"));
   CHECK(hap_pointer_add(s[1].session, &def, &id[1]) == HAP_ERROR_STATE);
   const hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   CHECK(hap_pointer_set_target(s[0].session, id[0], &pose, NULL) == HAP_ERROR_STATE);
-  CHECK(has(detail_of(&s[0]), "has a device"));
+  CHECK(text_has(detail_of(&s[0]), "has a device"));
   CHECK(hap_pointer_remove(s[0].session, id[0]) == HAP_OK);
   CHECK(hap_pointer_add(s[1].session, &def, &id[1]) == HAP_OK); /* free again */
   stage_end(&s[0]);
@@ -510,28 +510,28 @@ TEST(bad_pointer_defs_are_named)
     snprintf(name, sizeof name, "%.*s",
              dot != NULL ? (int)(dot - bad_fields[i].name) : (int)strlen(bad_fields[i].name),
              bad_fields[i].name);
-    CHECK(has(detail_of(&s), name));
+    CHECK(text_has(detail_of(&s), name));
     CHECK(id.v == 0);
   }
   for (int i = 0; i < 3; ++i) {
     hap_pointer_def def;
     memset(&def, garbage[i], sizeof def);
     CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(has(detail_of(&s), "hap_pointer_def_init"));
+    CHECK(text_has(detail_of(&s), "hap_pointer_def_init"));
     pointer_defs defs;
     pointer_defs_init(&defs.def, &defs.expert, &defs.research);
     memset(&defs.expert, garbage[i], sizeof defs.expert);
     CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(has(detail_of(&s), "hap_pointer_expert_def_init"));
+    CHECK(text_has(detail_of(&s), "hap_pointer_expert_def_init"));
     defs.def.expert = NULL;
     memset(&defs.research, garbage[i], sizeof defs.research);
     CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(has(detail_of(&s), "hap_pointer_research_def_init"));
+    CHECK(text_has(detail_of(&s), "hap_pointer_research_def_init"));
   }
   hap_pointer_def def = pointer_def(NULL);
   def.hull_points = 4;
   CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
-  CHECK(has(detail_of(&s), "hull_xyz is NULL"));
+  CHECK(text_has(detail_of(&s), "hull_xyz is NULL"));
   def = pointer_def(NULL);
   hap_pointer_expert_def expert;
   hap_pointer_expert_def_init(&expert, sizeof expert);
@@ -709,7 +709,7 @@ TEST(a_body_may_go_while_it_is_pushed)
     destroy_cube(&s);
     hap_status status = hap_session_advance(s.session, 30);
     CHECK(status == (told != 0 ? HAP_OK : HAP_BODY_LOST));
-    CHECK(told != 0 || has(detail_of(&s), "hap_session_forget_body"));
+    CHECK(told != 0 || text_has(detail_of(&s), "hap_session_forget_body"));
     CHECK(stats_of(&s).faults.bodies_lost == (told != 0 ? 0u : 1u));
     CHECK(stats_of(&s).model.neighbours == 0 && stats_of(&s).model.bodies_known == 0);
     hap_pose pose;

@@ -24,14 +24,14 @@ static void move_hand(stage *s, hap_pointer_id id, double x, double speed)
   CHECK(hap_pointer_set_target(s->session, id, &pose, &twist) == HAP_OK);
 }
 
-static double felt(stage *s, hap_pointer_id id)
+static double force_felt(stage *s, hap_pointer_id id)
 {
   hap_pointer_state state;
   CHECK(hap_pointer_get(s->session, id, &state, sizeof state) == HAP_OK);
   return state.wrench.force[0];
 }
 
-static hap_stats figures(stage *s)
+static hap_stats check_figures(stage *s)
 {
   hap_stats stats;
   CHECK(hap_session_stats(s->session, &stats, sizeof stats) == HAP_OK);
@@ -50,16 +50,16 @@ TEST(a_new_hand_does_not_feel_what_the_old_one_touched)
   CHECK(hap_session_advance(s->session, 30) == HAP_OK);
   move_hand(s, first, -0.055, 0.0);
   CHECK(hap_session_advance(s->session, 2) == HAP_OK);
-  CHECK(felt(s, first) < -1.0);
+  CHECK(force_felt(s, first) < -1.0);
   CHECK(hap_pointer_remove(s->session, first) == HAP_OK);
   hap_pointer_id second = add_hand(s, 0u); /* touches nothing at all */
   move_hand(s, second, -0.045, 0.0);
-  double impulse = figures(s).hand.impulse_ns;
+  double impulse = check_figures(s).hand.impulse_ns;
   for (int i = 0; i < 100; ++i) {
     CHECK(hap_session_advance(s->session, 1) == HAP_OK);
-    CHECK(felt(s, second) == 0.0);
+    CHECK(force_felt(s, second) == 0.0);
   }
-  CHECK(figures(s).hand.impulse_ns == impulse);
+  CHECK(check_figures(s).hand.impulse_ns == impulse);
 }
 
 TEST(a_hand_without_a_target_is_not_in_the_world)
@@ -69,14 +69,15 @@ TEST(a_hand_without_a_target_is_not_in_the_world)
   hap_pointer_id hand = add_hand(s, ~0u); /* the cube is at the origin */
   REQUIRE(hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 200) == HAP_OK);
-  CHECK(figures(s).model.pointer_contacts == 0 && figures(s).hand.impulse_abs_ns == 0.0);
+  CHECK(check_figures(s).model.pointer_contacts == 0 &&
+        check_figures(s).hand.impulse_abs_ns == 0.0);
   CHECK(dBodyGetPosition(s->cube)[0] == 0.0);
   move_hand(s, hand, -0.055, 0.0);
   CHECK(hap_session_advance(s->session, 200) == HAP_OK);
-  CHECK(figures(s).hand.impulse_abs_ns > 0.0);
+  CHECK(check_figures(s).hand.impulse_abs_ns > 0.0);
 }
 
-static void nudge(stage *s)
+static void cube_nudge(stage *s)
 {
   const dReal *x = dBodyGetPosition(s->cube);
   dBodySetPosition(s->cube, x[0], x[1] + 1e-9, x[2]);
@@ -87,7 +88,7 @@ TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
 {
   for (int nudged = 0; nudged < 2; ++nudged) {
     stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
-    s->in_step = nudged != 0 ? nudge : NULL;
+    s->in_step = nudged != 0 ? cube_nudge : NULL;
     REQUIRE(stage_create(s) == HAP_OK);
     hap_pointer_id hand = add_hand(s, ~0u);
     move_hand(s, hand, -0.07, 0.0);
@@ -96,7 +97,7 @@ TEST(no_impulse_is_lost_on_a_body_that_the_application_moves)
       move_hand(s, hand, i < 300 ? -0.07 + 1e-4 * i : -0.07, i < 300 ? 0.1 : 0.0);
       CHECK(hap_session_advance(s->session, 1) == HAP_OK);
     }
-    hap_stats stats = figures(s);
+    hap_stats stats = check_figures(s);
     CHECK(stats.hand.impulse_ns > 0.05);
     CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 1e-9);
     CHECK_NEAR(dBodyGetLinearVel(s->cube)[0], stats.hand.impulse_ns, 1e-9); /* 1 kg */
@@ -184,7 +185,7 @@ TEST(a_surface_that_is_no_number_does_not_reach_ode)
   (void)add_cube(s, 0.0995, NULL);
   REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 100) == HAP_FAULTED); /* and no abort */
-  CHECK(figures(s).faults.fault == HAP_FAULT_WORLD);
+  CHECK(check_figures(s).faults.fault == HAP_FAULT_WORLD);
   hap_detail detail;
   CHECK(hap_session_detail(s->session, &detail) == HAP_OK);
   CHECK(strstr(detail.text, "surface") != NULL);
@@ -211,7 +212,7 @@ TEST(an_adopted_body_with_a_geom_is_missed_when_it_is_destroyed)
   dGeomDestroy(s->geom);
   dBodyDestroy(s->cube);
   CHECK(hap_session_advance(s->session, 50) == HAP_BODY_LOST);
-  CHECK(figures(s).faults.bodies_lost == 1 && figures(s).model.bodies_known == 0);
+  CHECK(check_figures(s).faults.bodies_lost == 1 && check_figures(s).model.bodies_known == 0);
 }
 
 TEST(a_transmission_is_not_probed_and_that_is_said)
@@ -227,16 +228,16 @@ TEST(a_transmission_is_not_probed_and_that_is_said)
     move_hand(s, hand, -0.055, 0.0);
     REQUIRE(hap_session_start(s->session) == HAP_OK);
     CHECK(hap_session_advance(s->session, 100) == HAP_OK);
-    CHECK(figures(s).probes.steps == 0 || with == 0);
-    CHECK(figures(s).probes.steps > 0 || with != 0 || s->def.model == HAP_MODEL_CONTACT);
+    CHECK(check_figures(s).probes.steps == 0 || with == 0);
+    CHECK(check_figures(s).probes.steps > 0 || with != 0 || s->def.model == HAP_MODEL_CONTACT);
     CHECK((strstr(detail_of(s), "transmission") != NULL) == (with != 0));
-    CHECK(felt(s, hand) < 0.0 || with == 0);
-    CHECK(figures(s).hand.impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
+    CHECK(force_felt(s, hand) < 0.0 || with == 0);
+    CHECK(check_figures(s).hand.impulse_abs_ns == 0.0 || with == 0); /* it feels no force */
     stage_end(s);
   }
 }
 
-static void count(void *arg)
+static void calls_count(void *arg)
 {
   ++*(int *)arg;
 }
@@ -246,7 +247,7 @@ TEST(edits_of_a_session_that_never_ran_are_run)
   int run = 0;
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   REQUIRE(stage_create(s) == HAP_OK);
-  CHECK(hap_session_post(s->session, count, &run) == HAP_OK);
+  CHECK(hap_session_post(s->session, calls_count, &run) == HAP_OK);
   stage_end(s);
   CHECK(run == 1);
 }
@@ -273,7 +274,8 @@ TEST(a_falling_neighbour_falls_at_the_worlds_speed)
   CHECK(rows[0].tick == 0 && rows[89].tick == 89 && fabs(rows[89].t - 0.089) < 1e-9);
 }
 
-/* Its frame and its first target together take it out of the world: a fault, and poses that are poses. */
+/* Its frame and its first target together take it out of the world: a fault, and poses that are
+ * poses. */
 TEST(a_hand_that_never_came_in_has_a_pose)
 {
   hap_pointer_def def;
@@ -287,7 +289,7 @@ TEST(a_hand_that_never_came_in_has_a_pose)
   move_hand(s, id, 9e5, 0.0);
   REQUIRE(hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 100) >= HAP_OK);
-  CHECK(figures(s).faults.fault == HAP_FAULT_DEVICE_POSE);
+  CHECK(check_figures(s).faults.fault == HAP_FAULT_DEVICE_POSE);
   const int64_t times[] = {0, hap_session_now(s->session), INT64_MAX};
   for (int i = 0; i < 6; ++i) {
     CHECK(hap_pointer_poses(s->session, id, times[i / 2], &poses[0], &poses[1]) >= HAP_OK);

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""docs/writing-a-device.md at its word: the skeleton, copied and built as written there with the flags of
-pkg-config, conforms; the points of the check are those of the page.
+"""docs/writing-a-device.md at its word: the skeleton, copied and built as written there with the
+flags of pkg-config, conforms; the points of the check are those of the page.
 Arguments: source root, folder of hapode-uninstalled.pc, hapode-run, compiler."""
 import os
 import pathlib

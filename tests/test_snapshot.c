@@ -191,7 +191,7 @@ static test_world *begin_run(const run_plan *plan, run_kind kind)
 }
 
 /* Record k is the state after k + 1 steps. */
-static history record(const run_plan *plan, run_kind kind)
+static history run_record(const run_plan *plan, run_kind kind)
 {
   history h = {NULL, plan->steps, 0, 0};
   test_world *w = begin_run(plan, kind);
@@ -242,8 +242,8 @@ static int first_difference(const history *a, const history *b,
 
 static void compare_runs(const run_plan *plan, run_kind one, run_kind other)
 {
-  history a = record(plan, one);
-  history b = record(plan, other);
+  history a = run_record(plan, one);
+  history b = run_record(plan, other);
   REQUIRE(a.bits != NULL && b.bits != NULL && a.bodies == b.bodies);
   CHECK(first_difference(&a, &b, same_motion) == plan->steps);
   CHECK(one != NEAR || a.probes >= (uint64_t)plan->steps * 4);
@@ -254,7 +254,7 @@ static void compare_runs(const run_plan *plan, run_kind one, run_kind other)
 
 /* ---- (a) ---- */
 
-static void unsettle(test_world *w)
+static void world_unsettle(test_world *w)
 {
   for (int i = 0; i < w->body_count; ++i) {
     dBodySetFiniteRotationMode(w->bodies[i], i % 2);
@@ -284,7 +284,7 @@ TEST(probes_leave_every_bit)
   body_bits after[WORLD_BODIES_MAX];
   test_world *w = world_new(9.81, 20);
   build_stirred(w);
-  unsettle(w);
+  world_unsettle(w);
   REQUIRE(start_silent(w, true));
   world_step(w, 7);
   leave_forces(w);
@@ -419,9 +419,9 @@ static int count_sleeps(const history *h, int body)
 static void compare_sleep(event_fn event, int *out_sleeps)
 {
   run_plan plan = {build_falling, set_sleep, event, SLEEP_STEPS};
-  history near = record(&plan, NEAR);
-  history far = record(&plan, FAR);
-  history plain = record(&plan, PLAIN);
+  history near = run_record(&plan, NEAR);
+  history far = run_record(&plan, FAR);
+  history plain = run_record(&plan, PLAIN);
   REQUIRE(near.bits != NULL && far.bits != NULL && plain.bits != NULL);
   CHECK(first_difference(&far, &plain, same_motion) == SLEEP_STEPS);
   CHECK(first_difference(&near, &far, same_sleep) == SLEEP_STEPS);

@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Rows that have their bodies to themselves: one sweep solves them, and a static partner is not looked at. */
+/* Rows that have their bodies to themselves: one sweep solves them, and a static partner is not
+ * looked at. */
 
 #include <stdint.h>
 
@@ -15,7 +16,7 @@ static hapi_row rows[COUNT];
 static double v[COUNT + 1][6];
 
 /* A body in each that comes to the ground at 0.5 m/s, with its contact beside its centre. */
-static hapi_solver solve(bool apart)
+static hapi_solver problem_solve(bool apart)
 {
   memset(rows, 0, sizeof rows);
   memset(v, 0, sizeof v);
@@ -50,11 +51,11 @@ static hapi_solver solve(bool apart)
 TEST(rows_that_share_no_body_take_one_sweep)
 {
   double wanted[COUNT];
-  CHECK(solve(false).sweeps >= 2);
+  CHECK(problem_solve(false).sweeps >= 2);
   for (uint32_t i = 0; i < COUNT; ++i) {
     wanted[i] = rows[i].impulse;
   }
-  hapi_solver s = solve(true);
+  hapi_solver s = problem_solve(true);
   CHECK(s.sweeps == 1 && s.residual == 0.0);
   for (uint32_t i = 0; i < COUNT; ++i) {
     CHECK((i % 3 == 0) == (wanted[i] == 0.0));

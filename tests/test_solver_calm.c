@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* What is left of islands that the solver did not solve: no energy beyond what their rows ask for. */
+/* What is left of islands that the solver did not solve: no energy beyond what their rows ask
+ * for. */
 
 #include "tests/tap.h"
 
@@ -25,7 +26,7 @@ static struct {
 
 static uint64_t state;
 
-static double draw(double lo, double hi)
+static double random_draw(double lo, double hi)
 {
   state = state * 6364136223846793005u + 1442695040888963407u;
   return lo + (hi - lo) * (double)(state >> 11) / 9007199254740992.0;
@@ -33,7 +34,7 @@ static double draw(double lo, double hi)
 
 static uint32_t draw_below(uint32_t count)
 {
-  return (uint32_t)draw(0.0, count) % count;
+  return (uint32_t)random_draw(0.0, count) % count;
 }
 
 static void set_up(uint32_t bodies)
@@ -69,14 +70,14 @@ static hapi_row *add_row(uint32_t a, uint32_t b, const double ja[6], const doubl
   return row;
 }
 
-static void solve(void)
+static void problem_solve(void)
 {
   memcpy(s.free_v, s.v, sizeof s.v);
   hapi_solver_run(&s.solver);
   hapi_solver_calm(&s.solver);
 }
 
-static double energy(double v[BODIES][6])
+static double energy_of(double v[BODIES][6])
 {
   double sum = 0.0;
   for (uint32_t i = 0; i < s.solver.body_count; ++i) {
@@ -126,11 +127,11 @@ static void solve_impossible(uint32_t direct_rows, uint32_t budget)
   make_impossible(1);
   s.solver.direct_rows = direct_rows;
   s.solver.update_budget = budget;
-  double before = energy(s.v);
+  double before = energy_of(s.v);
   for (int tick = 0; tick < 200; ++tick) {
-    solve();
+    problem_solve();
   }
-  CHECK(energy(s.v) <= before * (1.0 + 1e-9)); /* false for NaN */
+  CHECK(energy_of(s.v) <= before * (1.0 + 1e-9)); /* false for NaN */
 }
 
 TEST(what_no_impulse_can_solve_adds_no_energy)
@@ -152,7 +153,7 @@ TEST(no_numbers_leave_the_bodies_alone)
   row->ba[0] = 1e10;
   (void)add_row(2, GROUND, x, none);
   s.v[1][0] = s.v[2][0] = -0.5;
-  solve();
+  problem_solve();
   CHECK_NEAR(s.v[1][0], -0.5, 0.0);
   CHECK(s.rows[0].impulse == 0.0);
   CHECK_NEAR(s.v[2][0], 0.0, 1e-9); /* another island */
@@ -187,8 +188,8 @@ TEST(a_direct_solve_does_not_lose_what_is_no_number)
 
 /* ---- other islands ---- */
 
-/* A row of bodies that runs into the ground: each holds all those behind it, which is far more than a few
- * sweeps find anew. */
+/* A row of bodies that runs into the ground: each holds all those behind it, which is far more
+ * than a few sweeps find anew. */
 TEST(a_solved_island_keeps_its_impulses_beside_an_impossible_one)
 {
   const double none[6] = {0.0};
@@ -200,7 +201,7 @@ TEST(a_solved_island_keeps_its_impulses_beside_an_impossible_one)
     (void)add_row(i, i > 2 ? i - 1 : GROUND, x, i > 2 ? back : none);
     s.v[i][0] = -0.3;
   }
-  solve();
+  problem_solve();
   CHECK(s.solver.residual > 1e-3);
   for (uint32_t i = 2; i < 42; ++i) {
     CHECK_NEAR(s.v[i][0], 0.0, 1e-6);
@@ -210,15 +211,15 @@ TEST(a_solved_island_keeps_its_impulses_beside_an_impossible_one)
 
 /* ---- what the budget cuts off ---- */
 
-/* Bodies at random, half of them hanging together, with frictions up to 10 and warm starts that are far
- * too large. No target gives anything: energy can only be lost. */
+/* Bodies at random, half of them hanging together, with frictions up to 10 and warm starts that
+ * are far too large. No target gives anything: energy can only be lost. */
 static void make_heap(uint32_t bodies)
 {
   set_up(bodies);
   for (uint32_t i = 1; i < bodies; ++i) {
-    s.mass[i] = pow(10.0, draw(-3.0, 1.0));
+    s.mass[i] = pow(10.0, random_draw(-3.0, 1.0));
     for (int k = 0; k < 6; ++k) {
-      s.v[i][k] = draw(-1.0, 1.0);
+      s.v[i][k] = random_draw(-1.0, 1.0);
     }
   }
   while (s.solver.row_count + 3 <= ROWS) {
@@ -228,32 +229,32 @@ static void make_heap(uint32_t bodies)
     for (int part = 0; part < 3; ++part) {
       double j[2][6];
       for (int k = 0; k < 6; ++k) {
-        j[0][k] = draw(-1.0, 1.0);
-        j[1][k] = b == GROUND ? 0.0 : draw(-1.0, 1.0);
+        j[0][k] = random_draw(-1.0, 1.0);
+        j[1][k] = b == GROUND ? 0.0 : random_draw(-1.0, 1.0);
       }
       hapi_row *row = add_row(a, b, j[0], j[1]);
-      row->impulse = pow(10.0, draw(-3.0, 2.0));
-      row->mu = part > 0 ? draw(0.0, 10.0) : 0.0;
+      row->impulse = pow(10.0, random_draw(-3.0, 2.0));
+      row->mu = part > 0 ? random_draw(0.0, 10.0) : 0.0;
       row->normal = part > 0 ? normal : -1;
     }
   }
 }
 
-static void spoil(uint32_t bodies, uint32_t budget)
+static void problem_spoil(uint32_t bodies, uint32_t budget)
 {
   make_heap(bodies);
   s.solver.update_budget = budget;
-  double before = energy(s.v);
-  solve();
+  double before = energy_of(s.v);
+  problem_solve();
   check_velocities();
-  CHECK(energy(s.v) <= before * (1.0 + 1e-9));
+  CHECK(energy_of(s.v) <= before * (1.0 + 1e-9));
 }
 
 TEST(no_budget_is_too_small_to_add_no_energy)
 {
   state = 1;
   for (uint32_t i = 0; i < 40; ++i) {
-    spoil(8 + 3 * (i % 17), i % 4 * 3000);
+    problem_spoil(8 + 3 * (i % 17), i % 4 * 3000);
   }
-  spoil(BODIES, 2000); /* more than there are islands for */
+  problem_spoil(BODIES, 2000); /* more than there are islands for */
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The device spidar on a pseudo-terminal with an emulator behind it. Time is real here: everything waits
- * until it has happened, generously, and nothing asks how long it took. */
+/* The device spidar on a pseudo-terminal with an emulator behind it. Time is real here:
+ * everything waits until it has happened, generously, and nothing asks how long it took. */
 
 #include "tests/tap.h"
 
@@ -48,7 +48,7 @@ static hap_status read_once(hands *h)
 }
 
 /* Ticks with that force; the first error, or HAP_OK. */
-static hap_status push(hands *h, double x, int ticks)
+static hap_status hands_push(hands *h, double x, int ticks)
 {
   const hap_wrench wanted = {{x, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   for (int i = 0; i < ticks; ++i) {
@@ -78,7 +78,7 @@ static bool await_status(hands *h, hap_status wanted)
   return false;
 }
 
-static bool explains(const hands *h, const char *word)
+static bool status_explains(const hands *h, const char *word)
 {
   hap_detail why = {""};
   hapi_device_explain(h->ops, h->self, &why);
@@ -168,26 +168,27 @@ TEST(the_hand_feels_what_was_reached)
   hap_detail detail = {""};
   REQUIRE(open_device(&h, ",timeout=5,rotate=1/0/0/0", &detail));
   REQUIRE(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 2.0, 1500) == HAP_OK);
+  CHECK(hands_push(&h, 2.0, 1500) == HAP_OK);
   h.ops->held(h.self, &held);
   CHECK_NEAR(held.force[0], 1.91, 0.05); /* not all that was wanted, and said so */
   REQUIRE(emulated_state(&machine, "force", force, 3));
   CHECK_NEAR(force[0], held.force[0], 0.15);
   CHECK_NEAR(force[1], 0.0, 0.05);
   CHECK_NEAR(h.pose.position[0], 2.0 / 150.0, 2e-3); /* the hand's spring gave way */
-  CHECK(push(&h, 0.0, 10) == HAP_OK);
+  CHECK(hands_push(&h, 0.0, 10) == HAP_OK);
   h.ops->zero(h.self);
   CHECK(emulated_await(&machine, true));
   h.ops->held(h.self, &held);
   CHECK(hapi_v3_norm(held.force) == 0.0);
-  CHECK(push(&h, 2.0, 10) == HAP_OK);
+  CHECK(hands_push(&h, 2.0, 10) == HAP_OK);
   CHECK(emulated_await(&machine, false));
   h.ops->stop(h.self);
   CHECK(emulated_await(&machine, true));
   hap_device_close(h.device);
 }
 
-/* x to the right, y away from the user, z up: the makers' z comes towards the user, their y is up. */
+/* x to the right, y away from the user, z up: the makers' z comes towards the user, their y is
+ * up. */
 TEST(the_frame_has_z_up)
 {
   hands h;
@@ -196,7 +197,7 @@ TEST(the_frame_has_z_up)
   REQUIRE(open_device(&h, ",timeout=5,offset=1/0/0", &detail));
   REQUIRE(h.ops->start(h.self) == HAP_OK);
   REQUIRE(emulated_tell(&machine, "push 0 3 1.5"));
-  CHECK(push(&h, 0.0, 1500) == HAP_OK);
+  CHECK(hands_push(&h, 0.0, 1500) == HAP_OK);
   REQUIRE(emulated_state(&machine, "position", place, 3));
   CHECK(place[1] > 0.015);
   CHECK_NEAR(h.pose.position[0], 1.0 + place[0], 2e-3);
@@ -204,7 +205,7 @@ TEST(the_frame_has_z_up)
   CHECK_NEAR(h.pose.position[2], place[1], 2e-3);
   CHECK_NEAR(fabs(h.pose.quat_wxyz[0]), 1.0, 1e-3);
   REQUIRE(emulated_tell(&machine, "push 0 0 0"));
-  CHECK(push(&h, 0.0, 500) == HAP_OK);
+  CHECK(hands_push(&h, 0.0, 500) == HAP_OK);
   hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
 }
@@ -234,12 +235,12 @@ TEST(a_home_that_was_told_holds_until_the_boards_are_switched_off)
   REQUIRE(emulated_tell(&machine, "push 2.4 0 0")); /* away from home before it is started */
   emulated_sleep(1.0);
   CHECK(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 0.0, 300) == HAP_OK);
+  CHECK(hands_push(&h, 0.0, 300) == HAP_OK);
   REQUIRE(emulated_state(&machine, "position", place, 3));
   CHECK(place[0] > 0.01);
   CHECK_NEAR(h.pose.position[0], place[0], 1e-3);
   REQUIRE(emulated_tell(&machine, "push 0 0 0"));
-  CHECK(push(&h, 0.0, 500) == HAP_OK);
+  CHECK(hands_push(&h, 0.0, 500) == HAP_OK);
   hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
   unlink(file);
@@ -260,7 +261,7 @@ TEST(boards_that_are_silent_fail_and_come_back_by_themselves)
   CHECK(detail.text[0] == '\0');
   REQUIRE(emulated_tell(&machine, "silent 1 1"));
   CHECK(await_status(&h, HAP_ERROR_DEVICE));
-  CHECK(explains(&h, "no whole answer"));
+  CHECK(status_explains(&h, "no whole answer"));
   REQUIRE(emulated_tell(&machine, "silent 1 0"));
   CHECK(await_status(&h, HAP_OK));
   h.ops->stop(h.self);
@@ -295,19 +296,19 @@ TEST(a_cable_is_pulled_and_put_in_again)
   char line[128];
   REQUIRE(open_device(&h, ",timeout=5", &detail));
   REQUIRE(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 1.0, 20) == HAP_OK);
+  CHECK(hands_push(&h, 1.0, 20) == HAP_OK);
   REQUIRE(emulated_tell(&machine, "unplug"));
   CHECK(await_status(&h, HAP_ERROR_DEVICE));
-  CHECK(explains(&h, "cable"));
-  CHECK(push(&h, 1.0, 1) == HAP_ERROR_DEVICE);
+  CHECK(status_explains(&h, "cable"));
+  CHECK(hands_push(&h, 1.0, 1) == HAP_ERROR_DEVICE);
   h.ops->stop(h.self);
   CHECK(h.ops->start(h.self) == HAP_ERROR_DEVICE);
-  CHECK(explains(&h, "does not open"));
+  CHECK(status_explains(&h, "does not open"));
   CHECK(read_once(&h) == HAP_ERROR_STATE);
   REQUIRE(emulated_tell(&machine, "plug"));
   REQUIRE(emulated_line(&machine, "port: ", line, sizeof line));
   CHECK(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 1.0, 20) == HAP_OK);
+  CHECK(hands_push(&h, 1.0, 20) == HAP_OK);
   h.ops->stop(h.self);
   CHECK(emulated_await(&machine, true));
   hap_device_close(h.device);
@@ -326,7 +327,7 @@ static void die_with_force(int number)
       _exit(1);
     }
     for (;;) {
-      (void)push(&h, 3.0, 100);
+      (void)hands_push(&h, 3.0, 100);
     }
   }
   CHECK(emulated_await(&machine, false));
@@ -354,14 +355,14 @@ TEST(a_loop_that_hangs_leaves_no_force)
   hap_detail detail = {""};
   REQUIRE(open_device(&h, ",timeout=5,stall=0.4", &detail));
   REQUIRE(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 3.0, 50) == HAP_OK);
+  CHECK(hands_push(&h, 3.0, 50) == HAP_OK);
   CHECK(emulated_await(&machine, true)); /* nobody wrote in the meantime */
-  CHECK(push(&h, 3.0, 1) == HAP_ERROR_DEVICE);
-  CHECK(explains(&h, "guard"));
+  CHECK(hands_push(&h, 3.0, 1) == HAP_ERROR_DEVICE);
+  CHECK(status_explains(&h, "guard"));
   CHECK(emulated_is_limp(&machine));
   h.ops->stop(h.self);
   CHECK(h.ops->start(h.self) == HAP_OK);
-  CHECK(push(&h, 1.0, 10) == HAP_OK);
+  CHECK(hands_push(&h, 1.0, 10) == HAP_OK);
   hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
 }
@@ -387,7 +388,7 @@ static void to_makers(const double v[3], double out[3])
   out[2] = -v[1];
 }
 
-static double share(const double asked[3], const double given[3])
+static double force_share(const double asked[3], const double given[3])
 {
   double size2 = hapi_v3_dot(asked, asked);
   return size2 > 0.0 ? hapi_v3_dot(asked, given) / size2 : 0.0;
@@ -400,16 +401,16 @@ static int by_value(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* The median: the two are not asked for at the same moment, and a thread that waits for a processor in between
- * spoils a sample, not the device. */
-static double middle(double shares[SAMPLES], int count)
+/* The median: the two are not asked for at the same moment, and a thread that waits for a
+ * processor in between spoils a sample, not the device. */
+static double shares_middle(double shares[SAMPLES], int count)
 {
   qsort(shares, (size_t)count, sizeof *shares, by_value);
   return count > 0 ? shares[count / 2] : 0.0;
 }
 
 /* The wrench on the hand against that of the strings, while the emulated hand pushes. */
-static void compare(rig *r, emulated *e, felt *out)
+static void forces_compare(rig *r, emulated *e, felt *out)
 {
   hap_pointer_state state;
   double asked[2][3];
@@ -423,8 +424,8 @@ static void compare(rig *r, emulated *e, felt *out)
   out->most = fmax(out->most, hapi_v3_norm(asked[0]));
   out->torque_most = fmax(out->torque_most, hapi_v3_norm(asked[1]));
   if (hapi_v3_norm(asked[0]) > LEAST_N) {
-    out->force[out->samples] = share(asked[0], given[0]);
-    out->torque[out->samples++] = share(asked[1], given[1]);
+    out->force[out->samples] = force_share(asked[0], given[0]);
+    out->torque[out->samples++] = force_share(asked[1], given[1]);
   }
 }
 
@@ -447,7 +448,7 @@ static bool begin_scene(const char *name, const char *port, rig *r)
 }
 
 /* Until there are samples enough, or a fault. */
-static hap_fault feel(rig *r, emulated *e, felt *seen)
+static hap_fault force_feel(rig *r, emulated *e, felt *seen)
 {
   hap_stats stats;
   hap_detail detail = {""};
@@ -455,7 +456,7 @@ static hap_fault feel(rig *r, emulated *e, felt *seen)
   memset(seen, 0, sizeof *seen);
   do {
     emulated_sleep(5e-3);
-    compare(r, e, seen);
+    forces_compare(r, e, seen);
     if (hap_session_stats(r->session, &stats, sizeof stats) < HAP_OK) {
       return HAP_FAULT_WORLD;
     }
@@ -466,8 +467,8 @@ static hap_fault feel(rig *r, emulated *e, felt *seen)
     printf("# %s\n", detail.text);
   }
   printf("# %d samples, at most %.2f N and %.4f N m asked; given of it %.3f and %.3f\n",
-         seen->samples, seen->most, seen->torque_most, middle(seen->force, seen->samples),
-         middle(seen->torque, seen->samples));
+         seen->samples, seen->most, seen->torque_most, shares_middle(seen->force, seen->samples),
+         shares_middle(seen->torque, seen->samples));
   return stats.faults.fault;
 }
 
@@ -480,7 +481,7 @@ TEST(a_row_of_cubes_is_felt)
   REQUIRE(emulated_tell(&machine, "hand push"));
   dInitODE2(0);
   REQUIRE(begin_scene("row10", machine.port, &r));
-  CHECK(feel(&r, &machine, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
+  CHECK(force_feel(&r, &machine, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
   CHECK(seen.most > 3.0); /* ten cubes of 0.1 kg on mu 0.5 move at 4.9 N */
   CHECK_NEAR(seen.force[seen.samples / 2], 0.98, 0.08);
   REQUIRE(emulated_tell(&machine, "unplug"));
@@ -499,8 +500,8 @@ TEST(a_row_of_cubes_is_felt)
   dCloseODE();
 }
 
-/* Down onto the lever as its own hand does it, turning along with it; the makers' y is up and their z towards the
- * user. */
+/* Down onto the lever as its own hand does it, turning along with it; the makers' y is up and
+ * their z towards the user. */
 TEST(a_tool_that_turns_a_lever_is_felt)
 {
   static const char *const arguments[] = {
@@ -515,7 +516,7 @@ TEST(a_tool_that_turns_a_lever_is_felt)
   REQUIRE(emulated_start(&other, arguments));
   dInitODE2(0);
   REQUIRE(begin_scene("lever", other.port, &r));
-  CHECK(feel(&r, &other, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
+  CHECK(force_feel(&r, &other, &seen) == HAP_FAULT_NONE && seen.samples == SAMPLES);
   CHECK(seen.torque_most > 0.01);
   CHECK_NEAR(seen.force[seen.samples / 2], 0.98, 0.08);
   CHECK_NEAR(seen.torque[seen.samples / 2], 0.96, 0.12);

@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Calibration of string devices: at home, and from counts that were recorded while the grip went about. */
+/* Calibration of string devices: at home, and from counts that were recorded while the grip went
+ * about. */
 
 #include "tests/tap.h"
 
@@ -34,8 +35,8 @@ static hapi_spidar_model real_one(const hapi_spidar_model *drawn, unsigned find,
 }
 
 /* The first one near home, as a hand holds it there. */
-static void record(const hapi_spidar_model *real, double share, bool known, uint64_t *seed,
-                   hapi_spidar_sample samples[SAMPLES])
+static void samples_record(const hapi_spidar_model *real, double share, bool known, uint64_t *seed,
+                           hapi_spidar_sample samples[SAMPLES])
 {
   for (int n = 0; n < SAMPLES; ++n) {
     hap_pose pose;
@@ -67,8 +68,8 @@ static double lengths_apart(const hapi_spidar_model *a, const hapi_spidar_model 
   return worst;
 }
 
-/* m, largest difference of the distances between two motors of one model and of the other: what the place of the
- * whole frame does not change. */
+/* m, largest difference of the distances between two motors of one model and of the other: what
+ * the place of the whole frame does not change. */
 static double frames_apart(const hapi_spidar_model *a, const hapi_spidar_model *b)
 {
   double worst = 0.0;
@@ -125,7 +126,7 @@ static void check_found(const hapi_spidar_model *drawn, unsigned find, bool know
   hapi_spidar_calibration found;
   hap_detail detail = {""};
   hapi_spidar_model real = real_one(drawn, find, seed);
-  record(&real, 1.0, known, seed, samples);
+  samples_record(&real, 1.0, known, seed, samples);
   hap_status status = hapi_spidar_calibrate(drawn, samples, SAMPLES, find, &found, &detail);
   bool motors = (find & HAPI_SPIDAR_FIND_MOTORS) != 0;
   if (strcmp(drawn->name, "x3r4") == 0 && find == 3 && !known) {
@@ -196,7 +197,7 @@ TEST(too_little_motion_is_refused)
   for (int k = 0; k < 3; ++k) {
     hapi_spidar_calibration found;
     hap_detail detail = {""};
-    record(m, shares[k], false, &seed, samples);
+    samples_record(m, shares[k], false, &seed, samples);
     CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, HAPI_SPIDAR_FIND_MOTORS, &found, &detail) ==
           HAP_ERROR_ARGUMENT);
     CHECK(strstr(detail.text, "move the grip further") != NULL);
@@ -212,7 +213,7 @@ TEST(too_few_samples_are_refused)
   const hapi_spidar_model *m = hapi_spidar_model_find("x5r");
   hapi_spidar_calibration found;
   hap_detail detail = {""};
-  record(m, 1.0, false, &seed, samples);
+  samples_record(m, 1.0, false, &seed, samples);
   /* two things a sample, eight unknowns */
   CHECK(hapi_spidar_calibrate(m, samples, 0, 0, &found, &detail) == HAP_ERROR_ARGUMENT);
   CHECK(hapi_spidar_calibrate(m, samples, 3, 0, &found, &detail) == HAP_ERROR_ARGUMENT);
@@ -230,11 +231,11 @@ TEST(samples_that_are_not_finite_are_refused)
   for (int k = 0; k < 3; ++k) {
     hapi_spidar_calibration found;
     hap_detail detail = {""};
-    record(m, 1.0, false, &seed, samples);
+    samples_record(m, 1.0, false, &seed, samples);
     samples[17].counts[5] = bad[k];
     CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, 0, &found, &detail) == HAP_ERROR_ARGUMENT);
     CHECK(strstr(detail.text, "sample 17") != NULL);
-    record(m, 1.0, true, &seed, samples);
+    samples_record(m, 1.0, true, &seed, samples);
     samples[18].pose.position[2] = bad[k] > 1e9 && isfinite(bad[k]) ? NAN : bad[k];
     CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, 0, &found, &detail) == HAP_ERROR_ARGUMENT);
     CHECK(strstr(detail.text, "sample 18") != NULL);
@@ -249,7 +250,7 @@ TEST(a_slack_string_is_refused)
   const hapi_spidar_model *m = hapi_spidar_model_find("x4r");
   hapi_spidar_calibration found;
   hap_detail detail = {""};
-  record(m, 0.8, false, &seed, samples);
+  samples_record(m, 0.8, false, &seed, samples);
   samples[100].counts[3] += 0.02 / m->metres_per_count[3];
   CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, 0, &found, &detail) == HAP_ERROR_ARGUMENT);
   CHECK(strstr(detail.text, "sample 100") != NULL);
@@ -268,7 +269,7 @@ TEST(no_memory_is_said)
   hooks.release = counted_release;
   hapi_spidar_calibration found;
   hap_detail detail = {""};
-  record(m, 1.0, false, &seed, samples);
+  samples_record(m, 1.0, false, &seed, samples);
   REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
   atomic_store(&heap.fail_at, atomic_load(&heap.calls) + 1);
   CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, 0, &found, &detail) == HAP_ERROR_MEMORY);
@@ -291,7 +292,7 @@ TEST(a_calibration_is_written_and_read)
   char path[64];
   snprintf(path, sizeof path, "/tmp/spidar-calibration-%ld.txt", (long)getpid());
   hapi_spidar_model real = real_one(m, 3, &seed);
-  record(&real, 1.0, true, &seed, samples);
+  samples_record(&real, 1.0, true, &seed, samples);
   CHECK(hapi_spidar_calibrate(m, samples, SAMPLES, 3, &found, &detail) == HAP_OK);
   CHECK(hapi_spidar_model_write(path, &found.model, &detail) == HAP_OK);
   CHECK(hapi_spidar_model_read(path, &read, &detail) == HAP_OK);

@@ -281,7 +281,7 @@ static emulator_def x4r_of(emulator_hand hand)
                         .hand = hand};
 }
 
-static void tell(stage *s, const char *line)
+static void stage_tell(stage *s, const char *line)
 {
   emulator_action action;
   hap_detail detail = {""};
@@ -325,7 +325,7 @@ TEST(boards_are_found_among_garbage)
   hap_detail detail = {""};
   stage *s = set_stage(&def);
   REQUIRE(s != NULL);
-  tell(s, "garbage 300");
+  stage_tell(s, "garbage 300");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK && found.count == 2);
   for (int lost = 0; lost < 14; ++lost) { /* one answer with a byte missing */
     wire_fault fault = {WIRE_LOSE, HAPI_SPIDAR_FROM_BOARD, (unsigned)lost, 0};
@@ -342,17 +342,17 @@ TEST(who_is_not_there_is_not_found)
   hap_detail detail = {""};
   stage *s = set_stage(&def);
   REQUIRE(s != NULL);
-  tell(s, "silent 1 1");
+  stage_tell(s, "silent 1 1");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK);
   CHECK(found.count == 1 && found.id[0] == 0);
-  tell(s, "silent all 1");
+  stage_tell(s, "silent all 1");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_ERROR_DEVICE);
   CHECK(strstr(detail.text, "switched on") != NULL);
-  tell(s, "silent all 0");
-  tell(s, "report 0 B3F");
+  stage_tell(s, "silent all 0");
+  stage_tell(s, "report 0 B3F");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK);
   CHECK(found.count == 2 && found.model[0] == B3F && found.model[1] == B3M);
-  tell(s, "unplug");
+  stage_tell(s, "unplug");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_ERROR_DEVICE);
   CHECK(strstr(detail.text, "port failed") != NULL);
   emulator_finish(&s->emulator);
@@ -360,7 +360,7 @@ TEST(who_is_not_there_is_not_found)
 
 /* ---- cycles ---- */
 
-static bool begin(stage *s, hapi_spidar_line *line)
+static bool stage_begin(stage *s, hapi_spidar_line *line)
 {
   hapi_spidar_boards found;
   hap_detail detail = {""};
@@ -369,7 +369,7 @@ static bool begin(stage *s, hapi_spidar_line *line)
 }
 
 /* A tick: takes what came, asks anew. */
-static bool tick(stage *s, hapi_spidar_line *line, const int16_t *currents)
+static bool stage_tick(stage *s, hapi_spidar_line *line, const int16_t *currents)
 {
   s->now += CYCLE_S;
   bool taken = hapi_spidar_line_receive(line) == 1;
@@ -402,10 +402,10 @@ TEST(cycles_are_answered_and_wrap)
   int taken = 0;
   int32_t least = INT32_MAX;
   int32_t most = INT32_MIN;
-  REQUIRE(begin(s, &line));
-  (void)tick(s, &line, taut);
+  REQUIRE(stage_begin(s, &line));
+  (void)stage_tick(s, &line, taut);
   for (int i = 0; i < 3000; ++i) {
-    taken += tick(s, &line, taut);
+    taken += stage_tick(s, &line, taut);
     CHECK(is_right(s, &line));
     for (int k = 0; k < 8; ++k) {
       least = line.counts.counts[k] < least ? line.counts.counts[k] : least;
@@ -423,7 +423,7 @@ TEST(short_padding_lets_replies_collide)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
   stage *s = set_stage(&def);
-  REQUIRE(begin(s, &line));
+  REQUIRE(stage_begin(s, &line));
   uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
   (void)hapi_spidar_cycle_commands(&line.cycle, taut, bytes);
   memmove(bytes + 9, bytes + 37, 37); /* no zeros between the two */
@@ -431,8 +431,8 @@ TEST(short_padding_lets_replies_collide)
   CHECK(s->emulator.wire.collisions > 0);
   s->now += CYCLE_S;
   CHECK(hapi_spidar_line_receive(&line) == 0);
-  (void)tick(s, &line, taut);
-  CHECK(tick(s, &line, taut) && is_right(s, &line));
+  (void)stage_tick(s, &line, taut);
+  CHECK(stage_tick(s, &line, taut) && is_right(s, &line));
   emulator_finish(&s->emulator);
 }
 
@@ -448,7 +448,7 @@ static void look_after(stage *s, hapi_spidar_line *line, const int16_t *currents
 {
   int without = 0;
   for (int i = 0; i < 8; ++i) {
-    bool taken = tick(s, line, currents);
+    bool taken = stage_tick(s, line, currents);
     io->wrong += taken && !is_right(s, line);
     without = taken ? 0 : without + 1;
     io->missed += !taken;
@@ -461,18 +461,18 @@ static outcome spoil_all(const emulator_def *def, wire_fault fault, const int16_
   outcome all = {0, 0, 0};
   hapi_spidar_line line;
   stage *s = set_stage(def);
-  if (!begin(s, &line)) {
+  if (!stage_begin(s, &line)) {
     all.slow = -1;
     return all;
   }
   for (int i = 0; i < 400; ++i) { /* the strings are wound in */
-    (void)tick(s, &line, currents);
+    (void)stage_tick(s, &line, currents);
   }
   uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
   int commands = hapi_spidar_cycle_commands(&line.cycle, currents, bytes);
   bool to = fault.direction == HAPI_SPIDAR_TO_BOARD;
   if (to) { /* with a byte lost, a current is another one: not so great that strings fly */
-    tell(s, "saturate 110");
+    stage_tell(s, "saturate 110");
   }
   for (int place = 0; place < (to ? commands : line.cycle.length); ++place) {
     fault.skip = (unsigned)place;
@@ -520,7 +520,8 @@ TEST(a_wrong_byte_in_the_replies_of_one_board_costs_one_cycle)
   spoil_in_all_ways(&def, HAPI_SPIDAR_FROM_BOARD, alternating);
 }
 
-/* A header that is lost, or one too many, makes a board take the currents for commands: here they are none. */
+/* A header that is lost, or one too many, makes a board take the currents for commands: here
+ * they are none. */
 TEST(a_wrong_byte_in_the_commands_costs_one_cycle)
 {
   static const uint8_t padding[] = {0x00, 0xff, 0x77};
@@ -543,12 +544,12 @@ TEST(late_replies_are_taken_when_they_come)
   const emulator_def def = x4r_of(EMULATOR_HAND_PUSH);
   hapi_spidar_line line;
   stage *s = set_stage(&def);
-  REQUIRE(begin(s, &line));
-  (void)tick(s, &line, taut);
-  tell(s, "late 0.0033");
+  REQUIRE(stage_begin(s, &line));
+  (void)stage_tick(s, &line, taut);
+  stage_tell(s, "late 0.0033");
   int taken = 0;
   for (int i = 0; i < 100; ++i) {
-    taken += tick(s, &line, taut);
+    taken += stage_tick(s, &line, taut);
     CHECK(is_right(s, &line));
   }
   CHECK(taken >= 95);
@@ -560,26 +561,26 @@ TEST(silence_is_measured)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
   stage *s = set_stage(&def);
-  REQUIRE(begin(s, &line));
-  (void)tick(s, &line, taut);
-  CHECK(tick(s, &line, taut));
+  REQUIRE(stage_begin(s, &line));
+  (void)stage_tick(s, &line, taut);
+  CHECK(stage_tick(s, &line, taut));
   CHECK(hapi_spidar_line_silence(&line) <= 1e-9);
-  tell(s, "silent 1 1");
+  stage_tell(s, "silent 1 1");
   for (int i = 0; i < 20; ++i) {
-    CHECK(!tick(s, &line, taut) || i == 0);
+    CHECK(!stage_tick(s, &line, taut) || i == 0);
   }
   CHECK(hapi_spidar_line_silence(&line) > 0.017 && hapi_spidar_line_silence(&line) < 0.021);
   CHECK(hapi_spidar_cycle_silent(&line.cycle) == 1);
-  tell(s, "silent 1 0");
-  (void)tick(s, &line, taut);
-  CHECK(tick(s, &line, taut) && is_right(s, &line));
+  stage_tell(s, "silent 1 0");
+  (void)stage_tick(s, &line, taut);
+  CHECK(stage_tick(s, &line, taut) && is_right(s, &line));
   CHECK(hapi_spidar_line_exchange(&line, taut, 0.1) == HAP_OK);
-  tell(s, "silent all 1");
+  stage_tell(s, "silent all 1");
   s->now += CYCLE_S;
   stage_flush(s);
   hapi_spidar_cycle_clear(&line.cycle);
   CHECK(hapi_spidar_line_exchange(&line, taut, 0.1) == HAP_ERROR_TIMEOUT);
-  tell(s, "unplug");
+  stage_tell(s, "unplug");
   CHECK(hapi_spidar_line_exchange(&line, taut, 0.1) == HAP_ERROR_DEVICE);
   emulator_finish(&s->emulator);
 }
@@ -591,11 +592,11 @@ TEST(a_pulled_cable_is_noticed_by_the_next_tick)
   hapi_spidar_line line;
   for (int part = 0; part < 10; ++part) {
     stage *s = set_stage(&def);
-    REQUIRE(begin(s, &line));
-    (void)tick(s, &line, taut);
-    CHECK(tick(s, &line, taut));
+    REQUIRE(stage_begin(s, &line));
+    (void)stage_tick(s, &line, taut);
+    CHECK(stage_tick(s, &line, taut));
     s->now += 1e-4 * part; /* answers are under way, or all there */
-    tell(s, "unplug");
+    stage_tell(s, "unplug");
     s->now += CYCLE_S;
     CHECK(hapi_spidar_line_receive(&line) == -EIO);
     CHECK(hapi_spidar_line_send(&line, taut) == -EIO);
@@ -610,10 +611,10 @@ TEST(a_command_that_was_cut_is_ended_by_zeros)
   hapi_spidar_line line;
   uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
   stage *s = set_stage(&def);
-  REQUIRE(begin(s, &line));
-  (void)tick(s, &line, taut);
+  REQUIRE(stage_begin(s, &line));
+  (void)stage_tick(s, &line, taut);
   for (int part = 1; part < 74; ++part) {
-    REQUIRE(tick(s, &line, taut));
+    REQUIRE(stage_tick(s, &line, taut));
     s->now += CYCLE_S;
     (void)hapi_spidar_line_receive(&line);
     (void)hapi_spidar_cycle_commands(&line.cycle, taut, bytes);
@@ -621,10 +622,10 @@ TEST(a_command_that_was_cut_is_ended_by_zeros)
     s->jammed = true;
     CHECK(hapi_spidar_line_send(&line, taut) == 0 && line.cut);
     s->jammed = false;
-    (void)tick(s, &line, taut);
+    (void)stage_tick(s, &line, taut);
     s->now += CYCLE_S; /* what came in between is over */
-    (void)tick(s, &line, taut);
-    CHECK(tick(s, &line, taut) && is_right(s, &line) && !line.cut);
+    (void)stage_tick(s, &line, taut);
+    CHECK(stage_tick(s, &line, taut) && is_right(s, &line) && !line.cut);
   }
   emulator_finish(&s->emulator);
 }
@@ -634,14 +635,14 @@ TEST(positions_that_jump_are_not_believed)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
   stage *s = set_stage(&def);
-  REQUIRE(begin(s, &line));
-  (void)tick(s, &line, taut);
-  CHECK(tick(s, &line, taut));
+  REQUIRE(stage_begin(s, &line));
+  (void)stage_tick(s, &line, taut);
+  CHECK(stage_tick(s, &line, taut));
   s->emulator.wire.boards[1].origin[2] = 5000; /* a RESET_SENSOR that nobody sent */
   int32_t before = line.counts.counts[6];
-  (void)tick(s, &line, taut);
+  (void)stage_tick(s, &line, taut);
   for (int i = 0; i < 5; ++i) {
-    CHECK(!tick(s, &line, taut));
+    CHECK(!stage_tick(s, &line, taut));
   }
   CHECK(line.bad_steps >= 5 && abs(line.counts.counts[6] - before) < 5);
   emulator_finish(&s->emulator);
@@ -650,7 +651,7 @@ TEST(positions_that_jump_are_not_believed)
 /* ---- mechanics ---- */
 
 /* With the tensions that the device would ask for: what the hand feels is what was wanted. */
-static void feel(const char *name, int model, const hap_wrench *wanted)
+static void model_feel(const char *name, int model, const hap_wrench *wanted)
 {
   const hapi_spidar_model *m = hapi_spidar_model_find(name);
   emulator_def def = {.model = m,
@@ -664,7 +665,7 @@ static void feel(const char *name, int model, const hap_wrench *wanted)
   hap_wrench reached;
   double tension[HAPI_SPIDAR_STRINGS_MAX];
   int16_t currents[8];
-  REQUIRE(begin(s, &line));
+  REQUIRE(stage_begin(s, &line));
   hapi_spidar_tensions_init(&solver, m);
   for (int i = 0; i < 2500; ++i) {
     const hap_pose *pose = &s->emulator.grip.pose;
@@ -672,7 +673,7 @@ static void feel(const char *name, int model, const hap_wrench *wanted)
     for (int k = 0; k < 8; ++k) {
       currents[k] = (int16_t)lround(tension[k] * m->volts_per_newton[k] * 4096.0 / 3.3);
     }
-    (void)tick(s, &line, currents);
+    (void)stage_tick(s, &line, currents);
     for (int k = 0; k < 8; ++k) {
       CHECK(s->emulator.grip.tension[k] >= 0.0);
     }
@@ -690,9 +691,9 @@ TEST(what_is_asked_for_is_felt)
 {
   const hap_wrench push = {{1.5, -0.5, 0.7}, {0.0, 0.0, 0.0}};
   const hap_wrench turn = {{0.0, 0.0, 0.0}, {0.005, 0.0, -0.005}};
-  feel("x4r", B3M, &push);
-  feel("x4r", B3M, &turn);
-  feel("x5r", B5M, &push);
+  model_feel("x4r", B3M, &push);
+  model_feel("x4r", B3M, &turn);
+  model_feel("x5r", B5M, &push);
 }
 
 TEST(nobody_holds_it_and_nobody_pulls)
@@ -702,7 +703,7 @@ TEST(nobody_holds_it_and_nobody_pulls)
   REQUIRE(s != NULL);
   emulator_advance(&s->emulator, 0.5);
   CHECK(hapi_v3_norm(s->emulator.grip.pose.position) < 1e-9);
-  tell(s, "push 0.2 0 0"); /* against slack rotors alone */
+  stage_tell(s, "push 0.2 0 0"); /* against slack rotors alone */
   emulator_advance(&s->emulator, 0.55);
   CHECK(s->emulator.grip.pose.position[0] > 1e-4);
   emulator_finish(&s->emulator);

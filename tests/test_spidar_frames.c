@@ -238,7 +238,7 @@ static int make_replies(const hapi_spidar_boards *boards, const int16_t *raw, ui
 }
 
 /* A hand moves: so many counts a cycle. */
-static void move(int motors, int16_t *raw)
+static void motors_move(int motors, int16_t *raw)
 {
   for (int i = 0; i < motors; ++i) {
     raw[i] = (int16_t)(raw[i] + (int)(throw_dice() % 41) - 20);
@@ -272,7 +272,7 @@ TEST(cycles_come_in_pieces)
   uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, &two_b3m);
   for (int piece = 1; piece <= 34; ++piece) {
-    move(8, raw);
+    motors_move(8, raw);
     int length = make_replies(&two_b3m, raw, bytes);
     bool there = false;
     for (int at = 0; at < length; at += piece) {
@@ -292,13 +292,13 @@ TEST(of_several_cycles_the_newest_is_taken)
   uint8_t bytes[128];
   hapi_spidar_cycle_init(&cycle, &two_b3m);
   for (int i = 0; i < 40; ++i) { /* more than the buffer holds */
-    move(8, raw);
+    motors_move(8, raw);
     hapi_spidar_cycle_push(&cycle, bytes, make_replies(&two_b3m, raw, bytes));
   }
   REQUIRE(hapi_spidar_cycle_take(&cycle, seen));
   CHECK(memcmp(seen, raw, sizeof raw) == 0);
   CHECK(!hapi_spidar_cycle_take(&cycle, seen));
-  move(8, raw);
+  motors_move(8, raw);
   hapi_spidar_cycle_push(&cycle, bytes, make_replies(&two_b3m, raw, bytes));
   int length = make_replies(&two_b3m, seen, bytes + 34); /* the one after it has only begun */
   for (int part = 1; part < length; ++part) {
@@ -379,7 +379,7 @@ static void damage_one(const hapi_spidar_boards *boards, damage_kind damage, int
     raw[i] = (int16_t)throw_dice();
   }
   for (int round = 0; round < 3; ++round) {
-    move(8, raw);
+    motors_move(8, raw);
     int length = make_replies(boards, raw, bytes);
     length = round == 1 ? damage_bytes(damage, place, bytes, length) : length;
     hapi_spidar_cycle_push(&cycle, bytes, length);

@@ -87,8 +87,8 @@ TEST(rows_are_derivatives_of_the_lengths)
 
 /* ---- back ---- */
 
-/* In motion at 1 m/s and 5 rad/s one call a tick finds the pose of least squares to 1/50 of a count, and the true
- * one within what rounding does. */
+/* In motion at 1 m/s and 5 rad/s one call a tick finds the pose of least squares to 1/50 of a
+ * count, and the true one within what rounding does. */
 TEST(one_call_a_tick_follows_fast_motion)
 {
   uint64_t seed = 2;
@@ -266,8 +266,8 @@ TEST(lengths_that_are_not_finite_change_nothing)
 
 /* ---- a string that is wrong ---- */
 
-/* Follows the motion while one string gets longer (slack) or is wound in (broken) by 0.2 m/s. Returns the first tick
- * at which the fit is poor, and the diagnosis there. */
+/* Follows the motion while one string gets longer (slack) or is wound in (broken) by 0.2 m/s.
+ * Returns the first tick at which the fit is poor, and the diagnosis there. */
 static int follow_fault(const hapi_spidar_model *m, int string, double speed, uint64_t *seed,
                         hapi_spidar_diagnosis *out)
 {
@@ -384,7 +384,8 @@ TEST(rates_of_a_straight_line_are_its_slope)
   }
 }
 
-/* Nothing of an earlier motion is left after a pause of counts, a jump, a time that goes back, and NaN. */
+/* Nothing of an earlier motion is left after a pause of counts, a jump, a time that goes back,
+ * and NaN. */
 TEST(rates_forget)
 {
   const hapi_spidar_model *m = hapi_spidar_model_find("x4r");

@@ -45,7 +45,7 @@ TEST(built_in_models_are_sound)
 }
 
 /* A string's signs, as bits: 1 is below 0. */
-static unsigned negative(const double *values, int count)
+static unsigned count_negative(const double *values, int count)
 {
   unsigned bits = 0;
   for (int i = 0; i < count; ++i) {
@@ -96,8 +96,8 @@ TEST(built_in_models_have_the_published_figures)
     const hapi_spidar_model *m = model_of(f->name);
     CHECK_NEAR(m->min_tension, f->least, 0.0);
     CHECK_NEAR(m->max_tension, f->most, 0.0);
-    CHECK(negative(m->metres_per_count, m->strings) == f->counts_negative);
-    CHECK(negative(m->volts_per_newton, m->strings) == f->volts_negative);
+    CHECK(count_negative(m->metres_per_count, m->strings) == f->counts_negative);
+    CHECK(count_negative(m->volts_per_newton, m->strings) == f->volts_negative);
     double motor[3] = {0.0};
     double grip[3] = {0.0};
     for (int i = 0; i < m->strings; ++i) {
@@ -284,7 +284,7 @@ TEST(what_a_file_does_not_say_has_sound_defaults)
 
 /* ---- the file ---- */
 
-static bool same(const hapi_spidar_model *a, const hapi_spidar_model *b)
+static bool models_same(const hapi_spidar_model *a, const hapi_spidar_model *b)
 {
   bool all = strcmp(a->name, b->name) == 0 && a->strings == b->strings && a->dof == b->dof &&
              a->board == b->board && a->calibrated == b->calibrated &&
@@ -321,7 +321,7 @@ TEST(models_are_read_as_they_were_written)
       memset(&back, 0xa5, sizeof back);
       CHECK(hapi_spidar_model_write(path, &m, &detail) == HAP_OK);
       CHECK(hapi_spidar_model_read(path, &back, &detail) == HAP_OK);
-      CHECK(same(&m, &back));
+      CHECK(models_same(&m, &back));
       unlink(path);
     }
   }
@@ -339,7 +339,7 @@ TEST(a_file_that_was_there_stays_when_writing_fails)
   CHECK(hapi_spidar_model_write(path, model_of("x5r"), &detail) == HAP_ERROR_IO);
   CHECK(strstr(detail.text, ".new") != NULL);
   CHECK(hapi_spidar_model_read(path, &back, &detail) == HAP_OK);
-  CHECK(same(m, &back));
+  CHECK(models_same(m, &back));
   rmdir(beside);
   unlink(path);
   CHECK(hapi_spidar_model_write("/nowhere/x", m, &detail) == HAP_ERROR_IO);
@@ -436,7 +436,7 @@ static const struct {
     {"# none", "version", "expected version = 1 before all else"},
 };
 
-static void slip(const char *line, const char *instead, char *out, size_t size)
+static void line_slip(const char *line, const char *instead, char *out, size_t size)
 {
   size_t used = 0;
   const char *at = minimal;
@@ -461,7 +461,7 @@ TEST(slips_are_said_with_their_line)
     hap_detail detail = {""};
     memset(&m, 0x5a, sizeof m);
     before = m;
-    slip(slips[i].line, slips[i].instead, text, sizeof text);
+    line_slip(slips[i].line, slips[i].instead, text, sizeof text);
     write_text(text);
     CHECK(hapi_spidar_model_read(path, &m, &detail) == HAP_ERROR_FORMAT);
     CHECK(strstr(detail.text, path) != NULL);

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* hapode-run --calibrate with the spidar-emulator, whose hand follows a script and whose motors are not quite where
- * the model has them. In real time; nothing asks how long it took. */
+/* hapode-run --calibrate with the spidar-emulator, whose hand follows a script and whose motors
+ * are not quite where the model has them. In real time; nothing asks how long it took. */
 
 #include "tests/files.h"
 #include "tests/tap.h"
@@ -25,7 +25,7 @@ static char said_path[160];
 
 /* ---- the emulator and its hand ---- */
 
-static bool bend(void)
+static bool model_bend(void)
 {
   hap_detail detail = {""};
   bent = *hapi_spidar_model_find("x4r");
@@ -37,7 +37,7 @@ static bool bend(void)
 }
 
 /* At home for long enough to be told so, then from place to place, each axis within its reach. */
-static void wander(const double reach[3], double step, uint64_t *seed, char *out)
+static void hand_wander(const double reach[3], double step, uint64_t *seed, char *out)
 {
   size_t used = (size_t)snprintf(out, PATH_SIZE, "0:0/0/0;2:0/0/0");
   double time = 2.0;
@@ -57,8 +57,8 @@ static bool start_machine(void)
   const double reach[3] = {0.03, 0.038, 0.03};
   const double angle[3] = {0.6, 0.6, 0.6};
   uint64_t seed = 5;
-  wander(reach, 0.5, &seed, path);
-  wander(angle, 0.7, &seed, turn);
+  hand_wander(reach, 0.5, &seed, path);
+  hand_wander(angle, 0.7, &seed, turn);
   const char *const arguments[] = {"--model", bent_path, "--fifo", "40", "--path",
                                    path,      "--turn",  turn,     NULL};
   return emulated_start(&machine, arguments);
@@ -67,7 +67,7 @@ static bool start_machine(void)
 /* ---- the program ---- */
 
 /* typed: what comes on its stdin. The exit status. */
-static int calibrate(const char *typed, const char *options)
+static int model_calibrate(const char *typed, const char *options)
 {
   char command[2000];
   snprintf(command, sizeof command,
@@ -78,7 +78,7 @@ static int calibrate(const char *typed, const char *options)
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-static bool said(const char *text)
+static bool output_said(const char *text)
 {
   static char all[20000];
   FILE *file = fopen(said_path, "r");
@@ -101,8 +101,8 @@ static bool was_written(void)
 
 /* ---- how good what was found is ---- */
 
-/* m, root mean square of the places' errors over the workspace, with counts as the emulator has them; in
- * the axes of what is found at home, as the whole frame may be elsewhere. */
+/* m, root mean square of the places' errors over the workspace, with counts as the emulator has
+ * them; in the axes of what is found at home, as the whole frame may be elsewhere. */
 static double error_of(const hapi_spidar_model *found)
 {
   enum {
@@ -164,8 +164,8 @@ TEST(who_writes_home_is_content_with_it)
 {
   hapi_spidar_model m;
   hap_detail detail = {""};
-  CHECK(calibrate("\\nhome\\n", "") == 0);
-  CHECK(said("offsets_m:"));
+  CHECK(model_calibrate("\\nhome\\n", "") == 0);
+  CHECK(output_said("offsets_m:"));
   REQUIRE(hapi_spidar_model_read(found_path, &m, &detail) == HAP_OK);
   const hapi_spidar_model *x4r = hapi_spidar_model_find("x4r");
   CHECK(m.calibrated && memcmp(m.motor, x4r->motor, sizeof m.motor) == 0);
@@ -178,9 +178,9 @@ TEST(a_sweep_finds_where_the_motors_are)
   hapi_spidar_model m;
   hap_detail detail = {""};
   CHECK(emulated_await(&machine, true));
-  CHECK(calibrate("\\n\\n", "--seconds " SWEEP) == 0);
-  CHECK(said("found: offsets and motor points"));
-  CHECK(said("turned by"));
+  CHECK(model_calibrate("\\n\\n", "--seconds " SWEEP) == 0);
+  CHECK(output_said("found: offsets and motor points"));
+  CHECK(output_said("turned by"));
   REQUIRE(hapi_spidar_model_read(found_path, &m, &detail) == HAP_OK);
   double error = error_of(&m);
   double frame = frame_error(&m);
@@ -195,19 +195,19 @@ TEST(a_sweep_finds_where_the_motors_are)
 TEST(a_sweep_that_says_too_little_leaves_no_file)
 {
   CHECK(emulated_await(&machine, true));
-  CHECK(calibrate("\\n\\n\\n", "") != 0);
-  CHECK(said("record more"));
+  CHECK(model_calibrate("\\n\\n\\n", "") != 0);
+  CHECK(output_said("record more"));
   CHECK(!was_written());
   CHECK(emulated_await(&machine, true));
-  CHECK(calibrate("\\n\\n", "--seconds 0.5") != 0); /* at home still */
-  CHECK(said("move the grip further"));
+  CHECK(model_calibrate("\\n\\n", "--seconds 0.5") != 0); /* at home still */
+  CHECK(output_said("move the grip further"));
   CHECK(!was_written());
 }
 
 TEST(nothing_is_written_when_nobody_is_there_or_the_cable_is_pulled)
 {
   CHECK(emulated_await(&machine, true));
-  CHECK(calibrate("", "") != 0);
+  CHECK(model_calibrate("", "") != 0);
   CHECK(!was_written());
   REQUIRE(emulated_tell(&machine, "hand hold"));
   pid_t child = fork();
@@ -215,8 +215,8 @@ TEST(nothing_is_written_when_nobody_is_there_or_the_cable_is_pulled)
     emulated_sleep(1.5);
     _exit(emulated_tell(&machine, "unplug") ? 0 : 1);
   }
-  CHECK(calibrate("\\n\\n", "") == 1);
-  CHECK(said("cable"));
+  CHECK(model_calibrate("\\n\\n", "") == 1);
+  CHECK(output_said("cable"));
   CHECK(!was_written());
   CHECK(waitpid(child, NULL, 0) == child);
 }
@@ -236,6 +236,6 @@ SET_UP
   snprintf(found_path, sizeof found_path, "%s", folder_path("found.txt"));
   snprintf(said_path, sizeof said_path, "%s", folder_path("said"));
   tap_at_end(machine_stop);
-  return (bend() && start_machine()) ||
+  return (model_bend() && start_machine()) ||
          tap_skip_all("no emulator, or no pseudo-terminal: set HAPODE_SPIDAR_EMULATOR");
 }

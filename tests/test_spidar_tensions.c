@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Tensions of string devices: the exact solution of their box-constrained problem, wrenches reached, steadiness,
- * and the heat of the motors. With the argument "long" 1e5 problems are held against all active sets. */
+/* Tensions of string devices: the exact solution of their box-constrained problem, wrenches
+ * reached, steadiness, and the heat of the motors. With the argument "long" 1e5 problems are
+ * held against all active sets. */
 
 #include "tests/tap.h"
 
@@ -127,7 +128,8 @@ static void random_direction(uint64_t *seed, double out[3])
   hapi_v3_scale(1.0 / size, v, out);
 }
 
-/* At the centre of the workspace, that is home for all but one: 0.97 of 1 N and 0.975 of 0.02 N m at least. */
+/* At the centre of the workspace, that is home for all but one: 0.97 of 1 N and 0.975 of 0.02 N
+ * m at least. */
 TEST(small_wrenches_are_reached)
 {
   uint64_t seed = 4;
@@ -249,8 +251,8 @@ TEST(what_is_not_finite_gives_no_force)
 
 /* ---- steadiness ---- */
 
-/* The tensions are a continuous function: a small step of pose and wrench makes a small one of theirs, whichever
- * strings come to a bound. No rate limit here. */
+/* The tensions are a continuous function: a small step of pose and wrench makes a small one of
+ * theirs, whichever strings come to a bound. No rate limit here. */
 TEST(tensions_do_not_jump)
 {
   uint64_t seed = 6;
@@ -322,7 +324,8 @@ TEST(the_rate_is_kept)
 
 /* ---- heat ---- */
 
-/* A motor that is asked for all it has: full for a while, then down to what it bears, smoothly, never too hot. */
+/* A motor that is asked for all it has: full for a while, then down to what it bears, smoothly,
+ * never too hot. */
 TEST(motors_do_not_get_too_hot)
 {
   static const double steps[] = {0.001, 0.01, 0.1};

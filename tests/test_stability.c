@@ -104,8 +104,8 @@ TEST(coupling_is_not_softer_than_the_device_allows)
   }
 }
 
-/* The cubes are so near to each other that there is no room for all contacts that may come to be, and
- * only their supports hold them. */
+/* The cubes are so near to each other that there is no room for all contacts that may come to
+ * be, and only their supports hold them. */
 TEST(many_light_cubes_are_all_felt)
 {
   static const double masses[] = {1e-3, 1e-2, 0.1};

@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* The table of stability cases, tests/stability/cases.c: one TAP line for each case and each model that
- * claims it, the worst figures in a comment before it. With the argument "all" the other models are run
- * and printed too; any other argument selects the cases whose names contain it. */
+/* The table of stability cases, tests/stability/cases.c: one TAP line for each case and each
+ * model that claims it, the worst figures in a comment before it. With the argument "all" the
+ * other models are run and printed too; any other argument selects the cases whose names contain
+ * it. */
 
 #include "tests/tap.h"
 

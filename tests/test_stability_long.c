@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* What takes minutes of the stability tests: 1e7 ticks in contact, and sweeps of stiffness, mass and
- * number of contacts. Argument: a seed for the hands and devices of the last sweep. */
+/* What takes minutes of the stability tests: 1e7 ticks in contact, and sweeps of stiffness, mass
+ * and number of contacts. Argument: a seed for the hands and devices of the last sweep. */
 
 #include "tests/tap.h"
 
@@ -13,7 +13,7 @@
 
 static uint64_t seed = 1;
 
-static unsigned draw(unsigned below)
+static unsigned random_draw(unsigned below)
 {
   seed = seed * 6364136223846793005u + 1442695040888963407u;
   return (unsigned)(seed >> 33) % below;
@@ -66,22 +66,22 @@ TEST(sweep_of_a_cube_pushed)
 static bench unused; /* takes the text of an error */
 
 /* Hand, device and layout by chance. */
-static stability_point choose(double k, double mass, int contacts, bool cubes)
+static stability_point case_choose(double k, double mass, int contacts, bool cubes)
 {
   stability_point p = {.integration = HAP_INTEGRATION_AUTO, .coupling = HAP_COUPLING_AUTO};
   p.stiffness = k;
   p.mass = mass;
   p.contacts = contacts;
   p.cubes = cubes;
-  p.layout = contacts == 1 ? (stability_layout)draw(2) : (stability_layout)draw(3);
-  p.hand = (stability_hand)draw(3);
-  if (draw(2) == 0) {
+  p.layout = contacts == 1 ? (stability_layout)random_draw(2) : (stability_layout)random_draw(3);
+  p.hand = (stability_hand)random_draw(3);
+  if (random_draw(2) == 0) {
     p.integration = HAP_INTEGRATION_IMPLICIT;
     p.coupling = HAP_COUPLING_PROXY;
   }
-  p.delay_ticks = 0.5 * draw(5);
-  p.quantum = draw(2) == 0 ? 0.0 : 3e-5;
-  p.missed = draw(2) == 0;
+  p.delay_ticks = 0.5 * random_draw(5);
+  p.quantum = random_draw(2) == 0 ? 0.0 : 3e-5;
+  p.missed = random_draw(2) == 0;
   return p;
 }
 
@@ -106,7 +106,7 @@ static void sweep_many(bool cubes)
   for (int n = 1; n <= 64; n *= 2) {
     for (int i = 0; i <= 6; ++i) {
       for (int j = -3; j <= 3; ++j) {
-        const stability_point p = choose(pow(10.0, i), pow(10.0, j), n, cubes);
+        const stability_point p = case_choose(pow(10.0, i), pow(10.0, j), n, cubes);
         sweep_point(&p);
       }
     }

@@ -12,7 +12,7 @@ static const hap_model all_models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_
                                        HAP_MODEL_CONTACT};
 
 /* Flat above the floor, then down to a depth. */
-static void press(tool_world *w, double depth, double angle)
+static void tool_press(tool_world *w, double depth, double angle)
 {
   tool_go(w, 0.0, 0.0, HALF + 0.004, angle);
   tool_run(w, 60);
@@ -26,7 +26,7 @@ TEST(a_flat_push_feels_the_stiffness)
     tool_world *w = tool_new(all_models[i]);
     tool_add_floor(w);
     CHECK(tool_start(w));
-    press(w, 0.002, 0.0);
+    tool_press(w, 0.002, 0.0);
     CHECK(w->state.contacts == 4);
     CHECK_NEAR(w->state.wrench.force[2], K * 0.002, 1e-9);
     CHECK_NEAR(hapi_v3_norm(w->state.wrench.torque), 0.0, 1e-12);
@@ -43,7 +43,7 @@ TEST(the_torque_is_about_the_pointers_origin)
     tool_set_box(w, half, middle);
     tool_add_floor(w);
     CHECK(tool_start(w));
-    press(w, 0.001, 0.0);
+    tool_press(w, 0.001, 0.0);
     CHECK_NEAR(w->state.wrench.force[2], 1.0, 1e-9);
     CHECK_NEAR(w->state.wrench.torque[0], 0.02, 1e-10); /* arm x force */
     CHECK_NEAR(w->state.wrench.torque[1], -0.05, 1e-10);
@@ -52,8 +52,8 @@ TEST(the_torque_is_about_the_pointers_origin)
   }
 }
 
-/* Four springs of k/4 at the corners: k HALF^2 about the middle of the face. About the pointer's origin, which
- * is HALF above, the force adds its own arm, which is of the second order. */
+/* Four springs of k/4 at the corners: k HALF^2 about the middle of the face. About the pointer's
+ * origin, which is HALF above, the force adds its own arm, which is of the second order. */
 TEST(a_tilted_face_turns_back_as_a_bed_of_springs)
 {
   for (int i = 0; i < 4; ++i) {
@@ -61,7 +61,7 @@ TEST(a_tilted_face_turns_back_as_a_bed_of_springs)
     tool_world *w = tool_new(all_models[i]);
     tool_add_floor(w);
     CHECK(tool_start(w));
-    press(w, 0.002, 0.0);
+    tool_press(w, 0.002, 0.0);
     tool_move(w, 0.0, 0.0, HALF - 0.002, angle, 50);
     tool_run(w, 50);
     double lever = HALF * sin(angle) * w->state.wrench.force[2]; /* of the face's middle */
@@ -78,7 +78,7 @@ TEST(no_force_jumps_when_a_tool_tilts_through_flat)
     tool_world *w = tool_new(all_models[i]);
     tool_add_floor(w);
     CHECK(tool_start(w));
-    press(w, 0.002, 0.0);
+    tool_press(w, 0.002, 0.0);
     tool_move(w, 0.0, 0.0, HALF - 0.002, 0.3, 500);
     w->steepest = w->steepest_torque = 0.0;
     tool_move(w, 0.0, 0.0, HALF - 0.002, -0.3, 1000);
@@ -216,7 +216,8 @@ TEST(every_shape_is_felt_with_the_stiffness)
   }
 }
 
-/* Over the seams of a fan of triangles, level and a little tilted: as over the plane that they are. */
+/* Over the seams of a fan of triangles, level and a little tilted: as over the plane that they
+ * are. */
 static dGeomID make_fan(dSpaceID space)
 {
   static float corners[9 * 3] = {0.003f, 0.001f, 0.0f};
@@ -313,7 +314,7 @@ TEST(the_callers_points_may_go)
   tool_add_floor(w);
   CHECK(tool_start(w));
   memset(w->hull, 0, sizeof w->hull);
-  press(w, 0.001, 0.0);
+  tool_press(w, 0.001, 0.0);
   CHECK_NEAR(w->state.wrench.force[2], 1.0, 1e-9);
 }
 
@@ -377,8 +378,8 @@ TEST(torque_is_scaled_by_force_over_motion)
 
 #define KV 2000.0
 
-/* Mean square of the vertices' distances from the pointer's origin, at most 50 mm: the arm of its angular
- * spring. */
+/* Mean square of the vertices' distances from the pointer's origin, at most 50 mm: the arm of
+ * its angular spring. */
 static double spin_stiffness(const tool_world *w)
 {
   double sum = 0.0;
@@ -400,7 +401,7 @@ TEST(a_tools_proxy_yields_along_and_turns)
   w->tool_expert.coupling_damping = 5.0;
   tool_add_floor(w);
   CHECK(tool_start(w));
-  press(w, 0.0003, 0.0);
+  tool_press(w, 0.0003, 0.0);
   tool_run(w, 500);
   double kr = spin_stiffness(w);
   double force = w->state.wrench.force[2];
@@ -430,13 +431,14 @@ TEST(a_tools_proxy_is_two_springs_in_a_row)
   w->tool_expert.coupling_damping = 5.0;
   tool_add_floor(w);
   CHECK(tool_start(w));
-  press(w, 0.003, 0.0);
+  tool_press(w, 0.003, 0.0);
   tool_run(w, 300);
   CHECK_NEAR(w->state.wrench.force[2], 0.003 * K * KV / (K + KV), 1e-6);
   CHECK_NEAR(hapi_v3_norm(w->state.wrench.torque), 0.0, 1e-9);
 }
 
-/* A spinning device in the air: the proxy turns with it, and the hand feels no torque of its own. */
+/* A spinning device in the air: the proxy turns with it, and the hand feels no torque of its
+ * own. */
 TEST(a_tools_proxy_turns_with_the_device)
 {
   tool_world *w = tool_new(HAP_MODEL_CONTACT);
@@ -462,7 +464,8 @@ typedef struct swing {
   double late_torque; /* N m */
 } swing;
 
-/* A light mechanism with a tool of which nobody holds more than a finger, against a wall of 20 kN/m. */
+/* A light mechanism with a tool of which nobody holds more than a finger, against a wall of 20
+ * kN/m. */
 static swing strike_wall(hap_coupling coupling)
 {
   swing out = {0.0, 0.0};

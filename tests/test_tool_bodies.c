@@ -35,7 +35,8 @@ typedef struct motion {
   double end[3];
 } motion;
 
-/* A cube of 0.5 kg on the floor is pushed along by the tool's corner beside its middle, so that it turns. */
+/* A cube of 0.5 kg on the floor is pushed along by the tool's corner beside its middle, so that
+ * it turns. */
 static void push_cube(hap_model model, double physics_hz, motion *out)
 {
   static const double half[3] = {0.025, 0.025, 0.025};
@@ -162,8 +163,8 @@ TEST(momentum_and_spin_go_to_a_free_body)
   }
 }
 
-/* With a shape that the loop does not know the body is measured, and a tool that meets it first of all has its
- * response as well. */
+/* With a shape that the loop does not know the body is measured, and a tool that meets it first
+ * of all has its response as well. */
 TEST(a_measured_body_answers_to_a_tool)
 {
   static const double half[3] = {0.02, 0.02, 0.02};
@@ -249,8 +250,8 @@ TEST(a_tool_that_arrives_deep_comes_in_slowly)
   }
 }
 
-/* A stack of three cubes of 2 g under a tool that presses, tilts and turns on it: it stays, and the hand gets
- * nothing back that it did not put in. */
+/* A stack of three cubes of 2 g under a tool that presses, tilts and turns on it: it stays, and
+ * the hand gets nothing back that it did not put in. */
 TEST(a_stack_of_light_cubes_stays_calm_under_a_tool)
 {
   static const double half[3] = {HALF, HALF, HALF};
@@ -303,8 +304,8 @@ TEST(a_tool_wedged_between_walls_is_held_in_the_middle)
   }
 }
 
-/* Flat onto the floor, tilted, off in that tilt, and back in the air: a round by which the shares of the
- * points make energy. */
+/* Flat onto the floor, tilted, off in that tilt, and back in the air: a round by which the
+ * shares of the points make energy. */
 static double go_rounds(hap_model model, hap_guard guard, double *out_stored)
 {
   tool_world *w = tool_new(model);

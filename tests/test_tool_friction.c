@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Friction of pointers that are hulls, against things that do not move: closed forms of sticking, sliding
- * and turning, what comes and goes while it sticks, energy. */
+/* Friction of pointers that are hulls, against things that do not move: closed forms of
+ * sticking, sliding and turning, what comes and goes while it sticks, energy. */
 
 #include "tests/tap.h"
 
@@ -31,14 +31,14 @@ static const ground grounds[] = {
 #define GROUNDS (sizeof grounds / sizeof grounds[0])
 
 /* Turned by an angle about the vertical. */
-static void stand(tool_world *w, double x, double y, double z, double angle)
+static void tool_stand(tool_world *w, double x, double y, double z, double angle)
 {
   w->pose = (hap_pose){{x, y, z}, {cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle)}};
   memset(&w->twist, 0, sizeof w->twist);
 }
 
 /* With its face flat on the ground, pressed into it. */
-static tool_world *press(const ground *g)
+static tool_world *tool_press(const ground *g)
 {
   tool_world *w = tool_new(g->model);
   w->tool_def.friction = MU;
@@ -63,7 +63,7 @@ static tool_world *press(const ground *g)
 }
 
 /* N/m, of the contact, and behind a proxy of both springs. */
-static double felt(const ground *g)
+static double tool_felt(const ground *g)
 {
   return g->proxied ? K / (1.0 + K / 1e6) : K;
 }
@@ -77,13 +77,13 @@ static double slip_of(const tool_world *w)
 TEST(a_face_sticks_as_a_spring)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
-    tool_world *w = press(&grounds[i]);
+    tool_world *w = tool_press(&grounds[i]);
     REQUIRE(w != NULL);
-    double k = felt(&grounds[i]);
+    double k = tool_felt(&grounds[i]);
     CHECK_NEAR(w->state.wrench.force[2], k * DEEP, 1e-3 * LOAD);
     CHECK(slip_of(w) < 1e-6);
     CHECK(w->state.contacts == 4);
-    stand(w, 4e-4, -3e-4, HALF - DEEP, 0.0);
+    tool_stand(w, 4e-4, -3e-4, HALF - DEEP, 0.0);
     tool_run(w, 300);
     CHECK_NEAR(w->state.wrench.force[0], -k * 4e-4, 1e-3 * k * 4e-4);
     CHECK_NEAR(w->state.wrench.force[1], k * 3e-4, 1e-3 * k * 3e-4);
@@ -97,13 +97,13 @@ TEST(a_face_sticks_as_a_spring)
 TEST(a_face_slides_as_coulomb_says)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
-    tool_world *w = press(&grounds[i]);
+    tool_world *w = tool_press(&grounds[i]);
     REQUIRE(w != NULL);
     for (int j = 0; j < 8; ++j) {
       double angle = 2.0 * M_PI * (j + 0.3) / 8.0;
       tool_move(w, 0.01 * cos(angle), 0.01 * sin(angle), HALF - DEEP, 0.0, 200);
       double limit = MU * w->state.wrench.force[2];
-      CHECK_NEAR(w->state.wrench.force[2], felt(&grounds[i]) * DEEP, 1e-3 * LOAD);
+      CHECK_NEAR(w->state.wrench.force[2], tool_felt(&grounds[i]) * DEEP, 1e-3 * LOAD);
       CHECK_NEAR(slip_of(w), limit, 1e-3 * limit);
       tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 200);
       CHECK_NEAR(w->state.wrench.force[0], limit * cos(angle), 2e-3 * limit);
@@ -113,25 +113,26 @@ TEST(a_face_slides_as_coulomb_says)
   }
 }
 
-/* All points are at r from the middle: k r^2 phi, and mu N r; with soft fingers of radius a at each, one
- * limit for both: r^2 + a^2 for r^2. A stretch that is dragged round points along the way of its end that
- * is left behind: that takes the cosine of its angle as seen from the middle. */
+/* All points are at r from the middle: k r^2 phi, and mu N r; with soft fingers of radius a at
+ * each, one limit for both: r^2 + a^2 for r^2. A stretch that is dragged round points along the
+ * way of its end that is left behind: that takes the cosine of its angle as seen from the
+ * middle. */
 TEST(a_face_holds_against_turning)
 {
   for (size_t i = 0; i < GROUNDS; ++i) {
     double a = grounds[i].finger;
     double radius = sqrt(2.0 * HALF * HALF + a * a);
-    tool_world *w = press(&grounds[i]);
+    tool_world *w = tool_press(&grounds[i]);
     REQUIRE(w != NULL);
-    double k = felt(&grounds[i]) * radius * radius;
+    double k = tool_felt(&grounds[i]) * radius * radius;
     for (int j = 1; j <= 5; ++j) {
-      stand(w, 0.0, 0.0, HALF - DEEP, 0.01 * j);
+      tool_stand(w, 0.0, 0.0, HALF - DEEP, 0.01 * j);
       tool_run(w, 20);
       CHECK_NEAR(w->state.wrench.torque[2], -k * 0.01 * j, 2e-3 * k * 0.01 * j);
     }
     CHECK(slip_of(w) < 1e-6);
     for (int j = 0; j < 300; ++j) {
-      stand(w, 0.0, 0.0, HALF - DEEP, 0.05 + 1e-3 * j);
+      tool_stand(w, 0.0, 0.0, HALF - DEEP, 0.05 + 1e-3 * j);
       w->twist.angular[2] = 1.0;
       tool_step(w);
     }
@@ -145,8 +146,8 @@ TEST(a_face_holds_against_turning)
 
 /* ---- what sticks stays ---- */
 
-/* A hand of 0.2 kg that pushes with a force and a torque about the vertical, and rests on the tool with its
- * weight; its wrist tilts a little all the time. */
+/* A hand of 0.2 kg that pushes with a force and a torque about the vertical, and rests on the
+ * tool with its weight; its wrist tilts a little all the time. */
 typedef struct hand {
   double at[3];
   double speed[3];
@@ -211,7 +212,7 @@ typedef struct crept {
 } crept;
 
 /* In that time, in which it tilts; level before and after. */
-static crept creep(const rest *r, int ticks)
+static crept tool_creep(const rest *r, int ticks)
 {
   crept out = {HUGE_VAL, HUGE_VAL};
   tool_world *w = tool_new(r->model);
@@ -274,7 +275,7 @@ TEST(a_face_that_sticks_does_not_creep)
   };
   for (size_t i = 0; i < sizeof rests / sizeof rests[0]; ++i) {
     const rest *r = &rests[i];
-    crept c = creep(r, 10000);
+    crept c = tool_creep(r, 10000);
     printf("# %s%s%s%s, %.1f and %.1f of the limit, tilt %.3f: %.3f um, %.2g rad in 10 s\n",
            hap_model_name(r->model), r->round ? ", round" : "", r->narrow ? ", at an edge" : "",
            r->proxied ? ", proxy" : "", r->share, r->twist, r->tilt, 1e6 * c.way, c.turn);
@@ -289,9 +290,9 @@ TEST(a_change_of_model_lets_nothing_go)
   static const hap_model next[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT, HAP_MODEL_ACCELERANCE,
                                    HAP_MODEL_IMPULSE, HAP_MODEL_CONTACT};
   const ground g = {HAP_MODEL_CONTACT, true, false, 0.005};
-  tool_world *w = press(&g);
+  tool_world *w = tool_press(&g);
   REQUIRE(w != NULL);
-  stand(w, 4e-4, 0.0, HALF - DEEP, 0.02);
+  tool_stand(w, 4e-4, 0.0, HALF - DEEP, 0.02);
   tool_run(w, 50);
   double force = w->state.wrench.force[0];
   double torque = w->state.wrench.torque[2];
@@ -305,7 +306,8 @@ TEST(a_change_of_model_lets_nothing_go)
   }
 }
 
-/* A device of 3 dof does not turn its tool, and gets no torque; a world that turns under it does not move it. */
+/* A device of 3 dof does not turn its tool, and gets no torque; a world that turns under it does
+ * not move it. */
 TEST(a_device_without_torque_feels_it_slide)
 {
   tool_world *w = tool_new(HAP_MODEL_CONTACT);
@@ -326,8 +328,8 @@ TEST(a_device_without_torque_feels_it_slide)
   hap_device_close(device);
 }
 
-/* On a box that is smaller than the face and shrinks: its corners are the same points of the patch as
- * before, and hold what they held, but where they are now. */
+/* On a box that is smaller than the face and shrinks: its corners are the same points of the
+ * patch as before, and hold what they held, but where they are now. */
 TEST(points_that_leap_hold_where_they_are)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
@@ -340,7 +342,7 @@ TEST(points_that_leap_hold_where_they_are)
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
     tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
-    stand(w, 2e-4, 0.0, HALF - DEEP, 0.04);
+    tool_stand(w, 2e-4, 0.0, HALF - DEEP, 0.04);
     tool_run(w, 40);
     double stiffness = 2.0 * K * 0.008 * 0.008;
     CHECK_NEAR(w->state.wrench.torque[2], -stiffness * 0.04, 0.02 * stiffness * 0.04);
@@ -355,7 +357,8 @@ TEST(points_that_leap_hold_where_they_are)
   }
 }
 
-/* Over the seam between two triangles: held as by a floor, along and about the normal, and no more. */
+/* Over the seam between two triangles: held as by a floor, along and about the normal, and no
+ * more. */
 TEST(a_mesh_holds_as_a_floor)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_ACCELERANCE, HAP_MODEL_CONTACT};
@@ -372,10 +375,10 @@ TEST(a_mesh_holds_as_a_floor)
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
     tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
-    stand(w, 4e-4, 0.0, HALF - DEEP, 0.0);
+    tool_stand(w, 4e-4, 0.0, HALF - DEEP, 0.0);
     tool_run(w, 1000);
     CHECK_NEAR(w->state.wrench.force[0], -K * 4e-4, 1e-3 * K * 4e-4);
-    stand(w, 0.0, 0.0, HALF - DEEP, 0.02);
+    tool_stand(w, 0.0, 0.0, HALF - DEEP, 0.02);
     tool_run(w, 1000);
     double stiffness = 2.0 * K * HALF * HALF;
     CHECK_NEAR(w->state.wrench.torque[2], -stiffness * 0.02, 2e-3 * stiffness * 0.02);
@@ -404,7 +407,8 @@ static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, do
   *io_mu = asked.says[geom == asked.left ? 0 : 1];
 }
 
-/* Across two boxes of which each has a friction of its own: the sum of both, and the moment between them. */
+/* Across two boxes of which each has a friction of its own: the sum of both, and the moment
+ * between them. */
 TEST(each_geom_has_its_friction)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
@@ -527,8 +531,9 @@ static void go_to(tool_world *w, const station *from, const station *to, int tic
   }
 }
 
-/* Held with all that friction can, turned on an edge, laid down flat, turned back on the other edge and taken
- * off: the shares change between points that were pulled by unlike ways. J of the best round for the hand. */
+/* Held with all that friction can, turned on an edge, laid down flat, turned back on the other
+ * edge and taken off: the shares change between points that were pulled by unlike ways. J of the
+ * best round for the hand. */
 static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored)
 {
   static const station stations[] = {{0, 0.07, 0},     {0, 0.07, 0.06}, {0, 0, 0.06},
@@ -574,7 +579,8 @@ TEST(turning_on_edges_gives_no_energy)
   }
 }
 
-/* Each round ends where it began, and nothing slides: what the hand puts in it gets back, and no more. */
+/* Each round ends where it began, and nothing slides: what the hand puts in it gets back, and no
+ * more. */
 TEST(no_round_that_sticks_gives_energy)
 {
   static const station rounds[][5] = {
@@ -584,7 +590,7 @@ TEST(no_round_that_sticks_gives_energy)
   };
   for (size_t i = 0; i < GROUNDS; ++i) {
     for (int r = 0; r < 6; ++r) { /* and the other way round */
-      tool_world *w = press(&grounds[i]);
+      tool_world *w = tool_press(&grounds[i]);
       REQUIRE(w != NULL);
       w->work = w->work_most = 0.0;
       for (int j = 0; j < 5; ++j) {

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Pointers that are hulls drag, turn and hold bodies by friction: against the world stepped at the haptic
- * rate, against momentum, and for how long. */
+/* Pointers that are hulls drag, turn and hold bodies by friction: against the world stepped at
+ * the haptic rate, against momentum, and for how long. */
 
 #include "tests/tap.h"
 
@@ -146,8 +146,8 @@ TEST(a_block_is_dragged_as_if_the_world_were_stepped_at_the_haptic_rate)
   }
 }
 
-/* Model accelerance knows by a testing simulation of its own what a torque of soft fingers does to a body: a block on
- * ice turns with the tool. */
+/* Model accelerance knows by a testing simulation of its own what a torque of soft fingers does
+ * to a body: a block on ice turns with the tool. */
 TEST(accelerance_turns_a_block_by_soft_fingers)
 {
   static const drag how = {"", 0.9, 0.0, 0.0, 0.6, 0.03, false};
@@ -181,8 +181,8 @@ TEST(lockstep_repeats)
 
 /* ---- what one gives the other gets ---- */
 
-/* Into the face at x = -EDGE / 2 beside its middle, along it, and turning; N s and N m s about the origin of
- * what the tool gave. */
+/* Into the face at x = -EDGE / 2 beside its middle, along it, and turning; N s and N m s about
+ * the origin of what the tool gave. */
 static void press_and_turn(tool_world *w, double impulse[3], double turn[3])
 {
   tool_go(w, -EDGE / 2 - HALF - 0.002, 0.004, 0.012, 0.0);
@@ -205,8 +205,8 @@ static void press_and_turn(tool_world *w, double impulse[3], double turn[3])
   }
 }
 
-/* A free body, pressed by the tool beside its middle, dragged along and turned, then let go. The last one is
- * measured by testing simulations. */
+/* A free body, pressed by the tool beside its middle, dragged along and turned, then let go. The
+ * last one is measured by testing simulations. */
 TEST(momentum_and_spin_go_to_a_free_body)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,

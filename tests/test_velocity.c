@@ -41,12 +41,12 @@ typedef struct track {
 
 static track t;
 
-static double position(const motion *m, double time)
+static double motion_position(const motion *m, double time)
 {
   return 0.0123456 + m->ramp * time + m->amplitude * sin(2.0 * PI * m->hz * time);
 }
 
-static double speed(const motion *m, double time)
+static double motion_speed(const motion *m, double time)
 {
   return m->ramp + 2.0 * PI * m->hz * m->amplitude * cos(2.0 * PI * m->hz * time);
 }
@@ -63,7 +63,7 @@ static double slope_of_last(const double *x, int count)
   return product / square * 1e3;
 }
 
-static void run(const motion *m)
+static void motion_run(const motion *m)
 {
   static double x[TICKS];
   hapi_velocity velocity;
@@ -71,10 +71,10 @@ static void run(const motion *m)
   for (int i = 0; i < TICKS; ++i) {
     hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
     hap_twist twist;
-    x[i] = QUANTUM * round(position(m, i * 1e-3) / QUANTUM);
+    x[i] = QUANTUM * round(motion_position(m, i * 1e-3) / QUANTUM);
     pose.position[1] = x[i];
     hapi_velocity_update(&velocity, i * MS, &pose, &twist);
-    t.truth[i] = speed(m, i * 1e-3);
+    t.truth[i] = motion_speed(m, i * 1e-3);
     t.adaptive[i] = twist.linear[1];
     t.plain[i] = i > 0 ? (x[i] - x[i - 1]) * 1e3 : 0.0;
     t.fixed[i] = i >= WINDOW ? slope_of_last(&x[i], WINDOW) : 0.0;
@@ -92,7 +92,7 @@ static double rms_error(const double *estimate, int shift)
 }
 
 /* Ticks by which the estimate is behind: where its error is least. */
-static int lag(const double *estimate)
+static int estimate_lag(const double *estimate)
 {
   int best = 0;
   for (int shift = 1; shift < 20; ++shift) {
@@ -107,7 +107,7 @@ TEST(ramps_are_smooth_where_differences_jump)
   static const double ramps[] = {0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0};
   for (int k = 0; k < 7; ++k) {
     motion m = {ramps[k] * 1.0137, 0.0, 0.0};
-    run(&m);
+    motion_run(&m);
     double adaptive = rms_error(t.adaptive, 0);
     double plain = rms_error(t.plain, 0);
     double fixed = rms_error(t.fixed, 0);
@@ -125,18 +125,18 @@ TEST(sines_lag_less_the_faster_they_turn)
   int before = 100;
   for (int k = 0; k < 6; ++k) {
     motion m = {0.0, 1e-3 * sines[k][0], sines[k][1]};
-    run(&m);
+    motion_run(&m);
     double w = 2.0 * PI * m.hz;
     double worst = w * w * m.amplitude; /* m/s^2 */
     printf("# %5g %4g: %.2f (%d) %.2f (%d) %.2f (%d)\n", sines[k][0], sines[k][1],
-           1e3 * rms_error(t.adaptive, 0), lag(t.adaptive), 1e3 * rms_error(t.plain, 0),
-           lag(t.plain), 1e3 * rms_error(t.fixed, 0), lag(t.fixed));
+           1e3 * rms_error(t.adaptive, 0), estimate_lag(t.adaptive), 1e3 * rms_error(t.plain, 0),
+           estimate_lag(t.plain), 1e3 * rms_error(t.fixed, 0), estimate_lag(t.fixed));
     /* a window over which the motion curves by a quantum: sqrt(8 q / a); half of it is the lag */
     double bound = sqrt(8.0 * QUANTUM / worst);
-    CHECK(lag(t.adaptive) <= 1 + (int)(0.5e3 * 1.5 * bound));
+    CHECK(estimate_lag(t.adaptive) <= 1 + (int)(0.5e3 * 1.5 * bound));
     CHECK(rms_error(t.adaptive, 0) < 0.5 * worst * bound + QUANTUM * 1e3 * 0.3);
-    CHECK(lag(t.adaptive) <= before);
-    before = lag(t.adaptive);
+    CHECK(estimate_lag(t.adaptive) <= before);
+    before = estimate_lag(t.adaptive);
   }
   CHECK(before <= 1); /* at 70 m/s^2 two samples are the window */
 }
@@ -144,7 +144,7 @@ TEST(sines_lag_less_the_faster_they_turn)
 TEST(rest_is_zero)
 {
   motion m = {0.0, 0.0, 0.0};
-  run(&m);
+  motion_run(&m);
   for (int i = 0; i < TICKS; ++i) {
     CHECK(t.adaptive[i] == 0.0);
   }

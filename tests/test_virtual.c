@@ -332,7 +332,7 @@ static void reference_step(double t, double h, double state[2])
 
 /* The pull of the script is taken as straight within 1 ms: an error of the second order, for the
  * sine (2 pi 5 Hz 1 ms)^2 / 12 of 10 mm, times 1.5 as the hand is near its resonance. */
-static void follow(int64_t step_ns)
+static void path_follow(int64_t step_ns)
 {
   double share = pow(fmin((double)step_ns / 1e6, 1.0), 2.0);
   device_rig *r = rig_new("virtual:path=0:0/0/0;0.4:0.1/0/0,sine=0.01/0/0,hz=5,hand=tense");
@@ -355,10 +355,10 @@ static void follow(int64_t step_ns)
 
 TEST(hand_follows_the_script)
 {
-  follow(1000000);
-  follow(250000);
-  follow(20000000); /* the script is still looked at every millisecond */
-  follow(500000000);
+  path_follow(1000000);
+  path_follow(250000);
+  path_follow(20000000); /* the script is still looked at every millisecond */
+  path_follow(500000000);
 }
 
 TEST(reads_are_reproducible)
@@ -401,8 +401,8 @@ TEST(a_rigid_hand_turns_by_its_script)
   CHECK_NEAR(r->twist.angular[0], 0.0, 1e-12);
 }
 
-/* Held on: the angle at which the wrist's spring balances the torque; and the first instant, in which it is
- * an inertia alone. */
+/* Held on: the angle at which the wrist's spring balances the torque; and the first instant, in
+ * which it is an inertia alone. */
 TEST(a_wrist_gives_way_to_a_torque)
 {
   hap_wrench twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.3}};

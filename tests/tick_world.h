@@ -184,12 +184,12 @@ static inline void set_free(hapi_model_contact *c, double mass, double inertia)
   }
 }
 
-static inline void adopt(void)
+static inline void model_adopt(void)
 {
   hapi_tick_adopt(&f.tick, f.model, f.now_ns);
 }
 
-static inline void run(int ticks)
+static inline void ticks_run(int ticks)
 {
   for (int i = 0; i < ticks; ++i) {
     hapi_tick_run(&f.tick, f.now_ns);
@@ -197,7 +197,7 @@ static inline void run(int ticks)
   }
 }
 
-static inline hapi_state *report(void)
+static inline hapi_state *tick_report(void)
 {
   hapi_state *state = hapi_exchange_state_back(f.exchange);
   hapi_tick_report(&f.tick, state);
@@ -218,8 +218,8 @@ static inline hapi_pointer *pointer_before_wall(void)
   hapi_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
-  adopt();
-  run(1);
+  model_adopt();
+  ticks_run(1);
   return p;
 }
 

@@ -3,8 +3,8 @@
 #ifndef HAPODE_TESTS_TOOL_WORLD_H
 #define HAPODE_TESTS_TOOL_WORLD_H
 
-/* A lockstep session with a pointer that is a hull, a cube of 20 mm if nothing else is said, moved by
- * the test. Public API only. Include after tap.h. */
+/* A lockstep session with a pointer that is a hull, a cube of 20 mm if nothing else is said,
+ * moved by the test. Public API only. Include after tap.h. */
 
 #include <math.h>
 #include <string.h>

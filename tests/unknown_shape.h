@@ -3,8 +3,8 @@
 #ifndef HAPODE_TESTS_UNKNOWN_SHAPE_H
 #define HAPODE_TESTS_UNKNOWN_SHAPE_H
 
-/* A geom that touches nothing, of a shape that the loop does not know: the body that has it is moved by what
- * testing simulations say. */
+/* A geom that touches nothing, of a shape that the loop does not know: the body that has it is
+ * moved by what testing simulations say. */
 
 #include <ode/ode.h>
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""with_emulator.py [--todo POINT] EMULATOR [ARGUMENTS] -- HAPODE_RUN --check-device...: checks a device while the
-spidar-emulator runs; {port} in the words becomes the emulated port. Exit status: that of the check. POINT is one
-that is known to be off, and must be.
+"""with_emulator.py [--todo POINT] EMULATOR [ARGUMENTS] -- HAPODE_RUN --check-device...: checks a
+device while the spidar-emulator runs; {port} in the words becomes the emulated port. Exit status:
+that of the check. POINT is one that is known to be off, and must be.
 
-Both live in real time. Where SCHED_FIFO is not allowed and the machine is busy, a tick that is missed looks like
-a device whose poses and twists do not fit: then the check is one without force, at rest."""
+Both live in real time. Where SCHED_FIFO is not allowed and the machine is busy, a tick that is
+missed looks like a device whose poses and twists do not fit: then the check is one without force,
+at rest."""
 import os
 import subprocess
 import sys
@@ -41,7 +42,8 @@ def main(words):
         print("# no SCHED_FIFO: without force", flush=True)
         words = words + ["--check-force", "0"]
     split = words.index("--")
-    emulator = subprocess.Popen(words[:split], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    emulator = subprocess.Popen(words[:split], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                text=True)
     try:
         line = emulator.stdout.readline()
         if not line.startswith("port: "):

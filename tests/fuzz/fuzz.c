@@ -15,7 +15,7 @@ static struct {
   atomic_bool failed;
 } heap;
 
-static void *allocate(size_t size, void *user)
+static void *counted_allocate(size_t size, void *user)
 {
   (void)user;
   if (atomic_fetch_add(&heap.calls, 1) + 1 == atomic_load(&heap.fail_at)) {
@@ -29,7 +29,7 @@ static void *allocate(size_t size, void *user)
   return memory;
 }
 
-static void release(void *memory, void *user)
+static void counted_release(void *memory, void *user)
 {
   (void)user;
   atomic_fetch_sub(&heap.lives, 1);
@@ -40,8 +40,8 @@ void fuzz_start(void)
 {
   hap_hooks hooks;
   hap_hooks_init(&hooks, sizeof hooks);
-  hooks.allocate = allocate;
-  hooks.release = release;
+  hooks.allocate = counted_allocate;
+  hooks.release = counted_release;
   FUZZ_CHECK(hap_hooks_set(&hooks) == HAP_OK);
 }
 
@@ -50,7 +50,7 @@ bool fuzz_starved(void)
   return atomic_load(&heap.failed);
 }
 
-static void run(const uint8_t *data, size_t size, long fail_at)
+static void input_run(const uint8_t *data, size_t size, long fail_at)
 {
   atomic_store(&heap.calls, 0);
   atomic_store(&heap.failed, false);
@@ -60,7 +60,7 @@ static void run(const uint8_t *data, size_t size, long fail_at)
 }
 
 /* Which allocation fails depends on the bytes alone, so that an input tells the same every time. */
-static long pick(const uint8_t *data, size_t size, long calls)
+static long failure_pick(const uint8_t *data, size_t size, long calls)
 {
   uint32_t hash = 2166136261u; /* FNV-1a */
   for (size_t i = 0; i < size; ++i) {
@@ -71,10 +71,10 @@ static long pick(const uint8_t *data, size_t size, long calls)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-  run(data, size, 0);
+  input_run(data, size, 0);
   long calls = atomic_load(&heap.calls);
   if (calls > 0) {
-    run(data, size, pick(data, size, calls));
+    input_run(data, size, failure_pick(data, size, calls));
   }
   return 0;
 }

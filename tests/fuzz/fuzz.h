@@ -29,15 +29,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 /* Whether an allocation of the running input was refused. */
 bool fuzz_starved(void);
 
-/* The bytes as a text, in a block of its own and of just its size, so that a sanitizer sees a reader
- * that goes beyond it. Ends at the first zero byte. Free it. */
+/* The bytes as a text, in a block of its own and of just its size, so that a sanitizer sees a
+ * reader that goes beyond it. Ends at the first zero byte. Free it. */
 char *fuzz_text(const uint8_t *data, size_t size);
 
 /* Fills it so that a text without end is seen. */
 void fuzz_detail_spoil(hap_detail *detail);
 
-/* What every reader owes: a refusal has no result and a text that ends; HAP_ERROR_MEMORY comes when,
- * and only when, an allocation was refused. */
+/* What every reader owes: a refusal has no result and a text that ends; HAP_ERROR_MEMORY comes
+ * when, and only when, an allocation was refused. */
 void fuzz_check_answer(hap_status status, const void *result, const hap_detail *detail);
 
 /* A file in memory with these bytes; path, of at least 40 bytes, opens it. Close the descriptor. */

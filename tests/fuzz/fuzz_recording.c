@@ -15,7 +15,7 @@ enum {
   OWN_BUILD = 4 /* and the machine and the library are this one's */
 };
 
-static void repair(uint8_t *data, size_t size, bool own_build)
+static void recording_repair(uint8_t *data, size_t size, bool own_build)
 {
   hapi_file_head head;
   size_t at = sizeof head;
@@ -99,7 +99,7 @@ void fuzz_one(const uint8_t *data, size_t size)
     memcpy(bytes, data, size - 1);
   }
   if ((how & REPAIRED) != 0) {
-    repair(bytes, size - 1, (how & OWN_BUILD) != 0);
+    recording_repair(bytes, size - 1, (how & OWN_BUILD) != 0);
   }
   int descriptor = fuzz_file(bytes, size > 0 ? size - 1 : 0, path, sizeof path);
   bool incomplete = (how & INCOMPLETE) != 0;

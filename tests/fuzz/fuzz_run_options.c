@@ -11,7 +11,7 @@
 #define ARGUMENTS_MAX 40
 
 /* Cuts text at its line ends; argv ends with NULL. */
-static int split(char *text, char **argv)
+static int text_split(char *text, char **argv)
 {
   static char name[] = "hapode-run";
   int count = 0;
@@ -91,7 +91,7 @@ void fuzz_one(const uint8_t *data, size_t size)
 {
   char *argv[ARGUMENTS_MAX + 1];
   char *text = fuzz_text(data, size);
-  int argc = split(text, argv);
+  int argc = text_split(text, argv);
   run_options options;
   hap_detail detail;
   fuzz_detail_spoil(&detail);

@@ -2,7 +2,8 @@
  * SPDX-License-Identifier: MIT */
 
 /* The numbers that an application hands in: defs of a session and of a pointer, then targets. In
- * lockstep, over one cube. Whatever they are, they are refused, or forces and bodies stay finite. */
+ * lockstep, over one cube. Whatever they are, they are refused, or forces and bodies stay
+ * finite. */
 
 #include <math.h>
 
@@ -146,7 +147,7 @@ static void edit_pointer(source *s, hap_pointer_def *def)
   *doubles[take_byte(s) % (sizeof doubles / sizeof doubles[0])] = take_double(s);
 }
 
-static void build(place *p)
+static void place_build(place *p)
 {
   static bool initialised;
   if (!initialised) {
@@ -195,7 +196,7 @@ static void check_def(const hap_session_def *def)
   FUZZ_CHECK(((expert->effects_on | expert->effects_off) >> HAP_EFFECTS) == 0);
 }
 
-static bool create(source *s, place *p)
+static bool session_create(source *s, place *p)
 {
   session_defs defs;
   hap_ode_def ode;
@@ -262,7 +263,7 @@ static void check_state(const place *p, hap_pointer_id id, const hap_pointer_def
   check_drawing(p, id);
 }
 
-static void move(source *s, const place *p, hap_pointer_id id)
+static void hand_move(source *s, const place *p, hap_pointer_id id)
 {
   hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -301,7 +302,7 @@ static void take_hull(source *s, hap_pointer_def *def)
   def->finger_radius = take_double(s);
 }
 
-static void run(source *s, const place *p)
+static void session_run(source *s, const place *p)
 {
   hap_pointer_def def;
   hap_pointer_id id;
@@ -320,7 +321,7 @@ static void run(source *s, const place *p)
   hap_status status = hap_session_start(p->session);
   FUZZ_CHECK(status >= HAP_OK || fuzz_starved());
   for (int moves = 0; status >= HAP_OK && moves < MOVES_MAX && s->left > 0; ++moves) {
-    move(s, p, id);
+    hand_move(s, p, id);
     status = hap_session_advance(p->session, 1 + take_byte(s) % TICKS_MAX);
     FUZZ_CHECK(status >= HAP_OK);
     check_state(p, id, &def);
@@ -331,9 +332,9 @@ void fuzz_one(const uint8_t *data, size_t size)
 {
   source s = {data, size};
   place p = {.session = NULL};
-  build(&p);
-  if (create(&s, &p)) {
-    run(&s, &p);
+  place_build(&p);
+  if (session_create(&s, &p)) {
+    session_run(&s, &p);
   }
   hap_session_destroy(p.session);
   dSpaceDestroy(p.space);

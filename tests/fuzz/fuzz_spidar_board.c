@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* tools/spidar-emulator: the bytes are what a host sends to two boards, with faults on the way, and a
- * command of the emulator. The first byte chooses the model of the boards, the second and third a fault. */
+/* tools/spidar-emulator: the bytes are what a host sends to two boards, with faults on the way,
+ * and a command of the emulator. The first byte chooses the model of the boards, the second and
+ * third a fault. */
 
 #include "tests/fuzz/fuzz.h"
 #include "tools/spidar-emulator/emulator.h"
@@ -23,7 +24,7 @@ static void set_boards(wire *w, int model)
   board_init(&w->boards[1], 1, 5, 32760);
 }
 
-static void send(const uint8_t *data, size_t size)
+static void board_send(const uint8_t *data, size_t size)
 {
   static wire w;
   static uint8_t replies[2 * WIRE_REPLIES_MAX];
@@ -49,7 +50,7 @@ static void send(const uint8_t *data, size_t size)
   FUZZ_CHECK(wire_to_host(&w, 1e9, replies, sizeof replies) >= 0 && w.reply_count == 0);
 }
 
-static void command(const uint8_t *data, size_t size)
+static void board_command(const uint8_t *data, size_t size)
 {
   static emulator e;
   emulator_action action;
@@ -76,6 +77,6 @@ void fuzz_one(const uint8_t *data, size_t size)
   if (size < 4) {
     return;
   }
-  send(data, size);
-  command(data, size);
+  board_send(data, size);
+  board_command(data, size);
 }

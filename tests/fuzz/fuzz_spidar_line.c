@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* plugins/spidar/frames.h, cycle.h and line.h: the bytes are what boards send. The first chooses the boards,
- * the second how the rest is cut into pieces. */
+/* plugins/spidar/frames.h, cycle.h and line.h: the bytes are what boards send. The first chooses
+ * the boards, the second how the rest is cut into pieces. */
 
 #include <errno.h>
 
@@ -10,7 +10,7 @@
 #include "tests/fuzz/fuzz.h"
 
 /* What is cut out of a stream is a frame, and comes back from decode and encode. */
-static void cut(const uint8_t *data, size_t size, int model, hapi_spidar_direction direction)
+static void line_cut(const uint8_t *data, size_t size, int model, hapi_spidar_direction direction)
 {
   hapi_spidar_cutter cutter;
   hapi_spidar_cutter_init(&cutter, model, direction);
@@ -28,7 +28,7 @@ static void cut(const uint8_t *data, size_t size, int model, hapi_spidar_directi
   }
 }
 
-static bool holds(const uint8_t *data, size_t size, const uint8_t *part, size_t count)
+static bool bytes_hold(const uint8_t *data, size_t size, const uint8_t *part, size_t count)
 {
   for (size_t i = 0; i + count <= size; ++i) {
     if (memcmp(data + i, part, count) == 0) {
@@ -51,7 +51,7 @@ static void check_taken(const hapi_spidar_cycle *cycle, const int16_t *raw, cons
       bytes[2 + 2 * k] = (uint8_t)((uint16_t)*raw >> 8);
       ++raw;
     }
-    FUZZ_CHECK(holds(data, size, bytes, 1 + 2 * (size_t)kind->motors));
+    FUZZ_CHECK(bytes_hold(data, size, bytes, 1 + 2 * (size_t)kind->motors));
   }
 }
 
@@ -124,7 +124,7 @@ static void source_flush(void *self)
   (void)self;
 }
 
-static void find(const uint8_t *data, size_t size, size_t piece)
+static void frames_find(const uint8_t *data, size_t size, size_t piece)
 {
   source s = {data, size, piece, 0.0};
   const hapi_spidar_port port = {&s,           source_send, source_receive,
@@ -158,8 +158,8 @@ void fuzz_one(const uint8_t *data, size_t size)
   }
   size_t piece = 1 + (size_t)data[1] % 64;
   int model = 1 + data[0] % 7;
-  cut(data + 2, size - 2, model, HAPI_SPIDAR_FROM_BOARD);
-  cut(data + 2, size - 2, model, HAPI_SPIDAR_TO_BOARD);
+  line_cut(data + 2, size - 2, model, HAPI_SPIDAR_FROM_BOARD);
+  line_cut(data + 2, size - 2, model, HAPI_SPIDAR_TO_BOARD);
   take_cycles(data + 2, size - 2, piece, &lines[data[0] % 4]);
-  find(data + 2, size - 2, piece);
+  frames_find(data + 2, size - 2, piece);
 }

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* plugins/spidar: the bytes are a geometry file. What is taken is sound, and the same when it was written and read
- * again. */
+/* plugins/spidar: the bytes are a geometry file. What is taken is sound, and the same when it
+ * was written and read again. */
 
 #include <math.h>
 #include <unistd.h>

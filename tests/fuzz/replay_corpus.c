@@ -34,7 +34,7 @@ static long read_file(const char *name, uint8_t *data)
 }
 
 /* In a block of its own size, which a sanitizer watches. */
-static void run(const uint8_t *data, size_t size)
+static void input_run(const uint8_t *data, size_t size)
 {
   uint8_t *copy = malloc(size > 0 ? size : 1);
   memcpy(copy, data, size);
@@ -56,7 +56,7 @@ static int run_files(bool cut)
       printf("# %s%s\n", names[i]->d_name, cut ? ", cut off" : "");
       fflush(stdout);
       for (long length = cut ? 0 : size; length <= size; ++length) {
-        run(data, (size_t)length);
+        input_run(data, (size_t)length);
       }
       ++files;
     }

@@ -65,7 +65,8 @@ def build(root, folder, name):
 
 def fuzz(command, corpora, seconds, here, folder, name):
     """What to say, and whether it went well."""
-    command = command + [f"-max_total_time={seconds}", f"-max_len={INPUT_MAX_OF.get(name, INPUT_MAX)}", "-timeout=20",
+    length = INPUT_MAX_OF.get(name, INPUT_MAX)
+    command = command + [f"-max_total_time={seconds}", f"-max_len={length}", "-timeout=20",
                          "-print_final_stats=1", "-verbosity=1",
                          f"-artifact_prefix={os.path.join(folder, name)}-"]
     dictionary = os.path.join(here, name + ".dict")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""headers.py ROOT CC...: each public header compiles alone, twice included, as C11 and as C++17. A
-status that is thrown away is warned of where the language has an attribute for it, and never when it
-is cast to void."""
+"""headers.py ROOT CC...: each public header compiles alone, twice included, as C11 and as C++17.
+A status that is thrown away is warned of where the language has an attribute for it, and never when
+it is cast to void."""
 import os
 import shlex
 import shutil

@@ -26,13 +26,13 @@ ANY_SIZE = re.compile(r"^(?:lib/sync/|lib/base/pointer_setup\.h:|"
                       r"include/hapode/.*:hap_\w*(?:_def|_stats)$)")
 
 # Folders where a point does not hold yet: what is found there is printed and counted, no failure.
-OTHERS = ("examples/", "tests/", "lib/accuracy/", "lib/local/", "lib/near/", "lib/physics/",
+OTHERS = ("examples/", "lib/accuracy/", "lib/local/", "lib/near/", "lib/physics/",
           "lib/pointer/", "lib/probe/", "lib/research/", "lib/world/")
 NOT_YET = {
     "names": OTHERS,
     "structs": OTHERS,
-    "headers": ("tests/",),
-    "columns": OTHERS,
+    "headers": ("tests/contact_world.h", "tests/physics_world.h"),
+    "columns": OTHERS + ("tests/stability/cases.c",),
 }
 
 # Not written by people, or not for people.

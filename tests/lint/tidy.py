@@ -15,7 +15,7 @@ import lint
 
 
 def first_commands(build, folder):
-    """The first command alone of a unit that is compiled several times: clang-tidy would run all."""
+    """The first command of a unit that is compiled several times: clang-tidy would run all."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as f:
         commands = json.load(f)
     first = {}

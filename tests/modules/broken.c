@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A device that is right in all, dof 6, but for what its argument says: "break=NAME". A module, like
- * those that people write. break=none: nothing is wrong. */
+/* A device that is right in all, dof 6, but for what its argument says: "break=NAME". A module,
+ * like those that people write. break=none: nothing is wrong. */
 
 #define _POSIX_C_SOURCE 200809L
 
@@ -47,7 +47,7 @@ static int closes;
 
 static const hap_wrench some = {{1.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
 
-static bool is(const broken *d, const char *fault)
+static bool fault_is(const broken *d, const char *fault)
 {
   return strcmp(d->fault, fault) == 0;
 }
@@ -73,24 +73,24 @@ static void *wait_for_ever(void *unused)
   return unused;
 }
 
-static void leak(const broken *d)
+static void memory_leak(const broken *d)
 {
   pthread_t thread;
   static void *volatile kept;
-  if (is(d, "leak_memory")) {
+  if (fault_is(d, "leak_memory")) {
     kept = malloc(5000);
     memset(kept, 1, 5000);
-  } else if (is(d, "leak_file")) {
+  } else if (fault_is(d, "leak_file")) {
     (void)!open("/dev/null", O_RDONLY);
-  } else if (is(d, "leak_thread")) {
+  } else if (fault_is(d, "leak_thread")) {
     (void)pthread_create(&thread, NULL, wait_for_ever, NULL);
   }
 }
 
-static void hold(broken *d, const hap_wrench *wrench)
+static void wrench_hold(broken *d, const hap_wrench *wrench)
 {
   d->held = *wrench;
-  if (is(d, "shared")) {
+  if (fault_is(d, "shared")) {
     shared = *wrench;
   }
   atomic_store(&d->zeroed, false);
@@ -108,26 +108,26 @@ static hap_status broken_open(const char *args, void **self, hap_detail *detail)
   const char *fault = strncmp(args, key, strlen(key)) == 0 ? args + strlen(key) : "none";
   snprintf(d->fault, sizeof d->fault, "%.*s", (int)strcspn(fault, ","), fault);
   const char *rest = strchr(fault, ',');
-  ops.help = is(d, "help_of_two_lines") ? "two\nlines" : "a device for tests: break=NAME";
+  ops.help = fault_is(d, "help_of_two_lines") ? "two\nlines" : "a device for tests: break=NAME";
   if (rest != NULL && strcmp(rest, ",pacing=host") == 0) {
     ops.pacing = HAP_PACING_HOST;
   } else if (rest != NULL && strcmp(rest, ",pacing=device") == 0) {
     ops.pacing = HAP_PACING_DEVICE;
-  } else if (rest != NULL && !is(d, "takes_any_argument")) {
+  } else if (rest != NULL && !fault_is(d, "takes_any_argument")) {
     snprintf(detail->text, sizeof detail->text, "%s",
-             is(d, "silent_refusal") ? "" : "there is no such argument");
-    *self = is(d, "self_of_failure") ? &shared : NULL;
+             fault_is(d, "silent_refusal") ? "" : "there is no such argument");
+    *self = fault_is(d, "self_of_failure") ? &shared : NULL;
     free(d);
     return HAP_ERROR_ARGUMENT;
   }
   pthread_mutex_init(&d->lock, NULL);
   atomic_init(&d->zeroed, true);
-  if (is(d, "force_at_open")) {
-    hold(d, &some);
-  } else if (is(d, "force_of_last_life") && closes > 0) {
-    hold(d, &of_last_life);
+  if (fault_is(d, "force_at_open")) {
+    wrench_hold(d, &some);
+  } else if (fault_is(d, "force_of_last_life") && closes > 0) {
+    wrench_hold(d, &of_last_life);
   }
-  leak(d);
+  memory_leak(d);
   *self = d;
   return HAP_OK;
 }
@@ -136,41 +136,43 @@ static void broken_describe(void *self, hap_device_info *out)
 {
   const broken *d = self;
   out->dof = 6;
-  out->max_force = is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
+  out->max_force = fault_is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
   out->max_torque = TORQUE_MAX;
-  out->measures_velocity = is(d, "measures_twice") ? 2 : 1;
+  out->measures_velocity = fault_is(d, "measures_twice") ? 2 : 1;
 }
 
 static hap_status broken_start(void *self)
 {
   broken *d = self;
   ++d->starts;
-  if (is(d, "start_fails") || (is(d, "starts_once") && d->starts > 1) ||
-      (is(d, "unplugged_for_ever") && d->reads > 500) ||
-      (is(d, "unplugged") && d->reads > 0 && d->starts < 4)) {
+  if (fault_is(d, "start_fails") || (fault_is(d, "starts_once") && d->starts > 1) ||
+      (fault_is(d, "unplugged_for_ever") && d->reads > 500) ||
+      (fault_is(d, "unplugged") && d->reads > 0 && d->starts < 4)) {
     return HAP_ERROR_DEVICE;
   }
-  if (is(d, "start_resumes") && d->starts > 1) {
+  if (fault_is(d, "start_resumes") && d->starts > 1) {
     atomic_store(&d->zeroed, false);
   }
-  if (is(d, "force_at_start")) {
-    hold(d, &some);
+  if (fault_is(d, "force_at_start")) {
+    wrench_hold(d, &some);
   }
   d->loop = pthread_self();
   d->first_ns = 0;
-  d->pushed = d->pushed && !is(d, "zero_is_for_ever");
+  d->pushed = d->pushed && !fault_is(d, "zero_is_for_ever");
   d->started = true;
   return HAP_OK;
 }
 
 /* A sine along x, y and about z. */
-static void move(const broken *d, double t, hap_pose *pose, hap_twist *twist)
+static void hand_move(const broken *d, double t, hap_pose *pose, hap_twist *twist)
 {
   double s = sin(RATE * t);
   double c = RATE * cos(RATE * t);
-  double wrong = is(d, "twist_is_double") ? 2.0 : is(d, "twist_is_against") ? -1.0 : 1.0;
-  double turned = is(d, "twist_in_degrees") ? 57.3 : 1.0;
-  double scale = is(d, "quaternion_is_not_unit") ? 1.01 : 1.0;
+  double wrong = fault_is(d, "twist_is_double")    ? 2.0
+                 : fault_is(d, "twist_is_against") ? -1.0
+                                                   : 1.0;
+  double turned = fault_is(d, "twist_in_degrees") ? 57.3 : 1.0;
+  double scale = fault_is(d, "quaternion_is_not_unit") ? 1.01 : 1.0;
   *pose = (hap_pose){{0.02 * s, 0.01 * s, 0.0},
                      {scale * cos(0.5 * TURN * s), 0.0, 0.0, scale * sin(0.5 * TURN * s)}};
   *twist = (hap_twist){{wrong * 0.02 * c, wrong * 0.01 * c, 0.0}, {0.0, 0.0, turned * TURN * c}};
@@ -180,33 +182,35 @@ static hap_status status_of_read(broken *d, int64_t time_ns)
 {
   bool late = d->before_ns != 0 && time_ns - d->before_ns > 200000000;
   d->before_ns = time_ns;
-  if (!d->started && !is(d, "read_before_start") && !(is(d, "read_after_stop") && d->starts > 0)) {
+  if (!d->started && !fault_is(d, "read_before_start") &&
+      !(fault_is(d, "read_after_stop") && d->starts > 0)) {
     return HAP_ERROR_STATE;
   }
-  if ((is(d, "pause_is_fatal") && late) || (is(d, "read_fails") && d->reads > 200) ||
-      (is(d, "zero_disturbs") && atomic_load(&d->disturbed)) ||
-      ((is(d, "unplugged") || is(d, "unplugged_for_ever")) && d->starts == 1 && d->reads > 500)) {
+  if ((fault_is(d, "pause_is_fatal") && late) || (fault_is(d, "read_fails") && d->reads > 200) ||
+      (fault_is(d, "zero_disturbs") && atomic_load(&d->disturbed)) ||
+      ((fault_is(d, "unplugged") || fault_is(d, "unplugged_for_ever")) && d->starts == 1 &&
+       d->reads > 500)) {
     return HAP_ERROR_DEVICE;
   }
-  return is(d, "odd_status") ? (hap_status)42 : HAP_OK;
+  return fault_is(d, "odd_status") ? (hap_status)42 : HAP_OK;
 }
 
 static void spoil_read(const broken *d, hap_pose *pose, hap_twist *twist)
 {
   const double nan = (double)NAN;
-  if (is(d, "pose_is_nan") && d->reads % 50 == 49) {
+  if (fault_is(d, "pose_is_nan") && d->reads % 50 == 49) {
     pose->position[1] = nan;
-  } else if (is(d, "pose_is_far")) {
+  } else if (fault_is(d, "pose_is_far")) {
     pose->position[0] = 1e30;
-  } else if (is(d, "runs_away")) {
+  } else if (fault_is(d, "runs_away")) {
     pose->position[2] += 5e-4 * d->reads_pushed;
-  } else if (is(d, "twist_is_nan")) {
+  } else if (fault_is(d, "twist_is_nan")) {
     twist->angular[2] = nan;
-  } else if (is(d, "jumps") && d->reads % 100 == 99) {
+  } else if (fault_is(d, "jumps") && d->reads % 100 == 99) {
     pose->position[0] += 0.2;
-  } else if (is(d, "read_is_slow")) {
+  } else if (fault_is(d, "read_is_slow")) {
     rest_ms(ops.pacing == HAP_PACING_DEVICE ? 2.5 : 1.5);
-  } else if (is(d, "read_hangs")) {
+  } else if (fault_is(d, "read_hangs")) {
     rest_ms(990.0);
     (void)wait_for_ever(NULL);
   }
@@ -217,7 +221,7 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
 {
   broken *d = self;
   hap_pose here;
-  if (is(d, "zero_locks")) {
+  if (fault_is(d, "zero_locks")) {
     pthread_mutex_lock(&d->lock);
     rest_ms(0.3);
     pthread_mutex_unlock(&d->lock);
@@ -233,33 +237,34 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   d->first_ns = d->first_ns == 0 ? time_ns : d->first_ns;
   ++d->reads;
   d->reads_pushed += d->pushed;
-  move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, twist);
+  hand_move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, twist);
   spoil_read(d, &here, twist);
-  if (is(d, "pose_is_not_filled_in")) {
+  if (fault_is(d, "pose_is_not_filled_in")) {
     memcpy(pose->position, here.position, sizeof here.position);
   } else {
     *pose = here;
   }
-  if (!is(d, "buttons_are_not_filled_in")) {
+  if (!fault_is(d, "buttons_are_not_filled_in")) {
     *buttons = 0;
   }
   return status;
 }
 
-static double norm(const double v[3])
+static double vector_norm(const double v[3])
 {
   return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-static bool shorten(const broken *d, double v[3], double limit)
+static bool vector_shorten(const broken *d, double v[3], double limit)
 {
-  bool beyond = norm(v) > limit;
-  if (is(d, "no_limit")) {
+  bool beyond = vector_norm(v) > limit;
+  if (fault_is(d, "no_limit")) {
     return beyond;
   }
-  double scale = beyond ? limit / norm(v) : 1.0;
+  double scale = beyond ? limit / vector_norm(v) : 1.0;
   for (int i = 0; i < 3; ++i) {
-    v[i] = is(d, "limit_per_axis") ? fmin(fmax(v[i], -0.5 * limit), 0.5 * limit) : scale * v[i];
+    v[i] =
+        fault_is(d, "limit_per_axis") ? fmin(fmax(v[i], -0.5 * limit), 0.5 * limit) : scale * v[i];
   }
   return beyond;
 }
@@ -276,23 +281,25 @@ static bool is_finite(const hap_wrench *w)
 static hap_status check_write(broken *d, const hap_wrench *wanted)
 {
   bool finite = is_finite(wanted);
-  if (!d->started && !is(d, "write_before_start") &&
-      !(is(d, "write_after_stop") && d->starts > 0)) {
+  if (!d->started && !fault_is(d, "write_before_start") &&
+      !(fault_is(d, "write_after_stop") && d->starts > 0)) {
     return HAP_ERROR_STATE;
   }
-  if ((is(d, "runs_away") && d->reads_pushed > 110 && norm(wanted->force) > 0.0) ||
-      (is(d, "refuses_all_force") && norm(wanted->force) + norm(wanted->torque) > 0.0) ||
-      (is(d, "refuses_much_force") && !(finite && norm(wanted->force) <= SMALL_FORCE))) {
+  if ((fault_is(d, "runs_away") && d->reads_pushed > 110 && vector_norm(wanted->force) > 0.0) ||
+      (fault_is(d, "refuses_all_force") &&
+       vector_norm(wanted->force) + vector_norm(wanted->torque) > 0.0) ||
+      (fault_is(d, "refuses_much_force") &&
+       !(finite && vector_norm(wanted->force) <= SMALL_FORCE))) {
     puts("# it was asked for what this check must not ask for");
     return HAP_ERROR_DEVICE;
   }
-  if (is(d, "zero_is_for_ever") && atomic_load(&d->zeroed) && d->pushed) {
+  if (fault_is(d, "zero_is_for_ever") && atomic_load(&d->zeroed) && d->pushed) {
     return HAP_ERROR_DEVICE;
   }
-  if (!finite && is(d, "nan_is_held")) {
-    hold(d, &some);
+  if (!finite && fault_is(d, "nan_is_held")) {
+    wrench_hold(d, &some);
   }
-  return finite || is(d, "nan_is_taken") ? HAP_OK : HAP_ERROR_ARGUMENT;
+  return finite || fault_is(d, "nan_is_taken") ? HAP_OK : HAP_ERROR_ARGUMENT;
 }
 
 static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
@@ -303,42 +310,43 @@ static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench 
     return status;
   }
   hap_wrench given = *wanted;
-  double factor = is(d, "gives_double") ? 2.0 : is(d, "gives_against") ? -1.0 : 1.0;
+  double factor = fault_is(d, "gives_double") ? 2.0 : fault_is(d, "gives_against") ? -1.0 : 1.0;
   for (int i = 0; i < 3; ++i) {
     given.force[i] *= factor;
     given.torque[i] *= factor;
   }
-  bool saturated = shorten(d, given.force, FORCE_MAX);
-  saturated = shorten(d, given.torque, TORQUE_MAX) || saturated;
-  d->pushed = d->pushed || norm(given.force) > 0.0;
-  if (!is(d, "reached_is_not_filled_in")) {
+  bool saturated = vector_shorten(d, given.force, FORCE_MAX);
+  saturated = vector_shorten(d, given.torque, TORQUE_MAX) || saturated;
+  d->pushed = d->pushed || vector_norm(given.force) > 0.0;
+  if (!fault_is(d, "reached_is_not_filled_in")) {
     *reached = given;
   }
-  if (is(d, "reached_is_a_lie")) {
+  if (fault_is(d, "reached_is_a_lie")) {
     for (int i = 0; i < 3; ++i) {
       given.force[i] *= 0.5;
     }
   }
-  hold(d, &given);
-  if (is(d, "write_is_slow")) {
+  wrench_hold(d, &given);
+  if (fault_is(d, "write_is_slow")) {
     rest_ms(1.5);
   }
-  return saturated && !is(d, "limit_is_not_said") ? HAP_SATURATED : HAP_OK;
+  return saturated && !fault_is(d, "limit_is_not_said") ? HAP_SATURATED : HAP_OK;
 }
 
 static void broken_zero(void *self)
 {
   broken *d = self;
-  if (is(d, "zero_locks")) {
+  if (fault_is(d, "zero_locks")) {
     pthread_mutex_lock(&d->lock);
     pthread_mutex_unlock(&d->lock);
-  } else if (is(d, "zero_is_slow")) {
+  } else if (fault_is(d, "zero_is_slow")) {
     rest_ms(1.5);
-  } else if (is(d, "zero_disturbs") && d->started && !pthread_equal(d->loop, pthread_self())) {
+  } else if (fault_is(d, "zero_disturbs") && d->started &&
+             !pthread_equal(d->loop, pthread_self())) {
     atomic_store(&d->disturbed, true);
-  } else if (is(d, "zero_does_nothing") && d->started) {
+  } else if (fault_is(d, "zero_does_nothing") && d->started) {
     return;
-  } else if (is(d, "shared")) {
+  } else if (fault_is(d, "shared")) {
     memset(&shared, 0, sizeof shared);
   }
   atomic_store(&d->zeroed, true);
@@ -348,14 +356,14 @@ static void broken_stop(void *self)
 {
   broken *d = self;
   bool again = !d->started && d->starts > 0;
-  if (!is(d, "stop_keeps_force")) {
+  if (!fault_is(d, "stop_keeps_force")) {
     broken_zero(self);
   }
   d->started = false;
-  if ((is(d, "second_stop_gives_force") && again) ||
-      (is(d, "stop_before_start_gives_force") && d->starts == 0)) {
-    hold(d, &some);
-  } else if (is(d, "zero_does_nothing")) {
+  if ((fault_is(d, "second_stop_gives_force") && again) ||
+      (fault_is(d, "stop_before_start_gives_force") && d->starts == 0)) {
+    wrench_hold(d, &some);
+  } else if (fault_is(d, "zero_does_nothing")) {
     atomic_store(&d->zeroed, true);
   }
 }
@@ -375,7 +383,7 @@ static void broken_held(void *self, hap_wrench *out)
 {
   const broken *d = self;
   memset(out, 0, sizeof *out);
-  if (is(d, "shared")) {
+  if (fault_is(d, "shared")) {
     *out = shared;
   } else if (!atomic_load(&d->zeroed)) {
     *out = d->held;

@@ -22,21 +22,21 @@ HAP_API atomic_int tables_zeroed;
 
 static const char *wrong;
 
-static bool is(const char *name)
+static bool variant_is(const char *name)
 {
   return wrong != NULL && strcmp(wrong, name) == 0;
 }
 
 static hap_status tables_open(const char *args, void **self, hap_detail *detail)
 {
-  if (is("open_fails") || strcmp(args, "fail") == 0) {
+  if (variant_is("open_fails") || strcmp(args, "fail") == 0) {
     snprintf(detail->text, sizeof detail->text, "no board on port 7: is it switched on?");
     return HAP_ERROR_DEVICE;
   }
-  if (is("open_fails_silently")) {
+  if (variant_is("open_fails_silently")) {
     return (hap_status)-77;
   }
-  if (!is("no_self")) {
+  if (!variant_is("no_self")) {
     *self = malloc(16);
   }
   atomic_fetch_add(&tables_opened, 1);
@@ -46,8 +46,8 @@ static hap_status tables_open(const char *args, void **self, hap_detail *detail)
 static void tables_describe(void *self, hap_device_info *out)
 {
   (void)self;
-  out->dof = is("dof_4") ? 4 : 3;
-  out->max_force = is("limit_is_negative") ? -1.0 : 5.0;
+  out->dof = variant_is("dof_4") ? 4 : 3;
+  out->max_force = variant_is("limit_is_negative") ? -1.0 : 5.0;
 }
 
 static hap_status tables_start(void *self)
@@ -78,7 +78,7 @@ static void tables_zero(void *self)
 {
   const struct timespec while_it_is_here = {0, 20000000};
   (void)self;
-  if (is("zero_is_slow")) {
+  if (variant_is("zero_is_slow")) {
     nanosleep(&while_it_is_here, NULL);
   }
   atomic_fetch_add(&tables_zeroed, 1); /* last, so that it comes back to this code from the sleep */
@@ -106,15 +106,15 @@ static void fill_in(void)
                                 tables_close,       NULL};
   memset(long_name, 'n', sizeof long_name - 1);
   ops = right;
-  ops.abi += is("abi_is_new") ? 1 : is("abi_is_old") ? UINT32_MAX : 0;
-  ops.size = is("size_is_small") ? 40 : ops.size;
-  ops.pacing = is("pacing_is_unknown") ? 9 : ops.pacing;
-  ops.name = is("no_name")        ? NULL
-             : is("name_is_bad")  ? "My Device"
-             : is("name_is_long") ? long_name
-                                  : ops.name;
-  ops.read = is("no_read") ? NULL : ops.read;
-  ops.zero = is("no_zero") || is("name_is_long") ? NULL : ops.zero;
+  ops.abi += variant_is("abi_is_new") ? 1 : variant_is("abi_is_old") ? UINT32_MAX : 0;
+  ops.size = variant_is("size_is_small") ? 40 : ops.size;
+  ops.pacing = variant_is("pacing_is_unknown") ? 9 : ops.pacing;
+  ops.name = variant_is("no_name")        ? NULL
+             : variant_is("name_is_bad")  ? "My Device"
+             : variant_is("name_is_long") ? long_name
+                                          : ops.name;
+  ops.read = variant_is("no_read") ? NULL : ops.read;
+  ops.zero = variant_is("no_zero") || variant_is("name_is_long") ? NULL : ops.zero;
 }
 
 /* Once: the environment is that of this load. */
@@ -127,5 +127,5 @@ const hap_device_ops *hapode_device_module(uint32_t host_abi)
     fill_in();
   }
   pthread_mutex_unlock(&lock);
-  return is("refuses") || host_abi != HAP_DEVICE_ABI ? NULL : &ops;
+  return variant_is("refuses") || host_abi != HAP_DEVICE_ABI ? NULL : &ops;
 }

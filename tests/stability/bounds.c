@@ -125,15 +125,15 @@ static bool body_is_finite(const seen_body *s, dBodyID body)
          all_finite(dBodyGetLinearVel(body), 3) && all_finite(dBodyGetAngularVel(body), 3);
 }
 
-static double length4(const double q[4])
+static double quat_length(const double q[4])
 {
   return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
 }
 
 /* ---- times ---- */
 
-/* Whether the force of a pointer contact is that of the tick's own time, as the body feels it; else it is
- * that of the time after it. */
+/* Whether the force of a pointer contact is that of the tick's own time, as the body feels it;
+ * else it is that of the time after it. */
 static bool is_now(const hapi_tick *tick, const hapi_local_contact *c)
 {
   const hapi_pointer *p = &tick->pointers.of[c->pointer];
@@ -191,8 +191,8 @@ static double tools_ahead(const bounds *b)
   return sum;
 }
 
-/* The same of a body that falls: its pose is half a tick ahead of its velocity. One that ODE moves has come to
- * it, or goes from it, with pose and velocity of one time. */
+/* The same of a body that falls: its pose is half a tick ahead of its velocity. One that ODE
+ * moves has come to it, or goes from it, with pose and velocity of one time. */
 static double fall_ahead(const bounds *b, int index, const seen_body *s)
 {
   dMass mass;
@@ -267,11 +267,11 @@ static void look_at_hand(bounds *b, int index, double *work, double *kinetic)
   hapi_v3_sub(p->guard.wanted.torque, p->guard.written.torque, held_back);
   b->cut += fmin(0.0, hapi_v3_dot(held_back, turn));
   double written = hapi_v3_norm(p->guard.written.force);
-  b->force = fmax(b->force, fmax(written, hapi_v3_norm(now->force)));
-  b->finite = b->finite && all_finite(now->position, 3) && all_finite(now->velocity, 3) &&
-              isfinite(written) && isfinite(now->work) && all_finite(p->wrench.force, 3) &&
-              all_finite(p->pose.position, 3) && all_finite(p->twist.linear, 3) &&
-              all_finite(p->proxy.position, 3);
+  b->worst.force = fmax(b->worst.force, fmax(written, hapi_v3_norm(now->force)));
+  b->worst.finite = b->worst.finite && all_finite(now->position, 3) &&
+                    all_finite(now->velocity, 3) && isfinite(written) && isfinite(now->work) &&
+                    all_finite(p->wrench.force, 3) && all_finite(p->pose.position, 3) &&
+                    all_finite(p->twist.linear, 3) && all_finite(p->proxy.position, 3);
 }
 
 /* ---- the bounds ---- */
@@ -297,9 +297,9 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
       height += height_of(b, i, &seen[i]) - fall_ahead(b, i, &seen[i]);
       double way[3];
       hapi_v3_sub(seen[i].pose.position, b->w->start[i], way);
-      b->way = fmax(b->way, hapi_v3_norm(way));
-      b->finite = b->finite && body_is_finite(&seen[i], b->w->bodies[i]);
-      b->unit = fmax(b->unit, fabs(length4(seen[i].pose.quat_wxyz) - 1.0));
+      b->worst.way = fmax(b->worst.way, hapi_v3_norm(way));
+      b->worst.finite = b->worst.finite && body_is_finite(&seen[i], b->w->bodies[i]);
+      b->worst.unit = fmax(b->worst.unit, fabs(quat_length(seen[i].pose.quat_wxyz) - 1.0));
     }
   }
   kinetic -= contacts_ahead(b) + tools_ahead(b);
@@ -315,7 +315,7 @@ static void look_at_energy(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
   b->least = fmin(b->least, made + springs);
   b->gain = fmax(b->gain, made + springs - b->least);
   b->stored_max = fmax(b->stored_max, kinetic + held + springs);
-  b->finite = b->finite && isfinite(work + kinetic + height);
+  b->worst.finite = b->worst.finite && isfinite(work + kinetic + height);
 }
 
 static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
@@ -345,8 +345,8 @@ static void look_at_depth(bounds *b, const seen_body seen[WORLD_BODIES_MAX])
                      hapi_v3_norm(s->met_twist.angular) * hapi_v3_norm(arm);
       double yields = p->rigid ? 0.0 : hapi_v3_norm(c->force) / p->surface.stiffness;
       double allowed = yields + speed * step + b->row->depth;
-      b->depth = fmax(b->depth, found.depth);
-      b->deeper = fmax(b->deeper, found.depth / (allowed + LEAST_DEPTH));
+      b->worst.depth = fmax(b->worst.depth, found.depth);
+      b->worst.deeper = fmax(b->worst.deeper, found.depth / (allowed + LEAST_DEPTH));
     }
   }
 }
@@ -358,15 +358,15 @@ static void look_at_momentum(bounds *b)
   double before = b->ticks >= b->interval ? b->impulse[b->ticks % b->interval] : 0.0;
   b->impulse[b->ticks % b->interval] = now;
   if (hap_session_stats(b->w->session, &stats, sizeof stats) != HAP_OK) {
-    b->finite = false;
+    b->worst.finite = false;
     return;
   }
   /* of one interval, and rounding */
   double allowed = now - before + 1e-9 * now + 1e-12;
-  b->residual = fmax(b->residual, stats.hand.momentum_error_ns / allowed);
-  b->finite = b->finite && isfinite(stats.hand.momentum_error_ns);
-  b->fault = stats.faults.fault != 0 ? stats.faults.fault : b->fault;
-  b->contact_ticks = stats.loop.contact_ticks;
+  b->worst.residual = fmax(b->worst.residual, stats.hand.momentum_error_ns / allowed);
+  b->worst.finite = b->worst.finite && isfinite(stats.hand.momentum_error_ns);
+  b->worst.fault = stats.faults.fault != 0 ? stats.faults.fault : b->worst.fault;
+  b->worst.contact_ticks = stats.loop.contact_ticks;
 }
 
 /* The shape alone, of a body with one geom in its middle. */
@@ -401,7 +401,7 @@ void bounds_begin(bounds *b, const case_row *row, world *w, hap_model model)
   b->row = row;
   b->w = w;
   b->model = model;
-  b->finite = true;
+  b->worst.finite = true;
   double step = model == HAP_MODEL_SINGLE ? 1.0 : ceil(w->def.haptic_hz / w->def.physics_hz);
   b->interval = (uint64_t)(model == HAP_MODEL_IMPULSE ? 2.0 * step : step) + 2;
   for (int i = 0; i < w->body_count; ++i) {
@@ -419,7 +419,7 @@ void bounds_look(bounds *b)
   see_bodies(b, seen);
   look_at_energy(b, seen);
   look_at_momentum(b);
-  if (b->finite) {
+  if (b->worst.finite) {
     look_at_depth(b, seen);
   }
   ++b->ticks;
@@ -449,7 +449,7 @@ double bounds_gain(const bounds *b)
   return fmax(0.0, b->gain - b->row->given) / fmax(b->stored_max, LEAST_ENERGY);
 }
 
-static void note(char *out, size_t size, bool broken, const char *what)
+static void bound_note(char *out, size_t size, bool broken, const char *what)
 {
   size_t length = strlen(out);
   if (broken) {
@@ -460,16 +460,16 @@ static void note(char *out, size_t size, bool broken, const char *what)
 bool bounds_hold(const bounds *b, char *out_broken, size_t size)
 {
   out_broken[0] = '\0';
-  note(out_broken, size, !b->finite, "finite");
-  note(out_broken, size, b->fault != HAP_FAULT_NONE, "fault");
-  note(out_broken, size, !(b->force <= b->w->max_force * (1.0 + 1e-12)), "force");
-  note(out_broken, size, !(bounds_energy(b) <= BOUNDS_ENERGY), "energy");
+  bound_note(out_broken, size, !b->worst.finite, "finite");
+  bound_note(out_broken, size, b->worst.fault != HAP_FAULT_NONE, "fault");
+  bound_note(out_broken, size, !(b->worst.force <= b->w->max_force * (1.0 + 1e-12)), "force");
+  bound_note(out_broken, size, !(bounds_energy(b) <= BOUNDS_ENERGY), "energy");
   double gain = b->row->gain > 0.0 ? b->row->gain : BOUNDS_ENERGY;
-  note(out_broken, size, !answers_late(b) && !(bounds_gain(b) <= gain), "gain");
-  note(out_broken, size, !(b->deeper <= 1.0), "depth");
-  note(out_broken, size, !(b->residual <= 1.0), "momentum");
-  note(out_broken, size, !(b->unit <= BOUNDS_UNIT), "unit");
-  note(out_broken, size, !(b->way <= b->row->room), "room");
-  note(out_broken, size, b->contact_ticks == 0, "nothing was touched");
+  bound_note(out_broken, size, !answers_late(b) && !(bounds_gain(b) <= gain), "gain");
+  bound_note(out_broken, size, !(b->worst.deeper <= 1.0), "depth");
+  bound_note(out_broken, size, !(b->worst.residual <= 1.0), "momentum");
+  bound_note(out_broken, size, !(b->worst.unit <= BOUNDS_UNIT), "unit");
+  bound_note(out_broken, size, !(b->worst.way <= b->row->room), "room");
+  bound_note(out_broken, size, b->worst.contact_ticks == 0, "nothing was touched");
   return out_broken[0] == '\0';
 }

@@ -22,7 +22,8 @@ static dJointID add_hinge(world *w, dBodyID a, dBodyID b, const double at[3], co
   return hinge;
 }
 
-/* Hangs on z through the origin; 0.1 rad either way. size: share of the speed that the stops throw back. */
+/* Hangs on z through the origin; 0.1 rad either way. size: share of the speed that the stops
+ * throw back. */
 void build_stop(world *w, const case_row *row)
 {
   set_gravity(w, 0.0);
@@ -34,8 +35,8 @@ void build_stop(world *w, const case_row *row)
   add_hand(w, "path=0:0.25/-0.022/0;0.4:0.25/0.04/0;0.6:0.25/0.04/0;0.8:0.25/-0.022/0,loop=1");
 }
 
-/* A square of four bars in the plane y = 0, the lowest hinged to the world at both ends: in space its
- * hinges hold three degrees of freedom too many. */
+/* A square of four bars in the plane y = 0, the lowest hinged to the world at both ends: in
+ * space its hinges hold three degrees of freedom too many. */
 void build_loop(world *w, const case_row *row)
 {
   const double y[3] = {0.0, 1.0, 0.0};
@@ -72,7 +73,8 @@ void build_chain(world *w, const case_row *row)
   add_hand(w, "path=0:-0.02/0/%g;0.3:0.03/0/%g;0.6:-0.02/0/%g,loop=1", z, z, z);
 }
 
-/* n links in hinges along y, and below them a cube of size times their mass; pushed at the middle link. */
+/* n links in hinges along y, and below them a cube of size times their mass; pushed at the
+ * middle link. */
 void build_weight(world *w, const case_row *row)
 {
   const double length = 0.05;

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Worlds for hands with friction, which pull along the surface and hold. As in build_solid.c they come from
- * apart and go again, over and over. */
+/* Worlds for hands with friction, which pull along the surface and hold. As in build_solid.c
+ * they come from apart and go again, over and over. */
 
 #include "tests/stability/build.h"
 #include "tests/stability/cases.h"
@@ -78,7 +78,7 @@ void build_tool_rub(world *w, const case_row *row)
 }
 
 /* Two fingers lift a cube beside its middle, swing it, put it down and let go. */
-static void pinch(world *w, const case_row *row, double reach, const char *more)
+static void case_pinch(world *w, const case_row *row, double reach, const char *more)
 {
   double beside = 0.3 * HALF;
   double z = HALF - WORLD_LAYER;
@@ -98,11 +98,11 @@ static void pinch(world *w, const case_row *row, double reach, const char *more)
 
 void build_pinch(world *w, const case_row *row)
 {
-  pinch(w, row, w->pointer.radius, "");
+  case_pinch(w, row, w->pointer.radius, "");
 }
 
 void build_tool_pinch(world *w, const case_row *row)
 {
   take_tool(w);
-  pinch(w, row, TOOL_HALF + TOOL_ROUNDING, "dof=6,");
+  case_pinch(w, row, TOOL_HALF + TOOL_ROUNDING, "dof=6,");
 }

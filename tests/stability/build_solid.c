@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Worlds of cubes, balls and plates. A hand goes from 2 mm apart to the place that its spring pulls it
- * to, behind the surface, and back, over and over. */
+/* Worlds of cubes, balls and plates. A hand goes from 2 mm apart to the place that its spring
+ * pulls it to, behind the surface, and back, over and over. */
 
 #include <math.h>
 #include <string.h>
@@ -158,7 +158,7 @@ void build_walls(world *w, const case_row *row)
   press_at(w, 0.01, 0.0, HALF, 0.02);
 }
 
-static void tilt(dGeomID geom, double x, double y, double angle)
+static void geom_tilt(dGeomID geom, double x, double y, double angle)
 {
   dMatrix3 rotation;
   dRFromAxisAndAngle(rotation, x, y, 0.0, angle);
@@ -172,7 +172,8 @@ void build_groove(world *w, const case_row *row)
   double off = HALF + 0.01;
   for (int side = -1; side <= 1; side += 2) {
     double x = side * cos(angle) * off;
-    tilt(add_block(w, AT(0.02, 0.2, 0.2), AT(x, 0.0, -sin(angle) * off)), 0.0, 1.0, side * angle);
+    geom_tilt(add_block(w, AT(0.02, 0.2, 0.2), AT(x, 0.0, -sin(angle) * off)), 0.0, 1.0,
+              side * angle);
   }
   (void)add_ball(w, row->mass, HALF, AT(0.0, 0.0, 0.0));
   press_at(w, 0.0, 0.0, HALF, 0.03);
@@ -185,7 +186,7 @@ void build_funnel(world *w, const case_row *row)
     double x = i == 0 ? 1.0 : i == 1 ? -1.0 : 0.0;
     double y = i == 2 ? 1.0 : i == 3 ? -1.0 : 0.0;
     dGeomID side = add_block(w, AT(0.7, 0.7, 0.2), AT(0.15 * x, 0.15 * y, 0.0));
-    tilt(side, y, -x, 0.25 * M_PI);
+    geom_tilt(side, y, -x, 0.25 * M_PI);
   }
   for (int i = 0; i < row->n; ++i) {
     double x = 0.03 * (i % 2) - 0.015;
@@ -278,7 +279,7 @@ void build_brush(world *w, const case_row *row)
            (far + 0.05) / 0.8, far, z, 2.0 * (far + 0.05) / 0.8, z);
 }
 
-static void flicker(world *w)
+static void cube_flicker(world *w)
 {
   double x = w->steps % 2 == 0 ? -3.0 : 0.06;
   dBodySetPosition(w->bodies[1], w->origin[0] + x, 0.0, HALF - WORLD_LAYER);
@@ -291,12 +292,12 @@ void build_flicker(world *w, const case_row *row)
   add_floor(w);
   (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, HALF - WORLD_LAYER));
   (void)add_cube(w, row->mass, EDGE, AT(0.06, 0.0, HALF - WORLD_LAYER));
-  w->before_step = flicker;
+  w->before_step = cube_flicker;
   press_at(w, 0.01, 0.0, EDGE - WORLD_LAYER, 0.02);
 }
 
 /* In the middle of the second press. */
-static void destroy(world *w)
+static void cube_destroy(world *w)
 {
   if (w->steps != 45 || w->bodies[0] == NULL) {
     return;
@@ -311,7 +312,7 @@ static void destroy(world *w)
 void build_destroyed(world *w, const case_row *row)
 {
   build_press(w, row);
-  w->before_step = destroy;
+  w->before_step = cube_destroy;
 }
 
 /* Under a ball of 10 m, each on a block of its own, so that all are touched at once. */

@@ -5,8 +5,8 @@
 
 #include "tests/stability/cases.h"
 
-/* Runs the case for its time, looks at the bounds after every tick, and prints the worst figures as a
- * comment that begins with how. Whether all bounds held. */
+/* Runs the case for its time, looks at the bounds after every tick, and prints the worst figures
+ * as a comment that begins with how. Whether all bounds held. */
 bool case_holds(const case_row *row, hap_model model, const char *how);
 
 #endif

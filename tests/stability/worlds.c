@@ -74,7 +74,7 @@ void add_hand(world *w, const char *format, ...)
 
 /* ---- the session ---- */
 
-static bool surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool world_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   world *w = user;
   dBodyID body_a = dGeomGetBody(a);
@@ -124,7 +124,7 @@ static bool open_session(world *w)
   hap_ode_def_init(&ode, sizeof ode);
   ode.world = w->world;
   ode.space = w->space;
-  ode.surface = surface;
+  ode.surface = world_surface;
   ode.before_step = in_step;
   ode.user = w;
   return hap_session_create(&w->def, &ode, &w->session, &w->detail) >= HAP_OK;

@@ -3,8 +3,8 @@
 #ifndef HAPODE_TESTS_STABILITY_WORLDS_H
 #define HAPODE_TESTS_STABILITY_WORLDS_H
 
-/* The worlds of the stability cases: an ODE world, the simulated hands in it, and a lockstep session
- * over both. A builder fills the world in, world_start starts it. */
+/* The worlds of the stability cases: an ODE world, the simulated hands in it, and a lockstep
+ * session over both. A builder fills the world in, world_start starts it. */
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
