@@ -4,11 +4,14 @@
 #define HAPODE_TESTS_STABILITY_BOUNDS_H
 
 /* The common bounds of all stability cases, looked at after every tick.
- *  finite     forces, pointers, devices, bodies in the loop and in ODE; no fault force      on the
- * hand <= limit of the device energy     W - D + E(t) - E(0) <= 1 % of the largest stored energy
- * depth      of a pointer in a body <= F/k + v H momentum   residual of the audit <= impulse of
- * the hands in one interval unit      | |q| - 1 | of the bodies' orientations < 1e-12 room
- * way of a body from where it started
+ *
+ *   finite     forces, pointers, devices, bodies in the loop and in ODE; no fault
+ *   force      on the hand <= limit of the device
+ *   energy     W - D + E(t) - E(0) <= 1 % of the largest stored energy
+ *   depth      of a pointer in a body <= F/k + v H
+ *   momentum   residual of the audit <= impulse of the hands in one interval
+ *   unit      | |q| - 1 | of the bodies' orientations < 1e-12
+ *   room       way of a body from where it started
  *
  * Energy. W is the work of the force that really acted on the hands (the virtual device keeps it),
  * D what the damping of the devices took of it, E the kinetic and potential energy of the bodies.
