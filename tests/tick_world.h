@@ -37,8 +37,7 @@ static struct {
   hapi_local_body bodies[BODIES];
   uint32_t live[BODIES];
   hapi_local_contact contacts[CONTACTS];
-  hapi_ramp ramps[CONTACTS];
-  uint32_t ramp_generations[CONTACTS];
+  hapi_kept_touch kept[CONTACTS];
   hapi_friction frictions[CONTACTS];
   hapi_pointer pointers[POINTERS];
   hapi_model_cross crosses[CROSSES];
@@ -88,8 +87,7 @@ static inline void set_up(void)
   f.tick.bodies.of = f.bodies;
   f.tick.bodies.live = f.live;
   f.tick.touches.of = f.contacts;
-  f.tick.touches.ramps = f.ramps;
-  f.tick.touches.ramp_generations = f.ramp_generations;
+  f.tick.touches.kept = f.kept;
   f.tick.touches.frictions = f.frictions;
   f.tick.pointers.of = f.pointers;
   f.tick.touches.crosses.of = f.crosses;

@@ -28,7 +28,7 @@ typedef struct part {
   size_t size;
 } part;
 
-#define PARTS 12
+#define PARTS 11
 
 /* Of all that a tick of model SINGLE uses. */
 static void tick_list_parts(hapi_tick *t, part out[PARTS])
@@ -39,8 +39,7 @@ static void tick_list_parts(hapi_tick *t, part out[PARTS])
       {(void **)&t->bodies.of, c->bodies, sizeof *t->bodies.of},
       {(void **)&t->bodies.live, c->bodies, sizeof *t->bodies.live},
       {(void **)&t->touches.of, c->contacts + tools, sizeof *t->touches.of},
-      {(void **)&t->touches.ramps, c->contacts, sizeof *t->touches.ramps},
-      {(void **)&t->touches.ramp_generations, c->contacts, sizeof *t->touches.ramp_generations},
+      {(void **)&t->touches.kept, c->contacts, sizeof *t->touches.kept},
       {(void **)&t->touches.frictions, c->contacts, sizeof *t->touches.frictions},
       {(void **)&t->pointers.of, c->pointers, sizeof *t->pointers.of},
       {(void **)&t->touches.tool.tools, tools, sizeof *t->touches.tool.tools},

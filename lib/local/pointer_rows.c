@@ -9,6 +9,7 @@
 #include "local/body_step.h"
 #include "local/contact_ramp.h"
 #include "local/pointer_spring.h"
+#include "proximity/constrained_ball.h"
 
 /* Pointer contacts as rows of the solver: pointer_spring.h says which. Those of friction are in
  * pointer_friction_rows.c. */
@@ -18,7 +19,92 @@
 #define NEAR_S 5e-3
 #define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
 
-static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at)
+/* No hand comes from farther, into a shape, in a tick: m/s. */
+#define CROSS_SPEED HAPI_PRESS_SPEED
+
+/* In the body's frame. */
+static void ball_in_body(const hapi_placed_pointer *at, double out[3])
+{
+  const double *center = at->pointer->pose.position;
+  if (at->body == NULL) {
+    hapi_v3_copy(center, out);
+    return;
+  }
+  double apart[3];
+  hapi_v3_sub(center, at->body->pose.position, apart);
+  hapi_m3_apply_transposed(at->body->rotation, apart, out);
+}
+
+/* From the body's frame to the world. */
+static void nearest_to_world(const hapi_local_body *body, hapi_nearest *io)
+{
+  double normal[3];
+  double point[3];
+  hapi_body_vector(body, io->normal, normal);
+  hapi_body_point(body, io->point_b, point);
+  hapi_v3_copy(normal, io->normal);
+  hapi_v3_copy(point, io->point_b);
+}
+
+/* The ball may be deep in the shape, or behind it: seen from the side where it was. */
+static __attribute__((noinline, cold)) void ball_search(hapi_local_contact *c, double radius,
+                                                        const double ball[3],
+                                                        const hapi_nearest *nearest,
+                                                        hapi_nearest *out)
+{
+  static const hapi_touch_frame own = {NULL, NULL};
+  hapi_ball_search search;
+  hapi_ball_search_begin(&c->ball, ball, radius, nearest, &search);
+  while (hapi_ball_search_asks(&c->ball, &search)) {
+    hapi_nearest there;
+    bool found = hapi_ball_nearest(search.ask, radius, &c->shape, &c->shape_pose, &own, &there);
+    hapi_ball_search_answer(&c->ball, &search, found ? &there : NULL);
+  }
+  hapi_ball_search_end(&c->ball, &search, out);
+}
+
+/* One that was put in the body by no motion has no side but the nearest. One that came in before
+ * the loop knew of the contact has that of the model. */
+static void ball_enter(hapi_local_contact *c, const hapi_pointer *p)
+{
+  if (p->device.jump_s <= 0.0) {
+    c->ball.known = c->ball.held = true;
+    c->ball.gap = 0.0;
+    hapi_v3_copy(c->normal_body, c->ball.normal);
+    hapi_v3_madd(c->point_body, p->shape.radius, c->normal_body, c->ball.center);
+  }
+}
+
+/* The answer for the side that the pointer touches, where another may be nearer. */
+static __attribute__((noinline)) void keep_side(hapi_local_contact *c,
+                                                const hapi_placed_pointer *at, hapi_nearest *io)
+{
+  const hapi_pointer *p = at->pointer;
+  double radius = p->shape.radius;
+  double ball[3];
+  hapi_nearest local = *io;
+  ball_in_body(at, ball);
+  if (at->body != NULL) {
+    double apart[3];
+    hapi_v3_sub(io->point_b, at->body->pose.position, apart);
+    hapi_m3_apply_transposed(at->body->rotation, apart, local.point_b);
+    hapi_m3_apply_transposed(at->body->rotation, io->normal, local.normal);
+  }
+  if (p->device.jumped) {
+    c->ball.known = false;
+  } else if (!c->ball.known && io->distance + radius <= 0.0) {
+    ball_enter(c, p);
+  }
+  if (!hapi_ball_is_free(&c->ball, ball, radius, &local)) {
+    ball_search(c, radius, ball, &local, &local);
+    if (c->ball.held) {
+      nearest_to_world(at->body, &local);
+      *io = local;
+    }
+  }
+}
+
+static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at, double period)
 {
   hapi_nearest nearest;
   hapi_touch_frame frame = {NULL, NULL};
@@ -29,16 +115,23 @@ static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at)
                          &c->shape_pose, &frame, &nearest)) {
     return false;
   }
+  bool flat = c->shape.kind == HAPI_SHAPE_PLANE; /* it has one side */
+  bool far = nearest.distance + at->pointer->shape.radius > CROSS_SPEED * period;
+  if (!flat && (!far || c->ball.known)) {
+    keep_side(c, at, &nearest);
+    c->ball.known = c->ball.known && (!far || c->ball.held);
+  }
   hapi_v3_copy(nearest.normal, c->normal_now);
   hapi_v3_copy(nearest.point_b, c->point_now);
   at->depth = -nearest.distance;
   return true;
 }
 
-static bool ask_shape(hapi_local_contact *c, hapi_placed_pointer *at, hapi_effect_sample *sample)
+static bool ask_shape(hapi_local_contact *c, hapi_placed_pointer *at, double period,
+                      hapi_effect_sample *sample)
 {
   uint64_t begin = hapi_effect_begin(sample);
-  bool found = place_by_shape(c, at);
+  bool found = place_by_shape(c, at, period);
   hapi_effect_end(sample, HAP_EFFECT_SHAPE, begin);
   return found;
 }
@@ -73,7 +166,7 @@ static bool pointer_place(const hapi_tool_world *tools, hapi_local_contact *c, d
     return place_tool(&tools->tools[c->tool - 1], at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  if (!c->has_shape || !ask_shape(c, at, sample)) {
+  if (!c->has_shape || !ask_shape(c, at, period, sample)) {
     place_by_plane(c, at);
   }
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, period);

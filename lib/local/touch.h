@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "base/wishes.h"
+#include "proximity/constrained_ball.h"
 #include "sync/messages.h"
 
 /* How much of a contact that arrived deep is felt yet, see contact_ramp.h. */
@@ -68,6 +69,7 @@ typedef struct hapi_local_contact {
   uint32_t pointer;
   uint32_t pointer_generation;
   uint32_t generation;
+  uint32_t epoch; /* of the body, when the model came */
   uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
   uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
   bool seen;      /* rendered at least once */
@@ -76,6 +78,7 @@ typedef struct hapi_local_contact {
   double point_body[3];
   double normal_body[3];
   hapi_ramp ramp;
+  hapi_constrained_ball ball; /* of a sphere, in the body's frame; model CONTACT */
   double mu;
   double weight;        /* 0..1, share of the pointer's stiffness; of a sphere 1 */
   double force[3];      /* on the body */
@@ -132,14 +135,21 @@ typedef struct hapi_crosses {
   uint32_t count;
 } hapi_crosses;
 
+/* Of the contacts of spheres, by contact slot: with what the next model's contact goes on. */
+typedef struct hapi_kept_touch {
+  uint32_t generation; /* of the contact; 0: nothing is kept */
+  uint32_t epoch;      /* of the body */
+  hapi_ramp ramp;
+  hapi_constrained_ball ball;
+} hapi_kept_touch;
+
 typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
-  uint32_t pushing;           /* that push in this tick */
-  bool rubs;                  /* some contact rubs */
-  hapi_ramp *ramps;           /* by contact slot, of the model before: to go on with */
-  uint32_t *ramp_generations; /* by contact slot */
-  hapi_friction *frictions;   /* by contact slot; of spheres */
+  uint32_t pushing;         /* that push in this tick */
+  bool rubs;                /* some contact rubs */
+  hapi_kept_touch *kept;    /* capacity.contacts */
+  hapi_friction *frictions; /* by contact slot; of spheres */
   hapi_tool_world tool;
   hapi_crosses crosses;
   uint64_t contact_ticks; /* in which something pushed; this and the next since start */
@@ -175,7 +185,7 @@ static inline void hapi_touches_forget(const hapi_touches *touches, uint32_t poi
 {
   for (uint32_t i = 0; i < touches->count; ++i) {
     if (pointer == HAPI_SLOT_NONE || touches->of[i].pointer == pointer) {
-      touches->of[i].seen = false;
+      touches->of[i].seen = touches->of[i].ball.known = false;
     }
   }
   for (uint32_t i = 0; i < touches->tool.pair_count; ++i) {

@@ -7,19 +7,27 @@
 #include "base/assert.h"
 #include "local/tool_adopt.h"
 
-static void remember_ramps(const hapi_touches *touches)
+static uint32_t epoch_of(const hapi_bodies *bodies, uint32_t slot)
+{
+  return slot == HAPI_SLOT_NONE ? 0 : bodies->of[slot].epoch;
+}
+
+static void touches_keep(const hapi_touches *touches)
 {
   for (uint32_t i = 0; i < touches->count; ++i) {
     const hapi_local_contact *c = &touches->of[i];
     HAPI_ASSERT(c->tool == 0);
-    touches->ramps[c->slot] = c->ramp;
-    touches->ramp_generations[c->slot] = c->seen ? c->generation : 0;
+    touches->kept[c->slot] = (hapi_kept_touch){.generation = c->seen ? c->generation : 0,
+                                               .epoch = c->epoch,
+                                               .ramp = c->ramp,
+                                               .ball = c->ball};
   }
 }
 
-static void contact_adopt(hapi_touches *touches, const hapi_model_contact *in, uint32_t wishes,
-                          hapi_local_contact *out)
+static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
+                          const hapi_model_contact *in, uint32_t wishes, hapi_local_contact *out)
 {
+  const hapi_kept_touch *kept = &touches->kept[in->slot];
   memset(out, 0, sizeof *out);
   out->slot = in->slot;
   out->generation = in->generation;
@@ -37,9 +45,12 @@ static void contact_adopt(hapi_touches *touches, const hapi_model_contact *in, u
   out->has_shape = in->has_shape != 0;
   out->shape = in->shape;
   out->shape_pose = in->shape_pose;
-  if (touches->ramp_generations[in->slot] == in->generation) {
+  out->epoch = epoch_of(bodies, in->body);
+  if (kept->generation == in->generation) {
     out->seen = true;
-    out->ramp = touches->ramps[in->slot];
+    out->ramp = kept->ramp;
+    out->ball = kept->ball;
+    out->ball.known &= kept->epoch == out->epoch; /* else the body was put elsewhere */
   }
 }
 
@@ -65,7 +76,7 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
   const hapi_model_contact *in = hapi_model_contacts(model);
   hapi_tool_set_aside(touches);
   uint32_t cross = 0;
-  remember_ramps(touches);
+  touches_keep(touches);
   touches->count = 0;
   touches->crosses.count = 0;
   touches->rubs = false;
@@ -75,7 +86,7 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
     /* The pointer may have gone while the message was on its way. */
     if (in[i].tool == 0 && pointers->of[pointer].generation == in[i].pointer_generation) {
       crosses_adopt(&touches->crosses, bodies, model, i, touches->count, &cross);
-      contact_adopt(touches, &in[i], model->wishes, &touches->of[touches->count++]);
+      contact_adopt(touches, bodies, &in[i], model->wishes, &touches->of[touches->count++]);
     }
   }
   hapi_tool_adopt_model(touches, pointers, model);

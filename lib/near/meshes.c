@@ -7,6 +7,7 @@
 #include "base/assert.h"
 #include "base/vec.h"
 #include "near/near.h"
+#include "proximity/triangle.h"
 
 /* Triangles of static meshes near a box. ODE's own search keeps a cache that the whole process
  * shares, and gives contacts, not triangles; so the triangles are read once, in the order of the
@@ -258,4 +259,35 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
     }
   }
   return found;
+}
+
+/* False: it has no area. */
+static bool triangle_normal(const double corners[9], double out[3])
+{
+  double sides[2][3];
+  hapi_v3_sub(corners + 3, corners, sides[0]);
+  hapi_v3_sub(corners + 6, corners, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], out);
+  return hapi_v3_norm(out) > 0.0;
+}
+
+bool hapi_triangles_nearest(const hapi_meshes *meshes, uint32_t count, const double center[3],
+                            double radius, hapi_nearest *out)
+{
+  double best = HUGE_VAL;
+  for (uint32_t i = 0; i < count; ++i) {
+    double point[3];
+    double apart[3];
+    hapi_triangle_nearest(meshes->found[i].corners, center, point);
+    hapi_v3_sub(center, point, apart);
+    double distance = hapi_v3_norm(apart);
+    if (distance < best && (distance > 0.0 || triangle_normal(meshes->found[i].corners, apart))) {
+      best = distance;
+      hapi_v3_copy(point, out->point_b);
+      hapi_v3_scale(1.0 / hapi_v3_norm(apart), apart, out->normal);
+    }
+  }
+  out->distance = best - radius;
+  hapi_v3_madd(center, -radius, out->normal, out->point_a);
+  return best < HUGE_VAL;
 }

@@ -3,11 +3,14 @@
 #ifndef HAPODE_NEAR_MESHES_H
 #define HAPODE_NEAR_MESHES_H
 
-/* Triangles of static meshes near a geom. */
+/* Triangles of meshes near a geom. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <ode/ode.h>
+
+#include "proximity/proximity.h"
 
 typedef struct hapi_nearby hapi_nearby;
 
@@ -41,6 +44,10 @@ typedef struct hapi_meshes {
  * number of the model that they are for; HAPI_NEAR_TRIANGLES: there may be more, or there is no
  * memory for them, and they are not to be used. */
 uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], uint64_t walk);
+/* Nearest points of a ball (a), outside of the surface, and the first count of them (b), which have
+ * two sides. False: there are none. */
+bool hapi_triangles_nearest(const hapi_meshes *meshes, uint32_t count, const double center[3],
+                            double radius, hapi_nearest *out);
 void hapi_meshes_forget(hapi_meshes *meshes, dGeomID geom);
 void hapi_meshes_finish(hapi_meshes *meshes);
 

@@ -12,12 +12,14 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "near/near.h"
+#include "proximity/constrained_ball.h"
 
 /* Neighbours: the bodies that a pointer may touch before the next sync (paper section 4.1). In two
  * passes. Before the global step the space is asked for what is near; its geoms are clean then, and
  * asking moves nothing in its lists. After the step the nearest points are taken. */
 
 #define REACH_FLOOR 0.005       /* m */
+#define DEPTH_MOST 1.0          /* m, of a touch: what is deeper has been left behind */
 #define REACH_ACCELERATION 15.0 /* m/s^2: a hand, or a body that is hit */
 
 double hapi_neighbors_reach(double relative_speed, double horizon_s)
@@ -71,6 +73,20 @@ static void collect_geom(void *data, dGeomID a, dGeomID b)
   candidate->reach = hood->current_reach;
 }
 
+/* m: how deep the pointer is in what it touched at the loop's last message. What is that far in
+ * front of it belongs to the touch. */
+static double deepest_touch(const hapi_nearby *nearby, uint32_t pointer)
+{
+  double deepest = 0.0;
+  for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
+    const hapi_contact_slot *slot = &nearby->slots.contacts[i];
+    if (slot->phase == HAPI_SLOT_LIVE && slot->pointer == pointer && slot->touched) {
+      deepest = fmax(deepest, slot->depth);
+    }
+  }
+  return deepest;
+}
+
 void hapi_neighbors_collect(hapi_nearby *nearby)
 {
   hapi_neighbors *hood = &nearby->neighbors;
@@ -96,7 +112,8 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
     double size = is_tool ? pointers[i].extent : pointers[i].radius;
     double speed = hood->fastest + hapi_v3_norm(pointers[i].twist.linear);
     speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
-    double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s);
+    double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s) +
+                   fmin(deepest_touch(nearby, i), DEPTH_MOST);
     hood->current_pointer = i;
     hood->current_reach = reach;
     dGeomSphereSetRadius(hood->probe_geom, size + reach);
@@ -125,21 +142,144 @@ double hapi_neighbors_spin(dGeomID geom, double distance)
   return body != NULL ? distance * hapi_v3_norm(dBodyGetAngularVel(body)) : 0.0;
 }
 
+/* A search about a geom: from where a pointer would be if it could not enter it. */
+typedef struct side_search {
+  hapi_nearby *nearby;
+  dGeomID geom;
+  dBodyID body; /* NULL: static */
+  double radius;
+  double reach;
+  bool mesh;
+  uint32_t triangles; /* of a mesh, in nearby->meshes.found */
+} side_search;
+
+static void side_to_body(const side_search *s, const double point[3], double out[3])
+{
+  hapi_v3_copy(point, out);
+  if (s->body != NULL) {
+    hapi_pose_unpoint(dBodyGetPosition(s->body), dBodyGetQuaternion(s->body), point, out);
+  }
+}
+
+static void side_to_world(const side_search *s, const double point[3], double out[3])
+{
+  hapi_v3_copy(point, out);
+  if (s->body != NULL) {
+    hapi_pose_point(dBodyGetPosition(s->body), dBodyGetQuaternion(s->body), point, out);
+  }
+}
+
+/* The triangles that the ball may meet on its way between the two places of the body's frame. */
+static void side_gather(side_search *s, const double from[3], const double to[3])
+{
+  double box[6];
+  double ends[2][3];
+  side_to_world(s, from, ends[0]);
+  side_to_world(s, to, ends[1]);
+  for (int k = 0; k < 3; ++k) {
+    box[2 * k] = fmin(ends[0][k], ends[1][k]) - s->reach - s->radius;
+    box[2 * k + 1] = fmax(ends[0][k], ends[1][k]) + s->reach + s->radius;
+  }
+  uint64_t walk = s->nearby->cycle->model_number + 1; /* of this cycle */
+  s->triangles = hapi_mesh_near(s->nearby, s->geom, box, walk);
+}
+
+/* Nearest points of a ball of the pointer's size at a place of the body's frame. */
+static bool side_nearest(const side_search *s, const double at[3], hapi_nearest *out)
+{
+  double center[3];
+  side_to_world(s, at, center);
+  bool found =
+      s->mesh && s->triangles < HAPI_NEAR_TRIANGLES
+          ? hapi_triangles_nearest(&s->nearby->meshes, s->triangles, center, s->radius, out)
+          : hapi_geom_nearest(s->nearby, s->geom, center, s->radius, s->reach, out);
+  if (found && s->body != NULL) {
+    side_to_body(s, out->point_b, out->point_b);
+    hapi_quat_unrotate(dBodyGetQuaternion(s->body), out->normal, out->normal);
+  }
+  return found;
+}
+
+/* A pointer that touched at the loop's last message is felt from the side that it is on. False: it
+ * has left the geom. */
+static bool nearest_of_side(hapi_nearby *nearby, const hapi_candidate *candidate,
+                            const hapi_contact_slot *slot, const double center[3], double radius,
+                            hapi_nearest *out)
+{
+  hapi_constrained_ball ball = {.known = true, .outside = radius};
+  hapi_ball_search search;
+  hapi_nearest here;
+  double at[3];
+  double way[3];
+  side_search s = {.nearby = nearby,
+                   .geom = candidate->geom,
+                   .body = dGeomGetBody(candidate->geom),
+                   .radius = radius,
+                   .mesh = dGeomGetClass(candidate->geom) == dTriMeshClass};
+  hapi_v3_copy(slot->ball, ball.ball);
+  hapi_v3_copy(slot->ball, ball.center);
+  hapi_v3_copy(slot->ball_normal, ball.normal);
+  side_to_body(&s, center, at);
+  hapi_v3_sub(at, ball.center, way);
+  s.reach = candidate->reach + hapi_v3_norm(way);
+  if (s.mesh) {
+    side_gather(&s, ball.center, at);
+  }
+  bool near = side_nearest(&s, at, &here);
+  if (!hapi_ball_is_free(&ball, at, radius, near ? &here : NULL)) {
+    hapi_ball_search_begin(&ball, at, radius, near ? &here : NULL, &search);
+    while (hapi_ball_search_asks(&ball, &search)) {
+      hapi_nearest there;
+      bool found = side_nearest(&s, search.ask, &there);
+      hapi_ball_search_answer(&ball, &search, found ? &there : NULL);
+    }
+    near = hapi_ball_search_end(&ball, &search, &here);
+  }
+  if (!ball.held &&
+      hapi_geom_nearest(nearby, candidate->geom, center, radius, candidate->reach, out)) {
+    return true;
+  }
+  *out = here;
+  if (near && s.body != NULL) {
+    side_to_world(&s, out->point_b, out->point_b);
+    hapi_quat_rotate(dBodyGetQuaternion(s.body), out->normal, out->normal);
+  }
+  return near;
+}
+
+/* What the loop last told of the contact; NULL: nothing that is of use. */
+static const hapi_contact_slot *touch_of(hapi_nearby *nearby, const hapi_candidate *candidate,
+                                         const hapi_state_pointer *pointer)
+{
+  dBodyID body = dGeomGetBody(candidate->geom);
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
+  uint32_t of = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_SLOT_NONE;
+  if (body != NULL && of == HAPI_NONE) {
+    return NULL;
+  }
+  const hapi_contact_slot *slot =
+      hapi_slots_find_contact(nearby, of, candidate->geom, candidate->pointer, pointer->generation);
+  bool moved = slot != NULL && body != NULL && slot->epoch != nearby->slots.bodies[of].epoch;
+  return slot != NULL && slot->touched && !moved ? slot : NULL;
+}
+
 /* Nearest points for where the pointer will be at the time of the model, which is later than now in
- * model IMPULSE; where that would put its centre inside the body, for where it is now: the far face
- * must not be taken for the near one. */
+ * model IMPULSE; where that would put its centre inside the body, for where it is now. */
 static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_nearest *out)
 {
   const hapi_state_pointer *pointer =
       &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
+  const hapi_contact_slot *touch = touch_of(nearby, candidate, pointer);
   double horizon = nearby->cycle->probe_step_s;
   double ahead = hapi_cycle_steps_to_now(nearby->cycle) ? 0.0 : horizon;
   double there[3];
   hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
-  bool found =
-      hapi_geom_nearest(nearby, candidate->geom, there, pointer->radius, candidate->reach, out);
-  if (!found || out->distance < -pointer->radius) {
-    found = hapi_geom_nearest(nearby, candidate->geom, pointer->pose.position, pointer->radius,
+  double radius = pointer->radius;
+  bool found = touch != NULL ? nearest_of_side(nearby, candidate, touch, there, radius, out)
+                             : hapi_geom_nearest(nearby, candidate->geom, there, radius,
+                                                 candidate->reach, out);
+  if (touch == NULL && (!found || out->distance < -radius)) {
+    found = hapi_geom_nearest(nearby, candidate->geom, pointer->pose.position, radius,
                               candidate->reach, out);
   }
   return found && out->distance <=
@@ -162,8 +302,6 @@ static int hit_by_distance(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* A plane that turned far is another contact: it does not go on with the force of the old one. */
-#define SAME_PLANE_COSINE 0.7
 
 #define FRICTION_MOST 10.0 /* as between bodies */
 
@@ -203,10 +341,6 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
     hapi_pose_unpoint(dBodyGetPosition(body), q, hit->nearest.point_b, slot->point_body);
     hapi_quat_unrotate(q, hit->nearest.normal, normal);
   }
-  if (slot->placed && hapi_v3_dot(normal, slot->normal_body) < SAME_PLANE_COSINE) {
-    ++slot->generation;
-    memset(slot->last_force, 0, sizeof slot->last_force);
-  }
   /* The shape itself, in the body's frame, for the loop to ask. */
   hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
@@ -230,6 +364,7 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
   slot->placed = true;
+  slot->epoch = slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].epoch : 0;
   slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;

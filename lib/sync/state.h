@@ -40,7 +40,12 @@ typedef struct hapi_state_body {
 typedef struct hapi_state_contact {
   uint32_t slot;
   uint32_t generation;
-  double force[3]; /* N on the body at this tick */
+  uint32_t touches; /* of a sphere: what follows holds */
+  uint32_t reserved;
+  double depth;     /* m, of the pointer in the geom */
+  double force[3];  /* N on the body at this tick */
+  double ball[3];   /* m, body frame: centre of the pointer if it could not enter the geom */
+  double normal[3]; /* unit, body frame: of the surface there */
 } hapi_state_contact;
 
 /* Since the start, of the ticks that had a budget. */

@@ -30,7 +30,36 @@ static void report_bodies(const hapi_bodies *from, hapi_state *out)
   out->body_high = from->high;
 }
 
-static void report_contacts(const hapi_touches *touches, hapi_state *out)
+/* Where a pointer that touches would be if it could not enter the geom: physics then looks for the
+ * nearest point from there. */
+static void report_ball(const hapi_local_contact *in, const hapi_pointer *p,
+                        const hapi_local_body *body, hapi_state_contact *out)
+{
+  double apart[3];
+  out->touches =
+      in->tool == 0 && in->seen && in->ramp.depth > 0.0 && p->generation == in->pointer_generation;
+  if (out->touches == 0) {
+    return;
+  }
+  hapi_v3_copy(p->pose.position, out->ball);
+  if (body != NULL) {
+    hapi_pose_unpoint(body->pose.position, body->pose.quat_wxyz, out->ball, out->ball);
+  }
+  if (in->has_shape && in->ball.known) {
+    hapi_v3_copy(in->ball.normal, out->normal);
+    hapi_v3_sub(in->ball.center, out->ball, apart);
+    out->depth = hapi_v3_dot(apart, out->normal);
+    hapi_v3_copy(in->ball.center, out->ball);
+  } else { /* the plane that the model gave */
+    hapi_v3_copy(in->normal_body, out->normal);
+    hapi_v3_sub(out->ball, in->point_body, apart);
+    out->depth = p->shape.radius - hapi_v3_dot(apart, out->normal);
+    hapi_v3_madd(out->ball, out->depth, out->normal, out->ball);
+  }
+}
+
+static void report_contacts(const hapi_touches *touches, const hapi_pointers *pointers,
+                            const hapi_bodies *bodies, hapi_state *out)
 {
   hapi_state_contact *contacts = hapi_state_contacts(out);
   uint32_t count = 0;
@@ -39,6 +68,8 @@ static void report_contacts(const hapi_touches *touches, hapi_state *out)
     if (in->slot != HAPI_SLOT_NONE) { /* else physics does not know it */
       contacts[count].slot = in->slot;
       contacts[count].generation = in->generation;
+      report_ball(in, &pointers->of[in->pointer], hapi_bodies_at(bodies, in->body),
+                  &contacts[count]);
       hapi_v3_copy(in->force, contacts[count++].force);
     }
   }
@@ -100,7 +131,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   out->model_number = tick->facts.model_number;
   out->model = tick->facts.model;
   report_bodies(&tick->bodies, out);
-  report_contacts(&tick->touches, out);
+  report_contacts(&tick->touches, &tick->pointers, &tick->bodies, out);
   report_springs(&tick->touches, tick->facts.tick, out);
   report_pointers(&tick->pointers, out);
 }
