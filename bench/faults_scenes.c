@@ -717,7 +717,7 @@ const faults_scene faults_table[] = {
      .build = post_build,
      .motion = FINGER(corner_hand),
      .seconds = 1.2,
-     .check = WITHIN(0.02)},
+     .check = {.kind = FAULTS_FORCE, .bound = 0.02, .begin_s = 0.05}}, /* it begins in touch */
     SHEET("sheet_0.1mm", 1e-4),
     SHEET("sheet_0.3mm", 3e-4),
     SHEET("sheet_1mm", 1e-3),

@@ -28,7 +28,7 @@
 /* A running session's tick, run alone and put back: what the haptic loop computes from that state,
  * without devices, messages, threads and hash, and without a trace in the session. */
 
-#define TICK_ARRAYS 13
+#define TICK_ARRAYS 12
 
 typedef struct tick_array {
   void *at;

@@ -48,6 +48,7 @@ typedef struct hapi_lookback_touch {
   uint32_t contact_generation; /* for one contact after another */
   bool placed;                 /* at the last step it was near, ... */
   double normal_body[3];       /* ... and this was the normal */
+  double point_body[3];        /* m, where it touched */
   bool there;
   bool noted; /* while this window was open */
 } hapi_lookback_touch;

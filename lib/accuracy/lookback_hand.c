@@ -20,8 +20,6 @@
  * near comes as a message of physics, as in a session of that model; so hulls, friction and soft
  * fingers are the loop's own code. */
 
-#define SAME_PLANE_COSINE 0.7 /* as for the contacts of a session */
-
 typedef struct part {
   void **array;
   size_t count;
@@ -258,12 +256,38 @@ static hapi_model_contact *model_add_contact(hapi_lookback *w, const hapi_lookba
   return out;
 }
 
+/* A pointer whose centre is in the geom, or behind it, is asked for from where it would be if it
+ * could not enter it: on the side of the last plane. */
+static void touch_place(const hapi_lookback_touch *t, const hapi_state_pointer *p, double out[3])
+{
+  dBodyID body = dGeomGetBody(t->geom);
+  double normal[3];
+  double point[3];
+  double apart[3];
+  hapi_v3_copy(p->pose.position, out);
+  if (!t->placed) {
+    return;
+  }
+  hapi_v3_copy(t->normal_body, normal);
+  hapi_v3_copy(t->point_body, point);
+  if (body != NULL) {
+    hapi_quat_rotate(dBodyGetQuaternion(body), t->normal_body, normal);
+    hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), t->point_body, point);
+  }
+  hapi_v3_sub(out, point, apart);
+  double height = hapi_v3_dot(apart, normal);
+  if (height <= 0.0) {
+    hapi_v3_madd(out, p->radius - height, normal, out);
+  }
+}
+
 static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
                              const hapi_state_pointer *p, double period)
 {
   hapi_nearest at;
   double normal[3];
-  const double *center = p->pose.position;
+  double center[3];
+  touch_place(t, p, center);
   double reach = hapi_neighbors_reach(hapi_neighbors_speed(t->geom, p, center), period);
   if (!hapi_geom_nearest(w->near, t->geom, center, p->radius, reach, &at)) {
     t->placed = false;
@@ -274,8 +298,6 @@ static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t 
   if (body != HAPI_SLOT_NONE) {
     hapi_quat_unrotate(dBodyGetQuaternion(dGeomGetBody(t->geom)), at.normal, normal);
   }
-  t->contact_generation +=
-      t->placed && hapi_v3_dot(normal, t->normal_body) < SAME_PLANE_COSINE; /* another face */
   t->placed = true;
   hapi_v3_copy(normal, t->normal_body);
   hapi_model_contact *out = model_add_contact(w, t, body);
@@ -285,6 +307,7 @@ static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t 
     dBodyID of = dGeomGetBody(t->geom);
     hapi_pose_unpoint(dBodyGetPosition(of), dBodyGetQuaternion(of), at.point_b, out->point_body);
   }
+  hapi_v3_copy(out->point_body, t->point_body);
 }
 
 /* False: there are more points than the loop has room for. */

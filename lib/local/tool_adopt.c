@@ -11,7 +11,7 @@
  * the same pair was is that one, and keeps what it had. While a pair presses, others come in
  * slowly, and those that are gone leave slowly: the force does not jump where a patch changes. */
 
-#define SAME_COSINE 0.7 /* of the normals */
+#define SAME_COSINE 0.7 /* of like normals */
 
 void hapi_tool_set_aside(hapi_touches *touches)
 {
@@ -38,29 +38,51 @@ static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
   return w->pair_count++;
 }
 
-/* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. One that is
- * taken has its member negative. */
-static uint32_t find_old(const hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in)
+/* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. */
+static uint32_t find_old(const hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in,
+                         double least_cosine)
 {
   double best = in->same_within;
   uint32_t chosen = HAPI_SLOT_NONE;
   for (uint32_t i = 0; i < old_count; ++i) {
     const hapi_local_tool *old = &w->old_tools[i];
     double apart[3];
-    if (old->member < 0.0 || old->in.at.key != in->at.key ||
+    if (old->heir != 0 || old->in.at.key != in->at.key ||
         old->in.pointer_generation != in->pointer_generation || old->in.pointer != in->pointer) {
       continue;
     }
     hapi_v3_sub(old->in.at.core_a, in->at.core_a, apart);
     double distance = hapi_v3_norm(apart);
     bool turned = old->in.at.touch == in->at.touch &&
-                  hapi_v3_dot(old->in.at.normal, in->at.normal) < SAME_COSINE;
+                  hapi_v3_dot(old->in.at.normal, in->at.normal) < least_cosine;
     if (distance < best && !turned) {
       best = distance;
       chosen = i;
     }
   }
   return chosen;
+}
+
+/* First those with like normals: where a corner touches two faces, each goes on as what it was. */
+static void choose_heirs(hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in,
+                         uint32_t number)
+{
+  uint32_t old = find_old(w, old_count, in, SAME_COSINE);
+  if (old != HAPI_SLOT_NONE) {
+    w->old_tools[old].heir = number + 1;
+  }
+}
+
+/* Then those that are left, however far the surface has turned. */
+static uint32_t old_of(hapi_tool_world *w, uint32_t old_count, const hapi_tool_point *in,
+                       uint32_t number)
+{
+  for (uint32_t i = 0; i < old_count; ++i) {
+    if (w->old_tools[i].heir == number + 1) {
+      return i;
+    }
+  }
+  return find_old(w, old_count, in, -1.0);
 }
 
 static void link_to_pair(hapi_tool_world *w, uint32_t at)
@@ -85,7 +107,7 @@ static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t 
     *c = w->old_contacts[old];
     tool->member = w->old_tools[old].member;
     tool->friction = w->old_tools[old].friction;
-    w->old_tools[old].member = -1.0;
+    w->old_tools[old].heir = HAPI_SLOT_NONE;
   } else {
     memset(c, 0, sizeof *c);
     tool->member = w->pairs[pair].depth > 0.0 ? 0.0 : 1.0;
@@ -113,7 +135,7 @@ static void tools_keep_leaving(hapi_touches *touches, uint32_t old_count, uint32
   for (uint32_t i = 0; i < old_count; ++i) {
     const hapi_local_tool old = w->old_tools[i];
     bool room = w->count < 2 * w->capacity;
-    if (old.member < 0.0 || !room || !(w->pairs[old.pair].depth > 0.0)) {
+    if (old.heir != 0 || !room || !(w->pairs[old.pair].depth > 0.0)) {
       continue;
     }
     uint32_t at = w->count;
@@ -145,6 +167,9 @@ static uint32_t tools_begin(hapi_tool_world *w)
   w->count = 0;
   for (uint32_t i = 0; i < w->pair_count; ++i) {
     w->pairs[i].first = HAPI_SLOT_NONE;
+  }
+  for (uint32_t i = 0; i < old_count; ++i) {
+    w->old_tools[i].heir = 0;
   }
   return old_count;
 }
@@ -184,12 +209,17 @@ void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
   }
   uint32_t old_count = tools_begin(&touches->tool);
   for (uint32_t i = 0; i < model->contact_count; ++i) {
+    if (contacts[i].tool != 0) {
+      choose_heirs(&touches->tool, old_count, &tools[contacts[i].tool - 1], i);
+    }
+  }
+  for (uint32_t i = 0; i < model->contact_count; ++i) {
     const hapi_tool_point *in = &tools[contacts[i].tool - 1];
     if (contacts[i].tool == 0 || !is_there(&touches->tool, pointers, in)) {
       continue;
     }
     hapi_local_contact *c = &touches->of[touches->count]; /* where it comes to be */
-    tool_add(touches, in, find_old(&touches->tool, old_count, in), model->wishes);
+    tool_add(touches, in, old_of(&touches->tool, old_count, in, i), model->wishes);
     c->slot = contacts[i].slot;
     c->generation = contacts[i].generation;
     memcpy(c->a, contacts[i].a, sizeof c->a);
@@ -208,8 +238,11 @@ void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointer
   hapi_tool_set_aside(touches);
   uint32_t old_count = tools_begin(&touches->tool);
   for (uint32_t i = 0; i < patches->tool_count; ++i) {
+    choose_heirs(&touches->tool, old_count, &tools[i], i);
+  }
+  for (uint32_t i = 0; i < patches->tool_count; ++i) {
     if (is_there(&touches->tool, pointers, &tools[i])) {
-      tool_add(touches, &tools[i], find_old(&touches->tool, old_count, &tools[i]), wishes);
+      tool_add(touches, &tools[i], old_of(&touches->tool, old_count, &tools[i], i), wishes);
     }
   }
   tools_end(touches, old_count, wishes);

@@ -99,6 +99,7 @@ typedef struct hapi_local_tool {
   double member; /* 0..1: one that is new, or no longer there, comes and goes slowly */
   bool leaving;  /* no longer there */
   bool placed;   /* in this tick */
+  uint32_t heir; /* scratch of adopting: 1 + the new point that goes on with it; 0: none */
   double claim;  /* 0..1, in this tick: its part of the stiffness before it is shared */
   double depth;  /* m, in this tick, less the pair's excess */
   double felt;   /* 0..1, share of the stiffness in this tick */

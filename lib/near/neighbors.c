@@ -302,7 +302,6 @@ static int hit_by_distance(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-
 #define FRICTION_MOST 10.0 /* as between bodies */
 
 /* What the application says of the pair. */

@@ -100,10 +100,8 @@ hapi_contact_slot *hapi_slots_new_contact(hapi_nearby *nearby, uint32_t body, dG
     return NULL;
   }
   uint32_t generation = slot->generation;
-  uint32_t life = slot->life;
   memset(slot, 0, sizeof *slot);
   slot->generation = generation + 1;
-  slot->life = life + 1;
   slot->phase = HAPI_SLOT_LIVE;
   slot->body = body;
   slot->geom = geom;
@@ -197,10 +195,8 @@ void hapi_slots_reset(hapi_nearby *nearby)
   }
   for (uint32_t i = 0; i < nearby->cycle->config->capacity.contacts; ++i) {
     uint32_t generation = nearby->slots.contacts[i].generation;
-    uint32_t life = nearby->slots.contacts[i].life;
     memset(&nearby->slots.contacts[i], 0, sizeof nearby->slots.contacts[i]);
     nearby->slots.contacts[i].generation = generation;
-    nearby->slots.contacts[i].life = life;
   }
   for (uint32_t i = 0; i < nearby->world->bodies.high; ++i) {
     nearby->world->bodies.entries[i].slot = HAPI_NONE;

@@ -44,8 +44,7 @@ typedef struct hapi_body_slot {
 
 typedef struct hapi_contact_slot {
   hapi_slot_phase phase;
-  uint32_t generation; /* grows also where the same contact turned far */
-  uint32_t life;       /* grows with each new contact in this place */
+  uint32_t generation; /* grows with each new contact in this place */
   uint32_t body;       /* slot, HAPI_SLOT_NONE: static world */
   uint32_t pointer;
   uint32_t pointer_generation;

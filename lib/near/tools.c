@@ -267,8 +267,6 @@ void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t bo
   }
 }
 
-#define SAME_COSINE 0.7 /* of the normals: else it does not go on with the old one's force */
-
 static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                        const hapi_found_point *point)
 {
@@ -283,10 +281,6 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
     const dReal *q = dBodyGetQuaternion(body);
     hapi_pose_unpoint(dBodyGetPosition(body), q, slot->point_world, slot->point_body);
     hapi_quat_unrotate(q, point->normal, normal);
-  }
-  if (slot->placed && hapi_v3_dot(normal, slot->normal_body) < SAME_COSINE) {
-    ++slot->generation;
-    memset(slot->last_force, 0, sizeof slot->last_force);
   }
   hapi_v3_copy(normal, slot->normal_body);
   slot->has_shape = false;

@@ -42,8 +42,8 @@ void hapi_answers_follow(hapi_answers *answers, const hapi_slots *slots)
     answers->bodies[i].edge = false;
   }
   for (uint32_t i = 0; i < slots->contact_high; ++i) {
-    if (answers->contacts[i].life != slots->contacts[i].life) {
-      answers->contacts[i] = (hapi_contact_answer){.life = slots->contacts[i].life};
+    if (answers->contacts[i].generation != slots->contacts[i].generation) {
+      answers->contacts[i] = (hapi_contact_answer){.generation = slots->contacts[i].generation};
     }
   }
 }

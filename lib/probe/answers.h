@@ -23,8 +23,8 @@ typedef struct hapi_body_answer {
 } hapi_body_answer;
 
 typedef struct hapi_contact_answer {
-  uint32_t life;  /* of the slot that the rest is of */
-  bool probed;    /* a holds a measured accelerance */
+  uint32_t generation; /* of the slot that the rest is of */
+  bool probed;         /* a holds a measured accelerance */
   double push;    /* N, of this cycle's testing simulations; their directions are of the contact */
   double a[6][3]; /* eq. 6 */
   double turn[6]; /* the same of a torque about the normal */
