@@ -153,10 +153,10 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
 }
 
 /* In real time: a frame of the application is a step of physics, but time passes slowly. */
-static hap_status frames_run(bench *b, const faults_scene *scene, hap_session *session,
-                             hap_pointer_id hand, double physics_hz, run_state *run,
-                             faults_run *out)
+static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand, double physics_hz,
+                             run_state *run, faults_run *out)
 {
+  const faults_scene *scene = run->w.scene;
   double frame_s = 1.0 / physics_hz;
   double next_frame = frame_s;
   struct timespec at;
@@ -249,7 +249,7 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, double physic
     status = pointer_add(b, scene, session, &hand);
   }
   if (status >= HAP_OK) {
-    status = scene->slow > 0.0 ? frames_run(b, scene, session, hand, physics_hz, &run, out)
+    status = scene->slow > 0.0 ? frames_run(b, session, hand, physics_hz, &run, out)
                                : ticks_run(b, scene, session, hand, &run, out);
   }
   if (status >= HAP_OK && hap_session_stats(session, &stats, sizeof stats) >= HAP_OK) {
