@@ -58,7 +58,25 @@ void hapi_thread_join(hapi_thread *thread)
   if (thread->running) {
     pthread_join(thread->handle, NULL);
     thread->running = false;
+    atomic_store(&thread->claims, 0);
   }
+}
+
+static uintptr_t own_mark(void)
+{
+  static _Thread_local char mark;
+  return (uintptr_t)&mark;
+}
+
+void hapi_thread_claim(hapi_thread *thread)
+{
+  atomic_store(&thread->claims, own_mark());
+}
+
+bool hapi_thread_is_mine(const hapi_thread *thread)
+{
+  uintptr_t owner = atomic_load(&thread->claims);
+  return owner == 0 || owner == own_mark();
 }
 
 void hapi_thread_prepare_for_ticks(void)

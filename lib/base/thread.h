@@ -7,13 +7,15 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include <hapode/status.h>
 
 typedef struct hapi_thread {
   pthread_t handle;
   bool running;
-  _Atomic bool realtime; /* has the priority it asked for */
+  _Atomic bool realtime;    /* has the priority it asked for */
+  _Atomic uintptr_t claims; /* who runs, after hapi_thread_claim; 0: nobody */
 } hapi_thread;
 
 /* Starts main(arg). priority 1..99 asks for SCHED_FIFO and goes on without it when that is not
@@ -21,6 +23,12 @@ typedef struct hapi_thread {
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority);
 void hapi_thread_join(hapi_thread *thread); /* idempotent */
+
+/* [the thread] From now on, until it is joined, what belongs to it is its own; for asserts. */
+void hapi_thread_claim(hapi_thread *thread);
+/* Whether the calling thread may do what belongs to the thread: also anyone while it does not run.
+ * */
+bool hapi_thread_is_mine(const hapi_thread *thread);
 
 /* The calling thread: wakes up without the timer slack of ordinary threads, and has its stack
  * touched down to 64 KiB. */

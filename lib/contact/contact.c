@@ -67,6 +67,7 @@ typedef struct placed_geom {
 
 bool hapi_contact_has_news(hapi_contact *contact)
 {
+  HAPI_ASSERT(hapi_thread_is_mine(&contact->thread));
   hapi_poses *poses = hapi_exchange_poses_take(contact->config.exchange);
   contact->poses = poses != NULL ? poses : contact->poses;
   return contact->poses != NULL && contact->poses->model_number != 0 &&
@@ -546,6 +547,7 @@ static void *contact_main(void *arg)
 {
   const int64_t look_ns = 1000000;
   hapi_contact *contact = arg;
+  hapi_thread_claim(&contact->thread);
   int64_t due = contact->start_ns;
   while (atomic_load_explicit(&contact->stop, memory_order_acquire) == 0) {
     int64_t now = hapi_clock_now();

@@ -217,6 +217,7 @@ static void take_messages(hapi_haptic *haptic)
 
 static void messages_receive(hapi_haptic *haptic, int64_t now_ns)
 {
+  HAPI_ASSERT(hapi_thread_is_mine(&haptic->thread));
   take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
     haptic->tick.facts.now_ns = now_ns;
@@ -307,6 +308,7 @@ static void trace_write(hapi_haptic *haptic)
 
 void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
 {
+  HAPI_ASSERT(hapi_thread_is_mine(&haptic->thread));
   int64_t begin_ns = hapi_clock_now();
   unsigned before = hapi_denormals_flush();
   hapi_loop_sample_begin(haptic);

@@ -51,6 +51,7 @@ static uint64_t wait_for(hapi_haptic *haptic, uint64_t next)
 static void *haptic_main(void *arg)
 {
   hapi_haptic *haptic = arg;
+  hapi_thread_claim(&haptic->thread);
   hapi_thread_prepare_for_ticks();
   uint64_t next = window_of(haptic, hapi_clock_now()) + 1;
   while (atomic_load_explicit(&haptic->stop, memory_order_acquire) == 0) {

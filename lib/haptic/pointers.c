@@ -177,6 +177,7 @@ static int phase_after(int way)
 
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
+  HAPI_ASSERT(hapi_thread_is_mine(&haptic->thread));
   if (hapi_tape_plays(haptic->tape)) {
     follow_tape(haptic);
     return;

@@ -137,6 +137,7 @@ static bool block_flush(hapi_recorder *recorder, hapi_stream stream)
 
 static size_t cells_take(hapi_recorder *recorder, hapi_stream stream)
 {
+  HAPI_ASSERT(hapi_thread_is_mine(&recorder->thread));
   uint32_t *count = &recorder->counts[stream];
   size_t got = hapi_tape_take(&recorder->tapes[stream], recorder->cells[stream] + *count,
                               HAPI_BLOCK_CELLS - *count);
@@ -188,6 +189,7 @@ static void end_file(hapi_recorder *recorder)
 static void *recorder_main(void *arg)
 {
   hapi_recorder *recorder = arg;
+  hapi_thread_claim(&recorder->thread);
   sigset_t all;
   sigfillset(&all); /* a file that may grow no further is an error to be told, and no signal that
                        ends the process */
