@@ -100,6 +100,8 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   out->fixed_iterations = knobs->iterations > 0 ? knobs->iterations : 0;
 }
 
+/* ---- when one is turned ---- */
+
 #define ROOM 0.6 /* a load below it leaves room for a step */
 #define FAR_OVER 2.0
 #define FAR_STEPS 3
@@ -127,6 +129,8 @@ int hapi_turn_by(hapi_turn *turn, double load, double seconds)
   turn->tried = true;
   return -1;
 }
+
+/* ---- two of them ---- */
 
 #define STEP 10 /* percent, of a turn */
 #define LOOK_TICKS 100u

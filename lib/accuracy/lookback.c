@@ -11,8 +11,9 @@
 #include "base/vec.h"
 #include "sync/exchange.h"
 
-/* Going over a window: the reference of a tick is what ODE and the loop's tick of model SINGLE
- * make of it, with the bodies where they are by that reckoning. */
+/* The life of a window: what it keeps, what is noted while it is open, what comes out.
+ * In going over it the reference of a tick is what ODE and the loop's tick of model SINGLE make of
+ * it, with the bodies where they are by that reckoning. */
 
 #define ITERATIONS 2         /* times those of the world: what they leave undone shows as well */
 #define ITERATIONS_LEAST 200 /* where there is time for them */
@@ -98,8 +99,6 @@ static void window_collide(hapi_lookback *w, const hapi_cycle *as_single)
     }
   }
 }
-
-/* ---- what comes out ---- */
 
 /* ---- steps ---- */
 
@@ -312,7 +311,7 @@ static hap_status window_run(hapi_lookback *w, int own_iterations, double second
   return status;
 }
 
-/* The life of a window: what it keeps, what is noted while it is open, what comes out. */
+/* ---- the life of a window ---- */
 
 #define WINDOW_S 0.25
 #define WINDOW_STEPS 4.0 /* of physics, at least */

@@ -8,6 +8,9 @@
 #include "base/assert.h"
 #include "base/vec.h"
 
+/* Where the loop's world and the global world meet (paper section 6,
+ * docs/decisions/step-ends-now.md). */
+
 bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, const hapi_world *world,
                          const hapi_slots *slots)
 {
@@ -32,8 +35,7 @@ void hapi_account_reset(hapi_account *account)
   memset(account->bodies, 0, account->capacity * sizeof *account->bodies);
 }
 
-/* Where the loop's world and the global world meet (paper section 6,
- * docs/decisions/step-ends-now.md). */
+/* ---- in and out ---- */
 
 /* What the newest message says of the body of a slot; NULL: nothing. */
 static const hapi_state_body *state_of_slot(const hapi_account *account, uint32_t slot_index)
@@ -355,7 +357,7 @@ void hapi_reconcile_leave(hapi_account *account)
   }
 }
 
-/* What the loop owns is not stepped by ODE: its bodies and joints are switched off for the step. */
+/* ---- what the loop owns is off for the global step: its bodies and joints ---- */
 
 static bool is_owned(const hapi_body_table *table, uint32_t body)
 {

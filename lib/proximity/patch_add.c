@@ -8,6 +8,11 @@
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
+/* From what lies over a reference to points of the patch: spots are clipped and reduced, then
+ * added; edges are added where they cross. */
+
+/* --- which spots are kept --------------------------------------------------------------------- */
+
 /* Part of a height difference; a spot nearer than that beside a deeper one carries nothing: the
  * top corner of a plate over its bottom corner, up to a tilt of 6 degrees. */
 static const double steep = 0.1;
@@ -113,6 +118,8 @@ int hapi_patch_reduce(hapi_spot *spots, int count, double size)
   }
   return HAPI_PATCH_POINTS;
 }
+
+/* --- what is inside of the reference ---------------------------------------------------------- */
 
 static const double pi = 3.14159265358979323846;
 
@@ -374,6 +381,8 @@ static int spots_clip(const hapi_feature *reference, const hapi_frame *frame, ha
   return clip_polygon(reference, frame, spots, count);
 }
 
+/* --- points ----------------------------------------------------------------------------------- */
+
 static double gap_of(const hapi_pair *pair, const hapi_patch_point *p)
 {
   double back[3];
@@ -489,6 +498,8 @@ bool hapi_patch_add_faces(const hapi_pair *pair, bool reference_is_a, const hapi
   hapi_patch_add_spots(pair, reference_is_a, &frame, incident, spots, count);
   return pair->out->count > before;
 }
+
+/* --- edges ------------------------------------------------------------------------------------ */
 
 /* Sine of the angle below which two lines are side by side and not crossing: there the cross
  * product follows the bodies' rotations a hundred times too fast. */

@@ -6,6 +6,10 @@
 #include "proximity/direction.h"
 #include "proximity/patch_parts.h"
 
+/* Faces, lines and corners of solids along a direction. */
+
+/* --- hulls ------------------------------------------------------------------------------------ */
+
 /* A hull is a heap of points with no list of faces. A plane that comes along d is wrapped around
  * the hull. It meets the farthest point, tilts until it meets a second one, and turns about these
  * two until it meets a third. Of the two faces there the one turned least is taken. */
@@ -245,7 +249,6 @@ static void hull_feature(const hapi_solid *hull, const double d[3], hapi_feature
   }
 }
 
-/* Of hulls. */
 static bool hull_edge(const hapi_solid *hull, const double d[3], hapi_edge *out)
 {
   wrap w;
@@ -265,6 +268,8 @@ static bool hull_edge(const hapi_solid *hull, const double d[3], hapi_edge *out)
 enum {
   RIM_CORNERS = 8 /* of a cap; 90 % of its area */
 };
+
+/* --- all kinds -------------------------------------------------------------------------------- */
 
 /* Sine of the tilt below which a cap lies on its whole rim, and above which it stands on one point
  * of it: 2 degrees. */

@@ -8,6 +8,8 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 
+/* ---- who steps a world ---- */
+
 static pthread_mutex_t claims_lock = PTHREAD_MUTEX_INITIALIZER;
 static hapi_claim *claims;
 
@@ -41,6 +43,8 @@ void hapi_claim_release(hapi_claim *claim)
   claim->world = NULL;
   pthread_mutex_unlock(&claims_lock);
 }
+
+/* ---- island threads ---- */
 
 /* Threads of ODE that step separate islands of the world at once, in the global step only. Testing
  * simulations are one or a few islands each: waking threads up would take longer than they do. */
@@ -105,6 +109,8 @@ double hapi_body_mass(dBodyID body)
   dBodyGetMass(body, &mass);
   return mass.mass;
 }
+
+/* ---- the world ---- */
 
 bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,
                        const hapi_world_listener *listener)
