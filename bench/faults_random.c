@@ -24,6 +24,7 @@
 #define FACES_MAX 6
 #define POLYGON_MAX 32
 #define SAID_MAX 10
+#define SOLIDS 3
 
 /* ---- convex shapes ---- */
 
@@ -36,7 +37,7 @@ typedef struct solid {
   unsigned polygons[POLYGON_MAX];
 } solid;
 
-static const solid solids[] = {
+static const solid solids[SOLIDS] = {
     {8,
      6,
      {{-0.5, -0.5, -0.5},
@@ -93,8 +94,7 @@ static bool draw_chance(random_world *r, double share)
 
 static dGeomID hull_create(random_world *r, hull *h, const double size[3])
 {
-  const solid *s =
-      &solids[(size_t)draw_between(r, 0.0, (double)(sizeof solids / sizeof solids[0]))];
+  const solid *s = &solids[(size_t)draw_between(r, 0.0, SOLIDS)];
   const unsigned *polygon = s->polygons;
   for (unsigned i = 0; i < s->points; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -197,10 +197,10 @@ static void world_create(random_world *r, long number)
 static bool world_run(random_world *r)
 {
   bool is_finite = true;
-  double from[3] = {draw_between(r, -0.1, 0.1), draw_between(r, -0.1, 0.1),
-                    draw_between(r, 0.0, 0.15)};
-  double speed[3] = {draw_between(r, -1.0, 1.0), draw_between(r, -1.0, 1.0),
-                     draw_between(r, -1.0, 0.5)};
+  const double from[3] = {draw_between(r, -0.1, 0.1), draw_between(r, -0.1, 0.1),
+                          draw_between(r, 0.0, 0.15)};
+  const double speed[3] = {draw_between(r, -1.0, 1.0), draw_between(r, -1.0, 1.0),
+                           draw_between(r, -1.0, 0.5)};
   hap_session *session;
   hap_pointer_id hand;
   hap_session_def def;

@@ -211,7 +211,7 @@ static void cylinder_touch(pointer *p, dGeomID geom)
   dGeomCylinderGetParams(geom, &radius, &length);
   geom_to_local(geom, p->centre, c);
   double rho = hypot(c[0], c[1]);
-  double x[2] = {rho > 0.0 ? c[0] / rho : 1.0, rho > 0.0 ? c[1] / rho : 0.0};
+  const double x[2] = {rho > 0.0 ? c[0] / rho : 1.0, rho > 0.0 ? c[1] / rho : 0.0};
   double end = c[2] < 0.0 ? -1.0 : 1.0;
   double beside = rho - radius;
   double above = fabs(c[2]) - 0.5 * length;

@@ -305,6 +305,8 @@ static void nook_hand(double t, double x[3], double v[3])
 #define FIELD_CELL 0.01
 #define FIELD_X 21
 #define FIELD_Y 11
+#define FIELD_MIDDLE_X 10
+#define FIELD_MIDDLE_Y 5
 
 static double flat_height(double x)
 {
@@ -328,8 +330,8 @@ static void field_triangles(faults_world *w, double (*height)(double))
   for (int j = 0; j < FIELD_Y; ++j) {
     for (int i = 0; i < FIELD_X; ++i) {
       double *v = &m->vertices[3 * m->vertex_count++];
-      v[0] = FIELD_CELL * (i - FIELD_X / 2);
-      v[1] = -FIELD_CELL * (j - FIELD_Y / 2);
+      v[0] = FIELD_CELL * (i - FIELD_MIDDLE_X);
+      v[1] = -FIELD_CELL * (j - FIELD_MIDDLE_Y);
       v[2] = height(v[0]);
     }
   }
@@ -349,7 +351,7 @@ static void field_geom(faults_world *w, double (*height)(double))
   w->field = calloc((size_t)FIELD_X * FIELD_Y, sizeof *w->field);
   for (int j = 0; j < FIELD_Y; ++j) {
     for (int i = 0; i < FIELD_X; ++i) {
-      w->field[j * FIELD_X + i] = height(FIELD_CELL * (i - FIELD_X / 2));
+      w->field[j * FIELD_X + i] = height(FIELD_CELL * (i - FIELD_MIDDLE_X));
     }
   }
   w->field_data = dGeomHeightfieldDataCreate();

@@ -34,7 +34,8 @@ static void carpet_build(faults_world *w)
   floor_add(w);
   w->mu = 0.4;
   for (int i = 0; i < 49; ++i) {
-    cube_add(w, TILE_MASS, TILE, 0.5 * TILE + pitch * (i / 7), pitch * (i % 7 - 3),
+    int along = i / 7;
+    cube_add(w, TILE_MASS, TILE, 0.5 * TILE + pitch * along, pitch * (i % 7 - 3),
              0.5 * TILE - FAULTS_LAYER);
   }
 }
@@ -80,8 +81,10 @@ static void pile_build(faults_world *w)
   for (int layer = 0; layer < 4 && layer < side; ++layer) {
     int width = side - layer;
     for (int i = 0; i < width * width && (int)w->body_count < w->scene->count; ++i) {
-      cube_add(w, PILE_MASS, PILE_EDGE, 0.5 * PILE_EDGE + pitch * (i / width + 0.5 * layer),
-               pitch * (i % width + 0.5 * layer - side / 2),
+      int along = i / width;
+      int across = i % width - side / 2;
+      cube_add(w, PILE_MASS, PILE_EDGE, 0.5 * PILE_EDGE + pitch * (along + 0.5 * layer),
+               pitch * (across + 0.5 * layer),
                0.5 * PILE_EDGE - PILE_LAYER + layer * (PILE_EDGE - PILE_LAYER));
     }
   }
@@ -106,7 +109,8 @@ static void pebbles_build(faults_world *w)
   int side = (int)ceil(sqrt(w->scene->count));
   floor_add(w);
   for (int i = 0; i < w->scene->count; ++i) {
-    double x = pitch * (i / side - 0.5 * (side - 1));
+    int along = i / side;
+    double x = pitch * (along - 0.5 * (side - 1));
     double y = pitch * (i % side - 0.5 * (side - 1));
     if (w->is_reference) {
       faults_box(w, NULL, (double[3]){PEBBLE, PEBBLE, PEBBLE},

@@ -66,7 +66,7 @@ static void bridge_build(faults_world *w)
   for (int i = 0; i < PLANKS; ++i) {
     dMatrix3 turned;
     double slope = PLANK_SLOPE * (1.0 - 2.0 * (i + 0.5) / PLANKS);
-    double half[3] = {0.5 * PLANK_PITCH * cos(slope), 0.0, -0.5 * PLANK_PITCH * sin(slope)};
+    const double half[3] = {0.5 * PLANK_PITCH * cos(slope), 0.0, -0.5 * PLANK_PITCH * sin(slope)};
     dBodyID plank =
         faults_body(w, PLANK_MASS, size, (double[3]){at[0] + half[0], 0.0, at[2] + half[2]});
     dRFromAxisAndAngle(turned, 0.0, 1.0, 0.0, slope);

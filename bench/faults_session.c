@@ -17,8 +17,10 @@
 
 typedef struct run_state {
   faults_world w;
+  double physics_hz;
   double world_s; /* time of the application's world */
-  double open;    /* m, the widest hinge so far */
+  unsigned long steps;
+  double open; /* m, the widest hinge so far */
 } run_state;
 
 static atomic_ulong lines_said;
@@ -54,6 +56,7 @@ static void after_step(void *user, double step_s)
     run->w.scene->after(&run->w, run->world_s, run->world_s + step_s);
   }
   run->world_s += step_s;
+  ++run->steps;
   run->open = fmax(run->open, faults_world_open(&run->w));
 }
 
@@ -102,12 +105,15 @@ static hap_status pointer_add(bench *b, const faults_scene *scene, hap_session *
 typedef struct tick_times {
   double with_step; /* s, sum */
   double without;
+  unsigned long seen; /* steps of the world */
   unsigned long steps;
   unsigned long others;
 } tick_times;
 
-static void tick_times_add(tick_times *t, double spent, bool has_step)
+static void tick_times_add(tick_times *t, double spent, unsigned long seen)
 {
+  bool has_step = seen != t->seen;
+  t->seen = seen;
   *(has_step ? &t->with_step : &t->without) += spent;
   *(has_step ? &t->steps : &t->others) += 1;
 }
@@ -120,25 +126,24 @@ static double tick_times_step(const tick_times *t)
   return t->with_step / (double)t->steps - t->without / (double)t->others;
 }
 
-static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *session,
-                            hap_pointer_id hand, run_state *run, faults_run *out)
+static hap_status ticks_run(bench *b, hap_session *session, hap_pointer_id hand, run_state *run,
+                            faults_run *out)
 {
   tick_times times = {.steps = 0};
   for (size_t i = 0; i < out->count; ++i) {
     hap_pose pose = {.quat_wxyz = {1.0}};
     hap_twist twist = {{0.0}, {0.0}};
     hap_pointer_state state;
-    scene->motion.hand((double)i * FAULTS_TICK_S, pose.position, twist.linear);
+    run->w.scene->motion.hand((double)i * FAULTS_TICK_S, pose.position, twist.linear);
     hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
     if (status >= HAP_OK && i == 0) {
       status = hap_session_start(session);
     }
-    double world_s = run->world_s;
     double begin = bench_used_seconds();
     if (status >= HAP_OK) {
       status = hap_session_advance(session, 1);
     }
-    tick_times_add(&times, bench_used_seconds() - begin, run->world_s > world_s);
+    tick_times_add(&times, bench_used_seconds() - begin, run->steps);
     if (status >= HAP_OK) {
       status = hap_pointer_get(session, hand, &state, sizeof state);
     }
@@ -153,11 +158,11 @@ static hap_status ticks_run(bench *b, const faults_scene *scene, hap_session *se
 }
 
 /* In real time: a frame of the application is a step of physics, but time passes slowly. */
-static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand, double physics_hz,
-                             run_state *run, faults_run *out)
+static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand, run_state *run,
+                             faults_run *out)
 {
   const faults_scene *scene = run->w.scene;
-  double frame_s = 1.0 / physics_hz;
+  double frame_s = 1.0 / run->physics_hz;
   double next_frame = frame_s;
   struct timespec at;
   clock_gettime(CLOCK_MONOTONIC, &at);
@@ -195,8 +200,7 @@ static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand
   return HAP_OK;
 }
 
-static hap_status session_make(bench *b, hap_model model, double physics_hz, run_state *run,
-                               hap_session **out)
+static hap_status session_make(bench *b, hap_model model, run_state *run, hap_session **out)
 {
   hap_session_def def;
   hap_research_def research;
@@ -206,7 +210,7 @@ static hap_status session_make(bench *b, hap_model model, double physics_hz, run
   hap_ode_def_init(&ode, sizeof ode);
   def.drive = run->w.scene->slow > 0.0 ? HAP_DRIVE_FRAME : HAP_DRIVE_LOCKSTEP;
   def.model = model;
-  def.physics_hz = physics_hz;
+  def.physics_hz = run->physics_hz;
   /* In slow motion the guard fades the force while physics waits: that is felt too. */
   research.guard = run->w.scene->slow > 0.0 ? HAP_GUARD_ON : HAP_GUARD_MEASURE;
   def.research = &research;
@@ -232,9 +236,9 @@ static hap_model scene_model(const faults_scene *scene)
 hap_status faults_session_run(bench *b, const faults_scene *scene, double physics_hz,
                               faults_run *out)
 {
-  run_state run = {.world_s = 0.0};
+  run_state run = {.physics_hz = physics_hz};
   hap_session *session = NULL;
-  hap_pointer_id hand;
+  hap_pointer_id hand = {0};
   hap_stats stats;
   hap_hooks hooks;
   hap_hooks_init(&hooks, sizeof hooks);
@@ -244,13 +248,13 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, double physic
       !faults_world_create(scene, false, &run.w)) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", scene->name);
   }
-  hap_status status = session_make(b, scene_model(scene), physics_hz, &run, &session);
+  hap_status status = session_make(b, scene_model(scene), &run, &session);
   if (status >= HAP_OK) {
     status = pointer_add(b, scene, session, &hand);
   }
   if (status >= HAP_OK) {
-    status = scene->slow > 0.0 ? frames_run(b, session, hand, physics_hz, &run, out)
-                               : ticks_run(b, scene, session, hand, &run, out);
+    status = scene->slow > 0.0 ? frames_run(b, session, hand, &run, out)
+                               : ticks_run(b, session, hand, &run, out);
   }
   if (status >= HAP_OK && hap_session_stats(session, &stats, sizeof stats) >= HAP_OK) {
     out->dropped = (unsigned long)stats.model.capacity_dropped;
