@@ -419,6 +419,38 @@ static void crate_on_field_build(faults_world *w)
   faults_box(w, crate, crate_size, crate_at);
 }
 
+#define SLOPE 0.14 /* upwards along x; the crate does not slip */
+
+static double slope_height(double x)
+{
+  return SLOPE * x;
+}
+
+static void crate_on_slope_build(faults_world *w)
+{
+  const double up[3] = {-SLOPE / sqrt(1.0 + SLOPE * SLOPE), 0.0, 1.0 / sqrt(1.0 + SLOPE * SLOPE)};
+  double middle = crate_at[2];
+  dMatrix3 turned;
+  faults_gravity(w);
+  if (w->is_reference) {
+    dCreatePlane(w->space, up[0], up[1], up[2], 0.0);
+  } else {
+    field_geom(w, slope_height);
+  }
+  dBodyID crate = faults_body(w, CRATE_MASS, crate_size,
+                              (double[3]){middle * up[0], crate_at[1], middle * up[2]});
+  dRFromAxisAndAngle(turned, 0.0, 1.0, 0.0, -atan(SLOPE));
+  dBodySetRotation(crate, turned);
+  faults_box(w, crate, crate_size, crate_at);
+}
+
+static void slope_hand(double t, double x[3], double v[3])
+{
+  faults_hand_at(x, v, -0.042, 0.003, 0.016);
+  faults_glide(t, 0.05, 0.75, 0.05, &x[0], &v[0]);
+  faults_glide(t, 0.05, 0.75, 0.05 * SLOPE, &x[2], &v[2]);
+}
+
 static void ball_on_field_build(faults_world *w)
 {
   dMass mass;
@@ -841,6 +873,12 @@ const faults_scene faults_table[] = {
      .name = "field_crate",
      .build = crate_on_field_build,
      .motion = FINGER(crate_hand),
+     .seconds = 0.8,
+     .check = WITHIN(0.02)},
+    {.item = 5,
+     .name = "field_slope",
+     .build = crate_on_slope_build,
+     .motion = FINGER(slope_hand),
      .seconds = 0.8,
      .check = WITHIN(0.02)},
     {.item = 5,
