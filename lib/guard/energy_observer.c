@@ -194,7 +194,7 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
     hapi_ramp *r = &c->ramp;
-    double share = r->share * p->guard.felt;
+    double share = c->hidden ? 0.0 : r->share * p->guard.felt;
     double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
     double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;

@@ -9,6 +9,7 @@
 #include "local/body_step.h"
 #include "local/contact_ramp.h"
 #include "local/pointer_spring.h"
+#include "local/seams.h"
 #include "proximity/constrained_ball.h"
 
 /* Pointer contacts as rows of the solver: pointer_spring.h says which. Those of friction are in
@@ -393,19 +394,65 @@ static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_wo
   }
 }
 
+#define CLOSE 2e-3 /* m: nearer than this, contacts of several things may be those of one surface */
+
+/* Where several things are touched, all are placed before any pushes. */
+static __attribute__((noinline, cold)) void contacts_place(const hapi_tick_facts *facts,
+                                                           const hapi_pointers *pointers,
+                                                           const hapi_bodies *bodies,
+                                                           const hapi_touches *touches,
+                                                           hapi_effect_sample *sample)
+{
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    hapi_local_contact *c = &touches->of[i];
+    hapi_placed_pointer at = {
+        .index = i, .pointer = &pointers->of[c->pointer], .body = hapi_bodies_at(bodies, c->body)};
+    c->placed = pointer_place(&touches->tool, c, facts->period, &at, sample);
+  }
+  hapi_seams_hide(facts, pointers, bodies, touches);
+}
+
+/* As contacts_place found it. */
+static void pointer_placed(const hapi_tool_world *tools, hapi_local_contact *c,
+                           hapi_placed_pointer *at)
+{
+  at->normal = c->normal_now;
+  at->point = c->point_now;
+  if (c->tool != 0) {
+    (void)place_tool(&tools->tools[c->tool - 1], at);
+  } else {
+    hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
+    at->depth = c->ramp.depth - c->ramp.excess;
+    at->share = c->ramp.share;
+  }
+}
+
 void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointers,
-                       const hapi_bodies *bodies, const hapi_touches *touches, hapi_rows *rows,
+                       const hapi_bodies *bodies, hapi_touches *touches, hapi_rows *rows,
                        hapi_effect_sample *sample)
 {
+  bool several = touches->close > 1 && !facts->faulted;
+  if (several) {
+    contacts_place(facts, pointers, bodies, touches, sample);
+  }
+  touches->close = 0;
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     hapi_placed_pointer at;
     at.index = i;
     at.pointer = &pointers->of[c->pointer];
     at.body = hapi_bodies_at(bodies, c->body);
-    bool placed = !facts->faulted && pointer_place(&touches->tool, c, facts->period, &at, sample);
+    bool placed;
+    if (several) {
+      placed = c->placed;
+      pointer_placed(&touches->tool, c, &at);
+    } else {
+      c->hidden = false;
+      placed = !facts->faulted && pointer_place(&touches->tool, c, facts->period, &at, sample);
+    }
     c->row = HAPI_NO_ROW;
-    if (!placed) {
+    touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;
+    if (!placed || c->hidden) {
       hapi_v3_set(c->force, 0.0, 0.0, 0.0);
       continue;
     }

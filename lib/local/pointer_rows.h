@@ -30,7 +30,7 @@ typedef struct hapi_placed_pointer {
 
 /* The contacts of hulls have been placed. */
 void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointers,
-                       const hapi_bodies *bodies, const hapi_touches *touches, hapi_rows *rows,
+                       const hapi_bodies *bodies, hapi_touches *touches, hapi_rows *rows,
                        hapi_effect_sample *sample);
 
 /* The rows of a contact's friction, after that of its normal. */

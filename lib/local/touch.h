@@ -73,6 +73,8 @@ typedef struct hapi_local_contact {
   uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
   uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
   bool seen;      /* rendered at least once */
+  bool placed;    /* in this tick, where pointers touch several things */
+  bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
   bool rubs;      /* friction is worked out: there is some, or it was asked for */
   bool has_shape; /* model CONTACT: asked at every tick */
   double point_body[3];
@@ -148,6 +150,7 @@ typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
   uint32_t pushing;         /* that push in this tick */
+  uint32_t close;           /* spheres' that touched in the last tick, or nearly */
   bool rubs;                /* some contact rubs */
   hapi_kept_touch *kept;    /* capacity.contacts */
   hapi_friction *frictions; /* by contact slot; of spheres */
