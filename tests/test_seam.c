@@ -1,0 +1,129 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Seams: what lies side by side is one surface, and an inner corner is two. The forces have closed
+ * forms, those of one spring and of two. */
+
+#include "tests/tap.h"
+
+#include "tests/contact_world.h"
+
+#define RADIUS 0.005
+#define K 1000.0
+#define DEEP 0.002 /* m */
+#define SPEED 0.05 /* m/s, along the surface */
+
+static void open_world(contact_world *w, double friction)
+{
+  cw_open(w, 0.0);
+  w->def.physics_hz = 20.0;
+  w->hand_def.radius = RADIUS;
+  w->hand_def.stiffness = K;
+  w->hand_def.damping = 0.0;
+  w->hand_def.friction = friction;
+  w->hand_expert.coupling = HAP_COUPLING_DIRECT;
+  cw_add_cube(w, 1.0, 0.1, 5.0, 0.0, 0.0);
+}
+
+static dGeomID add_block(contact_world *w, double x, double z)
+{
+  dGeomID geom = dCreateBox(w->space, 0.1, 0.1, 0.1);
+  dGeomSetPosition(geom, x, 0.0, z);
+  return geom;
+}
+
+/* Across the seam at x = 0, pressed in. Largest error of the force's two parts, N. */
+static double slide_error(contact_world *w, double mu)
+{
+  double worst = 0.0;
+  CHECK(cw_start(w, -0.02, 0.001, RADIUS + 0.001));
+  cw_move_hand(w, 0.0, 0.0, -0.03);
+  cw_run(w, 100);
+  cw_move_hand(w, SPEED, 0.0, 0.0);
+  cw_run(w, 100);
+  for (int i = 0; i < 600; ++i) {
+    cw_tick(w);
+    worst = fmax(worst, fabs(w->force[2] - K * DEEP));
+    worst = fmax(worst, fabs(w->force[0] + mu * K * DEEP));
+    worst = fmax(worst, fabs(w->force[1]));
+  }
+  CHECK(w->hand_at[0] > 0.01);
+  return worst;
+}
+
+TEST(two_flush_boxes_push_once)
+{
+  static const double frictions[] = {0.0, 0.5};
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    open_world(&w, frictions[i]);
+    (void)add_block(&w, -0.05, -0.05);
+    (void)add_block(&w, 0.05, -0.05);
+    CHECK(slide_error(&w, frictions[i]) < 1e-6);
+    cw_close(&w);
+  }
+}
+
+/* They reach into each other, the second a little lower. */
+TEST(boxes_that_overlap_push_once)
+{
+  contact_world w;
+  open_world(&w, 0.5);
+  (void)add_block(&w, -0.05, -0.05);
+  (void)add_block(&w, 0.04, -0.05);
+  (void)add_block(&w, -0.01, -0.053);
+  CHECK(slide_error(&w, 0.5) < 1e-6);
+  cw_close(&w);
+}
+
+TEST(one_body_of_two_boxes_pushes_once)
+{
+  contact_world w;
+  open_world(&w, 0.3);
+  dBodyID body = cw_add_cube(&w, 1.0, 0.1, 0.0, 0.0, 1.0);
+  dBodySetKinematic(body);
+  dBodySetPosition(body, 0.0, 0.0, -0.05);
+  dGeomSetOffsetPosition(dBodyGetFirstGeom(body), -0.05, 0.0, 0.0);
+  dGeomID second = dCreateBox(w.space, 0.1, 0.1, 0.1);
+  dGeomSetBody(second, body);
+  dGeomSetOffsetPosition(second, 0.05, 0.0, 0.0);
+  CHECK(slide_error(&w, 0.3) < 1e-6);
+  cw_close(&w);
+}
+
+TEST(both_sides_of_an_inner_corner_push)
+{
+  contact_world w;
+  open_world(&w, 0.0);
+  (void)cw_add_floor(&w);
+  (void)add_block(&w, -0.05, 0.05); /* a wall at x = 0 that stands on it */
+  REQUIRE(cw_start(&w, RADIUS + 0.001, 0.0, RADIUS + 0.001));
+  cw_move_hand(&w, -0.05, 0.0, -0.03);
+  for (int i = 0; i < 200; ++i) { /* until its middle is in the wall */
+    cw_tick(&w);
+    CHECK_NEAR(w.force[0], K * fmax(RADIUS - w.hand_at[0], 0.0), 1e-6);
+    CHECK_NEAR(w.force[2], K * fmax(RADIUS - w.hand_at[2], 0.0), 1e-6);
+  }
+  CHECK(w.hand_at[0] < -0.003 && w.hand_at[2] < 0.001);
+  cw_close(&w);
+}
+
+/* A step of a tenth of the finger's radius is one. */
+TEST(a_step_is_no_seam)
+{
+  contact_world w;
+  double most = 0.0;
+  open_world(&w, 0.0);
+  (void)add_block(&w, -0.05, -0.05);
+  (void)add_block(&w, 0.05, -0.05 + 0.1 * RADIUS);
+  REQUIRE(cw_start(&w, -0.01, 0.0, RADIUS - DEEP));
+  cw_run(&w, 100);
+  cw_move_hand(&w, SPEED, 0.0, 0.0);
+  for (int i = 0; i < 300; ++i) {
+    cw_tick(&w);
+    most = fmax(most, -w.force[0]);
+  }
+  CHECK(most > 0.1);
+  CHECK_NEAR(w.force[2], K * (DEEP + 0.1 * RADIUS), 1e-6);
+  cw_close(&w);
+}
