@@ -105,6 +105,7 @@ typedef struct faults_scene {
   /* Slow motion: share of the hand's time that passes for the bodies. Such a session is in drive
    * FRAME, in real time. 0: no slow motion, in drive LOCKSTEP */
   double slow;
+  bool alike; /* the session has the shapes of the reference: how exact the bench is */
 } faults_scene;
 
 /* Forces on the hand at the begin of each tick. */

@@ -245,7 +245,7 @@ hap_status faults_session_run(bench *b, const faults_scene *scene, double physic
   hooks.log = count_line;
   atomic_store(&lines_said, 0);
   if (hap_hooks_set(&hooks) < HAP_OK || !faults_run_create(scene, out) ||
-      !faults_world_create(scene, false, &run.w)) {
+      !faults_world_create(scene, scene->alike, &run.w)) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", scene->name);
   }
   hap_status status = session_make(b, scene_model(scene), &run, &session);

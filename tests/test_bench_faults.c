@@ -68,6 +68,33 @@ TEST(the_reference_keeps_energy)
   faults_run_free(&half);
 }
 
+/* Where session and reference have the same shapes, nothing is left of a fault. */
+TEST(the_same_shapes_give_the_same_force)
+{
+  static const char *const names[] = {"seam_body", "seam_rub", "field_slope", "mesh_box"};
+  for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k) {
+    bench b = {.out = test_folder};
+    faults_run reference;
+    faults_run run;
+    REQUIRE(scene_find(names[k]) != NULL);
+    faults_scene scene = *scene_find(names[k]);
+    scene.alike = true;
+    REQUIRE(faults_reference_run(&scene, 4000.0, &reference));
+    REQUIRE(faults_session_run(&b, &scene, 60.0, &run) >= HAP_OK);
+    double off = 0.0;
+    double all = 0.0;
+    for (size_t i = 0; i < run.count; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        off += pow(run.force[i][j] - reference.force[i][j], 2);
+        all += pow(reference.force[i][j], 2);
+      }
+    }
+    CHECK(all > 0.0 && off < 4e-6 * all); /* 0.2 % */
+    faults_run_free(&reference);
+    faults_run_free(&run);
+  }
+}
+
 TEST(the_controls_are_good)
 {
   folder_clear();
