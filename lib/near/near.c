@@ -29,6 +29,7 @@ bool hapi_nearby_create(hapi_nearby *nearby, const hapi_world *world, const hapi
   }
   hood->probe_geom = dCreateSphere(NULL, 1.0);
   hood->plane_geom = dCreatePlane(NULL, 0.0, 0.0, 1.0, 0.0);
+  hood->ray_geom = dCreateRay(NULL, 1.0);
   hapi_slots_reset(nearby);
   return true;
 }
@@ -39,6 +40,7 @@ void hapi_nearby_finish(hapi_nearby *nearby)
   if (hood->probe_geom != NULL) {
     dGeomDestroy(hood->probe_geom);
     dGeomDestroy(hood->plane_geom);
+    dGeomDestroy(hood->ray_geom);
   }
   hapi_range_finish(nearby);
   hapi_meshes_finish(&nearby->meshes);

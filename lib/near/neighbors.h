@@ -33,6 +33,7 @@ typedef struct hapi_hit {
 typedef struct hapi_neighbors {
   dGeomID probe_geom;     /* private sphere, in no space */
   dGeomID plane_geom;     /* private plane, in no space */
+  dGeomID ray_geom;       /* private ray, in no space */
   dContactGeom *vertices; /* HAPI_HULL_POINTS, of a convex geom */
   double *hull;           /* the same, x, y, z */
   hapi_candidate *candidates;

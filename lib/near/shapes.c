@@ -8,7 +8,8 @@
 
 /* Geoms as shapes for proximity. ODE has no getters for the points of a convex geom: its collider
  * with a plane lists the vertices below the plane, so two planes back to back give all of them. For
- * a trimesh or a heightfield the collider is asked with a sphere that is as large as the reach. */
+ * a trimesh the collider is asked with a sphere that is as large as the reach; for a heightfield,
+ * with rays. */
 
 #define FALLBACK_CONTACTS 64
 
@@ -106,6 +107,109 @@ static bool nearest_by_collider(hapi_nearby *nearby, dGeomID geom, const double 
   return out->distance <= reach;
 }
 
+/* ---- heightfields: ODE gives neither heights nor cells, but a ray meets the very triangle ---- */
+
+#define FIELD_STEPS 8    /* triangles that are walked over */
+#define FIELD_FLUSH 1e-9 /* m: on the triangle's plane */
+#define FIELD_EDGE 1e-6  /* m: beside an edge, to see which triangle is there */
+
+/* A triangle of the surface, under a place. */
+typedef struct field_plane {
+  double point[3];
+  double normal[3]; /* unit, up */
+} field_plane;
+
+static bool field_below(const hapi_nearby *nearby, dGeomID geom, const double place[3],
+                        field_plane *out)
+{
+  dContactGeom contact;
+  dReal box[6];
+  const dReal *turn = dGeomGetRotation(geom);
+  const double up[3] = {turn[1], turn[5], turn[9]}; /* the field's y */
+  double from[3];
+  double apart[3];
+  dGeomGetAABB(geom, box);
+  hapi_v3_set(apart, box[1] - box[0], box[3] - box[2], box[5] - box[4]);
+  double far = hapi_v3_norm(apart);
+  hapi_v3_sub(place, dGeomGetPosition(geom), apart);
+  far += hapi_v3_norm(apart);
+  hapi_v3_madd(place, far, up, from);
+  dGeomRaySetLength(nearby->neighbors.ray_geom, 2.0 * far);
+  dGeomRaySet(nearby->neighbors.ray_geom, from[0], from[1], from[2], -up[0], -up[1], -up[2]);
+  if (dCollide(nearby->neighbors.ray_geom, geom, 1, &contact, sizeof contact) < 1 ||
+      !hapi_contact_is_sound(&contact)) {
+    return false; /* beside the field */
+  }
+  hapi_v3_copy(contact.pos, out->point);
+  double sign = hapi_v3_dot(contact.normal, up) < 0.0 ? -1.0 : 1.0;
+  hapi_v3_scale(sign, contact.normal, out->normal);
+  return true;
+}
+
+/* m, above the plane. */
+static double field_height(const field_plane *plane, const double place[3])
+{
+  double apart[3];
+  hapi_v3_sub(place, plane->point, apart);
+  return hapi_v3_dot(apart, plane->normal);
+}
+
+/* The point of the line of two planes that is nearest to a place. False: they are parallel. */
+static bool field_ridge(const field_plane *a, const field_plane *b, const double place[3],
+                        double out[3])
+{
+  double cosine = hapi_v3_dot(a->normal, b->normal);
+  double left = 1.0 - cosine * cosine;
+  if (left < 1e-12) {
+    return false;
+  }
+  double ha = field_height(a, place);
+  double hb = field_height(b, place);
+  hapi_v3_madd(place, -(ha - cosine * hb) / left, a->normal, out);
+  hapi_v3_madd(out, -(hb - cosine * ha) / left, b->normal, out);
+  return true;
+}
+
+/* From the triangle under the centre to the one, or the edge, that is nearest to it. */
+static bool nearest_on_field(const hapi_nearby *nearby, dGeomID geom, const double center[3],
+                             double radius, double reach, hapi_nearest *out)
+{
+  field_plane here;
+  field_plane there;
+  double point[3];
+  double way[3];
+  if (!field_below(nearby, geom, center, &here)) {
+    return false;
+  }
+  hapi_v3_copy(here.normal, out->normal);
+  for (int step = 0; step < FIELD_STEPS; ++step) {
+    double height = field_height(&here, center);
+    hapi_v3_madd(center, -height, here.normal, point);
+    hapi_v3_copy(here.normal, out->normal);
+    out->distance = height - radius;
+    if (!field_below(nearby, geom, point, &there)) {
+      break;
+    }
+    double above = field_height(&there, point);
+    if (fabs(above) < FIELD_FLUSH) {
+      break;
+    }
+    if (above > 0.0 && height > 0.0 && field_ridge(&here, &there, center, point)) {
+      hapi_v3_sub(center, point, way);
+      double distance = hapi_v3_norm(way);
+      out->distance = distance - radius;
+      if (distance > FIELD_EDGE) {
+        hapi_v3_scale(1.0 / distance, way, out->normal);
+      }
+      break;
+    }
+    here = there;
+  }
+  hapi_v3_copy(point, out->point_b);
+  hapi_v3_madd(point, out->distance, out->normal, out->point_a);
+  return out->distance <= reach;
+}
+
 /* Appends the vertices of a convex geom on the lower side of the plane normal . x = offset. */
 static uint32_t vertices_below(hapi_nearby *nearby, dGeomID geom, const double normal[3],
                                double offset, uint32_t count)
@@ -150,7 +254,9 @@ bool hapi_geom_nearest(hapi_nearby *nearby, dGeomID geom, const double center[3]
   bool convex =
       dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(nearby, geom, &shape, &pose);
   if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
-    return nearest_by_collider(nearby, geom, center, radius, reach, out);
+    return dGeomGetClass(geom) == dHeightfieldClass
+               ? nearest_on_field(nearby, geom, center, radius, reach, out)
+               : nearest_by_collider(nearby, geom, center, radius, reach, out);
   }
   /* A hull is worth asking first whether it is near at all (libccd): its box says little. */
   if (convex && !hapi_overlap(&pointer, &at, &shape, &pose, reach)) {
