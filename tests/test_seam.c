@@ -127,3 +127,44 @@ TEST(a_step_is_no_seam)
   CHECK_NEAR(w.force[2], K * (DEEP + 0.1 * RADIUS), 1e-6);
   cw_close(&w);
 }
+
+/* Geoms that the loop cannot ask, and models that ask none: a plane for each between two syncs. */
+
+static const unsigned hull_faces[] = {4, 0, 2, 3, 1, 4, 4, 5, 7, 6, 4, 0, 1, 5, 4,
+                                      4, 2, 6, 7, 3, 4, 0, 4, 6, 2, 4, 1, 3, 7, 5};
+static const double hull_planes[] = {0, 0, -1, 0.05, 0,  0, 1, 0.05, 0, -1, 0, 0.05,
+                                     0, 1, 0,  0.05, -1, 0, 0, 0.05, 1, 0,  0, 0.05};
+
+static dGeomID add_hull(contact_world *w, double points[24], double x, double z)
+{
+  for (int i = 0; i < 24; ++i) {
+    points[i] = ((i / 3 >> i % 3) & 1) != 0 ? 0.05 : -0.05;
+  }
+  dGeomID geom = dCreateConvex(w->space, hull_planes, 6, points, 8, hull_faces);
+  dGeomSetPosition(geom, x, 0.0, z);
+  return geom;
+}
+
+TEST(two_flush_hulls_push_once_in_every_model)
+{
+  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
+                                     HAP_MODEL_CONTACT};
+  static double points[2][24];
+  for (int m = 0; m < 4; ++m) {
+    for (int hull = 0; hull < 2; ++hull) {
+      contact_world w;
+      open_world(&w, 0.0);
+      w.def.model = models[m];
+      if (hull != 0) {
+        (void)add_hull(&w, points[0], -0.05, -0.05);
+        (void)add_hull(&w, points[1], 0.05, -0.05);
+      } else {
+        (void)add_block(&w, -0.05, -0.05);
+        (void)add_block(&w, 0.05, -0.05);
+      }
+      double error = slide_error(&w, 0.0);
+      CHECK(error < 1e-6);
+      cw_close(&w);
+    }
+  }
+}

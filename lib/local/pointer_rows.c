@@ -447,7 +447,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       placed = c->placed;
       pointer_placed(&touches->tool, c, &at);
     } else {
-      c->hidden = false;
+      c->hidden = c->is_hidden;
       placed = !facts->faulted && pointer_place(&touches->tool, c, facts->period, &at, sample);
     }
     c->row = HAPI_NO_ROW;

@@ -88,7 +88,7 @@ void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
     double least = -REACH * p->shape.radius;
-    c->hidden = false;
+    c->hidden = c->is_hidden;
     if (!c->placed || c->tool != 0 || !(c->ramp.depth > least)) {
       continue;
     }

@@ -75,6 +75,7 @@ typedef struct hapi_local_contact {
   bool seen;      /* rendered at least once */
   bool placed;    /* in this tick, where pointers touch several things */
   bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
+  bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
   bool rubs;      /* friction is worked out: there is some, or it was asked for */
   bool has_shape; /* model CONTACT: asked at every tick */
   double point_body[3];

@@ -43,6 +43,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   touches->rubs |= out->rubs;
   out->weight = 1.0;
   out->has_shape = in->has_shape != 0;
+  out->is_hidden = in->hidden != 0;
   out->shape = in->shape;
   out->shape_pose = in->shape_pose;
   out->epoch = epoch_of(bodies, in->body);

@@ -363,6 +363,7 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
   hapi_v3_copy(hit->nearest.point_b, slot->point_world);
   slot->distance = hit->nearest.distance;
   slot->placed = true;
+  slot->hidden = hit->hidden;
   slot->epoch = slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].epoch : 0;
   slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
   slot->stiffness = pointer->stiffness;
@@ -460,6 +461,61 @@ static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
   }
 }
 
+/* ---- seams, as in local/seams.h: for what the tick cannot ask the shape of ---- */
+
+#define SEAM_SHARE 0.01 /* of the pointer's radius */
+
+/* The tick does. */
+static bool tick_hides(const hapi_nearby *nearby, dGeomID a, dGeomID b)
+{
+  hapi_shape shape;
+  hap_pose pose;
+  return nearby->cycle->model == HAP_MODEL_CONTACT &&
+         !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_SHAPE) &&
+         hapi_shape_of_geom(a, &shape, &pose) && hapi_shape_of_geom(b, &shape, &pose);
+}
+
+static bool box_holds(dGeomID geom, const double point[3], double slack)
+{
+  dReal box[6];
+  dGeomGetAABB(geom, box);
+  for (int k = 0; k < 3; ++k) {
+    if (point[k] < box[2 * k] - slack || point[k] > box[2 * k + 1] + slack) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* by: the deeper one. */
+static bool hit_hides(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit *hit)
+{
+  double radius = hapi_state_pointers(nearby->cycle->state)[hit->pointer].radius;
+  double step = SEAM_SHARE * radius;
+  double held[3];
+  hapi_nearest there;
+  if (by->pointer != hit->pointer || by->tool_count > 0 || hit->tool_count > 0 ||
+      !box_holds(by->geom, hit->nearest.point_b, step) || tick_hides(nearby, by->geom, hit->geom) ||
+      !hapi_geom_nearest(nearby, by->geom, hit->nearest.point_b, 0.0, step, &there)) {
+    return false;
+  }
+  hapi_v3_madd(by->nearest.point_b, radius, by->nearest.normal, held);
+  return !hapi_geom_nearest(nearby, hit->geom, held, radius, radius, &there) ||
+         there.distance > -step;
+}
+
+/* Nearest first. */
+static void hits_hide(hapi_nearby *nearby, uint32_t count)
+{
+  hapi_hit *hits = nearby->neighbors.hits;
+  for (uint32_t i = 0; i < count; ++i) {
+    hits[i].hidden = false;
+    for (uint32_t k = 0; k < i && !hits[i].hidden; ++k) {
+      hits[i].hidden = hit_hides(nearby, &hits[k], &hits[i]);
+    }
+  }
+}
+
 void hapi_neighbors_find(hapi_nearby *nearby)
 {
   hapi_neighbors *hood = &nearby->neighbors;
@@ -480,6 +536,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   qsort(hood->hits, count, sizeof *hood->hits, hit_by_distance); /* nearest first, for capacity */
   HAPI_ASSERT(count <= hood->candidate_count);
   count = hood->hit_count = choose_hits(nearby, count);
+  hits_hide(nearby, count);
   for (uint32_t i = 0; i < count; ++i) {
     keep_places(nearby, &hood->hits[i]);
   }

@@ -50,6 +50,7 @@ typedef struct hapi_contact_slot {
   uint32_t pointer_generation;
   dGeomID geom; /* compared only, never used */
   bool wanted;
+  bool hidden; /* by a nearer one, of the same surface */
   double point_body[3];
   double normal_body[3];
   bool has_shape;                 /* one with a closed form, and it is wished for */

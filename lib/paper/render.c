@@ -183,7 +183,8 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
     return;
   }
   double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
-  double force = normal_force(facts, c, p, &at, share, depth);
+  c->hidden = c->is_hidden;
+  double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
   if (force == 0.0 || facts->faulted) {
     return;
   }

@@ -119,6 +119,7 @@ static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answe
   memcpy(out->turn, answer->turn, sizeof out->turn);
   out->mu = slot->mu;
   out->has_shape = slot->has_shape;
+  out->hidden = slot->hidden;
   out->shape = slot->shape;
   out->shape_pose = slot->shape_pose;
 }

@@ -159,7 +159,9 @@ typedef struct hapi_model_contact {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
   uint32_t pointer;
   uint32_t pointer_generation;
-  uint32_t has_shape;    /* shape and shape_pose can be asked for the nearest point at every tick */
+  uint32_t has_shape; /* shape and shape_pose can be asked for the nearest point at every tick */
+  uint32_t hidden;    /* by a nearer one, of the same surface: it does not push */
+  uint32_t reserved;
   double point_body[3];  /* contact point, body frame (world frame for the static world) */
   double normal_body[3]; /* unit, out of the body */
   double a[6][3];        /* accelerance of eq. 6: force at the contact point, world axes */
