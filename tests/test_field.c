@@ -15,18 +15,18 @@
 
 typedef double (*height_of)(double x);
 
-static double plain(double x)
+static double plain_height(double x)
 {
   (void)x;
   return 0.0;
 }
 
-static double slope(double x)
+static double slope_height(double x)
 {
   return 0.5 * x;
 }
 
-static double ridge(double x)
+static double ridge_height(double x)
 {
   return -0.5 * fabs(x);
 }
@@ -53,7 +53,7 @@ static dHeightfieldDataID add_field(contact_world *w, height_of height)
 }
 
 /* Down to a place, and what is felt there. */
-static void press(height_of height, hap_model model, double x, double z, double out[3])
+static void hand_press(height_of height, hap_model model, double x, double z, double out[3])
 {
   contact_world w;
   cw_open(&w, 0.0);
@@ -82,7 +82,7 @@ TEST(a_sphere_feels_a_plain)
 {
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
-    press(plain, models[i], 0.021, RADIUS - 0.005, force);
+    hand_press(plain_height, models[i], 0.021, RADIUS - 0.005, force);
     CHECK_NEAR(force[0], 0.0, 1e-6);
     CHECK_NEAR(force[2], 5.0, 1e-6);
   }
@@ -92,7 +92,7 @@ TEST(a_sphere_feels_a_plain)
 TEST(a_sphere_feels_a_plain_as_deep_as_it_is)
 {
   double force[3] = {0.0};
-  press(plain, HAP_MODEL_CONTACT, 0.021, RADIUS - 0.03, force);
+  hand_press(plain_height, HAP_MODEL_CONTACT, 0.021, RADIUS - 0.03, force);
   CHECK_NEAR(force[2], 30.0, 1e-6);
 }
 
@@ -102,7 +102,7 @@ TEST(a_sphere_feels_a_slope_along_its_normal)
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
     double z = 0.5 * 0.021 + (RADIUS - 0.004) * sqrt(1.25); /* 4 mm deep */
-    press(slope, models[i], 0.021, z, force);
+    hand_press(slope_height, models[i], 0.021, z, force);
     CHECK_NEAR(force[0], 4.0 * n[0], 1e-6);
     CHECK_NEAR(force[1], 0.0, 1e-6);
     CHECK_NEAR(force[2], 4.0 * n[2], 1e-6);
@@ -114,7 +114,7 @@ TEST(a_sphere_feels_a_ridge)
 {
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
-    press(ridge, models[i], 0.0, RADIUS - 0.003, force);
+    hand_press(ridge_height, models[i], 0.0, RADIUS - 0.003, force);
     CHECK_NEAR(force[0], 0.0, 1e-6);
     CHECK_NEAR(force[2], 3.0, 1e-6);
   }
@@ -123,6 +123,7 @@ TEST(a_sphere_feels_a_ridge)
 TEST(beside_its_end_a_field_is_not_felt)
 {
   double force[3] = {0.0};
-  press(plain, HAP_MODEL_CONTACT, 0.5 * CELLS * CELL + 2.0 * RADIUS, RADIUS - 0.005, force);
+  hand_press(plain_height, HAP_MODEL_CONTACT, 0.5 * CELLS * CELL + 2.0 * RADIUS, RADIUS - 0.005,
+             force);
   CHECK(force[0] == 0.0 && force[1] == 0.0 && force[2] == 0.0);
 }

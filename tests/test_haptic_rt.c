@@ -572,7 +572,7 @@ TEST(a_local_state_that_is_not_finite_is_stopped)
       CHECK(state_is_finite(tick_report()));
       CHECK(memcmp(&before, &f.bodies[3].pose, sizeof before) == 0);
       body_under_pointer(0.003);
-      f.contacts[0].a[place][0] = bad[k];
+      f.contacts[0].response.a[place][0] = bad[k];
       ticks_run(1);
       CHECK(f.tick.guard.latch.fault == HAP_FAULT_LOCAL_STATE && state_is_finite(tick_report()));
       CHECK(force_is_zero(&f.pointers[0]));
@@ -585,8 +585,8 @@ TEST(a_force_that_overflows_is_not_written)
 {
   for (int k = 0; k < 2; ++k) {
     body_under_pointer(0.003);
-    memset(f.contacts[0].a, 0, sizeof f.contacts[0].a); /* stays where it is */
-    ticks_run(50);                                      /* the ramp is over */
+    memset(f.contacts[0].response.a, 0, sizeof f.contacts[0].response.a); /* stays where it is */
+    ticks_run(50);                                                        /* the ramp is over */
     CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE && f.pointers[0].contacts == 1);
     f.pointers[0].surface.stiffness = k == 0 ? 1e308 : 1e306;
     f.pointers[0].surface.damping = k == 0 ? 1e308 : 0.0;

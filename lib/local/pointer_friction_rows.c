@@ -31,7 +31,7 @@ static void set_friction_columns(const hapi_local_contact *contact, const hapi_p
     hapi_v3_madd(couple + 3, p->surface.finger_radius * axis[3], at->normal, couple + 3);
     hapi_row_response(at->body, couple, row->ba);
     for (int i = 0; i < 6; ++i) {
-      row->ba[i] += hapi_v3_dot(contact->a[i], axis);
+      row->ba[i] += hapi_v3_dot(contact->response.a[i], axis);
     }
   }
   memset(row->jb, 0, sizeof row->jb);

@@ -58,7 +58,8 @@ static __attribute__((noinline, cold)) void ball_search(hapi_local_contact *c, d
   hapi_ball_search_begin(&c->ball, ball, radius, nearest, &search);
   while (hapi_ball_search_asks(&c->ball, &search)) {
     hapi_nearest there;
-    bool found = hapi_ball_nearest(search.ask, radius, &c->shape, &c->shape_pose, &own, &there);
+    bool found =
+        hapi_ball_nearest(search.ask, radius, &c->asked.shape, &c->asked.pose, &own, &there);
     hapi_ball_search_answer(&c->ball, &search, found ? &there : NULL);
   }
   hapi_ball_search_end(&c->ball, &search, out);
@@ -112,11 +113,11 @@ static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at, doubl
   if (at->body != NULL) {
     frame = (hapi_touch_frame){&at->body->pose, at->body->rotation};
   }
-  if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->shape.radius, &c->shape,
-                         &c->shape_pose, &frame, &nearest)) {
+  if (!hapi_ball_nearest(at->pointer->pose.position, at->pointer->shape.radius, &c->asked.shape,
+                         &c->asked.pose, &frame, &nearest)) {
     return false;
   }
-  bool flat = c->shape.kind == HAPI_SHAPE_PLANE; /* it has one side */
+  bool flat = c->asked.shape.kind == HAPI_SHAPE_PLANE; /* it has one side */
   bool far = nearest.distance + at->pointer->shape.radius > CROSS_SPEED * period;
   if (!flat && (!far || c->ball.known)) {
     keep_side(c, at, &nearest);
@@ -167,7 +168,7 @@ static bool pointer_place(const hapi_tool_world *tools, hapi_local_contact *c, d
     return place_tool(&tools->tools[c->tool - 1], at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  if (!c->has_shape || !ask_shape(c, at, period, sample)) {
+  if (!c->asked.has || !ask_shape(c, at, period, sample)) {
     place_by_plane(c, at);
   }
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, period);
@@ -252,7 +253,7 @@ static void set_columns(const hapi_local_contact *contact, const hapi_placed_poi
   hapi_row_response(at->body, row->ja, row->ba);
   if (contact->tool == 0 && hapi_body_has_own_probes(at->body)) {
     for (int i = 0; i < 6; ++i) {
-      row->ba[i] = hapi_v3_dot(contact->a[i], at->j);
+      row->ba[i] = hapi_v3_dot(contact->response.a[i], at->j);
     }
   }
   row->a = at->body != NULL ? at->body->row : HAPI_STATIC_ROW;

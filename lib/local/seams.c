@@ -15,13 +15,13 @@ static bool shape_distance(const hapi_local_contact *c, const hapi_local_body *b
 {
   hapi_touch_frame frame = {NULL, NULL};
   hapi_nearest nearest;
-  if (!c->has_shape && c->shape.kind != HAPI_SHAPE_PLANE) {
+  if (!c->asked.has && c->asked.shape.kind != HAPI_SHAPE_PLANE) {
     return false;
   }
   if (body != NULL) {
     frame = (hapi_touch_frame){&body->pose, body->rotation};
   }
-  if (!hapi_ball_nearest(center, radius, &c->shape, &c->shape_pose, &frame, &nearest)) {
+  if (!hapi_ball_nearest(center, radius, &c->asked.shape, &c->asked.pose, &frame, &nearest)) {
     return false;
   }
   *out = nearest.distance;

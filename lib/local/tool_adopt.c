@@ -222,8 +222,8 @@ void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
     tool_add(touches, in, old_of(&touches->tool, old_count, in, i), model->wishes);
     c->slot = contacts[i].slot;
     c->generation = contacts[i].generation;
-    memcpy(c->a, contacts[i].a, sizeof c->a);
-    memcpy(c->turn, contacts[i].turn, sizeof c->turn);
+    memcpy(c->response.a, contacts[i].a, sizeof c->response.a);
+    memcpy(c->response.turn, contacts[i].turn, sizeof c->response.turn);
   }
   tools_end(touches, old_count, model->wishes);
 }

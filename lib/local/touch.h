@@ -63,6 +63,19 @@ typedef struct hapi_friction {
 
 #define HAPI_NO_ROW 0xffffffffu
 
+/* Model CONTACT: the geom that is asked for its nearest point at every tick. */
+typedef struct hapi_touch_shape {
+  bool has; /* it is asked; else the shape may still be known, of a plane */
+  hapi_shape shape;
+  hap_pose pose; /* body frame */
+} hapi_touch_shape;
+
+/* Accelerance of the body, world axes. */
+typedef struct hapi_touch_response {
+  double a[6][3]; /* by one N at the contact, eq. 6 */
+  double turn[6]; /* by one N m about the normal; soft finger */
+} hapi_touch_response;
+
 typedef struct hapi_local_contact {
   uint32_t slot;
   uint32_t body;
@@ -77,7 +90,7 @@ typedef struct hapi_local_contact {
   bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
   bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
   bool rubs;      /* friction is worked out: there is some, or it was asked for */
-  bool has_shape; /* model CONTACT: asked at every tick */
+
   double point_body[3];
   double normal_body[3];
   hapi_ramp ramp;
@@ -88,10 +101,8 @@ typedef struct hapi_local_contact {
   double couple[3];     /* N m, on the body about the contact point; friction */
   double normal_now[3]; /* model CONTACT, and of hulls all: world, out of the body */
   double point_now[3];
-  double a[6][3];
-  double turn[6]; /* acceleration by one N m about the normal; soft finger */
-  hapi_shape shape;
-  hap_pose shape_pose;
+  hapi_touch_response response;
+  hapi_touch_shape asked;
 } hapi_local_contact;
 
 /* A contact of a pointer that is a hull, beside its hapi_local_contact. */

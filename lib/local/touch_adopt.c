@@ -36,16 +36,16 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   out->pointer_generation = in->pointer_generation;
   memcpy(out->point_body, in->point_body, sizeof out->point_body);
   memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
-  memcpy(out->a, in->a, sizeof out->a);
-  memcpy(out->turn, in->turn, sizeof out->turn);
+  memcpy(out->response.a, in->a, sizeof out->response.a);
+  memcpy(out->response.turn, in->turn, sizeof out->response.turn);
   out->mu = in->mu;
   out->rubs = hapi_touch_rubs(in->mu, wishes);
   touches->rubs |= out->rubs;
   out->weight = 1.0;
-  out->has_shape = in->has_shape != 0;
+  out->asked.has = in->has_shape != 0;
   out->is_hidden = in->hidden != 0;
-  out->shape = in->shape;
-  out->shape_pose = in->shape_pose;
+  out->asked.shape = in->shape;
+  out->asked.pose = in->shape_pose;
   out->epoch = epoch_of(bodies, in->body);
   if (kept->generation == in->generation) {
     out->seen = true;

@@ -80,8 +80,8 @@ static double deepest_touch(const hapi_nearby *nearby, uint32_t pointer)
   double deepest = 0.0;
   for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
     const hapi_contact_slot *slot = &nearby->slots.contacts[i];
-    if (slot->phase == HAPI_SLOT_LIVE && slot->pointer == pointer && slot->touched) {
-      deepest = fmax(deepest, slot->depth);
+    if (slot->phase == HAPI_SLOT_LIVE && slot->pointer == pointer && slot->last_touch.touched) {
+      deepest = fmax(deepest, slot->last_touch.depth);
     }
   }
   return deepest;
@@ -216,9 +216,9 @@ static bool nearest_of_side(hapi_nearby *nearby, const hapi_candidate *candidate
                    .body = dGeomGetBody(candidate->geom),
                    .radius = radius,
                    .mesh = dGeomGetClass(candidate->geom) == dTriMeshClass};
-  hapi_v3_copy(slot->ball, ball.ball);
-  hapi_v3_copy(slot->ball, ball.center);
-  hapi_v3_copy(slot->ball_normal, ball.normal);
+  hapi_v3_copy(slot->last_touch.ball, ball.ball);
+  hapi_v3_copy(slot->last_touch.ball, ball.center);
+  hapi_v3_copy(slot->last_touch.normal, ball.normal);
   side_to_body(&s, center, at);
   hapi_v3_sub(at, ball.center, way);
   s.reach = candidate->reach + hapi_v3_norm(way);
@@ -259,8 +259,9 @@ static const hapi_contact_slot *touch_of(hapi_nearby *nearby, const hapi_candida
   }
   const hapi_contact_slot *slot =
       hapi_slots_find_contact(nearby, of, candidate->geom, candidate->pointer, pointer->generation);
-  bool moved = slot != NULL && body != NULL && slot->epoch != nearby->slots.bodies[of].epoch;
-  return slot != NULL && slot->touched && !moved ? slot : NULL;
+  bool moved =
+      slot != NULL && body != NULL && slot->last_touch.epoch != nearby->slots.bodies[of].epoch;
+  return slot != NULL && slot->last_touch.touched && !moved ? slot : NULL;
 }
 
 /* Nearest points for where the pointer will be at the time of the model, which is later than now in
@@ -364,7 +365,8 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
   slot->distance = hit->nearest.distance;
   slot->placed = true;
   slot->hidden = hit->hidden;
-  slot->epoch = slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].epoch : 0;
+  slot->last_touch.epoch =
+      slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].epoch : 0;
   slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;

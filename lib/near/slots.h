@@ -42,6 +42,15 @@ typedef struct hapi_body_slot {
   double exchanged[6]; /* N, N m: mean wrench from the loop in the last interval */
 } hapi_body_slot;
 
+/* How a sphere touched at the newest message of the loop. */
+typedef struct hapi_last_touch {
+  bool touched;     /* what follows holds */
+  uint32_t epoch;   /* of the body, when the model was made */
+  double depth;     /* m, of the pointer in the geom */
+  double ball[3];   /* m, body frame: of the pointer if it could not enter the geom */
+  double normal[3]; /* unit, body frame */
+} hapi_last_touch;
+
 typedef struct hapi_contact_slot {
   hapi_slot_phase phase;
   uint32_t generation; /* grows with each new contact in this place */
@@ -65,12 +74,8 @@ typedef struct hapi_contact_slot {
   double mu;             /* of the pair, as the application says */
   double finger_radius;  /* m, the pointer's; 0: no torsion */
   double last_force[3];  /* on the body, newest message */
-  bool touched;          /* then, by a sphere; what follows holds */
-  uint32_t epoch;        /* of the body, when the model was made */
-  double depth;          /* m, of the pointer in the geom */
-  double ball[3];        /* m, body frame: of the pointer if it could not enter the geom */
-  double ball_normal[3]; /* unit, body frame */
-  bool is_tool;          /* a point of a hull's patch */
+  hapi_last_touch last_touch;
+  bool is_tool; /* a point of a hull's patch */
   hapi_tool_point tool;
 } hapi_contact_slot;
 

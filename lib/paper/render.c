@@ -124,7 +124,7 @@ static void contact_rub(const hapi_tick_facts *facts, const hapi_bodies *bodies,
   if (body != NULL) {
     double turning = p->surface.finger_radius * push[3];
     for (int i = 0; i < 6; ++i) {
-      body->linear.acceleration[i] += turning * c->turn[i];
+      body->linear.acceleration[i] += turning * c->response.turn[i];
     }
   }
 }
@@ -140,7 +140,8 @@ static void push_body(const hapi_local_contact *c, const plane *at, double perio
   hapi_v3_madd(body->account.angular_impulse, period, moment, body->account.angular_impulse);
   for (int i = 0; i < 6; i += 2) { /* in pairs, as they are read soon after */
     double *sum = body->linear.acceleration + i;
-    hapi_two more = hapi_two_of(hapi_v3_dot(c->a[i], c->force), hapi_v3_dot(c->a[i + 1], c->force));
+    hapi_two more = hapi_two_of(hapi_v3_dot(c->response.a[i], c->force),
+                                hapi_v3_dot(c->response.a[i + 1], c->force));
     hapi_two_store(sum, hapi_two_add(hapi_two_load(sum), more));
   }
 }

@@ -175,7 +175,7 @@ void hapi_reconcile_take(hapi_account *account)
   for (uint32_t i = 0; i < account->slots->contact_high; ++i) {
     memset(account->slots->contacts[i].last_force, 0,
            sizeof account->slots->contacts[i].last_force);
-    account->slots->contacts[i].touched = false;
+    account->slots->contacts[i].last_touch.touched = false;
   }
   for (uint32_t i = 0; i < account->cycle->state->contact_count; ++i) {
     HAPI_ASSERT_INDEX(in[i].slot, account->cycle->config->capacity.contacts);
@@ -183,11 +183,11 @@ void hapi_reconcile_take(hapi_account *account)
     if (contact->phase == HAPI_SLOT_LIVE && contact->generation == in[i].generation &&
         hapi_finite(in[i].force, 3)) {
       hapi_v3_copy(in[i].force, contact->last_force);
-      contact->touched = in[i].touches != 0 && hapi_finite(&in[i].depth, 1) &&
-                         hapi_finite(in[i].ball, 3) && hapi_finite(in[i].normal, 3);
-      contact->depth = in[i].depth;
-      hapi_v3_copy(in[i].ball, contact->ball);
-      hapi_v3_copy(in[i].normal, contact->ball_normal);
+      contact->last_touch.touched = in[i].touches != 0 && hapi_finite(&in[i].depth, 1) &&
+                                    hapi_finite(in[i].ball, 3) && hapi_finite(in[i].normal, 3);
+      contact->last_touch.depth = in[i].depth;
+      hapi_v3_copy(in[i].ball, contact->last_touch.ball);
+      hapi_v3_copy(in[i].normal, contact->last_touch.normal);
     }
   }
 }

@@ -45,7 +45,7 @@ static void report_ball(const hapi_local_contact *in, const hapi_pointer *p,
   if (body != NULL) {
     hapi_pose_unpoint(body->pose.position, body->pose.quat_wxyz, out->ball, out->ball);
   }
-  if (in->has_shape && in->ball.known) {
+  if (in->asked.has && in->ball.known) {
     hapi_v3_copy(in->ball.normal, out->normal);
     hapi_v3_sub(in->ball.center, out->ball, apart);
     out->depth = hapi_v3_dot(apart, out->normal);
