@@ -22,7 +22,7 @@ typedef struct app {
   hap_pointer_id hand;
 } app;
 
-static bool wood(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+static bool wood_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user, (void)a, (void)b;
   io->mu = 0.4;
@@ -55,7 +55,7 @@ static hap_status make_session(app *a, hap_detail *why)
   def.drive = HAP_DRIVE_FRAME; /* physics where we call hap_session_update, at 60 Hz */
   ode.world = a->world;
   ode.space = a->space;
-  ode.surface = wood;
+  ode.surface = wood_surface;
   hand.radius = BALL;
   hand.stiffness = 3000; /* N/m: a finger sinks in by 1 mm at 3 N */
   hand.damping = 10;
@@ -71,7 +71,7 @@ static hap_status make_session(app *a, hap_detail *why)
 }
 
 /* Box and hand at one time: what touches is drawn touching. */
-static void draw(const app *a, int frame)
+static void frame_draw(const app *a, int frame)
 {
   hap_pose box = {{0}, {0}};
   hap_pose hand = {{0}, {0}};
@@ -103,7 +103,7 @@ int main(void)
       printf("frame %3d: %.0f ms late\n", frame, 1e-6 * (double)(now - last));
     }
     last = now;
-    draw(&a, frame);
+    frame_draw(&a, frame);
   }
   hap_session_destroy(a.session);
   hap_device_close(a.device);
