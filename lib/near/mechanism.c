@@ -97,6 +97,19 @@ static bool add_joint(hapi_nearby *nearby, dJointID joint)
   return add_partner(nearby, known->index[0]) && (!others || add_partner(nearby, known->index[1]));
 }
 
+/* What a contact joint of the application holds cannot be read: such a body stays with ODE, and is
+ * measured. */
+static bool contacts_are_known(hapi_nearby *nearby, const hapi_known_body *known)
+{
+  if (known->contacted) {
+    hapi_say_once(nearby->cycle, &nearby->range.said_contacted,
+                  "the application makes contact joints of its own for a body near a pointer: the "
+                  "loop cannot carry them, and goes by testing simulations of the body; a surface "
+                  "callback that returns true leaves the contacts to the library");
+  }
+  return !known->contacted;
+}
+
 static bool add_joints(hapi_nearby *nearby, dBodyID body)
 {
   int count = dBodyGetNumJoints(body);
@@ -116,7 +129,8 @@ bool hapi_mechanism_gather(hapi_nearby *nearby, uint32_t known)
   range->mechanism.count = range->mechanism.moving = 0;
   bool good = add_member(nearby, known);
   for (uint32_t i = 0; good && i < range->mechanism.moving; ++i) {
-    good = add_joints(nearby, known_body(nearby, range->mechanism.members[i])->body);
+    const hapi_known_body *member = known_body(nearby, range->mechanism.members[i]);
+    good = contacts_are_known(nearby, member) && add_joints(nearby, member->body);
   }
   return good;
 }

@@ -18,7 +18,7 @@
  *   owned      bodies of shapes that the contact thread knows, free or in joints that the loop
  *              has: it moves them
  *   measured   in other joints, or on ground that only ODE's collider knows: testing simulations
- *   outside    beyond the capacity: a moving boundary
+ *   outside    beyond the capacity: answers with its mass, until physics says what became of it
  *   driven     kinematic
  *
  * What is written here is what the contact thread needs: geoms, and pairs with their surfaces. */

@@ -56,8 +56,8 @@ enum {
   HAPI_BODY_RESTING = 2, /* asleep in the world: does not move until it is pushed */
   HAPI_BODY_FOLLOWS = 4, /* not pushed in the interval before: the world's state is better */
   /* Model CONTACT: the loop moves the body, ODE takes its state from the loop. A body that is not
-   * OWNED, DRIVEN or MEASURED is outside of the range: it keeps its twist, and ODE gets what the
-   * loop gave to it. */
+   * OWNED, DRIVEN or MEASURED is outside of the range: it answers with its mass, and ODE gets
+   * what the loop gave to it. */
   HAPI_BODY_OWNED = 8,
   HAPI_BODY_MEASURED = 16, /* model CONTACT: the loop moves it by response and b, ODE by itself */
   HAPI_BODY_GYROSCOPIC = 32,

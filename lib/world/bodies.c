@@ -173,6 +173,7 @@ static void look_at(hapi_world *world, hapi_known_body *known)
   known->seen = table->scan;
   ++table->seen_count;
   known->jointed = dBodyGetJoint(body, 0) != NULL;
+  known->contacted = false;
   table->jointed_count += known->jointed;
   if (table->geoms_forgotten && !known->sized) {
     known->geoms_print = 0;

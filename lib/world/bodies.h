@@ -63,6 +63,7 @@ typedef struct hapi_known_body {
   bool sized;      /* all of its geoms are of classes whose sizes are in geoms_print */
   bool measured;   /* the last scan found its geoms changed */
   bool jointed;
+  bool contacted;  /* by contact joints of the application */
   bool loop_owned; /* in the newest message, also while its slot retires */
   bool loop_touched;
   bool pushed; /* user_force or user_torque is not 0 */

@@ -10,8 +10,9 @@
  * stop either touched or not, and both may change within a tick. Where an axis is, and how far
  * along, ODE says of these:
  *
- * AMotor   up to three axes, turned with the world or one of the bodies PR       slides along the
- * first axis, turns about the second piston   slides along and turns about its axis
+ *   AMotor   up to three axes, turned with the world or one of the bodies
+ *   PR       slides along the first axis, turns about the second
+ *   piston   slides along and turns about its axis
  *
  * It does not say it of the axes of an LMotor (only their numbers, without the frame), nor of a
  * Plane2D: there motors are part of the measurement. */

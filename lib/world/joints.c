@@ -221,7 +221,8 @@ static void joint_see(hapi_world *world, dJointID joint)
   }
 }
 
-/* A body has its newest joint first. */
+/* A body has its newest joint first. Contact joints that are there now are the application's: the
+ * library's own live from the collision phase to the end of the step. */
 void hapi_joints_scan(hapi_world *world)
 {
   ++world->joints.scan;
@@ -234,6 +235,8 @@ void hapi_joints_scan(hapi_world *world)
       dJointID joint = dBodyGetJoint(body, k - 1);
       if (dJointGetType(joint) != dJointTypeContact) {
         joint_see(world, joint);
+      } else {
+        world->bodies.entries[i].contacted = true;
       }
     }
   }
