@@ -2,12 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include "local/seams.h"
 
+#include <math.h>
+
 #include "base/pose.h"
 #include "local/ball_nearest.h"
 #include "local/pointer_friction.h"
 
-#define ON_SHARE 0.01 /* of the pointer's radius: a step between two surfaces that is none */
-#define REACH 2.0     /* radii: things that are farther have no part in the touch */
+/* A step between two surfaces that is none: of the pointer's radius, and m at most. */
+#define ON_SHARE 0.01
+#define ON_MOST 1e-4
+#define REACH 2.0 /* radii: things that are farther have no part in the touch */
 
 /* m, from a ball to the contact's shape; false: it has none that can be asked. */
 static bool shape_distance(const hapi_local_contact *c, const hapi_local_body *body,
@@ -32,7 +36,7 @@ static bool contact_hides(const hapi_local_contact *by, const hapi_local_contact
                           const hapi_pointer *p, const hapi_bodies *bodies)
 {
   double radius = p->shape.radius;
-  double step = ON_SHARE * radius;
+  double step = fmin(ON_SHARE * radius, ON_MOST);
   double held[3];
   double distance;
   if (!shape_distance(by, hapi_bodies_at(bodies, by->body), c->point_now, 0.0, &distance) ||

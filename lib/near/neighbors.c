@@ -377,6 +377,16 @@ static uint32_t body_of_hit(const hapi_nearby *nearby, const hapi_hit *hit)
   return hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(hit->geom));
 }
 
+/* What is only near finds its place when it is touched: farther ones lose theirs then. */
+static void say_crowded(hapi_nearby *nearby, const hapi_hit *hit)
+{
+  if (hit->nearest.distance < 0.0) {
+    hapi_say_once(nearby->cycle, &nearby->neighbors.said_crowded,
+                  "a pointer touches more than the session has room for: what finds none is not "
+                  "felt, and the force is too small; give more max_bodies and max_contacts");
+  }
+}
+
 /* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
  * those lose them then. */
 static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
@@ -396,6 +406,7 @@ static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
                 (!known || counted || bodies < nearby->cycle->config->max_bodies);
     if (!room) {
       ++nearby->counts.dropped;
+      say_crowded(nearby, &hits[i]);
       continue;
     }
     if (known && !counted) {
@@ -466,6 +477,7 @@ static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
 /* ---- seams, as in local/seams.h: for what the tick cannot ask the shape of ---- */
 
 #define SEAM_SHARE 0.01 /* of the pointer's radius */
+#define SEAM_MOST 1e-4  /* m */
 
 /* The tick does. */
 static bool tick_hides(const hapi_nearby *nearby, dGeomID a, dGeomID b)
@@ -493,7 +505,7 @@ static bool box_holds(dGeomID geom, const double point[3], double slack)
 static bool hit_hides(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit *hit)
 {
   double radius = hapi_state_pointers(nearby->cycle->state)[hit->pointer].radius;
-  double step = SEAM_SHARE * radius;
+  double step = fmin(SEAM_SHARE * radius, SEAM_MOST);
   double held[3];
   hapi_nearest there;
   if (by->pointer != hit->pointer || by->tool_count > 0 || hit->tool_count > 0 ||

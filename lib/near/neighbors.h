@@ -5,6 +5,7 @@
 
 /* Geoms near the pointers: which bodies and contacts a model has. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <ode/ode.h>
@@ -43,6 +44,7 @@ typedef struct hapi_neighbors {
   struct hapi_hit *hits; /* candidate_capacity */
   uint32_t hit_count;    /* that the newest model has */
   hapi_cover cover;
+  bool said_crowded;        /* of what is touched and finds no room, once a session */
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
   double current_reach;

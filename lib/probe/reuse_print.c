@@ -388,9 +388,7 @@ bool hapi_print_island(const hapi_reuse_input *input, hapi_reuse_book *book, hap
   of->touch_count = book->now.touch_count - of->first_touch;
   if (of->touch_count > 0) { /* else there may be none at all yet, nor a place for them */
     hapi_touch_print *touches = book->now.touches + of->first_touch;
-    if (of->touch_count > 0) {
-      qsort(touches, of->touch_count, sizeof *touches, touches_compare);
-    }
+    qsort(touches, of->touch_count, sizeof *touches, touches_compare);
   }
   return p->good;
 }

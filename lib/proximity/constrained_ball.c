@@ -11,7 +11,7 @@
  * surface is never that of another side. Where it no longer moves, it is nearest to the ball among
  * its neighbours. A ball that goes round an edge does so in some ticks. */
 
-#define STEPS_MOST 8u    /* questions in a search */
+#define STEPS_MOST 9u    /* questions in a search */
 #define GAP_LEAST 1e-9   /* m: it touches */
 #define ROUNDING 1e-9    /* m */
 #define MOVE_LEAST 1e-10 /* m: it no longer moves */
@@ -73,8 +73,12 @@ bool hapi_ball_search_asks(hapi_constrained_ball *b, hapi_ball_search *io)
   double way[3];
   hapi_v3_sub(io->ball, b->center, way);
   double length = hapi_v3_norm(way);
-  if (io->reached || io->steps++ == STEPS_MOST) {
+  if (io->reached || io->steps == STEPS_MOST) {
     return false;
+  }
+  if (io->steps++ == 0) { /* the shape may be another one since */
+    hapi_v3_copy(b->center, io->ask);
+    return true;
   }
   if (b->gap > GAP_LEAST) {
     io->reached = length <= b->gap; /* nothing is in the way */
@@ -90,8 +94,12 @@ bool hapi_ball_search_asks(hapi_constrained_ball *b, hapi_ball_search *io)
 void hapi_ball_search_answer(hapi_constrained_ball *b, hapi_ball_search *io,
                              const hapi_nearest *nearest)
 {
-  if (nearest == NULL || nearest->distance < -io->radius) {
+  if (nearest == NULL) {
     io->steps = STEPS_MOST; /* no surface is known there: it stays where it is */
+    return;
+  }
+  if (nearest->distance < -io->radius) {
+    io->reached = true; /* it is deep in the shape: begin anew */
     return;
   }
   HAPI_ASSERT_UNIT(nearest->normal);
