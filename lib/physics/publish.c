@@ -71,6 +71,51 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
   memcpy(out->response, answer->response, sizeof out->response);
 }
 
+static bool is_zero(const hap_twist *twist)
+{
+  return hapi_v3_dot(twist->linear, twist->linear) == 0.0 &&
+         hapi_v3_dot(twist->angular, twist->angular) == 0.0;
+}
+
+static void twist_between(const hapi_slot_account *from, const hap_pose *to, double seconds,
+                          hap_twist *out)
+{
+  const double back[4] = {from->left_quat[0], -from->left_quat[1], -from->left_quat[2],
+                          -from->left_quat[3]};
+  double turn[4];
+  hapi_v3_sub(to->position, from->left_position, out->linear);
+  hapi_v3_scale(1.0 / seconds, out->linear, out->linear);
+  hapi_quat_multiply(to->quat_wxyz, back, turn);
+  double sine = hapi_v3_norm(turn + 1);
+  double angle = 2.0 * atan2(sine, fabs(turn[0]));
+  double rate = sine > 0.0 ? (turn[0] < 0.0 ? -angle : angle) / (sine * seconds) : 0.0;
+  hapi_v3_scale(rate, turn + 1, out->angular);
+}
+
+/* A step that is no longer than the one before: it is on its way, and was not put elsewhere. */
+static bool goes_on(const double before[3], const double now[3])
+{
+  double change[3];
+  hapi_v3_sub(now, before, change);
+  return hapi_v3_norm(change) <= hapi_v3_norm(before);
+}
+
+/* A kinematic body that is moved by its pose alone has the velocity of its way in the last step: in
+ * the loop it would stand until the next sync else, and leap then. */
+static void twist_by_pose(hapi_slot_account *of, double seconds, const hap_pose *pose,
+                          hap_twist *io)
+{
+  const hap_twist before = of->moved;
+  memset(&of->moved, 0, sizeof of->moved);
+  if (!of->placed || !(seconds > 0.0) || !is_zero(io)) {
+    return;
+  }
+  twist_between(of, pose, seconds, &of->moved);
+  if (goes_on(before.linear, of->moved.linear) && goes_on(before.angular, of->moved.angular)) {
+    *io = of->moved;
+  }
+}
+
 static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
 {
   const hapi_body_slot *slot = &p->slots->bodies[index];
@@ -85,6 +130,9 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   hapi_pose_read(body, &out->pose);
   hapi_twist_read(body, &out->twist);
+  if ((slot->flags & HAPI_BODY_DRIVEN) != 0) {
+    twist_by_pose(of, p->cycle->step_s, &out->pose, &out->twist);
+  }
   memcpy(out->b, answer->b, sizeof out->b);
   memcpy(out->residual, of->residual, sizeof out->residual);
   hapi_v3_copy(of->impulse_taken, out->impulse_taken);
