@@ -174,3 +174,18 @@ TEST(two_flush_hulls_push_once_in_every_model)
     }
   }
 }
+
+/* Where the loop asks no shape, physics finds the seam. */
+TEST(two_flush_boxes_push_once_where_no_shape_is_asked)
+{
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    open_world(&w, 0.0);
+    w.expert.effects_off = i == 0 ? HAP_EFFECT_BIT(HAP_EFFECT_SHAPE) : 0;
+    w.def.accuracy = i == 0 ? w.def.accuracy : 0.0;
+    (void)add_block(&w, -0.05, -0.05);
+    (void)add_block(&w, 0.05, -0.05);
+    CHECK(slide_error(&w, 0.0) < 1e-6);
+    cw_close(&w);
+  }
+}

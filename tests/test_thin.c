@@ -193,3 +193,32 @@ TEST(no_sheet_gives_way_to_a_fast_hand)
     }
   }
 }
+
+/* A hand that is put behind a plate is behind it: nobody pressed it through. */
+TEST(a_jump_through_a_plate_is_no_touch)
+{
+  for (int kind = 0; kind < SHEET_KINDS; ++kind) {
+    contact_world w;
+    plate p = {.mesh = NULL};
+    cw_open(&w, 0.0);
+    w.hand_def.radius = RADIUS;
+    w.hand_def.stiffness = K;
+    w.hand_def.damping = 0.0;
+    w.hand_expert.coupling = HAP_COUPLING_DIRECT;
+    dGeomSetPosition(plate_create(&p, w.space, (sheet_kind)kind, 0.001), 0.0, 0.0, -0.0005);
+    cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
+    REQUIRE(cw_start(&w, 0.013, 0.007, RADIUS + 0.01));
+    cw_move_hand(&w, 0.0, 0.0, -0.05);
+    cw_run(&w, 240); /* 2 mm deep */
+    CHECK_NEAR(w.force[2], 2.0, 1e-6);
+    cw_move_hand(&w, 0.0, 0.0, 0.0);
+    w.hand_at[2] = -0.03;
+    cw_run(&w, 300);
+    CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
+    w.hand_at[2] = -0.02;
+    cw_run(&w, 300);
+    CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
+    cw_close(&w);
+    plate_destroy(&p);
+  }
+}

@@ -20,7 +20,7 @@
 #define NEAR_S 5e-3
 #define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
 
-/* No hand comes from farther, into a shape, in a tick: m/s. */
+/* m/s: no hand comes from farther in a tick; what does was put there, and has no side. */
 #define CROSS_SPEED HAPI_PRESS_SPEED
 
 /* In the body's frame. */
@@ -79,7 +79,8 @@ static void ball_enter(hapi_local_contact *c, const hapi_pointer *p)
 
 /* The answer for the side that the pointer touches, where another may be nearer. */
 static __attribute__((noinline)) void keep_side(hapi_local_contact *c,
-                                                const hapi_placed_pointer *at, hapi_nearest *io)
+                                                const hapi_placed_pointer *at, double period,
+                                                hapi_nearest *io)
 {
   const hapi_pointer *p = at->pointer;
   double radius = p->shape.radius;
@@ -92,7 +93,9 @@ static __attribute__((noinline)) void keep_side(hapi_local_contact *c,
     hapi_m3_apply_transposed(at->body->rotation, apart, local.point_b);
     hapi_m3_apply_transposed(at->body->rotation, io->normal, local.normal);
   }
-  if (p->device.jumped) {
+  double way[3];
+  hapi_v3_sub(ball, c->ball.ball, way);
+  if (p->device.jumped || (c->ball.known && hapi_v3_norm(way) > CROSS_SPEED * period)) {
     c->ball.known = false;
   } else if (!c->ball.known && io->distance + radius <= 0.0) {
     ball_enter(c, p);
@@ -120,7 +123,7 @@ static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at, doubl
   bool flat = c->asked.shape.kind == HAPI_SHAPE_PLANE; /* it has one side */
   bool far = nearest.distance + at->pointer->shape.radius > CROSS_SPEED * period;
   if (!flat && (!far || c->ball.known)) {
-    keep_side(c, at, &nearest);
+    keep_side(c, at, period, &nearest);
     c->ball.known = c->ball.known && (!far || c->ball.held);
   }
   hapi_v3_copy(nearest.normal, c->normal_now);

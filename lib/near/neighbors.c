@@ -479,13 +479,14 @@ static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
 #define SEAM_SHARE 0.01 /* of the pointer's radius */
 #define SEAM_MOST 1e-4  /* m */
 
-/* The tick does. */
+/* The tick does: of both it asks the shape. */
 static bool tick_hides(const hapi_nearby *nearby, dGeomID a, dGeomID b)
 {
   hapi_shape shape;
   hap_pose pose;
-  return nearby->cycle->model == HAP_MODEL_CONTACT &&
-         !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_SHAPE) &&
+  hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
+  bool asks = wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && nearby->cycle->settings.shapes);
+  return nearby->cycle->model == HAP_MODEL_CONTACT && asks &&
          hapi_shape_of_geom(a, &shape, &pose) && hapi_shape_of_geom(b, &shape, &pose);
 }
 

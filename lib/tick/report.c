@@ -50,7 +50,9 @@ static void report_ball(const hapi_local_contact *in, const hapi_pointer *p,
     hapi_v3_sub(in->ball.center, out->ball, apart);
     out->depth = hapi_v3_dot(apart, out->normal);
     hapi_v3_copy(in->ball.center, out->ball);
-  } else { /* the plane that the model gave */
+  } else if (p->device.jump_s > 0.0 || in->ramp.excess > 0.0) {
+    out->touches = 0; /* it has no side: it was put where it is */
+  } else {            /* the plane that the model gave */
     hapi_v3_copy(in->normal_body, out->normal);
     hapi_v3_sub(out->ball, in->point_body, apart);
     out->depth = p->shape.radius - hapi_v3_dot(apart, out->normal);
