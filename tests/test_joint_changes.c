@@ -317,19 +317,6 @@ TEST(second_start_reads_the_joints_anew)
   check_owned(m, 1);
 }
 
-TEST(feedback_is_zero)
-{
-  mechanism m;
-  dJointFeedback feedback = {.f1 = {1.0}, .t1 = {1.0}, .f2 = {1.0}, .t2 = {1.0}};
-  open_mechanism(&m, build_pendulum, 9.81);
-  dJointSetFeedback(m.joints[0], &feedback);
-  REQUIRE(start_mechanism(&m));
-  cw_run(&m.w, 4 * STEP_TICKS);
-  CHECK(cw_norm(feedback.f1) == 0.0 && cw_norm(feedback.t1) == 0.0);
-  CHECK(cw_norm(feedback.f2) == 0.0 && cw_norm(feedback.t2) == 0.0);
-  cw_close(&m.w);
-}
-
 /* ---- room ---- */
 
 static void build_long_chain(mechanism *m)

@@ -65,8 +65,9 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  *
  * Joints belong to the application. They may come, change and go where the world may be touched.
  * Model CONTACT may move the bodies of a ball, hinge, slider, universal, hinge-2 or fixed joint
- * itself. Then ODE does not step the joint: it is switched off during the step, and its
- * dJointFeedback is zero. A fixed joint whose bodies the application moves against each other holds
+ * itself. Then ODE does not step the joint: it is switched off during the step. Its dJointFeedback
+ * is the mean of the loop's ticks in the step, as ODE would write it, from the second step on after
+ * dJointSetFeedback. A fixed joint whose bodies the application moves against each other holds
  * them as they then are; so does a slider across its axis.
  *
  * Numbers. ODE ends the process on NaN, and so the world is examined before each step. start

@@ -713,6 +713,52 @@ void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *
   }
 }
 
+/* ---- what the application is told ---- */
+
+static bool body_waits(const hapi_local_body *body)
+{
+  return body != NULL && body->waiting;
+}
+
+/* A body that waits for its contacts has no weight: what holds it then is not what is asked. */
+static bool joint_tells(const hapi_joints *joints, const hapi_bodies *bodies, uint32_t index)
+{
+  placed_joint j;
+  return joints->of[index].told != 0 && find_joint(joints, bodies, index, &j) &&
+         (hapi_body_responds(j.a) || hapi_body_responds(j.b)) && !body_waits(j.a) &&
+         !body_waits(j.b);
+}
+
+/* ODE gives the force of a motor at its stop to the bodies, not to the joint. */
+static bool is_motor_on_stop(const hapi_joint_memory *memory, int part)
+{
+  return part >= PART_AXIS && (part - PART_AXIS) % 3 == 0 &&
+         (memory->impulse[part + 1] != 0.0 || memory->impulse[part + 2] != 0.0);
+}
+
+void hapi_joints_tell(const hapi_joints *joints, const hapi_bodies *bodies, const hapi_rows *rows,
+                      double period)
+{
+  for (uint32_t i = 0; i < joints->count; ++i) {
+    hapi_joint_memory *memory = &joints->memory[joints->of[i].slot];
+    memory->tells = joint_tells(joints, bodies, i);
+    memory->given.seconds += memory->tells ? period : 0.0;
+  }
+  for (uint32_t i = 0; i < rows->solver.row_count; ++i) {
+    const hapi_row *row = &rows->solver.rows[i];
+    const hapi_row_source *source = &rows->sources[i];
+    if (!source->joint) {
+      continue;
+    }
+    HAPI_ASSERT_INDEX(source->contact, joints->count);
+    hapi_joint_memory *memory = &joints->memory[joints->of[source->contact].slot];
+    if (memory->tells && !is_motor_on_stop(memory, source->part)) {
+      hapi_madd6(memory->given.impulse[0], row->impulse, row->ja);
+      hapi_madd6(memory->given.impulse[1], row->impulse, row->jb);
+    }
+  }
+}
+
 /* ---- wake and adopt ---- */
 
 static bool body_moves(const hapi_local_body *body)
@@ -754,9 +800,11 @@ void hapi_joints_adopt(hapi_joints *joints, hapi_model *model)
 {
   const hapi_model_joint *in = hapi_model_joints(model);
   joints->count = model->joint_count;
+  joints->told = 0;
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     hapi_joint_memory *memory = &joints->memory[in[i].slot];
     joints->of[i] = in[i];
+    joints->told += in[i].told;
     if (memory->generation != in[i].generation) {
       memset(memory, 0, sizeof *memory);
       memory->generation = in[i].generation;

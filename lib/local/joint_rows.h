@@ -16,12 +16,15 @@
 typedef struct hapi_joint_memory {
   uint32_t generation;
   uint32_t measurement;             /* whose rows the impulses are of */
-  double impulse[HAPI_JOINT_PARTS]; /* N s, N m s */
+  bool tells;                       /* in this tick, to given */
+  double impulse[HAPI_JOINT_PARTS]; /* N s, N m s, of the last tick */
+  hapi_joint_given given;
 } hapi_joint_memory;
 
 typedef struct hapi_joints {
   hapi_model_joint *of; /* of the model in use; capacity.joints */
   uint32_t count;
+  uint32_t told;             /* of these */
   hapi_joint_memory *memory; /* by slot; capacity.joints */
 } hapi_joints;
 
@@ -33,5 +36,9 @@ void hapi_joint_wake(const hapi_joints *joints, const hapi_bodies *bodies, hapi_
 
 void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
                      const hapi_tick_facts *facts);
+
+/* After the solve: adds to what physics is told of joints. */
+void hapi_joints_tell(const hapi_joints *joints, const hapi_bodies *bodies, const hapi_rows *rows,
+                      double period);
 
 #endif

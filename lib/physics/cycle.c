@@ -80,6 +80,7 @@ static void global_step(hapi_physics *physics)
   hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
   hapi_world_step(&physics->world, physics->cycle.step_s);
   hapi_world_restore(&physics->world, &meant);
+  hapi_feedback_tell(&physics->feedback);
   hapi_hold_let_go(&physics->account);
 }
 

@@ -94,6 +94,7 @@ void hapi_physics_take_state(hapi_physics *physics)
   if (newest != NULL) { /* else the loop has stopped or is late: nothing is taken twice */
     physics->cycle.state = newest;
     hapi_reconcile_take(&physics->account);
+    hapi_feedback_take(&physics->feedback);
   }
 }
 

@@ -20,6 +20,7 @@ static bool physics_allocate(hapi_physics *physics, const hap_ode_def *ode)
   const hapi_capacity *c = &physics->config.capacity;
   return hapi_account_create(&physics->account, &physics->cycle, &physics->world,
                              &physics->near.slots) &&
+         hapi_feedback_create(&physics->feedback, &physics->cycle, &physics->world) &&
          hapi_probe_create(&physics->probe, &physics->cycle, &physics->world,
                            &physics->near.slots) &&
          hapi_cross_create(&physics->cross, &physics->cycle, &physics->near.slots,
@@ -100,6 +101,7 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_nearby_finish(&physics->near);
   hapi_world_finish(&physics->world);
   hapi_account_finish(&physics->account);
+  hapi_feedback_finish(&physics->feedback);
   hapi_poses_finish(&physics->drawing);
   hapi_probe_finish(&physics->probe);
   hapi_cross_finish(&physics->cross);
@@ -175,6 +177,7 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
 {
   physics->world.begun = true;
   hapi_account_reset(&physics->account);
+  hapi_feedback_reset(&physics->feedback);
   hapi_slots_reset(&physics->near); /* the scan leaves what is local to others */
   hapi_joints_reset(
       &physics->world.joints); /* as for the meshes below; and walks are counted from 1 again */

@@ -15,6 +15,7 @@
 #include "near/near.h"
 #include "physics/counts.h"
 #include "physics/edits.h"
+#include "physics/feedback.h"
 #include "physics/physics.h"
 #include "physics/poses.h"
 #include "physics/reconcile.h"
@@ -48,6 +49,7 @@ struct hapi_physics {
   hapi_lookback lookback;
   hapi_dial dial;
   hapi_account account;
+  hapi_feedback feedback;
   hapi_watch watch;
   hapi_drawing drawing;
   hapi_taping tape;

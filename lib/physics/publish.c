@@ -311,6 +311,7 @@ static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_
   out->generation_a = a->generation;
   out->body_b = b != NULL ? (uint32_t)(b - p->slots->bodies) : HAPI_SLOT_NONE;
   out->generation_b = b != NULL ? b->generation : 0;
+  out->told = dJointGetFeedback(known->joint) != NULL;
   if (measured != NULL) {
     out->kind = HAPI_JOINT_MEASURED;
     out->place = measured->place;

@@ -441,13 +441,8 @@ void hapi_hold_let_go(hapi_account *account)
     }
     of->held = false;
   }
-  /* The feedback of a held joint is zero. */
   for (uint32_t i = 0; i < account->world->joints.count; ++i) {
     hapi_known_joint *known = &account->world->joints.entries[i];
-    dJointFeedback *feedback = known->held ? dJointGetFeedback(known->joint) : NULL;
-    if (feedback != NULL) {
-      memset(feedback, 0, sizeof *feedback);
-    }
     if (known->held) {
       dJointEnable(known->joint);
     }

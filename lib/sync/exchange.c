@@ -67,6 +67,7 @@ static const message_array arrays[] = {
     STATE(pointers_offset, pointer_count, hapi_state_pointer, pointers),
     STATE(hulls_offset, pointer_count, hapi_tool_hull, pointers),
     STATE(springs_offset, spring_count, hapi_state_spring, springs),
+    STATE(joints_offset, joint_count, hapi_state_joint, joints),
 #define NEAR(...) ARRAY(HAPI_CHANNEL_NEAR, hapi_near, __VA_ARGS__)
     NEAR(bodies_offset, body_count, hapi_near_body, bodies),
     NEAR(geoms_offset, geom_count, hapi_near_geom, geoms),

@@ -115,6 +115,7 @@ typedef struct hapi_model_joint {
   uint32_t generation_a;
   uint32_t body_b; /* HAPI_SLOT_NONE: static world */
   uint32_t generation_b;
+  uint32_t told; /* the application listens to its dJointFeedback */
   hapi_joint_place place;
   hapi_softness along;   /* hinge-2: the suspension, along axis_a */
   hapi_softness linear;  /* anchors */

@@ -48,12 +48,27 @@ typedef struct hapi_state_contact {
   double normal[3]; /* unit, body frame: of the surface there */
 } hapi_state_contact;
 
+/* Running totals of a joint, since its slot's generation began. */
+typedef struct hapi_joint_given {
+  double seconds;       /* of the ticks that they are of */
+  double impulse[2][6]; /* N s, N m s about the centres of mass, on the first and the second body */
+} hapi_joint_given;
+
 /* Since the start, of the ticks that had a budget. */
 typedef struct hapi_tick_load {
   uint64_t ticks;
   uint64_t over;
   double spent_ns;
 } hapi_tick_load;
+
+/* What a joint did to its bodies, for dJointFeedback. */
+typedef struct hapi_state_joint {
+  uint32_t slot;
+  uint32_t generation;
+  uint32_t body_a; /* slot of the body that comes first */
+  uint32_t reserved;
+  hapi_joint_given given;
+} hapi_state_joint;
 
 /* How far a closed pointer contact with friction is stretched along the surface. */
 typedef struct hapi_state_spring {
@@ -82,12 +97,15 @@ typedef struct hapi_state {
   uint32_t spring_count;
   uint32_t spring_capacity; /* 0: springs are not told */
   uint32_t springs_offset;
+  uint32_t joint_count;
+  uint32_t joints_offset;
 } hapi_state;
 
 HAPI_MESSAGE_ARRAY(hapi_state_bodies, hapi_state, hapi_state_body, bodies_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_contacts, hapi_state, hapi_state_contact, contacts_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_pointers, hapi_state, hapi_state_pointer, pointers_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_springs, hapi_state, hapi_state_spring, springs_offset)
+HAPI_MESSAGE_ARRAY(hapi_state_joints, hapi_state, hapi_state_joint, joints_offset)
 
 /* By pointer; not set for a sphere. */
 HAPI_MESSAGE_ARRAY(hapi_state_hulls, hapi_state, hapi_tool_hull, hulls_offset)

@@ -486,4 +486,7 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
   }
   rows_account(&tick->rows, &tick->bodies, &tick->contacts, &tick->joints, tick->facts.observes);
+  if (tick->joints.told > 0) {
+    hapi_joints_tell(&tick->joints, &tick->bodies, &tick->rows, period);
+  }
 }

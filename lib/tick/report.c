@@ -100,6 +100,21 @@ static void report_springs(const hapi_touches *touches, uint64_t tick, hapi_stat
   }
 }
 
+static void report_joints(const hapi_joints *from, hapi_state *out)
+{
+  out->joint_count = 0;
+  for (uint32_t i = 0; i < from->count && out->joint_count < from->told; ++i) {
+    const hapi_model_joint *in = &from->of[i];
+    if (in->told != 0) {
+      hapi_state_joints(out)[out->joint_count++] =
+          (hapi_state_joint){.slot = in->slot,
+                             .generation = in->generation,
+                             .body_a = in->body_a,
+                             .given = from->memory[in->slot].given};
+    }
+  }
+}
+
 /* The places of those that have not come yet were cleared at start. */
 static void report_pointers(const hapi_pointers *from, hapi_state *out)
 {
@@ -135,6 +150,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   report_bodies(&tick->bodies, out);
   report_contacts(&tick->touches, &tick->pointers, &tick->bodies, out);
   report_springs(&tick->touches, tick->facts.tick, out);
+  report_joints(&tick->joints, out);
   report_pointers(&tick->pointers, out);
 }
 
