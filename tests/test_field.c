@@ -127,3 +127,213 @@ TEST(beside_its_end_a_field_is_not_felt)
              force);
   CHECK(force[0] == 0.0 && force[1] == 0.0 && force[2] == 0.0);
 }
+
+/* ---- bodies on a field: the loop moves them, on the field's triangles ---- */
+
+#define ROUGH 12
+#define ROUGH_CELL 0.02
+
+static double rough_height(int i, int k)
+{
+  return 0.0008 * sin(1.7 * i + 0.4 * k) + 0.0005 * cos(2.3 * k - 0.9 * i);
+}
+
+static double rough_heights[(ROUGH + 1) * (ROUGH + 1)];
+
+typedef struct rough {
+  dHeightfieldDataID field;
+  dTriMeshDataID mesh;
+  double vertices[(ROUGH + 1) * (ROUGH + 1) * 3];
+  dTriIndex indices[ROUGH * ROUGH * 6];
+} rough;
+
+static void rough_fill(void)
+{
+  for (int k = 0; k <= ROUGH; ++k) {
+    for (int i = 0; i <= ROUGH; ++i) {
+      rough_heights[k * (ROUGH + 1) + i] = rough_height(i, k);
+    }
+  }
+}
+
+/* The field's z is -y of the world. */
+static void rough_add_field(contact_world *w, rough *r)
+{
+  const double width = ROUGH * ROUGH_CELL;
+  dMatrix3 upright;
+  rough_fill();
+  r->field = dGeomHeightfieldDataCreate();
+  dGeomHeightfieldDataBuildDouble(r->field, rough_heights, 0, width, width, ROUGH + 1, ROUGH + 1,
+                                  1.0, 0.0, 1.0, 0);
+  dGeomID geom = dCreateHeightfield(w->space, r->field, 1);
+  dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * M_PI);
+  dGeomSetRotation(geom, upright);
+}
+
+/* The same triangles. */
+static void rough_add_mesh(contact_world *w, rough *r)
+{
+  const double width = ROUGH * ROUGH_CELL;
+  dTriIndex *at = r->indices;
+  for (int k = 0; k <= ROUGH; ++k) {
+    for (int i = 0; i <= ROUGH; ++i) {
+      double *v = &r->vertices[(size_t)3 * (size_t)(k * (ROUGH + 1) + i)];
+      v[0] = ROUGH_CELL * i - 0.5 * width;
+      v[1] = -(ROUGH_CELL * k - 0.5 * width);
+      v[2] = rough_height(i, k);
+    }
+  }
+  for (int k = 0; k < ROUGH; ++k) {
+    for (int i = 0; i < ROUGH; ++i) {
+      dTriIndex a = (dTriIndex)(k * (ROUGH + 1) + i);
+      const dTriIndex cell[6] = {a, a + ROUGH + 1, a + 1, a + 1, a + ROUGH + 1, a + ROUGH + 2};
+      memcpy(at, cell, sizeof cell);
+      at += 6;
+    }
+  }
+  r->mesh = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(r->mesh, r->vertices, 3 * sizeof(double), (ROUGH + 1) * (ROUGH + 1),
+                              r->indices, ROUGH * ROUGH * 6, 3 * sizeof(dTriIndex));
+  dCreateTriMesh(w->space, r->mesh, NULL, NULL, NULL);
+}
+
+typedef struct slide {
+  double at[3];
+  double largest;
+  uint32_t owned;
+  uint32_t measured;
+} slide;
+
+/* A crate that is dragged over rough ground. */
+static slide crate_slide(bool field, double physics_hz)
+{
+  static rough r;
+  slide s = {.largest = 0.0};
+  contact_world *w = cw_new(CW_GRAVITY);
+  w->def.physics_hz = physics_hz;
+  w->def.max_contacts = 2048;
+  w->expert.max_hull_points = 20000;
+  cw_add_box(w, 0.5, (const double[3]){0.06, 0.05, 0.04}, -0.03, 0.004, 0.0212);
+  if (field) {
+    rough_add_field(w, &r);
+  } else {
+    rough_add_mesh(w, &r);
+  }
+  if (cw_start(w, -0.075, 0.004, 0.03)) {
+    cw_run(w, 200);
+    cw_move_hand(w, 0.1, 0.0, 0.0);
+    for (int i = 0; i < 600; ++i) {
+      cw_tick(w);
+      s.largest = fmax(s.largest, -w->force[0]);
+    }
+    hap_stats stats = cw_stats(w);
+    s.owned = stats.model.range_bodies;
+    s.measured = stats.model.measured_bodies;
+    memcpy(s.at, w->position[0], sizeof s.at);
+  }
+  cw_close(w);
+  if (field) {
+    dGeomHeightfieldDataDestroy(r.field);
+  } else {
+    dGeomTriMeshDataDestroy(r.mesh);
+  }
+  return s;
+}
+
+TEST(a_crate_on_a_field_is_that_on_the_same_triangles)
+{
+  for (int i = 0; i < 2; ++i) {
+    double hz = i == 0 ? 20.0 : 60.0;
+    slide field = crate_slide(true, hz);
+    slide mesh = crate_slide(false, hz);
+    printf("# %.0f Hz: field %.6f %.6f %.6f, %.3f N; mesh %.6f %.6f %.6f, %.3f N\n", hz,
+           field.at[0], field.at[1], field.at[2], field.largest, mesh.at[0], mesh.at[1], mesh.at[2],
+           mesh.largest);
+    CHECK(field.owned == 1 && field.measured == 0);
+    CHECK(mesh.owned == 1);
+    CHECK(field.at[0] > 0.02);
+    for (int k = 0; k < 3; ++k) {
+      CHECK_NEAR(field.at[k], mesh.at[k], 5e-4);
+    }
+    CHECK_NEAR(field.largest, mesh.largest, 0.05 * mesh.largest);
+  }
+}
+
+static double tile_heights[16];
+
+static void tile_read(double first)
+{
+  for (int i = 0; i < 16; ++i) {
+    tile_heights[i] = i == 0 ? first : 0.01 * (i % 3);
+  }
+}
+
+/* A ball that lies in a field which ODE repeats for ever, or which has no pose of its own: its y is
+ * up then. */
+static void ball_rests(bool placeable, bool wraps, const double at[3])
+{
+  contact_world *w = cw_new(0.0);
+  dHeightfieldDataID data = dGeomHeightfieldDataCreate();
+  tile_read(0.0);
+  dGeomHeightfieldDataBuildDouble(data, tile_heights, 0, 0.3, 0.3, 4, 4, 1.0, 0.0, 1.0, wraps);
+  dCreateHeightfield(w->space, data, placeable);
+  dWorldSetGravity(w->world, 0.0, -CW_GRAVITY, 0.0);
+  cw_add_ball(w, 0.5, 0.03, at[0], at[1], at[2]);
+  REQUIRE(cw_start(w, at[0], at[1] + 0.05, at[2]));
+  double least = HUGE_VAL;
+  cw_run(w, 20);
+  hap_stats stats = cw_stats(w); /* it may roll away from the hand */
+  for (int i = 0; i < 600; ++i) {
+    cw_tick(w);
+    least = fmin(least, w->position[0][1]);
+  }
+  printf("# placeable %d wraps %d: lowest %.4f\n", placeable, wraps, least);
+  CHECK(stats.model.range_bodies == 1 && stats.model.measured_bodies == 0);
+  CHECK(least > 0.02 && least < 0.06);
+  cw_close(w);
+  dGeomHeightfieldDataDestroy(data);
+}
+
+TEST(a_field_may_have_no_pose_and_no_end)
+{
+  const double inside[3] = {0.02, 0.045, 0.03};
+  const double outside[3] = {0.73, 0.045, -0.51};
+  ball_rests(false, false, inside);
+  ball_rests(true, false, inside);
+  ball_rests(false, true, outside);
+  ball_rests(true, true, outside);
+}
+
+static double lift_height;
+
+static dReal lift_at(void *user, int x, int z)
+{
+  (void)user;
+  return x == 3 && z == 3 ? lift_height : 0.0;
+}
+
+/* The ground grows under a ball. */
+TEST(a_field_may_change)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  dHeightfieldDataID data = dGeomHeightfieldDataCreate();
+  dMatrix3 upright;
+  lift_height = 0.0;
+  dGeomHeightfieldDataBuildCallback(data, NULL, lift_at, 0.6, 0.6, 7, 7, 1.0, 0.0, 0.5, 0);
+  dGeomID geom = dCreateHeightfield(w->space, data, 1); /* no bounds are said */
+  dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * M_PI);
+  dGeomSetRotation(geom, upright);
+  cw_add_ball(w, 0.5, 0.03, 0.0, 0.0, 0.0299);
+  REQUIRE(cw_start(w, 0.0, 0.0, 0.09));
+  for (int i = 0; i < 500; ++i) {
+    lift_height = 2e-5 * i;
+    cw_tick(w);
+  }
+  cw_run(w, 100);
+  hap_stats stats = cw_stats(w);
+  printf("# lifted to %.5f\n", w->position[0][2]);
+  CHECK(stats.model.range_bodies == 1);
+  CHECK_NEAR(w->position[0][2], 0.03 + lift_height, 3e-3);
+  cw_close(w);
+  dGeomHeightfieldDataDestroy(data);
+}

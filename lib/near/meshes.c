@@ -137,7 +137,7 @@ static const hapi_mesh *find_mesh(hapi_meshes *meshes, dGeomID geom, uint64_t wa
   return &meshes->meshes[meshes->count++];
 }
 
-/* An edge is 3 x triangle + its number. Corners that two triangles share have the same bits. */
+/* An edge is 3 x triangle + its number. */
 
 static const double *edge_corner(const hapi_meshes *meshes, uint32_t edge, uint32_t which)
 {
@@ -198,6 +198,17 @@ static void meet_edge(hapi_meshes *meshes, uint32_t edge)
   meshes->places[at] = edge + 1;
 }
 
+void hapi_meshes_join(hapi_meshes *meshes, uint32_t count)
+{
+  memset(meshes->places, 0, sizeof meshes->places);
+  for (uint32_t i = 0; i < count; ++i) {
+    meshes->found[i].open_edges = 15;
+  }
+  for (uint32_t edge = 0; edge < 3 * count; ++edge) {
+    meet_edge(meshes, edge);
+  }
+}
+
 static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
                              hapi_meshes *meshes, uint32_t found)
 {
@@ -243,13 +254,7 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
   if (found == FOUND_MAX) {
     return found; /* too many: the caller leaves them to ODE */
   }
-  memset(meshes->places, 0, sizeof meshes->places);
-  for (uint32_t i = 0; i < found; ++i) {
-    meshes->found[i].open_edges = 15;
-  }
-  for (uint32_t edge = 0; edge < 3 * found; ++edge) {
-    meet_edge(meshes, edge);
-  }
+  hapi_meshes_join(meshes, found);
   dQuaternion quat;
   dGeomGetQuaternion(geom, quat);
   for (uint32_t i = 0; i < found; ++i) {

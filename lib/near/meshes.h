@@ -17,6 +17,9 @@ typedef struct hapi_nearby hapi_nearby;
 #define HAPI_EDGE_PLACES 8192u    /* of the edges of HAPI_NEAR_TRIANGLES, a power of 2 */
 #define HAPI_NEAR_TRIANGLES 1024u /* of a mesh, near one geom; with more ODE itself collides it */
 
+/* Of cells with two triangles each, whichever way they lie. */
+#define HAPI_FIELD_CORNERS (HAPI_NEAR_TRIANGLES + 2u)
+
 typedef struct hapi_mesh {
   dGeomID geom;
   dTriMeshDataID data;
@@ -37,13 +40,18 @@ typedef struct hapi_meshes {
   uint32_t count;
   uint32_t capacity;
   hapi_near_triangle found[HAPI_NEAR_TRIANGLES];
-  uint32_t places[HAPI_EDGE_PLACES]; /* of their edges, + 1; open addressing */
+  uint32_t places[HAPI_EDGE_PLACES];  /* of their edges, + 1; open addressing */
+  double heights[HAPI_FIELD_CORNERS]; /* of a heightfield's cells; scratch */
+  bool said_unknown;                  /* of a heightfield's cells, once a session */
 } hapi_meshes;
 
 /* Triangles of a static mesh that meet a box of the world, into near.meshes.found. walk: the
  * number of the model that they are for; HAPI_NEAR_TRIANGLES: there may be more, or there is no
  * memory for them, and they are not to be used. */
 uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], uint64_t walk);
+/* Finds the edges of the first count of them that can be touched. Corners that two triangles share
+ * have the same bits. */
+void hapi_meshes_join(hapi_meshes *meshes, uint32_t count);
 /* Nearest points of a ball (a), outside of the surface, and the first count of them (b), which have
  * two sides. False: there are none. */
 bool hapi_triangles_nearest(const hapi_meshes *meshes, uint32_t count, const double center[3],

@@ -222,7 +222,7 @@ static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *tria
 /* The triangles of static ground near a geom, each as a geom of its own. */
 static void add_mesh(hapi_nearby *nearby, const hapi_link *link)
 {
-  uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
+  uint32_t count = hapi_triangles_near(nearby, link->other, link->box, nearby->range.number);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     const hapi_near_triangle *triangle = &nearby->meshes.found[i];
     uint32_t geom = add_triangle(nearby, triangle);
@@ -339,6 +339,7 @@ static bool geom_is_known(dGeomID geom)
     case dConvexClass:
       return true;
     case dTriMeshClass:
+    case dHeightfieldClass:
       return dGeomGetBody(geom) == NULL;
     default:
       return false;
@@ -517,12 +518,12 @@ static bool can_be_owned(hapi_nearby *nearby, const hapi_known_body *known, rang
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
-    if (dGeomGetClass(link->other) != dTriMeshClass) {
+    if (!hapi_geom_has_triangles(link->other)) {
       need_geom(nearby, link->other, io);
       ++io->pairs;
       continue;
     }
-    uint32_t count = hapi_mesh_near(nearby, link->other, link->box, nearby->range.number);
+    uint32_t count = hapi_triangles_near(nearby, link->other, link->box, nearby->range.number);
     bool all = count < HAPI_NEAR_TRIANGLES;
     io->geoms += count;
     io->points += 3 * count;
@@ -556,7 +557,7 @@ static void take_links(hapi_nearby *nearby)
     if (body != NULL) {
       nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
     }
-    if (dGeomGetClass(link->other) == dTriMeshClass) {
+    if (hapi_geom_has_triangles(link->other)) {
       add_mesh(nearby, link);
     } else {
       add_pair(nearby, link, take_geom(nearby, link->other), 0);

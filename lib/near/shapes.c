@@ -111,6 +111,7 @@ static bool nearest_by_collider(hapi_nearby *nearby, dGeomID geom, const double 
 
 #define FIELD_STEPS 8    /* triangles that are walked over */
 #define FIELD_FLUSH 1e-9 /* m: on the triangle's plane */
+#define FIELD_FAR 1e4    /* m */
 #define FIELD_EDGE 1e-6  /* m: beside an edge, to see which triangle is there */
 
 /* A triangle of the surface, under a place. */
@@ -124,14 +125,16 @@ static bool field_below(const hapi_nearby *nearby, dGeomID geom, const double pl
 {
   dContactGeom contact;
   dReal box[6];
-  const dReal *turn = dGeomGetRotation(geom);
-  const double up[3] = {turn[1], turn[5], turn[9]}; /* the field's y */
+  dVector3 up; /* the field's y */
+  dVector3 middle;
   double from[3];
   double apart[3];
+  dGeomVectorToWorld(geom, 0.0, 1.0, 0.0, up); /* also of one that has no pose */
+  dGeomGetRelPointPos(geom, 0.0, 0.0, 0.0, middle);
   dGeomGetAABB(geom, box);
   hapi_v3_set(apart, box[1] - box[0], box[3] - box[2], box[5] - box[4]);
-  double far = hapi_v3_norm(apart);
-  hapi_v3_sub(place, dGeomGetPosition(geom), apart);
+  double far = hapi_min(hapi_v3_norm(apart), FIELD_FAR); /* one that goes on for ever */
+  hapi_v3_sub(place, middle, apart);
   far += hapi_v3_norm(apart);
   hapi_v3_madd(place, far, up, from);
   dGeomRaySetLength(nearby->neighbors.ray_geom, 2.0 * far);
