@@ -7,10 +7,7 @@
  * tick is read from the trace: where the traced bodies are, how fast they move, what the hand gave.
  * Public API only. Include after tap.h. */
 
-#include <hapode/hapode.h>
-#include <hapode/ode.h>
-
-#include "tools/session_defs.h"
+#include "tests/ode_world.h"
 
 #define CW_BODIES_MAX 128
 #define CW_TRACED_MAX HAP_TRACE_BODIES_MAX
@@ -117,13 +114,8 @@ static inline void cw_after_step(void *user, double step_s)
 static inline void cw_open(contact_world *w, double gravity)
 {
   memset(w, 0, sizeof *w);
-  w->world = dWorldCreate();
-  w->space = dHashSpaceCreate(NULL);
-  dWorldSetGravity(w->world, 0.0, 0.0, -gravity);
-  dWorldSetCFM(w->world, 1e-12);
-  dWorldSetERP(w->world, 0.2);
-  dWorldSetContactSurfaceLayer(w->world, 1e-4);
-  dWorldSetQuickStepNumIterations(w->world, 100);
+  ode_world_make(gravity, &w->world, &w->space);
+  ode_world_stiffen(w->world, 100);
   w->surface = (dSurfaceParameters){.mode = dContactApprox1, .mu = 0.5};
   session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
@@ -144,12 +136,7 @@ static inline void cw_open(contact_world *w, double gravity)
 
 static inline void cw_close(contact_world *w)
 {
-  if (w->world == NULL) { /* closed already */
-    return;
-  }
-  hap_session_destroy(w->session);
-  dSpaceDestroy(w->space);
-  dWorldDestroy(w->world);
+  ode_world_end(w->session, w->world, w->space);
   memset(w, 0, sizeof *w);
 }
 
@@ -169,42 +156,25 @@ static inline contact_world *cw_new(double gravity)
 static inline dBodyID cw_add(contact_world *w, dGeomID geom, const dMass *mass, double x, double y,
                              double z)
 {
-  dBodyID body = dBodyCreate(w->world);
-  dBodySetMass(body, mass);
-  dBodySetPosition(body, x, y, z);
-  if (geom != NULL) {
-    dGeomSetBody(geom, body);
-  }
-  w->bodies[w->body_count++] = body;
-  return body;
+  return w->bodies[w->body_count++] = ode_body(w->world, geom, mass, AT(x, y, z));
 }
 
 static inline dBodyID cw_add_box(contact_world *w, double mass, const double edges[3], double x,
                                  double y, double z)
 {
-  dMass m;
-  dGeomID geom = dCreateBox(w->space, edges[0], edges[1], edges[2]);
-  dMassSetBoxTotal(&m, mass, edges[0], edges[1], edges[2]);
-  dBodyID body = dBodyCreate(w->world);
-  dBodySetMass(body, &m);
-  dBodySetPosition(body, x, y, z);
-  dGeomSetBody(geom, body);
-  w->bodies[w->body_count++] = body;
-  return body;
+  return w->bodies[w->body_count++] = ode_box(w->world, w->space, mass, edges, AT(x, y, z));
 }
 
 static inline dBodyID cw_add_cube(contact_world *w, double mass, double edge, double x, double y,
                                   double z)
 {
-  return cw_add_box(w, mass, (const double[3]){edge, edge, edge}, x, y, z);
+  return cw_add_box(w, mass, AT(edge, edge, edge), x, y, z);
 }
 
 static inline dBodyID cw_add_ball(contact_world *w, double mass, double radius, double x, double y,
                                   double z)
 {
-  dMass m;
-  dMassSetSphereTotal(&m, mass, radius);
-  return cw_add(w, dCreateSphere(w->space, radius), &m, x, y, z);
+  return w->bodies[w->body_count++] = ode_ball(w->world, w->space, mass, radius, AT(x, y, z));
 }
 
 static inline dGeomID cw_add_floor(contact_world *w)
@@ -222,52 +192,35 @@ static inline void cw_put_hand(contact_world *w, double vx, double vy, double vz
 
 static inline hap_stats cw_stats(const contact_world *w)
 {
-  hap_stats stats;
-  memset(&stats, 0, sizeof stats);
-  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
-  return stats;
+  return session_stats(w->session);
 }
 
 /* Session and hand, started. The first 16 bodies are traced. */
-static inline bool cw_start(contact_world *w, double x, double y, double z)
+static inline void cw_start(contact_world *w, double x, double y, double z)
 {
-  hap_detail detail = {""};
+  size_t traced = w->body_count < CW_TRACED_MAX ? (size_t)w->body_count : CW_TRACED_MAX;
   w->ode.world = w->world;
   w->ode.space = w->space;
   w->ode.user = w;
   w->seen.range_min = UINT32_MAX;
-  if (hap_session_create(&w->def, &w->ode, &w->session, &detail) < HAP_OK) {
-    printf("# %s\n", detail.text);
-    return false;
-  }
-  size_t traced = w->body_count < CW_TRACED_MAX ? (size_t)w->body_count : CW_TRACED_MAX;
-  w->hand_at[0] = x;
-  w->hand_at[1] = y;
-  w->hand_at[2] = z;
+  w->session = session_make(&w->def, &w->ode);
+  memcpy(w->hand_at, AT(x, y, z), sizeof w->hand_at);
   for (size_t i = 0; i < traced; ++i) {
     memcpy(w->position[i], dBodyGetPosition(w->bodies[i]), 3 * sizeof(double));
   }
-  bool good = hap_session_trace_bodies(w->session, w->bodies, traced) == HAP_OK &&
-              hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK;
-  if (good) {
-    cw_put_hand(w, 0.0, 0.0, 0.0);
-    good = hap_session_start(w->session) == HAP_OK;
-  }
-  if (!good && hap_session_detail(w->session, &detail) == HAP_OK) {
-    printf("# %s\n", detail.text);
-  }
-  return good;
+  REQUIRE(hap_session_trace_bodies(w->session, w->bodies, traced) == HAP_OK);
+  REQUIRE(hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK);
+  cw_put_hand(w, 0.0, 0.0, 0.0);
+  session_run(w->session);
 }
 
 /* As cw_start, with a hand that goes with the first body at this distance from its centre. */
-static inline bool cw_start_following(contact_world *w, double dx, double dy, double dz)
+static inline void cw_start_following(contact_world *w, double dx, double dy, double dz)
 {
   const dReal *p = dBodyGetPosition(w->bodies[0]);
   w->follow.on = true;
-  w->follow.offset[0] = dx;
-  w->follow.offset[1] = dy;
-  w->follow.offset[2] = dz;
-  return cw_start(w, p[0] + dx, p[1] + dy, p[2] + dz);
+  memcpy(w->follow.offset, AT(dx, dy, dz), sizeof w->follow.offset);
+  cw_start(w, p[0] + dx, p[1] + dy, p[2] + dz);
 }
 
 static inline void cw_read(contact_world *w)
@@ -323,9 +276,7 @@ static inline void cw_run(contact_world *w, int ticks)
 
 static inline void cw_move_hand(contact_world *w, double vx, double vy, double vz)
 {
-  w->hand_velocity[0] = vx;
-  w->hand_velocity[1] = vy;
-  w->hand_velocity[2] = vz;
+  memcpy(w->hand_velocity, AT(vx, vy, vz), sizeof w->hand_velocity);
 }
 
 /* Moves the hand at a velocity for some ticks. */

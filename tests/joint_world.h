@@ -67,8 +67,6 @@ static inline dJointID add_slider(mechanism *m, dBodyID a, dBodyID b, const doub
   return joint;
 }
 
-#define AT(x, y, z) ((const double[3]){(x), (y), (z)})
-
 /* ---- runs ---- */
 
 static inline void open_mechanism(mechanism *m, build_fn build, double gravity)
@@ -80,9 +78,9 @@ static inline void open_mechanism(mechanism *m, build_fn build, double gravity)
   build(m);
 }
 
-static inline bool start_mechanism(mechanism *m)
+static inline void start_mechanism(mechanism *m)
 {
-  return cw_start_following(&m->w, 0.0, 0.0, BALL + m->w.hand_def.radius + NEAR);
+  cw_start_following(&m->w, 0.0, 0.0, BALL + m->w.hand_def.radius + NEAR);
 }
 
 static inline void mechanism_owned(void *owned)
@@ -98,17 +96,18 @@ static inline mechanism *mechanism_new(build_fn build, double gravity)
   return m;
 }
 
-/* The same, started; NULL when not. */
+/* The same, started. */
 static inline mechanism *mechanism_running(build_fn build, double gravity)
 {
   mechanism *m = mechanism_new(build, gravity);
-  return start_mechanism(m) ? m : NULL;
+  start_mechanism(m);
+  return m;
 }
 
-static inline bool mechanism_begin(mechanism *m, build_fn build, double gravity)
+static inline void mechanism_begin(mechanism *m, build_fn build, double gravity)
 {
   open_mechanism(m, build, gravity);
-  return start_mechanism(m);
+  start_mechanism(m);
 }
 
 /* Both anchors of a joint, as ODE has them; false: the joint has none. */

@@ -6,13 +6,10 @@
 /* A small ODE world with a lockstep session over it, for the tests of lib/physics. Pointers have no
  * device: a test puts them where it wants them. Include after tap.h. */
 
-#include <hapode/hapode.h>
-#include <hapode/ode.h>
-
 #include "base/vec.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
-#include "tools/session_defs.h"
+#include "tests/ode_world.h"
 
 #define WORLD_BODIES_MAX 64
 #define WORLD_POINTERS_MAX 4
@@ -34,18 +31,13 @@ typedef struct test_world {
   int surface_calls;
 } test_world;
 
-/* A step H of 20 Hz, contacts without compliance, a layer in which they rest without push. */
+/* A step H of 20 Hz. */
 static inline void world_open(test_world *w, double gravity, int iterations)
 {
   memset(w, 0, sizeof *w);
-  w->world = dWorldCreate();
-  w->space = dHashSpaceCreate(NULL);
+  ode_world_make(gravity, &w->world, &w->space);
+  ode_world_stiffen(w->world, iterations);
   w->mu = 0.5;
-  dWorldSetGravity(w->world, 0.0, 0.0, -gravity);
-  dWorldSetCFM(w->world, 1e-12);
-  dWorldSetERP(w->world, 0.2);
-  dWorldSetContactSurfaceLayer(w->world, 1e-4);
-  dWorldSetQuickStepNumIterations(w->world, iterations);
   session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
   w->def.model = HAP_MODEL_ACCELERANCE;
@@ -55,12 +47,7 @@ static inline void world_open(test_world *w, double gravity, int iterations)
 
 static inline void world_close(test_world *w)
 {
-  if (w->world == NULL) { /* closed already */
-    return;
-  }
-  hap_session_destroy(w->session);
-  dSpaceDestroy(w->space);
-  dWorldDestroy(w->world);
+  ode_world_end(w->session, w->world, w->space);
   memset(w, 0, sizeof *w);
 }
 
@@ -80,36 +67,25 @@ static inline test_world *world_new(double gravity, int iterations)
 static inline dBodyID world_add(test_world *w, dGeomID geom, const dMass *mass, double x, double y,
                                 double z)
 {
-  dBodyID body = dBodyCreate(w->world);
-  dBodySetMass(body, mass);
-  dBodySetPosition(body, x, y, z);
-  if (geom != NULL) {
-    dGeomSetBody(geom, body);
-  }
-  w->bodies[w->body_count++] = body;
-  return body;
+  return w->bodies[w->body_count++] = ode_body(w->world, geom, mass, AT(x, y, z));
 }
 
 static inline dBodyID world_add_box(test_world *w, const double edges[3], double mass, double x,
                                     double y, double z)
 {
-  dMass m;
-  dMassSetBoxTotal(&m, mass, edges[0], edges[1], edges[2]);
-  return world_add(w, dCreateBox(w->space, edges[0], edges[1], edges[2]), &m, x, y, z);
+  return w->bodies[w->body_count++] = ode_box(w->world, w->space, mass, edges, AT(x, y, z));
 }
 
 static inline dBodyID world_add_cube(test_world *w, double edge, double mass, double x, double y,
                                      double z)
 {
-  return world_add_box(w, (const double[3]){edge, edge, edge}, mass, x, y, z);
+  return world_add_box(w, AT(edge, edge, edge), mass, x, y, z);
 }
 
 static inline dBodyID world_add_sphere(test_world *w, double radius, double mass, double x,
                                        double y, double z)
 {
-  dMass m;
-  dMassSetSphereTotal(&m, mass, radius);
-  return world_add(w, dCreateSphere(w->space, radius), &m, x, y, z);
+  return w->bodies[w->body_count++] = ode_ball(w->world, w->space, mass, radius, AT(x, y, z));
 }
 
 static inline bool world_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -122,9 +98,8 @@ static inline bool world_surface(void *user, dGeomID a, dGeomID b, dSurfaceParam
   return true;
 }
 
-static inline hap_status world_create_session(test_world *w, hap_surface_fn surface)
+static inline void world_create_session(test_world *w, hap_surface_fn surface)
 {
-  hap_detail detail = {""};
   hap_ode_def ode;
   if (w->def.model == HAP_MODEL_ACCELERANCE) { /* also of free bodies: it is what is looked at */
     expert_wish(&w->expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
@@ -136,11 +111,7 @@ static inline hap_status world_create_session(test_world *w, hap_surface_fn surf
   ode.before_step = w->before_step;
   ode.after_step = w->after_step;
   ode.user = w;
-  hap_status status = hap_session_create(&w->def, &ode, &w->session, &detail);
-  if (status < HAP_OK) {
-    printf("# %s\n", detail.text);
-  }
-  return status;
+  w->session = session_make(&w->def, &ode);
 }
 
 static inline void world_move_pointer(test_world *w, int index, const double at[3],
@@ -161,17 +132,15 @@ static inline void world_add_pointer(test_world *w, double radius, double x, dou
   def.radius = radius;
   int index = w->pointer_count++;
   CHECK(hap_pointer_add(w->session, &def, &w->pointers[index]) == HAP_OK);
-  world_move_pointer(w, index, (const double[3]){x, y, z}, NULL);
+  world_move_pointer(w, index, AT(x, y, z), NULL);
 }
 
 /* A session with one pointer, started: the first local model is built. */
-static inline bool world_start(test_world *w, double radius, double x, double y, double z)
+static inline void world_start(test_world *w, double radius, double x, double y, double z)
 {
-  if (world_create_session(w, NULL) < HAP_OK) {
-    return false;
-  }
+  world_create_session(w, NULL);
   world_add_pointer(w, radius, x, y, z);
-  return hap_session_start(w->session) == HAP_OK;
+  session_run(w->session);
 }
 
 static inline hapi_physics *world_physics(const test_world *w)
@@ -188,10 +157,7 @@ static inline void world_step(test_world *w, int steps)
 
 static inline hap_stats world_stats(const test_world *w)
 {
-  hap_stats stats;
-  memset(&stats, 0, sizeof stats);
-  CHECK(hap_session_stats(w->session, &stats, sizeof stats) == HAP_OK);
-  return stats;
+  return session_stats(w->session);
 }
 
 /* The live contact of a body (NULL: the static world) and a pointer; NULL: there is none. */
@@ -260,54 +226,6 @@ static inline const hapi_slot_account *world_account(const test_world *w, dBodyI
   return slot != NULL
              ? hapi_account_of(&physics->account, (uint32_t)(slot - physics->near.slots.bodies))
              : NULL;
-}
-
-/* Everything about a body that a getter of ODE gives and a step can change. */
-typedef struct body_bits {
-  dReal position[3];
-  dReal quat[4];
-  dReal rotation[12];
-  dReal linear[3];
-  dReal angular[3];
-  dReal force[3];
-  dReal torque[3];
-  dReal finite_axis[3];
-  dReal thresholds[2];
-  dReal idle_time;
-  int idle_steps;
-  int samples;
-  int automatic;
-  int finite_mode;
-  int enabled;
-  int kinematic;
-  int gyroscopic;
-  int joints;
-} body_bits;
-
-static inline void body_read(dBodyID body, body_bits *out)
-{
-  dVector3 axis;
-  memset(out, 0, sizeof *out);
-  memcpy(out->position, dBodyGetPosition(body), sizeof out->position);
-  memcpy(out->quat, dBodyGetQuaternion(body), sizeof out->quat);
-  memcpy(out->rotation, dBodyGetRotation(body), sizeof out->rotation);
-  memcpy(out->linear, dBodyGetLinearVel(body), sizeof out->linear);
-  memcpy(out->angular, dBodyGetAngularVel(body), sizeof out->angular);
-  memcpy(out->force, dBodyGetForce(body), sizeof out->force);
-  memcpy(out->torque, dBodyGetTorque(body), sizeof out->torque);
-  dBodyGetFiniteRotationAxis(body, axis);
-  memcpy(out->finite_axis, axis, sizeof out->finite_axis);
-  out->thresholds[0] = dBodyGetAutoDisableLinearThreshold(body);
-  out->thresholds[1] = dBodyGetAutoDisableAngularThreshold(body);
-  out->idle_time = dBodyGetAutoDisableTime(body);
-  out->idle_steps = dBodyGetAutoDisableSteps(body);
-  out->samples = dBodyGetAutoDisableAverageSamplesCount(body);
-  out->automatic = dBodyGetAutoDisableFlag(body);
-  out->finite_mode = dBodyGetFiniteRotationMode(body);
-  out->enabled = dBodyIsEnabled(body);
-  out->kinematic = dBodyIsKinematic(body);
-  out->gyroscopic = dBodyGetGyroscopicMode(body);
-  out->joints = dBodyGetNumJoints(body);
 }
 
 #endif

@@ -7,12 +7,10 @@
 
 #include <stdatomic.h>
 
-#include <hapode/hapode.h>
-#include <hapode/ode.h>
-
 #include "base/clock.h"
 #include "tests/tap.h"
-#include "tools/session_defs.h"
+
+#include "tests/ode_world.h"
 
 #define MS 1000000LL
 
@@ -36,15 +34,9 @@ typedef struct stage {
 
 static inline dBodyID add_cube(stage *s, double x, dGeomID *out_geom)
 {
-  dMass mass;
-  dBodyID body = dBodyCreate(s->world);
-  dGeomID geom = dCreateBox(s->space, 0.1, 0.1, 0.1);
-  dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
-  dBodySetMass(body, &mass);
-  dGeomSetBody(geom, body);
-  dBodySetPosition(body, x, 0.0, 0.0);
+  dBodyID body = ode_box(s->world, s->space, 1.0, AT(0.1, 0.1, 0.1), AT(x, 0.0, 0.0));
   if (out_geom != NULL) {
-    *out_geom = geom;
+    *out_geom = dBodyGetFirstGeom(body);
   }
   return body;
 }
@@ -62,8 +54,7 @@ static inline void before_step(void *user, double step_s)
 static inline void stage_init(stage *s, hap_drive drive)
 {
   memset(s, 0, sizeof *s);
-  s->world = dWorldCreate();
-  s->space = dHashSpaceCreate(NULL);
+  ode_world_make(0.0, &s->world, &s->space);
   s->cube = add_cube(s, 0.0, &s->geom);
   session_defs_init(&s->def, &s->expert, &s->research);
   s->def.drive = drive;
@@ -81,21 +72,17 @@ static inline hap_status stage_create(stage *s)
   return hap_session_create(&s->def, &s->ode, &s->session, &s->detail);
 }
 
-/* Created and started; false when not. */
-static inline bool stage_run(stage *s, hap_drive drive)
+/* Created and started. */
+static inline void stage_run(stage *s, hap_drive drive)
 {
   stage_init(s, drive);
-  return stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK;
+  s->session = session_make(&s->def, &s->ode);
+  session_run(s->session);
 }
 
 static inline void stage_end(stage *s)
 {
-  if (s->world == NULL) { /* closed already */
-    return;
-  }
-  hap_session_destroy(s->session);
-  dSpaceDestroy(s->space);
-  dWorldDestroy(s->world);
+  ode_world_end(s->session, s->world, s->space);
   s->world = NULL;
 }
 
@@ -112,20 +99,17 @@ static inline stage *stage_new(hap_drive drive)
   return s;
 }
 
-/* Created and started; NULL when not. */
+/* Created and started. */
 static inline stage *stage_running(hap_drive drive)
 {
-  stage *s = stage_new(drive);
-  bool runs = stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK;
-  return runs ? s : NULL;
+  stage *s = tap_own(sizeof *s, stage_end_owned);
+  stage_run(s, drive);
+  return s;
 }
 
 static inline hap_stats stats_of(const stage *s)
 {
-  hap_stats stats;
-  memset(&stats, 0, sizeof stats);
-  CHECK(hap_session_stats(s->session, &stats, sizeof stats) == HAP_OK);
-  return stats;
+  return session_stats(s->session);
 }
 
 static inline const char *detail_of(stage *s)

@@ -4,7 +4,7 @@
 #define HAPODE_TESTS_TAP_H
 
 /* Test Anything Protocol, version 13. A test is one test point. CHECK* note a failure and go on,
- * REQUIRE leaves the test.
+ * REQUIRE and SKIP leave the test, from any function that the test calls in its own thread.
  *
  *   TEST(name) { CHECK_NEAR(a, b, 1e-9); }
  *
@@ -36,6 +36,8 @@ void tap_check_near(double a, double b, double tolerance, const char *file, int 
                     const char *what);
 void tap_say(const char *format, ...) HAP_PRINTF(1, 2);
 void tap_skip(const char *format, ...) HAP_PRINTF(1, 2);
+/* Leaves the running test; what it owns is finished. */
+_Noreturn void tap_leave(void);
 /* Both return false. */
 bool tap_skip_all(const char *reason);
 bool tap_bail_out(const char *reason);
@@ -67,6 +69,14 @@ static inline void tap_check(bool good, const char *file, int line, const char *
 #define RUN(name) tap_run(test_##name, #name)
 #define CHECK(condition) tap_check((condition), __FILE__, __LINE__, #condition)
 /* With a comment when it fails. */
+#define REQUIRE_SAY(condition, ...)                      \
+  do {                                                   \
+    if (!(condition)) {                                  \
+      tap_note(__FILE__, __LINE__, "needs " #condition); \
+      tap_say(__VA_ARGS__);                              \
+      tap_leave();                                       \
+    }                                                    \
+  } while (0)
 #define CHECK_SAY(condition, ...)               \
   do {                                          \
     if (!(condition)) {                         \
@@ -80,13 +90,13 @@ static inline void tap_check(bool good, const char *file, int line, const char *
   do {                                                   \
     if (!(condition)) {                                  \
       tap_note(__FILE__, __LINE__, "needs " #condition); \
-      return;                                            \
+      tap_leave();                                       \
     }                                                    \
   } while (0)
 #define SKIP(...)          \
   do {                     \
     tap_skip(__VA_ARGS__); \
-    return;                \
+    tap_leave();           \
   } while (0)
 
 #endif

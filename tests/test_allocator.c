@@ -130,7 +130,6 @@ TEST(without_memory_for_probes_the_force_is_still_felt)
   hap_pointer_id id;
   hap_pointer_def def;
   stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
-  REQUIRE(s != NULL);
   hap_pointer_def_init(&def, sizeof def);
   REQUIRE(hap_pointer_add(s->session, &def, &id) == HAP_OK);
   fail_from_now(1, 1);

@@ -37,10 +37,7 @@ static bounce body_drop(hap_model model, bool ball, double e, double threshold, 
   } else {
     cw_add_cube(w, 0.5, 0.06, 0.0, 0.0, 0.03 + height);
   }
-  if (!cw_start_following(w, 0.043, 0.0, 0.0)) {
-    CHECK(false);
-    return b;
-  }
+  cw_start_following(w, 0.043, 0.0, 0.0);
   bool down = true; /* the loop lets a body bounce before it touches: only its speed tells */
   for (int i = 0; i < 600; ++i) {
     cw_tick(w);
@@ -221,7 +218,7 @@ static void push_row(int count, int range, int probes)
   for (int i = 0; i < count; ++i) {
     cw_add_cube(w, 1.0, 0.05, 0.025 + 0.0501 * i, 0.0, 0.0);
   }
-  REQUIRE(cw_start(w, -0.011, 0.0, 0.0));
+  cw_start(w, -0.011, 0.0, 0.0);
   cw_move_hand(w, 0.1, 0.0, 0.0);
   for (int i = 0; i < 400; ++i) {
     cw_tick(w);
@@ -328,7 +325,7 @@ static void spin_box(double speed, double angle_bound)
   const double inertia[3] = {mass.I[0], mass.I[5], mass.I[10]};
   double before[3];
   double energy = spin_state(box, before);
-  REQUIRE(cw_start(w, 0.0, 0.0, 0.073));
+  cw_start(w, 0.0, 0.0, 0.073);
   double worst_l = 0.0;
   double worst_e = 0.0;
   for (int i = 0; i < 10; ++i) {
@@ -397,7 +394,7 @@ static void body_roll(int kind)
     }
     dBodySetRotation(w->bodies[0], rotation);
   }
-  REQUIRE(cw_start(w, -radius - 0.0105, 0.0, radius));
+  cw_start(w, -radius - 0.0105, 0.0, radius);
   cw_go(w, 0.2, 0.0, 0.0, 300);
   cw_go(w, 0.1, 0.0, 0.0, 51);
   double before = w->velocity[0][0];
@@ -431,9 +428,9 @@ static bool lay_box(contact_world *w)
   return true;
 }
 
-static bool start_over_box(contact_world *w)
+static void start_over_box(contact_world *w)
 {
-  return cw_start_following(w, 0.0, 0.0, 0.033);
+  cw_start_following(w, 0.0, 0.0, 0.033);
 }
 
 TEST(two_coefficients_along_a_given_direction)
@@ -446,7 +443,7 @@ TEST(two_coefficients_along_a_given_direction)
       w->direction[direction] = 2.0;
       lay_box(w);
       dBodySetLinearVel(w->bodies[0], axis == 0, axis == 1, 0.0);
-      REQUIRE(start_over_box(w));
+      start_over_box(w);
       cw_run(w, 60);
       double before = w->velocity[0][axis];
       cw_run(w, 150);
@@ -465,7 +462,7 @@ TEST(friction_without_approx_is_a_force)
   w->surface = (dSurfaceParameters){.mode = 0, .mu = 0.25};
   lay_box(w);
   dBodySetLinearVel(w->bodies[0], 1.0, 0.0, 0.0);
-  REQUIRE(start_over_box(w));
+  start_over_box(w);
   cw_run(w, 60);
   double before = w->velocity[0][0];
   cw_run(w, 400);
@@ -484,7 +481,7 @@ TEST(slip_is_a_speed_for_a_force)
     w->direction[0] = 1.0;
     lay_box(w);
     w->user.force[axis] = 2.0;
-    REQUIRE(start_over_box(w));
+    start_over_box(w);
     cw_run(w, 1000);
     CHECK_NEAR(w->velocity[0][axis] / ((axis == 0 ? 0.1 : 0.3) * 2.0 / 4.0), 1.0, 0.01);
     cw_close(w);
@@ -498,7 +495,7 @@ TEST(a_belt_carries_a_box_at_its_speed)
       .mode = dContactApprox1 | dContactFDir1 | dContactMotion1, .mu = 0.5, .motion1 = 0.2};
   w->direction[1] = 1.0;
   lay_box(w);
-  REQUIRE(start_over_box(w));
+  start_over_box(w);
   cw_run(w, 500);
   double contact = w->velocity[0][1];
   CHECK(w->seen.range_min == 1);
@@ -510,7 +507,7 @@ TEST(a_belt_carries_a_box_at_its_speed)
       .mode = dContactApprox1 | dContactFDir1 | dContactMotion1, .mu = 0.5, .motion1 = 0.2};
   w->direction[1] = 1.0;
   lay_box(w);
-  REQUIRE(start_over_box(w));
+  start_over_box(w);
   cw_run(w, 500);
   CHECK_NEAR(w->velocity[0][1], contact, 1e-3);
 }
@@ -534,7 +531,7 @@ TEST(a_soft_contact_sinks_by_its_spring)
       } else {
         cw_add_box(w, 1.0, (const double[3]){0.1, 0.1, 0.04}, 0.0, 0.0, half);
       }
-      REQUIRE(cw_start_following(w, 0.0, 0.0, half + 0.013));
+      cw_start_following(w, 0.0, 0.0, half + 0.013);
       cw_run(w, 1500);
       double k = 0.3 / (step * 2e-3) * (ball ? 1.0 : 4.0);
       double sink = half - w->position[0][2] - 1e-4;
@@ -551,7 +548,7 @@ TEST(the_surface_layer_is_not_pushed_out)
   dWorldSetContactSurfaceLayer(w->world, 1e-3);
   cw_add_floor(w);
   cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.03 - 3e-3);
-  REQUIRE(cw_start_following(w, 0.043, 0.0, 0.0));
+  cw_start_following(w, 0.043, 0.0, 0.0);
   cw_run(w, 1500);
   CHECK_NEAR(0.03 - w->position[0][2], 1e-3, 5e-5);
 }
@@ -563,7 +560,7 @@ TEST(the_correcting_velocity_has_its_limit)
   dWorldSetContactMaxCorrectingVel(w->world, 0.01);
   cw_add_floor(w);
   cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.03 - 3e-3);
-  REQUIRE(cw_start_following(w, 0.043, 0.0, 0.0));
+  cw_start_following(w, 0.043, 0.0, 0.0);
   for (int i = 0; i < 1500; ++i) {
     cw_tick(w);
     fastest = fmax(fastest, w->velocity[0][2]);
@@ -584,7 +581,7 @@ TEST(a_body_comes_out_of_the_ground_without_energy)
     } else {
       cw_add_cube(w, 1.0, 0.06, 0.0, 0.0, 0.025);
     }
-    REQUIRE(cw_start_following(w, 0.043, 0.0, 0.0));
+    cw_start_following(w, 0.043, 0.0, 0.0);
     for (int t = 0; t < 1000; ++t) {
       cw_tick(w);
       fastest = fmax(fastest, w->velocity[0][2]);
@@ -611,7 +608,7 @@ TEST(damping_is_meant_for_the_worlds_step)
     dBodySetAngularDamping(w->bodies[0], 0.02);
     dBodySetLinearVel(w->bodies[0], 0.3, 0.0, 0.0);
     dBodySetAngularVel(w->bodies[0], 0.0, 0.0, 5.0);
-    REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
+    cw_start_following(w, 0.0, 0.0, 0.043);
     cw_run(w, 1001);
     CHECK_NEAR(dBodyGetLinearVel(w->bodies[0])[0] / 0.3, pow(0.99, 20.0), 2e-3);
     CHECK_NEAR(dBodyGetAngularVel(w->bodies[0])[2] / 5.0, pow(0.98, 20.0), 3e-3);
@@ -627,7 +624,7 @@ TEST(user_forces_act_every_tick)
   cw_add_ball(w, 0.5, 0.03, 0.0, 0.0, 0.0);
   w->user.force[0] = 0.3;
   w->user.torque[1] = 1e-4;
-  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
+  cw_start_following(w, 0.0, 0.0, 0.043);
   cw_run(w, 60);
   double worst = 0.0;
   for (int i = 0; i < 500; ++i) {
@@ -652,7 +649,7 @@ TEST(a_body_without_gravity_stays)
   contact_world *w = cw_new(G);
   cw_add_ball(w, 0.5, 0.03, 0.0, 0.0, 0.1);
   dBodySetGravityMode(w->bodies[0], 0);
-  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.043));
+  cw_start_following(w, 0.0, 0.0, 0.043);
   cw_run(w, 500);
   CHECK(w->seen.range_min == 1);
   CHECK_NEAR(w->position[0][2], 0.1, 1e-12);
@@ -666,7 +663,7 @@ static void bounce_on_hand(double stiffness, double mass)
   w->hand_def.stiffness = stiffness;
   w->hand_def.damping = 0.0;
   cw_add_ball(w, mass, 0.01, 0.0, 0.0, 0.03);
-  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+  cw_start(w, 0.0, 0.0, 0.0);
   double most = 0.0;
   double first = mass * G * 0.01; /* above the touch */
   for (int i = 0; i < 2000; ++i) {
@@ -704,15 +701,12 @@ static double most_of_bounce(double stiffness)
     w->hand_def.damping = 0.0;
     cw_add_ball(w, 1e-3, 0.01, 0.0, 0.0, 0.03 + 2e-5 * phase);
     dBodySetLinearVel(w->bodies[0], 0.0, 0.0, -0.4);
-    if (cw_start(w, 0.0, 0.0, 0.0)) {
-      for (int i = 0; i < 200 && out < 0.01; ++i) {
-        cw_tick(w);
-        out = cw_norm(w->force) == 0.0 ? w->velocity[0][2] : out;
-      }
-      most = fmax(most, out / 0.4);
-    } else {
-      CHECK(false);
+    cw_start(w, 0.0, 0.0, 0.0);
+    for (int i = 0; i < 200 && out < 0.01; ++i) {
+      cw_tick(w);
+      out = cw_norm(w->force) == 0.0 ? w->velocity[0][2] : out;
     }
+    most = fmax(most, out / 0.4);
     cw_close(w);
   }
   return most;
@@ -736,7 +730,7 @@ static void cube_squeeze(double stiffness, double damping)
   w->hand_def.damping = damping;
   cw_add_floor(w);
   cw_add_cube(w, 1e-3, 0.02, 0.0, 0.0, 0.0099);
-  REQUIRE(cw_start(w, 0.001, 0.002, 0.031));
+  cw_start(w, 0.001, 0.002, 0.031);
   cw_run(w, 50);
   cw_go(w, 0.0, 0.0, -0.016, 100);
   cw_go(w, 0.0, 0.0, 0.0, 500);
@@ -772,7 +766,7 @@ TEST(a_moving_platform_carries_a_box)
   dBodyID platform = cw_add_box(w, 1.0, (const double[3]){0.6, 0.6, 0.1}, 0.0, 0.0, -0.05);
   dBodySetKinematic(platform);
   dBodySetLinearVel(platform, 0.1, 0.0, 0.0);
-  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.025 + 0.013));
+  cw_start_following(w, 0.0, 0.0, 0.025 + 0.013);
   cw_run(w, 1001);
   CHECK(w->seen.range_min == 1 && w->seen.range_max == 1);
   CHECK_NEAR(w->velocity[0][0], 0.1, 1e-4);
@@ -791,7 +785,7 @@ TEST(a_kinematic_wall_pushes_a_box_and_is_not_pushed)
   dBodyID wall = cw_add_box(w, 1.0, (const double[3]){0.02, 0.4, 0.4}, -0.08, 0.0, 0.21);
   dBodySetKinematic(wall);
   dBodySetLinearVel(wall, 0.1, 0.0, 0.0);
-  REQUIRE(cw_start_following(w, 0.0, 0.0, 0.063));
+  cw_start_following(w, 0.0, 0.0, 0.063);
   cw_run(w, 1001);
   CHECK_NEAR(w->velocity[0][0], 0.1, 1e-3);
   CHECK_NEAR(dBodyGetPosition(wall)[0], -0.08 + 0.1, 1e-9);
@@ -803,7 +797,7 @@ TEST(a_hand_does_not_move_a_kinematic_body)
   contact_world *w = cw_new(0.0);
   dBodyID body = cw_add_cube(w, 1.0, 0.1, 0.0, 0.0, 0.0);
   dBodySetKinematic(body);
-  REQUIRE(cw_start(w, -0.0605, 0.0, 0.0));
+  cw_start(w, -0.0605, 0.0, 0.0);
   cw_go(w, 0.01, 0.0, 0.0, 500);
   CHECK_NEAR(-w->force[0], 2000.0 * 4.5e-3 + 20.0 * 0.01, 0.05);
   CHECK(dBodyGetPosition(body)[0] == 0.0 && dBodyGetLinearVel(body)[0] == 0.0);

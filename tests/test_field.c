@@ -65,7 +65,7 @@ static void hand_press(height_of height, hap_model model, double x, double z, do
   w.hand_expert.coupling = HAP_COUPLING_DIRECT;
   cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
   dHeightfieldDataID data = add_field(&w, height);
-  REQUIRE(cw_start(&w, x, 0.013, z + 0.05));
+  cw_start(&w, x, 0.013, z + 0.05);
   cw_move_hand(&w, 0.0, 0.0, -0.05);
   cw_run(&w, 1000);
   cw_move_hand(&w, 0.0, 0.0, 0.0);

@@ -474,7 +474,7 @@ TEST(wrong_calls_say_so_and_change_nothing)
                                86401.0, 1e300};
   stage s;
   pthread_t thread;
-  REQUIRE(stage_run(&s, HAP_DRIVE_FRAME)); /* H = 20 ms */
+  stage_run(&s, HAP_DRIVE_FRAME); /* H = 20 ms */
   CHECK(hap_session_update(s.session, 0.015) == HAP_OK);
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
     CHECK(hap_session_update(s.session, bad[i]) == HAP_ERROR_ARGUMENT);
@@ -497,7 +497,7 @@ TEST(wrong_calls_say_so_and_change_nothing)
   stage_end(&s);
   static const hap_drive others[] = {HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP};
   for (int i = 0; i < 2; ++i) {
-    REQUIRE(stage_run(&s, others[i]));
+    stage_run(&s, others[i]);
     CHECK(hap_session_update(s.session, 0.02) == HAP_ERROR_STATE);
     CHECK(text_has(detail_of(&s), "FRAME"));
     stage_end(&s);

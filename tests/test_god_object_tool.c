@@ -44,7 +44,7 @@ TEST(in_the_air_a_god_object_tool_is_the_device_to_the_bit)
 {
   tool_world *w = tool_of(HAP_COUPLING_GOD_OBJECT);
   tool_add_floor(w);
-  CHECK(tool_start(w));
+  tool_start(w);
   for (int i = 0; i < 300; ++i) {
     tool_move(w, 0.05 * sin(0.03 * i), 0.0, 0.1 + 0.02 * cos(0.1 * i), 0.5 * sin(0.02 * i), 1);
     CHECK(memcmp(&w->state.proxy.position, &w->pose.position, sizeof w->pose.position) == 0);
@@ -62,7 +62,7 @@ TEST(a_tool_lies_on_the_floor)
     double deepest = 0.0;
     tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
     tool_run(w, 60);
     for (int k = 0; k < 200; ++k) {
@@ -92,7 +92,7 @@ TEST(a_tool_stands_on_its_edge_where_the_springs_agree)
   double deepest = 0.0;
   tool_world *w = tool_of(HAP_COUPLING_GOD_OBJECT);
   tool_add_floor(w);
-  CHECK(tool_start(w));
+  tool_start(w);
   tool_go(w, 0.0, 0.0, 0.03, 0.0);
   tool_run(w, 60);
   tool_move(w, 0.0, 0.0, 0.03, 0.6, 300);
@@ -126,7 +126,7 @@ TEST(a_tool_rests_in_a_corner)
     tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
     dCreatePlane(w->space, -1.0, 0.0, 0.0, -0.05);
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
     tool_run(w, 60);
     tool_move(w, 0.045, 0.0, HALF - 0.003, 0.0, 400);
@@ -146,7 +146,7 @@ TEST(friction_holds_a_tool_to_the_cone)
     tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
     tool_run(w, 60);
     tool_move(w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
@@ -184,7 +184,7 @@ TEST(friction_holds_a_tool_against_turning)
     tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
     tool_run(w, 60);
     tool_move(w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
@@ -222,7 +222,7 @@ TEST(a_tool_pushes_a_cube)
     dBodySetMass(body, &mass);
     dGeomSetBody(dCreateBox(w->space, 0.05, 0.05, 0.05), body);
     dBodySetPosition(body, 0.05, 0.0, 0.025);
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, 0.012, 0.0);
     tool_run(w, 60);
     tool_move(w, 0.1, 0.0, 0.012, 0.0, 1000);
@@ -242,7 +242,7 @@ TEST(the_virtual_tool_is_felt_as_its_inertia)
     w->tool_research.virtual_mass = 0.2;
     w->tool_research.virtual_inertia = given[i];
     w->tool_expert.coupling_damping = 30.0;
-    CHECK(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, 0.5, 0.0);
     tool_run(w, 60);
     double speed = 0.0;

@@ -121,7 +121,7 @@ static void check_shape(shape kind, bool turned)
     hapi_quat_rotate(dBodyGetQuaternion(body), e.normal, e.normal);
   }
   printf("# %s%s\n", shape_names[kind], turned ? ", turned" : "");
-  CHECK(world_start(w, RADIUS, at[0], at[1], at[2]));
+  world_start(w, RADIUS, at[0], at[1], at[2]);
   check_contact(w, body, &e);
   CHECK(world_count_contacts(w) == 1);
   const hapi_contact_slot *contact = world_contact(w, body, 0);
@@ -151,7 +151,7 @@ TEST(edges_of_convex_and_trimesh)
     test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
     dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
-    CHECK(world_start(w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart));
+    world_start(w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart);
     check_contact(w, body, &e);
     world_close(w);
     dGeomTriMeshDataDestroy(mesh);
@@ -166,7 +166,7 @@ TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
     test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
     dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
-    CHECK(world_start(w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002));
+    world_start(w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002);
     const hapi_contact_slot *contact = world_contact(w, body, 0);
     REQUIRE(contact != NULL);
     for (int i = 0; i < 3; ++i) {
@@ -185,7 +185,7 @@ TEST(planes_are_found)
   test_world *w = world_new(0.0, 20);
   dCreatePlane(w->space, n[0], n[1], n[2], 0.25);
   double out = 0.25 + RADIUS + 0.003;
-  REQUIRE(world_start(w, RADIUS, n[0] * out, 7.0, n[2] * out));
+  world_start(w, RADIUS, n[0] * out, 7.0, n[2] * out);
   check_contact(w, NULL, &e);
   CHECK(world_stats(w).model.neighbours == 0); /* static ones are contacts, not neighbours */
 }
@@ -202,7 +202,7 @@ TEST(geom_offsets_and_several_geoms_of_a_body)
   dGeomSetBody(ball, body);
   dGeomSetOffsetPosition(ball, 0.3, 0.0, 0.1);
   dBodySetQuaternion(body, (const dQuaternion){sqrt(0.5), 0, 0, sqrt(0.5)}); /* x to y */
-  REQUIRE(world_start(w, RADIUS, 1.0, 2.3, 3.1 + 0.02 + RADIUS + 0.002));
+  world_start(w, RADIUS, 1.0, 2.3, 3.1 + 0.02 + RADIUS + 0.002);
   CHECK(world_count_contacts(w) == 1);
   check_contact(w, body, &e);
 }
@@ -217,7 +217,7 @@ TEST(a_body_is_touched_at_two_geoms)
   dGeomID ball = dCreateSphere(w->space, 0.02);
   dGeomSetBody(ball, body);
   dGeomSetOffsetPosition(ball, 0.04, 0, 0.01 + RADIUS + 0.002);
-  REQUIRE(world_start(w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002));
+  world_start(w, RADIUS, 0, 0, 0.01 + RADIUS + 0.002);
   CHECK(world_count_contacts(w) == 2);
   CHECK(hapi_neighbors_bodies(&world_physics(w)->near) == 1);
   hapi_physics *physics = world_physics(w);
@@ -252,7 +252,7 @@ TEST(nested_spaces_are_searched)
   dGeomID geom = dBodyGetFirstGeom(cube);
   dSpaceRemove(w->space, geom);
   dSpaceAdd(inmost, geom);
-  REQUIRE(world_start(w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002));
+  world_start(w, RADIUS, 0, 0, 0.025 + RADIUS + 0.002);
   check_contact(w, cube, &e);
   world_step(w, 2);
   check_contact(w, cube, &e);
@@ -274,7 +274,7 @@ static int pair_calls_a_step(int things)
     dGeomID ball = dCreateSphere(w->space, 0.01); /* within the box around both, touching nothing */
     dGeomSetPosition(ball, 0.025, 0.03, 0.02 + 0.001 * i);
   }
-  CHECK(world_create_session(w, count_pairs) == HAP_OK);
+  world_create_session(w, count_pairs);
   world_add_pointer(w, RADIUS, 5, 0, 0);
   CHECK(hap_session_start(w->session) == HAP_OK);
   pair_calls = 0;
@@ -298,7 +298,7 @@ static bool found_at(double distance, double pointer_speed, double body_speed)
   dBodyID cube = world_add_cube(w, 0.05, 0.3, 0, 0, 0);
   dBodySetLinearVel(cube, body_speed, 0, 0);
   double at = 0.025 + RADIUS + distance;
-  CHECK(world_create_session(w, NULL) == HAP_OK);
+  world_create_session(w, NULL);
   world_add_pointer(w, RADIUS, at, 0, 0);
   world_move_pointer(w, 0, (const double[3]){at, 0, 0}, (const double[3]){-pointer_speed, 0, 0});
   CHECK(hap_session_start(w->session) == HAP_OK);
@@ -325,7 +325,7 @@ TEST(a_fast_body_is_known_before_it_arrives)
     test_world *w = world_new(0.0, 20);
     dBodyID cube = world_add_cube(w, 0.05, 0.3, -1.0 - 0.03 * offset, 0, 0);
     dBodySetLinearVel(cube, 3.0, 0, 0);
-    REQUIRE(world_start(w, RADIUS, 0, 0, 0));
+    world_start(w, RADIUS, 0, 0, 0);
     double impulse = 0.0;
     for (int i = 0; i < 600 && impulse == 0.0; ++i) {
       CHECK(hap_session_advance(w->session, 1) == HAP_OK);
@@ -349,7 +349,7 @@ TEST(disabled_geoms_and_collide_bits)
   hap_pointer_def_init(&def, sizeof def);
   def.radius = 1.0;
   def.collide_bits = 1u | 2u;
-  REQUIRE(world_create_session(w, NULL) == HAP_OK);
+  world_create_session(w, NULL);
   REQUIRE(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
   w->pointer_count = 1;
   world_move_pointer(w, 0, (const double[3]){0, 0, 1.0 + 0.025 + 0.01}, NULL);
@@ -381,7 +381,8 @@ static test_world *start_crowd(int bodies, int contacts, bool nearest_first)
     int rank = nearest_first ? i : CROWD - 1 - i;
     world_add_sphere(w, 0.01, 0.1, 0.021 * (i - CROWD / 2), 0, -0.0105 - 0.001 * rank);
   }
-  return world_start(w, 100.0, 0, 0, 100.0 + 0.0005) ? w : NULL;
+  world_start(w, 100.0, 0, 0, 100.0 + 0.0005);
+  return w;
 }
 
 static int count_nearest(const test_world *w, bool nearest_first, int count)
@@ -430,7 +431,7 @@ static void check_newcomer(int bodies, int contacts)
     world_add_sphere(w, 0.01, 0.1, 0.03 * i, 0, -0.010 - 0.010);
   }
   dBodyID late = world_add_sphere(w, 0.01, 0.1, -0.03, 0, -1.0);
-  REQUIRE(world_start(w, 100.0, 0, 0, 100.0));
+  world_start(w, 100.0, 0, 0, 100.0);
   world_step(w, 3);
   CHECK(world_count_contacts(w) == 4);
   CHECK(world_contact(w, late, 0) == NULL);

@@ -239,7 +239,7 @@ static void measure_at(double at, double out[6][3])
   w->mu = 0.0;
   dBodyID cube = world_add_cube(w, 0.1, 1.0, at + 0.05, at, at + 0.05);
   dCreatePlane(w->space, 0.0, 0.0, 1.0, at);
-  REQUIRE(world_start(w, 0.01, at - 0.011, at + 0.02, at + 0.03));
+  world_start(w, 0.01, at - 0.011, at + 0.02, at + 0.03);
   const hapi_contact_slot *contact = world_contact(w, cube, 0);
   REQUIRE(contact != NULL && world_contact_answer(w, contact)->probed);
   memcpy(out, world_contact_answer(w, contact)->a, 18 * sizeof(double));

@@ -70,7 +70,7 @@ TEST(a_body_on_contact_joints_of_the_application_is_felt)
   w.hand_expert.coupling = HAP_COUPLING_DIRECT;
   (void)cw_add_floor(&w);
   dBodyID box = cw_add_cube(&w, 0.5, 0.1, 0.0, 0.0, 0.05);
-  REQUIRE(cw_start(&w, 0.0, 0.0, 0.1 + 0.005 + 0.02));
+  cw_start(&w, 0.0, 0.0, 0.1 + 0.005 + 0.02);
   cw_move_hand(&w, 0.0, 0.0, -0.024 / 0.5); /* 4 mm deep */
   cw_run(&w, 500);
   cw_move_hand(&w, 0.0, 0.0, 0.0);

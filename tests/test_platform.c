@@ -54,7 +54,7 @@ TEST(a_platform_that_is_moved_by_pose_has_no_stairs)
     platform *p = platform_open(rates[i], 0.0);
     double steepest = 0.0;
     double before = 0.0;
-    REQUIRE(cw_start(&p->w, 0.0, 0.0, RADIUS + 0.006));
+    cw_start(&p->w, 0.0, 0.0, RADIUS + 0.006);
     for (int k = 0; k < 150; ++k) { /* 3 mm deep when it has risen by 9 mm */
       cw_tick(&p->w);
       double force = p->w.force[2];
@@ -71,7 +71,7 @@ TEST(a_platform_that_is_put_elsewhere_stays_there)
 {
   platform *p = platform_open(20.0, 0.02);
   double most = 0.0;
-  REQUIRE(cw_start(&p->w, 0.0, 0.0, 0.02 + RADIUS - 0.002)); /* will be 2 mm deep */
+  cw_start(&p->w, 0.0, 0.0, 0.02 + RADIUS - 0.002); /* will be 2 mm deep */
   for (int k = 0; k < 2000; ++k) {
     cw_tick(&p->w);
     most = fmax(most, p->w.force[2]);

@@ -26,7 +26,7 @@ static test_world *open_cube(void)
 {
   test_world *w = world_new(0.0, 20);
   (void)world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
-  CHECK(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
+  world_start(w, RADIUS, -RADIUS - 0.002, 0, 0);
   return w;
 }
 
@@ -52,7 +52,7 @@ static void check_fig5(double stiffness)
   hap_pointer_def_init(&def, sizeof def);
   def.radius = RADIUS;
   def.stiffness = stiffness;
-  REQUIRE(world_create_session(w, NULL) == HAP_OK);
+  world_create_session(w, NULL);
   REQUIRE(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
   world_move_pointer(w, 0, (const double[3]){0, 0, 0}, NULL);
   REQUIRE(hap_session_start(w->session) == HAP_OK);
@@ -85,7 +85,7 @@ TEST(a_pushed_row_keeps_the_momentum)
   for (int i = 0; i < 5; ++i) {
     world_add_cube(w, EDGE, 0.5, EDGE / 2 + i * (EDGE - 1e-6), 0, 0);
   }
-  REQUIRE(world_start(w, RADIUS, x, 0, 0));
+  world_start(w, RADIUS, x, 0, 0);
   push_along(w, &x, 0.05, 400);
   push_along(w, &x, -0.2, 201); /* away; every impulse has arrived after a step */
   double momentum = 0.0;
@@ -106,7 +106,7 @@ TEST(an_impact_reaches_the_loop)
   test_world *w = world_new(0.0, 20);
   dCreatePlane(w->space, -1, 0, 0, -wall);
   dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
-  REQUIRE(world_start(w, RADIUS, x, 0, 0));
+  world_start(w, RADIUS, x, 0, 0);
   double farthest = 0.0;
   for (int i = 0; i < 40; ++i) {
     push_along(w, &x, x < 0.013 ? 0.1 : 0.0, 25);
@@ -211,7 +211,7 @@ TEST(a_changed_mass_is_read_again)
 TEST(a_body_added_near_the_pointer_is_felt)
 {
   test_world *w = world_new(0.0, 20);
-  REQUIRE(world_start(w, RADIUS, 0, 0, 0));
+  world_start(w, RADIUS, 0, 0, 0);
   world_forward(w, 120);
   CHECK(world_stats(w).model.bodies_known == 0);
   dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2 + RADIUS + 0.001, 0, 0);
@@ -300,7 +300,7 @@ static void check_destroyed_in_callback(bool after, bool forget)
   *(after ? &w->after_step : &w->before_step) = destroy_in_callback;
   world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
   world_add_cube(w, EDGE, 1.0, EDGE / 2, 2 * EDGE, 0);
-  REQUIRE(world_start(w, RADIUS, x, 0, 0));
+  world_start(w, RADIUS, x, 0, 0);
   push_along(w, &x, 0.1, 250);
   CHECK(callback_countdown < 0);
   hap_stats stats = world_stats(w);
@@ -438,7 +438,7 @@ TEST(a_body_broken_in_after_step_is_not_probed)
   w->after_step = break_after;
   dBodyID cube = world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
   world_add_cube(w, EDGE, 1.0, 1.5 * EDGE - 1e-6, 0, 0);
-  REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
+  world_start(w, RADIUS, -RADIUS - 0.002, 0, 0);
   world_forward(w, 201);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   const hapi_contact_slot *contact = world_contact(w, cube, 0);
@@ -460,7 +460,7 @@ TEST(a_body_broken_in_before_step_is_not_stepped)
   callback_countdown = 2;
   w->before_step = break_before;
   world_add_cube(w, EDGE, 1.0, EDGE / 2, 0, 0);
-  REQUIRE(world_start(w, RADIUS, -RADIUS - 0.002, 0, 0));
+  world_start(w, RADIUS, -RADIUS - 0.002, 0, 0);
   world_forward(w, 201);
   CHECK(fault_of(w) == HAP_FAULT_WORLD);
   CHECK(hapi_finite(dBodyGetAngularVel(w->bodies[0]), 3));
@@ -493,7 +493,7 @@ static test_world *open_switching(hap_model first)
   def.radius = RADIUS;
   def.stiffness = 500.0;
   def.damping = 5.0;
-  CHECK(world_create_session(w, NULL) == HAP_OK);
+  world_create_session(w, NULL);
   CHECK(hap_pointer_add(w->session, &def, &w->pointers[0]) == HAP_OK);
   world_move_pointer(w, 0, (const double[3]){-RADIUS - 0.002, 0, 0}, NULL);
   CHECK(hap_session_start(w->session) == HAP_OK);

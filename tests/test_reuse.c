@@ -31,6 +31,11 @@ typedef struct stack {
   bool apart; /* for the application the lower cube does not touch the floor */
 } stack;
 
+static void stack_end(void *owned)
+{
+  cw_close(&((stack *)owned)->w);
+}
+
 static bool stack_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   stack *s = user;
@@ -38,9 +43,9 @@ static bool stack_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *
   return !s->apart || (a != s->floor && b != s->floor);
 }
 
-static bool stack_begin(stack *s, double reuse, hap_probe probe)
+static stack *stack_new(double reuse, hap_probe probe)
 {
-  memset(s, 0, sizeof *s);
+  stack *s = tap_own(sizeof *s, stack_end);
   cw_open(&s->w, CW_GRAVITY);
   dWorldSetContactSurfaceLayer(s->w.world, LAYER);
   s->w.def.physics_hz = 50.0;
@@ -52,16 +57,15 @@ static bool stack_begin(stack *s, double reuse, hap_probe probe)
   (void)cw_add_cube(&s->w, 1.0, EDGE, 0.0, 0.0, 0.5 * EDGE - OVERLAP);
   (void)cw_add_cube(&s->w, 0.6, EDGE, 0.0, 0.0, 1.5 * EDGE - 2.0 * OVERLAP);
   s->top_geom = dBodyGetFirstGeom(s->w.bodies[1]);
-  return true;
+  return s;
 }
 
-static bool stack_start(stack *s)
+static void stack_start(stack *s)
 {
   double radius = s->w.hand_def.radius;
-  bool good = cw_start(&s->w, -0.5 * EDGE - radius, 0.0, 1.5 * EDGE - 2.0 * OVERLAP);
+  cw_start(&s->w, -0.5 * EDGE - radius, 0.0, 1.5 * EDGE - 2.0 * OVERLAP);
   cw_go(&s->w, 0.01, 0.0, 0.0, (int)(1000.0 * HELD / 0.01));
   cw_go(&s->w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
-  return good;
 }
 
 /* Testing simulations of so many physics steps. */
@@ -76,22 +80,19 @@ static uint64_t probes_of(contact_world *w, int steps)
 
 static void check_rest(hap_probe probe)
 {
-  stack s;
-  stack reference;
-  stack_begin(&s, 1e-6, probe);
-  stack_begin(&reference, 0.0, probe);
-  REQUIRE(stack_start(&s) && stack_start(&reference));
-  CHECK_NEAR(s.w.force[0], -2000.0 * HELD, 0.02);
+  stack *s = stack_new(1e-6, probe);
+  stack *reference = stack_new(0.0, probe);
+  stack_start(s);
+  stack_start(reference);
+  CHECK_NEAR(s->w.force[0], -2000.0 * HELD, 0.02);
   for (int step = 0; step < 20; ++step) {
-    uint64_t made = probes_of(&s.w, 1);
+    uint64_t made = probes_of(&s->w, 1);
     CHECK(made <= 1);
-    CHECK(probes_of(&reference.w, 1) == STEPS_OF_A);
-    CHECK_NEAR(s.w.force[0], reference.w.force[0], 1e-3 * fabs(reference.w.force[0]));
+    CHECK(probes_of(&reference->w, 1) == STEPS_OF_A);
+    CHECK_NEAR(s->w.force[0], reference->w.force[0], 1e-3 * fabs(reference->w.force[0]));
   }
-  CHECK(cw_stats(&s.w).probes.reused >= 20);
-  CHECK(cw_stats(&reference.w).probes.reused == 0);
-  cw_close(&s.w);
-  cw_close(&reference.w);
+  CHECK(cw_stats(&s->w).probes.reused >= 20);
+  CHECK(cw_stats(&reference->w).probes.reused == 0);
 }
 
 TEST(what_rests_is_measured_once)
@@ -102,32 +103,27 @@ TEST(what_rests_is_measured_once)
 
 TEST(as_in_the_paper_all_are_made)
 {
-  stack s;
-  stack_begin(&s, 1e-6, HAP_PROBE_PAPER);
-  REQUIRE(stack_start(&s));
-  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
-  cw_close(&s.w);
-  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
-  expert_wish(&s.w.expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
-  REQUIRE(stack_start(&s));
-  CHECK(probes_of(&s.w, 3) == 3 * STEPS_OF_A && cw_stats(&s.w).probes.reused == 0);
-  cw_close(&s.w);
+  stack *s = stack_new(1e-6, HAP_PROBE_PAPER);
+  stack_start(s);
+  CHECK(probes_of(&s->w, 3) == 3 * STEPS_OF_A && cw_stats(&s->w).probes.reused == 0);
+  s = stack_new(1e-6, HAP_PROBE_SHARED);
+  expert_wish(&s->w.expert, HAP_EFFECT_TESTING, HAP_EFFECT_ON);
+  stack_start(s);
+  CHECK(probes_of(&s->w, 3) == 3 * STEPS_OF_A && cw_stats(&s->w).probes.reused == 0);
 }
 
 /* Each step is less than what holds for the same, ten of them are not. */
 TEST(what_creeps_is_measured_again)
 {
-  stack s;
-  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
-  REQUIRE(stack_start(&s));
-  uint64_t before = cw_stats(&s.w).probes.reused;
+  stack *s = stack_new(1e-6, HAP_PROBE_SHARED);
+  stack_start(s);
+  uint64_t before = cw_stats(&s->w).probes.reused;
   for (int step = 0; step < 12; ++step) {
-    s.w.hand_at[2] += 3e-7;
-    cw_run(&s.w, STEP_TICKS);
+    s->w.hand_at[2] += 3e-7;
+    cw_run(&s->w, STEP_TICKS);
   }
-  uint64_t reused = cw_stats(&s.w).probes.reused - before;
+  uint64_t reused = cw_stats(&s->w).probes.reused - before;
   CHECK(reused >= 6 && reused <= 10);
-  cw_close(&s.w);
 }
 
 /* ---- what the application changes ---- */
@@ -302,30 +298,27 @@ static const struct {
 
 static void check_change(size_t which, double *out_worst)
 {
-  stack s;
-  stack reference;
-  stack_begin(&s, 1e-6, HAP_PROBE_SHARED);
-  stack_begin(&reference, 0.0, HAP_PROBE_SHARED);
-  REQUIRE(stack_start(&s) && stack_start(&reference));
-  CHECK(probes_of(&s.w, 1) <= 1);
-  (void)probes_of(&reference.w, 1);
-  changes[which].change(&s);
-  changes[which].change(&reference);
-  uint64_t made = probes_of(&s.w, changes[which].steps);
-  (void)probes_of(&reference.w, changes[which].steps);
+  stack *s = stack_new(1e-6, HAP_PROBE_SHARED);
+  stack *reference = stack_new(0.0, HAP_PROBE_SHARED);
+  stack_start(s);
+  stack_start(reference);
+  CHECK(probes_of(&s->w, 1) <= 1);
+  (void)probes_of(&reference->w, 1);
+  changes[which].change(s);
+  changes[which].change(reference);
+  uint64_t made = probes_of(&s->w, changes[which].steps);
+  (void)probes_of(&reference->w, changes[which].steps);
   if (made < STEPS_OF_A) {
     printf("# %s: %d testing simulations\n", changes[which].name, (int)made);
   }
   CHECK(made >= STEPS_OF_A);
   for (int tick = 0; tick < 4 * STEP_TICKS; ++tick) {
-    cw_tick(&s.w);
-    cw_tick(&reference.w);
+    cw_tick(&s->w);
+    cw_tick(&reference->w);
     for (int k = 0; k < 3; ++k) {
-      *out_worst = fmax(*out_worst, fabs(s.w.force[k] - reference.w.force[k]));
+      *out_worst = fmax(*out_worst, fabs(s->w.force[k] - reference->w.force[k]));
     }
   }
-  cw_close(&s.w);
-  cw_close(&reference.w);
 }
 
 TEST(what_is_changed_is_measured_in_the_next_step)
@@ -347,15 +340,21 @@ typedef struct held {
   dJointID joint;
 } held;
 
-/* A cube that a joint holds to the world in the air. */
-static void begin_held(held *h, dJointID (*create)(held *h))
+static void held_end(void *owned)
 {
-  memset(h, 0, sizeof *h);
+  cw_close(&((held *)owned)->w);
+}
+
+/* A cube that a joint holds to the world in the air. */
+static held *held_new(dJointID (*create)(held *h))
+{
+  held *h = tap_own(sizeof *h, held_end);
   cw_open(&h->w, 0.0);
   h->w.def.physics_hz = 50.0;
   h->w.def.model = HAP_MODEL_ACCELERANCE;
   (void)cw_add_cube(&h->w, 1.0, EDGE, 0.0, 0.0, 0.0);
   h->joint = create(h);
+  return h;
 }
 
 static dJointID create_hinge(held *h)
@@ -386,13 +385,12 @@ static dJointID create_slider(held *h)
   return joint;
 }
 
-static bool start_held(held *h)
+static void start_held(held *h)
 {
-  bool good = cw_start(&h->w, 0.5 * EDGE + h->w.hand_def.radius, 0.0, 0.0);
+  cw_start(&h->w, 0.5 * EDGE + h->w.hand_def.radius, 0.0, 0.0);
   cw_move_hand(&h->w, -0.02, 0.0, 0.0); /* through the hinge's axis */
   cw_run(&h->w, 100);
   cw_go(&h->w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
-  return good;
 }
 
 static void change_motor(held *h)
@@ -455,19 +453,17 @@ TEST(joints_are_held_against_what_they_were)
       {"slider", create_slider, change_slider},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    held h;
-    begin_held(&h, cases[i].create);
-    REQUIRE(start_held(&h));
-    CHECK(h.w.force[0] > 1.0);
-    uint64_t rest = probes_of(&h.w, 2);
-    cases[i].change(&h);
-    uint64_t made = probes_of(&h.w, 1);
+    held *h = held_new(cases[i].create);
+    start_held(h);
+    CHECK(h->w.force[0] > 1.0);
+    uint64_t rest = probes_of(&h->w, 2);
+    cases[i].change(h);
+    uint64_t made = probes_of(&h->w, 1);
     if (rest != 2 || made < STEPS_OF_A) {
       printf("# %s: %d at rest, then %d\n", cases[i].name, (int)rest, (int)made);
     }
     CHECK(rest == 2); /* b alone */
     CHECK(made >= STEPS_OF_A);
-    cw_close(&h.w);
   }
 }
 
@@ -486,10 +482,10 @@ static contact_world *begin_row(double reuse)
   for (int i = 0; i < 4; ++i) {
     (void)cw_add_cube(w, 0.5, EDGE, (EDGE - OVERLAP) * i, 0.0, 0.5 * EDGE - OVERLAP);
   }
-  bool good = cw_start(w, -0.5 * EDGE - w->hand_def.radius, 0.0, 0.5 * EDGE);
+  cw_start(w, -0.5 * EDGE - w->hand_def.radius, 0.0, 0.5 * EDGE);
   cw_go(w, 0.04, 0.0, 0.0, 100);
   cw_go(w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
-  return good ? w : NULL;
+  return w;
 }
 
 /* Bodies that the loop moves with this flag. */

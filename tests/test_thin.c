@@ -76,8 +76,7 @@ typedef struct press {
   hap_coupling coupling;
   hap_model model;
   double hz;
-  double speed;       /* m/s, of the hand */
-  double sheet_speed; /* m/s, of a kinematic plate that comes up to the hand */
+  double speed; /* m/s, of the hand */
 } press;
 
 /* Down onto the plate until the hand is 30 mm deep, and back up. Largest error of the force, in N,
@@ -98,8 +97,7 @@ static double press_error(const press *t, double *out_after)
   dGeomID geom = plate_create(&p, w.space, t->kind, t->thickness);
   dGeomSetPosition(geom, 0.0, 0.0, -0.5 * t->thickness);
   cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
-  bool started = cw_start(&w, 0.013, 0.007, RADIUS + 0.1);
-  CHECK(started);
+  cw_start(&w, 0.013, 0.007, RADIUS + 0.1);
   bool soft = t->coupling == HAP_COUPLING_PROXY;
   double stiffness = soft ? 0.5 * K : K; /* two springs behind each other */
   double way = RADIUS + 0.1;
@@ -152,8 +150,7 @@ TEST(no_sheet_gives_way_to_a_slow_hand)
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     for (int m = 0; m < 4; ++m) {
       for (int i = 0; i < 3; ++i) {
-        press t = {
-            (sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, models[m], 60.0, 0.1, 0.0};
+        press t = {(sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, models[m], 60.0, 0.1};
         check_press(&t);
       }
     }
@@ -167,8 +164,7 @@ TEST(no_sheet_gives_way_in_any_coupling)
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     for (int m = 0; m < 4; ++m) {
       for (int i = 0; i < 3; ++i) {
-        press t = {
-            (sheet_kind)kind, thicknesses[i], couplings[m], HAP_MODEL_CONTACT, 20.0, 0.1, 0.0};
+        press t = {(sheet_kind)kind, thicknesses[i], couplings[m], HAP_MODEL_CONTACT, 20.0, 0.1};
         check_press(&t);
       }
     }
@@ -181,13 +177,8 @@ TEST(no_sheet_gives_way_to_a_fast_hand)
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     for (int m = 0; m < 3; ++m) {
       for (int i = 0; i < 3; ++i) {
-        press t = {(sheet_kind)kind,
-                   thicknesses[i],
-                   HAP_COUPLING_DIRECT,
-                   HAP_MODEL_CONTACT,
-                   60.0,
-                   speeds[m],
-                   0.0};
+        press t = {(sheet_kind)kind,  thicknesses[i], HAP_COUPLING_DIRECT,
+                   HAP_MODEL_CONTACT, 60.0,           speeds[m]};
         check_press(&t);
       }
     }
@@ -207,7 +198,7 @@ TEST(a_jump_through_a_plate_is_no_touch)
     w.hand_expert.coupling = HAP_COUPLING_DIRECT;
     dGeomSetPosition(plate_create(&p, w.space, (sheet_kind)kind, 0.001), 0.0, 0.0, -0.0005);
     cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
-    REQUIRE(cw_start(&w, 0.013, 0.007, RADIUS + 0.01));
+    cw_start(&w, 0.013, 0.007, RADIUS + 0.01);
     cw_move_hand(&w, 0.0, 0.0, -0.05);
     cw_run(&w, 240); /* 2 mm deep */
     CHECK_NEAR(w.force[2], 2.0, 1e-6);

@@ -52,9 +52,7 @@ static tool_world *tool_press(const ground *g)
   } else {
     tool_add_floor(w);
   }
-  if (!tool_start(w)) {
-    return NULL;
-  }
+  tool_start(w);
   tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
   tool_run(w, 40);
   tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
@@ -231,10 +229,7 @@ static crept tool_creep(const rest *r, int ticks)
   hand h = {.at = {0.0, 0.0, HALF + 1e-3}, .push = {0.0, 0.0, -LOAD}};
   double start[3] = {0.0, 0.0, 0.0};
   double angle = 0.0;
-  if (!tool_start(w)) {
-    CHECK(false);
-    return out;
-  }
+  tool_start(w);
   for (int i = 0; i < ticks + 1500; ++i) {
     if (i == 500) {
       h.push[0] = r->share * MU * LOAD * 0.8;
@@ -317,7 +312,7 @@ TEST(a_device_without_torque_feels_it_slide)
                           "hand=rigid",
                           &w->tool_def.device, &w->detail) == HAP_OK);
   tool_add_floor(w);
-  REQUIRE(tool_start(w));
+  tool_start(w);
   CHECK(hap_session_advance(w->session, 900) == HAP_OK);
   CHECK(hap_pointer_get(w->session, w->tool, &w->state, sizeof w->state) == HAP_OK);
   CHECK_NEAR(w->state.wrench.force[2], LOAD, 1e-6);
@@ -338,7 +333,7 @@ TEST(points_that_leap_hold_where_they_are)
     w->tool_def.friction = MU;
     dGeomID box = dCreateBox(w->space, 0.016, 0.016, 0.1);
     dGeomSetPosition(box, 0.0, 0.0, -0.05);
-    REQUIRE(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
     tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
@@ -371,7 +366,7 @@ TEST(a_mesh_holds_as_a_floor)
     dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
                                 3 * (int)sizeof(dTriIndex));
     dCreateTriMesh(w->space, data, NULL, NULL, NULL);
-    REQUIRE(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
     tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
@@ -423,7 +418,7 @@ TEST(each_geom_has_its_friction)
     asked.left = dCreateBox(w->space, 0.1, 0.2, 0.1);
     dGeomSetPosition(asked.left, -0.051, 0.0, -0.05);
     dGeomSetPosition(dCreateBox(w->space, 0.1, 0.2, 0.1), 0.051, 0.0, -0.05);
-    REQUIRE(tool_start(w));
+    tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
     tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
@@ -463,7 +458,7 @@ static round_trip go_round(const ground *g, hap_guard guard, double tilt)
     w->tool_expert.coupling_stiffness = 1e4;
   }
   dGeomSetPosition(dCreateBox(w->space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
-  CHECK(tool_start(w));
+  tool_start(w);
   tool_go(w, 0.0, 0.0, HALF + 0.003, 0.0);
   tool_run(w, 60);
   w->work = w->work_most = 0.0;
@@ -544,7 +539,7 @@ static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored
   w->research.guard = guard;
   w->tool_def.friction = 10.0;
   dGeomSetPosition(dCreateBox(w->space, 0.3, 0.3, 0.1), 0.0, 0.0, -0.05);
-  CHECK(tool_start(w));
+  tool_start(w);
   tool_go(w, 0.0, 0.0, HALF + 0.004, 0.07);
   tool_run(w, 60);
   *out_stored = 0.0;

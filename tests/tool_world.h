@@ -9,10 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include <hapode/hapode.h>
-#include <hapode/ode.h>
-
-#include "tools/session_defs.h"
+#include "tests/ode_world.h"
 
 typedef struct tool_world {
   dWorldID world;
@@ -61,12 +58,8 @@ static inline void tool_set_box(tool_world *w, const double half[3], const doubl
 
 static inline void tool_begin(tool_world *w, hap_model model)
 {
-  static const double half[3] = {0.01, 0.01, 0.01};
-  static const double middle[3] = {0.0, 0.0, 0.0};
   memset(w, 0, sizeof *w);
-  w->world = dWorldCreate();
-  w->space = dHashSpaceCreate(NULL);
-  dWorldSetGravity(w->world, 0.0, 0.0, -9.81);
+  ode_world_make(9.81, &w->world, &w->space);
   session_defs_init(&w->def, &w->expert, &w->research);
   w->def.drive = HAP_DRIVE_LOCKSTEP;
   w->def.model = model;
@@ -81,7 +74,7 @@ static inline void tool_begin(tool_world *w, hap_model model)
   w->tool_def.max_force = 1e4;
   w->tool_def.max_torque = 1e4;
   w->pose.quat_wxyz[0] = 1.0;
-  tool_set_box(w, half, middle);
+  tool_set_box(w, AT(0.01, 0.01, 0.01), AT(0.0, 0.0, 0.0));
 }
 
 static inline void tool_add_floor(tool_world *w)
@@ -89,28 +82,16 @@ static inline void tool_add_floor(tool_world *w)
   dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
 }
 
-static inline bool tool_start(tool_world *w)
+static inline void tool_start(tool_world *w)
 {
-  bool good = hap_session_create(&w->def, &w->ode, &w->session, &w->detail) == HAP_OK &&
-              hap_pointer_add(w->session, &w->tool_def, &w->tool) == HAP_OK &&
-              hap_session_start(w->session) == HAP_OK;
-  if (!good && w->session != NULL) {
-    (void)hap_session_detail(w->session, &w->detail);
-  }
-  if (!good) {
-    printf("# %s\n", w->detail.text);
-  }
-  return good;
+  w->session = session_make(&w->def, &w->ode);
+  REQUIRE(hap_pointer_add(w->session, &w->tool_def, &w->tool) == HAP_OK);
+  session_run(w->session);
 }
 
 static inline void tool_end(tool_world *w)
 {
-  if (w->world == NULL) { /* closed already */
-    return;
-  }
-  hap_session_destroy(w->session);
-  dSpaceDestroy(w->space);
-  dWorldDestroy(w->world);
+  ode_world_end(w->session, w->world, w->space);
   w->world = NULL;
 }
 

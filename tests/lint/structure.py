@@ -25,12 +25,6 @@ COLUMNS_MAX = 100
 ANY_SIZE = re.compile(r"^(?:lib/sync/|lib/base/pointer_setup\.h:|"
                       r"include/hapode/.*:hap_\w*(?:_def|_stats)$)")
 
-# Files in which a point does not hold yet: what is found there is printed and counted, no failure.
-NOT_YET = {
-    "headers": ("tests/contact_world.h", "tests/physics_world.h"),
-    "columns": ("tests/stability/cases.c",),
-}
-
 # Not written by people, or not for people.
 GENERATED = ("tests/abi/", "tests/data/", "tests/fuzz/corpus/")
 
@@ -134,16 +128,6 @@ def wide_lines(root):
                     yield f"{name}:{number}: {len(line)} columns"
 
 
-def held_point(tap, topic, name, problems):
-    """A point about all files but those of NOT_YET, of which it only says how many there are."""
-    problems = list(problems)
-    waiting = [p for p in problems if p.startswith(NOT_YET.get(topic, ()))]
-    folders = collections.Counter(posixpath.dirname(p.split(":")[0]) or "." for p in waiting)
-    for folder, count in folders.most_common():
-        print(f"# not yet, {name}: {count} in {folder}")
-    tap.point(name, [p for p in problems if p not in waiting])
-
-
 def check_tags(tap, root, files):
     tags = tags_of(root, files)
     functions = [tag for tag in tags if tag["kind"] == "function"]
@@ -151,11 +135,9 @@ def check_tags(tap, root, files):
     tap.point("functions and structs are found",
               [] if functions and fields else ["ctags finds nothing"])
     tap.point(f"no function has over {PARAMETERS_MAX} parameters", crowded_functions(functions))
-    held_point(tap, "names", "static functions name their subject: two words",
-               one_word_functions(functions))
-    held_point(tap, "structs", f"no struct has over {FIELDS_MAX} fields", large_structs(fields))
-    held_point(tap, "structs", f"a header has one struct of over {LARGE_FIELDS} fields",
-               crowded_headers(fields))
+    tap.point("static functions name their subject: two words", one_word_functions(functions))
+    tap.point(f"no struct has over {FIELDS_MAX} fields", large_structs(fields))
+    tap.point(f"a header has one struct of over {LARGE_FIELDS} fields", crowded_headers(fields))
 
 
 def main(root):
@@ -165,9 +147,8 @@ def main(root):
         check_tags(tap, root, files)
     else:
         tap.skip("functions and structs", "needs universal-ctags with json")
-    held_point(tap, "headers", f"no internal header is over {HEADER_MAX} lines",
-               long_headers(root, files))
-    held_point(tap, "columns", f"no line is over {COLUMNS_MAX} columns", wide_lines(root))
+    tap.point(f"no internal header is over {HEADER_MAX} lines", long_headers(root, files))
+    tap.point(f"no line is over {COLUMNS_MAX} columns", wide_lines(root))
     tap.done()
 
 
