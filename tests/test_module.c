@@ -158,6 +158,7 @@ TEST(wrong_tables_are_refused)
       {"no_self", HAP_ERROR_DEVICE, {"'tables'", "gave no self", NULL}},
       {"dof_4", HAP_ERROR_DEVICE, {"'tables'", "dof 4", NULL}},
       {"limit_is_negative", HAP_ERROR_DEVICE, {"'tables'", "negative or not finite", NULL}},
+      {"damping_is_subnormal", HAP_ERROR_DEVICE, {"'tables'", "neither 0 nor from 1e-15", NULL}},
   };
   const char *path = module_of("HAPODE_TABLES");
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {

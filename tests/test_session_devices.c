@@ -486,6 +486,7 @@ static const struct {
     FIELD(def, finger_radius, (double)INFINITY, HAP_ERROR_ARGUMENT),
     FIELD(expert, coupling_stiffness, -1.0, HAP_ERROR_ARGUMENT),
     FIELD(expert, coupling_stiffness, (double)NAN, HAP_ERROR_ARGUMENT),
+    FIELD(expert, coupling_stiffness, 1e-310, HAP_ERROR_ARGUMENT),
     FIELD(expert, coupling_damping, 1.0, HAP_ERROR_ARGUMENT),
     FIELD(expert, coupling_damping, (double)NAN, HAP_ERROR_ARGUMENT),
     FIELD(expert, hand_damping, -1.0, HAP_ERROR_ARGUMENT),

@@ -15,8 +15,8 @@ HAP_BEGIN_DECLS
 
 typedef struct hap_device hap_device;
 
-/* What a device is and can hold. Zero in a limit: the device does not know. It has a size and may
- * grow at its end. */
+/* What a device is and can hold. Zero in a figure: the device does not know; others are from 1e-15
+ * to 1e9. It has a size and may grow at its end. */
 typedef struct hap_device_info {
   uint32_t size;              /* bytes filled in */
   uint32_t dof;               /* 3: force only; 6: force and torque */

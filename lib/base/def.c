@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "base/def.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -104,6 +105,11 @@ hap_status hapi_numbers_check(const hapi_number_rule *rules, size_t count, hap_d
     if (!other && !(r->value >= r->low && r->value <= r->high)) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is %g, not %sin %g .. %g", r->name, r->value,
                        r->other_name != NULL ? r->other_name : "", r->low, r->high);
+    }
+    if (r->value != 0.0 && fabs(r->value) < HAPI_NUMBER_LEAST) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                       "%s is %g; a number that is not 0 is at least %g", r->name, r->value,
+                       HAPI_NUMBER_LEAST);
     }
   }
   return HAP_OK;

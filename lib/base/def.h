@@ -67,7 +67,11 @@ typedef struct hapi_number_rule {
 #member, (def)->member, low, high, #other " or ", other \
   }
 
-/* HAP_ERROR_ARGUMENT where a value, which may be NaN, breaks its rule. */
+/* The least magnitude of a number from outside that is not 0. What is made of such numbers,
+ * quotients too, is never subnormal: the loop takes subnormal numbers for 0. */
+#define HAPI_NUMBER_LEAST 1e-15
+
+/* HAP_ERROR_ARGUMENT where a value, which may be NaN, breaks its rule or is too near to 0. */
 HAP_NODISCARD hap_status hapi_numbers_check(const hapi_number_rule *rules, size_t count,
                                             hap_detail *detail);
 

@@ -9,8 +9,9 @@
 #include "base/assert.h"
 #include "base/def.h"
 #include "base/log.h"
-#include "base/vec.h"
 #include "device/module.h"
+
+#define FIGURE_MOST 1e9 /* of what a device says of itself, in SI units */
 
 #define CLAIMED 1u
 #define CLOSED 2u
@@ -80,6 +81,16 @@ static hap_status check_ops(const hap_device_ops *ops, hap_detail *detail)
   return HAP_OK;
 }
 
+bool hapi_device_figures_good(const double *figures, size_t count)
+{
+  for (size_t i = 0; i < count; ++i) {
+    if (figures[i] != 0.0 && !(figures[i] >= HAPI_NUMBER_LEAST && figures[i] <= FIGURE_MOST)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 static hap_status check_info(const hap_device_ops *ops, const hap_device_info *info,
                              hap_detail *detail)
 {
@@ -87,14 +98,14 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
     return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s' says it has dof %u, known are 3 and 6",
                      ops->name, info->dof);
   }
-  double limits[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
-                     info->quantum,   info->mass,       info->friction,        info->delay};
-  for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
-    if (!hapi_finite(&limits[i], 1) || limits[i] < 0.0) {
-      return hapi_fail(detail, HAP_ERROR_DEVICE,
-                       "device '%s' describes itself with a limit that is negative or not finite",
-                       ops->name);
-    }
+  const double figures[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
+                            info->quantum,   info->mass,       info->friction,        info->delay};
+  if (!hapi_device_figures_good(figures, sizeof figures / sizeof figures[0])) {
+    return hapi_fail(
+        detail, HAP_ERROR_DEVICE,
+        "device '%s' describes itself with a figure that is negative or not finite, or "
+        "neither 0 nor from %g to %g",
+        ops->name, HAPI_NUMBER_LEAST, FIGURE_MOST);
   }
   return HAP_OK;
 }

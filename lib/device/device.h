@@ -37,6 +37,10 @@ void *hapi_device_self(const hap_device *device);
 /* [any] Lives as long as the device. */
 const hap_device_info *hapi_device_info(const hap_device *device);
 
+/* [any] Whether a device may describe itself with these: each is 0 (unknown) or from
+ * HAPI_NUMBER_LEAST to 1e9 in SI units. */
+HAP_NODISCARD bool hapi_device_figures_good(const double *figures, size_t count);
+
 /* [any] What the device says of its last failure; "" when it says nothing. */
 void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out);
 

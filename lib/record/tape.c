@@ -100,7 +100,7 @@ void hapi_tape_load(hapi_tape *tape, const hapi_cell *cells, uint32_t count)
 
 bool hapi_tape_next_is(const hapi_tape *tape, hapi_cell_kind kind)
 {
-  return tape->packet_at < tape->packet_count &&
+  return !tape->broken && tape->packet_at < tape->packet_count &&
          tape->packet_cells[tape->packet_at].kind == (uint8_t)kind;
 }
 

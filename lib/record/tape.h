@@ -97,7 +97,7 @@ uint32_t hapi_tape_put_so_far(const hapi_tape *tape); /* cells since open */
 void hapi_tape_commit(hapi_tape *tape);
 
 /* PLAY. The next cell of the packet; a zeroed one when it is of another kind or index, and the tape
- * is broken then. */
+ * is broken then. A broken tape has no next cell, so that a loop over cells ends. */
 const hapi_cell *hapi_tape_get(hapi_tape *tape, hapi_cell_kind kind, uint32_t index);
 bool hapi_tape_next_is(const hapi_tape *tape, hapi_cell_kind kind);
 /* Either way: RECORD puts a cell and fills it in from *io, PLAY gets one and fills *io in from it.

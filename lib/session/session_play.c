@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/log.h"
 #include "base/vec.h"
+#include "device/device.h"
 #include "record/reader.h"
 #include "session/session_internal.h"
 
@@ -283,7 +284,7 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
               joined.def.cookie == HAPI_POINTER_COOKIE && joined.def.device == NULL &&
               joined.def.hull_xyz == NULL &&
               read_hull(cells + HAPI_JOIN_CELLS, count - HAPI_JOIN_CELLS, &joined, points) &&
-              hapi_finite(figures, sizeof figures / sizeof figures[0]) &&
+              hapi_device_figures_good(figures, sizeof figures / sizeof figures[0]) &&
               memchr(info->name, '\0', sizeof info->name) != NULL;
   if (joined.has_device != 0 && joined.def.velocity == HAP_VELOCITY_ESTIMATED) {
     joined.def.velocity = HAP_VELOCITY_AUTO; /* of a device, which is not there */

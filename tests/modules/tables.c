@@ -48,6 +48,7 @@ static void tables_describe(void *self, hap_device_info *out)
   (void)self;
   out->dof = variant_is("dof_4") ? 4 : 3;
   out->max_force = variant_is("limit_is_negative") ? -1.0 : 5.0;
+  out->damping = variant_is("damping_is_subnormal") ? 1e-310 : 0.0;
 }
 
 static hap_status tables_start(void *self)
