@@ -28,7 +28,7 @@ static void wrenches_add(const dJointFeedback *f, double share, wrenches io)
   }
 }
 
-static void listen(const mechanism *m, dJointFeedback of[TOLD_MAX])
+static void listen_to(const mechanism *m, dJointFeedback of[TOLD_MAX])
 {
   memset(of, 0, TOLD_MAX * sizeof *of);
   for (int i = 0; i < m->joint_count && i < TOLD_MAX; ++i) {
@@ -36,7 +36,7 @@ static void listen(const mechanism *m, dJointFeedback of[TOLD_MAX])
   }
 }
 
-static double squares(const double *of, const double *from)
+static double squares_apart(const double *of, const double *from)
 {
   double sum = 0.0;
   for (int i = 0; i < 12; ++i) {
@@ -64,8 +64,8 @@ static double told_difference(mechanism *loop, mechanism *plain)
     for (int i = 0; i < loop->joint_count; ++i) {
       wrenches told = {0.0};
       wrenches_add(&feedbacks[i], 1.0, told);
-      off += squares(told, mean[i]);
-      all += squares(mean[i], none);
+      off += squares_apart(told, mean[i]);
+      all += squares_apart(mean[i], none);
     }
   }
   CHECK(all > 0.0);
@@ -76,8 +76,8 @@ static void check_told(build_fn build)
 {
   mechanism *plain = mechanism_new(build, 9.81);
   mechanism *loop = mechanism_new(build, 9.81);
-  listen(plain, fine);
-  listen(loop, feedbacks);
+  listen_to(plain, fine);
+  listen_to(loop, feedbacks);
   start_mechanism(loop);
   cw_tick(&loop->w); /* syncs come in the first tick of a step */
   double off = told_difference(loop, plain);
@@ -203,7 +203,7 @@ static void build_pressed_stop(mechanism *m)
 TEST(motor_at_its_stop_tells)
 {
   mechanism *loop = mechanism_new(build_pressed_stop, 9.81);
-  listen(loop, feedbacks);
+  listen_to(loop, feedbacks);
   start_mechanism(loop);
   cw_run(&loop->w, 5 * STEP_TICKS + 1);
   CHECK_NEAR(feedbacks[0].f1[2], 0.5 * 9.81 + 3.0, 0.02 * 3.0);
@@ -238,7 +238,7 @@ static void build_measured(mechanism *m)
 TEST(measured_joint_tells)
 {
   mechanism *loop = mechanism_new(build_measured, 9.81);
-  listen(loop, feedbacks);
+  listen_to(loop, feedbacks);
   start_mechanism(loop);
   cw_run(&loop->w, 6 * STEP_TICKS + 1);
   CHECK(cw_stats(&loop->w).model.range_joints == 1);
@@ -260,7 +260,7 @@ TEST(feedback_goes_on_where_the_hand_comes_and_goes)
   dJointSetHingeParam(loop->joints[1], dParamLoStop, 0.0); /* stands still */
   dJointSetHingeParam(loop->joints[1], dParamHiStop, 0.0);
   dWorldSetQuickStepNumIterations(loop->w.world, 1000);
-  listen(loop, feedbacks);
+  listen_to(loop, feedbacks);
   cw_start(&loop->w, 0.1, 0.0, 0.4);
   cw_move_hand(&loop->w, 0.0, 0.0, -1.0);
   for (int t = 0; t < 700; ++t) {
@@ -310,7 +310,7 @@ TEST(joint_breaks_by_its_feedback)
   breaking = mechanism_new(build_hanging, 9.81);
   contact_world *w = &breaking->w;
   breaks_at = 4.5;
-  listen(breaking, feedbacks);
+  listen_to(breaking, feedbacks);
   w->ode.after_step = break_joint;
   cw_start(w, 0.0, 0.0, BALL + w->hand_def.radius + 2.0 * NEAR);
   cw_move_hand(w, 0.0, 0.0, -0.1);
@@ -333,7 +333,7 @@ TEST(joint_breaks_by_its_feedback)
 
 static void listen_late(void *arg)
 {
-  listen(arg, feedbacks);
+  listen_to(arg, feedbacks);
 }
 
 TEST(feedback_may_be_set_while_it_runs)
@@ -355,7 +355,7 @@ static void body_sleep(void *arg)
 TEST(sleeping_body_keeps_what_was_told)
 {
   mechanism *loop = mechanism_new(build_hanging, 9.81);
-  listen(loop, feedbacks);
+  listen_to(loop, feedbacks);
   start_mechanism(loop);
   cw_run(&loop->w, 5 * STEP_TICKS + 1);
   CHECK(hap_session_post(loop->w.session, body_sleep, loop) == HAP_OK);

@@ -26,7 +26,7 @@ typedef struct part {
   size_t size;
 } part;
 
-#define PARTS 11
+#define PARTS 12
 
 /* Of all that a tick of model SINGLE uses. */
 static void tick_list_parts(hapi_tick *t, part out[PARTS])
@@ -35,6 +35,7 @@ static void tick_list_parts(hapi_tick *t, part out[PARTS])
   size_t tools = (size_t)2 * c->tool_points;
   const part all[PARTS] = {
       {(void **)&t->bodies.of, c->bodies, sizeof *t->bodies.of},
+      {(void **)&t->bodies.courses, c->bodies, sizeof *t->bodies.courses},
       {(void **)&t->bodies.live, c->bodies, sizeof *t->bodies.live},
       {(void **)&t->touches.of, c->contacts + tools, sizeof *t->touches.of},
       {(void **)&t->touches.kept, c->contacts, sizeof *t->touches.kept},

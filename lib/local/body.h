@@ -71,9 +71,19 @@ typedef struct hapi_local_body {
   hapi_body_left left;
 } hapi_local_body;
 
+/* Of a driven body: how physics expects it to go, and what the loop was off by when it was told. */
+typedef struct hapi_body_course {
+  bool known;
+  int64_t begin_ns;
+  hapi_model_course in;
+  int64_t told_ns; /* when the loop was apart by: */
+  double apart[6]; /* m, rad, ahead of the course; it fades */
+} hapi_body_course;
+
 typedef struct hapi_bodies {
-  hapi_local_body *of; /* by slot, capacity.bodies */
-  uint32_t *live;      /* slots in the model, live_count */
+  hapi_local_body *of;       /* by slot, capacity.bodies */
+  hapi_body_course *courses; /* likewise */
+  uint32_t *live;            /* slots in the model, live_count */
   uint32_t live_count;
   uint32_t high;           /* beyond the highest slot that was ever used */
   uint32_t resting;        /* at the tick's begin */

@@ -7,6 +7,7 @@
 #include "base/assert.h"
 #include "base/pose.h"
 #include "base/vec.h"
+#include "local/body_course.h"
 
 /* A body that comes in has the world's state, advanced by the age of the model. */
 static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
@@ -119,6 +120,14 @@ static bool is_linear(hap_model model, uint32_t flags)
          (model == HAP_MODEL_CONTACT && (flags & (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN)) == 0);
 }
 
+/* Whether the loop had it where it was driven to. */
+static bool was_driven(const hapi_local_body *body, const hapi_body_course *course,
+                       const hapi_model_body *in)
+{
+  return course->known && body->generation == in->generation && body->epoch == in->epoch &&
+         (body->flags & HAPI_BODY_DRIVEN) != 0;
+}
+
 static void adopt_body(hapi_local_body *body, const hapi_model *model, const hapi_model_body *in,
                        double age_s, const hapi_tick_facts *before)
 {
@@ -181,14 +190,22 @@ static void bodies_leave(const hapi_bodies *bodies, hapi_model *model, int64_t n
   }
 }
 
-void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, double age_s,
+void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now_ns, double age_s,
                              const hapi_tick_facts *before)
 {
   const hapi_model_body *in = hapi_model_bodies(model);
   bodies_leave(bodies, model, before->now_ns);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     HAPI_ASSERT_UNIT_QUAT(in[i].pose.quat_wxyz);
-    adopt_body(&bodies->of[in[i].slot], model, &in[i], age_s, before);
+    hapi_local_body *body = &bodies->of[in[i].slot];
+    hapi_body_course *course = &bodies->courses[in[i].slot];
+    hap_pose had = body->pose;
+    bool goes_on = was_driven(body, course, &in[i]);
+    adopt_body(body, model, &in[i], age_s, before);
+    course->known = false;
+    if (in[i].course != 0) {
+      hapi_course_adopt(course, model, &in[i], goes_on ? &had : NULL, now_ns, body);
+    }
     bodies->live[i] = in[i].slot;
     if (in[i].slot >= bodies->high) {
       bodies->high = in[i].slot + 1;

@@ -77,46 +77,24 @@ static bool is_zero(const hap_twist *twist)
          hapi_v3_dot(twist->angular, twist->angular) == 0.0;
 }
 
-static void twist_between(const hapi_slot_account *from, const hap_pose *to, double seconds,
-                          hap_twist *out)
+/* A kinematic body that is moved by its pose alone has the velocity of its way in the next step: in
+ * the loop it would stand until the next sync else. */
+static void fill_course(const publishing *p, hapi_slot_account *of, hapi_model *model,
+                        hapi_model_body *out)
 {
-  const double back[4] = {from->left_quat[0], -from->left_quat[1], -from->left_quat[2],
-                          -from->left_quat[3]};
-  double turn[4];
-  hapi_v3_sub(to->position, from->left_position, out->linear);
-  hapi_v3_scale(1.0 / seconds, out->linear, out->linear);
-  hapi_quat_multiply(to->quat_wxyz, back, turn);
-  double sine = hapi_v3_norm(turn + 1);
-  double angle = 2.0 * atan2(sine, fabs(turn[0]));
-  double rate = sine > 0.0 ? (turn[0] < 0.0 ? -angle : angle) / (sine * seconds) : 0.0;
-  hapi_v3_scale(rate, turn + 1, out->angular);
-}
-
-/* A step that is no longer than the one before: it is on its way, and was not put elsewhere. */
-static bool goes_on(const double before[3], const double now[3])
-{
-  double change[3];
-  hapi_v3_sub(now, before, change);
-  return hapi_v3_norm(change) <= hapi_v3_norm(before);
-}
-
-/* A kinematic body that is moved by its pose alone has the velocity of its way in the last step: in
- * the loop it would stand until the next sync else, and leap then. */
-static void twist_by_pose(hapi_slot_account *of, double seconds, const hap_pose *pose,
-                          hap_twist *io)
-{
-  const hap_twist before = of->moved;
-  memset(&of->moved, 0, sizeof of->moved);
-  if (!of->placed || !(seconds > 0.0) || !is_zero(io)) {
-    return;
+  hapi_model_course *course = &hapi_model_courses(model)[model->course_count];
+  double period = p->cycle->probe_step_s;
+  hapi_course_note(&of->course, &out->pose, &out->twist, p->cycle->step_s);
+  hapi_course_find(&of->course, &out->twist, period, course);
+  if (is_zero(&out->twist)) {
+    hapi_course_mean(course, &out->twist);
   }
-  twist_between(of, pose, seconds, &of->moved);
-  if (goes_on(before.linear, of->moved.linear) && goes_on(before.angular, of->moved.angular)) {
-    *io = of->moved;
+  if (p->cycle->model == HAP_MODEL_CONTACT) {
+    out->course = ++model->course_count;
   }
 }
 
-static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
+static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, hapi_model_body *out)
 {
   const hapi_body_slot *slot = &p->slots->bodies[index];
   hapi_slot_account *of = hapi_account_of(p->account, index);
@@ -130,8 +108,9 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model_body *out)
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   hapi_pose_read(body, &out->pose);
   hapi_twist_read(body, &out->twist);
+  of->course.known &= (slot->flags & HAPI_BODY_DRIVEN) != 0;
   if ((slot->flags & HAPI_BODY_DRIVEN) != 0) {
-    twist_by_pose(of, p->cycle->step_s, &out->pose, &out->twist);
+    fill_course(p, of, model, out);
   }
   memcpy(out->b, answer->b, sizeof out->b);
   memcpy(out->residual, of->residual, sizeof out->residual);
@@ -366,10 +345,11 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
       &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
   out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
   hapi_model_body *bodies = hapi_model_bodies(out);
-  out->body_count = 0;
+  out->body_count = out->course_count = 0;
   for (uint32_t i = 0; i < p.slots->body_high; ++i) {
     HAPI_ASSERT(out->body_count < p.cycle->config->capacity.bodies);
-    if (p.slots->bodies[i].phase == HAPI_SLOT_LIVE && fill_body(&p, i, &bodies[out->body_count])) {
+    if (p.slots->bodies[i].phase == HAPI_SLOT_LIVE &&
+        fill_body(&p, i, out, &bodies[out->body_count])) {
       ++out->body_count;
     }
   }

@@ -11,6 +11,7 @@
 
 #include "base/assert.h"
 #include "near/slots.h"
+#include "physics/course.h"
 #include "sync/messages.h"
 #include "world/world.h"
 
@@ -23,7 +24,7 @@ typedef struct hapi_slot_account {
   double left_position[3];
   double left_quat[4];
   double left_velocity[6];
-  hap_twist moved;         /* of a kinematic body: that of its way in the last step */
+  hapi_course_past course; /* of a kinematic body */
   double impulse_taken[3]; /* of the loop's totals */
   double angular_impulse_taken[3];
   double new_impulse[3]; /* of the last interval, to be given to the world */

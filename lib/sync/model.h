@@ -124,6 +124,19 @@ typedef struct hapi_model_joint {
   hapi_measured_joint measured; /* of that kind */
 } hapi_model_joint;
 
+/* ---- driven bodies ---- */
+
+#define HAPI_COURSE_ORDER 5
+
+/* How a driven body is expected to go until the next sync: its way since hapi_model.state_ns, the
+ * sum of ways[k] t^(k + 1), t in s; after the period as fast as at its end. */
+typedef struct hapi_model_course {
+  uint32_t leaps; /* it is put back at syncs: no difference is brought in */
+  uint32_t reserved;
+  double period_s;
+  double ways[HAPI_COURSE_ORDER][6]; /* m, rad, world axes */
+} hapi_model_course;
+
 /* ---- the model ---- */
 
 typedef struct hapi_model_body {
@@ -140,6 +153,7 @@ typedef struct hapi_model_body {
   double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
 
   /* Model CONTACT only. */
+  uint32_t course; /* of a driven one: 1 + index into the model's courses; 0: by its twist */
   double mass;
   double gravity[3];     /* m/s^2; zero where the body has none */
   double user_wrench[6]; /* N, N m about the centre of mass: the application's, held */
@@ -197,15 +211,17 @@ typedef struct hapi_model {
   uint32_t bounces;       /* surfaces and stops that bounce; model CONTACT */
   uint32_t body_count;
   uint32_t contact_count;
-  uint32_t watch_count; /* traced bodies */
-  uint32_t joint_count; /* model CONTACT */
-  uint32_t tool_count;  /* of models but CONTACT, where the contact thread tells them */
-  uint32_t cross_count; /* model ACCELERANCE */
+  uint32_t watch_count;  /* traced bodies */
+  uint32_t joint_count;  /* model CONTACT */
+  uint32_t tool_count;   /* of models but CONTACT, where the contact thread tells them */
+  uint32_t cross_count;  /* model ACCELERANCE */
+  uint32_t course_count; /* model CONTACT */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
   uint32_t tools_offset;
   uint32_t crosses_offset;
+  uint32_t courses_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -214,6 +230,7 @@ HAPI_MESSAGE_ARRAY(hapi_model_bodies, hapi_model, hapi_model_body, bodies_offset
 HAPI_MESSAGE_ARRAY(hapi_model_contacts, hapi_model, hapi_model_contact, contacts_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_joints, hapi_model, hapi_model_joint, joints_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_tools, hapi_model, hapi_tool_point, tools_offset)
+HAPI_MESSAGE_ARRAY(hapi_model_courses, hapi_model, hapi_model_course, courses_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_crosses, hapi_model, hapi_model_cross, crosses_offset)
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "base/assert.h"
 #include "base/pose.h"
+#include "local/body_course.h"
 #include "local/body_step.h"
 #include "local/contact_rows.h"
 #include "local/gyro.h"
@@ -43,7 +44,7 @@ static void body_begin(hapi_local_body *body, const hapi_patches *patches)
 }
 
 static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_rows *rows,
-                         double period)
+                         const hapi_tick_facts *facts)
 {
   hapi_solver *solver = &rows->solver;
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
@@ -56,9 +57,12 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     HAPI_ASSERT_INDEX(bodies->live[i], bodies->high);
     HAPI_ASSERT(body->live);
+    if (bodies->courses[bodies->live[i]].known) {
+      hapi_course_follow(&bodies->courses[bodies->live[i]], facts->now_ns, facts->period, body);
+    }
     body_begin(body, patches);
     body->row = solver->body_count++;
-    hapi_body_free_velocity(body, period, solver->v[body->row]);
+    hapi_body_free_velocity(body, facts->period, solver->v[body->row]);
     memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
     bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
@@ -404,7 +408,7 @@ static __attribute__((noinline, cold)) void proxies_begin(const hapi_pointers *p
 static void step_begin(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->rows.solver;
-  bodies_begin(&tick->bodies, tick->contacts.patches, &tick->rows, tick->facts.period);
+  bodies_begin(&tick->bodies, tick->contacts.patches, &tick->rows, &tick->facts);
   uint32_t first_hub = solver->body_count;
   if (tick->pointers.proxies) {
     uint64_t begin = hapi_effect_begin(&tick->sample);

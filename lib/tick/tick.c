@@ -27,6 +27,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       {&tick->pointers.of, c->pointers, sizeof *tick->pointers.of, true},
       {&tick->pointers.hulls, c->pointers, sizeof *tick->pointers.hulls, true},
       ARRAY(bodies.of, c->bodies),
+      ARRAY(bodies.courses, c->bodies),
       ARRAY(bodies.live, c->bodies),
       ARRAY(touches.of, c->contacts + tools),
       ARRAY(touches.kept, c->contacts),
@@ -67,7 +68,8 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->facts = (hapi_tick_facts){.period = tick->facts.period, .observes = true};
   tick->pointers.high = tick->capacity.pointers;
   tick->pointers.proxies = false;
-  tick->bodies = (hapi_bodies){.of = tick->bodies.of, .live = tick->bodies.live};
+  tick->bodies = (hapi_bodies){
+      .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
   touches->rubs = false;
   touches->contact_ticks = 0;
