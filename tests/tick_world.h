@@ -35,6 +35,7 @@ static const hapi_capacity capacity = {.bodies = BODIES,
 static struct {
   hapi_tick tick;
   hapi_local_body bodies[BODIES];
+  hapi_body_course courses[BODIES];
   uint32_t live[BODIES];
   hapi_local_contact contacts[CONTACTS];
   hapi_kept_touch kept[CONTACTS];
@@ -85,6 +86,7 @@ static inline void set_up(void)
   f.tick.hashing = true;
   f.tick.guard.mode = HAP_GUARD_MEASURE; /* the tests of the guard switch it on */
   f.tick.bodies.of = f.bodies;
+  f.tick.bodies.courses = f.courses;
   f.tick.bodies.live = f.live;
   f.tick.touches.of = f.contacts;
   f.tick.touches.kept = f.kept;
