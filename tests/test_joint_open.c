@@ -296,7 +296,8 @@ static void build_swing(mechanism *m)
   m->joints[m->joint_count++] = join_ball(m->w.world, first, second);
 }
 
-/* A hand comes from the side to where the ball passes, and waits there. */
+/* A hand comes from far to where the ball passes, and waits there. The loop has the bars as soon as
+ * ODE's step does not hold their joints. */
 TEST(what_ode_has_opened_is_closed_before_a_hand_touches)
 {
   mechanism m;
@@ -304,10 +305,11 @@ TEST(what_ode_has_opened_is_closed_before_a_hand_touches)
   both worst = {{0.0, 0.0}, {0.0, 0.0}};
   double before = 0.0;
   int open_ticks = 0;
+  bool closed = false;
   open_mechanism(&m, build_swing, 9.81);
   REQUIRE(joint_gauge_init(&gauge, m.w.bodies, 2, NULL) == HAP_OK);
-  cw_start(&m.w, 0.0, -1.0, -0.1);
-  cw_move_hand(&m.w, 0.0, 0.8, 0.0);
+  cw_start(&m.w, 0.0, -8.0, -0.1);
+  cw_move_hand(&m.w, 0.0, 4.0, 0.0);
   for (int t = 0; t < 4000 && cw_norm(m.w.force) == 0.0; ++t) {
     worst = (both){{0.0, 0.0}, {0.0, 0.0}};
     if (m.w.hand_at[1] >= 0.0) {
@@ -317,7 +319,8 @@ TEST(what_ode_has_opened_is_closed_before_a_hand_touches)
     read_both(&m, &gauge, &worst);
     bool held = cw_stats(&m.w).model.range_bodies > 0;
     before = held ? before : fmax(before, worst.world.way);
-    open_ticks += held && worst.loop.way > CLOSED;
+    closed = closed || (held && worst.loop.way <= CLOSED);
+    open_ticks += held && !closed;
   }
   printf("# ODE left it open by %.3g mm, the loop for %d ticks, %.3g mm at the touch\n",
          1e3 * before, open_ticks, 1e3 * worst.loop.way);
@@ -396,7 +399,7 @@ TEST(other_models_open)
   CHECK(m.joints_loop.way > CLOSED && m.joints_world.way > CLOSED);
   accuracy_motion_free(&m);
   REQUIRE(run_scene("cart", HAP_MODEL_CONTACT, 20.0, &m));
-  CHECK(m.joints_left.way > CLOSED); /* the cart rolls out of the hand's reach */
+  CHECK(m.joints_left.way <= CLOSED); /* the cart rolls out of the hand's reach: still the loop's */
   accuracy_motion_free(&m);
   REQUIRE(run_scene("slide", HAP_MODEL_CONTACT, 20.0, &m));
   CHECK(m.joints == 0 && m.joints_loop.way == 0.0 && m.joints_left.way == 0.0);

@@ -31,6 +31,8 @@ typedef struct hapi_visit {
   uint64_t chosen_in;   /* a neighbour of this model */
   uint64_t ranged_in;   /* in the queue of the range */
   uint64_t gathered_in; /* asked whether its mechanism can be owned */
+  uint64_t refused_in;  /* looked ahead to, with more than there is room for */
+  uint64_t island_in;   /* looked ahead to */
   int32_t hops; /* from the neighbours; of a mechanism those of the body that was met first */
 } hapi_visit;
 

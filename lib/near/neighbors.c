@@ -97,10 +97,13 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
   const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
   hood->fastest = nearby->world->bodies.fastest;
   for (uint32_t i = 0; i < nearby->slots.body_high; ++i) { /* what the loop moved since the scan */
-    uint32_t known = nearby->slots.bodies[i].known;
-    double speed =
-        known != HAPI_NONE ? hapi_extent_speed(&nearby->world->bodies.entries[known]) : 0.0;
+    uint32_t index = nearby->slots.bodies[i].known;
+    hapi_known_body *known = index != HAPI_NONE ? &nearby->world->bodies.entries[index] : NULL;
+    double speed = known != NULL ? hapi_extent_speed(known) : 0.0;
     hood->fastest = speed > hood->fastest ? speed : hood->fastest;
+    if (known != NULL && known->slot == i) { /* others are counted by the scan */
+      hapi_extent_rest(known, speed);
+    }
   }
   hapi_cover_begin(&hood->cover);
   for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {

@@ -440,7 +440,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
 }
 
 /* The space is asked with room for the fastest body of all; each pair then has its own reach. */
-static void find_links(hapi_nearby *nearby, const hapi_known_body *known)
+void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known)
 {
   hapi_range *range = &nearby->range;
   double own = surface_speed(nearby, known->body);
@@ -467,14 +467,7 @@ static void find_links(hapi_nearby *nearby, const hapi_known_body *known)
 
 /* ---- roles ---- */
 
-/* What the pairs of a body would add to the message. */
-typedef struct range_need {
-  uint32_t geoms;
-  uint32_t points;
-  uint32_t pairs;
-} range_need;
-
-static void need_geom(hapi_nearby *nearby, dGeomID geom, range_need *io)
+static void need_geom(hapi_nearby *nearby, dGeomID geom, hapi_range_need *io)
 {
   hapi_shape hull;
   hap_pose pose;
@@ -492,7 +485,7 @@ static bool body_is_known(const hapi_nearby *nearby, dBodyID body)
   return body == NULL || hapi_bodies_find(&nearby->world->bodies, body) != HAPI_NONE;
 }
 
-static bool can_be_owned(hapi_nearby *nearby, const hapi_known_body *known, range_need *io)
+bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_range_need *io)
 {
   const hapi_range *range = &nearby->range;
   if (range->links.missing ||
@@ -577,7 +570,7 @@ static bool may_own(const hapi_nearby *nearby, uint32_t known)
 static bool mechanism_can_be_owned(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;
-  range_need n = {0, 0, 0};
+  hapi_range_need n = {0, 0, 0};
   if (range->owned + range->mechanism.moving > range_capacity(nearby)) {
     return false;
   }
@@ -586,8 +579,8 @@ static bool mechanism_can_be_owned(hapi_nearby *nearby)
     if (!may_own(nearby, range->mechanism.members[i])) {
       return false;
     }
-    find_links(nearby, known);
-    if (!can_be_owned(nearby, known, &n)) {
+    hapi_range_links(nearby, known);
+    if (!hapi_range_can_own(nearby, known, &n)) {
       return false;
     }
   }
@@ -606,7 +599,7 @@ static void own_mechanism(hapi_nearby *nearby)
   for (uint32_t i = 0; i < range->mechanism.moving; ++i) {
     const hapi_known_body *known = known_body(nearby, range->mechanism.members[i]);
     if (range->mechanism.moving > 1) { /* else they were found last */
-      find_links(nearby, known);
+      hapi_range_links(nearby, known);
     }
     nearby->slots.bodies[known->slot].flags |=
         range->links.count > 0 ? HAPI_BODY_OWNED : HAPI_BODY_OWNED | HAPI_BODY_ALONE;
@@ -647,6 +640,19 @@ static void range_expand(hapi_nearby *nearby, uint32_t index, bool seed)
   slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
 }
 
+bool hapi_range_follow(hapi_nearby *nearby, uint32_t known)
+{
+  hapi_range *range = &nearby->range;
+  uint32_t next = range->count;
+  if (!range_enqueue(nearby, known)) {
+    return false;
+  }
+  for (; next < range->count; ++next) {
+    range_expand(nearby, range->queue[next], false);
+  }
+  return true;
+}
+
 /* The effect range=on: also what no chain of contacts leads to, as long as there is room: once
  * all is in that chains lead to, and where there are neighbours, as a range begins at them. */
 static void range_expand_further(hapi_nearby *nearby)
@@ -659,12 +665,8 @@ static void range_expand_further(hapi_nearby *nearby)
         nearby->visits[i].ranged_in == range->number) {
       continue;
     }
-    uint32_t next = range->count;
-    if (!range_enqueue(nearby, i)) {
+    if (!hapi_range_follow(nearby, i)) {
       return;
-    }
-    for (; next < range->count; ++next) {
-      range_expand(nearby, range->queue[next], false);
     }
   }
 }
@@ -712,6 +714,7 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   for (uint32_t next = range->seeds; next < range->count; ++next) {
     range_expand(nearby, range->queue[next], false);
   }
+  hapi_ahead_walk(nearby);
   if (range->seeds > 0 && !range->refused &&
       hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_RANGE)) {
     range_expand_further(nearby);
@@ -768,6 +771,7 @@ bool hapi_range_create(hapi_nearby *nearby)
   range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
   range->mechanism.members = hapi_alloc_array(c->bodies, sizeof *range->mechanism.members);
   range->mechanism.joints = hapi_alloc_array(c->joints, sizeof *range->mechanism.joints);
+  range->ahead.island = hapi_alloc_array(c->bodies, sizeof *range->ahead.island);
   range->links.pair_place_count = 4;
   while (range->links.pair_place_count < 4 * c->contacts) {
     range->links.pair_place_count *= 2;
@@ -777,7 +781,8 @@ bool hapi_range_create(hapi_nearby *nearby)
   range->links.box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
   return range->queue != NULL && range->geoms != NULL && range->mechanism.members != NULL &&
          range->mechanism.joints != NULL && range->links.pair_places != NULL &&
-         range->links.box_geom != NULL && hapi_cover_create(&range->links.cover);
+         range->ahead.island != NULL && range->links.box_geom != NULL &&
+         hapi_cover_create(&range->links.cover);
 }
 
 void hapi_range_finish(hapi_nearby *nearby)
@@ -790,6 +795,8 @@ void hapi_range_finish(hapi_nearby *nearby)
   hapi_free(range->queue);
   hapi_free(range->geoms);
   hapi_free(range->links.list);
+  hapi_free(range->ahead.island);
+  hapi_free(range->ahead.comers);
   hapi_free(range->mechanism.members);
   hapi_free(range->mechanism.joints);
   hapi_free(range->links.pair_places);

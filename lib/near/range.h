@@ -14,6 +14,7 @@
 #include "near/cover.h"
 #include "near/geom_names.h"
 #include "sync/messages.h"
+#include "world/bodies.h"
 #include "world/surfaces.h"
 
 typedef struct hapi_nearby hapi_nearby;
@@ -49,6 +50,28 @@ typedef struct hapi_mechanism {
   uint32_t joint_count;
 } hapi_mechanism;
 
+/* A body that may come to a pointer by itself. */
+typedef struct hapi_comer {
+  uint32_t known;   /* entry of the body table */
+  double arrival_s; /* from now on, at the earliest; HUGE_VAL: a mechanism that ODE does not hold */
+} hapi_comer;
+
+typedef struct hapi_ahead {
+  hapi_comer *comers;
+  uint32_t count;
+  uint32_t capacity;
+  uint32_t *island; /* entries of the body table that touch each other; capacity.bodies */
+  uint32_t island_count;
+  uint32_t half_pairs; /* of the island */
+} hapi_ahead;
+
+/* What a body would add to the message. */
+typedef struct hapi_range_need {
+  uint32_t geoms;
+  uint32_t points;
+  uint32_t pairs;
+} hapi_range_need;
+
 typedef struct hapi_range {
   hapi_near *near;     /* message being written */
   bool said_contacted; /* of contact joints of the application, once a session */
@@ -65,6 +88,7 @@ typedef struct hapi_range {
   hapi_geom_names names;
   hapi_links links;
   hapi_mechanism mechanism;
+  hapi_ahead ahead;
 } hapi_range;
 
 /* range.c */
@@ -73,6 +97,17 @@ void hapi_range_finish(hapi_nearby *nearby);
 void hapi_range_reset(hapi_nearby *nearby);
 void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count);
 void hapi_range_publish(hapi_nearby *nearby); /* with the model of the same number */
+
+/* What is near the body: range.links. */
+void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known);
+/* After its links: whether the loop can own it, beside its joints. *io: of the bodies that were
+ * looked at before; grows. */
+bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_range_need *io);
+/* The body, and from it on all that may touch; false: there is no room for it. */
+bool hapi_range_follow(hapi_nearby *nearby, uint32_t known);
+
+/* ahead.c */
+void hapi_ahead_walk(hapi_nearby *nearby); /* after all that the neighbours lead to */
 
 /* mechanism.c */
 /* The bodies that joints tie to this one, itself first, into range.mechanism, and their joints

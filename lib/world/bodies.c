@@ -195,11 +195,12 @@ static void look_at(hapi_world *world, hapi_known_body *known)
     return;
   }
   double speed = hapi_extent_speed(known);
+  hapi_extent_rest(known, speed);
   table->fastest = speed > table->fastest ? speed : table->fastest;
   const char *unsound = hapi_body_unsoundness(body, known->jointed);
-  if (unsound != NULL && table->unsound_body == NULL) {
-    table->unsound_body = body;
-    table->unsound_text = unsound;
+  if (unsound != NULL && table->unsound.body == NULL) {
+    table->unsound.body = body;
+    table->unsound.text = unsound;
   }
 }
 
@@ -241,7 +242,7 @@ static void see_geom(hapi_world *world, dGeomID geom)
   if (same || (posed && hapi_geom_is_sound(geom))) {
     return;
   }
-  table->unsound_geom = posed && table->unsound_geom == NULL ? geom : table->unsound_geom;
+  table->unsound.geom = posed && table->unsound.geom == NULL ? geom : table->unsound.geom;
   if (known != NULL) {
     known->geoms_print = 0;
   }
@@ -343,9 +344,7 @@ hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle)
   table->seen_count = table->jointed_count = 0;
   table->last_seen = HAPI_NONE;
   table->fastest = 0.0;
-  table->unsound_body = NULL;
-  table->unsound_text = NULL;
-  table->unsound_geom = NULL;
+  table->unsound = (hapi_unsound){NULL, NULL, NULL};
   see_space(world, world->ode.space);
   see_jointed(world);
   drop_unseen(world, cycle);

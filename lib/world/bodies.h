@@ -14,6 +14,7 @@
 #include "world/cycle.h"
 
 #define HAPI_NONE HAPI_INDEX_NONE
+#define HAPI_STILL_MOST UINT16_MAX
 
 typedef struct hapi_world hapi_world;
 
@@ -73,6 +74,7 @@ typedef struct hapi_known_body {
   bool
       sleep_automatic; /* ODE's flag as the application set it; kept by us while the session runs */
   bool awake;          /* after the last global step */
+  uint16_t still; /* cycles in a row in which it was at rest, up to HAPI_STILL_MOST; 0: it is new */
 } hapi_known_body;
 
 /* What other parts want to hear of the world. Called under the lock that the caller of the world's
@@ -85,6 +87,13 @@ typedef struct hapi_world_listener {
   void (*body_gone)(void *user, uint32_t index); /* its entry still holds it */
   void (*surface_asked)(void *user, dGeomID a, dGeomID b, const dSurfaceParameters *surface);
 } hapi_world_listener;
+
+/* The first ones that the scan met; NULL: none. Not of the local bodies. */
+typedef struct hapi_unsound {
+  dBodyID body;
+  const char *text; /* of the body */
+  dGeomID geom;
+} hapi_unsound;
 
 typedef struct hapi_body_table {
   const hapi_world_listener *listener;
@@ -100,10 +109,8 @@ typedef struct hapi_body_table {
   uint32_t seen_count;    /* entries that this scan saw */
   uint32_t jointed_count; /* of those with joints */
   uint32_t last_seen;
-  double fastest;       /* m/s, surface of the bodies that are awake and not local */
-  dBodyID unsound_body; /* the first one that the scan met, NULL: none; not of the local ones */
-  const char *unsound_text;
-  dGeomID unsound_geom;
+  double fastest; /* m/s, surface of the bodies that are awake and not local */
+  hapi_unsound unsound;
   uint64_t lost;
   uint32_t replaced; /* among them, not counted yet: another one is at the address */
   bool said_lost;
@@ -126,6 +133,8 @@ hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *c
 bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
 /* m/s, of its surface; 0 for one that sleeps */
 double hapi_extent_speed(const hapi_known_body *known);
+/* Once a cycle: counts in known->still whether it is at rest at that speed. */
+void hapi_extent_rest(hapi_known_body *known, double speed);
 
 /* mark.c: tells a body from a later one at its address */
 void hapi_mark_place(hapi_known_body *known);

@@ -9,6 +9,8 @@
 /* How far a body reaches from its origin. Measured anew when its geoms have changed: the box
  * around a geom, which it is taken from, is another one in each orientation. */
 
+#define REST_SPEED 2e-3 /* m/s */
+
 static double extent_measure(dBodyID body)
 {
   const dReal *at = dBodyGetPosition(body);
@@ -94,6 +96,12 @@ bool hapi_extent_follow(hapi_known_body *known)
   known->geoms_print = print;
   known->extent = extent_measure(known->body);
   return true;
+}
+
+void hapi_extent_rest(hapi_known_body *known, double speed)
+{
+  bool rests = speed < REST_SPEED && !known->pushed;
+  known->still = !rests ? 0 : known->still < HAPI_STILL_MOST ? known->still + 1 : known->still;
 }
 
 double hapi_extent_speed(const hapi_known_body *known)

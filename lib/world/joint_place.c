@@ -356,3 +356,26 @@ void hapi_joint_read(hapi_known_joint *known, bool is_new)
     known->usable = true;
   }
 }
+
+double hapi_joint_open(const hapi_known_joint *known)
+{
+  const hapi_joint_place *place = &known->place;
+  hap_pose a;
+  hap_pose b;
+  double ends[2][3];
+  double apart[3];
+  double axis[3];
+  if (!known->carried || !known->usable) {
+    return 0.0;
+  }
+  hapi_pose_read(known->bodies[0], &a);
+  hapi_pose_read(known->bodies[1], &b);
+  hapi_pose_point(a.position, a.quat_wxyz, place->anchor_a, ends[0]);
+  hapi_pose_point(b.position, b.quat_wxyz, place->anchor_b, ends[1]);
+  hapi_v3_sub(ends[1], ends[0], apart);
+  if (known->kind == HAPI_JOINT_SLIDER || known->kind == HAPI_JOINT_HINGE2) { /* free along it */
+    hapi_quat_rotate(a.quat_wxyz, place->axis_a, axis);
+    hapi_v3_madd(apart, -hapi_v3_dot(apart, axis), axis, apart);
+  }
+  return hapi_v3_norm(apart);
+}

@@ -91,6 +91,8 @@ void hapi_joints_take_slots(hapi_joint_table *table, uint64_t model, const uint3
 /* is_new: as it is now; else only where it is another than it was. Sets usable. */
 void hapi_joint_read(hapi_known_joint *known, bool is_new);
 void hapi_joint_leave(hapi_known_joint *known);
+/* m, by which its anchors are apart; 0 where its place is not known. */
+double hapi_joint_open(const hapi_known_joint *known);
 
 /* joint_axes.c */
 

@@ -274,10 +274,10 @@ bool hapi_world_is_unsound(const hapi_world *world, hap_detail *out_text)
     snprintf(out_text->text, sizeof out_text->text, "the world has %s: set it right", what);
     return true;
   }
-  if (table->unsound_body != NULL) {
-    body_say(out_text, table->unsound_body, table->unsound_text);
+  if (table->unsound.body != NULL) {
+    body_say(out_text, table->unsound.body, table->unsound.text);
   }
-  return table->unsound_body != NULL;
+  return table->unsound.body != NULL;
 }
 
 bool hapi_body_is_unsound(const hapi_known_body *known, hap_detail *out_text)
@@ -291,7 +291,7 @@ bool hapi_body_is_unsound(const hapi_known_body *known, hap_detail *out_text)
 
 bool hapi_geoms_are_unsound(const hapi_world *world, hap_detail *out_text)
 {
-  dGeomID geom = world->bodies.unsound_geom;
+  dGeomID geom = world->bodies.unsound.geom;
   if (geom != NULL) {
     snprintf(out_text->text, sizeof out_text->text,
              "a geom of class %d has a pose or size that is not a number: set it right",
