@@ -78,6 +78,9 @@ static void global_step(hapi_physics *physics)
   hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
   hapi_hold(&physics->account);
   hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
+  if (physics->cycle.model == HAP_MODEL_CONTACT) { /* the others are as they were published */
+    hapi_flight_prepare(&physics->world, physics->cycle.step_s);
+  }
   hapi_world_step(&physics->world, physics->cycle.step_s);
   hapi_world_restore(&physics->world, &meant);
   hapi_feedback_tell(&physics->feedback);

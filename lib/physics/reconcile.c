@@ -220,6 +220,7 @@ static void take_last_state(const hapi_account *account, const hapi_slot_account
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
   if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */
+    hapi_v3_madd(pose.position, 0.5 * since * since, of->falls, pose.position);
     hapi_v3_madd(twist.linear, -since, of->falls, twist.linear);
   }
   set_state(slot, body, &pose, &twist);

@@ -75,6 +75,12 @@ void hapi_world_finish(hapi_world *world);
 void hapi_world_step(hapi_world *world, double step_s); /* the global step */
 double hapi_body_mass(dBodyID body);                    /* 0 for a kinematic one */
 
+/* flight.c */
+/* Just before the global step, after the collision phase: what flies is put back by what the step
+ * will take it too far. */
+void hapi_flight_prepare(const hapi_world *world, double step_s);
+
+/* life.c */
 /* False: another claim has the world, and *claim is unchanged. *claim stays where it is until
  * release. */
 bool hapi_claim_take(hapi_claim *claim, dWorldID world);
