@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* What comes by itself: in time, whole, and in the loop before it arrives. What rests, what finds no
- * room and what is far is ODE's. */
+/* What comes by itself: in time, whole, and in the loop before it arrives. What rests, what finds
+ * no room and what is far is ODE's. */
 
 #include "tests/tap.h"
 

@@ -226,7 +226,8 @@ void hapi_ahead_walk(hapi_nearby *nearby)
   ahead->count = 0;
   if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_RANGE) ||
       nearby->cycle->settings.range_hops != HAP_RANGE_ALL ||
-      range->owned >= nearby->cycle->config->max_bodies) {
+      range->owned >= nearby->cycle->config->max_bodies ||
+      nearby->visit_capacity < nearby->world->bodies.high) { /* no memory for what walks note */
     return;
   }
   comers_collect(nearby);
