@@ -28,7 +28,7 @@ TEST(a_body_in_flight_is_on_its_parabola_after_each_step)
   dBodySetLinearVel(ball, 0.0, 0.5, 2.0);
   dBodyID weightless = cw_add_ball(w, 0.1, 0.02, 0.0, 1.0, 0.0);
   dBodySetGravityMode(weightless, 0);
-  REQUIRE(cw_start(w, 100.0, 0.0, 0.0));
+  cw_start(w, 100.0, 0.0, 0.0);
   for (int i = 0; i < 20; ++i) {
     cw_run(w, 50);
     double t = STEP * w->seen.steps;
@@ -56,7 +56,7 @@ static void check_fall(double height)
   w->hand_def.radius = 0.01;
   w->hand_expert.coupling = HAP_COUPLING_DIRECT;
   (void)cw_add_ball(w, 0.1, 0.02, 0.0, 0.0, 0.03 + height);
-  REQUIRE(cw_start(w, 0.0, 0.0, 0.0));
+  cw_start(w, 0.0, 0.0, 0.0);
   double seconds = first_touch(w);
   printf("# from %.3g m after %.4f s of %.4f s\n", height, seconds, sqrt(2.0 * height / G));
   CHECK_NEAR(seconds, sqrt(2.0 * height / G), 2e-3);
@@ -83,7 +83,7 @@ TEST(what_is_carried_arrives_in_time)
   dBodyID belt = cw_add_box(w, 10.0, belt_size, 0.0, 0.0, -0.05);
   dBodySetKinematic(belt);
   dBodySetLinearVel(belt, belt_speed, 0.0, 0.0);
-  REQUIRE(cw_start(w, 0.05 + 0.01 + way, 0.0, 0.05));
+  cw_start(w, 0.05 + 0.01 + way, 0.0, 0.05);
   double seconds = first_touch(w);
   double right = way / belt_speed + 0.5 * belt_speed / speed_up;
   printf("# after %.4f s of %.4f s\n", seconds, right);
@@ -128,7 +128,7 @@ TEST(a_chain_that_nobody_touches_stays_whole)
   double open = 0.0;
   w->surface.mu = 0.0;
   chain_build(w, LINKS);
-  REQUIRE(cw_start(w, 0.2, 0.6, 0.0));
+  cw_start(w, 0.2, 0.6, 0.0);
   for (int i = 0; i < 1500; ++i) {
     cw_tick(w);
     open = fmax(open, widest_open(LINKS));
@@ -144,7 +144,7 @@ TEST(a_mechanism_beyond_the_room_is_left_to_ode_as_a_whole)
   contact_world *w = cw_new(G);
   w->def.max_bodies = LINKS - 1;
   chain_build(w, LINKS);
-  REQUIRE(cw_start(w, 0.2, 0.6, 0.0));
+  cw_start(w, 0.2, 0.6, 0.0);
   cw_run(w, 500);
   CHECK(w->seen.range_max == 0);
   CHECK(cw_stats(w).model.edge_bodies == 0);
@@ -157,7 +157,7 @@ static double far_chain_opens(bool range, uint32_t *out_owned)
   double open = 0.0;
   chain_build(w, 3);
   w->expert.effects_off = range ? 0 : HAP_EFFECT_BIT(HAP_EFFECT_RANGE);
-  CHECK(cw_start(w, 0.0, 50.0, 0.0));
+  cw_start(w, 0.0, 50.0, 0.0);
   cw_run(w, 400);
   for (int i = 0; i < 600; ++i) {
     cw_tick(w);
@@ -188,7 +188,7 @@ TEST(what_rests_is_left_to_ode_until_it_moves)
 {
   contact_world *w = cw_new(G);
   rest_build(w);
-  REQUIRE(cw_start(w, 0.0, 0.6, 0.05));
+  cw_start(w, 0.0, 0.6, 0.05);
   cw_run(w, 600);
   CHECK(w->seen.range_max == 4); /* new ones may move */
   CHECK(cw_stats(w).model.range_bodies == 0);
@@ -205,7 +205,7 @@ TEST(what_touches_comes_together_or_not_at_all)
   contact_world *w = cw_new(G);
   w->def.max_bodies = 3;
   rest_build(w);
-  REQUIRE(cw_start(w, 0.0, 0.6, 0.05));
+  cw_start(w, 0.0, 0.6, 0.05);
   cw_run(w, 600);
   CHECK(w->seen.range_max == 0);
   CHECK(cw_stats(w).model.edge_bodies == 0 && cw_stats(w).model.measured_bodies == 0);
@@ -221,7 +221,7 @@ TEST(the_room_is_that_of_the_tick)
     for (int i = 0; i < (few ? 0 : 40); ++i) {
       (void)cw_add_ball(w, 0.1, 0.02, 0.0412 * i, 0.3, 0.0);
     }
-    REQUIRE(cw_start(w, 0.2, 0.6, 0.0));
+    cw_start(w, 0.2, 0.6, 0.0);
     cw_run(w, 100);
     printf("# %u bodies\n", w->seen.range_max);
     CHECK(few ? w->seen.range_max == 3 : w->seen.range_max < 48);
